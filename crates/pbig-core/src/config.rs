@@ -1,0 +1,107 @@
+//! What a caller can choose. Every field says its unit, why one would change it, and what follows.
+
+/// Where the work runs.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Backend {
+    /// What the plan expects to be fastest.
+    #[default]
+    Auto,
+    /// The CPU, with rayon's threads when the scene is worth it.
+    Cpu,
+    /// A GPU. Without one the call finishes on the CPU and [`crate::Report::fallback`] says so.
+    Gpu,
+    /// Every pair is tested, on the CPU: the definition of right, quadratic time.
+    Brute,
+}
+
+/// Which algorithm finds the pairs on the CPU.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Strategy {
+    /// The plan decides between brute force and the grid.
+    #[default]
+    Auto,
+    /// One entry a box, sorted by the cell of its lower corner; the fastest on a CPU.
+    Grid,
+    /// PBIG's own grid: one entry for each cell that a box touches (PBIG 4.2). Plain and scalar,
+    /// the twin that GPU kernels are held against; slower than [`Strategy::Grid`].
+    Pbig,
+}
+
+/// In which order lists of pairs come.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Order {
+    /// By `(a, b)`: the same bytes on every backend, strategy and thread count.
+    #[default]
+    Sorted,
+    /// As found. Saves the sort, about a third of the time of a whole call.
+    Unspecified,
+}
+
+/// Sizes at which a call ends with an error rather than exhaust the machine.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Limits {
+    /// Most boxes, and one more than the largest id of [`crate::BroadPhase`], which keeps about
+    /// 100 bytes for every id up to the largest.
+    pub max_boxes: u64,
+    /// Most pairs that one call may report; 8 bytes each, 32 while [`crate::BroadPhase`] keeps it.
+    pub max_pairs: u64,
+}
+
+impl Limits {
+    /// 2^27 boxes (3 GiB of boxes alone) and 2^28 pairs (2 GiB).
+    pub const DEFAULT: Self = Self { max_boxes: 1 << 27, max_pairs: 1 << 28 };
+    /// As far as 32-bit ids reach.
+    pub const UNLIMITED: Self = Self { max_boxes: u32::MAX as u64, max_pairs: u64::MAX };
+}
+
+impl Default for Limits {
+    fn default() -> Self {
+        Self::DEFAULT
+    }
+}
+
+/// Everything a caller can choose; the defaults are right for most.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Config {
+    /// Where the work runs.
+    pub backend: Backend,
+    /// Which algorithm, for study and for tests.
+    pub strategy: Strategy,
+    /// Order of lists of pairs; events are always sorted.
+    pub order: Order,
+    /// When to end with an error.
+    pub limits: Limits,
+    /// How far a stored box reaches beyond the box it was given ([`crate::BroadPhase`] only), in
+    /// the caller's length unit. Larger: fewer boxes count as changed, more pairs are reported
+    /// that do not touch yet.
+    pub margin: f32,
+    /// Below this many boxes every pair is tested without a grid. Avril's table 7 puts the
+    /// crossover at 1000 boxes on a GPU of 2008; on a CPU core of 2022 it is near 100.
+    pub brute_below: u32,
+    /// PBIG's `W` in the constraint `f >= W` of equation 6: the wanted boxes per cell of
+    /// [`Strategy::Pbig`]. The paper takes a warp, 32; a core without lanes to fill prefers few.
+    pub pbig_boxes_per_cell: f32,
+    /// In [`Strategy::Pbig`], cells of at most this many boxes go through Avril's index to pair
+    /// mapping, larger ones through PBIG's balanced rows.
+    pub small_cell: u32,
+}
+
+impl Config {
+    /// The defaults.
+    pub const DEFAULT: Self = Self {
+        backend: Backend::Auto,
+        strategy: Strategy::Auto,
+        order: Order::Sorted,
+        limits: Limits::DEFAULT,
+        margin: 0.0,
+        brute_below: 64,
+        pbig_boxes_per_cell: 4.0,
+        small_cell: 32,
+    };
+}
+
+impl Default for Config {
+    fn default() -> Self {
+        Self::DEFAULT
+    }
+}

@@ -1,0 +1,35 @@
+//! Everything that can go wrong, each with what to do about it.
+
+/// Why a call could not be completed. No partial result exists beside an error (contract 2).
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum Error {
+    /// More boxes than [`crate::Limits::max_boxes`], or an id beyond it.
+    #[error("{boxes} boxes are more than Limits::max_boxes = {limit}; raise it or split the set")]
+    TooManyBoxes {
+        /// Boxes asked for: the length of the list, or the id plus one.
+        boxes: u64,
+        /// The limit in force.
+        limit: u64,
+    },
+    /// More overlapping pairs than [`crate::Limits::max_pairs`].
+    #[error("more than Limits::max_pairs = {limit} overlapping pairs; raise it (8 bytes a pair) or split the set")]
+    TooManyPairs {
+        /// The limit in force.
+        limit: u64,
+    },
+    /// `find_filtered` was given lists of different lengths.
+    #[error("{filters} filters for {boxes} boxes: give one filter for each box")]
+    FilterCount {
+        /// Length of the list of boxes.
+        boxes: usize,
+        /// Length of the list of filters.
+        filters: usize,
+    },
+    /// A margin that is negative, infinite or NaN.
+    #[error("margin {margin} is not a finite length of at least 0")]
+    Margin {
+        /// The margin that was given.
+        margin: f32,
+    },
+}

@@ -1,0 +1,174 @@
+//! All pairs of a list of boxes, from nothing each time.
+
+use crate::cpu::check::Found;
+use crate::cpu::emit;
+use crate::cpu::map::Map;
+use crate::cpu::pbig::PbigGrid;
+use crate::plan::{Chosen, Plan, Summary};
+use crate::report::{Checks, Report, lap};
+use crate::{Aabb, Backend, Config, Error, Pair, ProxyFilter};
+use std::time::Instant;
+
+/// Every pair of overlapping boxes, sorted, with default settings.
+///
+/// `boxes[i]` has the id `i`. Invalid boxes pair with nothing.
+///
+/// # Errors
+/// [`Error::TooManyBoxes`] and [`Error::TooManyPairs`], see [`crate::Limits`].
+///
+/// ```
+/// use pbig_core::{find_pairs, Aabb, Pair};
+/// let boxes = [0.0, 0.9, 5.0].map(|x| Aabb::from_center([x, 0.0, 0.0], [0.5; 3]));
+/// assert_eq!(find_pairs(&boxes)?, [Pair::new(0, 1)]);
+/// # Ok::<(), pbig_core::Error>(())
+/// ```
+pub fn find_pairs(boxes: &[Aabb]) -> Result<Vec<Pair>, Error> {
+    let mut finder = Finder::default();
+    finder.find(boxes)?;
+    Ok(finder.pairs)
+}
+
+/// Finds pairs again and again, keeping its buffers.
+///
+/// ```
+/// use pbig_core::{Aabb, Config, Finder, ProxyFilter};
+/// let mut finder = Finder::new(Config::default());
+/// let boxes = [[0.0; 3], [0.5; 3]].map(|c| Aabb::from_center(c, [0.5; 3]));
+/// assert_eq!(finder.find(&boxes)?.len(), 1);
+/// let one_body = [ProxyFilter { body: 3, ..ProxyFilter::ALL }; 2];
+/// assert_eq!(finder.find_filtered(&boxes, &one_body)?.len(), 0);
+/// println!("{}", finder.report().plan);
+/// # Ok::<(), pbig_core::Error>(())
+/// ```
+#[derive(Debug)]
+pub struct Finder {
+    config: Config,
+    search: Search,
+    pairs: Vec<Pair>,
+    scratch: Vec<u32>,
+    report: Report,
+}
+
+impl Default for Finder {
+    fn default() -> Self {
+        Self::new(Config::DEFAULT)
+    }
+}
+
+impl Finder {
+    /// A finder with the given settings ([`Config::margin`] is not used).
+    pub fn new(config: Config) -> Self {
+        Self { config, search: Search::new(), pairs: vec![], scratch: vec![], report: Report::default() }
+    }
+
+    /// Every pair of overlapping boxes; `boxes[i]` has the id `i`.
+    ///
+    /// # Errors
+    /// [`Error::TooManyBoxes`] and [`Error::TooManyPairs`], see [`crate::Limits`].
+    pub fn find(&mut self, boxes: &[Aabb]) -> Result<&[Pair], Error> {
+        self.find_where(boxes, &|_, _| true)
+    }
+
+    /// As [`Finder::find`], with only the pairs that both filters allow.
+    ///
+    /// # Errors
+    /// As [`Finder::find`], and [`Error::FilterCount`].
+    pub fn find_filtered(&mut self, boxes: &[Aabb], filters: &[ProxyFilter]) -> Result<&[Pair], Error> {
+        if boxes.len() != filters.len() {
+            return Err(Error::FilterCount { boxes: boxes.len(), filters: filters.len() });
+        }
+        self.find_where(boxes, &|a, b| filters[a as usize].allows(&filters[b as usize]))
+    }
+
+    fn find_where<A>(&mut self, boxes: &[Aabb], accept: &A) -> Result<&[Pair], Error>
+    where
+        A: Fn(u32, u32) -> bool + Sync,
+    {
+        self.pairs.clear();
+        check_count(boxes.len() as u64, &self.config)?;
+        self.report = Report { fallback: fallback(&self.config), ..Report::default() };
+        self.search.find(boxes, &self.config, accept, &mut self.report)?;
+        let mut clock = Instant::now();
+        let chunks = &self.search.found.chunks;
+        emit::collect(chunks, boxes.len(), self.config.order, &mut self.scratch, &mut self.pairs);
+        self.report.stages.emit = lap(&mut clock);
+        self.report.pairs = self.pairs.len() as u64;
+        Ok(&self.pairs)
+    }
+
+    /// The pairs of the last call.
+    pub fn pairs(&self) -> &[Pair] {
+        &self.pairs
+    }
+
+    /// What the last call did.
+    pub fn report(&self) -> &Report {
+        &self.report
+    }
+}
+
+/// Why the wanted backend cannot be had, if so (contract 8: the call finishes on the CPU).
+pub(crate) fn fallback(config: &Config) -> Option<&'static str> {
+    (config.backend == Backend::Gpu).then(|| {
+        tracing::warn!("pbig: no GPU backend in this build, using the CPU");
+        "no GPU backend in this build: the CPU did the work"
+    })
+}
+
+pub(crate) fn check_count(boxes: u64, config: &Config) -> Result<(), Error> {
+    let limit = config.limits.max_boxes.min(u64::from(u32::MAX));
+    if boxes > limit { Err(Error::TooManyBoxes { boxes, limit }) } else { Ok(()) }
+}
+
+/// A search from nothing by whatever strategy the plan chooses, with its buffers.
+#[derive(Clone, Debug)]
+pub(crate) struct Search {
+    pub(crate) map: Map,
+    pbig: PbigGrid,
+    pub(crate) found: Found,
+}
+
+impl Search {
+    pub(crate) fn new() -> Self {
+        Self { map: Map::new(), pbig: PbigGrid::default(), found: Found::default() }
+    }
+
+    /// Leaves the accepted pairs in `found`, and what was done in `report`.
+    pub(crate) fn find<A>(&mut self, boxes: &[Aabb], config: &Config, accept: &A, report: &mut Report) -> Result<(), Error>
+    where
+        A: Fn(u32, u32) -> bool + Sync,
+    {
+        let mut clock = Instant::now();
+        let summary = Summary::of(boxes, None);
+        report.boxes = boxes.len() as u64;
+        report.invalid = boxes.len() as u64 - u64::from(summary.valid);
+        report.stages.plan += lap(&mut clock);
+        report.plan = self.map.plan_and_build(&summary, config, boxes, None, &mut report.stages);
+        if report.plan.chosen == Chosen::Pbig {
+            return self.find_pbig(boxes, config, accept, report);
+        }
+        let mut clock = Instant::now();
+        self.map.find(accept, config.limits.max_pairs, &mut self.found)?;
+        report.stages.check += lap(&mut clock);
+        report.checks = single_entry_checks(&self.found);
+        Ok(())
+    }
+
+    fn find_pbig<A>(&mut self, boxes: &[Aabb], config: &Config, accept: &A, report: &mut Report) -> Result<(), Error>
+    where
+        A: Fn(u32, u32) -> bool,
+    {
+        let Plan { pbig: Some(plan), .. } = report.plan else { return Ok(()) };
+        let mut clock = Instant::now();
+        self.pbig.build(&plan, boxes);
+        report.stages.map += lap(&mut clock);
+        report.checks = self.pbig.find(&plan, config.small_cell, accept, config.limits.max_pairs, &mut self.found)?;
+        report.stages.check += lap(&mut clock);
+        Ok(())
+    }
+}
+
+/// Checks of a structure that stores each box once: none is redundant.
+pub(crate) fn single_entry_checks(found: &Found) -> Checks {
+    Checks { made: found.checks, unnecessary: found.checks - found.overlaps, redundant: 0 }
+}

@@ -1,0 +1,65 @@
+//! pbig finds every pair of overlapping axis-aligned boxes, and never misses one.
+//!
+//! Three ways in, from simple to fast:
+//!
+//! | you have | use |
+//! | --- | --- |
+//! | a list of boxes, once | [`find_pairs`] |
+//! | a new list every time | [`Finder`], which keeps its buffers |
+//! | boxes that move a little, come and go | [`BroadPhase`], which tells what changed |
+//!
+//! ```
+//! use pbig_core::{find_pairs, Aabb, Pair};
+//!
+//! let boxes = [
+//!     Aabb::new([0.0, 0.0, 0.0], [1.0, 1.0, 1.0]),
+//!     Aabb::new([1.0, 0.5, 0.5], [2.0, 1.5, 1.5]), // touches the first
+//!     Aabb::new([5.0, 5.0, 5.0], [6.0, 6.0, 6.0]),
+//! ];
+//! assert_eq!(find_pairs(&boxes)?, [Pair::new(0, 1)]);
+//! # Ok::<(), pbig_core::Error>(())
+//! ```
+//!
+//! # Should I use this?
+//!
+//! For rapier worlds use the crate `rapier-pbig`, which feeds colliders to this one. Use this crate
+//! for boxes of your own: from ten to a hundred million, of any mix of sizes, anywhere in f32. It
+//! knows boxes only: no rays, no queries, no shapes.
+//!
+//! # What is guaranteed
+//!
+//! * Two boxes pair when `a.min <= b.max && b.min <= a.max` on all three axes, in f32, exactly, as
+//!   [`oracle`] defines it; every strategy gives the same pairs, in the same order, whatever the
+//!   number of threads. Threads are those of the rayon pool in which the call is made.
+//! * A call is complete or an [`Error`]; there are no partial results.
+//! * A box with a NaN, or with `min > max`, pairs with nothing and harms no other box.
+//!
+//! # Sources
+//!
+//! Lo, Lee, Chung, Chung: "Optimizing Pairwise Box Intersection Checking on GPUs for Large-Scale
+//! Simulations", ACM TOMACS 23(3), 2013 (*PBIG*). Avril, Gouranton, Arnaldi: "Fast Collision
+//! Culling in Large-Scale Environments Using GPU Mapping Function", EGPGV 2012 (*Avril*).
+
+mod aabb;
+mod broad_phase;
+mod config;
+mod cpu;
+mod diff;
+mod error;
+mod filter;
+mod finder;
+pub mod oracle;
+mod pair;
+pub mod pair_index;
+pub mod plan;
+mod report;
+
+pub use aabb::Aabb;
+pub use broad_phase::{BroadPhase, Events};
+pub use config::{Backend, Config, Limits, Order, Strategy};
+pub use error::Error;
+pub use filter::{ProxyFilter, TestMode};
+pub use finder::{Finder, find_pairs};
+pub use pair::Pair;
+pub use plan::Plan;
+pub use report::{Checks, Report, StageTimes};

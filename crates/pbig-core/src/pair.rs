@@ -1,0 +1,21 @@
+//! A pair of box ids.
+
+use bytemuck::{Pod, Zeroable};
+
+/// Two overlapping boxes by id, `a < b`. Ordered by `a`, then `b`.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash, Pod, Zeroable)]
+pub struct Pair {
+    /// The smaller id.
+    pub a: u32,
+    /// The larger id.
+    pub b: u32,
+}
+
+impl Pair {
+    /// The pair of two different ids, in either order.
+    #[inline(always)]
+    pub fn new(i: u32, j: u32) -> Self {
+        Self { a: i.min(j), b: i.max(j) }
+    }
+}

@@ -1,0 +1,225 @@
+//! Which boxes share a grid. Sizes have no law (contract 4): one grid where one is cheapest, several
+//! levels where sizes differ by decades, and a list tested against everything for the few largest.
+
+use super::{Summary, spacing};
+use crate::config::Strategy;
+use std::fmt;
+
+/// One grid: the boxes of neighbouring size classes, sorted by the cell of their lower corner.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LevelPlan {
+    /// Boxes in the level.
+    pub boxes: u32,
+    /// First and last size class ([`super::Summary::classes`]).
+    pub classes: (u8, u8),
+    /// Largest extent on each axis: no box reaches further than this beyond its lower corner.
+    pub max_extent: [f32; 3],
+    /// Cell size: above `max_extent`, and such that about half a box falls into a cell.
+    pub cell: [f32; 3],
+    /// Where cell 0 begins.
+    pub origin: [f32; 3],
+    /// Cells on each axis before they wrap around; the last is a lower bound, see `cells`.
+    pub dims: [u32; 3],
+    /// All cells, a power of two.
+    pub cells: u32,
+}
+
+impl fmt::Display for LevelPlan {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let largest = self.max_extent.into_iter().fold(0.0, f32::max);
+        let [x, y, z] = self.cell;
+        write!(f, "level of {} boxes up to {largest}, cells of {x} x {y} x {z}", self.boxes)
+    }
+}
+
+/// Size classes beyond this power of two (2^100) are swept: a cell of that size, or its inverse,
+/// would leave the normal range of f32.
+const LARGEST_CLASS: usize = 227;
+
+/// Smallest cell, 2^-100, for the same reason.
+const SMALLEST_CELL: f32 = 7.888_609e-31;
+
+/// Costs in ns on one core (Zen 3, 2.4 GHz), as measured by `benches`. Only their ratios matter,
+/// and those coarsely: the choice between one level, two, and a list changes the cost by factors.
+mod cost {
+    /// One test of two boxes at random places.
+    pub(super) const CHECK: f64 = 1.5;
+    /// One test in a sweep over a list.
+    pub(super) const SWEEP: f64 = 0.8;
+    /// Sorting one box into a grid, and setting up its search there.
+    pub(super) const BOX: f64 = 35.0;
+    /// Setting up the search for a box in the grid of another level.
+    pub(super) const VISIT: f64 = 20.0;
+    /// One more grid, however small.
+    pub(super) const LEVEL: f64 = 2000.0;
+}
+
+/// Boxes wanted in a cell. The measured optimum is flat from 0.25 to 1.
+const PER_CELL: f64 = 0.5;
+
+/// Splits the boxes into levels and a number of swept boxes, at least cost.
+pub(super) fn choose(summary: &Summary, crowding: f32, strategy: Strategy) -> (Vec<LevelPlan>, u32) {
+    let world = World::new(summary, crowding);
+    let used: Vec<usize> = (0..LARGEST_CLASS).filter(|&c| summary.classes[c].boxes > 0).collect();
+    let last = split(&world, &used, strategy);
+    let (levels, in_levels) = assemble(&world, &used, last);
+    (levels, summary.valid - in_levels)
+}
+
+/// One way to end at a class: the segment's first class, whether it is swept, and the cost so far.
+#[derive(Clone, Copy)]
+struct Step {
+    first: usize,
+    swept: bool,
+    cost: f64,
+}
+
+/// The cheapest split, by dynamic programming over the classes in use: what a level costs depends
+/// only on its own classes and on how many boxes are smaller. `steps[j]` covers classes `0..=j`.
+fn split(world: &World<'_>, used: &[usize], strategy: Strategy) -> Vec<Step> {
+    let mut steps: Vec<Step> = Vec::with_capacity(used.len());
+    for last in 0..used.len() {
+        let before = |first: usize| if first == 0 { 0.0 } else { steps[first - 1].cost };
+        let grids = (0..=last).map(|first| {
+            let cost = before(first) + world.grid_cost(&used[first..=last], &used[..first]);
+            Step { first, swept: false, cost }
+        });
+        // Only the largest boxes can be swept, and never all when the caller asked for the grid.
+        let may_sweep = last + 1 == used.len();
+        let first_swept = usize::from(strategy == Strategy::Grid);
+        let sweeps = (first_swept..if may_sweep { last + 1 } else { 0 }).map(|first| {
+            let cost = before(first) + world.sweep_cost(&used[first..=last], &used[..first]);
+            Step { first, swept: true, cost }
+        });
+        let best = grids.chain(sweeps).min_by(|a, b| a.cost.total_cmp(&b.cost));
+        steps.extend(best);
+    }
+    steps
+}
+
+fn assemble(world: &World<'_>, used: &[usize], steps: Vec<Step>) -> (Vec<LevelPlan>, u32) {
+    let mut levels = Vec::new();
+    let mut end = used.len();
+    while end > 0 {
+        let step = steps[end - 1];
+        if !step.swept {
+            levels.push(world.level(&used[step.first..end]));
+        }
+        end = step.first;
+    }
+    levels.reverse();
+    let boxes = levels.iter().map(|level| level.boxes).sum();
+    (levels, boxes)
+}
+
+/// The summary with the ranges in which the boxes lie.
+struct World<'a> {
+    summary: &'a Summary,
+    low: [f32; 3],
+    range: [f32; 3],
+    crowding: f32,
+}
+
+impl<'a> World<'a> {
+    fn new(summary: &'a Summary, crowding: f32) -> Self {
+        let ranges: [(f32, f32); 3] = std::array::from_fn(|k| summary.range(k));
+        Self {
+            summary,
+            low: ranges.map(|r| r.0.clamp(f32::MIN, f32::MAX)),
+            range: ranges.map(|r| (r.1 - r.0).clamp(0.0, f32::MAX)),
+            crowding,
+        }
+    }
+
+    fn boxes(&self, classes: &[usize]) -> u32 {
+        classes.iter().map(|&c| self.summary.classes[c].boxes).sum()
+    }
+
+    /// Rounded up: a window reaches down by this much, and `max - min` was rounded to nearest.
+    fn max_extent(&self, classes: &[usize]) -> [f32; 3] {
+        let extents = |k: usize| classes.iter().map(move |&c| self.summary.classes[c].max_extent[k]);
+        std::array::from_fn(|k| extents(k).fold(0.0, f32::max).next_up())
+    }
+
+    /// A cell holds the largest box, with a little to spare for rounding, and about half a box.
+    fn cell(&self, classes: &[usize]) -> [f32; 3] {
+        let spaced = spacing(self.range, self.boxes(classes), PER_CELL) as f32 * self.crowding;
+        self.max_extent(classes).map(|e| (e * 1.001).max(spaced).max(SMALLEST_CELL))
+    }
+
+    fn grid_cost(&self, classes: &[usize], smaller: &[usize]) -> f64 {
+        let n = f64::from(self.boxes(classes));
+        let own = n * (cost::BOX + 0.5 * cost::CHECK * self.candidates(classes, classes));
+        let visits = f64::from(self.boxes(smaller));
+        let cross = visits * (cost::VISIT + cost::CHECK * self.candidates(smaller, classes));
+        cost::LEVEL + own + cross
+    }
+
+    fn sweep_cost(&self, classes: &[usize], smaller: &[usize]) -> f64 {
+        let n = f64::from(self.boxes(classes));
+        cost::SWEEP * n * (f64::from(self.boxes(smaller)) + 0.5 * n)
+    }
+
+    /// Boxes of the level `classes` that an average box of the classes `of` is tested against, were
+    /// they spread evenly.
+    fn candidates(&self, of: &[usize], classes: &[usize]) -> f64 {
+        let (extent, cell) = (self.max_extent(classes), self.cell(classes));
+        let share = |class: usize| -> f64 {
+            let own = self.summary.classes[class].max_extent;
+            (0..3).map(|k| {
+                let window = own[k] + extent[k] + cell[k];
+                f64::from(window) / f64::from(self.range[k].max(window))
+            }).product()
+        };
+        let weighted: f64 = of.iter().map(|&c| f64::from(self.summary.classes[c].boxes) * share(c)).sum();
+        f64::from(self.boxes(classes)) * weighted / f64::from(self.boxes(of).max(1))
+    }
+
+    fn level(&self, classes: &[usize]) -> LevelPlan {
+        let (boxes, cell) = (self.boxes(classes), self.cell(classes));
+        let (dims, cells) = dimensions(self.range, cell, boxes);
+        LevelPlan {
+            boxes,
+            classes: (classes[0] as u8, classes[classes.len() - 1] as u8),
+            max_extent: self.max_extent(classes),
+            cell,
+            origin: self.low,
+            dims,
+            cells,
+        }
+    }
+}
+
+/// Fewest cells on an axis. Windows reach 3 cells to each side at most (see `cpu::map`), so that two
+/// cells of one window never wrap onto each other when an axis has more than 2 * 3 cells.
+const FEWEST: u32 = 8;
+
+/// Cells on each axis: enough for the range, but no more than four a box in all (wrapping around
+/// costs a few more tests, empty cells cost memory traffic).
+fn dimensions(range: [f32; 3], cell: [f32; 3], boxes: u32) -> ([u32; 3], u32) {
+    let budget = (4 * u64::from(boxes)).max(u64::from(FEWEST).pow(3)).min(1 << 27);
+    let wanted = |k: usize| (range[k] / cell[k]).min(1e9) as u64 + 4;
+    let mut dims: [u64; 3] = std::array::from_fn(|k| wanted(k).max(u64::from(FEWEST)));
+    while dims.iter().product::<u64>() > budget {
+        let widest = (0..3).max_by_key(|&k| dims[k]).unwrap_or(0);
+        if dims[widest] <= u64::from(FEWEST) {
+            break;
+        }
+        dims[widest] = (dims[widest] / 2).max(u64::from(FEWEST));
+    }
+    let cells = dims.iter().product::<u64>().next_power_of_two();
+    (dims.map(|d| d as u32), cells as u32)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn dimensions_follow_the_range_and_stay_within_four_cells_a_box() {
+        assert_eq!(dimensions([96.0; 3], [1.0; 3], 1_000_000).0, [100; 3]);
+        let (dims, cells) = dimensions([1e30, 1.0, 1.0], [1.0; 3], 1000);
+        assert!(cells <= 4096 && dims[0] >= 32, "{dims:?}");
+        assert_eq!(dimensions([0.0; 3], [1.0; 3], 1), ([8; 3], 512));
+    }
+}

@@ -1,0 +1,205 @@
+//! The plan: from a summary of the boxes to strategy, levels and cell sizes. Nothing else chooses.
+//!
+//! A pure function of the [`Summary`] and the [`Config`]; the [`Plan`] explains itself in words.
+
+mod levels;
+mod pbig;
+mod summary;
+
+pub use levels::LevelPlan;
+pub use pbig::{PbigPlan, density_cell, pbig_cell, pbig_objective};
+pub(crate) use summary::size_class_of;
+pub use summary::{SizeClass, Summary};
+
+use crate::config::{Backend, Config, Strategy};
+use std::fmt;
+
+/// What the plan settled on.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Chosen {
+    /// Fewer than two valid boxes, or nothing has changed.
+    #[default]
+    Nothing,
+    /// Every pair is tested.
+    Brute,
+    /// Boxes sorted by the cell of their lower corner, in one grid a level.
+    Grid,
+    /// PBIG's grid of duplicated entries.
+    Pbig,
+    /// The grid of an earlier update is kept; only boxes that moved since are looked at.
+    Edit,
+}
+
+impl Chosen {
+    /// The name in reports.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Nothing => "nothing",
+            Self::Brute => "brute",
+            Self::Grid => "grid",
+            Self::Pbig => "pbig",
+            Self::Edit => "edit",
+        }
+    }
+}
+
+/// How a set of boxes is searched. Its `Display` says what was chosen and why.
+///
+/// ```
+/// use pbig_core::{Aabb, Finder};
+/// let boxes: Vec<_> = (0..500).map(|i| Aabb::from_center([i as f32, 0.0, 0.0], [0.6; 3])).collect();
+/// let mut finder = Finder::default();
+/// finder.find(&boxes).unwrap();
+/// println!("{}", finder.report().plan);
+/// ```
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Plan {
+    /// The strategy.
+    pub chosen: Chosen,
+    /// Grids, smallest boxes first ([`Chosen::Grid`]).
+    pub levels: Vec<LevelPlan>,
+    /// Boxes tested against every other: too large for a level that would pay, or a small set.
+    pub swept: u32,
+    /// The grid of [`Chosen::Pbig`].
+    pub pbig: Option<PbigPlan>,
+    /// Boxes that have moved since the grid was built ([`Chosen::Edit`]).
+    pub moved: u32,
+    /// Valid boxes planned for.
+    pub boxes: u32,
+}
+
+impl Plan {
+    /// Chooses for the boxes behind `summary`. `crowding` is 1, or less where earlier cells turned
+    /// out to be too full (see [`LevelPlan::cell`]).
+    pub fn new(summary: &Summary, config: &Config, crowding: f32) -> Self {
+        let boxes = summary.valid;
+        let brute = Self { chosen: Chosen::Brute, swept: boxes, boxes, ..Self::default() };
+        if boxes < 2 {
+            return Self { boxes, ..Self::default() };
+        }
+        if config.backend == Backend::Brute {
+            return brute;
+        }
+        match config.strategy {
+            Strategy::Pbig => Self {
+                chosen: Chosen::Pbig,
+                pbig: Some(PbigPlan::new(summary, config)),
+                boxes,
+                ..Self::default()
+            },
+            Strategy::Auto if boxes < config.brute_below => brute,
+            Strategy::Auto | Strategy::Grid => {
+                let (levels, swept) = levels::choose(summary, crowding, config.strategy);
+                let chosen = if levels.is_empty() { Chosen::Brute } else { Chosen::Grid };
+                Self { chosen, levels, swept, boxes, ..Self::default() }
+            }
+        }
+    }
+}
+
+impl fmt::Display for Plan {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let boxes = self.boxes;
+        match self.chosen {
+            Chosen::Nothing => write!(f, "nothing to do: {boxes} valid boxes, or none changed"),
+            Chosen::Brute => write!(f, "brute force: {boxes} boxes are cheaper to test than to sort"),
+            Chosen::Grid => write!(f, "grid: {boxes} boxes"),
+            Chosen::Edit => write!(f, "edit: {} of {boxes} boxes moved since the grid was built", self.moved),
+            Chosen::Pbig => write!(f, "PBIG grid: {boxes} boxes"),
+        }?;
+        if let Some(pbig) = &self.pbig {
+            write!(f, "; {pbig}")?;
+        }
+        for level in &self.levels {
+            write!(f, "; {level}")?;
+        }
+        if self.swept > 0 && self.chosen != Chosen::Brute {
+            write!(f, "; {} oversize boxes tested against all", self.swept)?;
+        }
+        Ok(())
+    }
+}
+
+/// The spacing at which about `per_cell` of `n` boxes fall into a cube of that edge, in a world of
+/// the given ranges. An axis that is thinner than the spacing has one layer and does not count:
+/// a flat world is divided as a plane, a row of boxes as a line.
+fn spacing(ranges: [f32; 3], n: u32, per_cell: f64) -> f64 {
+    let cells = (f64::from(n) / per_cell).max(1.0);
+    let mut ranges = ranges.map(f64::from);
+    ranges.sort_unstable_by(|a, b| b.total_cmp(a));
+    let mut volume = 1.0;
+    let mut best = 0.0f64;
+    for (axes, range) in ranges.into_iter().enumerate() {
+        if axes > 0 && range <= best {
+            break;
+        }
+        volume *= range;
+        best = (volume / cells).powf(1.0 / (axes as f64 + 1.0));
+    }
+    best
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Aabb;
+
+    fn plan(boxes: &[Aabb], config: Config) -> Plan {
+        Plan::new(&Summary::of(boxes, None), &config, 1.0)
+    }
+
+    fn lattice(n: u32, step: f32, half: f32) -> Vec<Aabb> {
+        let at = |i: u32, d: u32| (i / d % n) as f32 * step;
+        (0..n * n * n)
+            .map(|i| Aabb::from_center([at(i, 1), at(i, n), at(i, n * n)], [half; 3]))
+            .collect()
+    }
+
+    #[test]
+    fn spacing_gives_the_wanted_boxes_per_cell_in_one_two_and_three_dimensions() {
+        assert!((spacing([100.0; 3], 1_000_000, 1.0) - 1.0).abs() < 1e-6);
+        assert!((spacing([100.0, 0.001, 100.0], 10_000, 1.0) - 1.0).abs() < 1e-6);
+        assert!((spacing([0.0, 100.0, 0.0], 100, 1.0) - 1.0).abs() < 1e-6);
+        assert_eq!(spacing([0.0; 3], 100, 1.0), 0.0);
+    }
+
+    #[test]
+    fn small_sets_are_not_sorted_and_large_ones_are() {
+        assert_eq!(plan(&lattice(1, 1.0, 0.4), Config::DEFAULT).chosen, Chosen::Nothing);
+        assert_eq!(plan(&lattice(3, 1.0, 0.4), Config::DEFAULT).chosen, Chosen::Brute);
+        assert_eq!(plan(&lattice(20, 1.0, 0.4), Config::DEFAULT).chosen, Chosen::Grid);
+    }
+
+    #[test]
+    fn boxes_of_one_size_share_one_level_whose_cells_hold_any_of_them() {
+        let plan = plan(&lattice(20, 1.0, 0.4), Config::DEFAULT);
+        assert_eq!((plan.levels.len(), plan.swept), (1, 0));
+        assert!(plan.levels[0].cell.iter().all(|&c| c > 0.8 && c < 2.0), "{plan}");
+    }
+
+    #[test]
+    fn one_enormous_box_does_not_enlarge_the_cells_of_the_others() {
+        let mut boxes = lattice(20, 1.0, 0.4);
+        boxes.push(Aabb::new([-1e4; 3], [1e4; 3]));
+        let plan = plan(&boxes, Config::DEFAULT);
+        assert_eq!((plan.levels.len(), plan.swept), (1, 1), "{plan}");
+        assert!(plan.levels[0].cell[0] < 2.0, "{plan}");
+    }
+
+    #[test]
+    fn sizes_over_six_decades_get_levels_rather_than_one_huge_cell() {
+        let mut boxes = lattice(20, 1.0, 0.0005);
+        boxes.extend(lattice(10, 10.0, 5.0));
+        let plan = plan(&boxes, Config::DEFAULT);
+        assert_eq!(plan.levels.len(), 2, "{plan}");
+    }
+
+    #[test]
+    fn a_plan_explains_itself() {
+        let mut boxes = lattice(20, 1.0, 0.4);
+        boxes.push(Aabb::new([f32::NEG_INFINITY; 3], [f32::INFINITY; 3]));
+        let text = plan(&boxes, Config::DEFAULT).to_string();
+        assert!(text.starts_with("grid: 8001 boxes; level of 8000 boxes up to 0.8"), "{text}");
+        assert!(text.ends_with("1 oversize boxes tested against all"), "{text}");
+    }
+}

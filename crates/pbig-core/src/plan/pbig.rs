@@ -1,0 +1,122 @@
+//! PBIG's cell size (Lo et al. 2013, section 4.1, equations 2 to 6) and Avril's density rule
+//! (Avril et al. 2012, section 4.1).
+
+use super::Summary;
+use crate::Aabb;
+use crate::config::Config;
+use std::fmt;
+
+/// The grid of [`crate::Strategy::Pbig`]: one entry for each cell that a box touches.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PbigPlan {
+    /// Edge of the cubic cells.
+    pub cell: f32,
+    /// Where cell 0 begins.
+    pub origin: [f32; 3],
+    /// Cells on each axis; boxes beyond are clamped into the border cells.
+    pub dims: [u32; 3],
+    /// Cells that a box may touch before it is tested against all instead.
+    pub max_cells_per_box: u32,
+    /// `f` of equation 2 at this cell size: average entries per cell.
+    pub objective: f32,
+}
+
+impl fmt::Display for PbigPlan {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let [x, y, z] = self.dims;
+        write!(f, "{x} x {y} x {z} cells of {}, f = {} entries a cell", self.cell, self.objective)
+    }
+}
+
+impl PbigPlan {
+    /// Solves equation 6 on the summary's sample, with `W` from the configuration.
+    pub fn new(summary: &Summary, config: &Config) -> Self {
+        let (space, origin) = space_of(summary);
+        let wanted = config.pbig_boxes_per_cell.max(1.0);
+        let n = summary.valid;
+        let cell = pbig_cell(&summary.sample, n, space, wanted);
+        let dims = space.map(|length| ((length / cell).ceil() as u32).clamp(1, 1 << 10));
+        let objective = pbig_objective(&summary.sample, n, space, cell);
+        Self { cell, origin, dims, max_cells_per_box: 512, objective }
+    }
+}
+
+/// The space of the paper: from the lowest corner to the highest, of most of the sample.
+fn space_of(summary: &Summary) -> ([f32; 3], [f32; 3]) {
+    let ranges: [(f32, f32); 3] = std::array::from_fn(|k| summary.range(k));
+    let largest = |k: usize| summary.sample.iter().map(|b| b.extents()[k]).fold(0.0, f32::max);
+    let length = |k: usize| (ranges[k].1 - ranges[k].0 + largest(k)).clamp(1e-30, 1e30);
+    (std::array::from_fn(length), ranges.map(|r| r.0.clamp(-1e30, 1e30)))
+}
+
+/// `f = N alpha / M`, the average number of entries per cell, for cubic cells of edge `cell`
+/// (equations 2 to 5, `alpha` estimated from the sample).
+pub fn pbig_objective(sample: &[Aabb], n: u32, space: [f32; 3], cell: f32) -> f32 {
+    let cells_along = |length: f32| f64::from((length / cell).ceil().max(1.0));
+    let cells: f64 = space.into_iter().map(cells_along).product();
+    let occupied = |b: &Aabb| b.extents().into_iter().map(cells_along).product::<f64>();
+    let alpha = sample.iter().map(occupied).sum::<f64>() / sample.len().max(1) as f64;
+    (f64::from(n) * alpha / cells) as f32
+}
+
+/// The smallest cell with `f >= wanted` (equation 6), by a binary search on its edge as the paper
+/// does: `f` grows with the cell, because more boxes meet in it. With fewer boxes than `wanted`,
+/// one cell for the whole space.
+pub fn pbig_cell(sample: &[Aabb], n: u32, space: [f32; 3], wanted: f32) -> f32 {
+    let whole = space.into_iter().fold(f32::MIN_POSITIVE, f32::max);
+    // Smallest cell worth trying: 1024 to an axis, the most that the plan offers.
+    let (mut low, mut high) = (whole / 1024.0, whole);
+    for _ in 0..24 {
+        let middle = 0.5 * (low + high);
+        if pbig_objective(sample, n, space, middle) >= wanted { high = middle } else { low = middle }
+    }
+    high
+}
+
+/// Avril's rule: the cubic cell in which `wanted` objects are expected at the density of the
+/// environment, refined so that cells fit it exactly on its longest axis.
+pub fn density_cell(n: u32, space: [f32; 3], wanted: f32) -> f32 {
+    let volume: f64 = space.into_iter().map(f64::from).product();
+    let ideal = (f64::from(wanted) * volume / f64::from(n.max(1))).cbrt();
+    let longest = f64::from(space.into_iter().fold(0.0, f32::max));
+    let count = (longest / ideal).floor().max(1.0);
+    (longest / count) as f32
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn cubes(n: usize, edge: f32) -> Vec<Aabb> {
+        vec![Aabb::new([0.0; 3], [edge; 3]); n]
+    }
+
+    #[test]
+    fn objective_by_hand() {
+        // 10^3 boxes of edge 15 in 100^3, cells of 10: M = 1000, alpha = 2^3, f = 8.
+        assert_eq!(pbig_objective(&cubes(10, 15.0), 1000, [100.0; 3], 10.0), 8.0);
+    }
+
+    #[test]
+    fn the_constraint_holds_and_a_smaller_cell_would_break_it() {
+        let (sample, space) = (cubes(1000, 50.0), [1e4; 3]);
+        for wanted in [2.0, 8.0, 32.0] {
+            let cell = pbig_cell(&sample, 1_000_000, space, wanted);
+            let f = |cell| pbig_objective(&sample, 1_000_000, space, cell);
+            assert!(f(cell) >= wanted && f(cell * 0.98) < wanted, "W = {wanted}: cell {cell}");
+        }
+    }
+
+    #[test]
+    fn too_few_boxes_for_the_constraint_get_one_cell() {
+        let cell = pbig_cell(&cubes(5, 1.0), 5, [100.0; 3], 32.0);
+        assert!((cell - 100.0).abs() < 1e-3, "{cell}");
+    }
+
+    #[test]
+    fn density_rule_puts_the_wanted_objects_into_a_cell_that_fits() {
+        let cell = density_cell(1_000_000, [1000.0; 3], 8.0);
+        assert!((cell - 20.0).abs() < 1e-3, "{cell}");
+        assert_eq!(density_cell(1, [10.0, 5.0, 5.0], 1e9), 10.0);
+    }
+}

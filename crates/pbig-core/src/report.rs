@@ -1,0 +1,75 @@
+//! What a call did: times, counts and the plan, for a user who wants to know why.
+
+use crate::plan::Plan;
+use std::time::{Duration, Instant};
+
+/// Wall time of each stage of the last call.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct StageTimes {
+    /// Looking at the boxes and choosing strategy and cell sizes.
+    pub plan: Duration,
+    /// Sorting boxes into cells.
+    pub map: Duration,
+    /// Testing candidates.
+    pub check: Duration,
+    /// Bringing the pairs into their order.
+    pub emit: Duration,
+    /// Turning states into events ([`crate::BroadPhase`] only).
+    pub diff: Duration,
+}
+
+impl StageTimes {
+    /// The stages by name, in the order in which they run.
+    pub fn named(&self) -> [(&'static str, Duration); 5] {
+        [
+            ("plan", self.plan),
+            ("map", self.map),
+            ("check", self.check),
+            ("emit", self.emit),
+            ("diff", self.diff),
+        ]
+    }
+
+    /// The sum of all stages.
+    pub fn total(&self) -> Duration {
+        self.named().iter().map(|(_, time)| *time).sum()
+    }
+}
+
+/// The time since `clock`, which is set to now.
+pub(crate) fn lap(clock: &mut Instant) -> Duration {
+    let now = Instant::now();
+    now.duration_since(std::mem::replace(clock, now))
+}
+
+/// Counts of exact box tests, as PBIG's section 4.1 defines them.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Checks {
+    /// Box pairs tested, counting each test.
+    pub made: u64,
+    /// UC: tests of two boxes that do not overlap.
+    pub unnecessary: u64,
+    /// RC: repeated tests of one pair in another cell; 0 without duplicated entries.
+    pub redundant: u64,
+}
+
+/// What the last call of a [`crate::Finder`] or [`crate::BroadPhase`] did.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Report {
+    /// Wall time by stage.
+    pub stages: StageTimes,
+    /// Boxes given (present ones, for [`crate::BroadPhase`]).
+    pub boxes: u64,
+    /// Boxes with a NaN or with `min > max` on an axis; they pair with nothing.
+    pub invalid: u64,
+    /// Boxes that had changed ([`crate::BroadPhase`]: beyond their margin, or filter).
+    pub changed: u64,
+    /// Exact tests made.
+    pub checks: Checks,
+    /// Pairs reported ([`crate::BroadPhase`]: pairs that exist now).
+    pub pairs: u64,
+    /// How the work was done, and why.
+    pub plan: Plan,
+    /// Why the wanted backend was not used, if it was not.
+    pub fallback: Option<&'static str>,
+}

@@ -1,0 +1,151 @@
+//! `PbigBroadPhase`: rapier's calls translated to the finder's, and its events back.
+
+use crate::proxy::{collision_aabb, filter_of};
+use pbig_core::{BroadPhase as Finder, Config, Limits, Pair, Report};
+use rapier3d::prelude::{
+    BroadPhase, BroadPhasePairEvent, Collider, ColliderHandle, ColliderPair, ColliderSet,
+    IntegrationParameters, RigidBodySet,
+};
+
+/// A collider index that is not in the finder. Rapier's generations cannot reach it.
+const ABSENT: u32 = u32::MAX;
+
+/// The broad phase to hand to rapier's `PhysicsPipeline` or `CollisionPipeline`.
+///
+/// A collider's index is its id in the finder. Each collider is stored with its box and filter, and
+/// set again whenever rapier lists it as modified: rapier does not tell what has changed, and a
+/// collider whose fat box still holds it and whose filter is the same costs nothing more.
+#[derive(Clone, Debug)]
+pub struct PbigBroadPhase {
+    finder: Finder,
+    /// By collider index: the generation that the finder holds.
+    generations: Vec<u32>,
+    /// Margin in units of `IntegrationParameters::length_unit`.
+    relative_margin: f32,
+}
+
+impl Default for PbigBroadPhase {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl PbigBroadPhase {
+    /// The defaults: a margin of 1% of the length unit, as rapier's own broad phase has, and no
+    /// limit on colliders or pairs, as rapier has none.
+    pub const CONFIG: Config = Config { margin: 0.01, limits: Limits::UNLIMITED, ..Config::DEFAULT };
+
+    /// An empty broad phase with [`PbigBroadPhase::CONFIG`].
+    pub fn new() -> Self {
+        Self::with_config(Self::CONFIG)
+    }
+
+    /// An empty broad phase. [`Config::margin`] is in units of rapier's `length_unit`; one that is
+    /// not a finite length of at least 0 is replaced by the default. Limits are not used: rapier's
+    /// trait knows no errors.
+    pub fn with_config(config: Config) -> Self {
+        let margin = if config.margin >= 0.0 && config.margin.is_finite() { config.margin } else { Self::CONFIG.margin };
+        let config = Config { margin, limits: Limits::UNLIMITED, ..config };
+        let finder = Finder::new(config).expect("the margin was checked above");
+        Self { finder, generations: Vec::new(), relative_margin: margin }
+    }
+
+    /// What the last update did.
+    pub fn report(&self) -> &Report {
+        self.finder.report()
+    }
+
+    /// Pairs that rapier knows of.
+    pub fn pair_count(&self) -> usize {
+        self.finder.pair_count()
+    }
+
+    /// The pairs that rapier knows of, in no particular order.
+    pub fn pairs(&self) -> impl Iterator<Item = ColliderPair> {
+        self.finder.pairs().map(|pair| self.handles(pair))
+    }
+
+    fn handle(&self, index: u32) -> ColliderHandle {
+        ColliderHandle::from_raw_parts(index, self.generations[index as usize])
+    }
+
+    /// The collider with fewer pairs first, then the lower index: rapier looks for the edge of a
+    /// pair by walking the pairs of the first (measured on 0.27, 30,000 balls on one ground: 17 ms
+    /// in this order, 1.05 s in the other).
+    fn handles(&self, pair: Pair) -> ColliderPair {
+        let (a, b) = (self.handle(pair.a), self.handle(pair.b));
+        let swap = self.finder.degree(pair.b) < self.finder.degree(pair.a);
+        if swap { ColliderPair::new(b, a) } else { ColliderPair::new(a, b) }
+    }
+
+    /// Forgets a collider, if the finder holds this very one. Its pairs end without an event: the
+    /// narrow phase drops the pairs of removed and disabled colliders itself.
+    fn remove(&mut self, handle: ColliderHandle) {
+        let (index, generation) = handle.into_raw_parts();
+        if self.generations.get(index as usize) == Some(&generation) {
+            self.finder.remove(index);
+            self.generations[index as usize] = ABSENT;
+        }
+    }
+
+    fn set(&mut self, handle: ColliderHandle, collider: &Collider, params: &IntegrationParameters, bodies: &RigidBodySet) {
+        let (index, generation) = handle.into_raw_parts();
+        self.claim(index, generation);
+        let aabb = collision_aabb(params, bodies, collider);
+        if let Err(error) = self.finder.set(index, aabb, filter_of(bodies, collider)) {
+            tracing::error!("pbig: collider {handle:?} is ignored: {error}");
+        }
+    }
+
+    /// Makes the index stand for this generation; a predecessor that was never reported as removed
+    /// is removed now.
+    fn claim(&mut self, index: u32, generation: u32) {
+        let i = index as usize;
+        if i >= self.generations.len() {
+            self.generations.resize(i + 1, ABSENT);
+        }
+        if self.generations[i] != generation {
+            self.finder.remove(index);
+            self.generations[i] = generation;
+        }
+    }
+
+    fn send(&self, events: &mut Vec<BroadPhasePairEvent>) {
+        let found = self.finder.events();
+        let removed = found.removed.iter().map(|&pair| BroadPhasePairEvent::DeletePair(self.handles(pair)));
+        let added = found.added.iter().map(|&pair| BroadPhasePairEvent::AddPair(self.handles(pair)));
+        events.extend(removed.chain(added));
+    }
+}
+
+impl BroadPhase for PbigBroadPhase {
+    fn update(
+        &mut self,
+        params: &IntegrationParameters,
+        colliders: &ColliderSet,
+        bodies: &RigidBodySet,
+        modified_colliders: &[ColliderHandle],
+        removed_colliders: &[ColliderHandle],
+        events: &mut Vec<BroadPhasePairEvent>,
+    ) {
+        // First, because a modified collider may have taken the index of a removed one.
+        for &handle in removed_colliders {
+            self.remove(handle);
+        }
+        if modified_colliders.is_empty() {
+            return;
+        }
+        // A length unit that makes no sense leaves the margin as it was.
+        let _ = self.finder.set_margin(self.relative_margin * params.length_unit);
+        for &handle in modified_colliders {
+            match colliders.get(handle).filter(|collider| collider.is_enabled()) {
+                Some(collider) => self.set(handle, collider, params, bodies),
+                None => self.remove(handle),
+            }
+        }
+        match self.finder.update() {
+            Ok(_) => self.send(events),
+            Err(error) => tracing::error!("pbig: no pairs in this update: {error}"),
+        }
+    }
+}

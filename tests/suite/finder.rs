@@ -1,0 +1,148 @@
+//! Contract 1: every strategy returns the oracle's pairs, sorted, whatever the boxes and threads.
+
+use pbig_core::{Aabb, Config, Error, Finder, Limits, Order, Pair, ProxyFilter, oracle};
+use pbig_harness::boxes::BoxSet;
+use pbig_tests::{corpus, strategies};
+use proptest::prelude::*;
+
+fn check(name: &str, boxes: &[Aabb]) {
+    let wanted = oracle::pairs(boxes);
+    let invalid = boxes.iter().filter(|b| !b.is_valid()).count() as u64;
+    for (strategy, config) in strategies() {
+        let mut finder = Finder::new(config);
+        let found = finder.find(boxes).expect("within the limits");
+        assert_eq!(found, wanted, "{name}, {strategy}");
+        let report = finder.report();
+        assert_eq!((report.boxes, report.invalid), (boxes.len() as u64, invalid), "{name}, {strategy}");
+        assert_eq!(report.pairs, wanted.len() as u64);
+        let useful = report.checks.made - report.checks.unnecessary - report.checks.redundant;
+        assert_eq!(useful, wanted.len() as u64, "{name}, {strategy}: each pair has one useful check");
+    }
+}
+
+#[test]
+fn the_corpus_on_every_strategy() {
+    for case in corpus() {
+        check(&case.name, &case.boxes);
+    }
+}
+
+#[test]
+fn ten_thousand_random_sets_with_every_degenerate_kind() {
+    let set = BoxSet::named("degenerate").expect("the set exists");
+    for seed in 0..10_000 {
+        let boxes = set.boxes((seed % 301) as usize, seed);
+        check(&format!("degenerate, seed {seed}"), &boxes);
+    }
+}
+
+#[test]
+fn the_sets_of_the_paper_at_100_000() {
+    for name in ["uniform", "gaussian"] {
+        let boxes = BoxSet::named(name).expect("the set exists").boxes(100_000, 7);
+        let wanted = oracle::pairs(&boxes);
+        for (strategy, config) in strategies().into_iter().filter(|(s, _)| *s != "brute") {
+            let mut finder = Finder::new(config);
+            assert_eq!(finder.find(&boxes).expect("within the limits"), wanted, "{name}, {strategy}");
+        }
+    }
+}
+
+#[test]
+fn the_same_bytes_for_any_number_of_threads() {
+    for name in ["uniform", "gaussian", "mixed", "pile"] {
+        let boxes = BoxSet::named(name).expect("the set exists").boxes(40_000, 3);
+        for order in [Order::Sorted, Order::Unspecified] {
+            let with_threads = |threads| {
+                let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool");
+                pool.install(|| {
+                    let mut finder = Finder::new(Config { order, ..Config::DEFAULT });
+                    finder.find(&boxes).expect("within the limits").to_vec()
+                })
+            };
+            assert_eq!(with_threads(1), with_threads(2), "{name}, {order:?}");
+            assert_eq!(with_threads(1), with_threads(3), "{name}, {order:?}");
+        }
+    }
+}
+
+#[test]
+fn a_finder_that_is_used_again_forgets_the_boxes_before() {
+    for (strategy, config) in strategies() {
+        let mut finder = Finder::new(config);
+        for case in corpus() {
+            let wanted = oracle::pairs(&case.boxes);
+            assert_eq!(finder.find(&case.boxes).expect("within the limits"), wanted, "{}, {strategy}", case.name);
+        }
+    }
+}
+
+#[test]
+fn filters_are_applied_while_searching() {
+    let boxes = BoxSet::named("pile").expect("the set exists").boxes(2000, 1);
+    let filters: Vec<_> = (0..2000u32)
+        .map(|i| ProxyFilter { body: i % 50, memberships: 1 << (i % 5), mask: !(1 << (i % 3)), ..ProxyFilter::ALL })
+        .collect();
+    let wanted = oracle::pairs_filtered(&boxes, &filters);
+    assert!(!wanted.is_empty() && wanted.len() < oracle::pairs(&boxes).len());
+    for (strategy, config) in strategies() {
+        let mut finder = Finder::new(config);
+        assert_eq!(finder.find_filtered(&boxes, &filters).expect("one each"), wanted, "{strategy}");
+    }
+}
+
+#[test]
+fn limits_end_in_errors_that_name_them() {
+    let boxes = vec![Aabb::new([0.0; 3], [1.0; 3]); 300];
+    for (strategy, config) in strategies() {
+        let with = |max_boxes, max_pairs| Config { limits: Limits { max_boxes, max_pairs }, ..config };
+        let pairs = 300 * 299 / 2;
+        assert_eq!(Finder::new(with(300, pairs)).find(&boxes).map(<[Pair]>::len), Ok(pairs as usize), "{strategy}");
+        let error = Finder::new(with(300, pairs - 1)).find(&boxes).unwrap_err();
+        assert_eq!(error, Error::TooManyPairs { limit: pairs - 1 }, "{strategy}");
+        assert!(error.to_string().contains("Limits::max_pairs"));
+        let error = Finder::new(with(299, pairs)).find(&boxes).unwrap_err();
+        assert_eq!(error, Error::TooManyBoxes { boxes: 300, limit: 299 }, "{strategy}");
+    }
+    let error = Finder::default().find_filtered(&boxes, &[]).unwrap_err();
+    assert_eq!(error, Error::FilterCount { boxes: 300, filters: 0 });
+}
+
+#[test]
+fn clusters_do_not_cost_more_than_an_even_spread() {
+    // 2 x 20,000 boxes a million apart: cells sized for the whole world would hold a cluster each.
+    let unit = BoxSet::named("unit").expect("the set exists");
+    let mut boxes = unit.boxes(20_000, 1);
+    boxes.extend(unit.boxes(20_000, 2).iter().map(|b| Aabb::new(b.min.map(|x| x + 1e6), b.max.map(|x| x + 1e6))));
+    let mut finder = Finder::default();
+    finder.find(&boxes).expect("within the limits");
+    let checks = finder.report().checks.made;
+    assert!(checks < 40_000 * 60, "{checks} checks: {}", finder.report().plan);
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 500, failure_persistence: None, ..ProptestConfig::default() })]
+
+    #[test]
+    fn any_floats_at_all(values in proptest::collection::vec(proptest::num::f32::ANY, 0..600)) {
+        let boxes: Vec<Aabb> = values
+            .chunks_exact(6)
+            .map(|v| Aabb::new([v[0].min(v[3]), v[1], v[2].min(v[5])], [v[0].max(v[3]), v[4], v[2].max(v[5])]))
+            .collect();
+        check("any floats", &boxes);
+    }
+
+    #[test]
+    fn boxes_on_a_coarse_raster_where_every_border_coincides(
+        corners in proptest::collection::vec((0i8..12, 0i8..12, 0i8..12, 0i8..4), 64..400),
+        scale in -30i32..30,
+    ) {
+        let scale = (scale as f32).exp2();
+        let at = |c: i8| f32::from(c) * scale;
+        let boxes: Vec<Aabb> = corners
+            .iter()
+            .map(|&(x, y, z, s)| Aabb::new([at(x), at(y), at(z)], [at(x + s), at(y + s), at(z + s)]))
+            .collect();
+        check("raster", &boxes);
+    }
+}

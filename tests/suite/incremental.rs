@@ -1,0 +1,186 @@
+//! The incremental facade: after every update the kept pairs are what the oracle makes of the fat
+//! boxes, and the events lead from one state to the next.
+
+use pbig_core::{Aabb, BroadPhase, Config, Error, Limits, Pair, ProxyFilter, oracle};
+use pbig_harness::boxes::{BoxSet, moved};
+use pbig_tests::strategies;
+use rand::rngs::StdRng;
+use rand::{RngExt, SeedableRng};
+use std::collections::BTreeSet;
+
+/// A broad phase with what its caller knows: the boxes that were set, and the pairs by its events.
+struct Follower {
+    broad_phase: BroadPhase,
+    boxes: Vec<Option<(Aabb, ProxyFilter)>>,
+    pairs: BTreeSet<Pair>,
+}
+
+impl Follower {
+    fn new(config: Config, ids: usize) -> Self {
+        let broad_phase = BroadPhase::new(config).expect("a good margin");
+        Self { broad_phase, boxes: vec![None; ids], pairs: BTreeSet::new() }
+    }
+
+    fn set(&mut self, id: u32, aabb: Aabb, filter: ProxyFilter) {
+        self.boxes[id as usize] = Some((aabb, filter));
+        self.broad_phase.set(id, aabb, filter).expect("a small id");
+    }
+
+    fn remove(&mut self, id: u32) {
+        let was_there = self.boxes[id as usize].take().is_some();
+        assert_eq!(self.broad_phase.remove(id), was_there);
+        self.pairs.retain(|p| p.a != id && p.b != id);
+    }
+
+    /// Updates, follows the events, and compares.
+    fn update(&mut self, what: &str) {
+        let events = self.broad_phase.update().expect("within the limits");
+        assert!(events.added.is_sorted() && events.removed.is_sorted(), "{what}: events out of order");
+        for pair in &events.removed {
+            assert!(self.pairs.remove(pair), "{what}: {pair:?} ended but was not there");
+        }
+        for pair in &events.added {
+            assert!(self.pairs.insert(*pair), "{what}: {pair:?} added twice");
+        }
+        let kept: BTreeSet<Pair> = self.broad_phase.pairs().collect();
+        assert_eq!(self.pairs, kept, "{what}: events lead elsewhere");
+        self.compare_with_oracle(what);
+    }
+
+    fn compare_with_oracle(&self, what: &str) {
+        let fat: Vec<Aabb> = (0..self.boxes.len() as u32)
+            .map(|id| self.broad_phase.fat_aabb(id).unwrap_or(Aabb::NOWHERE))
+            .collect();
+        let filter = |id: u32| self.boxes[id as usize].map_or(ProxyFilter::ALL, |b| b.1);
+        let wanted: BTreeSet<Pair> =
+            oracle::pairs_where(&fat, |a, b| filter(a).allows(&filter(b))).into_iter().collect();
+        assert_eq!(self.pairs, wanted, "{what}: {}", self.broad_phase.report().plan);
+        self.fat_boxes_are_near(what);
+    }
+
+    /// A fat box contains its box and reaches at most two margins beyond.
+    fn fat_boxes_are_near(&self, what: &str) {
+        let slack = 2.0 * self.broad_phase.config().margin;
+        for (id, given) in self.boxes.iter().enumerate() {
+            let fat = self.broad_phase.fat_aabb(id as u32);
+            let valid = given.is_some_and(|(aabb, _)| aabb.is_valid());
+            assert_eq!(fat.is_some(), valid, "{what}: box {id}");
+            if let (Some(fat), Some((aabb, _))) = (fat, given) {
+                for k in 0..3 {
+                    let (below, above) = (aabb.min[k] - fat.min[k], fat.max[k] - aabb.max[k]);
+                    assert!(fat.min[k] <= aabb.min[k] && fat.max[k] >= aabb.max[k], "{what}: box {id} outside");
+                    assert!(!(below > slack) && !(above > slack), "{what}: box {id} too fat");
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn random_worlds_with_churn_on_every_strategy() {
+    let degenerate = BoxSet::named("degenerate").expect("the set exists");
+    for (strategy, config) in strategies() {
+        for seed in 0..60 {
+            let mut rng = StdRng::seed_from_u64(seed);
+            let margin = [0.0, 0.01, 0.3][seed as usize % 3];
+            let ids = [20, 90, 300][seed as usize % 3];
+            let mut world = Follower::new(Config { margin, ..config }, ids);
+            for round in 0..25 {
+                // From a handful of changes to a change of everything.
+                let changes = if round % 7 == 0 { ids } else { rng.random_range(0..1 + ids / 10) };
+                for new in degenerate.boxes(changes, seed * 1000 + round) {
+                    let id = rng.random_range(0..ids as u32);
+                    change(&mut world, &mut rng, id, new);
+                }
+                world.update(&format!("{strategy}, seed {seed}, round {round}"));
+            }
+        }
+    }
+}
+
+fn change(world: &mut Follower, rng: &mut StdRng, id: u32, new: Aabb) {
+    let filter = ProxyFilter { body: id % 7, memberships: 3, mask: rng.random_range(0..4), ..ProxyFilter::ALL };
+    match (rng.random_range(0..6), world.boxes[id as usize]) {
+        (0, Some(_)) => world.remove(id),
+        (1, Some(_)) => {
+            // Index reuse within one update.
+            world.remove(id);
+            world.set(id, new, filter);
+        }
+        (2, Some((aabb, _))) => world.set(id, aabb, filter),
+        (3, Some((aabb, filter))) => world.set(id, moved(&[aabb], 0.05, rng.random())[0], filter),
+        _ => world.set(id, new, filter),
+    }
+}
+
+#[test]
+fn moving_sets_where_all_or_a_few_boxes_move() {
+    for (name, distance) in [("unit", 0.1), ("mixed", 0.1), ("pile", 0.02)] {
+        for share in [1.0, 0.01] {
+            let mut boxes = BoxSet::named(name).expect("the set exists").boxes(4000, 5);
+            let mut world = Follower::new(Config { margin: 0.01, ..Config::DEFAULT }, boxes.len());
+            let mut rng = StdRng::seed_from_u64(1);
+            for frame in 0..12 {
+                let next = moved(&boxes, distance, frame);
+                for (id, next) in next.into_iter().enumerate() {
+                    if frame == 0 || rng.random_bool(share) {
+                        boxes[id] = next;
+                        world.set(id as u32, next, ProxyFilter::ALL);
+                    }
+                }
+                world.update(&format!("{name}, share {share}, frame {frame}"));
+            }
+        }
+    }
+}
+
+#[test]
+fn contract_5_no_change_no_work_and_few_changes_little() {
+    let boxes = BoxSet::named("unit").expect("the set exists").boxes(20_000, 5);
+    let mut broad_phase = BroadPhase::new(Config { margin: 0.05, ..Config::DEFAULT }).expect("a good margin");
+    let mut set_all = |broad_phase: &mut BroadPhase, by: f32| {
+        for (id, b) in boxes.iter().enumerate() {
+            let aabb = Aabb::new(b.min.map(|x| x + by), b.max.map(|x| x + by));
+            broad_phase.set(id as u32, aabb, ProxyFilter::ALL).expect("a small id");
+        }
+    };
+    set_all(&mut broad_phase, 0.0);
+    broad_phase.update().expect("within the limits");
+    set_all(&mut broad_phase, 0.04);
+    broad_phase.update().expect("within the limits");
+    let report = broad_phase.report();
+    assert_eq!((report.changed, report.checks.made), (0, 0), "motion within the margin is no change");
+    for frame in 1..40 {
+        let aabb = Aabb::from_center([frame as f32; 3], [0.5; 3]);
+        broad_phase.set(77, aabb, ProxyFilter::ALL).expect("a small id");
+        broad_phase.update().expect("within the limits");
+        let made = broad_phase.report().checks.made;
+        assert!(made < 200, "{made} checks for one moving box: {}", broad_phase.report().plan);
+    }
+}
+
+#[test]
+fn an_update_that_finds_too_many_pairs_can_be_repeated() {
+    let limits = Limits { max_pairs: 10, ..Limits::DEFAULT };
+    let mut broad_phase = BroadPhase::new(Config { limits, ..Config::DEFAULT }).expect("a good margin");
+    let unit = Aabb::new([0.0; 3], [1.0; 3]);
+    for id in 0..6 {
+        broad_phase.set(id, unit, ProxyFilter::ALL).expect("a small id");
+    }
+    assert_eq!(broad_phase.update().unwrap_err(), Error::TooManyPairs { limit: 10 });
+    assert!(broad_phase.events().added.is_empty() && broad_phase.pair_count() == 0, "no partial result");
+    broad_phase.remove(5);
+    assert_eq!(broad_phase.update().expect("ten pairs now").added.len(), 10);
+}
+
+#[test]
+fn bad_arguments_are_errors() {
+    for margin in [-1.0, f32::NAN, f32::INFINITY] {
+        let error = BroadPhase::new(Config { margin, ..Config::DEFAULT }).unwrap_err();
+        assert!(error.to_string().contains("margin"), "{error}");
+    }
+    let mut broad_phase = BroadPhase::new(Config::DEFAULT).expect("a good margin");
+    let error = broad_phase.set(u32::MAX, Aabb::NOWHERE, ProxyFilter::ALL).unwrap_err();
+    assert!(matches!(error, Error::TooManyBoxes { boxes: 4_294_967_296, .. }));
+    assert!(!broad_phase.remove(5), "an unknown id is not there");
+}
