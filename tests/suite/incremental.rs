@@ -138,7 +138,7 @@ fn moving_sets_where_all_or_a_few_boxes_move() {
 fn contract_5_no_change_no_work_and_few_changes_little() {
     let boxes = BoxSet::named("unit").expect("the set exists").boxes(20_000, 5);
     let mut broad_phase = BroadPhase::new(Config { margin: 0.05, ..Config::DEFAULT }).expect("a good margin");
-    let mut set_all = |broad_phase: &mut BroadPhase, by: f32| {
+    let set_all = |broad_phase: &mut BroadPhase, by: f32| {
         for (id, b) in boxes.iter().enumerate() {
             let aabb = Aabb::new(b.min.map(|x| x + by), b.max.map(|x| x + by));
             broad_phase.set(id as u32, aabb, ProxyFilter::ALL).expect("a small id");

@@ -2,7 +2,7 @@
 
 use pbig_core::Aabb;
 use rand::rngs::StdRng;
-use rand::{Rng, RngExt, SeedableRng};
+use rand::{RngExt, SeedableRng};
 use rand_distr::{Distribution, Normal};
 
 /// A named generator: `n` boxes from a seed, the same ones every time.

@@ -34,11 +34,25 @@ impl PbigPlan {
         let (space, origin) = space_of(summary);
         let wanted = config.pbig_boxes_per_cell.max(1.0);
         let n = summary.valid;
-        let cell = pbig_cell(&summary.sample, n, space, wanted);
-        let dims = space.map(|length| ((length / cell).ceil() as u32).clamp(1, 1 << 10));
+        let mut cell = pbig_cell(&summary.sample, n, space, wanted);
+        // Oversize boxes in the sample raise alpha, and with it f, whatever the cell: the search
+        // would end at a billion cells for a handful of boxes.
+        while cells_along(space, cell).product::<u64>() > u64::from(n).max(64) * MAX_CELLS_PER_BOX {
+            cell *= 1.25;
+        }
+        let mut along = cells_along(space, cell).map(|cells| cells as u32);
+        let dims = std::array::from_fn(|_| along.next().unwrap_or(1));
         let objective = pbig_objective(&summary.sample, n, space, cell);
         Self { cell, origin, dims, max_cells_per_box: 512, objective }
     }
+}
+
+/// Cells in all, per box: beyond, empty cells cost more than full ones.
+const MAX_CELLS_PER_BOX: u64 = 4;
+
+/// Equation 3, axis by axis.
+fn cells_along(space: [f32; 3], cell: f32) -> impl Iterator<Item = u64> {
+    space.into_iter().map(move |length| ((length / cell).ceil() as u64).max(1))
 }
 
 /// The space of the paper: from the lowest corner to the highest, of most of the sample.
@@ -52,11 +66,10 @@ fn space_of(summary: &Summary) -> ([f32; 3], [f32; 3]) {
 /// `f = N alpha / M`, the average number of entries per cell, for cubic cells of edge `cell`
 /// (equations 2 to 5, `alpha` estimated from the sample).
 pub fn pbig_objective(sample: &[Aabb], n: u32, space: [f32; 3], cell: f32) -> f32 {
-    let cells_along = |length: f32| f64::from((length / cell).ceil().max(1.0));
-    let cells: f64 = space.into_iter().map(cells_along).product();
-    let occupied = |b: &Aabb| b.extents().into_iter().map(cells_along).product::<f64>();
+    let cells = |lengths: [f32; 3]| cells_along(lengths, cell).map(|c| c as f64).product::<f64>();
+    let occupied = |b: &Aabb| cells(b.extents());
     let alpha = sample.iter().map(occupied).sum::<f64>() / sample.len().max(1) as f64;
-    (f64::from(n) * alpha / cells) as f32
+    (f64::from(n) * alpha / cells(space)) as f32
 }
 
 /// The smallest cell with `f >= wanted` (equation 6), by a binary search on its edge as the paper
