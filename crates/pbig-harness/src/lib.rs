@@ -1,3 +1,10 @@
 //! Scenes, box sets, the headless runner and the shadow checker behind the `pbig` program.
 
 pub mod boxes;
+pub mod chart;
+pub mod files;
+pub mod runner;
+pub mod scenes;
+pub mod shadow;
+pub mod simulate;
+pub mod world;

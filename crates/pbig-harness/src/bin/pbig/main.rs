@@ -1,1 +1,71 @@
-fn main(){}
+//! The `pbig` program. Its commands, files, JSON and exit status are in docs/CLI.md; other programs
+//! rely on them.
+
+mod doctor;
+mod options;
+mod output;
+mod pairs;
+mod replay;
+mod simulate;
+
+use clap::{Parser, Subcommand};
+use output::Failure;
+use std::process::ExitCode;
+
+/// Finds every pair of overlapping axis-aligned boxes.
+#[derive(Parser)]
+#[command(version, about)]
+struct Cli {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    /// All overlapping pairs of the boxes in a file.
+    Pairs(pairs::Args),
+    /// Pairs that come and go while boxes move from frame to frame.
+    Replay(replay::Args),
+    /// A headless rapier world.
+    Simulate(simulate::Args),
+    /// The scenes for `simulate`, with a line each.
+    Scenes,
+    /// What this machine offers, what is chosen and why, and a self-test.
+    Doctor,
+}
+
+fn main() -> ExitCode {
+    match Cli::try_parse() {
+        Ok(cli) => finish(run(cli.command)),
+        Err(error) if !error.use_stderr() => finish(output::print(&error.to_string())),
+        // One line on stderr, as for any other bad input; clap's own has several.
+        Err(error) => finish(Err(Failure::Input(usage_line(&error.to_string())))),
+    }
+}
+
+fn run(command: Command) -> Result<(), Failure> {
+    match command {
+        Command::Pairs(args) => pairs::run(&args),
+        Command::Replay(args) => replay::run(&args),
+        Command::Simulate(args) => simulate::run(&args),
+        Command::Scenes => simulate::list(),
+        Command::Doctor => doctor::run(),
+    }
+}
+
+fn usage_line(message: &str) -> String {
+    let lines: Vec<&str> = message.lines().map(str::trim).filter(|line| !line.is_empty()).collect();
+    let told: Vec<&str> = lines.into_iter().take_while(|line| !line.starts_with("Usage:")).collect();
+    format!("{} (see pbig --help)", told.join(" ").trim_start_matches("error: "))
+}
+
+fn finish(result: Result<(), Failure>) -> ExitCode {
+    match result {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(failure) => {
+            // Nothing is left to do when stderr is closed too.
+            let _ = std::io::Write::write_all(&mut std::io::stderr(), format!("pbig: {failure}\n").as_bytes());
+            failure.code()
+        }
+    }
+}

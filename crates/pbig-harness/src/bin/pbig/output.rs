@@ -1,0 +1,56 @@
+//! What the program prints, and how it ends.
+
+use std::fmt;
+use std::io::{ErrorKind, IsTerminal, Write};
+use std::process::ExitCode;
+
+/// Why the program ends with a status other than 0.
+#[derive(Debug)]
+pub(crate) enum Failure {
+    /// A check failed: status 1.
+    Check(String),
+    /// Bad usage or bad input: status 2.
+    Input(String),
+}
+
+impl Failure {
+    pub(crate) fn code(&self) -> ExitCode {
+        ExitCode::from(match self {
+            Self::Check(_) => 1,
+            Self::Input(_) => 2,
+        })
+    }
+}
+
+impl fmt::Display for Failure {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let (Self::Check(message) | Self::Input(message)) = self;
+        f.write_str(message)
+    }
+}
+
+impl From<String> for Failure {
+    fn from(message: String) -> Self {
+        Self::Input(message)
+    }
+}
+
+/// Prints to stdout. A reader that has gone away (`pbig scenes | head -1`) is no failure.
+pub(crate) fn print(text: &str) -> Result<(), Failure> {
+    let mut stdout = std::io::stdout().lock();
+    let newline = if text.ends_with('\n') { "" } else { "\n" };
+    match write!(stdout, "{text}{newline}").and_then(|()| stdout.flush()) {
+        Err(error) if error.kind() != ErrorKind::BrokenPipe => Err(Failure::Input(format!("stdout: {error}"))),
+        _ => Ok(()),
+    }
+}
+
+/// A progress bar on stderr, when that is a terminal.
+pub(crate) fn progress(length: usize, what: &'static str) -> indicatif::ProgressBar {
+    if !std::io::stderr().is_terminal() {
+        return indicatif::ProgressBar::hidden();
+    }
+    let style = indicatif::ProgressStyle::with_template("{msg} {wide_bar} {pos}/{len} {eta}");
+    let bar = indicatif::ProgressBar::new(length as u64).with_message(what);
+    style.map_or(bar.clone(), |style| bar.with_style(style))
+}

@@ -1,0 +1,136 @@
+//! `pbig simulate` and `pbig scenes`: headless rapier worlds.
+
+use crate::options::{BackendOption, positive};
+use crate::output::{Failure, print, progress};
+use clap::ValueEnum;
+use pbig_harness::scenes::Scene;
+use pbig_harness::simulate::{Check, Outcome, Task, run as run_scene, run_checked};
+use rapier_pbig::PbigBroadPhase;
+use rapier3d::prelude::DefaultBroadPhase;
+use std::path::Path;
+
+#[derive(clap::Args)]
+pub(crate) struct Args {
+    /// The scene; `pbig scenes` lists them.
+    #[arg(long, value_name = "NAME")]
+    scene: String,
+    /// Bodies; each scene has its own default.
+    #[arg(long, value_name = "N", value_parser = positive)]
+    bodies: Option<usize>,
+    /// Steps of 1/60 s.
+    #[arg(long, value_name = "K", default_value = "300", value_parser = positive)]
+    steps: usize,
+    /// Which broad phase drives the world.
+    #[arg(long, value_enum, default_value_t)]
+    broad_phase: BroadPhaseOption,
+    /// Where pbig works.
+    #[arg(long, value_enum, default_value_t)]
+    backend: BackendOption,
+    /// For the random numbers of the scene.
+    #[arg(long, default_value = "1")]
+    seed: u64,
+    /// Run rapier's broad phase and the oracle beside pbig and compare after every call.
+    #[arg(long)]
+    check: bool,
+    /// Print one JSON object.
+    #[arg(long)]
+    json: bool,
+}
+
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+enum BroadPhaseOption {
+    #[default]
+    Pbig,
+    Stock,
+}
+
+impl BroadPhaseOption {
+    fn name(self) -> &'static str {
+        match self {
+            Self::Pbig => "pbig",
+            Self::Stock => "stock",
+        }
+    }
+}
+
+pub(crate) fn list() -> Result<(), Failure> {
+    let line = |scene: Scene| format!("{:<11} {} ({} bodies)\n", scene.name, scene.about, scene.default_bodies);
+    print(&Scene::ALL.map(line).concat())
+}
+
+pub(crate) fn run(args: &Args) -> Result<(), Failure> {
+    let scene = Scene::named(&args.scene)?;
+    let bodies = args.bodies.unwrap_or(scene.default_bodies);
+    let task = Task { scene, bodies, steps: args.steps, seed: args.seed };
+    if args.check && args.broad_phase == BroadPhaseOption::Stock {
+        return Err(Failure::Input("--check compares pbig with stock: leave out --broad-phase stock".into()));
+    }
+    let bar = progress(args.steps, "steps");
+    let config = pbig_core::Config { backend: args.backend.config().backend, ..PbigBroadPhase::CONFIG };
+    let ours = PbigBroadPhase::with_config(config);
+    let outcome = match args.broad_phase {
+        _ if args.check => run_checked(task, ours, config.margin, Path::new("."), |_| bar.inc(1))?,
+        BroadPhaseOption::Pbig => run_scene(task, ours, |_| bar.inc(1)),
+        BroadPhaseOption::Stock => run_scene(task, DefaultBroadPhase::new(), |_| bar.inc(1)),
+    };
+    bar.finish_and_clear();
+    report(args, bodies, &outcome)?;
+    if outcome.failed() { Err(Failure::Check(failure_line(&outcome))) } else { Ok(()) }
+}
+
+/// The first difference and where the frames are.
+fn failure_line(outcome: &Outcome) -> String {
+    let check = outcome.check.as_ref();
+    let first = check.and_then(|c| c.differences.first()).map_or(String::new(), ToString::to_string);
+    let file = check.and_then(|c| c.frames_file.as_deref()).map_or(String::new(), |f| f.display().to_string());
+    format!("{first}; the frames up to there are in {file}")
+}
+
+fn report(args: &Args, bodies: usize, outcome: &Outcome) -> Result<(), Failure> {
+    let backend = if args.broad_phase == BroadPhaseOption::Stock { "cpu" } else { args.backend.in_use() };
+    if args.json {
+        let object = serde_json::json!({
+            "scene": args.scene,
+            "bodies": bodies,
+            "colliders": outcome.colliders,
+            "steps": outcome.steps,
+            "broad_phase": args.broad_phase.name(),
+            "backend": backend,
+            "adapter": null,
+            "ms": { "broad_phase": outcome.broad_phase, "step": outcome.step },
+            "pairs": outcome.pairs,
+            "added": outcome.added,
+            "removed": outcome.removed,
+            "check": outcome.check.as_ref().map(check_object),
+        });
+        return print(&object.to_string());
+    }
+    let (broad_phase, step) = (outcome.broad_phase, outcome.step);
+    print(&format!(
+        "{}: {bodies} bodies, {} colliders, {} steps with the {} broad phase\n\
+         broad phase {:.3} ms a step (median; {:.3} to {:.3}), whole step {:.3} ms ({:.3} to {:.3})\n\
+         {} pairs at the end; {} added, {} removed\n{}",
+        args.scene, outcome.colliders, outcome.steps, args.broad_phase.name(),
+        broad_phase.median, broad_phase.min, broad_phase.max, step.median, step.min, step.max,
+        outcome.pairs, outcome.added, outcome.removed,
+        outcome.check.as_ref().map_or(String::new(), check_line),
+    ))
+}
+
+fn check_object(check: &Check) -> serde_json::Value {
+    serde_json::json!({
+        "calls": check.calls,
+        "oracle_pairs": check.oracle_pairs,
+        "stock_only": check.stock_only,
+        "missing": check.missing(),
+        "differences": check.differences.iter().map(ToString::to_string).collect::<Vec<_>>(),
+        "frames_file": check.frames_file,
+    })
+}
+
+fn check_line(check: &Check) -> String {
+    format!(
+        "checked {} calls: {} missing pairs of {} that the oracle found; {} pairs of stock alone, all without contact or excluded by a filter",
+        check.calls, check.missing(), check.oracle_pairs, check.stock_only
+    )
+}

@@ -1,0 +1,131 @@
+//! Runs a scene step by step and measures the broad phase and the whole step.
+
+use crate::scenes::Scene;
+use crate::world::World;
+use rapier3d::prelude::*;
+use std::time::{Duration, Instant};
+
+/// A broad phase with a clock around it.
+pub struct Timed<B> {
+    /// The broad phase.
+    pub inner: B,
+    /// Time inside since the last [`Timed::take`].
+    time: Duration,
+    /// `AddPair` events so far.
+    pub added: u64,
+    /// `DeletePair` events so far.
+    pub removed: u64,
+}
+
+impl<B> Timed<B> {
+    /// Starts at zero.
+    pub fn new(inner: B) -> Self {
+        Self { inner, time: Duration::ZERO, added: 0, removed: 0 }
+    }
+
+    /// The time since the last call.
+    pub fn take(&mut self) -> Duration {
+        std::mem::take(&mut self.time)
+    }
+}
+
+impl<B: BroadPhase> BroadPhase for Timed<B> {
+    fn update(
+        &mut self,
+        params: &IntegrationParameters,
+        colliders: &ColliderSet,
+        bodies: &RigidBodySet,
+        modified: &[ColliderHandle],
+        removed: &[ColliderHandle],
+        events: &mut Vec<BroadPhasePairEvent>,
+    ) {
+        let before = events.len();
+        let clock = Instant::now();
+        self.inner.update(params, colliders, bodies, modified, removed, events);
+        self.time += clock.elapsed();
+        let is_added = |event: &&BroadPhasePairEvent| matches!(event, BroadPhasePairEvent::AddPair(_));
+        let added = events[before..].iter().filter(is_added).count();
+        self.added += added as u64;
+        self.removed += (events.len() - before - added) as u64;
+    }
+}
+
+/// Milliseconds of one step.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct StepTime {
+    /// Inside the broad phase, all its calls.
+    pub broad_phase: f64,
+    /// Of the whole step, the broad phase included.
+    pub step: f64,
+}
+
+/// A scene being run with one broad phase.
+pub struct Run<B> {
+    /// The world.
+    pub world: World,
+    /// The broad phase and its counts.
+    pub broad_phase: Timed<B>,
+    /// One for each step so far.
+    pub times: Vec<StepTime>,
+}
+
+impl<B: BroadPhase> Run<B> {
+    /// Builds the scene.
+    pub fn new(scene: Scene, bodies: usize, seed: u64, broad_phase: B) -> Self {
+        Self { world: scene.build(bodies, seed), broad_phase: Timed::new(broad_phase), times: Vec::new() }
+    }
+
+    /// One step, measured.
+    pub fn step(&mut self) {
+        let clock = Instant::now();
+        self.world.step(&mut self.broad_phase);
+        let step = milliseconds(clock.elapsed());
+        let broad_phase = milliseconds(self.broad_phase.take());
+        self.times.push(StepTime { broad_phase, step });
+    }
+
+    /// Pairs that the narrow phase knows: edges of contacts and of intersections.
+    pub fn pairs(&self) -> usize {
+        let narrow_phase = &self.world.narrow_phase;
+        narrow_phase.contact_pairs().count() + narrow_phase.intersection_pairs().count()
+    }
+}
+
+/// A duration in milliseconds.
+pub fn milliseconds(time: Duration) -> f64 {
+    time.as_secs_f64() * 1e3
+}
+
+/// Smallest, median and largest of some times.
+#[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize)]
+pub struct Spread {
+    /// The smallest.
+    pub min: f64,
+    /// The median; of an even count, the upper of the two in the middle.
+    pub median: f64,
+    /// The largest.
+    pub max: f64,
+}
+
+impl Spread {
+    /// Of any number of times; zeros for none.
+    pub fn of(times: impl IntoIterator<Item = f64>) -> Self {
+        let mut times: Vec<f64> = times.into_iter().collect();
+        times.sort_unstable_by(f64::total_cmp);
+        match times[..] {
+            [] => Self::default(),
+            [min, ..] => Self { min, median: times[times.len() / 2], max: times[times.len() - 1] },
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn spread_by_hand() {
+        assert_eq!(Spread::of([3.0, 1.0, 2.0]), Spread { min: 1.0, median: 2.0, max: 3.0 });
+        assert_eq!(Spread::of([]), Spread::default());
+    }
+}

@@ -1,0 +1,101 @@
+//! A headless rapier world, and the conversion from glam, in which scenes are built.
+
+use glam::{Quat, Vec3};
+use rapier3d::prelude::*;
+
+/// Everything that rapier keeps apart, together; the broad phase is lent to each step.
+pub struct World {
+    /// Rigid bodies.
+    pub bodies: RigidBodySet,
+    /// Colliders.
+    pub colliders: ColliderSet,
+    /// Joints between bodies.
+    pub impulse_joints: ImpulseJointSet,
+    /// Articulations.
+    pub multibody_joints: MultibodyJointSet,
+    /// Contacts and intersections.
+    pub narrow_phase: NarrowPhase,
+    /// Acceleration, m/s^2.
+    pub gravity: Vec3,
+    /// Step length and the like.
+    pub params: IntegrationParameters,
+    islands: IslandManager,
+    ccd_solver: CCDSolver,
+    pipeline: PhysicsPipeline,
+}
+
+impl Default for World {
+    fn default() -> Self {
+        Self {
+            bodies: RigidBodySet::new(),
+            colliders: ColliderSet::new(),
+            impulse_joints: ImpulseJointSet::new(),
+            multibody_joints: MultibodyJointSet::new(),
+            narrow_phase: NarrowPhase::new(),
+            gravity: Vec3::new(0.0, -9.81, 0.0),
+            params: IntegrationParameters::default(),
+            islands: IslandManager::new(),
+            ccd_solver: CCDSolver::new(),
+            pipeline: PhysicsPipeline::new(),
+        }
+    }
+}
+
+impl World {
+    /// One step of rapier's physics pipeline.
+    pub fn step(&mut self, broad_phase: &mut dyn BroadPhase) {
+        self.pipeline.step(
+            &to_vector(self.gravity),
+            &self.params,
+            &mut self.islands,
+            broad_phase,
+            &mut self.narrow_phase,
+            &mut self.bodies,
+            &mut self.colliders,
+            &mut self.impulse_joints,
+            &mut self.multibody_joints,
+            &mut self.ccd_solver,
+            &(),
+            &(),
+        );
+    }
+
+    /// Adds a body with one collider.
+    pub fn add(&mut self, body: RigidBodyBuilder, collider: ColliderBuilder) -> RigidBodyHandle {
+        let handle = self.bodies.insert(body);
+        self.colliders.insert_with_parent(collider, handle, &mut self.bodies);
+        handle
+    }
+
+    /// A dynamic body at a place.
+    pub fn dynamic(at: Vec3) -> RigidBodyBuilder {
+        RigidBodyBuilder::dynamic().translation(to_vector(at))
+    }
+
+    /// Removes a body with its colliders.
+    pub fn remove(&mut self, body: RigidBodyHandle) {
+        let Self { bodies, islands, colliders, impulse_joints, multibody_joints, .. } = self;
+        bodies.remove(body, islands, colliders, impulse_joints, multibody_joints, true);
+    }
+
+    /// Every number that makes up the poses of all bodies, bit by bit, in order: equal exactly when
+    /// two worlds are.
+    pub fn pose_bits(&self) -> Vec<u32> {
+        let bits = |(_, body): (RigidBodyHandle, &RigidBody)| {
+            let pose = body.position();
+            let numbers = pose.translation.vector.iter().chain(pose.rotation.coords.iter());
+            numbers.map(|x| x.to_bits()).collect::<Vec<_>>()
+        };
+        self.bodies.iter().flat_map(bits).collect()
+    }
+}
+
+/// glam's vector as rapier's.
+pub fn to_vector(v: Vec3) -> Vector<Real> {
+    vector![v.x, v.y, v.z]
+}
+
+/// A glam rotation as the scaled axis that rapier's builders take.
+pub fn to_rotation(q: Quat) -> Vector<Real> {
+    to_vector(q.to_scaled_axis())
+}
