@@ -1,1 +1,146 @@
-fn main(){}
+//! The main job: thousands of objects fall, once with rapier's own broad phase and once with pbig's,
+//! step by step in turn, so that both see the same noise of the machine.
+//!
+//! `cargo run --release --example falling_objects -- --help`
+
+use clap::{Parser, ValueEnum};
+use pbig_core::{Backend, Config};
+use pbig_harness::chart::{self, Panel, Series};
+use pbig_harness::runner::{Run, Spread, StepTime};
+use pbig_harness::scenes::Scene;
+use pbig_harness::shadow::{Fault, Shadow};
+use rapier_pbig::PbigBroadPhase;
+use rapier3d::prelude::{BroadPhase, DefaultBroadPhase};
+use std::io::IsTerminal;
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+/// Objects fall in rapier, with its own broad phase and with pbig's.
+#[derive(Parser)]
+struct Args {
+    /// How many objects.
+    #[arg(long, default_value_t = 10_000)]
+    bodies: usize,
+    /// Steps of 1/60 s.
+    #[arg(long, default_value_t = 300)]
+    steps: usize,
+    /// Which scene; a wrong name lists the right ones.
+    #[arg(long, default_value = "column", value_parser = Scene::named)]
+    scene: Scene,
+    /// Where pbig works.
+    #[arg(long, value_enum, default_value_t)]
+    backend: BackendOption,
+    /// For the random numbers of the scene.
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// Where to write the chart (SVG).
+    #[arg(long, default_value = "out/falling_objects.svg")]
+    chart: PathBuf,
+}
+
+#[derive(Clone, Copy, Default, ValueEnum)]
+enum BackendOption {
+    #[default]
+    Auto,
+    Cpu,
+    Gpu,
+    Brute,
+}
+
+impl BackendOption {
+    fn config(self) -> Config {
+        let backend = match self {
+            Self::Auto => Backend::Auto,
+            Self::Cpu => Backend::Cpu,
+            Self::Gpu => Backend::Gpu,
+            Self::Brute => Backend::Brute,
+        };
+        Config { backend, ..PbigBroadPhase::CONFIG }
+    }
+}
+
+/// Steps from one comparison with the oracle to the next; events are followed in all of them.
+const CHECK_EVERY: usize = 20;
+
+fn main() -> ExitCode {
+    let args = Args::parse();
+    let new = || PbigBroadPhase::with_config(args.backend.config());
+    let mut stock = Run::new(args.scene, args.bodies, args.seed, DefaultBroadPhase::new());
+    let mut ours = Run::new(args.scene, args.bodies, args.seed, new());
+    let bar = progress(args.steps as u64);
+    for _ in 0..args.steps {
+        stock.step();
+        ours.step();
+        bar.inc(1);
+    }
+    bar.finish_and_clear();
+    let checked = check(&args, new());
+    println!("{} with {} bodies, {} steps\n", args.scene.name, args.bodies, args.steps);
+    print_table(&stock, &ours, &checked);
+    println!("\n{}", ours.broad_phase.inner.report().plan);
+    if let Some(why) = ours.broad_phase.inner.report().fallback {
+        println!("note: {why}");
+    }
+    match write_chart(&args, &stock.times, &ours.times) {
+        Ok(()) => println!("chart: {}", args.chart.display()),
+        Err(error) => eprintln!("{error}"),
+    }
+    if checked.missing == 0 { ExitCode::SUCCESS } else { ExitCode::FAILURE }
+}
+
+fn progress(steps: u64) -> indicatif::ProgressBar {
+    if std::io::stderr().is_terminal() { indicatif::ProgressBar::new(steps) } else { indicatif::ProgressBar::hidden() }
+}
+
+/// What the oracle says about a third run, apart from the measured ones because it is slow.
+struct Checked {
+    comparisons: usize,
+    missing: usize,
+}
+
+fn check(args: &Args, broad_phase: PbigBroadPhase) -> Checked {
+    let shadow = Shadow::new(broad_phase, PbigBroadPhase::CONFIG.margin).every(CHECK_EVERY);
+    let mut run = Run::new(args.scene, args.bodies, args.seed, shadow);
+    let bar = progress(args.steps as u64);
+    for _ in 0..args.steps {
+        run.step();
+        bar.inc(1);
+    }
+    bar.finish_and_clear();
+    let shadow = run.broad_phase.inner;
+    let missing = |fault: Fault| matches!(fault, Fault::Missing | Fault::MissingContact);
+    let missing = shadow.differences.iter().filter(|d| missing(d.fault)).count();
+    Checked { comparisons: shadow.checked, missing }
+}
+
+fn print_table(stock: &Run<DefaultBroadPhase>, ours: &Run<PbigBroadPhase>, checked: &Checked) {
+    println!("                                 stock        pbig   stock/pbig");
+    let row = |name: &str, of: fn(&StepTime) -> f64| {
+        let [stock, ours] = [&stock.times, &ours.times].map(|times| Spread::of(times.iter().map(of)).median);
+        println!("{name:<26} {stock:>11.3} {ours:>11.3} {:>11.2}x", stock / ours);
+    };
+    row("broad phase, ms a step", |t| t.broad_phase);
+    row("whole step, ms", |t| t.step);
+    println!("{:<26} {:>11} {:>11}", "pairs at the end", stock.pairs(), ours.pairs());
+    println!("{:<26} {:>11} {:>11}", "events", events(stock), events(ours));
+    let against = format!("(against the oracle, {} comparisons)", checked.comparisons);
+    println!("{:<26} {:>11} {:>11}   {against}", "missing pairs", "", checked.missing);
+    println!("\nTimes are medians over the steps. pbig leaves out the pairs that rapier's narrow phase throws away.");
+}
+
+fn events<B: BroadPhase>(run: &Run<B>) -> u64 {
+    run.broad_phase.added + run.broad_phase.removed
+}
+
+fn write_chart(args: &Args, stock: &[StepTime], ours: &[StepTime]) -> Result<(), String> {
+    let folder = args.chart.parent().filter(|folder| !folder.as_os_str().is_empty());
+    if let Some(folder) = folder {
+        std::fs::create_dir_all(folder).map_err(|error| format!("{}: {error}", folder.display()))?;
+    }
+    let panel = |title, of: fn(&StepTime) -> f64| {
+        let series = |name, times: &[StepTime]| Series { name, values: times.iter().map(of).collect() };
+        Panel { title, series: vec![series("stock", stock), series("pbig", ours)] }
+    };
+    let panels = [panel("broad phase", |t| t.broad_phase), panel("whole step", |t| t.step)];
+    chart::write(&args.chart, &panels)
+}

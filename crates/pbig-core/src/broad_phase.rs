@@ -341,7 +341,7 @@ impl BroadPhase {
         self.found.chunks.iter().for_each(|chunk| self.events.added.extend_from_slice(chunk));
         // Entries of boxes that have left the base are still in it: their home says so.
         let accept = |a: u32, b: u32| self.home[b as usize] == Home::Base && state.is_added(a, b);
-        let mut checker = Checker { accept: &accept, out: &mut self.events.added, checks: 0, overlaps: 0 };
+        let mut checker = Checker::new(&accept, &mut self.events.added);
         for old in &self.changed {
             let aabb = self.boxes[old.id as usize];
             if aabb.is_valid() {

@@ -7,9 +7,10 @@
 //!
 //! and the list meets itself.
 
-use super::map::{Entry, Grid, Map};
+use super::map::{Entries, Grid, Map, Query};
 use crate::{Aabb, Error, Pair};
 use rayon::prelude::*;
+use std::ops::Range;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 /// Entries in one piece of work: enough to hide the cost of handing it out (a few us against 100),
@@ -48,86 +49,134 @@ impl Found {
     }
 }
 
-/// Tests one box against others, counting.
+/// Tests boxes against runs of candidates, and takes those that overlap and are accepted.
 pub(crate) struct Checker<'a, A> {
     /// Whether an overlapping pair of ids is to be reported (filters, changes).
-    pub(crate) accept: &'a A,
+    accept: &'a A,
     pub(crate) out: &'a mut Vec<Pair>,
     pub(crate) checks: u64,
     pub(crate) overlaps: u64,
+    /// Places of the overlapping boxes of a run; longer than any run so far.
+    hits: Vec<u32>,
 }
 
-impl<A: Fn(u32, u32) -> bool> Checker<'_, A> {
+impl<'a, A: Fn(u32, u32) -> bool> Checker<'a, A> {
+    pub(crate) fn new(accept: &'a A, out: &'a mut Vec<Pair>) -> Self {
+        Self { accept, out, checks: 0, overlaps: 0, hits: Vec::new() }
+    }
+
+    /// Tests the box `id` against the entries in `run`.
+    ///
+    /// In two passes: whether a candidate overlaps is a coin toss that no branch predictor wins, so
+    /// the first appends without a branch.
     #[inline(always)]
-    pub(crate) fn test(&mut self, one: &Aabb, id: u32, others: &[Entry]) {
-        self.checks += others.len() as u64;
-        for other in others {
-            if one.overlaps(&other.aabb) {
-                self.overlaps += 1;
-                if (self.accept)(id, other.id) {
-                    self.out.push(Pair::new(id, other.id));
-                }
+    pub(crate) fn test(&mut self, query: &Query, id: u32, entries: &Entries, run: Range<usize>) {
+        let candidates = &entries.boxes[run.start..run.end];
+        self.checks += candidates.len() as u64;
+        if self.hits.len() < candidates.len() {
+            self.hits.resize(candidates.len(), 0);
+        }
+        let hits = &mut self.hits[..candidates.len()];
+        let mut count = 0;
+        for (i, candidate) in candidates.iter().enumerate() {
+            hits[count] = i as u32;
+            count += usize::from(candidate.overlaps(query));
+        }
+        if count > 0 {
+            self.take(id, &entries.ids[run.start..run.end], count);
+        }
+    }
+
+    #[inline]
+    fn take(&mut self, id: u32, ids: &[u32], count: usize) {
+        self.overlaps += count as u64;
+        for &hit in &self.hits[..count] {
+            let other = ids[hit as usize];
+            if (self.accept)(id, other) {
+                self.out.push(Pair::new(id, other));
             }
         }
     }
 }
 
 impl Grid {
-    /// The entries in `length` consecutive cells from `key` on, in at most two pieces because keys
-    /// wrap around.
+    /// The entries in `length` consecutive cells from `key` on; keys wrap around.
     #[inline(always)]
-    fn run(&self, key: u32, length: u32, mut visit: impl FnMut(&[Entry])) {
+    fn test_cells<A: Fn(u32, u32) -> bool>(
+        &self,
+        checker: &mut Checker<'_, A>,
+        query: &Query,
+        id: u32,
+        key: u32,
+        length: u32,
+    ) {
         let cells = self.starts.len() as u32 - 1;
-        let (start, end) = (key as usize, key + length);
+        let (start, end) = (self.starts[key as usize] as usize, key + length);
         if end <= cells {
-            visit(&self.entries[self.starts[start] as usize..self.starts[end as usize] as usize]);
+            checker.test(query, id, &self.entries, start..self.starts[end as usize] as usize);
         } else {
-            visit(&self.entries[self.starts[start] as usize..]);
-            visit(&self.entries[..self.starts[(end - cells) as usize] as usize]);
+            self.test_around_the_end(checker, query, id, start, end - cells);
         }
+    }
+
+    #[cold]
+    fn test_around_the_end<A: Fn(u32, u32) -> bool>(
+        &self,
+        checker: &mut Checker<'_, A>,
+        query: &Query,
+        id: u32,
+        start: usize,
+        cells: u32,
+    ) {
+        checker.test(query, id, &self.entries, start..self.entries.len());
+        checker.test(query, id, &self.entries, 0..self.starts[cells as usize] as usize);
     }
 
     /// Entry `i` against the half of its window that comes after it: the rest of its row, the rows
     /// above in its layer, and the rows of the layers above.
     #[inline(always)]
     fn check_half<A: Fn(u32, u32) -> bool>(&self, i: usize, checker: &mut Checker<'_, A>) {
-        let (entry, span) = (self.entries[i], self.spans[i]);
-        let (one, id, cells) = (&entry.aabb, entry.id, &self.cells);
-        let own_end = self.starts[entry.key as usize + 1] as usize;
-        checker.test(one, id, &self.entries[i + 1..own_end]);
+        let (query, id, key, span) = (self.entries.boxes[i].query(), self.entries.ids[i], self.keys[i], self.spans[i]);
+        let cells = &self.cells;
+        checker.test(&query, id, &self.entries, i + 1..self.starts[key as usize + 1] as usize);
         if span.up_x() > 0 {
-            let next = cells.wrap(entry.key + 1);
-            self.run(next, span.up_x(), |others| checker.test(one, id, others));
+            self.test_cells(checker, &query, id, cells.wrap(key + 1), span.up_x());
         }
-        let row = entry.key.wrapping_sub(span.down_x());
+        let row = key.wrapping_sub(span.down_x());
         let length = span.down_x() + span.up_x() + 1;
         for y in 1..=span.up_y() {
             let key = cells.wrap(row.wrapping_add(y * cells.stride_y));
-            self.run(key, length, |others| checker.test(one, id, others));
+            self.test_cells(checker, &query, id, key, length);
         }
         for z in 1..=span.up_z() {
             let mut key = row.wrapping_add(z * cells.stride_z).wrapping_sub(span.down_y() * cells.stride_y);
             for _ in 0..=span.down_y() + span.up_y() {
-                self.run(cells.wrap(key), length, |others| checker.test(one, id, others));
+                self.test_cells(checker, &query, id, cells.wrap(key), length);
                 key = key.wrapping_add(cells.stride_y);
             }
         }
     }
 
     /// Any box against every entry whose box it may overlap, each once.
-    pub(crate) fn check_window<A: Fn(u32, u32) -> bool>(&self, one: &Aabb, id: u32, checker: &mut Checker<'_, A>) {
+    pub(crate) fn check_window<A: Fn(u32, u32) -> bool>(
+        &self,
+        one: &Aabb,
+        id: u32,
+        checker: &mut Checker<'_, A>,
+    ) {
+        let query = Query::new(one);
         let (low, high) = self.window(one);
         let wide: [i64; 3] = std::array::from_fn(|k| i64::from(high[k]) - i64::from(low[k]) + 1);
         // A window that wraps onto itself would meet entries twice; one with more rows than there
-        // are entries is slower than a sweep. `CHUNK` keeps the comparison from being exact.
+        // are entries is slower than a sweep.
         let wraps = (0..3).any(|k| wide[k] > i64::from(self.cells.dims[k]));
         if wraps || wide[1] * wide[2] > self.entries.len() as i64 {
-            return checker.test(one, id, &self.entries);
+            return checker.test(&query, id, &self.entries, 0..self.entries.len());
         }
         for z in low[2]..=high[2] {
             for y in low[1]..=high[1] {
                 let key = self.cells.key([low[0], y, z]);
-                self.run(key, wide[0] as u32, |others| checker.test(one, id, others));
+                self.test_cells(checker, &query, id, key, wide[0] as u32);
             }
         }
     }
@@ -165,14 +214,14 @@ impl Map {
     where
         A: Fn(u32, u32) -> bool,
     {
-        let mut checker = Checker { accept, out, checks: 0, overlaps: 0 };
+        let mut checker = Checker::new(accept, out);
         let mut taken = 0;
         for i in chunk.start..chunk.end {
             match chunk.level {
                 Some(level) => self.check_entry(level, i, &mut checker),
                 None => {
-                    let entry = self.list[i];
-                    checker.test(&entry.aabb, entry.id, &self.list[i + 1..]);
+                    let (query, id) = (self.list.boxes[i].query(), self.list.ids[i]);
+                    checker.test(&query, id, &self.list, i + 1..self.list.len());
                 }
             }
             if !room.take(checker.out.len(), &mut taken) {
@@ -186,11 +235,13 @@ impl Map {
     fn check_entry<A: Fn(u32, u32) -> bool>(&self, level: usize, i: usize, checker: &mut Checker<'_, A>) {
         let grid = &self.grids[level];
         grid.check_half(i, checker);
-        let Entry { aabb, id, .. } = grid.entries[i];
+        let (stored, id) = (&grid.entries.boxes[i], grid.entries.ids[i]);
         for larger in &self.grids[level + 1..] {
-            larger.check_window(&aabb, id, checker);
+            larger.check_window(&stored.aabb(), id, checker);
         }
-        checker.test(&aabb, id, &self.list);
+        if self.list.len() > 0 {
+            checker.test(&stored.query(), id, &self.list, 0..self.list.len());
+        }
     }
 
     /// Every pair of `one` with a box of the map that overlaps it, whatever its size.
@@ -201,7 +252,7 @@ impl Map {
         for grid in &self.grids {
             grid.check_window(one, id, checker);
         }
-        checker.test(one, id, &self.list);
+        checker.test(&Query::new(one), id, &self.list, 0..self.list.len());
     }
 }
 

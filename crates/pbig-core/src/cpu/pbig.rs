@@ -7,7 +7,7 @@
 //! coordinates" when lower corners are meant, in integers, so exact on every device (contract 3).
 
 use super::check::{Checker, Found, Room};
-use super::map::Entry;
+use super::map::{Entries, Query};
 use crate::pair_index::{pair_count, pair_of, row_len, row_pair};
 use crate::plan::PbigPlan;
 use crate::report::Checks;
@@ -48,10 +48,11 @@ impl Touched {
 pub(crate) struct PbigGrid {
     offsets: Vec<u32>,
     places: Vec<u32>,
-    boxes: Vec<Entry>,
+    boxes: Vec<Aabb>,
+    ids: Vec<u32>,
     lowest: Vec<[u32; 3]>,
     /// Boxes that touch too many cells: tested against all.
-    list: Vec<Entry>,
+    list: Entries,
 }
 
 impl PbigGrid {
@@ -84,15 +85,16 @@ impl PbigGrid {
     /// Valid boxes into `boxes` with the cells they touch, oversize ones into `list`.
     fn select(&mut self, plan: &PbigPlan, boxes: &[Aabb]) -> Vec<Touched> {
         self.boxes.clear();
+        self.ids.clear();
         self.list.clear();
         let mut touched = Vec::new();
         for (id, aabb) in boxes.iter().enumerate().filter(|(_, b)| b.is_valid()) {
-            let entry = Entry { aabb: *aabb, id: id as u32, key: 0 };
             let cells = Touched::new(plan, aabb);
             if cells.count() > u64::from(plan.max_cells_per_box) {
-                self.list.push(entry);
+                self.list.push(aabb, id as u32);
             } else {
-                self.boxes.push(entry);
+                self.boxes.push(*aabb);
+                self.ids.push(id as u32);
                 touched.push(cells);
             }
         }
@@ -121,10 +123,13 @@ impl PbigGrid {
         }
         let mut checks = cell.checks;
         let mut taken = cell.taken;
-        let mut checker = Checker { accept, out, checks: 0, overlaps: 0 };
-        for (i, entry) in self.list.iter().enumerate() {
-            checker.test(&entry.aabb, entry.id, &self.list[i + 1..]);
-            checker.test(&entry.aabb, entry.id, &self.boxes);
+        let mut checker = Checker::new(accept, out);
+        // The list against itself, then every other box against the list.
+        for (i, (stored, &id)) in self.list.boxes.iter().zip(&self.list.ids).enumerate() {
+            checker.test(&stored.query(), id, &self.list, i + 1..self.list.len());
+        }
+        for (aabb, &id) in self.boxes.iter().zip(&self.ids) {
+            checker.test(&Query::new(aabb), id, &self.list, 0..self.list.len());
             if !room.take(checker.out.len(), &mut taken) {
                 break;
             }
@@ -174,11 +179,13 @@ impl<A: Fn(u32, u32) -> bool> CellChecker<'_, A> {
             self.checks.redundant += 1;
             return;
         }
-        let (one, other) = (&self.grid.boxes[i], &self.grid.boxes[j]);
-        if !one.aabb.overlaps(&other.aabb) {
+        if !self.grid.boxes[i].overlaps(&self.grid.boxes[j]) {
             self.checks.unnecessary += 1;
-        } else if (self.accept)(one.id, other.id) {
-            self.out.push(Pair::new(one.id, other.id));
+            return;
+        }
+        let (one, other) = (self.grid.ids[i], self.grid.ids[j]);
+        if (self.accept)(one, other) {
+            self.out.push(Pair::new(one, other));
         }
     }
 
