@@ -1,6 +1,7 @@
 //! The incremental facade: boxes are set and removed, an update tells which pairs came and went.
 
-use crate::cpu::check::{Checker, Found};
+use crate::cpu::check::Checker;
+use crate::cpu::find::Found;
 use crate::diff::PairStore;
 use crate::finder::{Search, check_count, fallback, single_entry_checks};
 use crate::cpu::map::Map;

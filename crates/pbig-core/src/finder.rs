@@ -1,6 +1,6 @@
 //! All pairs of a list of boxes, from nothing each time.
 
-use crate::cpu::check::Found;
+use crate::cpu::find::Found;
 use crate::cpu::emit;
 use crate::cpu::map::Map;
 use crate::cpu::pbig::PbigGrid;

@@ -1,7 +1,12 @@
-//! The CPU backend: `map` sorts boxes into cells, `check` tests candidates, `emit` orders pairs.
-//! `pbig` is the paper's grid, the scalar twin of the GPU kernels.
+//! The CPU backend. `map` sorts boxes into cells (`cells`, `entries`), `find` searches them (`half`
+//! within a grid, `check` across grids), `emit` orders the pairs. `pbig` is the paper's grid, the
+//! scalar twin of the GPU kernels.
 
+mod cells;
 pub(crate) mod check;
 pub(crate) mod emit;
+mod entries;
+pub(crate) mod find;
+mod half;
 pub(crate) mod map;
 pub(crate) mod pbig;

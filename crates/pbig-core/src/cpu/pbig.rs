@@ -6,8 +6,9 @@
 //! boxes, which is the cell of the paper's "corner of the intersection with the largest
 //! coordinates" when lower corners are meant, in integers, so exact on every device (contract 3).
 
-use super::check::{Checker, Found, Room};
-use super::map::{Entries, Query};
+use super::check::Checker;
+use super::entries::{Entries, Query};
+use super::find::{Found, Room};
 use crate::pair_index::{pair_count, pair_of, row_len, row_pair};
 use crate::plan::PbigPlan;
 use crate::report::Checks;
