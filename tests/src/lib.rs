@@ -1,6 +1,6 @@
 //! The corpus: sets of boxes that every strategy must get right, with the strategies to try.
 
-use pbig_core::{Aabb, Backend, Config, Strategy};
+use pbig_core::{Aabb, Backend, Config, Pair, Strategy};
 use pbig_harness::boxes::BoxSet;
 
 /// A set of boxes with a name to read in a failure.
@@ -29,6 +29,25 @@ pub fn corpus() -> Vec<Case> {
     let mut cases = sets();
     cases.extend(by_hand().into_iter().map(|(name, boxes)| Case { name: name.into(), boxes }));
     cases
+}
+
+/// How a list of pairs differs from the oracle's, if it does: the first fault, in words.
+pub fn difference(found: &[Pair], wanted: &[Pair]) -> Option<String> {
+    if let Some(pair) = found.iter().find(|pair| pair.a >= pair.b) {
+        return Some(format!("{pair:?} is not a < b"));
+    }
+    for two in found.windows(2) {
+        match two[0].cmp(&two[1]) {
+            std::cmp::Ordering::Less => {}
+            std::cmp::Ordering::Equal => return Some(format!("twice: {:?}", two[0])),
+            std::cmp::Ordering::Greater => return Some(format!("out of order: {two:?}")),
+        }
+    }
+    let missing = wanted.iter().find(|pair| found.binary_search(pair).is_err());
+    let spurious = found.iter().find(|pair| wanted.binary_search(pair).is_err());
+    missing
+        .map(|pair| format!("missing: {pair:?}, of {} pairs", wanted.len()))
+        .or(spurious.map(|pair| format!("spurious: {pair:?}, beside {} pairs", wanted.len())))
 }
 
 fn sets() -> Vec<Case> {

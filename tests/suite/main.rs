@@ -1,4 +1,7 @@
 //! One test binary: linking rapier once is what keeps the suite fast to build.
 
+mod drop_in;
 mod finder;
 mod incremental;
+mod planted;
+mod worlds;

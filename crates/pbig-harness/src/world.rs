@@ -42,6 +42,11 @@ impl Default for World {
 }
 
 impl World {
+    /// An empty world with the given acceleration, m/s^2.
+    pub fn with_gravity(gravity: Vec3) -> Self {
+        Self { gravity, ..Self::default() }
+    }
+
     /// One step of rapier's physics pipeline.
     pub fn step(&mut self, broad_phase: &mut dyn BroadPhase) {
         self.pipeline.step(
@@ -76,6 +81,11 @@ impl World {
     pub fn remove(&mut self, body: RigidBodyHandle) {
         let Self { bodies, islands, colliders, impulse_joints, multibody_joints, .. } = self;
         bodies.remove(body, islands, colliders, impulse_joints, multibody_joints, true);
+    }
+
+    /// Removes a collider.
+    pub fn remove_collider(&mut self, collider: ColliderHandle) {
+        self.colliders.remove(collider, &mut self.islands, &mut self.bodies, true);
     }
 
     /// Every number that makes up the poses of all bodies, bit by bit, in order: equal exactly when

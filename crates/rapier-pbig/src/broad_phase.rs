@@ -1,14 +1,22 @@
 //! `PbigBroadPhase`: rapier's calls translated to the finder's, and its events back.
 
 use crate::proxy::{collision_aabb, filter_of};
-use pbig_core::{BroadPhase as Finder, Config, Limits, Pair, Report};
+use pbig_core::{Aabb, BroadPhase as Finder, Config, Limits, Pair, ProxyFilter, Report};
 use rapier3d::prelude::{
-    BroadPhase, BroadPhasePairEvent, Collider, ColliderHandle, ColliderPair, ColliderSet,
-    IntegrationParameters, RigidBodySet,
+    BroadPhase, BroadPhasePairEvent, ColliderHandle, ColliderPair, ColliderSet, IntegrationParameters,
+    RigidBodySet,
 };
+use rayon::prelude::*;
 
 /// A collider index that is not in the finder. Rapier's generations cannot reach it.
 const ABSENT: u32 = u32::MAX;
+
+/// Modified colliders from which their boxes are computed on several threads: below, a second one
+/// costs more than it saves.
+const PARALLEL_FROM: usize = 2048;
+
+/// What the finder is told about a collider; nothing when it is gone or disabled.
+type Proxy = Option<(Aabb, ProxyFilter)>;
 
 /// The broad phase to hand to rapier's `PhysicsPipeline` or `CollisionPipeline`.
 ///
@@ -22,6 +30,8 @@ pub struct PbigBroadPhase {
     generations: Vec<u32>,
     /// Margin in units of `IntegrationParameters::length_unit`.
     relative_margin: f32,
+    /// Of the modified colliders of one call, in their order.
+    proxies: Vec<Proxy>,
 }
 
 impl Default for PbigBroadPhase {
@@ -47,7 +57,7 @@ impl PbigBroadPhase {
         let margin = if config.margin >= 0.0 && config.margin.is_finite() { config.margin } else { Self::CONFIG.margin };
         let config = Config { margin, limits: Limits::UNLIMITED, ..config };
         let finder = Finder::new(config).expect("the margin was checked above");
-        Self { finder, generations: Vec::new(), relative_margin: margin }
+        Self { finder, generations: Vec::new(), relative_margin: margin, proxies: Vec::new() }
     }
 
     /// What the last update did.
@@ -88,12 +98,32 @@ impl PbigBroadPhase {
         }
     }
 
-    fn set(&mut self, handle: ColliderHandle, collider: &Collider, params: &IntegrationParameters, bodies: &RigidBodySet) {
+    fn set(&mut self, handle: ColliderHandle, aabb: Aabb, filter: ProxyFilter) {
         let (index, generation) = handle.into_raw_parts();
         self.claim(index, generation);
-        let aabb = collision_aabb(params, bodies, collider);
-        if let Err(error) = self.finder.set(index, aabb, filter_of(bodies, collider)) {
+        if let Err(error) = self.finder.set(index, aabb, filter) {
             tracing::error!("pbig: collider {handle:?} is ignored: {error}");
+        }
+    }
+
+    /// Boxes and filters of the modified colliders. Most of it is waiting for the memory of each
+    /// collider and body, which a second thread halves.
+    fn compute_proxies(
+        &mut self,
+        params: &IntegrationParameters,
+        colliders: &ColliderSet,
+        bodies: &RigidBodySet,
+        modified: &[ColliderHandle],
+    ) {
+        let proxy = |handle: &ColliderHandle| -> Proxy {
+            let collider = colliders.get(*handle).filter(|collider| collider.is_enabled())?;
+            Some((collision_aabb(params, bodies, collider), filter_of(bodies, collider)))
+        };
+        if modified.len() < PARALLEL_FROM || rayon::current_num_threads() == 1 {
+            self.proxies.clear();
+            self.proxies.extend(modified.iter().map(proxy));
+        } else {
+            modified.par_iter().with_min_len(PARALLEL_FROM / 4).map(proxy).collect_into_vec(&mut self.proxies);
         }
     }
 
@@ -137,9 +167,10 @@ impl BroadPhase for PbigBroadPhase {
         }
         // A length unit that makes no sense leaves the margin as it was.
         let _ = self.finder.set_margin(self.relative_margin * params.length_unit);
-        for &handle in modified_colliders {
-            match colliders.get(handle).filter(|collider| collider.is_enabled()) {
-                Some(collider) => self.set(handle, collider, params, bodies),
+        self.compute_proxies(params, colliders, bodies, modified_colliders);
+        for (i, &handle) in modified_colliders.iter().enumerate() {
+            match self.proxies[i] {
+                Some((aabb, filter)) => self.set(handle, aabb, filter),
                 None => self.remove(handle),
             }
         }

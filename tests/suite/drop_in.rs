@@ -1,0 +1,290 @@
+//! What rapier 0.27 is owed by its broad phase, call by call.
+
+use pbig_harness::shadow::Shadow;
+use pbig_harness::world::World;
+use rapier_pbig::PbigBroadPhase;
+use rapier3d::prelude::*;
+
+/// A world whose every step is checked beside stock and the oracle.
+struct Checked {
+    world: World,
+    broad_phase: Shadow<PbigBroadPhase>,
+}
+
+impl Checked {
+    /// Things stay where they are put: no gravity, and bodies that contacts cannot push.
+    fn new() -> Self {
+        let world = World::with_gravity(glam::Vec3::ZERO);
+        let shadow = Shadow::new(PbigBroadPhase::new(), PbigBroadPhase::CONFIG.margin);
+        Self { world, broad_phase: shadow }
+    }
+
+    fn ball(&mut self, x: f32) -> (RigidBodyHandle, ColliderHandle) {
+        let body = RigidBodyBuilder::dynamic().translation(vector![x, 0.0, 0.0]);
+        let body = self.world.bodies.insert(body.can_sleep(false).lock_translations().lock_rotations());
+        (body, self.attach(body))
+    }
+
+    fn attach(&mut self, body: RigidBodyHandle) -> ColliderHandle {
+        let World { bodies, colliders, .. } = &mut self.world;
+        colliders.insert_with_parent(ColliderBuilder::ball(0.5), body, bodies)
+    }
+
+    fn move_to(&mut self, body: RigidBodyHandle, x: f32) {
+        self.world.bodies[body].set_translation(vector![x, 0.0, 0.0], true);
+    }
+
+    /// Steps, checks, and returns how many pairs the broad phase keeps.
+    fn step(&mut self) -> usize {
+        self.world.step(&mut self.broad_phase);
+        if let Some(first) = self.broad_phase.differences.first() {
+            panic!("{first}");
+        }
+        self.broad_phase.inner.pair_count()
+    }
+
+    fn contacts(&self) -> usize {
+        self.world.narrow_phase.contact_pairs().count()
+    }
+}
+
+#[test]
+fn insertion_motion_and_removal() {
+    let mut scene = Checked::new();
+    let (a, _) = scene.ball(0.0);
+    let (_, _) = scene.ball(0.9);
+    assert_eq!(scene.step(), 1);
+    scene.move_to(a, 50.0);
+    assert_eq!((scene.step(), scene.contacts()), (0, 0));
+    scene.move_to(a, 1.5);
+    assert_eq!((scene.step(), scene.contacts()), (1, 1));
+    scene.world.remove(a);
+    scene.step();
+    assert_eq!(scene.contacts(), 0);
+}
+
+#[test]
+fn an_index_is_reused_in_the_step_in_which_it_is_freed() {
+    let mut scene = Checked::new();
+    let (body, old) = scene.ball(0.0);
+    scene.ball(0.9);
+    scene.step();
+    scene.world.remove_collider(old);
+    let new = scene.attach(body);
+    assert_eq!(old.into_raw_parts().0, new.into_raw_parts().0, "the index is reused");
+    assert_ne!(old, new);
+    assert_eq!((scene.step(), scene.contacts()), (1, 1), "the new collider has the pair");
+}
+
+#[test]
+fn a_collider_inserted_and_removed_before_the_first_step_is_nothing() {
+    let mut scene = Checked::new();
+    let (_, gone) = scene.ball(0.0);
+    scene.ball(0.9);
+    scene.world.remove_collider(gone);
+    assert_eq!(scene.step(), 0);
+}
+
+#[test]
+fn many_removed_at_once_and_others_added_in_the_same_step() {
+    let mut scene = Checked::new();
+    let first: Vec<_> = (0..200).map(|i| scene.ball(i as f32 * 0.9)).collect();
+    assert_eq!(scene.step(), 199);
+    for (body, _) in first.iter().rev().step_by(2) {
+        scene.world.remove(*body);
+    }
+    for i in 0..50 {
+        scene.ball(i as f32 * 0.9 + 0.3);
+    }
+    scene.step();
+    // Each new ball touches the next one and the old one that is nearest.
+    assert_eq!((scene.step(), scene.contacts()), (49 + 50, 49 + 50));
+}
+
+#[test]
+fn a_disabled_collider_has_no_pairs_and_gets_them_back_without_motion() {
+    let mut scene = Checked::new();
+    let (_, a) = scene.ball(0.0);
+    scene.ball(0.9);
+    scene.step();
+    scene.world.colliders[a].set_enabled(false);
+    assert_eq!(scene.step(), 0);
+    // On a body that goes on moving, the collider stays in the list of modified ones.
+    scene.step();
+    assert_eq!(scene.contacts(), 0);
+    scene.world.colliders[a].set_enabled(true);
+    assert_eq!((scene.step(), scene.contacts()), (1, 1));
+}
+
+#[test]
+fn a_body_is_disabled_while_one_that_it_overlaps_is_removed() {
+    let mut scene = Checked::new();
+    let (a, _) = scene.ball(0.0);
+    let (b, _) = scene.ball(0.5);
+    scene.ball(0.9);
+    assert_eq!(scene.step(), 3);
+    scene.world.bodies[a].set_enabled(false);
+    scene.world.remove(b);
+    assert_eq!((scene.step(), scene.contacts()), (0, 0));
+    scene.world.bodies[a].set_enabled(true);
+    assert_eq!((scene.step(), scene.contacts()), (1, 1));
+}
+
+#[test]
+fn colliders_of_one_body_never_pair_until_one_is_moved_to_another_body() {
+    let mut scene = Checked::new();
+    let (a, _) = scene.ball(0.0);
+    let second = scene.attach(a);
+    let (b, _) = scene.ball(10.0);
+    assert_eq!(scene.step(), 0);
+    scene.world.bodies[b].set_translation(vector![0.2, 0.0, 0.0], true);
+    assert_eq!(scene.step(), 2);
+    scene.world.colliders.set_parent(second, Some(b), &mut scene.world.bodies);
+    assert_eq!(scene.step(), 2, "first with second and with b's own");
+}
+
+#[test]
+fn groups_take_effect_without_motion() {
+    let mut scene = Checked::new();
+    let (_, a) = scene.ball(0.0);
+    scene.ball(0.9);
+    assert_eq!(scene.step(), 1);
+    scene.world.colliders[a].set_collision_groups(InteractionGroups::none());
+    assert_eq!((scene.step(), scene.contacts()), (0, 0));
+    scene.world.colliders[a].set_collision_groups(InteractionGroups::all());
+    assert_eq!((scene.step(), scene.contacts()), (1, 1));
+}
+
+#[test]
+fn kinds_of_bodies_take_effect_without_motion() {
+    let mut scene = Checked::new();
+    let (a, on_a) = scene.ball(0.0);
+    let (b, _) = scene.ball(0.9);
+    assert_eq!(scene.step(), 1);
+    scene.world.bodies[a].set_body_type(RigidBodyType::Fixed, true);
+    assert_eq!(scene.step(), 1);
+    scene.world.bodies[b].set_body_type(RigidBodyType::KinematicPositionBased, true);
+    assert_eq!(scene.step(), 0, "fixed and kinematic do not collide");
+    let types = ActiveCollisionTypes::default() | ActiveCollisionTypes::KINEMATIC_FIXED;
+    scene.world.colliders[on_a].set_active_collision_types(types);
+    assert_eq!(scene.step(), 1, "one collider that allows it is enough");
+}
+
+#[test]
+fn parentless_colliders_count_as_fixed() {
+    let mut scene = Checked::new();
+    for x in [0.0, 0.1] {
+        scene.world.colliders.insert(ColliderBuilder::ball(0.5).translation(vector![x, 0.0, 0.0]));
+    }
+    assert_eq!(scene.step(), 0);
+    scene.ball(0.2);
+    assert_eq!(scene.step(), 2);
+}
+
+#[test]
+fn contact_skin_and_prediction_reach_as_far_as_rapiers() {
+    let mut scene = Checked::new();
+    let (_, a) = scene.ball(0.0);
+    let (b, _) = scene.ball(1.3);
+    assert_eq!(scene.step(), 0);
+    scene.world.colliders[a].set_contact_skin(0.4);
+    scene.move_to(b, 1.31);
+    // The setter raises no flag in rapier; setting the position again does.
+    let pose = *scene.world.colliders[a].position();
+    scene.world.colliders[a].set_position(pose);
+    scene.step();
+    scene.world.params.normalized_prediction_distance = 0.5;
+    scene.move_to(b, 1.45);
+    assert_eq!(scene.step(), 1);
+}
+
+#[test]
+fn soft_ccd_boxes_contain_stocks_when_the_motion_is_cut_off_and_spins() {
+    for spin in [0.0, 30.0, 300.0] {
+        let mut world = World::with_gravity(glam::Vec3::ZERO);
+        let body = RigidBodyBuilder::dynamic().linvel(vector![900.0, 0.0, 0.0]).angvel(vector![0.0, 0.0, spin]);
+        world.add(body.soft_ccd_prediction(3.0), ColliderBuilder::cuboid(2.0, 0.1, 0.1));
+        // A curtain of targets around the path; stock tells which of them matter.
+        for i in 0..400 {
+            let at = vector![(i % 20) as f32 * 0.5 - 3.0, (i / 20) as f32 * 0.3 - 3.0, 0.0];
+            world.add(RigidBodyBuilder::dynamic().translation(at), ColliderBuilder::ball(0.05));
+        }
+        let pairs = |broad_phase: &mut dyn BroadPhase| {
+            let handles: Vec<_> = world.colliders.iter().map(|(handle, _)| handle).collect();
+            let mut events = Vec::new();
+            broad_phase.update(&world.params, &world.colliders, &world.bodies, &handles, &[], &mut events);
+            let pair = |event: &BroadPhasePairEvent| match event {
+                BroadPhasePairEvent::AddPair(p) => [p.collider1.into_raw_parts().0, p.collider2.into_raw_parts().0],
+                BroadPhasePairEvent::DeletePair(_) => panic!("nothing to delete"),
+            };
+            let found = events.iter().map(pair).map(|[a, b]| [a.min(b), a.max(b)]);
+            found.filter(|[a, _]| *a == 0).collect::<std::collections::BTreeSet<_>>()
+        };
+        // Positions of colliders are set by a step; the first one of each has just this effect.
+        let (stock, ours) = (pairs(&mut DefaultBroadPhase::new()), pairs(&mut PbigBroadPhase::new()));
+        assert!(stock.len() > 10 && ours.is_superset(&stock), "spin {spin}: {:?}", stock.difference(&ours));
+    }
+}
+
+#[test]
+fn a_nan_position_is_contained_and_the_others_go_on() {
+    let mut world = World::with_gravity(glam::Vec3::ZERO);
+    let mut broad_phase = PbigBroadPhase::new();
+    let mut place = |x: f32| {
+        let body = world.bodies.insert(RigidBodyBuilder::dynamic().translation(vector![x, 0.0, 0.0]));
+        world.colliders.insert_with_parent(ColliderBuilder::ball(0.5), body, &mut world.bodies)
+    };
+    let handles = [place(f32::NAN), place(0.0), place(0.9)];
+    let mut events = Vec::new();
+    broad_phase.update(&world.params, &world.colliders, &world.bodies, &handles, &[], &mut events);
+    assert_eq!(events.len(), 1, "the two good balls pair");
+    assert_eq!(broad_phase.report().invalid, 1);
+}
+
+#[test]
+fn calls_without_changes_do_nothing() {
+    let mut scene = Checked::new();
+    scene.ball(0.0);
+    scene.ball(0.9);
+    scene.step();
+    let World { params, colliders, bodies, .. } = &scene.world;
+    let broad_phase = &mut scene.broad_phase.inner;
+    let mut events = Vec::new();
+    broad_phase.update(params, colliders, bodies, &[], &[], &mut events);
+    let unknown = [ColliderHandle::from_raw_parts(77, 3), ColliderHandle::invalid()];
+    broad_phase.update(params, colliders, bodies, &unknown, &unknown, &mut events);
+    assert!(events.is_empty());
+    assert_eq!(broad_phase.pair_count(), 1);
+}
+
+#[test]
+fn the_collider_with_fewer_pairs_comes_first() {
+    let mut world = World::default();
+    let ground = world.colliders.insert(ColliderBuilder::halfspace(Vector::y_axis()));
+    for i in 0..20 {
+        let at = vector![i as f32 * 3.0, 0.4, 0.0];
+        world.add(RigidBodyBuilder::dynamic().translation(at), ColliderBuilder::ball(0.5));
+    }
+    let mut broad_phase = PbigBroadPhase::new();
+    world.step(&mut broad_phase);
+    let pairs: Vec<ColliderPair> = broad_phase.pairs().collect();
+    assert_eq!(pairs.len(), 20);
+    assert!(pairs.iter().all(|pair| pair.collider2 == ground));
+}
+
+#[test]
+fn the_collision_pipeline_works_as_with_stock() {
+    let (mut bodies, mut colliders) = (RigidBodySet::new(), ColliderSet::new());
+    let sensor = || {
+        let shape = ColliderBuilder::cuboid(1.0, 1.0, 1.0).sensor(true);
+        shape.active_collision_types(ActiveCollisionTypes::all())
+    };
+    let first = colliders.insert(sensor());
+    colliders.insert(sensor());
+    let (mut broad_phase, mut narrow_phase) = (PbigBroadPhase::new(), NarrowPhase::new());
+    let prediction = IntegrationParameters::default().prediction_distance();
+    CollisionPipeline::new().step(
+        prediction, &mut broad_phase, &mut narrow_phase, &mut bodies, &mut colliders, &(), &(),
+    );
+    assert_eq!(narrow_phase.intersection_pairs_with(first).filter(|(_, _, hit)| *hit).count(), 1);
+}

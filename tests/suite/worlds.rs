@@ -1,0 +1,121 @@
+//! Scenes in rapier: the shadow check finds nothing, and the same scene gives the same bits.
+
+use pbig_core::{Backend, Config, Strategy};
+use pbig_harness::runner::Run;
+use pbig_harness::scenes::Scene;
+use pbig_harness::simulate::{Task, run_checked};
+use pbig_harness::world::World;
+use rapier_pbig::PbigBroadPhase;
+use rapier3d::prelude::*;
+
+/// Bodies in a test; `pbig simulate --check` runs the scenes at their full size.
+const MOST_BODIES: usize = 1000;
+
+fn check(scene: Scene, config: Config, steps: usize) {
+    let bodies = scene.default_bodies.min(MOST_BODIES);
+    let task = Task { scene, bodies, steps, seed: 11 };
+    let folder = std::env::temp_dir();
+    let ours = PbigBroadPhase::with_config(config);
+    let outcome = run_checked(task, ours, config.margin, &folder, |_| ()).expect("the folder is writable");
+    let check = outcome.check.as_ref().expect("a check was asked for");
+    assert!(!outcome.failed(), "{}: {}", scene.name, check.differences[0]);
+    assert!(check.calls > 0 && check.oracle_pairs > 0, "{}: nothing was compared", scene.name);
+}
+
+#[test]
+fn every_scene_for_300_steps_beside_stock_and_the_oracle() {
+    for scene in Scene::ALL {
+        check(scene, PbigBroadPhase::CONFIG, 300);
+    }
+}
+
+#[test]
+fn every_scene_on_every_strategy() {
+    for strategy in pbig_tests::strategies() {
+        let (name, config) = strategy;
+        println!("{name}");
+        for scene in Scene::ALL {
+            check(scene, Config { margin: PbigBroadPhase::CONFIG.margin, ..config }, 40);
+        }
+    }
+}
+
+fn bits(scene: Scene, config: Config, threads: usize, steps: usize) -> Vec<u32> {
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool");
+    pool.install(|| {
+        let bodies = scene.default_bodies.min(MOST_BODIES);
+        let mut run = Run::new(scene, bodies, 5, PbigBroadPhase::with_config(config));
+        (0..steps).for_each(|_| run.step());
+        run.world.pose_bits()
+    })
+}
+
+#[test]
+fn the_same_scene_gives_bit_identical_positions_whatever_the_threads() {
+    for scene in Scene::ALL {
+        let wanted = bits(scene, PbigBroadPhase::CONFIG, 1, 120);
+        for threads in [1, 2] {
+            let got = bits(scene, PbigBroadPhase::CONFIG, threads, 120);
+            assert!(got == wanted, "{} on {threads} threads differs", scene.name);
+        }
+    }
+}
+
+#[test]
+fn a_world_large_enough_for_threads_gives_the_same_bits_on_one_and_two() {
+    let scene = Scene::named("column").expect("the scene exists");
+    let run = |threads| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool");
+        pool.install(|| {
+            let mut run = Run::new(scene, 6000, 5, PbigBroadPhase::new());
+            (0..60).for_each(|_| run.step());
+            run.world.pose_bits()
+        })
+    };
+    assert!(run(1) == run(2));
+}
+
+#[test]
+fn every_strategy_gives_the_same_bits() {
+    let scene = Scene::named("column").expect("the scene exists");
+    let with = |backend, strategy| Config { backend, strategy, ..PbigBroadPhase::CONFIG };
+    let wanted = bits(scene, PbigBroadPhase::CONFIG, 2, 120);
+    for config in [
+        with(Backend::Cpu, Strategy::Grid),
+        with(Backend::Cpu, Strategy::Pbig),
+        with(Backend::Brute, Strategy::Auto),
+        with(Backend::Gpu, Strategy::Auto),
+    ] {
+        assert!(bits(scene, config, 2, 120) == wanted, "{config:?}");
+    }
+}
+
+#[test]
+fn a_sleeping_world_costs_no_checks() {
+    let scene = Scene::named("sleeping").expect("the scene exists");
+    let mut run = Run::new(scene, 4000, 1, PbigBroadPhase::new());
+    // The awake body falls for a second before it lands on others.
+    let mut most = 0;
+    for step in 0..40 {
+        run.step();
+        let made = run.broad_phase.inner.report().checks.made;
+        most = if step > 2 { most.max(made) } else { 0 };
+    }
+    assert!(most < 500, "{most} checks in one update for one awake body");
+}
+
+#[test]
+fn objects_that_fall_for_ever_are_still_found_and_memory_does_not_follow_them() {
+    let mut world = World::with_gravity(glam::Vec3::NEG_Y * 1e4);
+    for i in 0..200 {
+        let at = vector![(i % 10) as f32 * 0.9, 0.0, (i / 10) as f32 * 0.9];
+        world.add(RigidBodyBuilder::dynamic().translation(at), ColliderBuilder::ball(0.5));
+    }
+    let mut broad_phase = PbigBroadPhase::new();
+    for _ in 0..2000 {
+        world.step(&mut broad_phase);
+    }
+    let depth = world.bodies.iter().map(|(_, b)| b.translation().y).fold(0.0, f32::min);
+    assert!(depth < -1e6, "fell to {depth}");
+    assert!(broad_phase.report().checks.made < 200 * 200);
+}
