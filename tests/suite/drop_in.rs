@@ -118,16 +118,21 @@ fn a_disabled_collider_has_no_pairs_and_gets_them_back_without_motion() {
 
 #[test]
 fn a_body_is_disabled_while_one_that_it_overlaps_is_removed() {
+    // Not beside stock: this panics in rapier 0.27's own broad phase (a pair of equal indices).
     let mut scene = Checked::new();
-    let (a, _) = scene.ball(0.0);
-    let (b, _) = scene.ball(0.5);
-    scene.ball(0.9);
-    assert_eq!(scene.step(), 3);
-    scene.world.bodies[a].set_enabled(false);
-    scene.world.remove(b);
-    assert_eq!((scene.step(), scene.contacts()), (0, 0));
-    scene.world.bodies[a].set_enabled(true);
-    assert_eq!((scene.step(), scene.contacts()), (1, 1));
+    let [a, b, _] = [0.0, 0.5, 0.9].map(|x| scene.ball(x).0);
+    let mut world = scene.world;
+    let mut broad_phase = PbigBroadPhase::new();
+    let mut step = |world: &mut World| {
+        world.step(&mut broad_phase);
+        (broad_phase.pair_count(), world.narrow_phase.contact_pairs().count())
+    };
+    assert_eq!(step(&mut world), (3, 3));
+    world.bodies[a].set_enabled(false);
+    world.remove(b);
+    assert_eq!(step(&mut world), (0, 0));
+    world.bodies[a].set_enabled(true);
+    assert_eq!(step(&mut world), (1, 1));
 }
 
 #[test]
