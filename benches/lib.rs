@@ -1,1 +1,1 @@
-//! x
+//! Benchmarks of pbig; each file beside this one is one.

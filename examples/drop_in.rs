@@ -1,4 +1,44 @@
-//! x
-use pbig_harness::scenes::Scene; use pbig_harness::runner::Run; use rapier_pbig::PbigBroadPhase; use rapier3d::prelude::*;
-fn main(){ let n:usize=std::env::args().nth(1).unwrap().parse().unwrap(); let mut a=Run::new(Scene::named("column").unwrap(),n,1,PbigBroadPhase::new()); let mut b=Run::new(Scene::named("column").unwrap(),n,1,DefaultBroadPhase::new());
- for s in 0..150{a.step();b.step(); if s%15==14 { let r=a.broad_phase.inner.report(); let t=a.times[s]; println!("{s} ours {:.2} stock {:.2} | changed {} checks {:?} pairs {} {:?}",t.broad_phase,b.times[s].broad_phase,r.changed,r.checks,r.pairs,r.stages.named().map(|(n,t)|(n,t.as_micros()))); println!("{}",r.plan); } } }
+//! Any rapier app, with one line changed.
+//!
+//! `cargo run --release --example drop_in`
+
+use rapier_pbig::PbigBroadPhase;
+use rapier3d::prelude::*;
+
+fn main() {
+    let (mut bodies, mut colliders) = (RigidBodySet::new(), ColliderSet::new());
+    colliders.insert(ColliderBuilder::halfspace(Vector::y_axis()));
+    for i in 0..100 {
+        let at = vector![(i % 5) as f32 * 1.1, 1.0 + (i / 5) as f32, 0.0];
+        let body = bodies.insert(RigidBodyBuilder::dynamic().translation(at));
+        colliders.insert_with_parent(ColliderBuilder::ball(0.5), body, &mut bodies);
+    }
+
+    // The one line. Before: let mut broad_phase = DefaultBroadPhase::new();
+    let mut broad_phase = PbigBroadPhase::new();
+
+    let mut pipeline = PhysicsPipeline::new();
+    let (mut islands, mut narrow_phase) = (IslandManager::new(), NarrowPhase::new());
+    let (mut impulse_joints, mut multibody_joints) = (ImpulseJointSet::new(), MultibodyJointSet::new());
+    let mut ccd_solver = CCDSolver::new();
+    for _ in 0..240 {
+        pipeline.step(
+            &vector![0.0, -9.81, 0.0],
+            &IntegrationParameters::default(),
+            &mut islands,
+            &mut broad_phase,
+            &mut narrow_phase,
+            &mut bodies,
+            &mut colliders,
+            &mut impulse_joints,
+            &mut multibody_joints,
+            &mut ccd_solver,
+            &(),
+            &(),
+        );
+    }
+
+    let lowest = bodies.iter().map(|(_, body)| body.translation().y).fold(f32::MAX, f32::min);
+    println!("after four seconds the lowest of {} balls is at {lowest:.3}", bodies.len());
+    println!("{} pairs; {}", broad_phase.pair_count(), broad_phase.report().plan);
+}

@@ -89,7 +89,11 @@ fn main() -> ExitCode {
 }
 
 fn progress(steps: u64) -> indicatif::ProgressBar {
-    if std::io::stderr().is_terminal() { indicatif::ProgressBar::new(steps) } else { indicatif::ProgressBar::hidden() }
+    if std::io::stderr().is_terminal() {
+        indicatif::ProgressBar::new(steps)
+    } else {
+        indicatif::ProgressBar::hidden()
+    }
 }
 
 /// What the oracle says about a third run, apart from the measured ones because it is slow.
@@ -125,7 +129,9 @@ fn print_table(stock: &Run<DefaultBroadPhase>, ours: &Run<PbigBroadPhase>, check
     println!("{:<26} {:>11} {:>11}", "events", events(stock), events(ours));
     let against = format!("(against the oracle, {} comparisons)", checked.comparisons);
     println!("{:<26} {:>11} {:>11}   {against}", "missing pairs", "", checked.missing);
-    println!("\nTimes are medians over the steps. pbig leaves out the pairs that rapier's narrow phase throws away.");
+    println!(
+        "\nTimes are medians over the steps. pbig leaves out the pairs that rapier's narrow phase throws away."
+    );
 }
 
 fn events<B: BroadPhase>(run: &Run<B>) -> u64 {

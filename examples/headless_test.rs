@@ -1,5 +1,27 @@
-//! x
-use pbig_core::*; use pbig_harness::boxes::BoxSet; use std::time::Instant;
-fn main(){ let a:Vec<String>=std::env::args().collect(); let set=BoxSet::named(&a[1]).unwrap(); let n:usize=a[2].parse().unwrap(); let b=set.boxes(n,1); let mut f=Finder::new(Config{order:Order::Unspecified,..Config::DEFAULT});
- let mut best=[f64::MAX;4]; for _ in 0..a[3].parse().unwrap(){ let t=Instant::now(); f.find(&b).unwrap(); let e=t.elapsed().as_secs_f64()*1e3; let s=&f.report().stages; for (b,v) in best.iter_mut().zip([e,s.plan.as_secs_f64()*1e3,s.map.as_secs_f64()*1e3,s.check.as_secs_f64()*1e3]){*b=b.min(v);} }
- println!("{} {n}: total {:.3} plan {:.3} map {:.3} check {:.3} | {:?} pairs {} | {}",a[1],best[0],best[1],best[2],best[3],f.report().checks,f.report().pairs,f.report().plan); }
+//! A physics test that runs headless: a ball dropped on a plank must come to rest on it, with no
+//! pair missed on the way.
+//!
+//! `cargo run --release --example headless_test`
+
+use pbig_harness::shadow::Shadow;
+use pbig_harness::world::World;
+use rapier_pbig::PbigBroadPhase;
+use rapier3d::prelude::*;
+
+fn main() {
+    let mut world = World::default();
+    world.colliders.insert(ColliderBuilder::cuboid(5.0, 0.1, 5.0));
+    let ball = world
+        .add(RigidBodyBuilder::dynamic().translation(vector![0.3, 4.0, 0.0]), ColliderBuilder::ball(0.5));
+
+    // The shadow runs rapier's own broad phase and brute force beside pbig, and compares every call.
+    let mut broad_phase = Shadow::new(PbigBroadPhase::new(), PbigBroadPhase::CONFIG.margin);
+    for _ in 0..300 {
+        world.step(&mut broad_phase);
+    }
+
+    let height = world.bodies[ball].translation().y;
+    assert!((height - 0.6).abs() < 0.01, "the ball rests on the plank, not at {height}");
+    assert!(broad_phase.differences.is_empty(), "{}", broad_phase.differences[0]);
+    println!("the ball rests at {height:.3}; {} calls checked, nothing missing", broad_phase.checked);
+}

@@ -93,16 +93,40 @@ fn by_hand() -> Vec<(&'static str, Vec<Aabb>)> {
         ("line along z", line(700, [0.0, 0.0, 0.9], 0.5)),
         ("diagonal", line(700, [0.9; 3], 0.5)),
         ("plane", (0..900).map(|i| cube([(i % 30) as f32, 0.0, (i / 30) as f32], 0.5)).collect()),
-        ("infinite boxes among small ones", with(lattice(6, 1.0, [0.0; 3]), &[infinite, half_space, infinite])),
+        (
+            "infinite boxes among small ones",
+            with(lattice(6, 1.0, [0.0; 3]), &[infinite, half_space, infinite]),
+        ),
         ("points at infinity", with(lattice(6, 1.0, [0.0; 3]), &[points_at_infinity; 3])),
         ("one far away", with(lattice(6, 1.0, [0.0; 3]), &[cube([1e30; 3], 1e29), cube([-3e38; 3], 1e38)])),
         ("two clusters", with(lattice(8, 1.0, [0.0; 3]), &lattice(8, 1.0, [1e6; 3]))),
-        ("many clusters that wrap onto each other", (0..6).flat_map(|i| lattice(5, 1.0, [i as f32 * 1e4; 3])).collect()),
-        ("sizes over twelve decades", (0..600).map(|i| cube([(i % 7) as f32; 3], 10f32.powf((i % 121) as f32 / 10.0 - 6.0))).collect()),
+        (
+            "many clusters that wrap onto each other",
+            (0..6).flat_map(|i| lattice(5, 1.0, [i as f32 * 1e4; 3])).collect(),
+        ),
+        (
+            "sizes over twelve decades",
+            (0..600).map(|i| cube([(i % 7) as f32; 3], 10f32.powf((i % 121) as f32 / 10.0 - 6.0))).collect(),
+        ),
         ("one large among small", with(lattice(8, 1.0, [0.0; 3]), &[cube([4.0; 3], 50.0)])),
-        ("needles crossing", (0..400).map(|i| { let mut h = [0.01; 3]; h[i % 3] = 60.0; Aabb::from_center([(i % 11) as f32, (i % 13) as f32, (i % 17) as f32], h) }).collect()),
+        (
+            "needles crossing",
+            (0..400)
+                .map(|i| {
+                    let mut h = [0.01; 3];
+                    h[i % 3] = 60.0;
+                    Aabb::from_center([(i % 11) as f32, (i % 13) as f32, (i % 17) as f32], h)
+                })
+                .collect(),
+        ),
         ("denormals", (0..400).map(|i| cube([i as f32 * 1e-42; 3], 1e-42)).collect()),
         ("negative zero", vec![Aabb::new([-0.0; 3], [0.0; 3]), Aabb::new([0.0; 3], [-0.0; 3])]),
-        ("largest floats", with(lattice(6, 1.0, [0.0; 3]), &[Aabb::new([f32::MAX; 3], [f32::MAX; 3]), Aabb::new([-f32::MAX; 3], [f32::MAX; 3])])),
+        (
+            "largest floats",
+            with(
+                lattice(6, 1.0, [0.0; 3]),
+                &[Aabb::new([f32::MAX; 3], [f32::MAX; 3]), Aabb::new([-f32::MAX; 3], [f32::MAX; 3])],
+            ),
+        ),
     ]
 }

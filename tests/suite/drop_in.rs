@@ -207,7 +207,8 @@ fn contact_skin_and_prediction_reach_as_far_as_rapiers() {
 fn soft_ccd_boxes_contain_stocks_when_the_motion_is_cut_off_and_spins() {
     for spin in [0.0, 30.0, 300.0] {
         let mut world = World::with_gravity(glam::Vec3::ZERO);
-        let body = RigidBodyBuilder::dynamic().linvel(vector![900.0, 0.0, 0.0]).angvel(vector![0.0, 0.0, spin]);
+        let body =
+            RigidBodyBuilder::dynamic().linvel(vector![900.0, 0.0, 0.0]).angvel(vector![0.0, 0.0, spin]);
         world.add(body.soft_ccd_prediction(3.0), ColliderBuilder::cuboid(2.0, 0.1, 0.1));
         // A curtain of targets around the path; stock tells which of them matter.
         for i in 0..400 {
@@ -219,7 +220,9 @@ fn soft_ccd_boxes_contain_stocks_when_the_motion_is_cut_off_and_spins() {
             let mut events = Vec::new();
             broad_phase.update(&world.params, &world.colliders, &world.bodies, &handles, &[], &mut events);
             let pair = |event: &BroadPhasePairEvent| match event {
-                BroadPhasePairEvent::AddPair(p) => [p.collider1.into_raw_parts().0, p.collider2.into_raw_parts().0],
+                BroadPhasePairEvent::AddPair(p) => {
+                    [p.collider1.into_raw_parts().0, p.collider2.into_raw_parts().0]
+                }
                 BroadPhasePairEvent::DeletePair(_) => panic!("nothing to delete"),
             };
             let found = events.iter().map(pair).map(|[a, b]| [a.min(b), a.max(b)]);
@@ -289,7 +292,13 @@ fn the_collision_pipeline_works_as_with_stock() {
     let (mut broad_phase, mut narrow_phase) = (PbigBroadPhase::new(), NarrowPhase::new());
     let prediction = IntegrationParameters::default().prediction_distance();
     CollisionPipeline::new().step(
-        prediction, &mut broad_phase, &mut narrow_phase, &mut bodies, &mut colliders, &(), &(),
+        prediction,
+        &mut broad_phase,
+        &mut narrow_phase,
+        &mut bodies,
+        &mut colliders,
+        &(),
+        &(),
     );
     assert_eq!(narrow_phase.intersection_pairs_with(first).filter(|(_, _, hit)| *hit).count(), 1);
 }

@@ -83,7 +83,12 @@ fn a_finder_that_is_used_again_forgets_the_boxes_before() {
 fn filters_are_applied_while_searching() {
     let boxes = BoxSet::named("pile").expect("the set exists").boxes(2000, 1);
     let filters: Vec<_> = (0..2000u32)
-        .map(|i| ProxyFilter { body: i % 50, memberships: 1 << (i % 5), mask: !(1 << (i % 3)), ..ProxyFilter::ALL })
+        .map(|i| ProxyFilter {
+            body: i % 50,
+            memberships: 1 << (i % 5),
+            mask: !(1 << (i % 3)),
+            ..ProxyFilter::ALL
+        })
         .collect();
     let wanted = oracle::pairs_filtered(&boxes, &filters);
     assert!(!wanted.is_empty() && wanted.len() < oracle::pairs(&boxes).len());
@@ -99,7 +104,11 @@ fn limits_end_in_errors_that_name_them() {
     for (strategy, config) in strategies() {
         let with = |max_boxes, max_pairs| Config { limits: Limits { max_boxes, max_pairs }, ..config };
         let pairs = 300 * 299 / 2;
-        assert_eq!(Finder::new(with(300, pairs)).find(&boxes).map(<[Pair]>::len), Ok(pairs as usize), "{strategy}");
+        assert_eq!(
+            Finder::new(with(300, pairs)).find(&boxes).map(<[Pair]>::len),
+            Ok(pairs as usize),
+            "{strategy}"
+        );
         let error = Finder::new(with(300, pairs - 1)).find(&boxes).unwrap_err();
         assert_eq!(error, Error::TooManyPairs { limit: pairs - 1 }, "{strategy}");
         assert!(error.to_string().contains("Limits::max_pairs"));
@@ -115,7 +124,9 @@ fn clusters_do_not_cost_more_than_an_even_spread() {
     // 2 x 20,000 boxes a million apart: cells sized for the whole world would hold a cluster each.
     let unit = BoxSet::named("unit").expect("the set exists");
     let mut boxes = unit.boxes(20_000, 1);
-    boxes.extend(unit.boxes(20_000, 2).iter().map(|b| Aabb::new(b.min.map(|x| x + 1e6), b.max.map(|x| x + 1e6))));
+    boxes.extend(
+        unit.boxes(20_000, 2).iter().map(|b| Aabb::new(b.min.map(|x| x + 1e6), b.max.map(|x| x + 1e6))),
+    );
     let mut finder = Finder::default();
     finder.find(&boxes).expect("within the limits");
     let checks = finder.report().checks.made;

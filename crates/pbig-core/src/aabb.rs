@@ -48,9 +48,7 @@ impl Aabb {
     /// Whether `min <= max` on all axes (false when a value is NaN).
     #[inline]
     pub fn is_valid(&self) -> bool {
-        (self.min[0] <= self.max[0])
-            & (self.min[1] <= self.max[1])
-            & (self.min[2] <= self.max[2])
+        (self.min[0] <= self.max[0]) & (self.min[1] <= self.max[1]) & (self.min[2] <= self.max[2])
     }
 
     /// Whether two boxes share a point: PBIG's equation 1, closed intervals, exactly (contract 1).

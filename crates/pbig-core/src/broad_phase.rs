@@ -2,9 +2,9 @@
 
 use crate::cpu::check::Checker;
 use crate::cpu::find::Found;
+use crate::cpu::map::Map;
 use crate::diff::PairStore;
 use crate::finder::{Search, check_count, fallback, single_entry_checks};
-use crate::cpu::map::Map;
 use crate::plan::{Chosen, Plan, Summary};
 use crate::report::{Report, lap};
 use crate::{Aabb, Backend, Config, Error, Pair, ProxyFilter, Strategy};
@@ -200,6 +200,7 @@ impl BroadPhase {
             invalid: u64::from(self.invalid_count),
             changed: self.changed.len() as u64,
             pairs: self.pairs.len() as u64,
+            plan: Plan { boxes: self.present_count - self.invalid_count, ..Plan::default() },
             ..Report::default()
         };
         if self.changed.is_empty() {
@@ -311,7 +312,12 @@ impl BroadPhase {
 
     /// Builds the base anew from all boxes and searches it.
     fn search_all(&mut self) -> Result<(), Error> {
-        let state = State { boxes: &self.boxes, filters: &self.filters, changed: &self.changed, change_of: &self.change_of };
+        let state = State {
+            boxes: &self.boxes,
+            filters: &self.filters,
+            changed: &self.changed,
+            change_of: &self.change_of,
+        };
         let (boxes, invalid) = (self.report.boxes, self.report.invalid);
         let accept = |a: u32, b: u32| state.is_added(a, b);
         self.base.find(&self.boxes, &self.config, &accept, &mut self.report)?;
@@ -335,7 +341,12 @@ impl BroadPhase {
         let stages = &mut self.report.stages;
         stages.plan += lap(&mut clock);
         let plan = self.loose.plan_and_build(&summary, &self.config, &self.boxes, Some(&self.moved), stages);
-        let state = State { boxes: &self.boxes, filters: &self.filters, changed: &self.changed, change_of: &self.change_of };
+        let state = State {
+            boxes: &self.boxes,
+            filters: &self.filters,
+            changed: &self.changed,
+            change_of: &self.change_of,
+        };
         let max_pairs = self.config.limits.max_pairs;
         let mut clock = Instant::now();
         self.loose.find(&|a, b| state.is_added(a, b), max_pairs, &mut self.found)?;
@@ -363,7 +374,12 @@ impl BroadPhase {
 
     /// Kept pairs that no longer hold, into `events.removed` and, by place, `ended`.
     fn find_removed(&mut self) {
-        let state = State { boxes: &self.boxes, filters: &self.filters, changed: &self.changed, change_of: &self.change_of };
+        let state = State {
+            boxes: &self.boxes,
+            filters: &self.filters,
+            changed: &self.changed,
+            change_of: &self.change_of,
+        };
         let (ended, removed) = (&mut self.ended, &mut self.events.removed);
         ended.clear();
         let mut end = |(place, pair): (u32, Pair)| {

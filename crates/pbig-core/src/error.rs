@@ -13,7 +13,9 @@ pub enum Error {
         limit: u64,
     },
     /// More overlapping pairs than [`crate::Limits::max_pairs`].
-    #[error("more than Limits::max_pairs = {limit} overlapping pairs; raise it (8 bytes a pair) or split the set")]
+    #[error(
+        "more than Limits::max_pairs = {limit} overlapping pairs; raise it (8 bytes a pair) or split the set"
+    )]
     TooManyPairs {
         /// The limit in force.
         limit: u64,

@@ -1,7 +1,7 @@
 //! All pairs of a list of boxes, from nothing each time.
 
-use crate::cpu::find::Found;
 use crate::cpu::emit;
+use crate::cpu::find::Found;
 use crate::cpu::map::Map;
 use crate::cpu::pbig::PbigGrid;
 use crate::plan::{Chosen, Plan, Summary};
@@ -134,7 +134,13 @@ impl Search {
     }
 
     /// Leaves the accepted pairs in `found`, and what was done in `report`.
-    pub(crate) fn find<A>(&mut self, boxes: &[Aabb], config: &Config, accept: &A, report: &mut Report) -> Result<(), Error>
+    pub(crate) fn find<A>(
+        &mut self,
+        boxes: &[Aabb],
+        config: &Config,
+        accept: &A,
+        report: &mut Report,
+    ) -> Result<(), Error>
     where
         A: Fn(u32, u32) -> bool + Sync,
     {
@@ -154,7 +160,13 @@ impl Search {
         Ok(())
     }
 
-    fn find_pbig<A>(&mut self, boxes: &[Aabb], config: &Config, accept: &A, report: &mut Report) -> Result<(), Error>
+    fn find_pbig<A>(
+        &mut self,
+        boxes: &[Aabb],
+        config: &Config,
+        accept: &A,
+        report: &mut Report,
+    ) -> Result<(), Error>
     where
         A: Fn(u32, u32) -> bool,
     {
@@ -162,7 +174,8 @@ impl Search {
         let mut clock = Instant::now();
         self.pbig.build(&plan, boxes);
         report.stages.map += lap(&mut clock);
-        report.checks = self.pbig.find(&plan, config.small_cell, accept, config.limits.max_pairs, &mut self.found)?;
+        report.checks =
+            self.pbig.find(&plan, config.small_cell, accept, config.limits.max_pairs, &mut self.found)?;
         report.stages.check += lap(&mut clock);
         Ok(())
     }

@@ -18,12 +18,20 @@ pub struct BoxSet {
 impl BoxSet {
     /// Every set.
     pub const ALL: [Self; 6] = [
-        Self { name: "uniform", about: "PBIG 6.1: centres uniform in 10^4 cubed, edges 1 to 100", make: uniform },
+        Self {
+            name: "uniform",
+            about: "PBIG 6.1: centres uniform in 10^4 cubed, edges 1 to 100",
+            make: uniform,
+        },
         Self { name: "gaussian", about: "PBIG 6.3: centres normal, deviation 1000", make: gaussian },
         Self { name: "unit", about: "unit cubes, density 1/4, about one pair a box", make: unit },
         Self { name: "mixed", about: "edges log-uniform from 0.1 to 10, about one pair a box", make: mixed },
         Self { name: "pile", about: "a settled lattice, 10 to 12 neighbours a box", make: pile },
-        Self { name: "degenerate", about: "every kind of bad, flat, far, huge and identical box", make: degenerate },
+        Self {
+            name: "degenerate",
+            about: "every kind of bad, flat, far, huge and identical box",
+            make: degenerate,
+        },
     ];
 
     /// The set with this name.

@@ -1,7 +1,7 @@
 //! Boxes in files, as the program `pbig` reads and writes them.
 
 use ndarray::{Array2, Array3, ArrayView2};
-use ndarray_npy::{ReadNpyError, ReadNpyExt, ReadableElement, WriteNpyExt, WriteNpyError};
+use ndarray_npy::{ReadNpyError, ReadNpyExt, ReadableElement, WriteNpyError, WriteNpyExt};
 use pbig_core::{Aabb, Pair};
 use std::fs::File;
 use std::io::{BufReader, BufWriter, Write};
@@ -121,7 +121,10 @@ fn read_as<T: ReadableElement, D: ndarray::Dimension>(path: &Path) -> Result<nda
         ReadNpyError::WrongDescriptor(_) => Reading::Type,
         ReadNpyError::WrongNdim(wanted, found) => Reading::Other(at(
             path,
-            format!("expected {} dimensions, found {found}", wanted.map_or("other".into(), |n| n.to_string())),
+            format!(
+                "expected {} dimensions, found {found}",
+                wanted.map_or("other".into(), |n| n.to_string())
+            ),
         )),
         other => Reading::Other(at(path, format!("not a readable .npy file: {other}"))),
     })
@@ -133,7 +136,8 @@ fn rows<'a, T: Copy>(array: &'a ArrayView2<'_, T>) -> impl Iterator<Item = [T; 6
 }
 
 fn read_npy_boxes(path: &Path) -> Result<Vec<Aabb>, FileError> {
-    let wrong = |shape: &[usize]| at(path, format!("expected an array of shape (N,6), found {}", shape_text(shape)));
+    let wrong =
+        |shape: &[usize]| at(path, format!("expected an array of shape (N,6), found {}", shape_text(shape)));
     match read_array::<ndarray::Ix2>(path)? {
         Floats::F32(a) if a.ncols() == 6 => Ok(rows(&a.view()).map(f32_box).collect()),
         Floats::F64(a) if a.ncols() == 6 => Ok(rows(&a.view()).map(f64_box).collect()),
@@ -143,22 +147,29 @@ fn read_npy_boxes(path: &Path) -> Result<Vec<Aabb>, FileError> {
 }
 
 fn read_csv_boxes(path: &Path) -> Result<Vec<Aabb>, FileError> {
+    let text = std::fs::read_to_string(path).map_err(|error| at(path, error))?;
     let mut reader = csv::ReaderBuilder::new()
         .has_headers(false)
         .flexible(true)
         .trim(csv::Trim::All)
-        .from_path(path)
-        .map_err(|error| at(path, error))?;
+        .from_reader(text.as_bytes());
     let mut boxes = Vec::new();
     for (i, record) in reader.records().enumerate() {
         let record = record.map_err(|error| at(path, error))?;
-        let line = record.position().map_or(i as u64 + 1, csv::Position::line);
         let is_header = i == 0 && record.iter().all(|field| field.parse::<f32>().is_err());
         if !is_header {
-            boxes.push(csv_box(&record).map_err(|what| at(path, format!("line {line}: {what}")))?);
+            let about = |what| at(path, format!("line {}: {what}", line_of(&text, &record)));
+            boxes.push(csv_box(&record).map_err(about)?);
         }
     }
     Ok(boxes)
+}
+
+/// The line of a record, counted from 1. The reader's own count is off after blank lines.
+fn line_of(text: &str, record: &csv::StringRecord) -> usize {
+    let start = record.position().map_or(0, |position| position.byte() as usize);
+    let blank = text[start..].len() - text[start..].trim_start_matches(['\r', '\n']).len();
+    1 + text[..start + blank].matches('\n').count()
 }
 
 fn csv_box(record: &csv::StringRecord) -> Result<Aabb, String> {
@@ -192,7 +203,11 @@ pub fn write_pairs(path: &Path, pairs: &[Pair]) -> Result<(), FileError> {
 ///
 /// # Errors
 /// A message that names the file, when it cannot be written.
-pub fn write_csv(path: &Path, header: &str, lines: impl IntoIterator<Item = String>) -> Result<(), FileError> {
+pub fn write_csv(
+    path: &Path,
+    header: &str,
+    lines: impl IntoIterator<Item = String>,
+) -> Result<(), FileError> {
     let write = || -> std::io::Result<()> {
         let mut file = BufWriter::new(File::create(path)?);
         writeln!(file, "{header}")?;
@@ -208,7 +223,10 @@ pub fn write_csv(path: &Path, header: &str, lines: impl IntoIterator<Item = Stri
 ///
 /// # Errors
 /// A message that names the file, when it cannot be written.
-pub fn write_frames<'a>(path: &Path, frames: impl IntoIterator<Item = &'a Vec<Aabb>>) -> Result<(), FileError> {
+pub fn write_frames<'a>(
+    path: &Path,
+    frames: impl IntoIterator<Item = &'a Vec<Aabb>>,
+) -> Result<(), FileError> {
     let frames: Vec<&Vec<Aabb>> = frames.into_iter().collect();
     let boxes = frames.iter().map(|frame| frame.len()).max().unwrap_or(0);
     let array = Array3::from_shape_fn((frames.len(), boxes, 6), |(f, i, k)| {
@@ -218,7 +236,10 @@ pub fn write_frames<'a>(path: &Path, frames: impl IntoIterator<Item = &'a Vec<Aa
     write_npy(path, |file| array.write_npy(file))
 }
 
-fn write_npy(path: &Path, write: impl FnOnce(&mut BufWriter<File>) -> Result<(), WriteNpyError>) -> Result<(), FileError> {
+fn write_npy(
+    path: &Path,
+    write: impl FnOnce(&mut BufWriter<File>) -> Result<(), WriteNpyError>,
+) -> Result<(), FileError> {
     let mut file = BufWriter::new(File::create(path).map_err(|error| at(path, error))?);
     write(&mut file).map_err(|error| at(path, error))?;
     file.flush().map_err(|error| at(path, error))

@@ -27,20 +27,85 @@ struct Builder {
 impl Scene {
     /// Every scene.
     pub const ALL: [Self; 14] = [
-        Self { name: "column", about: "spheres, cubes and slabs fall in a column onto a plane (Avril, figure 1)", default_bodies: 1000, build: column },
-        Self { name: "spheres", about: "the column with spheres alone", default_bodies: 1000, build: |b, n| fall(b, n, sphere) },
-        Self { name: "cubes", about: "the column with cubes alone", default_bodies: 1000, build: |b, n| fall(b, n, cube) },
-        Self { name: "slabs", about: "the column with slabs alone", default_bodies: 1000, build: |b, n| fall(b, n, slab) },
-        Self { name: "pile", about: "cubes stacked close together settle and fall asleep", default_bodies: 1000, build: pile },
+        Self {
+            name: "column",
+            about: "spheres, cubes and slabs fall in a column onto a plane (Avril, figure 1)",
+            default_bodies: 1000,
+            build: column,
+        },
+        Self {
+            name: "spheres",
+            about: "the column with spheres alone",
+            default_bodies: 1000,
+            build: |b, n| fall(b, n, sphere),
+        },
+        Self {
+            name: "cubes",
+            about: "the column with cubes alone",
+            default_bodies: 1000,
+            build: |b, n| fall(b, n, cube),
+        },
+        Self {
+            name: "slabs",
+            about: "the column with slabs alone",
+            default_bodies: 1000,
+            build: |b, n| fall(b, n, slab),
+        },
+        Self {
+            name: "pile",
+            about: "cubes stacked close together settle and fall asleep",
+            default_bodies: 1000,
+            build: pile,
+        },
         Self { name: "pyramid", about: "a pyramid of cubes at rest", default_bodies: 650, build: pyramid },
-        Self { name: "mixed", about: "sizes from 0.05 to 50 fall together", default_bodies: 600, build: mixed },
-        Self { name: "city", about: "fixed blocks in streets, few movers among them", default_bodies: 3000, build: city },
-        Self { name: "rain", about: "small drops fall fast over a wide, hilly ground, thinly spread", default_bodies: 1500, build: rain },
-        Self { name: "ragdolls", about: "figures of eleven jointed capsules fall over each other", default_bodies: 660, build: ragdolls },
-        Self { name: "sensors", about: "spheres fall through layers of sensors, some that see fixed bodies too", default_bodies: 800, build: sensors },
-        Self { name: "compounds", about: "bodies of several colliders, and compound shapes, fall", default_bodies: 500, build: compounds },
-        Self { name: "sleeping", about: "one awake body among sleeping ones", default_bodies: 20_000, build: sleeping },
-        Self { name: "groups", about: "crowds in groups that ignore each other, kinematic bodies and moving walls", default_bodies: 800, build: groups },
+        Self {
+            name: "mixed",
+            about: "sizes from 0.05 to 50 fall together",
+            default_bodies: 600,
+            build: mixed,
+        },
+        Self {
+            name: "city",
+            about: "fixed blocks in streets, few movers among them",
+            default_bodies: 3000,
+            build: city,
+        },
+        Self {
+            name: "rain",
+            about: "small drops fall fast over a wide, hilly ground, thinly spread",
+            default_bodies: 1500,
+            build: rain,
+        },
+        Self {
+            name: "ragdolls",
+            about: "figures of eleven jointed capsules fall over each other",
+            default_bodies: 660,
+            build: ragdolls,
+        },
+        Self {
+            name: "sensors",
+            about: "spheres fall through layers of sensors, some that see fixed bodies too",
+            default_bodies: 800,
+            build: sensors,
+        },
+        Self {
+            name: "compounds",
+            about: "bodies of several colliders, and compound shapes, fall",
+            default_bodies: 500,
+            build: compounds,
+        },
+        Self {
+            name: "sleeping",
+            about: "one awake body among sleeping ones",
+            default_bodies: 20_000,
+            build: sleeping,
+        },
+        Self {
+            name: "groups",
+            about: "crowds in groups that ignore each other, kinematic bodies and moving walls",
+            default_bodies: 800,
+            build: groups,
+        },
     ];
 
     /// The scene with this name, or an error that lists them all.
@@ -152,7 +217,8 @@ fn mixed(b: &mut Builder, n: usize) {
         height += 2.0 * half / (width / (2.2 * half)).max(1.0).powi(2) + 1e-3;
         let free = (width - half).max(0.0);
         let at = b.random_vec(Vec3::new(free, 0.0, free)) + Vec3::Y * (height + half);
-        let shape = if i % 2 == 0 { ColliderBuilder::ball(half) } else { ColliderBuilder::cuboid(half, half, half) };
+        let shape =
+            if i % 2 == 0 { ColliderBuilder::ball(half) } else { ColliderBuilder::cuboid(half, half, half) };
         b.falling(at, shape);
     }
 }
@@ -164,7 +230,8 @@ fn city(b: &mut Builder, n: usize) {
         let at = Vec3::new((i % side) as f32, 0.0, (i / side) as f32) * 4.0;
         if i % 50 == 0 {
             let up = b.random(10.0, 20.0);
-            let body = World::dynamic(at + Vec3::Y * up + Vec3::X * 2.0).linvel(to_vector(b.random_vec(Vec3::splat(5.0))));
+            let body = World::dynamic(at + Vec3::Y * up + Vec3::X * 2.0)
+                .linvel(to_vector(b.random_vec(Vec3::splat(5.0))));
             b.world.add(body, ColliderBuilder::ball(0.4));
         } else {
             let half_height = b.random(0.5, 6.0);
@@ -227,7 +294,10 @@ fn limb(b: &mut Builder, at: Vec3, parent: RigidBodyHandle, from: Vec3, halves: 
 
 fn join(b: &mut Builder, parent: RigidBodyHandle, at: Vec3, child: RigidBodyHandle, child_at: Vec3) {
     let point = |v: Vec3| Point::from(to_vector(v));
-    let joint = SphericalJointBuilder::new().local_anchor1(point(at)).local_anchor2(point(child_at)).contacts_enabled(false);
+    let joint = SphericalJointBuilder::new()
+        .local_anchor1(point(at))
+        .local_anchor2(point(child_at))
+        .contacts_enabled(false);
     b.world.impulse_joints.insert(parent, child, joint, true);
 }
 
@@ -260,7 +330,10 @@ fn compounds(b: &mut Builder, n: usize) {
         let at = place * 2.6 + b.random_vec(Vec3::splat(0.1)) + Vec3::Y * 2.0;
         if i % 3 == 0 {
             let cube = || SharedShape::cuboid(0.3, 0.3, 0.3);
-            let shapes = vec![(Isometry::translation(-0.4, 0.0, 0.0), cube()), (Isometry::translation(0.4, 0.2, 0.0), cube())];
+            let shapes = vec![
+                (Isometry::translation(-0.4, 0.0, 0.0), cube()),
+                (Isometry::translation(0.4, 0.2, 0.0), cube()),
+            ];
             b.falling(at, ColliderBuilder::compound(shapes));
         } else {
             let body = b.falling(at, ColliderBuilder::ball(0.35));

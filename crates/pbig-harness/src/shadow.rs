@@ -55,7 +55,13 @@ impl fmt::Display for Difference {
         };
         let index = |h: ColliderHandle| h.into_raw_parts();
         let ((a, b), [box_a, box_b]) = (self.pair, self.boxes);
-        write!(f, "call {}: colliders {:?} and {:?}: {what}; boxes {box_a:?} and {box_b:?}", self.call, index(a), index(b))
+        write!(
+            f,
+            "call {}: colliders {:?} and {:?}: {what}; boxes {box_a:?} and {box_b:?}",
+            self.call,
+            index(a),
+            index(b)
+        )
     }
 }
 
@@ -158,7 +164,8 @@ impl<B: BroadPhase> Shadow<B> {
     fn compare(&mut self, scene: &SceneView<'_>) {
         let mut faults = Vec::new();
         let wanted = scene.oracle();
-        faults.extend(wanted.iter().filter(|pair| !self.known.0.contains(pair)).map(|&p| (Fault::Missing, p)));
+        faults
+            .extend(wanted.iter().filter(|pair| !self.known.0.contains(pair)).map(|&p| (Fault::Missing, p)));
         for &pair in self.stock_known.0.difference(&self.known.0) {
             self.stock_only += 1;
             if scene.allowed(pair) && scene.in_contact(pair) {
@@ -256,7 +263,8 @@ impl SceneView<'_> {
             body.map_or(RigidBodyType::Fixed, |body| body.body_type())
         };
         let same_body = a.parent().is_some() && a.parent() == b.parent();
-        let kinds = a.active_collision_types().test(kind(a), kind(b)) || b.active_collision_types().test(kind(a), kind(b));
+        let kinds = a.active_collision_types().test(kind(a), kind(b))
+            || b.active_collision_types().test(kind(a), kind(b));
         !same_body && kinds && a.collision_groups().test(b.collision_groups())
     }
 

@@ -1,9 +1,9 @@
 //! A scene run with one broad phase, checked or not: what `pbig simulate` does.
 
+use crate::files::write_frames;
 use crate::runner::{Run, Spread, StepTime};
 use crate::scenes::Scene;
 use crate::shadow::{Difference, Fault, Shadow};
-use crate::files::write_frames;
 use rapier3d::prelude::BroadPhase;
 use std::path::{Path, PathBuf};
 

@@ -54,7 +54,11 @@ impl PbigBroadPhase {
     /// not a finite length of at least 0 is replaced by the default. Limits are not used: rapier's
     /// trait knows no errors.
     pub fn with_config(config: Config) -> Self {
-        let margin = if config.margin >= 0.0 && config.margin.is_finite() { config.margin } else { Self::CONFIG.margin };
+        let margin = if config.margin >= 0.0 && config.margin.is_finite() {
+            config.margin
+        } else {
+            Self::CONFIG.margin
+        };
         let config = Config { margin, limits: Limits::UNLIMITED, ..config };
         let finder = Finder::new(config).expect("the margin was checked above");
         Self { finder, generations: Vec::new(), relative_margin: margin, proxies: Vec::new() }
@@ -123,7 +127,11 @@ impl PbigBroadPhase {
             self.proxies.clear();
             self.proxies.extend(modified.iter().map(proxy));
         } else {
-            modified.par_iter().with_min_len(PARALLEL_FROM / 4).map(proxy).collect_into_vec(&mut self.proxies);
+            modified
+                .par_iter()
+                .with_min_len(PARALLEL_FROM / 4)
+                .map(proxy)
+                .collect_into_vec(&mut self.proxies);
         }
     }
 

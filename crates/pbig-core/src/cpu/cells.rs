@@ -13,8 +13,8 @@
 //! * Cells are computed by a monotone function of the coordinate, and a window is computed from
 //!   coordinates that bound those of every overlapping box: whatever the rounding, it is inside.
 
-use crate::plan::LevelPlan;
 use crate::Aabb;
+use crate::plan::LevelPlan;
 
 /// From coordinates to cells, four lanes at a time (the last one idle).
 #[derive(Clone, Copy, Debug)]
@@ -167,7 +167,8 @@ mod tests {
     #[test]
     fn cells_are_monotone_and_finite_for_every_float() {
         let cells = cells(0.3, -7.0);
-        let mut floats: Vec<f32> = (0..=u16::MAX).map(|high| f32::from_bits(u32::from(high) << 16 | 0x1234)).collect();
+        let mut floats: Vec<f32> =
+            (0..=u16::MAX).map(|high| f32::from_bits(u32::from(high) << 16 | 0x1234)).collect();
         floats.retain(|x| !x.is_nan());
         floats.sort_unstable_by(f32::total_cmp);
         let found: Vec<i32> = floats.iter().map(|&x| cells.cell(&[x; 4])[0]).collect();

@@ -3,7 +3,13 @@
 use crate::{Order, Pair};
 
 /// Brings the pairs of all chunks into `out`. Ids are below `ids`.
-pub(crate) fn collect(chunks: &[Vec<Pair>], ids: usize, order: Order, scratch: &mut Vec<u32>, out: &mut Vec<Pair>) {
+pub(crate) fn collect(
+    chunks: &[Vec<Pair>],
+    ids: usize,
+    order: Order,
+    scratch: &mut Vec<u32>,
+    out: &mut Vec<Pair>,
+) {
     let len = chunks.iter().map(Vec::len).sum::<usize>();
     out.clear();
     // A counting sort touches a counter for every id: not worth it for few pairs.

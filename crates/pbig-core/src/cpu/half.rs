@@ -52,7 +52,11 @@ impl<'a, A: Fn(u32, u32) -> bool> Half<'a, A> {
     /// Entries `range` against what comes after each; stops early when there is no more room.
     pub(crate) fn check(&mut self, range: Range<usize>) {
         for i in range {
-            if self.grid.spans[i].is_narrow() { self.check_narrow(i) } else { self.check_wide(i) }
+            if self.grid.spans[i].is_narrow() {
+                self.check_narrow(i)
+            } else {
+                self.check_wide(i)
+            }
             if self.kept > KEPT - 64 {
                 self.expand();
                 if !self.room.take(self.out.len(), &mut self.taken) {

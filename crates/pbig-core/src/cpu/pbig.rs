@@ -27,7 +27,10 @@ impl Touched {
             let scaled = (x - plan.origin[k]) * (1.0 / plan.cell);
             scaled.clamp(0.0, (plan.dims[k] - 1) as f32) as u32
         };
-        Self { low: std::array::from_fn(|k| cell(k, one.min[k])), high: std::array::from_fn(|k| cell(k, one.max[k])) }
+        Self {
+            low: std::array::from_fn(|k| cell(k, one.min[k])),
+            high: std::array::from_fn(|k| cell(k, one.max[k])),
+        }
     }
 
     fn count(&self) -> u64 {

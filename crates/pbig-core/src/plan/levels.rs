@@ -166,10 +166,12 @@ impl<'a> World<'a> {
         let (extent, cell) = (self.max_extent(classes), self.cell(classes));
         let share = |class: usize| -> f64 {
             let own = self.summary.classes[class].max_extent;
-            (0..3).map(|k| {
-                let window = own[k] + extent[k] + cell[k];
-                f64::from(window) / f64::from(self.range[k].max(window))
-            }).product()
+            (0..3)
+                .map(|k| {
+                    let window = own[k] + extent[k] + cell[k];
+                    f64::from(window) / f64::from(self.range[k].max(window))
+                })
+                .product()
         };
         let weighted: f64 = of.iter().map(|&c| f64::from(self.summary.classes[c].boxes) * share(c)).sum();
         f64::from(self.boxes(classes)) * weighted / f64::from(self.boxes(of).max(1))

@@ -101,7 +101,10 @@ impl fmt::Display for Plan {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let boxes = self.boxes;
         match self.chosen {
-            Chosen::Nothing => write!(f, "nothing to do: {boxes} valid boxes, or none changed"),
+            Chosen::Nothing => write!(
+                f,
+                "nothing to do: of {boxes} valid boxes none has changed, or there are fewer than two"
+            ),
             Chosen::Brute => write!(f, "brute force: {boxes} boxes are cheaper to test than to sort"),
             Chosen::Grid => write!(f, "grid: {boxes} boxes"),
             Chosen::Edit => write!(f, "edit: {} of {boxes} boxes moved since the grid was built", self.moved),
@@ -150,9 +153,7 @@ mod tests {
 
     fn lattice(n: u32, step: f32, half: f32) -> Vec<Aabb> {
         let at = |i: u32, d: u32| (i / d % n) as f32 * step;
-        (0..n * n * n)
-            .map(|i| Aabb::from_center([at(i, 1), at(i, n), at(i, n * n)], [half; 3]))
-            .collect()
+        (0..n * n * n).map(|i| Aabb::from_center([at(i, 1), at(i, n), at(i, n * n)], [half; 3])).collect()
     }
 
     #[test]

@@ -31,11 +31,8 @@ impl Summary {
 
     /// Summarises all `boxes`, or those with the given ids.
     pub fn of(boxes: &[Aabb], ids: Option<&[u32]>) -> Self {
-        let mut summary = Self {
-            valid: 0,
-            classes: Box::new([SizeClass::default(); 256]),
-            sample: Vec::new(),
-        };
+        let mut summary =
+            Self { valid: 0, classes: Box::new([SizeClass::default(); 256]), sample: Vec::new() };
         match ids {
             Some(ids) => ids.iter().for_each(|&id| summary.count(&boxes[id as usize])),
             None => boxes.iter().for_each(|b| summary.count(b)),
@@ -62,7 +59,8 @@ impl Summary {
         const GOLDEN: u64 = 0x9E37_79B9_7F4A_7C15;
         let len = ids.map_or(boxes.len(), <[u32]>::len);
         for i in 0..len.min(Self::SAMPLE) as u64 {
-            let step = if len <= Self::SAMPLE { i } else { ((i.wrapping_mul(GOLDEN) >> 32) * len as u64) >> 32 };
+            let step =
+                if len <= Self::SAMPLE { i } else { ((i.wrapping_mul(GOLDEN) >> 32) * len as u64) >> 32 };
             let index = ids.map_or(step as usize, |ids| ids[step as usize] as usize);
             let one = boxes[index];
             if one.is_valid() && one.min.iter().chain(&one.max).all(|x| x.is_finite()) {

@@ -40,7 +40,11 @@ fn self_test() -> Result<(), Failure> {
             }
         }
     }
-    if wrong.is_empty() { Ok(()) } else { Err(Failure::Check(format!("self-test failed: {}", wrong.join(", ")))) }
+    if wrong.is_empty() {
+        Ok(())
+    } else {
+        Err(Failure::Check(format!("self-test failed: {}", wrong.join(", "))))
+    }
 }
 
 #[cfg(target_arch = "x86_64")]

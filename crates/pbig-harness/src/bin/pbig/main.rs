@@ -64,7 +64,8 @@ fn finish(result: Result<(), Failure>) -> ExitCode {
         Ok(()) => ExitCode::SUCCESS,
         Err(failure) => {
             // Nothing is left to do when stderr is closed too.
-            let _ = std::io::Write::write_all(&mut std::io::stderr(), format!("pbig: {failure}\n").as_bytes());
+            let _ =
+                std::io::Write::write_all(&mut std::io::stderr(), format!("pbig: {failure}\n").as_bytes());
             failure.code()
         }
     }

@@ -40,7 +40,8 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
     let frames = read_frames(&args.frames)?;
     let config = Config { margin: args.margin, ..args.backend.config() };
     let about = |error| Failure::Input(format!("{}: {error}", args.frames.display()));
-    let mut broad_phase = BroadPhase::new(config).map_err(|error| Failure::Input(format!("--margin: {error}")))?;
+    let mut broad_phase =
+        BroadPhase::new(config).map_err(|error| Failure::Input(format!("--margin: {error}")))?;
     let mut replay = Replay::default();
     let bar = progress(frames.len(), "frames");
     for (number, frame) in frames.iter().enumerate() {
@@ -96,7 +97,12 @@ impl Replay {
     }
 }
 
-fn report(args: &Args, frames: &[Vec<Frame>], replay: &Replay, broad_phase: &BroadPhase) -> Result<(), Failure> {
+fn report(
+    args: &Args,
+    frames: &[Vec<Frame>],
+    replay: &Replay,
+    broad_phase: &BroadPhase,
+) -> Result<(), Failure> {
     let boxes = frames.first().map_or(0, Vec::len);
     let ms = Spread::of(replay.times.iter().copied());
     let (added, removed) = (replay.added, replay.removed);
@@ -121,6 +127,11 @@ fn report(args: &Args, frames: &[Vec<Frame>], replay: &Replay, broad_phase: &Bro
     }
     print(&format!(
         "{} frames of {boxes} boxes: {added} pairs added, {removed} removed, {} at the end\n{:.3} ms a frame (median; {:.3} to {:.3})\nlast frame: {}",
-        frames.len(), broad_phase.pair_count(), ms.median, ms.min, ms.max, report.plan
+        frames.len(),
+        broad_phase.pair_count(),
+        ms.median,
+        ms.min,
+        ms.max,
+        report.plan
     ))
 }

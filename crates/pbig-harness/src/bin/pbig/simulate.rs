@@ -54,7 +54,8 @@ impl BroadPhaseOption {
 }
 
 pub(crate) fn list() -> Result<(), Failure> {
-    let line = |scene: Scene| format!("{:<11} {} ({} bodies)\n", scene.name, scene.about, scene.default_bodies);
+    let line =
+        |scene: Scene| format!("{:<11} {} ({} bodies)\n", scene.name, scene.about, scene.default_bodies);
     print(&Scene::ALL.map(line).concat())
 }
 
@@ -82,7 +83,8 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
 fn failure_line(outcome: &Outcome) -> String {
     let check = outcome.check.as_ref();
     let first = check.and_then(|c| c.differences.first()).map_or(String::new(), ToString::to_string);
-    let file = check.and_then(|c| c.frames_file.as_deref()).map_or(String::new(), |f| f.display().to_string());
+    let file =
+        check.and_then(|c| c.frames_file.as_deref()).map_or(String::new(), |f| f.display().to_string());
     format!("{first}; the frames up to there are in {file}")
 }
 
@@ -110,9 +112,19 @@ fn report(args: &Args, bodies: usize, outcome: &Outcome) -> Result<(), Failure> 
         "{}: {bodies} bodies, {} colliders, {} steps with the {} broad phase\n\
          broad phase {:.3} ms a step (median; {:.3} to {:.3}), whole step {:.3} ms ({:.3} to {:.3})\n\
          {} pairs at the end; {} added, {} removed\n{}",
-        args.scene, outcome.colliders, outcome.steps, args.broad_phase.name(),
-        broad_phase.median, broad_phase.min, broad_phase.max, step.median, step.min, step.max,
-        outcome.pairs, outcome.added, outcome.removed,
+        args.scene,
+        outcome.colliders,
+        outcome.steps,
+        args.broad_phase.name(),
+        broad_phase.median,
+        broad_phase.min,
+        broad_phase.max,
+        step.median,
+        step.min,
+        step.max,
+        outcome.pairs,
+        outcome.added,
+        outcome.removed,
         outcome.check.as_ref().map_or(String::new(), check_line),
     ))
 }
@@ -131,6 +143,9 @@ fn check_object(check: &Check) -> serde_json::Value {
 fn check_line(check: &Check) -> String {
     format!(
         "checked {} calls: {} missing pairs of {} that the oracle found; {} pairs of stock alone, all without contact or excluded by a filter",
-        check.calls, check.missing(), check.oracle_pairs, check.stock_only
+        check.calls,
+        check.missing(),
+        check.oracle_pairs,
+        check.stock_only
     )
 }

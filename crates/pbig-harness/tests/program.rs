@@ -1,0 +1,327 @@
+//! The program `pbig` as other programs see it: files, JSON, exit status, one line on stderr.
+
+use ndarray::{Array2, Array3, ShapeBuilder};
+use ndarray_npy::{ReadNpyExt, WriteNpyExt};
+use pbig_core::{Aabb, Pair, oracle};
+use pbig_harness::boxes::{BoxSet, moved};
+use rand::rngs::StdRng;
+use rand::{RngExt, SeedableRng};
+use serde_json::Value;
+use std::collections::BTreeSet;
+use std::fs::File;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+fn pbig(folder: &Path, args: &[&str]) -> Output {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_pbig"));
+    command.current_dir(folder).args(args).output().expect("the program starts")
+}
+
+fn json(output: &Output) -> Value {
+    let text = String::from_utf8_lossy(&output.stdout);
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    serde_json::from_str(&text).unwrap_or_else(|error| panic!("not one JSON object: {error}: {text}"))
+}
+
+/// Exit status 2 and one line on stderr that contains all the words.
+fn refused(output: &Output, words: &[&str]) {
+    let line = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(2), "{line}");
+    assert_eq!(line.lines().count(), 1, "{line}");
+    assert!(output.stdout.is_empty());
+    for word in words {
+        assert!(line.contains(word), "'{word}' is not in: {line}");
+    }
+}
+
+fn six(b: &Aabb) -> [f32; 6] {
+    [b.min[0], b.min[1], b.min[2], b.max[0], b.max[1], b.max[2]]
+}
+
+fn array(boxes: &[Aabb]) -> Array2<f32> {
+    Array2::from_shape_fn((boxes.len(), 6), |(i, k)| six(&boxes[i])[k])
+}
+
+fn save<T: ndarray_npy::WritableElement, D: ndarray::Dimension>(
+    folder: &Path,
+    name: &str,
+    array: &ndarray::Array<T, D>,
+) -> PathBuf {
+    let path = folder.join(name);
+    array.write_npy(File::create(&path).expect("a new file")).expect("written");
+    path
+}
+
+fn read_pairs(path: &Path) -> Vec<Pair> {
+    let array = Array2::<u32>::read_npy(File::open(path).expect("the output")).expect("(K,2) uint32");
+    assert_eq!(array.ncols(), 2);
+    array.outer_iter().map(|row| Pair { a: row[0], b: row[1] }).collect()
+}
+
+fn degenerate(n: usize, seed: u64) -> Vec<Aabb> {
+    BoxSet::named("degenerate").expect("the set exists").boxes(n, seed)
+}
+
+#[test]
+fn pairs_of_every_input_format_and_backend_are_the_oracles() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let boxes = degenerate(400, 1);
+    let wanted = oracle::pairs(&boxes);
+    let rows = array(&boxes);
+    save(folder.path(), "f32.npy", &rows);
+    save(folder.path(), "f64.npy", &rows.mapv(f64::from));
+    let mut fortran = Array2::<f32>::zeros(rows.raw_dim().f());
+    fortran.assign(&rows);
+    save(folder.path(), "fortran.npy", &fortran);
+    let lines: Vec<String> = boxes.iter().map(|b| six(b).map(|x| x.to_string()).join(",")).collect();
+    std::fs::write(folder.path().join("plain.csv"), lines.join("\n")).expect("written");
+    let header = "min_x,min_y,min_z,max_x,max_y,max_z\n";
+    std::fs::write(folder.path().join("header.csv"), format!("{header}{}\n", lines.join("\n")))
+        .expect("written");
+    for input in ["f32.npy", "f64.npy", "fortran.npy", "plain.csv", "header.csv"] {
+        for backend in ["auto", "cpu", "gpu", "brute"] {
+            let object = json(&pbig(
+                folder.path(),
+                &["pairs", input, "-o", "out.npy", "--backend", backend, "--json"],
+            ));
+            assert_eq!(read_pairs(&folder.path().join("out.npy")), wanted, "{input}, {backend}");
+            assert_eq!(object["boxes"], 400, "{input}");
+            assert_eq!(object["pairs"], wanted.len());
+            assert_eq!(object["invalid"], boxes.iter().filter(|b| !b.is_valid()).count());
+        }
+    }
+}
+
+#[test]
+fn pairs_writes_csv_too_and_reports_as_documented() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let boxes = BoxSet::named("unit").expect("the set exists").boxes(500, 2);
+    save(folder.path(), "boxes.npy", &array(&boxes));
+    let args =
+        ["pairs", "boxes.npy", "-o", "out.csv", "--threads", "1", "--repeat", "3", "--strict", "--json"];
+    let object = json(&pbig(folder.path(), &args));
+    for key in ["boxes", "pairs", "invalid", "backend", "adapter", "plan"] {
+        assert!(object.get(key).is_some(), "{key} is missing");
+    }
+    let ms = |key: &str| object["ms"][key].as_f64().expect("a number");
+    assert!(ms("min") > 0.0 && ms("min") <= ms("median") && ms("median") <= ms("max"));
+    assert!(object["stages"]["check"].is_f64());
+    let text = std::fs::read_to_string(folder.path().join("out.csv")).expect("the output");
+    let wanted: Vec<String> = oracle::pairs(&boxes).iter().map(|p| format!("{},{}", p.a, p.b)).collect();
+    assert_eq!(text, format!("a,b\n{}\n", wanted.join("\n")));
+}
+
+#[test]
+fn f64_boxes_are_rounded_outward() {
+    let folder = tempfile::tempdir().expect("a folder");
+    // Apart by less than an f32 can tell; inverted by less.
+    let rows = Array2::from_shape_vec(
+        (3, 6),
+        vec![
+            0.0,
+            0.0,
+            0.0,
+            0.1,
+            1.0,
+            1.0, //
+            0.1 + 1e-12,
+            0.0,
+            0.0,
+            1.0,
+            1.0,
+            1.0, //
+            0.5 + 1e-12,
+            0.0,
+            0.0,
+            0.5,
+            1.0,
+            1.0,
+        ],
+    );
+    save(folder.path(), "boxes.npy", &rows.expect("3 x 6"));
+    let object = json(&pbig(folder.path(), &["pairs", "boxes.npy", "--json"]));
+    assert_eq!((&object["pairs"], &object["invalid"]), (&Value::from(1), &Value::from(1)));
+}
+
+#[test]
+fn no_boxes_at_all() {
+    let folder = tempfile::tempdir().expect("a folder");
+    save(folder.path(), "none.npy", &Array2::<f32>::zeros((0, 6)));
+    std::fs::write(folder.path().join("none.csv"), "").expect("written");
+    for input in ["none.npy", "none.csv"] {
+        let object = json(&pbig(folder.path(), &["pairs", input, "-o", "out.npy", "--json"]));
+        assert_eq!(object["pairs"], 0);
+        assert_eq!(read_pairs(&folder.path().join("out.npy")), []);
+    }
+}
+
+#[test]
+fn bad_input_is_refused_in_one_line_that_says_what_and_where() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let here = folder.path();
+    let write = |name: &str, text: &str| std::fs::write(here.join(name), text).expect("written");
+    let refuse = |args: &[&str], words: &[&str]| refused(&pbig(here, args), words);
+    refuse(&["pairs", "nothing.npy"], &["nothing.npy", "No such file"]);
+    write("boxes.txt", "");
+    refuse(&["pairs", "boxes.txt"], &["boxes.txt", ".npy or .csv"]);
+    write("not.npy", "this is no array");
+    refuse(&["pairs", "not.npy"], &["not.npy"]);
+    write("word.csv", "0,0,0,1,1,1\n0,0,zero,1,1,1\n");
+    refuse(&["pairs", "word.csv"], &["word.csv", "line 2", "column 3", "'zero'"]);
+    write("short.csv", "0,0,0,1,1,1\n\n0,0,0,1,1\n");
+    refuse(&["pairs", "short.csv"], &["short.csv", "line 3", "6 columns", "5"]);
+    save(here, "five.npy", &Array2::<f32>::zeros((4, 5)));
+    refuse(&["pairs", "five.npy"], &["five.npy", "(N,6)", "(4,5)"]);
+    save(here, "cube.npy", &Array3::<f32>::zeros((2, 2, 6)));
+    refuse(&["pairs", "cube.npy"], &["cube.npy", "2 dimensions"]);
+    save(here, "ints.npy", &Array2::<i32>::zeros((4, 6)));
+    refuse(&["pairs", "ints.npy"], &["ints.npy", "float32"]);
+    save(here, "flat.npy", &Array2::<f32>::zeros((4, 6)));
+    refuse(&["replay", "flat.npy"], &["flat.npy", "3 dimensions"]);
+    refuse(&["pairs", "flat.npy", "-o", "out.txt"], &["out.txt", ".npy or .csv"]);
+    refuse(&["pairs", "flat.npy", "-o", "no/such/folder.npy"], &["no/such/folder.npy"]);
+    write("cut.npy", "");
+    let whole = std::fs::read(here.join("flat.npy")).expect("written above");
+    std::fs::write(here.join("cut.npy"), &whole[..whole.len() - 10]).expect("written");
+    refuse(&["pairs", "cut.npy"], &["cut.npy"]);
+    save(here, "inverted.npy", &array(&[Aabb::new([0.0; 3], [1.0; 3]), Aabb::new([1.0; 3], [0.0; 3])]));
+    refuse(&["pairs", "inverted.npy", "--strict"], &["inverted.npy", "box 1"]);
+}
+
+#[test]
+fn bad_usage_is_refused_in_one_line() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let refuse = |args: &[&str], words: &[&str]| refused(&pbig(folder.path(), args), words);
+    refuse(&[], &["pbig"]);
+    refuse(&["pears"], &["pears"]);
+    refuse(&["pairs"], &["INPUT"]);
+    refuse(&["pairs", "x.npy", "--backend", "abacus"], &["abacus", "brute"]);
+    refuse(&["pairs", "x.npy", "--threads", "0"], &["--threads", "at least 1"]);
+    refuse(&["simulate", "--scene", "colum"], &["colum", "column, spheres"]);
+    refuse(&["simulate", "--scene", "column", "--check", "--broad-phase", "stock"], &["--check"]);
+    let frames = Array3::<f32>::zeros((1, 2, 6));
+    save(folder.path(), "frames.npy", &frames);
+    refuse(&["replay", "frames.npy", "--margin=-1"], &["--margin"]);
+}
+
+/// Frames of moving boxes that come and go, some invalid for a while.
+fn frames(n: usize, count: usize, seed: u64) -> Vec<Vec<Option<Aabb>>> {
+    let mut rng = StdRng::seed_from_u64(seed);
+    let mut boxes = degenerate(n / 2, seed);
+    boxes.extend(BoxSet::named("unit").expect("the set exists").boxes(n - n / 2, seed));
+    (0..count)
+        .map(|frame| {
+            if frame % 3 > 0 {
+                boxes = moved(&boxes, 0.3, frame as u64);
+            }
+            boxes.iter().map(|b| (!rng.random_bool(0.1)).then_some(*b)).collect()
+        })
+        .collect()
+}
+
+fn save_frames(folder: &Path, frames: &[Vec<Option<Aabb>>]) {
+    let shape = (frames.len(), frames[0].len(), 6);
+    let value = |(f, i, k): (usize, usize, usize)| frames[f][i].map_or(f32::NAN, |b| six(&b)[k]);
+    save(folder, "frames.npy", &Array3::from_shape_fn(shape, value));
+}
+
+/// The pairs after each frame, by the events alone.
+fn followed(path: &Path, frames: usize) -> Vec<BTreeSet<(u32, u32)>> {
+    let text = std::fs::read_to_string(path).expect("the events");
+    let mut lines = text.lines();
+    assert_eq!(lines.next(), Some("frame,event,a,b"));
+    let mut states = vec![BTreeSet::new(); frames];
+    let mut current = BTreeSet::new();
+    let mut at = 0;
+    for line in lines {
+        let fields: Vec<&str> = line.split(',').collect();
+        let [frame, a, b] = [0, 2, 3].map(|i| fields[i].parse::<u32>().expect("a number"));
+        for state in &mut states[at..frame as usize] {
+            state.clone_from(&current);
+        }
+        at = frame as usize;
+        let known = if fields[1] == "+" { current.insert((a, b)) } else { current.remove(&(a, b)) };
+        assert!(known && a < b && ["+", "-"].contains(&fields[1]), "{line}");
+    }
+    states[at..].fill(current);
+    states
+}
+
+#[test]
+fn replayed_events_add_up_to_the_pairs_of_every_frame() {
+    let folder = tempfile::tempdir().expect("a folder");
+    for (seed, n) in [(1, 40), (2, 200), (3, 600)] {
+        let frames = frames(n, 20, seed);
+        save_frames(folder.path(), &frames);
+        for backend in ["auto", "cpu", "brute"] {
+            let args = ["replay", "frames.npy", "-o", "events.csv", "--backend", backend, "--json"];
+            let object = json(&pbig(folder.path(), &args));
+            assert_eq!((&object["frames"], &object["boxes"]), (&Value::from(20), &Value::from(n)));
+            assert_eq!(object["ms"]["per_frame"].as_array().map(Vec::len), Some(20));
+            let states = followed(&folder.path().join("events.csv"), frames.len());
+            for (frame, state) in frames.iter().zip(&states) {
+                let boxes: Vec<Aabb> = frame.iter().map(|b| b.unwrap_or(Aabb::NOWHERE)).collect();
+                let wanted = oracle::pairs(&boxes).iter().map(|p| (p.a, p.b)).collect();
+                assert_eq!(*state, wanted, "seed {seed}, {backend}");
+            }
+        }
+    }
+}
+
+#[test]
+fn with_a_margin_the_pairs_lie_between_the_boxes_and_those_grown_by_two_margins() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let frames = frames(300, 15, 4);
+    save_frames(folder.path(), &frames);
+    json(&pbig(folder.path(), &["replay", "frames.npy", "-o", "events.csv", "--margin", "0.2", "--json"]));
+    let states = followed(&folder.path().join("events.csv"), frames.len());
+    for (frame, state) in frames.iter().zip(&states) {
+        let boxes: Vec<Aabb> = frame.iter().map(|b| b.unwrap_or(Aabb::NOWHERE)).collect();
+        let grown: Vec<Aabb> = boxes.iter().map(|b| b.inflated(0.4)).collect();
+        let pairs =
+            |boxes: &[Aabb]| -> BTreeSet<_> { oracle::pairs(boxes).iter().map(|p| (p.a, p.b)).collect() };
+        assert!(state.is_superset(&pairs(&boxes)), "a pair is missing");
+        assert!(state.is_subset(&pairs(&grown)), "{:?}", state.difference(&pairs(&grown)).next());
+    }
+}
+
+#[test]
+fn simulate_checks_and_reports() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let args = ["simulate", "--scene", "column", "--bodies", "100", "--steps", "30", "--json"];
+    let object = json(&pbig(folder.path(), &[&args[..], &["--check"]].concat()));
+    assert_eq!(
+        (&object["scene"], &object["bodies"], &object["steps"]),
+        (&"column".into(), &100.into(), &30.into())
+    );
+    assert_eq!(object["check"]["missing"], 0);
+    assert!(object["check"]["oracle_pairs"].as_u64() > Some(0));
+    let stock = json(&pbig(folder.path(), &[&args[..], &["--broad-phase", "stock"]].concat()));
+    assert_eq!(stock["broad_phase"], "stock");
+    assert!(stock["check"].is_null() && stock["ms"]["step"]["median"].as_f64() > Some(0.0));
+}
+
+#[test]
+fn scenes_and_doctor_say_what_there_is() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let scenes = pbig(folder.path(), &["scenes"]);
+    let text = String::from_utf8_lossy(&scenes.stdout).into_owned();
+    assert!(scenes.status.success() && text.lines().count() == pbig_harness::scenes::Scene::ALL.len());
+    let doctor = pbig(folder.path(), &["doctor"]);
+    let text = String::from_utf8_lossy(&doctor.stdout).into_owned();
+    assert!(doctor.status.success() && text.contains("self-test") && !text.contains("WRONG"), "{text}");
+}
+
+#[test]
+fn a_reader_that_goes_away_is_no_failure() {
+    use std::process::Stdio;
+    let mut child = Command::new(env!("CARGO_BIN_EXE_pbig"))
+        .arg("scenes")
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .expect("the program starts");
+    drop(child.stdout.take());
+    let output = child.wait_with_output().expect("the program ends");
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+}
