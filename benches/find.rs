@@ -13,7 +13,8 @@ use std::hint::black_box;
 fn find(c: &mut Criterion) {
     let mut group = c.benchmark_group("find");
     group.sample_size(20);
-    for set in BoxSet::ALL {
+    // Not `degenerate`: its huge boxes all overlap each other, and their pairs are all one measures.
+    for set in BoxSet::ALL.into_iter().filter(|set| set.name != "degenerate") {
         for n in [100, 1_000, 10_000, 100_000] {
             let boxes = set.boxes(n, 1);
             let mut finder = Finder::new(Config { order: Order::Unspecified, ..Config::DEFAULT });

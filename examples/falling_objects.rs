@@ -3,13 +3,13 @@
 //!
 //! `cargo run --release --example falling_objects -- --help`
 
-use clap::{Parser, ValueEnum};
-use pbig_core::{Backend, Config};
+use clap::Parser;
 use pbig_harness::chart::{self, Panel, Series};
+use pbig_harness::options::BackendOption;
 use pbig_harness::runner::{Run, Spread, StepTime};
 use pbig_harness::scenes::Scene;
 use pbig_harness::shadow::{Fault, Shadow};
-use rapier_pbig::PbigBroadPhase;
+use rapier_pbig::{Config, PbigBroadPhase};
 use rapier3d::prelude::{BroadPhase, DefaultBroadPhase};
 use std::io::IsTerminal;
 use std::path::PathBuf;
@@ -38,33 +38,13 @@ struct Args {
     chart: PathBuf,
 }
 
-#[derive(Clone, Copy, Default, ValueEnum)]
-enum BackendOption {
-    #[default]
-    Auto,
-    Cpu,
-    Gpu,
-    Brute,
-}
-
-impl BackendOption {
-    fn config(self) -> Config {
-        let backend = match self {
-            Self::Auto => Backend::Auto,
-            Self::Cpu => Backend::Cpu,
-            Self::Gpu => Backend::Gpu,
-            Self::Brute => Backend::Brute,
-        };
-        Config { backend, ..PbigBroadPhase::CONFIG }
-    }
-}
-
 /// Steps from one comparison with the oracle to the next; events are followed in all of them.
 const CHECK_EVERY: usize = 20;
 
 fn main() -> ExitCode {
     let args = Args::parse();
-    let new = || PbigBroadPhase::with_config(args.backend.config());
+    let config = Config { backend: args.backend.backend(), ..PbigBroadPhase::CONFIG };
+    let new = || PbigBroadPhase::with_config(config);
     let mut stock = Run::new(args.scene, args.bodies, args.seed, DefaultBroadPhase::new());
     let mut ours = Run::new(args.scene, args.bodies, args.seed, new());
     let bar = progress(args.steps as u64);

@@ -115,7 +115,8 @@ fn the_shadow_checker_notices_each_fault_and_writes_the_frames() {
         let task = Task { scene, bodies: 300, steps: 300, seed: 1 };
         let faulty = Faulty { inner: PbigBroadPhase::new(), plant, seen: 0 };
         let margin = PbigBroadPhase::CONFIG.margin;
-        let outcome = run_checked(task, faulty, margin, folder.path(), |_| ()).expect("a writable folder");
+        let (outcome, _) =
+            run_checked(task, faulty, margin, folder.path(), |_| ()).expect("a writable folder");
         let check = outcome.check.as_ref().expect("a check was asked for");
         let first = check.differences.first().unwrap_or_else(|| panic!("{plant:?} was not noticed"));
         assert!(faults.contains(&first.fault), "{plant:?}: {first}");

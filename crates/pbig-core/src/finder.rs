@@ -58,6 +58,7 @@ impl Default for Finder {
 impl Finder {
     /// A finder with the given settings ([`Config::margin`] is not used).
     pub fn new(config: Config) -> Self {
+        warn_of_fallback(&config);
         Self { config, search: Search::new(), pairs: vec![], scratch: vec![], report: Report::default() }
     }
 
@@ -109,10 +110,14 @@ impl Finder {
 
 /// Why the wanted backend cannot be had, if so (contract 8: the call finishes on the CPU).
 pub(crate) fn fallback(config: &Config) -> Option<&'static str> {
-    (config.backend == Backend::Gpu).then(|| {
-        tracing::warn!("pbig: no GPU backend in this build, using the CPU");
-        "no GPU backend in this build: the CPU did the work"
-    })
+    (config.backend == Backend::Gpu).then_some("no GPU backend in this build: the CPU does the work")
+}
+
+/// Once for each finder; the report says it after every call.
+pub(crate) fn warn_of_fallback(config: &Config) {
+    if let Some(why) = fallback(config) {
+        tracing::warn!("pbig: {why}");
+    }
 }
 
 pub(crate) fn check_count(boxes: u64, config: &Config) -> Result<(), Error> {

@@ -3,6 +3,7 @@
 pub mod boxes;
 pub mod chart;
 pub mod files;
+pub mod options;
 pub mod runner;
 pub mod scenes;
 pub mod shadow;

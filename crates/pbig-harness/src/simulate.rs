@@ -83,18 +83,17 @@ fn outcome<B: BroadPhase>(run: &Run<B>, check: Option<Check>) -> Outcome {
     }
 }
 
-/// Runs the scene; `progress` is told after each step.
-pub fn run<B: BroadPhase>(task: Task, broad_phase: B, mut progress: impl FnMut(usize)) -> Outcome {
+/// Runs the scene and gives the broad phase back; `progress` is told after each step.
+pub fn run<B: BroadPhase>(task: Task, broad_phase: B, mut progress: impl FnMut(usize)) -> (Outcome, B) {
     let mut run = Run::new(task.scene, task.bodies, task.seed, broad_phase);
     for step in 0..task.steps {
         run.step();
         progress(step);
     }
-    outcome(&run, None)
+    (outcome(&run, None), run.broad_phase.inner)
 }
 
-/// Runs the scene with rapier's own broad phase and the oracle beside the given one, and stops at
-/// the first difference, after writing the failing frames into `folder`.
+/// As [`run`], with rapier's own broad phase and the oracle beside the given one; stops at the first difference, after writing the failing frames into `folder`.
 ///
 /// # Errors
 /// A message that names the file, when the frames cannot be written.
@@ -104,7 +103,7 @@ pub fn run_checked<B: BroadPhase>(
     relative_margin: f32,
     folder: &Path,
     mut progress: impl FnMut(usize),
-) -> Result<Outcome, String> {
+) -> Result<(Outcome, B), String> {
     let shadow = Shadow::new(broad_phase, relative_margin);
     let mut run = Run::new(task.scene, task.bodies, task.seed, shadow);
     for step in 0..task.steps {
@@ -127,5 +126,5 @@ pub fn run_checked<B: BroadPhase>(
         differences: shadow.differences.clone(),
         frames_file: failed.then_some(file),
     };
-    Ok(outcome(&run, Some(check)))
+    Ok((outcome(&run, Some(check)), run.broad_phase.inner.inner))
 }

@@ -1,40 +1,7 @@
 //! Options that several commands share.
 
 use crate::output::Failure;
-use clap::ValueEnum;
-use pbig_core::{Backend, Config, Report};
-
-/// `--backend`.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
-pub(crate) enum BackendOption {
-    /// What is expected to be fastest.
-    #[default]
-    Auto,
-    /// The CPU.
-    Cpu,
-    /// A GPU; without one the CPU does the work and the output says so.
-    Gpu,
-    /// Every pair is tested.
-    Brute,
-}
-
-impl BackendOption {
-    /// The settings that this asks for.
-    pub(crate) fn config(self) -> Config {
-        let backend = match self {
-            Self::Auto => Backend::Auto,
-            Self::Cpu => Backend::Cpu,
-            Self::Gpu => Backend::Gpu,
-            Self::Brute => Backend::Brute,
-        };
-        Config { backend, ..Config::DEFAULT }
-    }
-
-    /// The backend that does the work.
-    pub(crate) fn in_use(self) -> &'static str {
-        if self == Self::Brute { "brute" } else { "cpu" }
-    }
-}
+use pbig_core::Report;
 
 /// Runs `work` on `threads` threads, or on all.
 pub(crate) fn with_threads<T: Send>(

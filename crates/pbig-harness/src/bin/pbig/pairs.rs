@@ -1,9 +1,10 @@
 //! `pbig pairs`: all overlapping pairs of the boxes in a file.
 
-use crate::options::{BackendOption, positive, stages, with_threads};
+use crate::options::{positive, stages, with_threads};
 use crate::output::{Failure, print, progress};
-use pbig_core::{Aabb, Finder};
+use pbig_core::{Aabb, Config, Finder};
 use pbig_harness::files::{read_boxes, write_pairs};
+use pbig_harness::options::BackendOption;
 use pbig_harness::runner::{Spread, milliseconds};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -37,7 +38,7 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
     if args.strict {
         refuse_invalid(&args.input, &boxes)?;
     }
-    let mut finder = Finder::new(args.backend.config());
+    let mut finder = Finder::new(Config { backend: args.backend.backend(), ..Config::DEFAULT });
     let times = with_threads(args.threads, || find(&mut finder, &boxes, args))?;
     if let Some(output) = &args.output {
         write_pairs(output, finder.pairs())?;

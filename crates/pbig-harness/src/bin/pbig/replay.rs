@@ -1,9 +1,10 @@
 //! `pbig replay`: the incremental path over frames of boxes.
 
-use crate::options::{BackendOption, stages};
+use crate::options::stages;
 use crate::output::{Failure, print, progress};
 use pbig_core::{BroadPhase, Config, Pair, ProxyFilter};
 use pbig_harness::files::{Frame, read_frames, write_csv};
+use pbig_harness::options::BackendOption;
 use pbig_harness::runner::{Spread, milliseconds};
 use std::path::PathBuf;
 use std::time::Instant;
@@ -38,7 +39,7 @@ struct Replay {
 
 pub(crate) fn run(args: &Args) -> Result<(), Failure> {
     let frames = read_frames(&args.frames)?;
-    let config = Config { margin: args.margin, ..args.backend.config() };
+    let config = Config { margin: args.margin, backend: args.backend.backend(), ..Config::DEFAULT };
     let about = |error| Failure::Input(format!("{}: {error}", args.frames.display()));
     let mut broad_phase =
         BroadPhase::new(config).map_err(|error| Failure::Input(format!("--margin: {error}")))?;

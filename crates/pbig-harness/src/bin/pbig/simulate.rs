@@ -1,11 +1,12 @@
 //! `pbig simulate` and `pbig scenes`: headless rapier worlds.
 
-use crate::options::{BackendOption, positive};
+use crate::options::positive;
 use crate::output::{Failure, print, progress};
 use clap::ValueEnum;
+use pbig_harness::options::BackendOption;
 use pbig_harness::scenes::Scene;
 use pbig_harness::simulate::{Check, Outcome, Task, run as run_scene, run_checked};
-use rapier_pbig::PbigBroadPhase;
+use rapier_pbig::{Config, PbigBroadPhase};
 use rapier3d::prelude::DefaultBroadPhase;
 use std::path::Path;
 
@@ -67,15 +68,20 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
         return Err(Failure::Input("--check compares pbig with stock: leave out --broad-phase stock".into()));
     }
     let bar = progress(args.steps, "steps");
-    let config = pbig_core::Config { backend: args.backend.config().backend, ..PbigBroadPhase::CONFIG };
+    let config = Config { backend: args.backend.backend(), ..PbigBroadPhase::CONFIG };
     let ours = PbigBroadPhase::with_config(config);
-    let outcome = match args.broad_phase {
-        _ if args.check => run_checked(task, ours, config.margin, Path::new("."), |_| bar.inc(1))?,
-        BroadPhaseOption::Pbig => run_scene(task, ours, |_| bar.inc(1)),
-        BroadPhaseOption::Stock => run_scene(task, DefaultBroadPhase::new(), |_| bar.inc(1)),
+    let step = |_| bar.inc(1);
+    let (outcome, fallback) = match args.broad_phase {
+        BroadPhaseOption::Stock => (run_scene(task, DefaultBroadPhase::new(), step).0, None),
+        BroadPhaseOption::Pbig => {
+            let checked =
+                args.check.then(|| run_checked(task, ours.clone(), config.margin, Path::new("."), step));
+            let (outcome, ours) = checked.unwrap_or_else(|| Ok(run_scene(task, ours, step)))?;
+            (outcome, ours.report().fallback)
+        }
     };
     bar.finish_and_clear();
-    report(args, bodies, &outcome)?;
+    report(args, bodies, &outcome, fallback)?;
     if outcome.failed() { Err(Failure::Check(failure_line(&outcome))) } else { Ok(()) }
 }
 
@@ -88,7 +94,7 @@ fn failure_line(outcome: &Outcome) -> String {
     format!("{first}; the frames up to there are in {file}")
 }
 
-fn report(args: &Args, bodies: usize, outcome: &Outcome) -> Result<(), Failure> {
+fn report(args: &Args, bodies: usize, outcome: &Outcome, fallback: Option<&str>) -> Result<(), Failure> {
     let backend = if args.broad_phase == BroadPhaseOption::Stock { "cpu" } else { args.backend.in_use() };
     if args.json {
         let object = serde_json::json!({
@@ -103,6 +109,7 @@ fn report(args: &Args, bodies: usize, outcome: &Outcome) -> Result<(), Failure> 
             "pairs": outcome.pairs,
             "added": outcome.added,
             "removed": outcome.removed,
+            "fallback": fallback,
             "check": outcome.check.as_ref().map(check_object),
         });
         return print(&object.to_string());

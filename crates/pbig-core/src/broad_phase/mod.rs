@@ -1,13 +1,13 @@
 //! The incremental facade: boxes are set and removed, an update tells which pairs came and went.
 
-use crate::cpu::check::Checker;
+mod update;
+
 use crate::cpu::find::Found;
 use crate::cpu::map::Map;
 use crate::diff::PairStore;
-use crate::finder::{Search, check_count, fallback, single_entry_checks};
-use crate::plan::{Chosen, Plan, Summary};
+use crate::finder::{Search, check_count, fallback, warn_of_fallback};
 use crate::report::{Report, lap};
-use crate::{Aabb, Backend, Config, Error, Pair, ProxyFilter, Strategy};
+use crate::{Aabb, Config, Error, Pair, Plan, ProxyFilter};
 use std::time::Instant;
 
 /// What an update changed. Both lists are sorted and free of duplicates, and have no pair in common.
@@ -95,6 +95,7 @@ impl BroadPhase {
     /// [`Error::Margin`].
     pub fn new(config: Config) -> Result<Self, Error> {
         check_margin(config.margin)?;
+        warn_of_fallback(&config);
         Ok(Self {
             config,
             boxes: vec![],
@@ -288,164 +289,6 @@ impl BroadPhase {
         if self.change_of[i] == UNCHANGED {
             self.change_of[i] = self.changed.len() as u32;
             self.changed.push(Old { id, aabb, filter });
-        }
-    }
-
-    /// Pairs that overlap now and did not, into `events.added`.
-    fn find_added(&mut self) -> Result<(), Error> {
-        for old in &self.changed {
-            if std::mem::replace(&mut self.home[old.id as usize], Home::Moved) != Home::Moved {
-                self.moved.push(old.id);
-            }
-        }
-        let whole = self.config.strategy == Strategy::Pbig || self.config.backend == Backend::Brute;
-        if whole || self.moved.len() * 8 >= self.present_count as usize {
-            self.search_all()?;
-        } else {
-            self.search_moved()?;
-        }
-        let mut clock = Instant::now();
-        self.events.added.sort_unstable();
-        self.report.stages.emit += lap(&mut clock);
-        Ok(())
-    }
-
-    /// Builds the base anew from all boxes and searches it.
-    fn search_all(&mut self) -> Result<(), Error> {
-        let state = State {
-            boxes: &self.boxes,
-            filters: &self.filters,
-            changed: &self.changed,
-            change_of: &self.change_of,
-        };
-        let (boxes, invalid) = (self.report.boxes, self.report.invalid);
-        let accept = |a: u32, b: u32| state.is_added(a, b);
-        self.base.find(&self.boxes, &self.config, &accept, &mut self.report)?;
-        (self.report.boxes, self.report.invalid) = (boxes, invalid);
-        for id in self.moved.drain(..) {
-            self.home[id as usize] = Home::None;
-        }
-        // A search by another strategy leaves no base grid to keep.
-        let kept = if self.report.plan.chosen == Chosen::Pbig { Home::None } else { Home::Base };
-        for (home, aabb) in self.home.iter_mut().zip(&self.boxes) {
-            *home = if aabb.is_valid() { kept } else { Home::None };
-        }
-        self.base.found.chunks.iter().for_each(|chunk| self.events.added.extend_from_slice(chunk));
-        Ok(())
-    }
-
-    /// Sorts the boxes that moved since the base was built, and searches them and the base.
-    fn search_moved(&mut self) -> Result<(), Error> {
-        let mut clock = Instant::now();
-        let summary = Summary::of(&self.boxes, Some(&self.moved));
-        let stages = &mut self.report.stages;
-        stages.plan += lap(&mut clock);
-        let plan = self.loose.plan_and_build(&summary, &self.config, &self.boxes, Some(&self.moved), stages);
-        let state = State {
-            boxes: &self.boxes,
-            filters: &self.filters,
-            changed: &self.changed,
-            change_of: &self.change_of,
-        };
-        let max_pairs = self.config.limits.max_pairs;
-        let mut clock = Instant::now();
-        self.loose.find(&|a, b| state.is_added(a, b), max_pairs, &mut self.found)?;
-        self.found.chunks.iter().for_each(|chunk| self.events.added.extend_from_slice(chunk));
-        // Entries of boxes that have left the base are still in it: their home says so.
-        let accept = |a: u32, b: u32| self.home[b as usize] == Home::Base && state.is_added(a, b);
-        let mut checker = Checker::new(&accept, &mut self.events.added);
-        for old in &self.changed {
-            let aabb = self.boxes[old.id as usize];
-            if aabb.is_valid() {
-                self.base.map.check_one(&aabb, old.id, &mut checker);
-            }
-            if checker.out.len() as u64 > max_pairs {
-                return Err(Error::TooManyPairs { limit: max_pairs });
-            }
-        }
-        self.found.checks += checker.checks;
-        self.found.overlaps += checker.overlaps;
-        self.report.stages.check += lap(&mut clock);
-        self.report.checks = single_entry_checks(&self.found);
-        let moved = self.moved.len() as u32;
-        self.report.plan = Plan { chosen: Chosen::Edit, moved, boxes: self.present_count, ..plan };
-        Ok(())
-    }
-
-    /// Kept pairs that no longer hold, into `events.removed` and, by place, `ended`.
-    fn find_removed(&mut self) {
-        let state = State {
-            boxes: &self.boxes,
-            filters: &self.filters,
-            changed: &self.changed,
-            change_of: &self.change_of,
-        };
-        let (ended, removed) = (&mut self.ended, &mut self.events.removed);
-        ended.clear();
-        let mut end = |(place, pair): (u32, Pair)| {
-            if !state.holds_now(pair.a, pair.b) {
-                ended.push(place);
-                removed.push(pair);
-            }
-        };
-        if self.changed.len() * 8 >= self.present_count as usize {
-            // Most boxes changed: one walk in memory order beats many along links.
-            self.pairs.iter().for_each(end);
-        } else {
-            for old in &self.changed {
-                // A pair of two changed boxes is in both their lists: count it at the first.
-                let first = |pair: &Pair| pair.a == old.id || self.change_of[pair.a as usize] == UNCHANGED;
-                self.pairs.of(old.id).filter(|(_, pair)| first(pair)).for_each(&mut end);
-            }
-        }
-        self.events.removed.sort_unstable();
-    }
-
-    /// Brings the kept pairs up to date and forgets the changes.
-    fn store(&mut self) {
-        self.pairs.remove_all(&mut self.ended);
-        for &pair in &self.events.added {
-            self.pairs.insert(pair);
-        }
-        for old in self.changed.drain(..) {
-            self.change_of[old.id as usize] = UNCHANGED;
-        }
-    }
-}
-
-/// The boxes now and at the last update.
-struct State<'a> {
-    boxes: &'a [Aabb],
-    filters: &'a [ProxyFilter],
-    changed: &'a [Old],
-    change_of: &'a [u32],
-}
-
-impl State<'_> {
-    /// Whether two boxes pair now. Absent and invalid boxes are NaN and overlap nothing.
-    fn holds_now(&self, a: u32, b: u32) -> bool {
-        let (a, b) = (a as usize, b as usize);
-        self.boxes[a].overlaps(&self.boxes[b]) && self.filters[a].allows(&self.filters[b])
-    }
-
-    /// Whether two boxes that overlap now pair now and did not at the last update.
-    #[inline]
-    fn is_added(&self, a: u32, b: u32) -> bool {
-        let (i, j) = (self.change_of[a as usize], self.change_of[b as usize]);
-        if i == UNCHANGED && j == UNCHANGED {
-            return false;
-        }
-        if !self.filters[a as usize].allows(&self.filters[b as usize]) {
-            return false;
-        }
-        let ((box_a, filter_a), (box_b, filter_b)) = (self.before(a, i), self.before(b, j));
-        !(box_a.overlaps(box_b) && filter_a.allows(filter_b))
-    }
-
-    fn before(&self, id: u32, change: u32) -> (&Aabb, &ProxyFilter) {
-        match self.changed.get(change as usize) {
-            Some(old) => (&old.aabb, &old.filter),
-            None => (&self.boxes[id as usize], &self.filters[id as usize]),
         }
     }
 }
