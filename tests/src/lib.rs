@@ -1,6 +1,6 @@
 //! The corpus: sets of boxes that every strategy must get right, with the strategies to try.
 
-use pbig_core::{Aabb, Backend, Config, Pair, Strategy};
+use pbig_core::{Aabb, Backend, CellRule, Config, Pair, Strategy};
 use pbig_harness::boxes::BoxSet;
 
 /// A set of boxes with a name to read in a failure.
@@ -19,6 +19,7 @@ pub fn strategies() -> Vec<(&'static str, Config)> {
         ("auto", Config::DEFAULT),
         ("grid", with(Backend::Cpu, Strategy::Grid)),
         ("pbig", with(Backend::Cpu, Strategy::Pbig)),
+        ("pbig by density", Config { cell_rule: CellRule::Density, ..with(Backend::Cpu, Strategy::Pbig) }),
         ("pbig rows", Config { small_cell: 1, ..with(Backend::Cpu, Strategy::Pbig) }),
         ("brute", with(Backend::Brute, Strategy::Auto)),
     ]

@@ -27,6 +27,18 @@ pub enum Strategy {
     Pbig,
 }
 
+/// How [`Strategy::Pbig`] chooses its cell size, both times from [`Config::pbig_boxes_per_cell`].
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum CellRule {
+    /// PBIG's equation 6: the smallest cell with that many entries on average, boxes counted in
+    /// every cell they touch.
+    #[default]
+    Objective,
+    /// Avril's section 4.1: the cell that holds that many boxes at the density of the space, sizes
+    /// ignored.
+    Density,
+}
+
 /// In which order lists of pairs come.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Order {
@@ -81,6 +93,8 @@ pub struct Config {
     /// PBIG's `W` in the constraint `f >= W` of equation 6: the wanted boxes per cell of
     /// [`Strategy::Pbig`]. The paper takes a warp, 32; a core without lanes to fill prefers few.
     pub pbig_boxes_per_cell: f32,
+    /// How [`Strategy::Pbig`] turns that number into a cell size.
+    pub cell_rule: CellRule,
     /// In [`Strategy::Pbig`], cells of at most this many boxes go through Avril's index to pair
     /// mapping, larger ones through PBIG's balanced rows.
     pub small_cell: u32,
@@ -96,6 +110,7 @@ impl Config {
         margin: 0.0,
         brute_below: 64,
         pbig_boxes_per_cell: 4.0,
+        cell_rule: CellRule::Objective,
         small_cell: 32,
     };
 }

@@ -56,7 +56,7 @@ mod report;
 
 pub use aabb::Aabb;
 pub use broad_phase::{BroadPhase, Events};
-pub use config::{Backend, Config, Limits, Order, Strategy};
+pub use config::{Backend, CellRule, Config, Limits, Order, Strategy};
 pub use error::Error;
 pub use filter::{ProxyFilter, TestMode};
 pub use finder::{Finder, find_pairs};

@@ -3,7 +3,7 @@
 
 use super::Summary;
 use crate::Aabb;
-use crate::config::Config;
+use crate::config::{CellRule, Config};
 use std::fmt;
 
 /// The grid of [`crate::Strategy::Pbig`]: one entry for each cell that a box touches.
@@ -29,30 +29,36 @@ impl fmt::Display for PbigPlan {
 }
 
 impl PbigPlan {
-    /// Solves equation 6 on the summary's sample, with `W` from the configuration.
+    /// Solves equation 6 on the summary's sample, or applies the density rule.
     pub fn new(summary: &Summary, config: &Config) -> Self {
         let (space, origin) = space_of(summary);
         let wanted = config.pbig_boxes_per_cell.max(1.0);
         let n = summary.valid;
-        let mut cell = pbig_cell(&summary.sample, n, space, wanted);
+        let mut cell = match config.cell_rule {
+            CellRule::Objective => pbig_cell(&summary.sample, n, space, wanted),
+            CellRule::Density => density_cell(n, space, wanted),
+        };
         // Oversize boxes in the sample raise alpha, and with it f, whatever the cell: the search
         // would end at a billion cells for a handful of boxes.
-        while cells_along(space, cell).product::<u64>() > u64::from(n).max(64) * MAX_CELLS_PER_BOX {
+        while cells_in(space, cell) > f64::from(n.max(64)) * MAX_CELLS_PER_BOX {
             cell *= 1.25;
         }
-        let mut along = cells_along(space, cell).map(|cells| cells as u32);
-        let dims = std::array::from_fn(|_| along.next().unwrap_or(1));
+        let dims = space.map(|length| cells_along(length, cell) as u32);
         let objective = pbig_objective(&summary.sample, n, space, cell);
         Self { cell, origin, dims, max_cells_per_box: 512, objective }
     }
 }
 
 /// Cells in all, per box: beyond, empty cells cost more than full ones.
-const MAX_CELLS_PER_BOX: u64 = 4;
+const MAX_CELLS_PER_BOX: f64 = 4.0;
 
-/// Equation 3, axis by axis.
-fn cells_along(space: [f32; 3], cell: f32) -> impl Iterator<Item = u64> {
-    space.into_iter().map(move |length| ((length / cell).ceil() as u64).max(1))
+fn cells_along(length: f32, cell: f32) -> f64 {
+    f64::from((length / cell).ceil().max(1.0))
+}
+
+/// Equations 3 and 4: cells of edge `cell` in a space, or under a box, of the given lengths.
+fn cells_in(lengths: [f32; 3], cell: f32) -> f64 {
+    lengths.into_iter().map(|length| cells_along(length, cell)).product()
 }
 
 /// The space of the paper: from the lowest corner to the highest, of most of the sample.
@@ -66,10 +72,8 @@ fn space_of(summary: &Summary) -> ([f32; 3], [f32; 3]) {
 /// `f = N alpha / M`, the average number of entries per cell, for cubic cells of edge `cell`
 /// (equations 2 to 5, `alpha` estimated from the sample).
 pub fn pbig_objective(sample: &[Aabb], n: u32, space: [f32; 3], cell: f32) -> f32 {
-    let cells = |lengths: [f32; 3]| cells_along(lengths, cell).map(|c| c as f64).product::<f64>();
-    let occupied = |b: &Aabb| cells(b.extents());
-    let alpha = sample.iter().map(occupied).sum::<f64>() / sample.len().max(1) as f64;
-    (f64::from(n) * alpha / cells(space)) as f32
+    let alpha = sample.iter().map(|b| cells_in(b.extents(), cell)).sum::<f64>() / sample.len().max(1) as f64;
+    (f64::from(n) * alpha / cells_in(space, cell)) as f32
 }
 
 /// The smallest cell with `f >= wanted` (equation 6), by a binary search on its edge as the paper
