@@ -5,6 +5,7 @@ use super::entries::{Entries, Stored};
 use crate::plan::{LevelPlan, Plan, Summary, size_class_of};
 use crate::report::{StageTimes, lap};
 use crate::{Aabb, Config};
+use std::ops::Range;
 use std::time::Instant;
 
 /// The boxes of one level, sorted by cell.
@@ -51,50 +52,53 @@ impl Grid {
         (self.starts.len() - 1 - GHOSTS) as u32
     }
 
-    /// Counting sort of `members` by cell (PBIG 4.2: count, scan, scatter), stable.
-    fn build(&mut self, level: &LevelPlan, boxes: &[Aabb], members: &[u32], places: &mut Vec<(u32, Span)>) {
+    /// Counting sort of `members` by cell (PBIG 4.2: count, scan, scatter), stable, in two passes:
+    /// into buckets of consecutive cells, then each bucket, which fits a cache. In one pass the
+    /// scatter misses the cache with every box: 112 to 126 ms for a million, against 43 to 51.
+    fn build(&mut self, level: &LevelPlan, boxes: &[Aabb], members: &[u32], sort: &mut Sort) {
         self.cells = Cells::new(level);
-        self.count(level.cells as usize, boxes, members, places);
-        self.scan();
-        self.scatter(boxes, members, places);
-        self.haunt();
-    }
-
-    fn count(&mut self, cells: usize, boxes: &[Aabb], members: &[u32], places: &mut Vec<(u32, Span)>) {
+        sort.place(&self.cells, boxes, members);
+        let shift = sort.distribute(level.cells, boxes, members);
         self.starts.clear();
-        self.starts.resize(cells + 1 + GHOSTS, 0);
-        places.clear();
-        places.extend(members.iter().map(|&id| self.cells.place(&boxes[id as usize])));
-        for (key, _) in places {
-            self.starts[*key as usize] += 1;
-        }
-    }
-
-    /// Counts to ends, which the scatter turns into starts.
-    fn scan(&mut self) {
-        let (mut sum, mut squares) = (0u32, 0u64);
-        for start in &mut self.starts {
-            squares += u64::from(*start) * u64::from(*start);
-            sum += *start;
-            *start = sum;
-        }
-        self.crowd = (squares as f64 / f64::from(sum.max(1))) as f32 - 1.0;
-    }
-
-    fn scatter(&mut self, boxes: &[Aabb], members: &[u32], places: &[(u32, Span)]) {
+        self.starts.resize(level.cells as usize + 1 + GHOSTS, 0);
         self.entries.resize(members.len());
         self.keys.resize(members.len(), 0);
         self.spans.resize(members.len(), Span::default());
-        // Backwards, so that equal keys keep the order of their ids.
-        for (&id, &(key, span)) in members.iter().zip(places).rev() {
-            let start = &mut self.starts[key as usize];
-            *start -= 1;
-            let place = *start as usize;
-            self.entries.boxes[place] = Stored::new(&boxes[id as usize]);
-            self.entries.ids[place] = id;
-            self.keys[place] = key;
-            self.spans[place] = span;
+        let mut squares = 0;
+        for (bucket, range) in sort.buckets().enumerate() {
+            let first = (bucket as u32) << shift;
+            let last = (first + (1 << shift)).min(level.cells);
+            squares += self.fill(first..last, range.start, &sort.items[range]);
         }
+        self.crowd = (squares as f64 / members.len().max(1) as f64) as f32 - 1.0;
+        self.haunt();
+    }
+
+    /// Sorts a bucket, whose entries begin at `base`, into its cells; returns the sum of the squares
+    /// of their counts.
+    fn fill(&mut self, cells: Range<u32>, base: usize, bucket: &[Item]) -> u64 {
+        // One cell further on: the cursor of a cell ends where the next one begins.
+        let cursors = &mut self.starts[cells.start as usize + 1..=cells.end as usize];
+        for item in bucket {
+            cursors[(item.key - cells.start) as usize] += 1;
+        }
+        let (mut next, mut squares) = (base as u32, 0);
+        for cursor in cursors.iter_mut() {
+            let count = *cursor;
+            squares += u64::from(count) * u64::from(count);
+            *cursor = next;
+            next += count;
+        }
+        for item in bucket {
+            let cursor = &mut cursors[(item.key - cells.start) as usize];
+            let place = *cursor as usize;
+            *cursor += 1;
+            self.entries.boxes[place] = Stored::new(&item.aabb);
+            self.entries.ids[place] = item.id;
+            self.keys[place] = item.key;
+            self.spans[place] = item.span;
+        }
+        squares
     }
 
     /// Copies the first cells behind the last.
@@ -109,6 +113,70 @@ impl Grid {
     }
 }
 
+/// A box on its way into a grid. It travels whole: to fetch it by id in the second pass would miss
+/// the cache with every box (60 ns each at a million, two thirds of the whole sort).
+#[derive(Clone, Copy, Debug)]
+struct Item {
+    aabb: Aabb,
+    id: u32,
+    key: u32,
+    span: Span,
+}
+
+/// The first pass of the sort, with its buffers.
+#[derive(Clone, Debug, Default)]
+struct Sort {
+    /// By member: the key of its cell, and its window.
+    placed: Vec<(u32, Span)>,
+    /// The members by bucket.
+    items: Vec<Item>,
+    /// End of each bucket in `items`.
+    ends: Vec<u32>,
+}
+
+impl Sort {
+    /// Boxes of a bucket: with its cells about 100 KB, a share of a second-level cache.
+    const BUCKET: usize = 2048;
+
+    /// Most buckets: each is a stream of writes, and the first-level cache has 512 lines.
+    const MOST: usize = 512;
+
+    /// Where each box goes; cells are computed here and nowhere else.
+    fn place(&mut self, cells: &Cells, boxes: &[Aabb], members: &[u32]) {
+        self.placed.clear();
+        self.placed.extend(members.iter().map(|&id| cells.place(&boxes[id as usize])));
+    }
+
+    /// Into buckets of `2^shift` cells each; returns the shift.
+    fn distribute(&mut self, cells: u32, boxes: &[Aabb], members: &[u32]) -> u32 {
+        let buckets = (members.len() / Self::BUCKET).next_power_of_two().min(Self::MOST) as u32;
+        let shift = (cells / buckets.min(cells)).trailing_zeros();
+        self.ends.clear();
+        self.ends.resize(buckets as usize, 0);
+        for (key, _) in &self.placed {
+            self.ends[(key >> shift) as usize] += 1;
+        }
+        let mut sum = 0;
+        for end in &mut self.ends {
+            // The start for now; it moves to the end as the bucket fills.
+            sum += std::mem::replace(end, sum);
+        }
+        let empty = Item { aabb: Aabb::NOWHERE, id: 0, key: 0, span: Span::default() };
+        self.items.resize(members.len(), empty);
+        for (&id, &(key, span)) in members.iter().zip(&self.placed) {
+            let cursor = &mut self.ends[(key >> shift) as usize];
+            self.items[*cursor as usize] = Item { aabb: boxes[id as usize], id, key, span };
+            *cursor += 1;
+        }
+        shift
+    }
+
+    fn buckets(&self) -> impl Iterator<Item = Range<usize>> {
+        let starts = std::iter::once(0).chain(self.ends.iter().copied());
+        starts.zip(&self.ends).map(|(start, &end)| start as usize..end as usize)
+    }
+}
+
 /// A set of boxes, ready to be searched: grids by level, and the boxes that fit none of them.
 #[derive(Clone, Debug)]
 pub(crate) struct Map {
@@ -117,7 +185,7 @@ pub(crate) struct Map {
     pub(crate) list: Entries,
     /// Scratch: ids of the boxes of a level, and where they go.
     members: Vec<Vec<u32>>,
-    places: Vec<(u32, Span)>,
+    sort: Sort,
     /// Factor on the cell size: below 1 where clusters fill the cells that an even spread would
     /// leave half empty. Kept from one build to the next.
     crowding: f32,
@@ -132,7 +200,13 @@ const FINEST: f32 = 1e-6;
 
 impl Map {
     pub(crate) fn new() -> Self {
-        Self { grids: vec![], list: Entries::default(), members: vec![], places: vec![], crowding: 1.0 }
+        Self {
+            grids: vec![],
+            list: Entries::default(),
+            members: vec![],
+            sort: Sort::default(),
+            crowding: 1.0,
+        }
     }
 
     /// Plans and sorts; again with finer cells where clusters make them too full.
@@ -183,7 +257,7 @@ impl Map {
             if self.grids.len() == i {
                 self.grids.push(Grid::new(level));
             }
-            self.grids[i].build(level, boxes, &self.members[i], &mut self.places);
+            self.grids[i].build(level, boxes, &self.members[i], &mut self.sort);
         }
     }
 
