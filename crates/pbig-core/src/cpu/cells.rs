@@ -7,7 +7,7 @@
 //!
 //! * A box is stored once, so no pair is found in two cells.
 //! * Two cells of a window never share a key: `dims.x >= 8`, `dims.y >= 8`, `M >= 8 dims.x dims.y`,
-//!   and windows reach at most 3 cells to each side (or are checked against `dims`). So a pair is
+//!   and windows reach one cell to each side (or are checked against `dims`). So a pair is
 //!   met at most once from each of its boxes, and from exactly one of them, because the half
 //!   neighbourhood and its mirror image share no key either.
 //! * Cells are computed by a monotone function of the coordinate, and a window is computed from
@@ -16,12 +16,13 @@
 use crate::Aabb;
 use crate::plan::LevelPlan;
 
-/// From coordinates to cells, four lanes at a time (the last one idle).
+/// From coordinates to cells, in f64: no rounding within the reach of f32 is large enough to widen a
+/// window, and cells far from the origin stay apart.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Cells {
-    origin: [f32; 4],
-    inverse: [f32; 4],
-    max_extent: [f32; 4],
+    origin: [f64; 3],
+    inverse: [f64; 3],
+    max_extent: [f64; 3],
     pub(crate) dims: [u32; 3],
     pub(crate) stride_y: u32,
     pub(crate) stride_z: u32,
@@ -29,20 +30,17 @@ pub(crate) struct Cells {
 }
 
 /// Cells beyond this distance from the origin share the last one. Up to here rounding moves a
-/// coordinate by less than a fifth of a cell, which keeps windows within 3 cells.
-const FARTHEST: f32 = (1 << 20) as f32;
-
-fn four(v: &[f32; 3]) -> [f32; 4] {
-    [v[0], v[1], v[2], 0.0]
-}
+/// coordinate by less than half a thousandth of a cell, and two of them stay within the spare room of
+/// [`LevelPlan::cell`].
+const FARTHEST: f64 = (1u64 << 40) as f64;
 
 impl Cells {
     pub(crate) fn new(level: &LevelPlan) -> Self {
         let [x, y, _] = level.dims;
         Self {
-            origin: four(&level.origin),
-            inverse: four(&level.cell.map(|c| 1.0 / c)),
-            max_extent: four(&level.max_extent),
+            origin: level.origin.map(f64::from),
+            inverse: level.cell.map(|c| 1.0 / f64::from(c)),
+            max_extent: level.max_extent.map(f64::from),
             dims: level.dims,
             stride_y: x,
             stride_z: x * y,
@@ -50,42 +48,41 @@ impl Cells {
         }
     }
 
-    /// The cell of a point: monotone on each axis, all that correctness asks of it.
+    /// The cell of coordinate `x` on axis `k`: monotone in `x`, all that correctness asks of it.
     #[inline(always)]
-    fn cell(&self, point: &[f32; 4]) -> [i32; 4] {
-        std::array::from_fn(|k| {
-            let scaled = (point[k] - self.origin[k]) * self.inverse[k];
-            // Comparisons that a NaN fails, unlike `clamp`, are one instruction each.
-            let below = if scaled < FARTHEST { scaled } else { FARTHEST };
-            let within = if below > -FARTHEST { below } else { -FARTHEST };
-            // SAFETY: `within` is at least -2^20 and at most 2^20, and no NaN, by the lines above.
-            unsafe { within.to_int_unchecked::<i32>() }
-        })
+    fn coordinate(&self, k: usize, x: f64) -> i64 {
+        let scaled = (x - self.origin[k]) * self.inverse[k];
+        // Comparisons that a NaN fails, unlike `clamp`, are one instruction each.
+        let below = if scaled < FARTHEST { scaled } else { FARTHEST };
+        let within = if below > -FARTHEST { below } else { -FARTHEST };
+        // SAFETY: `within` is at least -2^40 and at most 2^40, and no NaN, by the lines above.
+        unsafe { within.to_int_unchecked::<i64>() }
+    }
+
+    #[inline(always)]
+    fn cell(&self, point: &[f32; 3]) -> [i64; 3] {
+        std::array::from_fn(|k| self.coordinate(k, f64::from(point[k])))
     }
 
     /// The cells in which the lower corner of a box that overlaps `one` can lie: from where the
     /// largest box of the level would begin, to the cell of the upper corner.
     #[inline(always)]
-    pub(crate) fn window(&self, one: &Aabb) -> ([i32; 4], [i32; 4]) {
-        (self.cell(&self.lowest(one)), self.cell(&four(&one.max)))
-    }
-
-    #[inline(always)]
-    fn lowest(&self, one: &Aabb) -> [f32; 4] {
-        let min = four(&one.min);
-        std::array::from_fn(|k| min[k] - self.max_extent[k])
+    pub(crate) fn window(&self, one: &Aabb) -> ([i64; 3], [i64; 3]) {
+        let lowest = |k: usize| f64::from(one.min[k]) - self.max_extent[k];
+        (std::array::from_fn(|k| self.coordinate(k, lowest(k))), self.cell(&one.max))
     }
 
     /// Where a box of the level is stored, and its window.
     #[inline(always)]
     pub(crate) fn place(&self, one: &Aabb) -> (u32, Span) {
-        let cell = self.cell(&four(&one.min));
+        let cell = self.cell(&one.min);
         let (low, high) = self.window(one);
         (self.key(cell), Span::new(low, cell, high))
     }
 
     #[inline(always)]
-    pub(crate) fn key(&self, cell: [i32; 4]) -> u32 {
+    pub(crate) fn key(&self, cell: [i64; 3]) -> u32 {
+        // Truncation to 32 bits is a remainder too, by a multiple of M.
         let y = (cell[1] as u32).wrapping_mul(self.stride_y);
         let z = (cell[2] as u32).wrapping_mul(self.stride_z);
         self.wrap((cell[0] as u32).wrapping_add(y).wrapping_add(z))
@@ -97,34 +94,25 @@ impl Cells {
     }
 }
 
-/// How far a box's window reaches from the cell of its lower corner, in cells, 0 to 3 each. The half
-/// neighbourhood needs no lower z.
+/// Whether a box's window reaches into the next cell, down and up, a bit each: it never reaches
+/// further, because no box of the level is as large as a cell. The half neighbourhood needs no
+/// lower z.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub(crate) struct Span(u16);
+pub(crate) struct Span(u8);
 
 impl Span {
     #[inline(always)]
-    fn new(low: [i32; 4], cell: [i32; 4], high: [i32; 4]) -> Self {
+    fn new(low: [i64; 3], cell: [i64; 3], high: [i64; 3]) -> Self {
         let [down_x, down_y] = [cell[0] - low[0], cell[1] - low[1]];
-        let up: [i32; 3] = std::array::from_fn(|k| high[k] - cell[k]);
-        let fields = [down_x, down_y, up[0], up[1], up[2]];
-        debug_assert!(fields.iter().all(|f| (0..=Self::WIDEST).contains(f)), "window too wide");
-        Self(fields.iter().enumerate().fold(0, |bits, (i, &f)| bits | ((f & 3) as u16) << (2 * i)))
-    }
-
-    /// Cells that a window reaches to each side at most: `max_extent` is below a cell, rounding adds
-    /// less than two (see `FARTHEST`; subtracting an extent near an ulp can double it).
-    pub(crate) const WIDEST: i32 = 3;
-
-    /// Whether no side reaches further than one cell, as nearly always.
-    #[inline(always)]
-    pub(crate) fn is_narrow(self) -> bool {
-        self.0 & 0b10_1010_1010 == 0
+        let [up_x, up_y, up_z] = [high[0] - cell[0], high[1] - cell[1], high[2] - cell[2]];
+        let fields = [down_x, down_y, up_x, up_y, up_z];
+        debug_assert!(fields.iter().all(|f| (0..=1).contains(f)), "window too wide: {fields:?}");
+        Self(fields.iter().enumerate().fold(0, |bits, (i, &f)| bits | (f as u8) << i))
     }
 
     #[inline(always)]
     fn field(self, i: u32) -> u32 {
-        u32::from(self.0 >> (2 * i) & 3)
+        u32::from(self.0 >> i & 1)
     }
 
     pub(crate) fn down_x(self) -> u32 {
@@ -171,25 +159,24 @@ mod tests {
             (0..=u16::MAX).map(|high| f32::from_bits(u32::from(high) << 16 | 0x1234)).collect();
         floats.retain(|x| !x.is_nan());
         floats.sort_unstable_by(f32::total_cmp);
-        let found: Vec<i32> = floats.iter().map(|&x| cells.cell(&[x; 4])[0]).collect();
+        let found: Vec<i64> = floats.iter().map(|&x| cells.cell(&[x; 3])[0]).collect();
         assert!(found.is_sorted());
-        assert_eq!((found[0], found[found.len() - 1]), (-(1 << 20), 1 << 20));
-        assert_eq!(cells.cell(&[f32::NAN; 4])[0], 1 << 20);
+        assert_eq!((found[0], found[found.len() - 1]), (-(1 << 40), 1 << 40));
+        assert_eq!(cells.cell(&[f32::NAN; 3])[0], 1 << 40);
     }
 
     #[test]
-    fn windows_reach_at_most_three_cells_wherever_and_however_small_the_cells() {
+    fn windows_reach_one_cell_at_most_wherever_and_however_small_the_cells() {
         for cell in [1e-20f32, 1e-3, 0.3, 1.0, 777.0, 1e20] {
-            for scale in [0.0f32, 1.0, 1e3, 1e6, 1e9, 1e30] {
+            for scale in [0.0f32, 1.0, 1e3, 1e6, 1e9, 1e12] {
                 let cells = cells(cell, 0.1 * scale * cell);
                 for i in 0..2000 {
                     let min = (i as f32 * 0.377 - 300.0) * scale * cell;
                     let one = Aabb::new([min; 3], [min + cell / 1.0011 * (i % 7) as f32 / 6.0; 3]);
                     if one.extents()[0] <= cell / 1.001 {
-                        let (low, high) = cells.window(&one);
-                        let own = cells.cell(&[min; 4]);
+                        let ((low, high), own) = (cells.window(&one), cells.cell(&one.min));
                         let reach = (own[0] - low[0]).max(high[0] - own[0]);
-                        assert!((0..=Span::WIDEST).contains(&reach), "{reach}: cell {cell}, box {one:?}");
+                        assert!((0..=1).contains(&reach), "{reach}: cell {cell}, box {one:?}");
                     }
                 }
             }

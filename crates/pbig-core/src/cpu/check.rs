@@ -65,7 +65,7 @@ impl Grid {
     ) {
         let query = Query::new(one);
         let (low, high) = self.cells.window(one);
-        let wide: [i64; 3] = std::array::from_fn(|k| i64::from(high[k]) - i64::from(low[k]) + 1);
+        let wide: [i64; 3] = std::array::from_fn(|k| high[k] - low[k] + 1);
         // A window that wraps onto itself would meet entries twice; one with more rows than there
         // are entries is slower than a sweep.
         let wraps = (0..3).any(|k| wide[k] > i64::from(self.cells.dims[k]));
@@ -74,7 +74,7 @@ impl Grid {
         }
         for z in low[2]..=high[2] {
             for y in low[1]..=high[1] {
-                let key = self.cells.key([low[0], y, z, 0]);
+                let key = self.cells.key([low[0], y, z]);
                 self.test_row(checker, &query, id, key, wide[0] as u32);
             }
         }

@@ -19,8 +19,11 @@ const BLOCK: usize = 4;
 /// Tested blocks with hits that are kept before they are expanded.
 const KEPT: usize = 1024;
 
-/// Entries that a block may read beyond the last one.
-const _: () = assert!(PADDING >= BLOCK);
+/// Rows that a box looks at; each may keep a block.
+const ROWS: usize = 5;
+
+/// A block may read beyond the last entry, and a row of three cells beyond the last cell.
+const _: () = assert!(PADDING >= BLOCK && GHOSTS >= 3);
 
 /// A block with hits: entry `i`, candidates from `j` on, a bit for each.
 #[derive(Clone, Copy, Default)]
@@ -52,12 +55,8 @@ impl<'a, A: Fn(u32, u32) -> bool> Half<'a, A> {
     /// Entries `range` against what comes after each; stops early when there is no more room.
     pub(crate) fn check(&mut self, range: Range<usize>) {
         for i in range {
-            if self.grid.spans[i].is_narrow() {
-                self.check_narrow(i)
-            } else {
-                self.check_wide(i)
-            }
-            if self.kept > KEPT - 64 {
+            self.check_one(i);
+            if self.kept > KEPT - ROWS {
                 self.expand();
                 if !self.room.take(self.out.len(), &mut self.taken) {
                     return;
@@ -67,9 +66,8 @@ impl<'a, A: Fn(u32, u32) -> bool> Half<'a, A> {
         self.expand();
     }
 
-    /// Windows of at most one cell to each side: five rows.
     #[inline(always)]
-    fn check_narrow(&mut self, i: usize) {
+    fn check_one(&mut self, i: usize) {
         let (grid, key) = (self.grid, self.grid.keys[i]);
         let (span, cells) = (grid.spans[i], &grid.cells);
         let query = grid.entries.boxes[i].query();
@@ -88,25 +86,6 @@ impl<'a, A: Fn(u32, u32) -> bool> Half<'a, A> {
             let from = cells.wrap(from);
             let end = from + length * needed;
             self.test(i, &query, grid.starts[from as usize], grid.starts[end as usize]);
-        }
-    }
-
-    /// Wider windows, where rounding pushed a corner over a border: rare.
-    #[cold]
-    fn check_wide(&mut self, i: usize) {
-        let (grid, key, span) = (self.grid, self.grid.keys[i], self.grid.spans[i]);
-        let (cells, query) = (&grid.cells, grid.entries.boxes[i].query());
-        self.test(i, &query, i as u32 + 1, grid.starts[(key + 1 + span.up_x()) as usize]);
-        let length = span.down_x() + span.up_x() + 1;
-        for z in 0..=span.up_z() {
-            let down = if z == 0 { 0 } else { span.down_y() };
-            let first = u32::from(z == 0);
-            let layer = key.wrapping_sub(span.down_x()).wrapping_add(z * cells.stride_z);
-            let lowest = layer.wrapping_sub(down * cells.stride_y);
-            for y in first..=down + span.up_y() {
-                let from = cells.wrap(lowest.wrapping_add(y * cells.stride_y));
-                self.test(i, &query, grid.starts[from as usize], grid.starts[(from + length) as usize]);
-            }
         }
     }
 
@@ -138,7 +117,7 @@ impl<'a, A: Fn(u32, u32) -> bool> Half<'a, A> {
     fn test_long(&mut self, i: usize, query: &Query, start: u32, length: u32) {
         for done in (0..length).step_by(BLOCK) {
             self.test_block(i, query, start + done, length - done);
-            if self.kept > KEPT - 16 {
+            if self.kept > KEPT - 2 * ROWS {
                 self.expand();
             }
         }
@@ -162,6 +141,3 @@ impl<'a, A: Fn(u32, u32) -> bool> Half<'a, A> {
         self.kept = 0;
     }
 }
-
-/// A row of a narrow or wide window fits into the ghosts.
-const _: () = assert!(2 * super::cells::Span::WIDEST < GHOSTS as i32);

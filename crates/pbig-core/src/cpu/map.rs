@@ -24,8 +24,8 @@ pub(crate) struct Grid {
 }
 
 /// Cells that are repeated behind the last one, so that a row of a window that wraps around is still
-/// one run of entries: the widest row has 7 cells.
-pub(crate) const GHOSTS: usize = 8;
+/// one run of entries: a row has three cells.
+pub(crate) const GHOSTS: usize = 4;
 
 /// Entries behind the last ghost, so that a block of [`super::half::BLOCK`] may be read anywhere.
 pub(crate) const PADDING: usize = 8;
@@ -186,16 +186,25 @@ pub(crate) struct Map {
     /// Scratch: ids of the boxes of a level, and where they go.
     members: Vec<Vec<u32>>,
     sort: Sort,
-    /// Factor on the cell size: below 1 where clusters fill the cells that an even spread would
-    /// leave half empty. Kept from one build to the next.
-    crowding: f32,
+    crowding: Crowding,
 }
 
-/// Other entries in a box's cell, on average, at which finer cells are tried. An even spread has
-/// half a one. Relaxed again below a sixteenth of it, so that the choice does not flap.
-const CROWDED: f32 = 6.0;
+/// Cells smaller than an even spread of boxes would ask for, where clusters make them too full.
+/// Kept from one build to the next.
+#[derive(Clone, Copy, Debug)]
+struct Crowding {
+    /// Factor on the cell size.
+    factor: f32,
+    /// How full cells are where smaller ones did not help: identical boxes, say.
+    accepted: f32,
+}
 
-/// Where halving the cells ends.
+/// Other entries in a box's cell, on average over boxes, at which smaller cells are tried. An even
+/// spread has half a one. Doubling a cell gathers eight times as many boxes, so that cells grow
+/// again only when they are certain to stay below: the choice does not flap.
+const CROWDED: f32 = 12.0;
+
+/// Where dividing the cells ends.
 const FINEST: f32 = 1e-6;
 
 impl Map {
@@ -205,11 +214,11 @@ impl Map {
             list: Entries::default(),
             members: vec![],
             sort: Sort::default(),
-            crowding: 1.0,
+            crowding: Crowding { factor: 1.0, accepted: 0.0 },
         }
     }
 
-    /// Plans and sorts; again with finer cells where clusters make them too full.
+    /// Plans and sorts; again with smaller cells where clusters make them too full.
     pub(crate) fn plan_and_build(
         &mut self,
         summary: &Summary,
@@ -218,35 +227,36 @@ impl Map {
         ids: Option<&[u32]>,
         times: &mut StageTimes,
     ) -> Plan {
-        loop {
+        let mut build = |map: &mut Self| {
             let mut clock = Instant::now();
-            let plan = Plan::new(summary, config, self.crowding);
+            let plan = Plan::new(summary, config, map.crowding.factor);
             times.plan += lap(&mut clock);
-            self.build(&plan, boxes, ids);
+            map.build(&plan, boxes, ids);
             times.map += lap(&mut clock);
-            if !self.divide(self.worst_crowd(&plan)) {
-                return plan;
+            plan
+        };
+        let mut tried: Vec<(f32, f32)> = Vec::new();
+        loop {
+            let plan = build(self);
+            let crowd = self.crowd();
+            tried.push((self.crowding.factor, crowd));
+            let limit = CROWDED.max(1.5 * self.crowding.accepted);
+            if crowd > limit && divisible(&plan) && self.crowding.factor > FINEST {
+                // The first halvings of two far clusters change nothing: take larger steps then.
+                let helps = tried.len() < 2 || crowd < 0.8 * tried[tried.len() - 2].1;
+                self.crowding.factor *= if helps { 0.5 } else { 0.25 };
+                continue;
             }
+            if self.crowding.settle(&tried) {
+                return build(self);
+            }
+            return plan;
         }
     }
 
-    /// How full the fullest level is, of those whose cells could be smaller.
-    fn worst_crowd(&self, plan: &Plan) -> f32 {
-        let divisible = |level: &LevelPlan| (0..3).any(|k| level.cell[k] > 1.5 * level.max_extent[k]);
-        let crowd = |(grid, level): (&Grid, _)| if divisible(level) { grid.crowd } else { 0.0 };
-        self.grids.iter().zip(&plan.levels).map(crowd).fold(0.0, f32::max)
-    }
-
-    /// Whether to build again with finer cells, which `crowding` then asks for. Two far clusters
-    /// need many halvings before any helps; identical boxes stop at the last.
-    fn divide(&mut self, crowd: f32) -> bool {
-        let divide = crowd > CROWDED && self.crowding > FINEST;
-        if divide {
-            self.crowding *= 0.5;
-        } else if crowd < CROWDED / 16.0 {
-            self.crowding = (self.crowding * 2.0).min(1.0);
-        }
-        divide
+    /// How full the fullest level is.
+    fn crowd(&self) -> f32 {
+        self.grids.iter().map(|grid| grid.crowd).fold(0.0, f32::max)
     }
 
     /// Sorts the valid boxes among `boxes` (or among those with the given ids) as planned.
@@ -285,6 +295,31 @@ impl Map {
     /// All entries, grid by grid, smallest boxes first; without the list.
     pub(crate) fn len_in_grids(&self) -> usize {
         self.grids.iter().map(|g| g.len()).sum()
+    }
+}
+
+/// Whether smaller cells would still hold the largest box of a level.
+fn divisible(plan: &Plan) -> bool {
+    plan.levels.iter().any(|level| (0..3).any(|k| level.cell[k] > 1.5 * level.max_extent[k]))
+}
+
+impl Crowding {
+    /// Settles on one of the factors tried in a call, with the crowd that each led to, for the calls
+    /// to come; true when it is not the last one, so that the map has to be built again.
+    fn settle(&mut self, tried: &[(f32, f32)]) -> bool {
+        let last = tried.len() - 1;
+        let least = tried.iter().map(|t| t.1).fold(f32::INFINITY, f32::min);
+        if tried[last].1 <= CROWDED {
+            self.accepted = 0.0;
+            if 8.0 * (least + 1.0) <= CROWDED {
+                self.factor = (self.factor * 2.0).min(1.0);
+            }
+            return false;
+        }
+        // Smaller cells that are as full are of no use: the largest that are no fuller.
+        let best = tried.iter().position(|t| t.1 <= 1.1 * least).unwrap_or(last);
+        (self.factor, self.accepted) = tried[best];
+        best != last
     }
 }
 

@@ -14,7 +14,8 @@ pub struct LevelPlan {
     pub classes: (u8, u8),
     /// Largest extent on each axis: no box reaches further than this beyond its lower corner.
     pub max_extent: [f32; 3],
-    /// Cell size: above `max_extent`, and such that about half a box falls into a cell.
+    /// Cell size: at least a thousandth above `max_extent`, and such that about half a box falls into a
+    /// cell.
     pub cell: [f32; 3],
     /// Where cell 0 begins.
     pub origin: [f32; 3],
@@ -193,15 +194,19 @@ impl<'a> World<'a> {
     }
 }
 
-/// Fewest cells on an axis. Windows reach 3 cells to each side at most (see `cpu::map`), so that two
-/// cells of one window never wrap onto each other when an axis has more than 2 * 3 cells.
+/// Fewest cells on an axis. Windows reach one cell to each side (see `cpu::cells`), so that two cells
+/// of one window never wrap onto each other when an axis has more than four.
 const FEWEST: u32 = 8;
+
+/// Most cells in all.
+const MOST: u64 = 1 << 27;
 
 /// Cells on each axis: enough for the range, but no more than four a box in all (wrapping around
 /// costs a few more tests, empty cells cost memory traffic).
 fn dimensions(range: [f32; 3], cell: [f32; 3], boxes: u32) -> ([u32; 3], u32) {
-    let budget = (4 * u64::from(boxes)).max(u64::from(FEWEST).pow(3)).min(1 << 27);
-    let wanted = |k: usize| (range[k] / cell[k]).min(1e9) as u64 + 4;
+    let budget = (4 * u64::from(boxes)).max(u64::from(FEWEST).pow(3)).min(MOST);
+    // Capped so that the product of three stays below 2^64; the loop takes care of the rest.
+    let wanted = |k: usize| ((range[k] / cell[k]).min(1e6) as u64) + 4;
     let mut dims: [u64; 3] = std::array::from_fn(|k| wanted(k).max(u64::from(FEWEST)));
     while dims.iter().product::<u64>() > budget {
         let widest = (0..3).max_by_key(|&k| dims[k]).unwrap_or(0);
