@@ -47,11 +47,13 @@ cargo fmt --version >/dev/null 2>&1 && cargo clippy --version >/dev/null 2>&1 ||
     step rustup component add rustfmt clippy
 has_vulkan || require "a Vulkan driver (this software one will do)" mesa-vulkan-drivers libvulkan1
 
-# One profile and one set of features throughout: everything is built once.
+# One profile and one set of features: everything is built once, pbig-core alone a second time.
 step cargo fmt --all --check
 step cargo clippy --release --workspace --all-targets -- -D warnings
 step cargo build --release --workspace --examples --bins
 step cargo test --release --workspace
+# Once more with overflow checks and debug assertions, where there is unsafe code and index arithmetic.
+step cargo test -p pbig-core
 # The commands that the README shows, at a size that takes seconds.
 step target/release/examples/falling_objects --bodies 500 --steps 60
 step target/release/examples/drop_in

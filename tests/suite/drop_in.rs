@@ -281,6 +281,62 @@ fn the_collider_with_fewer_pairs_comes_first() {
 }
 
 #[test]
+fn a_ground_that_loses_all_its_pairs_does_not_come_first_either() {
+    let mut world = World::with_gravity(glam::Vec3::ZERO);
+    let ground = world.colliders.insert(ColliderBuilder::cuboid(100.0, 1.0, 100.0));
+    let balls: Vec<_> = (0..20)
+        .map(|i| {
+            world.add(
+                RigidBodyBuilder::dynamic().translation(vector![i as f32 * 3.0, 1.4, 0.0]),
+                ColliderBuilder::ball(0.5),
+            )
+        })
+        .collect();
+    let mut broad_phase = PbigBroadPhase::new();
+    world.step(&mut broad_phase);
+    assert_eq!(broad_phase.pair_count(), 20);
+    let params = world.params;
+    for ball in balls {
+        world.bodies[ball].set_translation(vector![0.0, 500.0, 0.0], true);
+        world.bodies.propagate_modified_body_positions_to_colliders(&mut world.colliders);
+    }
+    let handles: Vec<_> = world.colliders.iter().map(|(handle, _)| handle).collect();
+    let mut events = Vec::new();
+    broad_phase.update(&params, &world.colliders, &world.bodies, &handles, &[], &mut events);
+    let second = |event: &BroadPhasePairEvent| match event {
+        BroadPhasePairEvent::DeletePair(pair) => Some(pair.collider2),
+        BroadPhasePairEvent::AddPair(_) => None,
+    };
+    let ended: Vec<_> = events.iter().filter_map(second).collect();
+    assert_eq!(ended, [ground; 20]);
+}
+
+#[test]
+fn a_length_unit_scales_the_margin() {
+    for (length_unit, pairs) in [(1.0, 0), (100.0, 1)] {
+        let mut scene = Checked::new();
+        scene.world.params.length_unit = length_unit;
+        // Less than a prediction distance and two margins apart at 100, more at 1.
+        scene.world.params.normalized_prediction_distance = 0.0;
+        scene.ball(0.0);
+        scene.ball(2.0);
+        assert_eq!(scene.step(), pairs, "length unit {length_unit}");
+    }
+}
+
+#[test]
+fn the_report_is_that_of_the_last_call_also_when_nothing_moved() {
+    let mut scene = Checked::new();
+    scene.ball(0.0);
+    scene.ball(0.9);
+    scene.step();
+    let World { params, colliders, bodies, .. } = &scene.world;
+    scene.broad_phase.inner.update(params, colliders, bodies, &[], &[], &mut Vec::new());
+    let report = scene.broad_phase.inner.report();
+    assert_eq!((report.changed, report.checks.made, report.boxes, report.pairs), (0, 0, 2, 1));
+}
+
+#[test]
 fn the_collision_pipeline_works_as_with_stock() {
     let (mut bodies, mut colliders) = (RigidBodySet::new(), ColliderSet::new());
     let sensor = || {

@@ -121,16 +121,67 @@ fn limits_end_in_errors_that_name_them() {
 
 #[test]
 fn clusters_do_not_cost_more_than_an_even_spread() {
-    // 2 x 20,000 boxes a million apart: cells sized for the whole world would hold a cluster each.
+    // 2 x 20,000 boxes far apart: cells sized for the whole world would hold a cluster each.
     let unit = BoxSet::named("unit").expect("the set exists");
-    let mut boxes = unit.boxes(20_000, 1);
-    boxes.extend(
-        unit.boxes(20_000, 2).iter().map(|b| Aabb::new(b.min.map(|x| x + 1e6), b.max.map(|x| x + 1e6))),
-    );
+    for apart in [1e3f32, 1e6, 1e7] {
+        let away = |b: &Aabb| Aabb::new(b.min.map(|x| x + apart), b.max.map(|x| x + apart));
+        let mut boxes = unit.boxes(20_000, 1);
+        boxes.extend(unit.boxes(20_000, 2).iter().map(away));
+        checks_at_most(60 * 40_000, &boxes);
+    }
+}
+
+#[test]
+fn boxes_flung_far_away_do_not_cost_the_others_their_resolution() {
+    let mut boxes = BoxSet::named("pile").expect("the set exists").boxes(9000, 1);
+    boxes.extend((0..1000).map(|i| {
+        let side = |k: u32| if i >> k & 1 == 0 { 1.0 } else { -1.0 };
+        Aabb::from_center([side(0), side(1), side(2)].map(|s| s * (1e9 + 1e6 * i as f32)), [0.5; 3])
+    }));
+    checks_at_most(60 * 10_000, &boxes);
+}
+
+#[test]
+fn points_among_identical_ones_cost_no_more_than_those() {
+    let mut boxes: Vec<Aabb> = BoxSet::named("unit")
+        .expect("the set exists")
+        .boxes(9000, 1)
+        .iter()
+        .map(|b| Aabb::new(b.min, b.min))
+        .collect();
+    boxes.extend(vec![boxes[17]; 300]);
+    checks_at_most(300 * 300 / 2 + 60 * 9300, &boxes);
+}
+
+/// In each of three calls of one finder, which has learned from the calls before.
+fn checks_at_most(most: u64, boxes: &[Aabb]) {
     let mut finder = Finder::default();
-    finder.find(&boxes).expect("within the limits");
-    let checks = finder.report().checks.made;
-    assert!(checks < 40_000 * 60, "{checks} checks: {}", finder.report().plan);
+    for call in 0..3 {
+        finder.find(boxes).expect("within the limits");
+        let made = finder.report().checks.made;
+        assert!(made < most, "call {call}: {made} checks: {}", finder.report().plan);
+    }
+}
+
+#[test]
+fn a_limit_is_noticed_before_memory_runs_out() {
+    // 5 * 10^9 pairs, 40 GB, if anything went on past the limit.
+    let boxes = vec![Aabb::new([0.0; 3], [1.0; 3]); 100_000];
+    for (strategy, config) in strategies() {
+        let limits = Limits { max_pairs: 1000, ..Limits::DEFAULT };
+        let error = Finder::new(Config { limits, ..config }).find(&boxes).unwrap_err();
+        assert_eq!(error, Error::TooManyPairs { limit: 1000 }, "{strategy}");
+    }
+}
+
+#[test]
+fn nothing_of_an_earlier_call_outlives_a_failed_one() {
+    let boxes = vec![Aabb::new([0.0; 3], [1.0; 3]); 3];
+    let limits = Limits { max_boxes: 3, ..Limits::DEFAULT };
+    let mut finder = Finder::new(Config { limits, ..Config::DEFAULT });
+    assert_eq!(finder.find(&boxes).map(<[Pair]>::len), Ok(3));
+    assert!(finder.find_filtered(&boxes, &[]).is_err());
+    assert!(finder.pairs().is_empty() && finder.report().boxes == 0);
 }
 
 proptest! {

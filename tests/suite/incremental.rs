@@ -180,6 +180,81 @@ fn an_update_that_finds_too_many_pairs_can_be_repeated() {
 }
 
 #[test]
+fn an_edit_that_finds_too_many_pairs_can_be_repeated() {
+    let limits = Limits { max_pairs: 150, ..Limits::DEFAULT };
+    let mut broad_phase = BroadPhase::new(Config { limits, ..Config::DEFAULT }).expect("a good margin");
+    let boxes = BoxSet::named("unit").expect("the set exists").boxes(100, 1);
+    for (id, aabb) in boxes.iter().enumerate() {
+        broad_phase.set(id as u32, *aabb, ProxyFilter::ALL).expect("a small id");
+    }
+    broad_phase.update().expect("within the limits");
+    let before: BTreeSet<Pair> = broad_phase.pairs().collect();
+    for id in [3, 4] {
+        broad_phase.set(id, Aabb::from_center([0.0; 3], [1e6; 3]), ProxyFilter::ALL).expect("a small id");
+    }
+    assert_eq!(broad_phase.update().unwrap_err(), Error::TooManyPairs { limit: 150 });
+    assert_eq!(broad_phase.pairs().collect::<BTreeSet<_>>(), before, "nothing has changed");
+    broad_phase.set(4, boxes[4], ProxyFilter::ALL).expect("a small id");
+    broad_phase.update().expect("a hundred pairs now");
+    assert_eq!(broad_phase.degree(3), 99);
+}
+
+#[test]
+fn boxes_that_moved_once_and_came_to_rest_stop_costing() {
+    let boxes = BoxSet::named("unit").expect("the set exists").boxes(10_000, 5);
+    let mut broad_phase = BroadPhase::new(Config::DEFAULT).expect("a good margin");
+    for (id, aabb) in boxes.iter().enumerate() {
+        broad_phase.set(id as u32, *aabb, ProxyFilter::ALL).expect("a small id");
+    }
+    broad_phase.update().expect("within the limits");
+    for (id, aabb) in moved(&boxes[..1000], 0.1, 1).into_iter().enumerate() {
+        broad_phase.set(id as u32, aabb, ProxyFilter::ALL).expect("a small id");
+    }
+    let mut made = 0;
+    for frame in 0..40 {
+        broad_phase
+            .set(5000, Aabb::from_center([frame as f32; 3], [0.5; 3]), ProxyFilter::ALL)
+            .expect("a small id");
+        broad_phase.update().expect("within the limits");
+        made = broad_phase.report().checks.made;
+    }
+    assert!(made < 200, "{made} checks for one moving box: {}", broad_phase.report().plan);
+}
+
+#[test]
+fn a_margin_that_changes_applies_to_boxes_set_afterwards() {
+    let mut world = Follower::new(Config { margin: 0.5, ..Config::DEFAULT }, 40);
+    let boxes = BoxSet::named("pile").expect("the set exists").boxes(40, 2);
+    for (round, margin) in [0.5, 0.01, 2.0, 0.0].into_iter().enumerate() {
+        world.broad_phase.set_margin(margin).expect("a good margin");
+        for (id, aabb) in moved(&boxes, 0.02, round as u64).into_iter().enumerate() {
+            world.set(id as u32, aabb, ProxyFilter::ALL);
+        }
+        world.update(&format!("margin {margin}"));
+    }
+}
+
+#[test]
+fn the_same_events_on_one_thread_and_on_two() {
+    let boxes = BoxSet::named("pile").expect("the set exists").boxes(20_000, 2);
+    let run = |threads| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool");
+        pool.install(|| {
+            let mut broad_phase = BroadPhase::new(Config::DEFAULT).expect("a good margin");
+            let mut all = Vec::new();
+            for round in 0..3 {
+                for (id, aabb) in moved(&boxes, 0.05, round).into_iter().enumerate() {
+                    broad_phase.set(id as u32, aabb, ProxyFilter::ALL).expect("a small id");
+                }
+                all.push(broad_phase.update().expect("within the limits").clone());
+            }
+            all
+        })
+    };
+    assert!(run(1) == run(2));
+}
+
+#[test]
 fn bad_arguments_are_errors() {
     for margin in [-1.0, f32::NAN, f32::INFINITY] {
         let error = BroadPhase::new(Config { margin, ..Config::DEFAULT }).unwrap_err();

@@ -62,8 +62,8 @@ pub struct Limits {
 impl Limits {
     /// 2^27 boxes (3 GiB of boxes alone) and 2^28 pairs (2 GiB).
     pub const DEFAULT: Self = Self { max_boxes: 1 << 27, max_pairs: 1 << 28 };
-    /// As far as 32-bit ids reach.
-    pub const UNLIMITED: Self = Self { max_boxes: u32::MAX as u64, max_pairs: u64::MAX };
+    /// As far as 32-bit numbers of boxes, and of the pairs that [`crate::BroadPhase`] keeps, reach.
+    pub const UNLIMITED: Self = Self { max_boxes: 1 << 31, max_pairs: u64::MAX };
 }
 
 impl Default for Limits {

@@ -33,6 +33,9 @@ pub(crate) struct PairStore {
 }
 
 impl PairStore {
+    /// Most pairs that can be kept: places are 32 bits, and one of them means none.
+    pub(crate) const MOST: u64 = NONE as u64;
+
     /// Makes ids below `ids` known.
     pub(crate) fn reserve_ids(&mut self, ids: usize) {
         if self.first.len() < ids {

@@ -25,7 +25,7 @@ pub struct ProxyFilter {
     pub kind: u8,
     /// The kinds that the box accepts, a bit each.
     pub accepted_kinds: u8,
-    /// How the groups are combined: a [`TestMode`] as an integer.
+    /// How the groups are combined: a [`TestMode`] as an integer, of which the lowest bit counts.
     pub test_mode: u16,
     /// Groups that the box is a member of, a bit each.
     pub memberships: u32,
@@ -69,7 +69,7 @@ impl ProxyFilter {
     fn groups_allow(&self, other: &Self) -> bool {
         let forth = self.memberships & other.mask != 0;
         let back = other.memberships & self.mask != 0;
-        let either = self.test_mode & other.test_mode == TestMode::Or as u16;
+        let either = self.test_mode & other.test_mode & TestMode::Or as u16 != 0;
         (forth & back) | (either & (forth | back))
     }
 }

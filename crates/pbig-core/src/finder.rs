@@ -4,9 +4,9 @@ use crate::cpu::emit;
 use crate::cpu::find::Found;
 use crate::cpu::map::Map;
 use crate::cpu::pbig::PbigGrid;
-use crate::plan::{Chosen, Plan, Summary};
+use crate::plan::{Plan, Summary};
 use crate::report::{Checks, Report, lap};
-use crate::{Aabb, Backend, Config, Error, Pair, ProxyFilter};
+use crate::{Aabb, Backend, Config, Error, Limits, Pair, ProxyFilter, Strategy};
 use std::time::Instant;
 
 /// Every pair of overlapping boxes, sorted, with default settings.
@@ -76,6 +76,7 @@ impl Finder {
     /// As [`Finder::find`], and [`Error::FilterCount`].
     pub fn find_filtered(&mut self, boxes: &[Aabb], filters: &[ProxyFilter]) -> Result<&[Pair], Error> {
         if boxes.len() != filters.len() {
+            self.forget();
             return Err(Error::FilterCount { boxes: boxes.len(), filters: filters.len() });
         }
         self.find_where(boxes, &|a, b| filters[a as usize].allows(&filters[b as usize]))
@@ -85,9 +86,8 @@ impl Finder {
     where
         A: Fn(u32, u32) -> bool + Sync,
     {
-        self.pairs.clear();
+        self.forget();
         check_count(boxes.len() as u64, &self.config)?;
-        self.report = Report { fallback: fallback(&self.config), ..Report::default() };
         self.search.find(boxes, &self.config, accept, &mut self.report)?;
         let mut clock = Instant::now();
         let chunks = &self.search.found.chunks;
@@ -97,7 +97,13 @@ impl Finder {
         Ok(&self.pairs)
     }
 
-    /// The pairs of the last call.
+    /// Nothing of an earlier call outlives the next, even if that fails.
+    fn forget(&mut self) {
+        self.pairs.clear();
+        self.report = Report { fallback: fallback(&self.config), ..Report::default() };
+    }
+
+    /// The pairs of the last call; none if it failed.
     pub fn pairs(&self) -> &[Pair] {
         &self.pairs
     }
@@ -121,7 +127,7 @@ pub(crate) fn warn_of_fallback(config: &Config) {
 }
 
 pub(crate) fn check_count(boxes: u64, config: &Config) -> Result<(), Error> {
-    let limit = config.limits.max_boxes.min(u64::from(u32::MAX));
+    let limit = config.limits.max_boxes.min(Limits::UNLIMITED.max_boxes);
     if boxes > limit { Err(Error::TooManyBoxes { boxes, limit }) } else { Ok(()) }
 }
 
@@ -154,10 +160,11 @@ impl Search {
         report.boxes = boxes.len() as u64;
         report.invalid = boxes.len() as u64 - u64::from(summary.valid);
         report.stages.plan += lap(&mut clock);
-        report.plan = self.map.plan_and_build(&summary, config, boxes, None, &mut report.stages);
-        if report.plan.chosen == Chosen::Pbig {
+        if config.strategy == Strategy::Pbig && config.backend != Backend::Brute {
+            report.plan = Plan::new(&summary, config, 1.0);
             return self.find_pbig(boxes, config, accept, report);
         }
+        report.plan = self.map.plan_and_build(&summary, config, boxes, None, &mut report.stages);
         let mut clock = Instant::now();
         self.map.find(accept, config.limits.max_pairs, &mut self.found)?;
         report.stages.check += lap(&mut clock);
@@ -175,6 +182,8 @@ impl Search {
     where
         A: Fn(u32, u32) -> bool,
     {
+        self.found.clear();
+        // Fewer than two valid boxes have no plan.
         let Plan { pbig: Some(plan), .. } = report.plan else { return Ok(()) };
         let mut clock = Instant::now();
         self.pbig.build(&plan, boxes);

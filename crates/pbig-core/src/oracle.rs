@@ -13,9 +13,11 @@ pub fn pairs(boxes: &[Aabb]) -> Vec<Pair> {
     pairs_where(boxes, |_, _| true)
 }
 
-/// As [`pairs`], with only the pairs that both filters allow. One filter a box.
+/// As [`pairs`], with only the pairs that both filters allow. `filters[i]` is that of `boxes[i]`; a
+/// box without one pairs with nothing.
 pub fn pairs_filtered(boxes: &[Aabb], filters: &[ProxyFilter]) -> Vec<Pair> {
-    pairs_where(boxes, |a, b| filters[a as usize].allows(&filters[b as usize]))
+    let filter = |id: u32| filters.get(id as usize);
+    pairs_where(boxes, |a, b| filter(a).zip(filter(b)).is_some_and(|(a, b)| a.allows(b)))
 }
 
 /// Boxes tested against one box before their results are looked at.

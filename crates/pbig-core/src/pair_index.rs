@@ -14,23 +14,31 @@
 //! assert_eq!(index_of(74, 302, 1000), 71_452);
 //! ```
 
-/// How many pairs `n` boxes have; exact up to n = 2^32.
+/// How many pairs `n <= 2^32` boxes have.
 #[inline]
-pub fn pair_count(n: u64) -> u64 {
+pub const fn pair_count(n: u64) -> u64 {
     // One of n, n - 1 is even: halve that one, so that the product stays below 2^63.
     if n.is_multiple_of(2) { n / 2 * n.saturating_sub(1) } else { (n - 1) / 2 * n }
 }
 
-/// Index of the first pair of row `a` (the paper's S_a): `a (2n - a - 1) / 2`.
+/// Index of the first pair of row `a < n <= 2^32` (the paper's S_a): `a (2n - a - 1) / 2`.
+///
+/// # Panics
+/// If `a` is not below `n`.
 #[inline]
 pub fn row_start(a: u64, n: u64) -> u64 {
+    assert!(a < n, "row {a} of {n} boxes");
     let other = 2 * n - a - 1;
     if a.is_multiple_of(2) { a / 2 * other } else { other / 2 * a }
 }
 
 /// Index of the pair `(a, b)`, `a < b < n <= 2^32` (equation 2, solved for k).
+///
+/// # Panics
+/// If not `a < b < n`.
 #[inline]
 pub fn index_of(a: u64, b: u64, n: u64) -> u64 {
+    assert!(a < b && b < n, "pair ({a}, {b}) of {n} boxes");
     row_start(a, n) + (b - a - 1)
 }
 

@@ -32,6 +32,8 @@ pub struct PbigBroadPhase {
     relative_margin: f32,
     /// Of the modified colliders of one call, in their order.
     proxies: Vec<Proxy>,
+    /// By collider index: pairs before this call; only for the colliders in its events.
+    before: Vec<u32>,
 }
 
 impl Default for PbigBroadPhase {
@@ -61,7 +63,13 @@ impl PbigBroadPhase {
         };
         let config = Config { margin, limits: Limits::UNLIMITED, ..config };
         let finder = Finder::new(config).expect("the margin was checked above");
-        Self { finder, generations: Vec::new(), relative_margin: margin, proxies: Vec::new() }
+        Self {
+            finder,
+            generations: Vec::new(),
+            relative_margin: margin,
+            proxies: Vec::new(),
+            before: Vec::new(),
+        }
     }
 
     /// What the last update did.
@@ -87,9 +95,12 @@ impl PbigBroadPhase {
     /// pair by walking the pairs of the first (measured on 0.27, 30,000 balls on one ground: 17 ms
     /// in this order, 1.05 s in the other).
     fn handles(&self, pair: Pair) -> ColliderPair {
+        self.ordered(pair, |id| self.finder.degree(id))
+    }
+
+    fn ordered(&self, pair: Pair, degree: impl Fn(u32) -> u32) -> ColliderPair {
         let (a, b) = (self.handle(pair.a), self.handle(pair.b));
-        let swap = self.finder.degree(pair.b) < self.finder.degree(pair.a);
-        if swap { ColliderPair::new(b, a) } else { ColliderPair::new(a, b) }
+        if degree(pair.b) < degree(pair.a) { ColliderPair::new(b, a) } else { ColliderPair::new(a, b) }
     }
 
     /// Forgets a collider, if the finder holds this very one. Its pairs end without an event: the
@@ -148,11 +159,21 @@ impl PbigBroadPhase {
         }
     }
 
-    fn send(&self, events: &mut Vec<BroadPhasePairEvent>) {
+    /// A pair that has ended is ordered by the pairs that its colliders had before: a ground that has
+    /// lost all of them must not come first.
+    fn send(&mut self, events: &mut Vec<BroadPhasePairEvent>) {
         let found = self.finder.events();
-        let removed = found.removed.iter().map(|&pair| BroadPhasePairEvent::DeletePair(self.handles(pair)));
-        let added = found.added.iter().map(|&pair| BroadPhasePairEvent::AddPair(self.handles(pair)));
-        events.extend(removed.chain(added));
+        self.before.resize(self.generations.len(), 0);
+        let both = |pair: &Pair| [pair.a, pair.b];
+        let touched = || found.removed.iter().chain(&found.added).flat_map(both);
+        touched().for_each(|id| self.before[id as usize] = self.finder.degree(id));
+        found.removed.iter().flat_map(both).for_each(|id| self.before[id as usize] += 1);
+        found.added.iter().flat_map(both).for_each(|id| self.before[id as usize] -= 1);
+        let before = |id: u32| self.before[id as usize];
+        let removed = found.removed.iter().map(|&pair| self.ordered(pair, before));
+        let added = found.added.iter().map(|&pair| self.handles(pair));
+        events.extend(removed.map(BroadPhasePairEvent::DeletePair));
+        events.extend(added.map(BroadPhasePairEvent::AddPair));
     }
 }
 
@@ -169,9 +190,6 @@ impl BroadPhase for PbigBroadPhase {
         // First, because a modified collider may have taken the index of a removed one.
         for &handle in removed_colliders {
             self.remove(handle);
-        }
-        if modified_colliders.is_empty() {
-            return;
         }
         // A length unit that makes no sense leaves the margin as it was.
         let _ = self.finder.set_margin(self.relative_margin * params.length_unit);

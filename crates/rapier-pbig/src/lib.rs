@@ -28,6 +28,9 @@
 //! What it reports is what rapier's own broad phase reports, less the pairs that rapier's narrow
 //! phase would throw away again: colliders of one body, kinds of bodies that do not collide, and
 //! groups that exclude each other. Events come in an order that depends on the scene alone.
+//!
+//! It must be with its world from the start: rapier lists a collider that does not move only once, so a
+//! fresh `PbigBroadPhase` beside a world restored from a snapshot would miss those.
 
 mod broad_phase;
 mod proxy;

@@ -10,8 +10,8 @@ use rapier3d::prelude::{
 /// The box of a collider in which it may touch another during this step: its shape, half the
 /// prediction distance and its contact skin; with soft CCD, also where it is predicted to be.
 ///
-/// Without the change margin, which is the finder's. Never panics: a pose with a NaN gives an
-/// invalid box, which pairs with nothing.
+/// Without the change margin, which is the finder's. A pose with a NaN gives an invalid box, which
+/// pairs with nothing.
 pub fn collision_aabb(params: &IntegrationParameters, bodies: &RigidBodySet, collider: &Collider) -> Aabb {
     let reach = collider.contact_skin() + params.prediction_distance() / 2.0;
     let now = shape_aabb(collider.shape(), collider.position());
@@ -46,8 +46,9 @@ fn predicted_aabb(dt: Real, body: &RigidBody, collider: &Collider) -> Option<Aab
     let sphere = collider.shape().compute_bounding_sphere(collider.position());
     let radius = sphere.radius + (sphere.center - center).norm();
     let end: Point<Real> = center + path * (farthest / length);
-    // A part in 10^5 for the rounding of the norm and of rapier's own clamping.
-    Some(Aabb::from_center(end.coords.into(), [radius + farthest * 1e-5; 3]))
+    // For the rounding of the norm and of rapier's own clamping, and of positions far from the origin.
+    let rounding = 1e-5 * farthest + 4.0 * Real::EPSILON * center.coords.amax();
+    Some(Aabb::from_center(end.coords.into(), [radius + rounding; 3]))
 }
 
 fn union(a: &Aabb, b: &Aabb) -> Aabb {

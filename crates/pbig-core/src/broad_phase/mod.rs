@@ -51,7 +51,9 @@ enum Home {
 ///
 /// Settled boxes lie in a base grid. Boxes that have moved since it was built are taken out and
 /// sorted into a second, small one each time; changed boxes are searched in both. When an eighth of
-/// all boxes has moved, the base is built anew.
+/// all boxes has moved, the base is built anew, and now and then so that boxes at rest return to it.
+/// ([`crate::Strategy::Pbig`] and [`crate::Backend::Brute`] search everything at every update that changes
+/// something.)
 ///
 /// ```
 /// use pbig_core::{Aabb, BroadPhase, Config, Pair, ProxyFilter};
@@ -78,6 +80,8 @@ pub struct BroadPhase {
     change_of: Vec<u32>,
     home: Vec<Home>,
     moved: Vec<u32>,
+    /// Boxes sorted in updates since the base was built.
+    sorted_again: usize,
     base: Search,
     /// The boxes that moved; `base.map` holds the rest.
     loose: Map,
@@ -107,6 +111,7 @@ impl BroadPhase {
             change_of: vec![],
             home: vec![],
             moved: vec![],
+            sorted_again: 0,
             base: Search::new(),
             loose: Map::new(),
             found: Found::default(),
@@ -201,7 +206,7 @@ impl BroadPhase {
             invalid: u64::from(self.invalid_count),
             changed: self.changed.len() as u64,
             pairs: self.pairs.len() as u64,
-            plan: Plan { boxes: self.present_count - self.invalid_count, ..Plan::default() },
+            plan: Plan { boxes: self.valid_count(), ..Plan::default() },
             ..Report::default()
         };
         if self.changed.is_empty() {
@@ -230,22 +235,22 @@ impl BroadPhase {
         &self.report
     }
 
-    /// Pairs that exist after the last update.
+    /// How many pairs exist: those of the last update, less those of boxes removed since.
     pub fn pair_count(&self) -> usize {
         self.pairs.len()
     }
 
-    /// The pairs that exist after the last update, in no particular order.
+    /// The pairs that exist (see [`BroadPhase::pair_count`]), in no particular order.
     pub fn pairs(&self) -> impl Iterator<Item = Pair> {
         self.pairs.iter().map(|(_, pair)| pair)
     }
 
-    /// The pairs of one box after the last update, in no particular order.
+    /// The pairs of one box (see [`BroadPhase::pair_count`]), in no particular order.
     pub fn pairs_of(&self, id: u32) -> impl Iterator<Item = Pair> {
         self.pairs.of(id).map(|(_, pair)| pair)
     }
 
-    /// How many pairs a box has after the last update.
+    /// How many pairs a box has (see [`BroadPhase::pair_count`]).
     pub fn degree(&self, id: u32) -> u32 {
         self.pairs.degree(id)
     }
@@ -253,6 +258,10 @@ impl BroadPhase {
     /// The stored (fat) box, if there is one and it is valid.
     pub fn fat_aabb(&self, id: u32) -> Option<Aabb> {
         self.boxes.get(id as usize).copied().filter(Aabb::is_valid)
+    }
+
+    fn valid_count(&self) -> u32 {
+        self.present_count - self.invalid_count
     }
 
     fn make_room(&mut self, ids: usize) {

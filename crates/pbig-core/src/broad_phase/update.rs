@@ -2,6 +2,7 @@
 
 use super::{BroadPhase, Home, Old, UNCHANGED};
 use crate::cpu::check::Checker;
+use crate::diff::PairStore;
 use crate::finder::single_entry_checks;
 use crate::plan::{Chosen, Plan, Summary};
 use crate::report::lap;
@@ -17,10 +18,18 @@ impl BroadPhase {
             }
         }
         let whole = self.config.strategy == Strategy::Pbig || self.config.backend == Backend::Brute;
-        if whole || self.moved.len() * 8 >= self.present_count as usize {
+        // Boxes that moved once and came to rest go back into the base when looking at them again and
+        // again has cost as much as building it.
+        self.sorted_again += self.moved.len();
+        let present = self.present_count as usize;
+        if whole || self.moved.len() * 8 >= present || self.sorted_again > 2 * present {
             self.search_all()?;
         } else {
             self.search_moved()?;
+        }
+        let kept = (self.pairs.len() + self.events.added.len()) as u64;
+        if kept > PairStore::MOST {
+            return Err(Error::TooManyPairs { limit: PairStore::MOST });
         }
         let mut clock = Instant::now();
         self.events.added.sort_unstable();
@@ -40,9 +49,8 @@ impl BroadPhase {
         let accept = |a: u32, b: u32| state.is_added(a, b);
         self.base.find(&self.boxes, &self.config, &accept, &mut self.report)?;
         (self.report.boxes, self.report.invalid) = (boxes, invalid);
-        for id in self.moved.drain(..) {
-            self.home[id as usize] = Home::None;
-        }
+        self.moved.clear();
+        self.sorted_again = 0;
         // A search by another strategy leaves no base grid to keep.
         let kept = if self.report.plan.chosen == Chosen::Pbig { Home::None } else { Home::Base };
         for (home, aabb) in self.home.iter_mut().zip(&self.boxes) {
@@ -86,7 +94,7 @@ impl BroadPhase {
         self.report.stages.check += lap(&mut clock);
         self.report.checks = single_entry_checks(&self.found);
         let moved = self.moved.len() as u32;
-        self.report.plan = Plan { chosen: Chosen::Edit, moved, boxes: self.present_count, ..plan };
+        self.report.plan = Plan { chosen: Chosen::Edit, moved, boxes: self.valid_count(), ..plan };
         Ok(())
     }
 

@@ -87,9 +87,9 @@ impl Map {
         let mut counts = (0, 0);
         if let Some(level) = chunk.level {
             let mut half = Half::new(&self.grids[level], accept, out, room);
-            half.check(range.clone());
+            let room_left = half.check(range.clone());
             counts = (half.checks, half.overlaps);
-            if level + 1 == self.grids.len() && self.list.len() == 0 {
+            if !room_left || (level + 1 == self.grids.len() && self.list.len() == 0) {
                 return counts;
             }
         }

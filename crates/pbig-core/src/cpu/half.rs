@@ -52,18 +52,20 @@ impl<'a, A: Fn(u32, u32) -> bool> Half<'a, A> {
         Self { grid, accept, out, room, taken: 0, checks: 0, overlaps: 0, hits, kept: 0 }
     }
 
-    /// Entries `range` against what comes after each; stops early when there is no more room.
-    pub(crate) fn check(&mut self, range: Range<usize>) {
+    /// Entries `range` against what comes after each; false when there is no more room.
+    pub(crate) fn check(&mut self, range: Range<usize>) -> bool {
         for i in range {
             self.check_one(i);
             if self.kept > KEPT - ROWS {
                 self.expand();
-                if !self.room.take(self.out.len(), &mut self.taken) {
-                    return;
-                }
+            }
+            // Here, not after expanding: a long row has expanded its blocks itself.
+            if !self.room.take(self.out.len(), &mut self.taken) {
+                return false;
             }
         }
         self.expand();
+        true
     }
 
     #[inline(always)]

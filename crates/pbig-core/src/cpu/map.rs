@@ -187,6 +187,9 @@ pub(crate) struct Map {
     members: Vec<Vec<u32>>,
     sort: Sort,
     crowding: Crowding,
+    /// How often boxes were sorted.
+    #[cfg(test)]
+    builds: usize,
 }
 
 /// Cells smaller than an even spread of boxes would ask for, where clusters make them too full.
@@ -205,7 +208,7 @@ struct Crowding {
 const CROWDED: f32 = 12.0;
 
 /// Where dividing the cells ends.
-const FINEST: f32 = 1e-6;
+const FINEST: f32 = 1e-12;
 
 impl Map {
     pub(crate) fn new() -> Self {
@@ -215,6 +218,8 @@ impl Map {
             members: vec![],
             sort: Sort::default(),
             crowding: Crowding { factor: 1.0, accepted: 0.0 },
+            #[cfg(test)]
+            builds: 0,
         }
     }
 
@@ -244,7 +249,7 @@ impl Map {
             if crowd > limit && divisible(&plan) && self.crowding.factor > FINEST {
                 // The first halvings of two far clusters change nothing: take larger steps then.
                 let helps = tried.len() < 2 || crowd < 0.8 * tried[tried.len() - 2].1;
-                self.crowding.factor *= if helps { 0.5 } else { 0.25 };
+                self.crowding.factor *= if helps { 0.5 } else { 0.125 };
                 continue;
             }
             if self.crowding.settle(&tried) {
@@ -261,6 +266,10 @@ impl Map {
 
     /// Sorts the valid boxes among `boxes` (or among those with the given ids) as planned.
     fn build(&mut self, plan: &Plan, boxes: &[Aabb], ids: Option<&[u32]>) {
+        #[cfg(test)]
+        {
+            self.builds += 1;
+        }
         self.distribute(plan, boxes, ids);
         self.grids.truncate(plan.levels.len());
         for (i, level) in plan.levels.iter().enumerate() {
@@ -341,5 +350,50 @@ impl LevelOfClass {
     fn of(&self, one: &Aabb) -> Option<usize> {
         let level = self.0[size_class_of(one)];
         (level != Self::LIST).then_some(level as usize)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Builds in one call: how often the boxes were sorted.
+    fn builds(map: &mut Map, boxes: &[Aabb]) -> usize {
+        let summary = Summary::of(boxes, None);
+        let before = map.builds;
+        map.plan_and_build(&summary, &Config::DEFAULT, boxes, None, &mut StageTimes::default());
+        map.builds - before
+    }
+
+    fn lattice(side: usize, step: f32, half: f32, at: f32) -> Vec<Aabb> {
+        let corner = |i: usize| [i % side, i / side % side, i / side / side].map(|c| c as f32 * step + at);
+        (0..side.pow(3)).map(|i| Aabb::from_center(corner(i), [half; 3])).collect()
+    }
+
+    #[test]
+    fn cells_that_were_divided_for_clusters_stay_so() {
+        for apart in [3e3, 1e4, 1e5, 1e7] {
+            let mut boxes = lattice(12, 1.02, 0.5, 0.0);
+            boxes.extend(lattice(12, 1.02, 0.5, apart));
+            let mut map = Map::new();
+            let calls: Vec<usize> = (0..5).map(|_| builds(&mut map, &boxes)).collect();
+            assert!(calls[0] > 1 && calls[0] < 16, "{apart}: {calls:?}");
+            assert_eq!(calls[1..], [1; 4], "{apart}");
+        }
+    }
+
+    #[test]
+    fn boxes_that_no_cell_can_part_do_not_ruin_the_cells_of_the_others() {
+        let mut boxes = lattice(20, 1.0, 0.0, 0.0);
+        boxes.extend(vec![Aabb::from_center([5.5; 3], [0.0; 3]); 2000]);
+        let mut map = Map::new();
+        let calls: Vec<usize> = (0..4).map(|_| builds(&mut map, &boxes)).collect();
+        assert_eq!(calls[1..], [1; 3], "{calls:?}");
+        assert!(map.crowding.factor > 0.2, "{:?}", map.crowding);
+        let even = lattice(20, 1.0, 0.3, 0.0);
+        for _ in 0..8 {
+            builds(&mut map, &even);
+        }
+        assert_eq!(map.crowding.factor, 1.0, "an even world gets its cells back");
     }
 }

@@ -91,14 +91,17 @@ impl PbigGrid {
         self.boxes.clear();
         self.ids.clear();
         self.list.clear();
-        let mut touched = Vec::new();
+        let (mut touched, mut entries) = (Vec::new(), 0);
         for (id, aabb) in boxes.iter().enumerate().filter(|(_, b)| b.is_valid()) {
             let cells = Touched::new(plan, aabb);
-            if cells.count() > u64::from(plan.max_cells_per_box) {
+            // Places are counted in 32 bits.
+            let countable = entries + cells.count() <= u64::from(u32::MAX);
+            if cells.count() > u64::from(plan.max_cells_per_box) || !countable {
                 self.list.push(aabb, id as u32);
             } else {
                 self.boxes.push(*aabb);
                 self.ids.push(id as u32);
+                entries += cells.count();
                 touched.push(cells);
             }
         }
@@ -131,6 +134,9 @@ impl PbigGrid {
         // The list against itself, then every other box against the list.
         for (i, (stored, &id)) in self.list.boxes.iter().zip(&self.list.ids).enumerate() {
             checker.test(&stored.query(), id, &self.list, i + 1..self.list.len());
+            if !room.take(checker.out.len(), &mut taken) {
+                break;
+            }
         }
         for (aabb, &id) in self.boxes.iter().zip(&self.ids) {
             checker.test(&Query::new(aabb), id, &self.list, 0..self.list.len());

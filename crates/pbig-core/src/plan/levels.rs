@@ -12,7 +12,8 @@ pub struct LevelPlan {
     pub boxes: u32,
     /// First and last size class ([`super::Summary::classes`]).
     pub classes: (u8, u8),
-    /// Largest extent on each axis: no box reaches further than this beyond its lower corner.
+    /// Largest extent on each axis, in the boxes' length unit like all lengths here: no box reaches
+    /// further than this beyond its lower corner.
     pub max_extent: [f32; 3],
     /// Cell size: at least a thousandth above `max_extent`, and such that about half a box falls into a
     /// cell.
@@ -62,13 +63,43 @@ const PER_CELL: f64 = 0.5;
 /// Splits the boxes into levels and a number of swept boxes, at least cost.
 pub(super) fn choose(summary: &Summary, crowding: f32, strategy: Strategy) -> (Vec<LevelPlan>, u32) {
     let world = World::new(summary, crowding);
-    let used: Vec<usize> = (0..LARGEST_CLASS).filter(|&c| summary.classes[c].boxes > 0).collect();
-    let last = split(&world, &used, strategy);
-    let (levels, in_levels) = assemble(&world, &used, last);
+    let groups = groups(summary);
+    let steps = split(&world, &groups, strategy);
+    let (levels, in_levels) = assemble(&world, &groups, steps);
     (levels, summary.valid - in_levels)
 }
 
-/// One way to end at a class: the segment's first class, whether it is swept, and the cost so far.
+/// Neighbouring size classes that share their level.
+#[derive(Clone, Copy)]
+struct Group {
+    classes: (usize, usize),
+    boxes: u32,
+    max_extent: [f32; 3],
+}
+
+/// Most groups: the split weighs each run of groups by its members, cubic in their number, and sets of
+/// any floats use up to 227 classes.
+const GROUPS: usize = 24;
+
+/// The classes in use, at most [`GROUPS`] of them apart.
+fn groups(summary: &Summary) -> Vec<Group> {
+    let used: Vec<usize> = (0..LARGEST_CLASS).filter(|&c| summary.classes[c].boxes > 0).collect();
+    let together = used.len().div_ceil(GROUPS).max(1);
+    used.chunks(together).map(|classes| Group::of(summary, classes)).collect()
+}
+
+impl Group {
+    fn of(summary: &Summary, classes: &[usize]) -> Self {
+        let extent = |k: usize| classes.iter().map(|&c| summary.classes[c].max_extent[k]).fold(0.0, f32::max);
+        Self {
+            classes: (classes[0], classes[classes.len() - 1]),
+            boxes: classes.iter().map(|&c| summary.classes[c].boxes).sum(),
+            max_extent: std::array::from_fn(extent),
+        }
+    }
+}
+
+/// One way to end at a group: the segment's first group, whether it is swept, and the cost so far.
 #[derive(Clone, Copy)]
 struct Step {
     first: usize,
@@ -76,9 +107,9 @@ struct Step {
     cost: f64,
 }
 
-/// The cheapest split, by dynamic programming over the classes in use: what a level costs depends
-/// only on its own classes and on how many boxes are smaller. `steps[j]` covers classes `0..=j`.
-fn split(world: &World<'_>, used: &[usize], strategy: Strategy) -> Vec<Step> {
+/// The cheapest split, by dynamic programming over the groups: what a level costs depends only on its
+/// own groups and on how many boxes are smaller. `steps[j]` covers groups `0..=j`.
+fn split(world: &World, used: &[Group], strategy: Strategy) -> Vec<Step> {
     let mut steps: Vec<Step> = Vec::with_capacity(used.len());
     for last in 0..used.len() {
         let before = |first: usize| if first == 0 { 0.0 } else { steps[first - 1].cost };
@@ -90,7 +121,7 @@ fn split(world: &World<'_>, used: &[usize], strategy: Strategy) -> Vec<Step> {
         let may_sweep = last + 1 == used.len();
         let first_swept = usize::from(strategy == Strategy::Grid);
         let sweeps = (first_swept..if may_sweep { last + 1 } else { 0 }).map(|first| {
-            let cost = before(first) + world.sweep_cost(&used[first..=last], &used[..first]);
+            let cost = before(first) + sweep_cost(&used[first..=last], &used[..first]);
             Step { first, swept: true, cost }
         });
         let best = grids.chain(sweeps).min_by(|a, b| a.cost.total_cmp(&b.cost));
@@ -99,7 +130,7 @@ fn split(world: &World<'_>, used: &[usize], strategy: Strategy) -> Vec<Step> {
     steps
 }
 
-fn assemble(world: &World<'_>, used: &[usize], steps: Vec<Step>) -> (Vec<LevelPlan>, u32) {
+fn assemble(world: &World, used: &[Group], steps: Vec<Step>) -> (Vec<LevelPlan>, u32) {
     let mut levels = Vec::new();
     let mut end = used.len();
     while end > 0 {
@@ -114,84 +145,79 @@ fn assemble(world: &World<'_>, used: &[usize], steps: Vec<Step>) -> (Vec<LevelPl
     (levels, boxes)
 }
 
-/// The summary with the ranges in which the boxes lie.
-struct World<'a> {
-    summary: &'a Summary,
+/// Where the boxes lie.
+struct World {
     low: [f32; 3],
     range: [f32; 3],
     crowding: f32,
 }
 
-impl<'a> World<'a> {
-    fn new(summary: &'a Summary, crowding: f32) -> Self {
+impl World {
+    fn new(summary: &Summary, crowding: f32) -> Self {
         let ranges: [(f32, f32); 3] = std::array::from_fn(|k| summary.range(k));
         Self {
-            summary,
             low: ranges.map(|r| r.0.clamp(f32::MIN, f32::MAX)),
             range: ranges.map(|r| (r.1 - r.0).clamp(0.0, f32::MAX)),
             crowding,
         }
     }
 
-    fn boxes(&self, classes: &[usize]) -> u32 {
-        classes.iter().map(|&c| self.summary.classes[c].boxes).sum()
-    }
-
-    /// Rounded up: a window reaches down by this much, and `max - min` was rounded to nearest.
-    fn max_extent(&self, classes: &[usize]) -> [f32; 3] {
-        let extents = |k: usize| classes.iter().map(move |&c| self.summary.classes[c].max_extent[k]);
-        std::array::from_fn(|k| extents(k).fold(0.0, f32::max).next_up())
-    }
-
     /// A cell holds the largest box, with a little to spare for rounding, and about half a box.
-    fn cell(&self, classes: &[usize]) -> [f32; 3] {
-        let spaced = spacing(self.range, self.boxes(classes), PER_CELL) as f32 * self.crowding;
-        self.max_extent(classes).map(|e| (e * 1.001).max(spaced).max(SMALLEST_CELL))
+    fn cell(&self, groups: &[Group]) -> [f32; 3] {
+        let spaced = spacing(self.range, count(groups), PER_CELL) as f32 * self.crowding;
+        max_extent(groups).map(|e| (e * 1.001).max(spaced).max(SMALLEST_CELL))
     }
 
-    fn grid_cost(&self, classes: &[usize], smaller: &[usize]) -> f64 {
-        let n = f64::from(self.boxes(classes));
-        let own = n * (cost::BOX + 0.5 * cost::CHECK * self.candidates(classes, classes));
-        let visits = f64::from(self.boxes(smaller));
-        let cross = visits * (cost::VISIT + cost::CHECK * self.candidates(smaller, classes));
-        cost::LEVEL + own + cross
+    fn grid_cost(&self, level: &[Group], smaller: &[Group]) -> f64 {
+        let own = cost::BOX + 0.5 * cost::CHECK * self.candidates(level, level);
+        let visit = cost::VISIT + cost::CHECK * self.candidates(smaller, level);
+        cost::LEVEL + f64::from(count(level)) * own + f64::from(count(smaller)) * visit
     }
 
-    fn sweep_cost(&self, classes: &[usize], smaller: &[usize]) -> f64 {
-        let n = f64::from(self.boxes(classes));
-        cost::SWEEP * n * (f64::from(self.boxes(smaller)) + 0.5 * n)
-    }
-
-    /// Boxes of the level `classes` that an average box of the classes `of` is tested against, were
-    /// they spread evenly.
-    fn candidates(&self, of: &[usize], classes: &[usize]) -> f64 {
-        let (extent, cell) = (self.max_extent(classes), self.cell(classes));
-        let share = |class: usize| -> f64 {
-            let own = self.summary.classes[class].max_extent;
-            (0..3)
-                .map(|k| {
-                    let window = own[k] + extent[k] + cell[k];
-                    f64::from(window) / f64::from(self.range[k].max(window))
-                })
-                .product()
+    /// Boxes of `level` that an average box of `groups` is tested against, were they spread evenly.
+    fn candidates(&self, groups: &[Group], level: &[Group]) -> f64 {
+        let (extent, cell) = (max_extent(level), self.cell(level));
+        let share = |own: &[f32; 3], k: usize| {
+            let window = own[k] + extent[k] + cell[k];
+            f64::from(window) / f64::from(self.range[k].max(window))
         };
-        let weighted: f64 = of.iter().map(|&c| f64::from(self.summary.classes[c].boxes) * share(c)).sum();
-        f64::from(self.boxes(classes)) * weighted / f64::from(self.boxes(of).max(1))
+        let weighted = |group: &Group| {
+            let share: f64 = (0..3).map(|k| share(&group.max_extent, k)).product();
+            f64::from(group.boxes) * share
+        };
+        let sum: f64 = groups.iter().map(weighted).sum();
+        f64::from(count(level)) * sum / f64::from(count(groups).max(1))
     }
 
-    fn level(&self, classes: &[usize]) -> LevelPlan {
-        let (boxes, cell) = (self.boxes(classes), self.cell(classes));
+    fn level(&self, groups: &[Group]) -> LevelPlan {
+        let (boxes, cell) = (count(groups), self.cell(groups));
         let (dims, cells) = dimensions(self.range, cell, boxes);
+        let (first, last) = (groups[0].classes.0, groups[groups.len() - 1].classes.1);
         LevelPlan {
             boxes,
-            classes: (classes[0] as u8, classes[classes.len() - 1] as u8),
-            max_extent: self.max_extent(classes),
+            classes: (first as u8, last as u8),
+            max_extent: max_extent(groups),
             cell,
             origin: self.low,
             dims,
             cells,
         }
     }
+}
+
+fn count(groups: &[Group]) -> u32 {
+    groups.iter().map(|group| group.boxes).sum()
+}
+
+/// Rounded up: a window reaches down by this much, and `max - min` was rounded to nearest.
+fn max_extent(groups: &[Group]) -> [f32; 3] {
+    let largest = |k: usize| groups.iter().map(|group| group.max_extent[k]).fold(0.0, f32::max);
+    std::array::from_fn(|k| largest(k).next_up())
+}
+
+fn sweep_cost(swept: &[Group], smaller: &[Group]) -> f64 {
+    let n = f64::from(count(swept));
+    cost::SWEEP * n * (f64::from(count(smaller)) + 0.5 * n)
 }
 
 /// Fewest cells on an axis. Windows reach one cell to each side (see `cpu::cells`), so that two cells

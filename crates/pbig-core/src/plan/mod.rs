@@ -69,8 +69,8 @@ pub struct Plan {
 }
 
 impl Plan {
-    /// Chooses for the boxes behind `summary`. `crowding` is 1, or less where earlier cells turned
-    /// out to be too full (see [`LevelPlan::cell`]).
+    /// Chooses for the boxes behind `summary`. `crowding` is a factor on the cell size of an even
+    /// spread: 1, or less where such cells turned out to be too full.
     pub fn new(summary: &Summary, config: &Config, crowding: f32) -> Self {
         let boxes = summary.valid;
         let brute = Self { chosen: Chosen::Brute, swept: boxes, boxes, ..Self::default() };

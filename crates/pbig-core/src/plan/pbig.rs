@@ -9,9 +9,9 @@ use std::fmt;
 /// The grid of [`crate::Strategy::Pbig`]: one entry for each cell that a box touches.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PbigPlan {
-    /// Edge of the cubic cells.
+    /// Edge of the cubic cells, in the boxes' length unit.
     pub cell: f32,
-    /// Where cell 0 begins.
+    /// Where cell 0 begins, in the boxes' length unit.
     pub origin: [f32; 3],
     /// Cells on each axis; boxes beyond are clamped into the border cells.
     pub dims: [u32; 3],
@@ -31,11 +31,12 @@ impl fmt::Display for PbigPlan {
 impl PbigPlan {
     /// Solves equation 6 on the summary's sample, or applies the density rule.
     pub fn new(summary: &Summary, config: &Config) -> Self {
-        let (space, origin) = space_of(summary);
+        let sample = ordinary(summary);
+        let (space, origin) = space_of(summary, &sample);
         let wanted = config.pbig_boxes_per_cell.max(1.0);
         let n = summary.valid;
         let mut cell = match config.cell_rule {
-            CellRule::Objective => pbig_cell(&summary.sample, n, space, wanted),
+            CellRule::Objective => pbig_cell(&sample, n, space, wanted),
             CellRule::Density => density_cell(n, space, wanted),
         };
         // Oversize boxes in the sample raise alpha, and with it f, whatever the cell: the search
@@ -44,7 +45,7 @@ impl PbigPlan {
             cell *= 1.25;
         }
         let dims = space.map(|length| cells_along(length, cell) as u32);
-        let objective = pbig_objective(&summary.sample, n, space, cell);
+        let objective = pbig_objective(&sample, n, space, cell);
         Self { cell, origin, dims, max_cells_per_box: 512, objective }
     }
 }
@@ -61,10 +62,20 @@ fn cells_in(lengths: [f32; 3], cell: f32) -> f64 {
     lengths.into_iter().map(|length| cells_along(length, cell)).product()
 }
 
+/// The sample without boxes as wide as the range of all of them, a ground or a half-space: they touch
+/// so many cells that they are tested against all instead, and would stretch the space and its cells.
+fn ordinary(summary: &Summary) -> Vec<Aabb> {
+    let widths: [f32; 3] = std::array::from_fn(|k| summary.range(k).1 - summary.range(k).0);
+    let largest = widths.into_iter().fold(0.0, f32::max);
+    let fits = |b: &&Aabb| b.extents().into_iter().all(|extent| extent < largest);
+    let ordinary: Vec<Aabb> = summary.sample.iter().filter(fits).copied().collect();
+    if ordinary.is_empty() { summary.sample.clone() } else { ordinary }
+}
+
 /// The space of the paper: from the lowest corner to the highest, of most of the sample.
-fn space_of(summary: &Summary) -> ([f32; 3], [f32; 3]) {
+fn space_of(summary: &Summary, sample: &[Aabb]) -> ([f32; 3], [f32; 3]) {
     let ranges: [(f32, f32); 3] = std::array::from_fn(|k| summary.range(k));
-    let largest = |k: usize| summary.sample.iter().map(|b| b.extents()[k]).fold(0.0, f32::max);
+    let largest = |k: usize| sample.iter().map(|b| b.extents()[k]).fold(0.0, f32::max);
     let length = |k: usize| (ranges[k].1 - ranges[k].0 + largest(k)).clamp(1e-30, 1e30);
     (std::array::from_fn(length), ranges.map(|r| r.0.clamp(-1e30, 1e30)))
 }
@@ -128,6 +139,17 @@ mod tests {
     fn too_few_boxes_for_the_constraint_get_one_cell() {
         let cell = pbig_cell(&cubes(5, 1.0), 5, [100.0; 3], 32.0);
         assert!((cell - 100.0).abs() < 1e-3, "{cell}");
+    }
+
+    #[test]
+    fn a_ground_under_a_pile_does_not_enlarge_the_cells() {
+        let at = |i: u32| [i % 10, i / 10 % 10, i / 100].map(|c| c as f32 * 2.0);
+        let mut boxes: Vec<Aabb> = (0..999).map(|i| Aabb::from_center(at(i), [0.5; 3])).collect();
+        for half in [1e3, 1e6, 0.5 * f32::MAX] {
+            boxes.push(Aabb::from_center([0.0; 3], [half; 3]));
+            let plan = PbigPlan::new(&Summary::of(&boxes, None), &Config::DEFAULT);
+            assert!(plan.cell < 10.0, "ground of {half}: {plan}");
+        }
     }
 
     #[test]

@@ -30,6 +30,9 @@ impl Summary {
     pub const SAMPLE: usize = 1000;
 
     /// Summarises all `boxes`, or those with the given ids.
+    ///
+    /// # Panics
+    /// If an id is not below the number of boxes.
     pub fn of(boxes: &[Aabb], ids: Option<&[u32]>) -> Self {
         let mut summary =
             Self { valid: 0, classes: Box::new([SizeClass::default(); 256]), sample: Vec::new() };
