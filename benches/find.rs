@@ -1,4 +1,5 @@
-//! The finder alone, set by set and size by size, and an update through rapier beside stock's.
+//! The finder alone, set by set and size by size; updates in which all or few boxes move; and the
+//! first update of a rapier world beside stock's.
 //!
 //! `cargo bench -p pbig-benches`
 

@@ -8,7 +8,7 @@ use pbig_harness::chart::{self, Panel, Series};
 use pbig_harness::options::BackendOption;
 use pbig_harness::runner::{Run, Spread, StepTime};
 use pbig_harness::scenes::Scene;
-use pbig_harness::shadow::{Fault, Shadow};
+use pbig_harness::shadow::{Difference, Fault, Shadow};
 use rapier_pbig::{Config, PbigBroadPhase};
 use rapier3d::prelude::{BroadPhase, DefaultBroadPhase};
 use std::io::IsTerminal;
@@ -19,11 +19,11 @@ use std::process::ExitCode;
 #[derive(Parser)]
 struct Args {
     /// How many objects.
-    #[arg(long, default_value_t = 10_000)]
-    bodies: usize,
+    #[arg(long, default_value_t = 10_000, value_parser = clap::value_parser!(u32).range(1..))]
+    bodies: u32,
     /// Steps of 1/60 s.
-    #[arg(long, default_value_t = 300)]
-    steps: usize,
+    #[arg(long, default_value_t = 300, value_parser = clap::value_parser!(u32).range(1..))]
+    steps: u32,
     /// Which scene; a wrong name lists the right ones.
     #[arg(long, default_value = "column", value_parser = Scene::named)]
     scene: Scene,
@@ -45,9 +45,9 @@ fn main() -> ExitCode {
     let args = Args::parse();
     let config = Config { backend: args.backend.backend(), ..PbigBroadPhase::CONFIG };
     let new = || PbigBroadPhase::with_config(config);
-    let mut stock = Run::new(args.scene, args.bodies, args.seed, DefaultBroadPhase::new());
-    let mut ours = Run::new(args.scene, args.bodies, args.seed, new());
-    let bar = progress(args.steps as u64);
+    let mut stock = Run::new(args.scene, args.bodies as usize, args.seed, DefaultBroadPhase::new());
+    let mut ours = Run::new(args.scene, args.bodies as usize, args.seed, new());
+    let bar = progress(args.steps.into());
     for _ in 0..args.steps {
         stock.step();
         ours.step();
@@ -61,11 +61,15 @@ fn main() -> ExitCode {
     if let Some(why) = ours.broad_phase.inner.report().fallback {
         println!("note: {why}");
     }
-    match write_chart(&args, &stock.times, &ours.times) {
+    let drawn = write_chart(&args, &stock.times, &ours.times);
+    match &drawn {
         Ok(()) => println!("chart: {}", args.chart.display()),
         Err(error) => eprintln!("{error}"),
     }
-    if checked.missing == 0 { ExitCode::SUCCESS } else { ExitCode::FAILURE }
+    for difference in checked.differences.iter().take(3) {
+        eprintln!("{difference}");
+    }
+    if checked.differences.is_empty() && drawn.is_ok() { ExitCode::SUCCESS } else { ExitCode::FAILURE }
 }
 
 fn progress(steps: u64) -> indicatif::ProgressBar {
@@ -80,12 +84,13 @@ fn progress(steps: u64) -> indicatif::ProgressBar {
 struct Checked {
     comparisons: usize,
     missing: usize,
+    differences: Vec<Difference>,
 }
 
 fn check(args: &Args, broad_phase: PbigBroadPhase) -> Checked {
     let shadow = Shadow::new(broad_phase, PbigBroadPhase::CONFIG.margin).every(CHECK_EVERY);
-    let mut run = Run::new(args.scene, args.bodies, args.seed, shadow);
-    let bar = progress(args.steps as u64);
+    let mut run = Run::new(args.scene, args.bodies as usize, args.seed, shadow);
+    let bar = progress(args.steps.into());
     for _ in 0..args.steps {
         run.step();
         bar.inc(1);
@@ -94,7 +99,7 @@ fn check(args: &Args, broad_phase: PbigBroadPhase) -> Checked {
     let shadow = run.broad_phase.inner;
     let missing = |fault: Fault| matches!(fault, Fault::Missing | Fault::MissingContact);
     let missing = shadow.differences.iter().filter(|d| missing(d.fault)).count();
-    Checked { comparisons: shadow.checked, missing }
+    Checked { comparisons: shadow.checked, missing, differences: shadow.differences }
 }
 
 fn print_table(stock: &Run<DefaultBroadPhase>, ours: &Run<PbigBroadPhase>, checked: &Checked) {

@@ -4,13 +4,20 @@
 # otherwise it prints the command to run. With CI=true a missing part is a failure.
 set -euo pipefail
 cd "$(dirname "$0")/.."
+PATH=$PATH:/usr/sbin:/sbin
+
+as_root() {
+    if [ "$(id -u)" = 0 ]; then env "$@"; else sudo -n env "$@"; fi
+}
 
 may_install() {
     command -v apt-get >/dev/null && { [ "$(id -u)" = 0 ] || sudo -n true 2>/dev/null; }
 }
 
-as_root() {
-    if [ "$(id -u)" = 0 ]; then "$@"; else sudo -n "$@"; fi
+# give_up WHAT COMMAND: what a person has to run.
+give_up() {
+    echo "== $1 is missing; install it with: $2"
+    [ "${CI:-}" != true ] || exit 1
 }
 
 # require WHAT PACKAGE...: installs the packages that bring WHAT, or says how.
@@ -20,16 +27,37 @@ require() {
     if may_install; then
         echo "== $what is missing: installing $*"
         as_root apt-get update -qq
-        DEBIAN_FRONTEND=noninteractive as_root apt-get install -y -qq --no-install-recommends "$@" >/dev/null
+        as_root DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends "$@" >/dev/null ||
+            give_up "$what" "sudo apt-get install $*"
     else
-        echo "== $what is missing; install it with: sudo apt-get install $*"
-        [ "${CI:-}" != true ] || exit 1
+        give_up "$what" "sudo apt-get install $*"
     fi
 }
 
 has_vulkan() {
-    ldconfig -p 2>/dev/null | grep -q libvulkan.so.1 &&
-        ls /usr/share/vulkan/icd.d/*.json /etc/vulkan/icd.d/*.json >/dev/null 2>&1
+    case $(ldconfig -p 2>/dev/null) in *libvulkan.so.1*) ;; *) return 1 ;; esac
+    compgen -G '/usr/share/vulkan/icd.d/*.json' >/dev/null || compgen -G '/etc/vulkan/icd.d/*.json' >/dev/null
+}
+
+# has_rust: a toolchain new enough for the workspace, with the two tools that come beside it.
+has_rust() {
+    local wanted found
+    wanted=$(sed -n 's/^rust-version = "\(.*\)"/\1/p' Cargo.toml)
+    found=$(rustc --version 2>/dev/null | cut -d' ' -f2) || return 1
+    [ "$(printf '%s\n' "$wanted" "$found" | sort -V | head -n 1)" = "$wanted" ] &&
+        cargo fmt --version >/dev/null 2>&1 && cargo clippy --version >/dev/null 2>&1
+}
+
+# Rust comes through rustup: distributions' own compilers are often too old.
+require_rust() {
+    if ! command -v rustup >/dev/null && may_install && [ -n "$(apt-cache policy rustup 2>/dev/null)" ]; then
+        require "rustup" rustup
+    fi
+    if command -v rustup >/dev/null; then
+        step rustup toolchain install stable --profile minimal --component rustfmt,clippy
+        export RUSTUP_TOOLCHAIN=stable
+    fi
+    has_rust || give_up "Rust with rustfmt and clippy" "curl -sSf https://sh.rustup.rs | sh"
 }
 
 step() {
@@ -37,14 +65,9 @@ step() {
     "$@"
 }
 
-[ -f "$HOME/.cargo/env" ] && . "$HOME/.cargo/env"
+if [ -f "${HOME:-}/.cargo/env" ]; then . "$HOME/.cargo/env"; fi
 command -v cc >/dev/null || require "a C compiler, for linking," build-essential
-if ! command -v cargo >/dev/null; then
-    require "the Rust toolchain" rustup
-    command -v rustup >/dev/null && step rustup default stable
-fi
-cargo fmt --version >/dev/null 2>&1 && cargo clippy --version >/dev/null 2>&1 ||
-    step rustup component add rustfmt clippy
+has_rust || require_rust
 has_vulkan || require "a Vulkan driver (this software one will do)" mesa-vulkan-drivers libvulkan1
 
 # One profile and one set of features: everything is built once, pbig-core alone a second time.
@@ -59,6 +82,9 @@ step target/release/examples/falling_objects --bodies 500 --steps 60
 step target/release/examples/drop_in
 step target/release/examples/headless_test
 step target/release/examples/boxes_to_pairs
+step target/release/pbig pairs examples/boxes.csv
+step target/release/pbig replay examples/frames.npy
 RUSTDOCFLAGS="-D warnings" step cargo doc --release --workspace --no-deps --quiet
-cargo tree -p pbig-core --edges normal | grep -q wgpu && { echo "pbig-core pulls in wgpu"; exit 1; }
+dependencies=$(cargo tree -p pbig-core --edges normal)
+case $dependencies in *wgpu*) echo "pbig-core pulls in wgpu"; exit 1 ;; esac
 echo "== all passed"

@@ -19,7 +19,7 @@ pub struct Panel<'a> {
     pub series: Vec<Series<'a>>,
 }
 
-/// The first lines of two palettes that differ for the colour-blind too (Okabe and Ito).
+/// Colours that differ for the colour-blind too (Okabe and Ito).
 const COLOURS: [RGBColor; 4] =
     [RGBColor(213, 94, 0), RGBColor(0, 114, 178), RGBColor(0, 158, 115), RGBColor(0, 0, 0)];
 

@@ -4,7 +4,7 @@ use ndarray::{Array2, Array3, ArrayView2};
 use ndarray_npy::{ReadNpyError, ReadNpyExt, ReadableElement, WriteNpyError, WriteNpyExt};
 use pbig_core::{Aabb, Pair};
 use std::fs::File;
-use std::io::{BufReader, BufWriter, Write};
+use std::io::{BufWriter, Write};
 use std::path::Path;
 
 /// What is wrong with a file, in one line that names it.
@@ -32,36 +32,45 @@ pub fn read_boxes(path: &Path) -> Result<Vec<Aabb>, FileError> {
 ///
 /// # Errors
 /// A message that names the file and what is wrong.
-pub fn read_frames(path: &Path) -> Result<Vec<Vec<Frame>>, FileError> {
+pub fn read_frames(path: &Path) -> Result<Frames, FileError> {
     if extension(path) != "npy" {
         return Err(at(path, "expected a file that ends in .npy"));
     }
-    let frames = |shape: &[usize]| match shape {
+    let boxes = |shape: &[usize]| match shape {
         [_, n, 6] => Ok(*n),
         other => Err(at(path, format!("expected an array of shape (F,N,6), found {}", shape_text(other)))),
     };
     Ok(match read_array::<ndarray::Ix3>(path)? {
-        Floats::F32(array) => {
-            frames(array.shape())?;
-            array.outer_iter().map(|frame| rows(&frame).map(Frame::from_f32).collect()).collect()
-        }
-        Floats::F64(array) => {
-            frames(array.shape())?;
-            array.outer_iter().map(|frame| rows(&frame).map(Frame::from_f64).collect()).collect()
-        }
+        Floats::F32(array) => Frames {
+            boxes: boxes(array.shape())?,
+            frames: array.outer_iter().map(|frame| rows(&frame).map(FrameBox::from_f32).collect()).collect(),
+        },
+        Floats::F64(array) => Frames {
+            boxes: boxes(array.shape())?,
+            frames: array.outer_iter().map(|frame| rows(&frame).map(FrameBox::from_f64).collect()).collect(),
+        },
     })
+}
+
+/// What a file of frames holds.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Frames {
+    /// Boxes in each frame.
+    pub boxes: usize,
+    /// The frames.
+    pub frames: Vec<Vec<FrameBox>>,
 }
 
 /// A box of a frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Frame {
+pub enum FrameBox {
     /// All six values are NaN: the box is not there.
     Absent,
     /// A box, perhaps an invalid one.
     Present(Aabb),
 }
 
-impl Frame {
+impl FrameBox {
     fn from_f32(v: [f32; 6]) -> Self {
         Self::new(v.iter().all(|x| x.is_nan()), f32_box(v))
     }
@@ -99,35 +108,73 @@ enum Floats<D> {
 }
 
 fn read_array<D: ndarray::Dimension>(path: &Path) -> Result<Floats<D>, FileError> {
-    match read_as::<f32, D>(path) {
+    let bytes = std::fs::read(path).map_err(|error| at(path, error))?;
+    check_size(&bytes).map_err(|what| at(path, what))?;
+    match read_as::<f32, D>(&bytes) {
         Ok(array) => Ok(Floats::F32(array)),
-        Err(Reading::Type) => match read_as::<f64, D>(path) {
+        Err(ReadNpyError::WrongDescriptor(_)) => match read_as::<f64, D>(&bytes) {
             Ok(array) => Ok(Floats::F64(array)),
-            Err(Reading::Type) => Err(at(path, "expected float32 or float64 values, little-endian")),
-            Err(Reading::Other(message)) => Err(message),
+            Err(ReadNpyError::WrongDescriptor(_)) => Err(at(path, "expected float32 or float64 values")),
+            Err(error) => Err(at(path, npy_text(&error))),
         },
-        Err(Reading::Other(message)) => Err(message),
+        Err(error) => Err(at(path, npy_text(&error))),
     }
 }
 
-enum Reading {
-    Type,
-    Other(FileError),
+fn read_as<T: ReadableElement, D: ndarray::Dimension>(
+    bytes: &[u8],
+) -> Result<ndarray::Array<T, D>, ReadNpyError> {
+    ndarray::Array::<T, D>::read_npy(bytes)
 }
 
-fn read_as<T: ReadableElement, D: ndarray::Dimension>(path: &Path) -> Result<ndarray::Array<T, D>, Reading> {
-    let file = File::open(path).map_err(|error| Reading::Other(at(path, error)))?;
-    ndarray::Array::<T, D>::read_npy(BufReader::new(file)).map_err(|error| match error {
-        ReadNpyError::WrongDescriptor(_) => Reading::Type,
-        ReadNpyError::WrongNdim(wanted, found) => Reading::Other(at(
-            path,
-            format!(
-                "expected {} dimensions, found {found}",
-                wanted.map_or("other".into(), |n| n.to_string())
-            ),
-        )),
-        other => Reading::Other(at(path, format!("not a readable .npy file: {other}"))),
-    })
+fn npy_text(error: &ReadNpyError) -> String {
+    match error {
+        ReadNpyError::WrongNdim(wanted, found) => {
+            format!("expected {} dimensions, found {found}", wanted.unwrap_or_default())
+        }
+        other => format!("not a readable .npy file: {other}"),
+    }
+}
+
+/// Whether the file holds as many bytes as its header promises. The reader allocates what the header
+/// says, so a header that lies must be noticed before. What cannot be understood here is left to it.
+fn check_size(bytes: &[u8]) -> Result<(), String> {
+    let Some((header, rest)) = npy_header(bytes) else { return Ok(()) };
+    let field = |name: &str, from: char, to: char| {
+        let text = header.split(&format!("'{name}'")).nth(1)?;
+        Some(text.split(from).nth(1)?.split(to).next()?.to_string())
+    };
+    let (Some(shape), Some(kind)) = (field("shape", '(', ')'), field("descr", '\'', '\'')) else {
+        return Ok(());
+    };
+    let lengths: Option<Vec<u64>> =
+        shape.split(',').map(str::trim).filter(|n| !n.is_empty()).map(|n| n.parse().ok()).collect();
+    let Some(lengths) = lengths else { return Ok(()) };
+    let size: u64 = kind.trim_start_matches(|c: char| !c.is_ascii_digit()).parse().unwrap_or(1);
+    let bytes_of = |least: u64| lengths.iter().map(|&n| n.max(least)).try_fold(size, u64::checked_mul);
+    let found = rest.len() as u64;
+    match (bytes_of(0), bytes_of(1)) {
+        // Even without boxes, frames take memory.
+        (_, None) => Err(format!("shape ({shape}) is larger than any file")),
+        (Some(0), Some(frames)) if frames > 1 << 32 => {
+            Err(format!("shape ({shape}) has too many empty frames"))
+        }
+        (Some(needed), _) if needed > found => {
+            Err(format!("shape ({shape}) needs {needed} bytes of values, the file has {found}"))
+        }
+        _ => Ok(()),
+    }
+}
+
+/// The header's text, and what follows it.
+fn npy_header(bytes: &[u8]) -> Option<(String, &[u8])> {
+    let rest = bytes.strip_prefix(b"\x93NUMPY")?;
+    let (start, length) = match *rest.first()? {
+        1 => (4, u32::from(u16::from_le_bytes(rest.get(2..4)?.try_into().ok()?))),
+        _ => (6, u32::from_le_bytes(rest.get(2..6)?.try_into().ok()?)),
+    };
+    let header = rest.get(start..start + length as usize)?;
+    Some((String::from_utf8_lossy(header).into_owned(), &rest[start + length as usize..]))
 }
 
 /// The rows of an (N,6) array, whatever its memory order.
@@ -156,13 +203,19 @@ fn read_csv_boxes(path: &Path) -> Result<Vec<Aabb>, FileError> {
     let mut boxes = Vec::new();
     for (i, record) in reader.records().enumerate() {
         let record = record.map_err(|error| at(path, error))?;
-        let is_header = i == 0 && record.iter().all(|field| field.parse::<f32>().is_err());
-        if !is_header {
+        if i > 0 || !is_header(&record) {
             let about = |what| at(path, format!("line {}: {what}", line_of(&text, &record)));
             boxes.push(csv_box(&record).map_err(about)?);
         }
     }
     Ok(boxes)
+}
+
+/// The column names, and nothing else: a file that begins with other words is not taken for empty.
+fn is_header(record: &csv::StringRecord) -> bool {
+    let names = ["min_x", "min_y", "min_z", "max_x", "max_y", "max_z"];
+    let plain = |field: &str| field.trim_start_matches('\u{feff}').to_ascii_lowercase();
+    record.len() == 6 && record.iter().zip(names).all(|(field, name)| plain(field) == name)
 }
 
 /// The line of a record, counted from 1. The reader's own count is off after blank lines.
@@ -183,20 +236,37 @@ fn csv_box(record: &csv::StringRecord) -> Result<Aabb, String> {
     Ok(f32_box(values))
 }
 
+/// Whether [`write_pairs`] knows the extension: to be asked before the work, not after.
+///
+/// # Errors
+/// A message that names the file.
+pub fn check_pairs_path(path: &Path) -> Result<(), FileError> {
+    let known = ["npy", "csv"].contains(&extension(path));
+    if known { Ok(()) } else { Err(at(path, "expected a file that ends in .npy or .csv")) }
+}
+
 /// Pairs as `.npy` (K,2) uint32 or `.csv`.
 ///
 /// # Errors
 /// A message that names the file, when it cannot be written or has another extension.
 pub fn write_pairs(path: &Path, pairs: &[Pair]) -> Result<(), FileError> {
+    check_pairs_path(path)?;
     match extension(path) {
         "npy" => {
             let flat = pairs.iter().flat_map(|p| [p.a, p.b]).collect();
             let array = Array2::from_shape_vec((pairs.len(), 2), flat).map_err(|error| at(path, error))?;
             write_npy(path, |file| array.write_npy(file))
         }
-        "csv" => write_csv(path, "a,b", pairs.iter().map(|p| format!("{},{}", p.a, p.b))),
-        _ => Err(at(path, "expected a file that ends in .npy or .csv")),
+        _ => write_csv(path, "a,b", pairs.iter().map(|p| format!("{},{}", p.a, p.b))),
     }
+}
+
+/// Whether [`write_csv`] accepts the extension: to be asked before the work, not after.
+///
+/// # Errors
+/// A message that names the file.
+pub fn check_csv_path(path: &Path) -> Result<(), FileError> {
+    if extension(path) == "csv" { Ok(()) } else { Err(at(path, "expected a file that ends in .csv")) }
 }
 
 /// A text file of a header and lines.
@@ -208,6 +278,7 @@ pub fn write_csv(
     header: &str,
     lines: impl IntoIterator<Item = String>,
 ) -> Result<(), FileError> {
+    check_csv_path(path)?;
     let write = || -> std::io::Result<()> {
         let mut file = BufWriter::new(File::create(path)?);
         writeln!(file, "{header}")?;

@@ -152,6 +152,11 @@ impl Builder {
     }
 }
 
+/// The `i`-th place of a square column, layer by layer from the ground.
+fn lattice(i: usize, side: usize) -> Vec3 {
+    Vec3::new((i % side) as f32, (i / side / side) as f32, (i / side % side) as f32)
+}
+
 fn sphere(i: usize) -> ColliderBuilder {
     ColliderBuilder::ball(0.3 + 0.05 * (i % 5) as f32)
 }
@@ -171,7 +176,7 @@ fn fall(b: &mut Builder, n: usize, shape: fn(usize) -> ColliderBuilder) {
     b.ground();
     let side = ((n as f32 / 4.0).cbrt().ceil() as usize).clamp(1, 24);
     for i in 0..n {
-        let place = Vec3::new((i % side) as f32, (i / side / side) as f32, (i / side % side) as f32);
+        let place = lattice(i, side);
         let at = place * 1.3 + b.random_vec(Vec3::splat(0.1)) + Vec3::Y * 1.5;
         b.falling(at, shape(i));
     }
@@ -185,7 +190,7 @@ fn pile(b: &mut Builder, n: usize) {
     b.ground();
     let side = (n as f32).cbrt().ceil() as usize;
     for i in 0..n {
-        let place = Vec3::new((i % side) as f32, (i / side / side) as f32, (i / side % side) as f32);
+        let place = lattice(i, side);
         let at = place * 1.02 + b.random_vec(Vec3::new(0.01, 0.0, 0.01)) + Vec3::Y * 0.51;
         b.world.add(World::dynamic(at), ColliderBuilder::cuboid(0.5, 0.5, 0.5));
     }
@@ -252,7 +257,7 @@ fn rain(b: &mut Builder, n: usize) {
     }
 }
 
-/// Eleven capsules: trunk, head, and two to each limb but the short neck.
+/// Figures of eleven capsules: trunk, head, hips, and two to each limb.
 fn ragdolls(b: &mut Builder, n: usize) {
     b.ground();
     let side = (n as f32 / 11.0).sqrt().ceil() as usize;
@@ -305,7 +310,7 @@ fn sensors(b: &mut Builder, n: usize) {
     b.ground();
     let side = (n as f32 / 4.0).sqrt().ceil() as usize;
     for i in 0..n {
-        let place = Vec3::new((i % side) as f32, (i / side / side) as f32, (i / side % side) as f32) * 1.5;
+        let place = lattice(i, side) * 1.5;
         let types = ActiveCollisionTypes::default() | ActiveCollisionTypes::FIXED_FIXED;
         match i % 3 {
             0 => {
@@ -326,7 +331,7 @@ fn compounds(b: &mut Builder, n: usize) {
     b.ground();
     let side = (n as f32 / 4.0).cbrt().ceil() as usize;
     for i in 0..n {
-        let place = Vec3::new((i % side) as f32, (i / side / side) as f32, (i / side % side) as f32);
+        let place = lattice(i, side);
         let at = place * 2.6 + b.random_vec(Vec3::splat(0.1)) + Vec3::Y * 2.0;
         if i % 3 == 0 {
             let cube = || SharedShape::cuboid(0.3, 0.3, 0.3);
@@ -363,7 +368,7 @@ fn groups(b: &mut Builder, n: usize) {
     for i in 0..n {
         // Three crowds in one place: neighbours in the list stand inside each other.
         let spot = i / 3;
-        let place = Vec3::new((spot % side) as f32, (spot / side / side) as f32, (spot / side % side) as f32);
+        let place = lattice(spot, side);
         let at = place * 1.3 + b.random_vec(Vec3::splat(0.05)) + Vec3::Y;
         let own = Group::from_bits_truncate(1 << (i % 3));
         let groups = InteractionGroups::new(own, own | Group::GROUP_4);

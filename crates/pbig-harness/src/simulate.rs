@@ -1,7 +1,7 @@
 //! A scene run with one broad phase, checked or not: what `pbig simulate` does.
 
 use crate::files::write_frames;
-use crate::runner::{Run, Spread, StepTime};
+use crate::runner::{Run, Spread, StepTime, Timed, milliseconds};
 use crate::scenes::Scene;
 use crate::shadow::{Difference, Fault, Shadow};
 use rapier3d::prelude::BroadPhase;
@@ -46,12 +46,13 @@ pub struct Check {
     pub calls: usize,
     /// Pairs of the oracle, in all calls.
     pub oracle_pairs: u64,
-    /// Pairs that only stock reported, shown to be without contact.
+    /// Pairs that only stock reported, in all calls: excluded by a filter, or not in contact.
     pub stock_only: u64,
     /// What was wrong.
     pub differences: Vec<Difference>,
-    /// The boxes of the calls up to the failure, for `pbig replay`.
-    pub frames_file: Option<PathBuf>,
+    /// After a failure, where the boxes of the calls up to it are, for `pbig replay`; or why they could
+    /// not be written.
+    pub frames_file: Option<Result<PathBuf, String>>,
 }
 
 impl Check {
@@ -93,38 +94,46 @@ pub fn run<B: BroadPhase>(task: Task, broad_phase: B, mut progress: impl FnMut(u
     (outcome(&run, None), run.broad_phase.inner)
 }
 
-/// As [`run`], with rapier's own broad phase and the oracle beside the given one; stops at the first difference, after writing the failing frames into `folder`.
-///
-/// # Errors
-/// A message that names the file, when the frames cannot be written.
+/// As [`run`], with rapier's own broad phase and the oracle beside the given one; stops at the first
+/// difference, after writing the failing frames into `folder`. Times are without the checks.
 pub fn run_checked<B: BroadPhase>(
     task: Task,
     broad_phase: B,
     relative_margin: f32,
     folder: &Path,
     mut progress: impl FnMut(usize),
-) -> Result<(Outcome, B), String> {
-    let shadow = Shadow::new(broad_phase, relative_margin);
+) -> (Outcome, B) {
+    let shadow = Shadow::new(Timed::new(broad_phase), relative_margin);
     let mut run = Run::new(task.scene, task.bodies, task.seed, shadow);
     for step in 0..task.steps {
         run.step();
+        leave_out_checks(&mut run);
         progress(step);
         if !run.broad_phase.inner.differences.is_empty() {
             break;
         }
     }
-    let shadow = &run.broad_phase.inner;
-    let failed = !shadow.differences.is_empty();
-    let file = folder.join(format!("pbig-{}-{}-failed.npy", task.scene.name, run.times.len()));
-    if failed {
-        write_frames(&file, &shadow.frames)?;
+    let check = check(task, &run.broad_phase.inner, run.times.len(), folder);
+    (outcome(&run, Some(check)), run.broad_phase.inner.inner.inner)
+}
+
+/// The last step's times as they would be without the shadow.
+fn leave_out_checks<B: BroadPhase>(run: &mut Run<Shadow<Timed<B>>>) {
+    let own = milliseconds(run.broad_phase.inner.inner.take());
+    if let Some(last) = run.times.last_mut() {
+        last.step -= last.broad_phase - own;
+        last.broad_phase = own;
     }
-    let check = Check {
+}
+
+fn check<B>(task: Task, shadow: &Shadow<B>, steps: usize, folder: &Path) -> Check {
+    let file = folder.join(format!("pbig-{}-{steps}-failed.npy", task.scene.name));
+    let failed = !shadow.differences.is_empty();
+    Check {
         calls: shadow.checked,
         oracle_pairs: shadow.oracle_pairs,
         stock_only: shadow.stock_only,
         differences: shadow.differences.clone(),
-        frames_file: failed.then_some(file),
-    };
-    Ok((outcome(&run, Some(check)), run.broad_phase.inner.inner))
+        frames_file: failed.then(|| write_frames(&file, &shadow.frames).map(|()| file)),
+    }
 }

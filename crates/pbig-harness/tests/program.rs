@@ -114,31 +114,11 @@ fn pairs_writes_csv_too_and_reports_as_documented() {
 #[test]
 fn f64_boxes_are_rounded_outward() {
     let folder = tempfile::tempdir().expect("a folder");
-    // Apart by less than an f32 can tell; inverted by less.
-    let rows = Array2::from_shape_vec(
-        (3, 6),
-        vec![
-            0.0,
-            0.0,
-            0.0,
-            0.1,
-            1.0,
-            1.0, //
-            0.1 + 1e-12,
-            0.0,
-            0.0,
-            1.0,
-            1.0,
-            1.0, //
-            0.5 + 1e-12,
-            0.0,
-            0.0,
-            0.5,
-            1.0,
-            1.0,
-        ],
-    );
-    save(folder.path(), "boxes.npy", &rows.expect("3 x 6"));
+    let on_x = |min: f64, max: f64| [min, 0.0, 0.0, max, 1.0, 1.0];
+    // In f64 the first two are apart, and rounded to nearest they still are; the third is inverted by
+    // less than f32 can tell.
+    let rows = [on_x(0.0, 1.0 + 1e-8), on_x(1.0 + 1.1e-7, 2.0), on_x(5.0 + 1e-12, 5.0)].concat();
+    save(folder.path(), "boxes.npy", &Array2::from_shape_vec((3, 6), rows).expect("3 x 6"));
     let object = json(&pbig(folder.path(), &["pairs", "boxes.npy", "--json"]));
     assert_eq!((&object["pairs"], &object["invalid"]), (&Value::from(1), &Value::from(1)));
 }
@@ -179,6 +159,14 @@ fn bad_input_is_refused_in_one_line_that_says_what_and_where() {
     save(here, "flat.npy", &Array2::<f32>::zeros((4, 6)));
     refuse(&["replay", "flat.npy"], &["flat.npy", "3 dimensions"]);
     refuse(&["pairs", "flat.npy", "-o", "out.txt"], &["out.txt", ".npy or .csv"]);
+    save(here, "frames.npy", &Array3::<f32>::zeros((1, 2, 6)));
+    refuse(&["replay", "frames.npy", "-o", "events.npy"], &["events.npy", ".csv"]);
+    for words in ["hello world\n", "0\t0\t0\t1\t1\t1\n", "\"0,0,0,1,1,1\n0,0,0,1,1,1\n", "a,b\n"] {
+        write("words.csv", words);
+        refuse(&["pairs", "words.csv"], &["words.csv", "line 1"]);
+    }
+    write("swapped.csv", "max_x,max_y,max_z,min_x,min_y,min_z\n1,1,1,0,0,0\n");
+    refuse(&["pairs", "swapped.csv"], &["swapped.csv", "line 1", "'max_x'"]);
     refuse(&["pairs", "flat.npy", "-o", "no/such/folder.npy"], &["no/such/folder.npy"]);
     write("cut.npy", "");
     let whole = std::fs::read(here.join("flat.npy")).expect("written above");
@@ -188,11 +176,77 @@ fn bad_input_is_refused_in_one_line_that_says_what_and_where() {
     refuse(&["pairs", "inverted.npy", "--strict"], &["inverted.npy", "box 1"]);
 }
 
+/// A `.npy` file with this header text and nothing behind it.
+fn bare_header(shape: &str) -> Vec<u8> {
+    let text = format!("{{'descr': '<f4', 'fortran_order': False, 'shape': ({shape}), }}\n");
+    let length = (text.len() as u16).to_le_bytes();
+    [b"\x93NUMPY\x01\x00", &length[..], text.as_bytes()].concat()
+}
+
+#[test]
+fn a_header_that_promises_more_than_the_file_holds_is_refused_before_anything_is_allocated() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("lie.npy");
+    for (command, shape, words) in [
+        ("pairs", "1000000000000, 6", "24000000000000 bytes"),
+        ("pairs", "10, 6", "needs 240 bytes"),
+        ("pairs", "4611686018427387904, 6", "larger than any file"),
+        ("replay", "1000000000, 1000, 6", "bytes"),
+        ("replay", "0, 9223372036854775807, 6", "larger than any file"),
+        ("replay", "9223372036854775807, 0, 6", "larger than any file"),
+        ("replay", "1000000000000, 0, 6", "too many empty frames"),
+    ] {
+        std::fs::write(&path, bare_header(shape)).expect("written");
+        refused(&pbig(folder.path(), &[command, "lie.npy"]), &["lie.npy", words]);
+    }
+}
+
+#[test]
+fn frames_without_boxes_and_boxes_without_frames() {
+    let folder = tempfile::tempdir().expect("a folder");
+    for (frames, boxes) in [(0, 5), (3, 0), (0, 0)] {
+        save(folder.path(), "frames.npy", &Array3::<f32>::zeros((frames, boxes, 6)));
+        let object = json(&pbig(folder.path(), &["replay", "frames.npy", "-o", "events.csv", "--json"]));
+        assert_eq!((&object["frames"], &object["boxes"]), (&frames.into(), &boxes.into()));
+        let text = std::fs::read_to_string(folder.path().join("events.csv")).expect("the events");
+        assert_eq!(text, "frame,event,a,b\n");
+    }
+}
+
+#[test]
+fn absent_boxes_are_not_invalid_ones() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let mut frames = Array3::<f32>::zeros((2, 3, 6));
+    frames.slice_mut(ndarray::s![0, 0, ..]).fill(f32::NAN);
+    frames[[1, 1, 4]] = f32::NAN;
+    save(folder.path(), "frames.npy", &frames);
+    let object = json(&pbig(folder.path(), &["replay", "frames.npy", "--json"]));
+    assert_eq!(object["invalid"], 1);
+}
+
+#[test]
+fn a_backend_that_is_not_there_is_replaced_and_the_output_says_so() {
+    let folder = tempfile::tempdir().expect("a folder");
+    save(folder.path(), "boxes.npy", &Array2::<f32>::zeros((3, 6)));
+    save(folder.path(), "frames.npy", &Array3::<f32>::zeros((3, 3, 6)));
+    let scene = ["simulate", "--scene", "pile", "--bodies", "8", "--steps", "10"];
+    for args in [&["pairs", "boxes.npy"][..], &["replay", "frames.npy"], &scene] {
+        let gpu = [args, &["--backend", "gpu"]].concat();
+        let text = String::from_utf8_lossy(&pbig(folder.path(), &gpu).stdout).into_owned();
+        assert!(text.contains("no GPU backend"), "{args:?}: {text}");
+        let object = json(&pbig(folder.path(), &[&gpu[..], &["--json"]].concat()));
+        assert_eq!(object["backend"], "cpu", "{args:?}");
+        assert!(object.to_string().contains("no GPU backend"), "{args:?}: {object}");
+    }
+}
+
 #[test]
 fn bad_usage_is_refused_in_one_line() {
     let folder = tempfile::tempdir().expect("a folder");
     let refuse = |args: &[&str], words: &[&str]| refused(&pbig(folder.path(), args), words);
-    refuse(&[], &["pbig"]);
+    refuse(&[], &["a command is missing", "doctor"]);
+    refuse(&["simulate", "--scene", "a\nb\u{1b}"], &["no scene"]);
+    refuse(&["pairs", "x.npy", "--threads", "99999999999"], &["--threads", "at most 1024"]);
     refuse(&["pears"], &["pears"]);
     refuse(&["pairs"], &["INPUT"]);
     refuse(&["pairs", "x.npy", "--backend", "abacus"], &["abacus", "brute"]);

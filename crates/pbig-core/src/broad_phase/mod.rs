@@ -207,12 +207,12 @@ impl BroadPhase {
             changed: self.changed.len() as u64,
             pairs: self.pairs.len() as u64,
             plan: Plan { boxes: self.valid_count(), ..Plan::default() },
+            fallback: fallback(&self.config),
             ..Report::default()
         };
         if self.changed.is_empty() {
             return Ok(&self.events);
         }
-        self.report.fallback = fallback(&self.config);
         if let Err(error) = self.find_added() {
             self.events.added.clear();
             return Err(error);
@@ -281,7 +281,8 @@ impl BroadPhase {
     /// has shrunk is stored anew, so that only boxes near each other pair.
     #[inline]
     fn still_holds(&self, fat: &Aabb, aabb: &Aabb) -> bool {
-        let slack = 2.0 * self.config.margin;
+        // A little less than two margins: the gaps below are rounded.
+        let slack = 2.0 * self.config.margin * (1.0 - 2.0 * f32::EPSILON);
         // The comparison first: the difference of equal infinities is NaN.
         let near = |outer: f32, inner: f32, gap: f32| outer == inner || (0.0..=slack).contains(&gap);
         let axis = |k: usize| {

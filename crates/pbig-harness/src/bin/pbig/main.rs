@@ -8,13 +8,14 @@ mod pairs;
 mod replay;
 mod simulate;
 
+use clap::error::ErrorKind;
 use clap::{Parser, Subcommand};
 use output::Failure;
 use std::process::ExitCode;
 
 /// Finds every pair of overlapping axis-aligned boxes.
 #[derive(Parser)]
-#[command(version, about)]
+#[command(name = "pbig", version, about = "Finds every pair of overlapping axis-aligned boxes")]
 struct Cli {
     #[command(subcommand)]
     command: Command,
@@ -38,6 +39,10 @@ fn main() -> ExitCode {
     match Cli::try_parse() {
         Ok(cli) => finish(run(cli.command)),
         Err(error) if !error.use_stderr() => finish(output::print(&error.to_string())),
+        Err(error) if error.kind() == ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand => {
+            let commands = "pairs, replay, simulate, scenes or doctor";
+            finish(Err(Failure::Input(format!("a command is missing: {commands} (see pbig --help)"))))
+        }
         // One line on stderr, as for any other bad input; clap's own has several.
         Err(error) => finish(Err(Failure::Input(usage_line(&error.to_string())))),
     }
@@ -55,7 +60,10 @@ fn run(command: Command) -> Result<(), Failure> {
 
 fn usage_line(message: &str) -> String {
     let lines: Vec<&str> = message.lines().map(str::trim).filter(|line| !line.is_empty()).collect();
-    let told: Vec<&str> = lines.into_iter().take_while(|line| !line.starts_with("Usage:")).collect();
+    let told: Vec<&str> = lines
+        .into_iter()
+        .take_while(|line| !line.starts_with("Usage:") && !line.starts_with("For more"))
+        .collect();
     format!("{} (see pbig --help)", told.join(" ").trim_start_matches("error: "))
 }
 

@@ -22,6 +22,21 @@ pub(crate) fn positive(text: &str) -> Result<usize, String> {
     }
 }
 
+/// A number of threads: beyond the most, starting them takes longer than any work.
+pub(crate) fn threads(text: &str) -> Result<usize, String> {
+    const MOST: usize = 1024;
+    match positive(text)? {
+        count if count > MOST => Err(format!("must be at most {MOST}")),
+        count => Ok(count),
+    }
+}
+
+/// The plan in words, and why the wanted backend was not used.
+pub(crate) fn plan_text(report: &Report) -> String {
+    let why = report.fallback.map_or(String::new(), |why| format!("; {why}"));
+    format!("{}{why}", report.plan)
+}
+
 /// Stage times in milliseconds, by name.
 pub(crate) fn stages(report: &Report) -> serde_json::Value {
     let ms = |time: std::time::Duration| serde_json::Value::from(time.as_secs_f64() * 1e3);

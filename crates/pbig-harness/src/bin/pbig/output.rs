@@ -25,7 +25,11 @@ impl Failure {
 impl fmt::Display for Failure {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let (Self::Check(message) | Self::Input(message)) = self;
-        f.write_str(message)
+        // One line of bearable length, whatever a file or a name contained.
+        const LONGEST: usize = 600;
+        let plain = message.chars().map(|c| if c.is_control() { ' ' } else { c });
+        let end = if message.chars().count() > LONGEST { "..." } else { "" };
+        write!(f, "{}{end}", plain.take(LONGEST).collect::<String>().trim_end())
     }
 }
 
@@ -55,4 +59,22 @@ pub(crate) fn progress(length: usize, what: &'static str) -> indicatif::Progress
     let style = indicatif::ProgressStyle::with_template("{msg} {wide_bar} {pos}/{len} {eta}");
     let bar = indicatif::ProgressBar::new(length as u64).with_message(what);
     style.map_or(bar.clone(), |style| bar.with_style(style))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_failed_check_is_1_and_bad_input_is_2() {
+        let code = |failure: Failure| format!("{:?}", failure.code());
+        assert_eq!(code(Failure::Check(String::new())), format!("{:?}", ExitCode::from(1)));
+        assert_eq!(code(Failure::Input(String::new())), format!("{:?}", ExitCode::from(2)));
+    }
+
+    #[test]
+    fn a_message_is_one_line_of_bearable_length() {
+        let text = Failure::Input(format!("a\nb\u{1b}[1m{}", "x".repeat(10_000))).to_string();
+        assert!(text.starts_with("a b [1mx") && text.len() < 700, "{text}");
+    }
 }

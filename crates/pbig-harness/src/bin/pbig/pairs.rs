@@ -1,9 +1,9 @@
 //! `pbig pairs`: all overlapping pairs of the boxes in a file.
 
-use crate::options::{positive, stages, with_threads};
+use crate::options::{plan_text, positive, stages, threads, with_threads};
 use crate::output::{Failure, print, progress};
 use pbig_core::{Aabb, Config, Finder};
-use pbig_harness::files::{read_boxes, write_pairs};
+use pbig_harness::files::{check_pairs_path, read_boxes, write_pairs};
 use pbig_harness::options::BackendOption;
 use pbig_harness::runner::{Spread, milliseconds};
 use std::path::{Path, PathBuf};
@@ -20,7 +20,7 @@ pub(crate) struct Args {
     #[arg(long, value_enum, default_value_t)]
     backend: BackendOption,
     /// Threads; all by default.
-    #[arg(long, value_name = "N", value_parser = positive)]
+    #[arg(long, value_name = "N", value_parser = threads)]
     threads: Option<usize>,
     /// How often to find the pairs, for the times.
     #[arg(long, value_name = "K", default_value = "1", value_parser = positive)]
@@ -34,6 +34,9 @@ pub(crate) struct Args {
 }
 
 pub(crate) fn run(args: &Args) -> Result<(), Failure> {
+    if let Some(output) = &args.output {
+        check_pairs_path(output)?;
+    }
     let boxes = read_boxes(&args.input)?;
     if args.strict {
         refuse_invalid(&args.input, &boxes)?;
@@ -79,21 +82,18 @@ fn report(args: &Args, finder: &Finder, ms: Spread) -> Result<(), Failure> {
             "invalid": invalid,
             "backend": args.backend.in_use(),
             "adapter": null,
-            "plan": report.plan.to_string(),
+            "plan": plan_text(report),
             "ms": ms,
             "stages": stages(report),
-            "checks": {
-                "made": report.checks.made,
-                "unnecessary": report.checks.unnecessary,
-                "redundant": report.checks.redundant,
-            },
-            "fallback": report.fallback,
         });
         return print(&object.to_string());
     }
-    let note = report.fallback.map_or(String::new(), |why| format!("note: {why}\n"));
     print(&format!(
-        "{boxes} boxes ({invalid} invalid), {pairs} overlapping pairs\n{:.3} ms (median of {}; {:.3} to {:.3})\n{}\n{note}",
-        ms.median, args.repeat, ms.min, ms.max, report.plan
+        "{boxes} boxes ({invalid} invalid), {pairs} overlapping pairs\n{:.3} ms (median of {}; {:.3} to {:.3})\n{}",
+        ms.median,
+        args.repeat,
+        ms.min,
+        ms.max,
+        plan_text(report)
     ))
 }

@@ -1,9 +1,9 @@
 //! `pbig replay`: the incremental path over frames of boxes.
 
-use crate::options::stages;
+use crate::options::{plan_text, stages};
 use crate::output::{Failure, print, progress};
 use pbig_core::{BroadPhase, Config, Pair, ProxyFilter};
-use pbig_harness::files::{Frame, read_frames, write_csv};
+use pbig_harness::files::{FrameBox, Frames, check_csv_path, read_frames, write_csv};
 use pbig_harness::options::BackendOption;
 use pbig_harness::runner::{Spread, milliseconds};
 use std::path::PathBuf;
@@ -38,14 +38,17 @@ struct Replay {
 }
 
 pub(crate) fn run(args: &Args) -> Result<(), Failure> {
+    if let Some(output) = &args.output {
+        check_csv_path(output)?;
+    }
     let frames = read_frames(&args.frames)?;
     let config = Config { margin: args.margin, backend: args.backend.backend(), ..Config::DEFAULT };
     let about = |error| Failure::Input(format!("{}: {error}", args.frames.display()));
     let mut broad_phase =
         BroadPhase::new(config).map_err(|error| Failure::Input(format!("--margin: {error}")))?;
     let mut replay = Replay::default();
-    let bar = progress(frames.len(), "frames");
-    for (number, frame) in frames.iter().enumerate() {
+    let bar = progress(frames.frames.len(), "frames");
+    for (number, frame) in frames.frames.iter().enumerate() {
         replay.step(&mut broad_phase, number, frame, args.output.is_some()).map_err(about)?;
         bar.inc(1);
     }
@@ -61,7 +64,7 @@ impl Replay {
         &mut self,
         broad_phase: &mut BroadPhase,
         number: usize,
-        frame: &[Frame],
+        frame: &[FrameBox],
         keep_lines: bool,
     ) -> Result<(), pbig_core::Error> {
         // Pairs of a box that leaves end here: the broad phase ends them without an event.
@@ -69,8 +72,8 @@ impl Replay {
         let clock = Instant::now();
         for (id, now) in frame.iter().enumerate() {
             match now {
-                Frame::Present(aabb) => broad_phase.set(id as u32, *aabb, ProxyFilter::ALL)?,
-                Frame::Absent => {
+                FrameBox::Present(aabb) => broad_phase.set(id as u32, *aabb, ProxyFilter::ALL)?,
+                FrameBox::Absent => {
                     left.extend(broad_phase.pairs_of(id as u32));
                     broad_phase.remove(id as u32);
                 }
@@ -98,29 +101,24 @@ impl Replay {
     }
 }
 
-fn report(
-    args: &Args,
-    frames: &[Vec<Frame>],
-    replay: &Replay,
-    broad_phase: &BroadPhase,
-) -> Result<(), Failure> {
-    let boxes = frames.first().map_or(0, Vec::len);
+fn report(args: &Args, frames: &Frames, replay: &Replay, broad_phase: &BroadPhase) -> Result<(), Failure> {
+    let (boxes, count) = (frames.boxes, frames.frames.len());
     let ms = Spread::of(replay.times.iter().copied());
     let (added, removed) = (replay.added, replay.removed);
     let report = broad_phase.report();
     if args.json {
         let object = serde_json::json!({
-            "frames": frames.len(),
+            "frames": count,
             "boxes": boxes,
             "added": added,
             "removed": removed,
             "ms": { "min": ms.min, "median": ms.median, "max": ms.max, "per_frame": replay.times },
             "invalid": replay.invalid,
             "pairs": broad_phase.pair_count(),
-            "margin": args.margin,
+            "margin": args.margin.abs(),
             "backend": args.backend.in_use(),
             "adapter": null,
-            "plan": report.plan.to_string(),
+            "plan": plan_text(report),
             "stages": stages(report),
             "fallback": report.fallback,
         });
@@ -128,11 +126,11 @@ fn report(
     }
     print(&format!(
         "{} frames of {boxes} boxes: {added} pairs added, {removed} removed, {} at the end\n{:.3} ms a frame (median; {:.3} to {:.3})\nlast frame: {}",
-        frames.len(),
+        count,
         broad_phase.pair_count(),
         ms.median,
         ms.min,
         ms.max,
-        report.plan
+        plan_text(report)
     ))
 }

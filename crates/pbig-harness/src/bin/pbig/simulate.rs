@@ -74,9 +74,11 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
     let (outcome, fallback) = match args.broad_phase {
         BroadPhaseOption::Stock => (run_scene(task, DefaultBroadPhase::new(), step).0, None),
         BroadPhaseOption::Pbig => {
-            let checked =
-                args.check.then(|| run_checked(task, ours.clone(), config.margin, Path::new("."), step));
-            let (outcome, ours) = checked.unwrap_or_else(|| Ok(run_scene(task, ours, step)))?;
+            let (outcome, ours) = if args.check {
+                run_checked(task, ours, config.margin, Path::new("."), step)
+            } else {
+                run_scene(task, ours, step)
+            };
             (outcome, ours.report().fallback)
         }
     };
@@ -89,9 +91,11 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
 fn failure_line(outcome: &Outcome) -> String {
     let check = outcome.check.as_ref();
     let first = check.and_then(|c| c.differences.first()).map_or(String::new(), ToString::to_string);
-    let file =
-        check.and_then(|c| c.frames_file.as_deref()).map_or(String::new(), |f| f.display().to_string());
-    format!("{first}; the frames up to there are in {file}")
+    match check.and_then(|c| c.frames_file.as_ref()) {
+        Some(Ok(file)) => format!("{first}; the frames up to there are in {}", file.display()),
+        Some(Err(why)) => format!("{first}; the frames could not be written: {why}"),
+        None => first,
+    }
 }
 
 fn report(args: &Args, bodies: usize, outcome: &Outcome, fallback: Option<&str>) -> Result<(), Failure> {
@@ -114,6 +118,7 @@ fn report(args: &Args, bodies: usize, outcome: &Outcome, fallback: Option<&str>)
         });
         return print(&object.to_string());
     }
+    let note = fallback.map_or(String::new(), |why| format!("\nnote: {why}"));
     let (broad_phase, step) = (outcome.broad_phase, outcome.step);
     print(&format!(
         "{}: {bodies} bodies, {} colliders, {} steps with the {} broad phase\n\
@@ -132,7 +137,7 @@ fn report(args: &Args, bodies: usize, outcome: &Outcome, fallback: Option<&str>)
         outcome.pairs,
         outcome.added,
         outcome.removed,
-        outcome.check.as_ref().map_or(String::new(), check_line),
+        outcome.check.as_ref().map_or(String::new(), check_line) + &note,
     ))
 }
 
@@ -143,13 +148,13 @@ fn check_object(check: &Check) -> serde_json::Value {
         "stock_only": check.stock_only,
         "missing": check.missing(),
         "differences": check.differences.iter().map(ToString::to_string).collect::<Vec<_>>(),
-        "frames_file": check.frames_file,
+        "frames_file": check.frames_file.as_ref().and_then(|file| file.as_ref().ok()),
     })
 }
 
 fn check_line(check: &Check) -> String {
     format!(
-        "checked {} calls: {} missing pairs of {} that the oracle found; {} pairs of stock alone, all without contact or excluded by a filter",
+        "checked {} calls: {} missing pairs of {} that the oracle found; {} pairs that only stock reports",
         check.calls,
         check.missing(),
         check.oracle_pairs,
