@@ -12,42 +12,38 @@ pub(crate) struct Checker<'a, A> {
     pub(crate) out: &'a mut Vec<Pair>,
     pub(crate) checks: u64,
     pub(crate) overlaps: u64,
-    /// Places of the overlapping boxes of a run; longer than any run so far.
-    hits: Vec<u32>,
 }
+
+/// Candidates whose results are looked at together: most blocks of a sweep have no hit, so that one
+/// well predicted branch does for all.
+const BLOCK: usize = 8;
 
 impl<'a, A: Fn(u32, u32) -> bool> Checker<'a, A> {
     pub(crate) fn new(accept: &'a A, out: &'a mut Vec<Pair>) -> Self {
-        Self { accept, out, checks: 0, overlaps: 0, hits: Vec::new() }
+        Self { accept, out, checks: 0, overlaps: 0 }
     }
 
     /// Tests the box `id` against the entries in `run`.
-    ///
-    /// In two passes: whether a candidate overlaps is a coin toss that no branch predictor wins, so
-    /// the first appends without a branch.
     #[inline(always)]
     pub(crate) fn test(&mut self, query: &Query, id: u32, entries: &Entries, run: Range<usize>) {
-        let candidates = &entries.boxes[run.start..run.end];
+        let (candidates, ids) = (&entries.boxes[run.start..run.end], &entries.ids[run.start..run.end]);
         self.checks += candidates.len() as u64;
-        if self.hits.len() < candidates.len() {
-            self.hits.resize(candidates.len(), 0);
-        }
-        let hits = &mut self.hits[..candidates.len()];
-        let mut count = 0;
-        for (i, candidate) in candidates.iter().enumerate() {
-            hits[count] = i as u32;
-            count += usize::from(candidate.overlaps(query));
-        }
-        if count > 0 {
-            self.take(id, &entries.ids[run.start..run.end], count);
+        for (block, ids) in candidates.chunks(BLOCK).zip(ids.chunks(BLOCK)) {
+            let mut mask = 0u32;
+            for (bit, candidate) in block.iter().enumerate() {
+                mask |= u32::from(candidate.overlaps(query)) << bit;
+            }
+            if mask != 0 {
+                self.take(id, ids, mask);
+            }
         }
     }
 
-    #[inline]
-    fn take(&mut self, id: u32, ids: &[u32], count: usize) {
-        self.overlaps += count as u64;
-        for &hit in &self.hits[..count] {
-            let other = ids[hit as usize];
+    fn take(&mut self, id: u32, ids: &[u32], mut mask: u32) {
+        self.overlaps += u64::from(mask.count_ones());
+        while mask != 0 {
+            let other = ids[mask.trailing_zeros() as usize];
+            mask &= mask - 1;
             if (self.accept)(id, other) {
                 self.out.push(Pair::new(id, other));
             }

@@ -48,7 +48,7 @@ mod cost {
     /// One test of two boxes at random places.
     pub(super) const CHECK: f64 = 0.7;
     /// One test in a sweep over a list.
-    pub(super) const SWEEP: f64 = 0.8;
+    pub(super) const SWEEP: f64 = 1.8;
     /// Sorting one box into a grid, and setting up its search there.
     pub(super) const BOX: f64 = 65.0;
     /// Setting up the search for a box in the grid of another level.
