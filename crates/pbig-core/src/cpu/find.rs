@@ -19,9 +19,14 @@ use std::sync::atomic::{AtomicU64, Ordering};
 /// few enough to balance; fixed, so that the bytes of the result do not depend on the threads.
 const CHUNK: usize = 1024;
 
-/// Entries from which a second thread saves more than it costs: with 4,096 unit cubes it takes the
-/// search from 0.14 to 0.10 ms, with 16,000 from 0.57 to 0.31.
-const PARALLEL_FROM: usize = 4 * CHUNK;
+/// Expected time of a search, in ns on one core, from which it is shared with other threads. In a
+/// tight loop 150,000 pay off (4,096 unit cubes: 0.14 ms alone, 0.10 with a second thread), but in an
+/// app the other threads sleep between steps and waking one costs about as much.
+const PARALLEL_FROM: u64 = 500_000;
+
+/// What an entry costs, and a check, in ns; checks as many as in the call before.
+const ENTRY: u64 = 35;
+const CHECK: u64 = 1;
 
 /// Pairs as found, a buffer for each chunk, kept from call to call.
 #[derive(Clone, Debug, Default)]
@@ -60,9 +65,10 @@ impl Map {
         let chunks = self.chunks();
         let room = Room::new(max_pairs);
         let work = |(chunk, out): (&Chunk, &mut Vec<Pair>)| self.check_chunk(chunk, accept, out, &room);
+        let in_list = (self.list.len() as u64).pow(2) / 2;
+        let expected = ENTRY * self.len_in_grids() as u64 + CHECK * found.checks.max(in_list);
         let buffers = found.buffers(chunks.len());
-        let size = self.len_in_grids() + self.list.len() * self.list.len() / 64;
-        let counts = if size >= PARALLEL_FROM && rayon::current_num_threads() > 1 {
+        let counts = if expected >= PARALLEL_FROM && rayon::current_num_threads() > 1 {
             chunks.par_iter().zip(buffers).map(work).reduce(|| (0, 0), add)
         } else {
             chunks.iter().zip(buffers).map(work).fold((0, 0), add)
