@@ -8,7 +8,7 @@ use pbig_harness::chart::{self, Panel, Series};
 use pbig_harness::options::BackendOption;
 use pbig_harness::runner::{Run, Spread, StepTime};
 use pbig_harness::scenes::Scene;
-use pbig_harness::shadow::{Difference, Fault, Shadow};
+use pbig_harness::shadow::{Difference, Shadow};
 use rapier_pbig::{Config, PbigBroadPhase};
 use rapier3d::prelude::{BroadPhase, DefaultBroadPhase};
 use std::io::IsTerminal;
@@ -97,8 +97,7 @@ fn check(args: &Args, broad_phase: PbigBroadPhase) -> Checked {
     }
     bar.finish_and_clear();
     let shadow = run.broad_phase.inner;
-    let missing = |fault: Fault| matches!(fault, Fault::Missing | Fault::MissingContact);
-    let missing = shadow.differences.iter().filter(|d| missing(d.fault)).count();
+    let missing = shadow.differences.iter().filter(|d| d.fault.is_missing()).count();
     Checked { comparisons: shadow.checked, missing, differences: shadow.differences }
 }
 

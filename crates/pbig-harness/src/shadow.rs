@@ -35,6 +35,13 @@ pub enum Fault {
     WithItself,
 }
 
+impl Fault {
+    /// Whether a pair should have been there and was not.
+    pub fn is_missing(self) -> bool {
+        matches!(self, Self::Missing | Self::MissingContact)
+    }
+}
+
 /// A pair about which the broad phase is wrong.
 #[derive(Clone, Debug)]
 pub struct Difference {

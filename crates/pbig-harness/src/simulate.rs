@@ -3,7 +3,7 @@
 use crate::files::write_frames;
 use crate::runner::{Run, Spread, StepTime, Timed, milliseconds};
 use crate::scenes::Scene;
-use crate::shadow::{Difference, Fault, Shadow};
+use crate::shadow::{Difference, Shadow};
 use rapier3d::prelude::BroadPhase;
 use std::path::{Path, PathBuf};
 
@@ -58,8 +58,7 @@ pub struct Check {
 impl Check {
     /// Pairs that should have been there and were not.
     pub fn missing(&self) -> usize {
-        let missing = |d: &&Difference| matches!(d.fault, Fault::Missing | Fault::MissingContact);
-        self.differences.iter().filter(missing).count()
+        self.differences.iter().filter(|d| d.fault.is_missing()).count()
     }
 }
 
