@@ -58,7 +58,7 @@ fn main() -> ExitCode {
     println!("{} with {} bodies, {} steps\n", args.scene.name, args.bodies, args.steps);
     print_table(&stock, &ours, &checked);
     println!("\n{}", ours.broad_phase.inner.report().plan);
-    if let Some(why) = ours.broad_phase.inner.report().fallback {
+    if let Some(why) = &ours.broad_phase.inner.report().fallback {
         println!("note: {why}");
     }
     let drawn = write_chart(&args, &stock.times, &ours.times);

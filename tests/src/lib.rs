@@ -1,6 +1,6 @@
 //! The corpus: sets of boxes that every strategy must get right, with the strategies to try.
 
-use pbig_core::{Aabb, Backend, CellRule, Config, Pair, Strategy};
+use pbig_core::{Aabb, Backend, CellRule, Coding, Config, GpuOptions, Pair, Strategy};
 use pbig_harness::boxes::BoxSet;
 
 /// A set of boxes with a name to read in a failure.
@@ -22,7 +22,16 @@ pub fn strategies() -> Vec<(&'static str, Config)> {
         ("pbig by density", Config { cell_rule: CellRule::Density, ..with(Backend::Cpu, Strategy::Pbig) }),
         ("pbig rows", Config { small_cell: 1, ..with(Backend::Cpu, Strategy::Pbig) }),
         ("brute", with(Backend::Brute, Strategy::Auto)),
+        ("gpu", with(Backend::Gpu, Strategy::Auto)),
+        ("gpu grid", gpu(Coding::Plain)),
+        ("gpu grid packed", gpu(Coding::Packed)),
     ]
+}
+
+/// The grid on the GPU, whatever the size of the set.
+pub fn gpu(coding: Coding) -> Config {
+    let options = GpuOptions { coding, ..GpuOptions::DEFAULT };
+    Config { backend: Backend::Gpu, strategy: Strategy::Pbig, gpu: options, ..Config::DEFAULT }
 }
 
 /// The corpus.

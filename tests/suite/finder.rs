@@ -13,6 +13,7 @@ fn check(name: &str, boxes: &[Aabb]) {
         let found = finder.find(boxes).expect("within the limits");
         assert_eq!(difference(found, &wanted), None, "{name}, {strategy}");
         let report = finder.report();
+        assert_eq!(report.fallback, None, "{name}, {strategy}: a GPU's work must not be done by the CPU");
         assert_eq!((report.boxes, report.invalid), (boxes.len() as u64, invalid), "{name}, {strategy}");
         assert_eq!(report.pairs, wanted.len() as u64);
         let useful = report.checks.made - report.checks.unnecessary - report.checks.redundant;

@@ -1,5 +1,7 @@
 //! What a caller can choose. Every field says its unit, why one would change it, and what follows.
 
+use std::time::Duration;
+
 /// Where the work runs.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Backend {
@@ -72,6 +74,67 @@ impl Default for Limits {
     }
 }
 
+/// How the GPU's output is coded (docs/PAIR_FORMAT.md).
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Coding {
+    /// What would have been smaller in the call before, the tables for decoding included.
+    #[default]
+    Auto,
+    /// Two ids a pair.
+    Plain,
+    /// PBIG's three levels of cell, segment and place in the segment (PBIG 5.2); for a small scene
+    /// without a grid, one bit for each pair of boxes (Avril 3.4).
+    Packed,
+}
+
+/// What can be chosen about the GPU backend; the defaults are right, the rest is for study and tests.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct GpuOptions {
+    /// How the output is coded (PBIG table IV, "data compression").
+    pub coding: Coding,
+    /// Whether check, transfer and decoding overlap when there is more than one chunk of work (PBIG
+    /// table IV, "pipelining").
+    pub pipelining: bool,
+    /// Whether rows of a large cell get equally many pairs (PBIG table IV, "load balancing").
+    pub load_balancing: bool,
+    /// How Avril's mapping estimates the row (Avril 3.3): 0 the device's square root; 1 to 4 Carmack's
+    /// inverse root with so many Newton steps; 5 to 8 Lomont's; 9 no root, by bisection. All are exact,
+    /// as integers correct the estimate.
+    pub root: u32,
+    /// Work items of each kind, of at most 65,536 and a million tests, that one submission checks. Longer
+    /// ones could run into the time limit that some systems set a GPU.
+    pub chunk: [u32; 2],
+    /// Largest buffer and binding in bytes, if less than what the device allows; 2^20 at least.
+    pub max_bytes: u64,
+    /// Bytes of a buffer whose size must be guessed, in the first call.
+    pub first_bytes: u64,
+    /// How long a call waits for the device before it finishes on the CPU.
+    pub patience: Duration,
+    /// How long later calls stay on the CPU after the device failed.
+    pub pause: Duration,
+}
+
+impl GpuOptions {
+    /// The defaults.
+    pub const DEFAULT: Self = Self {
+        coding: Coding::Auto,
+        pipelining: true,
+        load_balancing: true,
+        root: 0,
+        chunk: [1 << 16, 1 << 11],
+        max_bytes: u64::MAX,
+        first_bytes: 1 << 16,
+        patience: Duration::from_secs(30),
+        pause: Duration::from_secs(5),
+    };
+}
+
+impl Default for GpuOptions {
+    fn default() -> Self {
+        Self::DEFAULT
+    }
+}
+
 /// Everything a caller can choose; the defaults are right for most.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Config {
@@ -98,6 +161,8 @@ pub struct Config {
     /// In [`Strategy::Pbig`], cells of at most this many boxes go through Avril's index to pair
     /// mapping, larger ones through PBIG's balanced rows.
     pub small_cell: u32,
+    /// About the GPU backend.
+    pub gpu: GpuOptions,
 }
 
 impl Config {
@@ -112,6 +177,7 @@ impl Config {
         pbig_boxes_per_cell: 4.0,
         cell_rule: CellRule::Objective,
         small_cell: 32,
+        gpu: GpuOptions::DEFAULT,
     };
 }
 

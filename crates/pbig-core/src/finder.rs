@@ -4,10 +4,12 @@ use crate::cpu::emit;
 use crate::cpu::find::Found;
 use crate::cpu::map::Map;
 use crate::cpu::pbig::PbigGrid;
+#[cfg(feature = "gpu")]
+use crate::gpu::{self, GpuFinder};
 use crate::plan::{Plan, Summary};
 use crate::report::{Checks, Report, lap};
 use crate::{Aabb, Backend, Config, Error, Limits, Pair, ProxyFilter, Strategy};
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 /// Every pair of overlapping boxes, sorted, with default settings.
 ///
@@ -58,8 +60,16 @@ impl Default for Finder {
 impl Finder {
     /// A finder with the given settings ([`Config::margin`] is not used).
     pub fn new(config: Config) -> Self {
-        warn_of_fallback(&config);
         Self { config, search: Search::new(), pairs: vec![], scratch: vec![], report: Report::default() }
+    }
+
+    /// As [`Finder::new`], on a given device: with [`crate::Backend::Gpu`] always, with
+    /// [`crate::Backend::Auto`] when it is no software and turns out faster than the CPU.
+    #[cfg(feature = "gpu")]
+    pub fn with_gpu(config: Config, gpu: GpuFinder) -> Self {
+        let mut finder = Self::new(config);
+        finder.search.gpu = Some(gpu);
+        finder
     }
 
     /// Every pair of overlapping boxes; `boxes[i]` has the id `i`.
@@ -67,7 +77,7 @@ impl Finder {
     /// # Errors
     /// [`Error::TooManyBoxes`] and [`Error::TooManyPairs`], see [`crate::Limits`].
     pub fn find(&mut self, boxes: &[Aabb]) -> Result<&[Pair], Error> {
-        self.find_where(boxes, &|_, _| true)
+        self.find_where(boxes, None, &|_, _| true)
     }
 
     /// As [`Finder::find`], with only the pairs that both filters allow.
@@ -79,16 +89,22 @@ impl Finder {
             self.forget();
             return Err(Error::FilterCount { boxes: boxes.len(), filters: filters.len() });
         }
-        self.find_where(boxes, &|a, b| filters[a as usize].allows(&filters[b as usize]))
+        self.find_where(boxes, Some(filters), &|a, b| filters[a as usize].allows(&filters[b as usize]))
     }
 
-    fn find_where<A>(&mut self, boxes: &[Aabb], accept: &A) -> Result<&[Pair], Error>
+    fn find_where<A>(
+        &mut self,
+        boxes: &[Aabb],
+        filters: Option<&[ProxyFilter]>,
+        accept: &A,
+    ) -> Result<&[Pair], Error>
     where
         A: Fn(u32, u32) -> bool + Sync,
     {
         self.forget();
         check_count(boxes.len() as u64, &self.config)?;
-        self.search.find(boxes, &self.config, accept, &mut self.report)?;
+        let rule = Rule { accept, filters, filters_suffice: true };
+        self.search.find(boxes, &self.config, &rule, &mut self.report)?;
         let mut clock = Instant::now();
         let chunks = &self.search.found.chunks;
         emit::collect(chunks, boxes.len(), self.config.order, &mut self.scratch, &mut self.pairs);
@@ -100,7 +116,7 @@ impl Finder {
     /// Nothing of an earlier call outlives the next, even if that fails.
     fn forget(&mut self) {
         self.pairs.clear();
-        self.report = Report { fallback: fallback(&self.config), ..Report::default() };
+        self.report = Report::default();
     }
 
     /// The pairs of the last call; none if it failed.
@@ -114,16 +130,16 @@ impl Finder {
     }
 }
 
-/// Why the wanted backend cannot be had, if so (contract 8: the call finishes on the CPU).
-pub(crate) fn fallback(config: &Config) -> Option<&'static str> {
-    (config.backend == Backend::Gpu).then_some("no GPU backend in this build: the CPU does the work")
-}
-
-/// Once for each finder; the report says it after every call.
-pub(crate) fn warn_of_fallback(config: &Config) {
-    if let Some(why) = fallback(config) {
-        tracing::warn!("pbig: {why}");
-    }
+/// Which pairs are wanted, besides that they overlap.
+pub(crate) struct Rule<'a, A> {
+    /// The whole rule.
+    pub(crate) accept: &'a A,
+    /// The part of it that a device can test.
+    #[cfg_attr(not(feature = "gpu"), expect(dead_code))]
+    pub(crate) filters: Option<&'a [ProxyFilter]>,
+    /// Whether that part is all of it.
+    #[cfg_attr(not(feature = "gpu"), expect(dead_code))]
+    pub(crate) filters_suffice: bool,
 }
 
 pub(crate) fn check_count(boxes: u64, config: &Config) -> Result<(), Error> {
@@ -137,11 +153,25 @@ pub(crate) struct Search {
     pub(crate) map: Map,
     pbig: PbigGrid,
     pub(crate) found: Found,
+    warned: bool,
+    #[cfg(feature = "gpu")]
+    pub(crate) gpu: Option<GpuFinder>,
+    #[cfg(feature = "gpu")]
+    trial: gpu::Trial,
 }
 
 impl Search {
     pub(crate) fn new() -> Self {
-        Self { map: Map::new(), pbig: PbigGrid::default(), found: Found::default() }
+        Self {
+            map: Map::new(),
+            pbig: PbigGrid::default(),
+            found: Found::default(),
+            warned: false,
+            #[cfg(feature = "gpu")]
+            gpu: None,
+            #[cfg(feature = "gpu")]
+            trial: gpu::Trial::default(),
+        }
     }
 
     /// Leaves the accepted pairs in `found`, and what was done in `report`.
@@ -149,7 +179,7 @@ impl Search {
         &mut self,
         boxes: &[Aabb],
         config: &Config,
-        accept: &A,
+        rule: &Rule<'_, A>,
         report: &mut Report,
     ) -> Result<(), Error>
     where
@@ -160,17 +190,111 @@ impl Search {
         report.boxes = boxes.len() as u64;
         report.invalid = boxes.len() as u64 - u64::from(summary.valid);
         report.stages.plan += lap(&mut clock);
+        if self.find_on_gpu(boxes, &summary, config, rule, report)? {
+            return Ok(());
+        }
+        let mut clock = Instant::now();
+        let result = self.find_on_cpu(boxes, &summary, config, rule.accept, report);
+        self.note_time(false, boxes.len(), lap(&mut clock));
+        result
+    }
+
+    fn find_on_cpu<A>(
+        &mut self,
+        boxes: &[Aabb],
+        summary: &Summary,
+        config: &Config,
+        accept: &A,
+        report: &mut Report,
+    ) -> Result<(), Error>
+    where
+        A: Fn(u32, u32) -> bool + Sync,
+    {
         if config.strategy == Strategy::Pbig && config.backend != Backend::Brute {
-            report.plan = Plan::new(&summary, config, 1.0);
+            report.plan = Plan::new(summary, config, 1.0);
             return self.find_pbig(boxes, config, accept, report);
         }
-        report.plan = self.map.plan_and_build(&summary, config, boxes, None, &mut report.stages);
+        report.plan = self.map.plan_and_build(summary, config, boxes, None, &mut report.stages);
         let mut clock = Instant::now();
         self.map.find(accept, config.limits.max_pairs, &mut self.found)?;
         report.stages.check += lap(&mut clock);
         report.checks = single_entry_checks(&self.found);
         Ok(())
     }
+
+    /// Searches on a device if that is wanted; false when it is not, or when the device could not do
+    /// it, which the report then says (contract 8).
+    #[cfg(feature = "gpu")]
+    fn find_on_gpu<A>(
+        &mut self,
+        boxes: &[Aabb],
+        summary: &Summary,
+        config: &Config,
+        rule: &Rule<'_, A>,
+        report: &mut Report,
+    ) -> Result<bool, Error>
+    where
+        A: Fn(u32, u32) -> bool + Sync,
+    {
+        if !gpu::wanted(config, self.gpu.as_ref(), &mut self.trial, boxes.len()) {
+            return Ok(false);
+        }
+        let mut clock = Instant::now();
+        let accept: Option<&(dyn Fn(u32, u32) -> bool + Sync)> =
+            if rule.filters_suffice { None } else { Some(rule.accept) };
+        let request = gpu::Request { boxes, filters: rule.filters, accept, summary, config };
+        let gpu = self.gpu.get_or_insert_with(GpuFinder::shared);
+        match gpu.find(&request, &mut self.found, report) {
+            Ok(()) => {
+                self.warned = false;
+                let time = lap(&mut clock);
+                report.stages.check += time;
+                self.note_time(true, boxes.len(), time);
+                Ok(true)
+            }
+            Err(gpu::Failure::Call(error)) => Err(error),
+            Err(gpu::Failure::Device(error)) => {
+                self.trial.failed();
+                self.fall_back(format!("{error}: the CPU does the work"), report);
+                Ok(false)
+            }
+        }
+    }
+
+    #[cfg(not(feature = "gpu"))]
+    fn find_on_gpu<A>(
+        &mut self,
+        _: &[Aabb],
+        _: &Summary,
+        config: &Config,
+        _: &Rule<'_, A>,
+        report: &mut Report,
+    ) -> Result<bool, Error> {
+        if config.backend == Backend::Gpu {
+            let why = "no GPU backend in this build (feature `gpu`): the CPU does the work";
+            self.fall_back(why.into(), report);
+        }
+        Ok(false)
+    }
+
+    /// The wanted backend could not do the work: the report says so every time, a warning once.
+    fn fall_back(&mut self, why: String, report: &mut Report) {
+        if !self.warned {
+            tracing::warn!("pbig: {why}");
+            self.warned = true;
+        }
+        report.fallback = Some(why);
+    }
+
+    /// Measures for [`Backend::Auto`].
+    #[cfg(feature = "gpu")]
+    fn note_time(&mut self, on_gpu: bool, boxes: usize, time: Duration) {
+        self.trial.note(on_gpu, boxes, time);
+    }
+
+    #[cfg(not(feature = "gpu"))]
+    #[expect(clippy::unused_self, reason = "as with a GPU backend")]
+    fn note_time(&mut self, _: bool, _: usize, _: Duration) {}
 
     fn find_pbig<A>(
         &mut self,

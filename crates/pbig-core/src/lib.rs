@@ -44,10 +44,16 @@ mod aabb;
 mod broad_phase;
 mod config;
 mod cpu;
+#[cfg(feature = "gpu")]
+pub mod decode;
 mod diff;
 mod error;
 mod filter;
 mod finder;
+#[cfg(feature = "gpu")]
+pub mod gpu;
+#[cfg(feature = "gpu")]
+pub mod layout;
 pub mod oracle;
 mod pair;
 pub mod pair_index;
@@ -56,10 +62,12 @@ mod report;
 
 pub use aabb::Aabb;
 pub use broad_phase::{BroadPhase, Events};
-pub use config::{Backend, CellRule, Config, Limits, Order, Strategy};
+pub use config::{Backend, CellRule, Coding, Config, GpuOptions, Limits, Order, Strategy};
 pub use error::Error;
 pub use filter::{ProxyFilter, TestMode};
 pub use finder::{Finder, find_pairs};
+#[cfg(feature = "gpu")]
+pub use gpu::GpuFinder;
 pub use pair::Pair;
 pub use plan::Plan;
-pub use report::{Checks, Report, StageTimes};
+pub use report::{Checks, GpuReport, Report, StageTimes};

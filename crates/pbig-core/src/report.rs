@@ -71,5 +71,32 @@ pub struct Report {
     /// How the work was done, and why.
     pub plan: Plan,
     /// Why the wanted backend was not used, if it was not.
-    pub fallback: Option<&'static str>,
+    pub fallback: Option<String>,
+    /// What the GPU did, if it did the work.
+    pub gpu: Option<GpuReport>,
+}
+
+/// What a call did on a GPU.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct GpuReport {
+    /// The adapter's name, and whether it is software.
+    pub adapter: String,
+    /// Time on the device by kernel, where the adapter measures it.
+    pub kernels: Vec<(&'static str, Duration)>,
+    /// Bytes sent to the device.
+    pub uploaded: u64,
+    /// Bytes read back.
+    pub downloaded: u64,
+    /// Bytes of buffers on the device, with those for reading back.
+    pub device_bytes: u64,
+    /// Output against two ids a pair (PBIG equation 9); 0 without pairs.
+    pub compression: f64,
+    /// Chunks of work items.
+    pub chunks: u32,
+    /// Parts into which the boxes were split because of the device's limits; 1 if they were not.
+    pub parts: u32,
+    /// Times that the map or a chunk was repeated for want of room.
+    pub repeats: u32,
+    /// Whether the kernels for subgroups ran.
+    pub subgroups: bool,
 }

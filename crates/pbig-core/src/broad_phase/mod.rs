@@ -5,7 +5,9 @@ mod update;
 use crate::cpu::find::Found;
 use crate::cpu::map::Map;
 use crate::diff::PairStore;
-use crate::finder::{Search, check_count, fallback, warn_of_fallback};
+use crate::finder::{Search, check_count};
+#[cfg(feature = "gpu")]
+use crate::gpu::GpuFinder;
 use crate::report::{Report, lap};
 use crate::{Aabb, Config, Error, Pair, Plan, ProxyFilter};
 use std::time::Instant;
@@ -52,8 +54,8 @@ enum Home {
 /// Settled boxes lie in a base grid. Boxes that have moved since it was built are taken out and
 /// sorted into a second, small one each time; changed boxes are searched in both. When an eighth of
 /// all boxes has moved, the base is built anew, and now and then so that boxes at rest return to it.
-/// ([`crate::Strategy::Pbig`] and [`crate::Backend::Brute`] search everything at every update that changes
-/// something.)
+/// ([`crate::Strategy::Pbig`], [`crate::Backend::Brute`] and [`crate::Backend::Gpu`] search everything at
+/// every update that changes something.)
 ///
 /// ```
 /// use pbig_core::{Aabb, BroadPhase, Config, Pair, ProxyFilter};
@@ -83,6 +85,8 @@ pub struct BroadPhase {
     /// Boxes sorted in updates since the base was built.
     sorted_again: usize,
     base: Search,
+    /// Whether `base.map` holds the boxes whose home it is: not after a search by anything else.
+    has_base: bool,
     /// The boxes that moved; `base.map` holds the rest.
     loose: Map,
     found: Found,
@@ -99,7 +103,6 @@ impl BroadPhase {
     /// [`Error::Margin`].
     pub fn new(config: Config) -> Result<Self, Error> {
         check_margin(config.margin)?;
-        warn_of_fallback(&config);
         Ok(Self {
             config,
             boxes: vec![],
@@ -113,6 +116,7 @@ impl BroadPhase {
             moved: vec![],
             sorted_again: 0,
             base: Search::new(),
+            has_base: false,
             loose: Map::new(),
             found: Found::default(),
             pairs: PairStore::default(),
@@ -120,6 +124,17 @@ impl BroadPhase {
             events: Events::default(),
             report: Report::default(),
         })
+    }
+
+    /// As [`BroadPhase::new`], on a given device, see [`crate::Finder::with_gpu`].
+    ///
+    /// # Errors
+    /// [`Error::Margin`].
+    #[cfg(feature = "gpu")]
+    pub fn with_gpu(config: Config, gpu: GpuFinder) -> Result<Self, Error> {
+        let mut broad_phase = Self::new(config)?;
+        broad_phase.base.gpu = Some(gpu);
+        Ok(broad_phase)
     }
 
     /// Changes the margin for boxes that are set from now on.
@@ -207,7 +222,6 @@ impl BroadPhase {
             changed: self.changed.len() as u64,
             pairs: self.pairs.len() as u64,
             plan: Plan { boxes: self.valid_count(), ..Plan::default() },
-            fallback: fallback(&self.config),
             ..Report::default()
         };
         if self.changed.is_empty() {

@@ -3,7 +3,7 @@
 use super::{BroadPhase, Home, Old, UNCHANGED};
 use crate::cpu::check::Checker;
 use crate::diff::PairStore;
-use crate::finder::single_entry_checks;
+use crate::finder::{Rule, single_entry_checks};
 use crate::plan::{Chosen, Plan, Summary};
 use crate::report::lap;
 use crate::{Aabb, Backend, Error, Pair, ProxyFilter, Strategy};
@@ -17,7 +17,9 @@ impl BroadPhase {
                 self.moved.push(old.id);
             }
         }
-        let whole = self.config.strategy == Strategy::Pbig || self.config.backend == Backend::Brute;
+        let whole = self.config.strategy == Strategy::Pbig
+            || matches!(self.config.backend, Backend::Brute | Backend::Gpu)
+            || !self.has_base;
         // Boxes that moved once and came to rest go back into the base when looking at them again and
         // again has cost as much as building it.
         self.sorted_again += self.moved.len();
@@ -47,12 +49,15 @@ impl BroadPhase {
         };
         let (boxes, invalid) = (self.report.boxes, self.report.invalid);
         let accept = |a: u32, b: u32| state.is_added(a, b);
-        self.base.find(&self.boxes, &self.config, &accept, &mut self.report)?;
+        let rule = Rule { accept: &accept, filters: Some(&self.filters), filters_suffice: false };
+        self.has_base = false;
+        self.base.find(&self.boxes, &self.config, &rule, &mut self.report)?;
         (self.report.boxes, self.report.invalid) = (boxes, invalid);
         self.moved.clear();
         self.sorted_again = 0;
         // A search by another strategy leaves no base grid to keep.
-        let kept = if self.report.plan.chosen == Chosen::Pbig { Home::None } else { Home::Base };
+        self.has_base = self.report.gpu.is_none() && self.report.plan.chosen != Chosen::Pbig;
+        let kept = if self.has_base { Home::Base } else { Home::None };
         for (home, aabb) in self.home.iter_mut().zip(&self.boxes) {
             *home = if aabb.is_valid() { kept } else { Home::None };
         }

@@ -2,10 +2,14 @@
 //!
 //! A pure function of the [`Summary`] and the [`Config`]; the [`Plan`] explains itself in words.
 
+#[cfg(feature = "gpu")]
+mod gpu;
 mod levels;
 mod pbig;
 mod summary;
 
+#[cfg(feature = "gpu")]
+pub use gpu::GpuPlan;
 pub use levels::LevelPlan;
 pub use pbig::{PbigPlan, density_cell, pbig_cell, pbig_objective};
 pub(crate) use summary::size_class_of;
@@ -62,6 +66,9 @@ pub struct Plan {
     pub swept: u32,
     /// The grid of [`Chosen::Pbig`].
     pub pbig: Option<PbigPlan>,
+    /// The grid on the GPU, if the GPU searched.
+    #[cfg(feature = "gpu")]
+    pub gpu: Option<GpuPlan>,
     /// Boxes that have moved since the grid was built ([`Chosen::Edit`]).
     pub moved: u32,
     /// Valid boxes planned for.
@@ -112,6 +119,10 @@ impl fmt::Display for Plan {
         }?;
         if let Some(pbig) = &self.pbig {
             write!(f, "; {pbig}")?;
+        }
+        #[cfg(feature = "gpu")]
+        if let Some(gpu) = &self.gpu {
+            write!(f, "; {gpu}")?;
         }
         for level in &self.levels {
             write!(f, "; {level}")?;

@@ -64,7 +64,7 @@ fn cells_in(lengths: [f32; 3], cell: f32) -> f64 {
 
 /// The sample without boxes as wide as the range of all of them, a ground or a half-space: they touch
 /// so many cells that they are tested against all instead, and would stretch the space and its cells.
-fn ordinary(summary: &Summary) -> Vec<Aabb> {
+pub(super) fn ordinary(summary: &Summary) -> Vec<Aabb> {
     let widths: [f32; 3] = std::array::from_fn(|k| summary.range(k).1 - summary.range(k).0);
     let largest = widths.into_iter().fold(0.0, f32::max);
     let fits = |b: &&Aabb| b.extents().into_iter().all(|extent| extent < largest);
@@ -73,7 +73,7 @@ fn ordinary(summary: &Summary) -> Vec<Aabb> {
 }
 
 /// The space of the paper: from the lowest corner to the highest, of most of the sample.
-fn space_of(summary: &Summary, sample: &[Aabb]) -> ([f32; 3], [f32; 3]) {
+pub(super) fn space_of(summary: &Summary, sample: &[Aabb]) -> ([f32; 3], [f32; 3]) {
     let ranges: [(f32, f32); 3] = std::array::from_fn(|k| summary.range(k));
     let largest = |k: usize| sample.iter().map(|b| b.extents()[k]).fold(0.0, f32::max);
     let length = |k: usize| (ranges[k].1 - ranges[k].0 + largest(k)).clamp(1e-30, 1e30);

@@ -33,7 +33,7 @@ pub(crate) fn threads(text: &str) -> Result<usize, String> {
 
 /// The plan in words, and why the wanted backend was not used.
 pub(crate) fn plan_text(report: &Report) -> String {
-    let why = report.fallback.map_or(String::new(), |why| format!("; {why}"));
+    let why = report.fallback.as_deref().map_or(String::new(), |why| format!("; {why}"));
     format!("{}{why}", report.plan)
 }
 

@@ -79,11 +79,11 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
             } else {
                 run_scene(task, ours, step)
             };
-            (outcome, ours.report().fallback)
+            (outcome, ours.report().fallback.clone())
         }
     };
     bar.finish_and_clear();
-    report(args, bodies, &outcome, fallback)?;
+    report(args, bodies, &outcome, fallback.as_deref())?;
     if outcome.failed() { Err(Failure::Check(failure_line(&outcome))) } else { Ok(()) }
 }
 

@@ -1,0 +1,212 @@
+//! From the words of a device to pairs. `docs/PAIR_FORMAT.md` is normative.
+//!
+//! Words that are not what the format says are an error, never a panic: what a device returns is
+//! input like any other.
+
+use crate::Pair;
+use crate::layout::{BOX_BITS, LANES};
+use crate::pair_index::{pair_count, row_start};
+use rayon::prelude::*;
+
+/// Words that break the format.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("the device returned words that are no pairs: {what} at word {at}")]
+pub struct DecodeError {
+    /// What is wrong.
+    pub what: &'static str,
+    /// Where.
+    pub at: usize,
+}
+
+/// The mark of a record of plain pairs.
+pub const PLAIN: u32 = 1 << 31;
+
+/// Words that one thread decodes at a time.
+const PIECE: usize = 1 << 15;
+
+/// Plain pairs: two ids each, the smaller first.
+///
+/// # Errors
+/// When the number of words is odd, or a pair is not `a < b < boxes`.
+pub fn plain(words: &[u32], boxes: u32) -> Result<Vec<Vec<Pair>>, DecodeError> {
+    if !words.len().is_multiple_of(2) {
+        return Err(DecodeError { what: "half a pair", at: words.len() });
+    }
+    let pieces = words.par_chunks(PIECE).enumerate();
+    pieces.map(|(i, piece)| plain_piece(piece, boxes, i * PIECE)).collect()
+}
+
+fn plain_piece(words: &[u32], boxes: u32, at: usize) -> Result<Vec<Pair>, DecodeError> {
+    let pair = |(i, two): (usize, &[u32])| {
+        let (a, b) = (two[0], two[1]);
+        let wrong = DecodeError { what: "not a < b < boxes", at: at + 2 * i };
+        if a < b && b < boxes { Ok(Pair { a, b }) } else { Err(wrong) }
+    };
+    words.chunks_exact(2).enumerate().map(pair).collect()
+}
+
+/// Records, whose boxes are given as places in `entries`, the boxes of all cells.
+///
+/// # Errors
+/// When a record is cut off or names what is not there.
+pub fn records(words: &[u32], entries: &[u32], boxes: u32) -> Result<Vec<Vec<Pair>>, DecodeError> {
+    let pieces = pieces(words)?;
+    pieces
+        .into_par_iter()
+        .map(|range| {
+            let mut reader = Reader { words, entries, boxes, at: range.start, pairs: Vec::new() };
+            while reader.at < range.end {
+                reader.record()?;
+            }
+            Ok(reader.pairs)
+        })
+        .collect()
+}
+
+/// Cuts the words between records, into pieces of about [`PIECE`].
+fn pieces(words: &[u32]) -> Result<Vec<std::ops::Range<usize>>, DecodeError> {
+    let (mut pieces, mut start, mut at) = (Vec::new(), 0, 0);
+    while at < words.len() {
+        at += record_len(words[at]);
+        if at > words.len() {
+            return Err(DecodeError { what: "a record is cut off", at: words.len() });
+        }
+        if at - start >= PIECE || at == words.len() {
+            pieces.push(start..at);
+            start = at;
+        }
+    }
+    Ok(pieces)
+}
+
+/// Words of a record, by its first.
+fn record_len(first: u32) -> usize {
+    if first & PLAIN != 0 { 1 + 2 * (first & !PLAIN) as usize } else { 3 + first as usize }
+}
+
+struct Reader<'a> {
+    words: &'a [u32],
+    entries: &'a [u32],
+    boxes: u32,
+    at: usize,
+    pairs: Vec<Pair>,
+}
+
+impl Reader<'_> {
+    /// Reads the record at `at`, which is whole: see [`pieces`].
+    fn record(&mut self) -> Result<(), DecodeError> {
+        let first = self.words[self.at];
+        let end = self.at + record_len(first);
+        if first & PLAIN != 0 {
+            self.pairs.extend(plain_piece(&self.words[self.at + 1..end], self.boxes, self.at + 1)?);
+            self.at = end;
+            return Ok(());
+        }
+        let start = self.words[self.at + 1] as usize;
+        let segments = self.words[self.at + 2];
+        let base = |segment: u32| start + (segment * LANES) as usize;
+        let (row_base, column_base) = (base(segments & 0xFFFF), base(segments >> 16));
+        self.at += 3;
+        while self.at < end {
+            self.row(row_base, column_base, end)?;
+        }
+        Ok(())
+    }
+
+    /// A row: its place in its segment, the number of partners less one, and their places, a byte each.
+    fn row(&mut self, row_base: usize, column_base: usize, end: usize) -> Result<(), DecodeError> {
+        let at = self.at;
+        let [row, more, ..] = self.words[at].to_le_bytes();
+        let partners = usize::from(more) + 1;
+        self.at += (partners + 2).div_ceil(4);
+        if self.at > end {
+            return Err(DecodeError { what: "a row is cut off", at });
+        }
+        let one = self.id(row_base + usize::from(row))?;
+        for i in 2..partners + 2 {
+            let place = self.words[at + i / 4].to_le_bytes()[i % 4];
+            let other = self.id(column_base + usize::from(place))?;
+            if one == other {
+                return Err(DecodeError { what: "a box paired with itself", at });
+            }
+            self.pairs.push(Pair::new(one, other));
+        }
+        Ok(())
+    }
+
+    fn id(&self, place: usize) -> Result<u32, DecodeError> {
+        let id = self.entries.get(place).map(|entry| entry & ((1 << BOX_BITS) - 1));
+        id.filter(|&id| id < self.boxes).ok_or(DecodeError { what: "no such entry", at: self.at })
+    }
+}
+
+/// One bit for each pair of `boxes` boxes, in Avril's numbering.
+///
+/// # Errors
+/// When there are not exactly as many words as the pairs need, or a bit beyond them is set.
+pub fn bits(words: &[u32], boxes: u32) -> Result<Vec<Vec<Pair>>, DecodeError> {
+    let all = pair_count(u64::from(boxes));
+    if words.len() as u64 != all.div_ceil(32) {
+        return Err(DecodeError { what: "not one bit a pair", at: words.len() });
+    }
+    let (mut pairs, mut a, n) = (Vec::new(), 0u64, u64::from(boxes));
+    for (at, &word) in words.iter().enumerate() {
+        let mut rest = word;
+        while rest != 0 {
+            let k = 32 * at as u64 + u64::from(rest.trailing_zeros());
+            rest &= rest - 1;
+            if k >= all {
+                return Err(DecodeError { what: "a bit beyond the last pair", at });
+            }
+            while a + 2 < n && row_start(a + 1, n) <= k {
+                a += 1;
+            }
+            pairs.push(Pair { a: a as u32, b: (a + 1 + k - row_start(a, n)) as u32 });
+        }
+    }
+    Ok(vec![pairs])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn pair(a: u32, b: u32) -> Pair {
+        Pair::new(a, b)
+    }
+
+    #[test]
+    fn the_example_of_the_format() {
+        // docs/PAIR_FORMAT.md: a cell whose entries begin at 2, its first box with three others.
+        let entries = [9, 9, 4, 1 | 7 << BOX_BITS, 6, 0];
+        let row = u32::from_le_bytes([0, 2, 1, 2]);
+        let words = [2, 2, 0, row, 3, PLAIN | 1, 7, 8];
+        let wanted = vec![vec![pair(1, 4), pair(4, 6), pair(0, 4), pair(7, 8)]];
+        assert_eq!(records(&words, &entries, 10), Ok(wanted));
+        assert_eq!(plain(&[1, 2, 0, 9], 10), Ok(vec![vec![pair(1, 2), pair(0, 9)]]));
+        // Pairs 0 (0, 1) and 4 (1, 3) of four boxes.
+        assert_eq!(bits(&[0b01_0001], 4), Ok(vec![vec![pair(0, 1), pair(1, 3)]]));
+    }
+
+    #[test]
+    fn broken_words_are_errors() {
+        let entries = [0, 1, 2];
+        let what = |result: Result<Vec<Vec<Pair>>, DecodeError>| result.unwrap_err().what;
+        assert_eq!(what(records(&[5, 0, 0], &entries, 3)), "a record is cut off");
+        assert_eq!(what(records(&[PLAIN | 0x7FFF_FFFF], &entries, 3)), "a record is cut off");
+        assert_eq!(
+            what(records(&[1, 0, 0, u32::from_le_bytes([0, 9, 1, 2])], &entries, 3)),
+            "a row is cut off"
+        );
+        assert_eq!(what(records(&[1, 2, 0, u32::from_le_bytes([0, 0, 1, 0])], &entries, 3)), "no such entry");
+        assert_eq!(
+            what(records(&[1, 0, 0, u32::from_le_bytes([1, 0, 1, 0])], &entries, 3)),
+            "a box paired with itself"
+        );
+        assert_eq!(what(plain(&[1], 3)), "half a pair");
+        assert_eq!(what(plain(&[2, 1], 3)), "not a < b < boxes");
+        assert_eq!(what(plain(&[1, 3], 3)), "not a < b < boxes");
+        assert_eq!(what(bits(&[0b1000], 3)), "a bit beyond the last pair");
+        assert_eq!(what(bits(&[], 3)), "not one bit a pair");
+    }
+}

@@ -1,0 +1,89 @@
+//! Which adapter, and a device on it.
+
+use super::GpuError;
+
+/// What pbig uses where an adapter has it.
+const WANTED: wgpu::Features = wgpu::Features::SUBGROUP.union(wgpu::Features::TIMESTAMP_QUERY);
+
+/// All adapters, best first: discrete, integrated, virtual, unknown, software. `WGPU_BACKEND` and the
+/// other variables of wgpu apply; with `WGPU_POWER_PREF=low` integrated ones come first.
+pub fn adapters() -> Vec<wgpu::Adapter> {
+    let instance = wgpu::Instance::new(wgpu::InstanceDescriptor::new_without_display_handle_from_env());
+    let backends = wgpu::Backends::from_env().unwrap_or(wgpu::Backends::all());
+    let mut adapters = pollster::block_on(instance.enumerate_adapters(backends));
+    let low = wgpu::PowerPreference::from_env() == Some(wgpu::PowerPreference::LowPower);
+    adapters.sort_by_key(|adapter| rank(adapter.get_info().device_type, low));
+    adapters
+}
+
+fn rank(kind: wgpu::DeviceType, low_power: bool) -> u32 {
+    match kind {
+        wgpu::DeviceType::DiscreteGpu => u32::from(low_power),
+        wgpu::DeviceType::IntegratedGpu => u32::from(!low_power),
+        wgpu::DeviceType::VirtualGpu => 2,
+        wgpu::DeviceType::Other => 3,
+        wgpu::DeviceType::Cpu => 4,
+    }
+}
+
+/// The adapter of the given name, or that of `WGPU_ADAPTER_NAME`, or the best. A part of the name is
+/// enough, in any case.
+pub(super) fn choose(name: Option<&str>) -> Result<wgpu::Adapter, GpuError> {
+    let wanted = name.map(str::to_owned).or_else(|| std::env::var("WGPU_ADAPTER_NAME").ok());
+    let all = adapters();
+    let found = all.iter().map(|a| a.get_info().name).collect::<Vec<_>>().join(", ");
+    let matches = |a: &wgpu::Adapter| match &wanted {
+        Some(name) => a.get_info().name.to_lowercase().contains(&name.to_lowercase()),
+        None => true,
+    };
+    let none = || GpuError::NoAdapter {
+        wanted: wanted.as_ref().map(|name| format!(" named {name:?}")).unwrap_or_default(),
+        found: if found.is_empty() { "none".into() } else { found.clone() },
+    };
+    all.iter().find(|a| matches(a)).cloned().ok_or_else(none)
+}
+
+/// A device with all that the adapter allows of what pbig uses.
+pub(super) fn open(adapter: &wgpu::Adapter) -> Result<(wgpu::Device, wgpu::Queue), GpuError> {
+    let descriptor = wgpu::DeviceDescriptor {
+        label: Some("pbig"),
+        required_features: adapter.features() & WANTED,
+        required_limits: adapter.limits(),
+        memory_hints: wgpu::MemoryHints::MemoryUsage,
+        ..Default::default()
+    };
+    let failed = |why: wgpu::RequestDeviceError| GpuError::NoDevice {
+        adapter: adapter.get_info().name,
+        why: why.to_string(),
+    };
+    pollster::block_on(adapter.request_device(&descriptor)).map_err(failed)
+}
+
+/// In words: name, kind and API.
+pub(super) fn describe(info: &wgpu::AdapterInfo) -> String {
+    let kind = match info.device_type {
+        wgpu::DeviceType::Cpu => "software",
+        wgpu::DeviceType::DiscreteGpu => "discrete",
+        wgpu::DeviceType::IntegratedGpu => "integrated",
+        wgpu::DeviceType::VirtualGpu => "virtual",
+        wgpu::DeviceType::Other => "unknown kind",
+    };
+    format!("{} ({kind}, {})", info.name, info.backend)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn software_comes_last_and_low_power_prefers_the_integrated_one() {
+        use wgpu::DeviceType::{Cpu, DiscreteGpu, IntegratedGpu, Other, VirtualGpu};
+        let best_first = |low| {
+            let mut kinds = [Cpu, Other, VirtualGpu, IntegratedGpu, DiscreteGpu];
+            kinds.sort_by_key(|&kind| rank(kind, low));
+            kinds
+        };
+        assert_eq!(best_first(false), [DiscreteGpu, IntegratedGpu, VirtualGpu, Other, Cpu]);
+        assert_eq!(best_first(true)[..2], [IntegratedGpu, DiscreteGpu]);
+    }
+}

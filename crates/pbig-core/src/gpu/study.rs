@@ -1,0 +1,109 @@
+//! One kernel alone, on given buffers: for tests against its scalar twin, and for studies.
+
+use super::engine::{Engine, Variant};
+use super::{GpuError, readback};
+use crate::config::GpuOptions;
+use pbig_shaders::Kernel;
+
+/// A device to run single kernels on.
+#[derive(Debug)]
+pub struct Bench {
+    engine: Engine,
+}
+
+impl Bench {
+    /// On the best adapter, or on that of `WGPU_ADAPTER_NAME`.
+    ///
+    /// # Errors
+    /// When there is no adapter, or it gives no device that the kernels can run on.
+    pub fn new() -> Result<Self, GpuError> {
+        Self::on_adapter(None, true)
+    }
+
+    /// On the adapter of a name, or the best; with or without its subgroups.
+    ///
+    /// # Errors
+    /// As [`Bench::new`].
+    pub fn on_adapter(name: Option<&str>, subgroups: bool) -> Result<Self, GpuError> {
+        let mut engine = Engine::on(&super::adapter::choose(name)?)?;
+        engine.subgroups &= subgroups;
+        Ok(Self { engine })
+    }
+
+    /// Whether the kernels for subgroups run.
+    pub fn subgroups(&self) -> bool {
+        self.engine.subgroups
+    }
+
+    /// Runs a kernel on the bytes of each of its bindings, in their order, and returns the bytes that
+    /// they have afterwards; uniforms come back as they were.
+    ///
+    /// # Errors
+    /// When the device refuses, is lost or does not answer within [`GpuOptions::patience`].
+    pub fn run(
+        &self,
+        kernel: &'static Kernel,
+        options: &GpuOptions,
+        bindings: &[Vec<u8>],
+        workgroups: u32,
+    ) -> Result<Vec<Vec<u8>>, GpuError> {
+        if bindings.len() != kernel.bindings.len() {
+            let (wanted, found) = (kernel.bindings.len(), bindings.len());
+            return Err(GpuError::Refused(format!("{}: {found} buffers for {wanted} bindings", kernel.name)));
+        }
+        self.engine.watch(|| self.run_watched(kernel, options, bindings, workgroups))
+    }
+
+    fn run_watched(
+        &self,
+        kernel: &'static Kernel,
+        options: &GpuOptions,
+        bindings: &[Vec<u8>],
+        workgroups: u32,
+    ) -> Result<Vec<Vec<u8>>, GpuError> {
+        use wgpu::BufferUsages as Usage;
+        let (engine, device) = (&self.engine, &self.engine.device);
+        let pipeline = engine.pipeline(kernel, Variant::new(options))?;
+        let is_uniform = |name: &str| matches!(name, "params" | "chunk");
+        let mut buffers = Vec::new();
+        for (&name, bytes) in kernel.bindings.iter().zip(bindings) {
+            let usage = if is_uniform(name) { Usage::UNIFORM } else { Usage::STORAGE };
+            let size = bytes.len().max(16) as u64;
+            let buffer = engine.buffer(name, size, usage | Usage::COPY_DST | Usage::COPY_SRC)?;
+            engine.queue.write_buffer(&buffer, 0, bytes);
+            buffers.push(buffer);
+        }
+        let bound: Vec<_> = (0..)
+            .zip(&buffers)
+            .map(|(binding, buffer)| wgpu::BindGroupEntry { binding, resource: buffer.as_entire_binding() })
+            .collect();
+        let group = device.create_bind_group(&wgpu::BindGroupDescriptor {
+            label: Some(kernel.name),
+            layout: &pipeline.get_bind_group_layout(0),
+            entries: &bound,
+        });
+        let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+        {
+            let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor::default());
+            pass.set_pipeline(&pipeline);
+            pass.set_bind_group(0, &group, &[]);
+            pass.dispatch_workgroups(workgroups.min(32_768), workgroups.div_ceil(32_768), 1);
+        }
+        let all: u64 = buffers.iter().map(wgpu::Buffer::size).sum();
+        let staging = engine.buffer("staging", all, Usage::MAP_READ | Usage::COPY_DST)?;
+        let mut at = 0;
+        for buffer in &buffers {
+            encoder.copy_buffer_to_buffer(buffer, 0, &staging, at, buffer.size());
+            at += buffer.size();
+        }
+        let submission = engine.submit(encoder);
+        readback::read(engine, &staging, all, submission, options.patience, |mut rest| {
+            let take = |(bytes, buffer): (&Vec<u8>, &wgpu::Buffer)| {
+                let (own, more) = rest.split_at(buffer.size() as usize);
+                rest = more;
+                own[..bytes.len()].to_vec()
+            };
+            bindings.iter().zip(&buffers).map(take).collect()
+        })
+    }
+}

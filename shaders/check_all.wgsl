@@ -1,0 +1,58 @@
+// Check, without a grid, for small scenes: one invocation for each pair of all boxes (Avril 3.2).
+// The output is one bit a pair (Avril 3.4) or the pairs, whichever is expected to be smaller.
+
+@group(0) @binding(0) var<uniform> params: Params;
+@group(0) @binding(1) var<uniform> chunk: Chunk;
+@group(0) @binding(2) var<storage, read> boxes: array<Box>;
+@group(0) @binding(3) var<storage, read> filters: array<vec4<u32>>;
+@group(0) @binding(4) var<storage, read_write> totals: array<atomic<u32>, 10>;
+@group(0) @binding(5) var<storage, read_write> out: array<u32>;
+
+var<workgroup> bits: array<atomic<u32>, 8>;
+
+@compute @workgroup_size(LANES)
+fn check_all(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>,
+             @builtin(local_invocation_index) lane: u32) {
+    let n = params.boxes;
+    let all = n * (n - 1u) / 2u;
+    let first = linear(group, groups) * LANES;
+    if first >= all || beyond_limit(lane) {
+        return;
+    }
+    var hit = false;
+    var pair = vec2<u32>(0u);
+    if first + lane < all {
+        pair = pair_at(first + lane, n);
+        let overlaps = overlap(boxes[pair.x], boxes[pair.y]);
+        atomicAdd(&tally[2], u32(overlaps));
+        hit = overlaps
+            && ((params.flags & FILTERED) == 0u || filters_allow(filters[pair.x], filters[pair.y]));
+    }
+    var rank = 0u;
+    if hit {
+        rank = atomicAdd(&tally[HITS], 1u);
+        atomicOr(&bits[lane / 32u], 1u << (lane % 32u));
+    }
+    if lane == 0u {
+        atomicStore(&tally[0], min(LANES, all - first));
+    }
+    workgroupBarrier();
+    if lane == 0u {
+        add_tests();
+        let hits = atomicLoad(&tally[HITS]);
+        placed = Placed(NO_ROOM, 0u, 0u, 0u);
+        if (params.flags & BITS) != 0u {
+            add_total(PAIRS, hits);
+        } else if hits > 0u {
+            placed = place_plain(hits);
+        }
+    }
+    let at = workgroupUniformLoad(&placed).at;
+    let word = first / 32u + lane;
+    if (params.flags & BITS) != 0u && lane < 8u && word < chunk.word_room {
+        out[word] = atomicLoad(&bits[lane]);
+    }
+    if hit && at != NO_ROOM {
+        write_pair(at + 2u * rank, pair.x, pair.y);
+    }
+}

@@ -1,0 +1,127 @@
+// Check, small cells (Avril 3.2): one invocation per pair. The workgroup's pairs lie in consecutive
+// small cells of a block; a lane finds its cell by bisection in workgroup memory, and its pair by a
+// square root and an exact correction.
+
+@group(0) @binding(0) var<uniform> params: Params;
+@group(0) @binding(1) var<uniform> chunk: Chunk;
+@group(0) @binding(2) var<storage, read> boxes: array<Box>;
+@group(0) @binding(3) var<storage, read> filters: array<vec4<u32>>;
+@group(0) @binding(4) var<storage, read> entries: array<u32>;
+@group(0) @binding(5) var<storage, read> counters: Counters;
+@group(0) @binding(6) var<storage, read> slots: array<Slot>;
+@group(0) @binding(7) var<storage, read> small_items: array<SmallItem>;
+@group(0) @binding(8) var<storage, read_write> totals: array<atomic<u32>, 10>;
+@group(0) @binding(9) var<storage, read_write> out: array<u32>;
+
+var<workgroup> first_pairs: array<u32, LANES>;
+// Of each slot: its hits, and where its record begins.
+var<workgroup> slot_hits: array<atomic<u32>, LANES>;
+var<workgroup> slot_at: array<u32, LANES>;
+
+// The last of the item's slots that begins at or before a pair.
+fn slot_of(pair: u32, count: u32) -> u32 {
+    var low = 0u;
+    var high = count;
+    while high - low > 1u {
+        let middle = (low + high) / 2u;
+        if first_pairs[middle] <= pair {
+            low = middle;
+        } else {
+            high = middle;
+        }
+    }
+    return low;
+}
+
+// The tests of one pair, cheapest first; counts what the report wants.
+fn is_pair(a: u32, b: u32) -> bool {
+    let i = box_of(a);
+    let j = box_of(b);
+    if !owns(a, b) || (params.split > 0u && (i < params.split) == (j < params.split)) {
+        atomicAdd(&tally[1], 1u);
+        return false;
+    }
+    if !overlap(boxes[i], boxes[j]) {
+        return false;
+    }
+    atomicAdd(&tally[2], 1u);
+    return (params.flags & FILTERED) == 0u || filters_allow(filters[i], filters[j]);
+}
+
+// Decides, by one lane, how the workgroup's hits are written, and where; `words` if as records.
+fn place(words: u32) -> Placed {
+    add_tests();
+    let hits = atomicLoad(&tally[HITS]);
+    if hits == 0u {
+        return Placed(NO_ROOM, 0u, 0u, 0u);
+    }
+    if (params.flags & PACKED) == 0u || 1u + 2u * hits < words {
+        return place_plain(hits);
+    }
+    return Placed(reserve(words, hits), hits, words, 1u);
+}
+
+@compute @workgroup_size(LANES)
+fn check_small(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>,
+               @builtin(local_invocation_index) lane: u32) {
+    let index = linear(group, groups);
+    if index >= chunk.small_items || chunk.first_small + index >= counters.small_items {
+        return;
+    }
+    if beyond_limit(lane) {
+        return;
+    }
+    let item = small_items[chunk.first_small + index];
+    if lane < item.slots {
+        first_pairs[lane] = slots[item.slot + lane].first_pair;
+    }
+    workgroupBarrier();
+    var hit = false;
+    var slot = 0u;
+    var start = 0u;
+    var pair = vec2<u32>(0u);
+    if lane < item.pairs {
+        slot = slot_of(item.first_pair + lane, item.slots);
+        let cell = slots[item.slot + slot];
+        start = cell.start;
+        pair = pair_at(item.first_pair + lane - cell.first_pair, cell.shape & 0xffffu);
+        hit = is_pair(entries[start + pair.x], entries[start + pair.y]);
+    }
+    // Any order of the hits will do, so that no prefix sum is needed.
+    var rank = 0u;
+    var slot_rank = 0u;
+    if hit {
+        rank = atomicAdd(&tally[HITS], 1u);
+        slot_rank = atomicAdd(&slot_hits[slot], 1u);
+    }
+    if lane == 0u {
+        atomicStore(&tally[0], item.pairs);
+    }
+    workgroupBarrier();
+    var words = 0u;
+    if (params.flags & PACKED) != 0u {
+        // A lane for each slot: three words and one for each hit.
+        let hits = atomicLoad(&slot_hits[lane]);
+        slot_at[lane] = block_scan(select(0u, 3u + hits, hits > 0u), lane);
+        words = block_sum();
+    }
+    if lane == 0u {
+        placed = place(words);
+    }
+    let to = workgroupUniformLoad(&placed);
+    if !hit || to.at == NO_ROOM {
+        return;
+    }
+    if to.packed == 0u {
+        write_pair(to.at + 2u * rank, box_of(entries[start + pair.x]), box_of(entries[start + pair.y]));
+        return;
+    }
+    let record = to.at + slot_at[slot];
+    if slot_rank == 0u {
+        out[record] = atomicLoad(&slot_hits[slot]);
+        out[record + 1u] = start;
+        out[record + 2u] = 0u;
+    }
+    // A row with one partner: both places in the only segment.
+    out[record + 3u + slot_rank] = pair.x | pair.y << 16u;
+}

@@ -1,0 +1,19 @@
+// For the study of Avril's mapping: the estimated row and the exact pair of each index.
+
+@group(0) @binding(0) var<uniform> params: Params;
+@group(0) @binding(1) var<storage, read_write> out: array<u32>;
+
+// `params.boxes` is n, `params.cells` the number of indices from `params.split` on.
+@compute @workgroup_size(LANES)
+fn index_pairs(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>,
+               @builtin(local_invocation_index) lane: u32) {
+    let i = linear(group, groups) * LANES + lane;
+    if i >= params.cells {
+        return;
+    }
+    let k = params.split + i;
+    let pair = pair_at(k, params.boxes);
+    out[3u * i] = estimated_row(k, params.boxes);
+    out[3u * i + 1u] = pair.x;
+    out[3u * i + 2u] = pair.y;
+}

@@ -1,0 +1,59 @@
+// Map, step 1 (PBIG 4.2, count): the cells that each box touches, its level, and how many boxes of
+// the level each cell has.
+
+@group(0) @binding(0) var<uniform> params: Params;
+@group(0) @binding(1) var<storage, read> boxes: array<Box>;
+@group(0) @binding(2) var<storage, read_write> located: array<Located>;
+@group(0) @binding(3) var<storage, read_write> cells: array<atomic<u32>>;
+
+// The float that an ordered integer stands for.
+fn float_of(key: i32) -> f32 {
+    return bitcast<f32>(key ^ ((key >> 31u) & 0x7fffffff));
+}
+
+// Monotone in `key`: a clamp, a subtraction, a multiplication by a positive number, a rounding.
+fn finest_cell(key: i32, axis: u32) -> i32 {
+    let x = float_of(clamp(key, params.reach_low[axis], params.reach_high[axis]));
+    let cell = floor((x - params.origin[axis]) * params.scale);
+    return i32(clamp(cell, -1073741824.0, 1073741824.0));
+}
+
+// The first level at which the box touches few cells; the last has one cell.
+fn level_of(low: vec3<i32>, high: vec3<i32>) -> u32 {
+    var level = 0u;
+    while level + 1u < params.levels {
+        let shift = vec3<u32>(params.level[level].shift);
+        let steps = (high >> shift) - (low >> shift);
+        let divided = params.level[level].dims > vec3<u32>(1u);
+        if all(select(vec3<i32>(0), steps, divided) < vec3<i32>(MOST_SPAN)) {
+            break;
+        }
+        level += 1u;
+    }
+    return level;
+}
+
+@compute @workgroup_size(LANES)
+fn locate(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>,
+          @builtin(local_invocation_index) lane: u32) {
+    let id = linear(group, groups) * LANES + lane;
+    if id >= params.boxes {
+        return;
+    }
+    let one = boxes[id];
+    if one.low[0] > one.high[0] {
+        located[id].level = NO_LEVEL;
+        return;
+    }
+    var at: Located;
+    for (var axis = 0u; axis < 3u; axis++) {
+        at.low[axis] = finest_cell(one.low[axis], axis);
+        at.high[axis] = finest_cell(one.high[axis], axis);
+    }
+    at.level = level_of(low_of(at), high_of(at));
+    located[id] = at;
+    let t = touched(low_of(at), high_of(at), at.level);
+    for (var k = 0u; k < cell_count(t); k++) {
+        atomicAdd(&cells[2u * cell_at(t, k, at.level).x], 1u);
+    }
+}

@@ -1,0 +1,16 @@
+// Map, step 5: the start of every cell's entries, from those within its block.
+
+@group(0) @binding(0) var<uniform> params: Params;
+@group(0) @binding(1) var<storage, read> sums: array<u32>;
+@group(0) @binding(2) var<storage, read_write> starts: array<u32>;
+
+const CELLS_PER_BLOCK = 1024u;
+
+@compute @workgroup_size(LANES)
+fn scan_add(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>,
+            @builtin(local_invocation_index) lane: u32) {
+    let cell = linear(group, groups) * LANES + lane;
+    if cell < params.cells {
+        starts[cell] += sums[cell / CELLS_PER_BLOCK];
+    }
+}

@@ -1,0 +1,127 @@
+// Schedule (PBIG 4.3): cells become work items of bounded size. Small cells are packed so that each
+// workgroup gets LANES pairs; large ones are cut into segments. A workgroup handles a block of cells
+// and reserves room in each list once.
+
+@group(0) @binding(0) var<uniform> params: Params;
+@group(0) @binding(1) var<storage, read> cells: array<Cell>;
+@group(0) @binding(2) var<storage, read> starts: array<u32>;
+@group(0) @binding(3) var<storage, read_write> slots: array<Slot>;
+@group(0) @binding(4) var<storage, read_write> small_items: array<SmallItem>;
+@group(0) @binding(5) var<storage, read_write> large_items: array<LargeItem>;
+// Entries, slots, small items, large items: Counters, as atomics.
+@group(0) @binding(6) var<storage, read_write> counters: array<atomic<u32>, 4>;
+
+const CELLS_PER_LANE = 4u;
+const CELLS_PER_BLOCK = 1024u;
+
+var<workgroup> slot_base: u32;
+var<workgroup> item_base: u32;
+var<workgroup> large_count: atomic<u32>;
+var<workgroup> large_seen: u32;
+var<workgroup> large_cells: array<u32, CELLS_PER_BLOCK>;
+
+// Pairs with at least one resident: those of the first rows, in Avril's numbering.
+fn pairs_of(cell: Cell) -> u32 {
+    let n = cell.residents + cell.visitors;
+    return cell.residents * (2u * n - cell.residents - 1u) / 2u;
+}
+
+fn is_small(cell: Cell) -> bool {
+    return cell.residents + cell.visitors <= params.small_cell;
+}
+
+// Work items of the rows before `row` when there are `columns` segments, `params.columns` to an item.
+// An item starts at a multiple of that, so the rows of one multiple have equally many.
+fn items_before(row: u32, columns: u32) -> u32 {
+    let wide = params.columns;
+    let most = (columns + wide - 1u) / wide;
+    let group = row / wide;
+    return wide * (group * most - group * (group - 1u) / 2u) + (row % wide) * (most - group);
+}
+
+@compute @workgroup_size(LANES)
+fn schedule(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>,
+            @builtin(local_invocation_index) lane: u32) {
+    let block = linear(group, groups);
+    let first = (block * LANES + lane) * CELLS_PER_LANE;
+    var pairs = 0u;
+    var used = 0u;
+    for (var i = 0u; i < CELLS_PER_LANE; i++) {
+        if first + i >= params.cells {
+            continue;
+        }
+        let cell = cells[first + i];
+        if cell.residents == 0u || cell.residents + cell.visitors < 2u {
+            continue;
+        }
+        if is_small(cell) {
+            pairs += pairs_of(cell);
+            used += 1u;
+        } else {
+            large_cells[atomicAdd(&large_count, 1u)] = first + i;
+        }
+    }
+    var pair = block_scan(pairs, lane);
+    let all_pairs = block_sum();
+    let slot = block_scan(used, lane);
+    let all_slots = block_sum();
+    if lane == 0u {
+        large_seen = atomicLoad(&large_count);
+        slot_base = atomicAdd(&counters[1], all_slots);
+        item_base = atomicAdd(&counters[2], (all_pairs + LANES - 1u) / LANES);
+    }
+    let base = workgroupUniformLoad(&slot_base);
+    let items = workgroupUniformLoad(&item_base);
+    var rank = slot;
+    for (var i = 0u; i < CELLS_PER_LANE; i++) {
+        if first + i >= params.cells {
+            continue;
+        }
+        let cell = cells[first + i];
+        let n = cell.residents + cell.visitors;
+        if cell.residents == 0u || n < 2u || !is_small(cell) {
+            continue;
+        }
+        if base + rank < params.slot_room {
+            slots[base + rank] = Slot(starts[first + i], n | cell.residents << 16u, pair);
+        }
+        let end = pair + pairs_of(cell);
+        // The items that begin in this cell.
+        for (var k = (pair + LANES - 1u) / LANES; k * LANES < end; k++) {
+            if items + k < params.small_room {
+                let left = min(LANES, all_pairs - k * LANES);
+                small_items[items + k] =
+                    SmallItem(base + rank, min(LANES, all_slots - rank), k * LANES, left);
+            }
+        }
+        pair = end;
+        rank += 1u;
+    }
+    schedule_large(lane);
+}
+
+// The large cells of the block, one after the other, by all lanes together: a row each.
+fn schedule_large(lane: u32) {
+    let count = workgroupUniformLoad(&large_seen);
+    for (var i = 0u; i < count; i++) {
+        let index = large_cells[i];
+        let cell = cells[index];
+        let n = cell.residents + cell.visitors;
+        let rows = (cell.residents + LANES - 1u) / LANES;
+        let columns = (n + LANES - 1u) / LANES;
+        if lane == 0u {
+            item_base = atomicAdd(&counters[3], items_before(rows, columns));
+        }
+        let items = workgroupUniformLoad(&item_base);
+        for (var row = lane; row < rows; row += LANES) {
+            var at = items + items_before(row, columns);
+            for (var column = row - row % params.columns; column < columns; column += params.columns) {
+                if at < params.large_room {
+                    large_items[at] = LargeItem(starts[index], n, cell.residents, row,
+                        max(column, row), min(column + params.columns, columns));
+                }
+                at += 1u;
+            }
+        }
+    }
+}

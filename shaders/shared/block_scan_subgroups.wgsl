@@ -1,0 +1,31 @@
+// As block_scan.wgsl, with subgroups: 2 barriers instead of 17. Lanes are ordered by the first lane
+// of their subgroup, then within it, the same in every call; no size or numbering of subgroups is
+// assumed.
+
+var<workgroup> scan_space: array<u32, LANES>;
+
+fn block_scan(value: u32, lane: u32) -> u32 {
+    let leader = subgroupMin(lane);
+    let rank = subgroupExclusiveAdd(1u);
+    let size = subgroupAdd(1u);
+    let before = subgroupExclusiveAdd(value);
+    let sum = subgroupAdd(value);
+    scan_space[lane] = select(0u, sum, lane == leader);
+    workgroupBarrier();
+    var part = 0u;
+    for (var i = rank; i < leader; i += size) {
+        part += scan_space[i];
+    }
+    return subgroupAdd(part) + before;
+}
+
+fn block_sum() -> u32 {
+    var sum = 0u;
+    let size = subgroupAdd(1u);
+    for (var i = subgroupExclusiveAdd(1u); i < LANES; i += size) {
+        sum += scan_space[i];
+    }
+    let all = subgroupAdd(sum);
+    workgroupBarrier();
+    return all;
+}

@@ -1,0 +1,81 @@
+//! Every kernel is valid WGSL, its bindings are those it is listed with, and none is forgotten. No
+//! device is needed for any of this.
+
+use naga::valid::{Capabilities, ValidationFlags, Validator};
+use pbig_shaders::{KERNELS, Kernel};
+
+fn parse(kernel: &Kernel, subgroups: bool) -> naga::Module {
+    let source = kernel.source(subgroups);
+    naga::front::wgsl::parse_str(&source)
+        .unwrap_or_else(|error| panic!("{}: {}", kernel.name, error.emit_to_string(&source)))
+}
+
+fn validate(kernel: &Kernel, subgroups: bool) -> naga::Module {
+    let module = parse(kernel, subgroups);
+    let capabilities = if subgroups { Capabilities::SUBGROUP } else { Capabilities::empty() };
+    let result = Validator::new(ValidationFlags::all(), capabilities).validate(&module);
+    result.unwrap_or_else(|error| {
+        panic!("{}: {}", kernel.name, error.emit_to_string(&kernel.source(subgroups)))
+    });
+    module
+}
+
+#[test]
+fn every_kernel_is_valid_with_the_portable_base_and_with_subgroups() {
+    for kernel in KERNELS {
+        validate(kernel, false);
+        validate(kernel, true);
+    }
+    assert!(KERNELS.iter().any(|kernel| kernel.gains_from_subgroups()));
+}
+
+#[test]
+fn bindings_are_numbered_as_listed_and_there_are_no_others() {
+    for kernel in KERNELS {
+        let module = validate(kernel, false);
+        let mut bound: Vec<(u32, String)> = module
+            .global_variables
+            .iter()
+            .filter_map(|(_, v)| v.binding.as_ref().map(|b| (b.binding, v.name.clone().unwrap_or_default())))
+            .collect();
+        bound.sort();
+        let listed: Vec<_> = (0u32..).zip(kernel.bindings.iter().map(|&name| name.to_owned())).collect();
+        assert_eq!(bound, listed, "{}", kernel.name);
+    }
+}
+
+#[test]
+fn the_list_of_kernels_is_the_list_of_files() {
+    let mut files: Vec<String> = std::fs::read_dir(env!("CARGO_MANIFEST_DIR"))
+        .expect("the crate's folder")
+        .filter_map(|entry| entry.expect("an entry").file_name().into_string().ok())
+        .filter_map(|name| name.strip_suffix(".wgsl").map(str::to_owned))
+        .collect();
+    files.sort();
+    let mut listed: Vec<String> = KERNELS.iter().map(|kernel| kernel.name.to_owned()).collect();
+    listed.sort();
+    assert_eq!(listed, files);
+}
+
+#[test]
+fn kernels_stay_within_the_limits_that_every_device_has() {
+    for kernel in KERNELS {
+        let module = validate(kernel, false);
+        let entry = &module.entry_points[0];
+        assert_eq!((module.entry_points.len(), entry.name.as_str()), (1, kernel.name));
+        assert!(entry.workgroup_size.iter().product::<u32>() <= 256, "{}: invocations", kernel.name);
+        let in_space = |space| module.global_variables.iter().filter(move |(_, v)| v.space == space);
+        let size = |v: &naga::GlobalVariable| module.types[v.ty].inner.size(module.to_ctx());
+        let shared: u32 = in_space(naga::AddressSpace::WorkGroup).map(|(_, v)| size(v)).sum();
+        assert!(shared <= 16_384, "{}: {shared} bytes of workgroup memory", kernel.name);
+        let is_storage = |v: &naga::GlobalVariable| matches!(v.space, naga::AddressSpace::Storage { .. });
+        let storage = module.global_variables.iter().filter(|(_, v)| is_storage(v)).count();
+        assert!(storage <= 8, "{}: {storage} storage buffers", kernel.name);
+    }
+}
+
+#[test]
+fn a_broken_kernel_does_not_pass() {
+    let broken = pbig_shaders::LOCATE.source(false).replace("params.boxes", "params.bodies");
+    assert!(naga::front::wgsl::parse_str(&broken).is_err());
+}
