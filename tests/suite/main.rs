@@ -2,6 +2,7 @@
 
 mod drop_in;
 mod finder;
+mod gpu;
 mod incremental;
 mod planted;
 mod worlds;

@@ -119,6 +119,12 @@ impl Finder {
         self.report = Report::default();
     }
 
+    /// The adapter of the device in use: name, kind and API. None before the first call on a GPU.
+    #[cfg(feature = "gpu")]
+    pub fn adapter(&self) -> Option<&str> {
+        self.search.adapter()
+    }
+
     /// The pairs of the last call; none if it failed.
     pub fn pairs(&self) -> &[Pair] {
         &self.pairs
@@ -220,6 +226,11 @@ impl Search {
         report.stages.check += lap(&mut clock);
         report.checks = single_entry_checks(&self.found);
         Ok(())
+    }
+
+    #[cfg(feature = "gpu")]
+    pub(crate) fn adapter(&self) -> Option<&str> {
+        self.gpu.as_ref().map(GpuFinder::adapter).filter(|name| !name.is_empty())
     }
 
     /// Searches on a device if that is wanted; false when it is not, or when the device could not do

@@ -81,6 +81,12 @@ pub struct Report {
 pub struct GpuReport {
     /// The adapter's name, and whether it is software.
     pub adapter: String,
+    /// Time of the host: packing and sending what changed.
+    pub upload: Duration,
+    /// Time of the host: waiting for the device, transfers included.
+    pub wait: Duration,
+    /// Time of the host: decoding.
+    pub decode: Duration,
     /// Time on the device by kernel, where the adapter measures it.
     pub kernels: Vec<(&'static str, Duration)>,
     /// Bytes sent to the device.

@@ -28,8 +28,12 @@ impl BackendOption {
         }
     }
 
-    /// The backend that does the work.
-    pub fn in_use(self) -> &'static str {
-        if self == Self::Brute { "brute" } else { "cpu" }
+    /// The backend that does the work, if `fallback` says why it is not the one asked for.
+    pub fn in_use(self, fallback: Option<&str>) -> &'static str {
+        match self {
+            Self::Brute => "brute",
+            Self::Gpu if fallback.is_none() => "gpu",
+            _ => "cpu",
+        }
     }
 }

@@ -56,13 +56,30 @@ impl PbigBroadPhase {
     /// not a finite length of at least 0 is replaced by the default. Limits are not used: rapier's
     /// trait knows no errors.
     pub fn with_config(config: Config) -> Self {
+        Self::on(config, Finder::new)
+    }
+
+    /// As [`PbigBroadPhase::with_config`], on a given device: with [`pbig_core::Backend::Gpu`] always,
+    /// with [`pbig_core::Backend::Auto`] when it is no software and turns out faster than the CPU.
+    #[cfg(feature = "gpu")]
+    pub fn with_gpu(config: Config, gpu: pbig_core::GpuFinder) -> Self {
+        Self::on(config, |config| Finder::with_gpu(config, gpu))
+    }
+
+    /// The adapter of the device in use: name, kind and API.
+    #[cfg(feature = "gpu")]
+    pub fn adapter(&self) -> Option<&str> {
+        self.finder.adapter()
+    }
+
+    fn on(config: Config, make: impl FnOnce(Config) -> Result<Finder, pbig_core::Error>) -> Self {
         let margin = if config.margin >= 0.0 && config.margin.is_finite() {
             config.margin
         } else {
             Self::CONFIG.margin
         };
         let config = Config { margin, limits: Limits::UNLIMITED, ..config };
-        let finder = Finder::new(config).expect("the margin was checked above");
+        let finder = make(config).expect("the margin was checked above");
         Self {
             finder,
             generations: Vec::new(),

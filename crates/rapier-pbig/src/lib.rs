@@ -36,5 +36,7 @@ mod broad_phase;
 mod proxy;
 
 pub use broad_phase::PbigBroadPhase;
+#[cfg(feature = "gpu")]
+pub use pbig_core::GpuFinder;
 pub use pbig_core::{Backend, Config, Report, Strategy};
 pub use proxy::{collision_aabb, filter_of};

@@ -137,6 +137,12 @@ impl BroadPhase {
         Ok(broad_phase)
     }
 
+    /// The adapter of the device in use, see [`crate::Finder::adapter`].
+    #[cfg(feature = "gpu")]
+    pub fn adapter(&self) -> Option<&str> {
+        self.base.adapter()
+    }
+
     /// Changes the margin for boxes that are set from now on.
     ///
     /// # Errors

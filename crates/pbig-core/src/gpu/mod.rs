@@ -111,6 +111,15 @@ impl GpuFinder {
         Self::open(Some(name.to_owned()))
     }
 
+    /// A device of its own on a given adapter, see [`adapters`].
+    ///
+    /// # Errors
+    /// When the adapter gives no device that the kernels can run on.
+    pub fn on(adapter: &wgpu::Adapter) -> Result<Self, GpuError> {
+        let engine = Some(Arc::new(Engine::on(adapter)?));
+        Ok(Self { source: Source::Own(Some(adapter.get_info().name)), engine, ..Self::shared() })
+    }
+
     /// On the app's own device, which is never replaced: when it is lost the calls run on the CPU.
     ///
     /// # Errors
@@ -139,6 +148,11 @@ impl GpuFinder {
     /// backend.
     pub fn is_software(&self) -> bool {
         self.engine.as_ref().is_some_and(|engine| engine.software)
+    }
+
+    /// In words, the variant of each stage that runs on the device, and why.
+    pub fn variants(&self) -> Vec<String> {
+        self.engine.as_ref().map_or(Vec::new(), |engine| engine.variants())
     }
 
     /// Makes the device fail after so many more submissions.

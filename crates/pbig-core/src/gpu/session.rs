@@ -12,13 +12,13 @@ use crate::cpu::find::Found;
 use crate::layout::{self, BITS, Chunk, Counters, FILTERED, LANES, PACKED, Params, Totals, wide};
 use crate::pair_index::pair_count;
 use crate::plan::GpuPlan;
-use crate::report::{Checks, GpuReport};
+use crate::report::{Checks, GpuReport, lap};
 use crate::{Aabb, Config, Error, Pair, ProxyFilter, decode};
 use pbig_shaders as shaders;
 use rayon::prelude::*;
 use std::collections::VecDeque;
 use std::sync::Arc;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 /// Times that a map is repeated before the call is left to the CPU: each repetition has the room that
 /// the last one asked for.
@@ -114,6 +114,8 @@ pub(super) struct Session {
     room: map::Room,
     /// Words of output of the last chunk: how much is fetched before the length is known.
     words: u64,
+    /// Most words of a chunk of this job; the room that the next one begins with.
+    most_words: u64,
     /// Room for output, in words.
     word_room: u64,
     coding: CodingChoice,
@@ -132,6 +134,7 @@ impl Session {
             clocks,
             room: map::Room::default(),
             words: 0,
+            most_words: 0,
             word_room: 0,
             coding: CodingChoice::default(),
             options: *options,
@@ -143,8 +146,11 @@ impl Session {
     /// Finds the pairs of a job, completely.
     pub(super) fn run(&mut self, job: &Job<'_>, sink: &mut Sink<'_>) -> Result<(), Failure> {
         self.table = None;
+        self.word_room = std::mem::take(&mut self.most_words);
+        let mut clock = Instant::now();
         self.mirror.upload(&self.engine, &mut self.storage, job.boxes, job.filters)?;
         sink.report.uploaded += self.mirror.sent;
+        sink.report.upload += lap(&mut clock);
         let result =
             if job.plan.is_some() { self.search_grid(job, sink) } else { self.search_all(job, sink) };
         sink.report.device_bytes = sink.report.device_bytes.max(self.storage.bytes());
@@ -215,8 +221,8 @@ impl Session {
             })?;
             let (counters, landed) = self.land(flight, &params, None, sink)?;
             if self.room.held(&params, counters) {
-                let overflow = self.note(landed, first, counters, sink);
-                self.search_rest(&params, overflow, counters, sink)?;
+                let rest = self.note(landed, first, counters, sink);
+                self.search_rest(&params, rest, sink)?;
                 self.coding.learn(packed, sink.pairs, self.room.needed.entries, &sink.report);
                 return Ok(());
             }
@@ -249,13 +255,7 @@ impl Session {
 
     /// The other chunks: two at a time, so that the device checks one while the host decodes the other
     /// (PBIG 5.3).
-    fn search_rest(
-        &mut self,
-        params: &Params,
-        rest: Chunk,
-        _found: Counters,
-        sink: &mut Sink<'_>,
-    ) -> Result<(), Failure> {
+    fn search_rest(&mut self, params: &Params, rest: Chunk, sink: &mut Sink<'_>) -> Result<(), Failure> {
         let mut pending: VecDeque<Chunk> = cut(rest, self.options.chunk).into();
         let mut flights: VecDeque<Flight> = VecDeque::new();
         let most = if self.options.pipelining { 2 } else { 1 };
@@ -373,6 +373,7 @@ impl Session {
         let bytes = HEAD + flight.prefetched;
         sink.report.downloaded += bytes;
         let patience = self.options.patience;
+        let mut clock = Instant::now();
         // The words leave the mapped memory only if they must wait for the table or for the rest.
         let (head, early) =
             readback::read(&engine, &staging, bytes, flight.submission.clone(), patience, |bytes| {
@@ -383,6 +384,7 @@ impl Session {
                 let used = if whole { &have[..4 * words] } else { have };
                 (head, bytemuck::pod_collect_to_vec::<u8, u32>(used))
             })?;
+        sink.report.wait += lap(&mut clock);
         if engine.timestamps {
             add_times(&mut sink.report.kernels, &head.times(&flight.passes, period));
         }
@@ -399,14 +401,16 @@ impl Session {
             return Ok((head.counters, Landed::Overflow(words)));
         }
         let rest = self.fetch(sided("out", flight.side), early.len() as u64, words, sink)?;
-        let words = [early, rest].concat();
+        sink.report.wait += lap(&mut clock);
+        let words = if rest.is_empty() { early } else { [early, rest].concat() };
         self.words = words.len() as u64;
-        self.word_room = self.word_room.max(self.words);
+        self.most_words = self.most_words.max(self.words);
         sink.count(&totals);
         let pairs = self.decode(&words, params, head.counters.entries, sink)?;
         self.coding.pairs = wide(totals.pairs);
         sink.report.compression += words.len() as f64;
         sink.add(pairs).map_err(Failure::Call)?;
+        sink.report.decode += lap(&mut clock);
         Ok((head.counters, Landed::Done))
     }
 

@@ -4,6 +4,7 @@ use super::engine::{Engine, Variant};
 use super::{GpuError, readback};
 use crate::config::GpuOptions;
 use pbig_shaders::Kernel;
+use std::time::Instant;
 
 /// A device to run single kernels on.
 #[derive(Debug)]
@@ -33,6 +34,32 @@ impl Bench {
     /// Whether the kernels for subgroups run.
     pub fn subgroups(&self) -> bool {
         self.engine.subgroups
+    }
+
+    /// Bytes per second that the device copies, read and written counted once: the best of five copies
+    /// of `bytes` bytes, as the host sees them.
+    ///
+    /// # Errors
+    /// When the device refuses, is lost or does not answer in time.
+    pub fn copy_rate(&self, bytes: u64) -> Result<f64, GpuError> {
+        use wgpu::BufferUsages as Usage;
+        let engine = &self.engine;
+        engine.watch(|| {
+            let bytes = bytes.min(engine.most_bytes(&GpuOptions::DEFAULT));
+            let usage = Usage::COPY_SRC | Usage::COPY_DST;
+            let (from, to) = (engine.buffer("from", bytes, usage)?, engine.buffer("to", bytes, usage)?);
+            let copy = || {
+                let mut encoder = engine.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+                encoder.copy_buffer_to_buffer(&from, 0, &to, 0, bytes);
+                let clock = Instant::now();
+                engine.wait(engine.submit(encoder), GpuOptions::DEFAULT.patience)?;
+                Ok::<_, GpuError>(clock.elapsed().as_secs_f64())
+            };
+            // The first copy also clears the buffers.
+            let times = (0..6).map(|_| copy()).collect::<Result<Vec<_>, _>>()?;
+            let best = times[1..].iter().copied().fold(f64::MAX, f64::min);
+            Ok(bytes as f64 / best)
+        })
     }
 
     /// Runs a kernel on the bytes of each of its bindings, in their order, and returns the bytes that

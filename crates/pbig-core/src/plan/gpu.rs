@@ -72,8 +72,8 @@ impl GpuPlan {
         self.cells += dims.iter().product::<u32>();
     }
 
-    /// The part of the parameters that the plan decides.
-    pub(crate) fn params(&self) -> Params {
+    /// The part of the kernels' parameters that the plan decides; the rest is 0.
+    pub fn params(&self) -> Params {
         let scale = (1.0 / f64::from(self.cell)) as f32;
         let reach = 0.99 * REACH / f64::from(scale);
         let bound = |k: usize, sign: f64| {

@@ -1,50 +1,120 @@
 //! `pbig doctor`: what this machine offers, what is chosen and why, and a self-test.
 
 use crate::output::{Failure, print};
-use pbig_core::{Backend, Config, Finder, Limits, Strategy, oracle};
+use pbig_core::gpu::{GpuError, adapters};
+use pbig_core::{Backend, Coding, Config, Finder, GpuFinder, GpuOptions, Limits, Strategy, oracle};
 use pbig_harness::boxes::BoxSet;
 
 pub(crate) fn run() -> Result<(), Failure> {
     let Limits { max_boxes, max_pairs } = Limits::DEFAULT;
     print(&format!(
         "pbig {}\n\
-         adapters: none; this build has no GPU backend\n\
          CPU: {} threads, SIMD found: {}; SIMD used: the compiler's baseline\n\
          limits: {max_boxes} boxes, {max_pairs} pairs (pbig_core::Limits)\n\
-         backend: cpu, because there is no adapter to compare with; below {} boxes without a grid\n\
-         self-test:",
+         backend auto: cpu; a GPU only where an app hands one over and it is measured to be faster\n\
+         strategy: below {} boxes without a grid",
         env!("CARGO_PKG_VERSION"),
         rayon::current_num_threads(),
         simd_found().join(" "),
         Config::DEFAULT.brute_below,
     ))?;
-    self_test()
-}
-
-/// Every strategy on every set against the oracle.
-fn self_test() -> Result<(), Failure> {
-    let mut wrong = Vec::new();
-    for (name, backend, strategy) in [
-        ("grid", Backend::Cpu, Strategy::Grid),
-        ("pbig grid", Backend::Cpu, Strategy::Pbig),
-        ("brute", Backend::Brute, Strategy::Auto),
-    ] {
-        let mut finder = Finder::new(Config { backend, strategy, ..Config::DEFAULT });
-        for set in BoxSet::ALL {
-            let boxes = set.boxes(2000, 1);
-            let right = finder.find(&boxes).is_ok_and(|found| found == oracle::pairs(&boxes));
-            let verdict = if right { "ok" } else { "WRONG" };
-            print(&format!("  {name:<9} {:<10} {verdict}", set.name))?;
-            if !right {
-                wrong.push(format!("{name} on {}", set.name));
-            }
-        }
+    let gpus = describe_adapters()?;
+    print("self-test, 2000 boxes of each set against brute force:")?;
+    let mut wrong = test_cpu()?;
+    for (name, gpu) in gpus {
+        wrong.extend(test_gpu(&name, &gpu)?);
     }
     if wrong.is_empty() {
         Ok(())
     } else {
         Err(Failure::Check(format!("self-test failed: {}", wrong.join(", "))))
     }
+}
+
+/// Prints every adapter, and returns those on which the kernels can run.
+fn describe_adapters() -> Result<Vec<(String, GpuFinder)>, Failure> {
+    let adapters = adapters();
+    if adapters.is_empty() {
+        print("adapters: none; `--backend gpu` falls back to the CPU")?;
+    }
+    let mut usable = Vec::new();
+    for (i, adapter) in adapters.iter().enumerate() {
+        let opened = GpuFinder::on(adapter);
+        print(&describe(i, adapter, &opened))?;
+        usable.extend(opened.ok().map(|gpu| (format!("gpu {i}"), gpu)));
+    }
+    Ok(usable)
+}
+
+/// An adapter, its limits, and the variant of each stage that runs on it and why.
+fn describe(i: usize, adapter: &wgpu::Adapter, opened: &Result<GpuFinder, GpuError>) -> String {
+    let (info, limits) = (adapter.get_info(), adapter.limits());
+    let chosen = if i == 0 { ", used by `--backend gpu` unless WGPU_ADAPTER_NAME names another" } else { "" };
+    let mib = |bytes: u64| bytes >> 20;
+    let features = match opened {
+        Ok(gpu) => gpu.variants().join("\n    "),
+        Err(why) => format!("not usable: {why}"),
+    };
+    format!(
+        "adapter gpu {i}: {} ({:?}, {}), driver {} {}{chosen}\n    \
+         limits: buffers {} MiB, bindings {} MiB, {} storage buffers, {} invocations, {} KiB workgroup memory\n    {}",
+        info.name,
+        info.device_type,
+        info.backend,
+        info.driver,
+        info.driver_info,
+        mib(limits.max_buffer_size),
+        mib(limits.max_storage_buffer_binding_size),
+        limits.max_storage_buffers_per_shader_stage,
+        limits.max_compute_invocations_per_workgroup,
+        limits.max_compute_workgroup_storage_size >> 10,
+        features,
+    )
+}
+
+/// Every strategy of the CPU; returns what was wrong.
+fn test_cpu() -> Result<Vec<String>, Failure> {
+    let mut wrong = Vec::new();
+    for (name, backend, strategy) in [
+        ("grid", Backend::Cpu, Strategy::Grid),
+        ("pbig grid", Backend::Cpu, Strategy::Pbig),
+        ("brute", Backend::Brute, Strategy::Auto),
+    ] {
+        let finder = Finder::new(Config { backend, strategy, ..Config::DEFAULT });
+        wrong.extend(test(name, finder)?);
+    }
+    Ok(wrong)
+}
+
+/// Both codings on a device; returns what was wrong.
+fn test_gpu(name: &str, gpu: &GpuFinder) -> Result<Vec<String>, Failure> {
+    let mut wrong = Vec::new();
+    for (coding, words) in [(Coding::Plain, "plain"), (Coding::Packed, "packed")] {
+        let options = GpuOptions { coding, ..GpuOptions::DEFAULT };
+        let config =
+            Config { backend: Backend::Gpu, strategy: Strategy::Pbig, gpu: options, ..Config::DEFAULT };
+        wrong.extend(test(&format!("{name} {words}"), Finder::with_gpu(config, gpu.clone()))?);
+    }
+    Ok(wrong)
+}
+
+/// A finder on every set. A device that leaves the work to the CPU has failed the test.
+fn test(name: &str, mut finder: Finder) -> Result<Vec<String>, Failure> {
+    let mut wrong = Vec::new();
+    for set in BoxSet::ALL {
+        let boxes = set.boxes(2000, 1);
+        let right = finder.find(&boxes).is_ok_and(|found| found == oracle::pairs(&boxes));
+        let verdict = match &finder.report().fallback {
+            Some(why) => why,
+            None if right => "ok",
+            None => "WRONG",
+        };
+        print(&format!("  {name:<12} {:<10} {verdict}", set.name))?;
+        if verdict != "ok" {
+            wrong.push(format!("{name} on {}", set.name));
+        }
+    }
+    Ok(wrong)
 }
 
 #[cfg(target_arch = "x86_64")]

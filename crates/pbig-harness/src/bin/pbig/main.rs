@@ -1,6 +1,7 @@
 //! The `pbig` program. Its commands, files, JSON and exit status are in docs/CLI.md; other programs
 //! rely on them.
 
+mod bench;
 mod doctor;
 mod options;
 mod output;
@@ -31,6 +32,8 @@ enum Command {
     Simulate(simulate::Args),
     /// The scenes for `simulate`, with a line each.
     Scenes,
+    /// How fast it is here; results are written to docs/benchmarks/results.
+    Bench(bench::Args),
     /// What this machine offers, what is chosen and why, and a self-test.
     Doctor,
 }
@@ -40,7 +43,7 @@ fn main() -> ExitCode {
         Ok(cli) => finish(run(cli.command)),
         Err(error) if !error.use_stderr() => finish(output::print(&error.to_string())),
         Err(error) if error.kind() == ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand => {
-            let commands = "pairs, replay, simulate, scenes or doctor";
+            let commands = "pairs, replay, simulate, scenes, bench or doctor";
             finish(Err(Failure::Input(format!("a command is missing: {commands} (see pbig --help)"))))
         }
         // One line on stderr, as for any other bad input; clap's own has several.
@@ -54,6 +57,7 @@ fn run(command: Command) -> Result<(), Failure> {
         Command::Replay(args) => replay::run(&args),
         Command::Simulate(args) => simulate::run(&args),
         Command::Scenes => simulate::list(),
+        Command::Bench(args) => bench::run(&args),
         Command::Doctor => doctor::run(),
     }
 }

@@ -71,19 +71,20 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
     let config = Config { backend: args.backend.backend(), ..PbigBroadPhase::CONFIG };
     let ours = PbigBroadPhase::with_config(config);
     let step = |_| bar.inc(1);
-    let (outcome, fallback) = match args.broad_phase {
-        BroadPhaseOption::Stock => (run_scene(task, DefaultBroadPhase::new(), step).0, None),
+    let (outcome, did) = match args.broad_phase {
+        BroadPhaseOption::Stock => (run_scene(task, DefaultBroadPhase::new(), step).0, Did::default()),
         BroadPhaseOption::Pbig => {
             let (outcome, ours) = if args.check {
                 run_checked(task, ours, config.margin, Path::new("."), step)
             } else {
                 run_scene(task, ours, step)
             };
-            (outcome, ours.report().fallback.clone())
+            let fallback = ours.report().fallback.clone();
+            (outcome, Did { fallback, adapter: ours.adapter().map(str::to_owned) })
         }
     };
     bar.finish_and_clear();
-    report(args, bodies, &outcome, fallback.as_deref())?;
+    report(args, bodies, &outcome, &did)?;
     if outcome.failed() { Err(Failure::Check(failure_line(&outcome))) } else { Ok(()) }
 }
 
@@ -98,8 +99,18 @@ fn failure_line(outcome: &Outcome) -> String {
     }
 }
 
-fn report(args: &Args, bodies: usize, outcome: &Outcome, fallback: Option<&str>) -> Result<(), Failure> {
-    let backend = if args.broad_phase == BroadPhaseOption::Stock { "cpu" } else { args.backend.in_use() };
+/// What did the work.
+#[derive(Default)]
+struct Did {
+    /// Why it was not the backend asked for.
+    fallback: Option<String>,
+    adapter: Option<String>,
+}
+
+fn report(args: &Args, bodies: usize, outcome: &Outcome, did: &Did) -> Result<(), Failure> {
+    let fallback = did.fallback.as_deref();
+    let stock = args.broad_phase == BroadPhaseOption::Stock;
+    let backend = if stock { "cpu" } else { args.backend.in_use(fallback) };
     if args.json {
         let object = serde_json::json!({
             "scene": args.scene,
@@ -108,7 +119,7 @@ fn report(args: &Args, bodies: usize, outcome: &Outcome, fallback: Option<&str>)
             "steps": outcome.steps,
             "broad_phase": args.broad_phase.name(),
             "backend": backend,
-            "adapter": null,
+            "adapter": did.adapter,
             "ms": { "broad_phase": outcome.broad_phase, "step": outcome.step },
             "pairs": outcome.pairs,
             "added": outcome.added,

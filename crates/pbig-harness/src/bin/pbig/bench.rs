@@ -1,0 +1,179 @@
+//! `pbig bench gpu`: the GPU beside the CPU, stage by stage, and the floor below both.
+
+use crate::output::{Failure, print, progress};
+use clap::ValueEnum;
+use pbig_core::gpu::study::Bench;
+use pbig_core::{Backend, Config, Finder, GpuFinder, GpuReport, Limits};
+use pbig_harness::boxes::BoxSet;
+use pbig_harness::runner::{Spread, milliseconds};
+use serde_json::{Value, json};
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+/// Where results are kept, in the project's folder.
+const RESULTS: &str = "docs/benchmarks/results";
+
+#[derive(clap::Args)]
+pub(crate) struct Args {
+    /// What to measure.
+    #[arg(value_enum)]
+    suite: Suite,
+    /// Print one JSON object.
+    #[arg(long)]
+    json: bool,
+    /// Small sizes only, in seconds; nothing is written.
+    #[arg(long)]
+    quick: bool,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum Suite {
+    /// The GPU pipeline: upload, each kernel, readback, decode, whole call.
+    Gpu,
+}
+
+/// One set at one size.
+struct Row {
+    set: &'static str,
+    boxes: usize,
+    pairs: u64,
+    cpu: Spread,
+    gpu: Spread,
+    report: GpuReport,
+}
+
+pub(crate) fn run(args: &Args) -> Result<(), Failure> {
+    let Suite::Gpu = args.suite;
+    let gpu = GpuFinder::new().map_err(|error| Failure::Input(error.to_string()))?;
+    let rate = Bench::new().and_then(|bench| bench.copy_rate(64 << 20));
+    let rate = rate.map_err(|error| Failure::Input(error.to_string()))?;
+    let sizes: &[usize] =
+        if args.quick { &[1000, 10_000] } else { &[1000, 10_000, 100_000, 1_000_000, 10_000_000] };
+    // Ten million boxes take minutes on a program that plays a GPU, and tell nothing.
+    let sizes = if gpu.is_software() { &sizes[..sizes.len().min(4)] } else { sizes };
+    let sets = ["uniform", "gaussian", "mixed"];
+    let bar = progress(sizes.len() * sets.len(), "sets");
+    let mut rows = Vec::new();
+    for &boxes in sizes {
+        for set in sets {
+            rows.push(measure(&gpu, set, boxes)?);
+            bar.inc(1);
+        }
+    }
+    bar.finish_and_clear();
+    let object = object(&gpu, rate, &rows);
+    if args.json { print(&object.to_string())? } else { print(&table(&gpu, rate, &rows))? }
+    if args.quick { Ok(()) } else { keep(&gpu, &object, args.json) }
+}
+
+/// Both backends on the same boxes, in turn.
+fn measure(gpu: &GpuFinder, name: &'static str, n: usize) -> Result<Row, Failure> {
+    let boxes = BoxSet::named(name).expect("a set of the harness").boxes(n, 1);
+    let config = |backend| Config { backend, limits: Limits::UNLIMITED, ..Config::DEFAULT };
+    let mut on_cpu = Finder::new(config(Backend::Cpu));
+    let mut on_gpu = Finder::with_gpu(config(Backend::Gpu), gpu.clone());
+    let rounds = if n > 100_000 { 5 } else { 11 };
+    let (mut cpu, mut gpu) = (Vec::new(), Vec::new());
+    for round in 0..rounds {
+        for (finder, times) in [(&mut on_cpu, &mut cpu), (&mut on_gpu, &mut gpu)] {
+            let clock = Instant::now();
+            finder.find(&boxes).map_err(|error| Failure::Input(format!("{name} {n}: {error}")))?;
+            // The first two calls compile, allocate and learn.
+            if round >= 2 {
+                times.push(milliseconds(clock.elapsed()));
+            }
+        }
+    }
+    if on_cpu.pairs() != on_gpu.pairs() {
+        return Err(Failure::Check(format!("{name} {n}: CPU and GPU differ")));
+    }
+    let report = on_gpu.report();
+    let why = || report.fallback.clone().unwrap_or_default();
+    let did = report.gpu.clone().ok_or_else(|| Failure::Check(format!("{name} {n}: {}", why())))?;
+    let (cpu, gpu) = (Spread::of(cpu), Spread::of(gpu));
+    Ok(Row { set: name, boxes: n, pairs: report.pairs, cpu, gpu, report: did })
+}
+
+/// Bytes that a call must move on the device whatever the algorithm: boxes read, pairs written.
+fn floor_ms(row: &Row, rate: f64) -> f64 {
+    (24 * row.boxes as u64 + 8 * row.pairs) as f64 / rate * 1e3
+}
+
+fn table(gpu: &GpuFinder, rate: f64, rows: &[Row]) -> String {
+    let mut lines = vec![
+        format!("{}, copies {:.1} GB/s", gpu.adapter(), rate / 1e9),
+        "medians in ms; floor: boxes read and pairs written at the device's copy rate; kernels: of the last call"
+            .into(),
+        format!(
+            "{:<9} {:>9} {:>10} {:>9} {:>9} {:>6} {:>8} {:>7} {:>7} {:>7}  kernels",
+            "set", "boxes", "pairs", "cpu", "gpu", "x", "floor", "upload", "wait", "decode"
+        ),
+    ];
+    for row in rows {
+        let kernels: Vec<String> =
+            row.report.kernels.iter().map(|(name, time)| format!("{name} {:.3}", milliseconds(*time))).collect();
+        lines.push(format!(
+            "{:<9} {:>9} {:>10} {:>9.3} {:>9.3} {:>6.2} {:>8.4} {:>7.3} {:>7.3} {:>7.3}  {}",
+            row.set,
+            row.boxes,
+            row.pairs,
+            row.cpu.median,
+            row.gpu.median,
+            row.cpu.median / row.gpu.median,
+            floor_ms(row, rate),
+            milliseconds(row.report.upload),
+            milliseconds(row.report.wait),
+            milliseconds(row.report.decode),
+            kernels.join(", ")
+        ));
+    }
+    if gpu.is_software() {
+        lines.push("this adapter is software: right answers, meaningless times".into());
+    }
+    lines.join("\n")
+}
+
+fn object(gpu: &GpuFinder, rate: f64, rows: &[Row]) -> Value {
+    let kernels = |row: &Row| -> Value {
+        let named = row.report.kernels.iter();
+        named.map(|(name, time)| ((*name).to_owned(), json!(milliseconds(*time)))).collect::<serde_json::Map<_, _>>().into()
+    };
+    let row = |row: &Row| {
+        json!({
+            "set": row.set, "boxes": row.boxes, "pairs": row.pairs,
+            "cpu_ms": row.cpu, "gpu_ms": row.gpu, "ratio": row.cpu.median / row.gpu.median,
+            "floor_ms": floor_ms(row, rate),
+            "upload_ms": milliseconds(row.report.upload),
+            "wait_ms": milliseconds(row.report.wait),
+            "decode_ms": milliseconds(row.report.decode),
+            "kernels_ms": kernels(row),
+            "uploaded": row.report.uploaded, "downloaded": row.report.downloaded,
+            "device_bytes": row.report.device_bytes, "compression": row.report.compression,
+            "chunks": row.report.chunks, "parts": row.report.parts,
+        })
+    };
+    json!({
+        "suite": "gpu",
+        "adapter": gpu.adapter(),
+        "software": gpu.is_software(),
+        "threads": rayon::current_num_threads(),
+        "copy_bytes_per_s": rate,
+        "rows": rows.iter().map(row).collect::<Vec<_>>(),
+    })
+}
+
+/// Writes the results where the project keeps them, named by day and machine.
+fn keep(gpu: &GpuFinder, object: &Value, quiet: bool) -> Result<(), Failure> {
+    let day = time::OffsetDateTime::now_utc().date();
+    let machine: Vec<String> = gpu
+        .adapter()
+        .to_lowercase()
+        .split(|c: char| !c.is_ascii_alphanumeric())
+        .filter(|word| !word.is_empty())
+        .map(str::to_owned)
+        .collect();
+    let path: PathBuf = Path::new(RESULTS).join(format!("{day}-gpu-{}.json", machine.join("-")));
+    let written = std::fs::create_dir_all(RESULTS).and_then(|()| std::fs::write(&path, format!("{object:#}\n")));
+    written.map_err(|error| Failure::Input(format!("{}: {error}", path.display())))?;
+    if quiet { Ok(()) } else { print(&format!("written to {}", path.display())) }
+}

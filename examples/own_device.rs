@@ -1,0 +1,34 @@
+//! An app that has a wgpu device shares it with the finder: boxes go to the same GPU, no second device
+//! is opened.
+//!
+//! cargo run --release --example own_device
+
+use pbig_core::{Aabb, Backend, Config, Finder, GpuFinder};
+
+fn main() -> Result<(), Box<dyn std::error::Error>> {
+    // What an app does anyway.
+    let instance = wgpu::Instance::new(wgpu::InstanceDescriptor::new_without_display_handle_from_env());
+    let adapter = pollster::block_on(instance.request_adapter(&wgpu::RequestAdapterOptions::default()))?;
+    let (device, queue) = pollster::block_on(adapter.request_device(&wgpu::DeviceDescriptor::default()))?;
+
+    let gpu = GpuFinder::from_device(device, queue)?;
+    println!("on {}", gpu.adapter());
+    let mut finder = Finder::with_gpu(Config { backend: Backend::Gpu, ..Config::DEFAULT }, gpu);
+
+    // A million cubes would do as well; this many take a moment on a software adapter too.
+    let boxes: Vec<Aabb> = (0..20_000u32)
+        .map(|i| Aabb::from_center([(i % 100) as f32, (i / 100 % 100) as f32, (i / 10_000) as f32], [0.5; 3]))
+        .collect();
+    let pairs = finder.find(&boxes)?.len();
+    let report = finder.report();
+    println!("{} boxes, {pairs} pairs; {}", report.boxes, report.plan);
+    if let Some(why) = &report.fallback {
+        println!("note: {why}");
+    }
+    let gpu = report.gpu.as_ref().ok_or("the CPU did the work")?;
+    for (kernel, time) in &gpu.kernels {
+        println!("  {kernel:<12} {time:?}");
+    }
+    println!("  {} bytes up, {} down, {} held on the device", gpu.uploaded, gpu.downloaded, gpu.device_bytes);
+    Ok(())
+}

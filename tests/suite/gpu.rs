@@ -1,0 +1,304 @@
+//! The GPU backend keeps the contracts when room is scarce, when the device fails, and whatever is
+//! switched off. Every test needs an adapter, a software one at least, and fails without.
+
+use pbig_core::gpu::{Fault, adapters};
+use pbig_core::layout::Box as DeviceBox;
+use pbig_core::{
+    Aabb, Backend, BroadPhase, Coding, Config, Events, Finder, GpuFinder, GpuOptions, GpuReport, Pair,
+    ProxyFilter, Strategy, oracle,
+};
+use pbig_harness::boxes::BoxSet;
+use pbig_tests::{corpus, difference, gpu};
+use std::time::Duration;
+
+fn set(name: &str, n: usize) -> Vec<Aabb> {
+    BoxSet::named(name).expect("the set exists").boxes(n, 5)
+}
+
+fn with(options: GpuOptions) -> Config {
+    Config { gpu: options, ..gpu(options.coding) }
+}
+
+/// The pairs, which a device must have found, and what it did.
+fn find(finder: &mut Finder, boxes: &[Aabb]) -> (Vec<Pair>, GpuReport) {
+    let pairs = finder.find(boxes).expect("within the limits").to_vec();
+    let report = finder.report();
+    assert_eq!(report.fallback, None);
+    (pairs, report.gpu.clone().expect("a device did the work"))
+}
+
+fn on_cpu(boxes: &[Aabb]) -> Vec<Pair> {
+    let config = Config { backend: Backend::Cpu, ..Config::DEFAULT };
+    Finder::new(config).find(boxes).expect("within the limits").to_vec()
+}
+
+fn cubes(n: usize) -> Vec<Aabb> {
+    vec![Aabb::new([0.0; 3], [1.0; 3]); n]
+}
+
+#[test]
+fn lists_that_begin_far_too_small_lose_nothing() {
+    for (name, boxes) in
+        [("uniform", set("uniform", 20_000)), ("pile", set("pile", 3000)), ("identical", cubes(1200))]
+    {
+        let wanted = on_cpu(&boxes);
+        for coding in [Coding::Plain, Coding::Packed] {
+            let tiny = GpuOptions { first_bytes: 0, coding, ..GpuOptions::DEFAULT };
+            let mut finder = Finder::new(with(tiny));
+            let (pairs, report) = find(&mut finder, &boxes);
+            assert_eq!(difference(&pairs, &wanted), None, "{name}, {coding:?}");
+            assert!(report.repeats > 0, "{name}: nothing was too small");
+            let (_, report) = find(&mut finder, &boxes);
+            assert_eq!(report.repeats, 0, "{name}: the second call has the room the first one needed");
+        }
+    }
+}
+
+#[test]
+fn work_in_many_chunks_is_complete_with_and_without_pipelining() {
+    for (name, boxes) in [("mixed", set("mixed", 3000)), ("identical", cubes(2000))] {
+        let wanted = on_cpu(&boxes);
+        for pipelining in [true, false] {
+            let options = GpuOptions { chunk: [3, 2], pipelining, first_bytes: 0, ..GpuOptions::DEFAULT };
+            let (pairs, report) = find(&mut Finder::new(with(options)), &boxes);
+            assert_eq!(difference(&pairs, &wanted), None, "{name}, pipelining {pipelining}");
+            assert!(report.chunks > 4, "{name}: {} chunks", report.chunks);
+        }
+    }
+}
+
+#[test]
+fn sets_that_exceed_the_limits_of_a_device_are_split_and_complete() {
+    // 1 MiB holds 37,449 boxes, and no more than 131,072 plain pairs.
+    let options = GpuOptions { max_bytes: 1 << 20, ..GpuOptions::DEFAULT };
+    let mut with_ground = set("pile", 50_000);
+    with_ground.push(Aabb::new([f32::NEG_INFINITY; 3], [f32::INFINITY, 0.0, f32::INFINITY]));
+    for (name, boxes, parts) in [
+        ("uniform", set("uniform", 120_000), 7),
+        ("gaussian", set("gaussian", 100_000), 6),
+        ("pile with ground", with_ground, 3),
+        ("identical", cubes(1500), 1),
+        ("degenerate", set("degenerate", 2000), 1),
+    ] {
+        let wanted = on_cpu(&boxes);
+        for coding in [Coding::Plain, Coding::Packed] {
+            let (pairs, report) = find(&mut Finder::new(with(GpuOptions { coding, ..options })), &boxes);
+            assert_eq!(difference(&pairs, &wanted), None, "{name}, {coding:?}");
+            assert!(report.parts >= parts, "{name}: {} parts", report.parts);
+        }
+    }
+}
+
+#[test]
+fn filters_hold_in_every_part() {
+    let boxes = set("pile", 45_000);
+    let filters: Vec<_> =
+        (0..45_000).map(|i| ProxyFilter { body: i / 3, mask: 1 << (i % 5), ..ProxyFilter::ALL }).collect();
+    let options = GpuOptions { max_bytes: 1 << 20, ..GpuOptions::DEFAULT };
+    let mut cpu = Finder::new(Config { backend: Backend::Cpu, ..Config::DEFAULT });
+    let mut finder = Finder::new(with(options));
+    let wanted = cpu.find_filtered(&boxes, &filters).expect("within the limits");
+    assert!(!wanted.is_empty());
+    assert_eq!(difference(finder.find_filtered(&boxes, &filters).expect("within the limits"), wanted), None);
+    assert!(finder.report().gpu.as_ref().is_some_and(|gpu| gpu.parts > 1));
+}
+
+#[test]
+fn every_switch_gives_the_same_bytes() {
+    for (name, boxes) in
+        [("pile", set("pile", 2000)), ("mixed", set("mixed", 2000)), ("identical", cubes(700))]
+    {
+        let wanted = on_cpu(&boxes);
+        let mut all = vec![GpuOptions { load_balancing: false, ..GpuOptions::DEFAULT }];
+        all.extend((0..=9).map(|root| GpuOptions { root, ..GpuOptions::DEFAULT }));
+        all.extend([Coding::Plain, Coding::Packed].map(|coding| GpuOptions { coding, ..GpuOptions::DEFAULT }));
+        for options in all {
+            for small_cell in [1, 32, 256] {
+                let config = Config { small_cell, ..with(options) };
+                let (pairs, _) = find(&mut Finder::new(config), &boxes);
+                assert_eq!(difference(&pairs, &wanted), None, "{name}, {small_cell}, {options:?}");
+            }
+        }
+    }
+}
+
+#[test]
+fn a_small_scene_needs_no_grid_and_may_answer_in_bits() {
+    let boxes = cubes(300);
+    let wanted = on_cpu(&boxes);
+    for (coding, downloaded) in [(Coding::Packed, 300 * 299 / 2 / 8), (Coding::Plain, wanted.len() * 8)] {
+        let config = Config { strategy: Strategy::Auto, ..with(GpuOptions { coding, ..GpuOptions::DEFAULT }) };
+        let mut finder = Finder::new(config);
+        let (pairs, _) = find(&mut finder, &boxes);
+        assert_eq!(difference(&pairs, &wanted), None, "{coding:?}");
+        let (_, report) = find(&mut finder, &boxes);
+        assert!(report.downloaded as usize >= downloaded, "{coding:?}: {}", report.downloaded);
+        assert!((report.downloaded as usize) < downloaded * 5 / 4 + 2048, "{coding:?}: {}", report.downloaded);
+    }
+}
+
+#[test]
+fn packed_output_is_an_eighth_of_plain_where_boxes_crowd_and_is_chosen_when_it_pays() {
+    let boxes = cubes(1500);
+    let mut finder = Finder::new(with(GpuOptions::DEFAULT));
+    assert_eq!(find(&mut finder, &boxes).1.compression, 1.0, "nothing is known in the first call");
+    let (_, report) = find(&mut finder, &boxes);
+    assert!(report.compression < 0.14, "{}", report.compression);
+    let sparse = set("uniform", 20_000);
+    find(&mut finder, &sparse);
+    assert_eq!(find(&mut finder, &sparse).1.compression, 1.0, "few pairs do not pay for the table");
+}
+
+#[test]
+fn only_what_changed_is_sent() {
+    let mut boxes = set("unit", 20_000);
+    let mut finder = Finder::new(with(GpuOptions::DEFAULT));
+    let all = size_of_val(boxes.as_slice()) as u64;
+    assert_eq!(find(&mut finder, &boxes).1.uploaded, all);
+    assert_eq!(find(&mut finder, &boxes).1.uploaded, 0);
+    boxes[777] = boxes[778];
+    let (pairs, report) = find(&mut finder, &boxes);
+    assert_eq!(report.uploaded, 256 * size_of::<DeviceBox>() as u64);
+    assert_eq!(difference(&pairs, &on_cpu(&boxes)), None);
+}
+
+#[test]
+fn memory_follows_what_is_needed_down_as_well_as_up() {
+    let mut finder = Finder::new(with(GpuOptions::DEFAULT));
+    let (many, few) = (set("pile", 60_000), set("pile", 500));
+    let burst = find(&mut finder, &many).1.device_bytes;
+    for _ in 0..130 {
+        find(&mut finder, &few);
+    }
+    let after = find(&mut finder, &few).1.device_bytes;
+    assert!(after * 4 < burst, "{after} of {burst} bytes are still held");
+    assert_eq!(difference(&find(&mut finder, &many).0, &on_cpu(&many)), None);
+}
+
+#[test]
+fn nothing_grows_while_boxes_churn() {
+    let mut finder = Finder::new(with(GpuOptions::DEFAULT));
+    let bytes = |seed| {
+        let boxes = BoxSet::named("pile").expect("the set exists").boxes(400 + (seed % 100) as usize, seed);
+        (boxes, seed)
+    };
+    let mut most = 0;
+    for seed in 0..600 {
+        let held = find(&mut finder, &bytes(seed).0).1.device_bytes;
+        if seed < 100 {
+            most = held.max(most);
+        }
+        assert!(held <= most * 5 / 4, "call {seed}: {held} bytes after at most {most}");
+    }
+}
+
+/// Boxes that move, come and go: the same frames for any backend.
+fn frames(broad_phase: &mut BroadPhase, mut before: impl FnMut(usize)) -> Vec<(Events, Option<String>)> {
+    let start = set("pile", 600);
+    let frame = |f: usize| {
+        before(f);
+        for (id, b) in start.iter().enumerate() {
+            let shift = ((id * 7 + f * 13) % 11) as f32 * 0.1;
+            let moved = Aabb::new(b.min.map(|x| x + shift), b.max.map(|x| x + shift));
+            if (id + f) % 17 == 0 {
+                broad_phase.remove(id as u32);
+            } else {
+                broad_phase.set(id as u32, moved, ProxyFilter::ALL).expect("within the limits");
+            }
+        }
+        let events = broad_phase.update().expect("within the limits").clone();
+        (events, broad_phase.report().fallback.clone())
+    };
+    (0..12).map(frame).collect()
+}
+
+fn events(frames: &[(Events, Option<String>)]) -> Vec<&Events> {
+    frames.iter().map(|(events, _)| events).collect()
+}
+
+#[test]
+fn a_device_that_fails_in_the_middle_of_a_run_loses_no_event() {
+    let base = Config { margin: 0.05, ..gpu(Coding::Auto) };
+    let cpu = frames(&mut BroadPhase::new(Config { backend: Backend::Cpu, ..base }).expect("a margin"), |_| ());
+    for (fault, words) in [
+        (Fault::LoseDevice, "lost"),
+        (Fault::Timeout, "did not answer"),
+        (Fault::OutOfMemory, "out of device memory"),
+        (Fault::RefuseShader, "refused"),
+    ] {
+        for pause in [Duration::ZERO, Duration::from_secs(3600)] {
+            let options = GpuOptions { pause, first_bytes: 0, ..GpuOptions::DEFAULT };
+            let device = GpuFinder::new().expect("an adapter");
+            // A shader is compiled, and buffers are made, in the first call; submissions go on.
+            let at = if matches!(fault, Fault::LoseDevice | Fault::Timeout) { 5 } else { 0 };
+            device.inject(fault, at);
+            let mut ours = BroadPhase::with_gpu(Config { gpu: options, ..base }, device).expect("a margin");
+            let got = frames(&mut ours, |_| ());
+            assert_eq!(events(&got), events(&cpu), "{fault:?}");
+            let failed = got.iter().position(|(_, why)| why.as_ref().is_some_and(|why| why.contains(words)));
+            let failed = failed.unwrap_or_else(|| panic!("{fault:?} was not reported"));
+            let after = &got[failed + 1].1;
+            let tried_again = pause == Duration::ZERO;
+            assert_eq!(after.is_none(), tried_again, "{fault:?}: {after:?}");
+        }
+    }
+}
+
+#[test]
+fn an_app_shares_its_device_and_a_lost_one_is_not_replaced() {
+    let adapter = adapters().into_iter().next().expect("an adapter");
+    let device = pollster::block_on(adapter.request_device(&wgpu::DeviceDescriptor::default()));
+    let (device, queue) = device.expect("a device with WebGPU's default limits");
+    let finder = GpuFinder::from_device(device.clone(), queue).expect("default limits are enough");
+    assert!(finder.adapter().contains(&adapter.get_info().name), "{}", finder.adapter());
+    let options = GpuOptions { pause: Duration::ZERO, ..GpuOptions::DEFAULT };
+    let mut finder = Finder::with_gpu(with(options), finder);
+    for case in corpus() {
+        let (pairs, report) = find(&mut finder, &case.boxes);
+        assert_eq!(difference(&pairs, &oracle::pairs(&case.boxes)), None, "{}", case.name);
+        assert!(!report.subgroups, "the device was made without them");
+    }
+    device.destroy();
+    let boxes = set("pile", 2000);
+    for _ in 0..2 {
+        assert_eq!(finder.find(&boxes).expect("within the limits"), on_cpu(&boxes));
+        let why = finder.report().fallback.clone().expect("the device is gone");
+        assert!(why.contains("lost"), "{why}");
+    }
+}
+
+#[test]
+fn an_adapter_that_does_not_exist_is_an_error_that_names_those_that_do() {
+    let error = GpuFinder::on_adapter("no such adapter").expect_err("no adapter has this name");
+    let real = adapters().into_iter().next().expect("an adapter").get_info().name;
+    let text = error.to_string();
+    assert!(text.contains("no such adapter") && text.contains(&real), "{text}");
+}
+
+#[test]
+fn auto_leaves_a_software_adapter_alone() {
+    let device = GpuFinder::new().expect("an adapter");
+    let software = device.is_software();
+    let mut finder = Finder::with_gpu(Config::DEFAULT, device);
+    let boxes = set("unit", 20_000);
+    for _ in 0..6 {
+        finder.find(&boxes).expect("within the limits");
+        assert!(finder.report().gpu.is_none() || !software);
+    }
+}
+
+#[test]
+fn finders_in_several_threads_share_a_device() {
+    let boxes = set("pile", 2000);
+    let wanted = on_cpu(&boxes);
+    std::thread::scope(|scope| {
+        for _ in 0..4 {
+            scope.spawn(|| {
+                let mut finder = Finder::new(with(GpuOptions::DEFAULT));
+                for _ in 0..10 {
+                    assert_eq!(difference(&find(&mut finder, &boxes).0, &wanted), None);
+                }
+            });
+        }
+    });
+}
