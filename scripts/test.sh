@@ -82,8 +82,11 @@ step target/release/examples/falling_objects --bodies 500 --steps 60
 step target/release/examples/drop_in
 step target/release/examples/headless_test
 step target/release/examples/boxes_to_pairs
+step target/release/examples/own_device
 step target/release/pbig pairs examples/boxes.csv
 step target/release/pbig replay examples/frames.npy
+step target/release/pbig simulate --scene pile --check --backend gpu --bodies 300 --steps 60
+step target/release/pbig bench gpu --quick
 RUSTDOCFLAGS="-D warnings" step cargo doc --release --workspace --no-deps --quiet
 dependencies=$(cargo tree -p pbig-core --edges normal)
 case $dependencies in *wgpu*) echo "pbig-core pulls in wgpu"; exit 1 ;; esac

@@ -159,12 +159,11 @@ fn check_large(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups)
             placed = place(item, column);
         }
         let to = workgroupUniformLoad(&placed);
-        if hits == 0u || to.at == NO_ROOM {
-            continue;
-        }
-        if to.packed != 0u {
+        let written = hits > 0u && to.at != NO_ROOM;
+        if written && to.packed != 0u {
             write_row(to.at + word_rank, lane, hits, within, n);
-        } else {
+        }
+        if written && to.packed == 0u {
             write_pairs(to.at + 2u * rank, lane, row_entry, within, n);
         }
     }

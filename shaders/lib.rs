@@ -69,8 +69,8 @@ kernels! {
     SCAN_BLOCKS "scan_blocks" [BLOCK_SCAN] (params, cells, starts, sums);
     /// Map: prefix sums of the blocks.
     SCAN_SUMS "scan_sums" [BLOCK_SCAN] (params, sums, counters);
-    /// Map: both together.
-    SCAN_ADD "scan_add" [] (params, sums, starts);
+    /// Map: both together, and cursors for the scatter.
+    SCAN_ADD "scan_add" [] (params, sums, starts, cells);
     /// Schedule: cells become work items.
     SCHEDULE "schedule" [BLOCK_SCAN] (params, cells, starts, slots, small_items, large_items, counters);
     /// Map: boxes into cells.

@@ -15,7 +15,8 @@ fn float_of(key: i32) -> f32 {
 fn finest_cell(key: i32, axis: u32) -> i32 {
     let x = float_of(clamp(key, params.reach_low[axis], params.reach_high[axis]));
     let cell = floor((x - params.origin[axis]) * params.scale);
-    return i32(clamp(cell, -1073741824.0, 1073741824.0));
+    // Just inside 2^30: the number of cells between two must fit an i32.
+    return i32(clamp(cell, -1073741760.0, 1073741760.0));
 }
 
 // The first level at which the box touches few cells; the last has one cell.

@@ -1,6 +1,6 @@
-// Map, step 6 (PBIG 4.2, scatter): every box into its cells, residents before visitors. The counts of
-// the cells are used up: an entry's place is what is left of them. In which order boxes of a cell
-// come is up to the device; the order of the pairs that are returned does not depend on it.
+// Map, step 6 (PBIG 4.2, scatter): every box into its cells, residents before visitors, each list from
+// its end. In which order the boxes of a cell come is up to the device; the order of the pairs that
+// are returned does not depend on it.
 
 @group(0) @binding(0) var<uniform> params: Params;
 @group(0) @binding(1) var<storage, read> located: array<Located>;
@@ -30,19 +30,11 @@ fn scatter(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) gro
     }
 }
 
-// Visitors come after the residents: from the end of the cell, so that nobody needs the number of
-// residents, which is being used up.
+// A cell without residents has counted no visitors, and its cursors stand at its start for good.
 fn place(cell: u32, entry: u32, resident: bool) {
     if resident {
-        entries[starts[cell] + atomicSub(&cells[2u * cell], 1u) - 1u] = entry;
-    } else if atomicLoad(&cells[2u * cell + 1u]) > 0u {
-        entries[end_of(cell) - atomicSub(&cells[2u * cell + 1u], 1u)] = entry;
+        entries[atomicSub(&cells[2u * cell], 1u) - 1u] = entry;
+    } else if atomicLoad(&cells[2u * cell + 1u]) > starts[cell] {
+        entries[atomicSub(&cells[2u * cell + 1u], 1u) - 1u] = entry;
     }
-}
-
-fn end_of(cell: u32) -> u32 {
-    if cell + 1u < params.cells {
-        return starts[cell + 1u];
-    }
-    return counters.entries;
 }

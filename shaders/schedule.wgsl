@@ -20,6 +20,12 @@ var<workgroup> large_count: atomic<u32>;
 var<workgroup> large_seen: u32;
 var<workgroup> large_cells: array<u32, CELLS_PER_BLOCK>;
 
+// The counts of a cell, from the ends of its entries.
+fn counts_of(index: u32) -> Cell {
+    let ends = cells[index];
+    return Cell(ends.residents - starts[index], ends.visitors - ends.residents);
+}
+
 // Pairs with at least one resident: those of the first rows, in Avril's numbering.
 fn pairs_of(cell: Cell) -> u32 {
     let n = cell.residents + cell.visitors;
@@ -50,7 +56,7 @@ fn schedule(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) gr
         if first + i >= params.cells {
             continue;
         }
-        let cell = cells[first + i];
+        let cell = counts_of(first + i);
         if cell.residents == 0u || cell.residents + cell.visitors < 2u {
             continue;
         }
@@ -77,7 +83,7 @@ fn schedule(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) gr
         if first + i >= params.cells {
             continue;
         }
-        let cell = cells[first + i];
+        let cell = counts_of(first + i);
         let n = cell.residents + cell.visitors;
         if cell.residents == 0u || n < 2u || !is_small(cell) {
             continue;
@@ -105,7 +111,7 @@ fn schedule_large(lane: u32) {
     let count = workgroupUniformLoad(&large_seen);
     for (var i = 0u; i < count; i++) {
         let index = large_cells[i];
-        let cell = cells[index];
+        let cell = counts_of(index);
         let n = cell.residents + cell.visitors;
         let rows = (cell.residents + LANES - 1u) / LANES;
         let columns = (n + LANES - 1u) / LANES;

@@ -1,4 +1,4 @@
-// As block_scan.wgsl, with subgroups: 2 barriers instead of 17. Lanes are ordered by the first lane
+// As block_scan.wgsl, with subgroups: 1 barrier instead of 17. Lanes are ordered by the first lane
 // of their subgroup, then within it, the same in every call; no size or numbering of subgroups is
 // assumed.
 

@@ -81,7 +81,7 @@ struct Chunk {
 }
 
 // Residents are the boxes of the cell's own level, visitors those of finer levels. Two visitors meet
-// in their own level.
+// in their own level. Counts until scan_add, from then on the ends of their entries.
 struct Cell {
     residents: u32,
     visitors: u32,

@@ -111,7 +111,9 @@ fn every_switch_gives_the_same_bytes() {
         let wanted = on_cpu(&boxes);
         let mut all = vec![GpuOptions { load_balancing: false, ..GpuOptions::DEFAULT }];
         all.extend((0..=9).map(|root| GpuOptions { root, ..GpuOptions::DEFAULT }));
-        all.extend([Coding::Plain, Coding::Packed].map(|coding| GpuOptions { coding, ..GpuOptions::DEFAULT }));
+        all.extend(
+            [Coding::Plain, Coding::Packed].map(|coding| GpuOptions { coding, ..GpuOptions::DEFAULT }),
+        );
         for options in all {
             for small_cell in [1, 32, 256] {
                 let config = Config { small_cell, ..with(options) };
@@ -127,13 +129,18 @@ fn a_small_scene_needs_no_grid_and_may_answer_in_bits() {
     let boxes = cubes(300);
     let wanted = on_cpu(&boxes);
     for (coding, downloaded) in [(Coding::Packed, 300 * 299 / 2 / 8), (Coding::Plain, wanted.len() * 8)] {
-        let config = Config { strategy: Strategy::Auto, ..with(GpuOptions { coding, ..GpuOptions::DEFAULT }) };
+        let config =
+            Config { strategy: Strategy::Auto, ..with(GpuOptions { coding, ..GpuOptions::DEFAULT }) };
         let mut finder = Finder::new(config);
         let (pairs, _) = find(&mut finder, &boxes);
         assert_eq!(difference(&pairs, &wanted), None, "{coding:?}");
         let (_, report) = find(&mut finder, &boxes);
         assert!(report.downloaded as usize >= downloaded, "{coding:?}: {}", report.downloaded);
-        assert!((report.downloaded as usize) < downloaded * 5 / 4 + 2048, "{coding:?}: {}", report.downloaded);
+        assert!(
+            (report.downloaded as usize) < downloaded * 5 / 4 + 2048,
+            "{coding:?}: {}",
+            report.downloaded
+        );
     }
 }
 
@@ -200,7 +207,7 @@ fn frames(broad_phase: &mut BroadPhase, mut before: impl FnMut(usize)) -> Vec<(E
         for (id, b) in start.iter().enumerate() {
             let shift = ((id * 7 + f * 13) % 11) as f32 * 0.1;
             let moved = Aabb::new(b.min.map(|x| x + shift), b.max.map(|x| x + shift));
-            if (id + f) % 17 == 0 {
+            if (id + f).is_multiple_of(17) {
                 broad_phase.remove(id as u32);
             } else {
                 broad_phase.set(id as u32, moved, ProxyFilter::ALL).expect("within the limits");
@@ -219,7 +226,8 @@ fn events(frames: &[(Events, Option<String>)]) -> Vec<&Events> {
 #[test]
 fn a_device_that_fails_in_the_middle_of_a_run_loses_no_event() {
     let base = Config { margin: 0.05, ..gpu(Coding::Auto) };
-    let cpu = frames(&mut BroadPhase::new(Config { backend: Backend::Cpu, ..base }).expect("a margin"), |_| ());
+    let cpu =
+        frames(&mut BroadPhase::new(Config { backend: Backend::Cpu, ..base }).expect("a margin"), |_| ());
     for (fault, words) in [
         (Fault::LoseDevice, "lost"),
         (Fault::Timeout, "did not answer"),

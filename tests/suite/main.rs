@@ -4,5 +4,6 @@ mod drop_in;
 mod finder;
 mod gpu;
 mod incremental;
+mod kernels;
 mod planted;
 mod worlds;

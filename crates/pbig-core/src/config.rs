@@ -47,7 +47,8 @@ pub enum Order {
     /// By `(a, b)`: the same bytes on every backend, strategy and thread count.
     #[default]
     Sorted,
-    /// As found. Saves the sort, about a third of the time of a whole call.
+    /// As found. Saves the sort, about a third of the time of a whole call. On a GPU the order differs
+    /// from call to call.
     Unspecified,
 }
 
@@ -101,7 +102,7 @@ pub struct GpuOptions {
     /// inverse root with so many Newton steps; 5 to 8 Lomont's; 9 no root, by bisection. All are exact,
     /// as integers correct the estimate.
     pub root: u32,
-    /// Work items of each kind, of at most 65,536 and a million tests, that one submission checks. Longer
+    /// Small and large work items, of at most 256 and 524,288 tests, that one submission checks. Longer
     /// ones could run into the time limit that some systems set a GPU.
     pub chunk: [u32; 2],
     /// Largest buffer and binding in bytes, if less than what the device allows; 2^20 at least.

@@ -230,7 +230,7 @@ impl Search {
 
     #[cfg(feature = "gpu")]
     pub(crate) fn adapter(&self) -> Option<&str> {
-        self.gpu.as_ref().map(GpuFinder::adapter).filter(|name| !name.is_empty())
+        self.gpu.as_ref().and_then(GpuFinder::working_adapter)
     }
 
     /// Searches on a device if that is wanted; false when it is not, or when the device could not do
@@ -258,6 +258,7 @@ impl Search {
         match gpu.find(&request, &mut self.found, report) {
             Ok(()) => {
                 self.warned = false;
+                report.fallback = None;
                 let time = lap(&mut clock);
                 report.stages.check += time;
                 self.note_time(true, boxes.len(), time);

@@ -142,7 +142,7 @@ pub struct Chunk {
     pub pairs_left: [u32; 2],
 }
 
-/// Entries of a cell by kind.
+/// Entries of a cell by kind: counts until `scan_add`, from then on the ends of both lists.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Pod, Zeroable)]
 pub struct Cell {

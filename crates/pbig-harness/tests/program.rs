@@ -17,6 +17,14 @@ fn pbig(folder: &Path, args: &[&str]) -> Output {
     command.current_dir(folder).args(args).output().expect("the program starts")
 }
 
+/// As `pbig`, where there is no GPU.
+fn pbig_without_gpu(folder: &Path, args: &[&str]) -> Output {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_pbig"));
+    // Some drivers complain on stderr when they have no such folder.
+    let command = command.env("WGPU_ADAPTER_NAME", "no such adapter").env("XDG_RUNTIME_DIR", folder);
+    command.current_dir(folder).args(args).output().expect("the program starts")
+}
+
 fn json(output: &Output) -> Value {
     let text = String::from_utf8_lossy(&output.stdout);
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
@@ -232,12 +240,17 @@ fn a_backend_that_is_not_there_is_replaced_and_the_output_says_so() {
     let scene = ["simulate", "--scene", "pile", "--bodies", "8", "--steps", "10"];
     for args in [&["pairs", "boxes.npy"][..], &["replay", "frames.npy"], &scene] {
         let gpu = [args, &["--backend", "gpu"]].concat();
-        let text = String::from_utf8_lossy(&pbig(folder.path(), &gpu).stdout).into_owned();
-        assert!(text.contains("no GPU backend"), "{args:?}: {text}");
-        let object = json(&pbig(folder.path(), &[&gpu[..], &["--json"]].concat()));
-        assert_eq!(object["backend"], "cpu", "{args:?}");
-        assert!(object.to_string().contains("no GPU backend"), "{args:?}: {object}");
+        let text = String::from_utf8_lossy(&pbig_without_gpu(folder.path(), &gpu).stdout).into_owned();
+        assert!(text.contains("no GPU adapter named"), "{args:?}: {text}");
+        let gpu = [&gpu[..], &["--json"]].concat();
+        let object = json(&pbig_without_gpu(folder.path(), &gpu));
+        assert_eq!((&object["backend"], &object["adapter"]), (&Value::from("cpu"), &Value::Null), "{args:?}");
+        assert!(object.to_string().contains("no GPU adapter named"), "{args:?}: {object}");
+        let object = json(&pbig(folder.path(), &gpu));
+        assert_eq!(object["backend"], "gpu", "{args:?}: {object}");
+        assert!(object["adapter"].as_str().is_some_and(|name| !name.is_empty()), "{args:?}: {object}");
     }
+    refused(&pbig_without_gpu(folder.path(), &["bench", "gpu", "--quick"]), &["no such adapter"]);
 }
 
 #[test]
@@ -307,7 +320,7 @@ fn replayed_events_add_up_to_the_pairs_of_every_frame() {
     for (seed, n) in [(1, 40), (2, 200), (3, 600)] {
         let frames = frames(n, 20, seed);
         save_frames(folder.path(), &frames);
-        for backend in ["auto", "cpu", "brute"] {
+        for backend in ["auto", "cpu", "gpu", "brute"] {
             let args = ["replay", "frames.npy", "-o", "events.csv", "--backend", backend, "--json"];
             let object = json(&pbig(folder.path(), &args));
             assert_eq!((&object["frames"], &object["boxes"]), (&Value::from(20), &Value::from(n)));
@@ -364,6 +377,7 @@ fn scenes_and_doctor_say_what_there_is() {
     let doctor = pbig(folder.path(), &["doctor"]);
     let text = String::from_utf8_lossy(&doctor.stdout).into_owned();
     assert!(doctor.status.success() && text.contains("self-test") && !text.contains("WRONG"), "{text}");
+    assert!(text.contains("gpu 0 packed"), "a software adapter at least is tested: {text}");
 }
 
 #[test]

@@ -228,6 +228,8 @@ impl BroadPhase {
             changed: self.changed.len() as u64,
             pairs: self.pairs.len() as u64,
             plan: Plan { boxes: self.valid_count(), ..Plan::default() },
+            // Until another search: an update that changes nothing says nothing new.
+            fallback: self.report.fallback.take(),
             ..Report::default()
         };
         if self.changed.is_empty() {

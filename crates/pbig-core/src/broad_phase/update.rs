@@ -6,7 +6,7 @@ use crate::diff::PairStore;
 use crate::finder::{Rule, single_entry_checks};
 use crate::plan::{Chosen, Plan, Summary};
 use crate::report::lap;
-use crate::{Aabb, Backend, Error, Pair, ProxyFilter, Strategy};
+use crate::{Aabb, Backend, Config, Error, Pair, ProxyFilter, Strategy};
 use std::time::Instant;
 
 impl BroadPhase {
@@ -51,7 +51,14 @@ impl BroadPhase {
         let accept = |a: u32, b: u32| state.is_added(a, b);
         let rule = Rule { accept: &accept, filters: Some(&self.filters), filters_suffice: false };
         self.has_base = false;
-        self.base.find(&self.boxes, &self.config, &rule, &mut self.report)?;
+        // After a search on a GPU there is no base. Where little moves it is worth having: the CPU builds it.
+        let few = self.moved.len() * 8 < self.present_count as usize;
+        let backend = match self.config.backend {
+            Backend::Auto if few => Backend::Cpu,
+            backend => backend,
+        };
+        let config = Config { backend, ..self.config };
+        self.base.find(&self.boxes, &config, &rule, &mut self.report)?;
         (self.report.boxes, self.report.invalid) = (boxes, invalid);
         self.moved.clear();
         self.sorted_again = 0;

@@ -102,14 +102,22 @@ impl Engine {
 
     /// In words, what was chosen for the device, and why.
     pub(super) fn variants(&self) -> Vec<String> {
-        let scan = if self.subgroups { "with subgroups: the adapter has them" } else { "without subgroups: the adapter has none" };
+        let scan = if self.subgroups {
+            "with subgroups: the adapter has them"
+        } else {
+            "without subgroups: the adapter has none"
+        };
         let times = if self.timestamps { "by timestamps" } else { "none: the adapter has no timestamps" };
         let most = self.most_bytes(&GpuOptions::DEFAULT);
         vec![
             format!("scan, schedule: {scan}"),
-            "check, small cells: the device's square root, corrected by integers; large cells: balanced rows".into(),
+            "check, small cells: the device's square root, corrected by integers; large cells: balanced rows"
+                .into(),
             format!("times of kernels: {times}"),
-            format!("sets are searched in parts from {} boxes on", most / size_of::<crate::layout::Located>() as u64),
+            format!(
+                "sets are searched in parts from {} boxes on",
+                most / size_of::<crate::layout::Located>() as u64
+            ),
         ]
     }
 

@@ -21,13 +21,16 @@
 //! ```
 
 mod adapter;
+mod coding;
 mod commands;
 mod engine;
 mod error;
+mod flight;
 mod map;
 mod parts;
 mod readback;
 mod session;
+mod sink;
 mod storage;
 pub mod study;
 mod trial;
@@ -46,7 +49,8 @@ use crate::plan::{Chosen, GpuPlan, Plan, Summary};
 use crate::report::{Checks, GpuReport, Report};
 use crate::{Aabb, Backend, Config, GpuOptions, ProxyFilter, Strategy};
 use engine::Engine;
-use session::{Job, Session, Sink};
+use session::{Job, Session};
+use sink::Sink;
 use std::sync::Arc;
 use std::time::Instant;
 
@@ -142,6 +146,11 @@ impl GpuFinder {
     /// The adapter's name, kind and API; empty before the first call of a shared device.
     pub fn adapter(&self) -> &str {
         self.engine.as_ref().map_or("", |engine| &engine.name)
+    }
+
+    /// The adapter, unless there is none yet or its device has failed.
+    pub(crate) fn working_adapter(&self) -> Option<&str> {
+        Some(self.adapter()).filter(|name| !name.is_empty() && self.failed.is_none())
     }
 
     /// Whether the adapter is a program, as lavapipe and WARP are: right, but slower than the CPU
@@ -269,6 +278,7 @@ fn search(
             found,
             used: 0,
             pairs: 0,
+            written: 0,
             limit: request.config.limits.max_pairs,
             ids: None,
             accept: request.accept,
@@ -288,18 +298,25 @@ fn search(
             Err(failure) => return Err(failure),
             Ok(plan) => {
                 let words = sink.report.compression;
-                sink.report.compression = if sink.pairs > 0 { words / (2 * sink.pairs) as f64 } else { 0.0 };
-                return Ok(Searched { checks: sink.checks, plan, gpu: sink.report, pairs: sink.pairs });
+                let pairs = sink.written;
+                sink.report.compression = if pairs > 0 { words / (2 * pairs) as f64 } else { 0.0 };
+                return Ok(Searched { checks: sink.checks, plan, gpu: sink.report, pairs });
             }
         }
     }
 }
 
-/// How many boxes fit: each has a place in every buffer, and at most 64 entries in each of 8 levels,
-/// which are counted in 32 bits.
+/// How many boxes fit: each has a place in every buffer, and a number in an entry.
 fn most_boxes(session: &Session) -> usize {
     let by_bytes = session.storage.most_bytes() / size_of::<Located>() as u64;
-    by_bytes.min(1 << (32 - 6 - 3)).min(1 << BOX_BITS) as usize
+    by_bytes.min(1 << BOX_BITS) as usize
+}
+
+/// Entries are counted in 32 bits: at most 4 x 4 x 4 for a box in each level but the last.
+fn check_entries(plan: &GpuPlan, boxes: usize) -> Result<(), GpuError> {
+    let entries = boxes as u64 * (64 * (plan.levels.len() as u64 - 1) + 1);
+    let limit = u64::from(u32::MAX);
+    if entries <= limit { Ok(()) } else { Err(GpuError::TooLarge { what: "entries", bytes: entries, limit }) }
 }
 
 fn search_whole(
@@ -316,6 +333,7 @@ fn search_whole(
     let config = request.config;
     let brute = config.strategy == Strategy::Auto && request.boxes.len() <= SMALL_SCENE;
     let plan = (!brute).then(|| plan(session, request.summary, config, crowding));
+    plan.as_ref().map_or(Ok(()), |plan| check_entries(plan, request.boxes.len()))?;
     let job = Job { boxes: request.boxes, filters: request.filters, split: 0, plan: plan.as_ref(), config };
     session.run(&job, sink)?;
     let (chosen, swept) = if brute { (Chosen::Brute, valid) } else { (Chosen::Pbig, 0) };
@@ -344,11 +362,13 @@ fn search_parts(
             request.filters.map(|all| ids.iter().map(|&id| all[id as usize]).collect());
         let split = if part.second.is_empty() { 0 } else { part.first.len() as u32 };
         let plan = plan(session, &Summary::of(&boxes, None), request.config, crowding);
+        check_entries(&plan, boxes.len())?;
         let config = request.config;
         let job = Job { boxes: &boxes, filters: filters.as_deref(), split, plan: Some(&plan), config };
         let mut own = Sink { ids: Some(&ids), found: &mut *sink.found, report: sink.report.clone(), ..*sink };
         session.run(&job, &mut own)?;
-        (sink.used, sink.pairs, sink.checks, sink.report) = (own.used, own.pairs, own.checks, own.report);
+        (sink.used, sink.pairs, sink.written) = (own.used, own.pairs, own.written);
+        (sink.checks, sink.report) = (own.checks, own.report);
         last = Some(plan);
     }
     sink.report.parts = parts.len() as u32;

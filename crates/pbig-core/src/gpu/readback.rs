@@ -61,14 +61,12 @@ impl Clock {
 
 /// Records the copies that end a submission: the head, and the first `prefetch` bytes of output, which
 /// are as many as the last call needed (PBIG 5.3).
-pub(super) fn record(commands: &mut Commands<'_>, clock: Option<&Clock>, with_counters: bool, prefetch: u64) {
+pub(super) fn record(commands: &mut Commands<'_>, clock: Option<&Clock>, prefetch: u64) {
     let staging = commands.buffer("staging");
     let (totals, out) = (commands.buffer("totals"), commands.buffer("out"));
     let counters = commands.storage.get("counters");
     let encoder = &mut commands.encoder;
-    if with_counters {
-        encoder.copy_buffer_to_buffer(counters, 0, staging, 0, TOTALS_AT);
-    }
+    encoder.copy_buffer_to_buffer(counters, 0, staging, 0, TOTALS_AT);
     encoder.copy_buffer_to_buffer(totals, 0, staging, TOTALS_AT, size_of::<Totals>() as u64);
     if let Some(clock) = clock {
         let used = 2 * commands.passes.len() as u32;

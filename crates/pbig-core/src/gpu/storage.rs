@@ -79,21 +79,16 @@ impl Storage {
     }
 
     /// To be called after each call: gives back, now and then, what has not been needed for long.
-    pub(super) fn end_call(&mut self) -> bool {
+    pub(super) fn end_call(&mut self) {
         self.calls += 1;
         if self.calls < WINDOW {
-            return false;
+            return;
         }
         self.calls = 0;
         let before = self.slabs.len();
         self.slabs.retain(|_, slab| slab.buffer.size() <= (4 * slab.used).max(1 << 16));
         self.slabs.values_mut().for_each(|slab| slab.used = 0);
         self.generation += u64::from(self.slabs.len() < before);
-        self.slabs.len() < before
-    }
-
-    pub(super) fn has(&self, name: &str) -> bool {
-        self.slabs.contains_key(name)
     }
 }
 

@@ -49,7 +49,8 @@ impl Bench {
             let usage = Usage::COPY_SRC | Usage::COPY_DST;
             let (from, to) = (engine.buffer("from", bytes, usage)?, engine.buffer("to", bytes, usage)?);
             let copy = || {
-                let mut encoder = engine.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+                let mut encoder =
+                    engine.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
                 encoder.copy_buffer_to_buffer(&from, 0, &to, 0, bytes);
                 let clock = Instant::now();
                 engine.wait(engine.submit(encoder), GpuOptions::DEFAULT.patience)?;

@@ -26,12 +26,6 @@ impl Mirror {
         Self { boxes: Vec::new(), filters: Vec::new(), sent: 0 }
     }
 
-    /// The device has lost its buffers.
-    pub(super) fn forget(&mut self) {
-        self.boxes.clear();
-        self.filters.clear();
-    }
-
     /// Brings the device's boxes, and filters if there are any, up to date.
     pub(super) fn upload(
         &mut self,
@@ -91,23 +85,28 @@ fn changed<T: Pod>(old: &mut Vec<T>, new: &[T]) -> Vec<Range<usize>> {
 mod tests {
     use super::*;
 
+    /// Start and end of each range.
+    fn sent<T: Pod>(old: &mut Vec<T>, new: &[T]) -> Vec<(usize, usize)> {
+        changed(old, new).into_iter().map(|range| (range.start, range.end)).collect()
+    }
+
     #[test]
     fn only_changed_blocks_are_sent() {
         let mut new = vec![0u32; 10 * BLOCK + 7];
         let mut old = Vec::new();
-        assert_eq!(changed(&mut old, &new), [0..new.len()]);
-        assert_eq!(changed(&mut old, &new), []);
+        assert_eq!(sent(&mut old, &new), [(0, new.len())]);
+        assert_eq!(sent(&mut old, &new), []);
         new[3 * BLOCK] = 1;
         new[4 * BLOCK + 9] = 1;
         new[10 * BLOCK + 6] = 1;
-        assert_eq!(changed(&mut old, &new), [3 * BLOCK..5 * BLOCK, 10 * BLOCK..10 * BLOCK + 7]);
+        assert_eq!(sent(&mut old, &new), [(3 * BLOCK, 5 * BLOCK), (10 * BLOCK, 10 * BLOCK + 7)]);
         // Shrunk, then grown again over what had been there.
-        assert_eq!(changed(&mut old, &new[..BLOCK]), []);
+        assert_eq!(sent(&mut old, &new[..BLOCK]), []);
         new[2 * BLOCK] = 5;
-        assert_eq!(changed(&mut old, &new), [2 * BLOCK..3 * BLOCK]);
+        assert_eq!(sent(&mut old, &new), [(2 * BLOCK, 3 * BLOCK)]);
         assert_eq!(old, new);
         let nan = [f32::NAN; 3];
         let mut old = nan.to_vec();
-        assert_eq!(changed(&mut old, &nan), []);
+        assert_eq!(sent(&mut old, &nan), []);
     }
 }

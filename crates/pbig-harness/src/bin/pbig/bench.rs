@@ -62,7 +62,11 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
     }
     bar.finish_and_clear();
     let object = object(&gpu, rate, &rows);
-    if args.json { print(&object.to_string())? } else { print(&table(&gpu, rate, &rows))? }
+    if args.json {
+        print(&object.to_string())?
+    } else {
+        print(&table(&gpu, rate, &rows))?
+    }
     if args.quick { Ok(()) } else { keep(&gpu, &object, args.json) }
 }
 
@@ -110,8 +114,12 @@ fn table(gpu: &GpuFinder, rate: f64, rows: &[Row]) -> String {
         ),
     ];
     for row in rows {
-        let kernels: Vec<String> =
-            row.report.kernels.iter().map(|(name, time)| format!("{name} {:.3}", milliseconds(*time))).collect();
+        let kernels: Vec<String> = row
+            .report
+            .kernels
+            .iter()
+            .map(|(name, time)| format!("{name} {:.3}", milliseconds(*time)))
+            .collect();
         lines.push(format!(
             "{:<9} {:>9} {:>10} {:>9.3} {:>9.3} {:>6.2} {:>8.4} {:>7.3} {:>7.3} {:>7.3}  {}",
             row.set,
@@ -136,7 +144,10 @@ fn table(gpu: &GpuFinder, rate: f64, rows: &[Row]) -> String {
 fn object(gpu: &GpuFinder, rate: f64, rows: &[Row]) -> Value {
     let kernels = |row: &Row| -> Value {
         let named = row.report.kernels.iter();
-        named.map(|(name, time)| ((*name).to_owned(), json!(milliseconds(*time)))).collect::<serde_json::Map<_, _>>().into()
+        named
+            .map(|(name, time)| ((*name).to_owned(), json!(milliseconds(*time))))
+            .collect::<serde_json::Map<_, _>>()
+            .into()
     };
     let row = |row: &Row| {
         json!({
@@ -173,7 +184,8 @@ fn keep(gpu: &GpuFinder, object: &Value, quiet: bool) -> Result<(), Failure> {
         .map(str::to_owned)
         .collect();
     let path: PathBuf = Path::new(RESULTS).join(format!("{day}-gpu-{}.json", machine.join("-")));
-    let written = std::fs::create_dir_all(RESULTS).and_then(|()| std::fs::write(&path, format!("{object:#}\n")));
+    let written =
+        std::fs::create_dir_all(RESULTS).and_then(|()| std::fs::write(&path, format!("{object:#}\n")));
     written.map_err(|error| Failure::Input(format!("{}: {error}", path.display())))?;
     if quiet { Ok(()) } else { print(&format!("written to {}", path.display())) }
 }

@@ -1,0 +1,133 @@
+//! Comparisons: what is wrong, if anything is.
+
+use super::*;
+
+pub(super) fn same<T: PartialEq + Debug>(what: &str, found: &[T], wanted: &[T]) -> Option<String> {
+    if found.len() != wanted.len() {
+        return Some(format!("{} {what}, not {}", found.len(), wanted.len()));
+    }
+    let at = (0..found.len()).find(|&i| found[i] != wanted[i])?;
+    Some(format!("{what}: {:?} instead of {:?} at {at}", found[at], wanted[at]))
+}
+
+pub(super) fn sorted<T: Ord + Clone>(list: &[T]) -> Vec<T> {
+    let mut list = list.to_vec();
+    list.sort_unstable();
+    list
+}
+
+pub(super) fn compare_located(before: &State, found: &State, wanted: &State) -> Option<String> {
+    same("located", &found.located, &wanted.located).or_else(|| compare_cells(before, found, wanted))
+}
+
+pub(super) fn compare_cells(_: &State, found: &State, wanted: &State) -> Option<String> {
+    same("cells", &found.cells, &wanted.cells)
+}
+
+/// With subgroups a scan may take the lanes of a workgroup in another order, so what is asked for is
+/// what the kernels after it rely on: ranges of a start and a length fill everything up to `end`.
+pub(super) fn ranges_fault(ranges: impl Iterator<Item = (u32, u32)>, end: u32) -> Option<String> {
+    let mut at = 0;
+    for (start, n) in sorted(&ranges.filter(|range| range.1 > 0).collect::<Vec<_>>()) {
+        if start != at {
+            return Some(format!("a range begins at {start}, the one before it ends at {at}"));
+        }
+        at += n;
+    }
+    (at != end).then(|| format!("the ranges end at {at} instead of {end}"))
+}
+
+pub(super) fn compare_blocks(before: &State, found: &State, wanted: &State) -> Option<String> {
+    let block = CELLS_PER_BLOCK as usize;
+    let ranges: Vec<_> = found.starts.iter().copied().zip(before.cells.iter().map(entries_of)).collect();
+    let mut blocks = ranges.chunks(block).zip(&found.sums);
+    same("sums", &found.sums, &wanted.sums)
+        .or_else(|| blocks.find_map(|(ranges, &sum)| ranges_fault(ranges.iter().copied(), sum)))
+}
+
+pub(super) fn compare_sums(before: &State, found: &State, wanted: &State) -> Option<String> {
+    let blocks = found.sums.iter().copied().zip(before.sums.iter().copied());
+    same("counters", &[found.counters], &[wanted.counters])
+        .or_else(|| ranges_fault(blocks, found.counters.entries))
+}
+
+pub(super) fn compare_starts(before: &State, found: &State, wanted: &State) -> Option<String> {
+    same("starts", &found.starts, &wanted.starts).or_else(|| compare_cells(before, found, wanted))
+}
+
+pub(super) fn compare_schedules(_: &State, found: &State, wanted: &State) -> Option<String> {
+    same("counters", &[found.counters], &[wanted.counters])
+        .or_else(|| same("slots", &sorted(&found.slots), &sorted(&wanted.slots)))
+        .or_else(|| same("small items", &resolved(found), &resolved(wanted)))
+        .or_else(|| same("large items", &sorted(&found.large_items), &sorted(&wanted.large_items)))
+}
+
+/// Small items with the slots they reach into instead of those slots' places, which are free.
+pub(super) fn resolved(s: &State) -> Vec<(Vec<Slot>, u32, u32)> {
+    let slots = |item: &SmallItem| taken(&s.slots, item.slot, item.slots).to_vec();
+    let items = s.small_items.iter().map(|item| (slots(item), item.first_pair, item.pairs));
+    sorted(&items.collect::<Vec<_>>())
+}
+
+/// In each cell the residents come first, then the visitors, each in any order.
+pub(super) fn compare_entries(before: &State, found: &State, wanted: &State) -> Option<String> {
+    let cell_fault = |(ends, &start): (&Cell, &u32)| {
+        let part = |s: &State, from: u32, to: u32| sorted(&s.entries[from as usize..to as usize]);
+        let parts = [("residents", start, ends.residents), ("visitors", ends.residents, ends.visitors)];
+        let fault = |(what, from, to)| same(what, &part(found, from, to), &part(wanted, from, to));
+        parts.into_iter().find_map(fault)
+    };
+    same("cells", &found.cells, &wanted.cells)
+        .or_else(|| before.cells.iter().zip(&before.starts).find_map(cell_fault))
+}
+
+pub(super) fn compare_dispatches(_: &State, found: &State, wanted: &State) -> Option<String> {
+    same("dispatches", &found.dispatches, &wanted.dispatches)
+}
+
+/// The pairs in `out`, sorted.
+pub(super) fn decoded(s: &State) -> Result<Vec<Pair>, String> {
+    let n = s.params.boxes;
+    let counted = if s.has(BITS) { pair_count(n.into()).div_ceil(32) } else { wide(s.totals.words) };
+    let words = s.out.get(..counted as usize).ok_or(format!("{counted} words in {}", s.out.len()))?;
+    let pieces = if s.has(BITS) {
+        decode::bits(words, n)
+    } else if s.has(PACKED) {
+        decode::records(words, &s.entries, n)
+    } else {
+        decode::plain(words, n)
+    };
+    pieces.map(|pieces| sorted(&pieces.concat())).map_err(|error| error.to_string())
+}
+
+pub(super) fn compare_checks(_: &State, found: &State, wanted: &State) -> Option<String> {
+    let pairs = match decoded(found) {
+        Ok(pairs) => pairs,
+        Err(error) => return Some(error),
+    };
+    difference(&pairs, &decoded(wanted).expect("a twin writes what can be read"))
+        .or_else(|| same("counts", &counts(found), &counts(wanted)))
+        .or_else(|| words_fault(found, wanted))
+}
+
+/// Pairs, tests made, redundant ones, overlaps.
+pub(super) fn counts(s: &State) -> [u64; 4] {
+    [s.totals.pairs, s.totals.made, s.totals.redundant, s.totals.overlaps].map(wide)
+}
+
+/// Records may take fewer words than marked plain pairs of one workgroup each, not more.
+pub(super) fn words_fault(found: &State, wanted: &State) -> Option<String> {
+    let (words, plain) = (wide(found.totals.words), wide(wanted.totals.words));
+    let right = if found.has(PACKED) { words <= 3 * hits(wanted) } else { words == plain };
+    (!right).then(|| format!("{words} words, {plain} if plain"))
+}
+
+/// Pairs that a check has found.
+pub(super) fn hits(s: &State) -> u64 {
+    wide(s.totals.pairs).saturating_sub(wide(NEARLY))
+}
+
+pub(super) fn compare_indices(_: &State, found: &State, wanted: &State) -> Option<String> {
+    let pairs = |s: &State| -> Vec<[u32; 2]> { s.out.chunks_exact(3).map(|c| [c[1], c[2]]).collect() };
+    same("pairs", &pairs(found), &pairs(wanted))
+}

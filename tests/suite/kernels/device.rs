@@ -1,0 +1,86 @@
+//! Kernels on the device, one at a time.
+
+use super::*;
+
+/// One device with its subgroups, if it has any, and one without, for all tests.
+pub(super) fn bench(subgroups: bool) -> &'static Bench {
+    static BENCHES: [OnceLock<Bench>; 2] = [const { OnceLock::new() }; 2];
+    let open = || Bench::on_adapter(None, subgroups).expect("a device, be it a software one");
+    BENCHES[usize::from(subgroups)].get_or_init(open)
+}
+
+/// The devices on which a kernel has different texts.
+pub(super) fn benches(kernel: &Kernel) -> Vec<&'static Bench> {
+    let first = bench(true);
+    let second = (kernel.gains_from_subgroups() && first.subgroups()).then(|| bench(false));
+    [first].into_iter().chain(second).collect()
+}
+
+/// The state after a kernel has run on it.
+pub(super) fn on_device(bench: &Bench, twin: &Twin, options: &GpuOptions, before: &State) -> State {
+    let mut after = before.clone();
+    let names = twin.kernel.bindings;
+    let buffers: Vec<_> = names.iter().map(|name| padded(after.bytes(name))).collect();
+    let groups = (twin.groups)(before);
+    let left = bench.run(twin.kernel, options, &buffers, groups).expect("the device runs the kernel");
+    for (name, left) in names.iter().zip(&left) {
+        let own = after.bytes(name);
+        let len = own.len();
+        own.copy_from_slice(&left[..len]);
+    }
+    after
+}
+
+/// A binding needs room for one element at least, even of an empty list.
+pub(super) fn padded(bytes: &[u8]) -> Vec<u8> {
+    let mut bytes = bytes.to_vec();
+    bytes.resize(bytes.len().max(64), 0);
+    bytes
+}
+
+/// The state with room for exactly the words that the twin wrote, or that records may take.
+pub(super) fn with_room(before: &State, wanted: &State) -> State {
+    let words = if before.has(PACKED) { 3 * hits(wanted) as usize } else { wanted.out.len() };
+    let mut before = State { out: vec![0; words], ..before.clone() };
+    before.chunk.word_room = words as u32;
+    before
+}
+
+pub(super) fn after_twin(twin: &Twin, before: &State) -> State {
+    let mut wanted = before.clone();
+    (twin.run)(&mut wanted);
+    wanted
+}
+
+/// How a kernel differs from its twin on the same buffers, if it does.
+pub(super) fn fault(twin: &Twin, options: &GpuOptions, before: &State) -> Option<String> {
+    let wanted = after_twin(twin, before);
+    let before = with_room(before, &wanted);
+    benches(twin.kernel).into_iter().find_map(|bench| {
+        let found = on_device(bench, twin, options, &before);
+        let fault = (twin.compare)(&before, &found, &wanted)?;
+        Some(format!("{}, subgroups {}: {fault}", twin.kernel.name, bench.subgroups()))
+    })
+}
+
+/// On all sets.
+pub(super) fn agrees(kernel: &str) {
+    for case in cases() {
+        let before = State::before(kernel, &case);
+        assert_eq!(fault(twin(kernel), &GpuOptions::DEFAULT, &before), None, "{}", case.name);
+    }
+}
+
+/// On all sets, with all codings, filters and splits.
+pub(super) fn check_agrees(kernel: &str, codings: &[u32]) {
+    for case in cases() {
+        let before = State::before(kernel, &case);
+        for &coding in codings {
+            for (filtered, split) in [(0, 0), (FILTERED, 0), (FILTERED, before.params.boxes / 2)] {
+                let state = before.clone().with(coding | filtered, split);
+                let fault = fault(twin(kernel), &GpuOptions::DEFAULT, &state);
+                assert_eq!(fault, None, "{}, flags {}, split {split}", case.name, coding | filtered);
+            }
+        }
+    }
+}

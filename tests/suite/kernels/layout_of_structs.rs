@@ -1,0 +1,122 @@
+//! Structs, constants and bindings are the same in Rust and in WGSL.
+
+use super::*;
+
+/// A Rust struct that kernels share.
+struct Mirror {
+    name: &'static str,
+    size: usize,
+    fields: Vec<(&'static str, usize)>,
+}
+
+macro_rules! mirrors {
+    ($($name:ident { $($field:ident),* })*) => {
+        vec![$(Mirror {
+            name: stringify!($name),
+            size: size_of::<layout::$name>(),
+            fields: vec![$((stringify!($field), offset_of!(layout::$name, $field))),*],
+        }),*]
+    };
+}
+
+fn mirrors() -> Vec<Mirror> {
+    mirrors! {
+        Box { low, high }
+        Located { low, high, level }
+        Level { dims, shift, first_cell, unused }
+        Params {
+            origin, scale, reach_low, boxes, reach_high, levels, cells, small_cell, columns, flags, split,
+            entry_room, slot_room, small_room, large_room, unused, level
+        }
+        Chunk { first_small, small_items, first_large, large_items, word_room, unused, pairs_left }
+        Cell { residents, visitors }
+        Slot { start, shape, first_pair }
+        SmallItem { slot, slots, first_pair, pairs }
+        LargeItem { start, boxes, residents, row, column, end_column }
+        Counters { entries, slots, small_items, large_items }
+    }
+}
+
+/// The Rust field that begins where a member of WGSL does: padding is one array there.
+fn field_of(member: &str) -> Option<&str> {
+    match member {
+        "unused0" => Some("unused"),
+        "unused1" | "unused2" => None,
+        other => Some(other),
+    }
+}
+
+fn module_of(kernel: &Kernel) -> naga::Module {
+    let parsed = naga::front::wgsl::parse_str(&kernel.source(false));
+    parsed.unwrap_or_else(|error| panic!("{}: {error}", kernel.name))
+}
+
+/// Fields and size of a struct of a module.
+fn struct_of<'a>(module: &'a naga::Module, name: &str) -> Option<(Vec<(&'a str, usize)>, usize)> {
+    let named = module.types.iter().find(|(_, ty)| ty.name.as_deref() == Some(name));
+    let naga::TypeInner::Struct { members, span } = &named?.1.inner else { return None };
+    let field = |member: &'a naga::StructMember| {
+        let name = member.name.as_deref().expect("members of WGSL have names");
+        Some((field_of(name)?, member.offset as usize))
+    };
+    Some((members.iter().filter_map(field).collect(), *span as usize))
+}
+
+#[test]
+fn structs_lie_in_memory_as_in_the_kernels() {
+    for kernel in KERNELS {
+        let module = module_of(kernel);
+        for mirror in mirrors() {
+            let found = struct_of(&module, mirror.name);
+            let wanted = Some((mirror.fields, mirror.size));
+            assert_eq!(found, wanted, "{}: {}", kernel.name, mirror.name);
+        }
+    }
+}
+
+/// The value of a named constant of a kernel, if it has it.
+fn constant_of(module: &naga::Module, name: &str) -> Option<u32> {
+    let (_, constant) = module.constants.iter().find(|(_, c)| c.name.as_deref() == Some(name))?;
+    match module.global_expressions[constant.init] {
+        naga::Expression::Literal(naga::Literal::U32(value)) => Some(value),
+        ref other => panic!("{name} is {other:?}"),
+    }
+}
+
+#[test]
+fn constants_are_those_of_the_kernels() {
+    let everywhere = [
+        ("LANES", LANES),
+        ("MOST_LEVELS", layout::MOST_LEVELS as u32),
+        ("NO_LEVEL", NO_LEVEL),
+        ("BOX_BITS", BOX_BITS),
+        ("FILTERED", FILTERED),
+        ("PACKED", PACKED),
+        ("BITS", BITS),
+    ];
+    let somewhere =
+        [("CELLS_PER_BLOCK", CELLS_PER_BLOCK), ("CELLS_PER_LANE", CELLS_PER_BLOCK / LANES), ("PLAIN", PLAIN)];
+    let most_span = format!("const MOST_SPAN = {MOST_SPAN};");
+    for kernel in KERNELS {
+        let module = module_of(kernel);
+        for (name, value) in everywhere {
+            assert_eq!(constant_of(&module, name), Some(value), "{}: {name}", kernel.name);
+        }
+        for (name, value) in somewhere {
+            assert_eq!(constant_of(&module, name).unwrap_or(value), value, "{}: {name}", kernel.name);
+        }
+        // An abstract number, of which a parsed module keeps nothing.
+        assert!(kernel.source(false).contains(&most_span), "{}", kernel.name);
+    }
+}
+
+#[test]
+fn bindings_are_those_of_the_kernels() {
+    for kernel in KERNELS {
+        let module = module_of(kernel);
+        let variables = module.global_variables.iter().map(|(_, variable)| variable);
+        let bound = variables.filter_map(|v| Some((v.binding.as_ref()?.binding, v.name.as_deref()?)));
+        let wanted: Vec<_> = (0u32..).zip(kernel.bindings.iter().copied()).collect();
+        assert_eq!(sorted(&bound.collect::<Vec<_>>()), wanted, "{}", kernel.name);
+    }
+}

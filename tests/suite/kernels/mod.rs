@@ -1,0 +1,408 @@
+//! The contract of the kernels: each, run alone, leaves in its buffers what a plain scalar twin leaves in
+//! the same buffers. Where the device's order is free, sets are compared.
+//!
+//! The twins say what a kernel is for, not how it does it; together they find the oracle's pairs.
+
+mod compare;
+mod device;
+mod layout_of_structs;
+mod state;
+mod twins;
+
+use bytemuck::{bytes_of_mut, cast_slice_mut};
+use compare::*;
+use device::*;
+use pbig_core::decode::{self, PLAIN};
+use pbig_core::gpu::study::Bench;
+use pbig_core::layout::{
+    self, BITS, BOX_BITS, CELLS_PER_BLOCK, Cell, Chunk, Counters, FILTERED, LANES, LargeItem, Level, Located,
+    MOST_SPAN, NO_LEVEL, PACKED, Params, Slot, SmallItem, Totals, halves, wide,
+};
+use pbig_core::pair_index::{index_of, pair_count, pair_of};
+use pbig_core::plan::{GpuPlan, Summary};
+use pbig_core::{Aabb, Config, GpuOptions, Pair, ProxyFilter, oracle};
+use pbig_harness::boxes::BoxSet;
+use pbig_shaders::{self as shaders, KERNELS, Kernel};
+use pbig_tests::{corpus, difference};
+use state::*;
+use std::fmt::Debug;
+use std::mem::offset_of;
+use std::sync::OnceLock;
+use twins::*;
+
+#[test]
+fn every_kernel_has_a_twin() {
+    let names: Vec<_> = TWINS.iter().map(|twin| twin.kernel.name).collect();
+    assert_eq!(names, KERNELS.iter().map(|kernel| kernel.name).collect::<Vec<_>>());
+}
+
+#[test]
+fn the_twins_together_find_the_pairs_of_the_oracle() {
+    for case in cases() {
+        let before = State::before("check_small", &case);
+        let filters = &before.filters;
+        let wanted =
+            [(0, oracle::pairs(&case.boxes)), (FILTERED, oracle::pairs_filtered(&case.boxes, filters))];
+        for (flags, wanted) in wanted {
+            let state = before.clone().with(flags, 0);
+            let pairs =
+                |kernel| decoded(&after_twin(twin(kernel), &state)).expect("a twin writes plain pairs");
+            let both = sorted(&[pairs("check_small"), pairs("check_large")].concat());
+            assert_eq!(difference(&both, &wanted), None, "{}, flags {flags}", case.name);
+            assert_eq!(difference(&pairs("check_all"), &wanted), None, "{}, flags {flags}", case.name);
+        }
+    }
+}
+
+/// What the tests below say would mean little if the sets did not lead everywhere.
+#[test]
+fn the_sets_have_small_and_large_cells_several_levels_and_visitors() {
+    let states: Vec<_> = cases().iter().map(|case| State::before("scatter", case)).collect();
+    some(&states, "block after the first", |s| s.sums.len() > 1);
+    some(&states, "visitors", |s| s.cells.iter().any(|ends| ends.visitors > ends.residents));
+    some(&states, "levels", |s| s.params.levels > 2);
+    some(&states, "both kinds of items", |s| s.counters.small_items > 1 && s.counters.large_items > 1);
+    some(&states, "rows beyond the first segment", |s| s.large_items.iter().any(|item| item.row > 0));
+    some(&states, "columns after a row's own", |s| s.large_items.iter().any(|item| item.column > item.row));
+    some(&states, "item of several segments", |s| {
+        s.large_items.iter().any(|item| item.end_column > item.column + 1)
+    });
+    let skips = |case: &Case| {
+        let s = State::before("check_large", case);
+        s.large_items.iter().any(|item| {
+            let mut checked = Checked::default();
+            check_large_item(&s, item, &mut checked);
+            checked.made == 0
+        })
+    };
+    assert!(cases().iter().any(skips), "no large item is skipped");
+}
+
+fn some(states: &[State], what: &str, has: impl Fn(&State) -> bool) {
+    assert!(states.iter().any(has), "no {what}");
+}
+
+#[test]
+fn locate_agrees_with_its_twin() {
+    agrees("locate");
+}
+
+#[test]
+fn visit_agrees_with_its_twin() {
+    agrees("visit");
+}
+
+#[test]
+fn scan_blocks_agrees_with_its_twin() {
+    agrees("scan_blocks");
+}
+
+#[test]
+fn scan_sums_agrees_with_its_twin() {
+    agrees("scan_sums");
+}
+
+/// More blocks than lanes, so that the one workgroup takes several turns.
+#[test]
+fn scan_sums_agrees_with_its_twin_on_many_blocks() {
+    for blocks in [1u32, 255, 256, 257, 1000] {
+        let params = Params { cells: blocks * CELLS_PER_BLOCK - 5, ..Params::default() };
+        let sums = (0..blocks).map(|i| i * 7919 % 100).collect();
+        let before = State { params, sums, ..State::default() };
+        assert_eq!(fault(twin("scan_sums"), &GpuOptions::DEFAULT, &before), None, "{blocks} blocks");
+    }
+}
+
+#[test]
+fn scan_add_agrees_with_its_twin() {
+    agrees("scan_add");
+}
+
+#[test]
+fn schedule_agrees_with_its_twin() {
+    agrees("schedule");
+}
+
+/// Cells of hundreds of segments, whose items `schedule` numbers by a formula, in every width.
+#[test]
+fn schedule_numbers_the_items_of_huge_cells_without_gaps() {
+    for columns in [1, 2, 3, 8] {
+        let shapes = [(1, 0), (256, 1), (257, 0), (1, 5000), (3000, 2000), (90_000, 0), (700, 70_000)];
+        let cells = shapes.map(|(residents, visitors)| Cell { residents, visitors }).to_vec();
+        let params = Params { cells: 7, small_cell: 32, columns, ..Params::default() };
+        let mut before = State { params, cells, starts: vec![0; 7], sums: vec![0], ..State::default() };
+        scan_blocks(&mut before);
+        scan_sums(&mut before);
+        scan_add(&mut before);
+        let wanted = after_twin(twin("schedule"), &before);
+        let Counters { entries, slots, small_items, large_items } = wanted.counters;
+        set_rooms(&mut before.params, &[entries, slots, small_items, large_items]);
+        before.large_items = vec![LargeItem::default(); large_items as usize];
+        assert_eq!(fault(twin("schedule"), &GpuOptions::DEFAULT, &before), None, "{columns} columns");
+    }
+}
+
+#[test]
+fn scatter_agrees_with_its_twin() {
+    agrees("scatter");
+}
+
+#[test]
+fn arrange_agrees_with_its_twin() {
+    agrees("arrange");
+}
+
+#[test]
+fn arrange_dispatches_nothing_without_room_and_rows_of_many() {
+    let found = Counters { entries: 10, slots: 20, small_items: 100_000, large_items: 32_769 };
+    let rooms = [10, 20, 100_000, 32_769];
+    let dispatches = |rooms: [u32; 4], large_items: u32| {
+        let mut before = State { counters: found, ..State::default() };
+        set_rooms(&mut before.params, &rooms);
+        before.chunk = Chunk { small_items: 1 << 16, large_items, ..Chunk::default() };
+        assert_eq!(fault(twin("arrange"), &GpuOptions::DEFAULT, &before), None, "{rooms:?}");
+        after_twin(twin("arrange"), &before).dispatches
+    };
+    assert_eq!(dispatches(rooms, 5), [32_768, 2, 1, 5, 1, 1]);
+    assert_eq!(dispatches(rooms, u32::MAX >> 1), [32_768, 2, 1, 32_768, 2, 1]);
+    for list in 0..4 {
+        let mut less = rooms;
+        less[list] -= 1;
+        assert_eq!(dispatches(less, 5), [0, 0, 1, 0, 0, 1], "list {list}");
+    }
+}
+
+#[test]
+fn check_small_agrees_with_its_twin() {
+    check_agrees("check_small", &[0, PACKED]);
+}
+
+#[test]
+fn check_large_agrees_with_its_twin() {
+    check_agrees("check_large", &[0, PACKED]);
+}
+
+#[test]
+fn check_large_agrees_with_its_twin_without_load_balancing() {
+    let options = GpuOptions { load_balancing: false, ..GpuOptions::DEFAULT };
+    for case in cases() {
+        for flags in [0, PACKED] {
+            let before = State::before("check_large", &case).with(flags, 0);
+            assert_eq!(fault(twin("check_large"), &options, &before), None, "{}, flags {flags}", case.name);
+        }
+    }
+}
+
+#[test]
+fn check_small_agrees_with_its_twin_for_every_root() {
+    let before = State::before("check_small", &pile());
+    for root in 0..=9 {
+        let options = GpuOptions { root, ..GpuOptions::DEFAULT };
+        assert_eq!(fault(twin("check_small"), &options, &before), None, "root {root}");
+    }
+}
+
+#[test]
+fn check_all_agrees_with_its_twin() {
+    check_agrees("check_all", &[0, PACKED, BITS]);
+}
+
+/// Around the limits of a workgroup, and without any pair.
+#[test]
+fn check_all_agrees_with_its_twin_on_few_boxes() {
+    for n in [1, 2, 3, 8, 9, 23, 24, 33] {
+        let case =
+            Case { name: "few", boxes: vec![Aabb::new([0.0; 3], [1.0; 3]); n], small_cell: 32, columns: 8 };
+        for flags in [0, PACKED, BITS] {
+            let before = State::new(&case).with(flags, 0);
+            let fault = fault(twin("check_all"), &GpuOptions::DEFAULT, &before);
+            assert_eq!(fault, None, "{n} boxes, flags {flags}");
+        }
+    }
+}
+
+#[test]
+fn a_chunk_is_its_items_and_no_others() {
+    for (kernel, case) in [("check_small", pile()), ("check_large", crowd())] {
+        for flags in [0, PACKED] {
+            let mut before = State::before(kernel, &case).with(flags, 0);
+            let Counters { small_items: small, large_items: large, .. } = before.counters;
+            for (from, part) in [(0, 3), (1, 3), (2, 1)] {
+                before.chunk = Chunk {
+                    first_small: from * small / 3,
+                    small_items: small / part,
+                    first_large: from * large / 3,
+                    large_items: large / part,
+                    ..before.chunk
+                };
+                let fault = fault(twin(kernel), &GpuOptions::DEFAULT, &before);
+                assert_eq!(fault, None, "{kernel}, flags {flags}, {:?}", before.chunk);
+            }
+        }
+    }
+}
+
+#[test]
+fn nothing_is_checked_once_there_are_too_many_pairs() {
+    for kernel in ["check_small", "check_large", "check_all"] {
+        let mut before = State::before(kernel, &pile());
+        before.out = vec![0; 1 << 16];
+        before.chunk.word_room = 1 << 16;
+        before.chunk.pairs_left = halves(wide(NEARLY) - 1);
+        for bench in benches(twin(kernel).kernel) {
+            let found = on_device(bench, twin(kernel), &GpuOptions::DEFAULT, &before);
+            assert_eq!((found.totals, &found.out), (before.totals, &before.out), "{kernel}");
+        }
+    }
+}
+
+#[test]
+fn the_checks_count_what_they_have_no_room_for_and_write_nothing_there() {
+    for (kernel, case) in [("check_small", pile()), ("check_large", crowd()), ("check_all", pile())] {
+        for flags in [0, PACKED] {
+            let before = State::before(kernel, &case).with(flags, 0);
+            let wanted = after_twin(twin(kernel), &before);
+            let mut before = with_room(&before, &wanted);
+            before.chunk.word_room = hits(&wanted) as u32 / 2;
+            let found = on_device(bench(true), twin(kernel), &GpuOptions::DEFAULT, &before);
+            assert_eq!(same("counts", &counts(&found), &counts(&wanted)), None, "{kernel}, flags {flags}");
+            assert_eq!(words_fault(&found, &wanted), None, "{kernel}, flags {flags}");
+            let beyond = &found.out[before.chunk.word_room as usize..];
+            assert!(beyond.iter().all(|&word| word == 0), "{kernel}, flags {flags}: written beyond the room");
+        }
+    }
+}
+
+#[test]
+fn schedule_counts_what_it_has_no_room_for_and_writes_nothing_there() {
+    let mut before = State::before("schedule", &pile());
+    let wanted = after_twin(twin("schedule"), &before);
+    let Counters { entries, slots, small_items, large_items } = wanted.counters;
+    let [slots, small, large] = [slots, small_items, large_items].map(|n| n / 2);
+    set_rooms(&mut before.params, &[entries, slots, small, large]);
+    for bench in benches(&shaders::SCHEDULE) {
+        let found = on_device(bench, twin("schedule"), &GpuOptions::DEFAULT, &before);
+        assert_eq!(found.counters, wanted.counters);
+        assert_eq!(room_fault(&found.slots, slots, &wanted.slots), None);
+        assert_eq!(room_fault(&found.large_items, large, &wanted.large_items), None);
+        // What a small item names depends on the order of the slots.
+        let (within, beyond) = found.small_items.split_at(small as usize);
+        assert!(within.iter().all(|item| item.pairs > 0), "a gap in the small items");
+        assert!(beyond.iter().all(|item| *item == SmallItem::default()), "a small item beyond the room");
+    }
+}
+
+/// A list of which only the first `room` places may be used: by different ones of those wanted.
+fn room_fault<T: Ord + Clone + Debug + Default>(found: &[T], room: u32, wanted: &[T]) -> Option<String> {
+    let (within, beyond) = found.split_at(room as usize);
+    let mut within = sorted(within);
+    within.dedup();
+    let strange =
+        within.iter().find(|item| !wanted.contains(item)).map(|item| format!("{item:?} is not wanted"));
+    let twice = (within.len() < room as usize).then(|| "something twice".to_owned());
+    let too_far = beyond.iter().find(|item| **item != T::default());
+    strange.or(twice).or(too_far.map(|item| format!("{item:?} is beyond the room")))
+}
+
+#[test]
+fn scatter_writes_nothing_without_room_for_all() {
+    let mut before = State::before("scatter", &pile());
+    before.params.entry_room -= 1;
+    let found = on_device(bench(true), twin("scatter"), &GpuOptions::DEFAULT, &before);
+    assert_eq!(same("entries", &found.entries, &before.entries), None);
+    assert_eq!(same("cells", &found.cells, &before.cells), None);
+}
+
+#[test]
+fn index_pairs_agrees_with_its_twin_for_every_root() {
+    for n in [2u32, 3, 4, 5, 31, 32, 33, 100, 257, 1000, 4097, 16_384, 32_767, 32_768] {
+        let all = pair_count(n.into()) as u32;
+        let count = all.min(20_000);
+        for first in [0, (all - count) / 3, all - count] {
+            for root in 0..=9 {
+                let place = format!("n {n}, from {first}, root {root}");
+                assert_eq!(index_fault(root, &indices(n, first, count)), None, "{place}");
+            }
+        }
+    }
+}
+
+/// The exact pairs, and how far off the estimated rows may be: one or two for a good root; one Newton
+/// step leaves an error of up to 0.18% of the root, which is up to twice n.
+fn index_fault(root: u32, before: &State) -> Option<String> {
+    let options = GpuOptions { root, ..GpuOptions::DEFAULT };
+    let kernel = twin("index_pairs");
+    let wanted = after_twin(kernel, before);
+    let found = on_device(bench(true), kernel, &options, &with_room(before, &wanted));
+    let far = if matches!(root, 1 | 5) { 2 + before.params.boxes / 500 } else { 2 };
+    let rows = found.out.iter().zip(&wanted.out).step_by(3);
+    let worst = rows.max_by_key(|(estimate, row)| estimate.abs_diff(**row))?;
+    let near = worst.0.abs_diff(*worst.1) <= far;
+    (kernel.compare)(before, &found, &wanted)
+        .or_else(|| (!near).then(|| format!("row {} was estimated as {}", worst.1, worst.0)))
+}
+
+/// Spoils what a kernel has left.
+type Plant = fn(&mut State);
+
+/// A comparison that finds no fault in anything would pass every test above.
+#[test]
+fn planted_faults_are_noticed() {
+    let faults: [(&str, Plant); 20] = [
+        ("locate", |s| s.located[7].high[1] += 1),
+        ("locate", |s| full(s).0.residents -= 1),
+        ("visit", |s| full(s).0.visitors += 1),
+        ("scan_blocks", |s| *s.sums.last_mut().expect("a block") += 1),
+        ("scan_blocks", |s| *full(s).1 += 1),
+        ("scan_sums", |s| s.sums[0] += 1),
+        ("scan_sums", |s| s.counters.entries -= 1),
+        ("scan_add", |s| *full(s).1 += 1),
+        ("schedule", |s| s.slots[1].first_pair += 1),
+        ("schedule", |s| s.small_items[1].slot -= 1),
+        ("schedule", |s| s.small_items[1].pairs -= 1),
+        ("schedule", |s| s.large_items.truncate(s.large_items.len() - 1)),
+        ("scatter", |s| s.entries[5] ^= 1 << BOX_BITS),
+        ("scatter", |s| s.entries[5] += 1),
+        ("arrange", |s| s.dispatches[3] += 1),
+        ("check_small", drop_a_pair),
+        ("check_large", drop_a_pair),
+        ("check_all", drop_a_pair),
+        ("check_small", |s| s.totals.redundant[0] ^= 1),
+        ("index_pairs", |s| s.out[4] ^= 1),
+    ];
+    for (i, (kernel, plant)) in faults.into_iter().enumerate() {
+        let before = State::before(kernel, &pile());
+        let wanted = after_twin(twin(kernel), &before);
+        let mut found = wanted.clone();
+        assert_eq!((twin(kernel).compare)(&before, &found, &wanted), None, "{kernel}");
+        plant(&mut found);
+        assert!((twin(kernel).compare)(&before, &found, &wanted).is_some(), "fault {i}, {kernel}");
+    }
+}
+
+/// A cell with residents, and its start.
+fn full(s: &mut State) -> (&mut Cell, &mut u32) {
+    let mut cells = s.cells.iter_mut().zip(&mut s.starts);
+    cells.find(|(cell, _)| cell.residents > 0).expect("a cell with residents")
+}
+
+/// From the list only: the counts still have it.
+fn drop_a_pair(s: &mut State) {
+    s.out.truncate(s.out.len() - 2);
+    s.totals.words = halves(s.out.len() as u64);
+}
+
+/// A planted fault in what a device is given, rather than in what it returned.
+#[test]
+fn an_entry_that_lost_a_bit_costs_pairs() {
+    let mut before = State::before("check_small", &pile());
+    let wanted = after_twin(twin("check_small"), &before);
+    let lost = 7u32 << BOX_BITS;
+    for entry in &mut before.entries {
+        *entry = if *entry & lost == lost { *entry & !(1 << BOX_BITS) } else { *entry };
+    }
+    let before = with_room(&before, &wanted);
+    let found = on_device(bench(true), twin("check_small"), &GpuOptions::DEFAULT, &before);
+    let fault = compare_checks(&before, &found, &wanted).expect("pairs are missing");
+    assert!(fault.starts_with("missing"), "{fault}");
+}

@@ -1,0 +1,182 @@
+//! Every buffer that a kernel can bind, and the sets that the kernels run on.
+
+use super::*;
+
+/// Counts begin just below 2^32, so that every test carries into the high half.
+pub(super) const NEARLY: [u32; 2] = [u32::MAX - 2, 0];
+
+/// Every buffer that a kernel can bind.
+#[derive(Clone, Debug, Default)]
+pub(super) struct State {
+    pub(super) params: Params,
+    pub(super) chunk: Chunk,
+    pub(super) boxes: Vec<layout::Box>,
+    pub(super) filters: Vec<ProxyFilter>,
+    pub(super) located: Vec<Located>,
+    pub(super) cells: Vec<Cell>,
+    pub(super) starts: Vec<u32>,
+    pub(super) sums: Vec<u32>,
+    pub(super) counters: Counters,
+    pub(super) slots: Vec<Slot>,
+    pub(super) small_items: Vec<SmallItem>,
+    pub(super) large_items: Vec<LargeItem>,
+    pub(super) entries: Vec<u32>,
+    pub(super) dispatches: [u32; 6],
+    pub(super) totals: Totals,
+    pub(super) out: Vec<u32>,
+}
+
+/// Boxes, and how their cells are scheduled.
+pub(super) struct Case {
+    pub(super) name: &'static str,
+    pub(super) boxes: Vec<Aabb>,
+    pub(super) small_cell: u32,
+    pub(super) columns: u32,
+}
+
+pub(super) fn set(name: &str, n: usize) -> Vec<Aabb> {
+    BoxSet::named(name).expect("the set exists").boxes(n, 1)
+}
+
+pub(super) fn cases() -> Vec<Case> {
+    let decades = corpus().into_iter().find(|case| case.name == "sizes over twelve decades");
+    let case = |name, boxes, small_cell, columns| Case { name, boxes, small_cell, columns };
+    vec![
+        case("mixed", set("mixed", 3000), 32, 8),
+        pile(),
+        case("degenerate", set("degenerate", 500), 32, 8),
+        case("identical", vec![Aabb::new([0.0; 3], [1.0; 3]); 600], 32, 1),
+        case("decades", decades.expect("the corpus has it").boxes, 32, 2),
+        crowd(),
+    ]
+}
+
+/// Cells of about four boxes, half of which count as large.
+pub(super) fn pile() -> Case {
+    Case { name: "pile", boxes: set("pile", 6000), small_cell: 4, columns: 8 }
+}
+
+/// Many identical boxes across the borders of cells: large cells that own none of their pairs.
+pub(super) fn crowd() -> Case {
+    let mut boxes = set("pile", 1000);
+    boxes.extend(vec![boxes[500]; 700]);
+    Case { name: "crowd in a pile", boxes, small_cell: 32, columns: 2 }
+}
+
+/// Filters that allow some pairs, and forbid some for each of the reasons there are.
+pub(super) fn filter(i: u32) -> ProxyFilter {
+    ProxyFilter {
+        body: if i.is_multiple_of(4) { ProxyFilter::NO_BODY } else { i % 50 },
+        kind: 1 << (i % 3),
+        accepted_kinds: 1 << (i % 2) | 1,
+        test_mode: (i / 2 % 2) as u16,
+        memberships: 1 << (i % 5),
+        mask: !(1 << (i % 3)),
+    }
+}
+
+impl State {
+    /// The buffers of a call before its first kernel, with room for exactly what will be found.
+    pub(super) fn new(case: &Case) -> Self {
+        let n = case.boxes.len();
+        let plan = GpuPlan::new(&Summary::of(&case.boxes, None), &Config::DEFAULT, 1.0, 1 << 20);
+        let (small_cell, columns) = (case.small_cell, case.columns);
+        let params = Params { boxes: n as u32, small_cell, columns, ..plan.params() };
+        let mut state = Self {
+            params,
+            chunk: Chunk {
+                small_items: 1 << 16,
+                large_items: 1 << 16,
+                pairs_left: [u32::MAX; 2],
+                ..Chunk::default()
+            },
+            boxes: case.boxes.iter().map(layout::Box::new).collect(),
+            filters: (0..n as u32).map(filter).collect(),
+            located: vec![Located::default(); n],
+            cells: vec![Cell::default(); params.cells as usize],
+            starts: vec![0; params.cells as usize],
+            sums: vec![0; params.cells.div_ceil(CELLS_PER_BLOCK) as usize],
+            totals: Totals {
+                words: [0; 2],
+                pairs: NEARLY,
+                made: NEARLY,
+                redundant: NEARLY,
+                overlaps: NEARLY,
+            },
+            ..Self::default()
+        };
+        state.make_room();
+        state
+    }
+
+    /// As much room in the lists as the twins say, so that anything too much has no place to hide.
+    pub(super) fn make_room(&mut self) {
+        let mut dry = self.clone();
+        set_rooms(&mut dry.params, &[u32::MAX; 4]);
+        TWINS.iter().take_while(|twin| twin.kernel.name != "scatter").for_each(|twin| (twin.run)(&mut dry));
+        let Counters { entries, slots, small_items, large_items } = dry.counters;
+        set_rooms(&mut self.params, &[entries, slots, small_items, large_items]);
+        self.entries = vec![0; entries as usize];
+        self.slots = vec![Slot::default(); slots as usize];
+        self.small_items = vec![SmallItem::default(); small_items as usize];
+        self.large_items = vec![LargeItem::default(); large_items as usize];
+    }
+
+    /// The state before a kernel: the twins of those before it have run.
+    pub(super) fn before(kernel: &str, case: &Case) -> Self {
+        if kernel == "index_pairs" {
+            return indices(1000, 77, 4000);
+        }
+        let mut state = Self::new(case);
+        for twin in TWINS.iter().take_while(|twin| twin.kernel.name != kernel) {
+            // The checks do not build upon each other.
+            if !twin.kernel.name.starts_with("check") {
+                (twin.run)(&mut state);
+            }
+        }
+        state
+    }
+
+    pub(super) fn with(mut self, flags: u32, split: u32) -> Self {
+        (self.params.flags, self.params.split) = (flags, split);
+        self
+    }
+
+    pub(super) fn has(&self, flag: u32) -> bool {
+        self.params.flags & flag != 0
+    }
+
+    /// The buffer of a binding.
+    pub(super) fn bytes(&mut self, binding: &str) -> &mut [u8] {
+        match binding {
+            "params" => bytes_of_mut(&mut self.params),
+            "chunk" => bytes_of_mut(&mut self.chunk),
+            "boxes" => cast_slice_mut(&mut self.boxes),
+            "filters" => cast_slice_mut(&mut self.filters),
+            "located" => cast_slice_mut(&mut self.located),
+            "cells" => cast_slice_mut(&mut self.cells),
+            "starts" => cast_slice_mut(&mut self.starts),
+            "sums" => cast_slice_mut(&mut self.sums),
+            "counters" => bytes_of_mut(&mut self.counters),
+            "slots" => cast_slice_mut(&mut self.slots),
+            "small_items" => cast_slice_mut(&mut self.small_items),
+            "large_items" => cast_slice_mut(&mut self.large_items),
+            "entries" => cast_slice_mut(&mut self.entries),
+            "dispatches" => bytes_of_mut(&mut self.dispatches),
+            "totals" => bytes_of_mut(&mut self.totals),
+            "out" => cast_slice_mut(&mut self.out),
+            other => panic!("no buffer {other}"),
+        }
+    }
+}
+
+/// Room for entries, slots, small and large items.
+pub(super) fn set_rooms(params: &mut Params, rooms: &[u32; 4]) {
+    [params.entry_room, params.slot_room, params.small_room, params.large_room] = *rooms;
+}
+
+/// What index_pairs reads and writes for `count` indices from `first` on.
+pub(super) fn indices(n: u32, first: u32, count: u32) -> State {
+    let params = Params { boxes: n, split: first, cells: count, ..Params::default() };
+    State { params, ..State::default() }
+}

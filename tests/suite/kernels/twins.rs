@@ -1,0 +1,401 @@
+//! The twins: what each kernel is for, one box, cell or pair after the other.
+
+use super::*;
+
+/// A kernel, what it should do, how many workgroups do it, and how the results are compared: the state
+/// before, what was found, what was wanted.
+pub(super) struct Twin {
+    pub(super) kernel: &'static Kernel,
+    pub(super) run: fn(&mut State),
+    pub(super) groups: fn(&State) -> u32,
+    pub(super) compare: fn(&State, &State, &State) -> Option<String>,
+}
+
+/// The twins, in the order in which the kernels run.
+pub(super) static TWINS: [Twin; 12] = [
+    Twin { kernel: &shaders::LOCATE, run: locate, groups: by_box, compare: compare_located },
+    Twin { kernel: &shaders::VISIT, run: visit, groups: by_box, compare: compare_cells },
+    Twin { kernel: &shaders::SCAN_BLOCKS, run: scan_blocks, groups: by_block, compare: compare_blocks },
+    Twin { kernel: &shaders::SCAN_SUMS, run: scan_sums, groups: one, compare: compare_sums },
+    Twin { kernel: &shaders::SCAN_ADD, run: scan_add, groups: by_cell, compare: compare_starts },
+    Twin { kernel: &shaders::SCHEDULE, run: schedule, groups: by_block, compare: compare_schedules },
+    Twin { kernel: &shaders::SCATTER, run: scatter, groups: by_box, compare: compare_entries },
+    Twin { kernel: &shaders::ARRANGE, run: arrange, groups: one, compare: compare_dispatches },
+    Twin { kernel: &shaders::CHECK_SMALL, run: check_small, groups: by_small_item, compare: compare_checks },
+    Twin { kernel: &shaders::CHECK_LARGE, run: check_large, groups: by_large_item, compare: compare_checks },
+    Twin { kernel: &shaders::CHECK_ALL, run: check_all, groups: by_pair, compare: compare_checks },
+    Twin { kernel: &shaders::INDEX_PAIRS, run: index_pairs, groups: by_cell, compare: compare_indices },
+];
+
+pub(super) fn twin(kernel: &str) -> &'static Twin {
+    TWINS.iter().find(|twin| twin.kernel.name == kernel).expect("a twin for each kernel")
+}
+
+pub(super) fn one(_: &State) -> u32 {
+    1
+}
+
+pub(super) fn by_box(s: &State) -> u32 {
+    s.params.boxes.div_ceil(LANES)
+}
+
+pub(super) fn by_cell(s: &State) -> u32 {
+    s.params.cells.div_ceil(LANES)
+}
+
+pub(super) fn by_block(s: &State) -> u32 {
+    s.params.cells.div_ceil(CELLS_PER_BLOCK)
+}
+
+pub(super) fn by_small_item(s: &State) -> u32 {
+    s.counters.small_items.min(s.chunk.small_items)
+}
+
+pub(super) fn by_large_item(s: &State) -> u32 {
+    s.counters.large_items.min(s.chunk.large_items)
+}
+
+pub(super) fn by_pair(s: &State) -> u32 {
+    pair_count(s.params.boxes.into()).div_ceil(LANES.into()) as u32
+}
+
+pub(super) fn locate(s: &mut State) {
+    for id in 0..s.boxes.len() {
+        let one = s.boxes[id];
+        if one.low[0] > one.high[0] {
+            s.located[id].level = NO_LEVEL;
+            continue;
+        }
+        let cells = |corner: [i32; 3]| [0, 1, 2].map(|k| finest_cell(&s.params, corner[k], k));
+        let mut at = Located { low: cells(one.low), high: cells(one.high), level: 0 };
+        at.level = level_of(&s.params, &at);
+        s.located[id] = at;
+        for (cell, _) in cells_of(&s.params, &at, at.level) {
+            s.cells[cell].residents += 1;
+        }
+    }
+}
+
+/// The float of an ordered integer.
+pub(super) fn float_of(key: i32) -> f32 {
+    let bits = if key < 0 { key ^ i32::MAX } else { key };
+    f32::from_bits(bits as u32)
+}
+
+pub(super) fn finest_cell(params: &Params, key: i32, k: usize) -> i32 {
+    let x = float_of(key.clamp(params.reach_low[k], params.reach_high[k]));
+    let cell = ((x - params.origin[k]) * params.scale).floor();
+    cell.clamp(-1073741760.0, 1073741760.0) as i32
+}
+
+/// The first level at which the box touches few cells on each axis, or the last.
+pub(super) fn level_of(params: &Params, at: &Located) -> u32 {
+    let steps = |l: &Level, k: usize| (at.high[k] >> l.shift) - (at.low[k] >> l.shift);
+    let fits = |l: &Level| (0..3).all(|k| l.dims[k] == 1 || steps(l, k) < MOST_SPAN as i32);
+    let last = params.levels - 1;
+    (0..last).find(|&level| fits(&params.level[level as usize])).unwrap_or(last)
+}
+
+/// The cells that a box touches at a level, each with the axes' bits of its entry there.
+pub(super) fn cells_of(params: &Params, at: &Located, level: u32) -> Vec<(usize, u32)> {
+    let l = params.level[level as usize];
+    let range = |k: usize| if l.dims[k] == 1 { 0..=0 } else { at.low[k] >> l.shift..=at.high[k] >> l.shift };
+    let lowest = [0, 1, 2].map(|k| *range(k).start());
+    let mut cells = Vec::new();
+    for z in range(2) {
+        for y in range(1) {
+            for x in range(0) {
+                cells.push(cell_at(&l, [x, y, z], lowest));
+            }
+        }
+    }
+    cells
+}
+
+pub(super) fn cell_at(l: &Level, place: [i32; 3], lowest: [i32; 3]) -> (usize, u32) {
+    let wrapped = |k: usize| ((i64::from(place[k]) + (1 << 30)) % i64::from(l.dims[k])) as u32;
+    let index = l.first_cell + (wrapped(2) * l.dims[1] + wrapped(1)) * l.dims[0] + wrapped(0);
+    let axes: u32 = (0..3).map(|k| u32::from(place[k] == lowest[k]) << k).sum();
+    (index as usize, axes << BOX_BITS)
+}
+
+pub(super) fn visit(s: &mut State) {
+    for at in s.located.iter().filter(|at| at.level != NO_LEVEL) {
+        for level in at.level + 1..s.params.levels {
+            for (cell, _) in cells_of(&s.params, at, level) {
+                let cell = &mut s.cells[cell];
+                cell.visitors += u32::from(cell.residents > 0);
+            }
+        }
+    }
+}
+
+pub(super) fn entries_of(cell: &Cell) -> u32 {
+    cell.residents + cell.visitors
+}
+
+pub(super) fn scan_blocks(s: &mut State) {
+    for (block, cells) in s.cells.chunks(CELLS_PER_BLOCK as usize).enumerate() {
+        let mut sum = 0;
+        for (i, cell) in cells.iter().enumerate() {
+            s.starts[block * CELLS_PER_BLOCK as usize + i] = sum;
+            sum += entries_of(cell);
+        }
+        s.sums[block] = sum;
+    }
+}
+
+pub(super) fn scan_sums(s: &mut State) {
+    let mut sum = 0;
+    for block in &mut s.sums {
+        let own = *block;
+        *block = sum;
+        sum += own;
+    }
+    s.counters.entries = sum;
+}
+
+/// The counts of a cell become the ends of its residents and of its visitors behind them.
+pub(super) fn scan_add(s: &mut State) {
+    for (i, (start, cell)) in s.starts.iter_mut().zip(&mut s.cells).enumerate() {
+        *start += s.sums[i / CELLS_PER_BLOCK as usize];
+        cell.residents += *start;
+        cell.visitors += cell.residents;
+    }
+}
+
+/// The counts of a cell after scan_add.
+pub(super) fn counts_of(ends: &Cell, start: u32) -> Cell {
+    Cell { residents: ends.residents - start, visitors: ends.visitors - ends.residents }
+}
+
+pub(super) fn schedule(s: &mut State) {
+    let (mut slots, mut small, mut large) = (Vec::new(), Vec::new(), Vec::new());
+    let (small_cell, columns) = (s.params.small_cell, s.params.columns);
+    for first in (0..s.cells.len()).step_by(CELLS_PER_BLOCK as usize) {
+        let block = first..(first + CELLS_PER_BLOCK as usize).min(s.cells.len());
+        let cell = |i: usize| (counts_of(&s.cells[i], s.starts[i]), s.starts[i]);
+        let cells = block.map(cell).filter(|(c, _)| has_work(c));
+        let (few, many): (Vec<_>, Vec<_>) = cells.partition(|(c, _)| entries_of(c) <= small_cell);
+        schedule_small(&few, &mut slots, &mut small);
+        large.extend(many.iter().flat_map(|(cell, start)| large_items(cell, *start, columns)));
+    }
+    s.counters.slots = slots.len() as u32;
+    s.counters.small_items = small.len() as u32;
+    s.counters.large_items = large.len() as u32;
+    (s.slots, s.small_items, s.large_items) = (slots, small, large);
+}
+
+pub(super) fn has_work(cell: &Cell) -> bool {
+    cell.residents > 0 && entries_of(cell) > 1
+}
+
+/// The small cells of a block become slots, and their pairs items of LANES pairs.
+pub(super) fn schedule_small(cells: &[(Cell, u32)], slots: &mut Vec<Slot>, items: &mut Vec<SmallItem>) {
+    let base = slots.len();
+    let mut pairs = 0;
+    for &(cell, start) in cells {
+        let n = entries_of(&cell);
+        slots.push(Slot { start, shape: n | cell.residents << 16, first_pair: pairs });
+        pairs += (0..cell.residents).map(|row| n - 1 - row).sum::<u32>();
+    }
+    for first_pair in (0..pairs).step_by(LANES as usize) {
+        let within = slots[base..].iter().rposition(|slot| slot.first_pair <= first_pair);
+        let slot = base + within.expect("the first slot begins with pair 0");
+        let reach = LANES.min((slots.len() - slot) as u32);
+        items.push(SmallItem {
+            slot: slot as u32,
+            slots: reach,
+            first_pair,
+            pairs: LANES.min(pairs - first_pair),
+        });
+    }
+}
+
+/// A large cell becomes items: each segment of rows with the segments of columns from its own on, cut
+/// at multiples of `wide`.
+pub(super) fn large_items(cell: &Cell, start: u32, wide: u32) -> Vec<LargeItem> {
+    let (boxes, residents) = (entries_of(cell), cell.residents);
+    let columns = boxes.div_ceil(LANES);
+    let mut items = Vec::new();
+    for row in 0..residents.div_ceil(LANES) {
+        for from in (row / wide * wide..columns).step_by(wide as usize) {
+            let (column, end_column) = (from.max(row), (from + wide).min(columns));
+            items.push(LargeItem { start, boxes, residents, row, column, end_column });
+        }
+    }
+    items
+}
+
+pub(super) fn scatter(s: &mut State) {
+    if s.counters.entries > s.params.entry_room {
+        return;
+    }
+    for id in 0..s.located.len() {
+        let at = s.located[id];
+        // For invalid boxes the range is empty.
+        for level in at.level..s.params.levels {
+            for (cell, axes) in cells_of(&s.params, &at, level) {
+                place(s, cell, id as u32 | axes, level == at.level);
+            }
+        }
+    }
+}
+
+/// Residents and visitors each from the end of their part of the cell, which moves down.
+pub(super) fn place(s: &mut State, cell: usize, entry: u32, resident: bool) {
+    let (ends, start) = (&mut s.cells[cell], s.starts[cell]);
+    let end = if resident { &mut ends.residents } else { &mut ends.visitors };
+    // A cell without residents has counted no visitors: its ends are its start.
+    if *end > start {
+        *end -= 1;
+        s.entries[*end as usize] = entry;
+    }
+}
+
+pub(super) fn arrange(s: &mut State) {
+    let (found, room) = (s.counters, s.params);
+    let fits = found.entries <= room.entry_room
+        && found.slots <= room.slot_room
+        && found.small_items <= room.small_room
+        && found.large_items <= room.large_room;
+    let groups = |items: u32| if fits { [items.min(32_768), items.div_ceil(32_768)] } else { [0, 0] };
+    let [x, y] = groups(found.small_items.min(s.chunk.small_items));
+    let [u, v] = groups(found.large_items.min(s.chunk.large_items));
+    s.dispatches = [x, y, 1, u, v, 1];
+}
+
+/// What a check has come to.
+#[derive(Default)]
+pub(super) struct Checked {
+    pub(super) made: u64,
+    pub(super) redundant: u64,
+    pub(super) overlaps: u64,
+    pub(super) pairs: Vec<Pair>,
+}
+
+impl Checked {
+    /// Two entries of a cell.
+    pub(super) fn test_entries(&mut self, s: &State, a: u32, b: u32) {
+        let (i, j) = (box_of(a), box_of(b));
+        let split = s.params.split;
+        if (a | b) >> BOX_BITS != 7 || (split > 0 && (i < split) == (j < split)) {
+            self.made += 1;
+            self.redundant += 1;
+        } else {
+            self.test_boxes(s, i, j);
+        }
+    }
+
+    pub(super) fn test_boxes(&mut self, s: &State, i: u32, j: u32) {
+        self.made += 1;
+        if !overlap(&s.boxes[i as usize], &s.boxes[j as usize]) {
+            return;
+        }
+        self.overlaps += 1;
+        if !s.has(FILTERED) || s.filters[i as usize].allows(&s.filters[j as usize]) {
+            self.pairs.push(Pair::new(i, j));
+        }
+    }
+
+    /// Writes the result into the state, unless the limit of pairs had been passed before.
+    pub(super) fn leave(self, s: &mut State) {
+        if wide(s.totals.pairs) > wide(s.chunk.pairs_left) {
+            return;
+        }
+        s.out = encoded(s, &self.pairs);
+        let words = if s.has(BITS) { 0 } else { s.out.len() as u64 };
+        let add = |total: &mut [u32; 2], more: u64| *total = halves(wide(*total) + more);
+        add(&mut s.totals.words, words);
+        add(&mut s.totals.pairs, self.pairs.len() as u64);
+        add(&mut s.totals.made, self.made);
+        add(&mut s.totals.redundant, self.redundant);
+        add(&mut s.totals.overlaps, self.overlaps);
+    }
+}
+
+pub(super) fn box_of(entry: u32) -> u32 {
+    entry & ((1 << BOX_BITS) - 1)
+}
+
+pub(super) fn overlap(a: &layout::Box, b: &layout::Box) -> bool {
+    (0..3).all(|k| a.low[k] <= b.high[k] && b.low[k] <= a.high[k])
+}
+
+/// Pairs as words in the simplest way that the format allows.
+pub(super) fn encoded(s: &State, pairs: &[Pair]) -> Vec<u32> {
+    let n = u64::from(s.params.boxes);
+    if s.has(BITS) {
+        let mut words = vec![0; pair_count(n).div_ceil(32).next_multiple_of(8) as usize];
+        for pair in pairs {
+            let k = index_of(pair.a.into(), pair.b.into(), n) as usize;
+            words[k / 32] |= 1 << (k % 32);
+        }
+        return words;
+    }
+    let mark = (s.has(PACKED) && !pairs.is_empty()).then_some(PLAIN | pairs.len() as u32);
+    mark.into_iter().chain(pairs.iter().flat_map(|pair| [pair.a, pair.b])).collect()
+}
+
+/// The items of a chunk.
+pub(super) fn taken<T>(items: &[T], first: u32, count: u32) -> &[T] {
+    let first = (first as usize).min(items.len());
+    &items[first..(first + count as usize).min(items.len())]
+}
+
+pub(super) fn check_small(s: &mut State) {
+    let mut checked = Checked::default();
+    for item in taken(&s.small_items, s.chunk.first_small, s.chunk.small_items) {
+        let slots = taken(&s.slots, item.slot, item.slots);
+        for pair in item.first_pair..item.first_pair + item.pairs {
+            let slot = slots.iter().rfind(|slot| slot.first_pair <= pair).expect("a slot has the pair");
+            let (i, j) = pair_of((pair - slot.first_pair).into(), (slot.shape & 0xFFFF).into());
+            let entry = |place: u64| s.entries[slot.start as usize + place as usize];
+            checked.test_entries(s, entry(i), entry(j));
+        }
+    }
+    checked.leave(s);
+}
+
+pub(super) fn check_large(s: &mut State) {
+    let mut checked = Checked::default();
+    for item in taken(&s.large_items, s.chunk.first_large, s.chunk.large_items) {
+        check_large_item(s, item, &mut checked);
+    }
+    checked.leave(s);
+}
+
+pub(super) fn check_large_item(s: &State, item: &LargeItem, checked: &mut Checked) {
+    let entry = |place: u32| s.entries[(item.start + place) as usize];
+    let segments = |from: u32, to: u32| from * LANES..(to * LANES).min(item.boxes);
+    let (rows, columns) = (segments(item.row, item.row + 1), segments(item.column, item.end_column));
+    // A cell that is nobody's lowest on some axis owns none of these pairs: they are not even tested.
+    let axes = rows.clone().chain(columns.clone()).fold(0, |axes, place| axes | entry(place));
+    if axes >> BOX_BITS != 7 {
+        return;
+    }
+    for i in rows.start..rows.end.min(item.residents) {
+        for j in columns.start.max(i + 1)..columns.end {
+            checked.test_entries(s, entry(i), entry(j));
+        }
+    }
+}
+
+pub(super) fn check_all(s: &mut State) {
+    let mut checked = Checked::default();
+    for a in 0..s.params.boxes {
+        for b in a + 1..s.params.boxes {
+            checked.test_boxes(s, a, b);
+        }
+    }
+    checked.leave(s);
+}
+
+/// The estimated row is the exact one here; a kernel's may be near it.
+pub(super) fn index_pairs(s: &mut State) {
+    s.out.clear();
+    for i in 0..s.params.cells {
+        let (a, b) = pair_of((s.params.split + i).into(), s.params.boxes.into());
+        s.out.extend([a as u32, a as u32, b as u32]);
+    }
+}
