@@ -6,11 +6,15 @@ use super::storage::Storage;
 use crate::layout::Box as DeviceBox;
 use crate::{Aabb, ProxyFilter};
 use bytemuck::{Pod, cast_slice};
+use rayon::prelude::*;
 use std::ops::Range;
 
 /// Elements that are sent together: one that changed costs 6 KiB, and a million are 4096 comparisons
 /// of memory.
 const BLOCK: usize = 256;
+
+/// Elements that are worth another thread: 10 us of work.
+const PIECE: usize = 1 << 14;
 
 /// What the device has.
 #[derive(Debug)]
@@ -39,7 +43,8 @@ impl Mirror {
             self.boxes.clear();
         }
         for range in changed(&mut self.boxes, boxes) {
-            let packed: Vec<DeviceBox> = boxes[range.clone()].iter().map(DeviceBox::new).collect();
+            let packed = boxes[range.clone()].par_iter().with_min_len(PIECE).map(DeviceBox::new);
+            let packed: Vec<DeviceBox> = packed.collect();
             self.sent += write(engine, storage.get("boxes"), range.start, &packed);
         }
         let filters = filters.unwrap_or(&[]);
@@ -61,18 +66,26 @@ fn write<T: Pod>(engine: &Engine, buffer: &wgpu::Buffer, start: usize, data: &[T
 /// Makes `old` equal to `new` and returns the ranges of `new` that differed, bit by bit: a NaN is
 /// equal to itself. Neighbouring blocks that changed are one range. What `new` no longer has stays:
 /// the device is told how many elements count.
-fn changed<T: Pod>(old: &mut Vec<T>, new: &[T]) -> Vec<Range<usize>> {
-    let mut ranges: Vec<Range<usize>> = Vec::new();
+fn changed<T: Pod + Send + Sync>(old: &mut Vec<T>, new: &[T]) -> Vec<Range<usize>> {
     let known = old.len();
     old.extend_from_slice(new.get(known..).unwrap_or(&[]));
-    for start in (0..new.len()).step_by(BLOCK) {
-        let end = new.len().min(start + BLOCK);
-        let same =
-            end <= known && cast_slice::<T, u8>(&old[start..end]) == cast_slice::<T, u8>(&new[start..end]);
-        if same {
-            continue;
+    let renew = |(i, (old, new)): (usize, (&mut [T], &[T]))| {
+        let bytes = cast_slice::<T, u8>;
+        let differs = i * BLOCK + new.len() > known || bytes(&old[..new.len()]) != bytes(new);
+        if differs {
+            old[..new.len()].copy_from_slice(new);
         }
-        old[start..end].copy_from_slice(&new[start..end]);
+        differs
+    };
+    let blocks = old.par_chunks_mut(BLOCK).zip(new.par_chunks(BLOCK)).enumerate();
+    let differs: Vec<bool> = blocks.with_min_len(PIECE / BLOCK).map(renew).collect();
+    ranges(&differs, new.len())
+}
+
+fn ranges(differs: &[bool], len: usize) -> Vec<Range<usize>> {
+    let mut ranges: Vec<Range<usize>> = Vec::new();
+    for (i, _) in differs.iter().enumerate().filter(|(_, differs)| **differs) {
+        let (start, end) = (i * BLOCK, len.min((i + 1) * BLOCK));
         match ranges.last_mut() {
             Some(last) if last.end == start => last.end = end,
             _ => ranges.push(start..end),
@@ -86,7 +99,7 @@ mod tests {
     use super::*;
 
     /// Start and end of each range.
-    fn sent<T: Pod>(old: &mut Vec<T>, new: &[T]) -> Vec<(usize, usize)> {
+    fn sent<T: Pod + Send + Sync>(old: &mut Vec<T>, new: &[T]) -> Vec<(usize, usize)> {
         changed(old, new).into_iter().map(|range| (range.start, range.end)).collect()
     }
 
