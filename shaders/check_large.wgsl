@@ -98,7 +98,7 @@ fn place(item: LargeItem, column: u32) -> Placed {
     if at != NO_ROOM {
         out[at] = words - 3u;
         out[at + 1u] = item.start;
-        out[at + 2u] = item.row | column << 16u;
+        out[at + 2u] = item.row | (column << 16u);
     }
     return Placed(select(at + 3u, NO_ROOM, at == NO_ROOM), hits, words, 1u);
 }
@@ -186,7 +186,7 @@ fn write_pairs(start: u32, lane: u32, entry: u32, within: bool, n: u32) {
 // A row of a packed record, four bytes to a word.
 fn write_row(start: u32, lane: u32, hits: u32, within: bool, n: u32) {
     var at = start;
-    var word = lane | (hits - 1u) << 8u;
+    var word = lane | ((hits - 1u) << 8u);
     var shift = 16u;
     for (var w = 0u; w < 8u; w++) {
         var bits = mask[w];

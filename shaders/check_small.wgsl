@@ -123,5 +123,5 @@ fn check_small(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups)
         out[record + 2u] = 0u;
     }
     // A row with one partner: both places in the only segment.
-    out[record + 3u + slot_rank] = pair.x | pair.y << 16u;
+    out[record + 3u + slot_rank] = pair.x | (pair.y << 16u);
 }

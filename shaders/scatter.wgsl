@@ -9,19 +9,48 @@
 @group(0) @binding(4) var<storage, read_write> cells: array<atomic<u32>>;
 @group(0) @binding(5) var<storage, read_write> entries: array<u32>;
 
+// Visitors of the last level's one cell take their places together, as `visit` counts them.
+var<workgroup> last_visitors: atomic<u32>;
+var<workgroup> last_end: u32;
+
 @compute @workgroup_size(LANES)
 fn scatter(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>,
            @builtin(local_invocation_index) lane: u32) {
-    let id = linear(group, groups) * LANES + lane;
     // Without room for all entries the host makes room and maps again.
-    if id >= params.boxes || counters.entries > params.entry_room {
+    if counters.entries > params.entry_room {
         return;
     }
-    let at = located[id];
-    if at.level == NO_LEVEL {
-        return;
+    let id = linear(group, groups) * LANES + lane;
+    let last = params.levels - 1u;
+    let last_cell = params.level[last].first_cell;
+    var visits_last = false;
+    if id < params.boxes && located[id].level != NO_LEVEL {
+        let at = located[id];
+        visits_last = at.level < last
+            && atomicLoad(&cells[2u * last_cell + 1u]) > starts[last_cell];
+        place_all(id, at, last);
     }
-    for (var level = at.level; level < params.levels; level++) {
+    var rank = 0u;
+    if visits_last {
+        rank = atomicAdd(&last_visitors, 1u);
+    }
+    workgroupBarrier();
+    if lane == 0u {
+        let visitors = atomicLoad(&last_visitors);
+        if visitors > 0u {
+            last_end = atomicSub(&cells[2u * last_cell + 1u], visitors);
+        }
+    }
+    let end = workgroupUniformLoad(&last_end);
+    if visits_last {
+        // The one cell is everybody's lowest, on all axes.
+        entries[end - 1u - rank] = id | (7u << BOX_BITS);
+    }
+}
+
+// A box in its own level and in those between that and the last.
+fn place_all(id: u32, at: Located, last: u32) {
+    for (var level = at.level; level == at.level || level < last; level++) {
         let t = touched(low_of(at), high_of(at), level);
         for (var k = 0u; k < cell_count(t); k++) {
             let cell = cell_at(t, k, level);

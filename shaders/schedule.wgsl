@@ -89,7 +89,7 @@ fn schedule(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) gr
             continue;
         }
         if base + rank < params.slot_room {
-            slots[base + rank] = Slot(starts[first + i], n | cell.residents << 16u, pair);
+            slots[base + rank] = Slot(starts[first + i], n | (cell.residents << 16u), pair);
         }
         let end = pair + pairs_of(cell);
         // The items that begin in this cell.

@@ -1,10 +1,12 @@
-// As block_scan.wgsl, with subgroups: 1 barrier instead of 17. Lanes are ordered by the first lane
+// As block_scan.wgsl, with subgroups: 2 barriers instead of 17. Lanes are ordered by the first lane
 // of their subgroup, then within it, the same in every call; no size or numbering of subgroups is
 // assumed.
 
 var<workgroup> scan_space: array<u32, LANES>;
 
 fn block_scan(value: u32, lane: u32) -> u32 {
+    // Lanes that the caller's branches parted run together again.
+    workgroupBarrier();
     let leader = subgroupMin(lane);
     let rank = subgroupExclusiveAdd(1u);
     let size = subgroupAdd(1u);
@@ -13,8 +15,9 @@ fn block_scan(value: u32, lane: u32) -> u32 {
     scan_space[lane] = select(0u, sum, lane == leader);
     workgroupBarrier();
     var part = 0u;
-    for (var i = rank; i < leader; i += size) {
-        part += scan_space[i];
+    // Equally many turns for all lanes, so that none leaves the subgroup early.
+    for (var i = rank; i < LANES; i += size) {
+        part += select(0u, scan_space[i], i < leader);
     }
     return subgroupAdd(part) + before;
 }

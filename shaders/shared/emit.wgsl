@@ -32,7 +32,8 @@ fn reserve(words: u32, pairs: u32) -> u32 {
 
 var<workgroup> enough: u32;
 
-// Whether the call has passed its limit of pairs: the rest need not be looked at.
+// Whether the call has passed its limit of pairs: the rest need not be looked at. The halves are read
+// one after the other; a carry in between can only happen when the output has long overflowed.
 fn beyond_limit(lane: u32) -> bool {
     if lane == 0u {
         let low = atomicLoad(&totals[2u * PAIRS]);

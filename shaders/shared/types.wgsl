@@ -150,7 +150,7 @@ fn filters_allow(a: vec4<u32>, b: vec4<u32>) -> bool {
     let kinds = ((((a.y >> 8u) & b.y) | ((b.y >> 8u) & a.y)) & 0xffu) != 0u;
     let forth = (a.z & b.w) != 0u;
     let back = (b.z & a.w) != 0u;
-    let either = ((a.y & b.y) >> 16u & 1u) != 0u;
+    let either = (((a.y & b.y) >> 16u) & 1u) != 0u;
     return bodies && kinds && ((forth && back) || (either && (forth || back)));
 }
 

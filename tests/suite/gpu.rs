@@ -78,7 +78,6 @@ fn sets_that_exceed_the_limits_of_a_device_are_split_and_complete() {
         ("gaussian", set("gaussian", 100_000), 6),
         ("pile with ground", with_ground, 3),
         ("identical", cubes(1500), 1),
-        ("degenerate", set("degenerate", 2000), 1),
     ] {
         let wanted = on_cpu(&boxes);
         for coding in [Coding::Plain, Coding::Packed] {
@@ -231,6 +230,7 @@ fn a_device_that_fails_in_the_middle_of_a_run_loses_no_event() {
     for (fault, words) in [
         (Fault::LoseDevice, "lost"),
         (Fault::Timeout, "did not answer"),
+        (Fault::Panic, "lost"),
         (Fault::OutOfMemory, "out of device memory"),
         (Fault::RefuseShader, "refused"),
     ] {
@@ -238,7 +238,7 @@ fn a_device_that_fails_in_the_middle_of_a_run_loses_no_event() {
             let options = GpuOptions { pause, first_bytes: 0, ..GpuOptions::DEFAULT };
             let device = GpuFinder::new().expect("an adapter");
             // A shader is compiled, and buffers are made, in the first call; submissions go on.
-            let at = if matches!(fault, Fault::LoseDevice | Fault::Timeout) { 5 } else { 0 };
+            let at = if matches!(fault, Fault::LoseDevice | Fault::Timeout | Fault::Panic) { 5 } else { 0 };
             device.inject(fault, at);
             let mut ours = BroadPhase::with_gpu(Config { gpu: options, ..base }, device).expect("a margin");
             let got = frames(&mut ours, |_| ());
@@ -250,6 +250,52 @@ fn a_device_that_fails_in_the_middle_of_a_run_loses_no_event() {
             assert_eq!(after.is_none(), tried_again, "{fault:?}: {after:?}");
         }
     }
+}
+
+#[test]
+fn a_device_that_is_lost_at_any_moment_of_a_call_loses_no_pair() {
+    let options =
+        GpuOptions { chunk: [12, 8], first_bytes: 0, coding: Coding::Packed, ..GpuOptions::DEFAULT };
+    let in_parts = GpuOptions { max_bytes: 1 << 20, ..GpuOptions::DEFAULT };
+    for (boxes, options) in [(set("mixed", 3000), options), (set("uniform", 45_000), in_parts)] {
+        let wanted = on_cpu(&boxes);
+        let mut lost = 0;
+        for after in 0..10 {
+            let device = GpuFinder::new().expect("an adapter");
+            device.inject(Fault::LoseDevice, after);
+            let mut finder = Finder::with_gpu(with(options), device);
+            let found = finder.find(&boxes).expect("within the limits");
+            assert_eq!(difference(found, &wanted), None, "lost after {after} submissions");
+            lost += u32::from(finder.report().fallback.is_some());
+        }
+        assert!(lost >= 6, "the device was lost in {lost} of 10 calls only");
+    }
+}
+
+#[test]
+fn auto_goes_back_and_forth_between_a_device_and_edits_on_the_cpu() {
+    let mut device = GpuFinder::new().expect("an adapter");
+    device.pretend_hardware();
+    let config = Config { margin: 0.05, ..Config::DEFAULT };
+    let mut ours = BroadPhase::with_gpu(config, device).expect("a margin");
+    let mut cpu = BroadPhase::new(Config { backend: Backend::Cpu, ..config }).expect("a margin");
+    let start = set("unit", 12_000);
+    let (mut on_gpu, mut edited) = (0, 0);
+    for frame in 0..24usize {
+        // All boxes move in two frames of three, a few in the third.
+        let step = if frame % 3 == 2 { 500 } else { 1 };
+        for (id, b) in start.iter().enumerate().step_by(step) {
+            let shift = ((id + frame) % 7) as f32 * 0.2;
+            let moved = Aabb::new(b.min.map(|x| x + shift), b.max.map(|x| x + shift));
+            ours.set(id as u32, moved, ProxyFilter::ALL).expect("within the limits");
+            cpu.set(id as u32, moved, ProxyFilter::ALL).expect("within the limits");
+        }
+        assert_eq!(ours.update(), cpu.update(), "frame {frame}");
+        on_gpu += u32::from(ours.report().gpu.is_some());
+        edited += u32::from(ours.report().plan.chosen == pbig_core::plan::Chosen::Edit);
+        assert_eq!(ours.report().fallback, None);
+    }
+    assert!(on_gpu >= 3 && edited >= 1, "{on_gpu} updates on the device, {edited} edits");
 }
 
 #[test]

@@ -17,9 +17,10 @@ fn check(scene: Scene, config: Config, steps: usize) {
     let task = Task { scene, bodies, steps, seed: 11 };
     let folder = std::env::temp_dir();
     let ours = PbigBroadPhase::with_config(config);
-    let (outcome, _) = run_checked(task, ours, config.margin, &folder, |_| ());
+    let (outcome, ours) = run_checked(task, ours, config.margin, &folder, |_| ());
     let check = outcome.check.as_ref().expect("a check was asked for");
     assert!(!outcome.failed(), "{}: {}", scene.name, check.differences[0]);
+    assert_eq!(ours.report().fallback, None, "{}: a GPU's work must not be done by the CPU", scene.name);
     assert!(check.calls > 0 && check.oracle_pairs > 0, "{}: nothing was compared", scene.name);
 }
 

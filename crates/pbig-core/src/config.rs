@@ -122,7 +122,7 @@ impl GpuOptions {
         pipelining: true,
         load_balancing: true,
         root: 0,
-        chunk: [1 << 16, 1 << 11],
+        chunk: [1 << 18, 1 << 12],
         max_bytes: u64::MAX,
         first_bytes: 1 << 16,
         patience: Duration::from_secs(30),

@@ -119,7 +119,8 @@ impl Finder {
         self.report = Report::default();
     }
 
-    /// The adapter of the device in use: name, kind and API. None before the first call on a GPU.
+    /// The adapter of the device at hand: name, kind and API. None before a shared one is opened, and
+    /// while it has failed.
     #[cfg(feature = "gpu")]
     pub fn adapter(&self) -> Option<&str> {
         self.search.adapter()
@@ -226,6 +227,18 @@ impl Search {
         report.stages.check += lap(&mut clock);
         report.checks = single_entry_checks(&self.found);
         Ok(())
+    }
+
+    /// Whether a search would be tried on a GPU because the caller wants one.
+    #[cfg(feature = "gpu")]
+    pub(crate) fn expects_gpu(&self, config: &Config) -> bool {
+        config.backend == Backend::Gpu && !self.gpu.as_ref().is_some_and(|gpu| gpu.is_paused(config))
+    }
+
+    #[cfg(not(feature = "gpu"))]
+    #[expect(clippy::unused_self, reason = "as with a GPU backend")]
+    pub(crate) fn expects_gpu(&self, _: &Config) -> bool {
+        false
     }
 
     #[cfg(feature = "gpu")]

@@ -237,7 +237,8 @@ fn a_backend_that_is_not_there_is_replaced_and_the_output_says_so() {
     let folder = tempfile::tempdir().expect("a folder");
     save(folder.path(), "boxes.npy", &Array2::<f32>::zeros((3, 6)));
     save(folder.path(), "frames.npy", &Array3::<f32>::zeros((3, 3, 6)));
-    let scene = ["simulate", "--scene", "pile", "--bodies", "8", "--steps", "10"];
+    // More than 1024 bodies: fewer need no grid.
+    let scene = ["simulate", "--scene", "pile", "--bodies", "1100", "--steps", "5"];
     for args in [&["pairs", "boxes.npy"][..], &["replay", "frames.npy"], &scene] {
         let gpu = [args, &["--backend", "gpu"]].concat();
         let text = String::from_utf8_lossy(&pbig_without_gpu(folder.path(), &gpu).stdout).into_owned();

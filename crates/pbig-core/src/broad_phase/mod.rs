@@ -9,7 +9,7 @@ use crate::finder::{Search, check_count};
 #[cfg(feature = "gpu")]
 use crate::gpu::GpuFinder;
 use crate::report::{Report, lap};
-use crate::{Aabb, Config, Error, Pair, Plan, ProxyFilter};
+use crate::{Aabb, Backend, Config, Error, Pair, Plan, ProxyFilter};
 use std::time::Instant;
 
 /// What an update changed. Both lists are sorted and free of duplicates, and have no pair in common.
@@ -228,8 +228,8 @@ impl BroadPhase {
             changed: self.changed.len() as u64,
             pairs: self.pairs.len() as u64,
             plan: Plan { boxes: self.valid_count(), ..Plan::default() },
-            // Until another search: an update that changes nothing says nothing new.
-            fallback: self.report.fallback.take(),
+            // A backend that was asked for stays unavailable until a search on it succeeds.
+            fallback: self.report.fallback.take().filter(|_| self.config.backend == Backend::Gpu),
             ..Report::default()
         };
         if self.changed.is_empty() {

@@ -18,7 +18,8 @@ impl BroadPhase {
             }
         }
         let whole = self.config.strategy == Strategy::Pbig
-            || matches!(self.config.backend, Backend::Brute | Backend::Gpu)
+            || self.config.backend == Backend::Brute
+            || self.base.expects_gpu(&self.config)
             || !self.has_base;
         // Boxes that moved once and came to rest go back into the base when looking at them again and
         // again has cost as much as building it.

@@ -4,6 +4,7 @@ use super::{GpuError, adapter};
 use crate::config::GpuOptions;
 use pbig_shaders::Kernel;
 use std::collections::HashMap;
+use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 use std::time::Duration;
@@ -20,6 +21,8 @@ pub enum Fault {
     RefuseShader,
     /// The device takes too long.
     Timeout,
+    /// wgpu panics, as it does when a device is lost while it is waited for.
+    Panic,
 }
 
 /// What is fixed when a pipeline is made.
@@ -154,10 +157,21 @@ impl Engine {
         let error = errors.fold(None, |first: Option<wgpu::Error>, error| first.or(error));
         match error {
             None => result,
-            Some(_) if self.is_lost() => Err(GpuError::Lost.into()),
             Some(wgpu::Error::OutOfMemory { .. }) => Err(GpuError::OutOfMemory.into()),
+            // A lost device refuses everything, in words that say nothing of the loss.
+            Some(_) if !self.is_alive() => Err(self.give_up().into()),
             Some(other) => Err(GpuError::Refused(first_line(&other.to_string())).into()),
         }
+    }
+
+    /// Whether the device still takes work and finishes it, by trying.
+    pub(super) fn is_alive(&self) -> bool {
+        let scope = self.device.push_error_scope(wgpu::ErrorFilter::Validation);
+        let encoder = self.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+        let submission = self.queue.submit([encoder.finish()]);
+        let finished = self.poll(submission, Duration::from_secs(1)).is_ok();
+        let refused = pollster::block_on(scope.pop()).is_some();
+        finished && !refused
     }
 
     /// The compiled kernel, compiled at first use.
@@ -226,15 +240,40 @@ impl Engine {
             self.give_up();
             return Err(GpuError::Timeout(patience));
         }
-        let wait = wgpu::PollType::Wait { submission_index: Some(submission), timeout: Some(patience) };
-        match self.device.poll(wait) {
-            Ok(_) => Ok(()),
-            Err(wgpu::PollError::Timeout) => {
+        match self.poll(submission, patience) {
+            Ok(()) => Ok(()),
+            Err(Some(wgpu::PollError::Timeout)) => {
                 self.give_up();
+                // To drop the last handle of a queue waits for it, without a limit: this one is kept.
+                std::mem::forget((self.device.clone(), self.queue.clone()));
                 Err(GpuError::Timeout(patience))
             }
+            // The submission was not accepted: what was wrong with it is known by the error scopes.
+            Err(Some(_)) if self.is_alive() => Err(GpuError::Refused("the submission".into())),
             Err(_) => Err(self.give_up()),
         }
+    }
+
+    /// Waits; `Err(None)` when wgpu panicked, as it does when the driver reports a lost device.
+    fn poll(
+        &self,
+        submission: wgpu::SubmissionIndex,
+        patience: Duration,
+    ) -> Result<(), Option<wgpu::PollError>> {
+        let wait = wgpu::PollType::Wait { submission_index: Some(submission), timeout: Some(patience) };
+        let poll = || {
+            assert!(!self.strikes(Fault::Panic), "an injected fault");
+            self.device.poll(wait)
+        };
+        match catch_unwind(AssertUnwindSafe(poll)) {
+            Ok(polled) => polled.map(|_| ()).map_err(Some),
+            Err(_) => Err(None),
+        }
+    }
+
+    /// A device that was given up for a while and works again.
+    pub(super) fn take_back(&self) {
+        self.lost.store(false, Ordering::Relaxed);
     }
 
     /// Marks the device as lost: what it is doing, or whether it is there at all, is unknown.
@@ -260,7 +299,9 @@ fn check_limits(limits: &wgpu::Limits) -> Result<(), GpuError> {
         ("invocations a workgroup", limits.max_compute_invocations_per_workgroup.into(), 256),
         ("bytes of workgroup memory", limits.max_compute_workgroup_storage_size.into(), 16_384),
         ("workgroups in a dimension", limits.max_compute_workgroups_per_dimension.into(), 65_535),
+        ("invocations along x", limits.max_compute_workgroup_size_x.into(), 256),
         ("bytes a storage binding", limits.max_storage_buffer_binding_size, 1 << 20),
+        ("bytes a buffer", limits.max_buffer_size, 1 << 20),
     ];
     match needs.into_iter().find(|&(_, found, needed)| found < needed) {
         Some((what, found, needed)) => Err(GpuError::TooLimited { what, found, needed }),

@@ -4,6 +4,7 @@ use super::GpuError;
 use super::commands::{Commands, sided};
 use super::engine::Variant;
 use super::error::Failure;
+use super::map::Room;
 use super::readback::{self, HEAD, Head};
 use super::session::Session;
 use super::sink::Sink;
@@ -24,6 +25,8 @@ pub(super) struct Flight {
 /// What a chunk came to.
 pub(super) enum Landed {
     Done,
+    /// The map's lists had no room, so nothing was checked.
+    NoMap,
     /// The output would have needed so many words.
     Overflow(u64),
 }
@@ -88,7 +91,7 @@ impl Session {
         sink.report.downloaded += bytes;
         let patience = self.options.patience;
         let mut clock = Instant::now();
-        // The words leave the mapped memory only if they must wait for the table or for the rest.
+        // Copied, so that the buffer is free for the next chunk before this one is decoded.
         let (head, early) =
             readback::read(&engine, &staging, bytes, flight.submission.clone(), patience, |bytes| {
                 let head: Head = bytemuck::pod_read_unaligned(&bytes[..HEAD as usize]);
@@ -107,9 +110,8 @@ impl Session {
             return Err(Failure::Call(Error::TooManyPairs { limit: sink.limit }));
         }
         let words = fixed.unwrap_or(wide(totals.words));
-        let plan_failed = params.cells > 0 && !self.room.clone().held(params, head.counters);
-        if plan_failed {
-            return Ok((head.counters, Landed::Done));
+        if params.cells > 0 && !Room::held(params, head.counters) {
+            return Ok((head.counters, Landed::NoMap));
         }
         if words > room {
             return Ok((head.counters, Landed::Overflow(words)));

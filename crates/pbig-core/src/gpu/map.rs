@@ -42,9 +42,8 @@ impl Room {
         Ok(())
     }
 
-    /// Whether all that was found had room; if not, so much is made next time.
-    pub(super) fn held(&mut self, params: &Params, found: Counters) -> bool {
-        self.needed = found;
+    /// Whether all that was found had room.
+    pub(super) fn held(params: &Params, found: Counters) -> bool {
         found.entries <= params.entry_room
             && found.slots <= params.slot_room
             && found.small_items <= params.small_room
@@ -54,10 +53,10 @@ impl Room {
 
 /// Records all kernels of the map and the schedule.
 pub(super) fn record(commands: &mut Commands<'_>, params: &Params) -> Result<(), GpuError> {
-    for name in ["cells", "counters"] {
-        let buffer = commands.storage.get(name);
-        commands.encoder.clear_buffer(buffer, 0, None);
-    }
+    let (cells, counters) = (commands.storage.get("cells"), commands.storage.get("counters"));
+    let used = u64::from(params.cells) * size_of::<Cell>() as u64;
+    commands.encoder.clear_buffer(cells, 0, Some(used));
+    commands.encoder.clear_buffer(counters, 0, None);
     let by_box = Groups::Direct(params.boxes.div_ceil(LANES));
     let by_cell = Groups::Direct(params.cells.div_ceil(LANES));
     let by_block = Groups::Direct(params.cells.div_ceil(CELLS_PER_BLOCK));

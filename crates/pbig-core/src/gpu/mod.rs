@@ -57,6 +57,9 @@ use std::time::Instant;
 /// Boxes up to which every pair is tested, without a grid. Avril's table 7 puts the crossover at 1000.
 const SMALL_SCENE: usize = 1024;
 
+/// Boxes of one cell whose work items, 2^17 rows against 2^17 / 8 times 8 columns, 32 bits can count.
+const MOST_IN_A_CELL: u64 = 1 << 25;
+
 /// Fewest boxes that are split further for want of room.
 const SMALLEST_PART: usize = 256;
 
@@ -79,6 +82,8 @@ pub struct GpuFinder {
     session: Option<(GpuOptions, Session)>,
     failed: Option<(Instant, String)>,
     crowding: f32,
+    /// A software adapter passes for hardware, in tests.
+    pretends: bool,
 }
 
 /// A copy shares the device and has buffers of its own.
@@ -140,7 +145,14 @@ impl GpuFinder {
 
     /// The device that the process shares, opened at the first call.
     pub(crate) fn shared() -> Self {
-        Self { source: Source::Shared, engine: None, session: None, failed: None, crowding: 1.0 }
+        Self {
+            source: Source::Shared,
+            engine: None,
+            session: None,
+            failed: None,
+            crowding: 1.0,
+            pretends: false,
+        }
     }
 
     /// The adapter's name, kind and API; empty before the first call of a shared device.
@@ -162,6 +174,12 @@ impl GpuFinder {
     /// In words, the variant of each stage that runs on the device, and why.
     pub fn variants(&self) -> Vec<String> {
         self.engine.as_ref().map_or(Vec::new(), |engine| engine.variants())
+    }
+
+    /// Makes [`crate::Backend::Auto`] take a software adapter for hardware.
+    #[doc(hidden)]
+    pub fn pretend_hardware(&mut self) {
+        self.pretends = true;
     }
 
     /// Makes the device fail after so many more submissions.
@@ -190,6 +208,11 @@ impl GpuFinder {
         result
     }
 
+    /// Whether calls stay on the CPU because the device failed a short while ago.
+    pub(crate) fn is_paused(&self, config: &Config) -> bool {
+        self.check_pause(config).is_err()
+    }
+
     fn check_pause(&self, config: &Config) -> Result<(), GpuError> {
         let pause = config.gpu.pause;
         match &self.failed {
@@ -202,10 +225,16 @@ impl GpuFinder {
 
     /// The session, on a device that is not lost.
     fn session(&mut self, options: &GpuOptions) -> Result<&mut Session, GpuError> {
-        if self.engine.as_ref().is_some_and(|engine| engine.is_lost()) {
-            (self.engine, self.session) = (None, None);
+        if let Some(engine) = self.engine.take_if(|engine| engine.is_lost()) {
+            self.session = None;
+            // An app's device may only have been busy for too long.
+            if matches!(self.source, Source::Given) && engine.is_alive() {
+                engine.take_back();
+            }
+            self.engine = Some(engine).filter(|_| matches!(self.source, Source::Given));
         }
         let engine = match (&self.engine, &self.source) {
+            (Some(engine), _) if engine.is_lost() => return Err(GpuError::Lost),
             (Some(engine), _) => engine.clone(),
             (None, Source::Shared) => Engine::shared()?,
             (None, Source::Own(name)) => Arc::new(Engine::on(&adapter::choose(name.as_deref())?)?),
@@ -215,7 +244,7 @@ impl GpuFinder {
         let kept = self.session.take().filter(|(known, _)| known == options).map(|(_, session)| session);
         let session = match kept {
             Some(session) => session,
-            None => Session::new(engine, options)?,
+            None => engine.clone().watch(|| Session::new(engine, options))?,
         };
         Ok(&mut self.session.insert((*options, session)).1)
     }
@@ -232,7 +261,9 @@ impl GpuFinder {
         let searched = engine.watch(|| search(session, request, crowding, found))?;
         session.end_call();
         self.failed = None;
-        self.learn(&searched, request.boxes.len());
+        if searched.plan.gpu.is_some() {
+            self.learn(&searched, request.boxes.len());
+        }
         report.checks = searched.checks;
         report.plan = searched.plan;
         report.gpu = Some(searched.gpu);
@@ -309,7 +340,7 @@ fn search(
 /// How many boxes fit: each has a place in every buffer, and a number in an entry.
 fn most_boxes(session: &Session) -> usize {
     let by_bytes = session.storage.most_bytes() / size_of::<Located>() as u64;
-    by_bytes.min(1 << BOX_BITS) as usize
+    by_bytes.min(1 << BOX_BITS).min(MOST_IN_A_CELL) as usize
 }
 
 /// Entries are counted in 32 bits: at most 4 x 4 x 4 for a box in each level but the last.
@@ -380,7 +411,7 @@ fn search_parts(
 pub(crate) fn wanted(config: &Config, gpu: Option<&GpuFinder>, trial: &mut Trial, boxes: usize) -> bool {
     match config.backend {
         Backend::Gpu => true,
-        Backend::Auto => gpu.is_some_and(|gpu| !gpu.is_software()) && trial.wants_gpu(boxes),
+        Backend::Auto => gpu.is_some_and(|gpu| gpu.pretends || !gpu.is_software()) && trial.wants_gpu(boxes),
         Backend::Cpu | Backend::Brute => false,
     }
 }

@@ -110,6 +110,12 @@ impl Session {
         params
     }
 
+    /// Work items in a chunk; a program that plays a GPU gets fewer, lest it passes for one that hangs.
+    fn chunk(&self) -> [u32; 2] {
+        let share = if self.engine.software { 4 } else { 1 };
+        self.options.chunk.map(|items| (items / share).max(1))
+    }
+
     /// Without a grid (Avril 3.2), one submission.
     fn search_all(&mut self, job: &Job<'_>, sink: &mut Sink<'_>) -> Result<(), Failure> {
         let mut params = self.params(job);
@@ -134,6 +140,7 @@ impl Session {
                     return Ok(());
                 }
                 Landed::Overflow(words) => self.word_room = words,
+                Landed::NoMap => {}
             }
             // One bit a pair has room in the smallest buffer.
             bits |= self.word_room > self.storage.most_bytes() / 4;
@@ -148,7 +155,7 @@ impl Session {
         let packed = self.coding.packed(job.config.gpu.coding) && job.boxes.len() < MOST_PACKED;
         params.flags |= if packed { PACKED } else { 0 };
         let before = (sink.written, sink.report.compression);
-        let [small_items, large_items] = self.options.chunk.map(|items| items.max(1));
+        let [small_items, large_items] = self.chunk();
         let first = Chunk { small_items, large_items, ..Chunk::default() };
         for _ in 0..MOST_REPEATS {
             self.room.make(&self.engine, &mut self.storage, &mut params, self.options.first_bytes)?;
@@ -158,7 +165,8 @@ impl Session {
                 commands.run(&shaders::CHECK_LARGE, Groups::Indirect(12))
             })?;
             let (counters, landed) = self.land(flight, &params, None, sink)?;
-            if self.room.held(&params, counters) {
+            self.room.needed = counters;
+            if !matches!(landed, Landed::NoMap) {
                 let rest = self.note(landed, first, counters, sink);
                 self.search_rest(&params, rest, sink)?;
                 let (pairs, words) = (sink.written - before.0, sink.report.compression - before.1);
@@ -173,7 +181,7 @@ impl Session {
     /// What is left to do after the first chunk: all of it again if its output had no room.
     fn note(&mut self, landed: Landed, first: Chunk, found: Counters, sink: &mut Sink<'_>) -> Chunk {
         let done = match landed {
-            Landed::Done => first,
+            Landed::Done | Landed::NoMap => first,
             Landed::Overflow(words) => {
                 self.word_room = words;
                 sink.report.repeats += 1;
@@ -195,7 +203,7 @@ impl Session {
     /// The other chunks: two at a time, so that the device checks one while the host decodes the other
     /// (PBIG 5.3).
     fn search_rest(&mut self, params: &Params, rest: Chunk, sink: &mut Sink<'_>) -> Result<(), Failure> {
-        let mut pending: VecDeque<Chunk> = cut(rest, self.options.chunk).into();
+        let mut pending: VecDeque<Chunk> = cut(rest, self.chunk()).into();
         let mut flights: VecDeque<Flight> = VecDeque::new();
         let most = if self.options.pipelining { 2 } else { 1 };
         let mut side = 0;
@@ -209,7 +217,7 @@ impl Session {
             let Some(flight) = flights.pop_front() else { return Ok(()) };
             let chunk = flight.chunk;
             match self.land(flight, params, None, sink)?.1 {
-                Landed::Done => sink.report.chunks += 1,
+                Landed::Done | Landed::NoMap => sink.report.chunks += 1,
                 Landed::Overflow(words) => {
                     sink.report.repeats += 1;
                     for part in self.smaller(chunk, words)?.into_iter().rev() {

@@ -13,6 +13,12 @@ use std::ops::Range;
 /// of memory.
 const BLOCK: usize = 256;
 
+/// Blocks in between that are sent along rather than split a transfer.
+const GAP: usize = 2;
+
+/// Transfers, an allocation each, beyond which all in between is sent along.
+const MOST_RANGES: usize = 32;
+
 /// Elements that are worth another thread: 10 us of work.
 const PIECE: usize = 1 << 14;
 
@@ -64,7 +70,7 @@ fn write<T: Pod>(engine: &Engine, buffer: &wgpu::Buffer, start: usize, data: &[T
 }
 
 /// Makes `old` equal to `new` and returns the ranges of `new` that differed, bit by bit: a NaN is
-/// equal to itself. Neighbouring blocks that changed are one range. What `new` no longer has stays:
+/// equal to itself. Blocks that changed near each other are one range. What `new` no longer has stays:
 /// the device is told how many elements count.
 fn changed<T: Pod + Send + Sync>(old: &mut Vec<T>, new: &[T]) -> Vec<Range<usize>> {
     let known = old.len();
@@ -87,9 +93,14 @@ fn ranges(differs: &[bool], len: usize) -> Vec<Range<usize>> {
     for (i, _) in differs.iter().enumerate().filter(|(_, differs)| **differs) {
         let (start, end) = (i * BLOCK, len.min((i + 1) * BLOCK));
         match ranges.last_mut() {
-            Some(last) if last.end == start => last.end = end,
+            Some(last) if last.end + GAP * BLOCK >= start => last.end = end,
             _ => ranges.push(start..end),
         }
+    }
+    if ranges.len() > MOST_RANGES {
+        let end = ranges.last().map_or(0, |last| last.end);
+        ranges.truncate(1);
+        ranges[0].end = end;
     }
     ranges
 }

@@ -3,8 +3,8 @@
 use crate::output::{Failure, print, progress};
 use clap::ValueEnum;
 use pbig_core::gpu::study::Bench;
-use pbig_core::{Backend, Config, Finder, GpuFinder, GpuReport, Limits};
-use pbig_harness::boxes::BoxSet;
+use pbig_core::{Aabb, Backend, Config, Finder, GpuFinder, GpuReport, Limits};
+use pbig_harness::boxes::{BoxSet, moved};
 use pbig_harness::runner::{Spread, milliseconds};
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
@@ -38,14 +38,18 @@ struct Row {
     boxes: usize,
     pairs: u64,
     cpu: Spread,
+    /// All boxes have moved since the call before.
     gpu: Spread,
+    /// None has, so nothing is sent.
+    still: Spread,
+    /// Of the last call with all boxes moved.
     report: GpuReport,
 }
 
 pub(crate) fn run(args: &Args) -> Result<(), Failure> {
     let Suite::Gpu = args.suite;
     let gpu = GpuFinder::new().map_err(|error| Failure::Input(error.to_string()))?;
-    let rate = Bench::new().and_then(|bench| bench.copy_rate(64 << 20));
+    let rate = Bench::new().and_then(|bench| bench.copy_rate(256 << 20));
     let rate = rate.map_err(|error| Failure::Input(error.to_string()))?;
     let sizes: &[usize] =
         if args.quick { &[1000, 10_000] } else { &[1000, 10_000, 100_000, 1_000_000, 10_000_000] };
@@ -70,35 +74,51 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
     if args.quick { Ok(()) } else { keep(&gpu, &object, args.json) }
 }
 
-/// Both backends on the same boxes, in turn.
+/// Both backends on the same boxes, in turn. In every other round all boxes have moved, as they do in a
+/// world: the device must get them anew. In the rounds between they are the same again.
 fn measure(gpu: &GpuFinder, name: &'static str, n: usize) -> Result<Row, Failure> {
-    let boxes = BoxSet::named(name).expect("a set of the harness").boxes(n, 1);
+    let start = BoxSet::named(name).expect("a set of the harness").boxes(n, 1);
+    let frames = [moved(&start, 1.0, 2), start];
     let config = |backend| Config { backend, limits: Limits::UNLIMITED, ..Config::DEFAULT };
     let mut on_cpu = Finder::new(config(Backend::Cpu));
     let mut on_gpu = Finder::with_gpu(config(Backend::Gpu), gpu.clone());
-    let rounds = if n > 100_000 { 5 } else { 11 };
-    let (mut cpu, mut gpu) = (Vec::new(), Vec::new());
+    let rounds = if n > 100_000 { 4 } else { 7 };
+    let (mut cpu, mut all_moved, mut still) = (Vec::new(), Vec::new(), Vec::new());
+    let mut report = GpuReport::default();
     for round in 0..rounds {
-        for (finder, times) in [(&mut on_cpu, &mut cpu), (&mut on_gpu, &mut gpu)] {
-            let clock = Instant::now();
-            finder.find(&boxes).map_err(|error| Failure::Input(format!("{name} {n}: {error}")))?;
-            // The first two calls compile, allocate and learn.
-            if round >= 2 {
-                times.push(milliseconds(clock.elapsed()));
-            }
+        let boxes = &frames[round % 2];
+        let times = [time(&mut on_cpu, boxes, name)?, time(&mut on_gpu, boxes, name)?];
+        report = did(&on_gpu, name, n)?;
+        let unchanged = time(&mut on_gpu, boxes, name)?;
+        if on_cpu.pairs() != on_gpu.pairs() {
+            return Err(Failure::Check(format!("{name} {n}: CPU and GPU differ")));
+        }
+        // The first round compiles, allocates and learns.
+        if round > 0 {
+            cpu.push(times[0]);
+            all_moved.push(times[1]);
+            still.push(unchanged);
         }
     }
-    if on_cpu.pairs() != on_gpu.pairs() {
-        return Err(Failure::Check(format!("{name} {n}: CPU and GPU differ")));
-    }
-    let report = on_gpu.report();
-    let why = || report.fallback.clone().unwrap_or_default();
-    let did = report.gpu.clone().ok_or_else(|| Failure::Check(format!("{name} {n}: {}", why())))?;
-    let (cpu, gpu) = (Spread::of(cpu), Spread::of(gpu));
-    Ok(Row { set: name, boxes: n, pairs: report.pairs, cpu, gpu, report: did })
+    let (cpu, gpu, still) = (Spread::of(cpu), Spread::of(all_moved), Spread::of(still));
+    Ok(Row { set: name, boxes: n, pairs: on_gpu.report().pairs, cpu, gpu, still, report })
 }
 
-/// Bytes that a call must move on the device whatever the algorithm: boxes read, pairs written.
+fn time(finder: &mut Finder, boxes: &[Aabb], name: &str) -> Result<f64, Failure> {
+    let clock = Instant::now();
+    let found = finder.find(boxes).map(|_| milliseconds(clock.elapsed()));
+    found.map_err(|error| Failure::Input(format!("{name} {}: {error}", boxes.len())))
+}
+
+/// What the device did; a call that it left to the CPU is no measurement.
+fn did(finder: &Finder, name: &str, n: usize) -> Result<GpuReport, Failure> {
+    let report = finder.report();
+    let why = || report.fallback.clone().unwrap_or_default();
+    report.gpu.clone().ok_or_else(|| Failure::Check(format!("{name} {n}: {}", why())))
+}
+
+/// Time for the bytes that a call must move on the device whatever the algorithm: boxes read once, pairs
+/// written once, at the rate at which copies read and write.
 fn floor_ms(row: &Row, rate: f64) -> f64 {
     (24 * row.boxes as u64 + 8 * row.pairs) as f64 / rate * 1e3
 }
@@ -106,11 +126,12 @@ fn floor_ms(row: &Row, rate: f64) -> f64 {
 fn table(gpu: &GpuFinder, rate: f64, rows: &[Row]) -> String {
     let mut lines = vec![
         format!("{}, copies {:.1} GB/s", gpu.adapter(), rate / 1e9),
-        "medians in ms; floor: boxes read and pairs written at the device's copy rate; kernels: of the last call"
+        "medians in ms; gpu: all boxes moved; still: none; x: cpu / gpu; floor: boxes read and pairs written at\n\
+         the device's copy rate; upload to kernels: of the last call with all boxes moved"
             .into(),
         format!(
-            "{:<9} {:>9} {:>10} {:>9} {:>9} {:>6} {:>8} {:>7} {:>7} {:>7}  kernels",
-            "set", "boxes", "pairs", "cpu", "gpu", "x", "floor", "upload", "wait", "decode"
+            "{:<9} {:>9} {:>10} {:>9} {:>9} {:>9} {:>6} {:>8} {:>7} {:>7} {:>7}  kernels",
+            "set", "boxes", "pairs", "cpu", "gpu", "still", "x", "floor", "upload", "wait", "decode"
         ),
     ];
     for row in rows {
@@ -121,12 +142,13 @@ fn table(gpu: &GpuFinder, rate: f64, rows: &[Row]) -> String {
             .map(|(name, time)| format!("{name} {:.3}", milliseconds(*time)))
             .collect();
         lines.push(format!(
-            "{:<9} {:>9} {:>10} {:>9.3} {:>9.3} {:>6.2} {:>8.4} {:>7.3} {:>7.3} {:>7.3}  {}",
+            "{:<9} {:>9} {:>10} {:>9.3} {:>9.3} {:>9.3} {:>6.2} {:>8.4} {:>7.3} {:>7.3} {:>7.3}  {}",
             row.set,
             row.boxes,
             row.pairs,
             row.cpu.median,
             row.gpu.median,
+            row.still.median,
             row.cpu.median / row.gpu.median,
             floor_ms(row, rate),
             milliseconds(row.report.upload),
@@ -152,7 +174,7 @@ fn object(gpu: &GpuFinder, rate: f64, rows: &[Row]) -> Value {
     let row = |row: &Row| {
         json!({
             "set": row.set, "boxes": row.boxes, "pairs": row.pairs,
-            "cpu_ms": row.cpu, "gpu_ms": row.gpu, "ratio": row.cpu.median / row.gpu.median,
+            "cpu_ms": row.cpu, "gpu_ms": row.gpu, "gpu_still_ms": row.still, "ratio": row.cpu.median / row.gpu.median,
             "floor_ms": floor_ms(row, rate),
             "upload_ms": milliseconds(row.report.upload),
             "wait_ms": milliseconds(row.report.wait),
