@@ -15,6 +15,8 @@ use std::fmt;
 const CELLS_PER_BOX: f64 = 4.0;
 /// Cells that every level may have, however few its boxes.
 const CELLS_ANYWAY: f64 = 4096.0;
+/// Others in the cell of a box, against the wanted boxes per cell, from which a finer cell is looked for.
+const CROWDED: f64 = 4.0;
 /// Finest cells from the middle of the world to its end, at most: they must fit an `i32` with room.
 const REACH: f64 = 1073741824.0;
 
@@ -99,15 +101,47 @@ impl GpuPlan {
 /// largest box touches few cells on each axis.
 fn edge(level: &LevelPlan, summary: &Summary, space: [f32; 3], config: &Config, crowding: f32) -> f64 {
     let of_level = |b: &&Aabb| (level.classes.0..=level.classes.1).contains(&(size_class_of(b) as u8));
-    let sample: Vec<Aabb> = summary.sample.iter().step_by(4).filter(of_level).copied().collect();
+    let sample: Vec<Aabb> = summary.sample.iter().filter(of_level).copied().collect();
     let wanted = config.pbig_boxes_per_cell.max(1.0);
     let cell = match config.cell_rule {
-        CellRule::Objective if !sample.is_empty() => pbig_cell(&sample, level.boxes, space, wanted),
+        CellRule::Objective if !sample.is_empty() => {
+            // A quarter of the sample will do: the search evaluates it 24 times.
+            let quarter: Vec<Aabb> = sample.iter().step_by(4).copied().collect();
+            pbig_cell(&quarter, level.boxes, space, wanted)
+        }
         _ => density_cell(level.boxes, space, wanted),
     };
     let largest = level.max_extent.into_iter().fold(0.0, f32::max);
     // A box reaches over at most one border more than it has cell lengths, and one more by rounding.
-    f64::from(cell * crowding).max(f64::from(largest) * 1.001 / f64::from(MOST_SPAN - 2))
+    let smallest = f64::from(largest) * 1.001 / f64::from(MOST_SPAN - 2);
+    let even = f64::from(cell) * f64::from(crowding);
+    uncrowded(&sample, level.boxes, even, smallest, CROWDED * f64::from(wanted)).max(smallest)
+}
+
+/// Equation 6 knows the average cell only: of boxes in clusters far apart most cells are empty and the
+/// others hold a cluster each. So the cell is halved until a box has at most `most` others in its cell,
+/// as the sample tells, or hardly more than in the smallest cell: identical boxes no cell can part.
+fn uncrowded(sample: &[Aabb], boxes: u32, even: f64, smallest: f64, most: f64) -> f64 {
+    let mut cell = even;
+    if crowd(sample, boxes, cell) <= most {
+        return cell;
+    }
+    let smallest = smallest.max(even * 2f64.powi(-30));
+    let goal = most.max(1.25 * crowd(sample, boxes, smallest));
+    while cell > smallest && crowd(sample, boxes, cell) > goal {
+        cell /= 2.0;
+    }
+    cell
+}
+
+/// Other boxes in the cell of a box's lower corner, on average over boxes, estimated from a sample.
+fn crowd(sample: &[Aabb], boxes: u32, cell: f64) -> f64 {
+    let of = |b: &Aabb| b.min.map(|x| (f64::from(x) / cell).floor() as i64);
+    let mut cells: Vec<[i64; 3]> = sample.iter().map(of).collect();
+    cells.sort_unstable();
+    let others = cells.chunk_by(|a, b| a == b).map(|same| same.len() * (same.len() - 1)).sum::<usize>();
+    let n = sample.len().max(1) as f64;
+    others as f64 / n * (f64::from(boxes) / n)
 }
 
 /// The finest cell, and by how many doublings each level's cells are larger; no level twice, and none
@@ -188,6 +222,21 @@ mod tests {
         let plan = plan(&lattice(20, 1.0, 0.4));
         assert_eq!(plan.levels.len(), 2, "{plan}");
         assert!((0.4..4.0).contains(&plan.cell), "{plan}");
+    }
+
+    #[test]
+    fn clusters_far_apart_do_not_share_a_cell_each() {
+        let mut boxes = lattice(12, 1.0, 0.4);
+        for apart in [1e4f32, 1e7] {
+            boxes.truncate(1728);
+            let away = |b: &Aabb| Aabb::new(b.min.map(|x| x + apart), b.max.map(|x| x + apart));
+            boxes.extend(lattice(12, 1.0, 0.4).iter().map(away));
+            let plan = plan(&boxes);
+            assert!(plan.cell < 4.0, "{apart} apart: {plan}");
+        }
+        // No cell parts identical boxes, so none is looked for.
+        let plan = plan(&[lattice(12, 1.0, 0.4), vec![Aabb::new([3.0; 3], [3.8; 3]); 3000]].concat());
+        assert!(plan.cell > 0.2, "{plan}");
     }
 
     #[test]
