@@ -89,6 +89,28 @@ fn sets_that_exceed_the_limits_of_a_device_are_split_and_complete() {
 }
 
 #[test]
+fn a_device_that_really_allows_little_is_enough() {
+    let adapter = adapters().into_iter().next().expect("an adapter");
+    let required_limits = wgpu::Limits {
+        max_storage_buffer_binding_size: 1 << 20,
+        max_buffer_size: 2 << 20,
+        ..wgpu::Limits::default()
+    };
+    let descriptor = wgpu::DeviceDescriptor { required_limits, ..Default::default() };
+    let device = pollster::block_on(adapter.request_device(&descriptor));
+    let (device, queue) = device.expect("a device with small limits");
+    let device = GpuFinder::from_device(device, queue).expect("small limits are enough");
+    let mut finder = Finder::with_gpu(with(GpuOptions::DEFAULT), device);
+    for boxes in [set("gaussian", 60_000), cubes(1500)] {
+        for call in 0..2 {
+            let (pairs, report) = find(&mut finder, &boxes);
+            assert_eq!(difference(&pairs, &on_cpu(&boxes)), None);
+            assert!(boxes.len() < 2000 || report.parts > 1, "call {call}: {} parts", report.parts);
+        }
+    }
+}
+
+#[test]
 fn filters_hold_in_every_part() {
     let boxes = set("pile", 45_000);
     let filters: Vec<_> =

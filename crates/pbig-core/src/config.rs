@@ -16,20 +16,21 @@ pub enum Backend {
     Brute,
 }
 
-/// Which algorithm finds the pairs on the CPU.
+/// Which algorithm finds the pairs.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Strategy {
-    /// The plan decides between brute force and the grid.
+    /// The plan decides between brute force and the grid; on a GPU up to 1024 boxes need none.
     #[default]
     Auto,
-    /// One entry a box, sorted by the cell of its lower corner; the fastest on a CPU.
+    /// One entry a box, sorted by the cell of its lower corner; the fastest on a CPU. On a GPU as
+    /// [`Strategy::Pbig`].
     Grid,
-    /// PBIG's own grid: one entry for each cell that a box touches (PBIG 4.2). Plain and scalar,
-    /// the twin that GPU kernels are held against; slower than [`Strategy::Grid`].
+    /// PBIG's own grid: one entry for each cell that a box touches (PBIG 4.2), however few the boxes. What
+    /// a GPU runs; on the CPU plain, scalar and slower than [`Strategy::Grid`], to compare with.
     Pbig,
 }
 
-/// How [`Strategy::Pbig`] chooses its cell size, both times from [`Config::pbig_boxes_per_cell`].
+/// How [`Strategy::Pbig`] and the GPU choose their cell size, both times from [`Config::pbig_boxes_per_cell`].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum CellRule {
     /// PBIG's equation 6: the smallest cell with that many entries on average, boxes counted in
@@ -151,15 +152,15 @@ pub struct Config {
     /// the caller's length unit. Larger: fewer boxes count as changed, more pairs are reported
     /// that do not touch yet.
     pub margin: f32,
-    /// Below this many boxes every pair is tested without a grid. Avril's table 7 puts the
+    /// On the CPU, below this many boxes every pair is tested without a grid. Avril's table 7 puts the
     /// crossover at 1000 boxes on a GPU of 2008; on a CPU core of 2022 it is near 100.
     pub brute_below: u32,
     /// PBIG's `W` in the constraint `f >= W` of equation 6: the wanted boxes per cell of
-    /// [`Strategy::Pbig`]. The paper takes a warp, 32; a core without lanes to fill prefers few.
+    /// [`Strategy::Pbig`] and of the GPU. The paper takes a warp, 32; a core without lanes to fill prefers few.
     pub pbig_boxes_per_cell: f32,
-    /// How [`Strategy::Pbig`] turns that number into a cell size.
+    /// How that number becomes a cell size.
     pub cell_rule: CellRule,
-    /// In [`Strategy::Pbig`], cells of at most this many boxes go through Avril's index to pair
+    /// In [`Strategy::Pbig`], and on the GPU up to 256, cells of at most this many boxes go through Avril's index to pair
     /// mapping, larger ones through PBIG's balanced rows.
     pub small_cell: u32,
     /// About the GPU backend.

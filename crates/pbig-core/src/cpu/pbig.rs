@@ -1,4 +1,4 @@
-//! PBIG's own grid (Lo et al. 2013, 4.2 and 4.3), plain and scalar: the twin of the GPU kernels.
+//! PBIG's own grid (Lo et al. 2013, 4.2 and 4.3), plain and scalar.
 //!
 //! Every box has an entry in each cell it touches. Pairs are tested within a cell: small cells
 //! through Avril's index to pair mapping, large ones by PBIG's balanced rows. A pair that meets in

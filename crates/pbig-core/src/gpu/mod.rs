@@ -325,6 +325,7 @@ fn search(
             // A list that only the device knows the length of was too long: fewer boxes make it shorter.
             Err(Failure::Device(GpuError::TooLarge { .. })) if most > SMALLEST_PART => {
                 most = (most.min(request.boxes.len()) / 2).max(SMALLEST_PART);
+                session.part_limit = most;
             }
             Err(failure) => return Err(failure),
             Ok(plan) => {
@@ -340,7 +341,7 @@ fn search(
 /// How many boxes fit: each has a place in every buffer, and a number in an entry.
 fn most_boxes(session: &Session) -> usize {
     let by_bytes = session.storage.most_bytes() / size_of::<Located>() as u64;
-    by_bytes.min(1 << BOX_BITS).min(MOST_IN_A_CELL) as usize
+    (by_bytes.min(1 << BOX_BITS).min(MOST_IN_A_CELL) as usize).min(session.part_limit)
 }
 
 /// Entries are counted in 32 bits: at most 4 x 4 x 4 for a box in each level but the last.

@@ -48,6 +48,8 @@ pub(super) struct Session {
     pub(super) binds: BindGroups,
     pub(super) clocks: [Option<Clock>; 2],
     pub(super) room: map::Room,
+    /// Boxes of a set that turned out to need parts, until buffers are looked through again.
+    pub(super) part_limit: usize,
     /// Words of output that a chunk is expected to have: how much is fetched before that is known.
     pub(super) words: u64,
     /// Most words of a chunk of this job; the room that the next one begins with.
@@ -69,6 +71,7 @@ impl Session {
             binds: BindGroups::default(),
             clocks,
             room: map::Room::default(),
+            part_limit: usize::MAX,
             words: 0,
             most_words: 0,
             word_room: 0,
@@ -96,7 +99,9 @@ impl Session {
 
     /// To be called after a call, which is one job or several.
     pub(super) fn end_call(&mut self) {
-        self.storage.end_call();
+        if self.storage.end_call() {
+            self.part_limit = usize::MAX;
+        }
     }
 
     fn params(&self, job: &Job<'_>) -> Params {

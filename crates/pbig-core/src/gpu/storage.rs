@@ -78,17 +78,19 @@ impl Storage {
         self.slabs.values().map(|slab| slab.buffer.size()).sum()
     }
 
-    /// To be called after each call: gives back, now and then, what has not been needed for long.
-    pub(super) fn end_call(&mut self) {
+    /// To be called after each call: gives back, now and then, what has not been needed for long. True
+    /// when it did so.
+    pub(super) fn end_call(&mut self) -> bool {
         self.calls += 1;
         if self.calls < WINDOW {
-            return;
+            return false;
         }
         self.calls = 0;
         let before = self.slabs.len();
         self.slabs.retain(|_, slab| slab.buffer.size() <= (4 * slab.used).max(1 << 16));
         self.slabs.values_mut().for_each(|slab| slab.used = 0);
         self.generation += u64::from(self.slabs.len() < before);
+        true
     }
 }
 
