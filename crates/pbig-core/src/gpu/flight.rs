@@ -84,27 +84,7 @@ impl Session {
         fixed: Option<u64>,
         sink: &mut Sink<'_>,
     ) -> Result<(Counters, Landed), Failure> {
-        let engine = self.engine.clone();
-        let period = engine.queue.get_timestamp_period();
-        let staging = self.storage.get(sided("staging", flight.side)).clone();
-        let bytes = HEAD + flight.prefetched;
-        sink.report.downloaded += bytes;
-        let patience = self.options.patience;
-        let mut clock = Instant::now();
-        // Copied, so that the buffer is free for the next chunk before this one is decoded.
-        let (head, early) =
-            readback::read(&engine, &staging, bytes, flight.submission.clone(), patience, |bytes| {
-                let head: Head = bytemuck::pod_read_unaligned(&bytes[..HEAD as usize]);
-                let words = fixed.unwrap_or(wide(head.totals.words)) as usize;
-                let have = &bytes[HEAD as usize..];
-                let whole = 4 * words <= have.len();
-                let used = if whole { &have[..4 * words] } else { have };
-                (head, bytemuck::pod_collect_to_vec::<u8, u32>(used))
-            })?;
-        sink.report.wait += lap(&mut clock);
-        if engine.timestamps {
-            sink.add_times(&head.times(&flight.passes, period));
-        }
+        let (head, early) = self.receive(&flight, fixed, sink)?;
         let (totals, room) = (head.totals, self.storage.size(sided("out", flight.side)) / 4);
         if wide(totals.pairs) > sink.limit.saturating_sub(sink.pairs) && sink.accept.is_none() {
             return Err(Failure::Call(Error::TooManyPairs { limit: sink.limit }));
@@ -116,6 +96,7 @@ impl Session {
         if words > room {
             return Ok((head.counters, Landed::Overflow(words)));
         }
+        let mut clock = Instant::now();
         let rest = self.fetch(sided("out", flight.side), early.len() as u64, words, sink)?;
         sink.report.wait += lap(&mut clock);
         let words = if rest.is_empty() { early } else { [early, rest].concat() };
@@ -128,6 +109,34 @@ impl Session {
         sink.add(pairs).map_err(Failure::Call)?;
         sink.report.decode += lap(&mut clock);
         Ok((head.counters, Landed::Done))
+    }
+
+    /// Waits for a chunk: what it counted, and as much of its output as was fetched with it.
+    fn receive(
+        &mut self,
+        flight: &Flight,
+        fixed: Option<u64>,
+        sink: &mut Sink<'_>,
+    ) -> Result<(Head, Vec<u32>), GpuError> {
+        let engine = self.engine.clone();
+        let staging = self.storage.get(sided("staging", flight.side)).clone();
+        let (bytes, submission) = (HEAD + flight.prefetched, flight.submission.clone());
+        sink.report.downloaded += bytes;
+        let mut clock = Instant::now();
+        let patience = self.options.patience;
+        // Copied, so that the buffer is free for the next chunk before this one is decoded.
+        let (head, early) = readback::read(&engine, &staging, bytes, submission, patience, |bytes| {
+            let head: Head = bytemuck::pod_read_unaligned(&bytes[..HEAD as usize]);
+            let have = &bytes[HEAD as usize..];
+            let used = fixed.unwrap_or(wide(head.totals.words)).saturating_mul(4);
+            let used = used.min(have.len() as u64) as usize;
+            (head, bytemuck::pod_collect_to_vec::<u8, u32>(&have[..used]))
+        })?;
+        sink.report.wait += lap(&mut clock);
+        if engine.timestamps {
+            sink.add_times(&head.times(&flight.passes, engine.queue.get_timestamp_period()));
+        }
+        Ok((head, early))
     }
 
     fn decode(

@@ -1,0 +1,146 @@
+//! What a call searches: everything at once where it fits, or in parts.
+
+use super::error::Failure;
+use super::session::{Job, Session};
+use super::sink::Sink;
+use super::{GpuError, Request, parts};
+use crate::cpu::find::Found;
+use crate::layout::{BOX_BITS, Located};
+use crate::plan::{Chosen, GpuPlan, Plan, Summary};
+use crate::report::{Checks, GpuReport};
+use crate::{Aabb, Config, ProxyFilter, Strategy};
+
+/// Boxes up to which every pair is tested, without a grid. Avril's table 7 puts the crossover at 1000.
+const SMALL_SCENE: usize = 1024;
+
+/// Boxes of one cell whose work items, 2^17 rows against 2^17 / 8 times 8 columns, 32 bits can count.
+const MOST_IN_A_CELL: u64 = 1 << 25;
+
+/// Fewest boxes that are split further for want of room.
+const SMALLEST_PART: usize = 256;
+
+/// What a search came to.
+pub(super) struct Searched {
+    pub(super) checks: Checks,
+    pub(super) plan: Plan,
+    pub(super) gpu: GpuReport,
+    pub(super) pairs: u64,
+}
+
+/// Searches in as few parts as fit.
+pub(super) fn search(
+    session: &mut Session,
+    request: &Request<'_>,
+    crowding: f32,
+    found: &mut Found,
+) -> Result<Searched, Failure> {
+    let mut most = most_boxes(session);
+    loop {
+        found.clear();
+        let gpu = GpuReport {
+            adapter: session.engine.name.clone(),
+            subgroups: session.engine.subgroups,
+            ..GpuReport::default()
+        };
+        let mut sink = Sink {
+            found,
+            used: 0,
+            pairs: 0,
+            written: 0,
+            limit: request.config.limits.max_pairs,
+            ids: None,
+            accept: request.accept,
+            checks: Checks::default(),
+            report: gpu,
+        };
+        let result = if request.boxes.len() <= most {
+            search_whole(session, request, crowding, &mut sink)
+        } else {
+            search_parts(session, request, crowding, most, &mut sink)
+        };
+        match result {
+            // A list that only the device knows the length of was too long: fewer boxes make it shorter.
+            Err(Failure::Device(GpuError::TooLarge { .. })) if most > SMALLEST_PART => {
+                most = (most.min(request.boxes.len()) / 2).max(SMALLEST_PART);
+                session.part_limit = most;
+            }
+            Err(failure) => return Err(failure),
+            Ok(plan) => {
+                let words = sink.report.compression;
+                let pairs = sink.written;
+                sink.report.compression = if pairs > 0 { words / (2 * pairs) as f64 } else { 0.0 };
+                return Ok(Searched { checks: sink.checks, plan, gpu: sink.report, pairs });
+            }
+        }
+    }
+}
+
+/// How many boxes fit: each has a place in every buffer, and a number in an entry.
+fn most_boxes(session: &Session) -> usize {
+    let by_bytes = session.storage.most_bytes() / size_of::<Located>() as u64;
+    (by_bytes.min(1 << BOX_BITS).min(MOST_IN_A_CELL) as usize).min(session.part_limit)
+}
+
+/// Entries are counted in 32 bits: at most 4 x 4 x 4 for a box in each level but the last.
+fn check_entries(plan: &GpuPlan, boxes: usize) -> Result<(), GpuError> {
+    let entries = boxes as u64 * (64 * (plan.levels.len() as u64 - 1) + 1);
+    let limit = u64::from(u32::MAX);
+    if entries <= limit { Ok(()) } else { Err(GpuError::TooLarge { what: "entries", bytes: entries, limit }) }
+}
+
+fn search_whole(
+    session: &mut Session,
+    request: &Request<'_>,
+    crowding: f32,
+    sink: &mut Sink<'_>,
+) -> Result<Plan, Failure> {
+    sink.report.parts = 1;
+    let valid = request.summary.valid;
+    if valid < 2 {
+        return Ok(Plan { boxes: valid, ..Plan::default() });
+    }
+    let config = request.config;
+    let brute = config.strategy == Strategy::Auto && request.boxes.len() <= SMALL_SCENE;
+    let plan = (!brute).then(|| plan(session, request.summary, config, crowding));
+    plan.as_ref().map_or(Ok(()), |plan| check_entries(plan, request.boxes.len()))?;
+    let job = Job { boxes: request.boxes, filters: request.filters, split: 0, plan: plan.as_ref(), config };
+    session.run(&job, sink)?;
+    let (chosen, swept) = if brute { (Chosen::Brute, valid) } else { (Chosen::Pbig, 0) };
+    Ok(Plan { chosen, swept, boxes: valid, gpu: plan, ..Plan::default() })
+}
+
+fn plan(session: &Session, summary: &Summary, config: &Config, crowding: f32) -> GpuPlan {
+    let most_cells = (session.storage.most_bytes() / 8).min(1 << 28) as u32;
+    GpuPlan::new(summary, config, crowding, most_cells)
+}
+
+fn search_parts(
+    session: &mut Session,
+    request: &Request<'_>,
+    crowding: f32,
+    most: usize,
+    sink: &mut Sink<'_>,
+) -> Result<Plan, Failure> {
+    let (sorted, axis) = parts::sorted(request.boxes, request.summary);
+    let parts = parts::parts(request.boxes, &sorted, axis, most / 2);
+    let mut last = None;
+    for part in &parts {
+        let ids: Vec<u32> = [part.first, part.second].concat();
+        let boxes: Vec<Aabb> = ids.iter().map(|&id| request.boxes[id as usize]).collect();
+        let filters: Option<Vec<ProxyFilter>> =
+            request.filters.map(|all| ids.iter().map(|&id| all[id as usize]).collect());
+        let split = if part.second.is_empty() { 0 } else { part.first.len() as u32 };
+        let plan = plan(session, &Summary::of(&boxes, None), request.config, crowding);
+        check_entries(&plan, boxes.len())?;
+        let config = request.config;
+        let job = Job { boxes: &boxes, filters: filters.as_deref(), split, plan: Some(&plan), config };
+        let mut own = Sink { ids: Some(&ids), found: &mut *sink.found, report: sink.report.clone(), ..*sink };
+        session.run(&job, &mut own)?;
+        (sink.used, sink.pairs, sink.written) = (own.used, own.pairs, own.written);
+        (sink.checks, sink.report) = (own.checks, own.report);
+        last = Some(plan);
+    }
+    sink.report.parts = parts.len() as u32;
+    let valid = request.summary.valid;
+    Ok(Plan { chosen: Chosen::Pbig, boxes: valid, gpu: last, ..Plan::default() })
+}
