@@ -89,6 +89,24 @@ fn sets_that_exceed_the_limits_of_a_device_are_split_and_complete() {
 }
 
 #[test]
+fn lists_that_exceed_a_buffer_split_the_set_and_are_remembered() {
+    // They fit as boxes, but their entries, some twenty each, do not.
+    let boxes = set("pile", 30_000);
+    let config = with(GpuOptions { max_bytes: 1 << 20, ..GpuOptions::DEFAULT });
+    let mut finder = Finder::new(Config { pbig_boxes_per_cell: 1.0, ..config });
+    let wanted = on_cpu(&boxes);
+    for call in 0..2 {
+        let (pairs, report) = find(&mut finder, &boxes);
+        assert_eq!(difference(&pairs, &wanted), None);
+        assert!(report.parts > 1, "call {call}: {} parts", report.parts);
+    }
+    let few = set("unit", 9000);
+    let (pairs, report) = find(&mut finder, &few);
+    assert_eq!(difference(&pairs, &on_cpu(&few)), None);
+    assert_eq!(report.parts, 1, "a small set is not cut because a large one was");
+}
+
+#[test]
 fn a_device_that_really_allows_little_is_enough() {
     let adapter = adapters().into_iter().next().expect("an adapter");
     let required_limits = wgpu::Limits {
@@ -304,8 +322,8 @@ fn auto_goes_back_and_forth_between_a_device_and_edits_on_the_cpu() {
     let start = set("unit", 12_000);
     let (mut on_gpu, mut edited) = (0, 0);
     for frame in 0..24usize {
-        // All boxes move in two frames of three, a few in the third.
-        let step = if frame % 3 == 2 { 500 } else { 1 };
+        // All boxes move in two frames, then a few in two: the first builds a base, the second edits it.
+        let step = if frame % 4 >= 2 { 500 } else { 1 };
         for (id, b) in start.iter().enumerate().step_by(step) {
             let shift = ((id + frame) % 7) as f32 * 0.2;
             let moved = Aabb::new(b.min.map(|x| x + shift), b.max.map(|x| x + shift));

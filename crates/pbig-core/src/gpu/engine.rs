@@ -165,11 +165,16 @@ impl Engine {
     }
 
     /// Whether the device still takes work and finishes it, by trying.
-    pub(super) fn is_alive(&self) -> bool {
+    fn is_alive(&self) -> bool {
+        self.is_idle_within(Duration::from_secs(1))
+    }
+
+    /// Whether the device finishes all its work in time, which it is given some more of to see.
+    pub(super) fn is_idle_within(&self, limit: Duration) -> bool {
         let scope = self.device.push_error_scope(wgpu::ErrorFilter::Validation);
         let encoder = self.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
         let submission = self.queue.submit([encoder.finish()]);
-        let finished = self.poll(submission, Duration::from_secs(1)).is_ok();
+        let finished = self.poll(submission, limit).is_ok();
         let refused = pollster::block_on(scope.pop()).is_some();
         finished && !refused
     }

@@ -52,7 +52,10 @@ use engine::Engine;
 use search::{Searched, search};
 use session::Session;
 use std::sync::Arc;
-use std::time::Instant;
+use std::time::{Duration, Instant};
+
+/// How long a call waits to see whether an app's device that was busy for too long is idle again.
+const PROBE: Duration = Duration::from_millis(10);
 
 /// Where a finder's device comes from, and where to look for another when it is lost.
 #[derive(Clone, Debug)]
@@ -219,7 +222,7 @@ impl GpuFinder {
         if let Some(engine) = self.engine.take_if(|engine| engine.is_lost()) {
             self.session = None;
             // An app's device may only have been busy for too long.
-            if matches!(self.source, Source::Given) && engine.is_alive() {
+            if matches!(self.source, Source::Given) && engine.is_idle_within(PROBE) {
                 engine.take_back();
             }
             self.engine = Some(engine).filter(|_| matches!(self.source, Source::Given));

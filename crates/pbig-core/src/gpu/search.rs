@@ -34,7 +34,10 @@ pub(super) fn search(
     crowding: f32,
     found: &mut Found,
 ) -> Result<Searched, Failure> {
-    let mut most = most_boxes(session);
+    let len = request.boxes.len();
+    // What one set needed says nothing about one of another size.
+    session.parted = session.parted.filter(|&(parted, _)| parted / 2 <= len && len / 2 <= parted);
+    let mut most = most_boxes(session).min(session.parted.map_or(usize::MAX, |(_, most)| most));
     loop {
         found.clear();
         let gpu = GpuReport {
@@ -61,8 +64,9 @@ pub(super) fn search(
         match result {
             // A list that only the device knows the length of was too long: fewer boxes make it shorter.
             Err(Failure::Device(GpuError::TooLarge { .. })) if most > SMALLEST_PART => {
-                most = (most.min(request.boxes.len()) / 2).max(SMALLEST_PART);
-                session.part_limit = most;
+                most = (most.min(len) / 2).max(SMALLEST_PART);
+                session.parted = Some((len, most));
+                session.forget_needs();
             }
             Err(failure) => return Err(failure),
             Ok(plan) => {
@@ -78,7 +82,7 @@ pub(super) fn search(
 /// How many boxes fit: each has a place in every buffer, and a number in an entry.
 fn most_boxes(session: &Session) -> usize {
     let by_bytes = session.storage.most_bytes() / size_of::<Located>() as u64;
-    (by_bytes.min(1 << BOX_BITS).min(MOST_IN_A_CELL) as usize).min(session.part_limit)
+    by_bytes.min(1 << BOX_BITS).min(MOST_IN_A_CELL) as usize
 }
 
 /// Entries are counted in 32 bits: at most 4 x 4 x 4 for a box in each level but the last.

@@ -48,8 +48,8 @@ pub(super) struct Session {
     pub(super) binds: BindGroups,
     pub(super) clocks: [Option<Clock>; 2],
     pub(super) room: map::Room,
-    /// Boxes of a set that turned out to need parts, until buffers are looked through again.
-    pub(super) part_limit: usize,
+    /// The size of a set that turned out to need parts, and theirs, until buffers are looked through again.
+    pub(super) parted: Option<(usize, usize)>,
     /// Words of output that a chunk is expected to have: how much is fetched before that is known.
     pub(super) words: u64,
     /// Most words of a chunk of this job; the room that the next one begins with.
@@ -71,7 +71,7 @@ impl Session {
             binds: BindGroups::default(),
             clocks,
             room: map::Room::default(),
-            part_limit: usize::MAX,
+            parted: None,
             words: 0,
             most_words: 0,
             word_room: 0,
@@ -100,8 +100,14 @@ impl Session {
     /// To be called after a call, which is one job or several.
     pub(super) fn end_call(&mut self) {
         if self.storage.end_call() {
-            self.part_limit = usize::MAX;
+            self.parted = None;
         }
+    }
+
+    /// Makes room anew: what a set needed that was too large is not what its parts need.
+    pub(super) fn forget_needs(&mut self) {
+        self.room = map::Room::default();
+        (self.words, self.most_words, self.word_room) = (0, 0, 0);
     }
 
     fn params(&self, job: &Job<'_>) -> Params {

@@ -17,6 +17,8 @@ const CELLS_PER_BOX: f64 = 4.0;
 const CELLS_ANYWAY: f64 = 4096.0;
 /// Others in the cell of a box, against the wanted boxes per cell, from which a finer cell is looked for.
 const CROWDED: f64 = 4.0;
+/// Others in a cell that a sample must show before they count: one coincidence stands for many boxes.
+const MEANINGFUL: usize = 16;
 /// Finest cells from the middle of the world to its end, at most: they must fit an `i32` with room.
 const REACH: f64 = 1073741824.0;
 
@@ -123,7 +125,8 @@ fn edge(level: &LevelPlan, summary: &Summary, space: [f32; 3], config: &Config, 
 /// as the sample tells, or hardly more than in the smallest cell: identical boxes no cell can part.
 fn uncrowded(sample: &[Aabb], boxes: u32, even: f64, smallest: f64, most: f64) -> f64 {
     let mut cell = even;
-    if crowd(sample, boxes, cell) <= most {
+    let (now, seen) = crowding(sample, boxes, cell);
+    if now <= most || seen < MEANINGFUL {
         return cell;
     }
     let smallest = smallest.max(even * 2f64.powi(-30));
@@ -134,14 +137,19 @@ fn uncrowded(sample: &[Aabb], boxes: u32, even: f64, smallest: f64, most: f64) -
     cell
 }
 
-/// Other boxes in the cell of a box's lower corner, on average over boxes, estimated from a sample.
 fn crowd(sample: &[Aabb], boxes: u32, cell: f64) -> f64 {
+    crowding(sample, boxes, cell).0
+}
+
+/// Other boxes in the cell of a box's lower corner, on average over boxes, estimated from a sample; and
+/// how many the sample itself has.
+fn crowding(sample: &[Aabb], boxes: u32, cell: f64) -> (f64, usize) {
     let of = |b: &Aabb| b.min.map(|x| (f64::from(x) / cell).floor() as i64);
     let mut cells: Vec<[i64; 3]> = sample.iter().map(of).collect();
     cells.sort_unstable();
     let others = cells.chunk_by(|a, b| a == b).map(|same| same.len() * (same.len() - 1)).sum::<usize>();
     let n = sample.len().max(1) as f64;
-    others as f64 / n * (f64::from(boxes) / n)
+    (others as f64 / n * (f64::from(boxes) / n), others)
 }
 
 /// The finest cell, and by how many doublings each level's cells are larger; no level twice, and none

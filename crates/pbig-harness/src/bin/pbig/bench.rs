@@ -90,6 +90,7 @@ fn measure(gpu: &GpuFinder, name: &'static str, n: usize) -> Result<Row, Failure
         let times = [time(&mut on_cpu, boxes, name)?, time(&mut on_gpu, boxes, name)?];
         report = did(&on_gpu, name, n)?;
         let unchanged = time(&mut on_gpu, boxes, name)?;
+        did(&on_gpu, name, n)?;
         if on_cpu.pairs() != on_gpu.pairs() {
             return Err(Failure::Check(format!("{name} {n}: CPU and GPU differ")));
         }
