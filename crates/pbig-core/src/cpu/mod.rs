@@ -1,6 +1,6 @@
 //! The CPU backend. `map` sorts boxes into cells (`cells`, `entries`), `find` searches them (`half`
-//! within a grid, `check` across grids), `emit` orders the pairs. `pbig` is the paper's grid, the
-//! scalar twin of the GPU kernels.
+//! within a grid, `check` across grids), `emit` orders the pairs. `pbig` is the paper's grid, plain
+//! and scalar.
 
 mod cells;
 pub(crate) mod check;
