@@ -40,5 +40,5 @@ fn main() {
 
     let lowest = bodies.iter().map(|(_, body)| body.translation().y).fold(f32::MAX, f32::min);
     println!("after four seconds the lowest of {} balls is at {lowest:.3}", bodies.len());
-    println!("{} pairs; {}", broad_phase.pair_count(), broad_phase.report().plan);
+    println!("{} pairs; {}", broad_phase.pair_count(), broad_phase.stats().report.plan);
 }

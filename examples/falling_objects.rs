@@ -8,7 +8,7 @@ use pbig_harness::chart::{self, Panel, Series};
 use pbig_harness::options::BackendOption;
 use pbig_harness::runner::{Run, Spread, StepTime};
 use pbig_harness::scenes::Scene;
-use pbig_harness::shadow::{Difference, Shadow};
+use pbig_harness::shadow::{Difference, Shadowed};
 use rapier_pbig::{Config, PbigBroadPhase};
 use rapier3d::prelude::{BroadPhase, DefaultBroadPhase};
 use std::io::IsTerminal;
@@ -57,8 +57,8 @@ fn main() -> ExitCode {
     let checked = check(&args, new());
     println!("{} with {} bodies, {} steps\n", args.scene.name, args.bodies, args.steps);
     print_table(&stock, &ours, &checked);
-    println!("\n{}", ours.broad_phase.inner.report().plan);
-    if let Some(why) = &ours.broad_phase.inner.report().fallback {
+    println!("\n{}", ours.broad_phase.inner.stats().report.plan);
+    if let Some(why) = &ours.broad_phase.inner.stats().report.fallback {
         println!("note: {why}");
     }
     let drawn = write_chart(&args, &stock.times, &ours.times);
@@ -88,7 +88,7 @@ struct Checked {
 }
 
 fn check(args: &Args, broad_phase: PbigBroadPhase) -> Checked {
-    let shadow = Shadow::new(broad_phase, PbigBroadPhase::CONFIG.margin).every(CHECK_EVERY);
+    let shadow = Shadowed::new(broad_phase, PbigBroadPhase::CONFIG.margin).every(CHECK_EVERY);
     let mut run = Run::new(args.scene, args.bodies as usize, args.seed, shadow);
     let bar = progress(args.steps.into());
     for _ in 0..args.steps {
@@ -97,8 +97,8 @@ fn check(args: &Args, broad_phase: PbigBroadPhase) -> Checked {
     }
     bar.finish_and_clear();
     let shadow = run.broad_phase.inner;
-    let missing = shadow.differences.iter().filter(|d| d.fault.is_missing()).count();
-    Checked { comparisons: shadow.checked, missing, differences: shadow.differences }
+    let missing = shadow.checker.differences.iter().filter(|d| d.fault.is_missing()).count();
+    Checked { comparisons: shadow.checker.compared, missing, differences: shadow.checker.differences }
 }
 
 fn print_table(stock: &Run<DefaultBroadPhase>, ours: &Run<PbigBroadPhase>, checked: &Checked) {

@@ -3,7 +3,7 @@
 //!
 //! `cargo run --release --example headless_test`
 
-use pbig_harness::shadow::Shadow;
+use pbig_harness::shadow::Shadowed;
 use pbig_harness::world::World;
 use rapier_pbig::PbigBroadPhase;
 use rapier3d::prelude::*;
@@ -15,13 +15,16 @@ fn main() {
         .add(RigidBodyBuilder::dynamic().translation(vector![0.3, 4.0, 0.0]), ColliderBuilder::ball(0.5));
 
     // The shadow runs rapier's own broad phase and brute force beside pbig, and compares every call.
-    let mut broad_phase = Shadow::new(PbigBroadPhase::new(), PbigBroadPhase::CONFIG.margin);
+    let mut broad_phase = Shadowed::new(PbigBroadPhase::new(), PbigBroadPhase::CONFIG.margin);
     for _ in 0..300 {
         world.step(&mut broad_phase);
     }
 
     let height = world.bodies[ball].translation().y;
     assert!((height - 0.6).abs() < 0.01, "the ball rests on the plank, not at {height}");
-    assert!(broad_phase.differences.is_empty(), "{}", broad_phase.differences[0]);
-    println!("the ball rests at {height:.3}; {} calls checked, nothing missing", broad_phase.checked);
+    assert!(broad_phase.first_difference().is_none(), "{:?}", broad_phase.first_difference());
+    println!(
+        "the ball rests at {height:.3}; {} calls checked, nothing missing",
+        broad_phase.checker.compared
+    );
 }

@@ -129,15 +129,15 @@ fn the_shadow_checker_notices_each_fault_and_writes_the_frames() {
 
 #[test]
 fn the_shadow_checker_notices_a_collider_paired_with_itself() {
-    use pbig_harness::shadow::Shadow;
+    use pbig_harness::shadow::Shadowed;
     let world = Scene::named("column").expect("the scene exists").build(300, 1);
     let handles: Vec<ColliderHandle> = world.colliders.iter().map(|(handle, _)| handle).collect();
     let faulty = Faulty { inner: PbigBroadPhase::new(), plant: Plant::WithItself, seen: 99 };
-    let mut shadow = Shadow::new(faulty, PbigBroadPhase::CONFIG.margin);
+    let mut shadow = Shadowed::new(faulty, PbigBroadPhase::CONFIG.margin);
     // Without a narrow phase, which would panic. Large boxes, so that there are pairs at once.
     let params = IntegrationParameters { normalized_prediction_distance: 1.0, ..world.params };
     shadow.update(&params, &world.colliders, &world.bodies, &handles, &[], &mut Vec::new());
-    assert_eq!(shadow.differences.first().map(|d| d.fault), Some(Fault::WithItself));
+    assert_eq!(shadow.first_difference().map(|d| d.fault), Some(Fault::WithItself));
 }
 
 #[test]

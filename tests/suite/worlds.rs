@@ -3,7 +3,7 @@
 use pbig_core::{Backend, Config, Strategy};
 use pbig_harness::runner::Run;
 use pbig_harness::scenes::Scene;
-use pbig_harness::shadow::Shadow;
+use pbig_harness::shadow::Shadowed;
 use pbig_harness::simulate::{Task, run_checked};
 use pbig_harness::world::World;
 use rapier_pbig::PbigBroadPhase;
@@ -20,7 +20,12 @@ fn check(scene: Scene, config: Config, steps: usize) {
     let (outcome, ours) = run_checked(task, ours, config.margin, &folder, |_| ());
     let check = outcome.check.as_ref().expect("a check was asked for");
     assert!(!outcome.failed(), "{}: {}", scene.name, check.differences[0]);
-    assert_eq!(ours.report().fallback, None, "{}: a GPU's work must not be done by the CPU", scene.name);
+    assert_eq!(
+        ours.stats().report.fallback,
+        None,
+        "{}: a GPU's work must not be done by the CPU",
+        scene.name
+    );
     assert!(check.calls > 0 && check.oracle_pairs > 0, "{}: nothing was compared", scene.name);
 }
 
@@ -107,7 +112,7 @@ fn a_sleeping_world_costs_no_checks() {
     let (mut most, mut updates) = (0, 0);
     for step in 0..40 {
         run.step();
-        let report = run.broad_phase.inner.report();
+        let report = run.broad_phase.inner.stats().report;
         if step > 2 {
             most = most.max(report.checks.made);
             updates += report.changed;
@@ -126,13 +131,15 @@ fn objects_that_fall_for_ever_are_still_found_at_the_same_cost() {
             .add(RigidBodyBuilder::dynamic().translation(at).linear_damping(0.0), ColliderBuilder::ball(0.5));
     }
     let margin = PbigBroadPhase::CONFIG.margin;
-    let mut broad_phase = Shadow::new(PbigBroadPhase::new(), margin).every(50);
+    let mut broad_phase = Shadowed::new(PbigBroadPhase::new(), margin).every(50);
     for _ in 0..2000 {
         world.step(&mut broad_phase);
-        let checks = broad_phase.inner.report().checks.made;
-        assert!(checks < 60 * 200, "{checks} checks: {}", broad_phase.inner.report().plan);
+        let checks = broad_phase.inner.stats().report.checks.made;
+        assert!(checks < 60 * 200, "{checks} checks: {}", broad_phase.inner.stats().report.plan);
     }
     let depth = world.bodies.iter().map(|(_, b)| b.translation().y).fold(0.0, f32::min);
     assert!(depth < -1e6, "fell to {depth}");
-    assert!(broad_phase.differences.is_empty(), "{}", broad_phase.differences[0]);
+    if let Some(first) = broad_phase.first_difference() {
+        panic!("{first}");
+    }
 }

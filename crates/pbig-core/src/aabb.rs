@@ -8,6 +8,7 @@ use bytemuck::{Pod, Zeroable};
 /// infinite. An invalid box overlaps nothing, itself included (contract 7).
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Aabb {
     /// Lower corner.
     pub min: [f32; 3],

@@ -4,6 +4,7 @@ use std::time::Duration;
 
 /// Where the work runs.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Backend {
     /// What the plan expects to be fastest.
     #[default]
@@ -18,6 +19,7 @@ pub enum Backend {
 
 /// Which algorithm finds the pairs.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Strategy {
     /// The plan decides between brute force and the grid; on a GPU up to 1024 boxes need none.
     #[default]
@@ -32,6 +34,7 @@ pub enum Strategy {
 
 /// How [`Strategy::Pbig`] and the GPU choose their cell size, both times from [`Config::pbig_boxes_per_cell`].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum CellRule {
     /// PBIG's equation 6: the smallest cell with that many entries on average, boxes counted in
     /// every cell they touch.
@@ -44,6 +47,7 @@ pub enum CellRule {
 
 /// In which order lists of pairs come.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Order {
     /// By `(a, b)`: the same bytes on every backend, strategy and thread count.
     #[default]
@@ -55,6 +59,7 @@ pub enum Order {
 
 /// Sizes at which a call ends with an error rather than exhaust the machine.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Limits {
     /// Most boxes, and one more than the largest id of [`crate::BroadPhase`], which keeps about
     /// 100 bytes for every id up to the largest.
@@ -78,6 +83,7 @@ impl Default for Limits {
 
 /// How the GPU's output is coded (docs/PAIR_FORMAT.md).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Coding {
     /// What would have been smaller in the call before, the tables for decoding included.
     #[default]
@@ -91,6 +97,7 @@ pub enum Coding {
 
 /// What can be chosen about the GPU backend; the defaults are right, the rest is for study and tests.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct GpuOptions {
     /// How the output is coded (PBIG table IV, "data compression").
     pub coding: Coding,
@@ -139,6 +146,7 @@ impl Default for GpuOptions {
 
 /// Everything a caller can choose; the defaults are right for most.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Config {
     /// Where the work runs.
     pub backend: Backend,

@@ -17,6 +17,7 @@ use bytemuck::{Pod, Zeroable};
 /// ```
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Pod, Zeroable)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct ProxyFilter {
     /// The body that the box belongs to; boxes of one body never pair. [`ProxyFilter::NO_BODY`]
     /// pairs with everything.
@@ -60,13 +61,24 @@ impl ProxyFilter {
     /// Whether the two boxes may pair. Symmetric.
     #[inline]
     pub fn allows(&self, other: &Self) -> bool {
-        let bodies = (self.body != other.body) | (self.body == Self::NO_BODY);
-        let kinds = (self.accepted_kinds & other.kind) | (other.accepted_kinds & self.kind) != 0;
-        bodies & kinds & self.groups_allow(other)
+        self.bodies_allow(other) & self.kinds_allow(other) & self.groups_allow(other)
     }
 
+    /// The first of the three tests: different bodies, or none.
     #[inline]
-    fn groups_allow(&self, other: &Self) -> bool {
+    pub fn bodies_allow(&self, other: &Self) -> bool {
+        (self.body != other.body) | (self.body == Self::NO_BODY)
+    }
+
+    /// The second: either one accepts the other's kind.
+    #[inline]
+    pub fn kinds_allow(&self, other: &Self) -> bool {
+        (self.accepted_kinds & other.kind) | (other.accepted_kinds & self.kind) != 0
+    }
+
+    /// The third: memberships and masks.
+    #[inline]
+    pub fn groups_allow(&self, other: &Self) -> bool {
         let forth = self.memberships & other.mask != 0;
         let back = other.memberships & self.mask != 0;
         let either = self.test_mode & other.test_mode & TestMode::Or as u16 != 0;

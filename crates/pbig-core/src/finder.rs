@@ -7,7 +7,7 @@ use crate::cpu::pbig::PbigGrid;
 #[cfg(feature = "gpu")]
 use crate::gpu::{self, GpuFinder};
 use crate::plan::{Plan, Summary};
-use crate::report::{Checks, Report, lap};
+use crate::report::{Checks, Report, lap, stage};
 use crate::{Aabb, Backend, Config, Error, Limits, Pair, ProxyFilter, Strategy};
 use std::time::{Duration, Instant};
 
@@ -106,6 +106,7 @@ impl Finder {
         let rule = Rule { accept, filters, filters_suffice: true };
         self.search.find(boxes, &self.config, &rule, &mut self.report)?;
         let mut clock = Instant::now();
+        stage!("emit");
         let chunks = &self.search.found.chunks;
         emit::collect(chunks, boxes.len(), self.config.order, &mut self.scratch, &mut self.pairs);
         self.report.stages.emit = lap(&mut clock);
@@ -263,6 +264,7 @@ impl Search {
         if !gpu::wanted(config, self.gpu.as_ref(), &mut self.trial, boxes.len()) {
             return Ok(false);
         }
+        stage!("gpu");
         let mut clock = Instant::now();
         let accept: Option<&(dyn Fn(u32, u32) -> bool + Sync)> =
             if rule.filters_suffice { None } else { Some(rule.accept) };
@@ -340,6 +342,7 @@ impl Search {
         // Fewer than two valid boxes have no plan.
         let Plan { pbig: Some(plan), .. } = report.plan else { return Ok(()) };
         let mut clock = Instant::now();
+        stage!("map and check");
         self.pbig.build(&plan, boxes);
         report.stages.map += lap(&mut clock);
         report.checks =

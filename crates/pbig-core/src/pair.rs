@@ -5,6 +5,7 @@ use bytemuck::{Pod, Zeroable};
 /// Two overlapping boxes by id, `a < b`. Ordered by `a`, then `b`.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash, Pod, Zeroable)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Pair {
     /// The smaller id.
     pub a: u32,

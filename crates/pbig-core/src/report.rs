@@ -36,6 +36,15 @@ impl StageTimes {
     }
 }
 
+/// A `tracing` span, target `pbig`, that lasts for the rest of the block: one for each stage, so that a
+/// profiler shows them. Without a subscriber it costs a comparison.
+macro_rules! stage {
+    ($name:literal) => {
+        let _span = tracing::debug_span!(target: "pbig", $name).entered();
+    };
+}
+pub(crate) use stage;
+
 /// The time since `clock`, which is set to now.
 pub(crate) fn lap(clock: &mut Instant) -> Duration {
     let now = Instant::now();

@@ -1,6 +1,6 @@
 //! Boxes in files, as the program `pbig` reads and writes them.
 
-use ndarray::{Array2, Array3, ArrayView2};
+use ndarray::{Array2, ArrayView2};
 use ndarray_npy::{ReadNpyError, ReadNpyExt, ReadableElement, WriteNpyError, WriteNpyExt};
 use pbig_core::{Aabb, Pair};
 use std::fs::File;
@@ -288,23 +288,6 @@ pub fn write_csv(
         file.flush()
     };
     write().map_err(|error| at(path, error))
-}
-
-/// Frames as `.npy` (F,N,6) float32, readable by `pbig replay`; boxes that a frame lacks are NaN.
-///
-/// # Errors
-/// A message that names the file, when it cannot be written.
-pub fn write_frames<'a>(
-    path: &Path,
-    frames: impl IntoIterator<Item = &'a Vec<Aabb>>,
-) -> Result<(), FileError> {
-    let frames: Vec<&Vec<Aabb>> = frames.into_iter().collect();
-    let boxes = frames.iter().map(|frame| frame.len()).max().unwrap_or(0);
-    let array = Array3::from_shape_fn((frames.len(), boxes, 6), |(f, i, k)| {
-        let aabb = frames[f].get(i).unwrap_or(&Aabb::NOWHERE);
-        if k < 3 { aabb.min[k] } else { aabb.max[k - 3] }
-    });
-    write_npy(path, |file| array.write_npy(file))
 }
 
 fn write_npy(

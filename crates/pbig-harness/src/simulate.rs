@@ -1,9 +1,9 @@
 //! A scene run with one broad phase, checked or not: what `pbig simulate` does.
 
-use crate::files::write_frames;
 use crate::runner::{Run, Spread, StepTime, Timed, milliseconds};
 use crate::scenes::Scene;
-use crate::shadow::{Difference, Shadow};
+use crate::shadow::{Difference, Shadowed};
+use rapier_pbig::shadow::write_frames;
 use rapier3d::prelude::BroadPhase;
 use std::path::{Path, PathBuf};
 
@@ -102,13 +102,13 @@ pub fn run_checked<B: BroadPhase>(
     folder: &Path,
     mut progress: impl FnMut(usize),
 ) -> (Outcome, B) {
-    let shadow = Shadow::new(Timed::new(broad_phase), relative_margin);
+    let shadow = Shadowed::new(Timed::new(broad_phase), relative_margin);
     let mut run = Run::new(task.scene, task.bodies, task.seed, shadow);
     for step in 0..task.steps {
         run.step();
         leave_out_checks(&mut run);
         progress(step);
-        if !run.broad_phase.inner.differences.is_empty() {
+        if run.broad_phase.inner.first_difference().is_some() {
             break;
         }
     }
@@ -117,7 +117,7 @@ pub fn run_checked<B: BroadPhase>(
 }
 
 /// The last step's times as they would be without the shadow.
-fn leave_out_checks<B: BroadPhase>(run: &mut Run<Shadow<Timed<B>>>) {
+fn leave_out_checks<B: BroadPhase>(run: &mut Run<Shadowed<Timed<B>>>) {
     let own = milliseconds(run.broad_phase.inner.inner.take());
     if let Some(last) = run.times.last_mut() {
         last.step -= last.broad_phase - own;
@@ -125,14 +125,18 @@ fn leave_out_checks<B: BroadPhase>(run: &mut Run<Shadow<Timed<B>>>) {
     }
 }
 
-fn check<B>(task: Task, shadow: &Shadow<B>, steps: usize, folder: &Path) -> Check {
+fn check<B>(task: Task, shadow: &Shadowed<B>, steps: usize, folder: &Path) -> Check {
+    let checker = &shadow.checker;
     let file = folder.join(format!("pbig-{}-{steps}-failed.npy", task.scene.name));
-    let failed = !shadow.differences.is_empty();
+    let failed = !checker.differences.is_empty();
     Check {
-        calls: shadow.checked,
-        oracle_pairs: shadow.oracle_pairs,
-        stock_only: shadow.stock_only,
-        differences: shadow.differences.clone(),
-        frames_file: failed.then(|| write_frames(&file, &shadow.frames).map(|()| file)),
+        calls: checker.compared,
+        oracle_pairs: checker.oracle_pairs,
+        stock_only: checker.stock_only,
+        differences: checker.differences.clone(),
+        frames_file: failed.then(|| {
+            let written = write_frames(&file, &checker.frames);
+            written.map(|()| file).map_err(|error| error.to_string())
+        }),
     }
 }

@@ -88,6 +88,40 @@ impl World {
         self.colliders.remove(collider, &mut self.islands, &mut self.bodies, true);
     }
 
+    /// Everything, bit by bit.
+    ///
+    /// # Panics
+    /// If a part cannot be saved, which none of rapier's refuses.
+    pub fn to_bytes(&self) -> Vec<u8> {
+        let sets = (&self.bodies, &self.colliders, &self.impulse_joints, &self.multibody_joints);
+        let rest = (&self.narrow_phase, &self.params, &self.islands, &self.ccd_solver);
+        postcard::to_stdvec(&(sets, rest, self.gravity.to_array())).expect("rapier's sets can be saved")
+    }
+
+    /// The world that was saved.
+    ///
+    /// # Errors
+    /// If these are not the bytes of a world.
+    pub fn from_bytes(bytes: &[u8]) -> Result<Self, postcard::Error> {
+        let (sets, rest, gravity): (_, _, [f32; 3]) = postcard::from_bytes(bytes)?;
+        let (bodies, colliders, impulse_joints, multibody_joints) = sets;
+        let (narrow_phase, params, islands, ccd_solver) = rest;
+        let gravity = Vec3::from_array(gravity);
+        let pipeline = PhysicsPipeline::new();
+        Ok(Self {
+            bodies,
+            colliders,
+            impulse_joints,
+            multibody_joints,
+            narrow_phase,
+            gravity,
+            params,
+            islands,
+            ccd_solver,
+            pipeline,
+        })
+    }
+
     /// Every number that makes up the poses of all bodies, bit by bit, in order: equal exactly when
     /// two worlds are.
     pub fn pose_bits(&self) -> Vec<u32> {

@@ -1,44 +1,64 @@
-//! `PbigBroadPhase`: rapier's calls translated to the finder's, and its events back.
+//! `PbigBroadPhase`: rapier's calls translated to the finder's.
 
+use crate::call::Call;
+use crate::events::{HandleOrder, Outbox};
 use crate::proxy::{collision_aabb, filter_of};
-use pbig_core::{Aabb, BroadPhase as Finder, Config, Limits, Pair, ProxyFilter, Report};
+use crate::roll::Roll;
+use crate::scene_tree::SceneTree;
+use crate::stats::Kept;
+use pbig_core::{Aabb, BroadPhase as Finder, Config, Limits, ProxyFilter};
 use rapier3d::prelude::{
     BroadPhase, BroadPhasePairEvent, ColliderHandle, ColliderPair, ColliderSet, IntegrationParameters,
-    RigidBodySet,
+    NarrowPhase, RigidBodySet,
 };
 use rayon::prelude::*;
-
-/// A collider index that is not in the finder. Rapier's generations cannot reach it.
-const ABSENT: u32 = u32::MAX;
+use std::time::Instant;
 
 /// Modified colliders from which their boxes are computed on several threads: below, a second one
 /// costs more than it saves.
 const PARALLEL_FROM: usize = 2048;
 
-/// What the finder is told about a collider; nothing when it is gone or disabled.
-type Proxy = Option<(Aabb, ProxyFilter)>;
+/// What the finder is to be told about a collider.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Proxy {
+    Gone,
+    Disabled,
+    Enabled(Aabb, ProxyFilter),
+}
 
 /// The broad phase to hand to rapier's `PhysicsPipeline` or `CollisionPipeline`.
 ///
 /// A collider's index is its id in the finder. Each collider is stored with its box and filter, and
 /// set again whenever rapier lists it as modified: rapier does not tell what has changed, and a
 /// collider whose fat box still holds it and whose filter is the same costs nothing more.
-#[derive(Clone, Debug)]
+///
+/// A clone, and one restored from a snapshot (feature `serde`), goes on as the original does.
+#[derive(Clone)]
 pub struct PbigBroadPhase {
-    finder: Finder,
-    /// By collider index: the generation that the finder holds.
-    generations: Vec<u32>,
+    pub(crate) finder: Finder,
+    pub(crate) roll: Roll,
     /// Margin in units of `IntegrationParameters::length_unit`.
-    relative_margin: f32,
-    /// Of the modified colliders of one call, in their order.
+    pub(crate) relative_margin: f32,
+    pub(crate) outbox: Outbox,
+    /// Of the listed colliders of one call, in their order.
     proxies: Vec<Proxy>,
-    /// By collider index: pairs before this call; only for the colliders in its events.
-    before: Vec<u32>,
+    pub(crate) tree: SceneTree,
+    pub(crate) kept: Kept,
+    #[cfg(feature = "shadow")]
+    pub(crate) shadow: Option<Box<crate::shadow::Checker>>,
 }
 
 impl Default for PbigBroadPhase {
     fn default() -> Self {
         Self::new()
+    }
+}
+
+impl std::fmt::Debug for PbigBroadPhase {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let mut shown = f.debug_struct("PbigBroadPhase");
+        shown.field("colliders", &self.roll.len()).field("pairs", &self.pair_count());
+        shown.field("config", self.finder.config()).finish_non_exhaustive()
     }
 }
 
@@ -66,6 +86,12 @@ impl PbigBroadPhase {
         Self::on(config, |config| Finder::with_gpu(config, gpu))
     }
 
+    /// Goes on with this device, from the next update: one restored from a snapshot has none.
+    #[cfg(feature = "gpu")]
+    pub fn set_gpu(&mut self, gpu: pbig_core::GpuFinder) {
+        self.finder.set_gpu(gpu);
+    }
+
     /// The adapter of the device in use: name, kind and API.
     #[cfg(feature = "gpu")]
     pub fn adapter(&self) -> Option<&str> {
@@ -79,19 +105,45 @@ impl PbigBroadPhase {
             Self::CONFIG.margin
         };
         let config = Config { margin, limits: Limits::UNLIMITED, ..config };
-        let finder = make(config).expect("the margin was checked above");
+        Self::around(make(config).expect("the margin was checked above"), margin)
+    }
+
+    pub(crate) fn around(finder: Finder, relative_margin: f32) -> Self {
         Self {
             finder,
-            generations: Vec::new(),
-            relative_margin: margin,
+            roll: Roll::default(),
+            relative_margin,
+            outbox: Outbox::default(),
             proxies: Vec::new(),
-            before: Vec::new(),
+            tree: SceneTree::default(),
+            kept: Kept::default(),
+            #[cfg(feature = "shadow")]
+            shadow: None,
         }
     }
 
-    /// What the last update did.
-    pub fn report(&self) -> &Report {
-        self.finder.report()
+    /// Chooses which collider of a pair comes first, for pairs reported from now on.
+    pub fn with_handle_order(mut self, order: HandleOrder) -> Self {
+        self.outbox.order = order;
+        self
+    }
+
+    /// Starts again beside a world that it has not accompanied: one restored from a snapshot without this broad
+    /// phase, or one that rapier's own broad phase has served so far. The next update looks at all
+    /// colliders; pairs that the narrow phase has and that are none end then.
+    ///
+    /// Without this call a new broad phase notices such a world too, but not the pairs that ended before it was
+    /// there: the narrow phase keeps those until one of their colliders is removed.
+    pub fn adopt(&mut self, narrow_phase: &NarrowPhase) {
+        let contacts = narrow_phase.contact_pairs().map(|pair| (pair.collider1, pair.collider2));
+        let intersections = narrow_phase.intersection_pairs().map(|(one, other, _)| (one, other));
+        self.outbox.adopted = contacts.chain(intersections).map(|(a, b)| ColliderPair::new(a, b)).collect();
+        let all: Vec<ColliderHandle> = self.roll.handles().collect();
+        all.into_iter().for_each(|handle| self.forget(handle));
+        #[cfg(feature = "shadow")]
+        if let Some(checker) = &mut self.shadow {
+            checker.assume(self.outbox.adopted.iter().copied());
+        }
     }
 
     /// Pairs that rapier knows of.
@@ -101,96 +153,115 @@ impl PbigBroadPhase {
 
     /// The pairs that rapier knows of, in no particular order.
     pub fn pairs(&self) -> impl Iterator<Item = ColliderPair> {
-        self.finder.pairs().map(|pair| self.handles(pair))
+        self.finder.pairs().map(|pair| self.outbox.pair(pair, &self.roll, |id| self.finder.degree(id)))
     }
 
-    fn handle(&self, index: u32) -> ColliderHandle {
-        ColliderHandle::from_raw_parts(index, self.generations[index as usize])
-    }
-
-    /// The collider with fewer pairs first, then the lower index: rapier looks for the edge of a
-    /// pair by walking the pairs of the first (measured on 0.27, 30,000 balls on one ground: 17 ms
-    /// in this order, 1.05 s in the other).
-    fn handles(&self, pair: Pair) -> ColliderPair {
-        self.ordered(pair, |id| self.finder.degree(id))
-    }
-
-    fn ordered(&self, pair: Pair, degree: impl Fn(u32) -> u32) -> ColliderPair {
-        let (a, b) = (self.handle(pair.a), self.handle(pair.b));
-        if degree(pair.b) < degree(pair.a) { ColliderPair::new(b, a) } else { ColliderPair::new(a, b) }
-    }
-
-    /// Forgets a collider, if the finder holds this very one. Its pairs end without an event: the
+    /// Forgets a collider, if this very one is on the roll. Its pairs end without an event: the
     /// narrow phase drops the pairs of removed and disabled colliders itself.
-    fn remove(&mut self, handle: ColliderHandle) {
-        let (index, generation) = handle.into_raw_parts();
-        if self.generations.get(index as usize) == Some(&generation) {
-            self.finder.remove(index);
-            self.generations[index as usize] = ABSENT;
+    fn forget(&mut self, handle: ColliderHandle) {
+        if self.roll.strike(handle) {
+            self.finder.remove(handle.into_raw_parts().0);
         }
     }
 
+    /// Keeps a collider on the roll, without a box.
+    fn disable(&mut self, handle: ColliderHandle) {
+        self.roll.enter(handle);
+        self.finder.remove(handle.into_raw_parts().0);
+    }
+
     fn set(&mut self, handle: ColliderHandle, aabb: Aabb, filter: ProxyFilter) {
-        let (index, generation) = handle.into_raw_parts();
-        self.claim(index, generation);
-        if let Err(error) = self.finder.set(index, aabb, filter) {
+        let id = handle.into_raw_parts().0;
+        if !self.roll.enter(handle) {
+            // A predecessor with this index that was never reported as removed.
+            self.finder.remove(id);
+        }
+        if let Err(error) = self.finder.set(id, aabb, filter) {
             tracing::error!("pbig: collider {handle:?} is ignored: {error}");
         }
     }
 
-    /// Boxes and filters of the modified colliders. Most of it is waiting for the memory of each
-    /// collider and body, which a second thread halves.
-    fn compute_proxies(
-        &mut self,
-        params: &IntegrationParameters,
-        colliders: &ColliderSet,
-        bodies: &RigidBodySet,
-        modified: &[ColliderHandle],
-    ) {
-        let proxy = |handle: &ColliderHandle| -> Proxy {
-            let collider = colliders.get(*handle).filter(|collider| collider.is_enabled())?;
-            Some((collision_aabb(params, bodies, collider), filter_of(bodies, collider)))
-        };
-        if modified.len() < PARALLEL_FROM || rayon::current_num_threads() == 1 {
+    /// Brings the finder up to date about some colliders.
+    fn look_at(&mut self, call: &Call<'_>, listed: &[ColliderHandle]) {
+        let clock = Instant::now();
+        self.compute_proxies(call, listed);
+        let proxied = Instant::now();
+        for (i, &handle) in listed.iter().enumerate() {
+            match self.proxies[i] {
+                Proxy::Enabled(aabb, filter) => self.set(handle, aabb, filter),
+                Proxy::Disabled => self.disable(handle),
+                Proxy::Gone => self.forget(handle),
+            }
+        }
+        self.kept.proxies += proxied - clock;
+        self.kept.set += proxied.elapsed();
+    }
+
+    /// Boxes and filters of colliders. Most of it is waiting for the memory of each collider and body, which
+    /// a second thread halves.
+    fn compute_proxies(&mut self, call: &Call<'_>, listed: &[ColliderHandle]) {
+        let _span = tracing::debug_span!(target: "pbig", "proxies").entered();
+        let proxy = |&handle: &ColliderHandle| call.proxy(handle);
+        if listed.len() < PARALLEL_FROM || rayon::current_num_threads() == 1 {
             self.proxies.clear();
-            self.proxies.extend(modified.iter().map(proxy));
+            self.proxies.extend(listed.iter().map(proxy));
         } else {
-            modified
-                .par_iter()
-                .with_min_len(PARALLEL_FROM / 4)
-                .map(proxy)
-                .collect_into_vec(&mut self.proxies);
+            listed.par_iter().with_min_len(PARALLEL_FROM / 4).map(proxy).collect_into_vec(&mut self.proxies);
         }
     }
 
-    /// Makes the index stand for this generation; a predecessor that was never reported as removed
-    /// is removed now.
-    fn claim(&mut self, index: u32, generation: u32) {
-        let i = index as usize;
-        if i >= self.generations.len() {
-            self.generations.resize(i + 1, ABSENT);
+    /// First what is removed, because a modified collider may have taken the index of a removed one.
+    fn take_in(&mut self, call: &Call<'_>) {
+        for &handle in call.removed {
+            // Disabled colliders are listed as removed, too.
+            if call.colliders.contains(handle) { self.disable(handle) } else { self.forget(handle) }
         }
-        if self.generations[i] != generation {
-            self.finder.remove(index);
-            self.generations[i] = generation;
+        // A length unit that makes no sense leaves the margin as it was.
+        let _ = self.finder.set_margin(self.relative_margin * call.params.length_unit);
+        self.look_at(call, call.modified);
+        if self.roll.is_behind(call.colliders) {
+            self.rescan(call);
         }
     }
 
-    /// A pair that has ended is ordered by the pairs that its colliders had before: a ground that has
-    /// lost all of them must not come first.
-    fn send(&mut self, events: &mut Vec<BroadPhasePairEvent>) {
-        let found = self.finder.events();
-        self.before.resize(self.generations.len(), 0);
-        let both = |pair: &Pair| [pair.a, pair.b];
-        let touched = || found.removed.iter().chain(&found.added).flat_map(both);
-        touched().for_each(|id| self.before[id as usize] = self.finder.degree(id));
-        found.removed.iter().flat_map(both).for_each(|id| self.before[id as usize] += 1);
-        found.added.iter().flat_map(both).for_each(|id| self.before[id as usize] -= 1);
-        let before = |id: u32| self.before[id as usize];
-        let removed = found.removed.iter().map(|&pair| self.ordered(pair, before));
-        let added = found.added.iter().map(|&pair| self.handles(pair));
-        events.extend(removed.map(BroadPhasePairEvent::DeletePair));
-        events.extend(added.map(BroadPhasePairEvent::AddPair));
+    /// Rapier lists a collider that neither moves nor changes only once, and this broad phase was not there: it is
+    /// new beside a world restored from a snapshot, or the world has been replaced.
+    fn rescan(&mut self, call: &Call<'_>) {
+        let gone = self.roll.handles().filter(|&handle| !call.colliders.contains(handle));
+        let gone: Vec<ColliderHandle> = gone.collect();
+        gone.into_iter().for_each(|handle| self.forget(handle));
+        let handles = call.colliders.iter().map(|(handle, _)| handle);
+        let missed: Vec<ColliderHandle> = handles.filter(|&handle| !self.roll.has(handle)).collect();
+        tracing::debug!("pbig: {} colliders that rapier has not listed", missed.len());
+        self.look_at(call, &missed);
+        self.kept.rescanned = true;
+    }
+
+    fn find_and_send(&mut self, events: &mut Vec<BroadPhasePairEvent>) {
+        if self.tree.is_used() {
+            self.tree.note(self.finder.changes(), self.roll.len());
+        }
+        if let Err(error) = self.finder.update() {
+            tracing::error!("pbig: no pairs in this update: {error}");
+            return;
+        }
+        let clock = Instant::now();
+        let sent = self.outbox.send(&self.finder, &self.roll, events);
+        self.kept.events = clock.elapsed();
+        (self.kept.added, self.kept.deleted) = sent;
+    }
+}
+
+impl Call<'_> {
+    fn proxy(&self, handle: ColliderHandle) -> Proxy {
+        match self.colliders.get(handle) {
+            None => Proxy::Gone,
+            Some(collider) if !collider.is_enabled() => Proxy::Disabled,
+            Some(collider) => Proxy::Enabled(
+                collision_aabb(self.params, self.bodies, collider),
+                filter_of(self.bodies, collider),
+            ),
+        }
     }
 }
 
@@ -204,22 +275,18 @@ impl BroadPhase for PbigBroadPhase {
         removed_colliders: &[ColliderHandle],
         events: &mut Vec<BroadPhasePairEvent>,
     ) {
-        // First, because a modified collider may have taken the index of a removed one.
-        for &handle in removed_colliders {
-            self.remove(handle);
-        }
-        // A length unit that makes no sense leaves the margin as it was.
-        let _ = self.finder.set_margin(self.relative_margin * params.length_unit);
-        self.compute_proxies(params, colliders, bodies, modified_colliders);
-        for (i, &handle) in modified_colliders.iter().enumerate() {
-            match self.proxies[i] {
-                Some((aabb, filter)) => self.set(handle, aabb, filter),
-                None => self.remove(handle),
-            }
-        }
-        match self.finder.update() {
-            Ok(_) => self.send(events),
-            Err(error) => tracing::error!("pbig: no pairs in this update: {error}"),
+        let (modified, removed) = (modified_colliders, removed_colliders);
+        let _span = tracing::debug_span!(target: "pbig", "update", modified = modified.len()).entered();
+        let call = Call { params, colliders, bodies, modified, removed };
+        let updates = self.kept.updates + 1;
+        self.kept = Kept { updates, modified: modified.len(), removed: removed.len(), ..Kept::default() };
+        self.take_in(&call);
+        #[cfg(feature = "shadow")]
+        let before = events.len();
+        self.find_and_send(events);
+        #[cfg(feature = "shadow")]
+        if let Some(checker) = &mut self.shadow {
+            checker.watch(&call, &events[before..]);
         }
     }
 }

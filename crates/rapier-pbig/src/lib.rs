@@ -29,14 +29,36 @@
 //! phase would throw away again: colliders of one body, kinds of bodies that do not collide, and
 //! groups that exclude each other. Events come in an order that depends on the scene alone.
 //!
-//! It must be with its world from the start: rapier lists a collider that does not move only once, so a
-//! fresh `PbigBroadPhase` beside a world restored from a snapshot would miss those.
+//! | feature | adds |
+//! | --- | --- |
+//! | `gpu` | the GPU backend |
+//! | `serde` | `Serialize` and `Deserialize`, as rapier's `serde-serialize` |
+//! | `debug-render` | [`PbigBroadPhase::debug_render`], as rapier's |
+//! | `shadow` | [`PbigBroadPhase::with_shadow`]: rapier's own broad phase and brute force beside it |
 
 mod broad_phase;
+mod call;
+#[cfg(feature = "debug-render")]
+mod debug_render;
+mod events;
 mod proxy;
+mod queries;
+mod roll;
+mod scene_tree;
+#[cfg(feature = "shadow")]
+pub mod shadow;
+#[cfg(feature = "serde")]
+mod snapshot;
+mod stats;
+mod why;
 
 pub use broad_phase::PbigBroadPhase;
+#[cfg(feature = "debug-render")]
+pub use debug_render::DebugRenderParts;
+pub use events::HandleOrder;
 #[cfg(feature = "gpu")]
 pub use pbig_core::GpuFinder;
 pub use pbig_core::{Backend, Config, Report, Strategy};
 pub use proxy::{collision_aabb, filter_of};
+pub use stats::Stats;
+pub use why::Why;

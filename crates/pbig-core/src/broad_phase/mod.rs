@@ -1,5 +1,7 @@
 //! The incremental facade: boxes are set and removed, an update tells which pairs came and went.
 
+#[cfg(feature = "serde")]
+mod snapshot;
 mod update;
 
 use crate::cpu::find::Found;
@@ -8,7 +10,8 @@ use crate::diff::PairStore;
 use crate::finder::{Search, check_count};
 #[cfg(feature = "gpu")]
 use crate::gpu::GpuFinder;
-use crate::report::{Report, lap};
+use crate::plan::OccupiedCell;
+use crate::report::{Report, lap, stage};
 use crate::{Aabb, Backend, Config, Error, Pair, Plan, ProxyFilter};
 use std::time::Instant;
 
@@ -143,6 +146,12 @@ impl BroadPhase {
         self.base.adapter()
     }
 
+    /// Goes on with this device, from the next update, see [`crate::Finder::with_gpu`].
+    #[cfg(feature = "gpu")]
+    pub fn set_gpu(&mut self, gpu: GpuFinder) {
+        self.base.gpu = Some(gpu);
+    }
+
     /// Changes the margin for boxes that are set from now on.
     ///
     /// # Errors
@@ -199,7 +208,7 @@ impl BroadPhase {
     /// matter). False when there was none.
     pub fn remove(&mut self, id: u32) -> bool {
         let i = id as usize;
-        if !self.present.get(i).copied().unwrap_or(false) {
+        if !self.contains(id) {
             return false;
         }
         self.ended.clear();
@@ -240,6 +249,7 @@ impl BroadPhase {
             return Err(error);
         }
         let mut clock = Instant::now();
+        stage!("diff");
         self.find_removed();
         self.store();
         self.report.stages.diff += lap(&mut clock);
@@ -275,6 +285,44 @@ impl BroadPhase {
     /// How many pairs a box has (see [`BroadPhase::pair_count`]).
     pub fn degree(&self, id: u32) -> u32 {
         self.pairs.degree(id)
+    }
+
+    /// Whether two boxes are a pair (see [`BroadPhase::pair_count`]).
+    pub fn has_pair(&self, pair: Pair) -> bool {
+        let fewer = if self.degree(pair.b) < self.degree(pair.a) { pair.b } else { pair.a };
+        self.pairs_of(fewer).any(|one| one == pair)
+    }
+
+    /// One more than the largest id that was ever set.
+    pub fn id_count(&self) -> u32 {
+        self.boxes.len() as u32
+    }
+
+    /// Whether a box was set and not removed, valid or not.
+    pub fn contains(&self, id: u32) -> bool {
+        self.present.get(id as usize).copied().unwrap_or(false)
+    }
+
+    /// Ids of boxes that the next update will look at: set beyond their margin, given another filter,
+    /// or removed since the last one.
+    pub fn changes(&self) -> impl Iterator<Item = u32> {
+        self.changed.iter().map(|old| old.id)
+    }
+
+    /// The filter of a box.
+    pub fn filter(&self, id: u32) -> Option<&ProxyFilter> {
+        self.filters.get(id as usize).filter(|_| self.contains(id))
+    }
+
+    /// The cells of the CPU's grids that boxes lie in, level by level, for a picture of them; none where the
+    /// boxes are searched without grids or on a GPU. Takes time and memory proportional to the boxes.
+    pub fn cells(&self) -> Vec<OccupiedCell> {
+        let mut cells = Vec::new();
+        if self.has_base {
+            self.base.map.cells(|id| self.home[id as usize] == Home::Base, &mut cells);
+            self.loose.cells(|id| self.home[id as usize] == Home::Moved, &mut cells);
+        }
+        cells
     }
 
     /// The stored (fat) box, if there is one and it is valid.

@@ -5,7 +5,7 @@ use crate::cpu::check::Checker;
 use crate::diff::PairStore;
 use crate::finder::{Rule, single_entry_checks};
 use crate::plan::{Chosen, Plan, Summary};
-use crate::report::lap;
+use crate::report::{lap, stage};
 use crate::{Aabb, Backend, Config, Error, Pair, ProxyFilter, Strategy};
 use std::time::Instant;
 
@@ -35,6 +35,7 @@ impl BroadPhase {
             return Err(Error::TooManyPairs { limit: PairStore::MOST });
         }
         let mut clock = Instant::now();
+        stage!("emit");
         self.events.added.sort_unstable();
         self.report.stages.emit += lap(&mut clock);
         Ok(())
@@ -90,6 +91,7 @@ impl BroadPhase {
         let mut clock = Instant::now();
         self.loose.find(&|a, b| state.is_added(a, b), max_pairs, &mut self.found)?;
         self.found.chunks.iter().for_each(|chunk| self.events.added.extend_from_slice(chunk));
+        stage!("check");
         // Entries of boxes that have left the base are still in it: their home says so.
         let accept = |a: u32, b: u32| self.home[b as usize] == Home::Base && state.is_added(a, b);
         let mut checker = Checker::new(&accept, &mut self.events.added);

@@ -64,6 +64,14 @@ impl Cells {
         std::array::from_fn(|k| self.coordinate(k, f64::from(point[k])))
     }
 
+    /// The cell of a box, and where that cell is.
+    pub(crate) fn bounds(&self, one: &Aabb) -> ([i64; 3], Aabb) {
+        let cell = self.cell(&one.min);
+        let corner = |i: i64, k: usize| (self.origin[k] + i as f64 / self.inverse[k]) as f32;
+        let low = std::array::from_fn(|k| corner(cell[k], k));
+        (cell, Aabb::new(low, std::array::from_fn(|k| corner(cell[k] + 1, k))))
+    }
+
     /// The cells in which the lower corner of a box that overlaps `one` can lie: from where the
     /// largest box of the level would begin, to the cell of the upper corner.
     #[inline(always)]

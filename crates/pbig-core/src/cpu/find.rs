@@ -11,6 +11,7 @@ use super::check::Checker;
 use super::entries::Query;
 use super::half::Half;
 use super::map::Map;
+use crate::report::stage;
 use crate::{Aabb, Error, Pair};
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -71,6 +72,7 @@ impl Map {
     where
         A: Fn(u32, u32) -> bool + Sync,
     {
+        stage!("check");
         let chunks = self.chunks();
         let room = Room::new(max_pairs);
         let work = |(chunk, out): (&Chunk, &mut Vec<Pair>)| self.check_chunk(chunk, accept, out, &room);

@@ -2,8 +2,8 @@
 
 use super::cells::{Cells, Span};
 use super::entries::{Entries, Stored};
-use crate::plan::{LevelPlan, Plan, Summary, size_class_of};
-use crate::report::{StageTimes, lap};
+use crate::plan::{LevelPlan, OccupiedCell, Plan, Summary, size_class_of};
+use crate::report::{StageTimes, lap, stage};
 use crate::{Aabb, Config};
 use std::ops::Range;
 use std::time::Instant;
@@ -234,8 +234,12 @@ impl Map {
     ) -> Plan {
         let mut build = |map: &mut Self| {
             let mut clock = Instant::now();
-            let plan = Plan::new(summary, config, map.crowding.factor);
+            let plan = {
+                stage!("plan");
+                Plan::new(summary, config, map.crowding.factor)
+            };
             times.plan += lap(&mut clock);
+            stage!("map");
             map.build(&plan, boxes, ids);
             times.map += lap(&mut clock);
             plan
@@ -298,6 +302,21 @@ impl Map {
         match ids {
             Some(ids) => ids.iter().for_each(|&id| put(id)),
             None => (0..boxes.len() as u32).for_each(put),
+        }
+    }
+
+    /// The occupied cells, with the boxes that `counts` takes.
+    pub(crate) fn cells(&self, counts: impl Fn(u32) -> bool, out: &mut Vec<OccupiedCell>) {
+        for (level, grid) in self.grids.iter().enumerate() {
+            let entries = &grid.entries;
+            let taken = (0..grid.len()).filter(|&i| counts(entries.ids[i]));
+            let place = |i: usize| (grid.cells.bounds(&entries.boxes[i].aabb()), entries.ids[i]);
+            let mut placed: Vec<_> = taken.map(place).collect();
+            placed.sort_by_key(|((cell, _), id)| (*cell, *id));
+            for cell in placed.chunk_by(|a, b| a.0.0 == b.0.0) {
+                let ids = cell.iter().map(|(_, id)| *id).collect();
+                out.push(OccupiedCell { level: level as u32, aabb: cell[0].0.1, ids });
+            }
         }
     }
 

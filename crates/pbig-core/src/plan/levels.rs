@@ -2,6 +2,7 @@
 //! levels where sizes differ by decades, and a list tested against everything for the few largest.
 
 use super::{Summary, spacing};
+use crate::Aabb;
 use crate::config::Strategy;
 use std::fmt;
 
@@ -24,6 +25,17 @@ pub struct LevelPlan {
     pub dims: [u32; 3],
     /// All cells, a power of two.
     pub cells: u32,
+}
+
+/// A cell of a grid with the boxes whose lower corners lie in it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct OccupiedCell {
+    /// Which level it belongs to, smallest boxes first.
+    pub level: u32,
+    /// Where it is.
+    pub aabb: Aabb,
+    /// The boxes.
+    pub ids: Vec<u32>,
 }
 
 impl fmt::Display for LevelPlan {

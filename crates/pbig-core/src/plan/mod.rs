@@ -10,7 +10,7 @@ mod summary;
 
 #[cfg(feature = "gpu")]
 pub use gpu::GpuPlan;
-pub use levels::LevelPlan;
+pub use levels::{LevelPlan, OccupiedCell};
 pub use pbig::{PbigPlan, density_cell, pbig_cell, pbig_objective};
 pub(crate) use summary::size_class_of;
 pub use summary::{SizeClass, Summary};

@@ -79,7 +79,7 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
             } else {
                 run_scene(task, ours, step)
             };
-            let fallback = ours.report().fallback.clone();
+            let fallback = ours.stats().report.fallback.clone();
             (outcome, Did { fallback, adapter: ours.adapter().map(str::to_owned) })
         }
     };

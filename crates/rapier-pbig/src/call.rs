@@ -1,0 +1,18 @@
+//! What rapier hands to a broad phase.
+
+use rapier3d::prelude::{ColliderHandle, ColliderSet, IntegrationParameters, RigidBodySet};
+
+/// The arguments of one call of rapier's `BroadPhase::update`.
+#[derive(Clone, Copy)]
+pub struct Call<'a> {
+    /// Step length, length unit, prediction distance.
+    pub params: &'a IntegrationParameters,
+    /// The colliders.
+    pub colliders: &'a ColliderSet,
+    /// Their bodies.
+    pub bodies: &'a RigidBodySet,
+    /// Colliders that may have changed.
+    pub modified: &'a [ColliderHandle],
+    /// Colliders that are gone or disabled.
+    pub removed: &'a [ColliderHandle],
+}

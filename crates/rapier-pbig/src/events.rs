@@ -1,0 +1,92 @@
+//! Pairs of ids into rapier's events, in an order that is a function of the scene alone.
+
+use crate::roll::Roll;
+use pbig_core::{BroadPhase as Finder, Pair};
+use rapier3d::prelude::{BroadPhasePairEvent, ColliderHandle, ColliderPair};
+use std::collections::HashSet;
+
+/// Which collider of a pair comes first. It decides how long rapier looks for the edge of a pair, and, by way of
+/// the order of edges, trajectories to the last bit.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub enum HandleOrder {
+    /// The collider with fewer pairs, then the lower index: rapier looks for the edge of a pair by walking the
+    /// pairs of the first. 30,000 balls that touch one ground: 17 ms in this order, 1.05 s with the ground first.
+    #[default]
+    FewPairsFirst,
+    /// The lower index, as rapier's own broad phase has it.
+    LowerIndexFirst,
+}
+
+/// Makes events.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Outbox {
+    pub(crate) order: HandleOrder,
+    /// Pairs that the narrow phase had before this broad phase was there.
+    pub(crate) adopted: Vec<ColliderPair>,
+    /// By collider index: pairs before this call; only for the colliders in its events.
+    before: Vec<u32>,
+}
+
+impl Outbox {
+    /// A pair in its order.
+    pub(crate) fn pair(&self, pair: Pair, roll: &Roll, degree: impl Fn(u32) -> u32) -> ColliderPair {
+        // Ids in the finder are on the roll.
+        let handle = |id: u32| roll.handle(id).unwrap_or(ColliderHandle::invalid());
+        let (a, b) = (handle(pair.a), handle(pair.b));
+        let swapped = self.order == HandleOrder::FewPairsFirst && degree(pair.b) < degree(pair.a);
+        if swapped { ColliderPair::new(b, a) } else { ColliderPair::new(a, b) }
+    }
+
+    /// The events of the finder's last update; returns how many pairs were added and deleted.
+    pub(crate) fn send(
+        &mut self,
+        finder: &Finder,
+        roll: &Roll,
+        events: &mut Vec<BroadPhasePairEvent>,
+    ) -> (usize, usize) {
+        let found = finder.events();
+        self.count_before(finder, roll.generations().len());
+        let start = events.len();
+        let before = |id: u32| self.before[id as usize];
+        let deleted = found.removed.iter().map(|&pair| self.pair(pair, roll, before));
+        events.extend(deleted.map(BroadPhasePairEvent::DeletePair));
+        let known = self.known(roll);
+        let ended = |pair: &&ColliderPair| !self.holds(finder, roll, pair);
+        let ended = self.adopted.iter().filter(ended).copied();
+        events.extend(ended.map(BroadPhasePairEvent::DeletePair));
+        let deleted = events.len() - start;
+        let new = found.added.iter().filter(|pair| !known.contains(pair));
+        let added = new.map(|&pair| self.pair(pair, roll, |id| finder.degree(id)));
+        events.extend(added.map(BroadPhasePairEvent::AddPair));
+        self.adopted.clear();
+        (events.len() - start - deleted, deleted)
+    }
+
+    /// A pair that has ended is ordered by the pairs that its colliders had before: a ground that has
+    /// lost all of them must not come first.
+    fn count_before(&mut self, finder: &Finder, ids: usize) {
+        let found = finder.events();
+        self.before.resize(ids, 0);
+        let both = |pair: &Pair| [pair.a, pair.b];
+        let touched = found.removed.iter().chain(&found.added).flat_map(both);
+        touched.for_each(|id| self.before[id as usize] = finder.degree(id));
+        found.removed.iter().flat_map(both).for_each(|id| self.before[id as usize] += 1);
+        found.added.iter().flat_map(both).for_each(|id| self.before[id as usize] -= 1);
+    }
+
+    /// The adopted pairs of colliders that are there.
+    fn known(&self, roll: &Roll) -> HashSet<Pair> {
+        self.adopted.iter().filter_map(|pair| ids(pair, roll)).collect()
+    }
+
+    fn holds(&self, finder: &Finder, roll: &Roll, pair: &ColliderPair) -> bool {
+        ids(pair, roll).is_some_and(|pair| finder.events().added.binary_search(&pair).is_ok())
+    }
+}
+
+fn ids(pair: &ColliderPair, roll: &Roll) -> Option<Pair> {
+    let both = [pair.collider1, pair.collider2];
+    let [a, b] = both.map(|handle| handle.into_raw_parts().0);
+    both.iter().all(|&handle| roll.has(handle)).then(|| Pair::new(a, b))
+}

@@ -1,0 +1,266 @@
+//! Shadow mode: a broad phase watched by rapier's own and by the oracle, on the same world, compared
+//! after every call.
+//!
+//! A [`Checker`] keeps what the narrow phase believes, by following the events, and holds three
+//! things against it: the oracle over boxes and filters taken straight from rapier's public functions,
+//! the pairs that stock reports, and the rule that every pair has a reason. It shares no code with the
+//! broad phase that it checks.
+//!
+//! What it cannot see: a pair that only soft CCD would need (its boxes are those of the present pose),
+//! and the order of events. Calls in which nothing is modified are followed but not compared.
+
+mod difference;
+mod followed;
+mod replay;
+mod scene;
+mod stock;
+
+pub use crate::call::Call;
+pub use difference::{Difference, Fault, Side};
+pub use replay::{ReplayError, write_frames};
+
+use crate::PbigBroadPhase;
+use followed::Followed;
+use pbig_core::Aabb;
+use rapier3d::prelude::*;
+use scene::SceneView;
+use std::collections::{HashSet, VecDeque};
+use std::path::PathBuf;
+use stock::Stock;
+
+/// Two colliders, the lower handle first.
+type HandlePair = (ColliderHandle, ColliderHandle);
+
+fn ordered(a: ColliderHandle, b: ColliderHandle) -> HandlePair {
+    if a.into_raw_parts() <= b.into_raw_parts() { (a, b) } else { (b, a) }
+}
+
+fn sorted(pair: &HandlePair) -> [(u32, u32); 2] {
+    [pair.0.into_raw_parts(), pair.1.into_raw_parts()]
+}
+
+/// What a broad phase is compared with.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Shadow {
+    /// Rapier's own broad phase on the same world: a pair that only it reports must be no contact.
+    /// Costs what it costs.
+    Stock,
+    /// Brute force over the boxes, the definition of right: every overlapping pair that no filter
+    /// excludes must be reported. Quadratic: 0.1 s a call with 10,000 colliders.
+    Oracle,
+}
+
+impl PbigBroadPhase {
+    /// Compares every update with this; a second call adds the other one. The first difference is kept in
+    /// [`PbigBroadPhase::differences`], goes to `tracing` as an error, and the boxes of the calls up to it into a file in
+    /// the system's folder for temporary files, for `pbig replay`.
+    ///
+    /// For tests, and for an app in which something seems to be missed. See [`Shadow`] for what it costs.
+    ///
+    /// ```
+    /// use rapier3d::prelude::*;
+    /// use rapier_pbig::{PbigBroadPhase, shadow::Shadow};
+    ///
+    /// let mut broad_phase = PbigBroadPhase::new().with_shadow(Shadow::Stock).with_shadow(Shadow::Oracle);
+    /// let (bodies, mut colliders) = (RigidBodySet::new(), ColliderSet::new());
+    /// let ball = colliders.insert(ColliderBuilder::ball(0.5));
+    /// let params = IntegrationParameters::default();
+    /// broad_phase.update(&params, &colliders, &bodies, &[ball], &[], &mut Vec::new());
+    /// assert!(broad_phase.differences().is_empty(), "{}", broad_phase.differences()[0]);
+    /// ```
+    pub fn with_shadow(mut self, shadow: Shadow) -> Self {
+        let (margin, known): (_, Vec<_>) = (self.relative_margin, self.pairs().collect());
+        let checker = self.shadow.get_or_insert_with(|| {
+            let mut checker = Checker::new(margin).with_replays_in(std::env::temp_dir());
+            checker.assume(known);
+            Box::new(checker)
+        });
+        checker.add(shadow);
+        self
+    }
+
+    /// What the shadow found wrong so far, oldest first; nothing without one.
+    pub fn differences(&self) -> &[Difference] {
+        self.shadow.as_ref().map_or(&[], |checker| &checker.differences)
+    }
+}
+
+/// How many frames before a fault are kept for a replay.
+const FRAMES_KEPT: usize = 8;
+
+/// Most differences that are kept.
+const KEPT: usize = 1000;
+
+/// Watches the calls and events of a broad phase.
+#[derive(Clone, Default)]
+pub struct Checker {
+    /// Everything wrong so far, oldest first, at most a thousand.
+    pub differences: Vec<Difference>,
+    /// Boxes without margin by collider index, the last few calls.
+    pub frames: VecDeque<Vec<Aabb>>,
+    /// Calls that were compared.
+    pub compared: usize,
+    /// Pairs that the oracle found, in all calls.
+    pub oracle_pairs: u64,
+    /// Pairs that only stock reported, in all calls: excluded by a filter, or not in contact.
+    pub stock_only: u64,
+    stock: Option<Stock>,
+    oracle: bool,
+    folder: Option<PathBuf>,
+    known: Followed,
+    margin: f32,
+    /// One in so many calls is compared; 0 as 1.
+    every: usize,
+    calls: usize,
+    /// Calls in which something was modified.
+    comparable: usize,
+}
+
+impl Checker {
+    /// Follows events and compares with nothing yet. `relative_margin` is the margin of the broad phase
+    /// in units of `length_unit`: its pairs may be four of them apart, two for each box.
+    pub fn new(relative_margin: f32) -> Self {
+        Self { margin: relative_margin, ..Self::default() }
+    }
+
+    /// Compares with this, too.
+    pub fn with(mut self, shadow: Shadow) -> Self {
+        self.add(shadow);
+        self
+    }
+
+    /// As [`Checker::with`].
+    pub fn add(&mut self, shadow: Shadow) {
+        match shadow {
+            Shadow::Oracle => self.oracle = true,
+            Shadow::Stock => self.stock = Some(Stock::default()),
+        }
+    }
+
+    /// Compares in one of `every` calls that modify something; events are followed in all of them.
+    pub fn every(self, every: usize) -> Self {
+        Self { every, ..self }
+    }
+
+    /// Writes the boxes of the calls up to the first difference into this folder.
+    pub fn with_replays_in(self, folder: PathBuf) -> Self {
+        Self { folder: Some(folder), ..self }
+    }
+
+    /// Takes these for the pairs that the narrow phase has.
+    pub fn assume(&mut self, pairs: impl IntoIterator<Item = ColliderPair>) {
+        self.known = Followed::of(pairs);
+    }
+
+    /// Whether stock is (still) compared with: it is not after it has panicked.
+    pub fn has_stock(&self) -> bool {
+        self.stock.as_ref().is_some_and(|stock| !stock.panicked)
+    }
+
+    /// Looks at a call that the broad phase has just answered with `events`.
+    pub fn watch(&mut self, call: &Call<'_>, events: &[BroadPhasePairEvent]) {
+        let scene = SceneView { params: call.params, colliders: call.colliders, bodies: call.bodies };
+        let mut faults = Vec::new();
+        self.known.purge(call.removed);
+        self.known.follow(events, |fault, pair| faults.push((fault, pair)));
+        if let Some(stock) = &mut self.stock {
+            stock.update(call);
+        }
+        // Where nothing was modified, nothing but pairs of removed colliders may have changed.
+        if !call.modified.is_empty() {
+            self.keep_frame(&scene);
+            if self.comparable.is_multiple_of(self.every.max(1)) {
+                self.compare(&scene, &mut faults);
+            }
+            self.comparable += 1;
+        }
+        let first = self.differences.is_empty();
+        faults.into_iter().for_each(|(fault, pair)| self.note(fault, pair, &scene));
+        if first && !self.differences.is_empty() {
+            self.report_first();
+        }
+        self.calls += 1;
+    }
+
+    fn keep_frame(&mut self, scene: &SceneView<'_>) {
+        self.frames.push_back(scene.boxes());
+        while self.frames.len() > FRAMES_KEPT {
+            self.frames.pop_front();
+        }
+    }
+
+    fn note(&mut self, fault: Fault, pair: HandlePair, scene: &SceneView<'_>) {
+        if self.differences.len() < KEPT {
+            let sides = [pair.0, pair.1].map(|handle| scene.side(handle));
+            self.differences.push(Difference { call: self.calls, fault, pair, sides, replay: None });
+        }
+    }
+
+    fn compare(&mut self, scene: &SceneView<'_>, faults: &mut Vec<(Fault, HandlePair)>) {
+        let from = faults.len();
+        let wanted = if self.oracle { scene.oracle() } else { HashSet::new() };
+        faults.extend(wanted.difference(&self.known.0).map(|&pair| (Fault::Missing, pair)));
+        if let Some(stock) = self.stock.as_ref().filter(|stock| !stock.panicked) {
+            for &pair in stock.known.0.difference(&self.known.0) {
+                self.stock_only += 1;
+                if !wanted.contains(&pair) && scene.allowed(pair) && scene.in_contact(pair) {
+                    faults.push((Fault::MissingContact, pair));
+                }
+            }
+        }
+        let baseless = |pair: &&HandlePair| !scene.may_pair(**pair, self.margin);
+        faults.extend(self.known.0.iter().filter(baseless).map(|&pair| (Fault::Spurious, pair)));
+        self.compared += 1;
+        self.oracle_pairs += wanted.len() as u64;
+        faults[from..].sort_by_key(|(_, pair)| sorted(pair));
+    }
+
+    /// Writes the frames that led to the first difference, and tells.
+    fn report_first(&mut self) {
+        let Some(first) = self.differences.first_mut() else { return };
+        if let Some(folder) = &self.folder {
+            first.replay = Some(replay::write_into(folder, &self.frames).map_err(|error| error.to_string()));
+        }
+        tracing::error!("pbig: {first}");
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_missing_pair_is_one_fault_although_stock_has_it_too() {
+        let (colliders, pair) = scene::tests::balls(1.0);
+        let (params, bodies) = (IntegrationParameters::default(), RigidBodySet::new());
+        let mut checker = Checker::new(0.01).with(Shadow::Stock).with(Shadow::Oracle);
+        let handles = [pair.0, pair.1];
+        let call = Call {
+            params: &params,
+            colliders: &colliders,
+            bodies: &bodies,
+            modified: &handles,
+            removed: &[],
+        };
+        checker.watch(&call, &[]);
+        let faults: Vec<Fault> = checker.differences.iter().map(|d| d.fault).collect();
+        assert_eq!(faults, [Fault::Missing]);
+        assert_eq!((checker.compared, checker.oracle_pairs, checker.stock_only), (1, 1, 1));
+    }
+
+    #[test]
+    fn without_the_oracle_stocks_pairs_are_demanded_where_there_is_a_contact() {
+        // Along an axis the balls touch; along the diagonal of a face only their boxes do.
+        for (y, faults) in [(0.0, &[Fault::MissingContact][..]), (0.9, &[])] {
+            let (mut colliders, pair) = scene::tests::balls(0.9);
+            colliders[pair.1].set_translation(vector![0.9, y, 0.0]);
+            let (params, bodies) = (IntegrationParameters::default(), RigidBodySet::new());
+            let mut checker = Checker::new(0.01).with(Shadow::Stock);
+            let (colliders, modified) = (&colliders, &[pair.0, pair.1]);
+            checker
+                .watch(&Call { params: &params, colliders, bodies: &bodies, modified, removed: &[] }, &[]);
+            let found: Vec<Fault> = checker.differences.iter().map(|d| d.fault).collect();
+            assert_eq!((found.as_slice(), checker.stock_only), (faults, 1), "{y}");
+        }
+    }
+}

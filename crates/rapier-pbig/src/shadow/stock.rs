@@ -1,0 +1,35 @@
+//! Rapier's own broad phase beside the one that is checked.
+
+use super::Call;
+use super::followed::Followed;
+use rapier3d::prelude::*;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+
+#[derive(Clone, Default)]
+pub(super) struct Stock {
+    broad_phase: DefaultBroadPhase,
+    /// The pairs that a narrow phase would have after its events.
+    pub(super) known: Followed,
+    /// It is of no further use then.
+    pub(super) panicked: bool,
+}
+
+impl Stock {
+    /// Rapier 0.27's broad phase panics when a body is disabled while one that it overlaps is removed.
+    /// That must not end the app that is being checked.
+    pub(super) fn update(&mut self, call: &Call<'_>) {
+        if self.panicked {
+            return;
+        }
+        let mut events = Vec::new();
+        let Call { params, colliders, bodies, modified, removed } = *call;
+        let broad_phase = &mut self.broad_phase;
+        let update = || broad_phase.update(params, colliders, bodies, modified, removed, &mut events);
+        if catch_unwind(AssertUnwindSafe(update)).is_err() {
+            tracing::warn!("pbig: rapier's own broad phase has panicked and is no longer compared with");
+            self.panicked = true;
+        }
+        self.known.purge(removed);
+        self.known.follow(&events, |_, _| ());
+    }
+}

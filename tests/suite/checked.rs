@@ -1,0 +1,86 @@
+//! A world whose every call of the broad phase is checked beside stock and the oracle.
+
+use pbig_core::{Backend, Coding, Config};
+use pbig_harness::shadow::Shadowed;
+use pbig_harness::world::World;
+use rapier_pbig::PbigBroadPhase;
+use rapier3d::prelude::*;
+
+/// The world, and the broad phase with its checker around it.
+pub(crate) struct Checked {
+    pub(crate) world: World,
+    pub(crate) broad_phase: Shadowed<PbigBroadPhase>,
+}
+
+/// The backends on which rapier's semantics are tested: the CPU, and a GPU with its grid, however
+/// small the world.
+pub(crate) fn backends() -> [(&'static str, Config); 2] {
+    let margin = PbigBroadPhase::CONFIG.margin;
+    let cpu = Config { backend: Backend::Cpu, ..PbigBroadPhase::CONFIG };
+    [("cpu", cpu), ("gpu", Config { margin, ..pbig_tests::gpu(Coding::Plain) })]
+}
+
+/// Runs a test on every backend, each time with a new world.
+pub(crate) fn everywhere(test: impl Fn(Checked)) {
+    for (name, config) in backends() {
+        println!("on {name}");
+        test(Checked::new(config));
+    }
+}
+
+impl Checked {
+    /// Things stay where they are put: no gravity, and [`Checked::ball`]s that contacts cannot push.
+    pub(crate) fn new(config: Config) -> Self {
+        let world = World::with_gravity(glam::Vec3::ZERO);
+        let shadow = Shadowed::new(PbigBroadPhase::with_config(config), config.margin);
+        Self { world, broad_phase: shadow }
+    }
+
+    /// A ball of radius 0.5 on a body of its own that never sleeps.
+    pub(crate) fn ball(&mut self, x: f32) -> (RigidBodyHandle, ColliderHandle) {
+        let body = RigidBodyBuilder::dynamic().translation(vector![x, 0.0, 0.0]);
+        let body = self.world.bodies.insert(body.can_sleep(false).lock_translations().lock_rotations());
+        (body, self.attach(body))
+    }
+
+    /// A second ball of radius 0.5 on a body, at its origin.
+    pub(crate) fn attach(&mut self, body: RigidBodyHandle) -> ColliderHandle {
+        self.attach_shape(body, ColliderBuilder::ball(0.5))
+    }
+
+    pub(crate) fn attach_shape(&mut self, body: RigidBodyHandle, shape: ColliderBuilder) -> ColliderHandle {
+        let World { bodies, colliders, .. } = &mut self.world;
+        colliders.insert_with_parent(shape, body, bodies)
+    }
+
+    pub(crate) fn move_to(&mut self, body: RigidBodyHandle, x: f32) {
+        self.world.bodies[body].set_translation(vector![x, 0.0, 0.0], true);
+    }
+
+    /// Steps, checks every call, and returns how many pairs the broad phase keeps.
+    pub(crate) fn step(&mut self) -> usize {
+        self.world.step(&mut self.broad_phase);
+        self.assert_no_difference();
+        self.broad_phase.inner.pair_count()
+    }
+
+    pub(crate) fn steps(&mut self, steps: usize) -> usize {
+        (0..steps).map(|_| self.step()).last().unwrap_or(0)
+    }
+
+    /// Pairs that the narrow phase has, apart from those with sensors.
+    pub(crate) fn contacts(&self) -> usize {
+        self.world.narrow_phase.contact_pairs().count()
+    }
+
+    fn assert_no_difference(&self) {
+        if let Some(first) = self.broad_phase.first_difference() {
+            panic!("{first}");
+        }
+        assert_eq!(
+            self.broad_phase.inner.stats().report.fallback,
+            None,
+            "a GPU's work is not done by the CPU"
+        );
+    }
+}
