@@ -10,6 +10,7 @@ use rapier3d::prelude::*;
 pub(crate) struct Checked {
     pub(crate) world: World,
     pub(crate) broad_phase: Shadowed<PbigBroadPhase>,
+    pub(crate) config: Config,
 }
 
 /// The backends on which rapier's semantics are tested: the CPU, and a GPU with its grid, however
@@ -33,7 +34,7 @@ impl Checked {
     pub(crate) fn new(config: Config) -> Self {
         let world = World::with_gravity(glam::Vec3::ZERO);
         let shadow = Shadowed::new(PbigBroadPhase::with_config(config), config.margin);
-        Self { world, broad_phase: shadow }
+        Self { world, broad_phase: shadow, config }
     }
 
     /// A ball of radius 0.5 on a body of its own that never sleeps.

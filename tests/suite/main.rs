@@ -2,9 +2,15 @@
 
 mod checked;
 mod drop_in;
+mod explain;
 mod finder;
 mod gpu;
 mod incremental;
 mod kernels;
 mod planted;
+mod queries;
+mod random_worlds;
+mod restore;
+mod shapes;
+mod upstream;
 mod worlds;

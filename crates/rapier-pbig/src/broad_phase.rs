@@ -216,6 +216,7 @@ impl PbigBroadPhase {
             // Disabled colliders are listed as removed, too.
             if call.colliders.contains(handle) { self.disable(handle) } else { self.forget(handle) }
         }
+        self.outbox.purge(call.removed);
         // A length unit that makes no sense leaves the margin as it was.
         let _ = self.finder.set_margin(self.relative_margin * call.params.length_unit);
         self.look_at(call, call.modified);

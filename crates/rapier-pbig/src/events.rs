@@ -29,6 +29,15 @@ pub(crate) struct Outbox {
 }
 
 impl Outbox {
+    /// Forgets adopted pairs of removed and disabled colliders, which the narrow phase drops itself.
+    pub(crate) fn purge(&mut self, removed: &[ColliderHandle]) {
+        if !removed.is_empty() && !self.adopted.is_empty() {
+            let removed: HashSet<_> = removed.iter().copied().collect();
+            let is_gone = |handle| removed.contains(&handle);
+            self.adopted.retain(|pair| !is_gone(pair.collider1) && !is_gone(pair.collider2));
+        }
+    }
+
     /// A pair in its order.
     pub(crate) fn pair(&self, pair: Pair, roll: &Roll, degree: impl Fn(u32) -> u32) -> ColliderPair {
         // Ids in the finder are on the roll.

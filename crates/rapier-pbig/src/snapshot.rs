@@ -4,8 +4,11 @@ use crate::PbigBroadPhase;
 use crate::events::HandleOrder;
 use crate::roll::Roll;
 use pbig_core::BroadPhase as Finder;
+use rapier3d::prelude::{ColliderHandle, ColliderPair};
 use serde::de::Error as _;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
+
+type RawHandle = (u32, u32);
 
 #[derive(Serialize)]
 struct Saved<'a> {
@@ -13,6 +16,7 @@ struct Saved<'a> {
     generations: &'a [u32],
     relative_margin: f32,
     order: HandleOrder,
+    adopted: Vec<[RawHandle; 2]>,
 }
 
 #[derive(Deserialize)]
@@ -21,6 +25,7 @@ struct Restored {
     generations: Vec<u32>,
     relative_margin: f32,
     order: HandleOrder,
+    adopted: Vec<[RawHandle; 2]>,
 }
 
 impl Serialize for PbigBroadPhase {
@@ -31,6 +36,7 @@ impl Serialize for PbigBroadPhase {
             generations: self.roll.generations(),
             relative_margin: self.relative_margin,
             order: self.outbox.order,
+            adopted: self.outbox.adopted.iter().map(to_raw).collect(),
         }
         .serialize(serializer)
     }
@@ -38,7 +44,8 @@ impl Serialize for PbigBroadPhase {
 
 impl<'de> Deserialize<'de> for PbigBroadPhase {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        let Restored { finder, generations, relative_margin, order } = Restored::deserialize(deserializer)?;
+        let Restored { finder, generations, relative_margin, order, adopted } =
+            Restored::deserialize(deserializer)?;
         let roll = Roll::of_generations(generations);
         let ids = (0..finder.id_count()).filter(|&id| finder.contains(id));
         if let Some(id) = ids.into_iter().find(|&id| roll.handle(id).is_none()) {
@@ -49,6 +56,16 @@ impl<'de> Deserialize<'de> for PbigBroadPhase {
         }
         let mut restored = Self::around(finder, relative_margin).with_handle_order(order);
         restored.roll = roll;
+        restored.outbox.adopted = adopted.into_iter().map(from_raw).collect();
         Ok(restored)
     }
+}
+
+fn to_raw(pair: &ColliderPair) -> [RawHandle; 2] {
+    [pair.collider1.into_raw_parts(), pair.collider2.into_raw_parts()]
+}
+
+fn from_raw(pair: [RawHandle; 2]) -> ColliderPair {
+    let [a, b] = pair.map(|(index, generation)| ColliderHandle::from_raw_parts(index, generation));
+    ColliderPair::new(a, b)
 }

@@ -257,8 +257,7 @@ mod tests {
             let (params, bodies) = (IntegrationParameters::default(), RigidBodySet::new());
             let mut checker = Checker::new(0.01).with(Shadow::Stock);
             let (colliders, modified) = (&colliders, &[pair.0, pair.1]);
-            checker
-                .watch(&Call { params: &params, colliders, bodies: &bodies, modified, removed: &[] }, &[]);
+            checker.watch(&Call { params: &params, colliders, bodies: &bodies, modified, removed: &[] }, &[]);
             let found: Vec<Fault> = checker.differences.iter().map(|d| d.fault).collect();
             assert_eq!((found.as_slice(), checker.stock_only), (faults, 1), "{y}");
         }

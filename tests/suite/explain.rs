@@ -1,0 +1,262 @@
+//! What a user sees: reasons, statistics, spans, pictures, and the shadow.
+
+use crate::checked::{Checked, everywhere};
+use pbig_core::{Backend, Config, Strategy};
+use pbig_harness::files::{FrameBox, read_frames};
+use pbig_harness::scenes::Scene;
+use pbig_harness::world::World;
+use rapier_pbig::shadow::{Fault, Shadow};
+use rapier_pbig::{DebugRenderParts, HandleOrder, PbigBroadPhase, Why};
+use rapier3d::pipeline::{DebugColor, DebugRenderBackend, DebugRenderObject};
+use rapier3d::prelude::*;
+use std::collections::BTreeSet;
+use std::sync::{Arc, Mutex};
+
+#[test]
+fn why_names_the_test_that_ended_a_pair() {
+    everywhere(|mut scene| {
+        let (_, a) = scene.ball(0.0);
+        let (b_body, b) = scene.ball(0.9);
+        let c = scene.attach(b_body);
+        let (_, far) = scene.ball(10.0);
+        let early = scene.broad_phase.inner.why(a, b);
+        assert_eq!(early, Why::Unknown(a), "before the first step");
+        scene.step();
+        let why = |scene: &Checked, x, y| scene.broad_phase.inner.why(x, y);
+        assert_eq!(why(&scene, a, b), Why::Reported);
+        assert_eq!(why(&scene, a, a), Why::SameCollider);
+        assert_eq!(why(&scene, b, c), Why::SameBody);
+        assert!(matches!(why(&scene, a, far), Why::Apart { axis: 0, gap } if (gap - 8.978).abs() < 1e-3));
+        scene.world.colliders[a].set_collision_groups(InteractionGroups::none());
+        scene.step();
+        assert!(matches!(why(&scene, a, b), Why::Groups(_)));
+        scene.world.colliders[a].set_enabled(false);
+        scene.step();
+        assert_eq!(why(&scene, a, b), Why::Disabled(a));
+        scene.world.remove_collider(far);
+        scene.step();
+        assert_eq!(why(&scene, b, far), Why::Unknown(far));
+    });
+}
+
+#[test]
+fn why_speaks_of_kinds_and_of_boxes_without_a_place() {
+    let mut world = World::with_gravity(glam::Vec3::ZERO);
+    let fixed = [0.0, 0.1]
+        .map(|x| world.colliders.insert(ColliderBuilder::ball(0.5).translation(vector![x, 0.0, 0.0])));
+    let mut broad_phase = PbigBroadPhase::new();
+    world.step(&mut broad_phase);
+    let why = broad_phase.why(fixed[0], fixed[1]);
+    assert!(matches!(why, Why::Kinds(_)), "{why}");
+    assert!(why.to_string().contains("a fixed and a fixed body"), "{why}");
+    let lost = ColliderBuilder::ball(0.5).translation(vector![f32::NAN, 0.0, 0.0]);
+    let lost = world.colliders.insert(lost);
+    let World { params, colliders, bodies, .. } = &world;
+    broad_phase.update(params, colliders, bodies, &[lost], &[], &mut Vec::new());
+    assert_eq!(broad_phase.why(fixed[0], lost), Why::InvalidBox(lost));
+    broad_phase.adopt(&world.narrow_phase);
+    assert_eq!(broad_phase.why(fixed[0], fixed[1]), Why::Unknown(fixed[0]), "before the next update");
+}
+
+#[test]
+fn statistics_count_what_an_update_was_given_and_sent() {
+    everywhere(|mut scene| {
+        let (a, _) = scene.ball(0.0);
+        scene.ball(0.9);
+        let World { params, colliders, bodies, .. } = &scene.world;
+        let handles: Vec<ColliderHandle> = colliders.iter().map(|(handle, _)| handle).collect();
+        let broad_phase = &mut scene.broad_phase.inner;
+        broad_phase.update(params, colliders, bodies, &handles, &[], &mut Vec::new());
+        let stats = broad_phase.stats();
+        assert_eq!((stats.updates, stats.colliders, stats.modified, stats.removed), (1, 2, 2, 0));
+        assert_eq!((stats.added, stats.deleted, stats.report.pairs, stats.rescanned), (1, 0, 1, false));
+        assert!(stats.total() >= stats.proxies + stats.set + stats.events && !stats.total().is_zero());
+        scene.world.bodies[a].set_translation(vector![50.0, 0.0, 0.0], true);
+        let World { params, colliders, bodies, .. } = &mut scene.world;
+        bodies.propagate_modified_body_positions_to_colliders(colliders);
+        let broad_phase = &mut scene.broad_phase.inner;
+        broad_phase.update(params, colliders, bodies, &handles[..1], &[handles[1]], &mut Vec::new());
+        let stats = broad_phase.stats();
+        assert_eq!((stats.updates, stats.modified, stats.removed, stats.added), (2, 1, 1, 0));
+        assert_eq!((stats.deleted, stats.report.pairs), (0, 0), "a removed collider's pairs end silently");
+    });
+}
+
+#[test]
+fn the_order_of_handles_can_be_stocks() {
+    for (order, ground_is) in [(HandleOrder::FewPairsFirst, 2), (HandleOrder::LowerIndexFirst, 1)] {
+        let mut world = World::default();
+        let ground = world.colliders.insert(ColliderBuilder::halfspace(Vector::y_axis()));
+        for i in 0..20 {
+            world.add(World::dynamic(glam::vec3(i as f32 * 3.0, 0.4, 0.0)), ColliderBuilder::ball(0.5));
+        }
+        let mut broad_phase = PbigBroadPhase::new().with_handle_order(order);
+        world.step(&mut broad_phase);
+        let place = |pair: &ColliderPair| if pair.collider1 == ground { 1 } else { 2 };
+        let places: Vec<_> = world.narrow_phase.contact_pairs().map(|pair| place(&pair_of(pair))).collect();
+        assert_eq!(places, [ground_is; 20], "{order:?}");
+    }
+}
+
+fn pair_of(pair: &ContactPair) -> ColliderPair {
+    ColliderPair::new(pair.collider1, pair.collider2)
+}
+
+/// Remembers the names of spans.
+#[derive(Clone, Default)]
+struct Names(Arc<Mutex<BTreeSet<&'static str>>>);
+
+impl tracing::Subscriber for Names {
+    fn enabled(&self, metadata: &tracing::Metadata<'_>) -> bool {
+        metadata.target() == "pbig"
+    }
+    fn new_span(&self, span: &tracing::span::Attributes<'_>) -> tracing::span::Id {
+        self.0.lock().expect("no panic").insert(span.metadata().name());
+        tracing::span::Id::from_u64(1)
+    }
+    fn record(&self, _: &tracing::span::Id, _: &tracing::span::Record<'_>) {}
+    fn record_follows_from(&self, _: &tracing::span::Id, _: &tracing::span::Id) {}
+    fn event(&self, _: &tracing::Event<'_>) {}
+    fn enter(&self, _: &tracing::span::Id) {}
+    fn exit(&self, _: &tracing::span::Id) {}
+}
+
+fn spans(config: Config) -> BTreeSet<&'static str> {
+    let names = Names::default();
+    tracing::subscriber::with_default(names.clone(), || {
+        let mut world = Scene::named("column").expect("the scene exists").build(200, 1);
+        let mut broad_phase = PbigBroadPhase::with_config(config);
+        (0..3).for_each(|_| world.step(&mut broad_phase));
+    });
+    let names = names.0.lock().expect("no panic");
+    names.clone()
+}
+
+#[test]
+fn each_stage_is_a_span() {
+    let of_cpu = spans(Config { backend: Backend::Cpu, ..PbigBroadPhase::CONFIG });
+    assert_eq!(of_cpu, ["update", "proxies", "plan", "map", "check", "emit", "diff"].into());
+    let of_gpu = spans(Config { backend: Backend::Gpu, ..PbigBroadPhase::CONFIG });
+    assert!(of_gpu.is_superset(&["update", "proxies", "gpu", "emit", "diff"].into()), "{of_gpu:?}");
+}
+
+/// Boxes drawn by kind of colour, from their lines.
+#[derive(Default)]
+struct Canvas {
+    lines: usize,
+    longest: f32,
+    colors: BTreeSet<[u32; 4]>,
+}
+
+impl DebugRenderBackend for Canvas {
+    fn draw_line(&mut self, object: DebugRenderObject, a: Point<f32>, b: Point<f32>, color: DebugColor) {
+        assert!(matches!(object, DebugRenderObject::ColliderAabb(..)));
+        self.lines += 1;
+        self.longest = self.longest.max((a - b).norm());
+        self.colors.insert(color.map(f32::to_bits));
+    }
+}
+
+#[test]
+fn boxes_and_cells_are_drawn_with_twelve_lines_each() {
+    let config = Config { strategy: Strategy::Grid, backend: Backend::Cpu, ..PbigBroadPhase::CONFIG };
+    let mut world = World::with_gravity(glam::Vec3::ZERO);
+    for i in 0..64 {
+        let at = glam::vec3((i % 4) as f32, (i / 4 % 4) as f32, (i / 16) as f32) * 5.0;
+        world.add(World::dynamic(at).can_sleep(false), ColliderBuilder::cuboid(0.5, 0.5, 0.5));
+    }
+    // Eight in one cell.
+    for _ in 0..8 {
+        world.add(World::dynamic(glam::Vec3::splat(20.0)).can_sleep(false), ColliderBuilder::ball(0.5));
+    }
+    let mut broad_phase = PbigBroadPhase::with_config(config);
+    world.step(&mut broad_phase);
+    let draw = |fat_boxes, cells| {
+        let mut canvas = Canvas::default();
+        broad_phase.debug_render(&world.colliders, DebugRenderParts { fat_boxes, cells }, &mut canvas);
+        canvas
+    };
+    let (boxes, cells, all) = (draw(true, false), draw(false, true), draw(true, true));
+    assert_eq!(boxes.lines, 72 * 12);
+    assert!((boxes.longest - 1.022).abs() < 1e-4, "a cube with its margins: {}", boxes.longest);
+    assert_eq!(all.lines, boxes.lines + cells.lines);
+    assert!(cells.lines % 12 == 0 && cells.lines > 12 && cells.lines <= 65 * 12, "{}", cells.lines);
+    assert!(cells.longest >= 1.022 && cells.colors.len() > 1, "full and nearly empty cells differ");
+}
+
+#[test]
+fn a_box_lies_in_one_cell_that_contains_its_lower_corner() {
+    let mut finder =
+        pbig_core::BroadPhase::new(Config { brute_below: 0, ..Config::DEFAULT }).expect("a margin");
+    let set = |finder: &mut pbig_core::BroadPhase, id: u32, shift: f32| {
+        let (size, step, side) = if id % 9 == 0 { (5.0, 10.0, 10) } else { (0.0005, 1.0, 20) };
+        let corner = [id / 9, id / 9 / side, id / 9 / side / side].map(|i| (i % side) as f32 * step + shift);
+        let aabb = pbig_core::Aabb::from_center(corner, [size; 3]);
+        finder.set(id, aabb, pbig_core::ProxyFilter::ALL).expect("few boxes");
+    };
+    for id in 0..9000 {
+        set(&mut finder, id, 0.0);
+    }
+    finder.update().expect("few pairs");
+    (0..20).for_each(|id| set(&mut finder, id * 3, 1000.0));
+    finder.update().expect("few pairs");
+    let cells = finder.cells();
+    let mut seen: Vec<u32> = cells.iter().flat_map(|cell| cell.ids.clone()).collect();
+    seen.sort_unstable();
+    assert!(seen.windows(2).all(|two| two[0] < two[1]) && seen.len() > 8900, "{} of 9000", seen.len());
+    for cell in &cells {
+        for &id in &cell.ids {
+            let corner = finder.fat_aabb(id).expect("it is there").min;
+            let inside = |k: usize| cell.aabb.min[k] <= corner[k] && corner[k] <= cell.aabb.max[k];
+            assert!((0..3).all(inside), "{corner:?} outside {cell:?}");
+        }
+    }
+    assert!(cells.iter().map(|cell| cell.level).collect::<BTreeSet<_>>().len() > 1, "several levels");
+}
+
+/// A ball has moved onto another one without being listed: what a shadow must notice.
+fn unlisted(shadow: Shadow) -> PbigBroadPhase {
+    let mut world = World::with_gravity(glam::Vec3::ZERO);
+    let bodies =
+        [0.0, 10.0, 20.0].map(|x| world.add(World::dynamic(glam::Vec3::X * x), ColliderBuilder::ball(0.5)));
+    let handles = bodies.map(|body| world.bodies[body].colliders()[0]);
+    let mut broad_phase = PbigBroadPhase::new().with_shadow(shadow);
+    world.step(&mut broad_phase);
+    assert!(broad_phase.differences().is_empty());
+    world.colliders[handles[0]].set_position(Isometry::translation(10.5, 0.0, 0.0));
+    let World { params, colliders, bodies, .. } = &world;
+    broad_phase.update(params, colliders, bodies, &handles[2..], &[], &mut Vec::new());
+    broad_phase
+}
+
+#[test]
+fn a_shadow_reports_the_first_difference_and_writes_a_file_for_a_replay() {
+    let broad_phase = unlisted(Shadow::Oracle);
+    let first = broad_phase.differences().first().expect("a difference");
+    assert_eq!(first.fault, Fault::Missing);
+    let text = first.to_string();
+    for part in ["colliders (0, 0) and (1, 0)", "box [", "Dynamic body (0, 0)", "groups 0xffffffff"] {
+        assert!(text.contains(part), "no {part} in {text}");
+    }
+    let file = first.replay.as_ref().expect("a folder was given").as_ref().expect("a writable folder");
+    let frames = read_frames(file).expect("a replayable file");
+    std::fs::remove_file(file).expect("the file is there");
+    assert_eq!(frames.boxes, 3);
+    let x = |frame: &Vec<FrameBox>| match frame[0] {
+        FrameBox::Present(aabb) => aabb.min[0],
+        FrameBox::Absent => f32::NAN,
+    };
+    let last = frames.frames.last().expect("frames");
+    assert!((x(last) - 9.999).abs() < 1e-3, "the last frame is the one that failed: {}", x(last));
+}
+
+#[test]
+fn a_shadow_added_to_a_broad_phase_at_work_finds_nothing_wrong_with_it() {
+    let mut world = Scene::named("column").expect("the scene exists").build(120, 2);
+    let mut broad_phase = PbigBroadPhase::new();
+    (0..60).for_each(|_| world.step(&mut broad_phase));
+    let mut broad_phase = broad_phase.with_shadow(Shadow::Stock).with_shadow(Shadow::Oracle);
+    (0..60).for_each(|_| world.step(&mut broad_phase));
+    assert!(broad_phase.differences().is_empty(), "{}", broad_phase.differences()[0]);
+    assert!(broad_phase.pair_count() > 50);
+}

@@ -1,0 +1,154 @@
+//! Scene queries give what rapier's own give.
+
+use crate::checked::backends;
+use pbig_harness::scenes::Scene;
+use pbig_harness::world::World;
+use rand::rngs::SmallRng;
+use rand::{RngExt, SeedableRng};
+use rapier_pbig::PbigBroadPhase;
+use rapier3d::parry::query::{DefaultQueryDispatcher, ShapeCastOptions};
+use rapier3d::prelude::*;
+use std::collections::BTreeSet;
+
+/// Hands each call to ours and to stock, whose events are not used.
+struct Both {
+    ours: PbigBroadPhase,
+    stock: DefaultBroadPhase,
+}
+
+impl BroadPhase for Both {
+    fn update(
+        &mut self,
+        params: &IntegrationParameters,
+        colliders: &ColliderSet,
+        bodies: &RigidBodySet,
+        modified: &[ColliderHandle],
+        removed: &[ColliderHandle],
+        events: &mut Vec<BroadPhasePairEvent>,
+    ) {
+        self.stock.update(params, colliders, bodies, modified, removed, &mut Vec::new());
+        self.ours.update(params, colliders, bodies, modified, removed, events);
+    }
+}
+
+/// One answer to each kind of query. Which of several equally near colliders is named is the tree's choice,
+/// so distances stand for them.
+#[derive(Debug, PartialEq)]
+struct Answers {
+    ray: Option<f32>,
+    all_on_ray: BTreeSet<u32>,
+    projection: Option<f32>,
+    within: BTreeSet<u32>,
+    shapes: BTreeSet<u32>,
+    cast: Option<f32>,
+}
+
+fn ask(queries: &QueryPipeline<'_>, at: [f32; 3], along: [f32; 3]) -> Answers {
+    let (point, direction) = (Point::from(at), Vector::from(along));
+    let (ray, ball) = (Ray::new(point, direction), Ball::new(0.7));
+    let pose = Isometry::translation(at[0], at[1], at[2]);
+    let index = |handle: ColliderHandle| handle.into_raw_parts().0;
+    Answers {
+        ray: queries.cast_ray(&ray, 30.0, true).map(|hit| hit.1),
+        all_on_ray: queries.intersect_ray(ray, 30.0, true).map(|hit| index(hit.0)).collect(),
+        projection: queries.project_point(&point, 5.0, true).map(|(_, found)| (found.point - point).norm()),
+        within: queries.intersect_point(point).map(|(handle, _)| index(handle)).collect(),
+        shapes: queries.intersect_shape(pose, &ball).map(|(handle, _)| index(handle)).collect(),
+        cast: queries
+            .cast_shape(&pose, &direction, &ball, ShapeCastOptions::with_max_time_of_impact(20.0))
+            .map(|(_, hit)| hit.time_of_impact),
+    }
+}
+
+fn random3(random: &mut SmallRng, reach: f32) -> [f32; 3] {
+    std::array::from_fn(|_| random.random_range(-reach..reach))
+}
+
+/// Asks both the same; returns how many rays hit.
+fn compare(world: &World, both: &Both, random: &mut SmallRng, questions: usize) -> usize {
+    let filter = QueryFilter::default();
+    let only_dynamic = QueryFilter::only_dynamic();
+    let mut hits = 0;
+    for i in 0..questions {
+        let filter = if i % 2 == 0 { filter } else { only_dynamic };
+        let (bodies, colliders) = (&world.bodies, &world.colliders);
+        let ours = both.ours.as_query_pipeline(&DefaultQueryDispatcher, bodies, colliders, filter);
+        let stock = both.stock.as_query_pipeline(&DefaultQueryDispatcher, bodies, colliders, filter);
+        let (at, along) = (random3(random, 8.0), random3(random, 1.0));
+        let wanted = ask(&stock, at, along);
+        assert_eq!(ask(&ours, at, along), wanted, "at {at:?} along {along:?}");
+        hits += usize::from(wanted.ray.is_some());
+    }
+    hits
+}
+
+#[test]
+fn queries_agree_with_stock_while_a_world_moves_and_changes() {
+    for (name, config) in backends() {
+        for scene in ["column", "compounds"] {
+            let mut world = Scene::named(scene).expect("the scene exists").build(120, 2);
+            let ours = PbigBroadPhase::with_config(config);
+            let mut both = Both { ours, stock: DefaultBroadPhase::new() };
+            let (mut random, mut hits) = (SmallRng::seed_from_u64(9), 0);
+            for round in 0..12 {
+                (0..10).for_each(|_| world.step(&mut both));
+                hits += compare(&world, &both, &mut random, 20);
+                let bodies: Vec<RigidBodyHandle> = world.bodies.iter().map(|(handle, _)| handle).collect();
+                let body = bodies[round * 7 % bodies.len()];
+                match round % 4 {
+                    0 => world.remove(body),
+                    1 => world.bodies[body].set_translation(vector![1.0, 3.0, round as f32], true),
+                    2 => world.bodies[body].set_enabled(false),
+                    _ => _ = world.add(World::dynamic(glam::Vec3::Y * 4.0), ColliderBuilder::ball(0.6)),
+                }
+            }
+            assert!(hits > 20, "{scene} on {name}: {hits} hits");
+        }
+    }
+}
+
+#[test]
+fn queries_work_before_the_first_step_in_small_worlds_and_on_mutable_sets() {
+    for count in 0..5 {
+        let mut world = World::default();
+        for i in 0..count {
+            world.colliders.insert(ColliderBuilder::ball(0.5).translation(vector![3.0 * i as f32, 0.0, 0.0]));
+        }
+        let mut ours = PbigBroadPhase::new();
+        let ray = Ray::new(point![-5.0, 0.0, 0.0], Vector::x());
+        let cast = |world: &mut World, ours: &PbigBroadPhase| {
+            let World { bodies, colliders, .. } = world;
+            let filter = QueryFilter::default();
+            let queries = ours.as_query_pipeline_mut(&DefaultQueryDispatcher, bodies, colliders, filter);
+            let hit = queries.as_ref().cast_ray(&ray, 100.0, true);
+            if let Some((handle, _)) = hit {
+                queries.colliders[handle].set_translation(vector![0.0, 90.0, 0.0]);
+            }
+            hit.map(|(_, distance)| distance)
+        };
+        assert_eq!(cast(&mut world, &ours), None, "as with stock, colliders are known after a step");
+        world.step(&mut ours);
+        assert_eq!(cast(&mut world, &ours), (count > 0).then_some(4.5));
+        world.step(&mut ours);
+        assert_eq!(cast(&mut world, &ours), (count > 1).then_some(7.5), "the first is out of the way");
+    }
+}
+
+#[test]
+fn several_threads_may_ask_at_once() {
+    let mut world = Scene::named("column").expect("the scene exists").build(200, 2);
+    let mut ours = PbigBroadPhase::new();
+    (0..30).for_each(|_| world.step(&mut ours));
+    let cast = || {
+        let filter = QueryFilter::default();
+        let queries =
+            ours.as_query_pipeline(&DefaultQueryDispatcher, &world.bodies, &world.colliders, filter);
+        let ray = Ray::new(point![0.0, 50.0, 0.0], -Vector::y());
+        queries.cast_ray(&ray, 100.0, true).map(|hit| hit.1)
+    };
+    let answers: Vec<_> = std::thread::scope(|scope| {
+        let threads: Vec<_> = (0..4).map(|_| scope.spawn(cast)).collect();
+        threads.into_iter().map(|thread| thread.join().expect("no panic")).collect()
+    });
+    assert!(answers[0].is_some() && answers.iter().all(|answer| *answer == answers[0]), "{answers:?}");
+}

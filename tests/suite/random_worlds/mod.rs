@@ -1,0 +1,362 @@
+//! Random operations on small worlds: each call of the broad phase is held against rapier's own and against
+//! brute force. A failure shrinks to a few operations.
+//!
+//! The suite plays the same ones each time; with `PROPTEST_CASES=1250` a test plays about 100,000 new ones.
+
+mod ops;
+
+use crate::checked::backends;
+use ops::{Op, any_op, apply};
+use pbig_core::Config;
+use pbig_harness::shadow::Shadowed;
+use pbig_harness::world::World;
+use proptest::collection::vec;
+use proptest::prelude::ProptestConfig;
+use proptest::test_runner::{RngAlgorithm, TestCaseError, TestError, TestRng, TestRunner};
+use rapier_pbig::PbigBroadPhase;
+use rapier3d::prelude::*;
+use std::cell::Cell;
+use std::collections::HashMap;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+
+/// A list has up to so many operations, half as many on average.
+const MOST_OPS: usize = 160;
+
+/// What the broad phase under test does wrong.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Plant {
+    Nothing,
+    /// The third `AddPair` of a call and those after it are lost, as in too small a buffer.
+    RoomForTwo,
+    /// A collider is looked at again only if its box has changed, not its parent, groups or body type.
+    OnlyMoved,
+    /// Nothing is left after a restore.
+    Forgets,
+}
+
+/// Ours, perhaps with a planted fault.
+struct Subject {
+    pbig: PbigBroadPhase,
+    plant: Plant,
+    /// For [`Plant::OnlyMoved`]: each collider's box when it was last listed.
+    boxes: HashMap<ColliderHandle, Option<Aabb>>,
+    /// In the middle of an update, where a panic is ours and not rapier's.
+    busy: bool,
+}
+
+impl Subject {
+    fn new(config: Config, plant: Plant) -> Self {
+        Self { pbig: PbigBroadPhase::with_config(config), plant, boxes: HashMap::new(), busy: false }
+    }
+
+    /// Goes on with what was saved.
+    fn restore(&mut self, config: Config) {
+        let bytes = postcard::to_stdvec(&self.pbig).expect("a broad phase can be saved");
+        self.pbig = match self.plant {
+            Plant::Forgets => PbigBroadPhase::with_config(config),
+            _ => postcard::from_bytes(&bytes).expect("these are the bytes of a broad phase"),
+        };
+    }
+
+    /// The modified colliders that it is shown.
+    fn shown(
+        &mut self,
+        params: &IntegrationParameters,
+        colliders: &ColliderSet,
+        modified: &[ColliderHandle],
+        removed: &[ColliderHandle],
+    ) -> Vec<ColliderHandle> {
+        if self.plant != Plant::OnlyMoved {
+            return modified.to_vec();
+        }
+        removed.iter().for_each(|handle| _ = self.boxes.remove(handle));
+        let reach = params.prediction_distance() / 2.0;
+        let aabb = |handle| colliders.get(handle).map(|collider| collider.compute_collision_aabb(reach));
+        let has_moved = |&handle: &ColliderHandle| {
+            let now = aabb(handle);
+            self.boxes.insert(handle, now) != Some(now)
+        };
+        modified.iter().copied().filter(has_moved).collect()
+    }
+}
+
+impl BroadPhase for Subject {
+    fn update(
+        &mut self,
+        params: &IntegrationParameters,
+        colliders: &ColliderSet,
+        bodies: &RigidBodySet,
+        modified: &[ColliderHandle],
+        removed: &[ColliderHandle],
+        events: &mut Vec<BroadPhasePairEvent>,
+    ) {
+        self.busy = true;
+        let (shown, mut right) = (self.shown(params, colliders, modified, removed), Vec::new());
+        self.pbig.update(params, colliders, bodies, &shown, removed, &mut right);
+        let mut room = if self.plant == Plant::RoomForTwo { 2 } else { usize::MAX };
+        right.retain(|event| {
+            let added = matches!(event, BroadPhasePairEvent::AddPair(_));
+            let fits = !added || room > 0;
+            room -= usize::from(added && fits);
+            fits
+        });
+        events.append(&mut right);
+        self.busy = false;
+    }
+}
+
+/// What happened, summed up.
+#[derive(Clone, Copy, Debug, Default)]
+struct Tally {
+    runs: u64,
+    ops: u64,
+    steps: u64,
+    /// Steps after which rapier's broad phase was still compared with: see `Checker::has_stock`.
+    beside_stock: u64,
+    oracle_pairs: u64,
+    contacts: u64,
+    restores: u64,
+    /// Runs that a panic of rapier's outside its broad phase has cut short.
+    cut_short: u64,
+}
+
+impl Tally {
+    fn plus(self, other: Self) -> Self {
+        Self {
+            runs: self.runs + other.runs,
+            ops: self.ops + other.ops,
+            steps: self.steps + other.steps,
+            beside_stock: self.beside_stock + other.beside_stock,
+            oracle_pairs: self.oracle_pairs + other.oracle_pairs,
+            contacts: self.contacts + other.contacts,
+            restores: self.restores + other.restores,
+            cut_short: self.cut_short + other.cut_short,
+        }
+    }
+
+    /// A few runs by hand may well have nothing of something.
+    fn assert_that_much_happened(&self) {
+        println!("{self:?}");
+        let few = self.runs < 20;
+        assert!(few || self.oracle_pairs > self.steps, "hardly any pairs: {self:?}");
+        assert!(few || self.contacts > self.steps / 10, "hardly any contacts: {self:?}");
+        assert!(few || self.beside_stock > self.steps / 2, "hardly compared with stock: {self:?}");
+        assert!(few || self.restores > self.runs / 2, "hardly ever restored: {self:?}");
+        assert!(few || self.cut_short < self.runs / 20, "rapier panics often: {self:?}");
+    }
+}
+
+/// How a run ends before its last operation.
+enum End {
+    Wrong(String),
+    /// Rapier's own bugs are not the matter here, but they must be few.
+    RapierPanicked,
+}
+
+/// The state in which a run ended; no poses and no pairs when it was cut short.
+#[derive(Default)]
+struct Outcome {
+    tally: Tally,
+    poses: Vec<u32>,
+    pairs: Vec<[(u32, u32); 2]>,
+}
+
+impl Outcome {
+    /// Whether another run ended in the very same state.
+    fn compare(&self, other: &Self) -> Result<(), String> {
+        if self.tally.contacts != other.tally.contacts || self.poses != other.poses {
+            return Err("the bodies have gone other ways".into());
+        }
+        if self.pairs == other.pairs { Ok(()) } else { Err("the broad phase has other pairs".into()) }
+    }
+}
+
+/// The world, and the broad phase with its checker around it.
+struct Scene {
+    world: World,
+    broad_phase: Shadowed<Subject>,
+    config: Config,
+    tally: Tally,
+}
+
+impl Scene {
+    fn new(config: Config, plant: Plant) -> Self {
+        let mut world = World::with_gravity(glam::Vec3::ZERO);
+        // With CCD, calls between the two of a step, for a part of it.
+        world.params.max_ccd_substeps = 3;
+        let broad_phase = Shadowed::new(Subject::new(config, plant), config.margin);
+        Self { world, broad_phase, config, tally: Tally { runs: 1, ..Tally::default() } }
+    }
+
+    fn play(&mut self, op: Op) -> Result<(), End> {
+        self.tally.ops += 1;
+        match op {
+            Op::Step(steps) => return (0..steps).try_for_each(|_| self.step()),
+            Op::Snapshot => {
+                self.restore_world();
+                self.broad_phase.inner.restore(self.config);
+            }
+            Op::Fresh => {
+                self.restore_world();
+                let mut fresh = PbigBroadPhase::with_config(self.config);
+                fresh.adopt(&self.world.narrow_phase);
+                self.broad_phase.inner.pbig = fresh;
+            }
+            op => apply(&mut self.world, op),
+        }
+        Ok(())
+    }
+
+    fn restore_world(&mut self) {
+        self.tally.restores += 1;
+        self.world = World::from_bytes(&self.world.to_bytes()).expect("these are the bytes of a world");
+    }
+
+    fn step(&mut self) -> Result<(), End> {
+        let step = AssertUnwindSafe(|| self.world.step(&mut self.broad_phase));
+        let whole = catch_unwind(step).is_ok();
+        if let Some(first) = self.broad_phase.first_difference() {
+            return Err(End::Wrong(first.to_string()));
+        }
+        match (whole, self.broad_phase.inner.busy) {
+            (true, _) => self.count_step(),
+            (false, true) => return Err(End::Wrong("the broad phase has panicked".into())),
+            (false, false) => return Err(End::RapierPanicked),
+        }
+        match &self.broad_phase.inner.pbig.stats().report.fallback {
+            Some(why) => Err(End::Wrong(format!("the CPU has done a GPU's work: {why}"))),
+            None => Ok(()),
+        }
+    }
+
+    fn count_step(&mut self) {
+        let touching = self.world.narrow_phase.contact_pairs().filter(|pair| pair.has_any_active_contact);
+        self.tally.contacts += touching.count() as u64;
+        self.tally.steps += 1;
+        self.tally.beside_stock += u64::from(self.broad_phase.checker.has_stock());
+        self.tally.oracle_pairs = self.broad_phase.checker.oracle_pairs;
+    }
+
+    fn outcome(&self) -> Outcome {
+        let parts = |pair: ColliderPair| [pair.collider1, pair.collider2].map(ColliderHandle::into_raw_parts);
+        let mut pairs: Vec<_> = self.broad_phase.inner.pbig.pairs().map(parts).collect();
+        pairs.sort_unstable();
+        Outcome { tally: self.tally, poses: self.world.pose_bits(), pairs }
+    }
+}
+
+/// Plays the operations and another step, so that the last one is seen too; or says what was wrong.
+fn run(ops: &[Op], config: Config, plant: Plant) -> Result<Outcome, String> {
+    let mut scene = Scene::new(config, plant);
+    match ops.iter().copied().chain([Op::Step(1)]).try_for_each(|op| scene.play(op)) {
+        Ok(()) => Ok(scene.outcome()),
+        Err(End::Wrong(what)) => Err(what),
+        Err(End::RapierPanicked) => {
+            Ok(Outcome { tally: Tally { cut_short: 1, ..scene.tally }, ..Outcome::default() })
+        }
+    }
+}
+
+/// Why a list of operations fails a test, and the list.
+type Failure = (String, Vec<Op>);
+
+/// Tests random lists of operations until one fails, and makes that one small.
+fn try_random_ops(cases: u32, test: &impl Fn(&[Op]) -> Result<(), String>) -> Result<(), Failure> {
+    let config =
+        ProptestConfig { failure_persistence: None, max_shrink_iters: 5000, ..ProptestConfig::default() };
+    let mut runner = if std::env::var_os("PROPTEST_CASES").is_some() {
+        TestRunner::new(config)
+    } else {
+        let rng = TestRng::deterministic_rng(RngAlgorithm::ChaCha);
+        TestRunner::new_with_rng(ProptestConfig { cases, ..config }, rng)
+    };
+    let lists = vec(any_op(), 1..MOST_OPS);
+    runner.run(&lists, |ops| test(&ops).map_err(TestCaseError::fail)).map_err(|error| match error {
+        TestError::Fail(why, ops) => smallest((why.to_string(), ops), test),
+        TestError::Abort(why) => panic!("{why}"),
+    })
+}
+
+/// Leaves out operations while the rest fails: proptest tries to leave each out only once, and not what a
+/// missing one does to the numbers in others.
+fn smallest((mut why, mut ops): Failure, test: &impl Fn(&[Op]) -> Result<(), String>) -> Failure {
+    let fails = |ops: Vec<Op>| test(&ops).err().map(|why| (why, ops));
+    let smaller = |ops: &[Op]| {
+        let without = |i: usize| [&ops[..i], &ops[i + 1..]].concat();
+        let renumbered = || (0..ops.len()).flat_map(|i| renumbered(without(i)));
+        (0..ops.len()).map(without).find_map(fails).or_else(|| renumbered().find_map(fails))
+    };
+    while let Some(smaller) = smaller(&ops) {
+        (why, ops) = smaller;
+    }
+    (why, ops)
+}
+
+/// The lists in which one operation is about another body or collider.
+fn renumbered(ops: Vec<Op>) -> impl Iterator<Item = Vec<Op>> {
+    let others: Vec<Vec<Op>> = ops.iter().map(|op| op.renumbered()).collect();
+    others.into_iter().enumerate().flat_map(move |(i, others)| {
+        let ops = ops.clone();
+        others.into_iter().map(move |other| [&ops[..i], &[other], &ops[i + 1..]].concat())
+    })
+}
+
+fn listed(ops: &[Op]) -> String {
+    ops.iter().map(|op| format!("{op:?}\n")).collect()
+}
+
+/// Runs a test on random lists of operations and sums up what happened in the runs that it returns.
+fn on_random_ops(cases: u32, test: impl Fn(&[Op]) -> Result<Outcome, String>) -> Tally {
+    let sum = Cell::new(Tally::default());
+    let counted = |ops: &[Op]| -> Result<(), String> {
+        sum.set(sum.get().plus(test(ops)?.tally));
+        Ok(())
+    };
+    if let Err((why, ops)) = try_random_ops(cases, &counted) {
+        panic!("{why}\nafter these operations and a step:\n{}", listed(&ops));
+    }
+    sum.get()
+}
+
+#[test]
+fn random_worlds_agree_with_stock_and_the_oracle() {
+    let [(_, cpu), _] = backends();
+    on_random_ops(250, |ops| run(ops, cpu, Plant::Nothing)).assert_that_much_happened();
+}
+
+#[test]
+fn random_worlds_on_a_gpu_agree_too_and_have_the_bits_of_the_cpu() {
+    let [(_, cpu), (_, gpu)] = backends();
+    let tally = on_random_ops(20, |ops| {
+        let on_gpu = run(ops, gpu, Plant::Nothing)?;
+        on_gpu.compare(&run(ops, cpu, Plant::Nothing)?)?;
+        Ok(on_gpu)
+    });
+    tally.assert_that_much_happened();
+}
+
+#[test]
+fn a_snapshot_anywhere_continues_bit_identically() {
+    let [(_, cpu), _] = backends();
+    let tally = on_random_ops(60, |ops| {
+        // A fresh broad phase has other fat boxes than one that was there all along, so other pairs.
+        let saved = |op: &Op| if matches!(op, Op::Fresh) { Op::Snapshot } else { *op };
+        let ops: Vec<Op> = ops.iter().map(saved).collect();
+        let kept: Vec<Op> = ops.iter().copied().filter(|op| !matches!(op, Op::Snapshot)).collect();
+        let with = run(&ops, cpu, Plant::Nothing)?;
+        with.compare(&run(&kept, cpu, Plant::Nothing)?)?;
+        Ok(with)
+    });
+    tally.assert_that_much_happened();
+}
+
+#[test]
+fn planted_faults_are_noticed_and_shrink_to_a_few_operations() {
+    let [(_, cpu), _] = backends();
+    for plant in [Plant::RoomForTwo, Plant::OnlyMoved, Plant::Forgets] {
+        let failing = |ops: &[Op]| run(ops, cpu, plant).map(|_| ());
+        let (why, ops) = try_random_ops(100, &failing).expect_err("the fault is noticed");
+        println!("{plant:?}: {why}\n{}", listed(&ops));
+        assert!(ops.len() <= 6, "{plant:?} needs {} operations:\n{}", ops.len(), listed(&ops));
+    }
+}

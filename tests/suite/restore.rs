@@ -1,0 +1,214 @@
+//! Snapshots: our state restored goes on bit by bit; a fresh broad phase beside a restored world misses nothing.
+
+use crate::checked::{backends, everywhere};
+use pbig_core::Config;
+use pbig_harness::runner::Timed;
+use pbig_harness::scenes::Scene;
+use pbig_harness::shadow::Shadowed;
+use pbig_harness::world::World;
+use rapier_pbig::{HandleOrder, PbigBroadPhase};
+use rapier3d::prelude::*;
+use std::collections::BTreeSet;
+
+fn saved(broad_phase: &PbigBroadPhase) -> Vec<u8> {
+    postcard::to_stdvec(broad_phase).expect("a snapshot")
+}
+
+fn restored(bytes: &[u8]) -> PbigBroadPhase {
+    postcard::from_bytes(bytes).expect("what was saved")
+}
+
+fn copy(world: &World) -> World {
+    World::from_bytes(&world.to_bytes()).expect("what was saved")
+}
+
+fn scene(name: &str, bodies: usize) -> World {
+    Scene::named(name).expect("the scene exists").build(bodies, 3)
+}
+
+fn steps(world: &mut World, broad_phase: &mut dyn BroadPhase, steps: usize) {
+    (0..steps).for_each(|_| world.step(broad_phase));
+}
+
+/// Pairs of the narrow phase, whatever their order.
+fn edges(world: &World) -> BTreeSet<[(u32, u32); 2]> {
+    let contacts = world.narrow_phase.contact_pairs().map(|pair| (pair.collider1, pair.collider2));
+    let intersections = world.narrow_phase.intersection_pairs().map(|(a, b, _)| (a, b));
+    let sorted = |(a, b): (ColliderHandle, ColliderHandle)| {
+        let (a, b) = (a.into_raw_parts(), b.into_raw_parts());
+        [a.min(b), a.max(b)]
+    };
+    contacts.chain(intersections).map(sorted).collect()
+}
+
+#[test]
+fn a_restored_broad_phase_goes_on_bit_by_bit_on_every_backend() {
+    for name in
+        ["column", "sleeping", "compounds", "kinematic"].into_iter().filter(|n| Scene::named(n).is_ok())
+    {
+        let mut ends = Vec::new();
+        for (backend, config) in backends() {
+            let (mut world, mut ours) = (scene(name, 300), PbigBroadPhase::with_config(config));
+            steps(&mut world, &mut ours, 40);
+            let (mut other, mut again) = (copy(&world), restored(&saved(&ours)));
+            steps(&mut world, &mut ours, 30);
+            steps(&mut other, &mut again, 30);
+            assert!(world.pose_bits() == other.pose_bits(), "{name} on {backend}: restored and not");
+            assert_eq!(saved(&ours), saved(&again), "{name} on {backend}");
+            assert!(ours.pair_count() > 0, "{name}: nothing to compare");
+            ends.push(world.pose_bits());
+        }
+        assert!(ends[0] == ends[1], "{name}: the CPU and the GPU");
+    }
+}
+
+#[test]
+fn options_survive_a_snapshot_and_it_is_the_same_in_json() {
+    let config = Config { margin: 0.03, ..PbigBroadPhase::CONFIG };
+    let ours = PbigBroadPhase::with_config(config).with_handle_order(HandleOrder::LowerIndexFirst);
+    let (mut world, mut ours) = (scene("column", 60), ours);
+    steps(&mut world, &mut ours, 20);
+    let json = serde_json::to_string(&ours).expect("JSON");
+    let again: PbigBroadPhase = serde_json::from_str(&json).expect("what was saved");
+    assert_eq!(saved(&again), saved(&ours));
+    assert!(again.pairs().all(|pair| pair.collider1.into_raw_parts() < pair.collider2.into_raw_parts()));
+    assert!(format!("{again:?}").contains("margin: 0.03"), "{again:?}");
+}
+
+/// A pile that sleeps on a fixed ground, and its broad phase.
+fn sleeping_pile(config: Config) -> (World, PbigBroadPhase) {
+    let (mut world, mut ours) = (World::default(), PbigBroadPhase::with_config(config));
+    world.colliders.insert(ColliderBuilder::cuboid(20.0, 0.5, 20.0));
+    for i in 0..30 {
+        let at = vector![(i % 5) as f32 * 1.02, 1.0 + (i / 5) as f32 * 1.01, 0.0];
+        world.add(RigidBodyBuilder::dynamic().translation(at), ColliderBuilder::cuboid(0.5, 0.5, 0.5));
+    }
+    steps(&mut world, &mut ours, 400);
+    assert!(world.bodies.iter().all(|(_, body)| body.is_sleeping()), "the pile sleeps");
+    (world, ours)
+}
+
+#[test]
+fn a_fresh_broad_phase_beside_a_restored_world_finds_what_sleeps_and_what_is_fixed() {
+    for (name, config) in backends() {
+        let (mut world, ours) = sleeping_pile(config);
+        let before = edges(&world);
+        let mut fresh = Shadowed::new(PbigBroadPhase::with_config(config), config.margin);
+        world = copy(&world);
+        world
+            .add(RigidBodyBuilder::dynamic().translation(vector![0.0, 8.0, 0.0]), ColliderBuilder::ball(0.4));
+        world.step(&mut fresh);
+        assert!(edges(&world).is_superset(&before), "{name}");
+        assert_eq!(fresh.inner.pair_count(), ours.pair_count(), "{name}: the pairs of the pile");
+        (0..120).for_each(|_| world.step(&mut fresh));
+        assert!(fresh.first_difference().is_none(), "{name}: {}", fresh.first_difference().expect("one"));
+        let ball = world.bodies.iter().last().expect("the ball").1;
+        assert!(ball.translation().y > 1.0, "{name}: the ball fell through");
+    }
+}
+
+#[test]
+fn a_rescan_happens_once_and_only_where_a_collider_is_unknown() {
+    let (world, _) = sleeping_pile(PbigBroadPhase::CONFIG);
+    let mut world = copy(&world);
+    let mut fresh = PbigBroadPhase::new();
+    let mut rescans = 0;
+    for _ in 0..5 {
+        world.step(&mut fresh);
+        rescans += usize::from(fresh.stats().rescanned);
+        let (World { params, colliders, bodies, .. }, events) = (&world, &mut Vec::new());
+        fresh.update(params, colliders, bodies, &[], &[], events);
+        assert!(events.is_empty() && !fresh.stats().rescanned);
+    }
+    assert!(rescans <= 1, "{rescans}");
+    assert_eq!((fresh.stats().colliders, fresh.pair_count() > 30), (31, true));
+}
+
+#[test]
+fn adopted_pairs_that_have_ended_are_deleted_and_the_others_are_not_added_again() {
+    everywhere(|mut scene| {
+        let (a, _) = scene.ball(0.0);
+        let (b, _) = scene.ball(0.9);
+        scene.ball(1.8);
+        assert_eq!((scene.step(), scene.contacts()), (2, 2));
+        scene.world = copy(&scene.world);
+        scene.move_to(a, 50.0);
+        let mut fresh = PbigBroadPhase::with_config(scene.config);
+        fresh.adopt(&scene.world.narrow_phase);
+        // Not the fresh one's own: it follows what the narrow phase was told, by whomever.
+        let mut counted = Timed::new(fresh);
+        scene.world.step(&mut counted);
+        assert_eq!((counted.added, counted.removed), (0, 1));
+        assert_eq!((scene.contacts(), counted.inner.pair_count()), (1, 1));
+        scene.broad_phase.inner = counted.inner;
+        scene.world.remove(b);
+        scene.world.step(&mut scene.broad_phase);
+        assert_eq!(scene.contacts(), 0);
+    });
+}
+
+#[test]
+fn a_running_world_goes_over_from_rapiers_broad_phase_to_ours() {
+    let (mut world, mut stock) = (scene("column", 200), DefaultBroadPhase::new());
+    steps(&mut world, &mut stock, 60);
+    let mut ours = PbigBroadPhase::new();
+    ours.adopt(&world.narrow_phase);
+    world.step(&mut ours);
+    let known = ours.pairs().map(|pair| {
+        let (a, b) = (pair.collider1.into_raw_parts(), pair.collider2.into_raw_parts());
+        [a.min(b), a.max(b)]
+    });
+    assert_eq!(known.collect::<BTreeSet<_>>(), edges(&world), "both know the same pairs");
+    let mut shadow = Shadowed::new(ours, PbigBroadPhase::CONFIG.margin);
+    let pairs: Vec<ColliderPair> = shadow.inner.pairs().collect();
+    shadow.checker.assume(pairs);
+    steps(&mut world, &mut shadow, 60);
+    assert!(shadow.first_difference().is_none(), "{}", shadow.first_difference().expect("one"));
+}
+
+#[test]
+fn a_world_replaced_by_a_smaller_or_larger_one_is_noticed() {
+    let mut ours = PbigBroadPhase::new();
+    for bodies in [50, 20, 80] {
+        let mut world = scene("column", bodies);
+        let known = world.colliders.len();
+        // As after a restore: nothing is listed as modified.
+        steps(&mut world, &mut DefaultBroadPhase::new(), 30);
+        let (World { params, colliders, bodies, .. }, events) = (&world, &mut Vec::new());
+        ours.update(params, colliders, bodies, &[], &[], events);
+        let mut fresh = PbigBroadPhase::new();
+        fresh.update(params, colliders, bodies, &[], &[], &mut Vec::new());
+        assert_eq!((ours.stats().colliders, fresh.stats().colliders), (known, known));
+        // Those that keep handle and box keep their pairs.
+        let pairs = |broad_phase: &PbigBroadPhase| broad_phase.pair_count();
+        assert!(pairs(&ours) > 0 && pairs(&fresh) > 0);
+        ours.adopt(&world.narrow_phase);
+        ours.update(params, colliders, bodies, &[], &[], events);
+        assert_eq!(pairs(&ours), pairs(&fresh), "after adoption nothing of the old world is left");
+    }
+}
+
+#[test]
+fn changed_bytes_are_errors_or_a_broad_phase_that_does_not_panic() {
+    let (mut world, mut ours) = (scene("column", 12), PbigBroadPhase::new());
+    steps(&mut world, &mut ours, 60);
+    let bytes = saved(&ours);
+    let handles: Vec<ColliderHandle> = world.colliders.iter().map(|(handle, _)| handle).collect();
+    let (mut errors, mut loaded) = (0, 0);
+    for i in 0..bytes.len() {
+        for change in [1, 0x80] {
+            let mut broken = bytes.clone();
+            broken[i] ^= change;
+            let Ok(mut other) = postcard::from_bytes::<PbigBroadPhase>(&broken) else {
+                errors += 1;
+                continue;
+            };
+            loaded += 1;
+            let World { params, colliders, bodies, .. } = &world;
+            other.update(params, colliders, bodies, &handles, &handles[..3], &mut Vec::new());
+            other.update(params, colliders, bodies, &handles, &[], &mut Vec::new());
+        }
+        assert!(postcard::from_bytes::<PbigBroadPhase>(&bytes[..i]).is_err(), "cut at {i}");
+    }
+    assert!(errors > 50 && loaded > 50, "{errors} errors, {loaded} loaded");
+}
