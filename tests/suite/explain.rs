@@ -189,7 +189,7 @@ fn a_box_lies_in_one_cell_that_contains_its_lower_corner() {
     let mut finder =
         pbig_core::BroadPhase::new(Config { brute_below: 0, ..Config::DEFAULT }).expect("a margin");
     let set = |finder: &mut pbig_core::BroadPhase, id: u32, shift: f32| {
-        let (size, step, side) = if id % 9 == 0 { (5.0, 10.0, 10) } else { (0.0005, 1.0, 20) };
+        let (size, step, side) = if id.is_multiple_of(9) { (5.0, 10.0, 10) } else { (0.0005, 1.0, 20) };
         let corner = [id / 9, id / 9 / side, id / 9 / side / side].map(|i| (i % side) as f32 * step + shift);
         let aabb = pbig_core::Aabb::from_center(corner, [size; 3]);
         finder.set(id, aabb, pbig_core::ProxyFilter::ALL).expect("few boxes");

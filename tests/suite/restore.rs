@@ -42,7 +42,7 @@ fn edges(world: &World) -> BTreeSet<[(u32, u32); 2]> {
 }
 
 #[test]
-fn a_restored_broad_phase_goes_on_bit_by_bit_on_every_backend() {
+fn upstream_910_966_a_restored_broad_phase_goes_on_bit_by_bit_on_every_backend() {
     for name in
         ["column", "sleeping", "compounds", "kinematic"].into_iter().filter(|n| Scene::named(n).is_ok())
     {
@@ -63,7 +63,7 @@ fn a_restored_broad_phase_goes_on_bit_by_bit_on_every_backend() {
 }
 
 #[test]
-fn options_survive_a_snapshot_and_it_is_the_same_in_json() {
+fn upstream_675_710_899_options_survive_a_snapshot_also_in_json() {
     let config = Config { margin: 0.03, ..PbigBroadPhase::CONFIG };
     let ours = PbigBroadPhase::with_config(config).with_handle_order(HandleOrder::LowerIndexFirst);
     let (mut world, mut ours) = (scene("column", 60), ours);
