@@ -9,31 +9,31 @@ use rand::{RngExt, SeedableRng};
 use std::collections::BTreeSet;
 
 /// A broad phase with what its caller knows: the boxes that were set, and the pairs by its events.
-struct Follower {
-    broad_phase: BroadPhase,
+pub(crate) struct Follower {
+    pub(crate) broad_phase: BroadPhase,
     boxes: Vec<Option<(Aabb, ProxyFilter)>>,
     pairs: BTreeSet<Pair>,
 }
 
 impl Follower {
-    fn new(config: Config, ids: usize) -> Self {
+    pub(crate) fn new(config: Config, ids: usize) -> Self {
         let broad_phase = BroadPhase::new(config).expect("a good margin");
         Self { broad_phase, boxes: vec![None; ids], pairs: BTreeSet::new() }
     }
 
-    fn set(&mut self, id: u32, aabb: Aabb, filter: ProxyFilter) {
+    pub(crate) fn set(&mut self, id: u32, aabb: Aabb, filter: ProxyFilter) {
         self.boxes[id as usize] = Some((aabb, filter));
         self.broad_phase.set(id, aabb, filter).expect("a small id");
     }
 
-    fn remove(&mut self, id: u32) {
+    pub(crate) fn remove(&mut self, id: u32) {
         let was_there = self.boxes[id as usize].take().is_some();
         assert_eq!(self.broad_phase.remove(id), was_there);
         self.pairs.retain(|p| p.a != id && p.b != id);
     }
 
     /// Updates, follows the events, and compares.
-    fn update(&mut self, what: &str) {
+    pub(crate) fn update(&mut self, what: &str) {
         let events = self.broad_phase.update().expect("within the limits");
         assert!(events.added.is_sorted() && events.removed.is_sorted(), "{what}: events out of order");
         for pair in &events.removed {

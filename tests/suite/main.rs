@@ -1,6 +1,7 @@
 //! One test binary: linking rapier once is what keeps the suite fast to build.
 
 mod checked;
+mod crowds;
 mod drop_in;
 mod explain;
 mod finder;

@@ -16,7 +16,7 @@ use bytemuck::{Pod, Zeroable};
 /// assert!(wheel.allows(&ProxyFilter::ALL));
 /// ```
 #[repr(C)]
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Pod, Zeroable)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Pod, Zeroable)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct ProxyFilter {
     /// The body that the box belongs to; boxes of one body never pair. [`ProxyFilter::NO_BODY`]

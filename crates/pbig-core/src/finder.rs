@@ -1,5 +1,6 @@
 //! All pairs of a list of boxes, from nothing each time.
 
+use crate::cpu::crowding::Set;
 use crate::cpu::emit;
 use crate::cpu::find::Found;
 use crate::cpu::map::Map;
@@ -142,8 +143,7 @@ impl Finder {
 pub(crate) struct Rule<'a, A> {
     /// The whole rule.
     pub(crate) accept: &'a A,
-    /// The part of it that a device can test.
-    #[cfg_attr(not(feature = "gpu"), expect(dead_code))]
+    /// The part of it that a device can test, and that tells who never pairs.
     pub(crate) filters: Option<&'a [ProxyFilter]>,
     /// Whether that part is all of it.
     #[cfg_attr(not(feature = "gpu"), expect(dead_code))]
@@ -202,15 +202,15 @@ impl Search {
             return Ok(());
         }
         let mut clock = Instant::now();
-        let result = self.find_on_cpu(boxes, &summary, config, rule.accept, report);
+        let set = Set { boxes, filters: rule.filters, ids: None, summary: &summary };
+        let result = self.find_on_cpu(&set, config, rule.accept, report);
         self.note_time(false, boxes.len(), lap(&mut clock));
         result
     }
 
     fn find_on_cpu<A>(
         &mut self,
-        boxes: &[Aabb],
-        summary: &Summary,
+        set: &Set<'_>,
         config: &Config,
         accept: &A,
         report: &mut Report,
@@ -219,10 +219,10 @@ impl Search {
         A: Fn(u32, u32) -> bool + Sync,
     {
         if config.strategy == Strategy::Pbig && config.backend != Backend::Brute {
-            report.plan = Plan::new(summary, config, 1.0);
-            return self.find_pbig(boxes, config, accept, report);
+            report.plan = Plan::new(set.summary, config, 1.0);
+            return self.find_pbig(set.boxes, config, accept, report);
         }
-        report.plan = self.map.plan_and_build(summary, config, boxes, None, &mut report.stages);
+        report.plan = self.map.plan_and_build(set, config, &mut report.stages);
         let mut clock = Instant::now();
         self.map.find(accept, config.limits.max_pairs, &mut self.found)?;
         report.stages.check += lap(&mut clock);

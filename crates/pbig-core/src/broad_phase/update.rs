@@ -2,6 +2,7 @@
 
 use super::{BroadPhase, Home, Old, UNCHANGED};
 use crate::cpu::check::Checker;
+use crate::cpu::crowding::Set;
 use crate::diff::PairStore;
 use crate::finder::{Rule, single_entry_checks};
 use crate::plan::{Chosen, Plan, Summary};
@@ -80,7 +81,13 @@ impl BroadPhase {
         let summary = Summary::of(&self.boxes, Some(&self.moved));
         let stages = &mut self.report.stages;
         stages.plan += lap(&mut clock);
-        let plan = self.loose.plan_and_build(&summary, &self.config, &self.boxes, Some(&self.moved), stages);
+        let set = Set {
+            boxes: &self.boxes,
+            filters: Some(&self.filters),
+            ids: Some(&self.moved),
+            summary: &summary,
+        };
+        let plan = self.loose.plan_and_build(&set, &self.config, stages);
         let state = State {
             boxes: &self.boxes,
             filters: &self.filters,
@@ -96,9 +103,9 @@ impl BroadPhase {
         let accept = |a: u32, b: u32| self.home[b as usize] == Home::Base && state.is_added(a, b);
         let mut checker = Checker::new(&accept, &mut self.events.added);
         for old in &self.changed {
-            let aabb = self.boxes[old.id as usize];
+            let (aabb, filter) = (self.boxes[old.id as usize], &self.filters[old.id as usize]);
             if aabb.is_valid() {
-                self.base.map.check_one(&aabb, old.id, &mut checker);
+                self.base.map.check_one(&aabb, filter, old.id, &mut checker);
             }
             if checker.out.len() as u64 > max_pairs {
                 return Err(Error::TooManyPairs { limit: max_pairs });

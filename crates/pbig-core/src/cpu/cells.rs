@@ -157,6 +157,7 @@ mod tests {
             origin: [origin; 3],
             dims: [8; 3],
             cells: 512,
+            camp: 0,
         })
     }
 

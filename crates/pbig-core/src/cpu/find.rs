@@ -11,8 +11,9 @@ use super::check::Checker;
 use super::entries::Query;
 use super::half::Half;
 use super::map::Map;
+use crate::plan::OPEN;
 use crate::report::stage;
-use crate::{Aabb, Error, Pair};
+use crate::{Aabb, Error, Pair, ProxyFilter};
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicU64, Ordering};
 
@@ -102,13 +103,16 @@ impl Map {
     {
         let range = chunk.start..chunk.end;
         let mut counts = (0, 0);
-        if let Some(level) = chunk.level {
+        if let Some(level) = chunk.level.filter(|&level| self.grids[level].camp == OPEN) {
             let mut half = Half::new(&self.grids[level], accept, out, room);
             let room_left = half.check(range.clone());
             counts = (half.checks, half.overlaps);
-            if !room_left || (level + 1 == self.grids.len() && self.list.len() == 0) {
+            if !room_left {
                 return counts;
             }
+        }
+        if chunk.level.is_some_and(|level| level + 1 == self.grids.len() && self.list.len() == 0) {
+            return counts;
         }
         let mut taken = out.len();
         let mut checker = Checker::new(accept, out);
@@ -132,18 +136,20 @@ impl Map {
     fn check_larger<A: Fn(u32, u32) -> bool>(&self, level: usize, i: usize, checker: &mut Checker<'_, A>) {
         let entries = &self.grids[level].entries;
         let (stored, id) = (&entries.boxes[i], entries.ids[i]);
-        for larger in &self.grids[level + 1..] {
+        let own = self.grids[level].camp;
+        for larger in self.grids[level + 1..].iter().filter(|grid| grid.camp == OPEN || grid.camp != own) {
             larger.check_window(&stored.aabb(), id, checker);
         }
         checker.test(&stored.query(), id, &self.list, 0..self.list.len());
     }
 
-    /// Every pair of `one` with a box of the map that overlaps it, whatever its size.
-    pub(crate) fn check_one<A>(&self, one: &Aabb, id: u32, checker: &mut Checker<'_, A>)
+    /// Every pair of `one` with a box of the map that overlaps it, whatever its size, and that its filter may allow.
+    pub(crate) fn check_one<A>(&self, one: &Aabb, filter: &ProxyFilter, id: u32, checker: &mut Checker<'_, A>)
     where
         A: Fn(u32, u32) -> bool,
     {
-        for grid in &self.grids {
+        let own = if self.has_camps() { self.camps.camp(filter) } else { OPEN };
+        for grid in self.grids.iter().filter(|grid| grid.camp == OPEN || grid.camp != own) {
             grid.check_window(one, id, checker);
         }
         checker.test(&Query::new(one), id, &self.list, 0..self.list.len());

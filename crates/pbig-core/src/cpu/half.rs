@@ -148,6 +148,7 @@ impl<'a, A: Fn(u32, u32) -> bool> Half<'a, A> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::cpu::crowding::Set;
     use crate::cpu::map::Map;
     use crate::plan::Summary;
     use crate::report::StageTimes;
@@ -168,7 +169,9 @@ mod tests {
         let boxes = crowd();
         let config = Config { strategy: Strategy::Grid, ..Config::DEFAULT };
         let mut map = Map::new();
-        map.plan_and_build(&Summary::of(&boxes, None), &config, &boxes, None, &mut StageTimes::default());
+        let summary = &Summary::of(&boxes, None);
+        let set = Set { boxes: &boxes, filters: None, ids: None, summary };
+        map.plan_and_build(&set, &config, &mut StageTimes::default());
         let (mut out, room) = (Vec::new(), Room::new(u64::MAX));
         let mut half = Half::new(&map.grids[0], &|_, _| true, &mut out, &room);
         for i in 0..boxes.len() {

@@ -1,12 +1,11 @@
 //! Map: boxes into cells. One entry a box, sorted by the cell of its lower corner.
 
 use super::cells::{Cells, Span};
+use super::crowding::{Crowding, Set};
 use super::entries::{Entries, Stored};
-use crate::plan::{LevelPlan, OccupiedCell, Plan, Summary, size_class_of};
-use crate::report::{StageTimes, lap, stage};
-use crate::{Aabb, Config};
+use crate::Aabb;
+use crate::plan::{Camps, LevelPlan, OPEN, OccupiedCell, Plan, size_class_of};
 use std::ops::Range;
-use std::time::Instant;
 
 /// The boxes of one level, sorted by cell.
 #[derive(Clone, Debug)]
@@ -19,8 +18,10 @@ pub(crate) struct Grid {
     /// By entry: the key of its cell, and its window.
     pub(crate) keys: Vec<u32>,
     pub(crate) spans: Vec<Span>,
+    /// Boxes of one camp other than [`OPEN`] never pair with each other.
+    pub(crate) camp: u8,
     /// Other boxes in a box's cell, on average over boxes.
-    crowd: f32,
+    pub(super) crowd: f32,
 }
 
 /// Cells that are repeated behind the last one, so that a row of a window that wraps around is still
@@ -38,6 +39,7 @@ impl Grid {
             entries: Entries::default(),
             keys: Vec::new(),
             spans: Vec::new(),
+            camp: level.camp,
             crowd: 0.0,
         }
     }
@@ -57,6 +59,7 @@ impl Grid {
     /// scatter misses the cache with every box: 112 to 126 ms for a million, against 43 to 51.
     fn build(&mut self, level: &LevelPlan, boxes: &[Aabb], members: &[u32], sort: &mut Sort) {
         self.cells = Cells::new(level);
+        self.camp = level.camp;
         sort.place(&self.cells, boxes, members);
         let shift = sort.distribute(level.cells, boxes, members);
         self.starts.clear();
@@ -186,29 +189,12 @@ pub(crate) struct Map {
     /// Scratch: ids of the boxes of a level, and where they go.
     members: Vec<Vec<u32>>,
     sort: Sort,
-    crowding: Crowding,
+    pub(super) crowding: Crowding,
+    pub(super) camps: Camps,
     /// How often boxes were sorted.
     #[cfg(test)]
-    builds: usize,
+    pub(super) builds: usize,
 }
-
-/// Cells smaller than an even spread of boxes would ask for, where clusters make them too full.
-/// Kept from one build to the next.
-#[derive(Clone, Copy, Debug)]
-struct Crowding {
-    /// Factor on the cell size.
-    factor: f32,
-    /// How full cells are where smaller ones did not help: identical boxes, say.
-    accepted: f32,
-}
-
-/// Other entries in a box's cell, on average over boxes, at which smaller cells are tried. An even
-/// spread has half a one. Doubling a cell gathers eight times as many boxes, so that cells grow
-/// again only when they are certain to stay below: the choice does not flap.
-const CROWDED: f32 = 12.0;
-
-/// Where dividing the cells ends.
-const FINEST: f32 = 1e-12;
 
 impl Map {
     pub(crate) fn new() -> Self {
@@ -217,91 +203,46 @@ impl Map {
             list: Entries::default(),
             members: vec![],
             sort: Sort::default(),
-            crowding: Crowding { factor: 1.0, accepted: 0.0 },
+            crowding: Crowding::default(),
+            camps: Camps::default(),
             #[cfg(test)]
             builds: 0,
         }
     }
 
-    /// Plans and sorts; again with smaller cells where clusters make them too full.
-    pub(crate) fn plan_and_build(
-        &mut self,
-        summary: &Summary,
-        config: &Config,
-        boxes: &[Aabb],
-        ids: Option<&[u32]>,
-        times: &mut StageTimes,
-    ) -> Plan {
-        let mut build = |map: &mut Self| {
-            let mut clock = Instant::now();
-            let plan = {
-                stage!("plan");
-                Plan::new(summary, config, map.crowding.factor)
-            };
-            times.plan += lap(&mut clock);
-            stage!("map");
-            map.build(&plan, boxes, ids);
-            times.map += lap(&mut clock);
-            plan
-        };
-        let mut tried: Vec<(f32, f32)> = Vec::new();
-        loop {
-            let plan = build(self);
-            let crowd = self.crowd();
-            tried.push((self.crowding.factor, crowd));
-            let limit = CROWDED.max(1.5 * self.crowding.accepted);
-            if crowd > limit && divisible(&plan) && self.crowding.factor > FINEST {
-                // The first halvings of two far clusters change nothing: take larger steps then.
-                let helps = tried.len() < 2 || crowd < 0.8 * tried[tried.len() - 2].1;
-                self.crowding.factor *= if helps { 0.5 } else { 0.125 };
-                continue;
-            }
-            if self.crowding.settle(&tried) {
-                return build(self);
-            }
-            return plan;
-        }
-    }
-
-    /// How full the fullest level is.
-    fn crowd(&self) -> f32 {
-        self.grids.iter().map(|grid| grid.crowd).fold(0.0, f32::max)
-    }
-
-    /// Sorts the valid boxes among `boxes` (or among those with the given ids) as planned.
-    fn build(&mut self, plan: &Plan, boxes: &[Aabb], ids: Option<&[u32]>) {
+    /// Sorts the valid boxes of the set as planned.
+    pub(super) fn build(&mut self, plan: &Plan, set: &Set<'_>) {
         #[cfg(test)]
         {
             self.builds += 1;
         }
-        self.distribute(plan, boxes, ids);
+        self.distribute(plan, set);
         self.grids.truncate(plan.levels.len());
         for (i, level) in plan.levels.iter().enumerate() {
             if self.grids.len() == i {
                 self.grids.push(Grid::new(level));
             }
-            self.grids[i].build(level, boxes, &self.members[i], &mut self.sort);
+            self.grids[i].build(level, set.boxes, &self.members[i], &mut self.sort);
         }
     }
 
     /// Ids by level, and the rest as entries of the list.
-    fn distribute(&mut self, plan: &Plan, boxes: &[Aabb], ids: Option<&[u32]>) {
-        let levels = LevelOfClass::new(plan);
+    fn distribute(&mut self, plan: &Plan, set: &Set<'_>) {
+        let levels: Vec<LevelOfClass> =
+            (0..self.camps.count()).map(|camp| LevelOfClass::new(plan, camp as u8)).collect();
+        let filters = set.filters.filter(|_| self.has_camps());
         self.list.clear();
         self.members.resize(plan.levels.len().max(self.members.len()), Vec::new());
         self.members.iter_mut().for_each(Vec::clear);
-        let mut put = |id: u32| {
-            let aabb = boxes[id as usize];
+        for id in set.ids() {
+            let aabb = set.boxes[id as usize];
             if aabb.is_valid() {
-                match levels.of(&aabb) {
+                let camp = filters.map_or(OPEN, |filters| self.camps.camp(&filters[id as usize]));
+                match levels[camp as usize].of(&aabb) {
                     Some(level) => self.members[level].push(id),
                     None => self.list.push(&aabb, id),
                 }
             }
-        };
-        match ids {
-            Some(ids) => ids.iter().for_each(|&id| put(id)),
-            None => (0..boxes.len() as u32).for_each(put),
         }
     }
 
@@ -326,40 +267,15 @@ impl Map {
     }
 }
 
-/// Whether smaller cells would still hold the largest box of a level.
-fn divisible(plan: &Plan) -> bool {
-    plan.levels.iter().any(|level| (0..3).any(|k| level.cell[k] > 1.5 * level.max_extent[k]))
-}
-
-impl Crowding {
-    /// Settles on one of the factors tried in a call, with the crowd that each led to, for the calls
-    /// to come; true when it is not the last one, so that the map has to be built again.
-    fn settle(&mut self, tried: &[(f32, f32)]) -> bool {
-        let last = tried.len() - 1;
-        let least = tried.iter().map(|t| t.1).fold(f32::INFINITY, f32::min);
-        if tried[last].1 <= CROWDED {
-            self.accepted = 0.0;
-            if 8.0 * (least + 1.0) <= CROWDED {
-                self.factor = (self.factor * 2.0).min(1.0);
-            }
-            return false;
-        }
-        // Smaller cells that are as full are of no use: the largest that are no fuller.
-        let best = tried.iter().position(|t| t.1 <= 1.1 * least).unwrap_or(last);
-        (self.factor, self.accepted) = tried[best];
-        best != last
-    }
-}
-
 /// Which level a box belongs to.
 struct LevelOfClass([u8; 256]);
 
 impl LevelOfClass {
     const LIST: u8 = u8::MAX;
 
-    fn new(plan: &Plan) -> Self {
+    fn new(plan: &Plan, camp: u8) -> Self {
         let mut table = [Self::LIST; 256];
-        for (i, level) in plan.levels.iter().enumerate() {
+        for (i, level) in plan.levels.iter().enumerate().filter(|(_, level)| level.camp == camp) {
             table[level.classes.0 as usize..=level.classes.1 as usize].fill(i as u8);
         }
         Self(table)
@@ -369,50 +285,5 @@ impl LevelOfClass {
     fn of(&self, one: &Aabb) -> Option<usize> {
         let level = self.0[size_class_of(one)];
         (level != Self::LIST).then_some(level as usize)
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// Builds in one call: how often the boxes were sorted.
-    fn builds(map: &mut Map, boxes: &[Aabb]) -> usize {
-        let summary = Summary::of(boxes, None);
-        let before = map.builds;
-        map.plan_and_build(&summary, &Config::DEFAULT, boxes, None, &mut StageTimes::default());
-        map.builds - before
-    }
-
-    fn lattice(side: usize, step: f32, half: f32, at: f32) -> Vec<Aabb> {
-        let corner = |i: usize| [i % side, i / side % side, i / side / side].map(|c| c as f32 * step + at);
-        (0..side.pow(3)).map(|i| Aabb::from_center(corner(i), [half; 3])).collect()
-    }
-
-    #[test]
-    fn cells_that_were_divided_for_clusters_stay_so() {
-        for apart in [3e3, 1e4, 1e5, 1e7] {
-            let mut boxes = lattice(12, 1.02, 0.5, 0.0);
-            boxes.extend(lattice(12, 1.02, 0.5, apart));
-            let mut map = Map::new();
-            let calls: Vec<usize> = (0..5).map(|_| builds(&mut map, &boxes)).collect();
-            assert!(calls[0] > 1 && calls[0] < 16, "{apart}: {calls:?}");
-            assert_eq!(calls[1..], [1; 4], "{apart}");
-        }
-    }
-
-    #[test]
-    fn boxes_that_no_cell_can_part_do_not_ruin_the_cells_of_the_others() {
-        let mut boxes = lattice(20, 1.0, 0.0, 0.0);
-        boxes.extend(vec![Aabb::from_center([5.5; 3], [0.0; 3]); 2000]);
-        let mut map = Map::new();
-        let calls: Vec<usize> = (0..4).map(|_| builds(&mut map, &boxes)).collect();
-        assert_eq!(calls[1..], [1; 3], "{calls:?}");
-        assert!(map.crowding.factor > 0.2, "{:?}", map.crowding);
-        let even = lattice(20, 1.0, 0.3, 0.0);
-        for _ in 0..8 {
-            builds(&mut map, &even);
-        }
-        assert_eq!(map.crowding.factor, 1.0, "an even world gets its cells back");
     }
 }

@@ -50,7 +50,7 @@ impl GpuPlan {
     /// The grid for the boxes behind `summary`, with at most `most_cells` cells. `crowding` is a factor
     /// on the cell size: 1, or less where cells turned out to be too full.
     pub fn new(summary: &Summary, config: &Config, crowding: f32, most_cells: u32) -> Self {
-        let (split, _) = levels::choose(summary, 1.0, Strategy::Grid);
+        let (split, _) = levels::choose(summary, 1.0, Strategy::Grid, 0);
         // The coarsest levels, if there are too many: finer boxes then share the first of them.
         let split = &split[split.len().saturating_sub(MOST_LEVELS - 1)..];
         let (space, low) = space_of(summary, &ordinary(summary));

@@ -25,6 +25,9 @@ pub struct LevelPlan {
     pub dims: [u32; 3],
     /// All cells, a power of two.
     pub cells: u32,
+    /// 0, or the number of a camp: boxes of levels with the same number never pair, whatever their filters say of
+    /// others.
+    pub camp: u8,
 }
 
 /// A cell of a grid with the boxes whose lower corners lie in it.
@@ -42,7 +45,8 @@ impl fmt::Display for LevelPlan {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let largest = self.max_extent.into_iter().fold(0.0, f32::max);
         let [x, y, z] = self.cell;
-        write!(f, "level of {} boxes up to {largest}, cells of {x} x {y} x {z}", self.boxes)
+        write!(f, "level of {} boxes up to {largest}, cells of {x} x {y} x {z}", self.boxes)?;
+        if self.camp == 0 { Ok(()) } else { write!(f, ", none of which pair (camp {})", self.camp) }
     }
 }
 
@@ -72,9 +76,15 @@ mod cost {
 /// Boxes wanted in a cell. The measured optimum is flat from 0.25 to 1.
 const PER_CELL: f64 = 0.5;
 
-/// Splits the boxes into levels and a number of swept boxes, at least cost.
-pub(super) fn choose(summary: &Summary, crowding: f32, strategy: Strategy) -> (Vec<LevelPlan>, u32) {
-    let world = World::new(summary, crowding);
+/// Splits the boxes into levels and a number of swept boxes, at least cost. `others` are boxes in levels of their
+/// own, which these are to be tested against, too.
+pub(super) fn choose(
+    summary: &Summary,
+    crowding: f32,
+    strategy: Strategy,
+    others: u32,
+) -> (Vec<LevelPlan>, u32) {
+    let world = World::new(summary, crowding, others);
     let groups = groups(summary);
     let steps = split(&world, &groups, strategy);
     let (levels, in_levels) = assemble(&world, &groups, steps);
@@ -133,7 +143,7 @@ fn split(world: &World, used: &[Group], strategy: Strategy) -> Vec<Step> {
         let may_sweep = last + 1 == used.len();
         let first_swept = usize::from(strategy == Strategy::Grid);
         let sweeps = (first_swept..if may_sweep { last + 1 } else { 0 }).map(|first| {
-            let cost = before(first) + sweep_cost(&used[first..=last], &used[..first]);
+            let cost = before(first) + world.sweep_cost(&used[first..=last], &used[..first]);
             Step { first, swept: true, cost }
         });
         let best = grids.chain(sweeps).min_by(|a, b| a.cost.total_cmp(&b.cost));
@@ -162,15 +172,17 @@ struct World {
     low: [f32; 3],
     range: [f32; 3],
     crowding: f32,
+    others: f64,
 }
 
 impl World {
-    fn new(summary: &Summary, crowding: f32) -> Self {
+    fn new(summary: &Summary, crowding: f32, others: u32) -> Self {
         let ranges: [(f32, f32); 3] = std::array::from_fn(|k| summary.range(k));
         Self {
             low: ranges.map(|r| r.0.clamp(f32::MIN, f32::MAX)),
             range: ranges.map(|r| (r.1 - r.0).clamp(0.0, f32::MAX)),
             crowding,
+            others: f64::from(others),
         }
     }
 
@@ -183,7 +195,13 @@ impl World {
     fn grid_cost(&self, level: &[Group], smaller: &[Group]) -> f64 {
         let own = cost::BOX + 0.5 * cost::CHECK * self.candidates(level, level);
         let visit = cost::VISIT + cost::CHECK * self.candidates(smaller, level);
-        cost::LEVEL + f64::from(count(level)) * own + f64::from(count(smaller)) * visit
+        let others = cost::VISIT * self.others.min(f64::from(count(level)));
+        cost::LEVEL + f64::from(count(level)) * own + f64::from(count(smaller)) * visit + others
+    }
+
+    fn sweep_cost(&self, swept: &[Group], smaller: &[Group]) -> f64 {
+        let n = f64::from(count(swept));
+        cost::SWEEP * n * (f64::from(count(smaller)) + 0.5 * n + self.others)
     }
 
     /// Boxes of `level` that an average box of `groups` is tested against, were they spread evenly.
@@ -213,6 +231,7 @@ impl World {
             origin: self.low,
             dims,
             cells,
+            camp: 0,
         }
     }
 }
@@ -225,11 +244,6 @@ fn count(groups: &[Group]) -> u32 {
 fn max_extent(groups: &[Group]) -> [f32; 3] {
     let largest = |k: usize| groups.iter().map(|group| group.max_extent[k]).fold(0.0, f32::max);
     std::array::from_fn(|k| largest(k).next_up())
-}
-
-fn sweep_cost(swept: &[Group], smaller: &[Group]) -> f64 {
-    let n = f64::from(count(swept));
-    cost::SWEEP * n * (f64::from(count(smaller)) + 0.5 * n)
 }
 
 /// Fewest cells on an axis. Windows reach one cell to each side (see `cpu::cells`), so that two cells

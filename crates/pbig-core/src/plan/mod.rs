@@ -2,18 +2,20 @@
 //!
 //! A pure function of the [`Summary`] and the [`Config`]; the [`Plan`] explains itself in words.
 
+mod camps;
 #[cfg(feature = "gpu")]
 mod gpu;
 mod levels;
 mod pbig;
 mod summary;
 
+pub(crate) use camps::{Camps, OPEN};
 #[cfg(feature = "gpu")]
 pub use gpu::GpuPlan;
 pub use levels::{LevelPlan, OccupiedCell};
 pub use pbig::{PbigPlan, density_cell, pbig_cell, pbig_objective};
-pub(crate) use summary::size_class_of;
 pub use summary::{SizeClass, Summary};
+pub(crate) use summary::{size_class_of, spread_evenly};
 
 use crate::config::{Backend, Config, Strategy};
 use std::fmt;
@@ -96,11 +98,29 @@ impl Plan {
             },
             Strategy::Auto if boxes < config.brute_below => brute,
             Strategy::Auto | Strategy::Grid => {
-                let (levels, swept) = levels::choose(summary, crowding, config.strategy);
+                let (levels, swept) = levels::choose(summary, crowding, config.strategy, 0);
                 let chosen = if levels.is_empty() { Chosen::Brute } else { Chosen::Grid };
                 Self { chosen, levels, swept, boxes, ..Self::default() }
             }
         }
+    }
+}
+
+impl Plan {
+    /// For boxes by camp, the first of which is open: levels for each, all in one plan.
+    pub(crate) fn of_camps(summaries: &[Summary], config: &Config, crowding: f32) -> Self {
+        let boxes = summaries.iter().map(|summary| summary.valid).sum();
+        let mut plan = Self { chosen: Chosen::Grid, boxes, ..Self::default() };
+        for (camp, summary) in summaries.iter().enumerate() {
+            let crowding = if camp == usize::from(OPEN) { crowding } else { 1.0 };
+            let others = boxes - summary.valid;
+            let (levels, swept) = levels::choose(summary, crowding, config.strategy, others);
+            plan.levels.extend(levels.into_iter().map(|level| LevelPlan { camp: camp as u8, ..level }));
+            plan.swept += swept;
+        }
+        // Small boxes search among larger ones, and few among many.
+        plan.levels.sort_by_key(|level| (level.classes.1, level.boxes));
+        plan
     }
 }
 

@@ -56,16 +56,9 @@ impl Summary {
         }
     }
 
-    /// A golden-ratio walk, so that a pattern in the order of the boxes cannot bias the sample;
-    /// the same for the same boxes.
     fn draw_sample(&mut self, boxes: &[Aabb], ids: Option<&[u32]>) {
-        const GOLDEN: u64 = 0x9E37_79B9_7F4A_7C15;
-        let len = ids.map_or(boxes.len(), <[u32]>::len);
-        for i in 0..len.min(Self::SAMPLE) as u64 {
-            let step =
-                if len <= Self::SAMPLE { i } else { ((i.wrapping_mul(GOLDEN) >> 32) * len as u64) >> 32 };
-            let index = ids.map_or(step as usize, |ids| ids[step as usize] as usize);
-            let one = boxes[index];
+        for step in spread_evenly(ids.map_or(boxes.len(), <[u32]>::len), Self::SAMPLE) {
+            let one = boxes[ids.map_or(step, |ids| ids[step] as usize)];
             if one.is_valid() && one.min.iter().chain(&one.max).all(|x| x.is_finite()) {
                 self.sample.push(one);
             }
@@ -86,6 +79,14 @@ impl Summary {
         let widening = (high - low) * 0.125;
         (low - widening, high + widening)
     }
+}
+
+/// At most `most` of the numbers below `len`, by a golden-ratio walk: a pattern in the order of the boxes cannot
+/// bias a sample, and it is the same for the same number of boxes.
+pub(crate) fn spread_evenly(len: usize, most: usize) -> impl Iterator<Item = usize> {
+    const GOLDEN: u64 = 0x9E37_79B9_7F4A_7C15;
+    let walk = move |i: u64| ((i.wrapping_mul(GOLDEN) >> 32) * len as u64) >> 32;
+    (0..len.min(most) as u64).map(move |i| if len <= most { i } else { walk(i) } as usize)
 }
 
 /// The exponent of the largest extent; NaN (a point at infinity on every axis) counts as infinite.

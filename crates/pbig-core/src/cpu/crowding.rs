@@ -1,0 +1,226 @@
+//! Crowds: what to do where many boxes share few cells. Smaller cells, where those part them; grids without a search of
+//! their own for boxes that may not pair with each other ([`Camps`]), where those do not.
+
+use super::map::Map;
+use crate::plan::{Camps, OPEN, Plan, Summary, spread_evenly};
+use crate::report::{StageTimes, lap, stage};
+use crate::{Aabb, Config, ProxyFilter};
+use std::time::Instant;
+
+/// The boxes to search, and all that is known about them.
+#[derive(Clone, Copy)]
+pub(crate) struct Set<'a> {
+    pub(crate) boxes: &'a [Aabb],
+    /// By id, where the caller has filters.
+    pub(crate) filters: Option<&'a [ProxyFilter]>,
+    /// Of the boxes that count; all if none are given.
+    pub(crate) ids: Option<&'a [u32]>,
+    pub(crate) summary: &'a Summary,
+}
+
+impl<'a> Set<'a> {
+    fn len(&self) -> usize {
+        self.ids.map_or(self.boxes.len(), <[u32]>::len)
+    }
+
+    fn id(&self, i: usize) -> u32 {
+        self.ids.map_or(i as u32, |ids| ids[i])
+    }
+
+    /// The ids of the boxes that count.
+    pub(crate) fn ids(&self) -> impl Iterator<Item = u32> + use<'a> {
+        let set = *self;
+        (0..self.len()).map(move |i| set.id(i))
+    }
+
+    /// The camps among the boxes, as far as a sample shows them.
+    fn camps(&self) -> Camps {
+        let Some(filters) = self.filters else { return Camps::default() };
+        let sample = spread_evenly(self.len(), SAMPLE);
+        let each = self.len().div_ceil(SAMPLE) as u32;
+        Camps::of(sample.map(|i| &filters[self.id(i) as usize]), each)
+    }
+}
+
+/// Filters that are looked at for camps. A camp that a sample misses is too small to matter: 2048 of any number of
+/// boxes take 0.1 ms.
+const SAMPLE: usize = 2048;
+
+/// Cells smaller than an even spread of boxes would ask for, where clusters make them too full.
+/// Kept from one build to the next.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Crowding {
+    /// Factor on the cell size.
+    factor: f32,
+    /// How full cells are where smaller ones did not help: identical boxes, say.
+    accepted: f32,
+}
+
+/// Other entries in a box's cell, on average over boxes, at which smaller cells are tried. An even
+/// spread has half a one. Doubling a cell gathers eight times as many boxes, so that cells grow
+/// again only when they are certain to stay below: the choice does not flap.
+const CROWDED: f32 = 12.0;
+
+/// Where dividing the cells ends.
+const FINEST: f32 = 1e-12;
+
+impl Default for Crowding {
+    fn default() -> Self {
+        Self { factor: 1.0, accepted: 0.0 }
+    }
+}
+
+impl Map {
+    /// Plans and sorts; again with smaller cells where clusters make them too full, and by camps where that does not
+    /// help.
+    pub(crate) fn plan_and_build(&mut self, set: &Set<'_>, config: &Config, times: &mut StageTimes) -> Plan {
+        if self.has_camps() {
+            self.settle_camps(set, times);
+        }
+        let plan = self.build_uncrowded(set, config, times);
+        if self.has_camps() || self.crowd(|_| true) <= CROWDED || !self.settle_camps(set, times) {
+            return plan;
+        }
+        self.build_uncrowded(set, config, times)
+    }
+
+    /// Divides the boxes into camps while those are crowded, and no longer; true when there are some.
+    fn settle_camps(&mut self, set: &Set<'_>, times: &mut StageTimes) -> bool {
+        let mut clock = Instant::now();
+        // A crowd that has dispersed: half, so that it does not flap.
+        let crowded = self.crowd(|_| true) > if self.has_camps() { CROWDED / 2.0 } else { CROWDED };
+        let had = self.has_camps();
+        self.camps = if crowded { set.camps() } else { Camps::default() };
+        if self.has_camps() != had {
+            self.crowding = Crowding::default();
+        }
+        times.plan += lap(&mut clock);
+        self.has_camps()
+    }
+
+    /// Plans and sorts, again with smaller cells where they are too full.
+    fn build_uncrowded(&mut self, set: &Set<'_>, config: &Config, times: &mut StageTimes) -> Plan {
+        let mut build = |map: &mut Self| {
+            let mut clock = Instant::now();
+            let plan = {
+                stage!("plan");
+                map.plan(set, config)
+            };
+            times.plan += lap(&mut clock);
+            stage!("map");
+            map.build(&plan, set);
+            times.map += lap(&mut clock);
+            plan
+        };
+        let mut tried: Vec<(f32, f32)> = Vec::new();
+        loop {
+            let plan = build(self);
+            let crowd = self.crowd(|camp| camp == OPEN);
+            tried.push((self.crowding.factor, crowd));
+            let limit = CROWDED.max(1.5 * self.crowding.accepted);
+            if crowd > limit && divisible(&plan) && self.crowding.factor > FINEST {
+                // The first halvings of two far clusters change nothing: take larger steps then.
+                let helps = tried.len() < 2 || crowd < 0.8 * tried[tried.len() - 2].1;
+                self.crowding.factor *= if helps { 0.5 } else { 0.125 };
+                continue;
+            }
+            if self.crowding.settle(&tried) {
+                return build(self);
+            }
+            return plan;
+        }
+    }
+
+    /// One plan for all boxes, or one for each camp, put together.
+    fn plan(&self, set: &Set<'_>, config: &Config) -> Plan {
+        let factor = self.crowding.factor;
+        let (Some(filters), true) = (set.filters, self.has_camps()) else {
+            return Plan::new(set.summary, config, factor);
+        };
+        let mut camps = vec![Vec::new(); self.camps.count()];
+        set.ids().for_each(|id| camps[self.camps.camp(&filters[id as usize]) as usize].push(id));
+        let summaries = camps.iter().map(|ids| Summary::of(set.boxes, Some(ids))).collect::<Vec<_>>();
+        Plan::of_camps(&summaries, config, factor)
+    }
+
+    /// How full the fullest level is, among some camps.
+    fn crowd(&self, counts: impl Fn(u8) -> bool) -> f32 {
+        let grids = self.grids.iter().filter(|grid| counts(grid.camp));
+        grids.map(|grid| grid.crowd).fold(0.0, f32::max)
+    }
+
+    pub(super) fn has_camps(&self) -> bool {
+        !self.camps.is_empty()
+    }
+}
+
+/// Whether smaller cells would still hold the largest box of a level.
+fn divisible(plan: &Plan) -> bool {
+    plan.levels.iter().any(|level| (0..3).any(|k| level.cell[k] > 1.5 * level.max_extent[k]))
+}
+
+impl Crowding {
+    /// Settles on one of the factors tried in a call, with the crowd that each led to, for the calls
+    /// to come; true when it is not the last one, so that the map has to be built again.
+    fn settle(&mut self, tried: &[(f32, f32)]) -> bool {
+        let last = tried.len() - 1;
+        let least = tried.iter().map(|t| t.1).fold(f32::INFINITY, f32::min);
+        if tried[last].1 <= CROWDED {
+            self.accepted = 0.0;
+            if 8.0 * (least + 1.0) <= CROWDED {
+                self.factor = (self.factor * 2.0).min(1.0);
+            }
+            return false;
+        }
+        // Smaller cells that are as full are of no use: the largest that are no fuller.
+        let best = tried.iter().position(|t| t.1 <= 1.1 * least).unwrap_or(last);
+        (self.factor, self.accepted) = tried[best];
+        best != last
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Builds in one call: how often the boxes were sorted.
+    fn builds(map: &mut Map, boxes: &[Aabb]) -> usize {
+        let summary = Summary::of(boxes, None);
+        let before = map.builds;
+        let set = Set { boxes, filters: None, ids: None, summary: &summary };
+        map.plan_and_build(&set, &Config::DEFAULT, &mut StageTimes::default());
+        map.builds - before
+    }
+
+    fn lattice(side: usize, step: f32, half: f32, at: f32) -> Vec<Aabb> {
+        let corner = |i: usize| [i % side, i / side % side, i / side / side].map(|c| c as f32 * step + at);
+        (0..side.pow(3)).map(|i| Aabb::from_center(corner(i), [half; 3])).collect()
+    }
+
+    #[test]
+    fn cells_that_were_divided_for_clusters_stay_so() {
+        for apart in [3e3, 1e4, 1e5, 1e7] {
+            let mut boxes = lattice(12, 1.02, 0.5, 0.0);
+            boxes.extend(lattice(12, 1.02, 0.5, apart));
+            let mut map = Map::new();
+            let calls: Vec<usize> = (0..5).map(|_| builds(&mut map, &boxes)).collect();
+            assert!(calls[0] > 1 && calls[0] < 16, "{apart}: {calls:?}");
+            assert_eq!(calls[1..], [1; 4], "{apart}");
+        }
+    }
+
+    #[test]
+    fn boxes_that_no_cell_can_part_do_not_ruin_the_cells_of_the_others() {
+        let mut boxes = lattice(20, 1.0, 0.0, 0.0);
+        boxes.extend(vec![Aabb::from_center([5.5; 3], [0.0; 3]); 2000]);
+        let mut map = Map::new();
+        let calls: Vec<usize> = (0..4).map(|_| builds(&mut map, &boxes)).collect();
+        assert_eq!(calls[1..], [1; 3], "{calls:?}");
+        assert!(map.crowding.factor > 0.2, "{:?}", map.crowding);
+        let even = lattice(20, 1.0, 0.3, 0.0);
+        for _ in 0..8 {
+            builds(&mut map, &even);
+        }
+        assert_eq!(map.crowding.factor, 1.0, "an even world gets its cells back");
+    }
+}
