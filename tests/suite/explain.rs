@@ -9,8 +9,8 @@ use rapier_pbig::shadow::{Fault, Shadow};
 use rapier_pbig::{DebugRenderParts, HandleOrder, PbigBroadPhase, Why};
 use rapier3d::pipeline::{DebugColor, DebugRenderBackend, DebugRenderObject};
 use rapier3d::prelude::*;
+use std::cell::RefCell;
 use std::collections::BTreeSet;
-use std::sync::{Arc, Mutex};
 
 #[test]
 fn why_names_the_test_that_ended_a_pair() {
@@ -102,16 +102,21 @@ fn pair_of(pair: &ContactPair) -> ColliderPair {
     ColliderPair::new(pair.collider1, pair.collider2)
 }
 
-/// Remembers the names of spans.
-#[derive(Clone, Default)]
-struct Names(Arc<Mutex<BTreeSet<&'static str>>>);
+thread_local! {
+    /// Names of the spans that this thread has entered.
+    static SPANS: RefCell<BTreeSet<&'static str>> = const { RefCell::new(BTreeSet::new()) };
+}
+
+/// For all threads and from then on: one for some threads only would race with the others, which decide for all
+/// whether a span is looked at.
+struct Names;
 
 impl tracing::Subscriber for Names {
     fn enabled(&self, metadata: &tracing::Metadata<'_>) -> bool {
         metadata.target() == "pbig"
     }
     fn new_span(&self, span: &tracing::span::Attributes<'_>) -> tracing::span::Id {
-        self.0.lock().expect("no panic").insert(span.metadata().name());
+        SPANS.with_borrow_mut(|spans| spans.insert(span.metadata().name()));
         tracing::span::Id::from_u64(1)
     }
     fn record(&self, _: &tracing::span::Id, _: &tracing::span::Record<'_>) {}
@@ -122,18 +127,16 @@ impl tracing::Subscriber for Names {
 }
 
 fn spans(config: Config) -> BTreeSet<&'static str> {
-    let names = Names::default();
-    tracing::subscriber::with_default(names.clone(), || {
-        let mut world = Scene::named("column").expect("the scene exists").build(200, 1);
-        let mut broad_phase = PbigBroadPhase::with_config(config);
-        (0..3).for_each(|_| world.step(&mut broad_phase));
-    });
-    let names = names.0.lock().expect("no panic");
-    names.clone()
+    SPANS.take();
+    let mut world = Scene::named("column").expect("the scene exists").build(200, 1);
+    let mut broad_phase = PbigBroadPhase::with_config(config);
+    (0..3).for_each(|_| world.step(&mut broad_phase));
+    SPANS.take()
 }
 
 #[test]
 fn each_stage_is_a_span() {
+    tracing::subscriber::set_global_default(Names).expect("there is no other");
     let of_cpu = spans(Config { backend: Backend::Cpu, ..PbigBroadPhase::CONFIG });
     assert_eq!(of_cpu, ["update", "proxies", "plan", "map", "check", "emit", "diff"].into());
     let of_gpu = spans(Config { backend: Backend::Gpu, ..PbigBroadPhase::CONFIG });

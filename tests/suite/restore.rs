@@ -1,7 +1,7 @@
 //! Snapshots: our state restored goes on bit by bit; a fresh broad phase beside a restored world misses nothing.
 
 use crate::checked::{backends, everywhere};
-use pbig_core::Config;
+use pbig_core::{Backend, Config, GpuFinder};
 use pbig_harness::runner::Timed;
 use pbig_harness::scenes::Scene;
 use pbig_harness::shadow::Shadowed;
@@ -105,6 +105,23 @@ fn a_fresh_broad_phase_beside_a_restored_world_finds_what_sleeps_and_what_is_fix
         let ball = world.bodies.iter().last().expect("the ball").1;
         assert!(ball.translation().y > 1.0, "{name}: the ball fell through");
     }
+}
+
+#[test]
+fn a_device_is_handed_over_at_the_start_or_to_a_restored_broad_phase() {
+    let config = Config { backend: Backend::Gpu, ..PbigBroadPhase::CONFIG };
+    let gpu = || GpuFinder::new().expect("an adapter");
+    let (mut world, mut ours) = (scene("column", 100), PbigBroadPhase::with_gpu(config, gpu()));
+    steps(&mut world, &mut ours, 20);
+    let (mut other, mut again) = (copy(&world), restored(&saved(&ours)));
+    assert!(again.adapter().is_none(), "a snapshot holds no device");
+    again.set_gpu(gpu());
+    steps(&mut world, &mut ours, 20);
+    steps(&mut other, &mut again, 20);
+    for broad_phase in [&ours, &again] {
+        assert!(broad_phase.adapter().is_some() && broad_phase.stats().report.gpu.is_some());
+    }
+    assert!(world.pose_bits() == other.pose_bits());
 }
 
 #[test]

@@ -130,16 +130,20 @@ impl PbigBroadPhase {
 
     /// Starts again beside a world that it has not accompanied: one restored from a snapshot without this broad
     /// phase, or one that rapier's own broad phase has served so far. The next update looks at all
-    /// colliders; pairs that the narrow phase has and that are none end then.
+    /// colliders; pairs that the narrow phase has and that are none end then. Until then [`PbigBroadPhase::why`] and
+    /// queries know of no collider.
     ///
     /// Without this call a new broad phase notices such a world too, but not the pairs that ended before it was
-    /// there: the narrow phase keeps those until one of their colliders is removed.
+    /// there: the narrow phase keeps those until one of their colliders is removed. It notices by the number of colliders; so
+    /// a world that is rolled back to another one of as many under a broad phase that stays has to be adopted, or the
+    /// broad phase rolled back with it.
     pub fn adopt(&mut self, narrow_phase: &NarrowPhase) {
         let contacts = narrow_phase.contact_pairs().map(|pair| (pair.collider1, pair.collider2));
         let intersections = narrow_phase.intersection_pairs().map(|(one, other, _)| (one, other));
         self.outbox.adopted = contacts.chain(intersections).map(|(a, b)| ColliderPair::new(a, b)).collect();
         let all: Vec<ColliderHandle> = self.roll.handles().collect();
         all.into_iter().for_each(|handle| self.forget(handle));
+        self.tree = SceneTree::default();
         #[cfg(feature = "shadow")]
         if let Some(checker) = &mut self.shadow {
             checker.assume(self.outbox.adopted.iter().copied());

@@ -36,6 +36,11 @@
 //! | `debug-render` | [`PbigBroadPhase::debug_render`], as rapier's |
 //! | `shadow` | [`PbigBroadPhase::with_shadow`]: rapier's own broad phase and brute force beside it |
 
+/// The programs in the README are tests.
+#[cfg(doctest)]
+#[doc = include_str!("../../../README.md")]
+struct Readme;
+
 mod broad_phase;
 mod call;
 #[cfg(feature = "debug-render")]

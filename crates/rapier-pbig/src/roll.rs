@@ -2,7 +2,7 @@
 //!
 //! Rapier lists each new and each removed collider once. So as long as it is the same world all along, the
 //! roll has as many colliders as the set; when it has not, the world was there before the broad phase was, or
-//! was replaced by another one (a snapshot was restored).
+//! was replaced by another one (a snapshot was restored). One replaced by as many other colliders goes unnoticed.
 
 use rapier3d::prelude::{ColliderHandle, ColliderSet};
 

@@ -4,10 +4,13 @@
 //! A [`Checker`] keeps what the narrow phase believes, by following the events, and holds three
 //! things against it: the oracle over boxes and filters taken straight from rapier's public functions,
 //! the pairs that stock reports, and the rule that every pair has a reason. It shares no code with the
-//! broad phase that it checks.
+//! broad phase that it checks but the definition of overlap.
 //!
 //! What it cannot see: a pair that only soft CCD would need (its boxes are those of the present pose),
-//! and the order of events. Calls in which nothing is modified are followed but not compared.
+//! and the order of events. Calls in which nothing is modified are followed but not compared. It takes the present
+//! prediction distance, length unit and contact skin for all colliders, where a broad phase learns of those of listed ones
+//! only: an app that changes these should touch all colliders, or the checker may see pairs missing that rapier's own broad
+//! phase misses too.
 
 mod difference;
 mod followed;
