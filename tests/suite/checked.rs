@@ -1,6 +1,6 @@
 //! A world whose every call of the broad phase is checked beside stock and the oracle.
 
-use pbig_core::{Backend, Coding, Config};
+use pbig_core::{Backend, Coding, Config, Strategy};
 use pbig_harness::shadow::Shadowed;
 use pbig_harness::world::World;
 use rapier_pbig::PbigBroadPhase;
@@ -13,12 +13,13 @@ pub(crate) struct Checked {
     pub(crate) config: Config,
 }
 
-/// The backends on which rapier's semantics are tested: the CPU, and a GPU with its grid, however
-/// small the world.
-pub(crate) fn backends() -> [(&'static str, Config); 2] {
+/// The backends on which rapier's semantics are tested: the CPU as it comes, which tests each two boxes of a small world,
+/// the CPU with its grid and a GPU with its grid, however small the world.
+pub(crate) fn backends() -> [(&'static str, Config); 3] {
     let margin = PbigBroadPhase::CONFIG.margin;
     let cpu = Config { backend: Backend::Cpu, ..PbigBroadPhase::CONFIG };
-    [("cpu", cpu), ("gpu", Config { margin, ..pbig_tests::gpu(Coding::Plain) })]
+    let grid = Config { strategy: Strategy::Grid, ..cpu };
+    [("cpu", cpu), ("cpu grid", grid), ("gpu", Config { margin, ..pbig_tests::gpu(Coding::Plain) })]
 }
 
 /// Runs a test on every backend, each time with a new world.
@@ -69,6 +70,15 @@ impl Checked {
         (0..steps).map(|_| self.step()).last().unwrap_or(0)
     }
 
+    /// Exact tests in the last update.
+    pub(crate) fn checks(&self) -> u64 {
+        self.broad_phase.inner.stats().report.checks.made
+    }
+
+    pub(crate) fn on_gpu(&self) -> bool {
+        self.config.backend == Backend::Gpu
+    }
+
     /// Pairs that the narrow phase has, apart from those with sensors.
     pub(crate) fn contacts(&self) -> usize {
         self.world.narrow_phase.contact_pairs().count()
@@ -78,10 +88,9 @@ impl Checked {
         if let Some(first) = self.broad_phase.first_difference() {
             panic!("{first}");
         }
-        assert_eq!(
-            self.broad_phase.inner.stats().report.fallback,
-            None,
-            "a GPU's work is not done by the CPU"
-        );
+        let report = self.broad_phase.inner.stats().report;
+        assert_eq!(report.fallback, None, "a GPU's work is not done by the CPU");
+        let searched = report.changed > 0 && report.boxes - report.invalid > 1;
+        assert_eq!(report.gpu.is_some(), searched && self.on_gpu(), "{}", report.plan);
     }
 }

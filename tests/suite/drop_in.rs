@@ -1,9 +1,11 @@
 //! What rapier 0.27 is owed by its broad phase, call by call.
 
-use crate::checked::{Checked, everywhere};
+use crate::checked::{Checked, backends, everywhere};
+use pbig_harness::scenes::Scene;
 use pbig_harness::world::World;
-use rapier_pbig::PbigBroadPhase;
+use rapier_pbig::{PbigBroadPhase, Why};
 use rapier3d::prelude::*;
+use std::panic::{AssertUnwindSafe, catch_unwind};
 
 #[test]
 fn insertion_motion_and_removal() {
@@ -277,6 +279,126 @@ fn a_ground_that_loses_all_its_pairs_does_not_come_first_either() {
     };
     let ended: Vec<_> = events.iter().filter_map(second).collect();
     assert_eq!(ended, [ground; 20]);
+}
+
+/// Notes the calls and the events of another broad phase.
+struct Recorder<B> {
+    inner: B,
+    /// Modified and removed colliders, and `dt`, of each call.
+    calls: Vec<(usize, usize, f32)>,
+    /// Whether a pair was added, and its indices, of each event.
+    events: Vec<Vec<(bool, [u32; 2])>>,
+}
+
+impl<B> Recorder<B> {
+    fn new(inner: B) -> Self {
+        Self { inner, calls: Vec::new(), events: Vec::new() }
+    }
+}
+
+impl<B: BroadPhase> BroadPhase for Recorder<B> {
+    fn update(
+        &mut self,
+        params: &IntegrationParameters,
+        colliders: &ColliderSet,
+        bodies: &RigidBodySet,
+        modified: &[ColliderHandle],
+        removed: &[ColliderHandle],
+        events: &mut Vec<BroadPhasePairEvent>,
+    ) {
+        let start = events.len();
+        self.inner.update(params, colliders, bodies, modified, removed, events);
+        self.calls.push((modified.len(), removed.len(), params.dt));
+        let indices = |pair: &ColliderPair| {
+            let [a, b] = [pair.collider1, pair.collider2].map(|handle| handle.into_raw_parts().0);
+            [a.min(b), a.max(b)]
+        };
+        let noted = |event: &BroadPhasePairEvent| match event {
+            BroadPhasePairEvent::AddPair(pair) => (true, indices(pair)),
+            BroadPhasePairEvent::DeletePair(pair) => (false, indices(pair)),
+        };
+        self.events.push(events[start..].iter().map(noted).collect());
+    }
+}
+
+#[test]
+fn a_step_is_two_calls_and_one_more_for_each_further_substep() {
+    for (name, config) in backends() {
+        let mut world = World::with_gravity(glam::Vec3::ZERO);
+        world.params.max_ccd_substeps = 4;
+        let wall = ColliderBuilder::cuboid(0.05, 5.0, 5.0).translation(vector![0.5, 0.0, 0.0]);
+        world.colliders.insert(wall);
+        // Five metres a step; the second one ends at the wall.
+        let bullet = World::dynamic(glam::Vec3::X * -7.0).linvel(vector![300.0, 0.0, 0.0]);
+        world.add(bullet.ccd_enabled(true).can_sleep(false), ColliderBuilder::ball(0.1));
+        let mut recorder = Recorder::new(PbigBroadPhase::with_config(config));
+        world.step(&mut recorder);
+        let dt = world.params.dt;
+        assert_eq!(recorder.calls, [(2, 0, dt), (1, 0, dt)], "{name}");
+        recorder.calls.clear();
+        world.step(&mut recorder);
+        let calls = &recorder.calls;
+        assert_eq!(calls[0], (0, 0, dt), "{name}: the app has changed nothing");
+        assert!(calls.len() > 2 && calls[1..].iter().all(|call| call.2 < dt), "{name}: {calls:?}");
+        assert!(world.bodies.iter().all(|(_, body)| body.translation().x < 0.5), "{name}: through the wall");
+    }
+}
+
+#[test]
+fn deletions_come_before_additions_each_by_index_and_the_same_on_every_backend() {
+    let streams = backends().map(|(_, config)| {
+        let mut world = Scene::named("column").expect("the scene exists").build(150, 4);
+        let mut recorder = Recorder::new(PbigBroadPhase::with_config(config));
+        (0..60).for_each(|_| world.step(&mut recorder));
+        recorder.events
+    });
+    assert!(streams.iter().all(|stream| *stream == streams[0]));
+    assert!(streams[0].iter().all(|call| call.is_sorted()), "false, a deletion, is less than true");
+    let mixed = |call: &&Vec<(bool, [u32; 2])>| call.iter().any(|e| e.0) && call.iter().any(|e| !e.0);
+    assert!(streams[0].iter().filter(mixed).count() > 5, "calls with both");
+}
+
+#[test]
+fn where_rapiers_own_broad_phase_panics_ours_does_not() {
+    for x in [0.5, 7.0] {
+        let step = |broad_phase: &mut dyn BroadPhase| {
+            let mut world = World::with_gravity(glam::Vec3::ZERO);
+            let [a, b, _] = [0.0, x, 0.9]
+                .map(|x| world.add(World::dynamic(glam::Vec3::X * x), ColliderBuilder::ball(0.5)));
+            world.step(broad_phase);
+            world.bodies[a].set_enabled(false);
+            world.remove(b);
+            (0..2).for_each(|_| world.step(broad_phase));
+        };
+        let panics = |mut broad_phase: Box<dyn BroadPhase>| {
+            catch_unwind(AssertUnwindSafe(move || step(broad_phase.as_mut()))).is_err()
+        };
+        println!("{x}: {}", panics(Box::new(DefaultBroadPhase::new())));
+        for (_, config) in backends() {
+            assert!(!panics(Box::new(PbigBroadPhase::with_config(config))));
+        }
+    }
+}
+
+#[test]
+fn an_heir_whose_predecessor_was_never_listed_as_removed_has_pairs_of_its_own() {
+    for (_, config) in backends() {
+        let (mut scene, mut ours) = (Checked::new(config), PbigBroadPhase::with_config(config));
+        let (body, old) = scene.ball(0.0);
+        let (_, other) = scene.ball(0.9);
+        let update = |scene: &Checked, ours: &mut PbigBroadPhase, listed: &[ColliderHandle]| {
+            let World { params, colliders, bodies, .. } = &scene.world;
+            let mut events = Vec::new();
+            ours.update(params, colliders, bodies, listed, &[], &mut events);
+            events.len()
+        };
+        assert_eq!(update(&scene, &mut ours, &[old, other]), 1);
+        scene.world.remove_collider(old);
+        let new = scene.attach(body);
+        assert_eq!(new.into_raw_parts().0, old.into_raw_parts().0);
+        assert_eq!(update(&scene, &mut ours, &[new]), 1, "the pair is new, although box and index are not");
+        assert_eq!((ours.why(new, other), ours.why(old, other)), (Why::Reported, Why::Unknown(old)));
+    }
 }
 
 #[test]

@@ -68,8 +68,8 @@ fn statistics_count_what_an_update_was_given_and_sent() {
         let broad_phase = &mut scene.broad_phase.inner;
         broad_phase.update(params, colliders, bodies, &handles, &[], &mut Vec::new());
         let stats = broad_phase.stats();
-        assert_eq!((stats.updates, stats.colliders, stats.modified, stats.removed), (1, 2, 2, 0));
-        assert_eq!((stats.added, stats.deleted, stats.report.pairs, stats.rescanned), (1, 0, 1, false));
+        assert_eq!((stats.totals.updates, stats.colliders, stats.modified, stats.removed), (1, 2, 2, 0));
+        assert_eq!((stats.added, stats.deleted, stats.report.pairs, stats.totals.rescans), (1, 0, 1, 0));
         assert!(stats.total() >= stats.proxies + stats.set + stats.events && !stats.total().is_zero());
         scene.world.bodies[a].set_translation(vector![50.0, 0.0, 0.0], true);
         let World { params, colliders, bodies, .. } = &mut scene.world;
@@ -77,8 +77,19 @@ fn statistics_count_what_an_update_was_given_and_sent() {
         let broad_phase = &mut scene.broad_phase.inner;
         broad_phase.update(params, colliders, bodies, &handles[..1], &[handles[1]], &mut Vec::new());
         let stats = broad_phase.stats();
-        assert_eq!((stats.updates, stats.modified, stats.removed, stats.added), (2, 1, 1, 0));
+        assert_eq!((stats.totals.updates, stats.modified, stats.removed, stats.added), (2, 1, 1, 0));
         assert_eq!((stats.deleted, stats.report.pairs), (0, 0), "a removed collider's pairs end silently");
+        for (x, sent) in [(0.9, (1, 0)), (50.0, (0, 1))] {
+            scene.world.bodies[a].set_translation(vector![x, 0.0, 0.0], true);
+            let World { params, colliders, bodies, .. } = &mut scene.world;
+            bodies.propagate_modified_body_positions_to_colliders(colliders);
+            let broad_phase = &mut scene.broad_phase.inner;
+            broad_phase.update(params, colliders, bodies, &handles, &[], &mut Vec::new());
+            let stats = broad_phase.stats();
+            assert_eq!((stats.added, stats.deleted), sent, "at {x}");
+        }
+        let totals = scene.broad_phase.inner.stats().totals;
+        assert_eq!((totals.updates, totals.added, totals.deleted, totals.failures), (4, 2, 1, 0));
     });
 }
 
@@ -138,9 +149,12 @@ fn spans(config: Config) -> BTreeSet<&'static str> {
 fn each_stage_is_a_span() {
     tracing::subscriber::set_global_default(Names).expect("there is no other");
     let of_cpu = spans(Config { backend: Backend::Cpu, ..PbigBroadPhase::CONFIG });
-    assert_eq!(of_cpu, ["update", "proxies", "plan", "map", "check", "emit", "diff"].into());
+    assert_eq!(of_cpu, ["update", "proxies", "set", "plan", "map", "check", "emit", "diff", "events"].into());
     let of_gpu = spans(Config { backend: Backend::Gpu, ..PbigBroadPhase::CONFIG });
-    assert!(of_gpu.is_superset(&["update", "proxies", "gpu", "emit", "diff"].into()), "{of_gpu:?}");
+    assert!(
+        of_gpu.is_superset(&["update", "proxies", "set", "gpu", "emit", "diff", "events"].into()),
+        "{of_gpu:?}"
+    );
 }
 
 /// Boxes drawn by kind of colour, from their lines.
@@ -217,16 +231,23 @@ fn a_box_lies_in_one_cell_that_contains_its_lower_corner() {
     assert!(cells.iter().map(|cell| cell.level).collect::<BTreeSet<_>>().len() > 1, "several levels");
 }
 
-/// A ball has moved onto another one without being listed: what a shadow must notice.
+/// A ball has moved onto another one without being listed: what a shadow must notice. Stock, which is not told either,
+/// notices it where it joins later.
 fn unlisted(shadow: Shadow) -> PbigBroadPhase {
     let mut world = World::with_gravity(glam::Vec3::ZERO);
     let bodies =
         [0.0, 10.0, 20.0].map(|x| world.add(World::dynamic(glam::Vec3::X * x), ColliderBuilder::ball(0.5)));
     let handles = bodies.map(|body| world.bodies[body].colliders()[0]);
-    let mut broad_phase = PbigBroadPhase::new().with_shadow(shadow);
+    let mut broad_phase = PbigBroadPhase::new();
+    if shadow == Shadow::Oracle {
+        broad_phase = broad_phase.with_shadow(shadow);
+    }
     world.step(&mut broad_phase);
     assert!(broad_phase.differences().is_empty());
     world.colliders[handles[0]].set_position(Isometry::translation(10.5, 0.0, 0.0));
+    if shadow == Shadow::Stock {
+        broad_phase = broad_phase.with_shadow(shadow);
+    }
     let World { params, colliders, bodies, .. } = &world;
     broad_phase.update(params, colliders, bodies, &handles[2..], &[], &mut Vec::new());
     broad_phase
@@ -251,6 +272,15 @@ fn a_shadow_reports_the_first_difference_and_writes_a_file_for_a_replay() {
     };
     let last = frames.frames.last().expect("frames");
     assert!((x(last) - 9.999).abs() < 1e-3, "the last frame is the one that failed: {}", x(last));
+}
+
+#[test]
+fn stock_alone_notices_a_contact_that_is_missing_also_when_it_joins_late() {
+    let broad_phase = unlisted(Shadow::Stock);
+    let faults: Vec<Fault> = broad_phase.differences().iter().map(|difference| difference.fault).collect();
+    assert_eq!(faults, [Fault::MissingContact]);
+    let file = broad_phase.differences()[0].replay.as_ref().expect("a folder was given");
+    std::fs::remove_file(file.as_ref().expect("a writable folder")).expect("the file is there");
 }
 
 #[test]

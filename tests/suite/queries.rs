@@ -152,3 +152,47 @@ fn several_threads_may_ask_at_once() {
     });
     assert!(answers[0].is_some() && answers.iter().all(|answer| *answer == answers[0]), "{answers:?}");
 }
+
+#[test]
+fn a_character_walks_the_same_way_with_either() {
+    use rapier3d::control::KinematicCharacterController;
+    let mut world = World::default();
+    world.colliders.insert(ColliderBuilder::cuboid(20.0, 0.5, 20.0));
+    for i in 1..30 {
+        let step = ColliderBuilder::cuboid(0.3, 0.05 * i as f32, 3.0);
+        world.colliders.insert(step.translation(vector![1.0 + 0.6 * i as f32, 0.5, 0.0]));
+    }
+    let mut both = Both { ours: PbigBroadPhase::new(), stock: DefaultBroadPhase::new() };
+    world.step(&mut both);
+    let controller = KinematicCharacterController::default();
+    let walk = |queries: &QueryPipeline<'_>| {
+        let mut at = Isometry::translation(0.0, 1.1, 0.0);
+        for _ in 0..200 {
+            let wanted = vector![0.05, -0.02, 0.01];
+            let moved = controller.move_shape(1.0 / 60.0, queries, &Ball::new(0.5), &at, wanted, |_| ());
+            at.translation.vector += moved.translation;
+        }
+        at.translation.vector
+    };
+    let filter = QueryFilter::default();
+    let (bodies, colliders) = (&world.bodies, &world.colliders);
+    let ours = walk(&both.ours.as_query_pipeline(&DefaultQueryDispatcher, bodies, colliders, filter));
+    let stock = walk(&both.stock.as_query_pipeline(&DefaultQueryDispatcher, bodies, colliders, filter));
+    assert!((ours - stock).norm() < 1e-3 && ours.x > 0.5, "{ours} {stock}");
+}
+
+#[test]
+fn queries_work_on_a_restored_and_on_a_cloned_broad_phase() {
+    let mut world = Scene::named("column").expect("the scene exists").build(100, 2);
+    let mut both = Both { ours: PbigBroadPhase::new(), stock: DefaultBroadPhase::new() };
+    (0..40).for_each(|_| world.step(&mut both));
+    let mut random = SmallRng::seed_from_u64(3);
+    assert!(compare(&world, &both, &mut random, 10) > 0);
+    let bytes = postcard::to_stdvec(&both.ours).expect("a snapshot");
+    for ours in [both.ours.clone(), postcard::from_bytes(&bytes).expect("what was saved")] {
+        both.ours = ours;
+        compare(&world, &both, &mut random, 20);
+    }
+    world.step(&mut both);
+    compare(&world, &both, &mut random, 20);
+}

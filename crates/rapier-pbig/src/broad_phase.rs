@@ -5,7 +5,7 @@ use crate::events::{HandleOrder, Outbox};
 use crate::proxy::{collision_aabb, filter_of};
 use crate::roll::Roll;
 use crate::scene_tree::SceneTree;
-use crate::stats::Kept;
+use crate::stats::{Kept, Totals};
 use pbig_core::{Aabb, BroadPhase as Finder, Config, Limits, ProxyFilter};
 use rapier3d::prelude::{
     BroadPhase, BroadPhasePairEvent, ColliderHandle, ColliderPair, ColliderSet, IntegrationParameters,
@@ -141,21 +141,16 @@ impl PbigBroadPhase {
         let contacts = narrow_phase.contact_pairs().map(|pair| (pair.collider1, pair.collider2));
         let intersections = narrow_phase.intersection_pairs().map(|(one, other, _)| (one, other));
         self.outbox.adopted = contacts.chain(intersections).map(|(a, b)| ColliderPair::new(a, b)).collect();
-        let all: Vec<ColliderHandle> = self.roll.handles().collect();
-        all.into_iter().for_each(|handle| self.forget(handle));
-        self.tree = SceneTree::default();
-        #[cfg(feature = "shadow")]
-        if let Some(checker) = &mut self.shadow {
-            checker.assume(self.outbox.adopted.iter().copied());
-        }
+        self.forget_all();
+        self.start_shadow_over();
     }
 
-    /// Pairs that rapier knows of.
+    /// Pairs that rapier knows of, but for adopted ones before the next update.
     pub fn pair_count(&self) -> usize {
         self.finder.pair_count()
     }
 
-    /// The pairs that rapier knows of, in no particular order.
+    /// The pairs that rapier knows of, in no particular order, but for adopted ones before the next update.
     pub fn pairs(&self) -> impl Iterator<Item = ColliderPair> {
         self.finder.pairs().map(|pair| self.outbox.pair(pair, &self.roll, |id| self.finder.degree(id)))
     }
@@ -190,6 +185,7 @@ impl PbigBroadPhase {
         let clock = Instant::now();
         self.compute_proxies(call, listed);
         let proxied = Instant::now();
+        let _span = tracing::debug_span!(target: "pbig", "set").entered();
         for (i, &handle) in listed.iter().enumerate() {
             match self.proxies[i] {
                 Proxy::Enabled(aabb, filter) => self.set(handle, aabb, filter),
@@ -230,16 +226,28 @@ impl PbigBroadPhase {
     }
 
     /// Rapier lists a collider that neither moves nor changes only once, and this broad phase was not there: it is
-    /// new beside a world restored from a snapshot, or the world has been replaced.
+    /// new beside a world restored from a snapshot, or the world has been replaced. Then nothing that is stored can
+    /// be trusted. (A pair that is added again does no harm.)
     fn rescan(&mut self, call: &Call<'_>) {
-        let gone = self.roll.handles().filter(|&handle| !call.colliders.contains(handle));
-        let gone: Vec<ColliderHandle> = gone.collect();
-        gone.into_iter().for_each(|handle| self.forget(handle));
-        let handles = call.colliders.iter().map(|(handle, _)| handle);
-        let missed: Vec<ColliderHandle> = handles.filter(|&handle| !self.roll.has(handle)).collect();
-        tracing::debug!("pbig: {} colliders that rapier has not listed", missed.len());
-        self.look_at(call, &missed);
-        self.kept.rescanned = true;
+        self.forget_all();
+        let all: Vec<ColliderHandle> = call.colliders.iter().map(|(handle, _)| handle).collect();
+        tracing::debug!("pbig: another world, all {} colliders are looked at", all.len());
+        self.look_at(call, &all);
+        self.kept.totals.rescans += 1;
+        self.start_shadow_over();
+    }
+
+    fn start_shadow_over(&mut self) {
+        #[cfg(feature = "shadow")]
+        if let Some(checker) = &mut self.shadow {
+            checker.start_over(self.outbox.adopted.iter().copied());
+        }
+    }
+
+    fn forget_all(&mut self) {
+        let all: Vec<ColliderHandle> = self.roll.handles().collect();
+        all.into_iter().for_each(|handle| self.forget(handle));
+        self.tree = SceneTree::default();
     }
 
     fn find_and_send(&mut self, events: &mut Vec<BroadPhasePairEvent>) {
@@ -247,13 +255,17 @@ impl PbigBroadPhase {
             self.tree.note(self.finder.changes(), self.roll.len());
         }
         if let Err(error) = self.finder.update() {
+            self.kept.totals.failures += 1;
             tracing::error!("pbig: no pairs in this update: {error}");
             return;
         }
         let clock = Instant::now();
+        let _span = tracing::debug_span!(target: "pbig", "events").entered();
         let sent = self.outbox.send(&self.finder, &self.roll, events);
         self.kept.events = clock.elapsed();
         (self.kept.added, self.kept.deleted) = sent;
+        self.kept.totals.added += sent.0 as u64;
+        self.kept.totals.deleted += sent.1 as u64;
     }
 }
 
@@ -283,8 +295,8 @@ impl BroadPhase for PbigBroadPhase {
         let (modified, removed) = (modified_colliders, removed_colliders);
         let _span = tracing::debug_span!(target: "pbig", "update", modified = modified.len()).entered();
         let call = Call { params, colliders, bodies, modified, removed };
-        let updates = self.kept.updates + 1;
-        self.kept = Kept { updates, modified: modified.len(), removed: removed.len(), ..Kept::default() };
+        let totals = Totals { updates: self.kept.totals.updates + 1, ..self.kept.totals };
+        self.kept = Kept { modified: modified.len(), removed: removed.len(), totals, ..Kept::default() };
         self.take_in(&call);
         #[cfg(feature = "shadow")]
         let before = events.len();
@@ -293,5 +305,35 @@ impl BroadPhase for PbigBroadPhase {
         if let Some(checker) = &mut self.shadow {
             checker.watch(&call, &events[before..]);
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rapier3d::prelude::{ColliderBuilder, RigidBodyBuilder, nalgebra, vector};
+
+    #[test]
+    fn an_update_that_fails_sends_nothing_and_the_next_one_sees_its_changes() {
+        let (mut bodies, mut colliders) = (RigidBodySet::new(), ColliderSet::new());
+        let mut ball = |x: f32| {
+            let body = bodies.insert(RigidBodyBuilder::dynamic().translation(vector![x, 0.0, 0.0]));
+            colliders.insert_with_parent(ColliderBuilder::ball(0.5), body, &mut bodies)
+        };
+        let handles: Vec<ColliderHandle> = (0..12).map(|i| ball(0.1 * i as f32)).collect();
+        let limits = Limits { max_pairs: 3, ..Limits::UNLIMITED };
+        let finder = Finder::new(Config { limits, ..PbigBroadPhase::CONFIG }).expect("a margin");
+        let mut broad_phase = PbigBroadPhase::around(finder, 0.01);
+        let params = IntegrationParameters::default();
+        let mut update = |modified: &[ColliderHandle], removed: &[ColliderHandle]| {
+            let mut events = Vec::new();
+            broad_phase.update(&params, &colliders, &bodies, modified, removed, &mut events);
+            (events.len(), broad_phase.stats().totals.failures, broad_phase.pair_count())
+        };
+        assert_eq!(update(&handles, &[]), (0, 1, 0), "66 pairs");
+        assert_eq!(update(&[], &[]), (0, 2, 0), "still");
+        // Disabled, as far as a broad phase is told.
+        assert_eq!(update(&[], &handles[3..]), (3, 2, 3));
+        assert_eq!(update(&[], &[]), (0, 2, 3));
     }
 }

@@ -4,6 +4,7 @@ use rapier3d::prelude::{ColliderHandle, ColliderSet, IntegrationParameters, Rigi
 
 /// The arguments of one call of rapier's `BroadPhase::update`.
 #[derive(Clone, Copy)]
+#[cfg_attr(not(feature = "shadow"), expect(unreachable_pub, reason = "public in `shadow`"))]
 pub struct Call<'a> {
     /// Step length, length unit, prediction distance.
     pub params: &'a IntegrationParameters,

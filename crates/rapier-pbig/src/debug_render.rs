@@ -9,8 +9,8 @@ use rapier3d::prelude::{Collider, ColliderHandle, ColliderSet, Isometry, Point, 
 /// What is drawn.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct DebugRenderParts {
-    /// The stored boxes, with their margins. Their hue tells the level: green for the smallest boxes, then blue,
-    /// violet, ...; grey for those that are tested against all others, or that no grid holds.
+    /// The stored boxes, with their margins. Their hue tells the level of their grid: green, blue, violet, ...,
+    /// each grid of boxes at rest and of boxes that have moved from the start; grey for those that are tested against all others, or that no grid holds.
     pub fat_boxes: bool,
     /// The occupied cells of the grids. Their lightness tells how many boxes lie in one: white with eight or more.
     pub cells: bool,

@@ -61,9 +61,11 @@ pub use broad_phase::PbigBroadPhase;
 #[cfg(feature = "debug-render")]
 pub use debug_render::DebugRenderParts;
 pub use events::HandleOrder;
+/// The finder, for the types of its settings and filters.
+pub use pbig_core;
 #[cfg(feature = "gpu")]
 pub use pbig_core::GpuFinder;
 pub use pbig_core::{Backend, Config, Report, Strategy};
 pub use proxy::{collision_aabb, filter_of};
-pub use stats::Stats;
+pub use stats::{Stats, Totals};
 pub use why::Why;

@@ -17,6 +17,7 @@ pub(crate) struct Roll {
 }
 
 impl Roll {
+    #[cfg(any(test, feature = "serde"))]
     pub(crate) fn of_generations(generations: Vec<u32>) -> Self {
         let count = generations.iter().filter(|generation| **generation != ABSENT).count();
         Self { generations, count }

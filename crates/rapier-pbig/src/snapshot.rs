@@ -3,7 +3,7 @@
 use crate::PbigBroadPhase;
 use crate::events::HandleOrder;
 use crate::roll::Roll;
-use pbig_core::BroadPhase as Finder;
+use pbig_core::{BroadPhase as Finder, Limits};
 use rapier3d::prelude::{ColliderHandle, ColliderPair};
 use serde::de::Error as _;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
@@ -53,6 +53,9 @@ impl<'de> Deserialize<'de> for PbigBroadPhase {
         }
         if !(relative_margin >= 0.0 && relative_margin.is_finite()) {
             return Err(D::Error::custom(format!("snapshot: margin {relative_margin} is not a length")));
+        }
+        if finder.config().limits != Limits::UNLIMITED {
+            return Err(D::Error::custom("snapshot: a broad phase for rapier has no limits"));
         }
         let mut restored = Self::around(finder, relative_margin).with_handle_order(order);
         restored.roll = roll;

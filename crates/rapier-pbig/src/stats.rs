@@ -5,23 +5,21 @@ use pbig_core::Report;
 use std::time::Duration;
 
 /// What the last update did. Rapier makes two in each step: the first sees what the app changed, the second
-/// what the step moved.
+/// what the step moved. So after a step these are the numbers of the second; [`Totals`] count both.
 #[derive(Clone, Copy, Debug)]
 pub struct Stats<'a> {
-    /// Updates so far, this one included.
-    pub updates: u64,
     /// Colliders on the roll, disabled ones included.
     pub colliders: usize,
     /// Colliders that rapier listed as modified.
     pub modified: usize,
     /// Colliders that rapier listed as removed or disabled.
     pub removed: usize,
-    /// Whether all colliders were looked at, because the world was not the one known so far.
-    pub rescanned: bool,
     /// `AddPair` events sent.
     pub added: usize,
     /// `DeletePair` events sent.
     pub deleted: usize,
+    /// The sums over all updates.
+    pub totals: Totals,
     /// Time for the boxes and filters of the modified colliders: reading colliders and bodies.
     pub proxies: Duration,
     /// Time for comparing those with what is stored.
@@ -32,22 +30,36 @@ pub struct Stats<'a> {
     pub report: &'a Report,
 }
 
+/// Sums over all updates so far.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Totals {
+    /// Updates.
+    pub updates: u64,
+    /// Those that looked at all colliders, because the world was not the one known so far.
+    pub rescans: u64,
+    /// Those that failed: `tracing` has the error, and the next one sees the same changes again.
+    pub failures: u64,
+    /// `AddPair` events.
+    pub added: u64,
+    /// `DeletePair` events.
+    pub deleted: u64,
+}
+
 /// The part of [`Stats`] that is kept.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Kept {
-    pub(crate) updates: u64,
     pub(crate) modified: usize,
     pub(crate) removed: usize,
-    pub(crate) rescanned: bool,
     pub(crate) added: usize,
     pub(crate) deleted: usize,
+    pub(crate) totals: Totals,
     pub(crate) proxies: Duration,
     pub(crate) set: Duration,
     pub(crate) events: Duration,
 }
 
 impl Stats<'_> {
-    /// The time of the whole update.
+    /// The time of all stages: nearly all of the update.
     pub fn total(&self) -> Duration {
         self.proxies + self.set + self.report.stages.total() + self.events
     }
@@ -56,20 +68,8 @@ impl Stats<'_> {
 impl PbigBroadPhase {
     /// What the last update did.
     pub fn stats(&self) -> Stats<'_> {
-        let Kept { updates, modified, removed, rescanned, added, deleted, proxies, set, events } = self.kept;
+        let Kept { modified, removed, added, deleted, totals, proxies, set, events } = self.kept;
         let (colliders, report) = (self.roll.len(), self.finder.report());
-        Stats {
-            updates,
-            colliders,
-            modified,
-            removed,
-            rescanned,
-            added,
-            deleted,
-            proxies,
-            set,
-            events,
-            report,
-        }
+        Stats { colliders, modified, removed, added, deleted, totals, proxies, set, events, report }
     }
 }

@@ -5,8 +5,7 @@ use pbig_core::{Pair, ProxyFilter};
 use rapier3d::prelude::ColliderHandle;
 use std::fmt;
 
-/// Whether a pair of colliders is reported and, if not, the first test that ended it, in the order in
-/// which they are listed here. Its `Display` says it in words.
+/// Whether a pair of colliders is reported and, if not, the first test that ended it. Its `Display` says it in words.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Why {
     /// The narrow phase has been told of the pair. Whether the shapes touch is its business.
@@ -18,7 +17,7 @@ pub enum Why {
     Unknown(ColliderHandle),
     /// The collider or its body is disabled.
     Disabled(ColliderHandle),
-    /// The box of this collider has a NaN.
+    /// The box of this collider has a NaN, or a lower corner above the upper one.
     InvalidBox(ColliderHandle),
     /// The boxes, with the margins, are apart.
     Apart {
@@ -117,7 +116,7 @@ impl fmt::Display for Why {
                 write!(f, "collider {:?}, or its body, is disabled", handle.into_raw_parts())
             }
             Self::InvalidBox(handle) => {
-                write!(f, "the box of collider {:?} has a NaN", handle.into_raw_parts())
+                write!(f, "the box of collider {:?} is invalid: a NaN, perhaps", handle.into_raw_parts())
             }
             Self::Apart { axis, gap } => {
                 write!(f, "the boxes are {gap:.3} apart on the {} axis", ["x", "y", "z"][axis % 3])

@@ -321,13 +321,17 @@ fn on_random_ops(cases: u32, test: impl Fn(&[Op]) -> Result<Outcome, String>) ->
 
 #[test]
 fn random_worlds_agree_with_stock_and_the_oracle() {
-    let [(_, cpu), _] = backends();
-    on_random_ops(1300, |ops| run(ops, cpu, Plant::Nothing)).assert_that_much_happened();
+    let [(_, cpu), (_, grid), _] = backends();
+    let [on_cpu, on_grid] =
+        [cpu, grid].map(|config| on_random_ops(700, |ops| run(ops, config, Plant::Nothing)));
+    let tally = on_cpu.plus(on_grid);
+    tally.assert_that_much_happened();
+    assert!(tally.ops >= 100_000 || std::env::var_os("PROPTEST_CASES").is_some(), "{tally:?}");
 }
 
 #[test]
 fn random_worlds_on_a_gpu_agree_too_and_have_the_bits_of_the_cpu() {
-    let [(_, cpu), (_, gpu)] = backends();
+    let [(_, cpu), _, (_, gpu)] = backends();
     let tally = on_random_ops(20, |ops| {
         let on_gpu = run(ops, gpu, Plant::Nothing)?;
         on_gpu.compare(&run(ops, cpu, Plant::Nothing)?)?;
@@ -338,7 +342,7 @@ fn random_worlds_on_a_gpu_agree_too_and_have_the_bits_of_the_cpu() {
 
 #[test]
 fn a_snapshot_anywhere_continues_bit_identically() {
-    let [(_, cpu), _] = backends();
+    let [(_, cpu), ..] = backends();
     let tally = on_random_ops(60, |ops| {
         // A fresh broad phase has other fat boxes than one that was there all along, so other pairs.
         let saved = |op: &Op| if matches!(op, Op::Fresh) { Op::Snapshot } else { *op };
@@ -353,7 +357,7 @@ fn a_snapshot_anywhere_continues_bit_identically() {
 
 #[test]
 fn planted_faults_are_noticed_and_shrink_to_a_few_operations() {
-    let [(_, cpu), _] = backends();
+    let [(_, cpu), ..] = backends();
     for plant in [Plant::RoomForTwo, Plant::OnlyMoved, Plant::Forgets] {
         let failing = |ops: &[Op]| run(ops, cpu, plant).map(|_| ());
         let (why, ops) = try_random_ops(100, &failing).expect_err("the fault is noticed");

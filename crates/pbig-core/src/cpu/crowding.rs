@@ -2,7 +2,7 @@
 //! their own for boxes that may not pair with each other ([`Camps`]), where those do not.
 
 use super::map::Map;
-use crate::plan::{Camps, OPEN, Plan, Summary, spread_evenly};
+use crate::plan::{Camps, Plan, Summary, spread_evenly};
 use crate::report::{StageTimes, lap, stage};
 use crate::{Aabb, Config, ProxyFilter};
 use std::time::Instant;
@@ -36,14 +36,13 @@ impl<'a> Set<'a> {
     /// The camps among the boxes, as far as a sample shows them.
     fn camps(&self) -> Camps {
         let Some(filters) = self.filters else { return Camps::default() };
-        let sample = spread_evenly(self.len(), SAMPLE);
-        let each = self.len().div_ceil(SAMPLE) as u32;
-        Camps::of(sample.map(|i| &filters[self.id(i) as usize]), each)
+        let sample = spread_evenly(self.len(), SAMPLE).map(|i| self.id(i) as usize);
+        let valid = sample.filter(|&id| self.boxes[id].is_valid());
+        Camps::of(valid.map(|id| &filters[id]), self.len().div_ceil(SAMPLE) as u32)
     }
 }
 
-/// Filters that are looked at for camps. A camp that a sample misses is too small to matter: 2048 of any number of
-/// boxes take 0.1 ms.
+/// Filters that are looked at for camps, 0.1 ms: a camp of which these have few is too small to matter.
 const SAMPLE: usize = 2048;
 
 /// Cells smaller than an even spread of boxes would ask for, where clusters make them too full.
@@ -60,6 +59,10 @@ pub(super) struct Crowding {
 /// spread has half a one. Doubling a cell gathers eight times as many boxes, so that cells grow
 /// again only when they are certain to stay below: the choice does not flap.
 const CROWDED: f32 = 12.0;
+
+/// Other entries in a box's cell at which camps pay: testing half of 48 boxes that overlap takes as long as searching
+/// another grid.
+const MOBBED: f32 = 4.0 * CROWDED;
 
 /// Where dividing the cells ends.
 const FINEST: f32 = 1e-12;
@@ -78,18 +81,19 @@ impl Map {
             self.settle_camps(set, times);
         }
         let plan = self.build_uncrowded(set, config, times);
-        if self.has_camps() || self.crowd(|_| true) <= CROWDED || !self.settle_camps(set, times) {
+        if self.has_camps() || !self.settle_camps(set, times) {
             return plan;
         }
         self.build_uncrowded(set, config, times)
     }
 
-    /// Divides the boxes into camps while those are crowded, and no longer; true when there are some.
+    /// Divides the boxes into camps where they crowd, and as long as they do; true when there are some.
     fn settle_camps(&mut self, set: &Set<'_>, times: &mut StageTimes) -> bool {
         let mut clock = Instant::now();
-        // A crowd that has dispersed: half, so that it does not flap.
-        let crowded = self.crowd(|_| true) > if self.has_camps() { CROWDED / 2.0 } else { CROWDED };
         let had = self.has_camps();
+        // Of a crowd each camp has a part.
+        let crowd: f32 = self.grids.iter().map(|grid| grid.crowd).sum();
+        let crowded = crowd > if had { MOBBED / 2.0 } else { MOBBED };
         self.camps = if crowded { set.camps() } else { Camps::default() };
         if self.has_camps() != had {
             self.crowding = Crowding::default();
@@ -115,7 +119,7 @@ impl Map {
         let mut tried: Vec<(f32, f32)> = Vec::new();
         loop {
             let plan = build(self);
-            let crowd = self.crowd(|camp| camp == OPEN);
+            let crowd = self.crowd();
             tried.push((self.crowding.factor, crowd));
             let limit = CROWDED.max(1.5 * self.crowding.accepted);
             if crowd > limit && divisible(&plan) && self.crowding.factor > FINEST {
@@ -132,21 +136,26 @@ impl Map {
     }
 
     /// One plan for all boxes, or one for each camp, put together.
-    fn plan(&self, set: &Set<'_>, config: &Config) -> Plan {
+    fn plan(&mut self, set: &Set<'_>, config: &Config) -> Plan {
         let factor = self.crowding.factor;
+        self.camp_of.clear();
         let (Some(filters), true) = (set.filters, self.has_camps()) else {
             return Plan::new(set.summary, config, factor);
         };
-        let mut camps = vec![Vec::new(); self.camps.count()];
-        set.ids().for_each(|id| camps[self.camps.camp(&filters[id as usize]) as usize].push(id));
-        let summaries = camps.iter().map(|ids| Summary::of(set.boxes, Some(ids))).collect::<Vec<_>>();
+        let camps = &self.camps;
+        self.camp_of.extend(set.ids().map(|id| camps.camp(&filters[id as usize])));
+        let members = |camp: u8| -> Vec<u32> {
+            let of_camp = set.ids().zip(&self.camp_of).filter(|(_, of)| **of == camp);
+            of_camp.map(|(id, _)| id).collect()
+        };
+        let summary = |camp: usize| Summary::of(set.boxes, Some(&members(camp as u8)));
+        let summaries: Vec<Summary> = (0..camps.count()).map(summary).collect();
         Plan::of_camps(&summaries, config, factor)
     }
 
-    /// How full the fullest level is, among some camps.
-    fn crowd(&self, counts: impl Fn(u8) -> bool) -> f32 {
-        let grids = self.grids.iter().filter(|grid| counts(grid.camp));
-        grids.map(|grid| grid.crowd).fold(0.0, f32::max)
+    /// How full the fullest level is.
+    fn crowd(&self) -> f32 {
+        self.grids.iter().map(|grid| grid.crowd).fold(0.0, f32::max)
     }
 
     pub(super) fn has_camps(&self) -> bool {

@@ -191,6 +191,8 @@ pub(crate) struct Map {
     sort: Sort,
     pub(super) crowding: Crowding,
     pub(super) camps: Camps,
+    /// Of the boxes of the set, in their order; empty without camps.
+    pub(super) camp_of: Vec<u8>,
     /// How often boxes were sorted.
     #[cfg(test)]
     pub(super) builds: usize,
@@ -205,6 +207,7 @@ impl Map {
             sort: Sort::default(),
             crowding: Crowding::default(),
             camps: Camps::default(),
+            camp_of: vec![],
             #[cfg(test)]
             builds: 0,
         }
@@ -230,14 +233,13 @@ impl Map {
     fn distribute(&mut self, plan: &Plan, set: &Set<'_>) {
         let levels: Vec<LevelOfClass> =
             (0..self.camps.count()).map(|camp| LevelOfClass::new(plan, camp as u8)).collect();
-        let filters = set.filters.filter(|_| self.has_camps());
         self.list.clear();
         self.members.resize(plan.levels.len().max(self.members.len()), Vec::new());
         self.members.iter_mut().for_each(Vec::clear);
-        for id in set.ids() {
+        for (i, id) in set.ids().enumerate() {
             let aabb = set.boxes[id as usize];
             if aabb.is_valid() {
-                let camp = filters.map_or(OPEN, |filters| self.camps.camp(&filters[id as usize]));
+                let camp = self.camp_of.get(i).copied().unwrap_or(OPEN);
                 match levels[camp as usize].of(&aabb) {
                     Some(level) => self.members[level].push(id),
                     None => self.list.push(&aabb, id),

@@ -12,6 +12,9 @@ use std::collections::HashMap;
 /// Fewer boxes than this are no camp: searching them costs less than another grid.
 const FEWEST: u32 = 64;
 
+/// Fewer filters of a sample than this are chance.
+const FEWEST_SEEN: u32 = 8;
+
 /// Most classes that are looked at, the largest ones.
 const CLASSES: usize = 32;
 
@@ -42,14 +45,15 @@ impl Camps {
             *classes.entry(class_of(filter)).or_insert(0u32) += each;
             *bodies.entry((filter.body, class_of(filter))).or_insert(0u32) += each;
         }
-        let classes = first_camp(largest(classes, CLASSES));
+        let fewest = FEWEST.max(FEWEST_SEEN * each);
+        let classes = first_camp(largest(classes, CLASSES), fewest);
         let mut by_body: HashMap<u32, u32> = HashMap::new();
         for ((body, class), count) in bodies {
             if body != ProxyFilter::NO_BODY && !classes.contains(&class) {
                 *by_body.entry(body).or_insert(0) += count;
             }
         }
-        let bodies = largest(by_body, BODIES).into_iter().filter(|(_, count)| *count >= FEWEST);
+        let bodies = largest(by_body, BODIES).into_iter().filter(|(_, count)| *count >= fewest);
         Self { classes, bodies: bodies.map(|(body, _)| body).collect() }
     }
 
@@ -80,7 +84,7 @@ fn largest<K: Copy + Ord>(counts: HashMap<K, u32>, most: usize) -> Vec<(K, u32)>
 }
 
 /// Classes that exclude themselves and each other, the largest first; none when they are few.
-fn first_camp(classes: Vec<(ProxyFilter, u32)>) -> Vec<ProxyFilter> {
+fn first_camp(classes: Vec<(ProxyFilter, u32)>, fewest: u32) -> Vec<ProxyFilter> {
     let (mut camp, mut boxes): (Vec<ProxyFilter>, u32) = (Vec::new(), 0);
     for (class, count) in classes {
         if !class.allows(&class) && camp.iter().all(|other| !class.allows(other)) {
@@ -88,7 +92,7 @@ fn first_camp(classes: Vec<(ProxyFilter, u32)>) -> Vec<ProxyFilter> {
             boxes += count;
         }
     }
-    if boxes < FEWEST { Vec::new() } else { camp }
+    if boxes < fewest { Vec::new() } else { camp }
 }
 
 #[cfg(test)]

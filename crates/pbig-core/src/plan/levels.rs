@@ -33,7 +33,7 @@ pub struct LevelPlan {
 /// A cell of a grid with the boxes whose lower corners lie in it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct OccupiedCell {
-    /// Which level it belongs to, smallest boxes first.
+    /// Which level of its grid it belongs to, from 0. The boxes at rest and those that have moved have levels each.
     pub level: u32,
     /// Where it is.
     pub aabb: Aabb,
@@ -76,15 +76,27 @@ mod cost {
 /// Boxes wanted in a cell. The measured optimum is flat from 0.25 to 1.
 const PER_CELL: f64 = 0.5;
 
-/// Splits the boxes into levels and a number of swept boxes, at least cost. `others` are boxes in levels of their
-/// own, which these are to be tested against, too.
+/// Who else there is.
+#[derive(Clone, Copy)]
+pub(super) struct Company {
+    /// Boxes in levels of their own, which these are to be tested against, too.
+    pub(super) others: u32,
+    /// Whether these are tested against each other.
+    pub(super) pairs: bool,
+}
+
+impl Company {
+    pub(super) const NONE: Self = Self { others: 0, pairs: true };
+}
+
+/// Splits the boxes into levels and a number of swept boxes, at least cost.
 pub(super) fn choose(
     summary: &Summary,
     crowding: f32,
     strategy: Strategy,
-    others: u32,
+    company: Company,
 ) -> (Vec<LevelPlan>, u32) {
-    let world = World::new(summary, crowding, others);
+    let world = World::new(summary, crowding, company);
     let groups = groups(summary);
     let steps = split(&world, &groups, strategy);
     let (levels, in_levels) = assemble(&world, &groups, steps);
@@ -173,16 +185,18 @@ struct World {
     range: [f32; 3],
     crowding: f32,
     others: f64,
+    pairs: f64,
 }
 
 impl World {
-    fn new(summary: &Summary, crowding: f32, others: u32) -> Self {
+    fn new(summary: &Summary, crowding: f32, company: Company) -> Self {
         let ranges: [(f32, f32); 3] = std::array::from_fn(|k| summary.range(k));
         Self {
             low: ranges.map(|r| r.0.clamp(f32::MIN, f32::MAX)),
             range: ranges.map(|r| (r.1 - r.0).clamp(0.0, f32::MAX)),
             crowding,
-            others: f64::from(others),
+            others: f64::from(company.others),
+            pairs: f64::from(u8::from(company.pairs)),
         }
     }
 
@@ -193,12 +207,13 @@ impl World {
     }
 
     fn grid_cost(&self, level: &[Group], smaller: &[Group]) -> f64 {
-        let own = cost::BOX + 0.5 * cost::CHECK * self.candidates(level, level);
+        let own = cost::BOX + 0.5 * cost::CHECK * self.pairs * self.candidates(level, level);
         let visit = cost::VISIT + cost::CHECK * self.candidates(smaller, level);
         let others = cost::VISIT * self.others.min(f64::from(count(level)));
         cost::LEVEL + f64::from(count(level)) * own + f64::from(count(smaller)) * visit + others
     }
 
+    /// A list is tested against everything, itself included, whatever may pair.
     fn sweep_cost(&self, swept: &[Group], smaller: &[Group]) -> f64 {
         let n = f64::from(count(swept));
         cost::SWEEP * n * (f64::from(count(smaller)) + 0.5 * n + self.others)

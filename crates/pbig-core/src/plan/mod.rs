@@ -12,6 +12,7 @@ mod summary;
 pub(crate) use camps::{Camps, OPEN};
 #[cfg(feature = "gpu")]
 pub use gpu::GpuPlan;
+use levels::Company;
 pub use levels::{LevelPlan, OccupiedCell};
 pub use pbig::{PbigPlan, density_cell, pbig_cell, pbig_objective};
 pub use summary::{SizeClass, Summary};
@@ -98,7 +99,7 @@ impl Plan {
             },
             Strategy::Auto if boxes < config.brute_below => brute,
             Strategy::Auto | Strategy::Grid => {
-                let (levels, swept) = levels::choose(summary, crowding, config.strategy, 0);
+                let (levels, swept) = levels::choose(summary, crowding, config.strategy, Company::NONE);
                 let chosen = if levels.is_empty() { Chosen::Brute } else { Chosen::Grid };
                 Self { chosen, levels, swept, boxes, ..Self::default() }
             }
@@ -112,9 +113,8 @@ impl Plan {
         let boxes = summaries.iter().map(|summary| summary.valid).sum();
         let mut plan = Self { chosen: Chosen::Grid, boxes, ..Self::default() };
         for (camp, summary) in summaries.iter().enumerate() {
-            let crowding = if camp == usize::from(OPEN) { crowding } else { 1.0 };
-            let others = boxes - summary.valid;
-            let (levels, swept) = levels::choose(summary, crowding, config.strategy, others);
+            let company = Company { others: boxes - summary.valid, pairs: camp == usize::from(OPEN) };
+            let (levels, swept) = levels::choose(summary, crowding, config.strategy, company);
             plan.levels.extend(levels.into_iter().map(|level| LevelPlan { camp: camp as u8, ..level }));
             plan.swept += swept;
         }

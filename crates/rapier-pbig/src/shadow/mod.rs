@@ -6,8 +6,7 @@
 //! the pairs that stock reports, and the rule that every pair has a reason. It shares no code with the
 //! broad phase that it checks but the definition of overlap.
 //!
-//! What it cannot see: a pair that only soft CCD would need (its boxes are those of the present pose),
-//! and the order of events. Calls in which nothing is modified are followed but not compared. It takes the present
+//! What it cannot see: a pair that only soft CCD would need where its distance cuts off the way, and the order of events. Calls in which nothing is modified are followed but not compared. It takes the present
 //! prediction distance, length unit and contact skin for all colliders, where a broad phase learns of those of listed ones
 //! only: an app that changes these should touch all colliders, or the checker may see pairs missing that rapier's own broad
 //! phase misses too.
@@ -56,7 +55,8 @@ pub enum Shadow {
 impl PbigBroadPhase {
     /// Compares every update with this; a second call adds the other one. The first difference is kept in
     /// [`PbigBroadPhase::differences`], goes to `tracing` as an error, and the boxes of the calls up to it into a file in
-    /// the system's folder for temporary files, for `pbig replay`.
+    /// the system's folder for temporary files, for `pbig replay`. (Boxes alone: `pbig replay` knows no filters, and its
+    /// `--margin` is 0 unless told.)
     ///
     /// For tests, and for an app in which something seems to be missed. See [`Shadow`] for what it costs.
     ///
@@ -72,14 +72,20 @@ impl PbigBroadPhase {
     /// assert!(broad_phase.differences().is_empty(), "{}", broad_phase.differences()[0]);
     /// ```
     pub fn with_shadow(mut self, shadow: Shadow) -> Self {
-        let (margin, known): (_, Vec<_>) = (self.relative_margin, self.pairs().collect());
+        let adopted = self.outbox.adopted.iter().copied();
+        let (margin, known): (_, Vec<_>) = (self.relative_margin, self.pairs().chain(adopted).collect());
         let checker = self.shadow.get_or_insert_with(|| {
             let mut checker = Checker::new(margin).with_replays_in(std::env::temp_dir());
-            checker.assume(known);
+            checker.start_over(known);
             Box::new(checker)
         });
         checker.add(shadow);
         self
+    }
+
+    /// The shadow, if there is one: what it has compared.
+    pub fn shadow(&self) -> Option<&Checker> {
+        self.shadow.as_deref()
     }
 
     /// What the shadow found wrong so far, oldest first; nothing without one.
@@ -97,7 +103,7 @@ const KEPT: usize = 1000;
 /// Watches the calls and events of a broad phase.
 #[derive(Clone, Default)]
 pub struct Checker {
-    /// Everything wrong so far, oldest first, at most a thousand.
+    /// Everything wrong so far, each once, oldest first, at most a thousand.
     pub differences: Vec<Difference>,
     /// Boxes without margin by collider index, the last few calls.
     pub frames: VecDeque<Vec<Aabb>>,
@@ -117,6 +123,8 @@ pub struct Checker {
     calls: usize,
     /// Calls in which something was modified.
     comparable: usize,
+    /// Whether this is another world than before.
+    fresh: bool,
 }
 
 impl Checker {
@@ -136,7 +144,7 @@ impl Checker {
     pub fn add(&mut self, shadow: Shadow) {
         match shadow {
             Shadow::Oracle => self.oracle = true,
-            Shadow::Stock => self.stock = Some(Stock::default()),
+            Shadow::Stock => _ = self.stock.get_or_insert_default(),
         }
     }
 
@@ -150,9 +158,14 @@ impl Checker {
         Self { folder: Some(folder), ..self }
     }
 
-    /// Takes these for the pairs that the narrow phase has.
-    pub fn assume(&mut self, pairs: impl IntoIterator<Item = ColliderPair>) {
+    /// Goes on beside another world, or one that is not new: takes these for the pairs that the narrow phase has, and
+    /// shows stock all colliders in the next call.
+    pub fn start_over(&mut self, pairs: impl IntoIterator<Item = ColliderPair>) {
         self.known = Followed::of(pairs);
+        self.fresh = true;
+        if let Some(stock) = &mut self.stock {
+            *stock = Stock::default();
+        }
     }
 
     /// Whether stock is (still) compared with: it is not after it has panicked.
@@ -162,7 +175,7 @@ impl Checker {
 
     /// Looks at a call that the broad phase has just answered with `events`.
     pub fn watch(&mut self, call: &Call<'_>, events: &[BroadPhasePairEvent]) {
-        let scene = SceneView { params: call.params, colliders: call.colliders, bodies: call.bodies };
+        let scene = SceneView::new(call);
         let mut faults = Vec::new();
         self.known.purge(call.removed);
         self.known.follow(events, |fault, pair| faults.push((fault, pair)));
@@ -170,7 +183,8 @@ impl Checker {
             stock.update(call);
         }
         // Where nothing was modified, nothing but pairs of removed colliders may have changed.
-        if !call.modified.is_empty() {
+        let fresh = std::mem::take(&mut self.fresh);
+        if fresh || !call.modified.is_empty() || !events.is_empty() {
             self.keep_frame(&scene);
             if self.comparable.is_multiple_of(self.every.max(1)) {
                 self.compare(&scene, &mut faults);
@@ -193,7 +207,8 @@ impl Checker {
     }
 
     fn note(&mut self, fault: Fault, pair: HandlePair, scene: &SceneView<'_>) {
-        if self.differences.len() < KEPT {
+        let noted = |one: &Difference| (one.fault, one.pair) == (fault, pair);
+        if self.differences.len() < KEPT && !self.differences.iter().any(noted) {
             let sides = [pair.0, pair.1].map(|handle| scene.side(handle));
             self.differences.push(Difference { call: self.calls, fault, pair, sides, replay: None });
         }

@@ -1,27 +1,48 @@
 //! The world as a broad phase sees it, through rapier's own functions.
 
-use super::{HandlePair, Side, ordered};
+use super::{Call, HandlePair, Side, ordered};
 use pbig_core::{Aabb, oracle};
+use rapier3d::parry::bounding_volume::BoundingVolume;
 use rapier3d::parry::query::{contact, distance};
 use rapier3d::prelude::*;
 use std::collections::HashSet;
 
-#[derive(Clone, Copy)]
 pub(super) struct SceneView<'a> {
     pub(super) params: &'a IntegrationParameters,
     pub(super) colliders: &'a ColliderSet,
     pub(super) bodies: &'a RigidBodySet,
+    listed: HashSet<ColliderHandle>,
 }
 
-impl SceneView<'_> {
+impl<'a> SceneView<'a> {
+    pub(super) fn new(call: &Call<'a>) -> Self {
+        let Call { params, colliders, bodies, modified, .. } = *call;
+        Self { params, colliders, bodies, listed: modified.iter().copied().collect() }
+    }
+
     fn enabled(&self, handle: ColliderHandle) -> Option<&Collider> {
         self.colliders.get(handle).filter(|collider| collider.is_enabled())
     }
 
     fn aabb(&self, handle: ColliderHandle) -> Option<Aabb> {
         let collider = self.enabled(handle)?;
-        let aabb = collider.compute_collision_aabb(self.params.prediction_distance() / 2.0);
+        let reach = self.params.prediction_distance() / 2.0;
+        let mut aabb = collider.compute_collision_aabb(reach);
+        if let Some(predicted) = self.predicted(collider).filter(|_| self.listed.contains(&handle)) {
+            let then = collider.shape().compute_aabb(&predicted).loosened(collider.contact_skin() + reach);
+            aabb.merge(&then);
+        }
         Some(Aabb::new(aabb.mins.coords.into(), aabb.maxs.coords.into()))
+    }
+
+    /// Where soft CCD expects a collider, which a broad phase learns when that is listed, if that is within its distance: beyond, rapier cuts off the way in private.
+    fn predicted(&self, collider: &Collider) -> Option<Isometry<Real>> {
+        let body = self.bodies.get(collider.parent()?)?;
+        let predicted = body.predict_position_using_velocity_and_forces(self.params.dt);
+        let way = predicted * body.local_center_of_mass() - body.position() * body.local_center_of_mass();
+        // A little less: the two are computed in different ways.
+        let within = way.norm() > 0.0 && way.norm() < 0.999 * body.soft_ccd_prediction();
+        within.then_some(predicted * collider.position_wrt_parent()?)
     }
 
     /// A collider as a difference shows it.
@@ -125,7 +146,9 @@ pub(super) mod tests {
     fn with_scene<T>(apart: f32, look: impl Fn(&SceneView<'_>, HandlePair) -> T) -> T {
         let (colliders, pair) = balls(apart);
         let (params, bodies) = (IntegrationParameters::default(), RigidBodySet::new());
-        look(&SceneView { params: &params, colliders: &colliders, bodies: &bodies }, pair)
+        let call =
+            Call { params: &params, colliders: &colliders, bodies: &bodies, modified: &[], removed: &[] };
+        look(&SceneView::new(&call), pair)
     }
 
     #[test]

@@ -12,6 +12,8 @@ pub(super) struct Stock {
     pub(super) known: Followed,
     /// It is of no further use then.
     pub(super) panicked: bool,
+    /// Whether it has seen the world.
+    started: bool,
 }
 
 impl Stock {
@@ -24,7 +26,13 @@ impl Stock {
         let mut events = Vec::new();
         let Call { params, colliders, bodies, modified, removed } = *call;
         let broad_phase = &mut self.broad_phase;
-        let update = || broad_phase.update(params, colliders, bodies, modified, removed, &mut events);
+        let first = !std::mem::replace(&mut self.started, true);
+        let update = || {
+            if first {
+                show_all(broad_phase, call, &mut events);
+            }
+            broad_phase.update(params, colliders, bodies, modified, removed, &mut events);
+        };
         if catch_unwind(AssertUnwindSafe(update)).is_err() {
             tracing::warn!("pbig: rapier's own broad phase has panicked and is no longer compared with");
             self.panicked = true;
@@ -32,4 +40,15 @@ impl Stock {
         self.known.purge(removed);
         self.known.follow(&events, |_, _| ());
     }
+}
+
+/// Stock skips colliders that have not changed, and the world may be older than the checker: so they change, in a copy.
+fn show_all(stock: &mut DefaultBroadPhase, call: &Call<'_>, events: &mut Vec<BroadPhasePairEvent>) {
+    let mut colliders = call.colliders.clone();
+    let all: Vec<ColliderHandle> = colliders.iter_enabled().map(|(handle, _)| handle).collect();
+    for &handle in &all {
+        let pose = *colliders[handle].position();
+        colliders[handle].set_position(pose);
+    }
+    stock.update(call.params, &colliders, call.bodies, &all, &[], events);
 }
