@@ -103,3 +103,35 @@ fn one_that_moves_in_a_crowd_that_excludes_it_is_tested_against_the_others_only(
     assert!(moved_checks(0.2, MOVING) >= 2000, "it has changed sides: all are to be met");
     assert!(moved_checks(0.3, DEBRIS) < 10, "and back");
 }
+
+/// Two towns far apart, each 1000 places with `fixed` fixed pieces and a moving ball in each.
+fn towns(fixed: usize) -> (Vec<Aabb>, Vec<ProxyFilter>) {
+    let (mut boxes, mut filters) = (Vec::new(), Vec::new());
+    for (town, i) in [0.0, 3000.0].into_iter().flat_map(|town| (0..1000).map(move |i| (town, i))) {
+        let corner = [i % 10, i / 10 % 10, i / 100].map(|x| x as f32 + town);
+        for piece in 0..fixed {
+            boxes.push(Aabb::from_center(corner.map(|x| x + 0.002 * piece as f32), [0.45; 3]));
+            filters.push(FIXED);
+        }
+        boxes.push(Aabb::from_center(corner.map(|x| x + 0.3), [0.3; 3]));
+        filters.push(MOVING);
+    }
+    (boxes, filters)
+}
+
+#[test]
+fn camps_in_clusters_far_apart_get_cells_as_small_as_others() {
+    for fixed in [8, 16, 40, 80] {
+        let (boxes, filters) = towns(fixed);
+        let mut finder = Finder::default();
+        let mut checks = Vec::new();
+        for _ in 0..3 {
+            finder.find_filtered(&boxes, &filters).expect("within the limits");
+            checks.push(finder.report().checks.made);
+        }
+        // Forty and more pieces in a place are a camp, which balls alone search.
+        let report = finder.report();
+        let most = if fixed < 40 { 10 * (boxes.len() * fixed) as u64 } else { 6 * report.pairs };
+        assert!(checks.iter().all(|made| *made < most), "{fixed}: {checks:?}, {most}: {}", report.plan);
+    }
+}

@@ -360,22 +360,25 @@ fn deletions_come_before_additions_each_by_index_and_the_same_on_every_backend()
 
 #[test]
 fn where_rapiers_own_broad_phase_panics_ours_does_not() {
+    // One of three is disabled and one removed in the same step. If stock survives that in another release, its row in
+    // docs/DROP_IN.md goes.
+    let step = |broad_phase: &mut dyn BroadPhase, x: f32| {
+        let mut scene = Checked::new(PbigBroadPhase::CONFIG);
+        let [a, b, _] = [0.0, x, 0.9].map(|x| scene.ball(x).0);
+        scene.world.step(broad_phase);
+        scene.world.bodies[a].set_enabled(false);
+        scene.world.remove(b);
+        scene.world.step(broad_phase);
+        scene.world.bodies[a].set_enabled(true);
+        scene.world.step(broad_phase);
+    };
+    let panics = |mut broad_phase: Box<dyn BroadPhase>, x: f32| {
+        catch_unwind(AssertUnwindSafe(move || step(broad_phase.as_mut(), x))).is_err()
+    };
     for x in [0.5, 7.0] {
-        let step = |broad_phase: &mut dyn BroadPhase| {
-            let mut world = World::with_gravity(glam::Vec3::ZERO);
-            let [a, b, _] = [0.0, x, 0.9]
-                .map(|x| world.add(World::dynamic(glam::Vec3::X * x), ColliderBuilder::ball(0.5)));
-            world.step(broad_phase);
-            world.bodies[a].set_enabled(false);
-            world.remove(b);
-            (0..2).for_each(|_| world.step(broad_phase));
-        };
-        let panics = |mut broad_phase: Box<dyn BroadPhase>| {
-            catch_unwind(AssertUnwindSafe(move || step(broad_phase.as_mut()))).is_err()
-        };
-        println!("{x}: {}", panics(Box::new(DefaultBroadPhase::new())));
+        assert!(panics(Box::new(DefaultBroadPhase::new()), x));
         for (_, config) in backends() {
-            assert!(!panics(Box::new(PbigBroadPhase::with_config(config))));
+            assert!(!panics(Box::new(PbigBroadPhase::with_config(config)), x));
         }
     }
 }

@@ -173,7 +173,6 @@ mod tests {
                     let gone: Vec<u32> =
                         (0..n).filter(|&id| !kept(id) && boxes[id as usize].is_some()).collect();
                     gone.iter().for_each(|&id| boxes[id as usize] = None);
-                    changed.truncate(1);
                     changed.extend(gone);
                 }
                 tree.note(changed.into_iter(), 2 * n as usize);

@@ -194,9 +194,13 @@ mod tests {
 
     /// Builds in one call: how often the boxes were sorted.
     fn builds(map: &mut Map, boxes: &[Aabb]) -> usize {
+        builds_filtered(map, boxes, None)
+    }
+
+    fn builds_filtered(map: &mut Map, boxes: &[Aabb], filters: Option<&[ProxyFilter]>) -> usize {
         let summary = Summary::of(boxes, None);
         let before = map.builds;
-        let set = Set { boxes, filters: None, ids: None, summary: &summary };
+        let set = Set { boxes, filters, ids: None, summary: &summary };
         map.plan_and_build(&set, &Config::DEFAULT, &mut StageTimes::default());
         map.builds - before
     }
@@ -231,5 +235,30 @@ mod tests {
             builds(&mut map, &even);
         }
         assert_eq!(map.crowding.factor, 1.0, "an even world gets its cells back");
+    }
+
+    #[test]
+    fn camps_stay_while_the_crowd_does_and_no_longer() {
+        for (bodies, each) in [(1, 60), (3, 18), (4, 14), (6, 9), (6, 20), (7, 40)] {
+            let places = lattice(5, 1.0, 0.45, 0.0);
+            let mut boxes = Vec::new();
+            let mut filters = Vec::new();
+            for body in 0..bodies {
+                boxes.extend((0..each).flat_map(|_| places.iter().copied()));
+                filters.resize(boxes.len(), ProxyFilter { body, ..ProxyFilter::ALL });
+            }
+            let mut map = Map::new();
+            let calls: Vec<usize> =
+                (0..5).map(|_| builds_filtered(&mut map, &boxes, Some(&filters))).collect();
+            assert_eq!(
+                (map.has_camps(), &calls[1..]),
+                (true, &[1; 4][..]),
+                "{bodies} bodies of {each}: {calls:?}"
+            );
+            let even = lattice(9, 1.0, 0.3, 0.0);
+            let after: Vec<usize> =
+                (0..3).map(|_| builds_filtered(&mut map, &even, Some(&filters[..even.len()]))).collect();
+            assert_eq!((map.has_camps(), after[2]), (false, 1), "{bodies} bodies of {each}: {after:?}");
+        }
     }
 }

@@ -17,7 +17,7 @@ pub(super) struct Stock {
 }
 
 impl Stock {
-    /// Rapier 0.27's broad phase panics when a body is disabled while one that it overlaps is removed.
+    /// Rapier 0.27's broad phase can panic when several colliders are removed or disabled at once.
     /// That must not end the app that is being checked.
     pub(super) fn update(&mut self, call: &Call<'_>) {
         if self.panicked {
