@@ -73,10 +73,14 @@ has_vulkan || require "a Vulkan driver (this software one will do)" mesa-vulkan-
 # One profile and one set of features: everything is built once, pbig-core alone a second time.
 step cargo fmt --all --check
 step cargo clippy --release --workspace --all-targets -- -D warnings
-# As most apps build it: without the GPU backend.
-step cargo clippy --release -p rapier-pbig -- -D warnings
+# As apps build it: without the GPU backend, and with one feature.
+for feature in '' serde debug-render shadow; do
+    step cargo clippy --release -p rapier-pbig --features "$feature" -- -D warnings
+done
 step cargo build --release --workspace --examples --bins
 step cargo test --release --workspace
+# Rapier's own features beside these are in scripts/features.sh; one of the other kind for all.
+step scripts/features.sh deterministic
 # Once more with overflow checks and debug assertions, where there is unsafe code and index arithmetic.
 step cargo test -p pbig-core --features gpu
 # The commands that the README shows, at a size that takes seconds.

@@ -1,7 +1,6 @@
 //! What rapier 0.27 is owed by its broad phase, call by call.
 
 use crate::checked::{Checked, backends, everywhere};
-use pbig_harness::scenes::Scene;
 use pbig_harness::world::World;
 use rapier_pbig::{PbigBroadPhase, Why};
 use rapier3d::prelude::*;
@@ -219,23 +218,6 @@ fn a_nan_position_is_contained_and_the_others_go_on() {
 }
 
 #[test]
-fn calls_without_changes_do_nothing() {
-    everywhere(|mut scene| {
-        scene.ball(0.0);
-        scene.ball(0.9);
-        scene.step();
-        let World { params, colliders, bodies, .. } = &scene.world;
-        let broad_phase = &mut scene.broad_phase.inner;
-        let mut events = Vec::new();
-        broad_phase.update(params, colliders, bodies, &[], &[], &mut events);
-        let unknown = [ColliderHandle::from_raw_parts(77, 3), ColliderHandle::invalid()];
-        broad_phase.update(params, colliders, bodies, &unknown, &unknown, &mut events);
-        assert!(events.is_empty());
-        assert_eq!(broad_phase.pair_count(), 1);
-    });
-}
-
-#[test]
 fn the_collider_with_fewer_pairs_comes_first() {
     let mut world = World::default();
     let ground = world.colliders.insert(ColliderBuilder::halfspace(Vector::y_axis()));
@@ -279,83 +261,6 @@ fn a_ground_that_loses_all_its_pairs_does_not_come_first_either() {
     };
     let ended: Vec<_> = events.iter().filter_map(second).collect();
     assert_eq!(ended, [ground; 20]);
-}
-
-/// Notes the calls and the events of another broad phase.
-struct Recorder<B> {
-    inner: B,
-    /// Modified and removed colliders, and `dt`, of each call.
-    calls: Vec<(usize, usize, f32)>,
-    /// Whether a pair was added, and its indices, of each event.
-    events: Vec<Vec<(bool, [u32; 2])>>,
-}
-
-impl<B> Recorder<B> {
-    fn new(inner: B) -> Self {
-        Self { inner, calls: Vec::new(), events: Vec::new() }
-    }
-}
-
-impl<B: BroadPhase> BroadPhase for Recorder<B> {
-    fn update(
-        &mut self,
-        params: &IntegrationParameters,
-        colliders: &ColliderSet,
-        bodies: &RigidBodySet,
-        modified: &[ColliderHandle],
-        removed: &[ColliderHandle],
-        events: &mut Vec<BroadPhasePairEvent>,
-    ) {
-        let start = events.len();
-        self.inner.update(params, colliders, bodies, modified, removed, events);
-        self.calls.push((modified.len(), removed.len(), params.dt));
-        let indices = |pair: &ColliderPair| {
-            let [a, b] = [pair.collider1, pair.collider2].map(|handle| handle.into_raw_parts().0);
-            [a.min(b), a.max(b)]
-        };
-        let noted = |event: &BroadPhasePairEvent| match event {
-            BroadPhasePairEvent::AddPair(pair) => (true, indices(pair)),
-            BroadPhasePairEvent::DeletePair(pair) => (false, indices(pair)),
-        };
-        self.events.push(events[start..].iter().map(noted).collect());
-    }
-}
-
-#[test]
-fn a_step_is_two_calls_and_one_more_for_each_further_substep() {
-    for (name, config) in backends() {
-        let mut world = World::with_gravity(glam::Vec3::ZERO);
-        world.params.max_ccd_substeps = 4;
-        let wall = ColliderBuilder::cuboid(0.05, 5.0, 5.0).translation(vector![0.5, 0.0, 0.0]);
-        world.colliders.insert(wall);
-        // Five metres a step; the second one ends at the wall.
-        let bullet = World::dynamic(glam::Vec3::X * -7.0).linvel(vector![300.0, 0.0, 0.0]);
-        world.add(bullet.ccd_enabled(true).can_sleep(false), ColliderBuilder::ball(0.1));
-        let mut recorder = Recorder::new(PbigBroadPhase::with_config(config));
-        world.step(&mut recorder);
-        let dt = world.params.dt;
-        assert_eq!(recorder.calls, [(2, 0, dt), (1, 0, dt)], "{name}");
-        recorder.calls.clear();
-        world.step(&mut recorder);
-        let calls = &recorder.calls;
-        assert_eq!(calls[0], (0, 0, dt), "{name}: the app has changed nothing");
-        assert!(calls.len() > 2 && calls[1..].iter().all(|call| call.2 < dt), "{name}: {calls:?}");
-        assert!(world.bodies.iter().all(|(_, body)| body.translation().x < 0.5), "{name}: through the wall");
-    }
-}
-
-#[test]
-fn deletions_come_before_additions_each_by_index_and_the_same_on_every_backend() {
-    let streams = backends().map(|(_, config)| {
-        let mut world = Scene::named("column").expect("the scene exists").build(150, 4);
-        let mut recorder = Recorder::new(PbigBroadPhase::with_config(config));
-        (0..60).for_each(|_| world.step(&mut recorder));
-        recorder.events
-    });
-    assert!(streams.iter().all(|stream| *stream == streams[0]));
-    assert!(streams[0].iter().all(|call| call.is_sorted()), "false, a deletion, is less than true");
-    let mixed = |call: &&Vec<(bool, [u32; 2])>| call.iter().any(|e| e.0) && call.iter().any(|e| !e.0);
-    assert!(streams[0].iter().filter(mixed).count() > 5, "calls with both");
 }
 
 #[test]
@@ -416,40 +321,4 @@ fn a_length_unit_scales_the_margin() {
             assert_eq!(scene.step(), pairs, "length unit {length_unit}");
         });
     }
-}
-
-#[test]
-fn the_report_is_that_of_the_last_call_also_when_nothing_moved() {
-    everywhere(|mut scene| {
-        scene.ball(0.0);
-        scene.ball(0.9);
-        scene.step();
-        let World { params, colliders, bodies, .. } = &scene.world;
-        scene.broad_phase.inner.update(params, colliders, bodies, &[], &[], &mut Vec::new());
-        let report = scene.broad_phase.inner.stats().report;
-        assert_eq!((report.changed, report.checks.made, report.boxes, report.pairs), (0, 0, 2, 1));
-    });
-}
-
-#[test]
-fn the_collision_pipeline_works_as_with_stock() {
-    let (mut bodies, mut colliders) = (RigidBodySet::new(), ColliderSet::new());
-    let sensor = || {
-        let shape = ColliderBuilder::cuboid(1.0, 1.0, 1.0).sensor(true);
-        shape.active_collision_types(ActiveCollisionTypes::all())
-    };
-    let first = colliders.insert(sensor());
-    colliders.insert(sensor());
-    let (mut broad_phase, mut narrow_phase) = (PbigBroadPhase::new(), NarrowPhase::new());
-    let prediction = IntegrationParameters::default().prediction_distance();
-    CollisionPipeline::new().step(
-        prediction,
-        &mut broad_phase,
-        &mut narrow_phase,
-        &mut bodies,
-        &mut colliders,
-        &(),
-        &(),
-    );
-    assert_eq!(narrow_phase.intersection_pairs_with(first).filter(|(_, _, hit)| *hit).count(), 1);
 }

@@ -1,5 +1,6 @@
 //! One test binary: linking rapier once is what keeps the suite fast to build.
 
+mod calls;
 mod checked;
 mod crowds;
 mod drop_in;
@@ -14,4 +15,5 @@ mod random_worlds;
 mod restore;
 mod shapes;
 mod upstream;
+mod upstream_churn;
 mod worlds;
