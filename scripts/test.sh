@@ -87,6 +87,7 @@ step cargo test -p pbig-core --features gpu
 step target/release/examples/falling_objects --bodies 500 --steps 60
 step target/release/examples/drop_in
 step target/release/examples/headless_test
+step target/release/examples/debug_render
 step target/release/examples/boxes_to_pairs
 step target/release/examples/own_device
 step target/release/pbig pairs examples/boxes.csv

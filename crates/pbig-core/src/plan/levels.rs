@@ -1,6 +1,7 @@
 //! Which boxes share a grid. Sizes have no law (contract 4): one grid where one is cheapest, several
 //! levels where sizes differ by decades, and a list tested against everything for the few largest.
 
+use super::summary::LARGEST_CLASS;
 use super::{Summary, spacing};
 use crate::Aabb;
 use crate::config::Strategy;
@@ -49,10 +50,6 @@ impl fmt::Display for LevelPlan {
         if self.camp == 0 { Ok(()) } else { write!(f, ", none of which pair (camp {})", self.camp) }
     }
 }
-
-/// Size classes beyond this power of two (2^100) are swept: a cell of that size, or its inverse,
-/// would leave the normal range of f32.
-const LARGEST_CLASS: usize = 227;
 
 /// Smallest cell, 2^-100, for the same reason.
 const SMALLEST_CELL: f32 = 7.888_609e-31;

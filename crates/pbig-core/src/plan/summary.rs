@@ -11,6 +11,10 @@ pub struct SizeClass {
     pub max_extent: [f32; 3],
 }
 
+/// Size classes beyond this power of two (2^100) are swept: a cell of that size, or its inverse,
+/// would leave the normal range of f32. Where such boxes lie says nothing about the others.
+pub(super) const LARGEST_CLASS: usize = 227;
+
 /// One pass over the boxes: counts by size class, invalid boxes, and a sample of the valid ones.
 ///
 /// Sizes are counted rather than sampled: a thousand large boxes among a million small ones are
@@ -21,7 +25,7 @@ pub struct Summary {
     pub valid: u32,
     /// By the exponent of the largest extent, from 0 (denormal) to 255 (infinite).
     pub classes: Box<[SizeClass; 256]>,
-    /// At most [`Summary::SAMPLE`] valid, finite boxes, spread evenly over the list.
+    /// At most [`Summary::SAMPLE`] valid boxes, spread evenly over the list, without infinite ones and half-spaces.
     pub sample: Vec<Aabb>,
 }
 
@@ -59,7 +63,7 @@ impl Summary {
     fn draw_sample(&mut self, boxes: &[Aabb], ids: Option<&[u32]>) {
         for step in spread_evenly(ids.map_or(boxes.len(), <[u32]>::len), Self::SAMPLE) {
             let one = boxes[ids.map_or(step, |ids| ids[step] as usize)];
-            if one.is_valid() && one.min.iter().chain(&one.max).all(|x| x.is_finite()) {
+            if one.is_valid() && size_class_of(&one) < LARGEST_CLASS {
                 self.sample.push(one);
             }
         }
@@ -114,7 +118,7 @@ mod tests {
         let summary = Summary::of(&boxes, None);
         assert_eq!((summary.valid, summary.classes[255].boxes), (4, 3));
         assert_eq!(summary.classes[127].max_extent, [1.5, 0.5, 0.25]);
-        assert_eq!(summary.sample.len(), 2);
+        assert_eq!(summary.sample.len(), 1);
     }
 
     #[test]
@@ -123,6 +127,14 @@ mod tests {
         boxes.push(Aabb::from_center([1e30; 3], [1.0; 3]));
         let (low, high) = Summary::of(&boxes, None).range(0);
         assert!((-300.0..200.0).contains(&low) && (1800.0..2300.0).contains(&high), "{low} {high}");
+    }
+
+    #[test]
+    fn the_range_of_a_few_boxes_on_a_half_space_is_theirs() {
+        let mut boxes: Vec<_> = (0..60).map(|i| Aabb::from_center([i as f32; 3], [1.0; 3])).collect();
+        boxes.insert(0, Aabb::new([-0.5 * f32::MAX; 3], [0.5 * f32::MAX; 3]));
+        let (low, high) = Summary::of(&boxes, None).range(1);
+        assert!((-20.0..0.0).contains(&low) && (50.0..80.0).contains(&high), "{low} {high}");
     }
 
     #[test]
