@@ -11,5 +11,5 @@ for feature in "$@"; do
     [ "$feature" != none ] || features=
     # The bits of a world whatever the threads, and everything in which rapier takes part.
     cargo test --release -p pbig-tests --no-default-features --features "$features" --test suite -- \
-        calls drop_in upstream shapes restore queries explain random_worlds crowds planted worlds::the_same
+        calls drop_in upstream shapes restore queries explain random_worlds worlds::the_same
 done

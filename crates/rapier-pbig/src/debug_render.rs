@@ -38,7 +38,8 @@ impl PbigBroadPhase {
         let mut levels = vec![None; self.roll.generations().len()];
         for cell in &cells {
             cell.ids.iter().for_each(|&id| levels[id as usize] = Some(cell.level));
-            if let (true, Some((handle, collider))) = (parts.cells, self.collider(colliders, cell.ids[0])) {
+            let first = cell.ids.iter().find_map(|&id| self.collider(colliders, id));
+            if let (true, Some((handle, collider))) = (parts.cells, first) {
                 let lightness = 0.2 + 0.1 * (cell.ids.len().min(8) as f32);
                 draw(backend, (handle, collider), &cell.aabb, hsla(Some(cell.level), lightness, OPAQUE[1]));
             }

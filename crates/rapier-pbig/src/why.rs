@@ -96,7 +96,8 @@ impl PbigBroadPhase {
     fn gap(&self, a: u32, b: u32) -> Option<(usize, f32)> {
         let (a, b) = (self.finder.fat_aabb(a)?, self.finder.fat_aabb(b)?);
         let gaps = (0..3).map(|k| (k, (a.min[k] - b.max[k]).max(b.min[k] - a.max[k])));
-        let (axis, gap) = gaps.max_by(|x, y| x.1.total_cmp(&y.1))?;
+        // Between equal infinities a gap is NaN.
+        let (axis, gap) = gaps.filter(|(_, gap)| !gap.is_nan()).max_by(|x, y| x.1.total_cmp(&y.1))?;
         (!a.overlaps(&b)).then_some((axis, gap))
     }
 }

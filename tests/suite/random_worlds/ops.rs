@@ -18,8 +18,8 @@ pub(super) enum Op {
     Step(u8),
     /// World and broad phase are saved, and it goes on with what was restored.
     Snapshot,
-    /// As [`Op::Snapshot`], but with a new broad phase that has never seen the world.
-    Fresh,
+    /// As [`Op::Snapshot`], but with a new broad phase that has never seen the world, and that adopts it or not.
+    Fresh(bool),
     /// A body with a collider.
     Insert(RigidBodyType, What, Place),
     /// A collider without a body.
@@ -34,6 +34,8 @@ pub(super) enum Op {
     Gravity([i8; 3]),
     /// One of a few prediction distances.
     Prediction(u8),
+    /// One of a few length units, in which margins are measured.
+    LengthUnit(u8),
 }
 
 impl Op {
@@ -124,7 +126,7 @@ pub(super) fn any_op() -> impl Strategy<Value = Op> {
     prop_oneof![
         28 => (1..=3u8).prop_map(Op::Step),
         2 => Just(Op::Snapshot),
-        2 => Just(Op::Fresh),
+        2 => any::<bool>().prop_map(Op::Fresh),
         22 => (kind(), what(), place()).prop_map(|(kind, what, place)| Op::Insert(kind, what, place)),
         5 => (what(), place()).prop_map(|(what, place)| Op::InsertLone(what, place)),
         6 => (n(), what(), triple(8)).prop_map(|(n, what, at)| Op::Attach(n, what, at)),
@@ -133,6 +135,7 @@ pub(super) fn any_op() -> impl Strategy<Value = Op> {
         22 => (n(), collider_op()).prop_map(|(n, op)| Op::Collider(n, op)),
         1 => triple(10).prop_map(Op::Gravity),
         1 => (0..4u8).prop_map(Op::Prediction),
+        1 => (0..3u8).prop_map(Op::LengthUnit),
     ]
 }
 
@@ -207,6 +210,7 @@ pub(super) fn apply(world: &mut World, op: Op) {
         Op::Collider(n, op) => on_collider(world, n, op),
         Op::Gravity(g) => world.gravity = glam::Vec3::from_array(g.map(f32::from)),
         Op::Prediction(n) => predict(world, n),
+        Op::LengthUnit(n) => measure(world, n),
         _ => {}
     }
 }
@@ -267,6 +271,13 @@ fn set_soft_ccd(world: &mut World, body: RigidBodyHandle, metres: u8) {
 fn predict(world: &mut World, n: u8) {
     let distances = [0.002, 0.0, 0.05, 0.3];
     world.params.normalized_prediction_distance = distances[usize::from(n) % distances.len()];
+    world.colliders.iter_mut().for_each(|(_, collider)| touch(collider));
+}
+
+/// Touches all colliders, as margins depend on it.
+fn measure(world: &mut World, n: u8) {
+    let units = [1.0, 0.3, 4.0];
+    world.params.length_unit = units[usize::from(n) % units.len()];
     world.colliders.iter_mut().for_each(|(_, collider)| touch(collider));
 }
 
