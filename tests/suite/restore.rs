@@ -31,15 +31,15 @@ fn steps(world: &mut World, broad_phase: &mut dyn BroadPhase, steps: usize) {
     (0..steps).for_each(|_| world.step(broad_phase));
 }
 
-/// Pairs of the narrow phase, whatever their order.
+/// Two colliders, whatever their order.
+fn unordered(pair: ColliderPair) -> [(u32, u32); 2] {
+    let [a, b] = [pair.collider1, pair.collider2].map(|handle| handle.into_raw_parts());
+    [a.min(b), a.max(b)]
+}
+
+/// Pairs of the narrow phase.
 fn edges(world: &World) -> BTreeSet<[(u32, u32); 2]> {
-    let contacts = world.narrow_phase.contact_pairs().map(|pair| (pair.collider1, pair.collider2));
-    let intersections = world.narrow_phase.intersection_pairs().map(|(a, b, _)| (a, b));
-    let sorted = |(a, b): (ColliderHandle, ColliderHandle)| {
-        let (a, b) = (a.into_raw_parts(), b.into_raw_parts());
-        [a.min(b), a.max(b)]
-    };
-    contacts.chain(intersections).map(sorted).collect()
+    world.pairs().map(unordered).collect()
 }
 
 #[test]
@@ -170,11 +170,8 @@ fn a_running_world_goes_over_from_rapiers_broad_phase_to_ours() {
     let mut ours = PbigBroadPhase::new();
     ours.adopt(&world.narrow_phase);
     world.step(&mut ours);
-    let known = ours.pairs().map(|pair| {
-        let (a, b) = (pair.collider1.into_raw_parts(), pair.collider2.into_raw_parts());
-        [a.min(b), a.max(b)]
-    });
-    assert_eq!(known.collect::<BTreeSet<_>>(), edges(&world), "both know the same pairs");
+    let known: BTreeSet<_> = ours.pairs().map(unordered).collect();
+    assert_eq!(known, edges(&world), "both know the same pairs");
     let mut shadow = Shadowed::new(ours, PbigBroadPhase::CONFIG.margin);
     let pairs: Vec<ColliderPair> = shadow.inner.pairs().collect();
     shadow.checker.start_over(pairs);
@@ -228,10 +225,8 @@ fn a_world_replaced_by_a_smaller_or_larger_one_is_noticed() {
         let mut fresh = PbigBroadPhase::new();
         fresh.update(params, colliders, bodies, &[], &[], &mut Vec::new());
         assert_eq!((ours.stats().colliders, fresh.stats().colliders), (known, known));
-        let pairs = |broad_phase: &PbigBroadPhase| -> BTreeSet<_> {
-            let indices = |pair: ColliderPair| [pair.collider1, pair.collider2].map(|h| h.into_raw_parts());
-            broad_phase.pairs().map(indices).collect()
-        };
+        let pairs =
+            |broad_phase: &PbigBroadPhase| -> BTreeSet<_> { broad_phase.pairs().map(unordered).collect() };
         assert!(ours.stats().totals.rescans > rescans && !pairs(&fresh).is_empty());
         assert_eq!(pairs(&ours), pairs(&fresh), "nothing of the old world is left");
     }

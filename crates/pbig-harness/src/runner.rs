@@ -86,8 +86,7 @@ impl<B: BroadPhase> Run<B> {
 
     /// Pairs that the narrow phase knows: edges of contacts and of intersections.
     pub fn pairs(&self) -> usize {
-        let narrow_phase = &self.world.narrow_phase;
-        narrow_phase.contact_pairs().count() + narrow_phase.intersection_pairs().count()
+        self.world.pairs().count()
     }
 }
 

@@ -122,6 +122,13 @@ impl World {
         })
     }
 
+    /// The pairs that the narrow phase has: of contacts, and with sensors.
+    pub fn pairs(&self) -> impl Iterator<Item = ColliderPair> {
+        let contacts = self.narrow_phase.contact_pairs().map(|pair| (pair.collider1, pair.collider2));
+        let intersections = self.narrow_phase.intersection_pairs().map(|(one, other, _)| (one, other));
+        contacts.chain(intersections).map(|(one, other)| ColliderPair::new(one, other))
+    }
+
     /// Every number that makes up the poses of all bodies, bit by bit, in order: equal exactly when
     /// two worlds are.
     pub fn pose_bits(&self) -> Vec<u32> {

@@ -7,22 +7,14 @@ use pbig_core::{BroadPhase as Finder, Limits};
 use rapier3d::prelude::{ColliderHandle, ColliderPair};
 use serde::de::Error as _;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
+use std::borrow::Cow;
 
 type RawHandle = (u32, u32);
 
-#[derive(Serialize)]
-struct Saved<'a> {
-    finder: &'a Finder,
-    generations: &'a [u32],
-    relative_margin: f32,
-    order: HandleOrder,
-    adopted: Vec<[RawHandle; 2]>,
-}
-
-#[derive(Deserialize)]
-struct Restored {
-    finder: Finder,
-    generations: Vec<u32>,
+#[derive(Serialize, Deserialize)]
+struct Snapshot<'a> {
+    finder: Cow<'a, Finder>,
+    generations: Cow<'a, [u32]>,
     relative_margin: f32,
     order: HandleOrder,
     adopted: Vec<[RawHandle; 2]>,
@@ -31,9 +23,9 @@ struct Restored {
 impl Serialize for PbigBroadPhase {
     /// All that events depend on. Not the tree for queries, the device, nor a shadow.
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        Saved {
-            finder: &self.finder,
-            generations: self.roll.generations(),
+        Snapshot {
+            finder: Cow::Borrowed(&self.finder),
+            generations: Cow::Borrowed(self.roll.generations()),
             relative_margin: self.relative_margin,
             order: self.outbox.order,
             adopted: self.outbox.adopted.iter().map(to_raw).collect(),
@@ -44,9 +36,9 @@ impl Serialize for PbigBroadPhase {
 
 impl<'de> Deserialize<'de> for PbigBroadPhase {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        let Restored { finder, generations, relative_margin, order, adopted } =
-            Restored::deserialize(deserializer)?;
-        let roll = Roll::of_generations(generations);
+        let Snapshot { finder, generations, relative_margin, order, adopted } =
+            Snapshot::deserialize(deserializer)?;
+        let (finder, roll) = (finder.into_owned(), Roll::of_generations(generations.into_owned()));
         let ids = (0..finder.id_count()).filter(|&id| finder.contains(id));
         if let Some(id) = ids.into_iter().find(|&id| roll.handle(id).is_none()) {
             return Err(D::Error::custom(format!("snapshot: box {id} belongs to no collider")));

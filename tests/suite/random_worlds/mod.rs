@@ -204,7 +204,7 @@ impl Scene {
                     fresh.adopt(&self.world.narrow_phase);
                 }
                 // Else it adds all pairs again, which does rapier no harm.
-                let known = if adopts { edges(&self.world.narrow_phase) } else { vec![] };
+                let known = if adopts { self.world.pairs().collect() } else { vec![] };
                 self.broad_phase.checker.start_over(known);
                 self.broad_phase.inner.pbig = fresh;
             }
@@ -261,13 +261,6 @@ fn run(ops: &[Op], config: Config, plant: Plant) -> Result<Outcome, String> {
             Ok(Outcome { tally: Tally { cut_short: 1, ..scene.tally }, ..Outcome::default() })
         }
     }
-}
-
-/// The pairs that a narrow phase has.
-fn edges(narrow_phase: &NarrowPhase) -> Vec<ColliderPair> {
-    let contacts = narrow_phase.contact_pairs().map(|pair| (pair.collider1, pair.collider2));
-    let intersections = narrow_phase.intersection_pairs().map(|(one, other, _)| (one, other));
-    contacts.chain(intersections).map(|(one, other)| ColliderPair::new(one, other)).collect()
 }
 
 /// Why a list of operations fails a test, and the list.
