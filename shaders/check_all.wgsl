@@ -3,7 +3,7 @@
 
 @group(0) @binding(0) var<uniform> params: Params;
 @group(0) @binding(1) var<uniform> chunk: Chunk;
-@group(0) @binding(2) var<storage, read> boxes: array<Box>;
+@group(0) @binding(2) var<storage, read> boxes: array<Subject>;
 @group(0) @binding(3) var<storage, read> filters: array<vec4<u32>>;
 @group(0) @binding(4) var<storage, read_write> totals: array<atomic<u32>, 10>;
 @group(0) @binding(5) var<storage, read_write> out: array<u32>;
@@ -23,9 +23,9 @@ fn check_all(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) g
     var pair = vec2<u32>(0u);
     if first + lane < all {
         pair = pair_at(first + lane, n);
-        let overlaps = overlap(boxes[pair.x], boxes[pair.y]);
-        atomicAdd(&tally[2], u32(overlaps));
-        hit = overlaps
+        let matters = matter(boxes[pair.x], boxes[pair.y]);
+        atomicAdd(&tally[2], u32(matters));
+        hit = matters
             && ((params.flags & FILTERED) == 0u || filters_allow(filters[pair.x], filters[pair.y]));
     }
     var rank = 0u;

@@ -3,7 +3,7 @@
 
 @group(0) @binding(0) var<uniform> params: Params;
 @group(0) @binding(1) var<uniform> chunk: Chunk;
-@group(0) @binding(2) var<storage, read> boxes: array<Box>;
+@group(0) @binding(2) var<storage, read> boxes: array<Subject>;
 @group(0) @binding(3) var<storage, read> filters: array<vec4<u32>>;
 @group(0) @binding(4) var<storage, read> entries: array<u32>;
 @group(0) @binding(5) var<storage, read> counters: Counters;
@@ -15,12 +15,12 @@
 override BALANCED: bool = true;
 
 // The segment of columns.
-var<workgroup> column_boxes: array<Box, LANES>;
+var<workgroup> column_boxes: array<Subject, LANES>;
 var<workgroup> column_entries: array<u32, LANES>;
-// The axes on which this is the lowest cell of any box of the item: if not all three occur, the cell
-// owns none of the item's pairs, and none is tested. Of many boxes across the same border of cells
-// that spares 7 cells of 8.
-var<workgroup> axes: atomic<u32>;
+// All marks that occur in entries of the item. Where those of an axis are missing the cell owns none of
+// the item's pairs, and none is tested: of many boxes across the same border of cells that spares 7
+// cells of 8. The same where no box has moved and only changes are asked for.
+var<workgroup> marks: atomic<u32>;
 var<workgroup> skip: u32;
 
 // How many partners a row has within its own segment of n boxes (equation 7 with m = n, less the
@@ -46,7 +46,7 @@ var<private> mask: array<u32, 8>;
 
 // Tests a row against the segment's columns; `within` its own segment against those that equation 7
 // assigns to it. Returns the number of hits.
-fn test_row(lane: u32, row: u32, entry: u32, one: Box, item: LargeItem, n: u32, within: bool) -> u32 {
+fn test_row(lane: u32, row: u32, entry: u32, one: Subject, item: LargeItem, n: u32, within: bool) -> u32 {
     var length = select(select(0u, n, row < item.residents), row_length(lane, n), within);
     var counts = vec3<u32>(0u);
     var hits = 0u;
@@ -61,12 +61,12 @@ fn test_row(lane: u32, row: u32, entry: u32, one: Box, item: LargeItem, n: u32, 
             counts.x += 1u;
             let a = box_of(entry);
             let b = box_of(column_entries[j]);
-            if !owns(entry, column_entries[j])
+            if !owns(entry, column_entries[j]) || !is_due(entry | column_entries[j])
                 || (params.split > 0u && (a < params.split) == (b < params.split)) {
                 counts.y += 1u;
                 continue;
             }
-            if !overlap(one, column_boxes[j]) {
+            if !matter(one, column_boxes[j]) {
                 continue;
             }
             counts.z += 1u;
@@ -116,19 +116,20 @@ fn check_large(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups)
     let item = large_items[chunk.first_large + index];
     let row = item.row * LANES + lane;
     var row_entry = 0u;
-    var row_box: Box;
+    var row_box: Subject;
     if row < item.boxes {
         row_entry = entries[item.start + row];
         row_box = boxes[box_of(row_entry)];
     }
-    var lane_axes = row_entry;
+    var lane_marks = row_entry;
     for (var at = item.column * LANES + lane; at < min(item.end_column * LANES, item.boxes); at += LANES) {
-        lane_axes |= entries[item.start + at];
+        lane_marks |= entries[item.start + at];
     }
-    atomicOr(&axes, lane_axes);
+    atomicOr(&marks, lane_marks);
     workgroupBarrier();
     if lane == 0u {
-        skip = u32(!owns(atomicLoad(&axes), 0u));
+        let all = atomicLoad(&marks);
+        skip = u32(!owns(all, 0u) || !is_due(all));
     }
     if workgroupUniformLoad(&skip) != 0u {
         return;

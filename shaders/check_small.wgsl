@@ -4,7 +4,7 @@
 
 @group(0) @binding(0) var<uniform> params: Params;
 @group(0) @binding(1) var<uniform> chunk: Chunk;
-@group(0) @binding(2) var<storage, read> boxes: array<Box>;
+@group(0) @binding(2) var<storage, read> boxes: array<Subject>;
 @group(0) @binding(3) var<storage, read> filters: array<vec4<u32>>;
 @group(0) @binding(4) var<storage, read> entries: array<u32>;
 @group(0) @binding(5) var<storage, read> counters: Counters;
@@ -37,11 +37,11 @@ fn slot_of(pair: u32, count: u32) -> u32 {
 fn is_pair(a: u32, b: u32) -> bool {
     let i = box_of(a);
     let j = box_of(b);
-    if !owns(a, b) || (params.split > 0u && (i < params.split) == (j < params.split)) {
+    if !owns(a, b) || !is_due(a | b) || (params.split > 0u && (i < params.split) == (j < params.split)) {
         atomicAdd(&tally[1], 1u);
         return false;
     }
-    if !overlap(boxes[i], boxes[j]) {
+    if !matter(boxes[i], boxes[j]) {
         return false;
     }
     atomicAdd(&tally[2], 1u);

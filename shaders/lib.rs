@@ -8,7 +8,7 @@
 //! ```
 //! let locate = pbig_shaders::LOCATE;
 //! assert_eq!(locate.name, "locate");
-//! assert!(locate.source(false).contains("fn locate("));
+//! assert!(locate.source(false, false).contains("fn locate("));
 //! ```
 
 /// A kernel: what it is called, which buffers it binds in which order, and its text.
@@ -23,11 +23,15 @@ pub struct Kernel {
 }
 
 impl Kernel {
-    /// The whole WGSL text, with the scan that uses subgroups where the device has them.
-    pub fn source(&self, subgroups: bool) -> String {
-        let subgroups = subgroups && self.gains_from_subgroups();
-        let scan = if subgroups { BLOCK_SCAN_SUBGROUPS } else { BLOCK_SCAN };
-        let parts = self.parts.iter().map(|&part| if part == BLOCK_SCAN { scan } else { part });
+    /// The whole WGSL text, with the scan that uses subgroups where the device has them, and for a
+    /// search for overlaps or for changes.
+    pub fn source(&self, subgroups: bool, changes: bool) -> String {
+        let part = |&part: &&'static str| match part {
+            BLOCK_SCAN if subgroups => BLOCK_SCAN_SUBGROUPS,
+            OVERLAPS if changes => CHANGES,
+            part => part,
+        };
+        let parts = self.parts.iter().map(part);
         // Without the standard's `enable subgroups`, which naga 30 does not know and does not ask for.
         [TYPES].into_iter().chain(parts).chain([self.body]).collect::<Vec<_>>().join("\n")
     }
@@ -36,6 +40,11 @@ impl Kernel {
     pub fn gains_from_subgroups(&self) -> bool {
         self.parts.contains(&BLOCK_SCAN)
     }
+
+    /// Whether the text of a search for changes is another than that of a search for overlaps.
+    pub fn tells_changes(&self) -> bool {
+        self.parts.contains(&OVERLAPS)
+    }
 }
 
 const TYPES: &str = include_str!("shared/types.wgsl");
@@ -43,6 +52,8 @@ const CELLS: &str = include_str!("shared/cells.wgsl");
 const BLOCK_SCAN: &str = include_str!("shared/block_scan.wgsl");
 const BLOCK_SCAN_SUBGROUPS: &str = include_str!("shared/block_scan_subgroups.wgsl");
 const PAIR_INDEX: &str = include_str!("shared/pair_index.wgsl");
+const OVERLAPS: &str = include_str!("shared/overlaps.wgsl");
+const CHANGES: &str = include_str!("shared/changes.wgsl");
 const EMIT: &str = include_str!("shared/emit.wgsl");
 
 /// Declares each kernel once, in the order in which they run.
@@ -61,8 +72,12 @@ macro_rules! kernels {
 }
 
 kernels! {
+    /// Changes: what boxes are becomes what they were.
+    SETTLE "settle" [] (params, boxes);
+    /// Changes: boxes and filters that have changed.
+    RENEW "renew" [] (params, moves, refilters, boxes, filters);
     /// Map: the cells of each box, its level, residents of each cell.
-    LOCATE "locate" [CELLS] (params, boxes, located, cells);
+    LOCATE "locate" [OVERLAPS, CELLS] (params, boxes, located, cells);
     /// Map: visitors of each cell.
     VISIT "visit" [CELLS] (params, located, cells);
     /// Map: prefix sums within blocks of cells.
@@ -78,13 +93,13 @@ kernels! {
     /// Schedule: the size of the dispatches that follow.
     ARRANGE "arrange" [] (params, chunk, counters, dispatches);
     /// Check: small cells.
-    CHECK_SMALL "check_small" [BLOCK_SCAN, PAIR_INDEX, EMIT]
+    CHECK_SMALL "check_small" [OVERLAPS, BLOCK_SCAN, PAIR_INDEX, EMIT]
         (params, chunk, boxes, filters, entries, counters, slots, small_items, totals, out);
     /// Check: large cells.
-    CHECK_LARGE "check_large" [EMIT]
+    CHECK_LARGE "check_large" [OVERLAPS, EMIT]
         (params, chunk, boxes, filters, entries, counters, large_items, totals, out);
     /// Check: all pairs, without a grid.
-    CHECK_ALL "check_all" [PAIR_INDEX, EMIT] (params, chunk, boxes, filters, totals, out);
+    CHECK_ALL "check_all" [OVERLAPS, PAIR_INDEX, EMIT] (params, chunk, boxes, filters, totals, out);
     /// Study: pairs of given indices.
     INDEX_PAIRS "index_pairs" [PAIR_INDEX] (params, out);
 }

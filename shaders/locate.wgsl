@@ -2,7 +2,7 @@
 // the level each cell has.
 
 @group(0) @binding(0) var<uniform> params: Params;
-@group(0) @binding(1) var<storage, read> boxes: array<Box>;
+@group(0) @binding(1) var<storage, read> boxes: array<Subject>;
 @group(0) @binding(2) var<storage, read_write> located: array<Located>;
 @group(0) @binding(3) var<storage, read_write> cells: array<atomic<u32>>;
 
@@ -41,7 +41,7 @@ fn locate(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) grou
     if id >= params.boxes {
         return;
     }
-    let one = boxes[id];
+    let one = reach_of(boxes[id]);
     if one.low[0] > one.high[0] {
         located[id].level = NO_LEVEL;
         return;
@@ -51,10 +51,11 @@ fn locate(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) grou
         at.low[axis] = finest_cell(one.low[axis], axis);
         at.high[axis] = finest_cell(one.high[axis], axis);
     }
-    at.level = level_of(low_of(at), high_of(at));
+    let level = level_of(low_of(at), high_of(at));
+    at.level = level | select(0u, MOVED, has_moved(boxes[id]));
     located[id] = at;
-    let t = touched(low_of(at), high_of(at), at.level);
+    let t = touched(low_of(at), high_of(at), level);
     for (var k = 0u; k < cell_count(t); k++) {
-        atomicAdd(&cells[2u * cell_at(t, k, at.level).x], 1u);
+        atomicAdd(&cells[2u * cell_at(t, k, level).x], 1u);
     }
 }

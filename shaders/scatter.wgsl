@@ -26,7 +26,7 @@ fn scatter(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) gro
     var visits_last = false;
     if id < params.boxes && located[id].level != NO_LEVEL {
         let at = located[id];
-        visits_last = at.level < last
+        visits_last = own_level(at) < last
             && atomicLoad(&cells[2u * last_cell + 1u]) > starts[last_cell];
         place_all(id, at, last);
     }
@@ -44,17 +44,19 @@ fn scatter(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) gro
     let end = workgroupUniformLoad(&last_end);
     if visits_last {
         // The one cell is everybody's lowest, on all axes.
-        entries[end - 1u - rank] = id | (7u << BOX_BITS);
+        entries[end - 1u - rank] = id | (located[id].level & MOVED) | (7u << AXIS_BITS);
     }
 }
 
 // A box in its own level and in those between that and the last.
 fn place_all(id: u32, at: Located, last: u32) {
-    for (var level = at.level; level == at.level || level < last; level++) {
+    let own = own_level(at);
+    let name = id | (at.level & MOVED);
+    for (var level = own; level == own || level < last; level++) {
         let t = touched(low_of(at), high_of(at), level);
         for (var k = 0u; k < cell_count(t); k++) {
             let cell = cell_at(t, k, level);
-            place(cell.x, id | cell.y, level == at.level);
+            place(cell.x, name | cell.y, level == own);
         }
     }
 }

@@ -16,7 +16,7 @@ fn visit(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) group
     let id = linear(group, groups) * LANES + lane;
     let last = params.levels - 1u;
     let last_cell = params.level[last].first_cell;
-    if id < params.boxes && located[id].level < last {
+    if id < params.boxes && own_level(located[id]) < last {
         if atomicLoad(&cells[2u * last_cell]) > 0u {
             atomicAdd(&last_visitors, 1u);
         }
@@ -34,7 +34,7 @@ fn visit(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) group
 // A box in the levels between its own and the last.
 fn count_visits(id: u32, last: u32) {
     let at = located[id];
-    for (var level = at.level + 1u; level < last; level++) {
+    for (var level = own_level(at) + 1u; level < last; level++) {
         let t = touched(low_of(at), high_of(at), level);
         for (var k = 0u; k < cell_count(t); k++) {
             let cell = cell_at(t, k, level).x;

@@ -31,7 +31,12 @@ fn cell_at(t: Touched, k: u32, level: u32) -> vec2<u32> {
     at = select(at, at - dims, at >= dims);
     let index = params.level[level].first_cell + (at.z * dims.y + at.y) * dims.x + at.x;
     let lowest = select(vec3<u32>(0u), vec3<u32>(1u, 2u, 4u), step == vec3<u32>(0u));
-    return vec2<u32>(index, (lowest.x | lowest.y | lowest.z) << BOX_BITS);
+    return vec2<u32>(index, (lowest.x | lowest.y | lowest.z) << AXIS_BITS);
+}
+
+// The level of a located box, without the mark.
+fn own_level(at: Located) -> u32 {
+    return at.level & (MOVED - 1u);
 }
 
 fn low_of(at: Located) -> vec3<i32> {

@@ -22,7 +22,29 @@ struct Box {
     high: array<i32, 3>,
 }
 
-// Cells that a box touches at the finest resolution, both ends included, and its level.
+// A box as it is, and as it was at the last update.
+struct Motion {
+    now: Box,
+    before: Box,
+}
+
+// A box that is to be what `now` says: its id, and ANEW if it was nowhere before.
+struct Move {
+    place: u32,
+    now: Box,
+}
+
+// A box that is to have another filter.
+struct Refilter {
+    id: u32,
+    filter0: u32,
+    filter1: u32,
+    filter2: u32,
+    filter3: u32,
+}
+
+// Cells that a box touches at the finest resolution, both ends included; its level, with MOVED where
+// it differs from what it was.
 struct Located {
     low: array<i32, 3>,
     high: array<i32, 3>,
@@ -61,9 +83,10 @@ struct Params {
     slot_room: u32,
     small_room: u32,
     large_room: u32,
-    unused0: u32,
-    unused1: u32,
-    unused2: u32,
+    // Boxes that the device knows from the last update, and what has changed since.
+    known: u32,
+    moves: u32,
+    refilters: u32,
     level: array<Level, MOST_LEVELS>,
 }
 
@@ -123,8 +146,13 @@ struct Counters {
     large_items: u32,
 }
 
-// An entry of a cell: the box, and for each axis whether this is the box's lowest cell there.
-const BOX_BITS = 29u;
+// An entry of a cell: the box, whether it has moved, and for each axis whether this is the box's
+// lowest cell there.
+const BOX_BITS = 28u;
+const AXIS_BITS = 29u;
+const MOVED = 1u << BOX_BITS;
+// In a Move: before, the box overlapped nothing.
+const ANEW = 0x80000000u;
 
 fn box_of(entry: u32) -> u32 {
     return entry & ((1u << BOX_BITS) - 1u);
@@ -134,7 +162,7 @@ fn box_of(entry: u32) -> u32 {
 // maximum of the boxes' lowest cells; both boxes touch this cell, so on each axis the maximum is
 // here exactly if the lowest cell of one of them is.
 fn owns(a: u32, b: u32) -> bool {
-    return ((a | b) >> BOX_BITS) == 7u;
+    return ((a | b) >> AXIS_BITS) == 7u;
 }
 
 // PBIG's equation 1, in closed intervals.

@@ -4,35 +4,43 @@
 use naga::valid::{Capabilities, ValidationFlags, Validator};
 use pbig_shaders::{KERNELS, Kernel};
 
-fn parse(kernel: &Kernel, subgroups: bool) -> naga::Module {
-    let source = kernel.source(subgroups);
+fn parse(kernel: &Kernel, subgroups: bool, changes: bool) -> naga::Module {
+    let source = kernel.source(subgroups, changes);
     naga::front::wgsl::parse_str(&source)
         .unwrap_or_else(|error| panic!("{}: {}", kernel.name, error.emit_to_string(&source)))
 }
 
-fn validate(kernel: &Kernel, subgroups: bool) -> naga::Module {
-    let module = parse(kernel, subgroups);
+fn validate(kernel: &Kernel, subgroups: bool, changes: bool) -> naga::Module {
+    let module = parse(kernel, subgroups, changes);
     let capabilities = if subgroups { Capabilities::SUBGROUP } else { Capabilities::empty() };
     let result = Validator::new(ValidationFlags::all(), capabilities).validate(&module);
     result.unwrap_or_else(|error| {
-        panic!("{}: {}", kernel.name, error.emit_to_string(&kernel.source(subgroups)))
+        panic!("{}: {}", kernel.name, error.emit_to_string(&kernel.source(subgroups, changes)))
     });
     module
 }
 
+/// Every kernel, for a search for overlaps and for one for changes.
+fn texts() -> impl Iterator<Item = (&'static &'static Kernel, bool)> {
+    KERNELS.iter().flat_map(|kernel| [(kernel, false), (kernel, true)])
+}
+
 #[test]
-fn every_kernel_is_valid_with_the_portable_base_and_with_subgroups() {
-    for kernel in KERNELS {
-        validate(kernel, false);
-        validate(kernel, true);
+fn every_text_of_every_kernel_is_valid() {
+    for (kernel, changes) in texts() {
+        validate(kernel, false, changes);
+        validate(kernel, true, changes);
+        let texts = [kernel.source(true, false), kernel.source(true, true)];
+        assert_eq!(texts[0] != texts[1], kernel.tells_changes(), "{}", kernel.name);
     }
     assert!(KERNELS.iter().any(|kernel| kernel.gains_from_subgroups()));
+    assert!(KERNELS.iter().any(|kernel| kernel.tells_changes()));
 }
 
 #[test]
 fn bindings_are_numbered_as_listed_and_there_are_no_others() {
-    for kernel in KERNELS {
-        let module = validate(kernel, false);
+    for (kernel, changes) in texts() {
+        let module = validate(kernel, false, changes);
         let mut bound: Vec<(u32, String)> = module
             .global_variables
             .iter()
@@ -59,8 +67,8 @@ fn the_list_of_kernels_is_the_list_of_files() {
 
 #[test]
 fn kernels_stay_within_the_limits_that_every_device_has() {
-    for kernel in KERNELS {
-        let module = validate(kernel, false);
+    for (kernel, changes) in texts() {
+        let module = validate(kernel, false, changes);
         let entry = &module.entry_points[0];
         assert_eq!((module.entry_points.len(), entry.name.as_str()), (1, kernel.name));
         assert!(entry.workgroup_size.iter().product::<u32>() <= 256, "{}: invocations", kernel.name);
@@ -76,6 +84,6 @@ fn kernels_stay_within_the_limits_that_every_device_has() {
 
 #[test]
 fn a_broken_kernel_does_not_pass() {
-    let broken = pbig_shaders::LOCATE.source(false).replace("params.boxes", "params.bodies");
+    let broken = pbig_shaders::LOCATE.source(false, false).replace("params.boxes", "params.bodies");
     assert!(naga::front::wgsl::parse_str(&broken).is_err());
 }

@@ -170,6 +170,7 @@ pub fn bits(words: &[u32], boxes: u32) -> Result<Vec<Vec<Pair>>, DecodeError> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::layout::AXIS_BITS;
 
     fn pair(a: u32, b: u32) -> Pair {
         Pair::new(a, b)
@@ -178,7 +179,7 @@ mod tests {
     #[test]
     fn the_example_of_the_format() {
         // docs/PAIR_FORMAT.md: a cell whose entries begin at 2, its first box with three others.
-        let entries = [9, 9, 4, 1 | 7 << BOX_BITS, 6, 0];
+        let entries = [9, 9, 4, 1 | 7 << AXIS_BITS, 6, 0];
         let row = u32::from_le_bytes([0, 2, 1, 2]);
         let words = [2, 2, 0, row, 3, PLAIN | 1, 7, 8];
         let wanted = vec![vec![pair(1, 4), pair(4, 6), pair(0, 4), pair(7, 8)]];

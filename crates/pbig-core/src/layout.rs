@@ -17,8 +17,14 @@ pub const FEWEST_CELLS: u32 = 2 * MOST_SPAN;
 pub const NO_LEVEL: u32 = u32::MAX;
 /// Cells to a workgroup of the scan and of the schedule.
 pub const CELLS_PER_BLOCK: u32 = 4 * LANES;
-/// Bits of an entry that number the box; the other three say on which axes this is its lowest cell.
-pub const BOX_BITS: u32 = 29;
+/// Bits of an entry that number the box; above them are [`MOVED`] and the axes.
+pub const BOX_BITS: u32 = 28;
+/// The first of the three bits of an entry that say on which axes this is the box's lowest cell.
+pub const AXIS_BITS: u32 = 29;
+/// Bit of an entry and of [`Located::level`], in a search for changes: the box is not what it was.
+pub const MOVED: u32 = 1 << BOX_BITS;
+/// Bit of [`Move::place`]: before, the box overlapped nothing.
+pub const ANEW: u32 = 1 << 31;
 /// Bit of [`Params::flags`]: filters are tested.
 pub const FILTERED: u32 = 1;
 /// Bit of [`Params::flags`]: the output is records (docs/PAIR_FORMAT.md) rather than plain pairs.
@@ -56,6 +62,36 @@ pub fn ordered(x: f32) -> i32 {
     bits ^ (((bits >> 31) as u32) >> 1) as i32
 }
 
+/// A box as it is, and as it was at the last update.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Pod, Zeroable)]
+pub struct Motion {
+    /// As it is.
+    pub now: Box,
+    /// As it was.
+    pub before: Box,
+}
+
+/// A box that is to be something else.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Pod, Zeroable)]
+pub struct Move {
+    /// Its id, and [`ANEW`].
+    pub place: u32,
+    /// What it is from now on.
+    pub now: Box,
+}
+
+/// A box that is to have another filter.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Pod, Zeroable)]
+pub struct Refilter {
+    /// Its id.
+    pub id: u32,
+    /// Its filter from now on.
+    pub filter: ProxyFilter,
+}
+
 /// Cells that a box touches at the finest resolution, and its level.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Pod, Zeroable)]
@@ -64,7 +100,7 @@ pub struct Located {
     pub low: [i32; 3],
     /// Highest cell on each axis.
     pub high: [i32; 3],
-    /// Its level, or [`NO_LEVEL`].
+    /// Its level, with [`MOVED`], or [`NO_LEVEL`].
     pub level: u32,
 }
 
@@ -116,8 +152,12 @@ pub struct Params {
     pub small_room: u32,
     /// Room for large work items.
     pub large_room: u32,
-    /// Padding to a multiple of 16 bytes.
-    pub unused: [u32; 3],
+    /// Boxes that the device knows from the last update, in a search for changes.
+    pub known: u32,
+    /// Length of the list of moves.
+    pub moves: u32,
+    /// Length of the list of filters that have changed.
+    pub refilters: u32,
     /// The levels, finest first.
     pub level: [Level; MOST_LEVELS],
 }
@@ -220,9 +260,10 @@ pub struct Totals {
     pub pairs: [u32; 2],
     /// Tests made.
     pub made: [u32; 2],
-    /// Tests of pairs that another cell owns.
+    /// Tests that the entries alone decide: of pairs that another cell owns, and, in a search for changes,
+    /// of boxes that have not moved.
     pub redundant: [u32; 2],
-    /// Overlapping pairs, whether filters allow them or not.
+    /// Overlapping pairs, or changed ones, whether filters allow them or not.
     pub overlaps: [u32; 2],
 }
 

@@ -16,6 +16,11 @@ pub(super) fn sorted<T: Ord + Clone>(list: &[T]) -> Vec<T> {
     list
 }
 
+pub(super) fn compare_motions(_: &State, found: &State, wanted: &State) -> Option<String> {
+    same("motions", &found.motions, &wanted.motions)
+        .or_else(|| same("filters", &found.filters, &wanted.filters))
+}
+
 pub(super) fn compare_located(before: &State, found: &State, wanted: &State) -> Option<String> {
     same("located", &found.located, &wanted.located).or_else(|| compare_cells(before, found, wanted))
 }

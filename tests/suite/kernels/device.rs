@@ -22,7 +22,9 @@ pub(super) fn on_device(bench: &Bench, twin: &Twin, options: &GpuOptions, before
     let names = twin.kernel.bindings;
     let buffers: Vec<_> = names.iter().map(|name| padded(after.bytes(name))).collect();
     let groups = (twin.groups)(before);
-    let left = bench.run(twin.kernel, options, &buffers, groups).expect("the device runs the kernel");
+    let changes = before.tells_changes();
+    let left =
+        bench.run(twin.kernel, options, changes, &buffers, groups).expect("the device runs the kernel");
     for (name, left) in names.iter().zip(&left) {
         let own = after.bytes(name);
         let len = own.len();
@@ -63,9 +65,9 @@ pub(super) fn fault(twin: &Twin, options: &GpuOptions, before: &State) -> Option
     })
 }
 
-/// On all sets.
+/// On all sets, at rest and moving.
 pub(super) fn agrees(kernel: &str) {
-    for case in cases() {
+    for case in cases().into_iter().chain(moving_cases()) {
         let before = State::before(kernel, &case);
         assert_eq!(fault(twin(kernel), &GpuOptions::DEFAULT, &before), None, "{}", case.name);
     }

@@ -22,11 +22,14 @@ macro_rules! mirrors {
 fn mirrors() -> Vec<Mirror> {
     mirrors! {
         Box { low, high }
+        Motion { now, before }
+        Move { place, now }
+        Refilter { id, filter }
         Located { low, high, level }
         Level { dims, shift, first_cell, unused }
         Params {
             origin, scale, reach_low, boxes, reach_high, levels, cells, small_cell, columns, flags, split,
-            entry_room, slot_room, small_room, large_room, unused, level
+            entry_room, slot_room, small_room, large_room, known, moves, refilters, level
         }
         Chunk { first_small, small_items, first_large, large_items, word_room, unused, pairs_left }
         Cell { residents, visitors }
@@ -37,17 +40,18 @@ fn mirrors() -> Vec<Mirror> {
     }
 }
 
-/// The Rust field that begins where a member of WGSL does: padding is one array there.
+/// The Rust field that begins where a member of WGSL does: padding is one array there, a filter one struct.
 fn field_of(member: &str) -> Option<&str> {
     match member {
         "unused0" => Some("unused"),
-        "unused1" | "unused2" => None,
+        "filter0" => Some("filter"),
+        "unused1" | "unused2" | "filter1" | "filter2" | "filter3" => None,
         other => Some(other),
     }
 }
 
 fn module_of(kernel: &Kernel) -> naga::Module {
-    let parsed = naga::front::wgsl::parse_str(&kernel.source(false));
+    let parsed = naga::front::wgsl::parse_str(&kernel.source(false, true));
     parsed.unwrap_or_else(|error| panic!("{}: {error}", kernel.name))
 }
 
@@ -90,6 +94,8 @@ fn constants_are_those_of_the_kernels() {
         ("MOST_LEVELS", layout::MOST_LEVELS as u32),
         ("NO_LEVEL", NO_LEVEL),
         ("BOX_BITS", BOX_BITS),
+        ("AXIS_BITS", AXIS_BITS),
+        ("ANEW", ANEW),
         ("FILTERED", FILTERED),
         ("PACKED", PACKED),
         ("BITS", BITS),
@@ -106,7 +112,7 @@ fn constants_are_those_of_the_kernels() {
             assert_eq!(constant_of(&module, name).unwrap_or(value), value, "{}: {name}", kernel.name);
         }
         // An abstract number, of which a parsed module keeps nothing.
-        assert!(kernel.source(false).contains(&most_span), "{}", kernel.name);
+        assert!(kernel.source(false, true).contains(&most_span), "{}", kernel.name);
     }
 }
 

@@ -3,20 +3,25 @@
 //!
 //! The twins say what a kernel is for, not how it does it; together they find the oracle's pairs.
 
+mod changes;
 mod compare;
 mod device;
+mod indices;
 mod layout_of_structs;
 mod state;
 mod twins;
 
 use bytemuck::{bytes_of_mut, cast_slice_mut};
+use changes::*;
 use compare::*;
 use device::*;
+use indices::*;
 use pbig_core::decode::{self, PLAIN};
 use pbig_core::gpu::study::Bench;
 use pbig_core::layout::{
-    self, BITS, BOX_BITS, CELLS_PER_BLOCK, Cell, Chunk, Counters, FILTERED, LANES, LargeItem, Level, Located,
-    MOST_SPAN, NO_LEVEL, PACKED, Params, Slot, SmallItem, Totals, halves, wide,
+    self, ANEW, AXIS_BITS, BITS, BOX_BITS, CELLS_PER_BLOCK, Cell, Chunk, Counters, FILTERED, LANES,
+    LargeItem, Level, Located, MOST_SPAN, MOVED, Motion, Move, NO_LEVEL, PACKED, Params, Refilter, Slot,
+    SmallItem, Totals, halves, wide,
 };
 use pbig_core::pair_index::{index_of, pair_count, pair_of};
 use pbig_core::plan::{GpuPlan, Summary};
@@ -211,8 +216,13 @@ fn check_all_agrees_with_its_twin() {
 #[test]
 fn check_all_agrees_with_its_twin_on_few_boxes() {
     for n in [1, 2, 3, 8, 9, 23, 24, 33] {
-        let case =
-            Case { name: "few", boxes: vec![Aabb::new([0.0; 3], [1.0; 3]); n], small_cell: 32, columns: 8 };
+        let case = Case {
+            name: "few",
+            boxes: vec![Aabb::new([0.0; 3], [1.0; 3]); n],
+            before: Vec::new(),
+            small_cell: 32,
+            columns: 8,
+        };
         for flags in [0, PACKED, BITS] {
             let before = State::new(&case).with(flags, 0);
             let fault = fault(twin("check_all"), &GpuOptions::DEFAULT, &before);
@@ -313,35 +323,6 @@ fn scatter_writes_nothing_without_room_for_all() {
     assert_eq!(same("cells", &found.cells, &before.cells), None);
 }
 
-#[test]
-fn index_pairs_agrees_with_its_twin_for_every_root() {
-    for n in [2u32, 3, 4, 5, 31, 32, 33, 100, 257, 1000, 4097, 16_384, 32_767, 32_768] {
-        let all = pair_count(n.into()) as u32;
-        let count = all.min(20_000);
-        for first in [0, (all - count) / 3, all - count] {
-            for root in 0..=9 {
-                let place = format!("n {n}, from {first}, root {root}");
-                assert_eq!(index_fault(root, &indices(n, first, count)), None, "{place}");
-            }
-        }
-    }
-}
-
-/// The exact pairs, and how far off the estimated rows may be: one or two for a good root; one Newton
-/// step leaves an error of up to 0.18% of the root, which is up to twice n.
-fn index_fault(root: u32, before: &State) -> Option<String> {
-    let options = GpuOptions { root, ..GpuOptions::DEFAULT };
-    let kernel = twin("index_pairs");
-    let wanted = after_twin(kernel, before);
-    let found = on_device(bench(true), kernel, &options, &with_room(before, &wanted));
-    let far = if matches!(root, 1 | 5) { 2 + before.params.boxes / 500 } else { 2 };
-    let rows = found.out.iter().zip(&wanted.out).step_by(3);
-    let worst = rows.max_by_key(|(estimate, row)| estimate.abs_diff(**row))?;
-    let near = worst.0.abs_diff(*worst.1) <= far;
-    (kernel.compare)(before, &found, &wanted)
-        .or_else(|| (!near).then(|| format!("row {} was estimated as {}", worst.1, worst.0)))
-}
-
 /// Spoils what a kernel has left.
 type Plant = fn(&mut State);
 
@@ -361,7 +342,7 @@ fn planted_faults_are_noticed() {
         ("schedule", |s| s.small_items[1].slot -= 1),
         ("schedule", |s| s.small_items[1].pairs -= 1),
         ("schedule", |s| s.large_items.truncate(s.large_items.len() - 1)),
-        ("scatter", |s| s.entries[5] ^= 1 << BOX_BITS),
+        ("scatter", |s| s.entries[5] ^= 1 << AXIS_BITS),
         ("scatter", |s| s.entries[5] += 1),
         ("arrange", |s| s.dispatches[3] += 1),
         ("check_small", drop_a_pair),
@@ -397,9 +378,9 @@ fn drop_a_pair(s: &mut State) {
 fn an_entry_that_lost_a_bit_costs_pairs() {
     let mut before = State::before("check_small", &pile());
     let wanted = after_twin(twin("check_small"), &before);
-    let lost = 7u32 << BOX_BITS;
+    let lost = 7u32 << AXIS_BITS;
     for entry in &mut before.entries {
-        *entry = if *entry & lost == lost { *entry & !(1 << BOX_BITS) } else { *entry };
+        *entry = if *entry & lost == lost { *entry & !(1 << AXIS_BITS) } else { *entry };
     }
     let before = with_room(&before, &wanted);
     let found = on_device(bench(true), twin("check_small"), &GpuOptions::DEFAULT, &before);

@@ -11,6 +11,10 @@ pub(super) struct State {
     pub(super) params: Params,
     pub(super) chunk: Chunk,
     pub(super) boxes: Vec<layout::Box>,
+    /// In a search for changes, in place of the boxes.
+    pub(super) motions: Vec<Motion>,
+    pub(super) moves: Vec<Move>,
+    pub(super) refilters: Vec<Refilter>,
     pub(super) filters: Vec<ProxyFilter>,
     pub(super) located: Vec<Located>,
     pub(super) cells: Vec<Cell>,
@@ -30,6 +34,8 @@ pub(super) struct State {
 pub(super) struct Case {
     pub(super) name: &'static str,
     pub(super) boxes: Vec<Aabb>,
+    /// What they were, for a search for changes; empty for one for overlaps.
+    pub(super) before: Vec<Aabb>,
     pub(super) small_cell: u32,
     pub(super) columns: u32,
 }
@@ -40,7 +46,8 @@ pub(super) fn set(name: &str, n: usize) -> Vec<Aabb> {
 
 pub(super) fn cases() -> Vec<Case> {
     let decades = corpus().into_iter().find(|case| case.name == "sizes over twelve decades");
-    let case = |name, boxes, small_cell, columns| Case { name, boxes, small_cell, columns };
+    let case =
+        |name, boxes, small_cell, columns| Case { name, boxes, before: Vec::new(), small_cell, columns };
     vec![
         case("mixed", set("mixed", 3000), 32, 8),
         pile(),
@@ -53,14 +60,14 @@ pub(super) fn cases() -> Vec<Case> {
 
 /// Cells of about four boxes, half of which count as large.
 pub(super) fn pile() -> Case {
-    Case { name: "pile", boxes: set("pile", 6000), small_cell: 4, columns: 8 }
+    Case { name: "pile", boxes: set("pile", 6000), before: Vec::new(), small_cell: 4, columns: 8 }
 }
 
 /// Many identical boxes across the borders of cells: large cells that own none of their pairs.
 pub(super) fn crowd() -> Case {
     let mut boxes = set("pile", 1000);
     boxes.extend(vec![boxes[500]; 700]);
-    Case { name: "crowd in a pile", boxes, small_cell: 32, columns: 2 }
+    Case { name: "crowd in a pile", boxes, before: Vec::new(), small_cell: 32, columns: 2 }
 }
 
 /// Filters that allow some pairs, and forbid some for each of the reasons there are.
@@ -79,7 +86,7 @@ impl State {
     /// The buffers of a call before its first kernel, with room for exactly what will be found.
     pub(super) fn new(case: &Case) -> Self {
         let n = case.boxes.len();
-        let plan = GpuPlan::new(&Summary::of(&case.boxes, None), &Config::DEFAULT, 1.0, 1 << 20);
+        let plan = GpuPlan::new(&Summary::of(&reaches(case), None), &Config::DEFAULT, 1.0, 1 << 20);
         let (small_cell, columns) = (case.small_cell, case.columns);
         let params = Params { boxes: n as u32, small_cell, columns, ..plan.params() };
         let mut state = Self {
@@ -105,6 +112,7 @@ impl State {
             },
             ..Self::default()
         };
+        state.add_changes(case);
         state.make_room();
         state
     }
@@ -151,7 +159,10 @@ impl State {
         match binding {
             "params" => bytes_of_mut(&mut self.params),
             "chunk" => bytes_of_mut(&mut self.chunk),
+            "boxes" if self.tells_changes() => cast_slice_mut(&mut self.motions),
             "boxes" => cast_slice_mut(&mut self.boxes),
+            "moves" => cast_slice_mut(&mut self.moves),
+            "refilters" => cast_slice_mut(&mut self.refilters),
             "filters" => cast_slice_mut(&mut self.filters),
             "located" => cast_slice_mut(&mut self.located),
             "cells" => cast_slice_mut(&mut self.cells),
@@ -173,10 +184,4 @@ impl State {
 /// Room for entries, slots, small and large items.
 pub(super) fn set_rooms(params: &mut Params, rooms: &[u32; 4]) {
     [params.entry_room, params.slot_room, params.small_room, params.large_room] = *rooms;
-}
-
-/// What index_pairs reads and writes for `count` indices from `first` on.
-pub(super) fn indices(n: u32, first: u32, count: u32) -> State {
-    let params = Params { boxes: n, split: first, cells: count, ..Params::default() };
-    State { params, ..State::default() }
 }

@@ -12,7 +12,9 @@ pub(super) struct Twin {
 }
 
 /// The twins, in the order in which the kernels run.
-pub(super) static TWINS: [Twin; 12] = [
+pub(super) static TWINS: [Twin; 14] = [
+    Twin { kernel: &shaders::SETTLE, run: settle, groups: by_known, compare: compare_motions },
+    Twin { kernel: &shaders::RENEW, run: renew, groups: by_change, compare: compare_motions },
     Twin { kernel: &shaders::LOCATE, run: locate, groups: by_box, compare: compare_located },
     Twin { kernel: &shaders::VISIT, run: visit, groups: by_box, compare: compare_cells },
     Twin { kernel: &shaders::SCAN_BLOCKS, run: scan_blocks, groups: by_block, compare: compare_blocks },
@@ -61,16 +63,17 @@ pub(super) fn by_pair(s: &State) -> u32 {
 
 pub(super) fn locate(s: &mut State) {
     for id in 0..s.boxes.len() {
-        let one = s.boxes[id];
+        let one = s.reach(id);
         if one.low[0] > one.high[0] {
             s.located[id].level = NO_LEVEL;
             continue;
         }
         let cells = |corner: [i32; 3]| [0, 1, 2].map(|k| finest_cell(&s.params, corner[k], k));
         let mut at = Located { low: cells(one.low), high: cells(one.high), level: 0 };
-        at.level = level_of(&s.params, &at);
+        let level = level_of(&s.params, &at);
+        at.level = level | if s.has_moved(id) { MOVED } else { 0 };
         s.located[id] = at;
-        for (cell, _) in cells_of(&s.params, &at, at.level) {
+        for (cell, _) in cells_of(&s.params, &at, level) {
             s.cells[cell].residents += 1;
         }
     }
@@ -116,12 +119,17 @@ pub(super) fn cell_at(l: &Level, place: [i32; 3], lowest: [i32; 3]) -> (usize, u
     let wrapped = |k: usize| ((i64::from(place[k]) + (1 << 30)) % i64::from(l.dims[k])) as u32;
     let index = l.first_cell + (wrapped(2) * l.dims[1] + wrapped(1)) * l.dims[0] + wrapped(0);
     let axes: u32 = (0..3).map(|k| u32::from(place[k] == lowest[k]) << k).sum();
-    (index as usize, axes << BOX_BITS)
+    (index as usize, axes << AXIS_BITS)
+}
+
+/// The level without the mark; that of an invalid box is beyond all.
+pub(super) fn own_level(at: &Located) -> u32 {
+    at.level & (MOVED - 1)
 }
 
 pub(super) fn visit(s: &mut State) {
     for at in s.located.iter().filter(|at| at.level != NO_LEVEL) {
-        for level in at.level + 1..s.params.levels {
+        for level in own_level(at) + 1..s.params.levels {
             for (cell, _) in cells_of(&s.params, at, level) {
                 let cell = &mut s.cells[cell];
                 cell.visitors += u32::from(cell.residents > 0);
@@ -234,9 +242,10 @@ pub(super) fn scatter(s: &mut State) {
     for id in 0..s.located.len() {
         let at = s.located[id];
         // For invalid boxes the range is empty.
-        for level in at.level..s.params.levels {
+        let own = own_level(&at);
+        for level in own..s.params.levels {
             for (cell, axes) in cells_of(&s.params, &at, level) {
-                place(s, cell, id as u32 | axes, level == at.level);
+                place(s, cell, id as u32 | (at.level & MOVED) | axes, level == own);
             }
         }
     }
@@ -279,7 +288,7 @@ impl Checked {
     pub(super) fn test_entries(&mut self, s: &State, a: u32, b: u32) {
         let (i, j) = (box_of(a), box_of(b));
         let split = s.params.split;
-        if (a | b) >> BOX_BITS != 7 || (split > 0 && (i < split) == (j < split)) {
+        if !is_due(s, a | b) || (split > 0 && (i < split) == (j < split)) {
             self.made += 1;
             self.redundant += 1;
         } else {
@@ -289,7 +298,7 @@ impl Checked {
 
     pub(super) fn test_boxes(&mut self, s: &State, i: u32, j: u32) {
         self.made += 1;
-        if !overlap(&s.boxes[i as usize], &s.boxes[j as usize]) {
+        if !s.matter(i as usize, j as usize) {
             return;
         }
         self.overlaps += 1;
@@ -316,6 +325,11 @@ impl Checked {
 
 pub(super) fn box_of(entry: u32) -> u32 {
     entry & ((1 << BOX_BITS) - 1)
+}
+
+/// Whether a cell may own pairs of entries with these marks, and they may matter.
+pub(super) fn is_due(s: &State, marks: u32) -> bool {
+    marks >> AXIS_BITS == 7 && (!s.tells_changes() || marks & MOVED != 0)
 }
 
 pub(super) fn overlap(a: &layout::Box, b: &layout::Box) -> bool {
@@ -369,9 +383,10 @@ pub(super) fn check_large_item(s: &State, item: &LargeItem, checked: &mut Checke
     let entry = |place: u32| s.entries[(item.start + place) as usize];
     let segments = |from: u32, to: u32| from * LANES..(to * LANES).min(item.boxes);
     let (rows, columns) = (segments(item.row, item.row + 1), segments(item.column, item.end_column));
-    // A cell that is nobody's lowest on some axis owns none of these pairs: they are not even tested.
-    let axes = rows.clone().chain(columns.clone()).fold(0, |axes, place| axes | entry(place));
-    if axes >> BOX_BITS != 7 {
+    // A cell that is nobody's lowest on some axis owns none of these pairs: they are not even tested. No
+    // more are they where nobody has moved.
+    let marks = rows.clone().chain(columns.clone()).fold(0, |marks, place| marks | entry(place));
+    if !is_due(s, marks) {
         return;
     }
     for i in rows.start..rows.end.min(item.residents) {
@@ -389,13 +404,4 @@ pub(super) fn check_all(s: &mut State) {
         }
     }
     checked.leave(s);
-}
-
-/// The estimated row is the exact one here; a kernel's may be near it.
-pub(super) fn index_pairs(s: &mut State) {
-    s.out.clear();
-    for i in 0..s.params.cells {
-        let (a, b) = pair_of((s.params.split + i).into(), s.params.boxes.into());
-        s.out.extend([a as u32, a as u32, b as u32]);
-    }
 }

@@ -30,11 +30,18 @@ pub enum Fault {
 pub(super) struct Variant {
     root: u32,
     balanced: bool,
+    /// Whether changes are searched for rather than overlaps.
+    changes: bool,
 }
 
 impl Variant {
-    pub(super) fn new(options: &GpuOptions) -> Self {
-        Self { root: options.root.min(9), balanced: options.load_balancing }
+    pub(super) fn new(options: &GpuOptions, changes: bool) -> Self {
+        Self { root: options.root.min(9), balanced: options.load_balancing, changes }
+    }
+
+    /// Two variants that are the same to a kernel are one.
+    fn to(self, kernel: &Kernel) -> Self {
+        Self { changes: self.changes && kernel.tells_changes(), ..self }
     }
 
     /// The overrides that a kernel has.
@@ -185,11 +192,12 @@ impl Engine {
         kernel: &'static Kernel,
         variant: Variant,
     ) -> Result<wgpu::ComputePipeline, GpuError> {
+        let variant = variant.to(kernel);
         let mut pipelines = lock(&self.pipelines);
         if let Some(pipeline) = pipelines.get(&(kernel.name, variant)) {
             return Ok(pipeline.clone());
         }
-        let mut source = kernel.source(self.subgroups);
+        let mut source = kernel.source(self.subgroups, variant.changes);
         if self.strikes(Fault::RefuseShader) {
             source.push_str("this is no WGSL");
         }

@@ -43,6 +43,8 @@ impl Session {
         record: &mut dyn FnMut(&mut Commands<'_>) -> Result<(), GpuError>,
     ) -> Result<Flight, GpuError> {
         let (engine, storage) = (self.engine.clone(), &mut self.storage);
+        // Taken in once, however often a map or a chunk is repeated.
+        let news = self.news.take();
         let most = storage.most_bytes();
         let first = self.options.first_bytes.min(most);
         storage.ensure(&engine, sided("out", side), (4 * words).clamp(first, most))?;
@@ -63,11 +65,14 @@ impl Session {
         engine.queue.write_buffer(storage.get("params"), 0, bytemuck::bytes_of(params));
         engine.queue.write_buffer(storage.get(sided("chunk", side)), 0, bytemuck::bytes_of(&chunk));
         let clock = self.clocks[side].as_ref();
-        let variant = Variant::new(&self.options);
+        let variant = Variant::new(&self.options, self.changes);
         let queries = clock.map(|clock| &clock.queries);
         let mut commands = Commands::new(&engine, &self.storage, &mut self.binds, variant, queries, side);
         let totals = commands.buffer("totals");
         commands.encoder.clear_buffer(totals, 0, None);
+        if let Some(news) = news {
+            news.record(&mut commands)?;
+        }
         record(&mut commands)?;
         readback::record(&mut commands, clock, prefetched);
         let (encoder, passes) = (commands.encoder, commands.passes);

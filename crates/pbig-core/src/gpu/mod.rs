@@ -21,6 +21,7 @@
 //! ```
 
 mod adapter;
+mod changes;
 mod coding;
 mod commands;
 mod engine;
@@ -38,6 +39,7 @@ mod trial;
 mod upload;
 
 pub use adapter::adapters;
+use changes::ChangeRequest;
 #[doc(hidden)]
 pub use engine::Fault;
 pub(crate) use error::Failure;
@@ -49,7 +51,7 @@ use crate::plan::Summary;
 use crate::report::Report;
 use crate::{Aabb, Backend, Config, GpuOptions, ProxyFilter};
 use engine::Engine;
-use search::{Searched, search};
+use search::{Searched, Task, search};
 use session::Session;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -194,12 +196,23 @@ impl GpuFinder {
         found.clear();
         self.check_pause(request.config)?;
         let result = self.try_find(request, found, report);
-        if let Err(Failure::Device(error)) = &result {
-            found.clear();
-            self.session = None;
-            self.failed = Some((Instant::now(), error.to_string()));
+        if let Err(failure) = &result {
+            self.fail(failure, found);
         }
         result
+    }
+
+    /// Nothing of a call that failed is relied upon later.
+    fn fail(&mut self, failure: &Failure, found: &mut Found) {
+        found.clear();
+        match (failure, &mut self.session) {
+            (Failure::Call(_), Some((_, session))) => session.mirror.forget_motions(),
+            (Failure::Call(_), None) => {}
+            (Failure::Device(error), session) => {
+                *session = None;
+                self.failed = Some((Instant::now(), error.to_string()));
+            }
+        }
     }
 
     /// Whether calls stay on the CPU because the device failed a short while ago.
@@ -252,21 +265,26 @@ impl GpuFinder {
         let crowding = self.crowding;
         let session = self.session(&request.config.gpu)?;
         let engine = session.engine.clone();
-        let searched = engine.watch(|| search(session, request, crowding, found))?;
+        let searched = engine.watch(|| search(session, &Task::new(request), crowding, found))?;
         session.end_call();
+        let useful = request.boxes.len() as u64 + searched.pairs;
+        self.finish(searched, useful, report);
+        Ok(())
+    }
+
+    /// A search has succeeded; boxes and pairs were worth `useful` tests.
+    fn finish(&mut self, searched: Searched, useful: u64, report: &mut Report) {
         self.failed = None;
         if searched.plan.gpu.is_some() {
-            self.learn(&searched, request.boxes.len());
+            self.learn(&searched, useful.max(1));
         }
         report.checks = searched.checks;
         report.plan = searched.plan;
         report.gpu = Some(searched.gpu);
-        Ok(())
     }
 
     /// Finer cells next time if these were far too full, coarser ones if they were nearly empty.
-    fn learn(&mut self, searched: &Searched, boxes: usize) {
-        let useful = (searched.pairs + boxes as u64).max(1);
+    fn learn(&mut self, searched: &Searched, useful: u64) {
         let waste = searched.checks.made / useful;
         if waste > 64 {
             self.crowding = (self.crowding * 0.5).max(1.0 / 64.0);

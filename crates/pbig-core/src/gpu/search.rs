@@ -1,11 +1,11 @@
 //! What a call searches: everything at once where it fits, or in parts.
 
 use super::error::Failure;
-use super::session::{Job, Session};
+use super::session::{Input, Job, Session};
 use super::sink::Sink;
-use super::{GpuError, Request, parts};
+use super::{ChangeRequest, GpuError, Request, parts};
 use crate::cpu::find::Found;
-use crate::layout::{BOX_BITS, Located};
+use crate::layout::{BOX_BITS, Located, Motion};
 use crate::plan::{Chosen, GpuPlan, Plan, Summary};
 use crate::report::{Checks, GpuReport};
 use crate::{Aabb, Config, ProxyFilter, Strategy};
@@ -19,6 +19,28 @@ const MOST_IN_A_CELL: u64 = 1 << 25;
 /// Fewest boxes that are split further for want of room.
 const SMALLEST_PART: usize = 256;
 
+/// What a search is for.
+pub(super) struct Task<'a> {
+    /// The boxes; in a search for changes what each reaches, now or before.
+    pub(super) boxes: &'a [Aabb],
+    pub(super) filters: Option<&'a [ProxyFilter]>,
+    /// None: for all pairs that overlap.
+    pub(super) changes: Option<&'a ChangeRequest<'a>>,
+    pub(super) accept: Option<&'a (dyn Fn(u32, u32) -> bool + Sync)>,
+    /// Most pairs.
+    pub(super) limit: u64,
+    pub(super) summary: &'a Summary,
+    pub(super) config: &'a Config,
+}
+
+impl<'a> Task<'a> {
+    /// All pairs that overlap.
+    pub(super) fn new(request: &Request<'a>) -> Self {
+        let &Request { boxes, filters, accept, summary, config } = request;
+        Self { boxes, filters, changes: None, accept, limit: config.limits.max_pairs, summary, config }
+    }
+}
+
 /// What a search came to.
 pub(super) struct Searched {
     pub(super) checks: Checks,
@@ -30,14 +52,14 @@ pub(super) struct Searched {
 /// Searches in as few parts as fit.
 pub(super) fn search(
     session: &mut Session,
-    request: &Request<'_>,
+    task: &Task<'_>,
     crowding: f32,
     found: &mut Found,
 ) -> Result<Searched, Failure> {
-    let len = request.boxes.len();
+    let len = task.boxes.len();
     // What one set needed says nothing about one of another size.
     session.parted = session.parted.filter(|&(parted, _)| parted / 2 <= len && len / 2 <= parted);
-    let mut most = most_boxes(session).min(session.parted.map_or(usize::MAX, |(_, most)| most));
+    let mut most = most_boxes(session, task).min(session.parted.map_or(usize::MAX, |(_, most)| most));
     loop {
         found.clear();
         let gpu = GpuReport {
@@ -50,16 +72,16 @@ pub(super) fn search(
             used: 0,
             pairs: 0,
             written: 0,
-            limit: request.config.limits.max_pairs,
+            limit: task.limit,
             ids: None,
-            accept: request.accept,
+            accept: task.accept,
             checks: Checks::default(),
             report: gpu,
         };
-        let result = if request.boxes.len() <= most {
-            search_whole(session, request, crowding, &mut sink)
+        let result = if task.boxes.len() <= most {
+            search_whole(session, task, crowding, &mut sink)
         } else {
-            search_parts(session, request, crowding, most, &mut sink)
+            search_parts(session, task, crowding, most, &mut sink)
         };
         match result {
             // A list that only the device knows the length of was too long: fewer boxes make it shorter.
@@ -80,8 +102,9 @@ pub(super) fn search(
 }
 
 /// How many boxes fit: each has a place in every buffer, and a number in an entry.
-fn most_boxes(session: &Session) -> usize {
-    let by_bytes = session.storage.most_bytes() / size_of::<Located>() as u64;
+fn most_boxes(session: &Session, task: &Task<'_>) -> usize {
+    let largest = if task.changes.is_some() { size_of::<Motion>() } else { size_of::<Located>() };
+    let by_bytes = session.storage.most_bytes() / largest as u64;
     by_bytes.min(1 << BOX_BITS).min(MOST_IN_A_CELL) as usize
 }
 
@@ -94,20 +117,21 @@ fn check_entries(plan: &GpuPlan, boxes: usize) -> Result<(), GpuError> {
 
 fn search_whole(
     session: &mut Session,
-    request: &Request<'_>,
+    task: &Task<'_>,
     crowding: f32,
     sink: &mut Sink<'_>,
 ) -> Result<Plan, Failure> {
     sink.report.parts = 1;
-    let valid = request.summary.valid;
+    let valid = task.summary.valid;
     if valid < 2 {
         return Ok(Plan { boxes: valid, ..Plan::default() });
     }
-    let config = request.config;
-    let brute = config.strategy == Strategy::Auto && request.boxes.len() <= SMALL_SCENE;
-    let plan = (!brute).then(|| plan(session, request.summary, config, crowding));
-    plan.as_ref().map_or(Ok(()), |plan| check_entries(plan, request.boxes.len()))?;
-    let job = Job { boxes: request.boxes, filters: request.filters, split: 0, plan: plan.as_ref(), config };
+    let config = task.config;
+    let brute = config.strategy == Strategy::Auto && task.boxes.len() <= SMALL_SCENE;
+    let plan = (!brute).then(|| plan(session, task.summary, config, crowding));
+    plan.as_ref().map_or(Ok(()), |plan| check_entries(plan, task.boxes.len()))?;
+    let input = task.changes.map_or(Input::Boxes(task.boxes), Input::Changes);
+    let job = Job { input, filters: task.filters, split: 0, plan: plan.as_ref(), config };
     session.run(&job, sink)?;
     let (chosen, swept) = if brute { (Chosen::Brute, valid) } else { (Chosen::Pbig, 0) };
     Ok(Plan { chosen, swept, boxes: valid, gpu: plan, ..Plan::default() })
@@ -120,24 +144,33 @@ fn plan(session: &Session, summary: &Summary, config: &Config, crowding: f32) ->
 
 fn search_parts(
     session: &mut Session,
-    request: &Request<'_>,
+    task: &Task<'_>,
     crowding: f32,
     most: usize,
     sink: &mut Sink<'_>,
 ) -> Result<Plan, Failure> {
-    let (sorted, axis) = parts::sorted(request.boxes, request.summary);
-    let parts = parts::parts(request.boxes, &sorted, axis, most / 2);
+    let (sorted, axis) = parts::sorted(task.boxes, task.summary);
+    let parts = parts::parts(task.boxes, &sorted, axis, most / 2);
+    // The device gets to know a part at a time.
+    session.mirror.forget_motions();
+    let all = task.changes.map(|changes| changes.motions(0..task.boxes.len()));
     let mut last = None;
     for part in &parts {
         let ids: Vec<u32> = [part.first, part.second].concat();
-        let boxes: Vec<Aabb> = ids.iter().map(|&id| request.boxes[id as usize]).collect();
+        let motions: Option<Vec<Motion>> =
+            all.as_ref().map(|all| ids.iter().map(|&id| all[id as usize]).collect());
+        if motions.as_ref().is_some_and(|motions| motions.iter().all(|motion| motion.now == motion.before)) {
+            continue;
+        }
+        let boxes: Vec<Aabb> = ids.iter().map(|&id| task.boxes[id as usize]).collect();
         let filters: Option<Vec<ProxyFilter>> =
-            request.filters.map(|all| ids.iter().map(|&id| all[id as usize]).collect());
+            task.filters.map(|all| ids.iter().map(|&id| all[id as usize]).collect());
         let split = if part.second.is_empty() { 0 } else { part.first.len() as u32 };
-        let plan = plan(session, &Summary::of(&boxes, None), request.config, crowding);
+        let plan = plan(session, &Summary::of(&boxes, None), task.config, crowding);
         check_entries(&plan, boxes.len())?;
-        let config = request.config;
-        let job = Job { boxes: &boxes, filters: filters.as_deref(), split, plan: Some(&plan), config };
+        let config = task.config;
+        let input = motions.as_deref().map_or(Input::Boxes(&boxes), Input::Motions);
+        let job = Job { input, filters: filters.as_deref(), split, plan: Some(&plan), config };
         let mut own = Sink { ids: Some(&ids), found: &mut *sink.found, report: sink.report.clone(), ..*sink };
         session.run(&job, &mut own)?;
         (sink.used, sink.pairs, sink.written) = (own.used, own.pairs, own.written);
@@ -145,6 +178,6 @@ fn search_parts(
         last = Some(plan);
     }
     sink.report.parts = parts.len() as u32;
-    let valid = request.summary.valid;
+    let valid = task.summary.valid;
     Ok(Plan { chosen: Chosen::Pbig, boxes: valid, gpu: last, ..Plan::default() })
 }

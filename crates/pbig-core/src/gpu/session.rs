@@ -1,5 +1,6 @@
 //! A search on a device: one submission and one wait, unless there is more work or output than fits.
 
+use super::changes::Trail;
 use super::coding::CodingChoice;
 use super::commands::{BindGroups, Groups};
 use super::engine::Engine;
@@ -8,10 +9,10 @@ use super::flight::{Flight, Landed};
 use super::readback::Clock;
 use super::sink::Sink;
 use super::storage::Storage;
-use super::upload::Mirror;
-use super::{GpuError, map};
+use super::upload::{Mirror, News};
+use super::{ChangeRequest, GpuError, map};
 use crate::config::{Coding, GpuOptions};
-use crate::layout::{BITS, Chunk, Counters, FILTERED, LANES, PACKED, Params};
+use crate::layout::{BITS, Chunk, Counters, FILTERED, LANES, Motion, PACKED, Params};
 use crate::pair_index::pair_count;
 use crate::plan::GpuPlan;
 use crate::report::lap;
@@ -28,9 +29,30 @@ const MOST_REPEATS: u32 = 6;
 /// Boxes of one cell that records can name: 2^16 segments.
 const MOST_PACKED: usize = 1 << 24;
 
+/// What a search is about.
+#[derive(Clone, Copy)]
+pub(super) enum Input<'a> {
+    /// Boxes as they are.
+    Boxes(&'a [Aabb]),
+    /// Boxes as they are and were.
+    Motions(&'a [Motion]),
+    /// The same, as changes of what the device knows if it knows it.
+    Changes(&'a ChangeRequest<'a>),
+}
+
+impl Input<'_> {
+    fn len(self) -> usize {
+        match self {
+            Self::Boxes(boxes) => boxes.len(),
+            Self::Motions(motions) => motions.len(),
+            Self::Changes(request) => request.boxes.len(),
+        }
+    }
+}
+
 /// One search.
 pub(super) struct Job<'a> {
-    pub(super) boxes: &'a [Aabb],
+    pub(super) input: Input<'a>,
     pub(super) filters: Option<&'a [ProxyFilter]>,
     /// Only pairs of one box below and one from here on, unless 0.
     pub(super) split: u32,
@@ -45,6 +67,11 @@ pub(super) struct Session {
     pub(super) engine: Arc<Engine>,
     pub(super) storage: Storage,
     pub(super) mirror: Mirror,
+    /// What the device has been sent of boxes that it knows, until a submission takes it in.
+    pub(super) news: Option<News>,
+    pub(super) trail: Trail,
+    /// Whether this job searches for changes rather than overlaps.
+    pub(super) changes: bool,
     pub(super) binds: BindGroups,
     pub(super) clocks: [Option<Clock>; 2],
     pub(super) room: map::Room,
@@ -68,6 +95,9 @@ impl Session {
         Ok(Self {
             storage: Storage::new(&engine, options),
             mirror: Mirror::new(),
+            news: None,
+            trail: Trail::default(),
+            changes: false,
             binds: BindGroups::default(),
             clocks,
             room: map::Room::default(),
@@ -88,13 +118,25 @@ impl Session {
         self.words = std::mem::take(&mut self.most_words);
         self.word_room = self.words;
         let mut clock = Instant::now();
-        self.mirror.upload(&self.engine, &mut self.storage, job.boxes, job.filters)?;
+        self.upload(job)?;
         sink.report.uploaded += self.mirror.sent;
         sink.report.upload += lap(&mut clock);
         let result =
             if job.plan.is_some() { self.search_grid(job, sink) } else { self.search_all(job, sink) };
         sink.report.device_bytes = sink.report.device_bytes.max(self.storage.bytes());
         result
+    }
+
+    fn upload(&mut self, job: &Job<'_>) -> Result<(), GpuError> {
+        let (engine, storage, mirror) = (&self.engine, &mut self.storage, &mut self.mirror);
+        self.changes = !matches!(job.input, Input::Boxes(_));
+        self.news = None;
+        match job.input {
+            Input::Boxes(boxes) => mirror.upload(engine, storage, boxes, job.filters)?,
+            Input::Motions(motions) => mirror.upload_motions(engine, storage, motions, job.filters)?,
+            Input::Changes(request) => self.news = mirror.upload_changes(engine, storage, request)?,
+        }
+        Ok(())
     }
 
     /// To be called after a call, which is one job or several.
@@ -112,12 +154,15 @@ impl Session {
 
     fn params(&self, job: &Job<'_>) -> Params {
         let mut params = job.plan.map_or(Params::default(), GpuPlan::params);
-        params.boxes = job.boxes.len() as u32;
+        params.boxes = job.input.len() as u32;
         params.small_cell = job.config.small_cell.clamp(1, LANES);
         // An item's output must fit the smallest buffer.
         params.columns = if self.storage.most_bytes() < 8 << 20 { 1 } else { 8 };
         params.flags = if job.filters.is_some() { FILTERED } else { 0 };
         params.split = job.split;
+        if let Some(news) = self.news {
+            (params.known, params.moves, params.refilters) = (news.known, news.moves, news.refilters);
+        }
         params
     }
 
@@ -130,7 +175,7 @@ impl Session {
     /// Without a grid (Avril 3.2), one submission.
     fn search_all(&mut self, job: &Job<'_>, sink: &mut Sink<'_>) -> Result<(), Failure> {
         let mut params = self.params(job);
-        let all = pair_count(job.boxes.len() as u64);
+        let all = pair_count(job.input.len() as u64);
         let bit_words = all.div_ceil(32);
         let mut bits = match job.config.gpu.coding {
             Coding::Auto => bit_words <= 2 * self.coding.pairs,
@@ -163,7 +208,7 @@ impl Session {
     /// With a grid: map, schedule and the first chunk in one submission; the other chunks after it.
     fn search_grid(&mut self, job: &Job<'_>, sink: &mut Sink<'_>) -> Result<(), Failure> {
         let mut params = self.params(job);
-        let packed = self.coding.packed(job.config.gpu.coding) && job.boxes.len() < MOST_PACKED;
+        let packed = self.coding.packed(job.config.gpu.coding) && job.input.len() < MOST_PACKED;
         params.flags |= if packed { PACKED } else { 0 };
         let before = (sink.written, sink.report.compression);
         let [small_items, large_items] = self.chunk();

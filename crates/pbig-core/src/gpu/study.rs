@@ -1,10 +1,16 @@
-//! One kernel alone, on given buffers: for tests against its scalar twin, and for studies.
+//! One kernel alone, on given buffers, and updates alone, without a broad phase around them: for tests,
+//! and for studies.
 
+pub use super::changes::{Change, ChangeRequest};
 use super::engine::{Engine, Variant};
-use super::{GpuError, readback};
+use super::{Failure, GpuError, GpuFinder, readback};
+use crate::Pair;
 use crate::config::GpuOptions;
+use crate::cpu::find::Found;
+use crate::report::Report;
 use pbig_shaders::Kernel;
-use std::time::Instant;
+use std::error::Error;
+use std::time::{Duration, Instant};
 
 /// Copies in a submission that is timed, so that handing it over counts for little.
 const COPIES: u64 = 16;
@@ -69,7 +75,8 @@ impl Bench {
     }
 
     /// Runs a kernel on the bytes of each of its bindings, in their order, and returns the bytes that
-    /// they have afterwards; uniforms come back as they were.
+    /// they have afterwards; uniforms come back as they were. Of kernels that have two texts, the one for
+    /// a search for changes if `changes`.
     ///
     /// # Errors
     /// When the device refuses, is lost or does not answer within [`GpuOptions::patience`].
@@ -77,6 +84,7 @@ impl Bench {
         &self,
         kernel: &'static Kernel,
         options: &GpuOptions,
+        changes: bool,
         bindings: &[Vec<u8>],
         workgroups: u32,
     ) -> Result<Vec<Vec<u8>>, GpuError> {
@@ -84,19 +92,22 @@ impl Bench {
             let (wanted, found) = (kernel.bindings.len(), bindings.len());
             return Err(GpuError::Refused(format!("{}: {found} buffers for {wanted} bindings", kernel.name)));
         }
-        self.engine.watch(|| self.run_watched(kernel, options, bindings, workgroups))
+        self.engine.watch(|| {
+            self.run_watched(kernel, Variant::new(options, changes), options.patience, bindings, workgroups)
+        })
     }
 
     fn run_watched(
         &self,
         kernel: &'static Kernel,
-        options: &GpuOptions,
+        variant: Variant,
+        patience: Duration,
         bindings: &[Vec<u8>],
         workgroups: u32,
     ) -> Result<Vec<Vec<u8>>, GpuError> {
         use wgpu::BufferUsages as Usage;
         let (engine, device) = (&self.engine, &self.engine.device);
-        let pipeline = engine.pipeline(kernel, Variant::new(options))?;
+        let pipeline = engine.pipeline(kernel, variant)?;
         let is_uniform = |name: &str| matches!(name, "params" | "chunk");
         let mut buffers = Vec::new();
         for (&name, bytes) in kernel.bindings.iter().zip(bindings) {
@@ -130,7 +141,7 @@ impl Bench {
             at += buffer.size();
         }
         let submission = engine.submit(encoder);
-        readback::read(engine, &staging, all, submission, options.patience, |mut rest| {
+        readback::read(engine, &staging, all, submission, patience, |mut rest| {
             let take = |(bytes, buffer): (&Vec<u8>, &wgpu::Buffer)| {
                 let (own, more) = rest.split_at(buffer.size() as usize);
                 rest = more;
@@ -138,5 +149,50 @@ impl Bench {
             };
             bindings.iter().zip(&buffers).map(take).collect()
         })
+    }
+}
+
+/// What an update of a [`Follower`] has found.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Followed {
+    /// Pairs that filters allow and that overlap now and did not before, or the other way round, in no
+    /// particular order.
+    pub pairs: Vec<Pair>,
+    /// Boxes that were searched as if they had not been there before.
+    pub restarted: Vec<u32>,
+    /// What was done.
+    pub report: Report,
+}
+
+/// Searches for changes on a device, update by update, and nothing but that.
+#[derive(Debug)]
+pub struct Follower {
+    gpu: GpuFinder,
+    found: Found,
+}
+
+impl Follower {
+    /// On this device.
+    pub fn new(gpu: GpuFinder) -> Self {
+        Self { gpu, found: Found::default() }
+    }
+
+    /// The device, to make it fail.
+    pub fn gpu(&self) -> &GpuFinder {
+        &self.gpu
+    }
+
+    /// The pairs that an update changes.
+    ///
+    /// # Errors
+    /// When the device fails, and with the error that the CPU would end in, too.
+    pub fn update(&mut self, request: &ChangeRequest<'_>) -> Result<Followed, Box<dyn Error>> {
+        let mut report = Report::default();
+        let restarted = match self.gpu.changes(request, &mut self.found, &mut report) {
+            Ok(restarted) => restarted,
+            Err(Failure::Call(error)) => return Err(error.into()),
+            Err(Failure::Device(error)) => return Err(error.into()),
+        };
+        Ok(Followed { pairs: self.found.chunks.concat(), restarted, report })
     }
 }

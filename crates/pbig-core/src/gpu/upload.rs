@@ -1,11 +1,14 @@
 //! Upload: boxes and filters go to the device once; later calls send only the blocks that changed.
 
+use super::ChangeRequest;
 use super::GpuError;
+use super::commands::{Commands, Groups};
 use super::engine::Engine;
 use super::storage::Storage;
-use crate::layout::Box as DeviceBox;
+use crate::layout::{Box as DeviceBox, LANES, Motion, Move, Refilter};
 use crate::{Aabb, ProxyFilter};
 use bytemuck::{Pod, cast_slice};
+use pbig_shaders as shaders;
 use rayon::prelude::*;
 use std::ops::Range;
 
@@ -27,13 +30,128 @@ const PIECE: usize = 1 << 14;
 pub(super) struct Mirror {
     boxes: Vec<Aabb>,
     filters: Vec<ProxyFilter>,
+    /// In place of both, after a search for changes of all boxes at once.
+    motions: Option<Known>,
     /// Bytes sent in this call.
     pub(super) sent: u64,
 }
 
+/// Boxes, now and before, that the device has as an update has left them.
+#[derive(Clone, Copy, Debug)]
+struct Known {
+    update: u64,
+    boxes: usize,
+}
+
+/// What the device has been sent of boxes that it knows, for `settle` and `renew` to take in.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct News {
+    pub(super) known: u32,
+    pub(super) moves: u32,
+    pub(super) refilters: u32,
+}
+
+impl News {
+    /// What boxes are becomes what they were, then the changed ones become what they are.
+    pub(super) fn record(self, commands: &mut Commands<'_>) -> Result<(), GpuError> {
+        commands.run(&shaders::SETTLE, Groups::Direct(self.known.div_ceil(LANES)))?;
+        let changes = self.moves.max(self.refilters);
+        commands.run(&shaders::RENEW, Groups::Direct(changes.div_ceil(LANES)))
+    }
+}
+
+/// Whether an update is the one after another.
+pub(super) fn follows(before: Option<u64>, update: u64) -> bool {
+    before.is_some_and(|before| before.checked_add(1) == Some(update))
+}
+
+/// The box around two, of which an invalid one does not count.
+pub(super) fn hull(one: &Aabb, other: &Aabb) -> Aabb {
+    match (one.is_valid(), other.is_valid()) {
+        (true, true) => Aabb::new(
+            std::array::from_fn(|k| one.min[k].min(other.min[k])),
+            std::array::from_fn(|k| one.max[k].max(other.max[k])),
+        ),
+        (false, true) => *other,
+        _ => *one,
+    }
+}
+
 impl Mirror {
     pub(super) fn new() -> Self {
-        Self { boxes: Vec::new(), filters: Vec::new(), sent: 0 }
+        Self { boxes: Vec::new(), filters: Vec::new(), motions: None, sent: 0 }
+    }
+
+    /// The device's motions are no longer what an update has left.
+    pub(super) fn forget_motions(&mut self) {
+        self.motions = None;
+    }
+
+    /// Sends boxes as they are and were, whatever the device has.
+    pub(super) fn upload_motions(
+        &mut self,
+        engine: &Engine,
+        storage: &mut Storage,
+        motions: &[Motion],
+        filters: Option<&[ProxyFilter]>,
+    ) -> Result<(), GpuError> {
+        self.replace_boxes();
+        storage.ensure(engine, "boxes", size_of_val(motions) as u64)?;
+        self.sent = write(engine, storage.get("boxes"), 0, motions);
+        let filters = filters.unwrap_or(&[]);
+        storage.ensure(engine, "filters", size_of_val(filters) as u64)?;
+        self.sent += write(engine, storage.get("filters"), 0, filters);
+        Ok(())
+    }
+
+    /// Sends what has changed, or everything to a device that does not know the update before.
+    pub(super) fn upload_changes(
+        &mut self,
+        engine: &Engine,
+        storage: &mut Storage,
+        request: &ChangeRequest<'_>,
+    ) -> Result<Option<News>, GpuError> {
+        let len = request.boxes.len();
+        let known = self.motions.filter(|known| follows(Some(known.update), request.update));
+        let room = (len * size_of::<Motion>()) as u64;
+        let renewed = storage.ensure(engine, "boxes", room)?
+            | storage.ensure(engine, "filters", size_of_val(request.filters) as u64)?;
+        let news = match known.filter(|_| !renewed) {
+            Some(known) => Some(self.send_changes(engine, storage, request, known.boxes.min(len))?),
+            None => {
+                let motions = request.motions(0..len);
+                self.upload_motions(engine, storage, &motions, Some(request.filters))?;
+                None
+            }
+        };
+        self.motions = Some(Known { update: request.update, boxes: len });
+        Ok(news)
+    }
+
+    /// Lists of what has changed, and the boxes that are new at the end.
+    fn send_changes(
+        &mut self,
+        engine: &Engine,
+        storage: &mut Storage,
+        request: &ChangeRequest<'_>,
+        known: usize,
+    ) -> Result<News, GpuError> {
+        let (moves, refilters) = request.lists(known);
+        storage.ensure(engine, "moves", size_of_val(&moves[..]) as u64)?;
+        storage.ensure(engine, "refilters", size_of_val(&refilters[..]) as u64)?;
+        let at_end = request.motions(known..request.boxes.len());
+        self.sent = write::<Move>(engine, storage.get("moves"), 0, &moves)
+            + write::<Refilter>(engine, storage.get("refilters"), 0, &refilters)
+            + write(engine, storage.get("boxes"), known, &at_end)
+            + write(engine, storage.get("filters"), known, &request.filters[known..]);
+        Ok(News { known: known as u32, moves: moves.len() as u32, refilters: refilters.len() as u32 })
+    }
+
+    /// What is known of the device's boxes and filters is about to be wrong.
+    fn replace_boxes(&mut self) {
+        self.boxes.clear();
+        self.filters.clear();
+        self.motions = None;
     }
 
     /// Brings the device's boxes, and filters if there are any, up to date.
@@ -45,6 +163,7 @@ impl Mirror {
         filters: Option<&[ProxyFilter]>,
     ) -> Result<(), GpuError> {
         self.sent = 0;
+        self.motions = None;
         if storage.ensure(engine, "boxes", size_of_val(boxes) as u64)? {
             self.boxes.clear();
         }

@@ -1,0 +1,228 @@
+//! The kernels in a search for changes: what there is besides boxes as they are.
+
+use super::*;
+
+impl State {
+    /// Whether this is a search for changes.
+    pub(super) fn tells_changes(&self) -> bool {
+        !self.motions.is_empty()
+    }
+
+    /// All that a box touches, now or before.
+    pub(super) fn reach(&self, id: usize) -> layout::Box {
+        self.motions.get(id).map_or_else(|| self.boxes[id], |motion| reach_of(motion))
+    }
+
+    pub(super) fn has_moved(&self, id: usize) -> bool {
+        self.motions.get(id).is_some_and(|motion| motion.now != motion.before)
+    }
+
+    /// Whether two boxes overlap, or began or ceased to.
+    pub(super) fn matter(&self, i: usize, j: usize) -> bool {
+        match (self.motions.get(i), self.motions.get(j)) {
+            (Some(a), Some(b)) => overlap(&a.now, &b.now) != overlap(&a.before, &b.before),
+            _ => overlap(&self.boxes[i], &self.boxes[j]),
+        }
+    }
+
+    /// What the device has of the last update, and the lists that make this one of it.
+    pub(super) fn add_changes(&mut self, case: &Case) {
+        for (id, (now, before)) in (0u32..).zip(case.boxes.iter().zip(&case.before)) {
+            let long_ago = layout::Box::new(&case.boxes[0]);
+            // As it was; boxes that were nowhere may have been something that no longer counts.
+            let known = if before.is_valid() { *before } else { case.boxes[1] };
+            self.motions.push(Motion { now: layout::Box::new(&known), before: long_ago });
+            if !before.is_valid() || now != before {
+                let mark = if before.is_valid() { 0 } else { ANEW };
+                self.moves.push(Move { place: id | mark, now: layout::Box::new(now) });
+            }
+            if id.is_multiple_of(9) {
+                self.refilters.push(Refilter { id, filter: filter(id + 1) });
+            }
+        }
+        self.params.known = self.motions.len() as u32;
+        self.params.moves = self.moves.len() as u32;
+        self.params.refilters = self.refilters.len() as u32;
+    }
+}
+
+fn reach_of(motion: &Motion) -> layout::Box {
+    let (now, before) = (&motion.now, &motion.before);
+    layout::Box {
+        low: std::array::from_fn(|k| now.low[k].min(before.low[k])),
+        high: std::array::from_fn(|k| now.high[k].max(before.high[k])),
+    }
+}
+
+/// What the plan is made for.
+pub(super) fn reaches(case: &Case) -> Vec<Aabb> {
+    let both = |(i, now): (usize, &Aabb)| match case.before.get(i) {
+        Some(before) if before.is_valid() && now.is_valid() => Aabb::new(
+            std::array::from_fn(|k| now.min[k].min(before.min[k])),
+            std::array::from_fn(|k| now.max[k].max(before.max[k])),
+        ),
+        Some(before) if before.is_valid() => *before,
+        _ => *now,
+    };
+    case.boxes.iter().enumerate().map(both).collect()
+}
+
+/// The cases, with the first half of their boxes on the move: a little, from anywhere, or there and gone.
+pub(super) fn moving_cases() -> Vec<Case> {
+    cases().into_iter().map(moving).collect()
+}
+
+pub(super) fn moving(mut case: Case) -> Case {
+    let all = case.boxes.clone();
+    case.before = all.clone();
+    for i in 0..all.len() / 2 {
+        let by = |x: f32| x + (i % 3) as f32 * 0.4;
+        case.before[i] = match i % 6 {
+            0 | 1 => Aabb::new(all[i].min.map(by), all[i].max.map(by)),
+            2 => Aabb::NOWHERE,
+            3 => all[i * 7 % all.len()],
+            _ => all[i],
+        };
+        if i % 6 == 4 {
+            case.boxes[i] = Aabb::NOWHERE;
+        }
+    }
+    case
+}
+
+pub(super) fn by_known(s: &State) -> u32 {
+    s.params.known.div_ceil(LANES)
+}
+
+pub(super) fn by_change(s: &State) -> u32 {
+    s.params.moves.max(s.params.refilters).div_ceil(LANES)
+}
+
+pub(super) fn settle(s: &mut State) {
+    let known = s.params.known as usize;
+    s.motions[..known].iter_mut().for_each(|motion| motion.before = motion.now);
+}
+
+pub(super) fn renew(s: &mut State) {
+    for one in &s.moves[..s.params.moves as usize] {
+        let motion = &mut s.motions[(one.place & !ANEW) as usize];
+        motion.now = one.now;
+        if one.place & ANEW != 0 {
+            motion.before = layout::Box::INVALID;
+        }
+    }
+    for one in &s.refilters[..s.params.refilters as usize] {
+        s.filters[one.id as usize] = one.filter;
+    }
+}
+
+#[test]
+fn settle_agrees_with_its_twin() {
+    agrees("settle");
+}
+
+#[test]
+fn renew_agrees_with_its_twin() {
+    agrees("renew");
+}
+
+/// On all sets but those with many boxes for a kernel that tests all pairs, with all codings.
+fn check_agrees_on_changes(kernel: &str, codings: &[u32], most_boxes: usize) {
+    for case in moving_cases().into_iter().filter(|case| case.boxes.len() <= most_boxes) {
+        let before = State::before(kernel, &case);
+        for &coding in codings {
+            for (filtered, split) in [(0, 0), (FILTERED, before.params.boxes / 2)] {
+                let state = before.clone().with(coding | filtered, split);
+                let fault = fault(twin(kernel), &GpuOptions::DEFAULT, &state);
+                assert_eq!(fault, None, "{}, flags {}, split {split}", case.name, coding | filtered);
+            }
+        }
+    }
+}
+
+#[test]
+fn check_small_agrees_with_its_twin_on_changes() {
+    check_agrees_on_changes("check_small", &[0, PACKED], usize::MAX);
+}
+
+#[test]
+fn check_large_agrees_with_its_twin_on_changes() {
+    check_agrees_on_changes("check_large", &[0, PACKED], usize::MAX);
+}
+
+#[test]
+fn check_all_agrees_with_its_twin_on_changes() {
+    check_agrees_on_changes("check_all", &[0, PACKED, BITS], 2000);
+}
+
+/// What has come to the end of the lists must not change: neither boxes nor filters.
+#[test]
+fn settle_and_renew_leave_alone_what_they_are_not_told() {
+    for kernel in ["settle", "renew"] {
+        let mut before = State::before(kernel, &moving(pile()));
+        before.params.known -= 300;
+        before.params.moves /= 2;
+        before.params.refilters -= 1;
+        assert_eq!(fault(twin(kernel), &GpuOptions::DEFAULT, &before), None, "{kernel}");
+    }
+}
+
+#[test]
+fn the_twins_together_find_what_the_oracle_has_in_one_of_two_states() {
+    for case in moving_cases() {
+        let state = State::before("check_small", &case);
+        let (now, before) = (oracle::pairs(&case.boxes), oracle::pairs(&case.before));
+        let differs = |pair: &&Pair| now.binary_search(pair).is_err() || before.binary_search(pair).is_err();
+        let wanted: Vec<_> = sorted(&[&now[..], &before[..]].concat());
+        let wanted: Vec<_> = wanted.iter().filter(differs).copied().collect();
+        let pairs = |kernel| decoded(&after_twin(twin(kernel), &state)).expect("a twin writes plain pairs");
+        let both = sorted(&[pairs("check_small"), pairs("check_large")].concat());
+        assert_eq!(difference(&both, &wanted), None, "{}", case.name);
+        assert_eq!(difference(&pairs("check_all"), &wanted), None, "{}", case.name);
+    }
+}
+
+/// What the tests say would mean little if nothing moved, or everything.
+#[test]
+fn the_moving_sets_have_large_items_without_and_with_movement() {
+    let marks = |s: &State, item: &LargeItem| -> u32 {
+        let entries = &s.entries[item.start as usize..(item.start + item.boxes) as usize];
+        entries.iter().fold(0, |marks, entry| marks | entry)
+    };
+    let states: Vec<_> = moving_cases().iter().map(|case| State::before("check_large", case)).collect();
+    let some =
+        |has: fn(u32) -> bool| states.iter().any(|s| s.large_items.iter().any(|item| has(marks(s, item))));
+    assert!(some(|marks| marks >> AXIS_BITS == 7 && marks & MOVED == 0), "all large cells have movement");
+    assert!(some(|marks| marks >> AXIS_BITS == 7 && marks & MOVED != 0), "no large cell has movement");
+}
+
+#[test]
+fn faults_planted_in_what_is_known_of_boxes_are_noticed() {
+    let faults: [(&str, fn(&mut State)); 5] = [
+        ("settle", |s| s.motions[3].before.low[0] += 1),
+        ("settle", |s| s.motions.swap(0, 8)),
+        ("renew", |s| s.motions[7].now.high[2] -= 1),
+        ("renew", |s| s.motions[2].before = s.motions[2].now),
+        ("renew", |s| s.filters[9].mask ^= 1),
+    ];
+    for (i, (kernel, plant)) in faults.into_iter().enumerate() {
+        let before = State::before(kernel, &moving(pile()));
+        let wanted = after_twin(twin(kernel), &before);
+        let mut found = wanted.clone();
+        assert_eq!((twin(kernel).compare)(&before, &found, &wanted), None, "{kernel}");
+        plant(&mut found);
+        assert!((twin(kernel).compare)(&before, &found, &wanted).is_some(), "fault {i}, {kernel}");
+    }
+}
+
+/// A box that moved and does not say so is overlooked: its pairs are missing.
+#[test]
+fn an_entry_that_lost_its_mark_costs_pairs() {
+    let mut before = State::before("check_small", &moving(pile()));
+    let wanted = after_twin(twin("check_small"), &before);
+    before.entries.iter_mut().for_each(|entry| *entry &= !MOVED);
+    let before = with_room(&before, &wanted);
+    let found = on_device(bench(true), twin("check_small"), &GpuOptions::DEFAULT, &before);
+    let fault = compare_checks(&before, &found, &wanted).expect("pairs are missing");
+    assert!(fault.starts_with("missing"), "{fault}");
+}

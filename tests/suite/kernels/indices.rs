@@ -1,0 +1,47 @@
+//! The study of Avril's mapping: pairs of given indices.
+
+use super::*;
+
+/// What index_pairs reads and writes for `count` indices from `first` on.
+pub(super) fn indices(n: u32, first: u32, count: u32) -> State {
+    let params = Params { boxes: n, split: first, cells: count, ..Params::default() };
+    State { params, ..State::default() }
+}
+
+/// The estimated row is the exact one here; a kernel's may be near it.
+pub(super) fn index_pairs(s: &mut State) {
+    s.out.clear();
+    for i in 0..s.params.cells {
+        let (a, b) = pair_of((s.params.split + i).into(), s.params.boxes.into());
+        s.out.extend([a as u32, a as u32, b as u32]);
+    }
+}
+
+#[test]
+fn index_pairs_agrees_with_its_twin_for_every_root() {
+    for n in [2u32, 3, 4, 5, 31, 32, 33, 100, 257, 1000, 4097, 16_384, 32_767, 32_768] {
+        let all = pair_count(n.into()) as u32;
+        let count = all.min(20_000);
+        for first in [0, (all - count) / 3, all - count] {
+            for root in 0..=9 {
+                let place = format!("n {n}, from {first}, root {root}");
+                assert_eq!(index_fault(root, &indices(n, first, count)), None, "{place}");
+            }
+        }
+    }
+}
+
+/// The exact pairs, and how far off the estimated rows may be: one or two for a good root; one Newton
+/// step leaves an error of up to 0.18% of the root, which is up to twice n.
+fn index_fault(root: u32, before: &State) -> Option<String> {
+    let options = GpuOptions { root, ..GpuOptions::DEFAULT };
+    let kernel = twin("index_pairs");
+    let wanted = after_twin(kernel, before);
+    let found = on_device(bench(true), kernel, &options, &with_room(before, &wanted));
+    let far = if matches!(root, 1 | 5) { 2 + before.params.boxes / 500 } else { 2 };
+    let rows = found.out.iter().zip(&wanted.out).step_by(3);
+    let worst = rows.max_by_key(|(estimate, row)| estimate.abs_diff(**row))?;
+    let near = worst.0.abs_diff(*worst.1) <= far;
+    (kernel.compare)(before, &found, &wanted)
+        .or_else(|| (!near).then(|| format!("row {} was estimated as {}", worst.1, worst.0)))
+}
