@@ -1,6 +1,7 @@
 //! One test binary: linking rapier once is what keeps the suite fast to build.
 
 mod calls;
+mod changes;
 mod checked;
 mod crowds;
 mod drop_in;

@@ -50,6 +50,10 @@ impl Input<'_> {
     }
 }
 
+/// Words of output for each changed box, at most, that are fetched before it is known how many there are:
+/// four pairs. What a burst of pairs needed says nothing about an update that changes little.
+const WORDS_A_CHANGE: u64 = 8;
+
 /// One search.
 pub(super) struct Job<'a> {
     pub(super) input: Input<'a>,
@@ -134,7 +138,10 @@ impl Session {
         match job.input {
             Input::Boxes(boxes) => mirror.upload(engine, storage, boxes, job.filters)?,
             Input::Motions(motions) => mirror.upload_motions(engine, storage, motions, job.filters)?,
-            Input::Changes(request) => self.news = mirror.upload_changes(engine, storage, request)?,
+            Input::Changes(request) => {
+                self.news = mirror.upload_changes(engine, storage, request)?;
+                self.words = self.words.min(WORDS_A_CHANGE * request.changed.len() as u64);
+            }
         }
         Ok(())
     }
@@ -166,6 +173,14 @@ impl Session {
         params
     }
 
+    /// The wanted coding. Changes are rarely so many that records or bits are smaller, and bursts of them end.
+    fn coding(&self) -> Coding {
+        match self.options.coding {
+            Coding::Auto if self.changes => Coding::Plain,
+            coding => coding,
+        }
+    }
+
     /// Work items in a chunk; a program that plays a GPU gets fewer, lest it passes for one that hangs.
     fn chunk(&self) -> [u32; 2] {
         let share = if self.engine.software { 4 } else { 1 };
@@ -177,7 +192,7 @@ impl Session {
         let mut params = self.params(job);
         let all = pair_count(job.input.len() as u64);
         let bit_words = all.div_ceil(32);
-        let mut bits = match job.config.gpu.coding {
+        let mut bits = match self.coding() {
             Coding::Auto => bit_words <= 2 * self.coding.pairs,
             coding => coding == Coding::Packed,
         };
@@ -208,7 +223,7 @@ impl Session {
     /// With a grid: map, schedule and the first chunk in one submission; the other chunks after it.
     fn search_grid(&mut self, job: &Job<'_>, sink: &mut Sink<'_>) -> Result<(), Failure> {
         let mut params = self.params(job);
-        let packed = self.coding.packed(job.config.gpu.coding) && job.input.len() < MOST_PACKED;
+        let packed = self.coding.packed(self.coding()) && job.input.len() < MOST_PACKED;
         params.flags |= if packed { PACKED } else { 0 };
         let before = (sink.written, sink.report.compression);
         let [small_items, large_items] = self.chunk();

@@ -152,9 +152,9 @@ impl Bench {
     }
 }
 
-/// What an update of a [`Follower`] has found.
+/// What an update of a [`Tracker`] has found.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Followed {
+pub struct Tracked {
     /// Pairs that filters allow and that overlap now and did not before, or the other way round, in no
     /// particular order.
     pub pairs: Vec<Pair>,
@@ -166,12 +166,12 @@ pub struct Followed {
 
 /// Searches for changes on a device, update by update, and nothing but that.
 #[derive(Debug)]
-pub struct Follower {
+pub struct Tracker {
     gpu: GpuFinder,
     found: Found,
 }
 
-impl Follower {
+impl Tracker {
     /// On this device.
     pub fn new(gpu: GpuFinder) -> Self {
         Self { gpu, found: Found::default() }
@@ -186,13 +186,13 @@ impl Follower {
     ///
     /// # Errors
     /// When the device fails, and with the error that the CPU would end in, too.
-    pub fn update(&mut self, request: &ChangeRequest<'_>) -> Result<Followed, Box<dyn Error>> {
+    pub fn update(&mut self, request: &ChangeRequest<'_>) -> Result<Tracked, Box<dyn Error>> {
         let mut report = Report::default();
         let restarted = match self.gpu.changes(request, &mut self.found, &mut report) {
             Ok(restarted) => restarted,
             Err(Failure::Call(error)) => return Err(error.into()),
             Err(Failure::Device(error)) => return Err(error.into()),
         };
-        Ok(Followed { pairs: self.found.chunks.concat(), restarted, report })
+        Ok(Tracked { pairs: self.found.chunks.concat(), restarted, report })
     }
 }

@@ -1,0 +1,393 @@
+//! A search for changes on a device, against brute force on both sides of each update: every pair that came
+//! or went comes back, once, and what is transferred follows the change, not the world.
+
+use pbig_core::gpu::Fault;
+use pbig_core::gpu::study::{Change, ChangeRequest, Tracked, Tracker};
+use pbig_core::{
+    Aabb, Coding, Config, GpuFinder, GpuOptions, GpuReport, Limits, Pair, ProxyFilter, Strategy, oracle,
+};
+use pbig_harness::boxes::BoxSet;
+use pbig_tests::gpu;
+use rand::rngs::StdRng;
+use rand::{RngExt, SeedableRng};
+use std::collections::{BTreeMap, BTreeSet};
+use std::time::Duration;
+
+/// What a broad phase keeps, in the plainest form.
+#[derive(Clone)]
+struct World {
+    boxes: Vec<Aabb>,
+    filters: Vec<ProxyFilter>,
+    changed: BTreeMap<u32, Change>,
+    kept: BTreeSet<Pair>,
+    update: u64,
+}
+
+impl World {
+    fn new(boxes: &[Aabb]) -> Self {
+        let mut world = Self {
+            boxes: Vec::new(),
+            filters: Vec::new(),
+            changed: BTreeMap::new(),
+            kept: BTreeSet::new(),
+            update: 0,
+        };
+        (0u32..).zip(boxes).for_each(|(id, aabb)| world.set(id, *aabb, ProxyFilter::ALL));
+        world
+    }
+
+    fn len(&self) -> u32 {
+        self.boxes.len() as u32
+    }
+
+    fn note(&mut self, id: u32) {
+        let i = id as usize;
+        if i >= self.boxes.len() {
+            self.boxes.resize(i + 1, Aabb::NOWHERE);
+            self.filters.resize(i + 1, ProxyFilter::ALL);
+        }
+        let was = Change { id, aabb: self.boxes[i], filter: self.filters[i] };
+        self.changed.entry(id).or_insert(was);
+    }
+
+    fn set(&mut self, id: u32, aabb: Aabb, filter: ProxyFilter) {
+        self.note(id);
+        self.boxes[id as usize] = if aabb.is_valid() { aabb } else { Aabb::NOWHERE };
+        self.filters[id as usize] = filter;
+    }
+
+    fn put(&mut self, id: u32, aabb: Aabb) {
+        let filter = self.filters.get(id as usize).copied().unwrap_or_default();
+        self.set(id, aabb, filter);
+    }
+
+    /// The pairs of a removed box end without anybody being told.
+    fn remove(&mut self, id: u32) {
+        self.put(id, Aabb::NOWHERE);
+        self.changed.entry(id).and_modify(|change| change.aabb = Aabb::NOWHERE);
+        self.kept.retain(|pair| pair.a != id && pair.b != id);
+    }
+
+    fn shift(&mut self, id: u32, by: [f32; 3]) {
+        let one = self.boxes[id as usize];
+        let moved = |corner: [f32; 3]| std::array::from_fn(|k| corner[k] + by[k]);
+        self.put(id, Aabb::new(moved(one.min), moved(one.max)));
+    }
+
+    /// One update on a device, compared with brute force.
+    fn follow(&mut self, tracker: &mut Tracker, config: &Config) -> Result<Tracked, String> {
+        let changed: Vec<_> = self.changed.values().copied().collect();
+        let request = ChangeRequest {
+            boxes: &self.boxes,
+            filters: &self.filters,
+            changed: &changed,
+            update: self.update,
+            kept: self.kept.len() as u64,
+            config,
+        };
+        let tracked = tracker.update(&request).map_err(|error| error.to_string())?;
+        assert_eq!(self.fault(&tracked), None, "update {}", self.update);
+        let pairs = self.completed(&tracked);
+        self.advance();
+        assert_eq!(pairs, self.kept, "update {}: what a caller makes of it", self.update);
+        Ok(tracked)
+    }
+
+    /// An update by something else.
+    fn advance(&mut self) {
+        self.kept = oracle::pairs_filtered(&self.boxes, &self.filters).into_iter().collect();
+        self.changed.clear();
+        self.update += 1;
+    }
+
+    /// How the found pairs differ from those that are in one of the two states, if they do.
+    fn fault(&self, tracked: &Tracked) -> Option<String> {
+        let mut before = self.boxes.clone();
+        for change in self.changed.values() {
+            let restarted = tracked.restarted.contains(&change.id);
+            before[change.id as usize] = if restarted { Aabb::NOWHERE } else { change.aabb };
+        }
+        let pairs = |boxes: &[Aabb]| -> BTreeSet<Pair> {
+            oracle::pairs_filtered(boxes, &self.filters).into_iter().collect()
+        };
+        let wanted: Vec<Pair> = (&pairs(&self.boxes) ^ &pairs(&before)).into_iter().collect();
+        let mut found = tracked.pairs.clone();
+        found.sort_unstable();
+        pbig_tests::difference(&found, &wanted)
+    }
+
+    /// The pairs after the update, as a caller has them that keeps the rules of `GpuFinder::changes`.
+    fn completed(&self, tracked: &Tracked) -> BTreeSet<Pair> {
+        let again = |pair: &Pair| [pair.a, pair.b].iter().any(|id| tracked.restarted.contains(id));
+        let overlaps = |pair: &Pair| self.boxes[pair.a as usize].overlaps(&self.boxes[pair.b as usize]);
+        let allowed = |pair: &Pair| self.filters[pair.a as usize].allows(&self.filters[pair.b as usize]);
+        let mut pairs = self.kept.clone();
+        for pair in &tracked.pairs {
+            let news = if overlaps(pair) { pairs.insert(*pair) } else { pairs.remove(pair) };
+            assert!(news || again(pair), "{pair:?} is no news");
+        }
+        pairs.retain(|pair| !again(pair) || (overlaps(pair) && allowed(pair)));
+        pairs
+    }
+}
+
+fn set(name: &str, n: usize) -> Vec<Aabb> {
+    BoxSet::named(name).expect("the set exists").boxes(n, 5)
+}
+
+fn tracker() -> Tracker {
+    Tracker::new(GpuFinder::new().expect("an adapter"))
+}
+
+fn with(options: GpuOptions) -> Config {
+    Config { gpu: options, ..gpu(options.coding) }
+}
+
+fn transferred(tracked: &Tracked) -> GpuReport {
+    tracked.report.gpu.clone().expect("a device did the work")
+}
+
+/// One of the things that can happen to a box.
+fn disturb(world: &mut World, rng: &mut StdRng) {
+    let id = rng.random_range(0..world.len() + 2);
+    let at: [f32; 3] = std::array::from_fn(|_| rng.random_range(-1.0..12.0));
+    let half = [rng.random_range(0.1..1.5), rng.random_range(0.1f32..1.5), 0.5];
+    let filter = ProxyFilter { body: id / 2, mask: 1 << rng.random_range(0..3), ..ProxyFilter::ALL };
+    match rng.random_range(0..14) {
+        0 => world.put(id, Aabb::from_center(at, half)),
+        1 => world.put(id, Aabb::NOWHERE),
+        2 => world.put(id, Aabb::new([f32::NEG_INFINITY; 3], [f32::INFINITY, at[1], f32::INFINITY])),
+        3 => world.put(id, Aabb::from_center(at, [30.0; 3])),
+        4 => world.put(id, Aabb::new([f32::INFINITY; 3], [f32::INFINITY; 3])),
+        5 => world.put(id, Aabb::from_center([1e30, -3e38, at[2]], half)),
+        6 => world.remove(id),
+        7 => world.set(id, Aabb::from_center(at, half), filter),
+        8 if id < world.len() => world.set(id, world.boxes[id as usize], filter),
+        9 if id < world.len() => world.put(id, world.boxes[id as usize]),
+        _ if id < world.len() => world.shift(id, at.map(|x| 0.04 * x)),
+        _ => {}
+    }
+}
+
+/// Updates one after the other on one device, with one by something else now and then.
+fn follow_at_random(seed: u64, boxes: usize, updates: usize, config: &Config) {
+    let rng = &mut StdRng::seed_from_u64(seed);
+    let start = |_| Aabb::from_center(std::array::from_fn(|_| rng.random_range(0.0..11.0)), [0.7; 3]);
+    let mut world = World::new(&(0..boxes).map(start).collect::<Vec<_>>());
+    let mut tracker = tracker();
+    for update in 0..updates {
+        let tracked = world.follow(&mut tracker, config).expect("no device fails here");
+        assert_eq!(transferred(&tracked).uploaded > 0, world.len() > 0, "update {update}");
+        for _ in 0..rng.random_range(0..2 * boxes / 3) {
+            disturb(&mut world, rng);
+        }
+        if rng.random_range(0..8) == 0 {
+            world.advance();
+        }
+        world.put(0, Aabb::from_center([update as f32; 3], [0.5; 3]));
+    }
+}
+
+#[test]
+fn random_updates_give_what_brute_force_gives_with_and_without_a_grid() {
+    for seed in 0..6 {
+        for coding in [Coding::Auto, Coding::Plain, Coding::Packed] {
+            for strategy in [Strategy::Auto, Strategy::Pbig] {
+                let config = Config { strategy, ..with(GpuOptions { coding, ..GpuOptions::DEFAULT }) };
+                follow_at_random(seed, 90, 14, &config);
+            }
+        }
+    }
+}
+
+#[test]
+fn random_updates_lose_nothing_where_room_is_scarce_and_work_comes_in_chunks() {
+    for (seed, coding) in [(1, Coding::Plain), (2, Coding::Packed)] {
+        for pipelining in [true, false] {
+            let tiny =
+                GpuOptions { coding, chunk: [2, 1], first_bytes: 0, pipelining, ..GpuOptions::DEFAULT };
+            for small_cell in [1, 32] {
+                follow_at_random(seed, 700, 7, &Config { small_cell, ..with(tiny) });
+            }
+        }
+    }
+}
+
+/// Moves a share of the boxes a little, in different directions.
+fn jostle(world: &mut World, every: usize, by: f32) {
+    for (i, id) in (0..world.len()).step_by(every).enumerate() {
+        let by = by * [1.0, -0.5, 2.0][i % 3];
+        world.shift(id, [by, 0.5 * by, -by]);
+    }
+}
+
+#[test]
+fn a_world_of_many_chunks_and_repeats_is_complete() {
+    let tiny = GpuOptions { chunk: [3, 2], first_bytes: 0, ..GpuOptions::DEFAULT };
+    let (mut world, mut tracker) = (World::new(&set("pile", 3000)), tracker());
+    let (mut chunks, mut repeats) = (0, 0);
+    for (every, by) in [(1, 0.0), (2, 0.2), (1, 0.3), (3, -0.4), (1000, 0.1)] {
+        jostle(&mut world, every, by);
+        let report = transferred(&world.follow(&mut tracker, &with(tiny)).expect("a device"));
+        chunks += report.chunks;
+        repeats += report.repeats;
+    }
+    assert!(chunks > 20 && repeats > 0, "{chunks} chunks, {repeats} repeats");
+}
+
+#[test]
+fn a_world_that_exceeds_the_limits_of_a_device_is_followed_in_parts() {
+    // 1 MiB holds 21,845 boxes as they are and were.
+    let options = GpuOptions { max_bytes: 1 << 20, ..GpuOptions::DEFAULT };
+    let mut boxes = set("pile", 24_000);
+    boxes.push(Aabb::new([f32::NEG_INFINITY; 3], [f32::INFINITY, 0.0, f32::INFINITY]));
+    let (mut world, mut tracker) = (World::new(&boxes), tracker());
+    for (every, by) in [(1, 0.0), (5, 0.3), (9000, 0.2)] {
+        jostle(&mut world, every, by);
+        let tracked = world.follow(&mut tracker, &with(options)).expect("a device");
+        assert!(transferred(&tracked).parts > 1, "{} parts", transferred(&tracked).parts);
+    }
+    // Fewer boxes fit again, and the device begins with everything.
+    (3000..world.len()).for_each(|id| world.remove(id));
+    world.boxes.truncate(3000);
+    world.filters.truncate(3000);
+    world.changed.retain(|&id, _| id < 3000);
+    for every in [1, 100] {
+        jostle(&mut world, every, 0.1);
+        let report = transferred(&world.follow(&mut tracker, &with(options)).expect("a device"));
+        assert_eq!((report.parts, report.uploaded > 3000 * 48), (1, every == 1));
+    }
+}
+
+/// Bytes of a box as it is and was with its filter, of a move, and of another filter.
+const WHOLE: u64 = 48 + 16;
+const MOVE: u64 = 28;
+const REFILTER: u64 = 20;
+
+#[test]
+fn transfers_follow_what_has_changed() {
+    let boxes = set("pile", 20_000);
+    let (mut world, mut tracker) = (World::new(&boxes), tracker());
+    let config = with(GpuOptions::DEFAULT);
+    let mut update = |world: &mut World| {
+        let kept = world.kept.len();
+        let tracked = world.follow(&mut tracker, &config).expect("a device");
+        let GpuReport { uploaded, downloaded, .. } = transferred(&tracked);
+        let events = tracked.pairs.len() as u64;
+        // 312 bytes of counts and times, and 64 words in advance.
+        assert!(downloaded >= 312 + 8 * events, "{downloaded} bytes for {events} events");
+        assert!(tracked.restarted.is_empty(), "nothing has left its place");
+        (uploaded, downloaded, events, kept)
+    };
+    let (uploaded, _, events, _) = update(&mut world);
+    assert_eq!((uploaded, events), (20_000 * WHOLE, world.kept.len() as u64));
+    assert!(events > 20_000, "{events} pairs: too few to be worth leaving out");
+    for every in [20_000, 1000, 10, 1, 20_000] {
+        jostle(&mut world, every, 0.02);
+        let moved = 20_000u64.div_ceil(every as u64);
+        let (uploaded, downloaded, events, _) = update(&mut world);
+        assert_eq!(uploaded, moved * MOVE, "{moved} boxes moved");
+        assert!(events > 0 || moved < 100, "{moved} boxes moved and nothing happened");
+        let most = 312 + 4 * 64 + 40 * moved + 8 * events;
+        assert!(downloaded <= most, "{downloaded} bytes for {moved} boxes and {events} events");
+    }
+    let filter = ProxyFilter { body: 3, ..ProxyFilter::ALL };
+    world.set(20_000, boxes[70], filter);
+    let (uploaded, ..) = update(&mut world);
+    assert!((WHOLE..=20_001 * WHOLE).contains(&uploaded), "a new box: {uploaded} bytes");
+    world.remove(20_000);
+    assert_eq!(update(&mut world).0, MOVE, "a removed box");
+    world.set(20_000, boxes[71], ProxyFilter::ALL);
+    assert_eq!(update(&mut world).0, MOVE + REFILTER, "a box at an id that was free");
+}
+
+#[test]
+fn boxes_that_leave_their_place_or_change_their_filter_begin_anew_and_no_others() {
+    let (mut world, mut tracker) = (World::new(&set("unit", 2000)), tracker());
+    let config = with(GpuOptions::DEFAULT);
+    world.follow(&mut tracker, &config).expect("a device");
+    world.shift(5, [0.3; 3]);
+    world.shift(6, [50.0, 0.0, 0.0]);
+    world.set(7, world.boxes[7], ProxyFilter { mask: 2, ..ProxyFilter::ALL });
+    world.put(8, Aabb::NOWHERE);
+    world.remove(9);
+    world.set(2000, world.boxes[3], ProxyFilter::ALL);
+    let tracked = world.follow(&mut tracker, &config).expect("a device");
+    assert_eq!(tracked.restarted, [6, 7]);
+    // The ground stays the ground, however far it moves.
+    world.put(10, Aabb::new([f32::MIN; 3], [f32::MAX, -50.0, f32::MAX]));
+    world.follow(&mut tracker, &config).expect("a device");
+    world.put(10, Aabb::new([f32::MIN; 3], [f32::MAX, 7.0, f32::MAX]));
+    let tracked = world.follow(&mut tracker, &config).expect("a device");
+    assert_eq!((tracked.restarted.len(), tracked.pairs.is_empty()), (0, false));
+}
+
+/// Pairs at rest are turned down before their boxes are read; what is tested follows the change.
+#[test]
+fn boxes_at_rest_are_not_tested() {
+    let (mut world, mut tracker) = (World::new(&set("pile", 6000)), tracker());
+    let config = with(GpuOptions::DEFAULT);
+    let tested = |tracked: &Tracked| tracked.report.checks.made - tracked.report.checks.redundant;
+    let all = tested(&world.follow(&mut tracker, &config).expect("a device"));
+    jostle(&mut world, 600, 0.01);
+    let few = tested(&world.follow(&mut tracker, &config).expect("a device"));
+    assert!(few > 0 && few * 100 < all, "{few} tests for 10 boxes, {all} for 6000");
+}
+
+#[test]
+fn a_device_that_has_not_seen_an_update_is_told_everything() {
+    let (mut world, mut tracker) = (World::new(&set("unit", 1500)), tracker());
+    let config = with(GpuOptions::DEFAULT);
+    for missed in [false, false, true, false, true, true] {
+        if missed {
+            jostle(&mut world, 2, 0.3);
+            world.advance();
+        }
+        jostle(&mut world, 3, 0.4);
+        let all = world.update == 0 || missed;
+        let report = transferred(&world.follow(&mut tracker, &config).expect("a device"));
+        assert_eq!(report.uploaded, if all { 1500 * WHOLE } else { 500 * MOVE });
+    }
+}
+
+#[test]
+fn after_a_failure_at_any_moment_the_next_update_is_right() {
+    let options = GpuOptions { chunk: [12, 8], first_bytes: 0, pause: Duration::ZERO, ..GpuOptions::DEFAULT };
+    let mut failures = 0;
+    for (fault, after) in
+        (0..8).map(|i| (Fault::LoseDevice, i)).chain([(Fault::Timeout, 2), (Fault::Panic, 3)])
+    {
+        let (mut world, mut tracker) = (World::new(&set("pile", 1500)), tracker());
+        world.follow(&mut tracker, &with(options)).expect("a device");
+        tracker.gpu().inject(fault, after);
+        for frame in 0..4 {
+            jostle(&mut world, 1 + frame, 0.3);
+            if world.follow(&mut tracker, &with(options)).is_err() {
+                failures += 1;
+                // Either the CPU does this update, or it is tried again.
+                if after.is_multiple_of(2) {
+                    world.advance();
+                }
+            }
+        }
+        assert!(world.follow(&mut tracker, &with(options)).is_ok(), "{fault:?} after {after}");
+    }
+    assert!(failures >= 8, "{failures} failures only");
+}
+
+#[test]
+fn too_many_pairs_are_an_error_and_the_update_can_be_repeated() {
+    let cubes = vec![Aabb::new([0.0; 3], [1.0; 3]); 1200];
+    let (mut world, mut tracker) = (World::new(&cubes), tracker());
+    let limits = Limits { max_pairs: 600_000, ..Limits::DEFAULT };
+    let limited = Config { limits, ..with(GpuOptions::DEFAULT) };
+    let error = world.follow(&mut tracker, &limited).expect_err("719,400 pairs");
+    assert!(error.contains("600000"), "{error}");
+    let config = with(GpuOptions::DEFAULT);
+    world.follow(&mut tracker, &config).expect("the device works");
+    // As many end, which is no reason to fail.
+    (0..1200).for_each(|id| world.put(id, Aabb::from_center([id as f32 * 9.0, 0.0, 0.0], [0.5; 3])));
+    world.put(0, Aabb::NOWHERE);
+    let tracked = world.follow(&mut tracker, &limited).expect("few pairs are new");
+    assert!(world.kept.is_empty() && !tracked.restarted.is_empty());
+}
