@@ -41,7 +41,8 @@ fn locate(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) grou
     if id >= params.boxes {
         return;
     }
-    let one = reach_of(boxes[id]);
+    let subject = boxes[id];
+    let one = reach_of(subject);
     if one.low[0] > one.high[0] {
         located[id].level = NO_LEVEL;
         return;
@@ -52,7 +53,7 @@ fn locate(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) grou
         at.high[axis] = finest_cell(one.high[axis], axis);
     }
     let level = level_of(low_of(at), high_of(at));
-    at.level = level | select(0u, MOVED, has_moved(boxes[id]));
+    at.level = level | select(0u, MOVED, has_moved(subject));
     located[id] = at;
     let t = touched(low_of(at), high_of(at), level);
     for (var k = 0u; k < cell_count(t); k++) {

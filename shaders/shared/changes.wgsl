@@ -3,23 +3,25 @@
 
 alias Subject = Motion;
 
+fn low_corner(one: Box) -> vec3<i32> {
+    return vec3<i32>(one.low[0], one.low[1], one.low[2]);
+}
+
+fn high_corner(one: Box) -> vec3<i32> {
+    return vec3<i32>(one.high[0], one.high[1], one.high[2]);
+}
+
 // All that lies between what it was and what it is: whom it overlaps, or did, it meets in a cell. One of
 // the two that is invalid does not count, as it has all of `low` above everything.
 fn reach_of(one: Subject) -> Box {
-    var both: Box;
-    for (var k = 0u; k < 3u; k++) {
-        both.low[k] = min(one.now.low[k], one.before.low[k]);
-        both.high[k] = max(one.now.high[k], one.before.high[k]);
-    }
-    return both;
+    let low = min(low_corner(one.now), low_corner(one.before));
+    let high = max(high_corner(one.now), high_corner(one.before));
+    return Box(array<i32, 3>(low.x, low.y, low.z), array<i32, 3>(high.x, high.y, high.z));
 }
 
 fn has_moved(one: Subject) -> bool {
-    var moved = false;
-    for (var k = 0u; k < 3u; k++) {
-        moved |= one.now.low[k] != one.before.low[k] || one.now.high[k] != one.before.high[k];
-    }
-    return moved;
+    return any(low_corner(one.now) != low_corner(one.before))
+        || any(high_corner(one.now) != high_corner(one.before));
 }
 
 // Two boxes that have not moved are as they were.

@@ -351,6 +351,41 @@ fn a_device_that_has_not_seen_an_update_is_told_everything() {
 }
 
 #[test]
+fn searches_for_all_pairs_in_between_do_no_harm() {
+    let (mut world, mut tracker) = (World::new(&set("pile", 2000)), tracker());
+    let config = with(GpuOptions::DEFAULT);
+    for find_all in [false, true, true, false, true] {
+        if find_all {
+            let few = &world.boxes[..1500];
+            let mut pairs = tracker.find(few, &config).expect("a device");
+            pairs.sort_unstable();
+            assert_eq!(pbig_tests::difference(&pairs, &oracle::pairs(few)), None);
+        }
+        for every in [2, 40] {
+            jostle(&mut world, every, 0.3);
+            world.follow(&mut tracker, &config).expect("a device");
+        }
+    }
+}
+
+#[test]
+fn memory_follows_what_is_needed_down_and_nothing_is_forgotten_with_it() {
+    let (mut world, mut tracker) = (World::new(&set("pile", 20_000)), tracker());
+    let config = with(GpuOptions::DEFAULT);
+    let burst = transferred(&world.follow(&mut tracker, &config).expect("a device")).device_bytes;
+    (300..20_000).for_each(|id| world.remove(id));
+    world.boxes.truncate(300);
+    world.filters.truncate(300);
+    world.changed.retain(|&id, _| id < 300);
+    let mut held = 0;
+    for _ in 0..140 {
+        jostle(&mut world, 5, 0.05);
+        held = transferred(&world.follow(&mut tracker, &config).expect("a device")).device_bytes;
+    }
+    assert!(held * 4 < burst, "{held} of {burst} bytes are still held");
+}
+
+#[test]
 fn after_a_failure_at_any_moment_the_next_update_is_right() {
     let options = GpuOptions { chunk: [12, 8], first_bytes: 0, pause: Duration::ZERO, ..GpuOptions::DEFAULT };
     let mut failures = 0;

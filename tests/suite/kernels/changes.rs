@@ -10,7 +10,7 @@ impl State {
 
     /// All that a box touches, now or before.
     pub(super) fn reach(&self, id: usize) -> layout::Box {
-        self.motions.get(id).map_or_else(|| self.boxes[id], |motion| reach_of(motion))
+        self.motions.get(id).map_or_else(|| self.boxes[id], reach_of)
     }
 
     pub(super) fn has_moved(&self, id: usize) -> bool {
@@ -198,7 +198,7 @@ fn the_moving_sets_have_large_items_without_and_with_movement() {
 
 #[test]
 fn faults_planted_in_what_is_known_of_boxes_are_noticed() {
-    let faults: [(&str, fn(&mut State)); 5] = [
+    let faults: [(&str, Plant); 5] = [
         ("settle", |s| s.motions[3].before.low[0] += 1),
         ("settle", |s| s.motions.swap(0, 8)),
         ("renew", |s| s.motions[7].now.high[2] -= 1),

@@ -6,13 +6,14 @@
 //! transferred, in either direction, follows what changed.
 
 use super::search::{Task, search};
-use super::upload::{follows, hull};
+use super::upload::{PIECE, follows, hull};
 use super::{Failure, GpuFinder};
 use crate::cpu::find::Found;
 use crate::layout::{ANEW, Box as DeviceBox, Motion, Move, Refilter};
 use crate::plan::Summary;
 use crate::report::Report;
 use crate::{Aabb, Config, Error, ProxyFilter};
+use rayon::prelude::*;
 use std::ops::Range;
 
 /// What a changed box was at the last update.
@@ -62,8 +63,8 @@ impl ChangeRequest<'_> {
 
     /// Boxes that begin anew although they had pairs.
     fn restarted(&self) -> Vec<u32> {
-        let restarted = self.changed.iter().filter(|change| self.restarts(change));
-        restarted.map(|change| change.id).collect()
+        let changed = self.changed.par_iter().with_min_len(PIECE);
+        changed.filter(|change| self.restarts(change)).map(|change| change.id).collect()
     }
 
     /// What boxes are and were, for a device that does not know them.
@@ -79,19 +80,23 @@ impl ChangeRequest<'_> {
 
     /// What has changed of the first `known` boxes, for a device that knows what they were.
     pub(super) fn lists(&self, known: usize) -> (Vec<Move>, Vec<Refilter>) {
-        let changed = self.changed.iter().filter(|change| (change.id as usize) < known);
-        let (mut moves, mut refilters) = (Vec::with_capacity(self.changed.len()), Vec::new());
-        for change in changed {
-            let (id, i) = (change.id, change.id as usize);
-            let mark = if self.before(change).is_valid() { 0 } else { ANEW };
-            moves.push(Move { place: id | mark, now: DeviceBox::new(&self.boxes[i]) });
-            // Of a box that was not there before nobody says which filter the device has.
-            let new = self.filters[i] != change.filter || !change.aabb.is_valid();
-            if new && self.boxes[i].is_valid() {
-                refilters.push(Refilter { id, filter: self.filters[i] });
-            }
-        }
-        (moves, refilters)
+        let changed = self.changed.par_iter().with_min_len(PIECE);
+        let changed = changed.filter(|change| (change.id as usize) < known);
+        let moves = changed.clone().map(|change| self.as_move(change)).collect();
+        (moves, changed.filter_map(|change| self.as_refilter(change)).collect())
+    }
+
+    fn as_move(&self, change: &Change) -> Move {
+        let mark = if self.before(change).is_valid() { 0 } else { ANEW };
+        Move { place: change.id | mark, now: DeviceBox::new(&self.boxes[change.id as usize]) }
+    }
+
+    /// The new filter, if the device may have another and it matters.
+    fn as_refilter(&self, change: &Change) -> Option<Refilter> {
+        let (now, filter) = (&self.boxes[change.id as usize], self.filters[change.id as usize]);
+        // Of a box that was not there before nobody says which filter the device has.
+        let new = filter != change.filter || !change.aabb.is_valid();
+        (new && now.is_valid()).then_some(Refilter { id: change.id, filter })
     }
 }
 
@@ -114,9 +119,10 @@ impl Trail {
             }
         }
         self.reach.extend_from_slice(&boxes[self.reach.len()..]);
-        for change in request.changed {
-            let reach = &mut self.reach[change.id as usize];
-            *reach = hull(&boxes[change.id as usize], &request.before(change));
+        let reach = |change: &Change| hull(&boxes[change.id as usize], &request.before(change));
+        let changed = request.changed.par_iter().with_min_len(PIECE);
+        for (change, reach) in request.changed.iter().zip(changed.map(reach).collect::<Vec<_>>()) {
+            self.reach[change.id as usize] = reach;
             self.moved.push(change.id);
         }
         self.update = Some(request.update);

@@ -3,11 +3,12 @@
 
 pub use super::changes::{Change, ChangeRequest};
 use super::engine::{Engine, Variant};
-use super::{Failure, GpuError, GpuFinder, readback};
-use crate::Pair;
+use super::{Failure, GpuError, GpuFinder, Request, readback};
 use crate::config::GpuOptions;
 use crate::cpu::find::Found;
+use crate::plan::Summary;
 use crate::report::Report;
+use crate::{Aabb, Config, Pair};
 use pbig_shaders::Kernel;
 use std::error::Error;
 use std::time::{Duration, Instant};
@@ -194,5 +195,19 @@ impl Tracker {
             Err(Failure::Device(error)) => return Err(error.into()),
         };
         Ok(Tracked { pairs: self.found.chunks.concat(), restarted, report })
+    }
+
+    /// All pairs of boxes, on the same device and its buffers, in no particular order.
+    ///
+    /// # Errors
+    /// As [`Tracker::update`].
+    pub fn find(&mut self, boxes: &[Aabb], config: &Config) -> Result<Vec<Pair>, Box<dyn Error>> {
+        let summary = &Summary::of(boxes, None);
+        let request = Request { boxes, filters: None, accept: None, summary, config };
+        match self.gpu.find(&request, &mut self.found, &mut Report::default()) {
+            Ok(()) => Ok(self.found.chunks.concat()),
+            Err(Failure::Call(error)) => Err(error.into()),
+            Err(Failure::Device(error)) => Err(error.into()),
+        }
     }
 }

@@ -23,7 +23,7 @@ const GAP: usize = 2;
 const MOST_RANGES: usize = 32;
 
 /// Elements that are worth another thread: 10 us of work.
-const PIECE: usize = 1 << 14;
+pub(super) const PIECE: usize = 1 << 14;
 
 /// What the device has.
 #[derive(Debug)]
