@@ -90,6 +90,16 @@ pub(super) fn moving(mut case: Case) -> Case {
     case
 }
 
+/// The level without the mark; that of an invalid box is beyond all.
+pub(super) fn own_level(at: &Located) -> u32 {
+    at.level & (MOVED - 1)
+}
+
+/// Whether a cell may own pairs of entries with these marks, and they may matter.
+pub(super) fn is_due(s: &State, marks: u32) -> bool {
+    marks >> AXIS_BITS == 7 && (!s.tells_changes() || marks & MOVED != 0)
+}
+
 pub(super) fn by_known(s: &State) -> u32 {
     s.params.known.div_ceil(LANES)
 }

@@ -122,11 +122,6 @@ pub(super) fn cell_at(l: &Level, place: [i32; 3], lowest: [i32; 3]) -> (usize, u
     (index as usize, axes << AXIS_BITS)
 }
 
-/// The level without the mark; that of an invalid box is beyond all.
-pub(super) fn own_level(at: &Located) -> u32 {
-    at.level & (MOVED - 1)
-}
-
 pub(super) fn visit(s: &mut State) {
     for at in s.located.iter().filter(|at| at.level != NO_LEVEL) {
         for level in own_level(at) + 1..s.params.levels {
@@ -325,11 +320,6 @@ impl Checked {
 
 pub(super) fn box_of(entry: u32) -> u32 {
     entry & ((1 << BOX_BITS) - 1)
-}
-
-/// Whether a cell may own pairs of entries with these marks, and they may matter.
-pub(super) fn is_due(s: &State, marks: u32) -> bool {
-    marks >> AXIS_BITS == 7 && (!s.tells_changes() || marks & MOVED != 0)
 }
 
 pub(super) fn overlap(a: &layout::Box, b: &layout::Box) -> bool {

@@ -6,7 +6,7 @@
 //! transferred, in either direction, follows what changed.
 
 use super::search::{Task, search};
-use super::upload::{PIECE, follows, hull};
+use super::upload::{PIECE, follows};
 use super::{Failure, GpuFinder};
 use crate::cpu::find::Found;
 use crate::layout::{ANEW, Box as DeviceBox, Motion, Move, Refilter};
@@ -181,6 +181,18 @@ impl GpuFinder {
         session.end_call();
         self.finish(searched, request.boxes.len() as u64 + request.kept, report);
         Ok(())
+    }
+}
+
+/// The box around two, of which an invalid one does not count.
+fn hull(one: &Aabb, other: &Aabb) -> Aabb {
+    match (one.is_valid(), other.is_valid()) {
+        (true, true) => Aabb::new(
+            std::array::from_fn(|k| one.min[k].min(other.min[k])),
+            std::array::from_fn(|k| one.max[k].max(other.max[k])),
+        ),
+        (false, true) => *other,
+        _ => *one,
     }
 }
 

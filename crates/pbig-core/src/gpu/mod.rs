@@ -6,7 +6,8 @@
 //!
 //! All of it is one submission and one wait, unless there is more work or output than fits in one
 //! chunk. `session` is that call; `map` and `readback` record its ends; `engine` owns the device,
-//! `storage` its buffers, `upload` what changed; `parts` splits sets that exceed the device's limits.
+//! `storage` its buffers, `upload` what changed; `parts` splits sets that exceed the device's limits;
+//! `changes` asks for the pairs that came or went instead of all.
 //! The kernels are in the crate `pbig-shaders`, which buffers hold what in [`crate::layout`].
 //!
 //! Most callers set [`crate::Backend::Gpu`] and need nothing from here. An app that has a wgpu device

@@ -1,4 +1,5 @@
-//! Upload: boxes and filters go to the device once; later calls send only the blocks that changed.
+//! Upload: boxes and filters go to the device once; later calls send only the blocks that changed, or the
+//! changes that they are given.
 
 use super::ChangeRequest;
 use super::GpuError;
@@ -63,18 +64,6 @@ impl News {
 /// Whether an update is the one after another.
 pub(super) fn follows(before: Option<u64>, update: u64) -> bool {
     before.is_some_and(|before| before.checked_add(1) == Some(update))
-}
-
-/// The box around two, of which an invalid one does not count.
-pub(super) fn hull(one: &Aabb, other: &Aabb) -> Aabb {
-    match (one.is_valid(), other.is_valid()) {
-        (true, true) => Aabb::new(
-            std::array::from_fn(|k| one.min[k].min(other.min[k])),
-            std::array::from_fn(|k| one.max[k].max(other.max[k])),
-        ),
-        (false, true) => *other,
-        _ => *one,
-    }
 }
 
 impl Mirror {

@@ -1,135 +1,19 @@
 //! A search for changes on a device, against brute force on both sides of each update: every pair that came
 //! or went comes back, once, and what is transferred follows the change, not the world.
 
+mod world;
+
 use pbig_core::gpu::Fault;
-use pbig_core::gpu::study::{Change, ChangeRequest, Tracked, Tracker};
+use pbig_core::gpu::study::{Tracked, Tracker};
 use pbig_core::{
-    Aabb, Coding, Config, GpuFinder, GpuOptions, GpuReport, Limits, Pair, ProxyFilter, Strategy, oracle,
+    Aabb, Coding, Config, GpuFinder, GpuOptions, GpuReport, Limits, ProxyFilter, Strategy, oracle,
 };
 use pbig_harness::boxes::BoxSet;
 use pbig_tests::gpu;
 use rand::rngs::StdRng;
 use rand::{RngExt, SeedableRng};
-use std::collections::{BTreeMap, BTreeSet};
 use std::time::Duration;
-
-/// What a broad phase keeps, in the plainest form.
-#[derive(Clone)]
-struct World {
-    boxes: Vec<Aabb>,
-    filters: Vec<ProxyFilter>,
-    changed: BTreeMap<u32, Change>,
-    kept: BTreeSet<Pair>,
-    update: u64,
-}
-
-impl World {
-    fn new(boxes: &[Aabb]) -> Self {
-        let mut world = Self {
-            boxes: Vec::new(),
-            filters: Vec::new(),
-            changed: BTreeMap::new(),
-            kept: BTreeSet::new(),
-            update: 0,
-        };
-        (0u32..).zip(boxes).for_each(|(id, aabb)| world.set(id, *aabb, ProxyFilter::ALL));
-        world
-    }
-
-    fn len(&self) -> u32 {
-        self.boxes.len() as u32
-    }
-
-    fn note(&mut self, id: u32) {
-        let i = id as usize;
-        if i >= self.boxes.len() {
-            self.boxes.resize(i + 1, Aabb::NOWHERE);
-            self.filters.resize(i + 1, ProxyFilter::ALL);
-        }
-        let was = Change { id, aabb: self.boxes[i], filter: self.filters[i] };
-        self.changed.entry(id).or_insert(was);
-    }
-
-    fn set(&mut self, id: u32, aabb: Aabb, filter: ProxyFilter) {
-        self.note(id);
-        self.boxes[id as usize] = if aabb.is_valid() { aabb } else { Aabb::NOWHERE };
-        self.filters[id as usize] = filter;
-    }
-
-    fn put(&mut self, id: u32, aabb: Aabb) {
-        let filter = self.filters.get(id as usize).copied().unwrap_or_default();
-        self.set(id, aabb, filter);
-    }
-
-    /// The pairs of a removed box end without anybody being told.
-    fn remove(&mut self, id: u32) {
-        self.put(id, Aabb::NOWHERE);
-        self.changed.entry(id).and_modify(|change| change.aabb = Aabb::NOWHERE);
-        self.kept.retain(|pair| pair.a != id && pair.b != id);
-    }
-
-    fn shift(&mut self, id: u32, by: [f32; 3]) {
-        let one = self.boxes[id as usize];
-        let moved = |corner: [f32; 3]| std::array::from_fn(|k| corner[k] + by[k]);
-        self.put(id, Aabb::new(moved(one.min), moved(one.max)));
-    }
-
-    /// One update on a device, compared with brute force.
-    fn follow(&mut self, tracker: &mut Tracker, config: &Config) -> Result<Tracked, String> {
-        let changed: Vec<_> = self.changed.values().copied().collect();
-        let request = ChangeRequest {
-            boxes: &self.boxes,
-            filters: &self.filters,
-            changed: &changed,
-            update: self.update,
-            kept: self.kept.len() as u64,
-            config,
-        };
-        let tracked = tracker.update(&request).map_err(|error| error.to_string())?;
-        assert_eq!(self.fault(&tracked), None, "update {}", self.update);
-        let pairs = self.completed(&tracked);
-        self.advance();
-        assert_eq!(pairs, self.kept, "update {}: what a caller makes of it", self.update);
-        Ok(tracked)
-    }
-
-    /// An update by something else.
-    fn advance(&mut self) {
-        self.kept = oracle::pairs_filtered(&self.boxes, &self.filters).into_iter().collect();
-        self.changed.clear();
-        self.update += 1;
-    }
-
-    /// How the found pairs differ from those that are in one of the two states, if they do.
-    fn fault(&self, tracked: &Tracked) -> Option<String> {
-        let mut before = self.boxes.clone();
-        for change in self.changed.values() {
-            let restarted = tracked.restarted.contains(&change.id);
-            before[change.id as usize] = if restarted { Aabb::NOWHERE } else { change.aabb };
-        }
-        let pairs = |boxes: &[Aabb]| -> BTreeSet<Pair> {
-            oracle::pairs_filtered(boxes, &self.filters).into_iter().collect()
-        };
-        let wanted: Vec<Pair> = (&pairs(&self.boxes) ^ &pairs(&before)).into_iter().collect();
-        let mut found = tracked.pairs.clone();
-        found.sort_unstable();
-        pbig_tests::difference(&found, &wanted)
-    }
-
-    /// The pairs after the update, as a caller has them that keeps the rules of `GpuFinder::changes`.
-    fn completed(&self, tracked: &Tracked) -> BTreeSet<Pair> {
-        let again = |pair: &Pair| [pair.a, pair.b].iter().any(|id| tracked.restarted.contains(id));
-        let overlaps = |pair: &Pair| self.boxes[pair.a as usize].overlaps(&self.boxes[pair.b as usize]);
-        let allowed = |pair: &Pair| self.filters[pair.a as usize].allows(&self.filters[pair.b as usize]);
-        let mut pairs = self.kept.clone();
-        for pair in &tracked.pairs {
-            let news = if overlaps(pair) { pairs.insert(*pair) } else { pairs.remove(pair) };
-            assert!(news || again(pair), "{pair:?} is no news");
-        }
-        pairs.retain(|pair| !again(pair) || (overlaps(pair) && allowed(pair)));
-        pairs
-    }
-}
+use world::World;
 
 fn set(name: &str, n: usize) -> Vec<Aabb> {
     BoxSet::named(name).expect("the set exists").boxes(n, 5)
