@@ -1,5 +1,9 @@
 //! Line charts as SVG: an image that needs no fonts or libraries to write.
 
+mod log_log;
+
+pub use log_log::{Line, LogLog, growth};
+
 use plotters::prelude::*;
 use std::path::Path;
 
@@ -20,8 +24,15 @@ pub struct Panel<'a> {
 }
 
 /// Colours that differ for the colour-blind too (Okabe and Ito).
-const COLOURS: [RGBColor; 4] =
-    [RGBColor(213, 94, 0), RGBColor(0, 114, 178), RGBColor(0, 158, 115), RGBColor(0, 0, 0)];
+const COLOURS: [RGBColor; 7] = [
+    RGBColor(213, 94, 0),
+    RGBColor(0, 114, 178),
+    RGBColor(0, 158, 115),
+    RGBColor(0, 0, 0),
+    RGBColor(204, 121, 167),
+    RGBColor(230, 159, 0),
+    RGBColor(86, 180, 233),
+];
 
 /// Writes panels one below the other, milliseconds against steps.
 ///

@@ -1,0 +1,103 @@
+//! Charts on which a power is a straight line, with its exponent in the legend.
+
+use super::{COLOURS, owned};
+use plotters::prelude::*;
+use std::path::Path;
+
+/// Points of one measurement, in ascending order of x.
+pub struct Line {
+    /// For the legend.
+    pub name: String,
+    /// Both above zero; others are left out.
+    pub points: Vec<(f64, f64)>,
+}
+
+/// Lines over logarithmic axes.
+pub struct LogLog {
+    /// Of the file, without its ending.
+    pub name: String,
+    /// Above the chart.
+    pub title: String,
+    /// Along the x axis.
+    pub x: &'static str,
+    /// Along the y axis.
+    pub y: &'static str,
+    /// What is drawn.
+    pub lines: Vec<Line>,
+}
+
+/// The exponent `k` of the power `c x^k` that fits best (least squares of the logarithms); none for fewer
+/// than two different x.
+pub fn growth(points: &[(f64, f64)]) -> Option<f64> {
+    let logs: Vec<(f64, f64)> = drawn(points).map(|(x, y)| (x.ln(), y.ln())).collect();
+    let n = logs.len() as f64;
+    let mean = |of: fn(&(f64, f64)) -> f64| logs.iter().map(of).sum::<f64>() / n;
+    let (x0, y0) = (mean(|p| p.0), mean(|p| p.1));
+    let spread: f64 = logs.iter().map(|(x, _)| (x - x0) * (x - x0)).sum();
+    let common: f64 = logs.iter().map(|(x, y)| (x - x0) * (y - y0)).sum();
+    (spread > 1e-12).then(|| common / spread)
+}
+
+fn drawn(points: &[(f64, f64)]) -> impl Iterator<Item = (f64, f64)> {
+    points.iter().copied().filter(|&(x, y)| x > 0.0 && y > 0.0 && x.is_finite() && y.is_finite())
+}
+
+impl LogLog {
+    /// Writes the chart.
+    ///
+    /// # Errors
+    /// A message that names the file, when it cannot be written.
+    pub fn write(&self, path: &Path) -> Result<(), String> {
+        self.draw(path).map_err(|error| format!("{}: cannot write the chart: {error}", path.display()))
+    }
+
+    /// From the smallest to the largest, a little more on both sides.
+    fn range(&self, of: fn((f64, f64)) -> f64) -> std::ops::Range<f64> {
+        let values = || self.lines.iter().flat_map(|line| drawn(&line.points)).map(of);
+        let (low, high) = (values().fold(f64::MAX, f64::min), values().fold(0.0, f64::max));
+        if low > high { 1.0..10.0 } else { low / 1.3..high * 1.3 }
+    }
+
+    fn draw(&self, path: &Path) -> Result<(), Box<dyn std::error::Error>> {
+        let root = SVGBackend::new(path, (960, 540)).into_drawing_area();
+        root.fill(&WHITE)?;
+        let mut chart = ChartBuilder::on(&root)
+            .caption(&self.title, ("sans-serif", 20))
+            .margin(12)
+            .x_label_area_size(40)
+            .y_label_area_size(70)
+            .build_cartesian_2d(self.range(|p| p.0).log_scale(), self.range(|p| p.1).log_scale())
+            .map_err(owned)?;
+        let plain = |value: &f64| format!("{value}");
+        let mut mesh = chart.configure_mesh();
+        mesh.x_desc(self.x).y_desc(self.y).x_label_formatter(&plain).y_label_formatter(&plain);
+        mesh.light_line_style(WHITE).draw().map_err(owned)?;
+        for (line, colour) in self.lines.iter().zip(COLOURS) {
+            let exponent = growth(&line.points).map_or(String::new(), |k| format!(" (grows as x^{k:.2})"));
+            chart
+                .draw_series(LineSeries::new(drawn(&line.points), colour.stroke_width(2)).point_size(3))
+                .map_err(owned)?
+                .label(format!("{}{exponent}", line.name))
+                .legend(move |(x, y)| PathElement::new([(x, y), (x + 20, y)], colour.stroke_width(3)));
+        }
+        let mut labels = chart.configure_series_labels();
+        labels.position(SeriesLabelPosition::UpperLeft).background_style(WHITE.mix(0.8)).border_style(BLACK);
+        labels.draw().map_err(owned)?;
+        drop(labels);
+        drop(chart);
+        root.present().map_err(owned)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_exponent_of_a_power_is_found() {
+        let square: Vec<(f64, f64)> = [1.0, 10.0, 50.0].map(|x| (x, 3.0 * x * x)).to_vec();
+        assert!((growth(&square).expect("three points") - 2.0).abs() < 1e-9);
+        assert_eq!(growth(&square[..1]), None);
+        assert_eq!(growth(&[(1.0, 0.0), (2.0, 4.0)]), None, "zero has no logarithm");
+    }
+}

@@ -1,0 +1,85 @@
+//! Boxes as colliders of a rapier world, moved by hand: a broad phase's call without the rest of a step.
+
+use crate::world::{World, to_vector};
+use glam::Vec3;
+use pbig_core::Aabb;
+use rand::rngs::StdRng;
+use rand::{RngExt, SeedableRng};
+use rapier3d::prelude::*;
+
+/// A cuboid on a dynamic body of its own for each box.
+pub struct Field {
+    /// The world; nothing in it moves by itself.
+    pub world: World,
+    /// The cuboids, in the order of the boxes.
+    pub colliders: Vec<ColliderHandle>,
+    bodies: Vec<RigidBodyHandle>,
+    rng: StdRng,
+}
+
+impl Field {
+    /// A collider for each box.
+    pub fn new(boxes: &[Aabb]) -> Self {
+        let mut world = World::default();
+        let bodies: Vec<RigidBodyHandle> = boxes.iter().map(|aabb| add(&mut world, aabb)).collect();
+        let colliders = bodies.iter().map(|&body| world.bodies[body].colliders()[0]).collect();
+        Self { world, colliders, bodies, rng: StdRng::seed_from_u64(3) }
+    }
+
+    /// Moves some of them by up to `distance` along each axis and returns their handles, as a step lists
+    /// what it has moved.
+    pub fn shift(&mut self, movers: &[u32], distance: f32) -> Vec<ColliderHandle> {
+        for &mover in movers {
+            let by: [f32; 3] = std::array::from_fn(|_| self.rng.random_range(-distance..=distance));
+            let body = self.world.bodies.get_mut(self.bodies[mover as usize]).expect("none is removed");
+            body.set_translation(body.translation() + to_vector(Vec3::from_array(by)), false);
+        }
+        let World { bodies, colliders, .. } = &mut self.world;
+        bodies.propagate_modified_body_positions_to_colliders(colliders);
+        movers.iter().map(|&mover| self.colliders[mover as usize]).collect()
+    }
+
+    /// Calls a broad phase as a step does.
+    pub fn call(
+        &self,
+        broad_phase: &mut dyn BroadPhase,
+        modified: &[ColliderHandle],
+        events: &mut Vec<BroadPhasePairEvent>,
+    ) {
+        let World { params, colliders, bodies, .. } = &self.world;
+        broad_phase.update(params, colliders, bodies, modified, &[], events);
+    }
+}
+
+fn add(world: &mut World, aabb: &Aabb) -> RigidBodyHandle {
+    let (min, max) = (Vec3::from_array(aabb.min), Vec3::from_array(aabb.max));
+    let half = (max - min) / 2.0;
+    world.add(World::dynamic((min + max) / 2.0), ColliderBuilder::cuboid(half.x, half.y, half.z))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::boxes::BoxSet;
+    use rapier_pbig::PbigBroadPhase;
+
+    #[test]
+    fn movers_are_listed_and_their_colliders_move_with_them() {
+        let boxes = BoxSet::named("unit").expect("the set exists").boxes(50, 1);
+        let mut field = Field::new(&boxes);
+        let place = |field: &Field, i: usize| *field.world.colliders[field.colliders[i]].translation();
+        let before = [place(&field, 3), place(&field, 4)];
+        assert_eq!(field.shift(&[3], 1.0), [field.colliders[3]]);
+        assert_ne!(place(&field, 3), before[0]);
+        assert_eq!(place(&field, 4), before[1]);
+    }
+
+    #[test]
+    fn a_broad_phase_sees_the_boxes() {
+        let cube = |x: f32| Aabb::from_center([x, 0.0, 0.0], [0.5; 3]);
+        let field = Field::new(&[cube(0.0), cube(0.9), cube(5.0)]);
+        let (mut broad_phase, mut events) = (PbigBroadPhase::new(), Vec::new());
+        field.call(&mut broad_phase, &field.colliders, &mut events);
+        assert_eq!(events.len(), 1);
+    }
+}
