@@ -118,7 +118,7 @@ fn test(name: &str, mut finder: Finder) -> Result<Vec<String>, Failure> {
 }
 
 #[cfg(target_arch = "x86_64")]
-fn simd_found() -> Vec<&'static str> {
+pub(crate) fn simd_found() -> Vec<&'static str> {
     let found = [
         ("sse4.2", is_x86_feature_detected!("sse4.2")),
         ("avx2", is_x86_feature_detected!("avx2")),
@@ -129,6 +129,6 @@ fn simd_found() -> Vec<&'static str> {
 }
 
 #[cfg(not(target_arch = "x86_64"))]
-fn simd_found() -> Vec<&'static str> {
+pub(crate) fn simd_found() -> Vec<&'static str> {
     vec![std::env::consts::ARCH]
 }

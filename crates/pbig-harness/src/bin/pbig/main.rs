@@ -34,6 +34,9 @@ enum Command {
     Scenes,
     /// How fast it is here; results are written to docs/benchmarks/results.
     Bench(bench::Args),
+    /// Finds pairs and says how much memory that took: a process of its own for `bench`.
+    #[command(hide = true)]
+    MemoryProbe(bench::memory::Args),
     /// What this machine offers, what is chosen and why, and a self-test.
     Doctor,
 }
@@ -58,6 +61,7 @@ fn run(command: Command) -> Result<(), Failure> {
         Command::Simulate(args) => simulate::run(&args),
         Command::Scenes => simulate::list(),
         Command::Bench(args) => bench::run(&args),
+        Command::MemoryProbe(args) => bench::memory::probe(&args),
         Command::Doctor => doctor::run(),
     }
 }

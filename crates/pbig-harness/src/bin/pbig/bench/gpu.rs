@@ -1,36 +1,14 @@
 //! `pbig bench gpu`: the GPU beside the CPU, stage by stage, and the floor below both.
 
+use super::machine::slug;
+use super::{Args, keep};
 use crate::output::{Failure, print, progress};
-use clap::ValueEnum;
 use pbig_core::gpu::study::Bench;
 use pbig_core::{Aabb, Backend, Config, Finder, GpuFinder, GpuReport, Limits};
 use pbig_harness::boxes::{BoxSet, moved};
 use pbig_harness::runner::{Spread, milliseconds};
 use serde_json::{Value, json};
-use std::path::{Path, PathBuf};
 use std::time::Instant;
-
-/// Where results are kept, in the project's folder.
-const RESULTS: &str = "docs/benchmarks/results";
-
-#[derive(clap::Args)]
-pub(crate) struct Args {
-    /// What to measure.
-    #[arg(value_enum)]
-    suite: Suite,
-    /// Print one JSON object.
-    #[arg(long)]
-    json: bool,
-    /// Small sizes only, in seconds; nothing is written.
-    #[arg(long)]
-    quick: bool,
-}
-
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-enum Suite {
-    /// The GPU pipeline: upload, each kernel, readback, decode, whole call.
-    Gpu,
-}
 
 /// One set at one size.
 struct Row {
@@ -47,7 +25,6 @@ struct Row {
 }
 
 pub(crate) fn run(args: &Args) -> Result<(), Failure> {
-    let Suite::Gpu = args.suite;
     let gpu = GpuFinder::new().map_err(|error| Failure::Input(error.to_string()))?;
     let rate = Bench::new().and_then(|bench| bench.copy_rate(256 << 20));
     let rate = rate.map_err(|error| Failure::Input(error.to_string()))?;
@@ -71,7 +48,7 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
     } else {
         print(&table(&gpu, rate, &rows))?
     }
-    if args.quick { Ok(()) } else { keep(&gpu, &object, args.json) }
+    if args.quick { Ok(()) } else { keep(&format!("gpu-{}", slug(gpu.adapter())), &object, args.json) }
 }
 
 /// Both backends on the same boxes, in turn. In every other round all boxes have moved, as they do in a
@@ -194,21 +171,4 @@ fn object(gpu: &GpuFinder, rate: f64, rows: &[Row]) -> Value {
         "copy_bytes_per_s": rate,
         "rows": rows.iter().map(row).collect::<Vec<_>>(),
     })
-}
-
-/// Writes the results where the project keeps them, named by day and machine.
-fn keep(gpu: &GpuFinder, object: &Value, quiet: bool) -> Result<(), Failure> {
-    let day = time::OffsetDateTime::now_utc().date();
-    let machine: Vec<String> = gpu
-        .adapter()
-        .to_lowercase()
-        .split(|c: char| !c.is_ascii_alphanumeric())
-        .filter(|word| !word.is_empty())
-        .map(str::to_owned)
-        .collect();
-    let path: PathBuf = Path::new(RESULTS).join(format!("{day}-gpu-{}.json", machine.join("-")));
-    let written =
-        std::fs::create_dir_all(RESULTS).and_then(|()| std::fs::write(&path, format!("{object:#}\n")));
-    written.map_err(|error| Failure::Input(format!("{}: {error}", path.display())))?;
-    if quiet { Ok(()) } else { print(&format!("written to {}", path.display())) }
 }

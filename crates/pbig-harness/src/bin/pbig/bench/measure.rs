@@ -1,0 +1,101 @@
+//! Times of several sides that do the same work, in turn in one run: only such times compare.
+
+use crate::output::Failure;
+use pbig_harness::runner::{Spread, milliseconds};
+use std::time::{Duration, Instant};
+
+/// Sides that do the same work, round by round.
+pub(crate) trait Contest {
+    /// How many take part.
+    fn sides(&self) -> usize;
+
+    /// What comes before a round and is not measured.
+    fn prepare(&mut self, round: usize);
+
+    /// One side's work in this round, and its milliseconds.
+    fn run(&mut self, side: usize) -> Result<f64, Failure>;
+}
+
+/// How long to measure.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Effort {
+    /// Rounds that do not count: they allocate, learn and fill caches.
+    pub(crate) warm_up: usize,
+    /// Rounds that do, at most.
+    pub(crate) rounds: usize,
+    /// Time after which no further round starts, once there are enough for a median.
+    pub(crate) budget: Duration,
+}
+
+impl Effort {
+    /// Seconds for a row, or a fraction of one.
+    pub(crate) fn new(quick: bool) -> Self {
+        let (rounds, budget) = if quick { (31, 250) } else { (61, 6000) };
+        Self { warm_up: 3, rounds, budget: Duration::from_millis(budget) }
+    }
+}
+
+/// Milliseconds of each side. The sides change places from round to round, as the first in a round warms
+/// the caches for the next: a side's time is the mean, over its places, of its median there.
+pub(crate) fn medians(contest: &mut impl Contest, effort: Effort) -> Result<Vec<f64>, Failure> {
+    let sides = contest.sides();
+    // By place, then by side.
+    let mut times = vec![vec![Vec::new(); sides]; sides];
+    let enough = effort.warm_up + 3 * sides.min(2);
+    let clock = Instant::now();
+    for round in 0..effort.warm_up + effort.rounds {
+        if round >= enough && clock.elapsed() > effort.budget {
+            break;
+        }
+        contest.prepare(round);
+        for (place, times) in times.iter_mut().enumerate() {
+            let side = (round + place) % sides;
+            let time = contest.run(side)?;
+            if round >= effort.warm_up {
+                times[side].push(time);
+            }
+        }
+    }
+    Ok((0..sides).map(|side| mean_of_medians(times.iter().map(|times| &times[side][..]))).collect())
+}
+
+/// Over the places in which there is a time.
+pub(crate) fn mean_of_medians<'a>(places: impl IntoIterator<Item = &'a [f64]>) -> f64 {
+    let median = |times: &[f64]| Spread::of(times.iter().copied()).median;
+    let seen: Vec<f64> = places.into_iter().filter(|times| !times.is_empty()).map(median).collect();
+    seen.iter().sum::<f64>() / seen.len().max(1) as f64
+}
+
+/// A call's result and its milliseconds.
+pub(crate) fn timed<T>(call: impl FnOnce() -> T) -> (T, f64) {
+    let clock = Instant::now();
+    let result = call();
+    (result, milliseconds(clock.elapsed()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Side 1 takes twice as long as side 0, and the first of a round 10 more.
+    struct Known(bool);
+
+    impl Contest for Known {
+        fn sides(&self) -> usize {
+            2
+        }
+        fn prepare(&mut self, _: usize) {
+            self.0 = true;
+        }
+        fn run(&mut self, side: usize) -> Result<f64, Failure> {
+            let cold = if std::mem::take(&mut self.0) { 10.0 } else { 0.0 };
+            Ok(cold + [1.0, 2.0][side])
+        }
+    }
+
+    #[test]
+    fn places_in_a_round_favour_no_side() {
+        let effort = Effort { warm_up: 1, rounds: 7, budget: Duration::MAX };
+        assert_eq!(medians(&mut Known(false), effort).expect("no failure"), [6.0, 7.0]);
+    }
+}

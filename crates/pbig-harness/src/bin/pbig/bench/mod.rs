@@ -1,0 +1,123 @@
+//! `pbig bench SUITE`: each row has ours and the other side, in turn in one run, and what is wanted.
+
+mod gpu;
+mod machine;
+mod measure;
+pub(crate) mod memory;
+mod peers;
+mod stages;
+mod step;
+mod table;
+mod update;
+
+use crate::output::{Failure, print};
+use clap::ValueEnum;
+use machine::{Machine, slug};
+use pbig_harness::chart::LogLog;
+use serde_json::{Value, json};
+use std::path::{Path, PathBuf};
+use table::Row;
+
+/// Where documents are kept, in the project's folder; the results are in a folder in it.
+const DOCUMENTS: &str = "docs/benchmarks";
+
+#[derive(clap::Args)]
+pub(crate) struct Args {
+    /// What to measure.
+    #[arg(value_enum)]
+    suite: Suite,
+    /// Print one JSON object.
+    #[arg(long)]
+    json: bool,
+    /// Small sizes only, in seconds; nothing is written.
+    #[arg(long)]
+    quick: bool,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum Suite {
+    /// Ours alone, stage by stage: against boxes, movers, density and the spread of sizes.
+    Stages,
+    /// A broad phase's call through rapier, beside stock's on the same world; and memory.
+    Update,
+    /// The finder alone, beside parry's tree and obvhs.
+    Peers,
+    /// Every scene at every size, stock beside ours in each step.
+    Step,
+    /// The GPU pipeline: upload, each kernel, readback, decode, whole call.
+    Gpu,
+}
+
+/// What a suite found out.
+struct Outcome {
+    rows: Vec<Row>,
+    /// What a reader must know to read the rows, a line each.
+    notes: Vec<String>,
+    charts: Vec<LogLog>,
+}
+
+pub(crate) fn run(args: &Args) -> Result<(), Failure> {
+    let quick = args.quick;
+    match args.suite {
+        Suite::Stages => report("stages", stages::run(quick)?, args),
+        Suite::Update => report("update", update::run(quick)?, args),
+        Suite::Peers => report("peers", peers::run(quick)?, args),
+        Suite::Step => report("step", step::run(quick)?, args),
+        Suite::Gpu => gpu::run(args),
+    }
+}
+
+fn report(suite: &str, mut outcome: Outcome, args: &Args) -> Result<(), Failure> {
+    outcome.notes.extend(table::summary(&outcome.rows));
+    let machine = Machine::here();
+    let object = object(suite, &machine, &outcome);
+    if args.json {
+        print(&object.to_string())?;
+    } else {
+        let notes = outcome.notes.join("\n");
+        print(&format!("{}\n{}\n{notes}", machine.line(), table::text(&outcome.rows)))?;
+    }
+    if args.quick {
+        return Ok(());
+    }
+    save(&Path::new(DOCUMENTS).join(format!("{suite}.md")), &document(suite, &machine, &outcome))?;
+    for chart in &outcome.charts {
+        chart.write(&Path::new(DOCUMENTS).join(format!("{}.svg", chart.name)))?;
+    }
+    keep(&format!("{suite}-{}", slug(&machine.cpu)), &object, args.json)
+}
+
+fn object(suite: &str, machine: &Machine, outcome: &Outcome) -> Value {
+    json!({
+        "suite": suite,
+        "day": machine.day,
+        "machine": machine.object(),
+        "rows": outcome.rows.iter().map(Row::object).collect::<Vec<_>>(),
+        "notes": outcome.notes,
+    })
+}
+
+fn document(suite: &str, machine: &Machine, outcome: &Outcome) -> String {
+    let notes: String = outcome.notes.iter().map(|note| format!("- {note}\n")).collect();
+    let charts: String =
+        outcome.charts.iter().map(|chart| format!("\n![{}]({}.svg)\n", chart.title, chart.name)).collect();
+    format!(
+        "# `pbig bench {suite}`\n\nWritten by that command, nothing by hand. {}.\n\n{notes}\n{}{charts}",
+        machine.line(),
+        table::markdown(&outcome.rows)
+    )
+}
+
+/// Writes results where the project keeps them, named by day, suite and machine.
+fn keep(name: &str, object: &Value, quiet: bool) -> Result<(), Failure> {
+    let day = time::OffsetDateTime::now_utc().date();
+    let path: PathBuf = Path::new(DOCUMENTS).join("results").join(format!("{day}-{name}.json"));
+    save(&path, &format!("{object:#}\n"))?;
+    if quiet { Ok(()) } else { print(&format!("written to {}", path.display())) }
+}
+
+fn save(path: &Path, text: &str) -> Result<(), Failure> {
+    let folder = path.parent().unwrap_or(Path::new("."));
+    let written = std::fs::create_dir_all(folder).and_then(|()| std::fs::write(path, text));
+    written.map_err(|error| Failure::Input(format!("{}: {error}", path.display())))
+}

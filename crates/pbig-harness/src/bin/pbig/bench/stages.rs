@@ -1,0 +1,197 @@
+//! `pbig bench stages`: ours alone, stage by stage, against what a scene can be.
+
+use super::Outcome;
+use super::measure::{Contest, Effort, medians, timed};
+use super::table::Row;
+use crate::output::{Failure, progress};
+use pbig_core::{BroadPhase, Config, Error, Finder, Limits, Order, ProxyFilter, StageTimes};
+use pbig_harness::boxes::{Wander, cubes};
+use pbig_harness::chart::{Line, LogLog};
+use pbig_harness::runner::{Spread, milliseconds};
+
+/// How far a box moves between two frames, along each axis; edges are around 1.
+const DISTANCE: f32 = 0.1;
+
+const CONFIG: Config = Config { limits: Limits::UNLIMITED, order: Order::Unspecified, ..Config::DEFAULT };
+
+/// Ours: the whole call, `set` (incremental only), and the stages of the report.
+const NAMES: [&str; 7] = ["whole", "set", "plan", "map", "check", "emit", "diff"];
+
+type Times = [f64; NAMES.len()];
+
+/// From nothing in each round, or events for what has moved.
+enum Way {
+    Scratch(Box<Finder>),
+    Events(Box<BroadPhase>),
+}
+
+struct Alone {
+    way: Way,
+    wander: Wander,
+    moved: Vec<u32>,
+    times: Vec<Times>,
+}
+
+impl Alone {
+    fn find(&mut self) -> Result<Times, Error> {
+        let Self { way, wander, moved, .. } = self;
+        let boxes = &wander.boxes;
+        match way {
+            Way::Scratch(finder) => {
+                let (done, whole) = timed(|| finder.find(boxes).map(|_| ()));
+                done.map(|()| in_order(whole, 0.0, &finder.report().stages))
+            }
+            Way::Events(broad_phase) => {
+                let (done, set) = timed(|| {
+                    let mut each = moved.iter();
+                    each.try_for_each(|&id| broad_phase.set(id, boxes[id as usize], ProxyFilter::ALL))
+                });
+                done?;
+                let (done, update) = timed(|| broad_phase.update().map(|_| ()));
+                done.map(|()| in_order(set + update, set, &broad_phase.report().stages))
+            }
+        }
+    }
+}
+
+fn in_order(whole: f64, set: f64, stages: &StageTimes) -> Times {
+    let StageTimes { plan, map, check, emit, diff } = *stages;
+    let [plan, map, check, emit, diff] = [plan, map, check, emit, diff].map(milliseconds);
+    [whole, set, plan, map, check, emit, diff]
+}
+
+impl Contest for Alone {
+    fn sides(&self) -> usize {
+        1
+    }
+
+    fn prepare(&mut self, round: usize) {
+        // In the first round all are new.
+        if round > 0 {
+            self.moved = self.wander.step(round);
+        }
+    }
+
+    fn run(&mut self, _: usize) -> Result<f64, Failure> {
+        let times = self.find().map_err(|error| Failure::Input(error.to_string()))?;
+        self.times.push(times);
+        Ok(times[0])
+    }
+}
+
+/// Medians of whole call and stages, and the pairs.
+fn measure(way: Way, wander: Wander, effort: Effort) -> Result<(Times, u64), Failure> {
+    let moved = (0..wander.boxes.len() as u32).collect();
+    let mut alone = Alone { way, wander, moved, times: vec![] };
+    medians(&mut alone, effort)?;
+    let times = &alone.times[effort.warm_up..];
+    let median = |k: usize| Spread::of(times.iter().map(|times| times[k])).median;
+    let pairs = match &alone.way {
+        Way::Scratch(finder) => finder.pairs().len(),
+        Way::Events(broad_phase) => broad_phase.pair_count(),
+    };
+    Ok((std::array::from_fn(median), pairs as u64))
+}
+
+/// What is varied, and the boxes at each value.
+struct Sweep {
+    name: &'static str,
+    /// Along the x axis; also in the rows' case.
+    x: &'static str,
+    scratch: bool,
+    points: Vec<Point>,
+}
+
+struct Point {
+    x: f64,
+    boxes: usize,
+    share: f64,
+    spread: f64,
+    pairs: f64,
+}
+
+const fn point(x: f64, boxes: usize) -> Point {
+    Point { x, boxes, share: 1.0, spread: 1.0, pairs: 1.0 }
+}
+
+fn sweeps(quick: bool) -> Vec<Sweep> {
+    let sizes = |most: u32| (2..=most).map(|k| 10usize.pow(k)).map(|n| point(n as f64, n)).collect();
+    let n = if quick { 10_000 } else { 100_000 };
+    let share = |x: f64| Point { share: x, ..point(x, n) };
+    let density = |x: f64| Point { pairs: x, ..point(x, n) };
+    let spread = |x: f64| Point { spread: x, ..point(x, n) };
+    let shares = [0.001, 0.003, 0.01, 0.03, 0.1, 0.3, 1.0].map(share).into();
+    let densities = || [0.01, 0.1, 0.3, 1.0, 3.0, 10.0, 30.0].map(density).into();
+    let spreads = || [1.0, 3.0, 10.0, 30.0, 100.0, 300.0, 1000.0].map(spread).into();
+    let sweep = |name, x, scratch, points| Sweep { name, x, scratch, points };
+    vec![
+        sweep("boxes-scratch", "boxes", true, sizes(if quick { 5 } else { 7 })),
+        sweep("boxes", "boxes", false, sizes(if quick { 4 } else { 6 })),
+        sweep("share", "share moved", false, shares),
+        sweep("density-scratch", "pairs a box", true, densities()),
+        sweep("density", "pairs a box", false, densities()),
+        sweep("spread-scratch", "largest edge / smallest", true, spreads()),
+        sweep("spread", "largest edge / smallest", false, spreads()),
+    ]
+}
+
+pub(super) fn run(quick: bool) -> Result<Outcome, Failure> {
+    let effort = Effort::new(quick);
+    let sweeps = sweeps(quick);
+    let bar = progress(sweeps.iter().map(|sweep| sweep.points.len()).sum(), "scenes");
+    let (mut rows, mut charts) = (Vec::new(), Vec::new());
+    for sweep in &sweeps {
+        let mut lines = NAMES.map(|name| Line { name: name.into(), points: Vec::new() });
+        for point in &sweep.points {
+            let (times, pairs) = at(sweep, point, effort)?;
+            lines.iter_mut().zip(times).for_each(|(line, ms)| line.points.push((point.x, ms)));
+            rows.push(row(sweep, point, &times, pairs));
+            bar.inc(1);
+        }
+        charts.push(chart(sweep, lines.into()));
+    }
+    bar.finish_and_clear();
+    Ok(Outcome { rows, notes: notes(), charts })
+}
+
+fn at(sweep: &Sweep, point: &Point, effort: Effort) -> Result<(Times, u64), Failure> {
+    let way = if sweep.scratch {
+        Way::Scratch(Box::new(Finder::new(CONFIG)))
+    } else {
+        let broad_phase = BroadPhase::new(CONFIG).map_err(|error| Failure::Input(error.to_string()))?;
+        Way::Events(Box::new(broad_phase))
+    };
+    let boxes = cubes(point.boxes, point.spread as f32, point.pairs as f32, 1);
+    measure(way, Wander::new(boxes, point.share, DISTANCE), effort)
+}
+
+fn what(sweep: &Sweep) -> &'static str {
+    if sweep.scratch { "from scratch" } else { "events" }
+}
+
+fn row(sweep: &Sweep, point: &Point, times: &Times, pairs: u64) -> Row {
+    let stages = NAMES.into_iter().zip(*times).skip(1).filter(|(_, time)| *time > 0.0).collect();
+    let case = format!("{}, {} {}", what(sweep), sweep.x, point.x);
+    Row::new(case, point.boxes, pairs).ours(times[0]).stages(stages)
+}
+
+/// Stages that this way does not have are left out.
+fn chart(sweep: &Sweep, lines: Vec<Line>) -> LogLog {
+    let used = |line: &Line| line.points.iter().any(|(_, ms)| *ms > 0.0);
+    LogLog {
+        name: format!("stages-{}", sweep.name),
+        title: format!("{}: time by stage", what(sweep)),
+        x: sweep.x,
+        y: "ms",
+        lines: lines.into_iter().filter(used).collect(),
+    }
+}
+
+fn notes() -> Vec<String> {
+    vec![
+        "cubes, edges around 1, about one pair a box unless that is varied; all move by up to 0.1 unless that is varied"
+            .into(),
+        "from scratch: `Finder` with `Order::Unspecified`; events: `BroadPhase`, `set` for each moved box and `update`"
+            .into(),
+    ]
+}

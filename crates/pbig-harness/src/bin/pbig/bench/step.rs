@@ -1,0 +1,137 @@
+//! `pbig bench step`: every scene at every size, stock beside ours in each step, and every share of
+//! moved boxes: where is ours slower?
+
+use super::measure::{Effort, mean_of_medians};
+use super::table::{Row, Target};
+use super::{Outcome, update};
+use crate::output::{Failure, progress};
+use pbig_harness::boxes::BoxSet;
+use pbig_harness::chart::{Line, LogLog};
+use pbig_harness::runner::{Timed, milliseconds};
+use pbig_harness::scenes::Scene;
+use rapier_pbig::PbigBroadPhase;
+use rapier3d::prelude::*;
+use std::time::{Duration, Instant};
+
+/// A step longer than this ends the measurement of its scene.
+const LONGEST: Duration = Duration::from_secs(5);
+
+/// Never slower.
+const TARGET: Option<Target> = Some(Target::Faster(1.0));
+
+/// Both broad phases in one world, in turn: they see the same boxes in every step, with caches as cold as the
+/// rest of the step leaves them, or as warm as the other has made them. The world gets our events.
+struct Both {
+    ours: Timed<PbigBroadPhase>,
+    stock: Timed<DefaultBroadPhase>,
+    ours_first: bool,
+    discarded: Vec<BroadPhasePairEvent>,
+}
+
+impl BroadPhase for Both {
+    fn update(
+        &mut self,
+        params: &IntegrationParameters,
+        colliders: &ColliderSet,
+        bodies: &RigidBodySet,
+        modified: &[ColliderHandle],
+        removed: &[ColliderHandle],
+        events: &mut Vec<BroadPhasePairEvent>,
+    ) {
+        let Self { ours, stock, ours_first, discarded } = self;
+        discarded.clear();
+        if *ours_first {
+            ours.update(params, colliders, bodies, modified, removed, events);
+        }
+        stock.update(params, colliders, bodies, modified, removed, discarded);
+        if !*ours_first {
+            ours.update(params, colliders, bodies, modified, removed, events);
+        }
+    }
+}
+
+pub(super) fn run(quick: bool) -> Result<Outcome, Failure> {
+    let sizes: &[usize] = if quick { &[1, 10, 100, 1000] } else { &[1, 10, 100, 1000, 10_000, 100_000] };
+    let effort = if quick {
+        Effort { warm_up: 2, rounds: 40, budget: Duration::from_millis(50) }
+    } else {
+        Effort { warm_up: 2, rounds: 1000, budget: Duration::from_secs(6) }
+    };
+    let bar = progress(Scene::ALL.len() * sizes.len(), "scenes");
+    let mut rows = Vec::new();
+    for scene in Scene::ALL {
+        for &bodies in sizes {
+            rows.push(measure(scene, bodies, effort));
+            bar.inc(1);
+        }
+    }
+    bar.finish_and_clear();
+    let chart = shares(quick, &mut rows)?;
+    let notes = notes(&rows);
+    Ok(Outcome { rows, notes, charts: vec![chart] })
+}
+
+fn notes(rows: &[Row]) -> Vec<String> {
+    let ratio = |row: &&Row| row.ratio().unwrap_or(f64::MAX);
+    let worst = rows.iter().min_by(|a, b| ratio(a).total_cmp(&ratio(b)));
+    let worst = worst.map(|row| format!("worst: {} of {}, {:.2}x", row.case, row.boxes, ratio(&row)));
+    let how = "scenes: both broad phases in one world, which ours drives; the times are all of a step's calls, \
+               from the third step on, first called in every other step; the steps are those that fit into some \
+               seconds";
+    let moved = "uniform: as in `update`, the broad phase's call alone";
+    [how.to_owned(), moved.to_owned()].into_iter().chain(worst).collect()
+}
+
+/// One scene at one size.
+fn measure(scene: Scene, bodies: usize, effort: Effort) -> Row {
+    let mut world = scene.build(bodies, 1);
+    let (ours, stock) = (Timed::new(PbigBroadPhase::new()), Timed::new(DefaultBroadPhase::new()));
+    let mut both = Both { ours, stock, ours_first: false, discarded: vec![] };
+    let mut times = [[vec![], vec![]], [vec![], vec![]]];
+    let (start, mut steps, mut too_long) = (Instant::now(), 0, false);
+    while steps < effort.warm_up + effort.rounds {
+        let enough = steps >= effort.warm_up + 6 && start.elapsed() > effort.budget;
+        if enough || (too_long && steps >= effort.warm_up + 2) {
+            break;
+        }
+        both.ours_first = steps % 2 == 0;
+        let clock = Instant::now();
+        world.step(&mut both);
+        too_long = clock.elapsed() > LONGEST;
+        let took = [both.ours.take(), both.stock.take()].map(milliseconds);
+        steps += 1;
+        if steps > effort.warm_up {
+            let ours_place = usize::from(!both.ours_first);
+            times[0][ours_place].push(took[0]);
+            times[1][1 - ours_place].push(took[1]);
+        }
+    }
+    let [ours, stock] = times.map(|places: [Vec<f64>; 2]| mean_of_medians(places.iter().map(Vec::as_slice)));
+    let pairs = both.ours.inner.pair_count() as u64;
+    let row = Row::new(format!("{}, {bodies} bodies", scene.name), world.colliders.len(), pairs)
+        .ours(ours)
+        .against("stock", stock);
+    let cut = if too_long { ", the last over 5 s" } else { "" };
+    row.target(TARGET).note(format!("{} steps{cut}", steps - effort.warm_up))
+}
+
+/// Shares of the uniform set that move; the largest size as a chart.
+fn shares(quick: bool, rows: &mut Vec<Row>) -> Result<LogLog, Failure> {
+    let sizes: &[usize] = if quick { &[100, 1000] } else { &[10, 100, 1000, 10_000, 100_000] };
+    let effort =
+        Effort { budget: Duration::from_millis(if quick { 50 } else { 2000 }), ..Effort::new(quick) };
+    let mut lines = ["ours", "stock"].map(|name| Line { name: name.into(), points: vec![] });
+    for &n in sizes {
+        let boxes = BoxSet::named("uniform").expect("a set of the harness").boxes(n, 1);
+        for share in [0.001, 0.01, 0.03, 0.1, 0.3, 1.0].into_iter().filter(|share| share * n as f64 >= 1.0) {
+            let (ours, stock, pairs) = update::shares(&boxes, share, effort)?;
+            let row = Row::new(format!("uniform, {}% moved", share * 100.0), n, pairs);
+            rows.push(row.ours(ours).against("stock", stock).target(TARGET));
+            if Some(&n) == sizes.last() {
+                lines.iter_mut().zip([ours, stock]).for_each(|(line, ms)| line.points.push((share, ms)));
+            }
+        }
+    }
+    let title = format!("a call through rapier, uniform, {} boxes", sizes.last().unwrap_or(&0));
+    Ok(LogLog { name: "step-share".into(), title, x: "share moved", y: "ms", lines: lines.into() })
+}
