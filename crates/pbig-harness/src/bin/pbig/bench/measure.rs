@@ -44,7 +44,8 @@ pub(crate) fn medians(contest: &mut impl Contest, effort: Effort) -> Result<Vec<
     let enough = effort.warm_up + 3 * sides.min(2);
     let clock = Instant::now();
     for round in 0..effort.warm_up + effort.rounds {
-        if round >= enough && clock.elapsed() > effort.budget {
+        // After an even number of rounds, boxes that go to and fro are at home: the same pairs in every run.
+        if round >= enough && round % 2 == 0 && clock.elapsed() > effort.budget {
             break;
         }
         contest.prepare(round);
