@@ -100,4 +100,27 @@ mod tests {
         assert_eq!(growth(&square[..1]), None);
         assert_eq!(growth(&[(1.0, 0.0), (2.0, 4.0)]), None, "zero has no logarithm");
     }
+
+    #[test]
+    fn a_chart_names_its_lines_and_their_growth() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("chart.svg");
+        let line = |name: &str, k| Line {
+            name: name.into(),
+            points: [1e2, 1e3, 1e4, 1e5, 1e6, 1e7].map(|x: f64| (x, 1e-5 * x.powf(k))).into(),
+        };
+        let lines =
+            vec![line("linear", 1.0), line("steeper", 1.25), Line { name: "empty".into(), points: vec![] }];
+        let title = "time by stage".to_owned();
+        let chart = LogLog { name: "chart".into(), title, x: "boxes", y: "ms", lines };
+        chart.write(&path).expect("written");
+        let text = std::fs::read_to_string(&path).expect("text");
+        for word in
+            ["time by stage", "boxes", "linear (grows as x^1.00)", "steeper (grows as x^1.25)", "empty"]
+        {
+            assert!(text.contains(word), "{word}");
+        }
+        let nowhere = chart.write(&folder.path().join("no/such/folder.svg"));
+        assert!(nowhere.is_err_and(|error| error.contains("folder.svg")));
+    }
 }

@@ -121,3 +121,21 @@ fn save(path: &Path, text: &str) -> Result<(), Failure> {
     let written = std::fs::create_dir_all(folder).and_then(|()| std::fs::write(path, text));
     written.map_err(|error| Failure::Input(format!("{}: {error}", path.display())))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_document_has_the_machine_the_table_and_the_charts() {
+        let chart =
+            LogLog { name: "some-chart".into(), title: "a chart".into(), x: "boxes", y: "ms", lines: vec![] };
+        let rows = vec![Row::new("a case", 10, 3).ours(2.0)];
+        let outcome = Outcome { rows, notes: vec!["a note".into()], charts: vec![chart] };
+        let text = document("some", &Machine::here(), &outcome);
+        for part in ["threads", "- a note\n", "| a case | 10 | 3 | 2.000 ms |", "![a chart](some-chart.svg)"]
+        {
+            assert!(text.contains(part), "{part} is not in:\n{text}");
+        }
+    }
+}

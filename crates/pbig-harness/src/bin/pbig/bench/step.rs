@@ -9,6 +9,7 @@ use pbig_harness::boxes::BoxSet;
 use pbig_harness::chart::{Line, LogLog};
 use pbig_harness::runner::{Timed, milliseconds};
 use pbig_harness::scenes::Scene;
+use pbig_harness::world::World;
 use rapier_pbig::PbigBroadPhase;
 use rapier3d::prelude::*;
 use std::time::{Duration, Instant};
@@ -55,7 +56,7 @@ pub(super) fn run(quick: bool) -> Result<Outcome, Failure> {
     let effort = if quick {
         Effort { warm_up: 2, rounds: 40, budget: Duration::from_millis(50) }
     } else {
-        Effort { warm_up: 2, rounds: 1000, budget: Duration::from_secs(6) }
+        Effort { warm_up: 2, rounds: 1000, budget: Duration::from_secs(4) }
     };
     let bar = progress(Scene::ALL.len() * sizes.len(), "scenes");
     let mut rows = Vec::new();
@@ -82,35 +83,58 @@ fn notes(rows: &[Row]) -> Vec<String> {
     [how.to_owned(), moved.to_owned()].into_iter().chain(worst).collect()
 }
 
-/// One scene at one size.
-fn measure(scene: Scene, bodies: usize, effort: Effort) -> Row {
-    let mut world = scene.build(bodies, 1);
-    let (ours, stock) = (Timed::new(PbigBroadPhase::new()), Timed::new(DefaultBroadPhase::new()));
-    let mut both = Both { ours, stock, ours_first: false, discarded: vec![] };
-    let mut times = [[vec![], vec![]], [vec![], vec![]]];
-    let (start, mut steps, mut too_long) = (Instant::now(), 0, false);
-    while steps < effort.warm_up + effort.rounds {
-        let enough = steps >= effort.warm_up + 6 && start.elapsed() > effort.budget;
-        if enough || (too_long && steps >= effort.warm_up + 2) {
-            break;
-        }
-        both.ours_first = steps % 2 == 0;
+/// One scene under way.
+struct Duel {
+    world: World,
+    both: Both,
+    steps: usize,
+    too_long: bool,
+    /// Ours and stock's, by place in the order of calls.
+    times: [[Vec<f64>; 2]; 2],
+}
+
+impl Duel {
+    fn new(scene: Scene, bodies: usize) -> Self {
+        let (ours, stock) = (Timed::new(PbigBroadPhase::new()), Timed::new(DefaultBroadPhase::new()));
+        let both = Both { ours, stock, ours_first: false, discarded: vec![] };
+        Self { world: scene.build(bodies, 1), both, steps: 0, too_long: false, times: Default::default() }
+    }
+
+    fn step(&mut self, counts: bool) {
+        let both = &mut self.both;
+        both.ours_first = self.steps % 2 == 0;
         let clock = Instant::now();
-        world.step(&mut both);
-        too_long = clock.elapsed() > LONGEST;
-        let took = [both.ours.take(), both.stock.take()].map(milliseconds);
-        steps += 1;
-        if steps > effort.warm_up {
-            let ours_place = usize::from(!both.ours_first);
-            times[0][ours_place].push(took[0]);
-            times[1][1 - ours_place].push(took[1]);
+        self.world.step(both);
+        self.too_long = clock.elapsed() > LONGEST;
+        self.steps += 1;
+        let (ours, stock) = (both.ours.take(), both.stock.take());
+        if counts {
+            let place = usize::from(!both.ours_first);
+            self.times[0][place].push(milliseconds(ours));
+            self.times[1][1 - place].push(milliseconds(stock));
         }
     }
-    let [ours, stock] = times.map(|places: [Vec<f64>; 2]| mean_of_medians(places.iter().map(Vec::as_slice)));
+
+    fn is_done(&self, effort: Effort, elapsed: Duration) -> bool {
+        let counted = self.steps.saturating_sub(effort.warm_up);
+        counted >= effort.rounds
+            || (counted >= 6 && elapsed > effort.budget)
+            || (counted >= 2 && self.too_long)
+    }
+}
+
+/// One scene at one size.
+fn measure(scene: Scene, bodies: usize, effort: Effort) -> Row {
+    let mut duel = Duel::new(scene, bodies);
+    let start = Instant::now();
+    while !duel.is_done(effort, start.elapsed()) {
+        duel.step(duel.steps >= effort.warm_up);
+    }
+    let Duel { world, both, steps, too_long, times } = duel;
+    let [ours, stock] = times.map(|places| mean_of_medians(places.iter().map(Vec::as_slice)));
     let pairs = both.ours.inner.pair_count() as u64;
-    let row = Row::new(format!("{}, {bodies} bodies", scene.name), world.colliders.len(), pairs)
-        .ours(ours)
-        .against("stock", stock);
+    let case = format!("{}, {bodies} bodies", scene.name);
+    let row = Row::new(case, world.colliders.len(), pairs).ours(ours).against("stock", stock);
     let cut = if too_long { ", the last over 5 s" } else { "" };
     row.target(TARGET).note(format!("{} steps{cut}", steps - effort.warm_up))
 }
