@@ -45,7 +45,7 @@ pub(crate) fn medians(contest: &mut impl Contest, effort: Effort) -> Result<Vec<
     let clock = Instant::now();
     for round in 0..effort.warm_up + effort.rounds {
         // After an even number of rounds, boxes that go to and fro are at home: the same pairs in every run.
-        if round >= enough && round % 2 == 0 && clock.elapsed() > effort.budget {
+        if round >= enough && round.is_multiple_of(2) && clock.elapsed() > effort.budget {
             break;
         }
         contest.prepare(round);

@@ -82,7 +82,7 @@ fn incremental(boxes: &[Aabb]) -> Result<usize, pbig_core::Error> {
     for update in 0..UPDATES {
         for (id, aabb) in boxes.iter().enumerate() {
             // To and fro by 0.1, neighbours apart from each other, and without a second list of boxes.
-            let by = if (id + update) % 2 == 0 { 0.1 } else { 0.0 };
+            let by = if (id + update).is_multiple_of(2) { 0.1 } else { 0.0 };
             let place = Aabb::new(aabb.min.map(|x| x + by), aabb.max.map(|x| x + by));
             broad_phase.set(id as u32, place, ProxyFilter::ALL)?;
         }

@@ -102,7 +102,7 @@ impl Duel {
 
     fn step(&mut self, counts: bool) {
         let both = &mut self.both;
-        both.ours_first = self.steps % 2 == 0;
+        both.ours_first = self.steps.is_multiple_of(2);
         let clock = Instant::now();
         self.world.step(both);
         self.too_long = clock.elapsed() > LONGEST;
