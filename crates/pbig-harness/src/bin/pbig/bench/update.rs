@@ -163,10 +163,14 @@ pub(super) fn run(quick: bool) -> Result<Outcome, Failure> {
 }
 
 fn notes() -> Vec<String> {
+    let features = [("parallel", cfg!(feature = "parallel")), ("simd-stable", cfg!(feature = "simd"))];
+    let on: Vec<&str> = features.into_iter().filter(|(_, on)| *on).map(|(name, _)| name).collect();
     vec![
-        "stock is rapier 0.27's DefaultBroadPhase with rapier's parallel and simd-stable; both are called in turn \
-         with the same list on the same world, and events are discarded"
-            .into(),
+        format!(
+            "stock is rapier 0.27's DefaultBroadPhase (rapier's features: {}); both are called in turn with the same \
+             list on the same world, and events are discarded",
+            on.join(", ")
+        ),
         "floor: reading each moved collider and computing its box, and nothing else".into(),
     ]
 }
