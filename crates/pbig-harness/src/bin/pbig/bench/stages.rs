@@ -66,9 +66,10 @@ impl Contest for Alone {
     }
 
     fn prepare(&mut self, round: usize) {
+        let moved = self.wander.step(round);
         // In the first round all are new.
         if round > 0 {
-            self.moved = self.wander.step(round);
+            self.moved = moved;
         }
     }
 
