@@ -58,6 +58,12 @@ impl ProxyFilter {
         mask: u32::MAX,
     };
 
+    /// Whether the two are the same: one comparison rather than six.
+    #[inline]
+    pub(crate) fn is(&self, other: &Self) -> bool {
+        bytemuck::cast::<_, [u64; 2]>(*self) == bytemuck::cast::<_, [u64; 2]>(*other)
+    }
+
     /// Whether the two boxes may pair. Symmetric.
     #[inline]
     pub fn allows(&self, other: &Self) -> bool {

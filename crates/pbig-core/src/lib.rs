@@ -59,6 +59,7 @@ mod pair;
 pub mod pair_index;
 pub mod plan;
 mod report;
+mod search;
 
 pub use aabb::Aabb;
 pub use broad_phase::{BroadPhase, Events};
@@ -71,3 +72,12 @@ pub use gpu::GpuFinder;
 pub use pair::Pair;
 pub use plan::Plan;
 pub use report::{Checks, GpuReport, Report, StageTimes};
+
+/// Which instructions the search on the CPU uses, chosen at run time: "AVX2", or "portable".
+///
+/// ```
+/// assert!(["AVX2", "portable"].contains(&pbig_core::simd()));
+/// ```
+pub fn simd() -> &'static str {
+    cpu::codes::Simd::detect().name()
+}

@@ -4,7 +4,7 @@
 //! are saved as bits: exact in any format, also where it has no NaN or infinity. Whatever is restored has been
 //! checked: no bytes make later calls panic.
 
-use super::BroadPhase;
+use super::{BroadPhase, Old, flag};
 use crate::{Aabb, Config, Pair, ProxyFilter};
 use serde::de::Error as _;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
@@ -22,7 +22,7 @@ struct Snapshot<'a> {
     config: Config,
     boxes: Vec<Bits>,
     filters: Cow<'a, [ProxyFilter]>,
-    present: Cow<'a, [bool]>,
+    present: Vec<bool>,
     pairs: Vec<Pair>,
     changed: Vec<(u32, Bits, ProxyFilter)>,
 }
@@ -35,9 +35,9 @@ impl Serialize for BroadPhase {
             config: self.config,
             boxes: self.boxes.iter().map(to_bits).collect(),
             filters: Cow::Borrowed(&self.filters),
-            present: Cow::Borrowed(&self.present),
+            present: self.flags.iter().map(|flags| flags & flag::PRESENT != 0).collect(),
             pairs,
-            changed: self.changed.iter().map(|old| (old.id, to_bits(&old.aabb), old.filter)).collect(),
+            changed: self.changed.iter().map(|&id| self.saved_change(id)).collect(),
         }
         .serialize(serializer)
     }
@@ -46,6 +46,26 @@ impl Serialize for BroadPhase {
 impl<'de> Deserialize<'de> for BroadPhase {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
         Snapshot::deserialize(deserializer)?.restore().map_err(D::Error::custom)
+    }
+}
+
+impl BroadPhase {
+    /// What a changed box was.
+    fn saved_change(&self, id: u32) -> (u32, Bits, ProxyFilter) {
+        let now = Old { aabb: self.before[id as usize], filter: self.filters[id as usize] };
+        let old = self.refiltered.get(&id).copied().unwrap_or(now);
+        (id, to_bits(&old.aabb), old.filter)
+    }
+
+    fn restore_change(&mut self, id: u32, old: Old) {
+        let i = id as usize;
+        self.note_change(id);
+        self.before[i] = old.aabb;
+        if old.filter != self.filters[i] {
+            self.flags[i] |= flag::REFILTERED;
+            self.before[i] = Aabb::NOWHERE;
+            self.refiltered.insert(id, old);
+        }
     }
 }
 
@@ -64,10 +84,13 @@ impl Snapshot<'_> {
         restored.present_count = self.present.iter().filter(|present| **present).count() as u32;
         restored.invalid_count = restored.present_count - valid as u32;
         restored.filters = self.filters.into_owned();
-        restored.present = self.present.into_owned();
-        self.pairs.iter().for_each(|&pair| restored.pairs.insert(pair));
+        restored.before.clone_from(&restored.boxes);
+        for (flags, present) in restored.flags.iter_mut().zip(&self.present) {
+            *flags = if *present { flag::PRESENT } else { 0 };
+        }
+        restored.pairs.insert(&self.pairs);
         for (id, bits, filter) in self.changed {
-            restored.note_change(id, bytemuck::cast(bits), filter);
+            restored.restore_change(id, Old { aabb: bytemuck::cast(bits), filter });
         }
         Ok(restored)
     }

@@ -1,118 +1,131 @@
 //! An update: what was added, what has ended, and the kept pairs brought up to date.
 
-use super::{BroadPhase, Home, Old, UNCHANGED};
-use crate::cpu::check::Checker;
+#[cfg(feature = "gpu")]
+use super::device::Ending;
+use super::{BroadPhase, Old, flag};
+use crate::cpu::codes::prefetch;
 use crate::cpu::crowding::Set;
-use crate::diff::PairStore;
-use crate::finder::{Rule, single_entry_checks};
-use crate::plan::{Chosen, Plan, Summary};
+use crate::cpu::find::Others;
+use crate::cpu::judge::Accept;
+use crate::cpu::record::Tracked;
+use crate::diff::{Judgement, PairStore};
+use crate::plan::{Chosen, LazySummary, Plan};
 use crate::report::{lap, stage};
-use crate::{Aabb, Backend, Config, Error, Pair, ProxyFilter, Strategy};
+use crate::search::{Rule, single_entry_checks};
+use crate::{Aabb, Backend, Error, Pair, ProxyFilter, Strategy};
+use std::collections::HashMap;
 use std::time::Instant;
 
+/// The [`State`] of a broad phase of which other fields may be written.
+macro_rules! state {
+    ($of:ident) => {
+        $crate::broad_phase::update::State {
+            boxes: &$of.boxes,
+            before: &$of.before,
+            filters: &$of.filters,
+            flags: &$of.flags,
+            refiltered: &$of.refiltered,
+        }
+    };
+}
+#[cfg(feature = "gpu")]
+pub(super) use state;
+
+/// Events from which both lists are sorted at once.
+const PARALLEL_FROM: usize = 4096;
+
 impl BroadPhase {
-    /// Pairs that overlap now and did not, into `events.added`.
+    /// Pairs that overlap now and did not, into `events.added`, in no order.
     pub(super) fn find_added(&mut self) -> Result<(), Error> {
-        for old in &self.changed {
-            if std::mem::replace(&mut self.home[old.id as usize], Home::Moved) != Home::Moved {
-                self.moved.push(old.id);
+        #[cfg(feature = "gpu")]
+        if self.find_changes_on_gpu()? {
+            return Ok(());
+        }
+        #[cfg(not(feature = "gpu"))]
+        self.base.miss_gpu(&self.config, &mut self.report);
+        let whole = self.many_changed()
+            || self.config.strategy == Strategy::Pbig
+            || self.config.backend == Backend::Brute
+            || !self.has_base;
+        if whole {
+            return self.search_all();
+        }
+        for &id in &self.changed {
+            let flags = &mut self.flags[id as usize];
+            if *flags & flag::MOVED == 0 {
+                *flags |= flag::MOVED;
+                self.moved.push(id);
             }
         }
-        let whole = self.config.strategy == Strategy::Pbig
-            || self.config.backend == Backend::Brute
-            || self.base.expects_gpu(&self.config)
-            || !self.has_base;
         // Boxes that moved once and came to rest go back into the base when looking at them again and
         // again has cost as much as building it.
         self.sorted_again += self.moved.len();
         let present = self.present_count as usize;
-        if whole || self.moved.len() * 8 >= present || self.sorted_again > 2 * present {
-            self.search_all()?;
+        if self.moved.len() * 8 >= present || self.sorted_again > 2 * present {
+            self.search_all()
         } else {
-            self.search_moved()?;
+            self.search_moved()
         }
+    }
+
+    /// Whether so many boxes have changed that to look at all costs less than to tell them apart.
+    pub(super) fn many_changed(&self) -> bool {
+        self.changed.len() * 8 >= self.present_count as usize
+    }
+
+    pub(super) fn check_room(&self) -> Result<(), Error> {
         let kept = (self.pairs.len() + self.events.added.len()) as u64;
         if kept > PairStore::MOST {
             return Err(Error::TooManyPairs { limit: PairStore::MOST });
         }
-        let mut clock = Instant::now();
-        stage!("emit");
-        self.events.added.sort_unstable();
-        self.report.stages.emit += lap(&mut clock);
         Ok(())
     }
 
     /// Builds the base anew from all boxes and searches it.
     fn search_all(&mut self) -> Result<(), Error> {
-        let state = State {
-            boxes: &self.boxes,
-            filters: &self.filters,
-            changed: &self.changed,
-            change_of: &self.change_of,
-        };
-        let (boxes, invalid) = (self.report.boxes, self.report.invalid);
-        let accept = |a: u32, b: u32| state.is_added(a, b);
-        let rule = Rule { accept: &accept, filters: Some(&self.filters), filters_suffice: false };
+        let state = state!(self);
+        let filters = Some(&self.filters[..]);
+        let rule = Rule { accept: &state, filters, filters_suffice: false, before: &self.before };
+        let summary = LazySummary::new(&self.boxes, None);
+        let invalid = self.report.invalid;
         self.has_base = false;
-        // After a search on a GPU there is no base. Where little moves it is worth having: the CPU builds it.
-        let few = self.moved.len() * 8 < self.present_count as usize;
-        let backend = match self.config.backend {
-            Backend::Auto if few => Backend::Cpu,
-            backend => backend,
-        };
-        let config = Config { backend, ..self.config };
-        self.base.find(&self.boxes, &config, &rule, &mut self.report)?;
-        (self.report.boxes, self.report.invalid) = (boxes, invalid);
-        self.moved.clear();
-        self.sorted_again = 0;
+        let report = &mut self.report;
+        self.base.find_without_gpu(&self.boxes, &summary, &self.config, &rule, report)?;
+        self.report.invalid = invalid;
+        self.forget_moved();
         // A search by another strategy leaves no base grid to keep.
-        self.has_base = self.report.gpu.is_none() && self.report.plan.chosen != Chosen::Pbig;
-        let kept = if self.has_base { Home::Base } else { Home::None };
-        for (home, aabb) in self.home.iter_mut().zip(&self.boxes) {
-            *home = if aabb.is_valid() { kept } else { Home::None };
-        }
+        self.has_base = self.report.plan.chosen != Chosen::Pbig;
         self.base.found.chunks.iter().for_each(|chunk| self.events.added.extend_from_slice(chunk));
         Ok(())
     }
 
+    /// No box has moved since the base was built.
+    pub(super) fn forget_moved(&mut self) {
+        for id in self.moved.drain(..) {
+            self.flags[id as usize] &= !flag::MOVED;
+        }
+        self.sorted_again = 0;
+    }
+
     /// Sorts the boxes that moved since the base was built, and searches them and the base.
     fn search_moved(&mut self) -> Result<(), Error> {
-        let mut clock = Instant::now();
-        let summary = Summary::of(&self.boxes, Some(&self.moved));
-        let stages = &mut self.report.stages;
-        stages.plan += lap(&mut clock);
-        let set = Set {
-            boxes: &self.boxes,
-            filters: Some(&self.filters),
-            ids: Some(&self.moved),
-            summary: &summary,
-        };
-        let plan = self.loose.plan_and_build(&set, &self.config, stages);
-        let state = State {
-            boxes: &self.boxes,
-            filters: &self.filters,
-            changed: &self.changed,
-            change_of: &self.change_of,
-        };
+        let plan = self.build_loose();
+        let state = state!(self);
         let max_pairs = self.config.limits.max_pairs;
         let mut clock = Instant::now();
-        self.loose.find(&|a, b| state.is_added(a, b), max_pairs, &mut self.found)?;
+        self.loose.find(&state, max_pairs, &mut self.found)?;
         self.found.chunks.iter().for_each(|chunk| self.events.added.extend_from_slice(chunk));
         stage!("check");
-        // Entries of boxes that have left the base are still in it: their home says so.
-        let accept = |a: u32, b: u32| self.home[b as usize] == Home::Base && state.is_added(a, b);
-        let mut checker = Checker::new(&accept, &mut self.events.added);
-        for old in &self.changed {
-            let (aabb, filter) = (self.boxes[old.id as usize], &self.filters[old.id as usize]);
-            if aabb.is_valid() {
-                self.base.map.check_one(&aabb, filter, old.id, &mut checker);
-            }
-            if checker.out.len() as u64 > max_pairs {
-                return Err(Error::TooManyPairs { limit: max_pairs });
-            }
+        self.others.clear();
+        // Neighbours one after the other: they look at the same cells.
+        for id in self.loose.ids().filter(|&id| state.flags[id as usize] & flag::CHANGED != 0) {
+            self.others.push(Tracked::new(self.boxes[id as usize], id, self.before[id as usize]));
         }
-        self.found.checks += checker.checks;
-        self.found.overlaps += checker.overlaps;
+        let others = Others { records: &self.others, filters: &self.filters };
+        let added = &mut self.events.added;
+        let (checks, overlaps) = self.base.map.check_others(&others, &WithBase(state), added, max_pairs)?;
+        self.found.checks += checks;
+        self.found.overlaps += overlaps;
         self.report.stages.check += lap(&mut clock);
         self.report.checks = single_entry_checks(&self.found);
         let moved = self.moved.len() as u32;
@@ -120,80 +133,172 @@ impl BroadPhase {
         Ok(())
     }
 
-    /// Kept pairs that no longer hold, into `events.removed` and, by place, `ended`.
-    pub(super) fn find_removed(&mut self) {
-        let state = State {
+    /// Sorts the boxes that moved since the base was built.
+    fn build_loose(&mut self) -> Plan {
+        let summary = LazySummary::new(&self.boxes, Some(&self.moved));
+        let set = Set {
             boxes: &self.boxes,
-            filters: &self.filters,
-            changed: &self.changed,
-            change_of: &self.change_of,
+            filters: Some(&self.filters),
+            ids: Some(&self.moved),
+            summary: &summary,
+            before: &self.before,
         };
-        let (ended, removed) = (&mut self.ended, &mut self.events.removed);
-        ended.clear();
-        let mut end = |(place, pair): (u32, Pair)| {
-            if !state.holds_now(pair.a, pair.b) {
-                ended.push(place);
-                removed.push(pair);
-            }
-        };
-        if self.changed.len() * 8 >= self.present_count as usize {
-            // Most boxes changed: one walk in memory order beats many along links.
-            self.pairs.iter().for_each(end);
-        } else {
-            for old in &self.changed {
-                // A pair of two changed boxes is in both their lists: count it at the first.
-                let first = |pair: &Pair| pair.a == old.id || self.change_of[pair.a as usize] == UNCHANGED;
-                self.pairs.of(old.id).filter(|(_, pair)| first(pair)).for_each(&mut end);
-            }
-        }
-        self.events.removed.sort_unstable();
+        self.loose.plan_and_build(&set, &self.config, &mut self.report.stages)
     }
 
-    /// Brings the kept pairs up to date and forgets the changes.
-    pub(super) fn store(&mut self) {
-        self.pairs.remove_all(&mut self.ended);
-        for &pair in &self.events.added {
-            self.pairs.insert(pair);
+    /// Kept pairs that no longer hold, into `events.removed`, in no order; they are no longer kept.
+    pub(super) fn find_removed(&mut self) {
+        let many = self.many_changed();
+        let state = state!(self);
+        let removed = &mut self.events.removed;
+        #[cfg(feature = "gpu")]
+        if self.report.gpu.is_some() {
+            return self.pairs.end_few(&self.ending, &Ending(state), removed);
         }
-        for old in self.changed.drain(..) {
-            self.change_of[old.id as usize] = UNCHANGED;
+        if many {
+            self.pairs.end_many(&state, removed);
+        } else {
+            self.pairs.end_few(&self.changed, &state, removed);
         }
     }
+
+    /// Keeps the added pairs, and forgets the changes.
+    pub(super) fn store(&mut self) {
+        self.pairs.insert(&self.events.added);
+        // Box by box where all have changed, too: memmove, of all of them at once, takes ten times as long on some
+        // processors (Zen, where what it copies to is not aligned).
+        for &id in &self.changed {
+            self.before[id as usize] = self.boxes[id as usize];
+            self.flags[id as usize] &= !(flag::CHANGED | flag::REFILTERED);
+        }
+        self.changed.clear();
+        self.refiltered.clear();
+        #[cfg(feature = "gpu")]
+        for id in self.ending.drain(..) {
+            self.flags[id as usize] &= !flag::ENDING;
+        }
+        self.updates += 1;
+    }
+
+    pub(super) fn sort_events(&mut self) {
+        let (added, removed) = (&mut self.events.added, &mut self.events.removed);
+        if added.len() + removed.len() > PARALLEL_FROM {
+            rayon::join(|| sort(added), || sort(removed));
+        } else {
+            sort(added);
+            sort(removed);
+        }
+    }
+}
+
+/// By one comparison of 64 bits.
+fn sort(pairs: &mut [Pair]) {
+    pairs.sort_unstable_by_key(|pair| u64::from(pair.a) << 32 | u64::from(pair.b));
 }
 
 /// The boxes now and at the last update.
-struct State<'a> {
-    boxes: &'a [Aabb],
-    filters: &'a [ProxyFilter],
-    changed: &'a [Old],
-    change_of: &'a [u32],
+#[derive(Clone, Copy)]
+pub(super) struct State<'a> {
+    pub(super) boxes: &'a [Aabb],
+    pub(super) before: &'a [Aabb],
+    pub(super) filters: &'a [ProxyFilter],
+    pub(super) flags: &'a [u8],
+    pub(super) refiltered: &'a HashMap<u32, Old>,
 }
 
 impl State<'_> {
-    /// Whether two boxes pair now. Absent and invalid boxes are NaN and overlap nothing.
-    fn holds_now(&self, a: u32, b: u32) -> bool {
-        let (a, b) = (a as usize, b as usize);
-        self.boxes[a].overlaps(&self.boxes[b]) && self.filters[a].allows(&self.filters[b])
+    pub(super) fn flags(&self, a: u32, b: u32) -> u8 {
+        self.flags[a as usize] | self.flags[b as usize]
     }
 
-    /// Whether two boxes that overlap now pair now and did not at the last update.
+    fn filters_allow(&self, a: u32, b: u32) -> bool {
+        self.filters[a as usize].allows(&self.filters[b as usize])
+    }
+
+    fn paired_before(&self, a: u32, b: u32) -> bool {
+        if self.flags(a, b) & flag::REFILTERED == 0 {
+            return self.before[a as usize].overlaps(&self.before[b as usize]);
+        }
+        let (a, b) = (self.old(a), self.old(b));
+        a.aabb.overlaps(&b.aabb) && a.filter.allows(&b.filter)
+    }
+
+    pub(super) fn old(&self, id: u32) -> Old {
+        let now = Old { aabb: self.before[id as usize], filter: self.filters[id as usize] };
+        self.refiltered.get(&id).copied().unwrap_or(now)
+    }
+}
+
+impl Judgement for State<'_> {
+    #[inline(always)]
+    fn prepare(&self, pair: Pair) {
+        for id in [pair.a, pair.b] {
+            prefetch(&self.boxes[id as usize]);
+        }
+    }
+
+    #[inline(always)]
+    fn concerns(&self, pair: Pair) -> bool {
+        self.flags(pair.a, pair.b) & flag::CHANGED != 0
+    }
+
+    /// Absent and invalid boxes are NaN and overlap nothing.
+    #[inline(always)]
+    fn holds(&self, pair: Pair) -> bool {
+        let Pair { a, b } = pair;
+        let overlap = self.boxes[a as usize].overlaps(&self.boxes[b as usize]);
+        let refiltered = self.flags(a, b) & flag::REFILTERED != 0;
+        overlap && (!refiltered || self.filters_allow(a, b))
+    }
+}
+
+/// Two boxes that overlap now, do they pair now, and did they not at the last update?
+impl Accept for State<'_> {
+    #[inline(always)]
+    fn prepare(&self, pair: Pair) {
+        for id in [pair.a, pair.b] {
+            prefetch(&self.filters[id as usize]);
+            prefetch(&self.flags[id as usize]);
+        }
+    }
+
     #[inline]
-    fn is_added(&self, a: u32, b: u32) -> bool {
-        let (i, j) = (self.change_of[a as usize], self.change_of[b as usize]);
-        if i == UNCHANGED && j == UNCHANGED {
-            return false;
-        }
-        if !self.filters[a as usize].allows(&self.filters[b as usize]) {
-            return false;
-        }
-        let ((box_a, filter_a), (box_b, filter_b)) = (self.before(a, i), self.before(b, j));
-        !(box_a.overlaps(box_b) && filter_a.allows(filter_b))
+    fn pair(&self, pair: Pair) -> bool {
+        let Pair { a, b } = pair;
+        self.concerns(pair) && self.filters_allow(a, b) && !self.paired_before(a, b)
     }
 
-    fn before(&self, id: u32, change: u32) -> (&Aabb, &ProxyFilter) {
-        match self.changed.get(change as usize) {
-            Some(old) => (&old.aabb, &old.filter),
-            None => (&self.boxes[id as usize], &self.filters[id as usize]),
-        }
+    /// Boxes that did not overlap before did not pair.
+    #[inline]
+    fn fresh(&self, pair: Pair) -> bool {
+        let Pair { a, b } = pair;
+        let refiltered = self.flags(a, b) & flag::REFILTERED != 0;
+        self.filters_allow(a, b) && !(refiltered && self.paired_before(a, b))
+    }
+}
+
+/// The same of a box that has moved since the base was built and one in the base: what that has of boxes that have moved
+/// is stale.
+struct WithBase<'a>(State<'a>);
+
+impl WithBase<'_> {
+    fn is_current(&self, pair: Pair) -> bool {
+        let moved = |id: u32| self.0.flags[id as usize] & flag::MOVED;
+        moved(pair.a) != moved(pair.b)
+    }
+}
+
+impl Accept for WithBase<'_> {
+    #[inline(always)]
+    fn prepare(&self, pair: Pair) {
+        Accept::prepare(&self.0, pair);
+    }
+
+    fn pair(&self, pair: Pair) -> bool {
+        self.is_current(pair) && self.0.pair(pair)
+    }
+
+    fn fresh(&self, pair: Pair) -> bool {
+        self.is_current(pair) && self.0.fresh(pair)
     }
 }

@@ -2,7 +2,8 @@
 //! their own for boxes that may not pair with each other ([`Camps`]), where those do not.
 
 use super::map::Map;
-use crate::plan::{Camps, Plan, Summary, spread_evenly};
+use super::record::Record;
+use crate::plan::{Camps, Chosen, LazySummary, Plan, Summary, spread_evenly};
 use crate::report::{StageTimes, lap, stage};
 use crate::{Aabb, Config, ProxyFilter};
 use std::time::Instant;
@@ -15,7 +16,9 @@ pub(crate) struct Set<'a> {
     pub(crate) filters: Option<&'a [ProxyFilter]>,
     /// Of the boxes that count; all if none are given.
     pub(crate) ids: Option<&'a [u32]>,
-    pub(crate) summary: &'a Summary,
+    pub(crate) summary: &'a LazySummary<'a>,
+    /// By id: what a box was at the last update, where only changes count.
+    pub(crate) before: &'a [Aabb],
 }
 
 impl<'a> Set<'a> {
@@ -55,6 +58,31 @@ pub(super) struct Crowding {
     accepted: f32,
 }
 
+/// A plan, kept from one build to the next.
+#[derive(Clone, Debug)]
+pub(super) struct Kept {
+    plan: Plan,
+    config: Config,
+    /// How full the fullest level was.
+    crowd: f32,
+    /// How often it has been used again.
+    builds: u32,
+}
+
+impl Kept {
+    /// Builds after which another plan is made: boxes may have spread, or shrunk.
+    const LONGEST: u32 = 64;
+
+    fn suits(&self, set: &Set<'_>, config: &Config) -> bool {
+        let (planned, boxes) = (u64::from(self.plan.boxes), set.len() as u64);
+        self.builds < Self::LONGEST
+            && self.plan.chosen == Chosen::Grid
+            && self.config == *config
+            && 7 * planned <= 8 * boxes
+            && 7 * boxes <= 8 * planned
+    }
+}
+
 /// Other entries in a box's cell, on average over boxes, at which smaller cells are tried. An even
 /// spread has half a one. Doubling a cell gathers eight times as many boxes, so that cells grow
 /// again only when they are certain to stay below: the choice does not flap.
@@ -73,18 +101,48 @@ impl Default for Crowding {
     }
 }
 
-impl Map {
+impl<R: Record> Map<R> {
     /// Plans and sorts; again with smaller cells where clusters make them too full, and by camps where that does not
     /// help.
     pub(crate) fn plan_and_build(&mut self, set: &Set<'_>, config: &Config, times: &mut StageTimes) -> Plan {
         if self.has_camps() {
             self.settle_camps(set, times);
         }
+        if let Some(plan) = self.build_as_before(set, config, times) {
+            return plan;
+        }
         let plan = self.build_uncrowded(set, config, times);
+        self.keep(&plan, config);
         if self.has_camps() || !self.settle_camps(set, times) {
             return plan;
         }
         self.build_uncrowded(set, config, times)
+    }
+
+    /// Sorts as planned for an earlier set, if that still suits: a plan costs a look at every box, as much as a tenth of
+    /// an update, and worlds change little from step to step.
+    fn build_as_before(&mut self, set: &Set<'_>, config: &Config, times: &mut StageTimes) -> Option<Plan> {
+        let kept = self.kept.take().filter(|kept| kept.suits(set, config) && !self.has_camps())?;
+        let mut clock = Instant::now();
+        stage!("map");
+        let fits = self.build(&kept.plan, set, kept.plan.swept);
+        times.map += lap(&mut clock);
+        let crowd = self.crowd();
+        if !fits || crowd > CROWDED.min(1.5 * kept.crowd + 1.0) {
+            return None;
+        }
+        let boxes = set.len() as u32 - self.invalid;
+        let plan = Plan { boxes, ..kept.plan.clone() };
+        self.kept = Some(Kept { builds: kept.builds + 1, ..kept });
+        Some(plan)
+    }
+
+    /// Not where cells are too full, or smaller than need be: another plan may do better then.
+    fn keep(&mut self, plan: &Plan, config: &Config) {
+        let crowd = self.crowd();
+        let settled = self.crowding.factor == 1.0 || !self.crowding.may_grow(crowd);
+        let good = crowd <= CROWDED && settled && !self.has_camps();
+        self.kept = good.then(|| Kept { plan: plan.clone(), config: *config, crowd, builds: 0 });
     }
 
     /// Divides the boxes into camps where they crowd, and as long as they do; true when there are some.
@@ -92,7 +150,7 @@ impl Map {
         let mut clock = Instant::now();
         let had = self.has_camps();
         // Of a crowd each camp has a part.
-        let crowd: f32 = self.grids.iter().map(|grid| grid.crowd).sum();
+        let crowd: f32 = self.levels.iter().map(|level| level.crowd).sum();
         let crowded = crowd > if had { MOBBED / 2.0 } else { MOBBED };
         self.camps = if crowded { set.camps() } else { Camps::default() };
         if self.has_camps() != had {
@@ -112,7 +170,7 @@ impl Map {
             };
             times.plan += lap(&mut clock);
             stage!("map");
-            map.build(&plan, set);
+            map.build(&plan, set, u32::MAX);
             times.map += lap(&mut clock);
             plan
         };
@@ -140,7 +198,7 @@ impl Map {
         let factor = self.crowding.factor;
         self.camp_of.clear();
         let (Some(filters), true) = (set.filters, self.has_camps()) else {
-            return Plan::new(set.summary, config, factor);
+            return Plan::new(set.summary.get(), config, factor);
         };
         let camps = &self.camps;
         self.camp_of.extend(set.ids().map(|id| camps.camp(&filters[id as usize])));
@@ -155,7 +213,7 @@ impl Map {
 
     /// How full the fullest level is.
     fn crowd(&self) -> f32 {
-        self.grids.iter().map(|grid| grid.crowd).fold(0.0, f32::max)
+        self.levels.iter().map(|level| level.crowd).fold(0.0, f32::max)
     }
 
     pub(super) fn has_camps(&self) -> bool {
@@ -169,6 +227,11 @@ fn divisible(plan: &Plan) -> bool {
 }
 
 impl Crowding {
+    /// Whether cells of twice the size would still not be too full.
+    fn may_grow(&self, crowd: f32) -> bool {
+        8.0 * (crowd + 1.0) <= CROWDED
+    }
+
     /// Settles on one of the factors tried in a call, with the crowd that each led to, for the calls
     /// to come; true when it is not the last one, so that the map has to be built again.
     fn settle(&mut self, tried: &[(f32, f32)]) -> bool {
@@ -176,7 +239,7 @@ impl Crowding {
         let least = tried.iter().map(|t| t.1).fold(f32::INFINITY, f32::min);
         if tried[last].1 <= CROWDED {
             self.accepted = 0.0;
-            if 8.0 * (least + 1.0) <= CROWDED {
+            if self.may_grow(least) {
                 self.factor = (self.factor * 2.0).min(1.0);
             }
             return false;
@@ -191,16 +254,17 @@ impl Crowding {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::cpu::record::Item;
 
     /// Builds in one call: how often the boxes were sorted.
-    fn builds(map: &mut Map, boxes: &[Aabb]) -> usize {
+    fn builds(map: &mut Map<Item>, boxes: &[Aabb]) -> usize {
         builds_filtered(map, boxes, None)
     }
 
-    fn builds_filtered(map: &mut Map, boxes: &[Aabb], filters: Option<&[ProxyFilter]>) -> usize {
-        let summary = Summary::of(boxes, None);
+    fn builds_filtered(map: &mut Map<Item>, boxes: &[Aabb], filters: Option<&[ProxyFilter]>) -> usize {
+        let summary = LazySummary::new(boxes, None);
         let before = map.builds;
-        let set = Set { boxes, filters, ids: None, summary: &summary };
+        let set = Set { boxes, filters, ids: None, summary: &summary, before: &[] };
         map.plan_and_build(&set, &Config::DEFAULT, &mut StageTimes::default());
         map.builds - before
     }

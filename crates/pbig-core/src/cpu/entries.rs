@@ -13,18 +13,10 @@ pub(crate) struct Stored([f32; 8]);
 pub(crate) struct Query([f32; 8]);
 
 impl Stored {
-    /// Overlaps nothing.
-    const EMPTY: Self = Self([f32::NAN; 8]);
-
     #[inline(always)]
     pub(crate) fn new(b: &Aabb) -> Self {
         let pass = f32::NEG_INFINITY;
         Self([b.min[0], b.min[1], b.min[2], -b.max[0], -b.max[1], -b.max[2], pass, pass])
-    }
-
-    pub(crate) fn aabb(&self) -> Aabb {
-        let [a, b, c, d, e, f, ..] = self.0;
-        Aabb::new([a, b, c], [-d, -e, -f])
     }
 
     /// The stored box as a query.
@@ -69,20 +61,15 @@ impl Entries {
         self.ids.clear();
     }
 
+    /// The boxes with these ids.
+    pub(crate) fn fill(&mut self, boxes: &[Aabb], ids: impl Iterator<Item = u32>) {
+        self.clear();
+        ids.for_each(|id| self.push(&boxes[id as usize], id));
+    }
+
     pub(crate) fn push(&mut self, aabb: &Aabb, id: u32) {
         self.boxes.push(Stored::new(aabb));
         self.ids.push(id);
-    }
-
-    pub(crate) fn resize(&mut self, len: usize) {
-        self.boxes.resize(len, Stored::EMPTY);
-        self.ids.resize(len, 0);
-    }
-
-    /// Appends copies of the first `count` entries.
-    pub(crate) fn extend_from_within(&mut self, count: usize) {
-        self.boxes.extend_from_within(..count);
-        self.ids.extend_from_within(..count);
     }
 }
 
@@ -103,8 +90,6 @@ mod tests {
                 let lanes = Stored::new(a).overlaps(&Query::new(b));
                 assert_eq!(lanes, a.overlaps(b), "{a:?} {b:?}");
             }
-            assert!(!Stored::EMPTY.overlaps(&Query::new(a)));
-            assert_eq!(Stored::new(a).aabb(), *a);
         }
     }
 }

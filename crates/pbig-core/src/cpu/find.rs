@@ -1,34 +1,44 @@
 //! Find: the search over a whole map, in pieces that threads share. Every pair is met once.
 //!
-//! The search walks the sorted entries, never the cells. Each entry meets
-//! 1. in its own grid the half of its window that comes after it (`half`),
-//! 2. in the grids of larger boxes the whole window (`check`),
-//! 3. the boxes of the list;
+//! The search walks the sorted boxes, never the cells. Each box meets
+//! 1. in its own level the half of its window that comes after it (`half`),
+//! 2. in the levels of larger boxes the whole window (`window`),
+//! 3. the boxes of the list (`check`);
 //!
 //! and the list meets itself.
 
 use super::check::Checker;
 use super::entries::Query;
-use super::half::Half;
+use super::half::{Half, Rests};
+use super::judge::{Accept, Judge, Scratch};
+use super::levels::Level;
 use super::map::Map;
+use super::record::Record;
+use super::window::Windows;
 use crate::plan::OPEN;
 use crate::report::stage;
-use crate::{Aabb, Error, Pair, ProxyFilter};
+use crate::{Error, Pair, ProxyFilter};
 use rayon::prelude::*;
+use std::cell::RefCell;
 use std::sync::atomic::{AtomicU64, Ordering};
 
-/// Entries in one piece of work: enough to hide the cost of handing it out (a few us against 50),
+/// Boxes in one piece of work: enough to hide the cost of handing it out (a few us against 50),
 /// few enough to balance; fixed, so that the bytes of the result do not depend on the threads.
-const CHUNK: usize = 1024;
+const CHUNK: usize = 2048;
 
 /// Expected time of a search, in ns on one core, from which it is shared with other threads. In a
 /// tight loop 150,000 pay off (4,096 unit cubes: 0.14 ms alone, 0.10 with a second thread), but in an
 /// app the other threads sleep between steps and waking one costs about as much.
-const PARALLEL_FROM: u64 = 500_000;
+const PARALLEL_FROM: u64 = 300_000;
 
-/// What an entry costs, and a check, in ns; checks as many as in the call before.
-const ENTRY: u64 = 35;
+/// What a box costs, and a check, in ns; checks as many as in the call before.
+const ENTRY: u64 = 15;
 const CHECK: u64 = 1;
+
+thread_local! {
+    /// Buffers of a search, one for each thread that takes part.
+    static SCRATCH: RefCell<(Scratch, Rests)> = RefCell::default();
+}
 
 /// Pairs as found, a buffer for each chunk, kept from call to call.
 #[derive(Clone, Debug, Default)]
@@ -67,92 +77,215 @@ impl Found {
     }
 }
 
-impl Map {
-    /// All pairs of overlapping boxes in the map that `accept` takes, into `found`.
+impl<R: Record> Map<R> {
+    /// All pairs of overlapping boxes in the map that `accept` takes, into `found`; of a map that knows what boxes were
+    /// before, only pairs that did not overlap then.
     pub(crate) fn find<A>(&self, accept: &A, max_pairs: u64, found: &mut Found) -> Result<(), Error>
     where
-        A: Fn(u32, u32) -> bool + Sync,
+        A: Accept,
     {
         stage!("check");
-        let chunks = self.chunks();
         let room = Room::new(max_pairs);
-        let work = |(chunk, out): (&Chunk, &mut Vec<Pair>)| self.check_chunk(chunk, accept, out, &room);
         let in_list = (self.list.len() as u64).pow(2) / 2;
         let expected = ENTRY * self.len_in_grids() as u64 + CHECK * found.checks.max(in_list);
-        let buffers = found.buffers(chunks.len());
+        let chunks = self.chunks();
+        let buffers = found.buffers(chunks);
+        let work = |(chunk, out): (usize, &mut Vec<Pair>)| self.check_chunk(chunk, accept, out, &room);
         let counts = if expected >= PARALLEL_FROM && rayon::current_num_threads() > 1 {
-            chunks.par_iter().zip(buffers).map(work).reduce(|| (0, 0), add)
+            buffers.par_iter_mut().enumerate().map(work).reduce(|| (0, 0), add)
         } else {
-            chunks.iter().zip(buffers).map(work).fold((0, 0), add)
+            buffers.iter_mut().enumerate().map(work).fold((0, 0), add)
         };
         (found.checks, found.overlaps) = counts;
         room.settle(found)
     }
 
-    fn chunks(&self) -> Vec<Chunk> {
-        let pieces = |level: Option<usize>, len: usize| {
-            (0..len).step_by(CHUNK).map(move |start| Chunk { level, start, end: len.min(start + CHUNK) })
-        };
-        let grids = self.grids.iter().enumerate().flat_map(|(i, g)| pieces(Some(i), g.len()));
-        grids.chain(pieces(None, self.list.len())).collect()
+    /// How many chunks there are: those of each level, then those of the list.
+    fn chunks(&self) -> usize {
+        let in_levels: usize = self.levels.iter().map(|level| level.slots.len().div_ceil(CHUNK)).sum();
+        in_levels + self.list.len().div_ceil(CHUNK)
     }
 
-    fn check_chunk<A>(&self, chunk: &Chunk, accept: &A, out: &mut Vec<Pair>, room: &Room) -> (u64, u64)
-    where
-        A: Fn(u32, u32) -> bool,
-    {
-        let range = chunk.start..chunk.end;
-        let mut counts = (0, 0);
-        if let Some(level) = chunk.level.filter(|&level| self.grids[level].camp == OPEN) {
-            let mut half = Half::new(&self.grids[level], accept, out, room);
-            let room_left = half.check(range.clone());
-            counts = (half.checks, half.overlaps);
-            if !room_left {
-                return counts;
+    /// Chunk `i`.
+    fn chunk(&self, mut i: usize) -> Chunk {
+        for (level, of) in self.levels.iter().enumerate() {
+            let count = of.slots.len().div_ceil(CHUNK);
+            if i < count {
+                let start = of.slots.start + i * CHUNK;
+                return Chunk { level: Some(level), start, end: of.slots.end.min(start + CHUNK) };
             }
+            i -= count;
         }
-        if chunk.level.is_some_and(|level| level + 1 == self.grids.len() && self.list.len() == 0) {
-            return counts;
+        Chunk { level: None, start: i * CHUNK, end: self.list.len().min((i + 1) * CHUNK) }
+    }
+
+    fn check_chunk<A>(&self, chunk: usize, accept: &A, out: &mut Vec<Pair>, room: &Room) -> (u64, u64)
+    where
+        A: Accept,
+    {
+        let chunk = self.chunk(chunk);
+        let Some(level) = chunk.level else { return self.check_list(&chunk, accept, out, room) };
+        SCRATCH.with_borrow_mut(|(scratch, rests)| {
+            let inner = self.check_half(&chunk, level, accept, out, room, (scratch, rests));
+            let larger = self.check_larger(&chunk, level, accept, out, room, scratch);
+            let listed = self.check_against_list(&chunk, accept, out, room);
+            add(add(inner, larger), listed)
+        })
+    }
+
+    /// Pairs among the boxes of the map.
+    fn judge<'a, A: Accept>(
+        &'a self,
+        accept: &'a A,
+        out: &'a mut Vec<Pair>,
+        room: &'a Room,
+    ) -> Judge<'a, R, A> {
+        let (records, places) = (&self.sorted.records, &self.sorted.places);
+        let taken = out.len();
+        Judge {
+            queries: records,
+            candidates: records,
+            places,
+            all_changed: true,
+            accept,
+            out,
+            room,
+            taken,
+            overlaps: 0,
+        }
+    }
+
+    /// Pairs within a level.
+    fn check_half<A>(
+        &self,
+        chunk: &Chunk,
+        level: usize,
+        accept: &A,
+        out: &mut Vec<Pair>,
+        room: &Room,
+        (scratch, rests): (&mut Scratch, &mut Rests),
+    ) -> (u64, u64)
+    where
+        A: Accept,
+    {
+        let level = &self.levels[level];
+        if level.camp != OPEN {
+            return (0, 0);
+        }
+        let sorted = &self.sorted;
+        let judge = self.judge(accept, out, room);
+        let mut half = Half { sorted, level, judge, scratch, rests, checks: 0 };
+        half.check(chunk.start..chunk.end, self.simd);
+        (half.checks, half.judge.overlaps)
+    }
+
+    /// Boxes of a level against those of larger levels.
+    fn check_larger<A>(
+        &self,
+        chunk: &Chunk,
+        level: usize,
+        accept: &A,
+        out: &mut Vec<Pair>,
+        room: &Room,
+        scratch: &mut Scratch,
+    ) -> (u64, u64)
+    where
+        A: Accept,
+    {
+        let own = self.levels[level].camp;
+        let judge = self.judge(accept, out, room);
+        let mut windows = Windows::new(&self.sorted, judge, scratch);
+        let places = &self.sorted.places[chunk.start..chunk.end];
+        let meets = |larger: &&Level| larger.camp == OPEN || larger.camp != own;
+        let mut levels = self.levels[level + 1..].iter().filter(meets);
+        levels.all(|larger| windows.check(larger, places, self.simd));
+        (windows.checks, windows.judge.overlaps)
+    }
+
+    fn check_against_list<A>(&self, chunk: &Chunk, accept: &A, out: &mut Vec<Pair>, room: &Room) -> (u64, u64)
+    where
+        A: Accept,
+    {
+        if self.list.len() == 0 {
+            return (0, 0);
         }
         let mut taken = out.len();
         let mut checker = Checker::new(accept, out);
-        for i in range {
-            match chunk.level {
-                Some(level) => self.check_larger(level, i, &mut checker),
-                None => {
-                    let (query, id) = (self.list.boxes[i].query(), self.list.ids[i]);
-                    checker.test(&query, id, &self.list, i + 1..self.list.len());
-                }
-            }
+        for slot in chunk.start..chunk.end {
+            let item = self.item(slot);
+            checker.test(&Query::new(&item.aabb), item.id, &self.list, 0..self.list.len());
             if !room.take(checker.out.len(), &mut taken) {
                 break;
             }
         }
-        add(counts, (checker.checks, checker.overlaps))
+        (checker.checks, checker.overlaps)
     }
 
-    /// Entry `i` of a level against the boxes of larger levels and of the list.
-    #[inline]
-    fn check_larger<A: Fn(u32, u32) -> bool>(&self, level: usize, i: usize, checker: &mut Checker<'_, A>) {
-        let entries = &self.grids[level].entries;
-        let (stored, id) = (&entries.boxes[i], entries.ids[i]);
-        let own = self.grids[level].camp;
-        for larger in self.grids[level + 1..].iter().filter(|grid| grid.camp == OPEN || grid.camp != own) {
-            larger.check_window(&stored.aabb(), id, checker);
-        }
-        checker.test(&stored.query(), id, &self.list, 0..self.list.len());
-    }
-
-    /// Every pair of `one` with a box of the map that overlaps it, whatever its size, and that its filter may allow.
-    pub(crate) fn check_one<A>(&self, one: &Aabb, filter: &ProxyFilter, id: u32, checker: &mut Checker<'_, A>)
+    /// The list against itself.
+    fn check_list<A>(&self, chunk: &Chunk, accept: &A, out: &mut Vec<Pair>, room: &Room) -> (u64, u64)
     where
-        A: Fn(u32, u32) -> bool,
+        A: Accept,
     {
-        let own = if self.has_camps() { self.camps.camp(filter) } else { OPEN };
-        for grid in self.grids.iter().filter(|grid| grid.camp == OPEN || grid.camp != own) {
-            grid.check_window(one, id, checker);
+        let mut taken = out.len();
+        let mut checker = Checker::new(accept, out);
+        for i in chunk.start..chunk.end {
+            let (query, id) = (self.list.boxes[i].query(), self.list.ids[i]);
+            checker.test(&query, id, &self.list, i + 1..self.list.len());
+            if !room.take(checker.out.len(), &mut taken) {
+                break;
+            }
         }
-        checker.test(&Query::new(one), id, &self.list, 0..self.list.len());
+        (checker.checks, checker.overlaps)
+    }
+
+    /// Every pair of a box from elsewhere with a box of the map that overlaps it, did not before if that is known, and
+    /// that its filter may allow. The boxes of the map have not changed.
+    pub(crate) fn check_others<A>(
+        &self,
+        others: &Others<'_, R>,
+        accept: &A,
+        out: &mut Vec<Pair>,
+        max_pairs: u64,
+    ) -> Result<(u64, u64), Error>
+    where
+        A: Accept,
+    {
+        let room = Room::new(max_pairs);
+        let mut full = false;
+        let mut counts = SCRATCH.with_borrow_mut(|(scratch, _)| {
+            let own = self.judge(accept, out, &room);
+            let judge = Judge { queries: others.records, all_changed: false, ..own };
+            let mut windows = Windows::new(&self.sorted, judge, scratch);
+            for (level, places) in self.levels.iter().map(|level| (level, others.meeting(self, level.camp))) {
+                full |= !windows.check(level, &places, self.simd);
+            }
+            (windows.checks, windows.judge.overlaps)
+        });
+        if self.list.len() > 0 && !full {
+            let mut checker = Checker::new(accept, out);
+            for item in others.records.iter().map(R::item) {
+                checker.test(&Query::new(&item.aabb), item.id, &self.list, 0..self.list.len());
+            }
+            counts = add(counts, (checker.checks, checker.overlaps));
+        }
+        let limit = max_pairs;
+        if full || out.len() as u64 > limit { Err(Error::TooManyPairs { limit }) } else { Ok(counts) }
+    }
+}
+
+/// Boxes that are not in the map.
+pub(crate) struct Others<'a, R> {
+    pub(crate) records: &'a [R],
+    /// By id.
+    pub(crate) filters: &'a [ProxyFilter],
+}
+
+impl<R: Record> Others<'_, R> {
+    /// The places of those that may pair with boxes of a camp.
+    fn meeting(&self, map: &Map<R>, camp: u8) -> Vec<u32> {
+        let meets =
+            |record: &R| camp == OPEN || camp != map.camps.camp(&self.filters[record.item().id as usize]);
+        (0..self.records.len() as u32).filter(|&place| meets(&self.records[place as usize])).collect()
     }
 }
 
@@ -160,13 +293,12 @@ fn add(a: (u64, u64), b: (u64, u64)) -> (u64, u64) {
     (a.0 + b.0, a.1 + b.1)
 }
 
-/// Consecutive entries of one grid, or of the list.
+/// Consecutive slots of one level, or places of the list.
 struct Chunk {
     level: Option<usize>,
     start: usize,
     end: usize,
 }
-
 /// How many pairs may still be found, across threads: the limit is noticed while pairs are found,
 /// before memory is exhausted.
 pub(crate) struct Room {

@@ -1,14 +1,19 @@
-//! The CPU backend. `map` sorts boxes into cells (`cells`, `entries`; `crowding` where
-//! many share few), `find` searches them (`half`
-//! within a grid, `check` across grids), `emit` orders the pairs. `pbig` is the paper's grid, plain
-//! and scalar.
+//! The CPU backend. `map` sorts boxes into cells (`levels`, `cells`, `sort`; `crowding` where many share few), `find`
+//! searches them: `half` within a level and `window` across levels leave candidates, by `codes`, which `judge` tests;
+//! `check` tests `entries` that fit no level. `emit` orders the pairs. `pbig` is the paper's grid, plain and scalar.
 
 mod cells;
 pub(crate) mod check;
+pub(crate) mod codes;
 pub(crate) mod crowding;
 pub(crate) mod emit;
 mod entries;
 pub(crate) mod find;
 mod half;
+pub(crate) mod judge;
+mod levels;
 pub(crate) mod map;
 pub(crate) mod pbig;
+pub(crate) mod record;
+mod sort;
+mod window;

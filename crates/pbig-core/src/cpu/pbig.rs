@@ -9,6 +9,7 @@
 use super::check::Checker;
 use super::entries::{Entries, Query};
 use super::find::{Found, Room};
+use super::judge::Accept;
 use crate::pair_index::{pair_count, pair_of, row_len, row_pair};
 use crate::plan::PbigPlan;
 use crate::report::Checks;
@@ -118,7 +119,7 @@ impl PbigGrid {
         found: &mut Found,
     ) -> Result<Checks, Error>
     where
-        A: Fn(u32, u32) -> bool,
+        A: Accept,
     {
         let room = Room::new(max_pairs);
         let out = &mut found.buffers(1)[0];
@@ -161,7 +162,7 @@ struct CellChecker<'a, A> {
     taken: usize,
 }
 
-impl<A: Fn(u32, u32) -> bool> CellChecker<'_, A> {
+impl<A: Accept> CellChecker<'_, A> {
     fn check(&mut self, key: usize, small_cell: u32, room: &Room) -> bool {
         let range = self.grid.offsets[key] as usize..self.grid.offsets[key + 1] as usize;
         let places = &self.grid.places[range];
@@ -193,9 +194,9 @@ impl<A: Fn(u32, u32) -> bool> CellChecker<'_, A> {
             self.checks.unnecessary += 1;
             return;
         }
-        let (one, other) = (self.grid.ids[i], self.grid.ids[j]);
-        if (self.accept)(one, other) {
-            self.out.push(Pair::new(one, other));
+        let pair = Pair::new(self.grid.ids[i], self.grid.ids[j]);
+        if self.accept.pair(pair) {
+            self.out.push(pair);
         }
     }
 

@@ -40,7 +40,7 @@ mod trial;
 mod upload;
 
 pub use adapter::adapters;
-use changes::ChangeRequest;
+pub(crate) use changes::{Change, ChangeRequest};
 #[doc(hidden)]
 pub use engine::Fault;
 pub(crate) use error::Failure;
@@ -216,11 +216,7 @@ impl GpuFinder {
         }
     }
 
-    /// Whether calls stay on the CPU because the device failed a short while ago.
-    pub(crate) fn is_paused(&self, config: &Config) -> bool {
-        self.check_pause(config).is_err()
-    }
-
+    /// An error while calls stay on the CPU because the device failed a short while ago.
     fn check_pause(&self, config: &Config) -> Result<(), GpuError> {
         let pause = config.gpu.pause;
         match &self.failed {

@@ -102,7 +102,8 @@ impl GpuPlan {
 /// The cell size of a level: equation 6 or the density rule on its boxes alone, but such that its
 /// largest box touches few cells on each axis.
 fn edge(level: &LevelPlan, summary: &Summary, space: [f32; 3], config: &Config, crowding: f32) -> f64 {
-    let of_level = |b: &&Aabb| (level.classes.0..=level.classes.1).contains(&(size_class_of(b) as u8));
+    let of_level =
+        |b: &&Aabb| (level.classes.0..=level.classes.1).contains(&(size_class_of(b.extents()) as u8));
     let sample: Vec<Aabb> = summary.sample.iter().filter(of_level).copied().collect();
     let wanted = config.pbig_boxes_per_cell.max(1.0);
     let cell = match config.cell_rule {

@@ -17,7 +17,7 @@ pub struct LevelPlan {
     /// Largest extent on each axis, in the boxes' length unit like all lengths here: no box reaches
     /// further than this beyond its lower corner.
     pub max_extent: [f32; 3],
-    /// Cell size: at least a thousandth above `max_extent`, and such that about half a box falls into a
+    /// Cell size: at least [`LevelPlan::SPARE`] times `max_extent`, and such that about half a box falls into a
     /// cell.
     pub cell: [f32; 3],
     /// Where cell 0 begins.
@@ -40,6 +40,11 @@ pub struct OccupiedCell {
     pub aabb: Aabb,
     /// The boxes.
     pub ids: Vec<u32>,
+}
+
+impl LevelPlan {
+    /// How much larger than its largest box a cell is at least: 62 of 64 steps, see `cpu::cells`.
+    pub const SPARE: f32 = 64.0 / 62.0 + 1e-6;
 }
 
 impl fmt::Display for LevelPlan {
@@ -200,7 +205,7 @@ impl World {
     /// A cell holds the largest box, with a little to spare for rounding, and about half a box.
     fn cell(&self, groups: &[Group]) -> [f32; 3] {
         let spaced = spacing(self.range, count(groups), PER_CELL) as f32 * self.crowding;
-        max_extent(groups).map(|e| (e * 1.001).max(spaced).max(SMALLEST_CELL))
+        max_extent(groups).map(|e| (e * LevelPlan::SPARE).max(spaced).max(SMALLEST_CELL))
     }
 
     fn grid_cost(&self, level: &[Group], smaller: &[Group]) -> f64 {

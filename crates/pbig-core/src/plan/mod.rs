@@ -15,11 +15,12 @@ pub use gpu::GpuPlan;
 use levels::Company;
 pub use levels::{LevelPlan, OccupiedCell};
 pub use pbig::{PbigPlan, density_cell, pbig_cell, pbig_objective};
+pub(crate) use summary::{LazySummary, size_class_of, spread_evenly};
 pub use summary::{SizeClass, Summary};
-pub(crate) use summary::{size_class_of, spread_evenly};
 
 use crate::config::{Backend, Config, Strategy};
 use std::fmt;
+use std::sync::Arc;
 
 /// What the plan settled on.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -64,7 +65,7 @@ pub struct Plan {
     /// The strategy.
     pub chosen: Chosen,
     /// Grids, smallest boxes first ([`Chosen::Grid`]).
-    pub levels: Vec<LevelPlan>,
+    pub levels: Arc<[LevelPlan]>,
     /// Boxes tested against every other: too large for a level that would pay, or a small set.
     pub swept: u32,
     /// The grid of [`Chosen::Pbig`].
@@ -101,7 +102,7 @@ impl Plan {
             Strategy::Auto | Strategy::Grid => {
                 let (levels, swept) = levels::choose(summary, crowding, config.strategy, Company::NONE);
                 let chosen = if levels.is_empty() { Chosen::Brute } else { Chosen::Grid };
-                Self { chosen, levels, swept, boxes, ..Self::default() }
+                Self { chosen, levels: levels.into(), swept, boxes, ..Self::default() }
             }
         }
     }
@@ -111,16 +112,16 @@ impl Plan {
     /// For boxes by camp, the first of which is open: levels for each, all in one plan.
     pub(crate) fn of_camps(summaries: &[Summary], config: &Config, crowding: f32) -> Self {
         let boxes = summaries.iter().map(|summary| summary.valid).sum();
-        let mut plan = Self { chosen: Chosen::Grid, boxes, ..Self::default() };
+        let (mut all, mut swept) = (Vec::new(), 0);
         for (camp, summary) in summaries.iter().enumerate() {
             let company = Company { others: boxes - summary.valid, pairs: camp == usize::from(OPEN) };
-            let (levels, swept) = levels::choose(summary, crowding, config.strategy, company);
-            plan.levels.extend(levels.into_iter().map(|level| LevelPlan { camp: camp as u8, ..level }));
-            plan.swept += swept;
+            let (levels, in_list) = levels::choose(summary, crowding, config.strategy, company);
+            all.extend(levels.into_iter().map(|level| LevelPlan { camp: camp as u8, ..level }));
+            swept += in_list;
         }
         // Small boxes search among larger ones, and few among many.
-        plan.levels.sort_by_key(|level| (level.classes.1, level.boxes));
-        plan
+        all.sort_by_key(|level| (level.classes.1, level.boxes));
+        Self { chosen: Chosen::Grid, levels: all.into(), swept, boxes, ..Self::default() }
     }
 }
 
@@ -144,7 +145,7 @@ impl fmt::Display for Plan {
         if let Some(gpu) = &self.gpu {
             write!(f, "; {gpu}")?;
         }
-        for level in &self.levels {
+        for level in self.levels.iter() {
             write!(f, "; {level}")?;
         }
         if self.swept > 0 && self.chosen != Chosen::Brute {

@@ -1,6 +1,7 @@
 //! What the plan looks at: exact counts by size, and a sample of positions.
 
 use crate::Aabb;
+use std::cell::OnceCell;
 
 /// Boxes whose largest extent lies within one power of two.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -53,9 +54,10 @@ impl Summary {
             return;
         }
         self.valid += 1;
-        let class = &mut self.classes[size_class_of(one)];
+        let extents = one.extents();
+        let class = &mut self.classes[size_class_of(extents)];
         class.boxes += 1;
-        for (max, extent) in class.max_extent.iter_mut().zip(one.extents()) {
+        for (max, extent) in class.max_extent.iter_mut().zip(extents) {
             *max = max.max(extent);
         }
     }
@@ -63,7 +65,7 @@ impl Summary {
     fn draw_sample(&mut self, boxes: &[Aabb], ids: Option<&[u32]>) {
         for step in spread_evenly(ids.map_or(boxes.len(), <[u32]>::len), Self::SAMPLE) {
             let one = boxes[ids.map_or(step, |ids| ids[step] as usize)];
-            if one.is_valid() && size_class_of(&one) < LARGEST_CLASS {
+            if one.is_valid() && size_class_of(one.extents()) < LARGEST_CLASS {
                 self.sample.push(one);
             }
         }
@@ -85,6 +87,23 @@ impl Summary {
     }
 }
 
+/// A summary that is made when somebody asks for it.
+pub(crate) struct LazySummary<'a> {
+    boxes: &'a [Aabb],
+    ids: Option<&'a [u32]>,
+    made: OnceCell<Summary>,
+}
+
+impl<'a> LazySummary<'a> {
+    pub(crate) fn new(boxes: &'a [Aabb], ids: Option<&'a [u32]>) -> Self {
+        Self { boxes, ids, made: OnceCell::new() }
+    }
+
+    pub(crate) fn get(&self) -> &Summary {
+        self.made.get_or_init(|| Summary::of(self.boxes, self.ids))
+    }
+}
+
 /// At most `most` of the numbers below `len`, by a golden-ratio walk: a pattern in the order of the boxes cannot
 /// bias a sample, and it is the same for the same number of boxes.
 pub(crate) fn spread_evenly(len: usize, most: usize) -> impl Iterator<Item = usize> {
@@ -95,8 +114,7 @@ pub(crate) fn spread_evenly(len: usize, most: usize) -> impl Iterator<Item = usi
 
 /// The exponent of the largest extent; NaN (a point at infinity on every axis) counts as infinite.
 #[inline]
-pub(crate) fn size_class_of(one: &Aabb) -> usize {
-    let extents = one.extents();
+pub(crate) fn size_class_of(extents: [f32; 3]) -> usize {
     let largest = extents[0].max(extents[1]).max(extents[2]);
     (largest.to_bits() >> 23 & 0xFF) as usize
 }

@@ -1,0 +1,78 @@
+//! Levels: boxes of similar size, in cells of their size, and which box belongs where.
+
+use super::cells::Cells;
+use super::sort::NOWHERE;
+use crate::Aabb;
+use crate::plan::{LevelPlan, Plan, size_class_of};
+use std::ops::Range;
+
+/// One grid.
+#[derive(Clone, Debug)]
+pub(crate) struct Level {
+    pub(crate) cells: Cells,
+    /// No box is larger.
+    max_extent: [f32; 3],
+    /// Its boxes.
+    pub(crate) slots: Range<usize>,
+    /// Boxes of one camp other than [`crate::plan::OPEN`] never pair with each other.
+    pub(crate) camp: u8,
+    /// Other boxes in a box's cell, on average over boxes.
+    pub(crate) crowd: f32,
+}
+
+impl Level {
+    pub(super) fn new(plan: &LevelPlan, base: u32) -> Self {
+        let (cells, max_extent) = (Cells::new(plan, base), plan.max_extent);
+        Self { cells, max_extent, slots: 0..0, camp: plan.camp, crowd: 0.0 }
+    }
+
+    /// False for extents of invalid boxes.
+    #[inline(always)]
+    fn holds(&self, extents: [f32; 3]) -> bool {
+        let mut holds = true;
+        for (extent, largest) in extents.into_iter().zip(self.max_extent) {
+            holds &= (extent >= 0.0) & (extent <= largest);
+        }
+        holds
+    }
+}
+
+/// No cell: a box that fits no level.
+pub(super) const LISTED: u32 = NOWHERE - 1;
+
+/// The level of a size class that has none.
+const NONE: u8 = u8::MAX;
+
+/// Which level a box belongs to, by camp and size class.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Classes(Vec<[u8; 256]>);
+
+impl Classes {
+    pub(super) fn set(&mut self, plan: &Plan, camps: usize) {
+        self.0.clear();
+        self.0.resize(camps, [NONE; 256]);
+        for (i, level) in plan.levels.iter().enumerate() {
+            let (first, last) = (usize::from(level.classes.0), usize::from(level.classes.1));
+            self.0[usize::from(level.camp)][first..=last].fill(i as u8);
+        }
+    }
+
+    /// The key of a box's cell; [`LISTED`] for a box that its level would not hold, though planned for others of its
+    /// class.
+    #[inline(always)]
+    pub(super) fn key(&self, one: &Aabb, camp: u8, levels: &[Level]) -> u32 {
+        let extents = one.extents();
+        if let [level] = levels
+            && camp == level.camp
+            && level.holds(extents)
+        {
+            // The only one: whatever fits is in it.
+            return level.cells.place(one);
+        }
+        match levels.get(usize::from(self.0[usize::from(camp)][size_class_of(extents)])) {
+            Some(level) if level.holds(extents) => level.cells.place(one),
+            _ if !one.is_valid() => NOWHERE,
+            _ => LISTED,
+        }
+    }
+}

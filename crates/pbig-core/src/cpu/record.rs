@@ -1,0 +1,97 @@
+//! Boxes as the search reads them: all that is tested of one lies in one cache line.
+
+use crate::Aabb;
+
+/// A box: half a cache line.
+#[repr(C, align(32))]
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Item {
+    pub(crate) aabb: Aabb,
+    pub(crate) id: u32,
+    /// Of its cell.
+    pub(super) key: u32,
+}
+
+impl Item {
+    pub(super) const fn new(aabb: Aabb, id: u32, key: u32) -> Self {
+        Self { aabb, id, key }
+    }
+}
+
+/// A box, and what it was before. (In arrays of their own the two were in two or three cache lines.)
+#[repr(C, align(64))]
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Tracked {
+    item: Item,
+    before: Aabb,
+}
+
+impl Tracked {
+    pub(crate) const fn new(aabb: Aabb, id: u32, before: Aabb) -> Self {
+        Self { item: Item::new(aabb, id, 0), before }
+    }
+}
+
+/// What the sort moves and the search tests.
+pub(crate) trait Record: Copy + Send + Sync {
+    const EMPTY: Self;
+
+    /// `before` has by id what boxes were before.
+    fn new(item: Item, before: &[Aabb]) -> Self;
+
+    fn item(&self) -> &Item;
+
+    /// Whether the two are known to have overlapped before.
+    fn overlapped(&self, other: &Self) -> bool;
+
+    /// As [`Record::overlapped`], the other one not having changed.
+    fn overlapped_still(&self, other: &Self) -> bool;
+}
+
+impl Record for Item {
+    const EMPTY: Self = Self::new(Aabb::NOWHERE, 0, 0);
+
+    #[inline(always)]
+    fn new(item: Item, _: &[Aabb]) -> Self {
+        item
+    }
+
+    #[inline(always)]
+    fn item(&self) -> &Item {
+        self
+    }
+
+    #[inline(always)]
+    fn overlapped(&self, _: &Self) -> bool {
+        false
+    }
+
+    #[inline(always)]
+    fn overlapped_still(&self, _: &Self) -> bool {
+        false
+    }
+}
+
+impl Record for Tracked {
+    const EMPTY: Self = Self { item: Item::EMPTY, before: Aabb::NOWHERE };
+
+    #[inline(always)]
+    fn new(item: Item, before: &[Aabb]) -> Self {
+        Self { item, before: before[item.id as usize] }
+    }
+
+    #[inline(always)]
+    fn item(&self) -> &Item {
+        &self.item
+    }
+
+    #[inline(always)]
+    fn overlapped(&self, other: &Self) -> bool {
+        self.before.overlaps(&other.before)
+    }
+
+    #[inline(always)]
+    fn overlapped_still(&self, other: &Self) -> bool {
+        self.before.overlaps(&other.item.aabb)
+    }
+}

@@ -1,0 +1,278 @@
+//! A search from nothing by whatever strategy the plan chooses, on whatever backend there is.
+
+#[cfg(feature = "gpu")]
+use crate::Pair;
+use crate::cpu::crowding::Set;
+use crate::cpu::find::Found;
+use crate::cpu::judge::Accept;
+use crate::cpu::map::Map;
+use crate::cpu::pbig::PbigGrid;
+use crate::cpu::record::Record;
+#[cfg(feature = "gpu")]
+use crate::gpu::{self, ChangeRequest, GpuFinder};
+use crate::plan::{LazySummary, Plan};
+use crate::report::{Checks, Report, lap, stage};
+use crate::{Aabb, Backend, Config, Error, ProxyFilter, Strategy};
+use std::time::{Duration, Instant};
+
+/// Which pairs are wanted, besides that they overlap.
+pub(crate) struct Rule<'a, A> {
+    /// The whole rule.
+    pub(crate) accept: &'a A,
+    /// The part of it that a device can test, and that tells who never pairs.
+    pub(crate) filters: Option<&'a [ProxyFilter]>,
+    /// Whether that part is all of it.
+    #[cfg_attr(not(feature = "gpu"), expect(dead_code))]
+    pub(crate) filters_suffice: bool,
+    /// By id: what a box was at the last update, for a search that keeps it.
+    pub(crate) before: &'a [Aabb],
+}
+
+/// A search from nothing by whatever strategy the plan chooses, with its buffers.
+#[derive(Clone, Debug)]
+pub(crate) struct Search<R> {
+    pub(crate) map: Map<R>,
+    pbig: PbigGrid,
+    pub(crate) found: Found,
+    warned: bool,
+    #[cfg(feature = "gpu")]
+    pub(crate) gpu: Option<GpuFinder>,
+    #[cfg(feature = "gpu")]
+    trial: gpu::Trial,
+}
+
+impl<R: Record> Search<R> {
+    pub(crate) fn new() -> Self {
+        Self {
+            map: Map::new(),
+            pbig: PbigGrid::default(),
+            found: Found::default(),
+            warned: false,
+            #[cfg(feature = "gpu")]
+            gpu: None,
+            #[cfg(feature = "gpu")]
+            trial: gpu::Trial::default(),
+        }
+    }
+
+    /// Leaves the accepted pairs in `found`, and what was done in `report`.
+    pub(crate) fn find<A>(
+        &mut self,
+        boxes: &[Aabb],
+        config: &Config,
+        rule: &Rule<'_, A>,
+        report: &mut Report,
+    ) -> Result<(), Error>
+    where
+        A: Accept,
+    {
+        report.boxes = boxes.len() as u64;
+        let summary = LazySummary::new(boxes, None);
+        if self.find_on_gpu(boxes, &summary, config, rule, report)? {
+            return Ok(());
+        }
+        self.find_without_gpu(boxes, &summary, config, rule, report)
+    }
+
+    /// The same on the CPU.
+    pub(crate) fn find_without_gpu<A>(
+        &mut self,
+        boxes: &[Aabb],
+        summary: &LazySummary<'_>,
+        config: &Config,
+        rule: &Rule<'_, A>,
+        report: &mut Report,
+    ) -> Result<(), Error>
+    where
+        A: Accept,
+    {
+        let mut clock = Instant::now();
+        let set = Set { boxes, filters: rule.filters, ids: None, summary, before: rule.before };
+        let result = self.find_on_cpu(&set, config, rule.accept, report);
+        self.note_time(false, boxes.len(), lap(&mut clock));
+        result
+    }
+
+    fn find_on_cpu<A>(
+        &mut self,
+        set: &Set<'_>,
+        config: &Config,
+        accept: &A,
+        report: &mut Report,
+    ) -> Result<(), Error>
+    where
+        A: Accept,
+    {
+        if config.strategy == Strategy::Pbig && config.backend != Backend::Brute {
+            let summary = set.summary.get();
+            report.plan = Plan::new(summary, config, 1.0);
+            report.invalid = set.boxes.len() as u64 - u64::from(summary.valid);
+            return self.find_pbig(set.boxes, config, accept, report);
+        }
+        report.plan = self.map.plan_and_build(set, config, &mut report.stages);
+        report.invalid = u64::from(self.map.invalid);
+        let mut clock = Instant::now();
+        self.map.find(accept, config.limits.max_pairs, &mut self.found)?;
+        report.stages.check += lap(&mut clock);
+        report.checks = single_entry_checks(&self.found);
+        Ok(())
+    }
+
+    #[cfg(feature = "gpu")]
+    pub(crate) fn adapter(&self) -> Option<&str> {
+        self.gpu.as_ref().and_then(GpuFinder::working_adapter)
+    }
+
+    /// Searches on a device if that is wanted; false when it is not, or when the device could not do
+    /// it, which the report then says (contract 8).
+    #[cfg(feature = "gpu")]
+    fn find_on_gpu<A>(
+        &mut self,
+        boxes: &[Aabb],
+        summary: &LazySummary<'_>,
+        config: &Config,
+        rule: &Rule<'_, A>,
+        report: &mut Report,
+    ) -> Result<bool, Error>
+    where
+        A: Accept,
+    {
+        if !self.wants_gpu(config, boxes.len()) {
+            return Ok(false);
+        }
+        stage!("gpu");
+        let mut clock = Instant::now();
+        let summary = summary.get();
+        report.invalid = boxes.len() as u64 - u64::from(summary.valid);
+        report.stages.plan += lap(&mut clock);
+        let accept = |a: u32, b: u32| rule.accept.pair(Pair::new(a, b));
+        let accept: Option<&(dyn Fn(u32, u32) -> bool + Sync)> =
+            if rule.filters_suffice { None } else { Some(&accept) };
+        let request = gpu::Request { boxes, filters: rule.filters, accept, summary, config };
+        let gpu = self.gpu.get_or_insert_with(GpuFinder::shared);
+        let found = gpu.find(&request, &mut self.found, report);
+        Ok(self.settle(found, boxes.len(), clock, report)?.is_some())
+    }
+
+    /// Finds on a device what has changed, into `found`, if that is wanted; returns the boxes that began anew
+    /// ([`GpuFinder::changes`]), nothing when it is not or could not be done.
+    #[cfg(feature = "gpu")]
+    pub(crate) fn changes_on_gpu(
+        &mut self,
+        request: &ChangeRequest<'_>,
+        report: &mut Report,
+    ) -> Result<Option<Vec<u32>>, Error> {
+        stage!("gpu");
+        let clock = Instant::now();
+        let gpu = self.gpu.get_or_insert_with(GpuFinder::shared);
+        let found = gpu.changes(request, &mut self.found, report);
+        self.settle(found, request.boxes.len(), clock, report)
+    }
+
+    /// Whether the next search of so many boxes is to be tried on a device.
+    #[cfg(feature = "gpu")]
+    pub(crate) fn wants_gpu(&mut self, config: &Config, boxes: usize) -> bool {
+        gpu::wanted(config, self.gpu.as_ref(), &mut self.trial, boxes)
+    }
+
+    /// What a call to the device that began at `clock` comes to: nothing when it could not do the work.
+    #[cfg(feature = "gpu")]
+    fn settle<T>(
+        &mut self,
+        found: Result<T, gpu::Failure>,
+        boxes: usize,
+        mut clock: Instant,
+        report: &mut Report,
+    ) -> Result<Option<T>, Error> {
+        match found {
+            Ok(found) => {
+                self.warned = false;
+                report.fallback = None;
+                let time = lap(&mut clock);
+                // The device's own times for its map; the rest of the call is check, transfer and decoding.
+                let kernels = report.gpu.iter().flat_map(|gpu| &gpu.kernels);
+                let mapping = kernels.filter(|(name, _)| !name.starts_with("check")).map(|(_, time)| *time);
+                let map = mapping.sum::<Duration>().min(time);
+                report.stages.map += map;
+                report.stages.check += time - map;
+                self.note_time(true, boxes, time);
+                Ok(Some(found))
+            }
+            Err(gpu::Failure::Call(error)) => Err(error),
+            Err(gpu::Failure::Device(error)) => {
+                self.trial.failed();
+                self.fall_back(format!("{error}: the CPU does the work"), report);
+                Ok(None)
+            }
+        }
+    }
+
+    #[cfg(not(feature = "gpu"))]
+    fn find_on_gpu<A>(
+        &mut self,
+        _: &[Aabb],
+        _: &LazySummary<'_>,
+        config: &Config,
+        _: &Rule<'_, A>,
+        report: &mut Report,
+    ) -> Result<bool, Error> {
+        self.miss_gpu(config, report);
+        Ok(false)
+    }
+
+    /// Says so when a backend is wanted that this build does not have.
+    #[cfg(not(feature = "gpu"))]
+    pub(crate) fn miss_gpu(&mut self, config: &Config, report: &mut Report) {
+        if config.backend == Backend::Gpu {
+            let why = "no GPU backend in this build (feature `gpu`): the CPU does the work";
+            self.fall_back(why.into(), report);
+        }
+    }
+
+    /// The wanted backend could not do the work: the report says so every time, a warning once.
+    pub(crate) fn fall_back(&mut self, why: String, report: &mut Report) {
+        if !self.warned {
+            tracing::warn!("pbig: {why}");
+            self.warned = true;
+        }
+        report.fallback = Some(why);
+    }
+
+    /// Measures for [`Backend::Auto`].
+    #[cfg(feature = "gpu")]
+    fn note_time(&mut self, on_gpu: bool, boxes: usize, time: Duration) {
+        self.trial.note(on_gpu, boxes, time);
+    }
+
+    #[cfg(not(feature = "gpu"))]
+    #[expect(clippy::unused_self, reason = "as with a GPU backend")]
+    fn note_time(&mut self, _: bool, _: usize, _: Duration) {}
+
+    fn find_pbig<A>(
+        &mut self,
+        boxes: &[Aabb],
+        config: &Config,
+        accept: &A,
+        report: &mut Report,
+    ) -> Result<(), Error>
+    where
+        A: Accept,
+    {
+        self.found.clear();
+        // Fewer than two valid boxes have no plan.
+        let Plan { pbig: Some(plan), .. } = report.plan else { return Ok(()) };
+        let mut clock = Instant::now();
+        stage!("map and check");
+        self.pbig.build(&plan, boxes);
+        report.stages.map += lap(&mut clock);
+        report.checks =
+            self.pbig.find(&plan, config.small_cell, accept, config.limits.max_pairs, &mut self.found)?;
+        report.stages.check += lap(&mut clock);
+        Ok(())
+    }
+}
+
+/// Checks of a structure that stores each box once: none is redundant.
+pub(crate) fn single_entry_checks(found: &Found) -> Checks {
+    Checks { made: found.checks, unnecessary: found.checks - found.overlaps, redundant: 0 }
+}
