@@ -2,7 +2,7 @@
 
 use crate::call::Call;
 use crate::events::{HandleOrder, Outbox};
-use crate::proxy::{collision_aabb, filter_of};
+use crate::proxy::{BLOCK, Proxy};
 use crate::roll::Roll;
 use crate::scene_tree::SceneTree;
 use crate::stats::{Kept, Totals};
@@ -12,19 +12,11 @@ use rapier3d::prelude::{
     NarrowPhase, RigidBodySet,
 };
 use rayon::prelude::*;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
-/// Modified colliders from which their boxes are computed on several threads: below, a second one
-/// costs more than it saves.
-const PARALLEL_FROM: usize = 2048;
-
-/// What the finder is to be told about a collider.
-#[derive(Clone, Copy, Debug)]
-pub(crate) enum Proxy {
-    Gone,
-    Disabled,
-    Enabled(Aabb, ProxyFilter),
-}
+/// Modified colliders from which their boxes are computed on several threads: below, waking a second one costs more than
+/// it saves.
+const PARALLEL_FROM: usize = 16_384;
 
 /// The broad phase to hand to rapier's `PhysicsPipeline` or `CollisionPipeline`.
 ///
@@ -183,30 +175,39 @@ impl PbigBroadPhase {
     /// Brings the finder up to date about some colliders.
     fn look_at(&mut self, call: &Call<'_>, listed: &[ColliderHandle]) {
         let clock = Instant::now();
-        self.compute_proxies(call, listed);
-        let proxied = Instant::now();
+        let mut proxies = std::mem::take(&mut self.proxies);
+        if listed.len() < PARALLEL_FROM || rayon::current_num_threads() == 1 {
+            let mut set = Duration::ZERO;
+            for block in listed.chunks(BLOCK) {
+                proxies.resize(block.len(), Proxy::Gone);
+                call.proxies(block, &mut proxies);
+                let proxied = Instant::now();
+                self.set_all(block, &proxies);
+                set += proxied.elapsed();
+            }
+            self.kept.set += set;
+            self.kept.proxies += clock.elapsed().saturating_sub(set);
+        } else {
+            proxies.resize(listed.len(), Proxy::Gone);
+            let block = |(listed, proxies): (&[ColliderHandle], &mut [Proxy])| call.proxies(listed, proxies);
+            let blocks = listed.par_chunks(BLOCK).zip(proxies.par_chunks_mut(BLOCK));
+            blocks.with_min_len(PARALLEL_FROM / BLOCK / 8).for_each(block);
+            self.kept.proxies += clock.elapsed();
+            let proxied = Instant::now();
+            self.set_all(listed, &proxies);
+            self.kept.set += proxied.elapsed();
+        }
+        self.proxies = proxies;
+    }
+
+    fn set_all(&mut self, listed: &[ColliderHandle], proxies: &[Proxy]) {
         let _span = tracing::debug_span!(target: "pbig", "set").entered();
-        for (i, &handle) in listed.iter().enumerate() {
-            match self.proxies[i] {
-                Proxy::Enabled(aabb, filter) => self.set(handle, aabb, filter),
+        for (&handle, proxy) in listed.iter().zip(proxies) {
+            match proxy {
+                Proxy::Enabled(aabb, filter) => self.set(handle, *aabb, *filter),
                 Proxy::Disabled => self.disable(handle),
                 Proxy::Gone => self.forget(handle),
             }
-        }
-        self.kept.proxies += proxied - clock;
-        self.kept.set += proxied.elapsed();
-    }
-
-    /// Boxes and filters of colliders. Most of it is waiting for the memory of each collider and body, which
-    /// a second thread halves.
-    fn compute_proxies(&mut self, call: &Call<'_>, listed: &[ColliderHandle]) {
-        let _span = tracing::debug_span!(target: "pbig", "proxies").entered();
-        let proxy = |&handle: &ColliderHandle| call.proxy(handle);
-        if listed.len() < PARALLEL_FROM || rayon::current_num_threads() == 1 {
-            self.proxies.clear();
-            self.proxies.extend(listed.iter().map(proxy));
-        } else {
-            listed.par_iter().with_min_len(PARALLEL_FROM / 4).map(proxy).collect_into_vec(&mut self.proxies);
         }
     }
 
@@ -266,19 +267,6 @@ impl PbigBroadPhase {
         (self.kept.added, self.kept.deleted) = sent;
         self.kept.totals.added += sent.0 as u64;
         self.kept.totals.deleted += sent.1 as u64;
-    }
-}
-
-impl Call<'_> {
-    fn proxy(&self, handle: ColliderHandle) -> Proxy {
-        match self.colliders.get(handle) {
-            None => Proxy::Gone,
-            Some(collider) if !collider.is_enabled() => Proxy::Disabled,
-            Some(collider) => Proxy::Enabled(
-                collision_aabb(self.params, self.bodies, collider),
-                filter_of(self.bodies, collider),
-            ),
-        }
     }
 }
 

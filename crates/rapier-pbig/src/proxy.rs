@@ -1,11 +1,49 @@
 //! From a collider to what the finder needs: its box and its filter. Both as rapier 0.27's own
 //! broad phase and narrow phase compute them.
 
+use crate::call::Call;
 use pbig_core::{Aabb, ProxyFilter, TestMode};
 use rapier3d::prelude::{
-    ActiveCollisionTypes, Collider, IntegrationParameters, Isometry, Point, Real, RigidBody, RigidBodySet,
-    RigidBodyType, Shape,
+    ActiveCollisionTypes, Collider, ColliderHandle, IntegrationParameters, Isometry, Point, Real, RigidBody,
+    RigidBodySet, RigidBodyType, Shape,
 };
+
+/// What the finder is to be told about a collider.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Proxy {
+    Gone,
+    Disabled,
+    Enabled(Aabb, ProxyFilter),
+}
+
+/// Colliders whose memory is asked for together. Most of the time goes into waiting for that of each collider and its
+/// body; asked for one by one, a processor waits for one or two at a time.
+pub(crate) const BLOCK: usize = 64;
+
+impl Call<'_> {
+    /// The proxies of at most [`BLOCK`] colliders.
+    pub(crate) fn proxies(&self, listed: &[ColliderHandle], out: &mut [Proxy]) {
+        let _span = tracing::debug_span!(target: "pbig", "proxies").entered();
+        let mut found = [(None, None); BLOCK];
+        for (found, &handle) in found.iter_mut().zip(listed) {
+            found.0 = self.colliders.get(handle);
+        }
+        for found in &mut found[..listed.len()] {
+            let parent = found.0.and_then(Collider::parent);
+            found.1 = parent.and_then(|handle| self.bodies.get(handle));
+        }
+        for (proxy, (collider, body)) in out.iter_mut().zip(found) {
+            *proxy = match collider {
+                None => Proxy::Gone,
+                Some(collider) if !collider.is_enabled() => Proxy::Disabled,
+                Some(collider) => {
+                    let aabb = aabb_of(self.params, body, collider);
+                    Proxy::Enabled(aabb, filter_with(body, collider))
+                }
+            };
+        }
+    }
+}
 
 /// The box of a collider in which it may touch another during this step: its shape, half the
 /// prediction distance and its contact skin; with soft CCD, also where it is predicted to be.
@@ -13,9 +51,16 @@ use rapier3d::prelude::{
 /// Without the change margin, which is the finder's. A pose with a NaN gives an invalid box, which
 /// pairs with nothing.
 pub fn collision_aabb(params: &IntegrationParameters, bodies: &RigidBodySet, collider: &Collider) -> Aabb {
+    aabb_of(params, parent_of(bodies, collider), collider)
+}
+
+fn parent_of<'a>(bodies: &'a RigidBodySet, collider: &Collider) -> Option<&'a RigidBody> {
+    collider.parent().and_then(|handle| bodies.get(handle))
+}
+
+fn aabb_of(params: &IntegrationParameters, parent: Option<&RigidBody>, collider: &Collider) -> Aabb {
     let reach = collider.contact_skin() + params.prediction_distance() / 2.0;
     let now = shape_aabb(collider.shape(), collider.position());
-    let parent = collider.parent().and_then(|handle| bodies.get(handle));
     let predicted = parent
         .filter(|body| body.soft_ccd_prediction() > 0.0)
         .and_then(|body| predicted_aabb(params.dt, body, collider));
@@ -61,13 +106,15 @@ fn union(a: &Aabb, b: &Aabb) -> Aabb {
 /// Rapier's early filters for a collider: parent body, body type against active collision types,
 /// collision groups. What stock's narrow phase tests before it computes contacts, nothing else.
 pub fn filter_of(bodies: &RigidBodySet, collider: &Collider) -> ProxyFilter {
-    let parent = collider.parent();
+    filter_with(parent_of(bodies, collider), collider)
+}
+
+fn filter_with(body: Option<&RigidBody>, collider: &Collider) -> ProxyFilter {
     // A collider without a body counts as fixed.
-    let body = parent.and_then(|handle| bodies.get(handle));
     let kind = body.map_or(RigidBodyType::Fixed, RigidBody::body_type);
     let groups = collider.collision_groups();
     ProxyFilter {
-        body: parent.map_or(ProxyFilter::NO_BODY, |handle| handle.into_raw_parts().0),
+        body: collider.parent().map_or(ProxyFilter::NO_BODY, |handle| handle.into_raw_parts().0),
         kind: kind_bit(kind),
         accepted_kinds: accepted_kinds(kind, collider.active_collision_types()),
         test_mode: TestMode::And as u16,
@@ -80,13 +127,36 @@ fn kind_bit(kind: RigidBodyType) -> u8 {
     1 << kind as u8
 }
 
-/// The kinds that a collider on a body of this kind may meet: a row of rapier's table.
+/// The kinds that a collider on a body of this kind may meet. Rapier's table has four bits for each kind, and tests
+/// both ways: a row of it and a column.
 fn accepted_kinds(kind: RigidBodyType, types: ActiveCollisionTypes) -> u8 {
-    const KINDS: [RigidBodyType; 4] = [
-        RigidBodyType::Dynamic,
-        RigidBodyType::Fixed,
-        RigidBodyType::KinematicPositionBased,
-        RigidBodyType::KinematicVelocityBased,
-    ];
-    KINDS.into_iter().filter(|other| types.test(kind, *other)).fold(0, |bits, other| bits | kind_bit(other))
+    let table = types.bits();
+    let row = table >> (4 * kind as u32);
+    let column = table >> kind as u32 & 0b0001_0001_0001_0001;
+    let column = column | column >> 3 | column >> 6 | column >> 9;
+    ((row | column) & 0b1111) as u8
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn accepted_kinds_are_those_that_rapier_tests() {
+        const KINDS: [RigidBodyType; 4] = [
+            RigidBodyType::Dynamic,
+            RigidBodyType::Fixed,
+            RigidBodyType::KinematicPositionBased,
+            RigidBodyType::KinematicVelocityBased,
+        ];
+        let sets = (0..=u16::MAX).filter_map(ActiveCollisionTypes::from_bits);
+        let mut tested = 0;
+        for (types, kind) in sets.flat_map(|types| KINDS.map(|kind| (types, kind))) {
+            let accepted = KINDS.into_iter().filter(|other| types.test(kind, *other));
+            let wanted = accepted.fold(0, |bits, other| bits | kind_bit(other));
+            assert_eq!(accepted_kinds(kind, types), wanted, "{types:?} {kind:?}");
+            tested += 1;
+        }
+        assert!(tested >= 4 * 64, "{tested}");
+    }
 }
