@@ -9,13 +9,14 @@ pub(crate) fn run() -> Result<(), Failure> {
     let Limits { max_boxes, max_pairs } = Limits::DEFAULT;
     print(&format!(
         "pbig {}\n\
-         CPU: {} threads, SIMD found: {}; SIMD used: the compiler's baseline\n\
+         CPU: {} threads, SIMD found: {}; SIMD used: {}\n\
          limits: {max_boxes} boxes, {max_pairs} pairs (pbig_core::Limits)\n\
          backend auto: cpu; a GPU only where an app hands one over and it is measured to be faster\n\
          strategy: below {} boxes without a grid",
         env!("CARGO_PKG_VERSION"),
         rayon::current_num_threads(),
         simd_found().join(" "),
+        pbig_core::simd(),
         Config::DEFAULT.brute_below,
     ))?;
     let gpus = describe_adapters()?;
