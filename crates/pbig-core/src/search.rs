@@ -10,7 +10,7 @@ use crate::cpu::pbig::PbigGrid;
 use crate::cpu::record::Record;
 #[cfg(feature = "gpu")]
 use crate::gpu::{self, ChangeRequest, GpuFinder};
-use crate::plan::{LazySummary, Plan};
+use crate::plan::{LazySummary, Plan, Summary};
 use crate::report::{Checks, Report, lap, stage};
 use crate::{Aabb, Backend, Config, Error, ProxyFilter, Strategy};
 use std::time::{Duration, Instant};
@@ -34,6 +34,8 @@ pub(crate) struct Search<R> {
     pub(crate) map: Map<R>,
     pbig: PbigGrid,
     pub(crate) found: Found,
+    /// Memory for a summary.
+    pub(crate) spare: Option<Summary>,
     warned: bool,
     #[cfg(feature = "gpu")]
     pub(crate) gpu: Option<GpuFinder>,
@@ -47,6 +49,7 @@ impl<R: Record> Search<R> {
             map: Map::new(),
             pbig: PbigGrid::default(),
             found: Found::default(),
+            spare: None,
             warned: false,
             #[cfg(feature = "gpu")]
             gpu: None,
@@ -67,11 +70,13 @@ impl<R: Record> Search<R> {
         A: Accept,
     {
         report.boxes = boxes.len() as u64;
-        let summary = LazySummary::new(boxes, None);
-        if self.find_on_gpu(boxes, &summary, config, rule, report)? {
-            return Ok(());
-        }
-        self.find_without_gpu(boxes, &summary, config, rule, report)
+        let summary = LazySummary::new(boxes, None, self.spare.take());
+        let found = match self.find_on_gpu(boxes, &summary, config, rule, report) {
+            Ok(false) => self.find_without_gpu(boxes, &summary, config, rule, report),
+            done => done.map(drop),
+        };
+        self.spare = summary.into_spare();
+        found
     }
 
     /// The same on the CPU.

@@ -1,5 +1,7 @@
 //! The incremental facade: boxes are set and removed, an update tells which pairs came and went.
 
+#[cfg(test)]
+mod allocations;
 #[cfg(feature = "gpu")]
 mod device;
 #[cfg(feature = "serde")]

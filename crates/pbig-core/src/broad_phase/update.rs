@@ -86,11 +86,13 @@ impl BroadPhase {
         let state = state!(self);
         let filters = Some(&self.filters[..]);
         let rule = Rule { accept: &state, filters, filters_suffice: false, before: &self.before };
-        let summary = LazySummary::new(&self.boxes, None);
+        let summary = LazySummary::new(&self.boxes, None, self.base.spare.take());
         let invalid = self.report.invalid;
         self.has_base = false;
         let report = &mut self.report;
-        self.base.find_without_gpu(&self.boxes, &summary, &self.config, &rule, report)?;
+        let found = self.base.find_without_gpu(&self.boxes, &summary, &self.config, &rule, report);
+        self.base.spare = summary.into_spare();
+        found?;
         self.report.invalid = invalid;
         self.forget_moved();
         // A search by another strategy leaves no base grid to keep.
@@ -135,7 +137,7 @@ impl BroadPhase {
 
     /// Sorts the boxes that moved since the base was built.
     fn build_loose(&mut self) -> Plan {
-        let summary = LazySummary::new(&self.boxes, Some(&self.moved));
+        let summary = LazySummary::new(&self.boxes, Some(&self.moved), self.base.spare.take());
         let set = Set {
             boxes: &self.boxes,
             filters: Some(&self.filters),
@@ -143,7 +145,9 @@ impl BroadPhase {
             summary: &summary,
             before: &self.before,
         };
-        self.loose.plan_and_build(&set, &self.config, &mut self.report.stages)
+        let plan = self.loose.plan_and_build(&set, &self.config, &mut self.report.stages);
+        self.base.spare = summary.into_spare();
+        plan
     }
 
     /// Kept pairs that no longer hold, into `events.removed`, in no order; they are no longer kept.

@@ -78,8 +78,8 @@ impl Kept {
         self.builds < Self::LONGEST
             && self.plan.chosen == Chosen::Grid
             && self.config == *config
-            && 7 * planned <= 8 * boxes
-            && 7 * boxes <= 8 * planned
+            && planned <= 2 * boxes
+            && boxes <= 2 * planned
     }
 }
 
@@ -162,6 +162,21 @@ impl<R: Record> Map<R> {
 
     /// Plans and sorts, again with smaller cells where they are too full.
     fn build_uncrowded(&mut self, set: &Set<'_>, config: &Config, times: &mut StageTimes) -> Plan {
+        let mut tried = std::mem::take(&mut self.tried);
+        tried.clear();
+        let plan = self.build_trying(set, config, times, &mut tried);
+        self.tried = tried;
+        plan
+    }
+
+    /// `tried` gathers factors and the crowds that they led to.
+    fn build_trying(
+        &mut self,
+        set: &Set<'_>,
+        config: &Config,
+        times: &mut StageTimes,
+        tried: &mut Vec<(f32, f32)>,
+    ) -> Plan {
         let mut build = |map: &mut Self| {
             let mut clock = Instant::now();
             let plan = {
@@ -174,7 +189,6 @@ impl<R: Record> Map<R> {
             times.map += lap(&mut clock);
             plan
         };
-        let mut tried: Vec<(f32, f32)> = Vec::new();
         loop {
             let plan = build(self);
             let crowd = self.crowd();
@@ -186,7 +200,7 @@ impl<R: Record> Map<R> {
                 self.crowding.factor *= if helps { 0.5 } else { 0.125 };
                 continue;
             }
-            if self.crowding.settle(&tried) {
+            if self.crowding.settle(tried) {
                 return build(self);
             }
             return plan;
@@ -262,7 +276,7 @@ mod tests {
     }
 
     fn builds_filtered(map: &mut Map<Item>, boxes: &[Aabb], filters: Option<&[ProxyFilter]>) -> usize {
-        let summary = LazySummary::new(boxes, None);
+        let summary = LazySummary::new(boxes, None, None);
         let before = map.builds;
         let set = Set { boxes, filters, ids: None, summary: &summary, before: &[] };
         map.plan_and_build(&set, &Config::DEFAULT, &mut StageTimes::default());

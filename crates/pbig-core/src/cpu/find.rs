@@ -37,7 +37,7 @@ const CHECK: u64 = 1;
 
 thread_local! {
     /// Buffers of a search, one for each thread that takes part.
-    static SCRATCH: RefCell<(Scratch, Rests)> = RefCell::default();
+    static SCRATCH: RefCell<(Scratch, Rests, Vec<u32>)> = RefCell::default();
 }
 
 /// Pairs as found, a buffer for each chunk, kept from call to call.
@@ -125,7 +125,7 @@ impl<R: Record> Map<R> {
     {
         let chunk = self.chunk(chunk);
         let Some(level) = chunk.level else { return self.check_list(&chunk, accept, out, room) };
-        SCRATCH.with_borrow_mut(|(scratch, rests)| {
+        SCRATCH.with_borrow_mut(|(scratch, rests, _)| {
             let inner = self.check_half(&chunk, level, accept, out, room, (scratch, rests));
             let larger = self.check_larger(&chunk, level, accept, out, room, scratch);
             let listed = self.check_against_list(&chunk, accept, out, room);
@@ -252,12 +252,13 @@ impl<R: Record> Map<R> {
     {
         let room = Room::new(max_pairs);
         let mut full = false;
-        let mut counts = SCRATCH.with_borrow_mut(|(scratch, _)| {
+        let mut counts = SCRATCH.with_borrow_mut(|(scratch, _, places)| {
             let own = self.judge(accept, out, &room);
             let judge = Judge { queries: others.records, all_changed: false, ..own };
             let mut windows = Windows::new(&self.sorted, judge, scratch);
-            for (level, places) in self.levels.iter().map(|level| (level, others.meeting(self, level.camp))) {
-                full |= !windows.check(level, &places, self.simd);
+            for level in &self.levels {
+                others.meeting(self, level.camp, places);
+                full |= !windows.check(level, places, self.simd);
             }
             (windows.checks, windows.judge.overlaps)
         });
@@ -282,10 +283,12 @@ pub(crate) struct Others<'a, R> {
 
 impl<R: Record> Others<'_, R> {
     /// The places of those that may pair with boxes of a camp.
-    fn meeting(&self, map: &Map<R>, camp: u8) -> Vec<u32> {
+    fn meeting(&self, map: &Map<R>, camp: u8, places: &mut Vec<u32>) {
         let meets =
             |record: &R| camp == OPEN || camp != map.camps.camp(&self.filters[record.item().id as usize]);
-        (0..self.records.len() as u32).filter(|&place| meets(&self.records[place as usize])).collect()
+        let all = 0..self.records.len() as u32;
+        places.clear();
+        places.extend(all.filter(|&place| meets(&self.records[place as usize])));
     }
 }
 

@@ -303,7 +303,7 @@ mod tests {
     fn map_of(boxes: &[Aabb]) -> Map<Item> {
         let config = Config { strategy: Strategy::Grid, ..Config::DEFAULT };
         let mut map = Map::new();
-        let summary = &LazySummary::new(boxes, None);
+        let summary = &LazySummary::new(boxes, None, None);
         let set = Set { boxes, filters: None, ids: None, summary, before: &[] };
         map.plan_and_build(&set, &config, &mut StageTimes::default());
         map

@@ -24,6 +24,8 @@ pub(crate) struct Map<R> {
     sort: Sort,
     pub(super) crowding: Crowding,
     pub(super) kept: Option<Kept>,
+    /// Scratch of a build.
+    pub(super) tried: Vec<(f32, f32)>,
     /// Boxes of the set that are invalid.
     pub(crate) invalid: u32,
     pub(super) camps: Camps,
@@ -45,6 +47,7 @@ impl<R: Record> Map<R> {
             sort: Sort::default(),
             crowding: Crowding::default(),
             kept: None,
+            tried: Vec::new(),
             invalid: 0,
             camps: Camps::default(),
             camp_of: Vec::new(),

@@ -1,7 +1,7 @@
 //! What the plan looks at: exact counts by size, and a sample of positions.
 
 use crate::Aabb;
-use std::cell::OnceCell;
+use std::cell::{Cell, OnceCell};
 
 /// Boxes whose largest extent lies within one power of two.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -30,6 +30,13 @@ pub struct Summary {
     pub sample: Vec<Aabb>,
 }
 
+impl Default for Summary {
+    /// Of no boxes.
+    fn default() -> Self {
+        Self { valid: 0, classes: Box::new([SizeClass::default(); 256]), sample: Vec::new() }
+    }
+}
+
 impl Summary {
     /// Sample size; PBIG's section 4.1 takes a simple random sample of 1000.
     pub const SAMPLE: usize = 1000;
@@ -39,14 +46,20 @@ impl Summary {
     /// # Panics
     /// If an id is not below the number of boxes.
     pub fn of(boxes: &[Aabb], ids: Option<&[u32]>) -> Self {
-        let mut summary =
-            Self { valid: 0, classes: Box::new([SizeClass::default(); 256]), sample: Vec::new() };
+        Self::default().refilled(boxes, ids)
+    }
+
+    /// The same in the memory of another summary.
+    fn refilled(mut self, boxes: &[Aabb], ids: Option<&[u32]>) -> Self {
+        self.valid = 0;
+        self.classes.fill(SizeClass::default());
+        self.sample.clear();
         match ids {
-            Some(ids) => ids.iter().for_each(|&id| summary.count(&boxes[id as usize])),
-            None => boxes.iter().for_each(|b| summary.count(b)),
+            Some(ids) => ids.iter().for_each(|&id| self.count(&boxes[id as usize])),
+            None => boxes.iter().for_each(|b| self.count(b)),
         }
-        summary.draw_sample(boxes, ids);
-        summary
+        self.draw_sample(boxes, ids);
+        self
     }
 
     fn count(&mut self, one: &Aabb) {
@@ -92,15 +105,22 @@ pub(crate) struct LazySummary<'a> {
     boxes: &'a [Aabb],
     ids: Option<&'a [u32]>,
     made: OnceCell<Summary>,
+    spare: Cell<Option<Summary>>,
 }
 
 impl<'a> LazySummary<'a> {
-    pub(crate) fn new(boxes: &'a [Aabb], ids: Option<&'a [u32]>) -> Self {
-        Self { boxes, ids, made: OnceCell::new() }
+    /// `spare`: one whose memory may be used.
+    pub(crate) fn new(boxes: &'a [Aabb], ids: Option<&'a [u32]>, spare: Option<Summary>) -> Self {
+        Self { boxes, ids, made: OnceCell::new(), spare: Cell::new(spare) }
     }
 
     pub(crate) fn get(&self) -> &Summary {
-        self.made.get_or_init(|| Summary::of(self.boxes, self.ids))
+        self.made.get_or_init(|| self.spare.take().unwrap_or_default().refilled(self.boxes, self.ids))
+    }
+
+    /// One whose memory may be used for the next.
+    pub(crate) fn into_spare(self) -> Option<Summary> {
+        self.made.into_inner().or(self.spare.into_inner())
     }
 }
 

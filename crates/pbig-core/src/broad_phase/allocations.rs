@@ -1,0 +1,92 @@
+//! Steady state asks for no memory: every allocation of this thread is counted.
+
+use crate::{Aabb, BroadPhase, Config, ProxyFilter};
+use std::alloc::{GlobalAlloc, Layout, System};
+use std::cell::Cell;
+use std::sync::Arc;
+
+/// The system's allocator, with a counter for each thread.
+struct Counting;
+
+thread_local! {
+    static COUNT: Cell<u64> = const { Cell::new(0) };
+}
+
+// SAFETY: all is left to the system's allocator.
+unsafe impl GlobalAlloc for Counting {
+    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
+        COUNT.set(COUNT.get() + 1);
+        // SAFETY: the caller's promise.
+        unsafe { System.alloc(layout) }
+    }
+
+    unsafe fn realloc(&self, old: *mut u8, layout: Layout, size: usize) -> *mut u8 {
+        COUNT.set(COUNT.get() + 1);
+        // SAFETY: the caller's promise.
+        unsafe { System.realloc(old, layout, size) }
+    }
+
+    unsafe fn dealloc(&self, old: *mut u8, layout: Layout) {
+        // SAFETY: the caller's promise.
+        unsafe { System.dealloc(old, layout) }
+    }
+}
+
+#[global_allocator]
+static COUNTING: Counting = Counting;
+
+/// Boxes that swing to and fro, so that pairs come and go and later frames need no more room than earlier ones.
+fn place(id: u32, frame: u32, boxes: u32) -> Aabb {
+    let edge = (2 * boxes) as f32;
+    let at =
+        |k: u32| (id.wrapping_mul(2_654_435_761).rotate_left(11 * k) % 4096) as f32 / 4096.0 * edge.cbrt();
+    let swing = if frame.is_multiple_of(2) { 0.0 } else { 0.3 };
+    Aabb::from_center([at(0) + swing, at(1), at(2) - swing], [0.5; 3])
+}
+
+/// Allocations of an update that needs no new plan, in which one in `share` boxes moves: the most of any in 40, after as
+/// many to warm up.
+fn most_allocations(boxes: u32, share: u32) -> u64 {
+    let mut broad_phase = BroadPhase::new(Config { margin: 0.01, ..Config::DEFAULT }).expect("a margin");
+    let (mut most, mut events, mut updates) = (0, 0, 0);
+    for frame in 0..80 {
+        let step = if frame == 0 { 1 } else { share };
+        for id in (0..boxes).step_by(step as usize) {
+            broad_phase.set(id, place(id, frame, boxes), ProxyFilter::ALL).expect("a small id");
+        }
+        let (before, plan) = (COUNT.get(), broad_phase.report().plan.levels.clone());
+        let changes = broad_phase.update().expect("few pairs");
+        events += changes.added.len() + changes.removed.len();
+        let counted = COUNT.get() - before;
+        // A new plan is a few small lists.
+        let kept = Arc::ptr_eq(&plan, &broad_phase.report().plan.levels);
+        assert!(frame < 40 || counted < 20, "{counted} in frame {frame}");
+        if frame >= 40 && kept {
+            most = most.max(counted);
+            updates += 1;
+        }
+    }
+    assert!(events > 40 && updates > 20, "{events} events, {updates} updates");
+    most
+}
+
+#[test]
+fn an_update_like_those_before_allocates_nothing() {
+    for (boxes, share) in [(60, 1), (500, 1), (5000, 1)] {
+        assert_eq!(most_allocations(boxes, share), 0, "{boxes} boxes, one in {share} moves");
+    }
+}
+
+#[test]
+fn nor_does_one_in_which_few_boxes_move() {
+    for (boxes, share) in [(500, 50), (5000, 100), (5000, 20)] {
+        assert_eq!(most_allocations(boxes, share), 0, "{boxes} boxes, one in {share} moves");
+    }
+}
+
+#[test]
+fn allocations_are_counted() {
+    let before = COUNT.get();
+    let some = std::hint::black_box(vec![1u8; 100]);
+    assert_eq!((COUNT.get() - before, some.len()), (1, 100));
+}
