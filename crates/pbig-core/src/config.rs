@@ -64,7 +64,7 @@ pub struct Limits {
     /// Most boxes, and one more than the largest id of [`crate::BroadPhase`], which keeps about
     /// 100 bytes for every id up to the largest.
     pub max_boxes: u64,
-    /// Most pairs that one call may report; 8 bytes each, 32 while [`crate::BroadPhase`] keeps it.
+    /// Most pairs that one call may report; 8 bytes each, up to 32 while [`crate::BroadPhase`] keeps it.
     pub max_pairs: u64,
 }
 

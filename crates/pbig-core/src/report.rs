@@ -51,7 +51,8 @@ pub(crate) fn lap(clock: &mut Instant) -> Duration {
     now.duration_since(std::mem::replace(clock, now))
 }
 
-/// Counts of exact box tests, as PBIG's section 4.1 defines them.
+/// Counts of box tests, as PBIG's section 4.1 defines them. On the CPU's grid most are of codes, which tell
+/// whether two boxes may overlap; what those leave is then tested exactly, and not counted again.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Checks {
     /// Box pairs tested, counting each test.
@@ -73,7 +74,7 @@ pub struct Report {
     pub invalid: u64,
     /// Boxes that had changed ([`crate::BroadPhase`]: beyond their margin, or filter).
     pub changed: u64,
-    /// Exact tests made.
+    /// Tests made.
     pub checks: Checks,
     /// Pairs reported ([`crate::BroadPhase`]: pairs that exist now).
     pub pairs: u64,

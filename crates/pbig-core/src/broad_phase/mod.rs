@@ -64,8 +64,8 @@ mod flag {
 /// Settled boxes lie in a base grid. Boxes that have moved since it was built are taken out and
 /// sorted into a second, small one each time; changed boxes are searched in both. When an eighth of
 /// all boxes has moved, the base is built anew, and now and then so that boxes at rest return to it.
-/// ([`crate::Strategy::Pbig`], [`crate::Backend::Brute`] and [`crate::Backend::Gpu`] search everything at
-/// every update that changes something.)
+/// ([`crate::Strategy::Pbig`] and [`crate::Backend::Brute`] search everything at every update that changes
+/// something. A GPU is told what has changed, and tells which pairs came or went.)
 ///
 /// ```
 /// use pbig_core::{Aabb, BroadPhase, Config, Pair, ProxyFilter};

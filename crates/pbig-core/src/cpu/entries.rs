@@ -1,4 +1,4 @@
-//! Boxes as the search reads them.
+//! Boxes that are tested one after the other: those that fit no level, and those of the paper's grid.
 
 use crate::Aabb;
 
