@@ -82,7 +82,7 @@ step cargo test --release --workspace
 # Rapier's own features beside these are in scripts/features.sh; one of the other kind for all.
 step scripts/features.sh deterministic
 # Once more with overflow checks and debug assertions, where there is unsafe code and index arithmetic.
-step cargo test -p pbig-core --features gpu
+step cargo test -p pbig-core --features serde
 # The commands that the README shows, at a size that takes seconds.
 step target/release/examples/falling_objects --bodies 500 --steps 60
 step target/release/examples/drop_in

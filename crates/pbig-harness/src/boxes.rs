@@ -171,7 +171,7 @@ fn pile(n: usize, rng: &mut StdRng) -> Vec<Aabb> {
     with(n, || {
         let place = [i % side, i / side % side, i / side / side];
         i += 1;
-        (place.map(|p| p as f32 * 1.02 + rng.random_range(-0.05..0.05)), [0.5; 3])
+        (place.map(|p| p as f32 * 0.985 + rng.random_range(-0.05..0.05)), [0.5; 3])
     })
 }
 

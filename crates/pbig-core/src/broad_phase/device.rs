@@ -33,14 +33,14 @@ impl BroadPhase {
         let Some(restarted) = self.base.changes_on_gpu(&request, &mut self.report)? else {
             return Ok(false);
         };
-        self.sort_out(&restarted);
         self.forget_moved();
         self.has_base = false;
+        self.sort_out(&restarted)?;
         Ok(true)
     }
 
     /// Pairs that came from those that went.
-    fn sort_out(&mut self, restarted: &[u32]) {
+    fn sort_out(&mut self, restarted: &[u32]) -> Result<(), Error> {
         let boxes = &self.boxes;
         for &pair in self.base.found.chunks.iter().flatten() {
             if boxes[pair.a as usize].overlaps(&boxes[pair.b as usize]) {
@@ -51,10 +51,16 @@ impl BroadPhase {
         }
         let held = self.held_by(restarted);
         self.events.added.retain(|pair| !held.contains(pair));
+        // The device has counted those that went, too.
+        let limit = self.config.limits.max_pairs;
+        if self.events.added.len() as u64 > limit {
+            return Err(Error::TooManyPairs { limit });
+        }
         self.ending.extend_from_slice(restarted);
         for &id in &self.ending {
             self.flags[id as usize] |= flag::ENDING;
         }
+        Ok(())
     }
 
     /// The kept pairs of boxes that began anew: the device takes those that still hold for new ones.
@@ -76,6 +82,6 @@ impl Judgement for Ending<'_> {
     }
 
     fn holds(&self, pair: Pair) -> bool {
-        self.0.holds(pair)
+        !self.concerns(pair) || self.0.holds(pair)
     }
 }

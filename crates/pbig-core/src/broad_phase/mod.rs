@@ -8,6 +8,7 @@ mod device;
 mod snapshot;
 mod update;
 
+use crate::cpu::emit;
 use crate::cpu::find::Found;
 use crate::cpu::map::Map;
 use crate::cpu::record::Tracked;
@@ -112,6 +113,8 @@ pub struct BroadPhase {
     others: Vec<Tracked>,
     pairs: PairStore,
     events: Events,
+    /// For added and for removed ones.
+    sorting: [emit::Scratch; 2],
     report: Report,
 }
 
@@ -144,6 +147,7 @@ impl BroadPhase {
             others: vec![],
             pairs: PairStore::default(),
             events: Events::default(),
+            sorting: Default::default(),
             report: Report::default(),
         })
     }
@@ -266,6 +270,7 @@ impl BroadPhase {
         if self.changed.is_empty() {
             return Ok(&self.events);
         }
+        self.pairs.drop_removed();
         if let Err(error) = self.find_added().and_then(|()| self.check_room()) {
             self.events.added.clear();
             return Err(error);
@@ -304,7 +309,8 @@ impl BroadPhase {
         self.pairs.iter()
     }
 
-    /// The pairs of one box (see [`BroadPhase::pair_count`]), in no particular order.
+    /// The pairs of one box (see [`BroadPhase::pair_count`]), in no particular order. While most boxes change in every
+    /// update all pairs are looked at.
     pub fn pairs_of(&self, id: u32) -> impl Iterator<Item = Pair> {
         self.pairs.of(id)
     }

@@ -5,6 +5,7 @@ use super::device::Ending;
 use super::{BroadPhase, Old, flag};
 use crate::cpu::codes::prefetch;
 use crate::cpu::crowding::Set;
+use crate::cpu::emit;
 use crate::cpu::find::Others;
 use crate::cpu::judge::Accept;
 use crate::cpu::record::Tracked;
@@ -157,7 +158,12 @@ impl BroadPhase {
         let removed = &mut self.events.removed;
         #[cfg(feature = "gpu")]
         if self.report.gpu.is_some() {
-            return self.pairs.end_few(&self.ending, &Ending(state), removed);
+            let ending = Ending(state);
+            return if many {
+                self.pairs.end_many(&ending, removed)
+            } else {
+                self.pairs.end_few(&self.ending, &ending, removed)
+            };
         }
         if many {
             self.pairs.end_many(&state, removed);
@@ -185,19 +191,15 @@ impl BroadPhase {
     }
 
     pub(super) fn sort_events(&mut self) {
-        let (added, removed) = (&mut self.events.added, &mut self.events.removed);
+        let (added, removed, ids) = (&mut self.events.added, &mut self.events.removed, self.boxes.len());
+        let [one, other] = &mut self.sorting;
         if added.len() + removed.len() > PARALLEL_FROM {
-            rayon::join(|| sort(added), || sort(removed));
+            rayon::join(|| emit::sort(added, ids, one), || emit::sort(removed, ids, other));
         } else {
-            sort(added);
-            sort(removed);
+            emit::sort(added, ids, one);
+            emit::sort(removed, ids, other);
         }
     }
-}
-
-/// By one comparison of 64 bits.
-fn sort(pairs: &mut [Pair]) {
-    pairs.sort_unstable_by_key(|pair| u64::from(pair.a) << 32 | u64::from(pair.b));
 }
 
 /// The boxes now and at the last update.

@@ -59,6 +59,7 @@ impl Lanes for Avx2 {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Simd {
     Portable,
+    /// With all that came with it or before.
     #[cfg(target_arch = "x86_64")]
     Avx2,
 }
@@ -67,7 +68,12 @@ impl Simd {
     /// The best that this processor has.
     pub(crate) fn detect() -> Self {
         #[cfg(target_arch = "x86_64")]
-        if is_x86_feature_detected!("avx2") && is_x86_feature_detected!("bmi2") {
+        if is_x86_feature_detected!("avx2")
+            && is_x86_feature_detected!("bmi1")
+            && is_x86_feature_detected!("bmi2")
+            && is_x86_feature_detected!("popcnt")
+            && is_x86_feature_detected!("lzcnt")
+        {
             return Self::Avx2;
         }
         Self::Portable

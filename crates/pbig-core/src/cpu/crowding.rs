@@ -155,6 +155,9 @@ impl<R: Record> Map<R> {
         self.camps = if crowded { set.camps() } else { Camps::default() };
         if self.has_camps() != had {
             self.crowding = Crowding::default();
+            // Made for other camps.
+            self.kept = None;
+            self.camp_of.clear();
         }
         times.plan += lap(&mut clock);
         self.has_camps()

@@ -12,16 +12,41 @@ pub(crate) fn collect(
 ) {
     let len = chunks.iter().map(Vec::len).sum::<usize>();
     out.clear();
-    // A counting sort touches a counter for every id: not worth it for few pairs.
-    let few = len < ids / 4 || len > u32::MAX as usize;
-    if order == Order::Unspecified || few {
+    if order == Order::Unspecified || are_few(len, ids) {
         chunks.iter().for_each(|chunk| out.extend_from_slice(chunk));
         if order == Order::Sorted {
-            out.sort_unstable();
+            sort_by_comparing(out);
         }
     } else {
         sort_by_counting(chunks, ids, len, scratch, out);
     }
+}
+
+/// Buffers of [`sort`].
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Scratch {
+    ends: Vec<u32>,
+    pairs: Vec<Pair>,
+}
+
+/// Brings one list into order. Ids are below `ids`.
+pub(crate) fn sort(pairs: &mut Vec<Pair>, ids: usize, scratch: &mut Scratch) {
+    if are_few(pairs.len(), ids) {
+        return sort_by_comparing(pairs);
+    }
+    let Scratch { ends, pairs: sorted } = scratch;
+    sort_by_counting(std::slice::from_ref(pairs), ids, pairs.len(), ends, sorted);
+    std::mem::swap(pairs, sorted);
+}
+
+/// A counting sort touches a counter for every id: not worth it for few pairs.
+fn are_few(pairs: usize, ids: usize) -> bool {
+    pairs < ids / 4 || pairs > u32::MAX as usize
+}
+
+/// By one comparison of 64 bits.
+fn sort_by_comparing(pairs: &mut [Pair]) {
+    pairs.sort_unstable_by_key(|pair| u64::from(pair.a) << 32 | u64::from(pair.b));
 }
 
 /// By `a` through a counting sort, then each row, which is short, by comparisons: at one pair a box
@@ -62,6 +87,9 @@ mod tests {
             let mut out = vec![Pair::default(); 3];
             collect(&chunks, ids, Order::Sorted, &mut Vec::new(), &mut out);
             assert_eq!(out, wanted, "{ids} ids");
+            let mut list: Vec<Pair> = chunks.concat();
+            sort(&mut list, ids, &mut Scratch::default());
+            assert_eq!(list, wanted, "one list, {ids} ids");
         }
     }
 }

@@ -31,6 +31,9 @@ const CHUNK: usize = 2048;
 /// app the other threads sleep between steps and waking one costs about as much.
 const PARALLEL_FROM: u64 = 300_000;
 
+/// Boxes to be looked up in a map from which the work is shared.
+const OTHERS_PARALLEL_FROM: usize = 4096;
+
 /// What a box costs, and a check, in ns; checks as many as in the call before.
 const ENTRY: u64 = 15;
 const CHECK: u64 = 1;
@@ -250,27 +253,56 @@ impl<R: Record> Map<R> {
     where
         A: Accept,
     {
-        let room = Room::new(max_pairs);
-        let mut full = false;
-        let mut counts = SCRATCH.with_borrow_mut(|(scratch, _, places)| {
-            let own = self.judge(accept, out, &room);
+        let (room, records) = (Room::new(max_pairs), others.records);
+        let counts = if records.len() >= OTHERS_PARALLEL_FROM && rayon::current_num_threads() > 1 {
+            let piece = |records| {
+                let mut out = Vec::new();
+                let counts = self.check_piece(&Others { records, ..*others }, accept, &mut out, &room);
+                (counts, out)
+            };
+            let found: Vec<_> = records.par_chunks(CHUNK / 2).map(piece).collect();
+            found.into_iter().fold((0, 0), |sum, (counts, pairs)| {
+                out.extend(pairs);
+                add(sum, counts)
+            })
+        } else {
+            self.check_piece(others, accept, out, &room)
+        };
+        // A search that ran out of room has ended early.
+        let (limit, found) = (max_pairs, room.used().max(out.len() as u64));
+        if found > limit { Err(Error::TooManyPairs { limit }) } else { Ok(counts) }
+    }
+
+    fn check_piece<A>(
+        &self,
+        others: &Others<'_, R>,
+        accept: &A,
+        out: &mut Vec<Pair>,
+        room: &Room,
+    ) -> (u64, u64)
+    where
+        A: Accept,
+    {
+        let counts = SCRATCH.with_borrow_mut(|(scratch, _, places)| {
+            let own = self.judge(accept, out, room);
             let judge = Judge { queries: others.records, all_changed: false, ..own };
             let mut windows = Windows::new(&self.sorted, judge, scratch);
             for level in &self.levels {
                 others.meeting(self, level.camp, places);
-                full |= !windows.check(level, places, self.simd);
+                if !windows.check(level, places, self.simd) {
+                    break;
+                }
             }
             (windows.checks, windows.judge.overlaps)
         });
-        if self.list.len() > 0 && !full {
-            let mut checker = Checker::new(accept, out);
-            for item in others.records.iter().map(R::item) {
-                checker.test(&Query::new(&item.aabb), item.id, &self.list, 0..self.list.len());
-            }
-            counts = add(counts, (checker.checks, checker.overlaps));
+        if self.list.len() == 0 {
+            return counts;
         }
-        let limit = max_pairs;
-        if full || out.len() as u64 > limit { Err(Error::TooManyPairs { limit }) } else { Ok(counts) }
+        let mut checker = Checker::new(accept, out);
+        for item in others.records.iter().map(R::item) {
+            checker.test(&Query::new(&item.aabb), item.id, &self.list, 0..self.list.len());
+        }
+        add(counts, (checker.checks, checker.overlaps))
     }
 }
 
@@ -302,6 +334,7 @@ struct Chunk {
     start: usize,
     end: usize,
 }
+
 /// How many pairs may still be found, across threads: the limit is noticed while pairs are found,
 /// before memory is exhausted.
 pub(crate) struct Room {
@@ -316,6 +349,11 @@ impl Room {
 
     pub(crate) fn new(limit: u64) -> Self {
         Self { used: AtomicU64::new(0), limit }
+    }
+
+    /// Pairs accounted for.
+    fn used(&self) -> u64 {
+        self.used.load(Ordering::Relaxed)
     }
 
     /// Accounts for a buffer that has grown from `taken` to `len`; false when the limit is passed.

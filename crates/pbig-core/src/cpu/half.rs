@@ -85,7 +85,7 @@ impl<R: Record, A: Accept> Half<'_, '_, R, A> {
     }
 
     /// # Safety
-    /// The processor has AVX2 and BMI2.
+    /// The processor has what [`Simd::Avx2`] stands for.
     #[cfg(target_arch = "x86_64")]
     #[target_feature(enable = "avx2,bmi1,bmi2,popcnt,lzcnt")]
     unsafe fn check_avx2(&mut self, slots: Range<usize>) -> bool {
@@ -333,6 +333,19 @@ mod tests {
                     assert_eq!(pairs(&map), wanted, "{count} in {edge}, crowd {crowd}, {simd:?}");
                 }
             }
+        }
+    }
+
+    #[test]
+    fn levels_search_each_other_whatever_the_processor() {
+        let mut boxes = boxes(8000, 20.0, 0.0005);
+        boxes.extend(super::tests::boxes(1000, 100.0, 5.0));
+        let wanted = oracle::pairs(&boxes);
+        let mut map = map_of(&boxes);
+        assert!(map.levels.len() > 1, "{} levels", map.levels.len());
+        for simd in [Simd::Portable, Simd::detect()] {
+            map.simd = simd;
+            assert_eq!(pairs(&map), wanted, "{simd:?}");
         }
     }
 

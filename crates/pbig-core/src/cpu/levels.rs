@@ -26,12 +26,12 @@ impl Level {
         Self { cells, max_extent, slots: 0..0, camp: plan.camp, crowd: 0.0 }
     }
 
-    /// False for extents of invalid boxes.
+    /// False for extents of invalid boxes. A box as large as the largest extent may be larger by what was rounded off.
     #[inline(always)]
     fn holds(&self, extents: [f32; 3]) -> bool {
         let mut holds = true;
         for (extent, largest) in extents.into_iter().zip(self.max_extent) {
-            holds &= (extent >= 0.0) & (extent <= largest);
+            holds &= (extent >= 0.0) & (extent < largest);
         }
         holds
     }
@@ -74,5 +74,54 @@ impl Classes {
             _ if !one.is_valid() => NOWHERE,
             _ => LISTED,
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A level of boxes up to `largest`, in cells of 1 from -8 on.
+    fn level(largest: f32) -> Level {
+        let plan = LevelPlan {
+            boxes: 1,
+            classes: (0, 254),
+            max_extent: [largest.next_up(); 3],
+            cell: [1.0; 3],
+            origin: [-8.0; 3],
+            dims: [8; 3],
+            cells: 512,
+            camp: 0,
+        };
+        Level::new(&plan, 0)
+    }
+
+    #[test]
+    fn no_box_that_a_level_holds_begins_before_the_window_of_one_it_touches() {
+        let level = level(0.9f32.next_down());
+        // As large as `max_extent` once rounded, and larger before: from the cell before the window.
+        let grown = Aabb::new([-(2f32.powi(-26)); 3], [0.9; 3]);
+        let touching = Aabb::new([0.9; 3], [1.0; 3]);
+        assert_eq!(grown.extents(), [0.9; 3]);
+        assert!(level.cells.window(&touching).0[0] > level.cells.bounds(&grown).0[0]);
+        assert!(!level.holds(grown.extents()));
+        let mut held = 0;
+        for i in 0..4000u32 {
+            let min = (i as f32 - 2000.0) * 1.3e-6;
+            let one = Aabb::new([min; 3], [min + 0.9 - (i % 7) as f32 * 1e-8; 3]);
+            if level.holds(one.extents()) {
+                let touching = Aabb::new(one.max, [2.0; 3]);
+                assert!(level.cells.window(&touching).0[0] <= level.cells.bounds(&one).0[0], "{one:?}");
+                held += 1;
+            }
+        }
+        assert!(held > 500, "{held}");
+    }
+
+    #[test]
+    fn invalid_boxes_fit_nowhere() {
+        let level = level(0.9);
+        assert!(level.holds([0.0; 3]) && level.holds([0.9; 3]));
+        assert!(!level.holds(Aabb::NOWHERE.extents()) && !level.holds([0.5, -0.1, 0.5]));
     }
 }

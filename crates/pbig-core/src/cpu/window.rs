@@ -33,7 +33,7 @@ impl<'a, 'b, R: Record, A: Accept> Windows<'a, 'b, R, A> {
     }
 
     /// # Safety
-    /// The processor has AVX2 and BMI2.
+    /// The processor has what [`Simd::Avx2`] stands for.
     #[cfg(target_arch = "x86_64")]
     #[target_feature(enable = "avx2,bmi1,bmi2,popcnt,lzcnt")]
     unsafe fn check_avx2(&mut self, level: &Level, places: &[u32]) -> bool {

@@ -31,8 +31,8 @@ const fn case(set: &'static str, boxes: usize, targets: &'static [f64]) -> Case 
 /// All moved: against parry on one thread, and on all.
 const FRAMES: [Case; 4] = [
     case("unit", 100_000, &[7.0, 4.0]),
-    case("unit", 1_000_000, &[7.0, 3.0]),
-    case("mixed", 100_000, &[6.0, 4.0]),
+    case("unit", 1_000_000, &[7.0, 4.0]),
+    case("mixed", 100_000, &[6.0, 3.0]),
     case("pile", 100_000, &[8.0, 4.0]),
 ];
 
