@@ -93,6 +93,48 @@ fn statistics_count_what_an_update_was_given_and_sent() {
     });
 }
 
+/// Calls that bring no news end at once. They are counted, their statistics are those of a call without news, and
+/// whatever comes next is seen: a change, a collider behind rapier's lists, an adopted world, a failed update.
+#[test]
+fn calls_without_news_are_counted_and_hide_nothing_that_follows() {
+    let mut world = World::default();
+    for i in 0..3 {
+        world.add(World::dynamic(glam::vec3(i as f32 * 0.9, 0.0, 0.0)), ColliderBuilder::ball(0.5));
+    }
+    let handles: Vec<ColliderHandle> = world.colliders.iter().map(|(handle, _)| handle).collect();
+    let mut broad_phase = PbigBroadPhase::new();
+    let call = |world: &World, broad_phase: &mut PbigBroadPhase, modified: &[ColliderHandle]| {
+        let mut events = Vec::new();
+        let World { params, colliders, bodies, .. } = world;
+        broad_phase.update(params, colliders, bodies, modified, &[], &mut events);
+        events.len()
+    };
+    assert_eq!(call(&world, &mut broad_phase, &handles), 2);
+    for _ in 0..3 {
+        assert_eq!(call(&world, &mut broad_phase, &[]), 0);
+        let stats = broad_phase.stats();
+        assert_eq!((stats.modified, stats.added, stats.report.changed, stats.report.pairs), (0, 0, 0, 2));
+    }
+    assert_eq!(broad_phase.stats().totals.updates, 4);
+    // News that no list has: another collider.
+    world.add(World::dynamic(glam::vec3(-0.9, 0.0, 0.0)), ColliderBuilder::ball(0.5));
+    assert_eq!(
+        call(&world, &mut broad_phase, &[]),
+        3,
+        "all colliders are looked at, and their pairs sent again"
+    );
+    (0..3).for_each(|_| assert_eq!(call(&world, &mut broad_phase, &[]), 0));
+    broad_phase.adopt(&world.narrow_phase);
+    assert_eq!(call(&world, &mut broad_phase, &[]), 3);
+    (0..3).for_each(|_| assert_eq!(call(&world, &mut broad_phase, &[]), 0));
+    let far = world.bodies.iter().next().expect("a body").0;
+    world.bodies[far].set_translation(vector![50.0, 0.0, 0.0], true);
+    let World { colliders, bodies, .. } = &mut world;
+    bodies.propagate_modified_body_positions_to_colliders(colliders);
+    assert_eq!(call(&world, &mut broad_phase, &handles), 2, "two pairs of the first ball have ended");
+    assert_eq!(broad_phase.stats().totals.updates, 13);
+}
+
 #[test]
 fn the_order_of_handles_can_be_stocks() {
     for (order, ground_is) in [(HandleOrder::FewPairsFirst, 2), (HandleOrder::LowerIndexFirst, 1)] {

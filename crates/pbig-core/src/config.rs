@@ -62,7 +62,7 @@ pub enum Order {
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Limits {
     /// Most boxes, and one more than the largest id of [`crate::BroadPhase`], which keeps about
-    /// 100 bytes for every id up to the largest.
+    /// 200 bytes for every id up to the largest.
     pub max_boxes: u64,
     /// Most pairs that one call may report; 8 bytes each, up to 32 while [`crate::BroadPhase`] keeps it.
     pub max_pairs: u64,

@@ -1,10 +1,10 @@
 //! The half neighbourhood: all pairs within one level, each from one of its boxes.
 //!
 //! Branches are what costs here: whether a row of the window is needed, how many boxes it holds, and which of them
-//! overlap are coin tosses. So a box always looks at the same five rows (the rest of its own, the next one, and three in
+//! overlap are coin tosses. So a box looks at the same five rows (the rest of its own, the next one, and three in
 //! the next layer), each a run of slots that is empty when not needed; the first block of each is tested whether or not
 //! there is anything in it, and hits are appended without a branch. What is longer than a block, or wraps around, waits
-//! until the batch is through.
+//! until the batch is through. Only where boxes are small in their cells, so that few reach beyond, is that asked first.
 
 use super::cells::{Span, as_query};
 use super::codes::{BLOCK, Lanes, Portable, Simd};

@@ -72,6 +72,7 @@ impl PbigBroadPhase {
     /// assert!(broad_phase.differences().is_empty(), "{}", broad_phase.differences()[0]);
     /// ```
     pub fn with_shadow(mut self, shadow: Shadow) -> Self {
+        self.idle = false;
         let adopted = self.outbox.adopted.iter().copied();
         let (margin, known): (_, Vec<_>) = (self.relative_margin, self.pairs().chain(adopted).collect());
         let checker = self.shadow.get_or_insert_with(|| {

@@ -11,8 +11,10 @@ use pbig_harness::boxes::{BoxSet, Wander};
 use rayon::{ThreadPool, ThreadPoolBuilder};
 use trees::{Obvhs, Parry, Refit, parry_rebuilt};
 
-/// How far a box moves between two frames, along each axis.
-const DISTANCE: f32 = 0.1;
+/// How far a box of a set moves between two frames, along each axis: what is settled hardly does.
+fn distance(set: &str) -> f32 {
+    if set == "pile" { 0.02 } else { 0.1 }
+}
 
 /// Unlimited, as the others know no limits.
 const CONFIG: Config = Config { limits: Limits::UNLIMITED, order: Order::Unspecified, ..Config::DEFAULT };
@@ -98,7 +100,8 @@ struct Frames {
 }
 
 impl Frames {
-    fn new(boxes: Vec<Aabb>, share: f64) -> Result<Self, Failure> {
+    fn new(case: &Case, share: f64) -> Result<Self, Failure> {
+        let boxes = named(case);
         let refits: &[Refit] =
             if share < 1.0 { &[Refit::Whole, Refit::Part] } else { &[Refit::Whole, Refit::Parallel] };
         let empty = || BroadPhase::new(CONFIG).map_err(|error| Failure::Input(error.to_string()));
@@ -109,7 +112,7 @@ impl Frames {
             lone: empty()?,
             pool: pool.map_err(|error| Failure::Input(error.to_string()))?,
             trees: refits.iter().map(|&refit| Parry::new(&boxes, refit, share < 1.0)).collect(),
-            wander: Wander::new(boxes, share, DISTANCE),
+            wander: Wander::new(boxes, share, distance(case.set)),
         };
         update(&mut frames.ours, &frames.wander.boxes, &frames.moved)?;
         update(&mut frames.lone, &frames.wander.boxes, &frames.moved)?;
@@ -169,7 +172,7 @@ impl Contest for Frames {
 
 fn frame_rows(what: &str, case: &Case, share: f64, effort: Effort) -> Result<Vec<Row>, Failure> {
     let name = format!("{what}, {}", case.set);
-    let mut frames = Frames::new(named(case), share)?;
+    let mut frames = Frames::new(case, share)?;
     let times = medians(&mut frames, effort)?;
     let pairs = frames.check(&name)?;
     let row = |name: &str, ours: f64| Row::new(name, case.boxes, pairs).ours(ours);
@@ -229,7 +232,7 @@ impl Contest for Scratch {
 fn scratch_rows(case: &Case, effort: Effort) -> Result<Vec<Row>, Failure> {
     let name = format!("from scratch, {}", case.set);
     let (ours, obvhs) = (Finder::new(CONFIG), Obvhs::default());
-    let wander = Wander::new(named(case), 1.0, DISTANCE);
+    let wander = Wander::new(named(case), 1.0, distance(case.set));
     let mut scratch = Scratch { wander, for_parry: vec![], ours, obvhs, pairs: [0; 3], found: vec![] };
     let times = medians(&mut scratch, effort)?;
     let pairs = agree(&name, scratch.pairs[0], &scratch.pairs[1..])?;

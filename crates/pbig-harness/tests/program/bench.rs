@@ -1,0 +1,74 @@
+//! `pbig bench`: each suite's shape, and that its figures are finite; never how large they are.
+
+use super::{json, pbig};
+use serde_json::Value;
+
+/// One object, in which every row has what it is about, ours, and a finite ratio where there is another side;
+/// nothing is written. What the times are is no matter of tests.
+fn bench_rows(suite: &str) -> Vec<Value> {
+    let folder = tempfile::tempdir().expect("a folder");
+    let object = json(&pbig(folder.path(), &["bench", suite, "--quick", "--json"]));
+    assert_eq!(object["suite"], suite);
+    for key in ["cpu", "cores", "threads", "simd"] {
+        assert!(!object["machine"][key].is_null(), "{key} is missing");
+    }
+    assert_eq!(std::fs::read_dir(folder.path()).expect("the folder").count(), 0);
+    let rows = object["rows"].as_array().expect("rows").clone();
+    for row in &rows {
+        assert!(row["case"].is_string() && row["boxes"].is_u64() && row["pairs"].is_u64(), "{row}");
+        assert!(row["ours_ms"].is_f64() || row["ours_mb"].is_f64() || row["note"].is_string(), "{row}");
+        if row["other"].is_string() {
+            let (ratio, other) = (row["ratio"].as_f64(), row["other_ms"].as_f64());
+            assert!(ratio.is_some_and(|x| x.is_finite() && x > 0.0) && other > Some(0.0), "{row}");
+        }
+        assert_eq!(row["target"].is_string(), row["met"].is_boolean(), "{row}");
+    }
+    rows
+}
+
+/// How many rows are about something.
+fn about(rows: &[Value], word: &str) -> usize {
+    let has = |row: &&Value| format!("{} {}", row["case"], row["other"]).contains(word);
+    rows.iter().filter(has).count()
+}
+
+#[test]
+fn bench_update_compares_with_stock_and_the_floor_and_measures_memory() {
+    let rows = bench_rows("update");
+    let others = ["stock", "floor, one thread", "floor, all threads", "nothing moved", "1% moved", "memory"];
+    for word in others {
+        assert!(about(&rows, word) > 0, "{word}");
+    }
+    let memory = rows.iter().filter(|row| row["case"].to_string().contains("memory"));
+    assert!(!cfg!(target_os = "linux") || memory.into_iter().all(|row| row["ours_mb"].as_f64() > Some(0.0)));
+}
+
+#[test]
+fn bench_peers_agree_on_the_pairs() {
+    let rows = bench_rows("peers");
+    for word in ["one thread", "all threads", "changed pairs", "refit_partial", "rebuilt", "obvhs", "per box"]
+    {
+        assert!(about(&rows, word) > 0, "{word}");
+    }
+    assert!(rows.iter().all(|row| row["pairs"].as_u64() > Some(0)));
+}
+
+#[test]
+fn bench_step_has_every_scene_and_names_the_worst() {
+    let rows = bench_rows("step");
+    for scene in pbig_harness::scenes::Scene::ALL {
+        assert!(about(&rows, scene.name) > 0, "{}", scene.name);
+    }
+    assert!(about(&rows, "uniform, 100% moved") > 0);
+    assert!(rows.iter().all(|row| row["target"] == "at least 1x"));
+}
+
+#[test]
+fn bench_stages_has_the_time_of_each_stage() {
+    let rows = bench_rows("stages");
+    for word in ["from scratch, boxes", "events, boxes", "share moved", "pairs a box", "largest edge"] {
+        assert!(about(&rows, word) > 0, "{word}");
+    }
+    let of_stages = |row: &Value| row["stages_ms"].as_object().map(serde_json::Map::len);
+    assert!(rows.iter().all(|row| of_stages(row) > Some(2)), "{rows:?}");
+}
