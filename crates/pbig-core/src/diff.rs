@@ -357,12 +357,12 @@ mod tests {
             if i != j && wanted.insert(Pair::new(i, j)) {
                 store.insert(&[Pair::new(i, j)]);
             } else if random >> 22 & 63 == 0 {
-                wanted.retain(|pair| pair.a % 3 != 0);
-                store.end_many(&Test(|_| true, |pair: Pair| pair.a % 3 != 0), &mut removed);
+                wanted.retain(|pair| !pair.a.is_multiple_of(3));
+                store.end_many(&Test(|_| true, |pair: Pair| !pair.a.is_multiple_of(3)), &mut removed);
             } else {
                 let concerns = |pair: Pair| [pair.a, pair.b].iter().any(|id| *id == i || *id == j);
-                wanted.retain(|&pair| !concerns(pair) || pair.b % 2 == 0);
-                store.end_few(&[i, j], &Test(concerns, |pair: Pair| pair.b % 2 == 0), &mut removed);
+                wanted.retain(|&pair| !concerns(pair) || pair.b.is_multiple_of(2));
+                store.end_few(&[i, j], &Test(concerns, |pair: Pair| pair.b.is_multiple_of(2)), &mut removed);
             }
             validate(&store, &wanted);
             let ended: BTreeSet<Pair> = removed.iter().copied().collect();

@@ -95,8 +95,8 @@ impl<'a, 'b, R: Record, A: Accept> Windows<'a, 'b, R, A> {
         let (mut from, to) = run;
         self.checks += u64::from(to - from);
         loop {
-            // SAFETY: these are slots, behind the last of which there is a block more of codes.
             let block = match code {
+                // SAFETY: these are slots, behind the last of which there is a block more of codes.
                 Some(code) => unsafe { L::test(code, &self.sorted.codes, from as usize) },
                 None => u32::MAX,
             };
