@@ -1,6 +1,7 @@
 //! The incremental facade: after every update the kept pairs are what the oracle makes of the fat
 //! boxes, and the events lead from one state to the next.
 
+use pbig_core::plan::Chosen;
 use pbig_core::{Aabb, BroadPhase, Config, Error, Limits, Pair, ProxyFilter, oracle};
 use pbig_harness::boxes::{BoxSet, moved};
 use pbig_tests::strategies;
@@ -138,6 +139,39 @@ fn moving_sets_where_all_or_a_few_boxes_move() {
             }
         }
     }
+}
+
+#[test]
+fn a_few_boxes_that_stay_in_their_cells_leave_them_and_come_back() {
+    let (mut edits, mut most_loose, mut at_home) = (0, 0, 0);
+    for (name, distance) in [("unit", 0.1), ("unit", 1.5), ("mixed", 0.2), ("gaussian", 0.3), ("pile", 0.05)]
+    {
+        let home = BoxSet::named(name).expect("the set exists").boxes(3000, 7);
+        let away = moved(&home, distance, 3);
+        let mut world = Follower::new(Config { margin: 0.0, ..Config::DEFAULT }, home.len());
+        home.iter().enumerate().for_each(|(id, aabb)| world.set(id as u32, *aabb, ProxyFilter::ALL));
+        world.update("all are new");
+        let mut rng = StdRng::seed_from_u64(9);
+        for frame in 0..30 {
+            let changes = rng.random_range(1..100);
+            for _ in 0..changes {
+                let id = rng.random_range(0..home.len());
+                let places = [home[id], away[id], Aabb::NOWHERE];
+                let aabb = places[usize::from(rng.random_ratio(1, 2)) + usize::from(rng.random_ratio(1, 20))];
+                let filter = ProxyFilter { body: id as u32 % 50, ..ProxyFilter::ALL };
+                if rng.random_ratio(1, 20) && world.boxes[id].is_some() {
+                    world.remove(id as u32);
+                }
+                world.set(id as u32, aabb, if rng.random_ratio(1, 10) { filter } else { ProxyFilter::ALL });
+            }
+            world.update(&format!("{name}, frame {frame}"));
+            let plan = &world.broad_phase.report().plan;
+            edits += u32::from(plan.chosen == Chosen::Edit);
+            most_loose = most_loose.max(plan.moved);
+            at_home += u32::from(plan.chosen == Chosen::Edit && u64::from(plan.moved) < changes);
+        }
+    }
+    assert!(edits > 120 && most_loose > 200 && at_home > 20, "{edits} {most_loose} {at_home}");
 }
 
 #[test]

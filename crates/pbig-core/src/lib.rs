@@ -54,6 +54,7 @@ mod finder;
 pub mod gpu;
 #[cfg(feature = "gpu")]
 pub mod layout;
+mod links;
 pub mod oracle;
 mod pair;
 pub mod pair_index;

@@ -10,7 +10,6 @@ mod state;
 mod update;
 
 use crate::cpu::emit;
-use crate::cpu::find::Found;
 use crate::cpu::map::Map;
 use crate::cpu::record::Tracked;
 use crate::diff::PairStore;
@@ -50,8 +49,8 @@ mod flag {
     pub(super) const CHANGED: u8 = 2;
     /// The filter has.
     pub(super) const REFILTERED: u8 = 4;
-    /// The box has changed since the base was built: what the base has of it, if anything, is stale.
-    pub(super) const MOVED: u8 = 8;
+    /// The box is not in the base: it has left its cell since that was built, or is new.
+    pub(super) const LOOSE: u8 = 8;
     /// The device has told that the box has lost pairs.
     #[cfg(feature = "gpu")]
     pub(super) const ENDING: u8 = 16;
@@ -62,9 +61,10 @@ mod flag {
 /// Each box is stored fat, grown by [`Config::margin`]; while later boxes stay inside, nothing has
 /// changed and nothing is done (contract 5). Ids should be dense: memory follows the largest.
 ///
-/// Settled boxes lie in a base grid. Boxes that have moved since it was built no longer count there and are
-/// sorted into a second, small one each time; changed boxes are searched in both. When an eighth of
-/// all boxes has moved, the base is built anew, and now and then so that boxes at rest return to it.
+/// All boxes lie in a base grid. Where few change, those that stay in their cells are overwritten there; the others
+/// are sorted into a second, small grid each time, until they come back. Changed boxes are searched in both. When an
+/// eighth of all boxes changes or has left its cell the base is built anew, and now and then so that boxes at rest
+/// return to it.
 /// ([`crate::Strategy::Pbig`] and [`crate::Backend::Brute`] search everything at every update that changes
 /// something. A GPU is told what has changed, and tells which pairs came or went.)
 ///
@@ -100,16 +100,16 @@ pub struct BroadPhase {
     /// Boxes that have lost pairs, as far as the device can tell.
     #[cfg(feature = "gpu")]
     ending: Vec<u32>,
+    /// The loose boxes.
     moved: Vec<u32>,
     /// Boxes sorted in updates since the base was built.
     sorted_again: usize,
     base: Search<Tracked>,
     /// Whether `base.map` holds the boxes whose home it is: not after a search by anything else.
     has_base: bool,
-    /// The boxes that moved; `base.map` holds the rest.
+    /// The loose boxes; `base.map` holds the rest.
     loose: Map<Tracked>,
-    found: Found,
-    /// The changed boxes, to be looked up in the base.
+    /// The changed boxes, to be looked up in both.
     others: Vec<Tracked>,
     pairs: PairStore,
     events: Events,
@@ -143,7 +143,6 @@ impl BroadPhase {
             base: Search::new(),
             has_base: false,
             loose: Map::new(),
-            found: Found::default(),
             others: vec![],
             pairs: PairStore::default(),
             events: Events::default(),

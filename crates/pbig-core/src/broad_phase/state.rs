@@ -69,9 +69,10 @@ impl BroadPhase {
     pub fn cells(&self) -> Vec<OccupiedCell> {
         let mut cells = Vec::new();
         if self.has_base {
-            let moved = |id: u32| self.flags[id as usize] & flag::MOVED != 0;
-            self.base.map.cells(|id| !moved(id), &mut cells);
-            self.loose.cells(moved, &mut cells);
+            self.base.map.cells(&mut cells);
+            if !self.moved.is_empty() {
+                self.loose.cells(&mut cells);
+            }
         }
         cells
     }

@@ -5,14 +5,14 @@ use super::device::Ending;
 use super::{BroadPhase, Old, flag};
 use crate::cpu::codes::prefetch;
 use crate::cpu::crowding::Set;
+use crate::cpu::edit::Changed;
 use crate::cpu::emit;
 use crate::cpu::find::Others;
 use crate::cpu::judge::Accept;
-use crate::cpu::record::Tracked;
 use crate::diff::{Judgement, PairStore};
 use crate::plan::{Chosen, LazySummary, Plan};
-use crate::report::{lap, stage};
-use crate::search::{Rule, single_entry_checks};
+use crate::report::{Checks, lap, stage};
+use crate::search::Rule;
 use crate::{Aabb, Backend, Error, Pair, ProxyFilter, Strategy};
 use std::collections::HashMap;
 use std::time::Instant;
@@ -51,21 +51,15 @@ impl BroadPhase {
         if whole {
             return self.search_all();
         }
-        for &id in &self.changed {
-            let flags = &mut self.flags[id as usize];
-            if *flags & flag::MOVED == 0 {
-                *flags |= flag::MOVED;
-                self.moved.push(id);
-            }
-        }
-        // Boxes that moved once and came to rest go back into the base when looking at them again and
+        self.edit_base();
+        // Boxes that left their cells and came to rest go back into the base when looking at them again and
         // again has cost as much as building it.
         self.sorted_again += self.moved.len();
         let present = self.present_count as usize;
         if self.moved.len() * 8 >= present || self.sorted_again > 2 * present {
             self.search_all()
         } else {
-            self.search_moved()
+            self.search_changed()
         }
     }
 
@@ -102,41 +96,65 @@ impl BroadPhase {
         Ok(())
     }
 
-    /// No box has moved since the base was built.
+    /// No box has left its cell since the base was built.
     pub(super) fn forget_moved(&mut self) {
         for id in self.moved.drain(..) {
-            self.flags[id as usize] &= !flag::MOVED;
+            self.flags[id as usize] &= !flag::LOOSE;
         }
         self.sorted_again = 0;
     }
 
-    /// Sorts the boxes that moved since the base was built, and searches them and the base.
-    fn search_moved(&mut self) -> Result<(), Error> {
-        let plan = self.build_loose();
-        let state = state!(self);
-        let max_pairs = self.config.limits.max_pairs;
+    /// Writes the changed boxes to their places in the base; those that have left their cells become loose.
+    fn edit_base(&mut self) {
         let mut clock = Instant::now();
-        self.loose.find(&state, max_pairs, &mut self.found)?;
-        self.found.chunks.iter().for_each(|chunk| self.events.added.extend_from_slice(chunk));
-        stage!("check");
-        self.others.clear();
-        // Neighbours one after the other: they look at the same cells.
-        for id in self.loose.ids().filter(|&id| state.flags[id as usize] & flag::CHANGED != 0) {
-            self.others.push(Tracked::new(self.boxes[id as usize], id, self.before[id as usize]));
+        stage!("map");
+        let update = self.present_update();
+        let (ids, boxes, before, filters) = (&self.changed, &self.boxes, &self.before, &self.filters);
+        let changed = Changed { ids, boxes, before, filters, update };
+        let (flags, moved, mut back) = (&mut self.flags, &mut self.moved, false);
+        self.base.map.edit(&changed, &mut self.others, |id, is_home| {
+            let flags = &mut flags[id as usize];
+            let was_loose = *flags & flag::LOOSE != 0;
+            back |= was_loose && is_home;
+            *flags = *flags & !flag::LOOSE | if is_home { 0 } else { flag::LOOSE };
+            if !is_home && !was_loose {
+                moved.push(id);
+            }
+        });
+        if back {
+            moved.retain(|&id| flags[id as usize] & flag::LOOSE != 0);
         }
-        let others = Others { records: &self.others, filters: &self.filters };
-        let added = &mut self.events.added;
-        let (checks, overlaps) = self.base.map.check_others(&others, &WithBase(state), added, max_pairs)?;
-        self.found.checks += checks;
-        self.found.overlaps += overlaps;
+        self.report.stages.map += lap(&mut clock);
+    }
+
+    fn present_update(&self) -> u64 {
+        self.updates + 1
+    }
+
+    /// Searches the base and the loose boxes for the changed ones.
+    fn search_changed(&mut self) -> Result<(), Error> {
+        // The last ones may have come home.
+        let plan = if self.moved.is_empty() { Plan::default() } else { self.build_loose() };
+        let mut clock = Instant::now();
+        stage!("check");
+        let update = self.present_update();
+        let (state, limit, added) =
+            (OfChanged(state!(self)), self.config.limits.max_pairs, &mut self.events.added);
+        let others = Others { records: &self.others, filters: &self.filters, update: Some(update) };
+        let (mut made, mut overlaps) = self.base.map.check_others(&others, &state, added, limit)?;
+        if !self.moved.is_empty() {
+            let others = Others { update: None, ..others };
+            let (more, of_them) = self.loose.check_others(&others, &state, added, limit)?;
+            (made, overlaps) = (made + more, overlaps + of_them);
+        }
         self.report.stages.check += lap(&mut clock);
-        self.report.checks = single_entry_checks(&self.found);
+        self.report.checks = Checks { made, unnecessary: made - overlaps, redundant: 0 };
         let moved = self.moved.len() as u32;
         self.report.plan = Plan { chosen: Chosen::Edit, moved, boxes: self.valid_count(), ..plan };
         Ok(())
     }
 
-    /// Sorts the boxes that moved since the base was built.
+    /// Sorts the loose boxes.
     fn build_loose(&mut self) -> Plan {
         let summary = LazySummary::new(&self.boxes, Some(&self.moved), self.base.spare.take());
         let set = Set {
@@ -261,8 +279,8 @@ impl Judgement for State<'_> {
 /// Two boxes that overlap now, do they pair now, and did they not at the last update?
 impl Accept for State<'_> {
     #[inline(always)]
-    fn prepare(&self, pair: Pair) {
-        for id in [pair.a, pair.b] {
+    fn prepare(&self, ids: [u32; 2]) {
+        for id in ids {
             prefetch(&self.filters[id as usize]);
             prefetch(&self.flags[id as usize]);
         }
@@ -283,28 +301,25 @@ impl Accept for State<'_> {
     }
 }
 
-/// The same of a box that has moved since the base was built and one in the base: what that has of boxes that have moved
-/// is stale.
-struct WithBase<'a>(State<'a>);
+/// The same of two boxes of which the first has changed. Of two that have, it is asked from both sides.
+struct OfChanged<'a>(State<'a>);
 
-impl WithBase<'_> {
-    fn is_current(&self, pair: Pair) -> bool {
-        let moved = |id: u32| self.0.flags[id as usize] & flag::MOVED;
-        moved(pair.a) != moved(pair.b)
-    }
-}
-
-impl Accept for WithBase<'_> {
+impl Accept for OfChanged<'_> {
     #[inline(always)]
-    fn prepare(&self, pair: Pair) {
-        Accept::prepare(&self.0, pair);
+    fn prepare(&self, ids: [u32; 2]) {
+        Accept::prepare(&self.0, ids);
+    }
+
+    #[inline(always)]
+    fn meets(&self, query: u32, candidate: u32) -> bool {
+        query < candidate || self.0.flags[candidate as usize] & flag::CHANGED == 0
     }
 
     fn pair(&self, pair: Pair) -> bool {
-        self.is_current(pair) && self.0.pair(pair)
+        self.0.pair(pair)
     }
 
     fn fresh(&self, pair: Pair) -> bool {
-        self.is_current(pair) && self.0.fresh(pair)
+        self.0.fresh(pair)
     }
 }

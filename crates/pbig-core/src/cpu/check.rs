@@ -43,9 +43,9 @@ impl<'a, A: Accept> Checker<'a, A> {
         while mask != 0 {
             let other = ids[mask.trailing_zeros() as usize];
             mask &= mask - 1;
-            let pair = Pair::new(id, other);
-            if self.accept.pair(pair) {
-                self.out.push(pair);
+            // A box and itself is no pair.
+            if self.accept.meets(id, other) && self.accept.pair(Pair::new(id, other)) {
+                self.out.push(Pair::new(id, other));
             }
         }
     }

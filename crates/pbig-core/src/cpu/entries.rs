@@ -67,6 +67,11 @@ impl Entries {
         ids.for_each(|id| self.push(&boxes[id as usize], id));
     }
 
+    /// Replaces the `i`-th box.
+    pub(crate) fn set(&mut self, i: usize, aabb: &Aabb) {
+        self.boxes[i] = Stored::new(aabb);
+    }
+
     pub(crate) fn push(&mut self, aabb: &Aabb, id: u32) {
         self.boxes.push(Stored::new(aabb));
         self.ids.push(id);

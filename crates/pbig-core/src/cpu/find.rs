@@ -14,7 +14,7 @@ use super::judge::{Accept, Judge, Scratch};
 use super::levels::Level;
 use super::map::Map;
 use super::record::Record;
-use super::window::Windows;
+use super::window::{Rows, Windows};
 use crate::plan::OPEN;
 use crate::report::stage;
 use crate::{Error, Pair, ProxyFilter};
@@ -40,7 +40,7 @@ const CHECK: u64 = 1;
 
 thread_local! {
     /// Buffers of a search, one for each thread that takes part.
-    static SCRATCH: RefCell<(Scratch, Rests, Vec<u32>)> = RefCell::default();
+    static SCRATCH: RefCell<(Scratch, Rests, Rows, Vec<u32>)> = RefCell::default();
 }
 
 /// Pairs as found, a buffer for each chunk, kept from call to call.
@@ -128,9 +128,9 @@ impl<R: Record> Map<R> {
     {
         let chunk = self.chunk(chunk);
         let Some(level) = chunk.level else { return self.check_list(&chunk, accept, out, room) };
-        SCRATCH.with_borrow_mut(|(scratch, rests, _)| {
+        SCRATCH.with_borrow_mut(|(scratch, rests, rows, _)| {
             let inner = self.check_half(&chunk, level, accept, out, room, (scratch, rests));
-            let larger = self.check_larger(&chunk, level, accept, out, room, scratch);
+            let larger = self.check_larger(&chunk, level, accept, out, room, (scratch, rows));
             let listed = self.check_against_list(&chunk, accept, out, room);
             add(add(inner, larger), listed)
         })
@@ -149,7 +149,7 @@ impl<R: Record> Map<R> {
             queries: records,
             candidates: records,
             places,
-            all_changed: true,
+            update: None,
             accept,
             out,
             room,
@@ -190,7 +190,7 @@ impl<R: Record> Map<R> {
         accept: &A,
         out: &mut Vec<Pair>,
         room: &Room,
-        scratch: &mut Scratch,
+        scratch: (&mut Scratch, &mut Rows),
     ) -> (u64, u64)
     where
         A: Accept,
@@ -241,8 +241,8 @@ impl<R: Record> Map<R> {
         (checker.checks, checker.overlaps)
     }
 
-    /// Every pair of a box from elsewhere with a box of the map that overlaps it, did not before if that is known, and
-    /// that its filter may allow. The boxes of the map have not changed.
+    /// Every pair of a box of `others` with a box of the map that overlaps it, did not before if that is known, and
+    /// that its filter may allow. Two boxes both of which are in both are met twice.
     pub(crate) fn check_others<A>(
         &self,
         others: &Others<'_, R>,
@@ -283,10 +283,10 @@ impl<R: Record> Map<R> {
     where
         A: Accept,
     {
-        let counts = SCRATCH.with_borrow_mut(|(scratch, _, places)| {
+        let counts = SCRATCH.with_borrow_mut(|(scratch, _, rows, places)| {
             let own = self.judge(accept, out, room);
-            let judge = Judge { queries: others.records, all_changed: false, ..own };
-            let mut windows = Windows::new(&self.sorted, judge, scratch);
+            let judge = Judge { queries: others.records, update: others.update, ..own };
+            let mut windows = Windows::new(&self.sorted, judge, (scratch, rows));
             for level in &self.levels {
                 others.meeting(self, level.camp, places);
                 if !windows.check(level, places, self.simd) {
@@ -306,9 +306,11 @@ impl<R: Record> Map<R> {
     }
 }
 
-/// Boxes that are not in the map.
+/// Boxes to be looked up in a map.
 pub(crate) struct Others<'a, R> {
     pub(crate) records: &'a [R],
+    /// The present one, if boxes of the map need not have changed in it.
+    pub(crate) update: Option<u64>,
     /// By id.
     pub(crate) filters: &'a [ProxyFilter],
 }

@@ -28,7 +28,7 @@ pub(super) struct Hits {
 pub(super) struct Scratch {
     pub(super) hits: Box<[Hits; HITS]>,
     candidates: Box<[(u32, u32); HITS * BLOCK]>,
-    passed: Box<[Pair; HITS * BLOCK]>,
+    passed: Box<[(u32, u32); HITS * BLOCK]>,
 }
 
 impl Default for Scratch {
@@ -36,7 +36,7 @@ impl Default for Scratch {
         Self {
             hits: Box::new([Hits::default(); HITS]),
             candidates: Box::new([(0, 0); HITS * BLOCK]),
-            passed: Box::new([Pair::default(); HITS * BLOCK]),
+            passed: Box::new([(0, 0); HITS * BLOCK]),
         }
     }
 }
@@ -44,7 +44,14 @@ impl Default for Scratch {
 /// Whether an overlapping pair is to be reported.
 pub(crate) trait Accept: Sync {
     /// Asks for what [`Accept::fresh`] will read.
-    fn prepare(&self, _: Pair) {}
+    fn prepare(&self, _: [u32; 2]) {}
+
+    /// Whether the two are to be judged from this side: false for one side of pairs that are met from both, and for a box and
+    /// itself.
+    #[inline(always)]
+    fn meets(&self, _query: u32, _candidate: u32) -> bool {
+        true
+    }
 
     /// Of any two boxes that overlap.
     fn pair(&self, pair: Pair) -> bool;
@@ -62,8 +69,8 @@ pub(super) struct Judge<'a, R, A> {
     /// Where the candidates are, and at which place by slot.
     pub(super) candidates: &'a [R],
     pub(super) places: &'a [u32],
-    /// Whether candidates may have changed.
-    pub(super) all_changed: bool,
+    /// The present one where candidates need not have changed in it.
+    pub(super) update: Option<u64>,
     pub(super) accept: &'a A,
     pub(super) out: &'a mut Vec<Pair>,
     pub(super) room: &'a Room,
@@ -80,14 +87,15 @@ impl<R: Record, A: Accept> Judge<'_, R, A> {
         place_of: impl Fn(usize) -> u32,
     ) -> bool {
         let expanded = self.expand(scratch, count, place_of);
-        let passed = if self.all_changed {
-            self.test(scratch, expanded, R::overlapped)
-        } else {
-            self.test(scratch, expanded, R::overlapped_still)
+        let passed = match self.update {
+            None => self.test(scratch, expanded, R::overlapped),
+            Some(update) => self.test(scratch, expanded, |a, b| a.overlapped_still(b, update)),
         };
-        let passed = &scratch.passed[..passed];
-        passed.iter().for_each(|&pair| self.accept.prepare(pair));
-        self.out.extend(passed.iter().filter(|pair| self.accept.fresh(**pair)));
+        let (passed, accept) = (&scratch.passed[..passed], self.accept);
+        passed.iter().for_each(|&(query, candidate)| accept.prepare([query, candidate]));
+        let met = passed.iter().filter(|(query, candidate)| accept.meets(*query, *candidate));
+        let pairs = met.map(|&(query, candidate)| Pair::new(query, candidate));
+        self.out.extend(pairs.filter(|pair| accept.fresh(*pair)));
         self.room.take(self.out.len(), &mut self.taken)
     }
 
@@ -116,7 +124,7 @@ impl<R: Record, A: Accept> Judge<'_, R, A> {
             let (one, other) = (&self.queries[query as usize], &self.candidates[candidate as usize]);
             let now = one.item().aabb.overlaps(&other.item().aabb);
             self.overlaps += u64::from(now);
-            scratch.passed[passed] = Pair::new(one.item().id, other.item().id);
+            scratch.passed[passed] = (one.item().id, other.item().id);
             passed += usize::from(now & !overlapped(one, other));
         }
         passed

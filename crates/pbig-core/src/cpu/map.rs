@@ -2,6 +2,7 @@
 
 use super::codes::Simd;
 use super::crowding::{Crowding, Kept, Set};
+use super::edit::Homes;
 use super::entries::Entries;
 use super::levels::{Classes, LISTED, Level};
 use super::record::{Item, Record};
@@ -20,8 +21,9 @@ pub(crate) struct Map<R> {
     /// Boxes tested against everything.
     pub(crate) list: Entries,
     pub(super) simd: Simd,
-    classes: Classes,
+    pub(super) classes: Classes,
     sort: Sort,
+    pub(super) homes: Homes,
     pub(super) crowding: Crowding,
     pub(super) kept: Option<Kept>,
     /// Scratch of a build.
@@ -45,6 +47,7 @@ impl<R: Record> Map<R> {
             simd: Simd::detect(),
             classes: Classes::default(),
             sort: Sort::default(),
+            homes: Homes::default(),
             crowding: Crowding::default(),
             kept: None,
             tried: Vec::new(),
@@ -63,6 +66,7 @@ impl<R: Record> Map<R> {
         {
             self.builds += 1;
         }
+        self.homes.forget();
         self.classes.set(plan, self.camps.count());
         let input = Input { boxes: set.boxes, ids: set.ids, before: set.before, camp_of: &self.camp_of };
         let shift = shift_for(input.len(), plan.levels.iter().map(|level| level.cells));
@@ -86,22 +90,16 @@ impl<R: Record> Map<R> {
         true
     }
 
-    /// The ids of all boxes; those in cells in the order of the cells.
-    pub(crate) fn ids(&self) -> impl Iterator<Item = u32> {
-        let sorted = (0..self.len_in_grids()).map(|slot| self.item(slot).id);
-        sorted.chain(self.list.ids.iter().copied())
-    }
-
     /// The box in a slot.
     #[inline(always)]
     pub(super) fn item(&self, slot: usize) -> &Item {
         self.sorted.records[self.sorted.places[slot] as usize].item()
     }
 
-    /// The occupied cells, with the boxes that `counts` takes.
-    pub(crate) fn cells(&self, counts: impl Fn(u32) -> bool, out: &mut Vec<OccupiedCell>) {
+    /// The occupied cells.
+    pub(crate) fn cells(&self, out: &mut Vec<OccupiedCell>) {
         for (i, level) in self.levels.iter().enumerate() {
-            let items = level.slots.clone().map(|slot| self.item(slot)).filter(|item| counts(item.id));
+            let items = level.slots.clone().map(|slot| self.item(slot)).filter(|item| item.aabb.is_valid());
             let place =
                 |item: &Item| -> (([i64; 3], Aabb), u32) { (level.cells.bounds(&item.aabb), item.id) };
             let mut placed: Vec<_> = items.map(place).collect();

@@ -1,4 +1,4 @@
-//! The CPU backend. `map` sorts boxes into cells (`levels`, `cells`, `sort`; `crowding` where many share few), `find`
+//! The CPU backend. `map` sorts boxes into cells (`levels`, `cells`, `sort`; `crowding` where many share few; `edit` where few move), `find`
 //! searches them: `half` within a level and `window` across levels leave candidates, by `codes`, which `judge` tests;
 //! `check` tests `entries` that fit no level. `emit` orders the pairs. `pbig` is the paper's grid, plain and scalar.
 
@@ -6,6 +6,7 @@ mod cells;
 pub(crate) mod check;
 pub(crate) mod codes;
 pub(crate) mod crowding;
+pub(crate) mod edit;
 pub(crate) mod emit;
 mod entries;
 pub(crate) mod find;

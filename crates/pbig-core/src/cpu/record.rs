@@ -23,12 +23,29 @@ impl Item {
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Tracked {
     item: Item,
+    /// As long as `update` is the present one; later, the box has not changed since.
     before: Aabb,
+    /// In which the box changed.
+    update: u64,
 }
 
+const _: () = assert!(size_of::<Tracked>() == 64);
+
 impl Tracked {
-    pub(crate) const fn new(aabb: Aabb, id: u32, before: Aabb) -> Self {
-        Self { item: Item::new(aabb, id, 0), before }
+    /// A box that changed in an update.
+    pub(crate) const fn changed(aabb: Aabb, id: u32, before: Aabb, update: u64) -> Self {
+        Self { item: Item::new(aabb, id, 0), before, update }
+    }
+
+    /// Another box in the same cell.
+    pub(super) fn put(&mut self, record: Self) {
+        *self = Self { item: Item { key: self.item.key, ..record.item }, ..record };
+    }
+
+    /// What the box was before the update that began.
+    #[inline(always)]
+    fn before(&self, update: u64) -> &Aabb {
+        if self.update == update { &self.before } else { &self.item.aabb }
     }
 }
 
@@ -44,8 +61,8 @@ pub(crate) trait Record: Copy + Send + Sync {
     /// Whether the two are known to have overlapped before.
     fn overlapped(&self, other: &Self) -> bool;
 
-    /// As [`Record::overlapped`], the other one not having changed.
-    fn overlapped_still(&self, other: &Self) -> bool;
+    /// As [`Record::overlapped`], where the other one need not have changed in this update.
+    fn overlapped_still(&self, other: &Self, update: u64) -> bool;
 }
 
 impl Record for Item {
@@ -67,17 +84,17 @@ impl Record for Item {
     }
 
     #[inline(always)]
-    fn overlapped_still(&self, _: &Self) -> bool {
+    fn overlapped_still(&self, _: &Self, _: u64) -> bool {
         false
     }
 }
 
 impl Record for Tracked {
-    const EMPTY: Self = Self { item: Item::EMPTY, before: Aabb::NOWHERE };
+    const EMPTY: Self = Self { item: Item::EMPTY, before: Aabb::NOWHERE, update: 0 };
 
     #[inline(always)]
     fn new(item: Item, before: &[Aabb]) -> Self {
-        Self { item, before: before[item.id as usize] }
+        Self { item, before: before[item.id as usize], update: 0 }
     }
 
     #[inline(always)]
@@ -91,7 +108,7 @@ impl Record for Tracked {
     }
 
     #[inline(always)]
-    fn overlapped_still(&self, other: &Self) -> bool {
-        self.before.overlaps(&other.item.aabb)
+    fn overlapped_still(&self, other: &Self, update: u64) -> bool {
+        self.before.overlaps(other.before(update))
     }
 }

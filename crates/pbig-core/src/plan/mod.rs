@@ -73,7 +73,7 @@ pub struct Plan {
     /// The grid on the GPU, if the GPU searched.
     #[cfg(feature = "gpu")]
     pub gpu: Option<GpuPlan>,
-    /// Boxes that have moved since the grid was built ([`Chosen::Edit`]).
+    /// Boxes that have left their cells since the grid was built ([`Chosen::Edit`]).
     pub moved: u32,
     /// Valid boxes planned for.
     pub boxes: u32,
@@ -135,7 +135,11 @@ impl fmt::Display for Plan {
             ),
             Chosen::Brute => write!(f, "brute force: {boxes} boxes are cheaper to test than to sort"),
             Chosen::Grid => write!(f, "grid: {boxes} boxes"),
-            Chosen::Edit => write!(f, "edit: {} of {boxes} boxes moved since the grid was built", self.moved),
+            Chosen::Edit => write!(
+                f,
+                "edit: {} of {boxes} boxes have left their cells since the grid was built",
+                self.moved
+            ),
             Chosen::Pbig => write!(f, "PBIG grid: {boxes} boxes"),
         }?;
         if let Some(pbig) = &self.pbig {
