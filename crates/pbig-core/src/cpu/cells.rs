@@ -33,6 +33,9 @@ const STEPS: i64 = 1 << STEP_BITS;
 /// less than a twentieth of a step.
 const FARTHEST: f64 = (1u64 << 46) as f64;
 
+/// Floats near this one are integers.
+const WHOLE: f64 = 1.5 * (1u64 << 52) as f64;
+
 /// Bits of a field of a code that are used.
 const FIELD: u64 = 511;
 
@@ -85,8 +88,8 @@ impl Cells {
         // Comparisons that a NaN fails, unlike `clamp`, are one instruction each.
         let below = if scaled < FARTHEST { scaled } else { FARTHEST };
         let within = if below > -FARTHEST { below } else { -FARTHEST };
-        // SAFETY: `within` is at least -2^46 and at most 2^46, and no NaN, by the lines above.
-        unsafe { within.to_int_unchecked::<i64>() }
+        // The lowest bits of a float of this size are an integer: a conversion that all lanes of a register make at once.
+        (within + WHOLE).to_bits().wrapping_sub(WHOLE.to_bits()) as i64
     }
 
     #[inline(always)]
@@ -102,7 +105,8 @@ impl Cells {
     /// The cell of a box, and where that cell is.
     pub(crate) fn bounds(&self, one: &Aabb) -> ([i64; 3], Aabb) {
         let cell = self.cell(&one.min);
-        let corner = |i: i64, k: usize| (self.origin[k] + i as f64 * STEPS as f64 / self.steps[k]) as f32;
+        // Steps are rounded to the nearest.
+        let corner = |i: i64, k: usize| (self.origin[k] + ((i * STEPS) as f64 - 0.5) / self.steps[k]) as f32;
         let low = std::array::from_fn(|k| corner(cell[k], k));
         (cell, Aabb::new(low, std::array::from_fn(|k| corner(cell[k] + 1, k))))
     }

@@ -98,17 +98,18 @@ mod tests {
 
     #[test]
     fn no_box_that_a_level_holds_begins_before_the_window_of_one_it_touches() {
-        let level = level(0.9f32.next_down());
-        // As large as `max_extent` once rounded, and larger before: from the cell before the window.
-        let grown = Aabb::new([-(2f32.powi(-26)); 3], [0.9; 3]);
-        let touching = Aabb::new([0.9; 3], [1.0; 3]);
-        assert_eq!(grown.extents(), [0.9; 3]);
+        let level = level(0.875f32.next_down());
+        // As large as `max_extent` once rounded, and larger before: from the cell before the window. Cells begin half a
+        // step, 1 / 128, below whole numbers.
+        let grown = Aabb::new([-1.0 / 128.0 - 2f32.powi(-30); 3], [0.875 - 1.0 / 128.0; 3]);
+        let touching = Aabb::new(grown.max, [1.0; 3]);
+        assert_eq!(grown.extents(), [0.875; 3]);
         assert!(level.cells.window(&touching).0[0] > level.cells.bounds(&grown).0[0]);
         assert!(!level.holds(grown.extents()));
         let mut held = 0;
         for i in 0..4000u32 {
-            let min = (i as f32 - 2000.0) * 1.3e-6;
-            let one = Aabb::new([min; 3], [min + 0.9 - (i % 7) as f32 * 1e-8; 3]);
+            let min = (i as f32 - 2000.0) * 1.3e-6 - 1.0 / 128.0;
+            let one = Aabb::new([min; 3], [min + 0.875 - (i % 7) as f32 * 1e-8; 3]);
             if level.holds(one.extents()) {
                 let touching = Aabb::new(one.max, [2.0; 3]);
                 assert!(level.cells.window(&touching).0[0] <= level.cells.bounds(&one).0[0], "{one:?}");
