@@ -9,6 +9,7 @@
 
 use crate::Pair;
 use crate::links::{Links, NONE};
+use crate::marks::Marks;
 use rayon::prelude::*;
 
 /// Walks that cost as much as linking all pairs.
@@ -28,27 +29,20 @@ pub(crate) trait Judgement: Sync {
     /// Asks for what [`Judgement::holds`] will read.
     fn prepare(&self, _: Pair) {}
 
-    /// Whether one of the boxes has changed. Pairs that do not concern us hold.
-    fn concerns(&self, pair: Pair) -> bool;
-
     /// Whether a kept pair is still one.
     fn holds(&self, pair: Pair) -> bool;
 }
 
-/// The end of all pairs of some boxes, by id.
-struct EndOf(Vec<bool>);
+/// The end of all pairs.
+struct End;
 
-impl Judgement for EndOf {
-    fn concerns(&self, pair: Pair) -> bool {
-        self.0[pair.a as usize] | self.0[pair.b as usize]
-    }
-
+impl Judgement for End {
     fn holds(&self, _: Pair) -> bool {
         false
     }
 }
 
-/// The kept pairs. 8 bytes a pair and 5 an id, beside links.
+/// The kept pairs. 8 bytes a pair and 4 an id, beside links.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct PairStore {
     pairs: Vec<Pair>,
@@ -64,8 +58,9 @@ pub(crate) struct PairStore {
     /// Boxes whose pairs are no longer there, although they are still in the list: a walk for each would cost more than
     /// one for all.
     removed: Vec<u32>,
-    /// By id: whether it is among them.
-    is_removed: Vec<bool>,
+    is_removed: Marks,
+    /// Boxes of which a walk looks for pairs.
+    marks: Marks,
 }
 
 impl PairStore {
@@ -76,7 +71,8 @@ impl PairStore {
     pub(crate) fn reserve_ids(&mut self, ids: usize) {
         if self.degree.len() < ids {
             self.degree.resize(ids, 0);
-            self.is_removed.resize(ids, false);
+            self.is_removed.reserve_ids(ids);
+            self.marks.reserve_ids(ids);
             self.links.reserve_ids(ids);
         }
     }
@@ -101,7 +97,7 @@ impl PairStore {
     }
 
     fn is_there(&self, pair: Pair) -> bool {
-        self.removed.is_empty() || !(self.is_removed[pair.a as usize] | self.is_removed[pair.b as usize])
+        self.removed.is_empty() || !(self.is_removed.has(pair.a) | self.is_removed.has(pair.b))
     }
 
     /// The pairs of a box; without links at the cost of looking at all, unless there are none.
@@ -127,7 +123,8 @@ impl PairStore {
 
     /// Removes all pairs of a box.
     pub(crate) fn remove_of(&mut self, id: u32) {
-        if self.listed_degree(id) > 0 && !std::mem::replace(&mut self.is_removed[id as usize], true) {
+        if self.listed_degree(id) > 0 && !self.is_removed.has(id) {
+            self.is_removed.set(id);
             self.removed.push(id);
             if self.links.are_there() {
                 self.drop_removed();
@@ -140,11 +137,11 @@ impl PairStore {
         if self.removed.is_empty() {
             return;
         }
-        let (ids, ends) = (std::mem::take(&mut self.removed), EndOf(std::mem::take(&mut self.is_removed)));
-        self.find_ended(&ids, &ends);
+        let mut ids = std::mem::take(&mut self.removed);
+        self.find_ended(&ids, &End);
         self.remove_places(|_| {});
-        (self.removed, self.is_removed) = (ids, ends.0);
-        self.removed.drain(..).for_each(|id| self.is_removed[id as usize] = false);
+        ids.drain(..).for_each(|id| self.is_removed.unset(id));
+        self.removed = ids;
     }
 
     /// Removes the pairs that do not hold, of all; and appends them to `removed`.
@@ -174,7 +171,9 @@ impl PairStore {
             places.sort_unstable_by(|a, b| b.cmp(a));
             places.dedup();
         } else {
+            ids.iter().for_each(|&id| self.marks.set(id));
             self.walk_for_few(of, &mut places);
+            ids.iter().for_each(|&id| self.marks.unset(id));
             places.reverse();
         }
         self.places = places;
@@ -215,10 +214,11 @@ impl PairStore {
     fn walk_for_few(&mut self, of: &impl Judgement, places: &mut Vec<u32>) {
         let pieces = self.pairs.len().div_ceil(PIECE);
         self.ended_places.resize(pieces.max(self.ended_places.len()), Vec::new());
+        let marks = &self.marks;
         let walk = |(i, (pairs, ended)): (usize, (&[Pair], &mut Vec<u32>))| {
             ended.clear();
             for (k, block) in pairs.chunks(BLOCK).enumerate() {
-                find_few(block, (i * PIECE + k * BLOCK) as u32, of, ended);
+                find_few(block, (i * PIECE + k * BLOCK) as u32, marks, of, ended);
             }
         };
         let (pairs, ended) = (&self.pairs, &mut self.ended_places[..pieces]);
@@ -279,13 +279,13 @@ fn keep(pairs: &mut [Pair], of: &impl Judgement, ended: &mut Vec<Pair>) {
     }
 }
 
-/// The places of pairs that have ended, from `first` on. Without a branch for each: first those that concern us, then
-/// which of them hold.
-fn find_few(pairs: &[Pair], first: u32, of: &impl Judgement, ended: &mut Vec<u32>) {
+/// The places of pairs that have ended, from `first` on. Without a branch for each: first those of marked boxes,
+/// then which of them hold.
+fn find_few(pairs: &[Pair], first: u32, marks: &Marks, of: &impl Judgement, ended: &mut Vec<u32>) {
     let (mut found, mut count) = ([0; BLOCK], 0);
     for (i, &pair) in (0..).zip(pairs) {
         found[count] = i;
-        count += usize::from(of.concerns(pair));
+        count += usize::from(marks.has(pair.a) | marks.has(pair.b));
     }
     let found = &found[..count];
     found.iter().for_each(|&i| of.prepare(pairs[i as usize]));
@@ -297,16 +297,12 @@ mod tests {
     use super::*;
     use std::collections::BTreeSet;
 
-    /// Pairs that concern, and that hold.
-    struct Test<C, H>(C, H);
+    /// Pairs that hold.
+    struct Test<H>(H);
 
-    impl<C: Fn(Pair) -> bool + Sync, H: Fn(Pair) -> bool + Sync> Judgement for Test<C, H> {
-        fn concerns(&self, pair: Pair) -> bool {
-            self.0(pair)
-        }
-
+    impl<H: Fn(Pair) -> bool + Sync> Judgement for Test<H> {
         fn holds(&self, pair: Pair) -> bool {
-            self.1(pair)
+            self.0(pair)
         }
     }
 
@@ -355,11 +351,11 @@ mod tests {
             } else if random >> 22 & 63 == 0 {
                 let holds = |pair: Pair| pair.a >= SMALL || !pair.a.is_multiple_of(3);
                 wanted.retain(|&pair| holds(pair));
-                store.end_many(&Test(|_| true, holds), &mut removed);
+                store.end_many(&Test(holds), &mut removed);
             } else {
                 let concerns = |pair: Pair| [pair.a, pair.b].iter().any(|id| *id == i || *id == j);
                 wanted.retain(|&pair| !concerns(pair) || pair.b.is_multiple_of(2));
-                store.end_few(&[i, j], &Test(concerns, |pair: Pair| pair.b.is_multiple_of(2)), &mut removed);
+                store.end_few(&[i, j], &Test(|pair: Pair| pair.b.is_multiple_of(2)), &mut removed);
             }
             validate(&store, &wanted);
             let ended: BTreeSet<Pair> = removed.iter().copied().collect();
@@ -378,7 +374,7 @@ mod tests {
         store.insert(&pairs);
         let holds = |pair: Pair| !(pair.a / 3).is_multiple_of(5);
         let mut removed = Vec::new();
-        store.end_many(&Test(|_| true, holds), &mut removed);
+        store.end_many(&Test(holds), &mut removed);
         let (kept, ended): (Vec<Pair>, Vec<Pair>) = pairs.into_iter().partition(|&pair| holds(pair));
         assert_eq!((store.pairs, removed), (kept, ended));
     }

@@ -55,6 +55,7 @@ pub mod gpu;
 #[cfg(feature = "gpu")]
 pub mod layout;
 mod links;
+mod marks;
 pub mod oracle;
 mod pair;
 pub mod pair_index;

@@ -33,7 +33,6 @@ impl BroadPhase {
         let Some(restarted) = self.base.changes_on_gpu(&request, &mut self.report)? else {
             return Ok(false);
         };
-        self.forget_moved();
         self.has_base = false;
         self.sort_out(&restarted)?;
         Ok(true)
@@ -77,11 +76,7 @@ impl BroadPhase {
 pub(super) struct Ending<'a>(pub(super) State<'a>);
 
 impl Judgement for Ending<'_> {
-    fn concerns(&self, pair: Pair) -> bool {
-        self.0.flags(pair.a, pair.b) & flag::ENDING != 0
-    }
-
     fn holds(&self, pair: Pair) -> bool {
-        !self.concerns(pair) || self.0.holds(pair)
+        self.0.flags(pair.a, pair.b) & flag::ENDING == 0 || self.0.holds(pair)
     }
 }

@@ -10,7 +10,6 @@ mod state;
 mod update;
 
 use crate::cpu::emit;
-use crate::cpu::map::Map;
 use crate::cpu::record::Tracked;
 use crate::diff::PairStore;
 use crate::finder::check_count;
@@ -49,8 +48,6 @@ mod flag {
     pub(super) const CHANGED: u8 = 2;
     /// The filter has.
     pub(super) const REFILTERED: u8 = 4;
-    /// The box is not in the base: it has left its cell since that was built, or is new.
-    pub(super) const LOOSE: u8 = 8;
     /// The device has told that the box has lost pairs.
     #[cfg(feature = "gpu")]
     pub(super) const ENDING: u8 = 16;
@@ -61,10 +58,8 @@ mod flag {
 /// Each box is stored fat, grown by [`Config::margin`]; while later boxes stay inside, nothing has
 /// changed and nothing is done (contract 5). Ids should be dense: memory follows the largest.
 ///
-/// All boxes lie in a base grid. Where few change, those that stay in their cells are overwritten there; the others
-/// are sorted into a second, small grid each time, until they come back. Changed boxes are searched in both. When an
-/// eighth of all boxes changes or has left its cell the base is built anew, and now and then so that boxes at rest
-/// return to it.
+/// All boxes lie in a base grid. Where few change they are put into other cells, and only they are searched. When an
+/// eighth of all boxes changes or is out of the grid's order, it is built anew.
 /// ([`crate::Strategy::Pbig`] and [`crate::Backend::Brute`] search everything at every update that changes
 /// something. A GPU is told what has changed, and tells which pairs came or went.)
 ///
@@ -100,16 +95,15 @@ pub struct BroadPhase {
     /// Boxes that have lost pairs, as far as the device can tell.
     #[cfg(feature = "gpu")]
     ending: Vec<u32>,
-    /// The loose boxes.
-    moved: Vec<u32>,
-    /// Boxes sorted in updates since the base was built.
-    sorted_again: usize,
     base: Search<Tracked>,
     /// Whether `base.map` holds the boxes whose home it is: not after a search by anything else.
     has_base: bool,
-    /// The loose boxes; `base.map` holds the rest.
-    loose: Map<Tracked>,
-    /// The changed boxes, to be looked up in both.
+    /// As it was built.
+    base_plan: Plan,
+    base_checks: u64,
+    /// Tests since then that another one would have saved.
+    strain: u64,
+    /// The changed boxes, to be looked up in it.
     others: Vec<Tracked>,
     pairs: PairStore,
     events: Events,
@@ -138,11 +132,11 @@ impl BroadPhase {
             updates: 0,
             #[cfg(feature = "gpu")]
             ending: vec![],
-            moved: vec![],
-            sorted_again: 0,
             base: Search::new(),
             has_base: false,
-            loose: Map::new(),
+            base_plan: Plan::default(),
+            base_checks: 0,
+            strain: 0,
             others: vec![],
             pairs: PairStore::default(),
             events: Events::default(),

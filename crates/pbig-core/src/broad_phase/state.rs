@@ -70,9 +70,6 @@ impl BroadPhase {
         let mut cells = Vec::new();
         if self.has_base {
             self.base.map.cells(&mut cells);
-            if !self.moved.is_empty() {
-                self.loose.cells(&mut cells);
-            }
         }
         cells
     }

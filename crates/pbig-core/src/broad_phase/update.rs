@@ -4,7 +4,6 @@
 use super::device::Ending;
 use super::{BroadPhase, Old, flag};
 use crate::cpu::codes::prefetch;
-use crate::cpu::crowding::Set;
 use crate::cpu::edit::Changed;
 use crate::cpu::emit;
 use crate::cpu::find::Others;
@@ -35,6 +34,9 @@ pub(super) use state;
 /// Events from which both lists are sorted at once.
 const PARALLEL_FROM: usize = 4096;
 
+/// Tests that take as long as to sort a box.
+const TESTS_OF_A_BOX: u64 = 64;
+
 impl BroadPhase {
     /// Pairs that overlap now and did not, into `events.added`, in no order.
     pub(super) fn find_added(&mut self) -> Result<(), Error> {
@@ -52,11 +54,8 @@ impl BroadPhase {
             return self.search_all();
         }
         self.edit_base();
-        // Boxes that left their cells and came to rest go back into the base when looking at them again and
-        // again has cost as much as building it.
-        self.sorted_again += self.moved.len();
-        let present = self.present_count as usize;
-        if self.moved.len() * 8 >= present || self.sorted_again > 2 * present {
+        let (out, present) = (self.base.map.out_of_order(), self.present_count as usize);
+        if out * 8 >= present || self.strain > self.rebuild_cost() {
             self.search_all()
         } else {
             self.search_changed()
@@ -89,41 +88,23 @@ impl BroadPhase {
         self.base.spare = summary.into_spare();
         found?;
         self.report.invalid = invalid;
-        self.forget_moved();
         // A search by another strategy leaves no base grid to keep.
         self.has_base = self.report.plan.chosen != Chosen::Pbig;
+        self.base_plan = self.report.plan.clone();
+        (self.base_checks, self.strain) = (self.report.checks.made, 0);
         self.base.found.chunks.iter().for_each(|chunk| self.events.added.extend_from_slice(chunk));
         Ok(())
     }
 
-    /// No box has left its cell since the base was built.
-    pub(super) fn forget_moved(&mut self) {
-        for id in self.moved.drain(..) {
-            self.flags[id as usize] &= !flag::LOOSE;
-        }
-        self.sorted_again = 0;
-    }
-
-    /// Writes the changed boxes to their places in the base; those that have left their cells become loose.
+    /// Puts the changed boxes where they are now.
     fn edit_base(&mut self) {
         let mut clock = Instant::now();
         stage!("map");
+        self.base.map.arrange(&mut self.changed, self.boxes.len());
         let update = self.present_update();
         let (ids, boxes, before, filters) = (&self.changed, &self.boxes, &self.before, &self.filters);
         let changed = Changed { ids, boxes, before, filters, update };
-        let (flags, moved, mut back) = (&mut self.flags, &mut self.moved, false);
-        self.base.map.edit(&changed, &mut self.others, |id, is_home| {
-            let flags = &mut flags[id as usize];
-            let was_loose = *flags & flag::LOOSE != 0;
-            back |= was_loose && is_home;
-            *flags = *flags & !flag::LOOSE | if is_home { 0 } else { flag::LOOSE };
-            if !is_home && !was_loose {
-                moved.push(id);
-            }
-        });
-        if back {
-            moved.retain(|&id| flags[id as usize] & flag::LOOSE != 0);
-        }
+        self.base.map.edit(&changed, &mut self.others);
         self.report.stages.map += lap(&mut clock);
     }
 
@@ -131,42 +112,34 @@ impl BroadPhase {
         self.updates + 1
     }
 
-    /// Searches the base and the loose boxes for the changed ones.
+    /// Searches the base for the changed boxes.
     fn search_changed(&mut self) -> Result<(), Error> {
-        // The last ones may have come home.
-        let plan = if self.moved.is_empty() { Plan::default() } else { self.build_loose() };
         let mut clock = Instant::now();
         stage!("check");
-        let update = self.present_update();
+        let update = Some(self.present_update());
         let (state, limit, added) =
             (OfChanged(state!(self)), self.config.limits.max_pairs, &mut self.events.added);
-        let others = Others { records: &self.others, filters: &self.filters, update: Some(update) };
-        let (mut made, mut overlaps) = self.base.map.check_others(&others, &state, added, limit)?;
-        if !self.moved.is_empty() {
-            let others = Others { update: None, ..others };
-            let (more, of_them) = self.loose.check_others(&others, &state, added, limit)?;
-            (made, overlaps) = (made + more, overlaps + of_them);
-        }
+        let others = Others { records: &self.others, filters: &self.filters, update };
+        let (made, overlaps) = self.base.map.check_others(&others, &state, added, limit)?;
         self.report.stages.check += lap(&mut clock);
         self.report.checks = Checks { made, unnecessary: made - overlaps, redundant: 0 };
-        let moved = self.moved.len() as u32;
-        self.report.plan = Plan { chosen: Chosen::Edit, moved, boxes: self.valid_count(), ..plan };
+        self.note_strain(made);
+        let (moved, boxes) = (self.base.map.out_of_order() as u32, self.valid_count());
+        self.report.plan = Plan { chosen: Chosen::Edit, moved, boxes, ..self.base_plan.clone() };
         Ok(())
     }
 
-    /// Sorts the loose boxes.
-    fn build_loose(&mut self) -> Plan {
-        let summary = LazySummary::new(&self.boxes, Some(&self.moved), self.base.spare.take());
-        let set = Set {
-            boxes: &self.boxes,
-            filters: Some(&self.filters),
-            ids: Some(&self.moved),
-            summary: &summary,
-            before: &self.before,
-        };
-        let plan = self.loose.plan_and_build(&set, &self.config, &mut self.report.stages);
-        self.base.spare = summary.into_spare();
-        plan
+    /// Tests beyond what boxes needed when the base was built, twice over: many boxes have come to few cells, or to the
+    /// list.
+    fn note_strain(&mut self, made: u64) {
+        let boxes = u64::from(self.base_plan.boxes.max(1));
+        let usual = TESTS_OF_A_BOX + 4 * self.base_checks / boxes;
+        self.strain += made.saturating_sub(self.others.len() as u64 * usual);
+    }
+
+    /// As many tests as it takes to build the base.
+    fn rebuild_cost(&self) -> u64 {
+        TESTS_OF_A_BOX * u64::from(self.present_count) + self.base_checks
     }
 
     /// Kept pairs that no longer hold, into `events.removed`, in no order; they are no longer kept.
@@ -261,11 +234,6 @@ impl Judgement for State<'_> {
         }
     }
 
-    #[inline(always)]
-    fn concerns(&self, pair: Pair) -> bool {
-        self.flags(pair.a, pair.b) & flag::CHANGED != 0
-    }
-
     /// Absent and invalid boxes are NaN and overlap nothing.
     #[inline(always)]
     fn holds(&self, pair: Pair) -> bool {
@@ -289,7 +257,7 @@ impl Accept for State<'_> {
     #[inline]
     fn pair(&self, pair: Pair) -> bool {
         let Pair { a, b } = pair;
-        self.concerns(pair) && self.filters_allow(a, b) && !self.paired_before(a, b)
+        self.flags(a, b) & flag::CHANGED != 0 && self.filters_allow(a, b) && !self.paired_before(a, b)
     }
 
     /// Boxes that did not overlap before did not pair.

@@ -1,29 +1,37 @@
 //! Edits: boxes that have changed, put where they belong without sorting anew.
 //!
-//! A box that stays in its cell keeps its slot and its place, its *home*: record and code are overwritten. (Of moves by 0.1
-//! in cells of 1.28, seven in eight stay.) One that leaves its cell leaves its home empty, and may come back. Homes are looked up by id in a
-//! table that is made when the first box is edited: where everything moves, none is.
+//! A box that stays in its cell keeps its slot: record and code are overwritten. (Of moves by 0.1 in cells of 1.28, seven in
+//! eight stay.) One that leaves its cell leaves its slot empty, and takes one in the new cell: an empty one if there is
+//! one, or one more behind all others (`spill`). Slots are looked up by id in a table that is made when the first box is
+//! edited: where everything moves, none is.
 
 use super::codes::prefetch;
+use super::levels::LISTED;
 use super::map::Map;
 use super::record::{Record, Tracked};
+use super::sort::NOWHERE;
+use crate::plan::OPEN;
 use crate::{Aabb, ProxyFilter};
 
 /// Boxes that are edited together: first all ask for their memory, then all are written.
 const BLOCK: usize = 32;
 
-/// No home: the box was invalid, or not there.
+/// Where a box is that is invalid, or not there.
 const NONE: u32 = u32::MAX;
 
-/// The home of a box that is in no cell, with its place in the list.
+/// Where a box is that is in no cell, beside its place in the list.
 const IN_LIST: u32 = 1 << 31;
 
-/// Where each box of a map is.
+/// The slot of each box of a map.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Homes {
     /// By id.
     of: Vec<u32>,
     are_known: bool,
+    /// Boxes in the list then.
+    listed: usize,
+    /// Slots and ids, to be sorted.
+    arranged: Vec<u64>,
 }
 
 impl Homes {
@@ -58,79 +66,111 @@ impl Changed<'_> {
 }
 
 impl Map<Tracked> {
-    /// Writes changed boxes to their homes, if they are still in those cells, and empties the others. `tell` hears of each whether
-    /// it is at home; `records` gets those of all that are valid.
-    pub(crate) fn edit(
-        &mut self,
-        changed: &Changed<'_>,
-        records: &mut Vec<Tracked>,
-        mut tell: impl FnMut(u32, bool),
-    ) {
-        self.learn_homes(changed.boxes.len());
+    /// Puts changed boxes where they are now; `records` gets those of all that are valid.
+    pub(crate) fn edit(&mut self, changed: &Changed<'_>, records: &mut Vec<Tracked>) {
         records.clear();
         for ids in changed.ids.chunks(BLOCK) {
             self.ask_for(ids, changed);
             for &id in ids {
                 let record = changed.record(id);
-                let camp = if self.has_camps() { self.camps.camp(&changed.filters[id as usize]) } else { 0 };
-                let is_home = self.put(record, camp);
-                let is_valid = !record.item().aabb.min[0].is_nan();
-                if is_valid {
+                let camp =
+                    if self.has_camps() { self.camps.camp(&changed.filters[id as usize]) } else { OPEN };
+                if self.put(id, record, camp) {
                     records.push(record);
                 }
-                tell(id, is_home || !is_valid);
             }
         }
     }
 
-    /// Asks for the memory of some boxes and their homes.
+    /// Brings the ids of boxes into the order of their slots, so that what is done with one after the other is near in
+    /// memory, too. (10,000 of a million: check and map in 5.6 instead of 7.9 ms.)
+    pub(crate) fn arrange(&mut self, ids: &mut [u32], boxes: usize) {
+        self.learn_homes(boxes);
+        let mut slots = std::mem::take(&mut self.homes.arranged);
+        slots.clear();
+        slots.extend(ids.iter().map(|&id| u64::from(self.homes.of(id)) << 32 | u64::from(id)));
+        slots.sort_unstable();
+        ids.iter_mut().zip(&slots).for_each(|(id, slot)| *id = *slot as u32);
+        self.homes.arranged = slots;
+    }
+
+    /// Boxes that have no place in the order of the last sort.
+    pub(crate) fn out_of_order(&self) -> usize {
+        let listed = if self.homes.are_known { self.homes.listed } else { self.list.len() };
+        self.sorted.spill.len() + self.list.len().saturating_sub(listed)
+    }
+
+    /// Asks for the memory of some boxes and their slots.
     fn ask_for(&self, ids: &[u32], changed: &Changed<'_>) {
-        let mut homes = [NONE; BLOCK];
-        for (home, &id) in homes.iter_mut().zip(ids) {
+        let mut slots = [NONE; BLOCK];
+        for (slot, &id) in slots.iter_mut().zip(ids) {
             prefetch(&changed.boxes[id as usize]);
             prefetch(&changed.before[id as usize]);
-            *home = self.homes.of(id);
+            *slot = self.homes.of(id);
         }
-        for &home in homes.iter().filter(|home| **home < IN_LIST) {
-            prefetch(&self.sorted.places[home as usize]);
-            prefetch(&self.sorted.codes[home as usize]);
+        for &slot in slots.iter().filter(|slot| **slot < IN_LIST) {
+            prefetch(&self.sorted.places[slot as usize]);
+            prefetch(&self.sorted.codes[slot as usize]);
+            prefetch(&self.sorted.keys[slot as usize]);
         }
-        for &home in homes.iter().filter(|home| **home < IN_LIST) {
-            prefetch(&self.sorted.records[self.sorted.places[home as usize] as usize]);
+        for &slot in slots.iter().filter(|slot| **slot < IN_LIST) {
+            prefetch(&self.sorted.records[self.sorted.places[slot as usize] as usize]);
         }
     }
 
-    /// Writes a box to its home, or empties that; false where it is not at home now.
-    fn put(&mut self, record: Tracked, camp: u8) -> bool {
-        let (home, aabb) = (self.homes.of(record.item().id), &record.item().aabb);
-        if home == NONE {
-            return false;
-        }
-        if home >= IN_LIST {
-            self.list.set((home & !IN_LIST) as usize, aabb);
+    /// Puts a box where it is now; false if it is invalid.
+    fn put(&mut self, id: u32, record: Tracked, camp: u8) -> bool {
+        let (home, key) = (self.homes.of(id), self.classes.key(&record.item().aabb, camp, &self.levels));
+        let was_in_cell = home < IN_LIST;
+        if was_in_cell && key == self.sorted.keys[home as usize] {
+            self.write(home, key, record);
             return true;
         }
-        let (home, key) = (home as usize, self.classes.key(aabb, camp, &self.levels));
-        let kept = &mut self.sorted.records[self.sorted.places[home] as usize];
-        let stays = key == kept.item().key;
-        kept.put(if stays {
-            record
-        } else {
-            Tracked::changed(Aabb::NOWHERE, record.item().id, Aabb::NOWHERE, 0)
-        });
-        if stays {
-            let level = self.levels.iter().rfind(|level| level.cells.base <= key);
-            self.sorted.codes[home] = level.map_or(0, |level| level.cells.code(aabb));
+        if was_in_cell {
+            self.sorted.leave(home);
+        } else if home != NONE && key == LISTED {
+            self.list.set((home & !IN_LIST) as usize, &record.item().aabb);
+            return true;
+        } else if home != NONE {
+            self.strike((home & !IN_LIST) as usize);
         }
-        stays
+        self.homes.of[id as usize] = match key {
+            NOWHERE => NONE,
+            LISTED => {
+                self.list.push(&record.item().aabb, id);
+                IN_LIST | (self.list.len() - 1) as u32
+            }
+            _ => {
+                let slot = self.sorted.occupy(key);
+                self.write(slot, key, record);
+                slot
+            }
+        };
+        key != NOWHERE
     }
 
-    /// The table of homes, once after boxes have been sorted.
+    fn write(&mut self, slot: u32, key: u32, record: Tracked) {
+        let level = self.levels.iter().rfind(|level| level.cells.base <= key);
+        self.sorted.codes[slot as usize] = level.map_or(0, |level| level.cells.code(&record.item().aabb));
+        self.sorted.records[self.sorted.places[slot as usize] as usize] = record;
+    }
+
+    /// Takes a box out of the list.
+    fn strike(&mut self, i: usize) {
+        self.list.swap_remove(i);
+        if let Some(&moved) = self.list.ids.get(i) {
+            self.homes.of[moved as usize] = IN_LIST | i as u32;
+        }
+    }
+
+    /// The table of slots, once after boxes have been sorted; later, room for more ids.
     fn learn_homes(&mut self, ids: usize) {
+        let of = &mut self.homes.of;
         if std::mem::replace(&mut self.homes.are_known, true) {
+            of.resize(ids, NONE);
             return;
         }
-        let of = &mut self.homes.of;
+        self.homes.listed = self.list.len();
         of.clear();
         of.resize(ids, NONE);
         for (slot, &place) in (0..).zip(&self.sorted.places) {
@@ -199,51 +239,64 @@ mod tests {
 
     #[test]
     fn edited_boxes_are_found_where_they_are_with_what_they_were() {
-        let (stayed, left, found) = edit_and_compare(&Config { brute_below: 0, ..Config::DEFAULT });
-        assert!(stayed > 500 && left > 200 && found > 500, "{stayed} {left} {found}");
-        let (stayed, left, found) = edit_and_compare(&Config { brute_below: 5000, ..Config::DEFAULT });
-        assert!(stayed > 2000 && left == 0 && found > 500, "{stayed} {left} {found}");
+        let (out_of_order, found) = edit_and_compare(&Config { brute_below: 0, ..Config::DEFAULT });
+        assert!(out_of_order > 20 && found > 500, "{out_of_order} {found}");
+        let (out_of_order, found) = edit_and_compare(&Config { brute_below: 5000, ..Config::DEFAULT });
+        assert!(out_of_order == 0 && found > 500, "{out_of_order} {found}");
     }
 
-    /// How many boxes were at home after edits and how many were not, and the pairs that were found.
-    fn edit_and_compare(config: &Config) -> (u32, u32, usize) {
+    /// The most boxes that were out of order, and the pairs that were found.
+    fn edit_and_compare(config: &Config) -> (usize, usize) {
         let mut seed = 5;
-        let (before, filters) = (world(&mut seed), vec![ProxyFilter::ALL; 1000]);
-        let mut map = built(&before, &filters, config);
-        let ids: Vec<u32> = (0..100).collect();
-        let (mut stayed, mut left, mut found) = (0, 0, 0);
-        let (mut old, mut boxes, mut records) = (before.clone(), before, Vec::new());
-        for update in 1..30 {
+        let (places, filters) = (world(&mut seed), vec![ProxyFilter::ALL; 1000]);
+        let mut map = built(&places, &filters, config);
+        let mut ids: Vec<u32> = (0..100).collect();
+        let (mut places, mut old, mut boxes) = (places.clone(), places.clone(), places);
+        let (mut out_of_order, mut found, mut records) = (0, 0, Vec::new());
+        for update in 1..60 {
             old.clone_from(&boxes);
-            for one in &mut boxes[..100] {
-                *one = shifted(one, [0.1, 0.4, 0.0][update as usize % 3], &mut seed);
+            for id in 0..100 {
+                let by = [0.1, 0.4, 0.0, 2.0][update as usize % 4];
+                places[id] = shifted(&places[id], by, &mut seed);
+                boxes[id] = if random(&mut seed) < 0.05 { Aabb::NOWHERE } else { places[id] };
             }
+            map.arrange(&mut ids, boxes.len());
             let changed = Changed { ids: &ids, boxes: &boxes, before: &old, filters: &filters, update };
-            let mut away = BTreeSet::new();
-            map.edit(&changed, &mut records, |id, is_home| {
-                (stayed, left) = (stayed + u32::from(is_home), left + u32::from(!is_home));
-                if !is_home {
-                    away.insert(id);
-                }
-            });
+            map.edit(&changed, &mut records);
+            out_of_order = out_of_order.max(map.out_of_order());
             let others = Others { records: &records, filters: &filters, update: Some(update) };
             let mut out = Vec::new();
             map.check_others(&others, &Met(&old), &mut out, u64::MAX).expect("few pairs");
             let all: BTreeSet<Pair> = out.iter().copied().collect();
             assert_eq!(all.len(), out.len(), "twice");
-            // A box that is away is a query only.
-            let is_met = |a: u32, b: u32| {
-                let (one, other) = (a as usize, b as usize);
-                let is_new = boxes[one].overlaps(&boxes[other]) && !old[one].overlaps(&old[other]);
-                is_new && !away.contains(&b)
-            };
+            let is_new = |a: usize, b: usize| boxes[a].overlaps(&boxes[b]) && !old[a].overlaps(&old[b]);
             let pairs = (0..100).flat_map(|a| (a + 1..1000).map(move |b| (a, b)));
-            let wanted: BTreeSet<Pair> =
-                pairs.filter(|&(a, b)| is_met(a, b)).map(|(a, b)| Pair::new(a, b)).collect();
+            let wanted = pairs.filter(|&(a, b)| is_new(a, b)).map(|(a, b)| Pair::new(a as u32, b as u32));
+            let wanted: BTreeSet<Pair> = wanted.collect();
             let wrong: Vec<&Pair> = all.symmetric_difference(&wanted).take(5).collect();
             assert!(wrong.is_empty(), "update {update}: {wrong:?}");
             found += all.len();
         }
-        (stayed, left, found)
+        (out_of_order, found)
+    }
+
+    #[test]
+    fn slots_that_boxes_leave_are_taken_again() {
+        let mut seed = 7;
+        let (mut boxes, filters) = (world(&mut seed), vec![ProxyFilter::ALL; 1000]);
+        let mut map = built(&boxes, &filters, &Config { brute_below: 0, ..Config::DEFAULT });
+        let (ids, mut records) = ((0..1000).collect::<Vec<u32>>(), Vec::new());
+        for update in 1..200 {
+            let before = boxes.clone();
+            // All into one corner, and out again.
+            boxes = world(&mut seed);
+            if update % 2 == 0 {
+                boxes.iter_mut().for_each(|one| *one = Aabb::from_center([0.5; 3], [0.5; 3]));
+            }
+            let changed = Changed { ids: &ids, boxes: &boxes, before: &before, filters: &filters, update };
+            map.learn_homes(1000);
+            map.edit(&changed, &mut records);
+            assert!(map.len_in_grids() <= 3000, "{} slots in update {update}", map.len_in_grids());
+        }
     }
 }

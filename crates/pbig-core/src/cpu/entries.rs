@@ -72,6 +72,12 @@ impl Entries {
         self.boxes[i] = Stored::new(aabb);
     }
 
+    /// Removes the `i`-th box, whose place the last one takes.
+    pub(crate) fn swap_remove(&mut self, i: usize) {
+        self.boxes.swap_remove(i);
+        self.ids.swap_remove(i);
+    }
+
     pub(crate) fn push(&mut self, aabb: &Aabb, id: u32) {
         self.boxes.push(Stored::new(aabb));
         self.ids.push(id);

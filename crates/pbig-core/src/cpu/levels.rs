@@ -26,6 +26,11 @@ impl Level {
         Self { cells, max_extent, slots: 0..0, camp: plan.camp, crowd: 0.0 }
     }
 
+    /// Whether a key is one of its cells.
+    pub(super) fn has(&self, key: u32) -> bool {
+        (self.cells.base..=self.cells.base + self.cells.mask).contains(&key)
+    }
+
     /// False for extents of invalid boxes. A box as large as the largest extent may be larger by what was rounded off.
     #[inline(always)]
     fn holds(&self, extents: [f32; 3]) -> bool {

@@ -99,7 +99,9 @@ impl<R: Record> Map<R> {
     /// The occupied cells.
     pub(crate) fn cells(&self, out: &mut Vec<OccupiedCell>) {
         for (i, level) in self.levels.iter().enumerate() {
-            let items = level.slots.clone().map(|slot| self.item(slot)).filter(|item| item.aabb.is_valid());
+            let behind = self.sorted.behind().filter(|&slot| level.has(self.sorted.keys[slot]));
+            let items = level.slots.clone().chain(behind).map(|slot| self.item(slot));
+            let items = items.filter(|item| item.aabb.is_valid());
             let place =
                 |item: &Item| -> (([i64; 3], Aabb), u32) { (level.cells.bounds(&item.aabb), item.id) };
             let mut placed: Vec<_> = items.map(place).collect();

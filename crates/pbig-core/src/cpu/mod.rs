@@ -1,4 +1,4 @@
-//! The CPU backend. `map` sorts boxes into cells (`levels`, `cells`, `sort`; `crowding` where many share few; `edit` where few move), `find`
+//! The CPU backend. `map` sorts boxes into cells (`levels`, `cells`, `sort`; `crowding` where many share few; `edit` and `spill` where few move), `find`
 //! searches them: `half` within a level and `window` across levels leave candidates, by `codes`, which `judge` tests;
 //! `check` tests `entries` that fit no level. `emit` orders the pairs. `pbig` is the paper's grid, plain and scalar.
 
@@ -17,4 +17,5 @@ pub(crate) mod map;
 pub(crate) mod pbig;
 pub(crate) mod record;
 mod sort;
+mod spill;
 mod window;

@@ -8,7 +8,7 @@ use crate::Aabb;
 pub(crate) struct Item {
     pub(crate) aabb: Aabb,
     pub(crate) id: u32,
-    /// Of its cell.
+    /// Of its cell, when it was sorted.
     pub(super) key: u32,
 }
 
@@ -35,11 +35,6 @@ impl Tracked {
     /// A box that changed in an update.
     pub(crate) const fn changed(aabb: Aabb, id: u32, before: Aabb, update: u64) -> Self {
         Self { item: Item::new(aabb, id, 0), before, update }
-    }
-
-    /// Another box in the same cell.
-    pub(super) fn put(&mut self, record: Self) {
-        *self = Self { item: Item { key: self.item.key, ..record.item }, ..record };
     }
 
     /// What the box was before the update that began.

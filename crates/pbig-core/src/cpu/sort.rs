@@ -10,6 +10,7 @@ use super::cells::Cells;
 use super::codes::BLOCK;
 use super::levels::{Classes, LISTED, Level};
 use super::record::{Item, Record};
+use super::spill::Spill;
 use crate::Aabb;
 use rayon::prelude::*;
 use std::marker::PhantomData;
@@ -51,12 +52,14 @@ pub(crate) struct Sorted<R> {
     pub(crate) keys: Vec<u32>,
     /// By slot: where its record is.
     pub(crate) places: Vec<u32>,
+    /// What came to cells since.
+    pub(super) spill: Spill,
 }
 
 impl<R> Default for Sorted<R> {
     fn default() -> Self {
-        let (starts, records, codes) = (Vec::new(), Vec::new(), Vec::new());
-        Self { starts, records, codes, keys: Vec::new(), places: Vec::new() }
+        let (starts, records, codes, spill) = (Vec::new(), Vec::new(), Vec::new(), Spill::default());
+        Self { starts, records, codes, keys: Vec::new(), places: Vec::new(), spill }
     }
 }
 
@@ -137,6 +140,7 @@ impl Sort {
         threads: bool,
         out: &mut Sorted<R>,
     ) {
+        out.spill.clear();
         let sorted = self.scan();
         self.scatter(input, threads, sorted, out);
         self.order(levels, threads, out);

@@ -28,12 +28,14 @@ struct Row {
 /// The rows of a batch, and the codes of its boxes, as far as they have one; a buffer for each thread.
 pub(super) struct Rows {
     list: Vec<Row>,
+    /// Of slots.
+    spilled: Vec<Row>,
     codes: [Option<u64>; BATCH],
 }
 
 impl Default for Rows {
     fn default() -> Self {
-        Self { list: Vec::with_capacity(ROWS + 2), codes: [None; BATCH] }
+        Self { list: Vec::with_capacity(ROWS + 2), spilled: Vec::new(), codes: [None; BATCH] }
     }
 }
 
@@ -54,7 +56,9 @@ impl<'a, 'b, R: Record, A: Accept> Windows<'a, 'b, R, A> {
         judge: Judge<'a, R, A>,
         (scratch, rows): (&'b mut Scratch, &'b mut Rows),
     ) -> Self {
+        // A search that ran out of room leaves some.
         rows.list.clear();
+        rows.spilled.clear();
         Self { sorted, judge, scratch, rows, checks: 0, kept: 0 }
     }
 
@@ -103,8 +107,7 @@ impl<'a, 'b, R: Record, A: Accept> Windows<'a, 'b, R, A> {
         // than all of them.
         let wraps = (0..3).any(|k| wide[k] > u64::from(cells.dims[k]));
         if wraps || wide[1] * wide[2] > level.slots.len() as u64 {
-            let slots = (level.slots.start as u32, level.slots.end as u32);
-            return self.scan_run::<L>(Row { query: query as u32, from: slots.0, to: slots.1 }, batch);
+            return self.scan_all::<L>(level, query as u32, batch);
         }
         for z in low[2]..=high[2] {
             for y in low[1]..=high[1] {
@@ -129,21 +132,49 @@ impl<'a, 'b, R: Record, A: Accept> Windows<'a, 'b, R, A> {
         }
     }
 
-    /// The rows that were pushed: first where in memory they are, then what is there.
+    /// The rows that were pushed: first where in memory they and what their cells have spilled are, then what is there.
     #[inline(always)]
     fn scan<L: Lanes>(&mut self, batch: &[u32]) -> bool {
-        let (starts, codes) = (&self.sorted.starts, &self.sorted.codes);
-        for row in &mut self.rows.list {
-            (row.from, row.to) = (starts[row.from as usize], starts[row.to as usize]);
-            prefetch(&codes[row.from as usize]);
-            prefetch(&codes[row.from as usize + BLOCK - 1]);
+        let (sorted, rows) = (self.sorted, &mut *self.rows);
+        for row in &mut rows.list {
+            let Row { query, from, to } = *row;
+            if sorted.have_spilled(from, to) {
+                let spilled = (from..to).flat_map(|key| sorted.spilled(key));
+                rows.spilled.extend(spilled.map(|slot| Row { query, from: slot, to: slot + 1 }));
+            }
+            (row.from, row.to) = (sorted.start(from), sorted.start(to));
+            prefetch(&sorted.codes[row.from as usize]);
+            prefetch(&sorted.codes[row.from as usize + BLOCK - 1]);
         }
         for i in 0..self.rows.list.len() {
             if !self.scan_run::<L>(self.rows.list[i], batch) {
                 return false;
             }
         }
+        for i in 0..self.rows.spilled.len() {
+            if !self.scan_run::<L>(self.rows.spilled[i], batch) {
+                return false;
+            }
+        }
         self.rows.list.clear();
+        self.rows.spilled.clear();
+        true
+    }
+
+    /// All slots of a level.
+    #[inline(always)]
+    fn scan_all<L: Lanes>(&mut self, level: &Level, query: u32, batch: &[u32]) -> bool {
+        let (from, to) = (level.slots.start as u32, level.slots.end as u32);
+        if !self.scan_run::<L>(Row { query, from, to }, batch) {
+            return false;
+        }
+        let sorted = self.sorted;
+        for slot in sorted.behind().filter(|&slot| level.has(sorted.keys[slot])) {
+            let from = slot as u32;
+            if !self.scan_run::<L>(Row { query, from, to: from + 1 }, batch) {
+                return false;
+            }
+        }
         true
     }
 

@@ -258,10 +258,14 @@ fn count(groups: &[Group]) -> u32 {
     groups.iter().map(|group| group.boxes).sum()
 }
 
+/// Room in a level for boxes that turn, or are rounded otherwise in another place: one that fits no level is tested
+/// against everything.
+const SLACK: f32 = 1.0 + 1.0 / 128.0;
+
 /// Rounded up: a window reaches down by this much, and `max - min` was rounded to nearest.
 fn max_extent(groups: &[Group]) -> [f32; 3] {
     let largest = |k: usize| groups.iter().map(|group| group.max_extent[k]).fold(0.0, f32::max);
-    std::array::from_fn(|k| largest(k).next_up())
+    std::array::from_fn(|k| (largest(k) * SLACK).next_up().min(f32::MAX))
 }
 
 /// Fewest cells on an axis. Windows reach one cell to each side (see `cpu::cells`), so that two cells

@@ -73,7 +73,7 @@ pub struct Plan {
     /// The grid on the GPU, if the GPU searched.
     #[cfg(feature = "gpu")]
     pub gpu: Option<GpuPlan>,
-    /// Boxes that have left their cells since the grid was built ([`Chosen::Edit`]).
+    /// Boxes that came since the grid was built and are out of its order ([`Chosen::Edit`]).
     pub moved: u32,
     /// Valid boxes planned for.
     pub boxes: u32,
@@ -137,7 +137,7 @@ impl fmt::Display for Plan {
             Chosen::Grid => write!(f, "grid: {boxes} boxes"),
             Chosen::Edit => write!(
                 f,
-                "edit: {} of {boxes} boxes have left their cells since the grid was built",
+                "edit: {} of {boxes} boxes are out of the order in which the grid was built",
                 self.moved
             ),
             Chosen::Pbig => write!(f, "PBIG grid: {boxes} boxes"),
