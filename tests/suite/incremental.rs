@@ -261,7 +261,7 @@ fn finds_too_many(strategy: Strategy) {
     for id in [3, 4] {
         broad_phase.set(id, Aabb::from_center([0.0; 3], [1e6; 3]), ProxyFilter::ALL).expect("a small id");
     }
-    assert_eq!(broad_phase.update().unwrap_err(), Error::TooManyPairs { limit: 150 });
+    assert_eq!(broad_phase.update().expect_err("too many pairs"), Error::TooManyPairs { limit: 150 });
     assert_eq!(broad_phase.pairs().collect::<BTreeSet<_>>(), before, "nothing has changed");
     broad_phase.set(4, boxes[4], ProxyFilter::ALL).expect("a small id");
     broad_phase.update().expect("a hundred pairs now");

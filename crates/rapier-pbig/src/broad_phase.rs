@@ -186,7 +186,7 @@ impl PbigBroadPhase {
     fn look_at(&mut self, call: &Call<'_>, listed: &[ColliderHandle]) {
         let mut watch = Watch::new(listed.len() >= MEASURED_FROM);
         if listed.len() < PARALLEL_FROM || rayon::current_num_threads() == 1 {
-            let _span = tracing::debug_span!(target: "pbig", "proxies and set").entered();
+            let _span = tracing::debug_span!(target: "pbig", "proxies").entered();
             listed.chunks(BLOCK).for_each(|block| self.look_at_block(call, block));
             self.kept.proxies += watch.lap();
             return;

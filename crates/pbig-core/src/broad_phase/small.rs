@@ -73,7 +73,6 @@ impl BroadPhase {
 
     /// As [`BroadPhase::find_added`], by bitmap.
     pub(super) fn find_in_small(&mut self, watch: &mut Watch) -> Result<(), Error> {
-        stage!("small");
         self.forget_moved();
         self.has_base = false;
         let cost = if self.boxes.len() <= TINY { self.look_up_tiny() } else { self.look_up_small(watch) };
@@ -87,8 +86,12 @@ impl BroadPhase {
 
     fn look_up_small(&mut self, watch: &mut Watch) -> Cost {
         self.report.plan.chosen = Chosen::Bitmap;
-        self.small.prepare(&self.boxes, &self.changed, self.valid_count());
+        {
+            stage!("map");
+            self.small.prepare(&self.boxes, &self.changed, self.valid_count());
+        }
         self.report.stages.map += watch.lap();
+        stage!("check");
         let state = state!(self);
         let cost = search(&mut self.small.bitmap, &state, &self.changed, &mut self.events.added);
         self.small.judge(cost, self.changed.len());
@@ -96,6 +99,7 @@ impl BroadPhase {
     }
 
     fn look_up_tiny(&mut self) -> Cost {
+        stage!("check");
         let boxes = self.valid_count();
         let all: [u32; TINY] = std::array::from_fn(|id| id as u32);
         if boxes > 1 {
