@@ -2,7 +2,7 @@
 //! boxes, and the events lead from one state to the next.
 
 use pbig_core::plan::Chosen;
-use pbig_core::{Aabb, BroadPhase, Config, Error, Limits, Pair, ProxyFilter, oracle};
+use pbig_core::{Aabb, BroadPhase, Config, Error, Limits, Pair, ProxyFilter, Strategy, oracle};
 use pbig_harness::boxes::{BoxSet, moved};
 use pbig_tests::strategies;
 use rand::rngs::StdRng;
@@ -141,6 +141,36 @@ fn moving_sets_where_all_or_a_few_boxes_move() {
     }
 }
 
+/// As many as a bitmap of each width holds, one less and one more; whether all or a few change, and filters with them.
+#[test]
+fn small_worlds_of_every_width_with_all_kinds_of_boxes() {
+    let degenerate = BoxSet::named("degenerate").expect("the set exists");
+    for ids in [1, 2, 64, 255, 256, 257, 511, 513, 1023, 1024, 1025] {
+        let mut world = Follower::new(Config { margin: 0.01, ..Config::DEFAULT }, ids);
+        let mut rng = StdRng::seed_from_u64(ids as u64);
+        for round in 0..8 {
+            let changes = if round % 3 == 0 { 2 * ids } else { 1 + ids / 10 };
+            for new in degenerate.boxes(changes, round) {
+                let id = rng.random_range(0..ids as u32);
+                change(&mut world, &mut rng, id, new);
+            }
+            world.update(&format!("{ids} boxes, round {round}"));
+        }
+    }
+}
+
+/// A box that reaches to infinity is the same again when the rest of it stays within the margin.
+#[test]
+fn infinite_boxes_within_their_margin_have_not_changed() {
+    let mut broad_phase = BroadPhase::new(Config { margin: 0.1, ..Config::DEFAULT }).expect("a good margin");
+    let half_space = |y: f32| Aabb::new([f32::NEG_INFINITY; 3], [f32::INFINITY, y, f32::INFINITY]);
+    for (y, changed) in [(0.0, 1), (0.05, 0), (-0.05, 0), (0.5, 1), (f32::INFINITY, 1), (f32::INFINITY, 0)] {
+        broad_phase.set(0, half_space(y), ProxyFilter::ALL).expect("a small id");
+        broad_phase.update().expect("no pairs");
+        assert_eq!(broad_phase.report().changed, changed, "{y}");
+    }
+}
+
 #[test]
 fn a_few_boxes_that_stay_in_their_cells_leave_them_and_come_back() {
     let (mut edits, mut out_of_order, mut in_order) = (0, 0, 0);
@@ -215,8 +245,13 @@ fn an_update_that_finds_too_many_pairs_can_be_repeated() {
 
 #[test]
 fn an_edit_that_finds_too_many_pairs_can_be_repeated() {
+    [Strategy::Grid, Strategy::Auto].into_iter().for_each(finds_too_many);
+}
+
+fn finds_too_many(strategy: Strategy) {
     let limits = Limits { max_pairs: 150, ..Limits::DEFAULT };
-    let mut broad_phase = BroadPhase::new(Config { limits, ..Config::DEFAULT }).expect("a good margin");
+    let config = Config { limits, strategy, ..Config::DEFAULT };
+    let mut broad_phase = BroadPhase::new(config).expect("a good margin");
     let boxes = BoxSet::named("unit").expect("the set exists").boxes(100, 1);
     for (id, aabb) in boxes.iter().enumerate() {
         broad_phase.set(id as u32, *aabb, ProxyFilter::ALL).expect("a small id");
@@ -226,7 +261,7 @@ fn an_edit_that_finds_too_many_pairs_can_be_repeated() {
     for id in [3, 4] {
         broad_phase.set(id, Aabb::from_center([0.0; 3], [1e6; 3]), ProxyFilter::ALL).expect("a small id");
     }
-    assert_eq!(broad_phase.update().unwrap_err(), Error::TooManyPairs { limit: 150 });
+    assert_eq!(broad_phase.update().expect_err("too many pairs"), Error::TooManyPairs { limit: 150 });
     assert_eq!(broad_phase.pairs().collect::<BTreeSet<_>>(), before, "nothing has changed");
     broad_phase.set(4, boxes[4], ProxyFilter::ALL).expect("a small id");
     broad_phase.update().expect("a hundred pairs now");

@@ -21,7 +21,8 @@ pub enum Backend {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Strategy {
-    /// The plan decides between brute force and the grid; on a GPU up to 1024 boxes need none.
+    /// The plan decides between brute force and the grid; on a GPU up to 1024 boxes need none. On the CPU
+    /// [`crate::BroadPhase`] keeps up to 1024 boxes in a bitmap instead.
     #[default]
     Auto,
     /// One entry a box, sorted by the cell of its lower corner; the fastest on a CPU. On a GPU as
@@ -160,7 +161,7 @@ pub struct Config {
     /// the caller's length unit. Larger: fewer boxes count as changed, more pairs are reported
     /// that do not touch yet.
     pub margin: f32,
-    /// On the CPU, below this many boxes every pair is tested without a grid. Avril's table 7 puts the
+    /// On the CPU, below this many boxes every pair is tested without a grid ([`crate::Finder`]). Avril's table 7 puts the
     /// crossover at 1000 boxes on a GPU of 2008; on a CPU core of 2022 it is near 100.
     pub brute_below: u32,
     /// PBIG's `W` in the constraint `f >= W` of equation 6: the wanted boxes per cell of

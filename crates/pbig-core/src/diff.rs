@@ -232,6 +232,9 @@ impl PairStore {
 
     /// Keeps in order what `keep` moves to the front of each piece.
     fn walk(&mut self, keep: impl Fn(&mut [Pair], &mut Vec<Pair>) + Sync, removed: &mut Vec<Pair>) {
+        if self.pairs.is_empty() {
+            return;
+        }
         let pieces = self.pairs.len().div_ceil(PIECE);
         self.ended.resize(pieces.max(self.ended.len()), Vec::new());
         let walk = |(pairs, ended): (&mut [Pair], &mut Vec<Pair>)| keep(pairs, ended);

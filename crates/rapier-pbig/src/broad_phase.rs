@@ -2,17 +2,16 @@
 
 use crate::call::Call;
 use crate::events::{HandleOrder, Outbox};
-use crate::proxy::{BLOCK, Proxy};
+use crate::proxy::{BLOCK, FEW, Proxy};
 use crate::roll::Roll;
 use crate::scene_tree::SceneTree;
-use crate::stats::{Kept, Totals};
+use crate::stats::{Kept, MEASURED_FROM, Totals, Watch};
 use pbig_core::{Aabb, BroadPhase as Finder, Config, Limits, ProxyFilter};
 use rapier3d::prelude::{
     BroadPhase, BroadPhasePairEvent, ColliderHandle, ColliderPair, ColliderSet, IntegrationParameters,
     NarrowPhase, RigidBodySet,
 };
 use rayon::prelude::*;
-use std::time::{Duration, Instant};
 
 /// Modified colliders from which their boxes are computed on several threads: below, waking a second one costs more than
 /// it saves.
@@ -165,53 +164,71 @@ impl PbigBroadPhase {
         self.finder.remove(handle.into_raw_parts().0);
     }
 
-    fn set(&mut self, handle: ColliderHandle, aabb: Aabb, filter: ProxyFilter) {
-        let id = handle.into_raw_parts().0;
+    #[inline(always)]
+    fn set(&mut self, handle: ColliderHandle, aabb: &Aabb, filter: &ProxyFilter) {
+        if !self.roll.has(handle) {
+            self.enter(handle);
+        }
+        if let Err(error) = self.finder.set(handle.into_raw_parts().0, *aabb, *filter) {
+            ignored(handle, &error);
+        }
+    }
+
+    #[cold]
+    fn enter(&mut self, handle: ColliderHandle) {
         if !self.roll.enter(handle) {
             // A predecessor with this index that was never reported as removed.
-            self.finder.remove(id);
-        }
-        if let Err(error) = self.finder.set(id, aabb, filter) {
-            tracing::error!("pbig: collider {handle:?} is ignored: {error}");
+            self.finder.remove(handle.into_raw_parts().0);
         }
     }
 
     /// Brings the finder up to date about some colliders.
     fn look_at(&mut self, call: &Call<'_>, listed: &[ColliderHandle]) {
-        let clock = Instant::now();
-        let mut proxies = std::mem::take(&mut self.proxies);
+        let mut watch = Watch::new(listed.len() >= MEASURED_FROM);
         if listed.len() < PARALLEL_FROM || rayon::current_num_threads() == 1 {
-            let mut set = Duration::ZERO;
-            for block in listed.chunks(BLOCK) {
-                proxies.resize(block.len(), Proxy::Gone);
-                call.proxies(block, &mut proxies);
-                let proxied = Instant::now();
-                self.set_all(block, &proxies);
-                set += proxied.elapsed();
-            }
-            self.kept.set += set;
-            self.kept.proxies += clock.elapsed().saturating_sub(set);
-        } else {
-            proxies.resize(listed.len(), Proxy::Gone);
-            let block = |(listed, proxies): (&[ColliderHandle], &mut [Proxy])| call.proxies(listed, proxies);
-            let blocks = listed.par_chunks(BLOCK).zip(proxies.par_chunks_mut(BLOCK));
-            blocks.with_min_len(PARALLEL_FROM / BLOCK / 8).for_each(block);
-            self.kept.proxies += clock.elapsed();
-            let proxied = Instant::now();
-            self.set_all(listed, &proxies);
-            self.kept.set += proxied.elapsed();
+            let _span = tracing::debug_span!(target: "pbig", "proxies").entered();
+            listed.chunks(BLOCK).for_each(|block| self.look_at_block(call, block));
+            self.kept.proxies += watch.lap();
+            return;
         }
+        let mut proxies = std::mem::take(&mut self.proxies);
+        proxies.resize(listed.len(), Proxy::Gone);
+        let block = |(listed, proxies): (&[ColliderHandle], &mut [Proxy])| call.proxies(listed, proxies);
+        let blocks = listed.par_chunks(BLOCK).zip(proxies.par_chunks_mut(BLOCK));
+        blocks.with_min_len(PARALLEL_FROM / BLOCK / 8).for_each(block);
+        self.kept.proxies += watch.lap();
+        self.set_all(listed, &proxies);
+        self.kept.set += watch.lap();
         self.proxies = proxies;
+    }
+
+    /// Each collider's proxy is set as soon as it is known: to write it down and read it again took 5 ns.
+    fn look_at_block(&mut self, call: &Call<'_>, listed: &[ColliderHandle]) {
+        let reach = call.reach();
+        if listed.len() <= FEW {
+            for &handle in listed {
+                self.set_proxy(handle, &call.proxy(call.fetch(handle), reach));
+            }
+            return;
+        }
+        let mut found = [(None, None); BLOCK];
+        call.fetch_all(listed, &mut found);
+        for (&handle, found) in listed.iter().zip(found) {
+            self.set_proxy(handle, &call.proxy(found, reach));
+        }
     }
 
     fn set_all(&mut self, listed: &[ColliderHandle], proxies: &[Proxy]) {
         let _span = tracing::debug_span!(target: "pbig", "set").entered();
-        for (&handle, proxy) in listed.iter().zip(proxies) {
-            match proxy {
-                Proxy::Enabled(aabb, filter) => self.set(handle, *aabb, *filter),
-                Proxy::Disabled => self.disable(handle),
-                Proxy::Gone => self.forget(handle),
-            }
+        listed.iter().zip(proxies).for_each(|(&handle, proxy)| self.set_proxy(handle, proxy));
+    }
+
+    #[inline(always)]
+    fn set_proxy(&mut self, handle: ColliderHandle, proxy: &Proxy) {
+        match proxy {
+            Proxy::Enabled(aabb, filter) => self.set(handle, aabb, filter),
+            Proxy::Disabled => self.disable(handle),
+            Proxy::Gone => self.forget(handle),
         }
     }
 
@@ -274,14 +291,43 @@ impl PbigBroadPhase {
             tracing::error!("pbig: no pairs in this update: {error}");
             return;
         }
-        let clock = Instant::now();
+        let (added, removed) = (&self.finder.events().added, &self.finder.events().removed);
+        let count = added.len() + removed.len() + self.outbox.adopted.len();
+        if count == 0 {
+            return;
+        }
+        let mut watch = Watch::new(count >= MEASURED_FROM);
         let _span = tracing::debug_span!(target: "pbig", "events").entered();
         let sent = self.outbox.send(&self.finder, &self.roll, events);
-        self.kept.events = clock.elapsed();
+        self.kept.events = watch.lap();
         (self.kept.added, self.kept.deleted) = sent;
         self.kept.totals.added += sent.0 as u64;
         self.kept.totals.deleted += sent.1 as u64;
     }
+
+    /// A call with news, or after one that left something to do. (Apart, as what it puts on the stack would be there for
+    /// calls at rest, too.)
+    #[inline(never)]
+    fn take(&mut self, call: &Call<'_>, has_news: bool, events: &mut Vec<BroadPhasePairEvent>) {
+        let (modified, removed) = (call.modified, call.removed);
+        let _span = tracing::debug_span!(target: "pbig", "update", modified = modified.len()).entered();
+        let totals = Totals { updates: self.kept.totals.updates + 1, ..self.kept.totals };
+        self.kept = Kept { modified: modified.len(), removed: removed.len(), totals, ..Kept::default() };
+        self.take_in(call);
+        #[cfg(feature = "shadow")]
+        let before = events.len();
+        self.find_and_send(events);
+        #[cfg(feature = "shadow")]
+        if let Some(checker) = &mut self.shadow {
+            checker.watch(call, &events[before..]);
+        }
+        self.idle = !has_news && self.rests();
+    }
+}
+
+#[cold]
+fn ignored(handle: ColliderHandle, error: &pbig_core::Error) {
+    tracing::error!("pbig: collider {handle:?} is ignored: {error}");
 }
 
 impl BroadPhase for PbigBroadPhase {
@@ -301,19 +347,7 @@ impl BroadPhase for PbigBroadPhase {
             self.kept.totals.updates += 1;
             return;
         }
-        let _span = tracing::debug_span!(target: "pbig", "update", modified = modified.len()).entered();
-        let call = Call { params, colliders, bodies, modified, removed };
-        let totals = Totals { updates: self.kept.totals.updates + 1, ..self.kept.totals };
-        self.kept = Kept { modified: modified.len(), removed: removed.len(), totals, ..Kept::default() };
-        self.take_in(&call);
-        #[cfg(feature = "shadow")]
-        let before = events.len();
-        self.find_and_send(events);
-        #[cfg(feature = "shadow")]
-        if let Some(checker) = &mut self.shadow {
-            checker.watch(&call, &events[before..]);
-        }
-        self.idle = !has_news && self.rests();
+        self.take(&Call { params, colliders, bodies, modified, removed }, has_news, events);
     }
 }
 

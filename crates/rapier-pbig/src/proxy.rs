@@ -5,7 +5,7 @@ use crate::call::Call;
 use pbig_core::{Aabb, ProxyFilter, TestMode};
 use rapier3d::prelude::{
     ActiveCollisionTypes, Collider, ColliderHandle, IntegrationParameters, Isometry, Point, Real, RigidBody,
-    RigidBodySet, RigidBodyType, Shape,
+    RigidBodySet, RigidBodyType, Shape, TypedShape,
 };
 
 /// What the finder is to be told about a collider.
@@ -20,27 +20,56 @@ pub(crate) enum Proxy {
 /// body; asked for one by one, a processor waits for one or two at a time.
 pub(crate) const BLOCK: usize = 64;
 
-impl Call<'_> {
+/// Colliders for which no memory is asked for ahead: to make room for a block took longer than to look at one.
+pub(crate) const FEW: usize = 8;
+
+/// A collider and its body, as far as they are there.
+pub(crate) type Fetched<'a> = (Option<&'a Collider>, Option<&'a RigidBody>);
+
+impl<'a> Call<'a> {
+    /// Half the prediction distance.
+    pub(crate) fn reach(&self) -> Real {
+        self.params.prediction_distance() / 2.0
+    }
+
     /// The proxies of at most [`BLOCK`] colliders.
     pub(crate) fn proxies(&self, listed: &[ColliderHandle], out: &mut [Proxy]) {
         let _span = tracing::debug_span!(target: "pbig", "proxies").entered();
-        let mut found = [(None, None); BLOCK];
+        let (reach, mut found) = (self.reach(), [(None, None); BLOCK]);
+        self.fetch_all(listed, &mut found);
+        for (proxy, found) in out.iter_mut().zip(found) {
+            *proxy = self.proxy(found, reach);
+        }
+    }
+
+    #[inline]
+    pub(crate) fn fetch(&self, handle: ColliderHandle) -> Fetched<'a> {
+        let collider = self.colliders.get(handle);
+        (collider, self.body(collider))
+    }
+
+    /// Of at most [`BLOCK`] colliders.
+    pub(crate) fn fetch_all(&self, listed: &[ColliderHandle], found: &mut [Fetched<'a>; BLOCK]) {
         for (found, &handle) in found.iter_mut().zip(listed) {
             found.0 = self.colliders.get(handle);
         }
         for found in &mut found[..listed.len()] {
-            let parent = found.0.and_then(Collider::parent);
-            found.1 = parent.and_then(|handle| self.bodies.get(handle));
+            found.1 = self.body(found.0);
         }
-        for (proxy, (collider, body)) in out.iter_mut().zip(found) {
-            *proxy = match collider {
-                None => Proxy::Gone,
-                Some(collider) if !collider.is_enabled() => Proxy::Disabled,
-                Some(collider) => {
-                    let aabb = aabb_of(self.params, body, collider);
-                    Proxy::Enabled(aabb, filter_with(body, collider))
-                }
-            };
+    }
+
+    fn body(&self, collider: Option<&Collider>) -> Option<&'a RigidBody> {
+        collider.and_then(Collider::parent).and_then(|handle| self.bodies.get(handle))
+    }
+
+    #[inline(always)]
+    pub(crate) fn proxy(&self, (collider, body): Fetched<'_>, reach: Real) -> Proxy {
+        match collider {
+            None => Proxy::Gone,
+            Some(collider) if !collider.is_enabled() => Proxy::Disabled,
+            Some(collider) => {
+                Proxy::Enabled(aabb_of(self.params.dt, reach, body, collider), filter_with(body, collider))
+            }
         }
     }
 }
@@ -51,25 +80,33 @@ impl Call<'_> {
 /// Without the change margin, which is the finder's. A pose with a NaN gives an invalid box, which
 /// pairs with nothing.
 pub fn collision_aabb(params: &IntegrationParameters, bodies: &RigidBodySet, collider: &Collider) -> Aabb {
-    aabb_of(params, parent_of(bodies, collider), collider)
+    aabb_of(params.dt, params.prediction_distance() / 2.0, parent_of(bodies, collider), collider)
 }
 
 fn parent_of<'a>(bodies: &'a RigidBodySet, collider: &Collider) -> Option<&'a RigidBody> {
     collider.parent().and_then(|handle| bodies.get(handle))
 }
 
-fn aabb_of(params: &IntegrationParameters, parent: Option<&RigidBody>, collider: &Collider) -> Aabb {
-    let reach = collider.contact_skin() + params.prediction_distance() / 2.0;
-    let now = shape_aabb(collider.shape(), collider.position());
-    let predicted = parent
-        .filter(|body| body.soft_ccd_prediction() > 0.0)
-        .and_then(|body| predicted_aabb(params.dt, body, collider));
-    let both = predicted.map_or(now, |then| union(&now, &then));
-    both.inflated(reach)
+/// `reach` is half the prediction distance.
+#[inline(always)]
+fn aabb_of(dt: Real, reach: Real, parent: Option<&RigidBody>, collider: &Collider) -> Aabb {
+    let mut aabb = shape_aabb(collider.shape(), collider.position());
+    if let Some(body) = parent.filter(|body| body.soft_ccd_prediction() > 0.0)
+        && let Some(then) = predicted_aabb(dt, body, collider)
+    {
+        aabb = union(&aabb, &then);
+    }
+    aabb.inflated(collider.contact_skin() + reach)
 }
 
+#[inline(always)]
 fn shape_aabb(shape: &dyn Shape, pose: &Isometry<Real>) -> Aabb {
-    let aabb = shape.compute_aabb(pose);
+    // What the shape does itself, but inlined: a result that comes by memory is waited for.
+    let aabb = match shape.as_typed_shape() {
+        TypedShape::Cuboid(cuboid) => cuboid.aabb(pose),
+        TypedShape::Ball(ball) => ball.aabb(pose),
+        _ => shape.compute_aabb(pose),
+    };
     Aabb::new(aabb.mins.coords.into(), aabb.maxs.coords.into())
 }
 
@@ -79,6 +116,7 @@ fn shape_aabb(shape: &dyn Shape, pose: &Isometry<Real>) -> Aabb {
 /// the path of the centre of mass is cut off at the distance, which is exact, and the orientation
 /// there, which is not known, is covered by a ball around it: conservative, and never larger than a
 /// ball. (A union with the unclamped pose alone can miss a collider that spins.)
+#[cold]
 fn predicted_aabb(dt: Real, body: &RigidBody, collider: &Collider) -> Option<Aabb> {
     let pose_in_body = collider.position_wrt_parent()?;
     let predicted = body.predict_position_using_velocity_and_forces(dt);

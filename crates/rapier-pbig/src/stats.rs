@@ -2,7 +2,26 @@
 
 use crate::PbigBroadPhase;
 use pbig_core::Report;
-use std::time::Duration;
+use std::time::{Duration, Instant};
+
+/// Colliders or events from which their stages are timed: a reading of the clock takes as long as one.
+pub(crate) const MEASURED_FROM: usize = 64;
+
+/// Reads the clock, or does not.
+pub(crate) struct Watch(Option<Instant>);
+
+impl Watch {
+    pub(crate) fn new(reads: bool) -> Self {
+        Self(reads.then(Instant::now))
+    }
+
+    /// The time since the last lap; zero when the clock is not read.
+    pub(crate) fn lap(&mut self) -> Duration {
+        let Some(clock) = &mut self.0 else { return Duration::ZERO };
+        let now = Instant::now();
+        now.duration_since(std::mem::replace(clock, now))
+    }
+}
 
 /// What the last update did. Rapier makes two in each step: the first sees what the app changed, the second
 /// what the step moved. So after a step these are the numbers of the second; [`Totals`] count both.
@@ -20,11 +39,14 @@ pub struct Stats<'a> {
     pub deleted: usize,
     /// The sums over all updates.
     pub totals: Totals,
-    /// Time for the boxes and filters of the modified colliders: reading colliders and bodies.
+    /// Time for the boxes and filters of the modified colliders: reading colliders and bodies, and, where one thread
+    /// does it, comparing each with what is stored. Zero for fewer than 64 colliders: reading the clock would take as
+    /// long.
     pub proxies: Duration,
-    /// Time for comparing those with what is stored.
+    /// Time for comparing those with what is stored, where that is a stage of its own: after several threads have
+    /// computed them.
     pub set: Duration,
-    /// Time for turning pairs of ids into events.
+    /// Time for turning pairs of ids into events. Zero for fewer than 64.
     pub events: Duration,
     /// The finder's stages between `set` and `events`, its plan and counts.
     pub report: &'a Report,
@@ -59,7 +81,7 @@ pub(crate) struct Kept {
 }
 
 impl Stats<'_> {
-    /// The time of all stages: nearly all of the update.
+    /// The time of all stages that were timed: nearly all of an update in which much changes.
     pub fn total(&self) -> Duration {
         self.proxies + self.set + self.report.stages.total() + self.events
     }

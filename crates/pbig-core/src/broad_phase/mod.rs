@@ -4,6 +4,7 @@
 mod allocations;
 #[cfg(feature = "gpu")]
 mod device;
+mod small;
 #[cfg(feature = "serde")]
 mod snapshot;
 mod state;
@@ -15,11 +16,13 @@ use crate::diff::PairStore;
 use crate::finder::check_count;
 #[cfg(feature = "gpu")]
 use crate::gpu::GpuFinder;
-use crate::report::{Report, lap, stage};
+use crate::report::{Checks, Report, StageTimes, Watch, stage};
 use crate::search::Search;
 use crate::{Aabb, Backend, Config, Error, Pair, Plan, ProxyFilter};
 use std::collections::HashMap;
-use std::time::Instant;
+
+/// Changed boxes of a small world from which its stages are timed: a reading of the clock takes as long as one box.
+const MEASURED_FROM: usize = 64;
 
 /// What an update changed. Both lists are sorted and free of duplicates, and have no pair in common.
 ///
@@ -58,7 +61,8 @@ mod flag {
 /// Each box is stored fat, grown by [`Config::margin`]; while later boxes stay inside, nothing has
 /// changed and nothing is done (contract 5). Ids should be dense: memory follows the largest.
 ///
-/// All boxes lie in a base grid. Where few change they are put into other cells, and only they are searched. When an
+/// On the CPU up to 1024 boxes are kept in a bitmap index, in which changed boxes are looked up. More
+/// lie in a base grid. Where few change they are put into other cells, and only they are searched. When an
 /// eighth of all boxes changes or is out of the grid's order, it is built anew.
 /// ([`crate::Strategy::Pbig`] and [`crate::Backend::Brute`] search everything at every update that changes
 /// something. A GPU is told what has changed, and tells which pairs came or went.)
@@ -96,6 +100,7 @@ pub struct BroadPhase {
     #[cfg(feature = "gpu")]
     ending: Vec<u32>,
     base: Search<Tracked>,
+    small: small::Small,
     /// Whether `base.map` holds the boxes whose home it is: not after a search by anything else.
     has_base: bool,
     /// As it was built.
@@ -133,6 +138,7 @@ impl BroadPhase {
             #[cfg(feature = "gpu")]
             ending: vec![],
             base: Search::new(),
+            small: small::Small::default(),
             has_base: false,
             base_plan: Plan::default(),
             base_checks: 0,
@@ -187,21 +193,12 @@ impl BroadPhase {
     ///
     /// # Errors
     /// [`Error::TooManyBoxes`] when the id is not below [`crate::Limits::max_boxes`].
-    #[inline]
+    #[inline(always)]
     pub fn set(&mut self, id: u32, aabb: Aabb, filter: ProxyFilter) -> Result<(), Error> {
         let i = id as usize;
-        if i >= self.boxes.len() {
-            self.make_room_for(id)?;
-        }
         let valid = aabb.is_valid();
-        if self.flags[i] & flag::PRESENT == 0 {
-            self.note_change(id);
-            self.flags[i] |= flag::PRESENT;
-            self.present_count += 1;
-            self.invalid_count += 1;
-            self.filters[i] = filter;
-            self.put(i, aabb, valid);
-            return Ok(());
+        if self.flags.get(i).is_none_or(|flags| flags & flag::PRESENT == 0) {
+            return self.insert(id, aabb, filter);
         }
         if !self.still_holds(&self.boxes[i], &aabb, valid) {
             self.note_change(id);
@@ -212,6 +209,22 @@ impl BroadPhase {
             self.note_filter(id);
             self.filters[i] = filter;
         }
+        Ok(())
+    }
+
+    #[cold]
+    fn insert(&mut self, id: u32, aabb: Aabb, filter: ProxyFilter) -> Result<(), Error> {
+        let i = id as usize;
+        if i >= self.boxes.len() {
+            check_count(u64::from(id) + 1, &self.config)?;
+            self.make_room(i + 1);
+        }
+        self.note_change(id);
+        self.flags[i] |= flag::PRESENT;
+        self.present_count += 1;
+        self.invalid_count += 1;
+        self.filters[i] = filter;
+        self.put(i, aabb, aabb.is_valid());
         Ok(())
     }
 
@@ -250,47 +263,52 @@ impl BroadPhase {
     pub fn update(&mut self) -> Result<&Events, Error> {
         self.events.added.clear();
         self.events.removed.clear();
-        self.report = Report {
-            boxes: u64::from(self.present_count),
-            invalid: u64::from(self.invalid_count),
-            changed: self.changed.len() as u64,
-            pairs: self.pairs.len() as u64,
-            plan: Plan { boxes: self.valid_count(), ..Plan::default() },
-            // A backend that was asked for stays unavailable until a search on it succeeds.
-            fallback: self.report.fallback.take().filter(|_| self.config.backend == Backend::Gpu),
-            ..Report::default()
-        };
+        self.begin_report();
         if self.changed.is_empty() {
             return Ok(&self.events);
         }
         self.pairs.drop_removed();
-        if let Err(error) = self.find_added().and_then(|()| self.check_room()) {
+        let is_small = self.is_small();
+        let mut watch = Watch::new(!is_small || self.changed.len() >= MEASURED_FROM);
+        let found = if is_small { self.find_in_small(&mut watch) } else { self.find_added() };
+        if let Err(error) = found.and_then(|()| self.check_room()) {
             self.events.added.clear();
             return Err(error);
         }
-        let mut clock = Instant::now();
+        if !is_small {
+            self.small.pass();
+            watch.lap();
+        }
         {
             stage!("diff");
             self.find_removed();
             self.store();
-            self.report.stages.diff += lap(&mut clock);
+            self.report.stages.diff += watch.lap();
         }
         stage!("emit");
         self.sort_events();
-        self.report.stages.emit += lap(&mut clock);
+        self.report.stages.emit += watch.lap();
         self.report.pairs = self.pairs.len() as u64;
         Ok(&self.events)
     }
 
-    fn valid_count(&self) -> u32 {
-        self.present_count - self.invalid_count
+    /// A report of nothing done yet. Field by field: to make and drop whole ones took longer than to search ten boxes.
+    fn begin_report(&mut self) {
+        let boxes = self.valid_count();
+        let report = &mut self.report;
+        (report.stages, report.checks) = (StageTimes::default(), Checks::default());
+        (report.boxes, report.invalid) = (u64::from(self.present_count), u64::from(self.invalid_count));
+        (report.changed, report.pairs) = (self.changed.len() as u64, self.pairs.len() as u64);
+        report.plan.begin(boxes);
+        report.gpu = None;
+        // A backend that was asked for stays unavailable until a search on it succeeds.
+        if self.config.backend != Backend::Gpu {
+            report.fallback = None;
+        }
     }
 
-    #[cold]
-    fn make_room_for(&mut self, id: u32) -> Result<(), Error> {
-        check_count(u64::from(id) + 1, &self.config)?;
-        self.make_room(id as usize + 1);
-        Ok(())
+    fn valid_count(&self) -> u32 {
+        self.present_count - self.invalid_count
     }
 
     fn make_room(&mut self, ids: usize) {
@@ -307,15 +325,17 @@ impl BroadPhase {
     fn still_holds(&self, fat: &Aabb, aabb: &Aabb, valid: bool) -> bool {
         // A little less than two margins: the gaps below are rounded.
         let slack = 2.0 * self.config.margin * (1.0 - 2.0 * f32::EPSILON);
-        // Equal first: the difference of equal infinities is NaN. No branches: which side of a box has moved is a coin
-        // toss, and six of them took 30 ns.
-        let near = |outer: f32, inner: f32, gap: f32| (outer == inner) | ((gap >= 0.0) & (gap <= slack));
-        let mut holds = valid;
+        // No branches: which side of a box has moved is a coin toss, and six of them took 30 ns.
+        let (mut moved, mut sum) = (!valid, 0.0);
         for k in 0..3 {
-            holds &= near(fat.min[k], aabb.min[k], aabb.min[k] - fat.min[k]);
-            holds &= near(fat.max[k], aabb.max[k], fat.max[k] - aabb.max[k]);
+            let (below, above) = (aabb.min[k] - fat.min[k], fat.max[k] - aabb.max[k]);
+            moved |= (below < 0.0) | (below > slack) | (above < 0.0) | (above > slack);
+            sum += below + above;
         }
-        holds || (!valid && !fat.is_valid())
+        if moved {
+            return !valid && !fat.is_valid();
+        }
+        !sum.is_nan() || holds_exactly(fat, aabb, slack)
     }
 
     /// The first time after an update that a box or its filter change.
@@ -338,6 +358,17 @@ impl BroadPhase {
             self.refiltered.insert(id, Old { aabb, filter: self.filters[i] });
         }
     }
+}
+
+/// As [`BroadPhase::still_holds`] of a valid box, some coordinates infinite or the fat box nowhere.
+#[cold]
+fn holds_exactly(fat: &Aabb, aabb: &Aabb, slack: f32) -> bool {
+    // Equal first: the difference of equal infinities is NaN.
+    let near = |outer: f32, inner: f32, gap: f32| outer == inner || (gap >= 0.0 && gap <= slack);
+    (0..3).all(|k| {
+        let (below, above) = (aabb.min[k] - fat.min[k], fat.max[k] - aabb.max[k]);
+        near(fat.min[k], aabb.min[k], below) && near(fat.max[k], aabb.max[k], above)
+    })
 }
 
 fn check_margin(margin: f32) -> Result<(), Error> {

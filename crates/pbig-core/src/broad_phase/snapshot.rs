@@ -146,7 +146,11 @@ mod tests {
 
     #[test]
     fn a_restored_broad_phase_goes_on_with_the_same_events() {
-        let config = Config { margin: 0.05, brute_below: 0, ..Config::DEFAULT };
+        [crate::Strategy::Grid, crate::Strategy::Auto].into_iter().for_each(goes_on);
+    }
+
+    fn goes_on(strategy: crate::Strategy) {
+        let config = Config { margin: 0.05, strategy, ..Config::DEFAULT };
         let mut kept = BroadPhase::new(config).expect("a margin");
         let mut events = 0;
         for round in 0..12 {

@@ -28,7 +28,6 @@ macro_rules! state {
         }
     };
 }
-#[cfg(feature = "gpu")]
 pub(super) use state;
 
 /// Events from which both lists are sorted at once.

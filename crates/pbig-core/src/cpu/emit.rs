@@ -31,6 +31,9 @@ pub(crate) struct Scratch {
 
 /// Brings one list into order. Ids are below `ids`.
 pub(crate) fn sort(pairs: &mut Vec<Pair>, ids: usize, scratch: &mut Scratch) {
+    if pairs.len() < 2 {
+        return;
+    }
     if are_few(pairs.len(), ids) {
         return sort_by_comparing(pairs);
     }

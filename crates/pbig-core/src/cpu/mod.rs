@@ -1,7 +1,10 @@
 //! The CPU backend. `map` sorts boxes into cells (`levels`, `cells`, `sort`; `crowding` where many share few; `edit` and `spill` where few move), `find`
 //! searches them: `half` within a level and `window` across levels leave candidates, by `codes`, which `judge` tests;
-//! `check` tests `entries` that fit no level. `emit` orders the pairs. `pbig` is the paper's grid, plain and scalar.
+//! `check` tests `entries` that fit no level. `bitmap` is for few boxes (`bands`). `emit` orders the pairs. `pbig` is the
+//! paper's grid, plain and scalar.
 
+mod bands;
+pub(crate) mod bitmap;
 mod cells;
 pub(crate) mod check;
 pub(crate) mod codes;

@@ -30,6 +30,8 @@ pub enum Chosen {
     Nothing,
     /// Every pair is tested.
     Brute,
+    /// A bitmap index, for few boxes that are kept from update to update.
+    Bitmap,
     /// Boxes sorted by the cell of their lower corner, in one grid a level.
     Grid,
     /// PBIG's grid of duplicated entries.
@@ -44,6 +46,7 @@ impl Chosen {
         match self {
             Self::Nothing => "nothing",
             Self::Brute => "brute",
+            Self::Bitmap => "bitmap",
             Self::Grid => "grid",
             Self::Pbig => "pbig",
             Self::Edit => "edit",
@@ -109,6 +112,20 @@ impl Plan {
 }
 
 impl Plan {
+    /// Nothing chosen, for so many boxes. What has no memory to give back is not touched.
+    pub(crate) fn begin(&mut self, boxes: u32) {
+        if self.levels.is_empty() {
+            (self.chosen, self.swept, self.pbig, self.moved) = (Chosen::Nothing, 0, None, 0);
+            #[cfg(feature = "gpu")]
+            {
+                self.gpu = None;
+            }
+            self.boxes = boxes;
+        } else {
+            *self = Self { boxes, ..Self::default() };
+        }
+    }
+
     /// For boxes by camp, the first of which is open: levels for each, all in one plan.
     pub(crate) fn of_camps(summaries: &[Summary], config: &Config, crowding: f32) -> Self {
         let boxes = summaries.iter().map(|summary| summary.valid).sum();
@@ -134,6 +151,7 @@ impl fmt::Display for Plan {
                 "nothing to do: of {boxes} valid boxes none has changed, or there are fewer than two"
             ),
             Chosen::Brute => write!(f, "brute force: {boxes} boxes are cheaper to test than to sort"),
+            Chosen::Bitmap => write!(f, "bitmap: {boxes} boxes are cheaper to look up in bands than to sort"),
             Chosen::Grid => write!(f, "grid: {boxes} boxes"),
             Chosen::Edit => write!(
                 f,
