@@ -2,6 +2,7 @@
 //! searches them: `half` within a level and `window` across levels leave candidates, by `codes`, which `judge` tests;
 //! `check` tests `entries` that fit no level. `emit` orders the pairs. `pbig` is the paper's grid, plain and scalar.
 
+mod calibrate;
 mod cells;
 pub(crate) mod check;
 pub(crate) mod codes;
