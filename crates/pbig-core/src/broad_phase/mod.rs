@@ -62,9 +62,9 @@ mod flag {
 /// changed and nothing is done (contract 5). Ids should be dense: memory follows the largest.
 ///
 /// All boxes lie in a base grid. Where few change, those that stay in their cells are overwritten there; the others
-/// are sorted into a second, small grid each time, until they come back. Changed boxes are searched in both. When an
-/// eighth of all boxes changes or has left its cell the base is built anew, and now and then so that boxes at rest
-/// return to it.
+/// are sorted into a second, small grid each time, until they come back. Changed boxes are searched in both. When a
+/// quarter of all boxes changes or an eighth has left its cell the base is built anew, and now and then so that boxes at
+/// rest return to it.
 /// ([`crate::Strategy::Pbig`] and [`crate::Backend::Brute`] search everything at every update that changes
 /// something. A GPU is told what has changed, and tells which pairs came or went.)
 ///
