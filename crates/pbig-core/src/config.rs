@@ -1,5 +1,6 @@
 //! What a caller can choose. Every field says its unit, why one would change it, and what follows.
 
+use crate::plan::Costs;
 use std::time::Duration;
 
 /// Where the work runs.
@@ -161,8 +162,9 @@ pub struct Config {
     /// the caller's length unit. Larger: fewer boxes count as changed, more pairs are reported
     /// that do not touch yet.
     pub margin: f32,
-    /// On the CPU, below this many boxes every pair is tested without a grid ([`crate::Finder`]). Avril's table 7 puts the
-    /// crossover at 1000 boxes on a GPU of 2008; on a CPU core of 2022 it is near 100.
+    /// On the CPU, below this many boxes every pair is tested without a grid, and costs are not compared
+    /// ([`crate::Finder`]). Avril's table 7 puts the crossover at 1000 boxes on a GPU of 2008; on a CPU core of 2022 it is between
+    /// 30 and 50, and above this number the plan finds it by the costs.
     pub brute_below: u32,
     /// PBIG's `W` in the constraint `f >= W` of equation 6: the wanted boxes per cell of
     /// [`Strategy::Pbig`] and of the GPU. The paper takes a warp, 32; a core without lanes to fill prefers few.
@@ -172,6 +174,9 @@ pub struct Config {
     /// In [`Strategy::Pbig`], and on the GPU up to 256, cells of at most this many boxes go through Avril's index to pair
     /// mapping, larger ones through PBIG's balanced rows.
     pub small_cell: u32,
+    /// What work costs, for the plan. None: as measured on this machine where a choice is close. Given ones, from a file
+    /// say, make plans and reports of searches from nothing the same everywhere; pairs and events are anyway.
+    pub costs: Option<Costs>,
     /// About the GPU backend.
     pub gpu: GpuOptions,
 }
@@ -184,10 +189,11 @@ impl Config {
         order: Order::Sorted,
         limits: Limits::DEFAULT,
         margin: 0.0,
-        brute_below: 64,
+        brute_below: 32,
         pbig_boxes_per_cell: 4.0,
         cell_rule: CellRule::Objective,
         small_cell: 32,
+        costs: None,
         gpu: GpuOptions::DEFAULT,
     };
 }

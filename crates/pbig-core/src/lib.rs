@@ -72,7 +72,7 @@ pub use finder::{Finder, find_pairs};
 #[cfg(feature = "gpu")]
 pub use gpu::GpuFinder;
 pub use pair::Pair;
-pub use plan::Plan;
+pub use plan::{Costs, Forecast, Plan};
 pub use report::{Checks, GpuReport, Report, StageTimes};
 
 /// Which instructions the search on the CPU uses, chosen at run time: "AVX2", or "portable".

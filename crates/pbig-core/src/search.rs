@@ -10,7 +10,7 @@ use crate::cpu::pbig::PbigGrid;
 use crate::cpu::record::Record;
 #[cfg(feature = "gpu")]
 use crate::gpu::{self, ChangeRequest, GpuFinder};
-use crate::plan::{LazySummary, Plan, Summary};
+use crate::plan::{Costs, LazySummary, Plan, Summary};
 use crate::report::{Checks, Report, lap, stage};
 use crate::{Aabb, Backend, Config, Error, ProxyFilter, Strategy};
 use std::time::{Duration, Instant};
@@ -120,7 +120,16 @@ impl<R: Record> Search<R> {
         self.map.find(accept, config.limits.max_pairs, &mut self.found)?;
         report.stages.check += lap(&mut clock);
         report.checks = single_entry_checks(&self.found);
+        self.learn(report);
         Ok(())
+    }
+
+    /// What the search took corrects what is expected of the next one. Pairs cost the same whichever way they are found.
+    fn learn(&mut self, report: &Report) {
+        let Some(expected) = report.plan.expected else { return };
+        let took = (report.stages.map + report.stages.check).as_nanos() as f32;
+        let pairs = Costs::REFERENCE.pair * self.found.overlaps as f32;
+        self.map.experience.note(expected, (took - pairs).max(0.0));
     }
 
     #[cfg(feature = "gpu")]

@@ -61,9 +61,10 @@ impl BroadPhase {
         }
     }
 
-    /// Whether so many boxes have changed that to look at all costs less than to tell them apart.
+    /// Whether so many boxes have changed that to look at all costs less than to tell them apart: edits take half as long
+    /// where a seventh moves, 0.8 to 1.0 times where a fifth does (docs/benchmarks/crossovers.md).
     pub(super) fn many_changed(&self) -> bool {
-        self.changed.len() * 8 >= self.present_count as usize
+        self.changed.len() * 4 >= self.present_count as usize
     }
 
     pub(super) fn check_room(&self) -> Result<(), Error> {

@@ -1,9 +1,10 @@
 //! Crowds: what to do where many boxes share few cells. Smaller cells, where those part them; grids without a search of
 //! their own for boxes that may not pair with each other ([`Camps`]), where those do not.
 
+use super::calibrate;
 use super::map::Map;
 use super::record::Record;
-use crate::plan::{Camps, Chosen, LazySummary, Plan, Summary, spread_evenly};
+use crate::plan::{Camps, Chosen, Costs, LazySummary, Plan, Summary, spread_evenly};
 use crate::report::{StageTimes, lap, stage};
 use crate::{Aabb, Config, ProxyFilter};
 use std::time::Instant;
@@ -76,7 +77,7 @@ impl Kept {
     fn suits(&self, set: &Set<'_>, config: &Config) -> bool {
         let (planned, boxes) = (u64::from(self.plan.boxes), set.len() as u64);
         self.builds < Self::LONGEST
-            && self.plan.chosen == Chosen::Grid
+            && matches!(self.plan.chosen, Chosen::Grid | Chosen::Brute)
             && self.config == *config
             && planned <= 2 * boxes
             && boxes <= 2 * planned
@@ -215,7 +216,7 @@ impl<R: Record> Map<R> {
         let factor = self.crowding.factor;
         self.camp_of.clear();
         let (Some(filters), true) = (set.filters, self.has_camps()) else {
-            return Plan::new(set.summary.get(), config, factor);
+            return self.plan_by_costs(set.summary.get(), config);
         };
         let camps = &self.camps;
         self.camp_of.extend(set.ids().map(|id| camps.camp(&filters[id as usize])));
@@ -225,7 +226,15 @@ impl<R: Record> Map<R> {
         };
         let summary = |camp: usize| Summary::of(set.boxes, Some(&members(camp as u8)));
         let summaries: Vec<Summary> = (0..camps.count()).map(summary).collect();
-        Plan::of_camps(&summaries, config, factor)
+        Plan::of_camps(&summaries, config, factor, &config.costs.unwrap_or(Costs::REFERENCE))
+    }
+
+    /// By given costs; else by those of the reference, or where that is too close to call by this machine's.
+    fn plan_by_costs(&self, summary: &Summary, config: &Config) -> Plan {
+        let by = |costs: &Costs| Plan::by(summary, config, self.crowding.factor, costs, &self.experience);
+        let plan = by(&config.costs.unwrap_or(Costs::REFERENCE));
+        let measure = config.costs.is_none() && plan.forecast.is_close();
+        if measure { by(calibrate::measured()) } else { plan }
     }
 
     /// How full the fullest level is.

@@ -280,7 +280,7 @@ mod tests {
     use crate::cpu::record::Item;
     use crate::plan::LazySummary;
     use crate::report::StageTimes;
-    use crate::{Aabb, Config, Pair, Strategy, oracle};
+    use crate::{Aabb, Config, Costs, Pair, Strategy, oracle};
 
     struct Every;
 
@@ -301,7 +301,11 @@ mod tests {
     }
 
     fn map_of(boxes: &[Aabb]) -> Map<Item> {
-        let config = Config { strategy: Strategy::Grid, ..Config::DEFAULT };
+        map_by(boxes, Costs::REFERENCE)
+    }
+
+    fn map_by(boxes: &[Aabb], costs: Costs) -> Map<Item> {
+        let config = Config { strategy: Strategy::Grid, costs: Some(costs), ..Config::DEFAULT };
         let mut map = Map::new();
         let summary = &LazySummary::new(boxes, None, None);
         let set = Set { boxes, filters: None, ids: None, summary, before: &[] };
@@ -341,7 +345,7 @@ mod tests {
         let mut boxes = boxes(8000, 20.0, 0.0005);
         boxes.extend(super::tests::boxes(1000, 100.0, 5.0));
         let wanted = oracle::pairs(&boxes);
-        let mut map = map_of(&boxes);
+        let mut map = map_by(&boxes, Costs { visit: 1.0, visited: 0.1, ..Costs::REFERENCE });
         assert!(map.levels.len() > 1, "{} levels", map.levels.len());
         for simd in [Simd::Portable, Simd::detect()] {
             map.simd = simd;

@@ -8,7 +8,7 @@ use super::levels::{Classes, LISTED, Level};
 use super::record::{Item, Record};
 use super::sort::{Input, Sort, Sorted, shift_for};
 use crate::Aabb;
-use crate::plan::{Camps, OccupiedCell, Plan};
+use crate::plan::{Camps, Experience, OccupiedCell, Plan};
 
 /// Boxes from which a sort is shared with other threads.
 const PARALLEL_FROM: usize = 20_000;
@@ -33,6 +33,8 @@ pub(crate) struct Map<R> {
     pub(super) camps: Camps,
     /// Of the boxes of the set, in their order; empty without camps.
     pub(super) camp_of: Vec<u8>,
+    /// What searches took against what was expected.
+    pub(crate) experience: Experience,
     /// How often boxes were sorted.
     #[cfg(test)]
     pub(super) builds: usize,
@@ -54,6 +56,7 @@ impl<R: Record> Map<R> {
             invalid: 0,
             camps: Camps::default(),
             camp_of: Vec::new(),
+            experience: Experience::default(),
             #[cfg(test)]
             builds: 0,
         }

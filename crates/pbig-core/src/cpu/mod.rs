@@ -5,6 +5,7 @@
 
 mod bands;
 pub(crate) mod bitmap;
+mod calibrate;
 mod cells;
 pub(crate) mod check;
 pub(crate) mod codes;

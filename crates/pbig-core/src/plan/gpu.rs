@@ -5,9 +5,9 @@
 //! single cell: boxes too large for the others are tested there against everything, once (contract 4).
 
 use super::pbig::{density_cell, ordinary, pbig_cell, space_of};
-use super::{Company, LevelPlan, Summary, levels, size_class_of};
+use super::{LevelPlan, Summary, levels, size_class_of};
 use crate::Aabb;
-use crate::config::{CellRule, Config, Strategy};
+use crate::config::{CellRule, Config};
 use crate::layout::{FEWEST_CELLS, Level, MOST_LEVELS, MOST_SPAN, Params, ordered};
 use std::fmt;
 
@@ -50,7 +50,7 @@ impl GpuPlan {
     /// The grid for the boxes behind `summary`, with at most `most_cells` cells. `crowding` is a factor
     /// on the cell size: 1, or less where cells turned out to be too full.
     pub fn new(summary: &Summary, config: &Config, crowding: f32, most_cells: u32) -> Self {
-        let (split, _) = levels::choose(summary, 1.0, Strategy::Grid, Company::NONE);
+        let split = levels::for_device(summary);
         // The coarsest levels, if there are too many: finer boxes then share the first of them.
         let split = &split[split.len().saturating_sub(MOST_LEVELS - 1)..];
         let (space, low) = space_of(summary, &ordinary(summary));

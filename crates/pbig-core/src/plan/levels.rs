@@ -1,6 +1,7 @@
 //! Which boxes share a grid. Sizes have no law (contract 4): one grid where one is cheapest, several
 //! levels where sizes differ by decades, and a list tested against everything for the few largest.
 
+use super::costs::{Costs, Experience, Forecast, Way};
 use super::summary::LARGEST_CLASS;
 use super::{Summary, spacing};
 use crate::Aabb;
@@ -18,7 +19,7 @@ pub struct LevelPlan {
     /// further than this beyond its lower corner.
     pub max_extent: [f32; 3],
     /// Cell size: at least [`LevelPlan::SPARE`] times `max_extent`, and such that about half a box falls into a
-    /// cell.
+    /// cell, or two.
     pub cell: [f32; 3],
     /// Where cell 0 begins.
     pub origin: [f32; 3],
@@ -45,6 +46,10 @@ pub struct OccupiedCell {
 impl LevelPlan {
     /// How much larger than its largest box a cell is at least: 62 of 64 steps, see `cpu::cells`.
     pub const SPARE: f32 = 64.0 / 62.0 + 1e-6;
+
+    /// Against its cell, boxes up to this size count as small: few reach beyond it. 22 of 64 steps, and two for rounding,
+    /// see `cpu::cells`.
+    pub(crate) const SPACIOUS: f32 = 22.0 / 64.0;
 }
 
 impl fmt::Display for LevelPlan {
@@ -59,25 +64,14 @@ impl fmt::Display for LevelPlan {
 /// Smallest cell, 2^-100, for the same reason.
 const SMALLEST_CELL: f32 = 7.888_609e-31;
 
-/// Costs in ns on one core (Zen 3, 2.4 GHz), from the stage times of the sets `unit`, `pile` and
-/// `mixed` at 10,000 and 100,000 boxes. Their ratios decide between one level, several, and a list:
-/// splitting `mixed` into two levels, as cheaper visits would suggest, takes 1.7 times as long. Measured with a search
-/// that tested boxes rather than codes: absolute times are lower now, the ratios have not been measured again.
-mod cost {
-    /// One test of two boxes at random places.
-    pub(super) const CHECK: f64 = 0.7;
-    /// One test in a sweep over a list.
-    pub(super) const SWEEP: f64 = 1.8;
-    /// Sorting one box into a grid, and setting up its search there.
-    pub(super) const BOX: f64 = 65.0;
-    /// Setting up the search for a box in the grid of another level.
-    pub(super) const VISIT: f64 = 85.0;
-    /// One more grid, however small.
-    pub(super) const LEVEL: f64 = 2000.0;
-}
-
 /// Boxes wanted in a cell. The measured optimum is flat from 0.25 to 1.
 const PER_CELL: f64 = 0.5;
+
+/// The same where that makes cells so large that few boxes reach beyond theirs: fewer cells then cost less to sort into,
+/// and few neighbours are looked at. All moving, of 0.5 to 6: 100,000 boxes of the set `uniform` 5.6 ms an update against
+/// 6.7 with half a box a cell, 10,000 of them 0.43 against 0.48, 30,000 unit cubes with 0.1 pairs each 1.75 against 2.2.
+/// Where boxes do reach beyond, two in a cell cost 5 to 10% more.
+const SPARSE_PER_CELL: f64 = 2.0;
 
 /// Who else there is.
 #[derive(Clone, Copy)]
@@ -92,18 +86,69 @@ impl Company {
     pub(super) const NONE: Self = Self { others: 0, pairs: true };
 }
 
+/// What the choice depends on, besides the boxes.
+#[derive(Clone, Copy)]
+pub(super) struct Setting<'a> {
+    /// Factor on the cell size of an even spread.
+    pub(super) crowding: f32,
+    pub(super) strategy: Strategy,
+    pub(super) company: Company,
+    pub(super) costs: &'a Costs,
+    pub(super) experience: &'a Experience,
+    /// A way that is given.
+    pub(super) only: Option<Way>,
+}
+
+/// The split into levels and a number of swept boxes, why, and by what way.
+pub(super) struct Choice {
+    pub(super) levels: Vec<LevelPlan>,
+    pub(super) swept: u32,
+    pub(super) forecast: Forecast,
+    /// The way, and what it would take by the costs alone.
+    pub(super) expected: (Way, f32),
+}
+
 /// Splits the boxes into levels and a number of swept boxes, at least cost.
-pub(super) fn choose(
-    summary: &Summary,
-    crowding: f32,
-    strategy: Strategy,
-    company: Company,
-) -> (Vec<LevelPlan>, u32) {
-    let world = World::new(summary, crowding, company);
+pub(super) fn choose(summary: &Summary, setting: &Setting<'_>) -> Choice {
+    let world = World::new(summary, setting);
     let groups = groups(summary);
-    let steps = split(&world, &groups, strategy);
-    let (levels, in_levels) = assemble(&world, &groups, steps);
-    (levels, summary.valid - in_levels)
+    let (several, steps) = split(&world, &groups);
+    let may_sweep_all = setting.strategy != Strategy::Grid;
+    let brute = if may_sweep_all { world.sweep_cost(summary.valid, 0) } else { f64::INFINITY };
+    let one_grid = if groups.is_empty() { f64::INFINITY } else { world.grid_cost(&groups, &[]) };
+    let all = [brute, one_grid, several].map(|cost| cost as f32);
+    let forecast = Forecast { brute: all[0], one_grid: all[1], levels: all[2] };
+    let (corrected, best) = setting.experience.choose(forecast);
+    let way = setting.only.unwrap_or(best);
+    let levels = match way {
+        Way::OneGrid if !groups.is_empty() => vec![world.level(&groups)],
+        Way::Levels => assemble(&world, &groups, steps),
+        _ => Vec::new(),
+    };
+    let in_levels: u32 = levels.iter().map(|level| level.boxes).sum();
+    let swept = summary.valid - in_levels;
+    Choice { levels, swept, forecast: corrected, expected: (way, forecast.of(way)) }
+}
+
+/// The levels of a device, of all boxes but those that it has in its last, single cell.
+#[cfg(feature = "gpu")]
+pub(super) fn for_device(summary: &Summary) -> Vec<LevelPlan> {
+    let (costs, experience) = (&Costs::DEVICE, &Experience::default());
+    let setting = Setting {
+        crowding: 1.0,
+        strategy: Strategy::Grid,
+        company: Company::NONE,
+        costs,
+        experience,
+        only: None,
+    };
+    let groups = groups(summary);
+    let world = World { on_device: true, ..World::new(summary, &setting) };
+    let (several, steps) = split(&world, &groups);
+    match groups.is_empty() || several < world.grid_cost(&groups, &[]) {
+        true => assemble(&world, &groups, steps),
+        false => vec![world.level(&groups)],
+    }
 }
 
 /// Neighbouring size classes that share their level.
@@ -144,30 +189,30 @@ struct Step {
     cost: f64,
 }
 
-/// The cheapest split, by dynamic programming over the groups: what a level costs depends only on its
-/// own groups and on how many boxes are smaller. `steps[j]` covers groups `0..=j`.
-fn split(world: &World, used: &[Group], strategy: Strategy) -> Vec<Step> {
+/// The cheapest split into two parts or more, by dynamic programming over the groups: what a level costs depends only on
+/// its own groups and on how many boxes are smaller. Its cost, and `steps[j]` covers groups `0..=j`.
+fn split(world: &World<'_>, used: &[Group]) -> (f64, Vec<Step>) {
     let mut steps: Vec<Step> = Vec::with_capacity(used.len());
     for last in 0..used.len() {
+        // All at the end, in two parts at least, and only the largest boxes can be swept.
+        let at_end = last + 1 == used.len();
         let before = |first: usize| if first == 0 { 0.0 } else { steps[first - 1].cost };
-        let grids = (0..=last).map(|first| {
+        let grids = (usize::from(at_end)..=last).map(|first| {
             let cost = before(first) + world.grid_cost(&used[first..=last], &used[..first]);
             Step { first, swept: false, cost }
         });
-        // Only the largest boxes can be swept, and never all when the caller asked for the grid.
-        let may_sweep = last + 1 == used.len();
-        let first_swept = usize::from(strategy == Strategy::Grid);
-        let sweeps = (first_swept..if may_sweep { last + 1 } else { 0 }).map(|first| {
-            let cost = before(first) + world.sweep_cost(&used[first..=last], &used[..first]);
+        let sweeps = (1..if at_end { last + 1 } else { 0 }).map(|first| {
+            let cost = before(first) + world.sweep_cost(count(&used[first..=last]), count(&used[..first]));
             Step { first, swept: true, cost }
         });
         let best = grids.chain(sweeps).min_by(|a, b| a.cost.total_cmp(&b.cost));
         steps.extend(best);
     }
-    steps
+    let whole = steps.len() == used.len();
+    (steps.last().filter(|_| whole).map_or(f64::INFINITY, |step| step.cost), steps)
 }
 
-fn assemble(world: &World, used: &[Group], steps: Vec<Step>) -> (Vec<LevelPlan>, u32) {
+fn assemble(world: &World<'_>, used: &[Group], steps: Vec<Step>) -> Vec<LevelPlan> {
     let mut levels = Vec::new();
     let mut end = used.len();
     while end > 0 {
@@ -178,48 +223,77 @@ fn assemble(world: &World, used: &[Group], steps: Vec<Step>) -> (Vec<LevelPlan>,
         end = step.first;
     }
     levels.reverse();
-    let boxes = levels.iter().map(|level| level.boxes).sum();
-    (levels, boxes)
+    levels
 }
 
-/// Where the boxes lie.
-struct World {
+/// Where the boxes lie, and what work costs.
+struct World<'a> {
     low: [f32; 3],
     range: [f32; 3],
     crowding: f32,
     others: f64,
     pairs: f64,
+    costs: &'a Costs,
+    /// A device looks at whole cells.
+    on_device: bool,
 }
 
-impl World {
-    fn new(summary: &Summary, crowding: f32, company: Company) -> Self {
+impl<'a> World<'a> {
+    fn new(summary: &Summary, setting: &Setting<'a>) -> Self {
         let ranges: [(f32, f32); 3] = std::array::from_fn(|k| summary.range(k));
         Self {
             low: ranges.map(|r| r.0.clamp(f32::MIN, f32::MAX)),
             range: ranges.map(|r| (r.1 - r.0).clamp(0.0, f32::MAX)),
-            crowding,
-            others: f64::from(company.others),
-            pairs: f64::from(u8::from(company.pairs)),
+            crowding: setting.crowding,
+            others: f64::from(setting.company.others),
+            pairs: f64::from(u8::from(setting.company.pairs)),
+            costs: setting.costs,
+            on_device: false,
         }
     }
 
-    /// A cell holds the largest box, with a little to spare for rounding, and about half a box.
+    /// A cell holds the largest box, with a little to spare for rounding, and about half a box; two, where few boxes then
+    /// reach beyond it.
     fn cell(&self, groups: &[Group]) -> [f32; 3] {
-        let spaced = spacing(self.range, count(groups), PER_CELL) as f32 * self.crowding;
-        max_extent(groups).map(|e| (e * LevelPlan::SPARE).max(spaced).max(SMALLEST_CELL))
+        let spaced = |per_cell| spacing(self.range, count(groups), per_cell) as f32 * self.crowding;
+        let (sparse, extent) = (spaced(SPARSE_PER_CELL), max_extent(groups));
+        let is_sparse = !self.on_device && extent.iter().all(|e| *e <= LevelPlan::SPACIOUS * sparse);
+        let spaced = if is_sparse { sparse } else { spaced(PER_CELL) };
+        extent.map(|e| (e * LevelPlan::SPARE).max(spaced).max(SMALLEST_CELL))
     }
 
     fn grid_cost(&self, level: &[Group], smaller: &[Group]) -> f64 {
-        let own = cost::BOX + 0.5 * cost::CHECK * self.pairs * self.candidates(level, level);
-        let visit = cost::VISIT + cost::CHECK * self.candidates(smaller, level);
-        let others = cost::VISIT * self.others.min(f64::from(count(level)));
-        cost::LEVEL + f64::from(count(level)) * own + f64::from(count(smaller)) * visit + others
+        let &Costs { place, candidate, visit, visited, grid, .. } = self.costs;
+        let [place, candidate, visit, visited, grid] =
+            [place, candidate, visit, visited, grid].map(f64::from);
+        let inner = if self.on_device { 0.5 * self.candidates(level, level) } else { self.half(level) };
+        let own = place + candidate * self.pairs * inner;
+        let visits = visit + visited * self.candidates(smaller, level);
+        let others = visit * self.others.min(f64::from(count(level)));
+        grid + f64::from(count(level)) * own + f64::from(count(smaller)) * visits + others
     }
 
     /// A list is tested against everything, itself included, whatever may pair.
-    fn sweep_cost(&self, swept: &[Group], smaller: &[Group]) -> f64 {
-        let n = f64::from(count(swept));
-        cost::SWEEP * n * (f64::from(count(smaller)) + 0.5 * n + self.others)
+    fn sweep_cost(&self, swept: u32, smaller: u32) -> f64 {
+        let (n, others) = (f64::from(swept), f64::from(smaller) + self.others);
+        f64::from(self.costs.test) * n * (others + 0.5 * n) + f64::from(self.costs.sweep) * (n + others)
+    }
+
+    /// Boxes of `level` that an average one of them is tested against, in the half of its window that comes after it, were
+    /// they spread evenly: the rest of its cell, and beyond only where it reaches there itself (`cpu::half`).
+    fn half(&self, level: &[Group]) -> f64 {
+        let (extent, cell) = (max_extent(level), self.cell(level));
+        let share = |k: usize, cells: f32| f64::from((cells * cell[k] / self.range[k].max(cell[k])).min(1.0));
+        let one: [f64; 3] = std::array::from_fn(|k| share(k, 1.0));
+        let weighted = |group: &Group| {
+            let own: [f32; 3] = std::array::from_fn(|k| group.max_extent[k] / cell[k]);
+            let up: [f64; 3] = std::array::from_fn(|k| share(k, 1.0 + own[k]) - one[k]);
+            let wide = |k: usize| share(k, 1.0 + own[k] + extent[k] / cell[k]);
+            let row = (0.5 * one[0] + up[0]) * one[1] * one[2];
+            let rest = up[1] * wide(0) * one[2] + up[2] * wide(0) * wide(1);
+            f64::from(group.boxes) * (row + rest)
+        };
+        level.iter().map(weighted).sum()
     }
 
     /// Boxes of `level` that an average box of `groups` is tested against, were they spread evenly.

@@ -3,6 +3,7 @@
 //! A pure function of the [`Summary`] and the [`Config`]; the [`Plan`] explains itself in words.
 
 mod camps;
+mod costs;
 #[cfg(feature = "gpu")]
 mod gpu;
 mod levels;
@@ -10,9 +11,11 @@ mod pbig;
 mod summary;
 
 pub(crate) use camps::{Camps, OPEN};
+pub use costs::{Costs, Forecast};
+pub(crate) use costs::{Experience, Way};
 #[cfg(feature = "gpu")]
 pub use gpu::GpuPlan;
-use levels::Company;
+use levels::{Choice, Company, Setting};
 pub use levels::{LevelPlan, OccupiedCell};
 pub use pbig::{PbigPlan, density_cell, pbig_cell, pbig_objective};
 pub(crate) use summary::{LazySummary, size_class_of, spread_evenly};
@@ -80,19 +83,34 @@ pub struct Plan {
     pub moved: u32,
     /// Valid boxes planned for.
     pub boxes: u32,
+    /// What the ways to search them would take, as far as they were compared.
+    pub forecast: Forecast,
+    /// The way chosen, and what it would take by the costs alone, in ns.
+    pub(crate) expected: Option<(Way, f32)>,
 }
 
 impl Plan {
-    /// Chooses for the boxes behind `summary`. `crowding` is a factor on the cell size of an even
-    /// spread: 1, or less where such cells turned out to be too full.
+    /// Chooses for the boxes behind `summary`, by [`Config::costs`] or those of the reference. `crowding` is a factor on
+    /// the cell size of an even spread: 1, or less where such cells turned out to be too full.
     pub fn new(summary: &Summary, config: &Config, crowding: f32) -> Self {
+        let costs = config.costs.unwrap_or(Costs::REFERENCE);
+        Self::by(summary, config, crowding, &costs, &Experience::default())
+    }
+
+    /// The same by given costs, and by what searches took.
+    pub(crate) fn by(
+        summary: &Summary,
+        config: &Config,
+        crowding: f32,
+        costs: &Costs,
+        experience: &Experience,
+    ) -> Self {
         let boxes = summary.valid;
-        let brute = Self { chosen: Chosen::Brute, swept: boxes, boxes, ..Self::default() };
         if boxes < 2 {
             return Self { boxes, ..Self::default() };
         }
         if config.backend == Backend::Brute {
-            return brute;
+            return Self::brute(boxes);
         }
         match config.strategy {
             Strategy::Pbig => Self {
@@ -101,21 +119,20 @@ impl Plan {
                 boxes,
                 ..Self::default()
             },
-            Strategy::Auto if boxes < config.brute_below => brute,
-            Strategy::Auto | Strategy::Grid => {
-                let (levels, swept) = levels::choose(summary, crowding, config.strategy, Company::NONE);
-                let chosen = if levels.is_empty() { Chosen::Brute } else { Chosen::Grid };
-                Self { chosen, levels: levels.into(), swept, boxes, ..Self::default() }
+            Strategy::Auto if boxes < config.brute_below => Self::brute(boxes),
+            strategy @ (Strategy::Auto | Strategy::Grid) => {
+                let setting =
+                    Setting { crowding, strategy, company: Company::NONE, costs, experience, only: None };
+                Self::of_levels(boxes, levels::choose(summary, &setting))
             }
         }
     }
-}
 
-impl Plan {
     /// Nothing chosen, for so many boxes. What has no memory to give back is not touched.
     pub(crate) fn begin(&mut self, boxes: u32) {
         if self.levels.is_empty() {
             (self.chosen, self.swept, self.pbig, self.moved) = (Chosen::Nothing, 0, None, 0);
+            (self.forecast, self.expected) = Default::default();
             #[cfg(feature = "gpu")]
             {
                 self.gpu = None;
@@ -126,15 +143,43 @@ impl Plan {
         }
     }
 
+    /// Of a way that is given.
+    pub(crate) fn only(way: Way, summary: &Summary) -> Self {
+        let (costs, experience) = (&Costs::REFERENCE, &Experience::default());
+        let (strategy, company) = (Strategy::Auto, Company::NONE);
+        let setting = Setting { crowding: 1.0, strategy, company, costs, experience, only: Some(way) };
+        Self::of_levels(summary.valid, levels::choose(summary, &setting))
+    }
+
+    fn brute(boxes: u32) -> Self {
+        Self { chosen: Chosen::Brute, swept: boxes, boxes, ..Self::default() }
+    }
+
+    fn of_levels(boxes: u32, choice: Choice) -> Self {
+        let Choice { levels, swept, forecast, expected } = choice;
+        let chosen = if levels.is_empty() { Chosen::Brute } else { Chosen::Grid };
+        Self {
+            chosen,
+            levels: levels.into(),
+            swept,
+            boxes,
+            forecast,
+            expected: Some(expected),
+            ..Self::default()
+        }
+    }
+
     /// For boxes by camp, the first of which is open: levels for each, all in one plan.
-    pub(crate) fn of_camps(summaries: &[Summary], config: &Config, crowding: f32) -> Self {
+    pub(crate) fn of_camps(summaries: &[Summary], config: &Config, crowding: f32, costs: &Costs) -> Self {
         let boxes = summaries.iter().map(|summary| summary.valid).sum();
         let (mut all, mut swept) = (Vec::new(), 0);
         for (camp, summary) in summaries.iter().enumerate() {
             let company = Company { others: boxes - summary.valid, pairs: camp == usize::from(OPEN) };
-            let (levels, in_list) = levels::choose(summary, crowding, config.strategy, company);
-            all.extend(levels.into_iter().map(|level| LevelPlan { camp: camp as u8, ..level }));
-            swept += in_list;
+            let (strategy, experience) = (config.strategy, &Experience::default());
+            let setting = Setting { crowding, strategy, company, costs, experience, only: None };
+            let choice = levels::choose(summary, &setting);
+            all.extend(choice.levels.into_iter().map(|level| LevelPlan { camp: camp as u8, ..level }));
+            swept += choice.swept;
         }
         // Small boxes search among larger ones, and few among many.
         all.sort_by_key(|level| (level.classes.1, level.boxes));
@@ -172,6 +217,9 @@ impl fmt::Display for Plan {
         }
         if self.swept > 0 && self.chosen != Chosen::Brute {
             write!(f, "; {} oversize boxes tested against all", self.swept)?;
+        }
+        if self.forecast != Forecast::default() && self.chosen != Chosen::Edit {
+            write!(f, "; expected: {}", self.forecast)?;
         }
         Ok(())
     }
@@ -242,11 +290,25 @@ mod tests {
     }
 
     #[test]
-    fn sizes_over_six_decades_get_levels_rather_than_one_huge_cell() {
+    fn sizes_over_decades_get_levels_where_those_cost_less_than_candidates() {
         let mut boxes = lattice(20, 1.0, 0.0005);
         boxes.extend(lattice(10, 10.0, 5.0));
-        let plan = plan(&boxes, Config::DEFAULT);
-        assert_eq!(plan.levels.len(), 2, "{plan}");
+        // A thousand small ones in a cell of the large ones: cheaper to test than to look for in another level...
+        let found = plan(&boxes, Config::DEFAULT);
+        assert_eq!((found.levels.len(), found.swept), (1, 0), "{found}");
+        // ...unless that costs next to nothing.
+        let costs = Some(Costs { visit: 1.0, visited: 0.1, ..Costs::REFERENCE });
+        let found = plan(&boxes, Config { costs, ..Config::DEFAULT });
+        assert_eq!(found.levels.len(), 2, "{found}");
+        assert!(found.forecast.levels < found.forecast.one_grid, "{found}");
+    }
+
+    #[test]
+    fn a_few_large_boxes_among_crowds_of_small_ones_are_tested_one_by_one() {
+        let mut boxes = lattice(30, 0.5, 0.0005);
+        boxes.extend(lattice(2, 5.0, 4.0));
+        let found = plan(&boxes, Config::DEFAULT);
+        assert_eq!((found.levels.len(), found.swept), (1, 8), "{found}");
     }
 
     #[test]
@@ -255,6 +317,7 @@ mod tests {
         boxes.push(Aabb::new([f32::NEG_INFINITY; 3], [f32::INFINITY; 3]));
         let text = plan(&boxes, Config::DEFAULT).to_string();
         assert!(text.starts_with("grid: 8001 boxes; level of 8000 boxes up to 0.8"), "{text}");
-        assert!(text.ends_with("1 oversize boxes tested against all"), "{text}");
+        let why = "1 oversize boxes tested against all; expected: brute force 64 ms, one grid 0.";
+        assert!(text.contains(why) && text.ends_with(" ms"), "{text}");
     }
 }
