@@ -2,11 +2,12 @@
 
 use crate::call::Call;
 use crate::events::{HandleOrder, Outbox};
+use crate::overlap::Overlap;
 use crate::proxy::{BLOCK, Proxy};
 use crate::roll::Roll;
 use crate::scene_tree::SceneTree;
 use crate::stats::{Kept, Totals};
-use pbig_core::{Aabb, BroadPhase as Finder, Config, Limits, ProxyFilter};
+use pbig_core::{Aabb, BroadPhase as Finder, Config, Events, Limits, ProxyFilter};
 use rapier3d::prelude::{
     BroadPhase, BroadPhasePairEvent, ColliderHandle, ColliderPair, ColliderSet, IntegrationParameters,
     NarrowPhase, RigidBodySet,
@@ -36,6 +37,8 @@ pub struct PbigBroadPhase {
     proxies: Vec<Proxy>,
     pub(crate) tree: SceneTree,
     pub(crate) kept: Kept,
+    /// What [`PbigBroadPhase::overlapped`] needs, if it is on.
+    pub(crate) overlap: Option<Box<Overlap>>,
     /// The last call had nothing to do, and left everything so that another one has not either.
     pub(crate) idle: bool,
     #[cfg(feature = "shadow")]
@@ -111,6 +114,7 @@ impl PbigBroadPhase {
             proxies: Vec::new(),
             tree: SceneTree::default(),
             kept: Kept::default(),
+            overlap: None,
             idle: false,
             #[cfg(feature = "shadow")]
             shadow: None,
@@ -133,6 +137,7 @@ impl PbigBroadPhase {
     /// a world that is rolled back to another one of as many under a broad phase that stays has to be adopted, or the
     /// broad phase rolled back with it.
     pub fn adopt(&mut self, narrow_phase: &NarrowPhase) {
+        self.finish_begun();
         let contacts = narrow_phase.contact_pairs().map(|pair| (pair.collider1, pair.collider2));
         let intersections = narrow_phase.intersection_pairs().map(|(one, other, _)| (one, other));
         self.outbox.adopted = contacts.chain(intersections).map(|(a, b)| ColliderPair::new(a, b)).collect();
@@ -153,23 +158,23 @@ impl PbigBroadPhase {
 
     /// Forgets a collider, if this very one is on the roll. Its pairs end without an event: the
     /// narrow phase drops the pairs of removed and disabled colliders itself.
-    fn forget(&mut self, handle: ColliderHandle) {
+    pub(crate) fn forget(&mut self, handle: ColliderHandle) {
         if self.roll.strike(handle) {
-            self.finder.remove(handle.into_raw_parts().0);
+            self.take_out(handle.into_raw_parts().0);
         }
     }
 
     /// Keeps a collider on the roll, without a box.
-    fn disable(&mut self, handle: ColliderHandle) {
+    pub(crate) fn disable(&mut self, handle: ColliderHandle) {
         self.roll.enter(handle);
-        self.finder.remove(handle.into_raw_parts().0);
+        self.take_out(handle.into_raw_parts().0);
     }
 
-    fn set(&mut self, handle: ColliderHandle, aabb: Aabb, filter: ProxyFilter) {
+    pub(crate) fn set(&mut self, handle: ColliderHandle, aabb: Aabb, filter: ProxyFilter) {
         let id = handle.into_raw_parts().0;
         if !self.roll.enter(handle) {
             // A predecessor with this index that was never reported as removed.
-            self.finder.remove(id);
+            self.take_out(id);
         }
         if let Err(error) = self.finder.set(id, aabb, filter) {
             tracing::error!("pbig: collider {handle:?} is ignored: {error}");
@@ -178,6 +183,9 @@ impl PbigBroadPhase {
 
     /// Brings the finder up to date about some colliders.
     fn look_at(&mut self, call: &Call<'_>, listed: &[ColliderHandle]) {
+        if self.overlap.is_some() {
+            return self.look_ahead(call, listed);
+        }
         let clock = Instant::now();
         let mut proxies = std::mem::take(&mut self.proxies);
         if listed.len() < PARALLEL_FROM || rayon::current_num_threads() == 1 {
@@ -266,9 +274,7 @@ impl PbigBroadPhase {
     }
 
     fn find_and_send(&mut self, events: &mut Vec<BroadPhasePairEvent>) {
-        if self.tree.is_used() {
-            self.tree.note(self.finder.changes(), self.roll.len());
-        }
+        self.note_for_queries();
         if let Err(error) = self.finder.update() {
             self.kept.totals.failures += 1;
             tracing::error!("pbig: no pairs in this update: {error}");
@@ -276,11 +282,24 @@ impl PbigBroadPhase {
         }
         let clock = Instant::now();
         let _span = tracing::debug_span!(target: "pbig", "events").entered();
-        let sent = self.outbox.send(&self.finder, &self.roll, events);
+        let mut found = self.finder.events();
+        if let Some(overlap) = &mut self.overlap {
+            overlap.join(found);
+            found = &overlap.unsent;
+        }
+        let sent = self.outbox.send(&self.finder, found, &self.roll, events);
+        self.overlap.iter_mut().for_each(|overlap| overlap.unsent = Events::default());
         self.kept.events = clock.elapsed();
         (self.kept.added, self.kept.deleted) = sent;
         self.kept.totals.added += sent.0 as u64;
         self.kept.totals.deleted += sent.1 as u64;
+    }
+
+    /// Boxes that have changed, for the tree of those who ask.
+    pub(crate) fn note_for_queries(&mut self) {
+        if self.tree.is_used() {
+            self.tree.note(self.finder.changes(), self.roll.len());
+        }
     }
 }
 
@@ -305,10 +324,15 @@ impl BroadPhase for PbigBroadPhase {
         let call = Call { params, colliders, bodies, modified, removed };
         let totals = Totals { updates: self.kept.totals.updates + 1, ..self.kept.totals };
         self.kept = Kept { modified: modified.len(), removed: removed.len(), totals, ..Kept::default() };
-        self.take_in(&call);
         #[cfg(feature = "shadow")]
         let before = events.len();
-        self.find_and_send(events);
+        if !self.leaves_alone(has_news) {
+            self.overlap.iter_mut().for_each(|overlap| overlap.start_call());
+            self.finish_begun();
+            self.take_in(&call);
+            self.find_and_send(events);
+            self.begin_next();
+        }
         #[cfg(feature = "shadow")]
         if let Some(checker) = &mut self.shadow {
             checker.watch(&call, &events[before..]);

@@ -1,6 +1,7 @@
 //! What an update did, in numbers.
 
 use crate::PbigBroadPhase;
+use crate::overlap::Overlapped;
 use pbig_core::Report;
 use std::time::Duration;
 
@@ -28,6 +29,8 @@ pub struct Stats<'a> {
     pub events: Duration,
     /// The finder's stages between `set` and `events`, its plan and counts.
     pub report: &'a Report,
+    /// With [`PbigBroadPhase::overlapped`]: the search that was begun before, and the next one.
+    pub overlapped: Option<Overlapped<'a>>,
 }
 
 /// Sums over all updates so far.
@@ -61,7 +64,8 @@ pub(crate) struct Kept {
 impl Stats<'_> {
     /// The time of all stages: nearly all of the update.
     pub fn total(&self) -> Duration {
-        self.proxies + self.set + self.report.stages.total() + self.events
+        let ahead = self.overlapped.map_or(Duration::ZERO, |overlapped| overlapped.report.stages.total());
+        self.proxies + self.set + self.report.stages.total() + ahead + self.events
     }
 }
 
@@ -70,6 +74,21 @@ impl PbigBroadPhase {
     pub fn stats(&self) -> Stats<'_> {
         let Kept { modified, removed, added, deleted, totals, proxies, set, events } = self.kept;
         let (colliders, report) = (self.roll.len(), self.finder.report());
-        Stats { colliders, modified, removed, added, deleted, totals, proxies, set, events, report }
+        let overlapped = self.overlap.as_deref();
+        let overlapped =
+            overlapped.map(|one| Overlapped { left: one.left, begun: one.begun, report: &one.report });
+        Stats {
+            colliders,
+            modified,
+            removed,
+            added,
+            deleted,
+            totals,
+            proxies,
+            set,
+            events,
+            report,
+            overlapped,
+        }
     }
 }

@@ -4,6 +4,7 @@
 mod allocations;
 #[cfg(feature = "gpu")]
 mod device;
+mod overlap;
 #[cfg(feature = "serde")]
 mod snapshot;
 mod state;
@@ -19,6 +20,7 @@ use crate::gpu::GpuFinder;
 use crate::report::{Report, lap, stage};
 use crate::search::Search;
 use crate::{Aabb, Backend, Config, Error, Pair, Plan, ProxyFilter};
+use overlap::Overlap;
 use std::collections::HashMap;
 use std::time::Instant;
 
@@ -97,6 +99,8 @@ pub struct BroadPhase {
     refiltered: HashMap<u32, Old>,
     /// Updates that have changed something.
     updates: u64,
+    /// An update that has begun and is not finished.
+    overlap: Overlap,
     /// Boxes that have lost pairs, as far as the device can tell.
     #[cfg(feature = "gpu")]
     ending: Vec<u32>,
@@ -136,6 +140,7 @@ impl BroadPhase {
             changed: vec![],
             refiltered: HashMap::new(),
             updates: 0,
+            overlap: Overlap::default(),
             #[cfg(feature = "gpu")]
             ending: vec![],
             moved: vec![],
@@ -180,7 +185,11 @@ impl BroadPhase {
     /// [`Error::Margin`].
     pub fn set_margin(&mut self, margin: f32) -> Result<(), Error> {
         check_margin(margin)?;
-        self.config.margin = margin;
+        if self.has_begun() {
+            self.change_margin_later(margin);
+        } else {
+            self.config.margin = margin;
+        }
         Ok(())
     }
 
@@ -195,6 +204,9 @@ impl BroadPhase {
     /// [`Error::TooManyBoxes`] when the id is not below [`crate::Limits::max_boxes`].
     #[inline]
     pub fn set(&mut self, id: u32, aabb: Aabb, filter: ProxyFilter) -> Result<(), Error> {
+        if self.has_begun() {
+            return self.set_later(id, aabb, filter);
+        }
         let i = id as usize;
         if i >= self.boxes.len() {
             self.make_room_for(id)?;
@@ -233,6 +245,9 @@ impl BroadPhase {
     /// Removes a box; its pairs end without an event (ask [`BroadPhase::pairs_of`] before if they
     /// matter). False when there was none.
     pub fn remove(&mut self, id: u32) -> bool {
+        if self.has_begun() {
+            return self.remove_later(id);
+        }
         let i = id as usize;
         if !self.contains(id) {
             return false;
@@ -249,11 +264,17 @@ impl BroadPhase {
         true
     }
 
-    /// Finds what has changed since the last update. Costs next to nothing when nothing has.
+    /// Finds what has changed since the last update. Costs next to nothing when nothing has. The same as
+    /// [`BroadPhase::begin`] and [`BroadPhase::finish`]: one that has begun already is finished.
     ///
     /// # Errors
     /// [`Error::TooManyPairs`]; the changes are kept, and the next update sees them again.
     pub fn update(&mut self) -> Result<&Events, Error> {
+        self.finish()
+    }
+
+    /// All of an update, but what a device has begun.
+    fn find_events(&mut self) -> Result<(), Error> {
         self.events.added.clear();
         self.events.removed.clear();
         self.report = Report {
@@ -267,7 +288,7 @@ impl BroadPhase {
             ..Report::default()
         };
         if self.changed.is_empty() {
-            return Ok(&self.events);
+            return Ok(());
         }
         self.pairs.drop_removed();
         if let Err(error) = self.find_added().and_then(|()| self.check_room()) {
@@ -285,7 +306,7 @@ impl BroadPhase {
         self.sort_events();
         self.report.stages.emit += lap(&mut clock);
         self.report.pairs = self.pairs.len() as u64;
-        Ok(&self.events)
+        Ok(())
     }
 
     fn valid_count(&self) -> u32 {

@@ -239,7 +239,7 @@ impl State<'_> {
         self.filters[a as usize].allows(&self.filters[b as usize])
     }
 
-    fn paired_before(&self, a: u32, b: u32) -> bool {
+    pub(super) fn paired_before(&self, a: u32, b: u32) -> bool {
         if self.flags(a, b) & flag::REFILTERED == 0 {
             return self.before[a as usize].overlaps(&self.before[b as usize]);
         }

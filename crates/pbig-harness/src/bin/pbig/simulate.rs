@@ -27,6 +27,9 @@ pub(crate) struct Args {
     /// Where pbig works.
     #[arg(long, value_enum, default_value_t)]
     backend: BackendOption,
+    /// Let pbig search while rapier does something else, and use the results in the next call.
+    #[arg(long)]
+    overlapped: bool,
     /// For the random numbers of the scene.
     #[arg(long, default_value = "1")]
     seed: u64,
@@ -70,12 +73,15 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
     let bar = progress(args.steps, "steps");
     let config = Config { backend: args.backend.backend(), ..PbigBroadPhase::CONFIG };
     let ours = PbigBroadPhase::with_config(config);
+    let ours = if args.overlapped { ours.overlapped() } else { ours };
+    // Boxes that reach ahead may pair at any distance.
+    let margin = if args.overlapped { f32::INFINITY } else { config.margin };
     let step = |_| bar.inc(1);
     let (outcome, did) = match args.broad_phase {
         BroadPhaseOption::Stock => (run_scene(task, DefaultBroadPhase::new(), step).0, Did::default()),
         BroadPhaseOption::Pbig => {
             let (outcome, ours) = if args.check {
-                run_checked(task, ours, config.margin, Path::new("."), step)
+                run_checked(task, ours, margin, Path::new("."), step)
             } else {
                 run_scene(task, ours, step)
             };
