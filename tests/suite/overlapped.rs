@@ -30,7 +30,7 @@ fn check(scene: Scene, broad_phase: PbigBroadPhase, bodies: usize, steps: usize)
 #[test]
 fn every_scene_beside_stock_and_the_oracle() {
     for scene in Scene::ALL {
-        check(scene, ours(PbigBroadPhase::CONFIG), 300, 150);
+        check(scene, ours(PbigBroadPhase::CONFIG), 200, 120);
     }
 }
 
@@ -38,7 +38,7 @@ fn every_scene_beside_stock_and_the_oracle() {
 fn every_scene_on_a_gpu() {
     for scene in Scene::ALL {
         let broad_phase =
-            check(scene, ours(Config { margin: 0.01, ..pbig_tests::gpu(Coding::Plain) }), 120, 25);
+            check(scene, ours(Config { margin: 0.01, ..pbig_tests::gpu(Coding::Plain) }), 100, 20);
         assert_eq!(broad_phase.stats().report.fallback, None, "{}", scene.name);
     }
 }

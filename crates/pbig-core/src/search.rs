@@ -76,7 +76,11 @@ impl<R: Record> Search<R> {
     {
         report.boxes = boxes.len() as u64;
         let summary = LazySummary::new(boxes, None, self.spare.take());
-        let found = match self.find_on_gpu(boxes, &summary, config, rule, report) {
+        #[cfg(feature = "gpu")]
+        let on_gpu = self.find_on_gpu(boxes, &summary, config, rule, report);
+        #[cfg(not(feature = "gpu"))]
+        let on_gpu = Ok(self.miss_gpu(config, report));
+        let found = match on_gpu {
             Ok(false) => self.find_without_gpu(boxes, &summary, config, rule, report),
             done => done.map(drop),
         };
@@ -228,26 +232,14 @@ impl<R: Record> Search<R> {
         }
     }
 
+    /// Says so when a backend is wanted that this build does not have; false, as no GPU does the work.
     #[cfg(not(feature = "gpu"))]
-    fn find_on_gpu<A>(
-        &mut self,
-        _: &[Aabb],
-        _: &LazySummary<'_>,
-        config: &Config,
-        _: &Rule<'_, A>,
-        report: &mut Report,
-    ) -> Result<bool, Error> {
-        self.miss_gpu(config, report);
-        Ok(false)
-    }
-
-    /// Says so when a backend is wanted that this build does not have.
-    #[cfg(not(feature = "gpu"))]
-    pub(crate) fn miss_gpu(&mut self, config: &Config, report: &mut Report) {
+    pub(crate) fn miss_gpu(&mut self, config: &Config, report: &mut Report) -> bool {
         if config.backend == Backend::Gpu {
             let why = "no GPU backend in this build (feature `gpu`): the CPU does the work";
             self.fall_back(why.into(), report);
         }
+        false
     }
 
     /// The wanted backend could not do the work: the report says so every time, a warning once.

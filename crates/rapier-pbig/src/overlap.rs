@@ -135,6 +135,8 @@ impl PbigBroadPhase {
     /// Stores where colliders are expected, and begins the search for that.
     pub(crate) fn begin_next(&mut self) {
         let Some(overlap) = &mut self.overlap else { return };
+        self.kept.totals.left += overlap.left as u64;
+        self.kept.totals.at_once += u64::from(overlap.left > 0);
         for (id, reach, filter) in overlap.staying.drain(..) {
             if let Err(error) = self.finder.set(id, reach, filter) {
                 tracing::error!("pbig: box {id} is ignored: {error}");
@@ -161,7 +163,8 @@ impl Overlap {
         let gone = std::mem::take(&mut self.gone);
         let there = |pair: &Pair| !gone.contains(&pair.a) && !gone.contains(&pair.b);
         let Events { added, removed } = &mut self.unsent;
-        [&mut *added, &mut *removed].map(|pairs| pairs.retain(there));
+        added.retain(there);
+        removed.retain(there);
         let came: Vec<Pair> = without(&found.added, removed);
         let went: Vec<Pair> = without(&found.removed, added);
         added.retain(|pair| found.removed.binary_search(pair).is_err());

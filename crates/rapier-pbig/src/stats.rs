@@ -42,6 +42,11 @@ pub struct Totals {
     pub rescans: u64,
     /// Those that failed: `tracing` has the error, and the next one sees the same changes again.
     pub failures: u64,
+    /// With [`PbigBroadPhase::overlapped`]: colliders whose pairs were searched for at once, because they were new or had
+    /// left their stored box.
+    pub left: u64,
+    /// Updates that did so.
+    pub at_once: u64,
     /// `AddPair` events.
     pub added: u64,
     /// `DeletePair` events.

@@ -374,9 +374,9 @@ fn random_worlds_on_a_gpu_agree_too_and_have_the_bits_of_the_cpu() {
 fn random_worlds_with_results_from_the_call_before_agree_too() {
     let [(_, cpu), (_, grid), (_, gpu)] =
         backends().map(|(name, config)| (name, Kind { config, overlapped: true }));
-    let tally = on_random_ops(150, |ops| run(ops, cpu, Plant::Nothing));
+    let tally = on_random_ops(100, |ops| run(ops, cpu, Plant::Nothing));
     tally.assert_that_much_happened();
-    let tally = on_random_ops(10, |ops| {
+    let tally = on_random_ops(6, |ops| {
         let on_gpu = run(ops, gpu, Plant::Nothing)?;
         on_gpu.compare(&run(ops, grid, Plant::Nothing)?)?;
         Ok(on_gpu)
@@ -387,7 +387,7 @@ fn random_worlds_with_results_from_the_call_before_agree_too() {
 #[test]
 fn a_snapshot_anywhere_continues_bit_identically() {
     let [(_, cpu), ..] = backends();
-    for (cases, overlapped) in [(60, false), (30, true)] {
+    for (cases, overlapped) in [(60, false), (20, true)] {
         snapshots_continue(cases, Kind { config: cpu, overlapped });
     }
 }

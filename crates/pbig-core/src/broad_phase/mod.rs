@@ -291,14 +291,12 @@ impl BroadPhase {
             return Ok(());
         }
         self.pairs.drop_removed();
-        if let Err(error) = self.find_added().and_then(|()| self.check_room()) {
-            self.events.added.clear();
-            return Err(error);
-        }
+        let found = self.find_added().and_then(|on_gpu| self.check_room().map(|()| on_gpu));
+        let on_gpu = found.inspect_err(|_| self.events.added.clear())?;
         let mut clock = Instant::now();
         {
             stage!("diff");
-            self.find_removed();
+            self.find_removed(on_gpu);
             self.store();
             self.report.stages.diff += lap(&mut clock);
         }

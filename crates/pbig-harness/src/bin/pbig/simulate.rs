@@ -6,7 +6,7 @@ use clap::ValueEnum;
 use pbig_harness::options::BackendOption;
 use pbig_harness::scenes::Scene;
 use pbig_harness::simulate::{Check, Outcome, Task, run as run_scene, run_checked};
-use rapier_pbig::{Config, PbigBroadPhase};
+use rapier_pbig::{Config, PbigBroadPhase, Totals};
 use rapier3d::prelude::DefaultBroadPhase;
 use std::path::Path;
 
@@ -85,8 +85,8 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
             } else {
                 run_scene(task, ours, step)
             };
-            let fallback = ours.stats().report.fallback.clone();
-            (outcome, Did { fallback, adapter: ours.adapter().map(str::to_owned) })
+            let (fallback, totals) = (ours.stats().report.fallback.clone(), ours.stats().totals);
+            (outcome, Did { fallback, adapter: ours.adapter().map(str::to_owned), totals })
         }
     };
     bar.finish_and_clear();
@@ -111,6 +111,7 @@ struct Did {
     /// Why it was not the backend asked for.
     fallback: Option<String>,
     adapter: Option<String>,
+    totals: Totals,
 }
 
 fn report(args: &Args, bodies: usize, outcome: &Outcome, did: &Did) -> Result<(), Failure> {
@@ -130,6 +131,9 @@ fn report(args: &Args, bodies: usize, outcome: &Outcome, did: &Did) -> Result<()
             "pairs": outcome.pairs,
             "added": outcome.added,
             "removed": outcome.removed,
+            "left": args.overlapped.then_some(did.totals.left),
+            "at_once": args.overlapped.then_some(did.totals.at_once),
+            "updates": did.totals.updates,
             "fallback": fallback,
             "check": outcome.check.as_ref().map(check_object),
         });
