@@ -56,7 +56,8 @@ impl PbigBroadPhase {
     ///
     /// Boxes reach to where the velocities and forces of bodies take them within `dt`, so there are more pairs, and
     /// trajectories differ in the last bits from those without; they are the same on every backend. Where the CPU does the
-    /// work nothing is gained: it searches twice.
+    /// work nothing is gained: it searches twice. Nor is it on a GPU while in each step some collider goes elsewhere, as the
+    /// search for that is waited for: [`crate::Totals::at_once`] says how often.
     ///
     /// ```
     /// use rapier_pbig::{Backend, Config, PbigBroadPhase};
