@@ -4,11 +4,12 @@
 //! The suite plays the same ones each time, on the CPU about 100,000; with `PROPTEST_CASES=6300` about a million new
 //! ones.
 
+mod kind;
 mod ops;
 
 use crate::checked::backends;
+use kind::Kind;
 use ops::{Op, any_op, apply};
-use pbig_core::Config;
 use pbig_harness::shadow::Shadowed;
 use pbig_harness::world::World;
 use proptest::collection::vec;
@@ -33,31 +34,6 @@ enum Plant {
     OnlyMoved,
     /// Nothing is left after a restore.
     Forgets,
-}
-
-/// The broad phase under test.
-#[derive(Clone, Copy)]
-struct Kind {
-    config: Config,
-    overlapped: bool,
-}
-
-impl From<Config> for Kind {
-    fn from(config: Config) -> Self {
-        Self { config, overlapped: false }
-    }
-}
-
-impl Kind {
-    fn pbig(self) -> PbigBroadPhase {
-        let pbig = PbigBroadPhase::with_config(self.config);
-        if self.overlapped { pbig.overlapped() } else { pbig }
-    }
-
-    /// How far apart pairs may be.
-    fn margin(self) -> f32 {
-        if self.overlapped { f32::INFINITY } else { self.config.margin }
-    }
 }
 
 /// Ours, perhaps with a planted fault.
