@@ -10,6 +10,8 @@ mod finder;
 mod gpu;
 mod incremental;
 mod kernels;
+mod overlap;
+mod overlapped;
 mod planted;
 mod queries;
 mod random_worlds;

@@ -71,6 +71,40 @@ impl Aabb {
         Self::new(self.min.map(|x| x - margin), self.max.map(|x| x + margin))
     }
 
+    /// The smallest box around both, of which an invalid one does not count.
+    #[inline]
+    pub fn union(&self, other: &Self) -> Self {
+        match (self.is_valid(), other.is_valid()) {
+            (true, true) => Self::new(
+                std::array::from_fn(|k| self.min[k].min(other.min[k])),
+                std::array::from_fn(|k| self.max[k].max(other.max[k])),
+            ),
+            (false, true) => *other,
+            _ => *self,
+        }
+    }
+
+    /// The box around this one and where it is after `motion`, a displacement in the same unit: velocity times time.
+    /// A motion that is no number leaves the box as it is.
+    ///
+    /// ```
+    /// use pbig_core::Aabb;
+    /// let (cube, velocity, dt) = (Aabb::from_center([0.0; 3], [0.5; 3]), [6.0, 0.0, -12.0], 0.25);
+    /// let swept = cube.swept(velocity.map(|v| v * dt));
+    /// assert_eq!(swept, Aabb::new([-0.5, -0.5, -3.5], [2.0, 0.5, 0.5]));
+    /// ```
+    #[inline]
+    pub fn swept(&self, motion: [f32; 3]) -> Self {
+        let moved = |corner: [f32; 3]| std::array::from_fn(|k| corner[k] + motion[k]);
+        self.union(&Self::new(moved(self.min), moved(self.max)))
+    }
+
+    /// Whether a box lies in this one, its border included; false where a number is NaN.
+    #[inline]
+    pub fn contains(&self, other: &Self) -> bool {
+        (0..3).all(|k| self.min[k] <= other.min[k] && other.max[k] <= self.max[k])
+    }
+
     /// Edge lengths; infinite where they overflow, as for a half-space.
     #[inline]
     pub fn extents(&self) -> [f32; 3] {
@@ -93,6 +127,20 @@ mod tests {
         let a = Aabb::new([0.0; 3], [1.0; 3]);
         assert!(a.overlaps(&Aabb::new([1.0; 3], [2.0; 3])));
         assert!(!a.overlaps(&Aabb::new([1.0f32.next_up(), 0.0, 0.0], [2.0; 3])));
+    }
+
+    #[test]
+    fn what_is_invalid_does_not_count_in_a_union_and_is_contained_nowhere() {
+        let (cube, all) =
+            (Aabb::new([0.0; 3], [1.0; 3]), Aabb::new([f32::NEG_INFINITY; 3], [f32::INFINITY; 3]));
+        for invalid in [Aabb::NOWHERE, Aabb::new([0.0, 0.0, 3.0], [9.0, 9.0, 2.0])] {
+            assert_eq!((cube.union(&invalid), invalid.union(&cube)), (cube, cube));
+        }
+        assert_eq!(cube.swept([0.0, f32::NAN, 1.0]), cube);
+        assert_eq!(all.swept([1.0; 3]), all);
+        assert!(cube.contains(&cube) && all.contains(&cube) && !cube.contains(&all));
+        assert!(!cube.contains(&Aabb::new([0.5; 3], [0.9, 0.9, 1.0f32.next_up()])));
+        assert!(!all.contains(&Aabb::NOWHERE) && !Aabb::NOWHERE.contains(&cube));
     }
 
     #[test]

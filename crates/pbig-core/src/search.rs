@@ -37,6 +37,9 @@ pub(crate) struct Search<R> {
     /// Memory for a summary.
     pub(crate) spare: Option<Summary>,
     warned: bool,
+    /// Time for the beginning of a search that was begun ahead.
+    #[cfg(feature = "gpu")]
+    spent: Duration,
     #[cfg(feature = "gpu")]
     pub(crate) gpu: Option<GpuFinder>,
     #[cfg(feature = "gpu")]
@@ -51,6 +54,8 @@ impl<R: Record> Search<R> {
             found: Found::default(),
             spare: None,
             warned: false,
+            #[cfg(feature = "gpu")]
+            spent: Duration::ZERO,
             #[cfg(feature = "gpu")]
             gpu: None,
             #[cfg(feature = "gpu")]
@@ -71,7 +76,11 @@ impl<R: Record> Search<R> {
     {
         report.boxes = boxes.len() as u64;
         let summary = LazySummary::new(boxes, None, self.spare.take());
-        let found = match self.find_on_gpu(boxes, &summary, config, rule, report) {
+        #[cfg(feature = "gpu")]
+        let on_gpu = self.find_on_gpu(boxes, &summary, config, rule, report);
+        #[cfg(not(feature = "gpu"))]
+        let on_gpu = Ok(self.miss_gpu(config, report));
+        let found = match on_gpu {
             Ok(false) => self.find_without_gpu(boxes, &summary, config, rule, report),
             done => done.map(drop),
         };
@@ -168,6 +177,15 @@ impl<R: Record> Search<R> {
         Ok(self.settle(found, boxes.len(), clock, report)?.is_some())
     }
 
+    /// Has a device begin what [`Search::changes_on_gpu`] finds, and does not wait for it.
+    #[cfg(feature = "gpu")]
+    pub(crate) fn begin_changes(&mut self, request: &ChangeRequest<'_>) {
+        stage!("gpu");
+        let clock = Instant::now();
+        self.gpu.get_or_insert_with(GpuFinder::shared).begin_changes(request);
+        self.spent = clock.elapsed();
+    }
+
     /// Finds on a device what has changed, into `found`, if that is wanted; returns the boxes that began anew
     /// ([`GpuFinder::changes`]), nothing when it is not or could not be done.
     #[cfg(feature = "gpu")]
@@ -177,7 +195,9 @@ impl<R: Record> Search<R> {
         report: &mut Report,
     ) -> Result<Option<Vec<u32>>, Error> {
         stage!("gpu");
-        let clock = Instant::now();
+        let now = Instant::now();
+        // As if the time in between had not passed: it was the caller's.
+        let clock = now.checked_sub(std::mem::take(&mut self.spent)).unwrap_or(now);
         let gpu = self.gpu.get_or_insert_with(GpuFinder::shared);
         let found = gpu.changes(request, &mut self.found, report);
         self.settle(found, request.boxes.len(), clock, report)
@@ -221,26 +241,14 @@ impl<R: Record> Search<R> {
         }
     }
 
+    /// Says so when a backend is wanted that this build does not have; false, as no GPU does the work.
     #[cfg(not(feature = "gpu"))]
-    fn find_on_gpu<A>(
-        &mut self,
-        _: &[Aabb],
-        _: &LazySummary<'_>,
-        config: &Config,
-        _: &Rule<'_, A>,
-        report: &mut Report,
-    ) -> Result<bool, Error> {
-        self.miss_gpu(config, report);
-        Ok(false)
-    }
-
-    /// Says so when a backend is wanted that this build does not have.
-    #[cfg(not(feature = "gpu"))]
-    pub(crate) fn miss_gpu(&mut self, config: &Config, report: &mut Report) {
+    pub(crate) fn miss_gpu(&mut self, config: &Config, report: &mut Report) -> bool {
         if config.backend == Backend::Gpu {
             let why = "no GPU backend in this build (feature `gpu`): the CPU does the work";
             self.fall_back(why.into(), report);
         }
+        false
     }
 
     /// The wanted backend could not do the work: the report says so every time, a warning once.

@@ -2,11 +2,12 @@
 
 use crate::call::Call;
 use crate::events::{HandleOrder, Outbox};
+use crate::overlap::Overlap;
 use crate::proxy::{BLOCK, FEW, Proxy};
 use crate::roll::Roll;
 use crate::scene_tree::SceneTree;
 use crate::stats::{Kept, MEASURED_FROM, Totals, Watch};
-use pbig_core::{Aabb, BroadPhase as Finder, Config, Limits, ProxyFilter};
+use pbig_core::{Aabb, BroadPhase as Finder, Config, Events, Limits, ProxyFilter};
 use rapier3d::prelude::{
     BroadPhase, BroadPhasePairEvent, ColliderHandle, ColliderPair, ColliderSet, IntegrationParameters,
     NarrowPhase, RigidBodySet,
@@ -35,6 +36,8 @@ pub struct PbigBroadPhase {
     proxies: Vec<Proxy>,
     pub(crate) tree: SceneTree,
     pub(crate) kept: Kept,
+    /// What [`PbigBroadPhase::overlapped`] needs, if it is on.
+    pub(crate) overlap: Option<Box<Overlap>>,
     /// The last call had nothing to do, and left everything so that another one has not either.
     pub(crate) idle: bool,
     #[cfg(feature = "shadow")]
@@ -110,6 +113,7 @@ impl PbigBroadPhase {
             proxies: Vec::new(),
             tree: SceneTree::default(),
             kept: Kept::default(),
+            overlap: None,
             idle: false,
             #[cfg(feature = "shadow")]
             shadow: None,
@@ -132,6 +136,7 @@ impl PbigBroadPhase {
     /// a world that is rolled back to another one of as many under a broad phase that stays has to be adopted, or the
     /// broad phase rolled back with it.
     pub fn adopt(&mut self, narrow_phase: &NarrowPhase) {
+        self.finish_begun();
         let contacts = narrow_phase.contact_pairs().map(|pair| (pair.collider1, pair.collider2));
         let intersections = narrow_phase.intersection_pairs().map(|(one, other, _)| (one, other));
         self.outbox.adopted = contacts.chain(intersections).map(|(a, b)| ColliderPair::new(a, b)).collect();
@@ -152,20 +157,20 @@ impl PbigBroadPhase {
 
     /// Forgets a collider, if this very one is on the roll. Its pairs end without an event: the
     /// narrow phase drops the pairs of removed and disabled colliders itself.
-    fn forget(&mut self, handle: ColliderHandle) {
+    pub(crate) fn forget(&mut self, handle: ColliderHandle) {
         if self.roll.strike(handle) {
-            self.finder.remove(handle.into_raw_parts().0);
+            self.take_out(handle.into_raw_parts().0);
         }
     }
 
     /// Keeps a collider on the roll, without a box.
-    fn disable(&mut self, handle: ColliderHandle) {
+    pub(crate) fn disable(&mut self, handle: ColliderHandle) {
         self.roll.enter(handle);
-        self.finder.remove(handle.into_raw_parts().0);
+        self.take_out(handle.into_raw_parts().0);
     }
 
     #[inline(always)]
-    fn set(&mut self, handle: ColliderHandle, aabb: &Aabb, filter: &ProxyFilter) {
+    pub(crate) fn set(&mut self, handle: ColliderHandle, aabb: &Aabb, filter: &ProxyFilter) {
         if !self.roll.has(handle) {
             self.enter(handle);
         }
@@ -178,12 +183,15 @@ impl PbigBroadPhase {
     fn enter(&mut self, handle: ColliderHandle) {
         if !self.roll.enter(handle) {
             // A predecessor with this index that was never reported as removed.
-            self.finder.remove(handle.into_raw_parts().0);
+            self.take_out(handle.into_raw_parts().0);
         }
     }
 
     /// Brings the finder up to date about some colliders.
     fn look_at(&mut self, call: &Call<'_>, listed: &[ColliderHandle]) {
+        if self.overlap.is_some() {
+            return self.look_ahead(call, listed);
+        }
         let mut watch = Watch::new(listed.len() >= MEASURED_FROM);
         if listed.len() < PARALLEL_FROM || rayon::current_num_threads() == 1 {
             let _span = tracing::debug_span!(target: "pbig", "proxies").entered();
@@ -283,26 +291,38 @@ impl PbigBroadPhase {
     }
 
     fn find_and_send(&mut self, events: &mut Vec<BroadPhasePairEvent>) {
-        if self.tree.is_used() {
-            self.tree.note(self.finder.changes(), self.roll.len());
-        }
+        self.note_for_queries();
         if let Err(error) = self.finder.update() {
             self.kept.totals.failures += 1;
             tracing::error!("pbig: no pairs in this update: {error}");
             return;
         }
-        let (added, removed) = (&self.finder.events().added, &self.finder.events().removed);
-        let count = added.len() + removed.len() + self.outbox.adopted.len();
+        let found = match &mut self.overlap {
+            Some(overlap) => {
+                overlap.join(self.finder.events());
+                &overlap.unsent
+            }
+            None => self.finder.events(),
+        };
+        let count = found.added.len() + found.removed.len() + self.outbox.adopted.len();
         if count == 0 {
             return;
         }
         let mut watch = Watch::new(count >= MEASURED_FROM);
         let _span = tracing::debug_span!(target: "pbig", "events").entered();
-        let sent = self.outbox.send(&self.finder, &self.roll, events);
+        let sent = self.outbox.send(&self.finder, found, &self.roll, events);
+        self.overlap.iter_mut().for_each(|overlap| overlap.unsent = Events::default());
         self.kept.events = watch.lap();
         (self.kept.added, self.kept.deleted) = sent;
         self.kept.totals.added += sent.0 as u64;
         self.kept.totals.deleted += sent.1 as u64;
+    }
+
+    /// Boxes that have changed, for the tree of those who ask.
+    pub(crate) fn note_for_queries(&mut self) {
+        if self.tree.is_used() {
+            self.tree.note(self.finder.changes(), self.roll.len());
+        }
     }
 
     /// A call with news, or after one that left something to do. (Apart, as what it puts on the stack would be there for
@@ -313,15 +333,24 @@ impl PbigBroadPhase {
         let _span = tracing::debug_span!(target: "pbig", "update", modified = modified.len()).entered();
         let totals = Totals { updates: self.kept.totals.updates + 1, ..self.kept.totals };
         self.kept = Kept { modified: modified.len(), removed: removed.len(), totals, ..Kept::default() };
-        self.take_in(call);
         #[cfg(feature = "shadow")]
         let before = events.len();
-        self.find_and_send(events);
+        if !self.leaves_alone(has_news) {
+            self.search(call, events);
+        }
         #[cfg(feature = "shadow")]
         if let Some(checker) = &mut self.shadow {
             checker.watch(call, &events[before..]);
         }
         self.idle = !has_news && self.rests();
+    }
+
+    fn search(&mut self, call: &Call<'_>, events: &mut Vec<BroadPhasePairEvent>) {
+        self.overlap.iter_mut().for_each(|overlap| overlap.start_call());
+        self.finish_begun();
+        self.take_in(call);
+        self.find_and_send(events);
+        self.begin_next();
     }
 }
 

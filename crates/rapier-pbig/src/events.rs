@@ -1,7 +1,7 @@
 //! Pairs of ids into rapier's events, in an order that is a function of the scene alone.
 
 use crate::roll::Roll;
-use pbig_core::{BroadPhase as Finder, Pair};
+use pbig_core::{BroadPhase as Finder, Events, Pair};
 use rapier3d::prelude::{BroadPhasePairEvent, ColliderHandle, ColliderPair};
 use std::collections::HashSet;
 
@@ -47,21 +47,22 @@ impl Outbox {
         if swapped { ColliderPair::new(b, a) } else { ColliderPair::new(a, b) }
     }
 
-    /// The events of the finder's last update; returns how many pairs were added and deleted.
+    /// Events that have led to what the finder has; returns how many pairs were added and deleted.
     pub(crate) fn send(
         &mut self,
         finder: &Finder,
+        found: &Events,
         roll: &Roll,
         events: &mut Vec<BroadPhasePairEvent>,
     ) -> (usize, usize) {
-        let found = finder.events();
-        self.count_before(finder, roll.generations().len());
+        self.count_before(finder, found, roll.generations().len());
         let start = events.len();
         let before = |id: u32| self.before[id as usize];
         let deleted = found.removed.iter().map(|&pair| self.pair(pair, roll, before));
         events.extend(deleted.map(BroadPhasePairEvent::DeletePair));
         let known = self.known(roll);
-        let ended = |pair: &&ColliderPair| !self.holds(finder, roll, pair);
+        let holds = |pair| found.added.binary_search(&pair).is_ok();
+        let ended = |pair: &&ColliderPair| !ids(pair, roll).is_some_and(holds);
         let ended = self.adopted.iter().filter(ended).copied();
         events.extend(ended.map(BroadPhasePairEvent::DeletePair));
         let deleted = events.len() - start;
@@ -74,8 +75,7 @@ impl Outbox {
 
     /// A pair that has ended is ordered by the pairs that its colliders had before: a ground that has
     /// lost all of them must not come first.
-    fn count_before(&mut self, finder: &Finder, ids: usize) {
-        let found = finder.events();
+    fn count_before(&mut self, finder: &Finder, found: &Events, ids: usize) {
         self.before.resize(ids, 0);
         let both = |pair: &Pair| [pair.a, pair.b];
         let touched = found.removed.iter().chain(&found.added).flat_map(both);
@@ -87,10 +87,6 @@ impl Outbox {
     /// The adopted pairs of colliders that are there.
     fn known(&self, roll: &Roll) -> HashSet<Pair> {
         self.adopted.iter().filter_map(|pair| ids(pair, roll)).collect()
-    }
-
-    fn holds(&self, finder: &Finder, roll: &Roll, pair: &ColliderPair) -> bool {
-        ids(pair, roll).is_some_and(|pair| finder.events().added.binary_search(&pair).is_ok())
     }
 }
 

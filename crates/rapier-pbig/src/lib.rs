@@ -46,6 +46,7 @@ mod call;
 #[cfg(feature = "debug-render")]
 mod debug_render;
 mod events;
+mod overlap;
 mod proxy;
 mod queries;
 mod roll;
@@ -61,6 +62,7 @@ pub use broad_phase::PbigBroadPhase;
 #[cfg(feature = "debug-render")]
 pub use debug_render::DebugRenderParts;
 pub use events::HandleOrder;
+pub use overlap::Overlapped;
 /// The finder, for the types of its settings and filters.
 pub use pbig_core;
 #[cfg(feature = "gpu")]

@@ -2,8 +2,9 @@
 
 use crate::PbigBroadPhase;
 use crate::events::HandleOrder;
+use crate::overlap::Overlap;
 use crate::roll::Roll;
-use pbig_core::{BroadPhase as Finder, Limits};
+use pbig_core::{BroadPhase as Finder, Events, Limits, Pair};
 use rapier3d::prelude::{ColliderHandle, ColliderPair};
 use serde::de::Error as _;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
@@ -18,6 +19,37 @@ struct Snapshot<'a> {
     relative_margin: f32,
     order: HandleOrder,
     adopted: Vec<[RawHandle; 2]>,
+    overlap: Option<Ahead>,
+}
+
+/// Of [`Overlap`] what later calls depend on.
+#[derive(Serialize, Deserialize)]
+struct Ahead {
+    added: Vec<Pair>,
+    removed: Vec<Pair>,
+    gone: Vec<u32>,
+    quiet: bool,
+}
+
+impl Ahead {
+    fn new(overlap: &Overlap) -> Self {
+        let Events { added, removed } = overlap.unsent.clone();
+        let mut gone: Vec<u32> = overlap.gone.iter().copied().collect();
+        gone.sort_unstable();
+        Self { added, removed, gone, quiet: overlap.quiet }
+    }
+
+    fn restore(self, ids: usize) -> Result<Overlap, String> {
+        for pairs in [&self.added, &self.removed] {
+            let known = pairs.iter().all(|pair| pair.a < pair.b && (pair.b as usize) < ids);
+            if !known || !pairs.is_sorted() {
+                return Err("snapshot: events of unknown boxes, or out of order".into());
+            }
+        }
+        let unsent = Events { added: self.added, removed: self.removed };
+        let gone = self.gone.into_iter().collect();
+        Ok(Overlap { unsent, gone, quiet: self.quiet, ..Overlap::default() })
+    }
 }
 
 impl Serialize for PbigBroadPhase {
@@ -29,6 +61,7 @@ impl Serialize for PbigBroadPhase {
             relative_margin: self.relative_margin,
             order: self.outbox.order,
             adopted: self.outbox.adopted.iter().map(to_raw).collect(),
+            overlap: self.overlap.as_deref().map(Ahead::new),
         }
         .serialize(serializer)
     }
@@ -36,7 +69,7 @@ impl Serialize for PbigBroadPhase {
 
 impl<'de> Deserialize<'de> for PbigBroadPhase {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        let Snapshot { finder, generations, relative_margin, order, adopted } =
+        let Snapshot { finder, generations, relative_margin, order, adopted, overlap } =
             Snapshot::deserialize(deserializer)?;
         let (finder, roll) = (finder.into_owned(), Roll::of_generations(generations.into_owned()));
         let ids = (0..finder.id_count()).filter(|&id| finder.contains(id));
@@ -49,8 +82,10 @@ impl<'de> Deserialize<'de> for PbigBroadPhase {
         if finder.config().limits != Limits::UNLIMITED {
             return Err(D::Error::custom("snapshot: a broad phase for rapier has no limits"));
         }
+        let overlap = overlap.map(|ahead| ahead.restore(roll.generations().len())).transpose();
         let mut restored = Self::around(finder, relative_margin).with_handle_order(order);
         restored.roll = roll;
+        restored.overlap = overlap.map_err(D::Error::custom)?.map(Box::new);
         restored.outbox.adopted = adopted.into_iter().map(from_raw).collect();
         Ok(restored)
     }

@@ -1,6 +1,7 @@
 //! What an update did, in numbers.
 
 use crate::PbigBroadPhase;
+use crate::overlap::Overlapped;
 use pbig_core::Report;
 use std::time::{Duration, Instant};
 
@@ -50,6 +51,8 @@ pub struct Stats<'a> {
     pub events: Duration,
     /// The finder's stages between `set` and `events`, its plan and counts.
     pub report: &'a Report,
+    /// With [`PbigBroadPhase::overlapped`]: the search that was begun before, and the next one.
+    pub overlapped: Option<Overlapped<'a>>,
 }
 
 /// Sums over all updates so far.
@@ -61,6 +64,11 @@ pub struct Totals {
     pub rescans: u64,
     /// Those that failed: `tracing` has the error, and the next one sees the same changes again.
     pub failures: u64,
+    /// With [`PbigBroadPhase::overlapped`]: colliders whose pairs were searched for at once, because they were new or had
+    /// left their stored box.
+    pub left: u64,
+    /// Updates that did so.
+    pub at_once: u64,
     /// `AddPair` events.
     pub added: u64,
     /// `DeletePair` events.
@@ -83,7 +91,8 @@ pub(crate) struct Kept {
 impl Stats<'_> {
     /// The time of all stages that were timed: nearly all of an update in which much changes.
     pub fn total(&self) -> Duration {
-        self.proxies + self.set + self.report.stages.total() + self.events
+        let ahead = self.overlapped.map_or(Duration::ZERO, |overlapped| overlapped.report.stages.total());
+        self.proxies + self.set + self.report.stages.total() + ahead + self.events
     }
 }
 
@@ -92,6 +101,21 @@ impl PbigBroadPhase {
     pub fn stats(&self) -> Stats<'_> {
         let Kept { modified, removed, added, deleted, totals, proxies, set, events } = self.kept;
         let (colliders, report) = (self.roll.len(), self.finder.report());
-        Stats { colliders, modified, removed, added, deleted, totals, proxies, set, events, report }
+        let overlapped = self.overlap.as_deref();
+        let overlapped =
+            overlapped.map(|one| Overlapped { left: one.left, begun: one.begun, report: &one.report });
+        Stats {
+            colliders,
+            modified,
+            removed,
+            added,
+            deleted,
+            totals,
+            proxies,
+            set,
+            events,
+            report,
+            overlapped,
+        }
     }
 }

@@ -4,11 +4,12 @@
 //! The suite plays the same ones each time, on the CPU about 100,000; with `PROPTEST_CASES=6300` about a million new
 //! ones.
 
+mod kind;
 mod ops;
 
 use crate::checked::backends;
+use kind::Kind;
 use ops::{Op, any_op, apply};
-use pbig_core::Config;
 use pbig_harness::shadow::Shadowed;
 use pbig_harness::world::World;
 use proptest::collection::vec;
@@ -46,15 +47,15 @@ struct Subject {
 }
 
 impl Subject {
-    fn new(config: Config, plant: Plant) -> Self {
-        Self { pbig: PbigBroadPhase::with_config(config), plant, boxes: HashMap::new(), busy: false }
+    fn new(kind: Kind, plant: Plant) -> Self {
+        Self { pbig: kind.pbig(), plant, boxes: HashMap::new(), busy: false }
     }
 
     /// Goes on with what was saved.
-    fn restore(&mut self, config: Config) {
+    fn restore(&mut self, kind: Kind) {
         let bytes = postcard::to_stdvec(&self.pbig).expect("a broad phase can be saved");
         self.pbig = match self.plant {
-            Plant::Forgets => PbigBroadPhase::with_config(config),
+            Plant::Forgets => kind.pbig(),
             _ => postcard::from_bytes(&bytes).expect("these are the bytes of a broad phase"),
         };
     }
@@ -176,17 +177,17 @@ impl Outcome {
 struct Scene {
     world: World,
     broad_phase: Shadowed<Subject>,
-    config: Config,
+    kind: Kind,
     tally: Tally,
 }
 
 impl Scene {
-    fn new(config: Config, plant: Plant) -> Self {
+    fn new(kind: Kind, plant: Plant) -> Self {
         let mut world = World::with_gravity(glam::Vec3::ZERO);
         // With CCD, calls between the two of a step, for a part of it.
         world.params.max_ccd_substeps = 3;
-        let broad_phase = Shadowed::new(Subject::new(config, plant), config.margin);
-        Self { world, broad_phase, config, tally: Tally { runs: 1, ..Tally::default() } }
+        let broad_phase = Shadowed::new(Subject::new(kind, plant), kind.margin());
+        Self { world, broad_phase, kind, tally: Tally { runs: 1, ..Tally::default() } }
     }
 
     fn play(&mut self, op: Op) -> Result<(), End> {
@@ -195,11 +196,11 @@ impl Scene {
             Op::Step(steps) => return (0..steps).try_for_each(|_| self.step()),
             Op::Snapshot => {
                 self.restore_world();
-                self.broad_phase.inner.restore(self.config);
+                self.broad_phase.inner.restore(self.kind);
             }
             Op::Fresh(adopts) => {
                 self.restore_world();
-                let mut fresh = PbigBroadPhase::with_config(self.config);
+                let mut fresh = self.kind.pbig();
                 if adopts {
                     fresh.adopt(&self.world.narrow_phase);
                 }
@@ -252,8 +253,8 @@ impl Scene {
 }
 
 /// Plays the operations and another step, so that the last one is seen too; or says what was wrong.
-fn run(ops: &[Op], config: Config, plant: Plant) -> Result<Outcome, String> {
-    let mut scene = Scene::new(config, plant);
+fn run(ops: &[Op], kind: Kind, plant: Plant) -> Result<Outcome, String> {
+    let mut scene = Scene::new(kind, plant);
     match ops.iter().copied().chain([Op::Step(1)]).try_for_each(|op| scene.play(op)) {
         Ok(()) => Ok(scene.outcome()),
         Err(End::Wrong(what)) => Err(what),
@@ -328,7 +329,7 @@ fn on_random_ops(cases: u32, test: impl Fn(&[Op]) -> Result<Outcome, String>) ->
 fn random_worlds_agree_with_stock_and_the_oracle() {
     let [(_, cpu), (_, grid), _] = backends();
     let [on_cpu, on_grid] =
-        [cpu, grid].map(|config| on_random_ops(700, |ops| run(ops, config, Plant::Nothing)));
+        [cpu, grid].map(|config| on_random_ops(700, |ops| run(ops, config.into(), Plant::Nothing)));
     let tally = on_cpu.plus(on_grid);
     tally.assert_that_much_happened();
     assert!(tally.ops >= 100_000 || std::env::var_os("PROPTEST_CASES").is_some(), "{tally:?}");
@@ -338,8 +339,22 @@ fn random_worlds_agree_with_stock_and_the_oracle() {
 fn random_worlds_on_a_gpu_agree_too_and_have_the_bits_of_the_cpu() {
     let [(_, cpu), _, (_, gpu)] = backends();
     let tally = on_random_ops(20, |ops| {
+        let on_gpu = run(ops, gpu.into(), Plant::Nothing)?;
+        on_gpu.compare(&run(ops, cpu.into(), Plant::Nothing)?)?;
+        Ok(on_gpu)
+    });
+    tally.assert_that_much_happened();
+}
+
+#[test]
+fn random_worlds_with_results_from_the_call_before_agree_too() {
+    let [(_, cpu), (_, grid), (_, gpu)] =
+        backends().map(|(name, config)| (name, Kind { config, overlapped: true }));
+    let tally = on_random_ops(100, |ops| run(ops, cpu, Plant::Nothing));
+    tally.assert_that_much_happened();
+    let tally = on_random_ops(6, |ops| {
         let on_gpu = run(ops, gpu, Plant::Nothing)?;
-        on_gpu.compare(&run(ops, cpu, Plant::Nothing)?)?;
+        on_gpu.compare(&run(ops, grid, Plant::Nothing)?)?;
         Ok(on_gpu)
     });
     tally.assert_that_much_happened();
@@ -348,13 +363,19 @@ fn random_worlds_on_a_gpu_agree_too_and_have_the_bits_of_the_cpu() {
 #[test]
 fn a_snapshot_anywhere_continues_bit_identically() {
     let [(_, cpu), ..] = backends();
-    let tally = on_random_ops(60, |ops| {
+    for (cases, overlapped) in [(60, false), (20, true)] {
+        snapshots_continue(cases, Kind { config: cpu, overlapped });
+    }
+}
+
+fn snapshots_continue(cases: u32, kind: Kind) {
+    let tally = on_random_ops(cases, |ops| {
         // A fresh broad phase has other fat boxes than one that was there all along, so other pairs.
         let saved = |op: &Op| if matches!(op, Op::Fresh(_)) { Op::Snapshot } else { *op };
         let ops: Vec<Op> = ops.iter().map(saved).collect();
         let kept: Vec<Op> = ops.iter().copied().filter(|op| !matches!(op, Op::Snapshot)).collect();
-        let with = run(&ops, cpu, Plant::Nothing)?;
-        with.compare(&run(&kept, cpu, Plant::Nothing)?)?;
+        let with = run(&ops, kind, Plant::Nothing)?;
+        with.compare(&run(&kept, kind, Plant::Nothing)?)?;
         Ok(with)
     });
     tally.assert_that_much_happened();
@@ -364,7 +385,7 @@ fn a_snapshot_anywhere_continues_bit_identically() {
 fn planted_faults_are_noticed_and_shrink_to_a_few_operations() {
     let [(_, cpu), ..] = backends();
     for plant in [Plant::RoomForTwo, Plant::OnlyMoved, Plant::Forgets] {
-        let failing = |ops: &[Op]| run(ops, cpu, plant).map(|_| ());
+        let failing = |ops: &[Op]| run(ops, cpu.into(), plant).map(|_| ());
         let (why, ops) = try_random_ops(100, &failing).expect_err("the fault is noticed");
         println!("{plant:?}: {why}\n{}", listed(&ops));
         assert!(ops.len() <= 6, "{plant:?} needs {} operations:\n{}", ops.len(), listed(&ops));

@@ -1,36 +1,65 @@
-//! An update on a GPU: only what has changed goes there, only pairs that came or went come back.
+//! An update on a GPU: only what has changed goes there, only pairs that came or went come back. Between its two halves
+//! the state is as it was ([`super::overlap`]), so that both ask the same, and the CPU can do it when the device fails.
 
 use super::update::{State, state};
 use super::{BroadPhase, flag};
 use crate::diff::Judgement;
 use crate::gpu::{Change, ChangeRequest};
 use crate::{Backend, Error, Pair};
-use std::collections::HashSet;
+
+/// What a device is asked by a broad phase of which other fields may be written.
+macro_rules! request {
+    ($of:ident) => {
+        ChangeRequest {
+            boxes: &$of.boxes,
+            filters: &$of.filters,
+            changed: &$of.overlap.changes,
+            update: $of.updates,
+            kept: $of.pairs.len() as u64,
+            config: &$of.config,
+        }
+    };
+}
 
 impl BroadPhase {
-    /// Asks the device, if that is wanted, for pairs that came or went: the added ones into `events.added`, boxes that have
-    /// lost some into `ending`. False when the CPU has to do it.
-    pub(super) fn find_changes_on_gpu(&mut self) -> Result<bool, Error> {
+    /// Has the device begin the search for pairs that came or went, if that is wanted.
+    pub(super) fn begin_on_gpu(&mut self) {
+        if self.changed.is_empty() {
+            return;
+        }
         // Where little moves the base of the CPU is worth having.
         let few = self.config.backend == Backend::Auto && !self.many_changed();
-        if few || !self.base.wants_gpu(&self.config, self.boxes.len()) {
-            return Ok(false);
+        let wanted = !few && self.base.wants_gpu(&self.config, self.boxes.len());
+        self.overlap.asked = Some(wanted);
+        if wanted {
+            self.pairs.drop_removed();
+            self.note_changes();
+            self.base.begin_changes(&request!(self));
         }
+    }
+
+    /// What the changed boxes were.
+    fn note_changes(&mut self) {
         let state = state!(self);
         let was = |&id: &u32| -> Change {
             let old = state.old(id);
             Change { id, aabb: old.aabb, filter: old.filter }
         };
-        let changed: Vec<Change> = self.changed.iter().map(was).collect();
-        let request = ChangeRequest {
-            boxes: &self.boxes,
-            filters: &self.filters,
-            changed: &changed,
-            update: self.updates,
-            kept: self.pairs.len() as u64,
-            config: &self.config,
-        };
-        let Some(restarted) = self.base.changes_on_gpu(&request, &mut self.report)? else {
+        self.overlap.changes.clear();
+        self.overlap.changes.extend(self.changed.iter().map(was));
+    }
+
+    /// What the device has found, if it was asked: the added ones into `events.added`, boxes that have
+    /// lost some into `ending`. False when the CPU has to do it.
+    pub(super) fn find_changes_on_gpu(&mut self) -> Result<bool, Error> {
+        // One restored from a snapshot has begun without a device.
+        if self.overlap.asked.is_none() {
+            self.begin_on_gpu();
+        }
+        if self.overlap.asked.take() != Some(true) {
+            return Ok(false);
+        }
+        let Some(restarted) = self.base.changes_on_gpu(&request!(self), &mut self.report)? else {
             return Ok(false);
         };
         self.has_base = false;
@@ -48,8 +77,11 @@ impl BroadPhase {
                 self.ending.push(pair.a);
             }
         }
-        let held = self.held_by(restarted);
-        self.events.added.retain(|pair| !held.contains(pair));
+        if !restarted.is_empty() {
+            // The device takes pairs of boxes that began anew for new ones.
+            let state = state!(self);
+            self.events.added.retain(|pair| !state.paired_before(pair.a, pair.b));
+        }
         // The device has counted those that went, too.
         let limit = self.config.limits.max_pairs;
         if self.events.added.len() as u64 > limit {
@@ -60,15 +92,6 @@ impl BroadPhase {
             self.flags[id as usize] |= flag::ENDING;
         }
         Ok(())
-    }
-
-    /// The kept pairs of boxes that began anew: the device takes those that still hold for new ones.
-    fn held_by(&self, restarted: &[u32]) -> HashSet<Pair> {
-        if restarted.is_empty() {
-            return HashSet::new();
-        }
-        let ids: HashSet<u32> = restarted.iter().copied().collect();
-        self.pairs.iter().filter(|pair| ids.contains(&pair.a) || ids.contains(&pair.b)).collect()
     }
 }
 

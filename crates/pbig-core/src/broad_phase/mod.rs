@@ -4,6 +4,7 @@
 mod allocations;
 #[cfg(feature = "gpu")]
 mod device;
+mod overlap;
 mod small;
 #[cfg(feature = "serde")]
 mod snapshot;
@@ -19,6 +20,7 @@ use crate::gpu::GpuFinder;
 use crate::report::{Checks, Report, StageTimes, Watch, stage};
 use crate::search::Search;
 use crate::{Aabb, Backend, Config, Error, Pair, Plan, ProxyFilter};
+use overlap::Overlap;
 use std::collections::HashMap;
 
 /// Changed boxes of a small world from which its stages are timed: a reading of the clock takes as long as one box.
@@ -96,6 +98,8 @@ pub struct BroadPhase {
     refiltered: HashMap<u32, Old>,
     /// Updates that have changed something.
     updates: u64,
+    /// An update that has begun and is not finished.
+    overlap: Overlap,
     /// Boxes that have lost pairs, as far as the device can tell.
     #[cfg(feature = "gpu")]
     ending: Vec<u32>,
@@ -135,6 +139,7 @@ impl BroadPhase {
             changed: vec![],
             refiltered: HashMap::new(),
             updates: 0,
+            overlap: Overlap::default(),
             #[cfg(feature = "gpu")]
             ending: vec![],
             base: Search::new(),
@@ -180,7 +185,11 @@ impl BroadPhase {
     /// [`Error::Margin`].
     pub fn set_margin(&mut self, margin: f32) -> Result<(), Error> {
         check_margin(margin)?;
-        self.config.margin = margin;
+        if self.has_begun() {
+            self.change_margin_later(margin);
+        } else {
+            self.config.margin = margin;
+        }
         Ok(())
     }
 
@@ -195,6 +204,9 @@ impl BroadPhase {
     /// [`Error::TooManyBoxes`] when the id is not below [`crate::Limits::max_boxes`].
     #[inline(always)]
     pub fn set(&mut self, id: u32, aabb: Aabb, filter: ProxyFilter) -> Result<(), Error> {
+        if self.has_begun() {
+            return self.set_later(id, aabb, filter);
+        }
         let i = id as usize;
         let valid = aabb.is_valid();
         if self.flags.get(i).is_none_or(|flags| flags & flag::PRESENT == 0) {
@@ -240,6 +252,9 @@ impl BroadPhase {
     /// Removes a box; its pairs end without an event (ask [`BroadPhase::pairs_of`] before if they
     /// matter). False when there was none.
     pub fn remove(&mut self, id: u32) -> bool {
+        if self.has_begun() {
+            return self.remove_later(id);
+        }
         let i = id as usize;
         if !self.contains(id) {
             return false;
@@ -256,32 +271,36 @@ impl BroadPhase {
         true
     }
 
-    /// Finds what has changed since the last update. Costs next to nothing when nothing has.
+    /// Finds what has changed since the last update. Costs next to nothing when nothing has. The same as
+    /// [`BroadPhase::begin`] and [`BroadPhase::finish`]: one that has begun already is finished.
     ///
     /// # Errors
     /// [`Error::TooManyPairs`]; the changes are kept, and the next update sees them again.
     pub fn update(&mut self) -> Result<&Events, Error> {
+        self.finish()
+    }
+
+    /// All of an update, but what a device has begun.
+    fn find_events(&mut self) -> Result<(), Error> {
         self.events.added.clear();
         self.events.removed.clear();
         self.begin_report();
         if self.changed.is_empty() {
-            return Ok(&self.events);
+            return Ok(());
         }
         self.pairs.drop_removed();
         let is_small = self.is_small();
         let mut watch = Watch::new(!is_small || self.changed.len() >= MEASURED_FROM);
-        let found = if is_small { self.find_in_small(&mut watch) } else { self.find_added() };
-        if let Err(error) = found.and_then(|()| self.check_room()) {
-            self.events.added.clear();
-            return Err(error);
-        }
+        let found = if is_small { self.find_in_small(&mut watch).map(|()| false) } else { self.find_added() };
+        let found = found.and_then(|on_gpu| self.check_room().map(|()| on_gpu));
+        let on_gpu = found.inspect_err(|_| self.events.added.clear())?;
         if !is_small {
             self.small.pass();
             watch.lap();
         }
         {
             stage!("diff");
-            self.find_removed();
+            self.find_removed(on_gpu);
             self.store();
             self.report.stages.diff += watch.lap();
         }
@@ -289,7 +308,7 @@ impl BroadPhase {
         self.sort_events();
         self.report.stages.emit += watch.lap();
         self.report.pairs = self.pairs.len() as u64;
-        Ok(&self.events)
+        Ok(())
     }
 
     /// A report of nothing done yet. Field by field: to make and drop whole ones took longer than to search ten boxes.

@@ -37,14 +37,20 @@ const PARALLEL_FROM: usize = 4096;
 const TESTS_OF_A_BOX: u64 = 64;
 
 impl BroadPhase {
-    /// Pairs that overlap now and did not, into `events.added`, in no order.
-    pub(super) fn find_added(&mut self) -> Result<(), Error> {
+    /// Pairs that overlap now and did not, into `events.added`, in no order; true when a device has found them, and
+    /// told which boxes have lost pairs.
+    pub(super) fn find_added(&mut self) -> Result<bool, Error> {
         #[cfg(feature = "gpu")]
-        if self.find_changes_on_gpu()? {
-            return Ok(());
-        }
+        let on_gpu = self.find_changes_on_gpu()?;
         #[cfg(not(feature = "gpu"))]
-        self.base.miss_gpu(&self.config, &mut self.report);
+        let on_gpu = self.base.miss_gpu(&self.config, &mut self.report);
+        if !on_gpu {
+            self.find_added_on_cpu()?;
+        }
+        Ok(on_gpu)
+    }
+
+    fn find_added_on_cpu(&mut self) -> Result<(), Error> {
         let whole = self.many_changed()
             || self.config.strategy == Strategy::Pbig
             || self.config.backend == Backend::Brute
@@ -143,12 +149,13 @@ impl BroadPhase {
     }
 
     /// Kept pairs that no longer hold, into `events.removed`, in no order; they are no longer kept.
-    pub(super) fn find_removed(&mut self) {
+    #[cfg_attr(not(feature = "gpu"), expect(unused_variables, reason = "nobody tells"))]
+    pub(super) fn find_removed(&mut self, is_told: bool) {
         let many = self.many_changed();
         let state = state!(self);
         let removed = &mut self.events.removed;
         #[cfg(feature = "gpu")]
-        if self.report.gpu.is_some() {
+        if is_told {
             let ending = Ending(state);
             return if many {
                 self.pairs.end_many(&ending, removed)
@@ -212,7 +219,7 @@ impl State<'_> {
         self.filters[a as usize].allows(&self.filters[b as usize])
     }
 
-    fn paired_before(&self, a: u32, b: u32) -> bool {
+    pub(super) fn paired_before(&self, a: u32, b: u32) -> bool {
         if self.flags(a, b) & flag::REFILTERED == 0 {
             return self.before[a as usize].overlaps(&self.before[b as usize]);
         }

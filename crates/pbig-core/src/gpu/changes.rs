@@ -5,9 +5,9 @@
 //! before, emits each pair that overlaps now and did not before, or the other way round. So what is
 //! transferred, in either direction, follows what changed.
 
-use super::search::{Task, search};
+use super::search::{Started, Task, search, start};
 use super::upload::{PIECE, follows};
-use super::{Failure, GpuFinder};
+use super::{Failure, GpuError, GpuFinder};
 use crate::cpu::find::Found;
 use crate::layout::{ANEW, Box as DeviceBox, Motion, Move, Refilter};
 use crate::plan::Summary;
@@ -67,6 +67,20 @@ impl ChangeRequest<'_> {
         changed.filter(|change| self.restarts(change)).map(|change| change.id).collect()
     }
 
+    /// The search for what has changed.
+    fn task<'a>(&'a self, trail: &'a Trail, summary: &'a Summary) -> Task<'a> {
+        Task {
+            boxes: &trail.reach,
+            filters: Some(self.filters),
+            changes: Some(self),
+            accept: None,
+            // More than this and more were added than there may be pairs: what ended had been kept.
+            limit: self.config.limits.max_pairs.saturating_add(self.kept),
+            summary,
+            config: self.config,
+        }
+    }
+
     /// What boxes are and were, for a device that does not know them.
     pub(super) fn motions(&self, ids: Range<usize>) -> Vec<Motion> {
         let at_rest = |now: DeviceBox| Motion { now, before: now };
@@ -119,7 +133,7 @@ impl Trail {
             }
         }
         self.reach.extend_from_slice(&boxes[self.reach.len()..]);
-        let reach = |change: &Change| hull(&boxes[change.id as usize], &request.before(change));
+        let reach = |change: &Change| boxes[change.id as usize].union(&request.before(change));
         let changed = request.changed.par_iter().with_min_len(PIECE);
         for (change, reach) in request.changed.iter().zip(changed.map(reach).collect::<Vec<_>>()) {
             self.reach[change.id as usize] = reach;
@@ -129,7 +143,22 @@ impl Trail {
     }
 }
 
+/// A search for changes that has begun: its boxes, and what the device was given if it takes one submission.
+#[derive(Debug)]
+pub(super) struct Ahead {
+    trail: Trail,
+    summary: Summary,
+    started: Option<Started>,
+}
+
 impl GpuFinder {
+    /// Has the device begin to search for changes, and does not wait for it. What fails is told by
+    /// [`GpuFinder::changes`], which must be given the same request.
+    pub(crate) fn begin_changes(&mut self, request: &ChangeRequest<'_>) {
+        let ahead = self.start_changes(request);
+        self.ahead = Some(ahead);
+    }
+
     /// Into `found`, once each and in no order, the pairs that filters allow and that overlap now and did
     /// not at the last update, or the other way round: which of the two the boxes tell. Returns the boxes
     /// that began anew, for which the caller completes the answer:
@@ -145,54 +174,48 @@ impl GpuFinder {
         report: &mut Report,
     ) -> Result<Vec<u32>, Failure> {
         found.clear();
-        self.check_pause(request.config)?;
-        let result = self.try_changes(request, found, report);
+        let ahead = self.ahead.take().unwrap_or_else(|| self.start_changes(request));
+        let result = ahead.and_then(|ahead| self.complete_changes(ahead, request, found, report));
         if let Err(failure) = &result {
             self.fail(failure, found);
         }
         result.map(|()| request.restarted())
     }
 
-    fn try_changes(
-        &mut self,
-        request: &ChangeRequest<'_>,
-        found: &mut Found,
-        report: &mut Report,
-    ) -> Result<(), Failure> {
+    fn start_changes(&mut self, request: &ChangeRequest<'_>) -> Result<Ahead, Failure> {
+        self.check_pause(request.config)?;
         let crowding = self.crowding;
         let session = self.session(&request.config.gpu)?;
         let engine = session.engine.clone();
         // It comes back with success only.
         let mut trail = std::mem::take(&mut session.trail);
         trail.follow(request);
-        let task = Task {
-            boxes: &trail.reach,
-            filters: Some(request.filters),
-            changes: Some(request),
-            accept: None,
-            // More than this and more were added than there may be pairs: what ended had been kept.
-            limit: request.config.limits.max_pairs.saturating_add(request.kept),
-            summary: &Summary::of(&trail.reach, None),
-            config: request.config,
-        };
-        let searched = engine.watch(|| search(session, &task, crowding, found));
+        let summary = Summary::of(&trail.reach, None);
+        let task = request.task(&trail, &summary);
+        let started = engine.watch(|| start(session, &task, crowding))?;
+        Ok(Ahead { trail, summary, started })
+    }
+
+    fn complete_changes(
+        &mut self,
+        ahead: Ahead,
+        request: &ChangeRequest<'_>,
+        found: &mut Found,
+        report: &mut Report,
+    ) -> Result<(), Failure> {
+        let crowding = self.crowding;
+        let Ahead { trail, summary, started } = ahead;
+        // The very session that has begun: one on another device knows nothing of it.
+        let session = self.session.as_mut().map(|(_, session)| session);
+        let session = session.filter(|session| !session.engine.is_lost()).ok_or(GpuError::Lost)?;
+        let engine = session.engine.clone();
+        let task = request.task(&trail, &summary);
+        let searched = engine.watch(|| search(session, &task, crowding, started, found));
         let searched = searched.map_err(|failure| with_limit(failure, request.config.limits.max_pairs))?;
         session.trail = trail;
         session.end_call();
         self.finish(searched, request.boxes.len() as u64 + request.kept, report);
         Ok(())
-    }
-}
-
-/// The box around two, of which an invalid one does not count.
-fn hull(one: &Aabb, other: &Aabb) -> Aabb {
-    match (one.is_valid(), other.is_valid()) {
-        (true, true) => Aabb::new(
-            std::array::from_fn(|k| one.min[k].min(other.min[k])),
-            std::array::from_fn(|k| one.max[k].max(other.max[k])),
-        ),
-        (false, true) => *other,
-        _ => *one,
     }
 }
 

@@ -14,6 +14,7 @@ use crate::{Error, Pair, decode};
 use std::time::Instant;
 
 /// A chunk that the device is working on.
+#[derive(Debug)]
 pub(super) struct Flight {
     pub(super) chunk: Chunk,
     side: usize,
@@ -32,14 +33,14 @@ pub(super) enum Landed {
 }
 
 impl Session {
-    /// Submits what `record` records, on one of the two sets of buffers.
+    /// Submits what `record` records, on one of the two sets of buffers. The device stops counting beyond `left` pairs.
     pub(super) fn launch(
         &mut self,
         params: &Params,
         mut chunk: Chunk,
         side: usize,
         words: u64,
-        sink: &Sink<'_>,
+        left: u64,
         record: &mut dyn FnMut(&mut Commands<'_>) -> Result<(), GpuError>,
     ) -> Result<Flight, GpuError> {
         let (engine, storage) = (self.engine.clone(), &mut self.storage);
@@ -57,11 +58,7 @@ impl Session {
         let prefetched = (4 * prefetched).min(4 * room).min(most - HEAD);
         storage.ensure(&engine, sided("staging", side), HEAD + prefetched)?;
         chunk.word_room = room.min(u64::from(u32::MAX) - 1) as u32;
-        chunk.pairs_left = layout::halves(sink.limit.saturating_sub(sink.pairs));
-        if sink.accept.is_some() {
-            // What the device counts is not what the limit is about.
-            chunk.pairs_left = [u32::MAX; 2];
-        }
+        chunk.pairs_left = layout::halves(left);
         engine.queue.write_buffer(storage.get("params"), 0, bytemuck::bytes_of(params));
         engine.queue.write_buffer(storage.get(sided("chunk", side)), 0, bytemuck::bytes_of(&chunk));
         let clock = self.clocks[side].as_ref();
@@ -91,7 +88,7 @@ impl Session {
     ) -> Result<(Counters, Landed), Failure> {
         let (head, early) = self.receive(&flight, fixed, sink)?;
         let (totals, room) = (head.totals, self.storage.size(sided("out", flight.side)) / 4);
-        if wide(totals.pairs) > sink.limit.saturating_sub(sink.pairs) && sink.accept.is_none() {
+        if wide(totals.pairs) > sink.left() {
             return Err(Failure::Call(Error::TooManyPairs { limit: sink.limit }));
         }
         let words = fixed.unwrap_or(wide(totals.words));

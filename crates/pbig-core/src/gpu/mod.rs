@@ -34,6 +34,7 @@ mod readback;
 mod search;
 mod session;
 mod sink;
+mod start;
 mod storage;
 pub mod study;
 mod trial;
@@ -51,6 +52,7 @@ use crate::cpu::find::Found;
 use crate::plan::Summary;
 use crate::report::Report;
 use crate::{Aabb, Backend, Config, GpuOptions, ProxyFilter};
+use changes::Ahead;
 use engine::Engine;
 use search::{Searched, Task, search};
 use session::Session;
@@ -78,6 +80,8 @@ pub struct GpuFinder {
     engine: Option<Arc<Engine>>,
     session: Option<(GpuOptions, Session)>,
     failed: Option<(Instant, String)>,
+    /// A search for changes that has begun, or why it could not.
+    ahead: Option<Result<Ahead, Failure>>,
     crowding: f32,
     /// A software adapter passes for hardware, in tests.
     pretends: bool,
@@ -147,6 +151,7 @@ impl GpuFinder {
             engine: None,
             session: None,
             failed: None,
+            ahead: None,
             crowding: 1.0,
             pretends: false,
         }
@@ -208,7 +213,7 @@ impl GpuFinder {
         found.clear();
         match (failure, &mut self.session) {
             (Failure::Call(_), Some((_, session))) => session.mirror.forget_motions(),
-            (Failure::Call(_), None) => {}
+            (Failure::Call(_), None) | (Failure::Device(GpuError::Paused { .. }), _) => {}
             (Failure::Device(error), session) => {
                 *session = None;
                 self.failed = Some((Instant::now(), error.to_string()));
@@ -262,7 +267,7 @@ impl GpuFinder {
         let crowding = self.crowding;
         let session = self.session(&request.config.gpu)?;
         let engine = session.engine.clone();
-        let searched = engine.watch(|| search(session, &Task::new(request), crowding, found))?;
+        let searched = engine.watch(|| search(session, &Task::new(request), crowding, None, found))?;
         session.end_call();
         let useful = request.boxes.len() as u64 + searched.pairs;
         self.finish(searched, useful, report);

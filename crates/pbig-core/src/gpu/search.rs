@@ -3,6 +3,7 @@
 use super::error::Failure;
 use super::session::{Input, Job, Session};
 use super::sink::Sink;
+use super::start::First;
 use super::{ChangeRequest, GpuError, Request, parts};
 use crate::cpu::find::Found;
 use crate::layout::{BOX_BITS, Located, Motion};
@@ -49,24 +50,45 @@ pub(super) struct Searched {
     pub(super) pairs: u64,
 }
 
-/// Searches in as few parts as fit.
+/// A search of everything at once that the device has begun.
+#[derive(Debug)]
+pub(super) struct Started {
+    plan: Option<GpuPlan>,
+    first: First,
+    report: GpuReport,
+}
+
+/// Begins a search without waiting for it; nothing where it takes parts, which wait for each other.
+pub(super) fn start(
+    session: &mut Session,
+    task: &Task<'_>,
+    crowding: f32,
+) -> Result<Option<Started>, GpuError> {
+    if task.boxes.len() > boxes_at_once(session, task) || task.summary.valid < 2 {
+        return Ok(None);
+    }
+    match start_whole(session, task, crowding) {
+        Err(GpuError::TooLarge { .. }) => {
+            // What was sent is not taken in: the search that follows sends everything again.
+            session.mirror.forget_motions();
+            Ok(None)
+        }
+        started => started.map(Some),
+    }
+}
+
+/// Searches in as few parts as fit, or completes what was started.
 pub(super) fn search(
     session: &mut Session,
     task: &Task<'_>,
     crowding: f32,
+    mut started: Option<Started>,
     found: &mut Found,
 ) -> Result<Searched, Failure> {
     let len = task.boxes.len();
-    // What one set needed says nothing about one of another size.
-    session.parted = session.parted.filter(|&(parted, _)| parted / 2 <= len && len / 2 <= parted);
-    let mut most = most_boxes(session, task).min(session.parted.map_or(usize::MAX, |(_, most)| most));
+    let mut most = boxes_at_once(session, task);
     loop {
         found.clear();
-        let gpu = GpuReport {
-            adapter: session.engine.name.clone(),
-            subgroups: session.engine.subgroups,
-            ..GpuReport::default()
-        };
         let mut sink = Sink {
             found,
             used: 0,
@@ -76,10 +98,10 @@ pub(super) fn search(
             ids: None,
             accept: task.accept,
             checks: Checks::default(),
-            report: gpu,
+            report: new_report(session),
         };
         let result = if task.boxes.len() <= most {
-            search_whole(session, task, crowding, &mut sink)
+            search_whole(session, task, crowding, started.take(), &mut sink)
         } else {
             search_parts(session, task, crowding, most, &mut sink)
         };
@@ -101,6 +123,19 @@ pub(super) fn search(
     }
 }
 
+fn new_report(session: &Session) -> GpuReport {
+    let engine = &session.engine;
+    GpuReport { adapter: engine.name.clone(), subgroups: engine.subgroups, parts: 1, ..GpuReport::default() }
+}
+
+/// How many boxes are searched at once, as far as is known.
+fn boxes_at_once(session: &mut Session, task: &Task<'_>) -> usize {
+    let len = task.boxes.len();
+    // What one set needed says nothing about one of another size.
+    session.parted = session.parted.filter(|&(parted, _)| parted / 2 <= len && len / 2 <= parted);
+    most_boxes(session, task).min(session.parted.map_or(usize::MAX, |(_, most)| most))
+}
+
 /// How many boxes fit: each has a place in every buffer, and a number in an entry.
 fn most_boxes(session: &Session, task: &Task<'_>) -> usize {
     let largest = if task.changes.is_some() { size_of::<Motion>() } else { size_of::<Located>() };
@@ -119,22 +154,35 @@ fn search_whole(
     session: &mut Session,
     task: &Task<'_>,
     crowding: f32,
+    started: Option<Started>,
     sink: &mut Sink<'_>,
 ) -> Result<Plan, Failure> {
-    sink.report.parts = 1;
     let valid = task.summary.valid;
     if valid < 2 {
         return Ok(Plan { boxes: valid, ..Plan::default() });
     }
-    let config = task.config;
-    let brute = config.strategy == Strategy::Auto && task.boxes.len() <= SMALL_SCENE;
-    let plan = (!brute).then(|| plan(session, task.summary, config, crowding));
-    plan.as_ref().map_or(Ok(()), |plan| check_entries(plan, task.boxes.len()))?;
-    let input = task.changes.map_or(Input::Boxes(task.boxes), Input::Changes);
-    let job = Job { input, filters: task.filters, split: 0, plan: plan.as_ref(), config };
-    session.run(&job, sink)?;
-    let (chosen, swept) = if brute { (Chosen::Brute, valid) } else { (Chosen::Pbig, 0) };
+    let started = started.map_or_else(|| start_whole(session, task, crowding), Ok)?;
+    let Started { plan, first, report } = started;
+    sink.report = report;
+    session.complete(&whole(task, plan.as_ref()), first, sink)?;
+    let (chosen, swept) = if plan.is_none() { (Chosen::Brute, valid) } else { (Chosen::Pbig, 0) };
     Ok(Plan { chosen, swept, boxes: valid, gpu: plan, ..Plan::default() })
+}
+
+fn start_whole(session: &mut Session, task: &Task<'_>, crowding: f32) -> Result<Started, GpuError> {
+    let brute = task.config.strategy == Strategy::Auto && task.boxes.len() <= SMALL_SCENE;
+    let plan = (!brute).then(|| plan(session, task.summary, task.config, crowding));
+    plan.as_ref().map_or(Ok(()), |plan| check_entries(plan, task.boxes.len()))?;
+    let left = if task.accept.is_some() { u64::MAX } else { task.limit };
+    let mut report = new_report(session);
+    let first = session.start(&whole(task, plan.as_ref()), left, &mut report)?;
+    Ok(Started { plan, first, report })
+}
+
+/// All boxes of a task as one job.
+fn whole<'a>(task: &Task<'a>, plan: Option<&'a GpuPlan>) -> Job<'a> {
+    let input = task.changes.map_or(Input::Boxes(task.boxes), Input::Changes);
+    Job { input, filters: task.filters, split: 0, plan, config: task.config }
 }
 
 fn plan(session: &Session, summary: &Summary, config: &Config, crowding: f32) -> GpuPlan {

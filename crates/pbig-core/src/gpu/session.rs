@@ -8,26 +8,21 @@ use super::error::Failure;
 use super::flight::{Flight, Landed};
 use super::readback::Clock;
 use super::sink::Sink;
+use super::start::{First, bit_words};
 use super::storage::Storage;
 use super::upload::{Mirror, News};
 use super::{ChangeRequest, GpuError, map};
 use crate::config::{Coding, GpuOptions};
 use crate::layout::{BITS, Chunk, Counters, FILTERED, LANES, Motion, PACKED, Params};
-use crate::pair_index::pair_count;
 use crate::plan::GpuPlan;
-use crate::report::lap;
 use crate::{Aabb, Config, ProxyFilter};
 use pbig_shaders as shaders;
 use std::collections::VecDeque;
 use std::sync::Arc;
-use std::time::Instant;
 
 /// Times that a map is repeated before the call is left to the CPU: each repetition has the room that
 /// the last one asked for.
 const MOST_REPEATS: u32 = 6;
-
-/// Boxes of one cell that records can name: 2^16 segments.
-const MOST_PACKED: usize = 1 << 24;
 
 /// What a search is about.
 #[derive(Clone, Copy)]
@@ -41,7 +36,7 @@ pub(super) enum Input<'a> {
 }
 
 impl Input<'_> {
-    fn len(self) -> usize {
+    pub(super) fn len(self) -> usize {
         match self {
             Self::Boxes(boxes) => boxes.len(),
             Self::Motions(motions) => motions.len(),
@@ -118,20 +113,24 @@ impl Session {
 
     /// Finds the pairs of a job, completely.
     pub(super) fn run(&mut self, job: &Job<'_>, sink: &mut Sink<'_>) -> Result<(), Failure> {
-        self.table = None;
-        self.words = std::mem::take(&mut self.most_words);
-        self.word_room = self.words;
-        let mut clock = Instant::now();
-        self.upload(job)?;
-        sink.report.uploaded += self.mirror.sent;
-        sink.report.upload += lap(&mut clock);
+        let first = self.start(job, sink.left(), &mut sink.report)?;
+        self.complete(job, first, sink)
+    }
+
+    /// Finds the pairs of a job whose first submission is on its way.
+    pub(super) fn complete(
+        &mut self,
+        job: &Job<'_>,
+        first: First,
+        sink: &mut Sink<'_>,
+    ) -> Result<(), Failure> {
         let result =
-            if job.plan.is_some() { self.search_grid(job, sink) } else { self.search_all(job, sink) };
+            if job.plan.is_some() { self.search_grid(first, sink) } else { self.search_all(first, sink) };
         sink.report.device_bytes = sink.report.device_bytes.max(self.storage.bytes());
         result
     }
 
-    fn upload(&mut self, job: &Job<'_>) -> Result<(), GpuError> {
+    pub(super) fn upload(&mut self, job: &Job<'_>) -> Result<(), GpuError> {
         let (engine, storage, mirror) = (&self.engine, &mut self.storage, &mut self.mirror);
         self.changes = !matches!(job.input, Input::Boxes(_));
         self.news = None;
@@ -159,7 +158,7 @@ impl Session {
         (self.words, self.most_words, self.word_room) = (0, 0, 0);
     }
 
-    fn params(&self, job: &Job<'_>) -> Params {
+    pub(super) fn params(&self, job: &Job<'_>) -> Params {
         let mut params = job.plan.map_or(Params::default(), GpuPlan::params);
         params.boxes = job.input.len() as u32;
         params.small_cell = job.config.small_cell.clamp(1, LANES);
@@ -174,7 +173,7 @@ impl Session {
     }
 
     /// The wanted coding. Changes are rarely so many that records or bits are smaller, and bursts of them end.
-    fn coding(&self) -> Coding {
+    pub(super) fn coding(&self) -> Coding {
         match self.options.coding {
             Coding::Auto if self.changes => Coding::Plain,
             coding => coding,
@@ -182,29 +181,20 @@ impl Session {
     }
 
     /// Work items in a chunk; a program that plays a GPU gets fewer, lest it passes for one that hangs.
-    fn chunk(&self) -> [u32; 2] {
+    pub(super) fn chunk(&self) -> [u32; 2] {
         let share = if self.engine.software { 4 } else { 1 };
         self.options.chunk.map(|items| (items / share).max(1))
     }
 
     /// Without a grid (Avril 3.2), one submission.
-    fn search_all(&mut self, job: &Job<'_>, sink: &mut Sink<'_>) -> Result<(), Failure> {
-        let mut params = self.params(job);
-        let all = pair_count(job.input.len() as u64);
-        let bit_words = all.div_ceil(32);
-        let mut bits = match self.coding() {
-            Coding::Auto => bit_words <= 2 * self.coding.pairs,
-            coding => coding == Coding::Packed,
-        };
+    fn search_all(&mut self, first: First, sink: &mut Sink<'_>) -> Result<(), Failure> {
+        let (mut params, mut first) = (first.params, Some(first.flight));
         for _ in 0..MOST_REPEATS {
-            params.flags |= if bits { BITS } else { 0 };
-            // The last workgroup writes all its words.
-            let words = if bits { bit_words.next_multiple_of(8) } else { self.word_room };
-            let chunk = Chunk { small_items: all.div_ceil(u64::from(LANES)) as u32, ..Chunk::default() };
-            let flight = self.launch(&params, chunk, 0, words, sink, &mut |commands| {
-                commands.run(&shaders::CHECK_ALL, Groups::Direct(chunk.small_items))
-            })?;
-            let fixed = bits.then_some(bit_words);
+            let flight = match first.take() {
+                Some(flight) => flight,
+                None => self.launch_all(&params, sink.left())?,
+            };
+            let fixed = (params.flags & BITS != 0).then(|| bit_words(&params));
             match self.land(flight, &params, fixed, sink)?.1 {
                 Landed::Done => {
                     sink.report.chunks += 1;
@@ -214,31 +204,26 @@ impl Session {
                 Landed::NoMap => {}
             }
             // One bit a pair has room in the smallest buffer.
-            bits |= self.word_room > self.storage.most_bytes() / 4;
+            params.flags |= if self.word_room > self.storage.most_bytes() / 4 { BITS } else { 0 };
             sink.report.repeats += 1;
         }
         Err(self.no_room().into())
     }
 
     /// With a grid: map, schedule and the first chunk in one submission; the other chunks after it.
-    fn search_grid(&mut self, job: &Job<'_>, sink: &mut Sink<'_>) -> Result<(), Failure> {
-        let mut params = self.params(job);
-        let packed = self.coding.packed(self.coding()) && job.input.len() < MOST_PACKED;
-        params.flags |= if packed { PACKED } else { 0 };
+    fn search_grid(&mut self, first: First, sink: &mut Sink<'_>) -> Result<(), Failure> {
+        let (mut params, mut first) = (first.params, Some(first.flight));
+        let packed = params.flags & PACKED != 0;
         let before = (sink.written, sink.report.compression);
-        let [small_items, large_items] = self.chunk();
-        let first = Chunk { small_items, large_items, ..Chunk::default() };
         for _ in 0..MOST_REPEATS {
-            self.room.make(&self.engine, &mut self.storage, &mut params, self.options.first_bytes)?;
-            let flight = self.launch(&params, first, 0, self.word_room, sink, &mut |commands| {
-                map::record(commands, &params)?;
-                commands.run(&shaders::CHECK_SMALL, Groups::Indirect(0))?;
-                commands.run(&shaders::CHECK_LARGE, Groups::Indirect(12))
-            })?;
+            let flight = match first.take() {
+                Some(flight) => flight,
+                None => self.launch_grid(&mut params, sink.left())?,
+            };
             let (counters, landed) = self.land(flight, &params, None, sink)?;
             self.room.needed = counters;
             if !matches!(landed, Landed::NoMap) {
-                let rest = self.note(landed, first, counters, sink);
+                let rest = self.note(landed, self.first_chunk(), counters, sink);
                 self.search_rest(&params, rest, sink)?;
                 let (pairs, words) = (sink.written - before.0, sink.report.compression - before.1);
                 self.coding.learn(packed, pairs, words as u64, self.room.needed.entries);
@@ -283,7 +268,7 @@ impl Session {
                 && let Some(chunk) = pending.pop_front()
             {
                 side = 1 - side;
-                flights.push_back(self.launch_chunk(params, chunk, side, sink)?);
+                flights.push_back(self.launch_chunk(params, chunk, side, sink.left())?);
             }
             let Some(flight) = flights.pop_front() else { return Ok(()) };
             let chunk = flight.chunk;
@@ -320,9 +305,9 @@ impl Session {
         params: &Params,
         chunk: Chunk,
         side: usize,
-        sink: &Sink<'_>,
+        left: u64,
     ) -> Result<Flight, GpuError> {
-        self.launch(params, chunk, side, self.word_room, sink, &mut |commands| {
+        self.launch(params, chunk, side, self.word_room, left, &mut |commands| {
             if chunk.small_items > 0 {
                 commands.run(&shaders::CHECK_SMALL, Groups::Direct(chunk.small_items))?;
             }

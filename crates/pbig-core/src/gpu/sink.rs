@@ -25,6 +25,11 @@ pub(super) struct Sink<'a> {
 }
 
 impl Sink<'_> {
+    /// How many more pairs the device may count: any number where that is not what the limit is about.
+    pub(super) fn left(&self) -> u64 {
+        if self.accept.is_some() { u64::MAX } else { self.limit.saturating_sub(self.pairs) }
+    }
+
     pub(super) fn add(&mut self, pieces: Vec<Vec<Pair>>) -> Result<(), Error> {
         let (ids, accept) = (self.ids, self.accept);
         let settle = |mut piece: Vec<Pair>| {
