@@ -159,3 +159,19 @@ pub(crate) fn check_count(boxes: u64, config: &Config) -> Result<(), Error> {
     let limit = config.limits.max_boxes.min(Limits::UNLIMITED.max_boxes);
     if boxes > limit { Err(Error::TooManyBoxes { boxes, limit }) } else { Ok(()) }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Strategy;
+
+    #[test]
+    fn what_a_row_that_wraps_around_tests_is_counted() {
+        let cube = |at: [f32; 3]| Aabb::from_center(at, [0.5; 3]);
+        let boxes = [cube([0.0, 0.0, 1.0]), cube([1.0, 0.0, 0.0])];
+        let mut finder = Finder::new(Config { strategy: Strategy::Grid, ..Config::DEFAULT });
+        assert_eq!(finder.find(&boxes).expect("one pair"), [Pair::new(0, 1)]);
+        let checks = finder.report().checks;
+        assert!(checks.made >= 1 && checks.unnecessary < checks.made, "{checks:?}");
+    }
+}

@@ -39,11 +39,14 @@ impl Ahead {
         Self { added, removed, gone, quiet: overlap.quiet }
     }
 
-    fn restore(self, ids: usize) -> Result<Overlap, String> {
-        for pairs in [&self.added, &self.removed] {
-            let known = pairs.iter().all(|pair| pair.a < pair.b && (pair.b as usize) < ids);
-            if !known || !pairs.is_sorted() {
-                return Err("snapshot: events of unknown boxes, or out of order".into());
+    /// Events are sent as the finder's pairs say, and counted by them.
+    fn restore(self, finder: &Finder) -> Result<Overlap, String> {
+        let is_gone = |pair: &Pair| self.gone.contains(&pair.a) || self.gone.contains(&pair.b);
+        for (pairs, kept) in [(&self.added, true), (&self.removed, false)] {
+            let known = |pair: &Pair| pair.a < pair.b && pair.b < finder.id_count();
+            let good = |pair: &Pair| known(pair) && (is_gone(pair) || finder.has_pair(*pair) == kept);
+            if !pairs.iter().all(good) || !pairs.is_sorted_by(|one, next| one < next) {
+                return Err("snapshot: events of unknown boxes or pairs, or out of order".into());
             }
         }
         let unsent = Events { added: self.added, removed: self.removed };
@@ -82,7 +85,10 @@ impl<'de> Deserialize<'de> for PbigBroadPhase {
         if finder.config().limits != Limits::UNLIMITED {
             return Err(D::Error::custom("snapshot: a broad phase for rapier has no limits"));
         }
-        let overlap = overlap.map(|ahead| ahead.restore(roll.generations().len())).transpose();
+        if finder.has_begun() && overlap.is_none() {
+            return Err(D::Error::custom("snapshot: a search that has begun, and nobody who waits for it"));
+        }
+        let overlap = overlap.map(|ahead| ahead.restore(&finder)).transpose();
         let mut restored = Self::around(finder, relative_margin).with_handle_order(order);
         restored.roll = roll;
         restored.overlap = overlap.map_err(D::Error::custom)?.map(Box::new);

@@ -89,6 +89,11 @@ fn nor_does_one_in_which_few_boxes_move() {
 }
 
 #[test]
+fn where_threads_share_the_work_only_their_queue_grows_now_and_then() {
+    assert!(most_allocations(100_000, 20) <= 1);
+}
+
+#[test]
 fn allocations_are_counted() {
     let before = COUNT.get();
     let some = std::hint::black_box(vec![1u8; 100]);

@@ -12,6 +12,7 @@ mod state;
 mod update;
 
 use crate::cpu::emit;
+use crate::cpu::find::Found;
 use crate::cpu::record::Tracked;
 use crate::diff::PairStore;
 use crate::finder::check_count;
@@ -112,6 +113,7 @@ pub struct BroadPhase {
     base_checks: u64,
     /// Tests since then that another one would have saved.
     strain: u64,
+    found: Found,
     /// The changed boxes, to be looked up in it.
     others: Vec<Tracked>,
     pairs: PairStore,
@@ -148,6 +150,7 @@ impl BroadPhase {
             base_plan: Plan::default(),
             base_checks: 0,
             strain: 0,
+            found: Found::default(),
             others: vec![],
             pairs: PairStore::default(),
             events: Events::default(),

@@ -10,8 +10,8 @@ use crate::cpu::find::Others;
 use crate::cpu::judge::Accept;
 use crate::diff::{Judgement, PairStore};
 use crate::plan::{Chosen, LazySummary, Plan};
-use crate::report::{Checks, lap, stage};
-use crate::search::Rule;
+use crate::report::{lap, stage};
+use crate::search::{Rule, single_entry_checks};
 use crate::{Aabb, Backend, Error, Pair, ProxyFilter, Strategy};
 use std::collections::HashMap;
 use std::time::Instant;
@@ -95,7 +95,7 @@ impl BroadPhase {
         found?;
         self.report.invalid = invalid;
         // A search by another strategy leaves no base grid to keep.
-        self.has_base = self.report.plan.chosen != Chosen::Pbig;
+        self.has_base = self.config.strategy != Strategy::Pbig || self.config.backend == Backend::Brute;
         self.base_plan = self.report.plan.clone();
         (self.base_checks, self.strain) = (self.report.checks.made, 0);
         self.base.found.chunks.iter().for_each(|chunk| self.events.added.extend_from_slice(chunk));
@@ -123,13 +123,13 @@ impl BroadPhase {
         let mut clock = Instant::now();
         stage!("check");
         let update = Some(self.present_update());
-        let (state, limit, added) =
-            (OfChanged(state!(self)), self.config.limits.max_pairs, &mut self.events.added);
+        let (state, limit) = (OfChanged(state!(self)), self.config.limits.max_pairs);
         let others = Others { records: &self.others, filters: &self.filters, update };
-        let (made, overlaps) = self.base.map.check_others(&others, &state, added, limit)?;
+        self.base.map.check_others(&others, &state, &mut self.found, limit)?;
+        self.found.chunks.iter().for_each(|chunk| self.events.added.extend_from_slice(chunk));
         self.report.stages.check += lap(&mut clock);
-        self.report.checks = Checks { made, unnecessary: made - overlaps, redundant: 0 };
-        self.note_strain(made);
+        self.report.checks = single_entry_checks(&self.found);
+        self.note_strain(self.found.checks);
         let (moved, boxes) = (self.base.map.out_of_order() as u32, self.valid_count());
         self.report.plan = Plan { chosen: Chosen::Edit, moved, boxes, ..self.base_plan.clone() };
         Ok(())

@@ -4,7 +4,7 @@
 use super::calibrate;
 use super::map::Map;
 use super::record::Record;
-use crate::plan::{Camps, Chosen, Costs, LazySummary, Plan, Summary, spread_evenly};
+use crate::plan::{Camps, Chosen, Costs, LazySummary, Plan, Summary, Way, spread_evenly};
 use crate::report::{StageTimes, lap, stage};
 use crate::{Aabb, Config, ProxyFilter};
 use std::time::Instant;
@@ -57,6 +57,8 @@ pub(super) struct Crowding {
     factor: f32,
     /// How full cells are where smaller ones did not help: identical boxes, say.
     accepted: f32,
+    /// Boxes of several sizes get levels: cells that hold the largest were too full.
+    apart: bool,
 }
 
 /// A plan, kept from one build to the next.
@@ -98,7 +100,7 @@ const FINEST: f32 = 1e-12;
 
 impl Default for Crowding {
     fn default() -> Self {
-        Self { factor: 1.0, accepted: 0.0 }
+        Self { factor: 1.0, accepted: 0.0, apart: false }
     }
 }
 
@@ -198,6 +200,10 @@ impl<R: Record> Map<R> {
             let crowd = self.crowd();
             tried.push((self.crowding.factor, crowd));
             let limit = CROWDED.max(1.5 * self.crowding.accepted);
+            if crowd > limit && !self.crowding.apart && plan.could_have_levels() {
+                self.crowding.apart = true;
+                continue;
+            }
             if crowd > limit && divisible(&plan) && self.crowding.factor > FINEST {
                 // The first halvings of two far clusters change nothing: take larger steps then.
                 let helps = tried.len() < 2 || crowd < 0.8 * tried[tried.len() - 2].1;
@@ -231,7 +237,9 @@ impl<R: Record> Map<R> {
 
     /// By given costs; else by those of the reference, or where that is too close to call by this machine's.
     fn plan_by_costs(&self, summary: &Summary, config: &Config) -> Plan {
-        let by = |costs: &Costs| Plan::by(summary, config, self.crowding.factor, costs, &self.experience);
+        let Crowding { factor, apart, .. } = self.crowding;
+        let only = apart.then_some(Way::Levels);
+        let by = |costs: &Costs| Plan::by(summary, config, factor, only, costs, &self.experience);
         let plan = by(&config.costs.unwrap_or(Costs::REFERENCE));
         let measure = config.costs.is_none() && plan.forecast.is_close();
         if measure { by(calibrate::measured()) } else { plan }
@@ -266,6 +274,8 @@ impl Crowding {
         if tried[last].1 <= CROWDED {
             self.accepted = 0.0;
             if self.may_grow(least) {
+                // First larger cells, then perhaps one grid again.
+                self.apart &= self.factor < 1.0;
                 self.factor = (self.factor * 2.0).min(1.0);
             }
             return false;
@@ -325,6 +335,21 @@ mod tests {
             builds(&mut map, &even);
         }
         assert_eq!(map.crowding.factor, 1.0, "an even world gets its cells back");
+    }
+
+    #[test]
+    fn a_crowd_of_small_boxes_among_large_ones_gets_a_level_of_its_own() {
+        let mut boxes = lattice(10, 10.0, 5.0, 0.0);
+        boxes.extend(lattice(20, 0.1, 0.0005, 0.0));
+        let mut map = Map::new();
+        let calls: Vec<usize> = (0..4).map(|_| builds(&mut map, &boxes)).collect();
+        assert!(
+            map.levels.len() > 1 && map.crowd() < CROWDED,
+            "{} levels, {}",
+            map.levels.len(),
+            map.crowd()
+        );
+        assert_eq!(calls[1..], [1; 3], "{calls:?}");
     }
 
     #[test]

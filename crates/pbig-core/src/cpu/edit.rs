@@ -97,7 +97,7 @@ impl Map<Tracked> {
     /// Boxes that have no place in the order of the last sort.
     pub(crate) fn out_of_order(&self) -> usize {
         let listed = if self.homes.are_known { self.homes.listed } else { self.list.len() };
-        self.sorted.spill.len() + self.list.len().saturating_sub(listed)
+        self.sorted.spill.out_of_order() + self.list.len().saturating_sub(listed)
     }
 
     /// Asks for the memory of some boxes and their slots.
@@ -186,7 +186,7 @@ impl Map<Tracked> {
 mod tests {
     use super::*;
     use crate::cpu::crowding::Set;
-    use crate::cpu::find::Others;
+    use crate::cpu::find::{Found, Others};
     use crate::cpu::judge::Accept;
     use crate::plan::LazySummary;
     use crate::report::StageTimes;
@@ -265,10 +265,10 @@ mod tests {
             map.edit(&changed, &mut records);
             out_of_order = out_of_order.max(map.out_of_order());
             let others = Others { records: &records, filters: &filters, update: Some(update) };
-            let mut out = Vec::new();
-            map.check_others(&others, &Met(&old), &mut out, u64::MAX).expect("few pairs");
-            let all: BTreeSet<Pair> = out.iter().copied().collect();
-            assert_eq!(all.len(), out.len(), "twice");
+            let mut pairs = Found::default();
+            map.check_others(&others, &Met(&old), &mut pairs, u64::MAX).expect("few pairs");
+            let all: BTreeSet<Pair> = pairs.chunks.iter().flatten().copied().collect();
+            assert_eq!(all.len(), pairs.len(), "twice");
             let is_new = |a: usize, b: usize| boxes[a].overlaps(&boxes[b]) && !old[a].overlaps(&old[b]);
             let pairs = (0..100).flat_map(|a| (a + 1..1000).map(move |b| (a, b)));
             let wanted = pairs.filter(|&(a, b)| is_new(a, b)).map(|(a, b)| Pair::new(a as u32, b as u32));

@@ -31,6 +31,9 @@ const CHUNK: usize = 2048;
 /// app the other threads sleep between steps and waking one costs about as much.
 const PARALLEL_FROM: u64 = 300_000;
 
+/// Boxes to be looked up in one piece of work.
+const OTHERS: usize = 1024;
+
 /// Boxes to be looked up in a map from which the work is shared.
 const OTHERS_PARALLEL_FROM: usize = 4096;
 
@@ -247,30 +250,29 @@ impl<R: Record> Map<R> {
         &self,
         others: &Others<'_, R>,
         accept: &A,
-        out: &mut Vec<Pair>,
+        found: &mut Found,
         max_pairs: u64,
-    ) -> Result<(u64, u64), Error>
+    ) -> Result<(), Error>
     where
         A: Accept,
     {
         let (room, records) = (Room::new(max_pairs), others.records);
-        let counts = if records.len() >= OTHERS_PARALLEL_FROM && rayon::current_num_threads() > 1 {
-            let piece = |records| {
-                let mut out = Vec::new();
-                let counts = self.check_piece(&Others { records, ..*others }, accept, &mut out, &room);
-                (counts, out)
-            };
-            let found: Vec<_> = records.par_chunks(CHUNK / 2).map(piece).collect();
-            found.into_iter().fold((0, 0), |sum, (counts, pairs)| {
-                out.extend(pairs);
-                add(sum, counts)
-            })
-        } else {
-            self.check_piece(others, accept, out, &room)
+        let piece = |(records, out): (&[R], &mut Vec<Pair>)| {
+            self.check_piece(&Others { records, ..*others }, accept, out, &room)
         };
+        let counts = if records.len() >= OTHERS_PARALLEL_FROM && rayon::current_num_threads() > 1 {
+            let pieces = records.par_chunks(OTHERS);
+            pieces.zip(found.buffers(records.len().div_ceil(OTHERS))).map(piece).reduce(|| (0, 0), add)
+        } else {
+            found.buffers(1).iter_mut().map(|out| piece((records, out))).fold((0, 0), add)
+        };
+        (found.checks, found.overlaps) = counts;
         // A search that ran out of room has ended early.
-        let (limit, found) = (max_pairs, room.used().max(out.len() as u64));
-        if found > limit { Err(Error::TooManyPairs { limit }) } else { Ok(counts) }
+        if room.used() > max_pairs {
+            Err(Error::TooManyPairs { limit: max_pairs })
+        } else {
+            room.settle(found)
+        }
     }
 
     fn check_piece<A>(

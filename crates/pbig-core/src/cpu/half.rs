@@ -237,6 +237,7 @@ impl Rows<'_> {
     fn wrapped_run(&mut self, query: Query, from: u32, length: u32) -> (u32, u32) {
         let count = self.starts.len() - 1;
         let behind = self.starts[from as usize + length as usize - count];
+        self.checks += u64::from(behind - self.starts[0]);
         self.rests.push(Rest { query: query.number, from: self.starts[0], to: behind });
         (self.starts[from as usize], self.starts[count])
     }

@@ -15,27 +15,40 @@ pub(super) const EMPTY: u32 = u32::MAX;
 /// No slot: the end of a list.
 const NONE: u32 = u32::MAX;
 
+/// Slots of a cell in which an empty one is looked for: a cell may hold thousands of boxes.
+const LOOK: u32 = 16;
+
+/// Neighbours in the list of a cell.
+#[derive(Clone, Copy, Debug)]
+struct Link {
+    next: u32,
+    previous: u32,
+}
+
 /// What cells have spilled.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Spill {
     /// By key: the first slot of the list, where the cell is marked.
     first: Vec<u32>,
     /// By slot, from the first behind the sorted ones on.
-    next: Vec<u32>,
+    links: Vec<Link>,
     /// Slots of these that are empty.
     empty: Vec<u32>,
+    /// Sorted slots that are.
+    left: usize,
 }
 
 impl Spill {
     /// Boxes have been sorted anew.
     pub(super) fn clear(&mut self) {
-        self.next.clear();
+        self.links.clear();
         self.empty.clear();
+        self.left = 0;
     }
 
-    /// Spilled boxes.
-    pub(super) fn len(&self) -> usize {
-        self.next.len() - self.empty.len()
+    /// Spilled boxes, or slots that boxes have left, whichever are more.
+    pub(super) fn out_of_order(&self) -> usize {
+        (self.links.len() - self.empty.len()).max(self.left)
     }
 }
 
@@ -48,7 +61,7 @@ impl<R: Record> Sorted<R> {
 
     /// The slots behind those of the sort.
     pub(super) fn behind(&self) -> Range<usize> {
-        self.places.len() - self.spill.next.len()..self.places.len()
+        self.places.len() - self.spill.links.len()..self.places.len()
     }
 
     /// Whether one of the cells from key `from` up to `to` may have spilled.
@@ -65,16 +78,22 @@ impl<R: Record> Sorted<R> {
         let mut slot = if is_marked { self.spill.first[key as usize] } else { NONE };
         std::iter::from_fn(move || {
             let this = slot;
-            slot = *self.spill.next.get((this as usize).checked_sub(first)?)?;
+            slot = self.spill.links.get((this as usize).checked_sub(first)?)?.next;
             Some(this)
         })
     }
 
     /// A slot for one more box in a cell.
     pub(super) fn occupy(&mut self, key: u32) -> u32 {
-        let run = self.start(key)..self.start(key + 1);
-        let empty = run.into_iter().find(|&slot| self.keys[slot as usize] == EMPTY);
-        let slot = empty.unwrap_or_else(|| self.spill_from(key));
+        let start = self.start(key);
+        let mut run = start..self.start(key + 1).min(start + LOOK);
+        let slot = match run.find(|&slot| self.keys[slot as usize] == EMPTY) {
+            Some(slot) => {
+                self.spill.left -= 1;
+                slot
+            }
+            None => self.spill_from(key),
+        };
         self.keys[slot as usize] = key;
         slot
     }
@@ -83,8 +102,10 @@ impl<R: Record> Sorted<R> {
     fn spill_from(&mut self, key: u32) -> u32 {
         let slot = self.spill.empty.pop().unwrap_or_else(|| self.append());
         let head = self.spilled(key).next().unwrap_or(NONE);
-        let behind = self.behind().start;
-        self.spill.next[slot as usize - behind] = head;
+        *self.link(slot) = Link { next: head, previous: NONE };
+        if head != NONE {
+            self.link(head).previous = slot;
+        }
         self.spill.first.resize(self.starts.len().max(self.spill.first.len()), NONE);
         self.spill.first[key as usize] = slot;
         self.starts[key as usize] |= MARK;
@@ -98,8 +119,13 @@ impl<R: Record> Sorted<R> {
         self.records.push(R::EMPTY);
         self.keys.push(EMPTY);
         self.codes.resize(slot + 1 + BLOCK, 0);
-        self.spill.next.push(NONE);
+        self.spill.links.push(Link { next: NONE, previous: NONE });
         slot as u32
+    }
+
+    fn link(&mut self, slot: u32) -> &mut Link {
+        let first = self.behind().start;
+        &mut self.spill.links[slot as usize - first]
     }
 
     /// Empties a slot.
@@ -109,18 +135,21 @@ impl<R: Record> Sorted<R> {
         if slot as usize >= self.behind().start {
             self.unlink(slot, key);
             self.spill.empty.push(slot);
+        } else {
+            self.spill.left += 1;
         }
     }
 
     /// Takes a slot out of the list of its cell.
     fn unlink(&mut self, slot: u32, key: u32) {
-        let behind = self.behind().start;
-        let next = self.spill.next[slot as usize - behind];
-        let before = self.spilled(key).take_while(|&one| one != slot).last();
-        match before {
-            Some(before) => self.spill.next[before as usize - behind] = next,
-            None if next == NONE => self.starts[key as usize] &= !MARK,
-            None => self.spill.first[key as usize] = next,
+        let Link { next, previous } = *self.link(slot);
+        if next != NONE {
+            self.link(next).previous = previous;
+        }
+        match (previous, next) {
+            (NONE, NONE) => self.starts[key as usize] &= !MARK,
+            (NONE, _) => self.spill.first[key as usize] = next,
+            _ => self.link(previous).next = next,
         }
     }
 }

@@ -35,7 +35,7 @@ pub struct LevelPlan {
 /// A cell of a grid with the boxes whose lower corners lie in it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct OccupiedCell {
-    /// Which level of its grid it belongs to, from 0. The boxes at rest and those that have moved have levels each.
+    /// Which level of its grid it belongs to, from 0.
     pub level: u32,
     /// Where it is.
     pub aabb: Aabb,
@@ -119,7 +119,9 @@ pub(super) fn choose(summary: &Summary, setting: &Setting<'_>) -> Choice {
     let all = [brute, one_grid, several].map(|cost| cost as f32);
     let forecast = Forecast { brute: all[0], one_grid: all[1], levels: all[2] };
     let (corrected, best) = setting.experience.choose(forecast);
-    let way = setting.only.unwrap_or(best);
+    // Boxes of one size cannot be parted by size.
+    let only = setting.only.filter(|way| *way != Way::Levels || several.is_finite());
+    let way = only.unwrap_or(best);
     let levels = match way {
         Way::OneGrid if !groups.is_empty() => vec![world.level(&groups)],
         Way::Levels => assemble(&world, &groups, steps),

@@ -94,14 +94,15 @@ impl Plan {
     /// the cell size of an even spread: 1, or less where such cells turned out to be too full.
     pub fn new(summary: &Summary, config: &Config, crowding: f32) -> Self {
         let costs = config.costs.unwrap_or(Costs::REFERENCE);
-        Self::by(summary, config, crowding, &costs, &Experience::default())
+        Self::by(summary, config, crowding, None, &costs, &Experience::default())
     }
 
-    /// The same by given costs, and by what searches took.
+    /// The same by given costs, and by what searches took; `only` one way, if boxes allow it.
     pub(crate) fn by(
         summary: &Summary,
         config: &Config,
         crowding: f32,
+        only: Option<Way>,
         costs: &Costs,
         experience: &Experience,
     ) -> Self {
@@ -121,8 +122,7 @@ impl Plan {
             },
             Strategy::Auto if boxes < config.brute_below => Self::brute(boxes),
             strategy @ (Strategy::Auto | Strategy::Grid) => {
-                let setting =
-                    Setting { crowding, strategy, company: Company::NONE, costs, experience, only: None };
+                let setting = Setting { crowding, strategy, company: Company::NONE, costs, experience, only };
                 Self::of_levels(boxes, levels::choose(summary, &setting))
             }
         }
@@ -149,6 +149,11 @@ impl Plan {
         let (strategy, company) = (Strategy::Auto, Company::NONE);
         let setting = Setting { crowding: 1.0, strategy, company, costs, experience, only: Some(way) };
         Self::of_levels(summary.valid, levels::choose(summary, &setting))
+    }
+
+    /// Whether boxes of several sizes share one grid that might have levels instead.
+    pub(crate) fn could_have_levels(&self) -> bool {
+        self.levels.len() == 1 && self.forecast.levels.is_finite() && self.expected.is_some()
     }
 
     fn brute(boxes: u32) -> Self {

@@ -9,6 +9,7 @@ mod stages;
 mod step;
 mod table;
 mod update;
+mod ways;
 
 use crate::output::{Failure, print};
 use clap::ValueEnum;

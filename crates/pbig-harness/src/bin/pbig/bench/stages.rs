@@ -3,6 +3,7 @@
 use super::Outcome;
 use super::measure::{Contest, Effort, medians, timed};
 use super::table::Row;
+use super::ways;
 use crate::output::{Failure, progress};
 use pbig_core::{BroadPhase, Config, Error, Finder, Limits, Order, ProxyFilter, StageTimes};
 use pbig_harness::boxes::{Wander, cubes};
@@ -152,6 +153,7 @@ pub(super) fn run(quick: bool) -> Result<Outcome, Failure> {
         charts.push(chart(sweep, lines.into()));
     }
     bar.finish_and_clear();
+    ways::run(effort, &mut rows, &mut charts)?;
     Ok(Outcome { rows, notes: notes(), charts })
 }
 
@@ -192,6 +194,7 @@ fn notes() -> Vec<String> {
     vec![
         "cubes, edges around 1, about one pair a box unless that is varied; all move by up to 0.1 unless that is varied"
             .into(),
+        "ways: `Finder` as planned, and with each way it may choose forced upon it".into(),
         "from scratch: `Finder` with `Order::Unspecified`; events: `BroadPhase`, `set` for each moved box and `update`"
             .into(),
     ]
