@@ -65,8 +65,8 @@ mod flag {
 /// changed and nothing is done (contract 5). Ids should be dense: memory follows the largest.
 ///
 /// On the CPU up to 1024 boxes are kept in a bitmap index, in which changed boxes are looked up. More
-/// lie in a base grid. Where few change they are put into other cells, and only they are searched. When an
-/// eighth of all boxes changes or is out of the grid's order, it is built anew.
+/// lie in a base grid. Where few change they are put into other cells, and only they are searched. When a
+/// quarter of all boxes changes, or an eighth is out of the grid's order, it is built anew.
 /// ([`crate::Strategy::Pbig`] and [`crate::Backend::Brute`] search everything at every update that changes
 /// something. A GPU is told what has changed, and tells which pairs came or went.)
 ///
