@@ -208,7 +208,7 @@ fn look_up<const B: usize>(
 impl State<'_> {
     /// Whether a changed box is the one of the two that their pair is left to: changed boxes meet each other twice.
     #[inline(always)]
-    fn comes_first(&self, id: u32, other: u32) -> bool {
+    pub(super) fn comes_first(&self, id: u32, other: u32) -> bool {
         (id < other) | (self.flags[other as usize] & flag::CHANGED == 0)
     }
 }

@@ -287,7 +287,7 @@ impl Accept for OfChanged<'_> {
 
     #[inline(always)]
     fn meets(&self, query: u32, candidate: u32) -> bool {
-        query < candidate || self.0.flags[candidate as usize] & flag::CHANGED == 0
+        self.0.comes_first(query, candidate)
     }
 
     fn pair(&self, pair: Pair) -> bool {

@@ -110,16 +110,6 @@ impl Record for Probe {
     fn item(&self) -> &Item {
         &self.0
     }
-
-    #[inline(always)]
-    fn overlapped(&self, _: &Self) -> bool {
-        false
-    }
-
-    #[inline(always)]
-    fn overlapped_still(&self, _: &Self, _: u64) -> bool {
-        false
-    }
 }
 
 struct Every;

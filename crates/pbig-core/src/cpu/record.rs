@@ -54,10 +54,16 @@ pub(crate) trait Record: Copy + Send + Sync {
     fn item(&self) -> &Item;
 
     /// Whether the two are known to have overlapped before.
-    fn overlapped(&self, other: &Self) -> bool;
+    #[inline(always)]
+    fn overlapped(&self, _other: &Self) -> bool {
+        false
+    }
 
     /// As [`Record::overlapped`], where the other one need not have changed in this update.
-    fn overlapped_still(&self, other: &Self, update: u64) -> bool;
+    #[inline(always)]
+    fn overlapped_still(&self, _other: &Self, _update: u64) -> bool {
+        false
+    }
 }
 
 impl Record for Item {
@@ -71,16 +77,6 @@ impl Record for Item {
     #[inline(always)]
     fn item(&self) -> &Item {
         self
-    }
-
-    #[inline(always)]
-    fn overlapped(&self, _: &Self) -> bool {
-        false
-    }
-
-    #[inline(always)]
-    fn overlapped_still(&self, _: &Self, _: u64) -> bool {
-        false
     }
 }
 
