@@ -8,6 +8,7 @@
 //! sake of very few boxes have cost as much, and dropped where a walk costs less.
 
 use crate::Pair;
+use crate::cpu::codes::prefetch;
 use crate::links::{Links, NONE};
 use crate::marks::Marks;
 use rayon::prelude::*;
@@ -118,6 +119,50 @@ impl PairStore {
             }
             self.degree[pair.a as usize] += 1;
             self.degree[pair.b as usize] += 1;
+        }
+    }
+
+    /// Adds a pair, and tells its place. There are no links ([`PairStore::relist`]).
+    #[inline]
+    pub(crate) fn push(&mut self, pair: Pair) -> u32 {
+        self.pairs.push(pair);
+        self.degree[pair.a as usize] += 1;
+        self.degree[pair.b as usize] += 1;
+        self.pairs.len() as u32 - 1
+    }
+
+    /// Removes the pair at a place, which the last one takes. There are no links.
+    #[inline]
+    pub(crate) fn swap_remove(&mut self, place: u32) {
+        let pair = self.pairs.swap_remove(place as usize);
+        self.degree[pair.a as usize] -= 1;
+        self.degree[pair.b as usize] -= 1;
+    }
+
+    /// The listed pairs in another order, and `added` ones.
+    pub(crate) fn relist(&mut self, pairs: impl Iterator<Item = Pair>, added: &[Pair]) {
+        self.links.drop_all();
+        let before = self.pairs.len();
+        self.pairs.clear();
+        self.pairs.extend(pairs);
+        debug_assert_eq!(self.pairs.len(), before + added.len());
+        for pair in added {
+            self.degree[pair.a as usize] += 1;
+            self.degree[pair.b as usize] += 1;
+        }
+    }
+
+    /// Asks for what [`PairStore::push`] and [`PairStore::swap_remove`] of a pair will write.
+    #[inline(always)]
+    pub(crate) fn prepare(&self, pair: Pair) {
+        prefetch(&self.degree[pair.a as usize]);
+        prefetch(&self.degree[pair.b as usize]);
+    }
+
+    /// No listed pair is of a removed box any more.
+    pub(crate) fn forget_removed(&mut self) {
+        for id in self.removed.drain(..) {
+            self.is_removed.unset(id);
         }
     }
 

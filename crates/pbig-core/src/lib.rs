@@ -56,6 +56,7 @@ pub mod gpu;
 pub mod layout;
 mod links;
 mod marks;
+mod near;
 pub mod oracle;
 mod pair;
 pub mod pair_index;

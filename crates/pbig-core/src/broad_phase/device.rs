@@ -32,6 +32,7 @@ impl BroadPhase {
         let wanted = !few && self.base.wants_gpu(&self.config, self.boxes.len());
         self.overlap.asked = Some(wanted);
         if wanted {
+            self.near.stop();
             self.pairs.drop_removed();
             self.note_changes();
             self.base.begin_changes(&request!(self));

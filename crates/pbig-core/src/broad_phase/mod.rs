@@ -4,6 +4,7 @@
 mod allocations;
 #[cfg(feature = "gpu")]
 mod device;
+mod near;
 mod overlap;
 mod small;
 #[cfg(feature = "serde")]
@@ -23,6 +24,7 @@ use crate::search::Search;
 use crate::{Aabb, Backend, Config, Error, Pair, Plan, ProxyFilter};
 use overlap::Overlap;
 use std::collections::HashMap;
+use update::Way;
 
 /// Changed boxes of a small world from which its stages are timed: a reading of the clock takes as long as one box.
 const MEASURED_FROM: usize = 64;
@@ -54,6 +56,8 @@ mod flag {
     pub(super) const CHANGED: u8 = 2;
     /// The filter has.
     pub(super) const REFILTERED: u8 = 4;
+    /// It has left its reach.
+    pub(super) const AWAY: u8 = 8;
     /// The device has told that the box has lost pairs.
     #[cfg(feature = "gpu")]
     pub(super) const ENDING: u8 = 16;
@@ -106,6 +110,7 @@ pub struct BroadPhase {
     ending: Vec<u32>,
     base: Search<Tracked>,
     small: small::Small,
+    near: near::Near,
     /// Whether `base.map` holds the boxes whose home it is: not after a search by anything else.
     has_base: bool,
     /// As it was built.
@@ -146,6 +151,7 @@ impl BroadPhase {
             ending: vec![],
             base: Search::new(),
             small: small::Small::default(),
+            near: near::Near::default(),
             has_base: false,
             base_plan: Plan::default(),
             base_checks: 0,
@@ -291,25 +297,28 @@ impl BroadPhase {
         if self.changed.is_empty() {
             return Ok(());
         }
-        self.pairs.drop_removed();
         let is_small = self.is_small();
         let mut watch = Watch::new(!is_small || self.changed.len() >= MEASURED_FROM);
-        let found = if is_small { self.find_in_small(&mut watch).map(|()| false) } else { self.find_added() };
-        let found = found.and_then(|on_gpu| self.check_room().map(|()| on_gpu));
-        let on_gpu = found.inspect_err(|_| self.events.added.clear())?;
+        let found =
+            if is_small { self.find_in_small(&mut watch).map(|()| Way::Other) } else { self.find_added() };
+        let found = found.and_then(|way| self.check_room().map(|()| way));
+        let way = found.inspect_err(|_| self.events.added.clear())?;
         if !is_small {
             self.small.pass();
             watch.lap();
         }
         {
             stage!("diff");
-            self.find_removed(on_gpu);
-            self.store();
+            self.find_removed(way);
+            self.store(way);
             self.report.stages.diff += watch.lap();
         }
         stage!("emit");
         self.sort_events();
         self.report.stages.emit += watch.lap();
+        if !is_small && self.updates > 1 {
+            self.near.note_time(way, self.report.changed as usize, self.report.stages.total());
+        }
         self.report.pairs = self.pairs.len() as u64;
         Ok(())
     }

@@ -68,7 +68,7 @@ impl BroadPhase {
     /// boxes are searched without grids or on a GPU. Takes time and memory proportional to the boxes.
     pub fn cells(&self) -> Vec<OccupiedCell> {
         let mut cells = Vec::new();
-        if self.has_base {
+        if self.has_base || self.near.is_on {
             self.base.map.cells(&mut cells);
         }
         cells

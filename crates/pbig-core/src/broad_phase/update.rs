@@ -2,6 +2,7 @@
 
 #[cfg(feature = "gpu")]
 use super::device::Ending;
+use super::near::Served;
 use super::{BroadPhase, Old, flag};
 use crate::cpu::codes::prefetch;
 use crate::cpu::edit::Changed;
@@ -30,6 +31,16 @@ macro_rules! state {
 }
 pub(super) use state;
 
+/// Who has found the pairs that came.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Way {
+    /// A device, which tells which boxes have lost pairs.
+    Gpu,
+    /// The list of near pairs: it has also found those that went, and kept those that came.
+    Near,
+    Other,
+}
+
 /// Events from which both lists are sorted at once.
 const PARALLEL_FROM: usize = 4096;
 
@@ -37,20 +48,26 @@ const PARALLEL_FROM: usize = 4096;
 const TESTS_OF_A_BOX: u64 = 64;
 
 impl BroadPhase {
-    /// Pairs that overlap now and did not, into `events.added`, in no order; true when a device has found them, and
-    /// told which boxes have lost pairs.
-    pub(super) fn find_added(&mut self) -> Result<bool, Error> {
+    /// Pairs that overlap now and did not, into `events.added`, in no order; and who has found them.
+    pub(super) fn find_added(&mut self) -> Result<Way, Error> {
         #[cfg(feature = "gpu")]
         let on_gpu = self.find_changes_on_gpu()?;
         #[cfg(not(feature = "gpu"))]
         let on_gpu = self.base.miss_gpu(&self.config, &mut self.report);
-        if !on_gpu {
-            self.find_added_on_cpu()?;
-        }
-        Ok(on_gpu)
+        if on_gpu { Ok(Way::Gpu) } else { self.find_added_on_cpu() }
     }
 
-    fn find_added_on_cpu(&mut self) -> Result<(), Error> {
+    fn find_added_on_cpu(&mut self) -> Result<Way, Error> {
+        if self.find_near()? == Served::Yes {
+            return Ok(Way::Near);
+        }
+        self.pairs.drop_removed();
+        let is_due = self.many_changed() || self.is_edited();
+        if let Some(skin) = self.skin(is_due)
+            && self.search_near(skin)? == Served::Yes
+        {
+            return Ok(Way::Near);
+        }
         let whole = self.many_changed()
             || self.config.strategy == Strategy::Pbig
             || self.config.backend == Backend::Brute
@@ -82,7 +99,7 @@ impl BroadPhase {
     }
 
     /// Builds the base anew from all boxes and searches it.
-    fn search_all(&mut self) -> Result<(), Error> {
+    fn search_all(&mut self) -> Result<Way, Error> {
         let state = state!(self);
         let filters = Some(&self.filters[..]);
         let rule = Rule { accept: &state, filters, filters_suffice: false, before: &self.before };
@@ -99,7 +116,7 @@ impl BroadPhase {
         self.base_plan = self.report.plan.clone();
         (self.base_checks, self.strain) = (self.report.checks.made, 0);
         self.base.found.chunks.iter().for_each(|chunk| self.events.added.extend_from_slice(chunk));
-        Ok(())
+        Ok(Way::Other)
     }
 
     /// Puts the changed boxes where they are now.
@@ -119,7 +136,7 @@ impl BroadPhase {
     }
 
     /// Searches the base for the changed boxes.
-    fn search_changed(&mut self) -> Result<(), Error> {
+    fn search_changed(&mut self) -> Result<Way, Error> {
         let mut clock = Instant::now();
         stage!("check");
         let update = Some(self.present_update());
@@ -132,7 +149,7 @@ impl BroadPhase {
         self.note_strain(self.found.checks);
         let (moved, boxes) = (self.base.map.out_of_order() as u32, self.valid_count());
         self.report.plan = Plan { chosen: Chosen::Edit, moved, boxes, ..self.base_plan.clone() };
-        Ok(())
+        Ok(Way::Other)
     }
 
     /// Tests beyond what boxes needed when the base was built, twice over: many boxes have come to few cells, or to the
@@ -149,13 +166,15 @@ impl BroadPhase {
     }
 
     /// Kept pairs that no longer hold, into `events.removed`, in no order; they are no longer kept.
-    #[cfg_attr(not(feature = "gpu"), expect(unused_variables, reason = "nobody tells"))]
-    pub(super) fn find_removed(&mut self, is_told: bool) {
+    pub(super) fn find_removed(&mut self, way: Way) {
+        if way == Way::Near {
+            return;
+        }
         let many = self.many_changed();
         let state = state!(self);
         let removed = &mut self.events.removed;
         #[cfg(feature = "gpu")]
-        if is_told {
+        if way == Way::Gpu {
             let ending = Ending(state);
             return if many {
                 self.pairs.end_many(&ending, removed)
@@ -171,8 +190,10 @@ impl BroadPhase {
     }
 
     /// Keeps the added pairs, and forgets the changes.
-    pub(super) fn store(&mut self) {
-        self.pairs.insert(&self.events.added);
+    pub(super) fn store(&mut self, way: Way) {
+        if way != Way::Near {
+            self.pairs.insert(&self.events.added);
+        }
         // Box by box where all have changed, too: memmove, of all of them at once, takes ten times as long on some
         // processors (Zen, where what it copies to is not aligned).
         for &id in &self.changed {
@@ -215,7 +236,7 @@ impl State<'_> {
         self.flags[a as usize] | self.flags[b as usize]
     }
 
-    fn filters_allow(&self, a: u32, b: u32) -> bool {
+    pub(super) fn filters_allow(&self, a: u32, b: u32) -> bool {
         self.filters[a as usize].allows(&self.filters[b as usize])
     }
 

@@ -52,6 +52,7 @@ pub(crate) struct Changed<'a> {
     pub(crate) ids: &'a [u32],
     /// These by id.
     pub(crate) boxes: &'a [Aabb],
+    /// What they were; those that it does not have were nowhere.
     pub(crate) before: &'a [Aabb],
     pub(crate) filters: &'a [ProxyFilter],
     /// The update in which they have.
@@ -61,7 +62,8 @@ pub(crate) struct Changed<'a> {
 impl Changed<'_> {
     fn record(&self, id: u32) -> Tracked {
         let i = id as usize;
-        Tracked::changed(self.boxes[i], id, self.before[i], self.update)
+        let before = self.before.get(i).copied().unwrap_or(Aabb::NOWHERE);
+        Tracked::changed(self.boxes[i], id, before, self.update)
     }
 }
 
@@ -105,7 +107,7 @@ impl Map<Tracked> {
         let mut slots = [NONE; BLOCK];
         for (slot, &id) in slots.iter_mut().zip(ids) {
             prefetch(&changed.boxes[id as usize]);
-            prefetch(&changed.before[id as usize]);
+            changed.before.get(id as usize).into_iter().for_each(prefetch);
             *slot = self.homes.of(id);
         }
         for &slot in slots.iter().filter(|slot| **slot < IN_LIST) {

@@ -48,7 +48,7 @@ impl Tracked {
 pub(crate) trait Record: Copy + Send + Sync {
     const EMPTY: Self;
 
-    /// `before` has by id what boxes were before.
+    /// `before` has by id what boxes were before; those that it does not have were nowhere.
     fn new(item: Item, before: &[Aabb]) -> Self;
 
     fn item(&self) -> &Item;
@@ -85,7 +85,7 @@ impl Record for Tracked {
 
     #[inline(always)]
     fn new(item: Item, before: &[Aabb]) -> Self {
-        Self { item, before: before[item.id as usize], update: 0 }
+        Self { item, before: before.get(item.id as usize).copied().unwrap_or(Aabb::NOWHERE), update: 0 }
     }
 
     #[inline(always)]

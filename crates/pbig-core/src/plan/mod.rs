@@ -41,6 +41,8 @@ pub enum Chosen {
     Pbig,
     /// The grid of an earlier update is kept; only boxes that moved since are looked at.
     Edit,
+    /// Pairs of boxes that were near each other at an earlier update; only these are tested.
+    Near,
 }
 
 impl Chosen {
@@ -53,6 +55,7 @@ impl Chosen {
             Self::Grid => "grid",
             Self::Pbig => "pbig",
             Self::Edit => "edit",
+            Self::Near => "near",
         }
     }
 }
@@ -208,6 +211,9 @@ impl fmt::Display for Plan {
                 "edit: {} of {boxes} boxes are out of the order in which the grid was built",
                 self.moved
             ),
+            Chosen::Near => {
+                write!(f, "near pairs: {boxes} boxes move little, and what was far apart cannot have met")
+            }
             Chosen::Pbig => write!(f, "PBIG grid: {boxes} boxes"),
         }?;
         if let Some(pbig) = &self.pbig {
@@ -223,7 +229,7 @@ impl fmt::Display for Plan {
         if self.swept > 0 && self.chosen != Chosen::Brute {
             write!(f, "; {} oversize boxes tested against all", self.swept)?;
         }
-        if self.forecast != Forecast::default() && self.chosen != Chosen::Edit {
+        if self.forecast != Forecast::default() && !matches!(self.chosen, Chosen::Edit | Chosen::Near) {
             write!(f, "; expected: {}", self.forecast)?;
         }
         Ok(())

@@ -1,0 +1,269 @@
+//! Updates by near pairs: most motion is small, and what was apart by more cannot have met.
+//!
+//! When many boxes move, or few have moved often, boxes are grown by a skin, pairs of those are found once, and updates
+//! only test them (`crate::near`). Boxes that leave their reach get a new one and are searched for, as edits of the grid of
+//! reaches; when they become many, all is searched anew. The skin is as wide as some moves, which it lasts for: wider, there
+//! are more near pairs to test; narrower, searches come more often. Where boxes jump so far that near pairs would be many,
+//! there are none, and the next attempts come ever later.
+
+mod policy;
+#[cfg(test)]
+mod tests;
+
+pub(super) use policy::Near;
+
+use super::update::{State, state};
+use super::{BroadPhase, flag};
+use crate::cpu::codes::prefetch;
+use crate::cpu::edit::Changed;
+use crate::cpu::find::Others;
+use crate::cpu::judge::Accept;
+use crate::diff::Judgement;
+use crate::plan::{Chosen, LazySummary, Plan};
+use crate::report::{Checks, lap, stage};
+use crate::search::Rule;
+use crate::{Aabb, Error, Pair, ProxyFilter};
+use policy::Cost;
+use std::time::Instant;
+
+/// Near pairs that are walked in the time that it takes to look up the pairs of one box.
+const LOOKUP: usize = 64;
+
+/// One in so many boxes may leave its reach in an update.
+const LEAVING: usize = 32;
+
+/// Near pairs that may come on a box: to test them must cost less than to search.
+const NEAR_OF_A_BOX: u64 = 16;
+
+/// What an update by near pairs came to.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Served {
+    Yes,
+    /// Another search has to do it.
+    No,
+}
+
+impl BroadPhase {
+    /// Pairs that came and went, into `events`, and keeps them; if near pairs are there, and still good.
+    pub(super) fn find_near(&mut self) -> Result<Served, Error> {
+        if !self.near.is_on {
+            return Ok(Served::No);
+        }
+        let mut clock = Instant::now();
+        self.find_away();
+        self.report.stages.plan += lap(&mut clock);
+        let served = self.follow_away() && {
+            self.test_near();
+            self.welcome();
+            true
+        };
+        self.forget_away();
+        if !served {
+            self.near.learn(self.present_count, self.pairs.len());
+            self.near.end();
+            return Ok(Served::No);
+        }
+        self.near.age += 1;
+        self.shrink_skin();
+        self.report_near();
+        self.check_near_limit()
+    }
+
+    /// Boxes that have left their reach, or have none: those that came, went, or got another filter.
+    fn find_away(&mut self) {
+        let Self { near, boxes, before, flags, changed, .. } = self;
+        near.reach.resize(boxes.len(), Aabb::NOWHERE);
+        near.away.clear();
+        for &id in &*changed {
+            let i = id as usize;
+            if !near.reach[i].contains(&boxes[i]) | before[i].min[0].is_nan() {
+                near.away.push(id);
+                flags[i] |= flag::AWAY;
+            }
+        }
+    }
+
+    fn forget_away(&mut self) {
+        for id in self.near.away.drain(..) {
+            self.flags[id as usize] &= !flag::AWAY;
+        }
+    }
+
+    /// Gives boxes that are away another reach, and finds what is near them now; false when they are too many.
+    fn follow_away(&mut self) -> bool {
+        let (away, present) = (self.near.away.len(), self.present_count as usize);
+        if away * LEAVING > present || self.near.list.len() as u64 > self.most_near() {
+            return false;
+        }
+        if away == 0 {
+            self.found.clear();
+            return true;
+        }
+        let mut clock = Instant::now();
+        self.edit_reaches();
+        self.report.stages.map += lap(&mut clock);
+        let (near, most) = (NearAway(state!(self)), self.most_near());
+        let others = Others { records: &self.others, filters: &self.filters, update: Some(self.updates + 1) };
+        let found = self.base.map.check_others(&others, &near, &mut self.found, most);
+        self.report.stages.check += lap(&mut clock);
+        found.is_ok() && self.base.map.out_of_order() * 8 < present
+    }
+
+    fn most_near(&self) -> u64 {
+        NEAR_OF_A_BOX * u64::from(self.present_count) + 2 * self.pairs.len() as u64
+    }
+
+    fn edit_reaches(&mut self) {
+        stage!("map");
+        let Self { near, boxes, base, others, filters, .. } = self;
+        for &id in &near.away {
+            near.reach[id as usize] = boxes[id as usize].inflated(near.skin);
+        }
+        base.map.arrange(&mut near.away, boxes.len());
+        let changed =
+            Changed { ids: &near.away, boxes: &near.reach, before: &[], filters, update: self.updates + 1 };
+        base.map.edit(&changed, others);
+    }
+
+    /// Tests the near pairs, but those of boxes that were away.
+    fn test_near(&mut self) {
+        stage!("check");
+        let mut clock = Instant::now();
+        let Self { near, boxes, pairs, events, flags, changed, .. } = self;
+        let Near { list, away, parted, .. } = near;
+        parted.clear();
+        if !away.is_empty() {
+            let is_away = |id: u32| flags[id as usize] & flag::AWAY != 0;
+            list.remove_of(away, is_away, pairs, |pair| parted.push(pair));
+        }
+        let (added, removed) = (|pair| events.added.push(pair), |pair| events.removed.push(pair));
+        if changed.len() * LOOKUP < list.len() {
+            let comes_first = |id: u32, other: u32| id < other || flags[other as usize] & flag::CHANGED == 0;
+            list.update_few(changed, boxes, comes_first, pairs, added, removed);
+        } else {
+            list.update(boxes, pairs, added, removed);
+        }
+        self.report.stages.check += lap(&mut clock);
+    }
+
+    /// Adds the near pairs of boxes that were away, and tells which of their pairs have ended.
+    fn welcome(&mut self) {
+        let state = state!(self);
+        let (added, removed) = (&mut self.events.added, &mut self.events.removed);
+        self.near.list.extend(&self.found.chunks, &self.boxes, &mut self.pairs, |pair| {
+            if !state.paired_before(pair.a, pair.b) {
+                added.push(pair);
+            }
+        });
+        let ended = |pair: &&Pair| state.paired_before(pair.a, pair.b) && !state.holds(**pair);
+        removed.extend(self.near.parted.iter().filter(ended));
+        self.pairs.forget_removed();
+    }
+
+    fn report_near(&mut self) {
+        let [made, needed] = self.near.list.take_tests();
+        self.report.checks = Checks { made, unnecessary: made - needed, redundant: 0 };
+        let (moved, boxes) = (self.base.map.out_of_order() as u32, self.valid_count());
+        self.report.plan = Plan { chosen: Chosen::Near, moved, boxes, ..self.base_plan.clone() };
+    }
+
+    /// Too many new pairs: all is as it was, for the next attempt.
+    fn check_near_limit(&mut self) -> Result<Served, Error> {
+        let limit = self.config.limits.max_pairs;
+        if self.events.added.len() as u64 <= limit {
+            return Ok(Served::Yes);
+        }
+        self.near.stop();
+        let state = state!(self);
+        self.pairs.end_many(&Before(state), &mut vec![]);
+        self.pairs.insert(&self.events.removed);
+        self.events.removed.clear();
+        Err(Error::TooManyPairs { limit })
+    }
+
+    /// Builds the base anew, of reaches, and keeps what overlaps of the pairs that are near; no, when these are too many.
+    pub(super) fn search_near(&mut self, skin: f32) -> Result<Served, Error> {
+        let mut clock = Instant::now();
+        let reach = |aabb: &Aabb| aabb.inflated(skin);
+        self.near.reach.clear();
+        self.near.reach.extend(self.boxes.iter().map(reach));
+        (self.near.skin, self.near.age, self.near.edited) = (skin, 0, 0);
+        (self.near.farthest, self.near.farthest_then) = (0.0, 0.0);
+        self.near.own = Cost::default();
+        self.report.stages.map += lap(&mut clock);
+        if self.find_reaches().is_err() {
+            self.near.end();
+            return Ok(Served::No);
+        }
+        stage!("diff");
+        let mut clock = Instant::now();
+        let state = state!(self);
+        let (added, removed) = (&mut self.events.added, &mut self.events.removed);
+        self.pairs.end_many(&state, removed);
+        let (found, boxes) = (&self.base.found.chunks, &self.boxes);
+        self.near.list.fill(found, boxes, &mut self.pairs, &Before(state), added);
+        self.near.is_on = true;
+        _ = self.near.list.take_tests();
+        self.report.stages.diff += lap(&mut clock);
+        self.check_near_limit()
+    }
+
+    /// Pairs of reaches, into the base.
+    fn find_reaches(&mut self) -> Result<(), Error> {
+        let accept = Allowed(&self.filters);
+        let rule = Rule { accept: &accept, filters: Some(&self.filters), filters_suffice: true, before: &[] };
+        let mut config = self.config.clone();
+        config.limits.max_pairs = self.most_near();
+        let summary = LazySummary::new(&self.near.reach, None, self.base.spare.take());
+        let (invalid, report) = (self.report.invalid, &mut self.report);
+        let found = self.base.find_without_gpu(&self.near.reach, &summary, &config, &rule, report);
+        self.base.spare = summary.into_spare();
+        self.report.invalid = invalid;
+        self.has_base = false;
+        self.base_plan = self.report.plan.clone();
+        found
+    }
+}
+
+/// Whether filters let two boxes pair.
+struct Allowed<'a>(&'a [ProxyFilter]);
+
+impl Accept for Allowed<'_> {
+    #[inline(always)]
+    fn prepare(&self, ids: [u32; 2]) {
+        ids.into_iter().for_each(|id| prefetch(&self.0[id as usize]));
+    }
+
+    #[inline]
+    fn pair(&self, pair: Pair) -> bool {
+        self.0[pair.a as usize].allows(&self.0[pair.b as usize])
+    }
+}
+
+/// The same of two boxes of which the first is away. Of two that are, it is asked from both sides.
+struct NearAway<'a>(State<'a>);
+
+impl Accept for NearAway<'_> {
+    #[inline(always)]
+    fn meets(&self, query: u32, candidate: u32) -> bool {
+        (query < candidate) | (self.0.flags[candidate as usize] & flag::AWAY == 0)
+    }
+
+    fn pair(&self, pair: Pair) -> bool {
+        self.0.filters_allow(pair.a, pair.b)
+    }
+}
+
+/// Which pairs there were at the last update.
+struct Before<'a>(State<'a>);
+
+impl Judgement for Before<'_> {
+    #[inline(always)]
+    fn prepare(&self, pair: Pair) {
+        [pair.a, pair.b].into_iter().for_each(|id| prefetch(&self.0.before[id as usize]));
+    }
+
+    fn holds(&self, pair: Pair) -> bool {
+        self.0.paired_before(pair.a, pair.b)
+    }
+}

@@ -1,0 +1,212 @@
+//! When there is a list of near pairs, and how wide its skin is.
+
+use crate::broad_phase::BroadPhase;
+use crate::broad_phase::update::Way;
+use crate::near::NearPairs;
+use crate::{Aabb, Backend, Pair, Strategy};
+use std::time::Duration;
+
+/// Moves that a skin is wide at first, at least and at most.
+const MOVES: [f32; 3] = [4.0, 2.0, 16.0];
+
+/// Tests of near pairs in the time that it takes to search for those of one box.
+const SEARCH_OF_A_BOX: f32 = 24.0;
+
+/// Boxes whose moves are looked at.
+const SAMPLE: usize = 256;
+
+/// One in so many boxes has to be edited before a list is made for few.
+const EDITED: usize = 4;
+
+/// What a list may cost, of what updates cost without one.
+const PAYS: f32 = 0.9;
+
+/// Updates that a list has to last, to be worth its price.
+const LONG: u32 = 2;
+
+/// Most updates without another attempt.
+const LONGEST_PAUSE: u32 = 64;
+
+/// Near pairs, and whether they are any good here.
+#[derive(Clone, Debug)]
+pub(crate) struct Near {
+    /// Whether the pairs hold, and the base grid has the reaches.
+    pub(crate) is_on: bool,
+    pub(crate) list: NearPairs,
+    /// By id: the reach; nowhere for a box that has none.
+    pub(crate) reach: Vec<Aabb>,
+    pub(crate) skin: f32,
+    /// In usual moves: how wide the next skin will be.
+    pub(crate) moves: f32,
+    /// Updates since the list was made.
+    pub(crate) age: u32,
+    /// How far boxes have been from where their reach was made, as far as samples show; and at half the age.
+    pub(crate) farthest: f32,
+    pub(crate) farthest_then: f32,
+    /// Updates without another attempt.
+    pub(crate) pause: u32,
+    pub(crate) next_pause: u32,
+    /// What updates with this list have cost.
+    pub(crate) own: Cost,
+    /// For each changed box, what the last ones without any have: ns.
+    pub(crate) usual: Option<f32>,
+    /// Boxes that were edited since the last search of all.
+    pub(crate) edited: usize,
+    /// Boxes that have left their reach in this update.
+    pub(crate) away: Vec<u32>,
+    /// Kept pairs of those, which may go on.
+    pub(crate) parted: Vec<Pair>,
+}
+
+/// What updates have cost.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Cost {
+    ns: f32,
+    changed: f32,
+}
+
+impl Default for Near {
+    fn default() -> Self {
+        Self {
+            is_on: false,
+            list: NearPairs::default(),
+            reach: vec![],
+            skin: 0.0,
+            moves: MOVES[0],
+            age: 0,
+            farthest: 0.0,
+            farthest_then: 0.0,
+            pause: 0,
+            next_pause: 0,
+            own: Cost::default(),
+            usual: None,
+            edited: 0,
+            away: vec![],
+            parted: vec![],
+        }
+    }
+}
+
+impl Near {
+    /// Another search has done the work.
+    pub(crate) fn stop(&mut self) {
+        if std::mem::take(&mut self.is_on) {
+            self.list.clear();
+        }
+    }
+
+    /// What a list of so many boxes and kept pairs has cost decides how wide the next skin will be: searches, which come
+    /// the more often the narrower it is, should cost as much as tests of pairs that are apart.
+    pub(crate) fn learn(&mut self, boxes: u32, kept: usize) {
+        let search = SEARCH_OF_A_BOX * boxes as f32 / self.age.max(1) as f32;
+        let tests = self.list.len().saturating_sub(kept) as f32;
+        let factor = if search > 1.5 * tests {
+            1.4
+        } else if tests > 1.5 * search {
+            1.0 / 1.4
+        } else {
+            1.0
+        };
+        self.moves = (factor * self.moves).clamp(MOVES[1], MOVES[2]);
+    }
+
+    /// What an update has taken, in which so many boxes have changed.
+    pub(crate) fn note_time(&mut self, way: Way, changed: usize, time: Duration) {
+        let (ns, changed) = (time.as_nanos() as f32, changed as f32);
+        if way == Way::Near {
+            self.own = Cost { ns: self.own.ns + ns, changed: self.own.changed + changed };
+        } else if way == Way::Other {
+            let usual = self.usual.unwrap_or(ns / changed);
+            self.usual = Some((usual + ns / changed) / 2.0);
+        }
+    }
+
+    /// No longer any good; if it has not paid, the next one comes later.
+    pub(crate) fn end(&mut self) {
+        self.stop();
+        let pays = self.usual.is_none_or(|usual| self.own.ns < PAYS * usual * self.own.changed);
+        self.next_pause =
+            if pays && self.age >= LONG { 0 } else { (2 * self.next_pause + 1).min(LONGEST_PAUSE) };
+        self.pause = self.next_pause;
+    }
+}
+
+impl BroadPhase {
+    /// Whether to look for near pairs now, and how far.
+    pub(crate) fn skin(&mut self, is_due: bool) -> Option<f32> {
+        if !is_due || self.config.backend == Backend::Brute || self.config.strategy == Strategy::Pbig {
+            return None;
+        }
+        if self.near.pause > 0 || self.near.usual.is_none() {
+            self.near.pause = self.near.pause.saturating_sub(1);
+            return None;
+        }
+        let skin = self.near.moves * self.usual_move()?;
+        (skin > 0.0 && skin.is_finite()).then_some(skin)
+    }
+
+    /// Whether edits have moved so many boxes that a list would have paid by now.
+    pub(crate) fn is_edited(&mut self) -> bool {
+        self.near.edited += self.changed.len();
+        let is_due = self.near.edited * EDITED >= self.present_count as usize;
+        if is_due {
+            self.near.edited = 0;
+        }
+        is_due
+    }
+
+    /// How far boxes move in an update: nine in ten of those that have changed no further.
+    fn usual_move(&self) -> Option<f32> {
+        let mut moves = [0.0f32; SAMPLE];
+        let step = self.changed.len().div_ceil(SAMPLE).max(1);
+        let mut count = 0;
+        for &id in self.changed.iter().step_by(step) {
+            let (now, old) = (&self.boxes[id as usize], &self.before[id as usize]);
+            let of = |k: usize| (now.min[k] - old.min[k]).abs().max((now.max[k] - old.max[k]).abs());
+            let moved = of(0).max(of(1)).max(of(2));
+            if moved.is_finite() && !old.min[0].is_nan() && !now.min[0].is_nan() {
+                moves[count] = moved;
+                count += 1;
+            }
+        }
+        if 2 * count * step < self.changed.len() {
+            return None;
+        }
+        let moves = &mut moves[..count];
+        moves.sort_unstable_by(f32::total_cmp);
+        moves.get(count * 9 / 10).copied()
+    }
+
+    /// Boxes that tremble, or swing, need less of a skin than those that go on: once they have come no farther for as long
+    /// again, near pairs are only those that such motion can bring together.
+    pub(crate) fn shrink_skin(&mut self) {
+        let Self { near, boxes, changed, .. } = self;
+        let step = changed.len().div_ceil(SAMPLE).max(1);
+        for &id in changed.iter().skip(near.age as usize % step).step_by(step) {
+            near.farthest =
+                near.farthest.max(near.skin - slack(&near.reach[id as usize], &boxes[id as usize]));
+        }
+        if near.age < 4 || !near.age.is_power_of_two() {
+            return;
+        }
+        let then = std::mem::replace(&mut near.farthest_then, near.farthest);
+        let enough = 1.25 * near.farthest;
+        if near.farthest > 1.2 * then || enough > 0.75 * near.skin {
+            return;
+        }
+        for (reach, aabb) in near.reach.iter_mut().zip(boxes) {
+            let less = reach.inflated(enough - near.skin);
+            if less.contains(aabb) {
+                *reach = less;
+            }
+        }
+        near.skin = enough;
+        near.list.retain(|pair| near.reach[pair.a as usize].overlaps(&near.reach[pair.b as usize]));
+    }
+}
+
+/// The narrowest gap between a box and the reach around it; NaN where that is infinite.
+fn slack(reach: &Aabb, aabb: &Aabb) -> f32 {
+    let gap = |k: usize| (aabb.min[k] - reach.min[k]).min(reach.max[k] - aabb.max[k]);
+    gap(0).min(gap(1)).min(gap(2))
+}

@@ -1,0 +1,212 @@
+//! Updates by near pairs against the oracle, and when there are any.
+
+use crate::broad_phase::{BroadPhase, Events};
+use crate::plan::Chosen;
+use crate::{Aabb, Config, Error, Limits, Pair, ProxyFilter, Strategy, oracle};
+use std::collections::BTreeSet;
+
+const BOXES: u32 = 1500;
+
+/// Boxes that move, and the pairs that events have told of.
+struct World {
+    broad_phase: BroadPhase,
+    boxes: Vec<Aabb>,
+    pairs: BTreeSet<Pair>,
+    seed: u64,
+    /// Updates by near pairs.
+    near: u32,
+}
+
+impl World {
+    fn new(margin: f32) -> Self {
+        let config = Config { strategy: Strategy::Grid, margin, ..Config::DEFAULT };
+        let broad_phase = BroadPhase::new(config).expect("a margin");
+        let mut world = Self { broad_phase, boxes: vec![], pairs: BTreeSet::new(), seed: 11, near: 0 };
+        for id in 0..BOXES {
+            let center = world.vector().map(|x| 7.0 * x);
+            world.boxes.push(Aabb::from_center(center, [0.5; 3]));
+            world.set(id);
+        }
+        world.update("all are new");
+        world
+    }
+
+    fn random(&mut self) -> f32 {
+        self.seed = self.seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (self.seed >> 40) as f32 / 16_777_216.0
+    }
+
+    /// From -1 to 1.
+    fn vector(&mut self) -> [f32; 3] {
+        [self.random(), self.random(), self.random()].map(|x| 2.0 * x - 1.0)
+    }
+
+    fn set(&mut self, id: u32) {
+        self.broad_phase.set(id, self.boxes[id as usize], ProxyFilter::ALL).expect("a small id");
+    }
+
+    fn shift(&mut self, id: u32, by: [f32; 3]) {
+        let add = |corner: [f32; 3]| std::array::from_fn(|k| corner[k] + by[k]);
+        let aabb = &mut self.boxes[id as usize];
+        *aabb = Aabb::new(add(aabb.min), add(aabb.max));
+        self.set(id);
+    }
+
+    fn tremble(&mut self, by: f32) {
+        for id in 0..BOXES {
+            let by = self.vector().map(|x| by * x);
+            self.shift(id, by);
+        }
+    }
+
+    /// The pairs that there should be: of the fat boxes, and as filters allow.
+    fn wanted(&self) -> BTreeSet<Pair> {
+        let of = &self.broad_phase;
+        let boxes: Vec<Aabb> =
+            (0..of.id_count()).map(|id| of.fat_aabb(id).unwrap_or(Aabb::NOWHERE)).collect();
+        let allow = |a: u32, b: u32| of.filter(a).zip(of.filter(b)).is_some_and(|(a, b)| a.allows(b));
+        oracle::pairs_where(&boxes, allow).into_iter().collect()
+    }
+
+    fn update(&mut self, what: &str) {
+        // How long anything takes decides nothing here.
+        self.broad_phase.near.usual = Some(f32::MAX);
+        let events = self.broad_phase.update().expect("within the limits").clone();
+        for pair in &events.removed {
+            assert!(self.pairs.remove(pair), "{what}: {pair:?} is removed and was not there");
+        }
+        for pair in &events.added {
+            assert!(self.pairs.insert(*pair), "{what}: {pair:?} is added and was there");
+        }
+        let wanted = self.wanted();
+        let wrong: Vec<&Pair> = wanted.symmetric_difference(&self.pairs).take(3).collect();
+        assert!(wrong.is_empty(), "{what}: {wrong:?}, {}", self.broad_phase.report().plan);
+        assert_eq!(self.broad_phase.pairs().collect::<BTreeSet<_>>(), wanted, "{what}");
+        self.near += u32::from(self.broad_phase.report().plan.chosen == Chosen::Near);
+    }
+
+    fn remove(&mut self, id: u32) {
+        assert!(self.broad_phase.remove(id));
+        self.pairs.retain(|pair| pair.a != id && pair.b != id);
+    }
+}
+
+#[test]
+fn all_that_can_happen_to_a_box_happens_while_the_others_tremble() {
+    for margin in [0.0, 0.02] {
+        let mut world = World::new(margin);
+        for round in 0..90u32 {
+            world.tremble(0.05);
+            let id = round * 31 % BOXES;
+            match round % 6 {
+                0 => world.remove(id),
+                1 => world.shift(id, [3.0, 0.0, 0.0]),
+                2 => {
+                    let filter = ProxyFilter { memberships: 2, mask: 1, ..ProxyFilter::ALL };
+                    world.broad_phase.set(id, world.boxes[id as usize], filter).expect("a small id");
+                }
+                3 => world.broad_phase.set(id, Aabb::NOWHERE, ProxyFilter::ALL).expect("a small id"),
+                4 => {
+                    world.remove(id);
+                    let filter = ProxyFilter { memberships: 4, mask: 2, ..ProxyFilter::ALL };
+                    world.broad_phase.set(id, world.boxes[id as usize], filter).expect("a small id");
+                }
+                _ => {
+                    world.boxes.push(world.boxes[id as usize]);
+                    world.set(world.boxes.len() as u32 - 1);
+                }
+            }
+            world.update(&format!("margin {margin}, round {round}"));
+        }
+        assert!(world.near > 50, "{} updates by near pairs", world.near);
+    }
+}
+
+#[test]
+fn few_movers_get_a_list_when_they_have_moved_often() {
+    let mut world = World::new(0.0);
+    for round in 0..200u32 {
+        for id in (round % 60..BOXES).step_by(60) {
+            let by = if round / 60 % 2 == 0 { 0.05 } else { -0.05 };
+            world.shift(id, [by, 0.0, -by]);
+        }
+        if round % 9 == 0 {
+            world.shift(round, [2.0, 2.0, 0.0]);
+        }
+        world.update(&format!("round {round}"));
+        let report = world.broad_phase.report();
+        let is_cheap = report.checks.made < 20 * 25;
+        assert!(round < 150 || report.plan.chosen != Chosen::Near || is_cheap, "{report:?}");
+    }
+    assert!(world.near > 100, "{} updates by near pairs", world.near);
+}
+
+#[test]
+fn the_skin_of_what_swings_shrinks_to_what_it_needs() {
+    let mut world = World::new(0.0);
+    let mut checks = vec![];
+    for round in 0..40u32 {
+        let by = if round % 2 == 0 { 0.05 } else { -0.05 };
+        (0..BOXES).for_each(|id| world.shift(id, [by, by, 0.0]));
+        world.update(&format!("round {round}"));
+        if world.broad_phase.report().plan.chosen == Chosen::Near {
+            checks.push(world.broad_phase.report().checks.made);
+        }
+    }
+    assert!(checks.len() > 30 && 4 * checks[checks.len() - 1] < 3 * checks[0], "{checks:?}");
+}
+
+#[test]
+fn boxes_that_jump_far_are_seldom_tried_with_a_list() {
+    let mut world = World::new(0.0);
+    let mut updates = 0;
+    for round in 0..100u32 {
+        (0..BOXES).for_each(|id| {
+            world.boxes[id as usize] = Aabb::from_center(world.vector().map(|x| 7.0 * x), [0.5; 3]);
+            world.set(id);
+        });
+        world.update(&format!("round {round}"));
+        updates += u32::from(world.broad_phase.near.is_on);
+    }
+    assert!(updates <= 8, "{updates} lists");
+}
+
+#[test]
+fn too_many_new_pairs_leave_all_as_it_was() {
+    let mut world = World::new(0.0);
+    for round in 0..6u32 {
+        world.tremble(0.02);
+        world.update(&format!("round {round}"));
+    }
+    assert!(world.broad_phase.near.is_on);
+    let limits = world.broad_phase.config.limits;
+    for after in ["a list", "no list"] {
+        let before: BTreeSet<Pair> = world.broad_phase.pairs().collect();
+        world.tremble(0.02);
+        world.broad_phase.config.limits = Limits { max_pairs: 1, ..limits };
+        assert_eq!(world.broad_phase.update(), Err(Error::TooManyPairs { limit: 1 }), "after {after}");
+        assert_eq!(world.broad_phase.events(), &Events::default());
+        assert_eq!(world.broad_phase.pairs().collect::<BTreeSet<_>>(), before, "after {after}");
+        world.broad_phase.config.limits = limits;
+        world.update(after);
+    }
+}
+
+#[test]
+fn a_list_that_has_not_paid_is_followed_by_ever_longer_pauses() {
+    let mut world = World::new(0.0);
+    let (mut lists, mut was_on) = (0, false);
+    for round in 0..200u32 {
+        world.tremble(0.05);
+        world.broad_phase.near.usual = Some(0.0);
+        world.broad_phase.update().expect("within the limits");
+        let is_on = world.broad_phase.near.is_on;
+        lists += u32::from(is_on && !was_on);
+        was_on = is_on;
+        // All leave their reach.
+        if is_on && round % 3 == 0 {
+            (0..BOXES).for_each(|id| world.shift(id, [1.0, 0.0, 0.0]));
+        }
+    }
+    assert!((3..9).contains(&lists), "{lists} lists");
+}

@@ -1,0 +1,156 @@
+//! The list against a naive one.
+
+use super::*;
+use std::collections::BTreeSet;
+
+const BOXES: u32 = 40;
+
+/// Boxes that move little, their reaches, and what the list should know.
+struct World {
+    seed: u64,
+    boxes: Vec<Aabb>,
+    reach: Vec<Aabb>,
+    list: NearPairs,
+    kept: PairStore,
+    wanted: BTreeSet<Pair>,
+}
+
+impl World {
+    fn new() -> Self {
+        let mut kept = PairStore::default();
+        kept.reserve_ids(BOXES as usize);
+        let (boxes, reach) = (vec![Aabb::NOWHERE; BOXES as usize], vec![Aabb::NOWHERE; BOXES as usize]);
+        let mut world =
+            Self { seed: 3, boxes, reach, list: NearPairs::default(), kept, wanted: BTreeSet::new() };
+        (0..BOXES).for_each(|id| world.place(id));
+        world
+    }
+
+    fn random(&mut self) -> f32 {
+        self.seed = self.seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (self.seed >> 40) as f32 / 16_777_216.0
+    }
+
+    /// Anywhere, with a new reach.
+    fn place(&mut self, id: u32) {
+        let center = [self.random(), self.random(), self.random()].map(|x| 4.0 * x);
+        self.boxes[id as usize] = Aabb::from_center(center, [0.5; 3]);
+        self.reach[id as usize] = self.boxes[id as usize].inflated(0.3);
+    }
+
+    /// Within the reach.
+    fn tremble(&mut self, id: u32) {
+        let by = [self.random(), self.random(), self.random()].map(|x| 0.6 * x - 0.3);
+        let reach = self.reach[id as usize].inflated(-0.3);
+        let add = |corner: [f32; 3]| std::array::from_fn(|k| corner[k] + by[k]);
+        self.boxes[id as usize] = Aabb::new(add(reach.min), add(reach.max));
+    }
+
+    /// Pairs of reaches that have one of the boxes.
+    fn near(&self, of: impl Fn(u32) -> bool) -> Vec<Vec<Pair>> {
+        let all = (0..BOXES).flat_map(|a| (a + 1..BOXES).map(move |b| Pair::new(a, b)));
+        let is_near = |pair: &Pair| self.reach[pair.a as usize].overlaps(&self.reach[pair.b as usize]);
+        let mut found = vec![vec![], vec![]];
+        all.filter(|pair| (of(pair.a) || of(pair.b)) && is_near(pair)).for_each(|pair| found[1].push(pair));
+        found
+    }
+
+    fn now(&self) -> BTreeSet<Pair> {
+        let all = (0..BOXES).flat_map(|a| (a + 1..BOXES).map(move |b| Pair::new(a, b)));
+        all.filter(|pair| self.boxes[pair.a as usize].overlaps(&self.boxes[pair.b as usize])).collect()
+    }
+
+    /// What was told turns the pairs there were into those there are, and these are kept.
+    fn validate(&mut self, added: &[Pair], removed: &[Pair]) {
+        for pair in removed {
+            assert!(self.wanted.remove(pair), "{pair:?} is removed and was not there");
+        }
+        for pair in added {
+            assert!(self.wanted.insert(*pair), "{pair:?} is added and was there");
+        }
+        assert_eq!(self.wanted, self.now());
+        assert_eq!(self.kept.iter().collect::<BTreeSet<_>>(), self.wanted);
+        assert_eq!(self.kept.len(), self.wanted.len());
+        for id in 0..BOXES {
+            let degree = self.wanted.iter().filter(|pair| pair.a == id || pair.b == id).count();
+            assert_eq!(self.kept.degree(id) as usize, degree, "degree of {id}");
+        }
+    }
+
+    fn update(&mut self, changed: &[u32]) {
+        let (mut added, mut removed) = (vec![], vec![]);
+        let Self { list, boxes, kept, .. } = self;
+        let (add, remove) = (|pair| added.push(pair), |pair| removed.push(pair));
+        if changed.len() as u32 == BOXES {
+            list.update(boxes, kept, add, remove);
+        } else {
+            let first = |id, other| id < other || !changed.contains(&other);
+            list.update_few(changed, boxes, first, kept, add, remove);
+        }
+        self.validate(&added, &removed);
+    }
+
+    /// Some boxes go elsewhere.
+    fn jump(&mut self, ids: &[u32]) {
+        let (mut added, mut removed) = (vec![], vec![]);
+        self.list.remove_of(ids, |id| ids.contains(&id), &mut self.kept, |pair| removed.push(pair));
+        ids.iter().for_each(|id| self.place(*id));
+        let found = self.near(|id| ids.contains(&id));
+        self.list.extend(&found, &self.boxes, &mut self.kept, |pair| added.push(pair));
+        self.validate(&added, &removed);
+    }
+}
+
+/// What was a pair before.
+struct Was(BTreeSet<Pair>);
+
+impl Judgement for Was {
+    fn holds(&self, pair: Pair) -> bool {
+        self.0.contains(&pair)
+    }
+}
+
+#[test]
+fn pairs_come_and_go_as_boxes_tremble_and_jump() {
+    let mut world = World::new();
+    let mut indexed = 0;
+    for round in 0..600 {
+        if round % 150 == 0 {
+            let mut added = vec![];
+            let found = world.near(|_| true);
+            let World { list, kept, wanted, boxes, .. } = &mut world;
+            list.fill(&found, boxes, kept, &Was(wanted.clone()), &mut added);
+            world.validate(&added, &[]);
+        }
+        let first = (world.random() * BOXES as f32) as u32;
+        let some = [first, (first + 7) % BOXES, (first + 8) % BOXES];
+        if round % 10 == 5 {
+            world.jump(&some[..1 + round % 3]);
+        }
+        // Now and then all, so that walks are due for an index again.
+        let changed: Vec<u32> = if round % 50 == 0 { (0..BOXES).collect() } else { some.to_vec() };
+        changed.iter().for_each(|id| world.tremble(*id));
+        world.update(&changed);
+        indexed += u32::from(world.list.index.known > 0);
+    }
+    assert!((300..600).contains(&indexed), "{indexed} rounds with an index");
+}
+
+#[test]
+fn what_is_apart_and_no_longer_near_is_forgotten() {
+    let mut world = World::new();
+    let found = world.near(|_| true);
+    let mut added = vec![];
+    world.list.fill(&found, &world.boxes, &mut world.kept, &Was(BTreeSet::new()), &mut added);
+    world.validate(&added, &[]);
+    let before = world.list.len();
+    world.list.retain(|pair| pair.a % 2 == 0);
+    assert!(world.list.len() < before && world.list.len() > added.len());
+    (0..BOXES).for_each(|id| world.tremble(id));
+    let odd = |pair: &&Pair| pair.a % 2 == 1 && !world.wanted.contains(pair);
+    let missed: Vec<Pair> = world.now().iter().filter(odd).copied().collect();
+    let mut now = vec![];
+    world.list.update(&world.boxes, &mut world.kept, |pair| now.push(pair), |_| {});
+    assert!(!missed.is_empty() && missed.iter().all(|pair| !now.contains(pair)));
+    assert!(!now.is_empty());
+}
