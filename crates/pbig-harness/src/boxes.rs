@@ -112,18 +112,34 @@ pub struct Wander {
     is_away: Vec<bool>,
     movers: Movers,
     distance: f32,
+    /// Of boxes that do not return: how far each goes in a frame.
+    velocities: Vec<[f32; 3]>,
 }
 
 impl Wander {
     /// All at home; a share of them will move in each frame.
     pub fn new(boxes: Vec<Aabb>, share: f64, distance: f32) -> Self {
         let movers = Movers::new(boxes.len(), share);
-        Self { home: boxes.clone(), is_away: vec![false; boxes.len()], boxes, movers, distance }
+        let (home, is_away) = (boxes.clone(), vec![false; boxes.len()]);
+        Self { home, is_away, boxes, movers, distance, velocities: vec![] }
+    }
+
+    /// All move in every frame, each in a direction of its own by up to the distance along each axis; at the border of
+    /// the space of the set they turn.
+    pub fn drifting(boxes: Vec<Aabb>, distance: f32) -> Self {
+        let mut rng = StdRng::seed_from_u64(9);
+        let velocities =
+            boxes.iter().map(|_| [0; 3].map(|_| rng.random_range(-distance..=distance))).collect();
+        Self { velocities, ..Self::new(boxes, 1.0, distance) }
     }
 
     /// Moves those of a frame, and tells who they are.
     pub fn step(&mut self, frame: usize) -> Vec<u32> {
         let movers = self.movers.of(frame);
+        if !self.velocities.is_empty() {
+            self.drift();
+            return movers;
+        }
         let homes: Vec<Aabb> = movers.iter().map(|&id| self.home[id as usize]).collect();
         for (&id, place) in movers.iter().zip(moved(&homes, self.distance, frame as u64)) {
             let i = id as usize;
@@ -131,6 +147,20 @@ impl Wander {
             self.is_away[i] = !self.is_away[i];
         }
         movers
+    }
+
+    fn drift(&mut self) {
+        let space = self.home.iter().fold(Aabb::NOWHERE, |space, home| space.union(home));
+        for (aabb, velocity) in self.boxes.iter_mut().zip(&mut self.velocities) {
+            for k in 0..3 {
+                let (out, below) = (aabb.max[k] > space.max[k], aabb.min[k] < space.min[k]);
+                if (out && velocity[k] > 0.0) || (below && velocity[k] < 0.0) {
+                    velocity[k] = -velocity[k];
+                }
+                aabb.min[k] += velocity[k];
+                aabb.max[k] += velocity[k];
+            }
+        }
     }
 }
 
@@ -246,6 +276,20 @@ mod tests {
         assert!(wander.boxes.iter().zip(&start).all(|(now, home)| now != home));
         wander.step(1);
         assert_eq!(wander.boxes, start);
+    }
+
+    #[test]
+    fn drifters_go_on_and_turn_at_the_border() {
+        let start = BoxSet::named("unit").expect("the set exists").boxes(200, 1);
+        let mut wander = Wander::drifting(start.clone(), 0.1);
+        assert_eq!(wander.step(0).len(), 200);
+        let first = wander.boxes.clone();
+        (1..400).for_each(|frame| _ = wander.step(frame));
+        let gone =
+            |a: &[Aabb]| a.iter().zip(&start).map(|(a, b)| (a.min[0] - b.min[0]).abs()).sum::<f32>() / 200.0;
+        assert!(gone(&first) < 0.1 && gone(&wander.boxes) > 1.0);
+        let edge = 800f32.cbrt() + 1.0;
+        assert!(wander.boxes.iter().all(|aabb| aabb.min[0] > -1.0 && aabb.max[0] < edge + 1.0));
     }
 
     #[test]

@@ -19,7 +19,7 @@ pub(crate) trait Contest {
 /// How long to measure.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Effort {
-    /// Rounds that do not count: they allocate, learn and fill caches.
+    /// Rounds that do not count: they allocate, fill caches, and learn how boxes move.
     pub(crate) warm_up: usize,
     /// Rounds that do, at most.
     pub(crate) rounds: usize,
@@ -31,13 +31,27 @@ impl Effort {
     /// Seconds for a row, or a fraction of one.
     pub(crate) fn new(quick: bool) -> Self {
         let (rounds, budget) = if quick { (31, 250) } else { (61, 6000) };
-        Self { warm_up: 3, rounds, budget: Duration::from_millis(budget) }
+        let warm_up = if quick { 3 } else { 12 };
+        Self { warm_up, rounds, budget: Duration::from_millis(budget) }
     }
 }
 
-/// Milliseconds of each side. The sides change places from round to round, as the first in a round warms
-/// the caches for the next: a side's time is the mean, over its places, of its median there.
+/// What a side took: milliseconds.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Took {
+    pub(crate) median: f64,
+    /// Of all rounds: work that is done in one round for many has its part in this.
+    pub(crate) mean: f64,
+}
+
+/// The medians of [`measured`].
 pub(crate) fn medians(contest: &mut impl Contest, effort: Effort) -> Result<Vec<f64>, Failure> {
+    Ok(measured(contest, effort)?.iter().map(|took| took.median).collect())
+}
+
+/// What each side took. The sides change places from round to round, as the first in a round warms
+/// the caches for the next: a side's median is the mean, over its places, of its median there.
+pub(crate) fn measured(contest: &mut impl Contest, effort: Effort) -> Result<Vec<Took>, Failure> {
     let sides = contest.sides();
     // By place, then by side.
     let mut times = vec![vec![Vec::new(); sides]; sides];
@@ -57,7 +71,12 @@ pub(crate) fn medians(contest: &mut impl Contest, effort: Effort) -> Result<Vec<
             }
         }
     }
-    Ok((0..sides).map(|side| mean_of_medians(times.iter().map(|times| &times[side][..]))).collect())
+    let took = |side: usize| {
+        let places = || times.iter().map(|times| &times[side][..]);
+        let (sum, count) = places().flatten().fold((0.0, 0), |(sum, count), time| (sum + time, count + 1));
+        Took { median: mean_of_medians(places()), mean: sum / f64::from(count.max(1)) }
+    };
+    Ok((0..sides).map(took).collect())
 }
 
 /// Over the places in which there is a time.
@@ -98,5 +117,8 @@ mod tests {
     fn places_in_a_round_favour_no_side() {
         let effort = Effort { warm_up: 1, rounds: 7, budget: Duration::MAX };
         assert_eq!(medians(&mut Known(false), effort).expect("no failure"), [6.0, 7.0]);
+        // Side 1 is first in four of seven rounds.
+        let mean = |side: usize| measured(&mut Known(false), effort).expect("no failure")[side].mean;
+        assert_eq!([mean(0), mean(1)], [1.0 + 30.0 / 7.0, 2.0 + 40.0 / 7.0]);
     }
 }

@@ -3,7 +3,7 @@
 mod trees;
 
 use super::Outcome;
-use super::measure::{Contest, Effort, medians, timed};
+use super::measure::{Contest, Effort, measured, medians, timed};
 use super::table::{Row, Target, Unit};
 use crate::output::{Failure, progress};
 use pbig_core::{Aabb, BroadPhase, Config, Finder, Limits, Order, ProxyFilter};
@@ -38,6 +38,9 @@ const FRAMES: [Case; 4] = [
     case("pile", 100_000, &[8.0, 4.0]),
 ];
 
+/// All drift, and none returns: the same, without targets.
+const DRIFT: [Case; 2] = [case("unit", 100_000, &[]), case("pile", 100_000, &[])];
+
 /// 1% moved: against both of parry's ways to refit a part.
 const PARTS: [Case; 2] = [case("unit", 100_000, &[10.0, 10.0]), case("unit", 1_000_000, &[20.0, 20.0])];
 
@@ -53,14 +56,17 @@ const SMALL: [Case; 3] = [case("unit", 10_000, &[]), case("mixed", 10_000, &[]),
 
 pub(super) fn run(quick: bool) -> Result<Outcome, Failure> {
     let effort = Effort::new(quick);
-    let (frames, parts, scratch): (&[Case], &[Case], &[Case]) =
-        if quick { (&SMALL, &SMALL[..1], &SMALL) } else { (&FRAMES, &PARTS, &SCRATCH) };
-    let bar = progress(frames.len() + parts.len() + scratch.len(), "cases");
+    let (frames, drift, parts, scratch): (&[Case], &[Case], &[Case], &[Case]) =
+        if quick { (&SMALL, &[], &SMALL[..1], &SMALL) } else { (&FRAMES, &DRIFT, &PARTS, &SCRATCH) };
+    let bar = progress(frames.len() + drift.len() + parts.len() + scratch.len(), "cases");
     let mut rows = Vec::new();
-    let kinds = [("events, all moved", 1.0, frames), ("events, 1% moved", 0.01, parts)];
-    for (what, share, cases) in kinds {
+    let all_moved =
+        [("events, all moved", Motion::Swing(1.0), frames), ("events, all drift", Motion::Drift, drift)];
+    for (what, motion, cases) in
+        all_moved.into_iter().chain([("events, 1% moved", Motion::Swing(0.01), parts)])
+    {
         for case in cases {
-            rows.extend(frame_rows(what, case, share, effort)?);
+            rows.extend(frame_rows(what, case, motion, effort)?);
             bar.inc(1);
         }
     }
@@ -82,10 +88,23 @@ fn notes() -> Vec<String> {
         "events: `set` for every box that moved and `update`; parry 0.31 keeps its tree and gives all pairs (1% moved: \
          those with a moved box), no events; ours runs on all threads where a row does not say otherwise"
             .into(),
+        "boxes that move go to and fro, by up to 0.1 on each axis (pile: 0.02); those that drift go on, as far in each frame"
+            .into(),
+        "x and the targets are about medians; the means, beside, have their part of work that one frame does for many"
+            .into(),
         "not counted for the others: turning boxes into theirs, and the list of updates for parry's parallel frame"
             .into(),
         "pair counts were compared in every case, and agree".into(),
     ]
+}
+
+/// How boxes move.
+#[derive(Clone, Copy)]
+enum Motion {
+    /// A share of them, to and fro.
+    Swing(f64),
+    /// All, on and on.
+    Drift,
 }
 
 /// Ours and parry's trees through the same frames.
@@ -100,8 +119,9 @@ struct Frames {
 }
 
 impl Frames {
-    fn new(case: &Case, share: f64) -> Result<Self, Failure> {
+    fn new(case: &Case, motion: Motion) -> Result<Self, Failure> {
         let boxes = named(case);
+        let share = if let Motion::Swing(share) = motion { share } else { 1.0 };
         let refits: &[Refit] =
             if share < 1.0 { &[Refit::Whole, Refit::Part] } else { &[Refit::Whole, Refit::Parallel] };
         let empty = || BroadPhase::new(CONFIG).map_err(|error| Failure::Input(error.to_string()));
@@ -112,7 +132,10 @@ impl Frames {
             lone: empty()?,
             pool: pool.map_err(|error| Failure::Input(error.to_string()))?,
             trees: refits.iter().map(|&refit| Parry::new(&boxes, refit, share < 1.0)).collect(),
-            wander: Wander::new(boxes, share, distance(case.set)),
+            wander: match motion {
+                Motion::Swing(share) => Wander::new(boxes, share, distance(case.set)),
+                Motion::Drift => Wander::drifting(boxes, distance(case.set)),
+            },
         };
         update(&mut frames.ours, &frames.wander.boxes, &frames.moved)?;
         update(&mut frames.lone, &frames.wander.boxes, &frames.moved)?;
@@ -170,24 +193,23 @@ impl Contest for Frames {
     }
 }
 
-fn frame_rows(what: &str, case: &Case, share: f64, effort: Effort) -> Result<Vec<Row>, Failure> {
+fn frame_rows(what: &str, case: &Case, motion: Motion, effort: Effort) -> Result<Vec<Row>, Failure> {
     let name = format!("{what}, {}", case.set);
-    let mut frames = Frames::new(case, share)?;
-    let times = medians(&mut frames, effort)?;
+    let mut frames = Frames::new(case, motion)?;
+    let times = measured(&mut frames, effort)?;
     let pairs = frames.check(&name)?;
-    let row = |name: &str, ours: f64| Row::new(name, case.boxes, pairs).ours(ours);
+    let row = |name: &str| Row::new(name, case.boxes, pairs);
     let mut rows: Vec<Row> = frames
         .trees
         .iter()
         .enumerate()
         .map(|(i, tree)| {
             let target = case.targets.get(i).map(|&times| Target::Faster(times));
-            row(&name, times[0]).against(tree.name(), times[2 + i]).target(target)
+            row(&name).compare(times[0], tree.name(), times[2 + i]).target(target)
         })
         .collect();
-    rows.push(
-        row(&format!("{name}, ours on one thread"), times[1]).against(frames.trees[0].name(), times[2]),
-    );
+    let alone = row(&format!("{name}, ours on one thread"));
+    rows.push(alone.compare(times[1], frames.trees[0].name(), times[2]));
     Ok(rows)
 }
 

@@ -1,5 +1,6 @@
 //! One row for each measurement, with what it should have been, and three ways to print it.
 
+use super::measure::Took;
 use serde_json::{Map, Value, json};
 
 /// What a row is printed in; times are kept in milliseconds, memory in MB.
@@ -67,6 +68,14 @@ impl Row {
 
     pub(crate) fn against(self, name: &'static str, value: f64) -> Self {
         Self { other: Some((name, value.max(1e-9))), ..self }
+    }
+
+    /// Median against median; what the means say is noted.
+    pub(crate) fn compare(self, ours: Took, name: &'static str, other: Took) -> Self {
+        let text = |ms: f64| self.unit.text(ms);
+        let note =
+            format!("means {} and {}, {:.2}x", text(ours.mean), text(other.mean), other.mean / ours.mean);
+        self.ours(ours.median).against(name, other.median).note(note)
     }
 
     pub(crate) fn unit(self, unit: Unit) -> Self {
@@ -211,6 +220,13 @@ mod tests {
         assert_eq!(row(Target::Below(1.0)).verdict(), "missed, 2.00x off");
         assert_eq!(row(Target::Below(2.0)).target_text(), "under 2.000 ms");
         assert_eq!(Row::new("case", 1, 0).target(Some(Target::Below(1.0))).met(), None, "nothing measured");
+    }
+
+    #[test]
+    fn a_comparison_is_of_medians_and_notes_the_means() {
+        let (ours, other) = (Took { median: 1.0, mean: 2.0 }, Took { median: 3.0, mean: 5.0 });
+        let row = Row::new("case", 10, 3).compare(ours, "other", other);
+        assert_eq!((row.ratio(), row.rest().as_str()), (Some(3.0), "means 2.000 ms and 5.000 ms, 2.50x"));
     }
 
     #[test]

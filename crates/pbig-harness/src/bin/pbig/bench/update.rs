@@ -1,6 +1,6 @@
 //! `pbig bench update`: a broad phase's call through rapier, ours and stock's in turn on the same world.
 
-use super::measure::{Contest, Effort, medians, timed};
+use super::measure::{Contest, Effort, Took, measured, medians, timed};
 use super::table::{Row, Target, Unit};
 use super::{Outcome, memory};
 use crate::output::{Failure, progress};
@@ -145,7 +145,8 @@ pub(super) fn run(quick: bool) -> Result<Outcome, Failure> {
         let all_moved = case.set == "uniform" && case.share == Some(1.0);
         let (own, times) = measure(case, all_moved, Effort::new(quick))?;
         if all_moved {
-            chart.iter_mut().zip(&times).for_each(|(line, &ms)| line.points.push((case.boxes as f64, ms)));
+            let point = |took: &Took| (case.boxes as f64, took.median);
+            chart.iter_mut().zip(&times).for_each(|(line, took)| line.points.push(point(took)));
         }
         rows.extend(own);
         bar.inc(1);
@@ -171,15 +172,17 @@ fn notes() -> Vec<String> {
              list on the same world, and events are discarded",
             on.join(", ")
         ),
+        "x and the target are about medians; the means, beside, have their part of work that one call does for many"
+            .into(),
         "floor: reading each moved collider and computing its box, and nothing else".into(),
     ]
 }
 
 /// The row of a case, with those of the floor, and the times of all sides.
-fn measure(case: &Case, with_floor: bool, effort: Effort) -> Result<(Vec<Row>, Vec<f64>), Failure> {
+fn measure(case: &Case, with_floor: bool, effort: Effort) -> Result<(Vec<Row>, Vec<Took>), Failure> {
     let boxes = BoxSet::named(case.set).expect("a set of the harness").boxes(case.boxes, 1);
     let mut calls = Calls::new(&boxes, case.share, with_floor);
-    let times = medians(&mut calls, effort)?;
+    let times = measured(&mut calls, effort)?;
     let pairs = calls.ours.pair_count() as u64;
     let moved = match case.share {
         None => "nothing".into(),
@@ -187,15 +190,15 @@ fn measure(case: &Case, with_floor: bool, effort: Effort) -> Result<(Vec<Row>, V
         Some(share) => format!("{}%", share * 100.0),
     };
     let unit = if case.share.is_none() { Unit::Us } else { Unit::Ms };
-    let row = |case_name: String| Row::new(case_name, case.boxes, pairs).ours(times[OURS]).unit(unit);
-    let mut rows =
-        vec![row(format!("{}, {moved} moved", case.set)).against("stock", times[STOCK]).target(case.target)];
+    let row = |name: &'static str, side: usize| {
+        let row = Row::new(format!("{}, {moved} moved", case.set), case.boxes, pairs).unit(unit);
+        row.compare(times[OURS], name, times[side])
+    };
+    let mut rows = vec![row("stock", STOCK).target(case.target)];
     if with_floor {
         let target = (case.boxes >= 10_000).then_some(Target::Within(2.0));
-        let floor =
-            |name, side: usize| row(format!("{}, {moved} moved", case.set)).against(name, times[side]);
-        rows.push(floor("floor, one thread", FLOOR).target(target));
-        rows.push(floor("floor, all threads", FLOOR_PARALLEL));
+        rows.push(row("floor, one thread", FLOOR).target(target));
+        rows.push(row("floor, all threads", FLOOR_PARALLEL));
     }
     Ok((rows, times))
 }
