@@ -4,6 +4,7 @@ pub mod boxes;
 pub mod chart;
 pub mod field;
 pub mod files;
+pub mod index;
 pub mod options;
 pub mod runner;
 pub mod scenes;

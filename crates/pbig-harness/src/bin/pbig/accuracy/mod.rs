@@ -2,6 +2,7 @@
 //!
 //! A study is a module with `run(quick) -> Result<Study, Failure>`, and a line in [`STUDIES`].
 
+mod index;
 mod study;
 
 use crate::bench::machine::{Machine, slug};
@@ -31,7 +32,7 @@ pub(crate) struct Args {
 type Run = fn(bool) -> Result<Study, Failure>;
 
 /// Every study by name, in the order of the document.
-const STUDIES: [(&str, Run); 0] = [];
+const STUDIES: [(&str, Run); 1] = [("index", index::run)];
 
 fn names() -> clap::builder::PossibleValuesParser {
     STUDIES.map(|(name, _)| name).into()
