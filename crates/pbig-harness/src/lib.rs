@@ -6,6 +6,7 @@ pub mod field;
 pub mod files;
 pub mod index;
 pub mod options;
+pub mod precision;
 pub mod runner;
 pub mod scenes;
 pub mod shadow;

@@ -2,6 +2,7 @@
 //!
 //! A study is a module with `run(quick) -> Result<Study, Failure>`, and a line in [`STUDIES`].
 
+mod coordinates;
 mod index;
 mod study;
 
@@ -32,7 +33,7 @@ pub(crate) struct Args {
 type Run = fn(bool) -> Result<Study, Failure>;
 
 /// Every study by name, in the order of the document.
-const STUDIES: [(&str, Run); 1] = [("index", index::run)];
+const STUDIES: [(&str, Run); 2] = [("index", index::run), ("coordinates", coordinates::run)];
 
 fn names() -> clap::builder::PossibleValuesParser {
     STUDIES.map(|(name, _)| name).into()
