@@ -19,6 +19,8 @@ pub struct Pareto {
     pub y: &'static str,
     /// What is drawn; times above 0, errors not below, all finite: others are left out.
     pub lines: Vec<Line>,
+    /// Whether points of a line are joined.
+    pub joined: bool,
 }
 
 /// Width of the legend, which stands beside the points and hides none.
@@ -58,7 +60,10 @@ impl Pareto {
 
     fn ranges(&self) -> (Range<f64>, Range<f64>) {
         let (x, y) = (self.ends(|p| p.0), self.ends(|p| p.1));
-        (x.0 / 1.5..x.1 * 1.5, self.floor() / 2.0..y.1 * 2.0)
+        // Whole decades, or an axis could be without a label.
+        let decade = |x: f64, round: fn(f64) -> f64| 10f64.powf(round(x.log10()));
+        let times = decade(x.0 / 1.1, f64::floor)..decade(x.1 * 1.1, f64::ceil);
+        (times, self.floor() / 2.0..y.1 * 2.0)
     }
 
     fn draw(&self, path: &Path) -> Done {
@@ -90,7 +95,9 @@ impl Pareto {
         for (k, line) in self.lines.iter().enumerate() {
             let points: Vec<_> = drawn(line).map(|(x, y)| (x, y.max(floor))).collect();
             let colour = colour(k);
-            chart.draw_series(LineSeries::new(points.clone(), colour.mix(0.5))).map_err(owned)?;
+            if self.joined {
+                chart.draw_series(LineSeries::new(points.clone(), colour.mix(0.5))).map_err(owned)?;
+            }
             chart.draw_series(points.into_iter().map(|at| mark(k, at))).map_err(owned)?;
         }
         Ok(())
@@ -124,7 +131,14 @@ mod tests {
 
     fn chart(points: &[(f64, f64)]) -> Pareto {
         let lines = vec![Line { name: "a line".into(), points: points.to_vec() }];
-        Pareto { name: "chart".into(), title: "time and error".into(), x: "ns", y: "wrong, %", lines }
+        Pareto {
+            name: "chart".into(),
+            title: "time and error".into(),
+            x: "ns",
+            y: "wrong, %",
+            lines,
+            joined: true,
+        }
     }
 
     #[test]

@@ -192,7 +192,7 @@ mod tests {
             let slow = [slowly::<R, AsItIs>(n), slowly::<R, Rules>(n), slowly::<R, Integers>(n)];
             assert_eq!(all::<R>(n), slow, "n {n}");
         }
-        for n in (2..50).chain([300, 777]) {
+        for n in (2..50).chain([300]) {
             check::<Newton<CARMACK, 1>>(n);
             check::<Newton<CARMACK, 2>>(n);
             check::<Single>(n);
@@ -212,7 +212,7 @@ mod tests {
                 "{}",
                 way.name
             );
-            let sample = (way.sample)(1 << 20, &[0, 1 << 30, 1 << 38])[2];
+            let sample = (way.sample)(1 << 17, &[0, 1 << 30, 1 << 32])[2];
             assert_eq!((sample.wrong_ends, sample.wrong_inner), (0, 0), "{} {:?}", way.name, way.steps);
         }
     }

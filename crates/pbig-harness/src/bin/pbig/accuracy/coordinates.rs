@@ -44,6 +44,8 @@ pub(super) fn run(quick: bool) -> Result<Study, Failure> {
         time: "ns per test, tests and exact tests of what they let through",
         error: "spurious candidates, % of the pairs",
         points: rows.iter().map(point).collect(),
+        // Sets have no order.
+        joined: false,
     })
 }
 

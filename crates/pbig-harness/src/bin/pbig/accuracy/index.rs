@@ -32,6 +32,7 @@ pub(super) fn run(quick: bool) -> Result<Study, Failure> {
         time: "ns per pair, one thread, 5,000 boxes (1,000 with --quick)",
         error: "wrong pairs, %, of all n looked at",
         points: points(&every, &times),
+        joined: true,
     })
 }
 

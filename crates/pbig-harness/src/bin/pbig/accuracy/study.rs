@@ -124,7 +124,7 @@ impl Table {
 /// What something costs, and how wrong it is.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Point {
-    /// Points of one series are joined in the order given.
+    /// Points of one series have one colour, and may be joined in the order given.
     pub(super) series: String,
     /// In the unit of the study's axis of time.
     pub(super) time: f64,
@@ -145,6 +145,8 @@ pub(super) struct Study {
     pub(super) time: &'static str,
     pub(super) error: &'static str,
     pub(super) points: Vec<Point>,
+    /// Whether the points of a series are joined: where the order means something.
+    pub(super) joined: bool,
 }
 
 impl Study {
@@ -158,7 +160,7 @@ impl Study {
             }
         }
         let (name, title) = (format!("accuracy-{}", self.name), self.title.to_owned());
-        Pareto { name, title, x: self.time, y: self.error, lines }
+        Pareto { name, title, x: self.time, y: self.error, lines, joined: self.joined }
     }
 
     pub(super) fn markdown(&self) -> String {
@@ -197,6 +199,7 @@ pub(super) mod tests {
             time: "ns",
             error: "wrong, %",
             points: vec![point("one", 1.0, 0.5), point("two", 2.0, 0.0), point("one", 3.0, 0.1)],
+            joined: true,
         }
     }
 
