@@ -4,7 +4,7 @@
 mod round;
 mod search;
 
-pub use round::{FARTHEST, Scale, half_down, half_up};
+pub use round::{FARTHEST, Scale, half_down, half_up, half_value};
 pub use search::{Candidates, Found};
 
 use pbig_core::Aabb;

@@ -2,14 +2,21 @@
 
 use half::f16;
 
-/// Coordinates are clamped to this many cells of the origin. Up to here f64 tells the smallest steps apart, and beyond
-/// it f32 has no two coordinates within a cell of each other: all that is there shares one place.
+/// Coordinates are clamped to this many cells of the origin. Up to here f64 tells the smallest steps apart; beyond, all
+/// coordinates share one place, which costs tests and never a pair. Without it steps would be rounded to multiples of
+/// what fixed point wraps around at.
 pub const FARTHEST: f64 = (1u64 << 32) as f64;
 
 /// An integer for each f16, in their order; -0 just below 0.
 fn ordered(half: f16) -> i16 {
     let bits = half.to_bits() as i16;
     bits ^ (((bits >> 15) as u16) >> 1) as i16
+}
+
+/// The value of an integer in the order of f16.
+pub fn half_value(integer: i16) -> f32 {
+    // The order's inverse is itself.
+    f16::from_bits((integer ^ (((integer >> 15) as u16) >> 1) as i16) as u16).to_f32()
 }
 
 /// The largest f16 that is not above `x`, as an integer in the order of f16; `x` is no NaN.
@@ -71,11 +78,6 @@ impl Scale {
 mod tests {
     use super::*;
 
-    fn float(integer: i16) -> f32 {
-        // The order's inverse is itself.
-        f16::from_bits((integer ^ (((integer >> 15) as u16) >> 1) as i16) as u16).to_f32()
-    }
-
     #[test]
     fn every_f16_is_itself_and_what_lies_beside_it_is_rounded_outward() {
         for bits in 0..=u16::MAX {
@@ -83,12 +85,12 @@ mod tests {
             if x.is_nan() {
                 continue;
             }
-            assert_eq!((float(half_down(x)), float(half_up(x))), (x, x));
+            assert_eq!((half_value(half_down(x)), half_value(half_up(x))), (x, x));
             for beside in [x.next_down(), x.next_up()].into_iter().filter(|x| x.is_finite()) {
                 let (down, up) = (half_down(beside), half_up(beside));
-                assert!(float(down) <= beside && beside <= float(up), "{beside:e}: {down} {up}");
+                assert!(half_value(down) <= beside && beside <= half_value(up), "{beside:e}: {down} {up}");
                 // None lies between; -0 and 0 are two integers.
-                assert!(up - down <= 2 && float(down + 1) >= beside, "{beside:e}: {down} {up}");
+                assert!(up - down <= 2 && half_value(down + 1) >= beside, "{beside:e}: {down} {up}");
             }
         }
     }
