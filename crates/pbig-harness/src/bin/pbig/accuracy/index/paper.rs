@@ -73,6 +73,24 @@ pub(super) fn table_3(quick: bool) -> Table {
     table
 }
 
+/// How many figures of the table are the paper's when each step is computed in f64, by the number of steps.
+pub(super) fn table_3_note(table: &Table) -> String {
+    let agree = |row: &&Vec<Cell>| match (&row[3], &row[5]) {
+        (Cell::Number(paper), Cell::Number(wide)) => (paper - wide).abs() < 1e-4,
+        _ => false,
+    };
+    let told = (2..=4).map(|steps| {
+        let rows: Vec<_> = table.rows.iter().filter(|row| row[2] == Cell::Count(steps)).collect();
+        let right: Vec<_> = rows.iter().copied().filter(agree).collect();
+        let most = right.last().map_or(String::new(), |row| format!(", up to {} tests", row[0].text()));
+        format!("{} of {} with {steps} steps{most}", right.len(), rows.len())
+    });
+    format!(
+        "Table 3, each step computed in f64 and rounded to f32: as many figures are the paper's: {}. All in f32 gives others.",
+        told.collect::<Vec<_>>().join("; ")
+    )
+}
+
 type Errors = fn(u32) -> u64;
 
 const fn errors<R: SingleRoot, Wide: SingleRoot>() -> (Errors, Errors) {
@@ -141,6 +159,8 @@ mod tests {
             assert!((paper - wide).abs() < 1e-4, "{row:?}");
         }
         assert_eq!(table.rows.len(), 4 * 6);
+        let note = table_3_note(&table);
+        assert!(note.contains("8 of 8 with 2 steps, up to 1000000 tests; 0 of 8 with 3 steps;"), "{note}");
     }
 
     #[test]
