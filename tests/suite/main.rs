@@ -13,6 +13,7 @@ mod kernels;
 mod overlap;
 mod overlapped;
 mod planted;
+mod precision;
 mod queries;
 mod random_worlds;
 mod restore;

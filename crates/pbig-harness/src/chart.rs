@@ -1,8 +1,10 @@
 //! Line charts as SVG: an image that needs no fonts or libraries to write.
 
 mod log_log;
+mod pareto;
 
 pub use log_log::{Line, LogLog, growth};
+pub use pareto::Pareto;
 
 use plotters::prelude::*;
 use std::path::Path;

@@ -1,5 +1,6 @@
 //! The program `pbig` as other programs see it: files, JSON, exit status, one line on stderr.
 
+mod accuracy;
 mod bench;
 
 use ndarray::{Array2, Array3, ShapeBuilder};

@@ -1,6 +1,7 @@
 //! The `pbig` program. Its commands, files, JSON and exit status are in docs/CLI.md; other programs
 //! rely on them.
 
+mod accuracy;
 mod bench;
 mod doctor;
 mod options;
@@ -34,6 +35,8 @@ enum Command {
     Scenes,
     /// How fast it is here; results are written to docs/benchmarks/results.
     Bench(bench::Args),
+    /// Run time against error; results are written to docs/benchmarks/accuracy.md.
+    Accuracy(accuracy::Args),
     /// Finds pairs and says how much memory that took: a process of its own for `bench`.
     #[command(hide = true)]
     MemoryProbe(bench::memory::Args),
@@ -46,7 +49,7 @@ fn main() -> ExitCode {
         Ok(cli) => finish(run(cli.command)),
         Err(error) if !error.use_stderr() => finish(output::print(&error.to_string())),
         Err(error) if error.kind() == ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand => {
-            let commands = "pairs, replay, simulate, scenes, bench or doctor";
+            let commands = "pairs, replay, simulate, scenes, bench, accuracy or doctor";
             finish(Err(Failure::Input(format!("a command is missing: {commands} (see pbig --help)"))))
         }
         // One line on stderr, as for any other bad input; clap's own has several.
@@ -61,6 +64,7 @@ fn run(command: Command) -> Result<(), Failure> {
         Command::Simulate(args) => simulate::run(&args),
         Command::Scenes => simulate::list(),
         Command::Bench(args) => bench::run(&args),
+        Command::Accuracy(args) => accuracy::run(&args),
         Command::MemoryProbe(args) => bench::memory::probe(&args),
         Command::Doctor => doctor::run(),
     }

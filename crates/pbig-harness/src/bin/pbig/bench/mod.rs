@@ -1,8 +1,8 @@
 //! `pbig bench SUITE`: each row has ours and the other side, in turn in one run, and what is wanted.
 
 mod gpu;
-mod machine;
-mod measure;
+pub(crate) mod machine;
+pub(crate) mod measure;
 pub(crate) mod memory;
 mod peers;
 mod stages;
@@ -20,7 +20,7 @@ use std::path::{Path, PathBuf};
 use table::Row;
 
 /// Where documents are kept, in the project's folder; the results are in a folder in it.
-const DOCUMENTS: &str = "docs/benchmarks";
+pub(crate) const DOCUMENTS: &str = "docs/benchmarks";
 
 #[derive(clap::Args)]
 pub(crate) struct Args {
@@ -110,14 +110,14 @@ fn document(suite: &str, machine: &Machine, outcome: &Outcome) -> String {
 }
 
 /// Writes results where the project keeps them, named by day, suite and machine.
-fn keep(name: &str, object: &Value, quiet: bool) -> Result<(), Failure> {
+pub(crate) fn keep(name: &str, object: &Value, quiet: bool) -> Result<(), Failure> {
     let day = time::OffsetDateTime::now_utc().date();
     let path: PathBuf = Path::new(DOCUMENTS).join("results").join(format!("{day}-{name}.json"));
     save(&path, &format!("{object:#}\n"))?;
     if quiet { Ok(()) } else { print(&format!("written to {}", path.display())) }
 }
 
-fn save(path: &Path, text: &str) -> Result<(), Failure> {
+pub(crate) fn save(path: &Path, text: &str) -> Result<(), Failure> {
     let folder = path.parent().unwrap_or(Path::new("."));
     let written = std::fs::create_dir_all(folder).and_then(|()| std::fs::write(path, text));
     written.map_err(|error| Failure::Input(format!("{}: {error}", path.display())))

@@ -1,0 +1,143 @@
+//! Time for a pair, on one thread, for every way and correction.
+
+use super::super::study::{Cell, Table};
+use crate::bench::measure::{Contest, Effort, medians, timed};
+use crate::output::Failure;
+use pbig_harness::index::{Block, CORRECTIONS, WAYS, Way, pass_bisection, pass_integer_root, pass_lazy};
+use pbig_harness::runner::Spread;
+use std::hint::black_box;
+use std::time::Duration;
+
+/// Blocks of indices that are looked at, evenly spread, and the length of each.
+const BLOCKS: i64 = 16;
+const BLOCK: i64 = 2048;
+
+/// Ways without an estimated root, after those that have one.
+const OTHERS: [&str; 3] = ["bisection over rows", "integer root", "lazy way"];
+
+/// Nanoseconds for a pair at one number of boxes.
+pub(super) struct Times {
+    pub(super) n: i64,
+    /// By way, as it is, by the rules, by integers.
+    pub(super) ways: [[f64; 3]; WAYS.len()],
+    /// In the order of [`OTHERS`].
+    others: [f64; 3],
+}
+
+impl Times {
+    pub(super) fn measure(n: i64, quick: bool) -> Result<Self, Failure> {
+        let (pairs, ids) = (blocks(n * (n - 1) / 2, 1), blocks(n * n, 2));
+        let mut sides = Sides { n, pairs, ids, times: vec![vec![]; SIDES] };
+        let rounds = if quick { 15 } else { 2 * SIDES };
+        medians(&mut sides, Effort { warm_up: 0, rounds, budget: Duration::from_secs(20) })?;
+        // Over all places in a round: there are too many for a median of each, and nothing is in memory that a side
+        // could warm for the next.
+        let medians: Vec<f64> =
+            sides.times.iter().map(|times| Spread::of(times.iter().copied()).median).collect();
+        let (ways, others) = medians.split_at(3 * WAYS.len());
+        Ok(Self {
+            n,
+            ways: std::array::from_fn(|way| std::array::from_fn(|fix| ways[3 * way + fix])),
+            others: std::array::from_fn(|k| others[k]),
+        })
+    }
+
+    /// With the processor's root in f32 and nothing else, as the paper has it.
+    pub(super) fn f32_root(&self) -> f64 {
+        self.ways[0][0]
+    }
+
+    pub(super) fn exact(&self) -> [(&'static str, f64); 3] {
+        std::array::from_fn(|k| (OTHERS[k], self.others[k]))
+    }
+
+    pub(super) fn lazy(&self) -> f64 {
+        self.others[2]
+    }
+}
+
+/// Blocks that cover what there is, or are spread over it.
+fn blocks(all: i64, times: i64) -> Vec<Block> {
+    let count = (BLOCK * times).min(all / BLOCKS).max(1);
+    (0..BLOCKS.min(all)).map(|k| ((all - count) * k / (BLOCKS - 1).max(1), count)).collect()
+}
+
+struct Sides {
+    n: i64,
+    pairs: Vec<Block>,
+    ids: Vec<Block>,
+    /// Nanoseconds for a pair, by side.
+    times: Vec<Vec<f64>>,
+}
+
+/// Ways with their corrections, and the others.
+const SIDES: usize = 3 * WAYS.len() + OTHERS.len();
+
+impl Contest for Sides {
+    fn sides(&self) -> usize {
+        SIDES
+    }
+
+    fn prepare(&mut self, _: usize) {}
+
+    fn run(&mut self, side: usize) -> Result<f64, Failure> {
+        let Self { n, pairs, ids, .. } = self;
+        let count: i64 = pairs.iter().map(|block| block.1).sum();
+        let pass = |pass: fn(i64, &[Block]) -> i64| (count, timed(|| black_box(pass(*n, pairs))).1);
+        let (pairs, ms) = match side.checked_sub(3 * WAYS.len()) {
+            None => pass(WAYS[side / 3].passes[side % 3]),
+            Some(0) => pass(pass_bisection),
+            Some(1) => pass(pass_integer_root),
+            Some(_) => {
+                let ((pairs, sum), ms) = timed(|| pass_lazy(*n, ids));
+                black_box(sum);
+                (pairs, ms)
+            }
+        };
+        self.times[side].push(ms * 1e6 / pairs.max(1) as f64);
+        Ok(ms)
+    }
+}
+
+/// A way's name with its steps.
+pub(super) fn label(way: &Way) -> String {
+    way.steps.map_or(way.name.to_owned(), |steps| format!("{} {steps}", way.name))
+}
+
+pub(super) fn table(times: &[Times]) -> Table {
+    let title = "Time for a pair: one thread, 64-bit integers, ways in turn in one run";
+    let columns =
+        ["boxes", "root", "as_it_is_ns_per_pair", "by_the_rules_ns_per_pair", "by_integers_ns_per_pair"];
+    debug_assert_eq!(CORRECTIONS.len() + 2, columns.len());
+    let mut table = Table::new("times", title, &columns);
+    for times in times {
+        for (way, ns) in WAYS.iter().zip(times.ways) {
+            table.row([Cell::from(times.n as u64), label(way).into()].into_iter().chain(ns.map(Cell::from)));
+        }
+        for (name, ns) in times.exact() {
+            table.row([(times.n as u64).into(), name.into(), ns.into(), Cell::Nothing, Cell::Nothing]);
+        }
+    }
+    table
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn blocks_lie_within_what_there_is() {
+        for all in [1, 3, 15, 16, 17, 1000, 1 << 39] {
+            let blocks = blocks(all, 1);
+            assert!(blocks.iter().all(|&(first, count)| first >= 0 && count > 0 && first + count <= all));
+        }
+    }
+
+    #[test]
+    fn every_way_has_a_time() {
+        let times = Times::measure(50, true).expect("no failure");
+        let all = times.ways.iter().flatten().chain(&times.others);
+        assert!(all.into_iter().all(|ns| ns.is_finite() && *ns > 0.0));
+        assert_eq!(table(&[times]).rows.len(), WAYS.len() + OTHERS.len());
+    }
+}

@@ -1,0 +1,95 @@
+//! How far roots are off, and the smallest number of boxes for which the paper's rules are wrong.
+
+use super::{AsItIs, Correction, Root, Rules, SingleRoot, discriminant, row_start};
+
+/// An index for which the rules of Avril 3.3 give a wrong pair.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Counterexample {
+    /// Boxes.
+    pub n: i64,
+    /// The index.
+    pub k: i64,
+    /// What comes out.
+    pub given: (i64, i64),
+    /// Its pair.
+    pub right: (i64, i64),
+}
+
+/// The smallest number of boxes up to `most <= 2^20`, at the first or last index of a row. There it is if it is
+/// anywhere: rules mend a row that is off by one, and an estimate is furthest from its row at one of the row's ends.
+pub fn counterexample<R: Root>(most: i64) -> Option<Counterexample> {
+    let least = least_root::<R>();
+    let first = ((least / 2.0) as i64).max(2);
+    (first..=most).find_map(|n| {
+        // The root at the start of row `a` is `2n - 1 - 2a`.
+        let rows = ((2 * n - 1) as f64 - least) / 2.0;
+        (0..(rows.ceil() as i64 + 1).clamp(0, n - 1)).find_map(|row| {
+            let ends = [row_start(row, n), row_start(row + 1, n) - 1];
+            ends.into_iter().find_map(|k| wrong_by_rules::<R>(n, row, k))
+        })
+    })
+}
+
+/// The smallest root that can be off by more than one row, so by more than 2. Rounding to f32 adds an eighth at most
+/// where roots are below 2^21: a sixteenth under the root, and another one in the subtraction.
+fn least_root<R: Root>() -> f64 {
+    1.875 / R::worst_relative()
+}
+
+fn wrong_by_rules<R: Root>(n: i64, row: i64, k: i64) -> Option<Counterexample> {
+    let estimate = R::row(2 * n - 1, discriminant(k, n));
+    if estimate.abs_diff(row) < 2 {
+        return None;
+    }
+    let (given, right) = (Rules::pair(estimate, k, n), AsItIs::pair(row, k, n));
+    (given != right).then_some(Counterexample { n, k, given, right })
+}
+
+/// For how many whole numbers `1 <= x < below` the root without its fraction is not that of `x` (Avril's table 3).
+pub fn root_errors<R: SingleRoot>(below: u32) -> u64 {
+    let mut wrong = 0u64;
+    let mut root = 1u32;
+    while root * root < below {
+        let end = (root + 1).pow(2).min(below);
+        let differs = |x: u32| {
+            let found = R::root(x as i32 as f32);
+            u32::from(!((found >= root as f32) & (found < (root + 1) as f32)))
+        };
+        wrong += u64::from((root * root..end).map(differs).sum::<u32>());
+        root += 1;
+    }
+    wrong
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::{CARMACK, Double, Newton, Single, tally};
+    use super::*;
+
+    #[test]
+    fn a_counterexample_is_one() {
+        let found = counterexample::<Newton<CARMACK, 1>>(1000).expect("one step is off by two rows soon");
+        assert_ne!(found.given, found.right);
+        let estimate = Newton::<CARMACK, 1>::row(2 * found.n - 1, discriminant(found.k, found.n));
+        assert_eq!(Rules::pair(estimate, found.k, found.n), found.given);
+        assert_eq!(super::super::Integers::pair(estimate, found.k, found.n), found.right);
+        // Before it, rules mend everything.
+        for n in (2..found.n).step_by(31).chain([found.n - 1]) {
+            assert_eq!(tally::all::<Newton<CARMACK, 1>>(n)[1].wrong, 0, "n {n}");
+        }
+    }
+
+    #[test]
+    fn good_roots_have_none() {
+        assert_eq!(counterexample::<Double>(1 << 20), None);
+        assert_eq!(counterexample::<Single>(1 << 20), None);
+    }
+
+    #[test]
+    fn roots_of_whole_numbers_are_right_but_for_some() {
+        assert_eq!(root_errors::<Single>(10_000), 0);
+        let slow = (1..5000u32)
+            .filter(|&x| Newton::<CARMACK, 2>::root(x as f32) as u32 != f64::from(x).sqrt() as u32);
+        assert_eq!(root_errors::<Newton<CARMACK, 2>>(5000), slow.count() as u64);
+    }
+}

@@ -1,0 +1,128 @@
+//! Coordinates in fewer bits, for study: what a search's tests could read instead of f32, and the rounding that
+//! keeps them from missing a pair.
+
+mod round;
+mod search;
+
+pub use round::{FARTHEST, Scale, half_down, half_up, half_value};
+pub use search::{Candidates, Found};
+
+use pbig_core::Aabb;
+
+/// Boxes as a test reads them.
+pub trait Coordinates: Copy {
+    /// For tables.
+    const NAME: &'static str;
+    /// Whether it says of no two boxes that they may overlap which do not.
+    const EXACT: bool = false;
+
+    /// From a box without NaN whose extents are at most a cell.
+    fn of(aabb: &Aabb, scale: &Scale) -> Self;
+
+    /// Whether two boxes may overlap whose lower corners are in cells that touch.
+    fn may_overlap(self, other: Self) -> bool;
+}
+
+/// As they are.
+#[derive(Clone, Copy, Debug)]
+pub struct Exact([f32; 6]);
+
+impl Coordinates for Exact {
+    const NAME: &'static str = "f32";
+    const EXACT: bool = true;
+
+    #[inline(always)]
+    fn of(aabb: &Aabb, _: &Scale) -> Self {
+        let ([a, b, c], [d, e, f]) = (aabb.min, aabb.max);
+        Self([a, b, c, d, e, f])
+    }
+
+    #[inline(always)]
+    fn may_overlap(self, other: Self) -> bool {
+        let (a, b) = (self.0, other.0);
+        (a[0] <= b[3]) & (a[1] <= b[4]) & (a[2] <= b[5]) & (b[0] <= a[3]) & (b[1] <= a[4]) & (b[2] <= a[5])
+    }
+}
+
+/// 16-bit fixed point, [`FIXED_STEPS`] to a cell, eight cells before it wraps around. `OUTWARD`: maxima are rounded
+/// up; otherwise everything is rounded down, which is monotone and so misses nothing either.
+#[derive(Clone, Copy, Debug)]
+pub struct Fixed<const OUTWARD: bool>([u16; 6]);
+
+/// Differences that mean anything are less than three cells, and must be less than 2^15 steps.
+pub const FIXED_STEPS: u32 = 8192;
+
+impl<const OUTWARD: bool> Coordinates for Fixed<OUTWARD> {
+    const NAME: &'static str =
+        if OUTWARD { "16-bit fixed point, outward" } else { "16-bit fixed point, all down" };
+
+    #[inline(always)]
+    fn of(aabb: &Aabb, scale: &Scale) -> Self {
+        let low = |k: usize| scale.down(k, aabb.min[k], FIXED_STEPS) as u16;
+        let high = |k: usize| {
+            let x = aabb.max[k];
+            (if OUTWARD { scale.up(k, x, FIXED_STEPS) } else { scale.down(k, x, FIXED_STEPS) }) as u16
+        };
+        Self([low(0), low(1), low(2), high(0), high(1), high(2)])
+    }
+
+    #[inline(always)]
+    fn may_overlap(self, other: Self) -> bool {
+        let (a, b) = (self.0, other.0);
+        let reaches = |high: u16, low: u16| high.wrapping_sub(low) as i16 >= 0;
+        reaches(b[3], a[0])
+            & reaches(b[4], a[1])
+            & reaches(b[5], a[2])
+            & reaches(a[3], b[0])
+            & reaches(a[4], b[1])
+            & reaches(a[5], b[2])
+    }
+}
+
+/// f16 of the world's coordinates, as integers in the same order.
+#[derive(Clone, Copy, Debug)]
+pub struct Half([i16; 6]);
+
+impl Coordinates for Half {
+    const NAME: &'static str = "f16, outward";
+
+    #[inline(always)]
+    fn of(aabb: &Aabb, _: &Scale) -> Self {
+        let ([a, b, c], [d, e, f]) = (aabb.min.map(half_down), aabb.max.map(half_up));
+        Self([a, b, c, d, e, f])
+    }
+
+    #[inline(always)]
+    fn may_overlap(self, other: Self) -> bool {
+        let (a, b) = (self.0, other.0);
+        (a[0] <= b[3]) & (a[1] <= b[4]) & (a[2] <= b[5]) & (b[0] <= a[3]) & (b[1] <= a[4]) & (b[2] <= a[5])
+    }
+}
+
+/// As pbig's CPU tests them (`pbig-core/src/cpu/cells.rs`): six fields of ten bits, 64 steps to a cell, everything
+/// rounded down; one addition and one test for all six comparisons.
+#[derive(Clone, Copy, Debug)]
+pub struct Code(u64);
+
+/// Steps of a [`Code`] to a cell.
+pub const CODE_STEPS: u32 = 64;
+
+impl Coordinates for Code {
+    const NAME: &'static str = "64-bit code";
+
+    #[inline(always)]
+    fn of(aabb: &Aabb, scale: &Scale) -> Self {
+        let step = |k: usize, x: f32| scale.down(k, x, CODE_STEPS);
+        let field = |steps: i64, k: usize| (steps as u64 & 511) << (10 * k);
+        let low: u64 = (0..3).map(|k| field(-step(k, aabb.min[k]), k)).sum();
+        let high: u64 = (0..3).map(|k| field(step(k, aabb.max[k]), k)).sum();
+        Self(low | high << 32)
+    }
+
+    #[inline(always)]
+    fn may_overlap(self, other: Self) -> bool {
+        // The ninth bit of each difference `max - min`: set where that is below 0.
+        const APART: u64 = 0x1004_0100_1004_0100;
+        self.0.rotate_left(32).wrapping_add(other.0) & APART == 0
+    }
+}

@@ -1,0 +1,53 @@
+//! `pbig accuracy`: its shape, that its figures are finite, and that what must be right is; never how long it took.
+
+use super::{json, pbig};
+use serde_json::Value;
+use std::path::Path;
+
+fn rows<'a>(object: &'a Value, study: &str, table: &str) -> &'a Vec<Value> {
+    let rows = object["studies"][study]["tables"][table]["rows"].as_array();
+    rows.unwrap_or_else(|| panic!("{study} has no table {table}"))
+}
+
+fn files(folder: &Path) -> Vec<String> {
+    let names = std::fs::read_dir(folder).expect("the folder");
+    let mut names: Vec<String> =
+        names.map(|entry| entry.expect("an entry").file_name().to_string_lossy().into_owned()).collect();
+    names.sort_unstable();
+    names
+}
+
+#[test]
+fn a_quick_run_is_one_object_and_writes_what_it_is_asked_for() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let object = json(&pbig(folder.path(), &["accuracy", "--quick", "--json", "--plot", "charts"]));
+    assert_eq!(files(folder.path()), ["charts"], "no document");
+    assert_eq!(
+        files(&folder.path().join("charts")),
+        ["accuracy-coordinates.svg", "accuracy-index.svg"],
+        "a chart for each study"
+    );
+    for (name, study) in object["studies"].as_object().expect("studies") {
+        for point in study["points"].as_array().expect("points") {
+            assert!(
+                point["time"].as_f64() > Some(0.0) && point["error"].as_f64() >= Some(0.0),
+                "{name}: {point}"
+            );
+        }
+    }
+    for row in rows(&object, "index", "all_pairs").iter().filter(|row| row["correction"] == "integers") {
+        assert_eq!((&row["wrong"], &row["missed"]), (&Value::from(0), &Value::from(0)), "{row}");
+    }
+    let by_rules = |row: &&Value| row["root"] == "Carmack 1" && row["correction"] == "the paper's rules";
+    let wrong = rows(&object, "index", "all_pairs").iter().find(by_rules).map(|row| row["wrong"].as_u64());
+    assert!(wrong.flatten() > Some(0), "one step is more than the rules mend");
+    assert!(rows(&object, "coordinates", "tests").iter().all(|row| row["missed"] == 0));
+}
+
+#[test]
+fn one_study_alone_and_no_other_name() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let object = json(&pbig(folder.path(), &["accuracy", "--quick", "--json", "--only", "coordinates"]));
+    assert_eq!(object["studies"].as_object().map(serde_json::Map::len), Some(1));
+    super::refused(&pbig(folder.path(), &["accuracy", "--only", "nothing"]), &["nothing", "index"]);
+}

@@ -1,0 +1,120 @@
+//! Coordinates in fewer bits end no pair: whatever the floats, two boxes that overlap may overlap in every kind of
+//! coordinates of the study.
+
+use pbig_core::Aabb;
+use pbig_harness::precision::{Code, Coordinates, Exact, Fixed, Half, Scale, half_down, half_up, half_value};
+use proptest::prelude::*;
+
+/// Any float but NaN, every magnitude as likely: zeros, denormals and infinities too.
+fn float() -> impl Strategy<Value = f32> {
+    let special = prop::sample::select(vec![
+        0.0,
+        -0.0,
+        f32::MIN_POSITIVE,
+        f32::from_bits(1),
+        65_504.0,
+        65_520.0,
+        f32::MAX,
+        f32::INFINITY,
+    ]);
+    let special = (special, any::<bool>()).prop_map(|(x, negative)| if negative { -x } else { x });
+    let any = any::<u32>().prop_map(f32::from_bits).prop_filter("NaN", |x| !x.is_nan());
+    prop_oneof![4 => any, 1 => special]
+}
+
+fn sorted_box(corners: [[f32; 3]; 2]) -> Aabb {
+    let [a, b] = corners;
+    Aabb::new(std::array::from_fn(|k| a[k].min(b[k])), std::array::from_fn(|k| a[k].max(b[k])))
+}
+
+fn any_box() -> impl Strategy<Value = Aabb> {
+    prop::array::uniform2(prop::array::uniform3(float())).prop_map(sorted_box)
+}
+
+/// A cell of any size and an origin anywhere; a box near the origin or far from it whose extents are at most a cell, and
+/// one that begins where it does or ends, or somewhere near.
+fn near_boxes() -> impl Strategy<Value = (Scale, Aabb, Aabb)> {
+    let cell = (-30i32..30).prop_map(|power| 2f32.powi(power) * 1.1);
+    let far = || prop::array::uniform3((-1f32..1.0, 0i32..62).prop_map(|(x, power)| x * 2f32.powi(power)));
+    let place = (far(), prop::array::uniform3(-9f32..9.0), any::<bool>());
+    let parts = prop::array::uniform4(prop::array::uniform3(0f32..=1.0));
+    (cell, place, parts).prop_map(|(cell, (origin, place, beside), [a, b, c, touch])| {
+        let origin = origin.map(|x| x * cell);
+        let low: [f32; 3] = std::array::from_fn(|k| place[k] * cell + if beside { origin[k] } else { 0.0 });
+        let scale = Scale { origin, cell };
+        let first = small(low, a, cell);
+        let begin = std::array::from_fn(|k| match touch[k] {
+            t if t < 0.3 => first.max[k],
+            t if t < 0.4 => first.min[k],
+            _ => first.min[k] + (b[k] - 0.5) * cell,
+        });
+        (scale, first, small(begin, c, cell))
+    })
+}
+
+/// From a corner, extents of parts of a cell: less by rounding, where floats are coarse.
+fn small(low: [f32; 3], parts: [f32; 3], cell: f32) -> Aabb {
+    let fits = |low: f32, high: f32| f64::from(high) - f64::from(low) <= f64::from(cell);
+    let high = |k: usize| Some(low[k] + parts[k] * cell).filter(|high| fits(low[k], *high)).unwrap_or(low[k]);
+    Aabb::new(low, std::array::from_fn(high))
+}
+
+fn may_overlap<C: Coordinates>(scale: &Scale, a: &Aabb, b: &Aabb) -> bool {
+    let (a, b) = (C::of(a, scale), C::of(b, scale));
+    let (there, back) = (a.may_overlap(b), b.may_overlap(a));
+    assert_eq!(there, back, "{}", C::NAME);
+    there
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 100_000, ..ProptestConfig::default() })]
+
+    /// Outward, and in the order of the floats.
+    #[test]
+    fn f16_is_rounded_outward_over_all_floats(x in float(), y in float()) {
+        prop_assert!(half_value(half_down(x)) <= x && x <= half_value(half_up(x)));
+        if x <= y {
+            prop_assert!(half_down(x) <= half_down(y) && half_up(x) <= half_up(y) && half_down(x) <= half_up(y));
+        }
+    }
+
+    #[test]
+    fn f16_ends_no_pair_of_any_boxes(a in any_box(), b in any_box()) {
+        let scale = Scale { origin: [0.0; 3], cell: 1.0 };
+        prop_assert_eq!(may_overlap::<Exact>(&scale, &a, &b), a.overlaps(&b));
+        prop_assert!(!a.overlaps(&b) || may_overlap::<Half>(&scale, &a, &b));
+    }
+
+    #[test]
+    fn steps_keep_the_order_of_all_floats(x in float(), y in float(), cell in (-30i32..30), steps in 1u32..9000) {
+        let scale = Scale { origin: [-7.3; 3], cell: 2f32.powi(cell) };
+        prop_assert!(scale.down(0, x, steps) <= scale.up(0, x, steps));
+        if x <= y {
+            prop_assert!(scale.down(0, x, steps) <= scale.down(0, y, steps));
+            prop_assert!(scale.up(0, x, steps) <= scale.up(0, y, steps));
+        }
+    }
+
+    /// At any distance, also where steps are finer than floats.
+    #[test]
+    fn fixed_point_and_codes_end_no_pair_of_boxes_within_cells((scale, a, b) in near_boxes()) {
+        let overlap = a.overlaps(&b);
+        prop_assert!(!overlap || may_overlap::<Fixed<true>>(&scale, &a, &b));
+        prop_assert!(!overlap || may_overlap::<Fixed<false>>(&scale, &a, &b));
+        prop_assert!(!overlap || may_overlap::<Code>(&scale, &a, &b));
+    }
+}
+
+/// Boxes that are a step or so apart, which rounding may join, and more, which it may not: or a test that lets
+/// everything through would pass.
+#[test]
+fn boxes_that_are_apart_are_told_apart() {
+    let scale = Scale { origin: [0.0; 3], cell: 1.0 };
+    let a = Aabb::new([5.0; 3], [5.5; 3]);
+    for (gap, axis) in [0.25f32, 1.0].into_iter().flat_map(|gap| (0..3).map(move |axis| (gap, axis))) {
+        let mut b = a;
+        (b.min[axis], b.max[axis]) = (5.5 + gap, 6.0 + gap);
+        assert!(!may_overlap::<Fixed<true>>(&scale, &a, &b) && !may_overlap::<Fixed<false>>(&scale, &a, &b));
+        assert!(!may_overlap::<Half>(&scale, &a, &b) && !may_overlap::<Code>(&scale, &a, &b));
+    }
+}
