@@ -12,14 +12,15 @@ pub(super) struct Device {
     gpu: Option<GpuFinder>,
     /// Why there is none.
     missing: String,
+    quick: bool,
 }
 
 impl Device {
     /// The best adapter, or that of `WGPU_ADAPTER_NAME`.
-    pub(super) fn best() -> Self {
+    pub(super) fn best(quick: bool) -> Self {
         match GpuFinder::new() {
-            Ok(gpu) => Self { gpu: Some(gpu), missing: String::new() },
-            Err(error) => Self { gpu: None, missing: error.to_string() },
+            Ok(gpu) => Self { gpu: Some(gpu), missing: String::new(), quick },
+            Err(error) => Self { gpu: None, missing: error.to_string(), quick },
         }
     }
 
@@ -52,8 +53,8 @@ impl Device {
 
     /// The device for a set of so many boxes: a program that plays one takes minutes for millions.
     pub(super) fn for_boxes(&self, boxes: usize) -> Option<&GpuFinder> {
-        const MOST_IN_SOFTWARE: usize = 100_000;
-        self.gpu.as_ref().filter(|gpu| !gpu.is_software() || boxes <= MOST_IN_SOFTWARE)
+        let most_in_software = if self.quick { 10_000 } else { 100_000 };
+        self.gpu.as_ref().filter(|gpu| !gpu.is_software() || boxes <= most_in_software)
     }
 
     /// Median milliseconds and the last report of each setting, in turn on the same moving boxes; nothing
@@ -67,9 +68,9 @@ impl Device {
         let Some(gpu) = self.for_boxes(boxes.len()) else { return Ok(vec![]) };
         let frames = [moved(boxes, distance, 2), boxes.to_vec()];
         let mut finders = Finders::new(configs.iter().copied(), Some(gpu), frames);
-        // The first calls compile, allocate and learn.
-        let rounds = if self.is_software() { 3 } else { 7 };
-        let times = finders.times(Effort { warm_up: 3, rounds, budget: Duration::from_secs(10) })?;
+        // The first calls compile, allocate and learn. Times in software mean nothing, so few will do.
+        let (warm_up, rounds) = if self.is_software() { (2, 2) } else { (3, 7) };
+        let times = finders.times(Effort { warm_up, rounds, budget: Duration::from_secs(10) })?;
         finders.pairs()?;
         Ok(times.into_iter().zip(finders.all.iter().map(|finder| finder.report().clone())).collect())
     }

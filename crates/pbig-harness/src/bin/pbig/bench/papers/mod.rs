@@ -104,7 +104,7 @@ const PARTS: [Part; 8] = [
 ];
 
 pub(super) fn run(args: &Args) -> Result<(), Failure> {
-    let (scale, device, machine) = (Scale::new(args.quick), Device::best(), Machine::here());
+    let (scale, device, machine) = (Scale::new(args.quick), Device::best(args.quick), Machine::here());
     let bar = progress(PARTS.len(), "tables");
     let mut sheets = Vec::new();
     for part in PARTS {
