@@ -4,13 +4,14 @@ use super::cells::{Alpha, config_for, expected_checks};
 use super::density::fitting;
 use super::printed::{Coverage, DOC_MS, INPUT_MB, MOST_BOXES, SEGMENT, TABLE_III, WARP};
 use super::sheet::{Sheet, short};
-use super::{Scale, UNSORTED, chart, effort, once};
+use super::{Once, Scale, UNSORTED, chart, effort, once};
 use crate::bench::finders::Finders;
 use crate::bench::papers::model::Model;
 use crate::output::Failure;
+use pbig_core::Aabb;
 use pbig_harness::boxes::moved;
 use pbig_harness::chart::Line;
-use serde_json::json;
+use serde_json::{Value, json};
 
 /// The cell length of a row: as printed, or by the paper's rule where it is not.
 fn cell(row: &Coverage, model: &Model) -> f64 {
@@ -60,6 +61,20 @@ pub(super) fn rule() -> Sheet {
 /// The table itself, counted.
 pub(super) fn table(scale: &Scale) -> Result<Sheet, Failure> {
     let n = scale.most_boxes;
+    let mut sheet = empty_table(n);
+    let mut lines = [line("our grid, CPU"), line("PBIG's grid, CPU, one thread")];
+    for row in &TABLE_III {
+        let model = fitting(n, row.doc);
+        let (pairs, ms, pbig) = search(row, model.boxes(n, 1))?;
+        lines.iter_mut().zip([ms, pbig.ms]).for_each(|(line, ms)| line.points.push((row.doc, ms)));
+        let (off, checks) = (model.off(n, pairs), pbig.checks);
+        let counts = json!([row.doc, row.pairs, pairs, off, row.checks, checks.made, checks.unnecessary]);
+        sheet.row(joined(counts, json!([checks.redundant, format!("< {DOC_MS}"), ms, pbig.ms])));
+    }
+    Ok(sheet.chart(chart("density", "PBIG figure 10: density", "DoC", lines)))
+}
+
+fn empty_table(n: usize) -> Sheet {
     let columns = [
         "DoC",
         "pairs printed (N = 10^7)",
@@ -73,8 +88,7 @@ pub(super) fn table(scale: &Scale) -> Result<Sheet, Failure> {
         "ms, our grid, CPU",
         "ms, PBIG's grid, CPU, one thread",
     ];
-    let (mut ours, mut theirs) = (line("our grid, CPU"), line("PBIG's grid, CPU, one thread"));
-    let mut sheet = Sheet::new("PBIG table III and figure 10: density", &columns)
+    Sheet::new("PBIG table III and figure 10: density", &columns)
         .about(format!(
             "N = {n} boxes, lower corners uniform in the paper's space, lengths uniform from 0 to the edge by equation 11 \
              rounded up. Cells: the length above, times the cube root of 10^7 / N. Figure 10 has no printed numbers; the text says \
@@ -83,43 +97,25 @@ pub(super) fn table(scale: &Scale) -> Result<Sheet, Failure> {
         .about(
             "Our grid has one entry a box and makes none of these checks; PBIG's grid on the CPU is `Strategy::Pbig`, plain, to \
              compare counts. Its time is of one call that also allocates.",
-        );
-    for row in &TABLE_III {
-        let model = fitting(n, row.doc);
-        let boxes = model.boxes(n, 1);
-        let pbig = once(
-            config_for(
-                &boxes,
-                cell(row, &fitting(MOST_BOXES, row.doc)) * (MOST_BOXES as f64 / n as f64).cbrt(),
-            ),
-            &boxes,
-        )?;
-        let mut finders = Finders::new([UNSORTED], None, [moved(&boxes, 1.0, 2), boxes]);
-        let ms = finders.times(effort(n))?[0];
-        let pairs = finders.pairs()?;
-        if pairs != pbig.pairs {
-            return Err(Failure::Check(format!(
-                "DoC {}: {pairs} pairs, by PBIG's grid {}",
-                row.doc, pbig.pairs
-            )));
-        }
-        ours.points.push((row.doc, ms));
-        theirs.points.push((row.doc, pbig.ms));
-        sheet.row(json!([
-            row.doc,
-            row.pairs,
-            pairs,
-            model.off(n, pairs),
-            row.checks,
-            pbig.checks.made,
-            pbig.checks.unnecessary,
-            pbig.checks.redundant,
-            format!("< {DOC_MS}"),
-            ms,
-            pbig.ms,
-        ]));
+        )
+}
+
+/// Pairs and milliseconds of our grid, and what PBIG's did in cells that hold as much as the row's.
+fn search(row: &Coverage, boxes: Vec<Aabb>) -> Result<(u64, f64, Once), Failure> {
+    let scale = (MOST_BOXES as f64 / boxes.len() as f64).cbrt();
+    let cell = scale * cell(row, &fitting(MOST_BOXES, row.doc));
+    let (pbig, effort) = (once(config_for(&boxes, cell), &boxes)?, effort(boxes.len()));
+    let mut finders = Finders::new([UNSORTED], None, [moved(&boxes, 1.0, 2), boxes]);
+    let (ms, pairs) = (finders.times(effort)?[0], finders.pairs()?);
+    if pairs == pbig.pairs {
+        return Ok((pairs, ms, pbig));
     }
-    Ok(sheet.chart(chart("density", "PBIG figure 10: density", "DoC", [ours, theirs])))
+    Err(Failure::Check(format!("DoC {}: {pairs} pairs, by PBIG's grid {}", row.doc, pbig.pairs)))
+}
+
+/// One row of both parts.
+fn joined(first: Value, rest: Value) -> Value {
+    [first, rest].into_iter().flat_map(|part| part.as_array().cloned().unwrap_or_default()).collect()
 }
 
 fn line(name: &str) -> Line {

@@ -71,7 +71,7 @@ impl Model {
         0.5 * n * (n - 1.0) * self.chance().0
     }
 
-    /// Standard deviation of the pairs: they come and go one by one, and with the sizes of all boxes. (The
+    /// Standard deviation of the pairs: they come and go one by one, and with sizes and places of all boxes. (The
     /// variance of a U-statistic; `n` boxes with `k` pairs add `4 k^2 / n` times the relative variance of
     /// a box's own chance.)
     pub(super) fn deviation(&self, n: usize) -> f64 {
@@ -84,8 +84,8 @@ impl Model {
         (count as f64 - self.pairs(n)) / self.deviation(n)
     }
 
-    /// The chance that two boxes overlap, and the relative variance over one box's sizes of its chance to
-    /// overlap another.
+    /// The chance that two boxes overlap, and the relative variance over one box's sizes and places of its
+    /// chance to overlap another.
     fn chance(&self) -> (f64, f64) {
         let alike = if self.edges.cubes { 3 } else { 1 };
         let of_one = |e: f64| self.edges.average(|f| self.on_axis(e, f).powi(alike));
@@ -94,11 +94,15 @@ impl Model {
         (first.powi(axes), (second / first.powi(2)).powi(axes) * self.crowding().powi(3) - 1.0)
     }
 
-    /// Mean square of the density along an axis, as a box meets it, over the square of its mean: 1 where
-    /// boxes lie evenly (the border left out), for a normal one `2 / sqrt(3)` whatever its deviation.
+    /// Along an axis the mean square of a box's chance to meet another, by where it lies, over the square of
+    /// its mean. Normal: `2 / sqrt(3)` whatever the deviation. Even, with mean length `t` of the space: 1 but for
+    /// boxes near the border, which have fewer around them; `4 t^2 (1 - 5 t / 6)` over `4 t^2 (1 - t / 2)^2`.
     fn crowding(&self) -> f64 {
         match self.space {
-            Space::Even(_) => 1.0,
+            Space::Even(length) => {
+                let t = (self.edges.mean() / length).min(0.5);
+                (1.0 - 5.0 * t / 6.0) / (1.0 - 0.5 * t).powi(2)
+            }
             Space::Normal(_) => 2.0 / 3f64.sqrt(),
         }
     }
