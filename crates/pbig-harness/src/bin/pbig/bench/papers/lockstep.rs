@@ -13,7 +13,8 @@ pub(super) enum Rows {
 /// Equation 7: matrix elements of row `i` of `m x n`, `i` counted from 0 by the caller.
 pub(super) fn equation_7(i: u64, m: u64, n: u64, rows: Rows) -> u64 {
     let i = if rows == Rows::FromOne { i + 1 } else { i };
-    let half = if i <= m.div_ceil(2) { (m + 1).div_ceil(2) } else { (m + 1) / 2 };
+    // (m + 1) / 2 rounded down is m / 2 rounded up.
+    let half = if i <= m.div_ceil(2) { (m + 1).div_ceil(2) } else { m.div_ceil(2) };
     n - m + half
 }
 
