@@ -53,7 +53,7 @@ impl Device {
 
     /// The device for a set of so many boxes: a program that plays one takes minutes for millions.
     pub(super) fn for_boxes(&self, boxes: usize) -> Option<&GpuFinder> {
-        let most_in_software = if self.quick { 10_000 } else { 100_000 };
+        let most_in_software = if self.quick { 10_000 } else { 50_000 };
         self.gpu.as_ref().filter(|gpu| !gpu.is_software() || boxes <= most_in_software)
     }
 

@@ -174,7 +174,7 @@ pub(super) fn gaussian(scale: &Scale, device: &Device) -> Result<Sheet, Failure>
 }
 
 /// Most checks of a row that is run: about ten seconds on one thread.
-const MOST_CHECKS: f64 = 3e9;
+const MOST_CHECKS: f64 = 1e9;
 
 pub(super) fn cells(scale: &Scale) -> Result<Sheet, Failure> {
     let columns = [

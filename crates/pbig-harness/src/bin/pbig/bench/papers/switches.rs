@@ -173,7 +173,7 @@ fn settings() -> [(String, Config); 7] {
 
 /// The counterpart on the CPU: which cells, which mapping, which entries.
 pub(super) fn on_cpu(scale: &Scale) -> Result<Sheet, Failure> {
-    let n = if scale.quick { 20_000 } else { 1_000_000 };
+    let n = if scale.quick { 20_000 } else { 300_000 };
     let columns = [
         "setting",
         "ms",
