@@ -1,6 +1,6 @@
 //! `pbig bench`: each suite's shape, and that its figures are finite; never how large they are.
 
-use super::{json, pbig};
+use super::{json, pbig, pbig_without_gpu};
 use serde_json::Value;
 
 /// One object, in which every row has what it is about, ours, and a finite ratio where there is another side;
@@ -71,4 +71,27 @@ fn bench_stages_has_the_time_of_each_stage() {
     }
     let of_stages = |row: &Value| row["stages_ms"].as_object().map(serde_json::Map::len);
     assert!(rows.iter().all(|row| of_stages(row) > Some(2)), "{rows:?}");
+}
+
+#[test]
+fn bench_papers_has_every_table_and_says_that_there_is_no_gpu() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let object = json(&pbig_without_gpu(folder.path(), &["bench", "papers", "--quick", "--json"]));
+    assert_eq!(std::fs::read_dir(folder.path()).expect("the folder").count(), 0);
+    assert!(object["suite"] == "papers" && object["adapter"].is_null());
+    let tables = object["tables"].as_array().expect("tables");
+    let title = |word: &str| tables.iter().filter(|table| table["title"].to_string().contains(word)).count();
+    for name in
+        ["PBIG figure 8", "figure 9", "figure 10", "figure 11", "table III", "table IV", "tables V and VI"]
+    {
+        assert!(title(name) > 0, "{name}");
+    }
+    for name in ["figure 3", "figure 4", "figure 5", "figure 6", "table 2", "table 5", "table 6", "table 7"] {
+        assert!(title(name) > 0, "Avril {name}");
+    }
+    let counted = tables
+        .iter()
+        .flat_map(|table| table["rows"].as_array().expect("rows"))
+        .filter(|row| row["pairs"].as_u64() > Some(0));
+    assert!(counted.count() > 20);
 }

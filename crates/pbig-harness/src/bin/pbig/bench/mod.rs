@@ -1,9 +1,11 @@
 //! `pbig bench SUITE`: each row has ours and the other side, in turn in one run, and what is wanted.
 
+mod finders;
 mod gpu;
 pub(crate) mod machine;
 pub(crate) mod measure;
 pub(crate) mod memory;
+mod papers;
 mod peers;
 mod stages;
 mod step;
@@ -45,6 +47,8 @@ enum Suite {
     Peers,
     /// Every scene at every size, stock beside ours in each step.
     Step,
+    /// The experiments of PBIG's and Avril's papers, the printed figures beside ours.
+    Papers,
     /// The GPU pipeline: upload, each kernel, readback, decode, whole call.
     Gpu,
 }
@@ -64,6 +68,7 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
         Suite::Update => report("update", update::run(quick)?, args),
         Suite::Peers => report("peers", peers::run(quick)?, args),
         Suite::Step => report("step", step::run(quick)?, args),
+        Suite::Papers => papers::run(args),
         Suite::Gpu => gpu::run(args),
     }
 }

@@ -5,7 +5,7 @@ use super::measure::{Contest, Effort, medians, timed};
 use super::table::Row;
 use super::ways;
 use crate::output::{Failure, progress};
-use pbig_core::{BroadPhase, Config, Error, Finder, Limits, Order, ProxyFilter, StageTimes};
+use pbig_core::{Aabb, BroadPhase, Config, Error, Finder, Limits, Order, ProxyFilter, StageTimes};
 use pbig_harness::boxes::{Wander, cubes};
 use pbig_harness::chart::{Line, LogLog};
 use pbig_harness::runner::{Spread, milliseconds};
@@ -16,9 +16,9 @@ const DISTANCE: f32 = 0.1;
 const CONFIG: Config = Config { limits: Limits::UNLIMITED, order: Order::Unspecified, ..Config::DEFAULT };
 
 /// Ours: the whole call, `set` (incremental only), and the stages of the report.
-const NAMES: [&str; 7] = ["whole", "set", "plan", "map", "check", "emit", "diff"];
+pub(super) const NAMES: [&str; 7] = ["whole", "set", "plan", "map", "check", "emit", "diff"];
 
-type Times = [f64; NAMES.len()];
+pub(super) type Times = [f64; NAMES.len()];
 
 /// From nothing in each round, or events for what has moved.
 enum Way {
@@ -26,7 +26,8 @@ enum Way {
     Events(Box<BroadPhase>),
 }
 
-struct Alone {
+/// Ours with nothing beside it.
+pub(super) struct Alone {
     way: Way,
     wander: Wander,
     moved: Vec<u32>,
@@ -34,6 +35,34 @@ struct Alone {
 }
 
 impl Alone {
+    /// From nothing in each round, a share moved by up to `distance`.
+    pub(super) fn scratch(boxes: Vec<Aabb>, share: f64, distance: f32) -> Self {
+        Self::new(Way::Scratch(Box::new(Finder::new(CONFIG))), boxes, share, distance)
+    }
+
+    /// Events of such moves.
+    pub(super) fn events(boxes: Vec<Aabb>, share: f64, distance: f32) -> Result<Self, Failure> {
+        let broad_phase = BroadPhase::new(CONFIG).map_err(|error| Failure::Input(error.to_string()))?;
+        Ok(Self::new(Way::Events(Box::new(broad_phase)), boxes, share, distance))
+    }
+
+    fn new(way: Way, boxes: Vec<Aabb>, share: f64, distance: f32) -> Self {
+        let moved = (0..boxes.len() as u32).collect();
+        Self { way, wander: Wander::new(boxes, share, distance), moved, times: vec![] }
+    }
+
+    /// Medians of whole call and stages, and the pairs.
+    pub(super) fn measure(mut self, effort: Effort) -> Result<(Times, u64), Failure> {
+        medians(&mut self, effort)?;
+        let times = &self.times[effort.warm_up..];
+        let median = |k: usize| Spread::of(times.iter().map(|times| times[k])).median;
+        let pairs = match &self.way {
+            Way::Scratch(finder) => finder.pairs().len(),
+            Way::Events(broad_phase) => broad_phase.pair_count(),
+        };
+        Ok((std::array::from_fn(median), pairs as u64))
+    }
+
     fn find(&mut self) -> Result<Times, Error> {
         let Self { way, wander, moved, .. } = self;
         let boxes = &wander.boxes;
@@ -79,20 +108,6 @@ impl Contest for Alone {
         self.times.push(times);
         Ok(times[0])
     }
-}
-
-/// Medians of whole call and stages, and the pairs.
-fn measure(way: Way, wander: Wander, effort: Effort) -> Result<(Times, u64), Failure> {
-    let moved = (0..wander.boxes.len() as u32).collect();
-    let mut alone = Alone { way, wander, moved, times: vec![] };
-    medians(&mut alone, effort)?;
-    let times = &alone.times[effort.warm_up..];
-    let median = |k: usize| Spread::of(times.iter().map(|times| times[k])).median;
-    let pairs = match &alone.way {
-        Way::Scratch(finder) => finder.pairs().len(),
-        Way::Events(broad_phase) => broad_phase.pair_count(),
-    };
-    Ok((std::array::from_fn(median), pairs as u64))
 }
 
 /// What is varied, and the boxes at each value.
@@ -158,14 +173,13 @@ pub(super) fn run(quick: bool) -> Result<Outcome, Failure> {
 }
 
 fn at(sweep: &Sweep, point: &Point, effort: Effort) -> Result<(Times, u64), Failure> {
-    let way = if sweep.scratch {
-        Way::Scratch(Box::new(Finder::new(CONFIG)))
-    } else {
-        let broad_phase = BroadPhase::new(CONFIG).map_err(|error| Failure::Input(error.to_string()))?;
-        Way::Events(Box::new(broad_phase))
-    };
     let boxes = cubes(point.boxes, point.spread as f32, point.pairs as f32, 1);
-    measure(way, Wander::new(boxes, point.share, DISTANCE), effort)
+    let alone = if sweep.scratch {
+        Alone::scratch(boxes, point.share, DISTANCE)
+    } else {
+        Alone::events(boxes, point.share, DISTANCE)?
+    };
+    alone.measure(effort)
 }
 
 fn what(sweep: &Sweep) -> &'static str {

@@ -1,0 +1,153 @@
+//! Avril's table 2 and the times of table 4: from the index of a pair to the pair, with a root and without.
+
+use super::Scale;
+use super::device::{Device, kernels, on_gpu};
+use super::printed::{AVRIL_2, AVRIL_4, AVRIL_LAZY_ON_CPU};
+use super::sheet::{Sheet, short};
+use crate::bench::measure::timed;
+use crate::output::Failure;
+use pbig_core::pair_index::{pair_count, pair_of};
+use pbig_core::{Aabb, GpuOptions};
+use pbig_harness::boxes::cubes;
+use serde_json::json;
+use std::ops::Range;
+
+/// Ids looked at in one measurement; where there are more, stretches of them, spread evenly.
+const MOST_IDS: u64 = 100_000_000;
+
+/// Stretches of `0..ids` of at most [`MOST_IDS`] in all, and how many times as many there are.
+fn stretches(ids: u64, most: u64) -> (Vec<Range<u64>>, f64) {
+    const STRETCHES: u64 = 1000;
+    if ids <= most {
+        return (std::iter::once(0..ids).collect(), 1.0);
+    }
+    let length = most / STRETCHES;
+    let begin = |i: u64| i * (ids - length) / (STRETCHES - 1);
+    let all = (0..STRETCHES).map(|i| begin(i)..begin(i) + length).collect();
+    (all, ids as f64 / (STRETCHES * length) as f64)
+}
+
+/// Ids of the lazy way: the pairs `(a, b)` are `(k / n, k % n)` where that is above the diagonal (Avril
+/// 3.2.2), so `n^2 - n` of them.
+fn lazy_ids(n: u64) -> u64 {
+    n * n - n
+}
+
+fn lazy_pair(k: u64, n: u64) -> Option<(u64, u64)> {
+    let (a, b) = (k / n, k % n);
+    (a < b).then_some((a, b))
+}
+
+/// Overlapping pairs among the ids.
+fn overlaps(boxes: &[Aabb], ids: &[Range<u64>], pair: impl Fn(u64) -> Option<(u64, u64)>) -> u64 {
+    let hit = |(a, b): (u64, u64)| boxes[a as usize].overlaps(&boxes[b as usize]);
+    ids.iter().flat_map(Range::clone).filter_map(pair).filter(|&pair| hit(pair)).count() as u64
+}
+
+/// Table 2 on one thread of the CPU.
+pub(super) fn lazy(scale: &Scale) -> Result<Sheet, Failure> {
+    let columns = [
+        "objects",
+        "ms printed, root",
+        "ms printed, lazy",
+        "lazy / root printed",
+        "ms, root",
+        "ms, lazy",
+        "lazy / root",
+        "pairs",
+        "ids looked at",
+    ];
+    let (seconds, times) = AVRIL_LAZY_ON_CPU;
+    let mut sheet = Sheet::new("Avril table 2: the lazy way, CPU", &columns)
+        .about(format!(
+            "One thread, each pair tested. Printed: the GPU; on their CPU the lazy way is {times} times as fast, {seconds} s for 10,000 \
+             objects. Here the root is in f64 with the exact correction, the lazy way two divisions. The more ids there are than {}, \
+             the larger the part that is extrapolated from stretches spread over all.",
+            short(MOST_IDS as f64)
+        ))
+        .about("No more is known of the objects; here they are cubes with a pair each. The test costs the same.");
+    let most = if scale.quick { MOST_IDS / 10 } else { MOST_IDS };
+    for (n, root, lazy) in AVRIL_2 {
+        let boxes = cubes(n as usize, 1.0, 1.0, 1);
+        let (by_root, times) = stretches(pair_count(n), most);
+        let (found, root_ms) = timed(|| overlaps(&boxes, &by_root, |k| Some(pair_of(k, n))));
+        let (by_lazy, lazy_times) = stretches(lazy_ids(n), most);
+        let (also, lazy_ms) = timed(|| overlaps(&boxes, &by_lazy, |k| lazy_pair(k, n)));
+        let whole = times == 1.0 && lazy_times == 1.0;
+        if whole && found != also {
+            return Err(Failure::Check(format!(
+                "{n} objects: {found} pairs by root, {also} by the lazy way"
+            )));
+        }
+        let (root_ms, lazy_ms) = (root_ms * times, lazy_ms * lazy_times);
+        let ids = if whole {
+            "all".into()
+        } else {
+            format!("{} %, {} %", short(100.0 / times), short(100.0 / lazy_times))
+        };
+        let pairs = whole.then_some(found);
+        sheet.row(json!([n, root, lazy, lazy / root, root_ms, lazy_ms, lazy_ms / root_ms, pairs, ids]));
+    }
+    Ok(sheet)
+}
+
+/// What `GpuOptions::root` can be, in words.
+const ROOTS: [(u32, &str); 6] = [
+    (0, "the device's square root"),
+    (2, "Carmack, 2 steps"),
+    (3, "Carmack, 3 steps"),
+    (6, "Lomont, 2 steps"),
+    (7, "Lomont, 3 steps"),
+    (9, "no root: bisection"),
+];
+
+/// The same on a device, with the roots of table 4.
+pub(super) fn roots(device: &Device) -> Result<Sheet, Failure> {
+    const OBJECTS: usize = 1000;
+    let columns = ["root", "ms of the kernel `check_all`", "times as long as the first", "pairs"];
+    let mut sheet = Sheet::new("Avril tables 2 and 4: roots, GPU", &columns)
+        .about(format!(
+            "{OBJECTS} objects, every pair tested by `check_all`. Printed for 1000: {} ms with the root and {} without; table 4 has {} of CUDA's \
+             roots in {} ms and 12.6 to 14.7 % less with Carmack's or Lomont's. Here integers correct each, so all are exact, and the \
+             root is a small part of a kernel that tests boxes. {}",
+            AVRIL_2[0].1,
+            AVRIL_2[0].2,
+            short(AVRIL_4.0 as f64),
+            AVRIL_4.1,
+            device.about()
+        ))
+        .about("How exact each is without the integers: `pbig accuracy`.");
+    let configs = ROOTS.map(|(root, _)| on_gpu(GpuOptions { root, ..GpuOptions::DEFAULT }));
+    let runs = device.run(&configs, &cubes(OBJECTS, 1.0, 1.0, 1), 0.1)?;
+    let times: Vec<Option<f64>> =
+        runs.iter().map(|(_, report)| kernels(report, |name| name == "check_all")).collect();
+    for ((_, name), (ms, (_, report))) in ROOTS.iter().zip(times.iter().zip(&runs)) {
+        let ratio = times[0].zip(*ms).map(|(first, ms)| ms / first);
+        sheet.row(json!([name, ms, ratio, report.pairs]));
+    }
+    Ok(sheet)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use pbig_core::oracle;
+
+    #[test]
+    fn both_ways_find_the_pairs_of_brute_force() {
+        let n = 300;
+        let boxes = cubes(n as usize, 1.0, 3.0, 1);
+        let pairs = oracle::pairs(&boxes).len() as u64;
+        let (by_root, by_lazy) = (0..pair_count(n), 0..lazy_ids(n));
+        assert_eq!(overlaps(&boxes, &[by_root], |k| Some(pair_of(k, n))), pairs);
+        assert_eq!(overlaps(&boxes, &[by_lazy], |k| lazy_pair(k, n)), pairs);
+    }
+
+    #[test]
+    fn stretches_are_spread_over_all_and_know_their_share() {
+        let all = 0..10;
+        assert_eq!(stretches(10, 100), (vec![all], 1.0));
+        let (some, times) = stretches(1_000_000, 10_000);
+        assert_eq!((some[0].clone(), some[999].clone(), times), (0..10, 999_990..1_000_000, 100.0));
+    }
+}

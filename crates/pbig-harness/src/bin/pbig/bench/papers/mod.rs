@@ -1,0 +1,156 @@
+//! `pbig bench papers`: the experiments of PBIG's and Avril's papers, the printed figures beside ours.
+//!
+//! What is printed is in `printed`, each number with its place. Counts compare as numbers; times are of other
+//! machines and stand beside ours to show how they grow.
+
+mod avril;
+mod cells;
+mod claims;
+mod coverage;
+mod density;
+mod device;
+mod lockstep;
+mod mapping;
+mod model;
+mod numbers;
+mod printed;
+mod sheet;
+mod switches;
+
+use super::machine::{Machine, slug};
+use super::measure::{Effort, timed};
+use super::{Args, DOCUMENTS, keep, save};
+use crate::output::{Failure, print, progress};
+use device::Device;
+use pbig_core::{Aabb, Checks, Config, Finder, Limits, Order};
+use pbig_harness::chart::{Line, LogLog};
+use serde_json::{Value, json};
+use sheet::Sheet;
+use std::path::Path;
+use std::time::Duration;
+
+/// Unlimited and in no order, as the papers' programs.
+const UNSORTED: Config = Config { limits: Limits::UNLIMITED, order: Order::Unspecified, ..Config::DEFAULT };
+
+/// How far the experiments go.
+struct Scale {
+    quick: bool,
+    /// Boxes of the experiment on readings of DoC.
+    experiment: &'static [usize],
+    /// Boxes where the papers have most.
+    most_boxes: usize,
+    /// Boxes of figures 8, 9 and 11 of PBIG.
+    numbers: &'static [usize],
+}
+
+impl Scale {
+    fn new(quick: bool) -> Self {
+        if quick {
+            Self { quick, experiment: &[10_000], most_boxes: 100_000, numbers: &[1000, 10_000, 100_000] }
+        } else {
+            let numbers = &[1000, 10_000, 100_000, 1_000_000, printed::MOST_BOXES];
+            Self { quick, experiment: &[100_000, 1_000_000], most_boxes: printed::MOST_BOXES, numbers }
+        }
+    }
+}
+
+/// Rounds for so many boxes: a median where a call is short, the least where it takes seconds.
+fn effort(boxes: usize) -> Effort {
+    let (warm_up, rounds) = if boxes > 200_000 { (1, 3) } else { (3, 15) };
+    Effort { warm_up, rounds, budget: Duration::from_secs(5) }
+}
+
+/// What one call from nothing gave, and its time.
+struct Once {
+    pairs: u64,
+    checks: Checks,
+    ms: f64,
+    /// The length of PBIG's cells, where it has them.
+    cell: Option<f32>,
+}
+
+fn once(config: Config, boxes: &[Aabb]) -> Result<Once, Failure> {
+    let mut finder = Finder::new(config);
+    let (found, ms) = timed(|| finder.find(boxes).map(<[_]>::len));
+    let pairs = found.map_err(|error| Failure::Input(error.to_string()))? as u64;
+    let report = finder.report();
+    Ok(Once { pairs, checks: report.checks, ms, cell: report.plan.pbig.map(|plan| plan.cell) })
+}
+
+fn chart(name: &str, title: &str, x: &'static str, lines: impl Into<Vec<Line>>) -> LogLog {
+    LogLog { name: format!("papers-{name}"), title: title.into(), x, y: "ms", lines: lines.into() }
+}
+
+type Part = fn(&Scale, &Device) -> Result<Vec<Sheet>, Failure>;
+
+/// In the order of the document.
+const PARTS: [Part; 8] = [
+    |scale, _| {
+        let (cells, table) = (coverage::rule(), coverage::table(scale)?);
+        Ok(vec![density::readings(), density::experiment(scale)?, cells, table, coverage::bytes()])
+    },
+    |scale, device| Ok(vec![numbers::uniform(scale, device)?, numbers::cells(scale)?]),
+    |scale, device| Ok(vec![numbers::gaussian(scale, device)?]),
+    switches::on_gpu,
+    |scale, _| Ok(vec![switches::on_cpu(scale)?]),
+    |scale, device| {
+        Ok(vec![mapping::lazy(scale)?, mapping::roots(device)?, avril::bytes(), avril::forms(device)?])
+    },
+    |scale, device| {
+        let steps = [avril::steps(scale)?, avril::movers(scale)?, avril::crossover(scale, device)?];
+        Ok([avril::brute_force(device)?].into_iter().chain(steps).collect())
+    },
+    |_, _| Ok(vec![claims::pbig(), claims::avril()]),
+];
+
+pub(super) fn run(args: &Args) -> Result<(), Failure> {
+    let (scale, device, machine) = (Scale::new(args.quick), Device::best(args.quick), Machine::here());
+    let bar = progress(PARTS.len(), "tables");
+    let mut sheets = Vec::new();
+    for part in PARTS {
+        sheets.extend(part(&scale, &device)?);
+        bar.inc(1);
+    }
+    bar.finish_and_clear();
+    let object = object(&machine, &device, &sheets);
+    if args.json {
+        print(&object.to_string())?;
+    } else {
+        let texts: Vec<String> = sheets.iter().map(Sheet::text).collect();
+        print(&format!("{}\n{}\n\n{}", machine.line(), device.about(), texts.join("\n")))?;
+    }
+    if args.quick {
+        return Ok(());
+    }
+    save(&Path::new(DOCUMENTS).join("papers.md"), &document(&machine, &device, &sheets))?;
+    for chart in sheets.iter().flat_map(|sheet| &sheet.charts) {
+        chart.write(&Path::new(DOCUMENTS).join(format!("{}.svg", chart.name)))?;
+    }
+    keep(&format!("papers-{}", slug(&machine.cpu)), &object, args.json)
+}
+
+fn object(machine: &Machine, device: &Device, sheets: &[Sheet]) -> Value {
+    json!({
+        "suite": "papers",
+        "day": machine.day,
+        "machine": machine.object(),
+        "adapter": device.adapter(),
+        "software": device.is_software(),
+        "tables": sheets.iter().map(Sheet::object).collect::<Vec<_>>(),
+    })
+}
+
+fn document(machine: &Machine, device: &Device, sheets: &[Sheet]) -> String {
+    let sheets: Vec<String> = sheets.iter().map(Sheet::markdown).collect();
+    format!(
+        "# `pbig bench papers`\n\nWritten by that command, nothing by hand. {}. {}\n\n\
+         *PBIG*: Lo, Lee, Chung, Chung, \"Optimizing Pairwise Box Intersection Checking on GPUs for Large-Scale Simulations\", ACM TOMACS \
+         23(3), 2013; times on a Tesla C2070. *Avril*: Avril, Gouranton, Arnaldi, \"Fast Collision Culling in Large-Scale Environments \
+         Using GPU Mapping Function\", EGPGV 2012; times on a Quadro FX 3600M. \"Printed\" is what they print; their figures are \
+         drawings, so of those only what the text says. Printed times are of other machines: compare how they grow, not how long they are. \
+         What differs is said above each table.\n\n{}",
+        machine.line(),
+        device.about(),
+        sheets.join("\n")
+    )
+}

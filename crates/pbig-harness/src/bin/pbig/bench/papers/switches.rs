@@ -1,0 +1,250 @@
+//! PBIG's tables IV, V and VI: each optimisation on and off, and the time of each task.
+
+use super::device::{self, Device, kernels};
+use super::model::{Edges, Model, Place, Space};
+use super::printed::{
+    Breakdown, GAUSSIAN_GB, GAUSSIAN_PAIRS, LENGTHS, MOST_BOXES, NORMAL, TABLE_V, TABLE_VI, WARP,
+};
+use super::sheet::{Sheet, short};
+use super::{Scale, UNSORTED, effort};
+use crate::bench::finders::Finders;
+use crate::output::Failure;
+use pbig_core::{CellRule, Coding, Config, GpuOptions, Report, Strategy};
+use pbig_harness::boxes::moved;
+use pbig_harness::runner::milliseconds;
+use serde_json::json;
+
+/// Section 6.3, of which section 6.4 takes 10^7 boxes.
+const BOXES: Model =
+    Model { space: Space::Normal(NORMAL), place: Place::Centre, edges: Edges::boxes(LENGTHS[0], LENGTHS[1]) };
+
+/// Boxes of section 6.3 that pair as often as 10^7 do in its space: pairs a box follow `N e^3`.
+fn crowded(n: usize) -> Model {
+    let larger = (MOST_BOXES as f64 / n as f64).cbrt();
+    Model { edges: Edges::boxes(LENGTHS[0] * larger, LENGTHS[1] * larger), ..BOXES }
+}
+
+fn name(row: &Breakdown) -> String {
+    let on = [("C", row.c), ("P", row.p), ("B", row.b)];
+    let names: Vec<&str> = on.iter().filter(|(_, on)| *on).map(|(name, _)| *name).collect();
+    if names.is_empty() { "baseline".into() } else { format!("+{}", names.join("+")) }
+}
+
+fn config(row: &Breakdown) -> Config {
+    let coding = if row.c { Coding::Packed } else { Coding::Plain };
+    // Chunks as small as gives several at this size: one alone leaves nothing to overlap.
+    let chunk = [1 << 13, 1 << 7];
+    device::on_gpu(GpuOptions {
+        coding,
+        pipelining: row.p,
+        load_balancing: row.b,
+        chunk,
+        ..GpuOptions::DEFAULT
+    })
+}
+
+/// Boxes for a device: as many as a program that plays one searches in seconds.
+fn count(scale: &Scale, device: &Device) -> usize {
+    match (device.is_software(), scale.quick) {
+        (_, true) => 2000,
+        (true, false) => 50_000,
+        (false, false) => 1_000_000,
+    }
+}
+
+/// Each setting in turn on the device; nothing is measured where there is none.
+pub(super) fn on_gpu(scale: &Scale, device: &Device) -> Result<Vec<Sheet>, Failure> {
+    let n = count(scale, device);
+    let runs = device.run(&TABLE_VI.map(|row| config(&row)), &crowded(n).boxes(n, 1), 1.0)?;
+    Ok(vec![optimisations(n, &runs, device), tasks(&runs, device)])
+}
+
+/// Table IV, and what each setting sends.
+fn optimisations(n: usize, runs: &[(f64, Report)], device: &Device) -> Sheet {
+    let columns = [
+        "setting",
+        "speed-up printed",
+        "speed-up by table VI",
+        device.column(),
+        "speed-up",
+        "pairs",
+        "checks",
+        "bytes back",
+        "bytes a pair",
+        "chunks",
+    ];
+    let a_pair = GAUSSIAN_GB.map(|size| short(size * 1e9 / GAUSSIAN_PAIRS as f64));
+    let mut sheet = Sheet::new("PBIG table IV: optimisations on and off, GPU", &columns)
+        .about(format!(
+            "C: data compression (`Coding::Packed` against `Plain`), P: pipelined execution, B: load balancing. Section 6.3 with {} boxes \
+             instead of 10^7, lengths so much longer that pairs a box stay the same. {}",
+            n,
+            device.about()
+        ))
+        .about(format!(
+            "Printed bytes a pair: {} without and {} with compression. Bytes back are all that is fetched: with C also the table for decoding, \
+             4 bytes an entry, and counters. The paper decodes with tables that it copies too, and does not count them.",
+            a_pair[0], a_pair[1]
+        ));
+    for (i, row) in TABLE_VI.iter().enumerate() {
+        let by_table = TABLE_VI[0].total as f64 / row.total as f64;
+        let run = runs.get(i);
+        let gpu = run.and_then(|(_, report)| report.gpu.as_ref());
+        let speed_up = run.map(|(ms, _)| runs[0].0 / ms);
+        let a_pair =
+            gpu.zip(run).map(|(gpu, (_, report))| gpu.downloaded as f64 / report.pairs.max(1) as f64);
+        sheet.row(json!([
+            name(row),
+            row.speed_up,
+            by_table,
+            run.map(|run| run.0),
+            speed_up,
+            run.map(|run| run.1.pairs),
+            run.map(|run| run.1.checks.made),
+            gpu.map(|gpu| gpu.downloaded),
+            a_pair,
+            gpu.map(|gpu| gpu.chunks),
+        ]));
+    }
+    sheet
+}
+
+/// Tables V and VI: the time of each task.
+fn tasks(runs: &[(f64, Report)], device: &Device) -> Sheet {
+    let mut columns = vec!["setting".to_owned(), "side".to_owned(), "total".to_owned()];
+    columns.extend(TABLE_V.iter().map(|task| task.0.to_owned()));
+    let columns: Vec<&str> = columns.iter().map(String::as_str).collect();
+    let mut sheet = Sheet::new("PBIG tables V and VI: time per task, ms", &columns).about(
+        "Printed: 10^7 boxes; with P, CHECK has the time of CHECK, DataOut and REPORT together. Ours: as in the table above, of the last call; with P \
+         DataOut is the time that the host waits beyond the kernels.",
+    );
+    for (task, what, here) in TABLE_V {
+        sheet = sheet.about(format!("{task}: {what}. Here: {here}."));
+    }
+    sheet = sheet.about(device.about());
+    for (i, row) in TABLE_VI.iter().enumerate() {
+        let ms = |of: u64| of as f64 / 1e3;
+        let printed = row.before.iter().chain(row.after).map(|&of| json!(ms(of)));
+        let first = [json!(name(row)), json!("printed"), json!(ms(row.total))];
+        let rest = std::iter::repeat(json!(null));
+        sheet.row(first.into_iter().chain(printed).chain(rest).take(columns.len()).collect());
+        if let Some((total, report)) = runs.get(i) {
+            let first = [json!(name(row)), json!("ours"), json!(total)];
+            sheet.row(first.into_iter().chain(of_tasks(report).map(|ms| json!(ms))).collect());
+        }
+    }
+    sheet
+}
+
+/// What a call on a device took by the paper's tasks.
+fn of_tasks(report: &Report) -> [Option<f64>; 7] {
+    let is_check = |name: &str| name.starts_with("check");
+    let is_schedule = |name: &str| matches!(name, "schedule" | "arrange");
+    let map = kernels(report, |name| !is_check(name) && !is_schedule(name));
+    let (schedule, check) = (kernels(report, is_schedule), kernels(report, is_check));
+    let gpu = report.gpu.as_ref();
+    let all = kernels(report, |_| true);
+    let out = gpu.zip(all).map(|(gpu, all)| (milliseconds(gpu.wait) - all).max(0.0));
+    let decode = gpu.map(|gpu| milliseconds(gpu.decode + report.stages.emit));
+    let upload = gpu.map(|gpu| milliseconds(gpu.upload));
+    [upload, Some(milliseconds(report.stages.plan)), map, schedule, check, out, decode]
+}
+
+/// What can be switched on the CPU.
+fn settings() -> [(String, Config); 7] {
+    let pbig = Config { strategy: Strategy::Pbig, ..UNSORTED };
+    let wanted = |name: &str, pbig_boxes_per_cell: f32| {
+        (format!("PBIG's grid, {name}, W = {pbig_boxes_per_cell}"), Config { pbig_boxes_per_cell, ..pbig })
+    };
+    let density = Config { cell_rule: CellRule::Density, ..pbig };
+    [
+        wanted("equation 6", WARP as f32),
+        wanted("equation 6", UNSORTED.pbig_boxes_per_cell),
+        ("PBIG's grid, Avril's cells of that many objects".into(), density),
+        ("the same as the second, every cell by balanced rows".into(), Config { small_cell: 0, ..pbig }),
+        ("the same, every cell by Avril's mapping".into(), Config { small_cell: u32::MAX, ..pbig }),
+        ("our grid, one entry a box".into(), Config { strategy: Strategy::Grid, ..UNSORTED }),
+        (
+            "our grid, list sorted".into(),
+            Config { strategy: Strategy::Grid, order: pbig_core::Order::Sorted, ..UNSORTED },
+        ),
+    ]
+}
+
+/// The counterpart on the CPU: which cells, which mapping, which entries.
+pub(super) fn on_cpu(scale: &Scale) -> Result<Sheet, Failure> {
+    let n = if scale.quick { 20_000 } else { 300_000 };
+    let columns = [
+        "setting",
+        "ms",
+        "times as fast as the first",
+        "pairs",
+        "checks",
+        "unnecessary",
+        "redundant",
+        "plan ms",
+        "map ms",
+        "check ms",
+        "emit ms",
+    ];
+    let mut sheet = Sheet::new("PBIG table IV's counterpart on the CPU", &columns).about(format!(
+        "Section 6.3 as printed with {n} boxes. PBIG's grid on one thread, ours on all. There is nothing to transfer, so neither compression nor \
+         pipelining; a redundant check is ended by the rule of the owning cell before the boxes are compared, and our grid, with one entry a \
+         box, makes none. Its checks are comparisons of codes. Stages are of the last call."
+    ));
+    let boxes = BOXES.boxes(n, 1);
+    let settings = settings();
+    let configs = settings.iter().map(|(_, config)| *config);
+    let mut finders = Finders::new(configs, None, [moved(&boxes, 1.0, 2), boxes]);
+    let times = finders.times(effort(n))?;
+    finders.pairs()?;
+    for ((name, _), (ms, finder)) in settings.iter().zip(times.iter().zip(&finders.all)) {
+        let report = finder.report();
+        let checks = report.checks;
+        let [plan, map, check, emit, _] = report.stages.named().map(|(_, time)| milliseconds(time));
+        sheet.row(json!([
+            name,
+            ms,
+            times[0] / ms,
+            report.pairs,
+            checks.made,
+            checks.unnecessary,
+            checks.redundant,
+            plan,
+            map,
+            check,
+            emit,
+        ]));
+    }
+    Ok(sheet)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use pbig_core::oracle;
+
+    #[test]
+    fn every_setting_finds_the_pairs_of_brute_force() {
+        let boxes = crowded(1500).boxes(1500, 1);
+        let pairs = oracle::pairs(&boxes).len() as u64;
+        for (name, config) in settings() {
+            assert_eq!(super::super::once(config, &boxes).expect("found").pairs, pairs, "{name}");
+        }
+        let device = Device::best(true);
+        for (_, report) in
+            device.run(&TABLE_VI.map(|row| config(&row)), &boxes, 1.0).expect("a device that works")
+        {
+            assert_eq!(report.pairs, pairs);
+        }
+    }
+
+    #[test]
+    fn fewer_boxes_are_as_crowded() {
+        let a_box = |model: &Model, n: usize| model.pairs(n) / n as f64;
+        let whole = a_box(&BOXES, MOST_BOXES);
+        for n in [50_000, 1_000_000] {
+            assert!((a_box(&crowded(n), n) / whole - 1.0).abs() < 0.1, "{n}");
+        }
+    }
+}
