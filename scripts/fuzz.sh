@@ -11,7 +11,7 @@ shift || true
 [ $# -gt 0 ] || set -- finder_against_oracle updates_against_scratch decode csv_reader npy_reader
 
 # Lengths at which an input takes milliseconds, and no allocation that the input does not account for.
-declare -A length=([finder_against_oracle]=1600 [updates_against_scratch]=2000)
+declare -A length=([finder_against_oracle]=1600 [updates_against_scratch]=800)
 cargo run --release -p pbig-tests --example fuzz_seeds
 for target in "$@"; do
     echo "== $target"

@@ -17,6 +17,7 @@ mod queries;
 mod random_worlds;
 mod restore;
 mod shapes;
+mod stress;
 mod upstream;
 mod upstream_churn;
 mod worlds;

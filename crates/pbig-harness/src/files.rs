@@ -142,7 +142,7 @@ enum Floats<D> {
 }
 
 fn array<D: ndarray::Dimension>(bytes: &[u8]) -> Result<Floats<D>, ContentError> {
-    check_size(bytes)?;
+    check_size(bytes).map_err(one_line)?;
     match read_as::<f32, D>(bytes) {
         Ok(array) => Ok(Floats::F32(array)),
         Err(ReadNpyError::WrongDescriptor(_)) => match read_as::<f64, D>(bytes) {

@@ -5,7 +5,7 @@ use pbig_core::{Aabb, BroadPhase, Config, Pair, ProxyFilter, oracle};
 use std::collections::BTreeSet;
 
 /// Pairs at which an input ends: what a set of thousands would show a smaller one shows in less time.
-const MOST_PAIRS: usize = 4000;
+const MOST_PAIRS: usize = 1000;
 
 /// Two bytes of settings, then operations: see [`Player::play`].
 pub fn updates_against_scratch(data: &[u8]) {
