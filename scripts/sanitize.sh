@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Undefined behaviour: pbig-core's unit tests, and the suite without what needs a GPU's driver, with sanitizers:
+# Undefined behaviour: pbig-core's unit tests, in which all of its unsafe code is reached, with sanitizers:
 #   scripts/sanitize.sh [address] [thread]     without an argument: both
 # Needs nightly Rust. With its component rust-src the standard library is instrumented, too; without it the thread
 # sanitizer cannot see how it synchronizes, so that rayon's own synchronization may be reported.
@@ -16,7 +16,7 @@ for sanitizer in "$@"; do
     flags="-Zsanitizer=$sanitizer"
     # Flags differ from those of the standard library that is not built anew.
     if [ ${#std[@]} = 0 ] && [ "$sanitizer" = thread ]; then flags+=" -Cunsafe-allow-abi-mismatch=sanitizer"; fi
-    RUSTFLAGS=$flags TSAN_OPTIONS="suppressions=$PWD/scripts/thread-sanitizer.txt halt_on_error=1" \
+    RUSTFLAGS=$flags TSAN_OPTIONS="suppressions=$PWD/scripts/thread-sanitizer.txt" \
         cargo +nightly test "${std[@]}" --target "$host" --target-dir "target/sanitize-$sanitizer" \
-        -p pbig-core --features serde --lib
+        -p pbig-core --features serde --lib -- --test-threads=1
 done
