@@ -5,11 +5,11 @@ use pbig_harness::boxes::BoxSet;
 use pbig_tests::{corpus, difference, gpu, strategies};
 use proptest::prelude::*;
 
-fn check(name: &str, boxes: &[Aabb]) {
+pub(crate) fn check(name: &str, boxes: &[Aabb]) {
     check_on(strategies(), name, boxes);
 }
 
-fn check_on(strategies: Vec<(&str, Config)>, name: &str, boxes: &[Aabb]) {
+pub(crate) fn check_on(strategies: Vec<(&str, Config)>, name: &str, boxes: &[Aabb]) {
     let wanted = oracle::pairs(boxes);
     let invalid = boxes.iter().filter(|b| !b.is_valid()).count() as u64;
     for (strategy, config) in strategies {

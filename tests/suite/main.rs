@@ -18,6 +18,7 @@ mod queries;
 mod random_worlds;
 mod restore;
 mod shapes;
+mod stress;
 mod upstream;
 mod upstream_churn;
 mod worlds;

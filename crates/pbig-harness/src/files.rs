@@ -10,9 +10,16 @@ use std::path::Path;
 /// What is wrong with a file, in one line that names it.
 pub type FileError = String;
 
+/// The same about its content, before it is known which file that is.
+type ContentError = String;
+
 fn at(path: &Path, what: impl std::fmt::Display) -> FileError {
-    // One line, whatever a library put into its message.
-    format!("{}: {what}", path.display()).replace('\n', " ")
+    format!("{}: {}", path.display(), one_line(what))
+}
+
+/// Whatever a library put into its message.
+fn one_line(what: impl std::fmt::Display) -> String {
+    what.to_string().replace(['\n', '\r'], " ")
 }
 
 /// A list of boxes: `.npy` (N,6) float32 or float64 (rounded outward), or `.csv` with the columns
@@ -22,8 +29,8 @@ fn at(path: &Path, what: impl std::fmt::Display) -> FileError {
 /// A message that names the file, what is wrong and where.
 pub fn read_boxes(path: &Path) -> Result<Vec<Aabb>, FileError> {
     match extension(path) {
-        "npy" => read_npy_boxes(path),
-        "csv" => read_csv_boxes(path),
+        "npy" => read(path, npy_boxes),
+        "csv" => read(path, csv_boxes),
         _ => Err(at(path, "expected a file that ends in .npy or .csv")),
     }
 }
@@ -33,14 +40,41 @@ pub fn read_boxes(path: &Path) -> Result<Vec<Aabb>, FileError> {
 /// # Errors
 /// A message that names the file and what is wrong.
 pub fn read_frames(path: &Path) -> Result<Frames, FileError> {
-    if extension(path) != "npy" {
-        return Err(at(path, "expected a file that ends in .npy"));
+    match extension(path) {
+        "npy" => read(path, npy_frames),
+        _ => Err(at(path, "expected a file that ends in .npy")),
     }
+}
+
+fn read<T>(path: &Path, content: fn(&[u8]) -> Result<T, ContentError>) -> Result<T, FileError> {
+    let bytes = std::fs::read(path).map_err(|error| at(path, error))?;
+    content(&bytes).map_err(|what| at(path, what))
+}
+
+/// The content of an `.npy` file of boxes, see [`read_boxes`].
+///
+/// # Errors
+/// What is wrong, in one line.
+pub fn npy_boxes(bytes: &[u8]) -> Result<Vec<Aabb>, ContentError> {
+    let wrong = |shape: &[usize]| format!("expected an array of shape (N,6), found {}", shape_text(shape));
+    match array::<ndarray::Ix2>(bytes)? {
+        Floats::F32(a) if a.ncols() == 6 => Ok(rows(&a.view()).map(f32_box).collect()),
+        Floats::F64(a) if a.ncols() == 6 => Ok(rows(&a.view()).map(f64_box).collect()),
+        Floats::F32(a) => Err(wrong(a.shape())),
+        Floats::F64(a) => Err(wrong(a.shape())),
+    }
+}
+
+/// The content of an `.npy` file of frames, see [`read_frames`].
+///
+/// # Errors
+/// What is wrong, in one line.
+pub fn npy_frames(bytes: &[u8]) -> Result<Frames, ContentError> {
     let boxes = |shape: &[usize]| match shape {
         [_, n, 6] => Ok(*n),
-        other => Err(at(path, format!("expected an array of shape (F,N,6), found {}", shape_text(other)))),
+        other => Err(format!("expected an array of shape (F,N,6), found {}", shape_text(other))),
     };
-    Ok(match read_array::<ndarray::Ix3>(path)? {
+    Ok(match array::<ndarray::Ix3>(bytes)? {
         Floats::F32(array) => Frames {
             boxes: boxes(array.shape())?,
             frames: array.outer_iter().map(|frame| rows(&frame).map(FrameBox::from_f32).collect()).collect(),
@@ -107,17 +141,16 @@ enum Floats<D> {
     F64(ndarray::Array<f64, D>),
 }
 
-fn read_array<D: ndarray::Dimension>(path: &Path) -> Result<Floats<D>, FileError> {
-    let bytes = std::fs::read(path).map_err(|error| at(path, error))?;
-    check_size(&bytes).map_err(|what| at(path, what))?;
-    match read_as::<f32, D>(&bytes) {
+fn array<D: ndarray::Dimension>(bytes: &[u8]) -> Result<Floats<D>, ContentError> {
+    check_size(bytes).map_err(one_line)?;
+    match read_as::<f32, D>(bytes) {
         Ok(array) => Ok(Floats::F32(array)),
-        Err(ReadNpyError::WrongDescriptor(_)) => match read_as::<f64, D>(&bytes) {
+        Err(ReadNpyError::WrongDescriptor(_)) => match read_as::<f64, D>(bytes) {
             Ok(array) => Ok(Floats::F64(array)),
-            Err(ReadNpyError::WrongDescriptor(_)) => Err(at(path, "expected float32 or float64 values")),
-            Err(error) => Err(at(path, npy_text(&error))),
+            Err(ReadNpyError::WrongDescriptor(_)) => Err("expected float32 or float64 values".into()),
+            Err(error) => Err(npy_text(&error)),
         },
-        Err(error) => Err(at(path, npy_text(&error))),
+        Err(error) => Err(npy_text(&error)),
     }
 }
 
@@ -132,14 +165,14 @@ fn npy_text(error: &ReadNpyError) -> String {
         ReadNpyError::WrongNdim(wanted, found) => {
             format!("expected {} dimensions, found {found}", wanted.unwrap_or_default())
         }
-        other => format!("not a readable .npy file: {other}"),
+        other => one_line(format!("not a readable .npy file: {other}")),
     }
 }
 
 /// Whether the file holds as many bytes as its header promises. The reader allocates what the header
 /// says, so a header that lies must be noticed before. What cannot be understood here is left to it.
 fn check_size(bytes: &[u8]) -> Result<(), String> {
-    let Some((header, rest)) = npy_header(bytes) else { return Ok(()) };
+    let Some((header, rest)) = npy_header(bytes)? else { return Ok(()) };
     let field = |name: &str, from: char, to: char| {
         let text = header.split(&format!("'{name}'")).nth(1)?;
         Some(text.split(from).nth(1)?.split(to).next()?.to_string())
@@ -154,9 +187,9 @@ fn check_size(bytes: &[u8]) -> Result<(), String> {
     let bytes_of = |least: u64| lengths.iter().map(|&n| n.max(least)).try_fold(size, u64::checked_mul);
     let found = rest.len() as u64;
     match (bytes_of(0), bytes_of(1)) {
-        // Even without boxes, frames take memory.
+        // Even without boxes, frames take memory: each as much as a box.
         (_, None) => Err(format!("shape ({shape}) is larger than any file")),
-        (Some(0), Some(frames)) if frames > 1 << 32 => {
+        (Some(0), Some(frames)) if frames > 1 << 26 => {
             Err(format!("shape ({shape}) has too many empty frames"))
         }
         (Some(needed), _) if needed > found => {
@@ -166,15 +199,23 @@ fn check_size(bytes: &[u8]) -> Result<(), String> {
     }
 }
 
-/// The header's text, and what follows it.
-fn npy_header(bytes: &[u8]) -> Option<(String, &[u8])> {
+/// The header's text, and what follows it. The reader allocates what the header's length says, up to 4 GiB, so one
+/// that is cut off must be noticed before.
+fn npy_header(bytes: &[u8]) -> Result<Option<(String, &[u8])>, ContentError> {
+    let Some((after, length)) = header_length(bytes) else { return Ok(None) };
+    match after.split_at_checked(length as usize) {
+        Some((header, rest)) => Ok(Some((String::from_utf8_lossy(header).into_owned(), rest))),
+        None => Err(format!("the header needs {length} bytes, the file has {}", after.len())),
+    }
+}
+
+/// What follows the length of the header, and this length.
+fn header_length(bytes: &[u8]) -> Option<(&[u8], u32)> {
     let rest = bytes.strip_prefix(b"\x93NUMPY")?;
-    let (start, length) = match *rest.first()? {
-        1 => (4, u32::from(u16::from_le_bytes(rest.get(2..4)?.try_into().ok()?))),
-        _ => (6, u32::from_le_bytes(rest.get(2..6)?.try_into().ok()?)),
-    };
-    let header = rest.get(start..start + length as usize)?;
-    Some((String::from_utf8_lossy(header).into_owned(), &rest[start + length as usize..]))
+    match *rest.first()? {
+        1 => Some((rest.get(4..)?, u32::from(u16::from_le_bytes(rest.get(2..4)?.try_into().ok()?)))),
+        _ => Some((rest.get(6..)?, u32::from_le_bytes(rest.get(2..6)?.try_into().ok()?))),
+    }
 }
 
 /// The rows of an (N,6) array, whatever its memory order.
@@ -182,29 +223,19 @@ fn rows<'a, T: Copy>(array: &'a ArrayView2<'_, T>) -> impl Iterator<Item = [T; 6
     array.outer_iter().map(|row| std::array::from_fn(|k| row[k]))
 }
 
-fn read_npy_boxes(path: &Path) -> Result<Vec<Aabb>, FileError> {
-    let wrong =
-        |shape: &[usize]| at(path, format!("expected an array of shape (N,6), found {}", shape_text(shape)));
-    match read_array::<ndarray::Ix2>(path)? {
-        Floats::F32(a) if a.ncols() == 6 => Ok(rows(&a.view()).map(f32_box).collect()),
-        Floats::F64(a) if a.ncols() == 6 => Ok(rows(&a.view()).map(f64_box).collect()),
-        Floats::F32(a) => Err(wrong(a.shape())),
-        Floats::F64(a) => Err(wrong(a.shape())),
-    }
-}
-
-fn read_csv_boxes(path: &Path) -> Result<Vec<Aabb>, FileError> {
-    let text = std::fs::read_to_string(path).map_err(|error| at(path, error))?;
-    let mut reader = csv::ReaderBuilder::new()
-        .has_headers(false)
-        .flexible(true)
-        .trim(csv::Trim::All)
-        .from_reader(text.as_bytes());
+/// The content of a `.csv` file of boxes, see [`read_boxes`].
+///
+/// # Errors
+/// What is wrong and in which line, in one line.
+pub fn csv_boxes(bytes: &[u8]) -> Result<Vec<Aabb>, ContentError> {
+    let text = std::str::from_utf8(bytes).map_err(one_line)?;
+    let mut reader =
+        csv::ReaderBuilder::new().has_headers(false).flexible(true).trim(csv::Trim::All).from_reader(bytes);
     let mut boxes = Vec::new();
     for (i, record) in reader.records().enumerate() {
-        let record = record.map_err(|error| at(path, error))?;
+        let record = record.map_err(one_line)?;
         if i > 0 || !is_header(&record) {
-            let about = |what| at(path, format!("line {}: {what}", line_of(&text, &record)));
+            let about = |what| one_line(format!("line {}: {what}", line_of(text, &record)));
             boxes.push(csv_box(&record).map_err(about)?);
         }
     }

@@ -1,0 +1,139 @@
+//! However boxes move, come and go: the kept pairs are those of a search from nothing, and the events lead there.
+
+use super::input::{Input, config};
+use pbig_core::{Aabb, BroadPhase, Config, Pair, ProxyFilter, oracle};
+use std::collections::BTreeSet;
+
+/// Pairs at which an input ends: what a set of thousands would show a smaller one shows in less time.
+const MOST_PAIRS: usize = 1000;
+
+/// Two bytes of settings, then operations: see [`Player::play`].
+pub fn updates_against_scratch(data: &[u8]) {
+    let mut input = Input(data);
+    let (Some(settings), Some(spread)) = (input.byte(), input.byte()) else { return };
+    let margin = [0.0, 0.01, 0.3, 1e30][usize::from(settings >> 4 & 3)];
+    let mut player = Player::new(Config { margin, ..config(settings & 15) }, 1 + u32::from(spread & 3));
+    while player.play(&mut input).is_some() {}
+    _ = player.update();
+}
+
+/// A broad phase, and what its caller knows.
+struct Player {
+    broad_phase: BroadPhase,
+    /// Ids are multiples of this: with gaps, and more of them than a byte can name.
+    stride: u32,
+    given: Vec<Aabb>,
+    ids: u32,
+    pairs: BTreeSet<Pair>,
+    /// Removed since an update has begun.
+    removed: Vec<u32>,
+}
+
+impl Player {
+    fn new(config: Config, stride: u32) -> Self {
+        let broad_phase = BroadPhase::new(config).expect("a good margin");
+        let (given, pairs, removed) = Default::default();
+        Self { broad_phase, stride, given, ids: 0, pairs, removed }
+    }
+
+    /// One operation; none when the input is used up.
+    fn play(&mut self, input: &mut Input) -> Option<()> {
+        match input.byte()? % 16 {
+            10 => self.update()?,
+            11 => self.broad_phase.begin(),
+            12 => self.remove(input)?,
+            13 => self.save_and_restore(),
+            14 => self.broad_phase.set_margin(f32::from(input.byte()?) / 64.0).expect("a good margin"),
+            15 => self.set_many(input)?,
+            op => self.set(input, op < 5)?,
+        }
+        Some(())
+    }
+
+    fn id(&self, input: &mut Input) -> Option<u32> {
+        Some(u32::from(input.byte()?) * self.stride)
+    }
+
+    fn set(&mut self, input: &mut Input, open: bool) -> Option<()> {
+        let id = self.id(input)?;
+        let aabb = input.aabb(&self.given)?;
+        let filter = if open { ProxyFilter::ALL } else { input.filter()? };
+        self.put(id, aabb, filter);
+        Some(())
+    }
+
+    /// A row of boxes next to each other: a few bytes for a set that needs a grid.
+    fn set_many(&mut self, input: &mut Input) -> Option<()> {
+        let (first, count, aabb) = (self.id(input)?, input.byte()?, input.aabb(&self.given)?);
+        let edges = aabb.extents();
+        for i in 0..u32::from(count) {
+            let by: [f32; 3] = std::array::from_fn(|k| edges[k] * (i / [1, 8, 64][k] % 8) as f32);
+            let moved = |corner: [f32; 3]| std::array::from_fn(|k| corner[k] + by[k]);
+            self.put(first + i, Aabb::new(moved(aabb.min), moved(aabb.max)), ProxyFilter::ALL);
+        }
+        Some(())
+    }
+
+    fn put(&mut self, id: u32, aabb: Aabb, filter: ProxyFilter) {
+        self.broad_phase.set(id, aabb, filter).expect("a small id");
+        self.given.push(aabb);
+        self.ids = self.ids.max(id + 1);
+        if !self.broad_phase.has_begun() {
+            let fat = self.broad_phase.fat_aabb(id);
+            assert_eq!(fat.is_some(), aabb.is_valid(), "{aabb:?}");
+            assert!(fat.is_none_or(|fat| fat.contains(&aabb)), "{fat:?} around {aabb:?}");
+        }
+    }
+
+    fn remove(&mut self, input: &mut Input) -> Option<()> {
+        let id = self.id(input)?;
+        self.broad_phase.remove(id);
+        if self.broad_phase.has_begun() {
+            self.removed.push(id)
+        } else {
+            self.forget(id)
+        }
+        Some(())
+    }
+
+    fn forget(&mut self, id: u32) {
+        self.pairs.retain(|pair| pair.a != id && pair.b != id);
+    }
+
+    fn save_and_restore(&mut self) {
+        let bytes = postcard::to_stdvec(&self.broad_phase).expect("a snapshot");
+        self.broad_phase = postcard::from_bytes(&bytes).expect("what was saved");
+        assert_eq!(postcard::to_stdvec(&self.broad_phase).expect("a snapshot"), bytes);
+    }
+
+    /// What the oracle makes of the boxes; of those of the beginning where an update has begun.
+    fn from_scratch(&self) -> BTreeSet<Pair> {
+        let fat: Vec<Aabb> =
+            (0..self.ids).map(|id| self.broad_phase.fat_aabb(id).unwrap_or(Aabb::NOWHERE)).collect();
+        let filters: Vec<ProxyFilter> =
+            (0..self.ids).map(|id| self.broad_phase.filter(id).copied().unwrap_or_default()).collect();
+        oracle::pairs_filtered(&fat, &filters).into_iter().collect()
+    }
+
+    fn update(&mut self) -> Option<()> {
+        let wanted = self.from_scratch();
+        if wanted.len() > MOST_PAIRS {
+            return None;
+        }
+        let events = self.broad_phase.update().expect("few boxes");
+        assert!(events.added.is_sorted() && events.removed.is_sorted());
+        for pair in &events.removed {
+            assert!(self.pairs.remove(pair), "{pair:?} ended but was not there");
+        }
+        for pair in &events.added {
+            assert!(self.pairs.insert(*pair), "{pair:?} was there already");
+        }
+        assert_eq!(self.pairs, wanted, "{}", self.broad_phase.report().plan);
+        for id in std::mem::take(&mut self.removed) {
+            self.forget(id);
+        }
+        let kept: BTreeSet<Pair> = self.broad_phase.pairs().collect();
+        assert_eq!(self.pairs, kept, "events lead elsewhere");
+        Some(())
+    }
+}

@@ -1,0 +1,36 @@
+//! Words of a device, and saved bytes, that may be anything: an error, or pairs as they may be; never a panic.
+
+use super::super::decode;
+use pbig_core::{Aabb, BroadPhase, Pair, ProxyFilter};
+
+/// A byte for the format, one for the number of boxes, one for that of entries; then words, entries first.
+pub fn decode_words(data: &[u8]) {
+    let [format, boxes, entries, rest @ ..] = data else { return };
+    let words: Vec<u32> = rest.chunks_exact(4).map(bytemuck::pod_read_unaligned).collect();
+    let (entries, output) = words.split_at(words.len().min(usize::from(*entries)));
+    let boxes = if format & 4 == 0 { u32::from(*boxes) } else { u32::MAX - u32::from(*boxes) };
+    let found = match format & 3 {
+        0 => decode::plain(output, boxes),
+        1 => decode::records(output, entries, boxes),
+        2 => decode::bits(output, boxes),
+        _ => return snapshot(rest),
+    };
+    let pairs: Vec<Pair> = found.into_iter().flatten().flatten().collect();
+    assert!(pairs.iter().all(|pair| pair.a < pair.b && pair.b < boxes), "no pairs of {boxes} boxes");
+    // A row takes a byte for each partner, a bit is one pair.
+    assert!(pairs.len() <= 32 * output.len(), "{} pairs of {} words", pairs.len(), output.len());
+}
+
+/// What a snapshot restores goes on without a panic.
+fn snapshot(bytes: &[u8]) {
+    let Ok(mut restored) = postcard::from_bytes::<BroadPhase>(bytes) else { return };
+    for id in 0..restored.id_count().min(40) {
+        // An error where the limits were restored as less than what there is.
+        _ = restored.set(id, Aabb::from_center([id as f32 * 0.9, 0.0, 0.0], [0.5; 3]), ProxyFilter::ALL);
+        _ = restored.update();
+    }
+    restored.begin();
+    restored.remove(1);
+    _ = restored.finish();
+    assert!(postcard::to_stdvec(&restored).is_ok_and(|bytes| !bytes.is_empty()));
+}

@@ -1,0 +1,14 @@
+//! What is fuzzed. The files in `checks` are compiled twice, here with instruments, and in the test suite, where
+//! seeds and every input that once failed are run again without any.
+
+// The decoder's and the readers' own files rather than their crates: these would bring wgpu and rapier.
+pub use pbig_core::{Aabb, Pair, ProxyFilter, pair_index};
+#[path = "../../crates/pbig-core/src/decode.rs"]
+pub mod decode;
+#[path = "../../crates/pbig-harness/src/files.rs"]
+pub mod files;
+#[path = "../../crates/pbig-core/src/layout.rs"]
+pub mod layout;
+
+pub mod checks;
+pub use checks::*;

@@ -1,0 +1,20 @@
+#!/usr/bin/env bash
+# Fuzzes, one target after the other, each for so many seconds (600 without a number):
+#   scripts/fuzz.sh [SECONDS] [TARGET...]
+# Needs nightly Rust and cargo-fuzz (cargo install cargo-fuzz). Seeds are made from the box sets and scenes; the corpus
+# stays in fuzz/corpus and grows from run to run. What fails lies in fuzz/artifacts: move it to fuzz/failed/TARGET,
+# where the test suite runs it from then on, and mend the cause.
+set -euo pipefail
+cd "$(dirname "$0")/.."
+seconds=${1:-600}
+shift || true
+[ $# -gt 0 ] || set -- finder_against_oracle updates_against_scratch decode csv_reader npy_reader
+
+# Lengths at which an input takes milliseconds, and no allocation that the input does not account for.
+declare -A length=([finder_against_oracle]=1600 [updates_against_scratch]=800)
+cargo run --release -p pbig-tests --example fuzz_seeds
+for target in "$@"; do
+    echo "== $target"
+    cargo +nightly fuzz run "$target" -- -max_total_time="$seconds" -max_len="${length[$target]:-4096}" \
+        -malloc_limit_mb=512 -timeout=60 -print_final_stats=1
+done

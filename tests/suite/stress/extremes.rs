@@ -1,0 +1,188 @@
+//! Numbers: sizes and offsets by decades, the smallest, the largest, both zeros, infinities, no numbers.
+
+use super::{everywhere, intervals, product, shifted, through_updates};
+use crate::incremental::Follower;
+use pbig_core::{Aabb, Config, ProxyFilter};
+use pbig_harness::boxes::BoxSet;
+use pbig_tests::strategies;
+use rand::rngs::StdRng;
+use rand::{RngExt, SeedableRng};
+
+const INFINITY: f32 = f32::INFINITY;
+
+fn pile(n: usize) -> Vec<Aabb> {
+    BoxSet::named("pile").expect("the set exists").boxes(n, 1)
+}
+
+#[test]
+fn sizes_over_twelve_decades_in_one_scene() {
+    let mut rng = StdRng::seed_from_u64(12);
+    let size = |i: usize| 10f32.powf((i % 121) as f32 / 10.0 - 6.0);
+    // Around its like a box has neighbours of its size: places are as far from the middle as boxes are large.
+    let mut place = |i: usize| std::array::from_fn(|_| size(i * 7) * rng.random_range(-60.0..60.0));
+    let boxes: Vec<Aabb> = (0..1100).map(|i| Aabb::from_center(place(i), [size(i) / 2.0; 3])).collect();
+    everywhere("twelve decades", &boxes);
+}
+
+#[test]
+fn offsets_from_one_to_1e30_each_alone_and_all_at_once() {
+    let near = pile(60);
+    let mut all = vec![];
+    for decade in (0..=30).step_by(3) {
+        let offset = 10f32.powi(decade);
+        // As large as a few ulps at least, or a box would be a point.
+        let scale = (offset * 1e-6).max(1.0);
+        let grown = |b: &Aabb| Aabb::new(b.min.map(|x| x * scale), b.max.map(|x| x * scale));
+        let there: Vec<Aabb> = near.iter().map(|b| shifted(&grown(b), [offset, -offset, offset])).collect();
+        everywhere(&format!("at 1e{decade}"), &there);
+        all.extend(there);
+    }
+    everywhere("at all offsets", &all);
+}
+
+#[test]
+fn denormals_down_to_the_smallest() {
+    let smallest = f32::from_bits(1);
+    for unit in [smallest, 8.0 * smallest, f32::MIN_POSITIVE] {
+        let at = |i: usize| (i as f32 - 3.0) * unit;
+        let row = |i: usize| [at(i), at(i + 1)];
+        let rows: Vec<[f32; 2]> = (0..7).map(row).collect();
+        everywhere(&format!("raster of {unit:e}"), &product(&rows, &rows, &rows));
+    }
+    let numbers = [-1.0, -smallest, 0.0, smallest, f32::MIN_POSITIVE];
+    everywhere(
+        "denormals among others",
+        &product(&intervals(&numbers), &[[0.0, smallest]], &intervals(&numbers)),
+    );
+}
+
+#[test]
+fn both_zeros_are_one() {
+    let zeros = [0.0, -0.0];
+    let ends: Vec<[f32; 2]> = zeros.iter().flat_map(|low| zeros.map(|high| [*low, high])).collect();
+    let boxes = product(&ends, &ends, &ends);
+    everywhere("zeros", &boxes);
+    assert_eq!(pbig_core::oracle::pairs(&boxes).len(), 64 * 63 / 2, "all of them are one point");
+    let below = f32::from_bits(1).copysign(-1.0);
+    everywhere(
+        "zeros and what is next to them",
+        &product(&ends, &intervals(&[-1.0, below, -0.0, 1.0]), &ends),
+    );
+}
+
+#[test]
+fn the_largest_floats() {
+    let numbers = [-f32::MAX, (-f32::MAX).next_up(), -1.0, 1.0, f32::MAX.next_down(), f32::MAX];
+    let few = intervals(&[-f32::MAX, 0.0, f32::MAX]);
+    everywhere("largest", &product(&intervals(&numbers), &few, &few[2..4]));
+    let small = pile(300);
+    everywhere("largest among small ones", &[&small[..], &product(&few, &few, &few[..3])].concat());
+}
+
+#[test]
+fn half_spaces_on_every_side() {
+    let half = 0.5 * f32::MAX;
+    let mut boxes = pile(500);
+    for axis in 0..3 {
+        for (low, high) in [(-half, half), (-INFINITY, INFINITY), (-f32::MAX, f32::MAX)] {
+            let (mut below, mut above) = (Aabb::new([low; 3], [high; 3]), Aabb::new([low; 3], [high; 3]));
+            below.max[axis] = 2.0;
+            above.min[axis] = 2.0f32.next_up();
+            boxes.extend([below, above, Aabb::new([low; 3], [high; 3])]);
+        }
+    }
+    everywhere("half-spaces", &boxes);
+}
+
+#[test]
+fn infinities_at_every_end() {
+    let numbers = [-INFINITY, -f32::MAX, 0.0, 1.0, INFINITY];
+    let few = intervals(&[-INFINITY, 0.5, INFINITY]);
+    everywhere("infinities", &product(&intervals(&numbers), &few, &[[0.0, 1.0], [-INFINITY, 0.0]]));
+    let small = pile(300);
+    everywhere("infinities among small ones", &[&small[..], &product(&few, &few, &few)].concat());
+}
+
+/// Which of its six numbers are spoiled: a bit each.
+fn spoiled(aabb: &Aabb, which: usize, with: impl Fn(f32) -> f32) -> Aabb {
+    let mut numbers: [f32; 6] = bytemuck::cast(*aabb);
+    for (k, number) in numbers.iter_mut().enumerate() {
+        *number = if which >> k & 1 == 1 { with(*number) } else { *number };
+    }
+    bytemuck::cast(numbers)
+}
+
+#[test]
+fn no_number_in_any_field_of_the_first_a_middle_and_the_last_box() {
+    let boxes = pile(120);
+    for which in 1..64 {
+        let mut bad = boxes.clone();
+        for id in [0, 57, 58, 119] {
+            bad[id] = spoiled(&bad[id], which, |_| f32::NAN);
+        }
+        crate::finder::check(&format!("NaN in {which:06b}"), &bad);
+    }
+}
+
+/// Spoiled when it comes, while it moves, twice, when its filter changes, when it is removed and comes back in one update,
+/// and while an update has begun.
+#[test]
+fn no_number_in_any_field_at_any_time() {
+    for (strategy, config) in strategies() {
+        // Each field, each axis, and all.
+        for which in [1, 2, 4, 8, 16, 32, 9, 18, 36, 63] {
+            let world = Follower::new(Config { margin: 0.01, ..config }, 60);
+            spoil_at_all_times(world, which, &format!("{strategy}, NaN in {which:06b}"));
+        }
+    }
+}
+
+fn spoil_at_all_times(mut world: Follower, which: usize, what: &str) {
+    let boxes = pile(60);
+    let bad = |id: usize| spoiled(&boxes[id], which, |_| f32::NAN);
+    let one_body = ProxyFilter { body: 4, ..ProxyFilter::ALL };
+    for (id, aabb) in boxes.iter().enumerate() {
+        world.set(id as u32, if id % 5 == 0 { bad(id) } else { *aabb }, ProxyFilter::ALL);
+    }
+    world.update(&format!("{what}, at first"));
+    for round in 0..5 {
+        for id in (round..60).step_by(4) {
+            let spoil = (id + round) % 3 != 0;
+            match round {
+                2 => world.remove(id as u32),
+                _ => world.set(id as u32, boxes[id], one_body),
+            }
+            let filter = if id % 2 == 0 { ProxyFilter::ALL } else { one_body };
+            world.set(id as u32, if spoil { bad(id) } else { boxes[id] }, filter);
+        }
+        world.update(&format!("{what}, round {round}"));
+    }
+    boxes.iter().enumerate().for_each(|(id, aabb)| world.set(id as u32, *aabb, ProxyFilter::ALL));
+    world.update(&format!("{what}, mended"));
+}
+
+#[test]
+fn inverted_boxes_on_any_axes_by_much_or_by_one_ulp() {
+    let boxes = pile(120);
+    let inverted = |b: &Aabb, axes: usize, by_an_ulp: bool| {
+        let mut bad = *b;
+        for k in (0..3).filter(|k| axes >> k & 1 == 1) {
+            (bad.min[k], bad.max[k]) = (b.max[k], if by_an_ulp { b.max[k].next_down() } else { b.min[k] });
+        }
+        bad
+    };
+    for by_an_ulp in [false, true] {
+        let bad: Vec<Aabb> = boxes
+            .iter()
+            .enumerate()
+            .map(|(i, b)| inverted(b, if i % 3 == 0 { i / 3 % 8 } else { 0 }, by_an_ulp))
+            .collect();
+        assert!(bad.iter().filter(|b| !b.is_valid()).count() == 35);
+        everywhere("inverted", &bad);
+        // There and back: an inverted box was a good one, and is again.
+        through_updates(
+            "inverted and mended",
+            &[boxes.clone(), bad.clone(), boxes.clone(), bad, boxes.clone()],
+        );
+    }
+}

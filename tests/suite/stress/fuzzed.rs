@@ -1,0 +1,48 @@
+//! What the fuzz targets check, without instruments: every input that once failed, and some that are random.
+
+use pbig_core::decode;
+use pbig_harness::files;
+use rand::rngs::StdRng;
+use rand::{RngExt, SeedableRng};
+
+#[path = "../../../fuzz/src/checks/mod.rs"]
+#[allow(unreachable_pub, reason = "the fuzz targets are other crates")]
+mod checks;
+
+const TARGETS: [(&str, fn(&[u8])); 5] = [
+    ("finder_against_oracle", checks::finder_against_oracle),
+    ("updates_against_scratch", checks::updates_against_scratch),
+    ("decode", checks::decode_words),
+    ("npy_reader", checks::npy_reader),
+    ("csv_reader", checks::csv_reader),
+];
+
+#[test]
+fn inputs_that_once_failed() {
+    let mut inputs = 0;
+    for (target, check) in TARGETS {
+        let folder = format!("{}/../fuzz/failed/{target}", env!("CARGO_MANIFEST_DIR"));
+        for file in std::fs::read_dir(folder).into_iter().flatten() {
+            let path = file.expect("a file").path();
+            println!("{}", path.display());
+            check(&std::fs::read(path).expect("readable"));
+            inputs += 1;
+        }
+    }
+    assert!(inputs > 0, "fuzz/failed has none");
+}
+
+#[test]
+fn random_bytes_on_every_target() {
+    for (target, check) in TARGETS {
+        println!("{target}");
+        for seed in 0..1500 {
+            let mut rng = StdRng::seed_from_u64(seed);
+            let length = rng.random_range(0..600);
+            // Few different values: of 256 kinds of bytes few would name the same box or id twice.
+            let kinds = [256, 48, 16][seed as usize % 3];
+            let bytes: Vec<u8> = (0..length).map(|_| rng.random_range(0..kinds) as u8).collect();
+            check(&bytes);
+        }
+    }
+}

@@ -1,0 +1,94 @@
+//! Numbers and worlds at which broad phases break, each through the finder and through updates, on every strategy, against
+//! the oracle. docs/STRESS.md says which test stands for what.
+
+mod extremes;
+mod fuzzed;
+mod memory;
+mod mixed;
+mod motion;
+mod multitudes;
+mod shapes;
+mod soak;
+
+use crate::finder::check;
+use crate::incremental::Follower;
+use pbig_core::{Aabb, Config, ProxyFilter};
+use pbig_tests::strategies;
+
+/// Whether sizes that take minutes or gigabytes are wanted, too: `PBIG_STRESS=1`.
+fn at_length() -> bool {
+    std::env::var_os("PBIG_STRESS").is_some()
+}
+
+/// A set through the finder, and through updates in which its boxes change places.
+fn everywhere(name: &str, boxes: &[Aabb]) {
+    check(name, boxes);
+    through_updates(name, &shuffled(boxes));
+}
+
+/// The ways to update: of the other strategies each is a search of everything, and the finder's tests have that.
+fn ways_to_update() -> Vec<(&'static str, Config)> {
+    let wanted = |name: &str| ["auto", "grid", "pbig", "gpu grid"].contains(&name);
+    strategies().into_iter().filter(|(name, _)| wanted(name)).collect()
+}
+
+/// The frames of a world one after the other; where little is searched, also with a margin.
+fn through_updates(name: &str, frames: &[Vec<Aabb>]) {
+    for (strategy, config) in ways_to_update() {
+        let margins: &[f32] = if ["auto", "grid"].contains(&strategy) { &[0.0, 0.01] } else { &[0.0] };
+        for &margin in margins {
+            let ids = frames.iter().map(Vec::len).max().unwrap_or(0);
+            let mut world = Follower::new(Config { margin, ..config }, ids);
+            play(&mut world, frames, &format!("{name}, {strategy}, margin {margin}"));
+        }
+    }
+}
+
+/// A box that stays is not set again.
+fn play(world: &mut Follower, frames: &[Vec<Aabb>], what: &str) {
+    let mut before: &[Aabb] = &[];
+    for (number, frame) in frames.iter().enumerate() {
+        step(world, before, frame);
+        world.update(&format!("{what}, frame {number}"));
+        before = frame;
+    }
+}
+
+fn step(world: &mut Follower, before: &[Aabb], frame: &[Aabb]) {
+    let bits = bytemuck::bytes_of::<Aabb>;
+    for (id, aabb) in frame.iter().enumerate() {
+        if before.get(id).is_none_or(|old| bits(old) != bits(aabb)) {
+            world.set(id as u32, *aabb, ProxyFilter::ALL);
+        }
+    }
+    (frame.len()..before.len()).for_each(|id| world.remove(id as u32));
+}
+
+/// The same boxes in other places: a few moved, all moved, a third gone, a few nowhere, all back.
+fn shuffled(boxes: &[Aabb]) -> Vec<Vec<Aabb>> {
+    let n = boxes.len();
+    let of = |id: usize| boxes[id % n.max(1)];
+    let few = (0..n).map(|id| if id % 11 == 0 { of(id * 7 + 3) } else { of(id) }).collect();
+    let all = (0..n).map(|id| of(id + 1)).collect();
+    let nowhere = (0..n).map(|id| if id % 13 == 0 { Aabb::NOWHERE } else { of(id) }).collect();
+    vec![boxes.to_vec(), few, all, boxes[..n - n / 3].to_vec(), nowhere, boxes.to_vec()]
+}
+
+/// Every closed interval between two of these numbers, points included.
+fn intervals(numbers: &[f32]) -> Vec<[f32; 2]> {
+    let from = |i: usize| numbers[i..].iter().map(move |high| [numbers[i], *high]);
+    (0..numbers.len()).flat_map(from).collect()
+}
+
+/// Every box of these intervals.
+fn product(x: &[[f32; 2]], y: &[[f32; 2]], z: &[[f32; 2]]) -> Vec<Aabb> {
+    let column =
+        |x: [f32; 2], y: [f32; 2]| z.iter().map(move |z| Aabb::new([x[0], y[0], z[0]], [x[1], y[1], z[1]]));
+    x.iter().flat_map(|x| y.iter().flat_map(move |y| column(*x, *y))).collect()
+}
+
+/// The box elsewhere.
+fn shifted(aabb: &Aabb, by: [f32; 3]) -> Aabb {
+    let moved = |corner: [f32; 3]| std::array::from_fn(|k| corner[k] + by[k]);
+    Aabb::new(moved(aabb.min), moved(aabb.max))
+}

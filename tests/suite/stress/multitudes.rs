@@ -1,0 +1,124 @@
+//! Boxes by the thousand in one place: complete, or an error that names the limit.
+
+use super::{at_length, ways_to_update};
+use crate::finder::check_on;
+use crate::incremental::Follower;
+use pbig_core::{Aabb, Backend, BroadPhase, Config, Error, Finder, Limits, Pair, ProxyFilter};
+use pbig_tests::strategies;
+
+fn all_pairs(n: u32) -> impl Iterator<Item = Pair> {
+    (0..n).flat_map(move |a| (a + 1..n).map(move |b| Pair { a, b }))
+}
+
+/// No two alike, each two overlapping.
+fn nested(n: usize) -> Vec<Aabb> {
+    let half = |i: usize| std::array::from_fn(|k| 1.0 + (i * (2 * k + 1) % 997) as f32);
+    (0..n).map(|i| Aabb::from_center([0.3; 3], half(i))).collect()
+}
+
+#[test]
+fn identical_boxes_by_the_thousand_in_three_places() {
+    let places = [[0.0; 3], [5.0, 0.0, 0.0], [1e7, -1e7, 3.0]];
+    for half in [0.0, 0.5] {
+        let boxes: Vec<Aabb> = (0..1800).map(|i| Aabb::from_center(places[i % 3], [half; 3])).collect();
+        check_on(strategies(), &format!("identical, half extent {half}"), &boxes);
+    }
+}
+
+/// Thousands in one place of which few may pair, through updates in which some leave and come back.
+#[test]
+fn identical_boxes_by_the_thousand_that_come_and_go() {
+    let cube = Aabb::from_center([1.0; 3], [0.5; 3]);
+    let (crowd, guest) = (
+        ProxyFilter { memberships: 1, mask: 2, ..ProxyFilter::ALL },
+        ProxyFilter { memberships: 2, mask: 3, ..ProxyFilter::ALL },
+    );
+    for (strategy, config) in ways_to_update() {
+        let mut world = Follower::new(config, 2400);
+        let filter = |id: u32| if id.is_multiple_of(480) { guest } else { crowd };
+        (0..2400).for_each(|id| world.set(id, cube, filter(id)));
+        world.update(&format!("{strategy}, all come"));
+        for round in 0..3 {
+            for id in (round..2400).step_by(240) {
+                world.remove(id);
+            }
+            world.update(&format!("{strategy}, some leave"));
+            (round..2400).step_by(240).for_each(|id| world.set(id, cube, filter(id)));
+            world.update(&format!("{strategy}, they return"));
+        }
+    }
+}
+
+#[test]
+fn everything_overlapping_everything_is_complete_or_an_error_that_names_the_limit() {
+    let (many, few) = (nested(20_000), nested(1200));
+    for (strategy, config) in strategies() {
+        let limited = Config { limits: Limits { max_pairs: 1_000_000, ..Limits::DEFAULT }, ..config };
+        let error = Finder::new(limited).find(&many).expect_err("2 * 10^8 pairs");
+        assert_eq!(error, Error::TooManyPairs { limit: 1_000_000 }, "{strategy}");
+        assert!(
+            error.to_string().contains("Limits::max_pairs = 1000000")
+                && error.to_string().contains("raise it")
+        );
+        let mut finder = Finder::new(config);
+        assert!(finder.find(&few).expect("10^6 pairs").iter().copied().eq(all_pairs(1200)), "{strategy}");
+    }
+}
+
+#[test]
+fn everything_overlapping_everything_in_updates() {
+    ways_to_update()
+        .into_iter()
+        .for_each(|(strategy, config)| complete_in_updates(config, strategy, &nested(1200)));
+}
+
+/// All come at once, one goes and comes back; before, the same with too low a limit, which changes nothing.
+fn complete_in_updates(config: Config, strategy: &str, boxes: &[Aabb]) {
+    let n = boxes.len() as u32;
+    let limits = Limits { max_pairs: 1000, ..Limits::DEFAULT };
+    for (config, complete) in [(Config { limits, ..config }, false), (config, true)] {
+        let mut broad_phase = BroadPhase::new(config).expect("a good margin");
+        for (id, aabb) in boxes.iter().enumerate() {
+            broad_phase.set(id as u32, *aabb, ProxyFilter::ALL).expect("a small id");
+        }
+        if !complete {
+            assert_eq!(broad_phase.update(), Err(Error::TooManyPairs { limit: 1000 }), "{strategy}");
+            assert_eq!(broad_phase.pair_count(), 0, "{strategy}");
+            continue;
+        }
+        assert!(
+            broad_phase.update().expect("the default limit").added.iter().copied().eq(all_pairs(n)),
+            "{strategy}"
+        );
+        broad_phase.remove(n / 2);
+        broad_phase.update().expect("fewer pairs");
+        assert_eq!(broad_phase.pair_count() as u64, u64::from(n - 1) * u64::from(n - 2) / 2, "{strategy}");
+        broad_phase.set(n / 2, boxes[0], ProxyFilter::ALL).expect("a small id");
+        assert_eq!(broad_phase.update().expect("the default limit").added.len() as u32, n - 1, "{strategy}");
+    }
+}
+
+/// 2 * 10^8 pairs, 1.6 GB of them alone: only where asked for (`PBIG_STRESS=1`), and not on software adapters, where it
+/// would take minutes.
+#[test]
+fn twenty_thousand_boxes_that_all_overlap() {
+    if !at_length() {
+        return;
+    }
+    let boxes = nested(20_000);
+    for (strategy, config) in strategies().into_iter().filter(|(_, config)| config.backend != Backend::Gpu) {
+        let clock = std::time::Instant::now();
+        let mut finder = Finder::new(config);
+        let found = finder.find(&boxes).expect("the default limit is 2^28");
+        println!("{strategy}: {} pairs in {:?}", found.len(), clock.elapsed());
+        assert!(found.iter().copied().eq(all_pairs(20_000)), "{strategy}");
+    }
+    let mut broad_phase = BroadPhase::new(Config::DEFAULT).expect("a good margin");
+    for (id, aabb) in boxes.iter().enumerate() {
+        broad_phase.set(id as u32, *aabb, ProxyFilter::ALL).expect("a small id");
+    }
+    let clock = std::time::Instant::now();
+    let added = &broad_phase.update().expect("the default limit is 2^28").added;
+    println!("in an update: {} pairs in {:?}", added.len(), clock.elapsed());
+    assert!(added.iter().copied().eq(all_pairs(20_000)));
+}

@@ -1,0 +1,184 @@
+//! Worlds that are flat, thin or on the borders of cells.
+
+use super::{everywhere, shifted};
+use crate::incremental::Follower;
+use pbig_core::plan::Chosen;
+use pbig_core::{Aabb, Backend, Config, Costs, Finder, Plan, ProxyFilter, Strategy};
+use pbig_harness::boxes::BoxSet;
+use pbig_tests::strategies;
+
+#[test]
+fn flat_worlds_of_any_thickness_on_every_axis() {
+    for axis in 0..3 {
+        for thickness in [0.0, f32::from_bits(1), 0.5] {
+            let place = |i: usize| {
+                let (u, v) = ((i % 36) as f32 * 0.97, (i / 36) as f32 * 1.03);
+                let mut at = [[u, v, 0.0], [u, 0.0, v], [0.0, u, v]][axis].map(|x| x - 17.0);
+                at[2 - axis] = 3.0;
+                at
+            };
+            let mut half = [0.5; 3];
+            half[2 - axis] = thickness;
+            let boxes: Vec<Aabb> = (0..1200).map(|i| Aabb::from_center(place(i), half)).collect();
+            everywhere(&format!("flat, normal to axis {}, thickness {thickness}", 2 - axis), &boxes);
+        }
+    }
+}
+
+#[test]
+fn linear_worlds_along_axes_and_diagonals() {
+    for direction in [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 1.0, 0.0], [1.0, -1.0, 1e-3]] {
+        let on_line =
+            |i: usize, half: [f32; 3]| Aabb::from_center(direction.map(|d| d * i as f32 * 0.7), half);
+        let beads: Vec<Aabb> = (0..1100).map(|i| on_line(i, [0.5; 3])).collect();
+        everywhere(&format!("beads along {direction:?}"), &beads);
+        // Thin as the line itself: segments that touch end to end.
+        let segments: Vec<Aabb> =
+            (0..300).map(|i| on_line(i, direction.map(|d: f32| d.abs() * 0.35))).collect();
+        everywhere(&format!("segments along {direction:?}"), &segments);
+    }
+}
+
+#[test]
+fn needles_a_billion_times_longer_than_thick() {
+    let needle = |i: usize| {
+        let mut half = [1e-4; 3];
+        half[i % 3] = [1e5, 10.0, 1.0][i / 3 % 3];
+        let at = [i * 17 % 23, i * 29 % 31, i * 7 % 19].map(|x| x as f32 * 0.05);
+        Aabb::from_center(at, half)
+    };
+    everywhere("needles", &(0..1100).map(needle).collect::<Vec<_>>());
+}
+
+/// A grid: where it begins, how long its cells are, and how large its boxes.
+#[derive(Clone, Copy, PartialEq)]
+struct Grid {
+    origin: [f32; 3],
+    cell: [f64; 3],
+    most: [f64; 3],
+}
+
+/// The grids of a plan, smallest boxes first.
+fn grids(plan: &Plan) -> Vec<Grid> {
+    let cube = |origin, edge: f64| Grid { origin, cell: [edge; 3], most: [edge; 3] };
+    let on_cpu = plan.levels.iter().map(|level| Grid {
+        origin: level.origin,
+        cell: level.cell.map(f64::from),
+        most: level.max_extent.map(f64::from),
+    });
+    let pbig = plan.pbig.iter().map(|pbig| cube(pbig.origin, f64::from(pbig.cell)));
+    let gpu = plan.gpu.iter().flat_map(|gpu| {
+        let divided = gpu.levels.split_last().map_or(&[][..], |(_, levels)| levels);
+        divided.iter().map(|level| cube(gpu.origin, f64::from(gpu.cell) * f64::from(level.shift).exp2()))
+    });
+    on_cpu.chain(pbig).chain(gpu).collect()
+}
+
+/// The grid that a box belongs to.
+fn home(aabb: &Aabb, grids: &[Grid]) -> Grid {
+    let holds = |grid: &&Grid| (0..3).all(|k| f64::from(aabb.extents()[k]) <= grid.most[k]);
+    grids.iter().find(holds).copied().unwrap_or(grids[grids.len() - 1])
+}
+
+/// The box moved so that its lower or upper corner is on a border of its cells, or one ulp beside it.
+fn onto_border(aabb: &Aabb, grids: &[Grid], i: usize) -> Aabb {
+    let Grid { origin, cell, .. } = home(aabb, grids);
+    let by = |k: usize| {
+        let corner = if i.is_multiple_of(2) { aabb.min[k] } else { aabb.max[k] };
+        let (start, cell) = (f64::from(origin[k]), cell[k]);
+        let border = (start + ((f64::from(corner) - start) / cell).round() * cell) as f32;
+        [border, border.next_up(), border.next_down()][i / 2 % 3] - corner
+    };
+    shifted(aabb, std::array::from_fn(by))
+}
+
+fn on_border(aabb: &Aabb, grids: &[Grid]) -> bool {
+    let Grid { origin, cell, .. } = home(aabb, grids);
+    let beside = |x: f32, k: usize| {
+        let place = (f64::from(x) - f64::from(origin[k])) / cell[k];
+        (place - place.round()).abs() < 1e-4
+    };
+    (0..3).all(|k| beside(aabb.min[k], k)) || (0..3).all(|k| beside(aabb.max[k], k))
+}
+
+/// Three heaps of cubes, each a hundred times larger than the one before.
+fn heaps() -> Vec<Aabb> {
+    let pile = BoxSet::named("pile").expect("the set exists");
+    let heap = |(scale, at): (f32, f32)| {
+        let there = move |x: f32| x * scale + at;
+        pile.boxes(800, 2).into_iter().map(move |b| Aabb::new(b.min.map(there), b.max.map(there)))
+    };
+    [(0.01, 0.0), (1.0, 50.0), (100.0, 500.0)].into_iter().flat_map(heap).collect()
+}
+
+/// The boxes, every other one of them moved onto a border of the cells that the plan for them has. Cells follow the
+/// boxes, so none leaves the space that all have, and it is tried again until they stay.
+fn on_borders(start: &[Aabb], config: Config) -> (Vec<Aabb>, usize) {
+    let (mut boxes, mut best) = (start.to_vec(), (start.to_vec(), 0));
+    let space = start.iter().fold(Aabb::NOWHERE, |all, aabb| all.union(aabb));
+    for _ in 0..8 {
+        let mut finder = Finder::new(config);
+        finder.find(&boxes).expect("few pairs");
+        let grids = grids(&finder.report().plan);
+        if grids.is_empty() {
+            break;
+        }
+        let on = boxes.iter().filter(|aabb| on_border(aabb, &grids)).count();
+        best = if on > best.1 { (boxes, on) } else { best };
+        let put = |(i, aabb): (usize, &Aabb)| {
+            let there = onto_border(aabb, &grids, i / 2);
+            if i % 2 == 1 && space.contains(&there) { there } else { *aabb }
+        };
+        boxes = start.iter().enumerate().map(put).collect();
+    }
+    best
+}
+
+#[test]
+fn boxes_on_the_borders_of_the_cells_that_are_planned_for_them() {
+    // Cells by density follow every box that moves: no set was found that lies on the borders of its own.
+    let settled = |name: &str| !["brute", "gpu", "pbig by density"].contains(&name);
+    for (strategy, config) in strategies().into_iter().filter(|(name, _)| settled(name)) {
+        let config = Config { costs: Some(Costs::REFERENCE), ..config };
+        let (boxes, on) = on_borders(&heaps(), config);
+        println!("{strategy}: {on} boxes on borders");
+        assert!(on > 300, "{strategy}: only {on} of {} boxes are on borders", boxes.len());
+        everywhere_on(config, strategy, &boxes);
+    }
+}
+
+/// Few boxes at a time, so that the grid that is there mostly stays: on the borders of its cells, level by level.
+#[test]
+fn boxes_on_the_borders_of_cells_at_every_level() {
+    let start = heaps();
+    let config = Config { strategy: Strategy::Grid, backend: Backend::Cpu, ..Config::DEFAULT };
+    let mut world = Follower::new(config, start.len());
+    super::step(&mut world, &[], &start);
+    world.update("the heaps");
+    let (mut there, mut edits) = (grids(&world.broad_phase.report().plan), 0);
+    let mut on = [0; 2];
+    for round in 0..12 {
+        for i in (round..start.len()).step_by(37) {
+            let aabb = onto_border(&start[i], &there, i / 37 + round);
+            world.set(i as u32, aabb, ProxyFilter::ALL);
+            let level = there.iter().position(|grid| *grid == home(&aabb, &there)).unwrap_or(0);
+            on[level] += usize::from(on_border(&aabb, &there));
+        }
+        world.update(&format!("round {round}"));
+        let plan = &world.broad_phase.report().plan;
+        // Now and then, when many are out of its order, the grid is built anew.
+        match plan.chosen {
+            Chosen::Edit => edits += 1,
+            _ => there = grids(plan),
+        }
+    }
+    assert!(edits >= 8, "{edits} updates with the grid that was there");
+    assert!(on.iter().all(|on| *on > 100), "{on:?} by level");
+}
+
+/// What lies on the borders of one strategy's cells is of no special place to another.
+fn everywhere_on(config: Config, strategy: &str, boxes: &[Aabb]) {
+    crate::finder::check_on(vec![(strategy, config)], "on borders", boxes);
+    let mut world = Follower::new(config, boxes.len());
+    super::play(&mut world, &super::shuffled(boxes), &format!("on borders, {strategy}"));
+}
