@@ -152,13 +152,13 @@ impl Wander {
     fn drift(&mut self) {
         let space = self.home.iter().fold(Aabb::NOWHERE, |space, home| space.union(home));
         for (aabb, velocity) in self.boxes.iter_mut().zip(&mut self.velocities) {
-            for k in 0..3 {
+            for (k, v) in velocity.iter_mut().enumerate() {
                 let (out, below) = (aabb.max[k] > space.max[k], aabb.min[k] < space.min[k]);
-                if (out && velocity[k] > 0.0) || (below && velocity[k] < 0.0) {
-                    velocity[k] = -velocity[k];
+                if (out && *v > 0.0) || (below && *v < 0.0) {
+                    *v = -*v;
                 }
-                aabb.min[k] += velocity[k];
-                aabb.max[k] += velocity[k];
+                aabb.min[k] += *v;
+                aabb.max[k] += *v;
             }
         }
     }

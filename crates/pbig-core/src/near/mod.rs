@@ -37,6 +37,9 @@ const TOGETHER: usize = 32;
 /// Walks that cost as much as an index.
 const WALKS: usize = 8;
 
+/// Some pairs, and their places.
+type Piece<'a> = (&'a [Pair], &'a [u32]);
+
 /// Near pairs, and which of them are kept: 12 bytes each, 8 more with an index, and 4 for each kept one.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct NearPairs {
@@ -287,7 +290,7 @@ impl NearPairs {
         let pieces = pairs.len().div_ceil(PIECE);
         self.flips.resize(pieces.max(self.flips.len()).max(1), Vec::new());
         self.flips.iter_mut().for_each(Vec::clear);
-        let walk = |(i, ((pairs, places), flips)): (usize, ((&[Pair], &[u32]), &mut Vec<u32>))| -> u64 {
+        let walk = |(i, ((pairs, places), flips)): (usize, (Piece<'_>, &mut Vec<u32>))| -> u64 {
             let blocks = pairs.chunks(BLOCK).zip(places.chunks(BLOCK)).enumerate();
             let first = first + i * PIECE;
             blocks.map(|(k, block)| test(block, (first + k * BLOCK) as u32, boxes, flips)).sum()
@@ -347,7 +350,7 @@ impl NearPairs {
 /// Of a block of pairs and their places, those whose test ends otherwise than the last time; how many overlap. No branches:
 /// what flips is a coin toss.
 #[inline(always)]
-fn test((pairs, places): (&[Pair], &[u32]), first: u32, boxes: &[Aabb], flips: &mut Vec<u32>) -> u64 {
+fn test((pairs, places): Piece<'_>, first: u32, boxes: &[Aabb], flips: &mut Vec<u32>) -> u64 {
     let (mut found, mut count, mut overlaps) = ([0; BLOCK], 0, 0);
     for (i, (&Pair { a, b }, &place)) in pairs.iter().zip(places).enumerate() {
         if let Some(ahead) = pairs.get(i + AHEAD) {

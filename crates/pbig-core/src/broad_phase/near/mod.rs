@@ -212,7 +212,7 @@ impl BroadPhase {
     fn find_reaches(&mut self) -> Result<(), Error> {
         let accept = Allowed(&self.filters);
         let rule = Rule { accept: &accept, filters: Some(&self.filters), filters_suffice: true, before: &[] };
-        let mut config = self.config.clone();
+        let mut config = self.config;
         config.limits.max_pairs = self.most_near();
         let summary = LazySummary::new(&self.near.reach, None, self.base.spare.take());
         let (invalid, report) = (self.report.invalid, &mut self.report);
