@@ -9,7 +9,10 @@ use rand::{RngExt, SeedableRng};
 #[allow(unreachable_pub, reason = "the fuzz targets are other crates")]
 mod checks;
 
-const TARGETS: [(&str, fn(&[u8])); 5] = [
+/// A name, and what is done with some bytes.
+type Target = (&'static str, fn(&[u8]));
+
+const TARGETS: [Target; 5] = [
     ("finder_against_oracle", checks::finder_against_oracle),
     ("updates_against_scratch", checks::updates_against_scratch),
     ("decode", checks::decode_words),
