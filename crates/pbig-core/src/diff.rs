@@ -83,6 +83,11 @@ impl PairStore {
         if self.removed.is_empty() { self.pairs.len() } else { self.iter().count() }
     }
 
+    /// How many there are at most: those of boxes that have been removed count.
+    pub(crate) fn listed(&self) -> usize {
+        self.pairs.len()
+    }
+
     /// How many pairs a box has; counted as [`PairStore::len`].
     pub(crate) fn degree(&self, id: u32) -> u32 {
         if self.removed.is_empty() { self.listed_degree(id) } else { self.of(id).count() as u32 }

@@ -262,13 +262,13 @@ impl<R: Record> Search<R> {
 
     /// Measures for [`Backend::Auto`].
     #[cfg(feature = "gpu")]
-    fn note_time(&mut self, on_gpu: bool, boxes: usize, time: Duration) {
+    pub(crate) fn note_time(&mut self, on_gpu: bool, boxes: usize, time: Duration) {
         self.trial.note(on_gpu, boxes, time);
     }
 
     #[cfg(not(feature = "gpu"))]
     #[expect(clippy::unused_self, reason = "as with a GPU backend")]
-    fn note_time(&mut self, _: bool, _: usize, _: Duration) {}
+    pub(crate) fn note_time(&mut self, _: bool, _: usize, _: Duration) {}
 
     fn find_pbig<A>(
         &mut self,

@@ -107,7 +107,7 @@ impl Player {
     }
 
     /// What the oracle makes of the boxes; of those of the beginning where an update has begun.
-    fn searched_anew(&self) -> BTreeSet<Pair> {
+    fn wanted_pairs(&self) -> BTreeSet<Pair> {
         let fat: Vec<Aabb> =
             (0..self.ids).map(|id| self.broad_phase.fat_aabb(id).unwrap_or(Aabb::NOWHERE)).collect();
         let filters: Vec<ProxyFilter> =
@@ -116,7 +116,7 @@ impl Player {
     }
 
     fn update(&mut self) -> Option<()> {
-        let wanted = self.searched_anew();
+        let wanted = self.wanted_pairs();
         if wanted.len() > MOST_PAIRS {
             return None;
         }

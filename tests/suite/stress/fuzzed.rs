@@ -9,10 +9,9 @@ use rand::{RngExt, SeedableRng};
 #[allow(unreachable_pub, reason = "the fuzz targets are other crates")]
 mod checks;
 
-/// A name, and what is done with some bytes.
-type Target = (&'static str, fn(&[u8]));
+type Check = fn(&[u8]);
 
-const TARGETS: [Target; 5] = [
+const TARGETS: [(&str, Check); 5] = [
     ("finder_against_oracle", checks::finder_against_oracle),
     ("updates_against_scratch", checks::updates_against_scratch),
     ("decode", checks::decode_words),

@@ -67,11 +67,7 @@ fn grids(plan: &Plan) -> Vec<Grid> {
         most: level.max_extent.map(f64::from),
     });
     let pbig = plan.pbig.iter().map(|pbig| cube(pbig.origin, f64::from(pbig.cell)));
-    let gpu = plan.gpu.iter().flat_map(|gpu| {
-        let divided = gpu.levels.split_last().map_or(&[][..], |(_, levels)| levels);
-        divided.iter().map(|level| cube(gpu.origin, f64::from(gpu.cell) * f64::from(level.shift).exp2()))
-    });
-    on_cpu.chain(pbig).chain(gpu).collect()
+    on_cpu.chain(pbig).collect()
 }
 
 /// The grid that a box belongs to.
@@ -136,8 +132,8 @@ fn on_borders(start: &[Aabb], config: Config) -> (Vec<Aabb>, usize) {
 
 #[test]
 fn boxes_on_the_borders_of_the_cells_that_are_planned_for_them() {
-    // Cells by density follow every box that moves: no set was found that lies on the borders of its own.
-    let settled = |name: &str| !["brute", "gpu", "pbig by density"].contains(&name);
+    // Cells by density, and the middle of a GPU's, follow every box that moves: there the corpus has lattices that touch.
+    let settled = |name: &str| ["auto", "grid", "pbig"].contains(&name);
     for (strategy, config) in strategies().into_iter().filter(|(name, _)| settled(name)) {
         let config = Config { costs: Some(Costs::REFERENCE), ..config };
         let (boxes, on) = on_borders(&heaps(), config);

@@ -4,6 +4,7 @@
 mod allocations;
 #[cfg(feature = "gpu")]
 mod device;
+mod flag;
 mod near;
 mod overlap;
 mod small;
@@ -48,21 +49,6 @@ struct Old {
     filter: ProxyFilter,
 }
 
-/// What is known about an id, a bit each.
-mod flag {
-    /// It was set and not removed.
-    pub(super) const PRESENT: u8 = 1;
-    /// Box or filter have changed since the last update.
-    pub(super) const CHANGED: u8 = 2;
-    /// The filter has.
-    pub(super) const REFILTERED: u8 = 4;
-    /// It has left its reach.
-    pub(super) const AWAY: u8 = 8;
-    /// The device has told that the box has lost pairs.
-    #[cfg(feature = "gpu")]
-    pub(super) const ENDING: u8 = 16;
-}
-
 /// Boxes by id, and the pairs between them, kept from update to update.
 ///
 /// Each box is stored fat, grown by [`Config::margin`]; while later boxes stay inside, nothing has
@@ -70,7 +56,8 @@ mod flag {
 ///
 /// On the CPU up to 1024 boxes are kept in a bitmap index, in which changed boxes are looked up. More
 /// lie in a base grid. Where few change they are put into other cells, and only they are searched. When a
-/// quarter of all boxes changes, or an eighth is out of the grid's order, it is built anew.
+/// quarter of all boxes changes, or an eighth is out of the grid's order, it is built anew. Where motion is small, pairs of
+/// boxes that are near each other are found for many updates at once, and an update only tests these.
 /// ([`crate::Strategy::Pbig`] and [`crate::Backend::Brute`] search everything at every update that changes
 /// something. A GPU is told what has changed, and tells which pairs came or went.)
 ///

@@ -40,6 +40,12 @@ impl Small {
         self.pause = self.pause.saturating_sub(1);
     }
 
+    /// Leaves so many updates to another search.
+    #[cfg(test)]
+    pub(super) fn rest_for(&mut self, updates: u32) {
+        self.pause = updates;
+    }
+
     /// What an update has cost decides about the next.
     fn judge(&mut self, cost: Cost, changed: usize) {
         self.age += 1;

@@ -27,7 +27,7 @@ impl BroadPhase {
     }
 
     /// The pairs of one box (see [`BroadPhase::pair_count`]), in no particular order. While most boxes change in every
-    /// update all pairs are looked at.
+    /// update, and until few have for long, all pairs are looked at.
     pub fn pairs_of(&self, id: u32) -> impl Iterator<Item = Pair> {
         self.pairs.of(id)
     }
@@ -64,7 +64,8 @@ impl BroadPhase {
         self.filters.get(id as usize).filter(|_| self.contains(id))
     }
 
-    /// The cells of the CPU's grids that boxes lie in, level by level, for a picture of them; none where the
+    /// The cells of the CPU's grids that boxes lie in (while near pairs do the work, boxes grown by the skin), level by
+    /// level, for a picture of them; none where the
     /// boxes are searched without grids or on a GPU. Takes time and memory proportional to the boxes.
     pub fn cells(&self) -> Vec<OccupiedCell> {
         let mut cells = Vec::new();

@@ -62,8 +62,7 @@ impl BroadPhase {
             return Ok(Way::Near);
         }
         self.pairs.drop_removed();
-        let is_due = self.many_changed() || self.is_edited();
-        if let Some(skin) = self.skin(is_due)
+        if let Some(skin) = self.skin()
             && self.search_near(skin)? == Served::Yes
         {
             return Ok(Way::Near);
@@ -115,6 +114,7 @@ impl BroadPhase {
         self.has_base = self.config.strategy != Strategy::Pbig || self.config.backend == Backend::Brute;
         self.base_plan = self.report.plan.clone();
         (self.base_checks, self.strain) = (self.report.checks.made, 0);
+        self.near.met = self.base.found.overlaps;
         self.base.found.chunks.iter().for_each(|chunk| self.events.added.extend_from_slice(chunk));
         Ok(Way::Other)
     }

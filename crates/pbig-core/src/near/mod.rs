@@ -216,6 +216,7 @@ impl NearPairs {
         if self.walked <= WALKS * all {
             return false;
         }
+        self.walked = 0;
         self.index.make(&self.pairs, &self.places, ids);
         true
     }

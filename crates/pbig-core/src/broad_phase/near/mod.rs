@@ -1,6 +1,6 @@
 //! Updates by near pairs: most motion is small, and what was apart by more cannot have met.
 //!
-//! When many boxes move, or few have moved often, boxes are grown by a skin, pairs of those are found once, and updates
+//! When many boxes move, they are grown by a skin, pairs of those are found once, and updates
 //! only test them (`crate::near`). Boxes that leave their reach get a new one and are searched for, as edits of the grid of
 //! reaches; when they become many, all is searched anew. The skin is as wide as some moves, which it lasts for: wider, there
 //! are more near pairs to test; narrower, searches come more often. Where boxes jump so far that near pairs would be many,
@@ -63,8 +63,10 @@ impl BroadPhase {
             self.near.end();
             return Ok(Served::No);
         }
+        let mut clock = Instant::now();
         self.near.age += 1;
         self.shrink_skin();
+        self.report.stages.plan += lap(&mut clock);
         self.report_near();
         self.check_near_limit()
     }
@@ -110,7 +112,8 @@ impl BroadPhase {
     }
 
     fn most_near(&self) -> u64 {
-        NEAR_OF_A_BOX * u64::from(self.present_count) + 2 * self.pairs.len() as u64
+        let most = NEAR_OF_A_BOX * u64::from(self.present_count) + 2 * self.pairs.listed() as u64;
+        most.min(u64::from(u32::MAX / 2))
     }
 
     fn edit_reaches(&mut self) {
@@ -148,6 +151,8 @@ impl BroadPhase {
 
     /// Adds the near pairs of boxes that were away, and tells which of their pairs have ended.
     fn welcome(&mut self) {
+        stage!("diff");
+        let mut clock = Instant::now();
         let state = state!(self);
         let (added, removed) = (&mut self.events.added, &mut self.events.removed);
         self.near.list.extend(&self.found.chunks, &self.boxes, &mut self.pairs, |pair| {
@@ -158,6 +163,7 @@ impl BroadPhase {
         let ended = |pair: &&Pair| state.paired_before(pair.a, pair.b) && !state.holds(**pair);
         removed.extend(self.near.parted.iter().filter(ended));
         self.pairs.forget_removed();
+        self.report.stages.diff += lap(&mut clock);
     }
 
     fn report_near(&mut self) {
@@ -165,6 +171,11 @@ impl BroadPhase {
         self.report.checks = Checks { made, unnecessary: made - needed, redundant: 0 };
         let (moved, boxes) = (self.base.map.out_of_order() as u32, self.valid_count());
         self.report.plan = Plan { chosen: Chosen::Near, moved, boxes, ..self.base_plan.clone() };
+        // A device that is compared with the CPU is compared with this.
+        if self.many_changed() {
+            let time = self.report.stages.total();
+            self.base.note_time(false, self.boxes.len(), time);
+        }
     }
 
     /// Too many new pairs: all is as it was, for the next attempt.
@@ -187,12 +198,12 @@ impl BroadPhase {
         let reach = |aabb: &Aabb| aabb.inflated(skin);
         self.near.reach.clear();
         self.near.reach.extend(self.boxes.iter().map(reach));
-        (self.near.skin, self.near.age, self.near.edited) = (skin, 0, 0);
+        (self.near.skin, self.near.age) = (skin, 0);
         (self.near.farthest, self.near.farthest_then) = (0.0, 0.0);
         self.near.own = Cost::default();
         self.report.stages.map += lap(&mut clock);
         if self.find_reaches().is_err() {
-            self.near.end();
+            self.near.fail();
             return Ok(Served::No);
         }
         stage!("diff");

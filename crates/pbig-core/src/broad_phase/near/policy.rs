@@ -15,8 +15,8 @@ const SEARCH_OF_A_BOX: f32 = 24.0;
 /// Boxes whose moves are looked at.
 const SAMPLE: usize = 256;
 
-/// One in so many boxes has to be edited before a list is made for few.
-const EDITED: usize = 4;
+/// Lists after which an update goes without one, so that what that takes is known.
+const LISTS: u32 = 8;
 
 /// What a list may cost, of what updates cost without one.
 const PAYS: f32 = 0.9;
@@ -50,8 +50,12 @@ pub(crate) struct Near {
     pub(crate) own: Cost,
     /// For each changed box, what the last ones without any have: ns.
     pub(crate) usual: Option<f32>,
-    /// Boxes that were edited since the last search of all.
-    pub(crate) edited: usize,
+    /// Lists so far.
+    pub(crate) lists: u32,
+    /// Whether an attempt has failed in this update, so that its time says nothing.
+    pub(crate) failed: bool,
+    /// Pairs that the last search of all has met, whether filters allow them or not.
+    pub(crate) met: u64,
     /// Boxes that have left their reach in this update.
     pub(crate) away: Vec<u32>,
     /// Kept pairs of those, which may go on.
@@ -61,8 +65,8 @@ pub(crate) struct Near {
 /// What updates have cost.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Cost {
-    ns: f32,
-    changed: f32,
+    pub(crate) ns: f32,
+    pub(crate) changed: f32,
 }
 
 impl Default for Near {
@@ -80,7 +84,9 @@ impl Default for Near {
             next_pause: 0,
             own: Cost::default(),
             usual: None,
-            edited: 0,
+            lists: 0,
+            failed: false,
+            met: 0,
             away: vec![],
             parted: vec![],
         }
@@ -88,7 +94,7 @@ impl Default for Near {
 }
 
 impl Near {
-    /// Another search has done the work.
+    /// Another search has done the work: the list no longer holds.
     pub(crate) fn stop(&mut self) {
         if std::mem::take(&mut self.is_on) {
             self.list.clear();
@@ -112,6 +118,9 @@ impl Near {
 
     /// What an update has taken, in which so many boxes have changed.
     pub(crate) fn note_time(&mut self, way: Way, changed: usize, time: Duration) {
+        if std::mem::take(&mut self.failed) {
+            return;
+        }
         let (ns, changed) = (time.as_nanos() as f32, changed as f32);
         if way == Way::Near {
             self.own = Cost { ns: self.own.ns + ns, changed: self.own.changed + changed };
@@ -121,20 +130,39 @@ impl Near {
         }
     }
 
-    /// No longer any good; if it has not paid, the next one comes later.
+    /// A list is no longer any good; if it has not paid, the next one comes later.
     pub(crate) fn end(&mut self) {
         self.stop();
+        self.lists += 1;
         let pays = self.usual.is_none_or(|usual| self.own.ns < PAYS * usual * self.own.changed);
-        self.next_pause =
-            if pays && self.age >= LONG { 0 } else { (2 * self.next_pause + 1).min(LONGEST_PAUSE) };
+        if pays && self.age >= LONG {
+            self.next_pause = 0;
+            self.pause = u32::from(self.lists.is_multiple_of(LISTS));
+        } else {
+            self.wait();
+        }
+    }
+
+    /// Too many pairs are near.
+    pub(crate) fn fail(&mut self) {
+        self.stop();
+        self.failed = true;
+        self.wait();
+    }
+
+    fn wait(&mut self) {
+        self.next_pause = (2 * self.next_pause + 1).min(LONGEST_PAUSE);
         self.pause = self.next_pause;
     }
 }
 
 impl BroadPhase {
     /// Whether to look for near pairs now, and how far.
-    pub(crate) fn skin(&mut self, is_due: bool) -> Option<f32> {
-        if !is_due || self.config.backend == Backend::Brute || self.config.strategy == Strategy::Pbig {
+    pub(crate) fn skin(&mut self) -> Option<f32> {
+        if !self.many_changed()
+            || self.config.backend == Backend::Brute
+            || self.config.strategy == Strategy::Pbig
+        {
             return None;
         }
         if self.near.pause > 0 || self.near.usual.is_none() {
@@ -142,17 +170,35 @@ impl BroadPhase {
             return None;
         }
         let skin = self.near.moves * self.usual_move()?;
-        (skin > 0.0 && skin.is_finite()).then_some(skin)
+        if !(skin > 0.0 && skin.is_finite()) {
+            return None;
+        }
+        // Filters may turn down most of what is near: a search would look at all that, and find little.
+        if self.near_to_come(skin) > self.most_near() as f64 {
+            self.near.wait();
+            return None;
+        }
+        Some(skin)
     }
 
-    /// Whether edits have moved so many boxes that a list would have paid by now.
-    pub(crate) fn is_edited(&mut self) -> bool {
-        self.near.edited += self.changed.len();
-        let is_due = self.near.edited * EDITED >= self.present_count as usize;
-        if is_due {
-            self.near.edited = 0;
+    /// How many pairs would be near: those that overlap, as often as there is more room around a box; filters left aside.
+    fn near_to_come(&self, skin: f32) -> f64 {
+        let mut edges = [0.0f32; SAMPLE];
+        let step = self.changed.len().div_ceil(SAMPLE).max(1);
+        let mut count = 0;
+        for &id in self.changed.iter().step_by(step) {
+            let extents = self.boxes[id as usize].extents();
+            let edge = (extents[0] + extents[1] + extents[2]) / 3.0;
+            if edge.is_finite() {
+                edges[count] = edge;
+                count += 1;
+            }
         }
-        is_due
+        let edges = &mut edges[..count];
+        edges.sort_unstable_by(f32::total_cmp);
+        let Some(&edge) = edges.get(count / 2) else { return 0.0 };
+        let grown = 1.0 + 2.0 * f64::from(skin) / f64::from(edge);
+        self.near.met as f64 * grown.powi(3)
     }
 
     /// How far boxes move in an update: nine in ten of those that have changed no further.

@@ -1,5 +1,6 @@
 //! Updates by near pairs against the oracle, and when there are any.
 
+use super::policy::{Cost, Near};
 use crate::broad_phase::{BroadPhase, Events};
 use crate::plan::Chosen;
 use crate::{Aabb, Config, Error, Limits, Pair, ProxyFilter, Strategy, oracle};
@@ -19,11 +20,19 @@ struct World {
 
 impl World {
     fn new(margin: f32) -> Self {
+        Self::with(margin, BOXES, 7.0)
+    }
+
+    fn of(boxes: u32, reach: f32) -> Self {
+        Self::with(0.0, boxes, reach)
+    }
+
+    fn with(margin: f32, boxes: u32, reach: f32) -> Self {
         let config = Config { strategy: Strategy::Grid, margin, ..Config::DEFAULT };
         let broad_phase = BroadPhase::new(config).expect("a margin");
         let mut world = Self { broad_phase, boxes: vec![], pairs: BTreeSet::new(), seed: 11, near: 0 };
-        for id in 0..BOXES {
-            let center = world.vector().map(|x| 7.0 * x);
+        for id in 0..boxes {
+            let center = world.vector().map(|x| reach * x);
             world.boxes.push(Aabb::from_center(center, [0.5; 3]));
             world.set(id);
         }
@@ -53,7 +62,7 @@ impl World {
     }
 
     fn tremble(&mut self, by: f32) {
-        for id in 0..BOXES {
+        for id in 0..self.boxes.len() as u32 {
             let by = self.vector().map(|x| by * x);
             self.shift(id, by);
         }
@@ -123,22 +132,93 @@ fn all_that_can_happen_to_a_box_happens_while_the_others_tremble() {
 }
 
 #[test]
-fn few_movers_get_a_list_when_they_have_moved_often() {
+fn few_that_move_under_a_list_are_looked_up() {
     let mut world = World::new(0.0);
-    for round in 0..200u32 {
-        for id in (round % 60..BOXES).step_by(60) {
-            let by = if round / 60 % 2 == 0 { 0.05 } else { -0.05 };
+    for round in 0..4 {
+        world.tremble(0.05);
+        world.update(&format!("trembling {round}"));
+    }
+    assert!(world.broad_phase.near.is_on);
+    let mut events = 0;
+    for round in 0..120u32 {
+        // All that are near one box: of the pairs that come and go, many are of two that have moved.
+        let center = world.boxes[(round % 60) as usize * 25].inflated(1.0);
+        let around: Vec<u32> =
+            (0..BOXES).filter(|id| center.overlaps(&world.boxes[*id as usize])).take(40).collect();
+        for &id in &around {
+            let by = if (id + round / 60).is_multiple_of(2) { 0.08 } else { -0.08 };
             world.shift(id, [by, 0.0, -by]);
         }
-        if round % 9 == 0 {
-            world.shift(round, [2.0, 2.0, 0.0]);
+        world.update(&format!("round {round}"));
+        events += world.broad_phase.events().added.len();
+    }
+    assert!(world.near > 100 && events > 100, "{} updates by near pairs, {events} pairs came", world.near);
+}
+
+/// More pairs than a piece of a walk has, so that threads share it.
+#[test]
+fn a_list_of_many_pieces_is_walked_whole() {
+    let mut world = World::of(6000, 9.0);
+    for round in 0..8 {
+        world.tremble(0.03);
+        (0..6).for_each(|k| world.shift(61 * k + round, [1.0, 1.0, 0.0]));
+        world.update(&format!("round {round}"));
+    }
+    let made = world.broad_phase.report().checks.made;
+    assert!(world.near > 4 && made > 40_000, "{} updates, {made} tests", world.near);
+}
+
+#[test]
+fn a_world_that_changes_between_bitmap_and_list_has_neither_stale() {
+    let mut world = World::of(1000, 5.0);
+    world.broad_phase.config.strategy = Strategy::Auto;
+    let mut turns = 0;
+    for round in 0..40u32 {
+        world.tremble(0.03);
+        let was_on = world.broad_phase.near.is_on;
+        world.broad_phase.small.rest_for(if round % 10 < 5 { 2 } else { 0 });
+        world.update(&format!("round {round}"));
+        turns += u32::from(was_on != world.broad_phase.near.is_on);
+    }
+    assert!(turns > 4, "{turns} turns");
+}
+
+#[test]
+fn no_list_is_tried_where_filters_turn_down_most_of_what_would_be_near() {
+    let mut world = World::new(0.0);
+    let filter =
+        |id: u32| ProxyFilter { memberships: 1 << (id % 32), mask: 1 << (id % 32), ..ProxyFilter::ALL };
+    for round in 0..40 {
+        for id in 0..BOXES {
+            let by = world.vector();
+            world.shift(id, by);
+            world.broad_phase.set(id, world.boxes[id as usize], filter(id)).expect("a small id");
         }
         world.update(&format!("round {round}"));
-        let report = world.broad_phase.report();
-        let is_cheap = report.checks.made < 20 * 25;
-        assert!(round < 150 || report.plan.chosen != Chosen::Near || is_cheap, "{report:?}");
+        let made = world.broad_phase.report().checks.made;
+        assert!(made < u64::from(BOXES) * 200, "{made} tests in round {round}");
     }
-    assert!(world.near > 100, "{} updates by near pairs", world.near);
+}
+
+#[test]
+fn what_lists_cost_decides_about_skins_and_pauses() {
+    let mut near = Near { age: 10, usual: Some(100.0), ..Near::default() };
+    let before = near.moves;
+    near.learn(100_000, 0);
+    assert!(near.moves > before, "searches cost, tests nothing");
+    near.own = Cost { ns: 50.0, changed: 1.0 };
+    near.end();
+    assert_eq!(near.pause, 0, "half as much");
+    near.own = Cost { ns: 95.0, changed: 1.0 };
+    let pauses = [0; 9].map(|_| {
+        near.end();
+        near.pause
+    });
+    assert_eq!(pauses, [1, 3, 7, 15, 31, 63, 64, 64, 64]);
+    near.age = 1;
+    near.own = Cost { ns: 1.0, changed: 1.0 };
+    near.end();
+    assert_eq!(near.pause, 64, "cheap, but it has not lasted");
 }
 
 #[test]
