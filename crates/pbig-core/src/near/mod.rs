@@ -31,6 +31,9 @@ const BLOCK: usize = 1024;
 /// Pairs ahead whose memory is asked for.
 const AHEAD: usize = 24;
 
+/// Pairs whose memory, 8 bytes each, is worth giving back.
+const MANY: usize = 1 << 20;
+
 /// Boxes whose pairs are looked up together.
 const TOGETHER: usize = 32;
 
@@ -83,14 +86,20 @@ impl NearPairs {
     /// before are put into `added`, and the others have been kept until now.
     pub(crate) fn fill(
         &mut self,
-        found: &[Vec<Pair>],
+        found: &mut [Vec<Pair>],
         boxes: &[Aabb],
         kept: &mut PairStore,
         before: &impl Judgement,
         added: &mut Vec<Pair>,
     ) {
         self.clear();
+        let count = found.iter().map(Vec::len).sum();
+        self.pairs.reserve_exact(count);
+        self.places.reserve_exact(count);
         self.add(found, boxes);
+        if count > MANY {
+            found.iter_mut().for_each(|pairs| *pairs = Vec::new());
+        }
         let Self { pairs, places, owners, flips, fresh, .. } = self;
         let pieces = pairs.len().div_ceil(PIECE);
         fresh.resize(pieces.max(fresh.len()), Vec::new());

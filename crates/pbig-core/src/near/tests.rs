@@ -117,9 +117,9 @@ fn pairs_come_and_go_as_boxes_tremble_and_jump() {
     for round in 0..600 {
         if round % 150 == 0 {
             let mut added = vec![];
-            let found = world.near(|_| true);
+            let mut found = world.near(|_| true);
             let World { list, kept, wanted, boxes, .. } = &mut world;
-            list.fill(&found, boxes, kept, &Was(wanted.clone()), &mut added);
+            list.fill(&mut found, boxes, kept, &Was(wanted.clone()), &mut added);
             world.validate(&added, &[]);
         }
         let first = (world.random() * BOXES as f32) as u32;
@@ -139,9 +139,9 @@ fn pairs_come_and_go_as_boxes_tremble_and_jump() {
 #[test]
 fn what_is_apart_and_no_longer_near_is_forgotten() {
     let mut world = World::new();
-    let found = world.near(|_| true);
+    let mut found = world.near(|_| true);
     let mut added = vec![];
-    world.list.fill(&found, &world.boxes, &mut world.kept, &Was(BTreeSet::new()), &mut added);
+    world.list.fill(&mut found, &world.boxes, &mut world.kept, &Was(BTreeSet::new()), &mut added);
     world.validate(&added, &[]);
     let before = world.list.len();
     world.list.retain(|pair| pair.a % 2 == 0);

@@ -211,7 +211,7 @@ impl BroadPhase {
         let state = state!(self);
         let (added, removed) = (&mut self.events.added, &mut self.events.removed);
         self.pairs.end_many(&state, removed);
-        let (found, boxes) = (&self.base.found.chunks, &self.boxes);
+        let (found, boxes) = (&mut self.base.found.chunks, &self.boxes);
         self.near.list.fill(found, boxes, &mut self.pairs, &Before(state), added);
         self.near.is_on = true;
         _ = self.near.list.take_tests();
