@@ -1,5 +1,6 @@
 //! What the fuzz targets check, without instruments: every input that once failed, and some that are random.
 
+use super::memory;
 use pbig_core::decode;
 use pbig_harness::files;
 use rand::rngs::StdRng;
@@ -19,6 +20,9 @@ const TARGETS: [(&str, Check); 5] = [
     ("csv_reader", checks::csv_reader),
 ];
 
+/// As the fuzzer allows one allocation: `-malloc_limit_mb` in scripts/fuzz.sh.
+const MOST_BYTES: usize = 512 << 20;
+
 #[test]
 fn inputs_that_once_failed() {
     let mut inputs = 0;
@@ -27,7 +31,10 @@ fn inputs_that_once_failed() {
         for file in std::fs::read_dir(folder).into_iter().flatten() {
             let path = file.expect("a file").path();
             println!("{}", path.display());
-            check(&std::fs::read(path).expect("readable"));
+            let bytes = std::fs::read(path).expect("readable");
+            memory::largest();
+            check(&bytes);
+            assert!(memory::largest() < MOST_BYTES, "more than the input accounts for");
             inputs += 1;
         }
     }

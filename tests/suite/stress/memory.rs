@@ -8,6 +8,7 @@ struct Counting;
 
 thread_local! {
     static HELD: Cell<i64> = const { Cell::new(0) };
+    static LARGEST: Cell<usize> = const { Cell::new(0) };
 }
 
 fn count(bytes: i64) {
@@ -15,22 +16,28 @@ fn count(bytes: i64) {
     _ = HELD.try_with(|held| held.set(held.get() + bytes));
 }
 
+fn count_new(size: usize) {
+    count(size as i64);
+    _ = LARGEST.try_with(|largest| largest.set(largest.get().max(size)));
+}
+
 // SAFETY: all is left to the system's allocator.
 unsafe impl GlobalAlloc for Counting {
     unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
-        count(layout.size() as i64);
+        count_new(layout.size());
         // SAFETY: the caller's promise.
         unsafe { System.alloc(layout) }
     }
 
     unsafe fn alloc_zeroed(&self, layout: Layout) -> *mut u8 {
-        count(layout.size() as i64);
+        count_new(layout.size());
         // SAFETY: the caller's promise.
         unsafe { System.alloc_zeroed(layout) }
     }
 
     unsafe fn realloc(&self, old: *mut u8, layout: Layout, size: usize) -> *mut u8 {
-        count(size as i64 - layout.size() as i64);
+        count(-(layout.size() as i64));
+        count_new(size);
         // SAFETY: the caller's promise.
         unsafe { System.realloc(old, layout, size) }
     }
@@ -50,6 +57,11 @@ pub(crate) fn held() -> i64 {
     HELD.get()
 }
 
+/// The largest block that this thread has asked for since it was asked last.
+pub(crate) fn largest() -> usize {
+    LARGEST.replace(0)
+}
+
 #[test]
 fn what_is_held_is_counted() {
     let before = held();
@@ -57,6 +69,8 @@ fn what_is_held_is_counted() {
     assert_eq!(held() - before, 1000);
     some.reserve_exact(3000);
     assert_eq!(held() - before, 4000);
+    largest();
+    assert!(std::hint::black_box(vec![0u8; 5000]).len() == 5000 && largest() == 5000 && largest() < 5000);
     drop(some);
     assert_eq!(held(), before);
 }
