@@ -6,6 +6,7 @@
 //! those of one box are found without looking at the others. Links cost more than the walk to keep up, a few random
 //! accesses for each pair that comes or goes (10,000 of 100,000: 1.1 ms against 0.1); so they are made when walks for the
 //! sake of very few boxes have cost as much, and dropped where a walk costs less.
+//! While a list of near pairs does the work (`crate::near`) there are none: it knows the place of each kept pair.
 
 use crate::Pair;
 use crate::cpu::codes::prefetch;

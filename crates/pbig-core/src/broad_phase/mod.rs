@@ -98,7 +98,8 @@ pub struct BroadPhase {
     base: Search<Tracked>,
     small: small::Small,
     near: near::Near,
-    /// Whether `base.map` holds the boxes whose home it is: not after a search by anything else.
+    /// Whether `base.map` holds the boxes whose home it is: not after a search by anything else, and not while it
+    /// holds reaches (see `near`).
     has_base: bool,
     /// As it was built.
     base_plan: Plan,
