@@ -23,6 +23,12 @@ pub trait Coordinates: Copy {
     fn may_overlap(self, other: Self) -> bool;
 }
 
+/// Minima, then maxima. All six comparisons, as the outcome of each is a coin toss.
+#[inline(always)]
+fn overlap<T: PartialOrd>(a: [T; 6], b: [T; 6]) -> bool {
+    (a[0] <= b[3]) & (a[1] <= b[4]) & (a[2] <= b[5]) & (b[0] <= a[3]) & (b[1] <= a[4]) & (b[2] <= a[5])
+}
+
 /// As they are.
 #[derive(Clone, Copy, Debug)]
 pub struct Exact([f32; 6]);
@@ -39,8 +45,7 @@ impl Coordinates for Exact {
 
     #[inline(always)]
     fn may_overlap(self, other: Self) -> bool {
-        let (a, b) = (self.0, other.0);
-        (a[0] <= b[3]) & (a[1] <= b[4]) & (a[2] <= b[5]) & (b[0] <= a[3]) & (b[1] <= a[4]) & (b[2] <= a[5])
+        overlap(self.0, other.0)
     }
 }
 
@@ -94,8 +99,7 @@ impl Coordinates for Half {
 
     #[inline(always)]
     fn may_overlap(self, other: Self) -> bool {
-        let (a, b) = (self.0, other.0);
-        (a[0] <= b[3]) & (a[1] <= b[4]) & (a[2] <= b[5]) & (b[0] <= a[3]) & (b[1] <= a[4]) & (b[2] <= a[5])
+        overlap(self.0, other.0)
     }
 }
 
