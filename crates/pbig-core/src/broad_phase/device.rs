@@ -15,7 +15,7 @@ macro_rules! request {
             filters: &$of.filters,
             changed: &$of.overlap.changes,
             update: $of.updates,
-            kept: $of.pairs.len() as u64,
+            kept: $of.pairs.listed() as u64,
             config: &$of.config,
         }
     };
@@ -32,7 +32,7 @@ impl BroadPhase {
         let wanted = !few && self.base.wants_gpu(&self.config, self.boxes.len());
         self.overlap.asked = Some(wanted);
         if wanted {
-            self.near.stop();
+            self.drop_near();
             self.pairs.drop_removed();
             self.note_changes();
             self.base.begin_changes(&request!(self));

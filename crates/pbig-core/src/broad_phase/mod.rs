@@ -307,17 +307,18 @@ impl BroadPhase {
         if !is_small && self.updates > 1 {
             self.near.note_time(way, self.report.changed as usize, self.report.stages.total());
         }
-        self.report.pairs = self.pairs.len() as u64;
+        self.report.pairs = self.pair_count() as u64;
         Ok(())
     }
 
     /// A report of nothing done yet. Field by field: to make and drop whole ones took longer than to search ten boxes.
     fn begin_report(&mut self) {
-        let boxes = self.valid_count();
+        let (boxes, pairs) = (self.valid_count(), self.pair_count() as u64);
         let report = &mut self.report;
         (report.stages, report.checks) = (StageTimes::default(), Checks::default());
         (report.boxes, report.invalid) = (u64::from(self.present_count), u64::from(self.invalid_count));
-        (report.changed, report.pairs) = (self.changed.len() as u64, self.pairs.len() as u64);
+        report.changed = self.changed.len() as u64;
+        report.pairs = pairs;
         report.plan.begin(boxes);
         report.gpu = None;
         // A backend that was asked for stays unavailable until a search on it succeeds.

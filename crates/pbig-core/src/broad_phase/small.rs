@@ -80,7 +80,7 @@ impl BroadPhase {
     /// As [`BroadPhase::find_added`], by bitmap.
     pub(super) fn find_in_small(&mut self, watch: &mut Watch) -> Result<(), Error> {
         self.has_base = false;
-        self.near.stop();
+        self.drop_near();
         self.pairs.drop_removed();
         let cost = if self.boxes.len() <= TINY { self.look_up_tiny() } else { self.look_up_small(watch) };
         self.report.checks =

@@ -18,23 +18,30 @@ impl BroadPhase {
 
     /// How many pairs exist: those of the last update, less those of boxes removed since.
     pub fn pair_count(&self) -> usize {
-        self.pairs.len()
+        if self.pairs.is_whole() {
+            self.pairs.listed() + self.near.list.overlapping()
+        } else {
+            self.pairs().count()
+        }
     }
 
     /// The pairs that exist (see [`BroadPhase::pair_count`]), in no particular order.
     pub fn pairs(&self) -> impl Iterator<Item = Pair> {
-        self.pairs.iter()
+        let near = self.near.list.iter().filter(|pair| self.pairs.is_there(*pair));
+        self.pairs.iter().chain(near)
     }
 
     /// The pairs of one box (see [`BroadPhase::pair_count`]), in no particular order. While most boxes change in every
     /// update, and until few have for long, all pairs are looked at.
     pub fn pairs_of(&self, id: u32) -> impl Iterator<Item = Pair> {
-        self.pairs.of(id)
+        let near = Some(&self.near.list).filter(|_| self.pairs.counted(id) > 0);
+        let near = near.into_iter().flat_map(move |list| list.of(id));
+        self.pairs.of(id).chain(near.filter(|pair| self.pairs.is_there(*pair)))
     }
 
     /// How many pairs a box has (see [`BroadPhase::pair_count`]).
     pub fn degree(&self, id: u32) -> u32 {
-        self.pairs.degree(id)
+        if self.pairs.is_whole() { self.pairs.counted(id) } else { self.pairs_of(id).count() as u32 }
     }
 
     /// Whether two boxes are a pair (see [`BroadPhase::pair_count`]).
@@ -65,8 +72,8 @@ impl BroadPhase {
     }
 
     /// The cells of the CPU's grids that boxes lie in (while near pairs do the work, boxes grown by the skin), level by
-    /// level, for a picture of them; none where the
-    /// boxes are searched without grids or on a GPU. Takes time and memory proportional to the boxes.
+    /// level, for a picture of them; none where the boxes are searched without grids or on a GPU. Takes time and memory
+    /// proportional to the boxes.
     pub fn cells(&self) -> Vec<OccupiedCell> {
         let mut cells = Vec::new();
         if self.has_base || self.near.is_on {

@@ -61,12 +61,13 @@ impl BroadPhase {
         if self.find_near()? == Served::Yes {
             return Ok(Way::Near);
         }
-        self.pairs.drop_removed();
         if let Some(skin) = self.skin()
             && self.search_near(skin)? == Served::Yes
         {
             return Ok(Way::Near);
         }
+        self.drop_near();
+        self.pairs.drop_removed();
         let whole = self.many_changed()
             || self.config.strategy == Strategy::Pbig
             || self.config.backend == Backend::Brute
@@ -90,7 +91,7 @@ impl BroadPhase {
     }
 
     pub(super) fn check_room(&self) -> Result<(), Error> {
-        let kept = (self.pairs.len() + self.events.added.len()) as u64;
+        let kept = (self.pair_count() + self.events.added.len()) as u64;
         if kept > PairStore::MOST {
             return Err(Error::TooManyPairs { limit: PairStore::MOST });
         }

@@ -18,7 +18,7 @@ impl Index {
     pub(super) fn range(&self, id: u32) -> Range<usize> {
         // Boxes that came later have none.
         match self.starts.get(id as usize..id as usize + 2) {
-            Some(&[start, end]) => start as usize..end as usize,
+            Some(&[start, end]) if self.known > 0 => start as usize..end as usize,
             _ => 0..0,
         }
     }
@@ -28,11 +28,11 @@ impl Index {
     }
 
     /// Of all pairs that are not gone, by counting.
-    pub(super) fn make(&mut self, pairs: &[Pair], places: &[u32], ids: usize) {
+    pub(super) fn make(&mut self, pairs: &[Pair], states: &[u8], ids: usize) {
         self.known = pairs.len();
         self.starts.clear();
         self.starts.resize(ids + 1, 0);
-        let near = || (0..).zip(pairs).zip(places).filter(|(_, place)| **place != GONE).map(|(pair, _)| pair);
+        let near = || (0..).zip(pairs).zip(states).filter(|(_, state)| **state != GONE).map(|(pair, _)| pair);
         for (_, pair) in near() {
             self.starts[pair.a as usize] += 1;
             self.starts[pair.b as usize] += 1;

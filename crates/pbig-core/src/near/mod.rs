@@ -5,27 +5,31 @@
 //! search costs 60 a box. Pairs that come and go are those whose test ends otherwise than the last time, without a look at
 //! what boxes were. (Boxes copied into the order of their pairs, so that those of a pair are near in memory, too, were no
 //! faster: the copying took what the tests gained.)
+//!
+//! While there is such a list, the pairs that exist are those that it has as overlapping, and are nowhere else. Kept in a
+//! list of their own beside it, each that came or went took 47 ns.
 
 mod index;
 #[cfg(test)]
 mod tests;
 
 use crate::cpu::codes::prefetch;
-use crate::diff::{Judgement, PairStore};
+use crate::diff::Judgement;
 use crate::{Aabb, Pair};
 use index::Index;
 use rayon::prelude::*;
 
-/// No place among the kept pairs: the boxes are near, and apart.
-const APART: u32 = u32::MAX;
+/// What the last test of a pair has said.
+const APART: u8 = 0;
+const OVERLAP: u8 = 1;
 
-/// The same, and they are no longer near.
-const GONE: u32 = u32::MAX - 1;
+/// The boxes are no longer near.
+const GONE: u8 = 2;
 
 /// Pairs of a piece of a walk.
 const PIECE: usize = 16_384;
 
-/// Pairs that are tested before those found are kept.
+/// Pairs that are tested before those found are told.
 const BLOCK: usize = 1024;
 
 /// Pairs ahead whose memory is asked for.
@@ -40,36 +44,38 @@ const TOGETHER: usize = 32;
 /// Walks that cost as much as an index.
 const WALKS: usize = 8;
 
-/// Some pairs, and their places.
-type Piece<'a> = (&'a [Pair], &'a [u32]);
+/// Some pairs, and their states.
+type Piece<'a> = (&'a [Pair], &'a mut [u8]);
 
-/// Near pairs, and which of them are kept: 12 bytes each, 8 more with an index, and 4 for each kept one.
+/// Near pairs, and which of them overlap: 9 bytes each, 8 more with an index.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct NearPairs {
     pairs: Vec<Pair>,
-    /// Of each: its place among the kept pairs, [`APART`] or [`GONE`].
-    places: Vec<u32>,
-    /// By place among the kept pairs: which near pair it is.
-    owners: Vec<u32>,
+    /// Of each: [`APART`], [`OVERLAP`] or [`GONE`].
+    states: Vec<u8>,
+    overlapping: usize,
     gone: usize,
     index: Index,
     /// Pairs walked for the sake of few boxes.
     walked: usize,
     /// Of each piece of a walk.
-    flips: Vec<Vec<u32>>,
-    /// Of each piece of a new list: pairs that are new.
-    fresh: Vec<Vec<Pair>>,
+    turned: Vec<Turned>,
     /// Tests made since they were asked for, and those that were true.
     tests: [u64; 2],
 }
 
+/// Pairs that have begun to overlap, and that have ended.
+#[derive(Clone, Debug, Default)]
+struct Turned {
+    added: Vec<Pair>,
+    removed: Vec<Pair>,
+}
+
 impl NearPairs {
-    /// Forgets all; kept pairs stay what they are.
     pub(crate) fn clear(&mut self) {
         self.pairs.clear();
-        self.places.clear();
-        self.owners.clear();
-        (self.gone, self.walked, self.index.known) = (0, 0, 0);
+        self.states.clear();
+        (self.overlapping, self.gone, self.walked, self.index.known) = (0, 0, 0, 0);
     }
 
     /// How many there are.
@@ -77,80 +83,91 @@ impl NearPairs {
         self.pairs.len() - self.gone
     }
 
+    /// How many of them overlap.
+    pub(crate) fn overlapping(&self) -> usize {
+        self.overlapping
+    }
+
+    /// Those that overlap.
+    pub(crate) fn iter(&self) -> impl Iterator<Item = Pair> {
+        let all = self.pairs.iter().zip(&self.states);
+        all.filter(|(_, state)| **state == OVERLAP).map(|(pair, _)| *pair)
+    }
+
+    /// Those of one box that overlap; without an index all are looked at.
+    pub(crate) fn of(&self, id: u32) -> impl Iterator<Item = Pair> {
+        let known = self.index.of(id).iter().map(|&i| i as usize);
+        let all = (self.index.known..self.pairs.len()).filter(move |&i| {
+            let Pair { a, b } = self.pairs[i];
+            (a == id) | (b == id)
+        });
+        known.chain(all).filter(|&i| self.states[i] == OVERLAP).map(|i| self.pairs[i])
+    }
+
     /// Tests made since the last time, and how many were true.
     pub(crate) fn take_tests(&mut self) -> [u64; 2] {
         std::mem::take(&mut self.tests)
     }
 
-    /// All pairs that are near, of a search; those that overlap become the kept pairs. Of these, the ones that did not hold
-    /// before are put into `added`, and the others have been kept until now.
+    /// Overlapping pairs that no longer hold, into `ended`.
+    pub(crate) fn find_ended(&mut self, of: &impl Judgement, ended: &mut Vec<Pair>) {
+        let pieces = self.prepare_pieces(self.pairs.len());
+        let walk = |((pairs, states), turned): ((&[Pair], &[u8]), &mut Turned)| {
+            let ended = |(pair, state): &(&Pair, &u8)| **state == OVERLAP && !of.holds(**pair);
+            turned.removed.extend(pairs.iter().zip(states).filter(ended).map(|(pair, _)| *pair));
+        };
+        let all = self.pairs.par_chunks(PIECE).zip(self.states.par_chunks(PIECE));
+        all.zip(&mut self.turned[..pieces]).for_each(walk);
+        self.turned[..pieces].iter().for_each(|turned| ended.extend_from_slice(&turned.removed));
+    }
+
+    /// All pairs that are near, of a search, instead of those there were. Those that overlap, and did not before, are put
+    /// into `added`.
     pub(crate) fn fill(
         &mut self,
         found: &mut [Vec<Pair>],
         boxes: &[Aabb],
-        kept: &mut PairStore,
         before: &impl Judgement,
         added: &mut Vec<Pair>,
     ) {
         self.clear();
         let count = found.iter().map(Vec::len).sum();
         self.pairs.reserve_exact(count);
-        self.places.reserve_exact(count);
-        self.add(found, boxes);
-        if count > MANY {
-            found.iter_mut().for_each(|pairs| *pairs = Vec::new());
-        }
-        let Self { pairs, places, owners, flips, fresh, .. } = self;
-        let pieces = pairs.len().div_ceil(PIECE);
-        fresh.resize(pieces.max(fresh.len()), Vec::new());
-        let part = |(flips, fresh): (&Vec<u32>, &mut Vec<Pair>)| {
-            fresh.clear();
-            for (k, &i) in flips.iter().enumerate() {
-                flips.get(k + AHEAD).into_iter().for_each(|&ahead| before.prepare(pairs[ahead as usize]));
-                fresh.extend(Some(pairs[i as usize]).filter(|pair| !before.holds(*pair)));
+        self.states.reserve_exact(count);
+        for part in found {
+            self.pairs.extend_from_slice(part);
+            // Twice the pairs at once would be the most that a large world ever takes.
+            if count > MANY {
+                *part = Vec::new();
             }
-        };
-        flips[..pieces].par_iter().zip(fresh.par_iter_mut()).for_each(part);
-        let first = added.len();
-        fresh[..pieces].iter().for_each(|fresh| added.extend_from_slice(fresh));
-        owners.extend(flips[..pieces].iter().flatten());
-        for (place, &i) in (0..).zip(&*owners) {
-            places[i as usize] = place;
         }
-        kept.relist(owners.iter().map(|&i| pairs[i as usize]), &added[first..]);
+        let pieces = self.test_from(0, boxes);
+        self.turned[..pieces].par_iter_mut().for_each(|turned| turned.find_fresh(before));
+        for turned in &self.turned[..pieces] {
+            self.overlapping += turned.added.len();
+            added.extend_from_slice(&turned.removed);
+        }
     }
 
-    /// Adds pairs that have come near; keeps those that overlap, and tells which.
-    pub(crate) fn extend(
-        &mut self,
-        found: &[Vec<Pair>],
-        boxes: &[Aabb],
-        kept: &mut PairStore,
-        added: impl FnMut(Pair),
-    ) {
-        self.add(found, boxes);
-        // What was apart cannot go.
-        self.turn(kept, added, |_| {});
-    }
-
-    /// Adds pairs as apart; those that overlap into `flips`.
-    fn add(&mut self, found: &[Vec<Pair>], boxes: &[Aabb]) {
+    /// Adds pairs that have come near; those that overlap are told.
+    pub(crate) fn extend(&mut self, found: &[Vec<Pair>], boxes: &[Aabb], added: &mut Vec<Pair>) {
         let first = self.pairs.len();
         found.iter().for_each(|pairs| self.pairs.extend_from_slice(pairs));
-        self.places.resize(self.pairs.len(), APART);
-        self.walk(first, boxes);
+        let pieces = self.test_from(first, boxes);
+        // What was apart cannot end.
+        self.tell(pieces, added, &mut vec![]);
+    }
+
+    /// Tests the pairs from `first` on, which are new; how many pieces that took.
+    fn test_from(&mut self, first: usize, boxes: &[Aabb]) -> usize {
+        self.states.resize(self.pairs.len(), APART);
+        self.walk(first, boxes)
     }
 
     /// Tests all near pairs, and tells which have come and which have gone.
-    pub(crate) fn update(
-        &mut self,
-        boxes: &[Aabb],
-        kept: &mut PairStore,
-        added: impl FnMut(Pair),
-        removed: impl FnMut(Pair),
-    ) {
-        self.walk(0, boxes);
-        self.turn(kept, added, removed);
+    pub(crate) fn update(&mut self, boxes: &[Aabb], added: &mut Vec<Pair>, removed: &mut Vec<Pair>) {
+        let pieces = self.walk(0, boxes);
+        self.tell(pieces, added, removed);
     }
 
     /// The same, where only the boxes `changed` have. `comes_first` says of two boxes whether the first is the one that their
@@ -160,44 +177,45 @@ impl NearPairs {
         changed: &[u32],
         boxes: &[Aabb],
         comes_first: impl Fn(u32, u32) -> bool,
-        kept: &mut PairStore,
-        added: impl FnMut(Pair),
-        removed: impl FnMut(Pair),
+        added: &mut Vec<Pair>,
+        removed: &mut Vec<Pair>,
     ) {
         if !self.is_indexed(boxes.len()) {
-            return self.update(boxes, kept, added, removed);
+            return self.update(boxes, added, removed);
         }
-        self.walk(self.index.known, boxes);
-        let (mut flips, mut tests) = (std::mem::take(&mut self.flips[0]), self.tests);
+        let pieces = self.walk(self.index.known, boxes);
+        self.tell(pieces, added, removed);
         for changed in changed.chunks(TOGETHER) {
             self.ask_for(changed, boxes);
-            for &id in changed {
-                tests[0] += self.index.of(id).len() as u64;
-                tests[1] += self.look_up(id, boxes, &comes_first, &mut flips);
-            }
+            changed.iter().for_each(|&id| self.look_up(id, boxes, &comes_first, added, removed));
         }
-        (self.flips[0], self.tests) = (flips, tests);
-        self.turn(kept, added, removed);
     }
 
-    /// Tests the pairs of one box; how many overlap.
+    /// Tests the pairs of one box.
     fn look_up(
-        &self,
+        &mut self,
         id: u32,
         boxes: &[Aabb],
         comes_first: impl Fn(u32, u32) -> bool,
-        flips: &mut Vec<u32>,
-    ) -> u64 {
-        let mut overlaps = 0;
+        added: &mut Vec<Pair>,
+        removed: &mut Vec<Pair>,
+    ) {
         for &i in self.index.of(id) {
-            let (Pair { a, b }, place) = (self.pairs[i as usize], self.places[i as usize]);
-            let now = boxes[a as usize].overlaps(&boxes[b as usize]);
-            if now != (place < GONE) && place != GONE && comes_first(id, a ^ b ^ id) {
-                flips.push(i);
+            let (pair, state) = (self.pairs[i as usize], &mut self.states[i as usize]);
+            let now = u8::from(boxes[pair.a as usize].overlaps(&boxes[pair.b as usize]));
+            self.tests = [self.tests[0] + 1, self.tests[1] + u64::from(now)];
+            if now ^ *state != 1 || !comes_first(id, pair.a ^ pair.b ^ id) {
+                continue;
             }
-            overlaps += u64::from(now);
+            *state = now;
+            if now == OVERLAP {
+                self.overlapping += 1;
+                added.push(pair);
+            } else {
+                self.overlapping -= 1;
+                removed.push(pair);
+            }
         }
-        overlaps
     }
 
     /// Asks for what the tests of some boxes will read.
@@ -207,7 +225,7 @@ impl NearPairs {
         changed.iter().for_each(|id| self.index.of(*id).first().into_iter().for_each(prefetch));
         for &i in entries() {
             prefetch(&self.pairs[i as usize]);
-            prefetch(&self.places[i as usize]);
+            prefetch(&self.states[i as usize]);
         }
         for &i in entries() {
             let Pair { a, b } = self.pairs[i as usize];
@@ -226,29 +244,24 @@ impl NearPairs {
             return false;
         }
         self.walked = 0;
-        self.index.make(&self.pairs, &self.places, ids);
+        self.index.make(&self.pairs, &self.states, ids);
         true
     }
 
-    /// The pairs of boxes `ids`, and of no others that `is_one` knows, are no longer near; tells which of them were kept.
-    pub(crate) fn remove_of(
-        &mut self,
-        ids: &[u32],
-        is_one: impl Fn(u32) -> bool,
-        kept: &mut PairStore,
-        mut tell: impl FnMut(Pair),
-    ) {
+    /// The pairs of boxes `ids`, and of no others that `is_one` knows, are no longer near; those that overlapped go to
+    /// `parted`.
+    pub(crate) fn remove_of(&mut self, ids: &[u32], is_one: impl Fn(u32) -> bool, parted: &mut Vec<Pair>) {
         let known = self.index.known;
         let indexed = if known > 0 { ids } else { &[] };
         for &id in indexed {
             for e in self.index.range(id) {
-                self.remove(self.index.entries[e] as usize, kept, &mut tell);
+                self.remove(self.index.entries[e] as usize, parted);
             }
         }
         for i in known..self.pairs.len() {
             let Pair { a, b } = self.pairs[i];
             if is_one(a) | is_one(b) {
-                self.remove(i, kept, &mut tell);
+                self.remove(i, parted);
             }
         }
         if self.gone * 4 > self.pairs.len() {
@@ -256,25 +269,28 @@ impl NearPairs {
         }
     }
 
-    fn remove(&mut self, i: usize, kept: &mut PairStore, tell: &mut impl FnMut(Pair)) {
-        let place = std::mem::replace(&mut self.places[i], GONE);
-        if place == GONE {
-            return;
-        }
-        self.gone += 1;
-        if place != APART {
-            self.free(place, kept);
-            tell(self.pairs[i]);
+    fn remove(&mut self, i: usize, parted: &mut Vec<Pair>) {
+        let state = std::mem::replace(&mut self.states[i], GONE);
+        self.gone += usize::from(state != GONE);
+        if state == OVERLAP {
+            self.overlapping -= 1;
+            parted.push(self.pairs[i]);
         }
     }
 
-    /// Forgets pairs that are apart, and for which `is_near` does not hold.
-    pub(crate) fn retain(&mut self, is_near: impl Fn(Pair) -> bool) {
-        for (pair, place) in self.pairs.iter().zip(&mut self.places) {
-            if *place == APART && !is_near(*pair) {
-                *place = GONE;
+    /// Forgets pairs that are apart, and whose reaches no longer overlap.
+    pub(crate) fn retain_near(&mut self, reach: &[Aabb]) {
+        let forget = |(pairs, states): Piece<'_>| {
+            for (i, (pair, state)) in pairs.iter().zip(states).enumerate() {
+                if let Some(ahead) = pairs.get(i + AHEAD) {
+                    prefetch(&reach[ahead.a as usize]);
+                    prefetch(&reach[ahead.b as usize]);
+                }
+                let is_near = reach[pair.a as usize].overlaps(&reach[pair.b as usize]);
+                *state = if (*state == APART) & !is_near { GONE } else { *state };
             }
-        }
+        };
+        self.pairs.par_chunks(PIECE).zip(self.states.par_chunks_mut(PIECE)).for_each(forget);
         self.compact();
     }
 
@@ -282,96 +298,86 @@ impl NearPairs {
     fn compact(&mut self) {
         let mut n = 0;
         for i in 0..self.pairs.len() {
-            let place = self.places[i];
-            (self.pairs[n], self.places[n]) = (self.pairs[i], place);
-            if place < GONE {
-                self.owners[place as usize] = n as u32;
-            }
-            n += usize::from(place != GONE);
+            let state = self.states[i];
+            (self.pairs[n], self.states[n]) = (self.pairs[i], state);
+            n += usize::from(state != GONE);
         }
         self.pairs.truncate(n);
-        self.places.truncate(n);
+        self.states.truncate(n);
         (self.gone, self.index.known) = (0, 0);
     }
 
-    /// Those of the pairs from `first` on whose test ends otherwise than the last time, into `flips`.
-    fn walk(&mut self, first: usize, boxes: &[Aabb]) {
-        let (pairs, places) = (&self.pairs[first..], &self.places[first..]);
-        let pieces = pairs.len().div_ceil(PIECE);
-        self.flips.resize(pieces.max(self.flips.len()).max(1), Vec::new());
-        self.flips.iter_mut().for_each(Vec::clear);
-        let walk = |(i, ((pairs, places), flips)): (usize, (Piece<'_>, &mut Vec<u32>))| -> u64 {
-            let blocks = pairs.chunks(BLOCK).zip(places.chunks(BLOCK)).enumerate();
-            let first = first + i * PIECE;
-            blocks.map(|(k, block)| test(block, (first + k * BLOCK) as u32, boxes, flips)).sum()
+    /// Tests the pairs from `first` on, and turns those whose test ends otherwise than the last time, which go into
+    /// `turned`; how many pieces that took.
+    fn walk(&mut self, first: usize, boxes: &[Aabb]) -> usize {
+        let pieces = self.prepare_pieces(self.pairs.len() - first);
+        let (pairs, states) = (&self.pairs[first..], &mut self.states[first..]);
+        let turned = &mut self.turned[..pieces];
+        let walk = |((pairs, states), turned): (Piece<'_>, &mut Turned)| -> u64 {
+            let blocks = pairs.chunks(BLOCK).zip(states.chunks_mut(BLOCK));
+            blocks.map(|block| test(block, boxes, turned)).sum()
         };
         let overlaps: u64 = if pieces > 2 && rayon::current_num_threads() > 1 {
-            let all = pairs.par_chunks(PIECE).zip(places.par_chunks(PIECE));
-            all.zip(&mut self.flips[..pieces]).enumerate().map(walk).sum()
+            pairs.par_chunks(PIECE).zip(states.par_chunks_mut(PIECE)).zip(turned).map(walk).sum()
         } else {
-            let all = pairs.chunks(PIECE).zip(places.chunks(PIECE));
-            all.zip(&mut self.flips[..pieces]).enumerate().map(walk).sum()
+            pairs.chunks(PIECE).zip(states.chunks_mut(PIECE)).zip(turned).map(walk).sum()
         };
         self.tests = [self.tests[0] + pairs.len() as u64, self.tests[1] + overlaps];
+        pieces
     }
 
-    /// Keeps what was apart and gives up what was kept, of all in `flips`.
-    fn turn(&mut self, kept: &mut PairStore, mut added: impl FnMut(Pair), mut removed: impl FnMut(Pair)) {
-        let flips = std::mem::take(&mut self.flips);
-        for flips in &flips {
-            for (k, &i) in flips.iter().enumerate() {
-                flips.get(k + AHEAD).into_iter().for_each(|&ahead| self.ask_for_turn(ahead as usize, kept));
-                let pair = self.pairs[i as usize];
-                match self.places[i as usize] {
-                    GONE => {}
-                    APART => {
-                        self.places[i as usize] = kept.push(pair);
-                        self.owners.push(i);
-                        added(pair);
-                    }
-                    place => {
-                        self.places[i as usize] = APART;
-                        self.free(place, kept);
-                        removed(pair);
-                    }
-                }
-            }
+    /// Room for what turns in a walk of so many pairs; how many pieces it has.
+    fn prepare_pieces(&mut self, pairs: usize) -> usize {
+        let pieces = pairs.div_ceil(PIECE);
+        self.turned.resize(pieces.max(self.turned.len()), Turned::default());
+        for turned in &mut self.turned[..pieces] {
+            turned.added.clear();
+            turned.removed.clear();
         }
-        self.flips = flips;
+        pieces
     }
 
-    /// Asks for what it takes to turn a pair.
-    #[inline(always)]
-    fn ask_for_turn(&self, i: usize, kept: &PairStore) {
-        kept.prepare(self.pairs[i]);
-        self.owners.get(self.places[i] as usize).into_iter().for_each(prefetch);
-    }
-
-    /// Gives up a kept pair; the last one takes its place.
-    fn free(&mut self, place: u32, kept: &mut PairStore) {
-        kept.swap_remove(place);
-        self.owners.swap_remove(place as usize);
-        if let Some(&owner) = self.owners.get(place as usize) {
-            self.places[owner as usize] = place;
+    /// What has turned in so many pieces.
+    fn tell(&mut self, pieces: usize, added: &mut Vec<Pair>, removed: &mut Vec<Pair>) {
+        for turned in &self.turned[..pieces] {
+            self.overlapping += turned.added.len();
+            self.overlapping -= turned.removed.len();
+            added.extend_from_slice(&turned.added);
+            removed.extend_from_slice(&turned.removed);
         }
     }
 }
 
-/// Of a block of pairs and their places, those whose test ends otherwise than the last time; how many overlap. No branches:
-/// what flips is a coin toss.
+impl Turned {
+    /// Those of the added pairs that did not hold before, into `removed`, which a new list has no other use for.
+    fn find_fresh(&mut self, before: &impl Judgement) {
+        for (k, &pair) in self.added.iter().enumerate() {
+            self.added.get(k + AHEAD).into_iter().for_each(|&ahead| before.prepare(ahead));
+            self.removed.extend(Some(pair).filter(|pair| !before.holds(*pair)));
+        }
+    }
+}
+
+/// Turns those of a block whose test ends otherwise than the last time; how many overlap. No branches: what turns is a coin
+/// toss.
 #[inline(always)]
-fn test((pairs, places): Piece<'_>, first: u32, boxes: &[Aabb], flips: &mut Vec<u32>) -> u64 {
-    let (mut found, mut count, mut overlaps) = ([0; BLOCK], 0, 0);
-    for (i, (&Pair { a, b }, &place)) in pairs.iter().zip(places).enumerate() {
+fn test((pairs, states): Piece<'_>, boxes: &[Aabb], turned: &mut Turned) -> u64 {
+    let (mut added, mut removed) = ([0u32; BLOCK], [0u32; BLOCK]);
+    let (mut come, mut gone, mut overlaps) = (0, 0, 0);
+    for (i, (&Pair { a, b }, state)) in pairs.iter().zip(states).enumerate() {
         if let Some(ahead) = pairs.get(i + AHEAD) {
             prefetch(&boxes[ahead.a as usize]);
             prefetch(&boxes[ahead.b as usize]);
         }
-        let now = boxes[a as usize].overlaps(&boxes[b as usize]);
-        found[count] = first + i as u32;
-        count += usize::from(now != (place < GONE));
+        let now = u8::from(boxes[a as usize].overlaps(&boxes[b as usize]));
+        let (comes, goes) = (*state < now, (*state == OVERLAP) & (now == APART));
+        (added[come], removed[gone]) = (i as u32, i as u32);
+        *state = if *state == GONE { GONE } else { now };
+        come += usize::from(comes);
+        gone += usize::from(goes);
         overlaps += u64::from(now);
     }
-    flips.extend_from_slice(&found[..count]);
+    turned.added.extend(added[..come].iter().map(|&i| pairs[i as usize]));
+    turned.removed.extend(removed[..gone].iter().map(|&i| pairs[i as usize]));
     overlaps
 }

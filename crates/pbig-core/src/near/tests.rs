@@ -11,17 +11,13 @@ struct World {
     boxes: Vec<Aabb>,
     reach: Vec<Aabb>,
     list: NearPairs,
-    kept: PairStore,
     wanted: BTreeSet<Pair>,
 }
 
 impl World {
     fn new() -> Self {
-        let mut kept = PairStore::default();
-        kept.reserve_ids(BOXES as usize);
         let (boxes, reach) = (vec![Aabb::NOWHERE; BOXES as usize], vec![Aabb::NOWHERE; BOXES as usize]);
-        let mut world =
-            Self { seed: 3, boxes, reach, list: NearPairs::default(), kept, wanted: BTreeSet::new() };
+        let mut world = Self { seed: 3, boxes, reach, list: NearPairs::default(), wanted: BTreeSet::new() };
         (0..BOXES).for_each(|id| world.place(id));
         world
     }
@@ -69,23 +65,24 @@ impl World {
             assert!(self.wanted.insert(*pair), "{pair:?} is added and was there");
         }
         assert_eq!(self.wanted, self.now());
-        assert_eq!(self.kept.iter().collect::<BTreeSet<_>>(), self.wanted);
-        assert_eq!(self.kept.len(), self.wanted.len());
+        assert_eq!(self.list.iter().collect::<BTreeSet<_>>(), self.wanted);
+        assert_eq!(self.list.overlapping(), self.wanted.len());
         for id in 0..BOXES {
-            let degree = self.wanted.iter().filter(|pair| pair.a == id || pair.b == id).count();
-            assert_eq!(self.kept.degree(id) as usize, degree, "degree of {id}");
+            let own: BTreeSet<Pair> =
+                self.wanted.iter().copied().filter(|p| p.a == id || p.b == id).collect();
+            assert_eq!(self.list.of(id).count(), own.len(), "those of {id} repeat");
+            assert_eq!(self.list.of(id).collect::<BTreeSet<_>>(), own, "those of {id}");
         }
     }
 
     fn update(&mut self, changed: &[u32]) {
         let (mut added, mut removed) = (vec![], vec![]);
-        let Self { list, boxes, kept, .. } = self;
-        let (add, remove) = (|pair| added.push(pair), |pair| removed.push(pair));
+        let Self { list, boxes, .. } = self;
         if changed.len() as u32 == BOXES {
-            list.update(boxes, kept, add, remove);
+            list.update(boxes, &mut added, &mut removed);
         } else {
             let first = |id, other| id < other || !changed.contains(&other);
-            list.update_few(changed, boxes, first, kept, add, remove);
+            list.update_few(changed, boxes, first, &mut added, &mut removed);
         }
         self.validate(&added, &removed);
     }
@@ -93,10 +90,10 @@ impl World {
     /// Some boxes go elsewhere.
     fn jump(&mut self, ids: &[u32]) {
         let (mut added, mut removed) = (vec![], vec![]);
-        self.list.remove_of(ids, |id| ids.contains(&id), &mut self.kept, |pair| removed.push(pair));
+        self.list.remove_of(ids, |id| ids.contains(&id), &mut removed);
         ids.iter().for_each(|id| self.place(*id));
         let found = self.near(|id| ids.contains(&id));
-        self.list.extend(&found, &self.boxes, &mut self.kept, |pair| added.push(pair));
+        self.list.extend(&found, &self.boxes, &mut added);
         self.validate(&added, &removed);
     }
 }
@@ -116,11 +113,13 @@ fn pairs_come_and_go_as_boxes_tremble_and_jump() {
     let mut indexed = 0;
     for round in 0..600 {
         if round % 150 == 0 {
-            let mut added = vec![];
-            let mut found = world.near(|_| true);
-            let World { list, kept, wanted, boxes, .. } = &mut world;
-            list.fill(&mut found, boxes, kept, &Was(wanted.clone()), &mut added);
-            world.validate(&added, &[]);
+            (0..BOXES).for_each(|id| world.tremble(id));
+            let (mut added, mut removed) = (vec![], vec![]);
+            let (mut found, now) = (world.near(|_| true), Was(world.now()));
+            let World { list, wanted, boxes, .. } = &mut world;
+            list.find_ended(&now, &mut removed);
+            list.fill(&mut found, boxes, &Was(wanted.clone()), &mut added);
+            world.validate(&added, &removed);
         }
         let first = (world.random() * BOXES as f32) as u32;
         let some = [first, (first + 7) % BOXES, (first + 8) % BOXES];
@@ -141,16 +140,19 @@ fn what_is_apart_and_no_longer_near_is_forgotten() {
     let mut world = World::new();
     let mut found = world.near(|_| true);
     let mut added = vec![];
-    world.list.fill(&mut found, &world.boxes, &mut world.kept, &Was(BTreeSet::new()), &mut added);
+    world.list.fill(&mut found, &world.boxes, &Was(BTreeSet::new()), &mut added);
     world.validate(&added, &[]);
     let before = world.list.len();
-    world.list.retain(|pair| pair.a % 2 == 0);
+    // Odd boxes are near nothing any more.
+    let reach = |(id, reach): (usize, &Aabb)| if id % 2 == 1 { Aabb::NOWHERE } else { *reach };
+    let reach: Vec<Aabb> = world.reach.iter().enumerate().map(reach).collect();
+    world.list.retain_near(&reach);
     assert!(world.list.len() < before && world.list.len() > added.len());
     (0..BOXES).for_each(|id| world.tremble(id));
-    let odd = |pair: &&Pair| pair.a % 2 == 1 && !world.wanted.contains(pair);
+    let odd = |pair: &&Pair| (pair.a % 2 == 1 || pair.b % 2 == 1) && !world.wanted.contains(pair);
     let missed: Vec<Pair> = world.now().iter().filter(odd).copied().collect();
     let mut now = vec![];
-    world.list.update(&world.boxes, &mut world.kept, |pair| now.push(pair), |_| {});
+    world.list.update(&world.boxes, &mut now, &mut vec![]);
     assert!(!missed.is_empty() && missed.iter().all(|pair| !now.contains(pair)));
     assert!(!now.is_empty());
 }

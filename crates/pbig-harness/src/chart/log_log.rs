@@ -42,6 +42,17 @@ fn drawn(points: &[(f64, f64)]) -> impl Iterator<Item = (f64, f64)> {
     points.iter().copied().filter(|&(x, y)| x > 0.0 && y > 0.0 && x.is_finite() && y.is_finite())
 }
 
+/// Many points on the lines between those that are drawn.
+fn along(points: &[(f64, f64)]) -> impl Iterator<Item = (f64, f64)> {
+    const BETWEEN: usize = 16;
+    let between = |((x, y), (u, v)): ((f64, f64), (f64, f64))| {
+        (0..=BETWEEN)
+            .map(move |i| i as f64 / BETWEEN as f64)
+            .map(move |t| (x * (u / x).powf(t), y * (v / y).powf(t)))
+    };
+    drawn(points).zip(drawn(points).skip(1)).flat_map(between)
+}
+
 impl LogLog {
     /// Writes the chart.
     ///
@@ -56,6 +67,26 @@ impl LogLog {
         let values = || self.lines.iter().flat_map(|line| drawn(&line.points)).map(of);
         let (low, high) = (values().fold(f64::MAX, f64::min), values().fold(0.0, f64::max));
         if low > high { 1.0..10.0 } else { low / 1.3..high * 1.3 }
+    }
+
+    /// Where the legend hides least of the lines.
+    fn emptiest_corner(&self) -> SeriesLabelPosition {
+        use SeriesLabelPosition::{LowerLeft, LowerRight, UpperLeft, UpperRight};
+        let corners =
+            [(UpperLeft, 0.0, 1.0), (UpperRight, 1.0, 1.0), (LowerLeft, 0.0, 0.0), (LowerRight, 1.0, 0.0)];
+        let (xs, ys) = (self.range(|p| p.0), self.range(|p| p.1));
+        let share =
+            |x: f64, range: &std::ops::Range<f64>| (x / range.start).ln() / (range.end / range.start).ln();
+        // Of the chart; a line of the legend is a text of up to 50 letters.
+        let (width, height) = (0.4, 0.04 + 0.045 * self.lines.len() as f64);
+        let hidden = |&(_, right, top): &(SeriesLabelPosition, f64, f64)| {
+            let is_hidden = |&(x, y): &(f64, f64)| {
+                (share(x, &xs) - right).abs() < width && (share(y, &ys) - top).abs() < height
+            };
+            self.lines.iter().flat_map(|line| along(&line.points)).filter(is_hidden).count()
+        };
+        let [first, ..] = corners;
+        corners.into_iter().min_by_key(hidden).map_or(first.0, |corner| corner.0)
     }
 
     fn draw(&self, path: &Path) -> Result<(), Box<dyn std::error::Error>> {
@@ -81,7 +112,7 @@ impl LogLog {
                 .legend(move |(x, y)| PathElement::new([(x, y), (x + 20, y)], colour.stroke_width(3)));
         }
         let mut labels = chart.configure_series_labels();
-        labels.position(SeriesLabelPosition::UpperLeft).background_style(WHITE.mix(0.8)).border_style(BLACK);
+        labels.position(self.emptiest_corner()).background_style(WHITE.mix(0.8)).border_style(BLACK);
         labels.draw().map_err(owned)?;
         drop(labels);
         drop(chart);
@@ -99,6 +130,21 @@ mod tests {
         assert!((growth(&square).expect("three points") - 2.0).abs() < 1e-9);
         assert_eq!(growth(&square[..1]), None);
         assert_eq!(growth(&[(1.0, 0.0), (2.0, 4.0)]), None, "zero has no logarithm");
+    }
+
+    #[test]
+    fn the_legend_goes_where_no_line_is() {
+        let rising: Vec<(f64, f64)> = [1.0, 10.0, 100.0].map(|x| (x, x)).to_vec();
+        let falling: Vec<(f64, f64)> = [1.0, 10.0, 100.0].map(|x| (x, 1.0 / x)).to_vec();
+        let corner = |points: &[&Vec<(f64, f64)>]| {
+            let line = |points: &&Vec<(f64, f64)>| Line { name: String::new(), points: points.to_vec() };
+            let lines = points.iter().map(line).collect();
+            LogLog { name: String::new(), title: String::new(), x: "", y: "", lines }.emptiest_corner()
+        };
+        assert!(matches!(corner(&[&rising]), SeriesLabelPosition::UpperLeft));
+        assert!(matches!(corner(&[&falling]), SeriesLabelPosition::UpperRight));
+        let low: Vec<(f64, f64)> = [1.0, 3.0, 100.0].map(|x: f64| (x, x.min(1.01))).to_vec();
+        assert!(matches!(corner(&[&rising, &low]), SeriesLabelPosition::UpperLeft));
     }
 
     #[test]

@@ -18,7 +18,7 @@ use crate::cpu::codes::prefetch;
 use crate::cpu::edit::Changed;
 use crate::cpu::find::Others;
 use crate::cpu::judge::Accept;
-use crate::diff::Judgement;
+use crate::diff::{Judgement, PairStore};
 use crate::plan::{Chosen, LazySummary, Plan};
 use crate::report::{Checks, lap, stage};
 use crate::search::Rule;
@@ -59,7 +59,7 @@ impl BroadPhase {
         };
         self.forget_away();
         if !served {
-            self.near.learn(self.present_count, self.pairs.len());
+            self.near.learn(self.present_count);
             self.near.end();
             return Ok(Served::No);
         }
@@ -112,7 +112,8 @@ impl BroadPhase {
     }
 
     fn most_near(&self) -> u64 {
-        let most = NEAR_OF_A_BOX * u64::from(self.present_count) + 2 * self.pairs.listed() as u64;
+        let most = NEAR_OF_A_BOX * u64::from(self.present_count)
+            + 2 * self.near.list.overlapping().max(self.pairs.listed()) as u64;
         most.min(u64::from(u32::MAX / 2))
     }
 
@@ -136,16 +137,18 @@ impl BroadPhase {
         let Near { list, away, parted, .. } = near;
         parted.clear();
         if !away.is_empty() {
-            let is_away = |id: u32| flags[id as usize] & flag::AWAY != 0;
-            list.remove_of(away, is_away, pairs, |pair| parted.push(pair));
+            list.remove_of(away, |id| flags[id as usize] & flag::AWAY != 0, parted);
+            pairs.count_removed(parted);
         }
-        let (added, removed) = (|pair| events.added.push(pair), |pair| events.removed.push(pair));
+        let (added, removed) = (&mut events.added, &mut events.removed);
         if changed.len() * LOOKUP < list.len() {
             let comes_first = |id: u32, other: u32| id < other || flags[other as usize] & flag::CHANGED == 0;
-            list.update_few(changed, boxes, comes_first, pairs, added, removed);
+            list.update_few(changed, boxes, comes_first, added, removed);
         } else {
-            list.update(boxes, pairs, added, removed);
+            list.update(boxes, added, removed);
         }
+        pairs.count_added(added);
+        pairs.count_removed(removed);
         self.report.stages.check += lap(&mut clock);
     }
 
@@ -155,13 +158,13 @@ impl BroadPhase {
         let mut clock = Instant::now();
         let state = state!(self);
         let (added, removed) = (&mut self.events.added, &mut self.events.removed);
-        self.near.list.extend(&self.found.chunks, &self.boxes, &mut self.pairs, |pair| {
-            if !state.paired_before(pair.a, pair.b) {
-                added.push(pair);
-            }
-        });
+        let Near { list, parted, came, .. } = &mut self.near;
+        came.clear();
+        list.extend(&self.found.chunks, &self.boxes, came);
+        self.pairs.count_added(came);
+        added.extend(came.iter().filter(|pair| !state.paired_before(pair.a, pair.b)));
         let ended = |pair: &&Pair| state.paired_before(pair.a, pair.b) && !state.holds(**pair);
-        removed.extend(self.near.parted.iter().filter(ended));
+        removed.extend(parted.iter().filter(ended));
         self.pairs.forget_removed();
         self.report.stages.diff += lap(&mut clock);
     }
@@ -184,7 +187,7 @@ impl BroadPhase {
         if self.events.added.len() as u64 <= limit {
             return Ok(Served::Yes);
         }
-        self.near.stop();
+        self.drop_near();
         let state = state!(self);
         self.pairs.end_many(&Before(state), &mut vec![]);
         self.pairs.insert(&self.events.removed);
@@ -208,15 +211,37 @@ impl BroadPhase {
         }
         stage!("diff");
         let mut clock = Instant::now();
-        let state = state!(self);
-        let (added, removed) = (&mut self.events.added, &mut self.events.removed);
-        self.pairs.end_many(&state, removed);
-        let (found, boxes) = (&mut self.base.found.chunks, &self.boxes);
-        self.near.list.fill(found, boxes, &mut self.pairs, &Before(state), added);
+        self.end_before_list();
+        let (before, added) = (Before(state!(self)), &mut self.events.added);
+        self.near.list.fill(&mut self.base.found.chunks, &self.boxes, &before, added);
+        self.pairs.count_added(added);
         self.near.is_on = true;
         _ = self.near.list.take_tests();
         self.report.stages.diff += lap(&mut clock);
         self.check_near_limit()
+    }
+
+    /// Pairs that have ended, wherever they are kept, before a new list has the others.
+    fn end_before_list(&mut self) {
+        let (state, removed) = (state!(self), &mut self.events.removed);
+        if self.near.is_on {
+            self.near.list.find_ended(&Staying(state, &self.pairs), removed);
+            self.pairs.count_removed(removed);
+            removed.retain(|pair| self.pairs.is_there(*pair));
+            self.pairs.forget_removed();
+        } else {
+            self.pairs.drop_removed();
+            self.pairs.end_many(&state, removed);
+            self.pairs.hand_over();
+        }
+    }
+
+    /// Does without the list, if there is one.
+    pub(super) fn drop_near(&mut self) {
+        if std::mem::take(&mut self.near.is_on) {
+            self.pairs.take_over(self.near.list.iter());
+            self.near.list.clear();
+        }
     }
 
     /// Pairs of reaches, into the base.
@@ -262,6 +287,15 @@ impl Accept for NearAway<'_> {
 
     fn pair(&self, pair: Pair) -> bool {
         self.0.filters_allow(pair.a, pair.b)
+    }
+}
+
+/// Pairs that hold, of boxes that were not removed: one set again since is another box.
+struct Staying<'a>(State<'a>, &'a PairStore);
+
+impl Judgement for Staying<'_> {
+    fn holds(&self, pair: Pair) -> bool {
+        self.0.holds(pair) && self.1.is_there(pair)
     }
 }
 

@@ -30,7 +30,7 @@ const LONGEST_PAUSE: u32 = 64;
 /// Near pairs, and whether they are any good here.
 #[derive(Clone, Debug)]
 pub(crate) struct Near {
-    /// Whether the pairs hold, and the base grid has the reaches.
+    /// Whether the list has the pairs that exist.
     pub(crate) is_on: bool,
     pub(crate) list: NearPairs,
     /// By id: the reach; nowhere for a box that has none.
@@ -58,8 +58,10 @@ pub(crate) struct Near {
     pub(crate) met: u64,
     /// Boxes that have left their reach in this update.
     pub(crate) away: Vec<u32>,
-    /// Kept pairs of those, which may go on.
+    /// Pairs of those, which may go on.
     pub(crate) parted: Vec<Pair>,
+    /// Their pairs now.
+    pub(crate) came: Vec<Pair>,
 }
 
 /// What updates have cost.
@@ -89,23 +91,17 @@ impl Default for Near {
             met: 0,
             away: vec![],
             parted: vec![],
+            came: vec![],
         }
     }
 }
 
 impl Near {
-    /// Another search has done the work: the list no longer holds.
-    pub(crate) fn stop(&mut self) {
-        if std::mem::take(&mut self.is_on) {
-            self.list.clear();
-        }
-    }
-
-    /// What a list of so many boxes and kept pairs has cost decides how wide the next skin will be: searches, which come
+    /// What a list of so many boxes has cost decides how wide the next skin will be: searches, which come
     /// the more often the narrower it is, should cost as much as tests of pairs that are apart.
-    pub(crate) fn learn(&mut self, boxes: u32, kept: usize) {
+    pub(crate) fn learn(&mut self, boxes: u32) {
         let search = SEARCH_OF_A_BOX * boxes as f32 / self.age.max(1) as f32;
-        let tests = self.list.len().saturating_sub(kept) as f32;
+        let tests = self.list.len().saturating_sub(self.list.overlapping()) as f32;
         let factor = if search > 1.5 * tests {
             1.4
         } else if tests > 1.5 * search {
@@ -132,7 +128,6 @@ impl Near {
 
     /// A list is no longer any good; if it has not paid, the next one comes later.
     pub(crate) fn end(&mut self) {
-        self.stop();
         self.lists += 1;
         let pays = self.usual.is_none_or(|usual| self.own.ns < PAYS * usual * self.own.changed);
         if pays && self.age >= LONG {
@@ -145,7 +140,6 @@ impl Near {
 
     /// Too many pairs are near.
     pub(crate) fn fail(&mut self) {
-        self.stop();
         self.failed = true;
         self.wait();
     }
@@ -183,44 +177,25 @@ impl BroadPhase {
 
     /// How many pairs would be near: those that overlap, as often as there is more room around a box; filters left aside.
     fn near_to_come(&self, skin: f32) -> f64 {
-        let mut edges = [0.0f32; SAMPLE];
-        let step = self.changed.len().div_ceil(SAMPLE).max(1);
-        let mut count = 0;
-        for &id in self.changed.iter().step_by(step) {
+        let edge = |id: u32| {
             let extents = self.boxes[id as usize].extents();
-            let edge = (extents[0] + extents[1] + extents[2]) / 3.0;
-            if edge.is_finite() {
-                edges[count] = edge;
-                count += 1;
-            }
-        }
-        let edges = &mut edges[..count];
-        edges.sort_unstable_by(f32::total_cmp);
-        let Some(&edge) = edges.get(count / 2) else { return 0.0 };
+            (extents[0] + extents[1] + extents[2]) / 3.0
+        };
+        let Some(edge) = Sample::of(&self.changed, edge).at(0.5) else { return 0.0 };
         let grown = 1.0 + 2.0 * f64::from(skin) / f64::from(edge);
         self.near.met as f64 * grown.powi(3)
     }
 
     /// How far boxes move in an update: nine in ten of those that have changed no further.
     fn usual_move(&self) -> Option<f32> {
-        let mut moves = [0.0f32; SAMPLE];
-        let step = self.changed.len().div_ceil(SAMPLE).max(1);
-        let mut count = 0;
-        for &id in self.changed.iter().step_by(step) {
+        let moved = |id: u32| {
             let (now, old) = (&self.boxes[id as usize], &self.before[id as usize]);
             let of = |k: usize| (now.min[k] - old.min[k]).abs().max((now.max[k] - old.max[k]).abs());
-            let moved = of(0).max(of(1)).max(of(2));
-            if moved.is_finite() && !old.min[0].is_nan() && !now.min[0].is_nan() {
-                moves[count] = moved;
-                count += 1;
-            }
-        }
-        if 2 * count * step < self.changed.len() {
-            return None;
-        }
-        let moves = &mut moves[..count];
-        moves.sort_unstable_by(f32::total_cmp);
-        moves.get(count * 9 / 10).copied()
+            // `max` would pass over a box that was not there.
+            if now.min[0].is_nan() | old.min[0].is_nan() { f32::NAN } else { of(0).max(of(1)).max(of(2)) }
+        };
+        let sample = Sample::of(&self.changed, moved);
+        if 2 * sample.count < sample.looked_at { None } else { sample.at(0.9) }
     }
 
     /// Boxes that tremble, or swing, need less of a skin than those that go on: once they have come no farther for as long
@@ -247,7 +222,32 @@ impl BroadPhase {
             }
         }
         near.skin = enough;
-        near.list.retain(|pair| near.reach[pair.a as usize].overlaps(&near.reach[pair.b as usize]));
+        near.list.retain_near(&near.reach);
+    }
+}
+
+/// Something of some boxes, from the least to the most; only what is finite.
+struct Sample {
+    values: [f32; SAMPLE],
+    count: usize,
+    looked_at: usize,
+}
+
+impl Sample {
+    fn of(ids: &[u32], value: impl Fn(u32) -> f32) -> Self {
+        let step = ids.len().div_ceil(SAMPLE).max(1);
+        let mut sample = Self { values: [0.0; SAMPLE], count: 0, looked_at: ids.len().div_ceil(step) };
+        for value in ids.iter().step_by(step).map(|&id| value(id)).filter(|value| value.is_finite()) {
+            sample.values[sample.count] = value;
+            sample.count += 1;
+        }
+        sample.values[..sample.count].sort_unstable_by(f32::total_cmp);
+        sample
+    }
+
+    /// The value that this share of the others is below; nothing of nothing.
+    fn at(&self, share: f32) -> Option<f32> {
+        self.values[..self.count].get((self.count as f32 * share) as usize).copied()
     }
 }
 

@@ -90,13 +90,29 @@ impl World {
         let wanted = self.wanted();
         let wrong: Vec<&Pair> = wanted.symmetric_difference(&self.pairs).take(3).collect();
         assert!(wrong.is_empty(), "{what}: {wrong:?}, {}", self.broad_phase.report().plan);
-        assert_eq!(self.broad_phase.pairs().collect::<BTreeSet<_>>(), wanted, "{what}");
+        self.check_pairs();
         self.near += u32::from(self.broad_phase.report().plan.chosen == Chosen::Near);
     }
 
     fn remove(&mut self, id: u32) {
         assert!(self.broad_phase.remove(id));
         self.pairs.retain(|pair| pair.a != id && pair.b != id);
+        self.check_pairs();
+    }
+
+    /// What can be asked about pairs, at any time.
+    fn check_pairs(&self) {
+        let of = &self.broad_phase;
+        assert_eq!(of.pairs().collect::<BTreeSet<_>>(), self.pairs);
+        assert_eq!(of.pair_count(), self.pairs.len());
+        let first = self.pairs.first().into_iter().chain(self.pairs.last());
+        for id in first.flat_map(|pair| [pair.a, pair.b]) {
+            let own: Vec<Pair> = self.pairs.iter().copied().filter(|p| p.a == id || p.b == id).collect();
+            let mut told: Vec<Pair> = of.pairs_of(id).collect();
+            told.sort_unstable();
+            assert_eq!(told, own, "those of {id}");
+            assert_eq!(of.degree(id) as usize, own.len(), "degree of {id}");
+        }
     }
 }
 
@@ -107,7 +123,7 @@ fn all_that_can_happen_to_a_box_happens_while_the_others_tremble() {
         for round in 0..90u32 {
             world.tremble(0.05);
             let id = round * 31 % BOXES;
-            match round % 6 {
+            match round % 7 {
                 0 => world.remove(id),
                 1 => world.shift(id, [3.0, 0.0, 0.0]),
                 2 => {
@@ -119,6 +135,12 @@ fn all_that_can_happen_to_a_box_happens_while_the_others_tremble() {
                     world.remove(id);
                     let filter = ProxyFilter { memberships: 4, mask: 2, ..ProxyFilter::ALL };
                     world.broad_phase.set(id, world.boxes[id as usize], filter).expect("a small id");
+                }
+                5 => {
+                    // Another one at the same place, while so many leave their reach that all are searched for anew.
+                    world.remove(id);
+                    world.set(id);
+                    (0..BOXES).step_by(16).for_each(|other| world.shift(other, [1.0, 0.0, 0.0]));
                 }
                 _ => {
                     world.boxes.push(world.boxes[id as usize]);
@@ -204,7 +226,7 @@ fn no_list_is_tried_where_filters_turn_down_most_of_what_would_be_near() {
 fn what_lists_cost_decides_about_skins_and_pauses() {
     let mut near = Near { age: 10, usual: Some(100.0), ..Near::default() };
     let before = near.moves;
-    near.learn(100_000, 0);
+    near.learn(100_000);
     assert!(near.moves > before, "searches cost, tests nothing");
     near.own = Cost { ns: 50.0, changed: 1.0 };
     near.end();
