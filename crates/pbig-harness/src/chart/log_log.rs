@@ -85,8 +85,7 @@ impl LogLog {
             };
             self.lines.iter().flat_map(|line| along(&line.points)).filter(is_hidden).count()
         };
-        let [first, ..] = corners;
-        corners.into_iter().min_by_key(hidden).map_or(first.0, |corner| corner.0)
+        corners.into_iter().min_by_key(hidden).map_or(UpperLeft, |corner| corner.0)
     }
 
     fn draw(&self, path: &Path) -> Result<(), Box<dyn std::error::Error>> {
