@@ -207,7 +207,7 @@ impl BroadPhase {
             near.farthest =
                 near.farthest.max(near.skin - slack(&near.reach[id as usize], &boxes[id as usize]));
         }
-        if near.age < 4 || !near.age.is_power_of_two() {
+        if near.age < 2 || !near.age.is_power_of_two() {
             return;
         }
         let then = std::mem::replace(&mut near.farthest_then, near.farthest);
