@@ -3,6 +3,7 @@
 
 use super::memory;
 use crate::incremental::Follower;
+use pbig_core::plan::Chosen;
 use pbig_core::{Aabb, Backend, Coding, Config, ProxyFilter, Strategy};
 use pbig_harness::boxes::BoxSet;
 use pbig_tests::gpu;
@@ -20,13 +21,18 @@ struct Churn {
     rng: StdRng,
     home: Vec<Aabb>,
     odd: Vec<Aabb>,
+    /// Whether all boxes move smoothly around their homes, so that near pairs are kept.
+    swings: bool,
+    /// Updates by near pairs.
+    near: usize,
 }
 
 impl Churn {
-    fn new(config: Config, ids: usize) -> Self {
+    fn new(config: Config, ids: usize, swings: bool) -> Self {
         let set = |name: &str, n| BoxSet::named(name).expect("the set exists").boxes(n, 4);
         let world = Follower::new(config, ids);
-        Self { world, rng: StdRng::seed_from_u64(6), home: set("unit", ids), odd: set("degenerate", 100) }
+        let rng = StdRng::seed_from_u64(6);
+        Self { world, rng, home: set("unit", ids), odd: set("degenerate", 100), swings, near: 0 }
     }
 
     fn aabb(&mut self, id: u32) -> Aabb {
@@ -39,8 +45,22 @@ impl Churn {
         }
     }
 
+    fn swing(&mut self, update: usize) {
+        for id in 0..self.home.len() as u32 {
+            let phase = update as f32 * 0.01 * (1 + id % 7) as f32;
+            let by = [phase.sin(), (1.3 * phase).sin(), (1.7 * phase).sin()].map(|x| 0.5 * x);
+            if self.world.has(id) {
+                let aabb = super::shifted(&self.home[id as usize], by);
+                self.world.set(id, aabb, ProxyFilter { body: id % 20, ..ProxyFilter::ALL });
+            }
+        }
+    }
+
     /// One in thirty boxes, and now and then all of them.
     fn change(&mut self, update: usize) {
+        if self.swings && !update.is_multiple_of(50) {
+            return self.swing(update);
+        }
         let ids = self.home.len();
         let all = update.is_multiple_of(97);
         for i in 0..if all { ids } else { 1 + ids / 30 } {
@@ -67,6 +87,7 @@ impl Churn {
                 self.world.update_unchecked();
             }
             let report = self.world.broad_phase.report();
+            self.near += usize::from(report.plan.chosen == Chosen::Near);
             let (held, on_device) = (memory::held(), report.gpu.as_ref().map_or(0, |gpu| gpu.device_bytes));
             assert_eq!(report.fallback, None, "update {update}");
             if update < updates / 5 {
@@ -80,8 +101,9 @@ impl Churn {
             assert!(on_device <= early_on_device * 5 / 4, "update {update}: {on_device} on the device");
         }
         println!(
-            "{updates} updates of {} ids: {early} bytes, {early_on_device} on the device",
-            self.home.len()
+            "{updates} updates of {} ids, {} by near pairs: {early} bytes, {early_on_device} on the device",
+            self.home.len(),
+            self.near
         );
     }
 }
@@ -89,7 +111,7 @@ impl Churn {
 /// On one thread, whose memory is counted.
 fn soak(config: Config, ids: usize, updates: usize) {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("a pool");
-    pool.install(|| Churn::new(config, ids).run(updates, (updates / 20).min(5000)));
+    pool.install(|| Churn::new(config, ids, false).run(updates, (updates / 20).min(5000)));
 }
 
 fn cpu(strategy: Strategy) -> Config {
@@ -109,6 +131,15 @@ fn soak_of_a_world_in_the_grid_with_edits() {
 #[test]
 fn soak_of_a_small_world_in_the_grid() {
     soak(cpu(Strategy::Grid), 120, updates());
+}
+
+#[test]
+fn soak_of_a_world_of_near_pairs() {
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("a pool");
+    let config = Config { margin: 0.0, ..cpu(Strategy::Grid) };
+    let mut churn = Churn::new(config, 300, true);
+    pool.install(|| churn.run(updates(), (updates() / 20).min(5000)));
+    assert!(churn.near > 0);
 }
 
 /// A software adapter takes milliseconds for an update: a hundredth of them.
