@@ -3,12 +3,21 @@
 #   scripts/sanitize.sh [address] [thread]     without an argument: both
 # Needs nightly Rust, and the thread sanitizer its component rust-src: where the standard library is not instrumented
 # its locks are not seen, and every exchange between rayon's threads is reported as a race.
+# PBIG_RUST: the folder of another rustc and cargo, which may be stable. Debian's rustc-web, cargo-web, libstd-rust-web-dev
+# and rust-web-src will do (PBIG_RUST=/usr/bin), with the file librustc-stable_rt.tsan.a of a rustup toolchain of the same
+# LLVM beside their standard library.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 [ $# -gt 0 ] || set -- address thread
-host=$(rustc +nightly -vV | sed -n 's/^host: //p')
+if [ -n "${PBIG_RUST:-}" ]; then
+    export RUSTC="$PBIG_RUST/rustc" RUSTC_BOOTSTRAP=1
+    rustc=("$RUSTC") cargo=("$PBIG_RUST/cargo")
+else
+    rustc=(rustc +nightly) cargo=(cargo +nightly)
+fi
+host=$("${rustc[@]}" -vV | sed -n 's/^host: //p')
 std=()
-if [ -f "$(rustc +nightly --print sysroot)/lib/rustlib/src/rust/library/Cargo.lock" ]; then std=(-Zbuild-std); fi
+if [ -f "$("${rustc[@]}" --print sysroot)/lib/rustlib/src/rust/library/Cargo.lock" ]; then std=(-Zbuild-std); fi
 # Optimized a little, with overflow checks and debug assertions; a folder for each sanitizer.
 export CARGO_PROFILE_DEV_OPT_LEVEL=1 CARGO_PROFILE_DEV_DEBUG=line-tables-only
 for sanitizer in "$@"; do
@@ -17,6 +26,6 @@ for sanitizer in "$@"; do
         exit 1
     fi
     echo "== $sanitizer sanitizer${std:+, standard library included}"
-    RUSTFLAGS="-Zsanitizer=$sanitizer" cargo +nightly test "${std[@]}" --target "$host" \
+    RUSTFLAGS="-Zsanitizer=$sanitizer" "${cargo[@]}" test "${std[@]}" --target "$host" \
         --target-dir "target/sanitize-$sanitizer" -p pbig-core --features serde --lib
 done
