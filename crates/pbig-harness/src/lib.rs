@@ -7,6 +7,7 @@ pub mod files;
 pub mod index;
 pub mod options;
 pub mod precision;
+pub mod reported;
 pub mod runner;
 pub mod scenes;
 pub mod shadow;

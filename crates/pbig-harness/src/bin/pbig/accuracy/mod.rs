@@ -4,6 +4,7 @@
 
 mod coordinates;
 mod index;
+mod margin;
 mod study;
 
 use crate::bench::machine::{Machine, slug};
@@ -33,7 +34,8 @@ pub(crate) struct Args {
 type Run = fn(bool) -> Result<Study, Failure>;
 
 /// Every study by name, in the order of the document.
-const STUDIES: [(&str, Run); 2] = [("index", index::run), ("coordinates", coordinates::run)];
+const STUDIES: [(&str, Run); 3] =
+    [("index", index::run), ("coordinates", coordinates::run), ("margin", margin::run)];
 
 fn names() -> clap::builder::PossibleValuesParser {
     STUDIES.map(|(name, _)| name).into()
