@@ -5,6 +5,8 @@ pub mod chart;
 pub mod field;
 pub mod files;
 pub mod index;
+pub mod mechanics;
+pub mod numbered;
 pub mod options;
 pub mod precision;
 pub mod reported;
