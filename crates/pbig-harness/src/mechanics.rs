@@ -113,7 +113,8 @@ mod tests {
         world.add(moving(Vec3::Y * 3.0, Vec3::X * 2.0), ball(0.5, 2.0));
         let spin = moving(Vec3::new(9.0, 1.0, 0.0), Vec3::X * -1.0).angvel(vector![0.0, 4.0, 0.0]);
         world.add(spin, ball(0.5, 5.0));
-        world.bodies.insert(RigidBodyBuilder::kinematic_velocity_based().linvel(vector![7.0, 0.0, 0.0]));
+        let kinematic = RigidBodyBuilder::kinematic_velocity_based().linvel(vector![7.0, 0.0, 0.0]);
+        world.add(kinematic.translation(vector![0.0, 20.0, 0.0]), ball(0.5, 3.0));
         let found = measured(world);
         near(found.mass, 7.0);
         // Half of m v^2 twice, and of I w^2 with I = 2/5 m r^2.
