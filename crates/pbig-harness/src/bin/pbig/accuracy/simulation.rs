@@ -7,7 +7,7 @@ mod sides;
 
 use super::study::{Cell, Point, Study, Table, plain};
 use crate::output::Failure;
-use figures::{Figures, QUANTITIES, Quantity, multiple};
+use figures::{DISTANCE, Figures, QUANTITIES, multiple};
 use sides::{CLOUD, Case, Side, WAYS, case, repeats, simulated};
 
 const FULL: [Case; 6] = [
@@ -73,11 +73,10 @@ impl Ways {
 
     /// A run in each quantity that has a meaning here: how far from stock, and its value and stock's.
     fn multiples<'a>(&'a self, run: &'a Figures) -> impl Iterator<Item = (&'static str, f64, [f64; 2])> + 'a {
-        let of = move |(name, of): Quantity| {
-            let times = multiple(run, self.first(), &self.yardsticks(), of)?;
-            Some((name, times, [of(run)?, of(self.first())?]))
-        };
-        QUANTITIES.into_iter().filter_map(of)
+        QUANTITIES.into_iter().filter_map(|quantity| {
+            let times = multiple(run, self.first(), &self.yardsticks(), quantity)?;
+            Some((quantity.name, times, [(quantity.of)(run)?, (quantity.of)(self.first())?]))
+        })
     }
 }
 
@@ -208,8 +207,30 @@ fn notes(scenes: &[Ways]) -> Vec<String> {
     ];
     notes.extend(WAYS.iter().filter_map(|way| again(scenes, way.name)));
     notes.extend(scenes.iter().map(first_difference));
+    notes.push(typical(scenes));
     notes.push(how_far(scenes));
     notes
+}
+
+/// Mean distances at the end as multiples of the farthest permuted run's: geometric means over the scenes in which bodies
+/// move apart.
+fn typical(scenes: &[Ways]) -> String {
+    let of = |name: &'static str| {
+        let run = |ways: &Ways| {
+            let run = ways.runs.iter().find(|run| run.way == name)?;
+            multiple(run, ways.first(), &ways.yardsticks(), DISTANCE)
+        };
+        let logs: Vec<f64> =
+            scenes.iter().filter_map(run).map(f64::ln).filter(|log| log.is_finite()).collect();
+        let mean = (logs.iter().sum::<f64>() / logs.len().max(1) as f64).exp();
+        format!("{mean:.2} times with {name}")
+    };
+    let ways = WAYS.iter().filter(|way| way.is_held_against_stock());
+    let all: Vec<String> = ways.map(|way| of(way.name)).collect();
+    format!(
+        "At the end bodies are as far from stock's as those of the farthest permuted run (geometric means over scenes): {}.",
+        all.join(", ")
+    )
 }
 
 /// Whether the same run is the same, of a way that was run twice.
@@ -266,7 +287,7 @@ fn how_far(scenes: &[Ways]) -> String {
 
 fn named((times, what): &(f64, String)) -> String {
     let times =
-        if times.is_finite() { format!("{times:.2} times") } else { "with no difference there".into() };
+        if times.is_finite() { format!("{times:.2} times") } else { "no permuted run differs".into() };
     format!("{what} ({times})")
 }
 
@@ -299,6 +320,20 @@ mod tests {
             far.starts_with("Farther from stock than 10 times") && far.contains("(15.00 times)"),
             "{far}"
         );
+    }
+
+    #[test]
+    fn distances_at_the_end_are_told_as_multiples_of_the_farthest_permuted() {
+        let with = |scene: &'static str, pbig: f64| {
+            let mut ways = made(100.0).remove(0);
+            ways.scene = scene;
+            for (way, run) in WAYS.iter().zip(&mut ways.runs) {
+                run.apart.mean = if way.is_pbig() { pbig } else { f64::from(u8::from(way.is_permuted())) };
+            }
+            ways
+        };
+        let told = typical(&[with("near", 0.5), with("far", 8.0), with("same", 0.0)]);
+        assert!(told.ends_with(": 2.00 times with pbig, 2.00 times with pbig without margin."), "{told}");
     }
 
     #[test]

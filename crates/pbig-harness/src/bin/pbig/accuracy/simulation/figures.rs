@@ -115,21 +115,35 @@ fn rest(all: &[Mechanics]) -> Option<usize> {
     (last < all.len()).then_some(last + 1)
 }
 
-/// One of the figures by name, where it has a meaning.
-pub(super) type Quantity = (&'static str, fn(&Figures) -> Option<f64>);
+/// One of the figures.
+#[derive(Clone, Copy)]
+pub(super) struct Quantity {
+    pub(super) name: &'static str,
+    /// None where it has no meaning.
+    pub(super) of: fn(&Figures) -> Option<f64>,
+    /// Less is no difference.
+    resolution: f64,
+}
+
+const fn quantity(name: &'static str, of: fn(&Figures) -> Option<f64>) -> Quantity {
+    Quantity { name, of, resolution: 0.0 }
+}
+
+/// How far bodies have come from those of the first way.
+pub(super) const DISTANCE: Quantity = quantity("mean distance at the end", |f| Some(f.apart.mean));
 
 /// All in which runs are compared.
 pub(super) const QUANTITIES: [Quantity; 10] = [
-    ("contacts", |f| Some(f.contacts)),
-    ("contact points", |f| Some(f.points)),
-    ("deepest penetration", |f| Some(f.deepest)),
-    ("mean penetration", |f| Some(f.penetration)),
-    ("energy at the end", |f| Some(f.energy)),
-    ("rise of energy", |f| Some(f.rise)),
-    ("drift of momentum", |f| f.momentum),
-    ("time to rest", |f| f.rest.map(|step| step as f64)),
-    ("mean distance at the end", |f| Some(f.apart.mean)),
-    ("largest distance at the end", |f| Some(f.apart.max)),
+    quantity("contacts", |f| Some(f.contacts)),
+    quantity("contact points", |f| Some(f.points)),
+    quantity("deepest penetration", |f| Some(f.deepest)),
+    quantity("mean penetration", |f| Some(f.penetration)),
+    quantity("energy at the end", |f| Some(f.energy)),
+    quantity("rise of energy", |f| Some(f.rise)),
+    quantity("drift of momentum", |f| f.momentum),
+    Quantity { resolution: 1.0, ..quantity("time to rest", |f| f.rest.map(|step| step as f64)) },
+    DISTANCE,
+    quantity("largest distance at the end", |f| Some(f.apart.max)),
 ];
 
 /// How far a run is from the first one in a quantity, as a multiple of the farthest of the yardsticks. None where the
@@ -138,11 +152,11 @@ pub(super) fn multiple(
     run: &Figures,
     first: &Figures,
     yardsticks: &[&Figures],
-    of: fn(&Figures) -> Option<f64>,
+    Quantity { of, resolution, .. }: Quantity,
 ) -> Option<f64> {
     let from_first = |figures: &Figures| Some((of(figures)? - of(first)?).abs());
     let reach = yardsticks.iter().map(|figures| from_first(figures)).collect::<Option<Vec<_>>>()?;
-    let (far, reach) = (from_first(run)?, reach.into_iter().fold(0.0, f64::max));
+    let (far, reach) = (from_first(run)?, reach.into_iter().fold(resolution, f64::max));
     Some(if far == 0.0 { 0.0 } else { far / reach })
 }
 
@@ -201,11 +215,18 @@ pub(super) mod tests {
     fn distances_are_multiples_of_the_farthest_yardstick() {
         let with = |contacts| Figures { contacts, ..nothing() };
         let (first, far, near) = (with(100.0), with(110.0), with(98.0));
-        let times = |run| multiple(&with(run), &first, &[&near, &far], |f| Some(f.contacts));
+        let times = |run| multiple(&with(run), &first, &[&near, &far], QUANTITIES[0]);
         assert_eq!((times(130.0), times(95.0), times(100.0)), (Some(3.0), Some(0.5), Some(0.0)));
-        let at_once = multiple(&with(101.0), &first, &[&first], |f| Some(f.contacts));
+        let at_once = multiple(&with(101.0), &first, &[&first], QUANTITIES[0]);
         assert_eq!(at_once, Some(f64::INFINITY));
-        assert_eq!(multiple(&far, &first, &[&near], |f| f.momentum), None);
+        assert_eq!(multiple(&far, &first, &[&near], QUANTITIES[6]), None);
+    }
+
+    #[test]
+    fn one_step_more_or_less_until_rest_is_no_difference() {
+        let at = |step| Figures { rest: Some(step), ..nothing() };
+        let times = |step| multiple(&at(step), &at(20), &[&at(20)], QUANTITIES[7]);
+        assert_eq!((times(20), times(21), times(25)), (Some(0.0), Some(1.0), Some(5.0)));
     }
 
     #[test]
