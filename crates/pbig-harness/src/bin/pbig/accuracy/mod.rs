@@ -4,6 +4,8 @@
 
 mod coordinates;
 mod index;
+mod margin;
+mod simulation;
 mod study;
 
 use crate::bench::machine::{Machine, slug};
@@ -33,7 +35,12 @@ pub(crate) struct Args {
 type Run = fn(bool) -> Result<Study, Failure>;
 
 /// Every study by name, in the order of the document.
-const STUDIES: [(&str, Run); 2] = [("index", index::run), ("coordinates", coordinates::run)];
+const STUDIES: [(&str, Run); 4] = [
+    ("index", index::run),
+    ("coordinates", coordinates::run),
+    ("margin", margin::run),
+    ("simulation", simulation::run),
+];
 
 fn names() -> clap::builder::PossibleValuesParser {
     STUDIES.map(|(name, _)| name).into()

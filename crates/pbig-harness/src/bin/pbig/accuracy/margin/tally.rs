@@ -1,0 +1,161 @@
+//! What each margin has cost and done: the same rounds several times over, all margins in turn in each round.
+
+use crate::bench::measure::{Contest, Effort, medians};
+use crate::output::Failure;
+use pbig_harness::reported::Reported;
+use pbig_harness::runner::{Spread, StepTime};
+use std::time::Duration;
+
+/// In units of rapier's length unit, as `Config::margin`.
+pub(super) const MARGINS: [f64; 8] = [0.0, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5];
+
+/// Rounds that do not count: boxes are new in the first, and later ones learn how they move.
+const WARM_UP: usize = 8;
+
+/// Pairs are compared with brute force in one of so many rounds.
+const COMPARED: usize = 10;
+
+/// All is done so often. The work is the same each time, so the shortest time of each round is the one least disturbed.
+/// (A median over rounds would hide what a margin does: boxes of one speed leave their fat boxes in the same round.)
+const PASSES: usize = 2;
+
+/// One margin's part.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Tally {
+    rounds: usize,
+    times: Vec<StepTime>,
+    /// Boxes that the broad phase was told of, in the counted rounds.
+    pub(super) listed: u64,
+    /// Those of them that had left their fat box.
+    pub(super) changed: u64,
+    /// In the rounds that were compared.
+    pub(super) reported: Reported,
+    /// Rounds that were compared.
+    pub(super) compared: u64,
+}
+
+impl Tally {
+    /// Whether pairs are compared in the round that is under way.
+    pub(super) fn compares(round: usize) -> bool {
+        round >= WARM_UP && (round + 1).is_multiple_of(COMPARED)
+    }
+
+    /// A round is done; `reported` is asked if it is one to compare.
+    pub(super) fn note(
+        &mut self,
+        time: StepTime,
+        [listed, changed]: [u64; 2],
+        reported: impl FnOnce() -> Reported,
+    ) {
+        if Self::compares(self.rounds) {
+            self.reported += reported();
+            self.compared += 1;
+        }
+        if self.rounds >= WARM_UP {
+            self.times.push(time);
+            self.listed += listed;
+            self.changed += changed;
+        }
+        self.rounds += 1;
+    }
+
+    /// Of the counted rounds: milliseconds of each, on average.
+    pub(super) fn mean(&self, of: fn(&StepTime) -> f64) -> f64 {
+        self.times.iter().map(of).sum::<f64>() / self.times.len().max(1) as f64
+    }
+
+    /// Rounds that count.
+    pub(super) fn counted(&self) -> usize {
+        self.times.len()
+    }
+
+    /// Takes the shorter time of each round.
+    fn shorten(&mut self, again: &Self) {
+        for (time, other) in self.times.iter_mut().zip(&again.times) {
+            time.broad_phase = time.broad_phase.min(other.broad_phase);
+            time.step = time.step.min(other.step);
+        }
+    }
+}
+
+/// Margins that take part, and what they have done.
+pub(super) trait Tallied: Contest {
+    fn tallies(self) -> Vec<Tally>;
+}
+
+/// What the passes have given.
+pub(super) struct Passes {
+    /// By margin.
+    pub(super) tallies: Vec<Tally>,
+    /// By how much the times of a margin differ between two passes, as a share of the shorter one; in the middle.
+    pub(super) noise: StepTime,
+}
+
+/// Makes the contest anew for each pass.
+pub(super) fn passes<C: Tallied>(
+    counted: usize,
+    make: impl Fn() -> Result<C, Failure>,
+) -> Result<Passes, Failure> {
+    let effort = Effort { warm_up: 0, rounds: WARM_UP + counted, budget: Duration::MAX };
+    let pass = || -> Result<Vec<Tally>, Failure> {
+        let mut contest = make()?;
+        medians(&mut contest, effort)?;
+        Ok(contest.tallies())
+    };
+    let mut tallies = pass()?;
+    let mut differences = Vec::new();
+    for _ in 1..PASSES {
+        let again = pass()?;
+        differences.extend(tallies.iter().zip(&again).map(|(one, other)| difference(one, other)));
+        tallies.iter_mut().zip(&again).for_each(|(tally, again)| tally.shorten(again));
+    }
+    let middle = |of: fn(&StepTime) -> f64| Spread::of(differences.iter().map(of)).median;
+    let noise = StepTime { broad_phase: middle(|by| by.broad_phase), step: middle(|by| by.step) };
+    Ok(Passes { tallies, noise })
+}
+
+fn difference(one: &Tally, other: &Tally) -> StepTime {
+    let of = |time: fn(&StepTime) -> f64| {
+        let [a, b] = [one, other].map(|tally| tally.mean(time));
+        (a - b).abs() / a.min(b).max(f64::MIN_POSITIVE)
+    };
+    StepTime { broad_phase: of(|time| time.broad_phase), step: of(|time| time.step) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn time(broad_phase: f64) -> StepTime {
+        StepTime { broad_phase, step: 10.0 * broad_phase }
+    }
+
+    /// Takes 1 ms more in each round, and in every second pass 4 ms.
+    fn tally(disturbed: bool) -> Tally {
+        let mut tally = Tally::default();
+        for round in 0..WARM_UP + 4 {
+            let ms = round as f64 + if disturbed && round % 2 == 0 { 4.0 } else { 0.0 };
+            tally.note(time(ms), [10, 3], || Reported { needed: 5, extra: 1, missed: 0 });
+        }
+        tally
+    }
+
+    #[test]
+    fn rounds_that_warm_up_count_for_nothing() {
+        let tally = tally(false);
+        assert_eq!((tally.counted(), tally.listed, tally.changed), (4, 40, 12));
+        assert_eq!(tally.mean(|time| time.step), 10.0 * (WARM_UP as f64 + 1.5));
+        let compared = (WARM_UP..WARM_UP + 4).filter(|&round| Tally::compares(round)).count() as u64;
+        assert!(compared > 0);
+        assert_eq!((tally.compared, tally.reported.needed), (compared, 5 * compared));
+    }
+
+    #[test]
+    fn the_shortest_time_of_each_round_is_taken() {
+        let mut disturbed = tally(true);
+        // 2 ms more than 9.5 on average.
+        assert_eq!(difference(&disturbed, &tally(false)).step, 2.0 / 9.5);
+        disturbed.shorten(&tally(false));
+        assert_eq!(disturbed.mean(|time| time.broad_phase), tally(false).mean(|time| time.broad_phase));
+    }
+}

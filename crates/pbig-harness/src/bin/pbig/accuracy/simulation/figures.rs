@@ -1,0 +1,239 @@
+//! One run in figures, and how far two runs are from each other in each.
+
+use super::sides::Side;
+use crate::output::Failure;
+use pbig_harness::mechanics::Mechanics;
+use pbig_harness::numbered::Apart;
+use pbig_harness::reported::Reported;
+
+/// Joules a kilogram below which a world counts as at rest: 4.5 cm/s on average, a tenth of the speed at which rapier
+/// lets a body fall asleep.
+const REST: f64 = 1e-3;
+
+/// One way through one scene.
+#[derive(Clone, Debug)]
+pub(super) struct Figures {
+    pub(super) way: &'static str,
+    /// In the second half of the run, on average.
+    pub(super) contacts: f64,
+    pub(super) points: f64,
+    /// The deepest of the run, millimetres.
+    pub(super) deepest: f64,
+    /// Over all points of the run, millimetres.
+    pub(super) penetration: f64,
+    /// At the end, % of that after the first step.
+    pub(super) energy: f64,
+    /// The most that energy has risen above what it had been, % of that after the first step.
+    pub(super) rise: f64,
+    /// The most that the sum of momenta has moved, % of the sum of their sizes at first; where nothing acts from outside.
+    pub(super) momentum: Option<f64>,
+    /// The step from which on the world is at rest.
+    pub(super) rest: Option<usize>,
+    /// From the bodies of the first way, at the end.
+    pub(super) apart: Apart,
+    /// The first step after which a body is elsewhere than with the first way.
+    pub(super) differs: Option<usize>,
+    /// Whole steps, on average.
+    pub(super) ms: f64,
+    pub(super) reported: Reported,
+    pub(super) compared: u64,
+}
+
+fn mean(values: impl Iterator<Item = f64>) -> f64 {
+    let (sum, count) = values.fold((0.0, 0), |(sum, count), value| (sum + value, count + 1));
+    sum / f64::from(count.max(1))
+}
+
+impl Figures {
+    /// Of a whole run.
+    pub(super) fn of(side: &Side, is_isolated: bool) -> Self {
+        let all: Vec<Mechanics> = side.samples.iter().map(|sample| sample.mechanics).collect();
+        let late = &all[all.len() / 2..];
+        let points: f64 = all.iter().map(|m| m.points as f64).sum();
+        let inside: f64 = all.iter().map(|m| m.points as f64 * m.mean_penetration).sum();
+        let moved = side.samples.iter().position(|sample| sample.apart.max > 0.0);
+        Self {
+            way: side.way.name,
+            contacts: mean(late.iter().map(|m| m.contacts as f64)),
+            points: mean(late.iter().map(|m| m.points as f64)),
+            deepest: all.iter().map(|m| m.deepest).fold(0.0, f64::max) * 1e3,
+            penetration: inside / points.max(1.0) * 1e3,
+            energy: energy_left(&all),
+            rise: energy_rise(&all),
+            momentum: is_isolated.then(|| momentum_drift(&all)),
+            rest: rest(&all),
+            apart: side.samples.last().map(|sample| sample.apart).unwrap_or_default(),
+            differs: moved.map(|step| step + 1),
+            ms: mean(side.ms.iter().copied()),
+            reported: side.reported,
+            compared: side.compared,
+        }
+    }
+
+    /// Or that a pair is missing which pbig should have reported.
+    pub(super) fn complete(self, scene: &str, is_pbig: bool) -> Result<Self, Failure> {
+        let Reported { missed, needed, .. } = self.reported;
+        if is_pbig && missed > 0 {
+            let what = format!("{scene}, {}: {missed} of {needed} pairs that overlap are missing", self.way);
+            return Err(Failure::Check(what));
+        }
+        Ok(self)
+    }
+}
+
+/// What all percentages of energy are of.
+fn first_energy(all: &[Mechanics]) -> f64 {
+    all.first().map_or(1.0, |m| m.energy().abs()).max(f64::MIN_POSITIVE)
+}
+
+fn energy_left(all: &[Mechanics]) -> f64 {
+    all.last().map_or(0.0, Mechanics::energy) / first_energy(all) * 100.0
+}
+
+fn energy_rise(all: &[Mechanics]) -> f64 {
+    let (mut least, mut rise) = (f64::MAX, 0.0f64);
+    for energy in all.iter().map(Mechanics::energy) {
+        least = least.min(energy);
+        rise = rise.max(energy - least);
+    }
+    rise / first_energy(all) * 100.0
+}
+
+fn momentum_drift(all: &[Mechanics]) -> f64 {
+    let Some(first) = all.first() else { return 0.0 };
+    let drift = |m: &Mechanics| {
+        let squares = m.momentum.iter().zip(first.momentum).map(|(p, at_first)| (p - at_first).powi(2));
+        squares.sum::<f64>().sqrt()
+    };
+    all.iter().map(drift).fold(0.0, f64::max) / first.speed.max(f64::MIN_POSITIVE) * 100.0
+}
+
+/// The step from which on kinetic energy stays below [`REST`].
+fn rest(all: &[Mechanics]) -> Option<usize> {
+    let is_moving = |m: &Mechanics| m.kinetic > REST * m.mass;
+    let last = all.iter().rposition(is_moving).map_or(0, |step| step + 1);
+    (last < all.len()).then_some(last + 1)
+}
+
+/// One of the figures.
+#[derive(Clone, Copy)]
+pub(super) struct Quantity {
+    pub(super) name: &'static str,
+    /// None where it has no meaning.
+    pub(super) of: fn(&Figures) -> Option<f64>,
+    /// Less is no difference.
+    resolution: f64,
+}
+
+const fn quantity(name: &'static str, of: fn(&Figures) -> Option<f64>) -> Quantity {
+    Quantity { name, of, resolution: 0.0 }
+}
+
+/// How far bodies have come from those of the first way.
+pub(super) const DISTANCE: Quantity = quantity("mean distance at the end", |f| Some(f.apart.mean));
+
+/// All in which runs are compared.
+pub(super) const QUANTITIES: [Quantity; 10] = [
+    quantity("contacts", |f| Some(f.contacts)),
+    quantity("contact points", |f| Some(f.points)),
+    quantity("deepest penetration", |f| Some(f.deepest)),
+    quantity("mean penetration", |f| Some(f.penetration)),
+    quantity("energy at the end", |f| Some(f.energy)),
+    quantity("rise of energy", |f| Some(f.rise)),
+    quantity("drift of momentum", |f| f.momentum),
+    Quantity { resolution: 1.0, ..quantity("time to rest", |f| f.rest.map(|step| step as f64)) },
+    DISTANCE,
+    quantity("largest distance at the end", |f| Some(f.apart.max)),
+];
+
+/// How far a run is from the first one in a quantity, as a multiple of the farthest of the yardsticks. None where the
+/// quantity has no meaning for one of them.
+pub(super) fn multiple(
+    run: &Figures,
+    first: &Figures,
+    yardsticks: &[&Figures],
+    Quantity { of, resolution, .. }: Quantity,
+) -> Option<f64> {
+    let from_first = |figures: &Figures| Some((of(figures)? - of(first)?).abs());
+    let reach = yardsticks.iter().map(|figures| from_first(figures)).collect::<Option<Vec<_>>>()?;
+    let (far, reach) = (from_first(run)?, reach.into_iter().fold(resolution, f64::max));
+    Some(if far == 0.0 { 0.0 } else { far / reach })
+}
+
+#[cfg(test)]
+pub(super) mod tests {
+    use super::*;
+
+    /// With everything 0, or as after a run in which nothing has happened.
+    pub(in super::super) fn nothing() -> Figures {
+        Figures {
+            way: "some way",
+            contacts: 0.0,
+            points: 0.0,
+            deepest: 0.0,
+            penetration: 0.0,
+            energy: 100.0,
+            rise: 0.0,
+            momentum: None,
+            rest: None,
+            apart: Apart::default(),
+            differs: None,
+            ms: 1.0,
+            reported: Reported::default(),
+            compared: 1,
+        }
+    }
+
+    fn energies(values: &[f64]) -> Vec<Mechanics> {
+        values.iter().map(|&kinetic| Mechanics { kinetic, mass: 2.0, ..Mechanics::default() }).collect()
+    }
+
+    #[test]
+    fn energy_that_is_lost_and_that_comes_back() {
+        let all = energies(&[10.0, 4.0, 7.0, 5.0]);
+        assert_eq!(energy_left(&all), 50.0);
+        assert_eq!(energy_rise(&all), 30.0);
+        assert_eq!(energy_rise(&energies(&[10.0, 9.0, 1.0])), 0.0);
+    }
+
+    #[test]
+    fn momentum_that_goes_elsewhere() {
+        let with = |momentum| Mechanics { momentum, speed: 50.0, ..Mechanics::default() };
+        let all = [with([1.0, 0.0, 0.0]), with([4.0, 4.0, 0.0]), with([1.0, 0.0, 0.0])];
+        assert_eq!(momentum_drift(&all), 10.0);
+    }
+
+    #[test]
+    fn rest_is_what_lasts() {
+        let little = REST;
+        assert_eq!(rest(&energies(&[1.0, little, 1.0, little, little])), Some(4));
+        assert_eq!(rest(&energies(&[little, little])), Some(1));
+        assert_eq!(rest(&energies(&[little, 1.0])), None);
+    }
+
+    #[test]
+    fn distances_are_multiples_of_the_farthest_yardstick() {
+        let with = |contacts| Figures { contacts, ..nothing() };
+        let (first, far, near) = (with(100.0), with(110.0), with(98.0));
+        let times = |run| multiple(&with(run), &first, &[&near, &far], QUANTITIES[0]);
+        assert_eq!((times(130.0), times(95.0), times(100.0)), (Some(3.0), Some(0.5), Some(0.0)));
+        let at_once = multiple(&with(101.0), &first, &[&first], QUANTITIES[0]);
+        assert_eq!(at_once, Some(f64::INFINITY));
+        assert_eq!(multiple(&far, &first, &[&near], QUANTITIES[6]), None);
+    }
+
+    #[test]
+    fn one_step_more_or_less_until_rest_is_no_difference() {
+        let at = |step| Figures { rest: Some(step), ..nothing() };
+        let times = |step| multiple(&at(step), &at(20), &[&at(20)], QUANTITIES[7]);
+        assert_eq!((times(20), times(21), times(25)), (Some(0.0), Some(1.0), Some(5.0)));
+    }
+
+    #[test]
+    fn only_pbig_has_to_be_complete() {
+        let missed = Figures { reported: Reported { needed: 7, extra: 0, missed: 2 }, ..nothing() };
+        assert!(missed.clone().complete("column", false).is_ok());
+        let failed = missed.complete("column", true).map(|_| ()).err().map(|failure| failure.to_string());
+        assert!(failed.is_some_and(|told| told.contains("column, some way: 2 of 7 pairs")));
+    }
+}

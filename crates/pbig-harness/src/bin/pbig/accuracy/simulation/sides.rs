@@ -1,0 +1,231 @@
+//! Worlds of one scene, side by side: with rapier's own broad phase, with pbig's, and with bodies in another order.
+
+use crate::bench::measure::timed;
+use crate::output::Failure;
+use glam::Vec3;
+use pbig_harness::mechanics::Mechanics;
+use pbig_harness::numbered::{Apart, Numbered};
+use pbig_harness::reported::Reported;
+use pbig_harness::scenes::Scene;
+use pbig_harness::world::{World, to_vector};
+use rapier_pbig::{Config, PbigBroadPhase};
+use rapier3d::prelude::*;
+use std::hash::{DefaultHasher, Hash, Hasher};
+
+/// One way to run a scene.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Way {
+    pub(super) name: &'static str,
+    /// Of pbig's broad phase; none: rapier's own.
+    margin: Option<f32>,
+    /// For the order in which bodies are inserted; none: the scene's.
+    order: Option<u64>,
+    /// The way before it once more.
+    is_again: bool,
+}
+
+const fn stock(name: &'static str, order: Option<u64>) -> Way {
+    Way { name, margin: None, order, is_again: false }
+}
+
+const fn pbig(name: &'static str, margin: f32) -> Way {
+    Way { name, margin: Some(margin), order: None, is_again: false }
+}
+
+const fn again(name: &'static str, way: Way) -> Way {
+    Way { name, is_again: true, ..way }
+}
+
+const STOCK: Way = stock("stock", None);
+const PBIG: Way = pbig("pbig", PbigBroadPhase::CONFIG.margin);
+
+/// All ways, what the others are held against first.
+pub(super) const WAYS: [Way; 8] = [
+    STOCK,
+    again("stock again", STOCK),
+    stock("stock permuted 1", Some(1)),
+    stock("stock permuted 2", Some(2)),
+    stock("stock permuted 3", Some(3)),
+    PBIG,
+    again("pbig again", PBIG),
+    pbig("pbig without margin", 0.0),
+];
+
+impl Way {
+    pub(super) fn is_pbig(&self) -> bool {
+        self.margin.is_some()
+    }
+
+    /// Whether it is pbig's, for the first time.
+    pub(super) fn is_held_against_stock(&self) -> bool {
+        self.is_pbig() && !self.is_again
+    }
+
+    /// Rapier's own broad phase, and another order.
+    pub(super) fn is_permuted(&self) -> bool {
+        self.order.is_some()
+    }
+
+    fn broad_phase(&self) -> Box<dyn BroadPhase> {
+        match self.margin {
+            None => Box::new(DefaultBroadPhase::new()),
+            Some(margin) => {
+                Box::new(PbigBroadPhase::with_config(Config { margin, ..PbigBroadPhase::CONFIG }))
+            }
+        }
+    }
+}
+
+/// A scene, how large, and for how long.
+#[derive(Clone, Copy)]
+pub(super) struct Case {
+    pub(super) scene: &'static str,
+    bodies: usize,
+    pub(super) steps: usize,
+}
+
+pub(super) const fn case(scene: &'static str, bodies: usize, steps: usize) -> Case {
+    Case { scene, bodies, steps }
+}
+
+/// The one scene that the harness does not have: see [`cloud`].
+pub(super) const CLOUD: &str = "cloud";
+
+impl Case {
+    fn world(&self) -> Result<World, Failure> {
+        if self.scene == CLOUD {
+            return Ok(cloud(self.bodies));
+        }
+        Ok(Scene::named(self.scene)?.build(self.bodies, 1))
+    }
+}
+
+/// Balls and cubes that fly at a common centre and through each other's ways, without gravity, ground or sleep: what
+/// they have of momentum they must keep.
+fn cloud(bodies: usize) -> World {
+    let mut world = World::with_gravity(Vec3::ZERO);
+    let side = (bodies as f32).cbrt().ceil() as usize;
+    for i in 0..bodies {
+        let place = [i % side, i / side % side, i / side / side].map(|k| k as f32 - side as f32 / 2.0);
+        let at = Vec3::from_array(place) * 1.5;
+        // The lattice is not symmetric, or momenta would add up to nothing that could be lost.
+        let velocity = -at + Vec3::new(0.5, 0.2 * (i % 7) as f32, -0.3);
+        let shape =
+            if i % 2 == 0 { ColliderBuilder::ball(0.5) } else { ColliderBuilder::cuboid(0.4, 0.4, 0.4) };
+        world.add(World::dynamic(at).linvel(to_vector(velocity)).can_sleep(false), shape);
+    }
+    world
+}
+
+/// What one way has come to after a step.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct Sample {
+    pub(super) mechanics: Mechanics,
+    /// From the first way's bodies.
+    pub(super) apart: Apart,
+    /// Of every number of every pose: the same exactly where two worlds with one order of bodies are.
+    pub(super) poses: u64,
+}
+
+/// One way under way.
+pub(super) struct Side {
+    pub(super) way: Way,
+    numbered: Numbered,
+    broad_phase: Box<dyn BroadPhase>,
+    /// After each step.
+    pub(super) samples: Vec<Sample>,
+    /// Of each step.
+    pub(super) ms: Vec<f64>,
+    /// Of the steps in which pairs were compared with brute force.
+    pub(super) reported: Reported,
+    /// Those steps.
+    pub(super) compared: u64,
+}
+
+impl Side {
+    fn new(way: Way, scene: &Numbered) -> Self {
+        let as_they_are: Vec<usize> = (0..scene.bodies.len()).collect();
+        let numbered = way.order.map_or_else(|| scene.inserted(&as_they_are), |seed| scene.permuted(seed));
+        let broad_phase = way.broad_phase();
+        let (reported, compared) = (Reported::default(), 0);
+        Self { way, numbered, broad_phase, samples: vec![], ms: vec![], reported, compared }
+    }
+
+    fn step(&mut self) {
+        let ((), ms) = timed(|| self.numbered.world.step(&mut *self.broad_phase));
+        self.ms.push(ms);
+    }
+
+    fn look(&mut self, apart: Apart) {
+        let world = &self.numbered.world;
+        let mut poses = DefaultHasher::new();
+        world.pose_bits().hash(&mut poses);
+        self.samples.push(Sample { mechanics: Mechanics::of(world), apart, poses: poses.finish() });
+        if self.samples.len().is_multiple_of(COMPARED) {
+            self.reported += Reported::of(world);
+            self.compared += 1;
+        }
+    }
+}
+
+/// Each way that was run twice: its name, and the first step after which the two differ.
+pub(super) fn repeats(sides: &[Side]) -> Vec<(&'static str, Option<usize>)> {
+    let repeat = |two: &[Side]| {
+        let poses = |side: &Side| side.samples.iter().map(|sample| sample.poses).collect::<Vec<_>>();
+        let same = poses(&two[0]).iter().zip(&poses(&two[1])).position(|(one, again)| one != again);
+        (two[0].way.name, same.map(|step| step + 1))
+    };
+    sides.windows(2).filter(|two| two[1].way.is_again).map(repeat).collect()
+}
+
+/// Pairs are compared with brute force in one of so many steps.
+const COMPARED: usize = 20;
+
+/// All ways through a scene, in turn step by step.
+pub(super) fn simulated(case: Case) -> Result<Vec<Side>, Failure> {
+    let scene = Numbered::new(case.world()?);
+    let mut sides: Vec<Side> = WAYS.iter().map(|way| Side::new(*way, &scene)).collect();
+    for step in 0..case.steps {
+        for place in 0..sides.len() {
+            sides[(step + place) % WAYS.len()].step();
+        }
+        let apart: Vec<Apart> = sides.iter().map(|side| sides[0].numbered.apart(&side.numbered)).collect();
+        sides.iter_mut().zip(apart).for_each(|(side, apart)| side.look(apart));
+    }
+    Ok(sides)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_cloud_has_momentum_and_nothing_to_give_it_to() {
+        let mut world = cloud(60);
+        assert!(world.colliders.iter().all(|(_, collider)| collider.parent().is_some()));
+        world.step(&mut DefaultBroadPhase::new());
+        let found = Mechanics::of(&world);
+        assert!(found.momentum[0] > 0.1 * found.mass && found.potential == 0.0, "{found:?}");
+    }
+
+    #[test]
+    fn all_ways_start_from_the_same_scene_and_are_looked_at_in_every_step() {
+        let sides = simulated(case("column", 20, 2 * COMPARED)).expect("a scene");
+        assert_eq!(sides.len(), WAYS.len());
+        for side in &sides {
+            assert_eq!((side.samples.len(), side.ms.len(), side.compared), (2 * COMPARED, 2 * COMPARED, 2));
+            assert!(side.samples[0].apart.max < 1e-3, "{}: {:?}", side.way.name, side.samples[0]);
+        }
+        assert!(sides[0].samples.iter().all(|sample| sample.apart == Apart::default()));
+        assert!(simulated(case("no such scene", 1, 1)).is_err());
+    }
+
+    #[test]
+    fn a_way_that_is_run_again_is_held_against_the_one_before() {
+        let mut sides = simulated(case("column", 5, 4)).expect("a scene");
+        assert_eq!(repeats(&sides), [("stock", None), ("pbig", None)], "in free fall");
+        let again = sides.iter_mut().find(|side| side.way.name == "pbig again").expect("a way");
+        again.samples[2].poses += 1;
+        assert_eq!(repeats(&sides), [("stock", None), ("pbig", Some(3))]);
+    }
+}
