@@ -11,4 +11,5 @@ pub mod runner;
 pub mod scenes;
 pub mod shadow;
 pub mod simulate;
+pub mod wide;
 pub mod world;

@@ -5,6 +5,7 @@
 mod coordinates;
 mod index;
 mod study;
+mod wide;
 
 use crate::bench::machine::{Machine, slug};
 use crate::bench::{DOCUMENTS, keep, save};
@@ -33,7 +34,8 @@ pub(crate) struct Args {
 type Run = fn(bool) -> Result<Study, Failure>;
 
 /// Every study by name, in the order of the document.
-const STUDIES: [(&str, Run); 2] = [("index", index::run), ("coordinates", coordinates::run)];
+const STUDIES: [(&str, Run); 3] =
+    [("index", index::run), ("coordinates", coordinates::run), ("wide", wide::run)];
 
 fn names() -> clap::builder::PossibleValuesParser {
     STUDIES.map(|(name, _)| name).into()
