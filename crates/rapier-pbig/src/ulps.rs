@@ -6,40 +6,41 @@
 //! position on any axis. How much too far inside may a bound be that parry 0.22 computes?
 //!
 //! - **Sums with `t`** are rounded up to three times: where a shape's corner or centre is, what it reaches from there
-//!   (a radius, half extents, a border), and contact skin with prediction. A ball and a cuboid have two of these, a hull
-//!   too. That is half an ulp each.
-//! - **The rotated shape** is off by some `u E`. Half extents times the absolute matrix: an entry is off by 4 `u`, and by 8 `u`
-//!   of itself if the quaternion's squared norm is off by 8 `u`; 3 `u` more for the sum; half extents add up to at
-//!   most 3 `E`: 45 `u E`. A point (a hull's corner, a capsule's end, a compound's centre) is at most the root of 3 times `E`
-//!   away: 17 `u` for two cross products and their sum, 16 `u` for the norm: 57 `u E`. Both, for a box around a box, and
-//!   once more for the parts of a compound: 220 `u E` at most.
+//!   (a radius, half extents, a border), and contact skin with prediction. A ball, a cuboid and a hull have two of these.
+//!   Each is half an ulp of `|t| + 2 E` at most. (Of `|t| + E`, but for an `E` that is rounded itself: twice that is in the
+//!   upper of two powers of two where a bound is between them.)
+//! - **The rotated shape** is off by some `u E`. Half extents times the absolute matrix: entries are off by 4 `u`, and by 8 `u` of
+//!   themselves if the quaternion's squared norm is off by 8 `u`; 3 `u` more for the products and their sum. As half extents
+//!   add up to at most 3 `E`, 23 `u E`. A point (a hull's corner, a capsule's end, a compound's centre) is at most the root of
+//!   3 times `E` away: 17 `u` for two cross products and their sum, 16 `u` for the norm: 57 `u E`. Both, for a box around a
+//!   box, 80 `u E`; and once more for the parts of a compound, 160 `u E`. A support point (cylinder, cone) is a point in a
+//!   direction that is off by 57 `u`, which at worst, along the axis, costs twice that: 171 `u E`.
 //!
-//! So with `M = |t| + 128 E`, of which an ulp is at least `u M`: three half ulps of `M`, another for the rounding of the
-//! widened bound itself (two where that is in the next power of two), and the rotated shape, are never more than 3 ulps of `M`.
-//! Where |t| is above 92 `E`, 220 `u E` is less than `u M`, thus than one ulp. Where it is below, the sums are
-//! rounded by `u (|t| + E)` each: 4 `u |t|` + 224 `u E` in all, and 3 ulps are 3 `u |t|` + 384 `u E` at least. A position that
-//! was rounded from f64 is off by half an ulp: 4 ulps then. (Above 10^-30 in size, where products do not underflow.)
+//! So a bound is too far inside by at most 1.5 ulps of `|t| + 2 E` and 171 `u E`. Two of `ulp(|t| + 2 E) + 128 u E` are more:
+//! before it is rounded, the widened bound is not inside the exact one. Rounding is monotone, so what it parts was
+//! apart: **with 2, whatever overlaps exactly still does**. A position that was rounded from f64 is off by half an ulp
+//! more, its rotation by 8 `u E`: with 3, also what overlaps there. (Above 10^-30 in size, where products do not underflow.)
 
 use crate::PbigBroadPhase;
 use pbig_core::Aabb;
 use rapier3d::prelude::{Isometry, Real};
 
-/// By how much farther from the origin a shape counts: see above.
-const ROTATION: f32 = 128.0;
+/// What rotations may take off, as a part of the size: half of it for each of two ulps.
+const ROTATION: f32 = 128.0 / (1 << 24) as f32;
 
 impl PbigBroadPhase {
-    /// For worlds far from the origin: boxes are widened as by [`widened_by_ulps`], colliders listed from now on. With 0, the
-    /// default, they are rapier's own.
+    /// For worlds far from the origin: boxes are widened as by [`widened_by_ulps`], those of colliders listed from now on. With
+    /// 0, the default, they are rapier's own.
     ///
     /// Parry's boxes are rounded in f32 to where shapes are, and so are the prediction distance and the margin that cover
     /// that: they do up to `margin x 2^22` from the origin, 40 km with the default margin of 1 cm. Beyond, pairs can be
-    /// missed, as rapier's own broad phase misses them, those first that are about to touch. With 3 ulps none is, however far
-    /// away; with 4 none is that the world would have whose positions were rounded to f32. There are more pairs that do not
-    /// touch: boxes reach up to so many ulps further, a third of a millimetre 1 km from the origin, 2 cm at 10^5 m, 3 m at 10^7 m.
+    /// missed, as rapier's own broad phase misses them. With 2 ulps none is whose boxes overlap at the poses that rapier has,
+    /// however far away; with 3 none that would be one in f64. There are more pairs that do not touch: 2 ulps are an eighth of
+    /// a millimetre 1 km from the origin, 1.6 cm at 10^5 m, 2 m at 10^7 m.
     ///
     /// ```
     /// use rapier_pbig::PbigBroadPhase;
-    /// let broad_phase = PbigBroadPhase::new().widened_by_ulps(3); // was: PbigBroadPhase::new()
+    /// let broad_phase = PbigBroadPhase::new().widened_by_ulps(2); // was: PbigBroadPhase::new()
     /// ```
     pub fn widened_by_ulps(mut self, ulps: u32) -> Self {
         self.ulps = ulps;
@@ -52,11 +53,11 @@ impl PbigBroadPhase {
 }
 
 /// The box with every bound moved outward by so many units in the last place (ulps) of the numbers that it was computed
-/// from: the position of the shape on that axis, and the box's own size.
+/// from: the position of the shape on that axis and the box's reach, with 2^-17 of that for rotations.
 ///
-/// With 3, a box that parry has computed in f32 for a shape at this pose holds the exact box of the shape there; with 4 also
-/// at the pose in f64 of which this one is the rounded one. Near the origin that is less than a ten-thousandth of the size.
-/// An invalid box stays as it is, and so do bounds that are infinite or beyond 10^36.
+/// With 2, boxes that parry has computed in f32 for two shapes overlap if the exact boxes of these shapes do at the same
+/// poses; with 3 also if they do at poses in f64 of which these are the rounded ones. Near the origin that is about a
+/// hundred-thousandth of the size. An invalid box stays as it is, and so do bounds that are infinite.
 ///
 /// ```
 /// use rapier_pbig::{pbig_core::Aabb, widened_by_ulps};
@@ -66,15 +67,15 @@ impl PbigBroadPhase {
 /// let stock = ball.aabb(&pose);
 /// assert_eq!(stock.mins.x, stock.maxs.x);
 /// let aabb = Aabb::new(stock.mins.coords.into(), stock.maxs.coords.into());
-/// assert_eq!(widened_by_ulps(&aabb, &pose, 3).max[0], 1e7 + 3.0);
+/// assert_eq!(widened_by_ulps(&aabb, &pose, 2).max[0], 1e7 + 2.0);
 /// ```
 #[inline]
 pub fn widened_by_ulps(aabb: &Aabb, pose: &Isometry<Real>, ulps: u32) -> Aabb {
     let at: [f32; 3] = pose.translation.vector.into();
     let reach = |k: usize| finite((aabb.max[k] - at[k]).abs()).max(finite((aabb.min[k] - at[k]).abs()));
-    let size = ROTATION * reach(0).max(reach(1)).max(reach(2));
+    let reach = reach(0).max(reach(1)).max(reach(2));
     let count = if aabb.is_valid() { ulps as f32 } else { 0.0 };
-    let by = at.map(|at| count * ulp(at.abs() + size));
+    let by = at.map(|at| count * (ulp(at.abs() + 2.0 * reach) + ROTATION * reach));
     Aabb::new(std::array::from_fn(|k| aabb.min[k] - by[k]), std::array::from_fn(|k| aabb.max[k] + by[k]))
 }
 
@@ -114,38 +115,39 @@ mod tests {
 
     #[test]
     fn bounds_move_by_ulps_of_the_position_on_their_own_axis() {
-        // In (0, 1024), [2^20, 2^21) and beyond 2^23, sizes included.
+        // In [8, 16), [2^20, 2^21) and beyond 2^23, reach included.
         let at = [8.0, -1.5e6, 1e7];
         let cube = Aabb::from_center(at, [0.5; 3]);
         let wide = widened_by_ulps(&cube, &pose(at), 2);
-        let by = [2.0 * ulp(72.0), 0.25, 2.0];
+        let by = [2.0 * (ulp(9.0) + 0.5 * ROTATION), 0.25, 2.0];
         assert_eq!(wide.min, std::array::from_fn(|k| cube.min[k] - by[k]));
         assert_eq!(wide.max, std::array::from_fn(|k| cube.max[k] + by[k]));
         assert_eq!(widened_by_ulps(&cube, &pose(at), 0), cube);
     }
 
     #[test]
-    fn where_a_shape_lies_across_from_its_position_that_counts() {
+    fn where_a_shape_lies_far_from_its_position_that_counts() {
         // A mesh whose corners are in the coordinates of a world, moved back to the origin.
         let cube = Aabb::from_center([0.0; 3], [1.0; 3]);
         let wide = widened_by_ulps(&cube, &pose([-1e6, 0.0, 0.0]), 1);
-        assert!(wide.max[0] - cube.max[0] >= 0.0625, "{wide:?}");
+        assert!(wide.max[0] - cube.max[0] >= ulp(1e6), "{wide:?}");
     }
 
     #[test]
-    fn what_is_invalid_stays_so_and_what_is_infinite_does_and_widens_nothing_else() {
-        let origin = pose([0.0; 3]);
+    fn what_is_invalid_or_infinite_stays_so_and_widens_nothing_else() {
         for invalid in [Aabb::new([1e7, 0.0, 0.0], [1e7 - 1.0, 1.0, 1.0]), Aabb::NOWHERE] {
             let wide = widened_by_ulps(&invalid, &pose([1e7, 0.0, 0.0]), u32::MAX);
             assert!(!wide.is_valid(), "{wide:?}");
         }
-        let slab = Aabb::new([f32::NEG_INFINITY, 0.0, -0.5 * f32::MAX], [f32::INFINITY, 1.0, 0.5 * f32::MAX]);
-        assert_eq!(widened_by_ulps(&slab, &origin, 4), slab, "sizes beyond 10^36 are not widened");
         let plate = Aabb::new([f32::NEG_INFINITY, 0.0, 0.0], [f32::INFINITY, 1.0, 1.0]);
-        let wide = widened_by_ulps(&plate, &origin, 4);
-        assert_eq!((wide.min[0], wide.max[0]), (f32::NEG_INFINITY, f32::INFINITY));
-        assert!(wide.max[1] > 1.0 && wide.max[1] < 1.001 && wide.min[2] < 0.0, "{wide:?}");
-        let lost = pose([f32::NAN, 0.0, 0.0]);
-        assert!(widened_by_ulps(&plate, &lost, 3).is_valid(), "a box that does not follow its position");
+        // One that does not follow its position, too.
+        for origin in [0.0, f32::NAN] {
+            let wide = widened_by_ulps(&plate, &pose([origin, 0.0, 0.0]), 4);
+            assert_eq!((wide.min[0], wide.max[0]), (f32::NEG_INFINITY, f32::INFINITY));
+            assert!(wide.max[1] > 1.0 && wide.max[1] < 1.001 && wide.min[2] < 0.0, "{wide:?}");
+        }
+        let half_space = Aabb::new([-0.5 * f32::MAX; 3], [0.5 * f32::MAX; 3]);
+        let wide = widened_by_ulps(&half_space, &pose([1.0; 3]), 4);
+        assert!(wide.contains(&half_space) && wide.max.iter().all(|x| x.is_finite()), "{wide:?}");
     }
 }
