@@ -33,7 +33,7 @@ impl Layout {
         Self { placed: placed.filter(|(shape, pose)| aabb(&**shape, pose).is_some()).collect() }
     }
 
-    /// Shapes of every kind about as large as `size`, turned and placed at random, about three pairs of boxes each.
+    /// Shapes of every kind about as large as `size`, turned and placed at random, about two pairs of boxes each.
     pub fn crowd(count: usize, size: f64, seed: u64) -> Self {
         let mut rng = StdRng::seed_from_u64(seed);
         let side = size * 1.1 * (count as f64).cbrt();
@@ -110,7 +110,7 @@ mod tests {
     fn a_world_elsewhere_has_the_same_pairs_in_f64() {
         let near = Layout::crowd(700, 1.0, 3);
         let pairs_at = |offset| pairs(&near.boxes(&near.poses(offset), 0.0)).len();
-        assert!((1500..4000).contains(&pairs_at([0.0; 3])), "{} pairs", pairs_at([0.0; 3]));
+        assert!((1000..2000).contains(&pairs_at([0.0; 3])), "{} pairs", pairs_at([0.0; 3]));
         assert_eq!(pairs_at([1e7, -1e7, 3e5]), pairs_at([0.0; 3]));
     }
 
