@@ -19,6 +19,7 @@ mod random_worlds;
 mod restore;
 mod shapes;
 mod stress;
+mod ulps;
 mod upstream;
 mod upstream_churn;
 mod worlds;

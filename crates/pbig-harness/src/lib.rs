@@ -14,4 +14,5 @@ pub mod runner;
 pub mod scenes;
 pub mod shadow;
 pub mod simulate;
+pub mod wide;
 pub mod world;

@@ -3,7 +3,7 @@
 use crate::call::Call;
 use crate::events::{HandleOrder, Outbox};
 use crate::overlap::Overlap;
-use crate::proxy::{BLOCK, FEW, Proxy};
+use crate::proxy::{BLOCK, FEW, Growth, Proxy};
 use crate::roll::Roll;
 use crate::scene_tree::SceneTree;
 use crate::stats::{Kept, MEASURED_FROM, Totals, Watch};
@@ -31,6 +31,8 @@ pub struct PbigBroadPhase {
     pub(crate) roll: Roll,
     /// Margin in units of `IntegrationParameters::length_unit`.
     pub(crate) relative_margin: f32,
+    /// By how much boxes are widened.
+    pub(crate) ulps: u32,
     pub(crate) outbox: Outbox,
     /// Of the listed colliders of one call, in their order.
     proxies: Vec<Proxy>,
@@ -109,6 +111,7 @@ impl PbigBroadPhase {
             finder,
             roll: Roll::default(),
             relative_margin,
+            ulps: 0,
             outbox: Outbox::default(),
             proxies: Vec::new(),
             tree: SceneTree::default(),
@@ -201,7 +204,9 @@ impl PbigBroadPhase {
         }
         let mut proxies = std::mem::take(&mut self.proxies);
         proxies.resize(listed.len(), Proxy::Gone);
-        let block = |(listed, proxies): (&[ColliderHandle], &mut [Proxy])| call.proxies(listed, proxies);
+        let growth = Growth::new(call.params, self.ulps);
+        let block =
+            |(listed, proxies): (&[ColliderHandle], &mut [Proxy])| call.proxies(growth, listed, proxies);
         let blocks = listed.par_chunks(BLOCK).zip(proxies.par_chunks_mut(BLOCK));
         blocks.with_min_len(PARALLEL_FROM / BLOCK / 8).for_each(block);
         self.kept.proxies += watch.lap();
@@ -212,17 +217,17 @@ impl PbigBroadPhase {
 
     /// Each collider's proxy is set as soon as it is known: to write it down and read it again took 5 ns.
     fn look_at_block(&mut self, call: &Call<'_>, listed: &[ColliderHandle]) {
-        let reach = call.reach();
+        let growth = Growth::new(call.params, self.ulps);
         if listed.len() <= FEW {
             for &handle in listed {
-                self.set_proxy(handle, &call.proxy(call.fetch(handle), reach));
+                self.set_proxy(handle, &call.proxy(call.fetch(handle), growth));
             }
             return;
         }
         let mut found = [(None, None); BLOCK];
         call.fetch_all(listed, &mut found);
         for (&handle, found) in listed.iter().zip(found) {
-            self.set_proxy(handle, &call.proxy(found, reach));
+            self.set_proxy(handle, &call.proxy(found, growth));
         }
     }
 

@@ -56,6 +56,7 @@ pub mod shadow;
 #[cfg(feature = "serde")]
 mod snapshot;
 mod stats;
+mod ulps;
 mod why;
 
 pub use broad_phase::PbigBroadPhase;
@@ -70,4 +71,5 @@ pub use pbig_core::GpuFinder;
 pub use pbig_core::{Backend, Config, Report, Strategy};
 pub use proxy::{collision_aabb, filter_of};
 pub use stats::{Stats, Totals};
+pub use ulps::widened_by_ulps;
 pub use why::Why;

@@ -6,7 +6,7 @@
 
 use crate::PbigBroadPhase;
 use crate::call::Call;
-use crate::proxy::{BLOCK, Proxy};
+use crate::proxy::{BLOCK, Growth, Proxy};
 use crate::stats::{MEASURED_FROM, Watch};
 use pbig_core::{Aabb, Events, Pair, ProxyFilter, Report};
 use rapier3d::prelude::ColliderHandle;
@@ -106,7 +106,7 @@ impl PbigBroadPhase {
     /// Brings the finder up to date about listed colliders that are not inside their stored boxes, and notes the others.
     pub(crate) fn look_ahead(&mut self, call: &Call<'_>, listed: &[ColliderHandle]) {
         let mut watch = Watch::new(listed.len() >= MEASURED_FROM);
-        let seen = call.seen(listed);
+        let seen = call.seen(Growth::new(call.params, self.ulps), listed);
         self.kept.proxies += watch.lap();
         for (&handle, (proxy, reach)) in listed.iter().zip(seen) {
             match proxy {
@@ -183,24 +183,25 @@ fn without(pairs: &[Pair], others: &[Pair]) -> Vec<Pair> {
 
 impl Call<'_> {
     /// Listed colliders as they are, and the boxes around that and where they are expected in the next call.
-    fn seen(&self, listed: &[ColliderHandle]) -> Vec<Seen> {
+    fn seen(&self, growth: Growth, listed: &[ColliderHandle]) -> Vec<Seen> {
         let mut seen = vec![(Proxy::Gone, Aabb::NOWHERE); listed.len()];
         if listed.len() < PARALLEL_FROM {
-            self.see(listed, &mut seen);
+            self.see(growth, listed, &mut seen);
         } else {
             let pieces = listed.par_chunks(BLOCK).zip(seen.par_chunks_mut(BLOCK));
-            pieces.with_min_len(PARALLEL_FROM / BLOCK / 8).for_each(|(listed, seen)| self.see(listed, seen));
+            let pieces = pieces.with_min_len(PARALLEL_FROM / BLOCK / 8);
+            pieces.for_each(|(listed, seen)| self.see(growth, listed, seen));
         }
         seen
     }
 
-    fn see(&self, listed: &[ColliderHandle], seen: &mut [Seen]) {
+    fn see(&self, growth: Growth, listed: &[ColliderHandle], seen: &mut [Seen]) {
         let mut proxies = [Proxy::Gone; BLOCK];
         for (listed, seen) in listed.chunks(BLOCK).zip(seen.chunks_mut(BLOCK)) {
-            self.proxies(listed, &mut proxies[..listed.len()]);
+            self.proxies(growth, listed, &mut proxies[..listed.len()]);
             for ((handle, proxy), seen) in listed.iter().zip(proxies).zip(seen) {
                 let reach = match proxy {
-                    Proxy::Enabled(aabb, _) => self.way_of(*handle, aabb),
+                    Proxy::Enabled(aabb, _) => self.way_of(growth, *handle, aabb),
                     Proxy::Gone | Proxy::Disabled => Aabb::NOWHERE,
                 };
                 *seen = (proxy, reach);
@@ -209,23 +210,22 @@ impl Call<'_> {
     }
 
     /// The box around a collider's box and where it is expected in the next call.
-    fn way_of(&self, handle: ColliderHandle, aabb: Aabb) -> Aabb {
+    fn way_of(&self, growth: Growth, handle: ColliderHandle, aabb: Aabb) -> Aabb {
         if !aabb.is_valid() {
             return aabb;
         }
-        self.expected(handle, &aabb).map_or(aabb, |then| aabb.union(&then))
+        self.expected(growth, handle, &aabb).map_or(aabb, |then| aabb.union(&then))
     }
 
     /// Where the velocity and the forces of its body take a collider. With soft CCD, which looks ahead itself, its box moves
     /// along; else where it is then is enough.
-    fn expected(&self, handle: ColliderHandle, aabb: &Aabb) -> Option<Aabb> {
+    fn expected(&self, growth: Growth, handle: ColliderHandle, aabb: &Aabb) -> Option<Aabb> {
         let collider = self.colliders.get(handle)?;
         let body = self.bodies.get(collider.parent()?)?;
         let pose = body.predict_position_using_velocity_and_forces(self.params.dt);
         let pose = pose * collider.position_wrt_parent()?;
-        let reach = collider.contact_skin() + self.params.prediction_distance() / 2.0;
         let then = collider.shape().compute_aabb(&pose);
-        let then = Aabb::new(then.mins.coords.into(), then.maxs.coords.into()).inflated(reach);
+        let then = growth.of(&Aabb::new(then.mins.coords.into(), then.maxs.coords.into()), collider);
         if body.soft_ccd_prediction() <= 0.0 {
             return Some(then);
         }

@@ -2,6 +2,7 @@
 //! broad phase and narrow phase compute them.
 
 use crate::call::Call;
+use crate::ulps::widened_by_ulps;
 use pbig_core::{Aabb, ProxyFilter, TestMode};
 use rapier3d::prelude::{
     ActiveCollisionTypes, Collider, ColliderHandle, IntegrationParameters, Isometry, Point, Real, RigidBody,
@@ -26,19 +27,36 @@ pub(crate) const FEW: usize = 8;
 /// A collider and its body, as far as they are there.
 pub(crate) type Fetched<'a> = (Option<&'a Collider>, Option<&'a RigidBody>);
 
-impl<'a> Call<'a> {
+/// How far boxes reach beyond shapes, apart from contact skin and margin.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Growth {
     /// Half the prediction distance.
-    pub(crate) fn reach(&self) -> Real {
-        self.params.prediction_distance() / 2.0
+    pub(crate) reach: Real,
+    /// As in [`widened_by_ulps`].
+    pub(crate) ulps: u32,
+}
+
+impl Growth {
+    pub(crate) fn new(params: &IntegrationParameters, ulps: u32) -> Self {
+        Self { reach: params.prediction_distance() / 2.0, ulps }
     }
 
+    /// From the box of a shape. Rapier's own to the bit without ulps; then there is nothing but this one comparison.
+    #[inline(always)]
+    pub(crate) fn of(self, aabb: &Aabb, collider: &Collider) -> Aabb {
+        let aabb = aabb.inflated(collider.contact_skin() + self.reach);
+        if self.ulps == 0 { aabb } else { widened_by_ulps(&aabb, collider.position(), self.ulps) }
+    }
+}
+
+impl<'a> Call<'a> {
     /// The proxies of at most [`BLOCK`] colliders.
-    pub(crate) fn proxies(&self, listed: &[ColliderHandle], out: &mut [Proxy]) {
+    pub(crate) fn proxies(&self, growth: Growth, listed: &[ColliderHandle], out: &mut [Proxy]) {
         let _span = tracing::debug_span!(target: "pbig", "proxies").entered();
-        let (reach, mut found) = (self.reach(), [(None, None); BLOCK]);
+        let mut found = [(None, None); BLOCK];
         self.fetch_all(listed, &mut found);
         for (proxy, found) in out.iter_mut().zip(found) {
-            *proxy = self.proxy(found, reach);
+            *proxy = self.proxy(found, growth);
         }
     }
 
@@ -63,12 +81,12 @@ impl<'a> Call<'a> {
     }
 
     #[inline(always)]
-    pub(crate) fn proxy(&self, (collider, body): Fetched<'_>, reach: Real) -> Proxy {
+    pub(crate) fn proxy(&self, (collider, body): Fetched<'_>, growth: Growth) -> Proxy {
         match collider {
             None => Proxy::Gone,
             Some(collider) if !collider.is_enabled() => Proxy::Disabled,
             Some(collider) => {
-                Proxy::Enabled(aabb_of(self.params.dt, reach, body, collider), filter_with(body, collider))
+                Proxy::Enabled(aabb_of(self.params.dt, growth, body, collider), filter_with(body, collider))
             }
         }
     }
@@ -77,26 +95,25 @@ impl<'a> Call<'a> {
 /// The box of a collider in which it may touch another during this step: its shape, half the
 /// prediction distance and its contact skin; with soft CCD, also where it is predicted to be.
 ///
-/// Without the change margin, which is the finder's. A pose with a NaN gives an invalid box, which
-/// pairs with nothing.
+/// Without the change margin, which is the finder's, and not [`widened_by_ulps`]. A pose with a NaN gives an invalid
+/// box, which pairs with nothing.
 pub fn collision_aabb(params: &IntegrationParameters, bodies: &RigidBodySet, collider: &Collider) -> Aabb {
-    aabb_of(params.dt, params.prediction_distance() / 2.0, parent_of(bodies, collider), collider)
+    aabb_of(params.dt, Growth::new(params, 0), parent_of(bodies, collider), collider)
 }
 
 fn parent_of<'a>(bodies: &'a RigidBodySet, collider: &Collider) -> Option<&'a RigidBody> {
     collider.parent().and_then(|handle| bodies.get(handle))
 }
 
-/// `reach` is half the prediction distance.
 #[inline(always)]
-fn aabb_of(dt: Real, reach: Real, parent: Option<&RigidBody>, collider: &Collider) -> Aabb {
+fn aabb_of(dt: Real, growth: Growth, parent: Option<&RigidBody>, collider: &Collider) -> Aabb {
     let mut aabb = shape_aabb(collider.shape(), collider.position());
     if let Some(body) = parent.filter(|body| body.soft_ccd_prediction() > 0.0)
         && let Some(then) = predicted_aabb(dt, body, collider)
     {
         aabb = union(&aabb, &then);
     }
-    aabb.inflated(collider.contact_skin() + reach)
+    growth.of(&aabb, collider)
 }
 
 #[inline(always)]

@@ -17,6 +17,7 @@ struct Snapshot<'a> {
     finder: Cow<'a, Finder>,
     generations: Cow<'a, [u32]>,
     relative_margin: f32,
+    ulps: u32,
     order: HandleOrder,
     adopted: Vec<[RawHandle; 2]>,
     overlap: Option<Ahead>,
@@ -62,6 +63,7 @@ impl Serialize for PbigBroadPhase {
             finder: Cow::Borrowed(&self.finder),
             generations: Cow::Borrowed(self.roll.generations()),
             relative_margin: self.relative_margin,
+            ulps: self.ulps,
             order: self.outbox.order,
             adopted: self.outbox.adopted.iter().map(to_raw).collect(),
             overlap: self.overlap.as_deref().map(Ahead::new),
@@ -72,7 +74,7 @@ impl Serialize for PbigBroadPhase {
 
 impl<'de> Deserialize<'de> for PbigBroadPhase {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        let Snapshot { finder, generations, relative_margin, order, adopted, overlap } =
+        let Snapshot { finder, generations, relative_margin, ulps, order, adopted, overlap } =
             Snapshot::deserialize(deserializer)?;
         let (finder, roll) = (finder.into_owned(), Roll::of_generations(generations.into_owned()));
         let ids = (0..finder.id_count()).filter(|&id| finder.contains(id));
@@ -91,6 +93,7 @@ impl<'de> Deserialize<'de> for PbigBroadPhase {
         let overlap = overlap.map(|ahead| ahead.restore(&finder)).transpose();
         let mut restored = Self::around(finder, relative_margin).with_handle_order(order);
         restored.roll = roll;
+        restored.ulps = ulps;
         restored.overlap = overlap.map_err(D::Error::custom)?.map(Box::new);
         restored.outbox.adopted = adopted.into_iter().map(from_raw).collect();
         Ok(restored)

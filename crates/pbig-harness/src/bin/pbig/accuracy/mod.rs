@@ -7,6 +7,7 @@ mod index;
 mod margin;
 mod simulation;
 mod study;
+mod wide;
 
 use crate::bench::machine::{Machine, slug};
 use crate::bench::{DOCUMENTS, keep, save};
@@ -35,10 +36,11 @@ pub(crate) struct Args {
 type Run = fn(bool) -> Result<Study, Failure>;
 
 /// Every study by name, in the order of the document.
-const STUDIES: [(&str, Run); 4] = [
+const STUDIES: [(&str, Run); 5] = [
     ("index", index::run),
     ("coordinates", coordinates::run),
     ("margin", margin::run),
+    ("wide", wide::run),
     ("simulation", simulation::run),
 ];
 

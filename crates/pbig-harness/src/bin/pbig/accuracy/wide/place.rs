@@ -1,0 +1,285 @@
+//! A world at a place: in f64, as rapier holds it, and its boxes in f32 by every way there is to them.
+
+use crate::output::Failure;
+use pbig_core::{Aabb, Config, Finder, Limits, Pair};
+use pbig_harness::scenes::Scene;
+use pbig_harness::wide::{Differences, Layout, Pose, Truth, Wide, doubt, to_f32, to_f64};
+use rapier_pbig::{PbigBroadPhase, collision_aabb, widened_by_ulps};
+use rapier3d::prelude::{Collider, IntegrationParameters, RigidBodySet};
+
+/// How boxes in f32 are made.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Way {
+    /// Rapier's, widened by so many ulps.
+    Ulps(u32),
+    /// The same, and the margin that the drop-in stores them with.
+    Margin(u32),
+    /// In f64 at poses in f64, rounded outward: what f32 cannot do without.
+    Outward,
+}
+
+/// Every way, in the order of tables; what takes time comes first.
+pub(super) const WAYS: [Way; 8] = [
+    Way::Ulps(0),
+    Way::Ulps(1),
+    Way::Ulps(2),
+    Way::Ulps(3),
+    Way::Ulps(4),
+    Way::Outward,
+    Way::Margin(0),
+    Way::Margin(2),
+];
+
+/// What misses nothing at the poses that rapier holds.
+pub(super) const AT_POSES: Way = Way::Ulps(2);
+
+/// What misses nothing of the world, whose poses are in f64.
+pub(super) const IN_WORLD: Way = Way::Ulps(3);
+
+impl Way {
+    pub(super) fn name(self) -> String {
+        match self {
+            Self::Ulps(0) => "rapier's boxes".into(),
+            Self::Ulps(1) => "widened by 1 ulp".into(),
+            Self::Ulps(ulps) => format!("widened by {ulps} ulps"),
+            Self::Margin(0) => "rapier's boxes, with the margin".into(),
+            Self::Margin(ulps) => format!("widened by {ulps} ulps, with the margin"),
+            Self::Outward => "f64, rounded outward".into(),
+        }
+    }
+
+    /// Its place in [`WAYS`].
+    pub(super) fn index(self) -> usize {
+        WAYS.iter().position(|&way| way == self).unwrap_or(0)
+    }
+}
+
+/// A world near the origin.
+pub(super) struct World {
+    pub(super) name: &'static str,
+    /// About how large its shapes are.
+    pub(super) size: f64,
+    pub(super) layout: Layout,
+    /// Whether it is moved along one axis, too.
+    pub(super) along_x: bool,
+}
+
+/// The worlds; `count` shapes in each, or a fifth where at last all lie in one place.
+pub(super) fn worlds(count: usize) -> Result<Vec<World>, Failure> {
+    let crowd = |name, size: f64, count| World {
+        name,
+        size,
+        layout: Layout::crowd(count, size, 1),
+        along_x: size == 1.0,
+    };
+    let scene = |name| -> Result<World, Failure> {
+        let built = Scene::named(name).map_err(Failure::Input)?.build(count, 1);
+        Ok(World { name, size: 1.0, layout: Layout::of_world(&built), along_x: true })
+    };
+    Ok(vec![
+        crowd("crowd", 1.0, count),
+        crowd("crowd, a tenth as large", 0.1, count / 5),
+        crowd("crowd, ten times as large", 10.0, count / 5),
+        scene("column")?,
+        scene("ragdolls")?,
+        scene("pile")?,
+    ])
+}
+
+/// Which way a world is moved.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Along {
+    Diagonal,
+    X,
+}
+
+/// A world that has been moved.
+pub(super) struct Place<'a> {
+    layout: &'a Layout,
+    poses: Vec<Pose>,
+    colliders: Vec<Collider>,
+    params: IntegrationParameters,
+    /// Boxes in f64 at poses in f64.
+    pub(super) world: Truth,
+    /// Boxes in f64 at the poses that rapier holds in f32.
+    pub(super) held: Truth,
+}
+
+impl<'a> Place<'a> {
+    pub(super) fn new(layout: &'a Layout, offset: f64, along: Along) -> Self {
+        let poses = match along {
+            Along::Diagonal => layout.poses([offset; 3]),
+            Along::X => layout.poses([offset, 0.0, 0.0]),
+        };
+        let params = IntegrationParameters::default();
+        let narrow: Vec<_> = poses.iter().map(to_f32).collect();
+        let held: Vec<_> = narrow.iter().map(to_f64).collect();
+        let truth = |poses: &[Pose]| {
+            let boxes = layout.boxes(poses, f64::from(params.prediction_distance() / 2.0));
+            Truth::of(boxes, doubt(farthest(poses)))
+        };
+        let (world, held) = (truth(&poses), truth(&held));
+        Self { layout, colliders: layout.colliders(&narrow), poses, params, world, held }
+    }
+
+    /// Twice what boxes reach beyond shapes: boxes that overlap by more are of shapes whose own do.
+    fn reach(&self) -> f64 {
+        f64::from(self.params.prediction_distance())
+    }
+
+    pub(super) fn len(&self) -> usize {
+        self.colliders.len()
+    }
+
+    pub(super) fn boxes(&self, way: Way) -> Vec<Aabb> {
+        match way {
+            Way::Ulps(ulps) => self.rapiers(ulps),
+            Way::Margin(ulps) => {
+                let margin = PbigBroadPhase::CONFIG.margin;
+                self.rapiers(ulps).iter().map(|aabb| aabb.inflated(margin)).collect()
+            }
+            Way::Outward => {
+                let boxes = self.layout.boxes(&self.poses, self.reach() / 2.0);
+                boxes.iter().map(Wide::outward).collect()
+            }
+        }
+    }
+
+    fn rapiers(&self, ulps: u32) -> Vec<Aabb> {
+        let none = RigidBodySet::new();
+        let stock = |collider: &Collider| collision_aabb(&self.params, &none, collider);
+        let colliders = self.colliders.iter();
+        if ulps == 0 {
+            return colliders.map(stock).collect();
+        }
+        colliders.map(|one| widened_by_ulps(&stock(one), one.position(), ulps)).collect()
+    }
+
+    /// How the pairs of boxes in f32 differ from those in f64: at the poses that rapier holds, and in the world.
+    fn differences(&self, way: Way) -> Result<[Differences; 2], Failure> {
+        let mut finder = finder();
+        let found = finder.find(&self.boxes(way));
+        let found = found.map_err(|error| Failure::Input(format!("{}: {error}", way.name())))?;
+        Ok([&self.held, &self.world].map(|truth| truth.differences(found, self.reach())))
+    }
+
+    /// How far a bound of rapier's boxes ends inside that in f64 at most, in ulps.
+    fn shortfall(&self) -> f64 {
+        let short = |(wide, aabb): (&Wide, &Aabb)| {
+            let ulps = ulps(wide);
+            wide.shortfall(aabb).into_iter().zip(ulps).map(|(short, ulp)| short / ulp).fold(0.0, f64::max)
+        };
+        self.held.boxes.iter().zip(&self.rapiers(0)).map(short).fold(0.0, f64::max)
+    }
+}
+
+pub(super) fn finder() -> Finder {
+    Finder::new(Config { limits: Limits::UNLIMITED, ..Config::DEFAULT })
+}
+
+fn farthest(poses: &[Pose]) -> f64 {
+    poses.iter().map(|pose| pose.translation.vector.amax()).fold(0.0, f64::max)
+}
+
+/// From one f32 to the next, on each axis where the box is, and at least as far as its size is.
+fn ulps(wide: &Wide) -> [f64; 3] {
+    let size = (0..3).map(|k| wide.max[k] - wide.min[k]).fold(0.0, f64::max);
+    std::array::from_fn(|k| ulp(wide.min[k].abs().max(wide.max[k].abs()).max(size)))
+}
+
+/// From one f32 to the next.
+pub(super) fn ulp(x: f64) -> f64 {
+    f64::from(f32::EPSILON) * x.abs().log2().floor().exp2()
+}
+
+/// What became of a world at a place.
+pub(super) struct Row {
+    pub(super) world: &'static str,
+    pub(super) size: f64,
+    pub(super) offset: f64,
+    pub(super) along: Along,
+    /// In f64.
+    pub(super) pairs: u64,
+    /// In f64 at the poses in f32.
+    pub(super) held_pairs: u64,
+    /// Boxes in f64 at the poses in f32, against the world.
+    pub(super) poses: Differences,
+    /// By way: against boxes in f64 at the same poses, and against the world.
+    pub(super) ways: Vec<[Differences; 2]>,
+    /// Of rapier's boxes.
+    pub(super) shortfall: f64,
+}
+
+impl Row {
+    pub(super) fn new(world: &World, offset: f64, along: Along) -> Result<Self, Failure> {
+        let place = Place::new(&world.layout, offset, along);
+        let held: Vec<Pair> = place.held.pairs.iter().map(|(pair, _)| *pair).collect();
+        let ways: Result<_, Failure> = WAYS.iter().map(|&way| place.differences(way)).collect();
+        Ok(Self {
+            world: world.name,
+            size: world.size,
+            offset,
+            along,
+            pairs: place.world.pairs.len() as u64,
+            held_pairs: held.len() as u64,
+            poses: place.world.differences(&held, place.reach()),
+            ways: ways?,
+            shortfall: place.shortfall(),
+        })
+    }
+
+    /// Against boxes in f64 at the same poses.
+    pub(super) fn by_boxes(&self, way: Way) -> Differences {
+        self.ways[way.index()][0]
+    }
+
+    /// Against the world.
+    pub(super) fn in_all(&self, way: Way) -> Differences {
+        self.ways[way.index()][1]
+    }
+
+    /// Missed and added, against the world, in percent of its pairs.
+    pub(super) fn wrong_percent(&self, way: Way) -> f64 {
+        let Differences { missed, added, .. } = self.in_all(way);
+        (missed + added) as f64 / self.pairs.max(1) as f64 * 100.0
+    }
+
+    /// How many ulps at this distance the shapes are large.
+    pub(super) fn size_in_ulps(&self) -> f64 {
+        self.size / ulp(self.offset.max(self.size))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_ulp_by_hand() {
+        assert_eq!([1.0, 1.99, 1e5, 1e7].map(ulp), [2f64.powi(-23), 2f64.powi(-23), 0.0078125, 1.0]);
+    }
+
+    #[test]
+    fn near_the_origin_nothing_differs_and_far_away_much_does() {
+        let worlds = worlds(300).expect("worlds");
+        let near = Row::new(&worlds[0], 0.0, Along::Diagonal).expect("a row");
+        assert!(near.pairs > 500 && near.wrong_percent(Way::Ulps(0)) < 1.0, "{} pairs", near.pairs);
+        let far = Row::new(&worlds[0], 1e7, Along::Diagonal).expect("a row");
+        assert!(far.poses.missed > 0 && far.poses.added > 0, "{:?}", far.poses);
+        assert!(far.by_boxes(Way::Ulps(0)).missed > 0, "{:?}", far.ways);
+        assert!(far.shortfall > 0.4 && far.shortfall < 1.6, "{}", far.shortfall);
+        assert_eq!(far.by_boxes(AT_POSES).missed, 0);
+        assert_eq!([far.in_all(IN_WORLD), far.in_all(Way::Outward)].map(|d| d.missed), [0, 0]);
+        assert!(far.in_all(Way::Outward).added < far.in_all(IN_WORLD).added);
+    }
+
+    #[test]
+    fn along_an_axis_the_others_keep_their_resolution() {
+        let worlds = worlds(300).expect("worlds");
+        let [diagonal, x] = [Along::Diagonal, Along::X].map(|along| {
+            let row = Row::new(&worlds[0], 1e6, along).expect("a row");
+            row.in_all(AT_POSES).added
+        });
+        assert!(x < diagonal, "{x} and {diagonal}");
+    }
+}
