@@ -24,7 +24,13 @@ fn a_quick_run_is_one_object_and_writes_what_it_is_asked_for() {
     assert_eq!(files(folder.path()), ["charts"], "no document");
     assert_eq!(
         files(&folder.path().join("charts")),
-        ["accuracy-coordinates.svg", "accuracy-index.svg", "accuracy-margin.svg", "accuracy-simulation.svg", "accuracy-wide.svg"],
+        [
+            "accuracy-coordinates.svg",
+            "accuracy-index.svg",
+            "accuracy-margin.svg",
+            "accuracy-simulation.svg",
+            "accuracy-wide.svg"
+        ],
         "a chart for each study"
     );
     for (name, study) in object["studies"].as_object().expect("studies") {
@@ -41,7 +47,14 @@ fn a_quick_run_is_one_object_and_writes_what_it_is_asked_for() {
     let by_rules = |row: &&Value| row["root"] == "Carmack 1" && row["correction"] == "the paper's rules";
     let wrong = rows(&object, "index", "all_pairs").iter().find(by_rules).map(|row| row["wrong"].as_u64());
     assert!(wrong.flatten() > Some(0), "one step is more than the rules mend");
-        ["accuracy-coordinates.svg", "accuracy-index.svg", "accuracy-margin.svg", "accuracy-simulation.svg", "accuracy-wide.svg"],
+    for (study, table) in [("coordinates", "tests"), ("margin", "margins"), ("simulation", "runs")] {
+        assert!(rows(&object, study, table).iter().all(|row| row["missed"] == 0), "{study}");
+    }
+    let missed = |boxes: &str| {
+        let rows = rows(&object, "wide", "ways").iter().filter(|row| row["boxes"] == boxes);
+        rows.map(|row| row["missed_at_the_poses"].as_u64().expect("a count")).sum::<u64>()
+    };
+    assert!(missed("rapier's boxes") > 0 && missed("widened by 2 ulps") == 0);
 }
 
 #[test]
