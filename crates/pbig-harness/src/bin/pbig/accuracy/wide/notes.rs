@@ -108,10 +108,10 @@ fn world_note(rows: &[Row]) -> String {
         let worse = rows.iter().filter(|row| is_crowd(row) && wrong(row) > percent);
         worse.map(Row::size_in_ulps).fold(0.0, f64::max)
     };
-    let told = [10.0, 1.0, 0.1]
-        .map(|percent| format!("more than {percent}% up to {} ulps", plain(largest(percent))));
+    let told = [10.0, 1.0, 0.1].map(|percent| format!("{percent}% up to {}", plain(largest(percent))));
     format!(
-        "Where it starts to matter, by poses and boxes together: of the crowd's pairs are wrong, by the size of its shapes, {}.",
+        "Where it starts to matter, by poses and boxes together, is a question of how many ulps shapes are large. Of the crowd's \
+         pairs more are wrong than {}.",
         told.join(", ")
     )
 }
