@@ -129,8 +129,9 @@ impl PairStore {
         }
     }
 
-    /// Takes back the pairs that another list had, which have been counted.
-    pub(crate) fn take_over(&mut self, pairs: impl Iterator<Item = Pair>) {
+    /// Takes back the pairs that another list had, so many, which have been counted.
+    pub(crate) fn take_over(&mut self, pairs: impl Iterator<Item = Pair>, count: usize) {
+        self.pairs.reserve(count);
         self.pairs.extend(pairs);
     }
 
@@ -141,6 +142,11 @@ impl PairStore {
         if self.pairs.capacity() > MANY {
             self.pairs = Vec::new();
         }
+    }
+
+    /// No pairs have been counted.
+    pub(crate) fn count_none(&mut self) {
+        self.degree.fill(0);
     }
 
     /// Counts pairs that another list has added.

@@ -11,6 +11,8 @@ mod small;
 #[cfg(feature = "serde")]
 mod snapshot;
 mod state;
+#[cfg(test)]
+mod tests;
 mod update;
 
 use crate::cpu::emit;
@@ -283,14 +285,18 @@ impl BroadPhase {
         self.events.removed.clear();
         self.begin_report();
         if self.changed.is_empty() {
+            self.report.pairs = self.pair_count() as u64;
             return Ok(());
         }
         let is_small = self.is_small();
         let mut watch = Watch::new(!is_small || self.changed.len() >= MEASURED_FROM);
         let found =
             if is_small { self.find_in_small(&mut watch).map(|()| Way::Other) } else { self.find_added() };
-        let found = found.and_then(|way| self.check_room().map(|()| way));
-        let way = found.inspect_err(|_| self.events.added.clear())?;
+        let found = found.and_then(|way| self.check_room(way).map(|()| way));
+        let way = found.inspect_err(|_| {
+            self.events.added.clear();
+            self.report.pairs = self.pair_count() as u64;
+        })?;
         if !is_small {
             self.small.pass();
             watch.lap();
@@ -313,12 +319,11 @@ impl BroadPhase {
 
     /// A report of nothing done yet. Field by field: to make and drop whole ones took longer than to search ten boxes.
     fn begin_report(&mut self) {
-        let (boxes, pairs) = (self.valid_count(), self.pair_count() as u64);
+        let boxes = self.valid_count();
         let report = &mut self.report;
         (report.stages, report.checks) = (StageTimes::default(), Checks::default());
         (report.boxes, report.invalid) = (u64::from(self.present_count), u64::from(self.invalid_count));
         report.changed = self.changed.len() as u64;
-        report.pairs = pairs;
         report.plan.begin(boxes);
         report.gpu = None;
         // A backend that was asked for stays unavailable until a search on it succeeds.

@@ -90,9 +90,10 @@ impl BroadPhase {
         self.changed.len() * 4 >= self.present_count as usize
     }
 
-    pub(super) fn check_room(&self) -> Result<(), Error> {
+    /// Near pairs are always few enough.
+    pub(super) fn check_room(&self, way: Way) -> Result<(), Error> {
         let kept = (self.pair_count() + self.events.added.len()) as u64;
-        if kept > PairStore::MOST {
+        if way != Way::Near && kept > PairStore::MOST {
             return Err(Error::TooManyPairs { limit: PairStore::MOST });
         }
         Ok(())

@@ -113,21 +113,25 @@ impl NearPairs {
     pub(crate) fn find_ended(&mut self, of: &impl Judgement, ended: &mut Vec<Pair>) {
         let pieces = self.prepare_pieces(self.pairs.len());
         let walk = |((pairs, states), turned): ((&[Pair], &[u8]), &mut Turned)| {
-            let ended = |(pair, state): &(&Pair, &u8)| **state == OVERLAP && !of.holds(**pair);
-            turned.removed.extend(pairs.iter().zip(states).filter(ended).map(|(pair, _)| *pair));
+            for (i, (pair, state)) in pairs.iter().zip(states).enumerate() {
+                pairs.get(i + AHEAD).into_iter().for_each(|&ahead| of.prepare(ahead));
+                let has_ended = *state == OVERLAP && !of.holds(*pair);
+                turned.removed.extend(Some(pair).filter(|_| has_ended));
+            }
         };
         let all = self.pairs.par_chunks(PIECE).zip(self.states.par_chunks(PIECE));
         all.zip(&mut self.turned[..pieces]).for_each(walk);
         self.turned[..pieces].iter().for_each(|turned| ended.extend_from_slice(&turned.removed));
     }
 
-    /// All pairs that are near, of a search, instead of those there were. Those that overlap, and did not before, are put
-    /// into `added`.
+    /// All pairs that are near, of a search, instead of those there were. Those that overlap are told, and those of them
+    /// that did not before are put into `added`.
     pub(crate) fn fill(
         &mut self,
         found: &mut [Vec<Pair>],
         boxes: &[Aabb],
         before: &impl Judgement,
+        mut tell: impl FnMut(&[Pair]),
         added: &mut Vec<Pair>,
     ) {
         self.clear();
@@ -145,7 +149,11 @@ impl NearPairs {
         self.turned[..pieces].par_iter_mut().for_each(|turned| turned.find_fresh(before));
         for turned in &self.turned[..pieces] {
             self.overlapping += turned.added.len();
+            tell(&turned.added);
             added.extend_from_slice(&turned.removed);
+        }
+        if count > MANY {
+            self.turned = Vec::new();
         }
     }
 
@@ -170,13 +178,11 @@ impl NearPairs {
         self.tell(pieces, added, removed);
     }
 
-    /// The same, where only the boxes `changed` have. `comes_first` says of two boxes whether the first is the one that their
-    /// pair is left to.
+    /// The same, where only the boxes `changed` have. A pair of two of them is turned by the first, and then is as it should.
     pub(crate) fn update_few(
         &mut self,
         changed: &[u32],
         boxes: &[Aabb],
-        comes_first: impl Fn(u32, u32) -> bool,
         added: &mut Vec<Pair>,
         removed: &mut Vec<Pair>,
     ) {
@@ -187,24 +193,17 @@ impl NearPairs {
         self.tell(pieces, added, removed);
         for changed in changed.chunks(TOGETHER) {
             self.ask_for(changed, boxes);
-            changed.iter().for_each(|&id| self.look_up(id, boxes, &comes_first, added, removed));
+            changed.iter().for_each(|&id| self.look_up(id, boxes, added, removed));
         }
     }
 
     /// Tests the pairs of one box.
-    fn look_up(
-        &mut self,
-        id: u32,
-        boxes: &[Aabb],
-        comes_first: impl Fn(u32, u32) -> bool,
-        added: &mut Vec<Pair>,
-        removed: &mut Vec<Pair>,
-    ) {
+    fn look_up(&mut self, id: u32, boxes: &[Aabb], added: &mut Vec<Pair>, removed: &mut Vec<Pair>) {
         for &i in self.index.of(id) {
             let (pair, state) = (self.pairs[i as usize], &mut self.states[i as usize]);
             let now = u8::from(boxes[pair.a as usize].overlaps(&boxes[pair.b as usize]));
             self.tests = [self.tests[0] + 1, self.tests[1] + u64::from(now)];
-            if now ^ *state != 1 || !comes_first(id, pair.a ^ pair.b ^ id) {
+            if now ^ *state != 1 {
                 continue;
             }
             *state = now;

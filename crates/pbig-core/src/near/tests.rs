@@ -81,8 +81,7 @@ impl World {
         if changed.len() as u32 == BOXES {
             list.update(boxes, &mut added, &mut removed);
         } else {
-            let first = |id, other| id < other || !changed.contains(&other);
-            list.update_few(changed, boxes, first, &mut added, &mut removed);
+            list.update_few(changed, boxes, &mut added, &mut removed);
         }
         self.validate(&added, &removed);
     }
@@ -118,7 +117,15 @@ fn pairs_come_and_go_as_boxes_tremble_and_jump() {
             let (mut found, now) = (world.near(|_| true), Was(world.now()));
             let World { list, wanted, boxes, .. } = &mut world;
             list.find_ended(&now, &mut removed);
-            list.fill(&mut found, boxes, &Was(wanted.clone()), &mut added);
+            let mut overlapping = 0;
+            list.fill(
+                &mut found,
+                boxes,
+                &Was(wanted.clone()),
+                |pairs| overlapping += pairs.len(),
+                &mut added,
+            );
+            assert_eq!(overlapping, list.overlapping());
             world.validate(&added, &removed);
         }
         let first = (world.random() * BOXES as f32) as u32;
@@ -140,7 +147,7 @@ fn what_is_apart_and_no_longer_near_is_forgotten() {
     let mut world = World::new();
     let mut found = world.near(|_| true);
     let mut added = vec![];
-    world.list.fill(&mut found, &world.boxes, &Was(BTreeSet::new()), &mut added);
+    world.list.fill(&mut found, &world.boxes, &Was(BTreeSet::new()), |_| {}, &mut added);
     world.validate(&added, &[]);
     let before = world.list.len();
     // Odd boxes are near nothing any more.

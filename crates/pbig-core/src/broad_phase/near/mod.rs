@@ -142,8 +142,7 @@ impl BroadPhase {
         }
         let (added, removed) = (&mut events.added, &mut events.removed);
         if changed.len() * LOOKUP < list.len() {
-            let comes_first = |id: u32, other: u32| id < other || flags[other as usize] & flag::CHANGED == 0;
-            list.update_few(changed, boxes, comes_first, added, removed);
+            list.update_few(changed, boxes, added, removed);
         } else {
             list.update(boxes, added, removed);
         }
@@ -213,8 +212,10 @@ impl BroadPhase {
         let mut clock = Instant::now();
         self.end_before_list();
         let (before, added) = (Before(state!(self)), &mut self.events.added);
-        self.near.list.fill(&mut self.base.found.chunks, &self.boxes, &before, added);
-        self.pairs.count_added(added);
+        let (found, boxes, counts) = (&mut self.base.found.chunks, &self.boxes, &mut self.pairs);
+        // What is counted is what the list has, whatever pairs a restored snapshot said there were.
+        counts.count_none();
+        self.near.list.fill(found, boxes, &before, |overlapping| counts.count_added(overlapping), added);
         self.near.is_on = true;
         _ = self.near.list.take_tests();
         self.report.stages.diff += lap(&mut clock);
@@ -226,7 +227,6 @@ impl BroadPhase {
         let (state, removed) = (state!(self), &mut self.events.removed);
         if self.near.is_on {
             self.near.list.find_ended(&Staying(state, &self.pairs), removed);
-            self.pairs.count_removed(removed);
             removed.retain(|pair| self.pairs.is_there(*pair));
             self.pairs.forget_removed();
         } else {
@@ -239,7 +239,7 @@ impl BroadPhase {
     /// Does without the list, if there is one.
     pub(super) fn drop_near(&mut self) {
         if std::mem::take(&mut self.near.is_on) {
-            self.pairs.take_over(self.near.list.iter());
+            self.pairs.take_over(self.near.list.iter(), self.near.list.overlapping());
             self.near.list.clear();
         }
     }
@@ -294,6 +294,11 @@ impl Accept for NearAway<'_> {
 struct Staying<'a>(State<'a>, &'a PairStore);
 
 impl Judgement for Staying<'_> {
+    #[inline(always)]
+    fn prepare(&self, pair: Pair) {
+        Judgement::prepare(&self.0, pair);
+    }
+
     fn holds(&self, pair: Pair) -> bool {
         self.0.holds(pair) && self.1.is_there(pair)
     }
