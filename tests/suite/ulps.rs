@@ -35,7 +35,7 @@ fn shrunk(pose: &Pose) -> Isometry<f32> {
     Isometry::from_parts(pose.translation, rotation)
 }
 
-/// Shapes of every kind, from a thousandth to a thousand in size, anywhere from the origin to 10^8 on each axis.
+/// Shapes of seven kinds, from a thousandth to a thousand in size, anywhere from the origin to 10^8 on each axis.
 #[test]
 fn two_ulps_reach_as_far_as_boxes_at_poses_in_f32_and_three_as_those_at_poses_in_f64() {
     let mut without = 0;

@@ -38,6 +38,8 @@ impl PbigBroadPhase {
     /// however far away; with 3 none that would be one in f64. There are more pairs that do not touch: 2 ulps are an eighth of
     /// a millimetre 1 km from the origin, 1.6 cm at 10^5 m, 2 m at 10^7 m.
     ///
+    /// With soft CCD the box where a shape is going to be is widened by what it takes where the shape is now.
+    ///
     /// ```
     /// use rapier_pbig::PbigBroadPhase;
     /// let broad_phase = PbigBroadPhase::new().widened_by_ulps(2); // was: PbigBroadPhase::new()

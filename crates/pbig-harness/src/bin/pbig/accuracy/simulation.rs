@@ -243,11 +243,7 @@ fn again(scenes: &[Ways], way: &str) -> Option<String> {
     if others.is_empty() {
         return Some(format!("Two runs with {way} are the same, to the bit of every pose, in every scene."));
     }
-    // Rapier 0.27, broad_phase_bvh.rs: `self.pairs.retain`.
-    let why = ": it reports the pairs that end in the order of a table with random hashes, but with rapier's \
-               `enhanced-determinism`";
-    let why = if way == WAYS[0].name { why } else { "" };
-    Some(format!("Two runs with {way} differ{why} ({}).", others.join(", ")))
+    Some(format!("Two runs with {way} differ ({}).", others.join(", ")))
 }
 
 fn first_difference(ways: &Ways) -> String {
@@ -348,7 +344,7 @@ mod tests {
         scenes[0].runs[3].differs = Some(9);
         scenes[0].runs[2].differs = Some(8);
         let told = again(&scenes, "stock").unwrap_or_default();
-        assert!(told.contains("random hashes") && told.ends_with("(column from step 7)."), "{told}");
+        assert!(told.ends_with("differ (column from step 7)."), "{told}");
         let told = first_difference(&scenes[0]);
         assert!(told.starts_with("column: a permuted stock differs from stock from step 8;"), "{told}");
     }

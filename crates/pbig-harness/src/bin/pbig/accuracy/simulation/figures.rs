@@ -5,6 +5,7 @@ use crate::output::Failure;
 use pbig_harness::mechanics::Mechanics;
 use pbig_harness::numbered::Apart;
 use pbig_harness::reported::Reported;
+use pbig_harness::runner::Spread;
 
 /// Joules a kilogram below which a world counts as at rest: 4.5 cm/s on average, a tenth of the speed at which rapier
 /// lets a body fall asleep.
@@ -29,11 +30,13 @@ pub(super) struct Figures {
     pub(super) momentum: Option<f64>,
     /// The step from which on the world is at rest.
     pub(super) rest: Option<usize>,
+    /// How many there were.
+    pub(super) steps: usize,
     /// From the bodies of the first way, at the end.
     pub(super) apart: Apart,
     /// The first step after which a body is elsewhere than with the first way.
     pub(super) differs: Option<usize>,
-    /// Whole steps, on average.
+    /// A whole step, in the middle.
     pub(super) ms: f64,
     pub(super) reported: Reported,
     pub(super) compared: u64,
@@ -62,9 +65,10 @@ impl Figures {
             rise: energy_rise(&all),
             momentum: is_isolated.then(|| momentum_drift(&all)),
             rest: rest(&all),
+            steps: all.len(),
             apart: side.samples.last().map(|sample| sample.apart).unwrap_or_default(),
             differs: moved.map(|step| step + 1),
-            ms: mean(side.ms.iter().copied()),
+            ms: Spread::of(side.ms.iter().copied()).median,
             reported: side.reported,
             compared: side.compared,
         }
@@ -76,6 +80,10 @@ impl Figures {
         if is_pbig && missed > 0 {
             let what = format!("{scene}, {}: {missed} of {needed} pairs that overlap are missing", self.way);
             return Err(Failure::Check(what));
+        }
+        let no_number = |quantity: &&Quantity| (quantity.of)(&self).is_some_and(|value| !value.is_finite());
+        if let Some(Quantity { name, .. }) = QUANTITIES.iter().find(no_number) {
+            return Err(Failure::Check(format!("{scene}, {}: {name} is no number", self.way)));
         }
         Ok(self)
     }
@@ -141,7 +149,8 @@ pub(super) const QUANTITIES: [Quantity; 10] = [
     quantity("energy at the end", |f| Some(f.energy)),
     quantity("rise of energy", |f| Some(f.rise)),
     quantity("drift of momentum", |f| f.momentum),
-    Quantity { resolution: 1.0, ..quantity("time to rest", |f| f.rest.map(|step| step as f64)) },
+    // One that never rests does so after the run.
+    Quantity { resolution: 1.0, ..quantity("time to rest", |f| Some(f.rest.unwrap_or(f.steps + 1) as f64)) },
     DISTANCE,
     quantity("largest distance at the end", |f| Some(f.apart.max)),
 ];
@@ -176,6 +185,7 @@ pub(super) mod tests {
             rise: 0.0,
             momentum: None,
             rest: None,
+            steps: 100,
             apart: Apart::default(),
             differs: None,
             ms: 1.0,
@@ -227,6 +237,8 @@ pub(super) mod tests {
         let at = |step| Figures { rest: Some(step), ..nothing() };
         let times = |step| multiple(&at(step), &at(20), &[&at(20)], QUANTITIES[7]);
         assert_eq!((times(20), times(21), times(25)), (Some(0.0), Some(1.0), Some(5.0)));
+        let never = multiple(&nothing(), &at(91), &[&at(91)], QUANTITIES[7]);
+        assert_eq!(never, Some(10.0), "of 100 steps");
     }
 
     #[test]
@@ -235,5 +247,9 @@ pub(super) mod tests {
         assert!(missed.clone().complete("column", false).is_ok());
         let failed = missed.complete("column", true).map(|_| ()).err().map(|failure| failure.to_string());
         assert!(failed.is_some_and(|told| told.contains("column, some way: 2 of 7 pairs")));
+        let exploded = Figures { energy: f64::NAN, ..nothing() }.complete("pile", false).map(|_| ());
+        assert!(
+            exploded.is_err_and(|failure| failure.to_string().contains("pile, some way: energy at the end"))
+        );
     }
 }

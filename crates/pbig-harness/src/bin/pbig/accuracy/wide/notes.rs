@@ -63,10 +63,8 @@ fn kinds_note(rows: &[Row]) -> String {
         format!("{world} {missed}")
     };
     format!(
-        "Rounding is monotone: it parts no two numbers that are in order. So what is rounded once (a ball, a cuboid) is hardly \
-         ever missed where it touches; what is rounded twice (the end of a capsule and then its radius, the centre of a \
-         compound and then its half extents) can be, and so can what is no nearer than the prediction distance. Missed pairs \
-         of touching shapes, by world: {}.",
+        "Rounding is monotone: it parts no two numbers that are in order, however often both are rounded alike. Missed pairs of \
+         touching shapes, by world: {}. Why: docs/ARCHITECTURE.md, far from the origin.",
         worlds.into_iter().map(of).collect::<Vec<_>>().join("; ")
     )
 }
