@@ -62,7 +62,7 @@ impl std::fmt::Debug for PbigBroadPhase {
 
 impl PbigBroadPhase {
     /// The defaults: a margin of 1% of the length unit, as rapier's own broad phase has, and no limit on colliders or pairs,
-    /// as rapier has none. In `pbig accuracy` no other margin is faster by more than the noise (docs/benchmarks/accuracy.md).
+    /// as rapier has none. Over all cases of `pbig accuracy` none is faster by more than the noise.
     pub const CONFIG: Config = Config { margin: 0.01, limits: Limits::UNLIMITED, ..Config::DEFAULT };
 
     /// An empty broad phase with [`PbigBroadPhase::CONFIG`].
