@@ -12,7 +12,7 @@ use rapier3d::prelude::{
     BroadPhase, BroadPhasePairEvent, ColliderHandle, ColliderPair, ColliderSet, IntegrationParameters,
     NarrowPhase, RigidBodySet,
 };
-use rayon::prelude::*;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Modified colliders from which their boxes are computed on several threads: below, waking a second one costs more than
 /// it saves.
@@ -34,8 +34,8 @@ pub struct PbigBroadPhase {
     /// By how much boxes are widened.
     pub(crate) ulps: u32,
     pub(crate) outbox: Outbox,
-    /// Of the listed colliders of one call, in their order.
-    proxies: Vec<Proxy>,
+    /// Indices of the listed colliders of one call.
+    listed: Vec<u32>,
     pub(crate) tree: SceneTree,
     pub(crate) kept: Kept,
     /// What [`PbigBroadPhase::overlapped`] needs, if it is on.
@@ -113,7 +113,7 @@ impl PbigBroadPhase {
             relative_margin,
             ulps: 0,
             outbox: Outbox::default(),
-            proxies: Vec::new(),
+            listed: Vec::new(),
             tree: SceneTree::default(),
             kept: Kept::default(),
             overlap: None,
@@ -202,17 +202,37 @@ impl PbigBroadPhase {
             self.kept.proxies += watch.lap();
             return;
         }
-        let mut proxies = std::mem::take(&mut self.proxies);
-        proxies.resize(listed.len(), Proxy::Gone);
-        let growth = Growth::new(call.params, self.ulps);
-        let block =
-            |(listed, proxies): (&[ColliderHandle], &mut [Proxy])| call.proxies(growth, listed, proxies);
-        let blocks = listed.par_chunks(BLOCK).zip(proxies.par_chunks_mut(BLOCK));
-        blocks.with_min_len(PARALLEL_FROM / BLOCK / 8).for_each(block);
+        self.look_at_many(call, listed);
         self.kept.proxies += watch.lap();
-        self.set_all(listed, &proxies);
-        self.kept.set += watch.lap();
-        self.proxies = proxies;
+    }
+
+    /// On several threads, but for colliders that are new, disabled or gone.
+    fn look_at_many(&mut self, call: &Call<'_>, listed: &[ColliderHandle]) {
+        let _span = tracing::debug_span!(target: "pbig", "proxies").entered();
+        self.listed.clear();
+        self.listed.extend(listed.iter().map(|handle| handle.into_raw_parts().0));
+        let (growth, roll, all_done) =
+            (Growth::new(call.params, self.ulps), &self.roll, AtomicBool::new(true));
+        let proxy = |found| match call.proxy(found, growth) {
+            Proxy::Enabled(aabb, filter) => Some((aabb, filter)),
+            Proxy::Disabled | Proxy::Gone => {
+                all_done.store(false, Ordering::Relaxed);
+                None
+            }
+        };
+        let fetch = |id| call.fetch_known(id, roll);
+        if let Err(error) = self.finder.set_many(&self.listed, fetch, proxy) {
+            tracing::error!("pbig: colliders are ignored: {error}");
+        }
+        if all_done.into_inner() {
+            return;
+        }
+        for &handle in listed {
+            match call.proxy(call.fetch(handle), growth) {
+                Proxy::Enabled(..) if self.roll.has(handle) => {}
+                proxy => self.set_proxy(handle, proxy),
+            }
+        }
     }
 
     /// Each collider's proxy is set as soon as it is known: to write it down and read it again took 5 ns.
@@ -220,26 +240,21 @@ impl PbigBroadPhase {
         let growth = Growth::new(call.params, self.ulps);
         if listed.len() <= FEW {
             for &handle in listed {
-                self.set_proxy(handle, &call.proxy(call.fetch(handle), growth));
+                self.set_proxy(handle, call.proxy(call.fetch(handle), growth));
             }
             return;
         }
         let mut found = [(None, None); BLOCK];
         call.fetch_all(listed, &mut found);
         for (&handle, found) in listed.iter().zip(found) {
-            self.set_proxy(handle, &call.proxy(found, growth));
+            self.set_proxy(handle, call.proxy(found, growth));
         }
     }
 
-    fn set_all(&mut self, listed: &[ColliderHandle], proxies: &[Proxy]) {
-        let _span = tracing::debug_span!(target: "pbig", "set").entered();
-        listed.iter().zip(proxies).for_each(|(&handle, proxy)| self.set_proxy(handle, proxy));
-    }
-
     #[inline(always)]
-    fn set_proxy(&mut self, handle: ColliderHandle, proxy: &Proxy) {
+    fn set_proxy(&mut self, handle: ColliderHandle, proxy: Proxy) {
         match proxy {
-            Proxy::Enabled(aabb, filter) => self.set(handle, aabb, filter),
+            Proxy::Enabled(aabb, filter) => self.set(handle, &aabb, &filter),
             Proxy::Disabled => self.disable(handle),
             Proxy::Gone => self.forget(handle),
         }

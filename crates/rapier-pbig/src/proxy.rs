@@ -2,6 +2,7 @@
 //! broad phase and narrow phase compute them.
 
 use crate::call::Call;
+use crate::roll::Roll;
 use crate::ulps::widened_by_ulps;
 use pbig_core::{Aabb, ProxyFilter, TestMode};
 use rapier3d::prelude::{
@@ -63,6 +64,13 @@ impl<'a> Call<'a> {
     #[inline]
     pub(crate) fn fetch(&self, handle: ColliderHandle) -> Fetched<'a> {
         let collider = self.colliders.get(handle);
+        (collider, self.body(collider))
+    }
+
+    /// The collider with an index; none if it is not the one on the roll.
+    pub(crate) fn fetch_known(&self, index: u32, roll: &Roll) -> Fetched<'a> {
+        let known = |&(_, handle): &(_, ColliderHandle)| roll.has(handle);
+        let collider = self.colliders.get_unknown_gen(index).filter(known).map(|(collider, _)| collider);
         (collider, self.body(collider))
     }
 
@@ -164,6 +172,7 @@ pub fn filter_of(bodies: &RigidBodySet, collider: &Collider) -> ProxyFilter {
     filter_with(parent_of(bodies, collider), collider)
 }
 
+#[inline(always)]
 fn filter_with(body: Option<&RigidBody>, collider: &Collider) -> ProxyFilter {
     // A collider without a body counts as fixed.
     let kind = body.map_or(RigidBodyType::Fixed, RigidBody::body_type);

@@ -40,12 +40,10 @@ pub struct Stats<'a> {
     pub deleted: usize,
     /// The sums over all updates.
     pub totals: Totals,
-    /// Time for the boxes and filters of the modified colliders: reading colliders and bodies, and, where one thread
-    /// does it, comparing each with what is stored. Zero for fewer than 64 colliders: reading the clock would take as
-    /// long.
+    /// Time for the boxes and filters of the modified colliders: reading colliders and bodies, and comparing each with
+    /// what is stored. Zero for fewer than 64 colliders: reading the clock would take as long.
     pub proxies: Duration,
-    /// Time for comparing those with what is stored, where that is a stage of its own: after several threads have
-    /// computed them.
+    /// With [`PbigBroadPhase::overlapped`]: time for comparing those with what is stored, which is a stage of its own.
     pub set: Duration,
     /// Time for turning pairs of ids into events. Zero for fewer than 64.
     pub events: Duration,

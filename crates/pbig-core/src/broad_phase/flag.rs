@@ -11,3 +11,5 @@ pub(super) const AWAY: u8 = 8;
 /// The device has told that the box has lost pairs.
 #[cfg(feature = "gpu")]
 pub(super) const ENDING: u8 = 16;
+/// It is among those that are set at once, and its turn has not come.
+pub(super) const LISTED: u8 = 32;

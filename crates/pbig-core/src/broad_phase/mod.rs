@@ -5,6 +5,7 @@ mod allocations;
 #[cfg(feature = "gpu")]
 mod device;
 mod flag;
+mod many;
 mod near;
 mod overlap;
 mod small;
@@ -13,6 +14,7 @@ mod snapshot;
 mod state;
 #[cfg(test)]
 mod tests;
+mod turns;
 mod update;
 
 use crate::cpu::emit;
@@ -89,6 +91,8 @@ pub struct BroadPhase {
     invalid_count: u32,
     /// Boxes changed since the last update.
     changed: Vec<u32>,
+    /// For `set_many`, empty between calls.
+    left: Vec<many::Left>,
     refiltered: HashMap<u32, Old>,
     /// Updates that have changed something.
     updates: u64,
@@ -134,6 +138,7 @@ impl BroadPhase {
             present_count: 0,
             invalid_count: 0,
             changed: vec![],
+            left: vec![],
             refiltered: HashMap::new(),
             updates: 0,
             overlap: Overlap::default(),
@@ -211,7 +216,7 @@ impl BroadPhase {
         if self.flags.get(i).is_none_or(|flags| flags & flag::PRESENT == 0) {
             return self.insert(id, aabb, filter);
         }
-        if !self.still_holds(&self.boxes[i], &aabb, valid) {
+        if !still_holds(&self.boxes[i], &aabb, valid, self.config.margin) {
             self.note_change(id);
             self.put(i, aabb, valid);
         }
@@ -313,6 +318,7 @@ impl BroadPhase {
         if !is_small && self.updates > 1 {
             self.near.note_time(way, self.report.changed as usize, self.report.stages.total());
         }
+        self.take_turns();
         self.report.pairs = self.pair_count() as u64;
         Ok(())
     }
@@ -344,25 +350,6 @@ impl BroadPhase {
         self.pairs.reserve_ids(ids);
     }
 
-    /// Whether a fat box still contains the box, and by no more than twice the margin: a box that
-    /// has shrunk is stored anew, so that only boxes near each other pair.
-    #[inline]
-    fn still_holds(&self, fat: &Aabb, aabb: &Aabb, valid: bool) -> bool {
-        // A little less than two margins: the gaps below are rounded.
-        let slack = 2.0 * self.config.margin * (1.0 - 2.0 * f32::EPSILON);
-        // No branches: which side of a box has moved is a coin toss, and six of them took 30 ns.
-        let (mut moved, mut sum) = (!valid, 0.0);
-        for k in 0..3 {
-            let (below, above) = (aabb.min[k] - fat.min[k], fat.max[k] - aabb.max[k]);
-            moved |= (below < 0.0) | (below > slack) | (above < 0.0) | (above > slack);
-            sum += below + above;
-        }
-        if moved {
-            return !valid && !fat.is_valid();
-        }
-        !sum.is_nan() || holds_exactly(fat, aabb, slack)
-    }
-
     /// The first time after an update that a box or its filter change.
     #[inline]
     fn note_change(&mut self, id: u32) {
@@ -385,7 +372,26 @@ impl BroadPhase {
     }
 }
 
-/// As [`BroadPhase::still_holds`] of a valid box, some coordinates infinite or the fat box nowhere.
+/// Whether a fat box still contains the box, and by no more than twice the margin: a box that
+/// has shrunk is stored anew, so that only boxes near each other pair.
+#[inline(always)]
+fn still_holds(fat: &Aabb, aabb: &Aabb, valid: bool, margin: f32) -> bool {
+    // A little less than two margins: the gaps below are rounded.
+    let slack = 2.0 * margin * (1.0 - 2.0 * f32::EPSILON);
+    // No branches: which side of a box has moved is a coin toss, and six of them took 30 ns.
+    let (mut moved, mut sum) = (!valid, 0.0);
+    for k in 0..3 {
+        let (below, above) = (aabb.min[k] - fat.min[k], fat.max[k] - aabb.max[k]);
+        moved |= (below < 0.0) | (below > slack) | (above < 0.0) | (above > slack);
+        sum += below + above;
+    }
+    if moved {
+        return !valid && !fat.is_valid();
+    }
+    !sum.is_nan() || holds_exactly(fat, aabb, slack)
+}
+
+/// As [`still_holds`] of a valid box, some coordinates infinite or the fat box nowhere.
 #[cold]
 fn holds_exactly(fat: &Aabb, aabb: &Aabb, slack: f32) -> bool {
     // Equal first: the difference of equal infinities is NaN.

@@ -1,7 +1,8 @@
 //! An update of a small world: no plan and no grid, but a bitmap index that is kept up to date.
 
+use super::turns::{Turn, Turns};
 use super::update::{State, state};
-use super::{BroadPhase, flag};
+use super::{BroadPhase, MEASURED_FROM, flag};
 use crate::cpu::bitmap::{Bitmap, MOST, Search};
 use crate::cpu::codes::Simd;
 use crate::cpu::judge::Accept;
@@ -31,6 +32,8 @@ pub(super) struct Small {
     built_for: u32,
     /// Updates that are still left to the grid.
     pause: u32,
+    /// Whether it is the bitmap's turn, where many boxes change.
+    pub(super) turns: Turns,
 }
 
 impl Small {
@@ -72,9 +75,25 @@ impl Small {
 impl BroadPhase {
     /// Whether the bitmap does the next update.
     pub(super) fn is_small(&self) -> bool {
+        self.may_be_small() && self.small.pause == 0 && self.small.turns.turn == Turn::Bitmap
+    }
+
+    fn may_be_small(&self) -> bool {
         let on_cpu = matches!(self.config.backend, Backend::Auto | Backend::Cpu);
-        let may = on_cpu && self.config.strategy == Strategy::Auto;
-        may && self.boxes.len() <= MOST && self.small.pause == 0
+        on_cpu && self.config.strategy == Strategy::Auto && self.boxes.len() <= MOST
+    }
+
+    /// What an update has taken decides whose turn the next ones are.
+    pub(super) fn take_turns(&mut self) {
+        let changed = self.report.changed as usize;
+        if !self.may_be_small() || self.small.pause > 0 {
+            return;
+        }
+        if changed >= MEASURED_FROM && 4 * changed >= self.present_count as usize {
+            self.small.turns.note_many(changed, self.report.stages.total());
+        } else {
+            self.small.turns.note_few();
+        }
     }
 
     /// As [`BroadPhase::find_added`], by bitmap.
@@ -256,7 +275,9 @@ mod tests {
     }
 
     fn new(strategy: Strategy) -> BroadPhase {
-        BroadPhase::new(Config { strategy, ..Config::DEFAULT }).expect("a margin")
+        let mut broad_phase = BroadPhase::new(Config { strategy, ..Config::DEFAULT }).expect("a margin");
+        broad_phase.small.turns = Turns::none();
+        broad_phase
     }
 
     /// Sets boxes and updates; what was chosen, and the events.

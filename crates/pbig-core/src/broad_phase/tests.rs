@@ -1,7 +1,8 @@
 //! What is taken in: which boxes count, and when one has changed.
 
 use super::BroadPhase;
-use crate::{Aabb, Config, ProxyFilter};
+use crate::plan::Chosen;
+use crate::{Aabb, Config, Events, ProxyFilter, Strategy};
 
 const MARGIN: f32 = 0.1;
 
@@ -46,4 +47,65 @@ fn boxes_that_are_invalid_are_there_and_do_not_count_in_the_plan() {
     broad_phase.update().expect("three boxes");
     let report = broad_phase.report();
     assert_eq!((report.boxes, report.invalid, report.plan.boxes), (3, 1, 2));
+}
+
+/// An update of a small world in which boxes swing against their neighbours, one goes, and now and then few move.
+fn swing(broad_phase: &mut BroadPhase, frame: u32, ids: u32) -> (Chosen, Events) {
+    let at = |id: u32| {
+        let swing = 0.25 * (frame as f32 * 0.5 + id as f32).sin();
+        let x = (id % 20 / 2 * 5) as f32 + (id % 2) as f32 * 1.2 + swing;
+        Aabb::from_center([x, (id / 20 * 3) as f32, 0.0], [0.5; 3])
+    };
+    let step = if frame % 200 > 190 { 50 } else { 1 };
+    for id in (0..ids).step_by(step) {
+        broad_phase.set(id, at(id), ProxyFilter::ALL).expect("a small id");
+    }
+    broad_phase.remove(frame % ids);
+    let events = broad_phase.update().expect("few pairs").clone();
+    (broad_phase.report().plan.chosen, events)
+}
+
+#[test]
+fn bitmap_grid_and_near_pairs_take_turns_in_a_small_world_and_tell_the_same() {
+    let of =
+        |strategy| BroadPhase::new(Config { strategy, margin: 0.01, ..Config::DEFAULT }).expect("a margin");
+    let (mut auto, mut grid) = (of(Strategy::Auto), of(Strategy::Grid));
+    let (mut ways, mut events) = (Vec::new(), 0);
+    for frame in 0..600 {
+        let (way, found) = swing(&mut auto, frame, 400);
+        assert_eq!(found, swing(&mut grid, frame, 400).1, "frame {frame}, by {way:?}");
+        events += found.added.len() + found.removed.len();
+        ways.push(way);
+    }
+    for way in [Chosen::Bitmap, Chosen::Grid, Chosen::Near] {
+        assert!(ways.contains(&way), "never by {way:?}: {ways:?}");
+    }
+    assert!(ways[..24].iter().all(|way| *way == Chosen::Bitmap) && ways[24] == Chosen::Grid);
+    assert!(events > 1000, "{events}");
+}
+
+#[test]
+fn threads_that_share_an_update_by_near_pairs_miss_none_of_those_who_leave() {
+    const IDS: u32 = 20_000;
+    let of =
+        |strategy| BroadPhase::new(Config { strategy, margin: 0.01, ..Config::DEFAULT }).expect("a margin");
+    let (mut auto, mut pbig) = (of(Strategy::Auto), of(Strategy::Pbig));
+    let ids: Vec<u32> = (0..IDS).collect();
+    let (mut by_near, mut events) = (0, 0);
+    for frame in 0..12_u32 {
+        let at = |id: u32| {
+            // One in a thousand jumps into the place of another.
+            let jumps = frame > 5 && (id + 100 * frame).is_multiple_of(1000);
+            let place = if jumps { id.wrapping_mul(2_654_435_761) % IDS } else { id };
+            let swing = 0.1 * (frame as f32 + id as f32).sin();
+            let center = [place % 30, place / 30 % 30, place / 900].map(|i| i as f32 * 1.15 + swing);
+            Some((Aabb::from_center(center, [0.5; 3]), ProxyFilter::ALL))
+        };
+        auto.set_many(&ids, |id| id, at).expect("few ids");
+        pbig.set_many(&ids, |id| id, at).expect("few ids");
+        assert_eq!(auto.update().expect("few pairs"), pbig.update().expect("few pairs"), "frame {frame}");
+        by_near += u32::from(auto.report().plan.chosen == Chosen::Near);
+        events += auto.events().added.len();
+    }
+    assert!(by_near > 5 && events > 10_000, "{by_near} by near pairs, {events} new pairs");
 }

@@ -14,6 +14,7 @@ use crate::plan::{Chosen, LazySummary, Plan};
 use crate::report::{lap, stage};
 use crate::search::{Rule, single_entry_checks};
 use crate::{Aabb, Backend, Error, Pair, ProxyFilter, Strategy};
+use rayon::prelude::*;
 use std::collections::HashMap;
 use std::time::Instant;
 
@@ -43,6 +44,10 @@ pub(super) enum Way {
 
 /// Events from which both lists are sorted at once.
 const PARALLEL_FROM: usize = 4096;
+
+/// Changed boxes from which all are looked at on several threads, and those that a thread takes at once.
+const RANGES_FROM: usize = 16_384;
+const RANGE: usize = 4096;
 
 /// Tests that take as long as to sort a box.
 const TESTS_OF_A_BOX: u64 = 64;
@@ -196,12 +201,7 @@ impl BroadPhase {
         if way != Way::Near {
             self.pairs.insert(&self.events.added);
         }
-        // Box by box where all have changed, too: memmove, of all of them at once, takes ten times as long on some
-        // processors (Zen, where what it copies to is not aligned).
-        for &id in &self.changed {
-            self.before[id as usize] = self.boxes[id as usize];
-            self.flags[id as usize] &= !(flag::CHANGED | flag::REFILTERED);
-        }
+        self.forget_changes();
         self.changed.clear();
         self.refiltered.clear();
         #[cfg(feature = "gpu")]
@@ -209,6 +209,29 @@ impl BroadPhase {
             self.flags[id as usize] &= !flag::ENDING;
         }
         self.updates += 1;
+    }
+
+    /// What boxes are is what they were. Box by box where all have changed, too: memmove, of all of them at once, takes ten
+    /// times as long on some processors (Zen, where what it copies to is not aligned).
+    fn forget_changes(&mut self) {
+        let Self { boxes, before, flags, changed, .. } = self;
+        const NEWS: u8 = flag::CHANGED | flag::REFILTERED;
+        if changed.len() < RANGES_FROM || changed.len() * 4 < boxes.len() {
+            for &id in changed.iter() {
+                before[id as usize] = boxes[id as usize];
+                flags[id as usize] &= !NEWS;
+            }
+            return;
+        }
+        let boxes = before.par_chunks_mut(RANGE).zip(boxes.par_chunks(RANGE));
+        boxes.zip(flags.par_chunks_mut(RANGE)).for_each(|((before, boxes), flags)| {
+            for ((before, aabb), flags) in before.iter_mut().zip(boxes).zip(flags) {
+                if *flags & flag::CHANGED != 0 {
+                    *before = *aabb;
+                    *flags &= !NEWS;
+                }
+            }
+        });
     }
 
     pub(super) fn sort_events(&mut self) {

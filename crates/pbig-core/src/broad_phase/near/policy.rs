@@ -7,13 +7,16 @@ use crate::{Aabb, Backend, Pair, Strategy};
 use std::time::Duration;
 
 /// Moves that a skin is wide at first, at least and at most.
-const MOVES: [f32; 3] = [4.0, 2.0, 16.0];
+const MOVES: [f32; 3] = [4.0, 2.0, 64.0];
 
 /// Tests of near pairs in the time that it takes to search for those of one box.
 const SEARCH_OF_A_BOX: f32 = 24.0;
 
 /// Boxes whose moves are looked at.
 const SAMPLE: usize = 256;
+
+/// Updates in which each box of a small world is looked at once, for how far it has come.
+const ROUND: usize = 4;
 
 /// Lists after which an update goes without one, so that what that takes is known.
 const LISTS: u32 = 8;
@@ -58,6 +61,8 @@ pub(crate) struct Near {
     pub(crate) met: u64,
     /// Boxes that have left their reach in this update.
     pub(crate) away: Vec<u32>,
+    /// The same of pieces of an update, between threads.
+    pub(crate) left: Vec<Vec<u32>>,
     /// Pairs of those, which may go on.
     pub(crate) parted: Vec<Pair>,
     /// Their pairs now.
@@ -90,6 +95,7 @@ impl Default for Near {
             failed: false,
             met: 0,
             away: vec![],
+            left: vec![],
             parted: vec![],
             came: vec![],
         }
@@ -202,7 +208,7 @@ impl BroadPhase {
     /// again, near pairs are only those that such motion can bring together.
     pub(crate) fn shrink_skin(&mut self) {
         let Self { near, boxes, changed, .. } = self;
-        let step = changed.len().div_ceil(SAMPLE).max(1);
+        let step = changed.len().div_ceil(SAMPLE).max(ROUND);
         for &id in changed.iter().skip(near.age as usize % step).step_by(step) {
             near.farthest =
                 near.farthest.max(near.skin - slack(&near.reach[id as usize], &boxes[id as usize]));

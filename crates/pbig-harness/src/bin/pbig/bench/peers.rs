@@ -159,13 +159,10 @@ fn agree(name: &str, ours: usize, others: &[usize]) -> Result<u64, Failure> {
 }
 
 fn update(broad_phase: &mut BroadPhase, boxes: &[Aabb], moved: &[u32]) -> Result<(), Failure> {
-    let mut all = || {
-        for &id in moved {
-            broad_phase.set(id, boxes[id as usize], ProxyFilter::ALL)?;
-        }
-        broad_phase.update().map(|_| ())
-    };
-    all().map_err(|error: pbig_core::Error| Failure::Input(error.to_string()))
+    let fetch = |id: u32| &boxes[id as usize];
+    let set = broad_phase.set_many(moved, fetch, |aabb| Some((*aabb, ProxyFilter::ALL)));
+    let done = set.and_then(|()| broad_phase.update().map(|_| ()));
+    done.map_err(|error| Failure::Input(error.to_string()))
 }
 
 impl Contest for Frames {
