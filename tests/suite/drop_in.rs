@@ -64,6 +64,31 @@ fn many_removed_at_once_and_others_added_in_the_same_step() {
 }
 
 #[test]
+fn a_multitude_that_several_threads_look_at_may_come_go_and_change_in_the_same_step() {
+    const BALLS: usize = 18_000;
+    let mut scene = Checked::new(PbigBroadPhase::CONFIG);
+    let mut balls: Vec<_> = (0..BALLS).map(|i| scene.ball(i as f32 * 0.9)).collect();
+    assert_eq!(scene.step(), BALLS - 1, "all are new");
+    for step in 1..4 {
+        for (i, (body, _)) in balls.iter().enumerate() {
+            scene.move_to(*body, i as f32 * 0.9 + if (i / 7) % 4 == step { 0.2 } else { 0.0 });
+        }
+        for (_, collider) in balls[step * 1000..].iter().take(100) {
+            scene.world.colliders[*collider].set_enabled(step.is_multiple_of(2));
+        }
+        for (body, old) in balls[2000..].iter_mut().step_by(500) {
+            scene.world.remove_collider(*old);
+            *old = scene.attach(*body);
+        }
+        let none = InteractionGroups::none();
+        scene.world.colliders[balls[4000 + step].1].set_collision_groups(none);
+        scene.move_to(balls[5000 * step].0, f32::NAN);
+        let pairs = scene.step();
+        assert!((BALLS - 900..BALLS - 200).contains(&pairs), "{pairs} pairs in step {step}");
+    }
+}
+
+#[test]
 fn a_disabled_collider_has_no_pairs_and_gets_them_back_without_motion() {
     everywhere(|mut scene| {
         let (_, a) = scene.ball(0.0);
