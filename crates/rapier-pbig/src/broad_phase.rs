@@ -3,20 +3,14 @@
 use crate::call::Call;
 use crate::events::{HandleOrder, Outbox};
 use crate::overlap::Overlap;
-use crate::proxy::{BLOCK, FEW, Growth, Proxy};
 use crate::roll::Roll;
 use crate::scene_tree::SceneTree;
 use crate::stats::{Kept, MEASURED_FROM, Totals, Watch};
-use pbig_core::{Aabb, BroadPhase as Finder, Config, Events, Limits, ProxyFilter};
+use pbig_core::{BroadPhase as Finder, Config, Events, Limits};
 use rapier3d::prelude::{
     BroadPhase, BroadPhasePairEvent, ColliderHandle, ColliderPair, ColliderSet, IntegrationParameters,
     NarrowPhase, RigidBodySet,
 };
-use std::sync::atomic::{AtomicBool, Ordering};
-
-/// Modified colliders from which their boxes are computed on several threads: below, waking a second one costs more than
-/// it saves.
-const PARALLEL_FROM: usize = 16_384;
 
 /// The broad phase to hand to rapier's `PhysicsPipeline` or `CollisionPipeline`.
 ///
@@ -35,7 +29,7 @@ pub struct PbigBroadPhase {
     pub(crate) ulps: u32,
     pub(crate) outbox: Outbox,
     /// Indices of the listed colliders of one call.
-    listed: Vec<u32>,
+    pub(crate) indices: Vec<u32>,
     pub(crate) tree: SceneTree,
     pub(crate) kept: Kept,
     /// What [`PbigBroadPhase::overlapped`] needs, if it is on.
@@ -113,7 +107,7 @@ impl PbigBroadPhase {
             relative_margin,
             ulps: 0,
             outbox: Outbox::default(),
-            listed: Vec::new(),
+            indices: Vec::new(),
             tree: SceneTree::default(),
             kept: Kept::default(),
             overlap: None,
@@ -170,94 +164,6 @@ impl PbigBroadPhase {
     pub(crate) fn disable(&mut self, handle: ColliderHandle) {
         self.roll.enter(handle);
         self.take_out(handle.into_raw_parts().0);
-    }
-
-    #[inline(always)]
-    pub(crate) fn set(&mut self, handle: ColliderHandle, aabb: &Aabb, filter: &ProxyFilter) {
-        if !self.roll.has(handle) {
-            self.enter(handle);
-        }
-        if let Err(error) = self.finder.set(handle.into_raw_parts().0, *aabb, *filter) {
-            ignored(handle, &error);
-        }
-    }
-
-    #[cold]
-    fn enter(&mut self, handle: ColliderHandle) {
-        if !self.roll.enter(handle) {
-            // A predecessor with this index that was never reported as removed.
-            self.take_out(handle.into_raw_parts().0);
-        }
-    }
-
-    /// Brings the finder up to date about some colliders.
-    fn look_at(&mut self, call: &Call<'_>, listed: &[ColliderHandle]) {
-        if self.overlap.is_some() {
-            return self.look_ahead(call, listed);
-        }
-        let mut watch = Watch::new(listed.len() >= MEASURED_FROM);
-        if listed.len() < PARALLEL_FROM || rayon::current_num_threads() == 1 {
-            let _span = tracing::debug_span!(target: "pbig", "proxies").entered();
-            listed.chunks(BLOCK).for_each(|block| self.look_at_block(call, block));
-            self.kept.proxies += watch.lap();
-            return;
-        }
-        self.look_at_many(call, listed);
-        self.kept.proxies += watch.lap();
-    }
-
-    /// On several threads, but for colliders that are new, disabled or gone.
-    fn look_at_many(&mut self, call: &Call<'_>, listed: &[ColliderHandle]) {
-        let _span = tracing::debug_span!(target: "pbig", "proxies").entered();
-        self.listed.clear();
-        self.listed.extend(listed.iter().map(|handle| handle.into_raw_parts().0));
-        let (growth, roll, all_done) =
-            (Growth::new(call.params, self.ulps), &self.roll, AtomicBool::new(true));
-        let proxy = |found| match call.proxy(found, growth) {
-            Proxy::Enabled(aabb, filter) => Some((aabb, filter)),
-            Proxy::Disabled | Proxy::Gone => {
-                all_done.store(false, Ordering::Relaxed);
-                None
-            }
-        };
-        let fetch = |id| call.fetch_known(id, roll);
-        if let Err(error) = self.finder.set_many(&self.listed, fetch, proxy) {
-            tracing::error!("pbig: colliders are ignored: {error}");
-        }
-        if all_done.into_inner() {
-            return;
-        }
-        for &handle in listed {
-            match call.proxy(call.fetch(handle), growth) {
-                Proxy::Enabled(..) if self.roll.has(handle) => {}
-                proxy => self.set_proxy(handle, proxy),
-            }
-        }
-    }
-
-    /// Each collider's proxy is set as soon as it is known: to write it down and read it again took 5 ns.
-    fn look_at_block(&mut self, call: &Call<'_>, listed: &[ColliderHandle]) {
-        let growth = Growth::new(call.params, self.ulps);
-        if listed.len() <= FEW {
-            for &handle in listed {
-                self.set_proxy(handle, call.proxy(call.fetch(handle), growth));
-            }
-            return;
-        }
-        let mut found = [(None, None); BLOCK];
-        call.fetch_all(listed, &mut found);
-        for (&handle, found) in listed.iter().zip(found) {
-            self.set_proxy(handle, call.proxy(found, growth));
-        }
-    }
-
-    #[inline(always)]
-    fn set_proxy(&mut self, handle: ColliderHandle, proxy: Proxy) {
-        match proxy {
-            Proxy::Enabled(aabb, filter) => self.set(handle, &aabb, &filter),
-            Proxy::Disabled => self.disable(handle),
-            Proxy::Gone => self.forget(handle),
-        }
     }
 
     /// First what is removed, because a modified collider may have taken the index of a removed one.
@@ -372,11 +278,6 @@ impl PbigBroadPhase {
         self.find_and_send(events);
         self.begin_next();
     }
-}
-
-#[cold]
-fn ignored(handle: ColliderHandle, error: &pbig_core::Error) {
-    tracing::error!("pbig: collider {handle:?} is ignored: {error}");
 }
 
 impl BroadPhase for PbigBroadPhase {

@@ -46,6 +46,7 @@ mod call;
 #[cfg(feature = "debug-render")]
 mod debug_render;
 mod events;
+mod look;
 mod overlap;
 mod proxy;
 mod queries;

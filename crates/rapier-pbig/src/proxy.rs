@@ -9,6 +9,7 @@ use rapier3d::prelude::{
     ActiveCollisionTypes, Collider, ColliderHandle, IntegrationParameters, Isometry, Point, Real, RigidBody,
     RigidBodySet, RigidBodyType, Shape, TypedShape,
 };
+use std::sync::atomic::{AtomicBool, Ordering};
 
 /// What the finder is to be told about a collider.
 #[derive(Clone, Copy, Debug)]
@@ -67,11 +68,17 @@ impl<'a> Call<'a> {
         (collider, self.body(collider))
     }
 
-    /// The collider with an index; none if it is not the one on the roll.
-    pub(crate) fn fetch_known(&self, index: u32, roll: &Roll) -> Fetched<'a> {
-        let known = |&(_, handle): &(_, ColliderHandle)| roll.has(handle);
-        let collider = self.colliders.get_unknown_gen(index).filter(known).map(|(collider, _)| collider);
-        (collider, self.body(collider))
+    /// The collider with an index; none if another one with it is on the roll. It is news if none is.
+    pub(crate) fn fetch_known(&self, index: u32, roll: &Roll, has_news: &AtomicBool) -> Fetched<'a> {
+        let Some((collider, handle)) = self.colliders.get_unknown_gen(index) else { return (None, None) };
+        let known = roll.handle(index);
+        if known.is_none() {
+            has_news.store(true, Ordering::Relaxed);
+        }
+        if known.is_some_and(|known| known != handle) {
+            return (None, None);
+        }
+        (Some(collider), self.body(Some(collider)))
     }
 
     /// Of at most [`BLOCK`] colliders.

@@ -55,10 +55,10 @@ fn most_allocations(boxes: u32, share: u32) -> u64 {
     let mut plans = [broad_phase.report().plan.levels.clone(), broad_phase.report().plan.levels.clone()];
     for frame in 0..80 {
         let step = if frame == 0 { 1 } else { share };
-        for id in (0..boxes).step_by(step as usize) {
-            broad_phase.set(id, place(id, frame, boxes), ProxyFilter::ALL).expect("a small id");
-        }
+        let ids: Vec<u32> = (0..boxes).step_by(step as usize).collect();
         let before = COUNT.get();
+        let at = |id| Some((place(id, frame, boxes), ProxyFilter::ALL));
+        broad_phase.set_many(&ids, |id| id, at).expect("small ids");
         let changes = broad_phase.update().expect("few pairs");
         events += changes.added.len() + changes.removed.len();
         let counted = COUNT.get() - before;
@@ -93,6 +93,7 @@ fn nor_does_one_in_which_few_boxes_move() {
 #[test]
 fn where_threads_share_the_work_only_their_queue_grows_now_and_then() {
     assert!(most_allocations(100_000, 20) <= 1);
+    assert!(most_allocations(100_000, 2) <= 8);
 }
 
 #[test]

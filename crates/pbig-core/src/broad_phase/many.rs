@@ -4,12 +4,19 @@
 //! memory is read in order, too, whatever the order in which boxes are listed. (To compute boxes first, in the order of the
 //! list, and set them one after the other took a fifth more of an update of 100,000 colliders, and 56 bytes for each.)
 
-use super::{BroadPhase, flag, still_holds};
+use super::fat::still_holds;
+use super::{BroadPhase, flag};
+use crate::cpu::codes::prefetch;
+use crate::finder::check_count;
 use crate::{Aabb, Error, ProxyFilter};
 use rayon::prelude::*;
+use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 
 /// Boxes from which several threads set them: for fewer, waking a second one takes longer.
 const PARALLEL_FROM: usize = 8192;
+
+/// Ids of which one is to be set, for them all to be looked through: eight at a time, as long as it takes to set one.
+const LOOKED_THROUGH: usize = 64;
 
 /// Ids that a thread takes at once.
 const RANGE: usize = 4096;
@@ -17,13 +24,13 @@ const RANGE: usize = 4096;
 /// Boxes whose memory is asked for together: one by one, a processor would wait for one or two at a time.
 const BLOCK: usize = 64;
 
-/// What is left to be done about a range of ids.
+/// What threads leave to be done about a range of ids.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Left {
+pub(super) struct Rest {
     /// Boxes that have changed for the first time since the last update.
     changed: Vec<u32>,
     /// Boxes that are new, invalid, or were, or have another filter.
-    odd: Vec<u32>,
+    odd: Vec<(u32, Aabb, ProxyFilter)>,
 }
 
 /// What is kept about a range of ids.
@@ -36,17 +43,22 @@ struct Range<'a> {
 }
 
 impl BroadPhase {
-    /// As [`BroadPhase::set`] of each of `ids`, in any order, on several threads: `of` tells box and filter from what
-    /// `fetch` has got for an id, and nothing of a box that is to be left alone. `fetch` is called for some ids before
-    /// `of` is, so that their memory is waited for together; for a few ids both are called twice.
+    /// Sets many boxes, as [`BroadPhase::set`] does one; from 8192 on with the threads of the present rayon pool, in no
+    /// particular order.
+    ///
+    /// `fetch` gets what `of` needs to know about an id, and is called for some ids before `of` is, so that
+    /// their memory is waited for together. `of` tells box and filter, or none for a box that is to be left as it is. For an
+    /// id that is listed twice both may be called once or twice, and have to say the same. A panic in them goes on to the
+    /// caller; then some of the boxes are set.
     ///
     /// ```
     /// use pbig_core::{Aabb, BroadPhase, Config, ProxyFilter};
-    /// let centers = [[0.0; 3], [0.5, 0.0, 0.0], [9.0, 0.0, 0.0]];
+    /// let centers: Vec<[f32; 3]> = (0..10_000).map(|i| [0.9 * i as f32, 0.0, 0.0]).collect();
+    /// let ids: Vec<u32> = (0..10_000).collect();
     /// let mut broad_phase = BroadPhase::new(Config::default())?;
-    /// let cube = |center: &[f32; 3]| Some((Aabb::from_center(*center, [0.5; 3]), ProxyFilter::ALL));
-    /// broad_phase.set_many(&[0, 1, 2], |id| &centers[id as usize], cube)?;
-    /// assert_eq!(broad_phase.update()?.added.len(), 1);
+    /// let cube = |center| Some((Aabb::from_center(center, [0.5; 3]), ProxyFilter::ALL));
+    /// broad_phase.set_many(&ids, |id| centers[id as usize], cube)?;
+    /// assert_eq!(broad_phase.update()?.added.len(), 9_999);
     /// # Ok::<(), pbig_core::Error>(())
     /// ```
     ///
@@ -58,59 +70,95 @@ impl BroadPhase {
         fetch: impl Fn(u32) -> T + Sync,
         of: impl Fn(T) -> Option<(Aabb, ProxyFilter)> + Sync,
     ) -> Result<(), Error> {
-        if self.has_begun() || ids.len() < PARALLEL_FROM || rayon::current_num_threads() == 1 {
+        let few = ids.len() < PARALLEL_FROM || ids.len() * LOOKED_THROUGH < self.boxes.len();
+        if few || self.has_begun() || rayon::current_num_threads() == 1 {
             return self.set_each(ids, &fetch, &of);
         }
-        let mut left = std::mem::take(&mut self.left);
-        let new = self.list(ids);
-        left.resize_with(self.boxes.len().div_ceil(RANGE), Left::default);
-        self.ranges().zip(&mut left).for_each(|(range, left)| range.set(&fetch, &of, left));
-        for Left { changed, .. } in &mut left {
-            self.changed.append(changed);
+        let listed = self.list(ids);
+        let set = catch_unwind(AssertUnwindSafe(|| self.set_ranges(&fetch, &of)));
+        self.rests.iter_mut().for_each(|rest| self.changed.append(&mut rest.changed));
+        if let Err(panic) = set {
+            self.flags.iter_mut().for_each(|flags| *flags &= !flag::LISTED);
+            self.rests.clear();
+            resume_unwind(panic);
         }
-        let mut result = self.set_each(&new, &fetch, &of);
-        for Left { odd, .. } in &mut left {
-            result = result.and(self.set_each(odd, &fetch, &of));
-            odd.clear();
+        listed.and(self.set_odd())
+    }
+
+    /// Marks listed ids, for which there is room then.
+    fn list(&mut self, ids: &[u32]) -> Result<(), Error> {
+        let room = |id: &u32| u64::from(*id) + 1;
+        let all = check_count(ids.iter().map(room).max().unwrap_or(0), &self.config);
+        let allowed = ids.iter().map(room).filter(|room| check_count(*room, &self.config).is_ok());
+        let room = allowed.max().unwrap_or(0) as usize;
+        if room > self.boxes.len() {
+            self.make_room(room);
         }
-        self.left = left;
+        for &id in ids {
+            if let Some(flags) = self.flags.get_mut(id as usize) {
+                *flags |= flag::LISTED;
+            }
+        }
+        all
+    }
+
+    fn set_ranges<T: Copy>(
+        &mut self,
+        fetch: &(impl Fn(u32) -> T + Sync),
+        of: &(impl Fn(T) -> Option<(Aabb, ProxyFilter)> + Sync),
+    ) {
+        let Self { boxes, flags, filters, rests, config, .. } = self;
+        rests.resize_with(boxes.len().div_ceil(RANGE), Rest::default);
+        let boxes = boxes.par_chunks_mut(RANGE).zip(flags.par_chunks_mut(RANGE));
+        let ranges = boxes.zip(filters.par_chunks(RANGE)).zip(rests).enumerate();
+        ranges.for_each(|(i, (((boxes, flags), filters), rest))| {
+            let range = Range { first: (i * RANGE) as u32, boxes, flags, filters, margin: config.margin };
+            range.set(fetch, of, rest);
+        });
+    }
+
+    fn set_odd(&mut self) -> Result<(), Error> {
+        let mut result = Ok(());
+        for i in 0..self.rests.len() {
+            let odd = std::mem::take(&mut self.rests[i].odd);
+            for (id, aabb, filter) in odd {
+                result = result.and(self.set(id, aabb, filter));
+            }
+        }
         result
     }
 
-    /// Marks listed ids; those that are not known yet.
-    fn list(&mut self, ids: &[u32]) -> Vec<u32> {
-        let mut new = Vec::new();
-        for &id in ids {
-            match self.flags.get_mut(id as usize) {
-                Some(flags) => *flags |= flag::LISTED,
-                None => new.push(id),
-            }
-        }
-        new
-    }
-
-    fn ranges(&mut self) -> impl IndexedParallelIterator<Item = Range<'_>> {
-        let margin = self.config.margin;
-        let filters = self.filters.par_chunks(RANGE);
-        let parts = self.boxes.par_chunks_mut(RANGE).zip(self.flags.par_chunks_mut(RANGE)).zip(filters);
-        parts.enumerate().map(move |(i, ((boxes, flags), filters))| Range {
-            first: (i * RANGE) as u32,
-            boxes,
-            flags,
-            filters,
-            margin,
-        })
-    }
-
     /// One after the other; the first error, if there are any.
-    fn set_each<T>(
+    fn set_each<T: Copy>(
         &mut self,
         ids: &[u32],
         fetch: &impl Fn(u32) -> T,
         of: &impl Fn(T) -> Option<(Aabb, ProxyFilter)>,
     ) -> Result<(), Error> {
-        let set = |&id: &u32| of(fetch(id)).map_or(Ok(()), |(aabb, filter)| self.set(id, aabb, filter));
-        ids.iter().map(set).fold(Ok(()), Result::and)
+        let mut result = Ok(());
+        for ids in ids.chunks(BLOCK) {
+            let mut block = [None; BLOCK];
+            for (fetched, &id) in block.iter_mut().zip(ids) {
+                self.ask_for(id as usize);
+                *fetched = Some(fetch(id));
+            }
+            for (fetched, &id) in block.into_iter().flatten().zip(ids) {
+                if let Some((aabb, filter)) = of(fetched) {
+                    result = result.and(self.set(id, aabb, filter));
+                }
+            }
+        }
+        result
+    }
+
+    /// Asks for what is kept about a box.
+    #[inline(always)]
+    fn ask_for(&self, i: usize) {
+        if let (Some(aabb), Some(filter)) = (self.boxes.get(i), self.filters.get(i)) {
+            prefetch(aabb);
+            prefetch(filter);
+            prefetch(&self.flags[i]);
+        }
     }
 }
 
@@ -119,12 +167,14 @@ impl Range<'_> {
         mut self,
         fetch: &impl Fn(u32) -> T,
         of: &impl Fn(T) -> Option<(Aabb, ProxyFilter)>,
-        left: &mut Left,
+        rest: &mut Rest,
     ) {
         let mut next = next_listed(self.flags, 0);
         while next < self.flags.len() {
             let (mut block, mut count) = ([None; BLOCK], 0);
             while next < self.flags.len() && count < BLOCK {
+                prefetch(&self.boxes[next]);
+                prefetch(&self.filters[next]);
                 block[count] = Some((next, fetch(self.first + next as u32)));
                 count += 1;
                 next = next_listed(self.flags, next + 1);
@@ -132,19 +182,19 @@ impl Range<'_> {
             for (i, fetched) in block[..count].iter().flatten() {
                 self.flags[*i] &= !flag::LISTED;
                 if let Some((aabb, filter)) = of(*fetched) {
-                    self.set_one(*i, &aabb, &filter, left);
+                    self.set_one(*i, &aabb, &filter, rest);
                 }
             }
         }
     }
 
     #[inline(always)]
-    fn set_one(&mut self, i: usize, aabb: &Aabb, filter: &ProxyFilter, left: &mut Left) {
+    fn set_one(&mut self, i: usize, aabb: &Aabb, filter: &ProxyFilter, rest: &mut Rest) {
         let id = self.first + i as u32;
         let (stored, flags) = (&mut self.boxes[i], &mut self.flags[i]);
         let is_there = *flags & flag::PRESENT != 0 && !stored.min[0].is_nan();
         if !(is_there && aabb.is_valid() && self.filters[i].is(filter)) {
-            return left.odd.push(id);
+            return rest.odd.push((id, *aabb, *filter));
         }
         if still_holds(stored, aabb, true, self.margin) {
             return;
@@ -152,7 +202,7 @@ impl Range<'_> {
         *stored = aabb.inflated(self.margin);
         if *flags & flag::CHANGED == 0 {
             *flags |= flag::CHANGED;
-            left.changed.push(id);
+            rest.changed.push(id);
         }
     }
 }
@@ -180,20 +230,32 @@ fn next_listed(flags: &[u8], from: usize) -> usize {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::Config;
+    use crate::{Config, Limits};
     use rand::rngs::StdRng;
     use rand::{Rng, RngExt, SeedableRng};
 
     const IDS: u32 = 20_000;
 
-    /// A box somewhere in a cube that has room for them; some invalid, some of another filter, some not at all.
-    fn anything(rng: &mut impl Rng) -> Option<(Aabb, ProxyFilter)> {
+    type Box = Option<(Aabb, ProxyFilter)>;
+
+    /// On two threads, however many there are.
+    fn on_two<R: Send>(test: impl FnOnce() -> R + Send) -> R {
+        rayon::ThreadPoolBuilder::new().num_threads(2).build().expect("a pool").install(test)
+    }
+
+    fn new() -> BroadPhase {
+        BroadPhase::new(Config { margin: 0.1, ..Config::DEFAULT }).expect("a margin")
+    }
+
+    /// A box somewhere in a cube that has room for them; some invalid or infinite, some of another filter, some not at all.
+    fn anything(rng: &mut impl Rng) -> Box {
         let center = std::array::from_fn(|_| rng.random_range(0.0..20.0));
         let aabb = Aabb::from_center(center, [0.5; 3]);
-        match rng.random_range(0..40) {
-            0 => None,
-            1 => Some((Aabb::NOWHERE, ProxyFilter::ALL)),
-            2 => Some((aabb, ProxyFilter { mask: 1, ..ProxyFilter::ALL })),
+        match rng.random_range(0..4000) {
+            0..100 => None,
+            100..200 => Some((Aabb::NOWHERE, ProxyFilter::ALL)),
+            200..300 => Some((aabb, ProxyFilter { mask: 1, ..ProxyFilter::ALL })),
+            300 => Some((Aabb { min: [f32::NEG_INFINITY; 3], ..aabb }, ProxyFilter::ALL)),
             _ => Some((aabb, ProxyFilter::ALL)),
         }
     }
@@ -204,23 +266,24 @@ mod tests {
         ids
     }
 
-    #[test]
-    fn many_at_once_are_set_as_one_after_the_other() {
-        let mut rng = StdRng::seed_from_u64(5);
-        let new = || BroadPhase::new(Config { margin: 0.1, ..Config::DEFAULT }).expect("a margin");
-        let (mut many, mut each) = (new(), new());
-        let mut boxes: Vec<_> = (0..IDS).map(|_| anything(&mut rng)).collect();
-        for update in 0..12 {
-            // The first time all are new; later some are, and some are listed twice.
+    /// Two that are told the same, one of them many boxes at once.
+    struct Both {
+        many: BroadPhase,
+        each: BroadPhase,
+        boxes: Vec<Box>,
+        rng: StdRng,
+    }
+
+    impl Both {
+        /// New places for some of the listed boxes. New ones are among them at first, and some are listed twice.
+        fn set(&mut self) {
+            let Self { many, each, boxes, rng } = self;
             let ids: Vec<u32> = (0..IDS).map(|_| rng.random_range(0..IDS)).collect();
             let share = rng.random_range(0.0..1.0);
             for &id in &ids {
                 if rng.random_bool(share) {
-                    boxes[id as usize] = anything(&mut rng);
+                    boxes[id as usize] = anything(rng);
                 }
-            }
-            if update == 7 {
-                (many.begin(), each.begin());
             }
             many.set_many(&ids, |id| id, |id| boxes[id as usize]).expect("few ids");
             for &id in &ids {
@@ -228,10 +291,17 @@ mod tests {
                     each.set(id, aabb, filter).expect("a small id");
                 }
             }
+        }
+
+        fn remove_some(&mut self) {
             for _ in 0..50 {
-                let id = rng.random_range(0..IDS);
-                assert_eq!(many.remove(id), each.remove(id));
+                let id = self.rng.random_range(0..IDS);
+                assert_eq!(self.many.remove(id), self.each.remove(id));
             }
+        }
+
+        fn compare(&mut self, update: u32) {
+            let Self { many, each, .. } = self;
             assert_eq!(sorted(many.changes()), sorted(each.changes()), "update {update}");
             assert_eq!(
                 many.update().expect("few pairs"),
@@ -241,18 +311,62 @@ mod tests {
             assert!(many.flags.iter().all(|flags| flags & flag::LISTED == 0));
             assert_eq!((many.present_count, many.invalid_count), (each.present_count, each.invalid_count));
         }
-        assert!(many.pair_count() > 1000, "{}", many.pair_count());
+    }
+
+    #[test]
+    fn many_at_once_are_set_as_one_after_the_other() {
+        let (many, each, rng) = (new(), new(), StdRng::seed_from_u64(5));
+        let mut both = Both { many, each, boxes: vec![None; IDS as usize], rng };
+        on_two(|| {
+            for update in 0..14 {
+                both.remove_some();
+                // In one update twice, and with another margin; in another while one has begun.
+                for _ in 0..=update % 3 {
+                    both.set();
+                    let margin = if update == 5 { 0.3 } else { 0.1 };
+                    [&mut both.many, &mut both.each].map(|of| of.set_margin(margin).expect("a margin"));
+                }
+                if update == 7 {
+                    (both.many.begin(), both.each.begin());
+                    both.set();
+                }
+                both.remove_some();
+                both.compare(update);
+            }
+        });
+        assert!(both.many.pair_count() > 1000, "{}", both.many.pair_count());
     }
 
     #[test]
     fn ids_beyond_the_limit_are_an_error_and_the_others_are_set() {
-        let limits = crate::Limits { max_boxes: 9000, ..crate::Limits::DEFAULT };
+        let limits = Limits { max_boxes: 9000, ..Limits::DEFAULT };
         let mut broad_phase = BroadPhase::new(Config { limits, ..Config::DEFAULT }).expect("a margin");
         let ids: Vec<u32> = (0..9100).rev().collect();
         let cube = |id: u32| Some((Aabb::from_center([id as f32, 0.0, 0.0], [0.4; 3]), ProxyFilter::ALL));
-        assert!(matches!(broad_phase.set_many(&ids, |id| id, cube), Err(Error::TooManyBoxes { .. })));
+        let set = on_two(|| broad_phase.set_many(&ids, |id| id, cube));
+        assert!(matches!(set, Err(Error::TooManyBoxes { boxes: 9100, limit: 9000 })), "{set:?}");
         assert_eq!(broad_phase.id_count(), 9000);
         assert!((0..9000).all(|id| broad_phase.contains(id)));
+    }
+
+    #[test]
+    fn after_a_panic_of_the_caller_changes_are_seen_and_nothing_is_listed_any_more() {
+        let (mut many, ids) = (new(), (0..IDS).collect::<Vec<u32>>());
+        let row = |x: f32| {
+            move |id: u32| Some((Aabb::from_center([x + id as f32, 0.0, 0.0], [0.4; 3]), ProxyFilter::ALL))
+        };
+        on_two(|| {
+            many.set_many(&ids, |id| id, row(0.0)).expect("few ids");
+            many.update().expect("few pairs");
+            let next = row(0.5);
+            let fails = |id: u32| if id == 9000 { panic!("as planned") } else { next(id) };
+            let set = catch_unwind(AssertUnwindSafe(|| many.set_many(&ids, |id| id, fails)));
+            assert!(set.is_err());
+        });
+        assert!(many.flags.iter().all(|flags| flags & flag::LISTED == 0));
+        let changed = (0..IDS).filter(|id| many.flags[*id as usize] & flag::CHANGED != 0);
+        assert_eq!(sorted(changed), sorted(many.changes()));
+        assert!(many.changes().count() > 1000);
     }
 
     #[test]

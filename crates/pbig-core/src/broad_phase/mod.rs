@@ -4,6 +4,7 @@
 mod allocations;
 #[cfg(feature = "gpu")]
 mod device;
+mod fat;
 mod flag;
 mod many;
 mod near;
@@ -27,8 +28,11 @@ use crate::gpu::GpuFinder;
 use crate::report::{Checks, Report, StageTimes, Watch, stage};
 use crate::search::Search;
 use crate::{Aabb, Backend, Config, Error, Pair, Plan, ProxyFilter};
+use fat::still_holds;
 use overlap::Overlap;
 use std::collections::HashMap;
+use std::time::Instant;
+use turns::Turn;
 use update::Way;
 
 /// Changed boxes of a small world from which its stages are timed: a reading of the clock takes as long as one box.
@@ -59,8 +63,8 @@ struct Old {
 /// changed and nothing is done (contract 5). Ids should be dense: memory follows the largest.
 ///
 /// On the CPU up to 1024 boxes are kept in a bitmap index, in which changed boxes are looked up, unless most change and that
-/// turns out to take longer than what follows. More lie in a base grid. Where few change they are put into other cells, and only they are searched. When a
-/// quarter of all boxes changes, or an eighth is out of the grid's order, it is built anew. Where motion is small, pairs of
+/// turns out to take longer than what follows. More lie in a base grid. Where few change they are put into other cells, and
+/// only they are searched. When a quarter of all boxes changes, or an eighth is out of the grid's order, it is built anew. Where motion is small, pairs of
 /// boxes that are near each other are found for many updates at once, and an update only tests these.
 /// ([`crate::Strategy::Pbig`] and [`crate::Backend::Brute`] search everything at every update that changes
 /// something. A GPU is told what has changed, and tells which pairs came or went.)
@@ -91,8 +95,8 @@ pub struct BroadPhase {
     invalid_count: u32,
     /// Boxes changed since the last update.
     changed: Vec<u32>,
-    /// For `set_many`, empty between calls.
-    left: Vec<many::Left>,
+    /// Of ranges of ids; for `set_many`, empty between calls.
+    rests: Vec<many::Rest>,
     refiltered: HashMap<u32, Old>,
     /// Updates that have changed something.
     updates: u64,
@@ -138,7 +142,7 @@ impl BroadPhase {
             present_count: 0,
             invalid_count: 0,
             changed: vec![],
-            left: vec![],
+            rests: vec![],
             refiltered: HashMap::new(),
             updates: 0,
             overlap: Overlap::default(),
@@ -294,7 +298,8 @@ impl BroadPhase {
             return Ok(());
         }
         let is_small = self.is_small();
-        let mut watch = Watch::new(!is_small || self.changed.len() >= MEASURED_FROM);
+        let is_timed = !is_small || self.changed.len() >= MEASURED_FROM;
+        let (clock, mut watch) = (is_timed.then(Instant::now), Watch::new(is_timed));
         let found =
             if is_small { self.find_in_small(&mut watch).map(|()| Way::Other) } else { self.find_added() };
         let found = found.and_then(|way| self.check_room(way).map(|()| way));
@@ -318,7 +323,7 @@ impl BroadPhase {
         if !is_small && self.updates > 1 {
             self.near.note_time(way, self.report.changed as usize, self.report.stages.total());
         }
-        self.take_turns();
+        self.take_turns(if is_small { Turn::Bitmap } else { Turn::Grid }, clock);
         self.report.pairs = self.pair_count() as u64;
         Ok(())
     }
@@ -370,36 +375,6 @@ impl BroadPhase {
             self.refiltered.insert(id, Old { aabb, filter: self.filters[i] });
         }
     }
-}
-
-/// Whether a fat box still contains the box, and by no more than twice the margin: a box that
-/// has shrunk is stored anew, so that only boxes near each other pair.
-#[inline(always)]
-fn still_holds(fat: &Aabb, aabb: &Aabb, valid: bool, margin: f32) -> bool {
-    // A little less than two margins: the gaps below are rounded.
-    let slack = 2.0 * margin * (1.0 - 2.0 * f32::EPSILON);
-    // No branches: which side of a box has moved is a coin toss, and six of them took 30 ns.
-    let (mut moved, mut sum) = (!valid, 0.0);
-    for k in 0..3 {
-        let (below, above) = (aabb.min[k] - fat.min[k], fat.max[k] - aabb.max[k]);
-        moved |= (below < 0.0) | (below > slack) | (above < 0.0) | (above > slack);
-        sum += below + above;
-    }
-    if moved {
-        return !valid && !fat.is_valid();
-    }
-    !sum.is_nan() || holds_exactly(fat, aabb, slack)
-}
-
-/// As [`still_holds`] of a valid box, some coordinates infinite or the fat box nowhere.
-#[cold]
-fn holds_exactly(fat: &Aabb, aabb: &Aabb, slack: f32) -> bool {
-    // Equal first: the difference of equal infinities is NaN.
-    let near = |outer: f32, inner: f32, gap: f32| outer == inner || (gap >= 0.0 && gap <= slack);
-    (0..3).all(|k| {
-        let (below, above) = (aabb.min[k] - fat.min[k], fat.max[k] - aabb.max[k]);
-        near(fat.min[k], aabb.min[k], below) && near(fat.max[k], aabb.max[k], above)
-    })
 }
 
 fn check_margin(margin: f32) -> Result<(), Error> {

@@ -9,6 +9,7 @@ use crate::cpu::judge::Accept;
 use crate::plan::Chosen;
 use crate::report::{Checks, Watch, stage};
 use crate::{Aabb, Backend, Error, Pair, Strategy};
+use std::time::{Duration, Instant};
 
 /// Candidates and bands that a changed box may cost on average: about as much as a grid does.
 const BUDGET: u64 = 48;
@@ -83,16 +84,20 @@ impl BroadPhase {
         on_cpu && self.config.strategy == Strategy::Auto && self.boxes.len() <= MOST
     }
 
-    /// What an update has taken decides whose turn the next ones are.
-    pub(super) fn take_turns(&mut self) {
-        let changed = self.report.changed as usize;
-        if !self.may_be_small() || self.small.pause > 0 {
+    /// What an update has taken decides whose turn the next ones are. Not one that was left to the grid for another reason.
+    pub(super) fn take_turns(&mut self, by: Turn, clock: Option<Instant>) {
+        let (changed, before) = (self.report.changed as usize, self.small.turns.turn);
+        if !self.may_be_small() || by != before {
             return;
         }
+        let time = clock.map_or(Duration::ZERO, |clock| clock.elapsed());
         if changed >= MEASURED_FROM && 4 * changed >= self.present_count as usize {
-            self.small.turns.note_many(changed, self.report.stages.total());
+            self.small.turns.note_many(changed, time);
         } else {
-            self.small.turns.note_few();
+            self.small.turns.note_few(time);
+        }
+        if self.small.turns.turn == Turn::Grid && before == Turn::Bitmap {
+            self.near.begin_anew();
         }
     }
 

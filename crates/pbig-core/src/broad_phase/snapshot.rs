@@ -71,13 +71,16 @@ impl Serialize for BroadPhase {
         if ids > filters.len() {
             filters.to_mut().resize(ids, ProxyFilter::ALL);
         }
+        // In the order of ids: the other order depends on who has set them.
+        let mut changed: Vec<u32> = self.changed.clone();
+        changed.sort_unstable();
         Snapshot {
             config: self.config,
             boxes,
             filters,
             present,
             pairs,
-            changed: self.changed.iter().map(|&id| self.saved_change(id)).collect(),
+            changed: changed.into_iter().map(|id| self.saved_change(id)).collect(),
             begun: self.overlap.begun,
             later: self.overlap.later.iter().map(SavedCall::new).collect(),
         }

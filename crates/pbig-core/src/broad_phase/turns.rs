@@ -2,6 +2,7 @@
 //! are. Both take turns, and the one that took less goes on. (1000 boxes that drift: 55 us an update by bitmap, 26 by near
 //! pairs; a pile of them that jump: 325 and 200. 100 boxes: 5 and 5.)
 
+use super::near::Cost;
 use std::time::Duration;
 
 /// Updates of a turn that decides: a list of near pairs lasts for about ten.
@@ -12,6 +13,10 @@ const UNTIMED: u32 = 3;
 
 /// Updates that the better one has, at first and at most.
 const STAY: [u32; 2] = [512, 4096];
+
+/// So many times what those before took on average, an update counts as at most: another process had the processor. (One
+/// in which near pairs are found takes three to five times as long as others.)
+const OUTLIER: f32 = 8.0;
 
 /// Updates with few changes after which nothing that was measured holds.
 const CALM: u32 = 4;
@@ -39,13 +44,6 @@ pub(super) struct Turns {
     stay: u32,
     /// Updates with few changes since the last one with many.
     calm: u32,
-}
-
-/// What updates have cost, and the boxes that changed in them.
-#[derive(Clone, Copy, Debug, Default)]
-struct Cost {
-    ns: f32,
-    changed: f32,
 }
 
 impl Cost {
@@ -80,27 +78,40 @@ impl Turns {
         Self { length: u32::MAX, ..Self::default() }
     }
 
-    /// After an update with few changes: those are the bitmap's.
-    pub(super) fn note_few(&mut self) {
+    /// After an update in which few boxes have changed, by the one whose turn it is. Those are the bitmap's; if the grid
+    /// does some between others, they count as part of what it takes.
+    pub(super) fn note_few(&mut self, time: Duration) {
         self.calm = (self.calm + 1).min(CALM);
-        if self.calm == CALM && self.turn == Turn::Grid {
+        if self.turn == Turn::Bitmap {
+            return;
+        }
+        if self.calm == CALM {
             *self = Self::default();
+        } else if self.is_timed() {
+            self.own.ns += time.as_nanos() as f32;
         }
     }
 
-    /// After one in which many boxes have changed.
+    /// After one in which many have.
     pub(super) fn note_many(&mut self, changed: usize, time: Duration) {
         if std::mem::take(&mut self.calm) == CALM {
             *self = Self::default();
         }
         self.age += 1;
-        if self.age > self.length - TRIAL + UNTIMED {
-            self.own.ns += time.as_nanos() as f32;
-            self.own.changed += changed as f32;
+        if self.is_timed() {
+            let (ns, changed) = (time.as_nanos() as f32, changed as f32);
+            let most =
+                if self.own.ns > 0.0 { OUTLIER * self.own.ns * changed / self.own.changed } else { ns };
+            self.own.ns += ns.min(most);
+            self.own.changed += changed;
         }
         if self.age >= self.length {
             self.end();
         }
+    }
+
+    fn is_timed(&self) -> bool {
+        self.age > self.length - TRIAL + UNTIMED
     }
 
     fn end(&mut self) {
@@ -109,18 +120,18 @@ impl Turns {
                 other: Some(self.own),
                 better: self.better,
                 stay: self.stay,
-                ..Self::of(self.turn.next())
+                ..Self::of(self.turn.other())
             };
             return;
         };
-        let better = if self.own.is_less(other) { self.turn } else { self.turn.next() };
+        let better = if self.own.is_less(other) { self.turn } else { self.turn.other() };
         let stay = if self.better == Some(better) { (2 * self.stay).min(STAY[1]) } else { STAY[0] };
         *self = Self { better: Some(better), stay, length: stay, ..Self::of(better) };
     }
 }
 
 impl Turn {
-    fn next(self) -> Self {
+    fn other(self) -> Self {
         match self {
             Self::Bitmap => Self::Grid,
             Self::Grid => Self::Bitmap,
@@ -188,11 +199,32 @@ mod tests {
     fn few_changes_are_left_to_the_bitmap_unless_they_are_only_few_updates() {
         let mut turns = Turns::default();
         play(&mut turns, 100, grid_takes(500));
-        (1..CALM).for_each(|_| turns.note_few());
+        (1..CALM).for_each(|_| turns.note_few(Duration::ZERO));
         assert_eq!(turns.turn, Turn::Grid);
         play(&mut turns, 1, grid_takes(500));
-        (0..CALM).for_each(|_| turns.note_few());
+        (0..CALM).for_each(|_| turns.note_few(Duration::ZERO));
         assert_eq!(turns.turn, Turn::Bitmap);
         assert_eq!(by_grid(&play(&mut turns, TRIAL as usize, grid_takes(500))), 0);
+    }
+
+    #[test]
+    fn updates_with_few_changes_between_others_count_for_the_grid() {
+        let mut turns = Turns::default();
+        for _ in 0..2 * TRIAL {
+            play(&mut turns, 1, grid_takes(900));
+            turns.note_few(Duration::from_nanos(200));
+        }
+        assert_eq!(turns.better, Some(Turn::Bitmap));
+    }
+
+    #[test]
+    fn one_update_that_was_interrupted_does_not_decide() {
+        let mut turns = Turns::default();
+        let played = std::cell::Cell::new(0);
+        play(&mut turns, 2 * TRIAL as usize, |turn| {
+            played.set(played.get() + 1);
+            if played.get() == 40 { 4_000_000 } else { grid_takes(500)(turn) }
+        });
+        assert_eq!(turns.better, Some(Turn::Grid));
     }
 }

@@ -14,7 +14,7 @@ mod index;
 mod tests;
 
 use crate::cpu::codes::prefetch;
-use crate::diff::Judgement;
+use crate::diff::{AHEAD, Judgement, MANY};
 use crate::{Aabb, Pair};
 use index::Index;
 use rayon::prelude::*;
@@ -31,12 +31,6 @@ const PIECE: usize = 16_384;
 
 /// Pairs that are tested before those found are told.
 const BLOCK: usize = 1024;
-
-/// Pairs ahead whose memory is asked for.
-const AHEAD: usize = 24;
-
-/// Pairs whose memory, 8 bytes each, is worth giving back.
-const MANY: usize = 1 << 20;
 
 /// Boxes whose pairs are looked up together.
 const TOGETHER: usize = 32;

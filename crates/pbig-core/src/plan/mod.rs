@@ -204,7 +204,7 @@ impl fmt::Display for Plan {
                 "nothing to do: of {boxes} valid boxes none has changed, or there are fewer than two"
             ),
             Chosen::Brute => write!(f, "brute force: {boxes} boxes are cheaper to test than to sort"),
-            Chosen::Bitmap => write!(f, "bitmap: {boxes} boxes are cheaper to look up in bands than to sort"),
+            Chosen::Bitmap => write!(f, "bitmap: {boxes} boxes are few enough to be looked up in bands"),
             Chosen::Grid => write!(f, "grid: {boxes} boxes"),
             Chosen::Edit => write!(
                 f,

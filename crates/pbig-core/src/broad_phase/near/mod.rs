@@ -10,7 +10,7 @@ mod policy;
 #[cfg(test)]
 mod tests;
 
-pub(super) use policy::Near;
+pub(super) use policy::{Cost, Near};
 
 use super::update::{State, state};
 use super::{BroadPhase, flag};
@@ -23,7 +23,6 @@ use crate::plan::{Chosen, LazySummary, Plan};
 use crate::report::{Checks, lap, stage};
 use crate::search::Rule;
 use crate::{Aabb, Error, Pair, ProxyFilter};
-use policy::Cost;
 use rayon::prelude::*;
 use std::time::Instant;
 
@@ -80,7 +79,7 @@ impl BroadPhase {
     fn find_away(&mut self) {
         let Self { near, boxes, before, flags, changed, .. } = self;
         near.reach.resize(boxes.len(), Aabb::NOWHERE);
-        let Near { reach, away, left, .. } = near;
+        let Near { reach, away, pieces, .. } = near;
         let is_away = |id: &u32| {
             let i = *id as usize;
             !reach[i].contains(&boxes[i]) | before[i].min[0].is_nan()
@@ -97,9 +96,9 @@ impl BroadPhase {
         if changed.len() < PARALLEL_FROM {
             look((changed, away));
         } else {
-            left.resize_with(changed.len().div_ceil(PIECE), Vec::new);
-            changed.par_chunks(PIECE).zip(&mut left[..]).for_each(look);
-            left.iter_mut().for_each(|left| away.append(left));
+            pieces.resize_with(changed.len().div_ceil(PIECE).max(pieces.len()), Vec::new);
+            changed.par_chunks(PIECE).zip(&mut pieces[..]).for_each(look);
+            pieces.iter_mut().for_each(|piece| away.append(piece));
         }
         away.iter().for_each(|&id| flags[id as usize] |= flag::AWAY);
     }

@@ -15,8 +15,9 @@ const SEARCH_OF_A_BOX: f32 = 24.0;
 /// Boxes whose moves are looked at.
 const SAMPLE: usize = 256;
 
-/// Updates in which each box of a small world is looked at once, for how far it has come.
-const ROUND: usize = 4;
+/// Updates in which each box of a small world is looked at once, for how far it has come. Odd, for worlds in which
+/// every other update is one of few.
+const ROUND: usize = 5;
 
 /// Lists after which an update goes without one, so that what that takes is known.
 const LISTS: u32 = 8;
@@ -61,8 +62,8 @@ pub(crate) struct Near {
     pub(crate) met: u64,
     /// Boxes that have left their reach in this update.
     pub(crate) away: Vec<u32>,
-    /// The same of pieces of an update, between threads.
-    pub(crate) left: Vec<Vec<u32>>,
+    /// The same, of each piece of an update on several threads.
+    pub(crate) pieces: Vec<Vec<u32>>,
     /// Pairs of those, which may go on.
     pub(crate) parted: Vec<Pair>,
     /// Their pairs now.
@@ -95,7 +96,7 @@ impl Default for Near {
             failed: false,
             met: 0,
             away: vec![],
-            left: vec![],
+            pieces: vec![],
             parted: vec![],
             came: vec![],
         }
@@ -142,6 +143,11 @@ impl Near {
         } else {
             self.wait();
         }
+    }
+
+    /// What was learned is too old.
+    pub(crate) fn begin_anew(&mut self) {
+        (self.pause, self.next_pause, self.met, self.usual) = (0, 0, 0, None);
     }
 
     /// Too many pairs are near.

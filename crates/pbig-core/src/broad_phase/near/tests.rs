@@ -314,3 +314,15 @@ fn a_list_that_has_not_paid_is_followed_by_ever_longer_pauses() {
     }
     assert!((3..9).contains(&lists), "{lists} lists");
 }
+
+#[test]
+fn a_skin_grows_while_few_pairs_are_near_and_no_wider_than_that() {
+    let mut near = Near { age: 10, ..Near::default() };
+    let mut widths = vec![near.moves];
+    for _ in 0..20 {
+        near.learn(1000);
+        widths.push(near.moves);
+    }
+    assert!(widths.is_sorted() && widths[..8].windows(2).all(|two| two[0] < two[1]), "{widths:?}");
+    assert_eq!(widths.last(), Some(&64.0));
+}

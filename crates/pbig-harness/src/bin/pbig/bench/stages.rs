@@ -73,8 +73,8 @@ impl Alone {
             }
             Way::Events(broad_phase) => {
                 let (done, set) = timed(|| {
-                    let fetch = |id: u32| &boxes[id as usize];
-                    broad_phase.set_many(moved, fetch, |aabb| Some((*aabb, ProxyFilter::ALL)))
+                    let fetch = |id: u32| boxes[id as usize];
+                    broad_phase.set_many(moved, fetch, |aabb| Some((aabb, ProxyFilter::ALL)))
                 });
                 done?;
                 let (done, update) = timed(|| broad_phase.update().map(|_| ()));

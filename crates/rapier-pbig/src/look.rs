@@ -1,0 +1,117 @@
+//! Listed colliders are looked at, and what has become of them is set in the finder.
+
+use crate::PbigBroadPhase;
+use crate::call::Call;
+use crate::proxy::{BLOCK, FEW, Growth, Proxy};
+use crate::stats::{MEASURED_FROM, Watch};
+use pbig_core::{Aabb, ProxyFilter};
+use rapier3d::prelude::ColliderHandle;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+/// Modified colliders from which their boxes are computed on several threads: below, waking a second one costs more than
+/// it saves.
+const PARALLEL_FROM: usize = 16_384;
+
+impl PbigBroadPhase {
+    /// Brings the finder up to date about some colliders.
+    pub(crate) fn look_at(&mut self, call: &Call<'_>, listed: &[ColliderHandle]) {
+        if self.overlap.is_some() {
+            return self.look_ahead(call, listed);
+        }
+        let mut watch = Watch::new(listed.len() >= MEASURED_FROM);
+        if listed.len() < PARALLEL_FROM || rayon::current_num_threads() == 1 {
+            let _span = tracing::debug_span!(target: "pbig", "proxies").entered();
+            listed.chunks(BLOCK).for_each(|block| self.look_at_block(call, block));
+            self.kept.proxies += watch.lap();
+            return;
+        }
+        self.look_at_many(call, listed);
+        self.kept.proxies += watch.lap();
+    }
+
+    /// On several threads, but for colliders that are disabled, gone, or heirs of an index.
+    fn look_at_many(&mut self, call: &Call<'_>, listed: &[ColliderHandle]) {
+        let _span = tracing::debug_span!(target: "pbig", "proxies").entered();
+        self.indices.clear();
+        self.indices.extend(listed.iter().map(|handle| handle.into_raw_parts().0));
+        let (growth, roll, has_news) =
+            (Growth::new(call.params, self.ulps), &self.roll, AtomicBool::new(false));
+        let fetch = |index| call.fetch_known(index, roll, &has_news);
+        let proxy = |found| match call.proxy(found, growth) {
+            Proxy::Enabled(aabb, filter) => Some((aabb, filter)),
+            Proxy::Disabled | Proxy::Gone => {
+                has_news.store(true, Ordering::Relaxed);
+                None
+            }
+        };
+        if let Err(error) = self.finder.set_many(&self.indices, fetch, proxy) {
+            tracing::error!("pbig: colliders are ignored: {error}");
+        }
+        if has_news.into_inner() {
+            listed.iter().for_each(|&handle| self.look_again(call, growth, handle));
+        }
+    }
+
+    /// At a collider of which nothing, or only the box, has been set so far, unless it was known and still is there.
+    fn look_again(&mut self, call: &Call<'_>, growth: Growth, handle: ColliderHandle) {
+        let index = handle.into_raw_parts().0;
+        let is_new = self.roll.handle(index).is_none();
+        match call.colliders.get(handle) {
+            Some(collider) if collider.is_enabled() && self.roll.has(handle) => {}
+            Some(collider) if collider.is_enabled() && is_new && self.finder.contains(index) => {
+                self.roll.enter(handle);
+            }
+            // What has been set is that of an heir, whose turn comes.
+            None if is_new => self.take_out(index),
+            _ => self.set_proxy(handle, call.proxy(call.fetch(handle), growth)),
+        }
+    }
+
+    /// Each collider's proxy is set as soon as it is known: to write it down and read it again took 5 ns.
+    fn look_at_block(&mut self, call: &Call<'_>, listed: &[ColliderHandle]) {
+        let growth = Growth::new(call.params, self.ulps);
+        if listed.len() <= FEW {
+            for &handle in listed {
+                self.set_proxy(handle, call.proxy(call.fetch(handle), growth));
+            }
+            return;
+        }
+        let mut found = [(None, None); BLOCK];
+        call.fetch_all(listed, &mut found);
+        for (&handle, found) in listed.iter().zip(found) {
+            self.set_proxy(handle, call.proxy(found, growth));
+        }
+    }
+
+    #[inline(always)]
+    fn set_proxy(&mut self, handle: ColliderHandle, proxy: Proxy) {
+        match proxy {
+            Proxy::Enabled(aabb, filter) => self.set(handle, &aabb, &filter),
+            Proxy::Disabled => self.disable(handle),
+            Proxy::Gone => self.forget(handle),
+        }
+    }
+
+    #[inline(always)]
+    pub(crate) fn set(&mut self, handle: ColliderHandle, aabb: &Aabb, filter: &ProxyFilter) {
+        if !self.roll.has(handle) {
+            self.enter(handle);
+        }
+        if let Err(error) = self.finder.set(handle.into_raw_parts().0, *aabb, *filter) {
+            ignored(handle, &error);
+        }
+    }
+
+    #[cold]
+    fn enter(&mut self, handle: ColliderHandle) {
+        if !self.roll.enter(handle) {
+            // A predecessor with this index that was never reported as removed.
+            self.take_out(handle.into_raw_parts().0);
+        }
+    }
+}
+
+#[cold]
+fn ignored(handle: ColliderHandle, error: &pbig_core::Error) {
+    tracing::error!("pbig: collider {handle:?} is ignored: {error}");
+}
