@@ -65,6 +65,11 @@ fn many_removed_at_once_and_others_added_in_the_same_step() {
 
 #[test]
 fn a_multitude_that_several_threads_look_at_may_come_go_and_change_in_the_same_step() {
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(2).build().expect("a pool");
+    pool.install(multitude);
+}
+
+fn multitude() {
     const BALLS: usize = 18_000;
     let mut scene = Checked::new(PbigBroadPhase::CONFIG);
     let mut balls: Vec<_> = (0..BALLS).map(|i| scene.ball(i as f32 * 0.9)).collect();

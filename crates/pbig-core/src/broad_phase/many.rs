@@ -324,10 +324,13 @@ mod tests {
                 for _ in 0..=update % 3 {
                     both.set();
                     let margin = if update == 5 { 0.3 } else { 0.1 };
-                    [&mut both.many, &mut both.each].map(|of| of.set_margin(margin).expect("a margin"));
+                    for of in [&mut both.many, &mut both.each] {
+                        of.set_margin(margin).expect("a margin");
+                    }
                 }
                 if update == 7 {
-                    (both.many.begin(), both.each.begin());
+                    both.many.begin();
+                    both.each.begin();
                     both.set();
                 }
                 both.remove_some();
