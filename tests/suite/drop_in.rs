@@ -94,6 +94,27 @@ fn multitude() {
 }
 
 #[test]
+fn a_multitude_leaves_the_same_behind_on_any_number_of_threads() {
+    let mut world = World::with_gravity(glam::Vec3::ZERO);
+    let ball = |i| World::dynamic(glam::Vec3::X * 0.9 * i as f32);
+    (0..17_000).for_each(|i| _ = world.add(ball(i), ColliderBuilder::ball(0.5).enabled(i < 16_900)));
+    let mut listed: Vec<_> = world.colliders.iter().map(|(handle, _)| handle).collect();
+    // Colliders that are gone, one of them with another's index.
+    listed.extend(
+        [(3, 77), (0x7fff_ffff, 0)].map(|(i, generation)| ColliderHandle::from_raw_parts(i, generation)),
+    );
+    let left_behind = |threads| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool");
+        let (mut broad_phase, mut events) = (PbigBroadPhase::new(), Vec::new());
+        let World { params, colliders, bodies, .. } = &world;
+        pool.install(|| broad_phase.update(params, colliders, bodies, &listed, &[], &mut events));
+        assert_eq!((events.len(), broad_phase.pair_count()), (16_899, 16_899), "{threads} threads");
+        serde_json::to_string(&broad_phase).expect("a snapshot")
+    };
+    assert!(left_behind(1) == left_behind(2));
+}
+
+#[test]
 fn a_disabled_collider_has_no_pairs_and_gets_them_back_without_motion() {
     everywhere(|mut scene| {
         let (_, a) = scene.ball(0.0);

@@ -23,7 +23,7 @@ pub enum Backend {
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Strategy {
     /// The plan decides between brute force and the grid; on a GPU up to 1024 boxes need none. On the CPU
-    /// [`crate::BroadPhase`] keeps up to 1024 boxes in a bitmap instead, unless most change and the grid takes less.
+    /// [`crate::BroadPhase`] keeps up to 1024 boxes in a bitmap instead, unless many change and the grid takes less.
     #[default]
     Auto,
     /// One entry a box, sorted by the cell of its lower corner; the fastest on a CPU. On a GPU as

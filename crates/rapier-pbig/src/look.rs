@@ -6,6 +6,7 @@ use crate::proxy::{BLOCK, FEW, Growth, Proxy};
 use crate::stats::{MEASURED_FROM, Watch};
 use pbig_core::{Aabb, ProxyFilter};
 use rapier3d::prelude::ColliderHandle;
+use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Modified colliders from which their boxes are computed on several threads: below, waking a second one costs more than
@@ -32,10 +33,34 @@ impl PbigBroadPhase {
     /// On several threads, but for colliders that are disabled, gone, or heirs of an index.
     fn look_at_many(&mut self, call: &Call<'_>, listed: &[ColliderHandle]) {
         let _span = tracing::debug_span!(target: "pbig", "proxies").entered();
-        self.indices.clear();
-        self.indices.extend(listed.iter().map(|handle| handle.into_raw_parts().0));
-        let (growth, roll, has_news) =
-            (Growth::new(call.params, self.ulps), &self.roll, AtomicBool::new(false));
+        let growth = Growth::new(call.params, self.ulps);
+        let looked = catch_unwind(AssertUnwindSafe(|| {
+            if self.set_many(call, growth, listed) {
+                listed.iter().for_each(|&handle| self.look_again(call, growth, handle));
+            }
+        }));
+        if let Err(panic) = looked {
+            // A shape of the app's: a box without a collider on the roll would stay for ever.
+            for &index in &self.indices {
+                if self.roll.handle(index).is_none() {
+                    self.finder.remove(index);
+                }
+            }
+            resume_unwind(panic);
+        }
+    }
+
+    /// Sets the boxes of colliders that are on the roll or new; whether there are others, or new ones.
+    fn set_many(&mut self, call: &Call<'_>, growth: Growth, listed: &[ColliderHandle]) -> bool {
+        let Self { finder, roll, indices, .. } = self;
+        // Not what has the index of another one that is on the roll: that may not be listed.
+        let known = listed.iter().filter(|handle| {
+            let known = roll.handle(handle.into_raw_parts().0);
+            known.is_none_or(|known| known == **handle)
+        });
+        indices.clear();
+        indices.extend(known.map(|handle| handle.into_raw_parts().0));
+        let has_news = AtomicBool::new(indices.len() < listed.len());
         let fetch = |index| call.fetch_known(index, roll, &has_news);
         let proxy = |found| match call.proxy(found, growth) {
             Proxy::Enabled(aabb, filter) => Some((aabb, filter)),
@@ -44,12 +69,10 @@ impl PbigBroadPhase {
                 None
             }
         };
-        if let Err(error) = self.finder.set_many(&self.indices, fetch, proxy) {
+        if let Err(error) = finder.set_many(indices, fetch, proxy) {
             tracing::error!("pbig: colliders are ignored: {error}");
         }
-        if has_news.into_inner() {
-            listed.iter().for_each(|&handle| self.look_again(call, growth, handle));
-        }
+        has_news.into_inner()
     }
 
     /// At a collider of which nothing, or only the box, has been set so far, unless it was known and still is there.

@@ -7,7 +7,6 @@
 use super::fat::still_holds;
 use super::{BroadPhase, flag};
 use crate::cpu::codes::prefetch;
-use crate::finder::check_count;
 use crate::{Aabb, Error, ProxyFilter};
 use rayon::prelude::*;
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
@@ -30,8 +29,11 @@ pub(super) struct Rest {
     /// Boxes that have changed for the first time since the last update.
     changed: Vec<u32>,
     /// Boxes that are new, invalid, or were, or have another filter.
-    odd: Vec<(u32, Aabb, ProxyFilter)>,
+    odd: Vec<Found>,
 }
+
+/// A box to be set.
+type Found = (u32, Aabb, ProxyFilter);
 
 /// What is kept about a range of ids.
 struct Range<'a> {
@@ -43,8 +45,8 @@ struct Range<'a> {
 }
 
 impl BroadPhase {
-    /// Sets many boxes, as [`BroadPhase::set`] does one; from 8192 on with the threads of the present rayon pool, in no
-    /// particular order.
+    /// Sets many boxes, as [`BroadPhase::set`] does one: with the threads of the present rayon pool and in no particular order
+    /// where they are at least 8192, one in 64 of all, and no update has begun.
     ///
     /// `fetch` gets what `of` needs to know about an id, and is called for some ids before `of` is, so that
     /// their memory is waited for together. `of` tells box and filter, or none for a box that is to be left as it is. For an
@@ -74,32 +76,32 @@ impl BroadPhase {
         if few || self.has_begun() || rayon::current_num_threads() == 1 {
             return self.set_each(ids, &fetch, &of);
         }
-        let listed = self.list(ids);
-        let set = catch_unwind(AssertUnwindSafe(|| self.set_ranges(&fetch, &of)));
+        let new = self.list(ids);
+        let mut found = Vec::new();
+        let set = catch_unwind(AssertUnwindSafe(|| {
+            self.set_ranges(&fetch, &of);
+            let find = |&id: &u32| of(fetch(id)).map(|(aabb, filter)| (id, aabb, filter));
+            found.par_extend(new.par_iter().filter_map(find));
+        }));
         self.rests.iter_mut().for_each(|rest| self.changed.append(&mut rest.changed));
         if let Err(panic) = set {
             self.flags.iter_mut().for_each(|flags| *flags &= !flag::LISTED);
             self.rests.clear();
             resume_unwind(panic);
         }
-        listed.and(self.set_odd())
+        self.set_odd(found)
     }
 
-    /// Marks listed ids, for which there is room then.
-    fn list(&mut self, ids: &[u32]) -> Result<(), Error> {
-        let room = |id: &u32| u64::from(*id) + 1;
-        let all = check_count(ids.iter().map(room).max().unwrap_or(0), &self.config);
-        let allowed = ids.iter().map(room).filter(|room| check_count(*room, &self.config).is_ok());
-        let room = allowed.max().unwrap_or(0) as usize;
-        if room > self.boxes.len() {
-            self.make_room(room);
-        }
+    /// Marks listed ids; those for which there is no room yet.
+    fn list(&mut self, ids: &[u32]) -> Vec<u32> {
+        let mut new = Vec::new();
         for &id in ids {
-            if let Some(flags) = self.flags.get_mut(id as usize) {
-                *flags |= flag::LISTED;
+            match self.flags.get_mut(id as usize) {
+                Some(flags) => *flags |= flag::LISTED,
+                None => new.push(id),
             }
         }
-        all
+        new
     }
 
     fn set_ranges<T: Copy>(
@@ -117,14 +119,15 @@ impl BroadPhase {
         });
     }
 
-    fn set_odd(&mut self) -> Result<(), Error> {
+    /// What threads have left, and boxes for which there is no room yet; the first error, if there are any.
+    fn set_odd(&mut self, new: Vec<Found>) -> Result<(), Error> {
         let mut result = Ok(());
-        for i in 0..self.rests.len() {
-            let odd = std::mem::take(&mut self.rests[i].odd);
-            for (id, aabb, filter) in odd {
-                result = result.and(self.set(id, aabb, filter));
-            }
+        let mut rests = std::mem::take(&mut self.rests);
+        let odd = rests.iter_mut().flat_map(|rest| std::mem::take(&mut rest.odd));
+        for (id, aabb, filter) in odd.chain(new) {
+            result = result.and(self.set(id, aabb, filter));
         }
+        self.rests = rests;
         result
     }
 
@@ -238,9 +241,9 @@ mod tests {
 
     type Box = Option<(Aabb, ProxyFilter)>;
 
-    /// On two threads, however many there are.
-    fn on_two<R: Send>(test: impl FnOnce() -> R + Send) -> R {
-        rayon::ThreadPoolBuilder::new().num_threads(2).build().expect("a pool").install(test)
+    /// On so many threads, however many there are.
+    fn on<R: Send>(threads: usize, test: impl FnOnce() -> R + Send) -> R {
+        rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool").install(test)
     }
 
     fn new() -> BroadPhase {
@@ -317,7 +320,7 @@ mod tests {
     fn many_at_once_are_set_as_one_after_the_other() {
         let (many, each, rng) = (new(), new(), StdRng::seed_from_u64(5));
         let mut both = Both { many, each, boxes: vec![None; IDS as usize], rng };
-        on_two(|| {
+        on(2, || {
             for update in 0..14 {
                 both.remove_some();
                 // In one update twice, and with another margin; in another while one has begun.
@@ -346,10 +349,22 @@ mod tests {
         let mut broad_phase = BroadPhase::new(Config { limits, ..Config::DEFAULT }).expect("a margin");
         let ids: Vec<u32> = (0..9100).rev().collect();
         let cube = |id: u32| Some((Aabb::from_center([id as f32, 0.0, 0.0], [0.4; 3]), ProxyFilter::ALL));
-        let set = on_two(|| broad_phase.set_many(&ids, |id| id, cube));
-        assert!(matches!(set, Err(Error::TooManyBoxes { boxes: 9100, limit: 9000 })), "{set:?}");
+        for threads in [1, 2] {
+            let set = on(threads, || broad_phase.set_many(&ids, |id| id, cube));
+            assert_eq!(set, Err(Error::TooManyBoxes { boxes: 9100, limit: 9000 }), "{threads} threads");
+        }
         assert_eq!(broad_phase.id_count(), 9000);
         assert!((0..9000).all(|id| broad_phase.contains(id)));
+    }
+
+    #[test]
+    fn there_is_no_room_for_boxes_that_are_not_set() {
+        let mut broad_phase = new();
+        let ids: Vec<u32> = (0..IDS).chain([u32::MAX, u32::MAX - 1]).collect();
+        let cube = |id: u32| Some((Aabb::from_center([id as f32, 0.0, 0.0], [0.4; 3]), ProxyFilter::ALL));
+        let set =
+            on(2, || broad_phase.set_many(&ids, |id| id, |id| if id < 15_000 { cube(id) } else { None }));
+        assert_eq!((set, broad_phase.id_count()), (Ok(()), 15_000));
     }
 
     #[test]
@@ -358,7 +373,7 @@ mod tests {
         let row = |x: f32| {
             move |id: u32| Some((Aabb::from_center([x + id as f32, 0.0, 0.0], [0.4; 3]), ProxyFilter::ALL))
         };
-        on_two(|| {
+        on(2, || {
             many.set_many(&ids, |id| id, row(0.0)).expect("few ids");
             many.update().expect("few pairs");
             let next = row(0.5);

@@ -62,7 +62,7 @@ struct Old {
 /// Each box is stored fat, grown by [`Config::margin`]; while later boxes stay inside, nothing has
 /// changed and nothing is done (contract 5). Ids should be dense: memory follows the largest.
 ///
-/// On the CPU up to 1024 boxes are kept in a bitmap index, in which changed boxes are looked up, unless most change and that
+/// On the CPU up to 1024 boxes are kept in a bitmap index, in which changed boxes are looked up, unless many change and that
 /// turns out to take longer than what follows. More lie in a base grid. Where few change they are put into other cells, and
 /// only they are searched. When a quarter of all boxes changes, or an eighth is out of the grid's order, it is built anew. Where motion is small, pairs of
 /// boxes that are near each other are found for many updates at once, and an update only tests these.

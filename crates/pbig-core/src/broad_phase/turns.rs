@@ -1,6 +1,6 @@
-//! Bitmap or grid, where most boxes of a small world move: which takes less depends on how far they move and how close they
-//! are. Both take turns, and the one that took less goes on. (1000 boxes that drift: 55 us an update by bitmap, 26 by near
-//! pairs; a pile of them that jump: 325 and 200. 100 boxes: 5 and 5.)
+//! Bitmap or grid, where a quarter of a small world's boxes, and at least 64, change: which takes less depends on how far
+//! they move and how close they are. Both take turns, and the one that took less goes on. (1000 boxes that drift: 55 us an
+//! update by bitmap, 26 by near pairs; a pile of them that jump: 325 and 200. 100 boxes: 5 and 5.)
 
 use super::near::Cost;
 use std::time::Duration;
@@ -72,7 +72,7 @@ impl Turns {
         }
     }
 
-    /// The bitmap's for ever.
+    /// The bitmap's as long as many change.
     #[cfg(test)]
     pub(super) fn none() -> Self {
         Self { length: u32::MAX, ..Self::default() }
