@@ -47,6 +47,7 @@ mod call;
 mod debug_render;
 mod events;
 mod look;
+mod news;
 mod overlap;
 mod proxy;
 mod queries;

@@ -2,12 +2,12 @@
 
 use crate::PbigBroadPhase;
 use crate::call::Call;
+use crate::news::{News, SecondLook};
 use crate::proxy::{BLOCK, FEW, Growth, Proxy};
 use crate::stats::{MEASURED_FROM, Watch};
 use pbig_core::{Aabb, ProxyFilter};
 use rapier3d::prelude::ColliderHandle;
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
-use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Modified colliders from which their boxes are computed on several threads: below, waking a second one costs more than
 /// it saves.
@@ -35,9 +35,8 @@ impl PbigBroadPhase {
         let _span = tracing::debug_span!(target: "pbig", "proxies").entered();
         let growth = Growth::new(call.params, self.ulps);
         let looked = catch_unwind(AssertUnwindSafe(|| {
-            if self.set_many(call, growth, listed) {
-                listed.iter().for_each(|&handle| self.look_again(call, growth, handle));
-            }
+            let second = self.set_many(call, growth, listed);
+            second.of(listed).for_each(|handle| self.look_again(call, growth, handle));
         }));
         if let Err(panic) = looked {
             // A shape of the app's: a box without a collider on the roll would stay for ever.
@@ -50,29 +49,32 @@ impl PbigBroadPhase {
         }
     }
 
-    /// Sets the boxes of colliders that are on the roll or new; whether there are others, or new ones.
-    fn set_many(&mut self, call: &Call<'_>, growth: Growth, listed: &[ColliderHandle]) -> bool {
+    /// Sets the boxes of colliders that are on the roll or new. A second look is due at new ones, and where there was
+    /// nothing to set.
+    fn set_many(&mut self, call: &Call<'_>, growth: Growth, listed: &[ColliderHandle]) -> SecondLook {
         let Self { finder, roll, indices, .. } = self;
-        // Not what has the index of another one that is on the roll: that may not be listed.
-        let known = listed.iter().filter(|handle| {
-            let known = roll.handle(handle.into_raw_parts().0);
-            known.is_none_or(|known| known == **handle)
-        });
+        let news = News::new(listed.len());
         indices.clear();
-        indices.extend(known.map(|handle| handle.into_raw_parts().0));
-        let has_news = AtomicBool::new(indices.len() < listed.len());
-        let fetch = |index| call.fetch_known(index, roll, &has_news);
-        let proxy = |found| match call.proxy(found, growth) {
+        for &handle in listed {
+            let index = handle.into_raw_parts().0;
+            // Not what has the index of another one that is on the roll: that may not be listed.
+            match roll.handle(index) {
+                Some(known) if known != handle => news.note(index),
+                _ => indices.push(index),
+            }
+        }
+        let fetch = |index| (index, call.fetch_known(index, roll, &news));
+        let proxy = |(index, found)| match call.proxy(found, growth) {
             Proxy::Enabled(aabb, filter) => Some((aabb, filter)),
             Proxy::Disabled | Proxy::Gone => {
-                has_news.store(true, Ordering::Relaxed);
+                news.note(index);
                 None
             }
         };
         if let Err(error) = finder.set_many(indices, fetch, proxy) {
             tracing::error!("pbig: colliders are ignored: {error}");
         }
-        has_news.into_inner()
+        news.into_second_look()
     }
 
     /// At a collider of which nothing, or only the box, has been set so far, unless it was known and still is there.

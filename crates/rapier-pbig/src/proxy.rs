@@ -2,6 +2,7 @@
 //! broad phase and narrow phase compute them.
 
 use crate::call::Call;
+use crate::news::News;
 use crate::roll::Roll;
 use crate::ulps::widened_by_ulps;
 use pbig_core::{Aabb, ProxyFilter, TestMode};
@@ -9,7 +10,6 @@ use rapier3d::prelude::{
     ActiveCollisionTypes, Collider, ColliderHandle, IntegrationParameters, Isometry, Point, Real, RigidBody,
     RigidBodySet, RigidBodyType, Shape, TypedShape,
 };
-use std::sync::atomic::{AtomicBool, Ordering};
 
 /// What the finder is to be told about a collider.
 #[derive(Clone, Copy, Debug)]
@@ -69,11 +69,11 @@ impl<'a> Call<'a> {
     }
 
     /// The collider with an index; none if another one with it is on the roll. It is news if none is.
-    pub(crate) fn fetch_known(&self, index: u32, roll: &Roll, has_news: &AtomicBool) -> Fetched<'a> {
+    pub(crate) fn fetch_known(&self, index: u32, roll: &Roll, news: &News) -> Fetched<'a> {
         let Some((collider, handle)) = self.colliders.get_unknown_gen(index) else { return (None, None) };
         let known = roll.handle(index);
         if known.is_none() {
-            has_news.store(true, Ordering::Relaxed);
+            news.note(index);
         }
         if known.is_some_and(|known| known != handle) {
             return (None, None);

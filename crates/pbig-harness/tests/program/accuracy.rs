@@ -33,7 +33,11 @@ fn a_quick_run_is_one_object_and_writes_what_it_is_asked_for() {
         ],
         "a chart for each study"
     );
-    for (name, study) in object["studies"].as_object().expect("studies") {
+    let seconds = |of: &Value| of["seconds"].as_f64().expect("how long it took");
+    let studies = object["studies"].as_object().expect("studies");
+    assert!(studies.values().all(|study| seconds(study) > 0.0), "each took some time");
+    assert!(studies.values().map(seconds).sum::<f64>() <= seconds(&object), "no less than all of it");
+    for (name, study) in studies {
         for point in study["points"].as_array().expect("points") {
             assert!(
                 point["time"].as_f64() > Some(0.0) && point["error"].as_f64() >= Some(0.0),
@@ -47,6 +51,12 @@ fn a_quick_run_is_one_object_and_writes_what_it_is_asked_for() {
     let by_rules = |row: &&Value| row["root"] == "Carmack 1" && row["correction"] == "the paper's rules";
     let wrong = rows(&object, "index", "all_pairs").iter().find(by_rules).map(|row| row["wrong"].as_u64());
     assert!(wrong.flatten() > Some(0), "one step is more than the rules mend");
+    for row in rows(&object, "index", "all_pairs") {
+        let count = |name: &str| row[name].as_u64().unwrap_or_else(|| panic!("{name} is no count: {row}"));
+        assert_eq!(count("missed"), count("doubled") + count("no_pair"), "{row}");
+    }
+    let doubled = rows(&object, "index", "all_pairs").iter().filter(|row| row["doubled"].as_u64() > Some(0));
+    assert!(doubled.count() > 0, "an error makes two indices test one pair");
     for (study, table) in [("coordinates", "tests"), ("margin", "margins"), ("simulation", "runs")] {
         assert!(rows(&object, study, table).iter().all(|row| row["missed"] == 0), "{study}");
     }

@@ -69,6 +69,12 @@ fn bench_stages_has_the_time_of_each_stage() {
     for word in ["from scratch, boxes", "events, boxes", "share moved", "pairs a box", "largest edge"] {
         assert!(about(&rows, word) > 0, "{word}");
     }
+    for word in ["small moves, 100% moved", "jumps, 100% moved"] {
+        let row = rows.iter().find(|row| row["case"].to_string().contains(word)).expect(word);
+        assert!(row["stages_ms"]["PBIG's grid, mean"].as_f64() > Some(0.0), "{row}");
+    }
+    let of_events = rows.iter().filter(|row| row["case"].to_string().contains("events"));
+    assert!(of_events.into_iter().all(|row| row["mean_ms"].as_f64() > Some(0.0)));
     let of_stages = |row: &Value| row["stages_ms"].as_object().map(serde_json::Map::len);
     assert!(rows.iter().all(|row| of_stages(row) > Some(2)), "{rows:?}");
 }
@@ -79,6 +85,9 @@ fn bench_papers_has_every_table_and_says_that_there_is_no_gpu() {
     let object = json(&pbig_without_gpu(folder.path(), &["bench", "papers", "--quick", "--json"]));
     assert_eq!(std::fs::read_dir(folder.path()).expect("the folder").count(), 0);
     assert!(object["suite"] == "papers" && object["adapter"].is_null());
+    let parts = object["parts"].as_array().expect("parts");
+    let sum: f64 = parts.iter().filter_map(|part| part["seconds"].as_f64()).sum();
+    assert!(parts.len() > 5 && object["seconds"].as_f64().is_some_and(|all| (all - sum).abs() < 1e-6));
     let tables = object["tables"].as_array().expect("tables");
     let title = |word: &str| tables.iter().filter(|table| table["title"].to_string().contains(word)).count();
     for name in
