@@ -84,3 +84,8 @@ pub use report::{Checks, GpuReport, Report, StageTimes};
 pub fn simd() -> &'static str {
     cpu::codes::Simd::detect().name()
 }
+
+/// From how many of something on several threads share the work. Fuzzers make small worlds: there a 512th will do.
+const fn shared_from(count: usize) -> usize {
+    if cfg!(fuzzing) { count / 512 } else { count }
+}

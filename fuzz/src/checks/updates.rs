@@ -2,7 +2,7 @@
 
 use super::input::{Input, config};
 use pbig_core::{Aabb, BroadPhase, Config, Pair, ProxyFilter, oracle};
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// Pairs at which an input ends: what a set of thousands would show a smaller one shows in less time.
 const MOST_PAIRS: usize = 1000;
@@ -23,6 +23,8 @@ struct Player {
     /// Ids are multiples of this: with gaps, and more of them than a byte can name.
     stride: u32,
     given: Vec<Aabb>,
+    /// By id: what was set last.
+    at: BTreeMap<u32, Aabb>,
     ids: u32,
     pairs: BTreeSet<Pair>,
     /// Removed since an update has begun.
@@ -32,8 +34,8 @@ struct Player {
 impl Player {
     fn new(config: Config, stride: u32) -> Self {
         let broad_phase = BroadPhase::new(config).expect("a good margin");
-        let (given, pairs, removed) = Default::default();
-        Self { broad_phase, stride, given, ids: 0, pairs, removed }
+        let (given, at, pairs, removed) = Default::default();
+        Self { broad_phase, stride, given, at, ids: 0, pairs, removed }
     }
 
     /// One operation; none when the input is used up.
@@ -45,6 +47,7 @@ impl Player {
             13 => self.save_and_restore(),
             14 => self.broad_phase.set_margin(f32::from(input.byte()?) / 64.0).expect("a good margin"),
             15 => self.set_many(input)?,
+            9 => self.tremble(input)?,
             op => self.set(input, op < 5)?,
         }
         Some(())
@@ -66,17 +69,44 @@ impl Player {
     fn set_many(&mut self, input: &mut Input) -> Option<()> {
         let (first, count, aabb) = (self.id(input)?, input.byte()?, input.aabb(&self.given)?);
         let edges = aabb.extents();
-        for i in 0..u32::from(count) {
-            let by: [f32; 3] = std::array::from_fn(|k| edges[k] * (i / [1, 8, 64][k] % 8) as f32);
-            let moved = |corner: [f32; 3]| std::array::from_fn(|k| corner[k] + by[k]);
-            self.put(first + i, Aabb::new(moved(aabb.min), moved(aabb.max)), ProxyFilter::ALL);
-        }
+        let place = |i: u32| {
+            let by = std::array::from_fn(|k| edges[k] * (i / [1, 8, 64][k] % 8) as f32);
+            (first + i, shifted(&aabb, by))
+        };
+        self.put_many((0..u32::from(count)).map(place).collect());
         Some(())
+    }
+
+    /// Boxes go on, each a little in a direction of its own: what lists of near pairs are for.
+    fn tremble(&mut self, input: &mut Input) -> Option<()> {
+        let (first, count, by) = (self.id(input)?, input.byte()?, f32::from(input.byte()?) / 1024.0);
+        let near = self.at.range(first..first.saturating_add(u32::from(count)));
+        let moved = |(&id, aabb): (&u32, &Aabb)| {
+            let sign = |k: u32| if id >> k & 1 == 0 { by } else { -by };
+            (id, shifted(aabb, [0, 1, 2].map(sign)))
+        };
+        let boxes = near.map(moved).collect();
+        self.put_many(boxes);
+        Some(())
+    }
+
+    fn put_many(&mut self, boxes: Vec<(u32, Aabb)>) {
+        let indices: Vec<u32> = boxes.iter().map(|(id, _)| *id).collect();
+        let by_id: BTreeMap<u32, Aabb> = boxes.iter().copied().collect();
+        let of = |id: u32| Some((by_id[&id], ProxyFilter::ALL));
+        self.broad_phase.set_many(&indices, |id| id, of).expect("small ids");
+        boxes.into_iter().for_each(|(id, aabb)| self.note(id, aabb));
     }
 
     fn put(&mut self, id: u32, aabb: Aabb, filter: ProxyFilter) {
         self.broad_phase.set(id, aabb, filter).expect("a small id");
+        self.note(id, aabb);
+    }
+
+    /// What has been set.
+    fn note(&mut self, id: u32, aabb: Aabb) {
         self.given.push(aabb);
+        self.at.insert(id, aabb);
         self.ids = self.ids.max(id + 1);
         if !self.broad_phase.has_begun() {
             let fat = self.broad_phase.fat_aabb(id);
@@ -88,6 +118,7 @@ impl Player {
     fn remove(&mut self, input: &mut Input) -> Option<()> {
         let id = self.id(input)?;
         self.broad_phase.remove(id);
+        self.at.remove(&id);
         if self.broad_phase.has_begun() {
             self.removed.push(id)
         } else {
@@ -136,4 +167,9 @@ impl Player {
         assert_eq!(self.pairs, kept, "events lead elsewhere");
         Some(())
     }
+}
+
+fn shifted(aabb: &Aabb, by: [f32; 3]) -> Aabb {
+    let add = |corner: [f32; 3]| std::array::from_fn(|k| corner[k] + by[k]);
+    Aabb::new(add(aabb.min), add(aabb.max))
 }

@@ -9,6 +9,7 @@ mod flag;
 mod many;
 mod near;
 mod overlap;
+mod rebuild;
 mod small;
 #[cfg(feature = "serde")]
 mod snapshot;
@@ -64,8 +65,9 @@ struct Old {
 ///
 /// On the CPU up to 1024 boxes are kept in a bitmap index, in which changed boxes are looked up, unless many change and that
 /// turns out to take longer than what follows. More lie in a base grid. Where few change they are put into other cells, and
-/// only they are searched. When a quarter of all boxes changes, or an eighth is out of the grid's order, it is built anew. Where motion is small, pairs of
-/// boxes that are near each other are found for many updates at once, and an update only tests these.
+/// only they are searched. Where so many change that this takes longer than a search of all, it is built anew; which takes less is
+/// measured. Where motion is small, pairs of boxes that are near each other are found for many updates at once, and an
+/// update only tests these.
 /// ([`crate::Strategy::Pbig`] and [`crate::Backend::Brute`] search everything at every update that changes
 /// something. A GPU is told what has changed, and tells which pairs came or went.)
 ///
@@ -108,6 +110,7 @@ pub struct BroadPhase {
     base: Search<Tracked>,
     small: small::Small,
     near: near::Near,
+    rebuild: rebuild::Rebuild,
     /// Whether `base.map` holds the boxes whose home it is: not after a search by anything else, and not while it
     /// holds reaches (see `near`).
     has_base: bool,
@@ -151,6 +154,7 @@ impl BroadPhase {
             base: Search::new(),
             small: small::Small::default(),
             near: near::Near::default(),
+            rebuild: rebuild::Rebuild::default(),
             has_base: false,
             base_plan: Plan::default(),
             base_checks: 0,
@@ -301,7 +305,7 @@ impl BroadPhase {
         let is_timed = !is_small || self.changed.len() >= MEASURED_FROM;
         let (clock, mut watch) = (is_timed.then(Instant::now), Watch::new(is_timed));
         let found =
-            if is_small { self.find_in_small(&mut watch).map(|()| Way::Other) } else { self.find_added() };
+            if is_small { self.find_in_small(&mut watch).map(|()| Way::Few) } else { self.find_added() };
         let found = found.and_then(|way| self.check_room(way).map(|()| way));
         let way = found.inspect_err(|_| {
             self.events.added.clear();
@@ -321,7 +325,11 @@ impl BroadPhase {
         self.sort_events();
         self.report.stages.emit += watch.lap();
         if !is_small && self.updates > 1 {
-            self.near.note_time(way, self.report.changed as usize, self.report.stages.total());
+            let (changed, time) = (self.report.changed as usize, self.report.stages.total());
+            if !std::mem::take(&mut self.near.failed) {
+                self.near.note_time(way, changed, time);
+                self.rebuild.note(way, changed, self.present_count as usize, time);
+            }
         }
         self.take_turns(if is_small { Turn::Bitmap } else { Turn::Grid }, clock);
         self.report.pairs = self.pair_count() as u64;

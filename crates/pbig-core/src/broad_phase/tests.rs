@@ -117,3 +117,30 @@ fn threads_that_share_an_update_by_near_pairs_miss_none_of_those_who_leave() {
     }
     assert!(by_near > 5 && events > 10_000, "{by_near} by near pairs, {events} new pairs");
 }
+
+#[test]
+fn few_that_jump_are_edited_and_many_searched_for_anew_and_the_report_says_what_an_edit_costs() {
+    const IDS: u32 = 2000;
+    let mut broad_phase =
+        BroadPhase::new(Config { strategy: Strategy::Grid, ..Config::DEFAULT }).expect("a margin");
+    assert_eq!(broad_phase.report().plan.edit_cost, None);
+    let mut ways = vec![];
+    for frame in 0..20_u32 {
+        let one_in = [40, 2][frame as usize % 2].min(1 + 40 * frame as usize);
+        for id in (0..IDS).step_by(one_in) {
+            let place = (id + 1).wrapping_mul(2_654_435_761).wrapping_mul(frame + 1) >> 8;
+            let center = [place % 13, place / 13 % 13, place / 169 % 13].map(|i| i as f32 * 1.1);
+            broad_phase.set(id, Aabb::from_center(center, [0.5; 3]), ProxyFilter::ALL).expect("a small id");
+        }
+        broad_phase.update().expect("few pairs");
+        ways.push(broad_phase.report().plan.chosen);
+        let mut pairs: Vec<Pair> = broad_phase.pairs().collect();
+        pairs.sort_unstable();
+        assert_eq!(pairs, oracle::pairs(&broad_phase.boxes), "frame {frame}");
+    }
+    let wanted: Vec<Chosen> =
+        (0..20).map(|frame| if frame % 2 == 0 { Chosen::Edit } else { Chosen::Grid }).collect();
+    assert_eq!(ways[1..], wanted[1..]);
+    let plan = &broad_phase.report().plan;
+    assert!(plan.edit_cost > Some(0.0) && plan.to_string().contains("the edit of a box"), "{plan}");
+}

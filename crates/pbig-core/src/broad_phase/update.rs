@@ -2,6 +2,7 @@
 
 #[cfg(feature = "gpu")]
 use super::device::Ending;
+use super::many::RANGE;
 use super::near::Served;
 use super::{BroadPhase, Old, flag};
 use crate::cpu::codes::prefetch;
@@ -13,7 +14,7 @@ use crate::diff::{Judgement, PairStore};
 use crate::plan::{Chosen, LazySummary, Plan};
 use crate::report::{lap, stage};
 use crate::search::{Rule, single_entry_checks};
-use crate::{Aabb, Backend, Error, Pair, ProxyFilter, Strategy};
+use crate::{Aabb, Backend, Error, Pair, ProxyFilter, Strategy, shared_from};
 use rayon::prelude::*;
 use std::collections::HashMap;
 use std::time::Instant;
@@ -39,15 +40,17 @@ pub(super) enum Way {
     Gpu,
     /// The list of near pairs: it has also found those that went, and kept those that came.
     Near,
-    Other,
+    /// A search for the boxes that have changed.
+    Few,
+    /// One for all.
+    All,
 }
 
 /// Events from which both lists are sorted at once.
-const PARALLEL_FROM: usize = 4096;
+const PARALLEL_FROM: usize = shared_from(4096);
 
-/// Changed boxes from which all are looked at on several threads, and those that a thread takes at once.
-const RANGES_FROM: usize = 16_384;
-const RANGE: usize = 4096;
+/// Changed boxes from which all are looked at on several threads.
+const RANGES_FROM: usize = shared_from(16_384);
 
 /// Tests that take as long as to sort a box.
 const TESTS_OF_A_BOX: u64 = 64;
@@ -63,34 +66,37 @@ impl BroadPhase {
     }
 
     fn find_added_on_cpu(&mut self) -> Result<Way, Error> {
-        if self.find_near()? == Served::Yes {
-            return Ok(Way::Near);
-        }
-        if let Some(skin) = self.skin()
-            && self.search_near(skin)? == Served::Yes
-        {
+        if self.find_near()? == Served::Yes || self.try_near()? == Served::Yes {
             return Ok(Way::Near);
         }
         self.drop_near();
         self.pairs.drop_removed();
-        let whole = self.many_changed()
-            || self.config.strategy == Strategy::Pbig
+        let way = self.edit_or_rebuild();
+        self.report.plan.edit_cost = self.rebuild.measured();
+        way
+    }
+
+    fn edit_or_rebuild(&mut self) -> Result<Way, Error> {
+        let present = self.present_count as usize;
+        let whole = self.config.strategy == Strategy::Pbig
             || self.config.backend == Backend::Brute
-            || !self.has_base;
+            || !self.has_base
+            || self.rebuild.pays(self.changed.len(), present);
         if whole {
             return self.search_all();
         }
         self.edit_base();
-        let (out, present) = (self.base.map.out_of_order(), self.present_count as usize);
-        if out * 8 >= present || self.strain > self.rebuild_cost() {
-            self.search_all()
+        if self.base.map.out_of_order() * 8 >= present || self.strain > self.rebuild_cost() {
+            let clock = Instant::now();
+            let way = self.search_all();
+            self.rebuild.followed_edits(present, clock.elapsed());
+            way
         } else {
             self.search_changed()
         }
     }
 
-    /// Whether so many boxes have changed that to look at all costs less than to tell them apart: edits take half as long
-    /// where a seventh moves, 0.8 to 1.0 times where a fifth does (docs/benchmarks/crossovers.md).
+    /// Whether so many boxes have changed that to look at all costs less than to tell them apart.
     pub(super) fn many_changed(&self) -> bool {
         self.changed.len() * 4 >= self.present_count as usize
     }
@@ -123,7 +129,7 @@ impl BroadPhase {
         (self.base_checks, self.strain) = (self.report.checks.made, 0);
         self.near.met = self.base.found.overlaps;
         self.base.found.chunks.iter().for_each(|chunk| self.events.added.extend_from_slice(chunk));
-        Ok(Way::Other)
+        Ok(Way::All)
     }
 
     /// Puts the changed boxes where they are now.
@@ -156,7 +162,7 @@ impl BroadPhase {
         self.note_strain(self.found.checks);
         let (moved, boxes) = (self.base.map.out_of_order() as u32, self.valid_count());
         self.report.plan = Plan { chosen: Chosen::Edit, moved, boxes, ..self.base_plan.clone() };
-        Ok(Way::Other)
+        Ok(Way::Few)
     }
 
     /// Tests beyond what boxes needed when the base was built, twice over: many boxes have come to few cells, or to the
@@ -177,7 +183,7 @@ impl BroadPhase {
         if way == Way::Near {
             return;
         }
-        let many = self.many_changed();
+        let many = way == Way::All || self.many_changed();
         let state = state!(self);
         let removed = &mut self.events.removed;
         #[cfg(feature = "gpu")]
@@ -214,12 +220,15 @@ impl BroadPhase {
     /// What boxes are is what they were. Box by box where all have changed, too: memmove, of all of them at once, takes ten
     /// times as long on some processors (Zen, where what it copies to is not aligned).
     fn forget_changes(&mut self) {
-        let Self { boxes, before, flags, changed, .. } = self;
+        self.near.movers.begin(self.changed.len(), &mut self.flags);
+        let Self { boxes, before, flags, changed, near, .. } = self;
         const NEWS: u8 = flag::CHANGED | flag::REFILTERED;
         if changed.len() < RANGES_FROM || changed.len() * 4 < boxes.len() {
             for &id in changed.iter() {
                 before[id as usize] = boxes[id as usize];
-                flags[id as usize] &= !NEWS;
+                let flags = &mut flags[id as usize];
+                near.movers.note(flags);
+                *flags &= !NEWS;
             }
             return;
         }

@@ -17,7 +17,7 @@ use super::record::Record;
 use super::window::{Rows, Windows};
 use crate::plan::OPEN;
 use crate::report::stage;
-use crate::{Error, Pair, ProxyFilter};
+use crate::{Error, Pair, ProxyFilter, shared_from};
 use rayon::prelude::*;
 use std::cell::RefCell;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -29,13 +29,13 @@ const CHUNK: usize = 2048;
 /// Expected time of a search, in ns on one core, from which it is shared with other threads. In a
 /// tight loop 150,000 pay off (4,096 unit cubes: 0.14 ms alone, 0.10 with a second thread), but in an
 /// app the other threads sleep between steps and waking one costs about as much.
-const PARALLEL_FROM: u64 = 300_000;
+const PARALLEL_FROM: u64 = shared_from(300_000) as u64;
 
 /// Boxes to be looked up in one piece of work.
 const OTHERS: usize = 1024;
 
 /// Boxes to be looked up in a map from which the work is shared.
-const OTHERS_PARALLEL_FROM: usize = 4096;
+const OTHERS_PARALLEL_FROM: usize = shared_from(4096);
 
 /// What a box costs, and a check, in ns; checks as many as in the call before.
 const ENTRY: u64 = 15;

@@ -7,11 +7,11 @@ use super::entries::Entries;
 use super::levels::{Classes, LISTED, Level};
 use super::record::{Item, Record};
 use super::sort::{Input, Sort, Sorted, shift_for};
-use crate::Aabb;
 use crate::plan::{Camps, Experience, OccupiedCell, Plan};
+use crate::{Aabb, shared_from};
 
 /// Boxes from which a sort is shared with other threads.
-const PARALLEL_FROM: usize = 20_000;
+const PARALLEL_FROM: usize = shared_from(20_000);
 
 /// A set of boxes, ready to be searched: grids by level, and the boxes that fit none of them.
 #[derive(Clone, Debug)]

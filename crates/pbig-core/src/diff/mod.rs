@@ -12,10 +12,10 @@
 #[cfg(test)]
 mod tests;
 
-use crate::Pair;
 use crate::cpu::codes::prefetch;
 use crate::links::{Links, NONE};
 use crate::marks::Marks;
+use crate::{Pair, shared_from};
 use rayon::prelude::*;
 
 /// Walks that cost as much as linking all pairs.
@@ -25,7 +25,7 @@ const WALKS: usize = 12;
 const LOOKUP: usize = 256;
 
 /// Pairs of a piece of a walk.
-const PIECE: usize = 16_384;
+const PIECE: usize = shared_from(16_384);
 
 /// Pairs of a walk for the sake of few boxes that are looked at together.
 const BLOCK: usize = 1024;
@@ -145,6 +145,12 @@ impl PairStore {
         if self.pairs.capacity() > MANY {
             self.pairs = Vec::new();
         }
+    }
+
+    /// The same, and what they are: all of them, also those of removed boxes.
+    pub(crate) fn give_all(&mut self) -> Vec<Pair> {
+        self.links.drop_all();
+        std::mem::take(&mut self.pairs)
     }
 
     /// No pairs have been counted.

@@ -15,7 +15,7 @@ mod tests;
 
 use crate::cpu::codes::prefetch;
 use crate::diff::{AHEAD, Judgement, MANY};
-use crate::{Aabb, Pair};
+use crate::{Aabb, Pair, shared_from};
 use index::Index;
 use rayon::prelude::*;
 
@@ -27,7 +27,7 @@ const OVERLAP: u8 = 1;
 const GONE: u8 = 2;
 
 /// Pairs of a piece of a walk.
-const PIECE: usize = 16_384;
+const PIECE: usize = shared_from(16_384);
 
 /// Pairs that are tested before those found are told.
 const BLOCK: usize = 1024;
@@ -36,7 +36,7 @@ const BLOCK: usize = 1024;
 const TOGETHER: usize = 32;
 
 /// Walks that cost as much as an index.
-const WALKS: usize = 8;
+const WALKS: usize = 3;
 
 /// Some pairs, and their states.
 type Piece<'a> = (&'a [Pair], &'a mut [u8]);
@@ -116,6 +116,15 @@ impl NearPairs {
         let all = self.pairs.par_chunks(PIECE).zip(self.states.par_chunks(PIECE));
         all.zip(&mut self.turned[..pieces]).for_each(walk);
         self.turned[..pieces].iter().for_each(|turned| ended.extend_from_slice(&turned.removed));
+    }
+
+    /// Pairs that overlap, instead of those there were. For few boxes: they are looked up from the first.
+    pub(crate) fn begin(&mut self, overlapping: Vec<Pair>) {
+        self.clear();
+        self.walked = WALKS * overlapping.len();
+        self.overlapping = overlapping.len();
+        self.states.resize(overlapping.len(), OVERLAP);
+        self.pairs = overlapping;
     }
 
     /// All pairs that are near, of a search, instead of those there were. Those that overlap are told, and those of them

@@ -1,6 +1,8 @@
-//! The plan: from a summary of the boxes to strategy, levels and cell sizes. Nothing else chooses.
+//! The plan: from a summary of the boxes to strategy, levels and cell sizes, by what these would cost. It explains itself in
+//! words.
 //!
-//! A pure function of the [`Summary`] and the [`Config`]; the [`Plan`] explains itself in words.
+//! How an update uses it, or does without, is chosen where updates are (`broad_phase`): by edits or anew (`rebuild`), by near pairs
+//! (`near::policy`), by bitmap (`turns`), on which processor (`search`).
 
 mod camps;
 mod costs;
@@ -84,6 +86,9 @@ pub struct Plan {
     pub gpu: Option<GpuPlan>,
     /// Boxes that came since the grid was built and are out of its order ([`Chosen::Edit`]).
     pub moved: u32,
+    /// How many boxes of a search of all take as long as the edit of one, as measured in updates ([`Chosen::Edit`], and
+    /// where all were searched instead).
+    pub edit_cost: Option<f32>,
     /// Valid boxes planned for.
     pub boxes: u32,
     /// What the ways to search them would take, as far as they were compared.
@@ -135,7 +140,7 @@ impl Plan {
     pub(crate) fn begin(&mut self, boxes: u32) {
         if self.levels.is_empty() {
             (self.chosen, self.swept, self.pbig, self.moved) = (Chosen::Nothing, 0, None, 0);
-            (self.forecast, self.expected) = Default::default();
+            (self.forecast, self.expected, self.edit_cost) = Default::default();
             #[cfg(feature = "gpu")]
             {
                 self.gpu = None;
@@ -231,6 +236,9 @@ impl fmt::Display for Plan {
         }
         if self.forecast != Forecast::default() && !matches!(self.chosen, Chosen::Edit | Chosen::Near) {
             write!(f, "; expected: {}", self.forecast)?;
+        }
+        if let Some(boxes) = self.edit_cost {
+            write!(f, "; the edit of a box takes as long as {boxes:.0} of a search of all")?;
         }
         Ok(())
     }

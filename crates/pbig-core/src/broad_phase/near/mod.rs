@@ -4,7 +4,8 @@
 //! only test them (`crate::near`). Boxes that leave their reach get a new one and are searched for, as edits of the grid of
 //! reaches; when they become many, all is searched anew. The skin is as wide as some moves, which it lasts for: wider, there
 //! are more near pairs to test; narrower, searches come more often. Where boxes jump so far that near pairs would be many,
-//! there are none, and the next attempts come ever later.
+//! there are none, and the next attempts come ever later. Where few boxes move, always the same ones, only they get a skin, as
+//! they first move: a search of all would be for those that stay.
 
 mod policy;
 #[cfg(test)]
@@ -15,6 +16,7 @@ pub(super) use policy::{Cost, Near};
 use super::update::{State, state};
 use super::{BroadPhase, flag};
 use crate::cpu::codes::prefetch;
+use crate::cpu::crowding::Set;
 use crate::cpu::edit::Changed;
 use crate::cpu::find::Others;
 use crate::cpu::judge::Accept;
@@ -22,22 +24,25 @@ use crate::diff::{Judgement, PairStore};
 use crate::plan::{Chosen, LazySummary, Plan};
 use crate::report::{Checks, lap, stage};
 use crate::search::Rule;
-use crate::{Aabb, Error, Pair, ProxyFilter};
+use crate::{Aabb, Error, Pair, ProxyFilter, shared_from};
 use rayon::prelude::*;
 use std::time::Instant;
 
 /// Near pairs that are walked in the time that it takes to look up the pairs of one box.
-const LOOKUP: usize = 64;
+const LOOKUP: usize = 20;
 
 /// One in so many boxes may leave its reach in an update.
 const LEAVING: usize = 32;
+
+/// The same in the first one of a list that begins without skins.
+const FIRST: usize = 8;
 
 /// Near pairs that may come on a box: to test them must cost less than to search.
 const NEAR_OF_A_BOX: u64 = 16;
 
 /// Changed boxes from which they are looked at on several threads, and those of a piece.
-const PARALLEL_FROM: usize = 16_384;
-const PIECE: usize = 4096;
+const PARALLEL_FROM: usize = shared_from(16_384);
+const PIECE: usize = shared_from(4096);
 
 /// What an update by near pairs came to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -53,10 +58,19 @@ impl BroadPhase {
         if !self.near.is_on {
             return Ok(Served::No);
         }
+        if !self.near.goes_on() {
+            self.near.end();
+            return Ok(Served::No);
+        }
+        self.serve_near(LEAVING)
+    }
+
+    /// As long as no more than one box in `leaving` has left its reach.
+    fn serve_near(&mut self, leaving: usize) -> Result<Served, Error> {
         let mut clock = Instant::now();
         self.find_away();
         self.report.stages.plan += lap(&mut clock);
-        let served = self.follow_away() && {
+        let served = self.follow_away(leaving) && {
             self.test_near();
             self.welcome();
             true
@@ -110,9 +124,9 @@ impl BroadPhase {
     }
 
     /// Gives boxes that are away another reach, and finds what is near them now; false when they are too many.
-    fn follow_away(&mut self) -> bool {
+    fn follow_away(&mut self, leaving: usize) -> bool {
         let (away, present) = (self.near.away.len(), self.present_count as usize);
-        if away * LEAVING > present || self.near.list.len() as u64 > self.most_near() {
+        if away * leaving > present || self.near.list.len() as u64 > self.most_near() {
             return false;
         }
         if away == 0 {
@@ -213,14 +227,12 @@ impl BroadPhase {
     }
 
     /// Builds the base anew, of reaches, and keeps what overlaps of the pairs that are near; no, when these are too many.
-    pub(super) fn search_near(&mut self, skin: f32) -> Result<Served, Error> {
+    fn search_near(&mut self, skin: f32) -> Result<Served, Error> {
         let mut clock = Instant::now();
         let reach = |aabb: &Aabb| aabb.inflated(skin);
         self.near.reach.clear();
         self.near.reach.extend(self.boxes.iter().map(reach));
-        (self.near.skin, self.near.age) = (skin, 0);
-        (self.near.farthest, self.near.farthest_then) = (0.0, 0.0);
-        self.near.own = Cost::default();
+        self.near.begin(skin);
         self.report.stages.map += lap(&mut clock);
         if self.find_reaches().is_err() {
             self.near.fail();
@@ -238,6 +250,38 @@ impl BroadPhase {
         _ = self.near.list.take_tests();
         self.report.stages.diff += lap(&mut clock);
         self.check_near_limit()
+    }
+
+    /// A list that begins with the pairs that exist: each box gets a reach, and what is near it, when it first moves. For a
+    /// world in which few boxes do, and the same ones: the base is built anew, but most of a search of all would be for those
+    /// that stay.
+    fn begin_near(&mut self, skin: f32) -> Result<Served, Error> {
+        self.build_reaches(skin);
+        let mut clock = Instant::now();
+        let Self { near, boxes, changed, pairs, .. } = self;
+        // In the base those that stay have a skin, too, for whatever its cells hold; here it is for what has been searched.
+        near.reach.clone_from(boxes);
+        changed.iter().for_each(|&id| near.reach[id as usize] = Aabb::NOWHERE);
+        near.begin(skin);
+        near.list.begin(pairs.give_all());
+        near.is_on = true;
+        self.report.stages.plan += lap(&mut clock);
+        let served = self.serve_near(FIRST);
+        self.near.failed = served == Ok(Served::No);
+        served
+    }
+
+    /// The base of all reaches, which are not searched.
+    fn build_reaches(&mut self, skin: f32) {
+        let reach = |aabb: &Aabb| aabb.inflated(skin);
+        self.near.reach.clear();
+        self.near.reach.extend(self.boxes.iter().map(reach));
+        let summary = LazySummary::new(&self.near.reach, None, self.base.spare.take());
+        let (boxes, filters) = (&self.near.reach[..], Some(&self.filters[..]));
+        let set = Set { boxes, filters, ids: None, summary: &summary, before: &[] };
+        self.base_plan = self.base.map.plan_and_build(&set, &self.config, &mut self.report.stages);
+        self.base.spare = summary.into_spare();
+        self.has_base = false;
     }
 
     /// Pairs that have ended, wherever they are kept, before a new list has the others.

@@ -1,9 +1,11 @@
 //! When there is a list of near pairs, and how wide its skin is.
 
+use super::{FIRST, Served};
 use crate::broad_phase::BroadPhase;
+use crate::broad_phase::flag;
 use crate::broad_phase::update::Way;
 use crate::near::NearPairs;
-use crate::{Aabb, Backend, Pair, Strategy};
+use crate::{Aabb, Backend, Error, Pair, Strategy};
 use std::time::Duration;
 
 /// Moves that a skin is wide at first, at least and at most.
@@ -24,6 +26,18 @@ const LISTS: u32 = 8;
 
 /// What a list may cost, of what updates cost without one.
 const PAYS: f32 = 0.9;
+
+/// Of how many boxes one has to change for a list: if it is always the same ones, and else.
+const FEWEST: [usize; 2] = [128, 16];
+
+/// Of how many boxes one has to have changed in updates without a list, for those to have cost about as much as one.
+const PATIENCE: usize = 8;
+
+/// Of how many boxes one may have changed for it to be remembered which.
+const REMEMBERED: usize = 4;
+
+/// Updates after which a list is first asked whether they cost less than without.
+const ASKED: u32 = 32;
 
 /// Updates that a list has to last, to be worth its price.
 const LONG: u32 = 2;
@@ -50,10 +64,14 @@ pub(crate) struct Near {
     /// Updates without another attempt.
     pub(crate) pause: u32,
     pub(crate) next_pause: u32,
-    /// What updates with this list have cost.
+    pub(crate) movers: Movers,
+    /// What updates with it have cost, and of these the one that made it.
     pub(crate) own: Cost,
+    pub(crate) price: Option<Cost>,
     /// For each changed box, what the last ones without any have: ns.
     pub(crate) usual: Option<f32>,
+    /// Boxes that have changed in updates without a list, since the last one.
+    pub(crate) without: usize,
     /// Lists so far.
     pub(crate) lists: u32,
     /// Whether an attempt has failed in this update, so that its time says nothing.
@@ -68,6 +86,40 @@ pub(crate) struct Near {
     pub(crate) parted: Vec<Pair>,
     /// Their pairs now.
     pub(crate) came: Vec<Pair>,
+}
+
+/// Whether it is always the same boxes that move.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Movers {
+    /// Boxes that have changed since all were forgotten.
+    count: usize,
+    /// In the last update: those that had before.
+    returned: usize,
+    /// All of them.
+    changed: usize,
+}
+
+impl Movers {
+    /// For an update in which so many have changed, each of which is to be noted.
+    pub(crate) fn begin(&mut self, changed: usize, flags: &mut [u8]) {
+        self.count += changed;
+        if self.count * REMEMBERED > flags.len() {
+            self.count = changed;
+            flags.iter_mut().for_each(|flags| *flags &= !flag::MOVED);
+        }
+        (self.returned, self.changed) = (0, changed);
+    }
+
+    #[inline(always)]
+    pub(crate) fn note(&mut self, flags: &mut u8) {
+        self.returned += usize::from(*flags & flag::MOVED != 0);
+        *flags |= flag::MOVED;
+    }
+
+    /// Whether most of the last update had changed before.
+    pub(crate) fn are_the_same(self) -> bool {
+        2 * self.returned > self.changed
+    }
 }
 
 /// What updates have cost.
@@ -90,8 +142,11 @@ impl Default for Near {
             farthest_then: 0.0,
             pause: 0,
             next_pause: 0,
+            movers: Movers::default(),
             own: Cost::default(),
+            price: None,
             usual: None,
+            without: 0,
             lists: 0,
             failed: false,
             met: 0,
@@ -104,6 +159,20 @@ impl Default for Near {
 }
 
 impl Near {
+    /// A list that is made now.
+    pub(crate) fn begin(&mut self, skin: f32) {
+        (self.skin, self.age) = (skin, 0);
+        (self.farthest, self.farthest_then) = (0.0, 0.0);
+        (self.own, self.price) = (Cost::default(), None);
+    }
+
+    /// Whether the list is of use: asked ever more rarely.
+    pub(crate) fn goes_on(&self) -> bool {
+        let is_asked = self.age >= ASKED && self.age.is_power_of_two();
+        let (Some(usual), Some(price), true) = (self.usual, self.price, is_asked) else { return true };
+        self.own.ns - price.ns < PAYS * usual * (self.own.changed - price.changed)
+    }
+
     /// What a list of so many boxes has cost decides how wide the next skin will be: searches, which come
     /// the more often the narrower it is, should cost as much as tests of pairs that are apart.
     pub(crate) fn learn(&mut self, boxes: u32) {
@@ -121,13 +190,12 @@ impl Near {
 
     /// What an update has taken, in which so many boxes have changed.
     pub(crate) fn note_time(&mut self, way: Way, changed: usize, time: Duration) {
-        if std::mem::take(&mut self.failed) {
-            return;
-        }
+        self.without = if way == Way::Near { 0 } else { self.without + changed };
         let (ns, changed) = (time.as_nanos() as f32, changed as f32);
         if way == Way::Near {
             self.own = Cost { ns: self.own.ns + ns, changed: self.own.changed + changed };
-        } else if way == Way::Other {
+            self.price.get_or_insert(self.own);
+        } else if way != Way::Gpu {
             let usual = self.usual.unwrap_or(ns / changed);
             self.usual = Some((usual + ns / changed) / 2.0);
         }
@@ -164,8 +232,8 @@ impl Near {
 
 impl BroadPhase {
     /// Whether to look for near pairs now, and how far.
-    pub(crate) fn skin(&mut self) -> Option<f32> {
-        if !self.many_changed()
+    fn skin(&mut self) -> Option<f32> {
+        if !self.enough_changed()
             || self.config.backend == Backend::Brute
             || self.config.strategy == Strategy::Pbig
         {
@@ -185,6 +253,25 @@ impl BroadPhase {
             return None;
         }
         Some(skin)
+    }
+
+    /// A new list, if there should be one, and what it comes to.
+    pub(in crate::broad_phase) fn try_near(&mut self) -> Result<Served, Error> {
+        let Some(skin) = self.skin() else { return Ok(Served::No) };
+        let (changed, present) = (self.changed.len(), self.present_count as usize);
+        if changed * FIRST <= present && self.near.movers.are_the_same() {
+            self.begin_near(skin)
+        } else {
+            self.search_near(skin)
+        }
+    }
+
+    /// Whether so many change that a list may pay: a quarter, or fewer for some time already. For a few of them an update
+    /// costs next to nothing anyway; and if it is other boxes each time, a list has to have all that is near.
+    fn enough_changed(&self) -> bool {
+        let (changed, present) = (self.changed.len(), self.present_count as usize);
+        let fewest = if self.near.movers.are_the_same() { FEWEST[0] } else { FEWEST[1] };
+        self.many_changed() || (changed * fewest >= present && self.near.without * PATIENCE >= present)
     }
 
     /// How many pairs would be near: those that overlap, as often as there is more room around a box; filters left aside.

@@ -1,5 +1,7 @@
 //! Updates by near pairs against the oracle, and when there are any.
 
+mod few;
+
 use super::policy::{Cost, Near};
 use crate::broad_phase::{BroadPhase, Events};
 use crate::plan::Chosen;

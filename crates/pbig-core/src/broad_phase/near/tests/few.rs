@@ -1,0 +1,170 @@
+//! Lists in worlds in which few boxes move.
+
+use super::{BOXES, World};
+use crate::broad_phase::Events;
+use crate::broad_phase::near::policy::{Cost, Movers, Near};
+use crate::{Aabb, Error, Limits, Pair, ProxyFilter};
+use std::collections::BTreeSet;
+
+/// Less than one in eight.
+const MOVERS: u32 = BOXES / 9;
+
+impl World {
+    /// Always the same boxes; they are not near each other.
+    fn tremble_few(&mut self, by: f32) {
+        for id in (0..BOXES).step_by(9) {
+            let by = self.vector().map(|x| by * x);
+            self.shift(id, by);
+        }
+    }
+
+    /// After updates of the same few: a list that has begun with the pairs that existed.
+    fn with_few_movers(margin: f32) -> Self {
+        let mut world = Self::new(margin);
+        let mut round = 0;
+        while !world.broad_phase.near.is_on {
+            world.tremble_few(0.05);
+            world.update(&format!("trembling {round}"));
+            round += 1;
+            assert!(round < 20, "no list");
+        }
+        let searched = world.broad_phase.report().checks.made;
+        assert!(
+            world.broad_phase.near.away.is_empty() && searched < 60 * u64::from(MOVERS),
+            "{searched} tests"
+        );
+        world
+    }
+}
+
+#[test]
+fn where_the_same_few_move_only_they_get_reaches() {
+    let mut world = World::with_few_movers(0.0);
+    let near = &world.broad_phase.near;
+    let grown = (0..BOXES as usize).filter(|&i| near.reach[i] != world.boxes[i]).count();
+    assert_eq!(grown, MOVERS as usize + 1);
+    for round in 0..60 {
+        world.tremble_few(0.05);
+        world.update(&format!("round {round}"));
+    }
+    assert!(world.near > 40, "{} updates by near pairs", world.near);
+}
+
+#[test]
+fn any_other_box_may_move_and_change_too() {
+    for margin in [0.0, 0.02] {
+        let mut world = World::with_few_movers(margin);
+        for round in 0..90u32 {
+            world.tremble_few(0.04);
+            let id = round * 31 % BOXES;
+            match round % 6 {
+                0 => world.remove(id),
+                1 => world.shift(id, [2.0, 0.0, 0.0]),
+                2 => {
+                    let filter = ProxyFilter { memberships: 2, mask: 1, ..ProxyFilter::ALL };
+                    world.broad_phase.set(id, world.boxes[id as usize], filter).expect("a small id");
+                }
+                3 => world.broad_phase.set(id, Aabb::NOWHERE, ProxyFilter::ALL).expect("a small id"),
+                4 => {
+                    world.remove(id);
+                    world.set(id);
+                }
+                _ => {
+                    world.boxes.push(world.boxes[id as usize]);
+                    world.set(world.boxes.len() as u32 - 1);
+                }
+            }
+            world.update(&format!("margin {margin}, round {round}"));
+        }
+        assert!(world.near > 60, "{} updates by near pairs", world.near);
+    }
+}
+
+/// What has happened in the very update in which the list begins.
+#[test]
+fn a_list_may_begin_while_boxes_come_go_and_change() {
+    let few = World::with_few_movers(0.0).broad_phase.updates;
+    for change in 0..6 {
+        let mut world = World::new(0.0);
+        for _ in 1..few - 1 {
+            world.tremble_few(0.05);
+            world.update("before");
+        }
+        assert!(!world.broad_phase.near.is_on);
+        world.tremble_few(0.05);
+        let filter = ProxyFilter { memberships: 2, mask: 1, ..ProxyFilter::ALL };
+        for id in (4..BOXES).step_by(150) {
+            match change {
+                0 => world.remove(id),
+                1 => world.shift(id, [2.0, 0.0, 0.0]),
+                2 => world.broad_phase.set(id, world.boxes[id as usize], filter).expect("a small id"),
+                3 => world.broad_phase.set(id, Aabb::NOWHERE, ProxyFilter::ALL).expect("a small id"),
+                4 => {
+                    world.remove(id);
+                    world.set(id);
+                }
+                _ => {
+                    world.boxes.push(world.boxes[id as usize]);
+                    world.set(world.boxes.len() as u32 - 1);
+                }
+            }
+        }
+        world.update(&format!("change {change}"));
+        assert!(world.broad_phase.near.is_on, "change {change}");
+        world.tremble_few(0.05);
+        world.update(&format!("after change {change}"));
+    }
+}
+
+#[test]
+fn too_many_new_pairs_in_the_update_that_begins_a_list_leave_all_as_it_was() {
+    let few = World::with_few_movers(0.0).broad_phase.updates;
+    let mut world = World::new(0.0);
+    for _ in 1..few - 1 {
+        world.tremble_few(0.05);
+        world.update("before");
+    }
+    let (limits, before) =
+        (world.broad_phase.config.limits, world.broad_phase.pairs().collect::<BTreeSet<Pair>>());
+    world.tremble_few(0.3);
+    world.broad_phase.config.limits = Limits { max_pairs: 1, ..limits };
+    assert_eq!(world.broad_phase.update(), Err(Error::TooManyPairs { limit: 1 }));
+    assert_eq!(world.broad_phase.events(), &Events::default());
+    assert_eq!(world.broad_phase.pairs().collect::<BTreeSet<_>>(), before);
+    world.broad_phase.config.limits = limits;
+    world.update("as it should");
+}
+
+#[test]
+fn a_list_that_costs_more_than_none_is_given_up() {
+    let list = |age, ns| {
+        let price = Some(Cost { ns: 5000.0, changed: 2.0 });
+        Near { age, usual: Some(100.0), own: Cost { ns, changed: 12.0 }, price, ..Near::default() }
+    };
+    assert!(list(32, 5850.0).goes_on(), "85 a box");
+    assert!(!list(32, 5950.0).goes_on() && !list(64, 5950.0).goes_on(), "95, beside its price");
+    assert!(list(31, 1e9).goes_on() && list(16, 1e9).goes_on(), "not asked");
+
+    let mut world = World::with_few_movers(0.0);
+    let mut lasted = 0;
+    while world.broad_phase.near.is_on {
+        world.tremble_few(0.01);
+        world.broad_phase.near.usual = Some(0.0);
+        world.broad_phase.update().expect("within the limits");
+        lasted += 1;
+    }
+    assert_eq!(lasted, 32);
+}
+
+#[test]
+fn movers_are_the_same_where_most_have_moved_before_and_not_long_ago() {
+    let (mut movers, mut flags) = (Movers::default(), vec![0; 100]);
+    let mut are_the_same = |ids: std::ops::Range<usize>| {
+        movers.begin(ids.len(), &mut flags);
+        flags[ids].iter_mut().for_each(|flags| movers.note(flags));
+        movers.are_the_same()
+    };
+    assert_eq!([0..8, 0..8, 3..11, 3..5].map(&mut are_the_same), [false, true, true, false], "forgotten");
+    assert_eq!([40..48, 44..52, 43..49].map(&mut are_the_same), [false, false, true]);
+    assert!((0..200).all(|k| !are_the_same(k * 10 % 100..k * 10 % 100 + 10)), "each in its turn");
+}
