@@ -1,5 +1,5 @@
 //! A call through rapier, ours and stock's, in which all or few colliders move; and the stages of the
-//! finder's update, each on its own.
+//! finder's update and of the adapter, each on its own.
 //!
 //! `cargo bench -p pbig-benches --bench update`; for ratios `pbig bench update` is better, which measures both
 //! in turn.
@@ -46,31 +46,63 @@ fn through_rapier(c: &mut Criterion) {
     }
 }
 
-/// As the finder itself measures them.
+/// Where boxes go, and what an update of all is then: a test of near pairs, or a grid built anew, as boxes jump too far
+/// for a list of those.
+const MOTIONS: [(&str, f32); 2] = [("all moved a little", 0.1), ("all jumped", 3.0)];
+
+/// Frames after which an update is like those before.
+const WARM_UP: usize = 12;
+
+/// The finder's stages, as it measures them itself.
 fn stages(c: &mut Criterion) {
-    let mut group = c.benchmark_group("stages, unit 100000, all moved");
-    group.sample_size(10);
-    let mut wander = Wander::new(boxes("unit", 100_000), 1.0, 0.1);
-    let mut broad_phase = Incremental::new(Config::DEFAULT).expect("a good margin");
-    let mut frame = 0;
-    for (stage, (name, _)) in broad_phase.report().stages.named().into_iter().enumerate() {
-        group.bench_function(name, |b| {
-            b.iter_custom(|rounds| {
-                let mut sum = Duration::ZERO;
-                for _ in 0..rounds {
-                    frame += 1;
-                    for id in wander.step(frame) {
-                        let aabb = wander.boxes[id as usize];
-                        broad_phase.set(id, aabb, ProxyFilter::ALL).expect("a small id");
-                    }
-                    broad_phase.update().expect("few pairs");
-                    sum += broad_phase.report().stages.named()[stage].1;
-                }
-                sum
-            });
-        });
+    for (motion, distance) in MOTIONS {
+        let mut group = c.benchmark_group(format!("stages, unit 100000, {motion}"));
+        group.sample_size(10);
+        let mut wander = Wander::new(boxes("unit", 100_000), 1.0, distance);
+        let mut broad_phase = Incremental::new(Config::DEFAULT).expect("a good margin");
+        let mut frame = 0;
+        let mut update = || {
+            let moved = wander.step(frame);
+            frame += 1;
+            let fetch = |id: u32| wander.boxes[id as usize];
+            let set = broad_phase.set_many(&moved, fetch, |aabb| Some((aabb, ProxyFilter::ALL)));
+            set.and_then(|()| broad_phase.update().map(|_| ())).expect("small ids and few pairs");
+            broad_phase.report().stages.named()
+        };
+        let last = (0..WARM_UP).map(|_| update()).last().unwrap_or_default();
+        // A stage that does nothing in such updates has no time to measure.
+        for (stage, (name, _)) in last.into_iter().enumerate().filter(|(_, (_, time))| !time.is_zero()) {
+            group.bench_function(name, |b| b.iter_custom(|rounds| sum(rounds, || update()[stage].1)));
+        }
     }
 }
 
-criterion_group!(benches, through_rapier, stages);
+/// What the adapter does before and after those: the colliders' boxes, and pairs turned into events.
+fn stages_of_the_adapter(c: &mut Criterion) {
+    let mut group = c.benchmark_group("stages of the adapter, gaussian 100000, all moved");
+    group.sample_size(10);
+    let mut field = Field::new(&boxes("gaussian", 100_000));
+    let movers = Movers::new(100_000, 1.0);
+    let mut broad_phase = PbigBroadPhase::new();
+    let (mut events, mut frame) = (Vec::new(), 0);
+    field.call(&mut broad_phase, &field.colliders, &mut events);
+    let mut call = || {
+        let modified = field.shift(&movers.of(frame), 1.0);
+        frame += 1;
+        events.clear();
+        field.call(&mut broad_phase, &modified, &mut events);
+        let stats = broad_phase.stats();
+        [stats.proxies, stats.events]
+    };
+    for (stage, name) in ["proxies", "events"].into_iter().enumerate() {
+        group.bench_function(name, |b| b.iter_custom(|rounds| sum(rounds, || call()[stage])));
+    }
+}
+
+/// Never zero, of which criterion can make nothing.
+fn sum(rounds: u64, mut measure: impl FnMut() -> Duration) -> Duration {
+    (0..rounds).map(|_| measure().max(Duration::from_nanos(1))).sum()
+}
+
+criterion_group!(benches, through_rapier, stages, stages_of_the_adapter);
 criterion_main!(benches);

@@ -27,7 +27,7 @@ pub struct LogLog {
 }
 
 /// The exponent `k` of the power `c x^k` that fits best (least squares of the logarithms); none for fewer
-/// than two different x.
+/// than three different x: two say nothing of how well it fits.
 pub fn growth(points: &[(f64, f64)]) -> Option<f64> {
     let logs: Vec<(f64, f64)> = drawn(points).map(|(x, y)| (x.ln(), y.ln())).collect();
     let n = logs.len() as f64;
@@ -35,7 +35,11 @@ pub fn growth(points: &[(f64, f64)]) -> Option<f64> {
     let (x0, y0) = (mean(|p| p.0), mean(|p| p.1));
     let spread: f64 = logs.iter().map(|(x, _)| (x - x0) * (x - x0)).sum();
     let common: f64 = logs.iter().map(|(x, y)| (x - x0) * (y - y0)).sum();
-    (spread > 1e-12).then(|| common / spread)
+    let are_three = |first: f64| {
+        let mut others = logs.iter().map(|p| p.0).filter(|x| *x != first);
+        others.next().is_some_and(|second| others.any(|third| third != second))
+    };
+    logs.first().is_some_and(|p| are_three(p.0)).then(|| common / spread)
 }
 
 fn drawn(points: &[(f64, f64)]) -> impl Iterator<Item = (f64, f64)> {
@@ -128,7 +132,9 @@ mod tests {
         let square: Vec<(f64, f64)> = [1.0, 10.0, 50.0].map(|x| (x, 3.0 * x * x)).to_vec();
         assert!((growth(&square).expect("three points") - 2.0).abs() < 1e-9);
         assert_eq!(growth(&square[..1]), None);
-        assert_eq!(growth(&[(1.0, 0.0), (2.0, 4.0)]), None, "zero has no logarithm");
+        assert_eq!(growth(&square[..2]), None);
+        assert_eq!(growth(&[square[0], square[1], square[0]]), None, "two different ones");
+        assert_eq!(growth(&[(1.0, 0.0), square[0], square[1]]), None, "zero has no logarithm");
     }
 
     #[test]

@@ -5,11 +5,13 @@
 //! are 0-based here as there, and every estimate is equation 1 in that form.
 
 mod correct;
+mod exact;
 mod root;
 mod search;
 mod tally;
 
 pub use correct::{AsItIs, Correction, Integers, Rules, lazy_pair};
+pub use exact::{EXACT, Exact};
 pub use root::{CARMACK, Double, LOMONT, Newton, Root, Single, SingleRoot, WideNewton};
 pub use search::{Counterexample, counterexample, root_errors};
 pub use tally::{MOST_EXHAUSTIVE, Sample, Tally};

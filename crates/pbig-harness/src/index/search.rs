@@ -15,8 +15,9 @@ pub struct Counterexample {
     pub right: (i64, i64),
 }
 
-/// The smallest number of boxes up to `most <= 2^20`, at the first or last index of a row. There it is if it is
-/// anywhere: rules mend a row that is off by one, and an estimate is furthest from its row at one of the row's ends.
+/// The smallest number of boxes up to `most <= 2^20` that has one at the first or last index of a row. An estimate by a
+/// root that is monotone is furthest from its row there. Newton's are not quite: an index within a row could be wrong
+/// at a number of boxes a little smaller, which only looking at all pairs could tell.
 pub fn counterexample<R: Root>(most: i64) -> Option<Counterexample> {
     let least = least_root::<R>();
     let first = ((least / 2.0) as i64).max(2);

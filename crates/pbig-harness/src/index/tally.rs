@@ -6,7 +6,8 @@ use std::ops::AddAssign;
 /// The most boxes whose pairs are all looked at: as far as `(2n - 1)^2` is below 2^30.
 pub const MOST_EXHAUSTIVE: i64 = 16_384;
 
-/// Estimates looked at together; only blocks with a wrong one are looked at one by one. (Of 128, that was most of the time.)
+/// Estimates looked at together; only blocks with a wrong one are looked at one by one. (Of 128, that was most of the
+/// time.)
 const BLOCK: i64 = 32;
 
 /// What comes of all pairs.
@@ -14,14 +15,17 @@ const BLOCK: i64 = 32;
 pub struct Tally {
     /// How many there are.
     pub pairs: u64,
-    /// Indices that give another pair, or none.
+    /// Indices that give anything but their pair, the lesser box first.
     pub wrong: u64,
     /// By how many rows the worst of them is off.
     pub worst_row: u64,
-    /// Pairs that no index gives.
+    /// Pairs that no index gives, whichever box comes first: they are not tested.
     pub missed: u64,
-    /// Indices that give a pair which another gives, too; one of them does not count.
+    /// Tests too many: indices that give a pair, whichever box comes first, which another gives, too; one of them
+    /// does not count.
     pub doubled: u64,
+    /// Indices that give no pair: a box and itself, or a box that there is not.
+    pub none: u64,
 }
 
 impl AddAssign for Tally {
@@ -31,6 +35,7 @@ impl AddAssign for Tally {
         self.worst_row = self.worst_row.max(other.worst_row);
         self.missed += other.missed;
         self.doubled += other.doubled;
+        self.none += other.none;
     }
 }
 
@@ -76,25 +81,62 @@ fn wrong_at<R: Root>(n: i64, row: i64, k: i64) -> Option<Wrong> {
     (estimate != row).then_some(Wrong { k: k as u32, estimate: estimate as i32, row: row as i32 })
 }
 
-/// What is left after a correction. An index that is right gives its own pair, so a pair is missed when its index is
-/// wrong and no other wrong index gives it.
+/// What is left after a correction.
 fn judged<C: Correction>(n: i64, wrong: &[Wrong]) -> Tally {
-    let mut tally = Tally { pairs: pairs_of(n) as u64, ..Tally::default() };
-    let mut left = Vec::new();
+    let mut left = Left::new(n);
     for w in wrong {
         let (k, row) = (i64::from(w.k), i64::from(w.row));
-        let (a, b) = C::pair(w.estimate.into(), k, n);
-        if (a, b) != AsItIs::pair(row, k, n) {
-            tally.worst_row = tally.worst_row.max(a.abs_diff(row));
-            let given = (0 <= a && a < b && b < n).then(|| row_start(a, n) + b - a - 1);
-            left.push((k, given));
+        left.note(k, AsItIs::pair(row, k, n), C::pair(w.estimate.into(), k, n));
+    }
+    left.tally()
+}
+
+/// What comes of pairs given one by one, in the order of all pairs.
+pub(super) fn of(n: i64, mut given: impl Iterator<Item = (i64, i64)>) -> Tally {
+    let mut left = Left::new(n);
+    let pairs = (0..n - 1).flat_map(|a| (a + 1..n).map(move |b| (a, b)));
+    for (k, pair) in (0..).zip(pairs) {
+        left.note(k, pair, given.next().unwrap_or((-1, -1)));
+    }
+    let tally = left.tally();
+    let more = given.count() as u64;
+    Tally { wrong: tally.wrong + more, doubled: tally.doubled + more, ..tally }
+}
+
+/// Wrong indices, each with the index of the pair that it gives, if it gives one.
+struct Left {
+    n: i64,
+    worst_row: u64,
+    wrong: Vec<(i64, Option<i64>)>,
+}
+
+impl Left {
+    fn new(n: i64) -> Self {
+        Self { n, worst_row: 0, wrong: Vec::new() }
+    }
+
+    fn note(&mut self, k: i64, right: (i64, i64), given: (i64, i64)) {
+        if given != right {
+            self.worst_row = self.worst_row.max(given.0.abs_diff(right.0));
+            self.wrong.push((k, tested(given, self.n)));
         }
     }
-    tally.wrong = left.len() as u64;
-    tally.missed = missed(&left, tally.pairs);
-    // n indices that give no pair leave n pairs missed; every other missed pair has its index on a pair of others.
-    tally.doubled = tally.missed - left.iter().filter(|(_, given)| given.is_none()).count() as u64;
-    tally
+
+    /// An index that is right tests its own pair, so a pair is missed when its index is wrong and no wrong index
+    /// tests it.
+    fn tally(&self) -> Tally {
+        let (pairs, wrong) = (pairs_of(self.n) as u64, self.wrong.len() as u64);
+        let missed = missed(&self.wrong, pairs);
+        let none = self.wrong.iter().filter(|(_, given)| given.is_none()).count() as u64;
+        // There are as many indices as pairs: those missed have theirs on no pair, or on one that another tests.
+        Tally { pairs, wrong, worst_row: self.worst_row, missed, doubled: missed - none, none }
+    }
+}
+
+/// The index of the pair that is tested: (1, 0) tests 0 and 1, as (0, 1) does.
+fn tested((a, b): (i64, i64), n: i64) -> Option<i64> {
+    let (a, b) = (a.min(b), a.max(b));
+    (0 <= a && a < b && b < n).then(|| row_start(a, n) + b - a - 1)
 }
 
 /// Of the pairs of wrong indices, those that none of them gives.
@@ -163,11 +205,12 @@ mod tests {
             let wrong = pair != AsItIs::pair(row, k, n);
             tally.wrong += u64::from(wrong);
             tally.worst_row = tally.worst_row.max(pair.0.abs_diff(row));
-            *given.entry(pair).or_default() += 1;
+            *given.entry((pair.0.min(pair.1), pair.0.max(pair.1))).or_default() += 1;
         }
         given.retain(|&(a, b), _| 0 <= a && a < b && b < n);
         tally.missed = tally.pairs - given.len() as u64;
         tally.doubled = given.values().map(|times| times - 1).sum();
+        tally.none = tally.pairs - given.values().sum::<u64>();
         tally
     }
 
@@ -201,6 +244,45 @@ mod tests {
         let [as_it_is, rules, integers] = all::<OffByThree>(50);
         assert!(as_it_is.wrong == as_it_is.pairs && as_it_is.worst_row == 3 && as_it_is.missed > 0);
         assert!(rules.missed > 0 && integers.wrong == 0);
+    }
+
+    /// Of 4 boxes, the pair under whose root stands `X` is estimated one row too far.
+    struct OneWrong<const X: i64>;
+
+    impl<const X: i64> Root for OneWrong<X> {
+        fn row(m: i64, x: i64) -> i64 {
+            Double::row(m, x) + i64::from(x == X)
+        }
+        fn lies_in(_: i32, _: i32, _: i32) -> bool {
+            false
+        }
+        fn worst_relative() -> f64 {
+            1.0
+        }
+    }
+
+    #[test]
+    fn a_pair_the_other_way_round_is_tested_twice_and_a_box_with_itself_is_no_pair() {
+        let of = |tally: Tally| [tally.wrong, tally.missed, tally.doubled, tally.none];
+        // Index 1, (0, 2), gives (1, 0), which index 0 tests; index 2, (0, 3), gives (1, 1).
+        assert_eq!(of(all::<OneWrong<{ 49 - 8 }>>(4)[0]), [1, 1, 1, 0]);
+        assert_eq!(of(all::<OneWrong<{ 49 - 16 }>>(4)[0]), [1, 1, 0, 1]);
+        // Index 3, (1, 2), gives (2, 1): wrong, but nothing is missed.
+        assert_eq!(of(all::<OneWrong<{ 49 - 24 }>>(4)[0]), [1, 0, 0, 0]);
+        // By the rules all three are right.
+        assert_eq!(of(all::<OneWrong<{ 49 - 8 }>>(4)[1]), [0; 4]);
+    }
+
+    #[test]
+    fn pairs_given_one_by_one_are_counted_alike() {
+        let of = |given: &[(i64, i64)]| {
+            let tally = of(3, given.iter().copied());
+            [tally.wrong, tally.missed, tally.doubled, tally.none]
+        };
+        assert_eq!(of(&[(0, 1), (0, 2), (1, 2)]), [0; 4]);
+        assert_eq!(of(&[(0, 1), (1, 0), (1, 2)]), [1, 1, 1, 0]);
+        assert_eq!(of(&[(0, 1), (0, 2)]), [1, 1, 0, 1], "one too few");
+        assert_eq!(of(&[(0, 1), (0, 2), (1, 2), (1, 2)]), [1, 0, 1, 0], "one too many");
     }
 
     #[test]

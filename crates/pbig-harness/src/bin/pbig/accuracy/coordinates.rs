@@ -221,12 +221,13 @@ fn notes(rows: &[Row]) -> Vec<String> {
     });
     vec![
         "One grid by lower corners, its cell the largest extent; each box is tested against those in the half \
-         neighbourhood. Boxes are records in the order of cells, one test at a time, whatever the coordinates. Spurious: \
-         let through and then ended by the exact test, as a share of the pairs."
+         neighbourhood. Boxes are records in the order of cells, one test at a time, whatever the coordinates. \
+         Spurious: let through and then ended by the exact test, as a share of the pairs."
             .to_owned(),
-        "No kind misses a pair: a run in which the pairs differ from pbig's fails. What is stored of a minimum is never \
-         above it and of a maximum never below (or all is rounded down by one monotone function, which keeps their order): \
-         `tests/suite/precision.rs` holds that over all floats."
+        "No kind misses a pair: a run in which the pairs differ from pbig's fails. What is stored of a minimum is \
+         never above it and of a maximum never below (or all is rounded down by one monotone function, which \
+         keeps their order): `tests/suite/precision.rs` holds each rule of that against 100,000 random cases, \
+         every magnitude as likely, zeros, denormals and infinities among them: no proof over all floats."
             .to_owned(),
         format!("Against f32: {}.", told.collect::<Vec<_>>().join("; ")),
         verdict(rows),
@@ -245,8 +246,8 @@ fn verdict(rows: &[Row]) -> String {
         "a `Precision` to choose would gain nothing"
     };
     format!(
-        "On the CPU pbig already tests 64-bit codes, eight bytes a box, and f32 only for what they let through. The fastest \
-         of 16 bits, {name}, takes {ratio:.2} times the time of codes: {pays} there."
+        "On the CPU pbig already tests 64-bit codes, eight bytes a box, and f32 only for what they let through. \
+         The fastest of 16 bits, {name}, takes {ratio:.2} times the time of codes: {pays} there."
     )
 }
 

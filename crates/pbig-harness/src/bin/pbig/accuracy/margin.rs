@@ -2,14 +2,16 @@
 
 mod boxes;
 mod tally;
+mod verdict;
 mod worlds;
 
 use super::study::{Cell, Point, Study, Table};
 use crate::output::Failure;
 use pbig_harness::reported::Reported;
-use pbig_harness::runner::{Spread, StepTime};
+use pbig_harness::runner::StepTime;
 use rapier_pbig::PbigBroadPhase;
 use tally::{MARGINS, Passes};
+use verdict::{against_default, criterion, over_all};
 
 pub(super) fn run(quick: bool) -> Result<Study, Failure> {
     let mut rows = worlds::measured(quick)?;
@@ -44,13 +46,13 @@ struct Row {
     /// Of the steps compared, all together.
     reported: Reported,
     compared: u64,
-    /// Between two passes, as shares.
-    noise: StepTime,
+    /// A step of each pass, on average.
+    passes: Vec<StepTime>,
 }
 
 /// The rows of a case.
 fn rows(case: &str, boxes: usize, edge: f32, has_step: bool, passes: &Passes) -> Result<Vec<Row>, Failure> {
-    let row = |(&margin, tally): (&f64, &tally::Tally)| {
+    let row = |((&margin, tally), means): ((&f64, &tally::Tally), &Vec<StepTime>)| {
         let percent = |part: u64, of: f64| part as f64 / of.max(1.0) * 100.0;
         Row {
             case: case.to_owned(),
@@ -63,10 +65,10 @@ fn rows(case: &str, boxes: usize, edge: f32, has_step: bool, passes: &Passes) ->
             step: has_step.then(|| tally.mean(|time| time.step)),
             reported: tally.reported,
             compared: tally.compared,
-            noise: passes.noise,
+            passes: means.clone(),
         }
     };
-    MARGINS.iter().zip(&passes.tallies).map(row).map(complete).collect()
+    MARGINS.iter().zip(&passes.tallies).zip(&passes.means).map(row).map(complete).collect()
 }
 
 fn complete(row: Row) -> Result<Row, Failure> {
@@ -118,13 +120,15 @@ fn table(rows: &[Row]) -> Table {
 /// What is compared.
 struct Time {
     what: &'static str,
+    /// Of the shorter time of each step.
     of: fn(&Row) -> Option<f64>,
-    noise: fn(&Row) -> f64,
+    /// Of one pass.
+    in_pass: fn(&StepTime) -> f64,
 }
 
 const BROAD_PHASE: Time =
-    Time { what: "the broad phase", of: |row| Some(row.broad_phase), noise: |row| row.noise.broad_phase };
-const STEP: Time = Time { what: "the whole step of rapier", of: |row| row.step, noise: |row| row.noise.step };
+    Time { what: "the broad phase", of: |row| Some(row.broad_phase), in_pass: |time| time.broad_phase };
+const STEP: Time = Time { what: "the whole step of rapier", of: |row| row.step, in_pass: |time| time.step };
 
 /// Which of [`MARGINS`] is rapier-pbig's default.
 fn default_margin() -> usize {
@@ -152,89 +156,58 @@ fn best(rows: &[Row]) -> Table {
     table
 }
 
-/// A margin's time over the default's: geometric mean over the cases that have one.
-fn against_default(rows: &[Row], margin: usize, Time { of: time, .. }: &Time) -> f64 {
-    let ratio = |case: &[Row]| Some((time(&case[margin])? / time(&case[default_margin()])?).ln());
-    let logs: Vec<f64> = rows.chunks_exact(MARGINS.len()).filter_map(ratio).collect();
-    (logs.iter().sum::<f64>() / logs.len().max(1) as f64).exp()
-}
-
 fn largest_extra(rows: &[Row], margin: usize) -> f64 {
     let of_margin = rows.chunks_exact(MARGINS.len()).map(|case| case[margin].reported.extra_percent());
     of_margin.fold(0.0, f64::max)
 }
 
 fn means(rows: &[Row]) -> Table {
-    let title = "Over all cases, times those of the default (geometric means)";
-    let columns = ["margin", "broad_phase", "whole_step", "largest_extra_percent"];
+    let title =
+        "Over all cases, times those of the default (geometric means over cases and passes), and their noise";
+    let columns = [
+        "margin",
+        "broad_phase",
+        "broad_phase_noise_percent",
+        "whole_step",
+        "whole_step_noise_percent",
+        "largest_extra_percent",
+    ];
     let mut table = Table::new("means", title, &columns);
     for (k, margin) in MARGINS.iter().enumerate() {
         let times = [BROAD_PHASE, STEP].map(|time| against_default(rows, k, &time));
-        table.row([*margin, times[0], times[1], largest_extra(rows, k)].map(Cell::from));
+        let times = times.iter().flat_map(|against| [against.times, against.noise]);
+        let all = [*margin].into_iter().chain(times).chain([largest_extra(rows, k)]);
+        table.row(all.map(Cell::from));
     }
     table
-}
-
-/// Between two passes, in the middle of the cases that have such a time; %.
-fn noise_percent(rows: &[Row], time: &Time) -> f64 {
-    let measured = rows.chunks(MARGINS.len()).map(|case| &case[0]).filter(|row| (time.of)(row).is_some());
-    Spread::of(measured.map(time.noise)).median * 100.0
 }
 
 fn notes(rows: &[Row]) -> Vec<String> {
     let compared: u64 = rows.iter().map(|row| row.compared).sum();
     vec![
-        "Margins are in units of rapier's `length_unit`, as `Config::margin`. From one state of a scene a world with each \
-         margin goes on, all in turn step by step; the steps are made twice, and of each the shorter time counts. Moved: \
-         boxes that the broad phase was told of. Changed: those of them that were no longer in their stored box. Drifting \
-         and trembling: unit cubes without rapier, all set in each step."
+        "Margins are in units of rapier's `length_unit`, as `Config::margin`. From one state of a scene a world \
+         with each margin goes on, all in turn step by step; the steps are made twice. Of each the shorter time \
+         counts for a case; means over cases and their noise are of both passes. Moved: boxes that the broad \
+         phase was told of. Changed: those of them that were no longer in their stored box. Drifting and \
+         trembling: unit cubes without rapier, all set in each step."
             .to_owned(),
         format!(
-            "No margin misses a pair: the run fails if one does. Compared {compared} times: worlds with brute force over \
-             the boxes of enabled colliders, the others with a search from nothing."
+            "No margin misses a pair: the run fails if one does. Compared {compared} times: worlds with brute \
+             force over the boxes of enabled colliders, the others with a search from nothing."
         ),
-        over_all(rows, &BROAD_PHASE),
+        criterion(rows),
         over_all(rows, &STEP),
+        over_all(rows, &BROAD_PHASE),
     ]
 }
 
-/// In how many of how many cases the default takes as long as the fastest margin, but for the noise.
-fn as_fast(rows: &[Row], time: &Time) -> (usize, usize) {
-    let times = rows.chunks(MARGINS.len()).filter_map(|case| Some(fastest(case, time)?.1));
-    let limit = 1.0 + noise_percent(rows, time) / 100.0;
-    (times.clone().filter(|times| *times <= limit).count(), times.count())
-}
-
-/// Which margin is fastest over all, and whether that is far from the default.
-fn over_all(rows: &[Row], time: &Time) -> String {
-    let mean = |k: &usize| against_default(rows, *k, time);
-    let noise = noise_percent(rows, time);
-    let (as_fast, cases) = as_fast(rows, time);
-    let best = (0..MARGINS.len()).min_by(|a, b| mean(a).total_cmp(&mean(b))).unwrap_or_default();
-    let (default, slower) = (MARGINS[default_margin()], (1.0 / mean(&best) - 1.0) * 100.0);
-    let verdict = if best == default_margin() {
-        "that is the default".to_owned()
-    } else if slower <= noise {
-        format!("the default, {default}, takes {slower:.1}% longer, which is within the noise")
-    } else {
-        format!("the default, {default}, takes {slower:.1}% longer")
-    };
-    let (margin, extra) = (MARGINS[best], largest_extra(rows, best));
-    format!(
-        "For {}, over all cases, a margin of {margin} is fastest: {verdict}. It has at most {extra:.1}% extra pairs, the \
-         default {:.1}%. In {as_fast} of {cases} cases the default is as fast as any, but for the noise: two passes of \
-         the same steps differ by {noise:.1}%, the median.",
-        time.what,
-        largest_extra(rows, default_margin())
-    )
-}
-
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
 
-    /// Cases in which a margin takes so many milliseconds; extra pairs are its place in the list.
-    fn made(cases: &[[f64; MARGINS.len()]], has_step: bool) -> Vec<Row> {
+    /// Cases in which a margin takes so many milliseconds; extra pairs are its place in the list. Between two passes
+    /// all but the default differ by 2%.
+    pub(super) fn made(cases: &[[f64; MARGINS.len()]], has_step: bool) -> Vec<Row> {
         let row = |k: usize, ms: f64| Row {
             case: "a case".into(),
             boxes: 10,
@@ -246,9 +219,13 @@ mod tests {
             step: has_step.then_some(10.0 * ms),
             reported: Reported { needed: 100, extra: k as u64, missed: 0 },
             compared: 1,
-            noise: StepTime { broad_phase: 0.02, step: 0.03 },
+            passes: passes(if k == default_margin() { 0.0 } else { 0.01 }, ms),
         };
         cases.iter().flat_map(|case| case.iter().enumerate().map(move |(k, ms)| row(k, *ms))).collect()
+    }
+
+    fn passes(off: f64, ms: f64) -> Vec<StepTime> {
+        [-off, off].map(|off| StepTime { broad_phase: ms * off.exp(), step: 10.0 * ms * off.exp() }).to_vec()
     }
 
     #[test]
@@ -263,33 +240,6 @@ mod tests {
         assert_eq!(fastest(&made(&[[1.0; MARGINS.len()]], false), &STEP), None);
         let row = &best(&rows).rows[0];
         assert_eq!((&row[2], &row[4]), (&Cell::Number(2.0), &Cell::Number(2.0)));
-    }
-
-    #[test]
-    fn cases_count_alike_whatever_their_size() {
-        let mut cases = [[1.0; MARGINS.len()], [100.0; MARGINS.len()]];
-        (cases[0][4], cases[1][4]) = (0.5, 50.0 / 4.0);
-        let rows = made(&cases, true);
-        assert!((against_default(&rows, 4, &BROAD_PHASE) - 0.25).abs() < 1e-12);
-        let told = over_all(&rows, &STEP);
-        assert!(told.contains("a margin of 0.05") && told.contains("300.0% longer."), "{told}");
-        assert!(told.contains("at most 4.0% extra pairs, the default 2.0%"), "{told}");
-        assert!(told.contains("In 0 of 2 cases the default is as fast"), "{told}");
-    }
-
-    #[test]
-    fn what_is_within_the_noise_is_said_to_be() {
-        let mut case = [1.0; MARGINS.len()];
-        case[0] = 0.99;
-        let told = over_all(&made(&[case], true), &BROAD_PHASE);
-        assert!(
-            told.contains("1.0% longer, which is within the noise") && told.contains("by 2.0%"),
-            "{told}"
-        );
-        assert!(told.contains("In 1 of 1 cases the default is as fast"), "{told}");
-        case[default_margin()] = 0.9;
-        let told = over_all(&made(&[case], true), &BROAD_PHASE);
-        assert!(told.contains("that is the default"), "{told}");
     }
 
     #[test]

@@ -14,6 +14,7 @@ use crate::bench::{DOCUMENTS, keep, save};
 use crate::output::{Failure, print, progress};
 use serde_json::{Map, Value, json};
 use std::path::{Path, PathBuf};
+use std::time::Instant;
 use study::Study;
 
 #[derive(clap::Args)]
@@ -49,10 +50,11 @@ fn names() -> clap::builder::PossibleValuesParser {
 }
 
 pub(crate) fn run(args: &Args) -> Result<(), Failure> {
+    let clock = Instant::now();
     let studies = made(args)?;
-    let machine = Machine::here();
-    let object = object(&machine, &studies);
-    let text = document(&machine, &studies);
+    let (machine, seconds) = (Machine::here(), clock.elapsed().as_secs_f64());
+    let object = object(&machine, seconds, &studies);
+    let text = document(&machine, seconds, &studies);
     if args.json {
         print(&object.to_string())?
     } else {
@@ -69,57 +71,95 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
     keep(&format!("accuracy-{}", slug(&machine.cpu)), &object, args.json)
 }
 
-fn made(args: &Args) -> Result<Vec<Study>, Failure> {
+/// A study, and how long it took.
+struct Made {
+    study: Study,
+    seconds: f64,
+}
+
+impl Made {
+    fn by(run: Run, quick: bool) -> Result<Self, Failure> {
+        let clock = Instant::now();
+        let study = run(quick)?;
+        Ok(Self { study, seconds: clock.elapsed().as_secs_f64() })
+    }
+}
+
+fn made(args: &Args) -> Result<Vec<Made>, Failure> {
     let wanted = |name: &str| args.only.as_deref().is_none_or(|only| only == name);
     let bar = progress(STUDIES.len(), "studies");
     let chosen = STUDIES.iter().filter(|(name, _)| wanted(name));
-    let studies = chosen.map(|(_, run)| run(args.quick).inspect(|_| bar.inc(1))).collect();
+    let studies = chosen.map(|(_, run)| Made::by(*run, args.quick).inspect(|_| bar.inc(1))).collect();
     bar.finish_and_clear();
     studies
 }
 
-fn plot(folder: &Path, studies: &[Study]) -> Result<(), Failure> {
+fn plot(folder: &Path, studies: &[Made]) -> Result<(), Failure> {
     let made = std::fs::create_dir_all(folder);
     made.map_err(|error| Failure::Input(format!("{}: {error}", folder.display())))?;
-    for chart in studies.iter().map(Study::chart) {
+    for chart in studies.iter().map(|made| made.study.chart()) {
         chart.write(&folder.join(format!("{}.svg", chart.name)))?;
     }
     Ok(())
 }
 
-fn object(machine: &Machine, studies: &[Study]) -> Value {
-    let named: Map<String, Value> =
-        studies.iter().map(|study| (study.name.to_owned(), study.object())).collect();
-    json!({ "day": machine.day, "machine": machine.object(), "studies": named })
+fn object(machine: &Machine, seconds: f64, studies: &[Made]) -> Value {
+    let named = studies.iter().map(|Made { study, seconds }| {
+        let mut object = study.object();
+        object["seconds"] = json!(seconds);
+        (study.name.to_owned(), object)
+    });
+    let named: Map<String, Value> = named.collect();
+    json!({ "day": machine.day, "machine": machine.object(), "seconds": seconds, "studies": named })
 }
 
-fn document(machine: &Machine, studies: &[Study]) -> String {
-    let parts: String = studies.iter().map(|study| format!("\n{}", study.markdown())).collect();
+fn document(machine: &Machine, seconds: f64, studies: &[Made]) -> String {
+    let parts: String =
+        studies.iter().map(|made| format!("\n{}", made.study.markdown(made.seconds))).collect();
     let head = "# `pbig accuracy`\n\nRun time against error. Written by that command, nothing by hand.";
     let zero = "In the charts both axes are logarithmic; what is never wrong lies on the line below, at 0.";
-    format!("{head} {}.\n{zero}\n{parts}", machine.line())
+    let each = studies.iter().map(|made| format!("{} {}", made.study.name, study::clock(made.seconds)));
+    let each = each.collect::<Vec<_>>().join(", ");
+    let took = format!("The run took {} from end to end: {each}.", study::clock(seconds));
+    format!("{head} {}.\n{took}\n{zero}\n{parts}", machine.line())
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
+    fn small() -> [Made; 1] {
+        [Made { study: study::tests::small(), seconds: 9.6 }]
+    }
+
     #[test]
-    fn the_document_has_the_machine_and_every_study() {
+    fn the_document_has_the_machine_every_study_and_how_long_it_took() {
         let machine = Machine::here();
-        let text = document(&machine, &[study::tests::small()]);
-        for part in ["threads", "## a small study", "- a note\n"] {
+        let text = document(&machine, 432.1, &small());
+        let took = "The run took 7 min 12 s from end to end: small 9.6 s.";
+        for part in ["threads", "## a small study\n\nTook 9.6 s.\n\n- a note\n", took] {
             assert!(text.contains(part), "{part} is not in:\n{text}");
         }
-        let object = object(&machine, &[study::tests::small()]);
+        let object = object(&machine, 432.1, &small());
         assert_eq!(object["studies"]["small"]["points"][1]["error"], 0.0);
+        assert_eq!(
+            (&object["seconds"], &object["studies"]["small"]["seconds"]),
+            (&json!(432.1), &json!(9.6))
+        );
+    }
+
+    #[test]
+    fn a_study_is_timed() {
+        let made = Made::by(|_| Ok(study::tests::small()), true).expect("no failure");
+        assert!(made.study.name == "small" && made.seconds < 1.0);
+        assert!(Made::by(|_| Err(Failure::Check("wrong".into())), true).is_err());
     }
 
     #[test]
     fn charts_are_written_into_a_folder_that_is_made_for_them() {
         let folder = tempfile::tempdir().expect("a folder");
         let inner = folder.path().join("charts");
-        plot(&inner, &[study::tests::small()]).expect("written");
+        plot(&inner, &small()).expect("written");
         let text = std::fs::read_to_string(inner.join("accuracy-small.svg")).expect("a chart");
         assert!(text.contains("a small study"));
     }

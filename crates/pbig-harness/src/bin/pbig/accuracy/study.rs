@@ -55,7 +55,7 @@ impl Cell {
             Self::Text(text) => text.clone(),
             Self::Count(count) => count.to_string(),
             Self::Number(number) => plain(*number),
-            Self::Nothing => String::new(),
+            Self::Nothing => "-".into(),
         }
     }
 
@@ -80,6 +80,16 @@ pub(super) fn plain(number: f64) -> String {
     }
     let digits = (3 - size.log10().floor() as i32).clamp(0, 6) as usize;
     format!("{number:.digits$}")
+}
+
+/// A time in minutes and seconds; below a minute with a digit behind the point.
+pub(super) fn clock(seconds: f64) -> String {
+    // What rounds to 60 is a minute.
+    if seconds < 59.95 {
+        return format!("{seconds:.1} s");
+    }
+    let whole = seconds.round() as u64;
+    format!("{} min {} s", whole / 60, whole % 60)
 }
 
 /// Rows under named columns. A column's name is its key in the JSON; people read it with spaces.
@@ -163,11 +173,13 @@ impl Study {
         Pareto { name, title, x: self.time, y: self.error, lines, joined: self.joined }
     }
 
-    pub(super) fn markdown(&self) -> String {
+    /// Its part of the document, and how long it took.
+    pub(super) fn markdown(&self, seconds: f64) -> String {
         let notes: String = self.notes.iter().map(|note| format!("- {note}\n")).collect();
         let tables: String = self.tables.iter().map(|table| format!("\n{}", table.markdown())).collect();
         let chart = self.chart();
-        format!("## {}\n\n{notes}\n![{}]({}.svg)\n{tables}", self.title, chart.title, chart.name)
+        let head = format!("## {}\n\nTook {}.\n\n{notes}", self.title, clock(seconds));
+        format!("{head}\n![{}]({}.svg)\n{tables}", chart.title, chart.name)
     }
 
     pub(super) fn object(&self) -> Value {
@@ -205,8 +217,8 @@ pub(super) mod tests {
 
     #[test]
     fn a_study_is_the_same_in_the_document_and_in_json() {
-        let text = small().markdown();
-        for part in ["## a small study", "- a note\n", "](accuracy-small.svg)", "| a | 3 | 0.2500 |  |"] {
+        let text = small().markdown(1.0);
+        for part in ["## a small study", "- a note\n", "](accuracy-small.svg)", "| a | 3 | 0.2500 | - |"] {
             assert!(text.contains(part), "{part} is not in:\n{text}");
         }
         assert!(text.contains("| case | boxes | ns per pair | missed |"), "{text}");
@@ -219,6 +231,11 @@ pub(super) mod tests {
         let lines = small().chart().lines;
         assert_eq!(lines.iter().map(|line| line.name.as_str()).collect::<Vec<_>>(), ["one", "two"]);
         assert_eq!(lines[0].points, [(1.0, 0.5), (3.0, 0.1)]);
+    }
+
+    #[test]
+    fn a_time_is_told_in_minutes_and_seconds() {
+        assert_eq!([0.04, 9.95, 59.96, 432.4].map(clock), ["0.0 s", "9.9 s", "1 min 0 s", "7 min 12 s"]);
     }
 
     #[test]

@@ -1,9 +1,9 @@
 //! f32 against f64: the same worlds from the origin to 10^7 from it, the pairs that boxes in f32 miss or add, and what
 //! widening them by ulps does about it.
 //!
-//! Two things are rounded. Poses: rapier holds another world than the one that was meant, and no broad phase can tell. And
-//! boxes, which are computed in f32 from these poses: that is what a broad phase answers for. So there are two truths, in f64
-//! both, and what differs is counted against each.
+//! Two things are rounded. Poses: rapier holds another world than the one that was meant, and no broad phase can
+//! tell. And boxes, which are computed in f32 from these poses: that is what a broad phase answers for. So there are
+//! two truths, in f64 both, and what differs is counted against each.
 
 mod notes;
 mod place;
@@ -45,8 +45,9 @@ fn rows(worlds: &[World]) -> Result<Vec<Row>, Failure> {
     places.map(|(world, (offset, along))| Row::new(world, offset, along)).collect()
 }
 
-/// What has been proved must hold: no pair is missed by boxes that are widened by 2 ulps, at the poses that rapier holds; by 3,
-/// in the world; by boxes in f64 that are rounded outward; nor, at the poses, as far out as the margin does.
+/// What has been proved must hold: no pair is missed by boxes that are widened by 2 ulps, at the poses that rapier
+/// holds; by 3, in the world; by boxes in f64 that are rounded outward; nor, at the poses, as far out as the margin
+/// does.
 fn check(rows: &[Row]) -> Result<(), Failure> {
     for row in rows {
         let near = row.offset < notes::covered();
@@ -88,7 +89,7 @@ fn pairs_table(rows: &[Row]) -> Table {
         "added_by_boxes",
         "missed",
         "added",
-        "largest_shortfall_in_ulps",
+        "largest_shortfall_in_ulps_of_widening",
     ];
     let mut table = Table::new("pairs", title, &columns);
     for row in rows {

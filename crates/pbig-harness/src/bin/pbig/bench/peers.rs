@@ -85,10 +85,11 @@ pub(super) fn run(quick: bool) -> Result<Outcome, Failure> {
 
 fn notes() -> Vec<String> {
     vec![
-        "events: `set` for every box that moved and `update`; parry 0.31 keeps its tree and gives all pairs (1% moved: \
-         those with a moved box), no events; ours runs on all threads where a row does not say otherwise"
+        "events: `set_many` of the boxes that moved and `update`; parry 0.31 keeps its tree and gives all pairs (1% \
+         moved: those with a moved box), no events; ours runs on all threads where a row does not say otherwise"
             .into(),
-        "boxes that move go to and fro, by up to 0.1 on each axis (pile: 0.02); those that drift go on, as far in each frame"
+        "boxes that move go to and fro, by up to 0.1 on each axis (pile: 0.02); those that drift go on, as far in \
+         each frame"
             .into(),
         "x and the targets are about medians; the means, beside, have their part of work that one frame does for many"
             .into(),

@@ -3,9 +3,9 @@
 use super::Outcome;
 use super::measure::{Contest, Effort, medians, timed};
 use super::table::Row;
-use super::ways;
+use super::{shares, ways};
 use crate::output::{Failure, progress};
-use pbig_core::{Aabb, BroadPhase, Config, Error, Finder, Limits, Order, ProxyFilter, StageTimes};
+use pbig_core::{Aabb, BroadPhase, Config, Error, Finder, Limits, Order, ProxyFilter, Report, StageTimes};
 use pbig_harness::boxes::{Wander, cubes};
 use pbig_harness::chart::{Line, LogLog};
 use pbig_harness::runner::{Spread, milliseconds};
@@ -15,7 +15,7 @@ const DISTANCE: f32 = 0.1;
 
 const CONFIG: Config = Config { limits: Limits::UNLIMITED, order: Order::Unspecified, ..Config::DEFAULT };
 
-/// Ours: the whole call, `set` (incremental only), and the stages of the report.
+/// Ours: the whole call, `set_many` (incremental only), and the stages of the report.
 pub(super) const NAMES: [&str; 7] = ["whole", "set", "plan", "map", "check", "emit", "diff"];
 
 pub(super) type Times = [f64; NAMES.len()];
@@ -32,6 +32,31 @@ pub(super) struct Alone {
     wander: Wander,
     moved: Vec<u32>,
     times: Vec<Times>,
+    /// What the plan chose, round by round.
+    chosen: Vec<&'static str>,
+}
+
+/// What the rounds took, and what they were.
+pub(super) struct Measured {
+    pub(super) median: Times,
+    /// In which a frame that builds what many others use has its part.
+    pub(super) mean: Times,
+    pub(super) pairs: u64,
+    /// What the plan chose, and how often.
+    pub(super) chosen: String,
+}
+
+/// How often each name occurs, the most frequent first.
+pub(super) fn counted(names: &[&'static str]) -> String {
+    let mut counts: Vec<(&str, usize)> = vec![];
+    for name in names {
+        match counts.iter_mut().find(|(known, _)| known == name) {
+            Some((_, count)) => *count += 1,
+            None => counts.push((name, 1)),
+        }
+    }
+    counts.sort_by_key(|(_, count)| std::cmp::Reverse(*count));
+    counts.iter().map(|(name, count)| format!("{name} {count}")).collect::<Vec<_>>().join(", ")
 }
 
 impl Alone {
@@ -48,19 +73,24 @@ impl Alone {
 
     fn new(way: Way, boxes: Vec<Aabb>, share: f64, distance: f32) -> Self {
         let moved = (0..boxes.len() as u32).collect();
-        Self { way, wander: Wander::new(boxes, share, distance), moved, times: vec![] }
+        Self { way, wander: Wander::new(boxes, share, distance), moved, times: vec![], chosen: vec![] }
     }
 
-    /// Medians of whole call and stages, and the pairs.
-    pub(super) fn measure(mut self, effort: Effort) -> Result<(Times, u64), Failure> {
+    pub(super) fn measure(mut self, effort: Effort) -> Result<Measured, Failure> {
         medians(&mut self, effort)?;
         let times = &self.times[effort.warm_up..];
-        let median = |k: usize| Spread::of(times.iter().map(|times| times[k])).median;
-        let pairs = match &self.way {
-            Way::Scratch(finder) => finder.pairs().len(),
-            Way::Events(broad_phase) => broad_phase.pair_count(),
-        };
-        Ok((std::array::from_fn(median), pairs as u64))
+        let of = |k: usize| times.iter().map(move |times| times[k]);
+        let median = std::array::from_fn(|k| Spread::of(of(k)).median);
+        let mean = std::array::from_fn(|k| of(k).sum::<f64>() / times.len().max(1) as f64);
+        let (pairs, chosen) = (self.report().pairs, counted(&self.chosen[effort.warm_up..]));
+        Ok(Measured { median, mean, pairs, chosen })
+    }
+
+    fn report(&self) -> &Report {
+        match &self.way {
+            Way::Scratch(finder) => finder.report(),
+            Way::Events(broad_phase) => broad_phase.report(),
+        }
     }
 
     fn find(&mut self) -> Result<Times, Error> {
@@ -106,6 +136,7 @@ impl Contest for Alone {
     fn run(&mut self, _: usize) -> Result<f64, Failure> {
         let times = self.find().map_err(|error| Failure::Input(error.to_string()))?;
         self.times.push(times);
+        self.chosen.push(self.report().plan.chosen.name());
         Ok(times[0])
     }
 }
@@ -117,6 +148,14 @@ struct Sweep {
     x: &'static str,
     scratch: bool,
     points: Vec<Point>,
+}
+
+impl Sweep {
+    /// Of stages: medians from nothing. Of events means, as a frame that makes a list or a grid for many others is none
+    /// that a median shows.
+    fn shown<'a>(&self, measured: &'a Measured) -> &'a Times {
+        if self.scratch { &measured.median } else { &measured.mean }
+    }
 }
 
 struct Point {
@@ -160,19 +199,21 @@ pub(super) fn run(quick: bool) -> Result<Outcome, Failure> {
     for sweep in &sweeps {
         let mut lines = NAMES.map(|name| Line { name: name.into(), points: Vec::new() });
         for point in &sweep.points {
-            let (times, pairs) = at(sweep, point, effort)?;
-            lines.iter_mut().zip(times).for_each(|(line, ms)| line.points.push((point.x, ms)));
-            rows.push(row(sweep, point, &times, pairs));
+            let measured = at(sweep, point, effort)?;
+            let times = sweep.shown(&measured);
+            lines.iter_mut().zip(times).for_each(|(line, &ms)| line.points.push((point.x, ms)));
+            rows.push(row(sweep, point, &measured));
             bar.inc(1);
         }
         charts.push(chart(sweep, lines.into()));
     }
     bar.finish_and_clear();
-    ways::run(effort, &mut rows, &mut charts)?;
-    Ok(Outcome { rows, notes: notes(), charts })
+    let crossings = ways::run(effort, &mut rows, &mut charts)?;
+    let won = shares::run(quick, &mut rows, &mut charts)?;
+    Ok(Outcome { rows, notes: [notes(), crossings, won].concat(), charts })
 }
 
-fn at(sweep: &Sweep, point: &Point, effort: Effort) -> Result<(Times, u64), Failure> {
+fn at(sweep: &Sweep, point: &Point, effort: Effort) -> Result<Measured, Failure> {
     let boxes = cubes(point.boxes, point.spread as f32, point.pairs as f32, 1);
     let alone = if sweep.scratch {
         Alone::scratch(boxes, point.share, DISTANCE)
@@ -186,10 +227,12 @@ fn what(sweep: &Sweep) -> &'static str {
     if sweep.scratch { "from scratch" } else { "events" }
 }
 
-fn row(sweep: &Sweep, point: &Point, times: &Times, pairs: u64) -> Row {
+fn row(sweep: &Sweep, point: &Point, measured: &Measured) -> Row {
+    let times = sweep.shown(measured);
     let stages = NAMES.into_iter().zip(*times).skip(1).filter(|(_, time)| *time > 0.0).collect();
     let case = format!("{}, {} {}", what(sweep), sweep.x, point.x);
-    Row::new(case, point.boxes, pairs).ours(times[0]).stages(stages)
+    let row = Row::new(case, point.boxes, measured.pairs).ours(measured.median[0]).mean(measured.mean[0]);
+    row.stages(stages).note(measured.chosen.clone())
 }
 
 /// Stages that this way does not have are left out.
@@ -199,7 +242,7 @@ fn chart(sweep: &Sweep, lines: Vec<Line>) -> LogLog {
         name: format!("stages-{}", sweep.name),
         title: format!("{}: time by stage", what(sweep)),
         x: sweep.x,
-        y: "ms",
+        y: if sweep.scratch { "ms" } else { "ms, means" },
         lines: lines.into_iter().filter(used).collect(),
     }
 }
@@ -208,8 +251,36 @@ fn notes() -> Vec<String> {
     vec![
         "cubes, edges around 1, about one pair a box unless that is varied; all move by up to 0.1 unless that is varied"
             .into(),
-        "ways: `Finder` as planned, and with each way it may choose forced upon it".into(),
-        "from scratch: `Finder` with `Order::Unspecified`; events: `BroadPhase`, `set` for each moved box and `update`"
+        "from scratch: `Finder` with `Order::Unspecified`; events: `BroadPhase`, `set_many` of the moved boxes (the \
+         stage `set`) and `update`"
+            .into(),
+        "ours is a median, its mean beside it; stages from scratch are medians, those of events and their charts \
+         means, which have the frames in them that make a list or a grid for many others; last, what the plan chose \
+         in how many calls"
+            .into(),
+        "ways: `Finder` as planned (ours), and made to test every pair, to use the grid, or to use PBIG's own grid, \
+         which no plan chooses; one grid or several levels cannot be asked for"
             .into(),
     ]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_frame_that_works_for_many_is_in_the_mean_and_named() {
+        let effort = Effort { warm_up: 12, rounds: 40, budget: std::time::Duration::MAX };
+        let alone = Alone::events(cubes(2000, 1.0, 1.0, 1), 1.0, DISTANCE).expect("a good margin");
+        let Measured { mean, pairs, chosen, .. } = alone.measure(effort).expect("measured");
+        let parts: f64 = mean[1..].iter().sum();
+        assert!(parts > 0.0 && parts <= mean[0] * 1.001, "{mean:?}");
+        assert!(pairs > 0 && chosen.chars().any(|c| c.is_ascii_digit()), "{chosen}");
+    }
+
+    #[test]
+    fn names_are_counted() {
+        assert_eq!(counted(&["grid", "near", "near"]), "near 2, grid 1");
+        assert_eq!(counted(&[]), "");
+    }
 }

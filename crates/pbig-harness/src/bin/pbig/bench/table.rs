@@ -51,14 +51,16 @@ pub(crate) struct Row {
     target: Option<Target>,
     unit: Unit,
     stages: Vec<(&'static str, f64)>,
+    /// Beside ours where that is a median.
+    mean: Option<f64>,
     note: Option<String>,
 }
 
 impl Row {
     pub(crate) fn new(case: impl Into<String>, boxes: usize, pairs: u64) -> Self {
         let case = case.into();
-        let (ours, other, target, note) = (None, None, None, None);
-        Self { case, boxes, pairs, ours, other, target, unit: Unit::Ms, stages: vec![], note }
+        let (ours, other, target, mean, note) = (None, None, None, None, None);
+        Self { case, boxes, pairs, ours, other, target, unit: Unit::Ms, stages: vec![], mean, note }
     }
 
     /// Ours; never 0, which no clock means.
@@ -88,6 +90,10 @@ impl Row {
 
     pub(crate) fn stages(self, stages: Vec<(&'static str, f64)>) -> Self {
         Self { stages, ..self }
+    }
+
+    pub(crate) fn mean(self, value: f64) -> Self {
+        Self { mean: Some(value), ..self }
     }
 
     pub(crate) fn note(self, note: impl Into<String>) -> Self {
@@ -135,8 +141,9 @@ impl Row {
     }
 
     fn rest(&self) -> String {
+        let mean = self.mean.map(|mean| format!("mean {}", self.unit.text(mean)));
         let stages = self.stages.iter().map(|(name, time)| format!("{name} {}", Unit::Ms.text(*time)));
-        stages.chain(self.note.clone()).collect::<Vec<_>>().join(", ")
+        mean.into_iter().chain(stages).chain(self.note.clone()).collect::<Vec<_>>().join(", ")
     }
 
     fn cells(&self) -> [String; 9] {
@@ -161,7 +168,7 @@ impl Row {
             self.stages.iter().map(|(name, time)| ((*name).to_owned(), json!(time))).collect();
         json!({
             "case": self.case, "boxes": self.boxes, "pairs": self.pairs,
-            key("ours"): self.ours,
+            key("ours"): self.ours, "mean_ms": self.mean,
             "other": self.other.map(|(name, _)| name), key("other"): self.other.map(|(_, value)| value),
             "ratio": self.ratio(), "target": target, "met": self.met(), "missed_by": self.missed_by(),
             "stages_ms": stages, "note": self.note,

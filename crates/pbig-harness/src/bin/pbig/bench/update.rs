@@ -174,7 +174,9 @@ fn notes() -> Vec<String> {
         ),
         "x and the target are about medians; the means, beside, have their part of work that one call does for many"
             .into(),
-        "floor: reading each moved collider and computing its box, and nothing else".into(),
+        "floor: reading each moved collider and computing its box, and nothing else; the target is about the floor on \
+         one thread, while ours runs on all"
+            .into(),
     ]
 }
 

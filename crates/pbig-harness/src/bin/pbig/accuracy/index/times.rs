@@ -3,7 +3,8 @@
 use super::super::study::{Cell, Table};
 use crate::bench::measure::{Contest, Effort, medians, timed};
 use crate::output::Failure;
-use pbig_harness::index::{Block, CORRECTIONS, WAYS, Way, pass_bisection, pass_integer_root, pass_lazy};
+use pbig_harness::index::{Block, CORRECTIONS, EXACT, WAYS, Way};
+use pbig_harness::index::{pass_bisection, pass_integer_root, pass_lazy};
 use pbig_harness::runner::Spread;
 use std::hint::black_box;
 use std::time::Duration;
@@ -12,16 +13,13 @@ use std::time::Duration;
 const BLOCKS: i64 = 16;
 const BLOCK: i64 = 2048;
 
-/// Ways without an estimated root, after those that have one.
-const OTHERS: [&str; 3] = ["bisection over rows", "integer root", "lazy way"];
-
 /// Nanoseconds for a pair at one number of boxes.
 pub(super) struct Times {
     pub(super) n: i64,
     /// By way, as it is, by the rules, by integers.
     pub(super) ways: [[f64; 3]; WAYS.len()],
-    /// In the order of [`OTHERS`].
-    others: [f64; 3],
+    /// In the order of [`EXACT`].
+    pub(super) exact: [f64; EXACT.len()],
 }
 
 impl Times {
@@ -34,25 +32,21 @@ impl Times {
         // could warm for the next.
         let medians: Vec<f64> =
             sides.times.iter().map(|times| Spread::of(times.iter().copied()).median).collect();
-        let (ways, others) = medians.split_at(3 * WAYS.len());
+        let (ways, exact) = medians.split_at(3 * WAYS.len());
         Ok(Self {
             n,
             ways: std::array::from_fn(|way| std::array::from_fn(|fix| ways[3 * way + fix])),
-            others: std::array::from_fn(|k| others[k]),
+            exact: std::array::from_fn(|k| exact[k]),
         })
     }
 
-    /// With the processor's root in f32 and nothing else, as the paper has it.
-    pub(super) fn f32_root(&self) -> f64 {
-        self.ways[0][0]
-    }
-
-    pub(super) fn exact(&self) -> [(&'static str, f64); 3] {
-        std::array::from_fn(|k| (OTHERS[k], self.others[k]))
+    /// With the processor's root in f32: as it is, by the rules.
+    pub(super) fn f32_root(&self) -> [f64; 2] {
+        [self.ways[0][0], self.ways[0][1]]
     }
 
     pub(super) fn lazy(&self) -> f64 {
-        self.others[2]
+        self.exact[2]
     }
 }
 
@@ -71,7 +65,7 @@ struct Sides {
 }
 
 /// Ways with their corrections, and the others.
-const SIDES: usize = 3 * WAYS.len() + OTHERS.len();
+const SIDES: usize = 3 * WAYS.len() + EXACT.len();
 
 impl Contest for Sides {
     fn sides(&self) -> usize {
@@ -114,8 +108,8 @@ pub(super) fn table(times: &[Times]) -> Table {
         for (way, ns) in WAYS.iter().zip(times.ways) {
             table.row([Cell::from(times.n as u64), label(way).into()].into_iter().chain(ns.map(Cell::from)));
         }
-        for (name, ns) in times.exact() {
-            table.row([(times.n as u64).into(), name.into(), ns.into(), Cell::Nothing, Cell::Nothing]);
+        for (way, ns) in EXACT.iter().zip(times.exact) {
+            table.row([(times.n as u64).into(), way.name.into(), ns.into(), Cell::Nothing, Cell::Nothing]);
         }
     }
     table
@@ -136,8 +130,8 @@ mod tests {
     #[test]
     fn every_way_has_a_time() {
         let times = Times::measure(50, true).expect("no failure");
-        let all = times.ways.iter().flatten().chain(&times.others);
+        let all = times.ways.iter().flatten().chain(&times.exact);
         assert!(all.into_iter().all(|ns| ns.is_finite() && *ns > 0.0));
-        assert_eq!(table(&[times]).rows.len(), WAYS.len() + OTHERS.len());
+        assert_eq!(table(&[times]).rows.len(), WAYS.len() + EXACT.len());
     }
 }

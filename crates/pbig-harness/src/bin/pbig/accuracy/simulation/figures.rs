@@ -26,7 +26,8 @@ pub(super) struct Figures {
     pub(super) energy: f64,
     /// The most that energy has risen above what it had been, % of that after the first step.
     pub(super) rise: f64,
-    /// The most that the sum of momenta has moved, % of the sum of their sizes at first; where nothing acts from outside.
+    /// The most that the sum of momenta has moved, % of the sum of their sizes at first; where nothing acts from
+    /// outside.
     pub(super) momentum: Option<f64>,
     /// The step from which on the world is at rest.
     pub(super) rest: Option<usize>,
@@ -129,12 +130,14 @@ pub(super) struct Quantity {
     pub(super) name: &'static str,
     /// None where it has no meaning.
     pub(super) of: fn(&Figures) -> Option<f64>,
+    /// Whether it came about in a run: where in neither of two, there is nothing to compare.
+    came: fn(&Figures) -> bool,
     /// Less is no difference.
     resolution: f64,
 }
 
 const fn quantity(name: &'static str, of: fn(&Figures) -> Option<f64>) -> Quantity {
-    Quantity { name, of, resolution: 0.0 }
+    Quantity { name, of, came: |_| true, resolution: 0.0 }
 }
 
 /// How far bodies have come from those of the first way.
@@ -150,23 +153,40 @@ pub(super) const QUANTITIES: [Quantity; 10] = [
     quantity("rise of energy", |f| Some(f.rise)),
     quantity("drift of momentum", |f| f.momentum),
     // One that never rests does so after the run.
-    Quantity { resolution: 1.0, ..quantity("time to rest", |f| Some(f.rest.unwrap_or(f.steps + 1) as f64)) },
+    Quantity {
+        resolution: 1.0,
+        came: |f| f.rest.is_some(),
+        ..quantity("time to rest", |f| Some(f.rest.unwrap_or(f.steps + 1) as f64))
+    },
     DISTANCE,
     quantity("largest distance at the end", |f| Some(f.apart.max)),
 ];
 
-/// How far a run is from the first one in a quantity, as a multiple of the farthest of the yardsticks. None where the
-/// quantity has no meaning for one of them.
+/// How far a run is from the first one in a quantity.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Multiple {
+    /// As a multiple of the farthest of the yardsticks. None where the quantity came about in neither run.
+    pub(super) times: Option<f64>,
+    /// The run's, the first one's, and that of the yardstick that is farthest from the first.
+    pub(super) values: [f64; 3],
+}
+
+/// None where the quantity has no meaning for one of them.
 pub(super) fn multiple(
     run: &Figures,
     first: &Figures,
     yardsticks: &[&Figures],
-    Quantity { of, resolution, .. }: Quantity,
-) -> Option<f64> {
-    let from_first = |figures: &Figures| Some((of(figures)? - of(first)?).abs());
-    let reach = yardsticks.iter().map(|figures| from_first(figures)).collect::<Option<Vec<_>>>()?;
-    let (far, reach) = (from_first(run)?, reach.into_iter().fold(resolution, f64::max));
-    Some(if far == 0.0 { 0.0 } else { far / reach })
+    Quantity { of, came, resolution, .. }: Quantity,
+) -> Option<Multiple> {
+    let [here, there] = [of(run)?, of(first)?];
+    let values = yardsticks.iter().map(|figures| of(figures)).collect::<Option<Vec<_>>>()?;
+    let from_there = |value: f64| (value - there).abs();
+    let farthest =
+        values.into_iter().max_by(|a, b| from_there(*a).total_cmp(&from_there(*b))).unwrap_or(there);
+    let (far, reach) = (from_there(here), from_there(farthest).max(resolution));
+    let times = if far == 0.0 { 0.0 } else { far / reach };
+    let is_there = came(run) || came(first);
+    Some(Multiple { times: is_there.then_some(times), values: [here, there, farthest] })
 }
 
 #[cfg(test)]
@@ -225,20 +245,35 @@ pub(super) mod tests {
     fn distances_are_multiples_of_the_farthest_yardstick() {
         let with = |contacts| Figures { contacts, ..nothing() };
         let (first, far, near) = (with(100.0), with(110.0), with(98.0));
-        let times = |run| multiple(&with(run), &first, &[&near, &far], QUANTITIES[0]);
+        let found =
+            |run| multiple(&with(run), &first, &[&near, &far], QUANTITIES[0]).expect("it has a meaning");
+        assert_eq!(found(130.0).values, [130.0, 100.0, 110.0]);
+        let times = |run| found(run).times;
         assert_eq!((times(130.0), times(95.0), times(100.0)), (Some(3.0), Some(0.5), Some(0.0)));
         let at_once = multiple(&with(101.0), &first, &[&first], QUANTITIES[0]);
-        assert_eq!(at_once, Some(f64::INFINITY));
+        assert_eq!(at_once.and_then(|it| it.times), Some(f64::INFINITY));
         assert_eq!(multiple(&far, &first, &[&near], QUANTITIES[6]), None);
     }
 
     #[test]
     fn one_step_more_or_less_until_rest_is_no_difference() {
         let at = |step| Figures { rest: Some(step), ..nothing() };
-        let times = |step| multiple(&at(step), &at(20), &[&at(20)], QUANTITIES[7]);
+        let times = |step| multiple(&at(step), &at(20), &[&at(20)], QUANTITIES[7]).and_then(|it| it.times);
         assert_eq!((times(20), times(21), times(25)), (Some(0.0), Some(1.0), Some(5.0)));
-        let never = multiple(&nothing(), &at(91), &[&at(91)], QUANTITIES[7]);
+        let never = multiple(&nothing(), &at(91), &[&at(91)], QUANTITIES[7]).and_then(|it| it.times);
         assert_eq!(never, Some(10.0), "of 100 steps");
+    }
+
+    #[test]
+    fn where_neither_run_comes_to_rest_there_is_no_time_to_it() {
+        let (never, rests) = (nothing(), Figures { rest: Some(80), ..nothing() });
+        let times = |run, first, yardstick| {
+            multiple(run, first, &[yardstick], QUANTITIES[7]).expect("a row in the table").times
+        };
+        assert_eq!(times(&never, &never, &never), None);
+        assert_eq!(times(&never, &never, &rests), None, "whatever a permuted one does");
+        assert_eq!(times(&rests, &never, &never), Some(21.0), "of 100 steps and one, and a resolution of 1");
+        assert!(times(&rests, &rests, &never) == Some(0.0));
     }
 
     #[test]

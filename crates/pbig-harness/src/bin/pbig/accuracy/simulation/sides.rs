@@ -56,6 +56,15 @@ impl Way {
         self.margin.is_some()
     }
 
+    /// What the chart calls it: runs with one broad phase are of one kind, whatever their order and however often.
+    pub(super) fn kind(&self) -> &'static str {
+        match self.margin {
+            None => STOCK.name,
+            Some(margin) if margin > 0.0 => PBIG.name,
+            Some(_) => "pbig without margin",
+        }
+    }
+
     /// Whether it is pbig's, for the first time.
     pub(super) fn is_held_against_stock(&self) -> bool {
         self.is_pbig() && !self.is_again

@@ -11,11 +11,14 @@ pub(super) fn is_crowd(row: &Row) -> bool {
     row.world.starts_with("crowd") && row.along == Along::Diagonal
 }
 
-/// How far from the origin the margin covers what rounding takes off a box and off the margin itself: 2 ulps, which are 2^-22 of
-/// the distance at most.
+/// How far from the origin the margin covers what rounding takes off a box and off the margin itself: 2 ulps, which
+/// are 2^-22 of the distance at most.
 pub(super) fn covered() -> f64 {
     f64::from(PbigBroadPhase::CONFIG.margin) * 2f64.powi(22)
 }
+
+/// A bound of rapier's ends too far inside by no more of its ulps, at the poses: proof in `rapier-pbig/src/ulps.rs`.
+const PROVED: f64 = 2.0;
 
 /// Over all worlds at an offset.
 pub(super) fn sum(rows: &[Row], offset: f64, of: &dyn Fn(&Row) -> u64) -> u64 {
@@ -24,11 +27,17 @@ pub(super) fn sum(rows: &[Row], offset: f64, of: &dyn Fn(&Row) -> u64) -> u64 {
 
 pub(super) fn notes(rows: &[Row], timed: &[(f64, Vec<Time>)]) -> Vec<String> {
     let mut notes = vec![
-        "The truth is in f64: boxes of parry3d-f64 around the same shapes, grown by half the prediction distance as rapier's \
-         are. *By poses*: these boxes at the poses that rapier holds in f32, against those at poses in f64; that is another \
-         world, and no broad phase can tell. *By boxes*: boxes in f32, as rapier computes them, against boxes in f64 at the \
-         same poses. *Of touching shapes*: the boxes of the shapes themselves overlap, not just those grown by the prediction \
-         distance. Boxes that touch as far as f64 can tell count neither as a pair nor as none."
+        "The truth is no simulation by rapier3d-f64, but boxes of parry3d-f64, from which rapier3d-f64 has its \
+         own, around the same shapes in the same layouts, moved away from the origin in f64 and grown by half the \
+         prediction distance as rapier's are. Two simulations part within steps, whatever rounds differently, and \
+         then their pairs are of two worlds: that says nothing about boxes. So every difference here is one of \
+         rounding, and what it does to a simulation over time is not told."
+            .to_owned(),
+        "*By poses*: these boxes at the poses that rapier holds in f32, against those at poses in f64; that is \
+         another world, and no broad phase can tell. *By boxes*: boxes in f32, as rapier computes them, against \
+         boxes in f64 at the same poses. *Of touching shapes*: the boxes of the shapes themselves overlap, not \
+         just those grown by the prediction distance. Boxes that touch as far as f64 can tell count neither as a \
+         pair nor as none."
             .to_owned(),
     ];
     notes.extend([boxes_note(rows), kinds_note(rows), margin_note(rows), ulps_note(rows), world_note(rows)]);
@@ -63,8 +72,8 @@ fn kinds_note(rows: &[Row]) -> String {
         format!("{world} {missed}")
     };
     format!(
-        "Rounding is monotone: it parts no two numbers that are in order, however often both are rounded alike. Missed pairs of \
-         touching shapes, by world: {}. Why: docs/ARCHITECTURE.md, far from the origin.",
+        "Rounding is monotone: it parts no two numbers that are in order, however often both are rounded alike. \
+         Missed pairs of touching shapes, by world: {}. Why: docs/ARCHITECTURE.md, far from the origin.",
         worlds.into_iter().map(of).collect::<Vec<_>>().join("; ")
     )
 }
@@ -74,8 +83,9 @@ fn margin_note(rows: &[Row]) -> String {
     let missed = counts(rows, &|row| row.by_boxes(way).missed, &|row| row.held_pairs);
     let deep = counts(rows, &|row| row.by_boxes(way).missed_deep, &|row| row.held_pairs);
     format!(
-        "With the margin that boxes are stored with, {}, they miss: {missed}; of touching shapes: {deep}. It covers the rounding of \
-         boxes, and its own, while two ulps are no more than it: up to the margin times 2^22, {:.0} length units.",
+        "With the margin that boxes are stored with, {}, they miss: {missed}; of touching shapes: {deep}. It \
+         covers the rounding of boxes, and its own, while two ulps are no more than it: up to the margin times \
+         2^22, {:.0} length units.",
         PbigBroadPhase::CONFIG.margin,
         covered()
     )
@@ -88,9 +98,14 @@ fn ulps_note(rows: &[Row]) -> String {
         enough.next().map_or("none of the ways".into(), |way| way.name())
     };
     let shortfall = rows.iter().map(|row| row.shortfall).fold(0.0, f64::max);
+    let verdict = if shortfall <= PROVED { "no more than" } else { "MORE THAN" };
     format!(
-        "The fewest ulps without a missed pair in these worlds: at the poses {}, against the world in f64 {}. A bound of rapier's \
-         was at most {} ulps too far inside. Proved, and checked in every run: {} at the poses, {} in the world.",
+        "The fewest ulps without a missed pair in these worlds: at the poses {}, against the world in f64 {}. \
+         Ulps by which boxes are widened, or end too far inside, are all of one kind: an ulp of position and \
+         reach on that axis, and 2^-17 of the reach, as `widened_by_ulps` has them. (Sizes, and `ulp` in the \
+         tables, are in distances from one f32 to the next at the offset.) A bound of rapier's was at most {} of \
+         them too far inside at the poses, {verdict} the {PROVED} that are proved. Pairs are checked in every \
+         run: none is missed {} at the poses, nor {} in the world.",
         fewest(&|row, way| row.by_boxes(way).missed),
         fewest(&|row, way| row.in_all(way).missed),
         plain(shortfall),
@@ -108,8 +123,8 @@ fn world_note(rows: &[Row]) -> String {
     };
     let told = [10.0, 1.0, 0.1].map(|percent| format!("{percent}% up to {}", plain(largest(percent))));
     format!(
-        "Where it starts to matter, by poses and boxes together, is a question of how many ulps shapes are large. Of the crowd's \
-         pairs more are wrong than {}.",
+        "Where it starts to matter, by poses and boxes together, is a question of how many ulps shapes are large. \
+         Of the crowd's pairs more are wrong than {}.",
         told.join(", ")
     )
 }
@@ -128,8 +143,8 @@ fn cost_note(rows: &[Row], timed: &[(f64, Vec<Time>)]) -> String {
         format!("{with}% at {:e} (rapier's boxes {without}%)", row.offset)
     });
     format!(
-        "To compute a box takes {:.0} ns, {} {:.0} ns (means over offsets). Pairs of the crowd, along the diagonal, that are added so \
-         to those in f64: {}.",
+        "To compute a box takes {:.0} ns, {} {:.0} ns (means over offsets). Pairs of the crowd, along the \
+         diagonal, that are added so to those in f64: {}.",
         mean(Way::Ulps(0)),
         AT_POSES.name(),
         mean(AT_POSES),

@@ -163,14 +163,24 @@ impl<'a> Place<'a> {
         Ok([&self.held, &self.world].map(|truth| truth.differences(found, self.reach())))
     }
 
-    /// How far a bound of rapier's boxes ends inside that in f64 at most, in ulps.
+    /// How far a bound of rapier's boxes ends inside that in f64 at most, in ulps as [`widened_by_ulps`] has them.
     fn shortfall(&self) -> f64 {
-        let short = |(wide, aabb): (&Wide, &Aabb)| {
-            let ulps = ulps(wide);
-            wide.shortfall(aabb).into_iter().zip(ulps).map(|(short, ulp)| short / ulp).fold(0.0, f64::max)
+        let short = |((wide, aabb), collider): ((&Wide, &Aabb), &Collider)| {
+            let units = units(aabb, collider);
+            wide.shortfall(aabb).into_iter().zip(units).map(|(short, unit)| short / unit).fold(0.0, f64::max)
         };
-        self.held.boxes.iter().zip(&self.rapiers(0)).map(short).fold(0.0, f64::max)
+        let rapiers = self.rapiers(0);
+        let boxes = self.held.boxes.iter().zip(&rapiers).zip(&self.colliders);
+        boxes.map(short).fold(0.0, f64::max)
     }
+}
+
+/// By how much one ulp of [`widened_by_ulps`] widens a box on each axis.
+fn units(aabb: &Aabb, collider: &Collider) -> [f64; 3] {
+    // So many that rounding of the widened bound is nothing beside them; a power of two, which rounds nothing itself.
+    const MANY: u32 = 1024;
+    let wide = widened_by_ulps(aabb, collider.position(), MANY);
+    std::array::from_fn(|k| (f64::from(wide.max[k]) - f64::from(aabb.max[k])) / f64::from(MANY))
 }
 
 pub(super) fn finder() -> Finder {
@@ -179,12 +189,6 @@ pub(super) fn finder() -> Finder {
 
 fn farthest(poses: &[Pose]) -> f64 {
     poses.iter().map(|pose| pose.translation.vector.amax()).fold(0.0, f64::max)
-}
-
-/// From one f32 to the next, on each axis where the box is, and at least as far as its size is.
-fn ulps(wide: &Wide) -> [f64; 3] {
-    let size = (0..3).map(|k| wide.max[k] - wide.min[k]).fold(0.0, f64::max);
-    std::array::from_fn(|k| ulp(wide.min[k].abs().max(wide.max[k].abs()).max(size)))
 }
 
 /// From one f32 to the next.
@@ -206,7 +210,7 @@ pub(super) struct Row {
     pub(super) poses: Differences,
     /// By way: against boxes in f64 at the same poses, and against the world.
     pub(super) ways: Vec<[Differences; 2]>,
-    /// Of rapier's boxes.
+    /// Of rapier's boxes at the poses that it holds, in ulps as [`widened_by_ulps`] has them.
     pub(super) shortfall: f64,
 }
 
@@ -257,6 +261,22 @@ mod tests {
     #[test]
     fn an_ulp_by_hand() {
         assert_eq!([1.0, 1.99, 1e5, 1e7].map(ulp), [2f64.powi(-23), 2f64.powi(-23), 0.0078125, 1.0]);
+    }
+
+    #[test]
+    fn a_shortfall_is_counted_in_what_a_box_is_widened_by() {
+        let ball = |at: f32| {
+            rapier3d::prelude::ColliderBuilder::ball(0.5).translation([at, 0.0, 0.0].into()).build()
+        };
+        let of = |at: f32| units(&Aabb::from_center([at, 0.0, 0.0], [0.5; 3]), &ball(at));
+        // On x an ulp of 10^7 + 1, on the others one of 1; and 2^-17 of what the box reaches: 0.5.
+        let near = 2f64.powi(-23) + 2f64.powi(-18);
+        for (found, right) in of(1e7).into_iter().zip([1.0 + 2f64.powi(-18), near, near]) {
+            assert!((found / right - 1.0).abs() < 1e-2, "{found}, not {right}");
+        }
+        let worlds = worlds(100).expect("worlds");
+        let far = Row::new(&worlds[0], 1e5, Along::Diagonal).expect("a row");
+        assert!(far.shortfall > 0.0 && far.shortfall < 2.0, "{}: no more than is proved", far.shortfall);
     }
 
     #[test]

@@ -1,13 +1,12 @@
-//! Avril's figures 3 to 6 and tables 5 to 7: bytes of output, brute force, steps with everything and with a part
-//! in motion, and where a grid begins to pay.
+//! Avril's figures 3 and 4 and tables 5 and 7: bytes of output, brute force, and where a grid begins to pay.
 
-use super::device::{Device, kernels, on_gpu};
-use super::printed::{AVRIL_5, AVRIL_6, AVRIL_7};
-use super::sheet::Sheet;
+use super::device::{Device, about_bytes, kernels, on_gpu, written};
+use super::printed::{AVRIL_5, AVRIL_7};
+use super::sheet::{Sheet, short, thousands};
+use super::steps::DISTANCE;
 use super::{Scale, UNSORTED, chart, effort};
 use crate::bench::finders::Finders;
 use crate::bench::measure::Effort;
-use crate::bench::stages::{Alone, NAMES};
 use crate::output::Failure;
 use pbig_core::pair_index::pair_count;
 use pbig_core::{Backend, CellRule, Coding, Config, GpuOptions, Strategy};
@@ -40,13 +39,10 @@ pub(super) fn bytes() -> Sheet {
         "bit",
         "tests/s printed",
     ];
-    let mut sheet = Sheet::new("Avril table 5 and figure 3: a byte or a bit a pair", &columns).about(
-        "Bytes by calculation from 3.4; rates are these bytes over the printed output time. The rates of large outputs agree, so the times are those of the \
-         bytes; the kernel takes the same with either, as printed.",
-    );
+    let mut sheet =
+        Sheet::new("Avril table 5 and figure 3: a byte or a bit a pair", &columns).about(about_rates());
     for (n, byte, bit) in AVRIL_5 {
         let [bytes, bits] = output_bytes(n);
-        let rate = |bytes: u64, us: f64| bytes as f64 / us / 1e3;
         let tests = pair_count(n) as f64 / (bit[0] / 1e3);
         sheet.row(json!([
             n,
@@ -65,20 +61,53 @@ pub(super) fn bytes() -> Sheet {
     sheet
 }
 
+/// GB a second.
+fn rate(bytes: u64, us: f64) -> f64 {
+    bytes as f64 / us / 1e3
+}
+
+/// What the printed times of table 5 say, as far as they do.
+fn about_rates() -> String {
+    let large = AVRIL_5.iter().filter(|(n, ..)| *n >= 1000);
+    let rates = large.flat_map(|&(n, byte, bit)| {
+        let [bytes, bits] = output_bytes(n);
+        [rate(bytes, byte[1]), rate(bits, bit[1])]
+    });
+    let (least, most) =
+        rates.fold((f64::MAX, 0.0f64), |(least, most), rate| (least.min(rate), most.max(rate)));
+    let apart = |&(_, byte, bit): &(u64, [f64; 2], [f64; 2])| 100.0 * (byte[0] / bit[0] - 1.0).abs();
+    let apart = AVRIL_5.iter().map(apart).fold(0.0, f64::max);
+    let so = if most < 1.2 * least {
+        "so these times are those of the bytes"
+    } else {
+        "so bytes alone do not explain them"
+    };
+    format!(
+        "Bytes by calculation from 3.4; rates are these bytes over the printed output time. From 1000 objects on the \
+         rates are {} to {} GB/s, {so}; the printed times of the kernel differ between the two by up to {} %.",
+        short(least),
+        short(most),
+        short(apart)
+    )
+}
+
 /// The same on a device: bits against a list of pairs.
 pub(super) fn forms(device: &Device) -> Result<Sheet, Failure> {
     let columns = [
         "objects",
         "pairs",
         "form",
-        "bytes back",
+        "bytes written",
+        "bytes fetched",
         "ms of the kernel `check_all`",
         "ms, host waits",
         "ms, host decodes",
     ];
     let mut sheet = Sheet::new("Avril table 5: forms of output, GPU", &columns).about(format!(
-        "`Coding::Packed` is a bit a pair of boxes as in 3.4, gathered in a workgroup's memory before it is written; `Plain` is a list of pairs, 8 \
-         bytes for each that overlaps. Without a grid a device searches up to 1024 boxes here, so 5000 and 7500 have no rows. One pair a box. {}",
+        "`Coding::Packed` is a bit a pair of boxes as in 3.4, gathered in a workgroup's memory before it is written; \
+         `Plain` is a list of pairs, 8 bytes for each that overlaps. Without a grid a device searches up to 1024 \
+         boxes here, so 5000 and 7500 have no rows. One pair a box. {} {}",
+        about_bytes(),
         device.about()
     ));
     for n in [100, 1000] {
@@ -86,9 +115,10 @@ pub(super) fn forms(device: &Device) -> Result<Sheet, Failure> {
         let configs = forms.map(|(_, coding)| on_gpu(GpuOptions { coding, ..GpuOptions::DEFAULT }));
         for ((form, _), (_, report)) in forms.iter().zip(device.run(&configs, &cubes(n, 1.0, 1.0, 1), 0.1)?) {
             let (kernel, gpu) =
-                (kernels(&report, |name| name == "check_all"), report.gpu.unwrap_or_default());
+                (kernels(&report, |name| name == "check_all"), report.gpu.clone().unwrap_or_default());
             let [wait, decode] = [gpu.wait, gpu.decode].map(pbig_harness::runner::milliseconds);
-            sheet.row(json!([n, report.pairs, form, gpu.downloaded, kernel, wait, decode]));
+            let written = written(&report);
+            sheet.row(json!([n, report.pairs, form, written, gpu.downloaded, kernel, wait, decode]));
         }
     }
     Ok(sheet)
@@ -106,8 +136,8 @@ pub(super) fn brute_force(device: &Device) -> Result<Sheet, Failure> {
         device.column(),
     ];
     let mut sheet = Sheet::new("Avril figure 4: brute force", &columns).about(
-        "The figure has no printed numbers; table 5 has the kernel's time at four of its sizes. On the CPU every pair is tested, in blocks of 32, one thread; on a device up to 1024 boxes \
-         (whole calls, kernel and transfers).",
+        "The figure has no printed numbers; table 5 has the kernel's time at four of its sizes. On the CPU every pair \
+         is tested, in blocks of 32, one thread; on a device up to 1024 boxes (whole calls, kernel and transfers).",
     );
     let mut line = Line { name: "brute force, CPU".into(), points: vec![] };
     for n in [100usize, 500, 1000, 2500, 5000] {
@@ -131,64 +161,6 @@ pub(super) fn brute_force(device: &Device) -> Result<Sheet, Failure> {
     Ok(sheet.chart(chart("brute", "Avril figure 4: brute force", "objects", [line])))
 }
 
-/// How far cubes with edges of 1 move in a step, along each axis.
-const DISTANCE: f32 = 0.1;
-
-fn step_effort(scale: &Scale) -> Effort {
-    Effort::new(scale.quick)
-}
-
-/// Table 6 and figure 5: a step in which all move.
-pub(super) fn steps(scale: &Scale) -> Result<Sheet, Failure> {
-    let columns = ["objects", "pairs", "side", "boxes up to date, ms", "grid, ms", "search, ms", "whole, ms"];
-    let mut sheet = Sheet::new("Avril table 6 and figure 5: a step, all moving", &columns).about(
-        "Printed: a column of equal objects falls onto a plane, their GPU, transfers included. Ours: cubes with a pair each, all moved by up to a tenth of their edge, on the CPU: \
-         `BroadPhase::set` for each, then `update`, whose plan and map are the grid, and check and diff, events included, the search. Whole falling scenes with rapier: \
-         [step](step.md); the dynamic tree of figure 5 in today's form: [peers](peers.md).",
-    );
-    let (mut printed_line, mut line) =
-        (Line { name: "printed".into(), points: vec![] }, Line { name: "ours, CPU".into(), points: vec![] });
-    for (n, printed) in AVRIL_6 {
-        if scale.quick && n > 100_000 {
-            continue;
-        }
-        let (ms, pairs) = Alone::events(cubes(n, 1.0, 1.0, 1), 1.0, DISTANCE)?.measure(step_effort(scale))?;
-        let of = |name: &str| {
-            NAMES.iter().zip(ms).filter(|(known, _)| **known == name).map(|(_, ms)| ms).sum::<f64>()
-        };
-        sheet.row(json!([n, null, "printed", printed[0], printed[1], printed[2], printed[3]]));
-        let (map, search) = (of("plan") + of("map"), of("check") + of("emit") + of("diff"));
-        sheet.row(json!([n, pairs, "ours, CPU", of("set"), map, search, of("whole")]));
-        printed_line.points.push((n as f64, printed[3]));
-        line.points.push((n as f64, of("whole")));
-    }
-    Ok(sheet.chart(chart(
-        "steps",
-        "Avril table 6 and figure 5: a step, all moving",
-        "objects",
-        [printed_line, line],
-    )))
-}
-
-/// Figure 6: a step in which a share moves.
-pub(super) fn movers(scale: &Scale) -> Result<Sheet, Failure> {
-    let n = if scale.quick { 10_000 } else { 100_000 };
-    let columns = ["share moved", "boxes", "pairs", "ms, events", "ms, from nothing"];
-    let mut sheet = Sheet::new("Avril figure 6: share of moving objects", &columns).about(
-        "The figure has no printed numbers; the text says that the time stays the same whatever moves, as everything is searched from nothing. So does our `Finder`; \
-         `BroadPhase` pays for what has moved.",
-    );
-    let mut lines = ["events", "from nothing"].map(|name| Line { name: name.into(), points: vec![] });
-    for share in [0.01, 0.1, 0.25, 0.5, 0.75, 1.0] {
-        let boxes = || cubes(n, 1.0, 1.0, 1);
-        let (events, pairs) = Alone::events(boxes(), share, DISTANCE)?.measure(step_effort(scale))?;
-        let (scratch, _) = Alone::scratch(boxes(), share, DISTANCE).measure(step_effort(scale))?;
-        sheet.row(json!([share, n, pairs, events[0], scratch[0]]));
-        lines.iter_mut().zip([events[0], scratch[0]]).for_each(|(line, ms)| line.points.push((share, ms)));
-    }
-    Ok(sheet.chart(chart("movers", "Avril figure 6: share of moving objects", "share moved", lines)))
-}
-
 /// Table 7: with and without a grid.
 pub(super) fn crossover(scale: &Scale, device: &Device) -> Result<Sheet, Failure> {
     let columns = [
@@ -203,11 +175,11 @@ pub(super) fn crossover(scale: &Scale, device: &Device) -> Result<Sheet, Failure
         "with",
     ];
     let mut sheet = Sheet::new("Avril table 7: with and without a grid", &columns).about(format!(
-        "Whole calls from nothing, cubes with a pair each, all moved. Printed, the grid pays from between 1000 and 10,000 objects on; where it does here, with more \
-         sizes and densities: [crossovers](crossovers.md). Without a grid a device searches up to 1024 boxes. {}",
+        "Whole calls from nothing, cubes with a pair each, all moved. More sizes and densities: \
+         [crossovers](crossovers.md). Without a grid a device searches up to 1024 boxes. {}",
         device.about()
     ));
-    let pbig = Config { strategy: Strategy::Pbig, ..UNSORTED };
+    let (pbig, mut pays) = (Config { strategy: Strategy::Pbig, ..UNSORTED }, vec![]);
     let sides = [
         Config { backend: Backend::Brute, ..UNSORTED },
         Config { strategy: Strategy::Grid, ..UNSORTED },
@@ -221,9 +193,24 @@ pub(super) fn crossover(scale: &Scale, device: &Device) -> Result<Sheet, Failure
         let mut finders = Finders::new(sides, None, [moved(&boxes, DISTANCE, 2), boxes]);
         let cpu = finders.times(Effort::new(scale.quick))?;
         let gpu_ms = |i: usize| gpu.get(i).map(|(ms, _)| *ms);
+        pays.push((n, with < without, cpu[1] < cpu[0]));
         sheet.row(json!([n, finders.pairs()?, without, with, cpu[0], cpu[1], cpu[2], gpu_ms(1), gpu_ms(0)]));
     }
-    Ok(sheet)
+    Ok(sheet.about(about_crossover(&pays)))
+}
+
+/// At which sizes the grid takes less, as printed and here.
+fn about_crossover(pays: &[(usize, bool, bool)]) -> String {
+    let at = |pays_there: &dyn Fn(&(usize, bool, bool)) -> bool| {
+        let sizes: Vec<String> =
+            pays.iter().filter(|row| pays_there(row)).map(|(n, ..)| thousands(*n as u64)).collect();
+        if sizes.is_empty() { "none of these sizes".to_owned() } else { sizes.join(", ") }
+    };
+    format!(
+        "A grid takes less than none at: printed {}; here on the CPU, ours, {}.",
+        at(&|row| row.1),
+        at(&|row| row.2)
+    )
 }
 
 #[cfg(test)]
@@ -246,11 +233,21 @@ mod tests {
             let n = row["objects"].as_u64().expect("a number");
             let pairs = oracle::pairs(&cubes(n as usize, 1.0, 1.0, 1)).len() as u64;
             assert_eq!(row["pairs"], pairs);
-            // Counters and times come back too, and words are of four bytes.
-            let least = if row["form"] == "a list of pairs" { 8 * pairs } else { output_bytes(n)[1] };
-            let back = row["bytes back"].as_u64().expect("a number");
-            assert!(back >= least && back < 2 * least + 2048, "{row}");
+            // Words are of four bytes; counters and times come back too.
+            let bits = output_bytes(n)[1].next_multiple_of(4);
+            let written = if row["form"] == "a list of pairs" { 8 * pairs } else { bits };
+            assert_eq!(row["bytes written"], written);
+            let fetched = row["bytes fetched"].as_u64().expect("a number");
+            assert!(fetched >= written && fetched < 2 * written + 2048, "{row}");
         }
+    }
+
+    #[test]
+    fn sizes_at_which_a_grid_pays_are_those_of_the_rows() {
+        let text = about_crossover(&[(100, false, true), (1000, false, true), (10_000, true, true)]);
+        assert!(text.contains("printed 10,000; here on the CPU, ours, 100, 1,000, 10,000."), "{text}");
+        assert!(about_crossover(&[(100, false, false)]).contains("printed none of these sizes"));
+        assert!(about_rates().contains("those of the bytes"), "{}", about_rates());
     }
 
     #[test]

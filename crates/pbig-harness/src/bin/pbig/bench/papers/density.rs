@@ -152,12 +152,39 @@ fn verdict() -> String {
     let others: Vec<String> = others.iter().map(name).collect();
     let others = if others.is_empty() { "none".to_owned() } else { others.join(", ") };
     format!(
-        "Of {} readings the best is {}; others within {LIKELY} standard deviations: {others}. So the lengths are not those of \
-         section 6.1, and DoC is equation 11 with the largest box for every box: a box's expected volume is an eighth of that, \
-         and so are the pairs.",
+        "Of {} readings the best is {}; others within {LIKELY} standard deviations: {others}. {}",
         READINGS.len(),
-        name(best)
+        name(best),
+        in_common(&fits)
     )
+}
+
+/// What follows from the readings that fit, where they agree on it.
+fn in_common(fits: &[&Reading]) -> String {
+    let all = |holds: &dyn Fn(&Edges) -> bool| {
+        fits.iter()
+            .all(|reading| TABLE_III.iter().all(|row| holds(&(reading.model)(MOST_BOXES, row.doc).edges)))
+    };
+    let by_largest = |reading: &&Reading| {
+        TABLE_III.iter().all(|row| {
+            (reading.model)(MOST_BOXES, row.doc).edges.high == equation_11(MOST_BOXES, row.doc).ceil()
+        })
+    };
+    let mut so = Vec::new();
+    if all(&|edges| edges.low < LENGTHS[0]) {
+        so.push("So the lengths are not those of section 6.1, which begin at 1.".to_owned());
+    }
+    if all(&|edges| edges.low == 0.0 && !edges.cubes) && fits.iter().all(by_largest) {
+        let (densest, most) = (TABLE_III[4].doc, MOST_BOXES);
+        let ratio = |of: fn(usize, f64) -> Model| of(most, densest).pairs(most);
+        so.push(format!(
+            "DoC is equation 11 with the largest box for every box: with lengths uniform from 0 a box's expected \
+             volume is an eighth of that, and the pairs at DoC {densest} are {} of those of equal cubes by equation \
+             11.",
+            short(ratio(fits[0].model) / ratio(READINGS[0].model))
+        ));
+    }
+    so.join(" ")
 }
 
 /// The calculation against counts: every reading at two sizes.
@@ -165,7 +192,8 @@ pub(super) fn experiment(scale: &Scale) -> Result<Sheet, Failure> {
     const DOC: f64 = 1.0;
     let columns = ["reading", "boxes", "expected pairs", "counted pairs", "off, standard deviations"];
     let mut sheet = Sheet::new("PBIG table III: the readings, counted", &columns)
-        .about("DoC 1, the paper's space, edges by N. The calculation above is right where counts are a few standard deviations off at most.");
+        .about("DoC 1, the paper's space, edges by N. The calculation above is right where counts are a few standard \
+                deviations off at most.");
     let mut finder =
         Finder::new(Config { limits: Limits::UNLIMITED, order: Order::Unspecified, ..Config::DEFAULT });
     for reading in &READINGS {
@@ -211,6 +239,17 @@ mod tests {
         let (others, fits) = READINGS.split_at(READINGS.len() - 2);
         assert!(others.iter().all(|reading| worst(reading) > 10.0));
         assert!(worst(&fits[1]) < 1.0 && (1.0..LIKELY).contains(&worst(&fits[0])));
+    }
+
+    #[test]
+    fn conclusions_are_drawn_only_from_readings_that_share_them() {
+        let last = &READINGS[READINGS.len() - 1];
+        assert!(
+            in_common(&[last]).contains("not those of section 6.1")
+                && in_common(&[last]).contains("an eighth")
+        );
+        assert_eq!(in_common(&[last, &READINGS[2]]), "", "lengths from 1 contradict both");
+        assert!(!in_common(&[last, &READINGS[0]]).contains("an eighth"), "equal cubes contradict the second");
     }
 
     #[test]

@@ -37,7 +37,8 @@ impl Device {
         match &self.gpu {
             Some(gpu) if gpu.is_software() => {
                 format!(
-                    "Adapter: {}, a program: its counts and bytes are right, its times mean nothing.",
+                    "Adapter: {}, a program: its pairs and the bytes that its kernels write are right, its times mean \
+                     nothing.",
                     gpu.adapter()
                 )
             }
@@ -74,6 +75,22 @@ impl Device {
         finders.pairs()?;
         Ok(times.into_iter().zip(finders.all.iter().map(|finder| finder.report().clone())).collect())
     }
+}
+
+/// Bytes that the kernels have written of output, for the host to decode; none where nothing was found. Those that come
+/// back are more: see [`about_bytes`].
+pub(super) fn written(report: &Report) -> Option<u64> {
+    let gpu = report.gpu.as_ref()?;
+    // The ratio to two ids a pair, of all that the kernels wrote.
+    (report.pairs > 0).then(|| (gpu.compression * 8.0 * report.pairs as f64).round() as u64)
+}
+
+/// What columns of bytes mean.
+pub(super) fn about_bytes() -> &'static str {
+    "Bytes written are the words of output of the kernels, what the papers' sizes are of. Bytes fetched are all that \
+     comes back: with each chunk of work its counters and times, and words that are fetched before it is known how \
+     many there are (as many as the largest chunk had, and a quarter more); with records also the table for decoding, \
+     4 bytes an entry, once a call."
 }
 
 /// Settings for a device.

@@ -15,7 +15,9 @@ mod model;
 mod numbers;
 mod printed;
 mod sheet;
+mod steps;
 mod switches;
+mod timing;
 
 use super::machine::{Machine, slug};
 use super::measure::{Effort, timed};
@@ -27,7 +29,8 @@ use pbig_harness::chart::{Line, LogLog};
 use serde_json::{Value, json};
 use sheet::Sheet;
 use std::path::Path;
-use std::time::Duration;
+use std::time::{Duration, Instant};
+use timing::Timing;
 
 /// Unlimited and in no order, as the papers' programs.
 const UNSORTED: Config = Config { limits: Limits::UNLIMITED, order: Order::Unspecified, ..Config::DEFAULT };
@@ -83,74 +86,83 @@ fn chart(name: &str, title: &str, x: &'static str, lines: impl Into<Vec<Line>>) 
 
 type Part = fn(&Scale, &Device) -> Result<Vec<Sheet>, Failure>;
 
-/// In the order of the document.
-const PARTS: [Part; 8] = [
-    |scale, _| {
+/// In the order of the document, with names for their times.
+const PARTS: [(&str, Part); 8] = [
+    ("PBIG table III and figure 10", |scale, device| {
         let (cells, table) = (coverage::rule(), coverage::table(scale)?);
-        Ok(vec![density::readings(), density::experiment(scale)?, cells, table, coverage::bytes()])
-    },
-    |scale, device| Ok(vec![numbers::uniform(scale, device)?, numbers::cells(scale)?]),
-    |scale, device| Ok(vec![numbers::gaussian(scale, device)?]),
-    switches::on_gpu,
-    |scale, _| Ok(vec![switches::on_cpu(scale)?]),
-    |scale, device| {
+        let bytes = coverage::bytes(scale, device)?;
+        Ok(vec![density::readings(), density::experiment(scale)?, cells, table, bytes])
+    }),
+    ("PBIG figures 8 and 9", |scale, device| {
+        Ok(vec![numbers::uniform(scale, device)?, numbers::cells(scale)?])
+    }),
+    ("PBIG figure 11", |scale, device| Ok(vec![numbers::gaussian(scale, device)?])),
+    ("PBIG tables IV to VI", switches::on_gpu),
+    ("PBIG table IV on the CPU", |scale, _| Ok(vec![switches::on_cpu(scale)?])),
+    ("Avril tables 2, 4 and 5", |scale, device| {
         Ok(vec![mapping::lazy(scale)?, mapping::roots(device)?, avril::bytes(), avril::forms(device)?])
-    },
-    |scale, device| {
-        let steps = [avril::steps(scale)?, avril::movers(scale)?, avril::crossover(scale, device)?];
+    }),
+    ("Avril figures 4 to 6, tables 6 and 7", |scale, device| {
+        let steps = [steps::steps(scale)?, steps::movers(scale)?, avril::crossover(scale, device)?];
         Ok([avril::brute_force(device)?].into_iter().chain(steps).collect())
-    },
-    |_, _| Ok(vec![claims::pbig(), claims::avril()]),
+    }),
+    ("what the papers print", |_, _| Ok(vec![claims::pbig(), claims::avril()])),
 ];
 
 pub(super) fn run(args: &Args) -> Result<(), Failure> {
     let (scale, device, machine) = (Scale::new(args.quick), Device::best(args.quick), Machine::here());
     let bar = progress(PARTS.len(), "tables");
-    let mut sheets = Vec::new();
-    for part in PARTS {
+    let (mut sheets, mut timing) = (Vec::new(), Timing::new(args.quick));
+    for (name, part) in PARTS {
+        let clock = Instant::now();
         sheets.extend(part(&scale, &device)?);
+        timing.note(name, clock.elapsed());
         bar.inc(1);
     }
     bar.finish_and_clear();
-    let object = object(&machine, &device, &sheets);
+    let object = object(&machine, &device, &timing, &sheets);
     if args.json {
         print(&object.to_string())?;
     } else {
         let texts: Vec<String> = sheets.iter().map(Sheet::text).collect();
-        print(&format!("{}\n{}\n\n{}", machine.line(), device.about(), texts.join("\n")))?;
+        let head = format!("{}\n{}\n{}", machine.line(), device.about(), timing.text());
+        print(&format!("{head}\n\n{}", texts.join("\n")))?;
     }
     if args.quick {
         return Ok(());
     }
-    save(&Path::new(DOCUMENTS).join("papers.md"), &document(&machine, &device, &sheets))?;
+    save(&Path::new(DOCUMENTS).join("papers.md"), &document(&machine, &device, &timing, &sheets))?;
     for chart in sheets.iter().flat_map(|sheet| &sheet.charts) {
         chart.write(&Path::new(DOCUMENTS).join(format!("{}.svg", chart.name)))?;
     }
     keep(&format!("papers-{}", slug(&machine.cpu)), &object, args.json)
 }
 
-fn object(machine: &Machine, device: &Device, sheets: &[Sheet]) -> Value {
+fn object(machine: &Machine, device: &Device, timing: &Timing, sheets: &[Sheet]) -> Value {
     json!({
         "suite": "papers",
         "day": machine.day,
         "machine": machine.object(),
         "adapter": device.adapter(),
         "software": device.is_software(),
+        "seconds": timing.seconds(),
+        "parts": timing.object(),
         "tables": sheets.iter().map(Sheet::object).collect::<Vec<_>>(),
     })
 }
 
-fn document(machine: &Machine, device: &Device, sheets: &[Sheet]) -> String {
+fn document(machine: &Machine, device: &Device, timing: &Timing, sheets: &[Sheet]) -> String {
     let sheets: Vec<String> = sheets.iter().map(Sheet::markdown).collect();
     format!(
-        "# `pbig bench papers`\n\nWritten by that command, nothing by hand. {}. {}\n\n\
-         *PBIG*: Lo, Lee, Chung, Chung, \"Optimizing Pairwise Box Intersection Checking on GPUs for Large-Scale Simulations\", ACM TOMACS \
-         23(3), 2013; times on a Tesla C2070. *Avril*: Avril, Gouranton, Arnaldi, \"Fast Collision Culling in Large-Scale Environments \
-         Using GPU Mapping Function\", EGPGV 2012; times on a Quadro FX 3600M. \"Printed\" is what they print; their figures are \
-         drawings, so of those only what the text says. Printed times are of other machines: compare how they grow, not how long they are. \
-         What differs is said above each table.\n\n{}",
+        "# `pbig bench papers`\n\nWritten by that command, nothing by hand. {}. {}\n\n{}\n\n*PBIG*: Lo, Lee, Chung, \
+         Chung, \"Optimizing Pairwise Box Intersection Checking on GPUs for Large-Scale Simulations\", ACM TOMACS \
+         23(3), 2013; times on a Tesla C2070. *Avril*: Avril, Gouranton, Arnaldi, \"Fast Collision Culling in \
+         Large-Scale Environments Using GPU Mapping Function\", EGPGV 2012; times on a Quadro FX 3600M. \"Printed\" \
+         is what they print; their figures are drawings, so of those only what the text says. Printed times are of \
+         other machines: compare how they grow, not how long they are. What differs is said above each table.\n\n{}",
         machine.line(),
         device.about(),
+        timing.text(),
         sheets.join("\n")
     )
 }

@@ -1,0 +1,62 @@
+//! How long `pbig bench papers` itself takes, which is promised to be short.
+
+use serde_json::{Value, json};
+use std::time::Duration;
+
+/// Minutes that a run may take on two cores, and with `--quick`.
+const MOST_MINUTES: [f64; 2] = [20.0, 1.0];
+
+/// Wall time of a run, part by part.
+pub(super) struct Timing {
+    parts: Vec<(&'static str, f64)>,
+    most_minutes: f64,
+}
+
+impl Timing {
+    pub(super) fn new(quick: bool) -> Self {
+        Self { parts: vec![], most_minutes: MOST_MINUTES[usize::from(quick)] }
+    }
+
+    pub(super) fn note(&mut self, name: &'static str, took: Duration) {
+        self.parts.push((name, took.as_secs_f64()));
+    }
+
+    pub(super) fn seconds(&self) -> f64 {
+        self.parts.iter().map(|(_, seconds)| seconds).sum()
+    }
+
+    pub(super) fn object(&self) -> Value {
+        self.parts.iter().map(|(name, seconds)| json!({ "name": name, "seconds": seconds })).collect()
+    }
+
+    pub(super) fn text(&self) -> String {
+        let whole = self.seconds();
+        let verdict = if whole < self.most_minutes * 60.0 { "met" } else { "missed" };
+        let parts: Vec<String> =
+            self.parts.iter().map(|(name, seconds)| format!("{name} {seconds:.1} s")).collect();
+        format!(
+            "The run took {:.1} minutes; wanted on two cores: under {} ({verdict}). Of that: {}.",
+            whole / 60.0,
+            self.most_minutes,
+            parts.join("; ")
+        )
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn parts_add_up_and_are_held_against_what_is_promised() {
+        let mut timing = Timing::new(true);
+        timing.note("one", Duration::from_secs(30));
+        assert_eq!(
+            timing.text(),
+            "The run took 0.5 minutes; wanted on two cores: under 1 (met). Of that: one 30.0 s."
+        );
+        timing.note("other", Duration::from_secs(45));
+        assert_eq!(timing.seconds(), 75.0);
+        assert!(timing.text().contains("(missed)"), "{}", timing.text());
+    }
+}
