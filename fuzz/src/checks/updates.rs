@@ -71,31 +71,31 @@ impl Player {
         let edges = aabb.extents();
         let place = |i: u32| {
             let by = std::array::from_fn(|k| edges[k] * (i / [1, 8, 64][k] % 8) as f32);
-            (first + i, shifted(&aabb, by))
+            (first + i, shifted(&aabb, by), ProxyFilter::ALL)
         };
         self.put_many((0..u32::from(count)).map(place).collect());
         Some(())
     }
 
-    /// Boxes go on, each a little in a direction of its own: what lists of near pairs are for.
+    /// Boxes go on, each a little in a direction of its own, or return: what lists of near pairs are for.
     fn tremble(&mut self, input: &mut Input) -> Option<()> {
-        let (first, count, by) = (self.id(input)?, input.byte()?, f32::from(input.byte()?) / 1024.0);
+        let (first, count, by) = (self.id(input)?, input.byte()?, f32::from(input.byte()? as i8) / 512.0);
         let near = self.at.range(first..first.saturating_add(u32::from(count)));
         let moved = |(&id, aabb): (&u32, &Aabb)| {
             let sign = |k: u32| if id >> k & 1 == 0 { by } else { -by };
-            (id, shifted(aabb, [0, 1, 2].map(sign)))
+            let filter = self.broad_phase.filter(id).copied().unwrap_or_default();
+            (id, shifted(aabb, [0, 1, 2].map(sign)), filter)
         };
         let boxes = near.map(moved).collect();
         self.put_many(boxes);
         Some(())
     }
 
-    fn put_many(&mut self, boxes: Vec<(u32, Aabb)>) {
-        let indices: Vec<u32> = boxes.iter().map(|(id, _)| *id).collect();
-        let by_id: BTreeMap<u32, Aabb> = boxes.iter().copied().collect();
-        let of = |id: u32| Some((by_id[&id], ProxyFilter::ALL));
-        self.broad_phase.set_many(&indices, |id| id, of).expect("small ids");
-        boxes.into_iter().for_each(|(id, aabb)| self.note(id, aabb));
+    fn put_many(&mut self, boxes: Vec<(u32, Aabb, ProxyFilter)>) {
+        let ids: Vec<u32> = boxes.iter().map(|one| one.0).collect();
+        let by_id: BTreeMap<_, _> = boxes.iter().map(|&(id, aabb, filter)| (id, (aabb, filter))).collect();
+        self.broad_phase.set_many(&ids, |id| id, |id| Some(by_id[&id])).expect("small ids");
+        boxes.into_iter().for_each(|(id, aabb, _)| self.note(id, aabb));
     }
 
     fn put(&mut self, id: u32, aabb: Aabb, filter: ProxyFilter) {

@@ -13,5 +13,5 @@ pub(super) const AWAY: u8 = 8;
 pub(super) const ENDING: u8 = 16;
 /// It is among those that are set at once, and its turn has not come.
 pub(super) const LISTED: u8 = 32;
-/// It has changed before, not long ago: see `near::Movers`.
+/// It has changed before, not long ago: see `near::policy::Movers`.
 pub(super) const MOVED: u8 = 64;

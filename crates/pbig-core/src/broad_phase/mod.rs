@@ -326,9 +326,10 @@ impl BroadPhase {
         self.report.stages.emit += watch.lap();
         if !is_small && self.updates > 1 {
             let (changed, time) = (self.report.changed as usize, self.report.stages.total());
-            if !std::mem::take(&mut self.near.failed) {
-                self.near.note_time(way, changed, time);
-                self.rebuild.note(way, changed, self.present_count as usize, time);
+            let present = self.present_count as usize;
+            if !self.near.failed {
+                self.near.note_time(way, changed, present, time);
+                self.rebuild.note(way, changed, present, time);
             }
         }
         self.take_turns(if is_small { Turn::Bitmap } else { Turn::Grid }, clock);

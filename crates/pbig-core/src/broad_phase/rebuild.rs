@@ -19,6 +19,10 @@ const SAME: u32 = 64;
 /// How much better or worse the other may be for that.
 const NEARLY: f32 = 2.0;
 
+/// The same where one seems better: it may have become the worse one. Not where it is by far.
+const SELDOM: u32 = 1024;
+const FAR: f32 = 4.0;
+
 /// How much one measurement counts: so many are about what is remembered.
 const MEMORY: f32 = 4.0;
 
@@ -40,7 +44,9 @@ impl Rebuild {
         let share = changed as f32 * self.ratio() / present.max(1) as f32;
         let is_close = (1.0 / NEARLY..NEARLY).contains(&share);
         let better = share >= 1.0;
-        let pays = if is_close && self.same >= SAME { !self.last } else { better };
+        let is_far = !(1.0 / FAR..FAR).contains(&share);
+        let patience = if is_close { SAME } else { SELDOM };
+        let pays = if !is_far && self.same >= patience { !self.last } else { better };
         self.same = if pays == self.last { self.same + 1 } else { 0 };
         self.last = pays;
         pays
@@ -61,6 +67,11 @@ impl Rebuild {
         learn(&mut self.of_box, time.as_nanos() as f32 / present.max(1) as f32);
     }
 
+    /// What a search of so many boxes takes: ns; nothing before one was measured.
+    pub(super) fn search_of(&self, present: usize) -> f32 {
+        self.of_box.unwrap_or(0.0) * present as f32
+    }
+
     /// What an update has taken.
     pub(super) fn note(&mut self, way: Way, changed: usize, present: usize, time: Duration) {
         let ns = time.as_nanos() as f32;
@@ -76,6 +87,7 @@ impl Rebuild {
 /// What takes longer than usual says less than what takes less: another process had the processor, or memory was made room
 /// for.
 fn learn(usual: &mut Option<f32>, ns: f32) {
+    let ns = ns.max(f32::MIN_POSITIVE);
     let before = usual.unwrap_or(ns);
     let memory = if ns < before { 2.0 } else { MEMORY };
     *usual = Some(before + (ns.min(2.0 * before) - before) / memory);

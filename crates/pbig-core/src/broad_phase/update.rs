@@ -66,6 +66,7 @@ impl BroadPhase {
     }
 
     fn find_added_on_cpu(&mut self) -> Result<Way, Error> {
+        self.near.failed = false;
         if self.find_near()? == Served::Yes || self.try_near()? == Served::Yes {
             return Ok(Way::Near);
         }
@@ -78,25 +79,28 @@ impl BroadPhase {
 
     fn edit_or_rebuild(&mut self) -> Result<Way, Error> {
         let present = self.present_count as usize;
-        let whole = self.config.strategy == Strategy::Pbig
-            || self.config.backend == Backend::Brute
-            || !self.has_base
-            || self.rebuild.pays(self.changed.len(), present);
-        if whole {
+        let pays = self.rebuild.pays(self.changed.len(), present);
+        if pays || !self.may_edit() || !self.has_base {
+            // One that a list has left to be done says nothing of updates without any.
+            self.near.failed |= !pays && self.may_edit();
             return self.search_all();
         }
         self.edit_base();
         if self.base.map.out_of_order() * 8 >= present || self.strain > self.rebuild_cost() {
             let clock = Instant::now();
-            let way = self.search_all();
+            let way = self.search_all()?;
             self.rebuild.followed_edits(present, clock.elapsed());
-            way
+            Ok(way)
         } else {
             self.search_changed()
         }
     }
 
-    /// Whether so many boxes have changed that to look at all costs less than to tell them apart.
+    fn may_edit(&self) -> bool {
+        self.config.strategy != Strategy::Pbig && self.config.backend != Backend::Brute
+    }
+
+    /// Whether so many boxes have changed that to walk all that is kept costs less than to tell them apart.
     pub(super) fn many_changed(&self) -> bool {
         self.changed.len() * 4 >= self.present_count as usize
     }
@@ -183,7 +187,7 @@ impl BroadPhase {
         if way == Way::Near {
             return;
         }
-        let many = way == Way::All || self.many_changed();
+        let many = self.many_changed() || (way == Way::All && self.may_edit());
         let state = state!(self);
         let removed = &mut self.events.removed;
         #[cfg(feature = "gpu")]
@@ -221,14 +225,13 @@ impl BroadPhase {
     /// times as long on some processors (Zen, where what it copies to is not aligned).
     fn forget_changes(&mut self) {
         self.near.movers.begin(self.changed.len(), &mut self.flags);
-        let Self { boxes, before, flags, changed, near, .. } = self;
+        let Self { boxes, before, flags, changed, .. } = self;
         const NEWS: u8 = flag::CHANGED | flag::REFILTERED;
         if changed.len() < RANGES_FROM || changed.len() * 4 < boxes.len() {
             for &id in changed.iter() {
                 before[id as usize] = boxes[id as usize];
                 let flags = &mut flags[id as usize];
-                near.movers.note(flags);
-                *flags &= !NEWS;
+                *flags = *flags & !NEWS | flag::MOVED;
             }
             return;
         }

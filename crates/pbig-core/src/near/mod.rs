@@ -238,12 +238,10 @@ impl NearPairs {
     /// Whether there is an index, which is made when walks without have cost as much.
     fn is_indexed(&mut self, ids: usize) -> bool {
         let (all, known) = (self.pairs.len(), self.index.known);
-        if known > 0 && (all - known) * 4 <= all {
-            return true;
-        }
-        self.walked += all;
+        let is_known = known > 0 && (all - known) * 4 <= all;
+        self.walked += if is_known { all - known } else { all };
         if self.walked <= WALKS * all {
-            return false;
+            return is_known;
         }
         self.walked = 0;
         self.index.make(&self.pairs, &self.states, ids);

@@ -59,10 +59,18 @@ impl BroadPhase {
             return Ok(Served::No);
         }
         if !self.near.goes_on() {
-            self.near.end();
+            self.end_near();
             return Ok(Served::No);
         }
         self.serve_near(LEAVING)
+    }
+
+    /// Where few change, a search of all follows that would not have been without the list.
+    fn end_near(&mut self) {
+        if !self.many_changed() {
+            self.near.own.ns += self.rebuild.search_of(self.present_count as usize);
+        }
+        self.near.end();
     }
 
     /// As long as no more than one box in `leaving` has left its reach.
@@ -78,7 +86,7 @@ impl BroadPhase {
         self.forget_away();
         if !served {
             self.near.learn(self.present_count);
-            self.near.end();
+            self.end_near();
             return Ok(Served::No);
         }
         let mut clock = Instant::now();
@@ -229,10 +237,8 @@ impl BroadPhase {
     /// Builds the base anew, of reaches, and keeps what overlaps of the pairs that are near; no, when these are too many.
     fn search_near(&mut self, skin: f32) -> Result<Served, Error> {
         let mut clock = Instant::now();
-        let reach = |aabb: &Aabb| aabb.inflated(skin);
-        self.near.reach.clear();
-        self.near.reach.extend(self.boxes.iter().map(reach));
-        self.near.begin(skin);
+        self.grow_reaches(skin);
+        self.near.begin(skin, self.present_count as usize);
         self.report.stages.map += lap(&mut clock);
         if self.find_reaches().is_err() {
             self.near.fail();
@@ -256,13 +262,14 @@ impl BroadPhase {
     /// world in which few boxes do, and the same ones: the base is built anew, but most of a search of all would be for those
     /// that stay.
     fn begin_near(&mut self, skin: f32) -> Result<Served, Error> {
+        self.drop_near();
         self.build_reaches(skin);
         let mut clock = Instant::now();
         let Self { near, boxes, changed, pairs, .. } = self;
         // In the base those that stay have a skin, too, for whatever its cells hold; here it is for what has been searched.
         near.reach.clone_from(boxes);
         changed.iter().for_each(|&id| near.reach[id as usize] = Aabb::NOWHERE);
-        near.begin(skin);
+        near.begin(skin, changed.len());
         near.list.begin(pairs.give_all());
         near.is_on = true;
         self.report.stages.plan += lap(&mut clock);
@@ -271,11 +278,15 @@ impl BroadPhase {
         served
     }
 
+    fn grow_reaches(&mut self, skin: f32) {
+        let Self { near, boxes, .. } = self;
+        near.reach.clear();
+        near.reach.extend(boxes.iter().map(|aabb| aabb.inflated(skin)));
+    }
+
     /// The base of all reaches, which are not searched.
     fn build_reaches(&mut self, skin: f32) {
-        let reach = |aabb: &Aabb| aabb.inflated(skin);
-        self.near.reach.clear();
-        self.near.reach.extend(self.boxes.iter().map(reach));
+        self.grow_reaches(skin);
         let summary = LazySummary::new(&self.near.reach, None, self.base.spare.take());
         let (boxes, filters) = (&self.near.reach[..], Some(&self.filters[..]));
         let set = Set { boxes, filters, ids: None, summary: &summary, before: &[] };

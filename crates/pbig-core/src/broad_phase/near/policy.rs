@@ -58,6 +58,9 @@ pub(crate) struct Near {
     pub(crate) moves: f32,
     /// Updates since the list was made.
     pub(crate) age: u32,
+    /// How many boxes move, and how often each of them has since then.
+    pub(crate) movers_count: f32,
+    pub(crate) rounds: f32,
     /// How far boxes have been from where their reach was made, as far as samples show; and at half the age.
     pub(crate) farthest: f32,
     pub(crate) farthest_then: f32,
@@ -88,37 +91,28 @@ pub(crate) struct Near {
     pub(crate) came: Vec<Pair>,
 }
 
-/// Whether it is always the same boxes that move.
+/// Which boxes have changed not long ago: those with [`flag::MOVED`].
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Movers {
-    /// Boxes that have changed since all were forgotten.
+    /// How many have changed since all were forgotten.
     count: usize,
-    /// In the last update: those that had before.
-    returned: usize,
-    /// All of them.
-    changed: usize,
 }
 
 impl Movers {
-    /// For an update in which so many have changed, each of which is to be noted.
+    /// For an update in which so many have changed, which are to be marked.
     pub(crate) fn begin(&mut self, changed: usize, flags: &mut [u8]) {
         self.count += changed;
         if self.count * REMEMBERED > flags.len() {
             self.count = changed;
             flags.iter_mut().for_each(|flags| *flags &= !flag::MOVED);
         }
-        (self.returned, self.changed) = (0, changed);
     }
 
-    #[inline(always)]
-    pub(crate) fn note(&mut self, flags: &mut u8) {
-        self.returned += usize::from(*flags & flag::MOVED != 0);
-        *flags |= flag::MOVED;
-    }
-
-    /// Whether most of the last update had changed before.
-    pub(crate) fn are_the_same(self) -> bool {
-        2 * self.returned > self.changed
+    /// Whether most of some boxes are among them, as far as samples show.
+    pub(crate) fn are_most_of(ids: &[u32], flags: &[u8]) -> bool {
+        let step = ids.len().div_ceil(SAMPLE).max(1);
+        let has_moved = |id: &&u32| flags[**id as usize] & flag::MOVED != 0;
+        2 * ids.iter().step_by(step).filter(has_moved).count() > ids.len().div_ceil(step)
     }
 }
 
@@ -138,6 +132,8 @@ impl Default for Near {
             skin: 0.0,
             moves: MOVES[0],
             age: 0,
+            movers_count: 0.0,
+            rounds: 0.0,
             farthest: 0.0,
             farthest_then: 0.0,
             pause: 0,
@@ -159,9 +155,10 @@ impl Default for Near {
 }
 
 impl Near {
-    /// A list that is made now.
-    pub(crate) fn begin(&mut self, skin: f32) {
+    /// A list that is made now, where so many boxes move.
+    pub(crate) fn begin(&mut self, skin: f32, movers: usize) {
         (self.skin, self.age) = (skin, 0);
+        (self.movers_count, self.rounds) = (movers as f32, 0.0);
         (self.farthest, self.farthest_then) = (0.0, 0.0);
         (self.own, self.price) = (Cost::default(), None);
     }
@@ -188,14 +185,15 @@ impl Near {
         self.moves = (factor * self.moves).clamp(MOVES[1], MOVES[2]);
     }
 
-    /// What an update has taken, in which so many boxes have changed.
-    pub(crate) fn note_time(&mut self, way: Way, changed: usize, time: Duration) {
+    /// What an update has taken, in which so many boxes of all have changed.
+    pub(crate) fn note_time(&mut self, way: Way, changed: usize, present: usize, time: Duration) {
+        let says_much = changed * FEWEST[0] >= present;
         self.without = if way == Way::Near { 0 } else { self.without + changed };
         let (ns, changed) = (time.as_nanos() as f32, changed as f32);
         if way == Way::Near {
             self.own = Cost { ns: self.own.ns + ns, changed: self.own.changed + changed };
             self.price.get_or_insert(self.own);
-        } else if way != Way::Gpu {
+        } else if way != Way::Gpu && says_much {
             let usual = self.usual.unwrap_or(ns / changed);
             self.usual = Some((usual + ns / changed) / 2.0);
         }
@@ -259,7 +257,7 @@ impl BroadPhase {
     pub(in crate::broad_phase) fn try_near(&mut self) -> Result<Served, Error> {
         let Some(skin) = self.skin() else { return Ok(Served::No) };
         let (changed, present) = (self.changed.len(), self.present_count as usize);
-        if changed * FIRST <= present && self.near.movers.are_the_same() {
+        if changed * FIRST <= present && self.are_the_same() {
             self.begin_near(skin)
         } else {
             self.search_near(skin)
@@ -270,8 +268,13 @@ impl BroadPhase {
     /// costs next to nothing anyway; and if it is other boxes each time, a list has to have all that is near.
     fn enough_changed(&self) -> bool {
         let (changed, present) = (self.changed.len(), self.present_count as usize);
-        let fewest = if self.near.movers.are_the_same() { FEWEST[0] } else { FEWEST[1] };
-        self.many_changed() || (changed * fewest >= present && self.near.without * PATIENCE >= present)
+        let is_due = || changed * FEWEST[0] >= present && self.near.without * PATIENCE >= present;
+        self.many_changed() || (is_due() && (changed * FEWEST[1] >= present || self.are_the_same()))
+    }
+
+    /// Whether most of the boxes that change have done so not long ago.
+    fn are_the_same(&self) -> bool {
+        Movers::are_most_of(&self.changed, &self.flags)
     }
 
     /// How many pairs would be near: those that overlap, as often as there is more room around a box; filters left aside.
@@ -306,7 +309,10 @@ impl BroadPhase {
             near.farthest =
                 near.farthest.max(near.skin - slack(&near.reach[id as usize], &boxes[id as usize]));
         }
-        if near.age < 2 || !near.age.is_power_of_two() {
+        let before = near.rounds as u32;
+        near.rounds += changed.len() as f32 / near.movers_count.max(1.0);
+        let rounds = near.rounds as u32;
+        if rounds == before || !rounds.is_power_of_two() {
             return;
         }
         let then = std::mem::replace(&mut near.farthest_then, near.farthest);

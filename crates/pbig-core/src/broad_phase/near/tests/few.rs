@@ -1,8 +1,8 @@
 //! Lists in worlds in which few boxes move.
 
 use super::{BOXES, World};
-use crate::broad_phase::Events;
 use crate::broad_phase::near::policy::{Cost, Movers, Near};
+use crate::broad_phase::{Events, flag};
 use crate::{Aabb, Error, Limits, Pair, ProxyFilter};
 use std::collections::BTreeSet;
 
@@ -159,12 +159,43 @@ fn a_list_that_costs_more_than_none_is_given_up() {
 #[test]
 fn movers_are_the_same_where_most_have_moved_before_and_not_long_ago() {
     let (mut movers, mut flags) = (Movers::default(), vec![0; 100]);
-    let mut are_the_same = |ids: std::ops::Range<usize>| {
+    let mut are_the_same = |ids: std::ops::Range<u32>| {
+        let ids: Vec<u32> = ids.collect();
+        let are = Movers::are_most_of(&ids, &flags);
         movers.begin(ids.len(), &mut flags);
-        flags[ids].iter_mut().for_each(|flags| movers.note(flags));
-        movers.are_the_same()
+        ids.iter().for_each(|&id| flags[id as usize] |= flag::MOVED);
+        are
     };
-    assert_eq!([0..8, 0..8, 3..11, 3..5].map(&mut are_the_same), [false, true, true, false], "forgotten");
+    assert_eq!([0..8, 0..8, 3..11, 20..22, 0..2].map(&mut are_the_same), [false, true, true, false, false]);
     assert_eq!([40..48, 44..52, 43..49].map(&mut are_the_same), [false, false, true]);
     assert!((0..200).all(|k| !are_the_same(k * 10 % 100..k * 10 % 100 + 10)), "each in its turn");
+    assert!(!Movers::are_most_of(&[], &[]));
+}
+
+/// So few that they are looked up, from the first update on; some with filters, and one without an end.
+#[test]
+fn very_few_that_move_are_looked_up() {
+    let mut world = World::new(0.0);
+    let filter = ProxyFilter { memberships: 2, mask: 2, ..ProxyFilter::ALL };
+    for id in (0..BOXES).step_by(80) {
+        world.broad_phase.set(id, world.boxes[id as usize], filter).expect("a small id");
+    }
+    let long = Aabb { min: [-50.0, 0.0, 0.0], max: [f32::INFINITY, 0.1, 0.1] };
+    world.broad_phase.set(77, long, ProxyFilter::ALL).expect("a small id");
+    let mut made = vec![];
+    for round in 0..60u32 {
+        for id in (0..BOXES).step_by(40) {
+            let (by, kept) = (world.vector(), *world.broad_phase.filter(id).expect("it is there"));
+            let add = |corner: [f32; 3]| std::array::from_fn(|k| corner[k] + 0.1 * by[k]);
+            let Aabb { min, max } = world.boxes[id as usize];
+            world.boxes[id as usize] = Aabb::new(add(min), add(max));
+            world.broad_phase.set(id, world.boxes[id as usize], kept).expect("a small id");
+        }
+        world.update(&format!("round {round}"));
+        if world.broad_phase.near.is_on {
+            made.push(world.broad_phase.report().checks.made);
+        }
+    }
+    assert!(made.len() > 40, "{} updates by near pairs", made.len());
+    assert!(made.iter().all(|made| *made < 2000), "never all pairs: {made:?}");
 }
