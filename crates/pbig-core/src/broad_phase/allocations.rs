@@ -1,6 +1,7 @@
-//! Steady state asks for no memory: every allocation of this thread is counted.
+//! Steady state asks for no memory: every allocation of this thread is counted, or of all threads of a pool.
 
 use crate::{Aabb, BroadPhase, Config, ProxyFilter};
+use rayon::{ThreadPool, ThreadPoolBuilder};
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
 use std::sync::Arc;
@@ -35,6 +36,18 @@ unsafe impl GlobalAlloc for Counting {
 #[global_allocator]
 static COUNTING: Counting = Counting;
 
+/// Allocations so far: of a pool, or of this thread.
+fn counted(pool: Option<&ThreadPool>) -> u64 {
+    pool.map_or_else(|| COUNT.get(), |pool| pool.broadcast(|_| COUNT.get()).iter().sum())
+}
+
+fn on<R: Send>(pool: Option<&ThreadPool>, work: impl FnOnce() -> R + Send) -> R {
+    match pool {
+        Some(pool) => pool.install(work),
+        None => work(),
+    }
+}
+
 /// Boxes that swing to and fro, so that pairs come and go and later frames need no more room than earlier ones.
 fn place(id: u32, frame: u32, boxes: u32) -> Aabb {
     let edge = (2 * boxes) as f32;
@@ -46,7 +59,7 @@ fn place(id: u32, frame: u32, boxes: u32) -> Aabb {
 
 /// Allocations of an update that needs no new plan, in which one in `share` boxes moves: the most of any in 40, after as
 /// many to warm up.
-fn most_allocations(boxes: u32, share: u32) -> u64 {
+fn most_allocations(boxes: u32, share: u32, pool: Option<&ThreadPool>) -> u64 {
     let mut broad_phase = BroadPhase::new(Config { margin: 0.01, ..Config::DEFAULT }).expect("a margin");
     // Whose turn it is depends on time, and the first of a turn makes room.
     broad_phase.small.turns = super::turns::Turns::none();
@@ -56,12 +69,14 @@ fn most_allocations(boxes: u32, share: u32) -> u64 {
     for frame in 0..80 {
         let step = if frame == 0 { 1 } else { share };
         let ids: Vec<u32> = (0..boxes).step_by(step as usize).collect();
-        let before = COUNT.get();
-        let at = |id| Some((place(id, frame, boxes), ProxyFilter::ALL));
-        broad_phase.set_many(&ids, |id| id, at).expect("small ids");
-        let changes = broad_phase.update().expect("few pairs");
-        events += changes.added.len() + changes.removed.len();
-        let counted = COUNT.get() - before;
+        let before = counted(pool);
+        on(pool, || {
+            let at = |id| Some((place(id, frame, boxes), ProxyFilter::ALL));
+            broad_phase.set_many(&ids, |id| id, at).expect("small ids");
+            broad_phase.update().map(|_| ()).expect("few pairs");
+        });
+        let counted = counted(pool) - before;
+        events += broad_phase.events().added.len() + broad_phase.events().removed.len();
         // A new plan is a few small lists.
         let plan =
             std::mem::replace(&mut plans[frame as usize % 2], broad_phase.report().plan.levels.clone());
@@ -79,21 +94,24 @@ fn most_allocations(boxes: u32, share: u32) -> u64 {
 #[test]
 fn an_update_like_those_before_allocates_nothing() {
     for (boxes, share) in [(60, 1), (500, 1), (5000, 1)] {
-        assert_eq!(most_allocations(boxes, share), 0, "{boxes} boxes, one in {share} moves");
+        assert_eq!(most_allocations(boxes, share, None), 0, "{boxes} boxes, one in {share} moves");
     }
 }
 
 #[test]
 fn nor_does_one_in_which_few_boxes_move() {
     for (boxes, share) in [(500, 50), (5000, 100), (5000, 20)] {
-        assert_eq!(most_allocations(boxes, share), 0, "{boxes} boxes, one in {share} moves");
+        assert_eq!(most_allocations(boxes, share, None), 0, "{boxes} boxes, one in {share} moves");
     }
 }
 
 #[test]
 fn where_threads_share_the_work_only_their_queue_grows_now_and_then() {
-    assert!(most_allocations(100_000, 20) <= 1);
-    assert!(most_allocations(100_000, 2) <= 8);
+    let pool = ThreadPoolBuilder::new().num_threads(2).build().expect("a pool");
+    for share in [20, 2, 1] {
+        let most = most_allocations(100_000, share, Some(&pool));
+        assert!(most <= 8, "{most} where one in {share} moves");
+    }
 }
 
 #[test]
@@ -101,4 +119,9 @@ fn allocations_are_counted() {
     let before = COUNT.get();
     let some = std::hint::black_box(vec![1u8; 100]);
     assert_eq!((COUNT.get() - before, some.len()), (1, 100));
+    let pool = ThreadPoolBuilder::new().num_threads(2).build().expect("a pool");
+    let before = counted(Some(&pool));
+    assert_eq!(counted(Some(&pool)), before, "to count is none");
+    pool.broadcast(|_| std::hint::black_box(vec![1u8; 100]));
+    assert_eq!(counted(Some(&pool)) - before, 2, "one on each thread");
 }

@@ -360,7 +360,10 @@ mod tests {
             for id in ids {
                 broad_phase.set(id, at(0.0)(id), ProxyFilter::ALL).expect("a small id");
             }
+            let mut other = broad_phase.small.bitmap.clone();
+            put_with(&mut other, &broad_phase.boxes, &broad_phase.changed);
             put(&mut broad_phase.small.bitmap, &broad_phase.boxes, &broad_phase.changed);
+            assert!(other.is_like(&broad_phase.small.bitmap), "what is put");
             let (state, mut found) = (state!(broad_phase), [vec![], vec![]]);
             let (bitmap, changed) = (&mut broad_phase.small.bitmap, &broad_phase.changed);
             let fast = search(bitmap, &state, changed, &mut found[0]);

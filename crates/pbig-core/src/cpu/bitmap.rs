@@ -37,6 +37,12 @@ pub(crate) struct Bitmap {
 }
 
 impl Bitmap {
+    /// Whether the same boxes lie in the same bands.
+    #[cfg(test)]
+    pub(crate) fn is_like(&self, other: &Self) -> bool {
+        self.rows == other.rows && self.spans == other.spans
+    }
+
     /// Whether there is room for so many ids.
     pub(crate) fn holds(&self, ids: usize) -> bool {
         ids <= self.spans.len()
