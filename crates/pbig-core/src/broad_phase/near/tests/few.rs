@@ -18,6 +18,28 @@ impl World {
         }
     }
 
+    /// One of the six things that can happen to a box.
+    fn change(&mut self, kind: u32, id: u32) {
+        let aabb = self.boxes[id as usize];
+        match kind {
+            0 => self.remove(id),
+            1 => self.shift(id, [2.0, 0.0, 0.0]),
+            2 => {
+                let filter = ProxyFilter { memberships: 2, mask: 1, ..ProxyFilter::ALL };
+                self.broad_phase.set(id, aabb, filter).expect("a small id");
+            }
+            3 => self.broad_phase.set(id, Aabb::NOWHERE, ProxyFilter::ALL).expect("a small id"),
+            4 => {
+                self.remove(id);
+                self.set(id);
+            }
+            _ => {
+                self.boxes.push(aabb);
+                self.set(self.boxes.len() as u32 - 1);
+            }
+        }
+    }
+
     /// After updates of the same few: a list that has begun with the pairs that existed.
     fn with_few_movers(margin: f32) -> Self {
         let mut world = Self::new(margin);
@@ -57,23 +79,7 @@ fn any_other_box_may_move_and_change_too() {
         for round in 0..90u32 {
             world.tremble_few(0.04);
             let id = round * 31 % BOXES;
-            match round % 6 {
-                0 => world.remove(id),
-                1 => world.shift(id, [2.0, 0.0, 0.0]),
-                2 => {
-                    let filter = ProxyFilter { memberships: 2, mask: 1, ..ProxyFilter::ALL };
-                    world.broad_phase.set(id, world.boxes[id as usize], filter).expect("a small id");
-                }
-                3 => world.broad_phase.set(id, Aabb::NOWHERE, ProxyFilter::ALL).expect("a small id"),
-                4 => {
-                    world.remove(id);
-                    world.set(id);
-                }
-                _ => {
-                    world.boxes.push(world.boxes[id as usize]);
-                    world.set(world.boxes.len() as u32 - 1);
-                }
-            }
+            world.change(round % 6, id);
             world.update(&format!("margin {margin}, round {round}"));
         }
         assert!(world.near > 60, "{} updates by near pairs", world.near);
@@ -92,23 +98,7 @@ fn a_list_may_begin_while_boxes_come_go_and_change() {
         }
         assert!(!world.broad_phase.near.is_on);
         world.tremble_few(0.05);
-        let filter = ProxyFilter { memberships: 2, mask: 1, ..ProxyFilter::ALL };
-        for id in (4..BOXES).step_by(150) {
-            match change {
-                0 => world.remove(id),
-                1 => world.shift(id, [2.0, 0.0, 0.0]),
-                2 => world.broad_phase.set(id, world.boxes[id as usize], filter).expect("a small id"),
-                3 => world.broad_phase.set(id, Aabb::NOWHERE, ProxyFilter::ALL).expect("a small id"),
-                4 => {
-                    world.remove(id);
-                    world.set(id);
-                }
-                _ => {
-                    world.boxes.push(world.boxes[id as usize]);
-                    world.set(world.boxes.len() as u32 - 1);
-                }
-            }
-        }
+        (4..BOXES).step_by(150).for_each(|id| world.change(change, id));
         world.update(&format!("change {change}"));
         assert!(world.broad_phase.near.is_on, "change {change}");
         world.tremble_few(0.05);
