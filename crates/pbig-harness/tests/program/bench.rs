@@ -79,6 +79,28 @@ fn bench_stages_has_the_time_of_each_stage() {
     assert!(rows.iter().all(|row| of_stages(row) > Some(2)), "{rows:?}");
 }
 
+/// On whatever adapter there is: what goes up and comes back is a matter of counts.
+#[test]
+fn bench_gpu_has_both_backends_and_moves_no_more_bytes_than_have_changed() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let object = json(&pbig(folder.path(), &["bench", "gpu", "--quick", "--json"]));
+    assert_eq!(std::fs::read_dir(folder.path()).expect("the folder").count(), 0);
+    let rows = |of: &str| object[of].as_array().expect(of).clone();
+    let number = |row: &Value, key: &str| row[key].as_f64().unwrap_or_else(|| panic!("{key}: {row}"));
+    assert!(rows("rows").len() == 6 && rows("rows").iter().all(|row| number(row, "ratio") > 0.0));
+    let events = rows("events");
+    assert_eq!(events.len(), 4);
+    for row in &events {
+        for key in ["cpu_ms", "gpu_ms", "begin_ms", "finish_ms"] {
+            assert!(number(&row[key], "median") > 0.0, "{key}: {row}");
+        }
+        let changed = number(row, "boxes") * number(row, "share");
+        assert!(number(row, "uploaded") < 64.0 * changed + 4096.0, "{row}");
+        assert!(number(row, "downloaded") < 32.0 * number(row, "events") + 4096.0, "{row}");
+    }
+    assert!(number(&events[3], "events") > 1000.0);
+}
+
 #[test]
 fn bench_papers_has_every_table_and_says_that_there_is_no_gpu() {
     let folder = tempfile::tempdir().expect("a folder");

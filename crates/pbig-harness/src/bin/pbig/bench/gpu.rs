@@ -1,5 +1,7 @@
 //! `pbig bench gpu`: the GPU beside the CPU, stage by stage, and the floor below both.
 
+mod events;
+
 use super::machine::slug;
 use super::{Args, keep};
 use crate::output::{Failure, print, progress};
@@ -8,7 +10,7 @@ use pbig_core::{Aabb, Backend, Config, Finder, GpuFinder, GpuReport, Limits};
 use pbig_harness::boxes::{BoxSet, moved};
 use pbig_harness::runner::{Spread, milliseconds};
 use serde_json::{Value, json};
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 /// One set at one size.
 struct Row {
@@ -30,25 +32,35 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
     let rate = rate.map_err(|error| Failure::Input(error.to_string()))?;
     let sizes: &[usize] =
         if args.quick { &[1000, 10_000] } else { &[1000, 10_000, 100_000, 1_000_000, 10_000_000] };
-    // Ten million boxes take minutes on a program that plays a GPU, and tell nothing.
-    let sizes = if gpu.is_software() { &sizes[..sizes.len().min(4)] } else { sizes };
-    let sets = ["uniform", "gaussian", "mixed"];
-    let bar = progress(sizes.len() * sets.len(), "sets");
-    let mut rows = Vec::new();
-    for &boxes in sizes {
-        for set in sets {
-            rows.push(measure(&gpu, set, boxes)?);
-            bar.inc(1);
-        }
-    }
-    bar.finish_and_clear();
-    let object = object(&gpu, rate, &rows);
+    let rows = rows(&gpu, sizes)?;
+    let updates = events::rows(&gpu, args.quick)?;
+    let object = object(&gpu, rate, &rows, &updates);
     if args.json {
         print(&object.to_string())?
     } else {
-        print(&table(&gpu, rate, &rows))?
+        print(&format!("{}\n{}", table(&gpu, rate, &rows), events::table(&updates)))?
     }
     if args.quick { Ok(()) } else { keep(&format!("gpu-{}", slug(gpu.adapter())), &object, args.json) }
+}
+
+/// Ten million boxes take minutes on a program that plays a GPU, and tell nothing.
+fn most_boxes(gpu: &GpuFinder) -> usize {
+    if gpu.is_software() { 1_000_000 } else { usize::MAX }
+}
+
+fn rows(gpu: &GpuFinder, sizes: &[usize]) -> Result<Vec<Row>, Failure> {
+    let sets = ["uniform", "gaussian", "mixed"];
+    let sizes = sizes.iter().filter(|&&boxes| boxes <= most_boxes(gpu));
+    let cases: Vec<_> = sizes.flat_map(|&boxes| sets.map(|set| (set, boxes))).collect();
+    let bar = progress(cases.len(), "sets");
+    let row = |&(set, boxes): &(&'static str, usize)| {
+        let row = measure(gpu, set, boxes);
+        bar.inc(1);
+        row
+    };
+    let rows = cases.iter().map(row).collect();
+    bar.finish_and_clear();
+    rows
 }
 
 /// Both backends on the same boxes, in turn. In every other round all boxes have moved, as they do in a
@@ -141,14 +153,12 @@ fn table(gpu: &GpuFinder, rate: f64, rows: &[Row]) -> String {
     lines.join("\n")
 }
 
-fn object(gpu: &GpuFinder, rate: f64, rows: &[Row]) -> Value {
-    let kernels = |row: &Row| -> Value {
-        let named = row.report.kernels.iter();
-        named
-            .map(|(name, time)| ((*name).to_owned(), json!(milliseconds(*time))))
-            .collect::<serde_json::Map<_, _>>()
-            .into()
-    };
+fn milliseconds_of(kernels: &[(&'static str, Duration)]) -> Value {
+    let named = kernels.iter().map(|(name, time)| ((*name).to_owned(), json!(milliseconds(*time))));
+    named.collect::<serde_json::Map<_, _>>().into()
+}
+
+fn object(gpu: &GpuFinder, rate: f64, rows: &[Row], updates: &[events::Row]) -> Value {
     let row = |row: &Row| {
         json!({
             "set": row.set, "boxes": row.boxes, "pairs": row.pairs,
@@ -157,7 +167,7 @@ fn object(gpu: &GpuFinder, rate: f64, rows: &[Row]) -> Value {
             "upload_ms": milliseconds(row.report.upload),
             "wait_ms": milliseconds(row.report.wait),
             "decode_ms": milliseconds(row.report.decode),
-            "kernels_ms": kernels(row),
+            "kernels_ms": milliseconds_of(&row.report.kernels),
             "uploaded": row.report.uploaded, "downloaded": row.report.downloaded,
             "device_bytes": row.report.device_bytes, "compression": row.report.compression,
             "chunks": row.report.chunks, "parts": row.report.parts,
@@ -170,5 +180,6 @@ fn object(gpu: &GpuFinder, rate: f64, rows: &[Row]) -> Value {
         "threads": rayon::current_num_threads(),
         "copy_bytes_per_s": rate,
         "rows": rows.iter().map(row).collect::<Vec<_>>(),
+        "events": updates.iter().map(events::object).collect::<Vec<_>>(),
     })
 }

@@ -1,0 +1,175 @@
+//! Part of `pbig bench gpu`: updates by the share that moves. What goes up and comes back should follow the change, not
+//! the world; and a caller who does something else meanwhile should hardly wait.
+
+use super::{milliseconds_of, most_boxes};
+use crate::output::{Failure, progress};
+use pbig_core::{Aabb, Backend, BroadPhase, Config, GpuFinder, GpuReport, Limits, ProxyFilter};
+use pbig_harness::boxes::{BoxSet, Wander};
+use pbig_harness::runner::{Spread, milliseconds};
+use serde_json::{Value, json};
+use std::time::{Duration, Instant};
+
+const SET: &str = "unit";
+
+/// In edges.
+const DISTANCE: f32 = 0.1;
+
+const SHARES: [f64; 4] = [0.001, 0.01, 0.1, 1.0];
+
+/// One share at one size: medians in ms of setting what has moved, and the update.
+pub(super) struct Row {
+    boxes: usize,
+    share: f64,
+    pairs: usize,
+    /// Pairs that came or went in the last round.
+    events: usize,
+    cpu: Spread,
+    gpu: Spread,
+    /// The same in two halves, between which the caller is busy for as long as the update takes.
+    begin: Spread,
+    finish: Spread,
+    /// Of the last round, not in halves.
+    report: GpuReport,
+}
+
+pub(super) fn rows(gpu: &GpuFinder, quick: bool) -> Result<Vec<Row>, Failure> {
+    let sizes: &[usize] = if quick { &[10_000] } else { &[10_000, 100_000, 1_000_000, 10_000_000] };
+    let sizes = sizes.iter().filter(|&&boxes| boxes <= most_boxes(gpu));
+    let cases: Vec<_> = sizes.flat_map(|&boxes| SHARES.map(|share| (boxes, share))).collect();
+    let bar = progress(cases.len(), "shares");
+    let row = |&(boxes, share): &(usize, f64)| {
+        let row = Race::new(gpu, boxes, share).and_then(Race::run);
+        bar.inc(1);
+        row
+    };
+    let rows = cases.iter().map(row).collect();
+    bar.finish_and_clear();
+    rows
+}
+
+/// Three broad phases that see the same boxes.
+struct Race {
+    cpu: BroadPhase,
+    gpu: BroadPhase,
+    halves: BroadPhase,
+    wander: Wander,
+    share: f64,
+}
+
+impl Race {
+    fn new(gpu: &GpuFinder, boxes: usize, share: f64) -> Result<Self, Failure> {
+        let config = |backend| Config { backend, limits: Limits::UNLIMITED, ..Config::DEFAULT };
+        let on_gpu = || BroadPhase::with_gpu(config(Backend::Gpu), gpu.clone()).map_err(failure);
+        let start = BoxSet::named(SET).expect("a set of the harness").boxes(boxes, 1);
+        let wander = Wander::new(start, share, DISTANCE);
+        let cpu = BroadPhase::new(config(Backend::Cpu)).map_err(failure)?;
+        let mut race = Self { cpu, gpu: on_gpu()?, halves: on_gpu()?, wander, share };
+        let all: Vec<u32> = (0..boxes as u32).collect();
+        for broad_phase in [&mut race.cpu, &mut race.gpu, &mut race.halves] {
+            set(broad_phase, &all, &race.wander.boxes)?;
+            broad_phase.update().map_err(failure)?;
+        }
+        Ok(race)
+    }
+
+    fn run(mut self) -> Result<Row, Failure> {
+        let boxes = self.wander.boxes.len();
+        let rounds = if boxes > 100_000 { 5 } else { 9 };
+        let mut times: [Vec<f64>; 4] = Default::default();
+        for round in 0..rounds {
+            let took = self.round(round)?;
+            self.compare()?;
+            // The first rounds allocate and learn.
+            if round > 1 {
+                times.iter_mut().zip(took).for_each(|(times, took)| times.push(milliseconds(took)));
+            }
+        }
+        let [cpu, gpu, begin, finish] = times.map(Spread::of);
+        let (share, pairs, report) = (self.share, self.gpu.pair_count(), did(&self.gpu)?);
+        let events = self.gpu.events().added.len() + self.gpu.events().removed.len();
+        Ok(Row { boxes, share, pairs, events, cpu, gpu, begin, finish, report })
+    }
+
+    /// What the update took on either backend, and its two halves.
+    fn round(&mut self, round: usize) -> Result<[Duration; 4], Failure> {
+        let moved = self.wander.step(round);
+        let boxes = &self.wander.boxes;
+        let cpu = update(&mut self.cpu, &moved, boxes)?;
+        let gpu = update(&mut self.gpu, &moved, boxes)?;
+        let clock = Instant::now();
+        set(&mut self.halves, &moved, boxes)?;
+        self.halves.begin();
+        let begin = clock.elapsed();
+        std::thread::sleep(gpu);
+        let clock = Instant::now();
+        self.halves.finish().map_err(failure)?;
+        Ok([cpu, gpu, begin, clock.elapsed()])
+    }
+
+    fn compare(&self) -> Result<(), Failure> {
+        let events = [&self.cpu, &self.gpu, &self.halves].map(BroadPhase::events);
+        if events.iter().all(|&other| other == events[0]) {
+            return Ok(());
+        }
+        let (boxes, share) = (self.wander.boxes.len(), self.share);
+        Err(Failure::Check(format!("events of {boxes} boxes, {share} moved: CPU and GPU differ")))
+    }
+}
+
+fn failure(error: pbig_core::Error) -> Failure {
+    Failure::Input(error.to_string())
+}
+
+fn update(broad_phase: &mut BroadPhase, moved: &[u32], boxes: &[Aabb]) -> Result<Duration, Failure> {
+    let clock = Instant::now();
+    set(broad_phase, moved, boxes)?;
+    broad_phase.update().map_err(failure)?;
+    Ok(clock.elapsed())
+}
+
+fn set(broad_phase: &mut BroadPhase, moved: &[u32], boxes: &[Aabb]) -> Result<(), Failure> {
+    let fetch = |id: u32| boxes[id as usize];
+    broad_phase.set_many(moved, fetch, |aabb| Some((aabb, ProxyFilter::ALL))).map_err(failure)
+}
+
+/// What the device did; an update that it left to the CPU is no measurement.
+fn did(broad_phase: &BroadPhase) -> Result<GpuReport, Failure> {
+    let report = broad_phase.report();
+    let why = || Failure::Check(format!("events: {}", report.fallback.as_deref().unwrap_or("on the CPU")));
+    report.gpu.clone().ok_or_else(why)
+}
+
+pub(super) fn table(rows: &[Row]) -> String {
+    let head = "events, medians in ms; gpu: one update; begin, finish: its halves, with as long between them; up, back: bytes";
+    let names = format!(
+        "{:<9} {:>9} {:>6} {:>9} {:>9} {:>9} {:>9} {:>9} {:>9} {:>10} {:>10}",
+        "set", "boxes", "share", "pairs", "events", "cpu", "gpu", "begin", "finish", "up", "back"
+    );
+    let line = |row: &Row| {
+        format!(
+            "{:<9} {:>9} {:>6} {:>9} {:>9} {:>9.3} {:>9.3} {:>9.3} {:>9.3} {:>10} {:>10}",
+            SET,
+            row.boxes,
+            row.share,
+            row.pairs,
+            row.events,
+            row.cpu.median,
+            row.gpu.median,
+            row.begin.median,
+            row.finish.median,
+            row.report.uploaded,
+            row.report.downloaded
+        )
+    };
+    let lines = rows.iter().map(line);
+    [head.into(), names].into_iter().chain(lines).collect::<Vec<_>>().join("\n")
+}
+
+pub(super) fn object(row: &Row) -> Value {
+    json!({
+        "set": SET, "boxes": row.boxes, "share": row.share, "pairs": row.pairs, "events": row.events,
+        "cpu_ms": row.cpu, "gpu_ms": row.gpu, "begin_ms": row.begin, "finish_ms": row.finish,
+        "uploaded": row.report.uploaded, "downloaded": row.report.downloaded,
+        "device_bytes": row.report.device_bytes, "kernels_ms": milliseconds_of(&row.report.kernels),
+    })
+}
