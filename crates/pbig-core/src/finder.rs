@@ -166,6 +166,14 @@ mod tests {
     use crate::Strategy;
 
     #[test]
+    fn filters_part_some_and_leave_the_others() {
+        let boxes = [Aabb::from_center([0.0; 3], [0.5; 3]); 3];
+        let filters = [1, 1, 2].map(|body| ProxyFilter { body, ..ProxyFilter::ALL });
+        let mut finder = Finder::default();
+        assert_eq!(finder.find_filtered(&boxes, &filters), Ok(&[Pair::new(0, 2), Pair::new(1, 2)][..]));
+    }
+
+    #[test]
     fn what_a_row_that_wraps_around_tests_is_counted() {
         let cube = |at: [f32; 3]| Aabb::from_center(at, [0.5; 3]);
         let boxes = [cube([0.0, 0.0, 1.0]), cube([1.0, 0.0, 0.0])];

@@ -280,6 +280,21 @@ mod tests {
     }
 
     #[test]
+    fn a_query_of_any_size_has_a_code_that_is_right_or_none() {
+        let cells = cells(1.0, 0.0);
+        let cube = |at: f32, edge: f32| Aabb::new([at; 3], [at + edge; 3]);
+        let queries: Vec<_> = (0..100).map(|i| cube(3.3, 0.1 * i as f32)).collect();
+        let with_codes = || queries.iter().filter_map(|query| Some((query, cells.query(query)?)));
+        assert!((10..90).contains(&with_codes().count()));
+        for (query, code) in with_codes() {
+            let level = (-50..250).map(|i| cube(0.07 * i as f32, 1.0 / LevelPlan::SPARE));
+            for one in level.filter(|one| one.overlaps(query)) {
+                assert_eq!(code.wrapping_add(cells.code(&one)) & APART, 0, "{query:?} {one:?}");
+            }
+        }
+    }
+
+    #[test]
     fn codes_part_boxes_that_are_a_few_steps_apart() {
         let cells = cells(1.0, 0.0);
         let at = |x: f32| Aabb::from_center([x, 0.5, 0.5], [0.2; 3]);

@@ -280,6 +280,7 @@ mod tests {
     #[test]
     fn spacing_gives_the_wanted_boxes_per_cell_in_one_two_and_three_dimensions() {
         assert!((spacing([100.0; 3], 1_000_000, 1.0) - 1.0).abs() < 1e-6);
+        assert!((spacing([100.0; 3], 1_000_000, 8.0) - 2.0).abs() < 1e-6);
         assert!((spacing([100.0, 0.001, 100.0], 10_000, 1.0) - 1.0).abs() < 1e-6);
         assert!((spacing([0.0, 100.0, 0.0], 100, 1.0) - 1.0).abs() < 1e-6);
         assert_eq!(spacing([0.0; 3], 100, 1.0), 0.0);
