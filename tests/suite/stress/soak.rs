@@ -3,16 +3,21 @@
 
 use super::memory;
 use crate::incremental::Follower;
-use pbig_core::plan::Chosen;
-use pbig_core::{Aabb, Backend, Coding, Config, ProxyFilter, Strategy};
+use pbig_core::{Aabb, Backend, Coding, Config, ProxyFilter, Report, Strategy};
 use pbig_harness::boxes::BoxSet;
 use pbig_tests::gpu;
 use rand::rngs::StdRng;
 use rand::{RngExt, SeedableRng};
+use std::collections::BTreeMap;
+use std::io::Write;
+
+fn given() -> Option<usize> {
+    let given = std::env::var("PBIG_SOAK").ok();
+    given.map(|n| n.parse().expect("PBIG_SOAK is a number of updates"))
+}
 
 fn updates() -> usize {
-    let given = std::env::var("PBIG_SOAK").ok();
-    given.map_or(2000, |n| n.parse().expect("PBIG_SOAK is a number of updates"))
+    given().unwrap_or(2000)
 }
 
 /// A world of boxes, half of which are there, in a space with about a pair a box.
@@ -23,16 +28,18 @@ struct Churn {
     odd: Vec<Aabb>,
     /// Whether all boxes move smoothly around their homes, so that near pairs are kept.
     swings: bool,
-    /// Updates by near pairs.
-    near: usize,
+    /// Otherwise one in so many changes in an update.
+    one_in: usize,
+    tally: Tally,
 }
 
 impl Churn {
-    fn new(config: Config, ids: usize, swings: bool) -> Self {
+    fn new(config: Config, ids: usize) -> Self {
         let set = |name: &str, n| BoxSet::named(name).expect("the set exists").boxes(n, 4);
         let world = Follower::new(config, ids);
         let rng = StdRng::seed_from_u64(6);
-        Self { world, rng, home: set("unit", ids), odd: set("degenerate", 100), swings, near: 0 }
+        let (home, odd) = (set("unit", ids), set("degenerate", 100));
+        Self { world, rng, home, odd, swings: false, one_in: 30, tally: Tally::default() }
     }
 
     fn aabb(&mut self, id: u32) -> Aabb {
@@ -61,14 +68,14 @@ impl Churn {
         }
     }
 
-    /// One in thirty boxes, and now and then all of them.
+    /// A share of the boxes, and now and then all of them.
     fn change(&mut self, update: usize) {
         if self.swings && !update.is_multiple_of(50) {
             return self.swing(update);
         }
         let ids = self.home.len();
         let all = update.is_multiple_of(97);
-        for i in 0..if all { ids } else { 1 + ids / 30 } {
+        for i in 0..if all { ids } else { 1 + ids / self.one_in } {
             let id = if all { i as u32 } else { self.rng.random_range(0..ids as u32) };
             let body = if self.rng.random_ratio(1, 3) { id % 20 } else { ProxyFilter::NO_BODY };
             match self.rng.random_range(0..4) {
@@ -83,40 +90,75 @@ impl Churn {
 
     /// So many updates, `sampled` of them compared with the oracle. In the first fifth memory may grow to what it takes.
     fn run(&mut self, updates: usize, sampled: usize) {
-        let (mut early, mut early_on_device) = (0, 0);
+        let (every, tenth) = ((updates / sampled).max(1), (updates / 10).max(1));
         for update in 0..updates {
             self.change(update);
-            if update.is_multiple_of((updates / sampled).max(1)) {
+            if update.is_multiple_of(every) {
                 self.world.update(&format!("update {update}"));
+                self.tally.equal += 1;
             } else {
                 self.world.update_unchecked();
             }
-            let report = self.world.broad_phase.report();
-            self.near += usize::from(report.plan.chosen == Chosen::Near);
-            let (held, on_device) = (memory::held(), report.gpu.as_ref().map_or(0, |gpu| gpu.device_bytes));
-            assert_eq!(report.fallback, None, "update {update}");
-            if update < updates / 5 {
-                (early, early_on_device) = (held.max(early), on_device.max(early_on_device));
-                continue;
+            self.tally.count(self.world.broad_phase.report(), update < updates / 5);
+            if (update + 1).is_multiple_of(tenth) && given().is_some() {
+                self.tally.tell(self.home.len());
             }
-            assert!(
-                held <= early * 5 / 4,
-                "update {update}: {held} bytes are held, at first at most {early}"
-            );
-            assert!(on_device <= early_on_device * 5 / 4, "update {update}: {on_device} on the device");
         }
-        println!(
-            "{updates} updates of {} ids, {} by near pairs: {early} bytes, {early_on_device} on the device",
-            self.home.len(),
-            self.near
-        );
+    }
+}
+
+/// What has been counted so far.
+#[derive(Default)]
+struct Tally {
+    updates: usize,
+    /// Of them those that were compared with the oracle, and equal.
+    equal: usize,
+    /// By who found the pairs: a device, or else what the plan names.
+    ways: BTreeMap<&'static str, usize>,
+    /// Bytes held by this thread and on the device: now, and the most in the first fifth.
+    bytes: [i64; 2],
+    early: [i64; 2],
+}
+
+impl Tally {
+    fn count(&mut self, report: &Report, is_early: bool) {
+        let way = if report.gpu.is_some() { "gpu" } else { report.plan.chosen.name() };
+        *self.ways.entry(way).or_default() += 1;
+        self.bytes = [memory::held(), report.gpu.as_ref().map_or(0, |gpu| gpu.device_bytes as i64)];
+        for (early, bytes) in self.early.iter_mut().zip(self.bytes) {
+            *early = if is_early { bytes.max(*early) } else { *early };
+            let update = self.updates;
+            assert!(bytes <= *early * 5 / 4, "update {update}: {bytes} bytes are held, at first {early}");
+        }
+        self.updates += 1;
+    }
+
+    /// To standard output as it is, where nobody keeps it until the test ends: a run that is cut off has then said how far
+    /// it came.
+    fn tell(&self, ids: usize) {
+        let Self { updates, equal, ways, bytes, early } = self;
+        let mut out = std::io::stdout().lock();
+        let done = format!("{ids} ids, {updates} updates, {equal} samples equal, {ways:?}");
+        let memory = format!("held and on the device: {bytes:?} bytes, at first at most {early:?}");
+        writeln!(out, "{done}; {memory}").and_then(|()| out.flush()).expect("standard output is open");
+    }
+
+    /// The ways that a soak is named after did so many percent of the updates.
+    fn assert_mostly(&self, names: &[&str], percent: usize) {
+        let done: usize = names.iter().filter_map(|name| self.ways.get(name)).sum();
+        let all = self.updates;
+        assert!(done * 100 >= all * percent, "{done} of {all} by {names:?}: {:?}", self.ways);
     }
 }
 
 /// On one thread, whose memory is counted.
-fn soak(config: Config, ids: usize, updates: usize) {
+fn soak(churn: impl FnOnce() -> Churn + Send, updates: usize) -> Tally {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("a pool");
-    pool.install(|| Churn::new(config, ids, false).run(updates, (updates / 20).min(5000)));
+    pool.install(|| {
+        let mut churn = churn();
+        churn.run(updates, (updates / 20).min(5000));
+        churn.tally
+    })
 }
 
 fn cpu(strategy: Strategy) -> Config {
@@ -125,31 +167,35 @@ fn cpu(strategy: Strategy) -> Config {
 
 #[test]
 fn soak_of_a_small_world_in_the_bitmap() {
-    soak(cpu(Strategy::Auto), 400, updates());
+    let tally = soak(|| Churn::new(cpu(Strategy::Auto), 400), updates());
+    tally.assert_mostly(&["bitmap"], 90);
 }
 
 #[test]
 fn soak_of_a_world_in_the_grid_with_edits() {
-    soak(cpu(Strategy::Auto), 3000, updates());
+    // So few that an edit is cheaper, whatever the processor was busy with when edits were measured.
+    let churn = || Churn { one_in: 100, ..Churn::new(cpu(Strategy::Auto), 3000) };
+    soak(churn, updates()).assert_mostly(&["edit"], 75);
 }
 
 #[test]
 fn soak_of_a_small_world_in_the_grid() {
-    soak(cpu(Strategy::Grid), 120, updates());
+    let tally = soak(|| Churn::new(cpu(Strategy::Grid), 120), updates());
+    tally.assert_mostly(&["grid", "edit"], 90);
 }
 
 #[test]
 fn soak_of_a_world_of_near_pairs() {
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("a pool");
     let config = Config { margin: 0.0, ..cpu(Strategy::Grid) };
-    let mut churn = Churn::new(config, 300, true);
-    pool.install(|| churn.run(updates(), (updates() / 20).min(5000)));
-    assert!(churn.near > updates() / 20, "{} updates by near pairs", churn.near);
+    let churn = || Churn { swings: true, ..Churn::new(config, 300) };
+    soak(churn, updates()).assert_mostly(&["near"], 50);
 }
 
 /// A software adapter takes milliseconds for an update: a hundredth of them.
 #[test]
 fn soak_on_a_gpu() {
     let config = Config { margin: 0.05, ..gpu(Coding::Auto) };
-    soak(config, 400, (updates() / 100).max(200));
+    let tally = soak(|| Churn::new(config, 400), (updates() / 100).max(200));
+    tally.assert_mostly(&["gpu"], 99);
+    assert!(tally.bytes[1] > 0, "nothing is held on the device");
 }
