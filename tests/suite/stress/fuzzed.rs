@@ -20,8 +20,11 @@ const TARGETS: [(&str, Check); 5] = [
     ("csv_reader", checks::csv_reader),
 ];
 
-/// As the fuzzer allows one allocation: `-malloc_limit_mb` in scripts/fuzz.sh.
-const MOST_BYTES: usize = 512 << 20;
+/// One allocation: as much as a search needs to begin with, and so much for each byte of the input.
+fn assert_fits(largest: usize, input: &[u8]) {
+    let most = (1 << 20) + 256 * input.len();
+    assert!(largest <= most, "{largest} bytes at once for an input of {}", input.len());
+}
 
 #[test]
 fn inputs_that_once_failed() {
@@ -34,7 +37,7 @@ fn inputs_that_once_failed() {
             let bytes = std::fs::read(path).expect("readable");
             memory::largest();
             check(&bytes);
-            assert!(memory::largest() < MOST_BYTES, "more than the input accounts for");
+            assert_fits(memory::largest(), &bytes);
             inputs += 1;
         }
     }
@@ -51,7 +54,9 @@ fn random_bytes_on_every_target() {
             // Few different values: of 256 kinds of bytes few would name the same box or id twice.
             let kinds = [256, 48, 16][seed as usize % 3];
             let bytes: Vec<u8> = (0..length).map(|_| rng.random_range(0..kinds) as u8).collect();
+            memory::largest();
             check(&bytes);
+            assert_fits(memory::largest(), &bytes);
         }
     }
 }
