@@ -114,7 +114,8 @@ fn print_table(stock: &Run<DefaultBroadPhase>, ours: &Run<PbigBroadPhase>, check
     let against = format!("(against the oracle, {} comparisons)", checked.comparisons);
     println!("{:<26} {:>11} {:>11}   {against}", "missing pairs", "", checked.missing);
     println!(
-        "\nTimes are medians over the steps. pbig leaves out the pairs that rapier's narrow phase throws away."
+        "\nTimes are medians over the steps. The two worlds drift apart, so pairs and events differ in number.\n\
+         Where a scene has pairs that rapier's narrow phase throws away, pbig leaves them out."
     );
 }
 

@@ -5,7 +5,7 @@ use bytemuck::{Pod, Zeroable};
 /// A closed axis-aligned box in f32, in the caller's length unit.
 ///
 /// A box is *valid* when `min <= max` on all three axes; a NaN makes it invalid. Extents may be
-/// infinite. An invalid box overlaps nothing, itself included (contract 7).
+/// infinite. An invalid box overlaps nothing, itself included.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -52,7 +52,7 @@ impl Aabb {
         (self.min[0] <= self.max[0]) & (self.min[1] <= self.max[1]) & (self.min[2] <= self.max[2])
     }
 
-    /// Whether two boxes share a point: PBIG's equation 1, closed intervals, exactly (contract 1).
+    /// Whether two boxes share a point: PBIG's equation 1, closed intervals, exactly.
     /// For valid boxes only: an inverted box can pass this test, see [`Aabb::is_valid`].
     #[inline(always)]
     pub fn overlaps(&self, other: &Self) -> bool {

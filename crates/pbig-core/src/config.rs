@@ -59,7 +59,7 @@ pub enum Order {
     Unspecified,
 }
 
-/// Sizes at which a call ends with an error rather than exhaust the machine.
+/// Most boxes and pairs that a call accepts. They bound memory; they do not keep it below what the machine has.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Limits {
@@ -174,8 +174,8 @@ pub struct Config {
     /// In [`Strategy::Pbig`], and on the GPU up to 256, cells of at most this many boxes go through Avril's index to pair
     /// mapping, larger ones through PBIG's balanced rows.
     pub small_cell: u32,
-    /// What work costs, for the plan. None: as measured on this machine where a choice is close. Given ones, from a file
-    /// say, make plans and reports of searches from nothing the same everywhere; pairs and events are anyway.
+    /// What work costs, for the plan. None: as measured on this machine where a choice is close. With costs given here, from
+    /// a file say, plans of searches from nothing are the same on every machine. Pairs and events always are.
     pub costs: Option<Costs>,
     /// About the GPU backend.
     pub gpu: GpuOptions,

@@ -1,6 +1,6 @@
 //! Everything that can go wrong, each with what to do about it.
 
-/// Why a call could not be completed. No partial result exists beside an error (contract 2).
+/// Why a call could not be completed. There is no partial result beside an error.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {

@@ -1,4 +1,4 @@
-//! Brute force: the definition of right. Every strategy must return this set (contract 1).
+//! Brute force: the definition of right. Every strategy must return this set.
 
 use crate::{Aabb, Pair, ProxyFilter};
 

@@ -6,7 +6,7 @@ use std::fmt;
 /// What a unit of work costs on one core, in ns. Only time depends on it: results are the same whatever the plan.
 ///
 /// [`Costs::REFERENCE`] will do where a choice is clear. Where it is close, what this machine takes is measured, once in
-/// a process (0.5 ms), unless [`crate::Config::costs`] has costs: with given ones the same boxes get the same plan on
+/// a process (0.2 to 0.3 ms), unless [`crate::Config::costs`] has costs: with given ones the same boxes get the same plan on
 /// any machine, as long as searches start from nothing.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]

@@ -204,10 +204,8 @@ impl fmt::Display for Plan {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let boxes = self.boxes;
         match self.chosen {
-            Chosen::Nothing => write!(
-                f,
-                "nothing to do: of {boxes} valid boxes none has changed, or there are fewer than two"
-            ),
+            Chosen::Nothing if boxes < 2 => write!(f, "nothing to do: fewer than two valid boxes"),
+            Chosen::Nothing => write!(f, "nothing to do: no box has changed"),
             Chosen::Brute => write!(f, "brute force: {boxes} boxes are cheaper to test than to sort"),
             Chosen::Bitmap => write!(f, "bitmap: {boxes} boxes are few enough to be looked up in bands"),
             Chosen::Grid => write!(f, "grid: {boxes} boxes"),
