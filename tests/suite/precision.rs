@@ -105,6 +105,43 @@ proptest! {
     }
 }
 
+/// A float by its place in the order of all: from the one below 0 that is furthest to infinity.
+fn in_order(place: i64) -> f32 {
+    let bits = place.unsigned_abs() as u32;
+    f32::from_bits(if place < 0 { bits | 1 << 31 } else { bits })
+}
+
+const INFINITE: i64 = 0x7f80_0000;
+
+/// Outward, and none before the one before it: with that the rounding of f16 is proved for the floats looked at.
+fn f16_is_right_for(places: std::ops::Range<i64>) {
+    let mut before = [half_down(in_order(places.start)), half_up(in_order(places.start))];
+    for x in places.map(in_order) {
+        let [down, up] = [half_down(x), half_up(x)];
+        assert!(half_value(down) <= x && x <= half_value(up), "{x:e}");
+        assert!(before[0] <= down && before[1] <= up, "{x:e}: not in order");
+        before = [down, up];
+    }
+}
+
+/// Where the answer changes: around each f16.
+#[test]
+fn f16_is_rounded_outward_and_in_order_around_each_of_them() {
+    for bits in 0..0x7c00u32 {
+        let x = i64::from(half_value(bits as i16).to_bits());
+        f16_is_right_for(x - 3..x + 4);
+        f16_is_right_for(-x - 3..-x + 4);
+    }
+    f16_is_right_for(INFINITE - 3..INFINITE + 1);
+    f16_is_right_for(-INFINITE..3 - INFINITE);
+}
+
+#[test]
+#[ignore = "all 2^32 floats take a minute: cargo test --release -p pbig-tests --test suite -- --ignored f16"]
+fn f16_is_rounded_outward_and_in_order_for_all_floats() {
+    f16_is_right_for(-INFINITE..INFINITE + 1);
+}
+
 /// Boxes that are a step or so apart, which rounding may join, and more, which it may not: or a test that lets
 /// everything through would pass.
 #[test]

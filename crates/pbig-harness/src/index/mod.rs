@@ -12,7 +12,7 @@ mod tally;
 
 pub use correct::{AsItIs, Correction, Integers, Rules, lazy_pair};
 pub use exact::{EXACT, Exact};
-pub use root::{CARMACK, Double, LOMONT, Newton, Root, Single, SingleRoot, WideNewton};
+pub use root::{AllSingle, CARMACK, Double, LOMONT, Newton, Root, Single, SingleRoot, WideNewton};
 pub use search::{Counterexample, counterexample, root_errors};
 pub use tally::{MOST_EXHAUSTIVE, Sample, Tally};
 
@@ -47,7 +47,7 @@ const fn way<R: Root>(name: &'static str, steps: Option<u32>) -> Way {
 }
 
 /// Every root.
-pub const WAYS: [Way; 10] = [
+pub const WAYS: [Way; 11] = [
     way::<Single>("f32 sqrt", None),
     way::<Double>("f64 sqrt", None),
     way::<Newton<CARMACK, 1>>("Carmack", Some(1)),
@@ -58,6 +58,7 @@ pub const WAYS: [Way; 10] = [
     way::<Newton<LOMONT, 2>>("Lomont", Some(2)),
     way::<Newton<LOMONT, 3>>("Lomont", Some(3)),
     way::<Newton<LOMONT, 4>>("Lomont", Some(4)),
+    way::<AllSingle>("all in f32", None),
 ];
 
 /// What follows the estimate, in the order of the arrays of a [`Way`].

@@ -6,7 +6,7 @@ pub const CARMACK: u32 = 0x5f37_59df;
 pub const LOMONT: u32 = 0x5f37_5a86;
 
 /// A square root by which a row is estimated: equation 1, 0-based, `(2n - 1 - sqrt((2n - 1)^2 - 8k)) / 2`
-/// without its fraction. What stands under the root is an exact integer and rounded once.
+/// without its fraction. What stands under the root is an exact integer and rounded once, but for [`AllSingle`].
 pub trait Root {
     /// The estimate from `m = 2n - 1` and `x = m^2 - 8k`.
     fn row(m: i64, x: i64) -> i64;
@@ -106,6 +106,34 @@ impl Root for Double {
     }
 }
 
+/// As [`Single`], with what stands under the root in f32, too: equation 1 on a device that has no 64-bit integers.
+pub struct AllSingle;
+
+impl AllSingle {
+    #[inline(always)]
+    fn estimate(m: f32, eight_k: f32) -> f32 {
+        (m - (m * m - eight_k).sqrt()) * 0.5
+    }
+}
+
+impl Root for AllSingle {
+    #[inline(always)]
+    fn row(m: i64, x: i64) -> i64 {
+        Self::estimate(m as f32, (m * m - x) as f32) as i64
+    }
+
+    #[inline(always)]
+    fn lies_in(a: i32, m: i32, x: i32) -> bool {
+        let row = Self::estimate(m as f32, (m * m - x) as f32);
+        (row >= a as f32) & (row < (a + 1) as f32)
+    }
+
+    /// Two large numbers are subtracted: nothing of a small root need be left.
+    fn worst_relative() -> f64 {
+        f64::INFINITY
+    }
+}
+
 /// The row by integers alone: `2a <= m - sqrt(x)` holds when it holds for the root rounded up.
 #[inline(always)]
 pub(super) fn integer_row(m: i64, x: i64) -> i64 {
@@ -162,6 +190,7 @@ mod tests {
         }
         check::<Single>(1500);
         check::<Double>(1500);
+        check::<AllSingle>(1500);
         check::<Newton<CARMACK, 1>>(1500);
         check::<Newton<LOMONT, 3>>(1500);
     }

@@ -64,7 +64,7 @@ pub fn root_errors<R: SingleRoot>(below: u32) -> u64 {
 
 #[cfg(test)]
 mod tests {
-    use super::super::{CARMACK, Double, Newton, Single, tally};
+    use super::super::{AllSingle, CARMACK, Double, Newton, Single, tally};
     use super::*;
 
     #[test]
@@ -81,9 +81,10 @@ mod tests {
     }
 
     #[test]
-    fn good_roots_have_none() {
+    fn good_roots_have_none_where_what_stands_under_them_is_exact() {
         assert_eq!(counterexample::<Double>(1 << 20), None);
         assert_eq!(counterexample::<Single>(1 << 20), None);
+        assert!(counterexample::<AllSingle>(10_000).is_some());
     }
 
     #[test]

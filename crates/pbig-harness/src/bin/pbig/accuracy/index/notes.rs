@@ -8,8 +8,9 @@ use pbig_harness::index::{CORRECTIONS, MOST_EXHAUSTIVE};
 
 pub(super) fn notes(found: &Found) -> Vec<String> {
     let mut notes = vec![
-        "What stands under the root is an exact 64-bit integer, rounded once; the row is what is left without the \
-         fraction. By integers nothing was wrong, whatever the root: a run in which something is fails."
+        "What stands under the root is an exact 64-bit integer, rounded once, but for `all in f32`, which computes \
+         equation 1 step by step in f32 as a device without such integers would; the row is what is left without \
+         the fraction. By integers nothing was wrong, whatever the root: a run in which something is fails."
             .to_owned(),
         "`Carmack 2` is two steps of Newton from Carmack's constant. Missed: pairs that no index gives, (a, b) or \
          (b, a), and that are not tested. Doubled: tests of a pair that another index tests, too. No pair: \
@@ -70,7 +71,7 @@ fn sign_note() -> String {
 /// With so many k under an f64 root.
 fn wrong_percent(n: i64, eight: i64) -> f64 {
     let (m, pairs) = (2 * n - 1, n * (n - 1) / 2);
-    let row = |k: i64| ((m as f64 - ((m * m + eight * k) as f64).sqrt()) / 2.0) as i64;
+    let row = |k: i64| ((m as f64 - ((m * m + eight * k) as f64).sqrt()) / 2.0).floor() as i64;
     let wrong = (0..pairs).filter(|&k| row(k) != pair_of(k as u64, n as u64).0 as i64).count();
     percent(wrong as u64, pairs as u64)
 }
