@@ -24,6 +24,8 @@ pub struct LogLog {
     pub y: &'static str,
     /// What is drawn.
     pub lines: Vec<Line>,
+    /// Whether the legend says how each line grows: a curve that has a least is no power.
+    pub exponents: bool,
 }
 
 /// The exponent `k` of the power `c x^k` that fits best (least squares of the logarithms); none for fewer
@@ -107,7 +109,8 @@ impl LogLog {
         mesh.x_desc(self.x).y_desc(self.y).x_label_formatter(&plain).y_label_formatter(&plain);
         mesh.light_line_style(WHITE).draw().map_err(owned)?;
         for (line, colour) in self.lines.iter().zip(COLOURS) {
-            let exponent = growth(&line.points).map_or(String::new(), |k| format!(" (grows as x^{k:.2})"));
+            let exponent = growth(&line.points).filter(|_| self.exponents);
+            let exponent = exponent.map_or(String::new(), |k| format!(" (grows as x^{k:.2})"));
             chart
                 .draw_series(LineSeries::new(drawn(&line.points), colour.stroke_width(2)).point_size(3))
                 .map_err(owned)?
@@ -144,7 +147,8 @@ mod tests {
         let corner = |points: &[&Vec<(f64, f64)>]| {
             let line = |points: &&Vec<(f64, f64)>| Line { name: String::new(), points: points.to_vec() };
             let lines = points.iter().map(line).collect();
-            LogLog { name: String::new(), title: String::new(), x: "", y: "", lines }.emptiest_corner()
+            let (name, title, exponents) = (String::new(), String::new(), true);
+            LogLog { name, title, x: "", y: "", lines, exponents }.emptiest_corner()
         };
         assert!(matches!(corner(&[&rising]), SeriesLabelPosition::UpperLeft));
         assert!(matches!(corner(&[&falling]), SeriesLabelPosition::UpperRight));
@@ -163,7 +167,7 @@ mod tests {
         let lines =
             vec![line("linear", 1.0), line("steeper", 1.25), Line { name: "empty".into(), points: vec![] }];
         let title = "time by stage".to_owned();
-        let chart = LogLog { name: "chart".into(), title, x: "boxes", y: "ms", lines };
+        let mut chart = LogLog { name: "chart".into(), title, x: "boxes", y: "ms", lines, exponents: true };
         chart.write(&path).expect("written");
         let text = std::fs::read_to_string(&path).expect("text");
         for word in
@@ -171,6 +175,10 @@ mod tests {
         {
             assert!(text.contains(word), "{word}");
         }
+        chart.exponents = false;
+        chart.write(&path).expect("written again");
+        let text = std::fs::read_to_string(&path).expect("text");
+        assert!(text.contains("linear") && !text.contains("grows"));
         let nowhere = chart.write(&folder.path().join("no/such/folder.svg"));
         assert!(nowhere.is_err_and(|error| error.contains("folder.svg")));
     }

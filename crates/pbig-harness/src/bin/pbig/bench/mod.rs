@@ -135,8 +135,8 @@ mod tests {
 
     #[test]
     fn a_document_has_the_machine_the_table_and_the_charts() {
-        let chart =
-            LogLog { name: "some-chart".into(), title: "a chart".into(), x: "boxes", y: "ms", lines: vec![] };
+        let (name, title, lines) = ("some-chart".into(), "a chart".into(), vec![]);
+        let chart = LogLog { name, title, x: "boxes", y: "ms", lines, exponents: true };
         let rows = vec![Row::new("a case", 10, 3).ours(2.0)];
         let outcome = Outcome { rows, notes: vec!["a note".into()], charts: vec![chart] };
         let text = document("some", &Machine::here(), &outcome);

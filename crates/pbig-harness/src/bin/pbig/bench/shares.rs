@@ -223,6 +223,7 @@ fn chart(motion: &str, boxes: usize, took: &[(f64, Vec<Took>)]) -> LogLog {
         x: "share moved",
         y: "ms",
         lines: means.chain([line("as planned, median", &|sides| sides[0].median)]).collect(),
+        exponents: true,
     }
 }
 

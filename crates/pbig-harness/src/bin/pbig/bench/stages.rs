@@ -244,6 +244,7 @@ fn chart(sweep: &Sweep, lines: Vec<Line>) -> LogLog {
         x: sweep.x,
         y: if sweep.scratch { "ms" } else { "ms, means" },
         lines: lines.into_iter().filter(used).collect(),
+        exponents: true,
     }
 }
 

@@ -157,5 +157,6 @@ fn shares(quick: bool, rows: &mut Vec<Row>) -> Result<LogLog, Failure> {
         }
     }
     let title = format!("a call through rapier, uniform, {} boxes", sizes.last().unwrap_or(&0));
-    Ok(LogLog { name: "step-share".into(), title, x: "share moved", y: "ms", lines: lines.into() })
+    let (name, lines) = ("step-share".into(), lines.into());
+    Ok(LogLog { name, title, x: "share moved", y: "ms", lines, exponents: true })
 }

@@ -159,6 +159,7 @@ pub(super) fn run(quick: bool) -> Result<Outcome, Failure> {
         x: "boxes",
         y: "ms",
         lines: chart.into(),
+        exponents: true,
     };
     Ok(Outcome { rows, notes: notes(), charts: vec![chart] })
 }

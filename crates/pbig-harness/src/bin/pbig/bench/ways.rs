@@ -48,6 +48,7 @@ pub(super) fn run(
             x: "boxes",
             y: "ms",
             lines: lines.into(),
+            exponents: true,
         });
     }
     Ok(notes)

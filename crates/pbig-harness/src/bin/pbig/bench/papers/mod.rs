@@ -81,7 +81,8 @@ fn once(config: Config, boxes: &[Aabb]) -> Result<Once, Failure> {
 }
 
 fn chart(name: &str, title: &str, x: &'static str, lines: impl Into<Vec<Line>>) -> LogLog {
-    LogLog { name: format!("papers-{name}"), title: title.into(), x, y: "ms", lines: lines.into() }
+    let (name, title) = (format!("papers-{name}"), title.into());
+    LogLog { name, title, x, y: "ms", lines: lines.into(), exponents: true }
 }
 
 type Part = fn(&Scale, &Device) -> Result<Vec<Sheet>, Failure>;
