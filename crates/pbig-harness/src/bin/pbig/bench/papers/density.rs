@@ -73,7 +73,7 @@ const READINGS: [Reading; 14] = [
         model: |n, doc| centred(Edges::equal(0.5 * equation_11(n, doc))),
     },
     Reading {
-        name: "the same, edges rounded up",
+        name: "equation 11 with half extents for lengths, rounded up",
         model: |n, doc| centred(Edges::equal(0.5 * equation_11(n, doc).ceil())),
     },
     Reading {
@@ -99,7 +99,10 @@ const READINGS: [Reading; 14] = [
         name: "lengths uniform from 0, the largest by equation 11 rounded up",
         model: |n, doc| centred(Edges::boxes(0.0, equation_11(n, doc).ceil())),
     },
-    Reading { name: "the same, lower corners uniform instead of centres", model: fitting },
+    Reading {
+        name: "lower corners uniform instead of centres, lengths uniform from 0, the largest by equation 11 rounded up",
+        model: fitting,
+    },
 ];
 
 /// By how many standard deviations each printed count is off what a reading expects.

@@ -147,6 +147,8 @@ fn object(machine: &Machine, device: &Device, timing: &Timing, sheets: &[Sheet])
         "adapter": device.adapter(),
         "software": device.is_software(),
         "seconds": timing.seconds(),
+        "seconds_wanted": timing.most_seconds(),
+        "met": timing.is_met(),
         "parts": timing.object(),
         "tables": sheets.iter().map(Sheet::object).collect::<Vec<_>>(),
     })
