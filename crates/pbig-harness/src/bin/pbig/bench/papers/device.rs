@@ -2,7 +2,7 @@
 
 use super::UNSORTED;
 use crate::bench::finders::Finders;
-use crate::bench::measure::Effort;
+use crate::bench::measure::{Contest, Effort, medians};
 use crate::output::Failure;
 use pbig_core::{Aabb, Backend, Config, GpuFinder, GpuOptions, Report};
 use pbig_harness::boxes::moved;
@@ -58,8 +58,8 @@ impl Device {
         self.gpu.as_ref().filter(|gpu| !gpu.is_software() || boxes <= most_in_software)
     }
 
-    /// Median milliseconds and the last report of each setting, in turn on the same moving boxes; nothing
-    /// without a device for so many.
+    /// Milliseconds and report of one call of each setting, that of the median time, in turn on the same moving
+    /// boxes; nothing without a device for so many.
     pub(super) fn run(
         &self,
         configs: &[Config],
@@ -68,13 +68,73 @@ impl Device {
     ) -> Result<Vec<(f64, Report)>, Failure> {
         let Some(gpu) = self.for_boxes(boxes.len()) else { return Ok(vec![]) };
         let frames = [moved(boxes, distance, 2), boxes.to_vec()];
-        let mut finders = Finders::new(configs.iter().copied(), Some(gpu), frames);
+        let mut calls = Calls::new(Finders::new(configs.iter().copied(), Some(gpu), frames));
         // The first calls compile, allocate and learn. Times in software mean nothing, so few will do.
-        let (warm_up, rounds) = if self.is_software() { (2, 2) } else { (3, 7) };
-        let times = finders.times(Effort { warm_up, rounds, budget: Duration::from_secs(10) })?;
-        finders.pairs()?;
-        Ok(times.into_iter().zip(finders.all.iter().map(|finder| finder.report().clone())).collect())
+        let (warm_up, rounds) = if self.is_software() { (1, 5) } else { (3, 13) };
+        medians(&mut calls, Effort { warm_up, rounds, budget: Duration::from_secs(10) })?;
+        calls.finders.pairs()?;
+        // In odd rounds boxes are at home; elsewhere they have other pairs.
+        let at_home =
+            |calls: Vec<(f64, Report)>| calls.into_iter().skip(warm_up).skip(1 - warm_up % 2).step_by(2);
+        Ok(calls.all.into_iter().filter_map(|calls| middle(at_home(calls))).collect())
     }
+
+    /// The same of one setting, which must find so many pairs: those of the CPU.
+    pub(super) fn run_for(
+        &self,
+        config: Config,
+        boxes: &[Aabb],
+        distance: f32,
+        pairs: u64,
+    ) -> Result<Option<(f64, Report)>, Failure> {
+        let runs = self.run(&[config], boxes, distance)?;
+        same_pairs(&runs, pairs)?;
+        Ok(runs.into_iter().next())
+    }
+}
+
+/// A failed check where calls on a device found other pairs than the CPU, of which there are so many.
+pub(super) fn same_pairs(runs: &[(f64, Report)], pairs: u64) -> Result<(), Failure> {
+    match runs.iter().map(|(_, report)| report.pairs).find(|found| *found != pairs) {
+        Some(found) => Err(Failure::Check(format!("{found} pairs on the device, {pairs} on the CPU"))),
+        None => Ok(()),
+    }
+}
+
+/// Finders, and what each of their calls took and did: total and tasks are to be of the same call.
+struct Calls {
+    finders: Finders,
+    /// By side, then by round.
+    all: Vec<Vec<(f64, Report)>>,
+}
+
+impl Calls {
+    fn new(finders: Finders) -> Self {
+        Self { all: vec![vec![]; finders.all.len()], finders }
+    }
+}
+
+impl Contest for Calls {
+    fn sides(&self) -> usize {
+        self.finders.sides()
+    }
+
+    fn prepare(&mut self, round: usize) {
+        self.finders.prepare(round);
+    }
+
+    fn run(&mut self, side: usize) -> Result<f64, Failure> {
+        let ms = self.finders.run(side)?;
+        self.all[side].push((ms, self.finders.all[side].report().clone()));
+        Ok(ms)
+    }
+}
+
+/// The call whose time is the median; of an even number of calls the shorter of the two in the middle.
+fn middle(calls: impl Iterator<Item = (f64, Report)>) -> Option<(f64, Report)> {
+    let mut calls: Vec<_> = calls.collect();
+    calls.sort_by(|a, b| a.0.total_cmp(&b.0));
+    (!calls.is_empty()).then(|| calls.swap_remove((calls.len() - 1) / 2))
 }
 
 /// Bytes that the kernels have written of output, for the host to decode; none where nothing was found. Those that come
@@ -104,4 +164,36 @@ pub(super) fn kernels(report: &Report, takes: impl Fn(&str) -> bool) -> Option<f
     let time = |of: &Duration| of.as_secs_f64() * 1e3;
     (!kernels.is_empty())
         .then(|| kernels.iter().filter(|(name, _)| takes(name)).map(|(_, of)| time(of)).sum())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use pbig_core::oracle;
+    use pbig_harness::boxes::cubes;
+
+    #[test]
+    fn the_call_in_the_middle_is_taken_with_its_own_report() {
+        let call = |ms: f64| (ms, Report { pairs: ms as u64, ..Report::default() });
+        let taken =
+            |times: &[f64]| middle(times.iter().copied().map(call)).map(|(ms, report)| (ms, report.pairs));
+        assert_eq!(taken(&[9.0, 1.0, 4.0]), Some((4.0, 4)));
+        assert_eq!(taken(&[9.0, 1.0, 4.0, 3.0]), Some((3.0, 3)));
+        assert_eq!(taken(&[]), None);
+    }
+
+    #[test]
+    fn other_pairs_than_the_cpu_has_are_a_failed_check() {
+        let run = |pairs: u64| (1.0, Report { pairs, ..Report::default() });
+        assert!(same_pairs(&[run(3), run(3)], 3).is_ok() && same_pairs(&[], 3).is_ok());
+        assert!(matches!(same_pairs(&[run(3), run(4)], 3), Err(Failure::Check(_))));
+    }
+
+    #[test]
+    fn reports_are_of_the_boxes_and_not_of_where_they_are_in_between() {
+        let boxes = cubes(500, 1.0, 3.0, 1);
+        let runs =
+            Device::best(true).run(&[on_gpu(GpuOptions::DEFAULT)], &boxes, 5.0).expect("no device fails");
+        assert!(runs.iter().all(|(_, report)| report.pairs == oracle::pairs(&boxes).len() as u64));
+    }
 }

@@ -139,11 +139,13 @@ fn about_checks(checks: &[u64]) -> String {
 fn tasks(runs: &[(f64, Report)], device: &Device) -> Sheet {
     let mut columns = vec!["setting".to_owned(), "side".to_owned(), "total".to_owned()];
     columns.extend(TABLE_V.iter().map(|task| task.0.to_owned()));
+    columns.push("in none".to_owned());
     let columns: Vec<&str> = columns.iter().map(String::as_str).collect();
     let mut sheet = Sheet::new("PBIG tables V and VI: time per task, ms", &columns).about(
-        "Printed: 10^7 boxes; with P, CHECK has the time of CHECK, DataOut and REPORT together. Ours: as in the table \
-         above, of the last call; with P DataOut is the time that the host waits beyond the kernels.",
+        "Printed: 10^7 boxes; with P, CHECK has the time of CHECK, DataOut and REPORT together. Ours: of the call in \
+         the table above; DataOut is the time that the host waits beyond the kernels. In none: total less the tasks.",
     );
+    sheet = sheet.about(about_rest(runs));
     for (task, what, here) in TABLE_V {
         sheet = sheet.about(format!("{task}: {what}. Here: {here}."));
     }
@@ -152,14 +154,51 @@ fn tasks(runs: &[(f64, Report)], device: &Device) -> Sheet {
         let ms = |of: u64| of as f64 / 1e3;
         let printed = row.before.iter().chain(row.after).map(|&of| json!(ms(of)));
         let first = [json!(name(row)), json!("printed"), json!(ms(row.total))];
-        let rest = std::iter::repeat(json!(null));
-        sheet.row(first.into_iter().chain(printed).chain(rest).take(columns.len()).collect());
+        let nothing = std::iter::repeat_n(json!(null), TABLE_V.len() - row.before.len() - row.after.len());
+        let rest = [json!(ms(row.total - tasks_of(row)))];
+        sheet.row(first.into_iter().chain(printed).chain(nothing).chain(rest).collect());
         if let Some((total, report)) = runs.get(i) {
             let first = [json!(name(row)), json!("ours"), json!(total)];
-            sheet.row(first.into_iter().chain(of_tasks(report).map(|ms| json!(ms))).collect());
+            let tasks = of_tasks(report);
+            let rest = [json!(total - sum(&tasks))];
+            sheet.row(first.into_iter().chain(tasks.map(|ms| json!(ms))).chain(rest).collect());
         }
     }
     sheet
+}
+
+/// Microseconds of all tasks of a printed row.
+fn tasks_of(row: &Breakdown) -> u64 {
+    row.before.iter().chain(row.after).sum()
+}
+
+fn sum(tasks: &[Option<f64>]) -> f64 {
+    tasks.iter().flatten().sum()
+}
+
+/// How much of the totals is in no task, as printed and here, where tasks follow one another and where they overlap.
+fn about_rest(runs: &[(f64, Report)]) -> String {
+    let printed = |row: &Breakdown| 100.0 * (1.0 - tasks_of(row) as f64 / row.total as f64);
+    let ours = |(total, report): &(f64, Report)| 100.0 * (1.0 - sum(&of_tasks(report)) / total);
+    let with = |pipelined: bool| {
+        let runs = TABLE_VI.iter().zip(runs).filter(move |(row, _)| row.p == pipelined);
+        between(runs.map(|(_, run)| ours(run)))
+    };
+    let says = format!("Of the printed totals {} % is in no task", between(TABLE_VI.iter().map(printed)));
+    if runs.is_empty() {
+        return format!("{says}.");
+    }
+    format!(
+        "{says}; of ours {} % without P. With P, where tasks overlap and what is at the same time counts twice, it is {} %.",
+        with(false),
+        with(true)
+    )
+}
+
+/// The least and the most.
+fn between(values: impl Iterator<Item = f64>) -> String {
+    let (least, most) = values.fold((f64::MAX, f64::MIN), |(least, most), x| (least.min(x), most.max(x)));
+    format!("{} to {}", short(least), short(most))
 }
 
 /// What a call on a device took by the paper's tasks.
@@ -277,6 +316,17 @@ mod tests {
             let is_plain = !row["setting"].as_str().is_some_and(|name| name.contains('C'));
             assert!(!is_plain || written == Some(8 * pairs), "{row}");
         }
+    }
+
+    #[test]
+    fn tasks_and_what_is_in_none_add_up_to_the_total_of_the_same_call() {
+        let sheets = on_gpu(&Scale::new(true), &Device::best(true)).expect("a device that works, or none");
+        for row in sheets[1].object()["rows"].as_array().expect("rows") {
+            let of = |name: &str| row[name].as_f64().unwrap_or(0.0);
+            let parts: f64 = TABLE_V.iter().map(|task| of(task.0)).sum();
+            assert!((parts + of("in none") - of("total")).abs() < 1e-6 * of("total"), "{row}");
+        }
+        assert!(about_rest(&[]).ends_with("0.1059 to 1.256 % is in no task."), "{}", about_rest(&[]));
     }
 
     #[test]
