@@ -98,6 +98,23 @@ pub(super) const TABLE_V: [(&str, &str, &str); 7] = [
     ("REPORT", "report (decode) the pairs", "`GpuReport::decode` and `StageTimes::emit`"),
 ];
 
+/// An element of Avril's table 1: row and column from 1 on with so many objects, what is printed there, and its value.
+pub(super) type Element = (fn(u64) -> (u64, u64), &'static str, fn(u64) -> u64);
+
+/// Avril, table 1.
+pub(super) const AVRIL_1: [Element; 10] = [
+    (|_| (1, 2), "0", |_| 0),
+    (|_| (1, 3), "1", |_| 1),
+    (|n| (1, n - 1), "n-3", |n| n - 3),
+    (|n| (1, n), "n-2", |n| n - 2),
+    (|_| (2, 3), "n-1", |n| n - 1),
+    (|n| (2, n - 1), "2n - 5", |n| 2 * n - 5),
+    (|n| (2, n), "2n - 4", |n| 2 * n - 4),
+    (|n| (3, n - 1), "3n - 8", |n| 3 * n - 8),
+    (|n| (3, n), "3n - 7", |n| 3 * n - 7),
+    (|n| (n - 1, n), "(n^2 - n) / 2", |n| (n * n - n) / 2),
+];
+
 /// Avril, table 2: objects, milliseconds with the square root and the "lazy way" without.
 pub(super) const AVRIL_2: [(u64, f64, f64); 3] =
     [(1000, 0.21, 0.25), (10_000, 2.25, 4.28), (100_000, 29.66, 58.24)];
@@ -105,8 +122,41 @@ pub(super) const AVRIL_2: [(u64, f64, f64); 3] =
 /// Avril 3.2.2: seconds of the lazy way for 10,000 objects on a CPU, and how many times faster it is there.
 pub(super) const AVRIL_LAZY_ON_CPU: (f64, f64) = (4.51, 4.0);
 
-/// Avril, table 4, last row: square roots, and the milliseconds of CUDA's own.
-pub(super) const AVRIL_4: (u64, f64) = (1_000_000_000, 48.01);
+/// A row of Avril's table 4.
+pub(super) struct Roots {
+    pub(super) roots: u64,
+    /// Milliseconds by Carmack's or Lomont's approximation, which it has the same for both.
+    pub(super) approximate: f64,
+    /// Milliseconds of CUDA's own.
+    pub(super) cuda: f64,
+    /// What the last digit of both counts.
+    pub(super) digit: f64,
+    /// "% of computation time reduction"
+    pub(super) gamma: f64,
+}
+
+impl Roots {
+    /// The reduction in % that the two times give; each `off` half digits from what is printed, in opposite directions.
+    pub(super) fn reduction(&self, off: f64) -> f64 {
+        let half = 0.5 * off * self.digit;
+        100.0 * (1.0 - (self.approximate - half) / (self.cuda + half))
+    }
+}
+
+const fn roots(roots: u64, approximate: f64, cuda: f64, digit: f64, gamma: f64) -> Roots {
+    Roots { roots, approximate, cuda, digit, gamma }
+}
+
+/// Avril, table 4.
+pub(super) const AVRIL_4: [Roots; 4] = [
+    roots(1_000_000, 0.042, 0.048, 0.001, 12.6),
+    roots(10_000_000, 0.409, 0.478, 0.001, 14.7),
+    roots(100_000_000, 4.102, 4.722, 0.001, 13.2),
+    roots(1_000_000_000, 41.01, 48.01, 0.01, 14.6),
+];
+
+/// Avril 3.3: the mean of that reduction, in %.
+pub(super) const AVRIL_4_MEAN: f64 = 13.7;
 
 /// Avril, table 5: objects; kernel (ms) and output (microseconds) with a byte a pair, and with a bit.
 pub(super) const AVRIL_5: [(u64, [f64; 2], [f64; 2]); 4] = [
@@ -127,6 +177,9 @@ pub(super) const AVRIL_6: [(usize, [f64; 4]); 4] = [
 /// Avril, table 7: objects; milliseconds without the grid and with it.
 pub(super) const AVRIL_7: [(usize, f64, f64); 3] =
     [(100, 0.046, 1.020), (1000, 0.872, 1.840), (10_000, 31.450, 3.257)];
+
+/// Avril 6: objects ("300 spheres and 4 cones"), and the milliseconds "exactly" of the broad phase with the grid.
+pub(super) const AVRIL_FEW: (u64, f64) = (304, 0.41);
 
 /// Avril 3.1: boxes, index of a pair counted from 0, and the pair counted from 1.
 pub(super) const AVRIL_EXAMPLES: [(u64, u64, (u64, u64)); 2] =
