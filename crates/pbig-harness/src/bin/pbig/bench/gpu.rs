@@ -1,6 +1,6 @@
 //! `pbig bench gpu`: the GPU beside the CPU, stage by stage, and the floor below both.
 
-mod events;
+pub(super) mod events;
 
 use super::machine::slug;
 use super::{Args, keep};

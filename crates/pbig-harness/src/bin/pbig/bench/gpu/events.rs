@@ -17,14 +17,14 @@ const DISTANCE: f32 = 0.1;
 const SHARES: [f64; 4] = [0.001, 0.01, 0.1, 1.0];
 
 /// One share at one size: medians in ms of setting what has moved, and the update.
-pub(super) struct Row {
+pub(in crate::bench) struct Row {
     boxes: usize,
     share: f64,
-    pairs: usize,
+    pub(in crate::bench) pairs: usize,
     /// Pairs that came or went in the last round.
     events: usize,
-    cpu: Spread,
-    gpu: Spread,
+    pub(in crate::bench) cpu: Spread,
+    pub(in crate::bench) gpu: Spread,
     /// The same in two halves, between which the caller is busy for as long as the update takes.
     begin: Spread,
     finish: Spread,
@@ -38,13 +38,24 @@ pub(super) fn rows(gpu: &GpuFinder, quick: bool) -> Result<Vec<Row>, Failure> {
     let cases: Vec<_> = sizes.flat_map(|&boxes| SHARES.map(|share| (boxes, share))).collect();
     let bar = progress(cases.len(), "shares");
     let row = |&(boxes, share): &(usize, f64)| {
-        let row = Race::new(gpu, boxes, share).and_then(Race::run);
+        let start = BoxSet::named(SET).expect("a set of the harness").boxes(boxes, 1);
+        let row = race(gpu, start, share, DISTANCE);
         bar.inc(1);
         row
     };
     let rows = cases.iter().map(row).collect();
     bar.finish_and_clear();
     rows
+}
+
+/// A share of these boxes moves by up to a distance; a check that fails where CPU and GPU have different events.
+pub(in crate::bench) fn race(
+    gpu: &GpuFinder,
+    start: Vec<Aabb>,
+    share: f64,
+    distance: f32,
+) -> Result<Row, Failure> {
+    Race::new(gpu, start, share, distance).and_then(Race::run)
 }
 
 /// Three broad phases that see the same boxes.
@@ -57,11 +68,11 @@ struct Race {
 }
 
 impl Race {
-    fn new(gpu: &GpuFinder, boxes: usize, share: f64) -> Result<Self, Failure> {
+    fn new(gpu: &GpuFinder, start: Vec<Aabb>, share: f64, distance: f32) -> Result<Self, Failure> {
         let config = |backend| Config { backend, limits: Limits::UNLIMITED, ..Config::DEFAULT };
         let on_gpu = || BroadPhase::with_gpu(config(Backend::Gpu), gpu.clone()).map_err(failure);
-        let start = BoxSet::named(SET).expect("a set of the harness").boxes(boxes, 1);
-        let wander = Wander::new(start, share, DISTANCE);
+        let boxes = start.len();
+        let wander = Wander::new(start, share, distance);
         let cpu = BroadPhase::new(config(Backend::Cpu)).map_err(failure)?;
         let mut race = Self { cpu, gpu: on_gpu()?, halves: on_gpu()?, wander, share };
         let all: Vec<u32> = (0..boxes as u32).collect();

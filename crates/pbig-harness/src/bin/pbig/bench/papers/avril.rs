@@ -1,15 +1,15 @@
-//! Avril's figures 3 and 4 and tables 5 and 7: bytes of output, brute force, and where a grid begins to pay.
+//! Avril's figures 3 and 4 and tables 5 and 7: bytes of output by calculation, brute force, and where a grid begins to pay.
 
-use super::device::{Device, about_bytes, kernels, on_gpu, written};
+use super::device::{Device, on_gpu, same_pairs};
 use super::printed::{AVRIL_5, AVRIL_7};
 use super::sheet::{Sheet, short, thousands};
 use super::steps::DISTANCE;
-use super::{Scale, UNSORTED, chart, effort};
+use super::{Scale, UNSORTED, chart, effort, once};
 use crate::bench::finders::Finders;
 use crate::bench::measure::Effort;
 use crate::output::Failure;
 use pbig_core::pair_index::pair_count;
-use pbig_core::{Backend, CellRule, Coding, Config, GpuOptions, Strategy};
+use pbig_core::{Backend, CellRule, Config, GpuOptions, Strategy};
 use pbig_harness::boxes::{cubes, moved};
 use pbig_harness::chart::Line;
 use serde_json::json;
@@ -20,7 +20,7 @@ fn input_bytes(n: u64) -> u64 {
 }
 
 /// Bytes that come back with a byte a pair, and with a bit (Avril 3.4).
-fn output_bytes(n: u64) -> [u64; 2] {
+pub(super) fn output_bytes(n: u64) -> [u64; 2] {
     [pair_count(n), pair_count(n).div_ceil(8)]
 }
 
@@ -91,39 +91,6 @@ fn about_rates() -> String {
     )
 }
 
-/// The same on a device: bits against a list of pairs.
-pub(super) fn forms(device: &Device) -> Result<Sheet, Failure> {
-    let columns = [
-        "objects",
-        "pairs",
-        "form",
-        "bytes written",
-        "bytes fetched",
-        "ms of the kernel `check_all`",
-        "ms, host waits",
-        "ms, host decodes",
-    ];
-    let mut sheet = Sheet::new("Avril table 5: forms of output, GPU", &columns).about(format!(
-        "`Coding::Packed` is a bit a pair of boxes as in 3.4, gathered in a workgroup's memory before it is written; \
-         `Plain` is a list of pairs, 8 bytes for each that overlaps. Without a grid a device searches up to 1024 \
-         boxes here, so 5000 and 7500 have no rows. One pair a box. {} {}",
-        about_bytes(),
-        device.about()
-    ));
-    for n in [100, 1000] {
-        let forms = [("a bit a pair of boxes", Coding::Packed), ("a list of pairs", Coding::Plain)];
-        let configs = forms.map(|(_, coding)| on_gpu(GpuOptions { coding, ..GpuOptions::DEFAULT }));
-        for ((form, _), (_, report)) in forms.iter().zip(device.run(&configs, &cubes(n, 1.0, 1.0, 1), 0.1)?) {
-            let (kernel, gpu) =
-                (kernels(&report, |name| name == "check_all"), report.gpu.clone().unwrap_or_default());
-            let [wait, decode] = [gpu.wait, gpu.decode].map(pbig_harness::runner::milliseconds);
-            let written = written(&report);
-            sheet.row(json!([n, report.pairs, form, written, gpu.downloaded, kernel, wait, decode]));
-        }
-    }
-    Ok(sheet)
-}
-
 /// Figure 4: brute force by number of objects.
 pub(super) fn brute_force(device: &Device) -> Result<Sheet, Failure> {
     let columns = [
@@ -144,6 +111,7 @@ pub(super) fn brute_force(device: &Device) -> Result<Sheet, Failure> {
         let boxes = cubes(n, 1.0, 1.0, 1);
         let gpu = if n <= 1024 { device.run(&[on_gpu(GpuOptions::DEFAULT)], &boxes, 0.1)? } else { vec![] };
         let config = Config { backend: Backend::Brute, ..UNSORTED };
+        same_pairs(&gpu, once(config, &boxes)?.pairs)?;
         let ms = Finders::new([config], None, [moved(&boxes, 0.1, 2), boxes]).times(effort(n))?[0];
         let tests = pair_count(n as u64);
         line.points.push((n as f64, ms));
@@ -190,11 +158,14 @@ pub(super) fn crossover(scale: &Scale, device: &Device) -> Result<Sheet, Failure
         let on = |strategy| Config { strategy, ..on_gpu(GpuOptions::DEFAULT) };
         let wanted = [on(Strategy::Pbig), on(Strategy::Auto)];
         let gpu = device.run(&wanted[..if n <= 1024 { 2 } else { 1 }], &boxes, DISTANCE)?;
+        let pairs = once(UNSORTED, &boxes)?.pairs;
+        same_pairs(&gpu, pairs)?;
         let mut finders = Finders::new(sides, None, [moved(&boxes, DISTANCE, 2), boxes]);
         let cpu = finders.times(Effort::new(scale.quick))?;
+        finders.pairs()?;
         let gpu_ms = |i: usize| gpu.get(i).map(|(ms, _)| *ms);
         pays.push((n, with < without, cpu[1] < cpu[0]));
-        sheet.row(json!([n, finders.pairs()?, without, with, cpu[0], cpu[1], cpu[2], gpu_ms(1), gpu_ms(0)]));
+        sheet.row(json!([n, pairs, without, with, cpu[0], cpu[1], cpu[2], gpu_ms(1), gpu_ms(0)]));
     }
     Ok(sheet.about(about_crossover(&pays)))
 }
@@ -224,22 +195,6 @@ mod tests {
         assert_eq!(input_bytes(1000), 24_000);
         assert_eq!(output_bytes(1000), [499_500, 62_438]);
         assert_eq!(output_bytes(7), [21, 3]);
-    }
-
-    #[test]
-    fn bits_come_back_as_calculated_whatever_overlaps() {
-        let sheet = forms(&Device::best(true)).expect("a device that works, or none").object();
-        for row in sheet["rows"].as_array().expect("rows") {
-            let n = row["objects"].as_u64().expect("a number");
-            let pairs = oracle::pairs(&cubes(n as usize, 1.0, 1.0, 1)).len() as u64;
-            assert_eq!(row["pairs"], pairs);
-            // Words are of four bytes; counters and times come back too.
-            let bits = output_bytes(n)[1].next_multiple_of(4);
-            let written = if row["form"] == "a list of pairs" { 8 * pairs } else { bits };
-            assert_eq!(row["bytes written"], written);
-            let fetched = row["bytes fetched"].as_u64().expect("a number");
-            assert!(fetched >= written && fetched < 2 * written + 2048, "{row}");
-        }
     }
 
     #[test]

@@ -2,17 +2,15 @@
 
 use super::cells::{Alpha, config_for, expected_checks};
 use super::density::fitting;
-use super::device::{Device, about_bytes, on_gpu, written};
-use super::printed::{
-    Coverage, DENSEST_PLAIN_MB, DOC_MS, INPUT_MB, MOST_BOXES, SEGMENT, SPACE, TABLE_III, WARP,
-};
+use super::device::{Device, on_gpu};
+use super::printed::{Coverage, DOC_MS, MOST_BOXES, SPACE, TABLE_III, WARP};
 use super::sheet::{Sheet, short};
 use super::switches::count;
 use super::{Once, Scale, UNSORTED, chart, effort, once};
 use crate::bench::finders::Finders;
 use crate::bench::papers::model::Model;
 use crate::output::Failure;
-use pbig_core::{Aabb, Coding, GpuOptions};
+use pbig_core::{Aabb, Config, GpuOptions};
 use pbig_harness::boxes::moved;
 use pbig_harness::chart::Line;
 use serde_json::{Value, json};
@@ -171,7 +169,7 @@ fn search(row: &Coverage, boxes: Vec<Aabb>) -> Result<(u64, f64, Once), Failure>
 }
 
 /// One row of both parts.
-fn joined(first: Value, rest: Value) -> Value {
+pub(super) fn joined(first: Value, rest: Value) -> Value {
     [first, rest].into_iter().flat_map(|part| part.as_array().cloned().unwrap_or_default()).collect()
 }
 
@@ -179,93 +177,40 @@ fn line(name: &str) -> Line {
     Line { name: name.into(), points: vec![] }
 }
 
-/// Bytes of the output against equations 9 and 10, and ours.
-pub(super) fn bytes(scale: &Scale, device: &Device) -> Result<Sheet, Failure> {
+/// The same on a device, with cells as our plan has them and as the paper's `W` gives them.
+pub(super) fn on_device(scale: &Scale, device: &Device) -> Result<Sheet, Failure> {
+    let n = if device.is_software() { count(scale, device) } else { scale.most_boxes };
     let columns = [
         "DoC",
-        "pairs printed",
-        "output printed, MB",
-        "bytes a pair, MB = 2^20",
-        "bytes a pair, MB = 10^6",
-        "pairs, ours",
-        "bytes written a pair, ours, list",
-        "the same, records",
-        "bytes fetched a pair, ours, records",
+        "boxes",
+        "pairs",
+        "checks, our W",
+        "ms, our W",
+        "checks, the paper's W",
+        "ms, the paper's W",
+        "ms printed",
     ];
-    let n = count(scale, device);
-    let mut sheet = Sheet::new("PBIG table III: bytes of output", &columns)
-        .about(about_units())
-        .about(about_equation_9());
-    sheet = sheet.about(format!(
-        "Ours: {n} boxes of the same law on a device, `Coding::Plain` and `Packed`, cells as its plan has them. {} {}",
-        about_bytes(),
+    let mut sheet = Sheet::new("PBIG table III and figure 10: density, GPU", &columns).about(format!(
+        "The same law; W is the wanted boxes of a cell, {} in our plan and {WARP} in the paper. Pairs are as many as \
+         on the CPU. Printed: 10^7 boxes. {}",
+        UNSORTED.pbig_boxes_per_cell,
         device.about()
     ));
     for row in &TABLE_III {
-        let a_pair = |unit: f64| row.output * unit / row.pairs as f64;
-        let printed = json!([row.doc, row.pairs, row.output, a_pair(1_048_576.0), a_pair(1e6)]);
-        sheet.row(joined(printed, our_bytes(row, n, device)?));
+        let boxes = fitting(n, row.doc).boxes(n, 1);
+        let pairs = once(UNSORTED, &boxes)?.pairs;
+        let at = |wanted: f32| {
+            let config = Config { pbig_boxes_per_cell: wanted, ..on_gpu(GpuOptions::DEFAULT) };
+            device.run_for(config, &boxes, 1.0, pairs)
+        };
+        if let [Some((ms, ours)), Some((paper_ms, paper))] =
+            [at(UNSORTED.pbig_boxes_per_cell)?, at(WARP as f32)?]
+        {
+            let made = [&ours, &paper].map(|report| report.checks.made);
+            sheet.row(json!([row.doc, n, pairs, made[0], ms, made[1], paper_ms, format!("< {DOC_MS}")]));
+        }
     }
     Ok(sheet)
-}
-
-/// Pairs of a row's boxes on a device, and bytes a pair of both codings; nothing without one.
-fn our_bytes(row: &Coverage, n: usize, device: &Device) -> Result<Value, Failure> {
-    let on = |coding| on_gpu(GpuOptions { coding, ..GpuOptions::DEFAULT });
-    let boxes = fitting(n, row.doc).boxes(n, 1);
-    let runs = device.run(&[on(Coding::Plain), on(Coding::Packed)], &boxes, 1.0)?;
-    let [(_, plain), (_, packed)] = &runs[..] else { return Ok(json!([null, null, null, null])) };
-    let a_pair = |bytes: Option<u64>| bytes.map(|bytes| bytes as f64 / plain.pairs.max(1) as f64);
-    let fetched = packed.gpu.as_ref().map(|gpu| gpu.downloaded);
-    Ok(json!([plain.pairs, a_pair(written(plain)), a_pair(written(packed)), a_pair(fetched)]))
-}
-
-/// What MB is.
-fn about_units() -> String {
-    let input = INPUT_MB * 1e6 / MOST_BOXES as f64;
-    let densest = |unit: f64| DENSEST_PLAIN_MB * unit / TABLE_III[4].pairs as f64;
-    let (binary, decimal) = (densest(1_048_576.0), densest(1e6));
-    let both = (binary - 8.0).abs() < 0.01 && (decimal - 8.0).abs() > 0.1 && input == input.round();
-    let so = if both { " So one row has both units." } else { "" };
-    format!(
-        "Input: {INPUT_MB} MB for 10^7 boxes is {input} bytes a box if MB is 10^6, {} words: six coordinates and an \
-         id are seven. Output: {DENSEST_PLAIN_MB} MB uncompressed at DoC 10 is {} bytes for each of the printed pairs \
-         if MB is 2^20, {} if 10^6; two ids are 8.{so}",
-        input / 4.0,
-        short(binary),
-        short(decimal)
-    )
-}
-
-/// Whether equation 9 can be what was measured.
-fn about_equation_9() -> String {
-    let (single, many) = (equation_9(1.0), equation_9(1e12));
-    let a_pair = |row: &Coverage| row.output * 1_048_576.0 / row.pairs as f64;
-    let [first, .., last] = &TABLE_III;
-    let (sparse, dense) = (a_pair(first), a_pair(last));
-    let so = if sparse < single && dense < many {
-        "less than the former where nearly all rows are of one pair, and at the densest less than the limit: equation \
-         9 does not describe the format that was measured"
-    } else {
-        "so equation 9 may describe the format that was measured"
-    };
-    format!(
-        "By equation 9 with 32-bit ids and cells, 16-bit segments and {SEGMENT} boxes a segment a row of one pair \
-         takes {} bytes, by equation 10 the limit for many is {} byte a pair. Printed are {} bytes a pair at DoC {} \
-         and {} at DoC {}, {so}.",
-        short(single),
-        short(many),
-        short(sparse),
-        first.doc,
-        short(dense),
-        last.doc
-    )
-}
-
-/// Bytes a pair of PBIG's equation 9, `k` pairs of a box with a segment.
-fn equation_9(k: f64) -> f64 {
-    let local = (SEGMENT as f64).log2().ceil();
-    (32.0 + 2.0 * 16.0 + 2.0 * local + k * local) / (8.0 * k)
 }
 
 #[cfg(test)]
@@ -289,31 +234,6 @@ mod tests {
         assert!(
             about_alpha().contains("in 3 of the 3 rows") && about_alpha().contains("did not use equation 5")
         );
-        assert!(
-            about_units().contains("8.000 bytes") && about_units().contains("both units"),
-            "{}",
-            about_units()
-        );
-        assert!(about_equation_9().contains("does not describe"), "{}", about_equation_9());
-    }
-
-    #[test]
-    fn our_list_is_eight_bytes_a_pair_and_records_are_at_most_twelve() {
-        let device = Device::best(true);
-        for row in &TABLE_III[3..] {
-            let ours = our_bytes(row, 2000, &device).expect("a device that works, or none");
-            let (list, records) = (ours[1].as_f64(), ours[2].as_f64());
-            assert!(
-                list.is_none_or(|bytes| bytes == 8.0) && records.is_none_or(|bytes| bytes <= 12.0),
-                "{ours}"
-            );
-        }
-    }
-
-    #[test]
-    fn equation_9_by_hand() {
-        assert_eq!(equation_9(1.0), 11.0);
-        assert!((equation_9(1e12) - 1.0).abs() < 1e-9);
     }
 
     #[test]

@@ -9,10 +9,14 @@ mod claims;
 mod coverage;
 mod density;
 mod device;
+mod forms;
+mod lengths;
 mod lockstep;
 mod mapping;
+mod matrix;
 mod model;
 mod numbers;
+mod output;
 mod printed;
 mod sheet;
 mod steps;
@@ -90,21 +94,24 @@ type Part = fn(&Scale, &Device) -> Result<Vec<Sheet>, Failure>;
 /// In the order of the document, with names for their times.
 const PARTS: [(&str, Part); 8] = [
     ("PBIG table III and figure 10", |scale, device| {
-        let (cells, table) = (coverage::rule(), coverage::table(scale)?);
-        let bytes = coverage::bytes(scale, device)?;
-        Ok(vec![density::readings(), density::experiment(scale)?, cells, table, bytes])
+        let readings = [density::readings(), density::experiment(scale)?, coverage::rule()];
+        let counted = [coverage::table(scale)?, coverage::on_device(scale, device)?];
+        Ok(readings.into_iter().chain(counted).chain([output::bytes(scale, device)?]).collect())
     }),
     ("PBIG figures 8 and 9", |scale, device| {
-        Ok(vec![numbers::uniform(scale, device)?, numbers::cells(scale)?])
+        Ok(vec![numbers::uniform(scale, device)?, lengths::cells(scale, device)?])
     }),
     ("PBIG figure 11", |scale, device| Ok(vec![numbers::gaussian(scale, device)?])),
     ("PBIG tables IV to VI", switches::on_gpu),
     ("PBIG table IV on the CPU", |scale, _| Ok(vec![switches::on_cpu(scale)?])),
-    ("Avril tables 2, 4 and 5", |scale, device| {
-        Ok(vec![mapping::lazy(scale)?, mapping::roots(device)?, avril::bytes(), avril::forms(device)?])
+    ("Avril tables 1, 2, 4 and 5", |scale, device| {
+        let mapping = [mapping::lazy(scale)?, mapping::roots(device)?, mapping::in_cells(device)?];
+        let output = [avril::bytes(), forms::on_cpu()?, forms::on_device(device)?];
+        Ok([matrix::table(device)?].into_iter().chain(mapping).chain(output).collect())
     }),
     ("Avril figures 4 to 6, tables 6 and 7", |scale, device| {
-        let steps = [steps::steps(scale)?, steps::movers(scale)?, avril::crossover(scale, device)?];
+        let (steps, movers) = (steps::steps(scale, device)?, steps::movers(scale, device)?);
+        let steps = [steps, movers, avril::crossover(scale, device)?];
         Ok([avril::brute_force(device)?].into_iter().chain(steps).collect())
     }),
     ("what the papers print", |_, _| Ok(vec![claims::pbig(), claims::avril()])),

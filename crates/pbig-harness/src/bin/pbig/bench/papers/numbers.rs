@@ -1,11 +1,10 @@
-//! PBIG's figures 8, 9 and 11: number of boxes, size of cells, distribution.
+//! PBIG's figures 8 and 11: number of boxes, distribution.
 
-use super::cells::config_for;
 use super::device::{Device, on_gpu};
 use super::model::{Edges, Model, Place, Space};
-use super::printed::{CELLS, GAUSSIAN_GB, GAUSSIAN_PAIRS, LENGTHS, NORMAL, SPACE, SPEED_UPS, TABLE_VI, WARP};
+use super::printed::{GAUSSIAN_GB, GAUSSIAN_PAIRS, LENGTHS, NORMAL, SPACE, SPEED_UPS, TABLE_VI};
 use super::sheet::{Sheet, short, thousands};
-use super::{Scale, UNSORTED, chart, effort, once};
+use super::{Scale, UNSORTED, chart, effort};
 use crate::bench::finders::Finders;
 use crate::bench::measure::timed;
 use crate::output::Failure;
@@ -15,7 +14,7 @@ use pbig_harness::chart::Line;
 use serde_json::{Value, json};
 
 /// Section 6.1 as it is printed.
-const UNIFORM: Model =
+pub(super) const UNIFORM: Model =
     Model { space: Space::Even(SPACE), place: Place::Centre, edges: Edges::boxes(LENGTHS[0], LENGTHS[1]) };
 
 /// Section 6.3 as it is printed.
@@ -175,84 +174,6 @@ pub(super) fn gaussian(scale: &Scale, device: &Device) -> Result<Sheet, Failure>
     )
 }
 
-/// Most checks of a row that is run: about ten seconds on one thread.
-const MOST_CHECKS: f64 = 1e9;
-
-pub(super) fn cells(scale: &Scale) -> Result<Sheet, Failure> {
-    let columns = [
-        "boxes",
-        "cell wanted",
-        "cell",
-        "checks",
-        "unnecessary",
-        "redundant",
-        "ms, PBIG's grid, CPU, one thread",
-    ];
-    let mut sheet = Sheet::new("PBIG figure 9: size of cells", &columns).about(
-        "Section 6.1 as printed, `Strategy::Pbig` on one thread, each row one call. The figure's 64 to 1024 are taken \
-         as lengths (see table III). The figure has no printed numbers: its text says that 256 is better than 64 and \
-         1024 at 10^7 boxes, and that equation 6 comes close to the best.",
-    );
-    let mut charts = Vec::new();
-    for &n in scale.numbers.iter().filter(|n| **n >= 10_000) {
-        let boxes = UNIFORM.boxes(n, 1);
-        let mut line = Line { name: format!("{} boxes", thousands(n as u64)), points: vec![] };
-        for cell in CELLS {
-            let row = of_cell(&boxes, cell)?;
-            line.points.extend(row[6].as_f64().map(|ms| (cell, ms)));
-            sheet.row(row);
-        }
-        let mut by_rule = [0.0; 2];
-        for (wanted, of_rule) in [UNSORTED.pbig_boxes_per_cell, WARP as f32].into_iter().zip(&mut by_rule) {
-            let config = Config { strategy: Strategy::Pbig, pbig_boxes_per_cell: wanted, ..UNSORTED };
-            let row = by_config(&boxes, format!("equation 6, W = {wanted}"), config)?;
-            let (cell, ms) = (row[2].as_f64(), row[6].as_f64());
-            line.points.extend(cell.zip(ms));
-            *of_rule = ms.unwrap_or(0.0);
-            sheet.row(row);
-        }
-        line.points.sort_by(|a, b| a.0.total_cmp(&b.0));
-        sheet = sheet.about(about_cells(n, &line.points, by_rule));
-        charts.push(line);
-    }
-    Ok(sheet.chart(chart("cells", "PBIG figure 9: size of cells", "length of a cell", charts)))
-}
-
-/// Which cells took least, and how close equation 6 comes to that.
-fn about_cells(n: usize, points: &[(f64, f64)], by_rule: [f64; 2]) -> String {
-    let Some(&(cell, least)) = points.iter().min_by(|a, b| a.1.total_cmp(&b.1)) else { return String::new() };
-    let [few, warp] = by_rule.map(|ms| short(ms / least));
-    format!(
-        "Here, {} boxes: the least of the {} that ran is {} ms, with cells of {}; by equation 6 {few} times that with \
-         W = {} and {warp} times with W = {WARP}.",
-        thousands(n as u64),
-        points.len(),
-        short(least),
-        short(cell),
-        UNSORTED.pbig_boxes_per_cell
-    )
-}
-
-/// A row with cells of a length; without figures where they would hold less than a box, which the rule does
-/// not give, or take too long.
-fn of_cell(boxes: &[Aabb], cell: f64) -> Result<Value, Failure> {
-    let n = boxes.len();
-    let lonely = n as f64 * (cell / SPACE).powi(3) < 0.3;
-    let checks = super::cells::expected_checks(&UNIFORM, n, cell);
-    let why = match () {
-        () if lonely => "not run: the plan gives no cells with less than a box each".to_owned(),
-        () if checks > MOST_CHECKS => format!("not run: {} checks", short(checks)),
-        () => return by_config(boxes, short(cell), config_for(boxes, cell)),
-    };
-    Ok(json!([n, short(cell), null, checks.round() as u64, null, null, why]))
-}
-
-fn by_config(boxes: &[Aabb], wanted: String, config: Config) -> Result<Value, Failure> {
-    let done = once(config, boxes)?;
-    let checks = done.checks;
-    Ok(json!([boxes.len(), wanted, done.cell, checks.made, checks.unnecessary, checks.redundant, done.ms]))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -275,13 +196,6 @@ mod tests {
         let printed = GAUSSIAN_GB[0] * 1e9 / 8.0;
         let off = |model: &Model| model.pairs(super::super::printed::MOST_BOXES) / printed - 1.0;
         assert!(off(&GAUSSIAN_READ).abs() < 1e-3 && off(&GAUSSIAN) > 0.02);
-    }
-
-    #[test]
-    fn the_least_of_the_cells_is_named() {
-        let text = about_cells(10_000, &[(64.0, 9.0), (128.0, 3.0), (256.0, 6.0)], [9.0, 6.0]);
-        assert!(text.contains("3.000 ms, with cells of 128.0; by equation 6 3.000 times"), "{text}");
-        assert!(text.ends_with("2.000 times with W = 32."), "{text}");
     }
 
     #[test]

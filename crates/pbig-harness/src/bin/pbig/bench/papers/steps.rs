@@ -1,8 +1,11 @@
 //! Avril's table 6 and figures 5 and 6: steps with everything and with a part in motion.
 
+use super::coverage::joined;
+use super::device::Device;
 use super::printed::AVRIL_6;
 use super::sheet::{Sheet, short};
 use super::{Scale, chart};
+use crate::bench::gpu::events::race;
 use crate::bench::measure::Effort;
 use crate::bench::stages::{Alone, Measured, NAMES};
 use crate::output::Failure;
@@ -20,7 +23,7 @@ const WORK: &str = "Ours are means, so that updates which make a list or a grid 
                     plan and map make the grid anew, with `edit` map puts what has moved into other cells of it.";
 
 /// Table 6 and figure 5: a step in which all move.
-pub(super) fn steps(scale: &Scale) -> Result<Sheet, Failure> {
+pub(super) fn steps(scale: &Scale, device: &Device) -> Result<Sheet, Failure> {
     let columns = [
         "objects",
         "pairs",
@@ -34,11 +37,12 @@ pub(super) fn steps(scale: &Scale) -> Result<Sheet, Failure> {
     let mut sheet = Sheet::new("Avril table 6 and figure 5: a step, all moving", &columns)
         .about(
             "Printed: a column of equal objects falls onto a plane, their GPU, transfers included. Ours: cubes with a \
-             pair each, all moved by up to a tenth of their edge, on the CPU: `BroadPhase::set_many` of all, then \
-             `update`, events included. Whole falling scenes with rapier: [step](step.md); the dynamic tree of figure \
+             pair each, all moved by up to a tenth of their edge: `BroadPhase::set_many` of all, then `update`, events \
+             included. Whole falling scenes with rapier: [step](step.md); the dynamic tree of figure \
              5 in today's form: [peers](peers.md).",
         )
-        .about(WORK);
+        .about(WORK)
+        .about(about_device(device));
     let mut lines = ["printed", "ours, CPU, means"].map(|name| Line { name: name.into(), points: vec![] });
     for (n, printed) in AVRIL_6 {
         if scale.quick && n > 100_000 {
@@ -47,12 +51,21 @@ pub(super) fn steps(scale: &Scale) -> Result<Sheet, Failure> {
         let ours = Alone::events(cubes(n, 1.0, 1.0, 1), 1.0, DISTANCE)?.measure(Effort::new(scale.quick))?;
         sheet.row(json!([n, null, "printed", printed[0], printed[1], printed[2], printed[3], null]));
         sheet.row(row(n, &ours));
+        if let Some(gpu) = device.for_boxes(n) {
+            let row = race(gpu, cubes(n, 1.0, 1.0, 1), 1.0, DISTANCE)?;
+            sheet.row(json!([n, row.pairs, "ours, GPU", null, null, null, row.gpu.median, null]));
+        }
         lines
             .iter_mut()
             .zip([printed[3], ours.mean[0]])
             .for_each(|(line, ms)| line.points.push((n as f64, ms)));
     }
     Ok(sheet.chart(chart("steps", "Avril table 6 and figure 5: a step, all moving", "objects", lines)))
+}
+
+/// What is said of times of a device, medians of which each has its events compared.
+fn about_device(device: &Device) -> String {
+    format!("On a device the median of a few updates, the same events as the CPU in each. {}", device.about())
 }
 
 fn row(n: usize, ours: &Measured) -> Value {
@@ -71,9 +84,19 @@ struct Moved {
 }
 
 /// Figure 6: a step in which a share moves.
-pub(super) fn movers(scale: &Scale) -> Result<Sheet, Failure> {
+pub(super) fn movers(scale: &Scale, device: &Device) -> Result<Sheet, Failure> {
     let n = if scale.quick { 10_000 } else { 100_000 };
-    let columns = ["share moved", "boxes", "pairs", "ms, events", "ms, from nothing", "updates"];
+    let columns = [
+        "share moved",
+        "boxes",
+        "pairs",
+        "ms, events",
+        "ms, from nothing",
+        "updates",
+        "boxes, GPU",
+        "ms, events, GPU",
+        "ms, events, CPU with as many",
+    ];
     let mut sheet = Sheet::new("Avril figure 6: share of moving objects", &columns).about(
         "The figure has no printed numbers; the text says that the time stays the same whatever moves, as everything \
          is searched from nothing.",
@@ -84,7 +107,8 @@ pub(super) fn movers(scale: &Scale) -> Result<Sheet, Failure> {
         let events = Alone::events(boxes(), share, DISTANCE)?.measure(effort)?;
         let scratch = Alone::scratch(boxes(), share, DISTANCE).measure(effort)?;
         let row = Moved { share, events: events.mean[0], scratch: scratch.mean[0] };
-        sheet.row(json!([share, n, events.pairs, row.events, row.scratch, events.chosen]));
+        let ours = json!([share, n, events.pairs, row.events, row.scratch, events.chosen]);
+        sheet.row(joined(ours, beside(device, n, share)?));
         rows.push(row);
     }
     let line = |name: &str, of: fn(&Moved) -> f64| Line {
@@ -92,34 +116,56 @@ pub(super) fn movers(scale: &Scale) -> Result<Sheet, Failure> {
         points: rows.iter().map(|row| (row.share, of(row))).collect(),
     };
     let lines = [line("events", |row| row.events), line("from nothing", |row| row.scratch)];
-    let sheet = sheet.about(about_movers(&rows)).about(WORK);
+    let sheet = sheet.about(about_movers(&rows)).about(WORK).about(about_device(device));
     Ok(sheet.chart(chart("movers", "Avril figure 6: share of moving objects", "share moved", lines)))
+}
+
+/// Boxes on a device, and milliseconds there and on the CPU; a program that plays one has fewer boxes.
+fn beside(device: &Device, n: usize, share: f64) -> Result<Value, Failure> {
+    let n = if device.for_boxes(n).is_some() { n } else { n.min(10_000) };
+    let Some(gpu) = device.for_boxes(n) else { return Ok(json!([null, null, null])) };
+    let row = race(gpu, cubes(n, 1.0, 1.0, 1), share, DISTANCE)?;
+    Ok(json!([n, row.gpu.median, row.cpu.median]))
 }
 
 /// What the rows say about both sides, and no more.
 fn about_movers(rows: &[Moved]) -> String {
-    let percent = |row: &Moved| format!("{}%", 100.0 * row.share);
     let at = |holds: &dyn Fn(&Moved) -> bool| {
         let shares: Vec<String> = rows.iter().filter(|row| holds(row)).map(percent).collect();
         if shares.is_empty() { "no share".to_owned() } else { shares.join(", ") }
     };
-    let fall = |two: &[Moved]| {
-        (two[1].events < two[0].events).then(|| format!("{} to {}", percent(&two[0]), percent(&two[1])))
-    };
-    let falls: Vec<String> = rows.windows(2).filter_map(fall).collect();
-    let falls =
-        if falls.is_empty() { String::new() } else { format!(", but falls from {}", falls.join(", from ")) };
     let (least, most) = rows
         .iter()
         .fold((f64::MAX, 0.0f64), |(least, most), row| (least.min(row.scratch), most.max(row.scratch)));
     format!(
-        "Our `Finder`, from nothing, takes {} to {} ms. The events of `BroadPhase` take less than that run of it at \
-         {}, and more at {}; their time rises with the share that moves{falls}.",
+        "Our `Finder`, from nothing, takes {} to {} ms, at most {} times the least. The events of `BroadPhase` take \
+         less than that run of it at {}, and more at {}; as more move, their time {}.",
         short(least),
         short(most),
+        short(most / least),
         at(&|row| row.events < row.scratch),
-        at(&|row| row.events >= row.scratch)
+        at(&|row| row.events >= row.scratch),
+        about_turns(rows)
     )
+}
+
+/// Between which shares the time of events rises, and between which it falls.
+fn about_turns(rows: &[Moved]) -> String {
+    let stretches = |verb: &str, holds: fn(f64, f64) -> bool| {
+        let named: Vec<String> = rows
+            .windows(2)
+            .filter(|two| holds(two[0].events, two[1].events))
+            .map(|two| format!("{} to {}", percent(&two[0]), percent(&two[1])))
+            .collect();
+        (!named.is_empty()).then(|| format!("{verb} from {}", named.join(", from ")))
+    };
+    let both = [stretches("rises", |from, to| to > from), stretches("falls", |from, to| to < from)];
+    let both: Vec<String> = both.into_iter().flatten().collect();
+    if both.is_empty() { "stays the same".to_owned() } else { both.join(" and ") }
+}
+
+fn percent(row: &Moved) -> String {
+    format!("{}%", 100.0 * row.share)
 }
 
 #[cfg(test)]
@@ -137,8 +183,14 @@ mod tests {
         };
         let text = about_movers(&rows([1.0, 9.0, 4.0]).collect::<Vec<_>>());
         assert!(text.contains("less than that run of it at 1%, 100%, and more at 25%"), "{text}");
-        assert!(text.ends_with("moves, but falls from 25% to 100%."), "{text}");
+        assert!(text.ends_with("their time rises from 1% to 25% and falls from 25% to 100%."), "{text}");
+        let text = about_movers(&rows([4.0, 3.0, 2.0]).collect::<Vec<_>>());
+        assert!(text.ends_with("their time falls from 1% to 25%, from 25% to 100%."), "{text}");
         let text = about_movers(&rows([1.0, 2.0, 4.0]).collect::<Vec<_>>());
-        assert!(text.contains("more at no share") && text.ends_with("with the share that moves."), "{text}");
+        assert!(
+            text.contains("more at no share")
+                && text.ends_with("time rises from 1% to 25%, from 25% to 100%."),
+            "{text}"
+        );
     }
 }

@@ -1,0 +1,305 @@
+//! PBIG's figure 9: size of cells.
+
+use super::cells::{config_for, expected_checks};
+use super::device::Device;
+use super::numbers::UNIFORM;
+use super::printed::{CELLS, MOST_BOXES, SPACE, WARP};
+use super::sheet::{Sheet, short, thousands};
+use super::{Scale, UNSORTED, chart, once};
+use crate::output::Failure;
+use pbig_core::{Aabb, Backend, Checks, Config, Strategy};
+use pbig_harness::chart::Line;
+use serde_json::{Value, json};
+
+/// Most checks of a row that is run: about a minute on one thread.
+const MOST_CHECKS: f64 = 5e9;
+
+/// A call of more milliseconds than this is not repeated; of shorter ones this many are made.
+const LONG: f64 = 2000.0;
+const CALLS: usize = 3;
+
+/// Cells whose lengths differ by less than this factor are the same work.
+const ALIKE: f64 = 1.05;
+
+const COLUMNS: [&str; 9] = [
+    "boxes",
+    "cell wanted",
+    "cell",
+    "checks",
+    "unnecessary",
+    "redundant",
+    "ms, PBIG's grid, CPU, one thread",
+    "calls",
+    "longest call / shortest",
+];
+
+/// What decides the length of cells.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Wanted {
+    Length(f64),
+    /// Equation 6, with a `W`.
+    Rule(f32),
+}
+
+impl Wanted {
+    /// The lengths of the figure, and equation 6 as we use it and as the paper does.
+    fn all() -> impl Iterator<Item = Self> {
+        let rules = [UNSORTED.pbig_boxes_per_cell, WARP as f32].map(Self::Rule);
+        CELLS.map(Self::Length).into_iter().chain(rules)
+    }
+
+    fn name(self) -> String {
+        match self {
+            Self::Length(cell) => short(cell),
+            Self::Rule(boxes) => format!("equation 6, W = {boxes}"),
+        }
+    }
+
+    fn config(self, boxes: &[Aabb]) -> Config {
+        match self {
+            Self::Length(cell) => config_for(boxes, cell),
+            Self::Rule(wanted) => {
+                Config { strategy: Strategy::Pbig, pbig_boxes_per_cell: wanted, ..UNSORTED }
+            }
+        }
+    }
+
+    /// Checks to expect and why such cells are not tried: where they would hold less than a box, which the rule
+    /// does not give, or take too long.
+    fn why_not(self, n: usize) -> Option<(f64, String)> {
+        let Self::Length(cell) = self else { return None };
+        let checks = expected_checks(&UNIFORM, n, cell);
+        let lonely = n as f64 * (cell / SPACE).powi(3) < 0.3;
+        let why = match () {
+            () if lonely => "not run: the plan gives no cells with less than a box each".to_owned(),
+            () if checks > MOST_CHECKS => format!("not run: {} checks", short(checks)),
+            () => return None,
+        };
+        Some((checks, why))
+    }
+}
+
+/// What cells of one length came to.
+struct Ran {
+    wanted: Wanted,
+    cell: f64,
+    pairs: u64,
+    checks: Checks,
+    /// Milliseconds of each call, the shortest first.
+    times: Vec<f64>,
+}
+
+impl Ran {
+    fn new(boxes: &[Aabb], wanted: Wanted) -> Result<Self, Failure> {
+        let config = wanted.config(boxes);
+        let first = once(config, boxes)?;
+        let mut times = vec![first.ms];
+        while first.ms < LONG && times.len() < CALLS {
+            times.push(once(config, boxes)?.ms);
+        }
+        times.sort_by(f64::total_cmp);
+        let cell = f64::from(first.cell.unwrap_or(0.0));
+        Ok(Self { wanted, cell, pairs: first.pairs, checks: first.checks, times })
+    }
+
+    /// The median.
+    fn ms(&self) -> f64 {
+        self.times[self.times.len() / 2]
+    }
+
+    /// The longest call over the shortest; none of a single one.
+    fn spread(&self) -> Option<f64> {
+        (self.times.len() > 1).then(|| self.times[self.times.len() - 1] / self.times[0])
+    }
+
+    fn row(&self, n: usize, on_device: [Value; 3]) -> Value {
+        let (checks, calls) = (self.checks, self.times.len());
+        let counts = [json!(checks.made), json!(checks.unnecessary), json!(checks.redundant)];
+        let first = [json!(n), json!(self.wanted.name()), json!(self.cell)].into_iter().chain(counts);
+        let times = [json!(self.ms()), json!(calls), json!(self.spread())];
+        first.chain(times).chain(on_device).collect()
+    }
+}
+
+/// By how much calls that do the same differ: repeated ones, and those with cells that are alike. None where there
+/// are no such calls.
+fn noise(rows: &[Ran]) -> Option<f64> {
+    let alike = |a: &Ran, b: &Ran| a.cell.max(b.cell) < ALIKE * a.cell.min(b.cell);
+    let ratio = |a: &Ran, b: &Ran| a.ms().max(b.ms()) / a.ms().min(b.ms());
+    let pairs = rows.iter().enumerate().flat_map(|(i, a)| rows[..i].iter().map(move |b| (a, b)));
+    let others = pairs.filter(|(a, b)| alike(a, b)).map(|(a, b)| ratio(a, b));
+    rows.iter().filter_map(Ran::spread).chain(others).reduce(f64::max)
+}
+
+pub(super) fn cells(scale: &Scale, device: &Device) -> Result<Sheet, Failure> {
+    let columns = COLUMNS.into_iter().chain(["cell, GPU", "checks, GPU", device.column()]);
+    let mut sheet = Sheet::new("PBIG figure 9: size of cells", &columns.collect::<Vec<_>>()).about(format!(
+        "Section 6.1 as printed, `Strategy::Pbig` on one thread, from nothing: the median of {CALLS} calls where one \
+         takes under {} s, elsewhere one call. The figure's 64 to 1024 are taken as lengths (see table III). The figure \
+         has no printed numbers: its text says that 256 is better than 64 and 1024 at 10^7 boxes, and that equation 6 \
+         comes close to the best. On a device the settings are the same, but levels and the largest box have a say in \
+         the length of its cells. {}",
+        LONG / 1e3,
+        device.about()
+    ));
+    let (mut lines, mut most_noise) = (Vec::new(), 1.0);
+    for &n in scale.numbers.iter().filter(|n| **n >= 10_000) {
+        let rows = of_number(&mut sheet, n, device)?;
+        most_noise = noise(&rows).map_or(most_noise, |noise| f64::max(noise, most_noise));
+        sheet = sheet.about(about_cells(n, &rows, noise(&rows).unwrap_or(most_noise)));
+        if n == MOST_BOXES {
+            sheet = sheet.about(about_claim(&rows, noise(&rows).unwrap_or(most_noise)));
+        }
+        lines.push(line(n, &rows));
+    }
+    let mut chart = chart("cells", "PBIG figure 9: size of cells", "length of a cell", lines);
+    chart.exponents = false;
+    Ok(sheet.chart(chart))
+}
+
+/// All cells with so many boxes: rows of the sheet, and those that ran.
+fn of_number(sheet: &mut Sheet, n: usize, device: &Device) -> Result<Vec<Ran>, Failure> {
+    let boxes = UNIFORM.boxes(n, 1);
+    let mut rows: Vec<Ran> = Vec::new();
+    for wanted in Wanted::all() {
+        if let Some((checks, why)) = wanted.why_not(n) {
+            let nothing = Value::Null;
+            let first = json!([n, wanted.name(), nothing, checks.round() as u64, nothing, nothing, why]);
+            sheet.row(first.as_array().into_iter().flatten().cloned().chain(vec![nothing; 5]).collect());
+            continue;
+        }
+        let ran = Ran::new(&boxes, wanted)?;
+        let known = rows.first().map_or(ran.pairs, |first| first.pairs);
+        if ran.pairs != known {
+            let cells = wanted.name();
+            return Err(Failure::Check(format!(
+                "{n} boxes, cells {cells}: {} pairs, not {known}",
+                ran.pairs
+            )));
+        }
+        sheet.row(ran.row(n, on_device(&boxes, &ran, device)?));
+        rows.push(ran);
+    }
+    Ok(rows)
+}
+
+/// Length of the finest cells, checks and milliseconds on a device, where there is one for so many boxes.
+fn on_device(boxes: &[Aabb], ran: &Ran, device: &Device) -> Result<[Value; 3], Failure> {
+    let config = Config { backend: Backend::Gpu, ..ran.wanted.config(boxes) };
+    let Some((ms, report)) = device.run_for(config, boxes, 1.0, ran.pairs)? else {
+        return Ok([Value::Null, Value::Null, Value::Null]);
+    };
+    let cell = report.plan.gpu.as_ref().map(|plan| plan.cell);
+    Ok([json!(cell), json!(report.checks.made), json!(ms)])
+}
+
+fn line(n: usize, rows: &[Ran]) -> Line {
+    let mut points: Vec<(f64, f64)> = rows.iter().map(|row| (row.cell, row.ms())).collect();
+    points.sort_by(|a, b| a.0.total_cmp(&b.0));
+    Line { name: format!("{} boxes", thousands(n as u64)), points }
+}
+
+/// Which cells took least, by time and by checks, and how close equation 6 comes to that.
+fn about_cells(n: usize, rows: &[Ran], noise: f64) -> String {
+    let least = rows.iter().min_by(|a, b| a.ms().total_cmp(&b.ms()));
+    let fewest = rows.iter().min_by_key(|row| row.checks.made);
+    let Some((least, fewest)) = least.zip(fewest) else { return String::new() };
+    let as_good = rows.iter().filter(|row| row.ms() < noise * least.ms()).map(|row| short(row.cell));
+    let rule = rows.iter().filter(|row| matches!(row.wanted, Wanted::Rule(_)));
+    let rule: Vec<String> =
+        rule.map(|row| format!("{} times by {}", short(row.ms() / least.ms()), row.wanted.name())).collect();
+    format!(
+        "Here, {} boxes: the least of the {} that ran is {} ms, with cells of {} and {} checks; fewest checks are {}, \
+         with cells of {}, in {} ms. Calls that do the same differ by up to {} times, so cells of {} are not told \
+         apart. Of the least time it is {}.",
+        thousands(n as u64),
+        rows.len(),
+        short(least.ms()),
+        short(least.cell),
+        thousands(least.checks.made),
+        thousands(fewest.checks.made),
+        short(fewest.cell),
+        short(fewest.ms()),
+        short(noise),
+        as_good.collect::<Vec<_>>().join(", "),
+        rule.join("; ")
+    )
+}
+
+/// What these rows say of the claim that cells of 256 are better than 64 and 1024 at 10^7 boxes.
+fn about_claim(rows: &[Ran], noise: f64) -> String {
+    let ms = |cell: f64| rows.iter().find(|row| row.wanted == Wanted::Length(cell)).map(Ran::ms);
+    let against = |cell: f64| match ms(256.0).zip(ms(cell)) {
+        Some((best, other)) => {
+            let so = match best / other {
+                ratio if ratio * noise < 1.0 => "so it holds here",
+                ratio if ratio > noise => "so it does not hold here",
+                _ => "which is too close to tell",
+            };
+            format!("against {} it takes {} times as long, {so}", short(cell), short(best / other))
+        }
+        None => {
+            let [checks, of_256] = [cell, 256.0].map(|cell| expected_checks(&UNIFORM, MOST_BOXES, cell));
+            format!(
+                "against {} it was not run, but has {} of its checks",
+                short(cell),
+                short(of_256 / checks)
+            )
+        }
+    };
+    format!("The claim for cells of 256: {}; {}.", against(64.0), against(1024.0))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn ran(wanted: Wanted, cell: f64, made: u64, times: &[f64]) -> Ran {
+        let checks = Checks { made, ..Checks::default() };
+        Ran { wanted, cell, pairs: 0, checks, times: times.to_vec() }
+    }
+
+    fn length(cell: f64, made: u64, times: &[f64]) -> Ran {
+        ran(Wanted::Length(cell), cell, made, times)
+    }
+
+    #[test]
+    fn the_least_of_the_cells_is_named_by_time_and_by_checks() {
+        let rule = ran(Wanted::Rule(32.0), 200.0, 30, &[6.0]);
+        let rows = [length(64.0, 10, &[9.0]), length(128.0, 20, &[2.0, 3.0, 4.0]), rule];
+        let text = about_cells(10_000, &rows, noise(&rows).expect("repeated calls"));
+        assert!(text.contains("is 3.000 ms, with cells of 128.0 and 20 checks"), "{text}");
+        assert!(text.contains("fewest checks are 10, with cells of 64.00, in 9.000 ms"), "{text}");
+        assert!(text.contains("up to 2.000 times, so cells of 128.0 are not told apart"), "{text}");
+        assert!(text.ends_with("Of the least time it is 2.000 times by equation 6, W = 32."), "{text}");
+    }
+
+    #[test]
+    fn single_calls_are_as_noisy_as_those_with_cells_that_are_alike() {
+        let rows = [length(64.0, 1, &[33.0]), length(62.0, 1, &[22.0]), length(128.0, 1, &[5.0])];
+        assert_eq!(noise(&rows), Some(1.5));
+        assert_eq!(noise(&rows[1..]), None);
+    }
+
+    #[test]
+    fn what_is_said_of_the_claim_is_what_the_rows_show() {
+        let says = |ms: f64| about_claim(&[length(64.0, 1, &[10.0]), length(256.0, 1, &[ms])], 1.5);
+        assert!(says(5.0).contains("64.00 it takes 0.5000 times as long, so it holds here"), "{}", says(5.0));
+        assert!(says(8.0).contains("too close to tell") && says(20.0).contains("does not hold here"));
+        assert!(
+            says(5.0).contains("against 1024 it was not run, but has 0.03641 of its checks"),
+            "{}",
+            says(5.0)
+        );
+    }
+
+    #[test]
+    fn short_calls_are_repeated_and_every_cell_finds_the_same() {
+        let boxes = UNIFORM.boxes(2000, 1);
+        let rows = [Wanted::Length(2000.0), Wanted::Rule(4.0)]
+            .map(|wanted| Ran::new(&boxes, wanted).expect("found"));
+        assert!(rows.iter().all(|row| row.times.len() == CALLS && row.spread() >= Some(1.0)));
+        assert_eq!(rows[0].pairs, pbig_core::oracle::pairs(&boxes).len() as u64);
+        assert_eq!(rows[0].pairs, rows[1].pairs);
+    }
+}
