@@ -204,14 +204,19 @@ fn about_cells(n: usize, rows: &[Ran], noise: f64) -> String {
     let least = rows.iter().min_by(|a, b| a.ms().total_cmp(&b.ms()));
     let fewest = rows.iter().min_by_key(|row| row.checks.made);
     let Some((least, fewest)) = least.zip(fewest) else { return String::new() };
-    let as_good = rows.iter().filter(|row| row.ms() < noise * least.ms()).map(|row| short(row.cell));
+    let is_other = |row: &&Ran| row.cell != least.cell && row.ms() < noise * least.ms();
+    let as_good: Vec<String> = rows.iter().filter(is_other).map(|row| short(row.cell)).collect();
+    let as_good = match &as_good[..] {
+        [] => "none of the others is as good".to_owned(),
+        cells => format!("those of {} may be as good", cells.join(", ")),
+    };
     let rule = rows.iter().filter(|row| matches!(row.wanted, Wanted::Rule(_)));
     let rule: Vec<String> =
         rule.map(|row| format!("{} times by {}", short(row.ms() / least.ms()), row.wanted.name())).collect();
     format!(
         "Here, {} boxes: the least of the {} that ran is {} ms, with cells of {} and {} checks; fewest checks are {}, \
-         with cells of {}, in {} ms. Calls that do the same differ by up to {} times, so cells of {} are not told \
-         apart. Of the least time it is {}.",
+         with cells of {}, in {} ms. Calls that do the same differ by up to {} times, so \
+         {as_good}. Of the least time it is {}.",
         thousands(n as u64),
         rows.len(),
         short(least.ms()),
@@ -221,7 +226,6 @@ fn about_cells(n: usize, rows: &[Ran], noise: f64) -> String {
         short(fewest.cell),
         short(fewest.ms()),
         short(noise),
-        as_good.collect::<Vec<_>>().join(", "),
         rule.join("; ")
     )
 }
@@ -270,7 +274,8 @@ mod tests {
         let text = about_cells(10_000, &rows, noise(&rows).expect("repeated calls"));
         assert!(text.contains("is 3.000 ms, with cells of 128.0 and 20 checks"), "{text}");
         assert!(text.contains("fewest checks are 10, with cells of 64.00, in 9.000 ms"), "{text}");
-        assert!(text.contains("up to 2.000 times, so cells of 128.0 are not told apart"), "{text}");
+        assert!(text.contains("up to 2.000 times, so none of the others is as good"), "{text}");
+        assert!(about_cells(10_000, &rows, 2.5).contains("so those of 200.0 may be as good"), "{text}");
         assert!(text.ends_with("Of the least time it is 2.000 times by equation 6, W = 32."), "{text}");
     }
 
