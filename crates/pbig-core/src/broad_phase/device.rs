@@ -68,6 +68,14 @@ impl BroadPhase {
         Ok(true)
     }
 
+    /// The device has gone on to where the boxes are, and the update has not: another one may follow without it.
+    pub(super) fn take_back_on_gpu(&mut self) {
+        self.ending.drain(..).for_each(|id| self.flags[id as usize] &= !flag::ENDING);
+        if let Some(gpu) = &mut self.base.gpu {
+            gpu.forget_changes();
+        }
+    }
+
     /// Pairs that came from those that went.
     fn sort_out(&mut self, restarted: &[u32]) -> Result<(), Error> {
         let boxes = &self.boxes;
@@ -102,5 +110,45 @@ pub(super) struct Ending<'a>(pub(super) State<'a>);
 impl Judgement for Ending<'_> {
     fn holds(&self, pair: Pair) -> bool {
         self.0.flags(pair.a, pair.b) & flag::ENDING == 0 || self.0.holds(pair)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::{Aabb, Backend, BroadPhase, Config, Error, GpuFinder, Limits, Pair, ProxyFilter};
+    use std::ops::Range;
+
+    /// Boxes 2i and 2i + 1 of some couples, which overlap when they are close. Between the two the latter goes half its
+    /// size: one that goes further would begin anew, and it would not matter what the device has.
+    fn put(broad_phase: &mut BroadPhase, couples: Range<u32>, close: bool) {
+        for i in couples {
+            let gap = if close { 1.5 } else { 2.5 };
+            for (id, x) in [(2 * i, 0.0), (2 * i + 1, gap)] {
+                let aabb = Aabb::from_center([10.0 * i as f32 + x, 0.0, 0.0], [1.0; 3]);
+                broad_phase.set(id, aabb, ProxyFilter::ALL).expect("room for it");
+            }
+        }
+    }
+
+    #[test]
+    fn a_device_whose_update_was_too_much_does_not_go_on_from_it() {
+        let limits = Limits { max_pairs: 10, ..Limits::UNLIMITED };
+        let config = Config { backend: Backend::Gpu, limits, ..Config::DEFAULT };
+        let gpu = GpuFinder::new().expect("an adapter, of which a software one will do");
+        let mut broad_phase = BroadPhase::with_gpu(config, gpu).expect("a margin that is one");
+        put(&mut broad_phase, 0..1000, false);
+        put(&mut broad_phase, 0..9, true);
+        assert_eq!(broad_phase.update().map(|events| events.added.len()), Ok(9));
+        // As many as the device may find, which counts those that may end, too.
+        put(&mut broad_phase, 20..32, true);
+        assert_eq!(broad_phase.update(), Err(Error::TooManyPairs { limit: 10 }));
+        assert!(broad_phase.report().gpu.is_some(), "the device has found them");
+        put(&mut broad_phase, 20..32, false);
+        broad_phase.config.backend = Backend::Cpu;
+        assert_eq!(broad_phase.update().map(|events| events.added.len()), Ok(0));
+        broad_phase.config.backend = Backend::Gpu;
+        put(&mut broad_phase, 20..21, true);
+        assert_eq!(broad_phase.update().map(|events| events.added.clone()), Ok(vec![Pair::new(40, 41)]));
+        assert!(broad_phase.report().gpu.is_some());
     }
 }

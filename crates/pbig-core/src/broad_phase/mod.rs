@@ -61,7 +61,7 @@ struct Old {
 /// Boxes by id, and the pairs between them, kept from update to update.
 ///
 /// Each box is stored fat, grown by [`Config::margin`]; while later boxes stay inside, nothing has
-/// changed and nothing is done (contract 5). Ids should be dense: memory follows the largest.
+/// changed and nothing is done. Ids should be dense: memory follows the largest.
 ///
 /// On the CPU up to 1024 boxes are kept in a bitmap index, in which changed boxes are looked up, unless many change and that
 /// turns out to take longer than what follows. More lie in a base grid. Where few change they are put into other cells, and
@@ -307,10 +307,7 @@ impl BroadPhase {
         let found =
             if is_small { self.find_in_small(&mut watch).map(|()| Way::Few) } else { self.find_added() };
         let found = found.and_then(|way| self.check_room(way).map(|()| way));
-        let way = found.inspect_err(|_| {
-            self.events.added.clear();
-            self.report.pairs = self.pair_count() as u64;
-        })?;
+        let way = found.inspect_err(|_| self.take_back())?;
         if !is_small {
             self.small.pass();
             watch.lap();
@@ -335,6 +332,14 @@ impl BroadPhase {
         self.take_turns(if is_small { Turn::Bitmap } else { Turn::Grid }, clock);
         self.report.pairs = self.pair_count() as u64;
         Ok(())
+    }
+
+    /// An update that ends with an error has changed nothing, whoever has found the pairs.
+    fn take_back(&mut self) {
+        self.events.added.clear();
+        self.report.pairs = self.pair_count() as u64;
+        #[cfg(feature = "gpu")]
+        self.take_back_on_gpu();
     }
 
     /// A report of nothing done yet. Field by field: to make and drop whole ones took longer than to search ten boxes.

@@ -29,6 +29,9 @@ fn rank(kind: wgpu::DeviceType, low_power: bool) -> u32 {
 /// The adapter of the given name, or that of `WGPU_ADAPTER_NAME`, or the best. A part of the name is
 /// enough, in any case.
 pub(super) fn choose(name: Option<&str>) -> Result<wgpu::Adapter, GpuError> {
+    if let Some(value) = unknown_api() {
+        return Err(GpuError::UnknownApi { value });
+    }
     let wanted = name.map(str::to_owned).or_else(|| std::env::var("WGPU_ADAPTER_NAME").ok());
     let all = adapters();
     let found = all.iter().map(|a| a.get_info().name).collect::<Vec<_>>().join(", ");
@@ -41,6 +44,12 @@ pub(super) fn choose(name: Option<&str>) -> Result<wgpu::Adapter, GpuError> {
         found: if found.is_empty() { "none".into() } else { found.clone() },
     };
     all.iter().find(|a| matches(a)).cloned().ok_or_else(none)
+}
+
+/// `WGPU_BACKEND`, when wgpu knows nothing of what it names.
+fn unknown_api() -> Option<String> {
+    let value = std::env::var("WGPU_BACKEND").ok()?;
+    wgpu::Backends::from_comma_list(&value).is_empty().then_some(value)
 }
 
 /// A device with all that the adapter allows of what pbig uses.
@@ -59,8 +68,8 @@ pub(super) fn open(adapter: &wgpu::Adapter) -> Result<(wgpu::Device, wgpu::Queue
     pollster::block_on(adapter.request_device(&descriptor)).map_err(failed)
 }
 
-/// In words: name, kind and API.
-pub(super) fn describe(info: &wgpu::AdapterInfo) -> String {
+/// An adapter in words, as reports name it: name, kind and API.
+pub fn describe(info: &wgpu::AdapterInfo) -> String {
     let kind = match info.device_type {
         wgpu::DeviceType::Cpu => "software",
         wgpu::DeviceType::DiscreteGpu => "discrete",

@@ -16,6 +16,12 @@ pub enum GpuError {
         /// The adapters that exist.
         found: String,
     },
+    /// `WGPU_BACKEND` is set, and names nothing that wgpu knows: no adapter is looked for.
+    #[error("no GPU adapter: WGPU_BACKEND={value:?} names no API (known: vulkan, metal, dx12, gl)")]
+    UnknownApi {
+        /// What it is set to.
+        value: String,
+    },
     /// The adapter gave no device.
     #[error("the adapter {adapter} gave no device: {why}")]
     NoDevice {

@@ -1,7 +1,7 @@
 //! The GPU backend: PBIG's pipeline in WGSL, on any device that wgpu knows.
 //!
 //! ```text
-//! upload ─► locate ─► visit ─► scan ─► schedule ─► scatter ─► check small, large ─► readback ─► decode
+//! upload ─► locate ─► visit ─► scan ─► schedule ─► scatter ─► arrange ─► check small, large ─► readback ─► decode
 //! ```
 //!
 //! All of it is one submission and one wait, unless there is more work or output than fits in one
@@ -40,7 +40,7 @@ pub mod study;
 mod trial;
 mod upload;
 
-pub use adapter::adapters;
+pub use adapter::{adapters, describe};
 pub(crate) use changes::{Change, ChangeRequest};
 #[doc(hidden)]
 pub use engine::Fault;
@@ -52,7 +52,7 @@ use crate::cpu::find::Found;
 use crate::plan::Summary;
 use crate::report::Report;
 use crate::{Aabb, Backend, Config, GpuOptions, ProxyFilter};
-use changes::Ahead;
+use changes::{Ahead, Trail};
 use engine::Engine;
 use search::{Searched, Task, search};
 use session::Session;
@@ -212,12 +212,20 @@ impl GpuFinder {
     fn fail(&mut self, failure: &Failure, found: &mut Found) {
         found.clear();
         match (failure, &mut self.session) {
-            (Failure::Call(_), Some((_, session))) => session.mirror.forget_motions(),
-            (Failure::Call(_), None) | (Failure::Device(GpuError::Paused { .. }), _) => {}
+            (Failure::Call(_), _) => self.forget_changes(),
+            (Failure::Device(GpuError::Paused { .. }), _) => {}
             (Failure::Device(error), session) => {
                 *session = None;
                 self.failed = Some((Instant::now(), error.to_string()));
             }
+        }
+    }
+
+    /// What the device was told last is not what an update has left: the next one begins with everything.
+    pub(crate) fn forget_changes(&mut self) {
+        if let Some((_, session)) = &mut self.session {
+            session.mirror.forget_motions();
+            session.trail = Trail::default();
         }
     }
 

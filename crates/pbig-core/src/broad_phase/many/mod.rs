@@ -195,7 +195,8 @@ impl Range<'_> {
     fn set_one(&mut self, i: usize, aabb: &Aabb, filter: &ProxyFilter, rest: &mut Rest) {
         let id = self.first + i as u32;
         let (stored, flags) = (&mut self.boxes[i], &mut self.flags[i]);
-        let is_there = *flags & flag::PRESENT != 0 && !stored.min[0].is_nan();
+        // Absent boxes are stored as invalid ones are.
+        let is_there = !stored.min[0].is_nan();
         if !(is_there && aabb.is_valid() && self.filters[i].is(filter)) {
             return rest.odd.push((id, *aabb, *filter));
         }
