@@ -2,7 +2,9 @@
 
 mod accuracy;
 mod bench;
+mod refused;
 mod replay;
+mod usage;
 
 use ndarray::{Array2, Array3, ShapeBuilder};
 use ndarray_npy::{ReadNpyExt, WriteNpyExt};
@@ -20,9 +22,14 @@ fn pbig(folder: &Path, args: &[&str]) -> Output {
 
 /// As `pbig`, where there is no GPU.
 fn pbig_without_gpu(folder: &Path, args: &[&str]) -> Output {
+    pbig_where(folder, "WGPU_ADAPTER_NAME", "no such adapter", args)
+}
+
+/// As `pbig`, where a variable has a value.
+fn pbig_where(folder: &Path, variable: &str, value: &str, args: &[&str]) -> Output {
     let mut command = Command::new(env!("CARGO_BIN_EXE_pbig"));
     // Some drivers complain on stderr when they have no such folder.
-    let command = command.env("WGPU_ADAPTER_NAME", "no such adapter").env("XDG_RUNTIME_DIR", folder);
+    let command = command.env(variable, value).env("XDG_RUNTIME_DIR", folder);
     command.current_dir(folder).args(args).output().expect("the program starts")
 }
 
@@ -145,72 +152,6 @@ fn no_boxes_at_all() {
 }
 
 #[test]
-fn bad_input_is_refused_in_one_line_that_says_what_and_where() {
-    let folder = tempfile::tempdir().expect("a folder");
-    let here = folder.path();
-    let write = |name: &str, text: &str| std::fs::write(here.join(name), text).expect("written");
-    let refuse = |args: &[&str], words: &[&str]| refused(&pbig(here, args), words);
-    refuse(&["pairs", "nothing.npy"], &["nothing.npy", "No such file"]);
-    write("boxes.txt", "");
-    refuse(&["pairs", "boxes.txt"], &["boxes.txt", ".npy or .csv"]);
-    write("not.npy", "this is no array");
-    refuse(&["pairs", "not.npy"], &["not.npy"]);
-    write("word.csv", "0,0,0,1,1,1\n0,0,zero,1,1,1\n");
-    refuse(&["pairs", "word.csv"], &["word.csv", "line 2", "column 3", "'zero'"]);
-    write("short.csv", "0,0,0,1,1,1\n\n0,0,0,1,1\n");
-    refuse(&["pairs", "short.csv"], &["short.csv", "line 3", "6 columns", "5"]);
-    save(here, "five.npy", &Array2::<f32>::zeros((4, 5)));
-    refuse(&["pairs", "five.npy"], &["five.npy", "(N,6)", "(4,5)"]);
-    save(here, "cube.npy", &Array3::<f32>::zeros((2, 2, 6)));
-    refuse(&["pairs", "cube.npy"], &["cube.npy", "2 dimensions"]);
-    save(here, "ints.npy", &Array2::<i32>::zeros((4, 6)));
-    refuse(&["pairs", "ints.npy"], &["ints.npy", "float32"]);
-    save(here, "flat.npy", &Array2::<f32>::zeros((4, 6)));
-    refuse(&["replay", "flat.npy"], &["flat.npy", "3 dimensions"]);
-    refuse(&["pairs", "flat.npy", "-o", "out.txt"], &["out.txt", ".npy or .csv"]);
-    save(here, "frames.npy", &Array3::<f32>::zeros((1, 2, 6)));
-    refuse(&["replay", "frames.npy", "-o", "events.npy"], &["events.npy", ".csv"]);
-    for words in ["hello world\n", "0\t0\t0\t1\t1\t1\n", "\"0,0,0,1,1,1\n0,0,0,1,1,1\n", "a,b\n"] {
-        write("words.csv", words);
-        refuse(&["pairs", "words.csv"], &["words.csv", "line 1"]);
-    }
-    write("swapped.csv", "max_x,max_y,max_z,min_x,min_y,min_z\n1,1,1,0,0,0\n");
-    refuse(&["pairs", "swapped.csv"], &["swapped.csv", "line 1", "'max_x'"]);
-    refuse(&["pairs", "flat.npy", "-o", "no/such/folder.npy"], &["no/such/folder.npy"]);
-    write("cut.npy", "");
-    let whole = std::fs::read(here.join("flat.npy")).expect("written above");
-    std::fs::write(here.join("cut.npy"), &whole[..whole.len() - 10]).expect("written");
-    refuse(&["pairs", "cut.npy"], &["cut.npy"]);
-    save(here, "inverted.npy", &array(&[Aabb::new([0.0; 3], [1.0; 3]), Aabb::new([1.0; 3], [0.0; 3])]));
-    refuse(&["pairs", "inverted.npy", "--strict"], &["inverted.npy", "box 1"]);
-}
-
-/// A `.npy` file with this header text and nothing behind it.
-fn bare_header(shape: &str) -> Vec<u8> {
-    let text = format!("{{'descr': '<f4', 'fortran_order': False, 'shape': ({shape}), }}\n");
-    let length = (text.len() as u16).to_le_bytes();
-    [b"\x93NUMPY\x01\x00", &length[..], text.as_bytes()].concat()
-}
-
-#[test]
-fn a_header_that_promises_more_than_the_file_holds_is_refused_before_anything_is_allocated() {
-    let folder = tempfile::tempdir().expect("a folder");
-    let path = folder.path().join("lie.npy");
-    for (command, shape, words) in [
-        ("pairs", "1000000000000, 6", "24000000000000 bytes"),
-        ("pairs", "10, 6", "needs 240 bytes"),
-        ("pairs", "4611686018427387904, 6", "larger than any file"),
-        ("replay", "1000000000, 1000, 6", "bytes"),
-        ("replay", "0, 9223372036854775807, 6", "larger than any file"),
-        ("replay", "9223372036854775807, 0, 6", "larger than any file"),
-        ("replay", "1000000000000, 0, 6", "too many empty frames"),
-    ] {
-        std::fs::write(&path, bare_header(shape)).expect("written");
-        refused(&pbig(folder.path(), &[command, "lie.npy"]), &["lie.npy", words]);
-    }
-}
-
-#[test]
 fn frames_without_boxes_and_boxes_without_frames() {
     let folder = tempfile::tempdir().expect("a folder");
     for (frames, boxes) in [(0, 5), (3, 0), (0, 0)] {
@@ -256,24 +197,6 @@ fn a_backend_that_is_not_there_is_replaced_and_the_output_says_so() {
 }
 
 #[test]
-fn bad_usage_is_refused_in_one_line() {
-    let folder = tempfile::tempdir().expect("a folder");
-    let refuse = |args: &[&str], words: &[&str]| refused(&pbig(folder.path(), args), words);
-    refuse(&[], &["a command is missing", "doctor"]);
-    refuse(&["simulate", "--scene", "a\nb\u{1b}"], &["no scene"]);
-    refuse(&["pairs", "x.npy", "--threads", "99999999999"], &["--threads", "at most 1024"]);
-    refuse(&["pears"], &["pears"]);
-    refuse(&["pairs"], &["INPUT"]);
-    refuse(&["pairs", "x.npy", "--backend", "abacus"], &["abacus", "brute"]);
-    refuse(&["pairs", "x.npy", "--threads", "0"], &["--threads", "at least 1"]);
-    refuse(&["simulate", "--scene", "colum"], &["colum", "column, spheres"]);
-    refuse(&["simulate", "--scene", "column", "--check", "--broad-phase", "stock"], &["--check"]);
-    let frames = Array3::<f32>::zeros((1, 2, 6));
-    save(folder.path(), "frames.npy", &frames);
-    refuse(&["replay", "frames.npy", "--margin=-1"], &["--margin"]);
-}
-
-#[test]
 fn simulate_checks_and_reports() {
     let folder = tempfile::tempdir().expect("a folder");
     let args = ["simulate", "--scene", "column", "--bodies", "100", "--steps", "30", "--json"];
@@ -290,6 +213,22 @@ fn simulate_checks_and_reports() {
 }
 
 #[test]
+fn a_misspelt_api_is_named_and_so_are_those_that_there_are() {
+    let folder = tempfile::tempdir().expect("a folder");
+    save(folder.path(), "boxes.npy", &Array2::<f32>::zeros((3, 6)));
+    let run = |args: &[&str]| pbig_where(folder.path(), "WGPU_BACKEND", "vulcan", args);
+    let words = "WGPU_BACKEND=\"vulcan\" names no API (known: vulkan, metal, dx12, gl)";
+    let object = json(&run(&["pairs", "boxes.npy", "--backend", "gpu", "--json"]));
+    assert!(object["plan"].as_str().is_some_and(|plan| plan.contains(words)), "{object}");
+    refused(&run(&["bench", "gpu", "--quick"]), &[words]);
+    let doctor = String::from_utf8_lossy(&run(&["doctor"]).stdout).into_owned();
+    assert!(doctor.contains(&format!("falls back to the CPU: no GPU adapter: {words}\n")), "{doctor}");
+    // One that is known is enough.
+    let known = pbig_where(folder.path(), "WGPU_BACKEND", "vulcan,gl,vulkan", &["doctor"]);
+    assert!(!String::from_utf8_lossy(&known.stdout).contains("names no API"));
+}
+
+#[test]
 fn scenes_and_doctor_say_what_there_is() {
     let folder = tempfile::tempdir().expect("a folder");
     let scenes = pbig(folder.path(), &["scenes"]);
@@ -299,6 +238,10 @@ fn scenes_and_doctor_say_what_there_is() {
     let text = String::from_utf8_lossy(&doctor.stdout).into_owned();
     assert!(doctor.status.success() && text.contains("self-test") && !text.contains("WRONG"), "{text}");
     assert!(text.contains("gpu 0 packed"), "a software adapter at least is tested: {text}");
+    save(folder.path(), "boxes.npy", &Array2::<f32>::zeros((3, 6)));
+    let object = json(&pbig(folder.path(), &["pairs", "boxes.npy", "--backend", "gpu", "--json"]));
+    let adapter = object["adapter"].as_str().expect("the same adapter");
+    assert!(text.contains(&format!("adapter gpu 0: {adapter}, driver")), "{adapter} is not in: {text}");
 }
 
 #[test]

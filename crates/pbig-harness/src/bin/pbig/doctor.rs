@@ -36,7 +36,11 @@ pub(crate) fn run() -> Result<(), Failure> {
 fn describe_adapters() -> Result<Vec<(String, GpuFinder)>, Failure> {
     let adapters = adapters();
     if adapters.is_empty() {
-        print("adapters: none; `--backend gpu` falls back to the CPU")?;
+        let why = match GpuFinder::new() {
+            Err(why @ GpuError::UnknownApi { .. }) => format!(": {why}"),
+            _ => String::new(),
+        };
+        print(&format!("adapters: none; `--backend gpu` falls back to the CPU{why}"))?;
     }
     let mut usable = Vec::new();
     for (i, adapter) in adapters.iter().enumerate() {
@@ -57,11 +61,9 @@ fn describe(i: usize, adapter: &wgpu::Adapter, opened: &Result<GpuFinder, GpuErr
         Err(why) => format!("not usable: {why}"),
     };
     format!(
-        "adapter gpu {i}: {} ({:?}, {}), driver {} {}{chosen}\n    \
+        "adapter gpu {i}: {}, driver {} {}{chosen}\n    \
          limits: buffers {} MiB, bindings {} MiB, {} storage buffers, {} invocations, {} KiB workgroup memory\n    {}",
-        info.name,
-        info.device_type,
-        info.backend,
+        pbig_core::gpu::describe(&info),
         info.driver,
         info.driver_info,
         mib(limits.max_buffer_size),

@@ -9,9 +9,9 @@ mod output;
 mod pairs;
 mod replay;
 mod simulate;
+mod usage;
 
-use clap::error::ErrorKind;
-use clap::{Parser, Subcommand};
+use clap::{CommandFactory, Parser, Subcommand};
 use output::Failure;
 use std::process::ExitCode;
 
@@ -48,12 +48,7 @@ fn main() -> ExitCode {
     match Cli::try_parse() {
         Ok(cli) => finish(run(cli.command)),
         Err(error) if !error.use_stderr() => finish(output::print(&error.to_string())),
-        Err(error) if error.kind() == ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand => {
-            let commands = "pairs, replay, simulate, scenes, bench, accuracy or doctor";
-            finish(Err(Failure::Input(format!("a command is missing: {commands} (see pbig --help)"))))
-        }
-        // One line on stderr, as for any other bad input; clap's own has several.
-        Err(error) => finish(Err(Failure::Input(usage_line(&error.to_string())))),
+        Err(error) => finish(Err(usage::failure(&error, &Cli::command(), std::env::args_os().nth(1)))),
     }
 }
 
@@ -68,15 +63,6 @@ fn run(command: Command) -> Result<(), Failure> {
         Command::MemoryProbe(args) => bench::memory::probe(&args),
         Command::Doctor => doctor::run(),
     }
-}
-
-fn usage_line(message: &str) -> String {
-    let lines: Vec<&str> = message.lines().map(str::trim).filter(|line| !line.is_empty()).collect();
-    let told: Vec<&str> = lines
-        .into_iter()
-        .take_while(|line| !line.starts_with("Usage:") && !line.starts_with("For more"))
-        .collect();
-    format!("{} (see pbig --help)", told.join(" ").trim_start_matches("error: "))
 }
 
 fn finish(result: Result<(), Failure>) -> ExitCode {

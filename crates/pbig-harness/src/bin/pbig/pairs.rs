@@ -1,6 +1,6 @@
 //! `pbig pairs`: all overlapping pairs of the boxes in a file.
 
-use crate::options::{plan_text, positive, stages, threads, with_threads};
+use crate::options::{plan_text, positive, search_text, stages, threads, with_threads};
 use crate::output::{Failure, print, progress};
 use pbig_core::{Aabb, Config, Finder};
 use pbig_harness::files::{check_pairs_path, read_boxes, write_pairs};
@@ -20,10 +20,10 @@ pub(crate) struct Args {
     #[arg(long, value_enum, default_value_t)]
     backend: BackendOption,
     /// Threads; all by default.
-    #[arg(long, value_name = "N", value_parser = threads)]
+    #[arg(long, value_name = "N", value_parser = threads, allow_negative_numbers = true)]
     threads: Option<usize>,
     /// How often to find the pairs, for the times.
-    #[arg(long, value_name = "K", default_value = "1", value_parser = positive)]
+    #[arg(long, value_name = "K", default_value = "1", value_parser = positive, allow_negative_numbers = true)]
     repeat: usize,
     /// An invalid box (NaN, or min > max) is an error.
     #[arg(long)]
@@ -65,7 +65,7 @@ fn find(finder: &mut Finder, boxes: &[Aabb], args: &Args) -> Result<Vec<f64>, Fa
         let clock = Instant::now();
         let found = finder.find(boxes).map(|_| milliseconds(clock.elapsed()));
         bar.inc(1);
-        found.map_err(|error| Failure::Input(format!("{}: {error}", args.input.display())))
+        found.map_err(|error| Failure::Input(format!("{}: {}", args.input.display(), search_text(&error))))
     };
     let times = (0..args.repeat).map(once).collect();
     bar.finish_and_clear();

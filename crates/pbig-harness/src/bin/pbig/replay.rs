@@ -1,6 +1,6 @@
 //! `pbig replay`: the incremental path over frames of boxes.
 
-use crate::options::{plan_text, stages};
+use crate::options::{margin, plan_text, search_text, stages};
 use crate::output::{Failure, print, progress};
 use pbig_core::{BroadPhase, Config, Pair, ProxyFilter};
 use pbig_harness::files::{FrameBox, Frames, check_csv_path, read_frames, write_csv};
@@ -20,7 +20,7 @@ pub(crate) struct Args {
     #[arg(long, value_enum, default_value_t)]
     backend: BackendOption,
     /// How far a stored box reaches beyond the box it was given.
-    #[arg(long, value_name = "M", default_value = "0")]
+    #[arg(long, value_name = "M", default_value = "0", value_parser = margin, allow_negative_numbers = true)]
     margin: f32,
     /// Print one JSON object.
     #[arg(long)]
@@ -43,7 +43,7 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
     }
     let frames = read_frames(&args.frames)?;
     let config = Config { margin: args.margin, backend: args.backend.backend(), ..Config::DEFAULT };
-    let about = |error| Failure::Input(format!("{}: {error}", args.frames.display()));
+    let about = |error| Failure::Input(format!("{}: {}", args.frames.display(), search_text(&error)));
     let mut broad_phase =
         BroadPhase::new(config).map_err(|error| Failure::Input(format!("--margin: {error}")))?;
     let mut replay = Replay::default();

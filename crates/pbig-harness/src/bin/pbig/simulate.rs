@@ -1,6 +1,6 @@
 //! `pbig simulate` and `pbig scenes`: headless rapier worlds.
 
-use crate::options::positive;
+use crate::options::{bodies, positive, seed};
 use crate::output::{Failure, print, progress};
 use clap::ValueEnum;
 use pbig_harness::options::BackendOption;
@@ -16,10 +16,10 @@ pub(crate) struct Args {
     #[arg(long, value_name = "NAME")]
     scene: String,
     /// Bodies; each scene has its own default.
-    #[arg(long, value_name = "N", value_parser = positive)]
+    #[arg(long, value_name = "N", value_parser = bodies, allow_negative_numbers = true)]
     bodies: Option<usize>,
     /// Steps of 1/60 s.
-    #[arg(long, value_name = "K", default_value = "300", value_parser = positive)]
+    #[arg(long, value_name = "K", default_value = "300", value_parser = positive, allow_negative_numbers = true)]
     steps: usize,
     /// Which broad phase drives the world.
     #[arg(long, value_enum, default_value_t)]
@@ -31,7 +31,7 @@ pub(crate) struct Args {
     #[arg(long)]
     overlapped: bool,
     /// For the random numbers of the scene.
-    #[arg(long, default_value = "1")]
+    #[arg(long, default_value = "1", value_parser = seed, allow_negative_numbers = true)]
     seed: u64,
     /// Run rapier's broad phase and the oracle beside pbig and compare after every call.
     #[arg(long)]
@@ -67,9 +67,7 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
     let scene = Scene::named(&args.scene)?;
     let bodies = args.bodies.unwrap_or(scene.default_bodies);
     let task = Task { scene, bodies, steps: args.steps, seed: args.seed };
-    if args.check && args.broad_phase == BroadPhaseOption::Stock {
-        return Err(Failure::Input("--check compares pbig with stock: leave out --broad-phase stock".into()));
-    }
+    refuse_what_stock_ignores(args)?;
     let bar = progress(args.steps, "steps");
     let config = Config { backend: args.backend.backend(), ..PbigBroadPhase::CONFIG };
     let ours = PbigBroadPhase::with_config(config);
@@ -92,6 +90,16 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
     bar.finish_and_clear();
     report(args, bodies, &outcome, &did)?;
     if outcome.failed() { Err(Failure::Check(failure_line(&outcome))) } else { Ok(()) }
+}
+
+fn refuse_what_stock_ignores(args: &Args) -> Result<(), Failure> {
+    let of_pbig = [("--check", args.check), ("--overlapped", args.overlapped)];
+    match of_pbig.into_iter().find(|&(_, given)| given) {
+        Some((option, _)) if args.broad_phase == BroadPhaseOption::Stock => Err(Failure::Input(format!(
+            "{option} is for pbig, not for rapier's own broad phase: leave out {option} or --broad-phase stock"
+        ))),
+        _ => Ok(()),
+    }
 }
 
 /// The first difference and where the frames are.

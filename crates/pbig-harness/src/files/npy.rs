@@ -1,0 +1,175 @@
+//! The content of `.npy` files.
+
+use super::{ContentError, FrameBox, Frames, f32_box, f64_box, one_line};
+use ndarray::{Array, ArrayD, ArrayView2, Dimension, Ix2, Ix3};
+use ndarray_npy::{ReadNpyError, ReadNpyExt};
+use pbig_core::Aabb;
+
+/// How every `.npy` file begins.
+const MAGIC: &[u8] = b"\x93NUMPY";
+
+/// The content of an `.npy` file of boxes, see [`super::read_boxes`].
+///
+/// # Errors
+/// What is wrong, in one line.
+pub fn npy_boxes(bytes: &[u8]) -> Result<Vec<Aabb>, ContentError> {
+    let wrong = |shape: &[usize]| match (shape, shape_text(shape)) {
+        ([_, _, 6], found) => {
+            format!("shape {found} is a list of frames: use `pbig replay`; `pbig pairs` expects (N, 6)")
+        }
+        (_, found) => format!("expected an array of shape (N, 6), found {found}"),
+    };
+    Ok(match array::<Ix2>(bytes, wrong)? {
+        Floats::F32(array) => rows(&array.view()).map(f32_box).collect(),
+        Floats::F64(array) => rows(&array.view()).map(f64_box).collect(),
+    })
+}
+
+/// The content of an `.npy` file of frames, see [`super::read_frames`].
+///
+/// # Errors
+/// What is wrong, in one line.
+pub fn npy_frames(bytes: &[u8]) -> Result<Frames, ContentError> {
+    let wrong = |shape: &[usize]| match (shape, shape_text(shape)) {
+        ([_, 6], found) => {
+            format!("shape {found} is one list of boxes: use `pbig pairs`; `pbig replay` expects (F, N, 6)")
+        }
+        (_, found) => format!("expected an array of shape (F, N, 6), found {found}"),
+    };
+    Ok(match array::<Ix3>(bytes, wrong)? {
+        Floats::F32(array) => Frames {
+            boxes: array.dim().1,
+            frames: array.outer_iter().map(|frame| rows(&frame).map(FrameBox::from_f32).collect()).collect(),
+        },
+        Floats::F64(array) => Frames {
+            boxes: array.dim().1,
+            frames: array.outer_iter().map(|frame| rows(&frame).map(FrameBox::from_f64).collect()).collect(),
+        },
+    })
+}
+
+/// The rows of an (N,6) array, whatever its memory order.
+fn rows<'a, T: Copy>(array: &'a ArrayView2<'_, T>) -> impl Iterator<Item = [T; 6]> + 'a {
+    array.outer_iter().map(|row| std::array::from_fn(|k| row[k]))
+}
+
+fn shape_text(shape: &[usize]) -> String {
+    let lengths: Vec<String> = shape.iter().map(usize::to_string).collect();
+    format!("({})", lengths.join(", "))
+}
+
+/// An array of either float type.
+enum Floats<D> {
+    F32(Array<f32, D>),
+    F64(Array<f64, D>),
+}
+
+/// The array of six columns, or what is `wrong` with its shape.
+fn array<D: Dimension>(
+    bytes: &[u8],
+    wrong: impl Fn(&[usize]) -> ContentError,
+) -> Result<Floats<D>, ContentError> {
+    check_start(bytes)?;
+    check_size(bytes).map_err(one_line)?;
+    match ArrayD::<f32>::read_npy(bytes) {
+        Err(ReadNpyError::WrongDescriptor(_)) => {
+            let array = ArrayD::<f64>::read_npy(bytes).map_err(|error| npy_text(&error))?;
+            six_columns(array, wrong).map(Floats::F64)
+        }
+        read => six_columns(read.map_err(|error| npy_text(&error))?, wrong).map(Floats::F32),
+    }
+}
+
+fn six_columns<T, D: Dimension>(
+    array: ArrayD<T>,
+    wrong: impl Fn(&[usize]) -> ContentError,
+) -> Result<Array<T, D>, ContentError> {
+    let shape = array.shape().to_vec();
+    let fits = D::NDIM == Some(shape.len()) && shape.last() == Some(&6);
+    array.into_dimensionality().ok().filter(|_| fits).ok_or_else(|| wrong(&shape))
+}
+
+fn npy_text(error: &ReadNpyError) -> String {
+    match error {
+        ReadNpyError::WrongDescriptor(kind) => {
+            let found = kind.as_string().map_or("records".into(), |kind| value_name(kind));
+            one_line(format!("values are {found}; expected float32 or float64 (numpy: `.astype('float32')`)"))
+        }
+        other => one_line(format!("not a readable .npy file: {other}")),
+    }
+}
+
+/// What numpy calls the values that a header describes as, say, `<i4`.
+fn value_name(kind: &str) -> String {
+    let plain = kind.trim_start_matches(['<', '>', '=', '|']);
+    let (letter, bytes) = plain.split_at_checked(1).unwrap_or((plain, ""));
+    let named = |name: &str| bytes.parse::<u8>().map(|bytes| format!("{name}{}", 8 * u32::from(bytes))).ok();
+    let name = match letter {
+        "b" => Some("bool".to_string()),
+        "i" => named("int"),
+        "u" => named("uint"),
+        "f" => named("float"),
+        "c" => named("complex"),
+        _ => None,
+    };
+    name.unwrap_or_else(|| format!("of type '{kind}'"))
+}
+
+/// Whether this is a `.npy` file at all.
+fn check_start(bytes: &[u8]) -> Result<(), ContentError> {
+    match bytes {
+        [] => Err("the file is empty".into()),
+        _ if bytes.starts_with(MAGIC) => Ok(()),
+        _ => Err("this is no .npy file, as `numpy.save` writes it".into()),
+    }
+}
+
+/// Whether the file holds as many bytes as its header promises. The reader allocates what the header
+/// says, so a header that lies must be noticed before. What cannot be understood here is left to it.
+fn check_size(bytes: &[u8]) -> Result<(), String> {
+    let Some((header, rest)) = npy_header(bytes)? else { return Ok(()) };
+    let field = |name: &str, from: char, to: char| {
+        let text = header.split(&format!("'{name}'")).nth(1)?;
+        Some(text.split(from).nth(1)?.split(to).next()?.to_string())
+    };
+    let (Some(shape), Some(kind)) = (field("shape", '(', ')'), field("descr", '\'', '\'')) else {
+        return Ok(());
+    };
+    let lengths: Option<Vec<u64>> =
+        shape.split(',').map(str::trim).filter(|n| !n.is_empty()).map(|n| n.parse().ok()).collect();
+    let Some(lengths) = lengths else { return Ok(()) };
+    let size: u64 = kind.trim_start_matches(|c: char| !c.is_ascii_digit()).parse().unwrap_or(1);
+    let bytes_of = |least: u64| lengths.iter().map(|&n| n.max(least)).try_fold(size, u64::checked_mul);
+    let found = rest.len() as u64;
+    // Even without boxes, frames take memory, which the bytes of the file do not account for.
+    let most_for_nothing = (64 << 10) + 64 * bytes.len() as u64;
+    match (bytes_of(0), bytes_of(1)) {
+        (_, None) => Err(format!("shape ({shape}) is larger than any file")),
+        (Some(0), Some(frames)) if frames > most_for_nothing => {
+            Err(format!("shape ({shape}) has too many empty frames"))
+        }
+        (Some(needed), _) if needed > found => {
+            Err(format!("shape ({shape}) needs {needed} bytes of values, the file has {found}"))
+        }
+        _ => Ok(()),
+    }
+}
+
+/// The header's text, and what follows it. The reader allocates what the header's length says, up to 4 GiB, so one
+/// that is cut off must be noticed before.
+fn npy_header(bytes: &[u8]) -> Result<Option<(String, &[u8])>, ContentError> {
+    let Some((after, length)) = header_length(bytes) else { return Ok(None) };
+    match after.split_at_checked(length as usize) {
+        Some((header, rest)) => Ok(Some((String::from_utf8_lossy(header).into_owned(), rest))),
+        None => Err(format!("the header needs {length} bytes, the file has {}", after.len())),
+    }
+}
+
+/// What follows the length of the header, and this length.
+fn header_length(bytes: &[u8]) -> Option<(&[u8], u32)> {
+    let rest = bytes.strip_prefix(MAGIC)?;
+    match *rest.first()? {
+        1 => Some((rest.get(4..)?, u32::from(u16::from_le_bytes(rest.get(2..4)?.try_into().ok()?)))),
+        _ => Some((rest.get(6..)?, u32::from_le_bytes(rest.get(2..6)?.try_into().ok()?))),
+    }
+}

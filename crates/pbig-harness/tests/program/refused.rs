@@ -1,0 +1,159 @@
+//! Files that cannot be read: what the one line on stderr says was found, where, and what to do.
+
+use super::{array, json, pbig, read_pairs, refused, save};
+use ndarray::{Array2, Array3};
+use pbig_core::Aabb;
+use std::path::Path;
+
+/// The one line on stderr about this content of a file.
+fn line_about(folder: &Path, command: &str, name: &str, content: &[u8]) -> String {
+    std::fs::write(folder.join(name), content).expect("written");
+    let output = pbig(folder, &[command, name]);
+    refused(&output, &[name]);
+    String::from_utf8_lossy(&output.stderr).trim_end().to_string()
+}
+
+#[test]
+fn bad_input_is_refused_in_one_line_that_says_what_and_where() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let here = folder.path();
+    let write = |name: &str, text: &str| std::fs::write(here.join(name), text).expect("written");
+    let refuse = |args: &[&str], words: &[&str]| refused(&pbig(here, args), words);
+    refuse(&["pairs", "nothing.npy"], &["nothing.npy", "No such file"]);
+    write("boxes.txt", "");
+    refuse(&["pairs", "boxes.txt"], &["boxes.txt", ".npy or .csv"]);
+    write("word.csv", "0,0,0,1,1,1\n0,0,zero,1,1,1\n");
+    refuse(&["pairs", "word.csv"], &["word.csv", "line 2", "column 3", "'zero'"]);
+    write("short.csv", "0,0,0,1,1,1\n\n0,0,0,1,1\n");
+    refuse(&["pairs", "short.csv"], &["short.csv", "line 3", "6 columns", "5"]);
+    save(here, "five.npy", &Array2::<f32>::zeros((4, 5)));
+    refuse(&["pairs", "five.npy"], &["five.npy", "(N, 6)", "(4, 5)"]);
+    save(here, "flat.npy", &Array2::<f32>::zeros((4, 6)));
+    refuse(&["pairs", "flat.npy", "-o", "out.txt"], &["out.txt", ".npy or .csv"]);
+    save(here, "frames.npy", &Array3::<f32>::zeros((1, 2, 6)));
+    refuse(&["replay", "frames.npy", "-o", "events.npy"], &["events.npy", ".csv"]);
+    refuse(&["pairs", "flat.npy", "-o", "no/such/folder.npy"], &["no/such/folder.npy"]);
+    write("cut.npy", "");
+    let whole = std::fs::read(here.join("flat.npy")).expect("written above");
+    std::fs::write(here.join("cut.npy"), &whole[..whole.len() - 10]).expect("written");
+    refuse(&["pairs", "cut.npy"], &["cut.npy"]);
+    save(here, "inverted.npy", &array(&[Aabb::new([0.0; 3], [1.0; 3]), Aabb::new([1.0; 3], [0.0; 3])]));
+    refuse(&["pairs", "inverted.npy", "--strict"], &["inverted.npy", "box 1"]);
+}
+
+/// A `.npy` file with this header text and nothing behind it.
+fn header(kind: &str, shape: &str) -> Vec<u8> {
+    let text = format!("{{'descr': {kind}, 'fortran_order': False, 'shape': ({shape}), }}\n");
+    let length = (text.len() as u16).to_le_bytes();
+    [b"\x93NUMPY\x01\x00", &length[..], text.as_bytes()].concat()
+}
+
+#[test]
+fn a_header_that_promises_more_than_the_file_holds_is_refused_before_anything_is_allocated() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("lie.npy");
+    for (command, shape, words) in [
+        ("pairs", "1000000000000, 6", "24000000000000 bytes"),
+        ("pairs", "10, 6", "needs 240 bytes"),
+        ("pairs", "4611686018427387904, 6", "larger than any file"),
+        ("replay", "1000000000, 1000, 6", "bytes"),
+        ("replay", "0, 9223372036854775807, 6", "larger than any file"),
+        ("replay", "9223372036854775807, 0, 6", "larger than any file"),
+        ("replay", "1000000000000, 0, 6", "too many empty frames"),
+    ] {
+        std::fs::write(&path, header("'<f4'", shape)).expect("written");
+        refused(&pbig(folder.path(), &[command, "lie.npy"]), &["lie.npy", words]);
+    }
+}
+
+#[test]
+fn values_that_are_no_floats_are_named_as_numpy_names_them() {
+    let folder = tempfile::tempdir().expect("a folder");
+    for (kind, size, name) in [
+        ("'<i4'", 4, "int32"),
+        ("'>u8'", 8, "uint64"),
+        ("'|b1'", 1, "bool"),
+        ("'<f2'", 2, "float16"),
+        ("'<c8'", 8, "complex64"),
+        ("'<U1'", 4, "of type '<U1'"),
+        ("'|O'", 8, "of type '|O'"),
+        ("[('a', '<f4')]", 4, "records"),
+    ] {
+        let file = [header(kind, "1, 6"), vec![0; 6 * size]].concat();
+        let wanted = format!(
+            "pbig: x.npy: values are {name}; expected float32 or float64 (numpy: `.astype('float32')`)"
+        );
+        assert_eq!(line_about(folder.path(), "pairs", "x.npy", &file), wanted);
+    }
+}
+
+#[test]
+fn a_list_of_frames_and_one_of_boxes_are_told_apart() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let refuse = |command, words: &str| refused(&pbig(folder.path(), &[command, "x.npy"]), &[words]);
+    save(folder.path(), "x.npy", &Array3::<f64>::zeros((4, 3, 6)));
+    refuse("pairs", "shape (4, 3, 6) is a list of frames: use `pbig replay`; `pbig pairs` expects (N, 6)");
+    save(folder.path(), "x.npy", &Array2::<f32>::zeros((4, 6)));
+    refuse("replay", "shape (4, 6) is one list of boxes: use `pbig pairs`; `pbig replay` expects (F, N, 6)");
+    save(folder.path(), "x.npy", &Array3::<f32>::zeros((6, 4, 3)));
+    refuse("pairs", "expected an array of shape (N, 6), found (6, 4, 3)");
+    refuse("replay", "expected an array of shape (F, N, 6), found (6, 4, 3)");
+}
+
+#[test]
+fn what_is_no_npy_file_is_not_read_as_one() {
+    let folder = tempfile::tempdir().expect("a folder");
+    for command in ["pairs", "replay"] {
+        let about = |content| line_about(folder.path(), command, "x.npy", content);
+        assert_eq!(about(b""), "pbig: x.npy: the file is empty");
+        let other = "pbig: x.npy: this is no .npy file, as `numpy.save` writes it";
+        assert_eq!((about(b"0,0,0,1,1,1\n").as_str(), about(b"\x93NUMP").as_str()), (other, other));
+    }
+}
+
+#[test]
+fn a_text_with_other_separators_or_another_header_is_told_what_is_expected() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let header = "the header must be min_x,min_y,min_z,max_x,max_y,max_z, or be left out";
+    for (text, wanted) in [
+        ("0;0;0;1;1;1\n", "line 1: values are separated by semicolons; expected commas"),
+        (
+            "min_x;min_y;min_z;max_x;max_y;max_z\n",
+            "line 1: values are separated by semicolons; expected commas",
+        ),
+        ("0,5;0,5;0,5;1;1;1\n", "line 1: values are separated by semicolons; expected commas"),
+        ("0,0,0,1,1,1\n0\t0\t0\t1\t1\t1\n", "line 2: values are separated by tabs; expected commas"),
+        ("0 0 0 1 1 1\n", "line 1: expected 6 columns, separated by commas, found 1"),
+        ("max_x,max_y,max_z,min_x,min_y,min_z\n1,1,1,0,0,0\n", &format!("line 1: {header}")),
+        ("\u{feff}id,min_x,min_y,min_z,max_x,max_y,max_z\n", &format!("line 1: {header}")),
+        ("hello world\n", &format!("line 1: {header}")),
+        ("0,0,0,1,1,1\na,b,c,d,e,f\n", "line 2: column 1: 'a' is not a number"),
+        ("\"0,0,0,1,1,1\n0,0,0,1,1,1\n", "line 1: expected 6 columns, separated by commas, found 1"),
+    ] {
+        let line = line_about(folder.path(), "pairs", "x.csv", text.as_bytes());
+        assert_eq!(line, format!("pbig: x.csv: {wanted}"));
+    }
+}
+
+#[test]
+fn the_line_of_what_is_not_utf_8_is_told() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let line = line_about(folder.path(), "pairs", "x.csv", b"0,0,0,1,1,1\n\n0,0,0,1,1,\xff\n");
+    assert_eq!(line, "pbig: x.csv: line 3: this is not UTF-8; save the file as UTF-8 text");
+}
+
+#[test]
+fn endings_in_capitals_are_the_same_endings() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let here = folder.path();
+    save(here, "A.NPY", &Array2::<f32>::zeros((2, 6)));
+    std::fs::write(here.join("B.CSV"), "0,0,0,1,1,1\n0,0,0,1,1,1\n").expect("written");
+    for input in ["A.NPY", "B.CSV"] {
+        json(&pbig(here, &["pairs", input, "-o", "OUT.Npy", "--json"]));
+        assert_eq!(read_pairs(&here.join("OUT.Npy")).len(), 1, "{input}");
+    }
+    json(&pbig(here, &["pairs", "A.NPY", "-o", "OUT.CSV", "--json"]));
+    assert_eq!(std::fs::read_to_string(here.join("OUT.CSV")).expect("the output"), "a,b\n0,1\n");
+    save(here, "F.NPY", &Array3::<f32>::zeros((1, 2, 6)));
+    json(&pbig(here, &["replay", "F.NPY", "-o", "EVENTS.CSV", "--json"]));
+}

@@ -1,0 +1,89 @@
+//! Arguments that cannot be: one line on stderr that names the option, its bounds and where they are listed.
+
+use super::{pbig, refused, save};
+use ndarray::Array3;
+
+#[test]
+fn bad_usage_is_refused_in_one_line() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let refuse = |args: &[&str], words: &[&str]| refused(&pbig(folder.path(), args), words);
+    refuse(&[], &["a command is missing", "doctor"]);
+    refuse(&["simulate", "--scene", "a\nb\u{1b}"], &["no scene"]);
+    refuse(&["pairs", "x.npy", "--threads", "99999999999"], &["--threads", "at most 1024"]);
+    refuse(&["pears"], &["pears"]);
+    refuse(&["pairs"], &["INPUT"]);
+    refuse(&["pairs", "x.npy", "--backend", "abacus"], &["abacus", "brute"]);
+    refuse(&["pairs", "x.npy", "--threads", "0"], &["--threads", "at least 1"]);
+    refuse(&["simulate", "--scene", "colum"], &["colum", "column, spheres"]);
+    let frames = Array3::<f32>::zeros((1, 2, 6));
+    save(folder.path(), "frames.npy", &frames);
+    refuse(&["replay", "frames.npy", "--margin=-1"], &["--margin"]);
+}
+
+/// The one line on stderr, without the program's name.
+fn line(args: &[&str]) -> String {
+    let folder = tempfile::tempdir().expect("a folder");
+    let output = pbig(folder.path(), args);
+    refused(&output, &["pbig: "]);
+    String::from_utf8_lossy(&output.stderr).trim_end().replacen("pbig: ", "", 1)
+}
+
+#[test]
+fn numbers_out_of_bounds_are_told_the_bound() {
+    let long = "9".repeat(40);
+    for (command, option, value, why) in [
+        ("simulate", "--bodies", "5000000000", "must be at most 10000000"),
+        ("simulate", "--bodies", "10000001", "must be at most 10000000"),
+        ("simulate", "--bodies", &long, "must be at most 10000000"),
+        ("simulate", "--bodies", "-5", "must be at least 1"),
+        ("simulate", "--bodies", "many", "must be a whole number"),
+        ("simulate", "--steps", "-1", "must be at least 1"),
+        ("simulate", "--seed", "-1", "must be at least 0"),
+        ("simulate", "--seed", "18446744073709551616", "must be at most 18446744073709551615"),
+        ("pairs", "--threads", "-1", "must be at least 1"),
+        ("pairs", "--repeat", "1.5", "must be a whole number"),
+        ("pairs", "--repeat", &long, "must be at most 18446744073709551615"),
+        ("replay", "--margin", "-1", "must be at least 0"),
+        ("replay", "--margin", "-1e40", "must be at least 0"),
+        ("replay", "--margin", "1e40", "must be at most 3.4028235e38, the largest f32"),
+        ("replay", "--margin", "inf", "must be at most 3.4028235e38, the largest f32"),
+        ("replay", "--margin", "nan", "must be a number"),
+    ] {
+        let wanted = format!("{option} {value}: {why} (see pbig {command} --help)");
+        assert_eq!(line(&[command, option, value]), wanted);
+        assert_eq!(line(&[command, &format!("{option}={value}")]), wanted);
+    }
+}
+
+#[test]
+fn every_error_names_the_help_that_lists_the_options_and_guesses_nothing() {
+    for (args, wanted) in [
+        (
+            &["pairs", "x.npy", "--output", "y"][..],
+            "unexpected argument '--output' found (see pbig pairs --help)",
+        ),
+        (&["replay", "x.npy", "-1"], "unexpected argument '-1' found (see pbig replay --help)"),
+        (&["doctor", "x"], "unexpected argument 'x' found (see pbig doctor --help)"),
+        (&["pears"], "unrecognized subcommand 'pears' (see pbig --help)"),
+        (&["--jsn", "pairs"], "unexpected argument '--jsn' found (see pbig --help)"),
+        (&["pairs"], "the following required arguments were not provided: <INPUT> (see pbig pairs --help)"),
+    ] {
+        assert_eq!(line(args), wanted, "{args:?}");
+    }
+    for args in [&["pairs", "x.npy", "--backend", "gpo"][..], &["bench", "stage"]] {
+        let line = line(args);
+        assert!(line.contains("possible values") && !line.contains("tip"), "{line}");
+        assert!(line.ends_with(&format!("(see pbig {} --help)", args[0])), "{line}");
+    }
+}
+
+#[test]
+fn what_stock_would_ignore_is_refused() {
+    let stock = ["simulate", "--scene", "column", "--broad-phase", "stock"];
+    for more in [&["--check"][..], &["--overlapped"]] {
+        let line = line(&[&stock[..], more].concat());
+        let option = more[0];
+        let wanted = format!("leave out {option} or --broad-phase stock");
+        assert!(line.starts_with(&format!("{option} is for pbig")) && line.ends_with(&wanted), "{line}");
+    }
+}
