@@ -11,7 +11,7 @@ use pbig_harness::reported::Reported;
 use pbig_harness::runner::StepTime;
 use rapier_pbig::PbigBroadPhase;
 use tally::{MARGINS, Passes};
-use verdict::{against_default, criterion, over_all};
+use verdict::{against_default, criterion, over_all, without_each_scene};
 
 pub(super) fn run(quick: bool) -> Result<Study, Failure> {
     let mut rows = worlds::measured(quick)?;
@@ -29,6 +29,7 @@ pub(super) fn run(quick: bool) -> Result<Study, Failure> {
 }
 
 /// One margin in one case: [`MARGINS`] in their order make a case.
+#[derive(Clone)]
 struct Row {
     case: String,
     boxes: usize,
@@ -197,6 +198,7 @@ fn notes(rows: &[Row]) -> Vec<String> {
         ),
         criterion(rows),
         over_all(rows, &STEP),
+        without_each_scene(rows),
         over_all(rows, &BROAD_PHASE),
     ]
 }
