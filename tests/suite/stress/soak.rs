@@ -129,8 +129,9 @@ impl Tally {
             *early = if is_early { bytes.max(*early) } else { *early };
             let update = self.updates;
             // In a short run a list that doubles late is no leak.
+            let late = if given().is_none() { 100_000 } else { 0 };
             assert!(
-                bytes <= *early * 5 / 4 + 100_000,
+                bytes <= *early * 5 / 4 + late,
                 "update {update}: {bytes} bytes are held, at first {early}"
             );
         }
@@ -192,7 +193,8 @@ fn soak_of_a_small_world_in_the_grid() {
 fn soak_of_a_world_of_near_pairs() {
     let config = Config { margin: 0.0, ..cpu(Strategy::Grid) };
     let churn = || Churn { swings: true, ..Churn::new(config, 300) };
-    soak(churn, updates()).assert_mostly(&["near"], 50);
+    // What lists have cost decides whether there is one, and other processes have a part in that.
+    soak(churn, updates()).assert_mostly(&["near"], 25);
 }
 
 /// A software adapter takes milliseconds for an update: a hundredth of them.

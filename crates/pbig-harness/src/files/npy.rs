@@ -2,6 +2,7 @@
 
 use super::{ContentError, FrameBox, Frames, f32_box, f64_box, one_line};
 use ndarray::{Array, ArrayD, ArrayView2, Dimension, Ix2, Ix3};
+use ndarray_npy::npy::header::Header;
 use ndarray_npy::{ReadNpyError, ReadNpyExt};
 use pbig_core::Aabb;
 
@@ -124,45 +125,52 @@ fn check_start(bytes: &[u8]) -> Result<(), ContentError> {
     }
 }
 
-/// Whether the file holds as many bytes as its header promises. The reader allocates what the header
-/// says, so a header that lies must be noticed before. What cannot be understood here is left to it.
-fn check_size(bytes: &[u8]) -> Result<(), String> {
-    let Some((header, rest)) = npy_header(bytes)? else { return Ok(()) };
-    let field = |name: &str, from: char, to: char| {
-        let text = header.split(&format!("'{name}'")).nth(1)?;
-        Some(text.split(from).nth(1)?.split(to).next()?.to_string())
-    };
-    let (Some(shape), Some(kind)) = (field("shape", '(', ')'), field("descr", '\'', '\'')) else {
-        return Ok(());
-    };
-    let lengths: Option<Vec<u64>> =
-        shape.split(',').map(str::trim).filter(|n| !n.is_empty()).map(|n| n.parse().ok()).collect();
-    let Some(lengths) = lengths else { return Ok(()) };
+/// Whether the file holds as many bytes as its header promises. The reader allocates what the header says, so a header
+/// that lies must be noticed before: by the reader's own parser, or the two would understand different things. What that
+/// cannot understand it will not read either.
+fn check_size(bytes: &[u8]) -> Result<(), ContentError> {
+    check_header(bytes)?;
+    let mut rest = bytes;
+    let Ok(header) = Header::from_reader(&mut rest) else { return Ok(()) };
+    let (lengths, shape) = (&header.shape, shape_text(&header.shape));
+    let kind = header.type_descriptor.as_string().map_or("", String::as_str);
     let size: u64 = kind.trim_start_matches(|c: char| !c.is_ascii_digit()).parse().unwrap_or(1);
-    let bytes_of = |least: u64| lengths.iter().map(|&n| n.max(least)).try_fold(size, u64::checked_mul);
-    let found = rest.len() as u64;
+    let bytes_of =
+        |least: u64| lengths.iter().map(|&n| (n as u64).max(least)).try_fold(size, u64::checked_mul);
     // Even without boxes, frames take memory, which the bytes of the file do not account for.
     let most_for_nothing = (64 << 10) + 64 * bytes.len() as u64;
+    let found = rest.len() as u64;
     match (bytes_of(0), bytes_of(1)) {
-        (_, None) => Err(format!("shape ({shape}) is larger than any file")),
+        (_, None) => Err(format!("shape {shape} is larger than any file")),
         (Some(0), Some(frames)) if frames > most_for_nothing => {
-            Err(format!("shape ({shape}) has too many empty frames"))
+            Err(format!("shape {shape} has too many empty frames"))
         }
         (Some(needed), _) if needed > found => {
-            Err(format!("shape ({shape}) needs {needed} bytes of values, the file has {found}"))
+            Err(format!("shape {shape} needs {needed} bytes of values, the file has {found}"))
         }
         _ => Ok(()),
     }
 }
 
-/// The header's text, and what follows it. The reader allocates what the header's length says, up to 4 GiB, so one
-/// that is cut off must be noticed before.
-fn npy_header(bytes: &[u8]) -> Result<Option<(String, &[u8])>, ContentError> {
-    let Some((after, length)) = header_length(bytes) else { return Ok(None) };
-    match after.split_at_checked(length as usize) {
-        Some((header, rest)) => Ok(Some((String::from_utf8_lossy(header).into_owned(), rest))),
-        None => Err(format!("the header needs {length} bytes, the file has {}", after.len())),
+/// Whether the header is all there and its parser will not take for ever. That allocates what the header's length says, up
+/// to 4 GiB, and takes twice as long for each bracket within another.
+fn check_header(bytes: &[u8]) -> Result<(), ContentError> {
+    const LONGEST: u32 = 1 << 16;
+    const DEEPEST: i32 = 6;
+    let Some((after, length)) = header_length(bytes) else { return Ok(()) };
+    let Some(header) = after.get(..length as usize) else {
+        return Err(format!("the header needs {length} bytes, the file has {}", after.len()));
+    };
+    let mut depth = 0;
+    let mut step = |byte: &u8| {
+        depth += i32::from(b"([{".contains(byte)) - i32::from(b")]}".contains(byte) && depth > 0);
+        depth
+    };
+    let deepest = header.iter().map(&mut step).max().unwrap_or(0);
+    if length > LONGEST || deepest > DEEPEST {
+        return Err("the header is none that numpy writes for an array of floats".into());
     }
+    Ok(())
 }
 
 /// What follows the length of the header, and this length.

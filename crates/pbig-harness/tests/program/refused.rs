@@ -42,10 +42,32 @@ fn bad_input_is_refused_in_one_line_that_says_what_and_where() {
 }
 
 /// A `.npy` file with this header text and nothing behind it.
+fn header_of(text: &str) -> Vec<u8> {
+    let length = (text.len() as u16 + 1).to_le_bytes();
+    [b"\x93NUMPY\x01\x00", &length[..], text.as_bytes(), b"\n"].concat()
+}
+
 fn header(kind: &str, shape: &str) -> Vec<u8> {
-    let text = format!("{{'descr': {kind}, 'fortran_order': False, 'shape': ({shape}), }}\n");
-    let length = (text.len() as u16).to_le_bytes();
-    [b"\x93NUMPY\x01\x00", &length[..], text.as_bytes()].concat()
+    header_of(&format!("{{'descr': {kind}, 'fortran_order': False, 'shape': ({shape}), }}"))
+}
+
+/// What parses headers understands more than numpy writes: what is checked must be what it understands.
+#[test]
+fn a_header_in_other_words_cannot_lie_either() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let quoted = |shape: &str| format!(r#"{{"descr": "<f4", "fortran_order": False, "shape": {shape}}}"#);
+    let twice = quoted("(1, 6)").replace('}', ", 'shape': (2_199_023_255_552, 6)}");
+    let nested = quoted(&format!("{}{}", "[".repeat(40), "]".repeat(40)));
+    for (command, text, words) in [
+        ("pairs", quoted("(0x20000000000, 6)"), "bytes of values"),
+        ("pairs", twice, "bytes of values"),
+        ("replay", quoted("(0, 0x4000000000000000, 6)"), "larger than any file"),
+        ("replay", quoted("(20000000, 0, 6)"), "too many empty frames"),
+        ("pairs", nested, "none that numpy writes"),
+    ] {
+        let line = line_about(folder.path(), command, "odd.npy", &header_of(&text));
+        assert!(line.contains(words), "{text}: {line}");
+    }
 }
 
 #[test]

@@ -63,7 +63,7 @@ pub(crate) fn margin(text: &str) -> Result<f32, String> {
 
 /// What a search says, with a way out that the program's user has.
 pub(crate) fn search_text(error: &Error) -> String {
-    let way_out = "split the file, or use the crate pbig-core with larger `Limits`";
+    let way_out = "for more, use the crate pbig-core with larger `Limits`";
     match error {
         Error::TooManyBoxes { boxes, limit } => format!("{boxes} boxes are more than {limit}; {way_out}"),
         Error::TooManyPairs { limit } => format!("more than {limit} overlapping pairs; {way_out}"),
@@ -91,9 +91,9 @@ mod tests {
     #[test]
     fn limits_come_with_what_a_user_of_the_program_can_do() {
         let pairs = search_text(&Error::TooManyPairs { limit: 268_435_456 });
-        assert!(pairs.starts_with("more than 268435456 overlapping pairs; split the file"), "{pairs}");
+        assert!(pairs.starts_with("more than 268435456 overlapping pairs; for more, use"), "{pairs}");
         let boxes = search_text(&Error::TooManyBoxes { boxes: 9, limit: 8 });
-        assert!(boxes.starts_with("9 boxes are more than 8; split the file"), "{boxes}");
+        assert!(boxes.starts_with("9 boxes are more than 8; for more, use"), "{boxes}");
         assert!([pairs, boxes].iter().all(|text| !text.contains("raise")));
     }
 
