@@ -15,6 +15,8 @@ declare -A length=([finder_against_oracle]=1600 [updates_against_scratch]=800)
 cargo run --release -p pbig-tests --example fuzz_seeds
 for target in "$@"; do
     echo "== $target"
+    words=()
+    [ ! -f "fuzz/$target.dict" ] || words=(-dict="fuzz/$target.dict")
     cargo +nightly fuzz run "$target" -- -max_total_time="$seconds" -max_len="${length[$target]:-4096}" \
-        -malloc_limit_mb=512 -timeout=60 -print_final_stats=1
+        -malloc_limit_mb=64 -timeout=60 -print_final_stats=1 "${words[@]}"
 done

@@ -92,17 +92,22 @@ fn six_columns<T, D: Dimension>(
 
 fn npy_text(error: &ReadNpyError) -> String {
     match error {
-        ReadNpyError::WrongDescriptor(kind) => {
-            let found = kind.as_string().map_or("records".into(), |kind| value_name(kind));
-            one_line(format!("values are {found}; expected float32 or float64 (numpy: `.astype('float32')`)"))
-        }
+        ReadNpyError::WrongDescriptor(kind) => values_text(kind.as_string()),
         other => one_line(format!("not a readable .npy file: {other}")),
     }
 }
 
+/// Marks of the order of bytes.
+const ORDERS: [char; 4] = ['<', '>', '=', '|'];
+
+fn values_text(kind: Option<&String>) -> ContentError {
+    let found = kind.map_or("records".into(), |kind| value_name(kind));
+    one_line(format!("values are {found}; expected float32 or float64 (numpy: `.astype('float32')`)"))
+}
+
 /// What numpy calls the values that a header describes as, say, `<i4`.
 fn value_name(kind: &str) -> String {
-    let plain = kind.trim_start_matches(['<', '>', '=', '|']);
+    let plain = kind.trim_start_matches(ORDERS);
     let (letter, bytes) = plain.split_at_checked(1).unwrap_or((plain, ""));
     let named = |name: &str| bytes.parse::<u8>().map(|bytes| format!("{name}{}", 8 * u32::from(bytes))).ok();
     let name = match letter {
@@ -133,8 +138,13 @@ fn check_size(bytes: &[u8]) -> Result<(), ContentError> {
     let mut rest = bytes;
     let Ok(header) = Header::from_reader(&mut rest) else { return Ok(()) };
     let (lengths, shape) = (&header.shape, shape_text(&header.shape));
-    let kind = header.type_descriptor.as_string().map_or("", String::as_str);
-    let size: u64 = kind.trim_start_matches(|c: char| !c.is_ascii_digit()).parse().unwrap_or(1);
+    let kind = header.type_descriptor.as_string();
+    let size: u64 = match kind.map(|kind| kind.trim_start_matches(ORDERS)) {
+        Some("f4") => 4,
+        Some("f8") => 8,
+        // The reader would ask for memory first.
+        _ => return Err(values_text(kind)),
+    };
     let bytes_of =
         |least: u64| lengths.iter().map(|&n| (n as u64).max(least)).try_fold(size, u64::checked_mul);
     // Even without boxes, frames take memory, which the bytes of the file do not account for.

@@ -64,6 +64,7 @@ fn a_header_in_other_words_cannot_lie_either() {
         ("replay", quoted("(0, 0x4000000000000000, 6)"), "larger than any file"),
         ("replay", quoted("(20000000, 0, 6)"), "too many empty frames"),
         ("pairs", nested, "none that numpy writes"),
+        ("pairs", quoted("(0x20000000000, 6)").replace("f4", "f0"), "values are float0"),
     ] {
         let line = line_about(folder.path(), command, "odd.npy", &header_of(&text));
         assert!(line.contains(words), "{text}: {line}");
