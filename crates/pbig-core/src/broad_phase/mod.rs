@@ -334,7 +334,7 @@ impl BroadPhase {
         Ok(())
     }
 
-    /// An update that ends with an error has changed nothing, whoever has found the pairs.
+    /// After an update that ends with an error pairs and changes are what they were, for the next one to begin from.
     fn take_back(&mut self) {
         self.events.added.clear();
         self.report.pairs = self.pair_count() as u64;
