@@ -1,6 +1,7 @@
 //! How rapier calls a broad phase, and in which order it is answered.
 
 use crate::checked::{backends, everywhere};
+use crate::stress::memory;
 use pbig_harness::scenes::Scene;
 use pbig_harness::world::World;
 use rapier_pbig::PbigBroadPhase;
@@ -134,4 +135,43 @@ fn the_collision_pipeline_works_as_with_stock() {
         &(),
     );
     assert_eq!(narrow_phase.intersection_pairs_with(first).filter(|(_, _, hit)| *hit).count(), 1);
+}
+
+/// Notes the largest block of memory that each call asks for.
+struct Weigher<B> {
+    inner: B,
+    largest: Vec<usize>,
+}
+
+impl<B: BroadPhase> BroadPhase for Weigher<B> {
+    fn update(
+        &mut self,
+        params: &IntegrationParameters,
+        colliders: &ColliderSet,
+        bodies: &RigidBodySet,
+        modified: &[ColliderHandle],
+        removed: &[ColliderHandle],
+        events: &mut Vec<BroadPhasePairEvent>,
+    ) {
+        events.reserve(10_000);
+        memory::largest();
+        self.inner.update(params, colliders, bodies, modified, removed, events);
+        self.largest.push(memory::largest());
+    }
+}
+
+#[test]
+fn a_call_like_those_before_asks_for_no_memory() {
+    let ours = [PbigBroadPhase::new(), PbigBroadPhase::new().overlapped()];
+    for (broad_phase, name) in ours.into_iter().zip(["waiting", "overlapped"]) {
+        let mut world = Scene::named("column").expect("the scene exists").build(3000, 4);
+        let mut weigher = Weigher { inner: broad_phase, largest: vec![] };
+        (0..200).for_each(|_| world.step(&mut weigher));
+        let late = &weigher.largest[200..];
+        let asking = late.iter().filter(|bytes| **bytes > 4096).count();
+        assert!(
+            weigher.inner.stats().totals.added > 1000 && 20 * asking < late.len(),
+            "{name}: {asking} calls"
+        );
+    }
 }

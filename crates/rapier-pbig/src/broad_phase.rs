@@ -6,7 +6,7 @@ use crate::overlap::Overlap;
 use crate::roll::Roll;
 use crate::scene_tree::SceneTree;
 use crate::stats::{Kept, MEASURED_FROM, Totals, Watch};
-use pbig_core::{BroadPhase as Finder, Config, Events, Limits};
+use pbig_core::{BroadPhase as Finder, Config, Limits};
 use rapier3d::prelude::{
     BroadPhase, BroadPhasePairEvent, ColliderHandle, ColliderPair, ColliderSet, IntegrationParameters,
     NarrowPhase, RigidBodySet,
@@ -240,7 +240,7 @@ impl PbigBroadPhase {
         let mut watch = Watch::new(count >= MEASURED_FROM);
         let _span = tracing::debug_span!(target: "pbig", "events").entered();
         let sent = self.outbox.send(&self.finder, found, &self.roll, events);
-        self.overlap.iter_mut().for_each(|overlap| overlap.unsent = Events::default());
+        self.overlap.iter_mut().for_each(|overlap| overlap.forget_sent());
         self.kept.events = watch.lap();
         (self.kept.added, self.kept.deleted) = sent;
         self.kept.totals.added += sent.0 as u64;

@@ -25,6 +25,8 @@ pub(crate) struct Overlap {
     pub(crate) gone: HashSet<u32>,
     /// Listed colliders that are still inside their stored boxes: id, the box to store next, filter.
     pub(crate) staying: Vec<(u32, Aabb, ProxyFilter)>,
+    /// For [`PbigBroadPhase::look_ahead`], and of no meaning between calls.
+    pub(crate) seen: Vec<Seen>,
     /// The last call had no news and left the search alone.
     pub(crate) quiet: bool,
     pub(crate) left: usize,
@@ -47,7 +49,7 @@ pub struct Overlapped<'a> {
 }
 
 /// A listed collider as it is and as it is expected.
-type Seen = (Proxy, Aabb);
+pub(crate) type Seen = (Proxy, Aabb);
 
 impl PbigBroadPhase {
     /// Lets a GPU search while rapier does something else: each call uses what was begun in the one before, searches at
@@ -106,15 +108,18 @@ impl PbigBroadPhase {
     /// Brings the finder up to date about listed colliders that are not inside their stored boxes, and notes the others.
     pub(crate) fn look_ahead(&mut self, call: &Call<'_>, listed: &[ColliderHandle]) {
         let mut watch = Watch::new(listed.len() >= MEASURED_FROM);
-        let seen = call.seen(Growth::new(call.params, self.ulps), listed);
+        let mut seen =
+            self.overlap.as_mut().map(|overlap| std::mem::take(&mut overlap.seen)).unwrap_or_default();
+        call.foresee(Growth::new(call.params, self.ulps), listed, &mut seen);
         self.kept.proxies += watch.lap();
-        for (&handle, (proxy, reach)) in listed.iter().zip(seen) {
+        for (&handle, (proxy, reach)) in listed.iter().zip(seen.drain(..)) {
             match proxy {
                 Proxy::Gone => self.forget(handle),
                 Proxy::Disabled => self.disable(handle),
                 Proxy::Enabled(aabb, filter) => self.set_ahead(handle, &aabb, reach, filter),
             }
         }
+        self.overlap.iter_mut().for_each(|overlap| overlap.seen = std::mem::take(&mut seen));
         self.kept.set += watch.lap();
     }
 
@@ -158,41 +163,45 @@ impl Overlap {
         self.staying.clear();
     }
 
+    pub(crate) fn forget_sent(&mut self) {
+        self.unsent.added.clear();
+        self.unsent.removed.clear();
+    }
+
     /// Adds the events of a search to those that wait: what came and went, or went and came, has not changed.
     pub(crate) fn join(&mut self, found: &Events) {
-        let gone = std::mem::take(&mut self.gone);
+        let Self { gone, unsent: Events { added, removed }, .. } = self;
         let there = |pair: &Pair| !gone.contains(&pair.a) && !gone.contains(&pair.b);
-        let Events { added, removed } = &mut self.unsent;
         added.retain(there);
         removed.retain(there);
-        let came: Vec<Pair> = without(&found.added, removed);
-        let went: Vec<Pair> = without(&found.removed, added);
+        gone.clear();
+        let waiting = added.len();
+        added.extend(without(&found.added, removed));
+        removed.extend(without(&found.removed, &added[..waiting]));
+        // What has just come is not among what was found to have gone, nor the other way round.
         added.retain(|pair| found.removed.binary_search(pair).is_err());
         removed.retain(|pair| found.added.binary_search(pair).is_err());
-        for (pairs, new) in [(added, came), (removed, went)] {
-            pairs.extend(new);
-            pairs.sort_unstable();
-        }
+        added.sort_unstable();
+        removed.sort_unstable();
     }
 }
 
 /// The pairs that are not among others, which are sorted.
-fn without(pairs: &[Pair], others: &[Pair]) -> Vec<Pair> {
-    pairs.iter().filter(|pair| others.binary_search(pair).is_err()).copied().collect()
+fn without(pairs: &[Pair], others: &[Pair]) -> impl Iterator<Item = Pair> {
+    pairs.iter().filter(|pair| others.binary_search(pair).is_err()).copied()
 }
 
 impl Call<'_> {
     /// Listed colliders as they are, and the boxes around that and where they are expected in the next call.
-    fn seen(&self, growth: Growth, listed: &[ColliderHandle]) -> Vec<Seen> {
-        let mut seen = vec![(Proxy::Gone, Aabb::NOWHERE); listed.len()];
+    fn foresee(&self, growth: Growth, listed: &[ColliderHandle], seen: &mut Vec<Seen>) {
+        seen.resize(listed.len(), (Proxy::Gone, Aabb::NOWHERE));
         if listed.len() < PARALLEL_FROM {
-            self.see(growth, listed, &mut seen);
+            self.see(growth, listed, seen);
         } else {
             let pieces = listed.par_chunks(BLOCK).zip(seen.par_chunks_mut(BLOCK));
             let pieces = pieces.with_min_len(PARALLEL_FROM / BLOCK / 8);
             pieces.for_each(|(listed, seen)| self.see(growth, listed, seen));
         }
-        seen
     }
 
     fn see(&self, growth: Growth, listed: &[ColliderHandle], seen: &mut [Seen]) {

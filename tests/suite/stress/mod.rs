@@ -3,7 +3,7 @@
 
 mod extremes;
 mod fuzzed;
-mod memory;
+pub(crate) mod memory;
 mod mixed;
 mod motion;
 mod multitudes;

@@ -147,10 +147,10 @@ impl PairStore {
         }
     }
 
-    /// The same, and what they are: all of them, also those of removed boxes.
-    pub(crate) fn give_all(&mut self) -> Vec<Pair> {
-        self.links.drop_all();
-        std::mem::take(&mut self.pairs)
+    /// The same, and what they are: all of them, also those of removed boxes. The room that `into` had is kept here.
+    pub(crate) fn give_all(&mut self, into: &mut Vec<Pair>) {
+        std::mem::swap(&mut self.pairs, into);
+        self.hand_over();
     }
 
     /// No pairs have been counted.

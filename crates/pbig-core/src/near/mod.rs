@@ -118,13 +118,14 @@ impl NearPairs {
         self.turned[..pieces].iter().for_each(|turned| ended.extend_from_slice(&turned.removed));
     }
 
-    /// Pairs that overlap, instead of those there were. For few boxes: they are looked up from the first.
-    pub(crate) fn begin(&mut self, overlapping: Vec<Pair>) {
+    /// The pairs that overlap, which `give` puts in the place of those there were. For few boxes: they are looked up from
+    /// the first.
+    pub(crate) fn begin(&mut self, give: impl FnOnce(&mut Vec<Pair>)) {
         self.clear();
-        self.walked = WALKS * overlapping.len();
-        self.overlapping = overlapping.len();
-        self.states.resize(overlapping.len(), OVERLAP);
-        self.pairs = overlapping;
+        give(&mut self.pairs);
+        self.walked = WALKS * self.pairs.len();
+        self.overlapping = self.pairs.len();
+        self.states.resize(self.pairs.len(), OVERLAP);
     }
 
     /// All pairs that are near, of a search, instead of those there were. Those that overlap are told, and those of them

@@ -270,7 +270,7 @@ impl BroadPhase {
         near.reach.clone_from(boxes);
         changed.iter().for_each(|&id| near.reach[id as usize] = Aabb::NOWHERE);
         near.begin(skin, changed.len());
-        near.list.begin(pairs.give_all());
+        near.list.begin(|list| pairs.give_all(list));
         near.is_on = true;
         self.report.stages.plan += lap(&mut clock);
         let served = self.serve_near(FIRST);
