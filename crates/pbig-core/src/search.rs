@@ -75,7 +75,7 @@ impl<R: Record> Search<R> {
         A: Accept,
     {
         report.boxes = boxes.len() as u64;
-        let summary = LazySummary::new(boxes, None, self.spare.take());
+        let summary = LazySummary::new(boxes, self.spare.take());
         #[cfg(feature = "gpu")]
         let on_gpu = self.find_on_gpu(boxes, &summary, config, rule, report);
         #[cfg(not(feature = "gpu"))]
@@ -101,7 +101,7 @@ impl<R: Record> Search<R> {
         A: Accept,
     {
         let mut clock = Instant::now();
-        let set = Set { boxes, filters: rule.filters, ids: None, summary, before: rule.before };
+        let set = Set { boxes, filters: rule.filters, summary, before: rule.before };
         let result = self.find_on_cpu(&set, config, rule.accept, report);
         self.note_time(false, boxes.len(), lap(&mut clock));
         result

@@ -119,7 +119,7 @@ impl BroadPhase {
         let state = state!(self);
         let filters = Some(&self.filters[..]);
         let rule = Rule { accept: &state, filters, filters_suffice: false, before: &self.before };
-        let summary = LazySummary::new(&self.boxes, None, self.base.spare.take());
+        let summary = LazySummary::new(&self.boxes, self.base.spare.take());
         let invalid = self.report.invalid;
         self.has_base = false;
         let report = &mut self.report;

@@ -57,9 +57,9 @@ struct Scene {
 
 impl Scene {
     fn of(way: Way, boxes: &[Aabb]) -> Self {
-        let summary = LazySummary::new(boxes, None, None);
+        let summary = LazySummary::new(boxes, None);
         let plan = Plan::only(way, summary.get());
-        let set = Set { boxes, filters: None, ids: None, summary: &summary, before: &[] };
+        let set = Set { boxes, filters: None, summary: &summary, before: &[] };
         let (mut map, mut found) = (Map::<Probe>::new(), Found::default());
         let mut took = f32::INFINITY;
         for _ in 0..ROUNDS {

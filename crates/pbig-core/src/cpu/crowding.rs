@@ -15,34 +15,18 @@ pub(crate) struct Set<'a> {
     pub(crate) boxes: &'a [Aabb],
     /// By id, where the caller has filters.
     pub(crate) filters: Option<&'a [ProxyFilter]>,
-    /// Of the boxes that count; all if none are given.
-    pub(crate) ids: Option<&'a [u32]>,
     pub(crate) summary: &'a LazySummary<'a>,
     /// By id: what a box was at the last update, where only changes count.
     pub(crate) before: &'a [Aabb],
 }
 
 impl<'a> Set<'a> {
-    fn len(&self) -> usize {
-        self.ids.map_or(self.boxes.len(), <[u32]>::len)
-    }
-
-    fn id(&self, i: usize) -> u32 {
-        self.ids.map_or(i as u32, |ids| ids[i])
-    }
-
-    /// The ids of the boxes that count.
-    pub(crate) fn ids(&self) -> impl Iterator<Item = u32> + use<'a> {
-        let set = *self;
-        (0..self.len()).map(move |i| set.id(i))
-    }
-
     /// The camps among the boxes, as far as a sample shows them.
     fn camps(&self) -> Camps {
         let Some(filters) = self.filters else { return Camps::default() };
-        let sample = spread_evenly(self.len(), SAMPLE).map(|i| self.id(i) as usize);
+        let sample = spread_evenly(self.boxes.len(), SAMPLE);
         let valid = sample.filter(|&id| self.boxes[id].is_valid());
-        Camps::of(valid.map(|id| &filters[id]), self.len().div_ceil(SAMPLE) as u32)
+        Camps::of(valid.map(|id| &filters[id]), self.boxes.len().div_ceil(SAMPLE) as u32)
     }
 }
 
@@ -77,7 +61,7 @@ impl Kept {
     const LONGEST: u32 = 64;
 
     fn suits(&self, set: &Set<'_>, config: &Config) -> bool {
-        let (planned, boxes) = (u64::from(self.plan.boxes), set.len() as u64);
+        let (planned, boxes) = (u64::from(self.plan.boxes), set.boxes.len() as u64);
         self.builds < Self::LONGEST
             && matches!(self.plan.chosen, Chosen::Grid | Chosen::Brute)
             && self.config == *config
@@ -134,7 +118,7 @@ impl<R: Record> Map<R> {
         if !fits || crowd > CROWDED.min(1.5 * kept.crowd + 1.0) {
             return None;
         }
-        let boxes = set.len() as u32 - self.invalid;
+        let boxes = set.boxes.len() as u32 - self.invalid;
         let plan = Plan { boxes, ..kept.plan.clone() };
         self.kept = Some(Kept { builds: kept.builds + 1, ..kept });
         Some(plan)
@@ -225,9 +209,9 @@ impl<R: Record> Map<R> {
             return self.plan_by_costs(set.summary.get(), config);
         };
         let camps = &self.camps;
-        self.camp_of.extend(set.ids().map(|id| camps.camp(&filters[id as usize])));
+        self.camp_of.extend(filters.iter().map(|filter| camps.camp(filter)));
         let members = |camp: u8| -> Vec<u32> {
-            let of_camp = set.ids().zip(&self.camp_of).filter(|(_, of)| **of == camp);
+            let of_camp = (0..).zip(&self.camp_of).filter(|(_, of)| **of == camp);
             of_camp.map(|(id, _)| id).collect()
         };
         let summary = |camp: usize| Summary::of(set.boxes, Some(&members(camp as u8)));
@@ -298,9 +282,9 @@ mod tests {
     }
 
     fn builds_filtered(map: &mut Map<Item>, boxes: &[Aabb], filters: Option<&[ProxyFilter]>) -> usize {
-        let summary = LazySummary::new(boxes, None, None);
+        let summary = LazySummary::new(boxes, None);
         let before = map.builds;
-        let set = Set { boxes, filters, ids: None, summary: &summary, before: &[] };
+        let set = Set { boxes, filters, summary: &summary, before: &[] };
         map.plan_and_build(&set, &Config::DEFAULT, &mut StageTimes::default());
         map.builds - before
     }

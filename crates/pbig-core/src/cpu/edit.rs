@@ -232,8 +232,8 @@ mod tests {
     }
 
     fn built(boxes: &[Aabb], filters: &[ProxyFilter], config: &Config) -> Map<Tracked> {
-        let summary = LazySummary::new(boxes, None, None);
-        let set = Set { boxes, filters: Some(filters), ids: None, summary: &summary, before: boxes };
+        let summary = LazySummary::new(boxes, None);
+        let set = Set { boxes, filters: Some(filters), summary: &summary, before: boxes };
         let mut map = Map::new();
         map.plan_and_build(&set, config, &mut StageTimes::default());
         map

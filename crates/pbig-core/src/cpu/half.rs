@@ -308,8 +308,8 @@ mod tests {
     fn map_by(boxes: &[Aabb], costs: Costs) -> Map<Item> {
         let config = Config { strategy: Strategy::Grid, costs: Some(costs), ..Config::DEFAULT };
         let mut map = Map::new();
-        let summary = &LazySummary::new(boxes, None, None);
-        let set = Set { boxes, filters: None, ids: None, summary, before: &[] };
+        let summary = &LazySummary::new(boxes, None);
+        let set = Set { boxes, filters: None, summary, before: &[] };
         map.plan_and_build(&set, &config, &mut StageTimes::default());
         map
     }

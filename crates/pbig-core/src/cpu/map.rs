@@ -71,24 +71,24 @@ impl<R: Record> Map<R> {
         }
         self.homes.forget();
         self.classes.set(plan, self.camps.count());
-        let input = Input { boxes: set.boxes, ids: set.ids, before: set.before, camp_of: &self.camp_of };
-        let shift = shift_for(input.len(), plan.levels.iter().map(|level| level.cells));
+        let input = Input { boxes: set.boxes, before: set.before, camp_of: &self.camp_of };
+        let shift = shift_for(input.boxes.len(), plan.levels.iter().map(|level| level.cells));
         self.levels.clear();
         let mut base = 0;
         for level in plan.levels.iter() {
             self.levels.push(Level::new(level, base));
             base += (level.cells.div_ceil(1 << shift)) << shift;
         }
-        let threads = input.len() >= PARALLEL_FROM && rayon::current_num_threads() > 1;
+        let threads = input.boxes.len() >= PARALLEL_FROM && rayon::current_num_threads() > 1;
         let elsewhere = self.sort.place(&input, &self.classes, &self.levels, shift, threads);
         self.invalid = elsewhere.invalid;
         if elsewhere.listed > most_listed {
             return false;
         }
         self.sort.sort(&input, &mut self.levels, threads, &mut self.sorted);
-        let listed = self.sort.keys.iter().enumerate().filter(|(_, key)| **key == LISTED);
+        let listed = (0..).zip(&self.sort.keys).filter(|(_, key)| **key == LISTED);
         // Most sets have none, and need not be asked box by box.
-        let listed = listed.take(elsewhere.listed as usize).map(|(member, _)| input.id(member));
+        let listed = listed.take(elsewhere.listed as usize).map(|(id, _)| id);
         self.list.fill(set.boxes, listed);
         true
     }

@@ -20,23 +20,10 @@ use std::ops::Range;
 #[derive(Clone, Copy)]
 pub(super) struct Input<'a> {
     pub(super) boxes: &'a [Aabb],
-    /// Of the boxes that count; all if none are given.
-    pub(super) ids: Option<&'a [u32]>,
     /// By id: what a box was before, for records that keep it.
     pub(super) before: &'a [Aabb],
-    /// By member; empty without camps.
+    /// By id; empty without camps.
     pub(super) camp_of: &'a [u8],
-}
-
-impl Input<'_> {
-    pub(super) fn len(&self) -> usize {
-        self.ids.map_or(self.boxes.len(), <[u32]>::len)
-    }
-
-    #[inline(always)]
-    pub(super) fn id(&self, member: usize) -> u32 {
-        self.ids.map_or(member as u32, |ids| ids[member])
-    }
 }
 
 /// The sorted boxes. By place: the order of the first pass; by slot: that of the cells.
@@ -96,7 +83,7 @@ impl Elsewhere {
 /// The buffers of the sort.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Sort {
-    /// By member: the key of its cell, [`LISTED`] or [`NOWHERE`].
+    /// By id: the key of its cell, [`LISTED`] or [`NOWHERE`].
     pub(super) keys: Vec<u32>,
     /// By piece and bucket: how many boxes, then where the next one goes.
     cursors: Vec<u32>,
@@ -162,15 +149,15 @@ impl Sort {
     /// Where each box goes, and how many go into each bucket.
     fn count(&mut self, input: &Input<'_>, classes: &Classes, levels: &[Level], threads: bool) -> Elsewhere {
         // Without a level there is nothing to count, but listed boxes are to be told from invalid ones.
-        let (n, buckets, shift) = (input.len(), self.levels.len().max(1), self.shift);
+        let (n, buckets, shift) = (input.boxes.len(), self.levels.len().max(1), self.shift);
         self.keys.resize(n, NOWHERE);
         self.cursors.clear();
         self.cursors.resize(n.div_ceil(PIECE) * buckets, 0);
         let piece = |(piece, (keys, counts)): (usize, (&mut [u32], &mut [u32]))| {
             let mut elsewhere = Elsewhere::default();
-            for (member, key) in (piece * PIECE..).zip(keys) {
-                let aabb = &input.boxes[input.id(member) as usize];
-                let camp = input.camp_of.get(member).copied().unwrap_or(0);
+            for (id, key) in (piece * PIECE..).zip(keys) {
+                let aabb = &input.boxes[id];
+                let camp = input.camp_of.get(id).copied().unwrap_or(0);
                 *key = classes.key(aabb, camp, levels);
                 if *key < LISTED {
                     counts[(*key >> shift) as usize] += 1;
@@ -212,12 +199,11 @@ impl Sort {
         let records = Shared::new(&mut out.records);
         let shift = self.shift;
         let piece = |(piece, (keys, cursors)): (usize, (&[u32], &mut [u32]))| {
-            for (member, &key) in (piece * PIECE..).zip(keys).filter(|(_, key)| **key < LISTED) {
-                let id = input.id(member);
+            for (id, &key) in (piece * PIECE..).zip(keys).filter(|(_, key)| **key < LISTED) {
                 let cursor = &mut cursors[(key >> shift) as usize];
                 let place = *cursor as usize;
                 *cursor += 1;
-                let item = Item::new(input.boxes[id as usize], id, key);
+                let item = Item::new(input.boxes[id], id as u32, key);
                 // SAFETY: each piece has places of its own in each bucket, as many as it counted.
                 unsafe { records.write(place, R::new(item, input.before)) }
             }

@@ -103,19 +103,18 @@ impl Summary {
 /// A summary that is made when somebody asks for it.
 pub(crate) struct LazySummary<'a> {
     boxes: &'a [Aabb],
-    ids: Option<&'a [u32]>,
     made: OnceCell<Summary>,
     spare: Cell<Option<Summary>>,
 }
 
 impl<'a> LazySummary<'a> {
     /// `spare`: one whose memory may be used.
-    pub(crate) fn new(boxes: &'a [Aabb], ids: Option<&'a [u32]>, spare: Option<Summary>) -> Self {
-        Self { boxes, ids, made: OnceCell::new(), spare: Cell::new(spare) }
+    pub(crate) fn new(boxes: &'a [Aabb], spare: Option<Summary>) -> Self {
+        Self { boxes, made: OnceCell::new(), spare: Cell::new(spare) }
     }
 
     pub(crate) fn get(&self) -> &Summary {
-        self.made.get_or_init(|| self.spare.take().unwrap_or_default().refilled(self.boxes, self.ids))
+        self.made.get_or_init(|| self.spare.take().unwrap_or_default().refilled(self.boxes, None))
     }
 
     /// One whose memory may be used for the next.

@@ -287,9 +287,9 @@ impl BroadPhase {
     /// The base of all reaches, which are not searched.
     fn build_reaches(&mut self, skin: f32) {
         self.grow_reaches(skin);
-        let summary = LazySummary::new(&self.near.reach, None, self.base.spare.take());
+        let summary = LazySummary::new(&self.near.reach, self.base.spare.take());
         let (boxes, filters) = (&self.near.reach[..], Some(&self.filters[..]));
-        let set = Set { boxes, filters, ids: None, summary: &summary, before: &[] };
+        let set = Set { boxes, filters, summary: &summary, before: &[] };
         self.base_plan = self.base.map.plan_and_build(&set, &self.config, &mut self.report.stages);
         self.base.spare = summary.into_spare();
         self.has_base = false;
@@ -323,7 +323,7 @@ impl BroadPhase {
         let rule = Rule { accept: &accept, filters: Some(&self.filters), filters_suffice: true, before: &[] };
         let mut config = self.config;
         config.limits.max_pairs = self.most_near();
-        let summary = LazySummary::new(&self.near.reach, None, self.base.spare.take());
+        let summary = LazySummary::new(&self.near.reach, self.base.spare.take());
         let (invalid, report) = (self.report.invalid, &mut self.report);
         let found = self.base.find_without_gpu(&self.near.reach, &summary, &config, &rule, report);
         self.base.spare = summary.into_spare();
