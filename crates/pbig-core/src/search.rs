@@ -85,6 +85,7 @@ impl<R: Record> Search<R> {
             done => done.map(drop),
         };
         self.spare = summary.into_spare();
+        report.plan.measured.gpu = self.share_of_gpu(config);
         found
     }
 
@@ -201,6 +202,15 @@ impl<R: Record> Search<R> {
         let gpu = self.gpu.get_or_insert_with(GpuFinder::shared);
         let found = gpu.changes(request, &mut self.found, report);
         self.settle(found, request.boxes.len(), clock, report)
+    }
+
+    /// What a device takes of the CPU's time, where that decides and both are known.
+    pub(crate) fn share_of_gpu(&self, _config: &Config) -> Option<f32> {
+        #[cfg(feature = "gpu")]
+        if _config.backend == Backend::Auto {
+            return self.trial.share_of_gpu();
+        }
+        None
     }
 
     /// Whether the next search of so many boxes is to be tried on a device.

@@ -148,7 +148,7 @@ fn lists_and_requests(boxes: u32, share: usize) -> (u32, u32) {
             broad_phase.set(id, on, ProxyFilter::ALL).expect("a small id");
         }
         // Whether lists pay is measured: not here.
-        broad_phase.near.pause = 0;
+        broad_phase.near.worth.pause = 0;
         if update % 16 == 0 {
             broad_phase.drop_near();
         }

@@ -7,6 +7,7 @@ mod device;
 mod fat;
 mod flag;
 mod many;
+mod measured;
 mod near;
 mod overlap;
 mod rebuild;
@@ -34,7 +35,7 @@ use overlap::Overlap;
 use std::collections::HashMap;
 use std::time::Instant;
 use turns::Turn;
-use update::Way;
+use update::Route;
 
 /// Changed boxes of a small world from which its stages are timed: a reading of the clock takes as long as one box.
 const MEASURED_FROM: usize = 64;
@@ -305,17 +306,17 @@ impl BroadPhase {
         let is_timed = !is_small || self.changed.len() >= MEASURED_FROM;
         let (clock, mut watch) = (is_timed.then(Instant::now), Watch::new(is_timed));
         let found =
-            if is_small { self.find_in_small(&mut watch).map(|()| Way::Few) } else { self.find_added() };
-        let found = found.and_then(|way| self.check_room(way).map(|()| way));
-        let way = found.inspect_err(|_| self.take_back())?;
+            if is_small { self.find_in_small(&mut watch).map(|()| Route::Few) } else { self.find_added() };
+        let found = found.and_then(|route| self.check_room(route).map(|()| route));
+        let route = found.inspect_err(|_| self.take_back())?;
         if !is_small {
             self.small.pass();
             watch.lap();
         }
         {
             stage!("diff");
-            self.find_removed(way);
-            self.store(way);
+            self.find_removed(route);
+            self.store(route);
             self.report.stages.diff += watch.lap();
         }
         stage!("emit");
@@ -324,11 +325,12 @@ impl BroadPhase {
         if !is_small && self.updates > 1 {
             let (changed, time) = (self.report.changed as usize, self.report.stages.total());
             let present = self.present_count as usize;
-            if !self.near.failed {
-                self.near.note_time(way, changed, present, time);
-                self.rebuild.note(way, changed, present, time);
+            if !self.near.worth.failed {
+                self.near.worth.note_time(route, changed, present, time);
+                self.rebuild.note(route, changed, present, time);
             }
         }
+        self.report_measured();
         self.take_turns(if is_small { Turn::Bitmap } else { Turn::Grid }, clock);
         self.report.pairs = self.pair_count() as u64;
         Ok(())

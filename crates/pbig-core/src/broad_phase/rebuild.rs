@@ -4,7 +4,7 @@
 //! edit costs as much as seven boxes of a search of all; where they jump, as much as twenty. (100,000 boxes of which 15%
 //! change: 6.5 ms by edits and 6.2 anew, or 13 and 6.)
 
-use super::update::Way;
+use super::update::Route;
 use std::time::Duration;
 
 /// Boxes of a search of all in the time of an edit: before both have been measured, at least and at most.
@@ -73,12 +73,12 @@ impl Rebuild {
     }
 
     /// What an update has taken.
-    pub(super) fn note(&mut self, way: Way, changed: usize, present: usize, time: Duration) {
+    pub(super) fn note(&mut self, route: Route, changed: usize, present: usize, time: Duration) {
         let ns = time.as_nanos() as f32;
-        let way = if std::mem::take(&mut self.after_edits) { Way::Few } else { way };
-        match way {
-            Way::All => learn(&mut self.of_box, ns / present.max(1) as f32),
-            Way::Few if changed * SHARE >= present => learn(&mut self.of_edit, ns / changed as f32),
+        let route = if std::mem::take(&mut self.after_edits) { Route::Few } else { route };
+        match route {
+            Route::All => learn(&mut self.of_box, ns / present.max(1) as f32),
+            Route::Few if changed * SHARE >= present => learn(&mut self.of_edit, ns / changed as f32),
             _ => {}
         }
     }
@@ -106,8 +106,8 @@ mod tests {
         let mut rebuild = Rebuild::default();
         assert!(!rebuild.pays(140, 1000) && rebuild.pays(150, 1000), "before anything is known: a seventh");
         for _ in 0..50 {
-            rebuild.note(Way::Few, 100, 1000, us(200));
-            rebuild.note(Way::All, 100, 1000, us(100));
+            rebuild.note(Route::Few, 100, 1000, us(200));
+            rebuild.note(Route::All, 100, 1000, us(100));
         }
         assert!(rebuild.pays(60, 1000) && !rebuild.pays(40, 1000), "an edit costs as much as 20 boxes");
         let tried = (0..10 * SAME).filter(|_| rebuild.pays(60, 1000)).count() as u32;
@@ -118,10 +118,10 @@ mod tests {
     #[test]
     fn few_changes_and_outliers_say_little() {
         let mut rebuild = Rebuild::default();
-        (0..50).for_each(|_| rebuild.note(Way::All, 100, 1000, us(100)));
-        (0..50).for_each(|_| rebuild.note(Way::Few, 100, 1000, us(70)));
-        (0..50).for_each(|_| rebuild.note(Way::Few, 10, 1000, us(70)));
-        rebuild.note(Way::Few, 100, 1000, us(7_000_000));
+        (0..50).for_each(|_| rebuild.note(Route::All, 100, 1000, us(100)));
+        (0..50).for_each(|_| rebuild.note(Route::Few, 100, 1000, us(70)));
+        (0..50).for_each(|_| rebuild.note(Route::Few, 10, 1000, us(70)));
+        rebuild.note(Route::Few, 100, 1000, us(7_000_000));
         assert!(rebuild.ratio() < 9.0, "{}", rebuild.ratio());
     }
 }

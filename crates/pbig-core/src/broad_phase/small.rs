@@ -79,7 +79,7 @@ impl BroadPhase {
         self.may_be_small() && self.small.pause == 0 && self.small.turns.turn == Turn::Bitmap
     }
 
-    fn may_be_small(&self) -> bool {
+    pub(super) fn may_be_small(&self) -> bool {
         let on_cpu = matches!(self.config.backend, Backend::Auto | Backend::Cpu);
         on_cpu && self.config.strategy == Strategy::Auto && self.boxes.len() <= MOST
     }

@@ -70,18 +70,23 @@ fn bitmap_grid_and_near_pairs_take_turns_in_a_small_world_and_tell_the_same() {
     let of =
         |strategy| BroadPhase::new(Config { strategy, margin: 0.01, ..Config::DEFAULT }).expect("a margin");
     let (mut auto, mut grid) = (of(Strategy::Auto), of(Strategy::Grid));
-    let (mut ways, mut events) = (Vec::new(), 0);
+    let (mut ways, mut events, mut told) = (Vec::new(), 0, 0);
     for frame in 0..600 {
         let (way, found) = swing(&mut auto, frame, 400);
         assert_eq!(found, swing(&mut grid, frame, 400).1, "frame {frame}, by {way:?}");
         events += found.added.len() + found.removed.len();
         ways.push(way);
+        let measured = auto.report().plan.measured.grid;
+        assert_eq!(auto.report().plan.to_string().contains("; a grid takes "), measured.is_some());
+        assert_eq!(grid.report().plan.measured.grid, None, "there are no turns");
+        told += u32::from(measured > Some(0.0));
     }
     for way in [Chosen::Bitmap, Chosen::Grid, Chosen::Near] {
         assert!(ways.contains(&way), "never by {way:?}: {ways:?}");
     }
     assert!(ways[..24].iter().all(|way| *way == Chosen::Bitmap) && ways[24] == Chosen::Grid);
     assert!(events > 1000, "{events}");
+    assert!(told > 100, "the report told {told} times");
 }
 
 #[test]
@@ -123,7 +128,7 @@ fn few_that_jump_are_edited_and_many_searched_for_anew_and_the_report_says_what_
     const IDS: u32 = 2000;
     let mut broad_phase =
         BroadPhase::new(Config { strategy: Strategy::Grid, ..Config::DEFAULT }).expect("a margin");
-    assert_eq!(broad_phase.report().plan.edit_cost, None);
+    assert_eq!(broad_phase.report().plan.measured.edit, None);
     let mut ways = vec![];
     for frame in 0..20_u32 {
         let one_in = [40, 2][frame as usize % 2].min(1 + 40 * frame as usize);
@@ -142,5 +147,5 @@ fn few_that_jump_are_edited_and_many_searched_for_anew_and_the_report_says_what_
         (0..20).map(|frame| if frame % 2 == 0 { Chosen::Edit } else { Chosen::Grid }).collect();
     assert_eq!(ways[1..], wanted[1..]);
     let plan = &broad_phase.report().plan;
-    assert!(plan.edit_cost > Some(0.0) && plan.to_string().contains("the edit of a box"), "{plan}");
+    assert!(plan.measured.edit > Some(0.0) && plan.to_string().contains("the edit of a box"), "{plan}");
 }

@@ -2,7 +2,7 @@
 //! they move and how close they are. Both take turns, and the one that took less goes on. (1000 boxes that drift: 55 us an
 //! update by bitmap, 26 by near pairs; a pile of them that jump: 325 and 200. 100 boxes: 5 and 5.)
 
-use super::near::Cost;
+use super::measured::Spent;
 use std::time::Duration;
 
 /// Updates of a turn that decides: a list of near pairs lasts for about ten.
@@ -36,20 +36,16 @@ pub(super) struct Turns {
     age: u32,
     length: u32,
     /// Of its last updates.
-    own: Cost,
+    own: Spent,
     /// What the other took, if the two are to be compared.
-    other: Option<Cost>,
+    other: Option<Spent>,
+    /// What the grid took of the bitmap's time, when both had had a turn.
+    share_of_grid: Option<f32>,
     better: Option<Turn>,
     /// Updates that the better one had.
     stay: u32,
     /// Updates with few changes since the last one with many.
     calm: u32,
-}
-
-impl Cost {
-    fn is_less(self, other: Self) -> bool {
-        self.ns * other.changed < other.ns * self.changed
-    }
 }
 
 impl Default for Turns {
@@ -64,8 +60,9 @@ impl Turns {
             turn,
             age: 0,
             length: TRIAL,
-            own: Cost::default(),
+            own: Spent::default(),
             other: None,
+            share_of_grid: None,
             better: None,
             stay: STAY[0],
             calm: 0,
@@ -110,6 +107,11 @@ impl Turns {
         }
     }
 
+    /// What the grid took of the bitmap's time, once both have had a turn.
+    pub(super) fn share_of_grid(&self) -> Option<f32> {
+        self.share_of_grid
+    }
+
     fn is_timed(&self) -> bool {
         self.age > self.length - TRIAL + UNTIMED
     }
@@ -120,13 +122,16 @@ impl Turns {
                 other: Some(self.own),
                 better: self.better,
                 stay: self.stay,
+                share_of_grid: self.share_of_grid,
                 ..Self::of(self.turn.other())
             };
             return;
         };
+        let share = self.own.share_of(other);
+        let share_of_grid = Some(if self.turn == Turn::Grid { share } else { 1.0 / share });
         let better = if self.own.is_less(other) { self.turn } else { self.turn.other() };
         let stay = if self.better == Some(better) { (2 * self.stay).min(STAY[1]) } else { STAY[0] };
-        *self = Self { better: Some(better), stay, length: stay, ..Self::of(better) };
+        *self = Self { better: Some(better), stay, length: stay, share_of_grid, ..Self::of(better) };
     }
 }
 

@@ -35,7 +35,7 @@ pub(super) use state;
 
 /// Who has found the pairs that came.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Way {
+pub(super) enum Route {
     /// A device, which tells which boxes have lost pairs.
     Gpu,
     /// The list of near pairs: it has also found those that went, and kept those that came.
@@ -57,40 +57,40 @@ const TESTS_OF_A_BOX: u64 = 64;
 
 impl BroadPhase {
     /// Pairs that overlap now and did not, into `events.added`, in no order; and who has found them.
-    pub(super) fn find_added(&mut self) -> Result<Way, Error> {
+    pub(super) fn find_added(&mut self) -> Result<Route, Error> {
         #[cfg(feature = "gpu")]
         let on_gpu = self.find_changes_on_gpu()?;
         #[cfg(not(feature = "gpu"))]
         let on_gpu = self.base.miss_gpu(&self.config, &mut self.report);
-        if on_gpu { Ok(Way::Gpu) } else { self.find_added_on_cpu() }
+        if on_gpu { Ok(Route::Gpu) } else { self.find_added_on_cpu() }
     }
 
-    fn find_added_on_cpu(&mut self) -> Result<Way, Error> {
-        self.near.failed = false;
+    fn find_added_on_cpu(&mut self) -> Result<Route, Error> {
+        self.near.worth.failed = false;
         if self.find_near()? == Served::Yes || self.try_near()? == Served::Yes {
-            return Ok(Way::Near);
+            return Ok(Route::Near);
         }
         self.drop_near();
         self.pairs.drop_removed();
-        let way = self.edit_or_rebuild();
-        self.report.plan.edit_cost = self.rebuild.measured();
-        way
+        let route = self.edit_or_rebuild();
+        self.report.plan.no_near = self.near.none;
+        route
     }
 
-    fn edit_or_rebuild(&mut self) -> Result<Way, Error> {
+    fn edit_or_rebuild(&mut self) -> Result<Route, Error> {
         let present = self.present_count as usize;
         let pays = self.rebuild.pays(self.changed.len(), present);
         if pays || !self.may_edit() || !self.has_base {
             // One that a list has left to be done says nothing of updates without any.
-            self.near.failed |= !pays && self.may_edit();
+            self.near.worth.failed |= !pays && self.may_edit();
             return self.search_all();
         }
         self.edit_base();
         if self.base.map.out_of_order() * 8 >= present || self.strain > self.rebuild_cost() {
             let clock = Instant::now();
-            let way = self.search_all()?;
+            let route = self.search_all()?;
             self.rebuild.followed_edits(present, clock.elapsed());
-            Ok(way)
+            Ok(route)
         } else {
             self.search_changed()
         }
@@ -106,16 +106,16 @@ impl BroadPhase {
     }
 
     /// Near pairs are always few enough.
-    pub(super) fn check_room(&self, way: Way) -> Result<(), Error> {
+    pub(super) fn check_room(&self, route: Route) -> Result<(), Error> {
         let kept = (self.pair_count() + self.events.added.len()) as u64;
-        if way != Way::Near && kept > PairStore::MOST {
+        if route != Route::Near && kept > PairStore::MOST {
             return Err(Error::TooManyPairs { limit: PairStore::MOST });
         }
         Ok(())
     }
 
     /// Builds the base anew from all boxes and searches it.
-    fn search_all(&mut self) -> Result<Way, Error> {
+    fn search_all(&mut self) -> Result<Route, Error> {
         let state = state!(self);
         let filters = Some(&self.filters[..]);
         let rule = Rule { accept: &state, filters, filters_suffice: false, before: &self.before };
@@ -133,7 +133,7 @@ impl BroadPhase {
         (self.base_checks, self.strain) = (self.report.checks.made, 0);
         self.near.met = self.base.found.overlaps;
         self.base.found.chunks.iter().for_each(|chunk| self.events.added.extend_from_slice(chunk));
-        Ok(Way::All)
+        Ok(Route::All)
     }
 
     /// Puts the changed boxes where they are now.
@@ -153,7 +153,7 @@ impl BroadPhase {
     }
 
     /// Searches the base for the changed boxes.
-    fn search_changed(&mut self) -> Result<Way, Error> {
+    fn search_changed(&mut self) -> Result<Route, Error> {
         let mut clock = Instant::now();
         stage!("check");
         let update = Some(self.present_update());
@@ -166,7 +166,7 @@ impl BroadPhase {
         self.note_strain(self.found.checks);
         let (moved, boxes) = (self.base.map.out_of_order() as u32, self.valid_count());
         self.report.plan = Plan { chosen: Chosen::Edit, moved, boxes, ..self.base_plan.clone() };
-        Ok(Way::Few)
+        Ok(Route::Few)
     }
 
     /// Tests beyond what boxes needed when the base was built, twice over: many boxes have come to few cells, or to the
@@ -183,15 +183,15 @@ impl BroadPhase {
     }
 
     /// Kept pairs that no longer hold, into `events.removed`, in no order; they are no longer kept.
-    pub(super) fn find_removed(&mut self, way: Way) {
-        if way == Way::Near {
+    pub(super) fn find_removed(&mut self, route: Route) {
+        if route == Route::Near {
             return;
         }
-        let many = self.many_changed() || (way == Way::All && self.may_edit());
+        let many = self.many_changed() || (route == Route::All && self.may_edit());
         let state = state!(self);
         let removed = &mut self.events.removed;
         #[cfg(feature = "gpu")]
-        if way == Way::Gpu {
+        if route == Route::Gpu {
             let ending = Ending(state);
             return if many {
                 self.pairs.end_many(&ending, removed)
@@ -207,8 +207,8 @@ impl BroadPhase {
     }
 
     /// Keeps the added pairs, and forgets the changes.
-    pub(super) fn store(&mut self, way: Way) {
-        if way != Way::Near {
+    pub(super) fn store(&mut self, route: Route) {
+        if route != Route::Near {
             self.pairs.insert(&self.events.added);
         }
         self.forget_changes();

@@ -52,6 +52,11 @@ impl Trial {
         *side = Some(side.map_or(per_box, |before| 0.75 * before + 0.25 * per_box));
     }
 
+    /// What the GPU takes of the CPU's time, once both are known.
+    pub(crate) fn share_of_gpu(&self) -> Option<f32> {
+        Some((self.gpu? / self.cpu?) as f32)
+    }
+
     /// The device has failed: it must prove itself again.
     pub(crate) fn failed(&mut self) {
         *self = Self { cpu: self.cpu, ..Self::default() };
@@ -77,7 +82,9 @@ mod tests {
     fn the_faster_side_gets_the_calls_and_the_other_is_tried_now_and_then() {
         let mut trial = Trial::default();
         assert_eq!(on_gpu(&mut trial, 100, 9_999, 100, 1), 0, "too few boxes");
+        assert_eq!(trial.share_of_gpu(), None);
         assert!(on_gpu(&mut trial, 1000, 100_000, 100, 10) > 990);
+        assert_eq!(trial.share_of_gpu(), Some(0.1));
         let mut trial = Trial::default();
         assert!(on_gpu(&mut trial, 1000, 100_000, 100, 95) < 12, "not enough better");
         assert!(on_gpu(&mut trial, 10_000, 100_000, 100, 10) > 8000, "noticed when it becomes better");

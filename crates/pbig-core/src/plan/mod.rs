@@ -10,6 +10,7 @@ mod costs;
 mod gpu;
 mod levels;
 mod pbig;
+mod reasons;
 mod summary;
 
 pub(crate) use camps::{Camps, OPEN};
@@ -20,6 +21,7 @@ pub use gpu::GpuPlan;
 use levels::{Choice, Company, Setting};
 pub use levels::{LevelPlan, OccupiedCell};
 pub use pbig::{PbigPlan, density_cell, pbig_cell, pbig_objective};
+pub use reasons::{Measured, NearPlan, NoNear};
 pub(crate) use summary::{LazySummary, size_class_of, spread_evenly};
 pub use summary::{SizeClass, Summary};
 
@@ -86,9 +88,12 @@ pub struct Plan {
     pub gpu: Option<GpuPlan>,
     /// Boxes that came since the grid was built and are out of its order ([`Chosen::Edit`]).
     pub moved: u32,
-    /// How many boxes of a search of all take as long as the edit of one, as measured in updates ([`Chosen::Edit`], and
-    /// where all were searched instead).
-    pub edit_cost: Option<f32>,
+    /// The list of [`Chosen::Near`].
+    pub near: Option<NearPlan>,
+    /// Why there is none, where many boxes change ([`Chosen::Edit`] and [`Chosen::Grid`], in updates).
+    pub no_near: Option<NoNear>,
+    /// What the ways to do it have taken, where that decides.
+    pub measured: Measured,
     /// Valid boxes planned for.
     pub boxes: u32,
     /// What the ways to search them would take, as far as they were compared.
@@ -140,7 +145,8 @@ impl Plan {
     pub(crate) fn begin(&mut self, boxes: u32) {
         if self.levels.is_empty() {
             (self.chosen, self.swept, self.pbig, self.moved) = (Chosen::Nothing, 0, None, 0);
-            (self.forecast, self.expected, self.edit_cost) = Default::default();
+            (self.forecast, self.expected) = Default::default();
+            (self.near, self.no_near, self.measured) = Default::default();
             #[cfg(feature = "gpu")]
             {
                 self.gpu = None;
@@ -235,10 +241,13 @@ impl fmt::Display for Plan {
         if self.forecast != Forecast::default() && !matches!(self.chosen, Chosen::Edit | Chosen::Near) {
             write!(f, "; expected: {}", self.forecast)?;
         }
-        if let Some(boxes) = self.edit_cost {
-            write!(f, "; the edit of a box takes as long as {boxes:.0} of a search of all")?;
+        if let Some(near) = self.near {
+            write!(f, "; {near}")?;
         }
-        Ok(())
+        if let Some(why) = self.no_near {
+            write!(f, "; no near pairs: {why}")?;
+        }
+        write!(f, "{}", self.measured)
     }
 }
 

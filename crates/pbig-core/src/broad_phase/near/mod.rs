@@ -7,24 +7,28 @@
 //! there are none, and the next attempts come ever later. Where few boxes move, always the same ones, only they get a skin, as
 //! they first move: a search of all would be for those that stay.
 
+mod making;
 mod policy;
+mod skin;
 #[cfg(test)]
 mod tests;
+mod worth;
 
-pub(super) use policy::{Cost, Near};
+use policy::Movers;
+use skin::Skin;
+use worth::Worth;
 
 use super::update::{State, state};
 use super::{BroadPhase, flag};
 use crate::cpu::codes::prefetch;
-use crate::cpu::crowding::Set;
 use crate::cpu::edit::Changed;
 use crate::cpu::find::Others;
 use crate::cpu::judge::Accept;
-use crate::diff::{Judgement, PairStore};
-use crate::plan::{Chosen, LazySummary, Plan};
+use crate::diff::Judgement;
+use crate::near::NearPairs;
+use crate::plan::{Chosen, NearPlan, NoNear, Plan};
 use crate::report::{Checks, lap, stage};
-use crate::search::Rule;
-use crate::{Aabb, Error, Pair, ProxyFilter, shared_from};
+use crate::{Aabb, Error, Pair, shared_from};
 use rayon::prelude::*;
 use std::time::Instant;
 
@@ -52,13 +56,55 @@ pub(super) enum Served {
     No,
 }
 
+/// Near pairs, and whether they are any good here.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Near {
+    /// Whether the list has the pairs that exist.
+    pub(super) is_on: bool,
+    pub(super) list: NearPairs,
+    /// By id: the reach; nowhere for a box that has none.
+    reach: Vec<Aabb>,
+    pub(super) skin: Skin,
+    pub(super) worth: Worth,
+    pub(super) movers: Movers,
+    /// Updates since the list was made.
+    pub(super) age: u32,
+    /// Pairs that the last search of all has met, whether filters allow them or not.
+    pub(super) met: u64,
+    /// Why there is no list, where many boxes change.
+    pub(super) none: Option<NoNear>,
+    /// Boxes that have left their reach in this update.
+    away: Vec<u32>,
+    /// The same, of each piece of an update on several threads.
+    pieces: Vec<Vec<u32>>,
+    /// Pairs of those, which may go on.
+    parted: Vec<Pair>,
+    /// Their pairs now.
+    came: Vec<Pair>,
+}
+
+impl Near {
+    /// A list that is made now, where so many boxes move.
+    fn begin(&mut self, width: f32, movers: usize) {
+        self.age = 0;
+        self.skin.begin(width, movers);
+        self.worth.begin();
+    }
+
+    /// What was learned is too old.
+    pub(super) fn begin_anew(&mut self) {
+        self.met = 0;
+        self.worth = Worth::default();
+    }
+}
+
 impl BroadPhase {
     /// Pairs that came and went, into `events`, and keeps them; if near pairs are there, and still good.
     pub(super) fn find_near(&mut self) -> Result<Served, Error> {
         if !self.near.is_on {
             return Ok(Served::No);
         }
-        if !self.near.goes_on() {
+        if !self.near.worth.goes_on(self.near.age) {
             self.end_near();
             return Ok(Served::No);
         }
@@ -68,9 +114,9 @@ impl BroadPhase {
     /// Where few change, a search of all follows that would not have been without the list.
     fn end_near(&mut self) {
         if !self.many_changed() {
-            self.near.own.ns += self.rebuild.search_of(self.present_count as usize);
+            self.near.worth.own.ns += self.rebuild.search_of(self.present_count as usize);
         }
-        self.near.end();
+        self.near.worth.end(self.near.age);
     }
 
     /// As long as no more than one box in `leaving` has left its reach.
@@ -85,7 +131,8 @@ impl BroadPhase {
         };
         self.forget_away();
         if !served {
-            self.near.learn(self.present_count);
+            let apart = self.near.list.len().saturating_sub(self.near.list.overlapping());
+            self.near.skin.learn(self.present_count, self.near.age, apart);
             self.end_near();
             return Ok(Served::No);
         }
@@ -161,7 +208,7 @@ impl BroadPhase {
         stage!("map");
         let Self { near, boxes, base, others, filters, .. } = self;
         for &id in &near.away {
-            near.reach[id as usize] = boxes[id as usize].inflated(near.skin);
+            near.reach[id as usize] = boxes[id as usize].inflated(near.skin.width);
         }
         base.map.arrange(&mut near.away, boxes.len());
         let changed =
@@ -212,7 +259,12 @@ impl BroadPhase {
         let [made, needed] = self.near.list.take_tests();
         self.report.checks = Checks { made, unnecessary: made - needed, redundant: 0 };
         let (moved, boxes) = (self.base.map.out_of_order() as u32, self.valid_count());
-        self.report.plan = Plan { chosen: Chosen::Near, moved, boxes, ..self.base_plan.clone() };
+        let near = Some(NearPlan {
+            skin: self.near.skin.width,
+            pairs: self.near.list.len() as u64,
+            age: self.near.age,
+        });
+        self.report.plan = Plan { chosen: Chosen::Near, moved, boxes, near, ..self.base_plan.clone() };
         // A device that is compared with the CPU is compared with this.
         if self.many_changed() {
             let time = self.report.stages.total();
@@ -233,123 +285,9 @@ impl BroadPhase {
         self.events.removed.clear();
         Err(Error::TooManyPairs { limit })
     }
-
-    /// Builds the base anew, of reaches, and keeps what overlaps of the pairs that are near; no, when these are too many.
-    fn search_near(&mut self, skin: f32) -> Result<Served, Error> {
-        let mut clock = Instant::now();
-        self.grow_reaches(skin);
-        self.near.begin(skin, self.present_count as usize);
-        self.report.stages.map += lap(&mut clock);
-        if self.find_reaches().is_err() {
-            self.near.fail();
-            return Ok(Served::No);
-        }
-        stage!("diff");
-        let mut clock = Instant::now();
-        self.end_before_list();
-        let (before, added) = (Before(state!(self)), &mut self.events.added);
-        let (found, boxes, counts) = (&mut self.base.found.chunks, &self.boxes, &mut self.pairs);
-        // What is counted is what the list has, whatever pairs a restored snapshot said there were.
-        counts.count_none();
-        self.near.list.fill(found, boxes, &before, |overlapping| counts.count_added(overlapping), added);
-        self.near.is_on = true;
-        _ = self.near.list.take_tests();
-        self.report.stages.diff += lap(&mut clock);
-        self.check_near_limit()
-    }
-
-    /// A list that begins with the pairs that exist: each box gets a reach, and what is near it, when it first moves. For a
-    /// world in which few boxes do, and the same ones: the base is built anew, but most of a search of all would be for those
-    /// that stay.
-    fn begin_near(&mut self, skin: f32) -> Result<Served, Error> {
-        self.drop_near();
-        self.build_reaches(skin);
-        let mut clock = Instant::now();
-        let Self { near, boxes, changed, pairs, .. } = self;
-        // In the base those that stay have a skin, too, for whatever its cells hold; here it is for what has been searched.
-        near.reach.clone_from(boxes);
-        changed.iter().for_each(|&id| near.reach[id as usize] = Aabb::NOWHERE);
-        near.begin(skin, changed.len());
-        near.list.begin(|list| pairs.give_all(list));
-        near.is_on = true;
-        self.report.stages.plan += lap(&mut clock);
-        let served = self.serve_near(FIRST);
-        self.near.failed = served == Ok(Served::No);
-        served
-    }
-
-    fn grow_reaches(&mut self, skin: f32) {
-        let Self { near, boxes, .. } = self;
-        near.reach.clear();
-        near.reach.extend(boxes.iter().map(|aabb| aabb.inflated(skin)));
-    }
-
-    /// The base of all reaches, which are not searched.
-    fn build_reaches(&mut self, skin: f32) {
-        self.grow_reaches(skin);
-        let summary = LazySummary::new(&self.near.reach, self.base.spare.take());
-        let (boxes, filters) = (&self.near.reach[..], Some(&self.filters[..]));
-        let set = Set { boxes, filters, summary: &summary, before: &[] };
-        self.base_plan = self.base.map.plan_and_build(&set, &self.config, &mut self.report.stages);
-        self.base.spare = summary.into_spare();
-        self.has_base = false;
-    }
-
-    /// Pairs that have ended, wherever they are kept, before a new list has the others.
-    fn end_before_list(&mut self) {
-        let (state, removed) = (state!(self), &mut self.events.removed);
-        if self.near.is_on {
-            self.near.list.find_ended(&Staying(state, &self.pairs), removed);
-            removed.retain(|pair| self.pairs.is_there(*pair));
-            self.pairs.forget_removed();
-        } else {
-            self.pairs.drop_removed();
-            self.pairs.end_many(&state, removed);
-            self.pairs.hand_over();
-        }
-    }
-
-    /// Does without the list, if there is one.
-    pub(super) fn drop_near(&mut self) {
-        if std::mem::take(&mut self.near.is_on) {
-            self.pairs.take_over(self.near.list.iter(), self.near.list.overlapping());
-            self.near.list.clear();
-        }
-    }
-
-    /// Pairs of reaches, into the base.
-    fn find_reaches(&mut self) -> Result<(), Error> {
-        let accept = Allowed(&self.filters);
-        let rule = Rule { accept: &accept, filters: Some(&self.filters), filters_suffice: true, before: &[] };
-        let mut config = self.config;
-        config.limits.max_pairs = self.most_near();
-        let summary = LazySummary::new(&self.near.reach, self.base.spare.take());
-        let (invalid, report) = (self.report.invalid, &mut self.report);
-        let found = self.base.find_without_gpu(&self.near.reach, &summary, &config, &rule, report);
-        self.base.spare = summary.into_spare();
-        self.report.invalid = invalid;
-        self.has_base = false;
-        self.base_plan = self.report.plan.clone();
-        found
-    }
 }
 
-/// Whether filters let two boxes pair.
-struct Allowed<'a>(&'a [ProxyFilter]);
-
-impl Accept for Allowed<'_> {
-    #[inline(always)]
-    fn prepare(&self, ids: [u32; 2]) {
-        ids.into_iter().for_each(|id| prefetch(&self.0[id as usize]));
-    }
-
-    #[inline]
-    fn pair(&self, pair: Pair) -> bool {
-        self.0[pair.a as usize].allows(&self.0[pair.b as usize])
-    }
-}
-
-/// The same of two boxes of which the first is away. Of two that are, it is asked from both sides.
+/// Whether filters let two boxes pair of which the first is away. Of two that are, it is asked from both sides.
 struct NearAway<'a>(State<'a>);
 
 impl Accept for NearAway<'_> {
@@ -360,20 +298,6 @@ impl Accept for NearAway<'_> {
 
     fn pair(&self, pair: Pair) -> bool {
         self.0.filters_allow(pair.a, pair.b)
-    }
-}
-
-/// Pairs that hold, of boxes that were not removed: one set again since is another box.
-struct Staying<'a>(State<'a>, &'a PairStore);
-
-impl Judgement for Staying<'_> {
-    #[inline(always)]
-    fn prepare(&self, pair: Pair) {
-        Judgement::prepare(&self.0, pair);
-    }
-
-    fn holds(&self, pair: Pair) -> bool {
-        self.0.holds(pair) && self.1.is_there(pair)
     }
 }
 

@@ -1,7 +1,9 @@
 //! Lists in worlds in which few boxes move.
 
 use super::{BOXES, World};
-use crate::broad_phase::near::policy::{Cost, Movers, Near};
+use crate::broad_phase::measured::Spent;
+use crate::broad_phase::near::policy::Movers;
+use crate::broad_phase::near::worth::Worth;
 use crate::broad_phase::{Events, flag};
 use crate::{Aabb, Error, Limits, Pair, ProxyFilter};
 use std::collections::BTreeSet;
@@ -128,18 +130,19 @@ fn too_many_new_pairs_in_the_update_that_begins_a_list_leave_all_as_it_was() {
 #[test]
 fn a_list_that_costs_more_than_none_is_given_up() {
     let list = |age, ns| {
-        let price = Some(Cost { ns: 5000.0, changed: 2.0 });
-        Near { age, usual: Some(100.0), own: Cost { ns, changed: 12.0 }, price, ..Near::default() }
+        let price = Some(Spent { ns: 5000.0, changed: 2.0 });
+        let own = Spent { ns, changed: 12.0 };
+        Worth { usual: Some(100.0), own, price, ..Worth::default() }.goes_on(age)
     };
-    assert!(list(32, 5850.0).goes_on(), "85 a box");
-    assert!(!list(32, 5950.0).goes_on() && !list(64, 5950.0).goes_on(), "95, beside its price");
-    assert!(list(31, 1e9).goes_on() && list(16, 1e9).goes_on(), "not asked");
+    assert!(list(32, 5850.0), "85 a box");
+    assert!(!list(32, 5950.0) && !list(64, 5950.0), "95, beside its price");
+    assert!(list(31, 1e9) && list(16, 1e9), "not asked");
 
     let mut world = World::with_few_movers(0.0);
     let mut lasted = 0;
     while world.broad_phase.near.is_on {
         world.tremble_few(0.01);
-        world.broad_phase.near.usual = Some(0.0);
+        world.broad_phase.near.worth.usual = Some(0.0);
         world.broad_phase.update().expect("within the limits");
         lasted += 1;
     }

@@ -2,7 +2,9 @@
 
 mod few;
 
-use super::policy::{Cost, Near};
+use super::skin::Skin;
+use super::worth::Worth;
+use crate::broad_phase::measured::Spent;
 use crate::broad_phase::{BroadPhase, Events};
 use crate::plan::Chosen;
 use crate::{Aabb, Config, Error, Limits, Pair, ProxyFilter, Strategy, oracle};
@@ -81,7 +83,7 @@ impl World {
 
     fn update(&mut self, what: &str) {
         // How long anything takes decides nothing here.
-        self.broad_phase.near.usual = Some(f32::MAX);
+        self.broad_phase.near.worth.usual = Some(f32::MAX);
         let events = self.broad_phase.update().expect("within the limits").clone();
         for pair in &events.removed {
             assert!(self.pairs.remove(pair), "{what}: {pair:?} is removed and was not there");
@@ -227,24 +229,20 @@ fn no_list_is_tried_where_filters_turn_down_most_of_what_would_be_near() {
 }
 
 #[test]
-fn what_lists_cost_decides_about_skins_and_pauses() {
-    let mut near = Near { age: 10, usual: Some(100.0), ..Near::default() };
-    let before = near.moves;
-    near.learn(100_000);
-    assert!(near.moves > before, "searches cost, tests nothing");
-    near.own = Cost { ns: 50.0, changed: 1.0 };
-    near.end();
-    assert_eq!(near.pause, 0, "half as much");
-    near.own = Cost { ns: 95.0, changed: 1.0 };
+fn what_lists_cost_decides_about_pauses() {
+    let spent = |ns| Spent { ns, changed: 1.0 };
+    let mut worth = Worth { usual: Some(100.0), own: spent(50.0), ..Worth::default() };
+    worth.end(10);
+    assert_eq!((worth.pause, worth.share()), (0, Some(0.5)), "half as much");
+    worth.own = spent(95.0);
     let pauses = [0; 9].map(|_| {
-        near.end();
-        near.pause
+        worth.end(10);
+        worth.pause
     });
     assert_eq!(pauses, [1, 3, 7, 15, 31, 63, 64, 64, 64]);
-    near.age = 1;
-    near.own = Cost { ns: 1.0, changed: 1.0 };
-    near.end();
-    assert_eq!(near.pause, 64, "cheap, but it has not lasted");
+    worth.own = spent(1.0);
+    worth.end(1);
+    assert_eq!(worth.pause, 64, "cheap, but it has not lasted");
 }
 
 #[test]
@@ -259,13 +257,21 @@ fn the_skin_of_what_swings_shrinks_to_what_it_needs() {
             checks.push(world.broad_phase.report().checks.made);
         }
     }
+    let (plan, near) = (&world.broad_phase.report().plan, &world.broad_phase.near);
+    let told = plan.near.expect("a list");
+    assert_eq!((told.skin, told.pairs, told.age), (near.skin.width, near.list.len() as u64, near.age));
+    let text = plan.to_string();
+    assert!(
+        text.contains(&format!("with a skin of {}", told.skin)) && text.contains("near pairs take 0."),
+        "{text}"
+    );
     assert!(checks.len() > 30 && 4 * checks[checks.len() - 1] < 3 * checks[0], "{checks:?}");
 }
 
 #[test]
 fn boxes_that_jump_far_are_seldom_tried_with_a_list() {
     let mut world = World::new(0.0);
-    let mut updates = 0;
+    let (mut updates, mut whys) = (0, BTreeSet::new());
     for round in 0..100u32 {
         (0..BOXES).for_each(|id| {
             world.boxes[id as usize] = Aabb::from_center(world.vector().map(|x| 7.0 * x), [0.5; 3]);
@@ -273,8 +279,13 @@ fn boxes_that_jump_far_are_seldom_tried_with_a_list() {
         });
         world.update(&format!("round {round}"));
         updates += u32::from(world.broad_phase.near.is_on);
+        let plan = &world.broad_phase.report().plan;
+        let why = plan.no_near.map_or(String::new(), |why| format!("; no near pairs: {why}"));
+        assert!(plan.near.is_some() || !why.is_empty() && plan.to_string().contains(&why), "{plan}");
+        whys.insert(why.split([',', ':']).take(2).collect::<String>());
     }
     assert!(updates <= 8, "{updates} lists");
+    assert!(whys.len() >= 2, "too far, and a pause: {whys:?}");
 }
 
 #[test]
@@ -304,7 +315,7 @@ fn a_list_that_has_not_paid_is_followed_by_ever_longer_pauses() {
     let (mut lists, mut was_on) = (0, false);
     for round in 0..200u32 {
         world.tremble(0.05);
-        world.broad_phase.near.usual = Some(0.0);
+        world.broad_phase.near.worth.usual = Some(0.0);
         world.broad_phase.update().expect("within the limits");
         let is_on = world.broad_phase.near.is_on;
         lists += u32::from(is_on && !was_on);
@@ -319,12 +330,16 @@ fn a_list_that_has_not_paid_is_followed_by_ever_longer_pauses() {
 
 #[test]
 fn a_skin_grows_while_few_pairs_are_near_and_no_wider_than_that() {
-    let mut near = Near { age: 10, ..Near::default() };
-    let mut widths = vec![near.moves];
+    let mut skin = Skin::default();
+    let mut widths = vec![skin.moves];
     for _ in 0..20 {
-        near.learn(1000);
-        widths.push(near.moves);
+        skin.learn(1000, 10, 0);
+        widths.push(skin.moves);
     }
     assert!(widths.is_sorted() && widths[..8].windows(2).all(|two| two[0] < two[1]), "{widths:?}");
     assert_eq!(widths.last(), Some(&64.0));
+    skin.learn(1000, 10, 2400);
+    assert_eq!(skin.moves, 64.0, "tests cost as much as searches");
+    skin.learn(1000, 10, 4000);
+    assert!(skin.moves < 64.0, "tests cost more");
 }

@@ -1,0 +1,41 @@
+//! What updates have taken, and the report of what that decides.
+
+use super::BroadPhase;
+use crate::plan::{Chosen, Measured, NoNear};
+
+impl BroadPhase {
+    /// What has decided about an update that is done.
+    pub(super) fn report_measured(&mut self) {
+        let plan = &self.report.plan;
+        let has_list = plan.near.is_some() || matches!(plan.no_near, Some(NoNear::Pause(_)));
+        let is_searched = matches!(plan.chosen, Chosen::Edit | Chosen::Grid);
+        self.report.plan.measured = Measured {
+            edit: self.rebuild.measured().filter(|_| is_searched && plan.near.is_none()),
+            near: self.near.worth.share().filter(|_| has_list),
+            grid: self.small.turns.share_of_grid().filter(|_| self.may_be_small()),
+            gpu: self.base.share_of_gpu(&self.config),
+        };
+    }
+}
+
+/// The time of some updates, and the boxes that have changed in them.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Spent {
+    pub(super) ns: f32,
+    pub(super) changed: f32,
+}
+
+impl Spent {
+    pub(super) fn add(&mut self, ns: f32, changed: f32) {
+        *self = Self { ns: self.ns + ns, changed: self.changed + changed };
+    }
+
+    /// By changed box, what this took of what another took.
+    pub(super) fn share_of(self, other: Self) -> f32 {
+        self.ns * other.changed / (other.ns * self.changed)
+    }
+
+    pub(super) fn is_less(self, other: Self) -> bool {
+        self.ns * other.changed < other.ns * self.changed
+    }
+}

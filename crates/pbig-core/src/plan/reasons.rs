@@ -1,0 +1,80 @@
+//! Why an update went its way, where what earlier ones have taken decides.
+
+use std::fmt;
+
+/// The list that [`crate::plan::Chosen::Near`] tests.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct NearPlan {
+    /// How far a box may go from where it was when the list was made, in the unit of the boxes.
+    pub skin: f32,
+    /// Pairs that are near each other, whether they overlap or not.
+    pub pairs: u64,
+    /// Updates that have used it.
+    pub age: u32,
+}
+
+/// Why there is no list of near pairs, where so many boxes change that there might be one.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum NoNear {
+    /// It is not known yet what updates cost without one.
+    Unmeasured,
+    /// The last ones did not pay: the next is made after so many updates more.
+    Pause(u32),
+    /// Boxes move so far that too many pairs would be near.
+    Far,
+    /// Most of the boxes that have changed were not there before, or nothing is known of how far they move.
+    New,
+}
+
+/// What the ways to do an update have taken here, as far as that has been measured and decides.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Measured {
+    /// How many boxes of a search of all take as long as the edit of one.
+    pub edit: Option<f32>,
+    /// By changed box: what updates with the last list of near pairs took, of what those without do.
+    pub near: Option<f32>,
+    /// Of up to 1024 boxes of which many change: what the grid takes, of what the bitmap does.
+    pub grid: Option<f32>,
+    /// What a device takes, of what the CPU does.
+    pub gpu: Option<f32>,
+}
+
+/// `1200 pairs in a list that 5 updates have used, with a skin of 0.1`.
+impl fmt::Display for NearPlan {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { skin, pairs, age } = self;
+        write!(f, "{pairs} pairs in a list that {age} updates have used, with a skin of {skin}")
+    }
+}
+
+impl fmt::Display for NoNear {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Unmeasured => write!(f, "what updates take without them is measured first"),
+            Self::Pause(0) => write!(f, "the last ones did not pay, the next update may try again"),
+            Self::Pause(updates) => write!(f, "the last ones did not pay, {updates} updates more go without"),
+            Self::Far => write!(f, "boxes move so far that too many would be near"),
+            Self::New => write!(f, "how far most boxes move is not known"),
+        }
+    }
+}
+
+/// Each as `; …`: what is not known is left out.
+impl fmt::Display for Measured {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if let Some(boxes) = self.edit {
+            write!(f, "; the edit of a box takes as long as {boxes:.0} of a search of all")?;
+        }
+        let times = [
+            (self.near, "near pairs take", "an update without"),
+            (self.grid, "a grid takes", "the bitmap's time"),
+            (self.gpu, "the GPU takes", "the CPU's time"),
+        ];
+        for (share, what, of) in times {
+            if let Some(share) = share {
+                write!(f, "; {what} {share:.2} of {of}")?;
+            }
+        }
+        Ok(())
+    }
+}
