@@ -115,7 +115,10 @@ impl Judgement for Ending<'_> {
 
 #[cfg(test)]
 mod tests {
-    use crate::{Aabb, Backend, BroadPhase, Config, Error, GpuFinder, Limits, Pair, ProxyFilter};
+    use crate::{Aabb, Backend, BroadPhase, Config, Error, GpuFinder, Limits, Pair, ProxyFilter, oracle};
+    use rand::rngs::StdRng;
+    use rand::{RngExt, SeedableRng};
+    use std::collections::BTreeSet;
     use std::ops::Range;
 
     /// Boxes 2i and 2i + 1 of some couples, which overlap when they are close. Between the two the latter goes half its
@@ -150,5 +153,44 @@ mod tests {
         put(&mut broad_phase, 20..21, true);
         assert_eq!(broad_phase.update().map(|events| events.added.clone()), Ok(vec![Pair::new(40, 41)]));
         assert!(broad_phase.report().gpu.is_some());
+    }
+
+    /// Whoever does an update, in one or in two halves, and however many before it have ended with an error: events lead from
+    /// the pairs of the last one that has not to those that there are.
+    #[test]
+    fn devices_and_the_cpu_take_turns_and_updates_fail_in_between() {
+        let config = Config { backend: Backend::Gpu, margin: 0.05, ..Config::DEFAULT };
+        let gpu = GpuFinder::new().expect("an adapter, of which a software one will do");
+        let mut broad_phase = BroadPhase::with_gpu(config, gpu).expect("a margin that is one");
+        let (mut random, mut pairs) = (StdRng::seed_from_u64(17), BTreeSet::new());
+        // Updates on the device and on the CPU, and of either those that failed.
+        let mut seen = [[0; 2]; 2];
+        for round in 0..150 {
+            broad_phase.config.backend = [Backend::Gpu, Backend::Cpu][random.random_range(0..2)];
+            broad_phase.config.limits.max_pairs = [40, u64::MAX][random.random_range(0..2)];
+            for _ in 0..random.random_range(0..90) {
+                let center = [0.0; 3].map(|_: f32| random.random_range(0.0..10.0));
+                let aabb = Aabb::from_center(center, [0.4; 3]);
+                let filter = ProxyFilter { memberships: random.random_range(1..3), ..ProxyFilter::ALL };
+                broad_phase.set(random.random_range(0..400), aabb, filter).expect("room for it");
+            }
+            if random.random() {
+                broad_phase.begin();
+            }
+            let result = broad_phase.update().cloned();
+            let on_gpu = broad_phase.report().gpu.is_some();
+            seen[usize::from(on_gpu)][usize::from(result.is_err())] += 1;
+            if let Ok(events) = result {
+                assert!(events.removed.iter().all(|pair| pairs.remove(pair)), "round {round}: was not there");
+                assert!(events.added.iter().all(|pair| pairs.insert(*pair)), "round {round}: was there");
+                let wanted = oracle::pairs(&broad_phase.boxes);
+                let allowed = |pair: &Pair| {
+                    let [a, b] = [pair.a, pair.b].map(|id| &broad_phase.filters[id as usize]);
+                    a.allows(b)
+                };
+                assert!(wanted.into_iter().filter(allowed).eq(pairs.iter().copied()), "round {round}");
+            }
+        }
+        assert!(seen.iter().flatten().all(|updates| *updates > 10), "{seen:?}");
     }
 }
