@@ -1,7 +1,5 @@
 //! A search from nothing by whatever strategy the plan chooses, on whatever backend there is.
 
-#[cfg(feature = "gpu")]
-use crate::Pair;
 use crate::cpu::crowding::Set;
 use crate::cpu::find::Found;
 use crate::cpu::judge::Accept;
@@ -12,7 +10,7 @@ use crate::cpu::record::Record;
 use crate::gpu::{self, ChangeRequest, GpuFinder};
 use crate::plan::{Costs, LazySummary, Plan, Summary};
 use crate::report::{Checks, Report, lap, stage};
-use crate::{Aabb, Backend, Config, Error, ProxyFilter, Strategy};
+use crate::{Aabb, Backend, Config, Error, Pair, ProxyFilter, Strategy};
 use std::time::{Duration, Instant};
 
 /// Which pairs are wanted, besides that they overlap.
@@ -101,15 +99,32 @@ impl<R: Record> Search<R> {
     where
         A: Accept,
     {
+        self.find_into(None, boxes, summary, config, rule, report)
+    }
+
+    /// The same, into one buffer instead of `found` if there is one, by grids, in no particular order.
+    pub(crate) fn find_into<A>(
+        &mut self,
+        all: Option<&mut Vec<Pair>>,
+        boxes: &[Aabb],
+        summary: &LazySummary<'_>,
+        config: &Config,
+        rule: &Rule<'_, A>,
+        report: &mut Report,
+    ) -> Result<(), Error>
+    where
+        A: Accept,
+    {
         let mut clock = Instant::now();
         let set = Set { boxes, filters: rule.filters, summary, before: rule.before };
-        let result = self.find_on_cpu(&set, config, rule.accept, report);
+        let result = self.find_on_cpu(all, &set, config, rule.accept, report);
         self.note_time(false, boxes.len(), lap(&mut clock));
         result
     }
 
     fn find_on_cpu<A>(
         &mut self,
+        all: Option<&mut Vec<Pair>>,
         set: &Set<'_>,
         config: &Config,
         accept: &A,
@@ -127,7 +142,11 @@ impl<R: Record> Search<R> {
         report.plan = self.map.plan_and_build(set, config, &mut report.stages);
         report.invalid = u64::from(self.map.invalid);
         let mut clock = Instant::now();
-        self.map.find(accept, config.limits.max_pairs, &mut self.found)?;
+        let limit = config.limits.max_pairs;
+        match all {
+            Some(all) => self.map.find_all(accept, limit, &mut self.found, all)?,
+            None => self.map.find(accept, limit, &mut self.found)?,
+        }
         report.stages.check += lap(&mut clock);
         report.checks = single_entry_checks(&self.found);
         self.learn(report);

@@ -122,8 +122,9 @@ impl BroadPhase {
         let summary = LazySummary::new(&self.boxes, self.base.spare.take());
         let invalid = self.report.invalid;
         self.has_base = false;
-        let report = &mut self.report;
-        let found = self.base.find_without_gpu(&self.boxes, &summary, &self.config, &rule, report);
+        let (boxes, config) = (&self.boxes, &self.config);
+        let added = Some(&mut self.events.added);
+        let found = self.base.find_into(added, boxes, &summary, config, &rule, &mut self.report);
         self.base.spare = summary.into_spare();
         found?;
         self.report.invalid = invalid;
@@ -132,6 +133,7 @@ impl BroadPhase {
         self.base_plan = self.report.plan.clone();
         (self.base_checks, self.strain) = (self.report.checks.made, 0);
         self.near.met = self.base.found.overlaps;
+        // One by PBIG's grid.
         self.base.found.chunks.iter().for_each(|chunk| self.events.added.extend_from_slice(chunk));
         Ok(Route::All)
     }

@@ -21,6 +21,7 @@ use crate::{Error, Pair, ProxyFilter, shared_from};
 use rayon::prelude::*;
 use std::cell::RefCell;
 use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Mutex, PoisonError};
 
 /// Boxes in one piece of work: enough to hide the cost of handing it out (a few us against 50),
 /// few enough to balance; fixed, so that the bytes of the result do not depend on the threads.
@@ -44,6 +45,8 @@ const CHECK: u64 = 1;
 thread_local! {
     /// Buffers of a search, one for each thread that takes part.
     static SCRATCH: RefCell<(Scratch, Rests, Rows, Vec<u32>)> = RefCell::default();
+    /// What a chunk has found, before it is put to the others.
+    static OUT: RefCell<Vec<Pair>> = const { RefCell::new(Vec::new()) };
 }
 
 /// Pairs as found, a buffer for each chunk, kept from call to call.
@@ -92,18 +95,58 @@ impl<R: Record> Map<R> {
     {
         stage!("check");
         let room = Room::new(max_pairs);
-        let in_list = (self.list.len() as u64).pow(2) / 2;
-        let expected = ENTRY * self.len_in_grids() as u64 + CHECK * found.checks.max(in_list);
-        let chunks = self.chunks();
-        let buffers = found.buffers(chunks);
+        let is_shared = self.is_shared(found);
+        let buffers = found.buffers(self.chunks());
         let work = |(chunk, out): (usize, &mut Vec<Pair>)| self.check_chunk(chunk, accept, out, &room);
-        let counts = if expected >= PARALLEL_FROM && rayon::current_num_threads() > 1 {
+        let counts = if is_shared {
             buffers.par_iter_mut().enumerate().map(work).reduce(|| (0, 0), add)
         } else {
             buffers.iter_mut().enumerate().map(work).fold((0, 0), add)
         };
         (found.checks, found.overlaps) = counts;
-        room.settle(found)
+        room.settle(found.len())
+    }
+
+    /// The same into `all`, chunk by chunk in no particular order, and nothing but counts into `found`: for so many pairs
+    /// that with chunks and a list of them, both kept, a world of a million boxes took 50 MB more.
+    pub(crate) fn find_all<A>(
+        &self,
+        accept: &A,
+        max_pairs: u64,
+        found: &mut Found,
+        all: &mut Vec<Pair>,
+    ) -> Result<(), Error>
+    where
+        A: Accept,
+    {
+        stage!("check");
+        let (room, is_shared) = (Room::new(max_pairs), self.is_shared(found));
+        all.clear();
+        found.clear();
+        let gathered = Mutex::new(&mut *all);
+        let work = |chunk: usize| {
+            OUT.with_borrow_mut(|out| {
+                out.clear();
+                let counts = self.check_chunk(chunk, accept, out, &room);
+                gathered.lock().unwrap_or_else(PoisonError::into_inner).extend_from_slice(out);
+                counts
+            })
+        };
+        let chunks = 0..self.chunks();
+        let counts = if is_shared {
+            chunks.into_par_iter().map(work).reduce(|| (0, 0), add)
+        } else {
+            chunks.map(work).fold((0, 0), add)
+        };
+        (found.checks, found.overlaps) = counts;
+        room.settle(all.len())
+    }
+
+    /// Whether a search is worth waking other threads, by the tests of the one before.
+    fn is_shared(&self, before: &Found) -> bool {
+        let in_list = (self.list.len() as u64).pow(2) / 2;
+        let expected = ENTRY * self.len_in_grids() as u64 + CHECK * before.checks.max(in_list);
+        expected >= PARALLEL_FROM && rayon::current_num_threads() > 1
     }
 
     /// How many chunks there are: those of each level, then those of the list.
@@ -271,7 +314,7 @@ impl<R: Record> Map<R> {
         if room.used() > max_pairs {
             Err(Error::TooManyPairs { limit: max_pairs })
         } else {
-            room.settle(found)
+            room.settle(found.len())
         }
     }
 
@@ -372,7 +415,7 @@ impl Room {
     }
 
     /// Whether all that was found is within the limit.
-    pub(crate) fn settle(&self, found: &Found) -> Result<(), Error> {
-        if found.len() as u64 > self.limit { Err(Error::TooManyPairs { limit: self.limit }) } else { Ok(()) }
+    pub(crate) fn settle(&self, found: usize) -> Result<(), Error> {
+        if found as u64 > self.limit { Err(Error::TooManyPairs { limit: self.limit }) } else { Ok(()) }
     }
 }

@@ -147,7 +147,7 @@ impl PbigGrid {
         }
         checks.made += checker.checks;
         checks.unnecessary += checker.checks - checker.overlaps;
-        room.settle(found)?;
+        room.settle(found.len())?;
         Ok(checks)
     }
 }

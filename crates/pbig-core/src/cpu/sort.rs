@@ -195,7 +195,7 @@ impl Sort {
 
     /// Boxes into buckets.
     fn scatter<R: Record>(&mut self, input: &Input<'_>, threads: bool, sorted: usize, out: &mut Sorted<R>) {
-        out.records.resize(sorted, R::EMPTY);
+        resize(&mut out.records, sorted, R::EMPTY);
         let records = Shared::new(&mut out.records);
         let shift = self.shift;
         let piece = |(piece, (keys, cursors)): (usize, (&[u32], &mut [u32]))| {
@@ -220,9 +220,9 @@ impl Sort {
     fn order<R: Record>(&mut self, levels: &[Level], threads: bool, out: &mut Sorted<R>) {
         let (sorted, buckets) = (out.records.len(), self.levels.len());
         out.starts.resize((buckets << self.shift) + 1, 0);
-        out.codes.resize(sorted + BLOCK, 0);
-        out.keys.resize(sorted, 0);
-        out.places.resize(sorted, 0);
+        resize(&mut out.codes, sorted + BLOCK, 0);
+        resize(&mut out.keys, sorted, 0);
+        resize(&mut out.places, sorted, 0);
         out.starts[0] = 0;
         // From the second key on: the cursor of a cell ends where the next one begins.
         let starts = Shared::new(&mut out.starts[1..]);
@@ -262,6 +262,16 @@ impl Sort {
             level.crowd = (squares as f64 / level.slots.len().max(1) as f64) as f32 - 1.0;
         }
     }
+}
+
+/// With room for boxes that come later, an eighth (`spill`): to move what there is would take as much memory again.
+fn resize<T: Copy>(of: &mut Vec<T>, len: usize, value: T) {
+    let room = len + len / 8;
+    if of.capacity() < room {
+        of.clear();
+        of.reserve_exact(room);
+    }
+    of.resize(len, value);
 }
 
 /// A slice of which threads use different elements.

@@ -42,6 +42,8 @@ impl Index {
             sum += *start;
             *start = sum;
         }
+        self.entries.clear();
+        self.entries.reserve_exact(sum as usize);
         self.entries.resize(sum as usize, 0);
         for (i, pair) in near() {
             for id in [pair.a, pair.b] {

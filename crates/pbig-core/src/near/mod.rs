@@ -14,10 +14,11 @@ mod index;
 mod tests;
 
 use crate::cpu::codes::prefetch;
-use crate::diff::{AHEAD, Judgement, MANY};
+use crate::diff::{AHEAD, Judgement};
 use crate::{Aabb, Pair, shared_from};
 use index::Index;
 use rayon::prelude::*;
+use std::ops::Range;
 
 /// What the last test of a pair has said.
 const APART: u8 = 0;
@@ -28,6 +29,10 @@ const GONE: u8 = 2;
 
 /// Pairs of a piece of a walk.
 const PIECE: usize = shared_from(16_384);
+
+/// Pairs of a new list that are tested before those that overlap are told: of all at once these would take as much memory as
+/// the kept pairs do.
+const PORTION: usize = 64 * PIECE;
 
 /// Pairs that are tested before those found are told.
 const BLOCK: usize = 1024;
@@ -103,21 +108,6 @@ impl NearPairs {
         std::mem::take(&mut self.tests)
     }
 
-    /// Overlapping pairs that no longer hold, into `ended`.
-    pub(crate) fn find_ended(&mut self, of: &impl Judgement, ended: &mut Vec<Pair>) {
-        let pieces = self.prepare_pieces(self.pairs.len());
-        let walk = |((pairs, states), turned): ((&[Pair], &[u8]), &mut Turned)| {
-            for (i, (pair, state)) in pairs.iter().zip(states).enumerate() {
-                pairs.get(i + AHEAD).into_iter().for_each(|&ahead| of.prepare(ahead));
-                let has_ended = *state == OVERLAP && !of.holds(*pair);
-                turned.removed.extend(Some(pair).filter(|_| has_ended));
-            }
-        };
-        let all = self.pairs.par_chunks(PIECE).zip(self.states.par_chunks(PIECE));
-        all.zip(&mut self.turned[..pieces]).for_each(walk);
-        self.turned[..pieces].iter().for_each(|turned| ended.extend_from_slice(&turned.removed));
-    }
-
     /// The pairs that overlap, which `give` puts in the place of those there were. For few boxes: they are looked up from
     /// the first.
     pub(crate) fn begin(&mut self, give: impl FnOnce(&mut Vec<Pair>)) {
@@ -128,36 +118,29 @@ impl NearPairs {
         self.states.resize(self.pairs.len(), OVERLAP);
     }
 
-    /// All pairs that are near, of a search, instead of those there were. Those that overlap are told, and those of them
-    /// that did not before are put into `added`.
-    pub(crate) fn fill(
+    /// Where a search puts all pairs that are near, instead of those there were, for [`NearPairs::begin_all`].
+    pub(crate) fn all(&mut self) -> &mut Vec<Pair> {
+        self.clear();
+        &mut self.pairs
+    }
+
+    /// Pairs that overlap, of all that are near, are told, and those of them that did not before are put into `added`.
+    pub(crate) fn begin_all(
         &mut self,
-        found: &mut [Vec<Pair>],
         boxes: &[Aabb],
         before: &impl Judgement,
         mut tell: impl FnMut(&[Pair]),
         added: &mut Vec<Pair>,
     ) {
-        self.clear();
-        let count = found.iter().map(Vec::len).sum();
-        self.pairs.reserve_exact(count);
-        self.states.reserve_exact(count);
-        for part in found {
-            self.pairs.extend_from_slice(part);
-            // Twice the pairs at once would be the most that a large world ever takes.
-            if count > MANY {
-                *part = Vec::new();
+        self.states.resize(self.pairs.len(), APART);
+        for first in (0..self.pairs.len()).step_by(PORTION) {
+            let pieces = self.walk(first..self.pairs.len().min(first + PORTION), boxes);
+            self.turned[..pieces].par_iter_mut().for_each(|turned| turned.find_fresh(before));
+            for turned in &self.turned[..pieces] {
+                self.overlapping += turned.added.len();
+                tell(&turned.added);
+                added.extend_from_slice(&turned.removed);
             }
-        }
-        let pieces = self.test_from(0, boxes);
-        self.turned[..pieces].par_iter_mut().for_each(|turned| turned.find_fresh(before));
-        for turned in &self.turned[..pieces] {
-            self.overlapping += turned.added.len();
-            tell(&turned.added);
-            added.extend_from_slice(&turned.removed);
-        }
-        if count > MANY {
-            self.turned = Vec::new();
         }
     }
 
@@ -165,20 +148,15 @@ impl NearPairs {
     pub(crate) fn extend(&mut self, found: &[Vec<Pair>], boxes: &[Aabb], added: &mut Vec<Pair>) {
         let first = self.pairs.len();
         found.iter().for_each(|pairs| self.pairs.extend_from_slice(pairs));
-        let pieces = self.test_from(first, boxes);
+        self.states.resize(self.pairs.len(), APART);
+        let pieces = self.walk(first..self.pairs.len(), boxes);
         // What was apart cannot end.
         self.tell(pieces, added, &mut vec![]);
     }
 
-    /// Tests the pairs from `first` on, which are new; how many pieces that took.
-    fn test_from(&mut self, first: usize, boxes: &[Aabb]) -> usize {
-        self.states.resize(self.pairs.len(), APART);
-        self.walk(first, boxes)
-    }
-
     /// Tests all near pairs, and tells which have come and which have gone.
     pub(crate) fn update(&mut self, boxes: &[Aabb], added: &mut Vec<Pair>, removed: &mut Vec<Pair>) {
-        let pieces = self.walk(0, boxes);
+        let pieces = self.walk(0..self.pairs.len(), boxes);
         self.tell(pieces, added, removed);
     }
 
@@ -193,7 +171,7 @@ impl NearPairs {
         if !self.is_indexed(boxes.len()) {
             return self.update(boxes, added, removed);
         }
-        let pieces = self.walk(self.index.known, boxes);
+        let pieces = self.walk(self.index.known..self.pairs.len(), boxes);
         self.tell(pieces, added, removed);
         for changed in changed.chunks(TOGETHER) {
             self.ask_for(changed, boxes);
@@ -308,11 +286,11 @@ impl NearPairs {
         (self.gone, self.index.known) = (0, 0);
     }
 
-    /// Tests the pairs from `first` on, and turns those whose test ends otherwise than the last time, which go into
-    /// `turned`; how many pieces that took.
-    fn walk(&mut self, first: usize, boxes: &[Aabb]) -> usize {
-        let pieces = self.prepare_pieces(self.pairs.len() - first);
-        let (pairs, states) = (&self.pairs[first..], &mut self.states[first..]);
+    /// Tests some of the pairs, and turns those whose test ends otherwise than the last time, which go into `turned`; how many
+    /// pieces that took.
+    fn walk(&mut self, some: Range<usize>, boxes: &[Aabb]) -> usize {
+        let pieces = self.prepare_pieces(some.len());
+        let (pairs, states) = (&self.pairs[some.clone()], &mut self.states[some]);
         let turned = &mut self.turned[..pieces];
         let walk = |((pairs, states), turned): (Piece<'_>, &mut Turned)| -> u64 {
             let blocks = pairs.chunks(BLOCK).zip(states.chunks_mut(BLOCK));

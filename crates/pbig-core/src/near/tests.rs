@@ -113,18 +113,12 @@ fn pairs_come_and_go_as_boxes_tremble_and_jump() {
     for round in 0..600 {
         if round % 150 == 0 {
             (0..BOXES).for_each(|id| world.tremble(id));
-            let (mut added, mut removed) = (vec![], vec![]);
-            let (mut found, now) = (world.near(|_| true), Was(world.now()));
+            let (near, now) = (world.near(|_| true), world.now());
+            let removed: Vec<Pair> = world.wanted.difference(&now).copied().collect();
             let World { list, wanted, boxes, .. } = &mut world;
-            list.find_ended(&now, &mut removed);
-            let mut overlapping = 0;
-            list.fill(
-                &mut found,
-                boxes,
-                &Was(wanted.clone()),
-                |pairs| overlapping += pairs.len(),
-                &mut added,
-            );
+            list.all().extend(near.iter().flatten());
+            let (mut added, mut overlapping) = (vec![], 0);
+            list.begin_all(boxes, &Was(wanted.clone()), |pairs| overlapping += pairs.len(), &mut added);
             assert_eq!(overlapping, list.overlapping());
             world.validate(&added, &removed);
         }
@@ -145,9 +139,9 @@ fn pairs_come_and_go_as_boxes_tremble_and_jump() {
 #[test]
 fn what_is_apart_and_no_longer_near_is_forgotten() {
     let mut world = World::new();
-    let mut found = world.near(|_| true);
-    let mut added = vec![];
-    world.list.fill(&mut found, &world.boxes, &Was(BTreeSet::new()), |_| {}, &mut added);
+    let (near, mut added) = (world.near(|_| true), vec![]);
+    world.list.all().extend(near.iter().flatten());
+    world.list.begin_all(&world.boxes, &Was(BTreeSet::new()), |_| {}, &mut added);
     world.validate(&added, &[]);
     let before = world.list.len();
     // Odd boxes are near nothing any more.

@@ -2,12 +2,11 @@
 
 use super::{Before, FIRST, Served};
 use crate::broad_phase::BroadPhase;
-use crate::broad_phase::update::{State, state};
+use crate::broad_phase::update::state;
 use crate::cpu::codes::prefetch;
 use crate::cpu::crowding::Set;
 use crate::cpu::judge::Accept;
-use crate::diff::{Judgement, PairStore};
-use crate::plan::LazySummary;
+use crate::plan::{LazySummary, NoNear};
 use crate::report::{lap, stage};
 use crate::search::Rule;
 use crate::{Aabb, Error, Pair, ProxyFilter};
@@ -17,21 +16,24 @@ impl BroadPhase {
     /// Builds the base anew, of reaches, and keeps what overlaps of the pairs that are near; no, when these are too many.
     pub(super) fn search_near(&mut self, skin: f32) -> Result<Served, Error> {
         let mut clock = Instant::now();
+        self.drop_near();
         self.grow_reaches(skin);
         self.near.begin(skin, self.present_count as usize);
         self.report.stages.map += lap(&mut clock);
         if self.find_reaches().is_err() {
+            self.near.list.clear();
+            self.near.none = Some(NoNear::Far);
             self.near.worth.fail();
             return Ok(Served::No);
         }
         stage!("diff");
         let mut clock = Instant::now();
-        self.end_before_list();
+        self.end_kept();
         let (before, added) = (Before(state!(self)), &mut self.events.added);
-        let (found, boxes, counts) = (&mut self.base.found.chunks, &self.boxes, &mut self.pairs);
+        let (boxes, counts) = (&self.boxes, &mut self.pairs);
         // What is counted is what the list has, whatever pairs a restored snapshot said there were.
         counts.count_none();
-        self.near.list.fill(found, boxes, &before, |overlapping| counts.count_added(overlapping), added);
+        self.near.list.begin_all(boxes, &before, |overlapping| counts.count_added(overlapping), added);
         self.near.is_on = true;
         _ = self.near.list.take_tests();
         self.report.stages.diff += lap(&mut clock);
@@ -75,18 +77,11 @@ impl BroadPhase {
         self.has_base = false;
     }
 
-    /// Pairs that have ended, wherever they are kept, before a new list has the others.
-    fn end_before_list(&mut self) {
-        let (state, removed) = (state!(self), &mut self.events.removed);
-        if self.near.is_on {
-            self.near.list.find_ended(&Staying(state, &self.pairs), removed);
-            removed.retain(|pair| self.pairs.is_there(*pair));
-            self.pairs.forget_removed();
-        } else {
-            self.pairs.drop_removed();
-            self.pairs.end_many(&state, removed);
-            self.pairs.hand_over();
-        }
+    /// Kept pairs that have ended, before a new list has the others.
+    fn end_kept(&mut self) {
+        self.pairs.drop_removed();
+        self.pairs.end_many(&state!(self), &mut self.events.removed);
+        self.pairs.hand_over();
     }
 
     /// Does without the list, if there is one.
@@ -97,7 +92,7 @@ impl BroadPhase {
         }
     }
 
-    /// Pairs of reaches, into the base.
+    /// Pairs of reaches, into the list.
     fn find_reaches(&mut self) -> Result<(), Error> {
         let accept = Allowed(&self.filters);
         let rule = Rule { accept: &accept, filters: Some(&self.filters), filters_suffice: true, before: &[] };
@@ -105,7 +100,14 @@ impl BroadPhase {
         config.limits.max_pairs = self.most_near();
         let summary = LazySummary::new(&self.near.reach, self.base.spare.take());
         let (invalid, report) = (self.report.invalid, &mut self.report);
-        let found = self.base.find_without_gpu(&self.near.reach, &summary, &config, &rule, report);
+        let found = self.base.find_into(
+            Some(self.near.list.all()),
+            &self.near.reach,
+            &summary,
+            &config,
+            &rule,
+            report,
+        );
         self.base.spare = summary.into_spare();
         self.report.invalid = invalid;
         self.has_base = false;
@@ -126,19 +128,5 @@ impl Accept for Allowed<'_> {
     #[inline]
     fn pair(&self, pair: Pair) -> bool {
         self.0[pair.a as usize].allows(&self.0[pair.b as usize])
-    }
-}
-
-/// Pairs that hold, of boxes that were not removed: one set again since is another box.
-struct Staying<'a>(State<'a>, &'a PairStore);
-
-impl Judgement for Staying<'_> {
-    #[inline(always)]
-    fn prepare(&self, pair: Pair) {
-        Judgement::prepare(&self.0, pair);
-    }
-
-    fn holds(&self, pair: Pair) -> bool {
-        self.0.holds(pair) && self.1.is_there(pair)
     }
 }

@@ -8,8 +8,11 @@ use pbig_harness::boxes::BoxSet;
 use serde_json::{Value, json};
 use std::process::Command;
 
-/// Updates of the incremental probe in which all boxes move.
-const UPDATES: usize = 4;
+/// Updates of the incremental probes: several lists of near pairs, where boxes drift.
+const UPDATES: usize = 30;
+
+/// How far a box moves in one.
+const STEP: f32 = 0.1;
 
 #[derive(clap::Args)]
 pub(crate) struct Args {
@@ -22,18 +25,24 @@ pub(crate) struct Args {
 
 #[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum Way {
-    /// A broad phase in which all boxes move for a few updates.
+    /// A broad phase in which all boxes move to and fro for some updates.
     Incremental,
+    /// All drift instead, each its own way.
+    Drift,
+    /// One in ten of them does.
+    FewDrift,
     /// A finder, once.
     Scratch,
 }
 
-/// Its two rows.
+/// Its rows.
 pub(crate) fn rows(quick: bool) -> Result<Vec<Row>, Failure> {
     let sizes = if quick { [10_000, 100_000] } else { [1_000_000, 10_000_000] };
     let target = |megabytes| (!quick).then_some(Target::Below(megabytes));
     Ok(vec![
         row(Way::Incremental, "memory, incremental, all moved", sizes[0])?.target(target(300.0)),
+        row(Way::Drift, "memory, incremental, all drift", sizes[0])?.target(target(300.0)),
+        row(Way::FewDrift, "memory, incremental, 10% drift", sizes[0])?.target(target(300.0)),
         row(Way::Scratch, "memory, from scratch", sizes[1])?.target(target(2500.0)),
     ])
 }
@@ -69,7 +78,9 @@ pub(crate) fn probe(args: &Args) -> Result<(), Failure> {
     // Linux then counts the peak from now on; where it may not, making the boxes had no higher one.
     let _ = std::fs::write("/proc/self/clear_refs", "5");
     let found = match args.way {
-        Way::Incremental => incremental(&boxes),
+        Way::Incremental => incremental(&boxes, 1, to_and_fro),
+        Way::Drift => incremental(&boxes, 1, drift),
+        Way::FewDrift => incremental(&boxes, 10, drift),
         Way::Scratch => from_scratch(&boxes),
     };
     let pairs = found.map_err(|error| Failure::Input(error.to_string()))?;
@@ -77,18 +88,34 @@ pub(crate) fn probe(args: &Args) -> Result<(), Failure> {
     print(&json!({ "boxes": args.boxes, "pairs": pairs, "bytes": bytes }).to_string())
 }
 
-fn incremental(boxes: &[Aabb]) -> Result<usize, pbig_core::Error> {
+/// Of every `share`-th box, `motion` says how far it is from where it began: by its id and the update, on each axis.
+fn incremental(
+    boxes: &[Aabb],
+    share: usize,
+    motion: fn(usize, usize) -> [f32; 3],
+) -> Result<usize, pbig_core::Error> {
     let mut broad_phase = BroadPhase::new(Config { limits: Limits::UNLIMITED, ..Config::DEFAULT })?;
     for update in 0..UPDATES {
-        for (id, aabb) in boxes.iter().enumerate() {
-            // To and fro by 0.1, neighbours apart from each other, and without a second list of boxes.
-            let by = if (id + update).is_multiple_of(2) { 0.1 } else { 0.0 };
-            let place = Aabb::new(aabb.min.map(|x| x + by), aabb.max.map(|x| x + by));
-            broad_phase.set(id as u32, place, ProxyFilter::ALL)?;
+        for (id, aabb) in boxes.iter().enumerate().step_by(if update == 0 { 1 } else { share }) {
+            // Without a second list of boxes.
+            let by = motion(id, update);
+            let add = |corner: [f32; 3]| std::array::from_fn(|k| corner[k] + by[k]);
+            broad_phase.set(id as u32, Aabb::new(add(aabb.min), add(aabb.max)), ProxyFilter::ALL)?;
         }
         broad_phase.update()?;
     }
     Ok(broad_phase.pair_count())
+}
+
+/// Neighbours apart from each other.
+fn to_and_fro(id: usize, update: usize) -> [f32; 3] {
+    [if (id + update).is_multiple_of(2) { STEP } else { 0.0 }; 3]
+}
+
+/// One of eight diagonals.
+fn drift(id: usize, update: usize) -> [f32; 3] {
+    let far = STEP * update as f32;
+    [0, 1, 2].map(|axis| if id >> axis & 1 == 0 { far } else { -far })
 }
 
 fn from_scratch(boxes: &[Aabb]) -> Result<usize, pbig_core::Error> {
