@@ -111,6 +111,14 @@ mod tests {
     }
 
     #[test]
+    fn the_row_is_found_from_any_near_it() {
+        let n = 40;
+        for (k, start) in (0..pair_count(n)).flat_map(|k| (0..n - 1).map(move |start| (k, start))) {
+            assert_eq!(exact_row(start, k, n), pair_of(k, n).0, "from row {start}");
+        }
+    }
+
+    #[test]
     fn exact_at_both_ends_of_every_row_up_to_two_to_the_32() {
         // The ends of rows are where a rounded root is wrong; odd, even and extreme n.
         for n in [4609, 46_342, 65_536, 92_683, 1 << 20, (1 << 31) + 1, (1 << 32) - 1, 1 << 32] {

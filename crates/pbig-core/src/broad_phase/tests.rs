@@ -128,6 +128,7 @@ fn few_that_jump_are_edited_and_many_searched_for_anew_and_the_report_says_what_
     const IDS: u32 = 2000;
     let mut broad_phase =
         BroadPhase::new(Config { strategy: Strategy::Grid, ..Config::DEFAULT }).expect("a margin");
+    assert_eq!(broad_phase.config().strategy, Strategy::Grid);
     assert_eq!(broad_phase.report().plan.measured.edit, None);
     let mut ways = vec![];
     for frame in 0..20_u32 {

@@ -73,6 +73,22 @@ fn lists_stay_whole_through_insertions_and_removals_of_every_place_with_links_an
 }
 
 #[test]
+fn a_box_that_comes_when_pairs_are_linked_gets_a_list_of_its_own() {
+    let mut store = PairStore::default();
+    store.reserve_ids(SMALL as usize);
+    let mut wanted: BTreeSet<Pair> = (1..SMALL).map(|b| Pair::new(0, b)).collect();
+    wanted.iter().for_each(|pair| store.insert(&[*pair]));
+    store.links.make(&store.pairs, SMALL as usize);
+    store.reserve_ids(SMALL as usize + 8);
+    let new = [Pair::new(0, SMALL), Pair::new(3, SMALL + 7)];
+    store.insert(&new);
+    wanted.extend(new);
+    assert!(store.links.are_there());
+    validate(&store, &wanted);
+    assert!(store.of(SMALL).eq([new[0]]) && store.of(SMALL + 7).eq([new[1]]) && store.of(SMALL + 1).eq([]));
+}
+
+#[test]
 fn a_walk_in_pieces_is_the_same_as_one() {
     let pairs: Vec<Pair> = (0..3 * PIECE as u32 + 77).map(|i| Pair::new(i, i + 1 + i % 7)).collect();
     let mut store = PairStore::default();
