@@ -1,7 +1,7 @@
 //! A search from nothing by whatever strategy the plan chooses, on whatever backend there is.
 
 use crate::cpu::crowding::Set;
-use crate::cpu::find::Found;
+use crate::cpu::found::Found;
 use crate::cpu::judge::Accept;
 use crate::cpu::map::Map;
 use crate::cpu::pbig::PbigGrid;

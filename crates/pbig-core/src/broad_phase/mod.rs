@@ -21,7 +21,7 @@ mod turns;
 mod update;
 
 use crate::cpu::emit;
-use crate::cpu::find::Found;
+use crate::cpu::found::Found;
 use crate::cpu::record::Tracked;
 use crate::diff::PairStore;
 use crate::finder::check_count;

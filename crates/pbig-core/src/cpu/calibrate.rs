@@ -1,7 +1,7 @@
 //! What this machine takes for a unit of work: the search itself, on four small scenes, once in a process.
 
 use super::crowding::Set;
-use super::find::Found;
+use super::found::Found;
 use super::judge::Accept;
 use super::map::Map;
 use super::record::{Item, Record};

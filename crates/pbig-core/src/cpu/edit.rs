@@ -188,7 +188,8 @@ impl Map<Tracked> {
 mod tests {
     use super::*;
     use crate::cpu::crowding::Set;
-    use crate::cpu::find::{Found, Others};
+    use crate::cpu::find::Others;
+    use crate::cpu::found::Found;
     use crate::cpu::judge::Accept;
     use crate::plan::LazySummary;
     use crate::report::StageTimes;

@@ -9,6 +9,7 @@
 
 use super::check::Checker;
 use super::entries::Query;
+use super::found::{Found, Room};
 use super::half::{Half, Rests};
 use super::judge::{Accept, Judge, Scratch};
 use super::levels::Level;
@@ -20,7 +21,6 @@ use crate::report::stage;
 use crate::{Error, Pair, ProxyFilter, shared_from};
 use rayon::prelude::*;
 use std::cell::RefCell;
-use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Mutex, PoisonError};
 
 /// Boxes in one piece of work: enough to hide the cost of handing it out (a few us against 50),
@@ -47,43 +47,6 @@ thread_local! {
     static SCRATCH: RefCell<(Scratch, Rests, Rows, Vec<u32>)> = RefCell::default();
     /// What a chunk has found, before it is put to the others.
     static OUT: RefCell<Vec<Pair>> = const { RefCell::new(Vec::new()) };
-}
-
-/// Pairs as found, a buffer for each chunk, kept from call to call.
-#[derive(Clone, Debug, Default)]
-pub(crate) struct Found {
-    pub(crate) chunks: Vec<Vec<Pair>>,
-    pub(crate) checks: u64,
-    /// Overlapping pairs met, whether accepted or not.
-    pub(crate) overlaps: u64,
-}
-
-impl Found {
-    /// Accepted pairs.
-    pub(crate) fn len(&self) -> usize {
-        self.chunks.iter().map(Vec::len).sum()
-    }
-
-    pub(crate) fn clear(&mut self) {
-        self.chunks.iter_mut().for_each(Vec::clear);
-        (self.checks, self.overlaps) = (0, 0);
-    }
-
-    /// Sets the `i`-th buffer.
-    #[cfg(feature = "gpu")]
-    pub(crate) fn put(&mut self, i: usize, pairs: Vec<Pair>) {
-        match self.chunks.get_mut(i) {
-            Some(chunk) => *chunk = pairs,
-            None => self.chunks.push(pairs),
-        }
-    }
-
-    /// Makes `chunks` have at least `n` buffers, all empty, and returns the first `n`.
-    pub(crate) fn buffers(&mut self, n: usize) -> &mut [Vec<Pair>] {
-        self.clear();
-        self.chunks.resize(n.max(self.chunks.len()), Vec::new());
-        &mut self.chunks[..n]
-    }
 }
 
 impl<R: Record> Map<R> {
@@ -380,42 +343,4 @@ struct Chunk {
     level: Option<usize>,
     start: usize,
     end: usize,
-}
-
-/// How many pairs may still be found, across threads: the limit is noticed while pairs are found,
-/// before memory is exhausted.
-pub(crate) struct Room {
-    used: AtomicU64,
-    limit: u64,
-}
-
-impl Room {
-    /// Pairs that a buffer gathers before it accounts for them: the counter is shared by threads,
-    /// and touching it for every box would cost more than the search.
-    const BATCH: usize = 4096;
-
-    pub(crate) fn new(limit: u64) -> Self {
-        Self { used: AtomicU64::new(0), limit }
-    }
-
-    /// Pairs accounted for.
-    fn used(&self) -> u64 {
-        self.used.load(Ordering::Relaxed)
-    }
-
-    /// Accounts for a buffer that has grown from `taken` to `len`; false when the limit is passed.
-    #[inline(always)]
-    pub(crate) fn take(&self, len: usize, taken: &mut usize) -> bool {
-        if len - *taken < Self::BATCH {
-            return true;
-        }
-        let more = (len - *taken) as u64;
-        *taken = len;
-        self.used.fetch_add(more, Ordering::Relaxed) + more <= self.limit
-    }
-
-    /// Whether all that was found is within the limit.
-    pub(crate) fn settle(&self, found: usize) -> Result<(), Error> {
-        if found as u64 > self.limit { Err(Error::TooManyPairs { limit: self.limit }) } else { Ok(()) }
-    }
 }

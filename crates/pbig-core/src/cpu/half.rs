@@ -275,13 +275,13 @@ fn first_bits(length: u32) -> u32 {
 mod tests {
     use super::*;
     use crate::cpu::crowding::Set;
-    use crate::cpu::find::Found;
+    use crate::cpu::found::Found;
     use crate::cpu::judge::Accept;
     use crate::cpu::map::Map;
     use crate::cpu::record::Item;
     use crate::plan::LazySummary;
     use crate::report::StageTimes;
-    use crate::{Aabb, Config, Costs, Pair, Strategy, oracle};
+    use crate::{Aabb, Config, Costs, Error, Pair, Strategy, oracle};
 
     struct Every;
 
@@ -320,6 +320,24 @@ mod tests {
         let mut pairs: Vec<Pair> = found.chunks.concat();
         pairs.sort_unstable();
         pairs
+    }
+
+    #[test]
+    fn one_buffer_gets_what_chunks_do_whoever_shares_the_search_and_its_limit() {
+        let boxes = boxes(20_000, 25.0, 0.5);
+        let (map, mut found, mut all) = (map_of(&boxes), Found::default(), vec![]);
+        let wanted = pairs(&map);
+        for threads in [1, 2] {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool");
+            let mut search = |limit| pool.install(|| map.find_all(&Every, limit, &mut found, &mut all));
+            assert_eq!(
+                search(wanted.len() as u64 - 1),
+                Err(Error::TooManyPairs { limit: wanted.len() as u64 - 1 })
+            );
+            assert_eq!(search(wanted.len() as u64), Ok(()));
+            all.sort_unstable();
+            assert!(all == wanted && found.overlaps == wanted.len() as u64 && found.len() == 0, "{threads}");
+        }
     }
 
     #[test]

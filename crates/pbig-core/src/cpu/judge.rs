@@ -6,7 +6,7 @@
 //! and kept or overwritten by the next one.
 
 use super::codes::{BLOCK, prefetch};
-use super::find::Room;
+use super::found::Room;
 use super::record::Record;
 use crate::Pair;
 

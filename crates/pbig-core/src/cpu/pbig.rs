@@ -8,7 +8,7 @@
 
 use super::check::Checker;
 use super::entries::{Entries, Query};
-use super::find::{Found, Room};
+use super::found::{Found, Room};
 use super::judge::Accept;
 use crate::pair_index::{pair_count, pair_of, row_len, row_pair};
 use crate::plan::PbigPlan;

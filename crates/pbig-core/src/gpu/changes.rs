@@ -8,7 +8,7 @@
 use super::search::{Started, Task, search, start};
 use super::upload::{PIECE, follows};
 use super::{Failure, GpuError, GpuFinder};
-use crate::cpu::find::Found;
+use crate::cpu::found::Found;
 use crate::layout::{ANEW, Box as DeviceBox, Motion, Move, Refilter};
 use crate::plan::Summary;
 use crate::report::Report;

@@ -48,7 +48,7 @@ pub(crate) use error::Failure;
 pub use error::GpuError;
 pub(crate) use trial::Trial;
 
-use crate::cpu::find::Found;
+use crate::cpu::found::Found;
 use crate::plan::Summary;
 use crate::report::Report;
 use crate::{Aabb, Backend, Config, GpuOptions, ProxyFilter};

@@ -5,7 +5,7 @@ use super::session::{Input, Job, Session};
 use super::sink::Sink;
 use super::start::First;
 use super::{ChangeRequest, GpuError, Request, parts};
-use crate::cpu::find::Found;
+use crate::cpu::found::Found;
 use crate::layout::{BOX_BITS, Located, Motion};
 use crate::plan::{Chosen, GpuPlan, Plan, Summary};
 use crate::report::{Checks, GpuReport};

@@ -1,6 +1,6 @@
 //! Where pairs go, and what is counted on the way.
 
-use crate::cpu::find::Found;
+use crate::cpu::found::Found;
 use crate::layout::{Totals, wide};
 use crate::report::{Checks, GpuReport};
 use crate::{Error, Pair};

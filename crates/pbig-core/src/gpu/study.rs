@@ -5,7 +5,7 @@ pub use super::changes::{Change, ChangeRequest};
 use super::engine::{Engine, Variant};
 use super::{Failure, GpuError, GpuFinder, Request, readback};
 use crate::config::GpuOptions;
-use crate::cpu::find::Found;
+use crate::cpu::found::Found;
 use crate::plan::Summary;
 use crate::report::Report;
 use crate::{Aabb, Config, Pair};
