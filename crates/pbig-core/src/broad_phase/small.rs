@@ -4,6 +4,7 @@ use super::turns::{Turn, Turns};
 use super::update::{State, state};
 use super::{BroadPhase, MEASURED_FROM, flag};
 use crate::cpu::bitmap::{Bitmap, MOST, Search};
+#[cfg(target_arch = "x86_64")]
 use crate::cpu::codes::Simd;
 use crate::cpu::judge::Accept;
 use crate::plan::Chosen;
