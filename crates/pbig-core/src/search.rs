@@ -102,7 +102,7 @@ impl<R: Record> Search<R> {
         self.find_into(None, boxes, summary, config, rule, report)
     }
 
-    /// The same, into one buffer instead of `found` if there is one, by grids, in no particular order.
+    /// The same, into one empty buffer if there is one, in no particular order.
     pub(crate) fn find_into<A>(
         &mut self,
         all: Option<&mut Vec<Pair>>,
@@ -137,7 +137,10 @@ impl<R: Record> Search<R> {
             let summary = set.summary.get();
             report.plan = Plan::new(summary, config, 1.0);
             report.invalid = set.boxes.len() as u64 - u64::from(summary.valid);
-            return self.find_pbig(set.boxes, config, accept, report);
+            let found = self.find_pbig(set.boxes, config, accept, report);
+            all.into_iter()
+                .for_each(|all| self.found.chunks.iter().for_each(|chunk| all.extend_from_slice(chunk)));
+            return found;
         }
         report.plan = self.map.plan_and_build(set, config, &mut report.stages);
         report.invalid = u64::from(self.map.invalid);

@@ -130,8 +130,10 @@ fn nor_does_one_in_which_few_boxes_move() {
 fn where_threads_share_the_work_only_their_queue_grows_now_and_then() {
     let pool = ThreadPoolBuilder::new().num_threads(2).build().expect("a pool");
     for share in [20, 2, 1] {
-        let most = most(ASKED, 100_000, share, Some(&pool));
-        assert!(most <= ASKED.of_plan, "{most} bytes where one in {share} moves");
+        for counter in [ALLOCATIONS, ASKED] {
+            let most = most(counter, 100_000, share, Some(&pool));
+            assert!(most <= counter.of_plan, "{most} where one in {share} moves");
+        }
     }
 }
 
@@ -149,10 +151,10 @@ fn lists_and_requests(boxes: u32, share: usize) -> (u32, u32) {
         }
         // Whether lists pay is measured: not here.
         broad_phase.near.worth.pause = 0;
+        let before = ASKED.get(None);
         if update % 16 == 0 {
             broad_phase.drop_near();
         }
-        let before = ASKED.get(None);
         broad_phase.update().expect("few pairs");
         if update >= 300 {
             lists += u32::from(broad_phase.near.is_on && broad_phase.near.age == 1);

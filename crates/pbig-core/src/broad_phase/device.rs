@@ -115,7 +115,9 @@ impl Judgement for Ending<'_> {
 
 #[cfg(test)]
 mod tests {
-    use crate::{Aabb, Backend, BroadPhase, Config, Error, GpuFinder, Limits, Pair, ProxyFilter, oracle};
+    use crate::{
+        Aabb, Backend, BroadPhase, Config, Error, GpuFinder, Limits, Pair, ProxyFilter, Strategy, oracle,
+    };
     use rand::rngs::StdRng;
     use rand::{RngExt, SeedableRng};
     use std::collections::BTreeSet;
@@ -159,27 +161,41 @@ mod tests {
     /// the pairs of the last one that has not to those that there are.
     #[test]
     fn devices_and_the_cpu_take_turns_and_updates_fail_in_between() {
-        let config = Config { backend: Backend::Gpu, margin: 0.05, ..Config::DEFAULT };
+        let config = Config { strategy: Strategy::Grid, ..Config::DEFAULT };
         let gpu = GpuFinder::new().expect("an adapter, of which a software one will do");
         let mut broad_phase = BroadPhase::with_gpu(config, gpu).expect("a margin that is one");
         let (mut random, mut pairs) = (StdRng::seed_from_u64(17), BTreeSet::new());
-        // Updates on the device and on the CPU, and of either those that failed.
-        let mut seen = [[0; 2]; 2];
-        for round in 0..150 {
-            broad_phase.config.backend = [Backend::Gpu, Backend::Cpu][random.random_range(0..2)];
-            broad_phase.config.limits.max_pairs = [40, u64::MAX][random.random_range(0..2)];
-            for _ in 0..random.random_range(0..90) {
-                let center = [0.0; 3].map(|_: f32| random.random_range(0.0..10.0));
-                let aabb = Aabb::from_center(center, [0.4; 3]);
-                let filter = ProxyFilter { memberships: random.random_range(1..3), ..ProxyFilter::ALL };
-                broad_phase.set(random.random_range(0..400), aabb, filter).expect("room for it");
+        let home = |id: u32| [id % 8, id / 8 % 8, id / 64].map(|i| i as f32);
+        // Updates on the device, on the CPU, and there by near pairs, and of each those that failed.
+        let mut seen = [[0; 2]; 3];
+        for round in 0..400 {
+            // For a while the same, so that there are lists.
+            if round % 10 == 0 {
+                broad_phase.config.backend = [Backend::Gpu, Backend::Cpu][random.random_range(0..2)];
             }
+            broad_phase.config.limits.max_pairs = if random.random_ratio(1, 6) { 40 } else { u64::MAX };
+            for id in 0..400 {
+                // All tremble; few go elsewhere, are taken out or get another filter: more would end a list.
+                let to = if random.random_ratio(1, 400) { random.random_range(0..400) } else { id };
+                let center = home(to).map(|x| x + random.random_range(-0.02..0.02));
+                if random.random_ratio(1, 400) {
+                    broad_phase.remove(id);
+                    pairs.retain(|pair: &Pair| pair.a != id && pair.b != id);
+                } else {
+                    let memberships = 1 + u32::from(random.random_ratio(1, 400));
+                    let filter = ProxyFilter { memberships, ..ProxyFilter::ALL };
+                    broad_phase.set(id, Aabb::from_center(center, [0.5; 3]), filter).expect("room for it");
+                }
+            }
+            broad_phase.near.worth.pause = 0;
             if random.random() {
                 broad_phase.begin();
             }
             let result = broad_phase.update().cloned();
-            let on_gpu = broad_phase.report().gpu.is_some();
-            seen[usize::from(on_gpu)][usize::from(result.is_err())] += 1;
+            let is_near = broad_phase.near.is_on && result.is_ok();
+            let way = if broad_phase.config.backend == Backend::Gpu { 0 } else { 1 + usize::from(is_near) };
+            assert!(way > 0 || result.is_err() || broad_phase.report().gpu.is_some(), "the device works");
+            seen[way][usize::from(result.is_err())] += 1;
             if let Ok(events) = result {
                 assert!(events.removed.iter().all(|pair| pairs.remove(pair)), "round {round}: was not there");
                 assert!(events.added.iter().all(|pair| pairs.insert(*pair)), "round {round}: was there");
@@ -191,6 +207,8 @@ mod tests {
                 assert!(wanted.into_iter().filter(allowed).eq(pairs.iter().copied()), "round {round}");
             }
         }
-        assert!(seen.iter().flatten().all(|updates| *updates > 10), "{seen:?}");
+        let [[on_gpu, failed_there], [by_grid, failed], [by_near, _]] = seen;
+        let are_enough = [on_gpu, failed_there, failed, by_near].iter().all(|updates| *updates > 10);
+        assert!(are_enough && by_grid > 0, "{seen:?}");
     }
 }

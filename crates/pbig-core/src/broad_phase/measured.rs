@@ -7,7 +7,8 @@ impl BroadPhase {
     /// What has decided about an update that is done.
     pub(super) fn report_measured(&mut self) {
         let plan = &self.report.plan;
-        let has_list = plan.near.is_some() || matches!(plan.no_near, Some(NoNear::Pause(_)));
+        let has_list =
+            plan.near.is_some() || matches!(plan.no_near, Some(NoNear::Unpaid(_) | NoNear::Compared));
         let is_searched = matches!(plan.chosen, Chosen::Edit | Chosen::Grid);
         self.report.plan.measured = Measured {
             edit: self.rebuild.measured().filter(|_| is_searched && plan.near.is_none()),

@@ -133,8 +133,6 @@ impl BroadPhase {
         self.base_plan = self.report.plan.clone();
         (self.base_checks, self.strain) = (self.report.checks.made, 0);
         self.near.met = self.base.found.overlaps;
-        // One by PBIG's grid.
-        self.base.found.chunks.iter().for_each(|chunk| self.events.added.extend_from_slice(chunk));
         Ok(Route::All)
     }
 

@@ -24,8 +24,11 @@ use std::cell::RefCell;
 use std::sync::{Mutex, PoisonError};
 
 /// Boxes in one piece of work: enough to hide the cost of handing it out (a few us against 50),
-/// few enough to balance; fixed, so that the bytes of the result do not depend on the threads.
+/// few enough to balance; fixed, so that the bytes that [`Map::find`] leaves do not depend on the threads.
 const CHUNK: usize = 2048;
+
+/// Pairs of a chunk that a thread keeps room for.
+const MOST_KEPT: usize = 1 << 16;
 
 /// Expected time of a search, in ns on one core, from which it is shared with other threads. In a
 /// tight loop 150,000 pay off (4,096 unit cubes: 0.14 ms alone, 0.10 with a second thread), but in an
@@ -86,23 +89,37 @@ impl<R: Record> Map<R> {
         let (room, is_shared) = (Room::new(max_pairs), self.is_shared(found));
         all.clear();
         found.clear();
-        let gathered = Mutex::new(&mut *all);
-        let work = |chunk: usize| {
-            OUT.with_borrow_mut(|out| {
-                out.clear();
-                let counts = self.check_chunk(chunk, accept, out, &room);
-                gathered.lock().unwrap_or_else(PoisonError::into_inner).extend_from_slice(out);
-                counts
-            })
-        };
         let chunks = 0..self.chunks();
         let counts = if is_shared {
+            let gathered = Mutex::new(&mut *all);
+            let work = |chunk: usize| self.check_for(&gathered, chunk, accept, &room);
             chunks.into_par_iter().map(work).reduce(|| (0, 0), add)
         } else {
-            chunks.map(work).fold((0, 0), add)
+            chunks.map(|chunk| self.check_chunk(chunk, accept, all, &room)).fold((0, 0), add)
         };
         (found.checks, found.overlaps) = counts;
         room.settle(all.len())
+    }
+
+    /// A chunk, for what all threads have found together.
+    fn check_for<A>(
+        &self,
+        gathered: &Mutex<&mut Vec<Pair>>,
+        chunk: usize,
+        accept: &A,
+        room: &Room,
+    ) -> (u64, u64)
+    where
+        A: Accept,
+    {
+        OUT.with_borrow_mut(|out| {
+            out.clear();
+            let counts = self.check_chunk(chunk, accept, out, room);
+            gathered.lock().unwrap_or_else(PoisonError::into_inner).extend_from_slice(out);
+            // One of a pile may have found very many, and the thread lives on.
+            out.shrink_to(MOST_KEPT);
+            counts
+        })
     }
 
     /// Whether a search is worth waking other threads, by the tests of the one before.

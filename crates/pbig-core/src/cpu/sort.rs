@@ -264,12 +264,12 @@ impl Sort {
     }
 }
 
-/// With room for boxes that come later, an eighth (`spill`): to move what there is would take as much memory again.
+/// With room for boxes that come later, a sixteenth to an eighth (`spill`): to move what there is takes as much memory again.
+/// What there was is not needed.
 fn resize<T: Copy>(of: &mut Vec<T>, len: usize, value: T) {
-    let room = len + len / 8;
-    if of.capacity() < room {
-        of.clear();
-        of.reserve_exact(room);
+    if of.capacity() < len + len / 16 {
+        *of = Vec::new();
+        of.reserve_exact(len + len / 8);
     }
     of.resize(len, value);
 }

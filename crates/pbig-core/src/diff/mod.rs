@@ -31,7 +31,7 @@ const PIECE: usize = shared_from(16_384);
 const BLOCK: usize = 1024;
 
 /// Pairs whose memory, 8 bytes each, is worth giving back.
-pub(crate) const MANY: usize = 1 << 20;
+const MANY: usize = 1 << 20;
 
 /// Which kept pairs have ended.
 pub(crate) trait Judgement: Sync {

@@ -42,9 +42,12 @@ impl Index {
             sum += *start;
             *start = sum;
         }
-        self.entries.clear();
-        self.entries.reserve_exact(sum as usize);
-        self.entries.resize(sum as usize, 0);
+        let sum = sum as usize;
+        if self.entries.capacity() < sum {
+            self.entries = Vec::new();
+            self.entries.reserve_exact(sum + sum / 8);
+        }
+        self.entries.resize(sum, 0);
         for (i, pair) in near() {
             for id in [pair.a, pair.b] {
                 let end = &mut self.starts[id as usize];

@@ -157,3 +157,21 @@ fn what_is_apart_and_no_longer_near_is_forgotten() {
     assert!(!missed.is_empty() && missed.iter().all(|pair| !now.contains(pair)));
     assert!(!now.is_empty());
 }
+
+/// More near pairs than are tested before those that overlap are told.
+#[test]
+fn a_long_list_is_begun_portion_by_portion() {
+    const MANY: u32 = 1600;
+    let at = |id: u32| Aabb::from_center([0.5 * id as f32, 0.0, 0.0], [1.0; 3]);
+    let boxes: Vec<Aabb> = (0..MANY).map(at).collect();
+    let all = || (0..MANY).flat_map(|a| (a + 1..MANY).map(move |b| Pair::new(a, b)));
+    let wanted: BTreeSet<Pair> = all().filter(|pair| pair.b - pair.a <= 4).collect();
+    let before: BTreeSet<Pair> = wanted.iter().copied().filter(|pair| pair.a % 3 == 0).collect();
+    let (mut list, mut told, mut added) = (NearPairs::default(), vec![], vec![]);
+    list.all().extend(all());
+    assert!(list.pairs.len() > PORTION);
+    list.begin_all(&boxes, &Was(before.clone()), |pairs| told.extend_from_slice(pairs), &mut added);
+    assert!(told.len() == wanted.len() && told.into_iter().collect::<BTreeSet<_>>() == wanted);
+    assert!(added.into_iter().eq(wanted.difference(&before).copied()));
+    assert!(list.overlapping() == wanted.len() && list.iter().eq(wanted));
+}

@@ -88,7 +88,7 @@ pub struct Plan {
     pub gpu: Option<GpuPlan>,
     /// Boxes that came since the grid was built and are out of its order ([`Chosen::Edit`]).
     pub moved: u32,
-    /// The list of [`Chosen::Near`].
+    /// The list of near pairs: in use ([`Chosen::Near`]), or made by this search.
     pub near: Option<NearPlan>,
     /// Why there is none, where many boxes change ([`Chosen::Edit`] and [`Chosen::Grid`], in updates).
     pub no_near: Option<NoNear>,

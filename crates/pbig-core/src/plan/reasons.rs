@@ -5,11 +5,11 @@ use std::fmt;
 /// The list that [`crate::plan::Chosen::Near`] tests.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct NearPlan {
-    /// How far a box may go from where it was when the list was made, in the unit of the boxes.
+    /// How far a box may go from where it was when it was last searched for, in the unit of the boxes.
     pub skin: f32,
     /// Pairs that are near each other, whether they overlap or not.
     pub pairs: u64,
-    /// Updates that have used it.
+    /// Updates that have used it since the one that searched for it.
     pub age: u32,
 }
 
@@ -18,12 +18,14 @@ pub struct NearPlan {
 pub enum NoNear {
     /// It is not known yet what updates cost without one.
     Unmeasured,
-    /// The last ones did not pay: the next is made after so many updates more.
-    Pause(u32),
-    /// Boxes move so far that too many pairs would be near.
-    Far,
-    /// Most of the boxes that have changed were not there before, or nothing is known of how far they move.
-    New,
+    /// They pay, and after some this is measured again, by an update without.
+    Compared,
+    /// The last ones did not pay: so many updates more go without.
+    Unpaid(u32),
+    /// Too many pairs would be near, as boxes move far, are crowded or filtered: so many updates more go without.
+    Many(u32),
+    /// How far boxes move is not known: most that have changed were not there before, or are where they were.
+    Unknown,
 }
 
 /// What the ways to do an update have taken here, as far as that has been measured and decides.
@@ -51,10 +53,12 @@ impl fmt::Display for NoNear {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Unmeasured => write!(f, "what updates take without them is measured first"),
-            Self::Pause(0) => write!(f, "the last ones did not pay, the next update may try again"),
-            Self::Pause(updates) => write!(f, "the last ones did not pay, {updates} updates more go without"),
-            Self::Far => write!(f, "boxes move so far that too many would be near"),
-            Self::New => write!(f, "how far most boxes move is not known"),
+            Self::Compared => write!(f, "they pay, which is measured again by an update without"),
+            Self::Unpaid(updates) => {
+                write!(f, "the last ones did not pay, {updates} updates more go without")
+            }
+            Self::Many(updates) => write!(f, "too many would be near, {updates} updates more go without"),
+            Self::Unknown => write!(f, "how far most boxes move is not known"),
         }
     }
 }

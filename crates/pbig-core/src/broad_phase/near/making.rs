@@ -1,12 +1,13 @@
 //! How a list of near pairs is made, and what becomes of the kept pairs meanwhile.
 
+use super::worth::Cause;
 use super::{Before, FIRST, Served};
 use crate::broad_phase::BroadPhase;
 use crate::broad_phase::update::state;
 use crate::cpu::codes::prefetch;
 use crate::cpu::crowding::Set;
 use crate::cpu::judge::Accept;
-use crate::plan::{LazySummary, NoNear};
+use crate::plan::LazySummary;
 use crate::report::{lap, stage};
 use crate::search::Rule;
 use crate::{Aabb, Error, Pair, ProxyFilter};
@@ -22,8 +23,9 @@ impl BroadPhase {
         self.report.stages.map += lap(&mut clock);
         if self.find_reaches().is_err() {
             self.near.list.clear();
-            self.near.none = Some(NoNear::Far);
-            self.near.worth.fail();
+            self.near.worth.failed = true;
+            self.near.worth.wait(Cause::Many);
+            self.near.none = Some(self.near.worth.told());
             return Ok(Served::No);
         }
         stage!("diff");
@@ -36,6 +38,7 @@ impl BroadPhase {
         self.near.list.begin_all(boxes, &before, |overlapping| counts.count_added(overlapping), added);
         self.near.is_on = true;
         _ = self.near.list.take_tests();
+        self.report.plan.near = Some(self.near.plan());
         self.report.stages.diff += lap(&mut clock);
         self.check_near_limit()
     }
@@ -56,7 +59,10 @@ impl BroadPhase {
         near.is_on = true;
         self.report.stages.plan += lap(&mut clock);
         let served = self.serve_near(FIRST);
-        self.near.worth.failed = served == Ok(Served::No);
+        if served == Ok(Served::No) {
+            self.near.worth.failed = true;
+            self.near.none = Some(self.near.worth.told());
+        }
         served
     }
 

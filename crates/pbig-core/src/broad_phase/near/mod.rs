@@ -91,6 +91,11 @@ impl Near {
         self.worth.begin();
     }
 
+    /// For the report.
+    fn plan(&self) -> NearPlan {
+        NearPlan { skin: self.skin.width, pairs: self.list.len() as u64, age: self.age }
+    }
+
     /// What was learned is too old.
     pub(super) fn begin_anew(&mut self) {
         self.met = 0;
@@ -259,11 +264,7 @@ impl BroadPhase {
         let [made, needed] = self.near.list.take_tests();
         self.report.checks = Checks { made, unnecessary: made - needed, redundant: 0 };
         let (moved, boxes) = (self.base.map.out_of_order() as u32, self.valid_count());
-        let near = Some(NearPlan {
-            skin: self.near.skin.width,
-            pairs: self.near.list.len() as u64,
-            age: self.near.age,
-        });
+        let near = Some(self.near.plan());
         self.report.plan = Plan { chosen: Chosen::Near, moved, boxes, near, ..self.base_plan.clone() };
         // A device that is compared with the CPU is compared with this.
         if self.many_changed() {

@@ -1,5 +1,6 @@
 //! When there is a list of near pairs.
 
+use super::worth::Cause;
 use super::{FIRST, Served};
 use crate::broad_phase::{BroadPhase, flag};
 use crate::plan::NoNear;
@@ -79,19 +80,14 @@ impl BroadPhase {
 
     /// How wide the skin of a list would be that is made now; or why there is to be none.
     fn skin(&mut self) -> Result<f32, NoNear> {
-        let worth = &mut self.near.worth;
-        if worth.pause > 0 {
-            worth.pause -= 1;
-            return Err(NoNear::Pause(worth.pause));
+        if let Some(why) = self.near.worth.goes_without() {
+            return Err(why);
         }
-        if worth.usual.is_none() {
-            return Err(NoNear::Unmeasured);
-        }
-        let width = self.next_width().ok_or(NoNear::New)?;
+        let width = self.next_width().ok_or(NoNear::Unknown)?;
         // Filters may turn down most of what is near: a search would look at all that, and find little.
         if self.near_to_come(width) > self.most_near() as f64 {
-            self.near.worth.wait();
-            return Err(NoNear::Far);
+            self.near.worth.wait(Cause::Many);
+            return Err(self.near.worth.told());
         }
         Ok(width)
     }

@@ -2,6 +2,7 @@
 
 use crate::broad_phase::measured::Spent;
 use crate::broad_phase::update::Route;
+use crate::plan::NoNear;
 use std::time::Duration;
 
 /// What a list may cost, of what updates cost without one: for less than a tenth it is not worth its memory.
@@ -23,6 +24,18 @@ const LISTS: u32 = 8;
 /// Most updates without another attempt.
 const LONGEST_PAUSE: u32 = 64;
 
+/// Why updates go without a list.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) enum Cause {
+    /// So that what that takes is known.
+    #[default]
+    Compared,
+    /// The last ones did not pay.
+    Unpaid,
+    /// Too many pairs would be near.
+    Many,
+}
+
 /// What lists have cost, and what goes without.
 #[derive(Clone, Debug, Default)]
 pub(in crate::broad_phase) struct Worth {
@@ -38,6 +51,7 @@ pub(in crate::broad_phase) struct Worth {
     /// Updates without another attempt: still to go, and as many as it was.
     pub(in crate::broad_phase) pause: u32,
     pub(super) next_pause: u32,
+    pub(super) cause: Cause,
     /// Whether an attempt has failed in this update, so that its time says nothing.
     pub(in crate::broad_phase) failed: bool,
 }
@@ -58,7 +72,7 @@ impl Worth {
     /// What updates with this list have cost, of what those without do; nothing before both are known.
     pub(in crate::broad_phase) fn share(&self) -> Option<f32> {
         let usual = Spent { ns: self.usual?, changed: 1.0 };
-        (self.own.ns > 0.0).then(|| self.own.share_of(usual))
+        (self.own.ns > 0.0 && self.own.changed > 0.0).then(|| self.own.share_of(usual))
     }
 
     /// What an update has taken, in which so many boxes of all have changed.
@@ -87,20 +101,32 @@ impl Worth {
         let pays = self.share().is_none_or(|share| share < PAYS);
         if pays && age >= LONG {
             self.next_pause = 0;
-            self.pause = u32::from(self.lists.is_multiple_of(LISTS));
+            (self.pause, self.cause) = (u32::from(self.lists.is_multiple_of(LISTS)), Cause::Compared);
         } else {
-            self.wait();
+            self.wait(Cause::Unpaid);
         }
     }
 
-    /// Too many pairs are near.
-    pub(super) fn fail(&mut self) {
-        self.failed = true;
-        self.wait();
+    pub(super) fn wait(&mut self, cause: Cause) {
+        self.next_pause = (2 * self.next_pause + 1).min(LONGEST_PAUSE);
+        (self.pause, self.cause) = (self.next_pause, cause);
     }
 
-    pub(super) fn wait(&mut self) {
-        self.next_pause = (2 * self.next_pause + 1).min(LONGEST_PAUSE);
-        self.pause = self.next_pause;
+    /// Whether this update is one of those that go without a list, and why.
+    pub(super) fn goes_without(&mut self) -> Option<NoNear> {
+        if self.pause == 0 {
+            return self.usual.is_none().then_some(NoNear::Unmeasured);
+        }
+        self.pause -= 1;
+        Some(self.told())
+    }
+
+    /// Why the updates to come go without.
+    pub(super) fn told(&self) -> NoNear {
+        match self.cause {
+            Cause::Compared => NoNear::Compared,
+            Cause::Unpaid => NoNear::Unpaid(self.pause),
+            Cause::Many => NoNear::Many(self.pause),
+        }
     }
 }
