@@ -14,7 +14,7 @@ pub use correct::{AsItIs, Correction, Integers, Rules, lazy_pair};
 pub use exact::{EXACT, Exact};
 pub use root::{AllSingle, CARMACK, Double, LOMONT, Newton, Root, Single, SingleRoot, WideNewton};
 pub use search::{Counterexample, counterexample, root_errors};
-pub use tally::{MOST_EXHAUSTIVE, Sample, Tally};
+pub use tally::{MOST_EXHAUSTIVE, Sample, Tally, of as tally_of};
 
 use pbig_core::pair_index::pair_count;
 

@@ -91,8 +91,8 @@ fn judged<C: Correction>(n: i64, wrong: &[Wrong]) -> Tally {
     left.tally()
 }
 
-/// What comes of pairs given one by one, in the order of all pairs.
-pub(super) fn of(n: i64, mut given: impl Iterator<Item = (i64, i64)>) -> Tally {
+/// What comes of pairs given one by one, in the order of all pairs of `n >= 2` boxes.
+pub fn of(n: i64, mut given: impl Iterator<Item = (i64, i64)>) -> Tally {
     let mut left = Left::new(n);
     let pairs = (0..n - 1).flat_map(|a| (a + 1..n).map(move |b| (a, b)));
     for (k, pair) in (0..).zip(pairs) {

@@ -55,6 +55,15 @@ fn a_quick_run_is_one_object_and_writes_what_it_is_asked_for() {
         let count = |name: &str| row[name].as_u64().unwrap_or_else(|| panic!("{name} is no count: {row}"));
         assert_eq!(count("missed"), count("doubled") + count("no_pair"), "{row}");
     }
+    // There is no such table without an adapter.
+    let kernels = object["studies"]["index"]["tables"]["kernels"]["rows"].as_array();
+    for row in kernels.into_iter().flatten() {
+        let sum = |of: &str| row[format!("doubled{of}")].as_u64().zip(row[format!("no_pair{of}")].as_u64());
+        for of in ["", "_by_the_rules"] {
+            let missed = row[format!("missed{of}")].as_u64();
+            assert!(missed.is_some() && missed == sum(of).map(|(doubled, none)| doubled + none), "{row}");
+        }
+    }
     let doubled = rows(&object, "index", "all_pairs").iter().filter(|row| row["doubled"].as_u64() > Some(0));
     assert!(doubled.count() > 0, "an error makes two indices test one pair");
     for (study, table) in [("coordinates", "tests"), ("margin", "margins"), ("simulation", "runs")] {

@@ -21,7 +21,7 @@ pub(super) fn run(quick: bool) -> Result<Study, Failure> {
     check(&every)?;
     let at = if quick { vec![1000, 1 << 20] } else { vec![1000, 5000, 10_000, 100_000, 1 << 20] };
     let times = at.iter().map(|&n| Times::measure(n, quick)).collect::<Result<Vec<_>, _>>()?;
-    let (kernels, adapter) = kernels(quick)?;
+    let (kernels, of_kernels) = kernels(quick)?;
     let found = Found {
         exact: exact::tallied(quick),
         sizes: sizes::looked_at(quick),
@@ -31,7 +31,7 @@ pub(super) fn run(quick: bool) -> Result<Study, Failure> {
         times,
         quick,
     };
-    let notes = notes::notes(&found).into_iter().chain([adapter]).collect();
+    let notes = notes::notes(&found).into_iter().chain(of_kernels).collect();
     let points = points(&found);
     Ok(Study {
         name: "index",
@@ -190,20 +190,19 @@ fn every_row(head: [String; 2], most: i64, values: u64, tally: &Tally, first: Op
     head.map(Cell::from).into_iter().chain(rest).collect()
 }
 
-/// The table, where there is an adapter, and which it is or why there is none.
-fn kernels(quick: bool) -> Result<(Option<Table>, String), Failure> {
+/// The table, where there is an adapter; and which it is, or why there is none.
+fn kernels(quick: bool) -> Result<(Option<Table>, Vec<String>), Failure> {
     let adapter = pbig_core::GpuFinder::new().map(|gpu| (gpu.adapter().to_owned(), gpu.is_software()));
     match (Bench::new(), adapter) {
         (Ok(bench), Ok((name, software))) => {
             let what =
                 if software { ", software: its times would mean nothing and are left out" } else { "" };
-            let scope = "indices from eight parts of all; no f64 there, and no lazy way";
-            Ok((
-                Some(kernels::table(&bench, software, quick)?),
-                format!("As kernels on {name}{what}; {scope}."),
-            ))
+            let estimates = kernels::estimates(&bench, software, quick)?;
+            let head = format!("As kernels on {name}{what}.");
+            let notes = [head].into_iter().chain(kernels::notes(&estimates)).collect();
+            Ok((Some(kernels::table(&estimates)), notes))
         }
-        (Err(why), _) | (_, Err(why)) => Ok((None, format!("Not run as kernels: {why}."))),
+        (Err(why), _) | (_, Err(why)) => Ok((None, vec![format!("Not run as kernels: {why}.")])),
     }
 }
 

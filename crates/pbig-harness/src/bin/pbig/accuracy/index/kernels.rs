@@ -1,6 +1,7 @@
 //! The same roots as kernels: the row that a device estimates, and the exact pair.
 
-use super::super::study::{Cell, Table};
+use super::super::study::{Cell, Table, plain};
+use super::percent;
 use super::times::label;
 use crate::bench::measure::timed;
 use crate::output::Failure;
@@ -8,94 +9,152 @@ use pbig_core::GpuOptions;
 use pbig_core::gpu::study::Bench;
 use pbig_core::layout::{LANES, Params};
 use pbig_core::pair_index::{pair_count, pair_of};
-use pbig_harness::index::{Correction, Rules, WAYS};
+use pbig_harness::index::{AsItIs, Correction, Rules, Tally, WAYS, Way, tally_of};
 
-/// Runs over all pairs, evenly spread, and the most indices of each.
-const RUNS: u64 = 8;
+/// Up to so many boxes all indices are looked at.
+const MOST_WHOLE: u32 = 5000;
+/// Parts of all indices that are looked at beyond, evenly spread, and the most indices of a call.
+const PARTS: u64 = 8;
 const MOST: u32 = 1 << 17;
 
-/// The kernel's numbers for roots (`GpuOptions::root`), with our names for them.
-fn roots() -> Vec<(u32, String)> {
-    let numbered = |way: &pbig_harness::index::Way| match (way.name, way.steps) {
+/// A root by the kernel's number (`GpuOptions::root`), with our name for it.
+struct Root {
+    number: u32,
+    name: String,
+}
+
+const BISECTION: u32 = 9;
+
+impl Root {
+    fn all() -> impl Iterator<Item = Self> {
+        let of_way = |way: &Way| Some(Self { number: number(way)?, name: label(way) });
+        let bisection = Self { number: BISECTION, name: "bisection over rows".to_owned() };
+        WAYS.iter().filter_map(of_way).chain([bisection])
+    }
+
+    /// The most boxes for which the kernel's 32-bit integers suffice: with a root for `(2n - 1)^2`, by bisection for
+    /// `n (n - 1)`.
+    fn most_boxes(&self) -> u32 {
+        if self.number == BISECTION { 1 << 16 } else { 1 << 15 }
+    }
+}
+
+fn number(way: &Way) -> Option<u32> {
+    match (way.name, way.steps) {
         ("f32 sqrt", _) => Some(0),
         ("Carmack", steps) => steps,
         ("Lomont", steps) => steps.map(|steps| steps + 4),
         _ => None,
-    };
-    let ways = WAYS.iter().filter_map(|way| numbered(way).map(|root| (root, label(way))));
-    ways.chain([(9, "bisection over rows".to_owned())]).collect()
+    }
 }
 
-#[derive(Default)]
-struct Found {
-    indices: u64,
-    wrong: u64,
-    wrong_by_rules: u64,
-    worst_row: u64,
+/// What comes of the rows that a root estimates for some boxes.
+pub(super) struct Estimates {
+    n: u32,
+    name: String,
+    /// As it is, by the rules. Unless all indices were looked at, without what is missed, doubled and no pair.
+    tallies: [Tally; 2],
+    /// Milliseconds for all these indices.
+    ms: Option<f64>,
 }
 
 /// Estimates and exact pairs on the best adapter; times where it is no software.
-pub(super) fn table(bench: &Bench, software: bool, quick: bool) -> Result<Table, Failure> {
-    let title = "As kernels: estimated rows, and pairs made exact by integers";
+pub(super) fn estimates(bench: &Bench, software: bool, quick: bool) -> Result<Vec<Estimates>, Failure> {
+    let sizes: &[u32] =
+        if quick { &[2, 300] } else { &[2, 300, 1000, 2000, MOST_WHOLE, 16_384, 1 << 15, 1 << 16] };
+    let all = sizes.iter().flat_map(|&n| Root::all().map(move |root| (n, root)));
+    let within = all.filter(|(n, root)| *n <= root.most_boxes());
+    within.map(|(n, root)| Estimates::of(bench, n, root, software)).collect()
+}
+
+impl Estimates {
+    fn of(bench: &Bench, n: u32, Root { number, name }: Root, software: bool) -> Result<Self, Failure> {
+        let (mut rows, mut ms) = (Vec::new(), 0.0);
+        for indices in parts(n) {
+            let (words, took) = timed_run(bench, number, &indices, if software { 1 } else { 3 })?;
+            rows.extend(estimated(&indices, &words)?);
+            ms += took;
+        }
+        let tallies = [judged::<AsItIs>(n, &rows), judged::<Rules>(n, &rows)];
+        Ok(Self { n, name, tallies, ms: (!software && ms > 0.0).then_some(ms) })
+    }
+
+    fn is_whole(&self) -> bool {
+        self.n <= MOST_WHOLE
+    }
+
+    fn row(&self) -> impl Iterator<Item = Cell> {
+        let indices = self.tallies[0].pairs;
+        let head = [u64::from(self.n).into(), self.name.as_str().into(), indices.into()];
+        let ns = Cell::from(self.ms.map(|ms| ms * 1e6 / indices as f64));
+        head.into_iter().chain(self.tallies.iter().flat_map(|tally| self.counts(tally))).chain([ns])
+    }
+
+    fn counts(&self, tally: &Tally) -> [Cell; 5] {
+        let if_whole = |count: u64| Cell::from(self.is_whole().then_some(count));
+        let [missed, doubled, none] = [tally.missed, tally.doubled, tally.none].map(if_whole);
+        [percent(tally.wrong, tally.pairs).into(), tally.worst_row.into(), missed, doubled, none]
+    }
+}
+
+pub(super) fn table(estimates: &[Estimates]) -> Table {
+    let title = "As kernels: estimated rows, as they are and by the paper's rules";
     let columns = [
         "boxes",
         "root",
         "indices",
         "wrong_percent",
         "worst_row",
+        "missed",
+        "doubled",
+        "no_pair",
         "wrong_by_the_rules_percent",
+        "worst_row_by_the_rules",
+        "missed_by_the_rules",
+        "doubled_by_the_rules",
+        "no_pair_by_the_rules",
         "ns_per_pair",
     ];
     let mut table = Table::new("kernels", title, &columns);
-    let sizes: &[u32] = if quick { &[300] } else { &[300, 1000, 2000, 5000, 16_384, 32_768] };
-    for &n in sizes {
-        for (root, name) in roots() {
-            let (found, ms) = study(bench, n, root)?;
-            let percent = |wrong: u64| wrong as f64 / found.indices as f64 * 100.0;
-            table.row([
-                u64::from(n).into(),
-                name.into(),
-                found.indices.into(),
-                percent(found.wrong).into(),
-                found.worst_row.into(),
-                percent(found.wrong_by_rules).into(),
-                Cell::from((!software && ms > 0.0).then(|| ms * 1e6 / found.indices as f64)),
-            ]);
-        }
-    }
-    Ok(table)
+    estimates.iter().for_each(|one| table.row(one.row()));
+    table
 }
 
-/// Some indices of each part of all pairs; and the time for them, less that of calls which compute none.
-fn study(bench: &Bench, n: u32, root: u32) -> Result<(Found, f64), Failure> {
-    let (mut found, mut ms) = (Found::default(), 0.0);
-    let pairs = pair_count(n.into());
-    for part in 0..RUNS {
-        let (first, end) = (pairs * part / RUNS, pairs * (part + 1) / RUNS);
-        let indices = Indices { n, first: first as u32, count: ((end - first) as u32).min(MOST) };
-        ms += timed_run(bench, root, &indices, &mut found)?;
-    }
-    Ok((found, ms))
-}
-
+/// Consecutive indices.
 struct Indices {
     n: u32,
     first: u32,
     count: u32,
 }
 
-/// The best of three, and what comes out.
-fn timed_run(bench: &Bench, root: u32, indices: &Indices, found: &mut Found) -> Result<f64, Failure> {
+impl Indices {
+    fn between(n: u32, first: u64, end: u64) -> Self {
+        Self { n, first: first as u32, count: ((end - first) as u32).min(MOST) }
+    }
+}
+
+/// All, or some of each part of all.
+fn parts(n: u32) -> Vec<Indices> {
+    let pairs = pair_count(n.into());
+    if n <= MOST_WHOLE {
+        (0..pairs).step_by(MOST as usize).map(|first| Indices::between(n, first, pairs)).collect()
+    } else {
+        let start = |part: u64| pairs * part / PARTS;
+        (0..PARTS).map(|part| Indices::between(n, start(part), start(part + 1))).collect()
+    }
+}
+
+/// What comes out, and the shortest time, less that of calls which compute none.
+fn timed_run(bench: &Bench, root: u32, indices: &Indices, times: u32) -> Result<(Vec<u32>, f64), Failure> {
     let mut best = [f64::MAX; 2];
     let mut out = Vec::new();
-    for _ in 0..3 {
+    for _ in 0..times {
         let (none, idle) = timed(|| run(bench, root, indices, 0));
         let (words, busy) = timed(|| run(bench, root, indices, indices.count));
         (_, out) = (none?, words?);
         best = [best[0].min(idle), best[1].min(busy)];
     }
-    judge(indices.n, indices.first, &out, found)?;
-    Ok(best[1] - best[0])
+    Ok((out, best[1] - best[0]))
 }
 
 /// With room for all indices, of which `cells` are computed.
@@ -110,38 +169,153 @@ fn run(bench: &Bench, root: u32, indices: &Indices, cells: u32) -> Result<Vec<u3
     Ok(bytemuck::pod_collect_to_vec(&found[1]))
 }
 
-/// An exact pair that is wrong is a failed check.
-fn judge(n: u32, first: u32, out: &[u32], found: &mut Found) -> Result<(), Failure> {
-    for (k, words) in (u64::from(first)..).zip(out.chunks_exact(3)) {
-        let (a, b) = pair_of(k, n.into());
-        if (a, b) != (words[1].into(), words[2].into()) {
-            return Err(Failure::Check(format!(
-                "index {k} of {n} boxes: the kernel gives {:?}",
-                &words[1..]
-            )));
+/// Each index with its estimated row. A pair that is wrong after the correction by integers is a failed check.
+fn estimated(&Indices { n, first, .. }: &Indices, words: &[u32]) -> Result<Vec<(u32, u32)>, Failure> {
+    let row = |(k, words): (u32, &[u32])| {
+        let right = pair_of(k.into(), n.into());
+        if right != (words[1].into(), words[2].into()) {
+            let given = &words[1..];
+            return Err(Failure::Check(format!("index {k} of {n} boxes: the kernel gives {given:?}")));
         }
-        let (estimate, a) = (i64::from(words[0]), a as i64);
-        let by_rules = Rules::pair(estimate, k as i64, n.into());
-        found.indices += 1;
-        found.wrong += u64::from(estimate != a);
-        found.wrong_by_rules += u64::from(by_rules != (a, b as i64));
-        found.worst_row = found.worst_row.max(estimate.abs_diff(a));
+        Ok((k, words[0]))
+    };
+    (first..).zip(words.chunks_exact(3)).map(row).collect()
+}
+
+/// The pairs that a correction makes of estimated rows.
+fn judged<C: Correction>(n: u32, rows: &[(u32, u32)]) -> Tally {
+    let given = rows.iter().map(|&(k, row)| (k, C::pair(row.into(), k.into(), n.into())));
+    if n <= MOST_WHOLE { tally_of(n.into(), given.map(|(_, pair)| pair)) } else { sampled(n, given) }
+}
+
+fn sampled(n: u32, given: impl Iterator<Item = (u32, (i64, i64))>) -> Tally {
+    let mut tally = Tally::default();
+    for (k, pair) in given {
+        let (a, b) = pair_of(k.into(), n.into());
+        let right = (a as i64, b as i64);
+        tally.pairs += 1;
+        tally.wrong += u64::from(pair != right);
+        tally.worst_row = tally.worst_row.max(pair.0.abs_diff(right.0));
     }
-    Ok(())
+    tally
+}
+
+/// What was looked at as kernels, and what not.
+pub(super) fn notes(estimates: &[Estimates]) -> Vec<String> {
+    let most = |number: u32| Root::all().find(|root| root.number == number).map_or(0, |r| r.most_boxes());
+    let largest = estimates.iter().map(|one| one.n).filter(|n| *n <= MOST_WHOLE).max().unwrap_or(0);
+    vec![
+        format!(
+            "Kernels: all indices up to {largest} boxes, beyond them {MOST} of each of {PARTS} parts of all. They \
+             keep estimated rows from 0 to n - 2. The pair that integers make of the row is right for each index: a \
+             run in which one is not fails."
+        ),
+        format!(
+            "WGSL has 32-bit integers only: kernels end at {} boxes with a root, beyond which (2n - 1)^2 is 2^32 or \
+             more, and at {} by bisection, beyond which n (n - 1) is. That is enough for pbig, which finds pairs by \
+             index in small cells and among few boxes.",
+            most(0),
+            most(BISECTION)
+        ),
+        "No kernels: f64 sqrt and the integer root, as WGSL has neither f64 nor 64-bit integers nor a root of \
+         integers; the lazy way, which is a division of integers and estimates nothing, so that a device could only \
+         take another time for it."
+            .to_owned(),
+        missed_note(estimates, largest),
+    ]
+}
+
+/// Roots that lose pairs of the most boxes of which all indices were looked at.
+fn missed_note(estimates: &[Estimates], n: u32) -> String {
+    let missed = |fix: usize| {
+        let of_n = estimates.iter().filter(|one| one.n == n && one.tallies[fix].missed > 0);
+        let told = of_n.map(|one| {
+            let Tally { missed, pairs, .. } = one.tallies[fix];
+            format!("{} {missed} ({}%)", one.name, plain(percent(missed, pairs)))
+        });
+        let told: Vec<_> = told.collect();
+        if told.is_empty() { "none with any root".to_owned() } else { told.join(", ") }
+    };
+    format!(
+        "Pairs of {n} boxes that kernels miss, as it is: {}; by the paper's rules: {}.",
+        missed(0),
+        missed(1)
+    )
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
+    fn indices(n: u32, first: u32, count: u32) -> Indices {
+        Indices { n, first, count }
+    }
+
     #[test]
-    fn a_wrong_row_is_counted_and_a_wrong_pair_is_a_failure() {
-        let mut found = Found::default();
-        let right = [0u32, 0, 1, 0, 0, 2];
-        assert!(judge(4, 0, &right, &mut found).is_ok() && found.wrong == 0);
-        let off_by_two = [2u32, 0, 2, 0, 0, 3];
-        judge(4, 1, &off_by_two, &mut found).expect("the pairs are right");
-        assert_eq!((found.indices, found.wrong, found.wrong_by_rules, found.worst_row), (4, 1, 1, 2));
-        assert!(judge(4, 0, &[0, 0, 2], &mut found).is_err());
+    fn a_wrong_pair_is_a_failure() {
+        let right = [0u32, 0, 1, 7, 0, 2];
+        assert_eq!(estimated(&indices(4, 0, 2), &right).expect("right pairs"), [(0, 0), (1, 7)]);
+        assert!(estimated(&indices(4, 0, 1), &[0, 0, 2]).is_err());
+    }
+
+    /// Of 4 boxes. As it is, index 1 gives (1, 0), which index 0 tests, 2 gives (1, 1), 3 gives (3, 1), which 4 tests, and 5
+    /// gives (0, 6). By the rules 3 gives (2, 1), which is its own pair the other way round, and 5 gives (1, 4).
+    #[test]
+    fn of_all_indices_it_is_counted_what_is_missed_and_doubled() {
+        let rows = [(0, 0), (1, 1), (2, 1), (3, 3), (4, 1), (5, 0)];
+        let counts = |tally: Tally| [tally.wrong, tally.worst_row, tally.missed, tally.doubled, tally.none];
+        assert_eq!(counts(judged::<AsItIs>(4, &rows)), [4, 2, 4, 2, 2]);
+        assert_eq!(counts(judged::<Rules>(4, &rows)), [2, 1, 1, 0, 1]);
+        let some = sampled(4, [(1, (1, 0)), (4, (1, 3)), (3, (3, 1))].into_iter());
+        assert_eq!((some.pairs, counts(some)), (3, [2, 2, 0, 0, 0]));
+    }
+
+    #[test]
+    fn small_numbers_of_boxes_have_all_their_indices_looked_at() {
+        for n in [2, 3, 300, MOST_WHOLE] {
+            let indices = parts(n).into_iter().flat_map(|part| part.first..part.first + part.count);
+            assert!(indices.eq(0..pair_count(n.into()) as u32), "{n}");
+        }
+        let ends = parts(1 << 16).into_iter().map(|part| u64::from(part.first) + u64::from(part.count));
+        assert!(ends.is_sorted() && parts(1 << 16).len() as u64 == PARTS);
+        assert!(parts(1 << 16).iter().all(|part| part.count == MOST));
+    }
+
+    #[test]
+    fn as_many_boxes_as_32_bits_suffice_for() {
+        let fits = |root: &Root, n: u64| {
+            let largest = if root.number == BISECTION { n * (n - 1) } else { (2 * n - 1).pow(2) };
+            largest < 1 << 32
+        };
+        for root in Root::all() {
+            let most = root.most_boxes().into();
+            assert!(fits(&root, most) && !fits(&root, most + 1), "{}", root.name);
+        }
+    }
+
+    /// With one box more an estimate is far off, and a pair by bisection is wrong: the limits are the kernel's own.
+    #[test]
+    fn kernels_are_right_up_to_their_most_boxes_and_no_further() {
+        let Ok(bench) = Bench::new() else { return };
+        let at = |root: u32, indices: &Indices| {
+            estimated(indices, &run(&bench, root, indices, indices.count).expect("a kernel that runs"))
+        };
+        let first_row = |n: u32| at(0, &indices(n, 0, 1)).map(|rows| rows[0].1).expect("right pairs");
+        assert_eq!(first_row(1 << 15), 0);
+        assert!(first_row((1 << 15) + 1) > 1000);
+        let last = |n: u32| at(BISECTION, &indices(n, (pair_count(n.into()) - 4) as u32, 4));
+        assert!(last(1 << 16).is_ok() && last((1 << 16) + 1).is_err());
+    }
+
+    #[test]
+    fn every_root_runs_and_lost_pairs_are_told() {
+        let Ok(bench) = Bench::new() else { return };
+        let found = estimates(&bench, true, true).expect("right pairs");
+        assert_eq!(found.len(), 2 * Root::all().count());
+        let told = missed_note(&found, 300);
+        let one_step = found.iter().find(|one| one.n == 300 && one.name == "Carmack 1").expect("one step");
+        let lost = format!("as it is: Carmack 1 {} (", one_step.tallies[0].missed);
+        assert!(told.contains(&lost) && !told.contains("bisection"), "{told}");
+        assert!(told.ends_with("by the paper's rules: none with any root."), "{told}");
     }
 }
