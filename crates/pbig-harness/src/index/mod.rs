@@ -12,7 +12,7 @@ mod tally;
 
 pub use correct::{AsItIs, Correction, Integers, Rules, lazy_pair};
 pub use exact::{EXACT, Exact};
-pub use root::{AllSingle, CARMACK, Double, LOMONT, Newton, Root, Single, SingleRoot, WideNewton};
+pub use root::{AllSingle, CARMACK, Double, LOMONT, Newton, Printed, Root, Single, SingleRoot, WideNewton};
 pub use search::{Counterexample, counterexample, root_errors};
 pub use tally::{MOST_EXHAUSTIVE, Sample, Tally, of as tally_of};
 
@@ -47,7 +47,7 @@ const fn way<R: Root>(name: &'static str, steps: Option<u32>) -> Way {
 }
 
 /// Every root.
-pub const WAYS: [Way; 11] = [
+pub const WAYS: [Way; 12] = [
     way::<Single>("f32 sqrt", None),
     way::<Double>("f64 sqrt", None),
     way::<Newton<CARMACK, 1>>("Carmack", Some(1)),
@@ -59,6 +59,7 @@ pub const WAYS: [Way; 11] = [
     way::<Newton<LOMONT, 3>>("Lomont", Some(3)),
     way::<Newton<LOMONT, 4>>("Lomont", Some(4)),
     way::<AllSingle>("all in f32", None),
+    way::<Printed>("as printed, in f32", None),
 ];
 
 /// What follows the estimate, in the order of the arrays of a [`Way`].

@@ -6,7 +6,8 @@ pub const CARMACK: u32 = 0x5f37_59df;
 pub const LOMONT: u32 = 0x5f37_5a86;
 
 /// A square root by which a row is estimated: equation 1, 0-based, `(2n - 1 - sqrt((2n - 1)^2 - 8k)) / 2`
-/// without its fraction. What stands under the root is an exact integer and rounded once, but for [`AllSingle`].
+/// without its fraction. What stands under the root is an exact integer and rounded once, but for [`AllSingle`] and
+/// [`Printed`].
 pub trait Root {
     /// The estimate from `m = 2n - 1` and `x = m^2 - 8k`.
     fn row(m: i64, x: i64) -> i64;
@@ -134,6 +135,34 @@ impl Root for AllSingle {
     }
 }
 
+/// Equation 1 as it is printed, in that order and all in f32: rows are counted from 1 there, indices from 0.
+pub struct Printed;
+
+impl Printed {
+    #[inline(always)]
+    fn estimate(n: f32, k: f32) -> f32 {
+        (-(2.0 * n + 1.0) + (4.0 * n * n - 4.0 * n - 8.0 * k + 1.0).sqrt()) / -2.0 - 1.0
+    }
+}
+
+impl Root for Printed {
+    #[inline(always)]
+    fn row(m: i64, x: i64) -> i64 {
+        Self::estimate(((m + 1) / 2) as f32, ((m * m - x) / 8) as f32).floor() as i64
+    }
+
+    #[inline(always)]
+    fn lies_in(a: i32, m: i32, x: i32) -> bool {
+        let row = Self::estimate(((m + 1) / 2) as f32, ((m * m - x) / 8) as f32);
+        (row >= a as f32) & (row < (a + 1) as f32)
+    }
+
+    /// As of [`AllSingle`].
+    fn worst_relative() -> f64 {
+        f64::INFINITY
+    }
+}
+
 /// The row by integers alone: `2a <= m - sqrt(x)` holds when it holds for the root rounded up.
 #[inline(always)]
 pub(super) fn integer_row(m: i64, x: i64) -> i64 {
@@ -191,6 +220,7 @@ mod tests {
         check::<Single>(1500);
         check::<Double>(1500);
         check::<AllSingle>(1500);
+        check::<Printed>(1500);
         check::<Newton<CARMACK, 1>>(1500);
         check::<Newton<LOMONT, 3>>(1500);
     }

@@ -64,7 +64,7 @@ pub fn root_errors<R: SingleRoot>(below: u32) -> u64 {
 
 #[cfg(test)]
 mod tests {
-    use super::super::{AllSingle, CARMACK, Double, Newton, Single, tally};
+    use super::super::{AllSingle, CARMACK, Double, Newton, Printed, Single, tally};
     use super::*;
 
     #[test]
@@ -84,7 +84,11 @@ mod tests {
     fn good_roots_have_none_where_what_stands_under_them_is_exact() {
         assert_eq!(counterexample::<Double>(1 << 20), None);
         assert_eq!(counterexample::<Single>(1 << 20), None);
-        assert!(counterexample::<AllSingle>(10_000).is_some());
+        let first = [counterexample::<AllSingle>, counterexample::<Printed>].map(|of| of(10_000));
+        assert_eq!(
+            first.map(|found| found.map(|it| (it.n, it.k))),
+            [Some((8193, 33_558_526)), Some((5794, 16_782_319))]
+        );
     }
 
     #[test]
