@@ -31,6 +31,12 @@ fn one_line(what: impl std::fmt::Display) -> String {
     what.to_string().replace(['\n', '\r'], " ")
 }
 
+/// As much of what a file says as a message needs, so that what is expected instead is not lost behind it.
+fn brief(text: &str) -> String {
+    const LONGEST: usize = 120;
+    text.char_indices().nth(LONGEST).map_or(text.to_owned(), |(end, _)| format!("{}...", &text[..end]))
+}
+
 /// A list of boxes: `.npy` (N,6) float32 or float64 (rounded outward), or `.csv` with the columns
 /// min_x,min_y,min_z,max_x,max_y,max_z (rounded to nearest, which never parts two boxes that touch).
 ///
@@ -169,7 +175,9 @@ fn csv_box(record: &csv::StringRecord) -> Result<Aabb, String> {
     }
     let mut values = [0.0f32; 6];
     for (column, (value, field)) in values.iter_mut().zip(record).enumerate() {
-        *value = field.parse().map_err(|_| format!("column {}: '{field}' is not a number", column + 1))?;
+        *value = field
+            .parse()
+            .map_err(|_| format!("column {}: '{}' is not a number", column + 1, brief(field)))?;
     }
     Ok(f32_box(values))
 }

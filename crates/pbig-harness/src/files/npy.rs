@@ -1,6 +1,6 @@
 //! The content of `.npy` files.
 
-use super::{ContentError, FrameBox, Frames, f32_box, f64_box, one_line};
+use super::{ContentError, FrameBox, Frames, brief, f32_box, f64_box, one_line};
 use ndarray::{Array, ArrayD, ArrayView2, Dimension, Ix2, Ix3};
 use ndarray_npy::npy::header::Header;
 use ndarray_npy::{ReadNpyError, ReadNpyExt};
@@ -56,7 +56,7 @@ fn rows<'a, T: Copy>(array: &'a ArrayView2<'_, T>) -> impl Iterator<Item = [T; 6
 
 fn shape_text(shape: &[usize]) -> String {
     let lengths: Vec<String> = shape.iter().map(usize::to_string).collect();
-    format!("({})", lengths.join(", "))
+    brief(&format!("({})", lengths.join(", ")))
 }
 
 /// An array of either float type.
@@ -93,7 +93,7 @@ fn six_columns<T, D: Dimension>(
 fn npy_text(error: &ReadNpyError) -> String {
     match error {
         ReadNpyError::WrongDescriptor(kind) => values_text(kind.as_string()),
-        other => one_line(format!("not a readable .npy file: {other}")),
+        other => one_line(format!("not a readable .npy file: {}", brief(&other.to_string()))),
     }
 }
 
@@ -118,7 +118,7 @@ fn value_name(kind: &str) -> String {
         "c" => named("complex"),
         _ => None,
     };
-    name.unwrap_or_else(|| format!("of type '{kind}'"))
+    name.unwrap_or_else(|| format!("of type '{}'", brief(kind)))
 }
 
 /// Whether this is a `.npy` file at all.

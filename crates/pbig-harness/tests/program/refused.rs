@@ -111,6 +111,28 @@ fn values_that_are_no_floats_are_named_as_numpy_names_them() {
 }
 
 #[test]
+fn what_a_file_says_at_length_is_told_in_brief_and_what_is_expected_all_the_same() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let long = "é".repeat(20_000);
+    let version_3 = |text: String| {
+        [b"\x93NUMPY\x03\x00", &(text.len() as u32).to_le_bytes()[..], text.as_bytes()].concat()
+    };
+    let of_kind = format!("{{'descr': '{long}', 'fortran_order': False, 'shape': (1, 6)}}\n");
+    let ones = "1, ".repeat(20_000);
+    for (name, content, words) in [
+        ("x.npy", version_3(of_kind), "é...'; expected float32 or float64"),
+        ("x.npy", version_3(format!("{{'{long}': 1}}\n")), r"unknown key: '\xe9"),
+        ("x.npy", version_3(long.clone()), "not a readable .npy file: "),
+        ("x.npy", [header("'<f4'", &ones), vec![0; 4]].concat(), "found (1, 1, "),
+        ("x.npy", header("'<f4'", &ones), "1,... needs 4 bytes of values, the file has 0"),
+        ("x.csv", format!("0,0,{long},1,1,1\n").into_bytes(), "é...' is not a number"),
+    ] {
+        let line = line_about(folder.path(), "pairs", name, &content);
+        assert!(line.contains(words) && line.chars().count() < 250, "{words}: {line}");
+    }
+}
+
+#[test]
 fn a_list_of_frames_and_one_of_boxes_are_told_apart() {
     let folder = tempfile::tempdir().expect("a folder");
     let refuse = |command, words: &str| refused(&pbig(folder.path(), &[command, "x.npy"]), &[words]);
