@@ -46,19 +46,20 @@ fn through_rapier(c: &mut Criterion) {
     }
 }
 
-/// Where boxes go, and what an update of all is then: a test of near pairs, or a grid built anew, as boxes jump too far
-/// for a list of those.
-const MOTIONS: [(&str, f32); 2] = [("all moved a little", 0.1), ("all jumped", 3.0)];
+/// How many boxes move and how far, and what an update is then: a test of near pairs, a grid built anew, as boxes jump too
+/// far for a list of those, or edits.
+const MOTIONS: [(&str, f64, f32); 3] =
+    [("all moved a little", 1.0, 0.1), ("all jumped", 1.0, 3.0), ("1% moved", 0.01, 0.1)];
 
 /// Frames after which an update is like those before.
 const WARM_UP: usize = 12;
 
 /// The finder's stages, as it measures them itself.
 fn stages(c: &mut Criterion) {
-    for (motion, distance) in MOTIONS {
+    for (motion, share, distance) in MOTIONS {
         let mut group = c.benchmark_group(format!("stages, unit 100000, {motion}"));
         group.sample_size(10);
-        let mut wander = Wander::new(boxes("unit", 100_000), 1.0, distance);
+        let mut wander = Wander::new(boxes("unit", 100_000), share, distance);
         let mut broad_phase = Incremental::new(Config::DEFAULT).expect("a good margin");
         let mut frame = 0;
         let mut update = || {

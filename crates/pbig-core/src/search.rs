@@ -83,7 +83,7 @@ impl<R: Record> Search<R> {
             done => done.map(drop),
         };
         self.spare = summary.into_spare();
-        report.plan.measured.gpu = self.share_of_gpu(config);
+        report.plan.measured.gpu = self.share_of_gpu(config, boxes.len());
         found
     }
 
@@ -227,10 +227,10 @@ impl<R: Record> Search<R> {
     }
 
     /// What a device takes of the CPU's time, where that decides and both are known.
-    pub(crate) fn share_of_gpu(&self, _config: &Config) -> Option<f32> {
+    pub(crate) fn share_of_gpu(&self, _config: &Config, _boxes: usize) -> Option<f32> {
         #[cfg(feature = "gpu")]
         if _config.backend == Backend::Auto {
-            return self.trial.share_of_gpu();
+            return self.trial.share_of_gpu(_boxes);
         }
         None
     }

@@ -4,17 +4,19 @@ use super::BroadPhase;
 use crate::plan::{Chosen, Measured, NoNear};
 
 impl BroadPhase {
-    /// What has decided about an update that is done.
+    /// What has decided about an update that is done, and has not been measured itself yet.
     pub(super) fn report_measured(&mut self) {
         let plan = &self.report.plan;
         let has_list =
             plan.near.is_some() || matches!(plan.no_near, Some(NoNear::Unpaid(_) | NoNear::Compared));
         let is_searched = matches!(plan.chosen, Chosen::Edit | Chosen::Grid);
+        // A device is not asked where few have.
+        let many = self.report.changed * 4 >= u64::from(self.present_count);
         self.report.plan.measured = Measured {
             edit: self.rebuild.measured().filter(|_| is_searched && plan.near.is_none()),
             near: self.near.worth.share().filter(|_| has_list),
             grid: self.small.turns.share_of_grid().filter(|_| self.may_be_small()),
-            gpu: self.base.share_of_gpu(&self.config),
+            gpu: self.base.share_of_gpu(&self.config, self.boxes.len()).filter(|_| many),
         };
     }
 }

@@ -322,6 +322,7 @@ impl BroadPhase {
         stage!("emit");
         self.sort_events();
         self.report.stages.emit += watch.lap();
+        self.report_measured();
         if !is_small && self.updates > 1 {
             let (changed, time) = (self.report.changed as usize, self.report.stages.total());
             let present = self.present_count as usize;
@@ -330,7 +331,6 @@ impl BroadPhase {
                 self.rebuild.note(route, changed, present, time);
             }
         }
-        self.report_measured();
         self.take_turns(if is_small { Turn::Bitmap } else { Turn::Grid }, clock);
         self.report.pairs = self.pair_count() as u64;
         Ok(())

@@ -16,6 +16,9 @@ const SHARE: usize = 64;
 /// Updates in a row that go one way before the other is tried again, where both are about as good.
 const SAME: u32 = 64;
 
+/// How much better the other has to be expected to be: the choice does not flap where they are as good.
+const BETTER: f32 = 1.15;
+
 /// How much better or worse the other may be for that.
 const NEARLY: f32 = 2.0;
 
@@ -43,7 +46,7 @@ impl Rebuild {
     pub(super) fn pays(&mut self, changed: usize, present: usize) -> bool {
         let share = changed as f32 * self.ratio() / present.max(1) as f32;
         let is_close = (1.0 / NEARLY..NEARLY).contains(&share);
-        let better = share >= 1.0;
+        let better = share >= if self.last { 1.0 / BETTER } else { BETTER };
         let is_far = !(1.0 / FAR..FAR).contains(&share);
         let patience = if is_close { SAME } else { SELDOM };
         let pays = if !is_far && self.same >= patience { !self.last } else { better };
@@ -104,7 +107,7 @@ mod tests {
     #[test]
     fn what_takes_less_is_done_and_the_other_tried_now_and_then_where_they_are_close() {
         let mut rebuild = Rebuild::default();
-        assert!(!rebuild.pays(140, 1000) && rebuild.pays(150, 1000), "before anything is known: a seventh");
+        assert!(!rebuild.pays(140, 1000) && rebuild.pays(170, 1000), "before anything is known: a seventh");
         for _ in 0..50 {
             rebuild.note(Route::Few, 100, 1000, us(200));
             rebuild.note(Route::All, 100, 1000, us(100));
@@ -113,6 +116,15 @@ mod tests {
         let tried = (0..10 * SAME).filter(|_| rebuild.pays(60, 1000)).count() as u32;
         assert!((10 * SAME - 12..10 * SAME - 5).contains(&tried), "{tried}");
         assert!((0..10 * SAME).all(|_| rebuild.pays(200, 1000)), "not close");
+    }
+
+    #[test]
+    fn about_where_both_are_as_good_the_choice_does_not_flap() {
+        let mut rebuild = Rebuild::default();
+        let mut goes = |changed: usize| rebuild.pays(changed, 1000);
+        assert!((0..20).all(|update| !goes(135 + 20 * (update % 2))), "edits as before");
+        assert!(goes(200) && (0..20).all(|update| goes(135 + 20 * (update % 2))), "anew as before");
+        assert!(!goes(100));
     }
 
     #[test]

@@ -47,6 +47,14 @@ fn boxes_that_are_invalid_are_there_and_do_not_count_in_the_plan() {
     broad_phase.update().expect("three boxes");
     let report = broad_phase.report();
     assert_eq!((report.boxes, report.invalid, report.plan.boxes), (3, 1, 2));
+    let idle = |broad_phase: &mut BroadPhase| {
+        broad_phase.update().expect("nothing new");
+        broad_phase.report().plan.to_string()
+    };
+    assert_eq!(idle(&mut broad_phase), "nothing to do: no box has changed");
+    broad_phase.remove(0);
+    broad_phase.update().expect("two boxes");
+    assert_eq!(idle(&mut broad_phase), "nothing to do: fewer than two valid boxes");
 }
 
 /// An update of a small world in which boxes swing against their neighbours, one goes, and now and then few move.

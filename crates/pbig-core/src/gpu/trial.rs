@@ -52,9 +52,9 @@ impl Trial {
         *side = Some(side.map_or(per_box, |before| 0.75 * before + 0.25 * per_box));
     }
 
-    /// What the GPU takes of the CPU's time, once both are known.
-    pub(crate) fn share_of_gpu(&self) -> Option<f32> {
-        Some((self.gpu? / self.cpu?) as f32)
+    /// What the GPU takes of the CPU's time, once both are known, for so many boxes that it decides.
+    pub(crate) fn share_of_gpu(&self, boxes: usize) -> Option<f32> {
+        if boxes < WORTH_TRYING { None } else { Some((self.gpu? / self.cpu?) as f32) }
     }
 
     /// The device has failed: it must prove itself again.
@@ -82,9 +82,9 @@ mod tests {
     fn the_faster_side_gets_the_calls_and_the_other_is_tried_now_and_then() {
         let mut trial = Trial::default();
         assert_eq!(on_gpu(&mut trial, 100, 9_999, 100, 1), 0, "too few boxes");
-        assert_eq!(trial.share_of_gpu(), None);
+        assert_eq!(trial.share_of_gpu(100_000), None);
         assert!(on_gpu(&mut trial, 1000, 100_000, 100, 10) > 990);
-        assert_eq!(trial.share_of_gpu(), Some(0.1));
+        assert_eq!((trial.share_of_gpu(100_000), trial.share_of_gpu(9999)), (Some(0.1), None));
         let mut trial = Trial::default();
         assert!(on_gpu(&mut trial, 1000, 100_000, 100, 95) < 12, "not enough better");
         assert!(on_gpu(&mut trial, 10_000, 100_000, 100, 10) > 8000, "noticed when it becomes better");

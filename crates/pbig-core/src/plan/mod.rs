@@ -212,6 +212,9 @@ impl fmt::Display for Plan {
         match self.chosen {
             Chosen::Nothing if boxes < 2 => write!(f, "nothing to do: fewer than two valid boxes"),
             Chosen::Nothing => write!(f, "nothing to do: no box has changed"),
+            Chosen::Brute if self.expected.is_none() => {
+                write!(f, "brute force: {boxes} boxes, by the settings (`backend`, `brute_below`)")
+            }
             Chosen::Brute => write!(f, "brute force: {boxes} boxes are cheaper to test than to sort"),
             Chosen::Bitmap => write!(f, "bitmap: {boxes} boxes are few enough to be looked up in bands"),
             Chosen::Grid => write!(f, "grid: {boxes} boxes"),
@@ -296,7 +299,11 @@ mod tests {
     #[test]
     fn small_sets_are_not_sorted_and_large_ones_are() {
         assert_eq!(plan(&lattice(1, 1.0, 0.4), Config::DEFAULT).chosen, Chosen::Nothing);
-        assert_eq!(plan(&lattice(3, 1.0, 0.4), Config::DEFAULT).chosen, Chosen::Brute);
+        let few = plan(&lattice(3, 1.0, 0.4), Config::DEFAULT);
+        assert_eq!(few.chosen, Chosen::Brute);
+        assert!(few.to_string().contains("by the settings"), "{few}");
+        let sorted_never = plan(&lattice(3, 1.0, 0.4), Config { brute_below: 0, ..Config::DEFAULT });
+        assert!(sorted_never.to_string().contains("cheaper to test than to sort"), "{sorted_never}");
         assert_eq!(plan(&lattice(20, 1.0, 0.4), Config::DEFAULT).chosen, Chosen::Grid);
     }
 

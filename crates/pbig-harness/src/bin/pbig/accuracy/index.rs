@@ -18,13 +18,14 @@ use times::{Times, label};
 
 pub(super) fn run(quick: bool) -> Result<Study, Failure> {
     let every: Vec<Every> = WAYS.iter().map(|way| Every::of(way, quick)).collect();
-    check(&every)?;
+    let (exact, sizes) = (exact::tallied(quick), sizes::looked_at(quick));
+    check(&every, &exact, &sizes)?;
     let at = if quick { vec![1000, 1 << 20] } else { vec![1000, 5000, 10_000, 100_000, 1 << 20] };
     let times = at.iter().map(|&n| Times::measure(n, quick)).collect::<Result<Vec<_>, _>>()?;
     let (kernels, of_kernels) = kernels(quick)?;
     let found = Found {
-        exact: exact::tallied(quick),
-        sizes: sizes::looked_at(quick),
+        exact,
+        sizes,
         counterexamples: rules::counterexamples(quick),
         table_3: paper::table_3(quick),
         every,
@@ -130,11 +131,13 @@ fn percent(part: u64, all: u64) -> f64 {
     part as f64 / all.max(1) as f64 * 100.0
 }
 
-/// After the correction by integers, nothing may be wrong.
-fn check(every: &[Every]) -> Result<(), Failure> {
-    let wrong = every.iter().find_map(|every| every.first[2].map(|n| (label(&every.way), n)));
-    wrong.map_or(Ok(()), |(name, n)| {
-        Err(Failure::Check(format!("{name}: a pair of {n} boxes is wrong after the correction by integers")))
+/// After the correction by integers nothing may be wrong, nor without an estimate.
+fn check(every: &[Every], exact: &[Exactly], sizes: &[sizes::Size]) -> Result<(), Failure> {
+    let estimated = every.iter().filter_map(|every| Some((label(&every.way), every.first[2]?)));
+    let large = sizes.iter().filter(|size| !size.is_right(2)).map(|size| (label(&WAYS[size.way]), size.n));
+    let exactly = exact.iter().filter_map(|way| Some((way.name.to_owned(), way.first?)));
+    estimated.chain(large).chain(exactly).next().map_or(Ok(()), |(name, n)| {
+        Err(Failure::Check(format!("{name}: a pair of {n} boxes is wrong, by integers")))
     })
 }
 
@@ -244,9 +247,16 @@ mod tests {
 
     #[test]
     fn a_wrong_pair_after_integers_is_a_failed_check() {
-        let mut every = Every::of(&WAYS[0], true);
-        assert!(check(std::slice::from_ref(&every)).is_ok());
+        let tells = |checked: Result<(), Failure>, of: &str| {
+            checked.is_err_and(|failure| failure.to_string().contains(of))
+        };
+        let (mut every, mut exact) = (Every::of(&WAYS[0], true), exact::tallied(true));
+        assert!(check(std::slice::from_ref(&every), &exact, &sizes::looked_at(true)).is_ok());
         every.first[2] = Some(7);
-        assert!(check(&[every]).is_err_and(|failure| failure.to_string().contains("7 boxes")));
+        assert!(tells(check(&[every], &exact, &[]), "7 boxes"));
+        exact[0].first = Some(8);
+        assert!(tells(check(&[], &exact, &[]), "8 boxes"));
+        let large = sizes::Size::planted(1 << 20);
+        assert!(tells(check(&[], &[], &[large]), "1048576 boxes"));
     }
 }

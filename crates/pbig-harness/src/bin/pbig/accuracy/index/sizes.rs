@@ -35,6 +35,13 @@ impl Size {
         Self { n, way, looked }
     }
 
+    /// With a wrong row after every correction.
+    #[cfg(test)]
+    pub(super) fn planted(n: i64) -> Self {
+        let wrong = Sample { wrong_ends: 1, ..Sample::default() };
+        Self { n, way: 0, looked: Looked::AtSome([wrong; 3]) }
+    }
+
     /// Whether nothing that was looked at is wrong after a correction.
     pub(super) fn is_right(&self, correction: usize) -> bool {
         match &self.looked {
