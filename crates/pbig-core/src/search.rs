@@ -137,10 +137,11 @@ impl<R: Record> Search<R> {
             let summary = set.summary.get();
             report.plan = Plan::new(summary, config, 1.0);
             report.invalid = set.boxes.len() as u64 - u64::from(summary.valid);
-            let found = self.find_pbig(set.boxes, config, accept, report);
-            all.into_iter()
-                .for_each(|all| self.found.chunks.iter().for_each(|chunk| all.extend_from_slice(chunk)));
-            return found;
+            self.find_pbig(set.boxes, config, accept, report)?;
+            if let Some(all) = all {
+                self.found.chunks.iter().for_each(|chunk| all.extend_from_slice(chunk));
+            }
+            return Ok(());
         }
         report.plan = self.map.plan_and_build(set, config, &mut report.stages);
         report.invalid = u64::from(self.map.invalid);

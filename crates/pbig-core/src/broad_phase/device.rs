@@ -166,7 +166,7 @@ mod tests {
         let mut broad_phase = BroadPhase::with_gpu(config, gpu).expect("a margin that is one");
         let (mut random, mut pairs) = (StdRng::seed_from_u64(17), BTreeSet::new());
         let home = |id: u32| [id % 8, id / 8 % 8, id / 64].map(|i| i as f32);
-        // Updates on the device, on the CPU, and there by near pairs, and of each those that failed.
+        // Updates on the device, on the CPU, and there by near pairs; and those that failed, with a list or without.
         let mut seen = [[0; 2]; 3];
         for round in 0..400 {
             // For a while the same, so that there are lists.

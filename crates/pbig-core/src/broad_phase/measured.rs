@@ -4,7 +4,7 @@ use super::BroadPhase;
 use crate::plan::{Chosen, Measured, NoNear};
 
 impl BroadPhase {
-    /// What has decided about an update that is done, and has not been measured itself yet.
+    /// What has decided about an update that is done. Edits and lists have not learned from it yet.
     pub(super) fn report_measured(&mut self) {
         let plan = &self.report.plan;
         let has_list =

@@ -113,10 +113,10 @@ impl<R: Record> Map<R> {
         A: Accept,
     {
         OUT.with_borrow_mut(|out| {
-            out.clear();
             let counts = self.check_chunk(chunk, accept, out, room);
             gathered.lock().unwrap_or_else(PoisonError::into_inner).extend_from_slice(out);
             // One of a pile may have found very many, and the thread lives on.
+            out.clear();
             out.shrink_to(MOST_KEPT);
             counts
         })

@@ -213,7 +213,10 @@ impl fmt::Display for Plan {
             Chosen::Nothing if boxes < 2 => write!(f, "nothing to do: fewer than two valid boxes"),
             Chosen::Nothing => write!(f, "nothing to do: no box has changed"),
             Chosen::Brute if self.expected.is_none() => {
-                write!(f, "brute force: {boxes} boxes, by the settings (`backend`, `brute_below`)")
+                write!(
+                    f,
+                    "brute force: {boxes} boxes; costs were not compared, they are few or `backend` asks for it"
+                )
             }
             Chosen::Brute => write!(f, "brute force: {boxes} boxes are cheaper to test than to sort"),
             Chosen::Bitmap => write!(f, "bitmap: {boxes} boxes are few enough to be looked up in bands"),
@@ -301,7 +304,7 @@ mod tests {
         assert_eq!(plan(&lattice(1, 1.0, 0.4), Config::DEFAULT).chosen, Chosen::Nothing);
         let few = plan(&lattice(3, 1.0, 0.4), Config::DEFAULT);
         assert_eq!(few.chosen, Chosen::Brute);
-        assert!(few.to_string().contains("by the settings"), "{few}");
+        assert!(few.to_string().contains("costs were not compared"), "{few}");
         let sorted_never = plan(&lattice(3, 1.0, 0.4), Config { brute_below: 0, ..Config::DEFAULT });
         assert!(sorted_never.to_string().contains("cheaper to test than to sort"), "{sorted_never}");
         assert_eq!(plan(&lattice(20, 1.0, 0.4), Config::DEFAULT).chosen, Chosen::Grid);

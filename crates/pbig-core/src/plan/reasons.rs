@@ -20,7 +20,7 @@ pub enum NoNear {
     Unmeasured,
     /// They pay, and after some this is measured again, by an update without.
     Compared,
-    /// The last ones did not pay: so many updates more go without.
+    /// The last ones did not pay, or did not last: so many updates more go without.
     Unpaid(u32),
     /// Too many pairs would be near, as boxes move far, are crowded or filtered: so many updates more go without.
     Many(u32),
@@ -54,11 +54,22 @@ impl fmt::Display for NoNear {
         match self {
             Self::Unmeasured => write!(f, "what updates take without them is measured first"),
             Self::Compared => write!(f, "they pay, which is measured again by an update without"),
-            Self::Unpaid(updates) => {
-                write!(f, "the last ones did not pay, {updates} updates more go without")
-            }
-            Self::Many(updates) => write!(f, "too many would be near, {updates} updates more go without"),
+            Self::Unpaid(pause) => write!(f, "the last ones did not pay or last, {}", Pause(*pause)),
+            Self::Many(pause) => write!(f, "too many would be near, {}", Pause(*pause)),
             Self::Unknown => write!(f, "how far most boxes move is not known"),
+        }
+    }
+}
+
+/// Updates that go without a list.
+struct Pause(u32);
+
+impl fmt::Display for Pause {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self.0 {
+            0 => write!(f, "the next update may try again"),
+            1 => write!(f, "one more update goes without"),
+            updates => write!(f, "{updates} more updates go without"),
         }
     }
 }

@@ -234,6 +234,10 @@ fn what_lists_cost_decides_about_pauses() {
     let mut worth = Worth { usual: Some(100.0), own: spent(50.0), ..Worth::default() };
     worth.end(10);
     assert_eq!((worth.pause, worth.share()), (0, Some(0.5)), "half as much");
+    assert_eq!(worth.goes_without(), None);
+    assert_eq!(Worth::default().goes_without(), Some(NoNear::Unmeasured));
+    (1..8).for_each(|_| worth.end(10));
+    assert_eq!(worth.goes_without(), Some(NoNear::Compared), "after eight of them");
     worth.own = spent(95.0);
     let pauses = [0; 9].map(|_| {
         worth.end(10);
@@ -243,6 +247,7 @@ fn what_lists_cost_decides_about_pauses() {
     worth.own = spent(1.0);
     worth.end(1);
     assert_eq!(worth.pause, 64, "cheap, but it has not lasted");
+    assert_eq!(worth.goes_without(), Some(NoNear::Unpaid(63)));
 }
 
 #[test]

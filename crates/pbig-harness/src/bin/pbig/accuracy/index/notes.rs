@@ -11,7 +11,8 @@ pub(super) fn notes(found: &Found) -> Vec<String> {
         "What stands under the root is an exact 64-bit integer, rounded once, but for two ways that compute \
          equation 1 step by step in f32, as a device without such integers would: `all in f32` with rows counted \
          from 0, `as printed, in f32` with rows from 1 and every term in the paper's order. Indices are counted \
-         from 0 in both, as they are in the paper. The row is what is left without the fraction. By integers nothing was wrong, whatever the root: a run in which something is fails."
+         from 0 in both, as they are in the paper. The row is what is left without the fraction. By integers \
+         nothing was wrong, whatever the root: a run in which something is fails."
             .to_owned(),
         "`Carmack 2` is two steps of Newton from Carmack's constant. Missed: pairs that no index gives, (a, b) or \
          (b, a), and that are not tested. Doubled: tests of a pair that another index tests, too. No pair: \
