@@ -102,4 +102,6 @@ kernels! {
     CHECK_ALL "check_all" [OVERLAPS, PAIR_INDEX, EMIT] (params, chunk, boxes, filters, totals, out);
     /// Study: pairs of given indices.
     INDEX_PAIRS "index_pairs" [PAIR_INDEX] (params, out);
+    /// Study: pairs of given identifiers, by the lazy way.
+    LAZY_PAIRS "lazy_pairs" [] (params, out);
 }

@@ -2,7 +2,10 @@
 //! coordinates of the study.
 
 use pbig_core::Aabb;
-use pbig_harness::precision::{Code, Coordinates, Exact, Fixed, Half, Scale, half_down, half_up, half_value};
+use pbig_harness::precision::{
+    CODE_STEPS, Code, Coordinates, Exact, FARTHEST, FIXED_STEPS, Fixed, Half, Scale, half_down, half_up,
+    half_value,
+};
 use proptest::prelude::*;
 
 /// Any float but NaN, every magnitude as likely: zeros, denormals and infinities too.
@@ -140,6 +143,55 @@ fn f16_is_rounded_outward_and_in_order_around_each_of_them() {
 #[ignore = "all 2^32 floats take a minute: cargo test --release -p pbig-tests --test suite -- --ignored f16"]
 fn f16_is_rounded_outward_and_in_order_for_all_floats() {
     f16_is_right_for(-INFINITE..INFINITE + 1);
+}
+
+/// In order, and the one below no more than a step from the one above: with that a minimum never comes after a maximum that it
+/// does not exceed, which is all that a pair needs.
+fn steps_are_right_for(scale: &Scale, steps: u32, places: std::ops::Range<i64>) {
+    let both = |x: f32| [scale.down(0, x, steps), scale.up(0, x, steps)];
+    let mut before = both(in_order(places.start));
+    for x in places.map(in_order) {
+        let [down, up] = both(x);
+        assert!(down <= up && up - down <= 1, "{x:e}: from {down} to {up}");
+        assert!(before[0] <= down && before[1] <= up, "{x:e}: not in order");
+        before = [down, up];
+    }
+}
+
+/// Cells from small to large, whose origin is that of the world, near it, or far away; as fixed point and codes count them.
+fn scales() -> impl Iterator<Item = (Scale, u32)> {
+    let cells = [(2f32.powi(-30), -7.3), (1.0, 0.0), (1.1, 1e6), (2f32.powi(30) * 1.1, -0.3)];
+    let scale = |(cell, origin): (f32, f32)| Scale { origin: [origin * cell; 3], cell };
+    cells.into_iter().map(scale).flat_map(|scale| [(scale, FIXED_STEPS), (scale, CODE_STEPS)])
+}
+
+/// Where the answer changes: around steps near the origin, and around where coordinates are clamped.
+#[test]
+fn fixed_point_is_rounded_outward_and_in_order_around_steps() {
+    for (scale, steps) in scales() {
+        let at = |cells: f64| (f64::from(scale.origin[0]) + cells * f64::from(scale.cell)) as f32;
+        let place = |x: f32| if x < 0.0 { -i64::from((-x).to_bits()) } else { i64::from(x.to_bits()) };
+        let whole = (-3000..3000).map(|step| f64::from(step) / f64::from(steps));
+        for cells in whole.chain([FARTHEST, -FARTHEST, 1e300, -1e300]) {
+            let x = place(at(cells).clamp(f32::MIN, f32::MAX));
+            steps_are_right_for(&scale, steps, (x - 3).max(-INFINITE)..(x + 4).min(INFINITE + 1));
+        }
+    }
+}
+
+#[test]
+#[ignore = "all 2^32 floats take minutes: cargo test --release -p pbig-tests --test suite -- --ignored fixed_point"]
+fn fixed_point_is_rounded_outward_and_in_order_for_all_floats() {
+    for (scale, steps) in scales() {
+        steps_are_right_for(&scale, steps, -INFINITE..INFINITE + 1);
+    }
+}
+
+/// With a cell below 0 they run backwards.
+#[test]
+#[should_panic(expected = "not in order")]
+fn steps_that_are_out_of_order_are_seen() {
+    steps_are_right_for(&Scale { origin: [0.0; 3], cell: -1.0 }, 64, 0x3f80_0000..0x4000_0000);
 }
 
 /// Boxes that are a step or so apart, which rounding may join, and more, which it may not: or a test that lets

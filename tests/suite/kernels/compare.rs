@@ -132,6 +132,10 @@ pub(super) fn hits(s: &State) -> u64 {
     wide(s.totals.pairs).saturating_sub(wide(NEARLY))
 }
 
+pub(super) fn compare_out(_: &State, found: &State, wanted: &State) -> Option<String> {
+    same("words", &found.out, &wanted.out)
+}
+
 pub(super) fn compare_indices(_: &State, found: &State, wanted: &State) -> Option<String> {
     let pairs = |s: &State| -> Vec<[u32; 2]> { s.out.chunks_exact(3).map(|c| [c[1], c[2]]).collect() };
     same("pairs", &pairs(found), &pairs(wanted))

@@ -1,8 +1,8 @@
-//! The study of Avril's mapping: pairs of given indices.
+//! The studies of Avril's mapping and of the lazy way: pairs of given indices, or identifiers.
 
 use super::*;
 
-/// What index_pairs reads and writes for `count` indices from `first` on.
+/// What these kernels read and write for `count` indices from `first` on.
 pub(super) fn indices(n: u32, first: u32, count: u32) -> State {
     let params = Params { boxes: n, split: first, cells: count, ..Params::default() };
     State { params, ..State::default() }
@@ -14,6 +14,27 @@ pub(super) fn index_pairs(s: &mut State) {
     for i in 0..s.params.cells {
         let (a, b) = pair_of((s.params.split + i).into(), s.params.boxes.into());
         s.out.extend([a as u32, a as u32, b as u32]);
+    }
+}
+
+/// Of n^2 identifiers those of pairs, lesser box first; the others give no box.
+pub(super) fn lazy_pairs(s: &mut State) {
+    s.out.clear();
+    for id in s.params.split..s.params.split + s.params.cells {
+        let (a, b) = (id / s.params.boxes, id % s.params.boxes);
+        s.out.extend(if a < b { [a, b] } else { [u32::MAX; 2] });
+    }
+}
+
+#[test]
+fn lazy_pairs_agrees_with_its_twin_as_far_as_32_bits_reach() {
+    for n in [1u32, 2, 3, 31, 32, 33, 1000, 65_535] {
+        let all = n * n;
+        let count = all.min(20_000);
+        for first in [0, (all - count) / 3, all - count] {
+            let fault = fault(twin("lazy_pairs"), &GpuOptions::DEFAULT, &indices(n, first, count));
+            assert_eq!(fault, None, "n {n}, from {first}");
+        }
     }
 }
 

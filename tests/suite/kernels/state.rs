@@ -132,7 +132,7 @@ impl State {
 
     /// The state before a kernel: the twins of those before it have run.
     pub(super) fn before(kernel: &str, case: &Case) -> Self {
-        if kernel == "index_pairs" {
+        if matches!(kernel, "index_pairs" | "lazy_pairs") {
             return indices(1000, 77, 4000);
         }
         let mut state = Self::new(case);

@@ -12,7 +12,7 @@ pub(super) struct Twin {
 }
 
 /// The twins, in the order in which the kernels run.
-pub(super) static TWINS: [Twin; 14] = [
+pub(super) static TWINS: [Twin; 15] = [
     Twin { kernel: &shaders::SETTLE, run: settle, groups: by_known, compare: compare_motions },
     Twin { kernel: &shaders::RENEW, run: renew, groups: by_change, compare: compare_motions },
     Twin { kernel: &shaders::LOCATE, run: locate, groups: by_box, compare: compare_located },
@@ -27,6 +27,7 @@ pub(super) static TWINS: [Twin; 14] = [
     Twin { kernel: &shaders::CHECK_LARGE, run: check_large, groups: by_large_item, compare: compare_checks },
     Twin { kernel: &shaders::CHECK_ALL, run: check_all, groups: by_pair, compare: compare_checks },
     Twin { kernel: &shaders::INDEX_PAIRS, run: index_pairs, groups: by_cell, compare: compare_indices },
+    Twin { kernel: &shaders::LAZY_PAIRS, run: lazy_pairs, groups: by_cell, compare: compare_out },
 ];
 
 pub(super) fn twin(kernel: &str) -> &'static Twin {

@@ -134,7 +134,7 @@ impl Left {
 }
 
 /// The index of the pair that is tested: (1, 0) tests 0 and 1, as (0, 1) does.
-fn tested((a, b): (i64, i64), n: i64) -> Option<i64> {
+pub(super) fn tested((a, b): (i64, i64), n: i64) -> Option<i64> {
     let (a, b) = (a.min(b), a.max(b));
     (0 <= a && a < b && b < n).then(|| row_start(a, n) + b - a - 1)
 }

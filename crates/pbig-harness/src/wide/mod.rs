@@ -1,15 +1,14 @@
 //! The same world in f64: poses, boxes and pairs to hold those of f32 against, near the origin and far from it.
-//!
-//! Boxes are those of parry3d-f64, from which rapier3d-f64 has its own: the rest of that is not needed here, and takes
-//! longer to build than parry's shapes and boxes alone.
 
 mod layout;
 mod pairs;
 mod shape;
+mod world;
 
 pub use layout::{Layout, to_f32, to_f64};
 pub use pairs::{Differences, Truth, pairs};
 pub use shape::aabb;
+pub use world::{WideWorld, moved};
 
 use pbig_core::Aabb;
 

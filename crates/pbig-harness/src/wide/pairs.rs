@@ -2,6 +2,7 @@
 
 use super::Wide;
 use pbig_core::Pair;
+use std::ops::AddAssign;
 
 /// Every pair of boxes that overlap, in order, each with [`Wide::gap`]. By a sweep along the axis on which they are spread most.
 pub fn pairs(boxes: &[Wide]) -> Vec<(Pair, f64)> {
@@ -46,6 +47,14 @@ pub struct Differences {
     pub missed_deep: u64,
     /// Others that are.
     pub added: u64,
+}
+
+impl AddAssign for Differences {
+    fn add_assign(&mut self, other: Self) {
+        self.missed += other.missed;
+        self.missed_deep += other.missed_deep;
+        self.added += other.added;
+    }
 }
 
 impl Truth {

@@ -84,19 +84,13 @@ struct Every {
     first: [Option<i64>; 3],
 }
 
-/// Every n up to this, and how far apart they are beyond. One step of Newton leaves most pairs of many boxes wrong,
-/// each of which is looked at in turn: thirty times the time of the others.
-fn boxes(way: &Way, quick: bool) -> Vec<i64> {
-    match (quick, way.steps) {
-        (true, _) => (2..=250).chain([1000]).collect(),
-        (false, Some(1)) => (2..=1000).chain((1050..=5000).step_by(50)).collect(),
-        (false, _) => (2..=5000).collect(),
-    }
+fn boxes(quick: bool) -> Vec<i64> {
+    if quick { (2..=250).chain([1000]).collect() } else { (2..=5000).collect() }
 }
 
 impl Every {
     fn of(way: &Way, quick: bool) -> Self {
-        let boxes = boxes(way, quick);
+        let boxes = boxes(quick);
         let zero = || Self { way: *way, boxes: vec![], tallies: Default::default(), first: [None; 3] };
         let one = |mut sum: Self, &n: &i64| {
             for (k, tally) in (way.tally)(n).into_iter().enumerate() {
@@ -234,7 +228,7 @@ mod tests {
         let way = WAYS.iter().find(|way| label(way) == "Carmack 1").expect("a way");
         let every = Every::of(way, true);
         let mut slow = [Tally::default(); 3];
-        for n in boxes(way, true) {
+        for n in boxes(true) {
             for (sum, tally) in slow.iter_mut().zip((way.tally)(n)) {
                 *sum += tally;
             }

@@ -10,6 +10,7 @@ mod study;
 mod wide;
 
 use crate::bench::machine::{Machine, slug};
+use crate::bench::measure::MOST_SECONDS;
 use crate::bench::{DOCUMENTS, keep, save};
 use crate::output::{Failure, print, progress};
 use serde_json::{Map, Value, json};
@@ -54,7 +55,7 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
     let studies = made(args)?;
     let (machine, seconds) = (Machine::here(), clock.elapsed().as_secs_f64());
     let object = object(&machine, seconds, &studies);
-    let text = document(&machine, seconds, &studies);
+    let text = document(&machine, seconds, &studies, args.quick);
     if args.json {
         print(&object.to_string())?
     } else {
@@ -113,14 +114,20 @@ fn object(machine: &Machine, seconds: f64, studies: &[Made]) -> Value {
     json!({ "day": machine.day, "machine": machine.object(), "seconds": seconds, "studies": named })
 }
 
-fn document(machine: &Machine, seconds: f64, studies: &[Made]) -> String {
+fn document(machine: &Machine, seconds: f64, studies: &[Made], quick: bool) -> String {
     let parts: String =
         studies.iter().map(|made| format!("\n{}", made.study.markdown(made.seconds))).collect();
     let head = "# `pbig accuracy`\n\nRun time against error. Written by that command, nothing by hand.";
     let zero = "In the charts both axes are logarithmic; what is never wrong lies on the line below, at 0.";
     let each = studies.iter().map(|made| format!("{} {}", made.study.name, study::clock(made.seconds)));
     let each = each.collect::<Vec<_>>().join(", ");
-    let took = format!("The run took {} from end to end: {each}.", study::clock(seconds));
+    let most = MOST_SECONDS[usize::from(quick)];
+    let verdict = if seconds < most { "met" } else { "missed" };
+    let took = format!(
+        "The run took {} from end to end; wanted on two cores: under {} ({verdict}). Of that: {each}.",
+        study::clock(seconds),
+        study::clock(most)
+    );
     format!("{head} {}.\n{took}\n{zero}\n{parts}", machine.line())
 }
 
@@ -135,11 +142,12 @@ mod tests {
     #[test]
     fn the_document_has_the_machine_every_study_and_how_long_it_took() {
         let machine = Machine::here();
-        let text = document(&machine, 432.1, &small());
-        let took = "The run took 7 min 12 s from end to end: small 9.6 s.";
+        let text = document(&machine, 432.1, &small(), false);
+        let took = "The run took 7 min 12 s from end to end; wanted on two cores: under 20 min 0 s (met). Of that: small 9.6 s.";
         for part in ["threads", "## a small study\n\nTook 9.6 s.\n\n- a note\n", took] {
             assert!(text.contains(part), "{part} is not in:\n{text}");
         }
+        assert!(document(&machine, 432.1, &small(), true).contains("under 1 min 0 s (missed)"));
         let object = object(&machine, 432.1, &small());
         assert_eq!(object["studies"]["small"]["points"][1]["error"], 0.0);
         assert_eq!(

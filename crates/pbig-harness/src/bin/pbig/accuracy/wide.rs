@@ -1,5 +1,5 @@
-//! f32 against f64: the same worlds from the origin to 10^7 from it, the pairs that boxes in f32 miss or add, and what
-//! widening them by ulps does about it.
+//! f32 against f64: the same worlds from the origin to 10^7 from it, as laid out and as rapier3d-f64 simulates them, the
+//! pairs that boxes in f32 miss or add, and what widening them by ulps does about it.
 //!
 //! Two things are rounded. Poses: rapier holds another world than the one that was meant, and no broad phase can
 //! tell. And boxes, which are computed in f32 from these poses: that is what a broad phase answers for. So there are
@@ -7,6 +7,7 @@
 
 mod notes;
 mod place;
+mod simulated;
 mod times;
 
 use super::study::{Cell, Point, Study, Table};
@@ -18,14 +19,22 @@ const OFFSETS: [f64; 7] = [0.0, 1e2, 1e3, 1e4, 1e5, 1e6, 1e7];
 
 pub(super) fn run(quick: bool) -> Result<Study, Failure> {
     let worlds = worlds(if quick { 500 } else { 12_000 })?;
-    let rows = rows(&worlds)?;
+    let mut rows = rows(&worlds)?;
+    let simulated = simulated::simulated(&OFFSETS, quick)?;
+    rows.extend(simulated.iter().map(|one| one.row.clone()));
     check(&rows)?;
     let timed = all_times(&worlds[0], quick)?;
     Ok(Study {
         name: "wide",
         title: "f32 far from the origin",
-        notes: notes::notes(&rows, &timed),
-        tables: vec![pairs_table(&rows), sizes_table(&rows), ways_table(&rows), times_table(&timed)],
+        notes: [notes::notes(&rows, &timed), simulated::notes(&simulated)].concat(),
+        tables: vec![
+            pairs_table(&rows),
+            simulated::table(&simulated),
+            sizes_table(&rows),
+            ways_table(&rows),
+            times_table(&timed),
+        ],
         time: "ns per box, computed and searched for",
         error: "pairs missed and added, % of those in f64 (crowd, along the diagonal)",
         points: points(&rows, &timed),
@@ -210,8 +219,9 @@ mod tests {
     #[test]
     fn a_quick_study_misses_pairs_without_ulps_and_none_with_them() {
         let study = run(true).expect("no failure");
-        let [pairs, sizes, ways, times] = &study.tables[..] else { panic!("four tables") };
-        assert_eq!(pairs.rows.len(), 6 * OFFSETS.len() + 4 * (OFFSETS.len() - 1));
+        let [pairs, simulated, sizes, ways, times] = &study.tables[..] else { panic!("five tables") };
+        assert_eq!(pairs.rows.len(), 7 * OFFSETS.len() + 4 * (OFFSETS.len() - 1));
+        assert_eq!(simulated.rows.len(), OFFSETS.len());
         assert_eq!((sizes.rows.len(), ways.rows.len()), (3 * OFFSETS.len(), WAYS.len() * OFFSETS.len()));
         assert_eq!(times.rows.len(), study.points.len());
         let missed = |way: Way| {

@@ -4,6 +4,9 @@ use crate::output::Failure;
 use pbig_harness::runner::{Spread, milliseconds};
 use std::time::{Duration, Instant};
 
+/// Seconds that all studies, and the papers' tables, may each take on two cores; and with `--quick`.
+pub(crate) const MOST_SECONDS: [f64; 2] = [1200.0, 60.0];
+
 /// Sides that do the same work, round by round.
 pub(crate) trait Contest {
     /// How many take part.

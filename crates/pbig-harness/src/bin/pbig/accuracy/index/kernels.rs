@@ -1,4 +1,6 @@
-//! The same roots as kernels: the row that a device estimates, and the exact pair.
+//! The same roots as kernels: the row that a device estimates, and the exact pair; and the lazy way.
+
+mod lazy;
 
 use super::super::study::{Cell, Table, plain};
 use super::percent;
@@ -10,6 +12,7 @@ use pbig_core::gpu::study::Bench;
 use pbig_core::layout::{LANES, Params};
 use pbig_core::pair_index::{pair_count, pair_of};
 use pbig_harness::index::{AsItIs, Correction, Rules, Tally, WAYS, Way, tally_of};
+use pbig_shaders::Kernel;
 
 /// Up to so many boxes all indices are looked at.
 const MOST_WHOLE: u32 = 5000;
@@ -52,8 +55,10 @@ fn number(way: &Way) -> Option<u32> {
 pub(super) struct Estimates {
     n: u32,
     name: String,
-    /// As it is, by the rules. Unless all indices were looked at, without what is missed, doubled and no pair.
-    tallies: [Tally; 2],
+    /// As it is. Unless all indices were looked at, without what is missed, doubled and no pair.
+    tally: Tally,
+    /// The same by the rules, of ways that estimate a row.
+    by_rules: Option<Tally>,
     /// Milliseconds for all these indices.
     ms: Option<f64>,
 }
@@ -64,19 +69,22 @@ pub(super) fn estimates(bench: &Bench, software: bool, quick: bool) -> Result<Ve
         if quick { &[2, 300] } else { &[2, 300, 1000, 2000, MOST_WHOLE, 16_384, 1 << 15, 1 << 16] };
     let all = sizes.iter().flat_map(|&n| Root::all().map(move |root| (n, root)));
     let within = all.filter(|(n, root)| *n <= root.most_boxes());
-    within.map(|(n, root)| Estimates::of(bench, n, root, software)).collect()
+    let rows = within.map(|(n, root)| Estimates::of(bench, n, root, software));
+    let lazy = sizes.iter().filter(|n| **n <= lazy::MOST_BOXES).map(|&n| lazy::estimates(bench, n, software));
+    rows.chain(lazy).collect()
 }
 
 impl Estimates {
     fn of(bench: &Bench, n: u32, Root { number, name }: Root, software: bool) -> Result<Self, Failure> {
         let (mut rows, mut ms) = (Vec::new(), 0.0);
-        for indices in parts(n) {
-            let (words, took) = timed_run(bench, number, &indices, if software { 1 } else { 3 })?;
+        for indices in parts(n, pair_count(n.into())) {
+            let (words, took) =
+                timed_run(software, |cells| run(bench, number, &indices, cells), indices.count)?;
             rows.extend(estimated(&indices, &words)?);
             ms += took;
         }
-        let tallies = [judged::<AsItIs>(n, &rows), judged::<Rules>(n, &rows)];
-        Ok(Self { n, name, tallies, ms: (!software && ms > 0.0).then_some(ms) })
+        let (tally, by_rules) = (judged::<AsItIs>(n, &rows), Some(judged::<Rules>(n, &rows)));
+        Ok(Self { n, name, tally, by_rules, ms: (!software && ms > 0.0).then_some(ms) })
     }
 
     fn is_whole(&self) -> bool {
@@ -84,13 +92,15 @@ impl Estimates {
     }
 
     fn row(&self) -> impl Iterator<Item = Cell> {
-        let indices = self.tallies[0].pairs;
+        let indices = self.tally.pairs;
         let head = [u64::from(self.n).into(), self.name.as_str().into(), indices.into()];
         let ns = Cell::from(self.ms.map(|ms| ms * 1e6 / indices as f64));
-        head.into_iter().chain(self.tallies.iter().flat_map(|tally| self.counts(tally))).chain([ns])
+        let counts = [Some(self.tally), self.by_rules].map(|tally| self.counts(tally));
+        head.into_iter().chain(counts.into_iter().flatten()).chain([ns])
     }
 
-    fn counts(&self, tally: &Tally) -> [Cell; 5] {
+    fn counts(&self, tally: Option<Tally>) -> [Cell; 5] {
+        let Some(tally) = tally else { return [(); 5].map(|()| Cell::Nothing) };
         let if_whole = |count: u64| Cell::from(self.is_whole().then_some(count));
         let [missed, doubled, none] = [tally.missed, tally.doubled, tally.none].map(if_whole);
         [percent(tally.wrong, tally.pairs).into(), tally.worst_row.into(), missed, doubled, none]
@@ -133,24 +143,27 @@ impl Indices {
     }
 }
 
-/// All, or some of each part of all.
-fn parts(n: u32) -> Vec<Indices> {
-    let pairs = pair_count(n.into());
+/// All of so many, or some of each part of all.
+fn parts(n: u32, all: u64) -> Vec<Indices> {
     if n <= MOST_WHOLE {
-        (0..pairs).step_by(MOST as usize).map(|first| Indices::between(n, first, pairs)).collect()
+        (0..all).step_by(MOST as usize).map(|first| Indices::between(n, first, all)).collect()
     } else {
-        let start = |part: u64| pairs * part / PARTS;
+        let start = |part: u64| all * part / PARTS;
         (0..PARTS).map(|part| Indices::between(n, start(part), start(part + 1))).collect()
     }
 }
 
-/// What comes out, and the shortest time, less that of calls which compute none.
-fn timed_run(bench: &Bench, root: u32, indices: &Indices, times: u32) -> Result<(Vec<u32>, f64), Failure> {
+/// What comes out of the run of a kernel, and the shortest time of some, less that of calls which compute none.
+fn timed_run(
+    software: bool,
+    run: impl Fn(u32) -> Result<Vec<u32>, Failure>,
+    count: u32,
+) -> Result<(Vec<u32>, f64), Failure> {
     let mut best = [f64::MAX; 2];
     let mut out = Vec::new();
-    for _ in 0..times {
-        let (none, idle) = timed(|| run(bench, root, indices, 0));
-        let (words, busy) = timed(|| run(bench, root, indices, indices.count));
+    for _ in 0..if software { 1 } else { 3 } {
+        let (none, idle) = timed(|| run(0));
+        let (words, busy) = timed(|| run(count));
         (_, out) = (none?, words?);
         best = [best[0].min(idle), best[1].min(busy)];
     }
@@ -159,12 +172,22 @@ fn timed_run(bench: &Bench, root: u32, indices: &Indices, times: u32) -> Result<
 
 /// With room for all indices, of which `cells` are computed.
 fn run(bench: &Bench, root: u32, indices: &Indices, cells: u32) -> Result<Vec<u32>, Failure> {
-    let &Indices { n, first, count } = indices;
-    let params = Params { boxes: n, split: first, cells, ..Params::default() };
     let options = GpuOptions { root, ..GpuOptions::DEFAULT };
-    let bindings = [bytemuck::bytes_of(&params).to_vec(), vec![0; 12 * count as usize]];
-    let kernel = &pbig_shaders::INDEX_PAIRS;
-    let found = bench.run(kernel, &options, false, &bindings, count.div_ceil(LANES));
+    run_kernel(bench, &pbig_shaders::INDEX_PAIRS, &options, indices, cells, 3)
+}
+
+/// So many words for each index.
+fn run_kernel(
+    bench: &Bench,
+    kernel: &'static Kernel,
+    options: &GpuOptions,
+    &Indices { n, first, count }: &Indices,
+    cells: u32,
+    words: usize,
+) -> Result<Vec<u32>, Failure> {
+    let params = Params { boxes: n, split: first, cells, ..Params::default() };
+    let bindings = [bytemuck::bytes_of(&params).to_vec(), vec![0; 4 * words * count as usize]];
+    let found = bench.run(kernel, options, false, &bindings, count.div_ceil(LANES));
     let found = found.map_err(|error| Failure::Input(format!("{}: {error}", kernel.name)))?;
     Ok(bytemuck::pod_collect_to_vec(&found[1]))
 }
@@ -218,28 +241,28 @@ pub(super) fn notes(estimates: &[Estimates]) -> Vec<String> {
             most(BISECTION)
         ),
         "No kernels: f64 sqrt and the integer root, as WGSL has neither f64 nor 64-bit integers nor a root of \
-         integers; the lazy way, which is a division of integers and estimates nothing, so that a device could only \
-         take another time for it."
+         integers."
             .to_owned(),
+        lazy::note(),
         missed_note(estimates, largest),
     ]
 }
 
 /// Roots that lose pairs of the most boxes of which all indices were looked at.
 fn missed_note(estimates: &[Estimates], n: u32) -> String {
-    let missed = |fix: usize| {
-        let of_n = estimates.iter().filter(|one| one.n == n && one.tallies[fix].missed > 0);
-        let told = of_n.map(|one| {
-            let Tally { missed, pairs, .. } = one.tallies[fix];
-            format!("{} {missed} ({}%)", one.name, plain(percent(missed, pairs)))
+    let missed = |tally: fn(&Estimates) -> Option<Tally>| {
+        let of_n = estimates.iter().filter(|one| one.n == n);
+        let told = of_n.filter_map(|one| {
+            let Tally { missed, pairs, .. } = tally(one).filter(|tally| tally.missed > 0)?;
+            Some(format!("{} {missed} ({}%)", one.name, plain(percent(missed, pairs))))
         });
         let told: Vec<_> = told.collect();
         if told.is_empty() { "none with any root".to_owned() } else { told.join(", ") }
     };
     format!(
         "Pairs of {n} boxes that kernels miss, as it is: {}; by the paper's rules: {}.",
-        missed(0),
-        missed(1)
+        missed(|one| Some(one.tally)),
+        missed(|one| one.by_rules)
     )
 }
 
@@ -272,13 +295,14 @@ mod tests {
 
     #[test]
     fn small_numbers_of_boxes_have_all_their_indices_looked_at() {
+        let parts_of = |n: u32| parts(n, pair_count(n.into()));
         for n in [2, 3, 300, MOST_WHOLE] {
-            let indices = parts(n).into_iter().flat_map(|part| part.first..part.first + part.count);
+            let indices = parts_of(n).into_iter().flat_map(|part| part.first..part.first + part.count);
             assert!(indices.eq(0..pair_count(n.into()) as u32), "{n}");
         }
-        let ends = parts(1 << 16).into_iter().map(|part| u64::from(part.first) + u64::from(part.count));
-        assert!(ends.is_sorted() && parts(1 << 16).len() as u64 == PARTS);
-        assert!(parts(1 << 16).iter().all(|part| part.count == MOST));
+        let ends = parts_of(1 << 16).into_iter().map(|part| u64::from(part.first) + u64::from(part.count));
+        assert!(ends.is_sorted() && parts_of(1 << 16).len() as u64 == PARTS);
+        assert!(parts_of(1 << 16).iter().all(|part| part.count == MOST));
     }
 
     #[test]
@@ -311,10 +335,10 @@ mod tests {
     fn every_root_runs_and_lost_pairs_are_told() {
         let Ok(bench) = Bench::new() else { return };
         let found = estimates(&bench, true, true).expect("right pairs");
-        assert_eq!(found.len(), 2 * Root::all().count());
+        assert_eq!(found.len(), 2 * (Root::all().count() + 1), "and the lazy way");
         let told = missed_note(&found, 300);
         let one_step = found.iter().find(|one| one.n == 300 && one.name == "Carmack 1").expect("one step");
-        let lost = format!("as it is: Carmack 1 {} (", one_step.tallies[0].missed);
+        let lost = format!("as it is: Carmack 1 {} (", one_step.tally.missed);
         assert!(told.contains(&lost) && !told.contains("bisection"), "{told}");
         assert!(told.ends_with("by the paper's rules: none with any root."), "{told}");
     }

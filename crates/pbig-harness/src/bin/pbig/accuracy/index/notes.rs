@@ -2,7 +2,7 @@
 
 use super::super::study::plain;
 use super::times::{Times, label};
-use super::{Found, exact, paper, percent, rules, sizes};
+use super::{Found, exact, paper, percent, rules};
 use pbig_core::pair_index::pair_of;
 use pbig_harness::index::{CORRECTIONS, MOST_EXHAUSTIVE};
 
@@ -21,15 +21,10 @@ pub(super) fn notes(found: &Found) -> Vec<String> {
     ];
     notes.push(doubled_note(found));
     notes.push(format!(
-        "Beyond {MOST_EXHAUSTIVE} boxes (with one step beyond {}: a hundred million wrong pairs are too many to \
-         keep) the first and last index of every row are looked at, and others evenly at random; what is missed \
-         and doubled is not counted there.",
-        sizes::MOST_OF_ONE_STEP
+        "Beyond {MOST_EXHAUSTIVE} boxes the first and last index of every row are looked at, and others evenly at \
+         random; what is missed and doubled is not counted there."
     ));
-    if !found.quick {
-        notes.push("One step: every n up to 1,000, then every fiftieth.".to_owned());
-    }
-    notes.push(format!("Bisection, integer root and lazy way: all pairs of {}.", exact::told(found.quick)));
+    notes.push(exact::told(&found.exact));
     notes.push(sign_note());
     notes.extend(rules::notes(found));
     notes.extend([table_2_note(), root_note(found), paper::TABLE_4_NOTE.to_owned()]);
@@ -147,9 +142,8 @@ fn fastest_note(found: &Found) -> String {
     });
     let most = found.sizes.iter().map(|size| size.n).max().unwrap_or(0);
     format!(
-        "Never wrong wherever looked at, up to {most} boxes (ways without an estimate: {}), fastest first by the \
-         geometric mean over {} boxes: {}.",
-        exact::told(found.quick),
+        "Never wrong wherever looked at, up to {most} boxes (ways without an estimate up to what is told above), \
+         fastest first by the geometric mean over {} boxes: {}.",
         timed(&found.times).join(", "),
         told.collect::<Vec<_>>().join("; ")
     )

@@ -3,13 +3,10 @@
 use super::super::study::{Cell, Table};
 use super::percent;
 use super::times::label;
-use pbig_harness::index::{MOST_EXHAUSTIVE, Sample, Tally, WAYS, Way};
+use pbig_harness::index::{MOST_EXHAUSTIVE, Sample, Tally, WAYS};
 use rand::rngs::StdRng;
 use rand::{RngExt, SeedableRng};
 use rayon::prelude::*;
-
-/// Of the ways that are left wrong by a hundred million pairs beyond, and lists of them, all are looked at up to here.
-pub(super) const MOST_OF_ONE_STEP: i64 = 5000;
 
 /// As it is, by the rules, by integers.
 enum Looked {
@@ -27,7 +24,7 @@ pub(super) struct Size {
 
 impl Size {
     fn of(n: i64, way: usize, count: usize) -> Self {
-        let looked = if n <= most(&WAYS[way]) {
+        let looked = if n <= MOST_EXHAUSTIVE {
             Looked::AtAll((WAYS[way].tally)(n))
         } else {
             Looked::AtSome((WAYS[way].sample)(n, &indices(n, count)))
@@ -49,11 +46,6 @@ impl Size {
             Looked::AtSome(samples) => samples[correction].wrong_ends + samples[correction].wrong_inner == 0,
         }
     }
-}
-
-/// Up to how many boxes all pairs of a way are looked at.
-fn most(way: &Way) -> i64 {
-    if way.steps == Some(1) { MOST_OF_ONE_STEP } else { MOST_EXHAUSTIVE }
 }
 
 pub(super) fn looked_at(quick: bool) -> Vec<Size> {

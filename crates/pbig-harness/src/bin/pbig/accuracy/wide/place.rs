@@ -111,6 +111,11 @@ impl<'a> Place<'a> {
             Along::Diagonal => layout.poses([offset; 3]),
             Along::X => layout.poses([offset, 0.0, 0.0]),
         };
+        Self::at(layout, poses)
+    }
+
+    /// Shapes at poses of their own.
+    pub(super) fn at(layout: &'a Layout, poses: Vec<Pose>) -> Self {
         let params = IntegrationParameters::default();
         let narrow: Vec<_> = poses.iter().map(to_f32).collect();
         let held: Vec<_> = narrow.iter().map(to_f64).collect();
@@ -123,7 +128,7 @@ impl<'a> Place<'a> {
     }
 
     /// Twice what boxes reach beyond shapes: boxes that overlap by more are of shapes whose own do.
-    fn reach(&self) -> f64 {
+    pub(super) fn reach(&self) -> f64 {
         f64::from(self.params.prediction_distance())
     }
 
@@ -146,13 +151,7 @@ impl<'a> Place<'a> {
     }
 
     fn rapiers(&self, ulps: u32) -> Vec<Aabb> {
-        let none = RigidBodySet::new();
-        let stock = |collider: &Collider| collision_aabb(&self.params, &none, collider);
-        let colliders = self.colliders.iter();
-        if ulps == 0 {
-            return colliders.map(stock).collect();
-        }
-        colliders.map(|one| widened_by_ulps(&stock(one), one.position(), ulps)).collect()
+        rapiers(&self.params, self.colliders.iter(), ulps)
     }
 
     /// How the pairs of boxes in f32 differ from those in f64: at the poses that rapier holds, and in the world.
@@ -173,6 +172,20 @@ impl<'a> Place<'a> {
         let boxes = self.held.boxes.iter().zip(&rapiers).zip(&self.colliders);
         boxes.map(short).fold(0.0, f64::max)
     }
+}
+
+/// Boxes of colliders without bodies, or of bodies without soft CCD, widened by so many ulps.
+pub(super) fn rapiers<'c>(
+    params: &IntegrationParameters,
+    colliders: impl Iterator<Item = &'c Collider>,
+    ulps: u32,
+) -> Vec<Aabb> {
+    let none = RigidBodySet::new();
+    let stock = |collider: &Collider| collision_aabb(params, &none, collider);
+    if ulps == 0 {
+        return colliders.map(stock).collect();
+    }
+    colliders.map(|one| widened_by_ulps(&stock(one), one.position(), ulps)).collect()
 }
 
 /// By how much one ulp of [`widened_by_ulps`] widens a box on each axis.
@@ -197,6 +210,7 @@ pub(super) fn ulp(x: f64) -> f64 {
 }
 
 /// What became of a world at a place.
+#[derive(Clone)]
 pub(super) struct Row {
     pub(super) world: &'static str,
     pub(super) size: f64,
@@ -216,12 +230,20 @@ pub(super) struct Row {
 
 impl Row {
     pub(super) fn new(world: &World, offset: f64, along: Along) -> Result<Self, Failure> {
-        let place = Place::new(&world.layout, offset, along);
+        Self::of(world.name, world.size, (offset, along), &Place::new(&world.layout, offset, along))
+    }
+
+    pub(super) fn of(
+        world: &'static str,
+        size: f64,
+        (offset, along): (f64, Along),
+        place: &Place<'_>,
+    ) -> Result<Self, Failure> {
         let held: Vec<Pair> = place.held.pairs.iter().map(|(pair, _)| *pair).collect();
         let ways: Result<_, Failure> = WAYS.iter().map(|&way| place.differences(way)).collect();
         Ok(Self {
-            world: world.name,
-            size: world.size,
+            world,
+            size,
             offset,
             along,
             pairs: place.world.pairs.len() as u64,
@@ -230,6 +252,18 @@ impl Row {
             ways: ways?,
             shortfall: place.shortfall(),
         })
+    }
+
+    /// With what became of the same world later.
+    pub(super) fn and(mut self, later: &Self) -> Self {
+        self.pairs += later.pairs;
+        self.held_pairs += later.held_pairs;
+        self.poses += later.poses;
+        for (sums, more) in self.ways.iter_mut().zip(&later.ways) {
+            sums.iter_mut().zip(more).for_each(|(sum, &one)| *sum += one);
+        }
+        self.shortfall = self.shortfall.max(later.shortfall);
+        self
     }
 
     /// Against boxes in f64 at the same poses.

@@ -1,10 +1,8 @@
 //! How long `pbig bench papers` itself takes, which is promised to be short.
 
+use crate::bench::measure::MOST_SECONDS;
 use serde_json::{Value, json};
 use std::time::Duration;
-
-/// Seconds that a run may take on two cores, and with `--quick`.
-const MOST_SECONDS: [f64; 2] = [1200.0, 60.0];
 
 /// Wall time of a run, part by part.
 pub(super) struct Timing {
