@@ -7,19 +7,21 @@ use pbig_harness::boxes::{BoxSet, moved};
 use pbig_tests::strategies;
 use rand::rngs::StdRng;
 use rand::{RngExt, SeedableRng};
-use std::collections::BTreeSet;
+use std::collections::{BTreeSet, HashSet};
 
 /// A broad phase with what its caller knows: the boxes that were set, and the pairs by its events.
 pub(crate) struct Follower {
     pub(crate) broad_phase: BroadPhase,
     boxes: Vec<Option<(Aabb, ProxyFilter)>>,
     pairs: BTreeSet<Pair>,
+    /// Removed since the last update: their pairs end without an event.
+    gone: HashSet<u32>,
 }
 
 impl Follower {
     pub(crate) fn new(config: Config, ids: usize) -> Self {
         let broad_phase = BroadPhase::new(config).expect("a good margin");
-        Self { broad_phase, boxes: vec![None; ids], pairs: BTreeSet::new() }
+        Self { broad_phase, boxes: vec![None; ids], pairs: BTreeSet::new(), gone: HashSet::new() }
     }
 
     pub(crate) fn set(&mut self, id: u32, aabb: Aabb, filter: ProxyFilter) {
@@ -30,7 +32,14 @@ impl Follower {
     pub(crate) fn remove(&mut self, id: u32) {
         let was_there = self.boxes[id as usize].take().is_some();
         assert_eq!(self.broad_phase.remove(id), was_there);
-        self.pairs.retain(|p| p.a != id && p.b != id);
+        self.gone.insert(id);
+    }
+
+    fn forget_pairs_of_removed(&mut self) {
+        if !self.gone.is_empty() {
+            self.pairs.retain(|p| !self.gone.contains(&p.a) && !self.gone.contains(&p.b));
+            self.gone.clear();
+        }
     }
 
     pub(crate) fn has(&self, id: u32) -> bool {
@@ -48,6 +57,7 @@ impl Follower {
 
     /// Updates and compares; between the two halves of the update these boxes are set, of which it must know nothing.
     pub(crate) fn update_while_set(&mut self, news: &[(u32, Aabb, ProxyFilter)], what: &str) {
+        self.forget_pairs_of_removed();
         self.broad_phase.begin();
         let wanted = self.wanted();
         for &(id, aabb, filter) in news {
@@ -66,6 +76,7 @@ impl Follower {
     }
 
     fn follow(&mut self, what: &str) {
+        self.forget_pairs_of_removed();
         let events = self.broad_phase.update().expect("within the limits");
         assert!(events.added.is_sorted() && events.removed.is_sorted(), "{what}: events out of order");
         for pair in &events.removed {

@@ -9,6 +9,7 @@ mod motion;
 mod multitudes;
 mod shapes;
 mod soak;
+mod soak_worlds;
 
 use crate::finder::check;
 use crate::incremental::Follower;

@@ -11,7 +11,7 @@ use rand::{RngExt, SeedableRng};
 use std::collections::BTreeMap;
 use std::io::Write;
 
-fn given() -> Option<usize> {
+pub(super) fn given() -> Option<usize> {
     let given = std::env::var("PBIG_SOAK").ok();
     given.map(|n| n.parse().expect("PBIG_SOAK is a number of updates"))
 }
@@ -115,7 +115,7 @@ struct Tally {
     equal: usize,
     /// By who found the pairs: a device, or else what the plan names.
     ways: BTreeMap<&'static str, usize>,
-    /// Bytes held by this thread and on the device: now, and the most in the first fifth.
+    /// Bytes held by the threads of this pool and on the device: now, and the most in the first fifth.
     bytes: [i64; 2],
     early: [i64; 2],
 }
@@ -124,7 +124,7 @@ impl Tally {
     fn count(&mut self, report: &Report, is_early: bool) {
         let way = if report.gpu.is_some() { "gpu" } else { report.plan.chosen.name() };
         *self.ways.entry(way).or_default() += 1;
-        self.bytes = [memory::held(), report.gpu.as_ref().map_or(0, |gpu| gpu.device_bytes as i64)];
+        self.bytes = [held_by_all(), report.gpu.as_ref().map_or(0, |gpu| gpu.device_bytes as i64)];
         for (early, bytes) in self.early.iter_mut().zip(self.bytes) {
             *early = if is_early { bytes.max(*early) } else { *early };
             let update = self.updates;
@@ -156,12 +156,24 @@ impl Tally {
     }
 }
 
-/// On one thread, whose memory is counted.
+/// What one thread has asked for another may give back: only the sum says something.
+fn held_by_all() -> i64 {
+    if rayon::current_num_threads() == 1 {
+        return memory::held();
+    }
+    rayon::broadcast(|_| memory::held()).into_iter().sum()
+}
+
+/// On one thread.
 fn soak(churn: impl FnOnce() -> Churn + Send, updates: usize) -> Tally {
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("a pool");
+    soak_on(1, churn, updates, (updates / 20).min(5000))
+}
+
+fn soak_on(threads: usize, churn: impl FnOnce() -> Churn + Send, updates: usize, sampled: usize) -> Tally {
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool");
     pool.install(|| {
         let mut churn = churn();
-        churn.run(updates, (updates / 20).min(5000));
+        churn.run(updates, sampled);
         churn.tally
     })
 }
@@ -195,6 +207,15 @@ fn soak_of_a_world_of_near_pairs() {
     let churn = || Churn { swings: true, ..Churn::new(config, 300) };
     // What lists have cost decides whether there is one, and other processes have a part in that.
     soak(churn, updates()).assert_mostly(&["near"], 25);
+}
+
+/// So many boxes that threads share the work: three hundredths of the updates, each of which changes thousands.
+#[test]
+fn soak_on_threads() {
+    let churn = || Churn { one_in: 8, ..Churn::new(cpu(Strategy::Auto), 20_000) };
+    let updates = (updates() / 30).max(40);
+    let tally = soak_on(3, churn, updates, (updates / 20).clamp(4, 500));
+    tally.assert_mostly(&["edit", "grid", "near"], 95);
 }
 
 /// A software adapter takes milliseconds for an update: a hundredth of them.
