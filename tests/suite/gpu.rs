@@ -3,6 +3,7 @@
 
 use pbig_core::gpu::{Fault, adapters};
 use pbig_core::layout::Box as DeviceBox;
+use pbig_core::plan::{Chosen, NoGpu};
 use pbig_core::{
     Aabb, Backend, BroadPhase, Coding, Config, Events, Finder, GpuFinder, GpuOptions, GpuReport, Pair,
     ProxyFilter, Strategy, oracle,
@@ -331,9 +332,11 @@ fn auto_goes_back_and_forth_between_a_device_and_edits_on_the_cpu() {
             cpu.set(id as u32, moved, ProxyFilter::ALL).expect("within the limits");
         }
         assert_eq!(ours.update(), cpu.update(), "frame {frame}");
-        on_gpu += u32::from(ours.report().gpu.is_some());
-        edited += u32::from(ours.report().plan.chosen == pbig_core::plan::Chosen::Edit);
-        assert_eq!(ours.report().fallback, None);
+        let report = ours.report();
+        let why = report.plan.no_gpu;
+        assert_eq!((report.gpu.is_none(), &report.fallback), (why.is_some(), &None), "frame {frame}");
+        on_gpu += u32::from(why.is_none());
+        edited += u32::from(report.plan.chosen == Chosen::Edit && why == Some(NoGpu::FewChanged));
     }
     assert!(on_gpu >= 3 && edited >= 1, "{on_gpu} updates on the device, {edited} edits");
 }
@@ -372,12 +375,12 @@ fn an_adapter_that_does_not_exist_is_an_error_that_names_those_that_do() {
 #[test]
 fn auto_leaves_a_software_adapter_alone() {
     let device = GpuFinder::new().expect("an adapter");
-    let software = device.is_software();
+    let (software, boxes) = (device.is_software(), set("unit", 20_000));
     let mut finder = Finder::with_gpu(Config::DEFAULT, device);
-    let boxes = set("unit", 20_000);
     for _ in 0..6 {
         finder.find(&boxes).expect("within the limits");
-        assert!(finder.report().gpu.is_none() || !software);
+        let report = finder.report();
+        assert!((report.gpu.is_none() && report.plan.no_gpu == Some(NoGpu::Software)) || !software);
     }
 }
 

@@ -146,6 +146,74 @@ impl Default for GpuOptions {
     }
 }
 
+/// How [`crate::BroadPhase`] makes events on the CPU, where [`Config::study`] asks for a way.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub enum Updates {
+    /// What the plan expects to be fastest.
+    #[default]
+    Auto,
+    /// Changed boxes are put into other cells, and only they are searched for. All are where that cannot be: in the first
+    /// update, and once too many are out of the grid's order.
+    Edits,
+    /// All are searched, in a grid that is built anew.
+    Anew,
+    /// By a list of near pairs, whatever it costs. Without one where none can be made: it is not known how far boxes
+    /// move, as in the first update, or more than 256 pairs a box would be near.
+    Near,
+}
+
+/// The CPU's grids, where [`Config::study`] asks for some. Where every pair is tested there is none.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub enum Grids {
+    /// What the plan expects to be fastest.
+    #[default]
+    Auto,
+    /// One for all boxes, however they differ in size.
+    One,
+    /// Levels by size, or one and a list of the largest boxes. As planned where all are of one size: none can be split off.
+    Levels,
+}
+
+/// The rows of cells at which a box looks in the CPU's search of its own grid, where [`Config::study`] asks for some.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub enum Look {
+    /// By the size of cells, and by how many boxes they hold.
+    #[default]
+    Auto,
+    /// At all rows: where boxes are few, to look costs less than to decide.
+    Everywhere,
+    /// Not at what rows have beyond a box's reach: where cells hold several boxes.
+    Trimmed,
+    /// At other rows than its own only where a box reaches them: where cells are so large that few do.
+    Seldom,
+}
+
+/// Ways to be gone whatever the plan would choose, for study and tests. Pairs and events are the same by all of them.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct Study {
+    /// How [`crate::BroadPhase`] makes events. With any but [`Updates::Auto`] it has no bitmap.
+    pub updates: Updates,
+    /// One grid, or levels.
+    pub grids: Grids,
+    /// Which rows the search looks at.
+    pub look: Look,
+}
+
+impl Study {
+    /// Everything as planned.
+    pub const DEFAULT: Self = Self { updates: Updates::Auto, grids: Grids::Auto, look: Look::Auto };
+}
+
+impl Default for Study {
+    fn default() -> Self {
+        Self::DEFAULT
+    }
+}
+
 /// Everything a caller can choose; the defaults are right for most.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -179,6 +247,8 @@ pub struct Config {
     pub costs: Option<Costs>,
     /// About the GPU backend.
     pub gpu: GpuOptions,
+    /// Ways on the CPU that are not left to the plan.
+    pub study: Study,
 }
 
 impl Config {
@@ -195,6 +265,7 @@ impl Config {
         small_cell: 32,
         costs: None,
         gpu: GpuOptions::DEFAULT,
+        study: Study::DEFAULT,
     };
 }
 

@@ -66,7 +66,9 @@ mod search;
 
 pub use aabb::Aabb;
 pub use broad_phase::{BroadPhase, Events};
-pub use config::{Backend, CellRule, Coding, Config, GpuOptions, Limits, Order, Strategy};
+pub use config::{
+    Backend, CellRule, Coding, Config, GpuOptions, Grids, Limits, Look, Order, Strategy, Study, Updates,
+};
 pub use error::Error;
 pub use filter::{ProxyFilter, TestMode};
 pub use finder::{Finder, find_pairs};

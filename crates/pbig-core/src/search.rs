@@ -8,7 +8,7 @@ use crate::cpu::pbig::PbigGrid;
 use crate::cpu::record::Record;
 #[cfg(feature = "gpu")]
 use crate::gpu::{self, ChangeRequest, GpuFinder};
-use crate::plan::{Costs, LazySummary, Plan, Summary};
+use crate::plan::{Costs, LazySummary, NoGpu, Plan, Summary};
 use crate::report::{Checks, Report, lap, stage};
 use crate::{Aabb, Backend, Config, Error, Pair, ProxyFilter, Strategy};
 use std::time::{Duration, Instant};
@@ -74,8 +74,12 @@ impl<R: Record> Search<R> {
     {
         report.boxes = boxes.len() as u64;
         let summary = LazySummary::new(boxes, self.spare.take());
+        let wanted = self.wants_gpu(config, boxes.len(), false);
         #[cfg(feature = "gpu")]
-        let on_gpu = self.find_on_gpu(boxes, &summary, config, rule, report);
+        let on_gpu = match wanted {
+            Ok(()) => self.find_on_gpu(boxes, &summary, config, rule, report),
+            Err(_) => Ok(false),
+        };
         #[cfg(not(feature = "gpu"))]
         let on_gpu = Ok(self.miss_gpu(config, report));
         let found = match on_gpu {
@@ -84,6 +88,7 @@ impl<R: Record> Search<R> {
         };
         self.spare = summary.into_spare();
         report.plan.measured.gpu = self.share_of_gpu(config, boxes.len());
+        report.plan.no_gpu = wanted.err().flatten();
         found
     }
 
@@ -152,6 +157,7 @@ impl<R: Record> Search<R> {
             None => self.map.find(accept, limit, &mut self.found)?,
         }
         report.stages.check += lap(&mut clock);
+        report.plan.looks = self.map.looks();
         report.checks = single_entry_checks(&self.found);
         self.learn(report);
         Ok(())
@@ -170,8 +176,7 @@ impl<R: Record> Search<R> {
         self.gpu.as_ref().and_then(GpuFinder::working_adapter)
     }
 
-    /// Searches on a device if that is wanted; false when it is not, or when the device could not do
-    /// it, which the report then says (contract 8).
+    /// Searches on a device; false when it could not do it, which the report then says (contract 8).
     #[cfg(feature = "gpu")]
     fn find_on_gpu<A>(
         &mut self,
@@ -184,9 +189,6 @@ impl<R: Record> Search<R> {
     where
         A: Accept,
     {
-        if !self.wants_gpu(config, boxes.len()) {
-            return Ok(false);
-        }
         stage!("gpu");
         let mut clock = Instant::now();
         let summary = summary.get();
@@ -236,10 +238,21 @@ impl<R: Record> Search<R> {
         None
     }
 
-    /// Whether the next search of so many boxes is to be tried on a device.
+    /// Whether the next search of so many boxes is to be tried on a device ([`gpu::wanted`]).
     #[cfg(feature = "gpu")]
-    pub(crate) fn wants_gpu(&mut self, config: &Config, boxes: usize) -> bool {
-        gpu::wanted(config, self.gpu.as_ref(), &mut self.trial, boxes)
+    pub(crate) fn wants_gpu(
+        &mut self,
+        config: &Config,
+        boxes: usize,
+        few_changed: bool,
+    ) -> Result<(), Option<NoGpu>> {
+        gpu::wanted(config, self.gpu.as_ref(), &mut self.trial, boxes, few_changed)
+    }
+
+    #[cfg(not(feature = "gpu"))]
+    #[expect(clippy::unused_self, reason = "as with a GPU backend")]
+    pub(crate) fn wants_gpu(&mut self, config: &Config, _: usize, _: bool) -> Result<(), Option<NoGpu>> {
+        Err((config.backend == Backend::Auto).then_some(NoGpu::NotBuilt))
     }
 
     /// What a call to the device that began at `clock` comes to: nothing when it could not do the work.

@@ -5,7 +5,7 @@ use super::update::{State, state};
 use super::{BroadPhase, flag};
 use crate::diff::Judgement;
 use crate::gpu::{Change, ChangeRequest};
-use crate::{Backend, Error, Pair};
+use crate::{Error, Pair};
 
 /// What a device is asked by a broad phase of which other fields may be written.
 macro_rules! request {
@@ -28,10 +28,11 @@ impl BroadPhase {
             return;
         }
         // Where little moves the base of the CPU is worth having.
-        let few = self.config.backend == Backend::Auto && !self.many_changed();
-        let wanted = !few && self.base.wants_gpu(&self.config, self.boxes.len());
-        self.overlap.asked = Some(wanted);
-        if wanted {
+        let few = !self.many_changed();
+        let wanted = self.base.wants_gpu(&self.config, self.boxes.len(), few);
+        self.overlap.asked = Some(wanted.is_ok());
+        self.overlap.no_gpu = wanted.err().flatten();
+        if wanted.is_ok() {
             self.drop_near();
             self.pairs.drop_removed();
             self.note_changes();

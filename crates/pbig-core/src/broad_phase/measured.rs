@@ -1,23 +1,36 @@
 //! What updates have taken, and the report of what that decides.
 
 use super::BroadPhase;
-use crate::plan::{Chosen, Measured, NoNear};
+use crate::Updates;
+use crate::plan::{Chosen, Measured, NoGpu, NoNear};
 
 impl BroadPhase {
     /// What has decided about an update that is done. Edits and lists have not learned from it yet.
     pub(super) fn report_measured(&mut self) {
+        self.report.plan.no_gpu = self.no_gpu();
         let plan = &self.report.plan;
+        let is_free = self.config.study.updates == Updates::Auto;
         let has_list =
             plan.near.is_some() || matches!(plan.no_near, Some(NoNear::Unpaid(_) | NoNear::Compared));
         let is_searched = matches!(plan.chosen, Chosen::Edit | Chosen::Grid);
         // A device is not asked where few have.
         let many = self.report.changed * 4 >= u64::from(self.present_count);
         self.report.plan.measured = Measured {
-            edit: self.rebuild.measured().filter(|_| is_searched && plan.near.is_none()),
-            near: self.near.worth.share().filter(|_| has_list),
+            edit: self.rebuild.measured().filter(|_| is_free && is_searched && plan.near.is_none()),
+            near: self.near.worth.share().filter(|_| is_free && has_list),
             grid: self.small.turns.share_of_grid().filter(|_| self.may_be_small()),
             gpu: self.base.share_of_gpu(&self.config, self.boxes.len()).filter(|_| many),
         };
+    }
+
+    #[cfg(feature = "gpu")]
+    fn no_gpu(&self) -> Option<NoGpu> {
+        self.overlap.no_gpu
+    }
+
+    #[cfg(not(feature = "gpu"))]
+    fn no_gpu(&mut self) -> Option<NoGpu> {
+        self.base.wants_gpu(&self.config, self.boxes.len(), false).err().flatten()
     }
 }
 

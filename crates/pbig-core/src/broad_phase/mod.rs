@@ -16,6 +16,8 @@ mod small;
 mod snapshot;
 mod state;
 #[cfg(test)]
+mod study;
+#[cfg(test)]
 mod tests;
 mod turns;
 mod update;

@@ -8,6 +8,8 @@ use super::{BroadPhase, Events};
 use crate::finder::check_count;
 #[cfg(feature = "gpu")]
 use crate::gpu::Change;
+#[cfg(feature = "gpu")]
+use crate::plan::NoGpu;
 use crate::{Aabb, Error, ProxyFilter};
 use std::collections::HashMap;
 
@@ -30,6 +32,9 @@ pub(super) struct Overlap {
     /// Whether a device is asked, once that is decided.
     #[cfg(feature = "gpu")]
     pub(super) asked: Option<bool>,
+    /// Why none is, where that is left open.
+    #[cfg(feature = "gpu")]
+    pub(super) no_gpu: Option<NoGpu>,
     /// What it is asked about.
     #[cfg(feature = "gpu")]
     pub(super) changes: Vec<Change>,

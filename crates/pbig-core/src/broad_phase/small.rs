@@ -9,7 +9,7 @@ use crate::cpu::codes::Simd;
 use crate::cpu::judge::Accept;
 use crate::plan::Chosen;
 use crate::report::{Checks, Watch, stage};
-use crate::{Aabb, Backend, Error, Pair, Strategy};
+use crate::{Aabb, Backend, Error, Pair, Strategy, Updates};
 use std::time::{Duration, Instant};
 
 /// Candidates and bands that a changed box may cost on average: about as much as a grid does.
@@ -82,7 +82,8 @@ impl BroadPhase {
 
     pub(super) fn may_be_small(&self) -> bool {
         let on_cpu = matches!(self.config.backend, Backend::Auto | Backend::Cpu);
-        on_cpu && self.config.strategy == Strategy::Auto && self.boxes.len() <= MOST
+        let is_free = self.config.strategy == Strategy::Auto && self.config.study.updates == Updates::Auto;
+        on_cpu && is_free && self.boxes.len() <= MOST
     }
 
     /// What an update has taken decides whose turn the next ones are. Not one that was left to the grid for another reason.

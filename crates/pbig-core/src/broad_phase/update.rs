@@ -11,10 +11,10 @@ use crate::cpu::emit;
 use crate::cpu::find::Others;
 use crate::cpu::judge::Accept;
 use crate::diff::{Judgement, PairStore};
-use crate::plan::{Chosen, LazySummary, Plan};
+use crate::plan::{Chosen, LazySummary, Looks, Plan};
 use crate::report::{lap, stage};
 use crate::search::{Rule, single_entry_checks};
-use crate::{Aabb, Backend, Error, Pair, ProxyFilter, Strategy, shared_from};
+use crate::{Aabb, Backend, Error, Pair, ProxyFilter, Strategy, Updates, shared_from};
 use rayon::prelude::*;
 use std::collections::HashMap;
 use std::time::Instant;
@@ -79,14 +79,14 @@ impl BroadPhase {
 
     fn edit_or_rebuild(&mut self) -> Result<Route, Error> {
         let present = self.present_count as usize;
-        let pays = self.rebuild.pays(self.changed.len(), present);
+        let pays = self.rebuild_pays();
         if pays || !self.may_edit() || !self.has_base {
             // One that a list has left to be done says nothing of updates without any.
             self.near.worth.failed |= !pays && self.may_edit();
             return self.search_all();
         }
         self.edit_base();
-        if self.base.map.out_of_order() * 8 >= present || self.strain > self.rebuild_cost() {
+        if self.base.map.out_of_order() * 8 >= present || self.is_strained() {
             let clock = Instant::now();
             let route = self.search_all()?;
             self.rebuild.followed_edits(present, clock.elapsed());
@@ -96,7 +96,23 @@ impl BroadPhase {
         }
     }
 
-    fn may_edit(&self) -> bool {
+    /// Whether all are to be searched anew although edits could do it.
+    fn rebuild_pays(&mut self) -> bool {
+        match self.config.study.updates {
+            Updates::Auto | Updates::Near => {
+                self.rebuild.pays(self.changed.len(), self.present_count as usize)
+            }
+            Updates::Edits => false,
+            Updates::Anew => true,
+        }
+    }
+
+    /// Whether edits have cost as much as it takes to build the base.
+    fn is_strained(&self) -> bool {
+        self.config.study.updates != Updates::Edits && self.strain > self.rebuild_cost()
+    }
+
+    pub(super) fn may_edit(&self) -> bool {
         self.config.strategy != Strategy::Pbig && self.config.backend != Backend::Brute
     }
 
@@ -165,7 +181,8 @@ impl BroadPhase {
         self.report.checks = single_entry_checks(&self.found);
         self.note_strain(self.found.checks);
         let (moved, boxes) = (self.base.map.out_of_order() as u32, self.valid_count());
-        self.report.plan = Plan { chosen: Chosen::Edit, moved, boxes, ..self.base_plan.clone() };
+        let looks = Looks::default();
+        self.report.plan = Plan { chosen: Chosen::Edit, moved, boxes, looks, ..self.base_plan.clone() };
         Ok(Route::Few)
     }
 

@@ -6,7 +6,7 @@ use super::map::Map;
 use super::record::Record;
 use crate::plan::{Camps, Chosen, Costs, LazySummary, Plan, Summary, Way, spread_evenly};
 use crate::report::{StageTimes, lap, stage};
-use crate::{Aabb, Config, ProxyFilter};
+use crate::{Aabb, Config, Grids, ProxyFilter};
 use std::time::Instant;
 
 /// The boxes to search, and all that is known about them.
@@ -92,6 +92,7 @@ impl<R: Record> Map<R> {
     /// Plans and sorts; again with smaller cells where clusters make them too full, and by camps where that does not
     /// help.
     pub(crate) fn plan_and_build(&mut self, set: &Set<'_>, config: &Config, times: &mut StageTimes) -> Plan {
+        self.look = config.study.look;
         if self.has_camps() {
             self.settle_camps(set, times);
         }
@@ -184,7 +185,8 @@ impl<R: Record> Map<R> {
             let crowd = self.crowd();
             tried.push((self.crowding.factor, crowd));
             let limit = CROWDED.max(1.5 * self.crowding.accepted);
-            if crowd > limit && !self.crowding.apart && plan.could_have_levels() {
+            let is_free = config.study.grids == Grids::Auto;
+            if crowd > limit && !self.crowding.apart && is_free && plan.could_have_levels() {
                 self.crowding.apart = true;
                 continue;
             }

@@ -201,9 +201,9 @@ impl<R: Record> Map<R> {
         if level.camp != OPEN {
             return (0, 0);
         }
-        let sorted = &self.sorted;
+        let (sorted, look) = (&self.sorted, self.look);
         let judge = self.judge(accept, out, room);
-        let mut half = Half { sorted, level, judge, scratch, rests, checks: 0 };
+        let mut half = Half { sorted, level, look, judge, scratch, rests, checks: 0 };
         half.check(chunk.start..chunk.end, self.simd);
         (half.checks, half.judge.overlaps)
     }

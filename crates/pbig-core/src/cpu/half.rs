@@ -12,6 +12,7 @@ use super::judge::{Accept, HITS, Hits, Judge, Scratch};
 use super::levels::Level;
 use super::record::Record;
 use super::sort::Sorted;
+use crate::Look;
 use std::ops::Range;
 
 /// Boxes whose rows are scanned before what they hit is judged.
@@ -51,22 +52,32 @@ impl Rests {
     }
 }
 
-/// At all rows: where boxes are few, to look costs less than to decide.
-const EVERYWHERE: u8 = 0;
-
-/// Not at what rows have beyond a box's reach: where cells hold several boxes.
-const TRIMMED: u8 = 1;
-
-/// At other rows than its own only where a box reaches them: where cells are so large that few do.
-const SELDOM: u8 = 2;
+/// See [`Look`].
+const EVERYWHERE: u8 = Look::Everywhere as u8;
+const TRIMMED: u8 = Look::Trimmed as u8;
+const SELDOM: u8 = Look::Seldom as u8;
 
 /// Other boxes in a box's cell from which rows are trimmed.
 const TRIM_FROM: f32 = 1.0;
+
+impl Level {
+    /// Which rows its boxes look at; never [`Look::Auto`].
+    pub(super) fn look(&self, asked: Look) -> Look {
+        match asked {
+            Look::Auto if self.cells.are_spacious() => Look::Seldom,
+            Look::Auto if self.crowd > TRIM_FROM => Look::Trimmed,
+            Look::Auto => Look::Everywhere,
+            asked => asked,
+        }
+    }
+}
 
 /// The search over one level.
 pub(super) struct Half<'a, 'b, R, A> {
     pub(super) sorted: &'a Sorted<R>,
     pub(super) level: &'a Level,
+    /// What is asked for.
+    pub(super) look: Look,
     pub(super) judge: Judge<'a, R, A>,
     pub(super) scratch: &'b mut Scratch,
     pub(super) rests: &'b mut Rests,
@@ -94,12 +105,10 @@ impl<R: Record, A: Accept> Half<'_, '_, R, A> {
 
     #[inline(always)]
     fn check_looking<L: Lanes>(&mut self, slots: Range<usize>) -> bool {
-        if self.level.cells.are_spacious() {
-            self.check_with::<L, SELDOM>(slots)
-        } else if self.level.crowd > TRIM_FROM {
-            self.check_with::<L, TRIMMED>(slots)
-        } else {
-            self.check_with::<L, EVERYWHERE>(slots)
+        match self.level.look(self.look) {
+            Look::Seldom => self.check_with::<L, SELDOM>(slots),
+            Look::Trimmed => self.check_with::<L, TRIMMED>(slots),
+            Look::Everywhere | Look::Auto => self.check_with::<L, EVERYWHERE>(slots),
         }
     }
 
@@ -344,16 +353,16 @@ mod tests {
     fn whichever_rows_are_left_out_and_whatever_the_processor_the_pairs_are_the_same() {
         // Spacious cells, sparse, dense, and so full that runs are longer than all hits that are judged together.
         for (count, edge, half) in
-            [(3000, 200.0, 0.5), (3000, 30.0, 0.5), (3000, 12.0, 0.5), (3000, 5.0, 0.5), (2500, 0.5, 0.5)]
+            [(3000, 200.0, 0.5), (3000, 30.0, 0.5), (3000, 12.0, 0.5), (3000, 5.0, 0.5), (1500, 0.5, 0.5)]
         {
             let boxes = boxes(count, edge, half);
             let wanted = oracle::pairs(&boxes);
             let mut map = map_of(&boxes);
-            for crowd in [0.0, 100.0] {
-                map.levels.iter_mut().for_each(|level| level.crowd = crowd);
+            for look in [Look::Everywhere, Look::Trimmed, Look::Seldom] {
+                map.look = look;
                 for simd in [Simd::Portable, Simd::detect()] {
                     map.simd = simd;
-                    assert_eq!(pairs(&map), wanted, "{count} in {edge}, crowd {crowd}, {simd:?}");
+                    assert_eq!(pairs(&map), wanted, "{count} in {edge}, {look:?}, {simd:?}");
                 }
             }
         }

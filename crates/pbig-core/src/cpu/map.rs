@@ -7,8 +7,8 @@ use super::entries::Entries;
 use super::levels::{Classes, LISTED, Level};
 use super::record::{Item, Record};
 use super::sort::{Input, Sort, Sorted, shift_for};
-use crate::plan::{Camps, Experience, OccupiedCell, Plan};
-use crate::{Aabb, shared_from};
+use crate::plan::{Camps, Experience, Looks, OPEN, OccupiedCell, Plan};
+use crate::{Aabb, Look, shared_from};
 
 /// Boxes from which a sort is shared with other threads.
 const PARALLEL_FROM: usize = shared_from(20_000);
@@ -21,6 +21,8 @@ pub(crate) struct Map<R> {
     /// Boxes tested against everything.
     pub(crate) list: Entries,
     pub(super) simd: Simd,
+    /// Which rows a search is asked to look at.
+    pub(super) look: Look,
     pub(super) classes: Classes,
     sort: Sort,
     pub(super) homes: Homes,
@@ -47,6 +49,7 @@ impl<R: Record> Map<R> {
             sorted: Sorted::default(),
             list: Entries::default(),
             simd: Simd::detect(),
+            look: Look::Auto,
             classes: Classes::default(),
             sort: Sort::default(),
             homes: Homes::default(),
@@ -114,6 +117,15 @@ impl<R: Record> Map<R> {
                 out.push(OccupiedCell { level: i as u32, aabb: cell[0].0.1, ids });
             }
         }
+    }
+
+    /// Which rows a search looks at, level by level.
+    pub(crate) fn looks(&self) -> Looks {
+        let mut looks = Looks::default();
+        // Of other camps none is searched for its own pairs.
+        let searched = self.levels.iter().filter(|level| level.camp == OPEN && !level.slots.is_empty());
+        searched.for_each(|level| looks.count(level.look(self.look)));
+        looks
     }
 
     /// Boxes in grids.

@@ -49,7 +49,7 @@ pub use error::GpuError;
 pub(crate) use trial::Trial;
 
 use crate::cpu::found::Found;
-use crate::plan::Summary;
+use crate::plan::{NoGpu, Summary};
 use crate::report::Report;
 use crate::{Aabb, Backend, Config, GpuOptions, ProxyFilter};
 use changes::{Ahead, Trail};
@@ -304,11 +304,41 @@ impl GpuFinder {
     }
 }
 
-/// Whether a search should run on a device.
-pub(crate) fn wanted(config: &Config, gpu: Option<&GpuFinder>, trial: &mut Trial, boxes: usize) -> bool {
-    match config.backend {
-        Backend::Gpu => true,
-        Backend::Auto => gpu.is_some_and(|gpu| gpu.pretends || !gpu.is_software()) && trial.wants_gpu(boxes),
-        Backend::Cpu | Backend::Brute => false,
+/// Whether a search should run on a device; if not, and where that was left open, why. `few_changed`: most boxes are where
+/// the CPU knows them.
+pub(crate) fn wanted(
+    config: &Config,
+    gpu: Option<&GpuFinder>,
+    trial: &mut Trial,
+    boxes: usize,
+    few_changed: bool,
+) -> Result<(), Option<NoGpu>> {
+    match (config.backend, gpu) {
+        (Backend::Gpu, _) => Ok(()),
+        (Backend::Cpu | Backend::Brute, _) => Err(None),
+        (Backend::Auto, None) => Err(Some(NoGpu::NotGiven)),
+        (Backend::Auto, Some(gpu)) if gpu.is_software() && !gpu.pretends => Err(Some(NoGpu::Software)),
+        (Backend::Auto, Some(_)) if few_changed => Err(Some(NoGpu::FewChanged)),
+        (Backend::Auto, Some(_)) => trial.wants_gpu(boxes).map_err(Some),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_device_that_is_not_asked_is_not_for_a_reason() {
+        let (mut trial, gpu) = (Trial::default(), GpuFinder::shared());
+        let mut why = |backend, gpu, boxes, few_changed| {
+            let config = Config { backend, ..Config::DEFAULT };
+            wanted(&config, gpu, &mut trial, boxes, few_changed)
+        };
+        assert_eq!(why(Backend::Gpu, None, 2, true), Ok(()));
+        assert_eq!(why(Backend::Cpu, Some(&gpu), 1 << 20, false), Err(None));
+        assert_eq!(why(Backend::Auto, None, 1 << 20, false), Err(Some(NoGpu::NotGiven)));
+        assert_eq!(why(Backend::Auto, Some(&gpu), 100, false), Err(Some(NoGpu::FewBoxes)));
+        assert_eq!(why(Backend::Auto, Some(&gpu), 1 << 20, true), Err(Some(NoGpu::FewChanged)));
+        assert_eq!(why(Backend::Auto, Some(&gpu), 1 << 20, false), Err(Some(NoGpu::Unmeasured)));
     }
 }

@@ -1,5 +1,6 @@
 //! [`crate::Backend::Auto`] with a device at hand: the CPU or the GPU, by measurement.
 
+use crate::plan::NoGpu;
 use std::time::Duration;
 
 /// Boxes from which a device is tried at all: below, a submission alone takes as long as the CPU does
@@ -23,19 +24,24 @@ pub(crate) struct Trial {
 }
 
 impl Trial {
-    /// Where the next call should run.
-    pub(crate) fn wants_gpu(&mut self, boxes: usize) -> bool {
+    /// Whether the next call should run on the device, and why not.
+    pub(crate) fn wants_gpu(&mut self, boxes: usize) -> Result<(), NoGpu> {
         if boxes < WORTH_TRYING {
-            return false;
+            return Err(NoGpu::FewBoxes);
         }
-        let (Some(cpu), Some(gpu)) = (self.cpu, self.gpu) else { return self.cpu.is_some() };
+        let Some(cpu) = self.cpu else { return Err(NoGpu::Unmeasured) };
+        let Some(gpu) = self.gpu else { return Ok(()) };
         let (here, there) = if self.on_gpu { (gpu, cpu) } else { (cpu, gpu) };
         if there < BETTER * here {
             self.on_gpu = !self.on_gpu;
             self.calls = 0;
         }
         self.calls += 1;
-        if self.calls.is_multiple_of(AGAIN) { !self.on_gpu } else { self.on_gpu }
+        match (self.on_gpu, self.calls.is_multiple_of(AGAIN)) {
+            (true, false) | (false, true) => Ok(()),
+            (true, true) => Err(NoGpu::Compared),
+            (false, false) => Err(NoGpu::Slower),
+        }
     }
 
     /// What a call took.
@@ -71,7 +77,7 @@ mod tests {
     fn on_gpu(trial: &mut Trial, calls: u32, boxes: usize, cpu: u64, gpu: u64) -> u32 {
         let mut count = 0;
         for _ in 0..calls {
-            let wants = trial.wants_gpu(boxes);
+            let wants = trial.wants_gpu(boxes).is_ok();
             count += u32::from(wants);
             trial.note(wants, boxes, Duration::from_nanos(boxes as u64 * if wants { gpu } else { cpu }));
         }
@@ -82,12 +88,17 @@ mod tests {
     fn the_faster_side_gets_the_calls_and_the_other_is_tried_now_and_then() {
         let mut trial = Trial::default();
         assert_eq!(on_gpu(&mut trial, 100, 9_999, 100, 1), 0, "too few boxes");
+        assert_eq!(trial.wants_gpu(9_999), Err(NoGpu::FewBoxes));
+        assert_eq!(trial.wants_gpu(100_000), Err(NoGpu::Unmeasured));
         assert_eq!(trial.share_of_gpu(100_000), None);
         assert!(on_gpu(&mut trial, 1000, 100_000, 100, 10) > 990);
         assert_eq!((trial.share_of_gpu(100_000), trial.share_of_gpu(9999)), (Some(0.1), None));
         let mut trial = Trial::default();
         assert!(on_gpu(&mut trial, 1000, 100_000, 100, 95) < 12, "not enough better");
+        assert_eq!(trial.wants_gpu(100_000), Err(NoGpu::Slower));
         assert!(on_gpu(&mut trial, 10_000, 100_000, 100, 10) > 8000, "noticed when it becomes better");
+        let whys = (0..AGAIN).filter_map(|_| trial.wants_gpu(100_000).err()).collect::<Vec<_>>();
+        assert_eq!(whys, [NoGpu::Compared], "one call in so many is the CPU's");
         trial.failed();
         assert_eq!(on_gpu(&mut trial, 1, 100_000, 100, 10), 1, "tried again");
     }

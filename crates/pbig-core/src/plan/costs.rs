@@ -1,6 +1,7 @@
 //! What work costs, and what the ways to search a set would take: the plan compares forecasts, and what searches then
 //! took corrects them.
 
+use crate::config::{Config, Grids};
 use std::fmt;
 
 /// What a unit of work costs on one core, in ns. Only time depends on it: results are the same whatever the plan.
@@ -70,6 +71,17 @@ pub(crate) enum Way {
     OneGrid = 1,
     /// Grids by size, or one and a list.
     Levels = 2,
+}
+
+impl Way {
+    /// The one that is asked for.
+    pub(super) fn asked(config: &Config) -> Option<Self> {
+        match config.study.grids {
+            Grids::Auto => None,
+            Grids::One => Some(Self::OneGrid),
+            Grids::Levels => Some(Self::Levels),
+        }
+    }
 }
 
 /// What the ways to search a set would take, in ns on one core, pairs not counted; infinite for one that is not possible
@@ -187,7 +199,7 @@ impl Experience {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{Aabb, Config, Finder, oracle};
+    use crate::{Aabb, Finder, oracle};
 
     const CLOSE: Forecast = Forecast { brute: 100.0, one_grid: 90.0, levels: f32::INFINITY };
 

@@ -21,7 +21,7 @@ pub use gpu::GpuPlan;
 use levels::{Choice, Company, Setting};
 pub use levels::{LevelPlan, OccupiedCell};
 pub use pbig::{PbigPlan, density_cell, pbig_cell, pbig_objective};
-pub use reasons::{Measured, NearPlan, NoNear};
+pub use reasons::{Looks, Measured, NearPlan, NoGpu, NoNear};
 pub(crate) use summary::{LazySummary, size_class_of, spread_evenly};
 pub use summary::{SizeClass, Summary};
 
@@ -92,6 +92,10 @@ pub struct Plan {
     pub near: Option<NearPlan>,
     /// Why there is none, where many boxes change ([`Chosen::Edit`] and [`Chosen::Grid`], in updates).
     pub no_near: Option<NoNear>,
+    /// Why no device was asked, where [`Backend::Auto`] leaves that open.
+    pub no_gpu: Option<NoGpu>,
+    /// At which rows the search of the CPU's grid has looked ([`Chosen::Grid`]).
+    pub looks: Looks,
     /// What the ways to do it have taken, where that decides.
     pub measured: Measured,
     /// Valid boxes planned for.
@@ -110,7 +114,7 @@ impl Plan {
         Self::by(summary, config, crowding, None, &costs, &Experience::default())
     }
 
-    /// The same by given costs, and by what searches took; `only` one way, if boxes allow it.
+    /// The same by given costs, and by what searches took; `only` one way, if boxes allow it and no other is asked for.
     pub(crate) fn by(
         summary: &Summary,
         config: &Config,
@@ -119,7 +123,7 @@ impl Plan {
         costs: &Costs,
         experience: &Experience,
     ) -> Self {
-        let boxes = summary.valid;
+        let (boxes, only) = (summary.valid, Way::asked(config).or(only));
         if boxes < 2 {
             return Self { boxes, ..Self::default() };
         }
@@ -146,7 +150,8 @@ impl Plan {
         if self.levels.is_empty() {
             (self.chosen, self.swept, self.pbig, self.moved) = (Chosen::Nothing, 0, None, 0);
             (self.forecast, self.expected) = Default::default();
-            (self.near, self.no_near, self.measured) = Default::default();
+            (self.near, self.no_near, self.no_gpu) = (None, None, None);
+            (self.looks, self.measured) = Default::default();
             #[cfg(feature = "gpu")]
             {
                 self.gpu = None;
@@ -195,7 +200,8 @@ impl Plan {
         for (camp, summary) in summaries.iter().enumerate() {
             let company = Company { others: boxes - summary.valid, pairs: camp == usize::from(OPEN) };
             let (strategy, experience) = (config.strategy, &Experience::default());
-            let setting = Setting { crowding, strategy, company, costs, experience, only: None };
+            let only = Way::asked(config);
+            let setting = Setting { crowding, strategy, company, costs, experience, only };
             let choice = levels::choose(summary, &setting);
             all.extend(choice.levels.into_iter().map(|level| LevelPlan { camp: camp as u8, ..level }));
             swept += choice.swept;
@@ -241,6 +247,9 @@ impl fmt::Display for Plan {
         for level in self.levels.iter() {
             write!(f, "; {level}")?;
         }
+        if self.looks != Looks::default() {
+            write!(f, "; rows looked at: {}", self.looks)?;
+        }
         if self.swept > 0 && self.chosen != Chosen::Brute {
             write!(f, "; {} oversize boxes tested against all", self.swept)?;
         }
@@ -252,6 +261,9 @@ impl fmt::Display for Plan {
         }
         if let Some(why) = self.no_near {
             write!(f, "; no near pairs: {why}")?;
+        }
+        if let Some(why) = self.no_gpu {
+            write!(f, "; no GPU: {why}")?;
         }
         write!(f, "{}", self.measured)
     }

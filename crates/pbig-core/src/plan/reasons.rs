@@ -1,6 +1,31 @@
 //! Why an update went its way, where what earlier ones have taken decides.
 
+use crate::Look;
 use std::fmt;
+
+/// At which rows boxes look in the search of the CPU's grid: in how many levels. None where nothing, or only what has changed,
+/// is searched for.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Looks {
+    /// [`Look::Everywhere`].
+    pub everywhere: u32,
+    /// [`Look::Trimmed`].
+    pub trimmed: u32,
+    /// [`Look::Seldom`].
+    pub seldom: u32,
+}
+
+impl Looks {
+    /// One more level.
+    pub(crate) fn count(&mut self, look: Look) {
+        match look {
+            Look::Auto => {}
+            Look::Everywhere => self.everywhere += 1,
+            Look::Trimmed => self.trimmed += 1,
+            Look::Seldom => self.seldom += 1,
+        }
+    }
+}
 
 /// The list that [`crate::plan::Chosen::Near`] tests.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -26,6 +51,29 @@ pub enum NoNear {
     Many(u32),
     /// How far boxes move is not known: most that have changed were not there before, or are where they were.
     Unknown,
+    /// [`crate::Config::study`] asks for another way.
+    Unwanted,
+}
+
+/// Why no device was asked, where [`crate::Backend::Auto`] leaves that open.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum NoGpu {
+    /// This build has no GPU backend.
+    NotBuilt,
+    /// None was given.
+    NotGiven,
+    /// The one that was given is software.
+    Software,
+    /// Fewer boxes than one is worth trying for.
+    FewBoxes,
+    /// Fewer than a quarter of the boxes have changed.
+    FewChanged,
+    /// What the CPU takes is not known yet.
+    Unmeasured,
+    /// The CPU takes less, or not so much more that it would change.
+    Slower,
+    /// The device takes less, and after some calls this is measured again, by one without.
+    Compared,
 }
 
 /// What the ways to do an update have taken here, as far as that has been measured and decides.
@@ -57,7 +105,38 @@ impl fmt::Display for NoNear {
             Self::Unpaid(pause) => write!(f, "the last ones did not pay or last, {}", Pause(*pause)),
             Self::Many(pause) => write!(f, "too many would be near, {}", Pause(*pause)),
             Self::Unknown => write!(f, "how far most boxes move is not known"),
+            Self::Unwanted => write!(f, "another way is asked for"),
         }
+    }
+}
+
+impl fmt::Display for NoGpu {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::NotBuilt => "this build has none",
+            Self::NotGiven => "none was given",
+            Self::Software => "the one given is software",
+            Self::FewBoxes => "there are too few boxes for one",
+            Self::FewChanged => "too few boxes have changed for one",
+            Self::Unmeasured => "what the CPU takes is measured first",
+            Self::Slower => "one does not take so much less that it pays to change",
+            Self::Compared => "one takes less, which is measured again, by the CPU",
+        })
+    }
+}
+
+/// `trimmed`, or `trimmed in 2 levels, seldom in 1`.
+impl fmt::Display for Looks {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let all = [("everywhere", self.everywhere), ("trimmed", self.trimmed), ("seldom", self.seldom)];
+        let mut used = all.into_iter().filter(|(_, levels)| *levels > 0);
+        let Some((name, levels)) = used.next() else { return f.write_str("none") };
+        let mut others = used.peekable();
+        if others.peek().is_none() {
+            return f.write_str(name);
+        }
+        write!(f, "{name} in {levels} levels")?;
+        others.try_for_each(|(name, levels)| write!(f, ", {name} in {levels}"))
     }
 }
 

@@ -26,7 +26,7 @@ use crate::cpu::find::Others;
 use crate::cpu::judge::Accept;
 use crate::diff::Judgement;
 use crate::near::NearPairs;
-use crate::plan::{Chosen, NearPlan, NoNear, Plan};
+use crate::plan::{Chosen, Looks, NearPlan, NoNear, Plan};
 use crate::report::{Checks, lap, stage};
 use crate::{Aabb, Error, Pair, shared_from};
 use rayon::prelude::*;
@@ -43,6 +43,9 @@ const FIRST: usize = 8;
 
 /// Near pairs that may come on a box: to test them must cost less than to search.
 const NEAR_OF_A_BOX: u64 = 16;
+
+/// The same where there is to be a list whatever it costs: 2 KB a box.
+const NEAR_AT_MOST: u64 = 256;
 
 /// Changed boxes from which they are looked at on several threads, and those of a piece.
 const PARALLEL_FROM: usize = shared_from(16_384);
@@ -109,7 +112,7 @@ impl BroadPhase {
         if !self.near.is_on {
             return Ok(Served::No);
         }
-        if !self.near.worth.goes_on(self.near.age) {
+        if !self.must_have_list() && !self.near.worth.goes_on(self.near.age) {
             self.end_near();
             return Ok(Served::No);
         }
@@ -204,7 +207,8 @@ impl BroadPhase {
     }
 
     fn most_near(&self) -> u64 {
-        let most = NEAR_OF_A_BOX * u64::from(self.present_count)
+        let of_a_box = if self.must_have_list() { NEAR_AT_MOST } else { NEAR_OF_A_BOX };
+        let most = of_a_box * u64::from(self.present_count)
             + 2 * self.near.list.overlapping().max(self.pairs.listed()) as u64;
         most.min(u64::from(u32::MAX / 2))
     }
@@ -265,7 +269,8 @@ impl BroadPhase {
         self.report.checks = Checks { made, unnecessary: made - needed, redundant: 0 };
         let (moved, boxes) = (self.base.map.out_of_order() as u32, self.valid_count());
         let near = Some(self.near.plan());
-        self.report.plan = Plan { chosen: Chosen::Near, moved, boxes, near, ..self.base_plan.clone() };
+        let looks = Looks::default();
+        self.report.plan = Plan { chosen: Chosen::Near, moved, boxes, near, looks, ..self.base_plan.clone() };
         // A device that is compared with the CPU is compared with this.
         if self.many_changed() {
             let time = self.report.stages.total();

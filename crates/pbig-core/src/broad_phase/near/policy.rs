@@ -4,7 +4,7 @@ use super::worth::Cause;
 use super::{FIRST, Served};
 use crate::broad_phase::{BroadPhase, flag};
 use crate::plan::NoNear;
-use crate::{Backend, Error, Strategy};
+use crate::{Error, Updates};
 
 /// Of how many boxes one has to change for a list: where it is always the same ones, and else.
 const FEWEST: [usize; 2] = [128, 16];
@@ -47,10 +47,7 @@ impl BroadPhase {
     /// A new list, if there should be one, and what it comes to.
     pub(in crate::broad_phase) fn try_near(&mut self) -> Result<Served, Error> {
         self.near.none = None;
-        if !self.enough_changed()
-            || self.config.backend == Backend::Brute
-            || self.config.strategy == Strategy::Pbig
-        {
+        if !self.may_edit() || !(self.must_have_list() || self.enough_changed()) {
             return Ok(Served::No);
         }
         match self.skin() {
@@ -63,6 +60,11 @@ impl BroadPhase {
                 Ok(Served::No)
             }
         }
+    }
+
+    /// Whether there is to be a list whatever it costs.
+    pub(super) fn must_have_list(&self) -> bool {
+        self.config.study.updates == Updates::Near
     }
 
     /// Whether so many change that a list may pay: a quarter, or fewer for some time already. For a few of them an update
@@ -80,7 +82,7 @@ impl BroadPhase {
 
     /// How wide the skin of a list would be that is made now; or why there is to be none.
     fn skin(&mut self) -> Result<f32, NoNear> {
-        if let Some(why) = self.near.worth.goes_without() {
+        if let Some(why) = self.why_without() {
             return Err(why);
         }
         let width = self.next_width().ok_or(NoNear::Unknown)?;
@@ -90,5 +92,14 @@ impl BroadPhase {
             return Err(self.near.worth.told());
         }
         Ok(width)
+    }
+
+    /// Why this update goes without a list, whatever it would be like.
+    fn why_without(&mut self) -> Option<NoNear> {
+        match self.config.study.updates {
+            Updates::Auto => self.near.worth.goes_without(),
+            Updates::Near => None,
+            Updates::Edits | Updates::Anew => Some(NoNear::Unwanted),
+        }
     }
 }
