@@ -392,9 +392,7 @@ fn finders_in_several_threads_share_a_device() {
         for _ in 0..4 {
             scope.spawn(|| {
                 let mut finder = Finder::new(with(GpuOptions::DEFAULT));
-                for _ in 0..10 {
-                    assert_eq!(difference(&find(&mut finder, &boxes).0, &wanted), None);
-                }
+                (0..10).for_each(|_| assert_eq!(difference(&find(&mut finder, &boxes).0, &wanted), None));
             });
         }
     });

@@ -5,6 +5,7 @@ use plotters::prelude::*;
 use std::path::Path;
 
 /// Points of one measurement, in ascending order of x.
+#[derive(Clone)]
 pub struct Line {
     /// For the legend.
     pub name: String,

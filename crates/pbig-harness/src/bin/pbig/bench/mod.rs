@@ -7,6 +7,7 @@ pub(crate) mod measure;
 pub(crate) mod memory;
 mod papers;
 mod peers;
+mod regret;
 mod shares;
 mod stages;
 mod step;

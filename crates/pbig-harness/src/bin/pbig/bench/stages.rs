@@ -208,7 +208,7 @@ pub(super) fn run(quick: bool) -> Result<Outcome, Failure> {
         charts.push(chart(sweep, lines.into()));
     }
     bar.finish_and_clear();
-    let crossings = ways::run(effort, &mut rows, &mut charts)?;
+    let crossings = ways::run(quick, &mut rows, &mut charts)?;
     let won = shares::run(quick, &mut rows, &mut charts)?;
     Ok(Outcome { rows, notes: [notes(), crossings, won].concat(), charts })
 }
@@ -260,7 +260,9 @@ fn notes() -> Vec<String> {
          in how many calls"
             .into(),
         "ways: `Finder` as planned (ours), and made to test every pair, to use the grid, or to use PBIG's own grid, \
-         which no plan chooses; one grid or several levels cannot be asked for"
+         which no plan chooses; grids: as planned, and made to use one grid, or levels by size or one grid and a list of \
+         the largest; rows: made to use one grid and to look at all rows, at those trimmed to a box's reach, or at other \
+         rows than its own only where a box reaches them (`Config::study`)"
             .into(),
     ]
 }
