@@ -1,6 +1,8 @@
 //! The corpus: sets of boxes that every strategy must get right, with the strategies to try.
 
-use pbig_core::{Aabb, Backend, CellRule, Coding, Config, GpuOptions, Pair, Strategy};
+use pbig_core::{
+    Aabb, Backend, CellRule, Coding, Config, GpuOptions, Grids, Look, Pair, Strategy, Study, Updates,
+};
 use pbig_harness::boxes::BoxSet;
 
 /// A set of boxes with a name to read in a failure.
@@ -25,6 +27,23 @@ pub fn strategies() -> Vec<(&'static str, Config)> {
         ("gpu", with(Backend::Gpu, Strategy::Auto)),
         ("gpu grid", gpu(Coding::Plain)),
         ("gpu grid packed", gpu(Coding::Packed)),
+    ]
+}
+
+/// Ways on the CPU that the plan would not choose everywhere, by name.
+pub fn asked() -> Vec<(&'static str, Config)> {
+    let grid = Config { backend: Backend::Cpu, strategy: Strategy::Grid, ..Config::DEFAULT };
+    let with = |study| Config { study, ..grid };
+    let by = |updates| with(Study { updates, ..Study::DEFAULT });
+    let of = |grids, look| with(Study { grids, look, ..Study::DEFAULT });
+    vec![
+        ("edits", by(Updates::Edits)),
+        ("grid anew", by(Updates::Anew)),
+        ("near pairs", by(Updates::Near)),
+        ("levels, rows everywhere", of(Grids::Levels, Look::Everywhere)),
+        ("levels, trimmed rows", of(Grids::Levels, Look::Trimmed)),
+        ("one grid, trimmed rows", of(Grids::One, Look::Trimmed)),
+        ("one grid, rows seldom", of(Grids::One, Look::Seldom)),
     ]
 }
 

@@ -2,7 +2,7 @@
 
 use pbig_core::{Aabb, Coding, Config, Error, Finder, Limits, Order, Pair, ProxyFilter, oracle};
 use pbig_harness::boxes::BoxSet;
-use pbig_tests::{corpus, difference, gpu, strategies};
+use pbig_tests::{asked, corpus, difference, gpu, strategies};
 use proptest::prelude::*;
 
 pub(crate) fn check(name: &str, boxes: &[Aabb]) {
@@ -29,6 +29,7 @@ pub(crate) fn check_on(strategies: Vec<(&str, Config)>, name: &str, boxes: &[Aab
 fn the_corpus_on_every_strategy() {
     for case in corpus() {
         check(&case.name, &case.boxes);
+        check_on(asked(), &case.name, &case.boxes);
     }
 }
 
@@ -40,7 +41,8 @@ fn ten_thousand_random_sets_with_every_degenerate_kind() {
         // A software adapter takes 4 ms for what the CPU does in 10 us.
         let on_gpu = |name: &str| name.starts_with("gpu");
         let strategies = strategies().into_iter().filter(|(name, _)| !on_gpu(name) || seed % 25 == 0);
-        check_on(strategies.collect(), &format!("degenerate, seed {seed}"), &boxes);
+        let asked = asked().into_iter().filter(|_| seed % 5 == 0);
+        check_on(strategies.chain(asked).collect(), &format!("degenerate, seed {seed}"), &boxes);
     }
 }
 

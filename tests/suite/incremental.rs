@@ -2,9 +2,12 @@
 //! boxes, and the events lead from one state to the next.
 
 use pbig_core::plan::Chosen;
-use pbig_core::{Aabb, Backend, BroadPhase, Config, Error, Limits, Pair, ProxyFilter, Strategy, oracle};
+use pbig_core::{
+    Aabb, Backend, BroadPhase, Config, Error, Limits, Pair, Plan, ProxyFilter, Strategy, Study, Updates,
+    oracle,
+};
 use pbig_harness::boxes::{BoxSet, moved};
-use pbig_tests::strategies;
+use pbig_tests::{asked, strategies};
 use rand::rngs::StdRng;
 use rand::{RngExt, SeedableRng};
 use std::collections::{BTreeSet, HashSet};
@@ -137,7 +140,7 @@ impl Follower {
 #[test]
 fn random_worlds_with_churn_on_every_strategy() {
     let degenerate = BoxSet::named("degenerate").expect("the set exists");
-    for (strategy, config) in strategies() {
+    for (strategy, config) in strategies().into_iter().chain(asked()) {
         for seed in 0..60 {
             let mut rng = StdRng::seed_from_u64(seed);
             let margin = [0.0, 0.01, 0.3][seed as usize % 3];
@@ -176,21 +179,38 @@ fn change(world: &mut Follower, rng: &mut StdRng, id: u32, new: Aabb) {
 fn moving_sets_where_all_or_a_few_boxes_move() {
     for (name, distance) in [("unit", 0.1), ("mixed", 0.1), ("pile", 0.02)] {
         for share in [1.0, 0.01] {
-            let mut boxes = BoxSet::named(name).expect("the set exists").boxes(4000, 5);
-            let mut world = Follower::new(Config { margin: 0.01, ..Config::DEFAULT }, boxes.len());
-            let mut rng = StdRng::seed_from_u64(1);
-            for frame in 0..12 {
-                let next = moved(&boxes, distance, frame);
-                for (id, next) in next.into_iter().enumerate() {
-                    if frame == 0 || rng.random_bool(share) {
-                        boxes[id] = next;
-                        world.set(id as u32, next, ProxyFilter::ALL);
-                    }
-                }
-                world.update(&format!("{name}, share {share}, frame {frame}"));
-            }
+            play(name, distance, share, Updates::Auto);
+            let edits = play(name, distance, share, Updates::Edits);
+            assert!(
+                share == 1.0 || edits.iter().all(|plan| plan.chosen == Chosen::Edit),
+                "{name}: {edits:?}"
+            );
+            let anew = play(name, distance, share, Updates::Anew);
+            assert!(anew.iter().all(|plan| plan.chosen == Chosen::Grid), "{name}: {anew:?}");
+            let near = play(name, distance, share, Updates::Near);
+            assert!(near.iter().all(|plan| plan.near.is_some()), "{name}: {near:?}");
         }
     }
+}
+
+/// Frames of a set by one way; the plans of all updates after the first.
+fn play(name: &str, distance: f32, share: f64, updates: Updates) -> Vec<Plan> {
+    let mut boxes = BoxSet::named(name).expect("the set exists").boxes(4000, 5);
+    let study = Study { updates, ..Study::DEFAULT };
+    let mut world = Follower::new(Config { margin: 0.01, study, ..Config::DEFAULT }, boxes.len());
+    let (mut rng, mut plans) = (StdRng::seed_from_u64(1), vec![]);
+    for frame in 0..12 {
+        let next = moved(&boxes, distance, frame);
+        for (id, next) in next.into_iter().enumerate() {
+            if frame == 0 || rng.random_bool(share) {
+                boxes[id] = next;
+                world.set(id as u32, next, ProxyFilter::ALL);
+            }
+        }
+        world.update(&format!("{name}, share {share}, frame {frame}, {updates:?}"));
+        plans.push(world.broad_phase.report().plan.clone());
+    }
+    plans.split_off(1)
 }
 
 /// As many as a bitmap of each width holds, one less and one more; whether all or a few change, and filters with them.

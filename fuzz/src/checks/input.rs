@@ -1,6 +1,6 @@
 //! Bytes as boxes: short, so that a mutation of one byte is a box that is a little different, equal, touching or odd.
 
-use pbig_core::{Aabb, Backend, CellRule, Config, Costs, ProxyFilter, Strategy};
+use pbig_core::{Aabb, Backend, CellRule, Config, Costs, Grids, Look, ProxyFilter, Strategy, Study, Updates};
 
 /// Numbers at which something changes: signs, ends of ranges, no numbers.
 const SPECIAL: [f32; 16] = [
@@ -69,13 +69,21 @@ impl Input<'_> {
 pub(crate) fn config(choice: u8) -> Config {
     let base = Config { backend: Backend::Cpu, costs: Some(Costs::REFERENCE), ..Config::DEFAULT };
     let with = |strategy| Config { strategy, ..base };
-    match choice % 6 {
+    let grid = with(Strategy::Grid);
+    let by = |updates| Config { study: Study { updates, ..Study::DEFAULT }, ..grid };
+    let of = |grids, look| Config { study: Study { grids, look, ..Study::DEFAULT }, ..grid };
+    match choice % 11 {
         0 => base,
         1 => Config { brute_below: 0, ..base },
-        2 => with(Strategy::Grid),
+        2 => grid,
         3 => with(Strategy::Pbig),
         4 => Config { cell_rule: CellRule::Density, small_cell: 1, ..with(Strategy::Pbig) },
-        _ => Config { backend: Backend::Brute, ..base },
+        5 => Config { backend: Backend::Brute, ..base },
+        6 => by(Updates::Edits),
+        7 => by(Updates::Anew),
+        8 => by(Updates::Near),
+        9 => of(Grids::Levels, Look::Trimmed),
+        _ => of(Grids::One, Look::Seldom),
     }
 }
 

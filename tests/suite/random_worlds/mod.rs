@@ -10,8 +10,10 @@ mod ops;
 use crate::checked::backends;
 use kind::Kind;
 use ops::{Op, any_op, apply};
+use pbig_core::Config;
 use pbig_harness::shadow::Shadowed;
 use pbig_harness::world::World;
+use pbig_tests::asked;
 use proptest::collection::vec;
 use proptest::prelude::ProptestConfig;
 use proptest::test_runner::{RngAlgorithm, TestCaseError, TestError, TestRng, TestRunner};
@@ -333,6 +335,10 @@ fn random_worlds_agree_with_stock_and_the_oracle() {
     let tally = on_cpu.plus(on_grid);
     tally.assert_that_much_happened();
     assert!(tally.ops >= 100_000 || std::env::var_os("PROPTEST_CASES").is_some(), "{tally:?}");
+    for (_, config) in asked().into_iter().take(3) {
+        let config = Config { margin: cpu.margin, ..config };
+        on_random_ops(100, |ops| run(ops, config.into(), Plant::Nothing)).assert_that_much_happened();
+    }
 }
 
 #[test]

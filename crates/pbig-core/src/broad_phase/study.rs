@@ -140,8 +140,11 @@ fn rows_are_told_by_level_and_not_where_none_is_searched() {
     let plan = find(&mixed, Study { grids: Grids::Levels, look: Look::Trimmed, ..Study::DEFAULT });
     assert_eq!(plan.looks.trimmed as usize, plan.levels.len(), "{plan}");
     assert_eq!((plan.looks.everywhere, plan.looks.seldom), (0, 0));
-    let looks = crate::plan::Looks { everywhere: 0, trimmed: 2, seldom: 1 };
-    assert_eq!(looks.to_string(), "trimmed in 2 levels, seldom in 1");
+    let looks = |trimmed, seldom| crate::plan::Looks { everywhere: 0, trimmed, seldom }.to_string();
+    assert_eq!(
+        [looks(2, 1), looks(1, 2), looks(0, 0)],
+        ["trimmed in 2 levels, seldom in 1", "trimmed in 1 level, seldom in 2", "none"]
+    );
     let [auto, edits, _, near] = play(30);
     let searched = |plan: &&Plan| plan.chosen == Chosen::Grid;
     for plan in auto.iter().chain(&edits).chain(&near).filter(|plan| !searched(plan)) {

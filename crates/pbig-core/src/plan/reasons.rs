@@ -125,7 +125,7 @@ impl fmt::Display for NoGpu {
     }
 }
 
-/// `trimmed`, or `trimmed in 2 levels, seldom in 1`.
+/// `trimmed`, or `trimmed in 1 level, seldom in 2`.
 impl fmt::Display for Looks {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let all = [("everywhere", self.everywhere), ("trimmed", self.trimmed), ("seldom", self.seldom)];
@@ -135,7 +135,7 @@ impl fmt::Display for Looks {
         if others.peek().is_none() {
             return f.write_str(name);
         }
-        write!(f, "{name} in {levels} levels")?;
+        write!(f, "{name} in {levels} level{}", if levels == 1 { "" } else { "s" })?;
         others.try_for_each(|(name, levels)| write!(f, ", {name} in {levels}"))
     }
 }

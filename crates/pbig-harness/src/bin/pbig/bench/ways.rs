@@ -6,7 +6,7 @@ use super::measure::Effort;
 use super::regret::{regret, winners};
 use super::table::Row;
 use crate::output::{Failure, progress};
-use pbig_core::{Backend, Config, Grids, Limits, Look, Order, Strategy, Study};
+use pbig_core::{Backend, Config, Grids, Limits, Look, Order, Plan, Strategy, Study};
 use pbig_harness::boxes::{cubes, moved};
 use pbig_harness::chart::{Line, LogLog};
 use std::time::Duration;
@@ -146,14 +146,7 @@ fn measure(sweep: &Sweep, point: &Point, effort: Effort) -> Result<(Row, Vec<f64
     let mut ways = Finders::new(configs, None, [moved(&start, 0.1, 2), start]);
     let times = ways.times(effort)?;
     let planned = ways.all.last().map(|finder| &finder.report().plan);
-    let note = planned.map_or(String::new(), |plan| {
-        format!(
-            "as planned: {}, {} levels, rows looked at: {}",
-            plan.chosen.name(),
-            plan.levels.len(),
-            plan.looks
-        )
-    });
+    let note = planned.map_or(String::new(), as_planned);
     let is_size = sweep.x == "boxes";
     let case = if is_size { sweep.case.clone() } else { format!("{}, {} {}", sweep.case, sweep.x, point.x) };
     let others = sweep.ways.iter().map(|(name, _)| *name).zip(times.iter().copied());
@@ -161,6 +154,16 @@ fn measure(sweep: &Sweep, point: &Point, effort: Effort) -> Result<(Row, Vec<f64
     let row =
         Row::new(case, point.boxes, ways.pairs()?).ours(times[times.len() - 1]).stages(stages).note(note);
     Ok((row, times))
+}
+
+/// What the plan makes of a set, in brief.
+fn as_planned(plan: &Plan) -> String {
+    let levels = match plan.levels.len() {
+        0 => String::new(),
+        1 => format!(" of one level, rows looked at: {}", plan.looks),
+        levels => format!(" of {levels} levels, rows looked at: {}", plan.looks),
+    };
+    format!("as planned: {}{levels}", plan.chosen.name())
 }
 
 /// Where each of the others takes least, and how far what is planned is from that.
