@@ -1,15 +1,17 @@
 //! `pbig bench gpu`: the GPU beside the CPU, stage by stage, and the floor below both.
 
+mod charts;
 pub(super) mod events;
 
 use super::machine::slug;
-use super::{Args, keep};
+use super::{Args, DOCUMENTS, keep};
 use crate::output::{Failure, print, progress};
 use pbig_core::gpu::study::Bench;
 use pbig_core::{Aabb, Backend, Config, Finder, GpuFinder, GpuReport, Limits};
 use pbig_harness::boxes::{BoxSet, moved};
 use pbig_harness::runner::{Spread, milliseconds};
 use serde_json::{Value, json};
+use std::path::Path;
 use std::time::{Duration, Instant};
 
 /// One set at one size.
@@ -38,9 +40,18 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
     if args.json {
         print(&object.to_string())?
     } else {
-        print(&format!("{}\n{}", table(&gpu, rate, &rows), events::table(&updates)))?
+        let tables = [table(&gpu, rate, &rows), events::table(&updates), charts::in_words(&rows, &updates)];
+        print(&tables.join("\n"))?
     }
-    if args.quick { Ok(()) } else { keep(&format!("gpu-{}", slug(gpu.adapter())), &object, args.json) }
+    if args.quick {
+        return Ok(());
+    }
+    let name = format!("gpu-{}", slug(gpu.adapter()));
+    keep(&name, &object, args.json)?;
+    for chart in charts::both(&name, gpu.adapter(), &rows, &updates) {
+        chart.write(&Path::new(DOCUMENTS).join(format!("{}.svg", chart.name)))?;
+    }
+    Ok(())
 }
 
 /// Ten million boxes take minutes on a program that plays a GPU, and tell nothing.

@@ -47,6 +47,9 @@ const BOXES: [usize; 9] = [10, 20, 30, 50, 100, 200, 500, 1000, 2000];
 /// Pairs a box.
 const DENSITIES: [f64; 3] = [0.1, 1.0, 10.0];
 
+const MS: &str = "ms";
+const NS: &str = "ns for each box and pair";
+
 /// What is varied, and the ways, of which the last is ours.
 struct Sweep {
     /// Of the chart.
@@ -55,6 +58,8 @@ struct Sweep {
     case: String,
     /// Along the x axis; also in the rows' case, if it is not the number of boxes.
     x: &'static str,
+    /// Along the y axis: times of a call, or their parts for each box and pair, where ways differ by less than sets do.
+    y: &'static str,
     ways: &'static [(&'static str, Config)],
     points: Vec<Point>,
 }
@@ -75,6 +80,7 @@ fn by_boxes(pairs: f64) -> Sweep {
         title: format!("{pairs} pairs a box: where each way wins"),
         case: format!("ways, {pairs} pairs a box"),
         x: "boxes",
+        y: MS,
         ways: &WAYS,
         points: BOXES.map(point).into(),
     }
@@ -88,6 +94,7 @@ fn by_spread(boxes: usize, pairs: f64) -> Sweep {
         title: format!("{boxes} boxes, {pairs} pairs each: one grid against levels"),
         case: format!("grids, {pairs} pairs a box"),
         x: "largest edge / smallest",
+        y: MS,
         ways: &GRIDS,
         points: [1.0, 3.0, 10.0, 30.0, 100.0, 300.0, 1000.0].map(point).into(),
     }
@@ -100,6 +107,7 @@ fn by_density(boxes: usize) -> Sweep {
         title: format!("{boxes} boxes in one grid: which rows the kernel looks at"),
         case: "rows".into(),
         x: "pairs a box",
+        y: NS,
         ways: &LOOKS,
         points: [0.01, 0.03, 0.1, 0.3, 1.0, 2.0, 4.0, 8.0, 16.0, 30.0].map(point).into(),
     }
@@ -128,7 +136,8 @@ pub(super) fn run(
             sweep.ways.iter().map(|(name, _)| Line { name: (*name).into(), points: vec![] }).collect();
         for point in &sweep.points {
             let (row, times) = measure(&sweep, point, effort)?;
-            lines.iter_mut().zip(times).for_each(|(line, ms)| line.points.push((point.x, ms)));
+            let unit = if sweep.y == NS { 1e6 / (point.boxes as u64 + row.pairs) as f64 } else { 1.0 };
+            lines.iter_mut().zip(times).for_each(|(line, ms)| line.points.push((point.x, unit * ms)));
             rows.push(row);
             bar.inc(1);
         }
@@ -191,8 +200,8 @@ fn crossings(lines: &[&Line], at: fn(f64) -> String) -> String {
 }
 
 fn chart(sweep: Sweep, lines: Vec<Line>) -> LogLog {
-    let Sweep { name, title, x, .. } = sweep;
-    LogLog { name, title, x, y: "ms", lines, exponents: x == "boxes" }
+    let Sweep { name, title, x, y, .. } = sweep;
+    LogLog { name, title, x, y, lines, exponents: x == "boxes" }
 }
 
 #[cfg(test)]

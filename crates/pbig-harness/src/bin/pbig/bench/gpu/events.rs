@@ -18,8 +18,8 @@ const SHARES: [f64; 4] = [0.001, 0.01, 0.1, 1.0];
 
 /// One share at one size: medians in ms of setting what has moved, and the update.
 pub(in crate::bench) struct Row {
-    boxes: usize,
-    share: f64,
+    pub(super) boxes: usize,
+    pub(super) share: f64,
     pub(in crate::bench) pairs: usize,
     /// Pairs that came or went in the last round.
     events: usize,
