@@ -171,5 +171,7 @@ fn the_report_says_why_no_device_was_asked_where_that_was_left_open() {
         }
         of.update().expect("nothing new");
         assert_eq!(of.report().plan.no_gpu, None, "nobody could have been asked");
+        finder.find(&few[..1]).expect("no pairs");
+        assert!(!finder.report().plan.to_string().contains("GPU"), "there was nothing to do");
     }
 }

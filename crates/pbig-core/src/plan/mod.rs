@@ -262,7 +262,7 @@ impl fmt::Display for Plan {
         if let Some(why) = self.no_near {
             write!(f, "; no near pairs: {why}")?;
         }
-        if let Some(why) = self.no_gpu {
+        if let Some(why) = self.no_gpu.filter(|_| self.chosen != Chosen::Nothing) {
             write!(f, "; no GPU: {why}")?;
         }
         write!(f, "{}", self.measured)
