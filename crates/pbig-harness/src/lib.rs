@@ -2,6 +2,7 @@
 
 pub mod boxes;
 pub mod chart;
+pub mod counting;
 pub mod field;
 pub mod files;
 pub mod index;

@@ -93,7 +93,7 @@ impl Tray {
         if step.is_multiple_of(3) {
             self.spawn();
         }
-        if step.is_multiple_of(5) {
+        if step.is_multiple_of(5) && !self.there.is_empty() {
             self.touch();
         }
         let most = if step.is_multiple_of(1009) { 0 } else { 60 };

@@ -222,13 +222,14 @@ impl<R: Record> Map<R> {
     }
 
     /// By given costs; else by those of the reference, or where that is too close to call by this machine's.
-    fn plan_by_costs(&self, summary: &Summary, config: &Config) -> Plan {
+    fn plan_by_costs(&mut self, summary: &Summary, config: &Config) -> Plan {
         let Crowding { factor, apart, .. } = self.crowding;
         let only = apart.then_some(Way::Levels);
         let by = |costs: &Costs| Plan::by(summary, config, factor, only, costs, &self.experience);
         let plan = by(&config.costs.unwrap_or(Costs::REFERENCE));
-        let measure = config.costs.is_none() && plan.forecast.is_close();
-        if measure { by(calibrate::measured()) } else { plan }
+        let measure = config.costs.is_none() && plan.forecast().is_close();
+        let plan = if measure { by(calibrate::measured()) } else { plan };
+        plan.plan_in(&mut self.kept_levels)
     }
 
     /// How full the fullest level is.

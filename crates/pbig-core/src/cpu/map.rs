@@ -7,7 +7,7 @@ use super::entries::Entries;
 use super::levels::{Classes, LISTED, Level};
 use super::record::{Item, Record};
 use super::sort::{Input, Sort, Sorted, shift_for};
-use crate::plan::{Camps, Experience, Looks, OPEN, OccupiedCell, Plan};
+use crate::plan::{Camps, Experience, KeptLevels, Looks, OPEN, OccupiedCell, Plan};
 use crate::{Aabb, Look, shared_from};
 
 /// Boxes from which a sort is shared with other threads.
@@ -37,6 +37,7 @@ pub(crate) struct Map<R> {
     pub(super) camp_of: Vec<u8>,
     /// What searches took against what was expected.
     pub(crate) experience: Experience,
+    pub(super) kept_levels: KeptLevels,
     /// How often boxes were sorted.
     #[cfg(test)]
     pub(super) builds: usize,
@@ -60,6 +61,7 @@ impl<R: Record> Map<R> {
             camps: Camps::default(),
             camp_of: Vec::new(),
             experience: Experience::default(),
+            kept_levels: KeptLevels::default(),
             #[cfg(test)]
             builds: 0,
         }

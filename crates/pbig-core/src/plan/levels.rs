@@ -6,6 +6,7 @@ use super::summary::LARGEST_CLASS;
 use super::{Summary, spacing};
 use crate::Aabb;
 use crate::config::Strategy;
+use arrayvec::ArrayVec;
 use std::fmt;
 
 /// One grid: the boxes of neighbouring size classes, sorted by the cell of their lower corner.
@@ -101,7 +102,7 @@ pub(super) struct Setting<'a> {
 
 /// The split into levels and a number of swept boxes, why, and by what way.
 pub(super) struct Choice {
-    pub(super) levels: Vec<LevelPlan>,
+    pub(super) levels: Levels,
     pub(super) swept: u32,
     pub(super) forecast: Forecast,
     /// The way, and what it would take by the costs alone.
@@ -123,9 +124,9 @@ pub(super) fn choose(summary: &Summary, setting: &Setting<'_>) -> Choice {
     let only = setting.only.filter(|way| *way != Way::Levels || several.is_finite());
     let way = only.unwrap_or(best);
     let levels = match way {
-        Way::OneGrid if !groups.is_empty() => vec![world.level(&groups)],
+        Way::OneGrid if !groups.is_empty() => Levels::from_iter([world.level(&groups)]),
         Way::Levels => assemble(&world, &groups, steps),
-        _ => Vec::new(),
+        _ => Levels::new(),
     };
     let in_levels: u32 = levels.iter().map(|level| level.boxes).sum();
     let swept = summary.valid - in_levels;
@@ -134,7 +135,7 @@ pub(super) fn choose(summary: &Summary, setting: &Setting<'_>) -> Choice {
 
 /// The levels of a device, of all boxes but those that it has in its last, single cell.
 #[cfg(feature = "gpu")]
-pub(super) fn for_device(summary: &Summary) -> Vec<LevelPlan> {
+pub(super) fn for_device(summary: &Summary) -> Levels {
     let (costs, experience) = (&Costs::DEVICE, &Experience::default());
     let setting = Setting {
         crowding: 1.0,
@@ -149,7 +150,7 @@ pub(super) fn for_device(summary: &Summary) -> Vec<LevelPlan> {
     let (several, steps) = split(&world, &groups);
     match groups.is_empty() || several < world.grid_cost(&groups, &[]) {
         true => assemble(&world, &groups, steps),
-        false => vec![world.level(&groups)],
+        false => Levels::from_iter([world.level(&groups)]),
     }
 }
 
@@ -165,9 +166,16 @@ struct Group {
 /// any floats use up to 227 classes.
 const GROUPS: usize = 24;
 
+/// What there are at most as many of as groups, on the stack: planning allocates nothing.
+type OfGroups<T> = ArrayVec<T, GROUPS>;
+
+/// Levels of a plan, small boxes first.
+pub(super) type Levels = OfGroups<LevelPlan>;
+
 /// The classes in use, at most [`GROUPS`] of them apart.
-fn groups(summary: &Summary) -> Vec<Group> {
-    let used: Vec<usize> = (0..LARGEST_CLASS).filter(|&c| summary.classes[c].boxes > 0).collect();
+fn groups(summary: &Summary) -> OfGroups<Group> {
+    let used = (0..LARGEST_CLASS).filter(|&c| summary.classes[c].boxes > 0);
+    let used: ArrayVec<usize, LARGEST_CLASS> = used.collect();
     let together = used.len().div_ceil(GROUPS).max(1);
     used.chunks(together).map(|classes| Group::of(summary, classes)).collect()
 }
@@ -193,8 +201,8 @@ struct Step {
 
 /// The cheapest split into two parts or more, by dynamic programming over the groups: what a level costs depends only on
 /// its own groups and on how many boxes are smaller. Its cost, and `steps[j]` covers groups `0..=j`.
-fn split(world: &World<'_>, used: &[Group]) -> (f64, Vec<Step>) {
-    let mut steps: Vec<Step> = Vec::with_capacity(used.len());
+fn split(world: &World<'_>, used: &[Group]) -> (f64, OfGroups<Step>) {
+    let mut steps = OfGroups::<Step>::new();
     for last in 0..used.len() {
         // All at the end, in two parts at least, and only the largest boxes can be swept.
         let at_end = last + 1 == used.len();
@@ -214,8 +222,8 @@ fn split(world: &World<'_>, used: &[Group]) -> (f64, Vec<Step>) {
     (steps.last().filter(|_| whole).map_or(f64::INFINITY, |step| step.cost), steps)
 }
 
-fn assemble(world: &World<'_>, used: &[Group], steps: Vec<Step>) -> Vec<LevelPlan> {
-    let mut levels = Vec::new();
+fn assemble(world: &World<'_>, used: &[Group], steps: OfGroups<Step>) -> Levels {
+    let mut levels = Levels::new();
     let mut end = used.len();
     while end > 0 {
         let step = steps[end - 1];

@@ -6,6 +6,7 @@
 
 mod camps;
 mod costs;
+mod draft;
 #[cfg(feature = "gpu")]
 mod gpu;
 mod levels;
@@ -16,6 +17,8 @@ mod summary;
 pub(crate) use camps::{Camps, OPEN};
 pub use costs::{Costs, Forecast};
 pub(crate) use costs::{Experience, Way};
+use draft::Draft;
+pub(crate) use draft::KeptLevels;
 #[cfg(feature = "gpu")]
 pub use gpu::GpuPlan;
 use levels::{Choice, Company, Setting};
@@ -111,7 +114,7 @@ impl Plan {
     /// the cell size of an even spread: 1, or less where such cells turned out to be too full.
     pub fn new(summary: &Summary, config: &Config, crowding: f32) -> Self {
         let costs = config.costs.unwrap_or(Costs::REFERENCE);
-        Self::by(summary, config, crowding, None, &costs, &Experience::default())
+        Self::by(summary, config, crowding, None, &costs, &Experience::default()).plan()
     }
 
     /// The same by given costs, and by what searches took; `only` one way, if boxes allow it and no other is asked for.
@@ -122,13 +125,13 @@ impl Plan {
         only: Option<Way>,
         costs: &Costs,
         experience: &Experience,
-    ) -> Self {
+    ) -> Draft {
         let (boxes, only) = (summary.valid, Way::asked(config).or(only));
         if boxes < 2 {
-            return Self { boxes, ..Self::default() };
+            return Self { boxes, ..Self::default() }.into();
         }
         if config.backend == Backend::Brute {
-            return Self::brute(boxes);
+            return Self::brute(boxes).into();
         }
         match config.strategy {
             Strategy::Pbig => Self {
@@ -136,8 +139,9 @@ impl Plan {
                 pbig: Some(PbigPlan::new(summary, config)),
                 boxes,
                 ..Self::default()
-            },
-            Strategy::Auto if boxes < config.brute_below => Self::brute(boxes),
+            }
+            .into(),
+            Strategy::Auto if boxes < config.brute_below => Self::brute(boxes).into(),
             strategy @ (Strategy::Auto | Strategy::Grid) => {
                 let setting = Setting { crowding, strategy, company: Company::NONE, costs, experience, only };
                 Self::of_levels(boxes, levels::choose(summary, &setting))
@@ -167,7 +171,7 @@ impl Plan {
         let (costs, experience) = (&Costs::REFERENCE, &Experience::default());
         let (strategy, company) = (Strategy::Auto, Company::NONE);
         let setting = Setting { crowding: 1.0, strategy, company, costs, experience, only: Some(way) };
-        Self::of_levels(summary.valid, levels::choose(summary, &setting))
+        Self::of_levels(summary.valid, levels::choose(summary, &setting)).plan()
     }
 
     /// Whether boxes of several sizes share one grid that might have levels instead.
@@ -179,18 +183,11 @@ impl Plan {
         Self { chosen: Chosen::Brute, swept: boxes, boxes, ..Self::default() }
     }
 
-    fn of_levels(boxes: u32, choice: Choice) -> Self {
+    fn of_levels(boxes: u32, choice: Choice) -> Draft {
         let Choice { levels, swept, forecast, expected } = choice;
         let chosen = if levels.is_empty() { Chosen::Brute } else { Chosen::Grid };
-        Self {
-            chosen,
-            levels: levels.into(),
-            swept,
-            boxes,
-            forecast,
-            expected: Some(expected),
-            ..Self::default()
-        }
+        let plan = Self { chosen, swept, boxes, forecast, expected: Some(expected), ..Self::default() };
+        Draft::new(plan, levels)
     }
 
     /// For boxes by camp, the first of which is open: levels for each, all in one plan.

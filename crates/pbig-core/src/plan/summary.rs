@@ -1,6 +1,7 @@
 //! What the plan looks at: exact counts by size, and a sample of positions.
 
 use crate::Aabb;
+use arrayvec::ArrayVec;
 use std::cell::{Cell, OnceCell};
 
 /// Boxes whose largest extent lies within one power of two.
@@ -88,7 +89,9 @@ impl Summary {
     /// widened by a quarter. A few far boxes do not stretch it (contract 4).
     pub(super) fn range(&self, k: usize) -> (f32, f32) {
         // 250 corners place a 4% quantile well enough, at a quarter of the cost of 1000.
-        let mut corners: Vec<f32> = self.sample.iter().step_by(4).map(|b| b.min[k]).collect();
+        const CORNERS: usize = Summary::SAMPLE.div_ceil(4);
+        let corners = self.sample.iter().step_by(4).map(|b| b.min[k]);
+        let mut corners: ArrayVec<f32, CORNERS> = corners.take(CORNERS).collect();
         if corners.is_empty() {
             return (0.0, 0.0);
         }

@@ -15,6 +15,10 @@ use clap::{CommandFactory, Parser, Subcommand};
 use output::Failure;
 use std::process::ExitCode;
 
+/// For `bench`, which says how often an update asks for memory.
+#[global_allocator]
+static COUNTING: pbig_harness::counting::Counting = pbig_harness::counting::Counting;
+
 /// Finds every pair of overlapping axis-aligned boxes.
 #[derive(Parser)]
 #[command(name = "pbig", version, about = "Finds every pair of overlapping axis-aligned boxes")]

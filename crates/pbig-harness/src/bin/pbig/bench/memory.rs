@@ -35,14 +35,39 @@ enum Way {
     Scratch,
 }
 
+/// How boxes move: each so many-th, by so much, by its id and the update.
+#[derive(Clone, Copy)]
+pub(super) struct Motion {
+    one_in: usize,
+    by: fn(usize, usize) -> [f32; 3],
+}
+
+impl Motion {
+    const TO_AND_FRO: Self = Self { one_in: 1, by: to_and_fro };
+    const DRIFT: Self = Self { one_in: 1, by: drift };
+    const FEW_DRIFT: Self = Self { one_in: 10, by: drift };
+
+    /// By what rows call them.
+    const ALL: [(&str, Self); 3] =
+        [("all moved", Self::TO_AND_FRO), ("all drift", Self::DRIFT), ("10% drift", Self::FEW_DRIFT)];
+
+    /// Those that stay about where they are, for ever: a world that drifts apart needs another plan now and then.
+    pub(super) const STEADY: [(&str, Self); 3] = [
+        ("all moved", Self::TO_AND_FRO),
+        ("all circle", Self { one_in: 1, by: circle }),
+        ("10% circle", Self { one_in: 10, by: circle }),
+    ];
+}
+
 /// Its rows.
 pub(crate) fn rows(quick: bool) -> Result<Vec<Row>, Failure> {
     let sizes = if quick { [10_000, 100_000] } else { [1_000_000, 10_000_000] };
     let target = |megabytes| (!quick).then_some(Target::Below(megabytes));
+    let [moved, drift, few_drift] = Motion::ALL.map(|(name, _)| format!("memory, incremental, {name}"));
     Ok(vec![
-        row(Way::Incremental, "memory, incremental, all moved", sizes[0])?.target(target(300.0)),
-        row(Way::Drift, "memory, incremental, all drift", sizes[0])?.target(target(300.0)),
-        row(Way::FewDrift, "memory, incremental, 10% drift", sizes[0])?.target(target(300.0)),
+        row(Way::Incremental, &moved, sizes[0])?.target(target(300.0)),
+        row(Way::Drift, &drift, sizes[0])?.target(target(300.0)),
+        row(Way::FewDrift, &few_drift, sizes[0])?.target(target(300.0)),
         row(Way::Scratch, "memory, from scratch", sizes[1])?.target(target(2500.0)),
     ])
 }
@@ -78,9 +103,9 @@ pub(crate) fn probe(args: &Args) -> Result<(), Failure> {
     // Linux then counts the peak from now on; where it may not, making the boxes had no higher one.
     let _ = std::fs::write("/proc/self/clear_refs", "5");
     let found = match args.way {
-        Way::Incremental => incremental(&boxes, 1, to_and_fro),
-        Way::Drift => incremental(&boxes, 1, drift),
-        Way::FewDrift => incremental(&boxes, 10, drift),
+        Way::Incremental => incremental(&boxes, Motion::TO_AND_FRO),
+        Way::Drift => incremental(&boxes, Motion::DRIFT),
+        Way::FewDrift => incremental(&boxes, Motion::FEW_DRIFT),
         Way::Scratch => from_scratch(&boxes),
     };
     let pairs = found.map_err(|error| Failure::Input(error.to_string()))?;
@@ -88,28 +113,60 @@ pub(crate) fn probe(args: &Args) -> Result<(), Failure> {
     print(&json!({ "boxes": args.boxes, "pairs": pairs, "bytes": bytes }).to_string())
 }
 
-/// Of every `share`-th box, `motion` says how far it is from where it began: by its id and the update, on each axis.
-fn incremental(
-    boxes: &[Aabb],
-    share: usize,
-    motion: fn(usize, usize) -> [f32; 3],
-) -> Result<usize, pbig_core::Error> {
-    let mut broad_phase = BroadPhase::new(Config { limits: Limits::UNLIMITED, ..Config::DEFAULT })?;
-    for update in 0..UPDATES {
-        for (id, aabb) in boxes.iter().enumerate().step_by(if update == 0 { 1 } else { share }) {
-            // Without a second list of boxes.
-            let by = motion(id, update);
-            let add = |corner: [f32; 3]| std::array::from_fn(|k| corner[k] + by[k]);
-            broad_phase.set(id as u32, Aabb::new(add(aabb.min), add(aabb.max)), ProxyFilter::ALL)?;
-        }
-        broad_phase.update()?;
+fn incremental(boxes: &[Aabb], motion: Motion) -> Result<usize, pbig_core::Error> {
+    let mut moving = Moving::new(boxes, motion)?;
+    (1..UPDATES).try_for_each(|_| moving.update())?;
+    Ok(moving.pairs())
+}
+
+/// A broad phase of boxes that move.
+pub(super) struct Moving<'a> {
+    boxes: &'a [Aabb],
+    motion: Motion,
+    broad_phase: BroadPhase,
+    updates: usize,
+}
+
+impl<'a> Moving<'a> {
+    /// With all boxes where they begin.
+    pub(super) fn new(boxes: &'a [Aabb], motion: Motion) -> Result<Self, pbig_core::Error> {
+        let broad_phase = BroadPhase::new(Config { limits: Limits::UNLIMITED, ..Config::DEFAULT })?;
+        let mut moving = Self { boxes, motion, broad_phase, updates: 0 };
+        moving.set(1)?;
+        Ok(moving)
     }
-    Ok(broad_phase.pair_count())
+
+    /// All that move have moved.
+    pub(super) fn update(&mut self) -> Result<(), pbig_core::Error> {
+        self.set(self.motion.one_in)
+    }
+
+    fn set(&mut self, one_in: usize) -> Result<(), pbig_core::Error> {
+        for (id, aabb) in self.boxes.iter().enumerate().step_by(one_in) {
+            // Without a second list of boxes.
+            let by = (self.motion.by)(id, self.updates);
+            let add = |corner: [f32; 3]| std::array::from_fn(|k| corner[k] + by[k]);
+            let moved = Aabb::new(add(aabb.min), add(aabb.max));
+            self.broad_phase.set(id as u32, moved, ProxyFilter::ALL)?;
+        }
+        self.updates += 1;
+        self.broad_phase.update().map(|_| ())
+    }
+
+    pub(super) fn pairs(&self) -> usize {
+        self.broad_phase.pair_count()
+    }
 }
 
 /// Neighbours apart from each other.
 fn to_and_fro(id: usize, update: usize) -> [f32; 3] {
     [if (id + update).is_multiple_of(2) { STEP } else { 0.0 }; 3]
+}
+
+/// Around a place beside where it began, so wide that lists of near pairs do not last.
+fn circle(id: usize, update: usize) -> [f32; 3] {
+    let (sin, cos) = (STEP * update as f32 + id as f32).sin_cos();
+    [cos, sin, 0.0]
 }
 
 /// One of eight diagonals.

@@ -8,6 +8,7 @@ pub(crate) mod memory;
 mod papers;
 mod peers;
 mod regret;
+mod requests;
 mod shares;
 mod stages;
 mod step;

@@ -3,18 +3,20 @@
 use super::measure::Took;
 use serde_json::{Map, Value, json};
 
-/// What a row is printed in; times are kept in milliseconds, memory in MB.
+/// What a row is printed in; times are kept in milliseconds, memory in MB, and some are plain counts.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Unit {
     Ms,
     Us,
     Ns,
     Mb,
+    Requests,
 }
 
 impl Unit {
     fn text(self, value: f64) -> String {
         let (value, name) = match self {
+            Self::Requests => return format!("{value:.0}"),
             Self::Ms => (value, "ms"),
             Self::Us => (value * 1e3, "us"),
             Self::Ns => (value * 1e6, "ns"),
@@ -26,7 +28,11 @@ impl Unit {
     }
 
     fn key(self) -> &'static str {
-        if self == Self::Mb { "mb" } else { "ms" }
+        match self {
+            Self::Mb => "mb",
+            Self::Requests => "requests",
+            _ => "ms",
+        }
     }
 }
 
@@ -39,6 +45,8 @@ pub(crate) enum Target {
     Within(f64),
     /// At most this, in the row's own ms or MB.
     Below(f64),
+    /// Not one.
+    Nothing,
 }
 
 /// One measurement.
@@ -63,9 +71,8 @@ impl Row {
         Self { case, boxes, pairs, ours, other, target, unit: Unit::Ms, stages: vec![], mean, note }
     }
 
-    /// Ours; never 0, which no clock means.
     pub(crate) fn ours(self, value: f64) -> Self {
-        Self { ours: Some(value.max(1e-9)), ..self }
+        Self { ours: Some(value), ..self }
     }
 
     pub(crate) fn against(self, name: &'static str, value: f64) -> Self {
@@ -102,7 +109,8 @@ impl Row {
 
     /// How many times as much the other takes.
     pub(crate) fn ratio(&self) -> Option<f64> {
-        Some(self.other?.1 / self.ours?)
+        // No clock means 0.
+        Some(self.other?.1 / self.ours?.max(1e-9))
     }
 
     /// What ours takes for each box and each pair.
@@ -116,6 +124,7 @@ impl Row {
             Target::Faster(times) => Some(times / self.ratio()?),
             Target::Within(times) => Some(1.0 / (times * self.ratio()?)),
             Target::Below(limit) => Some(self.ours? / limit),
+            Target::Nothing => Some(if self.ours? < 1.0 { 0.0 } else { f64::INFINITY }),
         }
     }
 
@@ -128,6 +137,7 @@ impl Row {
             Some(Target::Faster(times)) => format!("at least {times}x"),
             Some(Target::Within(times)) => format!("within {times}x"),
             Some(Target::Below(limit)) => format!("under {}", self.unit.text(limit)),
+            Some(Target::Nothing) => "none".into(),
             None => String::new(),
         }
     }
@@ -135,6 +145,7 @@ impl Row {
     fn verdict(&self) -> String {
         match self.missed_by() {
             Some(factor) if factor <= 1.0 => "met".into(),
+            Some(factor) if factor.is_infinite() => "missed".into(),
             Some(factor) => format!("missed, {factor:.2}x off"),
             None => String::new(),
         }

@@ -2,7 +2,7 @@
 
 use super::measure::{Contest, Effort, Took, measured, medians, timed};
 use super::table::{Row, Target, Unit};
-use super::{Outcome, memory};
+use super::{Outcome, memory, requests};
 use crate::output::{Failure, progress};
 use pbig_core::Aabb;
 use pbig_harness::boxes::{BoxSet, Movers};
@@ -152,6 +152,7 @@ pub(super) fn run(quick: bool) -> Result<Outcome, Failure> {
         bar.inc(1);
     }
     rows.extend(memory::rows(quick)?);
+    rows.extend(requests::rows(quick)?);
     bar.finish_and_clear();
     let chart = LogLog {
         name: "update-boxes".into(),

@@ -1,0 +1,96 @@
+//! A plan on its way: its levels are on the stack until the memory of an earlier plan is found for them, so that where the
+//! base is built anew again and again, nothing is allocated.
+
+use super::levels::Levels;
+use super::{Forecast, LevelPlan, Plan};
+use std::sync::Arc;
+
+/// A plan without its levels, and these.
+pub(crate) struct Draft {
+    plan: Plan,
+    levels: Levels,
+}
+
+impl From<Plan> for Draft {
+    /// Of a plan that has no levels.
+    fn from(plan: Plan) -> Self {
+        Self { plan, levels: Levels::new() }
+    }
+}
+
+impl Draft {
+    pub(super) fn new(plan: Plan, levels: Levels) -> Self {
+        Self { plan, levels }
+    }
+
+    pub(crate) fn forecast(&self) -> &Forecast {
+        &self.plan.forecast
+    }
+
+    /// In memory of its own.
+    pub(crate) fn plan(self) -> Plan {
+        self.plan_in(&mut KeptLevels::default())
+    }
+
+    /// In memory that a plan before had, if nobody looks at that any more.
+    pub(crate) fn plan_in(self, kept: &mut KeptLevels) -> Plan {
+        if self.levels.is_empty() {
+            return self.plan;
+        }
+        Plan { levels: kept.place(&self.levels), ..self.plan }
+    }
+}
+
+/// The levels of the last plans: one is the report's, one that of the base, and one is free.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct KeptLevels([Option<Arc<[LevelPlan]>>; 3]);
+
+impl KeptLevels {
+    fn place(&mut self, levels: &[LevelPlan]) -> Arc<[LevelPlan]> {
+        for kept in self.0.iter_mut().flatten().filter(|kept| kept.len() == levels.len()) {
+            if let Some(free) = Arc::get_mut(kept) {
+                free.copy_from_slice(levels);
+                return kept.clone();
+            }
+        }
+        self.0.rotate_right(1);
+        self.0[0].insert(levels.into()).clone()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::plan::Chosen;
+
+    fn drafted(boxes: &[u32]) -> Draft {
+        let level = |&boxes| LevelPlan {
+            boxes,
+            classes: (0, 0),
+            max_extent: [1.0; 3],
+            cell: [2.0; 3],
+            origin: [0.0; 3],
+            dims: [1; 3],
+            cells: 1,
+            camp: 0,
+        };
+        Draft::new(Plan { chosen: Chosen::Grid, ..Plan::default() }, boxes.iter().map(level).collect())
+    }
+
+    #[test]
+    fn memory_is_used_again_once_nobody_has_the_plan() {
+        let mut kept = KeptLevels::default();
+        let first = drafted(&[1, 2]).plan_in(&mut kept);
+        let second = drafted(&[3, 4]).plan_in(&mut kept);
+        assert_eq!([first.levels[1].boxes, second.levels[0].boxes], [2, 3], "the first is still there");
+        let place = first.levels.as_ptr();
+        drop(first);
+        let third = drafted(&[5, 6]).plan_in(&mut kept);
+        assert_eq!((third.levels.as_ptr(), third.levels[0].boxes), (place, 5));
+        assert_eq!(drafted(&[7]).plan_in(&mut kept).levels.len(), 1, "of another length");
+        assert_eq!(second.levels[1].boxes, 4);
+        assert!(
+            drafted(&[]).plan_in(&mut kept).levels.is_empty() && drafted(&[9]).plan().levels[0].boxes == 9
+        );
+    }
+}

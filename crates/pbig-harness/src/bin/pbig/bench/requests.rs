@@ -1,0 +1,73 @@
+//! How often a broad phase in steady state asks for memory: never, but for what a new plan or a pool's queue takes.
+
+use super::memory::{Motion, Moving};
+use super::table::{Row, Target, Unit};
+use crate::output::Failure;
+use pbig_harness::boxes::BoxSet;
+use pbig_harness::counting::requests;
+
+/// Updates before counting, in which buffers grow to what they take, and those counted: with lists of near pairs made anew.
+const WARM_UP: usize = 100;
+const COUNTED: usize = 200;
+
+/// Its rows: on one thread, whose requests are the broad phase's alone, and on all.
+pub(super) fn rows(quick: bool) -> Result<Vec<Row>, Failure> {
+    let boxes = if quick { 5000 } else { 100_000 };
+    let one = Motion::STEADY.map(|(name, motion)| row(name, motion, boxes, 1));
+    let all = Motion::STEADY.map(|(name, motion)| row(name, motion, boxes, rayon::current_num_threads()));
+    one.into_iter().chain(all).collect()
+}
+
+fn row(name: &str, motion: Motion, boxes: usize, threads: usize) -> Result<Row, Failure> {
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
+    let pool = pool.map_err(|error| Failure::Input(format!("threads: {error}")))?;
+    let (count, pairs) =
+        pool.install(|| counted(motion, boxes)).map_err(|error| Failure::Input(error.to_string()))?;
+    let (on, target) = match threads {
+        1 => ("one thread".to_owned(), Some(Target::Nothing)),
+        _ => (format!("{threads} threads, the blocks of whose queues are counted, too"), None),
+    };
+    let row =
+        Row::new(format!("requests for memory, {name}"), boxes, pairs).unit(Unit::Requests).target(target);
+    Ok(row.ours(count as f64).note(format!("in {COUNTED} updates, {on}")))
+}
+
+/// Requests of all threads of the pool in some updates, and the pairs afterwards.
+fn counted(motion: Motion, boxes: usize) -> Result<(u64, u64), pbig_core::Error> {
+    let boxes = BoxSet::named("unit").expect("a set of the harness").boxes(boxes, 1);
+    let mut moving = Moving::new(&boxes, motion)?;
+    (0..WARM_UP).try_for_each(|_| moving.update())?;
+    // To ask all threads takes some, too.
+    let asking = so_far();
+    let before = so_far();
+    (0..COUNTED).try_for_each(|_| moving.update())?;
+    let count = so_far() - before;
+    Ok((count.saturating_sub(before - asking), moving.pairs() as u64))
+}
+
+fn so_far() -> u64 {
+    if rayon::current_num_threads() == 1 {
+        requests()
+    } else {
+        rayon::broadcast(|_| requests()).into_iter().sum()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_an_update_asks_for_would_be_counted() {
+        let before = so_far();
+        let some = std::hint::black_box(vec![1u8; 100]);
+        assert_eq!((so_far() - before, some.len()), (1, 100));
+        let rows = rows(true).expect("within the limits");
+        assert_eq!(rows.len(), 2 * Motion::STEADY.len());
+        assert!(
+            rows[..Motion::STEADY.len()].iter().all(|row| row.met() == Some(true)),
+            "an update asked for memory"
+        );
+        assert!(rows[Motion::STEADY.len()..].iter().all(|row| row.met().is_none()));
+    }
+}

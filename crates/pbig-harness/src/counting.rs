@@ -1,0 +1,99 @@
+//! An allocator that counts what each thread asks for and gives back: for tests and benches, which make it theirs with
+//! `#[global_allocator]`. Elsewhere all counts are 0.
+
+use std::alloc::{GlobalAlloc, Layout, System};
+use std::cell::Cell;
+
+/// The system's allocator, with sums for each thread: other tests run beside, and the resident set is theirs, too. It costs an
+/// addition or two.
+pub struct Counting;
+
+thread_local! {
+    static HELD: Cell<i64> = const { Cell::new(0) };
+    static LARGEST: Cell<usize> = const { Cell::new(0) };
+    static REQUESTS: Cell<u64> = const { Cell::new(0) };
+}
+
+fn count(bytes: i64) {
+    // Where a thread ends its sum may be gone before the last block is.
+    _ = HELD.try_with(|held| held.set(held.get() + bytes));
+}
+
+fn count_new(size: usize) {
+    count(size as i64);
+    _ = LARGEST.try_with(|largest| largest.set(largest.get().max(size)));
+    _ = REQUESTS.try_with(|requests| requests.set(requests.get() + 1));
+}
+
+// SAFETY: all is left to the system's allocator.
+unsafe impl GlobalAlloc for Counting {
+    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
+        count_new(layout.size());
+        // SAFETY: the caller's promise.
+        unsafe { System.alloc(layout) }
+    }
+
+    unsafe fn alloc_zeroed(&self, layout: Layout) -> *mut u8 {
+        count_new(layout.size());
+        // SAFETY: the caller's promise.
+        unsafe { System.alloc_zeroed(layout) }
+    }
+
+    unsafe fn realloc(&self, old: *mut u8, layout: Layout, size: usize) -> *mut u8 {
+        count(-(layout.size() as i64));
+        count_new(size);
+        // SAFETY: the caller's promise.
+        unsafe { System.realloc(old, layout, size) }
+    }
+
+    unsafe fn dealloc(&self, old: *mut u8, layout: Layout) {
+        count(-(layout.size() as i64));
+        // SAFETY: the caller's promise.
+        unsafe { System.dealloc(old, layout) }
+    }
+}
+
+/// Bytes that this thread has asked for and nobody has given back to it.
+pub fn held() -> i64 {
+    HELD.get()
+}
+
+/// The largest block that this thread has asked for since it was asked last.
+pub fn largest() -> usize {
+    LARGEST.replace(0)
+}
+
+/// How often this thread has asked for memory.
+pub fn requests() -> u64 {
+    REQUESTS.get()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[global_allocator]
+    static COUNTING: Counting = Counting;
+
+    #[test]
+    fn what_is_held_is_counted() {
+        let before = held();
+        let mut some = std::hint::black_box(vec![1u8; 1000]);
+        assert_eq!(held() - before, 1000);
+        some.reserve_exact(3000);
+        assert_eq!(held() - before, 4000);
+        largest();
+        assert!(std::hint::black_box(vec![0u8; 5000]).len() == 5000 && largest() == 5000 && largest() < 5000);
+        drop(some);
+        assert_eq!(held(), before);
+    }
+
+    #[test]
+    fn requests_are_counted_and_not_what_is_given_back() {
+        let before = requests();
+        let mut some = std::hint::black_box(vec![1u8; 1000]);
+        some.reserve_exact(3000);
+        drop(some);
+        assert_eq!(requests() - before, 2);
+    }
+}
