@@ -191,7 +191,7 @@ pub enum Look {
     Seldom,
 }
 
-/// Ways to be gone whatever the plan would choose, for study and tests. Pairs and events are the same by all of them.
+/// Ways to take whatever the plan would choose, for study and tests: about speed only, pairs and events are the same by all.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Study {

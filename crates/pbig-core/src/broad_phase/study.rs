@@ -73,6 +73,8 @@ fn events_are_the_same_by_every_way_and_the_report_says_which_was_taken() {
         // Where few change there is not always a question of a list.
         let is_told = |plan: &Plan| plan.no_near == Some(NoNear::Unwanted);
         assert!(one_in == 30 || edits.iter().chain(&anew).all(is_told), "{anew:?}");
+        let words = "; no near pairs: another way is asked for";
+        assert_eq!(anew[8].to_string().contains(words), is_told(&anew[8]));
     }
 }
 
@@ -171,6 +173,7 @@ fn the_report_says_why_no_device_was_asked_where_that_was_left_open() {
         }
         of.update().expect("nothing new");
         assert_eq!(of.report().plan.no_gpu, None, "nobody could have been asked");
+        let mut finder = Finder::new(config);
         finder.find(&few[..1]).expect("no pairs");
         assert!(!finder.report().plan.to_string().contains("GPU"), "there was nothing to do");
     }

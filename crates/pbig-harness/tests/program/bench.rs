@@ -71,15 +71,15 @@ fn bench_stages_has_the_time_of_each_stage() {
     for word in words.into_iter().chain(["ways, 10 pairs", "grids, 10 pairs"]) {
         assert!(about(&rows, word) > 0, "{word}");
     }
-    // Those that can be gone, and no other.
-    let gone = [
+    // Those that can be taken, and no other.
+    let taken = [
         ("small moves, 1% moved", ["edits", "grid anew", "near pairs"], true),
         ("jumps, 100% moved", ["grid anew", "from scratch and diff", "PBIG's grid"], true),
         ("jumps, 100% moved", ["edits", "edits, mean", "near pairs"], false),
     ];
-    for (word, ways, gone) in gone {
+    for (word, ways, taken) in taken {
         let row = rows.iter().find(|row| row["case"].to_string().contains(word)).expect(word);
-        assert!(ways.iter().all(|way| (row["stages_ms"][way].as_f64() > Some(0.0)) == gone), "{row}");
+        assert!(ways.iter().all(|way| (row["stages_ms"][way].as_f64() > Some(0.0)) == taken), "{row}");
     }
     let of_events = rows.iter().filter(|row| row["case"].to_string().contains("events"));
     assert!(of_events.into_iter().all(|row| row["mean_ms"].as_f64() > Some(0.0)));

@@ -20,7 +20,7 @@ const SHARES: [f64; 13] = [0.003, 0.01, 0.02, 0.03, 0.05, 0.07, 0.1, 0.15, 0.2, 
 /// Shares at which PBIG's grid takes part.
 const WITH_PBIG: [f64; 3] = [0.01, 0.1, 1.0];
 
-/// What each way took at a share, if it was gone.
+/// What each way took at a share, if updates went that way.
 type Sides = Vec<Option<Took>>;
 
 /// Rows and a chart for each motion, and in words where each way wins.
@@ -56,7 +56,7 @@ fn about() -> String {
     let [small, jumps] = MOTIONS.map(|(name, distance)| format!("{name} are of up to {distance} edges"));
     format!(
         "events by share: {small}, {jumps}. Ours is `BroadPhase` as planned; beside it `BroadPhase` made to go one way \
-         (`Config::study`: edits, a grid anew, near pairs), where that way was gone in at least half of the updates: \
+         (`Config::study`: edits, a grid anew, near pairs), where at least half of the updates could: \
          edits leave some to a search of all once the order is used up, and so does what has no list. Then `Finder` with \
          sorted lists of which one is merged with the one before, and at some shares `BroadPhase` with \
          `Strategy::Pbig`. What the plan chose in how many updates comes last. Pairs and events of all were compared in \
@@ -73,8 +73,8 @@ fn row(
     effort: Effort,
 ) -> Result<Row, Failure> {
     let planned = sides[0].unwrap_or(Took { median: 0.0, mean: 0.0 });
-    let gone = sides.iter().enumerate().skip(1).filter_map(|(k, took)| took.map(|took| (k, took)));
-    let stages = gone.flat_map(|(k, took)| [(NAMES[k], took.median), (MEANS[k], took.mean)]).collect();
+    let there = sides.iter().enumerate().skip(1).filter_map(|(k, took)| took.map(|took| (k, took)));
+    let stages = there.flat_map(|(k, took)| [(NAMES[k], took.median), (MEANS[k], took.mean)]).collect();
     let row = Row::new(format!("events by share, {motion}, {}% moved", percent(share)), boxes, race.pairs()?);
     let chosen = counted(race.chosen[0].get(effort.warm_up..).unwrap_or(&[]));
     Ok(row.ours(planned.median).mean(planned.mean).stages(stages).note(chosen))
@@ -131,7 +131,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn ways_that_were_not_gone_win_nowhere_and_regret_is_of_those_that_can_be_asked_for() {
+    fn ways_that_were_not_taken_win_nowhere_and_regret_is_of_those_that_can_be_asked_for() {
         let took = |mean| Some(Took { median: 1.0, mean });
         let took = [
             (0.01, vec![took(1.2), took(1.0), took(9.0), took(2.0), took(0.5)]),

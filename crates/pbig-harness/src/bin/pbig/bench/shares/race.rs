@@ -139,7 +139,7 @@ impl Race {
         Ok(Self { ways, wander, moved, events: vec![[0; 2]; sides], chosen, taken })
     }
 
-    /// What each way took; none for one that was not gone in at least half of the rounds.
+    /// What each way took; none for one that less than half of the rounds went.
     pub(super) fn run_all(&mut self, effort: Effort) -> Result<Vec<Option<Took>>, Failure> {
         let took = measured(self, effort)?;
         let is_taken = |side: usize| {
@@ -202,16 +202,16 @@ mod tests {
     }
 
     #[test]
-    fn all_ways_have_the_same_events_and_those_that_cannot_be_gone_have_no_times() {
+    fn all_ways_have_the_same_events_and_those_that_cannot_be_taken_have_no_times() {
         // Moves within cells by a few, and jumps of all, for which there is neither an edit nor a list.
-        for (share, distance, gone) in
+        for (share, distance, taken) in
             [(0.1, 0.1, [true; 6]), (1.0, 3.0, [true, false, true, false, true, true])]
         {
             let mut race = Race::new(cubes(1500, 1.0, 1.0, 1), share, distance, true).expect("a good margin");
             let effort = Effort { warm_up: 2, rounds: 8, budget: Duration::MAX };
             let took = race.run_all(effort).expect("measured");
             assert!(race.pairs().expect("all agree") > 0 && race.events[0][1] > 0);
-            assert_eq!(took.iter().map(Option::is_some).collect::<Vec<_>>(), gone, "{:?}", race.chosen);
+            assert_eq!(took.iter().map(Option::is_some).collect::<Vec<_>>(), taken, "{:?}", race.chosen);
         }
     }
 }
