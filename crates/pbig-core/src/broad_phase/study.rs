@@ -2,7 +2,9 @@
 
 use super::BroadPhase;
 use crate::plan::{Chosen, NoGpu, NoNear, Plan};
-use crate::{Aabb, Backend, Config, Events, Finder, Grids, Look, Pair, ProxyFilter, Study, Updates, oracle};
+use crate::{
+    Aabb, Backend, Config, Costs, Events, Finder, Grids, Look, Pair, ProxyFilter, Study, Updates, oracle,
+};
 use rand::rngs::StdRng;
 use rand::{RngExt, SeedableRng};
 use std::collections::BTreeSet;
@@ -97,8 +99,12 @@ fn a_list_is_made_whatever_it_costs_but_memory() {
 }
 
 fn find(boxes: &[Aabb], study: Study) -> Plan {
-    let costs = Some(crate::Costs::REFERENCE);
-    let mut finder = Finder::new(Config { study, costs, brute_below: 0, ..Config::DEFAULT });
+    find_by(boxes, study, Costs::REFERENCE)
+}
+
+fn find_by(boxes: &[Aabb], study: Study, costs: Costs) -> Plan {
+    let config = Config { study, costs: Some(costs), brute_below: 0, ..Config::DEFAULT };
+    let mut finder = Finder::new(config);
     assert_eq!(finder.find(boxes).expect("few pairs"), oracle::pairs(boxes), "{study:?}");
     finder.report().plan.clone()
 }
@@ -108,9 +114,17 @@ fn one_grid_or_levels_are_made_where_they_can_be() {
     let of = |boxes: &[Aabb], grids| find(boxes, Study { grids, ..Study::DEFAULT });
     let mut mixed = boxes(600, 12.0, 0.01);
     mixed.extend(boxes(60, 12.0, 1.5));
-    let (one, levels) = (of(&mixed, Grids::One), of(&mixed, Grids::Levels));
-    assert_eq!((one.levels.len(), one.swept), (1, 0), "{one}");
-    assert!(levels.levels.len() > 1 || levels.swept > 0, "{levels}");
+    // By costs by which the plan itself takes one grid, and others by which it takes levels.
+    let dear = Costs { visit: 1e6, test: 1e6, ..Costs::REFERENCE };
+    let cheap = Costs { visit: 1.0, visited: 0.1, candidate: 10.0, ..Costs::REFERENCE };
+    for (costs, parted) in [(dear, false), (cheap, true)] {
+        let by = |grids| find_by(&mixed, Study { grids, ..Study::DEFAULT }, costs);
+        let are_parted = |plan: &Plan| plan.levels.len() > 1 || plan.swept > 0;
+        for (grids, wanted) in [(Grids::Auto, parted), (Grids::One, false), (Grids::Levels, true)] {
+            let plan = by(grids);
+            assert!(plan.chosen == Chosen::Grid && are_parted(&plan) == wanted, "{grids:?}: {plan}");
+        }
+    }
     let alike = boxes(600, 12.0, 0.5);
     let (auto, levels) = (of(&alike, Grids::Auto), of(&alike, Grids::Levels));
     assert_eq!((levels.chosen, &levels.levels, levels.swept), (auto.chosen, &auto.levels, 0), "of one size");
