@@ -16,8 +16,6 @@ mod small;
 mod snapshot;
 mod state;
 #[cfg(test)]
-mod study;
-#[cfg(test)]
 mod tests;
 mod turns;
 mod update;

@@ -1,5 +1,7 @@
 //! What is taken in: which boxes count, and when one has changed.
 
+mod study;
+
 use super::BroadPhase;
 use crate::plan::Chosen;
 use crate::{Aabb, Config, Events, Pair, ProxyFilter, Strategy, oracle};

@@ -1,6 +1,5 @@
 //! Each way that can be asked for is taken, and tells what the oracle does.
 
-use super::BroadPhase;
 use crate::plan::{Chosen, NoGpu, NoNear, Plan};
 use crate::{
     Aabb, Backend, Config, Costs, Events, Finder, Grids, Look, Pair, ProxyFilter, Study, Updates, oracle,
