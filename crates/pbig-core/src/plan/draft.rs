@@ -29,7 +29,7 @@ impl Draft {
 
     /// In memory of its own.
     pub(crate) fn plan(self) -> Plan {
-        self.plan_in(&mut KeptLevels::default())
+        Plan { levels: self.levels[..].into(), ..self.plan }
     }
 
     /// In memory that a plan before had, if nobody looks at that any more.
@@ -43,18 +43,19 @@ impl Draft {
 
 /// The levels of the last plans: one is the report's, one that of the base, and one is free.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct KeptLevels([Option<Arc<[LevelPlan]>>; 3]);
+pub(crate) struct KeptLevels([Arc<[LevelPlan]>; 3]);
 
 impl KeptLevels {
     fn place(&mut self, levels: &[LevelPlan]) -> Arc<[LevelPlan]> {
-        for kept in self.0.iter_mut().flatten().filter(|kept| kept.len() == levels.len()) {
+        for kept in self.0.iter_mut().filter(|kept| kept.len() == levels.len()) {
             if let Some(free) = Arc::get_mut(kept) {
                 free.copy_from_slice(levels);
                 return kept.clone();
             }
         }
-        self.0.rotate_right(1);
-        self.0[0].insert(levels.into()).clone()
+        // All at once: plans with as many levels ask for nothing from now on.
+        self.0 = std::array::from_fn(|_| levels.into());
+        self.0[0].clone()
     }
 }
 
@@ -81,14 +82,15 @@ mod tests {
     fn memory_is_used_again_once_nobody_has_the_plan() {
         let mut kept = KeptLevels::default();
         let first = drafted(&[1, 2]).plan_in(&mut kept);
-        let second = drafted(&[3, 4]).plan_in(&mut kept);
-        assert_eq!([first.levels[1].boxes, second.levels[0].boxes], [2, 3], "the first is still there");
+        let others = [3, 5].map(|boxes| drafted(&[boxes, boxes + 1]).plan_in(&mut kept));
+        assert_eq!(first.levels[1].boxes, 2, "it is still there");
         let place = first.levels.as_ptr();
         drop(first);
-        let third = drafted(&[5, 6]).plan_in(&mut kept);
-        assert_eq!((third.levels.as_ptr(), third.levels[0].boxes), (place, 5));
+        let last = drafted(&[7, 8]).plan_in(&mut kept);
+        assert_eq!((last.levels.as_ptr(), last.levels[0].boxes), (place, 7));
+        assert_eq!(drafted(&[9, 9]).plan_in(&mut kept).levels[1].boxes, 9, "none is free");
         assert_eq!(drafted(&[7]).plan_in(&mut kept).levels.len(), 1, "of another length");
-        assert_eq!(second.levels[1].boxes, 4);
+        assert_eq!([&others[0], &others[1], &last].map(|plan| plan.levels[1].boxes), [4, 6, 8]);
         assert!(
             drafted(&[]).plan_in(&mut kept).levels.is_empty() && drafted(&[9]).plan().levels[0].boxes == 9
         );

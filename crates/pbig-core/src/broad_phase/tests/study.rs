@@ -2,7 +2,8 @@
 
 use crate::plan::{Chosen, NoGpu, NoNear, Plan};
 use crate::{
-    Aabb, Backend, Config, Costs, Events, Finder, Grids, Look, Pair, ProxyFilter, Study, Updates, oracle,
+    Aabb, Backend, BroadPhase, Config, Costs, Events, Finder, Grids, Look, Pair, ProxyFilter, Study, Updates,
+    oracle,
 };
 use rand::rngs::StdRng;
 use rand::{RngExt, SeedableRng};
