@@ -145,14 +145,21 @@ fn f16_is_rounded_outward_and_in_order_for_all_floats() {
     f16_is_right_for(-INFINITE..INFINITE + 1);
 }
 
-/// In order, and the one below no more than a step from the one above: with that a minimum never comes after a maximum that it
-/// does not exceed, which is all that a pair needs.
+/// Outward, in order, and the one below no more than a step from the one above: with that a minimum never comes after a maximum
+/// that it does not exceed, which is all that a pair needs.
 fn steps_are_right_for(scale: &Scale, steps: u32, places: std::ops::Range<i64>) {
     let both = |x: f32| [scale.down(0, x, steps), scale.up(0, x, steps)];
     let mut before = both(in_order(places.start));
     for x in places.map(in_order) {
         let [down, up] = both(x);
         assert!(down <= up && up - down <= 1, "{x:e}: from {down} to {up}");
+        // Steps as distances, as far as f64 has them; further away all are one.
+        let at = f64::from(x) - f64::from(scale.origin[0]);
+        let nearly = at.abs() * 4.0 * f64::EPSILON;
+        let edge = f64::from(scale.cell) / f64::from(steps);
+        let (low, high) = (down as f64 * edge - nearly, up as f64 * edge + nearly);
+        let is_far = at.abs() >= FARTHEST * f64::from(scale.cell);
+        assert!(is_far || low <= at && at <= high, "{x:e}: not between {low:e} and {high:e}");
         assert!(before[0] <= down && before[1] <= up, "{x:e}: not in order");
         before = [down, up];
     }

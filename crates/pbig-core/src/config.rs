@@ -159,7 +159,8 @@ pub enum Updates {
     /// All are searched, in a grid that is built anew.
     Anew,
     /// By a list of near pairs, whatever it costs. Without one where none can be made: it is not known how far boxes
-    /// move, as in the first update, or more than 256 pairs a box would be near.
+    /// move, as in the first update, or more than 256 pairs a box would be near; and, as all of these, not with
+    /// [`Strategy::Pbig`], [`Backend::Brute`] or where a GPU does the update.
     Near,
 }
 

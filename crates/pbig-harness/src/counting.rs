@@ -3,10 +3,18 @@
 
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
+use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 
-/// The system's allocator, with sums for each thread: other tests run beside, and the resident set is theirs, too. It costs an
-/// addition or two.
-pub struct Counting;
+/// The system's allocator, with sums for each thread: other tests run beside, and the resident set is theirs, too. `ALWAYS`, or
+/// from [`switch_on`] on: before, a benchmark's other sides, which ask for more, do not pay for it.
+pub struct Counting<const ALWAYS: bool>;
+
+static IS_ON: AtomicBool = AtomicBool::new(false);
+
+/// Counts from now on.
+pub fn switch_on() {
+    IS_ON.store(true, Relaxed);
+}
 
 thread_local! {
     static HELD: Cell<i64> = const { Cell::new(0) };
@@ -14,40 +22,46 @@ thread_local! {
     static REQUESTS: Cell<u64> = const { Cell::new(0) };
 }
 
-fn count(bytes: i64) {
+fn count<const ALWAYS: bool>(bytes: i64) {
+    if !ALWAYS && !IS_ON.load(Relaxed) {
+        return;
+    }
     // Where a thread ends its sum may be gone before the last block is.
     _ = HELD.try_with(|held| held.set(held.get() + bytes));
 }
 
-fn count_new(size: usize) {
-    count(size as i64);
+fn count_new<const ALWAYS: bool>(size: usize) {
+    if !ALWAYS && !IS_ON.load(Relaxed) {
+        return;
+    }
+    count::<ALWAYS>(size as i64);
     _ = LARGEST.try_with(|largest| largest.set(largest.get().max(size)));
     _ = REQUESTS.try_with(|requests| requests.set(requests.get() + 1));
 }
 
 // SAFETY: all is left to the system's allocator.
-unsafe impl GlobalAlloc for Counting {
+unsafe impl<const ALWAYS: bool> GlobalAlloc for Counting<ALWAYS> {
     unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
-        count_new(layout.size());
+        count_new::<ALWAYS>(layout.size());
         // SAFETY: the caller's promise.
         unsafe { System.alloc(layout) }
     }
 
     unsafe fn alloc_zeroed(&self, layout: Layout) -> *mut u8 {
-        count_new(layout.size());
+        count_new::<ALWAYS>(layout.size());
         // SAFETY: the caller's promise.
         unsafe { System.alloc_zeroed(layout) }
     }
 
     unsafe fn realloc(&self, old: *mut u8, layout: Layout, size: usize) -> *mut u8 {
-        count(-(layout.size() as i64));
-        count_new(size);
+        count::<ALWAYS>(-(layout.size() as i64));
+        count_new::<ALWAYS>(size);
         // SAFETY: the caller's promise.
         unsafe { System.realloc(old, layout, size) }
     }
 
     unsafe fn dealloc(&self, old: *mut u8, layout: Layout) {
-        count(-(layout.size() as i64));
+        count::<ALWAYS>(-(layout.size() as i64));
         // SAFETY: the caller's promise.
         unsafe { System.dealloc(old, layout) }
     }
@@ -73,7 +87,7 @@ mod tests {
     use super::*;
 
     #[global_allocator]
-    static COUNTING: Counting = Counting;
+    static COUNTING: Counting<true> = Counting;
 
     #[test]
     fn what_is_held_is_counted() {

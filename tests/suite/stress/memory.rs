@@ -4,7 +4,7 @@ use pbig_harness::counting::Counting;
 pub(crate) use pbig_harness::counting::{held, largest};
 
 #[global_allocator]
-static COUNTING: Counting = Counting;
+static COUNTING: Counting<true> = Counting;
 
 #[test]
 fn it_is_this_allocator_that_counts() {

@@ -209,7 +209,7 @@ fn soak_of_a_world_of_near_pairs() {
     soak(churn, updates()).assert_mostly(&["near"], 25);
 }
 
-/// So many boxes that threads share the work: three hundredths of the updates, each of which changes thousands.
+/// So many boxes that threads share the work: a thirtieth of the updates, each of which changes thousands.
 #[test]
 fn soak_on_threads() {
     let churn = || Churn { one_in: 8, ..Churn::new(cpu(Strategy::Auto), 20_000) };

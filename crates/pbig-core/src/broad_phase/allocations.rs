@@ -5,7 +5,8 @@ use rayon::{ThreadPool, ThreadPoolBuilder};
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
 
-/// The system's allocator, with counters for each thread.
+/// The system's allocator, with counters for each thread. (The harness has another one, for what holds memory; this crate
+/// does not depend on it, not even for tests, as these run on targets for which the harness is not built.)
 struct Counting;
 
 thread_local! {

@@ -23,14 +23,11 @@ impl BroadPhase {
         };
     }
 
-    #[cfg(feature = "gpu")]
     fn no_gpu(&self) -> Option<NoGpu> {
-        self.overlap.no_gpu
-    }
-
-    #[cfg(not(feature = "gpu"))]
-    fn no_gpu(&mut self) -> Option<NoGpu> {
-        self.base.wants_gpu(&self.config, self.boxes.len(), false).err().flatten()
+        #[cfg(feature = "gpu")]
+        return self.overlap.no_gpu;
+        #[cfg(not(feature = "gpu"))]
+        (self.config.backend == crate::Backend::Auto).then_some(NoGpu::NotBuilt)
     }
 }
 

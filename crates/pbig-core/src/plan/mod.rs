@@ -259,7 +259,9 @@ impl fmt::Display for Plan {
         if let Some(why) = self.no_near {
             write!(f, "; no near pairs: {why}")?;
         }
-        if let Some(why) = self.no_gpu.filter(|_| self.chosen != Chosen::Nothing) {
+        // Who builds without one knows.
+        let is_news = |why: &NoGpu| self.chosen != Chosen::Nothing && *why != NoGpu::NotBuilt;
+        if let Some(why) = self.no_gpu.filter(is_news) {
             write!(f, "; no GPU: {why}")?;
         }
         write!(f, "{}", self.measured)

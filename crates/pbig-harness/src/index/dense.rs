@@ -63,7 +63,9 @@ impl Tested {
     }
 
     /// What a correction makes of a run. From the same estimate for the same row it takes the same way, so that the
-    /// first and the last pair say all where they are of one row, and the pairs between those between.
+    /// first and the last pair say all where they are of one row, and the pairs between those between: the rules ask
+    /// whether `b > n`, which it is from the start of the row after the estimated one on, and whether `a >= b`, which it is
+    /// below the start of the estimated one; both are borders of rows.
     #[inline(always)]
     fn note<C: Correction>(&mut self, run: &Run) {
         let Self { n, .. } = *self;

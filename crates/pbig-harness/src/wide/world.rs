@@ -27,8 +27,13 @@ impl WideWorld {
     /// The same world at a distance from where it is.
     ///
     /// # Errors
-    /// If a collider is no ball, cuboid or half-space, or a body not a dynamic one.
+    /// If it has what a world in f64 does not get: other shapes than balls, cuboids and half-spaces, other bodies than awake
+    /// dynamic ones with one collider in their middle, other settings than rapier's but for density, friction and
+    /// restitution, and joints.
     pub fn of(world: &World, offset: [f64; 3]) -> Result<Self, String> {
+        if !world.impulse_joints.is_empty() || world.multibody_joints.multibodies().next().is_some() {
+            return Err("a world in f64 has no joints".into());
+        }
         let mut wide = Self::empty(world.gravity.to_array().map(f64::from).into());
         let by = Translation3::from(Vector3::from(offset));
         for (_, collider) in world.colliders.iter() {
@@ -63,6 +68,7 @@ impl WideWorld {
         by: &Translation3<f64>,
     ) -> Result<(), String> {
         let shape = shape(collider.shape())?;
+        check_plain(collider)?;
         let is_bounded = shape.as_halfspace().is_none();
         let builder = ColliderBuilder::new(shape)
             .density(collider.density().into())
@@ -105,11 +111,31 @@ impl WideWorld {
 
 /// A moving body, nowhere yet.
 fn dynamic(body: &narrow::RigidBody) -> Result<RigidBodyBuilder, String> {
-    if !body.is_dynamic() {
-        return Err(format!("a world in f64 has no body that is {:?}", body.body_type()));
+    let is_plain = body.is_dynamic()
+        && body.is_enabled()
+        && !body.is_sleeping()
+        && !body.is_ccd_enabled()
+        && body.colliders().len() == 1
+        && body.gravity_scale() == 1.0
+        && body.linear_damping() == 0.0
+        && body.angular_damping() == 0.0
+        && body.locked_axes().is_empty();
+    if !is_plain {
+        return Err(format!("a world in f64 has no body such as this {:?} one", body.body_type()));
     }
     let [linear, angular] = [body.linvel(), body.angvel()].map(|velocity| velocity.cast());
     Ok(RigidBodyBuilder::dynamic().linvel(linear).angvel(angular))
+}
+
+/// Nothing that [`WideWorld::add`] would lose.
+fn check_plain(collider: &narrow::Collider) -> Result<(), String> {
+    let is_plain = collider.is_enabled()
+        && !collider.is_sensor()
+        && collider.collision_groups() == narrow::InteractionGroups::all()
+        && collider.solver_groups() == narrow::InteractionGroups::all()
+        && collider.contact_skin() == 0.0
+        && collider.position_wrt_parent().is_none_or(|pose| *pose == narrow::Isometry::identity());
+    if is_plain { Ok(()) } else { Err("a world in f64 has plain colliders only".into()) }
 }
 
 fn shape(shape: &dyn narrow::Shape) -> Result<SharedShape, String> {
@@ -192,6 +218,12 @@ mod tests {
     #[test]
     fn far_away_f32_is_another_world_at_once_and_the_ground_moves_too() {
         assert!(apart(1e7, 1) > 0.1, "{}", apart(1e7, 1));
+        let mut moved = moved(scene("column"), [1e3; 3]);
+        let mut broad_phase = PbigBroadPhase::new();
+        (0..90).for_each(|_| moved.step(&mut broad_phase));
+        let heights = moved.bodies.iter().map(|(_, body)| body.translation().y - 1e3);
+        let low = heights.fold(f32::INFINITY, f32::min);
+        assert!((0.0..1.0).contains(&low), "in f32 they lie on the ground, too: {low}");
         let near = WideWorld::of(&scene("column"), [0.0; 3]).expect("balls and cuboids");
         let far = WideWorld::of(&scene("column"), [1e5; 3]).expect("balls and cuboids");
         let after = |mut world: WideWorld, offset: f64| {
@@ -203,8 +235,12 @@ mod tests {
     }
 
     #[test]
-    fn shapes_that_it_does_not_have_are_refused_by_name() {
-        let refused = WideWorld::of(&scene("ragdolls"), [0.0; 3]).err().expect("capsules");
-        assert!(refused.contains("Capsule"), "{refused}");
+    fn what_it_does_not_have_is_refused() {
+        let refused = |name| WideWorld::of(&scene(name), [0.0; 3]).err().expect("something else");
+        for (name, told) in
+            [("rain", "HeightField"), ("ragdolls", "joints"), ("sensors", "plain"), ("sleeping", "Dynamic")]
+        {
+            assert!(refused(name).contains(told), "{name}: {}", refused(name));
+        }
     }
 }

@@ -1,6 +1,5 @@
 //! How a list of near pairs is made, and what becomes of the kept pairs meanwhile.
 
-use super::worth::Cause;
 use super::{Before, FIRST, Served};
 use crate::broad_phase::BroadPhase;
 use crate::broad_phase::update::state;
@@ -24,8 +23,7 @@ impl BroadPhase {
         if self.find_reaches().is_err() {
             self.near.list.clear();
             self.near.worth.failed = true;
-            self.near.worth.wait(Cause::Many);
-            self.near.none = Some(self.near.worth.told());
+            self.near.none = Some(self.too_many());
             return Ok(Served::No);
         }
         stage!("diff");

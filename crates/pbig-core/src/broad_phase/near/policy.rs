@@ -87,11 +87,16 @@ impl BroadPhase {
         }
         let width = self.next_width().ok_or(NoNear::Unknown)?;
         // Filters may turn down most of what is near: a search would look at all that, and find little.
-        if self.near_to_come(width) > self.most_near() as f64 {
-            self.near.worth.wait(Cause::Many);
-            return Err(self.near.worth.told());
+        if self.near_to_come(width) > self.most_near() as f64 { Err(self.too_many()) } else { Ok(width) }
+    }
+
+    /// Too many pairs are near: the next attempt comes later, but where a list is asked for.
+    pub(super) fn too_many(&mut self) -> NoNear {
+        if self.must_have_list() {
+            return NoNear::Many(0);
         }
-        Ok(width)
+        self.near.worth.wait(Cause::Many);
+        self.near.worth.told()
     }
 
     /// Why this update goes without a list, whatever it would be like.

@@ -112,7 +112,8 @@ impl BroadPhase {
         };
         let Some(edge) = Sample::of(&self.changed, edge).at(0.5) else { return 0.0 };
         let grown = 1.0 + 2.0 * f64::from(width) / f64::from(edge);
-        self.near.met as f64 * grown.powi(3)
+        let boxes = f64::from(self.present_count);
+        (self.near.met as f64 * grown.powi(3)).min(boxes * (boxes - 1.0) / 2.0)
     }
 
     /// Boxes that tremble, or swing, need less of a skin than those that go on: once they have come no farther for as long

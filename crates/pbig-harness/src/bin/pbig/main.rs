@@ -13,11 +13,12 @@ mod usage;
 
 use clap::{CommandFactory, Parser, Subcommand};
 use output::Failure;
+use pbig_harness::counting::Counting;
 use std::process::ExitCode;
 
 /// For `bench`, which says how often an update asks for memory.
 #[global_allocator]
-static COUNTING: pbig_harness::counting::Counting = pbig_harness::counting::Counting;
+static COUNTING: Counting<false> = Counting;
 
 /// Finds every pair of overlapping axis-aligned boxes.
 #[derive(Parser)]

@@ -1,10 +1,11 @@
-//! How often a broad phase in steady state asks for memory: never, but for what a new plan or a pool's queue takes.
+//! How often a broad phase in steady state asks for memory: never, but for the queue of a pool, and where a list, or the
+//! levels of a plan, are more than before.
 
 use super::memory::{Motion, Moving};
 use super::table::{Row, Target, Unit};
 use crate::output::Failure;
 use pbig_harness::boxes::BoxSet;
-use pbig_harness::counting::requests;
+use pbig_harness::counting::{self, requests};
 
 /// Updates before counting, in which buffers grow to what they take, and those counted: with lists of near pairs made anew.
 const WARM_UP: usize = 400;
@@ -12,10 +13,15 @@ const COUNTED: usize = 200;
 
 /// Its rows: on one thread, whose requests are the broad phase's alone, and on all.
 pub(super) fn rows(quick: bool) -> Result<Vec<Row>, Failure> {
-    let boxes = if quick { 5000 } else { 100_000 };
-    let one = Motion::STEADY.map(|(name, motion)| row(name, motion, boxes, 1));
-    let all = Motion::STEADY.map(|(name, motion)| row(name, motion, boxes, rayon::current_num_threads()));
-    one.into_iter().chain(all).collect()
+    let threads = rayon::current_num_threads();
+    let sides = [1, threads];
+    rows_on(if quick { 5000 } else { 100_000 }, if threads > 1 { &sides } else { &sides[..1] })
+}
+
+fn rows_on(boxes: usize, threads: &[usize]) -> Result<Vec<Row>, Failure> {
+    counting::switch_on();
+    let all = threads.iter().flat_map(|&threads| Motion::STEADY.map(|motion| (threads, motion)));
+    all.map(|(threads, (name, motion))| row(name, motion, boxes, threads)).collect()
 }
 
 fn row(name: &str, motion: Motion, boxes: usize, threads: usize) -> Result<Row, Failure> {
@@ -59,10 +65,18 @@ mod tests {
 
     #[test]
     fn what_an_update_asks_for_would_be_counted() {
-        let before = so_far();
+        counting::switch_on();
+        let before = requests();
         let some = std::hint::black_box(vec![1u8; 100]);
-        assert_eq!((so_far() - before, some.len()), (1, 100));
-        let rows = rows(true).expect("within the limits");
+        assert_eq!((requests() - before, some.len()), (1, 100));
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(2).build().expect("a pool");
+        let of_all = pool.install(|| {
+            let before = so_far();
+            rayon::broadcast(|_| std::hint::black_box(vec![1u8; 100]));
+            so_far() - before
+        });
+        assert!((2..20).contains(&of_all), "one on each thread, and {of_all} in all");
+        let rows = rows_on(5000, &[1, 2]).expect("within the limits");
         assert_eq!(rows.len(), 2 * Motion::STEADY.len());
         // Of the others time decides when a list is made that is longer than those before.
         assert_eq!(

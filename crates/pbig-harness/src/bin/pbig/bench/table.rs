@@ -124,7 +124,8 @@ impl Row {
             Target::Faster(times) => Some(times / self.ratio()?),
             Target::Within(times) => Some(1.0 / (times * self.ratio()?)),
             Target::Below(limit) => Some(self.ours? / limit),
-            Target::Nothing => Some(if self.ours? < 1.0 { 0.0 } else { f64::INFINITY }),
+            // One is as bad as another, and more are worse.
+            Target::Nothing => self.ours.map(|count| if count < 1.0 { 0.0 } else { 1.0 + count }),
         }
     }
 
@@ -145,7 +146,7 @@ impl Row {
     fn verdict(&self) -> String {
         match self.missed_by() {
             Some(factor) if factor <= 1.0 => "met".into(),
-            Some(factor) if factor.is_infinite() => "missed".into(),
+            Some(_) if matches!(self.target, Some(Target::Nothing)) => "missed".into(),
             Some(factor) => format!("missed, {factor:.2}x off"),
             None => String::new(),
         }

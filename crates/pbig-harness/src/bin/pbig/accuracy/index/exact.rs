@@ -50,7 +50,8 @@ pub(super) fn told(exact: &[Exactly]) -> String {
     format!(
         "Ways without an estimate ({}): all pairs of {values} values of n up to {most}, and the ends of the rows of every n \
          up to {ends_up_to}. These say what becomes of all pairs: the row that such a way gives never falls where the \
-         index grows, so that it is right within a row where it is at both ends. A run in which one is wrong fails.",
+         index grows, so that it is right within a row where it is at both ends; the lazy way's is a division, and its \
+         column what is left over. A run in which one is wrong fails.",
         names.join(", ")
     )
 }

@@ -27,11 +27,12 @@ pub(super) fn sum(rows: &[Row], offset: f64, of: &dyn Fn(&Row) -> u64) -> u64 {
 
 pub(super) fn notes(rows: &[Row], timed: &[(f64, Vec<Time>)]) -> Vec<String> {
     let mut notes = vec![
-        "The truth are boxes of parry3d-f64, from which rapier3d-f64 has its own, around the same shapes in the \
+        "The truth is boxes of parry3d-f64, from which rapier3d-f64 has its own, around the same shapes in the \
          same layouts, moved away from the origin in f64 and grown by half the prediction distance as rapier's \
-         are; and in each step of simulations by rapier3d-f64, around its colliders. So every difference is one of \
-         rounding. What rounding does to a simulation over time is told apart, as two simulations part within \
-         steps, whatever rounds differently, and then their pairs are of two worlds."
+         are; and, in a table of their own, in each step of simulations by rapier3d-f64, around its colliders. So \
+         every difference in the other tables is one of rounding. What becomes of a simulation in f32 is told in that \
+         one, as two simulations part within steps, whatever differs between them, and then their pairs are of two \
+         worlds."
             .to_owned(),
         "*By poses*: these boxes at the poses that rapier holds in f32, against those at poses in f64; that is \
          another world, and no broad phase can tell. *By boxes*: boxes in f32, as rapier computes them, against \

@@ -49,7 +49,8 @@ fn given(&Indices { n, first, .. }: &Indices, words: &[u32]) -> Result<Vec<(i64,
 
 pub(super) fn note() -> String {
     format!(
-        "The lazy way as a kernel looks at all n^2 identifiers, of which the rows count the pairs; it estimates \
+        "The lazy way as a kernel looks at n^2 identifiers where the others look at all indices, beyond at as many as they \
+         do; rows count the pairs among them, and their ns are for each of these. It estimates \
          nothing, so that the paper's rules have nothing to mend, and ends at {MOST_BOXES} boxes, beyond which n^2 is \
          2^32 or more. A run in which an identifier gives anything but its pair fails."
     )
