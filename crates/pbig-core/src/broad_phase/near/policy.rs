@@ -6,7 +6,9 @@ use crate::broad_phase::{BroadPhase, flag};
 use crate::plan::NoNear;
 use crate::{Error, Updates};
 
-/// Of how many boxes one has to change for a list: where it is always the same ones, and else.
+/// Of how many boxes one has to change for a list: where it is always the same ones, and else. A list for fewer takes less in
+/// most updates, and as much as a search of all in the one that makes it: with 1% of a million boxes, other ones each time, the
+/// median fell from 13.3 ms to 5.7, and the mean rose from 12.9 ms to 22.6.
 const FEWEST: [usize; 2] = [128, 16];
 
 /// Of how many boxes one has to have changed in updates without a list, for those to have cost about as much as one.
