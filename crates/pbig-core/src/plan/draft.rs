@@ -45,21 +45,27 @@ impl Draft {
 /// better is taken; and a free one.
 const PLANS: usize = 6;
 
-/// The levels of the last plans.
+/// The levels of the last plans, of two lengths: those that were asked for last come first.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct KeptLevels([Arc<[LevelPlan]>; PLANS]);
+pub(crate) struct KeptLevels([[Arc<[LevelPlan]>; PLANS]; 2]);
 
 impl KeptLevels {
     fn place(&mut self, levels: &[LevelPlan]) -> Arc<[LevelPlan]> {
-        for kept in self.0.iter_mut().filter(|kept| kept.len() == levels.len()) {
-            if let Some(free) = Arc::get_mut(kept) {
-                free.copy_from_slice(levels);
-                return kept.clone();
-            }
+        if self.0[0][0].len() != levels.len() {
+            self.0.swap(0, 1);
         }
-        // All at once: plans with as many levels ask for nothing from now on.
-        self.0 = std::array::from_fn(|_| levels.into());
-        self.0[0].clone()
+        let kept = &mut self.0[0];
+        let is_free =
+            |kept: &mut Arc<[LevelPlan]>| kept.len() == levels.len() && Arc::get_mut(kept).is_some();
+        let Some(at) = kept.iter_mut().position(is_free) else {
+            // All at once: plans with as many levels ask for nothing from now on.
+            *kept = std::array::from_fn(|_| levels.into());
+            return kept[0].clone();
+        };
+        if let Some(free) = Arc::get_mut(&mut kept[at]) {
+            free.copy_from_slice(levels);
+        }
+        kept[at].clone()
     }
 }
 
@@ -94,6 +100,9 @@ mod tests {
         let last = drafted(&[7, 8]).plan_in(&mut kept);
         assert_eq!((last.levels.as_ptr(), last.levels[0].boxes), (place, 7));
         assert_eq!(drafted(&[9, 9]).plan_in(&mut kept).levels[1].boxes, 9, "none is free");
+        let place = |kept: &mut KeptLevels, boxes: &[u32]| drafted(boxes).plan_in(kept).levels.as_ptr();
+        let places = [place(&mut kept, &[1]), place(&mut kept, &[1, 2])];
+        assert_eq!([place(&mut kept, &[3]), place(&mut kept, &[3, 4])], places, "two lengths by turns");
         assert_eq!(drafted(&[7]).plan_in(&mut kept).levels.len(), 1, "of another length");
         assert_eq!([&others[0], &others[4], &last].map(|plan| plan.levels[1].boxes), [4, 8, 8]);
         assert!(

@@ -32,7 +32,9 @@ pub struct Way {
     pub tally: fn(i64) -> [Tally; 3],
     /// Over the ends of all rows and some indices between, in the same order.
     pub sample: fn(i64, &[i64]) -> [Sample; 3],
-    /// The smallest `n` up to one of at most 2^20 for which the paper's rules leave a wrong pair.
+    /// The largest relative error of the root.
+    pub worst_relative: fn() -> f64,
+    /// The smallest `n` up to one of at most 2^20 for which the paper's rules leave a wrong pair at an end of a row.
     pub counterexample: fn(i64) -> Option<Counterexample>,
     /// Computes the pairs of blocks of indices, in the same order; the sum is for the optimiser.
     pub passes: [fn(i64, &[Block]) -> i64; 3],
@@ -46,7 +48,7 @@ const fn way<R: Root>(name: &'static str, steps: Option<u32>) -> Way {
     // After one step most rows are wrong.
     let tally = if matches!(steps, Some(1)) { dense::all::<R> } else { tally::all::<R> };
     let (sample, counterexample) = (tally::some::<R>, counterexample::<R>);
-    Way { name, steps, row: R::row, tally, sample, counterexample, passes }
+    Way { name, steps, row: R::row, tally, sample, worst_relative: R::worst_relative, counterexample, passes }
 }
 
 /// Every root.

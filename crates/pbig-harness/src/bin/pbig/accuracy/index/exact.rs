@@ -15,6 +15,9 @@ pub(super) struct Exactly {
     pub(super) first: Option<i64>,
 }
 
+/// Up to this the ends of rows of every n; beyond, of powers of two up to 2^20.
+const MOST_ENDS: i64 = 5000;
+
 /// Of which all pairs are looked at; fewer than of the others: these take up to ten times as long for a pair.
 fn boxes(quick: bool) -> Vec<i64> {
     if quick {
@@ -25,7 +28,7 @@ fn boxes(quick: bool) -> Vec<i64> {
 }
 
 pub(super) fn tallied(quick: bool) -> Vec<Exactly> {
-    let ends_up_to = if quick { 250 } else { 5000 };
+    let ends_up_to = if quick { 250 } else { MOST_ENDS };
     EXACT.iter().map(|way| of(way, &boxes(quick), ends_up_to)).collect()
 }
 
@@ -37,7 +40,9 @@ fn of(way: &Exact, boxes: &[i64], ends_up_to: i64) -> Exactly {
         first = first.or((one.wrong > 0).then_some(n));
     }
     let most = boxes.last().copied().unwrap_or(0);
-    let by_ends = (2..=ends_up_to).into_par_iter().filter(|&n| (way.wrong_ends)(n) > 0).min();
+    let powers = (13..=20).map(|power| 1i64 << power).filter(|_| ends_up_to == MOST_ENDS);
+    let all: Vec<i64> = (2..=ends_up_to).chain(powers).collect();
+    let by_ends = all.into_par_iter().filter(|&n| (way.wrong_ends)(n) > 0).min();
     let first = first.into_iter().chain(by_ends).min();
     Exactly { name: way.name, values: boxes.len() as u64, most, ends_up_to, tally, first }
 }
@@ -49,10 +54,11 @@ pub(super) fn told(exact: &[Exactly]) -> String {
         exact.first().map_or((0, 0, 0), |one| (one.values, one.most, one.ends_up_to));
     format!(
         "Ways without an estimate ({}): all pairs of {values} values of n up to {most}, and the ends of the rows of every n \
-         up to {ends_up_to}. These say what becomes of all pairs: the row that such a way gives never falls where the \
+         up to {ends_up_to}{}. These say what becomes of all pairs: the row that such a way gives never falls where the \
          index grows, so that it is right within a row where it is at both ends; the lazy way's is a division, and its \
          column what is left over. A run in which one is wrong fails.",
-        names.join(", ")
+        names.join(", "),
+        if ends_up_to == MOST_ENDS { " and of the powers of two from there to 2^20" } else { "" }
     )
 }
 

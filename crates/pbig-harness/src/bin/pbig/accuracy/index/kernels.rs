@@ -241,7 +241,8 @@ pub(super) fn notes(estimates: &[Estimates]) -> Vec<String> {
             most(BISECTION)
         ),
         "No kernels: f64 sqrt and the integer root, as WGSL has neither f64 nor 64-bit integers nor a root of \
-         integers."
+         integers; and equation 1 all in f32, as the exact integer under the root is as cheap there. The paper's rules \
+         are applied on the CPU to the rows that kernels estimate: they are integers in either place."
             .to_owned(),
         lazy::note(),
         missed_note(estimates, largest),

@@ -104,9 +104,26 @@ fn ends_note(every: &[Every], searched: &[Searched]) -> String {
     };
     format!(
         "Counterexamples are looked for at the first and last index of rows, where an estimate is furthest off if \
-         the root is monotone. Newton's are not quite, so the smallest n could be a little smaller than told. As \
-         far as all pairs were looked at, too, {agree}."
+         the root is monotone. Newton's are not quite, so that the smallest n could be a little smaller than told: {}. As \
+         far as all pairs were looked at, too, {agree}.",
+        bounds(searched)
     )
+}
+
+/// Of Newton's roots: below which n the rules cannot leave a wrong pair.
+fn bounds(searched: &[Searched]) -> String {
+    let newtons = searched.iter().filter(|it| it.way.steps.is_some() && it.found.is_some());
+    let told = newtons.map(|it| format!("with {} not below {}", label(&it.way), harmless_below(&it.way)));
+    let told: Vec<_> = told.collect();
+    if told.is_empty() { "none was found".to_owned() } else { told.join(", ") }
+}
+
+/// The rules mend a row that is off by one. To be off by two, an estimate `(m - s) / 2` has to be off by more than one, with
+/// `m` and the root below `2n`: by the relative error of the root, and a rounding each of what stands under it (half of that
+/// is left of it in the root), of the root, and of the difference.
+fn harmless_below(way: &Way) -> i64 {
+    let roundings = 2.5 * f64::from(f32::EPSILON) / 2.0;
+    (1.0 / ((way.worst_relative)() + roundings)) as i64
 }
 
 /// Whether the first n of those whose pairs were all looked at is another one than at the ends of rows.
@@ -147,6 +164,19 @@ mod tests {
         assert!(told.contains("not always right. Wrong: Carmack 1 from n = 643 on (index 641)."), "{told}");
         let told = wrong_note(&one(None));
         assert!(told.starts_with("No wrong pair is left") && told.ends_with(": Carmack 1."), "{told}");
+    }
+
+    #[test]
+    fn below_what_the_error_of_a_root_allows_there_is_no_counterexample() {
+        for way in WAYS.iter().filter(|way| way.steps.is_some_and(|steps| steps < 3)) {
+            let (most, found) = (1 << 18, (way.counterexample)(1 << 18).expect("a counterexample").n);
+            let least = harmless_below(way);
+            assert!(
+                least <= found && 10 * found < 12 * least,
+                "{}: {least} and {found} up to {most}",
+                label(way)
+            );
+        }
     }
 
     #[test]

@@ -104,7 +104,7 @@ pub(super) fn criterion(rows: &[Row]) -> String {
     format!(
         "Criterion: the default, {}, which is also what rapier's own broad phase has, stands unless another margin \
          makes the whole step of rapier faster, in the geometric mean over all cases, by more than the noise of that \
-         mean, and still does with any one scene left out: one that decides alone may be a special one. By these times \
+         mean, and still does with any one scene left out: it may be a special one. By these times \
          {}. The noise of a mean is two of its standard errors, from how the ratio of two margins differs from case to \
          case, or from pass to pass if that is more. (The fastest of {} margins is partly so by chance.)",
         MARGINS[default_margin()],
@@ -130,9 +130,8 @@ fn verdict(rows: &[Row]) -> String {
 }
 
 fn by_a_scene((rival, deciding): &(&Rival, Vec<&str>)) -> String {
-    let (which, scenes) =
-        (if deciding.len() == 1 { "which" } else { "each of which" }, deciding.join(" or "));
-    format!("{} is faster over all cases, but not without {scenes}, {which} decides alone", rival.told())
+    let scenes = deciding.join(" or ");
+    format!("{} is faster over all cases, but within the noise of those without {scenes}", rival.told())
 }
 
 /// Which margin is fastest over all, and whether that is far from the default.
@@ -283,7 +282,7 @@ mod tests {
     fn a_scene_that_decides_alone_decides_nothing() {
         let rows = scenes_of(&[("pile", 0.9), ("pile", 0.9), ("pile", 0.9), ("rain", 1.0), ("column", 0.99)]);
         let told = criterion(&rows);
-        let but = "is faster over all cases, but not without pile, which decides alone.";
+        let but = "is faster over all cases, but within the noise of those without pile.";
         assert!(told.contains("it stands: 0 (the default takes 6.") && told.contains(but), "{told}");
         let told = criterion(&scenes_of(&[("pile", 0.9), ("pile", 0.9), ("rain", 0.9), ("rain", 0.9)]));
         assert!(told.contains("does not stand"), "{told}");
@@ -298,7 +297,7 @@ mod tests {
         let told = criterion(&scenes_of(&[("pile", 0.9), ("pile", 0.9)]));
         assert!(told.contains(but), "{told}");
         let told = by_a_scene(&(&Rival { margin: 0, longer: 1.0, noise: 0.5 }, vec!["pile", "rain"]));
-        assert!(told.ends_with("but not without pile or rain, each of which decides alone"), "{told}");
+        assert!(told.ends_with("but within the noise of those without pile or rain"), "{told}");
     }
 
     #[test]

@@ -166,6 +166,9 @@ pub(super) fn notes(all: &[Simulated]) -> Vec<String> {
     [about].into_iter().chain(names.into_iter().map(|name| where_it_starts(name, all))).collect()
 }
 
+/// Percent of pairs that may differ at the origin for an offset to show.
+const MOST_APART: f64 = 20.0;
+
 /// From which offset on the simulation in f32 is further from f64 than at the origin.
 fn where_it_starts(name: &str, all: &[Simulated]) -> String {
     let wrong = |one: &Simulated| one.percent(one.own.missed + one.own.added);
@@ -175,9 +178,13 @@ fn where_it_starts(name: &str, all: &[Simulated]) -> String {
     let near = of_name().map(wrong).next().unwrap_or(0.0);
     let first = of_name().find(|one| wrong(one) > 2.0 * near).map(|one| one.row.offset);
     let first = first.map_or("nowhere".into(), |offset| format!("from {offset:e} on"));
+    let starts = if near > MOST_APART {
+        "so much at the origin that the offset hardly shows: bodies that fall part at once".to_owned()
+    } else {
+        format!("more than twice as many as at the origin {first}")
+    };
     format!(
-        "{name}: pairs of the simulation in f32 that are missed or too many, of those in f64: {told}; more than twice \
-         as many as at the origin {first}."
+        "{name}: pairs of the simulation in f32 that are missed or too many, of those in f64: {told}; {starts}."
     )
 }
 
