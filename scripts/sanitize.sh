@@ -3,6 +3,8 @@
 #   scripts/sanitize.sh [address] [thread]     without an argument: both
 # Needs nightly Rust, and the thread sanitizer its component rust-src: where the standard library is not instrumented
 # its locks are not seen, and every exchange between rayon's threads is reported as a race.
+# PBIG_SUITE=1: the whole test suite instead, on the GPU at hand, whose driver is not instrumented: what it does itself is not
+# looked at. Leaks are not looked for, as drivers keep what they have.
 # PBIG_RUST: the folder of another rustc and cargo, which may be stable. Debian's rustc-web, cargo-web, libstd-rust-web-dev
 # and rust-web-src will do (PBIG_RUST=/usr/bin), with the file librustc-stable_rt.tsan.a of a rustup toolchain of the same
 # LLVM beside their standard library.
@@ -18,8 +20,13 @@ fi
 host=$("${rustc[@]}" -vV | sed -n 's/^host: //p')
 std=()
 if [ -f "$("${rustc[@]}" --print sysroot)/lib/rustlib/src/rust/library/Cargo.lock" ]; then std=(-Zbuild-std); fi
+what=(-p pbig-core --features serde --lib)
 # Optimized a little, with overflow checks and debug assertions; a folder for each sanitizer.
 export CARGO_PROFILE_DEV_OPT_LEVEL=1 CARGO_PROFILE_DEV_DEBUG=line-tables-only
+if [ -n "${PBIG_SUITE:-}" ]; then
+    what=(--workspace --test suite)
+    export CARGO_PROFILE_DEV_OPT_LEVEL=2 ASAN_OPTIONS=detect_leaks=0 TSAN_OPTIONS=ignore_noninstrumented_modules=1
+fi
 for sanitizer in "$@"; do
     if [ "$sanitizer" = thread ] && [ ${#std[@]} = 0 ]; then
         echo "the thread sanitizer needs: rustup component add rust-src --toolchain nightly"
@@ -27,5 +34,5 @@ for sanitizer in "$@"; do
     fi
     echo "== $sanitizer sanitizer${std:+, standard library included}"
     RUSTFLAGS="-Zsanitizer=$sanitizer" "${cargo[@]}" test "${std[@]}" --target "$host" \
-        --target-dir "target/sanitize-$sanitizer" -p pbig-core --features serde --lib
+        --target-dir "target/sanitize-$sanitizer" "${what[@]}"
 done

@@ -39,8 +39,21 @@ fn bench_update_compares_with_stock_and_the_floor_and_measures_memory() {
     for word in others {
         assert!(about(&rows, word) > 0, "{word}");
     }
-    let memory = rows.iter().filter(|row| row["case"].to_string().contains("memory"));
-    assert!(!cfg!(target_os = "linux") || memory.into_iter().all(|row| row["ours_mb"].as_f64() > Some(0.0)));
+    let of = |case: &str| {
+        let has = move |row: &&Value| row["case"].as_str().is_some_and(|name| name.starts_with(case));
+        rows.iter().filter(has).collect::<Vec<_>>()
+    };
+    let memory = of("memory, ");
+    assert!(memory.len() > 2);
+    assert!(!cfg!(target_os = "linux") || memory.iter().all(|row| row["ours_mb"].as_f64() > Some(0.0)));
+    let requests = of("requests for memory, ");
+    assert!(requests.len() > 2 && requests.iter().all(|row| row["ours_requests"].is_number()));
+    assert_eq!(
+        (&requests[0]["target"], &requests[0]["met"]),
+        (&"none".into(), &true.into()),
+        "{}",
+        requests[0]
+    );
 }
 
 #[test]
