@@ -25,7 +25,9 @@ what=(-p pbig-core --features serde --lib)
 export CARGO_PROFILE_DEV_OPT_LEVEL=1 CARGO_PROFILE_DEV_DEBUG=line-tables-only
 if [ -n "${PBIG_SUITE:-}" ]; then
     what=(--workspace --test suite)
-    export CARGO_PROFILE_DEV_OPT_LEVEL=2 ASAN_OPTIONS=detect_leaks=0 TSAN_OPTIONS=ignore_noninstrumented_modules=1
+    export CARGO_PROFILE_DEV_OPT_LEVEL=2
+    export ASAN_OPTIONS=${ASAN_OPTIONS:+$ASAN_OPTIONS:}detect_leaks=0
+    export TSAN_OPTIONS=${TSAN_OPTIONS:+$TSAN_OPTIONS:}ignore_noninstrumented_modules=1
 fi
 for sanitizer in "$@"; do
     if [ "$sanitizer" = thread ] && [ ${#std[@]} = 0 ]; then

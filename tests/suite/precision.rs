@@ -148,7 +148,15 @@ fn f16_is_rounded_outward_and_in_order_for_all_floats() {
 /// Outward, in order, and the one below no more than a step from the one above: with that a minimum never comes after a maximum
 /// that it does not exceed, which is all that a pair needs.
 fn steps_are_right_for(scale: &Scale, steps: u32, places: std::ops::Range<i64>) {
-    let both = |x: f32| [scale.down(0, x, steps), scale.up(0, x, steps)];
+    both_are_right_for(scale, steps, places, |x| [scale.down(0, x, steps), scale.up(0, x, steps)]);
+}
+
+fn both_are_right_for(
+    scale: &Scale,
+    steps: u32,
+    places: std::ops::Range<i64>,
+    both: impl Fn(f32) -> [i64; 2],
+) {
     let mut before = both(in_order(places.start));
     for x in places.map(in_order) {
         let [down, up] = both(x);
@@ -194,11 +202,21 @@ fn fixed_point_is_rounded_outward_and_in_order_for_all_floats() {
     }
 }
 
-/// With a cell below 0 they run backwards.
+const ONE_TO_TWO: std::ops::Range<i64> = 0x3f80_0000..0x4000_0000;
+
 #[test]
 #[should_panic(expected = "not in order")]
 fn steps_that_are_out_of_order_are_seen() {
-    steps_are_right_for(&Scale { origin: [0.0; 3], cell: -1.0 }, 64, 0x3f80_0000..0x4000_0000);
+    // Where coordinates are clamped nothing else would tell.
+    let scale = Scale { origin: [0.0; 3], cell: 2f32.powi(-40) };
+    both_are_right_for(&scale, 64, ONE_TO_TWO, |x| [(-1000.0 * x) as i64; 2]);
+}
+
+#[test]
+#[should_panic(expected = "not between")]
+fn steps_that_are_rounded_inward_are_seen() {
+    let scale = Scale { origin: [0.0; 3], cell: 1.0 };
+    both_are_right_for(&scale, 64, ONE_TO_TWO, |x| [scale.down(0, x, 64); 2]);
 }
 
 /// Boxes that are a step or so apart, which rounding may join, and more, which it may not: or a test that lets

@@ -41,8 +41,8 @@ impl Draft {
     }
 }
 
-/// Plans that may be there at once: the report's, that of the base, the one that is kept for builds to come, two of which the
-/// better is taken; and a free one.
+/// Plans that may be there at once: the report's, that of the base, the one that is kept for builds to come, two that are
+/// compared, and a free one.
 const PLANS: usize = 6;
 
 /// The levels of the last plans, of two lengths: those that were asked for last come first.

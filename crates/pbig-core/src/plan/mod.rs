@@ -95,7 +95,7 @@ pub struct Plan {
     pub near: Option<NearPlan>,
     /// Why there is none, where many boxes change ([`Chosen::Edit`] and [`Chosen::Grid`], in updates).
     pub no_near: Option<NoNear>,
-    /// Why no device was asked, where [`Backend::Auto`] leaves that open.
+    /// Why no device was asked, where [`Backend::Auto`] leaves that open. The words of a plan leave out [`NoGpu::NotBuilt`].
     pub no_gpu: Option<NoGpu>,
     /// At which rows the search of the CPU's grid has looked ([`Chosen::Grid`]).
     pub looks: Looks,

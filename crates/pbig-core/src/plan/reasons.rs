@@ -47,7 +47,8 @@ pub enum NoNear {
     Compared,
     /// The last ones did not pay, or did not last: so many updates more go without.
     Unpaid(u32),
-    /// Too many pairs would be near, as boxes move far, are crowded or filtered: so many updates more go without.
+    /// Too many pairs would be near, as boxes move far, are crowded or filtered: so many updates more go without; none where
+    /// a list is asked for.
     Many(u32),
     /// How far boxes move is not known: most that have changed were not there before, or are where they were.
     Unknown,

@@ -120,7 +120,7 @@ fn bounds(searched: &[Searched]) -> String {
 
 /// The rules mend a row that is off by one. To be off by two, an estimate `(m - s) / 2` has to be off by more than one, with
 /// `m` and the root below `2n`: by the relative error of the root, and a rounding each of what stands under it (half of that
-/// is left of it in the root), of the root, and of the difference.
+/// is left of it in the root), of the root, and of the difference. (The error of a root has its own rounding already: slack.)
 fn harmless_below(way: &Way) -> i64 {
     let roundings = 2.5 * f64::from(f32::EPSILON) / 2.0;
     (1.0 / ((way.worst_relative)() + roundings)) as i64
