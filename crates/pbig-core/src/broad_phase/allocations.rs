@@ -1,6 +1,6 @@
 //! Steady state asks for no memory: every allocation of this thread is counted, or of all threads of a pool.
 
-use crate::{Aabb, BroadPhase, Config, ProxyFilter};
+use crate::{Aabb, BroadPhase, Config, ProxyFilter, Study, Updates};
 use rayon::{ThreadPool, ThreadPoolBuilder};
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
@@ -83,8 +83,15 @@ fn place(id: u32, frame: u32, boxes: u32) -> Aabb {
 
 /// Of an update in which one in `share` boxes moves: the most of any in 40, after as many to warm up.
 fn most(boxes: u32, share: u32, pool: Option<&ThreadPool>) -> Counts {
-    let mut broad_phase = BroadPhase::new(Config { margin: 0.01, ..Config::DEFAULT }).expect("a margin");
-    // Whose turn it is depends on time, and the first of a turn makes room.
+    // Which way many go depends on time, as whose turn it is does, and the first to go one makes room.
+    let updates = match pool {
+        None => Updates::Auto,
+        Some(_) if share >= 20 => Updates::Edits,
+        Some(_) => Updates::Near,
+    };
+    let study = Study { updates, ..Study::DEFAULT };
+    let config = Config { margin: 0.01, study, ..Config::DEFAULT };
+    let mut broad_phase = BroadPhase::new(config).expect("a margin");
     broad_phase.small.turns = super::turns::Turns::none();
     let (mut most, mut events) = ([0; 2], 0);
     for frame in 0..80 {
@@ -169,8 +176,8 @@ fn lists_of_near_pairs_that_are_made_anew_use_the_memory_of_those_before() {
 #[test]
 fn nor_do_new_plans_of_boxes_that_circle() {
     const BOXES: u32 = 3000;
-    let mut broad_phase = BroadPhase::new(Config::default()).expect("a margin");
-    broad_phase.small.turns = super::turns::Turns::none();
+    let study = Study { updates: Updates::Near, ..Study::DEFAULT };
+    let mut broad_phase = BroadPhase::new(Config { study, ..Config::DEFAULT }).expect("a margin");
     let (mut plans, mut requests, mut last) = (0, 0, broad_phase.report().plan.levels.first().copied());
     for update in 0..160 {
         for id in 0..BOXES {
@@ -180,6 +187,9 @@ fn nor_do_new_plans_of_boxes_that_circle() {
             broad_phase.set(id, Aabb::new(by(min), by(max)), ProxyFilter::ALL).expect("a small id");
         }
         let before = counts(None);
+        if update % 4 == 0 {
+            broad_phase.drop_near();
+        }
         broad_phase.update().expect("few pairs");
         let level = broad_phase.report().plan.levels.first().copied();
         let is_new = level != std::mem::replace(&mut last, level);
