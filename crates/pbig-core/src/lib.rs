@@ -63,6 +63,7 @@ pub mod pair_index;
 pub mod plan;
 mod report;
 mod search;
+mod share;
 
 pub use aabb::Aabb;
 pub use broad_phase::{BroadPhase, Events};

@@ -4,6 +4,7 @@
 mod allocations;
 #[cfg(feature = "gpu")]
 mod device;
+mod edits;
 mod fat;
 mod flag;
 mod many;

@@ -81,10 +81,12 @@ impl Rebuild {
     /// What an update has taken.
     pub(super) fn note(&mut self, route: Route, changed: usize, present: usize, time: Duration) {
         let ns = time.as_nanos() as f32;
-        let route = if std::mem::take(&mut self.after_edits) { Route::Few } else { route };
+        let route = if std::mem::take(&mut self.after_edits) { Route::Edits } else { route };
         match route {
             Route::All => learn(&mut self.of_box, ns / present.max(1) as f32),
-            Route::Few if changed * SHARE >= present => learn(&mut self.of_edit, ns / changed as f32),
+            Route::Few | Route::Edits if changed * SHARE >= present => {
+                learn(&mut self.of_edit, ns / changed as f32)
+            }
             _ => {}
         }
     }
@@ -115,7 +117,7 @@ mod tests {
             "before anything is known: a seventh, and 15% more to change over"
         );
         for _ in 0..50 {
-            rebuild.note(Route::Few, 100, 1000, us(200));
+            rebuild.note(Route::Edits, 100, 1000, us(200));
             rebuild.note(Route::All, 100, 1000, us(100));
         }
         assert!(rebuild.pays(60, 1000) && !rebuild.pays(40, 1000), "an edit costs as much as 20 boxes");
@@ -139,9 +141,9 @@ mod tests {
     fn few_changes_and_outliers_say_little() {
         let mut rebuild = Rebuild::default();
         (0..50).for_each(|_| rebuild.note(Route::All, 100, 1000, us(100)));
-        (0..50).for_each(|_| rebuild.note(Route::Few, 100, 1000, us(70)));
-        (0..50).for_each(|_| rebuild.note(Route::Few, 10, 1000, us(70)));
-        rebuild.note(Route::Few, 100, 1000, us(7_000_000));
+        (0..50).for_each(|_| rebuild.note(Route::Edits, 100, 1000, us(70)));
+        (0..50).for_each(|_| rebuild.note(Route::Edits, 10, 1000, us(70)));
+        rebuild.note(Route::Edits, 100, 1000, us(7_000_000));
         assert!(rebuild.ratio() < 9.0, "{}", rebuild.ratio());
     }
 }

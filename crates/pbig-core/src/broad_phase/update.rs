@@ -6,18 +6,14 @@ use super::many::RANGE;
 use super::near::Served;
 use super::{BroadPhase, Old, flag};
 use crate::cpu::codes::prefetch;
-use crate::cpu::edit::Changed;
 use crate::cpu::emit;
-use crate::cpu::find::Others;
 use crate::cpu::judge::Accept;
 use crate::diff::{Judgement, PairStore};
-use crate::plan::{Chosen, LazySummary, Looks, Plan};
-use crate::report::{lap, stage};
-use crate::search::{Rule, single_entry_checks};
-use crate::{Aabb, Backend, Error, Pair, ProxyFilter, Strategy, Updates, shared_from};
-use rayon::prelude::*;
+use crate::plan::LazySummary;
+use crate::search::Rule;
+use crate::share::{self, has_threads};
+use crate::{Aabb, Backend, Error, Pair, ProxyFilter, Strategy, shared_from};
 use std::collections::HashMap;
-use std::time::Instant;
 
 /// The [`State`] of a broad phase of which other fields may be written.
 macro_rules! state {
@@ -42,6 +38,8 @@ pub(super) enum Route {
     Near,
     /// A search for the boxes that have changed.
     Few,
+    /// The same in the base grid, and a walk that has found which pairs went.
+    Edits,
     /// One for all.
     All,
 }
@@ -51,9 +49,6 @@ const PARALLEL_FROM: usize = shared_from(4096);
 
 /// Changed boxes from which all are looked at on several threads.
 const RANGES_FROM: usize = shared_from(16_384);
-
-/// Tests that take as long as to sort a box.
-const TESTS_OF_A_BOX: u64 = 64;
 
 impl BroadPhase {
     /// Pairs that overlap now and did not, into `events.added`, in no order; and who has found them.
@@ -77,41 +72,6 @@ impl BroadPhase {
         route
     }
 
-    fn edit_or_rebuild(&mut self) -> Result<Route, Error> {
-        let present = self.present_count as usize;
-        let pays = self.rebuild_pays();
-        if pays || !self.may_edit() || !self.has_base {
-            // One that a list has left to be done says nothing of updates without any.
-            self.near.worth.failed |= !pays && self.may_edit();
-            return self.search_all();
-        }
-        self.edit_base();
-        if self.base.map.out_of_order() * 8 >= present || self.is_strained() {
-            let clock = Instant::now();
-            let route = self.search_all()?;
-            self.rebuild.followed_edits(present, clock.elapsed());
-            Ok(route)
-        } else {
-            self.search_changed()
-        }
-    }
-
-    /// Whether all are to be searched anew although edits could do it.
-    fn rebuild_pays(&mut self) -> bool {
-        match self.config.study.updates {
-            Updates::Auto | Updates::Near => {
-                self.rebuild.pays(self.changed.len(), self.present_count as usize)
-            }
-            Updates::Edits => false,
-            Updates::Anew => true,
-        }
-    }
-
-    /// Whether edits have cost as much as it takes to build the base.
-    fn is_strained(&self) -> bool {
-        self.config.study.updates != Updates::Edits && self.strain > self.rebuild_cost()
-    }
-
     pub(super) fn may_edit(&self) -> bool {
         self.config.strategy != Strategy::Pbig && self.config.backend != Backend::Brute
     }
@@ -131,7 +91,7 @@ impl BroadPhase {
     }
 
     /// Builds the base anew from all boxes and searches it.
-    fn search_all(&mut self) -> Result<Route, Error> {
+    pub(super) fn search_all(&mut self) -> Result<Route, Error> {
         let state = state!(self);
         let filters = Some(&self.filters[..]);
         let rule = Rule { accept: &state, filters, filters_suffice: false, before: &self.before };
@@ -152,53 +112,6 @@ impl BroadPhase {
         Ok(Route::All)
     }
 
-    /// Puts the changed boxes where they are now.
-    fn edit_base(&mut self) {
-        let mut clock = Instant::now();
-        stage!("map");
-        self.base.map.arrange(&mut self.changed, self.boxes.len());
-        let update = self.present_update();
-        let (ids, boxes, before, filters) = (&self.changed, &self.boxes, &self.before, &self.filters);
-        let changed = Changed { ids, boxes, before, filters, update };
-        self.base.map.edit(&changed, &mut self.others);
-        self.report.stages.map += lap(&mut clock);
-    }
-
-    fn present_update(&self) -> u64 {
-        self.updates + 1
-    }
-
-    /// Searches the base for the changed boxes.
-    fn search_changed(&mut self) -> Result<Route, Error> {
-        let mut clock = Instant::now();
-        stage!("check");
-        let update = Some(self.present_update());
-        let (state, limit) = (OfChanged(state!(self)), self.config.limits.max_pairs);
-        let others = Others { records: &self.others, filters: &self.filters, update };
-        self.base.map.check_others(&others, &state, &mut self.found, limit)?;
-        self.found.chunks.iter().for_each(|chunk| self.events.added.extend_from_slice(chunk));
-        self.report.stages.check += lap(&mut clock);
-        self.report.checks = single_entry_checks(&self.found);
-        self.note_strain(self.found.checks);
-        let (moved, boxes) = (self.base.map.out_of_order() as u32, self.valid_count());
-        let looks = Looks::default();
-        self.report.plan = Plan { chosen: Chosen::Edit, moved, boxes, looks, ..self.base_plan.clone() };
-        Ok(Route::Few)
-    }
-
-    /// Tests beyond what boxes needed when the base was built, twice over: many boxes have come to few cells, or to the
-    /// list.
-    fn note_strain(&mut self, made: u64) {
-        let boxes = u64::from(self.base_plan.boxes.max(1));
-        let usual = TESTS_OF_A_BOX + 4 * self.base_checks / boxes;
-        self.strain += made.saturating_sub(self.others.len() as u64 * usual);
-    }
-
-    /// As many tests as it takes to build the base.
-    fn rebuild_cost(&self) -> u64 {
-        TESTS_OF_A_BOX * u64::from(self.present_count) + self.base_checks
-    }
-
     /// Kept pairs that no longer hold, into `events.removed`, in no order; they are no longer kept.
     pub(super) fn find_removed(&mut self, route: Route) {
         if route == Route::Near {
@@ -216,7 +129,9 @@ impl BroadPhase {
                 self.pairs.end_few(&self.ending, &ending, removed)
             };
         }
-        if many {
+        if route == Route::Edits {
+            self.pairs.end_found(removed);
+        } else if many {
             self.pairs.end_many(&state, removed);
         } else {
             self.pairs.end_few(&self.changed, &state, removed);
@@ -252,8 +167,8 @@ impl BroadPhase {
             }
             return;
         }
-        let boxes = before.par_chunks_mut(RANGE).zip(boxes.par_chunks(RANGE));
-        boxes.zip(flags.par_chunks_mut(RANGE)).for_each(|((before, boxes), flags)| {
+        let boxes = before.chunks_mut(RANGE).zip(boxes.chunks(RANGE));
+        share::for_each(has_threads(), boxes.zip(flags.chunks_mut(RANGE)), |((before, boxes), flags)| {
             for ((before, aabb), flags) in before.iter_mut().zip(boxes).zip(flags) {
                 if *flags & flag::CHANGED != 0 {
                     *before = *aabb;
@@ -266,12 +181,9 @@ impl BroadPhase {
     pub(super) fn sort_events(&mut self) {
         let (added, removed, ids) = (&mut self.events.added, &mut self.events.removed, self.boxes.len());
         let [one, other] = &mut self.sorting;
-        if added.len() + removed.len() > PARALLEL_FROM {
-            rayon::join(|| emit::sort(added, ids, one), || emit::sort(removed, ids, other));
-        } else {
-            emit::sort(added, ids, one);
-            emit::sort(removed, ids, other);
-        }
+        let is_shared = added.len() + removed.len() > PARALLEL_FROM && has_threads();
+        let lists = [(added, one), (removed, other)].into_iter();
+        share::for_each(is_shared, lists, |(events, scratch)| emit::sort(events, ids, scratch));
     }
 }
 
@@ -348,28 +260,5 @@ impl Accept for State<'_> {
         let Pair { a, b } = pair;
         let refiltered = self.flags(a, b) & flag::REFILTERED != 0;
         self.filters_allow(a, b) && !(refiltered && self.paired_before(a, b))
-    }
-}
-
-/// The same of two boxes of which the first has changed. Of two that have, it is asked from both sides.
-struct OfChanged<'a>(State<'a>);
-
-impl Accept for OfChanged<'_> {
-    #[inline(always)]
-    fn prepare(&self, ids: [u32; 2]) {
-        Accept::prepare(&self.0, ids);
-    }
-
-    #[inline(always)]
-    fn meets(&self, query: u32, candidate: u32) -> bool {
-        self.0.comes_first(query, candidate)
-    }
-
-    fn pair(&self, pair: Pair) -> bool {
-        self.0.pair(pair)
-    }
-
-    fn fresh(&self, pair: Pair) -> bool {
-        self.0.fresh(pair)
     }
 }

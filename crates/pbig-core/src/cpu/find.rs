@@ -18,8 +18,8 @@ use super::record::Record;
 use super::window::{Rows, Windows};
 use crate::plan::OPEN;
 use crate::report::stage;
+use crate::share::{self, has_threads};
 use crate::{Error, Pair, ProxyFilter, shared_from};
-use rayon::prelude::*;
 use std::cell::RefCell;
 use std::sync::{Mutex, PoisonError};
 
@@ -36,10 +36,10 @@ const MOST_KEPT: usize = 1 << 16;
 const PARALLEL_FROM: u64 = shared_from(300_000) as u64;
 
 /// Boxes to be looked up in one piece of work.
-const OTHERS: usize = 1024;
+const OTHERS: usize = 256;
 
 /// Boxes to be looked up in a map from which the work is shared.
-const OTHERS_PARALLEL_FROM: usize = shared_from(4096);
+const OTHERS_PARALLEL_FROM: usize = shared_from(512);
 
 /// What a box costs, and a check, in ns; checks as many as in the call before.
 const ENTRY: u64 = 15;
@@ -64,11 +64,7 @@ impl<R: Record> Map<R> {
         let is_shared = self.is_shared(found);
         let buffers = found.buffers(self.chunks());
         let work = |(chunk, out): (usize, &mut Vec<Pair>)| self.check_chunk(chunk, accept, out, &room);
-        let counts = if is_shared {
-            buffers.par_iter_mut().enumerate().map(work).reduce(|| (0, 0), add)
-        } else {
-            buffers.iter_mut().enumerate().map(work).fold((0, 0), add)
-        };
+        let counts = share::sum(is_shared, buffers.iter_mut().enumerate(), work, add);
         (found.checks, found.overlaps) = counts;
         room.settle(found.len())
     }
@@ -93,7 +89,7 @@ impl<R: Record> Map<R> {
         let counts = if is_shared {
             let gathered = Mutex::new(&mut *all);
             let work = |chunk: usize| self.check_for(&gathered, chunk, accept, &room);
-            chunks.into_par_iter().map(work).reduce(|| (0, 0), add)
+            share::sum(true, chunks, work, add)
         } else {
             chunks.map(|chunk| self.check_chunk(chunk, accept, all, &room)).fold((0, 0), add)
         };
@@ -126,7 +122,7 @@ impl<R: Record> Map<R> {
     fn is_shared(&self, before: &Found) -> bool {
         let in_list = (self.list.len() as u64).pow(2) / 2;
         let expected = ENTRY * self.len_in_grids() as u64 + CHECK * before.checks.max(in_list);
-        expected >= PARALLEL_FROM && rayon::current_num_threads() > 1
+        expected >= PARALLEL_FROM && has_threads()
     }
 
     /// How many chunks there are: those of each level, then those of the list.
@@ -283,12 +279,10 @@ impl<R: Record> Map<R> {
         let piece = |(records, out): (&[R], &mut Vec<Pair>)| {
             self.check_piece(&Others { records, ..*others }, accept, out, &room)
         };
-        let counts = if records.len() >= OTHERS_PARALLEL_FROM && rayon::current_num_threads() > 1 {
-            let pieces = records.par_chunks(OTHERS);
-            pieces.zip(found.buffers(records.len().div_ceil(OTHERS))).map(piece).reduce(|| (0, 0), add)
-        } else {
-            found.buffers(1).iter_mut().map(|out| piece((records, out))).fold((0, 0), add)
-        };
+        let is_shared = records.len() >= OTHERS_PARALLEL_FROM && has_threads();
+        let each = if is_shared { OTHERS } else { records.len().max(1) };
+        let buffers = found.buffers(records.len().div_ceil(each)).iter_mut();
+        let counts = share::sum(is_shared, records.chunks(each).zip(buffers), piece, add);
         (found.checks, found.overlaps) = counts;
         // A search that ran out of room has ended early.
         if room.used() > max_pairs {

@@ -8,6 +8,7 @@ use super::levels::{Classes, LISTED, Level};
 use super::record::{Item, Record};
 use super::sort::{Input, Sort, Sorted, shift_for};
 use crate::plan::{Camps, Experience, KeptLevels, Looks, OPEN, OccupiedCell, Plan};
+use crate::share::has_threads;
 use crate::{Aabb, Look, shared_from};
 
 /// Boxes from which a sort is shared with other threads.
@@ -84,7 +85,7 @@ impl<R: Record> Map<R> {
             self.levels.push(Level::new(level, base));
             base += (level.cells.div_ceil(1 << shift)) << shift;
         }
-        let threads = input.boxes.len() >= PARALLEL_FROM && rayon::current_num_threads() > 1;
+        let threads = input.boxes.len() >= PARALLEL_FROM && has_threads();
         let elsewhere = self.sort.place(&input, &self.classes, &self.levels, shift, threads);
         self.invalid = elsewhere.invalid;
         if elsewhere.listed > most_listed {

@@ -11,8 +11,7 @@ use super::codes::BLOCK;
 use super::levels::{Classes, LISTED, Level};
 use super::record::{Item, Record};
 use super::spill::Spill;
-use crate::Aabb;
-use rayon::prelude::*;
+use crate::{Aabb, share};
 use std::marker::PhantomData;
 use std::ops::Range;
 
@@ -168,13 +167,8 @@ impl Sort {
             elsewhere
         };
         let (keys, cursors) = (&mut self.keys, &mut self.cursors);
-        if threads {
-            let pieces = keys.par_chunks_mut(PIECE).zip(cursors.par_chunks_mut(buckets)).enumerate();
-            pieces.map(piece).reduce(Elsewhere::default, Elsewhere::add)
-        } else {
-            let pieces = keys.chunks_mut(PIECE).zip(cursors.chunks_mut(buckets)).enumerate();
-            pieces.map(piece).fold(Elsewhere::default(), Elsewhere::add)
-        }
+        let pieces = keys.chunks_mut(PIECE).zip(cursors.chunks_mut(buckets)).enumerate();
+        share::sum(threads, pieces, piece, Elsewhere::add)
     }
 
     /// Counts to places: bucket by bucket, in each piece by piece, so that the sort is stable; returns how many boxes
@@ -209,11 +203,8 @@ impl Sort {
             }
         };
         let (keys, cursors, buckets) = (&self.keys, &mut self.cursors, self.levels.len().max(1));
-        if threads {
-            keys.par_chunks(PIECE).zip(cursors.par_chunks_mut(buckets)).enumerate().for_each(piece);
-        } else {
-            keys.chunks(PIECE).zip(cursors.chunks_mut(buckets)).enumerate().for_each(piece);
-        }
+        let pieces = keys.chunks(PIECE).zip(cursors.chunks_mut(buckets)).enumerate();
+        share::for_each(threads, pieces, piece);
     }
 
     /// Each bucket by cell.
@@ -245,11 +236,9 @@ impl Sort {
             // SAFETY: as above.
             unsafe { squares.write(bucket, crowd) }
         };
-        if threads {
-            (0..buckets).into_par_iter().with_min_len(PIECE / BUCKET).for_each(order);
-        } else {
-            (0..buckets).for_each(order);
-        }
+        const TOGETHER: usize = PIECE / BUCKET;
+        let pieces = (0..buckets).step_by(TOGETHER);
+        share::for_each(threads, pieces, |first| (first..buckets.min(first + TOGETHER)).for_each(&order));
     }
 
     /// Where the boxes of each level are, and how crowded its cells.

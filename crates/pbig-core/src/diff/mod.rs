@@ -15,8 +15,8 @@ mod tests;
 use crate::cpu::codes::prefetch;
 use crate::links::{Links, NONE};
 use crate::marks::Marks;
+use crate::share::{self, has_threads};
 use crate::{Pair, shared_from};
-use rayon::prelude::*;
 
 /// Walks that cost as much as linking all pairs.
 const WALKS: usize = 12;
@@ -202,7 +202,7 @@ impl PairStore {
             return;
         }
         let mut ids = std::mem::take(&mut self.removed);
-        self.find_ended(&ids, &End);
+        self.find_ended(&ids, &End, false, || ());
         self.remove_places(|_| {});
         ids.drain(..).for_each(|id| self.is_removed.unset(id));
         self.removed = ids;
@@ -217,16 +217,31 @@ impl PairStore {
 
     /// As [`PairStore::end_many`], where pairs concern only the few boxes `ids`.
     pub(crate) fn end_few(&mut self, ids: &[u32], of: &impl Judgement, removed: &mut Vec<Pair>) {
-        self.find_ended(ids, of);
+        self.find_ended(ids, of, false, || ());
+        self.end_found(removed);
+    }
+
+    /// Removes what [`PairStore::find_ended`] has found, and appends it to `removed`.
+    pub(crate) fn end_found(&mut self, removed: &mut Vec<Pair>) {
         self.remove_places(|pair| removed.push(pair));
     }
 
-    /// The places of pairs of some boxes that do not hold, largest first.
-    fn find_ended(&mut self, ids: &[u32], of: &impl Judgement) {
+    /// Finds the pairs that do not hold, of those that concern the few boxes `ids`, and leaves them where they are; and does
+    /// something else, beside that if `is_shared`.
+    pub(crate) fn find_ended<T>(
+        &mut self,
+        ids: &[u32],
+        of: &impl Judgement,
+        is_shared: bool,
+        own: impl FnOnce() -> T,
+    ) -> T {
         self.choose(ids.len());
+        // Largest place first.
         let mut places = std::mem::take(&mut self.places);
         places.clear();
+        let done;
         if self.links.are_there() {
+            done = own();
             for &id in ids {
                 let listed = self.links.places(&self.pairs, id);
                 places.extend(listed.filter(|&place| !of.holds(self.pairs[place as usize])));
@@ -236,11 +251,12 @@ impl PairStore {
             places.dedup();
         } else {
             ids.iter().for_each(|&id| self.marks.set(id));
-            self.walk_for_few(of, &mut places);
+            done = self.walk_for_few(of, &mut places, is_shared, own);
             ids.iter().for_each(|&id| self.marks.unset(id));
             places.reverse();
         }
         self.places = places;
+        done
     }
 
     /// Links or not, for so many boxes: they are made when walks without have cost as much, and dropped where a walk
@@ -275,7 +291,13 @@ impl PairStore {
     }
 
     /// The places of pairs that do not hold, where those that have changed are few.
-    fn walk_for_few(&mut self, of: &impl Judgement, places: &mut Vec<u32>) {
+    fn walk_for_few<T>(
+        &mut self,
+        of: &impl Judgement,
+        places: &mut Vec<u32>,
+        is_shared: bool,
+        own: impl FnOnce() -> T,
+    ) -> T {
         let pieces = self.pairs.len().div_ceil(PIECE);
         self.ended_places.resize(pieces.max(self.ended_places.len()), Vec::new());
         let marks = &self.marks;
@@ -286,12 +308,10 @@ impl PairStore {
             }
         };
         let (pairs, ended) = (&self.pairs, &mut self.ended_places[..pieces]);
-        if pieces > 4 && rayon::current_num_threads() > 1 {
-            pairs.par_chunks(PIECE).zip(ended).enumerate().for_each(walk);
-        } else {
-            pairs.chunks(PIECE).zip(ended).enumerate().for_each(walk);
-        }
+        let is_shared = is_shared || (pieces > 4 && has_threads());
+        let done = share::beside(is_shared, own, pairs.chunks(PIECE).zip(ended).enumerate(), walk);
         self.ended_places[..pieces].iter().for_each(|ended| places.extend(ended));
+        done
     }
 
     /// Keeps in order what `keep` moves to the front of each piece.
@@ -302,11 +322,8 @@ impl PairStore {
         let pieces = self.pairs.len().div_ceil(PIECE);
         self.ended.resize(pieces.max(self.ended.len()), Vec::new());
         let walk = |(pairs, ended): (&mut [Pair], &mut Vec<Pair>)| keep(pairs, ended);
-        if pieces > 2 && rayon::current_num_threads() > 1 {
-            self.pairs.par_chunks_mut(PIECE).zip(&mut self.ended).for_each(walk);
-        } else {
-            self.pairs.chunks_mut(PIECE).zip(&mut self.ended).for_each(walk);
-        }
+        let is_shared = pieces > 2 && has_threads();
+        share::for_each(is_shared, self.pairs.chunks_mut(PIECE).zip(&mut self.ended), walk);
         let first = removed.len();
         let (mut kept, mut start) = (0, 0);
         for ended in &mut self.ended[..pieces] {

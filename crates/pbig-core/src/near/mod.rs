@@ -15,9 +15,9 @@ mod tests;
 
 use crate::cpu::codes::prefetch;
 use crate::diff::{AHEAD, Judgement};
+use crate::share::{self, has_threads};
 use crate::{Aabb, Pair, shared_from};
 use index::Index;
-use rayon::prelude::*;
 use std::ops::Range;
 
 /// What the last test of a pair has said.
@@ -135,7 +135,8 @@ impl NearPairs {
         self.states.resize(self.pairs.len(), APART);
         for first in (0..self.pairs.len()).step_by(PORTION) {
             let pieces = self.walk(first..self.pairs.len().min(first + PORTION), boxes);
-            self.turned[..pieces].par_iter_mut().for_each(|turned| turned.find_fresh(before));
+            let turned = self.turned[..pieces].iter_mut();
+            share::for_each(has_threads(), turned, |turned| turned.find_fresh(before));
             for turned in &self.turned[..pieces] {
                 self.overlapping += turned.added.len();
                 tell(&turned.added);
@@ -269,7 +270,8 @@ impl NearPairs {
                 *state = if (*state == APART) & !is_near { GONE } else { *state };
             }
         };
-        self.pairs.par_chunks(PIECE).zip(self.states.par_chunks_mut(PIECE)).for_each(forget);
+        let pieces = self.pairs.chunks(PIECE).zip(self.states.chunks_mut(PIECE));
+        share::for_each(has_threads(), pieces, forget);
         self.compact();
     }
 
@@ -296,11 +298,9 @@ impl NearPairs {
             let blocks = pairs.chunks(BLOCK).zip(states.chunks_mut(BLOCK));
             blocks.map(|block| test(block, boxes, turned)).sum()
         };
-        let overlaps: u64 = if pieces > 2 && rayon::current_num_threads() > 1 {
-            pairs.par_chunks(PIECE).zip(states.par_chunks_mut(PIECE)).zip(turned).map(walk).sum()
-        } else {
-            pairs.chunks(PIECE).zip(states.chunks_mut(PIECE)).zip(turned).map(walk).sum()
-        };
+        let is_shared = pieces > 2 && has_threads();
+        let all = pairs.chunks(PIECE).zip(states.chunks_mut(PIECE)).zip(turned);
+        let overlaps = share::sum(is_shared, all, walk, |a, b| a + b);
         self.tests = [self.tests[0] + pairs.len() as u64, self.tests[1] + overlaps];
         pieces
     }

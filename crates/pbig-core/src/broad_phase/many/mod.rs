@@ -7,6 +7,7 @@
 use super::fat::still_holds;
 use super::{BroadPhase, flag};
 use crate::cpu::codes::prefetch;
+use crate::share::{self, has_threads};
 use crate::{Aabb, Error, ProxyFilter, shared_from};
 use rayon::prelude::*;
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
@@ -73,7 +74,7 @@ impl BroadPhase {
         of: impl Fn(T) -> Option<(Aabb, ProxyFilter)> + Sync,
     ) -> Result<(), Error> {
         let few = ids.len() < PARALLEL_FROM || ids.len() * LOOKED_THROUGH < self.boxes.len();
-        if few || self.has_begun() || rayon::current_num_threads() == 1 {
+        if few || self.has_begun() || !has_threads() {
             return self.set_each(ids, &fetch, &of);
         }
         let new = self.list(ids);
@@ -111,9 +112,9 @@ impl BroadPhase {
     ) {
         let Self { boxes, flags, filters, rests, config, .. } = self;
         rests.resize_with(boxes.len().div_ceil(RANGE), Rest::default);
-        let boxes = boxes.par_chunks_mut(RANGE).zip(flags.par_chunks_mut(RANGE));
-        let ranges = boxes.zip(filters.par_chunks(RANGE)).zip(rests).enumerate();
-        ranges.for_each(|(i, (((boxes, flags), filters), rest))| {
+        let boxes = boxes.chunks_mut(RANGE).zip(flags.chunks_mut(RANGE));
+        let ranges = boxes.zip(filters.chunks(RANGE)).zip(rests).enumerate();
+        share::for_each(true, ranges, |(i, (((boxes, flags), filters), rest))| {
             let range = Range { first: (i * RANGE) as u32, boxes, flags, filters, margin: config.margin };
             range.set(fetch, of, rest);
         });

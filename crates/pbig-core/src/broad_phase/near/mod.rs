@@ -28,8 +28,8 @@ use crate::diff::Judgement;
 use crate::near::NearPairs;
 use crate::plan::{Chosen, Looks, NearPlan, NoNear, Plan};
 use crate::report::{Checks, lap, stage};
+use crate::share::{self, has_threads};
 use crate::{Aabb, Error, Pair, shared_from};
-use rayon::prelude::*;
 use std::time::Instant;
 
 /// Near pairs that are walked in the time that it takes to look up the pairs of one box.
@@ -174,7 +174,7 @@ impl BroadPhase {
             look((changed, away));
         } else {
             pieces.resize_with(changed.len().div_ceil(PIECE).max(pieces.len()), Vec::new);
-            changed.par_chunks(PIECE).zip(&mut pieces[..]).for_each(look);
+            share::for_each(has_threads(), changed.chunks(PIECE).zip(&mut pieces[..]), look);
             pieces.iter_mut().for_each(|piece| away.append(piece));
         }
         away.iter().for_each(|&id| flags[id as usize] |= flag::AWAY);
