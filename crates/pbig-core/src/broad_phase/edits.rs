@@ -34,8 +34,9 @@ impl BroadPhase {
             self.near.worth.failed |= !pays && self.may_edit();
             return self.search_all();
         }
-        if !self.is_strained() && self.edit_and_walk() {
-            return self.search_changed();
+        let is_shared = self.is_walk_shared();
+        if !self.is_strained() && self.edit_and_walk(is_shared) {
+            return self.search_changed(is_shared);
         }
         let clock = Instant::now();
         let route = self.search_all()?;
@@ -61,9 +62,9 @@ impl BroadPhase {
 
     /// Puts the changed boxes where they are now, and looks for the pairs that they have lost; whether enough of the base's
     /// order is left to search it.
-    fn edit_and_walk(&mut self) -> bool {
+    fn edit_and_walk(&mut self, is_shared: bool) -> bool {
         let mut clock = Instant::now();
-        let (is_shared, walks) = (self.is_walk_shared(), !self.many_changed());
+        let walks = !self.many_changed();
         self.base.map.arrange(&mut self.changed, self.boxes.len());
         let (state, ids, update) = (state!(self), &self.changed, self.updates + 1);
         let State { boxes, before, filters, .. } = state;
@@ -76,17 +77,19 @@ impl BroadPhase {
         self.base.map.out_of_order() * 8 < self.present_count as usize
     }
 
+    /// Whether there will be a walk, and enough to do.
     fn is_walk_shared(&self) -> bool {
-        WALK * self.pairs.listed() + EDIT * self.changed.len() >= SHARED_FROM && has_threads()
+        let walks = !(self.many_changed() || self.pairs.is_linked());
+        walks && WALK * self.pairs.listed() + EDIT * self.changed.len() >= SHARED_FROM && has_threads()
     }
 
     /// Searches the base for the changed boxes.
-    fn search_changed(&mut self) -> Result<Route, Error> {
+    fn search_changed(&mut self, are_awake: bool) -> Result<Route, Error> {
         let mut clock = Instant::now();
         stage!("check");
         let (state, limit) = (OfChanged(state!(self)), self.config.limits.max_pairs);
         let update = Some(self.updates + 1);
-        let others = Others { records: &self.others, filters: &self.filters, update };
+        let others = Others { records: &self.others, filters: &self.filters, update, are_awake };
         self.base.map.check_others(&others, &state, &mut self.found, limit)?;
         self.found.chunks.iter().for_each(|chunk| self.events.added.extend_from_slice(chunk));
         self.report.stages.check += lap(&mut clock);

@@ -38,8 +38,8 @@ const PARALLEL_FROM: u64 = shared_from(300_000) as u64;
 /// Boxes to be looked up in one piece of work.
 const OTHERS: usize = 256;
 
-/// Boxes to be looked up in a map from which the work is shared.
-const OTHERS_PARALLEL_FROM: usize = shared_from(512);
+/// Boxes to be looked up in a map from which the work is shared, with threads that are awake or asleep.
+const OTHERS_SHARED_FROM: [usize; 2] = [shared_from(512), shared_from(2048)];
 
 /// What a box costs, and a check, in ns; checks as many as in the call before.
 const ENTRY: u64 = 15;
@@ -279,7 +279,7 @@ impl<R: Record> Map<R> {
         let piece = |(records, out): (&[R], &mut Vec<Pair>)| {
             self.check_piece(&Others { records, ..*others }, accept, out, &room)
         };
-        let is_shared = records.len() >= OTHERS_PARALLEL_FROM && has_threads();
+        let is_shared = records.len() >= OTHERS_SHARED_FROM[usize::from(!others.are_awake)] && has_threads();
         let each = if is_shared { OTHERS } else { records.len().max(1) };
         let buffers = found.buffers(records.len().div_ceil(each)).iter_mut();
         let counts = share::sum(is_shared, records.chunks(each).zip(buffers), piece, add);
@@ -332,6 +332,8 @@ pub(crate) struct Others<'a, R> {
     pub(crate) update: Option<u64>,
     /// By id.
     pub(crate) filters: &'a [ProxyFilter],
+    /// Whether other threads have just had work.
+    pub(crate) are_awake: bool,
 }
 
 impl<R: Record> Others<'_, R> {

@@ -238,7 +238,11 @@ impl Sort {
         };
         const TOGETHER: usize = PIECE / BUCKET;
         let pieces = (0..buckets).step_by(TOGETHER);
-        share::for_each(threads, pieces, |first| (first..buckets.min(first + TOGETHER)).for_each(&order));
+        share::for_each(threads, pieces, |first| {
+            for bucket in first..buckets.min(first + TOGETHER) {
+                order(bucket);
+            }
+        });
     }
 
     /// Where the boxes of each level are, and how crowded its cells.

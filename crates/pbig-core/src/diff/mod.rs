@@ -101,6 +101,11 @@ impl PairStore {
         self.degree.get(id as usize).copied().unwrap_or(0)
     }
 
+    /// Whether the pairs of a box are found without a walk.
+    pub(crate) fn is_linked(&self) -> bool {
+        self.links.are_there()
+    }
+
     /// All pairs, in no particular order.
     pub(crate) fn iter(&self) -> impl Iterator<Item = Pair> {
         self.pairs.iter().copied().filter(|pair| self.is_there(*pair))

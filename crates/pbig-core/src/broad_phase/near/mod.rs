@@ -200,7 +200,8 @@ impl BroadPhase {
         self.edit_reaches();
         self.report.stages.map += lap(&mut clock);
         let (near, most) = (NearAway(state!(self)), self.most_near());
-        let others = Others { records: &self.others, filters: &self.filters, update: Some(self.updates + 1) };
+        let (records, filters, update) = (&self.others, &self.filters, Some(self.updates + 1));
+        let others = Others { records, filters, update, are_awake: false };
         let found = self.base.map.check_others(&others, &near, &mut self.found, most);
         self.report.stages.check += lap(&mut clock);
         found.is_ok() && self.base.map.out_of_order() * 8 < present
