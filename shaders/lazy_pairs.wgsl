@@ -1,4 +1,4 @@
-// For the study of Avril's lazy way (3.2.2): of n^2 identifiers, those above the diagonal are pairs.
+// For the study of Avril's lazy way (3.2.2): of n^2 - n identifiers, those above the diagonal are pairs.
 
 @group(0) @binding(0) var<uniform> params: Params;
 @group(0) @binding(1) var<storage, read_write> out: array<u32>;
@@ -6,7 +6,7 @@
 // What identifiers below the diagonal give, and on it.
 const NO_BOX: u32 = 0xffffffffu;
 
-// `params.boxes` is n, up to 65,535; `params.cells` the number of identifiers from `params.split` on.
+// `params.boxes` is n, up to 65,536; `params.cells` the number of identifiers from `params.split` on.
 @compute @workgroup_size(LANES)
 fn lazy_pairs(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>,
               @builtin(local_invocation_index) lane: u32) {

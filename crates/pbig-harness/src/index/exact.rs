@@ -1,7 +1,7 @@
 //! Ways that estimate nothing, and so should never be wrong: what becomes of all pairs.
 
 use super::tally::{self, Tally};
-use super::{AsItIs, Correction, correct, discriminant, lazy_pair, pairs_of, root, row_start};
+use super::{AsItIs, Correction, correct, discriminant, lazy_ids, lazy_pair, pairs_of, root, row_start};
 
 /// A way without an estimate.
 pub struct Exact {
@@ -37,14 +37,14 @@ fn wrong_ends(n: i64, row: impl Fn(i64) -> i64) -> u64 {
     (0..n - 1).filter(wrong).count() as u64
 }
 
-/// The first and last of each row of the square, and those about the diagonal.
+/// The first and last of each row of the square but the last, and those about the diagonal.
 fn wrong_identifiers(n: i64, pair: impl Fn(i64) -> Option<(i64, i64)>) -> u64 {
-    let places = (0..n).flat_map(|a| [0, a - 1, a, a + 1, n - 1].map(|b| (a, b.clamp(0, n - 1))));
+    let places = (0..n - 1).flat_map(|a| [0, a - 1, a, a + 1, n - 1].map(|b| (a, b.clamp(0, n - 1))));
     places.filter(|&(a, b)| pair(a * n + b) != (a < b).then_some((a, b))).count() as u64
 }
 
 fn lazily(n: i64) -> Tally {
-    tally::of(n, (0..n * n).filter_map(|id| lazy_pair(id, n)))
+    tally::of(n, (0..lazy_ids(n)).filter_map(|id| lazy_pair(id, n)))
 }
 
 #[cfg(test)]

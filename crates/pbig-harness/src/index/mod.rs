@@ -8,13 +8,15 @@ mod correct;
 mod dense;
 mod exact;
 mod root;
+mod rounded;
 mod search;
 mod tally;
 
-pub use correct::{AsItIs, Correction, Integers, Rules, lazy_pair};
+pub use correct::{AsItIs, Correction, Integers, LAZY, Rules, lazy_ids, lazy_pair};
 pub use exact::{EXACT, Exact};
 pub use root::{AllSingle, CARMACK, Double, LOMONT, Newton, Printed, Root, Single, SingleRoot, WideNewton};
-pub use search::{Counterexample, counterexample, root_errors};
+pub use rounded::{Rounded, Step};
+pub use search::{Counterexample, counterexample, root_differences, root_errors};
 pub use tally::{MOST_EXHAUSTIVE, Sample, Tally, of as tally_of};
 
 use pbig_core::pair_index::pair_count;

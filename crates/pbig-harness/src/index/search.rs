@@ -1,6 +1,6 @@
 //! How far roots are off, and the smallest number of boxes for which the paper's rules are wrong.
 
-use super::{AsItIs, Correction, Root, Rules, SingleRoot, discriminant, row_start};
+use super::{AsItIs, Correction, Root, Rules, Single, SingleRoot, discriminant, row_start};
 
 /// An index for which the rules of Avril 3.3 give a wrong pair.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -46,7 +46,19 @@ fn wrong_by_rules<R: Root>(n: i64, row: i64, k: i64) -> Option<Counterexample> {
     (given != right).then_some(Counterexample { n, k, given, right })
 }
 
-/// For how many whole numbers `1 <= x < below` the root without its fraction is not that of `x` (Avril's table 3).
+/// For how many whole numbers `1 <= x < below` the root without its fraction is not that of the processor's f32 root:
+/// Avril's table 3, where an error is a difference from "the computed square root". Up to 2^24 this is [`root_errors`].
+/// Beyond, `x` is not always an f32; both roots are then of the f32 that it is rounded to.
+pub fn root_differences<R: SingleRoot>(below: u32) -> u64 {
+    let without_fraction = |root: f32| root as i32;
+    let differs = |x: u32| {
+        let x = x as i32 as f32;
+        u32::from(without_fraction(R::root(x)) != without_fraction(Single::root(x)))
+    };
+    (1..below).map(differs).sum::<u32>().into()
+}
+
+/// For how many whole numbers `1 <= x < below` the root without its fraction is not that of `x`, which is exact.
 pub fn root_errors<R: SingleRoot>(below: u32) -> u64 {
     let mut wrong = 0u64;
     let mut root = 1u32;
@@ -89,6 +101,16 @@ mod tests {
             first.map(|found| found.map(|it| (it.n, it.k))),
             [Some((8193, 33_558_526)), Some((5794, 16_782_319))]
         );
+    }
+
+    #[test]
+    fn from_2_to_the_24th_on_the_f32_root_is_not_the_exact_one() {
+        type Two = Newton<CARMACK, 2>;
+        for below in [2, 1000, 1 << 24] {
+            assert_eq!(root_differences::<Two>(below), root_errors::<Two>(below), "below {below}");
+        }
+        assert_eq!(root_differences::<Single>(30_000_000), 0);
+        assert!(root_errors::<Single>(30_000_000) > 0);
     }
 
     #[test]

@@ -4,6 +4,7 @@ mod exact;
 mod kernels;
 mod notes;
 mod paper;
+mod roundings;
 mod rules;
 mod sizes;
 mod times;
@@ -28,6 +29,7 @@ pub(super) fn run(quick: bool) -> Result<Study, Failure> {
         sizes,
         counterexamples: rules::counterexamples(quick),
         table_3: paper::table_3(quick),
+        table_4: paper::table_4(quick),
         every,
         times,
         quick,
@@ -56,6 +58,7 @@ struct Found {
     times: Vec<Times>,
     counterexamples: Vec<rules::Searched>,
     table_3: Table,
+    table_4: Table,
     quick: bool,
 }
 
@@ -68,7 +71,7 @@ impl Found {
             times::table(&self.times),
             paper::table_2(&self.times),
             self.table_3,
-            paper::table_4(self.quick),
+            self.table_4,
         ]
     }
 }

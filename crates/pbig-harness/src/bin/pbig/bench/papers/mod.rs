@@ -10,6 +10,7 @@ mod coverage;
 mod density;
 mod device;
 mod forms;
+mod lazy;
 mod lengths;
 mod lockstep;
 mod mapping;
@@ -105,7 +106,7 @@ const PARTS: [(&str, Part); 8] = [
     ("PBIG tables IV to VI", switches::on_gpu),
     ("PBIG table IV on the CPU", |scale, _| Ok(vec![switches::on_cpu(scale)?])),
     ("Avril tables 1, 2, 4 and 5", |scale, device| {
-        let mapping = [mapping::lazy(scale)?, mapping::roots(device)?, mapping::in_cells(device)?];
+        let mapping = [lazy::table(scale)?, mapping::roots(device)?, mapping::in_cells(device)?];
         let output = [avril::bytes(), forms::on_cpu()?, forms::on_device(device)?];
         Ok([matrix::table(device)?].into_iter().chain(mapping).chain(output).collect())
     }),

@@ -1,19 +1,18 @@
-//! The lazy way as a kernel: of n^2 identifiers, about half are pairs (Avril 3.2.2).
+//! The lazy way as a kernel: of n^2 - n identifiers, half are pairs (Avril 3.2.2).
 
 use super::{Estimates, Indices, parts, run_kernel, timed_run};
 use crate::output::Failure;
 use pbig_core::GpuOptions;
 use pbig_core::gpu::study::Bench;
-use pbig_harness::index::{Tally, lazy_pair, tally_of};
+use pbig_harness::index::{LAZY, Tally, lazy_ids, lazy_pair, tally_of};
 
 /// The most boxes for which identifiers have 32 bits.
-pub(super) const MOST_BOXES: u32 = (1 << 16) - 1;
+pub(super) const MOST_BOXES: u32 = 1 << 16;
 
 /// What comes of identifiers, all or some as of indices; a wrong one is a failed check.
 pub(super) fn estimates(bench: &Bench, n: u32, software: bool) -> Result<Estimates, Failure> {
     let (mut pairs, mut ms) = (Vec::new(), 0.0);
-    let all = u64::from(n) * u64::from(n);
-    for identifiers in parts(n, all) {
+    for identifiers in parts(n, lazy_ids(n.into()) as u64) {
         let run = |cells| {
             run_kernel(bench, &pbig_shaders::LAZY_PAIRS, &GpuOptions::DEFAULT, &identifiers, cells, 2)
         };
@@ -49,10 +48,10 @@ fn given(&Indices { n, first, .. }: &Indices, words: &[u32]) -> Result<Vec<(i64,
 
 pub(super) fn note() -> String {
     format!(
-        "The lazy way as a kernel looks at n^2 identifiers where the others look at all indices, beyond at as many as they \
-         do; rows count the pairs among them, and their ns are for each of these. It estimates \
-         nothing, so that the paper's rules have nothing to mend, and ends at {MOST_BOXES} boxes, beyond which n^2 is \
-         2^32 or more. A run in which an identifier gives anything but its pair fails."
+        "The lazy way as a kernel. {LAZY} Up to as many boxes as have all indices looked at, all its identifiers are looked \
+         at; beyond, as many as the other kernels look at indices. The column of indices has the pairs among them. It \
+         estimates nothing, so the paper's rules have nothing to mend. It ends at {MOST_BOXES} boxes, beyond which n^2 - n \
+         is 2^32 or more. A run fails if an identifier gives anything but its pair."
     )
 }
 
@@ -68,6 +67,12 @@ mod tests {
         words[6..].copy_from_slice(&[1, 0]);
         let failure = given(&identifiers, &words).expect_err("below the diagonal").to_string();
         assert!(failure.contains("identifier 3 of 3 boxes"), "{failure}");
+    }
+
+    #[test]
+    fn with_one_box_more_identifiers_would_not_have_32_bits() {
+        let most = i64::from(MOST_BOXES);
+        assert!(lazy_ids(most) < 1 << 32 && lazy_ids(most + 1) >= 1 << 32);
     }
 
     #[test]
