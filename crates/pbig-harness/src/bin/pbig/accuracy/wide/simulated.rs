@@ -1,4 +1,5 @@
-//! Worlds that move: simulated by rapier3d-f64, whose poses are the truth in each step, and by rapier in f32 beside it. What is
+//! Worlds that move: simulated by rapier3d-f64, whose poses are the truth in each step, and by rapier in f32 beside it, once
+//! with our broad phase and once, as the control, with rapier's. What is
 //! promised of boxes must hold here, too; sums over worlds are without these, which are hundreds of frames of one.
 
 use super::super::study::{Cell, Table, plain};
@@ -9,7 +10,7 @@ use pbig_harness::scenes::Scene;
 use pbig_harness::wide::{Differences, Layout, Pose, WideWorld, moved, to_f64};
 use pbig_harness::world::World;
 use rapier_pbig::PbigBroadPhase;
-use rapier3d::prelude::Collider;
+use rapier3d::prelude::{BroadPhase, Collider, DefaultBroadPhase};
 
 /// What moves.
 #[derive(Clone, Copy)]
@@ -32,11 +33,18 @@ pub(super) struct Simulated {
     /// All steps together: what boxes in f32 make of the world in f64, held in f32.
     pub(super) row: Row,
     steps: usize,
-    /// All steps together: pairs of the world that rapier simulates in f32, against those of the one in f64.
-    own: Differences,
+    /// The world in f32 with our broad phase, and with rapier's.
+    own: [Own; 2],
+}
+
+/// What has become of a world that rapier simulates in f32.
+#[derive(Clone, Copy, Debug, Default)]
+struct Own {
+    /// All steps together: its pairs against those of the one in f64.
+    pairs: Differences,
     /// In the last step, between the places of a body in the two, on average.
     apart: f64,
-    /// Colliders of the world in f32 that are nowhere in the end.
+    /// Colliders that are nowhere in the end.
     lost: usize,
 }
 
@@ -51,18 +59,19 @@ pub(super) fn simulated(offsets: &[f64], quick: bool) -> Result<Vec<Simulated>, 
 
 impl Simulated {
     fn run(Scenery { scene, name, bodies, steps }: Scenery, offset: f64) -> Result<Self, Failure> {
-        let world = Scene::named(scene).map_err(Failure::Input)?.build(bodies, 1);
+        let world = built((scene, bodies))?;
         let layout = Layout::of_world(&world);
         let mut wide = WideWorld::of(&world, [offset; 3]).map_err(Failure::Input)?;
-        let mut narrow = Narrow::new(moved(world, [offset; 3]));
+        let mut narrow = [
+            Narrow::of((scene, bodies), offset, Box::new(PbigBroadPhase::new()))?,
+            Narrow::of((scene, bodies), offset, Box::new(DefaultBroadPhase::new()))?,
+        ];
         let mut sum: Option<Row> = None;
-        let mut own = Differences::default();
         for _ in 0..steps {
             wide.step();
-            narrow.step();
             let place = Place::at(&layout, wide.poses());
             let now = Row::of(name, 1.0, (offset, Along::Diagonal), &place)?;
-            own += place.world.differences(&narrow.pairs()?, place.reach());
+            narrow.iter_mut().try_for_each(|one| one.step(&place))?;
             sum = Some(sum.map_or_else(|| now.clone(), |sum| sum.and(&now)));
         }
         let row = sum.ok_or_else(|| Failure::Input("no steps".into()))?;
@@ -70,27 +79,38 @@ impl Simulated {
         if ends.iter().any(|pose| !pose.translation.vector.norm().is_finite()) {
             return Err(Failure::Check(format!("{name}, {offset} away: a body is nowhere in f64")));
         }
-        let distances = narrow.distances(&ends);
-        let (there, lost) =
-            (distances.iter().filter(|d| d.is_finite()), distances.iter().filter(|d| !d.is_finite()));
-        let apart = there.clone().sum::<f64>() / there.count().max(1) as f64;
-        Ok(Self { row, steps, own, apart, lost: lost.count() })
+        Ok(Self { row, steps, own: narrow.map(|one| one.at_the_end(&ends)) })
     }
 }
 
 /// The world as rapier simulates it in f32.
 struct Narrow {
     world: World,
-    broad_phase: PbigBroadPhase,
+    broad_phase: Box<dyn BroadPhase>,
+    own: Own,
+}
+
+fn built((scene, bodies): (&str, usize)) -> Result<World, Failure> {
+    Ok(Scene::named(scene).map_err(Failure::Input)?.build(bodies, 1))
 }
 
 impl Narrow {
-    fn new(world: World) -> Self {
-        Self { world, broad_phase: PbigBroadPhase::new() }
+    fn of(scene: (&str, usize), offset: f64, broad_phase: Box<dyn BroadPhase>) -> Result<Self, Failure> {
+        Ok(Self { world: moved(built(scene)?, [offset; 3]), broad_phase, own: Own::default() })
     }
 
-    fn step(&mut self) {
-        self.world.step(&mut self.broad_phase);
+    /// One step, after which the world in f64 is so.
+    fn step(&mut self, truth: &Place) -> Result<(), Failure> {
+        self.world.step(&mut *self.broad_phase);
+        self.own.pairs += truth.world.differences(&self.pairs()?, truth.reach());
+        Ok(())
+    }
+
+    fn at_the_end(&self, truth: &[Pose]) -> Own {
+        let distances = self.distances(truth);
+        let there = || distances.iter().filter(|distance| distance.is_finite());
+        let apart = there().sum::<f64>() / there().count().max(1) as f64;
+        Own { apart, lost: distances.len() - there().count(), ..self.own }
     }
 
     /// All but the ground.
@@ -130,6 +150,10 @@ pub(super) fn table(all: &[Simulated]) -> Table {
         "added_by_the_simulation_in_f32_percent",
         "apart_at_the_end",
         "lost_in_f32",
+        "missed_with_stock_in_f32_percent",
+        "added_with_stock_in_f32_percent",
+        "apart_with_stock",
+        "lost_with_stock",
     ];
     let mut table = Table::new("simulated", title, &columns);
     all.iter().for_each(|one| table.row(one.cells()));
@@ -142,9 +166,16 @@ impl Simulated {
         let (boxes, all) = (row.by_boxes(Way::Ulps(0)), row.in_all(Way::Ulps(0)));
         let head = [row.world.into(), row.offset.into(), (self.steps as u64).into(), row.pairs.into()];
         let counts = [boxes.missed, boxes.missed_deep, all.missed, all.added, row.in_all(IN_WORLD).missed];
-        let percents = [own.missed, own.added].map(|count| Cell::from(self.percent(count)));
-        let end = [self.apart.into(), (self.lost as u64).into()];
-        head.into_iter().chain(counts.map(Cell::from)).chain(percents).chain(end).collect()
+        let of_own = |own: &Own| {
+            let percents = [own.pairs.missed, own.pairs.added].map(|count| Cell::from(self.percent(count)));
+            percents.into_iter().chain([own.apart.into(), (own.lost as u64).into()])
+        };
+        head.into_iter().chain(counts.map(Cell::from)).chain(own.iter().flat_map(of_own)).collect()
+    }
+
+    /// Pairs in f32 that are missed or too many, of those in f64, in percent: with our broad phase, and with rapier's.
+    fn wrong(&self) -> [f64; 2] {
+        self.own.map(|own| self.percent(own.pairs.missed + own.pairs.added))
     }
 
     fn percent(&self, count: u64) -> f64 {
@@ -158,10 +189,11 @@ pub(super) fn notes(all: &[Simulated]) -> Vec<String> {
     names.dedup();
     let about = "*Simulated in f64*: rapier3d-f64 steps the same bodies at the same place; in each step its poses, rounded \
                  as rapier holds them in f32, are a layout like the others: boxes widened by 3 ulps miss none of its \
-                 pairs, or the run fails. Beside it rapier simulates the world in f32, with our broad phase where the \
-                 other has rapier's: its pairs differ from those in f64, step by step, by all that rounding does to \
-                 bodies on their way, too; at the origin, where rounding is least, by what two simulations differ \
-                 anyway."
+                 pairs, or the run fails. Beside it rapier simulates the world in f32, with our broad phase: its pairs differ \
+                 from those in f64, step by step, by all that rounding does to bodies on their way, too; at the origin, \
+                 where rounding is least, by what two simulations differ anyway. The control is a third world, in f32 with \
+                 rapier's own broad phase (stock): what it differs from f64 is what f32 brings, and only what ours \
+                 differs beyond that could be of our broad phase."
         .to_owned();
     [about].into_iter().chain(names.into_iter().map(|name| where_it_starts(name, all))).collect()
 }
@@ -171,17 +203,42 @@ const MOST_APART: f64 = 20.0;
 
 /// From which offset on the simulation in f32 is further from f64 than at the origin.
 fn where_it_starts(name: &str, all: &[Simulated]) -> String {
-    let wrong = |one: &Simulated| one.percent(one.own.missed + one.own.added);
+    let wrong = |one: &Simulated| one.wrong()[0];
     let of_name = || all.iter().filter(|one| one.row.world == name);
-    let told = of_name().map(|one| format!("{}% at {}", plain(wrong(one)), one.row.offset));
-    let told = told.collect::<Vec<_>>().join(", ");
+    let each = |one: &Simulated| {
+        let [ours, stock] = one.wrong().map(plain);
+        format!("{ours}% at {} (stock {stock}%)", one.row.offset)
+    };
+    let told = of_name().map(each).collect::<Vec<_>>().join(", ");
     let near = of_name().map(wrong).next().unwrap_or(0.0);
     let first = of_name().find(|one| wrong(one) > 2.0 * near).map(|one| one.row.offset);
     let first = first.map_or("nowhere".into(), |offset| format!("from {offset:e} on"));
     let but = if near > MOST_APART { ", so many that a smaller one may not show" } else { "" };
     format!(
         "{name}: pairs of the simulation in f32 that are missed or too many, of those in f64: {told}; more than twice \
-         as many as at the origin {first}{but}."
+         as many as at the origin {first}{but}. {}",
+        against_stock(of_name())
+    )
+}
+
+/// How far our world in f32 is from f64, over how far stock's is.
+fn against_stock<'a>(all: impl Iterator<Item = &'a Simulated>) -> String {
+    let ratios = |one: &Simulated| {
+        let [ours, stock] = one.wrong();
+        [ours / stock, one.own[0].apart / one.own[1].apart]
+    };
+    let all: Vec<[f64; 2]> = all.map(ratios).collect();
+    let range = |k: usize| {
+        let each = || all.iter().map(|ratios| ratios[k]).filter(|ratio| ratio.is_finite());
+        match each().min_by(f64::total_cmp).zip(each().max_by(f64::total_cmp)) {
+            Some((least, most)) => format!("{least:.2} to {most:.2} times"),
+            None => "no number of times (the control has none)".to_owned(),
+        }
+    };
+    format!(
+        "Ours has {} as many wrong pairs as the control, and its bodies end {} as far from those in f64.",
+        range(0),
+        range(1)
     )
 }
 
@@ -194,16 +251,23 @@ mod tests {
         let all = simulated(&[0.0, 1e6], true).expect("no failure");
         let [near, far] = &all[..] else { panic!("one scene at two places") };
         assert!(near.row.pairs > 1000 && near.row.pairs.abs_diff(far.row.pairs) < near.row.pairs / 5);
-        assert!(near.percent(near.own.missed + near.own.added) < 10.0, "{:?}", near.own);
-        assert!(far.percent(far.own.missed) > 10.0 && far.apart > near.apart, "{:?}", far.own);
+        for (near, far, own) in (0..2).map(|k| (near.wrong()[k], far.wrong()[k], [near.own[k], far.own[k]])) {
+            assert!(near < 10.0 && far > 10.0 && own[1].apart > own[0].apart, "{own:?}");
+        }
         assert!(far.row.poses.missed > 0 && far.row.in_all(IN_WORLD).missed == 0);
         let told = where_it_starts(near.row.world, &all);
-        assert!(told.ends_with("from 1e6 on."), "{told}");
+        assert!(told.contains("from 1e6 on. Ours has "), "{told}");
         assert_eq!(table(&all).rows.len(), 2);
         let mut all = all;
-        all.iter_mut().for_each(|one| one.own.missed = one.row.pairs);
+        for one in &mut all {
+            one.own[0].pairs = Differences { missed: one.row.pairs, added: 0, ..one.own[0].pairs };
+            one.own[1].pairs = Differences { missed: one.row.pairs / 2, added: 0, ..one.own[1].pairs };
+            (one.own[0].apart, one.own[1].apart) = (1.0, 4.0);
+        }
         let told = where_it_starts("column, simulated in f64", &all);
-        assert!(told.ends_with("at the origin nowhere, so many that a smaller one may not show."), "{told}");
+        assert!(told.contains("at the origin nowhere, so many that a smaller one may not show."), "{told}");
+        assert!(told.contains("100.0% at 0 (stock 50.00%)"), "{told}");
+        assert!(told.ends_with("and its bodies end 0.25 to 0.25 times as far from those in f64."), "{told}");
     }
 
     #[test]
