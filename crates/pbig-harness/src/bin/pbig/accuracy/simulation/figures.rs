@@ -1,6 +1,6 @@
 //! One run in figures, and how far two runs are from each other in each.
 
-use super::sides::Side;
+use super::sides::{Moving, Side};
 use crate::output::Failure;
 use pbig_harness::mechanics::Mechanics;
 use pbig_harness::numbered::Apart;
@@ -9,7 +9,7 @@ use pbig_harness::runner::Spread;
 
 /// Joules a kilogram below which a world counts as at rest: 4.5 cm/s on average, a tenth of the speed at which rapier
 /// lets a body fall asleep.
-const REST: f64 = 1e-3;
+pub(super) const REST: f64 = 1e-3;
 
 /// One way through one scene.
 #[derive(Clone, Debug)]
@@ -33,6 +33,8 @@ pub(super) struct Figures {
     pub(super) rest: Option<usize>,
     /// How many there were.
     pub(super) steps: usize,
+    /// At the end.
+    pub(super) moving: Moving,
     /// From the bodies of the first way, at the end.
     pub(super) apart: Apart,
     /// The first step after which a body is elsewhere than with the first way.
@@ -67,6 +69,7 @@ impl Figures {
             momentum: is_isolated.then(|| momentum_drift(&all)),
             rest: rest(&all),
             steps: all.len(),
+            moving: side.moving(REST),
             apart: side.samples.last().map(|sample| sample.apart).unwrap_or_default(),
             differs: moved.map(|step| step + 1),
             ms: Spread::of(side.ms.iter().copied()).median,
@@ -169,6 +172,8 @@ pub(super) struct Multiple {
     pub(super) times: Option<f64>,
     /// The run's, the first one's, and that of the yardstick that is farthest from the first.
     pub(super) values: [f64; 3],
+    /// How many of the yardsticks are nearer to the first than the run, by more than the resolution.
+    pub(super) nearer: usize,
 }
 
 /// None where the quantity has no meaning for one of them.
@@ -181,12 +186,14 @@ pub(super) fn multiple(
     let [here, there] = [of(run)?, of(first)?];
     let values = yardsticks.iter().map(|figures| of(figures)).collect::<Option<Vec<_>>>()?;
     let from_there = |value: f64| (value - there).abs();
+    let is_nearer = |value: &&f64| from_there(here) > from_there(**value).max(resolution);
+    let nearer = values.iter().filter(is_nearer).count();
     let farthest =
         values.into_iter().max_by(|a, b| from_there(*a).total_cmp(&from_there(*b))).unwrap_or(there);
     let (far, reach) = (from_there(here), from_there(farthest).max(resolution));
     let times = if far == 0.0 { 0.0 } else { far / reach };
     let is_there = came(run) || came(first);
-    Some(Multiple { times: is_there.then_some(times), values: [here, there, farthest] })
+    Some(Multiple { times: is_there.then_some(times), values: [here, there, farthest], nearer })
 }
 
 #[cfg(test)]
@@ -206,6 +213,7 @@ pub(super) mod tests {
             momentum: None,
             rest: None,
             steps: 100,
+            moving: Moving::default(),
             apart: Apart::default(),
             differs: None,
             ms: 1.0,
@@ -250,6 +258,8 @@ pub(super) mod tests {
         assert_eq!(found(130.0).values, [130.0, 100.0, 110.0]);
         let times = |run| found(run).times;
         assert_eq!((times(130.0), times(95.0), times(100.0)), (Some(3.0), Some(0.5), Some(0.0)));
+        let nearer = [130.0, 95.0, 101.0].map(|run| found(run).nearer);
+        assert_eq!(nearer, [2, 1, 0], "than 10 and 2");
         let at_once = multiple(&with(101.0), &first, &[&first], QUANTITIES[0]);
         assert_eq!(at_once.and_then(|it| it.times), Some(f64::INFINITY));
         assert_eq!(multiple(&far, &first, &[&near], QUANTITIES[6]), None);
@@ -260,6 +270,8 @@ pub(super) mod tests {
         let at = |step| Figures { rest: Some(step), ..nothing() };
         let times = |step| multiple(&at(step), &at(20), &[&at(20)], QUANTITIES[7]).and_then(|it| it.times);
         assert_eq!((times(20), times(21), times(25)), (Some(0.0), Some(1.0), Some(5.0)));
+        let nearer = |step| multiple(&at(step), &at(20), &[&at(20)], QUANTITIES[7]).map(|it| it.nearer);
+        assert_eq!((nearer(21), nearer(22)), (Some(0), Some(1)));
         let never = multiple(&nothing(), &at(91), &[&at(91)], QUANTITIES[7]).and_then(|it| it.times);
         assert_eq!(never, Some(10.0), "of 100 steps");
     }

@@ -39,17 +39,25 @@ const fn again(name: &'static str, way: Way) -> Way {
 const STOCK: Way = stock("stock", None);
 const PBIG: Way = pbig("pbig", PbigBroadPhase::CONFIG.margin);
 
+/// So many orders of insertion beside the scene's: a run that is one more of them is farther than all these once in 20 times.
+pub(super) const PERMUTED: usize = 19;
+
 /// All ways, what the others are held against first.
-pub(super) const WAYS: [Way; 8] = [
-    STOCK,
-    again("stock again", STOCK),
-    stock("stock permuted 1", Some(1)),
-    stock("stock permuted 2", Some(2)),
-    stock("stock permuted 3", Some(3)),
-    PBIG,
-    again("pbig again", PBIG),
-    pbig("pbig without margin", 0.0),
-];
+pub(super) static WAYS: [Way; PERMUTED + 5] = ways();
+
+const fn ways() -> [Way; PERMUTED + 5] {
+    let mut ways = [STOCK; PERMUTED + 5];
+    ways[1] = again("stock again", STOCK);
+    let mut order = 1;
+    while order <= PERMUTED {
+        ways[1 + order] = stock("stock permuted", Some(order as u64));
+        order += 1;
+    }
+    ways[PERMUTED + 2] = PBIG;
+    ways[PERMUTED + 3] = again("pbig again", PBIG);
+    ways[PERMUTED + 4] = pbig("pbig without margin", 0.0);
+    ways
+}
 
 impl Way {
     pub(super) fn is_pbig(&self) -> bool {
@@ -177,6 +185,43 @@ impl Side {
     }
 }
 
+/// Bodies that keep a world from coming to rest.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct Moving {
+    /// Dynamic ones.
+    pub(super) bodies: usize,
+    /// Those with more than a kinetic energy for each kilogram.
+    pub(super) moving: usize,
+    /// Of these, those with a shape that rolls.
+    pub(super) round: usize,
+}
+
+impl Side {
+    /// At the end, by the limit for a world at rest.
+    pub(super) fn moving(&self, rest: f64) -> Moving {
+        let world = &self.numbered.world;
+        let mut found = Moving::default();
+        for (_, body) in world.bodies.iter().filter(|(_, body)| body.is_dynamic()) {
+            let is_moving = f64::from(body.kinetic_energy()) > rest * f64::from(body.mass());
+            let is_round = body.colliders().iter().any(|&one| rolls(world.colliders[one].shape()));
+            found.bodies += 1;
+            found.moving += usize::from(is_moving);
+            found.round += usize::from(is_moving && is_round);
+        }
+        found
+    }
+}
+
+/// Rapier has no rolling friction.
+fn rolls(shape: &dyn Shape) -> bool {
+    use ShapeType::{Ball, Capsule, Cone, Cylinder};
+    let is_round = |shape: &dyn Shape| matches!(shape.shape_type(), Ball | Capsule | Cone | Cylinder);
+    match shape.as_compound() {
+        Some(compound) => compound.shapes().iter().any(|(_, part)| is_round(&**part)),
+        None => is_round(shape),
+    }
+}
+
 /// Each way that was run twice: its name, and the first step after which the two differ.
 pub(super) fn repeats(sides: &[Side]) -> Vec<(&'static str, Option<usize>)> {
     let repeat = |two: &[Side]| {
@@ -215,6 +260,22 @@ mod tests {
         world.step(&mut DefaultBroadPhase::new());
         let found = Mechanics::of(&world);
         assert!(found.momentum[0] > 0.1 * found.mass && found.potential == 0.0, "{found:?}");
+    }
+
+    #[test]
+    fn orders_are_all_different_and_every_way_is_of_one_kind() {
+        let orders: Vec<u64> = WAYS.iter().filter_map(|way| way.order).collect();
+        assert_eq!(orders, (1..=PERMUTED as u64).collect::<Vec<_>>());
+        assert_eq!(WAYS.iter().filter(|way| way.is_again).count(), 2);
+        assert_eq!(WAYS.iter().filter(|way| way.is_held_against_stock()).count(), 2);
+    }
+
+    #[test]
+    fn what_moves_at_the_end_is_counted_and_what_of_it_rolls() {
+        let sides = simulated(case(CLOUD, 60, 2)).expect("a scene");
+        let found = sides[0].moving(1e-3);
+        assert_eq!(found, Moving { bodies: 60, moving: 60, round: 30 });
+        assert_eq!(sides[0].moving(1e9).moving, 0);
     }
 
     #[test]

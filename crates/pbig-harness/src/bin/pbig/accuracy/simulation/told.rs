@@ -1,0 +1,254 @@
+//! What whole runs show, in words.
+
+use super::super::study::plain;
+use super::Ways;
+use super::figures::{DISTANCE, Figures, Multiple, multiple};
+use super::sides::{Moving, PERMUTED, WAYS};
+
+/// Everything farther than so many times the yardstick is listed.
+const FAR: f64 = 3.0;
+
+pub(super) fn notes(scenes: &[Ways]) -> Vec<String> {
+    let runs = || scenes.iter().flat_map(|ways| ways.pbig());
+    let (compared, needed) =
+        runs().fold((0, 0), |(steps, pairs), run| (steps + run.compared, pairs + run.reported.needed));
+    let mut notes = vec![
+        format!(
+            "Each scene with rapier's own broad phase (stock), with pbig's, with pbig's without a margin, and {PERMUTED} \
+             times with stock and the bodies inserted in another order. These are the control: as far as they are from \
+             stock, a run says nothing about who found the pairs. What f32 itself does to a world is in the study before \
+             this one, where the same world in f64 is the truth. All in turn, step by step. Contacts and points are \
+             means over the second half of the run; penetration and momentum are of the whole run, energy is in % of that \
+             after the first step. At rest: less than 1 mJ for each kg from there to the end; \"not within\" so many steps: \
+             not in this run. The cloud has no gravity, no ground and no sleep: what it loses of momentum is error. In the \
+             chart stock at 0 is the run that all are held against; the others of that colour are those again and permuted."
+        ),
+        format!(
+            "Pairs that overlap and that pbig does not report: none of {needed}, in {compared} steps (brute force)."
+        ),
+    ];
+    notes.extend(WAYS.iter().filter_map(|way| again(scenes, way.name)));
+    notes.extend(scenes.iter().map(first_difference));
+    notes.extend([rests(scenes), typical(scenes), beyond(scenes), how_far(scenes)]);
+    notes
+}
+
+/// Which scenes come to rest, and what moves at the end in those that do not.
+fn rests(scenes: &[Ways]) -> String {
+    let of = |ways: &Ways| {
+        let Figures { rest, steps, moving: Moving { bodies, moving, round }, .. } = ways.first();
+        match rest {
+            Some(step) => format!("{} from step {step} on", ways.scene),
+            None => format!(
+                "{} not within {steps} steps: at the end {moving} of {bodies} bodies have more than 1 mJ for each kg, {round} \
+                 of these with a shape that rolls",
+                ways.scene
+            ),
+        }
+    };
+    format!(
+        "At rest, with stock: {}. Rapier has no rolling friction: a ball on level ground rolls on, and a world with one is at \
+         rest only when it has hit what stops it. In the cloud nothing stops bodies but other bodies.",
+        scenes.iter().map(of).collect::<Vec<_>>().join("; ")
+    )
+}
+
+/// In how many quantities pbig is farther from stock than every permuted run, and in how many chance would have it.
+fn beyond(scenes: &[Ways]) -> String {
+    let of = |name: &'static str| {
+        let counted = scenes.iter().flat_map(|ways| {
+            let run = ways.pbig().find(|run| run.way == name);
+            let told = run.into_iter().flat_map(|run| ways.multiples(run));
+            told.filter_map(|(_, found)| found.times.map(|_| found.nearer == ways.yardsticks().len()))
+        });
+        let all: Vec<bool> = counted.collect();
+        let farther = all.iter().filter(|is_farther| **is_farther).count();
+        let by_chance = all.len() as f64 / (PERMUTED + 1) as f64;
+        format!("{farther} of {} with {name}, {by_chance:.1} by chance", all.len())
+    };
+    let ways = WAYS.iter().filter(|way| way.is_held_against_stock());
+    format!(
+        "If pbig were one more order of insertion, it would be farther from stock than all {PERMUTED} others in one quantity of \
+         {}. It is in {}. Quantities of one scene are not independent. The last table has the percent of permuted runs that \
+         are nearer.",
+        PERMUTED + 1,
+        ways.map(|way| of(way.name)).collect::<Vec<_>>().join("; in ")
+    )
+}
+
+/// Mean distances at the end as multiples of the farthest permuted run's: geometric means over the scenes in which
+/// bodies move apart.
+fn typical(scenes: &[Ways]) -> String {
+    let of = |name: &'static str| {
+        let run = |ways: &Ways| {
+            let run = ways.runs.iter().find(|run| run.way == name)?;
+            multiple(run, ways.first(), &ways.yardsticks(), DISTANCE)?.times
+        };
+        let logs: Vec<f64> =
+            scenes.iter().filter_map(run).map(f64::ln).filter(|log| log.is_finite()).collect();
+        let mean = (logs.iter().sum::<f64>() / logs.len().max(1) as f64).exp();
+        format!("{mean:.2} times with {name}")
+    };
+    let ways = WAYS.iter().filter(|way| way.is_held_against_stock());
+    let all: Vec<String> = ways.map(|way| of(way.name)).collect();
+    format!(
+        "At the end bodies are as far from stock's as those of the farthest permuted run (geometric means over \
+         scenes): {}.",
+        all.join(", ")
+    )
+}
+
+/// Whether the same run is the same, of a way that was run twice.
+fn again(scenes: &[Ways], way: &str) -> Option<String> {
+    let mut others = Vec::new();
+    for Ways { scene, repeats, .. } in scenes {
+        let (_, differs) = repeats.iter().find(|(name, _)| *name == way)?;
+        others.extend(differs.map(|step| format!("{scene} from step {step}")));
+    }
+    if others.is_empty() {
+        return Some(format!("Two runs with {way} are the same, to the bit of every pose, in every scene."));
+    }
+    Some(format!("Two runs with {way} differ ({}).", others.join(", ")))
+}
+
+fn first_difference(ways: &Ways) -> String {
+    let yardsticks = ways.yardsticks();
+    let permuted = yardsticks.iter().filter_map(|run| run.differs).min();
+    let told = |name: &str, differs: Option<usize>| match differs {
+        None => format!("{name} gives stock's positions to the bit, to the end"),
+        Some(step) => format!("{name} differs from stock from step {step}"),
+    };
+    let pbig = ways.pbig().map(|run| told(run.way, run.differs));
+    let all: Vec<String> = [told("a permuted stock", permuted)].into_iter().chain(pbig).collect();
+    format!("{}: {}.", ways.scene, all.join("; "))
+}
+
+/// Every quantity in which pbig is farther from stock than permuted runs by more than [`FAR`], or the worst one.
+fn how_far(scenes: &[Ways]) -> String {
+    let mut all: Vec<(f64, String)> = Vec::new();
+    for ways in scenes {
+        for run in ways.pbig() {
+            let told = |(quantity, found): (&str, Multiple)| {
+                Some((found.times?, told(ways.scene, run.way, quantity, &found)))
+            };
+            all.extend(ways.multiples(run).filter_map(told));
+        }
+    }
+    all.sort_by(|a, b| b.0.total_cmp(&a.0));
+    let (count, far) = (all.len(), all.iter().take_while(|one| one.0 > FAR));
+    let far: Vec<&str> = far.map(|one| one.1.as_str()).collect();
+    if far.is_empty() {
+        let worst = all.first().map_or("nothing", |one| one.1.as_str());
+        return format!(
+            "In no quantity is pbig more than {FAR} times as far from stock as a stock with another order is: at \
+             most {worst}."
+        );
+    }
+    format!(
+        "All in which pbig is more than {FAR} times as far from stock as the farthest of the stock runs with \
+         another order, {} of {count} quantities: {}.",
+        far.len(),
+        far.join("; ")
+    )
+}
+
+fn told(scene: &str, way: &str, quantity: &str, Multiple { times, values, nearer }: &Multiple) -> String {
+    let [here, stock, permuted] = values.map(plain);
+    let times = match times {
+        Some(times) if times.is_finite() => format!("{times:.2} times"),
+        _ => "no permuted run differs".into(),
+    };
+    format!(
+        "{quantity} of {scene} with {way}, {here} where stock has {stock} and a permuted one {permuted} ({times}, {nearer} \
+         of the permuted ones nearer)"
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::figures::tests::nothing;
+    use super::super::sides;
+    use super::*;
+
+    /// Stock and one permuted run with 100 and 110 contacts, pbig with these.
+    fn made(pbig: f64) -> Vec<Ways> {
+        let contacts = |way: &sides::Way| match (way.is_pbig(), way.is_permuted()) {
+            (true, _) => pbig,
+            (_, true) => 110.0,
+            _ => 100.0,
+        };
+        let run = |way| Figures { contacts: contacts(way), way: way.name, ..nothing() };
+        let repeats = vec![("stock", None), ("pbig", None)];
+        vec![Ways { scene: "column", runs: WAYS.iter().map(run).collect(), instants: vec![], repeats }]
+    }
+
+    #[test]
+    fn what_is_far_is_named_and_else_the_worst() {
+        let near = how_far(&made(130.0));
+        let worst = "with pbig, 130.0 where stock has 100.0 and a permuted one 110.0 (3.00 times, ";
+        assert!(near.contains("at most contacts of column") && near.contains(worst), "{near}");
+        // Just beyond: pbig and pbig without a margin, in contacts and nothing else of eight quantities each.
+        let far = how_far(&made(131.0));
+        assert!(far.starts_with("All in which pbig is more than 3 times"), "{far}");
+        assert!(
+            far.contains(", 2 of 16 quantities") && far.matches("(3.10 times, 19 of").count() == 2,
+            "{far}"
+        );
+    }
+
+    #[test]
+    fn distances_at_the_end_are_told_as_multiples_of_the_farthest_permuted() {
+        let with = |scene: &'static str, pbig: f64| {
+            let mut ways = made(100.0).remove(0);
+            ways.scene = scene;
+            for (way, run) in WAYS.iter().zip(&mut ways.runs) {
+                run.apart.mean = if way.is_pbig() { pbig } else { f64::from(u8::from(way.is_permuted())) };
+            }
+            ways
+        };
+        let told = typical(&[with("near", 0.5), with("far", 8.0), with("same", 0.0)]);
+        assert!(told.ends_with(": 2.00 times with pbig, 2.00 times with pbig without margin."), "{told}");
+    }
+
+    #[test]
+    fn a_run_beyond_all_permuted_ones_is_counted() {
+        let told = beyond(&made(105.0));
+        assert!(
+            told.contains("It is in 0 of 8 with pbig, 0.4 by chance; in 0 of 8 with pbig without"),
+            "{told}"
+        );
+        let told = beyond(&made(111.0));
+        assert!(
+            told.contains("It is in 1 of 8 with pbig, 0.4 by chance; in 1 of 8 with pbig without"),
+            "{told}"
+        );
+    }
+
+    #[test]
+    fn what_keeps_a_scene_from_rest_is_told() {
+        let mut scenes = made(100.0);
+        scenes[0].runs[0].moving = Moving { bodies: 9, moving: 4, round: 3 };
+        let told = rests(&scenes);
+        assert!(told.contains("column not within 100 steps: at the end 4 of 9 bodies have more"), "{told}");
+        assert!(told.contains("3 of these with a shape that rolls"), "{told}");
+        scenes[0].runs[0].rest = Some(7);
+        assert!(rests(&scenes).contains("column from step 7 on"), "{}", rests(&scenes));
+    }
+
+    #[test]
+    fn runs_that_do_not_differ_are_said_to_be_the_same() {
+        let mut scenes = made(100.0);
+        let told = again(&scenes, "pbig").unwrap_or_default();
+        assert!(told.contains("with pbig are the same, to the bit"), "{told}");
+        assert_eq!(again(&scenes, "stock permuted"), None);
+        let told = first_difference(&scenes[0]);
+        assert_eq!(told.matches("to the bit, to the end").count(), 3, "{told}");
+        scenes[0].repeats[0].1 = Some(7);
+        scenes[0].runs[3].differs = Some(9);
+        scenes[0].runs[2].differs = Some(8);
+        let told = again(&scenes, "stock").unwrap_or_default();
+        assert!(told.ends_with("differ (column from step 7)."), "{told}");
+        let told = first_difference(&scenes[0]);
+        assert!(told.starts_with("column: a permuted stock differs from stock from step 8;"), "{told}");
+    }
+}
