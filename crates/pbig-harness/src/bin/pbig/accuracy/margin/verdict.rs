@@ -102,11 +102,12 @@ impl Rival {
 /// How the default is chosen, and what the times say to that.
 pub(super) fn criterion(rows: &[Row]) -> String {
     format!(
-        "Criterion: the default, {}, which is also what rapier's own broad phase has, stands unless another margin \
-         makes the whole step of rapier faster, in the geometric mean over all cases, by more than the noise of that \
-         mean, and still does with any one scene left out: it may be a special one. By these times \
-         {}. The noise of a mean is two of its standard errors, from how the ratio of two margins differs from case to \
-         case, or from pass to pass if that is more. (The fastest of {} margins is partly so by chance.)",
+        "Criterion. The default, {}, is what rapier's own broad phase has. Another margin would replace it if it made the \
+         whole step of rapier faster, in the geometric mean over all cases, by more than the noise of that mean; and if it \
+         still did with any one scene left out, which may be a special one. By these times {}. The noise of a mean is two of \
+         its standard errors, in percent of it. They come from how the ratio of two margins differs from case to case, or \
+         from pass to pass if that is more. So if two margins took the same, one would seem faster by more than the noise in \
+         about 2 of 100 runs. (The fastest of {} margins is partly so by chance.)",
         MARGINS[default_margin()],
         verdict(rows),
         MARGINS.len()
@@ -117,21 +118,28 @@ fn verdict(rows: &[Row]) -> String {
     let all = Rival::all(rows, &STEP);
     let better = all.iter().filter(|rival| rival.is_better()).map(|rival| (rival, rival.deciding(rows)));
     let (proven, alone): (Vec<_>, Vec<_>) = better.partition(|(_, deciding)| deciding.is_empty());
+    let fastest = &all[0];
     match (proven.first(), &alone[..]) {
         (Some((rival, _)), _) => {
             format!("it does not stand: {} is faster, whichever scene is left out", rival.told())
         }
         (None, [_, ..]) => {
-            format!("it stands: {}", alone.iter().map(by_a_scene).collect::<Vec<_>>().join("; "))
+            let each = alone.iter().map(|(rival, deciding)| by_a_scene(rival, deciding, rows));
+            format!("it stands: {}", each.collect::<Vec<_>>().join("; "))
         }
-        _ if all[0].is_default() => "it is supported: no other is as fast".to_owned(),
-        _ => format!("it stands, but cannot be told from {}", MARGINS[all[0].margin]),
+        _ if fastest.is_default() => "it is supported: no other is as fast".to_owned(),
+        _ => format!("it stands: the fastest, {}, is not faster by more than the noise", fastest.told()),
     }
 }
 
-fn by_a_scene((rival, deciding): &(&Rival, Vec<&str>)) -> String {
-    let scenes = deciding.join(" or ");
-    format!("{} is faster over all cases, but within the noise of those without {scenes}", rival.told())
+/// A rival that owes it to some scenes: without each of these the default takes longer by no more than the noise.
+fn by_a_scene(rival: &Rival, deciding: &[&str], rows: &[Row]) -> String {
+    let left_out = |scene: &&str| {
+        let Rival { longer, noise, .. } = Rival::new(&without(rows, scene), rival.margin, &STEP);
+        format!("without {scene} the default takes {longer:.1}% longer, noise {noise:.1}%")
+    };
+    let left_out: Vec<String> = deciding.iter().map(left_out).collect();
+    format!("{} is faster over all cases, but {}", rival.told(), left_out.join(", and "))
 }
 
 /// Which margin is fastest over all, and whether that is far from the default.
@@ -254,7 +262,9 @@ mod tests {
         };
         let many = ["a", "b", "c", "d", "e", "f", "g", "h", "i"];
         assert!(told(1.0, 0.9, &many).contains("it is supported"), "{}", told(1.0, 0.9, &many));
-        assert!(told(0.99, 1.0, &["a"]).contains("cannot be told from 0."), "{}", told(0.99, 1.0, &["a"]));
+        let one = told(0.99, 1.0, &["a"]);
+        let noise = "it stands: the fastest, 0 (the default takes 1.0% longer, noise 2.0%), is not faster by more than";
+        assert!(one.contains(noise), "{one}");
         let told = told(0.99, 1.0, &many);
         let whichever =
             "it does not stand: 0 (the default takes 1.0% longer, noise 0.7%) is faster, whichever scene";
@@ -274,7 +284,7 @@ mod tests {
             ]))
         };
         assert!(told(0.9).contains("does not stand: 0 ("), "{}", told(0.9));
-        assert!(told(1.2).contains("cannot be told from 0."), "{}", told(1.2));
+        assert!(told(1.2).contains("is not faster by more than the noise"), "{}", told(1.2));
     }
 
     /// Another margin is faster over all cases, but by more than the noise only with what one scene adds.
@@ -282,8 +292,9 @@ mod tests {
     fn a_scene_that_decides_alone_decides_nothing() {
         let rows = scenes_of(&[("pile", 0.9), ("pile", 0.9), ("pile", 0.9), ("rain", 1.0), ("column", 0.99)]);
         let told = criterion(&rows);
-        let but = "is faster over all cases, but within the noise of those without pile.";
+        let but = "is faster over all cases, but without pile the default takes";
         assert!(told.contains("it stands: 0 (the default takes 6.") && told.contains(but), "{told}");
+        assert!(told.contains("without pile the default takes 0.5% longer, noise 1."), "{told}");
         let told = criterion(&scenes_of(&[("pile", 0.9), ("pile", 0.9), ("rain", 0.9), ("rain", 0.9)]));
         assert!(told.contains("does not stand"), "{told}");
         // Another one is faster in every scene, though by less.
@@ -296,8 +307,10 @@ mod tests {
         // Of a single scene nothing is left.
         let told = criterion(&scenes_of(&[("pile", 0.9), ("pile", 0.9)]));
         assert!(told.contains(but), "{told}");
-        let told = by_a_scene(&(&Rival { margin: 0, longer: 1.0, noise: 0.5 }, vec!["pile", "rain"]));
-        assert!(told.ends_with("but within the noise of those without pile or rain"), "{told}");
+        let rival = Rival { margin: 0, longer: 1.0, noise: 0.5 };
+        let told = by_a_scene(&rival, &["pile", "rain"], &scenes_of(&[("pile", 0.5), ("rain", 0.8)]));
+        let each = "without pile the default takes 25.0% longer, noise 2.0%, and without rain the default takes 100.0% longer";
+        assert!(told.contains(each), "{told}");
     }
 
     #[test]
