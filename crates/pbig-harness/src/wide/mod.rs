@@ -2,6 +2,7 @@
 
 mod layout;
 mod pairs;
+mod plain;
 mod shape;
 mod world;
 

@@ -1,5 +1,6 @@
 //! A world of rapier3d-f64: what a simulation is held against that runs in f32.
 
+use super::plain::{check_body, check_collider, check_world};
 use super::{Pose, to_f32, to_f64};
 use crate::world::World;
 use rapier3d::na::{Translation3, Vector3};
@@ -29,11 +30,9 @@ impl WideWorld {
     /// # Errors
     /// If it has what a world in f64 does not get: other shapes than balls, cuboids and half-spaces, other bodies than awake
     /// dynamic ones with one collider in their middle, other settings than rapier's but for density, friction and
-    /// restitution, and joints.
+    /// restitution, joints, and steps that it has already made.
     pub fn of(world: &World, offset: [f64; 3]) -> Result<Self, String> {
-        if !world.impulse_joints.is_empty() || world.multibody_joints.multibodies().next().is_some() {
-            return Err("a world in f64 has no joints".into());
-        }
+        check_world(world)?;
         let mut wide = Self::empty(world.gravity.to_array().map(f64::from).into());
         let by = Translation3::from(Vector3::from(offset));
         for (_, collider) in world.colliders.iter() {
@@ -68,7 +67,7 @@ impl WideWorld {
         by: &Translation3<f64>,
     ) -> Result<(), String> {
         let shape = shape(collider.shape())?;
-        check_plain(collider)?;
+        check_collider(collider)?;
         let is_bounded = shape.as_halfspace().is_none();
         let builder = ColliderBuilder::new(shape)
             .density(collider.density().into())
@@ -111,31 +110,9 @@ impl WideWorld {
 
 /// A moving body, nowhere yet.
 fn dynamic(body: &narrow::RigidBody) -> Result<RigidBodyBuilder, String> {
-    let is_plain = body.is_dynamic()
-        && body.is_enabled()
-        && !body.is_sleeping()
-        && !body.is_ccd_enabled()
-        && body.colliders().len() == 1
-        && body.gravity_scale() == 1.0
-        && body.linear_damping() == 0.0
-        && body.angular_damping() == 0.0
-        && body.locked_axes().is_empty();
-    if !is_plain {
-        return Err(format!("a world in f64 has no body such as this {:?} one", body.body_type()));
-    }
+    check_body(body)?;
     let [linear, angular] = [body.linvel(), body.angvel()].map(|velocity| velocity.cast());
     Ok(RigidBodyBuilder::dynamic().linvel(linear).angvel(angular))
-}
-
-/// Nothing that [`WideWorld::add`] would lose.
-fn check_plain(collider: &narrow::Collider) -> Result<(), String> {
-    let is_plain = collider.is_enabled()
-        && !collider.is_sensor()
-        && collider.collision_groups() == narrow::InteractionGroups::all()
-        && collider.solver_groups() == narrow::InteractionGroups::all()
-        && collider.contact_skin() == 0.0
-        && collider.position_wrt_parent().is_none_or(|pose| *pose == narrow::Isometry::identity());
-    if is_plain { Ok(()) } else { Err("a world in f64 has plain colliders only".into()) }
 }
 
 fn shape(shape: &dyn narrow::Shape) -> Result<SharedShape, String> {
@@ -237,9 +214,12 @@ mod tests {
     #[test]
     fn what_it_does_not_have_is_refused() {
         let refused = |name| WideWorld::of(&scene(name), [0.0; 3]).err().expect("something else");
-        for (name, told) in
-            [("rain", "HeightField"), ("ragdolls", "joints"), ("sensors", "plain"), ("sleeping", "Dynamic")]
-        {
+        for (name, told) in [
+            ("rain", "HeightField"),
+            ("ragdolls", "joints"),
+            ("sensors", "no sensors"),
+            ("sleeping", "awake"),
+        ] {
             assert!(refused(name).contains(told), "{name}: {}", refused(name));
         }
     }
