@@ -34,6 +34,8 @@ fn a_quick_run_is_one_object_and_writes_what_it_is_asked_for() {
         "a chart for each study"
     );
     let seconds = |of: &Value| of["seconds"].as_f64().expect("how long it took");
+    assert_eq!((&object["seconds_wanted"], &object["seconds_quick"]), (&Value::from(60.0), &Value::Null));
+    assert_eq!(object["met"], seconds(&object) < 60.0);
     let studies = object["studies"].as_object().expect("studies");
     assert!(studies.values().all(|study| seconds(study) > 0.0), "each took some time");
     assert!(studies.values().map(seconds).sum::<f64>() <= seconds(&object), "no less than all of it");

@@ -53,9 +53,12 @@ fn names() -> clap::builder::PossibleValuesParser {
 pub(crate) fn run(args: &Args) -> Result<(), Failure> {
     let clock = Instant::now();
     let studies = made(args)?;
-    let (machine, seconds) = (Machine::here(), clock.elapsed().as_secs_f64());
-    let object = object(&machine, seconds, &studies);
-    let text = document(&machine, seconds, &studies, args.quick);
+    let seconds = clock.elapsed().as_secs_f64();
+    let is_kept = !args.quick && args.only.is_none();
+    let with_quick = if is_kept { Some(quick_seconds()?) } else { None };
+    let (machine, took) = (Machine::here(), Took { seconds, is_quick: args.quick, with_quick });
+    let object = object(&machine, &took, &studies);
+    let text = document(&machine, &took, &studies);
     if args.json {
         print(&object.to_string())?
     } else {
@@ -64,12 +67,48 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
     if let Some(folder) = &args.plot {
         plot(folder, &studies)?;
     }
-    if args.quick || args.only.is_some() {
+    if !is_kept {
         return Ok(());
     }
     save(&Path::new(DOCUMENTS).join("accuracy.md"), &text)?;
     plot(Path::new(DOCUMENTS), &studies)?;
     keep(&format!("accuracy-{}", slug(&machine.cpu)), &object, args.json)
+}
+
+/// How long a run has taken, and how long the same takes with `--quick`, where that is told.
+struct Took {
+    seconds: f64,
+    is_quick: bool,
+    with_quick: Option<f64>,
+}
+
+impl Took {
+    /// What is promised of the run.
+    fn most_seconds(&self) -> f64 {
+        MOST_SECONDS[usize::from(self.is_quick)]
+    }
+
+    fn is_met(&self) -> bool {
+        self.seconds < self.most_seconds()
+    }
+
+    fn quick(&self) -> Option<Self> {
+        self.with_quick.map(|seconds| Self { seconds, is_quick: true, with_quick: None })
+    }
+
+    fn told(&self) -> String {
+        let verdict = if self.is_met() { "met" } else { "missed" };
+        let most = study::clock(self.most_seconds());
+        let taken = study::clock(self.seconds);
+        format!("{taken} from end to end; wanted on two cores: under {most} ({verdict})")
+    }
+}
+
+/// How long all studies take with `--quick`: a run without it tells that too, as that one writes no document.
+fn quick_seconds() -> Result<f64, Failure> {
+    let clock = Instant::now();
+    STUDIES.iter().try_for_each(|(_, run)| run(true).map(|_| ()))?;
+    Ok(clock.elapsed().as_secs_f64())
 }
 
 /// A study, and how long it took.
@@ -104,30 +143,33 @@ fn plot(folder: &Path, studies: &[Made]) -> Result<(), Failure> {
     Ok(())
 }
 
-fn object(machine: &Machine, seconds: f64, studies: &[Made]) -> Value {
+fn object(machine: &Machine, took: &Took, studies: &[Made]) -> Value {
     let named = studies.iter().map(|Made { study, seconds }| {
         let mut object = study.object();
         object["seconds"] = json!(seconds);
         (study.name.to_owned(), object)
     });
     let named: Map<String, Value> = named.collect();
-    json!({ "day": machine.day, "machine": machine.object(), "seconds": seconds, "studies": named })
+    json!({
+        "day": machine.day,
+        "machine": machine.object(),
+        "seconds": took.seconds,
+        "seconds_wanted": took.most_seconds(),
+        "met": took.is_met(),
+        "seconds_quick": took.with_quick,
+        "studies": named,
+    })
 }
 
-fn document(machine: &Machine, seconds: f64, studies: &[Made], quick: bool) -> String {
+fn document(machine: &Machine, took: &Took, studies: &[Made]) -> String {
     let parts: String =
         studies.iter().map(|made| format!("\n{}", made.study.markdown(made.seconds))).collect();
     let head = "# `pbig accuracy`\n\nRun time against error. Written by that command, nothing by hand.";
     let zero = "In the charts both axes are logarithmic; what is never wrong lies on the line below, at 0.";
     let each = studies.iter().map(|made| format!("{} {}", made.study.name, study::clock(made.seconds)));
     let each = each.collect::<Vec<_>>().join(", ");
-    let most = MOST_SECONDS[usize::from(quick)];
-    let verdict = if seconds < most { "met" } else { "missed" };
-    let took = format!(
-        "The run took {} from end to end; wanted on two cores: under {} ({verdict}). Of that: {each}.",
-        study::clock(seconds),
-        study::clock(most)
-    );
+    let quick = took.quick().map(|quick| format!("\nWith `--quick` the same took {}.", quick.told()));
+    let took = format!("The run took {}. Of that: {each}.{}", took.told(), quick.unwrap_or_default());
     format!("{head} {}.\n{took}\n{zero}\n{parts}", machine.line())
 }
 
@@ -142,13 +184,18 @@ mod tests {
     #[test]
     fn the_document_has_the_machine_every_study_and_how_long_it_took() {
         let machine = Machine::here();
-        let text = document(&machine, 432.1, &small(), false);
+        let full = Took { seconds: 432.1, is_quick: false, with_quick: Some(33.3) };
+        let text = document(&machine, &full, &small());
+        let quick = "With `--quick` the same took 33.3 s from end to end; wanted on two cores: under 1 min 0 s (met).";
         let took = "The run took 7 min 12 s from end to end; wanted on two cores: under 20 min 0 s (met). Of that: small 9.6 s.";
-        for part in ["threads", "## a small study\n\nTook 9.6 s.\n\n- a note\n", took] {
+        for part in ["threads", quick, "## a small study\n\nTook 9.6 s.\n\n- a note\n", took] {
             assert!(text.contains(part), "{part} is not in:\n{text}");
         }
-        assert!(document(&machine, 432.1, &small(), true).contains("under 1 min 0 s (missed)"));
-        let object = object(&machine, 432.1, &small());
+        let slow = Took { is_quick: true, with_quick: None, ..full };
+        assert!(document(&machine, &slow, &small()).contains("under 1 min 0 s (missed). Of that"));
+        assert_eq!(object(&machine, &slow, &small())["met"], false);
+        let object = object(&machine, &full, &small());
+        assert_eq!((&object["seconds_wanted"], &object["seconds_quick"]), (&json!(1200.0), &json!(33.3)));
         assert_eq!(object["studies"]["small"]["points"][1]["error"], 0.0);
         assert_eq!(
             (&object["seconds"], &object["studies"]["small"]["seconds"]),
