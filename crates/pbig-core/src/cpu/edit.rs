@@ -267,8 +267,8 @@ mod tests {
             let changed = Changed { ids: &ids, boxes: &boxes, before: &old, filters: &filters, update };
             map.edit(&changed, &mut records);
             out_of_order = out_of_order.max(map.out_of_order());
-            let (records, update) = (&records, Some(update));
-            let others = Others { records, filters: &filters, update, are_awake: false };
+            let (records, present) = (&records, Some(update));
+            let others = Others { records, filters: &filters, update: present, are_awake: false };
             let mut pairs = Found::default();
             map.check_others(&others, &Met(&old), &mut pairs, u64::MAX).expect("few pairs");
             let all: BTreeSet<Pair> = pairs.chunks.iter().flatten().copied().collect();
