@@ -5,6 +5,7 @@ mod changes;
 mod checked;
 mod crowds;
 mod drop_in;
+mod edits;
 mod explain;
 mod finder;
 mod gpu;

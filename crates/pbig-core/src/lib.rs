@@ -30,7 +30,7 @@
 //!
 //! * Two boxes pair when `a.min <= b.max && b.min <= a.max` on all three axes, in f32, exactly, as
 //!   [`oracle`] defines it; every strategy gives the same pairs, in the same order, whatever the
-//!   number of threads. Threads are those of the rayon pool in which the call is made.
+//!   number of threads. Threads are the one that calls, and those of its rayon pool.
 //! * A call is complete or an [`Error`]; there are no partial results.
 //! * A box with a NaN, or with `min > max`, pairs with nothing and harms no other box.
 //!

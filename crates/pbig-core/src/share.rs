@@ -2,7 +2,8 @@
 //!
 //! A thread that is none of the pool's, as an app's is, hands everything over where it calls `rayon::join` or a parallel
 //! iterator: it sleeps, and two others have to wake. Between the steps of a simulation they are asleep, and twice 200 us of
-//! work then took 535 us on two cores. Here the caller begins at once, and who wakes takes of what is left: 330 us.
+//! work then took 535 us on two cores. Here the caller begins at once, and who wakes takes of what is left: 330 us. In the end
+//! the caller waits for those that were asked, also where other work of the pool keeps them: a pool is for short work.
 
 use rayon::in_place_scope;
 use std::sync::{Mutex, PoisonError};
@@ -19,7 +20,11 @@ pub(crate) fn for_each<T: Send>(
     pieces: impl ExactSizeIterator<Item = T> + Send,
     work: impl Fn(T) + Sync,
 ) {
-    beside(is_shared, || (), pieces, work);
+    if !is_shared {
+        return pieces.for_each(work);
+    }
+    let others = pieces.len().saturating_sub(1);
+    with(others, || (), pieces, work);
 }
 
 /// The same, and the sum of what comes of the pieces.
@@ -55,7 +60,17 @@ pub(crate) fn beside<T: Send, U>(
         pieces.for_each(work);
         return done;
     }
-    let others = (rayon::current_num_threads() - 1).min(pieces.len());
+    with(pieces.len(), own, pieces, work)
+}
+
+/// The same with at most so many other threads.
+fn with<T: Send, U>(
+    most: usize,
+    own: impl FnOnce() -> U,
+    pieces: impl Iterator<Item = T> + Send,
+    work: impl Fn(T) + Sync,
+) -> U {
+    let others = most.min(rayon::current_num_threads() - 1);
     let pieces = Mutex::new(pieces);
     let next = || pieces.lock().unwrap_or_else(PoisonError::into_inner).next();
     let help = || {

@@ -270,7 +270,8 @@ fn resize<T: Copy>(of: &mut Vec<T>, len: usize, value: T) {
 /// A slice of which threads use different elements.
 struct Shared<'a, T>(*mut T, usize, PhantomData<&'a mut [T]>);
 
-// SAFETY: each element is used by one thread, as the methods ask.
+// SAFETY: each element is used by one thread, as the methods ask; `share` hands each piece out once, and returns or panics after
+// all have ended.
 unsafe impl<T: Send> Sync for Shared<'_, T> {}
 
 impl<'a, T: Copy> Shared<'a, T> {

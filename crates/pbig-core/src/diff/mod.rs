@@ -232,7 +232,7 @@ impl PairStore {
     }
 
     /// Finds the pairs that do not hold, of those that concern the few boxes `ids`, and leaves them where they are; and does
-    /// something else, beside that if `is_shared`.
+    /// something else, beside that if `is_shared` and it takes a walk.
     pub(crate) fn find_ended<T>(
         &mut self,
         ids: &[u32],
@@ -282,7 +282,8 @@ impl PairStore {
     /// Removes the pairs at the places found. Largest first: the pair that fills a hole comes from the end, which is not
     /// among them.
     fn remove_places(&mut self, mut tell: impl FnMut(Pair)) {
-        for &place in &self.places {
+        let mut places = std::mem::take(&mut self.places);
+        for place in places.drain(..) {
             let pair = self.pairs[place as usize];
             tell(pair);
             self.degree[pair.a as usize] -= 1;
@@ -293,6 +294,7 @@ impl PairStore {
                 self.pairs.swap_remove(place as usize);
             }
         }
+        self.places = places;
     }
 
     /// The places of pairs that do not hold, where those that have changed are few.

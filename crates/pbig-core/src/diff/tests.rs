@@ -100,3 +100,26 @@ fn a_walk_in_pieces_is_the_same_as_one() {
     let (kept, ended): (Vec<Pair>, Vec<Pair>) = pairs.into_iter().partition(|&pair| holds(pair));
     assert_eq!((store.pairs, removed), (kept, ended));
 }
+
+#[test]
+fn a_walk_for_few_in_pieces_finds_the_same_beside_something_else() {
+    let pairs: Vec<Pair> = (0..6 * PIECE as u32 + 77).map(|i| Pair::new(i, i + 1 + i % 7)).collect();
+    let ids: Vec<u32> = (0..pairs.len() as u32 + 50).step_by(50).collect();
+    let holds = |pair: Pair| !(pair.a / 3).is_multiple_of(5);
+    let ends = |pair: Pair| (pair.a.is_multiple_of(50) || pair.b.is_multiple_of(50)) && !holds(pair);
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(3).build().expect("a pool");
+    for is_shared in [false, true] {
+        let (mut store, mut removed) = (PairStore::default(), Vec::new());
+        store.reserve_ids(pairs.len() + 50);
+        store.insert(&pairs);
+        let done = pool.install(|| store.find_ended(&ids, &Test(holds), is_shared, || 7));
+        assert_eq!((done, store.listed()), (7, pairs.len()), "none is removed yet");
+        store.end_found(&mut removed);
+        store.end_found(&mut removed);
+        let (mut ended, mut kept): (Vec<Pair>, Vec<Pair>) = pairs.iter().partition(|&&pair| ends(pair));
+        [&mut removed, &mut ended, &mut kept, &mut store.pairs]
+            .into_iter()
+            .for_each(|list| list.sort_unstable());
+        assert!(ended.len() > 500 && removed == ended && store.pairs == kept, "{is_shared}");
+    }
+}

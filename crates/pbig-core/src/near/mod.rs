@@ -136,7 +136,7 @@ impl NearPairs {
         for first in (0..self.pairs.len()).step_by(PORTION) {
             let pieces = self.walk(first..self.pairs.len().min(first + PORTION), boxes);
             let turned = self.turned[..pieces].iter_mut();
-            share::for_each(has_threads(), turned, |turned| turned.find_fresh(before));
+            share::for_each(pieces > 2 && has_threads(), turned, |turned| turned.find_fresh(before));
             for turned in &self.turned[..pieces] {
                 self.overlapping += turned.added.len();
                 tell(&turned.added);
@@ -271,7 +271,7 @@ impl NearPairs {
             }
         };
         let pieces = self.pairs.chunks(PIECE).zip(self.states.chunks_mut(PIECE));
-        share::for_each(has_threads(), pieces, forget);
+        share::for_each(pieces.len() > 2 && has_threads(), pieces, forget);
         self.compact();
     }
 

@@ -46,7 +46,7 @@ struct Range<'a> {
 }
 
 impl BroadPhase {
-    /// Sets many boxes, as [`BroadPhase::set`] does one: with the threads of the present rayon pool and in no particular order
+    /// Sets many boxes, as [`BroadPhase::set`] does one: with the help of the present rayon pool and in no particular order
     /// where they are at least 8192, one in 64 of all, and no update has begun.
     ///
     /// `fetch` gets what `of` needs to know about an id, and is called for some ids before `of` is, so that
