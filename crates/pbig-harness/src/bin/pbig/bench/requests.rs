@@ -1,4 +1,4 @@
-//! How often a broad phase in steady state asks for memory: never, but for the queue of a pool, and where a list, or the
+//! How often a broad phase in steady state asks for memory: never, but for what threads hand work over with, and where a list, or the
 //! levels of a plan, are more than before.
 
 use super::memory::{Motion, Moving};
@@ -31,7 +31,7 @@ fn row(name: &str, motion: Motion, boxes: usize, threads: usize) -> Result<Row, 
         pool.install(|| counted(motion, boxes)).map_err(|error| Failure::Input(error.to_string()))?;
     let (on, target) = match threads {
         1 => ("one thread".to_owned(), Some(Target::Nothing)),
-        _ => (format!("{threads} threads, the blocks of whose queues are counted, too"), None),
+        _ => (format!("{threads} threads, with what hands work over from one to another"), None),
     };
     let row =
         Row::new(format!("requests for memory, {name}"), boxes, pairs).unit(Unit::Requests).target(target);
