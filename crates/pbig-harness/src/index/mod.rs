@@ -15,7 +15,7 @@ mod tally;
 pub use correct::{AsItIs, Correction, Integers, LAZY, Rules, lazy_ids, lazy_pair};
 pub use exact::{EXACT, Exact};
 pub use root::{AllSingle, CARMACK, Double, LOMONT, Newton, Printed, Root, Single, SingleRoot, WideNewton};
-pub use rounded::{Rounded, Step};
+pub use rounded::{Form, Rounded, Step};
 pub use search::{Counterexample, counterexample, root_differences, root_errors};
 pub use tally::{MOST_EXHAUSTIVE, Sample, Tally, of as tally_of};
 

@@ -54,37 +54,75 @@ impl Step {
     }
 }
 
-/// A root by Newton's steps: the first two in one way, those after them in another, and the last product `x y`.
+/// What is made of the `y` that steps give.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Form {
+    /// `x y` without its fraction.
+    Cut,
+    /// `x y` or the next whole number above.
+    Up,
+    /// `1 / y` without its fraction.
+    Reciprocal,
+}
+
+impl Form {
+    /// Each of them.
+    pub const ALL: [Self; 3] = [Self::Cut, Self::Up, Self::Reciprocal];
+
+    /// In words.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Cut => "x y cut",
+            Self::Up => "x y rounded up",
+            Self::Reciprocal => "1 / y cut",
+        }
+    }
+
+    /// What an exact root gives.
+    fn exact(self, x: u32) -> u32 {
+        let root = x.isqrt();
+        root + u32::from(self == Self::Up && root * root < x)
+    }
+}
+
+/// A root by Newton's steps: the first two in one way, those after them in another, and what is made of their result.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Rounded {
     early: Step,
     late: Step,
+    form: Form,
+    /// Of the last product, or of the reciprocal.
     last: Rounding,
 }
 
 impl Rounded {
-    /// With each rounding of the last product.
-    pub fn all(early: Step, late: Step) -> impl Iterator<Item = Self> {
-        Rounding::ALL.into_iter().map(move |last| Self { early, late, last })
+    /// With each rounding of the last operation.
+    pub fn all(early: Step, late: Step, form: Form) -> impl Iterator<Item = Self> {
+        Rounding::ALL.into_iter().map(move |last| Self { early, late, form, last })
     }
 
-    fn root(&self, magic: u32, steps: u32, x: f32) -> f64 {
+    fn root(&self, magic: u32, steps: u32, x: f32) -> u32 {
         let half = f64::from(x * 0.5);
         let mut y = f64::from(f32::from_bits(magic - (x.to_bits() >> 1)));
         for step in 0..steps {
             y = if step < 2 { self.early.next(half, y) } else { self.late.next(half, y) };
         }
-        self.last.of(f64::from(x) * y)
+        match self.form {
+            Form::Cut => self.last.of(f64::from(x) * y) as u32,
+            Form::Up => self.last.of(f64::from(x) * y).ceil() as u32,
+            Form::Reciprocal => self.last.of(1.0 / y) as u32,
+        }
     }
 
-    /// As [`super::root_errors`], up to 2^24: for how many whole numbers `1 <= x < below` the root without its fraction is
-    /// wrong after two steps or more. These are off by less than one in 200,000, so that only numbers near a square can be.
+    /// As [`super::root_errors`], up to 2^24: for how many whole numbers `1 <= x < below` the whole number that is made of the
+    /// root is wrong after two steps or more. These are off by less than one in 200,000, so that only numbers near a square
+    /// can be.
     pub fn errors(&self, magic: u32, steps: u32, below: u32) -> u64 {
         let near = |root: u32| {
             let (square, reach) = (root * root, 2 + root * root / 100_000);
             square - reach.min(root - 1)..=square + reach.min(root)
         };
-        let wrong = |x: &u32| self.root(magic, steps, *x as f32) as u32 != x.isqrt();
+        let wrong = |x: &u32| self.root(magic, steps, *x as f32) != self.form.exact(*x);
         let all = (1..=below.isqrt() + 1).flat_map(near).filter(|x| (1..below).contains(x));
         all.filter(wrong).count() as u64
     }
@@ -97,7 +135,7 @@ mod tests {
 
     fn with(rounding: [Rounding; 4]) -> Rounded {
         let step = Step { square_first: false, roundings: rounding };
-        Rounded { early: step, late: step, last: Rounding::Nearest }
+        Rounded { early: step, late: step, form: Form::Cut, last: Rounding::Nearest }
     }
 
     /// All in f32, and each step in f64, are two of them, which are counted over all numbers elsewhere.
@@ -112,6 +150,27 @@ mod tests {
             assert_eq!(wide.errors(LOMONT, 2, below), root_errors::<WideNewton<LOMONT, 2>>(below));
             assert_eq!(wide.errors(CARMACK, 3, below), root_errors::<WideNewton<CARMACK, 3>>(below));
         }
+    }
+
+    /// Steps in f64 end an ulp above at some squares: rounded up these are wrong, and so is their reciprocal.
+    #[test]
+    fn three_steps_in_f64_with_another_end_give_figures_of_table_3() {
+        use Rounding::{Nearest, Wide};
+        for form in [Form::Up, Form::Reciprocal] {
+            let way = Rounded { form, ..with([Wide, Wide, Wide, Nearest]) };
+            for steps in [3, 4] {
+                let errors =
+                    [1000, 10_000, 100_000, 1_000_000].map(|below| way.errors(CARMACK, steps, below));
+                assert_eq!(errors, [7, 12, 35, 110], "{form:?}");
+                assert_eq!(way.errors(LOMONT, steps, 1_000_000), 110, "{form:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn an_exact_root_is_rounded_up_or_cut() {
+        assert_eq!([8, 9, 10].map(|x| Form::Up.exact(x)), [3, 3, 4]);
+        assert_eq!([8, 9, 10].map(|x| Form::Cut.exact(x)), [2, 3, 3]);
     }
 
     #[test]

@@ -1,107 +1,178 @@
 //! Whether any rounding of Newton's steps gives Avril's table 3.
 
 use super::paper::TABLE_3;
-use pbig_harness::index::{CARMACK, LOMONT, Newton, Rounded, SingleRoot, Step, WideNewton};
+use pbig_harness::index::{CARMACK, Form, LOMONT, Newton, Rounded, SingleRoot, Step, WideNewton};
 use rayon::prelude::*;
 
 /// Rows of the table that are held against, and half of what the last digit counts there: with two steps, with three.
 const ROWS: [[f64; 2]; 4] = [[0.05, 0.05], [0.005, 0.005], [0.005, 5e-4], [5e-5, 5e-5]];
 
 /// Of ways to round, how many there are and how many give the table's figures of both constants in its first rows: those
-/// up to 100,000 tests, and those up to 1,000,000.
+/// up to 100,000 tests, and those up to 1,000,000; and how many give all of Carmack's.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct Found {
     ways: usize,
     few: usize,
     all: usize,
+    carmack: usize,
 }
 
 impl Found {
     fn and(self, other: Self) -> Self {
-        Self { ways: self.ways + other.ways, few: self.few + other.few, all: self.all + other.all }
+        self.by(other, |a, b| a + b)
     }
 
-    fn told(&self, steps: u32) -> String {
-        let Self { ways, few, all } = self;
-        format!("with {steps} steps, of {ways} ways {few} up to 100000 tests and {all} up to 1000000")
+    fn by(self, other: Self, of: fn(usize, usize) -> usize) -> Self {
+        Self {
+            ways: of(self.ways, other.ways),
+            few: of(self.few, other.few),
+            all: of(self.all, other.all),
+            carmack: of(self.carmack, other.carmack),
+        }
+    }
+
+    fn told(&self, steps: &str) -> String {
+        let Self { ways, few, all, carmack } = self;
+        format!("{steps}, of {ways} ways {few}, {all} and {carmack}")
     }
 }
 
-/// Every way to round so many steps. Two are rounded alike, and so are those beyond, in a way of their own.
-fn found(steps: u32) -> Found {
+/// With two steps, with three, with four, and with each of these in one and the same way.
+type Counts = [Found; 4];
+
+const STEPS: [&str; 4] = ["with 2 steps", "with 3", "with 4", "with each of these"];
+
+fn sum(a: Counts, b: Counts) -> Counts {
+    std::array::from_fn(|k| a[k].and(b[k]))
+}
+
+/// Every way to round that ends in a form. Two steps are rounded alike, and so are those beyond, in a way of their own.
+fn found(form: Form) -> Counts {
     let all = Step::all();
     let of_early = |early: &Step| {
-        let late = if steps > 2 { &all[..] } else { std::slice::from_ref(early) };
-        let ways = late.iter().flat_map(|late| Rounded::all(*early, *late));
-        ways.map(|way| judged(&way, steps)).fold(Found::default(), Found::and)
+        let two = Rounded::all(*early, *early, form).map(|way| judged(&way, 2));
+        let two =
+            [two.fold(Found::default(), Found::and), Found::default(), Found::default(), Found::default()];
+        let ways = all.iter().flat_map(|late| Rounded::all(*early, *late, form));
+        ways.map(|way| beyond_two(&way)).fold(two, sum)
     };
-    all.par_iter().map(of_early).reduce(Found::default, Found::and)
+    all.par_iter().map(of_early).reduce(Counts::default, sum)
+}
+
+/// Two steps are looked at only where three are the table's: few are.
+fn beyond_two(way: &Rounded) -> Counts {
+    let [three, four] = [3, 4].map(|steps| judged(way, steps));
+    let two =
+        if three.carmack + three.few > 0 { judged(way, 2) } else { Found { ways: 1, ..Found::default() } };
+    [Found::default(), three, four, two.by(three, usize::min).by(four, usize::min)]
 }
 
 fn judged(way: &Rounded, steps: u32) -> Found {
-    let rows = (0..ROWS.len()).take_while(|&row| is_printed(way, steps, row)).count();
-    Found { ways: 1, few: usize::from(rows >= 3), all: usize::from(rows == ROWS.len()) }
+    let carmack = rows(way, (CARMACK, 0), steps, ROWS.len());
+    let both = rows(way, (LOMONT, 1), steps, carmack);
+    let is = |rows: usize, least: usize| usize::from(rows >= least);
+    Found { ways: 1, few: is(both, 3), all: is(both, ROWS.len()), carmack: is(carmack, ROWS.len()) }
 }
 
-/// Whether the errors of both constants are those of a row of the table, to its last digit.
-fn is_printed(way: &Rounded, steps: u32, row: usize) -> bool {
-    let ((tests, paper), late) = (TABLE_3[row], usize::from(steps > 2));
-    [CARMACK, LOMONT].into_iter().enumerate().all(|(k, magic)| {
+/// In how many of the first rows, of so many, the errors of a constant are the table's to its last digit.
+fn rows(way: &Rounded, (magic, column): (u32, usize), steps: u32, most: usize) -> usize {
+    let late = usize::from(steps > 2);
+    let is_printed = |row: &usize| {
+        let (tests, paper) = TABLE_3[*row];
         let percent = way.errors(magic, steps, tests) as f64 / f64::from(tests) * 100.0;
-        (percent - paper[2 * late + k]).abs() <= ROWS[row][late]
-    })
+        (percent - paper[2 * late + column]).abs() <= ROWS[*row][late]
+    };
+    (0..most).take_while(is_printed).count()
 }
 
 /// What rounding can tell of the table.
 pub(super) fn note() -> String {
-    let [two, three, four] = [2, 3, 4].map(|steps| (steps, found(steps)));
-    let verdict = match (two.1.all, three.1.all, four.1.all) {
-        (0, ..) => "So no rounding of these explains any of it",
-        (_, 0, 0) => {
-            "So the figures for 2 steps are those of a known arithmetic, and those for 3 and 4 of none of these"
-        }
-        _ => "So one and the same machine may have given them",
-    };
-    let told = [two, three, four].map(|(steps, found)| found.told(steps));
+    let forms = Form::ALL.map(|form| (form.name(), found(form)));
+    let told = forms.map(|(name, counts)| {
+        let each: Vec<_> = STEPS.iter().zip(counts).map(|(steps, found)| found.told(steps)).collect();
+        format!("{name}: {}", each.join("; "))
+    });
     format!(
         "Table 3, every rounding. Of the four operations of a step, y (1.5 - h y y), each result can be rounded to the \
          nearest f32, cut to the next towards zero (as the multiply-add of the paper's device cuts its product), or stay \
          wide; and the product can begin with h y or y y. So there are {} ways for a step. The first two steps go one \
-         way, a third and fourth another, and x y has three ways. Both constants' figures come out: {}. {verdict}. Both \
-         halves of the table are held against the same root, so the difference is in the steps. The paper does not say on \
-         what its test ran.",
+         way, a third and fourth another. Of the result the whole number can be x y cut, x y rounded up (which is held \
+         against the exact root rounded up), or 1 / y cut, and x y and 1 / y can be rounded in three ways. How many of these \
+         ways give both constants' figures up to 100000 tests, both up to 1000000, and Carmack's alone up to 1000000; rows \
+         beyond are not looked at. {}. {}. The paper does not say on what its test ran.",
         Step::all().len(),
-        told.join("; ")
+        told.join(". "),
+        verdict(&forms.map(|(_, counts)| counts).into_iter().fold(Counts::default(), sum))
     )
+}
+
+fn verdict([two, three, four, same]: &Counts) -> &'static str {
+    match () {
+        () if two.all == 0 => "So none of these gives the figures for 2 steps",
+        () if same.all > 0 => "So one and the same machine may have given all these figures",
+        () if same.few > 0 => {
+            "So one and the same machine may have given all these figures up to 100000 tests, but not beyond"
+        }
+        () if three.all.min(four.all) > 0 => {
+            "So the figures for 2 steps are those of some of these ways, and those for 3 and 4 of others: no way gives all"
+        }
+        () if three.few.min(four.few) > 0 => {
+            "So the figures for 2 steps are those of some of these ways, and those for 3 and 4 up to 100000 tests of \
+             others: no way gives all, and beyond that not both of those for 3 and 4 come out"
+        }
+        () => {
+            "So the figures for 2 steps are those of some of these ways, and those for 3 and 4 are not both explained"
+        }
+    }
+}
+
+const TESTS: u32 = 1_000_000;
+
+/// Of the whole numbers below [`TESTS`]: those whose root without its fraction is wrong, the squares among them, and by how
+/// many ulps the root of a square is off at most.
+fn wrong(root: fn(f32) -> f32) -> [u32; 3] {
+    let is_square = |x: u32| x.isqrt().pow(2) == x;
+    let is_wrong = |x: &u32| root(*x as f32) as u32 != x.isqrt();
+    let all = (1..TESTS).filter(is_wrong);
+    let (all, squares) = all.fold((0, 0), |(all, squares), x| (all + 1, squares + u32::from(is_square(x))));
+    let ulps = |x: u32| root((x * x) as f32).to_bits().abs_diff((x as f32).to_bits());
+    [all, squares, (1..=(TESTS - 1).isqrt()).map(ulps).max().unwrap_or(0)]
 }
 
 /// What is wrong with three steps, and how many squares the paper's figures would be.
 pub(super) fn squares_note() -> String {
-    const TESTS: u32 = 1_000_000;
-    let wrong = |root: fn(f32) -> f32| {
-        let is_wrong = |x: &u32| root(*x as f32) as u32 != x.isqrt();
-        let all = (1..TESTS).filter(is_wrong);
-        all.fold((0, 0), |(all, squares), x| (all + 1, squares + u32::from(x.isqrt().pow(2) == x)))
-    };
     let told = [
         ("in f64", WideNewton::<CARMACK, 3>::root as fn(f32) -> f32),
         ("in f32", Newton::<CARMACK, 3>::root),
     ];
     let told = told.map(|(name, root)| {
-        let (all, squares) = wrong(root);
-        format!("{squares} of the {all} wrong ones are squares with steps {name}")
+        let [all, squares, ulps] = wrong(root);
+        format!(
+            "{squares} of the {all} wrong ones are squares with steps {name}, where the root of a square is off by up to \
+             {ulps} ulps"
+        )
     });
-    let papers = TABLE_3[..4].iter().map(|&(tests, percent)| {
-        let wrong = (percent[2] / 100.0 * f64::from(tests)).round();
-        format!("{wrong} of {} below {tests}", (tests - 1).isqrt())
+    let papers = TABLE_3.map(|(tests, percent)| {
+        (tests, (percent[2] / 100.0 * f64::from(tests)).round() as u32, (tests - 1).isqrt())
     });
+    let each =
+        papers.map(|(tests, wrong, squares)| format!("{wrong} where {squares} are squares below {tests}"));
     format!(
-        "Table 3, what 3 steps get wrong: below {TESTS}, {}. A root is then off by its last bit at most, and only a square \
-         loses its whole part by that. The paper's figures for Carmack are so many of all squares: {}. So they count how a \
-         machine rounds a last bit, and tell little of the method.",
+        "Table 3, what 3 steps get wrong: below {TESTS}, {}. The paper's figures for Carmack are so many: {}. {}.",
         told.join(", "),
-        papers.collect::<Vec<_>>().join(", ")
+        each.join(", "),
+        only_squares(&papers)
     )
+}
+
+/// Whether numbers of wrong ones could be of squares alone: by tests, wrong ones, squares.
+fn only_squares(papers: &[(u32, u32, u32)]) -> String {
+    let beyond: Vec<_> =
+        papers.iter().filter(|(_, wrong, squares)| wrong > squares).map(|row| row.0.to_string()).collect();
+    match &beyond[..] {
+        [] => "So all of them could be squares".to_owned(),
+        tests => format!("So they could all be squares, but for those below {}", tests.join(", ")),
+    }
 }
 
 #[cfg(test)]
@@ -109,11 +180,28 @@ mod tests {
     use super::*;
 
     #[test]
-    fn some_rounding_gives_the_figures_of_two_steps_and_none_those_of_three() {
-        let [two, three] = [2, 3].map(found);
-        assert_eq!((two.ways, three.ways), (3 * 162, 3 * 162 * 162));
-        assert!(two.all > 0 && two.all < two.ways / 10, "{two:?}");
-        assert!(three.few < 10 && three.all == 0, "{three:?}");
+    fn a_cut_product_gives_the_figures_of_two_steps_and_other_ends_those_of_three() {
+        let [cut, reciprocal] = [Form::Cut, Form::Reciprocal].map(found);
+        assert_eq!((cut[0].ways, cut[1].ways, cut[3].ways), (3 * 162, 3 * 162 * 162, 3 * 162 * 162));
+        assert!(cut[0].all > 0 && cut[0].all < cut[0].ways / 10, "{cut:?}");
+        assert!(cut[1].few < 10 && cut[1].all == 0, "{cut:?}");
+        assert!(
+            reciprocal[1].few > 0 && reciprocal[2].few > 0 && reciprocal[1].carmack > 0,
+            "{reciprocal:?}"
+        );
+    }
+
+    #[test]
+    fn the_verdict_is_what_was_found() {
+        let of = |[two, three, four, same]: [[usize; 2]; 4]| {
+            verdict(&[two, three, four, same].map(|[few, all]| Found { ways: 9, few, all, carmack: 0 }))
+        };
+        assert!(of([[1, 0], [1, 1], [1, 1], [1, 0]]).contains("none of these gives the figures for 2"));
+        assert!(of([[1, 1]; 4]).ends_with("all these figures"));
+        assert!(of([[1, 1], [1, 1], [1, 1], [1, 0]]).ends_with("but not beyond"));
+        assert!(of([[1, 1], [1, 1], [1, 1], [0, 0]]).ends_with("of others: no way gives all"));
+        assert!(of([[1, 1], [1, 0], [1, 0], [0, 0]]).contains("up to 100000 tests of others"));
+        assert!(of([[1, 1], [1, 1], [0, 0], [0, 0]]).ends_with("not both explained"));
     }
 
     #[test]
@@ -121,9 +209,10 @@ mod tests {
         let told = squares_note();
         assert!(told.contains("67 of the 67 wrong ones are squares with steps in f64"), "{told}");
         assert!(told.contains("214 of the 214 wrong ones are squares with steps in f32"), "{told}");
-        assert!(
-            told.contains("7 of 31 below 1000, 12 of 99 below 10000, 35 of 316 below 100000, 110 of 999"),
-            "{told}"
-        );
+        assert_eq!(wrong(Newton::<CARMACK, 3>::root)[2], 2);
+        assert!(told.contains("7 where 31 are squares below 1000, 12 where 99 are"), "{told}");
+        assert!(told.contains("13400 where 9999 are squares below 100000000"), "{told}");
+        assert!(told.ends_with("So they could all be squares, but for those below 100000000."), "{told}");
+        assert_eq!(only_squares(&[(9, 1, 2)]), "So all of them could be squares");
     }
 }
