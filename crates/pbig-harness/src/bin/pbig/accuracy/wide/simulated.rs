@@ -225,21 +225,31 @@ fn where_it_starts(name: &str, all: &[Simulated]) -> String {
 fn against_stock<'a>(all: impl Iterator<Item = &'a Simulated>) -> String {
     let ratios = |one: &Simulated| {
         let [ours, stock] = one.wrong();
-        [ours / stock, one.own[0].apart / one.own[1].apart]
+        [ours / stock, one.own[0].apart / one.own[1].apart].map(|ratio| (one.row.offset, ratio))
     };
-    let all: Vec<[f64; 2]> = all.map(ratios).collect();
-    let range = |k: usize| {
-        let each = || all.iter().map(|ratios| ratios[k]).filter(|ratio| ratio.is_finite());
-        match each().min_by(f64::total_cmp).zip(each().max_by(f64::total_cmp)) {
-            Some((least, most)) => format!("{least:.2} to {most:.2} times"),
-            None => "no number of times (the control has none)".to_owned(),
-        }
-    };
+    let (wrong, apart): (Vec<_>, Vec<_>) = all.map(ratios).map(|[wrong, apart]| (wrong, apart)).unzip();
     format!(
         "Ours has {} as many wrong pairs as the control, and its bodies end {} as far from those in f64.",
-        range(0),
-        range(1)
+        range(&wrong),
+        range(&apart)
     )
+}
+
+/// The least and the most of some ratios, each with its offset; and where there is none, as the control has 0.
+fn range(ratios: &[(f64, f64)]) -> String {
+    let each = || ratios.iter().map(|one| one.1).filter(|ratio| ratio.is_finite());
+    let told = match each().min_by(f64::total_cmp).zip(each().max_by(f64::total_cmp)) {
+        Some((least, most)) => format!("{least:.2} to {most:.2} times"),
+        None => "no number of times".to_owned(),
+    };
+    let named = |what: &str, is: fn(f64) -> bool| {
+        let offsets = ratios.iter().filter(|one| is(one.1)).map(|one| one.0.to_string()).collect::<Vec<_>>();
+        (!offsets.is_empty()).then(|| format!("{what} at {}", offsets.join(", ")))
+    };
+    let without =
+        [named("the control has 0 and ours more", f64::is_infinite), named("both have 0", f64::is_nan)];
+    let without: Vec<String> = without.into_iter().flatten().collect();
+    if without.is_empty() { told } else { format!("{told} ({})", without.join("; ")) }
 }
 
 #[cfg(test)]
@@ -268,6 +278,16 @@ mod tests {
         assert!(told.contains("at the origin nowhere, so many that a smaller one may not show."), "{told}");
         assert!(told.contains("100.0% at 0 (stock 50.00%)"), "{told}");
         assert!(told.ends_with("and its bodies end 0.25 to 0.25 times as far from those in f64."), "{told}");
+    }
+
+    #[test]
+    fn where_the_control_has_none_the_offset_is_named() {
+        let told = range(&[(0.0, f64::NAN), (1e3, 0.5), (1e4, f64::INFINITY), (1e6, 2.0)]);
+        assert_eq!(told, "0.50 to 2.00 times (the control has 0 and ours more at 10000; both have 0 at 0)");
+        assert_eq!(
+            range(&[(7.0, f64::INFINITY)]),
+            "no number of times (the control has 0 and ours more at 7)"
+        );
     }
 
     #[test]
