@@ -27,7 +27,7 @@ pub(super) fn notes(found: &Found) -> Vec<String> {
     notes.push(exact::told(&found.exact));
     notes.push(sign_note());
     notes.extend(rules::notes(found));
-    notes.extend([table_2_note(), root_note(found), lazy_note(&found.times)]);
+    notes.extend([table_2_note(), root_note(found), lazy_note(found)]);
     notes.extend([paper::table_3_note(&found.table_3), roundings::note(), roundings::squares_note()]);
     notes.push(paper::table_4_note(&found.table_4));
     notes.extend([fastest_note(found), each_size_note(found)]);
@@ -110,16 +110,17 @@ fn root_note(Found { every, .. }: &Found) -> String {
 }
 
 /// How the lazy way compares with a root, over all sizes that were timed.
-fn lazy_note(times: &[Times]) -> String {
+fn lazy_note(found: &Found) -> String {
     let over = |root: fn(&Times) -> f64| {
-        let ratios = times.iter().map(|times| times.lazy() / root(times));
+        let ratios = found.times.iter().map(|times| times.lazy() / root(times));
         let (least, most) = ratios.fold((f64::MAX, 0.0f64), |(a, b), ratio| (a.min(ratio), b.max(ratio)));
         format!("{least:.2} to {most:.2}")
     };
+    let wide = if is_right(found, 1, 0) { "never wrong here" } else { "wrong for some pairs here" };
     format!(
         "Table 2, the lazy way on a CPU. {LAZY} Here only pairs are made; in [papers](papers.md) their boxes are tested, too. \
-         The lazy way takes {} times as long as the f32 root with the paper's rules, and {} times as long as the f64 root, \
-         which needs no correction. The paper has it four times as fast as its root, on an Intel X7900.",
+         The lazy way takes {} times as long as the f32 root with the paper's rules, and {} times as long as the f64 root \
+         without a correction, which is {wide}. Section 3.2.2 of the paper has it four times as fast as its root, on its CPU.",
         over(|times| times.f32_root()[1]),
         over(Times::f64_root)
     )
@@ -213,8 +214,12 @@ mod tests {
 
     #[test]
     fn the_lazy_way_is_held_against_roots_that_are_right() {
-        let told = lazy_note(&made().times);
+        let told = lazy_note(&made());
         assert!(told.contains("0.20 to 1.60 times as long as the f32 root"), "{told}");
+        assert!(told.contains("as the f64 root without a correction, which is never wrong here."), "{told}");
+        let mut found = made();
+        found.every[1].tallies[0].wrong = 1;
+        assert!(lazy_note(&found).contains("which is wrong for some pairs here."));
     }
 
     #[test]

@@ -106,8 +106,8 @@ pub(super) fn criterion(rows: &[Row]) -> String {
          whole step of rapier faster, in the geometric mean over all cases, by more than the noise of that mean; and if it \
          still did with any one scene left out, which may be a special one. By these times {}. The noise of a mean is two of \
          its standard errors, in percent of it. They come from how the ratio of two margins differs from case to case, or \
-         from pass to pass if that is more. So if two margins took the same, one would seem faster by more than the noise in \
-         about 2 of 100 runs. (The fastest of {} margins is partly so by chance.)",
+         from pass to pass if that is more. So if ratios were normal, a given margin that takes as long as the default would \
+         seem faster by more than the noise in 2.3% of runs. (The fastest of {} margins is partly so by chance.)",
         MARGINS[default_margin()],
         verdict(rows),
         MARGINS.len()
@@ -135,7 +135,11 @@ fn verdict(rows: &[Row]) -> String {
 /// A rival that owes it to some scenes: without each of these the default takes longer by no more than the noise.
 fn by_a_scene(rival: &Rival, deciding: &[&str], rows: &[Row]) -> String {
     let left_out = |scene: &&str| {
-        let Rival { longer, noise, .. } = Rival::new(&without(rows, scene), rival.margin, &STEP);
+        let rows = without(rows, scene);
+        if scenes(&rows).is_empty() {
+            return format!("without {scene} no scene is left");
+        }
+        let Rival { longer, noise, .. } = Rival::new(&rows, rival.margin, &STEP);
         format!("without {scene} the default takes {longer:.1}% longer, noise {noise:.1}%")
     };
     let left_out: Vec<String> = deciding.iter().map(left_out).collect();
@@ -175,7 +179,11 @@ pub(super) fn over_all(rows: &[Row], time: &Time) -> String {
 /// Which margin is fastest for the whole step where one scene does not count: it may be a special one.
 pub(super) fn without_each_scene(rows: &[Row]) -> String {
     let told = scenes(rows).into_iter().map(|left_out| {
-        let Rival { margin, longer, noise } = Rival::all(&without(rows, left_out), &STEP)[0];
+        let rows = without(rows, left_out);
+        if scenes(&rows).is_empty() {
+            return format!("{left_out}: no scene is left");
+        }
+        let Rival { margin, longer, noise } = Rival::all(&rows, &STEP)[0];
         format!("{left_out}: {}, {longer:.1}% (noise {noise:.1}%)", MARGINS[margin])
     });
     format!(
@@ -306,7 +314,7 @@ mod tests {
         assert!(told.contains("does not stand: 0.005 (the default takes 2.0% longer"), "{told}");
         // Of a single scene nothing is left.
         let told = criterion(&scenes_of(&[("pile", 0.9), ("pile", 0.9)]));
-        assert!(told.contains(but), "{told}");
+        assert!(told.contains("is faster over all cases, but without pile no scene is left"), "{told}");
         let rival = Rival { margin: 0, longer: 1.0, noise: 0.5 };
         let told = by_a_scene(&rival, &["pile", "rain"], &scenes_of(&[("pile", 0.5), ("rain", 0.8)]));
         let each = "without pile the default takes 25.0% longer, noise 2.0%, and without rain the default takes 100.0% longer";
@@ -317,6 +325,8 @@ mod tests {
     fn the_fastest_without_each_scene_is_told() {
         let told = without_each_scene(&scenes_of(&[("pile", 0.5), ("rain", 1.25)]));
         assert!(told.contains("pile: 0.005, 0.0%") && told.contains("rain: 0, 100.0%"), "{told}");
+        let told = without_each_scene(&scenes_of(&[("pile", 0.5)]));
+        assert!(told.ends_with("takes: pile: no scene is left."), "{told}");
     }
 
     #[test]
