@@ -174,6 +174,8 @@ pub(super) struct Multiple {
     pub(super) values: [f64; 3],
     /// How many of the yardsticks are nearer to the first than the run, by more than the resolution.
     pub(super) nearer: usize,
+    /// Whether the run and all yardsticks are as far from the first, so that none of them could be the farthest.
+    pub(super) is_tied: bool,
 }
 
 /// None where the quantity has no meaning for one of them.
@@ -188,12 +190,14 @@ pub(super) fn multiple(
     let from_there = |value: f64| (value - there).abs();
     let is_nearer = |value: &&f64| from_there(here) > from_there(**value).max(resolution);
     let nearer = values.iter().filter(is_nearer).count();
+    let reached = |value: f64| from_there(value).max(resolution);
+    let is_tied = values.iter().all(|value| reached(*value) == reached(here));
     let farthest =
         values.into_iter().max_by(|a, b| from_there(*a).total_cmp(&from_there(*b))).unwrap_or(there);
-    let (far, reach) = (from_there(here), from_there(farthest).max(resolution));
+    let (far, reach) = (from_there(here), reached(farthest));
     let times = if far == 0.0 { 0.0 } else { far / reach };
     let is_there = came(run) || came(first);
-    Some(Multiple { times: is_there.then_some(times), values: [here, there, farthest], nearer })
+    Some(Multiple { times: is_there.then_some(times), values: [here, there, farthest], nearer, is_tied })
 }
 
 #[cfg(test)]

@@ -59,7 +59,8 @@ fn beyond(scenes: &[Ways]) -> String {
         let counted = scenes.iter().flat_map(|ways| {
             let run = ways.pbig().find(|run| run.way == name);
             let told = run.into_iter().flat_map(|run| ways.multiples(run));
-            told.filter_map(|(_, found)| found.times.map(|_| found.nearer == ways.yardsticks().len()))
+            let told = told.filter(|(_, found)| found.times.is_some() && !found.is_tied);
+            told.map(|(_, found)| found.nearer == ways.yardsticks().len())
         });
         let all: Vec<bool> = counted.collect();
         let farther = all.iter().filter(|is_farther| **is_farther).count();
@@ -69,7 +70,8 @@ fn beyond(scenes: &[Ways]) -> String {
     let ways = WAYS.iter().filter(|way| way.is_held_against_stock());
     format!(
         "If pbig were one more order of insertion, it would be farther from stock than all {PERMUTED} others in one quantity of \
-         {}. It is in {}. Quantities of one scene are not independent. The last table has the percent of permuted runs that \
+         {}. It is in {}. Quantities in which all these runs are as far from stock do not count. \
+         Quantities of one scene are not independent. The last table has the percent of permuted runs that \
          are nearer.",
         PERMUTED + 1,
         ways.map(|way| of(way.name)).collect::<Vec<_>>().join("; in ")
@@ -152,7 +154,7 @@ fn how_far(scenes: &[Ways]) -> String {
     )
 }
 
-fn told(scene: &str, way: &str, quantity: &str, Multiple { times, values, nearer }: &Multiple) -> String {
+fn told(scene: &str, way: &str, quantity: &str, Multiple { times, values, nearer, .. }: &Multiple) -> String {
     let [here, stock, permuted] = values.map(plain);
     let times = match times {
         Some(times) if times.is_finite() => format!("{times:.2} times"),
@@ -214,14 +216,20 @@ mod tests {
     fn a_run_beyond_all_permuted_ones_is_counted() {
         let told = beyond(&made(105.0));
         assert!(
-            told.contains("It is in 0 of 8 with pbig, 0.4 by chance; in 0 of 8 with pbig without"),
+            told.contains("It is in 0 of 1 with pbig, 0.1 by chance; in 0 of 1 with pbig without"),
             "{told}"
         );
         let told = beyond(&made(111.0));
         assert!(
-            told.contains("It is in 1 of 8 with pbig, 0.4 by chance; in 1 of 8 with pbig without"),
+            told.contains("It is in 1 of 1 with pbig, 0.1 by chance; in 1 of 1 with pbig without"),
             "{told}"
         );
+    }
+
+    #[test]
+    fn what_is_as_far_in_all_runs_does_not_count() {
+        let told = beyond(&made(110.0));
+        assert!(told.contains("It is in 0 of 0 with pbig, 0.0 by chance"), "{told}");
     }
 
     #[test]
