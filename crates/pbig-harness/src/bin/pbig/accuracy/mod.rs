@@ -55,7 +55,8 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
     let studies = made(args)?;
     let seconds = clock.elapsed().as_secs_f64();
     let is_kept = !args.quick && args.only.is_none();
-    let with_quick = if is_kept { Some(quick_seconds()?) } else { None };
+    let quick = is_kept.then(quick_seconds).transpose();
+    let with_quick = told_quick(&quick);
     let (machine, took) = (Machine::here(), Took { seconds, is_quick: args.quick, with_quick });
     let object = object(&machine, &took, &studies);
     let text = document(&machine, &took, &studies);
@@ -72,14 +73,20 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
     }
     save(&Path::new(DOCUMENTS).join("accuracy.md"), &text)?;
     plot(Path::new(DOCUMENTS), &studies)?;
-    keep(&format!("accuracy-{}", slug(&machine.cpu)), &object, args.json)
+    keep(&format!("accuracy-{}", slug(&machine.cpu)), &object, args.json)?;
+    quick.map(|_| ())
+}
+
+/// An error of the quick run is told with the results of the one that is done, not instead of them.
+fn told_quick(quick: &Result<Option<f64>, Failure>) -> Option<Result<f64, String>> {
+    quick.as_ref().map_err(Failure::to_string).copied().transpose()
 }
 
 /// How long a run has taken, and how long the same takes with `--quick`, where that is told.
 struct Took {
     seconds: f64,
     is_quick: bool,
-    with_quick: Option<f64>,
+    with_quick: Option<Result<f64, String>>,
 }
 
 impl Took {
@@ -92,8 +99,13 @@ impl Took {
         self.seconds < self.most_seconds()
     }
 
-    fn quick(&self) -> Option<Self> {
-        self.with_quick.map(|seconds| Self { seconds, is_quick: true, with_quick: None })
+    fn quick(&self) -> String {
+        let told = |seconds: f64| Self { seconds, is_quick: true, with_quick: None }.told();
+        match &self.with_quick {
+            None => String::new(),
+            Some(Ok(seconds)) => format!("\nWith `--quick` the same took {}.", told(*seconds)),
+            Some(Err(error)) => format!("\nWith `--quick` the same failed: {error}."),
+        }
     }
 
     fn told(&self) -> String {
@@ -156,7 +168,7 @@ fn object(machine: &Machine, took: &Took, studies: &[Made]) -> Value {
         "seconds": took.seconds,
         "seconds_wanted": took.most_seconds(),
         "met": took.is_met(),
-        "seconds_quick": took.with_quick,
+        "seconds_quick": took.with_quick.as_ref().and_then(|quick| quick.as_ref().ok()),
         "studies": named,
     })
 }
@@ -168,8 +180,7 @@ fn document(machine: &Machine, took: &Took, studies: &[Made]) -> String {
     let zero = "In the charts both axes are logarithmic; what is never wrong lies on the line below, at 0.";
     let each = studies.iter().map(|made| format!("{} {}", made.study.name, study::clock(made.seconds)));
     let each = each.collect::<Vec<_>>().join(", ");
-    let quick = took.quick().map(|quick| format!("\nWith `--quick` the same took {}.", quick.told()));
-    let took = format!("The run took {}. Of that: {each}.{}", took.told(), quick.unwrap_or_default());
+    let took = format!("The run took {}. Of that: {each}.{}", took.told(), took.quick());
     format!("{head} {}.\n{took}\n{zero}\n{parts}", machine.line())
 }
 
@@ -184,7 +195,7 @@ mod tests {
     #[test]
     fn the_document_has_the_machine_every_study_and_how_long_it_took() {
         let machine = Machine::here();
-        let full = Took { seconds: 432.1, is_quick: false, with_quick: Some(33.3) };
+        let full = Took { seconds: 432.1, is_quick: false, with_quick: Some(Ok(33.3)) };
         let text = document(&machine, &full, &small());
         let quick = "With `--quick` the same took 33.3 s from end to end; wanted on two cores: under 1 min 0 s (met).";
         let took = "The run took 7 min 12 s from end to end; wanted on two cores: under 20 min 0 s (met). Of that: small 9.6 s.";
@@ -201,6 +212,18 @@ mod tests {
             (&object["seconds"], &object["studies"]["small"]["seconds"]),
             (&json!(432.1), &json!(9.6))
         );
+    }
+
+    #[test]
+    fn what_fails_with_quick_is_told_with_the_results() {
+        let machine = Machine::here();
+        let with_quick = told_quick(&Err(Failure::Check("a pair is missing".into())));
+        let took = Took { seconds: 432.1, is_quick: false, with_quick };
+        let text = document(&machine, &took, &small());
+        assert!(text.contains("\nWith `--quick` the same failed: a pair is missing.\n"), "{text}");
+        assert!(text.contains("## a small study"));
+        assert!(object(&machine, &took, &small())["seconds_quick"].is_null());
+        assert_eq!((told_quick(&Ok(None)), told_quick(&Ok(Some(2.0)))), (None, Some(Ok(2.0))));
     }
 
     #[test]

@@ -9,7 +9,7 @@ pub(super) struct Timing {
     parts: Vec<(&'static str, f64)>,
     most_seconds: f64,
     /// What the same takes with `--quick`, which writes no document of its own.
-    with_quick: Option<f64>,
+    with_quick: Option<Result<f64, String>>,
 }
 
 impl Timing {
@@ -21,12 +21,13 @@ impl Timing {
         self.parts.push((name, took.as_secs_f64()));
     }
 
-    pub(super) fn note_quick(&mut self, quick: &Self) {
-        self.with_quick = Some(quick.seconds());
+    /// The seconds of that run, or its error.
+    pub(super) fn note_quick(&mut self, quick: Result<f64, String>) {
+        self.with_quick = Some(quick);
     }
 
     pub(super) fn seconds_quick(&self) -> Option<f64> {
-        self.with_quick
+        self.with_quick.as_ref().and_then(|quick| quick.as_ref().ok()).copied()
     }
 
     pub(super) fn seconds(&self) -> f64 {
@@ -49,8 +50,13 @@ impl Timing {
         let parts: Vec<String> =
             self.parts.iter().map(|(name, seconds)| format!("{name} {seconds:.1} s")).collect();
         let took = told(self.seconds(), self.most_seconds);
-        let quick = self.with_quick.map(|seconds| told(seconds, MOST_SECONDS[1]));
-        let quick = quick.map_or(String::new(), |told| format!(" With `--quick` the same took {told}."));
+        let quick = match &self.with_quick {
+            None => String::new(),
+            Some(Ok(seconds)) => {
+                format!(" With `--quick` the same took {}.", told(*seconds, MOST_SECONDS[1]))
+            }
+            Some(Err(error)) => format!(" With `--quick` the same failed: {error}."),
+        };
         format!("The run took {took}. Of that: {}.{quick}", parts.join("; "))
     }
 }
@@ -73,11 +79,14 @@ mod tests {
             "The run took 30.0 s; wanted on two cores: under 60 s (met). Of that: one 30.0 s."
         );
         let mut full = Timing::new(false);
-        full.note_quick(&timing);
+        full.note_quick(Ok(timing.seconds()));
         assert!(
             full.text()
                 .ends_with("With `--quick` the same took 30.0 s; wanted on two cores: under 60 s (met).")
         );
+        full.note_quick(Err("a pair is missing".into()));
+        assert!(full.text().ends_with("With `--quick` the same failed: a pair is missing."));
+        assert_eq!(full.seconds_quick(), None);
         timing.note("other", Duration::from_secs(45));
         assert_eq!((timing.seconds(), timing.is_met()), (75.0, false));
         assert!(timing.text().contains("(missed)"), "{}", timing.text());
