@@ -15,5 +15,6 @@ pub mod runner;
 pub mod scenes;
 pub mod shadow;
 pub mod simulate;
+pub mod sorted;
 pub mod wide;
 pub mod world;

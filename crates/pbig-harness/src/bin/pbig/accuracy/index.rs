@@ -21,7 +21,7 @@ pub(super) fn run(quick: bool) -> Result<Study, Failure> {
     let every: Vec<Every> = WAYS.iter().map(|way| Every::of(way, quick)).collect();
     let (exact, sizes) = (exact::tallied(quick), sizes::looked_at(quick));
     check(&every, &exact, &sizes)?;
-    let at = if quick { vec![1000, 1 << 20] } else { vec![1000, 5000, 10_000, 100_000, 1 << 20] };
+    let at = if quick { vec![1000, 1 << 20] } else { vec![16, 128, 1000, 5000, 10_000, 100_000, 1 << 20] };
     let times = at.iter().map(|&n| Times::measure(n, quick)).collect::<Result<Vec<_>, _>>()?;
     let (kernels, of_kernels) = kernels(quick)?;
     let found = Found {

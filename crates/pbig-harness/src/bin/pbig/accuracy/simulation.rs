@@ -1,6 +1,6 @@
 //! What becomes of a scene with pbig's broad phase instead of rapier's own: contacts, energy, and where bodies go.
 //! Events come in another order, so rapier solves contacts in another order; how far that leads is held against what
-//! another order of insertion does.
+//! another order of insertion does, and what our order of events does to rapier's own broad phase.
 
 mod figures;
 mod runs;
@@ -62,7 +62,8 @@ impl Ways {
         self.of(sides::Way::is_permuted).collect()
     }
 
-    fn pbig(&self) -> impl Iterator<Item = &Figures> {
+    /// The runs that are held against the permuted ones.
+    fn held(&self) -> impl Iterator<Item = &Figures> {
         self.of(sides::Way::is_held_against_stock)
     }
 
@@ -112,6 +113,8 @@ fn distances(scenes: &[Ways]) -> Table {
         "step",
         "permuted_mean",
         "permuted_largest",
+        "sorted_mean",
+        "sorted_largest",
         "pbig_mean",
         "pbig_largest",
         "pbig_without_margin_mean",
@@ -127,7 +130,7 @@ fn distances(scenes: &[Ways]) -> Table {
     table
 }
 
-/// The permuted ones together, then each of pbig's.
+/// The permuted ones together, then each that is held against them.
 fn at_an_instant(ways: &[[f64; 2]]) -> Vec<[f64; 2]> {
     let of = |wanted: fn(&sides::Way) -> bool| {
         WAYS.iter().zip(ways).filter(move |(way, _)| wanted(way)).map(|(_, apart)| *apart)
@@ -143,7 +146,7 @@ fn multiples(scenes: &[Ways]) -> Table {
     let columns = ["scene", "broad_phase", "quantity", "times", "permuted_runs_nearer_percent"];
     let mut table = Table::new("multiples", title, &columns);
     for ways in scenes {
-        for run in ways.pbig() {
+        for run in ways.held() {
             for (quantity, Multiple { times, nearer, .. }) in ways.multiples(run) {
                 let percent = times.map(|_| 100.0 * nearer as f64 / ways.yardsticks().len().max(1) as f64);
                 table.row([ways.scene.into(), run.way.into(), quantity.into(), times.into(), percent.into()]);
@@ -161,8 +164,9 @@ mod tests {
     #[test]
     fn the_farthest_of_the_permuted_runs_is_the_yardstick() {
         let ways: Vec<[f64; 2]> = (0..WAYS.len()).map(|way| [way as f64, 10.0 - way as f64]).collect();
-        let pbig = 2.0 + PERMUTED as f64;
-        let right = [[pbig - 1.0, 8.0], [pbig, 10.0 - pbig], [pbig + 2.0, 8.0 - pbig]];
+        let sorted = 2.0 + PERMUTED as f64;
+        let held = [sorted, sorted + 1.0, sorted + 3.0].map(|way| [way, 10.0 - way]);
+        let right = [&[[sorted - 1.0, 8.0]], &held[..]].concat();
         assert_eq!(at_an_instant(&ways), right);
     }
 

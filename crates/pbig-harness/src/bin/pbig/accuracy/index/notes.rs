@@ -96,16 +96,17 @@ fn table_2_note() -> String {
 }
 
 /// Which root stands beside the paper's in table 2, and whether it is right.
-fn root_note(Found { every, .. }: &Found) -> String {
+fn root_note(Found { every, counterexamples, .. }: &Found) -> String {
     let right = |fix: usize| match every[0].first[fix] {
         Some(n) => format!("{} it is wrong from n = {n} on", CORRECTIONS[fix]),
-        None => format!("{} it is right up to n = {}", CORRECTIONS[fix], every[0].most()),
+        None => format!("{} it is right for all pairs up to n = {}", CORRECTIONS[fix], every[0].most()),
     };
     format!(
-        "Table 2, ours with a root: the processor's f32 root ({}), as the paper's is CUDA's at that point; {}, by {}.",
+        "Table 2, ours with a root: the processor's f32 root ({}), as the paper's is CUDA's at that point; {}, by {}; {}.",
         label(&every[0].way),
         right(0),
-        right(1)
+        right(1),
+        counterexamples[0].ends()
     )
 }
 

@@ -97,13 +97,26 @@ pub(super) fn note() -> String {
          nearest f32, cut to the next towards zero (as the multiply-add of the paper's device cuts its product), or stay \
          wide; and the product can begin with h y or y y. So there are {} ways for a step. The first two steps go one \
          way, a third and fourth another. Of the result the whole number can be x y cut, x y rounded up (which is held \
-         against the exact root rounded up), or 1 / y cut, and x y and 1 / y can be rounded in three ways. How many of these \
+         against the exact root rounded up), or 1 / y cut, and x y and 1 / y can be rounded in three ways. (Of these, cut and \
+         wide differ by a fraction alone, which makes no difference to a number that is cut: both count.) How many of these \
          ways give both constants' figures up to 100000 tests, both up to 1000000, and Carmack's alone up to 1000000; rows \
-         beyond are not looked at. {}. {}. The paper does not say on what its test ran.",
+         beyond are not looked at. {}. {}{}. The paper does not say on what its test ran.",
         Step::all().len(),
         told.join(". "),
+        alike(&forms),
         verdict(&forms.map(|(_, counts)| counts).into_iter().fold(Counts::default(), sum))
     )
+}
+
+/// Why two forms have the same counts, if they have.
+fn alike(forms: &[(&str, Counts); 3]) -> String {
+    match forms {
+        [_, (up, one), (reciprocal, other)] if one == other => format!(
+            "{up} and {reciprocal} have the same counts: a whole root is wrong by either where y is the least above 1 over \
+             it, and hardly another number is. "
+        ),
+        _ => String::new(),
+    }
 }
 
 fn verdict([two, three, four, same]: &Counts) -> &'static str {

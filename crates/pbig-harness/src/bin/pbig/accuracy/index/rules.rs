@@ -14,6 +14,16 @@ pub(super) struct Searched {
     pub(super) found: Option<Counterexample>,
 }
 
+impl Searched {
+    /// What the rules give at the ends of rows, in words.
+    pub(super) fn ends(&self) -> String {
+        match self.found {
+            Some(it) => format!("at the ends of rows they are wrong from n = {} on", it.n),
+            None => format!("at the ends of rows they are right up to n = {}", self.most),
+        }
+    }
+}
+
 pub(super) fn counterexamples(quick: bool) -> Vec<Searched> {
     // Of two steps it takes seconds.
     let most = if quick { 1 << 16 } else { 1 << 20 };

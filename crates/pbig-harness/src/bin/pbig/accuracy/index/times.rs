@@ -55,10 +55,14 @@ impl Times {
     }
 }
 
-/// Blocks that cover what there is, or are spread over it.
+/// Blocks spread over what there is; all of it, as often as makes as many indices, if there are fewer.
 fn blocks(all: i64, times: i64) -> Vec<Block> {
-    let count = (BLOCK * times).min(all / BLOCKS).max(1);
-    (0..BLOCKS.min(all)).map(|k| ((all - count) * k / (BLOCKS - 1).max(1), count)).collect()
+    let count = BLOCK * times;
+    let evenly = |k: i64| ((all - count) * k / (BLOCKS - 1), count);
+    if all < BLOCKS * count {
+        return vec![(0, all); (BLOCKS * count / all + 1) as usize];
+    }
+    (0..BLOCKS).map(evenly).collect()
 }
 
 struct Sides {
@@ -129,6 +133,11 @@ mod tests {
         for all in [1, 3, 15, 16, 17, 1000, 1 << 39] {
             let blocks = blocks(all, 1);
             assert!(blocks.iter().all(|&(first, count)| first >= 0 && count > 0 && first + count <= all));
+            let indices: i64 = blocks.iter().map(|block| block.1).sum();
+            assert!(
+                (BLOCKS * BLOCK..=BLOCKS * BLOCK + all.min(BLOCK)).contains(&indices),
+                "{all}: {indices}"
+            );
         }
     }
 

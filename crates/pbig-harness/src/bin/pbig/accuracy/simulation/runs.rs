@@ -112,7 +112,11 @@ mod tests {
         let permuted = ["stock permuted, least", "stock permuted, median", "stock permuted, most"];
         assert_eq!(
             (&names[..2], &names[2..5], &names[5][..]),
-            (&["stock".to_owned(), "stock again".into()][..], &permuted.map(str::to_owned)[..], "pbig")
+            (
+                &["stock".to_owned(), "stock again".into()][..],
+                &permuted.map(str::to_owned)[..],
+                "stock sorted"
+            )
         );
         let column = |k: usize| [2, 3, 4].map(|row: usize| rows[row][k].clone());
         assert_eq!(column(2), [2.0, 11.0, 20.0].map(Cell::Number));

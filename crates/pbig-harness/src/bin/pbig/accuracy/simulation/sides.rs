@@ -1,4 +1,5 @@
-//! Worlds of one scene, side by side: with rapier's own broad phase, with pbig's, and with bodies in another order.
+//! Worlds of one scene, side by side: with rapier's own broad phase, with pbig's, and with bodies or events in another
+//! order.
 
 use crate::bench::measure::timed;
 use crate::output::Failure;
@@ -7,10 +8,20 @@ use pbig_harness::mechanics::Mechanics;
 use pbig_harness::numbered::{Apart, Numbered};
 use pbig_harness::reported::Reported;
 use pbig_harness::scenes::Scene;
+use pbig_harness::sorted::Sorted;
 use pbig_harness::world::{World, to_vector};
 use rapier_pbig::{Config, PbigBroadPhase};
 use rapier3d::prelude::*;
 use std::hash::{DefaultHasher, Hash, Hasher};
+
+/// What is in another order than rapier's own broad phase has it in the scene.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Order {
+    /// Bodies, as they are inserted; of a seed.
+    Permuted(u64),
+    /// Events, as rapier is told of them: as ours has them.
+    Sorted,
+}
 
 /// One way to run a scene.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -18,13 +29,12 @@ pub(super) struct Way {
     pub(super) name: &'static str,
     /// Of pbig's broad phase; none: rapier's own.
     margin: Option<f32>,
-    /// For the order in which bodies are inserted; none: the scene's.
-    order: Option<u64>,
+    order: Option<Order>,
     /// The way before it once more.
     is_again: bool,
 }
 
-const fn stock(name: &'static str, order: Option<u64>) -> Way {
+const fn stock(name: &'static str, order: Option<Order>) -> Way {
     Way { name, margin: None, order, is_again: false }
 }
 
@@ -37,25 +47,28 @@ const fn again(name: &'static str, way: Way) -> Way {
 }
 
 const STOCK: Way = stock("stock", None);
+/// What tells how much of a difference is that of the order of events.
+pub(super) const SORTED: &str = "stock sorted";
 const PBIG: Way = pbig("pbig", PbigBroadPhase::CONFIG.margin);
 
 /// So many orders of insertion beside the scene's: a run that is one more of them is farther than all these once in 20 times.
 pub(super) const PERMUTED: usize = 19;
 
 /// All ways, what the others are held against first.
-pub(super) static WAYS: [Way; PERMUTED + 5] = ways();
+pub(super) static WAYS: [Way; PERMUTED + 6] = ways();
 
-const fn ways() -> [Way; PERMUTED + 5] {
-    let mut ways = [STOCK; PERMUTED + 5];
+const fn ways() -> [Way; PERMUTED + 6] {
+    let mut ways = [STOCK; PERMUTED + 6];
     ways[1] = again("stock again", STOCK);
     let mut order = 1;
     while order <= PERMUTED {
-        ways[1 + order] = stock("stock permuted", Some(order as u64));
+        ways[1 + order] = stock("stock permuted", Some(Order::Permuted(order as u64)));
         order += 1;
     }
-    ways[PERMUTED + 2] = PBIG;
-    ways[PERMUTED + 3] = again("pbig again", PBIG);
-    ways[PERMUTED + 4] = pbig("pbig without margin", 0.0);
+    ways[PERMUTED + 2] = stock(SORTED, Some(Order::Sorted));
+    ways[PERMUTED + 3] = PBIG;
+    ways[PERMUTED + 4] = again("pbig again", PBIG);
+    ways[PERMUTED + 5] = pbig("pbig without margin", 0.0);
     ways
 }
 
@@ -73,22 +86,31 @@ impl Way {
         }
     }
 
-    /// Whether it is pbig's, for the first time.
+    /// Whether it is pbig's, for the first time, or has its order of events.
     pub(super) fn is_held_against_stock(&self) -> bool {
-        self.is_pbig() && !self.is_again
+        (self.is_pbig() || self.order == Some(Order::Sorted)) && !self.is_again
     }
 
-    /// Rapier's own broad phase, and another order.
+    /// Rapier's own broad phase, and another order of bodies.
     pub(super) fn is_permuted(&self) -> bool {
-        self.order.is_some()
+        matches!(self.order, Some(Order::Permuted(_)))
     }
 
     fn broad_phase(&self) -> Box<dyn BroadPhase> {
-        match self.margin {
-            None => Box::new(DefaultBroadPhase::new()),
-            Some(margin) => {
+        let stock = DefaultBroadPhase::new();
+        match (self.margin, self.order) {
+            (Some(margin), _) => {
                 Box::new(PbigBroadPhase::with_config(Config { margin, ..PbigBroadPhase::CONFIG }))
             }
+            (None, Some(Order::Sorted)) => Box::new(Sorted(stock)),
+            (None, _) => Box::new(stock),
+        }
+    }
+
+    fn inserted(&self, scene: &Numbered) -> Numbered {
+        match self.order {
+            Some(Order::Permuted(seed)) => scene.permuted(seed),
+            _ => scene.inserted(&(0..scene.bodies.len()).collect::<Vec<_>>()),
         }
     }
 }
@@ -161,9 +183,7 @@ pub(super) struct Side {
 
 impl Side {
     fn new(way: Way, scene: &Numbered) -> Self {
-        let as_they_are: Vec<usize> = (0..scene.bodies.len()).collect();
-        let numbered = way.order.map_or_else(|| scene.inserted(&as_they_are), |seed| scene.permuted(seed));
-        let broad_phase = way.broad_phase();
+        let (numbered, broad_phase) = (way.inserted(scene), way.broad_phase());
         let (reported, compared) = (Reported::default(), 0);
         Self { way, numbered, broad_phase, samples: vec![], ms: vec![], reported, compared }
     }
@@ -264,10 +284,11 @@ mod tests {
 
     #[test]
     fn orders_are_all_different_and_every_way_is_of_one_kind() {
-        let orders: Vec<u64> = WAYS.iter().filter_map(|way| way.order).collect();
-        assert_eq!(orders, (1..=PERMUTED as u64).collect::<Vec<_>>());
+        let orders: Vec<Order> = WAYS.iter().filter_map(|way| way.order).collect();
+        let permuted = (1..=PERMUTED as u64).map(Order::Permuted);
+        assert_eq!(orders, permuted.chain([Order::Sorted]).collect::<Vec<_>>());
         assert_eq!(WAYS.iter().filter(|way| way.is_again).count(), 2);
-        assert_eq!(WAYS.iter().filter(|way| way.is_held_against_stock()).count(), 2);
+        assert_eq!(WAYS.iter().filter(|way| way.is_held_against_stock()).count(), 3);
     }
 
     #[test]

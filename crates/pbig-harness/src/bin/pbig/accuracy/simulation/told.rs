@@ -3,25 +3,27 @@
 use super::super::study::plain;
 use super::Ways;
 use super::figures::{DISTANCE, Figures, Multiple, multiple};
-use super::sides::{Moving, PERMUTED, WAYS};
+use super::sides::{Moving, PERMUTED, SORTED, WAYS};
 
 /// Everything farther than so many times the yardstick is listed.
 const FAR: f64 = 3.0;
 
 pub(super) fn notes(scenes: &[Ways]) -> Vec<String> {
-    let runs = || scenes.iter().flat_map(|ways| ways.pbig());
+    let runs = || scenes.iter().flat_map(|ways| ways.held().filter(|run| run.way != SORTED));
     let (compared, needed) =
         runs().fold((0, 0), |(steps, pairs), run| (steps + run.compared, pairs + run.reported.needed));
     let mut notes = vec![
         format!(
             "Each scene with rapier's own broad phase (stock), with pbig's, with pbig's without a margin, and {PERMUTED} \
              times with stock and the bodies inserted in another order. These are the control: as far as they are from \
-             stock, a run says nothing about who found the pairs. What f32 itself does to a world is in the study before \
+             stock, a run says nothing about who found the pairs. Rapier solves contacts in an order that comes from that of \
+             the broad phase's events. Ours come sorted by colliders; so in one run more (sorted) stock's events are sorted as \
+             ours are: what it differs by, it does by their order alone. What f32 itself does to a world is in the study before \
              this one, where the same world in f64 is the truth. All in turn, step by step. Contacts and points are \
              means over the second half of the run; penetration and momentum are of the whole run, energy is in % of that \
              after the first step. At rest: less than 1 mJ for each kg from there to the end; \"not within\" so many steps: \
              not in this run. The cloud has no gravity, no ground and no sleep: what it loses of momentum is error. In the \
-             chart stock at 0 is the run that all are held against; the others of that colour are those again and permuted."
+             chart stock at 0 is the run that all are held against; the others of that colour are those again, permuted and sorted."
         ),
         format!(
             "Pairs that overlap and that pbig does not report: none of {needed}, in {compared} steps (brute force)."
@@ -53,29 +55,66 @@ fn rests(scenes: &[Ways]) -> String {
     )
 }
 
-/// In how many quantities pbig is farther from stock than every permuted run, and in how many chance would have it.
+/// Quantities, by scene, that have a meaning and in which not all these runs are as far from stock.
+fn counted<'a>(
+    name: &str,
+    scenes: &'a [Ways],
+) -> impl Iterator<Item = (&'static str, &'static str, Multiple)> + use<'a> {
+    let of = move |ways: &'a Ways, run: &'a Figures| {
+        let told = ways.multiples(run).filter(|(_, found)| found.times.is_some() && !found.is_tied);
+        told.map(|(quantity, found)| (ways.scene, quantity, found))
+    };
+    let runs = scenes.iter().filter_map(|ways| Some((ways, ways.held().find(|run| run.way == name)?)));
+    runs.flat_map(move |(ways, run)| of(ways, run)).collect::<Vec<_>>().into_iter()
+}
+
+/// Those in which a run is farther than every permuted one.
+fn farthest(name: &str, scenes: &[Ways]) -> Vec<(&'static str, &'static str)> {
+    let is_farther = |(_, _, found): &(_, _, Multiple)| found.nearer == PERMUTED;
+    counted(name, scenes).filter(is_farther).map(|(scene, quantity, _)| (scene, quantity)).collect()
+}
+
+/// In how many quantities runs are farther from stock than every permuted one, and in how many chance would have it.
 fn beyond(scenes: &[Ways]) -> String {
+    let sorted = farthest(SORTED, scenes);
     let of = |name: &'static str| {
-        let counted = scenes.iter().flat_map(|ways| {
-            let run = ways.pbig().find(|run| run.way == name);
-            let told = run.into_iter().flat_map(|run| ways.multiples(run));
-            let told = told.filter(|(_, found)| found.times.is_some() && !found.is_tied);
-            told.map(|(_, found)| found.nearer == ways.yardsticks().len())
-        });
-        let all: Vec<bool> = counted.collect();
-        let farther = all.iter().filter(|is_farther| **is_farther).count();
-        let by_chance = all.len() as f64 / (PERMUTED + 1) as f64;
-        format!("{farther} of {} with {name}, {by_chance:.1} by chance", all.len())
+        let (farther, all) = (farthest(name, scenes), counted(name, scenes).count());
+        let too = farther.iter().filter(|one| sorted.contains(one)).count();
+        let too = if name == SORTED { String::new() } else { format!(", {too} of them also with {SORTED}") };
+        format!(
+            "{} of {all} with {name}, {:.1} by chance{too}",
+            farther.len(),
+            all as f64 / (PERMUTED + 1) as f64
+        )
     };
     let ways = WAYS.iter().filter(|way| way.is_held_against_stock());
     format!(
-        "If pbig were one more order of insertion, it would be farther from stock than all {PERMUTED} others in one quantity of \
-         {}. It is in {}. Quantities in which all these runs are as far from stock do not count. \
+        "If a run were one more order of insertion, it would be farther from stock than all {PERMUTED} others in one quantity of \
+         {}. It is in {}. So {}. Quantities in which all these runs are as far from stock do not count. \
          Quantities of one scene are not independent. The last table has the percent of permuted runs that \
          are nearer.",
         PERMUTED + 1,
-        ways.map(|way| of(way.name)).collect::<Vec<_>>().join("; in ")
+        ways.map(|way| of(way.name)).collect::<Vec<_>>().join("; in "),
+        cause(scenes)
     )
+}
+
+/// Of what is beyond chance with pbig, whether the order of events does as much.
+fn cause(scenes: &[Ways]) -> &'static str {
+    let [ours, sorted] = ["pbig", SORTED].map(|name| {
+        let (count, all) = (farthest(name, scenes).len() as f64, counted(name, scenes).count() as f64);
+        let chance = all / (PERMUTED + 1) as f64;
+        // Two standard deviations, of quantities as if they were independent.
+        (count, chance + 2.0 * chance.sqrt())
+    });
+    match (ours.0 > ours.1, sorted.0 > sorted.1) {
+        (false, _) => "a run with pbig is as one more order of insertion, as far as this can tell",
+        (true, true) => {
+            "our order of events sets runs apart from those with stock's, more than orders of insertion do among each other, \
+             whoever finds the pairs"
+        }
+        (true, false) => "runs with pbig are apart, and the order of events is not why",
+    }
 }
 
 /// Mean distances at the end as multiples of the farthest permuted run's: geometric means over the scenes in which
@@ -120,16 +159,16 @@ fn first_difference(ways: &Ways) -> String {
         None => format!("{name} gives stock's positions to the bit, to the end"),
         Some(step) => format!("{name} differs from stock from step {step}"),
     };
-    let pbig = ways.pbig().map(|run| told(run.way, run.differs));
-    let all: Vec<String> = [told("a permuted stock", permuted)].into_iter().chain(pbig).collect();
+    let held = ways.held().map(|run| told(run.way, run.differs));
+    let all: Vec<String> = [told("a permuted stock", permuted)].into_iter().chain(held).collect();
     format!("{}: {}.", ways.scene, all.join("; "))
 }
 
-/// Every quantity in which pbig is farther from stock than permuted runs by more than [`FAR`], or the worst one.
+/// Every quantity in which a run is farther from stock than permuted runs by more than [`FAR`], or the worst one.
 fn how_far(scenes: &[Ways]) -> String {
     let mut all: Vec<(f64, String)> = Vec::new();
     for ways in scenes {
-        for run in ways.pbig() {
+        for run in ways.held() {
             let told = |(quantity, found): (&str, Multiple)| {
                 Some((found.times?, told(ways.scene, run.way, quantity, &found)))
             };
@@ -142,12 +181,12 @@ fn how_far(scenes: &[Ways]) -> String {
     if far.is_empty() {
         let worst = all.first().map_or("nothing", |one| one.1.as_str());
         return format!(
-            "In no quantity is pbig more than {FAR} times as far from stock as a stock with another order is: at \
+            "In no quantity is a run more than {FAR} times as far from stock as a stock with another order is: at \
              most {worst}."
         );
     }
     format!(
-        "All in which pbig is more than {FAR} times as far from stock as the farthest of the stock runs with \
+        "All in which a run is more than {FAR} times as far from stock as the farthest of the stock runs with \
          another order, {} of {count} quantities: {}.",
         far.len(),
         far.join("; ")
@@ -172,11 +211,16 @@ mod tests {
     use super::super::sides;
     use super::*;
 
-    /// Stock and one permuted run with 100 and 110 contacts, pbig with these.
+    /// Stock, sorted or not, with 100 contacts, the permuted runs with 110, pbig with these.
     fn made(pbig: f64) -> Vec<Ways> {
+        made_with(100.0, pbig)
+    }
+
+    fn made_with(sorted: f64, pbig: f64) -> Vec<Ways> {
         let contacts = |way: &sides::Way| match (way.is_pbig(), way.is_permuted()) {
             (true, _) => pbig,
             (_, true) => 110.0,
+            _ if way.name == SORTED => sorted,
             _ => 100.0,
         };
         let run = |way| Figures { contacts: contacts(way), way: way.name, ..nothing() };
@@ -189,11 +233,11 @@ mod tests {
         let near = how_far(&made(130.0));
         let worst = "with pbig, 130.0 where stock has 100.0 and a permuted one 110.0 (3.00 times, ";
         assert!(near.contains("at most contacts of column") && near.contains(worst), "{near}");
-        // Just beyond: pbig and pbig without a margin, in contacts and nothing else of eight quantities each.
+        // Just beyond: pbig and pbig without a margin, in contacts and nothing else of eight quantities each, sorted in none.
         let far = how_far(&made(131.0));
-        assert!(far.starts_with("All in which pbig is more than 3 times"), "{far}");
+        assert!(far.starts_with("All in which a run is more than 3 times"), "{far}");
         assert!(
-            far.contains(", 2 of 16 quantities") && far.matches("(3.10 times, 19 of").count() == 2,
+            far.contains(", 2 of 24 quantities") && far.matches("(3.10 times, 19 of").count() == 2,
             "{far}"
         );
     }
@@ -209,19 +253,33 @@ mod tests {
             ways
         };
         let told = typical(&[with("near", 0.5), with("far", 8.0), with("same", 0.0)]);
-        assert!(told.ends_with(": 2.00 times with pbig, 2.00 times with pbig without margin."), "{told}");
+        assert!(
+            told.ends_with(" with stock sorted, 2.00 times with pbig, 2.00 times with pbig without margin."),
+            "{told}"
+        );
     }
 
     #[test]
     fn a_run_beyond_all_permuted_ones_is_counted() {
         let told = beyond(&made(105.0));
         assert!(
-            told.contains("It is in 0 of 1 with pbig, 0.1 by chance; in 0 of 1 with pbig without"),
+            told.contains("; in 0 of 1 with pbig, 0.1 by chance, 0 of them also with stock sorted;"),
             "{told}"
         );
+        assert!(told.contains("So a run with pbig is as one more order of insertion"), "{told}");
         let told = beyond(&made(111.0));
         assert!(
-            told.contains("It is in 1 of 1 with pbig, 0.1 by chance; in 1 of 1 with pbig without"),
+            told.contains("; in 1 of 1 with pbig, 0.1 by chance, 0 of them also with stock sorted;"),
+            "{told}"
+        );
+        assert!(told.contains("the order of events is not why"), "{told}");
+        let told = beyond(&made_with(112.0, 111.0));
+        assert!(
+            told.contains("in 1 of 1 with stock sorted, 0.1 by chance; in 1 of 1 with pbig, 0.1"),
+            "{told}"
+        );
+        assert!(
+            told.contains("0.1 by chance, 1 of them also with") && told.contains("So our order"),
             "{told}"
         );
     }
@@ -229,7 +287,7 @@ mod tests {
     #[test]
     fn what_is_as_far_in_all_runs_does_not_count() {
         let told = beyond(&made(110.0));
-        assert!(told.contains("It is in 0 of 0 with pbig, 0.0 by chance"), "{told}");
+        assert!(told.contains("; in 0 of 0 with pbig, 0.0 by chance"), "{told}");
     }
 
     #[test]
@@ -250,7 +308,7 @@ mod tests {
         assert!(told.contains("with pbig are the same, to the bit"), "{told}");
         assert_eq!(again(&scenes, "stock permuted"), None);
         let told = first_difference(&scenes[0]);
-        assert_eq!(told.matches("to the bit, to the end").count(), 3, "{told}");
+        assert_eq!(told.matches("to the bit, to the end").count(), 4, "{told}");
         scenes[0].repeats[0].1 = Some(7);
         scenes[0].runs[3].differs = Some(9);
         scenes[0].runs[2].differs = Some(8);

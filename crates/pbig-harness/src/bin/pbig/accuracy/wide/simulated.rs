@@ -1,12 +1,13 @@
 //! Worlds that move: simulated by rapier3d-f64, whose poses are the truth in each step, and by rapier in f32 beside it, once
-//! with our broad phase and once, as the control, with rapier's. What is
-//! promised of boxes must hold here, too; sums over worlds are without these, which are hundreds of frames of one.
+//! with our broad phase and, as controls, with rapier's, in its own order of events and in ours. What is promised of boxes
+//! must hold here, too; sums over worlds are without these, which are hundreds of frames of one.
 
 use super::super::study::{Cell, Table, plain};
 use super::place::{Along, IN_WORLD, Place, Row, Way, finder, rapiers};
 use crate::output::Failure;
 use pbig_core::Pair;
 use pbig_harness::scenes::Scene;
+use pbig_harness::sorted::Sorted;
 use pbig_harness::wide::{Differences, Layout, Pose, WideWorld, moved, to_f64};
 use pbig_harness::world::World;
 use rapier_pbig::PbigBroadPhase;
@@ -33,8 +34,8 @@ pub(super) struct Simulated {
     /// All steps together: what boxes in f32 make of the world in f64, held in f32.
     pub(super) row: Row,
     steps: usize,
-    /// The world in f32 with our broad phase, and with rapier's.
-    own: [Own; 2],
+    /// The world in f32 with our broad phase, with rapier's, and with rapier's in our order of events.
+    own: [Own; 3],
 }
 
 /// What has become of a world that rapier simulates in f32.
@@ -65,6 +66,7 @@ impl Simulated {
         let mut narrow = [
             Narrow::of((scene, bodies), offset, Box::new(PbigBroadPhase::new()))?,
             Narrow::of((scene, bodies), offset, Box::new(DefaultBroadPhase::new()))?,
+            Narrow::of((scene, bodies), offset, Box::new(Sorted(DefaultBroadPhase::new())))?,
         ];
         let mut sum: Option<Row> = None;
         for _ in 0..steps {
@@ -154,6 +156,10 @@ pub(super) fn table(all: &[Simulated]) -> Table {
         "added_with_stock_in_f32_percent",
         "apart_with_stock",
         "lost_with_stock",
+        "missed_with_stock_sorted_percent",
+        "added_with_stock_sorted_percent",
+        "apart_with_stock_sorted",
+        "lost_with_stock_sorted",
     ];
     let mut table = Table::new("simulated", title, &columns);
     all.iter().for_each(|one| table.row(one.cells()));
@@ -173,8 +179,8 @@ impl Simulated {
         head.into_iter().chain(counts.map(Cell::from)).chain(own.iter().flat_map(of_own)).collect()
     }
 
-    /// Pairs in f32 that are missed or too many, of those in f64, in percent: with our broad phase, and with rapier's.
-    fn wrong(&self) -> [f64; 2] {
+    /// Pairs in f32 that are missed or too many, of those in f64, in percent, of each world in f32.
+    fn wrong(&self) -> [f64; 3] {
         self.own.map(|own| self.percent(own.pairs.missed + own.pairs.added))
     }
 
@@ -191,9 +197,11 @@ pub(super) fn notes(all: &[Simulated]) -> Vec<String> {
                  as rapier holds them in f32, are a layout like the others: boxes widened by 3 ulps miss none of its \
                  pairs, or the run fails. Beside it rapier simulates the world in f32, with our broad phase: its pairs differ \
                  from those in f64, step by step, by all that rounding does to bodies on their way, too; at the origin, \
-                 where rounding is least, by what two simulations differ anyway. The control is a third world, in f32 with \
-                 rapier's own broad phase (stock): what it differs from f64 is what f32 brings, and only what ours \
-                 differs beyond that could be of our broad phase."
+                 where rounding is least, by what two simulations differ anyway. A control is a third world, in f32 with \
+                 rapier's own broad phase (stock): what it differs from f64 is what f32 brings. Near the origin that is \
+                 little: the world in f64 is told of its pairs in the same order, by the same broad phase. So there is a \
+                 second control, stock with its events in our order (sorted): only what ours differs beyond both could be of \
+                 our broad phase."
         .to_owned();
     [about].into_iter().chain(names.into_iter().map(|name| where_it_starts(name, all))).collect()
 }
@@ -206,8 +214,8 @@ fn where_it_starts(name: &str, all: &[Simulated]) -> String {
     let wrong = |one: &Simulated| one.wrong()[0];
     let of_name = || all.iter().filter(|one| one.row.world == name);
     let each = |one: &Simulated| {
-        let [ours, stock] = one.wrong().map(plain);
-        format!("{ours}% at {} (stock {stock}%)", one.row.offset)
+        let [ours, stock, sorted] = one.wrong().map(plain);
+        format!("{ours}% at {} (stock {stock}%, sorted {sorted}%)", one.row.offset)
     };
     let told = of_name().map(each).collect::<Vec<_>>().join(", ");
     let near = of_name().map(wrong).next().unwrap_or(0.0);
@@ -221,17 +229,20 @@ fn where_it_starts(name: &str, all: &[Simulated]) -> String {
     )
 }
 
-/// How far our world in f32 is from f64, over how far stock's is.
+/// How far our world in f32 is from f64, over how far each control's is.
 fn against_stock<'a>(all: impl Iterator<Item = &'a Simulated>) -> String {
-    let ratios = |one: &Simulated| {
-        let [ours, stock] = one.wrong();
-        [ours / stock, one.own[0].apart / one.own[1].apart].map(|ratio| (one.row.offset, ratio))
+    let all: Vec<&Simulated> = all.collect();
+    let over = |control: usize| {
+        let ratio = |of: fn(&Simulated, usize) -> f64| {
+            let ratio = |one: &&Simulated| (one.row.offset, of(one, 0) / of(one, control));
+            range(&all.iter().map(ratio).collect::<Vec<_>>())
+        };
+        (ratio(|one, k| one.wrong()[k]), ratio(|one, k| one.own[k].apart))
     };
-    let (wrong, apart): (Vec<_>, Vec<_>) = all.map(ratios).map(|[wrong, apart]| (wrong, apart)).unzip();
+    let ((wrong, apart), (wrong_sorted, apart_sorted)) = (over(1), over(2));
     format!(
-        "Ours has {} as many wrong pairs as the control, and its bodies end {} as far from those in f64.",
-        range(&wrong),
-        range(&apart)
+        "Ours has {wrong} as many wrong pairs as stock, and {wrong_sorted} as many as stock sorted; its bodies end {apart} as \
+         far from those in f64 as stock's, and {apart_sorted} as far as those of stock sorted."
     )
 }
 
@@ -261,7 +272,7 @@ mod tests {
         let all = simulated(&[0.0, 1e6], true).expect("no failure");
         let [near, far] = &all[..] else { panic!("one scene at two places") };
         assert!(near.row.pairs > 1000 && near.row.pairs.abs_diff(far.row.pairs) < near.row.pairs / 5);
-        for (near, far, own) in (0..2).map(|k| (near.wrong()[k], far.wrong()[k], [near.own[k], far.own[k]])) {
+        for (near, far, own) in (0..3).map(|k| (near.wrong()[k], far.wrong()[k], [near.own[k], far.own[k]])) {
             assert!(near < 10.0 && far > 10.0 && own[1].apart > own[0].apart, "{own:?}");
         }
         assert!(far.row.poses.missed > 0 && far.row.in_all(IN_WORLD).missed == 0);
@@ -272,12 +283,17 @@ mod tests {
         for one in &mut all {
             one.own[0].pairs = Differences { missed: one.row.pairs, added: 0, ..one.own[0].pairs };
             one.own[1].pairs = Differences { missed: one.row.pairs / 2, added: 0, ..one.own[1].pairs };
-            (one.own[0].apart, one.own[1].apart) = (1.0, 4.0);
+            one.own[2].pairs = one.own[0].pairs;
+            [one.own[0].apart, one.own[1].apart, one.own[2].apart] = [1.0, 4.0, 0.5];
         }
         let told = where_it_starts("column, simulated in f64", &all);
         assert!(told.contains("at the origin nowhere, so many that a smaller one may not show."), "{told}");
-        assert!(told.contains("100.0% at 0 (stock 50.00%)"), "{told}");
-        assert!(told.ends_with("and its bodies end 0.25 to 0.25 times as far from those in f64."), "{told}");
+        assert!(told.contains("100.0% at 0 (stock 50.00%, sorted 100.0%)"), "{told}");
+        assert!(
+            told.contains("1.00 to 1.00 times as many as stock sorted; its bodies end 0.25 to 0.25"),
+            "{told}"
+        );
+        assert!(told.ends_with("and 2.00 to 2.00 times as far as those of stock sorted."), "{told}");
     }
 
     #[test]

@@ -85,6 +85,8 @@ struct Took {
     found: u64,
     /// The shorter of two calls, for all ids.
     ms: f64,
+    /// The longer of them.
+    longer: f64,
     /// All ids over those looked at.
     times: f64,
 }
@@ -96,7 +98,16 @@ impl Took {
         let (ids, times) = stretches(all, most);
         let call = || timed(|| WAYS[way].1(boxes, &ids));
         let ((found, first), (_, second)) = (call(), call());
-        Self { found, ms: first.min(second) * times, times }
+        Self { found, ms: first.min(second) * times, longer: first.max(second) * times, times }
+    }
+
+    /// Whether this way is faster than another: neither if calls of both overlap.
+    fn is_faster(&self, other: &Self) -> Option<bool> {
+        match () {
+            () if self.longer < other.ms => Some(true),
+            () if self.ms > other.longer => Some(false),
+            () => None,
+        }
     }
 }
 
@@ -162,7 +173,7 @@ fn abouts(rows: &[Vec<Took>], most: u64) -> [String; 3] {
         format!("{} to {} times as long as {}", short(least), short(longest), WAYS[way].0)
     };
     let all: Vec<String> = (0..IS_LAZY).map(against).collect();
-    let is_faster = |all: &Vec<Took>| std::array::from_fn(|root| all[IS_LAZY].ms < all[root].ms);
+    let is_faster = |all: &Vec<Took>| std::array::from_fn(|root| all[IS_LAZY].is_faster(&all[root]));
     let verdict = verdict(&rows.iter().map(is_faster).collect::<Vec<_>>());
     [
         format!(
@@ -185,19 +196,18 @@ fn abouts(rows: &[Vec<Took>], most: u64) -> [String; 3] {
     ]
 }
 
-/// Whether the lazy way is faster, from each number of objects with each root whether it is.
-fn verdict(rows: &[[bool; IS_LAZY]]) -> String {
-    let faster = rows.iter().flatten().filter(|is| **is).count();
-    let is_by_root = rows.iter().all(|row| *row == rows[0]);
-    let is_by_number = rows.iter().all(|row| row.iter().all(|is| *is == row[0]));
-    match faster {
-        all if all == rows.len() * IS_LAZY => "So it is faster than each of these roots".to_owned(),
-        0 => "So it is slower than each of these roots".to_owned(),
-        _ if is_by_root => "So the root decides which is faster".to_owned(),
-        _ if is_by_number => "So the number of objects decides which is faster".to_owned(),
-        some => format!(
-            "So it is faster in {some} of {} cases, which neither the root nor the number of objects decides alone",
-            rows.len() * IS_LAZY
+/// Whether the lazy way is faster, from each number of objects with each root whether it is, if that can be told.
+fn verdict(rows: &[[Option<bool>; IS_LAZY]]) -> String {
+    let count = |wanted: Option<bool>| rows.iter().flatten().filter(|is| **is == wanted).count();
+    let [faster, slower, same] = [Some(true), Some(false), None].map(count);
+    let cases = rows.len() * IS_LAZY;
+    match (faster, slower) {
+        (all, _) if all == cases => "So it is faster than each of these roots".to_owned(),
+        (_, all) if all == cases => "So it is slower than each of these roots".to_owned(),
+        _ => format!(
+            "So of {cases} cases it is faster in {faster} and slower in {slower}; in {same} the two calls of one lie on both \
+             sides of a call of the other{}",
+            if rows.iter().all(|row| *row == rows[0]) { ". The root decides which" } else { "" }
         ),
     }
 }
@@ -227,7 +237,7 @@ mod tests {
 
     #[test]
     fn a_row_has_the_lazy_way_over_each_root() {
-        let took = |ms: f64, times: f64| Took { found: 7, ms, times };
+        let took = |ms: f64, times: f64| Took { found: 7, ms, longer: ms, times };
         let all = [took(2.0, 1.0), took(4.0, 1.0), took(8.0, 1.0), took(4.0, 2.0)];
         let row = row([1000.0, 0.5, 1.0, 2.0], &all);
         let right = json!([1000, 0.5, 1.0, 2.0, 2.0, 4.0, 8.0, 4.0, 2.0, 1.0, 0.5, null, "all", "50.00 %"]);
@@ -235,19 +245,23 @@ mod tests {
         let told = abouts(&[all.into()], 10_000_000).join(" ");
         assert!(told.contains("More than 10,000,000 ids"), "{told}");
         assert!(told.contains("Here it takes 2.000 to 2.000 times as long as f32 root"), "{told}");
-        assert!(told.contains("So the root decides"), "{told}");
+        assert!(told.contains("of 3 cases it is faster in 1 and slower in 1; in 1 the two"), "{told}");
+        assert!(told.contains("The root decides"), "{told}");
     }
 
     #[test]
     fn what_decides_which_is_faster_is_what_the_rows_show() {
-        let [yes, no] = [[true; IS_LAZY], [false; IS_LAZY]];
-        let some = [true, false, false];
+        let [yes, no] = [[Some(true); IS_LAZY], [Some(false); IS_LAZY]];
+        let some = [Some(true), Some(false), None];
         let cases = [
             ([yes, yes], "faster than each"),
             ([no, no], "slower than each"),
-            ([some, some], "the root decides"),
-            ([yes, no], "the number of objects decides which"),
-            ([some, no], "in 1 of 6 cases, which neither"),
+            (
+                [some, some],
+                "faster in 2 and slower in 2; in 2 the two calls of one lie on both sides of a call of the other. \
+                            The root",
+            ),
+            ([some, no], "of 6 cases it is faster in 1 and slower in 4; in 1 the two"),
         ];
         for (rows, told) in cases {
             assert!(verdict(&rows).contains(told), "{}", verdict(&rows));
@@ -255,8 +269,18 @@ mod tests {
     }
 
     #[test]
+    fn a_way_is_faster_if_its_longer_call_is() {
+        let took = |ms: f64, longer: f64| Took { found: 7, ms, longer, times: 1.0 };
+        let against = |ms, longer| took(2.0, 3.0).is_faster(&took(ms, longer));
+        assert_eq!(
+            [against(3.5, 4.0), against(3.0, 4.0), against(1.0, 1.5)],
+            [Some(true), None, Some(false)]
+        );
+    }
+
+    #[test]
     fn ways_that_looked_at_the_same_are_compared() {
-        let took = |found, times| Took { found, ms: 1.0, times };
+        let took = |found, times| Took { found, ms: 1.0, longer: 1.0, times };
         let all = |second, (lazy, times)| [took(7, 2.0), took(second, 2.0), took(7, 2.0), took(lazy, times)];
         assert_eq!(odd_one(&all(7, (8, 4.0))), None);
         assert_eq!(odd_one(&all(7, (8, 1.0))), Some(IS_LAZY));
