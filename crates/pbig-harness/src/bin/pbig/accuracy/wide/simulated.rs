@@ -1,5 +1,5 @@
-//! Worlds that move: simulated by rapier3d-f64, whose poses are the truth in each step, and by rapier in f32 beside it, once
-//! with our broad phase and, as controls, with rapier's, in its own order of events and in ours. What is promised of boxes
+//! Worlds that move: simulated by rapier3d-f64, whose poses are the truth in each step, and by rapier in f32 beside it, with
+//! our broad phase and, as controls, with rapier's and with the orders of either in the other. What is promised of boxes
 //! must hold here, too; sums over worlds are without these, which are hundreds of frames of one.
 
 use super::super::study::{Cell, Table, plain};
@@ -10,7 +10,7 @@ use pbig_harness::scenes::Scene;
 use pbig_harness::sorted::Sorted;
 use pbig_harness::wide::{Differences, Layout, Pose, WideWorld, moved, to_f64};
 use pbig_harness::world::World;
-use rapier_pbig::PbigBroadPhase;
+use rapier_pbig::{HandleOrder, PbigBroadPhase};
 use rapier3d::prelude::{BroadPhase, Collider, DefaultBroadPhase};
 
 /// What moves.
@@ -29,13 +29,25 @@ const SCENES: [Scenery; 2] = [
     Scenery { scene: "pile", name: "pile, simulated in f64", bodies: 1000, steps: 120 },
 ];
 
+/// Names a broad phase, and makes it.
+type Kind = (&'static str, fn() -> Box<dyn BroadPhase>);
+
+/// With which rapier simulates in f32. The second of each two differs from the first in order alone: which collider of a
+/// pair is the first is as stock has it; and events are sorted as ours are.
+const KINDS: [Kind; 4] = [
+    ("pbig", || Box::new(PbigBroadPhase::new())),
+    ("pbig lower first", || Box::new(PbigBroadPhase::new().with_handle_order(HandleOrder::LowerIndexFirst))),
+    ("stock", || Box::new(DefaultBroadPhase::new())),
+    ("stock sorted", || Box::new(Sorted(DefaultBroadPhase::new()))),
+];
+
 /// A simulation at a place.
 pub(super) struct Simulated {
     /// All steps together: what boxes in f32 make of the world in f64, held in f32.
     pub(super) row: Row,
     steps: usize,
-    /// The world in f32 with our broad phase, with rapier's, and with rapier's in our order of events.
-    own: [Own; 3],
+    /// The world in f32, in the order of [`KINDS`].
+    own: [Own; KINDS.len()],
 }
 
 /// What has become of a world that rapier simulates in f32.
@@ -63,11 +75,8 @@ impl Simulated {
         let world = built((scene, bodies))?;
         let layout = Layout::of_world(&world);
         let mut wide = WideWorld::of(&world, [offset; 3]).map_err(Failure::Input)?;
-        let mut narrow = [
-            Narrow::of((scene, bodies), offset, Box::new(PbigBroadPhase::new()))?,
-            Narrow::of((scene, bodies), offset, Box::new(DefaultBroadPhase::new()))?,
-            Narrow::of((scene, bodies), offset, Box::new(Sorted(DefaultBroadPhase::new())))?,
-        ];
+        let narrow = KINDS.map(|(_, make)| Narrow::of((scene, bodies), offset, make()));
+        let mut narrow = narrow.into_iter().collect::<Result<Vec<_>, _>>()?;
         let mut sum: Option<Row> = None;
         for _ in 0..steps {
             wide.step();
@@ -81,7 +90,7 @@ impl Simulated {
         if ends.iter().any(|pose| !pose.translation.vector.norm().is_finite()) {
             return Err(Failure::Check(format!("{name}, {offset} away: a body is nowhere in f64")));
         }
-        Ok(Self { row, steps, own: narrow.map(|one| one.at_the_end(&ends)) })
+        Ok(Self { row, steps, own: std::array::from_fn(|kind| narrow[kind].at_the_end(&ends)) })
     }
 }
 
@@ -136,8 +145,12 @@ impl Narrow {
     }
 }
 
-pub(super) fn table(all: &[Simulated]) -> Table {
-    let title = "Simulated by rapier3d-f64 and by rapier in f32, all steps together";
+pub(super) fn tables(all: &[Simulated]) -> [Table; 2] {
+    [in_f64(all), in_f32(all)]
+}
+
+fn in_f64(all: &[Simulated]) -> Table {
+    let title = "Simulated by rapier3d-f64, its poses held in f32, all steps together";
     let columns = [
         "world",
         "offset",
@@ -148,40 +161,47 @@ pub(super) fn table(all: &[Simulated]) -> Table {
         "missed",
         "added",
         "missed_with_3_ulps",
-        "missed_by_the_simulation_in_f32_percent",
-        "added_by_the_simulation_in_f32_percent",
-        "apart_at_the_end",
-        "lost_in_f32",
-        "missed_with_stock_in_f32_percent",
-        "added_with_stock_in_f32_percent",
-        "apart_with_stock",
-        "lost_with_stock",
-        "missed_with_stock_sorted_percent",
-        "added_with_stock_sorted_percent",
-        "apart_with_stock_sorted",
-        "lost_with_stock_sorted",
     ];
     let mut table = Table::new("simulated", title, &columns);
     all.iter().for_each(|one| table.row(one.cells()));
     table
 }
 
+fn in_f32(all: &[Simulated]) -> Table {
+    let title = "Simulated by rapier in f32, held against rapier3d-f64, all steps together";
+    let columns = [
+        "world",
+        "offset",
+        "broad_phase",
+        "missed_percent",
+        "added_percent",
+        "apart_at_the_end",
+        "lost_bodies",
+    ];
+    let mut table = Table::new("simulated_in_f32", title, &columns);
+    for one in all {
+        for ((name, _), own) in KINDS.iter().zip(&one.own) {
+            let percents = [own.pairs.missed, own.pairs.added].map(|count| Cell::from(one.percent(count)));
+            let head = [one.row.world.into(), one.row.offset.into(), (*name).into()];
+            table.row(head.into_iter().chain(percents).chain([own.apart.into(), (own.lost as u64).into()]));
+        }
+    }
+    table
+}
+
 impl Simulated {
     fn cells(&self) -> Vec<Cell> {
-        let Self { row, own, .. } = self;
+        let row = &self.row;
         let (boxes, all) = (row.by_boxes(Way::Ulps(0)), row.in_all(Way::Ulps(0)));
         let head = [row.world.into(), row.offset.into(), (self.steps as u64).into(), row.pairs.into()];
         let counts = [boxes.missed, boxes.missed_deep, all.missed, all.added, row.in_all(IN_WORLD).missed];
-        let of_own = |own: &Own| {
-            let percents = [own.pairs.missed, own.pairs.added].map(|count| Cell::from(self.percent(count)));
-            percents.into_iter().chain([own.apart.into(), (own.lost as u64).into()])
-        };
-        head.into_iter().chain(counts.map(Cell::from)).chain(own.iter().flat_map(of_own)).collect()
+        head.into_iter().chain(counts.map(Cell::from)).collect()
     }
 
-    /// Pairs in f32 that are missed or too many, of those in f64, in percent, of each world in f32.
-    fn wrong(&self) -> [f64; 3] {
-        self.own.map(|own| self.percent(own.pairs.missed + own.pairs.added))
+    /// Pairs in f32 that are missed or too many, of those in f64, in percent, with a kind.
+    fn wrong(&self, kind: usize) -> f64 {
+        let own = &self.own[kind];
+        self.percent(own.pairs.missed + own.pairs.added)
     }
 
     fn percent(&self, count: u64) -> f64 {
@@ -197,11 +217,12 @@ pub(super) fn notes(all: &[Simulated]) -> Vec<String> {
                  as rapier holds them in f32, are a layout like the others: boxes widened by 3 ulps miss none of its \
                  pairs, or the run fails. Beside it rapier simulates the world in f32, with our broad phase: its pairs differ \
                  from those in f64, step by step, by all that rounding does to bodies on their way, too; at the origin, \
-                 where rounding is least, by what two simulations differ anyway. A control is a third world, in f32 with \
+                 where rounding is least, by what two simulations differ anyway. A control is another world, in f32 with \
                  rapier's own broad phase (stock): what it differs from f64 is what f32 brings. Near the origin that is \
-                 little: the world in f64 is told of its pairs in the same order, by the same broad phase. So there is a \
-                 second control, stock with its events in our order (sorted): only what ours differs beyond both could be of \
-                 our broad phase."
+                 little: the world in f64 is told of its pairs in the same order, by the same broad phase. So there are \
+                 two controls more: stock with its events sorted as ours are, and ours with the collider of the lower index \
+                 first in each pair (lower first), as stock has it, where ours has the one with fewer pairs first. These two differ in what \
+                 finds the pairs alone."
         .to_owned();
     [about].into_iter().chain(names.into_iter().map(|name| where_it_starts(name, all))).collect()
 }
@@ -211,38 +232,37 @@ const MOST_APART: f64 = 20.0;
 
 /// From which offset on the simulation in f32 is further from f64 than at the origin.
 fn where_it_starts(name: &str, all: &[Simulated]) -> String {
-    let wrong = |one: &Simulated| one.wrong()[0];
     let of_name = || all.iter().filter(|one| one.row.world == name);
     let each = |one: &Simulated| {
-        let [ours, stock, sorted] = one.wrong().map(plain);
-        format!("{ours}% at {} (stock {stock}%, sorted {sorted}%)", one.row.offset)
+        let kinds =
+            KINDS.iter().enumerate().map(|(kind, (name, _))| format!("{name} {}", plain(one.wrong(kind))));
+        format!("at {} {}", one.row.offset, kinds.collect::<Vec<_>>().join(", "))
     };
-    let told = of_name().map(each).collect::<Vec<_>>().join(", ");
-    let near = of_name().map(wrong).next().unwrap_or(0.0);
-    let first = of_name().find(|one| wrong(one) > 2.0 * near).map(|one| one.row.offset);
+    let told = of_name().map(each).collect::<Vec<_>>().join("; ");
+    let near = of_name().map(|one| one.wrong(0)).next().unwrap_or(0.0);
+    let first = of_name().find(|one| one.wrong(0) > 2.0 * near).map(|one| one.row.offset);
     let first = first.map_or("nowhere".into(), |offset| format!("from {offset:e} on"));
     let but = if near > MOST_APART { ", so many that a smaller one may not show" } else { "" };
     format!(
-        "{name}: pairs of the simulation in f32 that are missed or too many, of those in f64: {told}; more than twice \
-         as many as at the origin {first}{but}. {}",
-        against_stock(of_name())
+        "{name}: pairs of the simulation in f32 that are missed or too many, in percent of those in f64: {told}. With pbig \
+         more than twice as many as at the origin {first}{but}. {} {}",
+        over(of_name(), 0, 2),
+        over(of_name(), 1, 3)
     )
 }
 
-/// How far our world in f32 is from f64, over how far each control's is.
-fn against_stock<'a>(all: impl Iterator<Item = &'a Simulated>) -> String {
+/// How far a world in f32 is from f64, over how far that of a control is.
+fn over<'a>(all: impl Iterator<Item = &'a Simulated>, kind: usize, control: usize) -> String {
     let all: Vec<&Simulated> = all.collect();
-    let over = |control: usize| {
-        let ratio = |of: fn(&Simulated, usize) -> f64| {
-            let ratio = |one: &&Simulated| (one.row.offset, of(one, 0) / of(one, control));
-            range(&all.iter().map(ratio).collect::<Vec<_>>())
-        };
-        (ratio(|one, k| one.wrong()[k]), ratio(|one, k| one.own[k].apart))
+    let ratios = |of: fn(&Simulated, usize) -> f64| {
+        range(&all.iter().map(|one| (one.row.offset, of(one, kind) / of(one, control))).collect::<Vec<_>>())
     };
-    let ((wrong, apart), (wrong_sorted, apart_sorted)) = (over(1), over(2));
     format!(
-        "Ours has {wrong} as many wrong pairs as stock, and {wrong_sorted} as many as stock sorted; its bodies end {apart} as \
-         far from those in f64 as stock's, and {apart_sorted} as far as those of stock sorted."
+        "{} has {} as many wrong pairs as {}, and its bodies end {} as far from those in f64.",
+        KINDS[kind].0,
+        ratios(Simulated::wrong),
+        KINDS[control].0,
+        ratios(|one, kind| one.own[kind].apart)
     )
 }
 
@@ -272,28 +292,38 @@ mod tests {
         let all = simulated(&[0.0, 1e6], true).expect("no failure");
         let [near, far] = &all[..] else { panic!("one scene at two places") };
         assert!(near.row.pairs > 1000 && near.row.pairs.abs_diff(far.row.pairs) < near.row.pairs / 5);
-        for (near, far, own) in (0..3).map(|k| (near.wrong()[k], far.wrong()[k], [near.own[k], far.own[k]])) {
-            assert!(near < 10.0 && far > 10.0 && own[1].apart > own[0].apart, "{own:?}");
+        for kind in 0..KINDS.len() {
+            let own = [near.own[kind], far.own[kind]];
+            assert!(
+                near.wrong(kind) < 10.0 && far.wrong(kind) > 10.0 && own[1].apart > own[0].apart,
+                "{own:?}"
+            );
         }
         assert!(far.row.poses.missed > 0 && far.row.in_all(IN_WORLD).missed == 0);
         let told = where_it_starts(near.row.world, &all);
-        assert!(told.contains("from 1e6 on. Ours has "), "{told}");
-        assert_eq!(table(&all).rows.len(), 2);
-        let mut all = all;
+        assert!(told.contains("from 1e6 on. pbig has "), "{told}");
+        assert_eq!(tables(&all).map(|table| table.rows.len()), [2, 2 * KINDS.len()]);
+    }
+
+    #[test]
+    fn each_kind_is_held_against_its_control() {
+        let mut all = simulated(&[0.0, 1e6], true).expect("no failure");
         for one in &mut all {
-            one.own[0].pairs = Differences { missed: one.row.pairs, added: 0, ..one.own[0].pairs };
-            one.own[1].pairs = Differences { missed: one.row.pairs / 2, added: 0, ..one.own[1].pairs };
-            one.own[2].pairs = one.own[0].pairs;
-            [one.own[0].apart, one.own[1].apart, one.own[2].apart] = [1.0, 4.0, 0.5];
+            let with = |part: u64, apart| {
+                let pairs = Differences { missed: one.row.pairs / part, added: 0, ..one.own[0].pairs };
+                Own { pairs, apart, lost: 0 }
+            };
+            one.own = [with(1, 1.0), with(1, 3.0), with(2, 4.0), with(1, 0.5)];
         }
         let told = where_it_starts("column, simulated in f64", &all);
         assert!(told.contains("at the origin nowhere, so many that a smaller one may not show."), "{told}");
-        assert!(told.contains("100.0% at 0 (stock 50.00%, sorted 100.0%)"), "{told}");
+        assert!(told.contains("at 0 pbig 100.0, pbig lower first 100.0, stock 50.0"), "{told}");
         assert!(
-            told.contains("1.00 to 1.00 times as many as stock sorted; its bodies end 0.25 to 0.25"),
+            told.contains("as stock, and its bodies end 0.25 to 0.25 times as far from those in f64."),
             "{told}"
         );
-        assert!(told.ends_with("and 2.00 to 2.00 times as far as those of stock sorted."), "{told}");
+        assert!(told.contains("1.00 to 1.00 times as many wrong pairs as stock sorted, and its"), "{told}");
+        assert!(told.ends_with("bodies end 6.00 to 6.00 times as far from those in f64."), "{told}");
     }
 
     #[test]
