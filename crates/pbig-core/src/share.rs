@@ -63,7 +63,7 @@ pub(crate) fn beside<T: Send, U>(
     with(pieces.len(), own, pieces, work)
 }
 
-/// The same with at most so many other threads.
+/// As [`beside`], with at most so many other threads.
 fn with<T: Send, U>(
     most: usize,
     own: impl FnOnce() -> U,
@@ -136,6 +136,8 @@ mod tests {
             };
             assert!(catch_unwind(AssertUnwindSafe(|| for_each(is_shared, 0..8, work))).is_err());
             assert!(begun.into_inner() >= 4);
+            let own = || -> u32 { panic!("the caller's own work") };
+            assert!(catch_unwind(|| beside(is_shared, own, 0..8, |_| ())).is_err());
         });
     }
 }
