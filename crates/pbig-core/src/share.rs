@@ -136,8 +136,24 @@ mod tests {
             };
             assert!(catch_unwind(AssertUnwindSafe(|| for_each(is_shared, 0..8, work))).is_err());
             assert!(begun.into_inner() >= 4);
-            let own = || -> u32 { panic!("the caller's own work") };
-            assert!(catch_unwind(|| beside(is_shared, own, 0..8, |_| ())).is_err());
         });
+    }
+
+    #[test]
+    fn a_panic_of_the_caller_comes_after_the_pieces_that_have_begun_have_ended() {
+        let pool = ThreadPoolBuilder::new().num_threads(2).build().expect("a pool");
+        let (both, ended) = (Barrier::new(2), AtomicU32::new(0));
+        let own = || {
+            both.wait();
+            assert!(ended.load(Ordering::Relaxed) > 0, "the piece is under way");
+        };
+        let piece = |()| {
+            both.wait();
+            std::thread::sleep(std::time::Duration::from_millis(50));
+            ended.fetch_add(1, Ordering::Relaxed);
+        };
+        let shared = || beside(true, own, std::iter::once(()), piece);
+        assert!(pool.install(|| catch_unwind(AssertUnwindSafe(shared))).is_err());
+        assert_eq!(ended.into_inner(), 1);
     }
 }

@@ -182,7 +182,7 @@ fn sweeps(quick: bool) -> Vec<Sweep> {
     let sweep = |name, x, scratch, points| Sweep { name, x, scratch, points };
     vec![
         sweep("boxes-scratch", "boxes", true, sizes(if quick { 5 } else { 7 })),
-        sweep("boxes", "boxes", false, sizes(if quick { 4 } else { 6 })),
+        sweep("boxes", "boxes", false, sizes(if quick { 4 } else { 7 })),
         sweep("share", "share moved", false, shares),
         sweep("density-scratch", "pairs a box", true, densities()),
         sweep("density", "pairs a box", false, densities()),

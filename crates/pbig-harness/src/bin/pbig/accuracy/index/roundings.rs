@@ -108,13 +108,12 @@ pub(super) fn note() -> String {
     )
 }
 
-/// Why two forms have the same counts, if they have.
+/// Whether two forms have the same counts.
 fn alike(forms: &[(&str, Counts); 3]) -> String {
     match forms {
-        [_, (up, one), (reciprocal, other)] if one == other => format!(
-            "{up} and {reciprocal} have the same counts: a whole root is wrong by either where y is the least above 1 over \
-             it, and hardly another number is. "
-        ),
+        [_, (up, one), (reciprocal, other)] if one == other => {
+            format!("{up} and {reciprocal} have the same counts. ")
+        }
         _ => String::new(),
     }
 }

@@ -3,13 +3,14 @@
 use super::super::study::plain;
 use super::Ways;
 use super::figures::{DISTANCE, Figures, Multiple, multiple};
-use super::sides::{Moving, PERMUTED, SORTED, WAYS};
+use super::sides::{Moving, PERMUTED, WAYS};
+use super::tails;
 
 /// Everything farther than so many times the yardstick is listed.
 const FAR: f64 = 3.0;
 
 pub(super) fn notes(scenes: &[Ways]) -> Vec<String> {
-    let runs = || scenes.iter().flat_map(|ways| ways.held().filter(|run| run.way != SORTED));
+    let runs = || scenes.iter().flat_map(|ways| ways.pbig());
     let (compared, needed) =
         runs().fold((0, 0), |(steps, pairs), run| (steps + run.compared, pairs + run.reported.needed));
     let mut notes = vec![
@@ -18,7 +19,7 @@ pub(super) fn notes(scenes: &[Ways]) -> Vec<String> {
              times with stock and the bodies inserted in another order. These are the control: as far as they are from \
              stock, a run says nothing about who found the pairs. Rapier solves contacts in an order that comes from that of \
              the broad phase's events. Ours come sorted by colliders; so in one run more (sorted) stock's events are sorted as \
-             ours are: what it differs by, it does by their order alone. What f32 itself does to a world is in the study before \
+             ours are; where stock repeats itself to the bit, what that run differs by it does by their order alone. What f32 itself does to a world is in the study before \
              this one, where the same world in f64 is the truth. All in turn, step by step. Contacts and points are \
              means over the second half of the run; penetration and momentum are of the whole run, energy is in % of that \
              after the first step. At rest: less than 1 mJ for each kg from there to the end; \"not within\" so many steps: \
@@ -31,7 +32,7 @@ pub(super) fn notes(scenes: &[Ways]) -> Vec<String> {
     ];
     notes.extend(WAYS.iter().filter_map(|way| again(scenes, way.name)));
     notes.extend(scenes.iter().map(first_difference));
-    notes.extend([rests(scenes), typical(scenes), beyond(scenes), how_far(scenes)]);
+    notes.extend([rests(scenes), typical(scenes), tails::note(scenes), how_far(scenes)]);
     notes
 }
 
@@ -55,87 +56,29 @@ fn rests(scenes: &[Ways]) -> String {
     )
 }
 
-/// Quantities, by scene, that have a meaning and in which not all these runs are as far from stock.
-fn counted<'a>(
-    name: &str,
-    scenes: &'a [Ways],
-) -> impl Iterator<Item = (&'static str, &'static str, Multiple)> + use<'a> {
-    let of = move |ways: &'a Ways, run: &'a Figures| {
-        let told = ways.multiples(run).filter(|(_, found)| found.times.is_some() && !found.is_tied);
-        told.map(|(quantity, found)| (ways.scene, quantity, found))
-    };
-    let runs = scenes.iter().filter_map(|ways| Some((ways, ways.held().find(|run| run.way == name)?)));
-    runs.flat_map(move |(ways, run)| of(ways, run)).collect::<Vec<_>>().into_iter()
-}
-
-/// Those in which a run is farther than every permuted one.
-fn farthest(name: &str, scenes: &[Ways]) -> Vec<(&'static str, &'static str)> {
-    let is_farther = |(_, _, found): &(_, _, Multiple)| found.nearer == PERMUTED;
-    counted(name, scenes).filter(is_farther).map(|(scene, quantity, _)| (scene, quantity)).collect()
-}
-
-/// In how many quantities runs are farther from stock than every permuted one, and in how many chance would have it.
-fn beyond(scenes: &[Ways]) -> String {
-    let sorted = farthest(SORTED, scenes);
-    let of = |name: &'static str| {
-        let (farther, all) = (farthest(name, scenes), counted(name, scenes).count());
-        let too = farther.iter().filter(|one| sorted.contains(one)).count();
-        let too = if name == SORTED { String::new() } else { format!(", {too} of them also with {SORTED}") };
-        format!(
-            "{} of {all} with {name}, {:.1} by chance{too}",
-            farther.len(),
-            all as f64 / (PERMUTED + 1) as f64
-        )
-    };
-    let ways = WAYS.iter().filter(|way| way.is_held_against_stock());
-    format!(
-        "If a run were one more order of insertion, it would be farther from stock than all {PERMUTED} others in one quantity of \
-         {}. It is in {}. So {}. Quantities in which all these runs are as far from stock do not count. \
-         Quantities of one scene are not independent. The last table has the percent of permuted runs that \
-         are nearer.",
-        PERMUTED + 1,
-        ways.map(|way| of(way.name)).collect::<Vec<_>>().join("; in "),
-        cause(scenes)
-    )
-}
-
-/// Of what is beyond chance with pbig, whether the order of events does as much.
-fn cause(scenes: &[Ways]) -> &'static str {
-    let [ours, sorted] = ["pbig", SORTED].map(|name| {
-        let (count, all) = (farthest(name, scenes).len() as f64, counted(name, scenes).count() as f64);
-        let chance = all / (PERMUTED + 1) as f64;
-        // Two standard deviations, of quantities as if they were independent.
-        (count, chance + 2.0 * chance.sqrt())
-    });
-    match (ours.0 > ours.1, sorted.0 > sorted.1) {
-        (false, _) => "a run with pbig is as one more order of insertion, as far as this can tell",
-        (true, true) => {
-            "our order of events sets runs apart from those with stock's, more than orders of insertion do among each other, \
-             whoever finds the pairs"
-        }
-        (true, false) => "runs with pbig are apart, and the order of events is not why",
-    }
-}
-
 /// Mean distances at the end as multiples of the farthest permuted run's: geometric means over the scenes in which
-/// bodies move apart.
+/// bodies of those move apart from stock's.
 fn typical(scenes: &[Ways]) -> String {
     let of = |name: &'static str| {
         let run = |ways: &Ways| {
             let run = ways.runs.iter().find(|run| run.way == name)?;
             multiple(run, ways.first(), &ways.yardsticks(), DISTANCE)?.times
         };
-        let logs: Vec<f64> =
-            scenes.iter().filter_map(run).map(f64::ln).filter(|log| log.is_finite()).collect();
-        let mean = (logs.iter().sum::<f64>() / logs.len().max(1) as f64).exp();
-        format!("{mean:.2} times with {name}")
+        let times = scenes.iter().filter_map(run).filter(|times| times.is_finite());
+        let (some, none): (Vec<f64>, Vec<f64>) = times.partition(|times| *times > 0.0);
+        let mean = (some.iter().map(|times| times.ln()).sum::<f64>() / some.len() as f64).exp();
+        match (some.len(), none.len()) {
+            (0, _) => format!("at no distance with {name}"),
+            (_, 0) => format!("{mean:.2} times with {name}"),
+            (_, none) => format!("{mean:.2} times with {name}, where there is any: in {none} scenes none"),
+        }
     };
     let ways = WAYS.iter().filter(|way| way.is_held_against_stock());
     let all: Vec<String> = ways.map(|way| of(way.name)).collect();
     format!(
         "At the end bodies are as far from stock's as those of the farthest permuted run (geometric means over \
          scenes): {}.",
-        all.join(", ")
+        all.join("; ")
     )
 }
 
@@ -211,16 +154,11 @@ mod tests {
     use super::super::sides;
     use super::*;
 
-    /// Stock, sorted or not, with 100 contacts, the permuted runs with 110, pbig with these.
+    /// Stock with 100 contacts, the permuted runs with 110, pbig with these.
     fn made(pbig: f64) -> Vec<Ways> {
-        made_with(100.0, pbig)
-    }
-
-    fn made_with(sorted: f64, pbig: f64) -> Vec<Ways> {
         let contacts = |way: &sides::Way| match (way.is_pbig(), way.is_permuted()) {
             (true, _) => pbig,
             (_, true) => 110.0,
-            _ if way.name == SORTED => sorted,
             _ => 100.0,
         };
         let run = |way| Figures { contacts: contacts(way), way: way.name, ..nothing() };
@@ -237,7 +175,7 @@ mod tests {
         let far = how_far(&made(131.0));
         assert!(far.starts_with("All in which a run is more than 3 times"), "{far}");
         assert!(
-            far.contains(", 2 of 24 quantities") && far.matches("(3.10 times, 19 of").count() == 2,
+            far.contains(", 2 of 32 quantities") && far.matches("(3.10 times, 19 of").count() == 2,
             "{far}"
         );
     }
@@ -252,42 +190,15 @@ mod tests {
             }
             ways
         };
+        let told = typical(&[with("near", 0.5), with("far", 8.0)]);
+        let none =
+            "at no distance with stock again; at no distance with stock sorted; 2.00 times with pbig; ";
+        assert!(told.ends_with(&format!(": {none}2.00 times with pbig without margin.")), "{told}");
         let told = typical(&[with("near", 0.5), with("far", 8.0), with("same", 0.0)]);
         assert!(
-            told.ends_with(" with stock sorted, 2.00 times with pbig, 2.00 times with pbig without margin."),
+            told.contains("; 2.00 times with pbig, where there is any: in 1 scenes none; 2.00"),
             "{told}"
         );
-    }
-
-    #[test]
-    fn a_run_beyond_all_permuted_ones_is_counted() {
-        let told = beyond(&made(105.0));
-        assert!(
-            told.contains("; in 0 of 1 with pbig, 0.1 by chance, 0 of them also with stock sorted;"),
-            "{told}"
-        );
-        assert!(told.contains("So a run with pbig is as one more order of insertion"), "{told}");
-        let told = beyond(&made(111.0));
-        assert!(
-            told.contains("; in 1 of 1 with pbig, 0.1 by chance, 0 of them also with stock sorted;"),
-            "{told}"
-        );
-        assert!(told.contains("the order of events is not why"), "{told}");
-        let told = beyond(&made_with(112.0, 111.0));
-        assert!(
-            told.contains("in 1 of 1 with stock sorted, 0.1 by chance; in 1 of 1 with pbig, 0.1"),
-            "{told}"
-        );
-        assert!(
-            told.contains("0.1 by chance, 1 of them also with") && told.contains("So our order"),
-            "{told}"
-        );
-    }
-
-    #[test]
-    fn what_is_as_far_in_all_runs_does_not_count() {
-        let told = beyond(&made(110.0));
-        assert!(told.contains("; in 0 of 0 with pbig, 0.0 by chance"), "{told}");
     }
 
     #[test]
@@ -308,7 +219,7 @@ mod tests {
         assert!(told.contains("with pbig are the same, to the bit"), "{told}");
         assert_eq!(again(&scenes, "stock permuted"), None);
         let told = first_difference(&scenes[0]);
-        assert_eq!(told.matches("to the bit, to the end").count(), 4, "{told}");
+        assert_eq!(told.matches("to the bit, to the end").count(), 5, "{told}");
         scenes[0].repeats[0].1 = Some(7);
         scenes[0].runs[3].differs = Some(9);
         scenes[0].runs[2].differs = Some(8);

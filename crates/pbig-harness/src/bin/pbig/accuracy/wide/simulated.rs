@@ -218,11 +218,11 @@ pub(super) fn notes(all: &[Simulated]) -> Vec<String> {
                  pairs, or the run fails. Beside it rapier simulates the world in f32, with our broad phase: its pairs differ \
                  from those in f64, step by step, by all that rounding does to bodies on their way, too; at the origin, \
                  where rounding is least, by what two simulations differ anyway. A control is another world, in f32 with \
-                 rapier's own broad phase (stock): what it differs from f64 is what f32 brings. Near the origin that is \
-                 little: the world in f64 is told of its pairs in the same order, by the same broad phase. So there are \
+                 rapier's own broad phase (stock): what it differs from f64 is what f32 brings. But the world in f64 is told \
+                 of its pairs by that broad phase, too, so that stock may stay nearer to it for the order alone. So there are \
                  two controls more: stock with its events sorted as ours are, and ours with the collider of the lower index \
-                 first in each pair (lower first), as stock has it, where ours has the one with fewer pairs first. These two differ in what \
-                 finds the pairs alone."
+                 first in each pair (lower first), as stock has it, where ours has the one with fewer pairs first. Order sets \
+                 these two apart no longer, but what finds pairs does, and when they begin and end."
         .to_owned();
     [about].into_iter().chain(names.into_iter().map(|name| where_it_starts(name, all))).collect()
 }
@@ -230,7 +230,7 @@ pub(super) fn notes(all: &[Simulated]) -> Vec<String> {
 /// Percent of pairs that may differ at the origin for any offset to show.
 const MOST_APART: f64 = 20.0;
 
-/// From which offset on the simulation in f32 is further from f64 than at the origin.
+/// Pairs of each kind at each offset that differ from those in f64, and from which offset on they are more.
 fn where_it_starts(name: &str, all: &[Simulated]) -> String {
     let of_name = || all.iter().filter(|one| one.row.world == name);
     let each = |one: &Simulated| {
@@ -239,16 +239,23 @@ fn where_it_starts(name: &str, all: &[Simulated]) -> String {
         format!("at {} {}", one.row.offset, kinds.collect::<Vec<_>>().join(", "))
     };
     let told = of_name().map(each).collect::<Vec<_>>().join("; ");
-    let near = of_name().map(|one| one.wrong(0)).next().unwrap_or(0.0);
-    let first = of_name().find(|one| one.wrong(0) > 2.0 * near).map(|one| one.row.offset);
-    let first = first.map_or("nowhere".into(), |offset| format!("from {offset:e} on"));
-    let but = if near > MOST_APART { ", so many that a smaller one may not show" } else { "" };
+    let near = of_name().next().map_or(0.0, |one| one.wrong(0));
+    let but = if near > MOST_APART { ", so many there that a smaller one may not show" } else { "" };
+    let first = (0..KINDS.len()).map(|kind| format!("{} {}", KINDS[kind].0, twice(of_name(), kind)));
     format!(
-        "{name}: pairs of the simulation in f32 that are missed or too many, in percent of those in f64: {told}. With pbig \
-         more than twice as many as at the origin {first}{but}. {} {}",
+        "{name}: pairs of the simulation in f32 that are missed or too many, in percent of those in f64: {told}. More than \
+         twice as many as at the origin{but}: {}. {} {}",
+        first.collect::<Vec<_>>().join(", "),
         over(of_name(), 0, 2),
         over(of_name(), 1, 3)
     )
+}
+
+/// The first offset at which a kind has more than twice as many wrong pairs as at the origin.
+fn twice<'a>(mut all: impl Iterator<Item = &'a Simulated>, kind: usize) -> String {
+    let near = all.next().map_or(0.0, |one| one.wrong(kind));
+    let first = all.find(|one| one.wrong(kind) > 2.0 * near);
+    first.map_or("nowhere".into(), |one| format!("from {:e} on", one.row.offset))
 }
 
 /// How far a world in f32 is from f64, over how far that of a control is.
@@ -268,9 +275,13 @@ fn over<'a>(all: impl Iterator<Item = &'a Simulated>, kind: usize, control: usiz
 
 /// The least and the most of some ratios, each with its offset; and where there is none, as the control has 0.
 fn range(ratios: &[(f64, f64)]) -> String {
-    let each = || ratios.iter().map(|one| one.1).filter(|ratio| ratio.is_finite());
-    let told = match each().min_by(f64::total_cmp).zip(each().max_by(f64::total_cmp)) {
-        Some((least, most)) => format!("{least:.2} to {most:.2} times"),
+    let each = || ratios.iter().filter(|one| one.1.is_finite());
+    let [least, most] =
+        [each().min_by(|a, b| a.1.total_cmp(&b.1)), each().max_by(|a, b| a.1.total_cmp(&b.1))];
+    let told = match least.zip(most) {
+        Some((least, most)) => {
+            format!("{:.2} (at {}) to {:.2} times (at {})", least.1, least.0, most.1, most.0)
+        }
         None => "no number of times".to_owned(),
     };
     let named = |what: &str, is: fn(f64) -> bool| {
@@ -286,6 +297,7 @@ fn range(ratios: &[(f64, f64)]) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use rapier3d::prelude::BroadPhasePairEvent;
 
     #[test]
     fn far_away_f32_simulates_another_world_and_boxes_with_ulps_miss_nothing_of_f64() {
@@ -301,35 +313,70 @@ mod tests {
         }
         assert!(far.row.poses.missed > 0 && far.row.in_all(IN_WORLD).missed == 0);
         let told = where_it_starts(near.row.world, &all);
-        assert!(told.contains("from 1e6 on. pbig has "), "{told}");
+        assert!(
+            told.contains(": pbig from 1e6 on, pbig lower first from 1e6 on, stock from 1e6 on"),
+            "{told}"
+        );
         assert_eq!(tables(&all).map(|table| table.rows.len()), [2, 2 * KINDS.len()]);
     }
 
     #[test]
     fn each_kind_is_held_against_its_control() {
-        let mut all = simulated(&[0.0, 1e6], true).expect("no failure");
-        for one in &mut all {
-            let with = |part: u64, apart| {
-                let pairs = Differences { missed: one.row.pairs / part, added: 0, ..one.own[0].pairs };
-                Own { pairs, apart, lost: 0 }
-            };
-            one.own = [with(1, 1.0), with(1, 3.0), with(2, 4.0), with(1, 0.5)];
-        }
+        let mut all = simulated(&[0.0], true).expect("no failure");
+        let one = &mut all[0];
+        let with = |part: u64, apart| {
+            let pairs = Differences { missed: one.row.pairs / part, added: 0, ..one.own[0].pairs };
+            Own { pairs, apart, lost: 0 }
+        };
+        one.own = [with(1, 1.0), with(1, 3.0), with(2, 4.0), with(1, 0.5)];
         let told = where_it_starts("column, simulated in f64", &all);
-        assert!(told.contains("at the origin nowhere, so many that a smaller one may not show."), "{told}");
+        assert!(told.contains("one may not show: pbig nowhere, pbig lower first nowhere, "), "{told}");
         assert!(told.contains("at 0 pbig 100.0, pbig lower first 100.0, stock 50.0"), "{told}");
         assert!(
-            told.contains("as stock, and its bodies end 0.25 to 0.25 times as far from those in f64."),
+            told.contains("as stock, and its bodies end 0.25 (at 0) to 0.25 times (at 0) as far"),
             "{told}"
         );
-        assert!(told.contains("1.00 to 1.00 times as many wrong pairs as stock sorted, and its"), "{told}");
-        assert!(told.ends_with("bodies end 6.00 to 6.00 times as far from those in f64."), "{told}");
+        assert!(
+            told.contains("1.00 (at 0) to 1.00 times (at 0) as many wrong pairs as stock sorted, "),
+            "{told}"
+        );
+        assert!(
+            told.ends_with("bodies end 6.00 (at 0) to 6.00 times (at 0) as far from those in f64."),
+            "{told}"
+        );
+    }
+
+    /// Indices of the pairs that are added in the first step.
+    fn told_by((_, make): Kind) -> Vec<[u32; 2]> {
+        let (world, mut events) = (built(("pile", 200)).expect("a scene"), Vec::new());
+        let handles: Vec<_> = world.colliders.iter().map(|(handle, _)| handle).collect();
+        make().update(&world.params, &world.colliders, &world.bodies, &handles, &[], &mut events);
+        let added = events.into_iter().filter_map(|event| match event {
+            BroadPhasePairEvent::AddPair(pair) => Some(pair),
+            BroadPhasePairEvent::DeletePair(_) => None,
+        });
+        added.map(|pair| [pair.collider1, pair.collider2].map(|handle| handle.into_raw_parts().0)).collect()
+    }
+
+    #[test]
+    fn each_kind_has_the_order_that_it_is_to_have() {
+        let [ours, lower_first, stock, sorted] = KINDS.map(told_by);
+        let is_lower_first = |pairs: &[[u32; 2]]| pairs.iter().all(|[a, b]| a < b);
+        assert!(
+            !is_lower_first(&ours)
+                && [&lower_first, &stock, &sorted].map(|all| is_lower_first(all)) == [true; 3]
+        );
+        assert!(lower_first.is_sorted() && sorted.is_sorted() && !stock.is_sorted());
+        let mut in_order = stock;
+        in_order.sort_unstable();
+        assert!(in_order == sorted, "what stock tells, in another order");
     }
 
     #[test]
     fn where_the_control_has_none_the_offset_is_named() {
         let told = range(&[(0.0, f64::NAN), (1e3, 0.5), (1e4, f64::INFINITY), (1e6, 2.0)]);
-        assert_eq!(told, "0.50 to 2.00 times (the control has 0 and ours more at 10000; both have 0 at 0)");
+        let times = "0.50 (at 1000) to 2.00 times (at 1000000)";
+        assert_eq!(told, format!("{times} (the control has 0 and ours more at 10000; both have 0 at 0)"));
         assert_eq!(
             range(&[(7.0, f64::INFINITY)]),
             "no number of times (the control has 0 and ours more at 7)"

@@ -25,6 +25,8 @@ pub(super) const SEGMENT: u64 = 256;
 pub(super) const CELLS: [f64; 5] = [64.0, 128.0, 256.0, 512.0, 1024.0];
 /// Speed-up over CGAL at 10^7 boxes: PBIG section 1 and 7 ("up to"), and section 6.1.
 pub(super) const SPEED_UPS: [f64; 2] = [110.0, 116.0];
+/// The most over BULLET and PRI: PBIG sections 1 and 7.
+pub(super) const MOST_SPEED_UPS: [f64; 2] = [10.0, 3.0];
 /// Over PRI at 10^7 boxes: PBIG section 6.1.
 pub(super) const OVER_PRI: f64 = 3.3;
 /// Over CGAL at 10^7 boxes with normal centres: PBIG section 6.3.
