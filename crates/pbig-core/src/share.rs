@@ -136,6 +136,8 @@ mod tests {
             };
             assert!(catch_unwind(AssertUnwindSafe(|| for_each(is_shared, 0..8, work))).is_err());
             assert!(begun.into_inner() >= 4);
+            let own = || -> u32 { panic!("the caller's own work") };
+            assert!(catch_unwind(|| beside(is_shared, own, 0..8, |_| ())).is_err());
         });
     }
 
@@ -143,9 +145,9 @@ mod tests {
     fn a_panic_of_the_caller_comes_after_the_pieces_that_have_begun_have_ended() {
         let pool = ThreadPoolBuilder::new().num_threads(2).build().expect("a pool");
         let (both, ended) = (Barrier::new(2), AtomicU32::new(0));
-        let own = || {
+        let own = || -> u32 {
             both.wait();
-            assert!(ended.load(Ordering::Relaxed) > 0, "the piece is under way");
+            panic!("the piece is under way")
         };
         let piece = |()| {
             both.wait();

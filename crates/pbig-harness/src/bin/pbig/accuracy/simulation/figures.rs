@@ -174,8 +174,6 @@ pub(super) struct Multiple {
     pub(super) values: [f64; 3],
     /// How many of the yardsticks are nearer to the first than the run, by more than the resolution.
     pub(super) nearer: usize,
-    /// How many are farther.
-    pub(super) farther: usize,
     /// Whether the run and all yardsticks are as far from the first, so that none of them could be the farthest.
     pub(super) is_tied: bool,
 }
@@ -193,21 +191,13 @@ pub(super) fn multiple(
     let is_nearer = |value: &&f64| from_there(here) > from_there(**value).max(resolution);
     let nearer = values.iter().filter(is_nearer).count();
     let reached = |value: f64| from_there(value).max(resolution);
-    let is_farther = |value: &&f64| from_there(**value) > reached(here);
-    let beyond = values.iter().filter(is_farther).count();
     let is_tied = values.iter().all(|value| reached(*value) == reached(here));
     let farthest =
         values.into_iter().max_by(|a, b| from_there(*a).total_cmp(&from_there(*b))).unwrap_or(there);
     let (far, reach) = (from_there(here), reached(farthest));
     let times = if far == 0.0 { 0.0 } else { far / reach };
     let is_there = came(run) || came(first);
-    Some(Multiple {
-        times: is_there.then_some(times),
-        values: [here, there, farthest],
-        nearer,
-        farther: beyond,
-        is_tied,
-    })
+    Some(Multiple { times: is_there.then_some(times), values: [here, there, farthest], nearer, is_tied })
 }
 
 #[cfg(test)]
@@ -274,8 +264,6 @@ pub(super) mod tests {
         assert_eq!((times(130.0), times(95.0), times(100.0)), (Some(3.0), Some(0.5), Some(0.0)));
         let nearer = [130.0, 95.0, 101.0].map(|run| found(run).nearer);
         assert_eq!(nearer, [2, 1, 0], "than 10 and 2");
-        let farther = [130.0, 95.0, 101.0].map(|run| found(run).farther);
-        assert_eq!(farther, [0, 1, 2]);
         let at_once = multiple(&with(101.0), &first, &[&first], QUANTITIES[0]);
         assert_eq!(at_once.and_then(|it| it.times), Some(f64::INFINITY));
         assert_eq!(multiple(&far, &first, &[&near], QUANTITIES[6]), None);

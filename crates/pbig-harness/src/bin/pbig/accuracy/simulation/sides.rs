@@ -10,7 +10,7 @@ use pbig_harness::reported::Reported;
 use pbig_harness::scenes::Scene;
 use pbig_harness::sorted::Sorted;
 use pbig_harness::world::{World, to_vector};
-use rapier_pbig::{Config, PbigBroadPhase};
+use rapier_pbig::{Config, HandleOrder, PbigBroadPhase};
 use rapier3d::prelude::*;
 use std::hash::{DefaultHasher, Hash, Hasher};
 
@@ -21,6 +21,8 @@ enum Order {
     Permuted(u64),
     /// Events, as rapier is told of them: as ours has them.
     Sorted,
+    /// The two colliders of each of our pairs: as rapier's own broad phase has them.
+    LowerFirst,
 }
 
 /// One way to run a scene.
@@ -48,27 +50,29 @@ const fn again(name: &'static str, way: Way) -> Way {
 
 const STOCK: Way = stock("stock", None);
 /// What tells how much of a difference is that of the order of events.
-pub(super) const SORTED: &str = "stock sorted";
+const SORTED: Way = stock("stock sorted", Some(Order::Sorted));
 const PBIG: Way = pbig("pbig", PbigBroadPhase::CONFIG.margin);
 
 /// So many orders of insertion beside the scene's: a run that is one more of them is farther than all these once in 20 times.
 pub(super) const PERMUTED: usize = 19;
 
 /// All ways, what the others are held against first.
-pub(super) static WAYS: [Way; PERMUTED + 6] = ways();
+pub(super) static WAYS: [Way; PERMUTED + 8] = ways();
 
-const fn ways() -> [Way; PERMUTED + 6] {
-    let mut ways = [STOCK; PERMUTED + 6];
+const fn ways() -> [Way; PERMUTED + 8] {
+    let mut ways = [STOCK; PERMUTED + 8];
     ways[1] = again("stock again", STOCK);
     let mut order = 1;
     while order <= PERMUTED {
         ways[1 + order] = stock("stock permuted", Some(Order::Permuted(order as u64)));
         order += 1;
     }
-    ways[PERMUTED + 2] = stock(SORTED, Some(Order::Sorted));
-    ways[PERMUTED + 3] = PBIG;
-    ways[PERMUTED + 4] = again("pbig again", PBIG);
-    ways[PERMUTED + 5] = pbig("pbig without margin", 0.0);
+    ways[PERMUTED + 2] = SORTED;
+    ways[PERMUTED + 3] = again("stock sorted again", SORTED);
+    ways[PERMUTED + 4] = Way { name: "pbig lower first", order: Some(Order::LowerFirst), ..PBIG };
+    ways[PERMUTED + 5] = PBIG;
+    ways[PERMUTED + 6] = again("pbig again", PBIG);
+    ways[PERMUTED + 7] = pbig("pbig without margin", 0.0);
     ways
 }
 
@@ -86,9 +90,9 @@ impl Way {
         }
     }
 
-    /// Pbig's, for the first time; stock in our order of events; and stock once more, which says what chance does.
+    /// Pbig's, or stock in our order of events; for the first time.
     pub(super) fn is_held_against_stock(&self) -> bool {
-        if self.is_again { !self.is_pbig() } else { self.is_pbig() || self.order == Some(Order::Sorted) }
+        (self.is_pbig() || self.order == Some(Order::Sorted)) && !self.is_again
     }
 
     /// Rapier's own broad phase, and another order of bodies.
@@ -98,10 +102,12 @@ impl Way {
 
     fn broad_phase(&self) -> Box<dyn BroadPhase> {
         let stock = DefaultBroadPhase::new();
+        let ours = |margin| PbigBroadPhase::with_config(Config { margin, ..PbigBroadPhase::CONFIG });
         match (self.margin, self.order) {
-            (Some(margin), _) => {
-                Box::new(PbigBroadPhase::with_config(Config { margin, ..PbigBroadPhase::CONFIG }))
+            (Some(margin), Some(Order::LowerFirst)) => {
+                Box::new(ours(margin).with_handle_order(HandleOrder::LowerIndexFirst))
             }
+            (Some(margin), _) => Box::new(ours(margin)),
             (None, Some(Order::Sorted)) => Box::new(Sorted(stock)),
             (None, _) => Box::new(stock),
         }
@@ -286,8 +292,9 @@ mod tests {
     fn orders_are_all_different_and_every_way_is_of_one_kind() {
         let orders: Vec<Order> = WAYS.iter().filter_map(|way| way.order).collect();
         let permuted = (1..=PERMUTED as u64).map(Order::Permuted);
-        assert_eq!(orders, permuted.chain([Order::Sorted]).collect::<Vec<_>>());
-        assert_eq!(WAYS.iter().filter(|way| way.is_again).count(), 2);
+        let others = [Order::Sorted, Order::Sorted, Order::LowerFirst];
+        assert_eq!(orders, permuted.chain(others).collect::<Vec<_>>());
+        assert_eq!(WAYS.iter().filter(|way| way.is_again).count(), 3);
         assert_eq!(WAYS.iter().filter(|way| way.is_held_against_stock()).count(), 4);
     }
 
@@ -314,9 +321,13 @@ mod tests {
     #[test]
     fn a_way_that_is_run_again_is_held_against_the_one_before() {
         let mut sides = simulated(case("column", 5, 4)).expect("a scene");
-        assert_eq!(repeats(&sides), [("stock", None), ("pbig", None)], "in free fall");
+        assert_eq!(
+            repeats(&sides),
+            [("stock", None), ("stock sorted", None), ("pbig", None)],
+            "in free fall"
+        );
         let again = sides.iter_mut().find(|side| side.way.name == "pbig again").expect("a way");
         again.samples[2].poses += 1;
-        assert_eq!(repeats(&sides), [("stock", None), ("pbig", Some(3))]);
+        assert_eq!(repeats(&sides), [("stock", None), ("stock sorted", None), ("pbig", Some(3))]);
     }
 }

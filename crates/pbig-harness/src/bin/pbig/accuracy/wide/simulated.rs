@@ -239,22 +239,24 @@ fn where_it_starts(name: &str, all: &[Simulated]) -> String {
         format!("at {} {}", one.row.offset, kinds.collect::<Vec<_>>().join(", "))
     };
     let told = of_name().map(each).collect::<Vec<_>>().join("; ");
-    let near = of_name().next().map_or(0.0, |one| one.wrong(0));
-    let but = if near > MOST_APART { ", so many there that a smaller one may not show" } else { "" };
-    let first = (0..KINDS.len()).map(|kind| format!("{} {}", KINDS[kind].0, twice(of_name(), kind)));
+    let near = (0..KINDS.len()).filter_map(|kind| Some(of_name().next()?.wrong(kind)));
+    let near = near.fold(f64::MAX, f64::min);
+    let but = if near > MOST_APART { ", so many that a smaller one may not show" } else { "" };
+    let first =
+        (0..KINDS.len()).map(|kind| format!("{} {}", KINDS[kind].0, beyond(of_name(), kind, 2.0 * near)));
     format!(
         "{name}: pairs of the simulation in f32 that are missed or too many, in percent of those in f64: {told}. More than \
-         twice as many as at the origin{but}: {}. {} {}",
+         twice the least of these at the origin, {}{but}: {}. {} {}",
+        plain(near),
         first.collect::<Vec<_>>().join(", "),
         over(of_name(), 0, 2),
         over(of_name(), 1, 3)
     )
 }
 
-/// The first offset at which a kind has more than twice as many wrong pairs as at the origin.
-fn twice<'a>(mut all: impl Iterator<Item = &'a Simulated>, kind: usize) -> String {
-    let near = all.next().map_or(0.0, |one| one.wrong(kind));
-    let first = all.find(|one| one.wrong(kind) > 2.0 * near);
+/// The first offset at which a kind has more wrong pairs than that.
+fn beyond<'a>(mut all: impl Iterator<Item = &'a Simulated>, kind: usize, most: f64) -> String {
+    let first = all.find(|one| one.wrong(kind) > most);
     first.map_or("nowhere".into(), |one| format!("from {:e} on", one.row.offset))
 }
 
@@ -330,7 +332,8 @@ mod tests {
         };
         one.own = [with(1, 1.0), with(1, 3.0), with(2, 4.0), with(1, 0.5)];
         let told = where_it_starts("column, simulated in f64", &all);
-        assert!(told.contains("one may not show: pbig nowhere, pbig lower first nowhere, "), "{told}");
+        let first = "at the origin, 50.00, so many that a smaller one may not show: pbig nowhere, pbig lower first nowhere, ";
+        assert!(told.contains(first), "{told}");
         assert!(told.contains("at 0 pbig 100.0, pbig lower first 100.0, stock 50.0"), "{told}");
         assert!(
             told.contains("as stock, and its bodies end 0.25 (at 0) to 0.25 times (at 0) as far"),
@@ -342,6 +345,13 @@ mod tests {
         );
         assert!(
             told.ends_with("bodies end 6.00 (at 0) to 6.00 times (at 0) as far from those in f64."),
+            "{told}"
+        );
+        let mut none = all;
+        none[0].own[2].pairs = Differences { missed: 0, added: 0, ..none[0].own[2].pairs };
+        let told = where_it_starts("column, simulated in f64", &none);
+        assert!(
+            told.contains("the origin, 0: pbig from 0e0 on, pbig lower first from 0e0 on, stock nowhere, "),
             "{told}"
         );
     }

@@ -83,29 +83,38 @@ const IS_LAZY: usize = WAYS.len() - 1;
 /// What one way came to.
 struct Took {
     found: u64,
-    /// The shorter of two calls, for all ids.
+    /// The shortest of the calls, for all ids.
     ms: f64,
-    /// The longer of them.
-    longer: f64,
+    /// The longest of them.
+    longest: f64,
     /// All ids over those looked at.
     times: f64,
 }
 
+/// Calls of each way. Two ways that take as long have all calls of one before all of the other in 3% of cases.
+const CALLS: usize = 4;
+
 impl Took {
     fn new(boxes: &[Aabb], way: usize, most: u64) -> Self {
+        let mut took = Self { found: 0, ms: f64::MAX, longest: 0.0, times: 1.0 };
+        took.call(boxes, way, most);
+        took
+    }
+
+    fn call(&mut self, boxes: &[Aabb], way: usize, most: u64) {
         let n = boxes.len() as u64;
         let all = if way == IS_LAZY { lazy_ids(n as i64) as u64 } else { pair_count(n) };
         let (ids, times) = stretches(all, most);
-        let call = || timed(|| WAYS[way].1(boxes, &ids));
-        let ((found, first), (_, second)) = (call(), call());
-        Self { found, ms: first.min(second) * times, longer: first.max(second) * times, times }
+        let (found, ms) = timed(|| WAYS[way].1(boxes, &ids));
+        (self.found, self.times) = (found, times);
+        (self.ms, self.longest) = (self.ms.min(ms * times), self.longest.max(ms * times));
     }
 
     /// Whether this way is faster than another: neither if calls of both overlap.
     fn is_faster(&self, other: &Self) -> Option<bool> {
         match () {
-            () if self.longer < other.ms => Some(true),
-            () if self.ms > other.longer => Some(false),
+            () if self.longest < other.ms => Some(true),
+            () if self.ms > other.longest => Some(false),
             () => None,
         }
     }
@@ -114,7 +123,10 @@ impl Took {
 /// All ways with so many boxes. A failed check if those that looked at the same have not found the same.
 fn all_ways(n: u64, most: u64) -> Result<Vec<Took>, Failure> {
     let boxes = cubes(n as usize, 1.0, 1.0, 1);
-    let all: Vec<Took> = (0..WAYS.len()).map(|way| Took::new(&boxes, way, most)).collect();
+    let mut all: Vec<Took> = (0..WAYS.len()).map(|way| Took::new(&boxes, way, most)).collect();
+    for _ in 1..CALLS {
+        all.iter_mut().enumerate().for_each(|(way, took)| took.call(&boxes, way, most));
+    }
     match odd_one(&all) {
         Some(way) => Err(Failure::Check(format!(
             "{n} objects: {} pairs with {}, {} with {}",
@@ -185,7 +197,8 @@ fn abouts(rows: &[Vec<Took>], most: u64) -> [String; 3] {
         ),
         format!(
             "Printed are times of the GPU. On their CPU the paper has the lazy way {times} times as fast as its root, \
-             {seconds} s for 10,000 objects. Here it takes {}. {verdict}.",
+             {seconds} s for 10,000 objects. Here it takes {}, by the shortest of {CALLS} calls in turn. \
+             {verdict}. (All calls of one before all of the other: of two that take as long, in 3% of cases.)",
             all.join("; ")
         ),
         "`pair_of` is ours for up to 2^32 boxes: it multiplies in 128 bits and corrects \
@@ -243,7 +256,7 @@ mod tests {
 
     #[test]
     fn a_row_has_the_lazy_way_over_each_root() {
-        let took = |ms: f64, times: f64| Took { found: 7, ms, longer: ms, times };
+        let took = |ms: f64, times: f64| Took { found: 7, ms, longest: ms, times };
         let all = [took(2.0, 1.0), took(4.0, 1.0), took(8.0, 1.0), took(4.0, 2.0)];
         let row = row([1000.0, 0.5, 1.0, 2.0], &all);
         let right = json!([1000, 0.5, 1.0, 2.0, 2.0, 4.0, 8.0, 4.0, 2.0, 1.0, 0.5, null, "all", "50.00 %"]);
@@ -279,8 +292,8 @@ mod tests {
     }
 
     #[test]
-    fn a_way_is_faster_if_its_longer_call_is() {
-        let took = |ms: f64, longer: f64| Took { found: 7, ms, longer, times: 1.0 };
+    fn a_way_is_faster_if_its_longest_call_is() {
+        let took = |ms: f64, longest: f64| Took { found: 7, ms, longest, times: 1.0 };
         let against = |ms, longer| took(2.0, 3.0).is_faster(&took(ms, longer));
         assert_eq!(
             [against(3.5, 4.0), against(3.0, 4.0), against(1.0, 1.5)],
@@ -290,7 +303,7 @@ mod tests {
 
     #[test]
     fn ways_that_looked_at_the_same_are_compared() {
-        let took = |found, times| Took { found, ms: 1.0, longer: 1.0, times };
+        let took = |found, times| Took { found, ms: 1.0, longest: 1.0, times };
         let all = |second, (lazy, times)| [took(7, 2.0), took(second, 2.0), took(7, 2.0), took(lazy, times)];
         assert_eq!(odd_one(&all(7, (8, 4.0))), None);
         assert_eq!(odd_one(&all(7, (8, 1.0))), Some(IS_LAZY));
