@@ -212,6 +212,7 @@ mod tests {
             origin: [origin; 3],
             dims: [8; 3],
             cells: 512,
+            crowd: 0.0,
             camp: 0,
         };
         Cells::new(&level, 0)

@@ -96,6 +96,7 @@ mod tests {
             origin: [-8.0; 3],
             dims: [8; 3],
             cells: 512,
+            crowd: 0.0,
             camp: 0,
         };
         Level::new(&plan, 0)

@@ -83,6 +83,7 @@ mod tests {
             origin: [0.0; 3],
             dims: [1; 3],
             cells: 1,
+            crowd: 0.0,
             camp: 0,
         };
         Draft::new(Plan { chosen: Chosen::Grid, ..Plan::default() }, boxes.iter().map(level).collect())

@@ -28,6 +28,8 @@ pub struct LevelPlan {
     pub dims: [u32; 3],
     /// All cells, a power of two.
     pub cells: u32,
+    /// Boxes in a cell, were they spread evenly; unlike the others a number, not a length.
+    pub crowd: f32,
     /// 0, or the number of a camp: boxes of levels with the same number never pair, whatever their filters say of
     /// others.
     pub camp: u8,
@@ -333,8 +335,14 @@ impl<'a> World<'a> {
             origin: self.low,
             dims,
             cells,
+            crowd: boxes as f32 * self.share(cell),
             camp: 0,
         }
+    }
+
+    /// Of the world that a cell is.
+    fn share(&self, cell: [f32; 3]) -> f32 {
+        (0..3).map(|k| cell[k] / self.range[k].max(cell[k])).product()
     }
 }
 
