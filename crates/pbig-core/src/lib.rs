@@ -70,6 +70,8 @@ pub use broad_phase::{BroadPhase, Events};
 pub use config::{
     Backend, CellRule, Coding, Config, GpuOptions, Grids, Limits, Look, Order, Strategy, Study, Updates,
 };
+#[doc(hidden)]
+pub use cpu::codes::prefetch;
 pub use error::Error;
 pub use filter::{ProxyFilter, TestMode};
 pub use finder::{Finder, find_pairs};

@@ -3,15 +3,16 @@
 use crate::PbigBroadPhase;
 use crate::call::Call;
 use crate::news::{News, SecondLook};
-use crate::proxy::{BLOCK, FEW, Growth, Proxy};
+use crate::proxy::{BLOCK, FEW, Growth, Proxy, are_scattered};
 use crate::stats::{MEASURED_FROM, Watch};
 use pbig_core::{Aabb, ProxyFilter};
 use rapier3d::prelude::ColliderHandle;
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 
 /// Modified colliders from which their boxes are computed on several threads: below, waking a second one costs more than
-/// it saves.
+/// it saves. And the same of scattered ones, each of which takes several times as long.
 const PARALLEL_FROM: usize = 16_384;
+const SCATTERED_PARALLEL_FROM: usize = 8192;
 
 impl PbigBroadPhase {
     /// Brings the finder up to date about some colliders.
@@ -20,7 +21,8 @@ impl PbigBroadPhase {
             return self.look_ahead(call, listed);
         }
         let mut watch = Watch::new(listed.len() >= MEASURED_FROM);
-        if listed.len() < PARALLEL_FROM || rayon::current_num_threads() == 1 {
+        let parallel_from = if are_scattered(listed) { SCATTERED_PARALLEL_FROM } else { PARALLEL_FROM };
+        if listed.len() < parallel_from || rayon::current_num_threads() == 1 {
             let _span = tracing::debug_span!(target: "pbig", "proxies").entered();
             listed.chunks(BLOCK).for_each(|block| self.look_at_block(call, block));
             self.kept.proxies += watch.lap();
@@ -94,6 +96,9 @@ impl PbigBroadPhase {
 
     /// Each collider's proxy is set as soon as it is known: to write it down and read it again took 5 ns.
     fn look_at_block(&mut self, call: &Call<'_>, listed: &[ColliderHandle]) {
+        if are_scattered(listed) {
+            return self.look_at_scattered(call, listed);
+        }
         let growth = Growth::new(call.params, self.ulps);
         if listed.len() <= FEW {
             for &handle in listed {
@@ -103,6 +108,23 @@ impl PbigBroadPhase {
         }
         let mut found = [(None, None); BLOCK];
         call.fetch_all(listed, &mut found);
+        for (&handle, found) in listed.iter().zip(found) {
+            self.set_proxy(handle, call.proxy(found, growth));
+        }
+    }
+
+    /// The same of colliders whose memory lies apart: all that will be read is asked for. (1000 of 100,000: 165 us instead of
+    /// 205; 10,000 of a million: 3.0 ms instead of 4.0. Where they lie beside each other, it took a fifth longer.)
+    #[inline(never)]
+    fn look_at_scattered(&mut self, call: &Call<'_>, listed: &[ColliderHandle]) {
+        for &handle in listed {
+            let index = handle.into_raw_parts().0;
+            self.finder.ask_for(index);
+            self.roll.ask_for(index);
+        }
+        let mut found = [(None, None); BLOCK];
+        call.fetch_scattered(listed, &mut found);
+        let growth = Growth::new(call.params, self.ulps);
         for (&handle, found) in listed.iter().zip(found) {
             self.set_proxy(handle, call.proxy(found, growth));
         }

@@ -5,7 +5,7 @@ use crate::call::Call;
 use crate::news::News;
 use crate::roll::Roll;
 use crate::ulps::widened_by_ulps;
-use pbig_core::{Aabb, ProxyFilter, TestMode};
+use pbig_core::{Aabb, ProxyFilter, TestMode, prefetch};
 use rapier3d::prelude::{
     ActiveCollisionTypes, Collider, ColliderHandle, IntegrationParameters, Isometry, Point, Real, RigidBody,
     RigidBodySet, RigidBodyType, Shape, TypedShape,
@@ -56,7 +56,11 @@ impl<'a> Call<'a> {
     pub(crate) fn proxies(&self, growth: Growth, listed: &[ColliderHandle], out: &mut [Proxy]) {
         let _span = tracing::debug_span!(target: "pbig", "proxies").entered();
         let mut found = [(None, None); BLOCK];
-        self.fetch_all(listed, &mut found);
+        if are_scattered(listed) {
+            self.fetch_scattered(listed, &mut found);
+        } else {
+            self.fetch_all(listed, &mut found);
+        }
         for (proxy, found) in out.iter_mut().zip(found) {
             *proxy = self.proxy(found, growth);
         }
@@ -68,7 +72,8 @@ impl<'a> Call<'a> {
         (collider, self.body(collider))
     }
 
-    /// The collider with an index; none if another one with it is on the roll. It is news if none is.
+    /// The collider with an index; none if another one with it is on the roll. It is news if none is. What [`Call::proxy`]
+    /// reads of it is asked for: a tenth of an update of 100,000 colliders.
     pub(crate) fn fetch_known(&self, index: u32, roll: &Roll, news: &News) -> Fetched<'a> {
         let Some((collider, handle)) = self.colliders.get_unknown_gen(index) else { return (None, None) };
         let known = roll.handle(index);
@@ -78,7 +83,10 @@ impl<'a> Call<'a> {
         if known.is_some_and(|known| known != handle) {
             return (None, None);
         }
-        (Some(collider), self.body(Some(collider)))
+        prefetch(&collider.position().translation);
+        let body = self.body(Some(collider));
+        ask_for_what_it_refers_to(&(Some(collider), body));
+        (Some(collider), body)
     }
 
     /// Of at most [`BLOCK`] colliders.
@@ -88,6 +96,23 @@ impl<'a> Call<'a> {
         }
         for found in &mut found[..listed.len()] {
             found.1 = self.body(found.0);
+        }
+    }
+
+    /// The same of [`are_scattered`] ones: all that [`Call::proxy`] reads is asked for, of a collider a line of memory by each of
+    /// these three.
+    pub(crate) fn fetch_scattered(&self, listed: &[ColliderHandle], found: &mut [Fetched<'a>; BLOCK]) {
+        for (found, &handle) in found.iter_mut().zip(listed) {
+            found.0 = self.colliders.get(handle);
+            if let Some(collider) = found.0 {
+                prefetch(collider.shared_shape());
+                prefetch(&collider.position().translation);
+                prefetch(&collider.user_data);
+            }
+        }
+        for found in &mut found[..listed.len()] {
+            found.1 = self.body(found.0);
+            ask_for_what_it_refers_to(found);
         }
     }
 
@@ -105,6 +130,19 @@ impl<'a> Call<'a> {
             }
         }
     }
+}
+
+#[inline(always)]
+fn ask_for_what_it_refers_to((collider, body): &Fetched<'_>) {
+    collider.iter().for_each(|collider| prefetch(collider.shape()));
+    body.iter().for_each(|body| prefetch(*body));
+}
+
+/// Whether the memory of these colliders lies so far apart that a processor does not fetch that of the next one by itself.
+pub(crate) fn are_scattered(listed: &[ColliderHandle]) -> bool {
+    let [first, .., last] = listed else { return false };
+    let range = first.into_raw_parts().0.abs_diff(last.into_raw_parts().0);
+    listed.len() > FEW && range as usize > 4 * listed.len()
 }
 
 /// The box of a collider in which it may touch another during this step: its shape, half the
@@ -211,6 +249,17 @@ fn accepted_kinds(kind: RigidBodyType, types: ActiveCollisionTypes) -> u8 {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn colliders_far_from_each_other_are_scattered_unless_they_are_few() {
+        let listed = |count: u32, step: u32| -> Vec<ColliderHandle> {
+            (0..count).map(|i| ColliderHandle::from_raw_parts(7 + i * step, 0)).collect()
+        };
+        let backwards: Vec<ColliderHandle> = listed(64, 5).into_iter().rev().collect();
+        assert!(are_scattered(&listed(64, 5)) && are_scattered(&backwards));
+        assert!(!are_scattered(&listed(64, 4)) && !are_scattered(&listed(FEW as u32, 1000)));
+        assert!(!are_scattered(&[]) && !are_scattered(&listed(1, 1)));
+    }
 
     #[test]
     fn accepted_kinds_are_those_that_rapier_tests() {

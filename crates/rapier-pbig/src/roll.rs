@@ -33,6 +33,14 @@ impl Roll {
         (generation != ABSENT).then(|| ColliderHandle::from_raw_parts(index, generation))
     }
 
+    /// Asks for the memory that [`Roll::has`] reads.
+    #[inline(always)]
+    pub(crate) fn ask_for(&self, index: u32) {
+        if let Some(generation) = self.generations.get(index as usize) {
+            pbig_core::prefetch(generation);
+        }
+    }
+
     pub(crate) fn has(&self, handle: ColliderHandle) -> bool {
         self.handle(handle.into_raw_parts().0) == Some(handle)
     }

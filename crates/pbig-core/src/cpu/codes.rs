@@ -90,8 +90,9 @@ impl Simd {
 }
 
 /// Starts to bring a value into the cache. Costs an instruction; nothing where the processor has none for it.
+#[doc(hidden)]
 #[inline(always)]
-pub(crate) fn prefetch<T>(value: &T) {
+pub fn prefetch<T: ?Sized>(value: &T) {
     #[cfg(target_arch = "x86_64")]
     {
         use std::arch::x86_64::{_MM_HINT_T0, _mm_prefetch};

@@ -15,8 +15,9 @@ use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 /// Boxes from which several threads set them: for fewer, waking a second one takes longer.
 const PARALLEL_FROM: usize = shared_from(8192);
 
-/// Ids of which one is to be set, for them all to be looked through: eight at a time, as long as it takes to set one.
-const LOOKED_THROUGH: usize = 64;
+/// Ids of which one is to be set, for them all to be looked through: eight at a time, as long as it takes to set one that lies
+/// apart from others.
+const LOOKED_THROUGH: usize = 512;
 
 /// Ids that a thread takes at once.
 pub(super) const RANGE: usize = shared_from(4096);
@@ -47,7 +48,7 @@ struct Range<'a> {
 
 impl BroadPhase {
     /// Sets many boxes, as [`BroadPhase::set`] does one: with the help of the present rayon pool and in no particular order
-    /// where they are at least 8192, one in 64 of all, and no update has begun.
+    /// where they are at least 8192, one in 512 of all, and no update has begun.
     ///
     /// `fetch` gets what `of` needs to know about an id, and is called for some ids before `of` is, so that
     /// their memory is waited for together. `of` tells box and filter, or none for a box that is to be left as it is. For an
@@ -143,7 +144,7 @@ impl BroadPhase {
         for ids in ids.chunks(BLOCK) {
             let mut block = [None; BLOCK];
             for (fetched, &id) in block.iter_mut().zip(ids) {
-                self.ask_for(id as usize);
+                self.ask_for(id);
                 *fetched = Some(fetch(id));
             }
             for (fetched, &id) in block.into_iter().flatten().zip(ids) {
@@ -155,9 +156,11 @@ impl BroadPhase {
         result
     }
 
-    /// Asks for what is kept about a box.
+    /// Asks for the memory that [`BroadPhase::set`] will read of an id, so that it is not waited for then. Worth it for some
+    /// dozens of ids, all asked for before the first is set, that lie apart from each other.
     #[inline(always)]
-    fn ask_for(&self, i: usize) {
+    pub fn ask_for(&self, id: u32) {
+        let i = id as usize;
         if let (Some(aabb), Some(filter)) = (self.boxes.get(i), self.filters.get(i)) {
             prefetch(aabb);
             prefetch(filter);
