@@ -52,6 +52,7 @@ const CELLS: &str = include_str!("shared/cells.wgsl");
 const BLOCK_SCAN: &str = include_str!("shared/block_scan.wgsl");
 const BLOCK_SCAN_SUBGROUPS: &str = include_str!("shared/block_scan_subgroups.wgsl");
 const PAIR_INDEX: &str = include_str!("shared/pair_index.wgsl");
+const LAZY: &str = include_str!("shared/lazy.wgsl");
 const OVERLAPS: &str = include_str!("shared/overlaps.wgsl");
 const CHANGES: &str = include_str!("shared/changes.wgsl");
 const EMIT: &str = include_str!("shared/emit.wgsl");
@@ -103,5 +104,9 @@ kernels! {
     /// Study: pairs of given indices.
     INDEX_PAIRS "index_pairs" [PAIR_INDEX] (params, out);
     /// Study: pairs of given identifiers, by the lazy way.
-    LAZY_PAIRS "lazy_pairs" [] (params, out);
+    LAZY_PAIRS "lazy_pairs" [LAZY] (params, out);
+    /// Study: pairs at the ends of the rows of many numbers of boxes.
+    ROW_ENDS "row_ends" [PAIR_INDEX] (params, out);
+    /// Study: the same by the lazy way, and about the diagonal.
+    LAZY_ENDS "lazy_ends" [LAZY] (params, out);
 }

@@ -90,6 +90,21 @@ pub(super) fn compare_dispatches(_: &State, found: &State, wanted: &State) -> Op
     same("dispatches", &found.dispatches, &wanted.dispatches)
 }
 
+/// Pairs as words in the simplest way that the format allows.
+pub(super) fn encoded(s: &State, pairs: &[Pair]) -> Vec<u32> {
+    let n = u64::from(s.params.boxes);
+    if s.has(BITS) {
+        let mut words = vec![0; pair_count(n).div_ceil(32).next_multiple_of(8) as usize];
+        for pair in pairs {
+            let k = index_of(pair.a.into(), pair.b.into(), n) as usize;
+            words[k / 32] |= 1 << (k % 32);
+        }
+        return words;
+    }
+    let mark = (s.has(PACKED) && !pairs.is_empty()).then_some(PLAIN | pairs.len() as u32);
+    mark.into_iter().chain(pairs.iter().flat_map(|pair| [pair.a, pair.b])).collect()
+}
+
 /// The pairs in `out`, sorted.
 pub(super) fn decoded(s: &State) -> Result<Vec<Pair>, String> {
     let n = s.params.boxes;

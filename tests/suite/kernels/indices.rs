@@ -8,6 +8,32 @@ pub(super) fn indices(n: u32, first: u32, count: u32) -> State {
     State { params, ..State::default() }
 }
 
+/// The same for the ends of rows of `low..=high` boxes, with so many places for a row.
+pub(super) fn ends(low: u32, high: u32, of_row: u32) -> State {
+    let split = of_row * (high - 1);
+    let params = Params { boxes: low, split, cells: split * (high - low + 1), ..Params::default() };
+    State { params, ..State::default() }
+}
+
+/// What is written for each place of each row, and what for rows that there are not.
+fn by_places<const N: usize>(s: &mut State, of_row: u32, place: impl Fn(u32, u32, u32) -> [u32; N]) {
+    let Params { boxes, split, cells, .. } = s.params;
+    let places = (0..cells).map(|i| (boxes + i / split, i % split / of_row, i % split % of_row));
+    s.out = places.flat_map(|(n, row, at)| if row + 1 < n { place(n, row, at) } else { [0; N] }).collect();
+}
+
+/// A row begins with the box after it, and ends with the last.
+pub(super) fn row_ends(s: &mut State) {
+    by_places(s, 2, |n, row, at| [row, row, [row + 1, n - 1][at as usize]]);
+}
+
+pub(super) fn lazy_ends(s: &mut State) {
+    by_places(s, 5, |n, row, at| {
+        let column = [0, row.saturating_sub(1), row, row + 1, n - 1][at as usize];
+        if row < column { [row, column] } else { [u32::MAX; 2] }
+    });
+}
+
 /// The estimated row is the exact one here; a kernel's may be near it.
 pub(super) fn index_pairs(s: &mut State) {
     s.out.clear();
@@ -35,6 +61,19 @@ fn lazy_pairs_agrees_with_its_twin_as_far_as_32_bits_reach() {
             let fault = fault(twin("lazy_pairs"), &GpuOptions::DEFAULT, &indices(n, first, count));
             assert_eq!(fault, None, "n {n}, from {first}");
         }
+    }
+}
+
+#[test]
+fn ends_agree_with_their_twins_for_every_root() {
+    for (low, high) in [(2u32, 2), (2, 90), (255, 260), (4999, 5000)] {
+        for root in 0..=9 {
+            let options = GpuOptions { root, ..GpuOptions::DEFAULT };
+            let fault = fault(twin("row_ends"), &options, &ends(low, high, 2));
+            assert_eq!(fault, None, "n from {low} to {high}, root {root}");
+        }
+        let fault = fault(twin("lazy_ends"), &GpuOptions::DEFAULT, &ends(low, high, 5));
+        assert_eq!(fault, None, "n from {low} to {high}");
     }
 }
 

@@ -329,7 +329,7 @@ type Plant = fn(&mut State);
 /// A comparison that finds no fault in anything would pass every test above.
 #[test]
 fn planted_faults_are_noticed() {
-    let faults: [(&str, Plant); 21] = [
+    let faults: [(&str, Plant); 23] = [
         ("locate", |s| s.located[7].high[1] += 1),
         ("locate", |s| full(s).0.residents -= 1),
         ("visit", |s| full(s).0.visitors += 1),
@@ -351,6 +351,8 @@ fn planted_faults_are_noticed() {
         ("check_small", |s| s.totals.redundant[0] ^= 1),
         ("index_pairs", |s| s.out[4] ^= 1),
         ("lazy_pairs", |s| s.out[0] = u32::MAX),
+        ("row_ends", |s| s.out[7] ^= 1),
+        ("lazy_ends", |s| s.out[9] = u32::MAX),
     ];
     for (i, (kernel, plant)) in faults.into_iter().enumerate() {
         let before = State::before(kernel, &pile());

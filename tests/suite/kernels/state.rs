@@ -135,6 +135,9 @@ impl State {
         if matches!(kernel, "index_pairs" | "lazy_pairs") {
             return indices(1000, 77, 4000);
         }
+        if let "row_ends" | "lazy_ends" = kernel {
+            return ends(300, 350, if kernel == "row_ends" { 2 } else { 5 });
+        }
         let mut state = Self::new(case);
         for twin in TWINS.iter().take_while(|twin| twin.kernel.name != kernel) {
             // The checks do not build upon each other.

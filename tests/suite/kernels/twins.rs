@@ -12,7 +12,7 @@ pub(super) struct Twin {
 }
 
 /// The twins, in the order in which the kernels run.
-pub(super) static TWINS: [Twin; 15] = [
+pub(super) static TWINS: [Twin; 17] = [
     Twin { kernel: &shaders::SETTLE, run: settle, groups: by_known, compare: compare_motions },
     Twin { kernel: &shaders::RENEW, run: renew, groups: by_change, compare: compare_motions },
     Twin { kernel: &shaders::LOCATE, run: locate, groups: by_box, compare: compare_located },
@@ -28,6 +28,8 @@ pub(super) static TWINS: [Twin; 15] = [
     Twin { kernel: &shaders::CHECK_ALL, run: check_all, groups: by_pair, compare: compare_checks },
     Twin { kernel: &shaders::INDEX_PAIRS, run: index_pairs, groups: by_cell, compare: compare_indices },
     Twin { kernel: &shaders::LAZY_PAIRS, run: lazy_pairs, groups: by_cell, compare: compare_out },
+    Twin { kernel: &shaders::ROW_ENDS, run: row_ends, groups: by_cell, compare: compare_indices },
+    Twin { kernel: &shaders::LAZY_ENDS, run: lazy_ends, groups: by_cell, compare: compare_out },
 ];
 
 pub(super) fn twin(kernel: &str) -> &'static Twin {
@@ -325,21 +327,6 @@ pub(super) fn box_of(entry: u32) -> u32 {
 
 pub(super) fn overlap(a: &layout::Box, b: &layout::Box) -> bool {
     (0..3).all(|k| a.low[k] <= b.high[k] && b.low[k] <= a.high[k])
-}
-
-/// Pairs as words in the simplest way that the format allows.
-pub(super) fn encoded(s: &State, pairs: &[Pair]) -> Vec<u32> {
-    let n = u64::from(s.params.boxes);
-    if s.has(BITS) {
-        let mut words = vec![0; pair_count(n).div_ceil(32).next_multiple_of(8) as usize];
-        for pair in pairs {
-            let k = index_of(pair.a.into(), pair.b.into(), n) as usize;
-            words[k / 32] |= 1 << (k % 32);
-        }
-        return words;
-    }
-    let mark = (s.has(PACKED) && !pairs.is_empty()).then_some(PLAIN | pairs.len() as u32);
-    mark.into_iter().chain(pairs.iter().flat_map(|pair| [pair.a, pair.b])).collect()
 }
 
 /// The items of a chunk.

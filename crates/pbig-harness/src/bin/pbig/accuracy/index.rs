@@ -1,5 +1,6 @@
 //! From the index of a pair to the pair (Avril 3.2 and 3.3): every root and every correction.
 
+mod ends;
 mod exact;
 mod kernels;
 mod notes;
@@ -11,6 +12,7 @@ mod times;
 
 use super::study::{Cell, Point, Study, Table};
 use crate::output::Failure;
+use ends::Shown;
 use exact::Exactly;
 use pbig_core::gpu::study::Bench;
 use pbig_harness::index::{CORRECTIONS, Tally, WAYS, Way};
@@ -85,6 +87,8 @@ struct Every {
     tallies: [Tally; 3],
     /// The smallest n with a wrong pair.
     first: [Option<i64>; 3],
+    /// What the ends of rows alone would have shown.
+    at_ends: [Shown; 3],
 }
 
 fn boxes(quick: bool) -> Vec<i64> {
@@ -94,16 +98,24 @@ fn boxes(quick: bool) -> Vec<i64> {
 impl Every {
     fn of(way: &Way, quick: bool) -> Self {
         let boxes = boxes(quick);
-        let zero = || Self { way: *way, boxes: vec![], tallies: Default::default(), first: [None; 3] };
-        let one = |mut sum: Self, &n: &i64| {
-            for (k, tally) in (way.tally)(n).into_iter().enumerate() {
-                sum.tallies[k] += tally;
-                sum.first[k] = sum.first[k].or((tally.wrong > 0).then_some(n));
-            }
-            sum
-        };
-        let all = boxes.par_iter().fold(zero, one).reduce(zero, Self::and);
+        let all = boxes.par_iter().map(|&n| Self::of_one(way, n)).reduce(|| Self::of_none(way), Self::and);
         Self { boxes, ..all }
+    }
+
+    fn of_none(way: &Way) -> Self {
+        Self {
+            way: *way,
+            boxes: vec![],
+            tallies: Default::default(),
+            first: [None; 3],
+            at_ends: Default::default(),
+        }
+    }
+
+    fn of_one(way: &Way, n: i64) -> Self {
+        let tallies = (way.tally)(n);
+        let first = tallies.map(|tally| (tally.wrong > 0).then_some(n));
+        Self { tallies, first, at_ends: ends::shown(way, n, &tallies), ..Self::of_none(way) }
     }
 
     /// With what comes of others.
@@ -111,6 +123,7 @@ impl Every {
         for k in 0..3 {
             self.tallies[k] += other.tallies[k];
             self.first[k] = [self.first[k], other.first[k]].into_iter().flatten().min();
+            self.at_ends[k] = self.at_ends[k].and(other.at_ends[k]);
         }
         self
     }
@@ -153,23 +166,23 @@ fn every_table(found: &Found) -> Table {
         "missed",
         "doubled",
         "no_pair",
+        "values_of_n_with_wrong_pairs",
+        "of_these_with_right_ends_of_rows",
+        "worst_row_at_ends",
     ];
     let mut table = Table::new("all_pairs", title, &columns);
     for every in &found.every {
         for (k, correction) in CORRECTIONS.into_iter().enumerate() {
             let head = [label(&every.way), correction.to_owned()];
-            table.row(every_row(
-                head,
-                every.most(),
-                every.boxes.len() as u64,
-                &every.tallies[k],
-                every.first[k],
-            ));
+            let values = every.boxes.len() as u64;
+            let row = every_row(head, every.most(), values, &every.tallies[k], every.first[k]);
+            table.row(row.into_iter().chain(every.at_ends[k].cells()));
         }
     }
     for one in &found.exact {
         let head = [one.name, "as it is"].map(str::to_owned);
-        table.row(every_row(head, one.most, one.values, &one.tally, one.first));
+        let row = every_row(head, one.most, one.values, &one.tally, one.first);
+        table.row(row.into_iter().chain([const { Cell::Nothing }; 3]));
     }
     table
 }
@@ -190,19 +203,21 @@ fn every_row(head: [String; 2], most: i64, values: u64, tally: &Tally, first: Op
     head.map(Cell::from).into_iter().chain(rest).collect()
 }
 
-/// The table, where there is an adapter; and which it is, or why there is none.
-fn kernels(quick: bool) -> Result<(Option<Table>, Vec<String>), Failure> {
+/// The tables, where there is an adapter; and which it is, or why there is none.
+fn kernels(quick: bool) -> Result<(Vec<Table>, Vec<String>), Failure> {
     let adapter = pbig_core::GpuFinder::new().map(|gpu| (gpu.adapter().to_owned(), gpu.is_software()));
     match (Bench::new(), adapter) {
         (Ok(bench), Ok((name, software))) => {
             let what =
                 if software { ", software: its times would mean nothing and are left out" } else { "" };
             let estimates = kernels::estimates(&bench, software, quick)?;
+            let ends = kernels::ends::looked_at(&bench, quick)?;
             let head = format!("As kernels on {name}{what}.");
-            let notes = [head].into_iter().chain(kernels::notes(&estimates)).collect();
-            Ok((Some(kernels::table(&estimates)), notes))
+            let notes =
+                [head].into_iter().chain(kernels::notes(&estimates)).chain([kernels::ends::note(&ends)]);
+            Ok((vec![kernels::table(&estimates), kernels::ends::table(&ends)], notes.collect()))
         }
-        (Err(why), _) | (_, Err(why)) => Ok((None, vec![format!("Not run as kernels: {why}.")])),
+        (Err(why), _) | (_, Err(why)) => Ok((vec![], vec![format!("Not run as kernels: {why}.")])),
     }
 }
 

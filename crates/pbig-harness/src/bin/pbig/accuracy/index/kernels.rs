@@ -1,5 +1,6 @@
 //! The same roots as kernels: the row that a device estimates, and the exact pair; and the lazy way.
 
+pub(super) mod ends;
 mod lazy;
 
 use super::super::study::{Cell, Table, plain};
@@ -24,14 +25,16 @@ const MOST: u32 = 1 << 17;
 struct Root {
     number: u32,
     name: String,
+    /// The same on the CPU, of ways that estimate a row ([`Way::row`]).
+    row: Option<fn(i64, i64) -> i64>,
 }
 
 const BISECTION: u32 = 9;
 
 impl Root {
     fn all() -> impl Iterator<Item = Self> {
-        let of_way = |way: &Way| Some(Self { number: number(way)?, name: label(way) });
-        let bisection = Self { number: BISECTION, name: "bisection over rows".to_owned() };
+        let of_way = |way: &Way| Some(Self { number: number(way)?, name: label(way), row: Some(way.row) });
+        let bisection = Self { number: BISECTION, name: "bisection over rows".to_owned(), row: None };
         WAYS.iter().filter_map(of_way).chain([bisection])
     }
 
@@ -75,7 +78,7 @@ pub(super) fn estimates(bench: &Bench, software: bool, quick: bool) -> Result<Ve
 }
 
 impl Estimates {
-    fn of(bench: &Bench, n: u32, Root { number, name }: Root, software: bool) -> Result<Self, Failure> {
+    fn of(bench: &Bench, n: u32, Root { number, name, .. }: Root, software: bool) -> Result<Self, Failure> {
         let (mut rows, mut ms) = (Vec::new(), 0.0);
         for indices in parts(n, pair_count(n.into())) {
             let (words, took) =
@@ -141,6 +144,11 @@ impl Indices {
     fn between(n: u32, first: u64, end: u64) -> Self {
         Self { n, first: first as u32, count: ((end - first) as u32).min(MOST) }
     }
+
+    /// For so many of them.
+    fn params(&self, cells: u32) -> Params {
+        Params { boxes: self.n, split: self.first, cells, ..Params::default() }
+    }
 }
 
 /// All of so many, or some of each part of all.
@@ -172,22 +180,20 @@ fn timed_run(
 
 /// With room for all indices, of which `cells` are computed.
 fn run(bench: &Bench, root: u32, indices: &Indices, cells: u32) -> Result<Vec<u32>, Failure> {
-    let options = GpuOptions { root, ..GpuOptions::DEFAULT };
-    run_kernel(bench, &pbig_shaders::INDEX_PAIRS, &options, indices, cells, 3)
+    run_kernel(bench, (&pbig_shaders::INDEX_PAIRS, root), indices.params(cells), indices.count, 3)
 }
 
-/// So many words for each index.
+/// A kernel with a root, and room for so many cells of so many words each.
 fn run_kernel(
     bench: &Bench,
-    kernel: &'static Kernel,
-    options: &GpuOptions,
-    &Indices { n, first, count }: &Indices,
-    cells: u32,
+    (kernel, root): (&'static Kernel, u32),
+    params: Params,
+    room: u32,
     words: usize,
 ) -> Result<Vec<u32>, Failure> {
-    let params = Params { boxes: n, split: first, cells, ..Params::default() };
-    let bindings = [bytemuck::bytes_of(&params).to_vec(), vec![0; 4 * words * count as usize]];
-    let found = bench.run(kernel, options, false, &bindings, count.div_ceil(LANES));
+    let options = GpuOptions { root, ..GpuOptions::DEFAULT };
+    let bindings = [bytemuck::bytes_of(&params).to_vec(), vec![0; 4 * words * room as usize]];
+    let found = bench.run(kernel, &options, false, &bindings, room.div_ceil(LANES));
     let found = found.map_err(|error| Failure::Input(format!("{}: {error}", kernel.name)))?;
     Ok(bytemuck::pod_collect_to_vec(&found[1]))
 }
@@ -229,7 +235,7 @@ pub(super) fn notes(estimates: &[Estimates]) -> Vec<String> {
     let largest = estimates.iter().map(|one| one.n).filter(|n| *n <= MOST_WHOLE).max().unwrap_or(0);
     vec![
         format!(
-            "Kernels: all indices up to {largest} boxes, beyond them {MOST} of each of {PARTS} parts of all. They \
+            "Kernels, for some n: all indices up to {largest} boxes, beyond them {MOST} of each of {PARTS} parts of all. They \
              keep estimated rows from 0 to n - 2. The pair that integers make of the row is right for each index: a \
              run in which one is not fails."
         ),

@@ -2,7 +2,7 @@
 
 use super::super::study::plain;
 use super::times::{Times, label};
-use super::{Found, exact, paper, percent, roundings, rules};
+use super::{Found, ends, exact, paper, percent, roundings, rules};
 use pbig_core::pair_index::pair_of;
 use pbig_harness::index::{CORRECTIONS, LAZY, MOST_EXHAUSTIVE};
 
@@ -25,6 +25,7 @@ pub(super) fn notes(found: &Found) -> Vec<String> {
          random; what is missed and doubled is not counted there."
     ));
     notes.push(exact::told(&found.exact));
+    notes.push(ends::note(&found.every));
     notes.push(sign_note());
     notes.extend(rules::notes(found));
     notes.extend([table_2_note(), root_note(found), lazy_note(found)]);

@@ -1,0 +1,280 @@
+//! Kernels at the ends of all rows, for every n: what all pairs of every n would be too many for.
+//!
+//! A row is estimated from a number that falls with the index, so that an error shows where the row begins or ends before it
+//! shows within; `super::super::ends` tells how far that held on the CPU. What is missed and doubled ends cannot tell.
+
+use super::super::super::study::{Cell, Table};
+use super::super::percent;
+use super::{Root, run_kernel};
+use crate::output::Failure;
+use pbig_core::gpu::study::Bench;
+use pbig_core::layout::Params;
+use pbig_core::pair_index::index_of;
+use pbig_harness::index::{AsItIs, Correction, Rules, lazy_pair};
+use rayon::prelude::*;
+use std::ops::Range;
+
+/// The most places of a call.
+const MOST_PLACES: u32 = 1 << 20;
+
+/// What comes of some estimates.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+struct Found {
+    places: u64,
+    wrong: u64,
+    /// By how many rows the worst is off.
+    worst_row: u64,
+    /// Values of n with a wrong one, and the smallest of them.
+    values: u64,
+    first: Option<u32>,
+    /// Rows that the CPU estimates otherwise, before any correction.
+    otherwise: u64,
+}
+
+impl Found {
+    fn note(&mut self, given: (i64, i64), right: (i64, i64)) {
+        self.places += 1;
+        self.wrong += u64::from(given != right);
+        self.worst_row = self.worst_row.max(given.0.abs_diff(right.0));
+    }
+
+    /// Once all places of an n are noted.
+    fn of(self, n: u32) -> Self {
+        let is_wrong = self.wrong > 0;
+        Self { values: is_wrong.into(), first: is_wrong.then_some(n), ..self }
+    }
+
+    fn and(self, other: Self) -> Self {
+        Self {
+            places: self.places + other.places,
+            wrong: self.wrong + other.wrong,
+            worst_row: self.worst_row.max(other.worst_row),
+            values: self.values + other.values,
+            first: self.first.into_iter().chain(other.first).min(),
+            otherwise: self.otherwise + other.otherwise,
+        }
+    }
+
+    fn cells(&self) -> [Cell; 5] {
+        let share = percent(self.wrong, self.places);
+        let first = self.first.map(u64::from);
+        [self.wrong.into(), share.into(), self.values.into(), first.into(), self.worst_row.into()]
+    }
+}
+
+/// One root, or the lazy way, for every n up to `most`.
+pub(in super::super) struct Ends {
+    name: String,
+    most: u32,
+    as_it_is: Found,
+    /// Of ways that estimate a row: those that the CPU has, too.
+    by_rules: Option<Found>,
+}
+
+/// On the best adapter. A pair that is wrong after the correction by integers is a failed check.
+pub(in super::super) fn looked_at(bench: &Bench, quick: bool) -> Result<Vec<Ends>, Failure> {
+    let most = if quick { 250 } else { super::MOST_WHOLE };
+    let roots = Root::all().map(|root| of_root(bench, &root, most));
+    roots.chain([lazily(bench, most)]).collect()
+}
+
+fn of_root(bench: &Bench, root: &Root, most: u32) -> Result<Ends, Failure> {
+    let kernel = (&pbig_shaders::ROW_ENDS, root.number);
+    let mut sums = [Found::default(); 2];
+    for batch in batches(most, 2) {
+        let params = params(&batch, 2);
+        let words = run_kernel(bench, kernel, params, params.cells, 3)?;
+        let of_n = batch.into_par_iter().zip(words.par_chunks_exact(3 * params.split as usize));
+        let found = of_n.map(|(n, words)| judged(n, words, root)).collect::<Result<Vec<_>, _>>()?;
+        sums = found.into_iter().fold(sums, |[a, b], [c, d]| [a.and(c), b.and(d)]);
+    }
+    let [as_it_is, rules] = sums;
+    Ok(Ends { name: root.name.clone(), most, as_it_is, by_rules: root.row.map(|_| rules) })
+}
+
+fn lazily(bench: &Bench, most: u32) -> Result<Ends, Failure> {
+    let mut places = 0;
+    for batch in batches(most, COLUMNS) {
+        let params = params(&batch, COLUMNS);
+        let words = run_kernel(bench, (&pbig_shaders::LAZY_ENDS, 0), params, params.cells, 2)?;
+        let of_n = batch.into_par_iter().zip(words.par_chunks_exact(2 * params.split as usize));
+        let counts = of_n.map(|(n, words)| counted(n, words)).collect::<Result<Vec<_>, _>>()?;
+        places += counts.iter().sum::<u64>();
+    }
+    let as_it_is = Found { places, ..Found::default() };
+    Ok(Ends { name: "lazy way".to_owned(), most, as_it_is, by_rules: None })
+}
+
+/// Values of n that are looked at in one call, with so many places for each row.
+fn batches(most: u32, of_row: u32) -> Vec<Range<u32>> {
+    let (mut batches, mut low) = (vec![], 2);
+    while low <= most {
+        let fits = |high: &u32| of_row * (high - 1) * (high - low + 1) <= MOST_PLACES;
+        let high = (low..=most).take_while(fits).last().unwrap_or(low);
+        batches.push(low..high + 1);
+        low = high + 1;
+    }
+    batches
+}
+
+/// All of a batch have as many places as the largest, so that a thread finds its n by a division.
+fn params(batch: &Range<u32>, of_row: u32) -> Params {
+    let split = of_row * (batch.end - 2);
+    Params { boxes: batch.start, split, cells: split * batch.len() as u32, ..Params::default() }
+}
+
+/// Estimates at both ends of each row, as they are and by the rules.
+fn judged(n: u32, words: &[u32], root: &Root) -> Result<[Found; 2], Failure> {
+    let [mut as_it_is, mut rules] = [Found::default(); 2];
+    let ends = (0..n - 1).flat_map(|row| [(row, row + 1), (row, n - 1)]);
+    for (right, words) in ends.zip(words.chunks_exact(3)) {
+        if words[1..] != [right.0, right.1] {
+            return Err(wrong(n, right, &words[1..]));
+        }
+        let (estimate, n) = (i64::from(words[0]), i64::from(n));
+        let k = index_of(right.0.into(), right.1.into(), n as u64) as i64;
+        let right = (right.0.into(), right.1.into());
+        as_it_is.note(AsItIs::pair(estimate, k, n), right);
+        rules.note(Rules::pair(estimate, k, n), right);
+        as_it_is.otherwise += u64::from(root.row.is_some_and(|row| on_the_cpu(row, k, n) != estimate));
+    }
+    Ok([as_it_is.of(n), rules.of(n)])
+}
+
+fn wrong(n: u32, right: (u32, u32), given: &[u32]) -> Failure {
+    Failure::Check(format!("{right:?} of {n} boxes: the kernel gives {given:?}"))
+}
+
+/// Kept among the rows that there are, as kernels keep it.
+fn on_the_cpu(row: fn(i64, i64) -> i64, k: i64, n: i64) -> i64 {
+    let m = 2 * n - 1;
+    row(m, m * m - 8 * k).clamp(0, n - 2)
+}
+
+/// Identifiers of a row that are looked at: the first and the last, and those about the diagonal.
+const COLUMNS: u32 = 5;
+
+/// How many there are, if each gives its pair, or none.
+fn counted(n: u32, words: &[u32]) -> Result<u64, Failure> {
+    let columns = |row: u32| [0, row.saturating_sub(1), row, row + 1, n - 1].map(|column| (row, column));
+    for ((row, column), words) in (0..n - 1).flat_map(columns).zip(words.chunks_exact(2)) {
+        let given = (words != [u32::MAX; 2]).then(|| (words[0].into(), words[1].into()));
+        if given != lazy_pair((row * n + column).into(), n.into()) {
+            return Err(wrong(n, (row, column), words));
+        }
+    }
+    Ok(u64::from(COLUMNS * (n - 1)))
+}
+
+pub(in super::super) fn table(ends: &[Ends]) -> Table {
+    let most = ends.first().map_or(0, |one| one.most);
+    let title = format!("As kernels: both ends of each row, every n from 2 to {most}");
+    let columns = [
+        "root",
+        "looked_at",
+        "wrong",
+        "wrong_percent",
+        "values_of_n_with_wrong_ones",
+        "first_wrong_n",
+        "worst_row",
+        "wrong_by_the_rules",
+        "wrong_by_the_rules_percent",
+        "values_of_n_with_wrong_ones_by_the_rules",
+        "first_wrong_n_by_the_rules",
+        "worst_row_by_the_rules",
+        "rows_other_than_on_the_CPU",
+    ];
+    let mut table = Table::new("kernels_at_ends", title, &columns);
+    ends.iter().for_each(|one| table.row(one.row()));
+    table
+}
+
+impl Ends {
+    fn row(&self) -> impl Iterator<Item = Cell> {
+        let head = [self.name.as_str().into(), self.as_it_is.places.into()];
+        let rules = self.by_rules.map_or([const { Cell::Nothing }; 5], |found| found.cells());
+        let otherwise = self.by_rules.map(|_| self.as_it_is.otherwise);
+        head.into_iter().chain(self.as_it_is.cells()).chain(rules).chain([otherwise.into()])
+    }
+}
+
+/// What was looked at, and what was found to be wrong.
+pub(in super::super) fn note(ends: &[Ends]) -> String {
+    let most = ends.first().map_or(0, |one| one.most);
+    let told = |found: fn(&Ends) -> Option<Found>| {
+        let from = |one: &Ends| Some(format!("{} from {} on", one.name, found(one)?.first?));
+        let told: Vec<_> = ends.iter().filter_map(from).collect();
+        if told.is_empty() { "none".to_owned() } else { told.join(", ") }
+    };
+    let otherwise: u64 = ends.iter().map(|one| one.as_it_is.otherwise).sum();
+    format!(
+        "Kernels at every n from 2 to {most}: the first and last index of each row, and by the lazy way the first and last \
+         identifier of each row and those about the diagonal; all pairs of each of these n would be too many. Wrong, as it \
+         is: {}; by the paper's rules: {}; by integers none, nor by the lazy way: a run in which one is fails. Rows that the \
+         CPU estimates otherwise: {otherwise}. What ends can show is told above; what is missed and doubled they cannot.",
+        told(|one| Some(one.as_it_is)),
+        told(|one| one.by_rules)
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_n_is_in_one_batch_and_no_batch_is_too_large() {
+        for (most, of_row) in [(2, 2), (250, 2), (5000, 2), (5000, COLUMNS)] {
+            let batches = batches(most, of_row);
+            assert!(batches.iter().cloned().flatten().eq(2..=most), "{most}, {of_row}");
+            assert!(batches.iter().all(|batch| params(batch, of_row).cells <= MOST_PLACES));
+        }
+    }
+
+    /// Of 4 boxes, by a root that the CPU has estimate row 1 everywhere.
+    #[test]
+    fn wrong_estimates_are_counted_and_a_wrong_pair_is_a_failure() {
+        let root = Root { number: 0, name: String::new(), row: Some(|_, _| 1) };
+        let mut words = [[1, 0, 1], [0, 0, 3], [1, 1, 2], [1, 1, 3], [0, 2, 3], [2, 2, 3]].concat();
+        let [as_it_is, rules] = judged(4, &words, &root).expect("right pairs");
+        let counts =
+            |found: Found| [found.places, found.wrong, found.worst_row, found.values, found.otherwise];
+        assert_eq!((counts(as_it_is), as_it_is.first), ([6, 2, 2, 1, 3], Some(4)));
+        assert_eq!((counts(rules), rules.first), ([6, 1, 1, 1, 0], Some(4)));
+        words[4] = 1;
+        assert!(judged(4, &words, &root).is_err());
+    }
+
+    #[test]
+    fn a_wrong_identifier_is_a_failure() {
+        let none = [u32::MAX; 2];
+        let mut words = [none, none, none, [0, 1], [0, 2], none, none, none, [1, 2], [1, 2]].concat();
+        assert_eq!(counted(3, &words).expect("right pairs"), 10);
+        words[10] = 1;
+        assert!(counted(3, &words).is_err());
+    }
+
+    #[test]
+    fn sums_have_the_smallest_n_and_the_worst_row() {
+        let one = |wrong, worst_row, n| Found { places: 4, wrong, worst_row, ..Found::default() }.of(n);
+        let sum = one(0, 0, 3).and(one(2, 1, 9)).and(one(1, 3, 7));
+        assert_eq!((sum.places, sum.wrong, sum.worst_row, sum.values), (12, 3, 3, 2));
+        assert_eq!(sum.first, Some(7));
+    }
+
+    #[test]
+    fn kernels_are_looked_at_and_what_is_wrong_is_told() {
+        let Ok(bench) = Bench::new() else { return };
+        let ends = looked_at(&bench, true).expect("right pairs");
+        assert_eq!(ends.len(), Root::all().count() + 1);
+        let roots = ends.iter().filter(|one| one.name != "lazy way");
+        assert!(roots.clone().all(|one| one.as_it_is.places == 249 * 250));
+        let bisection = roots.clone().find(|one| one.name == "bisection over rows").expect("bisection");
+        assert_eq!((bisection.as_it_is.wrong, bisection.by_rules), (0, None));
+        let told = note(&ends);
+        let one_step = roots.clone().find(|one| one.name == "Carmack 1").expect("one step");
+        let first = one_step.as_it_is.first.expect("one step is too few");
+        assert!(told.contains(&format!("Carmack 1 from {first} on, Carmack 2 from ")), "{told}");
+        assert!(!told.contains("bisection over rows from"), "{told}");
+        assert!(told.contains("by the paper's rules: none;"), "{told}");
+    }
+}
