@@ -25,9 +25,9 @@ fn places(wanted: impl Fn(&Way) -> bool) -> Vec<usize> {
     (0..WAYS.len()).filter(|&place| wanted(&WAYS[place])).collect()
 }
 
-/// Those that are held against the permuted ones, and before them stock once more: what chance does where it does not repeat.
-fn held() -> Vec<usize> {
-    places(|way| way.is_held_against_stock() || way.name == WAYS[1].name)
+/// Runs whose quantities are counted, and listed: those held against the permuted ones, and before them stock once more.
+fn counted() -> Vec<usize> {
+    places(|way| way.is_stock_again() || way.is_held_against_stock())
 }
 
 /// Each permuted run among the others, ascending.
@@ -44,7 +44,7 @@ fn of_permuted(scenes: &[Ways]) -> Vec<usize> {
 
 pub(super) fn note(scenes: &[Ways]) -> String {
     let (permuted, control) = (places(Way::is_permuted), of_permuted(scenes));
-    let told = held().into_iter().map(|place| {
+    let told = counted().into_iter().map(|place| {
         let [count, all] = farthest(scenes, place, &permuted);
         let as_many = control.iter().filter(|of_control| **of_control >= count).count();
         format!("{} {count} of {all} (as many or more: {as_many} permuted ones)", WAYS[place].name)
@@ -95,7 +95,7 @@ fn row(ways: &Ways, quantity: Quantity, permuted: &[usize]) -> Vec<Cell> {
     let (least, most) =
         (others.iter().copied().fold(f64::MAX, f64::min), others.iter().copied().fold(f64::MIN, f64::max));
     let head = [Cell::from(ways.scene), quantity.name.into(), value(0).into(), least.into(), most.into()];
-    head.into_iter().chain(held().into_iter().map(|place| value(place).into())).collect()
+    head.into_iter().chain(counted().into_iter().map(|place| value(place).into())).collect()
 }
 
 #[cfg(test)]

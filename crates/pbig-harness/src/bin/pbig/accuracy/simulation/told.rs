@@ -33,7 +33,7 @@ pub(super) fn notes(scenes: &[Ways]) -> Vec<String> {
     ];
     notes.extend(WAYS.iter().filter_map(|way| again(scenes, way.name)));
     notes.extend(scenes.iter().map(first_difference));
-    notes.extend([rests(scenes), typical(scenes), tails::note(scenes), how_far(scenes)]);
+    notes.extend([rests(scenes), distances_at_the_end(scenes), tails::note(scenes), how_far(scenes)]);
     notes
 }
 
@@ -57,23 +57,13 @@ fn rests(scenes: &[Ways]) -> String {
     )
 }
 
-/// Mean distances at the end as multiples of the farthest permuted run's: geometric means over the scenes in which
-/// bodies of those move apart from stock's.
-fn typical(scenes: &[Ways]) -> String {
-    let of = |name: &'static str| {
-        let run = |ways: &Ways| {
-            let run = ways.runs.iter().find(|run| run.way == name)?;
-            multiple(run, ways.first(), &ways.yardsticks(), DISTANCE)?.times
-        };
-        let times: Vec<f64> = scenes.iter().filter_map(run).collect();
-        let some = times.iter().filter(|times| **times > 0.0 && times.is_finite());
-        let mean = (some.clone().map(|times| times.ln()).sum::<f64>() / some.clone().count() as f64).exp();
-        let parts = [
-            (some.count() > 0).then(|| format!("{mean:.2} times")),
-            count(&times, 0.0).map(|scenes| format!("not at all in {scenes}")),
-            count(&times, f64::INFINITY).map(|scenes| format!("where no permuted one moves in {scenes}")),
-        ];
-        format!("{name} {}", parts.into_iter().flatten().collect::<Vec<_>>().join(", "))
+/// Mean distances at the end as multiples of the farthest permuted run's, way by way.
+fn distances_at_the_end(scenes: &[Ways]) -> String {
+    let of = |name: &str| {
+        let times = times_at_the_end(scenes, name);
+        let mean = geometric_mean(&times).map(|mean| format!("{mean:.2} times"));
+        let parts: Vec<String> = mean.into_iter().chain(without_mean(&times)).collect();
+        format!("{name} {}", parts.join(", "))
     };
     let ways = WAYS.iter().filter(|way| way.is_held_against_stock());
     let all: Vec<String> = ways.map(|way| of(way.name)).collect();
@@ -84,8 +74,31 @@ fn typical(scenes: &[Ways]) -> String {
     )
 }
 
-fn count(all: &[f64], value: f64) -> Option<String> {
-    match all.iter().filter(|one| **one == value).count() {
+/// Scene by scene: 0 where a way's bodies end where stock's do, infinity where those of no permuted run end elsewhere.
+fn times_at_the_end(scenes: &[Ways], way: &str) -> Vec<f64> {
+    let times = |ways: &Ways| {
+        let run = ways.runs.iter().find(|run| run.way == way)?;
+        multiple(run, ways.first(), &ways.yardsticks(), DISTANCE)?.times
+    };
+    scenes.iter().filter_map(times).collect()
+}
+
+/// Of those that have a logarithm.
+fn geometric_mean(times: &[f64]) -> Option<f64> {
+    let logarithms: Vec<f64> = times.iter().map(|times| times.ln()).filter(|ln| ln.is_finite()).collect();
+    (!logarithms.is_empty()).then(|| (logarithms.iter().sum::<f64>() / logarithms.len() as f64).exp())
+}
+
+/// The others, in words.
+fn without_mean(times: &[f64]) -> impl Iterator<Item = String> {
+    let kinds = [("not at all", 0.0), ("where no permuted one moves", f64::INFINITY)];
+    let told = kinds.map(|(what, value)| Some(format!("{what} in {}", scenes_with(value, times)?)));
+    told.into_iter().flatten()
+}
+
+/// How many scenes have just this multiple; none: nothing is to be told.
+fn scenes_with(value: f64, times: &[f64]) -> Option<String> {
+    match times.iter().filter(|times| **times == value).count() {
         0 => None,
         1 => Some("1 scene".to_owned()),
         some => Some(format!("{some} scenes")),
@@ -201,17 +214,17 @@ mod tests {
             }
             ways
         };
-        let told = typical(&[with("near", 0.5), with("far", 8.0)]);
+        let told = distances_at_the_end(&[with("near", 0.5), with("far", 8.0)]);
         let none = "stock sorted not at all in 2 scenes; pbig lower first 2.00 times; pbig 2.00 times; ";
         assert!(told.ends_with(&format!(": {none}pbig without margin 2.00 times.")), "{told}");
-        let told = typical(&[with("near", 0.5), with("far", 8.0), with("same", 0.0)]);
+        let told = distances_at_the_end(&[with("near", 0.5), with("far", 8.0), with("same", 0.0)]);
         assert!(told.contains("; pbig 2.00 times, not at all in 1 scene; "), "{told}");
         let mut alone = with("alone", 1.0);
         WAYS.iter()
             .zip(&mut alone.runs)
             .filter(|(way, _)| way.is_permuted())
             .for_each(|(_, run)| run.apart.mean = 0.0);
-        let told = typical(&[alone]);
+        let told = distances_at_the_end(&[alone]);
         assert!(told.contains("; pbig where no permuted one moves in 1 scene; "), "{told}");
     }
 
