@@ -2,8 +2,10 @@
 //! our broad phase and, as controls, with rapier's and with the orders of either in the other. What is promised of boxes
 //! must hold here, too; sums over worlds are without these, which are hundreds of frames of one.
 
-use super::super::study::{Cell, Table, plain};
-use super::place::{Along, IN_WORLD, Place, Row, Way, finder, rapiers};
+mod tables;
+
+use super::super::study::plain;
+use super::place::{Along, Place, Row, finder, rapiers};
 use crate::output::Failure;
 use pbig_core::Pair;
 use pbig_harness::scenes::Scene;
@@ -12,6 +14,7 @@ use pbig_harness::wide::{Differences, Layout, Pose, WideWorld, moved, to_f64};
 use pbig_harness::world::World;
 use rapier_pbig::{HandleOrder, PbigBroadPhase};
 use rapier3d::prelude::{BroadPhase, Collider, DefaultBroadPhase};
+pub(super) use tables::tables;
 
 /// What moves.
 #[derive(Clone, Copy)]
@@ -145,59 +148,7 @@ impl Narrow {
     }
 }
 
-pub(super) fn tables(all: &[Simulated]) -> [Table; 2] {
-    [in_f64(all), in_f32(all)]
-}
-
-fn in_f64(all: &[Simulated]) -> Table {
-    let title = "Simulated by rapier3d-f64, its poses held in f32, all steps together";
-    let columns = [
-        "world",
-        "offset",
-        "steps",
-        "pairs",
-        "missed_by_boxes_in_f32",
-        "of_touching_shapes",
-        "missed",
-        "added",
-        "missed_with_3_ulps",
-    ];
-    let mut table = Table::new("simulated", title, &columns);
-    all.iter().for_each(|one| table.row(one.cells()));
-    table
-}
-
-fn in_f32(all: &[Simulated]) -> Table {
-    let title = "Simulated by rapier in f32, held against rapier3d-f64, all steps together";
-    let columns = [
-        "world",
-        "offset",
-        "broad_phase",
-        "missed_percent",
-        "added_percent",
-        "apart_at_the_end",
-        "lost_bodies",
-    ];
-    let mut table = Table::new("simulated_in_f32", title, &columns);
-    for one in all {
-        for ((name, _), own) in KINDS.iter().zip(&one.own) {
-            let percents = [own.pairs.missed, own.pairs.added].map(|count| Cell::from(one.percent(count)));
-            let head = [one.row.world.into(), one.row.offset.into(), (*name).into()];
-            table.row(head.into_iter().chain(percents).chain([own.apart.into(), (own.lost as u64).into()]));
-        }
-    }
-    table
-}
-
 impl Simulated {
-    fn cells(&self) -> Vec<Cell> {
-        let row = &self.row;
-        let (boxes, all) = (row.by_boxes(Way::Ulps(0)), row.in_all(Way::Ulps(0)));
-        let head = [row.world.into(), row.offset.into(), (self.steps as u64).into(), row.pairs.into()];
-        let counts = [boxes.missed, boxes.missed_deep, all.missed, all.added, row.in_all(IN_WORLD).missed];
-        head.into_iter().chain(counts.map(Cell::from)).collect()
-    }
-
     /// Pairs in f32 that are missed or too many, of those in f64, in percent, with a kind.
     fn wrong(&self, kind: usize) -> f64 {
         let own = &self.own[kind];
@@ -298,6 +249,7 @@ fn range(ratios: &[(f64, f64)]) -> String {
 
 #[cfg(test)]
 mod tests {
+    use super::super::place::{IN_WORLD, Way};
     use super::*;
     use rapier3d::prelude::BroadPhasePairEvent;
 
