@@ -5,7 +5,7 @@ mod avril;
 pub(super) use avril::avril;
 
 use super::lockstep::{Rows, algorithm_1, algorithm_2, equation_7};
-use super::printed::{GAUSSIAN_GB, SEGMENT, TABLE_VI};
+use super::printed::{GAUSSIAN_GB, MOST_SPEED_UPS, OVER_PRI, SEGMENT, SPEED_UPS, TABLE_VI};
 use super::sheet::{Sheet, short, thousands};
 use pbig_core::pair_index::pair_count;
 use serde_json::json;
@@ -20,6 +20,7 @@ pub(super) fn pbig() -> Sheet {
         unequal_segments(),
         totals(),
         speed_ups(),
+        over_pri(),
         gigabytes(),
         count_of_partners(),
     ] {
@@ -93,7 +94,7 @@ fn speed_ups() -> [String; 4] {
     let by_table = |row: &super::printed::Breakdown| TABLE_VI[0].total as f64 / row.total as f64;
     let off =
         TABLE_VI.iter().filter_map(|row| Some((row.speed_up? - by_table(row)).abs())).fold(0.0, f64::max);
-    let [first, last] = super::printed::SPEED_UPS;
+    let [first, last] = SPEED_UPS;
     [
         "tables IV and VI; sections 1, 6.1 and 7".into(),
         format!(
@@ -105,6 +106,25 @@ fn speed_ups() -> [String; 4] {
             if first == last { "agree" } else { "do not" }
         ),
         format!("largest difference between table IV and the quotients of table VI: {}", short(off)),
+    ]
+}
+
+/// Two numbers may be one, rounded; then the other two of the same sentences should be, too.
+fn over_pri() -> [String; 4] {
+    let ([_, most], [most_over_cgal, over_cgal]) = (MOST_SPEED_UPS, SPEED_UPS);
+    let more = |there: f64, most: f64| format!("{:.1}", 100.0 * (there / most - 1.0));
+    [
+        "sections 1, 6.1 and 7".into(),
+        format!("\"up to {most} times\" faster than PRI (1, 7), and {OVER_PRI} times at 10^7 boxes (6.1)"),
+        if OVER_PRI > most { "at 10^7 boxes it is more than the most" } else { "the two agree" }.into(),
+        format!(
+            "{OVER_PRI} is {} % more than {most}; rounded to a whole number it is {}. Over CGAL the two differ by {} %: \
+             {over_cgal}, rounded to tens, is {}, and {most_over_cgal} is printed",
+            more(OVER_PRI, most),
+            OVER_PRI.round(),
+            more(over_cgal, most_over_cgal),
+            (over_cgal / 10.0).round() * 10.0
+        ),
     ]
 }
 
@@ -147,6 +167,15 @@ mod tests {
         );
         assert!(!unequal_segments()[3].contains(": 0 of"), "{}", unequal_segments()[3]);
         assert_eq!(speed_ups()[2], "tables IV and VI agree; the two numbers against CGAL do not");
+        assert_eq!(over_pri()[2], "at 10^7 boxes it is more than the most");
+        assert!(
+            over_pri()[3].starts_with("3.3 is 10.0 % more than 3; rounded to a whole number it is 3. Over")
+        );
+        assert!(
+            over_pri()[3].ends_with("116, rounded to tens, is 120, and 110 is printed"),
+            "{}",
+            over_pri()[3]
+        );
         assert!(!totals()[2].contains(" 0.000000 %"), "{}", totals()[2]);
         let pairs = |unit: f64| GAUSSIAN_GB[0] * unit / 8.0 / super::super::printed::GAUSSIAN_PAIRS as f64;
         assert!((pairs(1e9) - 1.0).abs() < 0.01 && (pairs(1_073_741_824.0) - 1.0).abs() > 0.05);
