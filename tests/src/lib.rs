@@ -4,6 +4,8 @@ use pbig_core::{
     Aabb, Backend, CellRule, Coding, Config, GpuOptions, Grids, Look, Pair, Strategy, Study, Updates,
 };
 use pbig_harness::boxes::BoxSet;
+use std::io::Write;
+use std::sync::LazyLock;
 
 /// A set of boxes with a name to read in a failure.
 #[derive(Clone, Debug)]
@@ -14,10 +16,59 @@ pub struct Case {
     pub boxes: Vec<Aabb>,
 }
 
+/// Whether `PBIG_GPU=none` leaves devices out: where a driver must not run, as beside a sanitizer that cannot look into
+/// it. Said once, and by each test that asks.
+///
+/// # Panics
+/// With `CI=true`, and with another value.
+pub fn without_gpu() -> bool {
+    static IS_LEFT_OUT: LazyLock<bool> = LazyLock::new(|| {
+        let [gpu, ci] = ["PBIG_GPU", "CI"].map(|name| std::env::var(name).ok());
+        let is_left_out = leaves_out(gpu.as_deref(), ci.as_deref()).unwrap_or_else(|why| panic!("{why}"));
+        if is_left_out {
+            // Macros would leave it to the first test, which keeps it to itself if it passes.
+            let _ = writeln!(
+                std::io::stderr(),
+                "PBIG_GPU=none: no strategy runs on a GPU, and tests of it do nothing"
+            );
+        }
+        is_left_out
+    });
+    if *IS_LEFT_OUT {
+        println!("left out: PBIG_GPU=none");
+    }
+    *IS_LEFT_OUT
+}
+
+/// By the values of `PBIG_GPU` and `CI`.
+fn leaves_out(gpu: Option<&str>, ci: Option<&str>) -> Result<bool, String> {
+    match (gpu, ci) {
+        (None, _) => Ok(false),
+        (Some("none"), Some("true")) => Err("CI=true tests the GPU, too: not with PBIG_GPU=none".to_owned()),
+        (Some("none"), _) => Ok(true),
+        (Some(other), _) => Err(format!("PBIG_GPU={other}: it may be none, or not set")),
+    }
+}
+
+/// Whether a test may find pairs so.
+pub fn may_run(config: &Config) -> bool {
+    config.backend != Backend::Gpu || !without_gpu()
+}
+
+/// Ends a test, or what is left of it, where devices are left out: the one way for all that need one.
+#[macro_export]
+macro_rules! needs_gpu {
+    () => {
+        if $crate::without_gpu() {
+            return;
+        }
+    };
+}
+
 /// Every way to find pairs, by name.
 pub fn strategies() -> Vec<(&'static str, Config)> {
     let with = |backend, strategy| Config { backend, strategy, ..Config::DEFAULT };
-    vec![
+    let all = vec![
         ("auto", Config::DEFAULT),
         ("grid", with(Backend::Cpu, Strategy::Grid)),
         ("pbig", with(Backend::Cpu, Strategy::Pbig)),
@@ -27,7 +78,8 @@ pub fn strategies() -> Vec<(&'static str, Config)> {
         ("gpu", with(Backend::Gpu, Strategy::Auto)),
         ("gpu grid", gpu(Coding::Plain)),
         ("gpu grid packed", gpu(Coding::Packed)),
-    ]
+    ];
+    all.into_iter().filter(|(_, config)| may_run(config)).collect()
 }
 
 /// Ways on the CPU that the plan would not choose everywhere, by name.
@@ -158,4 +210,17 @@ fn by_hand() -> Vec<(&'static str, Vec<Aabb>)> {
             ),
         ),
     ]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ci_is_never_without_a_gpu() {
+        assert_eq!(leaves_out(None, Some("true")), Ok(false));
+        assert_eq!([None, Some("")].map(|ci| leaves_out(Some("none"), ci)), [Ok(true), Ok(true)]);
+        assert!(leaves_out(Some("none"), Some("true")).is_err_and(|why| why.contains("CI=true")));
+        assert!(leaves_out(Some("some"), None).is_err_and(|why| why.contains("PBIG_GPU=some")));
+    }
 }

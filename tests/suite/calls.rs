@@ -72,12 +72,13 @@ fn a_step_is_two_calls_and_one_more_for_each_further_substep() {
 
 #[test]
 fn deletions_come_before_additions_each_by_index_and_the_same_on_every_backend() {
-    let streams = backends().map(|(_, config)| {
+    let stream = |(_, config)| {
         let mut world = Scene::named("column").expect("the scene exists").build(150, 4);
         let mut recorder = Recorder::new(PbigBroadPhase::with_config(config));
         (0..60).for_each(|_| world.step(&mut recorder));
         recorder.events
-    });
+    };
+    let streams: Vec<_> = backends().into_iter().map(stream).collect();
     assert!(streams.iter().all(|stream| *stream == streams[0]));
     assert!(streams[0].iter().all(|call| call.is_sorted()), "false, a deletion, is less than true");
     let mixed = |call: &&Vec<(bool, [u32; 2])>| call.iter().any(|e| e.0) && call.iter().any(|e| !e.0);

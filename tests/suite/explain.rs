@@ -5,6 +5,7 @@ use pbig_core::{Backend, Config, Strategy};
 use pbig_harness::files::{FrameBox, read_frames};
 use pbig_harness::scenes::Scene;
 use pbig_harness::world::World;
+use pbig_tests::needs_gpu;
 use rapier_pbig::shadow::{Fault, Shadow};
 use rapier_pbig::{DebugRenderParts, HandleOrder, PbigBroadPhase, Why};
 use rapier3d::pipeline::{DebugColor, DebugRenderBackend, DebugRenderObject};
@@ -215,6 +216,7 @@ fn each_stage_is_a_span() {
     assert_eq!(spans(on_cpu), ["update", "proxies", "map", "check", "emit", "diff", "events"].into());
     let by_grid = spans(Config { strategy: Strategy::Grid, ..on_cpu });
     assert_eq!(by_grid, ["update", "proxies", "plan", "map", "check", "emit", "diff", "events"].into());
+    needs_gpu!();
     let of_gpu = spans(Config { backend: Backend::Gpu, ..PbigBroadPhase::CONFIG });
     assert!(of_gpu.is_superset(&["update", "proxies", "gpu", "emit", "diff", "events"].into()), "{of_gpu:?}");
 }

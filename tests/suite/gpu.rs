@@ -1,16 +1,17 @@
 //! The GPU backend keeps the contracts when room is scarce, when the device fails, and whatever is
 //! switched off. Every test needs an adapter, a software one at least, and fails without.
 
-use pbig_core::gpu::{Fault, adapters};
+mod failures;
+
+use pbig_core::gpu::adapters;
 use pbig_core::layout::Box as DeviceBox;
 use pbig_core::plan::{Chosen, NoGpu};
 use pbig_core::{
-    Aabb, Backend, BroadPhase, Coding, Config, Events, Finder, GpuFinder, GpuOptions, GpuReport, Pair,
-    ProxyFilter, Strategy, oracle,
+    Aabb, Backend, BroadPhase, Coding, Config, Finder, GpuFinder, GpuOptions, GpuReport, Pair, ProxyFilter,
+    Strategy,
 };
 use pbig_harness::boxes::BoxSet;
-use pbig_tests::{corpus, difference, gpu};
-use std::time::Duration;
+use pbig_tests::{difference, gpu, needs_gpu};
 
 fn set(name: &str, n: usize) -> Vec<Aabb> {
     BoxSet::named(name).expect("the set exists").boxes(n, 5)
@@ -39,6 +40,7 @@ fn cubes(n: usize) -> Vec<Aabb> {
 
 #[test]
 fn lists_that_begin_far_too_small_lose_nothing() {
+    needs_gpu!();
     for (name, boxes) in
         [("uniform", set("uniform", 20_000)), ("pile", set("pile", 3000)), ("identical", cubes(1200))]
     {
@@ -57,6 +59,7 @@ fn lists_that_begin_far_too_small_lose_nothing() {
 
 #[test]
 fn work_in_many_chunks_is_complete_with_and_without_pipelining() {
+    needs_gpu!();
     for (name, boxes) in [("mixed", set("mixed", 3000)), ("identical", cubes(2000))] {
         let wanted = on_cpu(&boxes);
         for pipelining in [true, false] {
@@ -70,6 +73,7 @@ fn work_in_many_chunks_is_complete_with_and_without_pipelining() {
 
 #[test]
 fn sets_that_exceed_the_limits_of_a_device_are_split_and_complete() {
+    needs_gpu!();
     // 1 MiB holds 37,449 boxes, and no more than 131,072 plain pairs.
     let options = GpuOptions { max_bytes: 1 << 20, ..GpuOptions::DEFAULT };
     let mut with_ground = set("pile", 50_000);
@@ -91,6 +95,7 @@ fn sets_that_exceed_the_limits_of_a_device_are_split_and_complete() {
 
 #[test]
 fn lists_that_exceed_a_buffer_split_the_set_and_are_remembered() {
+    needs_gpu!();
     // They fit as boxes, but their entries, some twenty each, do not.
     let boxes = set("pile", 30_000);
     let config = with(GpuOptions { max_bytes: 1 << 20, ..GpuOptions::DEFAULT });
@@ -109,6 +114,7 @@ fn lists_that_exceed_a_buffer_split_the_set_and_are_remembered() {
 
 #[test]
 fn a_device_that_really_allows_little_is_enough() {
+    needs_gpu!();
     let adapter = adapters().into_iter().next().expect("an adapter");
     let required_limits = wgpu::Limits {
         max_storage_buffer_binding_size: 1 << 20,
@@ -131,6 +137,7 @@ fn a_device_that_really_allows_little_is_enough() {
 
 #[test]
 fn filters_hold_in_every_part() {
+    needs_gpu!();
     let boxes = set("pile", 45_000);
     let filters: Vec<_> =
         (0..45_000).map(|i| ProxyFilter { body: i / 3, mask: 1 << (i % 5), ..ProxyFilter::ALL }).collect();
@@ -145,6 +152,7 @@ fn filters_hold_in_every_part() {
 
 #[test]
 fn every_switch_gives_the_same_bytes() {
+    needs_gpu!();
     for (name, boxes) in
         [("pile", set("pile", 2000)), ("mixed", set("mixed", 2000)), ("identical", cubes(700))]
     {
@@ -166,6 +174,7 @@ fn every_switch_gives_the_same_bytes() {
 
 #[test]
 fn a_small_scene_needs_no_grid_and_may_answer_in_bits() {
+    needs_gpu!();
     let boxes = cubes(300);
     let wanted = on_cpu(&boxes);
     for (coding, downloaded) in [(Coding::Packed, 300 * 299 / 2 / 8), (Coding::Plain, wanted.len() * 8)] {
@@ -186,6 +195,7 @@ fn a_small_scene_needs_no_grid_and_may_answer_in_bits() {
 
 #[test]
 fn packed_output_is_an_eighth_of_plain_where_boxes_crowd_and_is_chosen_when_it_pays() {
+    needs_gpu!();
     let boxes = cubes(1500);
     let mut finder = Finder::new(with(GpuOptions::DEFAULT));
     assert_eq!(find(&mut finder, &boxes).1.compression, 1.0, "nothing is known in the first call");
@@ -198,6 +208,7 @@ fn packed_output_is_an_eighth_of_plain_where_boxes_crowd_and_is_chosen_when_it_p
 
 #[test]
 fn only_what_changed_is_sent() {
+    needs_gpu!();
     let mut boxes = set("unit", 20_000);
     let mut finder = Finder::new(with(GpuOptions::DEFAULT));
     let all = size_of_val(boxes.as_slice()) as u64;
@@ -211,6 +222,7 @@ fn only_what_changed_is_sent() {
 
 #[test]
 fn memory_follows_what_is_needed_down_as_well_as_up() {
+    needs_gpu!();
     let mut finder = Finder::new(with(GpuOptions::DEFAULT));
     let (many, few) = (set("pile", 60_000), set("pile", 500));
     let burst = find(&mut finder, &many).1.device_bytes;
@@ -224,6 +236,7 @@ fn memory_follows_what_is_needed_down_as_well_as_up() {
 
 #[test]
 fn nothing_grows_while_boxes_churn() {
+    needs_gpu!();
     let mut finder = Finder::new(with(GpuOptions::DEFAULT));
     let bytes = |seed| {
         let boxes = BoxSet::named("pile").expect("the set exists").boxes(400 + (seed % 100) as usize, seed);
@@ -239,82 +252,9 @@ fn nothing_grows_while_boxes_churn() {
     }
 }
 
-/// Boxes that move, come and go: the same frames for any backend.
-fn frames(broad_phase: &mut BroadPhase, mut before: impl FnMut(usize)) -> Vec<(Events, Option<String>)> {
-    let start = set("pile", 600);
-    let frame = |f: usize| {
-        before(f);
-        for (id, b) in start.iter().enumerate() {
-            let shift = ((id * 7 + f * 13) % 11) as f32 * 0.1;
-            let moved = Aabb::new(b.min.map(|x| x + shift), b.max.map(|x| x + shift));
-            if (id + f).is_multiple_of(17) {
-                broad_phase.remove(id as u32);
-            } else {
-                broad_phase.set(id as u32, moved, ProxyFilter::ALL).expect("within the limits");
-            }
-        }
-        let events = broad_phase.update().expect("within the limits").clone();
-        (events, broad_phase.report().fallback.clone())
-    };
-    (0..12).map(frame).collect()
-}
-
-fn events(frames: &[(Events, Option<String>)]) -> Vec<&Events> {
-    frames.iter().map(|(events, _)| events).collect()
-}
-
-#[test]
-fn a_device_that_fails_in_the_middle_of_a_run_loses_no_event() {
-    let base = Config { margin: 0.05, ..gpu(Coding::Auto) };
-    let cpu =
-        frames(&mut BroadPhase::new(Config { backend: Backend::Cpu, ..base }).expect("a margin"), |_| ());
-    for (fault, words) in [
-        (Fault::LoseDevice, "lost"),
-        (Fault::Timeout, "did not answer"),
-        (Fault::Panic, "lost"),
-        (Fault::OutOfMemory, "out of device memory"),
-        (Fault::RefuseShader, "refused"),
-    ] {
-        for pause in [Duration::ZERO, Duration::from_secs(3600)] {
-            let options = GpuOptions { pause, first_bytes: 0, ..GpuOptions::DEFAULT };
-            let device = GpuFinder::new().expect("an adapter");
-            // A shader is compiled, and buffers are made, in the first call; submissions go on.
-            let at = if matches!(fault, Fault::LoseDevice | Fault::Timeout | Fault::Panic) { 5 } else { 0 };
-            device.inject(fault, at);
-            let mut ours = BroadPhase::with_gpu(Config { gpu: options, ..base }, device).expect("a margin");
-            let got = frames(&mut ours, |_| ());
-            assert_eq!(events(&got), events(&cpu), "{fault:?}");
-            let failed = got.iter().position(|(_, why)| why.as_ref().is_some_and(|why| why.contains(words)));
-            let failed = failed.unwrap_or_else(|| panic!("{fault:?} was not reported"));
-            let after = &got[failed + 1].1;
-            let tried_again = pause == Duration::ZERO;
-            assert_eq!(after.is_none(), tried_again, "{fault:?}: {after:?}");
-        }
-    }
-}
-
-#[test]
-fn a_device_that_is_lost_at_any_moment_of_a_call_loses_no_pair() {
-    let options =
-        GpuOptions { chunk: [12, 8], first_bytes: 0, coding: Coding::Packed, ..GpuOptions::DEFAULT };
-    let in_parts = GpuOptions { max_bytes: 1 << 20, ..GpuOptions::DEFAULT };
-    for (boxes, options) in [(set("mixed", 3000), options), (set("uniform", 45_000), in_parts)] {
-        let wanted = on_cpu(&boxes);
-        let mut lost = 0;
-        for after in 0..10 {
-            let device = GpuFinder::new().expect("an adapter");
-            device.inject(Fault::LoseDevice, after);
-            let mut finder = Finder::with_gpu(with(options), device);
-            let found = finder.find(&boxes).expect("within the limits");
-            assert_eq!(difference(found, &wanted), None, "lost after {after} submissions");
-            lost += u32::from(finder.report().fallback.is_some());
-        }
-        assert!(lost >= 6, "the device was lost in {lost} of 10 calls only");
-    }
-}
-
 #[test]
 fn auto_goes_back_and_forth_between_a_device_and_edits_on_the_cpu() {
+    needs_gpu!();
     let mut device = GpuFinder::new().expect("an adapter");
     device.pretend_hardware();
     let config = Config { margin: 0.05, ..Config::DEFAULT };
@@ -342,30 +282,8 @@ fn auto_goes_back_and_forth_between_a_device_and_edits_on_the_cpu() {
 }
 
 #[test]
-fn an_app_shares_its_device_and_a_lost_one_is_not_replaced() {
-    let adapter = adapters().into_iter().next().expect("an adapter");
-    let device = pollster::block_on(adapter.request_device(&wgpu::DeviceDescriptor::default()));
-    let (device, queue) = device.expect("a device with WebGPU's default limits");
-    let finder = GpuFinder::from_device(device.clone(), queue).expect("default limits are enough");
-    assert!(finder.adapter().contains(&adapter.get_info().name), "{}", finder.adapter());
-    let options = GpuOptions { pause: Duration::ZERO, ..GpuOptions::DEFAULT };
-    let mut finder = Finder::with_gpu(with(options), finder);
-    for case in corpus() {
-        let (pairs, report) = find(&mut finder, &case.boxes);
-        assert_eq!(difference(&pairs, &oracle::pairs(&case.boxes)), None, "{}", case.name);
-        assert!(!report.subgroups, "the device was made without them");
-    }
-    device.destroy();
-    let boxes = set("pile", 2000);
-    for _ in 0..2 {
-        assert_eq!(finder.find(&boxes).expect("within the limits"), on_cpu(&boxes));
-        let why = finder.report().fallback.clone().expect("the device is gone");
-        assert!(why.contains("lost"), "{why}");
-    }
-}
-
-#[test]
 fn an_adapter_that_does_not_exist_is_an_error_that_names_those_that_do() {
+    needs_gpu!();
     let error = GpuFinder::on_adapter("no such adapter").expect_err("no adapter has this name");
     let real = adapters().into_iter().next().expect("an adapter").get_info().name;
     let text = error.to_string();
@@ -374,6 +292,7 @@ fn an_adapter_that_does_not_exist_is_an_error_that_names_those_that_do() {
 
 #[test]
 fn auto_leaves_a_software_adapter_alone() {
+    needs_gpu!();
     let device = GpuFinder::new().expect("an adapter");
     let (software, boxes) = (device.is_software(), set("unit", 20_000));
     let mut finder = Finder::with_gpu(Config::DEFAULT, device);
@@ -386,6 +305,7 @@ fn auto_leaves_a_software_adapter_alone() {
 
 #[test]
 fn finders_in_several_threads_share_a_device() {
+    needs_gpu!();
     let boxes = set("pile", 2000);
     let wanted = on_cpu(&boxes);
     std::thread::scope(|scope| {

@@ -5,7 +5,7 @@ use pbig_core::{
     Aabb, Backend, BroadPhase, Coding, Config, Events, GpuFinder, GpuOptions, Limits, Pair, ProxyFilter,
 };
 use pbig_harness::boxes::BoxSet;
-use pbig_tests::{gpu, strategies};
+use pbig_tests::{gpu, may_run, needs_gpu, strategies};
 use rand::rngs::StdRng;
 use rand::{RngExt, SeedableRng};
 use std::time::Duration;
@@ -78,8 +78,9 @@ fn events_are_those_of_the_beginning_on_every_strategy() {
 #[test]
 fn whatever_the_order_of_calls_nothing_is_lost() {
     let cube = |x: f32| Aabb::from_center([x, 0.0, 0.0], [0.5; 3]);
-    for backend in [Backend::Cpu, Backend::Gpu] {
-        let mut broad_phase = new(Config { backend, ..Config::DEFAULT }, &[cube(0.0), cube(0.9), cube(5.0)]);
+    let configs = [Backend::Cpu, Backend::Gpu].map(|backend| Config { backend, ..Config::DEFAULT });
+    for config in configs.into_iter().filter(may_run) {
+        let mut broad_phase = new(config, &[cube(0.0), cube(0.9), cube(5.0)]);
         let added = |events: &Events| events.added.iter().map(|p| (p.a, p.b)).collect::<Vec<_>>();
         assert_eq!(added(broad_phase.finish().expect("few pairs")), [(0, 1)], "not begun, so it begins");
         broad_phase.begin();
@@ -97,6 +98,7 @@ fn whatever_the_order_of_calls_nothing_is_lost() {
 
 #[test]
 fn a_box_that_is_removed_meanwhile_is_in_the_events_and_gone_afterwards() {
+    needs_gpu!();
     let mut broad_phase = new(gpu(Coding::Plain), &[Aabb::new([0.0; 3], [1.0; 3]); 3]);
     broad_phase.begin();
     assert!(broad_phase.remove(1) && !broad_phase.remove(1) && !broad_phase.remove(7));
@@ -109,7 +111,8 @@ fn a_box_that_is_removed_meanwhile_is_in_the_events_and_gone_afterwards() {
 
 #[test]
 fn an_error_comes_in_the_end_and_the_changes_are_kept() {
-    for config in [gpu(Coding::Plain), Config { backend: Backend::Cpu, ..Config::DEFAULT }] {
+    let configs = [gpu(Coding::Plain), Config { backend: Backend::Cpu, ..Config::DEFAULT }];
+    for config in configs.into_iter().filter(may_run) {
         let limits = Limits { max_pairs: 100, max_boxes: 80 };
         let mut broad_phase = new(Config { limits, ..config }, &[Aabb::new([0.0; 3], [1.0; 3]); 40]);
         broad_phase.begin();
@@ -154,6 +157,7 @@ fn interrupted(
 
 #[test]
 fn the_device_is_at_work_once_an_update_has_begun() {
+    needs_gpu!();
     let device = GpuFinder::new().expect("an adapter");
     let other = device.clone();
     let mut broad_phase = BroadPhase::with_gpu(gpu(Coding::Plain), device).expect("a margin");
@@ -173,6 +177,7 @@ fn the_device_is_at_work_once_an_update_has_begun() {
 
 #[test]
 fn small_rooms_many_chunks_and_parts_are_finished_completely() {
+    needs_gpu!();
     let tiny = GpuOptions { chunk: [3, 2], first_bytes: 0, ..GpuOptions::DEFAULT };
     for options in [tiny, GpuOptions { coding: Coding::Packed, ..tiny }] {
         let device = GpuFinder::new().expect("an adapter");
@@ -191,6 +196,7 @@ fn small_rooms_many_chunks_and_parts_are_finished_completely() {
 
 #[test]
 fn a_device_that_is_lost_meanwhile_loses_no_event() {
+    needs_gpu!();
     let options = GpuOptions { pause: Duration::ZERO, ..GpuOptions::DEFAULT };
     for fault in [Fault::Timeout, Fault::Panic, Fault::OutOfMemory] {
         let device = GpuFinder::new().expect("an adapter");
@@ -218,6 +224,7 @@ fn a_device_that_is_lost_meanwhile_loses_no_event() {
 
 #[test]
 fn another_device_starts_from_the_same_boxes() {
+    needs_gpu!();
     let device = GpuFinder::new().expect("an adapter");
     let other = device.clone();
     let on_gpu = interrupted(GpuOptions::DEFAULT, device, |round, broad_phase| {

@@ -8,6 +8,7 @@ use pbig_harness::scenes::Scene;
 use pbig_harness::shadow::Shadowed;
 use pbig_harness::simulate::{Task, run_checked};
 use pbig_harness::world::World;
+use pbig_tests::needs_gpu;
 use rapier_pbig::PbigBroadPhase;
 use rapier_pbig::shadow::Shadow;
 use rapier3d::prelude::*;
@@ -36,6 +37,7 @@ fn every_scene_beside_stock_and_the_oracle() {
 
 #[test]
 fn every_scene_on_a_gpu() {
+    needs_gpu!();
     for scene in Scene::ALL {
         let broad_phase =
             check(scene, ours(Config { margin: 0.01, ..pbig_tests::gpu(Coding::Plain) }), 100, 20);
@@ -142,6 +144,7 @@ fn a_world_that_comes_to_rest_is_told_the_last_events_and_then_costs_nothing() {
 
 #[test]
 fn a_device_that_fails_between_two_calls_loses_no_pair() {
+    needs_gpu!();
     let scene = Scene::named("column").expect("the scene exists");
     let options = GpuOptions { pause: Duration::ZERO, ..GpuOptions::DEFAULT };
     let config = Config { margin: 0.01, gpu: options, ..pbig_tests::gpu(Coding::Plain) };

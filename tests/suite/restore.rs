@@ -6,6 +6,7 @@ use pbig_harness::runner::Timed;
 use pbig_harness::scenes::Scene;
 use pbig_harness::shadow::Shadowed;
 use pbig_harness::world::World;
+use pbig_tests::needs_gpu;
 use rapier_pbig::shadow::Shadow;
 use rapier_pbig::{HandleOrder, PbigBroadPhase};
 use rapier3d::prelude::*;
@@ -108,6 +109,7 @@ fn a_fresh_broad_phase_beside_a_restored_world_finds_what_sleeps_and_what_is_fix
 
 #[test]
 fn a_device_is_handed_over_at_the_start_or_to_a_restored_broad_phase() {
+    needs_gpu!();
     let config = Config { backend: Backend::Gpu, ..PbigBroadPhase::CONFIG };
     let gpu = || GpuFinder::new().expect("an adapter");
     let (mut world, mut ours) = (scene("column", 100), PbigBroadPhase::with_gpu(config, gpu()));

@@ -9,7 +9,7 @@ use pbig_core::{
     Aabb, Coding, Config, GpuFinder, GpuOptions, GpuReport, Limits, ProxyFilter, Strategy, oracle,
 };
 use pbig_harness::boxes::BoxSet;
-use pbig_tests::gpu;
+use pbig_tests::{gpu, needs_gpu};
 use rand::rngs::StdRng;
 use rand::{RngExt, SeedableRng};
 use std::time::Duration;
@@ -74,6 +74,7 @@ fn follow_at_random(seed: u64, boxes: usize, updates: usize, config: &Config) {
 
 #[test]
 fn random_updates_give_what_brute_force_gives_with_and_without_a_grid() {
+    needs_gpu!();
     for seed in 0..6 {
         for coding in [Coding::Auto, Coding::Plain, Coding::Packed] {
             for strategy in [Strategy::Auto, Strategy::Pbig] {
@@ -86,6 +87,7 @@ fn random_updates_give_what_brute_force_gives_with_and_without_a_grid() {
 
 #[test]
 fn random_updates_lose_nothing_where_room_is_scarce_and_work_comes_in_chunks() {
+    needs_gpu!();
     for (seed, coding) in [(1, Coding::Plain), (2, Coding::Packed)] {
         for pipelining in [true, false] {
             let tiny =
@@ -107,6 +109,7 @@ fn jostle(world: &mut World, every: usize, by: f32) {
 
 #[test]
 fn a_world_of_many_chunks_and_repeats_is_complete() {
+    needs_gpu!();
     let tiny = GpuOptions { chunk: [3, 2], first_bytes: 0, ..GpuOptions::DEFAULT };
     let (mut world, mut tracker) = (World::new(&set("pile", 3000)), tracker());
     let (mut chunks, mut repeats) = (0, 0);
@@ -121,6 +124,7 @@ fn a_world_of_many_chunks_and_repeats_is_complete() {
 
 #[test]
 fn a_world_that_exceeds_the_limits_of_a_device_is_followed_in_parts() {
+    needs_gpu!();
     // 1 MiB holds 21,845 boxes as they are and were.
     let options = GpuOptions { max_bytes: 1 << 20, ..GpuOptions::DEFAULT };
     let mut boxes = set("pile", 24_000);
@@ -150,6 +154,7 @@ const REFILTER: u64 = 20;
 
 #[test]
 fn transfers_follow_what_has_changed() {
+    needs_gpu!();
     let boxes = set("pile", 20_000);
     let (mut world, mut tracker) = (World::new(&boxes), tracker());
     let config = with(GpuOptions::DEFAULT);
@@ -187,6 +192,7 @@ fn transfers_follow_what_has_changed() {
 
 #[test]
 fn boxes_that_leave_their_place_or_change_their_filter_begin_anew_and_no_others() {
+    needs_gpu!();
     let (mut world, mut tracker) = (World::new(&set("unit", 2000)), tracker());
     let config = with(GpuOptions::DEFAULT);
     world.follow(&mut tracker, &config).expect("a device");
@@ -209,6 +215,7 @@ fn boxes_that_leave_their_place_or_change_their_filter_begin_anew_and_no_others(
 /// Pairs at rest are turned down before their boxes are read; what is tested follows the change.
 #[test]
 fn boxes_at_rest_are_not_tested() {
+    needs_gpu!();
     let (mut world, mut tracker) = (World::new(&set("pile", 6000)), tracker());
     let config = with(GpuOptions::DEFAULT);
     let tested = |tracked: &Tracked| tracked.report.checks.made - tracked.report.checks.redundant;
@@ -220,6 +227,7 @@ fn boxes_at_rest_are_not_tested() {
 
 #[test]
 fn a_device_that_has_not_seen_an_update_is_told_everything() {
+    needs_gpu!();
     let (mut world, mut tracker) = (World::new(&set("unit", 1500)), tracker());
     let config = with(GpuOptions::DEFAULT);
     for missed in [false, false, true, false, true, true] {
@@ -236,6 +244,7 @@ fn a_device_that_has_not_seen_an_update_is_told_everything() {
 
 #[test]
 fn searches_for_all_pairs_in_between_do_no_harm() {
+    needs_gpu!();
     let (mut world, mut tracker) = (World::new(&set("pile", 2000)), tracker());
     let config = with(GpuOptions::DEFAULT);
     for find_all in [false, true, true, false, true] {
@@ -254,6 +263,7 @@ fn searches_for_all_pairs_in_between_do_no_harm() {
 
 #[test]
 fn memory_follows_what_is_needed_down_and_nothing_is_forgotten_with_it() {
+    needs_gpu!();
     let (mut world, mut tracker) = (World::new(&set("pile", 20_000)), tracker());
     let config = with(GpuOptions::DEFAULT);
     let burst = transferred(&world.follow(&mut tracker, &config).expect("a device")).device_bytes;
@@ -271,6 +281,7 @@ fn memory_follows_what_is_needed_down_and_nothing_is_forgotten_with_it() {
 
 #[test]
 fn after_a_failure_at_any_moment_the_next_update_is_right() {
+    needs_gpu!();
     let options = GpuOptions { chunk: [12, 8], first_bytes: 0, pause: Duration::ZERO, ..GpuOptions::DEFAULT };
     let mut failures = 0;
     for (fault, after) in
@@ -296,6 +307,7 @@ fn after_a_failure_at_any_moment_the_next_update_is_right() {
 
 #[test]
 fn too_many_pairs_are_an_error_and_the_update_can_be_repeated() {
+    needs_gpu!();
     let cubes = vec![Aabb::new([0.0; 3], [1.0; 3]); 1200];
     let (mut world, mut tracker) = (World::new(&cubes), tracker());
     let limits = Limits { max_pairs: 600_000, ..Limits::DEFAULT };

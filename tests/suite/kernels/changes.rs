@@ -228,6 +228,7 @@ fn faults_planted_in_what_is_known_of_boxes_are_noticed() {
 /// A box that moved and does not say so is overlooked: its pairs are missing.
 #[test]
 fn an_entry_that_lost_its_mark_costs_pairs() {
+    needs_gpu!();
     let mut before = State::before("check_small", &moving(pile()));
     let wanted = after_twin(twin("check_small"), &before);
     before.entries.iter_mut().for_each(|entry| *entry &= !MOVED);

@@ -79,6 +79,7 @@ fn ends_agree_with_their_twins_for_every_root() {
 
 #[test]
 fn index_pairs_agrees_with_its_twin_for_every_root() {
+    needs_gpu!();
     for n in [2u32, 3, 4, 5, 31, 32, 33, 100, 257, 1000, 4097, 16_384, 32_767, 32_768] {
         let all = pair_count(n.into()) as u32;
         let count = all.min(20_000);

@@ -28,7 +28,7 @@ use pbig_core::plan::{GpuPlan, Summary};
 use pbig_core::{Aabb, Config, GpuOptions, Pair, ProxyFilter, oracle};
 use pbig_harness::boxes::BoxSet;
 use pbig_shaders::{self as shaders, KERNELS, Kernel};
-use pbig_tests::{corpus, difference};
+use pbig_tests::{corpus, difference, needs_gpu, without_gpu};
 use state::*;
 use std::fmt::Debug;
 use std::mem::offset_of;
@@ -268,6 +268,7 @@ fn nothing_is_checked_once_there_are_too_many_pairs() {
 
 #[test]
 fn the_checks_count_what_they_have_no_room_for_and_write_nothing_there() {
+    needs_gpu!();
     for (kernel, case) in [("check_small", pile()), ("check_large", crowd()), ("check_all", pile())] {
         for flags in [0, PACKED] {
             let before = State::before(kernel, &case).with(flags, 0);
@@ -316,6 +317,7 @@ fn room_fault<T: Ord + Clone + Debug + Default>(found: &[T], room: u32, wanted: 
 
 #[test]
 fn scatter_writes_nothing_without_room_for_all() {
+    needs_gpu!();
     let mut before = State::before("scatter", &pile());
     before.params.entry_room -= 1;
     let found = on_device(bench(true), twin("scatter"), &GpuOptions::DEFAULT, &before);
@@ -379,6 +381,7 @@ fn drop_a_pair(s: &mut State) {
 /// A planted fault in what a device is given, rather than in what it returned.
 #[test]
 fn an_entry_that_lost_a_bit_costs_pairs() {
+    needs_gpu!();
     let mut before = State::before("check_small", &pile());
     let wanted = after_twin(twin("check_small"), &before);
     let lost = 7u32 << AXIS_BITS;

@@ -7,13 +7,13 @@
 mod kind;
 mod ops;
 
-use crate::checked::backends;
+use crate::checked::{on_cpu, on_gpu};
 use kind::Kind;
 use ops::{Op, any_op, apply};
 use pbig_core::Config;
 use pbig_harness::shadow::Shadowed;
 use pbig_harness::world::World;
-use pbig_tests::asked;
+use pbig_tests::{asked, needs_gpu};
 use proptest::collection::vec;
 use proptest::prelude::ProptestConfig;
 use proptest::test_runner::{RngAlgorithm, TestCaseError, TestError, TestRng, TestRunner};
@@ -329,7 +329,7 @@ fn on_random_ops(cases: u32, test: impl Fn(&[Op]) -> Result<Outcome, String>) ->
 
 #[test]
 fn random_worlds_agree_with_stock_and_the_oracle() {
-    let [(_, cpu), (_, grid), _] = backends();
+    let [cpu, grid] = on_cpu();
     let [on_cpu, on_grid] =
         [cpu, grid].map(|config| on_random_ops(700, |ops| run(ops, config.into(), Plant::Nothing)));
     let tally = on_cpu.plus(on_grid);
@@ -343,34 +343,34 @@ fn random_worlds_agree_with_stock_and_the_oracle() {
 
 #[test]
 fn random_worlds_on_a_gpu_agree_too_and_have_the_bits_of_the_cpu() {
-    let [(_, cpu), _, (_, gpu)] = backends();
+    needs_gpu!();
     let tally = on_random_ops(20, |ops| {
-        let on_gpu = run(ops, gpu.into(), Plant::Nothing)?;
-        on_gpu.compare(&run(ops, cpu.into(), Plant::Nothing)?)?;
-        Ok(on_gpu)
+        let found = run(ops, on_gpu().into(), Plant::Nothing)?;
+        found.compare(&run(ops, on_cpu()[0].into(), Plant::Nothing)?)?;
+        Ok(found)
     });
     tally.assert_that_much_happened();
 }
 
 #[test]
 fn random_worlds_with_results_from_the_call_before_agree_too() {
-    let [(_, cpu), (_, grid), (_, gpu)] =
-        backends().map(|(name, config)| (name, Kind { config, overlapped: true }));
+    let overlapped = |config| Kind { config, overlapped: true };
+    let [cpu, grid] = on_cpu().map(overlapped);
     let tally = on_random_ops(100, |ops| run(ops, cpu, Plant::Nothing));
     tally.assert_that_much_happened();
+    needs_gpu!();
     let tally = on_random_ops(6, |ops| {
-        let on_gpu = run(ops, gpu, Plant::Nothing)?;
-        on_gpu.compare(&run(ops, grid, Plant::Nothing)?)?;
-        Ok(on_gpu)
+        let found = run(ops, overlapped(on_gpu()), Plant::Nothing)?;
+        found.compare(&run(ops, grid, Plant::Nothing)?)?;
+        Ok(found)
     });
     tally.assert_that_much_happened();
 }
 
 #[test]
 fn a_snapshot_anywhere_continues_bit_identically() {
-    let [(_, cpu), ..] = backends();
     for (cases, overlapped) in [(60, false), (20, true)] {
-        snapshots_continue(cases, Kind { config: cpu, overlapped });
+        snapshots_continue(cases, Kind { config: on_cpu()[0], overlapped });
     }
 }
 
@@ -389,9 +389,8 @@ fn snapshots_continue(cases: u32, kind: Kind) {
 
 #[test]
 fn planted_faults_are_noticed_and_shrink_to_a_few_operations() {
-    let [(_, cpu), ..] = backends();
     for plant in [Plant::RoomForTwo, Plant::OnlyMoved, Plant::Forgets] {
-        let failing = |ops: &[Op]| run(ops, cpu.into(), plant).map(|_| ());
+        let failing = |ops: &[Op]| run(ops, on_cpu()[0].into(), plant).map(|_| ());
         let (why, ops) = try_random_ops(100, &failing).expect_err("the fault is noticed");
         println!("{plant:?}: {why}\n{}", listed(&ops));
         assert!(ops.len() <= 6, "{plant:?} needs {} operations:\n{}", ops.len(), listed(&ops));

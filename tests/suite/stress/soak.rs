@@ -5,7 +5,7 @@ use super::memory;
 use crate::incremental::Follower;
 use pbig_core::{Aabb, Backend, Coding, Config, ProxyFilter, Report, Strategy};
 use pbig_harness::boxes::BoxSet;
-use pbig_tests::gpu;
+use pbig_tests::{gpu, needs_gpu};
 use rand::rngs::StdRng;
 use rand::{RngExt, SeedableRng};
 use std::collections::BTreeMap;
@@ -221,6 +221,7 @@ fn soak_on_threads() {
 /// A software adapter takes milliseconds for an update: a hundredth of them.
 #[test]
 fn soak_on_a_gpu() {
+    needs_gpu!();
     let config = Config { margin: 0.05, ..gpu(Coding::Auto) };
     let tally = soak(|| Churn::new(config, 400), (updates() / 100).max(200));
     tally.assert_mostly(&["gpu"], 99);

@@ -1,0 +1,109 @@
+//! Devices that fail, or are lost, at any moment.
+
+use super::{find, on_cpu, set, with};
+use pbig_core::gpu::{Fault, adapters};
+use pbig_core::{
+    Aabb, Backend, BroadPhase, Coding, Config, Events, Finder, GpuFinder, GpuOptions, ProxyFilter, oracle,
+};
+use pbig_tests::{corpus, difference, gpu, needs_gpu};
+use std::time::Duration;
+
+/// Boxes that move, come and go: the same frames for any backend.
+fn frames(broad_phase: &mut BroadPhase, mut before: impl FnMut(usize)) -> Vec<(Events, Option<String>)> {
+    let start = set("pile", 600);
+    let frame = |f: usize| {
+        before(f);
+        for (id, b) in start.iter().enumerate() {
+            let shift = ((id * 7 + f * 13) % 11) as f32 * 0.1;
+            let moved = Aabb::new(b.min.map(|x| x + shift), b.max.map(|x| x + shift));
+            if (id + f).is_multiple_of(17) {
+                broad_phase.remove(id as u32);
+            } else {
+                broad_phase.set(id as u32, moved, ProxyFilter::ALL).expect("within the limits");
+            }
+        }
+        let events = broad_phase.update().expect("within the limits").clone();
+        (events, broad_phase.report().fallback.clone())
+    };
+    (0..12).map(frame).collect()
+}
+
+fn events(frames: &[(Events, Option<String>)]) -> Vec<&Events> {
+    frames.iter().map(|(events, _)| events).collect()
+}
+
+#[test]
+fn a_device_that_fails_in_the_middle_of_a_run_loses_no_event() {
+    needs_gpu!();
+    let base = Config { margin: 0.05, ..gpu(Coding::Auto) };
+    let cpu =
+        frames(&mut BroadPhase::new(Config { backend: Backend::Cpu, ..base }).expect("a margin"), |_| ());
+    for (fault, words) in [
+        (Fault::LoseDevice, "lost"),
+        (Fault::Timeout, "did not answer"),
+        (Fault::Panic, "lost"),
+        (Fault::OutOfMemory, "out of device memory"),
+        (Fault::RefuseShader, "refused"),
+    ] {
+        for pause in [Duration::ZERO, Duration::from_secs(3600)] {
+            let options = GpuOptions { pause, first_bytes: 0, ..GpuOptions::DEFAULT };
+            let device = GpuFinder::new().expect("an adapter");
+            // A shader is compiled, and buffers are made, in the first call; submissions go on.
+            let at = if matches!(fault, Fault::LoseDevice | Fault::Timeout | Fault::Panic) { 5 } else { 0 };
+            device.inject(fault, at);
+            let mut ours = BroadPhase::with_gpu(Config { gpu: options, ..base }, device).expect("a margin");
+            let got = frames(&mut ours, |_| ());
+            assert_eq!(events(&got), events(&cpu), "{fault:?}");
+            let failed = got.iter().position(|(_, why)| why.as_ref().is_some_and(|why| why.contains(words)));
+            let failed = failed.unwrap_or_else(|| panic!("{fault:?} was not reported"));
+            let after = &got[failed + 1].1;
+            let tried_again = pause == Duration::ZERO;
+            assert_eq!(after.is_none(), tried_again, "{fault:?}: {after:?}");
+        }
+    }
+}
+
+#[test]
+fn a_device_that_is_lost_at_any_moment_of_a_call_loses_no_pair() {
+    needs_gpu!();
+    let options =
+        GpuOptions { chunk: [12, 8], first_bytes: 0, coding: Coding::Packed, ..GpuOptions::DEFAULT };
+    let in_parts = GpuOptions { max_bytes: 1 << 20, ..GpuOptions::DEFAULT };
+    for (boxes, options) in [(set("mixed", 3000), options), (set("uniform", 45_000), in_parts)] {
+        let wanted = on_cpu(&boxes);
+        let mut lost = 0;
+        for after in 0..10 {
+            let device = GpuFinder::new().expect("an adapter");
+            device.inject(Fault::LoseDevice, after);
+            let mut finder = Finder::with_gpu(with(options), device);
+            let found = finder.find(&boxes).expect("within the limits");
+            assert_eq!(difference(found, &wanted), None, "lost after {after} submissions");
+            lost += u32::from(finder.report().fallback.is_some());
+        }
+        assert!(lost >= 6, "the device was lost in {lost} of 10 calls only");
+    }
+}
+
+#[test]
+fn an_app_shares_its_device_and_a_lost_one_is_not_replaced() {
+    needs_gpu!();
+    let adapter = adapters().into_iter().next().expect("an adapter");
+    let device = pollster::block_on(adapter.request_device(&wgpu::DeviceDescriptor::default()));
+    let (device, queue) = device.expect("a device with WebGPU's default limits");
+    let finder = GpuFinder::from_device(device.clone(), queue).expect("default limits are enough");
+    assert!(finder.adapter().contains(&adapter.get_info().name), "{}", finder.adapter());
+    let options = GpuOptions { pause: Duration::ZERO, ..GpuOptions::DEFAULT };
+    let mut finder = Finder::with_gpu(with(options), finder);
+    for case in corpus() {
+        let (pairs, report) = find(&mut finder, &case.boxes);
+        assert_eq!(difference(&pairs, &oracle::pairs(&case.boxes)), None, "{}", case.name);
+        assert!(!report.subgroups, "the device was made without them");
+    }
+    device.destroy();
+    let boxes = set("pile", 2000);
+    for _ in 0..2 {
+        assert_eq!(finder.find(&boxes).expect("within the limits"), on_cpu(&boxes));
+        let why = finder.report().fallback.clone().expect("the device is gone");
+        assert!(why.contains("lost"), "{why}");
+    }
+}
