@@ -5,6 +5,7 @@
 mod figures;
 mod runs;
 mod sides;
+mod sleep;
 mod tails;
 mod told;
 

@@ -31,6 +31,12 @@ pub(super) struct Figures {
     pub(super) momentum: Option<f64>,
     /// The step from which on the world is at rest.
     pub(super) rest: Option<usize>,
+    /// The step from which on all bodies sleep.
+    pub(super) asleep: Option<usize>,
+    /// Of the dynamic bodies, those that do not sleep, %; on average over the steps.
+    pub(super) awake: f64,
+    /// Pairs that ended while their colliders touched.
+    pub(super) parted: u64,
     /// How many there were.
     pub(super) steps: usize,
     /// At the end.
@@ -68,6 +74,9 @@ impl Figures {
             rise: energy_rise(&all),
             momentum: is_isolated.then(|| momentum_drift(&all)),
             rest: rest(&all),
+            asleep: lasts(&side.samples, |sample| sample.awake == 0.0),
+            awake: mean(side.samples.iter().map(|sample| sample.awake)),
+            parted: side.parted,
             steps: all.len(),
             moving: side.moving(REST),
             apart: side.samples.last().map(|sample| sample.apart).unwrap_or_default(),
@@ -122,8 +131,12 @@ fn momentum_drift(all: &[Mechanics]) -> f64 {
 
 /// The step from which on kinetic energy stays below [`REST`].
 fn rest(all: &[Mechanics]) -> Option<usize> {
-    let is_moving = |m: &Mechanics| m.kinetic > REST * m.mass;
-    let last = all.iter().rposition(is_moving).map_or(0, |step| step + 1);
+    lasts(all, |m| m.kinetic <= REST * m.mass)
+}
+
+/// The step from which on something is so.
+fn lasts<T>(all: &[T], is_so: impl Fn(&T) -> bool) -> Option<usize> {
+    let last = all.iter().rposition(|one| !is_so(one)).map_or(0, |step| step + 1);
     (last < all.len()).then_some(last + 1)
 }
 
@@ -216,6 +229,9 @@ pub(super) mod tests {
             rise: 0.0,
             momentum: None,
             rest: None,
+            asleep: None,
+            awake: 100.0,
+            parted: 0,
             steps: 100,
             moving: Moving::default(),
             apart: Apart::default(),

@@ -20,6 +20,9 @@ pub(super) fn table(scenes: &[Ways]) -> Table {
         "energy_rise_percent",
         "momentum_drift_percent",
         "rest_from_step",
+        "asleep_from_step",
+        "awake_percent",
+        "parted_in_contact",
         "differs_from_step",
         "mean_distance",
         "largest_distance",
@@ -71,7 +74,8 @@ fn size(cell: &Cell) -> f64 {
 }
 
 fn cells(scene: &str, run: &Figures) -> Vec<Cell> {
-    let rest = run.rest.map_or_else(|| format!("not within {}", run.steps).into(), Cell::from);
+    let from =
+        |step: Option<usize>| step.map_or_else(|| format!("not within {}", run.steps).into(), Cell::from);
     vec![
         scene.into(),
         run.way.into(),
@@ -82,7 +86,10 @@ fn cells(scene: &str, run: &Figures) -> Vec<Cell> {
         run.energy.into(),
         run.rise.into(),
         run.momentum.into(),
-        rest,
+        from(run.rest),
+        from(run.asleep),
+        run.awake.into(),
+        run.parted.into(),
         run.differs.into(),
         run.apart.mean.into(),
         run.apart.max.into(),

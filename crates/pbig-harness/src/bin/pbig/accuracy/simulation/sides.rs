@@ -175,6 +175,8 @@ pub(super) struct Sample {
     pub(super) apart: Apart,
     /// Of every number of every pose: the same exactly where two worlds with one order of bodies are.
     pub(super) poses: u64,
+    /// Dynamic bodies that do not sleep, %.
+    pub(super) awake: f64,
 }
 
 /// One way under way.
@@ -190,30 +192,51 @@ pub(super) struct Side {
     pub(super) reported: Reported,
     /// Those steps.
     pub(super) compared: u64,
+    /// Pairs that ended while their colliders touched.
+    pub(super) parted: u64,
 }
 
 impl Side {
     fn new(way: Way, scene: &Numbered) -> Self {
         let (numbered, broad_phase) = (way.inserted(scene), way.broad_phase());
-        let (reported, compared) = (Reported::default(), 0);
-        Self { way, numbered, broad_phase, samples: vec![], ms: vec![], reported, compared }
+        let (reported, compared, parted) = (Reported::default(), 0, 0);
+        Self { way, numbered, broad_phase, samples: vec![], ms: vec![], reported, compared, parted }
     }
 
     fn step(&mut self) {
-        let ((), ms) = timed(|| self.numbered.world.step(&mut *self.broad_phase));
+        let world = &mut self.numbered.world;
+        let touching = touching(world);
+        let ((), ms) = timed(|| world.step(&mut *self.broad_phase));
         self.ms.push(ms);
+        let is_there =
+            |pair: &&[ColliderHandle; 2]| world.narrow_phase.contact_pair(pair[0], pair[1]).is_some();
+        self.parted += (touching.len() - touching.iter().filter(is_there).count()) as u64;
     }
 
     fn look(&mut self, apart: Apart) {
         let world = &self.numbered.world;
         let mut poses = DefaultHasher::new();
         world.pose_bits().hash(&mut poses);
-        self.samples.push(Sample { mechanics: Mechanics::of(world), apart, poses: poses.finish() });
+        let (mechanics, poses, awake) = (Mechanics::of(world), poses.finish(), awake(world));
+        self.samples.push(Sample { mechanics, apart, poses, awake });
         if self.samples.len().is_multiple_of(COMPARED) {
             self.reported += Reported::of(world);
             self.compared += 1;
         }
     }
+}
+
+/// Pairs of colliders that rapier holds to be in contact.
+fn touching(world: &World) -> Vec<[ColliderHandle; 2]> {
+    let pairs = world.narrow_phase.contact_pairs().filter(|pair| pair.has_any_active_contact);
+    pairs.map(|pair| [pair.collider1, pair.collider2]).collect()
+}
+
+/// Of the dynamic bodies, in percent.
+fn awake(world: &World) -> f64 {
+    let bodies = || world.bodies.iter().filter(|(_, body)| body.is_dynamic());
+    let awake = bodies().filter(|(_, body)| !body.is_sleeping()).count();
+    awake as f64 / bodies().count().max(1) as f64 * 100.0
 }
 
 /// Bodies that keep a world from coming to rest.
@@ -309,6 +332,26 @@ mod tests {
         let found = sides[0].moving(1e-3);
         assert_eq!(found, Moving { bodies: 60, moving: 60, round: 30 });
         assert_eq!(sides[0].moving(1e9).moving, 0);
+    }
+
+    #[test]
+    fn bodies_that_sleep_are_counted_and_pairs_that_end_while_they_touch() {
+        let scene = Numbered::new(case("pile", 8, 0).world().expect("a scene"));
+        let mut side = Side::new(PBIG, &scene);
+        for _ in 0..200 {
+            side.step();
+            side.look(Apart::default());
+        }
+        let awake: Vec<f64> = side.samples.iter().map(|sample| sample.awake).collect();
+        assert_eq!((awake[0], awake[199], side.parted), (100.0, 0.0, 0), "{awake:?}");
+        let touched = touching(&side.numbered.world).len();
+        let top = &mut side.numbered.world.bodies[side.numbered.bodies[7]];
+        top.set_translation(vector![0.0, 90.0, 0.0], true);
+        side.step();
+        side.look(Apart::default());
+        let parted = touched - touching(&side.numbered.world).len();
+        assert_eq!((side.parted, parted > 0), (parted as u64, true), "{touched} touched");
+        assert!(side.samples[200].awake > 0.0);
     }
 
     #[test]

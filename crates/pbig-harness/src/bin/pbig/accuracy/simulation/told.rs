@@ -4,7 +4,7 @@ use super::super::study::plain;
 use super::Ways;
 use super::figures::{DISTANCE, Figures, Multiple, multiple};
 use super::sides::{Moving, PERMUTED, WAYS};
-use super::tails;
+use super::{sleep, tails};
 
 /// Everything farther than so many times the yardstick is listed.
 const FAR: f64 = 3.0;
@@ -33,7 +33,8 @@ pub(super) fn notes(scenes: &[Ways]) -> Vec<String> {
     ];
     notes.extend(WAYS.iter().filter_map(|way| again(scenes, way.name)));
     notes.extend(scenes.iter().map(first_difference));
-    notes.extend([rests(scenes), distances_at_the_end(scenes), tails::note(scenes), how_far(scenes)]);
+    notes.extend([rests(scenes), sleep::note(scenes)]);
+    notes.extend([distances_at_the_end(scenes), tails::note(scenes), how_far(scenes)]);
     notes
 }
 
