@@ -99,8 +99,8 @@ impl<'a> Call<'a> {
         }
     }
 
-    /// The same of [`are_scattered`] ones: all that [`Call::proxy`] reads is asked for, of a collider a line of memory by each of
-    /// these three.
+    /// The same of [`are_scattered`] ones, and asks for most of what [`Call::proxy`] reads: the collider, its shape, and the
+    /// beginning of its body.
     pub(crate) fn fetch_scattered(&self, listed: &[ColliderHandle], found: &mut [Fetched<'a>; BLOCK]) {
         for (found, &handle) in found.iter_mut().zip(listed) {
             found.0 = self.colliders.get(handle);

@@ -75,11 +75,11 @@ impl Kept {
 /// again only when they are certain to stay below: the choice does not flap.
 const CROWDED: f32 = 12.0;
 
-/// The same for a plan: not before there are half as many more than it has counted on. (Boxes of edges that differ 1000 times,
-/// at 10 pairs each, were given levels, although the plan had found them dearer: 1.26 times as dear.)
+/// The same where no smaller cells can be had: a plan may have counted on more, then it is from half as many again. (Edges that
+/// differ 1000 times, at 10 pairs a box: levels, which the plan had found dearer, took 1.26 times as long.)
 fn crowded(plan: &Plan) -> f32 {
     let expected = plan.levels.iter().map(|level| level.crowd).fold(0.0, f32::max);
-    CROWDED.max(1.5 * expected)
+    if divisible(plan) { CROWDED } else { CROWDED.max(1.5 * expected) }
 }
 
 /// Other entries in a box's cell at which camps pay: testing half of 48 boxes that overlap takes as long as searching
@@ -136,7 +136,7 @@ impl<R: Record> Map<R> {
     fn keep(&mut self, plan: &Plan, config: &Config) {
         let crowd = self.crowd();
         let settled = self.crowding.factor == 1.0 || !self.crowding.may_grow(crowd);
-        let good = crowd <= crowded(plan) && settled && !self.has_camps();
+        let good = crowd <= crowded(plan).min(MOBBED) && settled && !self.has_camps();
         self.kept = good.then(|| Kept { plan: plan.clone(), config: *config, crowd, builds: 0 });
     }
 
