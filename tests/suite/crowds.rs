@@ -1,6 +1,6 @@
 //! Crowds of boxes that may not pair with each other: no pair is missed, and they cost nearly nothing.
 
-use crate::incremental::Follower;
+use crate::follower::Follower;
 use pbig_core::{Aabb, Config, Finder, ProxyFilter, oracle};
 use pbig_tests::strategies;
 use rand::rngs::StdRng;

@@ -8,6 +8,7 @@ mod drop_in;
 mod edits;
 mod explain;
 mod finder;
+mod follower;
 mod gpu;
 mod incremental;
 mod kernels;

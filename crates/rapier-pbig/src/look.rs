@@ -21,7 +21,8 @@ impl PbigBroadPhase {
             return self.look_ahead(call, listed);
         }
         let mut watch = Watch::new(listed.len() >= MEASURED_FROM);
-        let parallel_from = if are_scattered(listed) { SCATTERED_PARALLEL_FROM } else { PARALLEL_FROM };
+        let first = &listed[..listed.len().min(BLOCK)];
+        let parallel_from = if are_scattered(first) { SCATTERED_PARALLEL_FROM } else { PARALLEL_FROM };
         if listed.len() < parallel_from || rayon::current_num_threads() == 1 {
             let _span = tracing::debug_span!(target: "pbig", "proxies").entered();
             listed.chunks(BLOCK).for_each(|block| self.look_at_block(call, block));

@@ -1,7 +1,7 @@
 //! Numbers: sizes and offsets by decades, the smallest, the largest, both zeros, infinities, no numbers.
 
 use super::{everywhere, intervals, product, shifted, through_updates};
-use crate::incremental::Follower;
+use crate::follower::Follower;
 use pbig_core::{Aabb, Config, ProxyFilter};
 use pbig_harness::boxes::BoxSet;
 use pbig_tests::strategies;

@@ -12,7 +12,7 @@ mod soak;
 mod soak_worlds;
 
 use crate::finder::check;
-use crate::incremental::Follower;
+use crate::follower::Follower;
 use pbig_core::{Aabb, Config, ProxyFilter};
 use pbig_tests::strategies;
 

@@ -2,7 +2,7 @@
 
 use super::ways_to_update;
 use crate::finder::check_on;
-use crate::incremental::Follower;
+use crate::follower::Follower;
 use pbig_core::{Aabb, Backend, BroadPhase, Config, Error, Finder, Limits, Pair, ProxyFilter};
 use pbig_tests::strategies;
 

@@ -1,7 +1,7 @@
 //! Worlds that are flat, thin or on the borders of cells.
 
 use super::{everywhere, shifted};
-use crate::incremental::Follower;
+use crate::follower::Follower;
 use pbig_core::plan::Chosen;
 use pbig_core::{Aabb, Backend, Config, Costs, Finder, Plan, ProxyFilter, Strategy};
 use pbig_harness::boxes::BoxSet;

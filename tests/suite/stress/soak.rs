@@ -2,7 +2,7 @@
 //! the oracle. `PBIG_SOAK` is the number of updates, a few thousand without.
 
 use super::memory;
-use crate::incremental::Follower;
+use crate::follower::Follower;
 use pbig_core::{Aabb, Backend, Coding, Config, ProxyFilter, Report, Strategy};
 use pbig_harness::boxes::BoxSet;
 use pbig_tests::{gpu, needs_gpu};

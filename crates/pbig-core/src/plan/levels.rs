@@ -28,8 +28,8 @@ pub struct LevelPlan {
     pub dims: [u32; 3],
     /// All cells, a power of two.
     pub cells: u32,
-    /// Boxes expected in a cell, were they spread evenly.
-    pub crowd: f32,
+    /// Boxes expected in a cell, were they spread evenly over the range.
+    pub(crate) crowd: f32,
     /// 0, or the number of a camp: boxes of levels with the same number never pair, whatever their filters say of
     /// others.
     pub camp: u8,

@@ -10,12 +10,13 @@ use crate::cpu::codes::prefetch;
 use crate::share::{self, has_threads};
 use crate::{Aabb, Error, ProxyFilter, shared_from};
 use rayon::prelude::*;
+use std::ops::Range;
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 
 /// Boxes from which several threads set them: for fewer, waking a second one takes longer.
 const PARALLEL_FROM: usize = shared_from(8192);
 
-/// Ids of which one is to be set, for them all to be looked through: eight at a time, as long as it takes to set one that lies
+/// Ids from the lowest to the highest of which one is to be set, for them all to be looked through: eight at a time, as long as it takes to set one that lies
 /// apart from others.
 const LOOKED_THROUGH: usize = 512;
 
@@ -38,7 +39,7 @@ pub(super) struct Rest {
 type Found = (u32, Aabb, ProxyFilter);
 
 /// What is kept about a range of ids.
-struct Range<'a> {
+struct Part<'a> {
     first: u32,
     boxes: &'a mut [Aabb],
     flags: &'a mut [u8],
@@ -48,7 +49,7 @@ struct Range<'a> {
 
 impl BroadPhase {
     /// Sets many boxes, as [`BroadPhase::set`] does one: with the help of the present rayon pool and in no particular order
-    /// where they are at least 8192, one in 512 of all, and no update has begun.
+    /// where they are at least 8192, one in 512 from the lowest id to the highest, and no update has begun.
     ///
     /// `fetch` gets what `of` needs to know about an id, and is called for some ids before `of` is, so that
     /// their memory is waited for together. `of` tells box and filter, or none for a box that is to be left as it is. For an
@@ -74,14 +75,15 @@ impl BroadPhase {
         fetch: impl Fn(u32) -> T + Sync,
         of: impl Fn(T) -> Option<(Aabb, ProxyFilter)> + Sync,
     ) -> Result<(), Error> {
-        let few = ids.len() < PARALLEL_FROM || ids.len() * LOOKED_THROUGH < self.boxes.len();
+        let ranges = self.ranges_of(ids);
+        let few = ids.len() < PARALLEL_FROM || ids.len() * LOOKED_THROUGH < ranges.len() * RANGE;
         if few || self.has_begun() || !has_threads() {
             return self.set_each(ids, &fetch, &of);
         }
         let new = self.list(ids);
         let mut found = Vec::new();
         let set = catch_unwind(AssertUnwindSafe(|| {
-            self.set_ranges(&fetch, &of);
+            self.set_ranges(ranges, &fetch, &of);
             let find = |&id: &u32| of(fetch(id)).map(|(aabb, filter)| (id, aabb, filter));
             found.par_extend(new.par_iter().filter_map(find));
         }));
@@ -106,18 +108,26 @@ impl BroadPhase {
         new
     }
 
+    /// The ranges of ids that there is room for, from that of the lowest of some to that of the highest.
+    fn ranges_of(&self, ids: &[u32]) -> Range<usize> {
+        let (low, high) = ids.iter().fold((u32::MAX, 0), |(low, high), &id| (id.min(low), id.max(high)));
+        let end = self.boxes.len().min((high as usize).saturating_add(1)).div_ceil(RANGE);
+        (low as usize / RANGE).min(end)..end
+    }
+
     fn set_ranges<T: Copy>(
         &mut self,
+        ranges: Range<usize>,
         fetch: &(impl Fn(u32) -> T + Sync),
         of: &(impl Fn(T) -> Option<(Aabb, ProxyFilter)> + Sync),
     ) {
         let Self { boxes, flags, filters, rests, config, .. } = self;
-        rests.resize_with(boxes.len().div_ceil(RANGE), Rest::default);
+        rests.resize_with(ranges.len(), Rest::default);
         let boxes = boxes.chunks_mut(RANGE).zip(flags.chunks_mut(RANGE));
-        let ranges = boxes.zip(filters.chunks(RANGE)).zip(rests).enumerate();
-        share::for_each(true, ranges, |(i, (((boxes, flags), filters), rest))| {
-            let range = Range { first: (i * RANGE) as u32, boxes, flags, filters, margin: config.margin };
-            range.set(fetch, of, rest);
+        let by_range = boxes.zip(filters.chunks(RANGE)).enumerate().skip(ranges.start);
+        share::for_each(true, by_range.zip(rests), |((i, ((boxes, flags), filters)), rest)| {
+            let part = Part { first: (i * RANGE) as u32, boxes, flags, filters, margin: config.margin };
+            part.set(fetch, of, rest);
         });
     }
 
@@ -169,7 +179,7 @@ impl BroadPhase {
     }
 }
 
-impl Range<'_> {
+impl Part<'_> {
     fn set<T: Copy>(
         mut self,
         fetch: &impl Fn(u32) -> T,

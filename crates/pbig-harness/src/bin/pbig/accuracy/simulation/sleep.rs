@@ -3,6 +3,7 @@
 
 use super::Ways;
 use super::figures::Figures;
+use rapier3d::prelude::RigidBodyActivation;
 
 /// Where no run falls asleep there is nothing to tell.
 pub(super) fn note(scenes: &[Ways]) -> String {
@@ -10,12 +11,13 @@ pub(super) fn note(scenes: &[Ways]) -> String {
         let told: Vec<String> = scenes.iter().filter_map(tell).collect();
         if told.is_empty() { "none".to_owned() } else { told.join("; ") }
     };
+    let until_sleep = RigidBodyActivation::default_time_until_sleep();
     format!(
-        "Asleep. Rapier lets bodies sleep that have been slow for 2 s, all that touch each other at once. It wakes both \
-         bodies of a pair that ends while they touch, for 2 s more. With a margin a contact ends before its pair does; boxes \
+        "Asleep. Rapier lets bodies sleep that have been slow for {until_sleep} s, all that touch each other at once. It \
+         wakes both bodies of a pair that ends while they touch, for {until_sleep} s more. With a margin a contact ends before its pair does; boxes \
          without one reach no further than rapier looks for contacts, so that the pair can end first (parted in contact). \
-         Asleep from which step on, and so many pairs that parted in contact: {}. The time of a step is that of the one in \
-         the middle: of a world that is asleep by then, or of one that is not. Runs of these scenes that are awake for more \
+         Asleep from which step on, and so many pairs that parted in contact: {}. The time of a step is the \
+         median: of a world that is asleep for most of its steps, or of one that is not. Runs of these scenes that are awake for more \
          than half of their steps: {}.",
         told(asleep),
         told(mostly_awake)

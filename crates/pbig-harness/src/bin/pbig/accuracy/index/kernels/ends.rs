@@ -211,7 +211,7 @@ pub(in super::super) fn note(ends: &[Ends]) -> String {
         "Kernels at every n from 2 to {most}: the first and last index of each row, and by the lazy way the first and last \
          identifier of each row and those about the diagonal; all pairs of each of these n would be too many. Wrong, as it \
          is: {}; by the paper's rules: {}; by integers none, nor by the lazy way: a run in which one is fails. Rows that the \
-         CPU estimates otherwise: {otherwise}. What ends can show is told above; what is missed and doubled they cannot.",
+         CPU estimates otherwise, kept among the rows that there are on both sides: {otherwise}. What ends can show is told above; what is missed and doubled they cannot.",
         told(|one| Some(one.as_it_is)),
         told(|one| one.by_rules)
     )
