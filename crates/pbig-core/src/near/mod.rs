@@ -15,6 +15,7 @@ mod tests;
 
 use crate::cpu::codes::prefetch;
 use crate::diff::{AHEAD, Judgement};
+use crate::plan::spread_evenly;
 use crate::share::{self, has_threads};
 use crate::{Aabb, Pair, shared_from};
 use index::Index;
@@ -39,6 +40,13 @@ const BLOCK: usize = 1024;
 
 /// Boxes whose pairs are looked up together.
 const TOGETHER: usize = 32;
+
+/// Boxes of near pairs of which one has changed, for those of changed boxes to be looked up: that takes ten times as long a pair
+/// as a walk, which threads share.
+const RARE: usize = 10;
+
+/// Near pairs that are asked for it.
+const SAMPLE: usize = 256;
 
 /// Walks that cost as much as an index.
 const WALKS: usize = 3;
@@ -108,12 +116,10 @@ impl NearPairs {
         std::mem::take(&mut self.tests)
     }
 
-    /// The pairs that overlap, which `give` puts in the place of those there were. For few boxes: they are looked up from
-    /// the first.
+    /// The pairs that overlap, which `give` puts in the place of those there were.
     pub(crate) fn begin(&mut self, give: impl FnOnce(&mut Vec<Pair>)) {
         self.clear();
         give(&mut self.pairs);
-        self.walked = WALKS * self.pairs.len();
         self.overlapping = self.pairs.len();
         self.states.resize(self.pairs.len(), OVERLAP);
     }
@@ -147,7 +153,11 @@ impl NearPairs {
 
     /// Adds pairs that have come near; those that overlap are told.
     pub(crate) fn extend(&mut self, found: &[Vec<Pair>], boxes: &[Aabb], added: &mut Vec<Pair>) {
-        let first = self.pairs.len();
+        let (first, new) = (self.pairs.len(), found.iter().map(Vec::len).sum::<usize>());
+        if self.pairs.capacity() - first < new {
+            // Not twice as much: this may be most of the memory that there is.
+            self.pairs.reserve_exact(new + first / 8);
+        }
         found.iter().for_each(|pairs| self.pairs.extend_from_slice(pairs));
         self.states.resize(self.pairs.len(), APART);
         let pieces = self.walk(first..self.pairs.len(), boxes);
@@ -159,6 +169,15 @@ impl NearPairs {
     pub(crate) fn update(&mut self, boxes: &[Aabb], added: &mut Vec<Pair>, removed: &mut Vec<Pair>) {
         let pieces = self.walk(0..self.pairs.len(), boxes);
         self.tell(pieces, added, removed);
+    }
+
+    /// Whether few near pairs are of boxes that have changed, as far as a sample shows. (By how many boxes have changed alone, of
+    /// a million of which 100,000 drifted, those were looked up at 60 ms an update where a walk took 20: all near pairs were theirs.)
+    pub(crate) fn is_rarely_of(&self, has_changed: impl Fn(u32) -> bool) -> bool {
+        let changed =
+            |i: usize| [self.pairs[i].a, self.pairs[i].b].into_iter().filter(|&id| has_changed(id)).count();
+        let sampled: usize = spread_evenly(self.pairs.len(), SAMPLE).map(changed).sum();
+        sampled * RARE < 2 * self.pairs.len().min(SAMPLE)
     }
 
     /// The same, where only the boxes `changed` have. A pair of two of them is turned by the first, and then is as it should.
@@ -223,9 +242,14 @@ impl NearPairs {
         if self.walked <= WALKS * all {
             return is_known;
         }
+        self.make_index(ids);
+        true
+    }
+
+    /// Pairs are looked up from now on, where few boxes change.
+    pub(crate) fn make_index(&mut self, ids: usize) {
         self.walked = 0;
         self.index.make(&self.pairs, &self.states, ids);
-        true
     }
 
     /// The pairs of boxes `ids`, and of no others that `is_one` knows, are no longer near; those that overlapped go to
@@ -285,6 +309,10 @@ impl NearPairs {
         }
         self.pairs.truncate(n);
         self.states.truncate(n);
+        if self.index.known > 0 {
+            // It was of use, and will be.
+            self.walked = WALKS * n;
+        }
         (self.gone, self.index.known) = (0, 0);
     }
 

@@ -136,6 +136,36 @@ fn pairs_come_and_go_as_boxes_tremble_and_jump() {
     assert!((300..600).contains(&indexed), "{indexed} rounds with an index");
 }
 
+impl NearPairs {
+    pub(crate) fn has_index(&self) -> bool {
+        self.index.known > 0
+    }
+}
+
+#[test]
+fn pairs_are_looked_up_where_few_are_of_boxes_that_have_changed() {
+    let mut list = NearPairs::default();
+    list.all().extend((0..999).map(|a| Pair::new(a, a + 1)));
+    assert!(list.is_rarely_of(|id| id < 50) && !list.is_rarely_of(|id| id < 200));
+    // One that is near all others is of as many pairs as they are.
+    list.all().extend((1..1000).map(|b| Pair::new(0, b)));
+    assert!(list.is_rarely_of(|id| id == 1) && !list.is_rarely_of(|id| id == 0));
+}
+
+#[test]
+fn an_index_that_was_of_use_is_made_again_when_what_is_gone_has_been_dropped() {
+    let mut world = World::new();
+    let (near, mut events) = (world.near(|_| true), vec![]);
+    world.list.all().extend(near.iter().flatten());
+    world.list.begin_all(&world.boxes, &Was(BTreeSet::new()), |_| {}, &mut events);
+    world.list.make_index(BOXES as usize);
+    let half: Vec<u32> = (0..BOXES / 2).collect();
+    world.list.remove_of(&half, |id| id < BOXES / 2, &mut events);
+    assert!(!world.list.has_index());
+    world.list.update_few(&[BOXES - 1], &world.boxes, &mut vec![], &mut vec![]);
+    assert!(world.list.has_index());
+}
+
 #[test]
 fn what_is_apart_and_no_longer_near_is_forgotten() {
     let mut world = World::new();

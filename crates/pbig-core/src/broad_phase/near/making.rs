@@ -60,8 +60,19 @@ impl BroadPhase {
         if served == Ok(Served::No) {
             self.near.worth.failed = true;
             self.near.none = Some(self.near.worth.told());
+        } else {
+            self.index_near();
         }
         served
+    }
+
+    /// An index from the first, if it will be of use: its time is part of what the list is to pay for.
+    fn index_near(&mut self) {
+        let mut clock = Instant::now();
+        if self.near.is_on && self.looks_up() {
+            self.near.list.make_index(self.boxes.len());
+        }
+        self.report.stages.check += lap(&mut clock);
     }
 
     fn grow_reaches(&mut self, skin: f32) {

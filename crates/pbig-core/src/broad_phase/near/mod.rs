@@ -32,8 +32,8 @@ use crate::share::{self, has_threads};
 use crate::{Aabb, Error, Pair, shared_from};
 use std::time::Instant;
 
-/// Near pairs that are walked in the time that it takes to look up the pairs of one box.
-const LOOKUP: usize = 20;
+/// Near pairs for each changed box from which its own are looked up instead of walking all, whatever they are.
+const LOOKED_UP: usize = 64;
 
 /// One in so many boxes may leave its reach in an update.
 const LEAVING: usize = 32;
@@ -226,26 +226,44 @@ impl BroadPhase {
         base.map.edit(&changed, others);
     }
 
-    /// Tests the near pairs, but those of boxes that were away.
+    /// Tests the near pairs, but those of boxes that were away. If those are all that have changed, no other pair has.
     fn test_near(&mut self) {
         stage!("check");
         let mut clock = Instant::now();
-        let Self { near, boxes, pairs, events, flags, changed, .. } = self;
-        let Near { list, away, parted, .. } = near;
+        self.part_away();
+        if self.near.away.len() < self.changed.len() {
+            self.test_changed();
+        }
+        self.report.stages.check += lap(&mut clock);
+    }
+
+    /// Boxes that were away have no near pairs any more.
+    fn part_away(&mut self) {
+        let Self { near: Near { list, away, parted, .. }, pairs, flags, .. } = self;
         parted.clear();
         if !away.is_empty() {
             list.remove_of(away, |id| flags[id as usize] & flag::AWAY != 0, parted);
             pairs.count_removed(parted);
         }
-        let (added, removed) = (&mut events.added, &mut events.removed);
-        if changed.len() * LOOKUP < list.len() {
+    }
+
+    fn test_changed(&mut self) {
+        let looks_up = self.looks_up();
+        let Self { near, boxes, pairs, events, changed, .. } = self;
+        let (list, added, removed) = (&mut near.list, &mut events.added, &mut events.removed);
+        if looks_up {
             list.update_few(changed, boxes, added, removed);
         } else {
             list.update(boxes, added, removed);
         }
         pairs.count_added(added);
         pairs.count_removed(removed);
-        self.report.stages.check += lap(&mut clock);
+    }
+
+    /// Whether the near pairs of boxes that have changed are looked up, instead of walking all.
+    fn looks_up(&self) -> bool {
+        let has_changed = |id: u32| self.flags[id as usize] & flag::CHANGED != 0;
+        self.changed.len() * LOOKED_UP < self.near.list.len() || self.near.list.is_rarely_of(has_changed)
     }
 
     /// Adds the near pairs of boxes that were away, and tells which of their pairs have ended.

@@ -97,7 +97,7 @@ impl BroadPhase {
         if self.must_have_list() {
             return NoNear::Many(0);
         }
-        self.near.worth.wait(Cause::Many);
+        self.near.worth.wait(Cause::Many, 0);
         self.near.worth.told()
     }
 

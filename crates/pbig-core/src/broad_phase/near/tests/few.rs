@@ -75,6 +75,20 @@ fn where_the_same_few_move_only_they_get_reaches() {
 }
 
 #[test]
+fn a_list_for_few_has_an_index_from_the_first_unless_many_near_pairs_are_theirs() {
+    assert!(!World::with_few_movers(0.0).broad_phase.near.list.has_index());
+    let mut world = World::new(0.0);
+    for round in 0..60 {
+        if world.broad_phase.near.is_on {
+            break;
+        }
+        (0..BOXES).step_by(40).for_each(|id| world.shift(id, [0.02, 0.0, 0.0]));
+        world.update(&format!("round {round}"));
+    }
+    assert!(world.broad_phase.near.is_on && world.broad_phase.near.list.has_index());
+}
+
+#[test]
 fn any_other_box_may_move_and_change_too() {
     for margin in [0.0, 0.02] {
         let mut world = World::with_few_movers(margin);
@@ -130,13 +144,18 @@ fn too_many_new_pairs_in_the_update_that_begins_a_list_leave_all_as_it_was() {
 #[test]
 fn a_list_that_costs_more_than_none_is_given_up() {
     let list = |age, ns| {
-        let price = Some(Spent { ns: 5000.0, changed: 2.0 });
-        let own = Spent { ns, changed: 12.0 };
-        Worth { usual: Some(100.0), own, price, ..Worth::default() }.goes_on(age)
+        // The first half has cost much.
+        let (asked, own) = (Spent { ns: 5000.0, changed: 2.0 }, Spent { ns, changed: 12.0 });
+        Worth { usual: Some(100.0), own, asked, ..Worth::default() }.goes_on(age)
     };
-    assert!(list(32, 5850.0), "85 a box");
-    assert!(!list(32, 5950.0) && !list(64, 5950.0), "95, beside its price");
-    assert!(list(31, 1e9) && list(16, 1e9), "not asked");
+    assert!(list(16, 5850.0), "85 a box");
+    assert!(!list(16, 5950.0) && !list(64, 5950.0), "95");
+    assert!(list(17, 1e9) && list(8, 1e9), "not asked");
+    let mut worth = Worth { usual: Some(100.0), ..Worth::default() };
+    for (age, ns) in [(8, 5000.0), (16, 50.0), (32, 50.0)] {
+        worth.own.add(ns, 1.0);
+        assert!(worth.goes_on(age) && worth.goes_on(age), "after {age} updates, and again if one has failed");
+    }
 
     let mut world = World::with_few_movers(0.0);
     let mut lasted = 0;
@@ -146,7 +165,7 @@ fn a_list_that_costs_more_than_none_is_given_up() {
         world.broad_phase.update().expect("within the limits");
         lasted += 1;
     }
-    assert_eq!(lasted, 32);
+    assert_eq!(lasted, 16);
 }
 
 #[test]

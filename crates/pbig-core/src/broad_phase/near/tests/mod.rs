@@ -243,11 +243,11 @@ fn what_lists_cost_decides_about_pauses() {
         worth.end(10);
         worth.pause
     });
-    assert_eq!(pauses, [1, 3, 7, 15, 31, 63, 64, 64, 64]);
+    assert_eq!(pauses, [10, 21, 43, 87, 128, 128, 128, 128, 128]);
     worth.own = spent(1.0);
     worth.end(1);
-    assert_eq!(worth.pause, 64, "cheap, but it has not lasted");
-    assert_eq!(worth.goes_without(), Some(NoNear::Unpaid(63)));
+    assert_eq!(worth.pause, 128, "cheap, but it has not lasted");
+    assert_eq!(worth.goes_without(), Some(NoNear::Unpaid(127)));
 }
 
 #[test]
