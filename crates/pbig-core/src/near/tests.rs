@@ -145,22 +145,32 @@ impl NearPairs {
 #[test]
 fn pairs_are_looked_up_where_few_are_of_boxes_that_have_changed() {
     let mut list = NearPairs::default();
-    list.all().extend((0..999).map(|a| Pair::new(a, a + 1)));
+    list.begin(|pairs| *pairs = (0..999).map(|a| Pair::new(a, a + 1)).collect());
     assert!(list.is_rarely_of(|id| id < 50) && !list.is_rarely_of(|id| id < 200));
     // One that is near all others is of as many pairs as they are.
-    list.all().extend((1..1000).map(|b| Pair::new(0, b)));
+    list.begin(|pairs| *pairs = (1..1000).map(|b| Pair::new(0, b)).collect());
     assert!(list.is_rarely_of(|id| id == 1) && !list.is_rarely_of(|id| id == 0));
+    list.states.fill(GONE);
+    assert!(!list.is_rarely_of(|_| false), "none is left to be rare");
 }
 
 #[test]
-fn an_index_that_was_of_use_is_made_again_when_what_is_gone_has_been_dropped() {
+fn pairs_that_come_take_no_more_memory_than_an_eighth_beyond_them() {
+    let mut list = NearPairs::default();
+    list.begin(|pairs| *pairs = vec![Pair::new(0, 1); 8000]);
+    list.extend(&[vec![Pair::new(0, 2); 900], vec![Pair::new(1, 2); 100]], &[Aabb::NOWHERE; 3], &mut vec![]);
+    assert_eq!((list.len(), list.overlapping()), (9000, 8000));
+    assert!(list.pairs.capacity() <= 10_000 && list.states.capacity() <= 10_000);
+}
+
+#[test]
+fn an_index_that_was_of_use_is_made_again_for_narrower_reaches() {
     let mut world = World::new();
     let (near, mut events) = (world.near(|_| true), vec![]);
     world.list.all().extend(near.iter().flatten());
     world.list.begin_all(&world.boxes, &Was(BTreeSet::new()), |_| {}, &mut events);
     world.list.make_index(BOXES as usize);
-    let half: Vec<u32> = (0..BOXES / 2).collect();
-    world.list.remove_of(&half, |id| id < BOXES / 2, &mut events);
+    world.list.retain_near(&world.boxes);
     assert!(!world.list.has_index());
     world.list.update_few(&[BOXES - 1], &world.boxes, &mut vec![], &mut vec![]);
     assert!(world.list.has_index());

@@ -16,8 +16,8 @@ use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 /// Boxes from which several threads set them: for fewer, waking a second one takes longer.
 const PARALLEL_FROM: usize = shared_from(8192);
 
-/// Ids from the lowest to the highest of which one is to be set, for them all to be looked through: eight at a time, as long as it takes to set one that lies
-/// apart from others.
+/// Ids from the lowest to the highest of which one is to be set, for them all to be looked through: eight at a time, as long as
+/// it takes to set one that lies apart from others.
 const LOOKED_THROUGH: usize = 512;
 
 /// Ids that a thread takes at once.
@@ -75,9 +75,11 @@ impl BroadPhase {
         fetch: impl Fn(u32) -> T + Sync,
         of: impl Fn(T) -> Option<(Aabb, ProxyFilter)> + Sync,
     ) -> Result<(), Error> {
+        if ids.len() < PARALLEL_FROM || self.has_begun() || !has_threads() {
+            return self.set_each(ids, &fetch, &of);
+        }
         let ranges = self.ranges_of(ids);
-        let few = ids.len() < PARALLEL_FROM || ids.len() * LOOKED_THROUGH < ranges.len() * RANGE;
-        if few || self.has_begun() || !has_threads() {
+        if ids.len() * LOOKED_THROUGH < ranges.len() * RANGE {
             return self.set_each(ids, &fetch, &of);
         }
         let new = self.list(ids);
@@ -122,10 +124,10 @@ impl BroadPhase {
         of: &(impl Fn(T) -> Option<(Aabb, ProxyFilter)> + Sync),
     ) {
         let Self { boxes, flags, filters, rests, config, .. } = self;
-        rests.resize_with(ranges.len(), Rest::default);
+        rests.resize_with(boxes.len().div_ceil(RANGE), Rest::default);
         let boxes = boxes.chunks_mut(RANGE).zip(flags.chunks_mut(RANGE));
         let by_range = boxes.zip(filters.chunks(RANGE)).enumerate().skip(ranges.start);
-        share::for_each(true, by_range.zip(rests), |((i, ((boxes, flags), filters)), rest)| {
+        share::for_each(true, by_range.zip(&mut rests[ranges]), |((i, ((boxes, flags), filters)), rest)| {
             let part = Part { first: (i * RANGE) as u32, boxes, flags, filters, margin: config.margin };
             part.set(fetch, of, rest);
         });

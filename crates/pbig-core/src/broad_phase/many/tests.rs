@@ -44,11 +44,11 @@ struct Both {
 }
 
 impl Both {
-    /// New places for some of the boxes from one on. New ones are among them at first, and some are listed twice.
+    /// New places for some of the boxes from one to another. New ones are among them at first, and some are listed twice.
     fn set(&mut self) {
         let Self { many, each, boxes, rng } = self;
-        let first = rng.random_range(0..IDS / 2);
-        let ids: Vec<u32> = (0..IDS).map(|_| rng.random_range(first..IDS)).collect();
+        let (first, end) = (rng.random_range(0..IDS / 2), rng.random_range(IDS / 2 + 1..=IDS));
+        let ids: Vec<u32> = (0..IDS).map(|_| rng.random_range(first..end)).collect();
         let share = rng.random_range(0.0..1.0);
         for &id in &ids {
             if rng.random_bool(share) {

@@ -57,11 +57,13 @@ impl BroadPhase {
         near.is_on = true;
         self.report.stages.plan += lap(&mut clock);
         let served = self.serve_near(FIRST);
-        if served == Ok(Served::No) {
-            self.near.worth.failed = true;
-            self.near.none = Some(self.near.worth.told());
-        } else {
-            self.index_near();
+        match served {
+            Ok(Served::Yes) => self.index_near(),
+            Ok(Served::No) => {
+                self.near.worth.failed = true;
+                self.near.none = Some(self.near.worth.told());
+            }
+            Err(_) => {}
         }
         served
     }
@@ -69,7 +71,7 @@ impl BroadPhase {
     /// An index from the first, if it will be of use: its time is part of what the list is to pay for.
     fn index_near(&mut self) {
         let mut clock = Instant::now();
-        if self.near.is_on && self.looks_up() {
+        if self.looks_up() {
             self.near.list.make_index(self.boxes.len());
         }
         self.report.stages.check += lap(&mut clock);

@@ -72,7 +72,7 @@ impl Skin {
 
     /// A narrower width that is enough, after an update in which so many boxes have changed: for boxes that have come no
     /// farther for as long again. Asked ever more rarely.
-    fn enough(&mut self, changed: usize) -> Option<f32> {
+    pub(super) fn enough(&mut self, changed: usize) -> Option<f32> {
         let before = self.rounds as u32;
         self.rounds += changed as f32 / self.movers.max(1.0);
         let rounds = self.rounds as u32;
@@ -81,7 +81,8 @@ impl Skin {
         }
         let then = std::mem::replace(&mut self.farthest_then, self.farthest);
         let enough = ROOM * self.farthest;
-        (self.farthest <= NO_FURTHER * then && enough <= WORTH * self.width).then_some(enough)
+        (self.farthest > 0.0 && self.farthest <= NO_FURTHER * then && enough <= WORTH * self.width)
+            .then_some(enough)
     }
 }
 

@@ -39,9 +39,9 @@ pub(super) enum Cause {
 /// What lists have cost, and what goes without.
 #[derive(Clone, Debug, Default)]
 pub(in crate::broad_phase) struct Worth {
-    /// What updates with the list have cost; and had, when it was last asked.
+    /// What updates with the list have cost; and those since it was last asked in which many boxes changed.
     pub(super) own: Spent,
-    pub(super) asked: Spent,
+    pub(super) unasked: Spent,
     /// For each changed box, what the last ones without any have: ns.
     pub(super) usual: Option<f32>,
     /// Boxes that have changed in updates without a list, since the last one.
@@ -59,18 +59,17 @@ pub(in crate::broad_phase) struct Worth {
 impl Worth {
     /// A list is made now.
     pub(super) fn begin(&mut self) {
-        (self.own, self.asked) = (Spent::default(), Spent::default());
+        (self.own, self.unasked) = (Spent::default(), Spent::default());
     }
 
-    /// Whether a list that so many updates have used is of use: asked ever more rarely, about the latter half of them. (About
-    /// all but the one that made it, after 32: of a million boxes of which 3% drift, where each list is a loss, an update took
-    /// 24 ms on average in the first 90 instead of 17.)
+    /// Whether a list that so many updates have used is of use: asked ever more rarely, about the latter half of them, as far as
+    /// many boxes changed. (When it was asked about all but the first, after 32: of a million boxes of which 3% drift, where
+    /// lists are a loss, an update took 24 ms on average in the first 90 instead of 17.)
     pub(super) fn goes_on(&mut self, age: u32) -> bool {
         if !age.is_power_of_two() {
             return true;
         }
-        let before = std::mem::replace(&mut self.asked, self.own);
-        let (ns, changed) = (self.own.ns - before.ns, self.own.changed - before.changed);
+        let Spent { ns, changed } = std::mem::take(&mut self.unasked);
         age < ASKED || changed == 0.0 || self.usual.is_none_or(|usual| ns < PAYS * usual * changed)
     }
 
@@ -93,6 +92,9 @@ impl Worth {
         let (ns, changed) = (time.as_nanos() as f32, changed as f32);
         if route == Route::Near {
             self.own.add(ns, changed);
+            if says_much {
+                self.unasked.add(ns, changed);
+            }
         } else if route != Route::Gpu && says_much {
             let usual = self.usual.unwrap_or(ns / changed);
             self.usual = Some((usual + ns / changed) / 2.0);

@@ -4,9 +4,11 @@ use super::{BOXES, World};
 use crate::broad_phase::measured::Spent;
 use crate::broad_phase::near::policy::Movers;
 use crate::broad_phase::near::worth::Worth;
+use crate::broad_phase::update::Route;
 use crate::broad_phase::{Events, flag};
 use crate::{Aabb, Error, Limits, Pair, ProxyFilter};
 use std::collections::BTreeSet;
+use std::time::Duration;
 
 /// Less than one in eight.
 const MOVERS: u32 = BOXES / 9;
@@ -82,7 +84,8 @@ fn a_list_for_few_has_an_index_from_the_first_unless_many_near_pairs_are_theirs(
         if world.broad_phase.near.is_on {
             break;
         }
-        (0..BOXES).step_by(40).for_each(|id| world.shift(id, [0.02, 0.0, 0.0]));
+        // So many that it goes by their near pairs.
+        (0..BOXES).step_by(20).for_each(|id| world.shift(id, [0.02, 0.0, 0.0]));
         world.update(&format!("round {round}"));
     }
     assert!(world.broad_phase.near.is_on && world.broad_phase.near.list.has_index());
@@ -144,18 +147,23 @@ fn too_many_new_pairs_in_the_update_that_begins_a_list_leave_all_as_it_was() {
 #[test]
 fn a_list_that_costs_more_than_none_is_given_up() {
     let list = |age, ns| {
-        // The first half has cost much.
-        let (asked, own) = (Spent { ns: 5000.0, changed: 2.0 }, Spent { ns, changed: 12.0 });
-        Worth { usual: Some(100.0), own, asked, ..Worth::default() }.goes_on(age)
+        let (own, unasked) = (Spent { ns: 1e6, changed: 12.0 }, Spent { ns, changed: 10.0 });
+        Worth { usual: Some(100.0), own, unasked, ..Worth::default() }.goes_on(age)
     };
-    assert!(list(16, 5850.0), "85 a box");
-    assert!(!list(16, 5950.0) && !list(64, 5950.0), "95");
+    assert!(list(16, 850.0), "85 a box");
+    assert!(!list(16, 950.0) && !list(64, 950.0), "95");
     assert!(list(17, 1e9) && list(8, 1e9), "not asked");
+    // The first eight updates may cost what they will, and those in which next to nothing changes.
     let mut worth = Worth { usual: Some(100.0), ..Worth::default() };
-    for (age, ns) in [(8, 5000.0), (16, 50.0), (32, 50.0)] {
-        worth.own.add(ns, 1.0);
-        assert!(worth.goes_on(age) && worth.goes_on(age), "after {age} updates, and again if one has failed");
+    let near = |worth: &mut Worth, changed, ns| {
+        worth.note_time(Route::Near, changed, 1000, Duration::from_nanos(ns));
+    };
+    for (age, changed, ns) in [(8, 100, 1_000_000), (16, 100, 8000), (32, 1, 1_000_000)] {
+        near(&mut worth, changed, ns);
+        assert!(worth.goes_on(age), "after {age} updates");
     }
+    near(&mut worth, 100, 1_000_000);
+    assert!(!worth.goes_on(64));
 
     let mut world = World::with_few_movers(0.0);
     let mut lasted = 0;

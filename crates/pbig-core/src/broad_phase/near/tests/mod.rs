@@ -358,6 +358,13 @@ fn a_list_that_has_not_paid_is_followed_by_ever_longer_pauses() {
 }
 
 #[test]
+fn a_skin_stays_where_boxes_have_only_just_got_it() {
+    let mut skin = Skin::default();
+    skin.begin(0.4, 10);
+    assert_eq!(skin.enough(10), None, "they have not been anywhere yet");
+}
+
+#[test]
 fn a_skin_grows_while_few_pairs_are_near_and_no_wider_than_that() {
     let mut skin = Skin::default();
     let mut widths = vec![skin.moves];
