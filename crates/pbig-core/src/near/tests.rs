@@ -22,6 +22,15 @@ impl World {
         world
     }
 
+    /// With a list of all that are near, and the pairs that it tells of.
+    fn with_list() -> (Self, Vec<Pair>) {
+        let (mut world, mut added) = (Self::new(), vec![]);
+        let near = world.near(|_| true);
+        world.list.all().extend(near.iter().flatten());
+        world.list.begin_all(&world.boxes, &Was(BTreeSet::new()), |_| {}, &mut added);
+        (world, added)
+    }
+
     fn random(&mut self) -> f32 {
         self.seed = self.seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
         (self.seed >> 40) as f32 / 16_777_216.0
@@ -165,10 +174,7 @@ fn pairs_that_come_take_no_more_memory_than_an_eighth_beyond_them() {
 
 #[test]
 fn an_index_that_was_of_use_is_made_again_for_narrower_reaches() {
-    let mut world = World::new();
-    let (near, mut events) = (world.near(|_| true), vec![]);
-    world.list.all().extend(near.iter().flatten());
-    world.list.begin_all(&world.boxes, &Was(BTreeSet::new()), |_| {}, &mut events);
+    let (mut world, _) = World::with_list();
     world.list.make_index(BOXES as usize);
     world.list.retain_near(&world.boxes);
     assert!(!world.list.has_index());
@@ -178,10 +184,7 @@ fn an_index_that_was_of_use_is_made_again_for_narrower_reaches() {
 
 #[test]
 fn what_is_apart_and_no_longer_near_is_forgotten() {
-    let mut world = World::new();
-    let (near, mut added) = (world.near(|_| true), vec![]);
-    world.list.all().extend(near.iter().flatten());
-    world.list.begin_all(&world.boxes, &Was(BTreeSet::new()), |_| {}, &mut added);
+    let (mut world, added) = World::with_list();
     world.validate(&added, &[]);
     let before = world.list.len();
     // Odd boxes are near nothing any more.

@@ -32,9 +32,11 @@ use crate::share::{self, has_threads};
 use crate::{Aabb, Error, Pair, shared_from};
 use std::time::Instant;
 
-/// Near pairs for each box that has changed, from which its own are looked up and the others are not walked: without asking
-/// how many they are, and if they are rare. (A box without near pairs has to be looked up, too.)
-const PAIRS_A_MOVER: [usize; 2] = [64, 4];
+/// Near pairs for each box that has changed, from which those of such boxes are looked up, and the others are not walked.
+const LOOKED_UP: usize = 64;
+
+/// The same where those of such boxes are rare. (A box has to be looked up even if it has none.)
+const RARE_LOOKED_UP: usize = 4;
 
 /// One in so many boxes may leave its reach in an update.
 const LEAVING: usize = 32;
@@ -264,8 +266,9 @@ impl BroadPhase {
     /// Whether the near pairs of boxes that have changed are looked up, instead of walking all.
     fn looks_up(&self) -> bool {
         let has_changed = |id: u32| self.flags[id as usize] & flag::CHANGED != 0;
-        let [surely, perhaps] = PAIRS_A_MOVER.map(|pairs| self.changed.len() * pairs < self.near.list.len());
-        surely || (perhaps && self.near.list.is_rarely_of(has_changed))
+        let (changed, list) = (self.changed.len(), &self.near.list);
+        changed * LOOKED_UP < list.len()
+            || (changed * RARE_LOOKED_UP < list.len() && list.is_rarely_of(has_changed))
     }
 
     /// Adds the near pairs of boxes that were away, and tells which of their pairs have ended.
