@@ -63,6 +63,54 @@ impl Aabb {
         return self.overlaps_by_axes(other);
     }
 
+    /// Returns true if the gaps between this box and one around it are from 0 to `slack` on all sides; none if one of them
+    /// is NaN, because of a NaN or of equal infinities.
+    #[cfg(target_arch = "x86_64")]
+    #[inline(always)]
+    pub(crate) fn gaps_are_within(&self, outer: &Self, slack: f32) -> Option<bool> {
+        use std::arch::x86_64::*;
+        // SAFETY: SSE is part of the architecture.
+        unsafe {
+            // Lane by lane: a box that was just computed would be waited for if it were written and loaded as a whole.
+            let [min, max] = [self.min, self.max].map(|[x, y, z]| _mm_setr_ps(x, y, z, z));
+            let (outer_min, outer_max) = outer.corners();
+            let (below, above) = (_mm_sub_ps(min, outer_min), _mm_sub_ps(outer_max, max));
+            let (zero, slack) = (_mm_setzero_ps(), _mm_set1_ps(slack));
+            let least = _mm_and_ps(_mm_cmpge_ps(below, zero), _mm_cmpge_ps(above, zero));
+            let most = _mm_and_ps(_mm_cmple_ps(below, slack), _mm_cmple_ps(above, slack));
+            let axes = |lanes| _mm_movemask_ps(lanes) & 7;
+            let is_within = axes(_mm_and_ps(least, most)) == 7;
+            (is_within || axes(_mm_cmpunord_ps(below, above)) == 0).then_some(is_within)
+        }
+    }
+
+    /// Returns true if the gaps between this box and one around it are from 0 to `slack` on all sides; none if one of them
+    /// is NaN, because of a NaN or of equal infinities.
+    #[cfg(not(target_arch = "x86_64"))]
+    #[inline(always)]
+    pub(crate) fn gaps_are_within(&self, outer: &Self, slack: f32) -> Option<bool> {
+        let (mut is_within, mut sum) = (true, 0.0);
+        for k in 0..3 {
+            let (below, above) = (self.min[k] - outer.min[k], outer.max[k] - self.max[k]);
+            is_within &= (below >= 0.0) & (below <= slack) & (above >= 0.0) & (above <= slack);
+            sum += below + above;
+        }
+        (!sum.is_nan()).then_some(is_within)
+    }
+
+    /// Returns both corners, three lanes each; the fourth holds anything.
+    #[cfg(target_arch = "x86_64")]
+    #[inline(always)]
+    fn corners(&self) -> (std::arch::x86_64::__m128, std::arch::x86_64::__m128) {
+        use std::arch::x86_64::{_mm_loadu_ps, _mm_shuffle_ps};
+        // SAFETY: SSE is part of the architecture. A box is six numbers; the loads are of the first four and the last four.
+        unsafe {
+            let first = std::ptr::from_ref(self).cast::<f32>();
+            let max = _mm_loadu_ps(first.add(2));
+            (_mm_loadu_ps(first), _mm_shuffle_ps::<0b00_11_10_01>(max, max))
+        }
+    }
+
     /// Every x86-64 has the instructions for all axes at once: 11 of them where one axis after the other takes 30.
     #[cfg(target_arch = "x86_64")]
     #[inline(always)]

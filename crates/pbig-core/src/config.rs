@@ -1,13 +1,12 @@
 //! What a caller can choose. Every field says its unit, why one would change it, and what follows.
 
-use crate::plan::Costs;
 use std::time::Duration;
 
 /// Where the work runs.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Backend {
-    /// What the plan expects to be fastest.
+    /// The CPU; a GPU that was given, if it is no software and the boxes are many.
     #[default]
     Auto,
     /// The CPU, with rayon's threads when the scene is worth it.
@@ -18,44 +17,14 @@ pub enum Backend {
     Brute,
 }
 
-/// Which algorithm finds the pairs.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub enum Strategy {
-    /// The plan decides between brute force and the grid; on a GPU up to 1024 boxes need none. On the CPU
-    /// [`crate::BroadPhase`] keeps up to 1024 boxes in a bitmap instead, unless many change and the grid takes less.
-    #[default]
-    Auto,
-    /// One entry a box, sorted by the cell of its lower corner; the fastest on a CPU. On a GPU as
-    /// [`Strategy::Pbig`].
-    Grid,
-    /// PBIG's own grid: one entry for each cell that a box touches (PBIG 4.2), however few the boxes. What
-    /// a GPU runs; on the CPU plain, scalar and slower than [`Strategy::Grid`], to compare with.
-    Pbig,
-}
-
-/// How [`Strategy::Pbig`] and the GPU choose their cell size, both times from [`Config::pbig_boxes_per_cell`].
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub enum CellRule {
-    /// PBIG's equation 6: the smallest cell with that many entries on average, boxes counted in
-    /// every cell they touch.
-    #[default]
-    Objective,
-    /// Avril's section 4.1: the cell that holds that many boxes at the density of the space, sizes
-    /// ignored.
-    Density,
-}
-
 /// In which order lists of pairs come.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Order {
-    /// By `(a, b)`: the same bytes on every backend, strategy and thread count.
+    /// By `(a, b)`: the same bytes on every backend and thread count.
     #[default]
     Sorted,
-    /// As found. Saves the sort, about a third of the time of a whole call. On a GPU the order differs
-    /// from call to call.
+    /// As found, which saves the sort. The order depends on threads, and on a GPU on timing.
     Unspecified,
 }
 
@@ -63,18 +32,18 @@ pub enum Order {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Limits {
-    /// Most boxes, and one more than the largest id of [`crate::BroadPhase`], which keeps about
-    /// 200 bytes for every id up to the largest.
+    /// Most boxes, and one more than the largest id of [`crate::BroadPhase`].
     pub max_boxes: u64,
-    /// Most pairs that one call may report; 8 bytes each, up to 32 while [`crate::BroadPhase`] keeps it.
+    /// Most pairs that a [`crate::Finder`] lists, or a [`crate::BroadPhase`] keeps: 8 bytes each, up to 32 while they are
+    /// sorted.
     pub max_pairs: u64,
 }
 
 impl Limits {
     /// 2^27 boxes (3 GiB of boxes alone) and 2^28 pairs (2 GiB).
     pub const DEFAULT: Self = Self { max_boxes: 1 << 27, max_pairs: 1 << 28 };
-    /// As far as 32-bit numbers of boxes, and of the pairs that [`crate::BroadPhase`] keeps, reach.
-    pub const UNLIMITED: Self = Self { max_boxes: 1 << 31, max_pairs: u64::MAX };
+    /// 2^28 boxes and 2^31 pairs: as many as the numbers inside can tell apart.
+    pub const UNLIMITED: Self = Self { max_boxes: 1 << 28, max_pairs: 1 << 31 };
 }
 
 impl Default for Limits {
@@ -146,132 +115,59 @@ impl Default for GpuOptions {
     }
 }
 
-/// How [`crate::BroadPhase`] makes events on the CPU, where [`Config::study`] asks for a way.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub enum Updates {
-    /// What the plan expects to be fastest.
-    #[default]
-    Auto,
-    /// Changed boxes are put into other cells, and only they are searched for. All are where that cannot be: in the first
-    /// update, and once too many are out of the grid's order.
-    Edits,
-    /// All are searched, in a grid that is built anew.
-    Anew,
-    /// By a list of near pairs, whatever it costs. Without one where none can be made: it is not known how far boxes
-    /// move, as in the first update, or more than 256 pairs a box would be near; and, as all of these, not with
-    /// [`Strategy::Pbig`], [`Backend::Brute`] or where a GPU does the update.
-    Near,
-}
-
-/// The CPU's grids, where [`Config::study`] asks for some. Where every pair is tested there is none.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub enum Grids {
-    /// What the plan expects to be fastest.
-    #[default]
-    Auto,
-    /// One for all boxes, however they differ in size.
-    One,
-    /// Levels by size, or one and a list of the largest boxes. As planned where all are of one size: none can be split off.
-    Levels,
-}
-
-/// The rows of cells at which a box looks in the CPU's search of its own grid, where [`Config::study`] asks for some.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub enum Look {
-    /// By the size of cells, and by how many boxes they hold.
-    #[default]
-    Auto,
-    /// At all rows: where boxes are few, to look costs less than to decide.
-    Everywhere,
-    /// Not at what rows have beyond a box's reach: where cells hold several boxes.
-    Trimmed,
-    /// At other rows than its own only where a box reaches them: where cells are so large that few do.
-    Seldom,
-}
-
-/// Ways to take whatever the plan would choose, for study and tests: about speed only, pairs and events are the same by all.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub struct Study {
-    /// How [`crate::BroadPhase`] makes events. With any but [`Updates::Auto`] it has no bitmap.
-    pub updates: Updates,
-    /// One grid, or levels.
-    pub grids: Grids,
-    /// Which rows the search looks at.
-    pub look: Look,
-}
-
-impl Study {
-    /// Everything as planned.
-    pub const DEFAULT: Self = Self { updates: Updates::Auto, grids: Grids::Auto, look: Look::Auto };
-}
-
-impl Default for Study {
-    fn default() -> Self {
-        Self::DEFAULT
-    }
-}
-
-/// Everything a caller can choose; the defaults are right for most.
+/// Everything that a caller can choose; the defaults are right for most.
 #[derive(Clone, Copy, Debug, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Config {
     /// Where the work runs.
     pub backend: Backend,
-    /// Which algorithm, for study and for tests.
-    pub strategy: Strategy,
     /// Order of lists of pairs; events are always sorted.
     pub order: Order,
-    /// When to end with an error.
+    /// Limits beyond which a call ends with an error.
     pub limits: Limits,
-    /// How far a stored box reaches beyond the box it was given ([`crate::BroadPhase`] only), in
-    /// the caller's length unit. Larger: fewer boxes count as changed, more pairs are reported
-    /// that do not touch yet.
+    /// How far a stored box reaches beyond the box that was given ([`crate::BroadPhase`] only), in the caller's length
+    /// unit. A larger margin means fewer changed boxes, and more reported pairs that do not touch yet.
     pub margin: f32,
-    /// On the CPU, below this many boxes every pair is tested without a grid, and costs are not compared
-    /// ([`crate::Finder`]). Avril's table 7 puts the crossover at 1000 boxes on a GPU of 2008; on a CPU core of 2022 it is between
-    /// 30 and 50, and above this number the plan finds it by the costs.
-    pub brute_below: u32,
-    /// PBIG's `W` in the constraint `f >= W` of equation 6: the wanted boxes per cell of
-    /// [`Strategy::Pbig`] and of the GPU. The paper takes a warp, 32; a core without lanes to fill prefers few.
-    pub pbig_boxes_per_cell: f32,
-    /// How that number becomes a cell size.
-    pub cell_rule: CellRule,
-    /// In [`Strategy::Pbig`], and on the GPU up to 256, cells of at most this many boxes go through Avril's index to pair
-    /// mapping, larger ones through PBIG's balanced rows.
-    pub small_cell: u32,
-    /// What work costs, for the plan. None: as measured on this machine where a choice is close. With costs given here, from
-    /// a file say, plans of searches from nothing are the same on every machine. Pairs and events always are.
-    pub costs: Option<Costs>,
-    /// About the GPU backend.
+    /// Settings of the GPU backend.
     pub gpu: GpuOptions,
-    /// Ways on the CPU that are not left to the plan.
-    pub study: Study,
+    /// An engine to use whatever the policy says, for tests and measurements.
+    #[cfg(feature = "unstable-study")]
+    pub engine: Option<Engine>,
 }
 
 impl Config {
     /// The defaults.
     pub const DEFAULT: Self = Self {
         backend: Backend::Auto,
-        strategy: Strategy::Auto,
         order: Order::Sorted,
         limits: Limits::DEFAULT,
         margin: 0.0,
-        brute_below: 32,
-        pbig_boxes_per_cell: 4.0,
-        cell_rule: CellRule::Objective,
-        small_cell: 32,
-        costs: None,
         gpu: GpuOptions::DEFAULT,
-        study: Study::DEFAULT,
+        #[cfg(feature = "unstable-study")]
+        engine: None,
     };
+
+    /// Returns the engine that was asked for.
+    pub(crate) fn forced_engine(&self) -> Option<Engine> {
+        #[cfg(feature = "unstable-study")]
+        return self.engine;
+        #[cfg(not(feature = "unstable-study"))]
+        None
+    }
 }
 
 impl Default for Config {
     fn default() -> Self {
         Self::DEFAULT
     }
+}
+
+/// The ways in which the CPU makes an update of [`crate::BroadPhase`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Engine {
+    /// Changed boxes are tested against all.
+    Sweep,
+    /// Changed boxes are moved in the grid and searched for. All are sorted anew where there is no grid yet.
+    Edit,
+    /// All boxes are sorted into a grid, searched and compared.
+    Rebuild,
 }

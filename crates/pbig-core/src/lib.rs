@@ -41,56 +41,29 @@
 //! Culling in Large-Scale Environments Using GPU Mapping Function", EGPGV 2012 (*Avril*).
 
 mod aabb;
+mod all_pairs;
 mod broad_phase;
 mod config;
-mod cpu;
-#[cfg(feature = "gpu")]
-pub mod decode;
-mod diff;
 mod error;
 mod filter;
 mod finder;
-#[cfg(feature = "gpu")]
-pub mod gpu;
-#[cfg(feature = "gpu")]
-pub mod layout;
-mod links;
-mod marks;
-mod near;
+mod grid;
 pub mod oracle;
 mod pair;
 pub mod pair_index;
-pub mod plan;
+mod pairs;
+mod parallel;
+mod plan;
+mod policy;
 mod report;
-mod search;
-mod share;
 
 pub use aabb::Aabb;
 pub use broad_phase::{BroadPhase, Events};
-pub use config::{
-    Backend, CellRule, Coding, Config, GpuOptions, Grids, Limits, Look, Order, Strategy, Study, Updates,
-};
-#[doc(hidden)]
-pub use cpu::codes::prefetch;
+pub use config::{Backend, Coding, Config, Engine, GpuOptions, Limits, Order};
 pub use error::Error;
 pub use filter::{ProxyFilter, TestMode};
 pub use finder::{Finder, find_pairs};
-#[cfg(feature = "gpu")]
-pub use gpu::GpuFinder;
+pub use grid::{NeighbourScan, simd};
 pub use pair::Pair;
-pub use plan::{Costs, Forecast, Plan};
+pub use plan::{Algorithm, Plan};
 pub use report::{Checks, GpuReport, Report, StageTimes};
-
-/// Which instructions the search on the CPU uses, chosen at run time: "AVX2", or "portable".
-///
-/// ```
-/// assert!(["AVX2", "portable"].contains(&pbig_core::simd()));
-/// ```
-pub fn simd() -> &'static str {
-    cpu::codes::Simd::detect().name()
-}
-
-/// From how many of something on several threads share the work. Fuzzers make small worlds: there a 512th will do.
-const fn shared_from(count: usize) -> usize {
-    if cfg!(fuzzing) { count / 512 } else { count }
-}

@@ -1,7 +1,7 @@
 //! What a call did: times, counts and the plan, for a user who wants to know why.
 
 use crate::plan::Plan;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 /// Wall time of each stage of the last call.
 ///
@@ -48,25 +48,33 @@ macro_rules! stage {
 }
 pub(crate) use stage;
 
-/// Reads the clock, or does not.
-pub(crate) struct Watch(Option<Instant>);
-
-impl Watch {
-    pub(crate) fn new(reads: bool) -> Self {
-        Self(reads.then(Instant::now))
-    }
-
-    /// The time since the last lap; zero when the clock is not read.
-    #[inline]
-    pub(crate) fn lap(&mut self) -> Duration {
-        self.0.as_mut().map_or(Duration::ZERO, lap)
-    }
+/// A stopwatch for reports. It decides nothing, and stands still where there is no clock (wasm32-unknown-unknown).
+pub(crate) struct Clock {
+    #[cfg(not(all(target_family = "wasm", target_os = "unknown")))]
+    last: std::time::Instant,
 }
 
-/// The time since `clock`, which is set to now.
-pub(crate) fn lap(clock: &mut Instant) -> Duration {
-    let now = Instant::now();
-    now.duration_since(std::mem::replace(clock, now))
+impl Clock {
+    /// Starts a stopwatch.
+    pub(crate) fn start() -> Self {
+        Self {
+            #[cfg(not(all(target_family = "wasm", target_os = "unknown")))]
+            last: std::time::Instant::now(),
+        }
+    }
+
+    /// Returns the time since the last lap, or the start.
+    #[cfg(not(all(target_family = "wasm", target_os = "unknown")))]
+    pub(crate) fn lap(&mut self) -> Duration {
+        let now = std::time::Instant::now();
+        now.duration_since(std::mem::replace(&mut self.last, now))
+    }
+
+    /// Returns no time.
+    #[cfg(all(target_family = "wasm", target_os = "unknown"))]
+    pub(crate) fn lap(&mut self) -> Duration {
+        Duration::ZERO
+    }
 }
 
 /// Counts of box tests, as PBIG's section 4.1 defines them. On the CPU's grid most are of codes, which tell

@@ -1,162 +1,207 @@
-//! What is taken in: which boxes count, and when one has changed.
+//! Random worlds against the oracle, update by update: every engine gives the events that lead from one set to the next.
 
-mod study;
+use crate::{Aabb, BroadPhase, Config, Engine, Error, Limits, Pair, ProxyFilter, oracle};
+use rand::rngs::StdRng;
+use rand::{RngExt, SeedableRng};
+use std::collections::BTreeSet;
 
-use super::BroadPhase;
-use crate::plan::Chosen;
-use crate::{Aabb, Config, Events, Pair, ProxyFilter, Strategy, oracle};
+const ENGINES: [Option<Engine>; 4] = [None, Some(Engine::Sweep), Some(Engine::Edit), Some(Engine::Rebuild)];
 
-const MARGIN: f32 = 0.1;
-
-fn broad_phase() -> BroadPhase {
-    BroadPhase::new(Config { margin: MARGIN, ..Config::DEFAULT }).expect("a margin")
+/// A broad phase, and what it must know.
+struct Checked {
+    broad_phase: BroadPhase,
+    boxes: Vec<Aabb>,
+    filters: Vec<ProxyFilter>,
+    pairs: BTreeSet<Pair>,
+    events: usize,
 }
 
-fn cube() -> Aabb {
-    Aabb::from_center([3.0, -2.0, 1.0], [0.5; 3])
-}
-
-/// The cube, one side of which has moved outward.
-fn with_side(side: usize, by: f32) -> Aabb {
-    let mut aabb = cube();
-    if side < 3 {
-        aabb.min[side] -= by;
-    } else {
-        aabb.max[side - 3] += by;
+impl Checked {
+    fn new(engine: Option<Engine>, ids: usize) -> Self {
+        Self {
+            broad_phase: BroadPhase::new(Config { engine, ..Config::DEFAULT }).expect("a margin"),
+            boxes: vec![Aabb::NOWHERE; ids],
+            filters: vec![ProxyFilter::ALL; ids],
+            pairs: BTreeSet::new(),
+            events: 0,
+        }
     }
-    aabb
+
+    fn set(&mut self, id: u32, aabb: Aabb, filter: ProxyFilter) {
+        (self.boxes[id as usize], self.filters[id as usize]) = (aabb, filter);
+        self.broad_phase.set(id, aabb, filter).expect("few boxes");
+    }
+
+    fn remove(&mut self, id: u32) {
+        self.boxes[id as usize] = Aabb::NOWHERE;
+        self.broad_phase.remove(id);
+        self.pairs.retain(|pair| pair.a != id && pair.b != id);
+    }
+
+    fn update(&mut self, what: &str) {
+        assert!(self.broad_phase.pairs().eq(self.pairs.iter().copied()), "{what}: pairs before the update");
+        let events = self.broad_phase.update().expect("few pairs");
+        assert!(events.added.is_sorted() && events.removed.is_sorted(), "{what}");
+        assert!(events.removed.iter().all(|pair| self.pairs.remove(pair)), "{what}: was not there");
+        assert!(events.added.iter().all(|pair| self.pairs.insert(*pair)), "{what}: was there");
+        self.events += events.added.len() + events.removed.len();
+        let wanted = oracle::pairs_filtered(&self.boxes, &self.filters);
+        assert!(wanted.iter().eq(&self.pairs), "{what}: {:?}", self.broad_phase.report().plan);
+        assert_eq!(self.broad_phase.pair_count(), wanted.len());
+    }
 }
 
-#[test]
-fn a_box_has_changed_once_any_side_leaves_its_margin_or_has_shrunk_by_more() {
-    for side in 0..6 {
-        for (by, changes) in [(0.05, 0), (0.15, 1), (-0.05, 0), (-0.15, 1)] {
-            let mut broad_phase = broad_phase();
-            broad_phase.set(0, cube(), ProxyFilter::ALL).expect("a small id");
-            broad_phase.update().expect("one box");
-            broad_phase.set(0, with_side(side, by), ProxyFilter::ALL).expect("a small id");
-            assert_eq!(broad_phase.changes().count(), changes, "side {side} by {by}");
+fn random_box(random: &mut StdRng, kind: u32, width: f32) -> Aabb {
+    let mut center: [f32; 3] = std::array::from_fn(|_| random.random_range(0.0..width));
+    let mut half = [0.5; 3];
+    match kind {
+        1 => half = [random.random_range(0.1f32..1.6).powi(4); 3],
+        2 => center = center.map(f32::round),
+        3 => center[0] += 1e5 * random.random_range(0..3) as f32,
+        4 if random.random_ratio(1, 50) => half = [1e4, 30.0, 1e4],
+        5 => half[random.random_range(0..3)] = 20.0,
+        _ => {}
+    }
+    match random.random_range(0..300) {
+        0 => Aabb::NOWHERE,
+        1 => Aabb::new([1.0; 3], [0.0; 3]),
+        2 => Aabb::new([f32::NEG_INFINITY; 3], [f32::INFINITY; 3]),
+        _ => Aabb::from_center(center, half),
+    }
+}
+
+fn random_filter(random: &mut StdRng) -> ProxyFilter {
+    let (body, memberships) = (random.random_range(0..200), 1 << random.random_range(0..3));
+    ProxyFilter { body, memberships, mask: random.random_range(1..8), ..ProxyFilter::ALL }
+}
+
+/// Changes some boxes: most move a little, some jump, are removed or get another filter.
+fn change(random: &mut StdRng, world: &mut Checked, kind: u32, width: f32, is_filtered: bool) {
+    let ids = world.boxes.len() as u32;
+    let id = random.random_range(0..ids);
+    let filter = world.filters[id as usize];
+    match random.random_range(0..20) {
+        0 | 1 => world.set(id, random_box(random, kind, width), filter),
+        2 | 3 => world.remove(id),
+        4 if is_filtered => world.set(id, world.boxes[id as usize], random_filter(random)),
+        _ => {
+            let step: [f32; 3] = std::array::from_fn(|_| random.random_range(-0.3..0.3));
+            let moved = |corner: [f32; 3]| std::array::from_fn(|k| corner[k] + step[k]);
+            let aabb = world.boxes[id as usize];
+            world.set(id, Aabb::new(moved(aabb.min), moved(aabb.max)), filter);
         }
     }
 }
 
 #[test]
-fn boxes_that_are_invalid_are_there_and_do_not_count_in_the_plan() {
-    let mut broad_phase = broad_phase();
-    for (id, aabb) in [cube(), Aabb::NOWHERE, cube()].into_iter().enumerate() {
-        broad_phase.set(id as u32, aabb, ProxyFilter::ALL).expect("a small id");
+fn every_engine_follows_random_worlds() {
+    let mut events = 0;
+    for seed in 0..48 {
+        let mut random = StdRng::seed_from_u64(seed);
+        let ids = [5, 40, 200, 400, 1100][seed as usize % 5];
+        let (kind, is_filtered) = (seed as u32 % 6, seed % 3 == 0);
+        let width = (ids as f32 * [1.0, 6.0][seed as usize % 2]).cbrt();
+        let mut world = Checked::new(ENGINES[seed as usize % 4], ids);
+        for frame in 0..10 {
+            if frame == 0 {
+                for id in 0..ids as u32 {
+                    let filter = if is_filtered { random_filter(&mut random) } else { ProxyFilter::ALL };
+                    world.set(id, random_box(&mut random, kind, width), filter);
+                }
+            }
+            let changes = [0, 1, ids / 40 + 1, ids][frame % 4];
+            (0..changes).for_each(|_| change(&mut random, &mut world, kind, width, is_filtered));
+            world.update(&format!("seed {seed}, frame {frame}"));
+        }
+        events += world.events;
     }
-    broad_phase.update().expect("three boxes");
-    let report = broad_phase.report();
-    assert_eq!((report.boxes, report.invalid, report.plan.boxes), (3, 1, 2));
-    let idle = |broad_phase: &mut BroadPhase| {
-        broad_phase.update().expect("nothing new");
-        broad_phase.report().plan.to_string()
-    };
-    assert_eq!(idle(&mut broad_phase), "nothing to do: no box has changed");
-    broad_phase.remove(0);
-    broad_phase.update().expect("two boxes");
-    assert_eq!(idle(&mut broad_phase), "nothing to do: fewer than two valid boxes");
-}
-
-/// An update of a small world in which boxes swing against their neighbours, one goes, and now and then few move.
-fn swing(broad_phase: &mut BroadPhase, frame: u32, ids: u32) -> (Chosen, Events) {
-    let at = |id: u32| {
-        let swing = 0.25 * (frame as f32 * 0.5 + id as f32).sin();
-        let x = (id % 20 / 2 * 5) as f32 + (id % 2) as f32 * 1.2 + swing;
-        Aabb::from_center([x, (id / 20 * 3) as f32, 0.0], [0.5; 3])
-    };
-    let step = if frame % 200 > 190 { 50 } else { 1 };
-    for id in (0..ids).step_by(step) {
-        broad_phase.set(id, at(id), ProxyFilter::ALL).expect("a small id");
-    }
-    broad_phase.remove(frame % ids);
-    let events = broad_phase.update().expect("few pairs").clone();
-    (broad_phase.report().plan.chosen, events)
+    assert!(events > 10_000, "{events} events");
 }
 
 #[test]
-fn bitmap_grid_and_near_pairs_take_turns_in_a_small_world_and_tell_the_same() {
-    let of =
-        |strategy| BroadPhase::new(Config { strategy, margin: 0.01, ..Config::DEFAULT }).expect("a margin");
-    let (mut auto, mut grid) = (of(Strategy::Auto), of(Strategy::Grid));
-    let (mut ways, mut events, mut told) = (Vec::new(), 0, 0);
-    for frame in 0..600 {
-        let (way, found) = swing(&mut auto, frame, 400);
-        assert_eq!(found, swing(&mut grid, frame, 400).1, "frame {frame}, by {way:?}");
-        events += found.added.len() + found.removed.len();
-        ways.push(way);
-        let measured = auto.report().plan.measured.grid;
-        assert_eq!(auto.report().plan.to_string().contains("; a grid takes "), measured.is_some());
-        assert_eq!(grid.report().plan.measured.grid, None, "there are no turns");
-        told += u32::from(measured > Some(0.0));
-    }
-    for way in [Chosen::Bitmap, Chosen::Grid, Chosen::Near] {
-        assert!(ways.contains(&way), "never by {way:?}: {ways:?}");
-    }
-    assert!(ways[..24].iter().all(|way| *way == Chosen::Bitmap) && ways[24] == Chosen::Grid);
-    assert!(events > 1000, "{events}");
-    assert!(told > 100, "the report told {told} times");
-}
-
-#[test]
-fn threads_that_share_an_update_by_near_pairs_miss_none_of_those_who_leave() {
-    const IDS: u32 = 20_000;
-    let of =
-        |strategy| BroadPhase::new(Config { strategy, margin: 0.01, ..Config::DEFAULT }).expect("a margin");
-    let (mut auto, mut pbig) = (of(Strategy::Auto), of(Strategy::Pbig));
-    let ids: Vec<u32> = (0..IDS).collect();
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(2).build().expect("a pool");
-    let (mut by_near, mut events) = (0, 0);
-    for frame in 0..12_u32 {
-        let at = |id: u32| {
-            // One in a thousand jumps into the place of another.
-            let jumps = frame > 5 && (id + 100 * frame).is_multiple_of(1000);
-            let place = if jumps { id.wrapping_mul(2_654_435_761) % IDS } else { id };
-            let swing = 0.1 * (frame as f32 + id as f32).sin();
-            let center = [place % 30, place / 30 % 30, place / 900].map(|i| i as f32 * 1.15 + swing);
-            Some((Aabb::from_center(center, [0.5; 3]), ProxyFilter::ALL))
+fn an_update_with_too_many_pairs_changes_nothing_but_the_grid() {
+    for engine in ENGINES {
+        let limits = Limits { max_pairs: 10, ..Limits::DEFAULT };
+        let mut broad_phase =
+            BroadPhase::new(Config { limits, engine, ..Config::DEFAULT }).expect("a margin");
+        let put = |broad_phase: &mut BroadPhase, id: u32, x: f32| {
+            broad_phase.set(id, Aabb::from_center([x, 0.0, 0.0], [0.5; 3]), ProxyFilter::ALL).expect("room");
         };
-        pool.install(|| auto.set_many(&ids, |id| id, at).and_then(|()| auto.update().map(|_| ())))
-            .expect("few pairs");
-        for &id in &ids {
-            let (aabb, filter) = at(id).expect("a box");
-            pbig.set(id, aabb, filter).expect("a small id");
-        }
-        assert_eq!(auto.events(), pbig.update().expect("few pairs"), "frame {frame}");
-        let mut pairs: Vec<Pair> = auto.pairs().collect();
-        pairs.sort_unstable();
-        assert!(frame % 4 != 3 || pairs == oracle::pairs(&auto.boxes), "frame {frame}");
-        by_near += u32::from(auto.report().plan.chosen == Chosen::Near);
-        events += auto.events().added.len();
+        (0..70).for_each(|id| put(&mut broad_phase, id, 10.0 * id as f32));
+        assert_eq!(broad_phase.update().expect("no pairs").added, []);
+        (1..5).for_each(|id| put(&mut broad_phase, id, 0.0));
+        assert_eq!(broad_phase.update().expect("ten pairs").added.len(), 10);
+        put(&mut broad_phase, 6, 0.0);
+        assert_eq!(broad_phase.update(), Err(Error::TooManyPairs { limit: 10 }));
+        assert_eq!((broad_phase.pair_count(), broad_phase.events().added.len()), (10, 0));
+        put(&mut broad_phase, 0, 205.0);
+        let events = broad_phase.update().expect("ten pairs").clone();
+        let (added, removed): (Vec<_>, Vec<_>) =
+            (1..5).map(|id| (Pair::new(id, 6), Pair::new(0, id))).unzip();
+        assert_eq!((events.added.clone(), events.removed), (added, removed), "{engine:?}");
+        assert!(events.added.iter().all(|pair| broad_phase.has_pair(*pair)));
     }
-    assert!(by_near > 5 && events > 10_000, "{by_near} by near pairs, {events} new pairs");
 }
 
 #[test]
-fn few_that_jump_are_edited_and_many_searched_for_anew_and_the_report_says_what_an_edit_costs() {
-    const IDS: u32 = 2000;
-    let mut broad_phase =
-        BroadPhase::new(Config { strategy: Strategy::Grid, ..Config::DEFAULT }).expect("a margin");
-    assert_eq!(broad_phase.config().strategy, Strategy::Grid);
-    assert_eq!(broad_phase.report().plan.measured.edit, None);
-    let mut ways = vec![];
-    for frame in 0..20_u32 {
-        let one_in = [40, 2][frame as usize % 2].min(1 + 40 * frame as usize);
-        for id in (0..IDS).step_by(one_in) {
-            let place = (id + 1).wrapping_mul(2_654_435_761).wrapping_mul(frame + 1) >> 8;
-            let center = [place % 13, place / 13 % 13, place / 169 % 13].map(|i| i as f32 * 1.1);
-            broad_phase.set(id, Aabb::from_center(center, [0.5; 3]), ProxyFilter::ALL).expect("a small id");
+fn pairs_of_a_box_and_boxes_in_a_box_are_those_of_the_last_update() {
+    let mut random = StdRng::seed_from_u64(3);
+    let mut world = Checked::new(None, 1100);
+    for frame in 0..5 {
+        let changes = if frame == 0 { 2200 } else { 20 };
+        for _ in 0..changes {
+            let id = random.random_range(0..1100);
+            world.set(id, random_box(&mut random, 0, 14.0), ProxyFilter::ALL);
         }
-        broad_phase.update().expect("few pairs");
-        ways.push(broad_phase.report().plan.chosen);
-        let mut pairs: Vec<Pair> = broad_phase.pairs().collect();
-        pairs.sort_unstable();
-        assert_eq!(pairs, oracle::pairs(&broad_phase.boxes), "frame {frame}");
+        world.update("pairs of a box");
+        for id in 0..100 {
+            let of: Vec<Pair> = world.broad_phase.pairs_of(id).collect();
+            let wanted = world.pairs.iter().filter(|pair| pair.a == id || pair.b == id);
+            assert!(wanted.eq(&of));
+            assert_eq!(world.broad_phase.degree(id) as usize, of.len());
+        }
+        let looked_for = random_box(&mut random, 4, 14.0);
+        let mut found = world.broad_phase.overlapping(&looked_for);
+        found.sort_unstable();
+        let overlaps = |id: &u32| {
+            looked_for.is_valid() && world.broad_phase.fat_aabb(*id).is_some_and(|fat| fat.overlaps(&looked_for))
+        };
+        assert!((0..1100).filter(overlaps).eq(found));
     }
-    let wanted: Vec<Chosen> =
-        (0..20).map(|frame| if frame % 2 == 0 { Chosen::Edit } else { Chosen::Grid }).collect();
-    assert_eq!(ways[1..], wanted[1..]);
-    let plan = &broad_phase.report().plan;
-    assert!(plan.measured.edit > Some(0.0) && plan.to_string().contains("the edit of a box"), "{plan}");
+}
+
+#[test]
+fn boxes_are_counted_and_given_back() {
+    let mut broad_phase = BroadPhase::default();
+    let cube = Aabb::new([0.0; 3], [1.0; 3]);
+    for id in [0, 5, 7] {
+        broad_phase.set(id, cube, ProxyFilter::ALL).expect("room");
+    }
+    assert_eq!((broad_phase.len(), broad_phase.get(5)), (3, Some((cube, ProxyFilter::ALL))));
+    assert_eq!(broad_phase.update().expect("three pairs").added.len(), 3);
+    let other = ProxyFilter { mask: 0, ..ProxyFilter::ALL };
+    assert!(broad_phase.set_filter(7, other) && !broad_phase.set_filter(6, other));
+    assert_eq!(broad_phase.update().expect("one pair").removed.len(), 2);
+    assert!(broad_phase.remove(7) && !broad_phase.remove(7));
+    broad_phase.shrink_to_fit();
+    assert_eq!(broad_phase.update().expect("one pair").removed, []);
+    broad_phase.shrink_to_fit();
+    assert_eq!((broad_phase.id_count(), broad_phase.pair_count()), (6, 1));
+    broad_phase.clear();
+    assert!(broad_phase.is_empty() && broad_phase.pair_count() == 0);
+}
+
+#[test]
+fn a_margin_that_is_no_length_is_an_error() {
+    for margin in [-1.0, f32::NAN, f32::INFINITY] {
+        assert!(matches!(BroadPhase::new(Config { margin, ..Config::DEFAULT }), Err(Error::Margin { .. })));
+        assert!(BroadPhase::default().set_margin(margin).is_err());
+    }
+}
+
+#[test]
+fn finders_and_broad_phases_can_be_sent_and_shared() {
+    fn is_send_and_sync<T: Send + Sync + Clone + Default>() {}
+    is_send_and_sync::<BroadPhase>();
+    is_send_and_sync::<crate::Finder>();
 }

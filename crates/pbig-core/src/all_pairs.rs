@@ -1,0 +1,109 @@
+//! All pairs of a list of boxes: by a grid, or by testing every pair where the boxes are few.
+
+use crate::grid::{EditedGrid, GridPlan, Hits, Rule, brute_force};
+use crate::pairs::{Grouping, Groups};
+use crate::parallel::available_threads;
+use crate::policy::{self, PARALLEL_FROM_BOXES};
+use crate::report::{Checks, Clock, Report, stage};
+use crate::{Aabb, Algorithm, Backend, Config, Error, Pair, Plan, ProxyFilter};
+use std::sync::atomic::AtomicU64;
+
+/// What is searched.
+#[derive(Clone, Copy)]
+pub(crate) struct Request<'a> {
+    pub(crate) boxes: &'a [Aabb],
+    /// By id; none if all may pair.
+    pub(crate) filters: Option<&'a [ProxyFilter]>,
+    pub(crate) config: &'a Config,
+    /// How found pairs are counted, for [`Groups::gather`]; not at all if none is given.
+    pub(crate) grouping: Option<Grouping>,
+}
+
+/// The buffers of a search: what each thread has found.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct AllPairs {
+    pub(crate) hits: Vec<Hits>,
+}
+
+impl AllPairs {
+    /// Returns how many threads share the work on so many boxes.
+    pub(crate) fn workers(boxes: usize) -> usize {
+        if boxes < PARALLEL_FROM_BOXES { 1 } else { available_threads() }
+    }
+
+    /// Leaves all pairs in `hits`, the boxes in `grid` unless they were too few, and what was done in `report`. Returns
+    /// true if the grid has the boxes.
+    pub(crate) fn find(
+        &mut self,
+        request: &Request<'_>,
+        grid: &mut EditedGrid,
+        report: &mut Report,
+    ) -> Result<bool, Error> {
+        self.begin(request);
+        let found = AtomicU64::new(0);
+        let max_pairs = request.config.limits.max_pairs;
+        let rule = Rule { filters: request.filters, max_pairs, found: &found };
+        let is_few = request.boxes.len() <= policy::BRUTE_FORCE_UP_TO_BOXES;
+        let brute = request.config.backend == Backend::Brute || is_few;
+        if brute { self.test_all(request, &rule, report) } else { self.search(request, grid, &rule, report) }
+        let sum = |of: fn(&Hits) -> u64| self.hits.iter().map(of).sum::<u64>();
+        let (made, overlaps) = (sum(|hits| hits.tests), sum(|hits| hits.overlaps));
+        report.checks = Checks { made, unnecessary: made - overlaps, redundant: 0 };
+        let is_too_many = self.hits.iter().any(Hits::is_full) || sum(|hits| hits.pairs.len() as u64) > max_pairs;
+        if is_too_many { Err(Error::TooManyPairs { limit: max_pairs }) } else { Ok(!brute) }
+    }
+
+    fn begin(&mut self, request: &Request<'_>) {
+        let workers = Self::workers(request.boxes.len());
+        self.hits.resize_with(workers, Hits::default);
+        let Grouping { count, shift, .. } = request.grouping.unwrap_or_default();
+        self.hits.iter_mut().for_each(|hits| hits.begin(count, shift));
+    }
+
+    fn test_all(&mut self, request: &Request<'_>, rule: &Rule<'_>, report: &mut Report) {
+        stage!("check");
+        let mut clock = Clock::start();
+        let valid = brute_force(request.boxes, rule, &mut self.hits[0]);
+        report.invalid = (request.boxes.len() - valid) as u64;
+        let algorithm = if valid < 2 { Algorithm::Nothing } else { Algorithm::Brute };
+        report.plan = Plan { algorithm, boxes: valid as u32, ..Plan::default() };
+        report.stages.check += clock.lap();
+    }
+
+    fn search(&mut self, request: &Request<'_>, grid: &mut EditedGrid, rule: &Rule<'_>, report: &mut Report) {
+        let workers = self.hits.len();
+        let mut clock = Clock::start();
+        let plan = {
+            stage!("plan");
+            GridPlan::new(request.boxes, workers)
+        };
+        report.stages.plan += clock.lap();
+        let sorted = {
+            stage!("map");
+            grid.build(plan, request.boxes, workers)
+        };
+        report.stages.map += clock.lap();
+        {
+            stage!("check");
+            sorted.search(rule, &mut self.hits);
+        }
+        report.stages.check += clock.lap();
+        report.invalid = u64::from(grid.grid().invalid);
+        report.plan = Plan::of_grid(Algorithm::Grid, grid);
+    }
+
+    /// Gathers what was found, for sorting.
+    pub(crate) fn gather(&mut self, grouping: Grouping, groups: &mut Groups) -> usize {
+        let workers = self.hits.len();
+        groups.gather(grouping, &mut self.hits, workers)
+    }
+}
+
+impl AllPairs {
+    /// Copies all pairs into one list, in no particular order.
+    pub(crate) fn list(&mut self, pairs: &mut Vec<Pair>) {
+        pairs.clear();
+        pairs.reserve(self.hits.iter().map(|hits| hits.pairs.len()).sum());
+        self.hits.iter().for_each(|hits| pairs.extend_from_slice(&hits.pairs));
+    }
+}

@@ -1,0 +1,220 @@
+//! The engine for few changed boxes: they are looked up where they were and where they are, in a grid that is edited.
+//!
+//! A pair has ended if it overlapped before and does not now; it is new the other way round. Nothing else is looked at: an
+//! update takes time in proportion to what changed.
+
+use super::world::{Old, World};
+use crate::grid::{Candidates, EditedGrid, Meet, Place, Record};
+use crate::pairs::Comparison;
+use crate::parallel::{SharedSlice, available_threads, piece_range, run};
+use crate::policy;
+use crate::{Aabb, Pair, ProxyFilter};
+use std::sync::Mutex;
+
+/// The buffers of the engine.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Edit {
+    /// Changed boxes as they were, in the order of cells.
+    before: Vec<Record>,
+    /// The same boxes as they are.
+    after: Vec<Record>,
+    /// Where each one was found.
+    places: Vec<Place>,
+    threads: Vec<Thread>,
+    order: Vec<(u32, u32)>,
+}
+
+/// What one thread finds.
+#[derive(Clone, Debug, Default)]
+struct Thread {
+    candidates: Candidates,
+    added: Vec<Pair>,
+    removed: Vec<Pair>,
+    dropped: Vec<Pair>,
+}
+
+impl Edit {
+    /// Brings `grid` up to date with the changes of the world, and leaves the events in `events`, sorted.
+    pub(super) fn run(&mut self, world: &World, grid: &mut EditedGrid, events: &mut Comparison) {
+        self.list(world, grid);
+        let threads = if self.before.len() < policy::PARALLEL_FROM_EDITS { 1 } else { available_threads() };
+        self.threads.resize_with(threads.max(self.threads.len()), Thread::default);
+        self.threads.iter_mut().for_each(Thread::clear);
+        self.find_ended(world, grid, threads);
+        grid.move_all(&self.after, &self.places);
+        self.find_new(world, grid, threads);
+        self.gather(events);
+    }
+
+    /// Lists changed boxes in the order of their old cells: neighbours share cache lines.
+    fn list(&mut self, world: &World, grid: &EditedGrid) {
+        let Self { before, after, order, .. } = self;
+        let changed = world.changed.iter().zip(&world.old);
+        before.clear();
+        before.extend(changed.map(|(&id, old)| Record::new(old.aabb, id, 0)));
+        grid.keys(before);
+        order.clear();
+        order.extend(before.iter().map(|record| (record.key, record.id)));
+        order.sort_unstable();
+        let old = |id: u32| world.change_of(id).map_or(Aabb::NOWHERE, |at| world.old[at].aabb);
+        before.clear();
+        before.extend(order.iter().map(|&(key, id)| Record::new(old(id), id, key)));
+        after.clear();
+        after.extend(order.iter().map(|&(_, id)| Record::new(world.boxes[id as usize], id, 0)));
+        grid.keys(after);
+    }
+
+    fn find_ended(&mut self, world: &World, grid: &EditedGrid, threads: usize) {
+        let Self { before, after, places, threads: all, .. } = self;
+        places.clear();
+        places.resize(before.len(), Place::Nowhere);
+        let places = SharedSlice::new(places);
+        let all: Vec<Mutex<&mut Thread>> = all.iter_mut().map(Mutex::new).collect();
+        run(threads, threads, |_, piece| {
+            let Ok(mut thread) = all[piece].lock() else { return };
+            let range = piece_range(before.len(), piece, threads);
+            let Thread { candidates, removed, dropped, .. } = &mut **thread;
+            // SAFETY: each piece has its own range.
+            let places = unsafe { places.part(range.clone()) };
+            let (before, after) = (&before[range.clone()], &after[range]);
+            grid.look_up(before, candidates, &mut Ended { world, before, after, places, removed, dropped });
+        });
+    }
+
+    fn find_new(&mut self, world: &World, grid: &EditedGrid, threads: usize) {
+        let Self { before, after, threads: all, .. } = self;
+        let all: Vec<Mutex<&mut Thread>> = all.iter_mut().map(Mutex::new).collect();
+        run(threads, threads, |_, piece| {
+            let Ok(mut thread) = all[piece].lock() else { return };
+            let range = piece_range(after.len(), piece, threads);
+            let Thread { candidates, added, .. } = &mut **thread;
+            let (before, after) = (&before[range.clone()], &after[range]);
+            grid.look_up(after, candidates, &mut New { world, before, after, added });
+        });
+    }
+
+    fn gather(&mut self, events: &mut Comparison) {
+        events.clear();
+        for thread in &self.threads {
+            events.added.extend_from_slice(&thread.added);
+            events.removed.extend_from_slice(&thread.removed);
+            events.dropped.extend_from_slice(&thread.dropped);
+        }
+        events.sort();
+    }
+}
+
+impl Thread {
+    fn clear(&mut self) {
+        (self.added.clear(), self.removed.clear(), self.dropped.clear());
+    }
+}
+
+/// A box at one time: what decides about a pair.
+#[derive(Clone, Copy)]
+struct State<'a> {
+    aabb: &'a Aabb,
+    filter: &'a ProxyFilter,
+}
+
+impl State<'_> {
+    fn pairs_with(&self, other: &Self) -> bool {
+        self.aabb.overlaps(other.aabb) && self.filter.allows(other.filter)
+    }
+}
+
+impl World {
+    /// Returns a stored box as it was.
+    fn state_before(&self, id: u32) -> State<'_> {
+        match self.change_of(id) {
+            Some(at) => {
+                let Old { aabb, filter } = &self.old[at];
+                State { aabb, filter }
+            }
+            None => self.state_now(id),
+        }
+    }
+
+    fn state_now(&self, id: u32) -> State<'_> {
+        State { aabb: &self.boxes[id as usize], filter: &self.filters[id as usize] }
+    }
+
+    /// Returns true if the pair of a changed box with another one is the other one's business: both have changed.
+    fn is_met_twice(&self, id: u32, other: u32) -> bool {
+        other < id && self.change_of(other).is_some() || other == id
+    }
+
+    fn existed(&self, id: u32, other: u32) -> bool {
+        !self.was_removed(id) && !self.was_removed(other)
+    }
+}
+
+/// Meets what changed boxes overlapped.
+struct Ended<'a> {
+    world: &'a World,
+    before: &'a [Record],
+    after: &'a [Record],
+    places: &'a mut [Place],
+    removed: &'a mut Vec<Pair>,
+    dropped: &'a mut Vec<Pair>,
+}
+
+impl Meet for Ended<'_> {
+    #[inline(always)]
+    fn meet(&mut self, i: usize, stored: &Record, place: Place) {
+        let (world, id, other) = (self.world, self.before[i].id, stored.id);
+        if id == other {
+            self.places[i] = place;
+        }
+        if world.is_met_twice(id, other) {
+            return;
+        }
+        let still_overlaps = match world.change_of(other) {
+            None => self.after[i].overlaps(stored),
+            Some(_) => self.after[i].aabb.overlaps(&world.boxes[other as usize]),
+        };
+        let refiltered = world.is_filtered;
+        if still_overlaps && !refiltered && world.existed(id, other) {
+            return;
+        }
+        let allowed = |one: State<'_>, other: State<'_>| one.filter.allows(other.filter);
+        if refiltered && !allowed(world.state_before(id), world.state_before(other)) {
+            return;
+        }
+        if !world.existed(id, other) {
+            self.dropped.push(Pair::new(id, other));
+        } else if !(still_overlaps && allowed(world.state_now(id), world.state_now(other))) {
+            self.removed.push(Pair::new(id, other));
+        }
+    }
+}
+
+/// Meets what changed boxes overlap now.
+struct New<'a> {
+    world: &'a World,
+    before: &'a [Record],
+    after: &'a [Record],
+    added: &'a mut Vec<Pair>,
+}
+
+impl Meet for New<'_> {
+    #[inline(always)]
+    fn meet(&mut self, i: usize, stored: &Record, _: Place) {
+        let (world, id, other) = (self.world, self.after[i].id, stored.id);
+        if world.is_met_twice(id, other) {
+            return;
+        }
+        if world.is_filtered && !world.state_now(id).filter.allows(world.state_now(other).filter) {
+            return;
+        }
+        let overlapped = || match world.change_of(other) {
+            None => self.before[i].overlaps(stored),
+            Some(_) => self.before[i].aabb.overlaps(world.state_before(other).aabb),
+        };
+        let paired = || world.state_before(id).pairs_with(&world.state_before(other));
+        let existed = world.existed(id, other) && overlapped() && (!world.is_filtered || paired());
+        if !existed {
+            self.added.push(Pair::new(id, other));
+        }
+    }
+}

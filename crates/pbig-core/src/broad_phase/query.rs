@@ -1,0 +1,117 @@
+//! What a broad phase knows: boxes, pairs, and what the last update did.
+
+use super::{BroadPhase, Events};
+use crate::report::Report;
+use crate::{Aabb, Config, Pair, ProxyFilter};
+
+impl BroadPhase {
+    /// Returns the settings in force.
+    pub fn config(&self) -> &Config {
+        &self.config
+    }
+
+    /// Returns the events of the last update.
+    pub fn events(&self) -> &Events {
+        &self.events
+    }
+
+    /// Returns what the last update did.
+    pub fn report(&self) -> &Report {
+        &self.report
+    }
+
+    /// Returns how many boxes were set and not removed, invalid ones included.
+    pub fn len(&self) -> usize {
+        self.world.present() as usize
+    }
+
+    /// Returns true if there is no box.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// Returns one more than the largest id that was ever set.
+    pub fn id_count(&self) -> u32 {
+        self.world.ids() as u32
+    }
+
+    /// Returns true if a box was set and not removed, valid or not.
+    pub fn contains(&self, id: u32) -> bool {
+        self.world.contains(id)
+    }
+
+    /// Returns the stored (fat) box and the filter, if there is one and it is valid.
+    pub fn get(&self, id: u32) -> Option<(Aabb, ProxyFilter)> {
+        Some((self.fat_aabb(id)?, *self.filter(id)?))
+    }
+
+    /// Returns the filter of a box.
+    pub fn filter(&self, id: u32) -> Option<&ProxyFilter> {
+        self.world.filters.get(id as usize).filter(|_| self.contains(id))
+    }
+
+    /// Returns the stored (fat) box, if there is one and it is valid.
+    pub fn fat_aabb(&self, id: u32) -> Option<Aabb> {
+        self.world.boxes.get(id as usize).copied().filter(Aabb::is_valid)
+    }
+
+    /// Yields the ids of boxes that the next update will look at: set beyond their margin, given another filter, or
+    /// removed since the last one.
+    pub fn changes(&self) -> impl Iterator<Item = u32> {
+        self.world.changed.iter().copied()
+    }
+
+    /// Returns how many pairs exist: those of the last update, less those of boxes removed since.
+    pub fn pair_count(&self) -> usize {
+        if self.world.has_removed() { self.pairs().count() } else { self.kept.len() }
+    }
+
+    /// Yields the pairs that exist (see [`BroadPhase::pair_count`]), sorted.
+    pub fn pairs(&self) -> impl Iterator<Item = Pair> {
+        self.kept.iter().filter(|pair| self.exists(pair))
+    }
+
+    /// Yields the pairs of one box (see [`BroadPhase::pair_count`]), sorted by the other one. The first call after an
+    /// update in which many boxes have changed looks at all pairs, later ones at those of the box.
+    pub fn pairs_of(&self, id: u32) -> impl Iterator<Item = Pair> {
+        self.kept.partners(id).map(move |other| Pair::new(id, other)).filter(|pair| self.exists(pair))
+    }
+
+    /// Returns how many pairs a box has (see [`BroadPhase::pair_count`]).
+    pub fn degree(&self, id: u32) -> u32 {
+        if self.world.has_removed() { self.pairs_of(id).count() as u32 } else { self.kept.degree(id) }
+    }
+
+    /// Returns true if two boxes are a pair (see [`BroadPhase::pair_count`]).
+    pub fn has_pair(&self, pair: Pair) -> bool {
+        self.kept.contains(pair) && self.exists(&pair)
+    }
+
+    fn exists(&self, pair: &Pair) -> bool {
+        !self.world.was_removed(pair.a) && !self.world.was_removed(pair.b)
+    }
+
+    /// Yields the ids of all stored (fat) boxes that overlap a box, in no particular order. Filters are not asked.
+    ///
+    /// ```
+    /// use pbig_core::{Aabb, BroadPhase, ProxyFilter};
+    /// let mut broad_phase = BroadPhase::default();
+    /// broad_phase.set(7, Aabb::new([0.0; 3], [1.0; 3]), ProxyFilter::ALL)?;
+    /// let found = broad_phase.overlapping(&Aabb::new([1.0; 3], [2.0; 3]));
+    /// assert_eq!(found, [7]);
+    /// # Ok::<(), pbig_core::Error>(())
+    /// ```
+    pub fn overlapping(&self, aabb: &Aabb) -> Vec<u32> {
+        let mut ids = Vec::new();
+        if !aabb.is_valid() {
+            return ids;
+        }
+        if self.has_grid && self.world.changed.is_empty() {
+            self.grid.overlapping(aabb, &mut |id| ids.push(id));
+            return ids;
+        }
+        let overlaps = |(_, stored): &(usize, &Aabb)| aabb.overlaps(stored);
+        ids.extend(self.world.boxes.iter().enumerate().filter(overlaps).map(|(id, _)| id as u32));
+        ids
+    }
+}

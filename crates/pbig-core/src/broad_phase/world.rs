@@ -1,0 +1,200 @@
+//! The world: what is kept of each box by id, and which boxes have changed since the last update. It knows no grid.
+
+use crate::{Aabb, ProxyFilter};
+
+/// A word for each id: two flags, and 1 + the place in the list of changed ids, or 0.
+mod state {
+    /// The box was set and not removed.
+    pub(super) const PRESENT: u32 = 1 << 31;
+    /// The box of the last update was removed since: its pairs end without an event.
+    pub(super) const REMOVED: u32 = 1 << 30;
+    /// The place in the list.
+    pub(super) const CHANGE: u32 = REMOVED - 1;
+}
+
+/// A box as it was at the last update.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Old {
+    /// [`Aabb::NOWHERE`] if the box was absent or invalid.
+    pub(crate) aabb: Aabb,
+    pub(crate) filter: ProxyFilter,
+}
+
+/// Boxes by id.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct World {
+    /// Fat boxes; [`Aabb::NOWHERE`] for absent and invalid ones.
+    pub(super) boxes: Vec<Aabb>,
+    pub(super) filters: Vec<ProxyFilter>,
+    states: Vec<u32>,
+    /// Ids that have changed since the last update, each once.
+    pub(super) changed: Vec<u32>,
+    /// What the first ones of `changed` were. Shorter than `changed` if so many have changed that nobody will ask.
+    pub(super) old: Vec<Old>,
+    /// Changed boxes of which the old state is kept, at most.
+    pub(super) keep_old: usize,
+    /// Ids whose box of the last update was removed.
+    removed: Vec<u32>,
+    present: u32,
+    valid: u32,
+    /// Boxes that were ever given a filter other than [`ProxyFilter::ALL`].
+    pub(super) is_filtered: bool,
+}
+
+impl World {
+    /// Returns one more than the largest id that was ever set.
+    pub(super) fn ids(&self) -> usize {
+        self.boxes.len()
+    }
+
+    pub(super) fn present(&self) -> u32 {
+        self.present
+    }
+
+    pub(super) fn valid(&self) -> u32 {
+        self.valid
+    }
+
+    /// Returns true if a box was set and not removed, valid or not.
+    #[inline(always)]
+    pub(super) fn contains(&self, id: u32) -> bool {
+        self.states.get(id as usize).is_some_and(|state| state & state::PRESENT != 0)
+    }
+
+    /// Returns true if the box that an id had at the last update was removed since.
+    #[inline(always)]
+    pub(super) fn was_removed(&self, id: u32) -> bool {
+        self.states[id as usize] & state::REMOVED != 0
+    }
+
+    /// Returns true if any box was removed since the last update.
+    pub(super) fn has_removed(&self) -> bool {
+        !self.removed.is_empty()
+    }
+
+    /// Returns the place of a box in `changed`, if it has changed.
+    #[inline(always)]
+    pub(super) fn change_of(&self, id: u32) -> Option<usize> {
+        ((self.states[id as usize] & state::CHANGE) as usize).checked_sub(1)
+    }
+
+    /// Returns true if `old` has the old state of every changed box.
+    pub(super) fn knows_old(&self) -> bool {
+        self.old.len() == self.changed.len()
+    }
+
+    /// Makes ids below `ids` known.
+    pub(super) fn reserve_ids(&mut self, ids: usize) {
+        self.boxes.resize(ids, Aabb::NOWHERE);
+        self.filters.resize(ids, ProxyFilter::ALL);
+        self.states.resize(ids, 0);
+    }
+
+    /// Moves a box that is present.
+    #[inline(always)]
+    pub(super) fn set(&mut self, id: u32, aabb: Aabb, filter: ProxyFilter, margin: f32) {
+        let i = id as usize;
+        if !still_holds(&self.boxes[i], &aabb, margin) {
+            self.note_change(id);
+            self.put(i, aabb, margin);
+        }
+        if !self.filters[i].is(&filter) {
+            self.set_filter(id, filter);
+        }
+    }
+
+    #[cold]
+    pub(super) fn set_filter(&mut self, id: u32, filter: ProxyFilter) {
+        self.note_change(id);
+        self.filters[id as usize] = filter;
+        self.is_filtered |= !filter.is(&ProxyFilter::ALL);
+    }
+
+    /// Inserts a box that is not present; its id is known.
+    #[cold]
+    pub(super) fn insert(&mut self, id: u32, aabb: Aabb, filter: ProxyFilter, margin: f32) {
+        self.note_change(id);
+        self.states[id as usize] |= state::PRESENT;
+        self.present += 1;
+        self.put(id as usize, aabb, margin);
+        self.set_filter(id, filter);
+    }
+
+    /// Stores a box fat; an invalid one as nowhere, so that nothing pairs it later.
+    #[inline(always)]
+    fn put(&mut self, i: usize, aabb: Aabb, margin: f32) {
+        let is_valid = aabb.is_valid();
+        let was_valid = !self.boxes[i].min[0].is_nan();
+        self.boxes[i] = if is_valid { aabb.inflated(margin) } else { Aabb::NOWHERE };
+        self.valid = self.valid + u32::from(is_valid) - u32::from(was_valid);
+    }
+
+    /// Removes a box that is present.
+    pub(super) fn remove(&mut self, id: u32) {
+        self.note_change(id);
+        self.put(id as usize, Aabb::NOWHERE, 0.0);
+        let state = &mut self.states[id as usize];
+        if *state & state::REMOVED == 0 {
+            self.removed.push(id);
+        }
+        *state = *state & state::CHANGE | state::REMOVED;
+        self.present -= 1;
+    }
+
+    /// Notes the first change of a box since the last update, and what it was.
+    #[inline(always)]
+    pub(super) fn note_change(&mut self, id: u32) {
+        let i = id as usize;
+        if self.states[i] & state::CHANGE == 0 {
+            if self.old.len() < self.keep_old && self.knows_old() {
+                self.old.push(Old { aabb: self.boxes[i], filter: self.filters[i] });
+            }
+            self.changed.push(id);
+            self.states[i] |= self.changed.len() as u32;
+        }
+    }
+
+    /// Says that all changes were taken in by an update.
+    pub(super) fn forget_changes(&mut self) {
+        for &id in &self.changed {
+            self.states[id as usize] &= state::PRESENT;
+        }
+        (self.changed.clear(), self.old.clear(), self.removed.clear());
+    }
+
+    /// Drops known ids behind the last one that is present, and spare memory.
+    pub(super) fn shrink(&mut self) {
+        let used = self.states.iter().rposition(|&state| state != 0).map_or(0, |last| last + 1);
+        if self.changed.is_empty() {
+            self.reserve_ids(used);
+        }
+        (self.boxes.shrink_to_fit(), self.filters.shrink_to_fit(), self.states.shrink_to_fit());
+        (self.changed.shrink_to_fit(), self.old.shrink_to_fit(), self.removed.shrink_to_fit());
+    }
+}
+
+/// Returns true if a stored fat box still contains the box, by at most twice the margin: a box that has shrunk is stored
+/// anew, so that only boxes near each other pair.
+#[inline(always)]
+fn still_holds(fat: &Aabb, aabb: &Aabb, margin: f32) -> bool {
+    // A little less than two margins, because the gaps are rounded.
+    let slack = 2.0 * margin * (1.0 - 2.0 * f32::EPSILON);
+    match aabb.gaps_are_within(fat, slack) {
+        Some(holds) => holds & aabb.is_valid(),
+        None => holds_exactly(fat, *aabb, slack),
+    }
+}
+
+/// As [`still_holds`], some coordinates infinite or NaN.
+#[cold]
+fn holds_exactly(fat: &Aabb, aabb: Aabb, slack: f32) -> bool {
+    if !aabb.is_valid() {
+        return !fat.is_valid();
+    }
+    // Equal first: the difference of equal infinities is NaN.
+    let near = |outer: f32, inner: f32, gap: f32| outer == inner || (gap >= 0.0 && gap <= slack);
+    (0..3).all(|k| {
+        let (below, above) = (aabb.min[k] - fat.min[k], fat.max[k] - aabb.max[k]);
+        near(fat.min[k], aabb.min[k], below) && near(fat.max[k], aabb.max[k], above)
+    })
+}

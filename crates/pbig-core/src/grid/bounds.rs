@@ -1,0 +1,283 @@
+//! Bounds and sizes of a set of boxes: what the plan of a grid looks at.
+
+use crate::Aabb;
+use crate::parallel::{SharedSlice, piece_range, run};
+
+/// Coordinates beyond this one count as this one, so that a width never overflows.
+const FARTHEST: f32 = 1e37;
+
+/// Boxes of a sample.
+pub(super) const SAMPLE_SIZE: usize = 128;
+
+
+/// Boxes looked at for a sample: some may be invalid.
+const SAMPLE_TRIES: usize = 1024;
+
+/// Size classes: one for each power of two of the largest extent.
+pub(super) const CLASSES: usize = 256;
+
+/// Smallest and largest corners, and the largest extents, of the valid boxes.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Bounds {
+    pub(super) low: [f32; 4],
+    pub(super) high: [f32; 4],
+    pub(super) extent: [f32; 4],
+}
+
+impl Bounds {
+    const NONE: Self = Self { low: [FARTHEST; 4], high: [-FARTHEST; 4], extent: [0.0; 4] };
+
+    /// Measures all boxes.
+    pub(super) fn of(boxes: &[Aabb], workers: usize) -> Self {
+        let pieces = workers.max(1);
+        let mut parts = [Self::NONE; 64];
+        let shared = SharedSlice::new(&mut parts);
+        let pieces = pieces.min(64);
+        run(workers, pieces, |_, piece| {
+            let part = measure(&boxes[piece_range(boxes.len(), piece, pieces)]);
+            // SAFETY: each piece writes its own part.
+            unsafe { shared.write(piece, part) }
+        });
+        parts[..pieces].iter().fold(Self::NONE, |all, part| all.merged(part)).limited()
+    }
+
+    fn merged(self, other: &Self) -> Self {
+        Self {
+            low: std::array::from_fn(|k| lesser(other.low[k], self.low[k])),
+            high: std::array::from_fn(|k| greater(other.high[k], self.high[k])),
+            extent: std::array::from_fn(|k| greater(other.extent[k], self.extent[k])),
+        }
+    }
+
+    fn limited(mut self) -> Self {
+        self.low = self.low.map(|x| x.clamp(-FARTHEST, FARTHEST));
+        self.high = self.high.map(|x| x.clamp(-FARTHEST, FARTHEST));
+        self
+    }
+
+    /// Returns the largest extent of all axes.
+    pub(super) fn largest(&self) -> f32 {
+        largest(&self.extent)
+    }
+
+    /// Shrinks the bounds to where most of the sample lies, on axes where few boxes stretch them (contract 4).
+    pub(super) fn trimmed(mut self, sample: &Sample) -> Self {
+        for k in 0..3 {
+            let (low, high) = sample.range(k);
+            let margin = 0.125 * (high - low);
+            let wide = high - low + 2.0 * margin;
+            if self.high[k] - self.low[k] > 2.0 * wide {
+                self.low[k] = self.low[k].max(low - margin);
+                self.high[k] = self.high[k].min(high + margin);
+            }
+        }
+        self
+    }
+
+    /// Returns the width of an axis; more than 0.
+    pub(super) fn width(&self, k: usize) -> f64 {
+        (f64::from(self.high[k]) - f64::from(self.low[k])).max(1e-30)
+    }
+}
+
+/// The lesser of two; the second one where the first is NaN.
+#[inline(always)]
+fn lesser(x: f32, y: f32) -> f32 {
+    if x < y { x } else { y }
+}
+
+/// The greater of two; the second one where the first is NaN.
+#[inline(always)]
+fn greater(x: f32, y: f32) -> f32 {
+    if x > y { x } else { y }
+}
+
+fn largest(extent: &[f32]) -> f32 {
+    extent[0].max(extent[1]).max(extent[2])
+}
+
+/// Widens bounds to some boxes, three axes at once: every x86-64 has the instructions.
+#[cfg(target_arch = "x86_64")]
+fn measure(boxes: &[Aabb]) -> Bounds {
+    use std::arch::x86_64::*;
+    let mut all = Bounds::NONE;
+    // SAFETY: SSE is part of the architecture. A box is six numbers; the loads are of its first and last four.
+    unsafe {
+        let [mut low, mut high, mut extent] =
+            [&all.low, &all.high, &all.extent].map(|lanes| _mm_loadu_ps(lanes.as_ptr()));
+        for aabb in boxes {
+            let first = std::ptr::from_ref(aabb).cast::<f32>();
+            let max = _mm_loadu_ps(first.add(2));
+            let (min, max) = (_mm_loadu_ps(first), _mm_shuffle_ps::<0b11_11_10_01>(max, max));
+            // The second operand wins where the first is NaN.
+            low = _mm_min_ps(min, low);
+            high = _mm_max_ps(max, high);
+            extent = _mm_max_ps(_mm_sub_ps(max, min), extent);
+        }
+        _mm_storeu_ps(all.low.as_mut_ptr(), low);
+        _mm_storeu_ps(all.high.as_mut_ptr(), high);
+        _mm_storeu_ps(all.extent.as_mut_ptr(), extent);
+    }
+    all
+}
+
+/// Widens bounds to some boxes.
+#[cfg(not(target_arch = "x86_64"))]
+fn measure(boxes: &[Aabb]) -> Bounds {
+    let mut all = Bounds::NONE;
+    for aabb in boxes {
+        for k in 0..3 {
+            all.low[k] = lesser(aabb.min[k], all.low[k]);
+            all.high[k] = greater(aabb.max[k], all.high[k]);
+            all.extent[k] = greater(aabb.max[k] - aabb.min[k], all.extent[k]);
+        }
+    }
+    all
+}
+
+/// A few valid boxes, spread evenly over the list.
+#[derive(Clone, Debug)]
+pub(super) struct Sample {
+    boxes: [Aabb; SAMPLE_SIZE],
+    len: usize,
+}
+
+impl Sample {
+    /// Draws a sample.
+    pub(super) fn of(boxes: &[Aabb]) -> Self {
+        let mut sample = Self { boxes: [Aabb::NOWHERE; SAMPLE_SIZE], len: 0 };
+        for i in spread_evenly(boxes.len(), SAMPLE_TRIES) {
+            if sample.len < SAMPLE_SIZE && boxes[i].is_valid() {
+                sample.boxes[sample.len] = boxes[i];
+                sample.len += 1;
+            }
+        }
+        sample
+    }
+
+    /// Returns the boxes.
+    pub(super) fn boxes(&self) -> &[Aabb] {
+        &self.boxes[..self.len]
+    }
+
+    /// Returns a low and a high quantile (4%) of the lower corners on an axis.
+    fn range(&self, k: usize) -> (f32, f32) {
+        let mut corners = [0.0; SAMPLE_SIZE];
+        for (corner, aabb) in corners.iter_mut().zip(self.boxes()) {
+            *corner = aabb.min[k].clamp(-FARTHEST, FARTHEST);
+        }
+        let corners = &mut corners[..self.len];
+        if corners.is_empty() {
+            return (0.0, 0.0);
+        }
+        corners.sort_unstable_by(f32::total_cmp);
+        (corners[self.len / 25], corners[self.len - 1 - self.len / 25])
+    }
+
+    /// Returns the median of the boxes' largest extents.
+    pub(super) fn median_extent(&self) -> f32 {
+        let mut extents = [0.0; SAMPLE_SIZE];
+        for (extent, aabb) in extents.iter_mut().zip(self.boxes()) {
+            *extent = largest(&aabb.extents());
+        }
+        let extents = &mut extents[..self.len];
+        extents.sort_unstable_by(f32::total_cmp);
+        extents.get(self.len / 2).copied().unwrap_or(0.0)
+    }
+}
+
+/// Yields at most `most` of the numbers below `len` by a golden-ratio walk: a pattern in the order of the boxes cannot
+/// bias the sample.
+fn spread_evenly(len: usize, most: usize) -> impl Iterator<Item = usize> {
+    const GOLDEN: u64 = 0x9E37_79B9_7F4A_7C15;
+    let walk = move |i: u64| ((i.wrapping_mul(GOLDEN) >> 32) * len as u64) >> 32;
+    (0..len.min(most) as u64).map(move |i| if len <= most { i } else { walk(i) } as usize)
+}
+
+/// Boxes whose largest extent lies within one power of two.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct SizeClass {
+    pub(super) boxes: u32,
+    /// Largest extent, by axis.
+    pub(super) extent: [f32; 3],
+}
+
+/// Counts valid boxes by size class. Counted rather than sampled: a sample misses a thousand large boxes among a million
+/// small ones.
+pub(super) fn size_classes(boxes: &[Aabb], workers: usize) -> Box<[SizeClass; CLASSES]> {
+    let pieces = workers.clamp(1, 16);
+    let mut parts = vec![[SizeClass::default(); CLASSES]; pieces];
+    let shared = SharedSlice::new(&mut parts);
+    run(workers, pieces, |_, piece| {
+        // SAFETY: each piece has its own part.
+        let part = unsafe { &mut shared.part(piece..piece + 1)[0] };
+        boxes[piece_range(boxes.len(), piece, pieces)].iter().for_each(|aabb| count(part, aabb));
+    });
+    let mut all = Box::new(parts[0]);
+    for part in &parts[1..] {
+        all.iter_mut().zip(part).for_each(|(all, part)| all.add(part.boxes, part.extent));
+    }
+    all
+}
+
+impl SizeClass {
+    #[inline(always)]
+    fn add(&mut self, boxes: u32, extent: [f32; 3]) {
+        self.boxes += boxes;
+        self.extent = std::array::from_fn(|k| self.extent[k].max(extent[k]));
+    }
+}
+
+#[inline(always)]
+fn count(classes: &mut [SizeClass; CLASSES], aabb: &Aabb) {
+    if aabb.is_valid() {
+        let extent = aabb.extents();
+        // The exponent; a NaN, of a point at infinity, counts as infinite.
+        classes[(largest(&extent).to_bits() >> 23 & 255) as usize].add(1, extent);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn row(n: usize) -> Vec<Aabb> {
+        (0..n).map(|i| Aabb::from_center([i as f32, 0.0, 0.0], [0.5; 3])).collect()
+    }
+
+    #[test]
+    fn bounds_ignore_absent_boxes_and_are_finite() {
+        let mut boxes = row(100);
+        boxes.insert(50, Aabb::NOWHERE);
+        for workers in [1, 2, 5] {
+            let bounds = Bounds::of(&boxes, workers);
+            assert_eq!((bounds.low[0], bounds.high[0], bounds.largest()), (-0.5, 99.5, 1.0));
+        }
+        boxes.push(Aabb::new([f32::NEG_INFINITY; 3], [f32::INFINITY; 3]));
+        let bounds = Bounds::of(&boxes, 1);
+        assert!(bounds.width(0).is_finite() && bounds.largest() == f32::INFINITY);
+    }
+
+    #[test]
+    fn a_far_box_does_not_stretch_trimmed_bounds() {
+        let mut boxes = row(2000);
+        boxes.push(Aabb::from_center([1e30; 3], [1.0; 3]));
+        let bounds = Bounds::of(&boxes, 1).trimmed(&Sample::of(&boxes));
+        assert!(bounds.high[0] > 1900.0 && bounds.high[0] < 2500.0, "{bounds:?}");
+        assert!(bounds.low[0] < 100.0);
+    }
+
+    #[test]
+    fn size_classes_count_valid_boxes_by_power_of_two() {
+        let boxes = [
+            Aabb::NOWHERE,
+            Aabb::new([1.0; 3], [0.0; 3]),
+            Aabb::new([0.0; 3], [1.5, 0.5, 0.25]),
+            Aabb::new([f32::INFINITY; 3], [f32::INFINITY; 3]),
+        ];
+        let classes = size_classes(&boxes, 2);
+        assert_eq!((classes[127].boxes, classes[127].extent), (1, [1.5, 0.5, 0.25]));
+        assert_eq!(classes[255].boxes, 1);
+        assert_eq!(classes.iter().map(|class| class.boxes).sum::<u32>(), 2);
+    }
+}

@@ -1,0 +1,235 @@
+//! Building a grid: boxes are sorted by the cell of their lower corner, by two counting sorts.
+//!
+//! The first sort brings records into a few hundred *buckets* of neighbouring cells, the second one sorts each bucket
+//! while it is in the cache, and computes codes. Each pass is shared by threads piece by piece.
+
+use super::cells::TOMBSTONE;
+use super::plan::GridPlan;
+use super::record::Record;
+use super::simd::{BLOCK, Kernel, Simd, dispatch};
+use super::{Grid, Sorted};
+use crate::Aabb;
+use crate::parallel::{SharedSlice, ensure_scratch, piece_range, run};
+
+/// Buckets of the first sort, at most: their write positions stay in the nearest cache.
+const MAX_BUCKETS: usize = 2047;
+
+/// Boxes in a bucket, about: they are sorted within the second cache.
+const BOXES_PER_BUCKET: usize = 2048;
+
+/// Keys of boxes that are in no cell.
+const OVERSIZE: u32 = u32::MAX;
+const INVALID: u32 = u32::MAX - 1;
+
+/// By bucket: boxes of one piece, then their place. The last two are oversize and invalid boxes.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Counts([u32; MAX_BUCKETS + 3]);
+
+impl Counts {
+    const ZERO: Self = Self([0; MAX_BUCKETS + 3]);
+    const OVERSIZE: usize = MAX_BUCKETS + 1;
+    const INVALID: usize = MAX_BUCKETS + 2;
+}
+
+/// How keys fall into buckets, and boxes into pieces.
+#[derive(Clone, Copy)]
+struct Split {
+    /// log2 of the cells in a bucket.
+    shift: u32,
+    buckets: usize,
+    pieces: usize,
+}
+
+impl Split {
+    fn new(boxes: usize, cells: usize, workers: usize) -> Self {
+        let wanted = (boxes / BOXES_PER_BUCKET).clamp(1, MAX_BUCKETS);
+        let shift = (0..u32::BITS).find(|shift| cells >> shift < wanted).unwrap_or(u32::BITS - 1);
+        let pieces = if workers > 1 { 4 * workers } else { 1 };
+        Self { shift, buckets: (cells >> shift) + 1, pieces }
+    }
+}
+
+impl Grid {
+    /// Sorts the valid boxes, `boxes[id]` with the id `id`, into cells.
+    pub(crate) fn build(&mut self, plan: GridPlan, boxes: &[Aabb], workers: usize) -> Sorted<'_> {
+        self.plan = plan;
+        let split = Split::new(boxes.len(), self.plan.cells.count(), workers);
+        self.reserve(boxes.len());
+        self.count(boxes, split, workers);
+        let in_buckets = self.place(split);
+        self.list_oversize(boxes);
+        self.scatter(boxes, split, workers);
+        self.sort_buckets(&in_buckets, split, workers);
+        self.bucket_starts = in_buckets;
+        Sorted { grid: self }
+    }
+
+    fn reserve(&mut self, boxes: usize) {
+        ensure_scratch(&mut self.keys, boxes, 0);
+        ensure_scratch(&mut self.coarse, boxes, Record::EMPTY);
+        ensure_scratch(&mut self.records, boxes, Record::EMPTY);
+        ensure_scratch(&mut self.codes, boxes + 2 * BLOCK, TOMBSTONE);
+        ensure_scratch(&mut self.starts, self.plan.cells.count() + 4, 0);
+    }
+
+    /// Computes keys, and counts boxes by bucket.
+    fn count(&mut self, boxes: &[Aabb], split: Split, workers: usize) {
+        self.counts.resize(split.pieces.max(self.counts.len()), Counts::ZERO);
+        let (keys, counts) = (SharedSlice::new(&mut self.keys), SharedSlice::new(&mut self.counts));
+        let plan = &self.plan;
+        run(workers, split.pieces, |_, piece| {
+            let range = piece_range(boxes.len(), piece, split.pieces);
+            // SAFETY: each piece has its own boxes and counts.
+            let (keys, counts) =
+                unsafe { (keys.part(range.clone()), &mut counts.part(piece..piece + 1)[0]) };
+            counts.0[..=split.buckets].fill(0);
+            (counts.0[Counts::OVERSIZE], counts.0[Counts::INVALID]) = (0, 0);
+            dispatch(CountKeys { plan, boxes: &boxes[range], keys, counts, shift: split.shift });
+        });
+    }
+
+    /// Turns counts into places, and returns where each bucket begins and the last one ends.
+    fn place(&mut self, split: Split) -> Vec<u32> {
+        let mut starts = std::mem::take(&mut self.bucket_starts);
+        starts.clear();
+        let mut next = 0;
+        let counts = &mut self.counts[..split.pieces];
+        for bucket in 0..split.buckets {
+            starts.push(next);
+            for counts in counts.iter_mut() {
+                next += std::mem::replace(&mut counts.0[bucket], next);
+            }
+        }
+        starts.push(next);
+        self.len = next as usize;
+        self.invalid = counts.iter().map(|counts| counts.0[Counts::INVALID]).sum();
+        starts
+    }
+
+    fn list_oversize(&mut self, boxes: &[Aabb]) {
+        self.oversize.clear();
+        if self.len + self.invalid as usize == boxes.len() {
+            return;
+        }
+        for (id, aabb) in boxes.iter().enumerate().filter(|(id, _)| self.keys[*id] == OVERSIZE) {
+            self.oversize.push(Record::new(*aabb, id as u32, OVERSIZE));
+        }
+    }
+
+    /// Brings records into their buckets.
+    fn scatter(&mut self, boxes: &[Aabb], split: Split, workers: usize) {
+        let (coarse, counts) = (SharedSlice::new(&mut self.coarse), SharedSlice::new(&mut self.counts));
+        let keys = &self.keys;
+        run(workers, split.pieces, |_, piece| {
+            // SAFETY: each piece has its own counts.
+            let next = unsafe { &mut counts.part(piece..piece + 1)[0].0 };
+            let range = piece_range(boxes.len(), piece, split.pieces);
+            let start = range.start;
+            for (i, (aabb, &key)) in boxes[range.clone()].iter().zip(&keys[range]).enumerate() {
+                if key < INVALID {
+                    let place = &mut next[(key >> split.shift) as usize];
+                    // SAFETY: no two boxes of any pieces have the same place.
+                    unsafe { coarse.write(*place as usize, Record::new(*aabb, (start + i) as u32, key)) };
+                    *place += 1;
+                }
+            }
+        });
+    }
+
+    /// Sorts each bucket by cell, and computes codes.
+    fn sort_buckets(&mut self, bucket_starts: &[u32], split: Split, workers: usize) {
+        let cells = self.plan.cells.count();
+        let sort = SortBuckets {
+            plan: self.plan,
+            coarse: &self.coarse,
+            records: SharedSlice::new(&mut self.records),
+            codes: SharedSlice::new(&mut self.codes),
+            ends: SharedSlice::new(&mut self.starts[1..]),
+        };
+        run(workers, split.buckets, |_, bucket| {
+            let slots = bucket_starts[bucket] as usize..bucket_starts[bucket + 1] as usize;
+            let keys = bucket << split.shift..((bucket + 1) << split.shift).min(cells);
+            dispatch(SortBucket { sort: &sort, slots, keys });
+        });
+        self.starts[0] = 0;
+        self.starts[cells + 1..cells + 4].fill(self.len as u32);
+        self.codes[self.len..self.len + 2 * BLOCK].fill(TOMBSTONE);
+    }
+}
+
+struct CountKeys<'a> {
+    plan: &'a GridPlan,
+    boxes: &'a [Aabb],
+    keys: &'a mut [u32],
+    counts: &'a mut Counts,
+    shift: u32,
+}
+
+impl Kernel for CountKeys<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    unsafe fn run<S: Simd>(self) {
+        // Copied, so that the loop keeps them in registers.
+        let (cells, shift) = (self.plan.cells, self.shift);
+        for (aabb, to) in self.boxes.iter().zip(self.keys) {
+            // SAFETY: the caller has the instructions.
+            let (low, _) = unsafe { S::steps(&cells, aabb) };
+            let (mut key, mut bucket) = (cells.key(cells.cell(low)), 0);
+            if cells.takes(aabb) {
+                bucket += (key >> shift) as usize;
+            } else {
+                (key, bucket) =
+                    if aabb.is_valid() { (OVERSIZE, Counts::OVERSIZE) } else { (INVALID, Counts::INVALID) };
+            }
+            *to = key;
+            self.counts.0[bucket] += 1;
+        }
+    }
+}
+
+struct SortBuckets<'a> {
+    plan: GridPlan,
+    coarse: &'a [Record],
+    records: SharedSlice<Record>,
+    codes: SharedSlice<u64>,
+    /// By cell: where it ends.
+    ends: SharedSlice<u32>,
+}
+
+struct SortBucket<'a> {
+    sort: &'a SortBuckets<'a>,
+    slots: std::ops::Range<usize>,
+    keys: std::ops::Range<usize>,
+}
+
+impl Kernel for SortBucket<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    unsafe fn run<S: Simd>(self) {
+        let Self { sort, slots, keys } = self;
+        let cells = sort.plan.cells;
+        // SAFETY: no other bucket has these cells.
+        let ends = unsafe { sort.ends.part(keys.clone()) };
+        let bucket = &sort.coarse[slots.clone()];
+        ends.fill(0);
+        for record in bucket {
+            ends[record.key as usize - keys.start] += 1;
+        }
+        let mut next = slots.start as u32;
+        for end in ends.iter_mut() {
+            next += std::mem::replace(end, next);
+        }
+        for record in bucket {
+            let place = &mut ends[record.key as usize - keys.start];
+            // SAFETY: the caller has the instructions; no other bucket has these slots, and each record its own one.
+            unsafe {
+                let (low, high) = S::steps(&cells, &record.aabb);
+                sort.records.write(*place as usize, *record);
+                sort.codes.write(*place as usize, S::code(low, high));
+            }
+            *place += 1;
+        }
+    }
+}

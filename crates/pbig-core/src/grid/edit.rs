@@ -1,0 +1,253 @@
+//! Editing a grid in place: boxes that moved since it was built.
+//!
+//! A box that stays in its cell is overwritten. One that leaves its cell leaves a tombstone in its slot; it takes over a
+//! tombstone's slot in its new cell, or goes to a *spill* list of that cell.
+
+use super::cells::TOMBSTONE;
+use super::lookup::Place;
+use super::record::Record;
+use super::simd::{Kernel, Simd, dispatch, prefetch};
+use super::{Grid, Sorted};
+use super::plan::GridPlan;
+use super::search::KeyRun;
+use crate::Aabb;
+
+/// Boxes between a prefetch and the move.
+const AHEAD: usize = 12;
+
+/// No entry: the end of a list.
+const NONE: u32 = u32::MAX;
+
+/// A grid, and the boxes that are out of its order.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct EditedGrid {
+    pub(super) grid: Grid,
+    pub(super) spill: Spill,
+}
+
+/// Boxes by cell, as linked lists.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Spill {
+    records: Vec<Record>,
+    next: Vec<u32>,
+    free: Vec<u32>,
+    /// By cell: the first entry. Empty until the first box moves.
+    heads: Vec<u32>,
+    /// A bit for each cell: whether it has entries.
+    occupied: Vec<u64>,
+}
+
+impl Spill {
+    pub(super) fn is_empty(&self) -> bool {
+        self.records.len() == self.free.len()
+    }
+
+    fn len(&self) -> usize {
+        self.records.len() - self.free.len()
+    }
+
+    #[inline(always)]
+    pub(super) fn record(&self, entry: u32) -> &Record {
+        &self.records[entry as usize]
+    }
+
+    /// Visits the entries of a run of cells.
+    #[inline]
+    pub(super) fn visit(&self, (key, count): KeyRun, mut visit: impl FnMut(u32)) {
+        let end = key + count;
+        let mut key = key;
+        while key < end && !self.occupied.is_empty() {
+            let bits = self.occupied[key / 64] >> (key % 64);
+            if bits == 0 {
+                key = (key / 64 + 1) * 64;
+                continue;
+            }
+            key += bits.trailing_zeros() as usize;
+            if key >= end {
+                return;
+            }
+            let mut entry = self.heads[key];
+            while entry != NONE {
+                visit(entry);
+                entry = self.next[entry as usize];
+            }
+            key += 1;
+        }
+    }
+
+    /// Forgets all entries.
+    fn clear(&mut self) {
+        for record in &self.records {
+            if let Some(head) = self.heads.get_mut(record.key as usize) {
+                *head = NONE;
+                self.occupied[record.key as usize / 64] = 0;
+            }
+        }
+        (self.records.clear(), self.next.clear(), self.free.clear());
+    }
+
+    fn insert(&mut self, record: Record, cells: usize) {
+        if self.heads.len() < cells {
+            self.heads.resize(cells, NONE);
+            self.occupied.resize(cells / 64 + 1, 0);
+        }
+        let key = record.key as usize;
+        let entry = self.free.pop().unwrap_or(self.records.len() as u32);
+        if entry as usize == self.records.len() {
+            self.records.push(record);
+            self.next.push(NONE);
+        }
+        self.records[entry as usize] = record;
+        self.next[entry as usize] = std::mem::replace(&mut self.heads[key], entry);
+        self.occupied[key / 64] |= 1 << (key % 64);
+    }
+
+    fn remove(&mut self, entry: u32) {
+        let key = self.records[entry as usize].key as usize;
+        let next = self.next[entry as usize];
+        if self.heads[key] == entry {
+            self.heads[key] = next;
+        } else {
+            let mut before = self.heads[key];
+            while self.next[before as usize] != entry {
+                before = self.next[before as usize];
+            }
+            self.next[before as usize] = next;
+        }
+        if self.heads[key] == NONE {
+            self.occupied[key / 64] &= !(1 << (key % 64));
+        }
+        self.free.push(entry);
+    }
+}
+
+impl EditedGrid {
+    /// Builds the grid anew from all boxes.
+    pub(crate) fn build(&mut self, plan: GridPlan, boxes: &[Aabb], workers: usize) -> Sorted<'_> {
+        self.spill.clear();
+        self.grid.build(plan, boxes, workers)
+    }
+
+    /// Returns the grid without the spilled boxes, for reports.
+    pub(crate) fn grid(&self) -> &Grid {
+        &self.grid
+    }
+
+    /// Returns how many boxes are out of the grid's order.
+    pub(crate) fn spilled(&self) -> usize {
+        self.spill.len()
+    }
+
+    /// Moves boxes from where they are to where they are now; `moved[i]` is at `places[i]`.
+    pub(crate) fn move_all(&mut self, moved: &[Record], places: &[Place]) {
+        dispatch(MoveAll { grid: self, moved, places });
+    }
+
+    /// Returns the key of the cell in which a box lies, for sorting: movers are looked up in the order of cells.
+    pub(crate) fn keys(&self, boxes: &mut [Record]) {
+        dispatch(Keys { grid: self, boxes });
+    }
+
+    fn take_out(&mut self, place: Place, moved: &mut Vec<u32>) {
+        match place {
+            Place::Slot(slot) => {
+                self.grid.codes[slot as usize] = TOMBSTONE;
+                self.grid.records[slot as usize].aabb = Aabb::NOWHERE;
+            }
+            Place::Spill(entry) => self.spill.remove(entry),
+            Place::Oversize(entry) => moved.push(entry),
+            Place::Nowhere => {}
+        }
+    }
+
+    fn put(&mut self, record: Record, code: u64) {
+        let key = record.key as usize;
+        let (first, end) = (self.grid.starts[key] as usize, self.grid.starts[key + 1] as usize);
+        let free = self.grid.codes[first..end].iter().position(|code| *code == TOMBSTONE);
+        if let Some(free) = free {
+            self.grid.records[first + free] = record;
+            self.grid.codes[first + free] = code;
+        } else {
+            self.spill.insert(record, self.grid.plan.cells.count());
+        }
+    }
+
+    /// Returns true if the box stays in its slot or spill list, where it is overwritten then.
+    fn overwrite(&mut self, record: Record, code: u64, place: Place) -> bool {
+        match place {
+            Place::Slot(slot) if self.grid.records[slot as usize].key == record.key => {
+                self.grid.records[slot as usize] = record;
+                self.grid.codes[slot as usize] = code;
+                true
+            }
+            Place::Spill(entry) if self.spill.records[entry as usize].key == record.key => {
+                self.spill.records[entry as usize] = record;
+                true
+            }
+            _ => false,
+        }
+    }
+
+    /// Takes boxes out of the oversize list.
+    fn take_out_oversize(&mut self, mut entries: Vec<u32>) {
+        entries.sort_unstable();
+        entries.iter().rev().for_each(|&entry| _ = self.grid.oversize.swap_remove(entry as usize));
+    }
+}
+
+struct Keys<'a> {
+    grid: &'a EditedGrid,
+    boxes: &'a mut [Record],
+}
+
+impl Kernel for Keys<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    unsafe fn run<S: Simd>(self) {
+        let cells = self.grid.grid.plan.cells;
+        for record in self.boxes {
+            // SAFETY: the caller has the instructions.
+            let (low, _) = unsafe { S::steps(&cells, &record.aabb) };
+            record.key = cells.key(cells.cell(low));
+        }
+    }
+}
+
+struct MoveAll<'a> {
+    grid: &'a mut EditedGrid,
+    moved: &'a [Record],
+    places: &'a [Place],
+}
+
+impl Kernel for MoveAll<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    unsafe fn run<S: Simd>(self) {
+        let Self { grid, moved, places } = self;
+        let cells = grid.grid.plan.cells;
+        let (mut no_longer_oversize, mut oversize) = (vec![], vec![]);
+        for (i, (record, &place)) in moved.iter().zip(places).enumerate() {
+            if let Some(Place::Slot(slot)) = places.get(i + AHEAD) {
+                prefetch(grid.grid.records.as_ptr().wrapping_add(*slot as usize));
+            }
+            if !cells.takes(&record.aabb) {
+                grid.take_out(place, &mut no_longer_oversize);
+                oversize.extend(record.aabb.is_valid().then_some(*record));
+                continue;
+            }
+            // SAFETY: the caller has the instructions.
+            let code = unsafe {
+                let (low, high) = S::steps(&cells, &record.aabb);
+                S::code(low, high)
+            };
+            if !grid.overwrite(*record, code, place) {
+                grid.take_out(place, &mut no_longer_oversize);
+                grid.put(*record, code);
+            }
+        }
+        grid.take_out_oversize(no_longer_oversize);
+        grid.grid.oversize.extend(oversize);
+    }
+}

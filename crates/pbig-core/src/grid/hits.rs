@@ -1,0 +1,179 @@
+//! Hits: what the test of codes leaves over, tested exactly many at a time.
+//!
+//! A hit is a block of slots with a bit for each candidate. Hits are gathered first; then all are expanded, and then all
+//! tested, while the records further ahead are on their way. (Tested at once, each would wait for its record.) The test
+//! has no branch: a pair is written, and kept or overwritten by the next one.
+
+use super::record::Record;
+use super::simd::{BLOCK, Simd, prefetch};
+use crate::{Pair, ProxyFilter};
+use std::sync::atomic::{AtomicU64, Ordering};
+
+/// Hits that are tested together.
+const ROOM: usize = 1024;
+
+/// Hits that a loop may add between two looks at the room.
+pub(super) const SLACK: usize = 8;
+
+/// Candidates between a prefetch and the test: a record from memory takes about as long.
+const AHEAD: usize = 24;
+
+/// Pairs that a thread gathers before it accounts for them.
+const BATCH: usize = 4096;
+
+/// What a search reports, besides that two boxes overlap.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Rule<'a> {
+    /// By id; none if all may pair.
+    pub(crate) filters: Option<&'a [ProxyFilter]>,
+    /// Pairs that may be found.
+    pub(crate) max_pairs: u64,
+    /// Pairs found by all threads.
+    pub(crate) found: &'a AtomicU64,
+}
+
+/// The pairs that one thread finds, and its buffers.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Hits {
+    /// A hit each: slot of the query, first slot of the block, mask (28, 28 and 8 bits).
+    blocks: Vec<u64>,
+    len: usize,
+    queries: Vec<u32>,
+    places: Vec<u32>,
+    /// The pairs, in no particular order.
+    pub(crate) pairs: Vec<Pair>,
+    /// By group of `a` (`a >> group_shift`): pairs found. Empty if nobody asks.
+    pub(crate) groups: Vec<u32>,
+    pub(crate) group_shift: u32,
+    /// Candidates tested.
+    pub(crate) tests: u64,
+    /// Overlapping boxes met, filtered ones included.
+    pub(crate) overlaps: u64,
+    /// Pairs that other threads know of.
+    accounted: usize,
+    pub(super) is_full: bool,
+    /// The boxes of [`brute_force`](super::brute_force).
+    pub(super) records: Vec<Record>,
+}
+
+impl Hits {
+    /// Forgets the pairs of an earlier search; counts those of the next one in `groups` groups of `1 << shift` ids.
+    pub(crate) fn begin(&mut self, groups: usize, shift: u32) {
+        self.blocks.resize(ROOM + SLACK, 0);
+        self.queries.resize((ROOM + SLACK) * BLOCK + AHEAD, 0);
+        self.places.resize((ROOM + SLACK) * BLOCK + AHEAD, 0);
+        self.pairs.clear();
+        self.groups.clear();
+        self.groups.resize(groups, 0);
+        self.group_shift = shift;
+        (self.len, self.tests, self.overlaps, self.accounted, self.is_full) = (0, 0, 0, 0, false);
+    }
+
+    /// Returns true if more pairs were found than may be.
+    pub(crate) fn is_full(&self) -> bool {
+        self.is_full
+    }
+
+    /// Adds a hit unless its mask is empty.
+    ///
+    /// # Safety
+    /// At most [`SLACK`] hits are added between two calls of [`Hits::has_room`] that return true.
+    #[inline(always)]
+    pub(super) unsafe fn push(&mut self, query: usize, first: usize, mask: u32) {
+        debug_assert!(self.len < self.blocks.len());
+        // SAFETY: the caller keeps the room.
+        unsafe {
+            *self.blocks.get_unchecked_mut(self.len) = (query as u64) << 36 | (first as u64) << 8 | u64::from(mask);
+        }
+        self.len += usize::from(mask != 0);
+    }
+
+    /// Returns true if [`SLACK`] more hits fit.
+    #[inline(always)]
+    pub(super) fn has_room(&self) -> bool {
+        self.len <= ROOM
+    }
+
+    /// Tests all hits exactly and keeps the pairs that the rule allows.
+    ///
+    /// # Safety
+    /// The slots of all hits are inside `records`, and the processor has the instructions.
+    #[inline(always)]
+    pub(super) unsafe fn flush<S: Simd>(&mut self, records: &[Record], rule: &Rule<'_>) {
+        // SAFETY: the caller's promise; the lists have room for all candidates, and `AHEAD` more are read.
+        unsafe {
+            let candidates = self.expand::<S>();
+            self.test(records, candidates, rule);
+        }
+        self.len = 0;
+    }
+
+    #[inline(always)]
+    unsafe fn expand<S: Simd>(&mut self) -> usize {
+        let (queries, places) = (self.queries.as_mut_ptr(), self.places.as_mut_ptr());
+        let mut count = 0;
+        for hit in &self.blocks[..self.len] {
+            let (query, first, mask) = ((hit >> 36) as u32, (hit >> 8) as u32 & 0xFFF_FFFF, *hit as u32 & 255);
+            // SAFETY: `ROOM + SLACK` blocks fit.
+            count += unsafe { S::expand(query, first, mask, queries.add(count), places.add(count)) };
+        }
+        count
+    }
+
+    #[inline(always)]
+    unsafe fn test(&mut self, records: &[Record], candidates: usize, rule: &Rule<'_>) {
+        let from = self.pairs.len();
+        self.pairs.reserve(candidates + 1);
+        let (queries, places, records) = (self.queries.as_ptr(), self.places.as_ptr(), records.as_ptr());
+        // SAFETY: all candidates are inside the lists and the records, and the pairs have room for them.
+        unsafe {
+            let start = self.pairs.as_mut_ptr().add(from);
+            let mut next = start;
+            for i in 0..candidates {
+                prefetch(records.wrapping_add(*places.add(i + AHEAD) as usize));
+                let one = &*records.add(*queries.add(i) as usize);
+                let other = &*records.add(*places.add(i) as usize);
+                next.write(Pair::new(one.id, other.id));
+                next = next.add(usize::from(one.overlaps(other)));
+            }
+            self.pairs.set_len(from + next.offset_from(start) as usize);
+        }
+        self.keep(from, rule);
+    }
+
+    /// Filters, counts and accounts for the pairs from `from` on.
+    #[inline(always)]
+    pub(super) fn keep(&mut self, from: usize, rule: &Rule<'_>) {
+        self.overlaps += (self.pairs.len() - from) as u64;
+        if let Some(filters) = rule.filters {
+            self.filter(from, filters);
+        }
+        if !self.groups.is_empty() {
+            for pair in &self.pairs[from..] {
+                self.groups[(pair.a >> self.group_shift) as usize] += 1;
+            }
+        }
+        let new = self.pairs.len() - self.accounted;
+        if new >= BATCH {
+            self.accounted = self.pairs.len();
+            let found = rule.found.fetch_add(new as u64, Ordering::Relaxed) + new as u64;
+            self.is_full |= found > rule.max_pairs;
+        }
+    }
+
+    /// Drops the pairs from `from` on that filters exclude.
+    #[inline(always)]
+    fn filter(&mut self, from: usize, filters: &[ProxyFilter]) {
+        let (mut kept, len) = (from, self.pairs.len());
+        for i in from..len {
+            if let Some(ahead) = self.pairs.get(i + AHEAD) {
+                prefetch(filters.as_ptr().wrapping_add(ahead.a as usize));
+                prefetch(filters.as_ptr().wrapping_add(ahead.b as usize));
+            }
+            let pair = self.pairs[i];
+            self.pairs[kept] = pair;
+            kept += usize::from(filters[pair.a as usize].allows(&filters[pair.b as usize]));
+        }
+        self.pairs.truncate(kept);
+    }
+}

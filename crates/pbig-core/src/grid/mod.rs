@@ -1,0 +1,62 @@
+//! The grid: boxes sorted by the cell of their lower corner, one entry a box.
+//!
+//! ```text
+//! bounds ─► plan ─► build (keys, two counting sorts, codes) ─► search ─► hits (exact test) ─► pairs
+//!                     └─► edit: boxes that moved since, in place ─► query
+//! ```
+//!
+//! A search visits half of each box's neighbouring cells as contiguous runs of slots, tests 64-bit codes (`cells`), and
+//! tests exactly what these leave over.
+
+mod bounds;
+mod build;
+mod cells;
+mod edit;
+mod hits;
+mod lookup;
+mod oversize;
+mod plan;
+mod record;
+mod search;
+mod simd;
+
+pub(crate) use edit::EditedGrid;
+pub use plan::NeighbourScan;
+pub(crate) use plan::GridPlan;
+pub(crate) use record::Record;
+pub(crate) use simd::{BLOCK, EightBoxes, Kernel, Simd, dispatch, prefetch};
+pub use simd::simd;
+pub(crate) use hits::{Hits, Rule};
+pub(crate) use lookup::{Candidates, Meet, Place};
+pub(crate) use oversize::brute_force;
+
+use build::Counts;
+
+/// A grid with its buffers.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Grid {
+    pub(crate) plan: GridPlan,
+    /// By slot, sorted by cell. Longer than `len`.
+    records: Vec<Record>,
+    /// By slot; tombstones beyond `len`, so that a block can be read anywhere.
+    codes: Vec<u64>,
+    /// By cell: its first slot.
+    starts: Vec<u32>,
+    /// Slots in use.
+    pub(crate) len: usize,
+    /// Boxes too large for the cells.
+    pub(crate) oversize: Vec<Record>,
+    /// Invalid boxes met by the last build.
+    pub(crate) invalid: u32,
+    /// By id: the key of the last build.
+    keys: Vec<u32>,
+    /// The records by bucket, of the last build.
+    coarse: Vec<Record>,
+    counts: Vec<Counts>,
+    bucket_starts: Vec<u32>,
+}
+
+/// A grid as it was built: every box lies in its cell. (A grid that was edited has tombstones, and cannot be searched.)
+pub(crate) struct Sorted<'a> {
+    pub(crate) grid: &'a Grid,
+}

@@ -1,0 +1,109 @@
+//! Oversize boxes: too large for the cells, tested exactly against every box in the cells that they reach.
+
+use super::Grid;
+use super::cells::{Cells, Window};
+use super::hits::{Hits, Rule};
+use super::record::Record;
+use super::search::KeyRun;
+use super::simd::{Kernel, Simd, dispatch};
+use crate::{Aabb, Pair};
+
+impl Grid {
+    /// Finds the pairs of an oversize box with the boxes in the grid, and with the oversize boxes after it.
+    pub(super) fn sweep(&self, i: usize, rule: &Rule<'_>, hits: &mut Hits) {
+        let one = &self.oversize[i];
+        let from = hits.pairs.len();
+        self.reached_by(&one.aabb, |run| {
+            let (first, end) = self.slots(run);
+            hits.tests += (end - first) as u64;
+            test_run(one, &self.records[first..end], &mut hits.pairs);
+        });
+        hits.tests += (self.oversize.len() - i - 1) as u64;
+        test_run(one, &self.oversize[i + 1..], &mut hits.pairs);
+        hits.keep(from, rule);
+    }
+
+    /// Visits the cells in which boxes can lie that overlap a box of any size.
+    pub(super) fn reached_by(&self, aabb: &Aabb, mut visit: impl FnMut(KeyRun)) {
+        let cells = &self.plan.cells;
+        let window = dispatch(WindowOf { grid: self, aabb }).clipped(cells);
+        for z in window.low[2]..=window.high[2] {
+            if spans_rows(cells, &window) {
+                visit(layer(cells, &window, z));
+                continue;
+            }
+            for y in window.low[1]..=window.high[1] {
+                let first = [window.low[0], y, z];
+                let last = window.high[0];
+                let row = if cells.wraps { cells.row::<true>(first, last) } else { cells.row::<false>(first, last) };
+                row.into_iter().filter(|(_, count)| *count > 0).for_each(&mut visit);
+            }
+        }
+    }
+}
+
+/// Returns true if the window has all cells of its rows, so that the rows of a layer are one run.
+fn spans_rows(cells: &Cells, window: &Window) -> bool {
+    let [first, last] = if cells.wraps { [0, cells.dims[0] - 1] } else { [1, cells.dims[0] - 2] };
+    let is_aligned = !cells.wraps || window.low[1] >= 0 && window.high[1] < cells.dims[1];
+    window.low[0] <= first && window.high[0] >= last && is_aligned
+}
+
+/// Returns all rows of a window in a layer; the border cells between them are empty.
+fn layer(cells: &Cells, window: &Window, z: i32) -> KeyRun {
+    let z = if cells.wraps { z & (cells.dims[2] - 1) } else { z };
+    let first = cells.key([0, window.low[1], z]) as usize;
+    (first, cells.key([cells.dims[0] - 1, window.high[1], z]) as usize + 1 - first)
+}
+
+struct WindowOf<'a> {
+    grid: &'a Grid,
+    aabb: &'a Aabb,
+}
+
+impl Kernel for WindowOf<'_> {
+    type Output = Window;
+
+    #[inline(always)]
+    unsafe fn run<S: Simd>(self) -> Window {
+        // SAFETY: the caller has the instructions.
+        let (low, high) = unsafe { S::steps(&self.grid.plan.cells, self.aabb) };
+        self.grid.plan.cells.window(low, high)
+    }
+}
+
+/// Appends the pairs of a box with those of a run that overlap it.
+pub(super) fn test_run(one: &Record, run: &[Record], pairs: &mut Vec<Pair>) {
+    let from = pairs.len();
+    pairs.reserve(run.len() + 1);
+    // SAFETY: there is room for a pair of each, and one more to be overwritten.
+    unsafe {
+        let start = pairs.as_mut_ptr().add(from);
+        let mut next = start;
+        for other in run {
+            next.write(Pair::new(one.id, other.id));
+            next = next.add(usize::from(one.overlaps(other)));
+        }
+        pairs.set_len(from + next.offset_from(start) as usize);
+    }
+}
+
+/// Tests every pair of valid boxes; returns how many are valid.
+pub(crate) fn brute_force(boxes: &[Aabb], rule: &Rule<'_>, hits: &mut Hits) -> usize {
+    let valid = boxes.iter().enumerate().filter(|(_, aabb)| aabb.is_valid());
+    let mut records = std::mem::take(&mut hits.records);
+    records.clear();
+    records.extend(valid.map(|(id, aabb)| Record::new(*aabb, id as u32, 0)));
+    for (i, one) in records.iter().enumerate() {
+        let from = hits.pairs.len();
+        hits.tests += (records.len() - i - 1) as u64;
+        test_run(one, &records[i + 1..], &mut hits.pairs);
+        hits.keep(from, rule);
+        if hits.is_full {
+            break;
+        }
+    }
+    let valid = records.len();
+    hits.records = records;
+    valid
+}

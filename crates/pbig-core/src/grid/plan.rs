@@ -1,0 +1,174 @@
+//! The plan: how large the cells of a grid are, which boxes it takes, and how a search looks at neighbouring cells.
+
+use super::bounds::{Bounds, SAMPLE_SIZE, Sample, SizeClass, size_classes};
+use super::cells::{Cells, MAX_STEPS_PER_BOX};
+use crate::Aabb;
+use crate::policy;
+
+/// The cells that a search visits for each box.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum NeighbourScan {
+    /// Half of the 27 neighbouring cells, as five runs of sorted boxes, whatever they hold: fastest where cells hold few.
+    #[default]
+    Runs,
+    /// The cells in which an overlapping box can lie: fastest where cells hold many.
+    Windows,
+}
+
+/// A grid to be built.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct GridPlan {
+    pub(crate) cells: Cells,
+    pub(crate) scan: NeighbourScan,
+}
+
+impl GridPlan {
+    /// Plans a grid for the valid ones of some boxes.
+    pub(crate) fn new(boxes: &[Aabb], workers: usize) -> Self {
+        let sample = Sample::of(boxes);
+        let all = Bounds::of(boxes, workers);
+        let space = all.trimmed(&sample);
+        let is_mixed = all.largest() > policy::MIXED_SIZE_RATIO * sample.median_extent();
+        let extent = if is_mixed {
+            cheapest_extent(&size_classes(boxes, workers)[..], boxes.len(), &space)
+        } else {
+            std::array::from_fn(|k| all.extent[k])
+        };
+        Spacing::new(boxes.len(), space, extent).uncrowded(&sample).plan()
+    }
+}
+
+/// Returns the extent of the largest boxes that the grid should take: the larger it is, the more boxes share a cell; the
+/// smaller, the more boxes are oversize. The costs are those of a test, in ns.
+fn cheapest_extent(classes: &[SizeClass], boxes: usize, space: &Bounds) -> [f32; 3] {
+    const LARGEST_CLASS: usize = 227; // 2^100: the inverse of a cell of that size is still a normal f32
+    let (mut best, mut cheapest) = ([0.0; 3], f64::MAX);
+    let (mut taken, mut extent) = (0, [0.0f32; 3]);
+    for (i, class) in classes.iter().enumerate().take(LARGEST_CLASS).filter(|(_, class)| class.boxes > 0) {
+        taken += class.boxes;
+        extent = std::array::from_fn(|k| extent[k].max(class.extent[k]));
+        let candidates = f64::from(taken) * share(space, extent.map(|x| 2.5 * x)) * 0.5;
+        let cost = f64::from(taken) * (policy::NS_PER_BOX + candidates * policy::NS_PER_CANDIDATE)
+            + oversize_cost(&classes[i + 1..], f64::from(taken), extent, space);
+        if cost < cheapest {
+            (cheapest, best) = (cost, extent);
+        }
+    }
+    let _ = boxes;
+    best
+}
+
+/// Returns the time to test oversize boxes against those in the grid and each other, in ns.
+fn oversize_cost(classes: &[SizeClass], in_grid: f64, cell: [f32; 3], space: &Bounds) -> f64 {
+    let oversize = classes.iter().map(|class| f64::from(class.boxes)).sum::<f64>();
+    let against_grid = |class: &SizeClass| {
+        let reached = std::array::from_fn(|k| class.extent[k] + 2.0 * cell[k]);
+        f64::from(class.boxes) * (in_grid * share(space, reached) * policy::NS_PER_OVERSIZE_TEST)
+    };
+    let grid = classes.iter().filter(|class| class.boxes > 0).map(against_grid).sum::<f64>();
+    grid + oversize * oversize * 0.5 * policy::NS_PER_OVERSIZE_TEST
+}
+
+/// Returns the part of the space that a box covers.
+fn share(space: &Bounds, extent: [f32; 3]) -> f64 {
+    (0..3).map(|k| (f64::from(extent[k]) / space.width(k)).min(1.0)).product()
+}
+
+/// Step lengths, and what they follow from.
+struct Spacing {
+    boxes: usize,
+    space: Bounds,
+    extent: [f32; 3],
+    /// The edge of a cell that holds the wanted number of boxes.
+    edge: f64,
+    wraps: bool,
+}
+
+impl Spacing {
+    fn new(boxes: usize, space: Bounds, extent: [f32; 3]) -> Self {
+        let volume: f64 = (0..3).map(|k| space.width(k)).product();
+        let edge = (policy::BOXES_PER_CELL * volume / boxes.max(1) as f64).cbrt();
+        let mut spacing = Self { boxes, space, extent, edge, wraps: false };
+        while spacing.count() > spacing.most_cells() {
+            spacing.edge *= 1.5;
+        }
+        spacing
+    }
+
+    fn most_cells(&self) -> f64 {
+        policy::MAX_CELLS_PER_BOX * self.boxes as f64 + policy::MIN_CELLS
+    }
+
+    /// Returns the length of a step on an axis, for cells of 64 steps.
+    fn step(&self, k: usize) -> f64 {
+        let least = self.space.width(k) * 1e-9;
+        (f64::from(self.extent[k]) / (MAX_STEPS_PER_BOX - 1.0)).max(self.edge / 64.0).max(least).max(1e-36)
+    }
+
+    /// Returns the number of cells that the space has on an axis.
+    fn cells_along(&self, k: usize) -> f64 {
+        self.space.width(k) / (64.0 * self.step(k)) + 1.0
+    }
+
+    fn count(&self) -> f64 {
+        (0..3).map(|k| (self.cells_along(k) + 4.0).floor()).product()
+    }
+
+    /// Makes cells smaller where the sample says that boxes lie in a few clusters far apart: then the cells wrap around, as
+    /// a grid of the whole space would have too many.
+    fn uncrowded(mut self, sample: &Sample) -> Self {
+        let smallest = self.edge * 1e-6;
+        while self.edge > smallest && self.crowd(sample) > policy::MAX_CROWD {
+            self.edge *= 0.5;
+        }
+        self.wraps = self.count() > self.most_cells();
+        self
+    }
+
+    /// Estimates how many others a box has in its cell; 0 where the sample is too small to tell.
+    fn crowd(&self, sample: &Sample) -> f64 {
+        let cell = |k: usize, x: f32| ((f64::from(x) - f64::from(self.space.low[k])) / (64.0 * self.step(k))) as i64;
+        let mut cells = [[0i64; 3]; SAMPLE_SIZE];
+        let boxes = sample.boxes();
+        for (to, aabb) in cells.iter_mut().zip(boxes) {
+            *to = std::array::from_fn(|k| cell(k, aabb.min[k]));
+        }
+        let cells = &mut cells[..boxes.len()];
+        cells.sort_unstable();
+        let others: usize = cells.chunk_by(|a, b| a == b).map(|same| same.len() * (same.len() - 1)).sum();
+        let n = boxes.len().max(1) as f64;
+        if others < policy::MIN_COINCIDENCES { 0.0 } else { others as f64 / n * (self.boxes as f64 / n) }
+    }
+
+    fn plan(&self) -> GridPlan {
+        let per_cell = self.boxes as f64 / (0..3).map(|k| self.cells_along(k)).product::<f64>();
+        let is_crowded = self.wraps || per_cell > policy::RUNS_UP_TO_PER_CELL;
+        let shift = if per_cell > policy::HALF_CELLS_FROM_PER_CELL { 5 } else { 6 };
+        let mut cells = Cells { shift, wraps: self.wraps, ..Cells::default() };
+        for k in 0..3 {
+            let step = self.step(k);
+            cells.origin[k] = f64::from(self.space.low[k]) - 64.0 * step;
+            cells.scale[k] = 1.0 / step;
+            cells.max_extent[k] = self.extent[k];
+            cells.reach[k] = (f64::from(self.extent[k]) / step).ceil() as i32 + 2;
+            cells.dims[k] = ((self.space.width(k) / step + 128.0) / f64::from(1u32 << shift)) as i32 + 3;
+        }
+        if self.wraps {
+            cells.dims = wrapped_dims(cells.dims, self.most_cells());
+        }
+        GridPlan { cells, scan: if is_crowded { NeighbourScan::Windows } else { NeighbourScan::Runs } }
+    }
+}
+
+/// Returns powers of two, at most as many cells as allowed, and no more on an axis than the space needs.
+fn wrapped_dims(needed: [i32; 3], most: f64) -> [i32; 3] {
+    let mut dims = needed.map(|dim| (dim.clamp(8, 1 << 24) as u32).next_power_of_two() as i32);
+    while dims.iter().map(|&dim| f64::from(dim)).product::<f64>() > most {
+        let longest = dims.iter_mut().max().expect("three axes");
+        if *longest <= 8 {
+            break;
+        }
+        *longest /= 2;
+    }
+    dims
+}

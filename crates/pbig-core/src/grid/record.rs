@@ -1,0 +1,39 @@
+//! A box as the search reads it: half a cache line.
+
+use crate::Aabb;
+
+/// A box with its id and the key of its cell.
+#[repr(C, align(32))]
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Record {
+    pub(crate) aabb: Aabb,
+    pub(crate) id: u32,
+    pub(crate) key: u32,
+}
+
+const _: () = assert!(size_of::<Record>() == 32);
+
+impl Record {
+    pub(crate) const EMPTY: Self = Self { aabb: Aabb::NOWHERE, id: 0, key: 0 };
+
+    pub(crate) const fn new(aabb: Aabb, id: u32, key: u32) -> Self {
+        Self { aabb, id, key }
+    }
+
+    /// The exact test of two valid boxes, see [`Aabb::overlaps`]. A record has two numbers behind its box, so that both
+    /// corners can be loaded as four lanes.
+    #[inline(always)]
+    pub(crate) fn overlaps(&self, other: &Self) -> bool {
+        #[cfg(target_arch = "x86_64")]
+        // SAFETY: SSE is part of the architecture; each load lies inside a record.
+        unsafe {
+            use std::arch::x86_64::{_mm_and_ps, _mm_cmple_ps, _mm_loadu_ps, _mm_movemask_ps};
+            let [a, b] = [self, other].map(|record| std::ptr::from_ref(record).cast::<f32>());
+            let below = _mm_cmple_ps(_mm_loadu_ps(a), _mm_loadu_ps(b.add(3)));
+            let above = _mm_cmple_ps(_mm_loadu_ps(b), _mm_loadu_ps(a.add(3)));
+            _mm_movemask_ps(_mm_and_ps(below, above)) & 7 == 7
+        }
+        #[cfg(not(target_arch = "x86_64"))]
+        self.aabb.overlaps(&other.aabb)
+    }
+}

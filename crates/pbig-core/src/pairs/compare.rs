@@ -1,0 +1,172 @@
+//! The comparison: found pairs against the kept ones, group by group, in the order of ids.
+
+use super::groups::{Groups, Span};
+use super::kept::{Kept, Rows};
+use super::row;
+use crate::Pair;
+use crate::grid::{Kernel, Simd, dispatch};
+use crate::parallel::SharedSlice;
+
+/// What a comparison has found. All lists are sorted.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Comparison {
+    pub(crate) added: Vec<Pair>,
+    pub(crate) removed: Vec<Pair>,
+    /// Kept pairs of removed boxes, which end without an event.
+    pub(crate) dropped: Vec<Pair>,
+    /// By group.
+    parts: Vec<Part>,
+}
+
+/// The events of one group.
+#[derive(Clone, Debug, Default)]
+struct Part {
+    added: Vec<Pair>,
+    removed: Vec<Pair>,
+    dropped: Vec<Pair>,
+    /// An old row without the partners that were removed.
+    stripped: Vec<u32>,
+}
+
+impl Comparison {
+    /// Compares all found pairs with the kept ones; the found ones are kept from now on. `is_removed` tells of a box that
+    /// its kept pairs have ended already; none has if it is not given.
+    pub(crate) fn run(
+        &mut self,
+        found: &mut Groups,
+        kept: &mut Kept,
+        is_removed: Option<&(dyn Fn(u32) -> bool + Sync)>,
+        workers: usize,
+    ) {
+        let (grouping, count) = (found.grouping, found.len());
+        let mut next = std::mem::take(&mut kept.next);
+        next.prepare(grouping.ids, count);
+        self.parts.resize_with(grouping.count, Part::default);
+        let parts = SharedSlice::new(&mut self.parts);
+        let (spans, pool) = (SharedSlice::new(&mut next.spans), SharedSlice::new(&mut next.pool));
+        let old = &kept.forward;
+        found.for_each(workers, |found, sorter, group| {
+            let (ids, places) = (grouping.ids_of(group), found.range(group));
+            let (first_id, first_place) = (ids.start as u32, places.start as u32);
+            // SAFETY: each group has its own part, ids and places.
+            let (part, spans, pool) =
+                unsafe { (&mut parts.part(group..group + 1)[0], spans.part(ids), pool.part(places)) };
+            part.clear();
+            found.sort(group, sorter, spans, pool, first_place);
+            let new = NewRows { first_id, first_place, spans, pool };
+            match is_removed {
+                Some(is_removed) => part.compare_stripped(old, &new, is_removed),
+                None => dispatch(CompareRows { part, old, new: &new }),
+            }
+        });
+        kept.next = next;
+        self.gather();
+        kept.adopt_next(&self.added, &self.removed, &self.dropped);
+    }
+
+    /// Forgets all events.
+    pub(crate) fn clear(&mut self) {
+        (self.added.clear(), self.removed.clear(), self.dropped.clear());
+    }
+
+    /// Sorts events that were found in any order.
+    pub(crate) fn sort(&mut self) {
+        for events in [&mut self.added, &mut self.removed] {
+            events.sort_unstable_by_key(|pair| u64::from(pair.a) << 32 | u64::from(pair.b));
+        }
+    }
+
+    fn gather(&mut self) {
+        self.clear();
+        let Self { added, removed, dropped, parts } = self;
+        for part in parts {
+            added.extend_from_slice(&part.added);
+            removed.extend_from_slice(&part.removed);
+            dropped.extend_from_slice(&part.dropped);
+        }
+    }
+
+    /// Gives back memory.
+    pub(crate) fn shrink(&mut self) {
+        *self = Self::default();
+    }
+}
+
+impl Rows {
+    /// Makes room for `pairs` pairs of `ids` ids, whatever was there.
+    fn prepare(&mut self, ids: usize, pairs: usize) {
+        self.spans.resize(ids, Span::default());
+        self.pool.resize(pairs, 0);
+        self.set_packed(pairs);
+    }
+}
+
+/// The sorted rows of a group.
+struct NewRows<'a> {
+    first_id: u32,
+    /// Where the group's rows begin in the pool of all.
+    first_place: u32,
+    spans: &'a [Span],
+    pool: &'a [u32],
+}
+
+impl NewRows<'_> {
+    /// Yields each id with its row.
+    #[inline(always)]
+    fn rows(&self) -> impl Iterator<Item = (u32, &[u32])> {
+        (self.first_id..).zip(self.spans).map(|(a, span)| {
+            let start = (span.start - self.first_place) as usize;
+            (a, &self.pool[start..start + span.len as usize])
+        })
+    }
+}
+
+/// Compares rows, most of which are short and have not changed.
+struct CompareRows<'a> {
+    part: &'a mut Part,
+    old: &'a Rows,
+    new: &'a NewRows<'a>,
+}
+
+impl Kernel for CompareRows<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    unsafe fn run<S: Simd>(self) {
+        let Self { part, old, new } = self;
+        for (a, is) in new.rows() {
+            let was = old.row(a);
+            if !row::are_same::<S>(was, is, &old.pool, new.pool) {
+                row::differences(a, was, is, &mut part.added, &mut part.removed);
+            }
+        }
+    }
+}
+
+impl Part {
+    fn clear(&mut self) {
+        (self.added.clear(), self.removed.clear(), self.dropped.clear());
+    }
+
+    /// Compares as if the kept pairs of removed boxes had never been.
+    fn compare_stripped(&mut self, old: &Rows, new: &NewRows<'_>, is_removed: &(dyn Fn(u32) -> bool + Sync)) {
+        for (a, is) in new.rows() {
+            self.strip(a, old.row(a), is_removed);
+            if self.stripped != is {
+                row::differences(a, &self.stripped, is, &mut self.added, &mut self.removed);
+            }
+        }
+    }
+
+    fn strip(&mut self, a: u32, was: &[u32], is_removed: &(dyn Fn(u32) -> bool + Sync)) {
+        self.stripped.clear();
+        let has_ended = is_removed(a);
+        for &b in was {
+            if has_ended || is_removed(b) {
+                self.dropped.push(Pair { a, b });
+            } else {
+                self.stripped.push(b);
+            }
+        }
+    }
+}

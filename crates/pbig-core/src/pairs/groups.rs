@@ -1,0 +1,239 @@
+//! Groups: found pairs gathered by ranges of `a`, so that each group is sorted within the cache, by any thread.
+
+use super::row::{self, SHORT};
+use crate::Pair;
+use crate::grid::{Hits, Kernel, Simd, dispatch};
+use crate::parallel::{SharedSlice, ensure_scratch, run};
+use std::ops::Range;
+use std::sync::Mutex;
+
+/// log2 of the ids in a group, at least.
+const MIN_SHIFT: u32 = 10;
+
+/// Groups, at most, about: each thread has a write position for each.
+const MAX_GROUPS: usize = 500;
+
+/// Pairs of a row, on average, from which a group is sorted roughly by `b` first: rows are longer than a register.
+const RADIX_FROM: usize = 6;
+
+/// Bits of `b` by which it is.
+const RADIX_BITS: u32 = 11;
+
+/// How ids fall into groups.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Grouping {
+    pub(crate) ids: usize,
+    pub(crate) shift: u32,
+    pub(crate) count: usize,
+}
+
+impl Grouping {
+    /// Groups for so many ids.
+    pub(crate) fn new(ids: usize) -> Self {
+        let shift = (MIN_SHIFT..u32::BITS).find(|shift| ids >> shift <= MAX_GROUPS).unwrap_or(MIN_SHIFT);
+        Self { ids, shift, count: (ids >> shift) + 1 }
+    }
+
+    /// Returns the ids of a group.
+    pub(super) fn ids_of(&self, group: usize) -> Range<usize> {
+        group << self.shift..((group + 1) << self.shift).min(self.ids)
+    }
+}
+
+/// Where a row of pairs lies.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) struct Span {
+    pub(super) start: u32,
+    pub(super) len: u32,
+}
+
+impl Span {
+    pub(super) fn range(self) -> Range<usize> {
+        self.start as usize..(self.start + self.len) as usize
+    }
+}
+
+/// Pairs by group, with the buffers to sort them.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Groups {
+    pub(super) grouping: Grouping,
+    /// Pairs, group by group.
+    pairs: Vec<Pair>,
+    /// By group: its first pair; then the number of pairs.
+    starts: Vec<u32>,
+    /// By thread.
+    sorters: Vec<Sorter>,
+}
+
+impl Groups {
+    /// Gathers the pairs that threads have found and counted by this grouping; returns how many there are.
+    pub(crate) fn gather(&mut self, grouping: Grouping, hits: &mut [Hits], workers: usize) -> usize {
+        self.grouping = grouping;
+        let count = self.place(hits);
+        ensure_scratch(&mut self.pairs, count, Pair::default());
+        let pairs = SharedSlice::new(&mut self.pairs);
+        let hits: Vec<Mutex<&mut Hits>> = hits.iter_mut().map(Mutex::new).collect();
+        run(workers, hits.len(), |_, list| {
+            let Ok(mut hits) = hits[list].lock() else { return };
+            let Hits { pairs: found, groups: next, .. } = &mut **hits;
+            for pair in found.iter() {
+                let place = &mut next[(pair.a >> grouping.shift) as usize];
+                // SAFETY: every pair of every list has its own place.
+                unsafe { pairs.write(*place as usize, *pair) };
+                *place += 1;
+            }
+        });
+        count
+    }
+
+    /// Turns the counts of all lists into places.
+    fn place(&mut self, hits: &mut [Hits]) -> usize {
+        self.starts.clear();
+        let mut next = 0;
+        for group in 0..self.grouping.count {
+            self.starts.push(next);
+            for list in hits.iter_mut() {
+                next += std::mem::replace(&mut list.groups[group], next);
+            }
+        }
+        self.starts.push(next);
+        next as usize
+    }
+
+    /// Returns the number of pairs gathered.
+    pub(super) fn len(&self) -> usize {
+        self.starts.last().map_or(0, |&count| count as usize)
+    }
+
+    /// Returns the places of a group's pairs.
+    pub(super) fn range(&self, group: usize) -> Range<usize> {
+        self.starts[group] as usize..self.starts[group + 1] as usize
+    }
+
+    /// Replaces `list` by all pairs in order.
+    pub(crate) fn list(&mut self, list: &mut Vec<Pair>, workers: usize) {
+        list.resize(self.len(), Pair::default());
+        let list = SharedSlice::new(list);
+        self.for_each(workers, |groups, sorter, group| {
+            let places = groups.range(group);
+            // SAFETY: groups have different pairs.
+            let list = unsafe { list.part(places.clone()) };
+            let spans = &mut std::mem::take(&mut sorter.spans);
+            let others = &mut std::mem::take(&mut sorter.others);
+            spans.resize(groups.grouping.ids_of(group).len(), Span::default());
+            ensure_scratch(others, list.len(), 0);
+            groups.sort(group, sorter, spans, &mut others[..list.len()], 0);
+            for ((to, &a), &b) in list.iter_mut().zip(&sorter.firsts).zip(&*others) {
+                *to = Pair { a, b };
+            }
+            (sorter.spans, sorter.others) = (std::mem::take(spans), std::mem::take(others));
+        });
+    }
+
+    /// Hands each group to `work`, with the buffers of a thread.
+    pub(super) fn for_each(&mut self, workers: usize, work: impl Fn(&Self, &mut Sorter, usize) + Sync) {
+        let mut sorters = std::mem::take(&mut self.sorters);
+        sorters.resize_with(workers.max(sorters.len()), Sorter::default);
+        let groups = &*self;
+        let by_worker: Vec<Mutex<&mut Sorter>> = sorters.iter_mut().map(Mutex::new).collect();
+        run(workers, groups.grouping.count, |worker, group| {
+            if let Ok(mut sorter) = by_worker[worker].lock() {
+                work(groups, &mut sorter, group);
+            }
+        });
+        self.sorters = sorters;
+    }
+
+    /// Sorts a group: the `b` of each pair into `others`, row by row, and where each row lies, counted from `base`.
+    pub(super) fn sort(
+        &self,
+        group: usize,
+        sorter: &mut Sorter,
+        spans: &mut [Span],
+        others: &mut [u32],
+        base: u32,
+    ) {
+        let Sorter { firsts, unsorted, by_b, counts, .. } = sorter;
+        let first_id = self.grouping.ids_of(group).start as u32;
+        let pairs = &self.pairs[self.range(group)];
+        let is_long = pairs.len() > RADIX_FROM * spans.len();
+        let pairs = if is_long { sort_roughly(pairs, by_b, counts, self.grouping.ids) } else { pairs };
+        ensure_scratch(firsts, pairs.len(), 0);
+        ensure_scratch(unsorted, pairs.len() + SHORT, 0);
+        dispatch(SortRows { pairs, first_id, base, spans, others, firsts, unsorted, is_long });
+    }
+}
+
+/// The buffers with which a thread sorts groups.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Sorter {
+    spans: Vec<Span>,
+    others: Vec<u32>,
+    /// The `a` of each pair, in order.
+    firsts: Vec<u32>,
+    /// The `b` of each pair, by row, in no order within it.
+    unsorted: Vec<u32>,
+    by_b: Vec<Pair>,
+    counts: Vec<u32>,
+}
+
+/// Sorts pairs by the highest bits of `b`, so that rows made of them in turn are nearly sorted.
+fn sort_roughly<'a>(pairs: &[Pair], by_b: &'a mut Vec<Pair>, counts: &mut Vec<u32>, ids: usize) -> &'a [Pair] {
+    let shift = (usize::BITS - ids.leading_zeros()).saturating_sub(RADIX_BITS);
+    ensure_scratch(by_b, pairs.len(), Pair::default());
+    counts.clear();
+    counts.resize(1 << RADIX_BITS, 0);
+    pairs.iter().for_each(|pair| counts[(pair.b >> shift) as usize] += 1);
+    let mut next = 0;
+    for count in counts.iter_mut() {
+        next += std::mem::replace(count, next);
+    }
+    for pair in pairs {
+        let place = &mut counts[(pair.b >> shift) as usize];
+        by_b[*place as usize] = *pair;
+        *place += 1;
+    }
+    &by_b[..pairs.len()]
+}
+
+/// Scatters the `b` of pairs into rows, and sorts the rows.
+struct SortRows<'a> {
+    pairs: &'a [Pair],
+    first_id: u32,
+    base: u32,
+    spans: &'a mut [Span],
+    others: &'a mut [u32],
+    firsts: &'a mut [u32],
+    unsorted: &'a mut [u32],
+    is_long: bool,
+}
+
+impl Kernel for SortRows<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    unsafe fn run<S: Simd>(self) {
+        let Self { pairs, first_id, base, spans, others, firsts, unsorted, is_long } = self;
+        spans.fill(Span::default());
+        for pair in pairs {
+            spans[(pair.a - first_id) as usize].len += 1;
+        }
+        let mut next = 0;
+        for span in spans.iter_mut() {
+            span.start = next;
+            next += std::mem::take(&mut span.len);
+        }
+        for pair in pairs {
+            let span = &mut spans[(pair.a - first_id) as usize];
+            let place = (span.start + span.len) as usize;
+            (firsts[place], unsorted[place]) = (pair.a, pair.b);
+            span.len += 1;
+        }
+        for span in spans {
+            let range = span.range();
+            // SAFETY: the unsorted list is longer by a register.
+            unsafe { row::sort_into::<S>(unsorted, range, others, is_long) };
+            span.start += base;
+        }
+    }
+}

@@ -1,0 +1,219 @@
+//! Kept pairs: a sorted row of `b` for each `a`, all rows in one pool.
+
+use super::groups::Span;
+use crate::Pair;
+use crate::grid::prefetch;
+use std::sync::OnceLock;
+
+/// Room of a row that has outgrown its place, at least.
+const MIN_ROOM: u32 = 4;
+
+/// Pairs ahead of the one at hand whose rows are prefetched.
+const AHEAD: usize = 8;
+
+/// Sorted rows of ids, by id.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Rows {
+    pub(super) spans: Vec<Span>,
+    pub(super) pool: Vec<u32>,
+    /// Rows that begin before this place have no spare room; others have room for the next power of two.
+    pub(super) packed: u32,
+}
+
+impl Rows {
+    pub(super) fn row(&self, id: u32) -> &[u32] {
+        self.spans.get(id as usize).map_or(&[], |span| &self.pool[span.range()])
+    }
+
+    fn room(&self, span: Span) -> u32 {
+        if span.start < self.packed { span.len } else { span.len.next_power_of_two().max(MIN_ROOM) }
+    }
+
+    fn insert(&mut self, id: u32, other: u32) {
+        let span = self.spans[id as usize];
+        let span = if span.len == self.room(span) { self.move_to_end(span) } else { span };
+        let row = &mut self.pool[span.start as usize..][..span.len as usize + 1];
+        let mut place = span.len as usize;
+        while place > 0 && row[place - 1] > other {
+            row[place] = row[place - 1];
+            place -= 1;
+        }
+        row[place] = other;
+        self.spans[id as usize] = Span { len: span.len + 1, ..span };
+    }
+
+    /// Says that all rows lie in the first places, without spare room. An empty row at the end lies there, too.
+    pub(super) fn set_packed(&mut self, places: usize) {
+        self.packed = places as u32 + 1;
+    }
+
+    fn move_to_end(&mut self, span: Span) -> Span {
+        self.pool.resize(self.pool.len().max(self.packed as usize), 0);
+        let start = self.pool.len() as u32;
+        let room = (span.len + 1).next_power_of_two().max(MIN_ROOM);
+        self.pool.extend_from_within(span.range());
+        self.pool.resize((start + room) as usize, 0);
+        Span { start, len: span.len }
+    }
+
+    fn remove(&mut self, id: u32, other: u32) {
+        let span = self.spans[id as usize];
+        let row = &mut self.pool[span.range()];
+        if let Ok(place) = row.binary_search(&other) {
+            row.copy_within(place + 1.., place);
+            self.spans[id as usize] = Span { len: span.len - 1, ..span };
+        }
+    }
+
+    /// Moves all rows together when more than half of the pool is unused.
+    fn compact(&mut self, pairs: usize) {
+        if self.pool.len() <= 2 * pairs + self.spans.len() {
+            return;
+        }
+        let mut pool = Vec::with_capacity(pairs + pairs / 8);
+        for span in &mut self.spans {
+            let start = pool.len() as u32;
+            pool.extend_from_slice(&self.pool[span.range()]);
+            span.start = start;
+        }
+        self.set_packed(pool.len());
+        self.pool = pool;
+    }
+}
+
+/// The pairs that exist, kept from update to update.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Kept {
+    /// Rows of `b`, by `a`.
+    pub(super) forward: Rows,
+    /// Rows of `a`, by `b`: made when somebody asks for the pairs of a box, then kept up to date.
+    backward: OnceLock<Rows>,
+    /// By id: pairs in which it is `b`.
+    lower: Vec<u32>,
+    len: usize,
+    /// Buffers of the next comparison.
+    pub(super) next: Rows,
+}
+
+impl Kept {
+    /// Returns the number of pairs.
+    pub(crate) fn len(&self) -> usize {
+        self.len
+    }
+
+    /// Makes ids below `ids` known.
+    pub(crate) fn reserve_ids(&mut self, ids: usize) {
+        self.forward.spans.resize(ids.max(self.forward.spans.len()), Span::default());
+        self.lower.resize(ids.max(self.lower.len()), 0);
+        if let Some(rows) = self.backward.get_mut() {
+            rows.spans.resize(ids.max(rows.spans.len()), Span::default());
+        }
+    }
+
+    /// Yields all pairs, sorted.
+    pub(crate) fn iter(&self) -> impl Iterator<Item = Pair> {
+        (0..self.forward.spans.len() as u32)
+            .flat_map(|a| self.forward.row(a).iter().map(move |&b| Pair { a, b }))
+    }
+
+    /// Yields the partners of a box, sorted.
+    pub(crate) fn partners(&self, id: u32) -> impl Iterator<Item = u32> {
+        let backward = self.backward.get_or_init(|| self.reversed());
+        backward.row(id).iter().chain(self.forward.row(id)).copied()
+    }
+
+    /// Returns the number of pairs of a box.
+    pub(crate) fn degree(&self, id: u32) -> u32 {
+        let i = id as usize;
+        self.forward.spans.get(i).map_or(0, |span| span.len + self.lower[i])
+    }
+
+    /// Returns true if a pair exists.
+    pub(crate) fn contains(&self, pair: Pair) -> bool {
+        self.forward.row(pair.a).binary_search(&pair.b).is_ok()
+    }
+
+    fn reversed(&self) -> Rows {
+        let mut spans = vec![Span::default(); self.lower.len()];
+        let mut next = 0;
+        for (span, len) in spans.iter_mut().zip(&self.lower) {
+            span.start = next;
+            next += len;
+        }
+        let mut pool = vec![0; next as usize];
+        for pair in self.iter() {
+            let span = &mut spans[pair.b as usize];
+            pool[span.range().end] = pair.a;
+            span.len += 1;
+        }
+        let mut rows = Rows { spans, pool, packed: 0 };
+        rows.set_packed(next as usize);
+        rows
+    }
+
+    /// Brings the rows up to date with pairs that exist now, and with those that no longer do.
+    pub(crate) fn apply(&mut self, added: &[Pair], removed: &[Pair]) {
+        self.for_each(removed, |rows, id, other| rows.remove(id, other));
+        self.for_each(added, |rows, id, other| rows.insert(id, other));
+        self.count(added, removed);
+        self.forward.compact(self.len);
+        if let Some(rows) = self.backward.get_mut() {
+            rows.compact(self.len);
+        }
+    }
+
+    fn for_each(&mut self, pairs: &[Pair], change: impl Fn(&mut Rows, u32, u32)) {
+        for (i, pair) in pairs.iter().enumerate() {
+            if let Some(ahead) = pairs.get(i + AHEAD) {
+                let start = self.forward.spans[ahead.a as usize].start as usize;
+                prefetch(self.forward.pool.as_ptr().wrapping_add(start));
+            }
+            change(&mut self.forward, pair.a, pair.b);
+            if let Some(rows) = self.backward.get_mut() {
+                change(rows, pair.b, pair.a);
+            }
+        }
+    }
+
+    fn count(&mut self, added: &[Pair], removed: &[Pair]) {
+        added.iter().for_each(|pair| self.lower[pair.b as usize] += 1);
+        removed.iter().for_each(|pair| self.lower[pair.b as usize] -= 1);
+        self.len = self.len + added.len() - removed.len();
+    }
+
+    /// Takes the compared rows for the kept ones.
+    pub(super) fn adopt_next(&mut self, added: &[Pair], removed: &[Pair], dropped: &[Pair]) {
+        std::mem::swap(&mut self.forward, &mut self.next);
+        self.count(added, removed);
+        self.count(&[], dropped);
+        self.backward.take();
+    }
+
+    /// Drops pairs that end without an event.
+    pub(crate) fn drop_pairs(&mut self, dropped: &[Pair]) {
+        self.apply(&[], dropped);
+    }
+
+    /// Replaces all pairs by sorted ones.
+    pub(crate) fn replace(&mut self, pairs: &[Pair], ids: usize) {
+        *self = Self::default();
+        self.reserve_ids(ids);
+        for pair in pairs {
+            let span = &mut self.forward.spans[pair.a as usize];
+            if span.len == 0 {
+                span.start = self.forward.pool.len() as u32;
+            }
+            span.len += 1;
+            self.forward.pool.push(pair.b);
+        }
+        self.forward.set_packed(pairs.len());
+        self.count(pairs, &[]);
+    }
+
+    /// Gives back memory that the kept pairs do not need.
+    pub(crate) fn shrink(&mut self) {
+        self.next = Rows::default();
+        self.backward.take();
+        self.forward.pool.shrink_to_fit();
+    }
+}

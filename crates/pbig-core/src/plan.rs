@@ -1,0 +1,106 @@
+//! The plan in a report: what was done, and why, in words.
+
+use crate::grid::{EditedGrid, NeighbourScan};
+use std::fmt;
+
+/// The algorithm that did the work.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Algorithm {
+    /// None: fewer than two valid boxes, or nothing has changed.
+    #[default]
+    Nothing,
+    /// Every pair was tested.
+    Brute,
+    /// Changed boxes were tested against all, before and after.
+    Sweep,
+    /// All boxes were sorted into a grid and searched.
+    Grid,
+    /// Changed boxes were moved in the grid of an earlier update, and only they were searched for.
+    Edit,
+    /// A GPU did the work.
+    Gpu,
+}
+
+impl Algorithm {
+    /// Returns the name in reports.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Nothing => "nothing",
+            Self::Brute => "brute",
+            Self::Sweep => "sweep",
+            Self::Grid => "grid",
+            Self::Edit => "edit",
+            Self::Gpu => "gpu",
+        }
+    }
+}
+
+/// How the work was done. Its `Display` says so in words.
+///
+/// ```
+/// use pbig_core::{Aabb, Finder};
+/// let boxes: Vec<_> = (0..500).map(|i| Aabb::from_center([i as f32, 0.0, 0.0], [0.6; 3])).collect();
+/// let mut finder = Finder::default();
+/// finder.find(&boxes)?;
+/// println!("{}", finder.report().plan);
+/// # Ok::<(), pbig_core::Error>(())
+/// ```
+#[derive(Clone, Debug, Default, PartialEq)]
+#[non_exhaustive]
+pub struct Plan {
+    /// The algorithm.
+    pub algorithm: Algorithm,
+    /// Valid boxes.
+    pub boxes: u32,
+    /// Edges of a cell, in the boxes' length unit ([`Algorithm::Grid`] and [`Algorithm::Edit`]).
+    pub cell: [f32; 3],
+    /// Cells by axis.
+    pub dims: [u32; 3],
+    /// The cells that were visited for each box.
+    pub scan: NeighbourScan,
+    /// Boxes larger than a cell, tested against all boxes that they reach.
+    pub oversize: u32,
+    /// Boxes that are not in the grid's order, because they moved since it was built ([`Algorithm::Edit`]).
+    pub spilled: u32,
+}
+
+impl Plan {
+    /// Describes a grid that was used.
+    pub(crate) fn of_grid(algorithm: Algorithm, edited: &EditedGrid) -> Self {
+        let grid = edited.grid();
+        Self {
+            algorithm,
+            boxes: (grid.len + grid.oversize.len()) as u32,
+            cell: grid.plan.cells.edges(),
+            dims: grid.plan.cells.dims(),
+            scan: grid.plan.scan,
+            oversize: grid.oversize.len() as u32,
+            spilled: edited.spilled() as u32,
+        }
+    }
+}
+
+impl fmt::Display for Plan {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let boxes = self.boxes;
+        match self.algorithm {
+            Algorithm::Nothing if boxes < 2 => return write!(f, "nothing to do: fewer than two valid boxes"),
+            Algorithm::Nothing => return write!(f, "nothing to do: no box has changed"),
+            Algorithm::Brute => return write!(f, "brute force: every pair of {boxes} boxes is tested"),
+            Algorithm::Sweep => return write!(f, "sweep: changed boxes are tested against all {boxes}"),
+            Algorithm::Gpu => return write!(f, "GPU: {boxes} boxes"),
+            Algorithm::Grid => write!(f, "grid: {boxes} boxes are sorted and searched")?,
+            Algorithm::Edit => write!(f, "edit: {} of {boxes} boxes are out of the grid's order", self.spilled)?,
+        }
+        let ([x, y, z], [dx, dy, dz]) = (self.cell, self.dims);
+        write!(f, "; {dx} x {dy} x {dz} cells of {x:.3} x {y:.3} x {z:.3}")?;
+        if self.scan == NeighbourScan::Windows {
+            write!(f, ", of which only those in reach are visited")?;
+        }
+        if self.oversize > 0 {
+            write!(f, "; {} oversize boxes are tested against all in reach", self.oversize)?;
+        }
+        Ok(())
+    }
+}

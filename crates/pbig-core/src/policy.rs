@@ -1,0 +1,150 @@
+//! Every choice and every constant behind one. A choice is a fixed rule on counts, never on a clock: the same boxes and the
+//! same calls take the same path on every machine.
+
+use crate::Engine;
+
+/// Boxes from which several threads share a search: waking one costs about as much as 16,384 boxes take alone.
+pub(crate) const PARALLEL_FROM_BOXES: usize = 16_384;
+
+/// Boxes of which every pair is tested: a grid takes longer.
+pub(crate) const BRUTE_FORCE_UP_TO_BOXES: usize = 64;
+
+/// Wanted boxes in a cell where their density, not their size, decides.
+pub(crate) const BOXES_PER_CELL: f64 = 0.5;
+
+/// Cells for each box, at most: beyond, clearing and scanning counts takes longer than full cells do.
+pub(crate) const MAX_CELLS_PER_BOX: f64 = 8.0;
+
+/// Cells that a grid may have, however few the boxes.
+pub(crate) const MIN_CELLS: f64 = 4096.0;
+
+/// Boxes in a cell up to which the five runs of the half neighbourhood are visited unseen.
+pub(crate) const RUNS_UP_TO_PER_CELL: f64 = 3.0;
+
+/// Boxes in a cell from which cells are half as large as the largest box.
+pub(crate) const HALF_CELLS_FROM_PER_CELL: f64 = 16.0;
+
+/// Others in a box's cell, by the sample, from which cells are made smaller: boxes lie in clusters far apart.
+pub(crate) const MAX_CROWD: f64 = 64.0;
+
+/// Coincidences in the sample that say something: a few may be chance.
+pub(crate) const MIN_COINCIDENCES: usize = 16;
+
+/// Largest extent, in medians, from which sizes are counted by class to find which boxes are oversize.
+pub(crate) const MIXED_SIZE_RATIO: f32 = 4.0;
+
+/// Costs, in ns on one core, that decide which boxes are oversize: of a box in the grid, of a candidate in its cells, and
+/// of a test against an oversize box.
+pub(crate) const NS_PER_BOX: f64 = 40.0;
+pub(crate) const NS_PER_CANDIDATE: f64 = 0.35;
+pub(crate) const NS_PER_OVERSIZE_TEST: f64 = 0.7;
+
+/// Boxes of a world in which changed boxes are tested against all, at most.
+pub(crate) const SWEEP_UP_TO_BOXES: usize = 1024;
+
+/// Tests (changed boxes times boxes) up to which that takes less time than a grid.
+pub(crate) const SWEEP_UP_TO_TESTS: usize = 1 << 16;
+
+/// Share of the boxes, one in so many, up to which changed boxes are edited: measured, editing takes as long as a rebuild
+/// at 7 to 10% of 100,000 boxes, at 4 to 5% of a million.
+pub(crate) const EDIT_UP_TO_ONE_IN: usize = 20;
+
+/// Share of the boxes, one in so many, that may be out of the grid's order: lists of them are slower than slots.
+pub(crate) const SPILL_UP_TO_ONE_IN: usize = 2;
+
+/// Changed boxes from which several threads look them up.
+pub(crate) const PARALLEL_FROM_EDITS: usize = 1024;
+
+/// What is known when an engine is chosen.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Counts {
+    /// Boxes that are present.
+    pub(crate) boxes: usize,
+    /// One more than the largest id.
+    pub(crate) ids: usize,
+    /// Boxes changed since the last update.
+    pub(crate) changed: usize,
+    /// True if the old state of all changed boxes is known.
+    pub(crate) knows_old: bool,
+    /// True if the sweep knows the world of the last update.
+    pub(crate) knows_world: bool,
+    /// True if the grid holds the boxes of the last update.
+    pub(crate) has_grid: bool,
+    /// Boxes out of the grid's order.
+    pub(crate) spilled: usize,
+}
+
+/// Chooses the engine of an update in which some boxes have changed.
+///
+/// | rule, the first that applies | engine |
+/// | --- | --- |
+/// | ids at most [`SWEEP_UP_TO_BOXES`], changed x ids at most [`SWEEP_UP_TO_TESTS`] | sweep |
+/// | a grid of the last update, changed at most 1 in [`EDIT_UP_TO_ONE_IN`], spilled at most 1 in [`SPILL_UP_TO_ONE_IN`] | edit |
+/// | else | rebuild |
+pub(crate) fn choose_engine(counts: &Counts, forced: Option<Engine>) -> Engine {
+    let may_sweep = counts.knows_old || counts.knows_world;
+    let may_edit = counts.knows_old && counts.has_grid;
+    match forced {
+        Some(Engine::Sweep) if may_sweep => return Engine::Sweep,
+        Some(Engine::Edit) if may_edit => return Engine::Edit,
+        Some(_) => return Engine::Rebuild,
+        None => {}
+    }
+    let is_small = counts.ids <= SWEEP_UP_TO_BOXES && counts.changed * counts.ids <= SWEEP_UP_TO_TESTS;
+    let is_few = counts.changed * EDIT_UP_TO_ONE_IN <= counts.boxes;
+    let is_tidy = counts.spilled * SPILL_UP_TO_ONE_IN <= counts.boxes;
+    if is_small && may_sweep {
+        Engine::Sweep
+    } else if is_few && is_tidy && may_edit {
+        Engine::Edit
+    } else {
+        Engine::Rebuild
+    }
+}
+
+/// Returns of how many changed boxes the old state is worth keeping, until the next update.
+pub(crate) fn old_states_to_keep(boxes: usize, ids: usize, forced: Option<Engine>) -> usize {
+    if forced.is_some() || ids <= SWEEP_UP_TO_BOXES { usize::MAX } else { boxes / EDIT_UP_TO_ONE_IN }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const WORLD: Counts = Counts {
+        boxes: 10_000,
+        ids: 10_000,
+        changed: 100,
+        knows_old: true,
+        knows_world: false,
+        has_grid: true,
+        spilled: 0,
+    };
+
+    #[test]
+    fn few_changes_are_edited_and_many_rebuild_the_grid() {
+        assert_eq!(choose_engine(&WORLD, None), Engine::Edit);
+        assert_eq!(choose_engine(&Counts { changed: 501, ..WORLD }, None), Engine::Rebuild);
+        assert_eq!(choose_engine(&Counts { spilled: 5001, ..WORLD }, None), Engine::Rebuild);
+        assert_eq!(choose_engine(&Counts { has_grid: false, ..WORLD }, None), Engine::Rebuild);
+        assert_eq!(choose_engine(&Counts { knows_old: false, ..WORLD }, None), Engine::Rebuild);
+    }
+
+    #[test]
+    fn small_worlds_are_swept_while_few_boxes_change() {
+        let small = Counts { boxes: 1000, ids: 1000, changed: 65, has_grid: false, ..WORLD };
+        assert_eq!(choose_engine(&small, None), Engine::Sweep);
+        assert_eq!(choose_engine(&Counts { changed: 66, ..small }, None), Engine::Rebuild);
+        assert_eq!(choose_engine(&Counts { ids: 1025, ..small }, None), Engine::Rebuild);
+        assert_eq!(choose_engine(&Counts { knows_old: false, ..small }, None), Engine::Rebuild);
+    }
+
+    #[test]
+    fn an_engine_that_is_asked_for_is_used_where_it_can() {
+        for engine in [Engine::Sweep, Engine::Edit, Engine::Rebuild] {
+            assert_eq!(choose_engine(&WORLD, Some(engine)), engine);
+            let lost = Counts { has_grid: false, knows_old: false, ..WORLD };
+            assert_eq!(choose_engine(&lost, Some(engine)), Engine::Rebuild);
+        }
+    }
+}
