@@ -49,21 +49,6 @@ impl Follower {
         self.fat_boxes_are_near(what);
     }
 
-    /// Updates and compares; between the two halves of the update these boxes are set, of which it must know nothing.
-    pub(crate) fn update_while_set(&mut self, news: &[(u32, Aabb, ProxyFilter)], what: &str) {
-        self.forget_pairs_of_removed();
-        self.broad_phase.begin();
-        let wanted = self.wanted();
-        for &(id, aabb, filter) in news {
-            self.set(id, aabb, filter);
-        }
-        let kept: BTreeSet<Pair> = self.broad_phase.pairs().collect();
-        assert_eq!(self.pairs, kept, "{what}: until the end all is as it was");
-        self.follow(what);
-        assert_eq!(self.pairs, wanted, "{what}: {}", self.broad_phase.report().plan);
-        self.fat_boxes_are_near(what);
-    }
-
     /// Updates and follows the events: where there are a million updates a sample of them is compared.
     pub(crate) fn update_unchecked(&mut self) {
         self.follow("not compared");

@@ -35,9 +35,6 @@ pub(crate) struct Search<R> {
     /// Memory for a summary.
     pub(crate) spare: Option<Summary>,
     warned: bool,
-    /// Time for the beginning of a search that was begun ahead.
-    #[cfg(feature = "gpu")]
-    spent: Duration,
     #[cfg(feature = "gpu")]
     pub(crate) gpu: Option<GpuFinder>,
     #[cfg(feature = "gpu")]
@@ -52,8 +49,6 @@ impl<R: Record> Search<R> {
             found: Found::default(),
             spare: None,
             warned: false,
-            #[cfg(feature = "gpu")]
-            spent: Duration::ZERO,
             #[cfg(feature = "gpu")]
             gpu: None,
             #[cfg(feature = "gpu")]
@@ -203,15 +198,6 @@ impl<R: Record> Search<R> {
         Ok(self.settle(found, boxes.len(), clock, report)?.is_some())
     }
 
-    /// Has a device begin what [`Search::changes_on_gpu`] finds, and does not wait for it.
-    #[cfg(feature = "gpu")]
-    pub(crate) fn begin_changes(&mut self, request: &ChangeRequest<'_>) {
-        stage!("gpu");
-        let clock = Instant::now();
-        self.gpu.get_or_insert_with(GpuFinder::shared).begin_changes(request);
-        self.spent = clock.elapsed();
-    }
-
     /// Finds on a device what has changed, into `found`, if that is wanted; returns the boxes that began anew
     /// ([`GpuFinder::changes`]), nothing when it is not or could not be done.
     #[cfg(feature = "gpu")]
@@ -221,9 +207,7 @@ impl<R: Record> Search<R> {
         report: &mut Report,
     ) -> Result<Option<Vec<u32>>, Error> {
         stage!("gpu");
-        let now = Instant::now();
-        // As if the time in between had not passed: it was the caller's.
-        let clock = now.checked_sub(std::mem::take(&mut self.spent)).unwrap_or(now);
+        let clock = Instant::now();
         let gpu = self.gpu.get_or_insert_with(GpuFinder::shared);
         let found = gpu.changes(request, &mut self.found, report);
         self.settle(found, request.boxes.len(), clock, report)

@@ -1,10 +1,10 @@
-//! An update on a GPU: only what has changed goes there, only pairs that came or went come back. Between its two halves
-//! the state is as it was ([`super::overlap`]), so that both ask the same, and the CPU can do it when the device fails.
+//! An update on a GPU: only what has changed goes there, only pairs that came or went come back.
 
 use super::update::{State, state};
 use super::{BroadPhase, flag};
 use crate::diff::Judgement;
 use crate::gpu::{Change, ChangeRequest};
+use crate::plan::NoGpu;
 use crate::{Error, Pair};
 
 /// What a device is asked by a broad phase of which other fields may be written.
@@ -13,7 +13,7 @@ macro_rules! request {
         ChangeRequest {
             boxes: &$of.boxes,
             filters: &$of.filters,
-            changed: &$of.overlap.changes,
+            changed: &$of.asked.changes,
             update: $of.updates,
             kept: $of.pairs.listed() as u64,
             config: &$of.config,
@@ -21,25 +21,15 @@ macro_rules! request {
     };
 }
 
-impl BroadPhase {
-    /// Has the device begin the search for pairs that came or went, if that is wanted.
-    pub(super) fn begin_on_gpu(&mut self) {
-        if self.changed.is_empty() {
-            return;
-        }
-        // Where little moves the base of the CPU is worth having.
-        let few = !self.many_changed();
-        let wanted = self.base.wants_gpu(&self.config, self.boxes.len(), few);
-        self.overlap.asked = Some(wanted.is_ok());
-        self.overlap.no_gpu = wanted.err().flatten();
-        if wanted.is_ok() {
-            self.drop_near();
-            self.pairs.drop_removed();
-            self.note_changes();
-            self.base.begin_changes(&request!(self));
-        }
-    }
+/// The request of the last update.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Asked {
+    changes: Vec<Change>,
+    /// Why no device was asked, where that is left open.
+    pub(super) no_gpu: Option<NoGpu>,
+}
 
+impl BroadPhase {
     /// What the changed boxes were.
     fn note_changes(&mut self) {
         let state = state!(self);
@@ -47,20 +37,23 @@ impl BroadPhase {
             let old = state.old(id);
             Change { id, aabb: old.aabb, filter: old.filter }
         };
-        self.overlap.changes.clear();
-        self.overlap.changes.extend(self.changed.iter().map(was));
+        self.asked.changes.clear();
+        self.asked.changes.extend(self.changed.iter().map(was));
     }
 
     /// What the device has found, if it was asked: the added ones into `events.added`, boxes that have
     /// lost some into `ending`. False when the CPU has to do it.
     pub(super) fn find_changes_on_gpu(&mut self) -> Result<bool, Error> {
-        // One restored from a snapshot has begun without a device.
-        if self.overlap.asked.is_none() {
-            self.begin_on_gpu();
-        }
-        if self.overlap.asked.take() != Some(true) {
+        // Where little moves the base of the CPU is worth having.
+        let few = !self.many_changed();
+        let wanted = self.base.wants_gpu(&self.config, self.boxes.len(), few);
+        self.asked.no_gpu = wanted.err().flatten();
+        if wanted.is_err() {
             return Ok(false);
         }
+        self.drop_near();
+        self.pairs.drop_removed();
+        self.note_changes();
         let Some(restarted) = self.base.changes_on_gpu(&request!(self), &mut self.report)? else {
             return Ok(false);
         };
@@ -158,8 +151,8 @@ mod tests {
         assert!(broad_phase.report().gpu.is_some());
     }
 
-    /// Whoever does an update, in one or in two halves, and however many before it have ended with an error: events lead from
-    /// the pairs of the last one that has not to those that there are.
+    /// Whoever does an update, and however many before it have ended with an error: events lead from the pairs of the last
+    /// one that has not to those that there are.
     #[test]
     fn devices_and_the_cpu_take_turns_and_updates_fail_in_between() {
         let config = Config { strategy: Strategy::Grid, ..Config::DEFAULT };
@@ -189,9 +182,6 @@ mod tests {
                 }
             }
             broad_phase.near.worth.pause = 0;
-            if random.random() {
-                broad_phase.begin();
-            }
             let result = broad_phase.update().cloned();
             let is_near = broad_phase.near.is_on && result.is_ok();
             let way = if broad_phase.config.backend == Backend::Gpu { 0 } else { 1 + usize::from(is_near) };

@@ -25,7 +25,7 @@ impl BroadPhase {
 
     fn no_gpu(&self) -> Option<NoGpu> {
         #[cfg(feature = "gpu")]
-        return self.overlap.no_gpu;
+        return self.asked.no_gpu;
         #[cfg(not(feature = "gpu"))]
         (self.config.backend == crate::Backend::Auto).then_some(NoGpu::NotBuilt)
     }

@@ -10,7 +10,6 @@ mod flag;
 mod many;
 mod measured;
 mod near;
-mod overlap;
 mod rebuild;
 mod small;
 #[cfg(feature = "serde")]
@@ -32,7 +31,6 @@ use crate::report::{Checks, Report, StageTimes, Watch, stage};
 use crate::search::Search;
 use crate::{Aabb, Backend, Config, Error, Pair, Plan, ProxyFilter};
 use fat::still_holds;
-use overlap::Overlap;
 use std::collections::HashMap;
 use std::time::Instant;
 use turns::Turn;
@@ -104,8 +102,9 @@ pub struct BroadPhase {
     refiltered: HashMap<u32, Old>,
     /// Updates that have changed something.
     updates: u64,
-    /// An update that has begun and is not finished.
-    overlap: Overlap,
+    /// What a device is asked about, and why none is.
+    #[cfg(feature = "gpu")]
+    asked: device::Asked,
     /// Boxes that have lost pairs, as far as the device can tell.
     #[cfg(feature = "gpu")]
     ending: Vec<u32>,
@@ -150,7 +149,8 @@ impl BroadPhase {
             rests: vec![],
             refiltered: HashMap::new(),
             updates: 0,
-            overlap: Overlap::default(),
+            #[cfg(feature = "gpu")]
+            asked: device::Asked::default(),
             #[cfg(feature = "gpu")]
             ending: vec![],
             base: Search::new(),
@@ -199,11 +199,7 @@ impl BroadPhase {
     /// [`Error::Margin`].
     pub fn set_margin(&mut self, margin: f32) -> Result<(), Error> {
         check_margin(margin)?;
-        if self.has_begun() {
-            self.change_margin_later(margin);
-        } else {
-            self.config.margin = margin;
-        }
+        self.config.margin = margin;
         Ok(())
     }
 
@@ -218,9 +214,6 @@ impl BroadPhase {
     /// [`Error::TooManyBoxes`] when the id is not below [`crate::Limits::max_boxes`].
     #[inline(always)]
     pub fn set(&mut self, id: u32, aabb: Aabb, filter: ProxyFilter) -> Result<(), Error> {
-        if self.has_begun() {
-            return self.set_later(id, aabb, filter);
-        }
         let i = id as usize;
         let valid = aabb.is_valid();
         if self.flags.get(i).is_none_or(|flags| flags & flag::PRESENT == 0) {
@@ -266,9 +259,6 @@ impl BroadPhase {
     /// Removes a box; its pairs end without an event (ask [`BroadPhase::pairs_of`] before if they
     /// matter). False when there was none.
     pub fn remove(&mut self, id: u32) -> bool {
-        if self.has_begun() {
-            return self.remove_later(id);
-        }
         let i = id as usize;
         if !self.contains(id) {
             return false;
@@ -285,16 +275,15 @@ impl BroadPhase {
         true
     }
 
-    /// Finds what has changed since the last update. Costs next to nothing when nothing has. The same as
-    /// [`BroadPhase::begin`] and [`BroadPhase::finish`]: one that has begun already is finished.
+    /// Finds what has changed since the last update. Costs next to nothing when nothing has.
     ///
     /// # Errors
     /// [`Error::TooManyPairs`]; the changes are kept, and the next update sees them again.
     pub fn update(&mut self) -> Result<&Events, Error> {
-        self.finish()
+        self.find_events()?;
+        Ok(&self.events)
     }
 
-    /// All of an update, but what a device has begun.
     fn find_events(&mut self) -> Result<(), Error> {
         self.events.added.clear();
         self.events.removed.clear();

@@ -4,9 +4,8 @@
 //! are saved as bits: exact in any format, also where it has no NaN or infinity. Whatever is restored has been
 //! checked: no bytes make later calls panic.
 
-use super::overlap::Later;
 use super::{BroadPhase, Old, flag};
-use crate::{Aabb, Config, Error, Pair, ProxyFilter};
+use crate::{Aabb, Config, Pair, ProxyFilter};
 use serde::de::Error as _;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use std::borrow::Cow;
@@ -26,63 +25,22 @@ struct Snapshot<'a> {
     present: Vec<bool>,
     pairs: Vec<Pair>,
     changed: Vec<(u32, Bits, ProxyFilter)>,
-    begun: bool,
-    later: Vec<SavedCall>,
-}
-
-/// A call since an update has begun.
-#[derive(Serialize, Deserialize)]
-enum SavedCall {
-    Set(u32, Bits, ProxyFilter),
-    Remove(u32),
-    Margin(f32),
-}
-
-impl SavedCall {
-    fn new(call: &Later) -> Self {
-        match call {
-            Later::Set(id, aabb, filter) => Self::Set(*id, to_bits(aabb), *filter),
-            Later::Remove(id) => Self::Remove(*id),
-            Later::Margin(margin) => Self::Margin(*margin),
-        }
-    }
-
-    fn repeat(&self, on: &mut BroadPhase) -> Result<(), Error> {
-        match self {
-            Self::Set(id, bits, filter) => on.set(*id, bytemuck::cast(*bits), *filter)?,
-            Self::Remove(id) => _ = on.remove(*id),
-            Self::Margin(margin) => on.set_margin(*margin)?,
-        }
-        Ok(())
-    }
 }
 
 impl Serialize for BroadPhase {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         let mut pairs: Vec<Pair> = self.pairs().collect();
         pairs.sort_unstable();
-        // Room for ids that wait: what is restored makes none for ids that are not in the lists.
-        let ids = self.ids_to_come();
-        let mut present: Vec<bool> = self.flags.iter().map(|flags| flags & flag::PRESENT != 0).collect();
-        present.resize(ids, false);
-        let mut boxes: Vec<Bits> = self.boxes.iter().map(to_bits).collect();
-        boxes.resize(ids, to_bits(&Aabb::NOWHERE));
-        let mut filters = Cow::Borrowed(&self.filters[..]);
-        if ids > filters.len() {
-            filters.to_mut().resize(ids, ProxyFilter::ALL);
-        }
         // In the order of ids: the other order depends on who has set them.
         let mut changed: Vec<u32> = self.changed.clone();
         changed.sort_unstable();
         Snapshot {
             config: self.config,
-            boxes,
-            filters,
-            present,
+            boxes: self.boxes.iter().map(to_bits).collect(),
+            filters: Cow::Borrowed(&self.filters),
+            present: self.flags.iter().map(|flags| flags & flag::PRESENT != 0).collect(),
             pairs,
             changed: changed.into_iter().map(|id| self.saved_change(id)).collect(),
-            begun: self.overlap.begun,
-            later: self.overlap.later.iter().map(SavedCall::new).collect(),
         }
         .serialize(serializer)
     }
@@ -137,9 +95,6 @@ impl Snapshot<'_> {
         for (id, bits, filter) in self.changed {
             restored.restore_change(id, Old { aabb: bytemuck::cast(bits), filter });
         }
-        restored.overlap.begun = self.begun;
-        let repeated = self.later.iter().try_for_each(|call| call.repeat(&mut restored));
-        repeated.map_err(|error| format!("snapshot: {error}"))?;
         Ok(restored)
     }
 
@@ -160,10 +115,6 @@ impl Snapshot<'_> {
         }
         if let Some((id, ..)) = self.changed.iter().find(|(id, ..)| !known(*id)) {
             return Err(format!("snapshot: box {id} has changed, but there are {ids}"));
-        }
-        let unknown = |call: &SavedCall| matches!(call, SavedCall::Set(id, ..) if !known(*id));
-        if self.later.iter().any(unknown) || (!self.begun && !self.later.is_empty()) {
-            return Err("snapshot: calls that wait for nothing, or about boxes without a place".into());
         }
         Ok(())
     }
@@ -218,34 +169,11 @@ mod tests {
     }
 
     #[test]
-    fn an_update_that_has_begun_is_restored_with_the_calls_that_wait() {
-        let mut kept = BroadPhase::new(Config { brute_below: 0, ..Config::DEFAULT }).expect("a margin");
-        play(&mut kept, 0);
-        for (round, new_id) in [(1, 40), (2, 60)] {
-            kept.begin();
-            kept.set(new_id, Aabb::from_center([7.0, 0.0, 0.0], [0.6; 3]), ProxyFilter::ALL)
-                .expect("few boxes");
-            kept.set_margin(0.1).expect("a length");
-            assert!(kept.remove(4 + round) && kept.remove(new_id) && !kept.remove(new_id));
-            kept.set(new_id, Aabb::from_center([9.0, 0.0, 0.0], [0.6; 3]), ProxyFilter::ALL)
-                .expect("few boxes");
-            let mut restored: BroadPhase = serde_json::from_str(&saved(&kept)).expect("a restored one");
-            assert!(restored.has_begun() && !restored.remove(4 + round));
-            assert_eq!(restored.finish(), kept.finish());
-            assert_eq!(restored.update(), kept.update());
-            assert!(kept.events().added.iter().any(|pair| pair.b == new_id), "{:?}", kept.events());
-            assert_eq!(saved(&restored), saved(&kept));
-        }
-    }
-
-    #[test]
     fn broken_snapshots_are_errors() {
         let mut whole = BroadPhase::new(Config::DEFAULT).expect("a margin");
         for round in 0..3 {
             play(&mut whole, round);
         }
-        whole.begin();
-        whole.set(41, Aabb::new([0.0; 3], [1.0; 3]), ProxyFilter::ALL).expect("few boxes");
         let good: serde_json::Value = serde_json::from_str(&saved(&whole)).expect("JSON");
         let broken = |change: &dyn Fn(&mut serde_json::Value)| {
             let mut value = good.clone();
@@ -257,8 +185,6 @@ mod tests {
         assert!(broken(&|v| v["pairs"][1]["b"] = 4000.into()).contains("no pair"));
         assert!(broken(&|v| v["pairs"][1] = v["pairs"][0].clone()).contains("out of order"));
         assert!(broken(&|v| v["changed"][0][0] = 42.into()).contains("has changed"));
-        assert!(broken(&|v| v["later"][0]["Set"][0] = 42.into()).contains("calls that wait"));
-        assert!(broken(&|v| v["begun"] = false.into()).contains("calls that wait"));
         assert!(broken(&|v| _ = v["present"].as_array_mut().expect("a list").pop()).contains("flags"));
     }
 }

@@ -5,9 +5,9 @@
 //! before, emits each pair that overlaps now and did not before, or the other way round. So what is
 //! transferred, in either direction, follows what changed.
 
-use super::search::{Started, Task, search, start};
+use super::search::{Task, search};
 use super::upload::{PIECE, follows};
-use super::{Failure, GpuError, GpuFinder};
+use super::{Failure, GpuFinder};
 use crate::cpu::found::Found;
 use crate::layout::{ANEW, Box as DeviceBox, Motion, Move, Refilter};
 use crate::plan::Summary;
@@ -143,22 +143,7 @@ impl Trail {
     }
 }
 
-/// A search for changes that has begun: its boxes, and what the device was given if it takes one submission.
-#[derive(Debug)]
-pub(super) struct Ahead {
-    trail: Trail,
-    summary: Summary,
-    started: Option<Started>,
-}
-
 impl GpuFinder {
-    /// Has the device begin to search for changes, and does not wait for it. What fails is told by
-    /// [`GpuFinder::changes`], which must be given the same request.
-    pub(crate) fn begin_changes(&mut self, request: &ChangeRequest<'_>) {
-        let ahead = self.start_changes(request);
-        self.ahead = Some(ahead);
-    }
-
     /// Into `found`, once each and in no order, the pairs that filters allow and that overlap now and did
     /// not at the last update, or the other way round: which of the two the boxes tell. Returns the boxes
     /// that began anew, for which the caller completes the answer:
@@ -174,15 +159,19 @@ impl GpuFinder {
         report: &mut Report,
     ) -> Result<Vec<u32>, Failure> {
         found.clear();
-        let ahead = self.ahead.take().unwrap_or_else(|| self.start_changes(request));
-        let result = ahead.and_then(|ahead| self.complete_changes(ahead, request, found, report));
+        let result = self.try_changes(request, found, report);
         if let Err(failure) = &result {
             self.fail(failure, found);
         }
         result.map(|()| request.restarted())
     }
 
-    fn start_changes(&mut self, request: &ChangeRequest<'_>) -> Result<Ahead, Failure> {
+    fn try_changes(
+        &mut self,
+        request: &ChangeRequest<'_>,
+        found: &mut Found,
+        report: &mut Report,
+    ) -> Result<(), Failure> {
         self.check_pause(request.config)?;
         let crowding = self.crowding;
         let session = self.session(&request.config.gpu)?;
@@ -192,25 +181,7 @@ impl GpuFinder {
         trail.follow(request);
         let summary = Summary::of(&trail.reach, None);
         let task = request.task(&trail, &summary);
-        let started = engine.watch(|| start(session, &task, crowding))?;
-        Ok(Ahead { trail, summary, started })
-    }
-
-    fn complete_changes(
-        &mut self,
-        ahead: Ahead,
-        request: &ChangeRequest<'_>,
-        found: &mut Found,
-        report: &mut Report,
-    ) -> Result<(), Failure> {
-        let crowding = self.crowding;
-        let Ahead { trail, summary, started } = ahead;
-        // The very session that has begun: one on another device knows nothing of it.
-        let session = self.session.as_mut().map(|(_, session)| session);
-        let session = session.filter(|session| !session.engine.is_lost()).ok_or(GpuError::Lost)?;
-        let engine = session.engine.clone();
-        let task = request.task(&trail, &summary);
-        let searched = engine.watch(|| search(session, &task, crowding, started, found));
+        let searched = engine.watch(|| search(session, &task, crowding, found));
         let searched = searched.map_err(|failure| with_limit(failure, request.config.limits.max_pairs))?;
         session.trail = trail;
         session.end_call();

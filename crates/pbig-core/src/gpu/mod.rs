@@ -52,7 +52,7 @@ use crate::cpu::found::Found;
 use crate::plan::{NoGpu, Summary};
 use crate::report::Report;
 use crate::{Aabb, Backend, Config, GpuOptions, ProxyFilter};
-use changes::{Ahead, Trail};
+use changes::Trail;
 use engine::Engine;
 use search::{Searched, Task, search};
 use session::Session;
@@ -80,8 +80,6 @@ pub struct GpuFinder {
     engine: Option<Arc<Engine>>,
     session: Option<(GpuOptions, Session)>,
     failed: Option<(Instant, String)>,
-    /// A search for changes that has begun, or why it could not.
-    ahead: Option<Result<Ahead, Failure>>,
     crowding: f32,
     /// A software adapter passes for hardware, in tests.
     pretends: bool,
@@ -151,7 +149,6 @@ impl GpuFinder {
             engine: None,
             session: None,
             failed: None,
-            ahead: None,
             crowding: 1.0,
             pretends: false,
         }
@@ -275,7 +272,7 @@ impl GpuFinder {
         let crowding = self.crowding;
         let session = self.session(&request.config.gpu)?;
         let engine = session.engine.clone();
-        let searched = engine.watch(|| search(session, &Task::new(request), crowding, None, found))?;
+        let searched = engine.watch(|| search(session, &Task::new(request), crowding, found))?;
         session.end_call();
         let useful = request.boxes.len() as u64 + searched.pairs;
         self.finish(searched, useful, report);

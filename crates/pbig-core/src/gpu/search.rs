@@ -3,7 +3,6 @@
 use super::error::Failure;
 use super::session::{Input, Job, Session};
 use super::sink::Sink;
-use super::start::First;
 use super::{ChangeRequest, GpuError, Request, parts};
 use crate::cpu::found::Found;
 use crate::layout::{BOX_BITS, Located, Motion};
@@ -50,39 +49,11 @@ pub(super) struct Searched {
     pub(super) pairs: u64,
 }
 
-/// A search of everything at once that the device has begun.
-#[derive(Debug)]
-pub(super) struct Started {
-    plan: Option<GpuPlan>,
-    first: First,
-    report: GpuReport,
-}
-
-/// Begins a search without waiting for it; nothing where it takes parts, which wait for each other.
-pub(super) fn start(
-    session: &mut Session,
-    task: &Task<'_>,
-    crowding: f32,
-) -> Result<Option<Started>, GpuError> {
-    if task.boxes.len() > boxes_at_once(session, task) || task.summary.valid < 2 {
-        return Ok(None);
-    }
-    match start_whole(session, task, crowding) {
-        Err(GpuError::TooLarge { .. }) => {
-            // What was sent is not taken in: the search that follows sends everything again.
-            session.mirror.forget_motions();
-            Ok(None)
-        }
-        started => started.map(Some),
-    }
-}
-
-/// Searches in as few parts as fit, or completes what was started.
+/// Searches in as few parts as fit.
 pub(super) fn search(
     session: &mut Session,
     task: &Task<'_>,
     crowding: f32,
-    mut started: Option<Started>,
     found: &mut Found,
 ) -> Result<Searched, Failure> {
     let len = task.boxes.len();
@@ -101,7 +72,7 @@ pub(super) fn search(
             report: new_report(session),
         };
         let result = if task.boxes.len() <= most {
-            search_whole(session, task, crowding, started.take(), &mut sink)
+            search_whole(session, task, crowding, &mut sink)
         } else {
             search_parts(session, task, crowding, most, &mut sink)
         };
@@ -154,29 +125,18 @@ fn search_whole(
     session: &mut Session,
     task: &Task<'_>,
     crowding: f32,
-    started: Option<Started>,
     sink: &mut Sink<'_>,
 ) -> Result<Plan, Failure> {
     let valid = task.summary.valid;
     if valid < 2 {
         return Ok(Plan { boxes: valid, ..Plan::default() });
     }
-    let started = started.map_or_else(|| start_whole(session, task, crowding), Ok)?;
-    let Started { plan, first, report } = started;
-    sink.report = report;
-    session.complete(&whole(task, plan.as_ref()), first, sink)?;
-    let (chosen, swept) = if plan.is_none() { (Chosen::Brute, valid) } else { (Chosen::Pbig, 0) };
-    Ok(Plan { chosen, swept, boxes: valid, gpu: plan, ..Plan::default() })
-}
-
-fn start_whole(session: &mut Session, task: &Task<'_>, crowding: f32) -> Result<Started, GpuError> {
     let brute = task.config.strategy == Strategy::Auto && task.boxes.len() <= SMALL_SCENE;
     let plan = (!brute).then(|| plan(session, task.summary, task.config, crowding));
     plan.as_ref().map_or(Ok(()), |plan| check_entries(plan, task.boxes.len()))?;
-    let left = if task.accept.is_some() { u64::MAX } else { task.limit };
-    let mut report = new_report(session);
-    let first = session.start(&whole(task, plan.as_ref()), left, &mut report)?;
-    Ok(Started { plan, first, report })
+    session.run(&whole(task, plan.as_ref()), sink)?;
+    let (chosen, swept) = if plan.is_none() { (Chosen::Brute, valid) } else { (Chosen::Pbig, 0) };
+    Ok(Plan { chosen, swept, boxes: valid, gpu: plan, ..Plan::default() })
 }
 
 /// All boxes of a task as one job.

@@ -114,16 +114,6 @@ impl Session {
     /// Finds the pairs of a job, completely.
     pub(super) fn run(&mut self, job: &Job<'_>, sink: &mut Sink<'_>) -> Result<(), Failure> {
         let first = self.start(job, sink.left(), &mut sink.report)?;
-        self.complete(job, first, sink)
-    }
-
-    /// Finds the pairs of a job whose first submission is on its way.
-    pub(super) fn complete(
-        &mut self,
-        job: &Job<'_>,
-        first: First,
-        sink: &mut Sink<'_>,
-    ) -> Result<(), Failure> {
         let result =
             if job.plan.is_some() { self.search_grid(first, sink) } else { self.search_all(first, sink) };
         sink.report.device_bytes = sink.report.device_bytes.max(self.storage.bytes());

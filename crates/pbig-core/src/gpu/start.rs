@@ -1,4 +1,4 @@
-//! The first submission of a search, which the host need not wait for at once.
+//! The first submission of a search.
 
 use super::GpuError;
 use super::commands::Groups;

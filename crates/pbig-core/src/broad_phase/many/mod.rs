@@ -75,7 +75,7 @@ impl BroadPhase {
         fetch: impl Fn(u32) -> T + Sync,
         of: impl Fn(T) -> Option<(Aabb, ProxyFilter)> + Sync,
     ) -> Result<(), Error> {
-        if ids.len() < PARALLEL_FROM || self.has_begun() || !has_threads() {
+        if ids.len() < PARALLEL_FROM || !has_threads() {
             return self.set_each(ids, &fetch, &of);
         }
         let ranges = self.ranges_of(ids);

@@ -86,18 +86,13 @@ fn many_at_once_are_set_as_one_after_the_other() {
     on(2, || {
         for update in 0..14 {
             both.remove_some();
-            // In one update twice, and with another margin; in another while one has begun.
+            // In one update twice, and with another margin.
             for _ in 0..=update % 3 {
                 both.set();
                 let margin = if update == 5 { 0.3 } else { 0.1 };
                 for of in [&mut both.many, &mut both.each] {
                     of.set_margin(margin).expect("a margin");
                 }
-            }
-            if update == 7 {
-                both.many.begin();
-                both.each.begin();
-                both.set();
             }
             both.remove_some();
             both.compare(update);
