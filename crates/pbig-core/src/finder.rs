@@ -102,7 +102,7 @@ impl Finder {
     {
         self.forget();
         check_count(boxes.len() as u64, &self.config)?;
-        let rule = Rule { accept, filters, filters_suffice: true, before: &[] };
+        let rule = Rule { accept, filters, before: &[] };
         self.search.find(boxes, &self.config, &rule, &mut self.report)?;
         let mut clock = Instant::now();
         stage!("emit");

@@ -44,26 +44,44 @@ mod aabb;
 mod broad_phase;
 mod config;
 mod cpu;
-#[cfg(feature = "gpu")]
-pub mod decode;
 mod diff;
 mod error;
 mod filter;
 mod finder;
 #[cfg(feature = "gpu")]
 pub mod gpu;
-#[cfg(feature = "gpu")]
-pub mod layout;
+mod gpu_choice;
 mod links;
 mod marks;
 mod near;
 pub mod oracle;
 mod pair;
 pub mod pair_index;
+#[cfg(any(feature = "gpu", feature = "unstable-study"))]
+#[cfg_attr(not(feature = "unstable-study"), allow(unreachable_pub, reason = "`study` shows parts of it"))]
+mod pbig;
 pub mod plan;
 mod report;
 mod search;
 mod share;
+#[cfg(feature = "unstable-study")]
+pub mod study;
+
+#[cfg(all(feature = "gpu", feature = "unstable-study"))]
+pub mod decode;
+#[cfg(all(feature = "gpu", feature = "unstable-study"))]
+pub mod layout;
+
+#[cfg(all(feature = "gpu", not(feature = "unstable-study")))]
+#[allow(unreachable_pub, reason = "public with `unstable-study`")]
+mod decode;
+#[cfg(all(feature = "gpu", not(feature = "unstable-study")))]
+#[allow(
+    dead_code,
+    unreachable_pub,
+    reason = "public with `unstable-study`, and some constants are for tests of the kernels"
+)]
+mod layout;
 
 pub use aabb::Aabb;
 pub use broad_phase::{BroadPhase, Events};
@@ -77,6 +95,7 @@ pub use filter::{ProxyFilter, TestMode};
 pub use finder::{Finder, find_pairs};
 #[cfg(feature = "gpu")]
 pub use gpu::GpuFinder;
+pub use gpu_choice::NoGpu;
 pub use pair::Pair;
 pub use plan::{Costs, Forecast, Plan};
 pub use report::{Checks, GpuReport, Report, StageTimes};

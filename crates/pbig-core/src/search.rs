@@ -8,10 +8,15 @@ use crate::cpu::pbig::PbigGrid;
 use crate::cpu::record::Record;
 #[cfg(feature = "gpu")]
 use crate::gpu::{self, ChangeRequest, GpuFinder};
+use crate::gpu_choice::{self, AvailableDevice, Choice};
+#[cfg(feature = "gpu")]
+use crate::plan::Chosen;
 use crate::plan::{Costs, LazySummary, NoGpu, Plan, Summary};
 use crate::report::{Checks, Report, lap, stage};
 use crate::{Aabb, Backend, Config, Error, Pair, ProxyFilter, Strategy};
-use std::time::{Duration, Instant};
+#[cfg(feature = "gpu")]
+use std::time::Duration;
+use std::time::Instant;
 
 /// Which pairs are wanted, besides that they overlap.
 pub(crate) struct Rule<'a, A> {
@@ -19,9 +24,6 @@ pub(crate) struct Rule<'a, A> {
     pub(crate) accept: &'a A,
     /// The part of it that a device can test, and that tells who never pairs.
     pub(crate) filters: Option<&'a [ProxyFilter]>,
-    /// Whether that part is all of it.
-    #[cfg_attr(not(feature = "gpu"), expect(dead_code))]
-    pub(crate) filters_suffice: bool,
     /// By id: what a box was at the last update, for a search that keeps it.
     pub(crate) before: &'a [Aabb],
 }
@@ -37,8 +39,6 @@ pub(crate) struct Search<R> {
     warned: bool,
     #[cfg(feature = "gpu")]
     pub(crate) gpu: Option<GpuFinder>,
-    #[cfg(feature = "gpu")]
-    trial: gpu::Trial,
 }
 
 impl<R: Record> Search<R> {
@@ -51,8 +51,6 @@ impl<R: Record> Search<R> {
             warned: false,
             #[cfg(feature = "gpu")]
             gpu: None,
-            #[cfg(feature = "gpu")]
-            trial: gpu::Trial::default(),
         }
     }
 
@@ -69,10 +67,10 @@ impl<R: Record> Search<R> {
     {
         report.boxes = boxes.len() as u64;
         let summary = LazySummary::new(boxes, self.spare.take());
-        let wanted = self.wants_gpu(config, boxes.len(), false);
+        let wanted = self.wants_gpu(config, boxes.len());
         #[cfg(feature = "gpu")]
         let on_gpu = match wanted {
-            Ok(()) => self.find_on_gpu(boxes, &summary, config, rule, report),
+            Ok(()) => self.find_on_gpu(boxes, config, rule, report),
             Err(_) => Ok(false),
         };
         #[cfg(not(feature = "gpu"))]
@@ -82,7 +80,6 @@ impl<R: Record> Search<R> {
             done => done.map(drop),
         };
         self.spare = summary.into_spare();
-        report.plan.measured.gpu = self.share_of_gpu(config, boxes.len());
         report.plan.no_gpu = wanted.err().flatten();
         found
     }
@@ -115,11 +112,8 @@ impl<R: Record> Search<R> {
     where
         A: Accept,
     {
-        let mut clock = Instant::now();
         let set = Set { boxes, filters: rule.filters, summary, before: rule.before };
-        let result = self.find_on_cpu(all, &set, config, rule.accept, report);
-        self.note_time(false, boxes.len(), lap(&mut clock));
-        result
+        self.find_on_cpu(all, &set, config, rule.accept, report)
     }
 
     fn find_on_cpu<A>(
@@ -176,7 +170,6 @@ impl<R: Record> Search<R> {
     fn find_on_gpu<A>(
         &mut self,
         boxes: &[Aabb],
-        summary: &LazySummary<'_>,
         config: &Config,
         rule: &Rule<'_, A>,
         report: &mut Report,
@@ -185,17 +178,12 @@ impl<R: Record> Search<R> {
         A: Accept,
     {
         stage!("gpu");
-        let mut clock = Instant::now();
-        let summary = summary.get();
-        report.invalid = boxes.len() as u64 - u64::from(summary.valid);
-        report.stages.plan += lap(&mut clock);
-        let accept = |a: u32, b: u32| rule.accept.pair(Pair::new(a, b));
-        let accept: Option<&(dyn Fn(u32, u32) -> bool + Sync)> =
-            if rule.filters_suffice { None } else { Some(&accept) };
-        let request = gpu::Request { boxes, filters: rule.filters, accept, summary, config };
-        let gpu = self.gpu.get_or_insert_with(GpuFinder::shared);
-        let found = gpu.find(&request, &mut self.found, report);
-        Ok(self.settle(found, boxes.len(), clock, report)?.is_some())
+        let clock = Instant::now();
+        let request = gpu::Request { boxes, filters: rule.filters, config };
+        let found = self.gpu.get_or_insert_with(GpuFinder::shared).find(&request);
+        let done = self.settle(found, clock, report)?;
+        report.invalid = done.as_ref().map_or(0, |(_, valid)| boxes.len() as u64 - u64::from(*valid));
+        Ok(done.is_some())
     }
 
     /// Finds on a device what has changed, into `found`, if that is wanted; returns the boxes that began anew
@@ -209,62 +197,62 @@ impl<R: Record> Search<R> {
         stage!("gpu");
         let clock = Instant::now();
         let gpu = self.gpu.get_or_insert_with(GpuFinder::shared);
-        let found = gpu.changes(request, &mut self.found, report);
-        self.settle(found, request.boxes.len(), clock, report)
+        let found = gpu.changes(request);
+        Ok(self.settle(found, clock, report)?.map(|(restarted, _)| restarted))
     }
 
-    /// What a device takes of the CPU's time, where that decides and both are known.
-    pub(crate) fn share_of_gpu(&self, _config: &Config, _boxes: usize) -> Option<f32> {
-        #[cfg(feature = "gpu")]
-        if _config.backend == Backend::Auto {
-            return self.trial.share_of_gpu(_boxes);
+    /// Whether a search in which so many boxes have changed is to be tried on a device.
+    pub(crate) fn wants_gpu(&self, config: &Config, changed: usize) -> Result<(), Option<NoGpu>> {
+        match gpu_choice::choose(config.backend, self.device(), changed as u64) {
+            Choice::Gpu => Ok(()),
+            choice => Err(choice.no_gpu()),
         }
-        None
     }
 
-    /// Whether the next search of so many boxes is to be tried on a device ([`gpu::wanted`]).
     #[cfg(feature = "gpu")]
-    pub(crate) fn wants_gpu(
-        &mut self,
-        config: &Config,
-        boxes: usize,
-        few_changed: bool,
-    ) -> Result<(), Option<NoGpu>> {
-        gpu::wanted(config, self.gpu.as_ref(), &mut self.trial, boxes, few_changed)
+    fn device(&self) -> AvailableDevice {
+        gpu::available(self.gpu.as_ref())
     }
 
     #[cfg(not(feature = "gpu"))]
     #[expect(clippy::unused_self, reason = "as with a GPU backend")]
-    pub(crate) fn wants_gpu(&mut self, config: &Config, _: usize, _: bool) -> Result<(), Option<NoGpu>> {
-        Err((config.backend == Backend::Auto).then_some(NoGpu::NotBuilt))
+    fn device(&self) -> AvailableDevice {
+        AvailableDevice::NotBuilt
     }
 
     /// What a call to the device that began at `clock` comes to: nothing when it could not do the work.
     #[cfg(feature = "gpu")]
-    fn settle<T>(
+    fn settle(
         &mut self,
-        found: Result<T, gpu::Failure>,
-        boxes: usize,
+        found: Result<gpu::Found, gpu::Failure>,
         mut clock: Instant,
         report: &mut Report,
-    ) -> Result<Option<T>, Error> {
+    ) -> Result<Option<(Vec<u32>, u32)>, Error> {
         match found {
             Ok(found) => {
                 self.warned = false;
                 report.fallback = None;
                 let time = lap(&mut clock);
                 // The device's own times for its map; the rest of the call is check, transfer and decoding.
-                let kernels = report.gpu.iter().flat_map(|gpu| &gpu.kernels);
+                let kernels = found.report.kernels.iter();
                 let mapping = kernels.filter(|(name, _)| !name.starts_with("check")).map(|(_, time)| *time);
                 let map = mapping.sum::<Duration>().min(time);
                 report.stages.map += map;
                 report.stages.check += time - map;
-                self.note_time(true, boxes, time);
-                Ok(Some(found))
+                let (chosen, swept) = match (&found.plan, found.valid) {
+                    (None, 0 | 1) => (Chosen::Nothing, 0),
+                    (None, valid) => (Chosen::Brute, valid),
+                    (Some(_), _) => (Chosen::Pbig, 0),
+                };
+                let boxes = found.valid;
+                report.plan = Plan { chosen, swept, boxes, gpu: found.plan, ..Plan::default() };
+                (report.checks, report.gpu) = (found.checks, Some(found.report));
+                self.found.clear();
+                self.found.chunks = found.pairs;
+                Ok(Some((found.restarted, found.valid)))
             }
             Err(gpu::Failure::Call(error)) => Err(error),
             Err(gpu::Failure::Device(error)) => {
-                self.trial.failed();
                 self.fall_back(format!("{error}: the CPU does the work"), report);
                 Ok(None)
             }
@@ -290,16 +278,6 @@ impl<R: Record> Search<R> {
         report.fallback = Some(why);
     }
 
-    /// Measures for [`Backend::Auto`].
-    #[cfg(feature = "gpu")]
-    pub(crate) fn note_time(&mut self, on_gpu: bool, boxes: usize, time: Duration) {
-        self.trial.note(on_gpu, boxes, time);
-    }
-
-    #[cfg(not(feature = "gpu"))]
-    #[expect(clippy::unused_self, reason = "as with a GPU backend")]
-    pub(crate) fn note_time(&mut self, _: bool, _: usize, _: Duration) {}
-
     fn find_pbig<A>(
         &mut self,
         boxes: &[Aabb],
@@ -318,7 +296,7 @@ impl<R: Record> Search<R> {
         self.pbig.build(&plan, boxes);
         report.stages.map += lap(&mut clock);
         report.checks =
-            self.pbig.find(&plan, config.small_cell, accept, config.limits.max_pairs, &mut self.found)?;
+            self.pbig.find(&plan, config.gpu.small_cell, accept, config.limits.max_pairs, &mut self.found)?;
         report.stages.check += lap(&mut clock);
         Ok(())
     }

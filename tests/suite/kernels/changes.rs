@@ -4,13 +4,13 @@ use super::*;
 
 impl State {
     /// Whether this is a search for changes.
-    pub(super) fn tells_changes(&self) -> bool {
+    pub(super) fn finds_changes(&self) -> bool {
         !self.motions.is_empty()
     }
 
     /// All that a box touches, now or before.
-    pub(super) fn reach(&self, id: usize) -> layout::Box {
-        self.motions.get(id).map_or_else(|| self.boxes[id], reach_of)
+    pub(super) fn bounds(&self, id: usize) -> DeviceBox {
+        self.motions.get(id).map_or_else(|| self.boxes[id], bounds_of)
     }
 
     pub(super) fn has_moved(&self, id: usize) -> bool {
@@ -18,7 +18,7 @@ impl State {
     }
 
     /// Whether two boxes overlap, or began or ceased to.
-    pub(super) fn matter(&self, i: usize, j: usize) -> bool {
+    pub(super) fn is_wanted(&self, i: usize, j: usize) -> bool {
         match (self.motions.get(i), self.motions.get(j)) {
             (Some(a), Some(b)) => overlap(&a.now, &b.now) != overlap(&a.before, &b.before),
             _ => overlap(&self.boxes[i], &self.boxes[j]),
@@ -28,34 +28,34 @@ impl State {
     /// What the device has of the last update, and the lists that make this one of it.
     pub(super) fn add_changes(&mut self, case: &Case) {
         for (id, (now, before)) in (0u32..).zip(case.boxes.iter().zip(&case.before)) {
-            let long_ago = layout::Box::new(&case.boxes[0]);
+            let long_ago = DeviceBox::new(&case.boxes[0]);
             // As it was; boxes that were nowhere may have been something that no longer counts.
             let known = if before.is_valid() { *before } else { case.boxes[1] };
-            self.motions.push(Motion { now: layout::Box::new(&known), before: long_ago });
+            self.motions.push(Motion { now: DeviceBox::new(&known), before: long_ago });
             if !before.is_valid() || now != before {
-                let mark = if before.is_valid() { 0 } else { ANEW };
-                self.moves.push(Move { place: id | mark, now: layout::Box::new(now) });
+                let mark = if before.is_valid() { 0 } else { WAS_ABSENT };
+                self.box_changes.push(BoxChange { marked_id: id | mark, now: DeviceBox::new(now) });
             }
             if id.is_multiple_of(9) {
-                self.refilters.push(Refilter { id, filter: filter(id + 1) });
+                self.filter_changes.push(FilterChange { id, filter: filter(id + 1) });
             }
         }
         self.params.known = self.motions.len() as u32;
-        self.params.moves = self.moves.len() as u32;
-        self.params.refilters = self.refilters.len() as u32;
+        self.params.box_changes = self.box_changes.len() as u32;
+        self.params.filter_changes = self.filter_changes.len() as u32;
     }
 }
 
-fn reach_of(motion: &Motion) -> layout::Box {
+fn bounds_of(motion: &Motion) -> DeviceBox {
     let (now, before) = (&motion.now, &motion.before);
-    layout::Box {
+    DeviceBox {
         low: std::array::from_fn(|k| now.low[k].min(before.low[k])),
         high: std::array::from_fn(|k| now.high[k].max(before.high[k])),
     }
 }
 
 /// What the plan is made for.
-pub(super) fn reaches(case: &Case) -> Vec<Aabb> {
+pub(super) fn all_bounds(case: &Case) -> Vec<Aabb> {
     let both = |(i, now): (usize, &Aabb)| match case.before.get(i) {
         Some(before) if before.is_valid() && now.is_valid() => Aabb::new(
             std::array::from_fn(|k| now.min[k].min(before.min[k])),
@@ -96,8 +96,8 @@ pub(super) fn own_level(at: &Located) -> u32 {
 }
 
 /// Whether a cell may own pairs of entries with these marks, and they may matter.
-pub(super) fn is_due(s: &State, marks: u32) -> bool {
-    marks >> AXIS_BITS == 7 && (!s.tells_changes() || marks & MOVED != 0)
+pub(super) fn may_be_wanted(s: &State, marks: u32) -> bool {
+    marks >> AXIS_BITS == 7 && (!s.finds_changes() || marks & MOVED != 0)
 }
 
 pub(super) fn by_known(s: &State) -> u32 {
@@ -105,35 +105,35 @@ pub(super) fn by_known(s: &State) -> u32 {
 }
 
 pub(super) fn by_change(s: &State) -> u32 {
-    s.params.moves.max(s.params.refilters).div_ceil(LANES)
+    s.params.box_changes.max(s.params.filter_changes).div_ceil(LANES)
 }
 
-pub(super) fn settle(s: &mut State) {
+pub(super) fn store_previous(s: &mut State) {
     let known = s.params.known as usize;
     s.motions[..known].iter_mut().for_each(|motion| motion.before = motion.now);
 }
 
-pub(super) fn renew(s: &mut State) {
-    for one in &s.moves[..s.params.moves as usize] {
-        let motion = &mut s.motions[(one.place & !ANEW) as usize];
+pub(super) fn apply_changes(s: &mut State) {
+    for one in &s.box_changes[..s.params.box_changes as usize] {
+        let motion = &mut s.motions[(one.marked_id & !WAS_ABSENT) as usize];
         motion.now = one.now;
-        if one.place & ANEW != 0 {
-            motion.before = layout::Box::INVALID;
+        if one.marked_id & WAS_ABSENT != 0 {
+            motion.before = DeviceBox::INVALID;
         }
     }
-    for one in &s.refilters[..s.params.refilters as usize] {
+    for one in &s.filter_changes[..s.params.filter_changes as usize] {
         s.filters[one.id as usize] = one.filter;
     }
 }
 
 #[test]
-fn settle_agrees_with_its_twin() {
-    agrees("settle");
+fn store_previous_agrees_with_its_twin() {
+    agrees("store_previous");
 }
 
 #[test]
-fn renew_agrees_with_its_twin() {
-    agrees("renew");
+fn apply_changes_agrees_with_its_twin() {
+    agrees("apply_changes");
 }
 
 /// On all sets but those with many boxes for a kernel that tests all pairs, with all codings.
@@ -167,12 +167,12 @@ fn check_all_agrees_with_its_twin_on_changes() {
 
 /// What has come to the end of the lists must not change: neither boxes nor filters.
 #[test]
-fn settle_and_renew_leave_alone_what_they_are_not_told() {
-    for kernel in ["settle", "renew"] {
+fn store_previous_and_apply_changes_leave_alone_what_they_are_not_told() {
+    for kernel in ["store_previous", "apply_changes"] {
         let mut before = State::before(kernel, &moving(pile()));
         before.params.known -= 300;
-        before.params.moves /= 2;
-        before.params.refilters -= 1;
+        before.params.box_changes /= 2;
+        before.params.filter_changes -= 1;
         assert_eq!(fault(twin(kernel), &GpuOptions::DEFAULT, &before), None, "{kernel}");
     }
 }
@@ -209,11 +209,11 @@ fn the_moving_sets_have_large_items_without_and_with_movement() {
 #[test]
 fn faults_planted_in_what_is_known_of_boxes_are_noticed() {
     let faults: [(&str, Plant); 5] = [
-        ("settle", |s| s.motions[3].before.low[0] += 1),
-        ("settle", |s| s.motions.swap(0, 8)),
-        ("renew", |s| s.motions[7].now.high[2] -= 1),
-        ("renew", |s| s.motions[2].before = s.motions[2].now),
-        ("renew", |s| s.filters[9].mask ^= 1),
+        ("store_previous", |s| s.motions[3].before.low[0] += 1),
+        ("store_previous", |s| s.motions.swap(0, 8)),
+        ("apply_changes", |s| s.motions[7].now.high[2] -= 1),
+        ("apply_changes", |s| s.motions[2].before = s.motions[2].now),
+        ("apply_changes", |s| s.filters[9].mask ^= 1),
     ];
     for (i, (kernel, plant)) in faults.into_iter().enumerate() {
         let before = State::before(kernel, &moving(pile()));

@@ -22,14 +22,14 @@ pub(super) fn benches(kernel: &Kernel) -> Vec<&'static Bench> {
 /// The state after a kernel has run on it.
 pub(super) fn on_device(bench: &Bench, twin: &Twin, options: &GpuOptions, before: &State) -> State {
     let mut after = before.clone();
-    let names = twin.kernel.bindings;
-    let buffers: Vec<_> = names.iter().map(|name| padded(after.bytes(name))).collect();
+    let bindings = twin.kernel.bindings;
+    let buffers: Vec<_> = bindings.iter().map(|&buffer| padded(after.bytes(buffer))).collect();
     let groups = (twin.groups)(before);
-    let changes = before.tells_changes();
+    let changes = before.finds_changes();
     let left =
         bench.run(twin.kernel, options, changes, &buffers, groups).expect("the device runs the kernel");
-    for (name, left) in names.iter().zip(&left) {
-        let own = after.bytes(name);
+    for (&buffer, left) in bindings.iter().zip(&left) {
+        let own = after.bytes(buffer);
         let len = own.len();
         own.copy_from_slice(&left[..len]);
     }
@@ -47,7 +47,7 @@ pub(super) fn padded(bytes: &[u8]) -> Vec<u8> {
 pub(super) fn with_room(before: &State, wanted: &State) -> State {
     let words = if before.has(PACKED) { 3 * hits(wanted) as usize } else { wanted.out.len() };
     let mut before = State { out: vec![0; words], ..before.clone() };
-    before.chunk.word_room = words as u32;
+    before.chunk.word_capacity = words as u32;
     before
 }
 

@@ -17,17 +17,16 @@ use compare::*;
 use device::*;
 use indices::*;
 use pbig_core::decode::{self, PLAIN};
-use pbig_core::gpu::study::Bench;
+use pbig_core::gpu::study::{Bench, plan_params};
 use pbig_core::layout::{
-    self, ANEW, AXIS_BITS, BITS, BOX_BITS, CELLS_PER_BLOCK, Cell, Chunk, Counters, FILTERED, LANES,
-    LargeItem, Level, Located, MOST_SPAN, MOVED, Motion, Move, NO_LEVEL, PACKED, Params, Refilter, Slot,
-    SmallItem, Totals, halves, wide,
+    self, AXIS_BITS, BITS, BOX_BITS, BoxChange, CELLS_PER_BLOCK, Cell, Chunk, Counters, DeviceBox, FILTERED,
+    FilterChange, LANES, LargeItem, Level, Located, MAX_SPAN, MOVED, Motion, NO_LEVEL, PACKED, Params, Slot,
+    SmallItem, Totals, WAS_ABSENT, halves, wide,
 };
 use pbig_core::pair_index::{index_of, pair_count, pair_of};
-use pbig_core::plan::{GpuPlan, Summary};
-use pbig_core::{Aabb, Config, GpuOptions, Pair, ProxyFilter, oracle};
+use pbig_core::{Aabb, GpuOptions, Pair, ProxyFilter, oracle};
 use pbig_harness::boxes::BoxSet;
-use pbig_shaders::{self as shaders, KERNELS, Kernel};
+use pbig_shaders::{self as shaders, Buffer, KERNELS, Kernel};
 use pbig_tests::{corpus, difference, needs_gpu, without_gpu};
 use state::*;
 use std::fmt::Debug;
@@ -35,10 +34,15 @@ use std::mem::offset_of;
 use std::sync::OnceLock;
 use twins::*;
 
+/// Returns the kernels of a search and those of the studies.
+fn all_kernels() -> impl Iterator<Item = &'static Kernel> {
+    KERNELS.iter().chain(shaders::study::KERNELS).copied()
+}
+
 #[test]
 fn every_kernel_has_a_twin() {
     let names: Vec<_> = TWINS.iter().map(|twin| twin.kernel.name).collect();
-    assert_eq!(names, KERNELS.iter().map(|kernel| kernel.name).collect::<Vec<_>>());
+    assert_eq!(names, all_kernels().map(|kernel| kernel.name).collect::<Vec<_>>());
 }
 
 #[test]
@@ -257,7 +261,7 @@ fn nothing_is_checked_once_there_are_too_many_pairs() {
     for kernel in ["check_small", "check_large", "check_all"] {
         let mut before = State::before(kernel, &pile());
         before.out = vec![0; 1 << 16];
-        before.chunk.word_room = 1 << 16;
+        before.chunk.word_capacity = 1 << 16;
         before.chunk.pairs_left = halves(wide(NEARLY) - 1);
         for bench in benches(twin(kernel).kernel) {
             let found = on_device(bench, twin(kernel), &GpuOptions::DEFAULT, &before);
@@ -274,11 +278,11 @@ fn the_checks_count_what_they_have_no_room_for_and_write_nothing_there() {
             let before = State::before(kernel, &case).with(flags, 0);
             let wanted = after_twin(twin(kernel), &before);
             let mut before = with_room(&before, &wanted);
-            before.chunk.word_room = hits(&wanted) as u32 / 2;
+            before.chunk.word_capacity = hits(&wanted) as u32 / 2;
             let found = on_device(bench(true), twin(kernel), &GpuOptions::DEFAULT, &before);
             assert_eq!(same("counts", &counts(&found), &counts(&wanted)), None, "{kernel}, flags {flags}");
             assert_eq!(words_fault(&found, &wanted), None, "{kernel}, flags {flags}");
-            let beyond = &found.out[before.chunk.word_room as usize..];
+            let beyond = &found.out[before.chunk.word_capacity as usize..];
             assert!(beyond.iter().all(|&word| word == 0), "{kernel}, flags {flags}: written beyond the room");
         }
     }
@@ -319,7 +323,7 @@ fn room_fault<T: Ord + Clone + Debug + Default>(found: &[T], room: u32, wanted: 
 fn scatter_writes_nothing_without_room_for_all() {
     needs_gpu!();
     let mut before = State::before("scatter", &pile());
-    before.params.entry_room -= 1;
+    before.params.entry_capacity -= 1;
     let found = on_device(bench(true), twin("scatter"), &GpuOptions::DEFAULT, &before);
     assert_eq!(same("entries", &found.entries, &before.entries), None);
     assert_eq!(same("cells", &found.cells, &before.cells), None);

@@ -10,11 +10,11 @@ pub(super) const NEARLY: [u32; 2] = [u32::MAX - 2, 0];
 pub(super) struct State {
     pub(super) params: Params,
     pub(super) chunk: Chunk,
-    pub(super) boxes: Vec<layout::Box>,
+    pub(super) boxes: Vec<DeviceBox>,
     /// In a search for changes, in place of the boxes.
     pub(super) motions: Vec<Motion>,
-    pub(super) moves: Vec<Move>,
-    pub(super) refilters: Vec<Refilter>,
+    pub(super) box_changes: Vec<BoxChange>,
+    pub(super) filter_changes: Vec<FilterChange>,
     pub(super) filters: Vec<ProxyFilter>,
     pub(super) located: Vec<Located>,
     pub(super) cells: Vec<Cell>,
@@ -86,9 +86,9 @@ impl State {
     /// The buffers of a call before its first kernel, with room for exactly what will be found.
     pub(super) fn new(case: &Case) -> Self {
         let n = case.boxes.len();
-        let plan = GpuPlan::new(&Summary::of(&reaches(case), None), &Config::DEFAULT, 1.0, 1 << 20);
         let (small_cell, columns) = (case.small_cell, case.columns);
-        let params = Params { boxes: n as u32, small_cell, columns, ..plan.params() };
+        let plan = plan_params(&all_bounds(case), &GpuOptions::DEFAULT, 1 << 20);
+        let params = Params { boxes: n as u32, small_cell, columns, ..plan };
         let mut state = Self {
             params,
             chunk: Chunk {
@@ -97,7 +97,7 @@ impl State {
                 pairs_left: [u32::MAX; 2],
                 ..Chunk::default()
             },
-            boxes: case.boxes.iter().map(layout::Box::new).collect(),
+            boxes: case.boxes.iter().map(DeviceBox::new).collect(),
             filters: (0..n as u32).map(filter).collect(),
             located: vec![Located::default(); n],
             cells: vec![Cell::default(); params.cells as usize],
@@ -157,34 +157,33 @@ impl State {
         self.params.flags & flag != 0
     }
 
-    /// The buffer of a binding.
-    pub(super) fn bytes(&mut self, binding: &str) -> &mut [u8] {
-        match binding {
-            "params" => bytes_of_mut(&mut self.params),
-            "chunk" => bytes_of_mut(&mut self.chunk),
-            "boxes" if self.tells_changes() => cast_slice_mut(&mut self.motions),
-            "boxes" => cast_slice_mut(&mut self.boxes),
-            "moves" => cast_slice_mut(&mut self.moves),
-            "refilters" => cast_slice_mut(&mut self.refilters),
-            "filters" => cast_slice_mut(&mut self.filters),
-            "located" => cast_slice_mut(&mut self.located),
-            "cells" => cast_slice_mut(&mut self.cells),
-            "starts" => cast_slice_mut(&mut self.starts),
-            "sums" => cast_slice_mut(&mut self.sums),
-            "counters" => bytes_of_mut(&mut self.counters),
-            "slots" => cast_slice_mut(&mut self.slots),
-            "small_items" => cast_slice_mut(&mut self.small_items),
-            "large_items" => cast_slice_mut(&mut self.large_items),
-            "entries" => cast_slice_mut(&mut self.entries),
-            "dispatches" => bytes_of_mut(&mut self.dispatches),
-            "totals" => bytes_of_mut(&mut self.totals),
-            "out" => cast_slice_mut(&mut self.out),
-            other => panic!("no buffer {other}"),
+    /// Returns the bytes of a buffer.
+    pub(super) fn bytes(&mut self, buffer: Buffer) -> &mut [u8] {
+        match buffer {
+            Buffer::Params => bytes_of_mut(&mut self.params),
+            Buffer::Chunk => bytes_of_mut(&mut self.chunk),
+            Buffer::Boxes if self.finds_changes() => cast_slice_mut(&mut self.motions),
+            Buffer::Boxes => cast_slice_mut(&mut self.boxes),
+            Buffer::BoxChanges => cast_slice_mut(&mut self.box_changes),
+            Buffer::FilterChanges => cast_slice_mut(&mut self.filter_changes),
+            Buffer::Filters => cast_slice_mut(&mut self.filters),
+            Buffer::Located => cast_slice_mut(&mut self.located),
+            Buffer::Cells => cast_slice_mut(&mut self.cells),
+            Buffer::Starts => cast_slice_mut(&mut self.starts),
+            Buffer::Sums => cast_slice_mut(&mut self.sums),
+            Buffer::Counters => bytes_of_mut(&mut self.counters),
+            Buffer::Slots => cast_slice_mut(&mut self.slots),
+            Buffer::SmallItems => cast_slice_mut(&mut self.small_items),
+            Buffer::LargeItems => cast_slice_mut(&mut self.large_items),
+            Buffer::Entries => cast_slice_mut(&mut self.entries),
+            Buffer::Dispatches => bytes_of_mut(&mut self.dispatches),
+            Buffer::Totals => bytes_of_mut(&mut self.totals),
+            Buffer::Out => cast_slice_mut(&mut self.out),
         }
     }
 }
 
 /// Room for entries, slots, small and large items.
 pub(super) fn set_rooms(params: &mut Params, rooms: &[u32; 4]) {
-    [params.entry_room, params.slot_room, params.small_room, params.large_room] = *rooms;
+    [params.entry_capacity, params.slot_capacity, params.small_capacity, params.large_capacity] = *rooms;
 }

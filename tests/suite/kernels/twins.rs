@@ -13,8 +13,13 @@ pub(super) struct Twin {
 
 /// The twins, in the order in which the kernels run.
 pub(super) static TWINS: [Twin; 17] = [
-    Twin { kernel: &shaders::SETTLE, run: settle, groups: by_known, compare: compare_motions },
-    Twin { kernel: &shaders::RENEW, run: renew, groups: by_change, compare: compare_motions },
+    Twin {
+        kernel: &shaders::STORE_PREVIOUS,
+        run: store_previous,
+        groups: by_known,
+        compare: compare_motions,
+    },
+    Twin { kernel: &shaders::APPLY_CHANGES, run: apply_changes, groups: by_change, compare: compare_motions },
     Twin { kernel: &shaders::LOCATE, run: locate, groups: by_box, compare: compare_located },
     Twin { kernel: &shaders::VISIT, run: visit, groups: by_box, compare: compare_cells },
     Twin { kernel: &shaders::SCAN_BLOCKS, run: scan_blocks, groups: by_block, compare: compare_blocks },
@@ -26,10 +31,15 @@ pub(super) static TWINS: [Twin; 17] = [
     Twin { kernel: &shaders::CHECK_SMALL, run: check_small, groups: by_small_item, compare: compare_checks },
     Twin { kernel: &shaders::CHECK_LARGE, run: check_large, groups: by_large_item, compare: compare_checks },
     Twin { kernel: &shaders::CHECK_ALL, run: check_all, groups: by_pair, compare: compare_checks },
-    Twin { kernel: &shaders::INDEX_PAIRS, run: index_pairs, groups: by_cell, compare: compare_indices },
-    Twin { kernel: &shaders::LAZY_PAIRS, run: lazy_pairs, groups: by_cell, compare: compare_out },
-    Twin { kernel: &shaders::ROW_ENDS, run: row_ends, groups: by_cell, compare: compare_indices },
-    Twin { kernel: &shaders::LAZY_ENDS, run: lazy_ends, groups: by_cell, compare: compare_out },
+    Twin {
+        kernel: &shaders::study::INDEX_PAIRS,
+        run: index_pairs,
+        groups: by_cell,
+        compare: compare_indices,
+    },
+    Twin { kernel: &shaders::study::LAZY_PAIRS, run: lazy_pairs, groups: by_cell, compare: compare_out },
+    Twin { kernel: &shaders::study::ROW_ENDS, run: row_ends, groups: by_cell, compare: compare_indices },
+    Twin { kernel: &shaders::study::LAZY_ENDS, run: lazy_ends, groups: by_cell, compare: compare_out },
 ];
 
 pub(super) fn twin(kernel: &str) -> &'static Twin {
@@ -66,7 +76,7 @@ pub(super) fn by_pair(s: &State) -> u32 {
 
 pub(super) fn locate(s: &mut State) {
     for id in 0..s.boxes.len() {
-        let one = s.reach(id);
+        let one = s.bounds(id);
         if one.low[0] > one.high[0] {
             s.located[id].level = NO_LEVEL;
             continue;
@@ -89,7 +99,7 @@ pub(super) fn float_of(key: i32) -> f32 {
 }
 
 pub(super) fn finest_cell(params: &Params, key: i32, k: usize) -> i32 {
-    let x = float_of(key.clamp(params.reach_low[k], params.reach_high[k]));
+    let x = float_of(key.clamp(params.clamp_low[k], params.clamp_high[k]));
     let cell = ((x - params.origin[k]) * params.scale).floor();
     cell.clamp(-1073741760.0, 1073741760.0) as i32
 }
@@ -97,7 +107,7 @@ pub(super) fn finest_cell(params: &Params, key: i32, k: usize) -> i32 {
 /// The first level at which the box touches few cells on each axis, or the last.
 pub(super) fn level_of(params: &Params, at: &Located) -> u32 {
     let steps = |l: &Level, k: usize| (at.high[k] >> l.shift) - (at.low[k] >> l.shift);
-    let fits = |l: &Level| (0..3).all(|k| l.dims[k] == 1 || steps(l, k) < MOST_SPAN as i32);
+    let fits = |l: &Level| (0..3).all(|k| l.dims[k] == 1 || steps(l, k) < MAX_SPAN as i32);
     let last = params.levels - 1;
     (0..last).find(|&level| fits(&params.level[level as usize])).unwrap_or(last)
 }
@@ -234,7 +244,7 @@ pub(super) fn large_items(cell: &Cell, start: u32, wide: u32) -> Vec<LargeItem> 
 }
 
 pub(super) fn scatter(s: &mut State) {
-    if s.counters.entries > s.params.entry_room {
+    if s.counters.entries > s.params.entry_capacity {
         return;
     }
     for id in 0..s.located.len() {
@@ -262,10 +272,10 @@ pub(super) fn place(s: &mut State, cell: usize, entry: u32, resident: bool) {
 
 pub(super) fn arrange(s: &mut State) {
     let (found, room) = (s.counters, s.params);
-    let fits = found.entries <= room.entry_room
-        && found.slots <= room.slot_room
-        && found.small_items <= room.small_room
-        && found.large_items <= room.large_room;
+    let fits = found.entries <= room.entry_capacity
+        && found.slots <= room.slot_capacity
+        && found.small_items <= room.small_capacity
+        && found.large_items <= room.large_capacity;
     let groups = |items: u32| if fits { [items.min(32_768), items.div_ceil(32_768)] } else { [0, 0] };
     let [x, y] = groups(found.small_items.min(s.chunk.small_items));
     let [u, v] = groups(found.large_items.min(s.chunk.large_items));
@@ -286,7 +296,7 @@ impl Checked {
     pub(super) fn test_entries(&mut self, s: &State, a: u32, b: u32) {
         let (i, j) = (box_of(a), box_of(b));
         let split = s.params.split;
-        if !is_due(s, a | b) || (split > 0 && (i < split) == (j < split)) {
+        if !may_be_wanted(s, a | b) || (split > 0 && (i < split) == (j < split)) {
             self.made += 1;
             self.redundant += 1;
         } else {
@@ -296,7 +306,7 @@ impl Checked {
 
     pub(super) fn test_boxes(&mut self, s: &State, i: u32, j: u32) {
         self.made += 1;
-        if !s.matter(i as usize, j as usize) {
+        if !s.is_wanted(i as usize, j as usize) {
             return;
         }
         self.overlaps += 1;
@@ -325,7 +335,7 @@ pub(super) fn box_of(entry: u32) -> u32 {
     entry & ((1 << BOX_BITS) - 1)
 }
 
-pub(super) fn overlap(a: &layout::Box, b: &layout::Box) -> bool {
+pub(super) fn overlap(a: &DeviceBox, b: &DeviceBox) -> bool {
     (0..3).all(|k| a.low[k] <= b.high[k] && b.low[k] <= a.high[k])
 }
 
@@ -364,7 +374,7 @@ pub(super) fn check_large_item(s: &State, item: &LargeItem, checked: &mut Checke
     // A cell that is nobody's lowest on some axis owns none of these pairs: they are not even tested. No
     // more are they where nobody has moved.
     let marks = rows.clone().chain(columns.clone()).fold(0, |marks, place| marks | entry(place));
-    if !is_due(s, marks) {
+    if !may_be_wanted(s, marks) {
         return;
     }
     for i in rows.start..rows.end.min(item.residents) {

@@ -4,7 +4,6 @@ use super::update::{State, state};
 use super::{BroadPhase, flag};
 use crate::diff::Judgement;
 use crate::gpu::{Change, ChangeRequest};
-use crate::plan::NoGpu;
 use crate::{Error, Pair};
 
 /// What a device is asked by a broad phase of which other fields may be written.
@@ -25,8 +24,6 @@ macro_rules! request {
 #[derive(Clone, Debug, Default)]
 pub(super) struct Asked {
     changes: Vec<Change>,
-    /// Why no device was asked, where that is left open.
-    pub(super) no_gpu: Option<NoGpu>,
 }
 
 impl BroadPhase {
@@ -44,10 +41,7 @@ impl BroadPhase {
     /// What the device has found, if it was asked: the added ones into `events.added`, boxes that have
     /// lost some into `ending`. False when the CPU has to do it.
     pub(super) fn find_changes_on_gpu(&mut self) -> Result<bool, Error> {
-        // Where little moves the base of the CPU is worth having.
-        let few = !self.many_changed();
-        let wanted = self.base.wants_gpu(&self.config, self.boxes.len(), few);
-        self.asked.no_gpu = wanted.err().flatten();
+        let wanted = self.base.wants_gpu(&self.config, self.changed.len());
         if wanted.is_err() {
             return Ok(false);
         }

@@ -13,21 +13,16 @@ impl BroadPhase {
         let has_list =
             plan.near.is_some() || matches!(plan.no_near, Some(NoNear::Unpaid(_) | NoNear::Compared));
         let is_searched = matches!(plan.chosen, Chosen::Edit | Chosen::Grid);
-        // A device is not asked where few have.
-        let many = self.report.changed * 4 >= u64::from(self.present_count);
         self.report.plan.measured = Measured {
             edit: self.rebuild.measured().filter(|_| is_free && is_searched && plan.near.is_none()),
             near: self.near.worth.share().filter(|_| is_free && has_list),
             grid: self.small.turns.share_of_grid().filter(|_| self.may_be_small()),
-            gpu: self.base.share_of_gpu(&self.config, self.boxes.len()).filter(|_| many),
+            gpu: None,
         };
     }
 
     fn no_gpu(&self) -> Option<NoGpu> {
-        #[cfg(feature = "gpu")]
-        return self.asked.no_gpu;
-        #[cfg(not(feature = "gpu"))]
-        (self.config.backend == crate::Backend::Auto).then_some(NoGpu::NotBuilt)
+        self.base.wants_gpu(&self.config, self.report.changed as usize).err().flatten()
     }
 }
 

@@ -94,7 +94,7 @@ impl BroadPhase {
     pub(super) fn search_all(&mut self) -> Result<Route, Error> {
         let state = state!(self);
         let filters = Some(&self.filters[..]);
-        let rule = Rule { accept: &state, filters, filters_suffice: false, before: &self.before };
+        let rule = Rule { accept: &state, filters, before: &self.before };
         let summary = LazySummary::new(&self.boxes, self.base.spare.take());
         let invalid = self.report.invalid;
         self.has_base = false;

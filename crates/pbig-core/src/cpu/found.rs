@@ -23,15 +23,6 @@ impl Found {
         (self.checks, self.overlaps) = (0, 0);
     }
 
-    /// Sets the `i`-th buffer.
-    #[cfg(feature = "gpu")]
-    pub(crate) fn put(&mut self, i: usize, pairs: Vec<Pair>) {
-        match self.chunks.get_mut(i) {
-            Some(chunk) => *chunk = pairs,
-            None => self.chunks.push(pairs),
-        }
-    }
-
     /// Makes `chunks` have at least `n` buffers, all empty, and returns the first `n`.
     pub(crate) fn buffers(&mut self, n: usize) -> &mut [Vec<Pair>] {
         self.clear();

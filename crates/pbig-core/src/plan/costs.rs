@@ -47,19 +47,6 @@ impl Costs {
         grid: 700.0,
         pair: 13.0,
     };
-
-    /// What splits boxes into a device's levels. Ratios only; not fitted to a device.
-    #[cfg(feature = "gpu")]
-    pub(super) const DEVICE: Self = Self {
-        test: 1.8,
-        sweep: 0.0,
-        place: 65.0,
-        candidate: 0.7,
-        visit: 85.0,
-        visited: 0.7,
-        grid: 2000.0,
-        pair: 0.0,
-    };
 }
 
 /// A way to search a set from nothing.

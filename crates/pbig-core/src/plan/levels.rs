@@ -135,27 +135,6 @@ pub(super) fn choose(summary: &Summary, setting: &Setting<'_>) -> Choice {
     Choice { levels, swept, forecast: corrected, expected: (way, forecast.of(way)) }
 }
 
-/// The levels of a device, of all boxes but those that it has in its last, single cell.
-#[cfg(feature = "gpu")]
-pub(super) fn for_device(summary: &Summary) -> Levels {
-    let (costs, experience) = (&Costs::DEVICE, &Experience::default());
-    let setting = Setting {
-        crowding: 1.0,
-        strategy: Strategy::Grid,
-        company: Company::NONE,
-        costs,
-        experience,
-        only: None,
-    };
-    let groups = groups(summary);
-    let world = World { on_device: true, ..World::new(summary, &setting) };
-    let (several, steps) = split(&world, &groups);
-    match groups.is_empty() || several < world.grid_cost(&groups, &[]) {
-        true => assemble(&world, &groups, steps),
-        false => Levels::from_iter([world.level(&groups)]),
-    }
-}
-
 /// Neighbouring size classes that share their level.
 #[derive(Clone, Copy)]
 struct Group {
@@ -246,8 +225,6 @@ struct World<'a> {
     others: f64,
     pairs: f64,
     costs: &'a Costs,
-    /// A device looks at whole cells.
-    on_device: bool,
 }
 
 impl<'a> World<'a> {
@@ -260,7 +237,6 @@ impl<'a> World<'a> {
             others: f64::from(setting.company.others),
             pairs: f64::from(u8::from(setting.company.pairs)),
             costs: setting.costs,
-            on_device: false,
         }
     }
 
@@ -269,7 +245,7 @@ impl<'a> World<'a> {
     fn cell(&self, groups: &[Group]) -> [f32; 3] {
         let spaced = |per_cell| spacing(self.range, count(groups), per_cell) as f32 * self.crowding;
         let (sparse, extent) = (spaced(SPARSE_PER_CELL), max_extent(groups));
-        let is_sparse = !self.on_device && extent.iter().all(|e| *e <= LevelPlan::SPACIOUS * sparse);
+        let is_sparse = extent.iter().all(|e| *e <= LevelPlan::SPACIOUS * sparse);
         let spaced = if is_sparse { sparse } else { spaced(PER_CELL) };
         extent.map(|e| (e * LevelPlan::SPARE).max(spaced).max(SMALLEST_CELL))
     }
@@ -278,7 +254,7 @@ impl<'a> World<'a> {
         let &Costs { place, candidate, visit, visited, grid, .. } = self.costs;
         let [place, candidate, visit, visited, grid] =
             [place, candidate, visit, visited, grid].map(f64::from);
-        let inner = if self.on_device { 0.5 * self.candidates(level, level) } else { self.half(level) };
+        let inner = self.half(level);
         let own = place + candidate * self.pairs * inner;
         let visits = visit + visited * self.candidates(smaller, level);
         let others = visit * self.others.min(f64::from(count(level)));

@@ -7,24 +7,23 @@
 mod camps;
 mod costs;
 mod draft;
-#[cfg(feature = "gpu")]
-mod gpu;
 mod levels;
 mod pbig;
 mod reasons;
 mod summary;
 
+#[cfg(feature = "gpu")]
+pub use crate::gpu::GpuPlan;
+pub use crate::gpu_choice::NoGpu;
 pub(crate) use camps::{Camps, OPEN};
 pub use costs::{Costs, Forecast};
 pub(crate) use costs::{Experience, Way};
 use draft::Draft;
 pub(crate) use draft::KeptLevels;
-#[cfg(feature = "gpu")]
-pub use gpu::GpuPlan;
 use levels::{Choice, Company, Setting};
 pub use levels::{LevelPlan, OccupiedCell};
 pub use pbig::{PbigPlan, density_cell, pbig_cell, pbig_objective};
-pub use reasons::{Looks, Measured, NearPlan, NoGpu, NoNear};
+pub use reasons::{Looks, Measured, NearPlan, NoNear};
 pub(crate) use summary::{LazySummary, size_class_of, spread_evenly};
 pub use summary::{SizeClass, Summary};
 

@@ -33,9 +33,9 @@ impl PbigPlan {
     pub fn new(summary: &Summary, config: &Config) -> Self {
         let sample = ordinary(summary);
         let (space, origin) = space_of(summary, &sample);
-        let wanted = config.pbig_boxes_per_cell.max(1.0);
+        let wanted = config.gpu.boxes_per_cell.max(1.0);
         let n = summary.valid;
-        let mut cell = match config.cell_rule {
+        let mut cell = match config.gpu.cell_rule {
             CellRule::Objective => pbig_cell(&sample, n, space, wanted),
             CellRule::Density => density_cell(n, space, wanted),
         };

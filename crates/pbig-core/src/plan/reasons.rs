@@ -56,27 +56,6 @@ pub enum NoNear {
     Unwanted,
 }
 
-/// Why no device was asked, where [`crate::Backend::Auto`] leaves that open.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum NoGpu {
-    /// This build has no GPU backend.
-    NotBuilt,
-    /// None was given.
-    NotGiven,
-    /// The one that was given is software.
-    Software,
-    /// Fewer boxes than one is worth trying for.
-    FewBoxes,
-    /// Fewer than a quarter of the boxes have changed.
-    FewChanged,
-    /// What the CPU takes is not known yet.
-    Unmeasured,
-    /// The CPU takes less, or not so much more that it would change.
-    Slower,
-    /// The device takes less, and after some calls this is measured again, by one without.
-    Compared,
-}
-
 /// What the ways to do an update have taken here, as far as that has been measured and decides.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Measured {
@@ -108,21 +87,6 @@ impl fmt::Display for NoNear {
             Self::Unknown => write!(f, "how far most boxes move is not known"),
             Self::Unwanted => write!(f, "another way is asked for"),
         }
-    }
-}
-
-impl fmt::Display for NoGpu {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::NotBuilt => "this build has none",
-            Self::NotGiven => "none was given",
-            Self::Software => "the one given is software",
-            Self::FewBoxes => "there are too few boxes for one",
-            Self::FewChanged => "too few boxes have changed for one",
-            Self::Unmeasured => "what the CPU takes is measured first",
-            Self::Slower => "one does not take so much less that it pays to change",
-            Self::Compared => "one takes less, which is measured again, by the CPU",
-        })
     }
 }
 

@@ -112,7 +112,7 @@ impl BroadPhase {
     /// Pairs of reaches, into the list.
     fn find_reaches(&mut self) -> Result<(), Error> {
         let accept = Allowed(&self.filters);
-        let rule = Rule { accept: &accept, filters: Some(&self.filters), filters_suffice: true, before: &[] };
+        let rule = Rule { accept: &accept, filters: Some(&self.filters), before: &[] };
         let mut config = self.config;
         config.limits.max_pairs = self.most_near();
         let summary = LazySummary::new(&self.near.reach, self.base.spare.take());

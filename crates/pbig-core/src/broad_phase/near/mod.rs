@@ -295,11 +295,6 @@ impl BroadPhase {
         let near = Some(self.near.plan());
         let looks = Looks::default();
         self.report.plan = Plan { chosen: Chosen::Near, moved, boxes, near, looks, ..self.base_plan.clone() };
-        // A device that is compared with the CPU is compared with this.
-        if self.many_changed() {
-            let time = self.report.stages.total();
-            self.base.note_time(false, self.boxes.len(), time);
-        }
     }
 
     /// Too many new pairs: all is as it was, for the next attempt.

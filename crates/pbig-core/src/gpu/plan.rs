@@ -1,40 +1,44 @@
 //! The GPU's grid: PBIG's cells (section 4.1), one size for each level of boxes.
 //!
-//! A level's cells are a power of two times those of the finest, so that a device computes the cells
-//! of a box once and gets those of every level by shifting integers (contract 3). The last level has a
-//! single cell: boxes too large for the others are tested there against everything, once (contract 4).
+//! A level's cells are a power of two times those of the finest level. So a device computes the cells of a box once and
+//! shifts integers to get those of every level (contract 3). The last level has a single cell: there the boxes without
+//! a level of their own are tested against all others, once (contract 4).
 
-use super::pbig::{density_cell, ordinary, pbig_cell, space_of};
-use super::{LevelPlan, Summary, levels, size_class_of};
+use super::levels::{SizeRange, levels};
 use crate::Aabb;
-use crate::config::{CellRule, Config};
-use crate::layout::{FEWEST_CELLS, Level, MOST_LEVELS, MOST_SPAN, Params, ordered};
+use crate::config::{CellRule, GpuOptions};
+use crate::layout::{FEWEST_CELLS, Level, MAX_LEVELS, MAX_SPAN, Params, ordered};
+use crate::pbig::Summary;
+use crate::pbig::cell_size::{cell_size, ordinary, space_of};
+use crate::pbig::summary::size_class_of;
 use std::fmt;
 
-/// Cells of a level for each of its boxes, at most: beyond, the scan costs more than full cells do.
+/// Most cells of a level per box. With more cells, the scan costs more than full cells do.
 const CELLS_PER_BOX: f64 = 4.0;
-/// Cells that every level may have, however few its boxes.
-const CELLS_ANYWAY: f64 = 4096.0;
-/// Others in the cell of a box, against the wanted boxes per cell, from which a finer cell is looked for.
-const CROWDED: f64 = 4.0;
-/// Others in a cell that a sample must show before they count: one coincidence stands for many boxes.
-const MEANINGFUL: usize = 16;
-/// Finest cells from the middle of the world to its end, at most: they must fit an `i32` with room.
-const REACH: f64 = 1073741824.0;
+/// Number of cells that every level may have, however few its boxes.
+const MIN_CELLS_PER_LEVEL: f64 = 4096.0;
+/// Largest mean number of other boxes in a box's cell, as a multiple of the wanted boxes per cell. Above it the cell is
+/// halved.
+const OCCUPANCY_LIMIT: f64 = 4.0;
+/// Fewest pairs of sampled boxes in one cell that count: a single coincidence would stand for many boxes.
+const FEWEST_SAMPLED_PAIRS: usize = 16;
+/// Most cells of the finest level from the middle of the world to its end. They must fit an `i32` with room to spare.
+const MAX_CELL: f64 = 1073741824.0;
 
-/// Levels and cells for a device.
+/// The levels and cells of a search on a GPU.
 #[derive(Clone, Debug, PartialEq)]
 pub struct GpuPlan {
     /// Edge of the cells of the finest level, in the boxes' length unit.
     pub cell: f32,
-    /// Where cell 0 begins: the middle of most boxes.
+    /// Lower corner of cell 0, in the boxes' length unit: the middle of most boxes.
     pub origin: [f32; 3],
-    /// Finest first; the last has one cell.
-    pub levels: Vec<Level>,
-    /// Cells in all.
+    /// Number of cells of all levels.
     pub cells: u32,
+    /// Levels, finest first. The last has one cell.
+    pub(crate) levels: Vec<Level>,
 }
 
+/// `4097 cells, 16 x 16 x 16 of 1.5`.
 impl fmt::Display for GpuPlan {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{} cells", self.cells)?;
@@ -47,14 +51,15 @@ impl fmt::Display for GpuPlan {
 }
 
 impl GpuPlan {
-    /// The grid for the boxes behind `summary`, with at most `most_cells` cells. `crowding` is a factor
-    /// on the cell size: 1, or less where cells turned out to be too full.
-    pub fn new(summary: &Summary, config: &Config, crowding: f32, most_cells: u32) -> Self {
-        let split = levels::for_device(summary);
-        // The coarsest levels, if there are too many: finer boxes then share the first of them.
-        let split = &split[split.len().saturating_sub(MOST_LEVELS - 1)..];
+    /// Plans the grid for the boxes behind `summary`, with at most `max_cells` cells.
+    ///
+    /// `cell_factor` scales the cells: 1, or less where earlier cells held too many boxes.
+    pub(crate) fn new(summary: &Summary, options: &GpuOptions, cell_factor: f32, max_cells: u32) -> Self {
+        let split = levels(summary);
+        // Of too many levels the coarsest are kept: finer boxes then share the first of these.
+        let split = &split[split.len().saturating_sub(MAX_LEVELS - 1)..];
         let (space, low) = space_of(summary, &ordinary(summary));
-        let edges = split.iter().map(|level| edge(level, summary, space, config, crowding));
+        let edges = split.iter().map(|level| edge(level, summary, space, options, cell_factor));
         let (cell, shifts) = powers_of_two(&edges.collect::<Vec<_>>(), split, space);
         let mut plan = Self {
             cell: cell as f32,
@@ -63,8 +68,9 @@ impl GpuPlan {
             cells: 0,
         };
         for (shift, level) in shifts {
-            let share = most_cells.saturating_sub(1) / split.len().max(1) as u32;
-            let most = (f64::from(level.boxes) * CELLS_PER_BOX).max(CELLS_ANYWAY).min(f64::from(share));
+            let share = max_cells.saturating_sub(1) / split.len().max(1) as u32;
+            let most =
+                (f64::from(level.boxes) * CELLS_PER_BOX).max(MIN_CELLS_PER_LEVEL).min(f64::from(share));
             plan.push(dims(space, cell * f64::from(shift).exp2(), most), shift);
         }
         plan.push([1; 3], 0);
@@ -76,10 +82,10 @@ impl GpuPlan {
         self.cells += dims.iter().product::<u32>();
     }
 
-    /// The part of the kernels' parameters that the plan decides; the rest is 0.
-    pub fn params(&self) -> Params {
+    /// Returns the kernels' parameters, as far as the plan sets them; all others are 0.
+    pub(crate) fn params(&self) -> Params {
         let scale = (1.0 / f64::from(self.cell)) as f32;
-        let reach = 0.99 * REACH / f64::from(scale);
+        let reach = 0.99 * MAX_CELL / f64::from(scale);
         let bound = |k: usize, sign: f64| {
             let x =
                 (f64::from(self.origin[k]) + sign * reach).clamp(-f64::from(f32::MAX), f64::from(f32::MAX));
@@ -88,8 +94,8 @@ impl GpuPlan {
         let mut params = Params {
             origin: self.origin,
             scale,
-            reach_low: std::array::from_fn(|k| bound(k, -1.0)),
-            reach_high: std::array::from_fn(|k| bound(k, 1.0)),
+            clamp_low: std::array::from_fn(|k| bound(k, -1.0)),
+            clamp_high: std::array::from_fn(|k| bound(k, 1.0)),
             levels: self.levels.len() as u32,
             cells: self.cells,
             ..Params::default()
@@ -99,52 +105,55 @@ impl GpuPlan {
     }
 }
 
-/// The cell size of a level: equation 6 or the density rule on its boxes alone, but such that its
-/// largest box touches few cells on each axis.
-fn edge(level: &LevelPlan, summary: &Summary, space: [f32; 3], config: &Config, crowding: f32) -> f64 {
-    let of_level =
-        |b: &&Aabb| (level.classes.0..=level.classes.1).contains(&(size_class_of(b.extents()) as u8));
+/// Returns the cell size of a level: by the cell rule on its boxes alone, but such that its largest box touches few
+/// cells on each axis.
+fn edge(
+    level: &SizeRange,
+    summary: &Summary,
+    space: [f32; 3],
+    options: &GpuOptions,
+    cell_factor: f32,
+) -> f64 {
+    let of_level = |b: &&Aabb| (level.classes.0..=level.classes.1).contains(&size_class_of(b.extents()));
     let sample: Vec<Aabb> = summary.sample.iter().filter(of_level).copied().collect();
-    let wanted = config.pbig_boxes_per_cell.max(1.0);
-    let cell = match config.cell_rule {
-        CellRule::Objective if !sample.is_empty() => {
-            // A quarter of the sample will do: the search evaluates it 24 times.
-            let quarter: Vec<Aabb> = sample.iter().step_by(4).copied().collect();
-            pbig_cell(&quarter, level.boxes, space, wanted)
-        }
-        _ => density_cell(level.boxes, space, wanted),
+    let wanted = options.boxes_per_cell.max(1.0);
+    let cell = if sample.is_empty() {
+        cell_size(CellRule::Density, &sample, level.boxes, space, wanted)
+    } else {
+        // A quarter of the sample is enough: equation 6 is evaluated on it 24 times.
+        let quarter: Vec<Aabb> = sample.iter().step_by(4).copied().collect();
+        cell_size(options.cell_rule, &quarter, level.boxes, space, wanted)
     };
     let largest = level.max_extent.into_iter().fold(0.0, f32::max);
-    // A box reaches over at most one border more than it has cell lengths, and one more by rounding.
-    let smallest = f64::from(largest) * 1.001 / f64::from(MOST_SPAN - 2);
-    let even = f64::from(cell) * f64::from(crowding);
-    uncrowded(&sample, level.boxes, even, smallest, CROWDED * f64::from(wanted)).max(smallest)
+    // A box crosses at most one border more than it has cell lengths, and one more by rounding.
+    let smallest = f64::from(largest) * 1.001 / f64::from(MAX_SPAN - 2);
+    let even = f64::from(cell) * f64::from(cell_factor);
+    with_limited_occupancy(&sample, level.boxes, even, smallest, OCCUPANCY_LIMIT * f64::from(wanted))
+        .max(smallest)
 }
 
-/// Equation 6 knows the average cell only: of boxes in clusters far apart most cells are empty and the
-/// others hold a cluster each. So the cell is halved until a box has at most `most` others in its cell,
-/// as the sample tells, or hardly more than in the smallest cell: identical boxes no cell can part.
-fn uncrowded(sample: &[Aabb], boxes: u32, even: f64, smallest: f64, most: f64) -> f64 {
+/// Returns a cell size at which a box has at most `most` other boxes in its cell, as the sample tells.
+///
+/// Equation 6 knows the average cell only. If boxes lie in clusters far apart, most cells are empty and the others hold
+/// a cluster each; so the cell is halved. It stops where the smallest cell would hold hardly fewer boxes: no cell
+/// separates identical boxes.
+fn with_limited_occupancy(sample: &[Aabb], boxes: u32, even: f64, smallest: f64, most: f64) -> f64 {
     let mut cell = even;
-    let (now, seen) = crowding(sample, boxes, cell);
-    if now <= most || seen < MEANINGFUL {
+    let (now, sampled_pairs) = occupancy(sample, boxes, cell);
+    if now <= most || sampled_pairs < FEWEST_SAMPLED_PAIRS {
         return cell;
     }
     let smallest = smallest.max(even * 2f64.powi(-30));
-    let goal = most.max(1.25 * crowd(sample, boxes, smallest));
-    while cell > smallest && crowd(sample, boxes, cell) > goal {
+    let goal = most.max(1.25 * occupancy(sample, boxes, smallest).0);
+    while cell > smallest && occupancy(sample, boxes, cell).0 > goal {
         cell /= 2.0;
     }
     cell
 }
 
-fn crowd(sample: &[Aabb], boxes: u32, cell: f64) -> f64 {
-    crowding(sample, boxes, cell).0
-}
-
-/// Other boxes in the cell of a box's lower corner, on average over boxes, estimated from a sample; and
-/// how many the sample itself has.
-fn crowding(sample: &[Aabb], boxes: u32, cell: f64) -> (f64, usize) {
+/// Returns an estimate of the mean number of other boxes in the cell of a box's lower corner, and the number of pairs
+/// of sampled boxes that share a cell.
+fn occupancy(sample: &[Aabb], boxes: u32, cell: f64) -> (f64, usize) {
     let of = |b: &Aabb| b.min.map(|x| (f64::from(x) / cell).floor() as i64);
     let mut cells: Vec<[i64; 3]> = sample.iter().map(of).collect();
     cells.sort_unstable();
@@ -153,16 +162,16 @@ fn crowding(sample: &[Aabb], boxes: u32, cell: f64) -> (f64, usize) {
     (others as f64 / n * (f64::from(boxes) / n), others)
 }
 
-/// The finest cell, and by how many doublings each level's cells are larger; no level twice, and none
-/// so coarse that the finest would not reach across the space.
+/// Returns the finest cell, and for each level the number of doublings to its cells. Levels of equal cells are joined.
+/// Levels so coarse that the finest cells would not span the space are left out.
 fn powers_of_two<'a>(
     edges: &[f64],
-    levels: &'a [LevelPlan],
+    levels: &'a [SizeRange],
     space: [f32; 3],
-) -> (f64, Vec<(u32, &'a LevelPlan)>) {
+) -> (f64, Vec<(u32, &'a SizeRange)>) {
     let widest = f64::from(space.into_iter().fold(0.0, f32::max));
-    let finest = edges.first().copied().unwrap_or(1.0).max(4.0 * widest / REACH).clamp(1e-30, 1e30);
-    let mut shifts: Vec<(u32, &LevelPlan)> = Vec::new();
+    let finest = edges.first().copied().unwrap_or(1.0).max(4.0 * widest / MAX_CELL).clamp(1e-30, 1e30);
+    let mut shifts: Vec<(u32, &SizeRange)> = Vec::new();
     for (edge, level) in edges.iter().zip(levels) {
         let shift = (edge / finest).log2().ceil().max(0.0) as u32;
         match shifts.last() {
@@ -174,7 +183,7 @@ fn powers_of_two<'a>(
     (finest, shifts)
 }
 
-/// Cells on each axis: enough for the space, but at most `most` in all, beyond which they wrap around.
+/// Returns the number of cells on each axis: enough for the space, but at most `most` in all. Boxes beyond wrap around.
 /// An axis shorter than a cell is not divided.
 fn dims(space: [f32; 3], cell: f64, most: f64) -> [u32; 3] {
     let along = |length: f32| match f64::from(length) / cell {
@@ -197,12 +206,12 @@ mod tests {
     use super::*;
 
     fn plan(boxes: &[Aabb]) -> GpuPlan {
-        let plan = GpuPlan::new(&Summary::of(boxes, None), &Config::DEFAULT, 1.0, 1 << 24);
+        let plan = GpuPlan::new(&Summary::of(boxes), &GpuOptions::DEFAULT, 1.0, 1 << 24);
         validate(&plan);
         plan
     }
 
-    /// What the kernels rely on.
+    /// Asserts what the kernels rely on.
     fn validate(plan: &GpuPlan) {
         let mut first = 0;
         for level in &plan.levels {
@@ -211,7 +220,7 @@ mod tests {
             first += level.dims.iter().product::<u32>();
         }
         assert_eq!(plan.cells, first);
-        assert!(plan.levels.len() <= MOST_LEVELS);
+        assert!(plan.levels.len() <= MAX_LEVELS);
         let (last, finer) = plan.levels.split_last().expect("at least one level");
         assert_eq!(last.dims, [1; 3]);
         assert!(finer.windows(2).all(|two| two[0].shift < two[1].shift), "{plan}");
