@@ -179,7 +179,7 @@ impl<R: Record> Search<R> {
     {
         stage!("gpu");
         let clock = Instant::now();
-        let request = gpu::Request { boxes, filters: rule.filters, config };
+        let request = gpu::SearchRequest { boxes, filters: rule.filters, config };
         let found = self.gpu.get_or_insert_with(GpuFinder::shared).find(&request);
         let done = self.settle(found, clock, report)?;
         report.invalid = done.as_ref().map_or(0, |(_, valid)| boxes.len() as u64 - u64::from(*valid));
@@ -224,7 +224,7 @@ impl<R: Record> Search<R> {
     #[cfg(feature = "gpu")]
     fn settle(
         &mut self,
-        found: Result<gpu::Found, gpu::Failure>,
+        found: Result<gpu::GpuFound, gpu::Failure>,
         mut clock: Instant,
         report: &mut Report,
     ) -> Result<Option<(Vec<u32>, u32)>, Error> {

@@ -1,14 +1,14 @@
-//! The kernels in a search for changes: what there is besides boxes as they are.
+//! The kernels in a search for changes, which has each box now and at the last update.
 
 use super::*;
 
 impl State {
-    /// Whether this is a search for changes.
+    /// Returns true in a search for changes.
     pub(super) fn finds_changes(&self) -> bool {
         !self.motions.is_empty()
     }
 
-    /// All that a box touches, now or before.
+    /// Returns the bounds of a box now and at the last update.
     pub(super) fn bounds(&self, id: usize) -> DeviceBox {
         self.motions.get(id).map_or_else(|| self.boxes[id], bounds_of)
     }
@@ -17,7 +17,7 @@ impl State {
         self.motions.get(id).is_some_and(|motion| motion.now != motion.before)
     }
 
-    /// Whether two boxes overlap, or began or ceased to.
+    /// Returns true if two boxes overlap; in a search for changes, if their overlap has changed.
     pub(super) fn is_wanted(&self, i: usize, j: usize) -> bool {
         match (self.motions.get(i), self.motions.get(j)) {
             (Some(a), Some(b)) => overlap(&a.now, &b.now) != overlap(&a.before, &b.before),
@@ -25,11 +25,11 @@ impl State {
         }
     }
 
-    /// What the device has of the last update, and the lists that make this one of it.
+    /// Adds the boxes that the device has from the last update, and the lists of changes.
     pub(super) fn add_changes(&mut self, case: &Case) {
         for (id, (now, before)) in (0u32..).zip(case.boxes.iter().zip(&case.before)) {
             let long_ago = DeviceBox::new(&case.boxes[0]);
-            // As it was; boxes that were nowhere may have been something that no longer counts.
+            // The device may still have an old box where there was none at the last update.
             let known = if before.is_valid() { *before } else { case.boxes[1] };
             self.motions.push(Motion { now: DeviceBox::new(&known), before: long_ago });
             if !before.is_valid() || now != before {
@@ -54,7 +54,7 @@ fn bounds_of(motion: &Motion) -> DeviceBox {
     }
 }
 
-/// What the plan is made for.
+/// Returns the boxes that the plan is made for: the bounds of each box now and before.
 pub(super) fn all_bounds(case: &Case) -> Vec<Aabb> {
     let both = |(i, now): (usize, &Aabb)| match case.before.get(i) {
         Some(before) if before.is_valid() && now.is_valid() => Aabb::new(
@@ -67,7 +67,7 @@ pub(super) fn all_bounds(case: &Case) -> Vec<Aabb> {
     case.boxes.iter().enumerate().map(both).collect()
 }
 
-/// The cases, with the first half of their boxes on the move: a little, from anywhere, or there and gone.
+/// Returns the cases with moving boxes: half of them move a little, come from anywhere, appear or disappear.
 pub(super) fn moving_cases() -> Vec<Case> {
     cases().into_iter().map(moving).collect()
 }
@@ -90,12 +90,12 @@ pub(super) fn moving(mut case: Case) -> Case {
     case
 }
 
-/// The level without the mark; that of an invalid box is beyond all.
+/// Returns the level without the mark. For an invalid box it is larger than all levels.
 pub(super) fn own_level(at: &Located) -> u32 {
     at.level & (MOVED - 1)
 }
 
-/// Whether a cell may own pairs of entries with these marks, and they may matter.
+/// Returns true if a cell may own a pair of entries with these marks, and the pair may be wanted.
 pub(super) fn may_be_wanted(s: &State, marks: u32) -> bool {
     marks >> AXIS_BITS == 7 && (!s.finds_changes() || marks & MOVED != 0)
 }
@@ -136,7 +136,7 @@ fn apply_changes_agrees_with_its_twin() {
     agrees("apply_changes");
 }
 
-/// On all sets but those with many boxes for a kernel that tests all pairs, with all codings.
+/// Compares a kernel with its twin on all sets of at most `most_boxes` boxes, with all codings.
 fn check_agrees_on_changes(kernel: &str, codings: &[u32], most_boxes: usize) {
     for case in moving_cases().into_iter().filter(|case| case.boxes.len() <= most_boxes) {
         let before = State::before(kernel, &case);
@@ -165,9 +165,9 @@ fn check_all_agrees_with_its_twin_on_changes() {
     check_agrees_on_changes("check_all", &[0, PACKED, BITS], 2000);
 }
 
-/// What has come to the end of the lists must not change: neither boxes nor filters.
+/// Boxes and filters beyond the ends of the lists must not change.
 #[test]
-fn store_previous_and_apply_changes_leave_alone_what_they_are_not_told() {
+fn store_previous_and_apply_changes_change_nothing_else() {
     for kernel in ["store_previous", "apply_changes"] {
         let mut before = State::before(kernel, &moving(pile()));
         before.params.known -= 300;
@@ -192,7 +192,7 @@ fn the_twins_together_find_what_the_oracle_has_in_one_of_two_states() {
     }
 }
 
-/// What the tests say would mean little if nothing moved, or everything.
+/// The other tests would mean little if no box moved, or if all did.
 #[test]
 fn the_moving_sets_have_large_items_without_and_with_movement() {
     let marks = |s: &State, item: &LargeItem| -> u32 {
@@ -225,14 +225,14 @@ fn faults_planted_in_what_is_known_of_boxes_are_noticed() {
     }
 }
 
-/// A box that moved and does not say so is overlooked: its pairs are missing.
+/// A moved box without its mark is skipped, so its pairs are missing.
 #[test]
 fn an_entry_that_lost_its_mark_costs_pairs() {
     needs_gpu!();
     let mut before = State::before("check_small", &moving(pile()));
     let wanted = after_twin(twin("check_small"), &before);
     before.entries.iter_mut().for_each(|entry| *entry &= !MOVED);
-    let before = with_room(&before, &wanted);
+    let before = with_capacity_for(&before, &wanted);
     let found = on_device(bench(true), twin("check_small"), &GpuOptions::DEFAULT, &before);
     let fault = compare_checks(&before, &found, &wanted).expect("pairs are missing");
     assert!(fault.starts_with("missing"), "{fault}");

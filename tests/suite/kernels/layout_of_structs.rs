@@ -1,17 +1,17 @@
-//! Structs, constants and bindings are the same in Rust and in WGSL.
+//! Contract: structs, constants and bindings are the same in Rust and in WGSL.
 
 use super::*;
 
 /// A Rust struct that kernels share.
-struct Mirror {
+struct SharedStruct {
     name: &'static str,
     size: usize,
     fields: Vec<(&'static str, usize)>,
 }
 
-macro_rules! mirrors {
+macro_rules! shared_structs {
     ($($name:ident { $($field:ident),* })*) => {
-        vec![$(Mirror {
+        vec![$(SharedStruct {
             name: stringify!($name),
             size: size_of::<layout::$name>(),
             fields: vec![$((stringify!($field), offset_of!(layout::$name, $field))),*],
@@ -19,8 +19,8 @@ macro_rules! mirrors {
     };
 }
 
-fn mirrors() -> Vec<Mirror> {
-    mirrors! {
+fn shared_structs() -> Vec<SharedStruct> {
+    shared_structs! {
         DeviceBox { low, high }
         Motion { now, before }
         BoxChange { marked_id, now }
@@ -40,7 +40,7 @@ fn mirrors() -> Vec<Mirror> {
     }
 }
 
-/// The Rust field that begins where a member of WGSL does: padding is one array there, a filter one struct.
+/// Returns the Rust field that begins at a member of WGSL. In Rust padding is one array, and a filter is one struct.
 fn field_of(member: &str) -> Option<&str> {
     match member {
         "unused0" => Some("unused"),
@@ -55,7 +55,7 @@ fn module_of(kernel: &Kernel) -> naga::Module {
     parsed.unwrap_or_else(|error| panic!("{}: {error}", kernel.name))
 }
 
-/// Fields and size of a struct of a module.
+/// Returns the fields and the size of a struct of a module.
 fn struct_of<'a>(module: &'a naga::Module, name: &str) -> Option<(Vec<(&'a str, usize)>, usize)> {
     let named = module.types.iter().find(|(_, ty)| ty.name.as_deref() == Some(name));
     let naga::TypeInner::Struct { members, span } = &named?.1.inner else { return None };
@@ -70,15 +70,15 @@ fn struct_of<'a>(module: &'a naga::Module, name: &str) -> Option<(Vec<(&'a str, 
 fn structs_lie_in_memory_as_in_the_kernels() {
     for kernel in all_kernels() {
         let module = module_of(kernel);
-        for mirror in mirrors() {
-            let found = struct_of(&module, mirror.name);
-            let wanted = Some((mirror.fields, mirror.size));
-            assert_eq!(found, wanted, "{}: {}", kernel.name, mirror.name);
+        for shared in shared_structs() {
+            let found = struct_of(&module, shared.name);
+            let wanted = Some((shared.fields, shared.size));
+            assert_eq!(found, wanted, "{}: {}", kernel.name, shared.name);
         }
     }
 }
 
-/// The value of a named constant of a kernel, if it has it.
+/// Returns the value of a named constant of a kernel, if it has it.
 fn constant_of(module: &naga::Module, name: &str) -> Option<u32> {
     let (_, constant) = module.constants.iter().find(|(_, c)| c.name.as_deref() == Some(name))?;
     match module.global_expressions[constant.init] {
@@ -111,7 +111,7 @@ fn constants_are_those_of_the_kernels() {
         for (name, value) in somewhere {
             assert_eq!(constant_of(&module, name).unwrap_or(value), value, "{}: {name}", kernel.name);
         }
-        // An abstract number, of which a parsed module keeps nothing.
+        // A parsed module does not keep constants without a type.
         assert!(kernel.source(false, true).contains(&most_span), "{}", kernel.name);
     }
 }

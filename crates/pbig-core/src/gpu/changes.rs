@@ -7,7 +7,7 @@
 
 use super::search::{Task, search};
 use super::upload::{PIECE, follows};
-use super::{Failure, Found, GpuFinder};
+use super::{Failure, GpuFinder, GpuFound};
 use crate::layout::{BoxChange, DeviceBox, FilterChange, Motion, WAS_ABSENT};
 use crate::{Aabb, Config, Error, ProxyFilter};
 use rayon::prelude::*;
@@ -142,18 +142,18 @@ impl GpuFinder {
     /// Finds the pairs that the filters allow and that overlap now and did not at the last update, or the other way
     /// round. The boxes tell which of the two.
     ///
-    /// The device treats the boxes in [`Found::restarted`] as new. So the caller completes the answer for them:
+    /// The device treats the boxes in [`GpuFound::restarted`] as new. So the caller completes the answer for them:
     ///
     /// - a kept pair that no longer holds has ended, and is not in the result;
     /// - a kept pair that still holds is in the result like a new one, and must not be added again.
     ///
     /// After an error the next call uploads all boxes, so nothing is missed.
-    pub(crate) fn changes(&mut self, request: &ChangeRequest<'_>) -> Result<Found, Failure> {
+    pub(crate) fn changes(&mut self, request: &ChangeRequest<'_>) -> Result<GpuFound, Failure> {
         let result = self.try_changes(request);
         result.inspect_err(|failure| self.fail(failure))
     }
 
-    fn try_changes(&mut self, request: &ChangeRequest<'_>) -> Result<Found, Failure> {
+    fn try_changes(&mut self, request: &ChangeRequest<'_>) -> Result<GpuFound, Failure> {
         self.check_pause(request.config)?;
         let cell_factor = self.cell_factor;
         let session = self.session(&request.config.gpu)?;
@@ -166,7 +166,7 @@ impl GpuFinder {
         session.motion_bounds = bounds;
         session.end_call();
         self.succeed(&found, request.boxes.len() as u64 + request.kept);
-        Ok(Found { restarted: request.restarted(), ..found })
+        Ok(GpuFound { restarted: request.restarted(), ..found })
     }
 }
 

@@ -6,7 +6,7 @@ use crate::report::{Checks, GpuReport};
 
 /// The pairs that a device found, and how it found them. There is none of a search that failed.
 #[derive(Debug)]
-pub(crate) struct Found {
+pub(crate) struct GpuFound {
     /// Pairs, each once, in no particular order: a list for each piece of decoded output.
     ///
     /// [`super::GpuFinder::find`]: all pairs that overlap and that the filters allow.

@@ -57,7 +57,7 @@ pub(crate) use changes::{Change, ChangeRequest};
 pub use device::Fault;
 pub(crate) use error::Failure;
 pub use error::GpuError;
-pub(crate) use found::Found;
+pub(crate) use found::GpuFound;
 pub use plan::GpuPlan;
 
 use crate::gpu_choice::AvailableDevice;
@@ -105,7 +105,7 @@ impl Clone for GpuFinder {
 
 /// A search for all pairs.
 #[derive(Clone, Copy)]
-pub(crate) struct Request<'a> {
+pub(crate) struct SearchRequest<'a> {
     pub(crate) boxes: &'a [Aabb],
     pub(crate) filters: Option<&'a [ProxyFilter]>,
     pub(crate) config: &'a Config,
@@ -198,7 +198,7 @@ impl GpuFinder {
     }
 
     /// Finds all pairs of a request.
-    pub(crate) fn find(&mut self, request: &Request<'_>) -> Result<Found, Failure> {
+    pub(crate) fn find(&mut self, request: &SearchRequest<'_>) -> Result<GpuFound, Failure> {
         let result = self.try_find(request);
         result.inspect_err(|failure| self.fail(failure))
     }
@@ -263,7 +263,7 @@ impl GpuFinder {
         Ok(&mut self.session.insert((*options, session)).1)
     }
 
-    fn try_find(&mut self, request: &Request<'_>) -> Result<Found, Failure> {
+    fn try_find(&mut self, request: &SearchRequest<'_>) -> Result<GpuFound, Failure> {
         self.check_pause(request.config)?;
         let cell_factor = self.cell_factor;
         let session = self.session(&request.config.gpu)?;
@@ -276,7 +276,7 @@ impl GpuFinder {
     }
 
     /// Ends a pause, and adapts the cell size. A search of boxes and pairs takes `useful` tests at least.
-    fn succeed(&mut self, found: &Found, useful: u64) {
+    fn succeed(&mut self, found: &GpuFound, useful: u64) {
         self.failed = None;
         if found.plan.is_some() {
             self.adapt_cells(found.checks.made / useful.max(1));

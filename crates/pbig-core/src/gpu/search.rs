@@ -3,7 +3,7 @@
 use super::error::Failure;
 use super::session::{Input, Job, Session};
 use super::sink::Sink;
-use super::{ChangeRequest, Found, GpuError, GpuPlan, Request, parts};
+use super::{ChangeRequest, GpuError, GpuFound, GpuPlan, SearchRequest, parts};
 use crate::layout::{BOX_BITS, Located, Motion};
 use crate::pbig::Summary;
 use crate::report::{Checks, GpuReport};
@@ -33,14 +33,14 @@ pub(super) struct Task<'a> {
 
 impl<'a> Task<'a> {
     /// Returns the task to find all pairs of a request.
-    pub(super) fn all_pairs(request: &Request<'a>) -> Self {
-        let &Request { boxes, filters, config } = request;
+    pub(super) fn all_pairs(request: &SearchRequest<'a>) -> Self {
+        let &SearchRequest { boxes, filters, config } = request;
         Self { boxes, filters, changes: None, limit: config.limits.max_pairs, options: &config.gpu }
     }
 }
 
 /// Searches in as few parts as fit.
-pub(super) fn search(session: &mut Session, task: &Task<'_>, cell_factor: f32) -> Result<Found, Failure> {
+pub(super) fn search(session: &mut Session, task: &Task<'_>, cell_factor: f32) -> Result<GpuFound, Failure> {
     let summary = Summary::of(task.boxes);
     let len = task.boxes.len();
     let mut most = boxes_at_once(session, task);
@@ -71,10 +71,10 @@ fn new_sink(session: &Session, limit: u64) -> Sink {
     Sink { pairs: Vec::new(), pair_count: 0, words: 0, limit, checks: Checks::default(), report }
 }
 
-fn found(sink: Sink, plan: Option<GpuPlan>, valid: u32) -> Found {
+fn found(sink: Sink, plan: Option<GpuPlan>, valid: u32) -> GpuFound {
     let Sink { pairs, pair_count, words, checks, mut report, .. } = sink;
     report.compression = if pair_count > 0 { words as f64 / (2 * pair_count) as f64 } else { 0.0 };
-    Found { pairs, restarted: Vec::new(), valid, plan, checks, report }
+    GpuFound { pairs, restarted: Vec::new(), valid, plan, checks, report }
 }
 
 /// Returns the most boxes to search at once, by the limits and by earlier calls.

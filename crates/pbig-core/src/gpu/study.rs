@@ -2,7 +2,7 @@
 
 pub use super::changes::{Change, ChangeRequest};
 use super::device::{GpuDevice, Variant};
-use super::{Failure, Found, GpuError, GpuFinder, GpuPlan, Request, readback};
+use super::{Failure, GpuError, GpuFinder, GpuFound, GpuPlan, SearchRequest, readback};
 use crate::config::GpuOptions;
 use crate::layout::Params;
 use crate::pbig::Summary;
@@ -192,7 +192,7 @@ impl Tracker {
     /// # Errors
     /// If the device fails, or if the CPU would end in an error, too.
     pub fn update(&mut self, request: &ChangeRequest<'_>) -> Result<Tracked, Box<dyn Error>> {
-        let Found { pairs, restarted, checks, report, .. } = self.gpu.changes(request).map_err(boxed)?;
+        let GpuFound { pairs, restarted, checks, report, .. } = self.gpu.changes(request).map_err(boxed)?;
         Ok(Tracked { pairs: pairs.concat(), restarted, checks, report })
     }
 
@@ -201,7 +201,7 @@ impl Tracker {
     /// # Errors
     /// As [`Tracker::update`].
     pub fn find(&mut self, boxes: &[Aabb], config: &Config) -> Result<Vec<Pair>, Box<dyn Error>> {
-        let request = Request { boxes, filters: None, config };
+        let request = SearchRequest { boxes, filters: None, config };
         Ok(self.gpu.find(&request).map_err(boxed)?.pairs.concat())
     }
 }

@@ -42,26 +42,26 @@ pub fn pbig_grid(boxes: &[Aabb], options: &GpuOptions) -> Result<PbigFound, Erro
         return Err(Error::TooManyBoxes { boxes: boxes.len() as u64, limit });
     }
     let plan = PbigPlan::new(boxes, options);
-    let grid = Grid::new(&plan, boxes);
-    let mut search = Search { grid: &grid, pairs: Vec::new(), checks: Checks::default() };
+    let grid = PbigGrid::new(&plan, boxes);
+    let mut search = PbigSearch { grid: &grid, pairs: Vec::new(), checks: Checks::default() };
     for key in 0..grid.offsets.len() - 1 {
         search.check_cell(key, options.small_cell);
         search.check_limit()?;
     }
     search.check_oversize()?;
-    let Search { mut pairs, checks, .. } = search;
+    let PbigSearch { mut pairs, checks, .. } = search;
     pairs.sort_unstable();
     Ok(PbigFound { pairs, checks, plan })
 }
 
 /// The cells that a box touches, both ends included.
 #[derive(Clone, Copy, Debug)]
-struct Touched {
+struct TouchedCells {
     low: [u32; 3],
     high: [u32; 3],
 }
 
-impl Touched {
+impl TouchedCells {
     fn new(plan: &PbigPlan, one: &Aabb) -> Self {
         let cell = |k: usize, x: f32| {
             let scaled = (x - plan.origin[k]) * (1.0 / plan.cell);
@@ -92,24 +92,24 @@ fn key_of(cell: [u32; 3], dims: [u32; 3]) -> usize {
 
 /// A box in the grid.
 #[derive(Clone, Copy, Debug)]
-struct Member {
+struct GridMember {
     aabb: Aabb,
     id: u32,
-    touched: Touched,
+    touched: TouchedCells,
 }
 
 /// The grid: for each cell a range of `entries`, each an index into `members`.
 #[derive(Debug)]
-struct Grid {
+struct PbigGrid {
     dims: [u32; 3],
     offsets: Vec<u32>,
     entries: Vec<u32>,
-    members: Vec<Member>,
+    members: Vec<GridMember>,
     /// Boxes that touch too many cells, which are tested against all others.
     oversize: Vec<(u32, Aabb)>,
 }
 
-impl Grid {
+impl PbigGrid {
     /// Builds the grid by count, scan and scatter: the three kernels of PBIG 4.2.
     fn new(plan: &PbigPlan, boxes: &[Aabb]) -> Self {
         let (members, oversize) = select(plan, boxes);
@@ -134,36 +134,36 @@ impl Grid {
     }
 
     /// Returns the key of the cell that reports a pair.
-    fn owner(&self, a: &Member, b: &Member) -> usize {
+    fn owner(&self, a: &GridMember, b: &GridMember) -> usize {
         key_of(std::array::from_fn(|k| a.touched.low[k].max(b.touched.low[k])), self.dims)
     }
 }
 
 /// Returns the valid boxes with their cells, and the oversize boxes.
-fn select(plan: &PbigPlan, boxes: &[Aabb]) -> (Vec<Member>, Vec<(u32, Aabb)>) {
+fn select(plan: &PbigPlan, boxes: &[Aabb]) -> (Vec<GridMember>, Vec<(u32, Aabb)>) {
     let (mut members, mut oversize, mut entries) = (Vec::new(), Vec::new(), 0);
     for (id, aabb) in (0u32..).zip(boxes).filter(|(_, aabb)| aabb.is_valid()) {
-        let touched = Touched::new(plan, aabb);
+        let touched = TouchedCells::new(plan, aabb);
         let count = touched.count();
         // Entries are counted in 32 bits.
         if count > u64::from(plan.max_cells_per_box) || entries + count > u64::from(u32::MAX) {
             oversize.push((id, *aabb));
         } else {
             entries += count;
-            members.push(Member { aabb: *aabb, id, touched });
+            members.push(GridMember { aabb: *aabb, id, touched });
         }
     }
     (members, oversize)
 }
 
 /// A search of the grid, with its result so far.
-struct Search<'a> {
-    grid: &'a Grid,
+struct PbigSearch<'a> {
+    grid: &'a PbigGrid,
     pairs: Vec<Pair>,
     checks: Checks,
 }
 
-impl Search<'_> {
+impl PbigSearch<'_> {
     /// Tests the pairs of a cell.
     fn check_cell(&mut self, key: usize, small_cell: u32) {
         let range = self.grid.offsets[key] as usize..self.grid.offsets[key + 1] as usize;
