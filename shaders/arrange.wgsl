@@ -1,5 +1,5 @@
-// Between schedule and check: how many workgroups the check kernels of the first part get. What there
-// was no room for is not checked at all: the host makes room and maps again.
+// Computes the number of workgroups of the first check kernels, between schedule and check. If a list did not fit, there
+// are none: the host makes larger buffers and maps again.
 
 @group(0) @binding(0) var<uniform> params: Params;
 @group(0) @binding(1) var<uniform> chunk: Chunk;
@@ -18,8 +18,8 @@ fn write_dispatch(at: u32, items: u32) {
 
 @compute @workgroup_size(1)
 fn arrange() {
-    let fits = counters.entries <= params.entry_room && counters.slots <= params.slot_room
-        && counters.small_items <= params.small_room && counters.large_items <= params.large_room;
+    let fits = counters.entries <= params.entry_capacity && counters.slots <= params.slot_capacity
+        && counters.small_items <= params.small_capacity && counters.large_items <= params.large_capacity;
     write_dispatch(0u, select(0u, min(counters.small_items, chunk.small_items), fits));
     write_dispatch(3u, select(0u, min(counters.large_items, chunk.large_items), fits));
 }

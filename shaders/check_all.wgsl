@@ -1,9 +1,9 @@
-// Check, without a grid, for small scenes: one invocation for each pair of all boxes (Avril 3.2).
-// The output is one bit a pair (Avril 3.4) or the pairs, whichever is expected to be smaller.
+// Check, without a grid, for few boxes: one invocation for each pair (Avril 3.2). The output is one bit a pair (Avril 3.4)
+// or a list of pairs, whichever the host expects to be smaller.
 
 @group(0) @binding(0) var<uniform> params: Params;
 @group(0) @binding(1) var<uniform> chunk: Chunk;
-@group(0) @binding(2) var<storage, read> boxes: array<Subject>;
+@group(0) @binding(2) var<storage, read> boxes: array<KnownBox>;
 @group(0) @binding(3) var<storage, read> filters: array<vec4<u32>>;
 @group(0) @binding(4) var<storage, read_write> totals: array<atomic<u32>, 10>;
 @group(0) @binding(5) var<storage, read_write> out: array<u32>;
@@ -23,9 +23,9 @@ fn check_all(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) g
     var pair = vec2<u32>(0u);
     if first + lane < all {
         pair = pair_at(first + lane, n);
-        let matters = matter(boxes[pair.x], boxes[pair.y]);
-        atomicAdd(&tally[2], u32(matters));
-        hit = matters
+        let found = is_wanted(boxes[pair.x], boxes[pair.y]);
+        atomicAdd(&tally[2], u32(found));
+        hit = found
             && ((params.flags & FILTERED) == 0u || filters_allow(filters[pair.x], filters[pair.y]));
     }
     var rank = 0u;
@@ -40,7 +40,7 @@ fn check_all(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) g
     if lane == 0u {
         add_tests();
         let hits = atomicLoad(&tally[HITS]);
-        placed = Placed(NO_ROOM, 0u, 0u, 0u);
+        placed = Placed(NO_SPACE, 0u, 0u, 0u);
         if (params.flags & BITS) != 0u {
             add_total(PAIRS, hits);
         } else if hits > 0u {
@@ -49,10 +49,10 @@ fn check_all(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) g
     }
     let at = workgroupUniformLoad(&placed).at;
     let word = first / 32u + lane;
-    if (params.flags & BITS) != 0u && lane < 8u && word < chunk.word_room {
+    if (params.flags & BITS) != 0u && lane < 8u && word < chunk.word_capacity {
         out[word] = atomicLoad(&bits[lane]);
     }
-    if hit && at != NO_ROOM {
+    if hit && at != NO_SPACE {
         write_pair(at + 2u * rank, pair.x, pair.y);
     }
 }

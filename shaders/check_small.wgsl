@@ -1,10 +1,9 @@
-// Check, small cells (Avril 3.2): one invocation per pair. The workgroup's pairs lie in consecutive
-// small cells of a block; a lane finds its cell by bisection in workgroup memory, and its pair by a
-// square root and an exact correction.
+// Check, small cells (Avril 3.2): one invocation per pair. The workgroup's pairs lie in consecutive small cells of a
+// block. A lane finds its cell by bisection in workgroup memory, and its pair by a square root and an exact correction.
 
 @group(0) @binding(0) var<uniform> params: Params;
 @group(0) @binding(1) var<uniform> chunk: Chunk;
-@group(0) @binding(2) var<storage, read> boxes: array<Subject>;
+@group(0) @binding(2) var<storage, read> boxes: array<KnownBox>;
 @group(0) @binding(3) var<storage, read> filters: array<vec4<u32>>;
 @group(0) @binding(4) var<storage, read> entries: array<u32>;
 @group(0) @binding(5) var<storage, read> counters: Counters;
@@ -14,11 +13,11 @@
 @group(0) @binding(9) var<storage, read_write> out: array<u32>;
 
 var<workgroup> first_pairs: array<u32, LANES>;
-// Of each slot: its hits, and where its record begins.
+// For each slot: the number of its hits, and the first word of its record.
 var<workgroup> slot_hits: array<atomic<u32>, LANES>;
 var<workgroup> slot_at: array<u32, LANES>;
 
-// The last of the item's slots that begins at or before a pair.
+// Returns the last of the item's slots that begins at or before a pair.
 fn slot_of(pair: u32, count: u32) -> u32 {
     var low = 0u;
     var high = count;
@@ -33,27 +32,27 @@ fn slot_of(pair: u32, count: u32) -> u32 {
     return low;
 }
 
-// The tests of one pair, cheapest first; counts what the report wants.
+// Tests one pair, cheapest test first, and counts for the report.
 fn is_pair(a: u32, b: u32) -> bool {
     let i = box_of(a);
     let j = box_of(b);
-    if !owns(a, b) || !is_due(a | b) || (params.split > 0u && (i < params.split) == (j < params.split)) {
+    if !owns(a, b) || !may_be_wanted(a | b) || (params.split > 0u && (i < params.split) == (j < params.split)) {
         atomicAdd(&tally[1], 1u);
         return false;
     }
-    if !matter(boxes[i], boxes[j]) {
+    if !is_wanted(boxes[i], boxes[j]) {
         return false;
     }
     atomicAdd(&tally[2], 1u);
     return (params.flags & FILTERED) == 0u || filters_allow(filters[i], filters[j]);
 }
 
-// Decides, by one lane, how the workgroup's hits are written, and where; `words` if as records.
+// Decides, by one lane, how and where the workgroup's hits are written. As records they take `words` words.
 fn place(words: u32) -> Placed {
     add_tests();
     let hits = atomicLoad(&tally[HITS]);
     if hits == 0u {
-        return Placed(NO_ROOM, 0u, 0u, 0u);
+        return Placed(NO_SPACE, 0u, 0u, 0u);
     }
     if (params.flags & PACKED) == 0u || 1u + 2u * hits < words {
         return place_plain(hits);
@@ -87,7 +86,7 @@ fn check_small(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups)
         pair = pair_at(item.first_pair + lane - cell.first_pair, cell.shape & 0xffffu);
         hit = is_pair(entries[start + pair.x], entries[start + pair.y]);
     }
-    // Any order of the hits will do, so that no prefix sum is needed.
+    // The hits may come in any order, so no prefix sum is needed.
     var rank = 0u;
     var slot_rank = 0u;
     if hit {
@@ -100,7 +99,7 @@ fn check_small(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups)
     workgroupBarrier();
     var words = 0u;
     if (params.flags & PACKED) != 0u {
-        // A lane for each slot: three words and one for each hit.
+        // Each lane takes a slot: three words, and one for each hit.
         let hits = atomicLoad(&slot_hits[lane]);
         slot_at[lane] = block_scan(select(0u, 3u + hits, hits > 0u), lane);
         words = block_sum();
@@ -109,7 +108,7 @@ fn check_small(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups)
         placed = place(words);
     }
     let to = workgroupUniformLoad(&placed);
-    if !hit || to.at == NO_ROOM {
+    if !hit || to.at == NO_SPACE {
         return;
     }
     if to.packed == 0u {
@@ -122,6 +121,6 @@ fn check_small(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups)
         out[record + 1u] = start;
         out[record + 2u] = 0u;
     }
-    // A row with one partner: both places in the only segment.
+    // A row with one partner: the places of both in the only segment.
     out[record + 3u + slot_rank] = pair.x | (pair.y << 16u);
 }

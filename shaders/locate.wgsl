@@ -1,32 +1,33 @@
-// Map, step 1 (PBIG 4.2, count): the cells that each box touches, its level, and how many boxes of
-// the level each cell has.
+// Map, step 1 (PBIG 4.2, count): computes the cells that each box touches and its level. Counts the residents of each
+// cell: boxes of the cell's own level.
 
 @group(0) @binding(0) var<uniform> params: Params;
-@group(0) @binding(1) var<storage, read> boxes: array<Subject>;
+@group(0) @binding(1) var<storage, read> boxes: array<KnownBox>;
 @group(0) @binding(2) var<storage, read_write> located: array<Located>;
 @group(0) @binding(3) var<storage, read_write> cells: array<atomic<u32>>;
 
-// The float that an ordered integer stands for.
+// Returns the float of an ordered integer.
 fn float_of(key: i32) -> f32 {
     return bitcast<f32>(key ^ ((key >> 31u) & 0x7fffffff));
 }
 
-// Monotone in `key`: a clamp, a subtraction, a multiplication by a positive number, a rounding.
+// Returns the cell of a coordinate. Each step is monotone in `key`: clamp, subtraction, multiplication by a positive
+// number, rounding.
 fn finest_cell(key: i32, axis: u32) -> i32 {
-    let x = float_of(clamp(key, params.reach_low[axis], params.reach_high[axis]));
+    let x = float_of(clamp(key, params.clamp_low[axis], params.clamp_high[axis]));
     let cell = floor((x - params.origin[axis]) * params.scale);
-    // Just inside 2^30: the number of cells between two must fit an i32.
+    // The limit is just inside 2^30: the distance of two cells must fit an i32.
     return i32(clamp(cell, -1073741760.0, 1073741760.0));
 }
 
-// The first level at which the box touches few cells; the last has one cell.
+// Returns the first level at which the box touches at most MAX_SPAN cells along each axis. The last level has one cell.
 fn level_of(low: vec3<i32>, high: vec3<i32>) -> u32 {
     var level = 0u;
     while level + 1u < params.levels {
         let shift = vec3<u32>(params.level[level].shift);
         let steps = (high >> shift) - (low >> shift);
         let divided = params.level[level].dims > vec3<u32>(1u);
-        if all(select(vec3<i32>(0), steps, divided) < vec3<i32>(MOST_SPAN)) {
+        if all(select(vec3<i32>(0), steps, divided) < vec3<i32>(MAX_SPAN)) {
             break;
         }
         level += 1u;
@@ -41,8 +42,8 @@ fn locate(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) grou
     if id >= params.boxes {
         return;
     }
-    let subject = boxes[id];
-    let one = reach_of(subject);
+    let known = boxes[id];
+    let one = bounds_of(known);
     if one.low[0] > one.high[0] {
         located[id].level = NO_LEVEL;
         return;
@@ -53,7 +54,7 @@ fn locate(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) grou
         at.high[axis] = finest_cell(one.high[axis], axis);
     }
     let level = level_of(low_of(at), high_of(at));
-    at.level = level | select(0u, MOVED, has_moved(subject));
+    at.level = level | select(0u, MOVED, has_moved(known));
     located[id] = at;
     let t = touched(low_of(at), high_of(at), level);
     for (var k = 0u; k < cell_count(t); k++) {

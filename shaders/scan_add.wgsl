@@ -1,5 +1,5 @@
-// Map, step 5: the start of every cell's entries, from those within its block. The counts of the cell
-// become cursors for the scatter: the end of its residents, and that of its visitors behind them.
+// Map, step 5: computes the start of each cell's entries from the start within its block. The counts of the cell become
+// cursors for the scatter: the end of the residents, and the end of the visitors behind them.
 
 @group(0) @binding(0) var<uniform> params: Params;
 @group(0) @binding(1) var<storage, read> sums: array<u32>;

@@ -1,5 +1,6 @@
-// Map, step 3 (PBIG 4.2, scan): each block of cells gets prefix sums of its entries, and its total.
-// Three dispatches instead of one with look-back: WebGPU promises no progress between workgroups.
+// Map, step 3 (PBIG 4.2, scan): computes the prefix sums of the entries within each block of cells, and the block's
+// total. The scan takes three dispatches, not one with look-back, because WebGPU guarantees no progress between
+// workgroups.
 
 @group(0) @binding(0) var<uniform> params: Params;
 @group(0) @binding(1) var<storage, read> cells: array<Cell>;

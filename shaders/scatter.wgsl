@@ -1,6 +1,5 @@
-// Map, step 6 (PBIG 4.2, scatter): every box into its cells, residents before visitors, each list from
-// its end. In which order the boxes of a cell come is up to the device; the order of the pairs that
-// are returned does not depend on it.
+// Map, step 6 (PBIG 4.2, scatter): writes each box into the entries of its cells, residents before visitors. Each list is
+// filled from its end. The device decides the order of the boxes of a cell; the returned pairs do not depend on it.
 
 @group(0) @binding(0) var<uniform> params: Params;
 @group(0) @binding(1) var<storage, read> located: array<Located>;
@@ -9,15 +8,15 @@
 @group(0) @binding(4) var<storage, read_write> cells: array<atomic<u32>>;
 @group(0) @binding(5) var<storage, read_write> entries: array<u32>;
 
-// Visitors of the last level's one cell take their places together, as `visit` counts them.
+// Visitors of the last level's one cell, placed by the workgroup together, as `visit` counts them.
 var<workgroup> last_visitors: atomic<u32>;
 var<workgroup> last_end: u32;
 
 @compute @workgroup_size(LANES)
 fn scatter(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>,
            @builtin(local_invocation_index) lane: u32) {
-    // Without room for all entries the host makes room and maps again.
-    if counters.entries > params.entry_room {
+    // If the entries do not fit, the host makes larger buffers and maps again.
+    if counters.entries > params.entry_capacity {
         return;
     }
     let id = linear(group, groups) * LANES + lane;
@@ -43,12 +42,12 @@ fn scatter(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) gro
     }
     let end = workgroupUniformLoad(&last_end);
     if visits_last {
-        // The one cell is everybody's lowest, on all axes.
+        // The only cell is the lowest of every box, on all axes.
         entries[end - 1u - rank] = id | (located[id].level & MOVED) | (7u << AXIS_BITS);
     }
 }
 
-// A box in its own level and in those between that and the last.
+// Writes a box into its own level and into the levels between that and the last.
 fn place_all(id: u32, at: Located, last: u32) {
     let own = own_level(at);
     let name = id | (at.level & MOVED);
@@ -61,7 +60,7 @@ fn place_all(id: u32, at: Located, last: u32) {
     }
 }
 
-// A cell without residents has counted no visitors, and its cursors stand at its start for good.
+// Writes an entry. A cell without residents has no visitors counted, so its cursors stay at its start.
 fn place(cell: u32, entry: u32, resident: bool) {
     if resident {
         entries[atomicSub(&cells[2u * cell], 1u) - 1u] = entry;

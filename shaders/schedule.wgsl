@@ -1,6 +1,5 @@
-// Schedule (PBIG 4.3): cells become work items of bounded size. Small cells are packed so that each
-// workgroup gets LANES pairs; large ones are cut into segments. A workgroup handles a block of cells
-// and reserves room in each list once.
+// Schedule (PBIG 4.3): turns cells into work items of bounded size. The pairs of small cells are packed, LANES pairs to an
+// item. Large cells are cut into segments. A workgroup handles a block of cells and reserves its part of each list once.
 
 @group(0) @binding(0) var<uniform> params: Params;
 @group(0) @binding(1) var<storage, read> cells: array<Cell>;
@@ -20,13 +19,13 @@ var<workgroup> large_count: atomic<u32>;
 var<workgroup> large_seen: u32;
 var<workgroup> large_cells: array<u32, CELLS_PER_BLOCK>;
 
-// The counts of a cell, from the ends of its entries.
+// Returns the counts of a cell, from the ends of its entries.
 fn counts_of(index: u32) -> Cell {
     let ends = cells[index];
     return Cell(ends.residents - starts[index], ends.visitors - ends.residents);
 }
 
-// Pairs with at least one resident: those of the first rows, in Avril's numbering.
+// Returns the number of pairs with at least one resident. In Avril's numbering these are the pairs of the first rows.
 fn pairs_of(cell: Cell) -> u32 {
     let n = cell.residents + cell.visitors;
     return cell.residents * (2u * n - cell.residents - 1u) / 2u;
@@ -36,8 +35,8 @@ fn is_small(cell: Cell) -> bool {
     return cell.residents + cell.visitors <= params.small_cell;
 }
 
-// Work items of the rows before `row` when there are `columns` segments, `params.columns` to an item.
-// An item starts at a multiple of that, so the rows of one multiple have equally many.
+// Returns the number of work items of the rows before `row`, for `columns` segments of columns. An item has
+// `params.columns` segments and starts at a multiple of that, so the rows of one multiple have equally many items.
 fn items_before(row: u32, columns: u32) -> u32 {
     let wide = params.columns;
     let most = (columns + wide - 1u) / wide;
@@ -88,13 +87,13 @@ fn schedule(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) gr
         if cell.residents == 0u || n < 2u || !is_small(cell) {
             continue;
         }
-        if base + rank < params.slot_room {
+        if base + rank < params.slot_capacity {
             slots[base + rank] = Slot(starts[first + i], n | (cell.residents << 16u), pair);
         }
         let end = pair + pairs_of(cell);
-        // The items that begin in this cell.
+        // Writes the items that begin in this cell.
         for (var k = (pair + LANES - 1u) / LANES; k * LANES < end; k++) {
-            if items + k < params.small_room {
+            if items + k < params.small_capacity {
                 let left = min(LANES, all_pairs - k * LANES);
                 small_items[items + k] =
                     SmallItem(base + rank, min(LANES, all_slots - rank), k * LANES, left);
@@ -106,7 +105,7 @@ fn schedule(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) gr
     schedule_large(lane);
 }
 
-// The large cells of the block, one after the other, by all lanes together: a row each.
+// Schedules the large cells of the block, one after the other. Each lane takes a row of segments.
 fn schedule_large(lane: u32) {
     let count = workgroupUniformLoad(&large_seen);
     for (var i = 0u; i < count; i++) {
@@ -122,7 +121,7 @@ fn schedule_large(lane: u32) {
         for (var row = lane; row < rows; row += LANES) {
             var at = items + items_before(row, columns);
             for (var column = row - row % params.columns; column < columns; column += params.columns) {
-                if at < params.large_room {
+                if at < params.large_capacity {
                     large_items[at] = LargeItem(starts[index], n, cell.residents, row,
                         max(column, row), min(column + params.columns, columns));
                 }

@@ -1,13 +1,13 @@
-// Map, step 2: counts, in the cells of coarser levels that have residents, the boxes of finer levels.
-// Together with step 1 every box is counted in every cell where it can meet a box of its size or
-// larger. Only dispatched when there are several levels.
+// Map, step 2: counts the visitors of each cell that has residents: boxes of finer levels. After steps 1 and 2 each box
+// is counted in every cell where it can meet a box of its level or of a coarser one. Runs only if there are several
+// levels.
 
 @group(0) @binding(0) var<uniform> params: Params;
 @group(0) @binding(1) var<storage, read> located: array<Located>;
 @group(0) @binding(2) var<storage, read_write> cells: array<atomic<u32>>;
 
-// Visitors of the last level's one cell, which every box visits when there is a ground: counted once
-// for the workgroup, or all boxes would wait for each other at one address.
+// Visitors of the last level's one cell, counted by the workgroup. If that cell has a resident, say a ground, every box
+// visits it; without this count all boxes would wait for each other at one address.
 var<workgroup> last_visitors: atomic<u32>;
 
 @compute @workgroup_size(LANES)
@@ -31,14 +31,14 @@ fn visit(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) group
     }
 }
 
-// A box in the levels between its own and the last.
+// Counts a box in the levels between its own and the last.
 fn count_visits(id: u32, last: u32) {
     let at = located[id];
     for (var level = own_level(at) + 1u; level < last; level++) {
         let t = touched(low_of(at), high_of(at), level);
         for (var k = 0u; k < cell_count(t); k++) {
             let cell = cell_at(t, k, level).x;
-            // The last pass has counted all residents, so what is read here does not change.
+            // Step 1 has counted all residents, so this value no longer changes.
             if atomicLoad(&cells[2u * cell]) > 0u {
                 atomicAdd(&cells[2u * cell + 1u], 1u);
             }

@@ -1,4 +1,4 @@
-// An exclusive prefix sum over the lanes of a workgroup, without subgroups (Hillis and Steele).
+// Exclusive prefix sum over the lanes of a workgroup, without subgroups (Hillis and Steele).
 
 var<workgroup> scan_space: array<u32, LANES>;
 
@@ -17,7 +17,7 @@ fn block_scan(value: u32, lane: u32) -> u32 {
     return scan_space[lane] - value;
 }
 
-// The sum over all lanes of the last block_scan. Ends with a barrier, so that the next may begin.
+// Returns the sum over all lanes of the last block_scan. The barrier at its end lets the next scan begin.
 fn block_sum() -> u32 {
     let sum = scan_space[LANES - 1u];
     workgroupBarrier();

@@ -1,11 +1,10 @@
-// As block_scan.wgsl, with subgroups: 2 barriers instead of 17. Lanes are ordered by the first lane
-// of their subgroup, then within it, the same in every call; no size or numbering of subgroups is
-// assumed.
+// As block_scan.wgsl, with subgroups: 2 barriers instead of 17. Lanes are ordered by the first lane of their subgroup, then
+// by their rank within it. The order is the same in every call. No size or numbering of subgroups is assumed.
 
 var<workgroup> scan_space: array<u32, LANES>;
 
 fn block_scan(value: u32, lane: u32) -> u32 {
-    // Lanes that the caller's branches parted run together again.
+    // Reconverges lanes that the caller's branches separated.
     workgroupBarrier();
     let leader = subgroupMin(lane);
     let rank = subgroupExclusiveAdd(1u);
@@ -15,7 +14,7 @@ fn block_scan(value: u32, lane: u32) -> u32 {
     scan_space[lane] = select(0u, sum, lane == leader);
     workgroupBarrier();
     var part = 0u;
-    // Equally many turns for all lanes, so that none leaves the subgroup early.
+    // All lanes take equally many turns, so none leaves the subgroup early.
     for (var i = rank; i < LANES; i += size) {
         part += select(0u, scan_space[i], i < leader);
     }

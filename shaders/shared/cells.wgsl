@@ -1,9 +1,9 @@
-// Cells at a level, from those at the finest resolution: integers all the way (contract 3).
+// Cells at a level, computed from those at the finest resolution, in integers only (contract 3).
 
-// Shifts cells of either sign to where they are positive, without changing which wrap together.
-const FAR = 0x40000000;
+// Offset that makes every cell positive. All cells have the same, so distances do not change.
+const OFFSET = 0x40000000;
 
-// The cells of a box at a level: the lowest on each axis, wrapped around, and how many.
+// Cells of a box at a level: the lowest on each axis, wrapped around, and their number on each axis.
 struct Touched {
     wrapped: vec3<u32>,
     span: vec3<u32>,
@@ -15,7 +15,7 @@ fn touched(low: vec3<i32>, high: vec3<i32>, level: u32) -> Touched {
     let divided = dims > vec3<u32>(1u);
     let first = low >> vec3<u32>(shift);
     let span = vec3<u32>((high >> vec3<u32>(shift)) - first) + 1u;
-    let wrapped = vec3<u32>(first + FAR) % dims;
+    let wrapped = vec3<u32>(first + OFFSET) % dims;
     return Touched(select(vec3<u32>(0u), wrapped, divided), select(vec3<u32>(1u), span, divided));
 }
 
@@ -23,7 +23,7 @@ fn cell_count(t: Touched) -> u32 {
     return t.span.x * t.span.y * t.span.z;
 }
 
-// The index of the `k`-th cell, and for each axis whether it is the lowest there, as an entry's bits.
+// Returns the index of the `k`-th cell, and the bits of an entry that mark the axes on which this cell is the lowest.
 fn cell_at(t: Touched, k: u32, level: u32) -> vec2<u32> {
     let step = vec3<u32>(k % t.span.x, k / t.span.x % t.span.y, k / (t.span.x * t.span.y));
     let dims = params.level[level].dims;
@@ -34,7 +34,7 @@ fn cell_at(t: Touched, k: u32, level: u32) -> vec2<u32> {
     return vec2<u32>(index, (lowest.x | lowest.y | lowest.z) << AXIS_BITS);
 }
 
-// The level of a located box, without the mark.
+// Returns the level of a located box, without the mark.
 fn own_level(at: Located) -> u32 {
     return at.level & (MOVED - 1u);
 }

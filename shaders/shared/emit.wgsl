@@ -1,6 +1,6 @@
-// Emit: counts and output of the check kernels. The format of the words is docs/PAIR_FORMAT.md.
+// Emit: counts and output of the check kernels. docs/PAIR_FORMAT.md defines the words.
 
-// Places in `totals`, each a low and a high half: counts of pairs pass 2^32.
+// Indices into `totals`. Each count has a low and a high half, because pairs may be more than 2^32.
 const WORDS = 0u;
 const PAIRS = 1u;
 const MADE = 2u;
@@ -18,33 +18,33 @@ fn add_total(index: u32, amount: u32) -> u32 {
     return before;
 }
 
-// Where `reserve` found no room: nothing is to be written.
-const NO_ROOM = 0xffffffffu;
+// Place of output that does not fit: nothing is written.
+const NO_SPACE = 0xffffffffu;
 
-// One reservation for the workgroup (PBIG algorithm 2, line 27), by one lane. The counter runs past
-// the room, so that the host knows what is needed.
+// Reserves words for the workgroup (PBIG algorithm 2, line 27), by one lane. The counter runs past the capacity, so the
+// host knows how many words are needed.
 fn reserve(words: u32, pairs: u32) -> u32 {
     let at = add_total(WORDS, words);
     add_total(PAIRS, pairs);
-    let fits = at <= chunk.word_room && words <= chunk.word_room - at;
-    return select(NO_ROOM, at, fits);
+    let fits = at <= chunk.word_capacity && words <= chunk.word_capacity - at;
+    return select(NO_SPACE, at, fits);
 }
 
-var<workgroup> enough: u32;
+var<workgroup> is_over_limit: u32;
 
-// Whether the call has passed its limit of pairs: the rest need not be looked at. The halves are read
-// one after the other; a carry in between can only happen when the output has long overflowed.
+// Returns true if the call has passed its limit of pairs, so the rest need not be tested. The two halves are read one
+// after the other. A carry in between can only happen long after the output has overflowed.
 fn beyond_limit(lane: u32) -> bool {
     if lane == 0u {
         let low = atomicLoad(&totals[2u * PAIRS]);
         let high = atomicLoad(&totals[2u * PAIRS + 1u]);
         let left = chunk.pairs_left;
-        enough = u32(high > left.y || (high == left.y && low > left.x));
+        is_over_limit = u32(high > left.y || (high == left.y && low > left.x));
     }
-    return workgroupUniformLoad(&enough) != 0u;
+    return workgroupUniformLoad(&is_over_limit) != 0u;
 }
 
-// What the lanes of the workgroup count: tests made, redundant ones, overlaps; hits; words of rows.
+// Counts of the workgroup: tests made, redundant tests, overlaps; hits; words of rows.
 const HITS = 3u;
 const ROW_WORDS = 4u;
 var<workgroup> tally: array<atomic<u32>, 5>;
@@ -59,25 +59,25 @@ fn add_tests() {
     }
 }
 
-// Where the workgroup's output goes, as one lane has decided for all.
+// Place of the workgroup's output, which one lane decides for all.
 struct Placed {
     at: u32,
     hits: u32,
     words: u32,
-    // Whether it is a record of rows rather than plain pairs.
+    // 1 for a record of rows, 0 for plain pairs.
     packed: u32,
 }
 
 var<workgroup> placed: Placed;
 
-// Plain pairs, behind a mark if the output has records.
+// Reserves plain pairs, behind a mark if the output has records.
 fn place_plain(hits: u32) -> Placed {
     let mark = u32((params.flags & PACKED) != 0u);
     let at = reserve(mark + 2u * hits, hits);
-    if mark != 0u && at != NO_ROOM {
+    if mark != 0u && at != NO_SPACE {
         out[at] = PLAIN | hits;
     }
-    return Placed(select(at + mark, NO_ROOM, at == NO_ROOM), hits, 2u * hits, 0u);
+    return Placed(select(at + mark, NO_SPACE, at == NO_SPACE), hits, 2u * hits, 0u);
 }
 
 fn write_pair(at: u32, a: u32, b: u32) {

@@ -1,16 +1,16 @@
-// From the index of a pair to the pair, without memory access (Avril 3.2). Pairs (a, b), a < b < n,
-// are numbered row by row from 0. For n up to 32,768: 8 k and (2 n - 1)^2 stay below 2^32.
+// Mapping from the index of a pair to the pair, without memory access (Avril 3.2). Pairs (a, b), a < b < n, are numbered
+// row by row from 0. n is at most 32,768, so that 8 k and (2 n - 1)^2 stay below 2^32.
 
-// How the row is first estimated (Avril 3.3): 0 the device's square root; 1 to 4 the inverse square
-// root with Carmack's constant and so many Newton steps; 5 to 8 with Lomont's; 9 no square root.
+// Estimate of the row (Avril 3.3). 0: the device's square root. 1 to 4: the inverse square root with Carmack's constant
+// and so many Newton steps. 5 to 8: the same with Lomont's constant and 1 to 4 steps. 9: bisection, no square root.
 override ROOT: u32 = 0u;
 
-// Index of the first pair of row a.
+// Returns the index of the first pair of row a.
 fn row_start(a: u32, n: u32) -> u32 {
     return a * (2u * n - a - 1u) / 2u;
 }
 
-// 1 / sqrt(x): the exponent halved by integer arithmetic, then Newton's y (1.5 - x y^2 / 2).
+// Returns 1 / sqrt(x): halves the exponent by integer arithmetic, then takes Newton steps y (1.5 - x y^2 / 2).
 fn inverse_root(x: f32, magic: u32, steps: u32) -> f32 {
     var y = bitcast<f32>(magic - (bitcast<u32>(x) >> 1u));
     for (var i = 0u; i < steps; i++) {
@@ -29,7 +29,7 @@ fn root(x: f32) -> f32 {
     return x * inverse_root(x, 0x5f375a86u, ROOT - 4u);
 }
 
-// The largest row that starts at or before k, by bisection.
+// Returns the largest row that starts at or before k, by bisection.
 fn searched_row(k: u32, n: u32) -> u32 {
     var low = 0u;
     var high = n - 1u;
@@ -44,7 +44,7 @@ fn searched_row(k: u32, n: u32) -> u32 {
     return low;
 }
 
-// Equation 1, 0-based: (2n - 1 - sqrt((2n - 1)^2 - 8k)) / 2, rounded down: wrong by a row or so.
+// Returns equation 1, 0-based: (2n - 1 - sqrt((2n - 1)^2 - 8k)) / 2, rounded down. It may be off by a row or two.
 fn estimated_row(k: u32, n: u32) -> u32 {
     if ROOT == 9u {
         return searched_row(k, n);
@@ -54,7 +54,7 @@ fn estimated_row(k: u32, n: u32) -> u32 {
     return min(u32(max(row, 0.0)), n - 2u);
 }
 
-// The exact pair: integers correct the row, whatever the root's rounding.
+// Returns the exact pair: integers correct the row, however the root was rounded.
 fn pair_at(k: u32, n: u32) -> vec2<u32> {
     var a = estimated_row(k, n);
     while row_start(a, n) > k {

@@ -1,12 +1,12 @@
-// What several kernels share. The structs are mirrored, field by field, in pbig-core's layout.rs.
+// Types that kernels share. pbig-core's layout.rs has the same structs, field by field.
 
 // Lanes of a workgroup, and boxes of a segment (PBIG 5.2).
 const LANES = 256u;
-// Levels of cells, the last of which is one cell for everything.
-const MOST_LEVELS = 8u;
-// Cells that a box may touch along one axis of a level.
-const MOST_SPAN = 4;
-// The level of an invalid box.
+// Most levels of cells. The last level has one cell for everything.
+const MAX_LEVELS = 8u;
+// Most cells that a box touches along one axis of its level.
+const MAX_SPAN = 4;
+// Level of an invalid box.
 const NO_LEVEL = 0xffffffffu;
 
 // Bits of Params.flags.
@@ -14,28 +14,27 @@ const FILTERED = 1u;
 const PACKED = 2u;
 const BITS = 4u;
 
-// An AABB whose coordinates are integers in the order of the floats they stand for: comparisons are
-// exact on every device, whatever it does to denormals, infinities and NaN. An invalid box has all
-// of `low` above all of `high`.
-struct Box {
+// An AABB whose coordinates are integers in the order of the floats. Comparisons of integers are exact on every device,
+// whatever it does to denormals, infinities and NaN. An invalid box has all of `low` above all of `high`.
+struct DeviceBox {
     low: array<i32, 3>,
     high: array<i32, 3>,
 }
 
-// A box as it is, and as it was at the last update.
+// A box now and at the last update.
 struct Motion {
-    now: Box,
-    before: Box,
+    now: DeviceBox,
+    before: DeviceBox,
 }
 
-// A box that is to be what `now` says: its id, and ANEW if it was nowhere before.
-struct Move {
-    place: u32,
-    now: Box,
+// A changed box: its id, with WAS_ABSENT if it overlapped nothing at the last update, and the box now.
+struct BoxChange {
+    marked_id: u32,
+    now: DeviceBox,
 }
 
-// A box that is to have another filter.
-struct Refilter {
+// A changed filter: the id of its box, and the filter now.
+struct FilterChange {
     id: u32,
     filter0: u32,
     filter1: u32,
@@ -43,8 +42,7 @@ struct Refilter {
     filter3: u32,
 }
 
-// Cells that a box touches at the finest resolution, both ends included; its level, with MOVED where
-// it differs from what it was.
+// Cells that a box touches at the finest resolution, both ends included, and its level, with MOVED if the box has changed.
 struct Located {
     low: array<i32, 3>,
     high: array<i32, 3>,
@@ -52,11 +50,11 @@ struct Located {
 }
 
 struct Level {
-    // Cells on each axis before they wrap around; an axis of one cell is not divided.
+    // Number of cells on each axis; boxes beyond wrap around. An axis of one cell is not divided.
     dims: vec3<u32>,
-    // The level's cells are 2^shift of the finest on each axis.
+    // A cell of the level has 2^shift of the finest cells on each axis.
     shift: u32,
-    // Where the level's cells begin among all cells.
+    // Index of the level's first cell among all cells.
     first_cell: u32,
     unused0: u32,
     unused1: u32,
@@ -64,47 +62,47 @@ struct Level {
 }
 
 struct Params {
-    // Where cell 0 begins, and cells per unit of length at the finest resolution.
+    // Lower corner of cell 0, and cells per unit of length at the finest resolution.
     origin: vec3<f32>,
     scale: f32,
-    // Coordinates beyond are cut off before they become cells.
-    reach_low: vec3<i32>,
+    // Coordinates are clamped to these bounds before they become cells.
+    clamp_low: vec3<i32>,
     boxes: u32,
-    reach_high: vec3<i32>,
+    clamp_high: vec3<i32>,
     levels: u32,
     cells: u32,
     small_cell: u32,
-    // Column segments of one large work item.
+    // Number of column segments of a large work item.
     columns: u32,
     flags: u32,
-    // Only pairs of one box below and one box from `split` on, unless 0.
+    // If not 0: only pairs of a box below `split` and a box from `split` on are wanted.
     split: u32,
-    entry_room: u32,
-    slot_room: u32,
-    small_room: u32,
-    large_room: u32,
-    // Boxes that the device knows from the last update, and what has changed since.
+    entry_capacity: u32,
+    slot_capacity: u32,
+    small_capacity: u32,
+    large_capacity: u32,
+    // Number of boxes that the device has from the last update, and lengths of the lists of changes.
     known: u32,
-    moves: u32,
-    refilters: u32,
-    level: array<Level, MOST_LEVELS>,
+    box_changes: u32,
+    filter_changes: u32,
+    level: array<Level, MAX_LEVELS>,
 }
 
-// The part of the work items that one dispatch of the check kernels handles.
+// Range of the work items of one dispatch of the check kernels.
 struct Chunk {
     first_small: u32,
     small_items: u32,
     first_large: u32,
     large_items: u32,
-    // Words of output that there is room for.
-    word_room: u32,
+    // Capacity of the output, in words.
+    word_capacity: u32,
     unused: u32,
-    // Pairs after which the call will end in an error anyway: low and high half.
+    // Number of pairs after which the call ends in an error: low and high half.
     pairs_left: vec2<u32>,
 }
 
-// Residents are the boxes of the cell's own level, visitors those of finer levels. Two visitors meet
-// in their own level. Counts until scan_add, from then on the ends of their entries.
+// Entries of a cell. Residents are boxes of the cell's own level, visitors those of finer levels. Two visitors meet in a
+// cell of their own levels. Until scan_add these are counts, then the ends of both lists of entries.
 struct Cell {
     residents: u32,
     visitors: u32,
@@ -112,11 +110,11 @@ struct Cell {
 
 // A small cell in the schedule.
 struct Slot {
-    // Its first entry.
+    // First entry.
     start: u32,
-    // Entries, and residents << 16.
+    // Number of entries, and number of residents << 16.
     shape: u32,
-    // Pairs of the cells before it in its block.
+    // Number of pairs of the cells before it in its block.
     first_pair: u32,
 }
 
@@ -138,7 +136,7 @@ struct LargeItem {
     end_column: u32,
 }
 
-// What the map found, counted on past any capacity.
+// Lengths of the lists, counted on past their capacities.
 struct Counters {
     entries: u32,
     slots: u32,
@@ -146,33 +144,33 @@ struct Counters {
     large_items: u32,
 }
 
-// An entry of a cell: the box, whether it has moved, and for each axis whether this is the box's
-// lowest cell there.
+// Bits of an entry of a cell: the box, MOVED, and for each axis a bit that is set if this is the box's lowest cell there.
 const BOX_BITS = 28u;
 const AXIS_BITS = 29u;
 const MOVED = 1u << BOX_BITS;
-// In a Move: before, the box overlapped nothing.
-const ANEW = 0x80000000u;
+// Bit of BoxChange.marked_id: at the last update the box overlapped nothing.
+const WAS_ABSENT = 0x80000000u;
 
 fn box_of(entry: u32) -> u32 {
     return entry & ((1u << BOX_BITS) - 1u);
 }
 
-// Whether the cell of two entries owns their pair (contract 3). Its owner is the component-wise
-// maximum of the boxes' lowest cells; both boxes touch this cell, so on each axis the maximum is
-// here exactly if the lowest cell of one of them is.
+// Returns true if the cell of two entries owns their pair (contract 3). The owner is the component-wise maximum of the
+// boxes' lowest cells. Both boxes touch this cell, so on each axis it is the maximum exactly if it is the lowest cell of
+// one of them.
 fn owns(a: u32, b: u32) -> bool {
     return ((a | b) >> AXIS_BITS) == 7u;
 }
 
-// PBIG's equation 1, in closed intervals.
-fn overlap(a: Box, b: Box) -> bool {
+// Returns true if the boxes overlap: PBIG's equation 1, in closed intervals.
+fn overlap(a: DeviceBox, b: DeviceBox) -> bool {
     return a.low[0] <= b.high[0] && b.low[0] <= a.high[0]
         && a.low[1] <= b.high[1] && b.low[1] <= a.high[1]
         && a.low[2] <= b.high[2] && b.low[2] <= a.high[2];
 }
 
-// ProxyFilter: body; kind, accepted kinds << 8, test mode << 16; memberships; mask.
+// Returns true if both filters allow the pair. A filter is: body; kind, accepted kinds << 8, test mode << 16;
+// memberships; mask.
 fn filters_allow(a: vec4<u32>, b: vec4<u32>) -> bool {
     let bodies = a.x != b.x || a.x == 0xffffffffu;
     let kinds = ((((a.y >> 8u) & b.y) | ((b.y >> 8u) & a.y)) & 0xffu) != 0u;
@@ -182,7 +180,7 @@ fn filters_allow(a: vec4<u32>, b: vec4<u32>) -> bool {
     return bodies && kinds && ((forth && back) || (either && (forth || back)));
 }
 
-// Dispatches of more than 65,535 workgroups have rows of them.
+// Returns the index of a workgroup. A dispatch of more than 65,535 workgroups has rows of them.
 fn linear(group: vec3<u32>, groups: vec3<u32>) -> u32 {
     return group.y * groups.x + group.x;
 }

@@ -1,8 +1,8 @@
-//! Every kernel is valid WGSL, its bindings are those it is listed with, and none is forgotten. No
-//! device is needed for any of this.
+//! Contracts of the kernels' texts: every kernel is valid WGSL, its bindings are the listed ones, and no file is missing
+//! in the lists. These tests need no device.
 
 use naga::valid::{Capabilities, ValidationFlags, Validator};
-use pbig_shaders::{KERNELS, Kernel};
+use pbig_shaders::{Buffer, KERNELS, Kernel, study};
 
 fn parse(kernel: &Kernel, subgroups: bool, changes: bool) -> naga::Module {
     let source = kernel.source(subgroups, changes);
@@ -20,9 +20,9 @@ fn validate(kernel: &Kernel, subgroups: bool, changes: bool) -> naga::Module {
     module
 }
 
-/// Every kernel, for a search for overlaps and for one for changes.
+/// Returns every kernel, those of the studies too, for a search for overlaps and for one for changes.
 fn texts() -> impl Iterator<Item = (&'static &'static Kernel, bool)> {
-    KERNELS.iter().flat_map(|kernel| [(kernel, false), (kernel, true)])
+    KERNELS.iter().chain(study::KERNELS).flat_map(|kernel| [(kernel, false), (kernel, true)])
 }
 
 #[test]
@@ -31,10 +31,10 @@ fn every_text_of_every_kernel_is_valid() {
         validate(kernel, false, changes);
         validate(kernel, true, changes);
         let texts = [kernel.source(true, false), kernel.source(true, true)];
-        assert_eq!(texts[0] != texts[1], kernel.tells_changes(), "{}", kernel.name);
+        assert_eq!(texts[0] != texts[1], kernel.depends_on_search(), "{}", kernel.name);
     }
     assert!(KERNELS.iter().any(|kernel| kernel.gains_from_subgroups()));
-    assert!(KERNELS.iter().any(|kernel| kernel.tells_changes()));
+    assert!(KERNELS.iter().any(|kernel| kernel.depends_on_search()));
 }
 
 #[test]
@@ -47,22 +47,44 @@ fn bindings_are_numbered_as_listed_and_there_are_no_others() {
             .filter_map(|(_, v)| v.binding.as_ref().map(|b| (b.binding, v.name.clone().unwrap_or_default())))
             .collect();
         bound.sort();
-        let listed: Vec<_> = (0u32..).zip(kernel.bindings.iter().map(|&name| name.to_owned())).collect();
+        let listed: Vec<_> =
+            (0u32..).zip(kernel.bindings.iter().map(|buffer| buffer.name().to_owned())).collect();
         assert_eq!(bound, listed, "{}", kernel.name);
     }
 }
 
-#[test]
-fn the_list_of_kernels_is_the_list_of_files() {
-    let mut files: Vec<String> = std::fs::read_dir(env!("CARGO_MANIFEST_DIR"))
-        .expect("the crate's folder")
+/// Returns the names of the kernels' files in a folder of the crate, sorted.
+fn files(folder: &str) -> Vec<String> {
+    let folder = format!("{}/{folder}", env!("CARGO_MANIFEST_DIR"));
+    let mut files: Vec<String> = std::fs::read_dir(folder)
+        .expect("a folder of the crate")
         .filter_map(|entry| entry.expect("an entry").file_name().into_string().ok())
         .filter_map(|name| name.strip_suffix(".wgsl").map(str::to_owned))
         .collect();
     files.sort();
-    let mut listed: Vec<String> = KERNELS.iter().map(|kernel| kernel.name.to_owned()).collect();
-    listed.sort();
-    assert_eq!(listed, files);
+    files
+}
+
+#[test]
+fn the_lists_of_kernels_are_the_lists_of_files() {
+    for (folder, kernels) in [("", KERNELS), ("study", study::KERNELS)] {
+        let mut listed: Vec<String> = kernels.iter().map(|kernel| kernel.name.to_owned()).collect();
+        listed.sort();
+        assert_eq!(listed, files(folder), "{folder}");
+    }
+}
+
+#[test]
+fn uniform_buffers_are_the_ones_that_say_so() {
+    for (kernel, changes) in texts() {
+        let module = validate(kernel, false, changes);
+        for (_, variable) in module.global_variables.iter().filter(|(_, v)| v.binding.is_some()) {
+            let is_uniform = variable.space == naga::AddressSpace::Uniform;
+            let name = variable.name.as_deref();
+            let buffer = kernel.bindings.iter().find(|buffer| Some(buffer.name()) == name);
+            assert_eq!(buffer.map(|buffer| Buffer::is_uniform(*buffer)), Some(is_uniform), "{}", kernel.name);
+        }
+    }
 }
 
 #[test]

@@ -72,14 +72,22 @@ pub fn strategies() -> Vec<(&'static str, Config)> {
         ("auto", Config::DEFAULT),
         ("grid", with(Backend::Cpu, Strategy::Grid)),
         ("pbig", with(Backend::Cpu, Strategy::Pbig)),
-        ("pbig by density", Config { cell_rule: CellRule::Density, ..with(Backend::Cpu, Strategy::Pbig) }),
-        ("pbig rows", Config { small_cell: 1, ..with(Backend::Cpu, Strategy::Pbig) }),
+        ("pbig by density", by_density(with(Backend::Cpu, Strategy::Pbig))),
+        ("pbig rows", by_rows(with(Backend::Cpu, Strategy::Pbig))),
         ("brute", with(Backend::Brute, Strategy::Auto)),
         ("gpu", with(Backend::Gpu, Strategy::Auto)),
         ("gpu grid", gpu(Coding::Plain)),
         ("gpu grid packed", gpu(Coding::Packed)),
     ];
     all.into_iter().filter(|(_, config)| may_run(config)).collect()
+}
+
+fn by_density(config: Config) -> Config {
+    Config { gpu: GpuOptions { cell_rule: CellRule::Density, ..config.gpu }, ..config }
+}
+
+fn by_rows(config: Config) -> Config {
+    Config { gpu: GpuOptions { small_cell: 1, ..config.gpu }, ..config }
 }
 
 /// Ways on the CPU that the plan would not choose everywhere, by name.
@@ -101,8 +109,8 @@ pub fn asked() -> Vec<(&'static str, Config)> {
 
 /// The grid on the GPU, whatever the size of the set.
 pub fn gpu(coding: Coding) -> Config {
-    let options = GpuOptions { coding, ..GpuOptions::DEFAULT };
-    Config { backend: Backend::Gpu, strategy: Strategy::Pbig, gpu: options, ..Config::DEFAULT }
+    let options = GpuOptions { coding, all_pairs_up_to: 0, ..GpuOptions::DEFAULT };
+    Config { backend: Backend::Gpu, gpu: options, ..Config::DEFAULT }
 }
 
 /// The corpus.

@@ -1,14 +1,14 @@
-//! The incremental facade, followed by its events and held against the oracle.
+//! A broad phase whose events are followed, and whose pairs are compared with the oracle's.
 
 use pbig_core::{Aabb, Backend, BroadPhase, Config, Pair, ProxyFilter, oracle};
 use std::collections::{BTreeSet, HashSet};
 
-/// A broad phase with what its caller knows: the boxes that were set, and the pairs by its events.
+/// A broad phase with the state of its caller: the boxes that were set, and the pairs by the events.
 pub(crate) struct Follower {
     pub(crate) broad_phase: BroadPhase,
     pub(crate) boxes: Vec<Option<(Aabb, ProxyFilter)>>,
     pairs: BTreeSet<Pair>,
-    /// Removed since the last update: their pairs end without an event.
+    /// Ids removed since the last update: their pairs end without an event.
     gone: HashSet<u32>,
 }
 
@@ -49,22 +49,7 @@ impl Follower {
         self.fat_boxes_are_near(what);
     }
 
-    /// Updates and compares; between the two halves of the update these boxes are set, of which it must know nothing.
-    pub(crate) fn update_while_set(&mut self, news: &[(u32, Aabb, ProxyFilter)], what: &str) {
-        self.forget_pairs_of_removed();
-        self.broad_phase.begin();
-        let wanted = self.wanted();
-        for &(id, aabb, filter) in news {
-            self.set(id, aabb, filter);
-        }
-        let kept: BTreeSet<Pair> = self.broad_phase.pairs().collect();
-        assert_eq!(self.pairs, kept, "{what}: until the end all is as it was");
-        self.follow(what);
-        assert_eq!(self.pairs, wanted, "{what}: {}", self.broad_phase.report().plan);
-        self.fat_boxes_are_near(what);
-    }
-
-    /// Updates and follows the events: where there are a million updates a sample of them is compared.
+    /// Updates and follows the events, without a comparison: of a million updates only a sample is compared.
     pub(crate) fn update_unchecked(&mut self) {
         self.follow("not compared");
     }
@@ -82,11 +67,11 @@ impl Follower {
         self.assert_done_as_asked(what);
     }
 
-    /// A GPU's work is not done by the CPU, which would find the same pairs: the test would say nothing of the GPU.
+    /// Asserts that the wanted backend did the work. The CPU finds the same pairs, so a fallback would hide a broken GPU.
     fn assert_done_as_asked(&self, what: &str) {
         let report = self.broad_phase.report();
         assert_eq!(report.fallback, None, "{what}");
-        // Where fewer boxes are left, a device may be asked which pairs have ended.
+        // With fewer boxes a device may still be asked for ended pairs.
         let searched = report.changed > 0 && report.boxes - report.invalid > 1;
         let on_gpu = report.gpu.is_some();
         match self.broad_phase.config().backend {
@@ -96,7 +81,7 @@ impl Follower {
         }
     }
 
-    /// What the oracle makes of the fat boxes as they are.
+    /// Returns the oracle's pairs of the fat boxes.
     fn wanted(&self) -> BTreeSet<Pair> {
         let fat: Vec<Aabb> = (0..self.boxes.len() as u32)
             .map(|id| self.broad_phase.fat_aabb(id).unwrap_or(Aabb::NOWHERE))
@@ -105,7 +90,7 @@ impl Follower {
         oracle::pairs_where(&fat, |a, b| filter(a).allows(&filter(b))).into_iter().collect()
     }
 
-    /// A fat box contains its box and reaches at most two margins beyond.
+    /// Asserts that each fat box contains its box and reaches at most two margins beyond.
     fn fat_boxes_are_near(&self, what: &str) {
         let slack = 2.0 * self.broad_phase.config().margin;
         for (id, given) in self.boxes.iter().enumerate() {

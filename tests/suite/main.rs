@@ -12,8 +12,6 @@ mod follower;
 mod gpu;
 mod incremental;
 mod kernels;
-mod overlap;
-mod overlapped;
 mod planted;
 mod precision;
 mod queries;

@@ -100,6 +100,17 @@ impl AllPairs {
 }
 
 impl AllPairs {
+    /// Takes pairs that another backend has found, a list for each thread.
+    #[cfg(feature = "gpu")]
+    pub(crate) fn take(&mut self, lists: Vec<Vec<Pair>>, grouping: Option<Grouping>) {
+        let Grouping { count, shift, .. } = grouping.unwrap_or_default();
+        self.hits.resize_with(lists.len().max(1), Hits::default);
+        self.hits.iter_mut().for_each(|hits| hits.begin(count, shift));
+        for (hits, pairs) in self.hits.iter_mut().zip(lists) {
+            hits.take(pairs);
+        }
+    }
+
     /// Copies all pairs into one list, in no particular order.
     pub(crate) fn list(&mut self, pairs: &mut Vec<Pair>) {
         pairs.clear();

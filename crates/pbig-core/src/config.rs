@@ -52,46 +52,68 @@ impl Default for Limits {
     }
 }
 
-/// How the GPU's output is coded (docs/PAIR_FORMAT.md).
+/// The rule by which the GPU turns [`GpuOptions::boxes_per_cell`] into a cell size.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub enum CellRule {
+    /// PBIG's equation 6: the smallest cell with that many entries on average. A box has an entry in every cell that it
+    /// touches.
+    #[default]
+    Objective,
+    /// Avril's section 4.1: the cell that holds that many boxes at the density of the space, whatever their sizes.
+    Density,
+}
+
+/// The coding of the GPU's output (docs/PAIR_FORMAT.md).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Coding {
-    /// What would have been smaller in the call before, the tables for decoding included.
+    /// The coding that would have been smaller in the last call, with the tables for decoding.
     #[default]
     Auto,
     /// Two ids a pair.
     Plain,
-    /// PBIG's three levels of cell, segment and place in the segment (PBIG 5.2); for a small scene
-    /// without a grid, one bit for each pair of boxes (Avril 3.4).
+    /// PBIG's three levels of cell, segment and place in the segment (PBIG 5.2). Without a grid: one bit for each pair of
+    /// boxes (Avril 3.4).
     Packed,
 }
 
-/// What can be chosen about the GPU backend; the defaults are right, the rest is for study and tests.
+/// The settings of the GPU backend. The defaults suit most programs.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct GpuOptions {
-    /// How the output is coded (PBIG table IV, "data compression").
+    /// Coding of the output (PBIG table IV, "data compression").
     pub coding: Coding,
-    /// Whether check, transfer and decoding overlap when there is more than one chunk of work (PBIG
-    /// table IV, "pipelining").
+    /// If true, check, transfer and decoding of several chunks of work overlap (PBIG table IV, "pipelining").
     pub pipelining: bool,
-    /// Whether rows of a large cell get equally many pairs (PBIG table IV, "load balancing").
+    /// If true, the rows of a large cell get equally many pairs (PBIG table IV, "load balancing").
     pub load_balancing: bool,
-    /// How Avril's mapping estimates the row (Avril 3.3): 0 the device's square root; 1 to 4 Carmack's
-    /// inverse root with so many Newton steps; 5 to 8 Lomont's; 9 no root, by bisection. All are exact,
-    /// as integers correct the estimate.
+    /// Estimate of the row in Avril's mapping (Avril 3.3). 0: the device's square root. 1 to 4: Carmack's inverse root with
+    /// so many Newton steps. 5 to 8: Lomont's, with 1 to 4 steps. 9: bisection. All are exact, because integers correct
+    /// the estimate.
     pub root: u32,
-    /// Small and large work items, of at most 256 and 524,288 tests, that one submission checks. Longer
-    /// ones could run into the time limit that some systems set a GPU.
+    /// Number of small and of large work items of a submission. They have at most 256 and 524,288 tests each. Longer
+    /// submissions may exceed the time limit of some systems.
     pub chunk: [u32; 2],
-    /// Largest buffer and binding in bytes, if less than what the device allows; 2^20 at least.
+    /// Largest buffer and binding in bytes, at least 2^20. The device may allow less.
     pub max_bytes: u64,
-    /// Bytes of a buffer whose size must be guessed, in the first call.
+    /// Size in bytes, in the first call, of buffers whose needed size is unknown.
     pub first_bytes: u64,
-    /// How long a call waits for the device before it finishes on the CPU.
+    /// Longest time that a call waits for the device before it finishes on the CPU.
     pub patience: Duration,
-    /// How long later calls stay on the CPU after the device failed.
+    /// Time for which calls stay on the CPU after the device failed.
     pub pause: Duration,
+    /// Wanted boxes per cell: PBIG's `W` in the constraint `f >= W` of equation 6. More boxes make larger cells. The paper
+    /// takes a warp, 32.
+    pub boxes_per_cell: f32,
+    /// Rule that turns the wanted boxes per cell into a cell size.
+    pub cell_rule: CellRule,
+    /// Most boxes of a cell, up to 256, whose pairs are tested through Avril's mapping. Larger cells are tested by PBIG's
+    /// balanced rows.
+    pub small_cell: u32,
+    /// Most boxes of a set whose pairs are all tested, without a grid. 0: there is always a grid. Avril's table 7 puts the
+    /// crossover at 1000.
+    pub all_pairs_up_to: u32,
 }
 
 impl GpuOptions {
@@ -106,6 +128,10 @@ impl GpuOptions {
         first_bytes: 1 << 16,
         patience: Duration::from_secs(30),
         pause: Duration::from_secs(5),
+        boxes_per_cell: 4.0,
+        cell_rule: CellRule::Objective,
+        small_cell: 32,
+        all_pairs_up_to: 1024,
     };
 }
 
@@ -163,6 +189,7 @@ impl Default for Config {
 
 /// The ways in which the CPU makes an update of [`crate::BroadPhase`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(not(feature = "unstable-study"), allow(unreachable_pub, reason = "public with `unstable-study`"))]
 pub enum Engine {
     /// Changed boxes are tested against all.
     Sweep,

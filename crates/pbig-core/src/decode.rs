@@ -1,7 +1,6 @@
-//! From the words of a device to pairs. `docs/PAIR_FORMAT.md` is normative.
+//! Decodes the words that a device returns into pairs. `docs/PAIR_FORMAT.md` defines the format.
 //!
-//! Words that are not what the format says are an error, never a panic: what a device returns is
-//! input like any other.
+//! Words that break the format give an error, never a panic: the output of a device is untrusted input.
 
 use crate::Pair;
 use crate::layout::{BOX_BITS, LANES};
@@ -10,24 +9,24 @@ use rayon::prelude::*;
 
 /// Words that break the format.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("the device returned words that are no pairs: {what} at word {at}")]
+#[error("the device returned words that break the pair format: {what} at word {at}")]
 pub struct DecodeError {
-    /// What is wrong.
+    /// The fault.
     pub what: &'static str,
-    /// Where.
+    /// Index of the word.
     pub at: usize,
 }
 
-/// The mark of a record of plain pairs.
+/// Mark of a record of plain pairs.
 pub const PLAIN: u32 = 1 << 31;
 
-/// Words that one thread decodes at a time.
+/// Number of words that a thread decodes at a time.
 const PIECE: usize = 1 << 15;
 
-/// Plain pairs: two ids each, the smaller first.
+/// Decodes plain pairs: two ids each, the smaller first.
 ///
 /// # Errors
-/// When the number of words is odd, or a pair is not `a < b < boxes`.
+/// If the number of words is odd, or a pair is not `a < b < boxes`.
 pub fn plain(words: &[u32], boxes: u32) -> Result<Vec<Vec<Pair>>, DecodeError> {
     if !words.len().is_multiple_of(2) {
         return Err(DecodeError { what: "half a pair", at: words.len() });
@@ -45,10 +44,10 @@ fn plain_piece(words: &[u32], boxes: u32, at: usize) -> Result<Vec<Pair>, Decode
     words.chunks_exact(2).enumerate().map(pair).collect()
 }
 
-/// Records, whose boxes are given as places in `entries`, the boxes of all cells.
+/// Decodes records. They name boxes by their index in `entries`, the boxes of all cells.
 ///
 /// # Errors
-/// When a record is cut off or names what is not there.
+/// If a record is cut off, or names an entry or a box that does not exist.
 pub fn records(words: &[u32], entries: &[u32], boxes: u32) -> Result<Vec<Vec<Pair>>, DecodeError> {
     let pieces = pieces(words)?;
     pieces
@@ -63,7 +62,7 @@ pub fn records(words: &[u32], entries: &[u32], boxes: u32) -> Result<Vec<Vec<Pai
         .collect()
 }
 
-/// Cuts the words between records, into pieces of about [`PIECE`].
+/// Cuts the words between records into pieces of about [`PIECE`] words.
 fn pieces(words: &[u32]) -> Result<Vec<std::ops::Range<usize>>, DecodeError> {
     let (mut pieces, mut start, mut at) = (Vec::new(), 0, 0);
     while at < words.len() {
@@ -79,7 +78,7 @@ fn pieces(words: &[u32]) -> Result<Vec<std::ops::Range<usize>>, DecodeError> {
     Ok(pieces)
 }
 
-/// Words of a record, by its first.
+/// Returns the number of words of a record, by its first word.
 fn record_len(first: u32) -> usize {
     if first & PLAIN != 0 { 1 + 2 * (first & !PLAIN) as usize } else { 3 + first as usize }
 }
@@ -93,7 +92,7 @@ struct Reader<'a> {
 }
 
 impl Reader<'_> {
-    /// Reads the record at `at`, which is whole: see [`pieces`].
+    /// Reads the record at `at`. It is whole, see [`pieces`].
     fn record(&mut self) -> Result<(), DecodeError> {
         let first = self.words[self.at];
         let end = self.at + record_len(first);
@@ -113,7 +112,8 @@ impl Reader<'_> {
         Ok(())
     }
 
-    /// A row: its place in its segment, the number of partners less one, and their places, a byte each.
+    /// Reads a row: its place in its segment, the number of partners less one, and the places of the partners, a byte
+    /// each.
     fn row(&mut self, row_base: usize, column_base: usize, end: usize) -> Result<(), DecodeError> {
         let at = self.at;
         let [row, more, ..] = self.words[at].to_le_bytes();
@@ -140,10 +140,10 @@ impl Reader<'_> {
     }
 }
 
-/// One bit for each pair of `boxes` boxes, in Avril's numbering.
+/// Decodes one bit for each pair of `boxes` boxes, in Avril's numbering.
 ///
 /// # Errors
-/// When there are not exactly as many words as the pairs need, or a bit beyond them is set.
+/// If the number of words is not that of the pairs' bits, or if a bit beyond the last pair is set.
 pub fn bits(words: &[u32], boxes: u32) -> Result<Vec<Vec<Pair>>, DecodeError> {
     let all = pair_count(u64::from(boxes));
     if words.len() as u64 != all.div_ceil(32) {

@@ -1,6 +1,9 @@
 //! All pairs of a list of boxes, from nothing each time.
 
 use crate::all_pairs::{AllPairs, Request};
+#[cfg(feature = "gpu")]
+use crate::gpu::{GpuFinder, SearchRequest};
+use crate::gpu_slot::GpuSlot;
 use crate::grid::EditedGrid;
 use crate::pairs::{Grouping, Groups};
 use crate::report::{Clock, Report, stage};
@@ -40,6 +43,7 @@ pub fn find_pairs(boxes: &[Aabb]) -> Result<Vec<Pair>, Error> {
 #[derive(Clone, Debug, Default)]
 pub struct Finder {
     config: Config,
+    gpu: GpuSlot,
     grid: EditedGrid,
     all_pairs: AllPairs,
     groups: Groups,
@@ -51,6 +55,19 @@ impl Finder {
     /// Makes a finder with the given settings ([`Config::margin`] is not used).
     pub fn new(config: Config) -> Self {
         Self { config, ..Self::default() }
+    }
+
+    /// As [`Finder::new`], on a given device: with [`crate::Backend::Gpu`] always, with [`crate::Backend::Auto`] if it is
+    /// no software and the boxes are many.
+    #[cfg(feature = "gpu")]
+    pub fn with_gpu(config: Config, gpu: GpuFinder) -> Self {
+        Self { gpu: GpuSlot::new(gpu), ..Self::new(config) }
+    }
+
+    /// Returns the adapter of the device in use: name, kind and API. None while there is no device or it has failed.
+    #[cfg(feature = "gpu")]
+    pub fn adapter(&self) -> Option<&str> {
+        self.gpu.adapter()
     }
 
     /// Returns every pair of overlapping boxes; `boxes[i]` has the id `i`.
@@ -79,11 +96,35 @@ impl Finder {
         self.report.boxes = boxes.len() as u64;
         let is_sorted = self.config.order == Order::Sorted;
         let grouping = is_sorted.then(|| Grouping::new(boxes.len()));
-        let request = Request { boxes, filters, config: &self.config, grouping };
-        self.all_pairs.find(&request, &mut self.grid, &mut self.report)?;
+        // A copy, so that the finder is free for its backends.
+        let config = self.config;
+        let request = Request { boxes, filters, config: &config, grouping };
+        let is_wanted = self.gpu.is_wanted(&self.config, boxes.len(), &mut self.report);
+        let no_gpu = self.report.plan.no_gpu;
+        if !(is_wanted && self.find_on_gpu(&request)?) {
+            self.all_pairs.find(&request, &mut self.grid, &mut self.report)?;
+            self.report.plan.no_gpu = no_gpu;
+        }
         self.emit(grouping);
         self.report.pairs = self.pairs.len() as u64;
         Ok(&self.pairs)
+    }
+
+    /// Leaves the pairs where a search on the CPU leaves them, if a device has found them.
+    #[cfg(feature = "gpu")]
+    fn find_on_gpu(&mut self, request: &Request<'_>) -> Result<bool, Error> {
+        let Request { boxes, filters, config, grouping } = *request;
+        let found = self.gpu.find(&SearchRequest { boxes, filters, config }, &mut self.report)?;
+        let Some(found) = found else { return Ok(false) };
+        self.report.invalid = boxes.len() as u64 - u64::from(found.valid);
+        self.all_pairs.take(found.pairs, grouping);
+        Ok(true)
+    }
+
+    #[cfg(not(feature = "gpu"))]
+    #[expect(clippy::unused_self, clippy::unnecessary_wraps, reason = "as with a GPU backend")]
+    fn find_on_gpu(&mut self, _: &Request<'_>) -> Result<bool, Error> {
+        Ok(false)
     }
 
     /// Brings the pairs of all threads into one list, in order if there is a grouping.

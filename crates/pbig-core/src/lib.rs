@@ -47,23 +47,54 @@ mod config;
 mod error;
 mod filter;
 mod finder;
+#[cfg(feature = "gpu")]
+pub mod gpu;
+mod gpu_slot;
 mod grid;
 pub mod oracle;
 mod pair;
 pub mod pair_index;
 mod pairs;
 mod parallel;
+#[cfg(any(feature = "gpu", feature = "unstable-study"))]
+#[cfg_attr(not(feature = "unstable-study"), allow(unreachable_pub, reason = "`study` shows parts of it"))]
+mod pbig;
 mod plan;
 mod policy;
 mod report;
+#[cfg(feature = "unstable-study")]
+pub mod study;
+
+#[cfg(all(feature = "gpu", feature = "unstable-study"))]
+pub mod decode;
+#[cfg(all(feature = "gpu", feature = "unstable-study"))]
+pub mod layout;
+
+#[cfg(all(feature = "gpu", not(feature = "unstable-study")))]
+#[allow(unreachable_pub, reason = "public with `unstable-study`")]
+mod decode;
+#[cfg(all(feature = "gpu", not(feature = "unstable-study")))]
+#[allow(
+    dead_code,
+    unreachable_pub,
+    reason = "public with `unstable-study`, and some constants are for tests of the kernels"
+)]
+mod layout;
 
 pub use aabb::Aabb;
 pub use broad_phase::{BroadPhase, Events};
-pub use config::{Backend, Coding, Config, Engine, GpuOptions, Limits, Order};
+#[cfg(feature = "unstable-study")]
+pub use config::Engine;
+#[cfg(not(feature = "unstable-study"))]
+use config::Engine;
+pub use config::{Backend, CellRule, Coding, Config, GpuOptions, Limits, Order};
 pub use error::Error;
 pub use filter::{ProxyFilter, TestMode};
 pub use finder::{Finder, find_pairs};
+#[cfg(feature = "gpu")]
+pub use gpu::GpuFinder;
 pub use grid::{NeighbourScan, simd};
 pub use pair::Pair;
 pub use plan::{Algorithm, Plan};
+pub use policy::NoGpu;
 pub use report::{Checks, GpuReport, Report, StageTimes};

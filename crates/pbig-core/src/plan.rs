@@ -1,6 +1,7 @@
 //! The plan in a report: what was done, and why, in words.
 
 use crate::grid::{EditedGrid, NeighbourScan};
+use crate::policy::NoGpu;
 use std::fmt;
 
 /// The algorithm that did the work.
@@ -63,6 +64,11 @@ pub struct Plan {
     pub oversize: u32,
     /// Boxes that are not in the grid's order, because they moved since it was built ([`Algorithm::Edit`]).
     pub spilled: u32,
+    /// The grid on the GPU ([`Algorithm::Gpu`]); none where every pair was tested.
+    #[cfg(feature = "gpu")]
+    pub gpu: Option<crate::gpu::GpuPlan>,
+    /// The reason that kept [`crate::Backend::Auto`] from a GPU.
+    pub no_gpu: Option<NoGpu>,
 }
 
 impl Plan {
@@ -77,7 +83,20 @@ impl Plan {
             scan: grid.plan.scan,
             oversize: grid.oversize.len() as u32,
             spilled: edited.spilled() as u32,
+            ..Self::default()
         }
+    }
+}
+
+impl Plan {
+    fn write_gpu(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "GPU: {} boxes", self.boxes)?;
+        #[cfg(feature = "gpu")]
+        match &self.gpu {
+            Some(grid) => write!(f, "; {grid}")?,
+            None => write!(f, ", every pair is tested")?,
+        }
+        Ok(())
     }
 }
 
@@ -89,7 +108,7 @@ impl fmt::Display for Plan {
             Algorithm::Nothing => return write!(f, "nothing to do: no box has changed"),
             Algorithm::Brute => return write!(f, "brute force: every pair of {boxes} boxes is tested"),
             Algorithm::Sweep => return write!(f, "sweep: changed boxes are tested against all {boxes}"),
-            Algorithm::Gpu => return write!(f, "GPU: {boxes} boxes"),
+            Algorithm::Gpu => return self.write_gpu(f),
             Algorithm::Grid => write!(f, "grid: {boxes} boxes are sorted and searched")?,
             Algorithm::Edit => write!(f, "edit: {} of {boxes} boxes are out of the grid's order", self.spilled)?,
         }
@@ -100,6 +119,10 @@ impl fmt::Display for Plan {
         }
         if self.oversize > 0 {
             write!(f, "; {} oversize boxes are tested against all in reach", self.oversize)?;
+        }
+        // Without a GPU backend nobody expects one.
+        if let Some(why) = self.no_gpu.filter(|why| *why != NoGpu::NotBuilt) {
+            write!(f, "; no GPU: {why}")?;
         }
         Ok(())
     }

@@ -17,9 +17,6 @@ const SCATTERED_PARALLEL_FROM: usize = 8192;
 impl PbigBroadPhase {
     /// Brings the finder up to date about some colliders.
     pub(crate) fn look_at(&mut self, call: &Call<'_>, listed: &[ColliderHandle]) {
-        if self.overlap.is_some() {
-            return self.look_ahead(call, listed);
-        }
         let mut watch = Watch::new(listed.len() >= MEASURED_FROM);
         let first = &listed[..listed.len().min(BLOCK)];
         let parallel_from = if are_scattered(first) { SCATTERED_PARALLEL_FROM } else { PARALLEL_FROM };
@@ -90,7 +87,7 @@ impl PbigBroadPhase {
                 self.roll.enter(handle);
             }
             // What has been set is that of an heir, whose turn comes.
-            None if is_new => self.take_out(index),
+            None if is_new => _ = self.finder.remove(index),
             _ => self.set_proxy(handle, call.proxy(call.fetch(handle), growth)),
         }
     }
@@ -154,7 +151,7 @@ impl PbigBroadPhase {
     fn enter(&mut self, handle: ColliderHandle) {
         if !self.roll.enter(handle) {
             // A predecessor with this index that was never reported as removed.
-            self.take_out(handle.into_raw_parts().0);
+            self.finder.remove(handle.into_raw_parts().0);
         }
     }
 }

@@ -1,7 +1,6 @@
 //! What an update did, in numbers.
 
 use crate::PbigBroadPhase;
-use crate::overlap::Overlapped;
 use pbig_core::Report;
 use std::time::{Duration, Instant};
 
@@ -43,14 +42,10 @@ pub struct Stats<'a> {
     /// Time for the boxes and filters of the modified colliders: reading colliders and bodies, and comparing each with
     /// what is stored. Zero for fewer than 64 colliders: reading the clock would take as long.
     pub proxies: Duration,
-    /// With [`PbigBroadPhase::overlapped`]: time for comparing those with what is stored, which is a stage of its own.
-    pub set: Duration,
     /// Time for turning pairs of ids into events. Zero for fewer than 64.
     pub events: Duration,
-    /// The finder's stages between `set` and `events`, its plan and counts.
+    /// The finder's stages between `proxies` and `events`, its plan and counts.
     pub report: &'a Report,
-    /// With [`PbigBroadPhase::overlapped`]: the search that was begun before, and the next one.
-    pub overlapped: Option<Overlapped<'a>>,
 }
 
 /// Sums over all updates so far.
@@ -62,11 +57,6 @@ pub struct Totals {
     pub rescans: u64,
     /// Those that failed: `tracing` has the error, and the next one sees the same changes again.
     pub failures: u64,
-    /// With [`PbigBroadPhase::overlapped`]: colliders whose pairs were searched for at once, because they were new or had
-    /// left their stored box.
-    pub left: u64,
-    /// Updates that did so.
-    pub at_once: u64,
     /// `AddPair` events.
     pub added: u64,
     /// `DeletePair` events.
@@ -82,26 +72,21 @@ pub(crate) struct Kept {
     pub(crate) deleted: usize,
     pub(crate) totals: Totals,
     pub(crate) proxies: Duration,
-    pub(crate) set: Duration,
     pub(crate) events: Duration,
 }
 
 impl Stats<'_> {
     /// The time of all stages that were timed: nearly all of an update in which much changes.
     pub fn total(&self) -> Duration {
-        let ahead = self.overlapped.map_or(Duration::ZERO, |overlapped| overlapped.report.stages.total());
-        self.proxies + self.set + self.report.stages.total() + ahead + self.events
+        self.proxies + self.report.stages.total() + self.events
     }
 }
 
 impl PbigBroadPhase {
     /// What the last update did.
     pub fn stats(&self) -> Stats<'_> {
-        let Kept { modified, removed, added, deleted, totals, proxies, set, events } = self.kept;
+        let Kept { modified, removed, added, deleted, totals, proxies, events } = self.kept;
         let (colliders, report) = (self.roll.len(), self.finder.report());
-        let overlapped = self.overlap.as_deref();
-        let overlapped =
-            overlapped.map(|one| Overlapped { left: one.left, begun: one.begun, report: &one.report });
         Stats {
             colliders,
             modified,
@@ -110,10 +95,8 @@ impl PbigBroadPhase {
             deleted,
             totals,
             proxies,
-            set,
             events,
             report,
-            overlapped,
         }
     }
 }

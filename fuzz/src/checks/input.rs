@@ -1,6 +1,8 @@
 //! Bytes as boxes: short, so that a mutation of one byte is a box that is a little different, equal, touching or odd.
 
-use pbig_core::{Aabb, Backend, CellRule, Config, Costs, Grids, Look, ProxyFilter, Strategy, Study, Updates};
+use pbig_core::{
+    Aabb, Backend, CellRule, Config, Costs, GpuOptions, Grids, Look, ProxyFilter, Strategy, Study, Updates,
+};
 
 /// Numbers at which something changes: signs, ends of ranges, no numbers.
 const SPECIAL: [f32; 16] = [
@@ -77,7 +79,10 @@ pub(crate) fn config(choice: u8) -> Config {
         1 => Config { brute_below: 0, ..base },
         2 => grid,
         3 => with(Strategy::Pbig),
-        4 => Config { cell_rule: CellRule::Density, small_cell: 1, ..with(Strategy::Pbig) },
+        4 => Config {
+            gpu: GpuOptions { cell_rule: CellRule::Density, small_cell: 1, ..GpuOptions::DEFAULT },
+            ..with(Strategy::Pbig)
+        },
         5 => Config { backend: Backend::Brute, ..base },
         6 => by(Updates::Edits),
         7 => by(Updates::Anew),

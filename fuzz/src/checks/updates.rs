@@ -27,22 +27,19 @@ struct Player {
     at: BTreeMap<u32, Aabb>,
     ids: u32,
     pairs: BTreeSet<Pair>,
-    /// Removed since an update has begun.
-    removed: Vec<u32>,
 }
 
 impl Player {
     fn new(config: Config, stride: u32) -> Self {
         let broad_phase = BroadPhase::new(config).expect("a good margin");
-        let (given, at, pairs, removed) = Default::default();
-        Self { broad_phase, stride, given, at, ids: 0, pairs, removed }
+        let (given, at, pairs) = Default::default();
+        Self { broad_phase, stride, given, at, ids: 0, pairs }
     }
 
     /// One operation; none when the input is used up.
     fn play(&mut self, input: &mut Input) -> Option<()> {
         match input.byte()? % 16 {
-            10 => self.update()?,
-            11 => self.broad_phase.begin(),
+            10 | 11 => self.update()?,
             12 => self.remove(input)?,
             13 => self.save_and_restore(),
             14 => self.broad_phase.set_margin(f32::from(input.byte()?) / 64.0).expect("a good margin"),
@@ -108,27 +105,17 @@ impl Player {
         self.given.push(aabb);
         self.at.insert(id, aabb);
         self.ids = self.ids.max(id + 1);
-        if !self.broad_phase.has_begun() {
-            let fat = self.broad_phase.fat_aabb(id);
-            assert_eq!(fat.is_some(), aabb.is_valid(), "{aabb:?}");
-            assert!(fat.is_none_or(|fat| fat.contains(&aabb)), "{fat:?} around {aabb:?}");
-        }
+        let fat = self.broad_phase.fat_aabb(id);
+        assert_eq!(fat.is_some(), aabb.is_valid(), "{aabb:?}");
+        assert!(fat.is_none_or(|fat| fat.contains(&aabb)), "{fat:?} around {aabb:?}");
     }
 
     fn remove(&mut self, input: &mut Input) -> Option<()> {
         let id = self.id(input)?;
         self.broad_phase.remove(id);
         self.at.remove(&id);
-        if self.broad_phase.has_begun() {
-            self.removed.push(id)
-        } else {
-            self.forget(id)
-        }
-        Some(())
-    }
-
-    fn forget(&mut self, id: u32) {
         self.pairs.retain(|pair| pair.a != id && pair.b != id);
+        Some(())
     }
 
     fn save_and_restore(&mut self) {
@@ -137,7 +124,7 @@ impl Player {
         assert_eq!(postcard::to_stdvec(&self.broad_phase).expect("a snapshot"), bytes);
     }
 
-    /// What the oracle makes of the boxes; of those of the beginning where an update has begun.
+    /// Returns the oracle's pairs of the fat boxes.
     fn wanted_pairs(&self) -> BTreeSet<Pair> {
         let fat: Vec<Aabb> =
             (0..self.ids).map(|id| self.broad_phase.fat_aabb(id).unwrap_or(Aabb::NOWHERE)).collect();
@@ -160,9 +147,6 @@ impl Player {
             assert!(self.pairs.insert(*pair), "{pair:?} was there already");
         }
         assert_eq!(self.pairs, wanted, "{}", self.broad_phase.report().plan);
-        for id in std::mem::take(&mut self.removed) {
-            self.forget(id);
-        }
         let kept: BTreeSet<Pair> = self.broad_phase.pairs().collect();
         assert_eq!(self.pairs, kept, "events lead elsewhere");
         Some(())

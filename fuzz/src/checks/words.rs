@@ -29,8 +29,7 @@ fn snapshot(bytes: &[u8]) {
         _ = restored.set(id, Aabb::from_center([id as f32 * 0.9, 0.0, 0.0], [0.5; 3]), ProxyFilter::ALL);
         _ = restored.update();
     }
-    restored.begin();
     restored.remove(1);
-    _ = restored.finish();
+    _ = restored.update();
     assert!(postcard::to_stdvec(&restored).is_ok_and(|bytes| !bytes.is_empty()));
 }

@@ -1,10 +1,10 @@
-//! A world of boxes with its pairs by brute force, and updates of it on a device.
+//! A world of boxes with its pairs by brute force, and its updates on a device.
 
 use pbig_core::gpu::study::{Change, ChangeRequest, Tracked, Tracker};
 use pbig_core::{Aabb, Config, Pair, ProxyFilter, oracle};
 use std::collections::{BTreeMap, BTreeSet};
 
-/// What a broad phase keeps, in the plainest form.
+/// The state of a broad phase, in the plainest form.
 pub(super) struct World {
     pub(super) boxes: Vec<Aabb>,
     pub(super) filters: Vec<ProxyFilter>,
@@ -51,7 +51,7 @@ impl World {
         self.set(id, aabb, filter);
     }
 
-    /// The pairs of a removed box end without anybody being told.
+    /// Removes a box. Its pairs end without an event.
     pub(super) fn remove(&mut self, id: u32) {
         self.put(id, Aabb::NOWHERE);
         self.changed.entry(id).and_modify(|change| change.aabb = Aabb::NOWHERE);
@@ -64,7 +64,7 @@ impl World {
         self.put(id, Aabb::new(moved(one.min), moved(one.max)));
     }
 
-    /// One update on a device, compared with brute force.
+    /// Runs an update on a device and compares it with brute force.
     pub(super) fn follow(&mut self, tracker: &mut Tracker, config: &Config) -> Result<Tracked, String> {
         let changed: Vec<_> = self.changed.values().copied().collect();
         let request = ChangeRequest {
@@ -83,14 +83,14 @@ impl World {
         Ok(tracked)
     }
 
-    /// An update by something else.
+    /// Runs an update without the device.
     pub(super) fn advance(&mut self) {
         self.kept = oracle::pairs_filtered(&self.boxes, &self.filters).into_iter().collect();
         self.changed.clear();
         self.update += 1;
     }
 
-    /// How the found pairs differ from those that are in one of the two states, if they do.
+    /// Returns the first difference between the found pairs and those that are in one of the two states only.
     fn fault(&self, tracked: &Tracked) -> Option<String> {
         let mut before = self.boxes.clone();
         for change in self.changed.values() {
@@ -106,7 +106,7 @@ impl World {
         pbig_tests::difference(&found, &wanted)
     }
 
-    /// The pairs after the update, as a caller has them that keeps the rules of `GpuFinder::changes`.
+    /// Returns the pairs after the update, completed as the rules of `GpuFinder::changes` say.
     fn completed(&self, tracked: &Tracked) -> BTreeSet<Pair> {
         let again = |pair: &Pair| [pair.a, pair.b].iter().any(|id| tracked.restarted.contains(id));
         let overlaps = |pair: &Pair| self.boxes[pair.a as usize].overlaps(&self.boxes[pair.b as usize]);

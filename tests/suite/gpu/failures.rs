@@ -1,4 +1,4 @@
-//! Devices that fail, or are lost, at any moment.
+//! Contract: a device that fails or is lost at any moment costs no pair and no event.
 
 use super::{find, on_cpu, set, with};
 use pbig_core::gpu::{Fault, adapters};
@@ -8,7 +8,7 @@ use pbig_core::{
 use pbig_tests::{corpus, difference, gpu, needs_gpu};
 use std::time::Duration;
 
-/// Boxes that move, come and go: the same frames for any backend.
+/// Runs frames in which boxes move, appear and disappear. They are the same for any backend.
 fn frames(broad_phase: &mut BroadPhase, mut before: impl FnMut(usize)) -> Vec<(Events, Option<String>)> {
     let start = set("pile", 600);
     let frame = |f: usize| {
@@ -48,7 +48,7 @@ fn a_device_that_fails_in_the_middle_of_a_run_loses_no_event() {
         for pause in [Duration::ZERO, Duration::from_secs(3600)] {
             let options = GpuOptions { pause, first_bytes: 0, ..GpuOptions::DEFAULT };
             let device = GpuFinder::new().expect("an adapter");
-            // A shader is compiled, and buffers are made, in the first call; submissions go on.
+            // Shaders are compiled and buffers are made in the first call only; each call submits.
             let at = if matches!(fault, Fault::LoseDevice | Fault::Timeout | Fault::Panic) { 5 } else { 0 };
             device.inject(fault, at);
             let mut ours = BroadPhase::with_gpu(Config { gpu: options, ..base }, device).expect("a margin");

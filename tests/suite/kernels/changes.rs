@@ -1,61 +1,61 @@
-//! The kernels in a search for changes: what there is besides boxes as they are.
+//! The kernels in a search for changes, which has each box now and at the last update.
 
 use super::*;
 
 impl State {
-    /// Whether this is a search for changes.
-    pub(super) fn tells_changes(&self) -> bool {
+    /// Returns true in a search for changes.
+    pub(super) fn finds_changes(&self) -> bool {
         !self.motions.is_empty()
     }
 
-    /// All that a box touches, now or before.
-    pub(super) fn reach(&self, id: usize) -> layout::Box {
-        self.motions.get(id).map_or_else(|| self.boxes[id], reach_of)
+    /// Returns the bounds of a box now and at the last update.
+    pub(super) fn bounds(&self, id: usize) -> DeviceBox {
+        self.motions.get(id).map_or_else(|| self.boxes[id], bounds_of)
     }
 
     pub(super) fn has_moved(&self, id: usize) -> bool {
         self.motions.get(id).is_some_and(|motion| motion.now != motion.before)
     }
 
-    /// Whether two boxes overlap, or began or ceased to.
-    pub(super) fn matter(&self, i: usize, j: usize) -> bool {
+    /// Returns true if two boxes overlap; in a search for changes, if their overlap has changed.
+    pub(super) fn is_wanted(&self, i: usize, j: usize) -> bool {
         match (self.motions.get(i), self.motions.get(j)) {
             (Some(a), Some(b)) => overlap(&a.now, &b.now) != overlap(&a.before, &b.before),
             _ => overlap(&self.boxes[i], &self.boxes[j]),
         }
     }
 
-    /// What the device has of the last update, and the lists that make this one of it.
+    /// Adds the boxes that the device has from the last update, and the lists of changes.
     pub(super) fn add_changes(&mut self, case: &Case) {
         for (id, (now, before)) in (0u32..).zip(case.boxes.iter().zip(&case.before)) {
-            let long_ago = layout::Box::new(&case.boxes[0]);
-            // As it was; boxes that were nowhere may have been something that no longer counts.
+            let long_ago = DeviceBox::new(&case.boxes[0]);
+            // The device may still have an old box where there was none at the last update.
             let known = if before.is_valid() { *before } else { case.boxes[1] };
-            self.motions.push(Motion { now: layout::Box::new(&known), before: long_ago });
+            self.motions.push(Motion { now: DeviceBox::new(&known), before: long_ago });
             if !before.is_valid() || now != before {
-                let mark = if before.is_valid() { 0 } else { ANEW };
-                self.moves.push(Move { place: id | mark, now: layout::Box::new(now) });
+                let mark = if before.is_valid() { 0 } else { WAS_ABSENT };
+                self.box_changes.push(BoxChange { marked_id: id | mark, now: DeviceBox::new(now) });
             }
             if id.is_multiple_of(9) {
-                self.refilters.push(Refilter { id, filter: filter(id + 1) });
+                self.filter_changes.push(FilterChange { id, filter: filter(id + 1) });
             }
         }
         self.params.known = self.motions.len() as u32;
-        self.params.moves = self.moves.len() as u32;
-        self.params.refilters = self.refilters.len() as u32;
+        self.params.box_changes = self.box_changes.len() as u32;
+        self.params.filter_changes = self.filter_changes.len() as u32;
     }
 }
 
-fn reach_of(motion: &Motion) -> layout::Box {
+fn bounds_of(motion: &Motion) -> DeviceBox {
     let (now, before) = (&motion.now, &motion.before);
-    layout::Box {
+    DeviceBox {
         low: std::array::from_fn(|k| now.low[k].min(before.low[k])),
         high: std::array::from_fn(|k| now.high[k].max(before.high[k])),
     }
 }
 
-/// What the plan is made for.
-pub(super) fn reaches(case: &Case) -> Vec<Aabb> {
+/// Returns the boxes that the plan is made for: the bounds of each box now and before.
+pub(super) fn all_bounds(case: &Case) -> Vec<Aabb> {
     let both = |(i, now): (usize, &Aabb)| match case.before.get(i) {
         Some(before) if before.is_valid() && now.is_valid() => Aabb::new(
             std::array::from_fn(|k| now.min[k].min(before.min[k])),
@@ -67,7 +67,7 @@ pub(super) fn reaches(case: &Case) -> Vec<Aabb> {
     case.boxes.iter().enumerate().map(both).collect()
 }
 
-/// The cases, with the first half of their boxes on the move: a little, from anywhere, or there and gone.
+/// Returns the cases with moving boxes: half of them move a little, come from anywhere, appear or disappear.
 pub(super) fn moving_cases() -> Vec<Case> {
     cases().into_iter().map(moving).collect()
 }
@@ -90,14 +90,14 @@ pub(super) fn moving(mut case: Case) -> Case {
     case
 }
 
-/// The level without the mark; that of an invalid box is beyond all.
+/// Returns the level without the mark. For an invalid box it is larger than all levels.
 pub(super) fn own_level(at: &Located) -> u32 {
     at.level & (MOVED - 1)
 }
 
-/// Whether a cell may own pairs of entries with these marks, and they may matter.
-pub(super) fn is_due(s: &State, marks: u32) -> bool {
-    marks >> AXIS_BITS == 7 && (!s.tells_changes() || marks & MOVED != 0)
+/// Returns true if a cell may own a pair of entries with these marks, and the pair may be wanted.
+pub(super) fn may_be_wanted(s: &State, marks: u32) -> bool {
+    marks >> AXIS_BITS == 7 && (!s.finds_changes() || marks & MOVED != 0)
 }
 
 pub(super) fn by_known(s: &State) -> u32 {
@@ -105,38 +105,38 @@ pub(super) fn by_known(s: &State) -> u32 {
 }
 
 pub(super) fn by_change(s: &State) -> u32 {
-    s.params.moves.max(s.params.refilters).div_ceil(LANES)
+    s.params.box_changes.max(s.params.filter_changes).div_ceil(LANES)
 }
 
-pub(super) fn settle(s: &mut State) {
+pub(super) fn store_previous(s: &mut State) {
     let known = s.params.known as usize;
     s.motions[..known].iter_mut().for_each(|motion| motion.before = motion.now);
 }
 
-pub(super) fn renew(s: &mut State) {
-    for one in &s.moves[..s.params.moves as usize] {
-        let motion = &mut s.motions[(one.place & !ANEW) as usize];
+pub(super) fn apply_changes(s: &mut State) {
+    for one in &s.box_changes[..s.params.box_changes as usize] {
+        let motion = &mut s.motions[(one.marked_id & !WAS_ABSENT) as usize];
         motion.now = one.now;
-        if one.place & ANEW != 0 {
-            motion.before = layout::Box::INVALID;
+        if one.marked_id & WAS_ABSENT != 0 {
+            motion.before = DeviceBox::INVALID;
         }
     }
-    for one in &s.refilters[..s.params.refilters as usize] {
+    for one in &s.filter_changes[..s.params.filter_changes as usize] {
         s.filters[one.id as usize] = one.filter;
     }
 }
 
 #[test]
-fn settle_agrees_with_its_twin() {
-    agrees("settle");
+fn store_previous_agrees_with_its_twin() {
+    agrees("store_previous");
 }
 
 #[test]
-fn renew_agrees_with_its_twin() {
-    agrees("renew");
+fn apply_changes_agrees_with_its_twin() {
+    agrees("apply_changes");
 }
 
-/// On all sets but those with many boxes for a kernel that tests all pairs, with all codings.
+/// Compares a kernel with its twin on all sets of at most `most_boxes` boxes, with all codings.
 fn check_agrees_on_changes(kernel: &str, codings: &[u32], most_boxes: usize) {
     for case in moving_cases().into_iter().filter(|case| case.boxes.len() <= most_boxes) {
         let before = State::before(kernel, &case);
@@ -165,14 +165,14 @@ fn check_all_agrees_with_its_twin_on_changes() {
     check_agrees_on_changes("check_all", &[0, PACKED, BITS], 2000);
 }
 
-/// What has come to the end of the lists must not change: neither boxes nor filters.
+/// Boxes and filters beyond the ends of the lists must not change.
 #[test]
-fn settle_and_renew_leave_alone_what_they_are_not_told() {
-    for kernel in ["settle", "renew"] {
+fn store_previous_and_apply_changes_change_nothing_else() {
+    for kernel in ["store_previous", "apply_changes"] {
         let mut before = State::before(kernel, &moving(pile()));
         before.params.known -= 300;
-        before.params.moves /= 2;
-        before.params.refilters -= 1;
+        before.params.box_changes /= 2;
+        before.params.filter_changes -= 1;
         assert_eq!(fault(twin(kernel), &GpuOptions::DEFAULT, &before), None, "{kernel}");
     }
 }
@@ -192,7 +192,7 @@ fn the_twins_together_find_what_the_oracle_has_in_one_of_two_states() {
     }
 }
 
-/// What the tests say would mean little if nothing moved, or everything.
+/// The other tests would mean little if no box moved, or if all did.
 #[test]
 fn the_moving_sets_have_large_items_without_and_with_movement() {
     let marks = |s: &State, item: &LargeItem| -> u32 {
@@ -209,11 +209,11 @@ fn the_moving_sets_have_large_items_without_and_with_movement() {
 #[test]
 fn faults_planted_in_what_is_known_of_boxes_are_noticed() {
     let faults: [(&str, Plant); 5] = [
-        ("settle", |s| s.motions[3].before.low[0] += 1),
-        ("settle", |s| s.motions.swap(0, 8)),
-        ("renew", |s| s.motions[7].now.high[2] -= 1),
-        ("renew", |s| s.motions[2].before = s.motions[2].now),
-        ("renew", |s| s.filters[9].mask ^= 1),
+        ("store_previous", |s| s.motions[3].before.low[0] += 1),
+        ("store_previous", |s| s.motions.swap(0, 8)),
+        ("apply_changes", |s| s.motions[7].now.high[2] -= 1),
+        ("apply_changes", |s| s.motions[2].before = s.motions[2].now),
+        ("apply_changes", |s| s.filters[9].mask ^= 1),
     ];
     for (i, (kernel, plant)) in faults.into_iter().enumerate() {
         let before = State::before(kernel, &moving(pile()));
@@ -225,14 +225,14 @@ fn faults_planted_in_what_is_known_of_boxes_are_noticed() {
     }
 }
 
-/// A box that moved and does not say so is overlooked: its pairs are missing.
+/// A moved box without its mark is skipped, so its pairs are missing.
 #[test]
 fn an_entry_that_lost_its_mark_costs_pairs() {
     needs_gpu!();
     let mut before = State::before("check_small", &moving(pile()));
     let wanted = after_twin(twin("check_small"), &before);
     before.entries.iter_mut().for_each(|entry| *entry &= !MOVED);
-    let before = with_room(&before, &wanted);
+    let before = with_capacity_for(&before, &wanted);
     let found = on_device(bench(true), twin("check_small"), &GpuOptions::DEFAULT, &before);
     let fault = compare_checks(&before, &found, &wanted).expect("pairs are missing");
     assert!(fault.starts_with("missing"), "{fault}");

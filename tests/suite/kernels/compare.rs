@@ -1,4 +1,4 @@
-//! Comparisons: what is wrong, if anything is.
+//! Comparisons of two states. Each returns the first difference in words.
 
 use super::*;
 
@@ -29,8 +29,9 @@ pub(super) fn compare_cells(_: &State, found: &State, wanted: &State) -> Option<
     same("cells", &found.cells, &wanted.cells)
 }
 
-/// With subgroups a scan may take the lanes of a workgroup in another order, so what is asked for is
-/// what the kernels after it rely on: ranges of a start and a length fill everything up to `end`.
+/// Returns an error unless ranges of a start and a length fill everything up to `end`.
+///
+/// The kernels after a scan rely on this only: with subgroups a scan may take the lanes in another order.
 pub(super) fn ranges_fault(ranges: impl Iterator<Item = (u32, u32)>, end: u32) -> Option<String> {
     let mut at = 0;
     for (start, n) in sorted(&ranges.filter(|range| range.1 > 0).collect::<Vec<_>>()) {
@@ -67,14 +68,14 @@ pub(super) fn compare_schedules(_: &State, found: &State, wanted: &State) -> Opt
         .or_else(|| same("large items", &sorted(&found.large_items), &sorted(&wanted.large_items)))
 }
 
-/// Small items with the slots they reach into instead of those slots' places, which are free.
+/// Returns the small items with the slots that they reach into, because the device chooses the places of slots.
 pub(super) fn resolved(s: &State) -> Vec<(Vec<Slot>, u32, u32)> {
     let slots = |item: &SmallItem| taken(&s.slots, item.slot, item.slots).to_vec();
     let items = s.small_items.iter().map(|item| (slots(item), item.first_pair, item.pairs));
     sorted(&items.collect::<Vec<_>>())
 }
 
-/// In each cell the residents come first, then the visitors, each in any order.
+/// Compares the entries of each cell: first its residents, then its visitors, each in any order.
 pub(super) fn compare_entries(before: &State, found: &State, wanted: &State) -> Option<String> {
     let cell_fault = |(ends, &start): (&Cell, &u32)| {
         let part = |s: &State, from: u32, to: u32| sorted(&s.entries[from as usize..to as usize]);
@@ -90,7 +91,7 @@ pub(super) fn compare_dispatches(_: &State, found: &State, wanted: &State) -> Op
     same("dispatches", &found.dispatches, &wanted.dispatches)
 }
 
-/// Pairs as words in the simplest way that the format allows.
+/// Returns pairs as words, in the simplest way that the format allows.
 pub(super) fn encoded(s: &State, pairs: &[Pair]) -> Vec<u32> {
     let n = u64::from(s.params.boxes);
     if s.has(BITS) {
@@ -105,7 +106,7 @@ pub(super) fn encoded(s: &State, pairs: &[Pair]) -> Vec<u32> {
     mark.into_iter().chain(pairs.iter().flat_map(|pair| [pair.a, pair.b])).collect()
 }
 
-/// The pairs in `out`, sorted.
+/// Returns the pairs in `out`, sorted.
 pub(super) fn decoded(s: &State) -> Result<Vec<Pair>, String> {
     let n = s.params.boxes;
     let counted = if s.has(BITS) { pair_count(n.into()).div_ceil(32) } else { wide(s.totals.words) };
@@ -130,19 +131,19 @@ pub(super) fn compare_checks(_: &State, found: &State, wanted: &State) -> Option
         .or_else(|| words_fault(found, wanted))
 }
 
-/// Pairs, tests made, redundant ones, overlaps.
+/// Returns the numbers of pairs, tests, redundant tests and overlaps.
 pub(super) fn counts(s: &State) -> [u64; 4] {
     [s.totals.pairs, s.totals.made, s.totals.redundant, s.totals.overlaps].map(wide)
 }
 
-/// Records may take fewer words than marked plain pairs of one workgroup each, not more.
+/// Compares the numbers of words. Records take at most as many as marked plain pairs of one workgroup each.
 pub(super) fn words_fault(found: &State, wanted: &State) -> Option<String> {
     let (words, plain) = (wide(found.totals.words), wide(wanted.totals.words));
     let right = if found.has(PACKED) { words <= 3 * hits(wanted) } else { words == plain };
     (!right).then(|| format!("{words} words, {plain} if plain"))
 }
 
-/// Pairs that a check has found.
+/// Returns the number of pairs that a check has found.
 pub(super) fn hits(s: &State) -> u64 {
     wide(s.totals.pairs).saturating_sub(wide(NEARLY))
 }

@@ -1,15 +1,15 @@
-//! Kernels on the device, one at a time.
+//! Runs of single kernels on the device.
 
 use super::*;
 
-/// One device with its subgroups, if it has any, and one without, for all tests.
+/// Returns the device that all tests share: one with subgroups, if the adapter has them, and one without.
 pub(super) fn bench(subgroups: bool) -> &'static Bench {
     static BENCHES: [OnceLock<Bench>; 2] = [const { OnceLock::new() }; 2];
     let open = || Bench::on_adapter(None, subgroups).expect("a device, be it a software one");
     BENCHES[usize::from(subgroups)].get_or_init(open)
 }
 
-/// The devices on which a kernel has different texts; none where devices are left out, so that nothing is at fault.
+/// Returns the devices on which a kernel has different texts. There are none if `PBIG_GPU=none`.
 pub(super) fn benches(kernel: &Kernel) -> Vec<&'static Bench> {
     if without_gpu() {
         return Vec::new();
@@ -19,35 +19,35 @@ pub(super) fn benches(kernel: &Kernel) -> Vec<&'static Bench> {
     [first].into_iter().chain(second).collect()
 }
 
-/// The state after a kernel has run on it.
+/// Runs a kernel on a state, and returns the state afterwards.
 pub(super) fn on_device(bench: &Bench, twin: &Twin, options: &GpuOptions, before: &State) -> State {
     let mut after = before.clone();
-    let names = twin.kernel.bindings;
-    let buffers: Vec<_> = names.iter().map(|name| padded(after.bytes(name))).collect();
+    let bindings = twin.kernel.bindings;
+    let buffers: Vec<_> = bindings.iter().map(|&buffer| padded(after.bytes(buffer))).collect();
     let groups = (twin.groups)(before);
-    let changes = before.tells_changes();
+    let changes = before.finds_changes();
     let left =
         bench.run(twin.kernel, options, changes, &buffers, groups).expect("the device runs the kernel");
-    for (name, left) in names.iter().zip(&left) {
-        let own = after.bytes(name);
+    for (&buffer, left) in bindings.iter().zip(&left) {
+        let own = after.bytes(buffer);
         let len = own.len();
         own.copy_from_slice(&left[..len]);
     }
     after
 }
 
-/// A binding needs room for one element at least, even of an empty list.
+/// Extends a buffer, because a binding has at least one element even if its list is empty.
 pub(super) fn padded(bytes: &[u8]) -> Vec<u8> {
     let mut bytes = bytes.to_vec();
     bytes.resize(bytes.len().max(64), 0);
     bytes
 }
 
-/// The state with room for exactly the words that the twin wrote, or that records may take.
-pub(super) fn with_room(before: &State, wanted: &State) -> State {
+/// Returns the state with capacity for exactly the words that the twin wrote, or that records may take.
+pub(super) fn with_capacity_for(before: &State, wanted: &State) -> State {
     let words = if before.has(PACKED) { 3 * hits(wanted) as usize } else { wanted.out.len() };
     let mut before = State { out: vec![0; words], ..before.clone() };
-    before.chunk.word_room = words as u32;
+    before.chunk.word_capacity = words as u32;
     before
 }
 
@@ -57,10 +57,10 @@ pub(super) fn after_twin(twin: &Twin, before: &State) -> State {
     wanted
 }
 
-/// How a kernel differs from its twin on the same buffers, if it does.
+/// Returns the first difference of a kernel and its twin on the same buffers.
 pub(super) fn fault(twin: &Twin, options: &GpuOptions, before: &State) -> Option<String> {
     let wanted = after_twin(twin, before);
-    let before = with_room(before, &wanted);
+    let before = with_capacity_for(before, &wanted);
     benches(twin.kernel).into_iter().find_map(|bench| {
         let found = on_device(bench, twin, options, &before);
         let fault = (twin.compare)(&before, &found, &wanted)?;
@@ -68,7 +68,7 @@ pub(super) fn fault(twin: &Twin, options: &GpuOptions, before: &State) -> Option
     })
 }
 
-/// On all sets, at rest and moving.
+/// Compares a kernel with its twin on all sets, at rest and moving.
 pub(super) fn agrees(kernel: &str) {
     for case in cases().into_iter().chain(moving_cases()) {
         let before = State::before(kernel, &case);
@@ -76,7 +76,7 @@ pub(super) fn agrees(kernel: &str) {
     }
 }
 
-/// On all sets, with all codings, filters and splits.
+/// Compares a kernel with its twin on all sets, with all codings, filters and splits.
 pub(super) fn check_agrees(kernel: &str, codings: &[u32], most_boxes: usize) {
     for case in cases().into_iter().filter(|case| case.boxes.len() <= most_boxes) {
         let before = State::before(kernel, &case);

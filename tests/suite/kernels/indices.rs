@@ -1,28 +1,28 @@
-//! The studies of Avril's mapping and of the lazy way: pairs of given indices, or identifiers.
+//! The kernels of the studies: Avril's mapping and the lazy way, for given indices or identifiers.
 
 use super::*;
 
-/// What these kernels read and write for `count` indices from `first` on.
+/// Returns the state for `count` indices from `first` on.
 pub(super) fn indices(n: u32, first: u32, count: u32) -> State {
     let params = Params { boxes: n, split: first, cells: count, ..Params::default() };
     State { params, ..State::default() }
 }
 
-/// The same for the ends of rows of `low..=high` boxes, with so many places for a row.
+/// Returns the state for the ends of rows of `low..=high` boxes, with `of_row` places for a row.
 pub(super) fn ends(low: u32, high: u32, of_row: u32) -> State {
     let split = of_row * (high - 1);
     let params = Params { boxes: low, split, cells: split * (high - low + 1), ..Params::default() };
     State { params, ..State::default() }
 }
 
-/// What is written for each place of each row, and what for rows that there are not.
+/// Writes the words of each place of each row, and zeros for rows that a number of boxes does not have.
 fn by_places<const N: usize>(s: &mut State, of_row: u32, place: impl Fn(u32, u32, u32) -> [u32; N]) {
     let Params { boxes, split, cells, .. } = s.params;
     let places = (0..cells).map(|i| (boxes + i / split, i % split / of_row, i % split % of_row));
     s.out = places.flat_map(|(n, row, at)| if row + 1 < n { place(n, row, at) } else { [0; N] }).collect();
 }
 
-/// A row begins with the box after it, and ends with the last.
+/// Writes both ends of each row: it begins with the next box, and ends with the last.
 pub(super) fn row_ends(s: &mut State) {
     by_places(s, 2, |n, row, at| [row, row, [row + 1, n - 1][at as usize]]);
 }
@@ -34,7 +34,7 @@ pub(super) fn lazy_ends(s: &mut State) {
     });
 }
 
-/// The estimated row is the exact one here; a kernel's may be near it.
+/// Writes the pair of each index. The estimated row is exact here; a kernel's may be off by a few.
 pub(super) fn index_pairs(s: &mut State) {
     s.out.clear();
     for i in 0..s.params.cells {
@@ -43,7 +43,7 @@ pub(super) fn index_pairs(s: &mut State) {
     }
 }
 
-/// Of n^2 identifiers those of pairs, lesser box first; the others give no box.
+/// Writes the pair of each of n^2 identifiers, smaller box first. Other identifiers give no box.
 pub(super) fn lazy_pairs(s: &mut State) {
     s.out.clear();
     for id in s.params.split..s.params.split + s.params.cells {
@@ -92,13 +92,14 @@ fn index_pairs_agrees_with_its_twin_for_every_root() {
     }
 }
 
-/// The exact pairs, and how far off the estimated rows may be: one or two for a good root; one Newton
-/// step leaves an error of up to 0.18% of the root, which is up to twice n.
+/// Returns the first difference of the pairs, or of an estimated row that is too far off.
+///
+/// A good root is off by one or two rows. One Newton step leaves an error of up to 0.18% of the root, which is up to 2 n.
 fn index_fault(root: u32, before: &State) -> Option<String> {
     let options = GpuOptions { root, ..GpuOptions::DEFAULT };
     let kernel = twin("index_pairs");
     let wanted = after_twin(kernel, before);
-    let found = on_device(bench(true), kernel, &options, &with_room(before, &wanted));
+    let found = on_device(bench(true), kernel, &options, &with_capacity_for(before, &wanted));
     let far = if matches!(root, 1 | 5) { 2 + before.params.boxes / 500 } else { 2 };
     let rows = found.out.iter().zip(&wanted.out).step_by(3);
     let worst = rows.max_by_key(|(estimate, row)| estimate.abs_diff(**row))?;

@@ -1,17 +1,17 @@
-//! Structs, constants and bindings are the same in Rust and in WGSL.
+//! Contract: structs, constants and bindings are the same in Rust and in WGSL.
 
 use super::*;
 
 /// A Rust struct that kernels share.
-struct Mirror {
+struct SharedStruct {
     name: &'static str,
     size: usize,
     fields: Vec<(&'static str, usize)>,
 }
 
-macro_rules! mirrors {
+macro_rules! shared_structs {
     ($($name:ident { $($field:ident),* })*) => {
-        vec![$(Mirror {
+        vec![$(SharedStruct {
             name: stringify!($name),
             size: size_of::<layout::$name>(),
             fields: vec![$((stringify!($field), offset_of!(layout::$name, $field))),*],
@@ -19,19 +19,19 @@ macro_rules! mirrors {
     };
 }
 
-fn mirrors() -> Vec<Mirror> {
-    mirrors! {
-        Box { low, high }
+fn shared_structs() -> Vec<SharedStruct> {
+    shared_structs! {
+        DeviceBox { low, high }
         Motion { now, before }
-        Move { place, now }
-        Refilter { id, filter }
+        BoxChange { marked_id, now }
+        FilterChange { id, filter }
         Located { low, high, level }
         Level { dims, shift, first_cell, unused }
         Params {
-            origin, scale, reach_low, boxes, reach_high, levels, cells, small_cell, columns, flags, split,
-            entry_room, slot_room, small_room, large_room, known, moves, refilters, level
+            origin, scale, clamp_low, boxes, clamp_high, levels, cells, small_cell, columns, flags, split,
+            entry_capacity, slot_capacity, small_capacity, large_capacity, known, box_changes, filter_changes, level
         }
-        Chunk { first_small, small_items, first_large, large_items, word_room, unused, pairs_left }
+        Chunk { first_small, small_items, first_large, large_items, word_capacity, unused, pairs_left }
         Cell { residents, visitors }
         Slot { start, shape, first_pair }
         SmallItem { slot, slots, first_pair, pairs }
@@ -40,7 +40,7 @@ fn mirrors() -> Vec<Mirror> {
     }
 }
 
-/// The Rust field that begins where a member of WGSL does: padding is one array there, a filter one struct.
+/// Returns the Rust field that begins at a member of WGSL. In Rust padding is one array, and a filter is one struct.
 fn field_of(member: &str) -> Option<&str> {
     match member {
         "unused0" => Some("unused"),
@@ -55,7 +55,7 @@ fn module_of(kernel: &Kernel) -> naga::Module {
     parsed.unwrap_or_else(|error| panic!("{}: {error}", kernel.name))
 }
 
-/// Fields and size of a struct of a module.
+/// Returns the fields and the size of a struct of a module.
 fn struct_of<'a>(module: &'a naga::Module, name: &str) -> Option<(Vec<(&'a str, usize)>, usize)> {
     let named = module.types.iter().find(|(_, ty)| ty.name.as_deref() == Some(name));
     let naga::TypeInner::Struct { members, span } = &named?.1.inner else { return None };
@@ -68,17 +68,17 @@ fn struct_of<'a>(module: &'a naga::Module, name: &str) -> Option<(Vec<(&'a str, 
 
 #[test]
 fn structs_lie_in_memory_as_in_the_kernels() {
-    for kernel in KERNELS {
+    for kernel in all_kernels() {
         let module = module_of(kernel);
-        for mirror in mirrors() {
-            let found = struct_of(&module, mirror.name);
-            let wanted = Some((mirror.fields, mirror.size));
-            assert_eq!(found, wanted, "{}: {}", kernel.name, mirror.name);
+        for shared in shared_structs() {
+            let found = struct_of(&module, shared.name);
+            let wanted = Some((shared.fields, shared.size));
+            assert_eq!(found, wanted, "{}: {}", kernel.name, shared.name);
         }
     }
 }
 
-/// The value of a named constant of a kernel, if it has it.
+/// Returns the value of a named constant of a kernel, if it has it.
 fn constant_of(module: &naga::Module, name: &str) -> Option<u32> {
     let (_, constant) = module.constants.iter().find(|(_, c)| c.name.as_deref() == Some(name))?;
     match module.global_expressions[constant.init] {
@@ -91,19 +91,19 @@ fn constant_of(module: &naga::Module, name: &str) -> Option<u32> {
 fn constants_are_those_of_the_kernels() {
     let everywhere = [
         ("LANES", LANES),
-        ("MOST_LEVELS", layout::MOST_LEVELS as u32),
+        ("MAX_LEVELS", layout::MAX_LEVELS as u32),
         ("NO_LEVEL", NO_LEVEL),
         ("BOX_BITS", BOX_BITS),
         ("AXIS_BITS", AXIS_BITS),
-        ("ANEW", ANEW),
+        ("WAS_ABSENT", WAS_ABSENT),
         ("FILTERED", FILTERED),
         ("PACKED", PACKED),
         ("BITS", BITS),
     ];
     let somewhere =
         [("CELLS_PER_BLOCK", CELLS_PER_BLOCK), ("CELLS_PER_LANE", CELLS_PER_BLOCK / LANES), ("PLAIN", PLAIN)];
-    let most_span = format!("const MOST_SPAN = {MOST_SPAN};");
-    for kernel in KERNELS {
+    let most_span = format!("const MAX_SPAN = {MAX_SPAN};");
+    for kernel in all_kernels() {
         let module = module_of(kernel);
         for (name, value) in everywhere {
             assert_eq!(constant_of(&module, name), Some(value), "{}: {name}", kernel.name);
@@ -111,18 +111,18 @@ fn constants_are_those_of_the_kernels() {
         for (name, value) in somewhere {
             assert_eq!(constant_of(&module, name).unwrap_or(value), value, "{}: {name}", kernel.name);
         }
-        // An abstract number, of which a parsed module keeps nothing.
+        // A parsed module does not keep constants without a type.
         assert!(kernel.source(false, true).contains(&most_span), "{}", kernel.name);
     }
 }
 
 #[test]
 fn bindings_are_those_of_the_kernels() {
-    for kernel in KERNELS {
+    for kernel in all_kernels() {
         let module = module_of(kernel);
         let variables = module.global_variables.iter().map(|(_, variable)| variable);
         let bound = variables.filter_map(|v| Some((v.binding.as_ref()?.binding, v.name.as_deref()?)));
-        let wanted: Vec<_> = (0u32..).zip(kernel.bindings.iter().copied()).collect();
+        let wanted: Vec<_> = (0u32..).zip(kernel.bindings.iter().map(|buffer| buffer.name())).collect();
         assert_eq!(sorted(&bound.collect::<Vec<_>>()), wanted, "{}", kernel.name);
     }
 }

@@ -1,7 +1,7 @@
-//! The contract of the kernels: each, run alone, leaves in its buffers what a plain scalar twin leaves in
-//! the same buffers. Where the device's order is free, sets are compared.
+//! The contract of the kernels: run alone, each leaves the same content in its buffers as its plain scalar twin. Where the
+//! device may choose an order, sets are compared.
 //!
-//! The twins say what a kernel is for, not how it does it; together they find the oracle's pairs.
+//! A twin defines the result of a kernel, not its way. Together the twins find the oracle's pairs.
 
 mod changes;
 mod compare;
@@ -17,17 +17,16 @@ use compare::*;
 use device::*;
 use indices::*;
 use pbig_core::decode::{self, PLAIN};
-use pbig_core::gpu::study::Bench;
+use pbig_core::gpu::study::{Bench, plan_params};
 use pbig_core::layout::{
-    self, ANEW, AXIS_BITS, BITS, BOX_BITS, CELLS_PER_BLOCK, Cell, Chunk, Counters, FILTERED, LANES,
-    LargeItem, Level, Located, MOST_SPAN, MOVED, Motion, Move, NO_LEVEL, PACKED, Params, Refilter, Slot,
-    SmallItem, Totals, halves, wide,
+    self, AXIS_BITS, BITS, BOX_BITS, BoxChange, CELLS_PER_BLOCK, Cell, Chunk, Counters, DeviceBox, FILTERED,
+    FilterChange, LANES, LargeItem, Level, Located, MAX_SPAN, MOVED, Motion, NO_LEVEL, PACKED, Params, Slot,
+    SmallItem, Totals, WAS_ABSENT, halves, wide,
 };
 use pbig_core::pair_index::{index_of, pair_count, pair_of};
-use pbig_core::plan::{GpuPlan, Summary};
-use pbig_core::{Aabb, Config, GpuOptions, Pair, ProxyFilter, oracle};
+use pbig_core::{Aabb, GpuOptions, Pair, ProxyFilter, oracle};
 use pbig_harness::boxes::BoxSet;
-use pbig_shaders::{self as shaders, KERNELS, Kernel};
+use pbig_shaders::{self as shaders, Buffer, KERNELS, Kernel};
 use pbig_tests::{corpus, difference, needs_gpu, without_gpu};
 use state::*;
 use std::fmt::Debug;
@@ -35,10 +34,15 @@ use std::mem::offset_of;
 use std::sync::OnceLock;
 use twins::*;
 
+/// Returns the kernels of a search and those of the studies.
+fn all_kernels() -> impl Iterator<Item = &'static Kernel> {
+    KERNELS.iter().chain(shaders::study::KERNELS).copied()
+}
+
 #[test]
 fn every_kernel_has_a_twin() {
     let names: Vec<_> = TWINS.iter().map(|twin| twin.kernel.name).collect();
-    assert_eq!(names, KERNELS.iter().map(|kernel| kernel.name).collect::<Vec<_>>());
+    assert_eq!(names, all_kernels().map(|kernel| kernel.name).collect::<Vec<_>>());
 }
 
 #[test]
@@ -59,7 +63,7 @@ fn the_twins_together_find_the_pairs_of_the_oracle() {
     }
 }
 
-/// What the tests below say would mean little if the sets did not lead everywhere.
+/// The tests below would mean little if the sets did not reach every kind of cell and item.
 #[test]
 fn the_sets_have_small_and_large_cells_several_levels_and_visitors() {
     let states: Vec<_> = cases().iter().map(|case| State::before("scatter", case)).collect();
@@ -107,7 +111,7 @@ fn scan_sums_agrees_with_its_twin() {
     agrees("scan_sums");
 }
 
-/// More blocks than lanes, so that the one workgroup takes several turns.
+/// With more blocks than lanes the workgroup takes several turns.
 #[test]
 fn scan_sums_agrees_with_its_twin_on_many_blocks() {
     for blocks in [1u32, 255, 256, 257, 1000] {
@@ -128,7 +132,7 @@ fn schedule_agrees_with_its_twin() {
     agrees("schedule");
 }
 
-/// Cells of hundreds of segments, whose items `schedule` numbers by a formula, in every width.
+/// `schedule` numbers the items of a cell by a formula, which must hold for hundreds of segments and every width.
 #[test]
 fn schedule_numbers_the_items_of_huge_cells_without_gaps() {
     for columns in [1, 2, 3, 8] {
@@ -141,7 +145,7 @@ fn schedule_numbers_the_items_of_huge_cells_without_gaps() {
         scan_add(&mut before);
         let wanted = after_twin(twin("schedule"), &before);
         let Counters { entries, slots, small_items, large_items } = wanted.counters;
-        set_rooms(&mut before.params, &[entries, slots, small_items, large_items]);
+        set_capacities(&mut before.params, &[entries, slots, small_items, large_items]);
         before.large_items = vec![LargeItem::default(); large_items as usize];
         assert_eq!(fault(twin("schedule"), &GpuOptions::DEFAULT, &before), None, "{columns} columns");
     }
@@ -158,20 +162,20 @@ fn arrange_agrees_with_its_twin() {
 }
 
 #[test]
-fn arrange_dispatches_nothing_without_room_and_rows_of_many() {
+fn arrange_dispatches_nothing_without_capacity_and_rows_of_many() {
     let found = Counters { entries: 10, slots: 20, small_items: 100_000, large_items: 32_769 };
-    let rooms = [10, 20, 100_000, 32_769];
-    let dispatches = |rooms: [u32; 4], large_items: u32| {
+    let capacities = [10, 20, 100_000, 32_769];
+    let dispatches = |capacities: [u32; 4], large_items: u32| {
         let mut before = State { counters: found, ..State::default() };
-        set_rooms(&mut before.params, &rooms);
+        set_capacities(&mut before.params, &capacities);
         before.chunk = Chunk { small_items: 1 << 16, large_items, ..Chunk::default() };
-        assert_eq!(fault(twin("arrange"), &GpuOptions::DEFAULT, &before), None, "{rooms:?}");
+        assert_eq!(fault(twin("arrange"), &GpuOptions::DEFAULT, &before), None, "{capacities:?}");
         after_twin(twin("arrange"), &before).dispatches
     };
-    assert_eq!(dispatches(rooms, 5), [32_768, 2, 1, 5, 1, 1]);
-    assert_eq!(dispatches(rooms, u32::MAX >> 1), [32_768, 2, 1, 32_768, 2, 1]);
+    assert_eq!(dispatches(capacities, 5), [32_768, 2, 1, 5, 1, 1]);
+    assert_eq!(dispatches(capacities, u32::MAX >> 1), [32_768, 2, 1, 32_768, 2, 1]);
     for list in 0..4 {
-        let mut less = rooms;
+        let mut less = capacities;
         less[list] -= 1;
         assert_eq!(dispatches(less, 5), [0, 0, 1, 0, 0, 1], "list {list}");
     }
@@ -212,7 +216,7 @@ fn check_all_agrees_with_its_twin() {
     check_agrees("check_all", &[0, PACKED, BITS], 2000);
 }
 
-/// Around the limits of a workgroup, and without any pair.
+/// Numbers of pairs around the size of a workgroup, and none.
 #[test]
 fn check_all_agrees_with_its_twin_on_few_boxes() {
     for n in [1, 2, 3, 8, 9, 23, 24, 33] {
@@ -257,7 +261,7 @@ fn nothing_is_checked_once_there_are_too_many_pairs() {
     for kernel in ["check_small", "check_large", "check_all"] {
         let mut before = State::before(kernel, &pile());
         before.out = vec![0; 1 << 16];
-        before.chunk.word_room = 1 << 16;
+        before.chunk.word_capacity = 1 << 16;
         before.chunk.pairs_left = halves(wide(NEARLY) - 1);
         for bench in benches(twin(kernel).kernel) {
             let found = on_device(bench, twin(kernel), &GpuOptions::DEFAULT, &before);
@@ -267,68 +271,75 @@ fn nothing_is_checked_once_there_are_too_many_pairs() {
 }
 
 #[test]
-fn the_checks_count_what_they_have_no_room_for_and_write_nothing_there() {
+fn the_checks_count_output_that_does_not_fit_and_write_nothing_there() {
     needs_gpu!();
     for (kernel, case) in [("check_small", pile()), ("check_large", crowd()), ("check_all", pile())] {
         for flags in [0, PACKED] {
             let before = State::before(kernel, &case).with(flags, 0);
             let wanted = after_twin(twin(kernel), &before);
-            let mut before = with_room(&before, &wanted);
-            before.chunk.word_room = hits(&wanted) as u32 / 2;
+            let mut before = with_capacity_for(&before, &wanted);
+            before.chunk.word_capacity = hits(&wanted) as u32 / 2;
             let found = on_device(bench(true), twin(kernel), &GpuOptions::DEFAULT, &before);
             assert_eq!(same("counts", &counts(&found), &counts(&wanted)), None, "{kernel}, flags {flags}");
             assert_eq!(words_fault(&found, &wanted), None, "{kernel}, flags {flags}");
-            let beyond = &found.out[before.chunk.word_room as usize..];
-            assert!(beyond.iter().all(|&word| word == 0), "{kernel}, flags {flags}: written beyond the room");
+            let beyond = &found.out[before.chunk.word_capacity as usize..];
+            assert!(
+                beyond.iter().all(|&word| word == 0),
+                "{kernel}, flags {flags}: written beyond the capacity"
+            );
         }
     }
 }
 
 #[test]
-fn schedule_counts_what_it_has_no_room_for_and_writes_nothing_there() {
+fn schedule_counts_items_that_do_not_fit_and_writes_nothing_there() {
     let mut before = State::before("schedule", &pile());
     let wanted = after_twin(twin("schedule"), &before);
     let Counters { entries, slots, small_items, large_items } = wanted.counters;
     let [slots, small, large] = [slots, small_items, large_items].map(|n| n / 2);
-    set_rooms(&mut before.params, &[entries, slots, small, large]);
+    set_capacities(&mut before.params, &[entries, slots, small, large]);
     for bench in benches(&shaders::SCHEDULE) {
         let found = on_device(bench, twin("schedule"), &GpuOptions::DEFAULT, &before);
         assert_eq!(found.counters, wanted.counters);
-        assert_eq!(room_fault(&found.slots, slots, &wanted.slots), None);
-        assert_eq!(room_fault(&found.large_items, large, &wanted.large_items), None);
-        // What a small item names depends on the order of the slots.
+        assert_eq!(capacity_fault(&found.slots, slots, &wanted.slots), None);
+        assert_eq!(capacity_fault(&found.large_items, large, &wanted.large_items), None);
+        // The content of a small item depends on the order of the slots.
         let (within, beyond) = found.small_items.split_at(small as usize);
         assert!(within.iter().all(|item| item.pairs > 0), "a gap in the small items");
-        assert!(beyond.iter().all(|item| *item == SmallItem::default()), "a small item beyond the room");
+        assert!(beyond.iter().all(|item| *item == SmallItem::default()), "a small item beyond the capacity");
     }
 }
 
-/// A list of which only the first `room` places may be used: by different ones of those wanted.
-fn room_fault<T: Ord + Clone + Debug + Default>(found: &[T], room: u32, wanted: &[T]) -> Option<String> {
-    let (within, beyond) = found.split_at(room as usize);
+/// Returns an error unless the first `capacity` places of a list hold different wanted elements, and no other is used.
+fn capacity_fault<T: Ord + Clone + Debug + Default>(
+    found: &[T],
+    capacity: u32,
+    wanted: &[T],
+) -> Option<String> {
+    let (within, beyond) = found.split_at(capacity as usize);
     let mut within = sorted(within);
     within.dedup();
     let strange =
         within.iter().find(|item| !wanted.contains(item)).map(|item| format!("{item:?} is not wanted"));
-    let twice = (within.len() < room as usize).then(|| "something twice".to_owned());
+    let twice = (within.len() < capacity as usize).then(|| "something twice".to_owned());
     let too_far = beyond.iter().find(|item| **item != T::default());
-    strange.or(twice).or(too_far.map(|item| format!("{item:?} is beyond the room")))
+    strange.or(twice).or(too_far.map(|item| format!("{item:?} is beyond the capacity")))
 }
 
 #[test]
-fn scatter_writes_nothing_without_room_for_all() {
+fn scatter_writes_nothing_without_capacity_for_all() {
     needs_gpu!();
     let mut before = State::before("scatter", &pile());
-    before.params.entry_room -= 1;
+    before.params.entry_capacity -= 1;
     let found = on_device(bench(true), twin("scatter"), &GpuOptions::DEFAULT, &before);
     assert_eq!(same("entries", &found.entries, &before.entries), None);
     assert_eq!(same("cells", &found.cells, &before.cells), None);
 }
 
-/// Spoils what a kernel has left.
+/// A function that changes the result of a kernel.
 type Plant = fn(&mut State);
 
-/// A comparison that finds no fault in anything would pass every test above.
+/// A comparison that never finds a fault would pass every test above.
 #[test]
 fn planted_faults_are_noticed() {
     let faults: [(&str, Plant); 23] = [
@@ -366,19 +377,19 @@ fn planted_faults_are_noticed() {
     }
 }
 
-/// A cell with residents, and its start.
+/// Returns a cell with residents, and its start.
 fn full(s: &mut State) -> (&mut Cell, &mut u32) {
     let mut cells = s.cells.iter_mut().zip(&mut s.starts);
     cells.find(|(cell, _)| cell.residents > 0).expect("a cell with residents")
 }
 
-/// From the list only: the counts still have it.
+/// Removes a pair from the list, but not from the counts.
 fn drop_a_pair(s: &mut State) {
     s.out.truncate(s.out.len() - 2);
     s.totals.words = halves(s.out.len() as u64);
 }
 
-/// A planted fault in what a device is given, rather than in what it returned.
+/// A fault in the device's input must be noticed, too.
 #[test]
 fn an_entry_that_lost_a_bit_costs_pairs() {
     needs_gpu!();
@@ -388,7 +399,7 @@ fn an_entry_that_lost_a_bit_costs_pairs() {
     for entry in &mut before.entries {
         *entry = if *entry & lost == lost { *entry & !(1 << AXIS_BITS) } else { *entry };
     }
-    let before = with_room(&before, &wanted);
+    let before = with_capacity_for(&before, &wanted);
     let found = on_device(bench(true), twin("check_small"), &GpuOptions::DEFAULT, &before);
     let fault = compare_checks(&before, &found, &wanted).expect("pairs are missing");
     assert!(fault.starts_with("missing"), "{fault}");

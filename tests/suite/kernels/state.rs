@@ -1,20 +1,20 @@
-//! Every buffer that a kernel can bind, and the sets that the kernels run on.
+//! The buffers that kernels bind, and the sets that they run on.
 
 use super::*;
 
-/// Counts begin just below 2^32, so that every test carries into the high half.
+/// First value of the counts: just below 2^32, so that every test carries into the high half.
 pub(super) const NEARLY: [u32; 2] = [u32::MAX - 2, 0];
 
-/// Every buffer that a kernel can bind.
+/// The buffers that kernels bind.
 #[derive(Clone, Debug, Default)]
 pub(super) struct State {
     pub(super) params: Params,
     pub(super) chunk: Chunk,
-    pub(super) boxes: Vec<layout::Box>,
-    /// In a search for changes, in place of the boxes.
+    pub(super) boxes: Vec<DeviceBox>,
+    /// Boxes now and before, which replace `boxes` in a search for changes.
     pub(super) motions: Vec<Motion>,
-    pub(super) moves: Vec<Move>,
-    pub(super) refilters: Vec<Refilter>,
+    pub(super) box_changes: Vec<BoxChange>,
+    pub(super) filter_changes: Vec<FilterChange>,
     pub(super) filters: Vec<ProxyFilter>,
     pub(super) located: Vec<Located>,
     pub(super) cells: Vec<Cell>,
@@ -30,11 +30,11 @@ pub(super) struct State {
     pub(super) out: Vec<u32>,
 }
 
-/// Boxes, and how their cells are scheduled.
+/// A set of boxes, and the settings of the schedule.
 pub(super) struct Case {
     pub(super) name: &'static str,
     pub(super) boxes: Vec<Aabb>,
-    /// What they were, for a search for changes; empty for one for overlaps.
+    /// The boxes at the last update; empty for a search for overlaps.
     pub(super) before: Vec<Aabb>,
     pub(super) small_cell: u32,
     pub(super) columns: u32,
@@ -58,19 +58,19 @@ pub(super) fn cases() -> Vec<Case> {
     ]
 }
 
-/// Cells of about four boxes, half of which count as large.
+/// Returns a set with cells of about four boxes, half of which count as large.
 pub(super) fn pile() -> Case {
     Case { name: "pile", boxes: set("pile", 6000), before: Vec::new(), small_cell: 4, columns: 8 }
 }
 
-/// Many identical boxes across the borders of cells: large cells that own none of their pairs.
+/// Returns many identical boxes across the borders of cells: some large cells own none of their pairs.
 pub(super) fn crowd() -> Case {
     let mut boxes = set("pile", 1000);
     boxes.extend(vec![boxes[500]; 700]);
     Case { name: "crowd in a pile", boxes, before: Vec::new(), small_cell: 32, columns: 2 }
 }
 
-/// Filters that allow some pairs, and forbid some for each of the reasons there are.
+/// Returns filters that allow some pairs, and forbid others for each possible reason.
 pub(super) fn filter(i: u32) -> ProxyFilter {
     ProxyFilter {
         body: if i.is_multiple_of(4) { ProxyFilter::NO_BODY } else { i % 50 },
@@ -83,12 +83,12 @@ pub(super) fn filter(i: u32) -> ProxyFilter {
 }
 
 impl State {
-    /// The buffers of a call before its first kernel, with room for exactly what will be found.
+    /// Returns the buffers of a call before its first kernel, with exactly the needed capacities.
     pub(super) fn new(case: &Case) -> Self {
         let n = case.boxes.len();
-        let plan = GpuPlan::new(&Summary::of(&reaches(case), None), &Config::DEFAULT, 1.0, 1 << 20);
         let (small_cell, columns) = (case.small_cell, case.columns);
-        let params = Params { boxes: n as u32, small_cell, columns, ..plan.params() };
+        let plan = plan_params(&all_bounds(case), &GpuOptions::DEFAULT, 1 << 20);
+        let params = Params { boxes: n as u32, small_cell, columns, ..plan };
         let mut state = Self {
             params,
             chunk: Chunk {
@@ -97,7 +97,7 @@ impl State {
                 pairs_left: [u32::MAX; 2],
                 ..Chunk::default()
             },
-            boxes: case.boxes.iter().map(layout::Box::new).collect(),
+            boxes: case.boxes.iter().map(DeviceBox::new).collect(),
             filters: (0..n as u32).map(filter).collect(),
             located: vec![Located::default(); n],
             cells: vec![Cell::default(); params.cells as usize],
@@ -113,24 +113,24 @@ impl State {
             ..Self::default()
         };
         state.add_changes(case);
-        state.make_room();
+        state.set_exact_capacities();
         state
     }
 
-    /// As much room in the lists as the twins say, so that anything too much has no place to hide.
-    pub(super) fn make_room(&mut self) {
+    /// Sets the capacities to the lengths of the twins' lists, so that any surplus is noticed.
+    pub(super) fn set_exact_capacities(&mut self) {
         let mut dry = self.clone();
-        set_rooms(&mut dry.params, &[u32::MAX; 4]);
+        set_capacities(&mut dry.params, &[u32::MAX; 4]);
         TWINS.iter().take_while(|twin| twin.kernel.name != "scatter").for_each(|twin| (twin.run)(&mut dry));
         let Counters { entries, slots, small_items, large_items } = dry.counters;
-        set_rooms(&mut self.params, &[entries, slots, small_items, large_items]);
+        set_capacities(&mut self.params, &[entries, slots, small_items, large_items]);
         self.entries = vec![0; entries as usize];
         self.slots = vec![Slot::default(); slots as usize];
         self.small_items = vec![SmallItem::default(); small_items as usize];
         self.large_items = vec![LargeItem::default(); large_items as usize];
     }
 
-    /// The state before a kernel: the twins of those before it have run.
+    /// Returns the state before a kernel, made by the twins of the kernels before it.
     pub(super) fn before(kernel: &str, case: &Case) -> Self {
         if matches!(kernel, "index_pairs" | "lazy_pairs") {
             return indices(1000, 77, 4000);
@@ -140,7 +140,7 @@ impl State {
         }
         let mut state = Self::new(case);
         for twin in TWINS.iter().take_while(|twin| twin.kernel.name != kernel) {
-            // The checks do not build upon each other.
+            // The checks do not depend on each other.
             if !twin.kernel.name.starts_with("check") {
                 (twin.run)(&mut state);
             }
@@ -157,34 +157,33 @@ impl State {
         self.params.flags & flag != 0
     }
 
-    /// The buffer of a binding.
-    pub(super) fn bytes(&mut self, binding: &str) -> &mut [u8] {
-        match binding {
-            "params" => bytes_of_mut(&mut self.params),
-            "chunk" => bytes_of_mut(&mut self.chunk),
-            "boxes" if self.tells_changes() => cast_slice_mut(&mut self.motions),
-            "boxes" => cast_slice_mut(&mut self.boxes),
-            "moves" => cast_slice_mut(&mut self.moves),
-            "refilters" => cast_slice_mut(&mut self.refilters),
-            "filters" => cast_slice_mut(&mut self.filters),
-            "located" => cast_slice_mut(&mut self.located),
-            "cells" => cast_slice_mut(&mut self.cells),
-            "starts" => cast_slice_mut(&mut self.starts),
-            "sums" => cast_slice_mut(&mut self.sums),
-            "counters" => bytes_of_mut(&mut self.counters),
-            "slots" => cast_slice_mut(&mut self.slots),
-            "small_items" => cast_slice_mut(&mut self.small_items),
-            "large_items" => cast_slice_mut(&mut self.large_items),
-            "entries" => cast_slice_mut(&mut self.entries),
-            "dispatches" => bytes_of_mut(&mut self.dispatches),
-            "totals" => bytes_of_mut(&mut self.totals),
-            "out" => cast_slice_mut(&mut self.out),
-            other => panic!("no buffer {other}"),
+    /// Returns the bytes of a buffer.
+    pub(super) fn bytes(&mut self, buffer: Buffer) -> &mut [u8] {
+        match buffer {
+            Buffer::Params => bytes_of_mut(&mut self.params),
+            Buffer::Chunk => bytes_of_mut(&mut self.chunk),
+            Buffer::Boxes if self.finds_changes() => cast_slice_mut(&mut self.motions),
+            Buffer::Boxes => cast_slice_mut(&mut self.boxes),
+            Buffer::BoxChanges => cast_slice_mut(&mut self.box_changes),
+            Buffer::FilterChanges => cast_slice_mut(&mut self.filter_changes),
+            Buffer::Filters => cast_slice_mut(&mut self.filters),
+            Buffer::Located => cast_slice_mut(&mut self.located),
+            Buffer::Cells => cast_slice_mut(&mut self.cells),
+            Buffer::Starts => cast_slice_mut(&mut self.starts),
+            Buffer::Sums => cast_slice_mut(&mut self.sums),
+            Buffer::Counters => bytes_of_mut(&mut self.counters),
+            Buffer::Slots => cast_slice_mut(&mut self.slots),
+            Buffer::SmallItems => cast_slice_mut(&mut self.small_items),
+            Buffer::LargeItems => cast_slice_mut(&mut self.large_items),
+            Buffer::Entries => cast_slice_mut(&mut self.entries),
+            Buffer::Dispatches => bytes_of_mut(&mut self.dispatches),
+            Buffer::Totals => bytes_of_mut(&mut self.totals),
+            Buffer::Out => cast_slice_mut(&mut self.out),
         }
     }
 }
 
-/// Room for entries, slots, small and large items.
-pub(super) fn set_rooms(params: &mut Params, rooms: &[u32; 4]) {
-    [params.entry_room, params.slot_room, params.small_room, params.large_room] = *rooms;
+/// Sets the capacities for entries, slots, small and large items.
+pub(super) fn set_capacities(params: &mut Params, capacities: &[u32; 4]) {
+    [params.entry_capacity, params.slot_capacity, params.small_capacity, params.large_capacity] = *capacities;
 }

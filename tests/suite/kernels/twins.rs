@@ -1,9 +1,9 @@
-//! The twins: what each kernel is for, one box, cell or pair after the other.
+//! The twins: each computes the result of a kernel, one box, cell or pair after the other.
 
 use super::*;
 
-/// A kernel, what it should do, how many workgroups do it, and how the results are compared: the state
-/// before, what was found, what was wanted.
+/// A kernel, its twin, its number of workgroups, and the comparison of their results. The comparison gets the state before,
+/// the found one and the wanted one.
 pub(super) struct Twin {
     pub(super) kernel: &'static Kernel,
     pub(super) run: fn(&mut State),
@@ -13,8 +13,13 @@ pub(super) struct Twin {
 
 /// The twins, in the order in which the kernels run.
 pub(super) static TWINS: [Twin; 17] = [
-    Twin { kernel: &shaders::SETTLE, run: settle, groups: by_known, compare: compare_motions },
-    Twin { kernel: &shaders::RENEW, run: renew, groups: by_change, compare: compare_motions },
+    Twin {
+        kernel: &shaders::STORE_PREVIOUS,
+        run: store_previous,
+        groups: by_known,
+        compare: compare_motions,
+    },
+    Twin { kernel: &shaders::APPLY_CHANGES, run: apply_changes, groups: by_change, compare: compare_motions },
     Twin { kernel: &shaders::LOCATE, run: locate, groups: by_box, compare: compare_located },
     Twin { kernel: &shaders::VISIT, run: visit, groups: by_box, compare: compare_cells },
     Twin { kernel: &shaders::SCAN_BLOCKS, run: scan_blocks, groups: by_block, compare: compare_blocks },
@@ -26,10 +31,15 @@ pub(super) static TWINS: [Twin; 17] = [
     Twin { kernel: &shaders::CHECK_SMALL, run: check_small, groups: by_small_item, compare: compare_checks },
     Twin { kernel: &shaders::CHECK_LARGE, run: check_large, groups: by_large_item, compare: compare_checks },
     Twin { kernel: &shaders::CHECK_ALL, run: check_all, groups: by_pair, compare: compare_checks },
-    Twin { kernel: &shaders::INDEX_PAIRS, run: index_pairs, groups: by_cell, compare: compare_indices },
-    Twin { kernel: &shaders::LAZY_PAIRS, run: lazy_pairs, groups: by_cell, compare: compare_out },
-    Twin { kernel: &shaders::ROW_ENDS, run: row_ends, groups: by_cell, compare: compare_indices },
-    Twin { kernel: &shaders::LAZY_ENDS, run: lazy_ends, groups: by_cell, compare: compare_out },
+    Twin {
+        kernel: &shaders::study::INDEX_PAIRS,
+        run: index_pairs,
+        groups: by_cell,
+        compare: compare_indices,
+    },
+    Twin { kernel: &shaders::study::LAZY_PAIRS, run: lazy_pairs, groups: by_cell, compare: compare_out },
+    Twin { kernel: &shaders::study::ROW_ENDS, run: row_ends, groups: by_cell, compare: compare_indices },
+    Twin { kernel: &shaders::study::LAZY_ENDS, run: lazy_ends, groups: by_cell, compare: compare_out },
 ];
 
 pub(super) fn twin(kernel: &str) -> &'static Twin {
@@ -66,7 +76,7 @@ pub(super) fn by_pair(s: &State) -> u32 {
 
 pub(super) fn locate(s: &mut State) {
     for id in 0..s.boxes.len() {
-        let one = s.reach(id);
+        let one = s.bounds(id);
         if one.low[0] > one.high[0] {
             s.located[id].level = NO_LEVEL;
             continue;
@@ -82,27 +92,27 @@ pub(super) fn locate(s: &mut State) {
     }
 }
 
-/// The float of an ordered integer.
+/// Returns the float of an ordered integer.
 pub(super) fn float_of(key: i32) -> f32 {
     let bits = if key < 0 { key ^ i32::MAX } else { key };
     f32::from_bits(bits as u32)
 }
 
 pub(super) fn finest_cell(params: &Params, key: i32, k: usize) -> i32 {
-    let x = float_of(key.clamp(params.reach_low[k], params.reach_high[k]));
+    let x = float_of(key.clamp(params.clamp_low[k], params.clamp_high[k]));
     let cell = ((x - params.origin[k]) * params.scale).floor();
     cell.clamp(-1073741760.0, 1073741760.0) as i32
 }
 
-/// The first level at which the box touches few cells on each axis, or the last.
+/// Returns the first level at which the box touches few cells on each axis, or the last level.
 pub(super) fn level_of(params: &Params, at: &Located) -> u32 {
     let steps = |l: &Level, k: usize| (at.high[k] >> l.shift) - (at.low[k] >> l.shift);
-    let fits = |l: &Level| (0..3).all(|k| l.dims[k] == 1 || steps(l, k) < MOST_SPAN as i32);
+    let fits = |l: &Level| (0..3).all(|k| l.dims[k] == 1 || steps(l, k) < MAX_SPAN as i32);
     let last = params.levels - 1;
     (0..last).find(|&level| fits(&params.level[level as usize])).unwrap_or(last)
 }
 
-/// The cells that a box touches at a level, each with the axes' bits of its entry there.
+/// Returns the cells that a box touches at a level, each with the axis bits of its entry.
 pub(super) fn cells_of(params: &Params, at: &Located, level: u32) -> Vec<(usize, u32)> {
     let l = params.level[level as usize];
     let range = |k: usize| if l.dims[k] == 1 { 0..=0 } else { at.low[k] >> l.shift..=at.high[k] >> l.shift };
@@ -161,7 +171,7 @@ pub(super) fn scan_sums(s: &mut State) {
     s.counters.entries = sum;
 }
 
-/// The counts of a cell become the ends of its residents and of its visitors behind them.
+/// Turns the counts of each cell into the ends of its residents and of its visitors behind them.
 pub(super) fn scan_add(s: &mut State) {
     for (i, (start, cell)) in s.starts.iter_mut().zip(&mut s.cells).enumerate() {
         *start += s.sums[i / CELLS_PER_BLOCK as usize];
@@ -170,7 +180,7 @@ pub(super) fn scan_add(s: &mut State) {
     }
 }
 
-/// The counts of a cell after scan_add.
+/// Returns the counts of a cell after scan_add.
 pub(super) fn counts_of(ends: &Cell, start: u32) -> Cell {
     Cell { residents: ends.residents - start, visitors: ends.visitors - ends.residents }
 }
@@ -196,7 +206,7 @@ pub(super) fn has_work(cell: &Cell) -> bool {
     cell.residents > 0 && entries_of(cell) > 1
 }
 
-/// The small cells of a block become slots, and their pairs items of LANES pairs.
+/// Turns the small cells of a block into slots, and their pairs into items of LANES pairs.
 pub(super) fn schedule_small(cells: &[(Cell, u32)], slots: &mut Vec<Slot>, items: &mut Vec<SmallItem>) {
     let base = slots.len();
     let mut pairs = 0;
@@ -218,8 +228,8 @@ pub(super) fn schedule_small(cells: &[(Cell, u32)], slots: &mut Vec<Slot>, items
     }
 }
 
-/// A large cell becomes items: each segment of rows with the segments of columns from its own on, cut
-/// at multiples of `wide`.
+/// Returns the items of a large cell: each segment of rows with the segments of columns from its own on, cut at multiples of
+/// `wide`.
 pub(super) fn large_items(cell: &Cell, start: u32, wide: u32) -> Vec<LargeItem> {
     let (boxes, residents) = (entries_of(cell), cell.residents);
     let columns = boxes.div_ceil(LANES);
@@ -234,12 +244,12 @@ pub(super) fn large_items(cell: &Cell, start: u32, wide: u32) -> Vec<LargeItem> 
 }
 
 pub(super) fn scatter(s: &mut State) {
-    if s.counters.entries > s.params.entry_room {
+    if s.counters.entries > s.params.entry_capacity {
         return;
     }
     for id in 0..s.located.len() {
         let at = s.located[id];
-        // For invalid boxes the range is empty.
+        // The range of an invalid box is empty.
         let own = own_level(&at);
         for level in own..s.params.levels {
             for (cell, axes) in cells_of(&s.params, &at, level) {
@@ -249,11 +259,11 @@ pub(super) fn scatter(s: &mut State) {
     }
 }
 
-/// Residents and visitors each from the end of their part of the cell, which moves down.
+/// Writes an entry at the end of the residents or visitors of a cell, and moves that end down.
 pub(super) fn place(s: &mut State, cell: usize, entry: u32, resident: bool) {
     let (ends, start) = (&mut s.cells[cell], s.starts[cell]);
     let end = if resident { &mut ends.residents } else { &mut ends.visitors };
-    // A cell without residents has counted no visitors: its ends are its start.
+    // A cell without residents has no visitors counted, so its ends are its start.
     if *end > start {
         *end -= 1;
         s.entries[*end as usize] = entry;
@@ -262,17 +272,17 @@ pub(super) fn place(s: &mut State, cell: usize, entry: u32, resident: bool) {
 
 pub(super) fn arrange(s: &mut State) {
     let (found, room) = (s.counters, s.params);
-    let fits = found.entries <= room.entry_room
-        && found.slots <= room.slot_room
-        && found.small_items <= room.small_room
-        && found.large_items <= room.large_room;
+    let fits = found.entries <= room.entry_capacity
+        && found.slots <= room.slot_capacity
+        && found.small_items <= room.small_capacity
+        && found.large_items <= room.large_capacity;
     let groups = |items: u32| if fits { [items.min(32_768), items.div_ceil(32_768)] } else { [0, 0] };
     let [x, y] = groups(found.small_items.min(s.chunk.small_items));
     let [u, v] = groups(found.large_items.min(s.chunk.large_items));
     s.dispatches = [x, y, 1, u, v, 1];
 }
 
-/// What a check has come to.
+/// The result of a check.
 #[derive(Default)]
 pub(super) struct Checked {
     pub(super) made: u64,
@@ -282,11 +292,11 @@ pub(super) struct Checked {
 }
 
 impl Checked {
-    /// Two entries of a cell.
+    /// Tests two entries of a cell.
     pub(super) fn test_entries(&mut self, s: &State, a: u32, b: u32) {
         let (i, j) = (box_of(a), box_of(b));
         let split = s.params.split;
-        if !is_due(s, a | b) || (split > 0 && (i < split) == (j < split)) {
+        if !may_be_wanted(s, a | b) || (split > 0 && (i < split) == (j < split)) {
             self.made += 1;
             self.redundant += 1;
         } else {
@@ -296,7 +306,7 @@ impl Checked {
 
     pub(super) fn test_boxes(&mut self, s: &State, i: u32, j: u32) {
         self.made += 1;
-        if !s.matter(i as usize, j as usize) {
+        if !s.is_wanted(i as usize, j as usize) {
             return;
         }
         self.overlaps += 1;
@@ -305,7 +315,7 @@ impl Checked {
         }
     }
 
-    /// Writes the result into the state, unless the limit of pairs had been passed before.
+    /// Writes the result into the state, unless the limit of pairs was passed before.
     pub(super) fn leave(self, s: &mut State) {
         if wide(s.totals.pairs) > wide(s.chunk.pairs_left) {
             return;
@@ -325,11 +335,11 @@ pub(super) fn box_of(entry: u32) -> u32 {
     entry & ((1 << BOX_BITS) - 1)
 }
 
-pub(super) fn overlap(a: &layout::Box, b: &layout::Box) -> bool {
+pub(super) fn overlap(a: &DeviceBox, b: &DeviceBox) -> bool {
     (0..3).all(|k| a.low[k] <= b.high[k] && b.low[k] <= a.high[k])
 }
 
-/// The items of a chunk.
+/// Returns the items of a chunk.
 pub(super) fn taken<T>(items: &[T], first: u32, count: u32) -> &[T] {
     let first = (first as usize).min(items.len());
     &items[first..(first + count as usize).min(items.len())]
@@ -361,10 +371,10 @@ pub(super) fn check_large_item(s: &State, item: &LargeItem, checked: &mut Checke
     let entry = |place: u32| s.entries[(item.start + place) as usize];
     let segments = |from: u32, to: u32| from * LANES..(to * LANES).min(item.boxes);
     let (rows, columns) = (segments(item.row, item.row + 1), segments(item.column, item.end_column));
-    // A cell that is nobody's lowest on some axis owns none of these pairs: they are not even tested. No
-    // more are they where nobody has moved.
+    // If the cell is the lowest of no box on some axis, it owns none of these pairs and tests none. The same holds if no
+    // box has moved.
     let marks = rows.clone().chain(columns.clone()).fold(0, |marks, place| marks | entry(place));
-    if !is_due(s, marks) {
+    if !may_be_wanted(s, marks) {
         return;
     }
     for i in rows.start..rows.end.min(item.residents) {

@@ -7,23 +7,21 @@ use rapier_pbig::PbigBroadPhase;
 #[derive(Clone, Copy)]
 pub(super) struct Kind {
     pub(super) config: Config,
-    pub(super) overlapped: bool,
 }
 
 impl From<Config> for Kind {
     fn from(config: Config) -> Self {
-        Self { config, overlapped: false }
+        Self { config }
     }
 }
 
 impl Kind {
     pub(super) fn pbig(self) -> PbigBroadPhase {
-        let pbig = PbigBroadPhase::with_config(self.config);
-        if self.overlapped { pbig.overlapped() } else { pbig }
+        PbigBroadPhase::with_config(self.config)
     }
 
     /// How far apart pairs may be.
     pub(super) fn margin(self) -> f32 {
-        if self.overlapped { f32::INFINITY } else { self.config.margin }
+        self.config.margin
     }
 }

@@ -157,23 +157,8 @@ fn spoil_at_all_times(mut world: Follower, which: usize, what: &str) {
         }
         world.update(&format!("{what}, round {round}"));
     }
-    spoil_between_halves(&mut world, &boxes, &bad, what);
     boxes.iter().enumerate().for_each(|(id, aabb)| world.set(id as u32, *aabb, ProxyFilter::ALL));
     world.update(&format!("{what}, mended"));
-}
-
-/// Good boxes that become bad ones, and bad ones that are mended, while a search for others is on its way.
-fn spoil_between_halves(world: &mut Follower, boxes: &[Aabb], bad: &dyn Fn(usize) -> Aabb, what: &str) {
-    for round in 0..3 {
-        boxes.iter().enumerate().for_each(|(id, aabb)| {
-            let there = super::shifted(aabb, [round as f32; 3]);
-            world.set(id as u32, if id % 5 == round { bad(id) } else { there }, ProxyFilter::ALL);
-        });
-        let news = |id: usize| if id % 5 == round { boxes[id] } else { bad(id) };
-        let news = (round..60).step_by(3).map(|id| (id as u32, news(id), ProxyFilter::ALL));
-        world.update_while_set(&news.collect::<Vec<_>>(), &format!("{what}, half {round}"));
-        world.update(&format!("{what}, after half {round}"));
-    }
 }
 
 #[test]

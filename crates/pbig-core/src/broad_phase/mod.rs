@@ -4,6 +4,8 @@
 //! set, remove ─► world ─► policy ─► sweep, edit, or rebuild and compare ─► kept pairs ─► events
 //! ```
 
+#[cfg(feature = "gpu")]
+mod device;
 mod edit;
 mod query;
 mod set_many;
@@ -17,6 +19,7 @@ mod world;
 
 use crate::all_pairs::AllPairs;
 use crate::finder::check_count;
+use crate::gpu_slot::GpuSlot;
 use crate::grid::EditedGrid;
 use crate::pairs::{Comparison, Groups, Kept};
 use crate::report::Report;
@@ -59,6 +62,9 @@ pub struct Events {
 #[derive(Clone, Debug, Default)]
 pub struct BroadPhase {
     config: Config,
+    gpu: GpuSlot,
+    /// Updates that have changed something.
+    updates: u64,
     world: World,
     grid: EditedGrid,
     /// True if the grid holds the boxes of the last update.
@@ -80,7 +86,9 @@ impl BroadPhase {
     /// [`Error::Margin`].
     pub fn new(config: Config) -> Result<Self, Error> {
         check_margin(config.margin)?;
-        Ok(Self { config, ..Self::default() })
+        let mut broad_phase = Self { config, ..Self::default() };
+        broad_phase.world.keep_old = broad_phase.old_to_keep();
+        Ok(broad_phase)
     }
 
     /// Changes the margin for boxes that are set from now on.
@@ -138,7 +146,9 @@ impl BroadPhase {
 
     /// Removes all boxes; their pairs end without an event.
     pub fn clear(&mut self) {
-        *self = Self { config: self.config, ..Self::default() };
+        let (gpu, updates) = (std::mem::take(&mut self.gpu), self.updates + 2);
+        *self = Self { config: self.config, gpu, updates, ..Self::default() };
+        self.world.keep_old = self.old_to_keep();
     }
 
     /// Gives back the memory that the boxes and pairs at hand do not need.

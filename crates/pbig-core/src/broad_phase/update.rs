@@ -19,8 +19,7 @@ impl BroadPhase {
             self.kept.reserve_ids(self.world.ids());
             let done = self.find_events();
             if let Err(error) = done {
-                self.has_grid = false;
-                self.sweep.expire();
+                self.fail();
                 return Err(error);
             }
             self.finish();
@@ -30,6 +29,19 @@ impl BroadPhase {
     }
 
     fn find_events(&mut self) -> Result<(), Error> {
+        #[cfg(feature = "gpu")]
+        if self.find_on_gpu()? {
+            return self.apply_events();
+        }
+        #[cfg(not(feature = "gpu"))]
+        self.gpu.is_wanted(&self.config, self.world.changed.len(), &mut self.report);
+        let no_gpu = self.report.plan.no_gpu;
+        let found = self.find_on_cpu();
+        self.report.plan.no_gpu = no_gpu;
+        found
+    }
+
+    fn find_on_cpu(&mut self) -> Result<(), Error> {
         match self.engine() {
             Engine::Sweep => self.run_sweep(),
             Engine::Edit => self.run_edit(),
@@ -118,13 +130,33 @@ impl BroadPhase {
         Ok(())
     }
 
+    /// Makes the next update begin with nothing but the boxes and the kept pairs.
+    fn fail(&mut self) {
+        self.has_grid = false;
+        self.sweep.expire();
+        self.report.pairs = self.kept.len() as u64;
+        #[cfg(feature = "gpu")]
+        if let Some(gpu) = &mut self.gpu.gpu {
+            gpu.forget_changes();
+        }
+    }
+
     /// Hands the events over, and forgets the changes.
     fn finish(&mut self) {
         std::mem::swap(&mut self.events.added, &mut self.comparison.added);
         std::mem::swap(&mut self.events.removed, &mut self.comparison.removed);
         self.world.forget_changes();
-        let (boxes, ids) = (self.world.present() as usize, self.world.ids());
-        self.world.keep_old = policy::old_states_to_keep(boxes, ids, self.config.forced_engine());
+        self.world.keep_old = self.old_to_keep();
+        self.updates += 1;
+    }
+
+    /// Returns of how many boxes the next update wants to know what they were.
+    pub(super) fn old_to_keep(&self) -> usize {
+        #[cfg(feature = "gpu")]
+        if self.may_use_gpu() {
+            return usize::MAX;
+        }
+        policy::old_states_to_keep(self.len(), self.world.ids(), self.config.forced_engine())
     }
 
     /// Begins a report of nothing done yet.
@@ -136,5 +168,10 @@ impl BroadPhase {
         report.invalid = present - u64::from(self.world.valid());
         report.changed = self.world.changed.len() as u64;
         report.plan = Plan { boxes: self.world.valid(), ..Plan::default() };
+        report.gpu = None;
+        // A backend that was asked for stays unavailable until a call on it succeeds.
+        if self.config.backend != Backend::Gpu {
+            report.fallback = None;
+        }
     }
 }

@@ -1,12 +1,13 @@
-//! Which adapter, and a device on it.
+//! The choice of an adapter, and opening a device on it.
 
 use super::GpuError;
 
-/// What pbig uses where an adapter has it.
+/// Features that pbig uses if the adapter has them.
 const WANTED: wgpu::Features = wgpu::Features::SUBGROUP.union(wgpu::Features::TIMESTAMP_QUERY);
 
-/// All adapters, best first: discrete, integrated, virtual, unknown, software. `WGPU_BACKEND` and the
-/// other variables of wgpu apply; with `WGPU_POWER_PREF=low` integrated ones come first.
+/// Returns all adapters, best first: discrete, integrated, virtual, unknown, software.
+///
+/// `WGPU_BACKEND` and wgpu's other variables apply. With `WGPU_POWER_PREF=low` integrated adapters come first.
 pub fn adapters() -> Vec<wgpu::Adapter> {
     let instance = wgpu::Instance::new(wgpu::InstanceDescriptor::new_without_display_handle_from_env());
     let backends = wgpu::Backends::from_env().unwrap_or(wgpu::Backends::all());
@@ -26,8 +27,8 @@ fn rank(kind: wgpu::DeviceType, low_power: bool) -> u32 {
     }
 }
 
-/// The adapter of the given name, or that of `WGPU_ADAPTER_NAME`, or the best. A part of the name is
-/// enough, in any case.
+/// Returns the adapter of the given name, or of `WGPU_ADAPTER_NAME`, or the best. A part of the name is enough, in any
+/// case.
 pub(super) fn choose(name: Option<&str>) -> Result<wgpu::Adapter, GpuError> {
     if let Some(value) = unknown_api() {
         return Err(GpuError::UnknownApi { value });
@@ -46,13 +47,13 @@ pub(super) fn choose(name: Option<&str>) -> Result<wgpu::Adapter, GpuError> {
     all.iter().find(|a| matches(a)).cloned().ok_or_else(none)
 }
 
-/// `WGPU_BACKEND`, when wgpu knows nothing of what it names.
+/// Returns the value of `WGPU_BACKEND` if it names no API that wgpu knows.
 fn unknown_api() -> Option<String> {
     let value = std::env::var("WGPU_BACKEND").ok()?;
     wgpu::Backends::from_comma_list(&value).is_empty().then_some(value)
 }
 
-/// A device with all that the adapter allows of what pbig uses.
+/// Opens a device with the adapter's limits, and the features that pbig uses.
 pub(super) fn open(adapter: &wgpu::Adapter) -> Result<(wgpu::Device, wgpu::Queue), GpuError> {
     let descriptor = wgpu::DeviceDescriptor {
         label: Some("pbig"),
@@ -68,7 +69,7 @@ pub(super) fn open(adapter: &wgpu::Adapter) -> Result<(wgpu::Device, wgpu::Queue
     pollster::block_on(adapter.request_device(&descriptor)).map_err(failed)
 }
 
-/// An adapter in words, as reports name it: name, kind and API.
+/// Returns an adapter's name, kind and API, as reports show them.
 pub fn describe(info: &wgpu::AdapterInfo) -> String {
     let kind = match info.device_type {
         wgpu::DeviceType::Cpu => "software",

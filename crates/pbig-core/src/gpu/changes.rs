@@ -1,87 +1,82 @@
-//! Changes: instead of all pairs, those that came or went since the last update.
+//! The search for changes: instead of all pairs, it finds those that an update adds or removes.
 //!
-//! The device keeps of each box what it is and what it was (`shaders/shared/changes.wgsl`). What it is
-//! becomes what it was, the changed boxes go up, and one search over the cells that boxes reach, now or
-//! before, emits each pair that overlaps now and did not before, or the other way round. So what is
-//! transferred, in either direction, follows what changed.
+//! The device has each box now and at the last update (`shaders/shared/search_changes.wgsl`). An update stores the boxes as
+//! those of the last update and applies the changed boxes. One search then goes over the cells that each box touches, now
+//! or before, and emits every pair that overlaps now and did not before, or the other way round. So transfers in both
+//! directions are proportional to the number of changes.
 
-use super::search::{Started, Task, search, start};
+use super::search::{Task, search};
 use super::upload::{PIECE, follows};
-use super::{Failure, GpuError, GpuFinder};
-use crate::cpu::found::Found;
-use crate::layout::{ANEW, Box as DeviceBox, Motion, Move, Refilter};
-use crate::plan::Summary;
-use crate::report::Report;
+use super::{Failure, GpuFinder, GpuFound};
+use crate::layout::{BoxChange, DeviceBox, FilterChange, Motion, WAS_ABSENT};
 use crate::{Aabb, Config, Error, ProxyFilter};
 use rayon::prelude::*;
 use std::ops::Range;
 
-/// What a changed box was at the last update.
+/// A changed box as it was at the last update.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Change {
-    /// The box.
+    /// Id of the box.
     pub id: u32,
-    /// Where it was. [`Aabb::NOWHERE`]: it was not there, or the caller knows that its pairs have ended.
+    /// The box at the last update. [`Aabb::NOWHERE`] if it was absent, or if the caller has ended its pairs already.
     pub aabb: Aabb,
-    /// Its filter.
+    /// The filter at the last update.
     pub filter: ProxyFilter,
 }
 
-/// What has changed since the last update.
+/// The changes since the last update.
 #[derive(Clone, Copy, Debug)]
 pub struct ChangeRequest<'a> {
-    /// All boxes as they are, by id; [`Aabb::NOWHERE`] where there is none.
+    /// All boxes now, by id; [`Aabb::NOWHERE`] where there is none.
     pub boxes: &'a [Aabb],
-    /// Their filters.
+    /// Filters now, by id.
     pub filters: &'a [ProxyFilter],
-    /// Boxes that have changed, each once. All others are as they were, new ids nowhere.
+    /// The changed boxes, each once. All others are as at the last update; new ids were absent.
     pub changed: &'a [Change],
-    /// The number of this update, one more with each that was completed, by whatever backend: a device that
-    /// has not seen the one before is told everything again.
+    /// Number of this update: one more with each completed update, on any backend. A device that has not seen the last
+    /// update gets all boxes.
     pub update: u64,
-    /// Pairs that exist: as many may end without any being too many.
+    /// Number of pairs at the last update. As many may end without counting against the limit.
     pub kept: u64,
-    /// The settings.
+    /// The settings. The limit of pairs counts added pairs here; the caller counts all.
     pub config: &'a Config,
 }
 
 impl ChangeRequest<'_> {
-    /// Whether a box is searched as if it had not been there before. The cells between where it was and
-    /// where it is could be all there are, so one that has left its old box altogether begins anew, and
-    /// no box reaches further than what it is and what it was are long together. With another filter it
-    /// does too, so that the device needs one filter a box.
-    fn restarts(&self, change: &Change) -> bool {
+    /// Returns true if the device treats a changed box as new.
+    ///
+    /// - The box has left its old place. Otherwise the cells between both places could be all there are; so no box
+    ///   reaches further than the lengths of its old and its new box together.
+    /// - Its filter has changed. The device stores one filter per box.
+    fn is_restarted(&self, change: &Change) -> bool {
         let (now, filter) = (&self.boxes[change.id as usize], &self.filters[change.id as usize]);
-        let gone = now.is_valid() && !now.overlaps(&change.aabb);
-        change.aabb.is_valid() && (gone || *filter != change.filter)
+        let has_left = now.is_valid() && !now.overlaps(&change.aabb);
+        change.aabb.is_valid() && (has_left || *filter != change.filter)
     }
 
-    /// What the device takes a changed box to have been.
+    /// Returns a changed box at the last update, as the device stores it.
     fn before(&self, change: &Change) -> Aabb {
-        if self.restarts(change) { Aabb::NOWHERE } else { change.aabb }
+        if self.is_restarted(change) { Aabb::NOWHERE } else { change.aabb }
     }
 
-    /// Boxes that begin anew although they had pairs.
+    /// Returns the ids of the boxes that the device treats as new.
     fn restarted(&self) -> Vec<u32> {
         let changed = self.changed.par_iter().with_min_len(PIECE);
-        changed.filter(|change| self.restarts(change)).map(|change| change.id).collect()
+        changed.filter(|change| self.is_restarted(change)).map(|change| change.id).collect()
     }
 
-    /// The search for what has changed.
-    fn task<'a>(&'a self, trail: &'a Trail, summary: &'a Summary) -> Task<'a> {
+    fn task<'a>(&'a self, bounds: &'a MotionBounds) -> Task<'a> {
         Task {
-            boxes: &trail.reach,
+            boxes: &bounds.boxes,
             filters: Some(self.filters),
             changes: Some(self),
-            accept: None,
-            // More than this and more were added than there may be pairs: what ended had been kept.
+            // Removed pairs were kept. So with more changes than this, more pairs were added than there may be.
             limit: self.config.limits.max_pairs.saturating_add(self.kept),
-            summary,
-            config: self.config,
+            options: &self.config.gpu,
         }
     }
 
-    /// What boxes are and were, for a device that does not know them.
+    /// Returns boxes now and before, for a device that does not have them.
     pub(super) fn motions(&self, ids: Range<usize>) -> Vec<Motion> {
         let at_rest = |now: DeviceBox| Motion { now, before: now };
         let boxes = self.boxes[ids.clone()].iter();
@@ -92,134 +87,90 @@ impl ChangeRequest<'_> {
         motions
     }
 
-    /// What has changed of the first `known` boxes, for a device that knows what they were.
-    pub(super) fn lists(&self, known: usize) -> (Vec<Move>, Vec<Refilter>) {
+    /// Returns the changes of the first `known` boxes, for a device that has these boxes at the last update.
+    pub(super) fn lists(&self, known: usize) -> (Vec<BoxChange>, Vec<FilterChange>) {
         let changed = self.changed.par_iter().with_min_len(PIECE);
         let changed = changed.filter(|change| (change.id as usize) < known);
-        let moves = changed.clone().map(|change| self.as_move(change)).collect();
-        (moves, changed.filter_map(|change| self.as_refilter(change)).collect())
+        let boxes = changed.clone().map(|change| self.box_change(change)).collect();
+        (boxes, changed.filter_map(|change| self.filter_change(change)).collect())
     }
 
-    fn as_move(&self, change: &Change) -> Move {
-        let mark = if self.before(change).is_valid() { 0 } else { ANEW };
-        Move { place: change.id | mark, now: DeviceBox::new(&self.boxes[change.id as usize]) }
+    fn box_change(&self, change: &Change) -> BoxChange {
+        let mark = if self.before(change).is_valid() { 0 } else { WAS_ABSENT };
+        BoxChange { marked_id: change.id | mark, now: DeviceBox::new(&self.boxes[change.id as usize]) }
     }
 
-    /// The new filter, if the device may have another and it matters.
-    fn as_refilter(&self, change: &Change) -> Option<Refilter> {
+    /// Returns the new filter, if the device may have another one and the box is valid.
+    fn filter_change(&self, change: &Change) -> Option<FilterChange> {
         let (now, filter) = (&self.boxes[change.id as usize], self.filters[change.id as usize]);
-        // Of a box that was not there before nobody says which filter the device has.
-        let new = filter != change.filter || !change.aabb.is_valid();
-        (new && now.is_valid()).then_some(Refilter { id: change.id, filter })
+        // The filter that the device has for an absent box is unknown.
+        let may_differ = filter != change.filter || !change.aabb.is_valid();
+        (may_differ && now.is_valid()).then_some(FilterChange { id: change.id, filter })
     }
 }
 
-/// Where each box is or was at the last update: what a search for changes is planned for.
+/// The bounds of each box now and at the last update. The search for changes is planned for them.
 #[derive(Debug, Default)]
-pub(super) struct Trail {
+pub(super) struct MotionBounds {
     update: Option<u64>,
-    reach: Vec<Aabb>,
+    boxes: Vec<Aabb>,
     moved: Vec<u32>,
 }
 
-impl Trail {
-    /// Brings the trail to an update, in time proportional to what moves if it knows the one before.
+impl MotionBounds {
+    /// Brings the bounds to an update. If they are those of the last update, the time is proportional to the changes.
     fn follow(&mut self, request: &ChangeRequest<'_>) {
         let boxes = request.boxes;
-        self.reach.truncate(if follows(self.update, request.update) { boxes.len() } else { 0 });
+        self.boxes.truncate(if follows(self.update, request.update) { boxes.len() } else { 0 });
         for id in self.moved.drain(..) {
-            if let Some(reach) = self.reach.get_mut(id as usize) {
-                *reach = boxes[id as usize];
+            if let Some(bounds) = self.boxes.get_mut(id as usize) {
+                *bounds = boxes[id as usize];
             }
         }
-        self.reach.extend_from_slice(&boxes[self.reach.len()..]);
-        let reach = |change: &Change| boxes[change.id as usize].union(&request.before(change));
+        self.boxes.extend_from_slice(&boxes[self.boxes.len()..]);
+        let bounds = |change: &Change| boxes[change.id as usize].union(&request.before(change));
         let changed = request.changed.par_iter().with_min_len(PIECE);
-        for (change, reach) in request.changed.iter().zip(changed.map(reach).collect::<Vec<_>>()) {
-            self.reach[change.id as usize] = reach;
+        for (change, bounds) in request.changed.iter().zip(changed.map(bounds).collect::<Vec<_>>()) {
+            self.boxes[change.id as usize] = bounds;
             self.moved.push(change.id);
         }
         self.update = Some(request.update);
     }
 }
 
-/// A search for changes that has begun: its boxes, and what the device was given if it takes one submission.
-#[derive(Debug)]
-pub(super) struct Ahead {
-    trail: Trail,
-    summary: Summary,
-    started: Option<Started>,
-}
-
 impl GpuFinder {
-    /// Has the device begin to search for changes, and does not wait for it. What fails is told by
-    /// [`GpuFinder::changes`], which must be given the same request.
-    pub(crate) fn begin_changes(&mut self, request: &ChangeRequest<'_>) {
-        let ahead = self.start_changes(request);
-        self.ahead = Some(ahead);
+    /// Finds the pairs that the filters allow and that overlap now and did not at the last update, or the other way
+    /// round. The boxes tell which of the two.
+    ///
+    /// The device treats the boxes in [`GpuFound::restarted`] as new. So the caller completes the answer for them:
+    ///
+    /// - a kept pair that no longer holds has ended, and is not in the result;
+    /// - a kept pair that still holds is in the result like a new one, and must not be added again.
+    ///
+    /// After an error the next call uploads all boxes, so nothing is missed.
+    pub(crate) fn changes(&mut self, request: &ChangeRequest<'_>) -> Result<GpuFound, Failure> {
+        let result = self.try_changes(request);
+        result.inspect_err(|failure| self.fail(failure))
     }
 
-    /// Into `found`, once each and in no order, the pairs that filters allow and that overlap now and did
-    /// not at the last update, or the other way round: which of the two the boxes tell. Returns the boxes
-    /// that began anew, for which the caller completes the answer:
-    ///
-    /// - a kept pair of one that no longer holds has ended, and is not in `found`;
-    /// - one that still holds is in `found` like a new one, and is not to be added again.
-    ///
-    /// Whatever fails, the next call begins with everything, so that nothing is missed.
-    pub(crate) fn changes(
-        &mut self,
-        request: &ChangeRequest<'_>,
-        found: &mut Found,
-        report: &mut Report,
-    ) -> Result<Vec<u32>, Failure> {
-        found.clear();
-        let ahead = self.ahead.take().unwrap_or_else(|| self.start_changes(request));
-        let result = ahead.and_then(|ahead| self.complete_changes(ahead, request, found, report));
-        if let Err(failure) = &result {
-            self.fail(failure, found);
-        }
-        result.map(|()| request.restarted())
-    }
-
-    fn start_changes(&mut self, request: &ChangeRequest<'_>) -> Result<Ahead, Failure> {
+    fn try_changes(&mut self, request: &ChangeRequest<'_>) -> Result<GpuFound, Failure> {
         self.check_pause(request.config)?;
-        let crowding = self.crowding;
+        let cell_factor = self.cell_factor;
         let session = self.session(&request.config.gpu)?;
-        let engine = session.engine.clone();
-        // It comes back with success only.
-        let mut trail = std::mem::take(&mut session.trail);
-        trail.follow(request);
-        let summary = Summary::of(&trail.reach, None);
-        let task = request.task(&trail, &summary);
-        let started = engine.watch(|| start(session, &task, crowding))?;
-        Ok(Ahead { trail, summary, started })
-    }
-
-    fn complete_changes(
-        &mut self,
-        ahead: Ahead,
-        request: &ChangeRequest<'_>,
-        found: &mut Found,
-        report: &mut Report,
-    ) -> Result<(), Failure> {
-        let crowding = self.crowding;
-        let Ahead { trail, summary, started } = ahead;
-        // The very session that has begun: one on another device knows nothing of it.
-        let session = self.session.as_mut().map(|(_, session)| session);
-        let session = session.filter(|session| !session.engine.is_lost()).ok_or(GpuError::Lost)?;
-        let engine = session.engine.clone();
-        let task = request.task(&trail, &summary);
-        let searched = engine.watch(|| search(session, &task, crowding, started, found));
-        let searched = searched.map_err(|failure| with_limit(failure, request.config.limits.max_pairs))?;
-        session.trail = trail;
+        let device = session.device.clone();
+        // After an error the bounds stay empty.
+        let mut bounds = std::mem::take(&mut session.motion_bounds);
+        bounds.follow(request);
+        let found = device.watch(|| search(session, &request.task(&bounds), cell_factor));
+        let found = found.map_err(|failure| with_limit(failure, request.config.limits.max_pairs))?;
+        session.motion_bounds = bounds;
         session.end_call();
-        self.finish(searched, request.boxes.len() as u64 + request.kept, report);
-        Ok(())
+        self.succeed(&found, request.boxes.len() as u64 + request.kept);
+        Ok(GpuFound { restarted: request.restarted(), ..found })
     }
 }
 
-/// Too many pairs are too many for what the caller has set.
+/// Returns a failure with the caller's limit of pairs, instead of the larger one that the device got.
 fn with_limit(failure: Failure, limit: u64) -> Failure {
     match failure {
         Failure::Call(Error::TooManyPairs { .. }) => Failure::Call(Error::TooManyPairs { limit }),

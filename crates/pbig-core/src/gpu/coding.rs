@@ -1,35 +1,38 @@
-//! Records or plain pairs, whichever are smaller (PBIG equation 9).
+//! The choice between records and plain pairs by their size (PBIG equation 9).
 
 use crate::config::Coding;
 
-/// Whether records would be smaller than plain pairs, by what the calls before have shown.
+/// Chooses the smaller coding of the output by the sizes in earlier calls.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct CodingChoice {
-    /// Pairs of the last chunk.
+    /// Number of pairs of the last chunk.
     pub(super) pairs: u64,
-    packed: bool,
-    /// Calls until records are tried again after they turned out larger.
+    is_packed: bool,
+    /// Number of calls until records are tried again, after they were larger.
     wait: u32,
 }
 
 impl CodingChoice {
+    /// Returns true if the next call should write records.
     pub(super) fn packed(&self, wanted: Coding) -> bool {
         match wanted {
-            Coding::Auto => self.packed,
+            Coding::Auto => self.is_packed,
             coding => coding == Coding::Packed,
         }
     }
 
-    /// Records need the entries for decoding, 4 bytes each, and take a quarter of 8 bytes a pair where
-    /// pairs share rows, up to half of it where they do not.
+    /// Notes the sizes of a call.
+    ///
+    /// Decoding records needs the entries, 4 bytes each. Records take 2 bytes a pair if pairs share rows, and up to 4
+    /// if they do not; plain pairs take 8.
     pub(super) fn learn(&mut self, packed: bool, pairs: u64, words: u64, entries: u32) {
         let (plain, table) = (8 * pairs, 4 * u64::from(entries));
         self.wait = self.wait.saturating_sub(1);
         if packed {
-            self.packed = 4 * words + table < plain;
-            self.wait = if self.packed { 0 } else { 64 };
+            self.is_packed = 4 * words + table < plain;
+            self.wait = if self.is_packed { 0 } else { 64 };
         } else {
-            self.packed = self.wait == 0 && plain / 2 + table < plain;
+            self.is_packed = self.wait == 0 && plain / 2 + table < plain;
         }
     }
 }

@@ -1,43 +1,43 @@
-//! What can go wrong with a device. None of it reaches a caller of [`crate::Finder`]: the call
-//! finishes on the CPU, and the report says why.
+//! Errors of a device. None of them reaches a caller of [`crate::Finder`]: the call finishes on the CPU, and the report
+//! says why.
 
 use crate::Error;
 use crate::decode::DecodeError;
 
-/// Why a device could not do the work.
+/// Reason why a device could not do the work.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum GpuError {
-    /// No adapter, or none of the wanted name.
-    #[error("no GPU adapter{wanted}; there are: {found}")]
+    /// There is no adapter, or none of the wanted name.
+    #[error("no GPU adapter{wanted}; found: {found}")]
     NoAdapter {
-        /// The name asked for, in words.
+        /// The wanted name, in words.
         wanted: String,
         /// The adapters that exist.
         found: String,
     },
-    /// `WGPU_BACKEND` is set, and names nothing that wgpu knows: no adapter is looked for.
+    /// `WGPU_BACKEND` names no API that wgpu knows, so no adapter is looked for.
     #[error("no GPU adapter: WGPU_BACKEND={value:?} names no API (known: vulkan, metal, dx12, gl)")]
     UnknownApi {
-        /// What it is set to.
+        /// The value of the variable.
         value: String,
     },
-    /// The adapter gave no device.
-    #[error("the adapter {adapter} gave no device: {why}")]
+    /// The adapter refused to open a device.
+    #[error("the adapter {adapter} opened no device: {why}")]
     NoDevice {
         /// The adapter.
         adapter: String,
-        /// What it said.
+        /// The adapter's message.
         why: String,
     },
-    /// The device's limits are below those that every WebGPU device has.
+    /// A limit of the device is below that of every WebGPU device.
     #[error("the device allows {found} {what}, but {needed} are needed")]
     TooLimited {
-        /// Which limit.
+        /// The limit's name.
         what: &'static str,
-        /// What the device has.
+        /// The device's value.
         found: u64,
-        /// What pbig needs.
+        /// The value that pbig needs.
         needed: u64,
     },
     /// The device was lost, before or during the call.
@@ -50,41 +50,39 @@ pub enum GpuError {
     #[error("out of device memory")]
     OutOfMemory,
     /// wgpu refused a shader or a command.
-    #[error("refused: {0}")]
+    #[error("refused by wgpu: {0}")]
     Refused(String),
     /// A buffer would be larger than a limit allows, and the work cannot be split further.
-    #[error(
-        "{bytes} bytes for {what} are more than the {limit} that the device or GpuOptions::max_bytes allows"
-    )]
+    #[error("{what}: {bytes} bytes are needed, but the device or GpuOptions::max_bytes allows {limit}")]
     TooLarge {
-        /// Which buffer.
+        /// The buffer's name.
         what: &'static str,
-        /// Its size.
+        /// The needed size, in bytes.
         bytes: u64,
-        /// The limit.
+        /// The limit, in bytes.
         limit: u64,
     },
-    /// The device returned words that are no pairs.
+    /// The device returned words that break the pair format.
     #[error(transparent)]
     Decode(#[from] DecodeError),
-    /// The device failed a short while ago.
+    /// The device failed a short while ago, and calls wait before they try it again.
     #[error("the device failed {ago:?} ago ({why}); it is tried again after {pause:?}")]
     Paused {
-        /// When.
+        /// Time since the failure.
         ago: std::time::Duration,
-        /// How.
+        /// The failure.
         why: String,
         /// See [`crate::GpuOptions::pause`].
         pause: std::time::Duration,
     },
 }
 
-/// Why a search on a device ended early.
+/// Reason why a search on a device ended early.
 #[derive(Debug, PartialEq)]
 pub(crate) enum Failure {
-    /// The call is at an end: the CPU would say the same.
+    /// The call fails: the CPU would end in the same error.
     Call(Error),
-    /// The CPU can do what the device could not.
+    /// The device failed, and the CPU can do the work.
     Device(GpuError),
 }
 

@@ -1,59 +1,61 @@
-//! Map and schedule: from boxes to work items, without a round trip to the host.
+//! Map and schedule: turn boxes into work items, without a round trip to the host.
 
 use super::GpuError;
 use super::commands::{Commands, Groups};
-use super::engine::Engine;
-use super::storage::Storage;
+use super::device::GpuDevice;
+use super::storage::{BufferId, Storage};
 use crate::layout::{CELLS_PER_BLOCK, Cell, Counters, LANES, LargeItem, Located, Params, Slot, SmallItem};
-use pbig_shaders as shaders;
+use pbig_shaders::{self as shaders, Buffer};
 
-/// How much room the lists get whose length only the device finds out; what the last call needed.
+/// Capacities of the lists whose lengths the device finds out.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub(super) struct Room {
+pub(super) struct Capacities {
+    /// Lengths of the lists in the last call.
     pub(super) needed: Counters,
 }
 
-impl Room {
-    /// Makes room, and says in `params` how much there is.
-    pub(super) fn make(
+impl Capacities {
+    /// Makes the buffers of the map, and writes the capacities of the lists into `params`.
+    pub(super) fn make_buffers(
         &self,
-        engine: &Engine,
+        device: &GpuDevice,
         storage: &mut Storage,
         params: &mut Params,
         first_bytes: u64,
     ) -> Result<(), GpuError> {
         let of = |n: u32, size: usize| u64::from(n) * size as u64;
-        storage.ensure(engine, "located", of(params.boxes, size_of::<Located>()))?;
-        storage.ensure(engine, "cells", of(params.cells, size_of::<Cell>()))?;
-        storage.ensure(engine, "starts", of(params.cells, 4))?;
-        storage.ensure(engine, "sums", of(params.cells.div_ceil(CELLS_PER_BLOCK), 4))?;
-        storage.ensure(engine, "counters", size_of::<Counters>() as u64)?;
-        storage.ensure(engine, "dispatches", 24)?;
+        storage.ensure_bound(device, Buffer::Located, of(params.boxes, size_of::<Located>()))?;
+        storage.ensure_bound(device, Buffer::Cells, of(params.cells, size_of::<Cell>()))?;
+        storage.ensure_bound(device, Buffer::Starts, of(params.cells, 4))?;
+        storage.ensure_bound(device, Buffer::Sums, of(params.cells.div_ceil(CELLS_PER_BLOCK), 4))?;
+        storage.ensure_bound(device, Buffer::Counters, size_of::<Counters>() as u64)?;
+        storage.ensure_bound(device, Buffer::Dispatches, 24)?;
         let needed = self.needed;
-        let mut list = |name, n: u32, size: usize| {
-            let bytes = of(n, size).max(first_bytes.min(storage.most_bytes()));
-            storage.ensure(engine, name, bytes)?;
-            Ok::<u32, GpuError>((storage.size(name) / size as u64).min(u64::from(u32::MAX)) as u32)
+        let mut list = |buffer, n: u32, size: usize| {
+            let bytes = of(n, size).max(first_bytes.min(storage.max_buffer_bytes()));
+            storage.ensure_bound(device, buffer, bytes)?;
+            let capacity = storage.size(BufferId::Bound(buffer)) / size as u64;
+            Ok::<u32, GpuError>(capacity.min(u64::from(u32::MAX)) as u32)
         };
-        params.entry_room = list("entries", needed.entries, 4)?;
-        params.slot_room = list("slots", needed.slots, size_of::<Slot>())?;
-        params.small_room = list("small_items", needed.small_items, size_of::<SmallItem>())?;
-        params.large_room = list("large_items", needed.large_items, size_of::<LargeItem>())?;
+        params.entry_capacity = list(Buffer::Entries, needed.entries, 4)?;
+        params.slot_capacity = list(Buffer::Slots, needed.slots, size_of::<Slot>())?;
+        params.small_capacity = list(Buffer::SmallItems, needed.small_items, size_of::<SmallItem>())?;
+        params.large_capacity = list(Buffer::LargeItems, needed.large_items, size_of::<LargeItem>())?;
         Ok(())
     }
 
-    /// Whether all that was found had room.
-    pub(super) fn held(params: &Params, found: Counters) -> bool {
-        found.entries <= params.entry_room
-            && found.slots <= params.slot_room
-            && found.small_items <= params.small_room
-            && found.large_items <= params.large_room
+    /// Returns true if all lists fitted into their buffers.
+    pub(super) fn sufficed(params: &Params, found: Counters) -> bool {
+        found.entries <= params.entry_capacity
+            && found.slots <= params.slot_capacity
+            && found.small_items <= params.small_capacity
+            && found.large_items <= params.large_capacity
     }
 }
 
 /// Records all kernels of the map and the schedule.
 pub(super) fn record(commands: &mut Commands<'_>, params: &Params) -> Result<(), GpuError> {
-    let (cells, counters) = (commands.storage.get("cells"), commands.storage.get("counters"));
+    let (cells, counters) = (commands.buffer(Buffer::Cells), commands.buffer(Buffer::Counters));
     let used = u64::from(params.cells) * size_of::<Cell>() as u64;
     commands.encoder.clear_buffer(cells, 0, Some(used));
     commands.encoder.clear_buffer(counters, 0, None);

@@ -1,17 +1,23 @@
-//! The GPU backend: PBIG's pipeline in WGSL, on any device that wgpu knows.
+//! The GPU backend: PBIG's pipeline in WGSL, on any device that wgpu supports.
 //!
 //! ```text
 //! upload ─► locate ─► visit ─► scan ─► schedule ─► scatter ─► arrange ─► check small, large ─► readback ─► decode
 //! ```
 //!
-//! All of it is one submission and one wait, unless there is more work or output than fits in one
-//! chunk. `session` is that call; `map` and `readback` record its ends; `engine` owns the device,
-//! `storage` its buffers, `upload` what changed; `parts` splits sets that exceed the device's limits;
-//! `changes` asks for the pairs that came or went instead of all.
-//! The kernels are in the crate `pbig-shaders`, which buffers hold what in [`crate::layout`].
+//! A call is one submission and one wait, unless there is more work or output than fits in one chunk.
 //!
-//! Most callers set [`crate::Backend::Gpu`] and need nothing from here. An app that has a wgpu device
-//! hands it over:
+//! | file | content |
+//! | --- | --- |
+//! | `device`, `adapter` | the device and its pipelines, shared by finders |
+//! | `session`, `storage`, `upload` | the state of one finder on a device: buffers, and what they hold |
+//! | `search`, `parts` | a call: all boxes at once, or parts of a set that exceeds the device's limits |
+//! | `start`, `map`, `chunk`, `readback` | a submission: recording, submitting, waiting, decoding |
+//! | `changes` | the search for pairs that an update added or removed |
+//! | `plan`, `levels` | the choice of levels and cells |
+//!
+//! The kernels are in the crate `pbig-shaders`. The module `layout` has the structs that their buffers hold.
+//!
+//! Most callers set [`crate::Backend::Gpu`] and need nothing from here. An app that has a wgpu device passes it on:
 //!
 //! ```no_run
 //! # fn app(device: wgpu::Device, queue: wgpu::Queue) -> Result<(), Box<dyn std::error::Error>> {
@@ -22,54 +28,58 @@
 //! ```
 
 mod adapter;
+#[cfg_attr(not(feature = "unstable-study"), allow(unreachable_pub, reason = "`study` shows parts of it"))]
 mod changes;
+mod chunk;
 mod coding;
 mod commands;
-mod engine;
+#[cfg_attr(not(feature = "unstable-study"), allow(unreachable_pub, reason = "`Fault` is public with it"))]
+mod device;
 mod error;
-mod flight;
+mod found;
+mod levels;
 mod map;
 mod parts;
+mod plan;
 mod readback;
 mod search;
 mod session;
 mod sink;
 mod start;
 mod storage;
+#[cfg(feature = "unstable-study")]
 pub mod study;
-mod trial;
 mod upload;
 
 pub use adapter::{adapters, describe};
 pub(crate) use changes::{Change, ChangeRequest};
-#[doc(hidden)]
-pub use engine::Fault;
+#[cfg(feature = "unstable-study")]
+pub use device::Fault;
 pub(crate) use error::Failure;
 pub use error::GpuError;
-pub(crate) use trial::Trial;
+pub(crate) use found::GpuFound;
+pub use plan::GpuPlan;
 
-use crate::cpu::found::Found;
-use crate::plan::{NoGpu, Summary};
-use crate::report::Report;
-use crate::{Aabb, Backend, Config, GpuOptions, ProxyFilter};
-use changes::{Ahead, Trail};
-use engine::Engine;
-use search::{Searched, Task, search};
+use crate::policy::AvailableDevice;
+use crate::{Aabb, Config, GpuOptions, ProxyFilter};
+use changes::MotionBounds;
+use device::GpuDevice;
+use search::{Task, search};
 use session::Session;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-/// How long a call waits to see whether an app's device that was busy for too long is idle again.
+/// Time that a call waits for a device of the app that was busy for too long.
 const PROBE: Duration = Duration::from_millis(10);
 
-/// Where a finder's device comes from, and where to look for another when it is lost.
+/// The origin of a finder's device. It tells where to look for another one when the device is lost.
 #[derive(Clone, Debug)]
 enum Source {
-    /// The one that the process shares.
+    /// The device that the process shares.
     Shared,
-    /// One of its own, on the adapter of this name or on the best.
+    /// A device of its own, on the adapter of this name or on the best.
     Own(Option<String>),
-    /// The caller's.
+    /// The caller's device.
     Given,
 }
 
@@ -77,43 +87,40 @@ enum Source {
 #[derive(Debug)]
 pub struct GpuFinder {
     source: Source,
-    engine: Option<Arc<Engine>>,
+    device: Option<Arc<GpuDevice>>,
     session: Option<(GpuOptions, Session)>,
     failed: Option<(Instant, String)>,
-    /// A search for changes that has begun, or why it could not.
-    ahead: Option<Result<Ahead, Failure>>,
-    crowding: f32,
-    /// A software adapter passes for hardware, in tests.
-    pretends: bool,
+    /// Factor on the cell size: smaller while cells hold too many boxes.
+    cell_factor: f32,
+    /// [`crate::Backend::Auto`] takes a software adapter for hardware, in tests.
+    pretends_hardware: bool,
 }
 
 /// A copy shares the device and has buffers of its own.
 impl Clone for GpuFinder {
     fn clone(&self) -> Self {
-        Self { source: self.source.clone(), engine: self.engine.clone(), ..Self::shared() }
+        Self { source: self.source.clone(), device: self.device.clone(), ..Self::shared() }
     }
 }
 
-/// What to find.
-pub(crate) struct Request<'a> {
+/// A search for all pairs.
+#[derive(Clone, Copy)]
+pub(crate) struct SearchRequest<'a> {
     pub(crate) boxes: &'a [Aabb],
     pub(crate) filters: Option<&'a [ProxyFilter]>,
-    /// What the device does not know about a pair.
-    pub(crate) accept: Option<&'a (dyn Fn(u32, u32) -> bool + Sync)>,
-    pub(crate) summary: &'a Summary,
     pub(crate) config: &'a Config,
 }
 
 impl GpuFinder {
-    /// A device of its own on the best adapter, or on that of `WGPU_ADAPTER_NAME`.
+    /// Opens a device on the best adapter, or on the one that `WGPU_ADAPTER_NAME` names.
     ///
     /// # Errors
-    /// When there is no adapter, or it gives no device that the kernels can run on.
+    /// If there is no adapter, or if it gives no device that the kernels can run on.
     pub fn new() -> Result<Self, GpuError> {
         Self::open(None)
     }
 
-    /// A device of its own on the first adapter whose name contains `name`, in any case.
+    /// Opens a device on the first adapter whose name contains `name`, in any case.
     ///
     /// # Errors
     /// As [`GpuFinder::new`].
@@ -121,96 +128,83 @@ impl GpuFinder {
         Self::open(Some(name.to_owned()))
     }
 
-    /// A device of its own on a given adapter, see [`adapters`].
+    /// Opens a device on the given adapter, see [`adapters`].
     ///
     /// # Errors
-    /// When the adapter gives no device that the kernels can run on.
+    /// If the adapter gives no device that the kernels can run on.
     pub fn on(adapter: &wgpu::Adapter) -> Result<Self, GpuError> {
-        let engine = Some(Arc::new(Engine::on(adapter)?));
-        Ok(Self { source: Source::Own(Some(adapter.get_info().name)), engine, ..Self::shared() })
+        let device = Some(Arc::new(GpuDevice::on(adapter)?));
+        Ok(Self { source: Source::Own(Some(adapter.get_info().name)), device, ..Self::shared() })
     }
 
-    /// On the app's own device, which is never replaced: when it is lost the calls run on the CPU.
+    /// Uses the app's own device, which is never replaced: after its loss, calls run on the CPU.
     ///
     /// # Errors
-    /// [`GpuError::TooLimited`] when the device allows less than WebGPU guarantees.
+    /// [`GpuError::TooLimited`] if the device allows less than WebGPU guarantees.
     pub fn from_device(device: wgpu::Device, queue: wgpu::Queue) -> Result<Self, GpuError> {
-        let engine = Some(Arc::new(Engine::new(device, queue)?));
-        Ok(Self { source: Source::Given, engine, ..Self::shared() })
+        let device = Some(Arc::new(GpuDevice::new(device, queue)?));
+        Ok(Self { source: Source::Given, device, ..Self::shared() })
     }
 
     fn open(name: Option<String>) -> Result<Self, GpuError> {
-        let engine = Some(Arc::new(Engine::on(&adapter::choose(name.as_deref())?)?));
-        Ok(Self { source: Source::Own(name), engine, ..Self::shared() })
+        let device = Some(Arc::new(GpuDevice::on(&adapter::choose(name.as_deref())?)?));
+        Ok(Self { source: Source::Own(name), device, ..Self::shared() })
     }
 
-    /// The device that the process shares, opened at the first call.
+    /// Returns a finder on the device that the process shares. The first call opens it.
     pub(crate) fn shared() -> Self {
         Self {
             source: Source::Shared,
-            engine: None,
+            device: None,
             session: None,
             failed: None,
-            ahead: None,
-            crowding: 1.0,
-            pretends: false,
+            cell_factor: 1.0,
+            pretends_hardware: false,
         }
     }
 
-    /// The adapter's name, kind and API; empty before the first call of a shared device.
+    /// Returns the adapter's name, kind and API; empty before the first call on a shared device.
     pub fn adapter(&self) -> &str {
-        self.engine.as_ref().map_or("", |engine| &engine.name)
+        self.device.as_ref().map_or("", |device| &device.name)
     }
 
-    /// The adapter, unless there is none yet or its device has failed.
+    /// Returns the adapter, unless no device is open yet or the device has failed.
     pub(crate) fn working_adapter(&self) -> Option<&str> {
         Some(self.adapter()).filter(|name| !name.is_empty() && self.failed.is_none())
     }
 
-    /// Whether the adapter is a program, as lavapipe and WARP are: right, but slower than the CPU
-    /// backend.
+    /// Returns true if the adapter is a program, as lavapipe and WARP are: right, but slower than the CPU backend.
     pub fn is_software(&self) -> bool {
-        self.engine.as_ref().is_some_and(|engine| engine.software)
+        self.device.as_ref().is_some_and(|device| device.is_software)
     }
 
-    /// In words, the variant of each stage that runs on the device, and why.
+    /// Returns in words which variant of each stage runs on the device, and why.
     pub fn variants(&self) -> Vec<String> {
-        self.engine.as_ref().map_or(Vec::new(), |engine| engine.variants())
+        self.device.as_ref().map_or(Vec::new(), |device| device.variants())
     }
 
     /// Makes [`crate::Backend::Auto`] take a software adapter for hardware.
-    #[doc(hidden)]
+    #[cfg(feature = "unstable-study")]
     pub fn pretend_hardware(&mut self) {
-        self.pretends = true;
+        self.pretends_hardware = true;
     }
 
     /// Makes the device fail after so many more submissions.
-    #[doc(hidden)]
+    #[cfg(feature = "unstable-study")]
     pub fn inject(&self, fault: Fault, submissions: u32) {
-        if let Some(engine) = &self.engine {
-            engine.inject(fault, submissions);
+        if let Some(device) = &self.device {
+            device.inject(fault, submissions);
         }
     }
 
-    /// All pairs of a request into `found`.
-    pub(crate) fn find(
-        &mut self,
-        request: &Request<'_>,
-        found: &mut Found,
-        report: &mut Report,
-    ) -> Result<(), Failure> {
-        found.clear();
-        self.check_pause(request.config)?;
-        let result = self.try_find(request, found, report);
-        if let Err(failure) = &result {
-            self.fail(failure, found);
-        }
-        result
+    /// Finds all pairs of a request.
+    pub(crate) fn find(&mut self, request: &SearchRequest<'_>) -> Result<GpuFound, Failure> {
+        let result = self.try_find(request);
+        result.inspect_err(|failure| self.fail(failure))
     }
 
-    /// Nothing of a call that failed is relied upon later.
-    fn fail(&mut self, failure: &Failure, found: &mut Found) {
-        found.clear();
+    /// Drops all state that a failed call may have left wrong.
+    fn fail(&mut self, failure: &Failure) {
         match (failure, &mut self.session) {
             (Failure::Call(_), _) => self.forget_changes(),
             (Failure::Device(GpuError::Paused { .. }), _) => {}
@@ -221,15 +215,18 @@ impl GpuFinder {
         }
     }
 
-    /// What the device was told last is not what an update has left: the next one begins with everything.
+    /// Makes the next search for changes upload all boxes.
+    ///
+    /// To be called after an update that failed although the device had found its changes: the device has gone on to
+    /// the new boxes, the caller has not.
     pub(crate) fn forget_changes(&mut self) {
         if let Some((_, session)) = &mut self.session {
-            session.mirror.forget_motions();
-            session.trail = Trail::default();
+            session.uploaded.forget_motions();
+            session.motion_bounds = MotionBounds::default();
         }
     }
 
-    /// An error while calls stay on the CPU because the device failed a short while ago.
+    /// Returns an error while calls stay on the CPU because the device failed a short while ago.
     fn check_pause(&self, config: &Config) -> Result<(), GpuError> {
         let pause = config.gpu.pause;
         match &self.failed {
@@ -240,105 +237,69 @@ impl GpuFinder {
         }
     }
 
-    /// The session, on a device that is not lost.
+    /// Returns the session, on a device that is not lost.
     fn session(&mut self, options: &GpuOptions) -> Result<&mut Session, GpuError> {
-        if let Some(engine) = self.engine.take_if(|engine| engine.is_lost()) {
+        if let Some(device) = self.device.take_if(|device| device.is_lost()) {
             self.session = None;
             // An app's device may only have been busy for too long.
-            if matches!(self.source, Source::Given) && engine.is_idle_within(PROBE) {
-                engine.take_back();
+            if matches!(self.source, Source::Given) && device.is_idle_within(PROBE) {
+                device.take_back();
             }
-            self.engine = Some(engine).filter(|_| matches!(self.source, Source::Given));
+            self.device = Some(device).filter(|_| matches!(self.source, Source::Given));
         }
-        let engine = match (&self.engine, &self.source) {
-            (Some(engine), _) if engine.is_lost() => return Err(GpuError::Lost),
-            (Some(engine), _) => engine.clone(),
-            (None, Source::Shared) => Engine::shared()?,
-            (None, Source::Own(name)) => Arc::new(Engine::on(&adapter::choose(name.as_deref())?)?),
+        let device = match (&self.device, &self.source) {
+            (Some(device), _) if device.is_lost() => return Err(GpuError::Lost),
+            (Some(device), _) => device.clone(),
+            (None, Source::Shared) => GpuDevice::shared()?,
+            (None, Source::Own(name)) => Arc::new(GpuDevice::on(&adapter::choose(name.as_deref())?)?),
             (None, Source::Given) => return Err(GpuError::Lost),
         };
-        self.engine = Some(engine.clone());
+        self.device = Some(device.clone());
         let kept = self.session.take().filter(|(known, _)| known == options).map(|(_, session)| session);
         let session = match kept {
             Some(session) => session,
-            None => engine.clone().watch(|| Session::new(engine, options))?,
+            None => device.clone().watch(|| Session::new(device, options))?,
         };
         Ok(&mut self.session.insert((*options, session)).1)
     }
 
-    fn try_find(
-        &mut self,
-        request: &Request<'_>,
-        found: &mut Found,
-        report: &mut Report,
-    ) -> Result<(), Failure> {
-        let crowding = self.crowding;
+    fn try_find(&mut self, request: &SearchRequest<'_>) -> Result<GpuFound, Failure> {
+        self.check_pause(request.config)?;
+        let cell_factor = self.cell_factor;
         let session = self.session(&request.config.gpu)?;
-        let engine = session.engine.clone();
-        let searched = engine.watch(|| search(session, &Task::new(request), crowding, None, found))?;
+        let device = session.device.clone();
+        let found = device.watch(|| search(session, &Task::all_pairs(request), cell_factor))?;
         session.end_call();
-        let useful = request.boxes.len() as u64 + searched.pairs;
-        self.finish(searched, useful, report);
-        Ok(())
+        let pairs = found.pairs.iter().map(Vec::len).sum::<usize>();
+        self.succeed(&found, (request.boxes.len() + pairs) as u64);
+        Ok(found)
     }
 
-    /// A search has succeeded; boxes and pairs were worth `useful` tests.
-    fn finish(&mut self, searched: Searched, useful: u64, report: &mut Report) {
+    /// Ends a pause, and adapts the cell size. A search of boxes and pairs takes `useful` tests at least.
+    fn succeed(&mut self, found: &GpuFound, useful: u64) {
         self.failed = None;
-        if searched.plan.gpu.is_some() {
-            self.learn(&searched, useful.max(1));
+        if found.plan.is_some() {
+            self.adapt_cells(found.checks.made / useful.max(1));
         }
-        report.checks = searched.checks;
-        report.plan = searched.plan;
-        report.gpu = Some(searched.gpu);
     }
 
-    /// Finer cells next time if these were far too full, coarser ones if they were nearly empty.
-    fn learn(&mut self, searched: &Searched, useful: u64) {
-        let waste = searched.checks.made / useful;
-        if waste > 64 {
-            self.crowding = (self.crowding * 0.5).max(1.0 / 64.0);
-        } else if waste < 4 {
-            self.crowding = (self.crowding * 2.0).min(1.0);
+    /// Makes the cells of the next search finer if these held far too many boxes, coarser if they were nearly empty.
+    fn adapt_cells(&mut self, tests_per_useful_test: u64) {
+        const TOO_FULL: u64 = 64;
+        const NEARLY_EMPTY: u64 = 4;
+        if tests_per_useful_test > TOO_FULL {
+            self.cell_factor = (self.cell_factor * 0.5).max(1.0 / 64.0);
+        } else if tests_per_useful_test < NEARLY_EMPTY {
+            self.cell_factor = (self.cell_factor * 2.0).min(1.0);
         }
     }
 }
 
-/// Whether a search should run on a device; if not, and where that was left open, why. `few_changed`: most boxes are where
-/// the CPU knows them.
-pub(crate) fn wanted(
-    config: &Config,
-    gpu: Option<&GpuFinder>,
-    trial: &mut Trial,
-    boxes: usize,
-    few_changed: bool,
-) -> Result<(), Option<NoGpu>> {
-    match (config.backend, gpu) {
-        (Backend::Gpu, _) => Ok(()),
-        (Backend::Cpu | Backend::Brute, _) => Err(None),
-        (Backend::Auto, None) => Err(Some(NoGpu::NotGiven)),
-        (Backend::Auto, Some(gpu)) if gpu.is_software() && !gpu.pretends => Err(Some(NoGpu::Software)),
-        (Backend::Auto, Some(_)) if few_changed => Err(Some(NoGpu::FewChanged)),
-        (Backend::Auto, Some(_)) => trial.wants_gpu(boxes).map_err(Some),
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_device_that_is_not_asked_is_not_for_a_reason() {
-        let (mut trial, gpu) = (Trial::default(), GpuFinder::shared());
-        let mut why = |backend, gpu, boxes, few_changed| {
-            let config = Config { backend, ..Config::DEFAULT };
-            wanted(&config, gpu, &mut trial, boxes, few_changed)
-        };
-        assert_eq!(why(Backend::Gpu, None, 2, true), Ok(()));
-        assert_eq!(why(Backend::Cpu, Some(&gpu), 1 << 20, false), Err(None));
-        assert_eq!(why(Backend::Auto, None, 1 << 20, false), Err(Some(NoGpu::NotGiven)));
-        assert_eq!(why(Backend::Auto, Some(&gpu), 100, false), Err(Some(NoGpu::FewBoxes)));
-        assert_eq!(why(Backend::Auto, Some(&gpu), 1 << 20, true), Err(Some(NoGpu::FewChanged)));
-        assert_eq!(why(Backend::Auto, Some(&gpu), 1 << 20, false), Err(Some(NoGpu::Unmeasured)));
+/// Returns the device at hand, for [`crate::policy::choose_backend`].
+pub(crate) fn available(gpu: Option<&GpuFinder>) -> AvailableDevice {
+    match gpu {
+        None => AvailableDevice::NotGiven,
+        Some(gpu) if gpu.is_software() && !gpu.pretends_hardware => AvailableDevice::Software,
+        Some(_) => AvailableDevice::Hardware,
     }
 }

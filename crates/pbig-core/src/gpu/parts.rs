@@ -1,21 +1,21 @@
-//! Sets that do not fit the device at once: searched in parts, completely (contract 2).
+//! Parts of a set that does not fit the device at once. Together they have all pairs (contract 2).
 //!
-//! The boxes are sorted along an axis and cut into blocks of half the size that fits. Each block is
-//! searched alone, and with every other block that it reaches, for the pairs between the two. That
-//! needs no assumption about the boxes: in the worst case all blocks meet all others.
+//! The boxes are sorted along an axis and cut into blocks of half the size that fits. Each block is searched alone, and
+//! together with every later block that its boxes reach. This assumes nothing about the boxes: in the worst case each
+//! block is searched with all others.
 
 use crate::Aabb;
 use crate::layout::ordered;
-use crate::plan::Summary;
+use crate::pbig::Summary;
 
-/// Boxes whose pairs are to be found: all of `first`, or those between `first` and `second`.
+/// Ids of boxes to search: for all pairs of `first`, or for pairs between `first` and `second`.
 #[derive(Debug, PartialEq)]
 pub(super) struct Part<'a> {
     pub(super) first: &'a [u32],
     pub(super) second: &'a [u32],
 }
 
-/// Ids of the valid boxes, along the axis on which they are spread most.
+/// Returns the ids of the valid boxes, sorted along the axis on which they are spread most, and that axis.
 pub(super) fn sorted(boxes: &[Aabb], summary: &Summary) -> (Vec<u32>, usize) {
     let width = |k: usize| {
         let ends = summary.sample.iter().map(|b| b.min[k]);
@@ -27,15 +27,15 @@ pub(super) fn sorted(boxes: &[Aabb], summary: &Summary) -> (Vec<u32>, usize) {
     (ids, axis)
 }
 
-/// The parts for blocks of `size` ids, in order.
+/// Returns the parts for blocks of `size` sorted ids.
 pub(super) fn parts<'a>(boxes: &[Aabb], ids: &'a [u32], axis: usize, size: usize) -> Vec<Part<'a>> {
     let blocks: Vec<&[u32]> = ids.chunks(size.max(1)).collect();
     let mut parts = Vec::new();
     for (i, first) in blocks.iter().enumerate() {
         parts.push(Part { first, second: &[] });
-        let reach = first.iter().map(|&id| ordered(boxes[id as usize].max[axis])).max();
-        // Blocks are sorted: beyond the first that begins too far, all do.
-        let begins = |block: &&&[u32]| Some(ordered(boxes[block[0] as usize].min[axis])) <= reach;
+        let end = first.iter().map(|&id| ordered(boxes[id as usize].max[axis])).max();
+        // Blocks are sorted: after the first block that begins beyond the end, all do.
+        let begins = |block: &&&[u32]| Some(ordered(boxes[block[0] as usize].min[axis])) <= end;
         parts.extend(blocks[i + 1..].iter().take_while(begins).map(|second| Part { first, second }));
     }
     parts
@@ -55,7 +55,7 @@ mod tests {
         boxes.push(Aabb::new([f32::NEG_INFINITY; 3], [f32::INFINITY; 3]));
         boxes.push(Aabb::NOWHERE);
         for size in [1, 7, 50, 1000] {
-            let (ids, axis) = sorted(&boxes, &Summary::of(&boxes, None));
+            let (ids, axis) = sorted(&boxes, &Summary::of(&boxes));
             assert_eq!((ids.len(), axis), (301, 0));
             let mut found = Vec::new();
             for part in parts(&boxes, &ids, axis, size) {

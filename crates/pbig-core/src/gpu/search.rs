@@ -1,149 +1,98 @@
-//! What a call searches: everything at once where it fits, or in parts.
+//! A call: searches all boxes at once if they fit, else in parts.
 
 use super::error::Failure;
 use super::session::{Input, Job, Session};
 use super::sink::Sink;
-use super::start::First;
-use super::{ChangeRequest, GpuError, Request, parts};
-use crate::cpu::found::Found;
+use super::{ChangeRequest, GpuError, GpuFound, GpuPlan, SearchRequest, parts};
 use crate::layout::{BOX_BITS, Located, Motion};
-use crate::plan::{Chosen, GpuPlan, Plan, Summary};
+use crate::pbig::Summary;
 use crate::report::{Checks, GpuReport};
-use crate::{Aabb, Config, ProxyFilter, Strategy};
+use crate::{Aabb, GpuOptions, Pair, ProxyFilter};
+use rayon::prelude::*;
 
-/// Boxes up to which every pair is tested, without a grid. Avril's table 7 puts the crossover at 1000.
-const SMALL_SCENE: usize = 1024;
+/// Most boxes of one cell: their work items, 2^17 rows by 2^17 / 8 groups of 8 columns, fit 32 bits.
+const MAX_BOXES_PER_CELL: u64 = 1 << 25;
 
-/// Boxes of one cell whose work items, 2^17 rows against 2^17 / 8 times 8 columns, 32 bits can count.
-const MOST_IN_A_CELL: u64 = 1 << 25;
+/// Fewest boxes of a part that is split further because a list was too large.
+const MIN_SPLIT_BOXES: usize = 256;
 
-/// Fewest boxes that are split further for want of room.
-const SMALLEST_PART: usize = 256;
+/// Most cells of a plan.
+const MAX_CELLS: u64 = 1 << 28;
 
-/// What a search is for.
+/// A search for all pairs or for changes.
 pub(super) struct Task<'a> {
-    /// The boxes; in a search for changes what each reaches, now or before.
+    /// The boxes; in a search for changes the bounds of each box now and at the last update.
     pub(super) boxes: &'a [Aabb],
     pub(super) filters: Option<&'a [ProxyFilter]>,
-    /// None: for all pairs that overlap.
+    /// The changes; none in a search for all pairs.
     pub(super) changes: Option<&'a ChangeRequest<'a>>,
-    pub(super) accept: Option<&'a (dyn Fn(u32, u32) -> bool + Sync)>,
     /// Most pairs.
     pub(super) limit: u64,
-    pub(super) summary: &'a Summary,
-    pub(super) config: &'a Config,
+    pub(super) options: &'a GpuOptions,
 }
 
 impl<'a> Task<'a> {
-    /// All pairs that overlap.
-    pub(super) fn new(request: &Request<'a>) -> Self {
-        let &Request { boxes, filters, accept, summary, config } = request;
-        Self { boxes, filters, changes: None, accept, limit: config.limits.max_pairs, summary, config }
+    /// Returns the task to find all pairs of a request.
+    pub(super) fn all_pairs(request: &SearchRequest<'a>) -> Self {
+        let &SearchRequest { boxes, filters, config } = request;
+        Self { boxes, filters, changes: None, limit: config.limits.max_pairs, options: &config.gpu }
     }
 }
 
-/// What a search came to.
-pub(super) struct Searched {
-    pub(super) checks: Checks,
-    pub(super) plan: Plan,
-    pub(super) gpu: GpuReport,
-    pub(super) pairs: u64,
-}
-
-/// A search of everything at once that the device has begun.
-#[derive(Debug)]
-pub(super) struct Started {
-    plan: Option<GpuPlan>,
-    first: First,
-    report: GpuReport,
-}
-
-/// Begins a search without waiting for it; nothing where it takes parts, which wait for each other.
-pub(super) fn start(
-    session: &mut Session,
-    task: &Task<'_>,
-    crowding: f32,
-) -> Result<Option<Started>, GpuError> {
-    if task.boxes.len() > boxes_at_once(session, task) || task.summary.valid < 2 {
-        return Ok(None);
-    }
-    match start_whole(session, task, crowding) {
-        Err(GpuError::TooLarge { .. }) => {
-            // What was sent is not taken in: the search that follows sends everything again.
-            session.mirror.forget_motions();
-            Ok(None)
-        }
-        started => started.map(Some),
-    }
-}
-
-/// Searches in as few parts as fit, or completes what was started.
-pub(super) fn search(
-    session: &mut Session,
-    task: &Task<'_>,
-    crowding: f32,
-    mut started: Option<Started>,
-    found: &mut Found,
-) -> Result<Searched, Failure> {
+/// Searches in as few parts as fit.
+pub(super) fn search(session: &mut Session, task: &Task<'_>, cell_factor: f32) -> Result<GpuFound, Failure> {
+    let summary = Summary::of(task.boxes);
     let len = task.boxes.len();
     let mut most = boxes_at_once(session, task);
     loop {
-        found.clear();
-        let mut sink = Sink {
-            found,
-            used: 0,
-            pairs: 0,
-            written: 0,
-            limit: task.limit,
-            ids: None,
-            accept: task.accept,
-            checks: Checks::default(),
-            report: new_report(session),
-        };
-        let result = if task.boxes.len() <= most {
-            search_whole(session, task, crowding, started.take(), &mut sink)
+        let mut sink = new_sink(session, task.limit);
+        let result = if len <= most {
+            search_whole(session, task, &summary, cell_factor, &mut sink)
         } else {
-            search_parts(session, task, crowding, most, &mut sink)
+            search_parts(session, task, &summary, cell_factor, most, &mut sink)
         };
         match result {
-            // A list that only the device knows the length of was too long: fewer boxes make it shorter.
-            Err(Failure::Device(GpuError::TooLarge { .. })) if most > SMALLEST_PART => {
-                most = (most.min(len) / 2).max(SMALLEST_PART);
-                session.parted = Some((len, most));
-                session.forget_needs();
+            // Only the device knew the length of the list that was too large. Fewer boxes make it shorter.
+            Err(Failure::Device(GpuError::TooLarge { .. })) if most > MIN_SPLIT_BOXES => {
+                most = (most.min(len) / 2).max(MIN_SPLIT_BOXES);
+                session.split = Some((len, most));
+                session.reset_capacities();
             }
             Err(failure) => return Err(failure),
-            Ok(plan) => {
-                let words = sink.report.compression;
-                let pairs = sink.written;
-                sink.report.compression = if pairs > 0 { words / (2 * pairs) as f64 } else { 0.0 };
-                return Ok(Searched { checks: sink.checks, plan, gpu: sink.report, pairs });
-            }
+            Ok(plan) => return Ok(found(sink, plan, summary.valid)),
         }
     }
 }
 
-fn new_report(session: &Session) -> GpuReport {
-    let engine = &session.engine;
-    GpuReport { adapter: engine.name.clone(), subgroups: engine.subgroups, parts: 1, ..GpuReport::default() }
+fn new_sink(session: &Session, limit: u64) -> Sink {
+    let device = &session.device;
+    let (adapter, subgroups) = (device.name.clone(), device.has_subgroups);
+    let report = GpuReport { adapter, subgroups, parts: 1, ..GpuReport::default() };
+    Sink { pairs: Vec::new(), pair_count: 0, words: 0, limit, checks: Checks::default(), report }
 }
 
-/// How many boxes are searched at once, as far as is known.
+fn found(sink: Sink, plan: Option<GpuPlan>, valid: u32) -> GpuFound {
+    let Sink { pairs, pair_count, words, checks, mut report, .. } = sink;
+    report.compression = if pair_count > 0 { words as f64 / (2 * pair_count) as f64 } else { 0.0 };
+    GpuFound { pairs, restarted: Vec::new(), valid, plan, checks, report }
+}
+
+/// Returns the most boxes to search at once, by the limits and by earlier calls.
 fn boxes_at_once(session: &mut Session, task: &Task<'_>) -> usize {
     let len = task.boxes.len();
-    // What one set needed says nothing about one of another size.
-    session.parted = session.parted.filter(|&(parted, _)| parted / 2 <= len && len / 2 <= parted);
-    most_boxes(session, task).min(session.parted.map_or(usize::MAX, |(_, most)| most))
+    // The lists of a set say nothing about a set of another size.
+    session.split = session.split.filter(|&(split, _)| split / 2 <= len && len / 2 <= split);
+    max_boxes(session, task).min(session.split.map_or(usize::MAX, |(_, most)| most))
 }
 
-/// How many boxes fit: each has a place in every buffer, and a number in an entry.
-fn most_boxes(session: &Session, task: &Task<'_>) -> usize {
+/// Returns the most boxes that fit every buffer, and an entry's bits.
+fn max_boxes(session: &Session, task: &Task<'_>) -> usize {
     let largest = if task.changes.is_some() { size_of::<Motion>() } else { size_of::<Located>() };
-    let by_bytes = session.storage.most_bytes() / largest as u64;
-    by_bytes.min(1 << BOX_BITS).min(MOST_IN_A_CELL) as usize
+    let by_bytes = session.storage.max_buffer_bytes() / largest as u64;
+    by_bytes.min(1 << BOX_BITS).min(MAX_BOXES_PER_CELL) as usize
 }
 
-/// Entries are counted in 32 bits: at most 4 x 4 x 4 for a box in each level but the last.
+/// Returns an error if there may be more entries than 32 bits count: 4 x 4 x 4 for a box in each level but the last.
 fn check_entries(plan: &GpuPlan, boxes: usize) -> Result<(), GpuError> {
     let entries = boxes as u64 * (64 * (plan.levels.len() as u64 - 1) + 1);
     let limit = u64::from(u32::MAX);
@@ -153,79 +102,71 @@ fn check_entries(plan: &GpuPlan, boxes: usize) -> Result<(), GpuError> {
 fn search_whole(
     session: &mut Session,
     task: &Task<'_>,
-    crowding: f32,
-    started: Option<Started>,
-    sink: &mut Sink<'_>,
-) -> Result<Plan, Failure> {
-    let valid = task.summary.valid;
-    if valid < 2 {
-        return Ok(Plan { boxes: valid, ..Plan::default() });
+    summary: &Summary,
+    cell_factor: f32,
+    sink: &mut Sink,
+) -> Result<Option<GpuPlan>, Failure> {
+    if summary.valid < 2 {
+        return Ok(None);
     }
-    let started = started.map_or_else(|| start_whole(session, task, crowding), Ok)?;
-    let Started { plan, first, report } = started;
-    sink.report = report;
-    session.complete(&whole(task, plan.as_ref()), first, sink)?;
-    let (chosen, swept) = if plan.is_none() { (Chosen::Brute, valid) } else { (Chosen::Pbig, 0) };
-    Ok(Plan { chosen, swept, boxes: valid, gpu: plan, ..Plan::default() })
-}
-
-fn start_whole(session: &mut Session, task: &Task<'_>, crowding: f32) -> Result<Started, GpuError> {
-    let brute = task.config.strategy == Strategy::Auto && task.boxes.len() <= SMALL_SCENE;
-    let plan = (!brute).then(|| plan(session, task.summary, task.config, crowding));
-    plan.as_ref().map_or(Ok(()), |plan| check_entries(plan, task.boxes.len()))?;
-    let left = if task.accept.is_some() { u64::MAX } else { task.limit };
-    let mut report = new_report(session);
-    let first = session.start(&whole(task, plan.as_ref()), left, &mut report)?;
-    Ok(Started { plan, first, report })
-}
-
-/// All boxes of a task as one job.
-fn whole<'a>(task: &Task<'a>, plan: Option<&'a GpuPlan>) -> Job<'a> {
+    let needs_grid = task.boxes.len() > task.options.all_pairs_up_to as usize;
+    let plan = if needs_grid { Some(plan(session, summary, task, cell_factor)?) } else { None };
     let input = task.changes.map_or(Input::Boxes(task.boxes), Input::Changes);
-    Job { input, filters: task.filters, split: 0, plan, config: task.config }
+    session.run(&Job { input, filters: task.filters, split: 0, plan: plan.as_ref() }, sink)?;
+    Ok(plan)
 }
 
-fn plan(session: &Session, summary: &Summary, config: &Config, crowding: f32) -> GpuPlan {
-    let most_cells = (session.storage.most_bytes() / 8).min(1 << 28) as u32;
-    GpuPlan::new(summary, config, crowding, most_cells)
+fn plan(
+    session: &Session,
+    summary: &Summary,
+    task: &Task<'_>,
+    cell_factor: f32,
+) -> Result<GpuPlan, GpuError> {
+    let max_cells = (session.storage.max_buffer_bytes() / 8).min(MAX_CELLS) as u32;
+    let plan = GpuPlan::new(summary, task.options, cell_factor, max_cells);
+    check_entries(&plan, summary.valid as usize).map(|()| plan)
 }
 
 fn search_parts(
     session: &mut Session,
     task: &Task<'_>,
-    crowding: f32,
+    summary: &Summary,
+    cell_factor: f32,
     most: usize,
-    sink: &mut Sink<'_>,
-) -> Result<Plan, Failure> {
-    let (sorted, axis) = parts::sorted(task.boxes, task.summary);
+    sink: &mut Sink,
+) -> Result<Option<GpuPlan>, Failure> {
+    let (sorted, axis) = parts::sorted(task.boxes, summary);
     let parts = parts::parts(task.boxes, &sorted, axis, most / 2);
-    // The device gets to know a part at a time.
-    session.mirror.forget_motions();
-    let all = task.changes.map(|changes| changes.motions(0..task.boxes.len()));
+    // The device gets one part after the other.
+    session.uploaded.forget_motions();
+    let motions = task.changes.map(|changes| changes.motions(0..task.boxes.len()));
     let mut last = None;
     for part in &parts {
         let ids: Vec<u32> = [part.first, part.second].concat();
-        let motions: Option<Vec<Motion>> =
-            all.as_ref().map(|all| ids.iter().map(|&id| all[id as usize]).collect());
+        let split = if part.second.is_empty() { 0 } else { part.first.len() as u32 };
+        let motions = motions.as_deref().map(|all| of_ids(all, &ids));
         if motions.as_ref().is_some_and(|motions| motions.iter().all(|motion| motion.now == motion.before)) {
             continue;
         }
-        let boxes: Vec<Aabb> = ids.iter().map(|&id| task.boxes[id as usize]).collect();
-        let filters: Option<Vec<ProxyFilter>> =
-            task.filters.map(|all| ids.iter().map(|&id| all[id as usize]).collect());
-        let split = if part.second.is_empty() { 0 } else { part.first.len() as u32 };
-        let plan = plan(session, &Summary::of(&boxes, None), task.config, crowding);
-        check_entries(&plan, boxes.len())?;
-        let config = task.config;
+        let boxes = of_ids(task.boxes, &ids);
+        let filters = task.filters.map(|all| of_ids(all, &ids));
+        let plan = plan(session, &Summary::of(&boxes), task, cell_factor)?;
         let input = motions.as_deref().map_or(Input::Boxes(&boxes), Input::Motions);
-        let job = Job { input, filters: filters.as_deref(), split, plan: Some(&plan), config };
-        let mut own = Sink { ids: Some(&ids), found: &mut *sink.found, report: sink.report.clone(), ..*sink };
-        session.run(&job, &mut own)?;
-        (sink.used, sink.pairs, sink.written) = (own.used, own.pairs, own.written);
-        (sink.checks, sink.report) = (own.checks, own.report);
+        let before = sink.pairs.len();
+        session.run(&Job { input, filters: filters.as_deref(), split, plan: Some(&plan) }, sink)?;
+        name_pairs(&mut sink.pairs[before..], &ids);
         last = Some(plan);
     }
     sink.report.parts = parts.len() as u32;
-    let valid = task.summary.valid;
-    Ok(Plan { chosen: Chosen::Pbig, boxes: valid, gpu: last, ..Plan::default() })
+    Ok(last)
+}
+
+fn of_ids<T: Copy>(all: &[T], ids: &[u32]) -> Vec<T> {
+    ids.iter().map(|&id| all[id as usize]).collect()
+}
+
+/// Replaces indices into a part by the ids of its boxes.
+fn name_pairs(pairs: &mut [Vec<Pair>], ids: &[u32]) {
+    let name = |pair: &mut Pair| *pair = Pair::new(ids[pair.a as usize], ids[pair.b as usize]);
+    pairs.par_iter_mut().for_each(|piece| piece.iter_mut().for_each(name));
 }

@@ -1,37 +1,36 @@
-//! A search on a device: one submission and one wait, unless there is more work or output than fits.
+//! The state of a finder on a device, and the search of one job: one submission and one wait, unless there is more work or
+//! output than fits.
 
-use super::changes::Trail;
+use super::changes::MotionBounds;
+use super::chunk::{ChunkResult, PendingChunk};
 use super::coding::CodingChoice;
 use super::commands::{BindGroups, Groups};
-use super::engine::Engine;
+use super::device::GpuDevice;
 use super::error::Failure;
-use super::flight::{Flight, Landed};
-use super::readback::Clock;
+use super::readback::Timestamps;
 use super::sink::Sink;
-use super::start::{First, bit_words};
-use super::storage::Storage;
-use super::upload::{Mirror, News};
-use super::{ChangeRequest, GpuError, map};
+use super::start::{FirstSubmission, bit_words};
+use super::storage::{Side, Storage};
+use super::upload::{PendingChanges, UploadCache};
+use super::{ChangeRequest, GpuError, GpuPlan, map};
 use crate::config::{Coding, GpuOptions};
 use crate::layout::{BITS, Chunk, Counters, FILTERED, LANES, Motion, PACKED, Params};
-use crate::plan::GpuPlan;
-use crate::{Aabb, Config, ProxyFilter};
+use crate::{Aabb, ProxyFilter};
 use pbig_shaders as shaders;
 use std::collections::VecDeque;
 use std::sync::Arc;
 
-/// Times that a map is repeated before the call is left to the CPU: each repetition has the room that
-/// the last one asked for.
-const MOST_REPEATS: u32 = 6;
+/// Most repetitions of a map before the call goes to the CPU. Each one has the capacities that the last one asked for.
+const MAX_REPEATS: u32 = 6;
 
-/// What a search is about.
+/// The boxes of a job.
 #[derive(Clone, Copy)]
 pub(super) enum Input<'a> {
-    /// Boxes as they are.
+    /// Boxes now.
     Boxes(&'a [Aabb]),
-    /// Boxes as they are and were.
+    /// Boxes now and at the last update.
     Motions(&'a [Motion]),
-    /// The same, as changes of what the device knows if it knows it.
+    /// The same as changes, for a device that has the boxes of the last update.
     Changes(&'a ChangeRequest<'a>),
 }
 
@@ -45,206 +44,200 @@ impl Input<'_> {
     }
 }
 
-/// Words of output for each changed box, at most, that are fetched before it is known how many there are:
-/// four pairs. What a burst of pairs needed says nothing about an update that changes little.
-const WORDS_A_CHANGE: u64 = 8;
+/// Most words of output per changed box that are prefetched: four pairs. The output of a burst of pairs says nothing about
+/// an update with few changes.
+const PREFETCHED_WORDS_PER_CHANGE: u64 = 8;
 
-/// One search.
+/// A search of boxes that fit the device at once.
 pub(super) struct Job<'a> {
     pub(super) input: Input<'a>,
     pub(super) filters: Option<&'a [ProxyFilter]>,
-    /// Only pairs of one box below and one from here on, unless 0.
+    /// If not 0: only pairs of a box below this index and a box from it on are wanted.
     pub(super) split: u32,
-    /// None: every pair is tested.
+    /// The grid; without one every pair is tested.
     pub(super) plan: Option<&'a GpuPlan>,
-    pub(super) config: &'a Config,
 }
 
 /// The state of a finder on a device, kept from call to call.
 #[derive(Debug)]
 pub(super) struct Session {
-    pub(super) engine: Arc<Engine>,
+    pub(super) device: Arc<GpuDevice>,
     pub(super) storage: Storage,
-    pub(super) mirror: Mirror,
-    /// What the device has been sent of boxes that it knows, until a submission takes it in.
-    pub(super) news: Option<News>,
-    pub(super) trail: Trail,
-    /// Whether this job searches for changes rather than overlaps.
-    pub(super) changes: bool,
-    pub(super) binds: BindGroups,
-    pub(super) clocks: [Option<Clock>; 2],
-    pub(super) room: map::Room,
-    /// The size of a set that turned out to need parts, and theirs, until buffers are looked through again.
-    pub(super) parted: Option<(usize, usize)>,
-    /// Words of output that a chunk is expected to have: how much is fetched before that is known.
-    pub(super) words: u64,
-    /// Most words of a chunk of this job; the room that the next one begins with.
-    pub(super) most_words: u64,
-    /// Room for output, in words.
-    pub(super) word_room: u64,
+    pub(super) uploaded: UploadCache,
+    /// Uploaded changes that no submission has applied yet.
+    pub(super) pending_changes: Option<PendingChanges>,
+    pub(super) motion_bounds: MotionBounds,
+    /// This job searches for changes instead of all overlaps.
+    pub(super) finds_changes: bool,
+    pub(super) bind_groups: BindGroups,
+    pub(super) timestamps: [Option<Timestamps>; 2],
+    pub(super) capacities: map::Capacities,
+    /// Number of boxes of a set that needed parts, and of its parts, until the next window of [`Storage::end_call`].
+    pub(super) split: Option<(usize, usize)>,
+    /// Expected words of output of a chunk: these are prefetched.
+    pub(super) expected_words: u64,
+    /// Most words of a chunk of this job.
+    pub(super) max_words: u64,
+    /// Capacity for output, in words.
+    pub(super) word_capacity: u64,
     pub(super) coding: CodingChoice,
     pub(super) options: GpuOptions,
-    /// The entries of this job's map, once fetched.
+    /// Entries of this job's map, once fetched.
     pub(super) table: Option<Vec<u32>>,
 }
 
 impl Session {
-    pub(super) fn new(engine: Arc<Engine>, options: &GpuOptions) -> Result<Self, GpuError> {
-        let clocks = [Clock::new(&engine)?, Clock::new(&engine)?];
+    pub(super) fn new(device: Arc<GpuDevice>, options: &GpuOptions) -> Result<Self, GpuError> {
+        let timestamps = [Timestamps::new(&device)?, Timestamps::new(&device)?];
         Ok(Self {
-            storage: Storage::new(&engine, options),
-            mirror: Mirror::new(),
-            news: None,
-            trail: Trail::default(),
-            changes: false,
-            binds: BindGroups::default(),
-            clocks,
-            room: map::Room::default(),
-            parted: None,
-            words: 0,
-            most_words: 0,
-            word_room: 0,
+            storage: Storage::new(&device, options),
+            uploaded: UploadCache::default(),
+            pending_changes: None,
+            motion_bounds: MotionBounds::default(),
+            finds_changes: false,
+            bind_groups: BindGroups::default(),
+            timestamps,
+            capacities: map::Capacities::default(),
+            split: None,
+            expected_words: 0,
+            max_words: 0,
+            word_capacity: 0,
             coding: CodingChoice::default(),
             options: *options,
             table: None,
-            engine,
+            device,
         })
     }
 
-    /// Finds the pairs of a job, completely.
-    pub(super) fn run(&mut self, job: &Job<'_>, sink: &mut Sink<'_>) -> Result<(), Failure> {
+    /// Finds all pairs of a job.
+    pub(super) fn run(&mut self, job: &Job<'_>, sink: &mut Sink) -> Result<(), Failure> {
         let first = self.start(job, sink.left(), &mut sink.report)?;
-        self.complete(job, first, sink)
-    }
-
-    /// Finds the pairs of a job whose first submission is on its way.
-    pub(super) fn complete(
-        &mut self,
-        job: &Job<'_>,
-        first: First,
-        sink: &mut Sink<'_>,
-    ) -> Result<(), Failure> {
         let result =
             if job.plan.is_some() { self.search_grid(first, sink) } else { self.search_all(first, sink) };
         sink.report.device_bytes = sink.report.device_bytes.max(self.storage.bytes());
         result
     }
 
+    /// Uploads the boxes of a job.
     pub(super) fn upload(&mut self, job: &Job<'_>) -> Result<(), GpuError> {
-        let (engine, storage, mirror) = (&self.engine, &mut self.storage, &mut self.mirror);
-        self.changes = !matches!(job.input, Input::Boxes(_));
-        self.news = None;
+        let (device, storage, uploaded) = (&self.device, &mut self.storage, &mut self.uploaded);
+        self.finds_changes = !matches!(job.input, Input::Boxes(_));
+        self.pending_changes = None;
         match job.input {
-            Input::Boxes(boxes) => mirror.upload(engine, storage, boxes, job.filters)?,
-            Input::Motions(motions) => mirror.upload_motions(engine, storage, motions, job.filters)?,
+            Input::Boxes(boxes) => uploaded.upload(device, storage, boxes, job.filters)?,
+            Input::Motions(motions) => uploaded.upload_motions(device, storage, motions, job.filters)?,
             Input::Changes(request) => {
-                self.news = mirror.upload_changes(engine, storage, request)?;
-                self.words = self.words.min(WORDS_A_CHANGE * request.changed.len() as u64);
+                self.pending_changes = uploaded.upload_changes(device, storage, request)?;
+                self.expected_words =
+                    self.expected_words.min(PREFETCHED_WORDS_PER_CHANGE * request.changed.len() as u64);
             }
         }
         Ok(())
     }
 
-    /// To be called after a call, which is one job or several.
+    /// Notes the end of a call, which is one job or several.
     pub(super) fn end_call(&mut self) {
         if self.storage.end_call() {
-            self.parted = None;
+            self.split = None;
         }
     }
 
-    /// Makes room anew: what a set needed that was too large is not what its parts need.
-    pub(super) fn forget_needs(&mut self) {
-        self.room = map::Room::default();
-        (self.words, self.most_words, self.word_room) = (0, 0, 0);
+    /// Resets the capacities: a set that was too large says nothing about its parts.
+    pub(super) fn reset_capacities(&mut self) {
+        self.capacities = map::Capacities::default();
+        (self.expected_words, self.max_words, self.word_capacity) = (0, 0, 0);
     }
 
+    /// Returns the parameters of a job, without capacities.
     pub(super) fn params(&self, job: &Job<'_>) -> Params {
         let mut params = job.plan.map_or(Params::default(), GpuPlan::params);
         params.boxes = job.input.len() as u32;
-        params.small_cell = job.config.small_cell.clamp(1, LANES);
-        // An item's output must fit the smallest buffer.
-        params.columns = if self.storage.most_bytes() < 8 << 20 { 1 } else { 8 };
+        params.small_cell = self.options.small_cell.clamp(1, LANES);
+        // The output of a work item must fit the smallest buffer.
+        params.columns = if self.storage.max_buffer_bytes() < 8 << 20 { 1 } else { 8 };
         params.flags = if job.filters.is_some() { FILTERED } else { 0 };
         params.split = job.split;
-        if let Some(news) = self.news {
-            (params.known, params.moves, params.refilters) = (news.known, news.moves, news.refilters);
+        if let Some(changes) = self.pending_changes {
+            params.known = changes.known;
+            (params.box_changes, params.filter_changes) = (changes.boxes, changes.filters);
         }
         params
     }
 
-    /// The wanted coding. Changes are rarely so many that records or bits are smaller, and bursts of them end.
+    /// Returns the coding. Changes are rarely so many that records or bits are smaller, and bursts of them end.
     pub(super) fn coding(&self) -> Coding {
         match self.options.coding {
-            Coding::Auto if self.changes => Coding::Plain,
+            Coding::Auto if self.finds_changes => Coding::Plain,
             coding => coding,
         }
     }
 
-    /// Work items in a chunk; a program that plays a GPU gets fewer, lest it passes for one that hangs.
-    pub(super) fn chunk(&self) -> [u32; 2] {
-        let share = if self.engine.software { 4 } else { 1 };
+    /// Returns the work items of a chunk. A software adapter gets fewer, so that it answers in time.
+    pub(super) fn chunk_items(&self) -> [u32; 2] {
+        let share = if self.device.is_software { 4 } else { 1 };
         self.options.chunk.map(|items| (items / share).max(1))
     }
 
-    /// Without a grid (Avril 3.2), one submission.
-    fn search_all(&mut self, first: First, sink: &mut Sink<'_>) -> Result<(), Failure> {
-        let (mut params, mut first) = (first.params, Some(first.flight));
-        for _ in 0..MOST_REPEATS {
-            let flight = match first.take() {
-                Some(flight) => flight,
-                None => self.launch_all(&params, sink.left())?,
+    /// Tests every pair (Avril 3.2), in one submission.
+    fn search_all(&mut self, first: FirstSubmission, sink: &mut Sink) -> Result<(), Failure> {
+        let (mut params, mut first) = (first.params, Some(first.chunk));
+        for _ in 0..MAX_REPEATS {
+            let chunk = match first.take() {
+                Some(chunk) => chunk,
+                None => self.submit_all(&params, sink.left())?,
             };
             let fixed = (params.flags & BITS != 0).then(|| bit_words(&params));
-            match self.land(flight, &params, fixed, sink)?.1 {
-                Landed::Done => {
+            match self.finish_chunk(chunk, &params, fixed, sink)?.1 {
+                ChunkResult::Done => {
                     sink.report.chunks += 1;
                     return Ok(());
                 }
-                Landed::Overflow(words) => self.word_room = words,
-                Landed::NoMap => {}
+                ChunkResult::OutputTooLarge(words) => self.word_capacity = words,
+                ChunkResult::MapTooLarge => {}
             }
-            // One bit a pair has room in the smallest buffer.
-            params.flags |= if self.word_room > self.storage.most_bytes() / 4 { BITS } else { 0 };
+            // One bit a pair fits the smallest buffer.
+            params.flags |= if self.word_capacity > self.storage.max_buffer_bytes() / 4 { BITS } else { 0 };
             sink.report.repeats += 1;
         }
-        Err(self.no_room().into())
+        Err(self.too_large().into())
     }
 
-    /// With a grid: map, schedule and the first chunk in one submission; the other chunks after it.
-    fn search_grid(&mut self, first: First, sink: &mut Sink<'_>) -> Result<(), Failure> {
-        let (mut params, mut first) = (first.params, Some(first.flight));
+    /// Searches with a grid: map, schedule and the first chunk in one submission, then the other chunks.
+    fn search_grid(&mut self, first: FirstSubmission, sink: &mut Sink) -> Result<(), Failure> {
+        let (mut params, mut first) = (first.params, Some(first.chunk));
         let packed = params.flags & PACKED != 0;
-        let before = (sink.written, sink.report.compression);
-        for _ in 0..MOST_REPEATS {
-            let flight = match first.take() {
-                Some(flight) => flight,
-                None => self.launch_grid(&mut params, sink.left())?,
+        let before = (sink.pair_count, sink.words);
+        for _ in 0..MAX_REPEATS {
+            let chunk = match first.take() {
+                Some(chunk) => chunk,
+                None => self.submit_grid(&mut params, sink.left())?,
             };
-            let (counters, landed) = self.land(flight, &params, None, sink)?;
-            self.room.needed = counters;
-            if !matches!(landed, Landed::NoMap) {
-                let rest = self.note(landed, self.first_chunk(), counters, sink);
+            let (counters, result) = self.finish_chunk(chunk, &params, None, sink)?;
+            self.capacities.needed = counters;
+            if !matches!(result, ChunkResult::MapTooLarge) {
+                let rest = self.after_first(result, self.first_chunk(), counters, sink);
                 self.search_rest(&params, rest, sink)?;
-                let (pairs, words) = (sink.written - before.0, sink.report.compression - before.1);
-                self.coding.learn(packed, pairs, words as u64, self.room.needed.entries);
+                let (pairs, words) = (sink.pair_count - before.0, sink.words - before.1);
+                self.coding.learn(packed, pairs, words, counters.entries);
                 return Ok(());
             }
             sink.report.repeats += 1;
         }
-        Err(self.no_room().into())
+        Err(self.too_large().into())
     }
 
-    /// What is left to do after the first chunk: all of it again if its output had no room.
-    fn note(&mut self, landed: Landed, first: Chunk, found: Counters, sink: &mut Sink<'_>) -> Chunk {
-        let done = match landed {
-            Landed::Done | Landed::NoMap => first,
-            Landed::Overflow(words) => {
-                self.word_room = words;
+    /// Returns the work items that are left after the first chunk: all of them if its output did not fit.
+    fn after_first(&mut self, result: ChunkResult, first: Chunk, found: Counters, sink: &mut Sink) -> Chunk {
+        let is_done = matches!(result, ChunkResult::Done);
+        let done = match result {
+            ChunkResult::Done | ChunkResult::MapTooLarge => first,
+            ChunkResult::OutputTooLarge(words) => {
+                self.word_capacity = words;
                 sink.report.repeats += 1;
                 Chunk::default()
             }
         };
-        sink.report.chunks += u32::from(matches!(landed, Landed::Done));
+        sink.report.chunks += u32::from(is_done);
         let (first_small, first_large) =
             (found.small_items.min(done.small_items), found.large_items.min(done.large_items));
         Chunk {
@@ -256,27 +249,26 @@ impl Session {
         }
     }
 
-    /// The other chunks: two at a time, so that the device checks one while the host decodes the other
-    /// (PBIG 5.3).
-    fn search_rest(&mut self, params: &Params, rest: Chunk, sink: &mut Sink<'_>) -> Result<(), Failure> {
-        let mut pending: VecDeque<Chunk> = cut(rest, self.chunk()).into();
-        let mut flights: VecDeque<Flight> = VecDeque::new();
+    /// Searches the other chunks, two at a time: the device checks one while the host decodes the other (PBIG 5.3).
+    fn search_rest(&mut self, params: &Params, rest: Chunk, sink: &mut Sink) -> Result<(), Failure> {
+        let mut pending: VecDeque<Chunk> = cut(rest, self.chunk_items()).into();
+        let mut in_progress: VecDeque<PendingChunk> = VecDeque::new();
         let most = if self.options.pipelining { 2 } else { 1 };
-        let mut side = 0;
+        let mut side = Side::First;
         loop {
-            while flights.len() < most
-                && let Some(chunk) = pending.pop_front()
+            while in_progress.len() < most
+                && let Some(items) = pending.pop_front()
             {
-                side = 1 - side;
-                flights.push_back(self.launch_chunk(params, chunk, side, sink.left())?);
+                side = side.other();
+                in_progress.push_back(self.submit_items(params, items, side, sink.left())?);
             }
-            let Some(flight) = flights.pop_front() else { return Ok(()) };
-            let chunk = flight.chunk;
-            match self.land(flight, params, None, sink)?.1 {
-                Landed::Done | Landed::NoMap => sink.report.chunks += 1,
-                Landed::Overflow(words) => {
+            let Some(chunk) = in_progress.pop_front() else { return Ok(()) };
+            let items = chunk.items;
+            match self.finish_chunk(chunk, params, None, sink)?.1 {
+                ChunkResult::Done | ChunkResult::MapTooLarge => sink.report.chunks += 1,
+                ChunkResult::OutputTooLarge(words) => {
                     sink.report.repeats += 1;
-                    for part in self.smaller(chunk, words)?.into_iter().rev() {
+                    for part in self.smaller(items, words)?.into_iter().rev() {
                         pending.push_front(part);
                     }
                 }
@@ -284,42 +276,42 @@ impl Session {
         }
     }
 
-    /// A chunk again with the room it needs, or in halves if that is more than a buffer may have.
+    /// Returns a chunk whose output was too large: whole with more capacity, or in halves if a buffer cannot be so large.
     fn smaller(&mut self, chunk: Chunk, words: u64) -> Result<Vec<Chunk>, GpuError> {
-        if words <= self.storage.most_bytes() / 4 {
-            self.word_room = self.word_room.max(words);
+        if words <= self.storage.max_buffer_bytes() / 4 {
+            self.word_capacity = self.word_capacity.max(words);
             return Ok(vec![chunk]);
         }
-        self.word_room = self.storage.most_bytes() / 4;
+        self.word_capacity = self.storage.max_buffer_bytes() / 4;
         let halves = cut(chunk, [chunk.small_items.div_ceil(2).max(1), chunk.large_items.div_ceil(2).max(1)]);
-        if halves.len() < 2 { Err(self.no_room()) } else { Ok(halves) }
+        if halves.len() < 2 { Err(self.too_large()) } else { Ok(halves) }
     }
 
-    fn no_room(&self) -> GpuError {
-        let limit = self.storage.most_bytes();
-        GpuError::TooLarge { what: "the output of one work item", bytes: 4 * self.word_room, limit }
+    fn too_large(&self) -> GpuError {
+        let limit = self.storage.max_buffer_bytes();
+        GpuError::TooLarge { what: "the output of one work item", bytes: 4 * self.word_capacity, limit }
     }
 
-    fn launch_chunk(
+    fn submit_items(
         &mut self,
         params: &Params,
-        chunk: Chunk,
-        side: usize,
+        items: Chunk,
+        side: Side,
         left: u64,
-    ) -> Result<Flight, GpuError> {
-        self.launch(params, chunk, side, self.word_room, left, &mut |commands| {
-            if chunk.small_items > 0 {
-                commands.run(&shaders::CHECK_SMALL, Groups::Direct(chunk.small_items))?;
+    ) -> Result<PendingChunk, GpuError> {
+        self.submit_chunk(params, items, side, self.word_capacity, left, &mut |commands| {
+            if items.small_items > 0 {
+                commands.run(&shaders::CHECK_SMALL, Groups::Direct(items.small_items))?;
             }
-            if chunk.large_items > 0 {
-                commands.run(&shaders::CHECK_LARGE, Groups::Direct(chunk.large_items))?;
+            if items.large_items > 0 {
+                commands.run(&shaders::CHECK_LARGE, Groups::Direct(items.large_items))?;
             }
             Ok(())
         })
     }
 }
 
-/// A range of work items in chunks.
+/// Cuts a range of work items into chunks.
 fn cut(all: Chunk, [small, large]: [u32; 2]) -> Vec<Chunk> {
     let (small, large) = (small.max(1), large.max(1));
     let count = all.small_items.div_ceil(small).max(all.large_items.div_ceil(large));

@@ -1,71 +1,71 @@
-//! One kernel alone, on given buffers, and updates alone, without a broad phase around them: for tests,
-//! and for studies.
+//! For tests and studies: single kernels on given buffers, and searches for changes without a broad phase.
 
 pub use super::changes::{Change, ChangeRequest};
-use super::engine::{Engine, Variant};
-use super::{Failure, GpuError, GpuFinder, Request, readback};
+use super::device::{GpuDevice, Variant};
+use super::{Failure, GpuError, GpuFinder, GpuFound, GpuPlan, SearchRequest, readback};
 use crate::config::GpuOptions;
-use crate::cpu::found::Found;
-use crate::plan::Summary;
-use crate::report::Report;
+use crate::layout::Params;
+use crate::pbig::Summary;
+use crate::report::{Checks, GpuReport};
 use crate::{Aabb, Config, Pair};
 use pbig_shaders::Kernel;
 use std::error::Error;
 use std::time::{Duration, Instant};
 
-/// Copies in a submission that is timed, so that handing it over counts for little.
+/// Copies in a timed submission: so many that the submission itself counts for little.
 const COPIES: u64 = 16;
 
 /// A device to run single kernels on.
 #[derive(Debug)]
 pub struct Bench {
-    engine: Engine,
+    device: GpuDevice,
 }
 
 impl Bench {
-    /// On the best adapter, or on that of `WGPU_ADAPTER_NAME`.
+    /// Opens the best adapter, or the one that `WGPU_ADAPTER_NAME` names.
     ///
     /// # Errors
-    /// When there is no adapter, or it gives no device that the kernels can run on.
+    /// If there is no adapter, or it gives no device that the kernels can run on.
     pub fn new() -> Result<Self, GpuError> {
         Self::on_adapter(None, true)
     }
 
-    /// On the adapter of a name, or the best; with or without its subgroups.
+    /// Opens the adapter of a name, or the best. Its subgroups are used or not.
     ///
     /// # Errors
     /// As [`Bench::new`].
     pub fn on_adapter(name: Option<&str>, subgroups: bool) -> Result<Self, GpuError> {
-        let mut engine = Engine::on(&super::adapter::choose(name)?)?;
-        engine.subgroups &= subgroups;
-        Ok(Self { engine })
+        let mut device = GpuDevice::on(&super::adapter::choose(name)?)?;
+        device.has_subgroups &= subgroups;
+        Ok(Self { device })
     }
 
-    /// Whether the kernels for subgroups run.
+    /// Returns true if the kernels for subgroups run.
     pub fn subgroups(&self) -> bool {
-        self.engine.subgroups
+        self.device.has_subgroups
     }
 
-    /// Bytes per second that the device reads and writes while it copies (a copied byte counts twice): the
-    /// best of five submissions of sixteen copies of `bytes` bytes, or of as many as a buffer may have.
+    /// Returns the bytes per second that the device reads and writes while it copies; a copied byte counts twice.
+    ///
+    /// This is the best of five submissions of sixteen copies of `bytes` bytes, or of a buffer's limit.
     ///
     /// # Errors
-    /// When the device refuses, is lost or does not answer in time.
+    /// If the device refuses, is lost or does not answer in time.
     pub fn copy_rate(&self, bytes: u64) -> Result<f64, GpuError> {
         use wgpu::BufferUsages as Usage;
-        let engine = &self.engine;
-        engine.watch(|| {
-            let bytes = bytes.min(engine.most_bytes(&GpuOptions::DEFAULT));
+        let device = &self.device;
+        device.watch(|| {
+            let bytes = bytes.min(device.max_buffer_bytes(&GpuOptions::DEFAULT));
             let usage = Usage::COPY_SRC | Usage::COPY_DST;
-            let (from, to) = (engine.buffer("from", bytes, usage)?, engine.buffer("to", bytes, usage)?);
+            let (from, to) = (device.buffer("from", bytes, usage)?, device.buffer("to", bytes, usage)?);
             let copy = || {
                 let mut encoder =
-                    engine.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+                    device.handle.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
                 for _ in 0..COPIES {
                     encoder.copy_buffer_to_buffer(&from, 0, &to, 0, bytes);
                 }
                 let clock = Instant::now();
-                engine.wait(engine.submit(encoder), GpuOptions::DEFAULT.patience)?;
+                device.wait(device.submit(encoder), GpuOptions::DEFAULT.patience)?;
                 Ok::<_, GpuError>(clock.elapsed().as_secs_f64())
             };
             // The first copy also clears the buffers.
@@ -75,12 +75,12 @@ impl Bench {
         })
     }
 
-    /// Runs a kernel on the bytes of each of its bindings, in their order, and returns the bytes that
-    /// they have afterwards; uniforms come back as they were. Of kernels that have two texts, the one for
-    /// a search for changes if `changes`.
+    /// Runs a kernel on the bytes of its bindings, in their order, and returns the bytes afterwards.
+    ///
+    /// Uniforms come back unchanged. If a kernel has two texts, `changes` picks the one for a search for changes.
     ///
     /// # Errors
-    /// When the device refuses, is lost or does not answer within [`GpuOptions::patience`].
+    /// If the device refuses, is lost or does not answer within [`GpuOptions::patience`].
     pub fn run(
         &self,
         kernel: &'static Kernel,
@@ -93,7 +93,7 @@ impl Bench {
             let (wanted, found) = (kernel.bindings.len(), bindings.len());
             return Err(GpuError::Refused(format!("{}: {found} buffers for {wanted} bindings", kernel.name)));
         }
-        self.engine.watch(|| {
+        self.device.watch(|| {
             self.run_watched(kernel, Variant::new(options, changes), options.patience, bindings, workgroups)
         })
     }
@@ -107,27 +107,26 @@ impl Bench {
         workgroups: u32,
     ) -> Result<Vec<Vec<u8>>, GpuError> {
         use wgpu::BufferUsages as Usage;
-        let (engine, device) = (&self.engine, &self.engine.device);
-        let pipeline = engine.pipeline(kernel, variant)?;
-        let is_uniform = |name: &str| matches!(name, "params" | "chunk");
+        let (device, handle) = (&self.device, &self.device.handle);
+        let pipeline = device.pipeline(kernel, variant)?;
         let mut buffers = Vec::new();
-        for (&name, bytes) in kernel.bindings.iter().zip(bindings) {
-            let usage = if is_uniform(name) { Usage::UNIFORM } else { Usage::STORAGE };
+        for (&binding, bytes) in kernel.bindings.iter().zip(bindings) {
+            let usage = if binding.is_uniform() { Usage::UNIFORM } else { Usage::STORAGE };
             let size = bytes.len().max(16) as u64;
-            let buffer = engine.buffer(name, size, usage | Usage::COPY_DST | Usage::COPY_SRC)?;
-            engine.queue.write_buffer(&buffer, 0, bytes);
+            let buffer = device.buffer(binding.name(), size, usage | Usage::COPY_DST | Usage::COPY_SRC)?;
+            device.queue.write_buffer(&buffer, 0, bytes);
             buffers.push(buffer);
         }
         let bound: Vec<_> = (0..)
             .zip(&buffers)
             .map(|(binding, buffer)| wgpu::BindGroupEntry { binding, resource: buffer.as_entire_binding() })
             .collect();
-        let group = device.create_bind_group(&wgpu::BindGroupDescriptor {
+        let group = handle.create_bind_group(&wgpu::BindGroupDescriptor {
             label: Some(kernel.name),
             layout: &pipeline.get_bind_group_layout(0),
             entries: &bound,
         });
-        let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+        let mut encoder = handle.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
         {
             let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor::default());
             pass.set_pipeline(&pipeline);
@@ -135,14 +134,14 @@ impl Bench {
             pass.dispatch_workgroups(workgroups.min(32_768), workgroups.div_ceil(32_768), 1);
         }
         let all: u64 = buffers.iter().map(wgpu::Buffer::size).sum();
-        let staging = engine.buffer("staging", all, Usage::MAP_READ | Usage::COPY_DST)?;
+        let staging = device.buffer("staging", all, Usage::MAP_READ | Usage::COPY_DST)?;
         let mut at = 0;
         for buffer in &buffers {
             encoder.copy_buffer_to_buffer(buffer, 0, &staging, at, buffer.size());
             at += buffer.size();
         }
-        let submission = engine.submit(encoder);
-        readback::read(engine, &staging, all, submission, patience, |mut rest| {
+        let submission = device.submit(encoder);
+        readback::read(device, &staging, all, submission, patience, |mut rest| {
             let take = |(bytes, buffer): (&Vec<u8>, &wgpu::Buffer)| {
                 let (own, more) = rest.split_at(buffer.size() as usize);
                 rest = more;
@@ -153,61 +152,63 @@ impl Bench {
     }
 }
 
-/// What an update of a [`Tracker`] has found.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Tracked {
-    /// Pairs that filters allow and that overlap now and did not before, or the other way round, in no
-    /// particular order.
-    pub pairs: Vec<Pair>,
-    /// Boxes that were searched as if they had not been there before.
-    pub restarted: Vec<u32>,
-    /// What was done.
-    pub report: Report,
+/// Returns the kernels' parameters for a grid of the boxes with at most `max_cells` cells, as far as the plan sets them.
+pub fn plan_params(boxes: &[Aabb], options: &GpuOptions, max_cells: u32) -> Params {
+    GpuPlan::new(&Summary::of(boxes), options, 1.0, max_cells).params()
 }
 
-/// Searches for changes on a device, update by update, and nothing but that.
+/// The changes that an update of a [`Tracker`] found.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Tracked {
+    /// Allowed pairs that overlap now and did not before, or the other way round, in no particular order.
+    pub pairs: Vec<Pair>,
+    /// Ids of boxes that the device treated as new.
+    pub restarted: Vec<u32>,
+    /// Tests made.
+    pub checks: Checks,
+    /// Work of the device.
+    pub report: GpuReport,
+}
+
+/// A device that searches for changes, update by update, without a broad phase.
 #[derive(Debug)]
 pub struct Tracker {
     gpu: GpuFinder,
-    found: Found,
 }
 
 impl Tracker {
-    /// On this device.
+    /// Returns a tracker on the device.
     pub fn new(gpu: GpuFinder) -> Self {
-        Self { gpu, found: Found::default() }
+        Self { gpu }
     }
 
-    /// The device, to make it fail.
+    /// Returns the device, so that a test can make it fail.
     pub fn gpu(&self) -> &GpuFinder {
         &self.gpu
     }
 
-    /// The pairs that an update changes.
+    /// Finds the pairs that an update changes.
     ///
     /// # Errors
-    /// When the device fails, and with the error that the CPU would end in, too.
+    /// If the device fails, or if the CPU would end in an error, too.
     pub fn update(&mut self, request: &ChangeRequest<'_>) -> Result<Tracked, Box<dyn Error>> {
-        let mut report = Report::default();
-        let restarted = match self.gpu.changes(request, &mut self.found, &mut report) {
-            Ok(restarted) => restarted,
-            Err(Failure::Call(error)) => return Err(error.into()),
-            Err(Failure::Device(error)) => return Err(error.into()),
-        };
-        Ok(Tracked { pairs: self.found.chunks.concat(), restarted, report })
+        let GpuFound { pairs, restarted, checks, report, .. } = self.gpu.changes(request).map_err(boxed)?;
+        Ok(Tracked { pairs: pairs.concat(), restarted, checks, report })
     }
 
-    /// All pairs of boxes, on the same device and its buffers, in no particular order.
+    /// Finds all pairs of boxes, on the same device and its buffers, in no particular order.
     ///
     /// # Errors
     /// As [`Tracker::update`].
     pub fn find(&mut self, boxes: &[Aabb], config: &Config) -> Result<Vec<Pair>, Box<dyn Error>> {
-        let summary = &Summary::of(boxes, None);
-        let request = Request { boxes, filters: None, accept: None, summary, config };
-        match self.gpu.find(&request, &mut self.found, &mut Report::default()) {
-            Ok(()) => Ok(self.found.chunks.concat()),
-            Err(Failure::Call(error)) => Err(error.into()),
-            Err(Failure::Device(error)) => Err(error.into()),
-        }
+        let request = SearchRequest { boxes, filters: None, config };
+        Ok(self.gpu.find(&request).map_err(boxed)?.pairs.concat())
+    }
+}
+
+fn boxed(failure: Failure) -> Box<dyn Error> {
+    match failure {
+        Failure::Call(error) => error.into(),
+        Failure::Device(error) => error.into(),
     }
 }

@@ -1,189 +1,188 @@
-//! Upload: boxes and filters go to the device once; later calls send only the blocks that changed, or the
-//! changes that they are given.
+//! Upload: boxes and filters go to the device once. Later calls send only the blocks that changed, or the changes that the
+//! caller lists.
 
 use super::ChangeRequest;
 use super::GpuError;
 use super::commands::{Commands, Groups};
-use super::engine::Engine;
+use super::device::GpuDevice;
 use super::storage::Storage;
-use crate::layout::{Box as DeviceBox, LANES, Motion, Move, Refilter};
+use crate::layout::{DeviceBox, LANES, Motion};
 use crate::{Aabb, ProxyFilter};
 use bytemuck::{Pod, cast_slice};
-use pbig_shaders as shaders;
+use pbig_shaders::{self as shaders, Buffer};
 use rayon::prelude::*;
 use std::ops::Range;
 
-/// Elements that are sent together: one that changed costs 6 KiB, and a million are 4096 comparisons
-/// of memory.
+/// Elements that are compared and sent together. A changed element costs 6 KiB; a million elements are 4096 comparisons of
+/// memory.
 const BLOCK: usize = 256;
 
-/// Blocks in between that are sent along rather than split a transfer.
-const GAP: usize = 2;
+/// Most unchanged blocks between two changed ones that are sent along, to join two transfers.
+const MAX_GAP_BLOCKS: usize = 2;
 
-/// Transfers, an allocation each, beyond which all in between is sent along.
-const MOST_RANGES: usize = 32;
+/// Most transfers, each of which allocates. If there would be more, one transfer sends everything in between.
+const MAX_RANGES: usize = 32;
 
-/// Elements that are worth another thread: 10 us of work.
+/// Fewest elements for a thread: 10 us of work.
 pub(super) const PIECE: usize = 1 << 14;
 
-/// What the device has.
-#[derive(Debug)]
-pub(super) struct Mirror {
+/// The boxes and filters that the device has.
+#[derive(Debug, Default)]
+pub(super) struct UploadCache {
     boxes: Vec<Aabb>,
     filters: Vec<ProxyFilter>,
-    /// In place of both, after a search for changes of all boxes at once.
-    motions: Option<Known>,
+    /// In place of both lists: the update whose motions the device has.
+    motions: Option<KnownMotions>,
     /// Bytes sent in this call.
-    pub(super) sent: u64,
+    pub(super) bytes_sent: u64,
 }
 
-/// Boxes, now and before, that the device has as an update has left them.
+/// An update whose boxes the device has, now and before.
 #[derive(Clone, Copy, Debug)]
-struct Known {
+struct KnownMotions {
     update: u64,
     boxes: usize,
 }
 
-/// What the device has been sent of boxes that it knows, for `settle` and `renew` to take in.
+/// Uploaded lists of changes, which the kernels `store_previous` and `apply_changes` have yet to apply.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct News {
+pub(super) struct PendingChanges {
+    /// Number of boxes that the device has.
     pub(super) known: u32,
-    pub(super) moves: u32,
-    pub(super) refilters: u32,
+    /// Length of the list of changed boxes.
+    pub(super) boxes: u32,
+    /// Length of the list of changed filters.
+    pub(super) filters: u32,
 }
 
-impl News {
-    /// What boxes are becomes what they were, then the changed ones become what they are.
+impl PendingChanges {
+    /// Records the kernels that apply the changes.
     pub(super) fn record(self, commands: &mut Commands<'_>) -> Result<(), GpuError> {
-        commands.run(&shaders::SETTLE, Groups::Direct(self.known.div_ceil(LANES)))?;
-        let changes = self.moves.max(self.refilters);
-        commands.run(&shaders::RENEW, Groups::Direct(changes.div_ceil(LANES)))
+        commands.run(&shaders::STORE_PREVIOUS, Groups::Direct(self.known.div_ceil(LANES)))?;
+        let longest = self.boxes.max(self.filters);
+        commands.run(&shaders::APPLY_CHANGES, Groups::Direct(longest.div_ceil(LANES)))
     }
 }
 
-/// Whether an update is the one after another.
+/// Returns true if an update comes right after another.
 pub(super) fn follows(before: Option<u64>, update: u64) -> bool {
     before.is_some_and(|before| before.checked_add(1) == Some(update))
 }
 
-impl Mirror {
-    pub(super) fn new() -> Self {
-        Self { boxes: Vec::new(), filters: Vec::new(), motions: None, sent: 0 }
-    }
-
-    /// The device's motions are no longer what an update has left.
+impl UploadCache {
+    /// Forgets which motions the device has: the next search for changes uploads all boxes.
     pub(super) fn forget_motions(&mut self) {
         self.motions = None;
     }
 
-    /// Sends boxes as they are and were, whatever the device has.
+    /// Uploads boxes now and before, whatever the device has.
     pub(super) fn upload_motions(
         &mut self,
-        engine: &Engine,
+        device: &GpuDevice,
         storage: &mut Storage,
         motions: &[Motion],
         filters: Option<&[ProxyFilter]>,
     ) -> Result<(), GpuError> {
-        self.replace_boxes();
-        storage.ensure(engine, "boxes", size_of_val(motions) as u64)?;
-        self.sent = write(engine, storage.get("boxes"), 0, motions);
-        let filters = filters.unwrap_or(&[]);
-        storage.ensure(engine, "filters", size_of_val(filters) as u64)?;
-        self.sent += write(engine, storage.get("filters"), 0, filters);
-        Ok(())
-    }
-
-    /// Sends what has changed, or everything to a device that does not know the update before.
-    pub(super) fn upload_changes(
-        &mut self,
-        engine: &Engine,
-        storage: &mut Storage,
-        request: &ChangeRequest<'_>,
-    ) -> Result<Option<News>, GpuError> {
-        let len = request.boxes.len();
-        let known = self.motions.filter(|known| follows(Some(known.update), request.update));
-        let room = (len * size_of::<Motion>()) as u64;
-        let renewed = storage.ensure(engine, "boxes", room)?
-            | storage.ensure(engine, "filters", size_of_val(request.filters) as u64)?;
-        let news = match known.filter(|_| !renewed) {
-            Some(known) => Some(self.send_changes(engine, storage, request, known.boxes.min(len))?),
-            None => {
-                let motions = request.motions(0..len);
-                self.upload_motions(engine, storage, &motions, Some(request.filters))?;
-                None
-            }
-        };
-        self.motions = Some(Known { update: request.update, boxes: len });
-        Ok(news)
-    }
-
-    /// Lists of what has changed, and the boxes that are new at the end.
-    fn send_changes(
-        &mut self,
-        engine: &Engine,
-        storage: &mut Storage,
-        request: &ChangeRequest<'_>,
-        known: usize,
-    ) -> Result<News, GpuError> {
-        let (moves, refilters) = request.lists(known);
-        storage.ensure(engine, "moves", size_of_val(&moves[..]) as u64)?;
-        storage.ensure(engine, "refilters", size_of_val(&refilters[..]) as u64)?;
-        let at_end = request.motions(known..request.boxes.len());
-        self.sent = write::<Move>(engine, storage.get("moves"), 0, &moves)
-            + write::<Refilter>(engine, storage.get("refilters"), 0, &refilters)
-            + write(engine, storage.get("boxes"), known, &at_end)
-            + write(engine, storage.get("filters"), known, &request.filters[known..]);
-        Ok(News { known: known as u32, moves: moves.len() as u32, refilters: refilters.len() as u32 })
-    }
-
-    /// What is known of the device's boxes and filters is about to be wrong.
-    fn replace_boxes(&mut self) {
+        // The buffers no longer hold what a search for all pairs has left.
         self.boxes.clear();
         self.filters.clear();
         self.motions = None;
+        storage.ensure_bound(device, Buffer::Boxes, size_of_val(motions) as u64)?;
+        self.bytes_sent = write(device, storage, Buffer::Boxes, 0, motions);
+        let filters = filters.unwrap_or(&[]);
+        storage.ensure_bound(device, Buffer::Filters, size_of_val(filters) as u64)?;
+        self.bytes_sent += write(device, storage, Buffer::Filters, 0, filters);
+        Ok(())
     }
 
-    /// Brings the device's boxes, and filters if there are any, up to date.
+    /// Uploads the changes, or all boxes to a device that does not have those of the last update.
+    pub(super) fn upload_changes(
+        &mut self,
+        device: &GpuDevice,
+        storage: &mut Storage,
+        request: &ChangeRequest<'_>,
+    ) -> Result<Option<PendingChanges>, GpuError> {
+        let len = request.boxes.len();
+        let known = self.motions.filter(|known| follows(Some(known.update), request.update));
+        let (boxes, filters) = (len * size_of::<Motion>(), size_of_val(request.filters));
+        let lost_content = storage.ensure_bound(device, Buffer::Boxes, boxes as u64)?
+            | storage.ensure_bound(device, Buffer::Filters, filters as u64)?;
+        let pending = match known.filter(|_| !lost_content) {
+            Some(known) => Some(self.send_changes(device, storage, request, known.boxes.min(len))?),
+            None => {
+                let motions = request.motions(0..len);
+                self.upload_motions(device, storage, &motions, Some(request.filters))?;
+                None
+            }
+        };
+        self.motions = Some(KnownMotions { update: request.update, boxes: len });
+        Ok(pending)
+    }
+
+    /// Sends the lists of changes of the first `known` boxes, and the boxes after these.
+    fn send_changes(
+        &mut self,
+        device: &GpuDevice,
+        storage: &mut Storage,
+        request: &ChangeRequest<'_>,
+        known: usize,
+    ) -> Result<PendingChanges, GpuError> {
+        let (boxes, filters) = request.lists(known);
+        storage.ensure_bound(device, Buffer::BoxChanges, size_of_val(&boxes[..]) as u64)?;
+        storage.ensure_bound(device, Buffer::FilterChanges, size_of_val(&filters[..]) as u64)?;
+        let new = request.motions(known..request.boxes.len());
+        self.bytes_sent = write(device, storage, Buffer::BoxChanges, 0, &boxes)
+            + write(device, storage, Buffer::FilterChanges, 0, &filters)
+            + write(device, storage, Buffer::Boxes, known, &new)
+            + write(device, storage, Buffer::Filters, known, &request.filters[known..]);
+        let (boxes, filters) = (boxes.len() as u32, filters.len() as u32);
+        Ok(PendingChanges { known: known as u32, boxes, filters })
+    }
+
+    /// Uploads the blocks of boxes and filters that differ from those on the device.
     pub(super) fn upload(
         &mut self,
-        engine: &Engine,
+        device: &GpuDevice,
         storage: &mut Storage,
         boxes: &[Aabb],
         filters: Option<&[ProxyFilter]>,
     ) -> Result<(), GpuError> {
-        self.sent = 0;
+        self.bytes_sent = 0;
         self.motions = None;
-        if storage.ensure(engine, "boxes", size_of_val(boxes) as u64)? {
+        if storage.ensure_bound(device, Buffer::Boxes, size_of_val(boxes) as u64)? {
             self.boxes.clear();
         }
-        for range in changed(&mut self.boxes, boxes) {
+        for range in update_copy(&mut self.boxes, boxes) {
             let packed = boxes[range.clone()].par_iter().with_min_len(PIECE).map(DeviceBox::new);
             let packed: Vec<DeviceBox> = packed.collect();
-            self.sent += write(engine, storage.get("boxes"), range.start, &packed);
+            self.bytes_sent += write(device, storage, Buffer::Boxes, range.start, &packed);
         }
         let filters = filters.unwrap_or(&[]);
-        if storage.ensure(engine, "filters", size_of_val(filters) as u64)? {
+        if storage.ensure_bound(device, Buffer::Filters, size_of_val(filters) as u64)? {
             self.filters.clear();
         }
-        for range in changed(&mut self.filters, filters) {
-            self.sent += write(engine, storage.get("filters"), range.start, &filters[range.clone()]);
+        for range in update_copy(&mut self.filters, filters) {
+            let changed = &filters[range.clone()];
+            self.bytes_sent += write(device, storage, Buffer::Filters, range.start, changed);
         }
         Ok(())
     }
 }
 
-fn write<T: Pod>(engine: &Engine, buffer: &wgpu::Buffer, start: usize, data: &[T]) -> u64 {
-    engine.queue.write_buffer(buffer, (start * size_of::<T>()) as u64, cast_slice(data));
+/// Writes elements into a buffer, from the element `start` on. Returns the bytes sent.
+fn write<T: Pod>(device: &GpuDevice, storage: &Storage, buffer: Buffer, start: usize, data: &[T]) -> u64 {
+    device.queue.write_buffer(storage.bound(buffer), (start * size_of::<T>()) as u64, cast_slice(data));
     size_of_val(data) as u64
 }
 
-/// Makes `old` equal to `new` and returns the ranges of `new` that differed, bit by bit: a NaN is
-/// equal to itself. Blocks that changed near each other are one range. What `new` no longer has stays:
-/// the device is told how many elements count.
-fn changed<T: Pod + Send + Sync>(old: &mut Vec<T>, new: &[T]) -> Vec<Range<usize>> {
+/// Makes `old` equal to `new`, and returns the ranges of `new` that differed. Changed blocks near each other are one range.
+///
+/// Elements are compared bit by bit, so a NaN equals itself. If `old` is longer, its rest stays: the device knows how many
+/// elements count.
+fn update_copy<T: Pod + Send + Sync>(old: &mut Vec<T>, new: &[T]) -> Vec<Range<usize>> {
     let known = old.len();
     old.extend_from_slice(new.get(known..).unwrap_or(&[]));
-    let renew = |(i, (old, new)): (usize, (&mut [T], &[T]))| {
+    let update = |(i, (old, new)): (usize, (&mut [T], &[T]))| {
         let bytes = cast_slice::<T, u8>;
         let differs = i * BLOCK + new.len() > known || bytes(&old[..new.len()]) != bytes(new);
         if differs {
@@ -192,20 +191,21 @@ fn changed<T: Pod + Send + Sync>(old: &mut Vec<T>, new: &[T]) -> Vec<Range<usize
         differs
     };
     let blocks = old.par_chunks_mut(BLOCK).zip(new.par_chunks(BLOCK)).enumerate();
-    let differs: Vec<bool> = blocks.with_min_len(PIECE / BLOCK).map(renew).collect();
+    let differs: Vec<bool> = blocks.with_min_len(PIECE / BLOCK).map(update).collect();
     ranges(&differs, new.len())
 }
 
+/// Returns the ranges of elements of the blocks that differ.
 fn ranges(differs: &[bool], len: usize) -> Vec<Range<usize>> {
     let mut ranges: Vec<Range<usize>> = Vec::new();
     for (i, _) in differs.iter().enumerate().filter(|(_, differs)| **differs) {
         let (start, end) = (i * BLOCK, len.min((i + 1) * BLOCK));
         match ranges.last_mut() {
-            Some(last) if last.end + GAP * BLOCK >= start => last.end = end,
+            Some(last) if last.end + MAX_GAP_BLOCKS * BLOCK >= start => last.end = end,
             _ => ranges.push(start..end),
         }
     }
-    if ranges.len() > MOST_RANGES {
+    if ranges.len() > MAX_RANGES {
         let end = ranges.last().map_or(0, |last| last.end);
         ranges.truncate(1);
         ranges[0].end = end;
@@ -217,9 +217,9 @@ fn ranges(differs: &[bool], len: usize) -> Vec<Range<usize>> {
 mod tests {
     use super::*;
 
-    /// Start and end of each range.
+    /// Returns start and end of each range.
     fn sent<T: Pod + Send + Sync>(old: &mut Vec<T>, new: &[T]) -> Vec<(usize, usize)> {
-        changed(old, new).into_iter().map(|range| (range.start, range.end)).collect()
+        update_copy(old, new).into_iter().map(|range| (range.start, range.end)).collect()
     }
 
     #[test]
@@ -232,7 +232,7 @@ mod tests {
         new[4 * BLOCK + 9] = 1;
         new[10 * BLOCK + 6] = 1;
         assert_eq!(sent(&mut old, &new), [(3 * BLOCK, 5 * BLOCK), (10 * BLOCK, 10 * BLOCK + 7)]);
-        // Shrunk, then grown again over what had been there.
+        // The list shrinks, then grows again over old elements.
         assert_eq!(sent(&mut old, &new[..BLOCK]), []);
         new[2 * BLOCK] = 5;
         assert_eq!(sent(&mut old, &new), [(2 * BLOCK, 3 * BLOCK)]);

@@ -148,17 +148,30 @@ impl Hits {
         if let Some(filters) = rule.filters {
             self.filter(from, filters);
         }
-        if !self.groups.is_empty() {
-            for pair in &self.pairs[from..] {
-                self.groups[(pair.a >> self.group_shift) as usize] += 1;
-            }
-        }
+        self.count_groups(from);
         let new = self.pairs.len() - self.accounted;
         if new >= BATCH {
             self.accounted = self.pairs.len();
             let found = rule.found.fetch_add(new as u64, Ordering::Relaxed) + new as u64;
             self.is_full |= found > rule.max_pairs;
         }
+    }
+
+    /// Counts the pairs from `from` on by group.
+    #[inline(always)]
+    fn count_groups(&mut self, from: usize) {
+        if !self.groups.is_empty() {
+            for pair in &self.pairs[from..] {
+                self.groups[(pair.a >> self.group_shift) as usize] += 1;
+            }
+        }
+    }
+
+    /// Takes pairs that were found elsewhere.
+    #[cfg(feature = "gpu")]
+    pub(crate) fn take(&mut self, pairs: Vec<Pair>) {
+        self.pairs = pairs;
+        self.count_groups(0);
     }
 
     /// Drops the pairs from `from` on that filters exclude.

@@ -16,7 +16,7 @@ const AHEAD: usize = 8;
 pub(super) struct Rows {
     pub(super) spans: Vec<Span>,
     pub(super) pool: Vec<u32>,
-    /// Rows that begin before this place have no spare room; others have room for the next power of two.
+    /// Rows that begin up to this place have no spare room; others have room for the next power of two.
     pub(super) packed: u32,
 }
 
@@ -26,7 +26,7 @@ impl Rows {
     }
 
     fn room(&self, span: Span) -> u32 {
-        if span.start < self.packed { span.len } else { span.len.next_power_of_two().max(MIN_ROOM) }
+        if span.start <= self.packed { span.len } else { span.len.next_power_of_two().max(MIN_ROOM) }
     }
 
     fn insert(&mut self, id: u32, other: u32) {
@@ -44,11 +44,11 @@ impl Rows {
 
     /// Says that all rows lie in the first places, without spare room. An empty row at the end lies there, too.
     pub(super) fn set_packed(&mut self, places: usize) {
-        self.packed = places as u32 + 1;
+        self.packed = places as u32;
     }
 
     fn move_to_end(&mut self, span: Span) -> Span {
-        self.pool.resize(self.pool.len().max(self.packed as usize), 0);
+        self.pool.resize(self.pool.len().max(self.packed as usize + 1), 0);
         let start = self.pool.len() as u32;
         let room = (span.len + 1).next_power_of_two().max(MIN_ROOM);
         self.pool.extend_from_within(span.range());
@@ -195,6 +195,7 @@ impl Kept {
     }
 
     /// Replaces all pairs by sorted ones.
+    #[cfg(feature = "serde")]
     pub(crate) fn replace(&mut self, pairs: &[Pair], ids: usize) {
         *self = Self::default();
         self.reserve_ids(ids);

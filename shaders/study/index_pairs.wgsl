@@ -1,9 +1,9 @@
-// For the study of Avril's mapping: the estimated row and the exact pair of each index.
+// Study of Avril's mapping: computes the estimated row and the exact pair of each index.
 
 @group(0) @binding(0) var<uniform> params: Params;
 @group(0) @binding(1) var<storage, read_write> out: array<u32>;
 
-// `params.boxes` is n, `params.cells` the number of indices from `params.split` on.
+// Parameters: `boxes` is n, `split` the first index, `cells` the number of indices.
 @compute @workgroup_size(LANES)
 fn index_pairs(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>,
                @builtin(local_invocation_index) lane: u32) {

@@ -1,4 +1,4 @@
-//! The device: pipelines, buffers, submissions. With `readback`, the only place that talks to a queue.
+//! The device: pipelines, buffers, submissions. Only this file and `readback` talk to a queue.
 
 use super::{GpuError, adapter};
 use crate::config::GpuOptions;
@@ -9,8 +9,7 @@ use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 use std::time::Duration;
 
-/// A fault to be injected by a test, at a later submission.
-#[doc(hidden)]
+/// A fault that a test injects at a later submission.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Fault {
     /// The device is destroyed before the submission.
@@ -19,106 +18,107 @@ pub enum Fault {
     OutOfMemory,
     /// The kernels do not compile.
     RefuseShader,
-    /// The device takes too long.
+    /// The device does not answer in time.
     Timeout,
-    /// wgpu panics, as it does when a device is lost while it is waited for.
+    /// wgpu panics, as it does when a device is lost during a wait.
     Panic,
 }
 
-/// What is fixed when a pipeline is made.
+/// The choices that are fixed when a pipeline is made.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub(super) struct Variant {
     root: u32,
-    balanced: bool,
-    /// Whether changes are searched for rather than overlaps.
+    is_balanced: bool,
+    /// The search is for changes instead of all pairs.
     changes: bool,
 }
 
 impl Variant {
     pub(super) fn new(options: &GpuOptions, changes: bool) -> Self {
-        Self { root: options.root.min(9), balanced: options.load_balancing, changes }
+        Self { root: options.root.min(9), is_balanced: options.load_balancing, changes }
     }
 
-    /// Two variants that are the same to a kernel are one.
-    fn to(self, kernel: &Kernel) -> Self {
-        Self { changes: self.changes && kernel.tells_changes(), ..self }
+    /// Returns the variant without the choices that the kernel does not depend on.
+    fn reduced_to(self, kernel: &Kernel) -> Self {
+        Self { changes: self.changes && kernel.depends_on_search(), ..self }
     }
 
-    /// The overrides that a kernel has.
+    /// Returns the values of the overrides that the source declares.
     fn constants(self, source: &str) -> Vec<(&'static str, f64)> {
-        let all = [("ROOT", f64::from(self.root)), ("BALANCED", f64::from(u8::from(self.balanced)))];
+        let all = [("ROOT", f64::from(self.root)), ("BALANCED", f64::from(u8::from(self.is_balanced)))];
         all.into_iter().filter(|(name, _)| source.contains(&format!("override {name}"))).collect()
     }
 }
 
-/// A device with its pipelines, shared by the finders that use it.
+/// A device with its pipelines, shared by finders.
 #[derive(Debug)]
-pub(crate) struct Engine {
-    pub(super) device: wgpu::Device,
+pub(crate) struct GpuDevice {
+    pub(super) handle: wgpu::Device,
     pub(super) queue: wgpu::Queue,
     pub(super) name: String,
-    pub(super) software: bool,
-    pub(super) subgroups: bool,
-    pub(super) timestamps: bool,
+    pub(super) is_software: bool,
+    pub(super) has_subgroups: bool,
+    pub(super) has_timestamps: bool,
     pipelines: Mutex<HashMap<(&'static str, Variant), wgpu::ComputePipeline>>,
-    lost: AtomicBool,
+    is_lost: AtomicBool,
     fault: Mutex<Option<Fault>>,
     /// Submissions until the fault.
     countdown: AtomicU32,
 }
 
-impl Engine {
+impl GpuDevice {
     pub(super) fn new(device: wgpu::Device, queue: wgpu::Queue) -> Result<Self, GpuError> {
         check_limits(&device.limits())?;
         let (features, info) = (device.features(), device.adapter_info());
         Ok(Self {
             name: adapter::describe(&info),
-            software: info.device_type == wgpu::DeviceType::Cpu,
-            subgroups: features.contains(wgpu::Features::SUBGROUP),
-            timestamps: features.contains(wgpu::Features::TIMESTAMP_QUERY),
-            device,
+            is_software: info.device_type == wgpu::DeviceType::Cpu,
+            has_subgroups: features.contains(wgpu::Features::SUBGROUP),
+            has_timestamps: features.contains(wgpu::Features::TIMESTAMP_QUERY),
+            handle: device,
             queue,
             pipelines: Mutex::default(),
-            lost: AtomicBool::new(false),
+            is_lost: AtomicBool::new(false),
             fault: Mutex::default(),
             countdown: AtomicU32::new(0),
         })
     }
 
-    /// A device of our own on an adapter.
+    /// Opens a device on an adapter.
     pub(super) fn on(adapter: &wgpu::Adapter) -> Result<Self, GpuError> {
         let (device, queue) = adapter::open(adapter)?;
         Self::new(device, queue)
     }
 
-    /// The process's device, which finders without one of their own share: to open one takes tenths of
-    /// a second. Opened anew when it has been lost.
+    /// Returns the process's device, which finders without a device of their own share. Opening a device takes tenths
+    /// of a second. A lost device is replaced.
     pub(super) fn shared() -> Result<Arc<Self>, GpuError> {
-        static SHARED: OnceLock<Mutex<Option<Arc<Engine>>>> = OnceLock::new();
+        static SHARED: OnceLock<Mutex<Option<Arc<GpuDevice>>>> = OnceLock::new();
         let mut shared = lock(SHARED.get_or_init(Mutex::default));
         match &*shared {
-            Some(engine) if !engine.is_lost() => Ok(engine.clone()),
+            Some(device) if !device.is_lost() => Ok(device.clone()),
             _ => {
-                let engine = Arc::new(Self::on(&adapter::choose(None)?)?);
-                *shared = Some(engine.clone());
-                Ok(engine)
+                let device = Arc::new(Self::on(&adapter::choose(None)?)?);
+                *shared = Some(device.clone());
+                Ok(device)
             }
         }
     }
 
+    /// Returns true if the device is lost, or was given up.
     pub(super) fn is_lost(&self) -> bool {
-        self.lost.load(Ordering::Relaxed)
+        self.is_lost.load(Ordering::Relaxed)
     }
 
-    /// In words, what was chosen for the device, and why.
+    /// Returns in words which variants the device runs, and why.
     pub(super) fn variants(&self) -> Vec<String> {
-        let scan = if self.subgroups {
+        let scan = if self.has_subgroups {
             "with subgroups: the adapter has them"
         } else {
             "without subgroups: the adapter has none"
         };
-        let times = if self.timestamps { "by timestamps" } else { "none: the adapter has no timestamps" };
-        let most = self.most_bytes(&GpuOptions::DEFAULT);
+        let times = if self.has_timestamps { "by timestamps" } else { "none: the adapter has no timestamps" };
+        let most = self.max_buffer_bytes(&GpuOptions::DEFAULT);
         vec![
             format!("scan, schedule: {scan}"),
             "check, small cells: the device's square root, corrected by integers; large cells: balanced rows"
@@ -131,14 +131,15 @@ impl Engine {
         ]
     }
 
-    /// Arms a fault for after so many submissions.
+    /// Makes a fault happen after so many submissions.
+    #[cfg(feature = "unstable-study")]
     pub(super) fn inject(&self, fault: Fault, submissions: u32) {
         *lock(&self.fault) = Some(fault);
         self.countdown.store(submissions, Ordering::Relaxed);
     }
 
-    /// Whether the given fault is due; it strikes once.
-    fn strikes(&self, fault: Fault) -> bool {
+    /// Returns true, once, if the given fault is due.
+    fn is_due(&self, fault: Fault) -> bool {
         let mut armed = lock(&self.fault);
         let due = *armed == Some(fault) && self.countdown.load(Ordering::Relaxed) == 0;
         if due {
@@ -147,17 +148,17 @@ impl Engine {
         due
     }
 
-    /// Largest buffer or binding.
-    pub(super) fn most_bytes(&self, options: &GpuOptions) -> u64 {
-        let limits = self.device.limits();
+    /// Returns the largest size of a buffer or binding, in bytes.
+    pub(super) fn max_buffer_bytes(&self, options: &GpuOptions) -> u64 {
+        let limits = self.handle.limits();
         let most = limits.max_buffer_size.min(limits.max_storage_buffer_binding_size);
         most.min(options.max_bytes.max(1 << 20)) / 256 * 256
     }
 
-    /// Runs `work` and turns the errors that wgpu reports meanwhile into an `Err`.
+    /// Runs `work`, and returns errors that wgpu reports meanwhile.
     pub(super) fn watch<T, F: From<GpuError>>(&self, work: impl FnOnce() -> Result<T, F>) -> Result<T, F> {
         use wgpu::ErrorFilter::{Internal, OutOfMemory, Validation};
-        let scopes = [Validation, OutOfMemory, Internal].map(|filter| self.device.push_error_scope(filter));
+        let scopes = [Validation, OutOfMemory, Internal].map(|filter| self.handle.push_error_scope(filter));
         let result = work();
         // Innermost first.
         let errors = scopes.into_iter().rev().map(|scope| pollster::block_on(scope.pop()));
@@ -165,40 +166,40 @@ impl Engine {
         match error {
             None => result,
             Some(wgpu::Error::OutOfMemory { .. }) => Err(GpuError::OutOfMemory.into()),
-            // A lost device refuses everything, in words that say nothing of the loss.
+            // A lost device refuses everything, and its messages do not name the loss.
             Some(_) if !self.is_alive() => Err(self.give_up().into()),
-            Some(other) => Err(GpuError::Refused(first_line(&other.to_string())).into()),
+            Some(other) => Err(GpuError::Refused(first_lines(&other.to_string())).into()),
         }
     }
 
-    /// Whether the device still takes work and finishes it, by trying.
+    /// Returns true if the device still finishes a submission.
     fn is_alive(&self) -> bool {
         self.is_idle_within(Duration::from_secs(1))
     }
 
-    /// Whether the device finishes all its work in time, which it is given some more of to see.
+    /// Returns true if the device finishes all its work, and an empty submission, in time.
     pub(super) fn is_idle_within(&self, limit: Duration) -> bool {
-        let scope = self.device.push_error_scope(wgpu::ErrorFilter::Validation);
-        let encoder = self.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+        let scope = self.handle.push_error_scope(wgpu::ErrorFilter::Validation);
+        let encoder = self.handle.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
         let submission = self.queue.submit([encoder.finish()]);
         let finished = self.poll(submission, limit).is_ok();
         let refused = pollster::block_on(scope.pop()).is_some();
         finished && !refused
     }
 
-    /// The compiled kernel, compiled at first use.
+    /// Returns the pipeline of a kernel, which is compiled at first use.
     pub(super) fn pipeline(
         &self,
         kernel: &'static Kernel,
         variant: Variant,
     ) -> Result<wgpu::ComputePipeline, GpuError> {
-        let variant = variant.to(kernel);
+        let variant = variant.reduced_to(kernel);
         let mut pipelines = lock(&self.pipelines);
         if let Some(pipeline) = pipelines.get(&(kernel.name, variant)) {
             return Ok(pipeline.clone());
         }
-        let mut source = kernel.source(self.subgroups, variant.changes);
-        if self.strikes(Fault::RefuseShader) {
+        let mut source = kernel.source(self.has_subgroups, variant.changes);
+        if self.is_due(Fault::RefuseShader) {
             source.push_str("this is no WGSL");
         }
         let pipeline = self.watch(|| Ok::<_, GpuError>(self.compile(kernel, &source, variant)))?;
@@ -207,11 +208,11 @@ impl Engine {
     }
 
     fn compile(&self, kernel: &Kernel, source: &str, variant: Variant) -> wgpu::ComputePipeline {
-        let module = self.device.create_shader_module(wgpu::ShaderModuleDescriptor {
+        let module = self.handle.create_shader_module(wgpu::ShaderModuleDescriptor {
             label: Some(kernel.name),
             source: wgpu::ShaderSource::Wgsl(source.into()),
         });
-        self.device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
+        self.handle.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
             label: Some(kernel.name),
             layout: None,
             module: &module,
@@ -224,32 +225,34 @@ impl Engine {
         })
     }
 
+    /// Makes a buffer.
     pub(super) fn buffer(
         &self,
         label: &str,
         size: u64,
         usage: wgpu::BufferUsages,
     ) -> Result<wgpu::Buffer, GpuError> {
-        if self.strikes(Fault::OutOfMemory) {
+        if self.is_due(Fault::OutOfMemory) {
             return Err(GpuError::OutOfMemory);
         }
         let descriptor =
             wgpu::BufferDescriptor { label: Some(label), size, usage, mapped_at_creation: false };
-        Ok(self.device.create_buffer(&descriptor))
+        Ok(self.handle.create_buffer(&descriptor))
     }
 
+    /// Submits commands.
     pub(super) fn submit(&self, encoder: wgpu::CommandEncoder) -> wgpu::SubmissionIndex {
-        if self.strikes(Fault::LoseDevice) {
-            self.device.destroy();
+        if self.is_due(Fault::LoseDevice) {
+            self.handle.destroy();
         }
         let left = self.countdown.load(Ordering::Relaxed);
         self.countdown.store(left.saturating_sub(1), Ordering::Relaxed);
         self.queue.submit([encoder.finish()])
     }
 
-    /// Waits for a submission, but not longer than `patience`.
+    /// Waits for a submission, at most for `patience`.
     pub(super) fn wait(&self, submission: wgpu::SubmissionIndex, patience: Duration) -> Result<(), GpuError> {
-        if self.strikes(Fault::Timeout) {
+        if self.is_due(Fault::Timeout) {
             self.give_up();
             return Err(GpuError::Timeout(patience));
         }
@@ -257,17 +260,17 @@ impl Engine {
             Ok(()) => Ok(()),
             Err(Some(wgpu::PollError::Timeout)) => {
                 self.give_up();
-                // To drop the last handle of a queue waits for it, without a limit: this one is kept.
-                std::mem::forget((self.device.clone(), self.queue.clone()));
+                // Dropping the last handle of a queue waits for it without a limit, so a handle is leaked.
+                std::mem::forget((self.handle.clone(), self.queue.clone()));
                 Err(GpuError::Timeout(patience))
             }
-            // The submission was not accepted: what was wrong with it is known by the error scopes.
+            // wgpu did not accept the submission. The error scopes know why.
             Err(Some(_)) if self.is_alive() => Err(GpuError::Refused("the submission".into())),
             Err(_) => Err(self.give_up()),
         }
     }
 
-    /// Waits; `Err(None)` when wgpu panicked, as it does when the driver reports a lost device.
+    /// Waits. Returns `Err(None)` if wgpu panicked, as it does when the driver reports a lost device.
     fn poll(
         &self,
         submission: wgpu::SubmissionIndex,
@@ -275,8 +278,8 @@ impl Engine {
     ) -> Result<(), Option<wgpu::PollError>> {
         let wait = wgpu::PollType::Wait { submission_index: Some(submission), timeout: Some(patience) };
         let poll = || {
-            assert!(!self.strikes(Fault::Panic), "an injected fault");
-            self.device.poll(wait)
+            assert!(!self.is_due(Fault::Panic), "an injected fault");
+            self.handle.poll(wait)
         };
         match catch_unwind(AssertUnwindSafe(poll)) {
             Ok(polled) => polled.map(|_| ()).map_err(Some),
@@ -284,28 +287,29 @@ impl Engine {
         }
     }
 
-    /// A device that was given up for a while and works again.
+    /// Marks a device that was given up as working again.
     pub(super) fn take_back(&self) {
-        self.lost.store(false, Ordering::Relaxed);
+        self.is_lost.store(false, Ordering::Relaxed);
     }
 
-    /// Marks the device as lost: what it is doing, or whether it is there at all, is unknown.
+    /// Marks the device as lost, because its state is unknown.
     pub(super) fn give_up(&self) -> GpuError {
-        self.lost.store(true, Ordering::Relaxed);
+        self.is_lost.store(true, Ordering::Relaxed);
         GpuError::Lost
     }
 }
 
-/// A lock that a panic in another thread does not poison: what is behind it is only a cache.
+/// Locks a mutex even if another thread panicked while it held the lock: these mutexes guard caches only.
 pub(super) fn lock<T>(mutex: &Mutex<T>) -> std::sync::MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-fn first_line(text: &str) -> String {
+/// Returns the first lines of a message, joined.
+fn first_lines(text: &str) -> String {
     text.lines().map(str::trim).filter(|line| !line.is_empty()).take(3).collect::<Vec<_>>().join(": ")
 }
 
-/// The kernels need what every WebGPU device has.
+/// Returns an error if the device lacks what every WebGPU device has.
 fn check_limits(limits: &wgpu::Limits) -> Result<(), GpuError> {
     let needs = [
         ("storage buffers a stage", limits.max_storage_buffers_per_shader_stage.into(), 8),

@@ -1,10 +1,10 @@
-// For the study of Avril's lazy way: both ends of each row of identifiers and those about the diagonal, for many n.
+// Study of Avril's lazy way: computes the pairs at both ends of each row of identifiers and at the diagonal, for many n.
 
 @group(0) @binding(0) var<uniform> params: Params;
 @group(0) @binding(1) var<storage, read_write> out: array<u32>;
 
-// Each n from `params.boxes` on has `params.split` places, five for a row; those of rows that it has not are left alone.
-// `params.cells` is the number of places.
+// Parameters: `boxes` is the first n, `split` the number of places of each n, five to a row, `cells` the number of all
+// places. Places of rows that an n does not have stay as they are.
 @compute @workgroup_size(LANES)
 fn lazy_ends(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>,
              @builtin(local_invocation_index) lane: u32) {

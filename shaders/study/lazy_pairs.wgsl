@@ -1,9 +1,9 @@
-// For the study of Avril's lazy way: the pair of each identifier.
+// Study of Avril's lazy way: computes the pair of each identifier.
 
 @group(0) @binding(0) var<uniform> params: Params;
 @group(0) @binding(1) var<storage, read_write> out: array<u32>;
 
-// `params.boxes` is n, `params.cells` the number of identifiers from `params.split` on.
+// Parameters: `boxes` is n, `split` the first identifier, `cells` the number of identifiers.
 @compute @workgroup_size(LANES)
 fn lazy_pairs(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>,
               @builtin(local_invocation_index) lane: u32) {

@@ -1,0 +1,98 @@
+//! An update on a GPU: only what has changed goes there, only pairs that were added or removed come back.
+
+use super::BroadPhase;
+use crate::gpu::{Change, ChangeRequest, GpuFinder, GpuFound};
+use crate::{Aabb, Backend, Config, Error, Pair};
+
+impl BroadPhase {
+    /// As [`BroadPhase::new`], on a given device: with [`Backend::Gpu`] always, with [`Backend::Auto`] if it is no
+    /// software and many boxes change.
+    ///
+    /// # Errors
+    /// [`Error::Margin`].
+    pub fn with_gpu(config: Config, gpu: GpuFinder) -> Result<Self, Error> {
+        let mut broad_phase = Self::new(config)?;
+        broad_phase.set_gpu(gpu);
+        Ok(broad_phase)
+    }
+
+    /// Uses this device from the next update on whose changes are all set after this call; until then the CPU.
+    pub fn set_gpu(&mut self, gpu: GpuFinder) {
+        self.gpu.gpu = Some(gpu);
+        self.world.keep_old = usize::MAX;
+    }
+
+    /// Returns the adapter of the device in use: name, kind and API. None while there is no device or it has failed.
+    pub fn adapter(&self) -> Option<&str> {
+        self.gpu.adapter()
+    }
+
+    /// Returns true if an update may run on a device, which needs to know what boxes were.
+    pub(super) fn may_use_gpu(&self) -> bool {
+        self.gpu.gpu.is_some() || self.config.backend == Backend::Gpu
+    }
+
+    /// Leaves the events in `comparison` if a device has found them. False if the CPU has to do it.
+    pub(super) fn find_on_gpu(&mut self) -> Result<bool, Error> {
+        let world = &self.world;
+        if !world.knows_old() || !self.gpu.is_wanted(&self.config, world.changed.len(), &mut self.report) {
+            return Ok(false);
+        }
+        let old = world.changed.iter().zip(&world.old);
+        let was = |(&id, old): (&u32, &super::world::Old)| {
+            let aabb = if world.was_removed(id) { Aabb::NOWHERE } else { old.aabb };
+            Change { id, aabb, filter: old.filter }
+        };
+        let changed: Vec<Change> = old.map(was).collect();
+        let request = ChangeRequest {
+            boxes: &world.boxes,
+            filters: &world.filters,
+            changed: &changed,
+            update: self.updates,
+            kept: self.kept.len() as u64,
+            config: &self.config,
+        };
+        let invalid = self.report.invalid;
+        let found = self.gpu.changes(&request, &mut self.report)?;
+        self.report.invalid = invalid;
+        let Some(found) = found else { return Ok(false) };
+        self.has_grid = false;
+        self.sweep.expire();
+        self.sort_out(&found);
+        Ok(true)
+    }
+
+    /// Sorts what a device has found into added, removed and dropped pairs.
+    fn sort_out(&mut self, found: &GpuFound) {
+        let (world, kept, events) = (&self.world, &self.kept, &mut self.comparison);
+        events.clear();
+        let overlaps = |pair: &Pair| world.boxes[pair.a as usize].overlaps(&world.boxes[pair.b as usize]);
+        let existed = |pair: &Pair| !world.was_removed(pair.a) && !world.was_removed(pair.b);
+        let was_kept = |pair: &Pair| kept.contains(*pair) && existed(pair);
+        for pair in found.pairs.iter().flatten() {
+            if !overlaps(pair) {
+                events.removed.push(*pair);
+            } else if !was_kept(pair) {
+                // The device takes pairs of boxes that it treats as new for new ones.
+                events.added.push(*pair);
+            }
+        }
+        for &id in &world.changed {
+            if world.was_removed(id) {
+                events.dropped.extend(kept.partners(id).map(|other| Pair::new(id, other)));
+            }
+        }
+        let allows = |pair: &Pair| world.filters[pair.a as usize].allows(&world.filters[pair.b as usize]);
+        for &id in &found.restarted {
+            let pairs = kept.partners(id).map(|other| Pair::new(id, other));
+            events.removed.extend(pairs.filter(|pair| existed(pair) && !(overlaps(pair) && allows(pair))));
+        }
+        events.sort();
+        events.removed.dedup();
+        events.dropped.sort_unstable();
+        events.dropped.dedup();
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,82 @@
+//! Updates on a device against those of the CPU and the oracle. The device is the best adapter, or a software one.
+
+use crate::{Aabb, Backend, BroadPhase, Config, Error, GpuFinder, Limits, Pair, ProxyFilter, oracle};
+use rand::rngs::StdRng;
+use rand::{RngExt, SeedableRng};
+use std::collections::BTreeSet;
+use std::ops::Range;
+
+/// Boxes 2i and 2i + 1 of some couples, which overlap when they are close. Between the two the latter goes half its
+/// size: one that goes further would begin anew, and it would not matter what the device has.
+fn put(broad_phase: &mut BroadPhase, couples: Range<u32>, close: bool) {
+    for i in couples {
+        let gap = if close { 1.5 } else { 2.5 };
+        for (id, x) in [(2 * i, 0.0), (2 * i + 1, gap)] {
+            let aabb = Aabb::from_center([10.0 * i as f32 + x, 0.0, 0.0], [1.0; 3]);
+            broad_phase.set(id, aabb, ProxyFilter::ALL).expect("room for it");
+        }
+    }
+}
+
+#[test]
+fn a_device_whose_update_was_too_much_does_not_go_on_from_it() {
+    let limits = Limits { max_pairs: 10, ..Limits::UNLIMITED };
+    let config = Config { backend: Backend::Gpu, limits, ..Config::DEFAULT };
+    let gpu = GpuFinder::new().expect("an adapter, of which a software one will do");
+    let mut broad_phase = BroadPhase::with_gpu(config, gpu).expect("a margin that is one");
+    put(&mut broad_phase, 0..1000, false);
+    put(&mut broad_phase, 0..9, true);
+    assert_eq!(broad_phase.update().map(|events| events.added.len()), Ok(9));
+    // As many as the device may find, which counts those that may end, too.
+    put(&mut broad_phase, 20..32, true);
+    assert_eq!(broad_phase.update(), Err(Error::TooManyPairs { limit: 10 }));
+    assert!(broad_phase.report().gpu.is_some(), "the device has found them");
+    put(&mut broad_phase, 20..32, false);
+    broad_phase.config.backend = Backend::Cpu;
+    assert_eq!(broad_phase.update().map(|events| events.added.len()), Ok(0));
+    broad_phase.config.backend = Backend::Gpu;
+    put(&mut broad_phase, 20..21, true);
+    assert_eq!(broad_phase.update().map(|events| events.added.clone()), Ok(vec![Pair::new(40, 41)]));
+    assert!(broad_phase.report().gpu.is_some());
+}
+
+/// Events lead from the pairs of the last update that did not fail to those that there are, whichever backend finds them.
+#[test]
+fn devices_and_the_cpu_take_turns_and_updates_fail_in_between() {
+    let gpu = GpuFinder::new().expect("an adapter, of which a software one will do");
+    let mut broad_phase = BroadPhase::with_gpu(Config::DEFAULT, gpu).expect("a margin that is one");
+    let (mut random, mut pairs) = (StdRng::seed_from_u64(17), BTreeSet::new());
+    let home = |id: u32| [id % 8, id / 8 % 8, id / 64].map(|i| i as f32);
+    // Updates on the device and on the CPU; those that succeeded and those that failed.
+    let mut seen = [[0; 2]; 2];
+    for round in 0..300 {
+        let way = random.random_range(0..2);
+        broad_phase.config.backend = [Backend::Gpu, Backend::Cpu][way];
+        broad_phase.config.limits.max_pairs = if random.random_ratio(1, 6) { 40 } else { u64::MAX };
+        for id in 0..400 {
+            let to = if random.random_ratio(1, 400) { random.random_range(0..400) } else { id };
+            let center = home(to).map(|x| x + random.random_range(-0.02..0.02));
+            if random.random_ratio(1, 400) {
+                broad_phase.remove(id);
+                pairs.retain(|pair: &Pair| pair.a != id && pair.b != id);
+            }
+            if random.random_ratio(399, 400) {
+                let memberships = 1 + u32::from(random.random_ratio(1, 400));
+                let filter = ProxyFilter { memberships, ..ProxyFilter::ALL };
+                broad_phase.set(id, Aabb::from_center(center, [0.5; 3]), filter).expect("room for it");
+            }
+        }
+        let result = broad_phase.update().cloned();
+        let is_on_gpu = broad_phase.report().gpu.is_some();
+        assert!(result.is_err() || is_on_gpu == (way == 0), "round {round}: the device works");
+        seen[way][usize::from(result.is_err())] += 1;
+        if let Ok(events) = result {
+            assert!(events.removed.iter().all(|pair| pairs.remove(pair)), "round {round}: was not there");
+            assert!(events.added.iter().all(|pair| pairs.insert(*pair)), "round {round}: was there");
+            let wanted = oracle::pairs_filtered(&broad_phase.world.boxes, &broad_phase.world.filters);
+            assert!(wanted.iter().eq(&pairs), "round {round}");
+            assert!(broad_phase.pairs().eq(wanted), "round {round}: kept");
+        }
+    }
+    assert!(seen.as_flattened().iter().all(|updates| *updates > 10), "{seen:?}");
+}

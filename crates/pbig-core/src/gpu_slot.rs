@@ -1,0 +1,121 @@
+//! The GPU of a finder or a broad phase, if it has one, and what is reported when it cannot do the work.
+
+use crate::policy::{AvailableDevice, Choice, choose_backend};
+use crate::report::Report;
+use crate::Config;
+#[cfg(feature = "gpu")]
+use crate::gpu::{ChangeRequest, Failure, GpuFinder, GpuFound, SearchRequest, available};
+#[cfg(feature = "gpu")]
+use crate::report::{Clock, stage};
+#[cfg(feature = "gpu")]
+use crate::{Algorithm, Error, Plan};
+
+/// Room for a GPU.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct GpuSlot {
+    #[cfg(feature = "gpu")]
+    pub(crate) gpu: Option<GpuFinder>,
+    has_warned: bool,
+}
+
+impl GpuSlot {
+    /// Returns true if a call in which so many boxes have changed should run on the GPU; otherwise says why not in the
+    /// report.
+    pub(crate) fn is_wanted(&mut self, config: &Config, changed: usize, report: &mut Report) -> bool {
+        let choice = choose_backend(config.backend, self.device(), changed as u64);
+        report.plan.no_gpu = choice.no_gpu();
+        #[cfg(not(feature = "gpu"))]
+        if choice == Choice::Gpu {
+            let why = "no GPU backend in this build (feature `gpu`): the CPU does the work";
+            self.fall_back(why.into(), report);
+            return false;
+        }
+        choice == Choice::Gpu
+    }
+
+    #[cfg(not(feature = "gpu"))]
+    #[expect(clippy::unused_self, reason = "as with a GPU backend")]
+    fn device(&self) -> AvailableDevice {
+        AvailableDevice::NotBuilt
+    }
+
+    #[cfg(feature = "gpu")]
+    fn device(&self) -> AvailableDevice {
+        available(self.gpu.as_ref())
+    }
+
+    /// Reports that the wanted backend could not do the work: every time in the report, once as a warning.
+    fn fall_back(&mut self, why: String, report: &mut Report) {
+        if !self.has_warned {
+            tracing::warn!("pbig: {why}");
+            self.has_warned = true;
+        }
+        report.fallback = Some(why);
+    }
+}
+
+#[cfg(feature = "gpu")]
+impl GpuSlot {
+    /// Makes a slot with a GPU.
+    pub(crate) fn new(gpu: GpuFinder) -> Self {
+        Self { gpu: Some(gpu), has_warned: false }
+    }
+
+    /// Returns the adapter of the device, unless there is none or it has failed.
+    pub(crate) fn adapter(&self) -> Option<&str> {
+        self.gpu.as_ref().and_then(GpuFinder::working_adapter)
+    }
+
+    /// Finds all pairs. Returns none if the device could not do it; the report says why.
+    pub(crate) fn find(
+        &mut self,
+        request: &SearchRequest<'_>,
+        report: &mut Report,
+    ) -> Result<Option<GpuFound>, Error> {
+        self.call(report, |gpu| gpu.find(request))
+    }
+
+    /// Finds what has changed. Returns none if the device could not do it; the report says why.
+    pub(crate) fn changes(
+        &mut self,
+        request: &ChangeRequest<'_>,
+        report: &mut Report,
+    ) -> Result<Option<GpuFound>, Error> {
+        self.call(report, |gpu| gpu.changes(request))
+    }
+
+    fn call(
+        &mut self,
+        report: &mut Report,
+        call: impl FnOnce(&mut GpuFinder) -> Result<GpuFound, Failure>,
+    ) -> Result<Option<GpuFound>, Error> {
+        stage!("gpu");
+        let mut clock = Clock::start();
+        match call(self.gpu.get_or_insert_with(GpuFinder::shared)) {
+            Ok(found) => {
+                self.has_warned = false;
+                note_success(&found, &mut clock, report);
+                Ok(Some(found))
+            }
+            Err(Failure::Call(error)) => Err(error),
+            Err(Failure::Device(error)) => {
+                self.fall_back(format!("{error}: the CPU does the work"), report);
+                Ok(None)
+            }
+        }
+    }
+}
+
+/// Says in the report what the device did.
+#[cfg(feature = "gpu")]
+fn note_success(found: &GpuFound, clock: &mut Clock, report: &mut Report) {
+    // The device's own times for its map; the rest of the call is check, transfer and decoding.
+    let kernels = found.report.kernels.iter().filter(|(name, _)| !name.starts_with("check"));
+    let time = clock.lap();
+    let map = kernels.map(|(_, time)| *time).sum::<std::time::Duration>().min(time);
+    report.stages.map += map;
+    report.stages.check += time - map;
+    let algorithm = if found.valid < 2 { Algorithm::Nothing } else { Algorithm::Gpu };
+    report.plan = Plan { algorithm, boxes: found.valid, gpu: found.plan.clone(), ..Plan::default() };
+    (report.checks, report.gpu, report.fallback) = (found.checks, Some(found.report.clone()), None);
+}

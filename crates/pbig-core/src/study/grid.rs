@@ -1,0 +1,262 @@
+//! PBIG's grid (Lo et al. 2013, 4.2 and 4.3), plain and scalar.
+//!
+//! A cell of few boxes is tested through Avril's mapping from indices to pairs, a larger one by PBIG's balanced rows. A pair
+//! that meets in several cells is reported by its owner: the component-wise maximum of the lowest cells of its boxes. The
+//! paper calls this cell the "corner of the intersection with the largest coordinates". It is an integer here, so it is
+//! exact (contract 3).
+
+use super::PbigPlan;
+use crate::config::{GpuOptions, Limits};
+use crate::pair_index::{pair_count, pair_of, row_len, row_pair};
+use crate::report::Checks;
+use crate::{Aabb, Error, Pair};
+
+/// The result of [`pbig_grid`].
+#[derive(Clone, Debug, PartialEq)]
+pub struct PbigFound {
+    /// All overlapping pairs, sorted.
+    pub pairs: Vec<Pair>,
+    /// Tests made, counted as in the paper's section 4.1.
+    pub checks: Checks,
+    /// The grid.
+    pub plan: PbigPlan,
+}
+
+/// Finds all overlapping pairs with PBIG's grid, on one thread.
+///
+/// Of the options it uses `cell_rule`, `boxes_per_cell` and `small_cell`.
+///
+/// # Errors
+/// [`Error::TooManyBoxes`] and [`Error::TooManyPairs`], by [`Limits::DEFAULT`].
+///
+/// ```
+/// use pbig_core::{Aabb, GpuOptions, Pair, study};
+/// let boxes = [0.0, 0.9, 5.0].map(|x| Aabb::from_center([x, 0.0, 0.0], [0.5; 3]));
+/// let found = study::pbig_grid(&boxes, &GpuOptions::DEFAULT)?;
+/// assert_eq!(found.pairs, [Pair::new(0, 1)]);
+/// # Ok::<(), pbig_core::Error>(())
+/// ```
+pub fn pbig_grid(boxes: &[Aabb], options: &GpuOptions) -> Result<PbigFound, Error> {
+    let limit = Limits::DEFAULT.max_boxes;
+    if boxes.len() as u64 > limit {
+        return Err(Error::TooManyBoxes { boxes: boxes.len() as u64, limit });
+    }
+    let plan = PbigPlan::new(boxes, options);
+    let grid = PbigGrid::new(&plan, boxes);
+    let mut search = PbigSearch { grid: &grid, pairs: Vec::new(), checks: Checks::default() };
+    for key in 0..grid.offsets.len() - 1 {
+        search.check_cell(key, options.small_cell);
+        search.check_limit()?;
+    }
+    search.check_oversize()?;
+    let PbigSearch { mut pairs, checks, .. } = search;
+    pairs.sort_unstable();
+    Ok(PbigFound { pairs, checks, plan })
+}
+
+/// The cells that a box touches, both ends included.
+#[derive(Clone, Copy, Debug)]
+struct TouchedCells {
+    low: [u32; 3],
+    high: [u32; 3],
+}
+
+impl TouchedCells {
+    fn new(plan: &PbigPlan, one: &Aabb) -> Self {
+        let cell = |k: usize, x: f32| {
+            let scaled = (x - plan.origin[k]) * (1.0 / plan.cell);
+            scaled.clamp(0.0, (plan.dims[k] - 1) as f32) as u32
+        };
+        Self {
+            low: std::array::from_fn(|k| cell(k, one.min[k])),
+            high: std::array::from_fn(|k| cell(k, one.max[k])),
+        }
+    }
+
+    fn count(&self) -> u64 {
+        (0..3).map(|k| u64::from(self.high[k] - self.low[k] + 1)).product()
+    }
+
+    /// Returns the keys of the cells, row by row.
+    fn keys(self, dims: [u32; 3]) -> impl Iterator<Item = usize> {
+        (self.low[2]..=self.high[2]).flat_map(move |z| {
+            (self.low[1]..=self.high[1])
+                .flat_map(move |y| (self.low[0]..=self.high[0]).map(move |x| key_of([x, y, z], dims)))
+        })
+    }
+}
+
+fn key_of(cell: [u32; 3], dims: [u32; 3]) -> usize {
+    ((cell[2] * dims[1] + cell[1]) * dims[0] + cell[0]) as usize
+}
+
+/// A box in the grid.
+#[derive(Clone, Copy, Debug)]
+struct GridMember {
+    aabb: Aabb,
+    id: u32,
+    touched: TouchedCells,
+}
+
+/// The grid: for each cell a range of `entries`, each an index into `members`.
+#[derive(Debug)]
+struct PbigGrid {
+    dims: [u32; 3],
+    offsets: Vec<u32>,
+    entries: Vec<u32>,
+    members: Vec<GridMember>,
+    /// Boxes that touch too many cells, which are tested against all others.
+    oversize: Vec<(u32, Aabb)>,
+}
+
+impl PbigGrid {
+    /// Builds the grid by count, scan and scatter: the three kernels of PBIG 4.2.
+    fn new(plan: &PbigPlan, boxes: &[Aabb]) -> Self {
+        let (members, oversize) = select(plan, boxes);
+        let dims = plan.dims;
+        let mut offsets = vec![0; dims.iter().product::<u32>() as usize + 1];
+        for key in members.iter().flat_map(|member| member.touched.keys(dims)) {
+            offsets[key] += 1;
+        }
+        let mut sum = 0;
+        for offset in &mut offsets {
+            sum += *offset;
+            *offset = sum;
+        }
+        let mut entries = vec![0; sum as usize];
+        for (i, member) in members.iter().enumerate().rev() {
+            for key in member.touched.keys(dims) {
+                offsets[key] -= 1;
+                entries[offsets[key] as usize] = i as u32;
+            }
+        }
+        Self { dims, offsets, entries, members, oversize }
+    }
+
+    /// Returns the key of the cell that reports a pair.
+    fn owner(&self, a: &GridMember, b: &GridMember) -> usize {
+        key_of(std::array::from_fn(|k| a.touched.low[k].max(b.touched.low[k])), self.dims)
+    }
+}
+
+/// Returns the valid boxes with their cells, and the oversize boxes.
+fn select(plan: &PbigPlan, boxes: &[Aabb]) -> (Vec<GridMember>, Vec<(u32, Aabb)>) {
+    let (mut members, mut oversize, mut entries) = (Vec::new(), Vec::new(), 0);
+    for (id, aabb) in (0u32..).zip(boxes).filter(|(_, aabb)| aabb.is_valid()) {
+        let touched = TouchedCells::new(plan, aabb);
+        let count = touched.count();
+        // Entries are counted in 32 bits.
+        if count > u64::from(plan.max_cells_per_box) || entries + count > u64::from(u32::MAX) {
+            oversize.push((id, *aabb));
+        } else {
+            entries += count;
+            members.push(GridMember { aabb: *aabb, id, touched });
+        }
+    }
+    (members, oversize)
+}
+
+/// A search of the grid, with its result so far.
+struct PbigSearch<'a> {
+    grid: &'a PbigGrid,
+    pairs: Vec<Pair>,
+    checks: Checks,
+}
+
+impl PbigSearch<'_> {
+    /// Tests the pairs of a cell.
+    fn check_cell(&mut self, key: usize, small_cell: u32) {
+        let range = self.grid.offsets[key] as usize..self.grid.offsets[key + 1] as usize;
+        let entries = &self.grid.entries[range];
+        let n = entries.len() as u32;
+        if n <= small_cell {
+            for k in 0..pair_count(u64::from(n)) {
+                let (i, j) = pair_of(k, u64::from(n));
+                self.test_members(key, entries[i as usize], entries[j as usize]);
+            }
+            return;
+        }
+        for (i, j) in (0..n).flat_map(|row| (0..row_len(row, n)).map(move |k| row_pair(row, k, n))) {
+            self.test_members(key, entries[i as usize], entries[j as usize]);
+        }
+    }
+
+    fn test_members(&mut self, key: usize, i: u32, j: u32) {
+        let (a, b) = (&self.grid.members[i as usize], &self.grid.members[j as usize]);
+        if self.grid.owner(a, b) == key {
+            self.test((a.id, &a.aabb), (b.id, &b.aabb));
+        } else {
+            self.checks.made += 1;
+            self.checks.redundant += 1;
+        }
+    }
+
+    /// Tests two boxes.
+    fn test(&mut self, a: (u32, &Aabb), b: (u32, &Aabb)) {
+        self.checks.made += 1;
+        if a.1.overlaps(b.1) {
+            self.pairs.push(Pair::new(a.0, b.0));
+        } else {
+            self.checks.unnecessary += 1;
+        }
+    }
+
+    /// Tests oversize boxes against each other and against all others.
+    fn check_oversize(&mut self) -> Result<(), Error> {
+        let grid = self.grid;
+        for (i, (id, aabb)) in grid.oversize.iter().enumerate() {
+            for (other, other_aabb) in &grid.oversize[i + 1..] {
+                self.test((*id, aabb), (*other, other_aabb));
+            }
+            for member in &grid.members {
+                self.test((*id, aabb), (member.id, &member.aabb));
+            }
+            self.check_limit()?;
+        }
+        Ok(())
+    }
+
+    fn check_limit(&self) -> Result<(), Error> {
+        let limit = Limits::DEFAULT.max_pairs;
+        if self.pairs.len() as u64 > limit { Err(Error::TooManyPairs { limit }) } else { Ok(()) }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::config::CellRule;
+    use crate::oracle;
+
+    fn boxes() -> Vec<Aabb> {
+        let at = |i: u32| [i * 37 % 101, i * 53 % 29, i * 17 % 7].map(|x| x as f32 * 0.7);
+        let mut boxes: Vec<_> =
+            (0..600).map(|i| Aabb::from_center(at(i), [0.2 + (i % 5) as f32; 3])).collect();
+        boxes.push(Aabb::new([f32::NEG_INFINITY; 3], [f32::INFINITY; 3]));
+        boxes.push(Aabb::new([-1e6, -1.0, -1e6], [1e6, 0.0, 1e6]));
+        boxes.push(Aabb::NOWHERE);
+        boxes
+    }
+
+    #[test]
+    fn the_pairs_are_those_of_the_oracle_for_all_options() {
+        let boxes = boxes();
+        let wanted = oracle::pairs(&boxes);
+        for cell_rule in [CellRule::Objective, CellRule::Density] {
+            for (boxes_per_cell, small_cell) in [(1.0, 32), (4.0, 1), (32.0, 0), (4.0, u32::MAX)] {
+                let options = GpuOptions { cell_rule, boxes_per_cell, small_cell, ..GpuOptions::DEFAULT };
+                let found = pbig_grid(&boxes, &options).expect("few boxes");
+                assert_eq!(found.pairs, wanted, "{cell_rule:?}, {boxes_per_cell}, {small_cell}");
+                let Checks { made, unnecessary, redundant } = found.checks;
+                assert_eq!(made, unnecessary + redundant + wanted.len() as u64, "{}", found.plan);
+            }
+        }
+    }
+
+    #[test]
+    fn few_or_invalid_boxes_have_no_pairs() {
+        for boxes in [&[][..], &[Aabb::NOWHERE; 3], &[Aabb::new([0.0; 3], [1.0; 3])]] {
+            assert_eq!(pbig_grid(boxes, &GpuOptions::DEFAULT).map(|found| found.pairs), Ok(vec![]));
+        }
+    }
+}

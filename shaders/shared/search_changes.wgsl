@@ -1,0 +1,34 @@
+// Search for changes. A wanted pair overlaps now and did not at the last update, or the other way round. The functions
+// replace those of search_overlaps.wgsl.
+
+alias KnownBox = Motion;
+
+fn low_corner(one: DeviceBox) -> vec3<i32> {
+    return vec3<i32>(one.low[0], one.low[1], one.low[2]);
+}
+
+fn high_corner(one: DeviceBox) -> vec3<i32> {
+    return vec3<i32>(one.high[0], one.high[1], one.high[2]);
+}
+
+// Returns the box around the box now and at the last update: in its cells it meets every box that it overlaps or
+// overlapped. An invalid box adds nothing, because all of its `low` lies above everything.
+fn bounds_of(one: KnownBox) -> DeviceBox {
+    let low = min(low_corner(one.now), low_corner(one.before));
+    let high = max(high_corner(one.now), high_corner(one.before));
+    return DeviceBox(array<i32, 3>(low.x, low.y, low.z), array<i32, 3>(high.x, high.y, high.z));
+}
+
+fn has_moved(one: KnownBox) -> bool {
+    return any(low_corner(one.now) != low_corner(one.before))
+        || any(high_corner(one.now) != high_corner(one.before));
+}
+
+// Two boxes that have not moved cannot be wanted.
+fn may_be_wanted(marks: u32) -> bool {
+    return (marks & MOVED) != 0u;
+}
+
+fn is_wanted(a: KnownBox, b: KnownBox) -> bool {
+    return overlap(a.now, b.now) != overlap(a.before, b.before);
+}
