@@ -79,20 +79,8 @@ fn bench_step_has_every_scene_and_names_the_worst() {
 #[test]
 fn bench_stages_has_the_time_of_each_stage() {
     let rows = bench_rows("stages");
-    let words =
-        ["from scratch, boxes", "events, boxes", "share moved", "pairs a box", "largest edge", "rows"];
-    for word in words.into_iter().chain(["ways, 10 pairs", "grids, 10 pairs"]) {
+    for word in ["from scratch, boxes", "events, boxes", "share moved", "pairs a box", "largest edge"] {
         assert!(about(&rows, word) > 0, "{word}");
-    }
-    // Those that can be taken, and no other.
-    let taken = [
-        ("small moves, 1% moved", ["edits", "grid anew", "near pairs"], true),
-        ("jumps, 100% moved", ["grid anew", "from scratch and diff", "PBIG's grid"], true),
-        ("jumps, 100% moved", ["edits", "edits, mean", "near pairs"], false),
-    ];
-    for (word, ways, taken) in taken {
-        let row = rows.iter().find(|row| row["case"].to_string().contains(word)).expect(word);
-        assert!(ways.iter().all(|way| (row["stages_ms"][way].as_f64() > Some(0.0)) == taken), "{row}");
     }
     let of_events = rows.iter().filter(|row| row["case"].to_string().contains("events"));
     assert!(of_events.into_iter().all(|row| row["mean_ms"].as_f64() > Some(0.0)));
@@ -112,7 +100,7 @@ fn bench_gpu_has_both_backends_and_moves_no_more_bytes_than_have_changed() {
     let events = rows("events");
     assert_eq!(events.len(), 4);
     for row in &events {
-        for key in ["cpu_ms", "gpu_ms", "begin_ms", "finish_ms"] {
+        for key in ["cpu_ms", "gpu_ms"] {
             assert!(number(&row[key], "median") > 0.0, "{key}: {row}");
         }
         let changed = number(row, "boxes") * number(row, "share");

@@ -7,14 +7,11 @@ pub(crate) mod measure;
 pub(crate) mod memory;
 mod papers;
 mod peers;
-mod regret;
 mod requests;
-mod shares;
 mod stages;
 mod step;
 mod table;
 mod update;
-mod ways;
 
 use crate::output::{Failure, print};
 use clap::ValueEnum;

@@ -143,8 +143,8 @@ pub(super) fn crossover(scale: &Scale, device: &Device) -> Result<Sheet, Failure
         "with",
     ];
     let mut sheet = Sheet::new("Avril table 7: with and without a grid", &columns).about(format!(
-        "Whole calls from nothing, cubes with a pair each, all moved. More sizes and densities: \
-         [crossovers](crossovers.md). Without a grid a device searches up to 1024 boxes. {}",
+        "Whole calls from nothing, cubes with a pair each, all moved. Without a grid a device searches up to 1024 \
+         boxes. {}",
         device.about()
     ));
     let (pbig, mut pays) = (Config { strategy: Strategy::Pbig, ..UNSORTED }, vec![]);
