@@ -16,5 +16,6 @@ pub mod scenes;
 pub mod shadow;
 pub mod simulate;
 pub mod sorted;
+pub mod study;
 pub mod wide;
 pub mod world;

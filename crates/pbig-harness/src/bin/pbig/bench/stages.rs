@@ -8,6 +8,7 @@ use pbig_core::{Aabb, BroadPhase, Config, Error, Finder, Limits, Order, ProxyFil
 use pbig_harness::boxes::{Wander, cubes};
 use pbig_harness::chart::{Line, LogLog};
 use pbig_harness::runner::{Spread, milliseconds};
+use pbig_harness::study::algorithm;
 
 /// How far a box moves between two frames, along each axis; edges are around 1.
 const DISTANCE: f32 = 0.1;
@@ -134,7 +135,7 @@ impl Contest for Alone {
     fn run(&mut self, _: usize) -> Result<f64, Failure> {
         let times = self.find().map_err(|error| Failure::Input(error.to_string()))?;
         self.times.push(times);
-        self.chosen.push(self.report().plan.chosen.name());
+        self.chosen.push(algorithm(&self.report().plan));
         Ok(times[0])
     }
 }
