@@ -7,6 +7,7 @@ pub mod field;
 pub mod files;
 pub mod index;
 pub mod mechanics;
+pub mod motions;
 pub mod numbered;
 pub mod options;
 pub mod precision;
