@@ -97,7 +97,7 @@ fn bench_steady_has_every_motion_and_every_scene_and_writes_them() {
         assert_eq!(about(&rows, &format!("\"{name}, scene\" \"stock")), 1, "{name}");
     }
     let compared = rows.iter().filter(|row| row["stages_ms"]["median"].is_number());
-    assert!(compared.clone().count() >= 3 * motions.len() + scenes.len());
+    assert_eq!(compared.clone().count(), 2 * motions.len() + 2 + scenes.len());
     for row in compared {
         let of = |key: &str| row["stages_ms"][key].as_f64().expect("a number");
         assert!(of("median") <= of("p99") && of("p99") <= of("worst") && of("first") > 0.0, "{row}");

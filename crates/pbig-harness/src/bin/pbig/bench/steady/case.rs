@@ -77,16 +77,19 @@ impl Case {
         format!("{}, {}", self.motion, self.density)
     }
 
-    /// Returns a row for ours beside each other side, then those of p99 and worst beside the median.
+    /// Returns a row for ours beside each other side, then those of p99 and worst beside the median. The first row has
+    /// the figures of ours.
     pub(super) fn rows(&self, quick: bool) -> Vec<Row> {
         let Some((ours, others)) = self.sides.split_first() else { return vec![] };
         let ours = Figures::of(&ours.ms);
-        let beside = others.iter().map(|other| self.beside(&ours, other, quick));
+        let Figures { mean, median, p99, worst, first } = ours;
+        let figures = vec![("median", median), ("p99", p99), ("worst", worst), ("first", first)];
+        let beside = others.iter().zip([figures].into_iter().chain(std::iter::repeat(vec![])));
+        let beside = beside.map(|(other, figures)| self.beside(mean, other, quick).stages(figures));
         beside.chain(self.evenness(&ours, quick)).collect()
     }
 
-    fn beside(&self, ours: &Figures, other: &Side, quick: bool) -> Row {
-        let Figures { mean, median, p99, worst, first } = *ours;
+    fn beside(&self, mean: f64, other: &Side, quick: bool) -> Row {
         let theirs = Figures::of(&other.ms);
         let note = format!(
             "{}: median {:.4} ms, p99 {:.4} ms, worst {:.4} ms, first {:.4} ms",
@@ -100,7 +103,6 @@ impl Case {
             .ours(mean)
             .against(other.label(), theirs.mean)
             .target(self.target(other.what).filter(|_| !quick))
-            .stages(vec![("median", median), ("p99", p99), ("worst", worst), ("first", first)])
             .note(note)
     }
 
