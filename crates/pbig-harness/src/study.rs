@@ -6,6 +6,7 @@ use pbig_core::plan::{PbigPlan, Summary};
 use pbig_core::{Aabb, Backend, Checks, Config, Error, Finder, Limits, Order, Pair, Plan, Strategy};
 
 pub use pbig_core::CellRule;
+pub use pbig_core::plan::density_cell;
 
 /// Settings of PBIG's grid.
 #[derive(Clone, Copy, Debug, PartialEq)]
