@@ -1,4 +1,5 @@
-//! What only studies may ask of pbig-core: PBIG's grid on the CPU, its settings on a GPU, the grid for few boxes.
+//! What only studies may ask of pbig-core and its shaders: PBIG's grid on the CPU, its settings on a GPU, our grid for few
+//! boxes, single kernels.
 //!
 //! Everything else in this crate uses the core as an app does.
 
@@ -7,6 +8,7 @@ use pbig_core::{Aabb, Backend, Checks, Config, Error, Finder, Limits, Order, Pai
 
 pub use pbig_core::CellRule;
 pub use pbig_core::plan::density_cell;
+pub use pbig_shaders::{INDEX_PAIRS, LAZY_ENDS, LAZY_PAIRS, ROW_ENDS};
 
 /// Settings of PBIG's grid.
 #[derive(Clone, Copy, Debug, PartialEq)]
