@@ -46,8 +46,7 @@ fn through_rapier(c: &mut Criterion) {
     }
 }
 
-/// How many boxes move and how far, and what an update is then: a test of near pairs, a grid built anew, as boxes jump too
-/// far for a list of those, or edits.
+/// Share of boxes that move, and how far: all move within their neighbourhood, all leave it, few move.
 const MOTIONS: [(&str, f64, f32); 3] =
     [("all moved a little", 1.0, 0.1), ("all jumped", 1.0, 3.0), ("1% moved", 0.01, 0.1)];
 

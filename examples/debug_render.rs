@@ -3,7 +3,6 @@
 //!
 //! `cargo run --release --example debug_render` writes out/debug_render.svg
 
-use pbig_core::{Config, Strategy};
 use pbig_harness::scenes::Scene;
 use plotters::prelude::*;
 use rapier_pbig::{DebugRenderParts, PbigBroadPhase};
@@ -33,10 +32,9 @@ impl DebugRenderBackend for Lines {
 }
 
 fn main() -> Result<(), Box<dyn Error>> {
-    // So few boxes are usually tested without a grid.
-    let config = Config { strategy: Strategy::Grid, ..PbigBroadPhase::CONFIG };
-    let mut broad_phase = PbigBroadPhase::with_config(config);
-    let mut world = Scene::named("rain")?.build(160, 1);
+    // A few hundred boxes would need no grid, so there would be no cells to draw.
+    let mut broad_phase = PbigBroadPhase::new();
+    let mut world = Scene::named("rain")?.build(1500, 1);
     for _ in 0..60 {
         world.step(&mut broad_phase);
     }

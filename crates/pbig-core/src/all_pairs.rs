@@ -43,7 +43,8 @@ impl AllPairs {
         let found = AtomicU64::new(0);
         let max_pairs = request.config.limits.max_pairs;
         let rule = Rule { filters: request.filters, max_pairs, found: &found };
-        let is_few = request.boxes.len() <= policy::BRUTE_FORCE_UP_TO_BOXES;
+        let may_be_brute = request.config.forced_engine().is_none();
+        let is_few = may_be_brute && request.boxes.len() <= policy::BRUTE_FORCE_UP_TO_BOXES;
         let brute = request.config.backend == Backend::Brute || is_few;
         if brute { self.test_all(request, &rule, report) } else { self.search(request, grid, &rule, report) }
         let sum = |of: fn(&Hits) -> u64| self.hits.iter().map(of).sum::<u64>();

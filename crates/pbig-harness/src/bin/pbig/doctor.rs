@@ -2,8 +2,9 @@
 
 use crate::output::{Failure, print};
 use pbig_core::gpu::{GpuError, adapters};
-use pbig_core::{Backend, Coding, Config, Finder, GpuFinder, GpuOptions, Limits, Strategy, oracle};
+use pbig_core::{Aabb, Backend, Coding, Config, Finder, GpuFinder, GpuOptions, Limits, Pair, oracle};
 use pbig_harness::boxes::BoxSet;
+use pbig_harness::study::{SETTINGS, pbig_grid, with_gpu_grid};
 
 pub(crate) fn run() -> Result<(), Failure> {
     let Limits { max_boxes, max_pairs } = Limits::DEFAULT;
@@ -11,13 +12,11 @@ pub(crate) fn run() -> Result<(), Failure> {
         "pbig {}\n\
          CPU: {} threads, SIMD found: {}; SIMD used: {}\n\
          limits: {max_boxes} boxes, {max_pairs} pairs (pbig_core::Limits)\n\
-         backend auto: cpu; a GPU only where an app hands one over and it is measured to be faster\n\
-         strategy: below {} boxes without a grid",
+         backend auto: cpu; a GPU only where an app hands one over and many boxes have changed",
         env!("CARGO_PKG_VERSION"),
         rayon::current_num_threads(),
         simd_found().join(" "),
         pbig_core::simd(),
-        Config::DEFAULT.brute_below,
     ))?;
     let gpus = describe_adapters()?;
     print("self-test, 2000 boxes of each set against brute force:")?;
@@ -75,42 +74,52 @@ fn describe(i: usize, adapter: &wgpu::Adapter, opened: &Result<GpuFinder, GpuErr
     )
 }
 
-/// Every strategy of the CPU; returns what was wrong.
+/// Tests every search on the CPU; returns what was wrong.
 fn test_cpu() -> Result<Vec<String>, Failure> {
     let mut wrong = Vec::new();
-    for (name, backend, strategy) in [
-        ("grid", Backend::Cpu, Strategy::Grid),
-        ("pbig grid", Backend::Cpu, Strategy::Pbig),
-        ("brute", Backend::Brute, Strategy::Auto),
-    ] {
-        let finder = Finder::new(Config { backend, strategy, ..Config::DEFAULT });
-        wrong.extend(test(name, finder)?);
+    for (name, backend) in [("cpu", Backend::Cpu), ("brute", Backend::Brute)] {
+        let mut finder = Finder::new(Config { backend, ..Config::DEFAULT });
+        wrong.extend(test(name, |boxes| find(&mut finder, boxes))?);
     }
+    let by_pbigs_grid = |boxes: &[Aabb]| {
+        let mut pairs = pbig_grid(boxes, &SETTINGS).map_err(|error| error.to_string())?.pairs;
+        pairs.sort_unstable();
+        Ok(pairs)
+    };
+    wrong.extend(test("pbig grid", by_pbigs_grid)?);
     Ok(wrong)
 }
 
-/// Both codings on a device; returns what was wrong.
+/// Tests both codings on a device, always with the grid; returns what was wrong.
 fn test_gpu(name: &str, gpu: &GpuFinder) -> Result<Vec<String>, Failure> {
     let mut wrong = Vec::new();
     for (coding, words) in [(Coding::Plain, "plain"), (Coding::Packed, "packed")] {
         let options = GpuOptions { coding, ..GpuOptions::DEFAULT };
-        let config =
-            Config { backend: Backend::Gpu, strategy: Strategy::Pbig, gpu: options, ..Config::DEFAULT };
-        wrong.extend(test(&format!("{name} {words}"), Finder::with_gpu(config, gpu.clone()))?);
+        let config = Config { backend: Backend::Gpu, gpu: options, ..Config::DEFAULT };
+        let mut finder = Finder::with_gpu(with_gpu_grid(config, &SETTINGS, 0), gpu.clone());
+        wrong.extend(test(&format!("{name} {words}"), |boxes| find(&mut finder, boxes))?);
     }
     Ok(wrong)
 }
 
-/// A finder on every set. A device that leaves the work to the CPU has failed the test.
-fn test(name: &str, mut finder: Finder) -> Result<Vec<String>, Failure> {
+/// Returns the pairs. A device that leaves the work to the CPU is an error.
+fn find(finder: &mut Finder, boxes: &[Aabb]) -> Result<Vec<Pair>, String> {
+    let pairs = finder.find(boxes).map_err(|error| error.to_string())?.to_vec();
+    finder.report().fallback.clone().map_or(Ok(pairs), Err)
+}
+
+/// Tests a search on every set; returns what was wrong.
+fn test(
+    name: &str,
+    mut find: impl FnMut(&[Aabb]) -> Result<Vec<Pair>, String>,
+) -> Result<Vec<String>, Failure> {
     let mut wrong = Vec::new();
     for set in BoxSet::ALL {
         let boxes = set.boxes(2000, 1);
-        let right = finder.find(&boxes).is_ok_and(|found| found == oracle::pairs(&boxes));
-        let verdict = match &finder.report().fallback {
-            Some(why) => why,
-            None if right => "ok",
-            None => "WRONG",
+        let verdict = match find(&boxes) {
+            Err(why) => why,
+            Ok(pairs) if pairs == oracle::pairs(&boxes) => "ok".into(),
+            Ok(_) => "WRONG".into(),
         };
         print(&format!("  {name:<12} {:<10} {verdict}", set.name))?;
         if verdict != "ok" {

@@ -1,11 +1,91 @@
-//! Finders with different settings that search the same boxes from nothing, in turn.
+//! Different ways to search the same boxes from nothing, in turn.
 
 use super::measure::{Contest, Effort, medians, timed};
 use crate::output::Failure;
-use pbig_core::{Aabb, Backend, Config, Finder, GpuFinder};
+use pbig_core::{Aabb, Backend, Checks, Config, Error, Finder, GpuFinder, Report};
+use pbig_harness::study::{PbigFound, PbigSettings, pbig_grid};
+
+/// A way to search from nothing.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Way {
+    /// Ours, with these settings.
+    Finder(Config),
+    /// PBIG's grid on the CPU.
+    Pbig(PbigSettings),
+}
+
+impl From<Config> for Way {
+    fn from(config: Config) -> Self {
+        Self::Finder(config)
+    }
+}
+
+impl From<PbigSettings> for Way {
+    fn from(settings: PbigSettings) -> Self {
+        Self::Pbig(settings)
+    }
+}
+
+/// A way to search, with the results of its last call.
+pub(super) enum Side {
+    Finder(Box<Finder>),
+    Pbig(PbigSettings, Option<PbigFound>),
+}
+
+impl Side {
+    pub(super) fn new(way: impl Into<Way>, gpu: Option<&GpuFinder>) -> Self {
+        match way.into() {
+            Way::Pbig(settings) => Self::Pbig(settings, None),
+            Way::Finder(config) => Self::Finder(Box::new(match gpu {
+                Some(gpu) if config.backend == Backend::Gpu => Finder::with_gpu(config, gpu.clone()),
+                _ => Finder::new(config),
+            })),
+        }
+    }
+
+    pub(super) fn find(&mut self, boxes: &[Aabb]) -> Result<(), Error> {
+        match self {
+            Self::Finder(finder) => finder.find(boxes).map(|_| ()),
+            Self::Pbig(settings, found) => {
+                *found = Some(pbig_grid(boxes, settings)?);
+                Ok(())
+            }
+        }
+    }
+
+    pub(super) fn pairs(&self) -> u64 {
+        match self {
+            Self::Finder(finder) => finder.pairs().len() as u64,
+            Self::Pbig(_, found) => found.as_ref().map_or(0, |found| found.pairs.len() as u64),
+        }
+    }
+
+    pub(super) fn checks(&self) -> Checks {
+        match self {
+            Self::Finder(finder) => finder.report().checks,
+            Self::Pbig(_, found) => found.as_ref().map_or(Checks::default(), |found| found.checks),
+        }
+    }
+
+    /// The length of PBIG's cells, where it has them.
+    pub(super) fn cell(&self) -> Option<f32> {
+        match self {
+            Self::Finder(_) => None,
+            Self::Pbig(_, found) => found.as_ref().map(|found| found.plan.cell),
+        }
+    }
+
+    /// What our finder reports; PBIG's grid has no report.
+    pub(super) fn report(&self) -> Option<&Report> {
+        match self {
+            Self::Finder(finder) => Some(finder.report()),
+            Self::Pbig(..) => None,
+        }
+    }
+}
 
 pub(super) struct Finders {
-    pub(super) all: Vec<Finder>,
+    pub(super) all: Vec<Side>,
     /// Searched in turn, as boxes of a world are elsewhere each time and a device must get them anew; those
     /// of the set itself come last.
     frames: [Vec<Aabb>; 2],
@@ -14,15 +94,11 @@ pub(super) struct Finders {
 
 impl Finders {
     pub(super) fn new(
-        configs: impl IntoIterator<Item = Config>,
+        ways: impl IntoIterator<Item = impl Into<Way>>,
         gpu: Option<&GpuFinder>,
         frames: [Vec<Aabb>; 2],
     ) -> Self {
-        let finder = |config: Config| match gpu {
-            Some(gpu) if config.backend == Backend::Gpu => Finder::with_gpu(config, gpu.clone()),
-            _ => Finder::new(config),
-        };
-        Self { all: configs.into_iter().map(finder).collect(), frames, now: 0 }
+        Self { all: ways.into_iter().map(|way| Side::new(way, gpu)).collect(), frames, now: 0 }
     }
 
     /// Milliseconds of each.
@@ -32,9 +108,9 @@ impl Finders {
 
     /// The pairs of the last round, in which all must have found as many.
     pub(super) fn pairs(&self) -> Result<u64, Failure> {
-        let counts: Vec<usize> = self.all.iter().map(|finder| finder.pairs().len()).collect();
+        let counts: Vec<u64> = self.all.iter().map(Side::pairs).collect();
         match counts.iter().all(|count| *count == counts[0]) {
-            true => Ok(counts[0] as u64),
+            true => Ok(counts[0]),
             false => Err(Failure::Check(format!("finders that differ in settings found {counts:?} pairs"))),
         }
     }
@@ -51,10 +127,10 @@ impl Contest for Finders {
 
     fn run(&mut self, side: usize) -> Result<f64, Failure> {
         let finder = &mut self.all[side];
-        let (found, time) = timed(|| finder.find(&self.frames[self.now]).map(|_| ()));
+        let (found, time) = timed(|| finder.find(&self.frames[self.now]));
         found.map_err(|error| Failure::Input(error.to_string()))?;
         // A call that a device left to the CPU is no measurement of the device.
-        match &finder.report().fallback {
+        match finder.report().and_then(|report| report.fallback.as_ref()) {
             None => Ok(time),
             Some(why) => Err(Failure::Check(why.clone())),
         }

@@ -8,7 +8,7 @@ use pbig_harness::boxes::BoxSet;
 use serde_json::{Value, json};
 use std::process::Command;
 
-/// Updates of the incremental probes: several lists of near pairs, where boxes drift.
+/// Updates of the incremental probes: enough for every buffer to reach its size.
 const UPDATES: usize = 30;
 
 /// How far a box moves in one.
@@ -163,7 +163,7 @@ fn to_and_fro(id: usize, update: usize) -> [f32; 3] {
     [if (id + update).is_multiple_of(2) { STEP } else { 0.0 }; 3]
 }
 
-/// Around a place beside where it began, so wide that lists of near pairs do not last.
+/// Around a place beside where it began, about two edges wide.
 fn circle(id: usize, update: usize) -> [f32; 3] {
     let (sin, cos) = (STEP * update as f32 + id as f32).sin_cos();
     [cos, sin, 0.0]

@@ -7,15 +7,14 @@ pub(crate) mod measure;
 pub(crate) mod memory;
 mod papers;
 mod peers;
-mod regret;
 mod requests;
-mod shares;
 mod stages;
+mod steady;
 mod step;
 mod table;
 mod update;
-mod ways;
 
+use crate::options::bodies;
 use crate::output::{Failure, print};
 use clap::ValueEnum;
 use machine::{Machine, slug};
@@ -38,6 +37,12 @@ pub(crate) struct Args {
     /// Small sizes only, in seconds; nothing is written.
     #[arg(long)]
     quick: bool,
+    /// Of `steady`: write the times as CSV, and a chart of some, into this folder.
+    #[arg(long, value_name = "DIR")]
+    write: Option<PathBuf>,
+    /// Of `steady`: numbers of boxes, and of bodies, instead of its own.
+    #[arg(long, value_name = "N,N", value_parser = bodies, value_delimiter = ',', allow_negative_numbers = true)]
+    boxes: Vec<usize>,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
@@ -50,6 +55,8 @@ enum Suite {
     Peers,
     /// Every scene at every size, stock beside ours in each step.
     Step,
+    /// Whether updates take equally long: mean, median, p99 and worst by motion, and of every scene.
+    Steady,
     /// The experiments of PBIG's and Avril's papers, the printed figures beside ours.
     Papers,
     /// The GPU pipeline: upload, each kernel, readback, decode, whole call.
@@ -66,26 +73,44 @@ struct Outcome {
 
 pub(crate) fn run(args: &Args) -> Result<(), Failure> {
     let quick = args.quick;
+    refuse_what_others_ignore(args)?;
     match args.suite {
         Suite::Stages => report("stages", stages::run(quick)?, args),
         Suite::Update => report("update", update::run(quick)?, args),
         Suite::Peers => report("peers", peers::run(quick)?, args),
         Suite::Step => report("step", step::run(quick)?, args),
+        Suite::Steady => steady::run(args),
         Suite::Papers => papers::run(args),
         Suite::Gpu => gpu::run(args),
     }
 }
 
-fn report(suite: &str, mut outcome: Outcome, args: &Args) -> Result<(), Failure> {
+fn refuse_what_others_ignore(args: &Args) -> Result<(), Failure> {
+    let of_steady = [("--write", args.write.is_some()), ("--boxes", !args.boxes.is_empty())];
+    match of_steady.into_iter().find(|&(_, given)| given) {
+        Some((option, _)) if args.suite != Suite::Steady => {
+            Err(Failure::Input(format!("{option} is for `pbig bench steady`, not for other suites")))
+        }
+        _ => Ok(()),
+    }
+}
+
+/// Prints the rows; returns the JSON object.
+fn show(suite: &str, outcome: &mut Outcome, machine: &Machine, json: bool) -> Result<Value, Failure> {
     outcome.notes.extend(table::summary(&outcome.rows));
-    let machine = Machine::here();
-    let object = object(suite, &machine, &outcome);
-    if args.json {
+    let object = object(suite, machine, outcome);
+    if json {
         print(&object.to_string())?;
     } else {
         let notes = outcome.notes.join("\n");
         print(&format!("{}\n{}\n{notes}", machine.line(), table::text(&outcome.rows)))?;
     }
+    Ok(object)
+}
+
+fn report(suite: &str, mut outcome: Outcome, args: &Args) -> Result<(), Failure> {
+    let machine = Machine::here();
+    let object = show(suite, &mut outcome, &machine, args.json)?;
     if args.quick {
         return Ok(());
     }

@@ -1,6 +1,6 @@
 //! `pbig bench peers`: the finder alone beside parry's newer tree and obvhs, same boxes, in turn.
 
-mod trees;
+pub(super) mod trees;
 
 use super::Outcome;
 use super::measure::{Contest, Effort, measured, medians, timed};

@@ -1,5 +1,5 @@
-//! How often a broad phase in steady state asks for memory: never, but for what threads hand work over with, and where a list, or the
-//! levels of a plan, are more than before.
+//! How often a broad phase in steady state asks for memory. On one thread it should never do so. On several, rayon asks for
+//! memory to hand work from thread to thread.
 
 use super::memory::{Motion, Moving};
 use super::table::{Row, Target, Unit};
@@ -7,7 +7,7 @@ use crate::output::Failure;
 use pbig_harness::boxes::BoxSet;
 use pbig_harness::counting::{self, requests};
 
-/// Updates before counting, in which buffers grow to what they take, and those counted: with lists of near pairs made anew.
+/// Updates before counting, in which buffers grow to their size, and updates that are counted.
 const WARM_UP: usize = 400;
 const COUNTED: usize = 200;
 
@@ -78,7 +78,7 @@ mod tests {
         assert!((2..20).contains(&of_all), "one on each thread, and {of_all} in all");
         let rows = rows_on(5000, &[1, 2]).expect("within the limits");
         assert_eq!(rows.len(), 2 * Motion::STEADY.len());
-        // Of the others time decides when a list is made that is longer than those before.
+        // Boxes that circle can have more pairs than in any update before, and then a buffer grows.
         assert_eq!(
             (rows[0].met(), rows[1].met().is_some()),
             (Some(true), true),

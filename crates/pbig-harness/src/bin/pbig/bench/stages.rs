@@ -3,12 +3,12 @@
 use super::Outcome;
 use super::measure::{Contest, Effort, medians, timed};
 use super::table::Row;
-use super::{shares, ways};
 use crate::output::{Failure, progress};
 use pbig_core::{Aabb, BroadPhase, Config, Error, Finder, Limits, Order, ProxyFilter, Report, StageTimes};
 use pbig_harness::boxes::{Wander, cubes};
 use pbig_harness::chart::{Line, LogLog};
 use pbig_harness::runner::{Spread, milliseconds};
+use pbig_harness::study::algorithm;
 
 /// How far a box moves between two frames, along each axis; edges are around 1.
 const DISTANCE: f32 = 0.1;
@@ -39,7 +39,6 @@ pub(super) struct Alone {
 /// What the rounds took, and what they were.
 pub(super) struct Measured {
     pub(super) median: Times,
-    /// In which a frame that builds what many others use has its part.
     pub(super) mean: Times,
     pub(super) pairs: u64,
     /// What the plan chose, and how often.
@@ -136,7 +135,7 @@ impl Contest for Alone {
     fn run(&mut self, _: usize) -> Result<f64, Failure> {
         let times = self.find().map_err(|error| Failure::Input(error.to_string()))?;
         self.times.push(times);
-        self.chosen.push(self.report().plan.chosen.name());
+        self.chosen.push(algorithm(&self.report().plan));
         Ok(times[0])
     }
 }
@@ -151,8 +150,7 @@ struct Sweep {
 }
 
 impl Sweep {
-    /// Of stages: medians from nothing. Of events means, as a frame that makes a list or a grid for many others is none
-    /// that a median shows.
+    /// Medians from nothing, means of events: updates differ, and a median shows only one kind of them.
     fn shown<'a>(&self, measured: &'a Measured) -> &'a Times {
         if self.scratch { &measured.median } else { &measured.mean }
     }
@@ -208,9 +206,7 @@ pub(super) fn run(quick: bool) -> Result<Outcome, Failure> {
         charts.push(chart(sweep, lines.into()));
     }
     bar.finish_and_clear();
-    let crossings = ways::run(quick, &mut rows, &mut charts)?;
-    let won = shares::run(quick, &mut rows, &mut charts)?;
-    Ok(Outcome { rows, notes: [notes(), crossings, won].concat(), charts })
+    Ok(Outcome { rows, notes: notes(), charts })
 }
 
 fn at(sweep: &Sweep, point: &Point, effort: Effort) -> Result<Measured, Failure> {
@@ -255,14 +251,8 @@ fn notes() -> Vec<String> {
         "from scratch: `Finder` with `Order::Unspecified`; events: `BroadPhase`, `set_many` of the moved boxes (the \
          stage `set`) and `update`"
             .into(),
-        "ours is a median, its mean beside it; stages from scratch are medians, those of events and their charts \
-         means, which have the frames in them that make a list or a grid for many others; last, what the plan chose \
-         in how many calls"
-            .into(),
-        "ways: `Finder` as planned (ours), and made to test every pair, to use the grid, or to use PBIG's own grid, \
-         which no plan chooses; grids: as planned, and made to use one grid, or levels by size or one grid and a list of \
-         the largest; rows: made to use one grid and to look at all rows, at those trimmed to a box's reach, or at other \
-         rows than its own only where a box reaches them (`Config::study`)"
+        "ours is a median, its mean beside it; stages from scratch are medians, stages of events and their charts are \
+         means; last, the algorithms that the plan chose, each with its number of calls"
             .into(),
     ]
 }
@@ -272,7 +262,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_frame_that_works_for_many_is_in_the_mean_and_named() {
+    fn the_stages_add_up_to_at_most_the_whole_and_algorithms_are_counted() {
         let effort = Effort { warm_up: 12, rounds: 40, budget: std::time::Duration::MAX };
         let alone = Alone::events(cubes(2000, 1.0, 1.0, 1), 1.0, DISTANCE).expect("a good margin");
         let Measured { mean, pairs, chosen, .. } = alone.measure(effort).expect("measured");
@@ -283,7 +273,7 @@ mod tests {
 
     #[test]
     fn names_are_counted() {
-        assert_eq!(counted(&["grid", "near", "near"]), "near 2, grid 1");
+        assert_eq!(counted(&["grid", "edit", "edit"]), "edit 2, grid 1");
         assert_eq!(counted(&[]), "");
     }
 }

@@ -84,59 +84,68 @@ fn notes(rows: &[Row]) -> Vec<String> {
 }
 
 /// One scene under way.
-struct Duel {
+pub(super) struct Duel {
     world: World,
     both: Both,
-    steps: usize,
+    /// Ours and stock's milliseconds, by step; in even steps ours is called first.
+    pub(super) times: Vec<[f64; 2]>,
     too_long: bool,
-    /// Ours and stock's, by place in the order of calls.
-    times: [[Vec<f64>; 2]; 2],
 }
 
 impl Duel {
-    fn new(scene: Scene, bodies: usize) -> Self {
+    /// Runs a scene for as many steps as the effort allows.
+    pub(super) fn run(scene: Scene, bodies: usize, effort: Effort) -> Self {
         let (ours, stock) = (Timed::new(PbigBroadPhase::new()), Timed::new(DefaultBroadPhase::new()));
         let both = Both { ours, stock, ours_first: false, discarded: vec![] };
-        Self { world: scene.build(bodies, 1), both, steps: 0, too_long: false, times: Default::default() }
+        let mut duel = Self { world: scene.build(bodies, 1), both, times: vec![], too_long: false };
+        let start = Instant::now();
+        while !duel.is_done(effort, start.elapsed()) {
+            duel.step();
+        }
+        duel
     }
 
-    fn step(&mut self, counts: bool) {
+    fn step(&mut self) {
         let both = &mut self.both;
-        both.ours_first = self.steps.is_multiple_of(2);
+        both.ours_first = self.times.len().is_multiple_of(2);
         let clock = Instant::now();
         self.world.step(both);
         self.too_long = clock.elapsed() > LONGEST;
-        self.steps += 1;
-        let (ours, stock) = (both.ours.take(), both.stock.take());
-        if counts {
-            let place = usize::from(!both.ours_first);
-            self.times[0][place].push(milliseconds(ours));
-            self.times[1][1 - place].push(milliseconds(stock));
-        }
+        self.times.push([both.ours.take(), both.stock.take()].map(milliseconds));
     }
 
     fn is_done(&self, effort: Effort, elapsed: Duration) -> bool {
-        let counted = self.steps.saturating_sub(effort.warm_up);
+        let counted = self.times.len().saturating_sub(effort.warm_up);
         counted >= effort.rounds
             || (counted >= 6 && elapsed > effort.budget)
             || (counted >= 2 && self.too_long)
+    }
+
+    /// Returns the pairs that ours has now.
+    pub(super) fn pairs(&self) -> u64 {
+        self.both.ours.inner.pair_count() as u64
+    }
+
+    /// Returns the median of ours and of stock from a step on: the mean of the medians of even and odd steps.
+    fn medians(&self, from: usize) -> [f64; 2] {
+        [0, 1].map(|side| {
+            let of = |parity: usize| -> Vec<f64> {
+                let steps = self.times.iter().enumerate().skip(from);
+                steps.filter(|(step, _)| step % 2 == parity).map(|(_, ms)| ms[side]).collect()
+            };
+            mean_of_medians([of(0), of(1)].iter().map(Vec::as_slice))
+        })
     }
 }
 
 /// One scene at one size.
 fn measure(scene: Scene, bodies: usize, effort: Effort) -> Row {
-    let mut duel = Duel::new(scene, bodies);
-    let start = Instant::now();
-    while !duel.is_done(effort, start.elapsed()) {
-        duel.step(duel.steps >= effort.warm_up);
-    }
-    let Duel { world, both, steps, too_long, times } = duel;
-    let [ours, stock] = times.map(|places| mean_of_medians(places.iter().map(Vec::as_slice)));
-    let pairs = both.ours.inner.pair_count() as u64;
+    let duel = Duel::run(scene, bodies, effort);
+    let [ours, stock] = duel.medians(effort.warm_up);
     let case = format!("{}, {bodies} bodies", scene.name);
-    let row = Row::new(case, world.colliders.len(), pairs).ours(ours).against("stock", stock);
-    let cut = if too_long { ", the last over 5 s" } else { "" };
-    row.target(TARGET).note(format!("{} steps{cut}", steps - effort.warm_up))
+    let row = Row::new(case, duel.world.colliders.len(), duel.pairs()).ours(ours).against("stock", stock);
+    let cut = if duel.too_long { ", the last over 5 s" } else { "" };
+    row.target(TARGET).note(format!("{} steps{cut}", duel.times.len() - effort.warm_up))
 }
 
 /// Shares of the uniform set that move; the largest size as a chart.

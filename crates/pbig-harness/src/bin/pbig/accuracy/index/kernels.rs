@@ -180,7 +180,7 @@ fn timed_run(
 
 /// With room for all indices, of which `cells` are computed.
 fn run(bench: &Bench, root: u32, indices: &Indices, cells: u32) -> Result<Vec<u32>, Failure> {
-    run_kernel(bench, (&pbig_shaders::study::INDEX_PAIRS, root), indices.params(cells), indices.count, 3)
+    run_kernel(bench, (&pbig_harness::study::INDEX_PAIRS, root), indices.params(cells), indices.count, 3)
 }
 
 /// A kernel with a root, and room for so many cells of so many words each.

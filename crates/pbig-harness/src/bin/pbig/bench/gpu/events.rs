@@ -1,5 +1,5 @@
-//! Part of `pbig bench gpu`: updates by the share that moves. What goes up and comes back should follow the change, not
-//! the world; and a caller who does something else meanwhile should hardly wait.
+//! Part of `pbig bench gpu`: updates by the share that moves. The bytes that go up and come back should follow the number
+//! of changed boxes, not the number of all boxes.
 
 use super::{milliseconds_of, most_boxes};
 use crate::output::{Failure, progress};
@@ -25,10 +25,7 @@ pub(in crate::bench) struct Row {
     events: usize,
     pub(in crate::bench) cpu: Spread,
     pub(in crate::bench) gpu: Spread,
-    /// The same in two halves, between which the caller is busy for as long as the update takes.
-    begin: Spread,
-    finish: Spread,
-    /// Of the last round, not in halves.
+    /// Of the last round.
     report: GpuReport,
 }
 
@@ -58,11 +55,10 @@ pub(in crate::bench) fn race(
     Race::new(gpu, start, share, distance).and_then(Race::run)
 }
 
-/// Three broad phases that see the same boxes.
+/// Two broad phases that see the same boxes.
 struct Race {
     cpu: BroadPhase,
     gpu: BroadPhase,
-    halves: BroadPhase,
     wander: Wander,
     share: f64,
 }
@@ -70,13 +66,13 @@ struct Race {
 impl Race {
     fn new(gpu: &GpuFinder, start: Vec<Aabb>, share: f64, distance: f32) -> Result<Self, Failure> {
         let config = |backend| Config { backend, limits: Limits::UNLIMITED, ..Config::DEFAULT };
-        let on_gpu = || BroadPhase::with_gpu(config(Backend::Gpu), gpu.clone()).map_err(failure);
+        let gpu = BroadPhase::with_gpu(config(Backend::Gpu), gpu.clone()).map_err(failure)?;
         let boxes = start.len();
         let wander = Wander::new(start, share, distance);
         let cpu = BroadPhase::new(config(Backend::Cpu)).map_err(failure)?;
-        let mut race = Self { cpu, gpu: on_gpu()?, halves: on_gpu()?, wander, share };
+        let mut race = Self { cpu, gpu, wander, share };
         let all: Vec<u32> = (0..boxes as u32).collect();
-        for broad_phase in [&mut race.cpu, &mut race.gpu, &mut race.halves] {
+        for broad_phase in [&mut race.cpu, &mut race.gpu] {
             set(broad_phase, &all, &race.wander.boxes)?;
             broad_phase.update().map_err(failure)?;
         }
@@ -86,43 +82,32 @@ impl Race {
     fn run(mut self) -> Result<Row, Failure> {
         let boxes = self.wander.boxes.len();
         let rounds = if boxes > 100_000 { 5 } else { 9 };
-        let mut times: [Vec<f64>; 4] = Default::default();
+        let mut times: [Vec<f64>; 2] = Default::default();
         let mut report = GpuReport::default();
         for round in 0..rounds {
             let took = self.round(round)?;
             self.compare()?;
             report = did(&self.gpu)?;
-            did(&self.halves)?;
             // The first rounds allocate and learn.
             if round > 1 {
                 times.iter_mut().zip(took).for_each(|(times, took)| times.push(milliseconds(took)));
             }
         }
-        let [cpu, gpu, begin, finish] = times.map(Spread::of);
+        let [cpu, gpu] = times.map(Spread::of);
         let (share, pairs) = (self.share, self.gpu.pair_count());
         let events = self.gpu.events().added.len() + self.gpu.events().removed.len();
-        Ok(Row { boxes, share, pairs, events, cpu, gpu, begin, finish, report })
+        Ok(Row { boxes, share, pairs, events, cpu, gpu, report })
     }
 
-    /// What the update took on either backend, and its two halves.
-    fn round(&mut self, round: usize) -> Result<[Duration; 4], Failure> {
+    /// What the update took on either backend.
+    fn round(&mut self, round: usize) -> Result<[Duration; 2], Failure> {
         let moved = self.wander.step(round);
         let boxes = &self.wander.boxes;
-        let cpu = update(&mut self.cpu, &moved, boxes)?;
-        let gpu = update(&mut self.gpu, &moved, boxes)?;
-        let clock = Instant::now();
-        set(&mut self.halves, &moved, boxes)?;
-        self.halves.begin();
-        let begin = clock.elapsed();
-        std::thread::sleep(gpu);
-        let clock = Instant::now();
-        self.halves.finish().map_err(failure)?;
-        Ok([cpu, gpu, begin, clock.elapsed()])
+        Ok([update(&mut self.cpu, &moved, boxes)?, update(&mut self.gpu, &moved, boxes)?])
     }
 
     fn compare(&self) -> Result<(), Failure> {
-        let events = [&self.cpu, &self.gpu, &self.halves].map(BroadPhase::events);
-        if events.iter().all(|&other| other == events[0]) {
+        if self.cpu.events() == self.gpu.events() {
             return Ok(());
         }
         let (boxes, share) = (self.wander.boxes.len(), self.share);
@@ -154,15 +139,14 @@ fn did(broad_phase: &BroadPhase) -> Result<GpuReport, Failure> {
 }
 
 pub(super) fn table(rows: &[Row]) -> String {
-    let head = "events, medians in ms; gpu: one update; x: cpu / gpu; begin, finish: its halves, with as long between \
-                them; up, back: bytes of the last round";
+    let head = "events, medians in ms; x: cpu / gpu; up, back: bytes of the last round";
     let names = format!(
-        "{:<9} {:>9} {:>6} {:>9} {:>9} {:>9} {:>9} {:>6} {:>9} {:>9} {:>10} {:>10}",
-        "set", "boxes", "share", "pairs", "events", "cpu", "gpu", "x", "begin", "finish", "up", "back"
+        "{:<9} {:>9} {:>6} {:>9} {:>9} {:>9} {:>9} {:>6} {:>10} {:>10}",
+        "set", "boxes", "share", "pairs", "events", "cpu", "gpu", "x", "up", "back"
     );
     let line = |row: &Row| {
         format!(
-            "{:<9} {:>9} {:>6} {:>9} {:>9} {:>9.3} {:>9.3} {:>6.2} {:>9.3} {:>9.3} {:>10} {:>10}",
+            "{:<9} {:>9} {:>6} {:>9} {:>9} {:>9.3} {:>9.3} {:>6.2} {:>10} {:>10}",
             SET,
             row.boxes,
             row.share,
@@ -171,8 +155,6 @@ pub(super) fn table(rows: &[Row]) -> String {
             row.cpu.median,
             row.gpu.median,
             row.cpu.median / row.gpu.median,
-            row.begin.median,
-            row.finish.median,
             row.report.uploaded,
             row.report.downloaded
         )
@@ -184,7 +166,7 @@ pub(super) fn table(rows: &[Row]) -> String {
 pub(super) fn object(row: &Row) -> Value {
     json!({
         "set": SET, "boxes": row.boxes, "share": row.share, "pairs": row.pairs, "events": row.events,
-        "cpu_ms": row.cpu, "gpu_ms": row.gpu, "ratio": row.cpu.median / row.gpu.median, "begin_ms": row.begin, "finish_ms": row.finish,
+        "cpu_ms": row.cpu, "gpu_ms": row.gpu, "ratio": row.cpu.median / row.gpu.median,
         "uploaded": row.report.uploaded, "downloaded": row.report.downloaded,
         "device_bytes": row.report.device_bytes, "kernels_ms": milliseconds_of(&row.report.kernels),
     })

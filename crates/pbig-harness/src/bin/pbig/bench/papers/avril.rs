@@ -5,13 +5,14 @@ use super::printed::{AVRIL_5, AVRIL_7};
 use super::sheet::{Sheet, short, thousands};
 use super::steps::DISTANCE;
 use super::{Scale, UNSORTED, chart, effort, once};
-use crate::bench::finders::Finders;
+use crate::bench::finders::{Finders, Way};
 use crate::bench::measure::Effort;
 use crate::output::Failure;
 use pbig_core::pair_index::pair_count;
-use pbig_core::{Backend, CellRule, Config, GpuOptions, Strategy};
+use pbig_core::{Backend, Config, GpuOptions};
 use pbig_harness::boxes::{cubes, moved};
 use pbig_harness::chart::Line;
+use pbig_harness::study::{ALL_PAIRS_UP_TO, CellRule, PbigSettings, SETTINGS, with_gpu_grid, with_our_grid};
 use serde_json::json;
 
 /// Bytes of boxes that go up: 6 coordinates each (Avril 3.2.1).
@@ -143,20 +144,20 @@ pub(super) fn crossover(scale: &Scale, device: &Device) -> Result<Sheet, Failure
         "with",
     ];
     let mut sheet = Sheet::new("Avril table 7: with and without a grid", &columns).about(format!(
-        "Whole calls from nothing, cubes with a pair each, all moved. More sizes and densities: \
-         [crossovers](crossovers.md). Without a grid a device searches up to 1024 boxes. {}",
+        "Whole calls from nothing, cubes with a pair each, all moved. Without a grid a device searches up to 1024 \
+         boxes. {}",
         device.about()
     ));
-    let (pbig, mut pays) = (Config { strategy: Strategy::Pbig, ..UNSORTED }, vec![]);
-    let sides = [
-        Config { backend: Backend::Brute, ..UNSORTED },
-        Config { strategy: Strategy::Grid, ..UNSORTED },
-        Config { cell_rule: CellRule::Density, ..pbig },
+    let mut pays = vec![];
+    let sides: [Way; 3] = [
+        Config { backend: Backend::Brute, ..UNSORTED }.into(),
+        with_our_grid(UNSORTED).into(),
+        PbigSettings { cell_rule: CellRule::Density, ..SETTINGS }.into(),
     ];
     for (n, without, with) in AVRIL_7 {
         let boxes = cubes(n, 1.0, 1.0, 1);
-        let on = |strategy| Config { strategy, ..on_gpu(GpuOptions::DEFAULT) };
-        let wanted = [on(Strategy::Pbig), on(Strategy::Auto)];
+        let on = |all_pairs_up_to| with_gpu_grid(on_gpu(GpuOptions::DEFAULT), &SETTINGS, all_pairs_up_to);
+        let wanted = [on(0), on(ALL_PAIRS_UP_TO)];
         let gpu = device.run(&wanted[..if n <= 1024 { 2 } else { 1 }], &boxes, DISTANCE)?;
         let pairs = once(UNSORTED, &boxes)?.pairs;
         same_pairs(&gpu, pairs)?;

@@ -3,8 +3,8 @@
 
 use super::model::{Edges, Model, Space};
 use super::printed::WARP;
-use pbig_core::plan::{PbigPlan, Summary};
-use pbig_core::{Aabb, Config, Strategy};
+use pbig_core::Aabb;
+use pbig_harness::study::{PbigCells, PbigSettings, SETTINGS};
 
 /// Cells from 0 on along an axis of even boxes, of which the last may be cut off.
 fn along(length: f64, cell: f64) -> f64 {
@@ -83,17 +83,13 @@ fn mean_of_ceilings(edges: &Edges, cell: f64) -> f64 {
 }
 
 /// Settings with which PBIG's grid has cells as close to `cell` as its rule can be made to give.
-pub(super) fn config_for(boxes: &[Aabb], cell: f64) -> Config {
-    let summary = Summary::of(boxes, None);
-    let with = |wanted: f64| Config {
-        strategy: Strategy::Pbig,
-        pbig_boxes_per_cell: wanted as f32,
-        ..super::UNSORTED
-    };
+pub(super) fn settings_for(boxes: &[Aabb], cell: f64) -> PbigSettings {
+    let cells = PbigCells::new(boxes);
+    let with = |wanted: f64| PbigSettings { boxes_per_cell: wanted as f32, ..SETTINGS };
     let (mut low, mut high) = (1.0, boxes.len().max(2) as f64);
     for _ in 0..40 {
         let middle: f64 = (low * high).sqrt();
-        let given = f64::from(PbigPlan::new(&summary, &with(middle)).cell);
+        let given = f64::from(cells.length(&with(middle)));
         if given < cell { low = middle } else { high = middle }
     }
     with(high)
@@ -147,8 +143,8 @@ mod tests {
     fn settings_give_the_cells_that_are_asked_for() {
         let boxes = model().boxes(20_000, 1);
         for cell in [5.0, 10.0, 25.0] {
-            let plan = PbigPlan::new(&Summary::of(&boxes, None), &config_for(&boxes, cell));
-            assert!((f64::from(plan.cell) / cell - 1.0).abs() < 0.06, "{cell}: {plan}");
+            let given = f64::from(PbigCells::new(&boxes).length(&settings_for(&boxes, cell)));
+            assert!((given / cell - 1.0).abs() < 0.06, "{cell}: {given}");
         }
     }
 }

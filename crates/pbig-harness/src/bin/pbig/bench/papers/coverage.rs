@@ -1,6 +1,6 @@
 //! PBIG's table III and figure 10, by the reading of DoC that fits: pairs, checks, times; and the cells.
 
-use super::cells::{Alpha, config_for, expected_checks};
+use super::cells::{Alpha, expected_checks, settings_for};
 use super::density::fitting;
 use super::device::{Device, on_gpu};
 use super::printed::{Coverage, DOC_MS, MOST_BOXES, SPACE, TABLE_III, WARP};
@@ -10,9 +10,10 @@ use super::{Once, Scale, UNSORTED, chart, effort, once};
 use crate::bench::finders::Finders;
 use crate::bench::papers::model::Model;
 use crate::output::Failure;
-use pbig_core::{Aabb, Config, GpuOptions};
+use pbig_core::{Aabb, GpuOptions};
 use pbig_harness::boxes::moved;
 use pbig_harness::chart::Line;
+use pbig_harness::study::{ALL_PAIRS_UP_TO, PbigSettings, SETTINGS, with_gpu_grid};
 use serde_json::{Value, json};
 
 /// The cell length of a row: as printed, or by the paper's rule where it is not.
@@ -150,8 +151,8 @@ fn empty_table(n: usize) -> Sheet {
              printed numbers; the text says under {DOC_MS} ms for each."
         ))
         .about(
-            "Our grid has one entry a box and makes none of these checks; PBIG's grid on the CPU is `Strategy::Pbig`, \
-             plain, to compare counts. Its time is of one call that also allocates.",
+            "Our grid has one entry a box and makes none of these checks; PBIG's grid on the CPU is plain, to \
+             compare counts. Its time is of one call that also allocates.",
         )
 }
 
@@ -159,7 +160,7 @@ fn empty_table(n: usize) -> Sheet {
 fn search(row: &Coverage, boxes: Vec<Aabb>) -> Result<(u64, f64, Once), Failure> {
     let scale = (MOST_BOXES as f64 / boxes.len() as f64).cbrt();
     let cell = scale * cell(row, &fitting(MOST_BOXES, row.doc));
-    let (pbig, effort) = (once(config_for(&boxes, cell), &boxes)?, effort(boxes.len()));
+    let (pbig, effort) = (once(settings_for(&boxes, cell), &boxes)?, effort(boxes.len()));
     let mut finders = Finders::new([UNSORTED], None, [moved(&boxes, 1.0, 2), boxes]);
     let (ms, pairs) = (finders.times(effort)?[0], finders.pairs()?);
     if pairs == pbig.pairs {
@@ -193,18 +194,18 @@ pub(super) fn on_device(scale: &Scale, device: &Device) -> Result<Sheet, Failure
     let mut sheet = Sheet::new("PBIG table III and figure 10: density, GPU", &columns).about(format!(
         "The same law; W is the wanted boxes of a cell, {} in our plan and {WARP} in the paper. Pairs are as many as \
          on the CPU. Printed: 10^7 boxes. {}",
-        UNSORTED.pbig_boxes_per_cell,
+        SETTINGS.boxes_per_cell,
         device.about()
     ));
     for row in &TABLE_III {
         let boxes = fitting(n, row.doc).boxes(n, 1);
         let pairs = once(UNSORTED, &boxes)?.pairs;
         let at = |wanted: f32| {
-            let config = Config { pbig_boxes_per_cell: wanted, ..on_gpu(GpuOptions::DEFAULT) };
+            let settings = PbigSettings { boxes_per_cell: wanted, ..SETTINGS };
+            let config = with_gpu_grid(on_gpu(GpuOptions::DEFAULT), &settings, ALL_PAIRS_UP_TO);
             device.run_for(config, &boxes, 1.0, pairs)
         };
-        if let [Some((ms, ours)), Some((paper_ms, paper))] =
-            [at(UNSORTED.pbig_boxes_per_cell)?, at(WARP as f32)?]
+        if let [Some((ms, ours)), Some((paper_ms, paper))] = [at(SETTINGS.boxes_per_cell)?, at(WARP as f32)?]
         {
             let made = [&ours, &paper].map(|report| report.checks.made);
             sheet.row(json!([row.doc, n, pairs, made[0], ms, made[1], paper_ms, format!("< {DOC_MS}")]));

@@ -125,7 +125,7 @@ impl Contest for Calls {
 
     fn run(&mut self, side: usize) -> Result<f64, Failure> {
         let ms = self.finders.run(side)?;
-        self.all[side].push((ms, self.finders.all[side].report().clone()));
+        self.all[side].extend(self.finders.all[side].report().map(|report| (ms, report.clone())));
         Ok(ms)
     }
 }

@@ -1,14 +1,15 @@
 //! PBIG's figure 9: size of cells.
 
-use super::cells::{config_for, expected_checks};
+use super::cells::{expected_checks, settings_for};
 use super::device::Device;
 use super::numbers::UNIFORM;
 use super::printed::{CELLS, MOST_BOXES, SPACE, WARP};
 use super::sheet::{Sheet, short, thousands};
 use super::{Scale, UNSORTED, chart, once};
 use crate::output::Failure;
-use pbig_core::{Aabb, Backend, Checks, Config, Strategy};
+use pbig_core::{Aabb, Backend, Checks, Config};
 use pbig_harness::chart::Line;
+use pbig_harness::study::{PbigSettings, SETTINGS, with_gpu_grid};
 use serde_json::{Value, json};
 
 /// Most checks of a row that is run: about three minutes on one thread, at 9 ns each.
@@ -53,7 +54,7 @@ enum Wanted {
 impl Wanted {
     /// The lengths of the figure, and equation 6 as we use it and as the paper does.
     fn all() -> impl Iterator<Item = Self> {
-        let rules = [UNSORTED.pbig_boxes_per_cell, WARP as f32].map(Self::Rule);
+        let rules = [SETTINGS.boxes_per_cell, WARP as f32].map(Self::Rule);
         CELLS.map(Self::Length).into_iter().chain(rules)
     }
 
@@ -64,12 +65,10 @@ impl Wanted {
         }
     }
 
-    fn config(self, boxes: &[Aabb]) -> Config {
+    fn settings(self, boxes: &[Aabb]) -> PbigSettings {
         match self {
-            Self::Length(cell) => config_for(boxes, cell),
-            Self::Rule(wanted) => {
-                Config { strategy: Strategy::Pbig, pbig_boxes_per_cell: wanted, ..UNSORTED }
-            }
+            Self::Length(cell) => settings_for(boxes, cell),
+            Self::Rule(boxes_per_cell) => PbigSettings { boxes_per_cell, ..SETTINGS },
         }
     }
 
@@ -100,11 +99,11 @@ struct Ran {
 
 impl Ran {
     fn new(boxes: &[Aabb], wanted: Wanted) -> Result<Self, Failure> {
-        let config = wanted.config(boxes);
-        let first = once(config, boxes)?;
+        let settings = wanted.settings(boxes);
+        let first = once(settings, boxes)?;
         let mut times = vec![first.ms];
         while times.len() < calls(first.ms) {
-            times.push(once(config, boxes)?.ms);
+            times.push(once(settings, boxes)?.ms);
         }
         times.sort_by(f64::total_cmp);
         let cell = f64::from(first.cell.unwrap_or(0.0));
@@ -138,7 +137,7 @@ fn noise(rows: &[Ran]) -> f64 {
 pub(super) fn cells(scale: &Scale, device: &Device) -> Result<Sheet, Failure> {
     let columns = COLUMNS.into_iter().chain(["cell, GPU", "checks, GPU", device.column()]);
     let mut sheet = Sheet::new("PBIG figure 9: size of cells", &columns.collect::<Vec<_>>()).about(format!(
-        "Section 6.1 as printed, `Strategy::Pbig` on one thread, from nothing: the median of {CALLS} calls where one \
+        "Section 6.1 as printed, PBIG's grid on one thread, from nothing: the median of {CALLS} calls where one \
          takes under {} s, elsewhere the shorter of {LONG_CALLS}, and one where it takes {} s or more. The figure's 64 to 1024 are taken as lengths (see table III). The figure \
          has no printed numbers: its text says that 256 is better than 64 and 1024 at 10^7 boxes, and that equation 6 \
          comes close to the best. On a device the settings are the same, but levels and the largest box have a say in \
@@ -196,7 +195,8 @@ fn would_take(checks: f64, before: Option<&Ran>) -> String {
 
 /// Length of the finest cells, checks and milliseconds on a device, where there is one for so many boxes.
 fn on_device(boxes: &[Aabb], ran: &Ran, device: &Device) -> Result<[Value; 3], Failure> {
-    let config = Config { backend: Backend::Gpu, ..ran.wanted.config(boxes) };
+    let config = Config { backend: Backend::Gpu, ..UNSORTED };
+    let config = with_gpu_grid(config, &ran.wanted.settings(boxes), 0);
     let Some((ms, report)) = device.run_for(config, boxes, 1.0, ran.pairs)? else {
         return Ok([Value::Null, Value::Null, Value::Null]);
     };

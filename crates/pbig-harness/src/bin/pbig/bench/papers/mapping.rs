@@ -5,8 +5,9 @@ use super::printed::{AVRIL_2, AVRIL_4};
 use super::sheet::{Sheet, short};
 use super::{UNSORTED, once};
 use crate::output::Failure;
-use pbig_core::{Config, GpuOptions, Strategy};
+use pbig_core::GpuOptions;
 use pbig_harness::boxes::cubes;
+use pbig_harness::study::{PbigSettings, SETTINGS, with_gpu_grid};
 use serde_json::json;
 
 /// What `GpuOptions::root` can be, in words.
@@ -90,7 +91,7 @@ pub(super) fn in_cells(device: &Device) -> Result<Sheet, Failure> {
         let pairs = once(UNSORTED, &boxes)?.pairs;
         for (root, name) in ROOTS {
             let gpu = on_gpu(GpuOptions { root, ..GpuOptions::DEFAULT });
-            let config = Config { strategy: Strategy::Pbig, small_cell: 256, ..gpu };
+            let config = with_gpu_grid(gpu, &PbigSettings { small_cell: 256, ..SETTINGS }, 0);
             if let Some((_, report)) = device.run_for(config, &boxes, 0.1, pairs)? {
                 let kernel = kernels(&report, |name| name == "check_small");
                 sheet.row(json!([n, name, kernel, report.checks.made, report.pairs]));

@@ -86,7 +86,7 @@ fn on_device() -> Result<Vec<(u64, u64)>, Failure> {
     let count = pair_count(OBJECTS) as u32;
     let params = Params { boxes: OBJECTS as u32, cells: count, ..Params::default() };
     let bindings = [bytemuck::bytes_of(&params).to_vec(), vec![0; 12 * count as usize]];
-    let kernel = &pbig_shaders::study::INDEX_PAIRS;
+    let kernel = &pbig_harness::study::INDEX_PAIRS;
     let run = |bench: Bench| bench.run(kernel, &GpuOptions::DEFAULT, false, &bindings, count.div_ceil(LANES));
     let found =
         Bench::new().and_then(run).map_err(|error| Failure::Input(format!("{}: {error}", kernel.name)))?;

@@ -24,12 +24,13 @@ mod steps;
 mod switches;
 mod timing;
 
+use super::finders::{Side, Way};
 use super::machine::{Machine, slug};
 use super::measure::{Effort, timed};
 use super::{Args, DOCUMENTS, keep, save};
 use crate::output::{Failure, print, progress};
 use device::Device;
-use pbig_core::{Aabb, Checks, Config, Finder, Limits, Order};
+use pbig_core::{Aabb, Checks, Config, Limits, Order};
 use pbig_harness::chart::{Line, LogLog};
 use serde_json::{Value, json};
 use sheet::Sheet;
@@ -77,12 +78,11 @@ struct Once {
     cell: Option<f32>,
 }
 
-fn once(config: Config, boxes: &[Aabb]) -> Result<Once, Failure> {
-    let mut finder = Finder::new(config);
-    let (found, ms) = timed(|| finder.find(boxes).map(<[_]>::len));
-    let pairs = found.map_err(|error| Failure::Input(error.to_string()))? as u64;
-    let report = finder.report();
-    Ok(Once { pairs, checks: report.checks, ms, cell: report.plan.pbig.map(|plan| plan.cell) })
+fn once(way: impl Into<Way>, boxes: &[Aabb]) -> Result<Once, Failure> {
+    let mut side = Side::new(way, None);
+    let (found, ms) = timed(|| side.find(boxes));
+    found.map_err(|error| Failure::Input(error.to_string()))?;
+    Ok(Once { pairs: side.pairs(), checks: side.checks(), ms, cell: side.cell() })
 }
 
 fn chart(name: &str, title: &str, x: &'static str, lines: impl Into<Vec<Line>>) -> LogLog {

@@ -8,12 +8,13 @@ use super::printed::{
 };
 use super::sheet::{Sheet, short, thousands};
 use super::{Scale, UNSORTED, chart, effort};
-use crate::bench::finders::Finders;
+use crate::bench::finders::{Finders, Way};
 use crate::bench::measure::timed;
 use crate::output::Failure;
-use pbig_core::{Aabb, Config, Finder, GpuOptions, Strategy};
+use pbig_core::{Aabb, Finder, GpuOptions};
 use pbig_harness::boxes::moved;
 use pbig_harness::chart::Line;
+use pbig_harness::study::SETTINGS;
 use serde_json::{Value, json};
 
 /// Section 6.1 as it is printed.
@@ -42,15 +43,15 @@ fn sides(model: &Model, n: usize, device: &Device) -> Result<([Option<f64>; 3], 
         return Ok(([Some(ms), None, None], pairs));
     }
     let gpu = device.for_boxes(n);
-    let mut takes_part = vec![(0, UNSORTED)];
+    let mut takes_part: Vec<(usize, Way)> = vec![(0, UNSORTED.into())];
     if n <= MOST_PLAIN {
-        takes_part.push((1, Config { strategy: Strategy::Pbig, ..UNSORTED }));
+        takes_part.push((1, SETTINGS.into()));
     }
     if gpu.is_some() {
-        takes_part.push((2, on_gpu(GpuOptions::DEFAULT)));
+        takes_part.push((2, on_gpu(GpuOptions::DEFAULT).into()));
     }
-    let configs = takes_part.iter().map(|(_, config)| *config);
-    let mut finders = Finders::new(configs, gpu, [moved(&boxes, 1.0, 2), boxes]);
+    let ways = takes_part.iter().map(|(_, way)| *way);
+    let mut finders = Finders::new(ways, gpu, [moved(&boxes, 1.0, 2), boxes]);
     let mut times = [None; 3];
     for ((side, _), ms) in takes_part.iter().zip(finders.times(effort(n))?) {
         times[*side] = Some(ms);

@@ -1,14 +1,15 @@
 //! PBIG's table III: bytes of output, against equations 9 and 10, and ours.
 
+use super::Scale;
 use super::coverage::joined;
 use super::density::fitting;
 use super::device::{Device, about_bytes, on_gpu, written};
 use super::printed::{Coverage, DENSEST_PLAIN_MB, INPUT_MB, MOST_BOXES, SEGMENT, TABLE_III, WARP};
 use super::sheet::{Sheet, short};
 use super::switches::count;
-use super::{Scale, UNSORTED};
 use crate::output::Failure;
-use pbig_core::{Coding, Config, GpuOptions};
+use pbig_core::{Coding, GpuOptions};
+use pbig_harness::study::{ALL_PAIRS_UP_TO, PbigSettings, SETTINGS, with_gpu_grid};
 use serde_json::{Value, json};
 
 /// What the paper's MB is where it is not 10^6.
@@ -35,7 +36,7 @@ pub(super) fn bytes(scale: &Scale, device: &Device) -> Result<Sheet, Failure> {
     sheet = sheet.about(format!(
         "Ours: {n} boxes of the same law on a device, `Coding::Plain` and `Packed`, cells as its plan has them (W = {}); \
          then `Packed` with the paper's W and all cells by rows of segments (`small_cell` 1). {} {}",
-        UNSORTED.pbig_boxes_per_cell,
+        SETTINGS.boxes_per_cell,
         about_bytes(),
         device.about()
     ));
@@ -67,7 +68,8 @@ impl Ours {
     /// Of a row's boxes; nothing without a device, or without pairs.
     fn new(row: &Coverage, n: usize, device: &Device) -> Result<Option<Self>, Failure> {
         let on = |coding| on_gpu(GpuOptions { coding, ..GpuOptions::DEFAULT });
-        let rows = Config { pbig_boxes_per_cell: WARP as f32, small_cell: 1, ..on(Coding::Packed) };
+        let in_rows = PbigSettings { boxes_per_cell: WARP as f32, small_cell: 1, ..SETTINGS };
+        let rows = with_gpu_grid(on(Coding::Packed), &in_rows, ALL_PAIRS_UP_TO);
         let boxes = fitting(n, row.doc).boxes(n, 1);
         let runs = device.run(&[on(Coding::Plain), on(Coding::Packed), rows], &boxes, 1.0)?;
         let [(_, plain), (_, packed), (_, rows)] = &runs[..] else { return Ok(None) };
@@ -100,8 +102,8 @@ fn about_ours(sparse: &Ours, dense: &Ours) -> String {
         format!(
             "most cells of W = {} have at most {} boxes, and there each pair is a row of its own, {ROW} bytes (place, \
              number of partners, partner, padding); the other {} are headers of {HEADER} bytes, one for {} pairs",
-            UNSORTED.pbig_boxes_per_cell,
-            UNSORTED.small_cell,
+            SETTINGS.boxes_per_cell,
+            SETTINGS.small_cell,
             short(headers),
             short(HEADER / headers)
         )

@@ -17,10 +17,8 @@ use serde_json::{Value, json};
 pub(super) const DISTANCE: f32 = 0.1;
 
 /// What `plan` and `map` are, and what the last column of ours says.
-const WORK: &str = "Ours are means, so that updates which make a list or a grid for others count; the last column has \
-                    how many updates did what. By a list of near pairs (`near`) nothing is sorted: plan is a look at \
-                    which boxes have left the reach that the list was made for, map puts those elsewhere. With `grid` \
-                    plan and map make the grid anew, with `edit` map puts what has moved into other cells of it.";
+const WORK: &str = "Ours are means; the last column counts the updates of each algorithm. With `grid` plan and map rebuild \
+                    the grid; with `edit` map moves the changed boxes to other cells of the grid.";
 
 /// Table 6 and figure 5: a step in which all move.
 pub(super) fn steps(scale: &Scale, device: &Device) -> Result<Sheet, Failure> {

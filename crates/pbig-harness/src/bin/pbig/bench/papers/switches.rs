@@ -7,11 +7,12 @@ use super::printed::{
 };
 use super::sheet::{Sheet, short, thousands};
 use super::{Scale, UNSORTED, effort};
-use crate::bench::finders::Finders;
+use crate::bench::finders::{Finders, Way};
 use crate::output::Failure;
-use pbig_core::{CellRule, Coding, Config, GpuOptions, Report, Strategy};
+use pbig_core::{Coding, Config, GpuOptions, Order, Report};
 use pbig_harness::boxes::moved;
 use pbig_harness::runner::milliseconds;
+use pbig_harness::study::{CellRule, PbigSettings, SETTINGS, with_our_grid};
 use serde_json::json;
 
 /// Section 6.3, of which section 6.4 takes 10^7 boxes.
@@ -216,23 +217,22 @@ fn of_tasks(report: &Report) -> [Option<f64>; 7] {
 }
 
 /// What can be switched on the CPU.
-fn settings() -> [(String, Config); 7] {
-    let pbig = Config { strategy: Strategy::Pbig, ..UNSORTED };
-    let wanted = |name: &str, pbig_boxes_per_cell: f32| {
-        (format!("PBIG's grid, {name}, W = {pbig_boxes_per_cell}"), Config { pbig_boxes_per_cell, ..pbig })
+fn settings() -> [(String, Way); 7] {
+    let wanted = |boxes_per_cell: f32| {
+        let name = format!("PBIG's grid, equation 6, W = {boxes_per_cell}");
+        (name, PbigSettings { boxes_per_cell, ..SETTINGS }.into())
     };
-    let density = Config { cell_rule: CellRule::Density, ..pbig };
+    let small_cell = |small_cell: u32| PbigSettings { small_cell, ..SETTINGS }.into();
+    let density = PbigSettings { cell_rule: CellRule::Density, ..SETTINGS };
+    let (ours, sorted) = (with_our_grid(UNSORTED), Config { order: Order::Sorted, ..UNSORTED });
     [
-        wanted("equation 6", WARP as f32),
-        wanted("equation 6", UNSORTED.pbig_boxes_per_cell),
-        ("PBIG's grid, Avril's cells of that many objects".into(), density),
-        ("the same as the second, every cell by balanced rows".into(), Config { small_cell: 0, ..pbig }),
-        ("the same, every cell by Avril's mapping".into(), Config { small_cell: u32::MAX, ..pbig }),
-        ("our grid, one entry a box".into(), Config { strategy: Strategy::Grid, ..UNSORTED }),
-        (
-            "our grid, list sorted".into(),
-            Config { strategy: Strategy::Grid, order: pbig_core::Order::Sorted, ..UNSORTED },
-        ),
+        wanted(WARP as f32),
+        wanted(SETTINGS.boxes_per_cell),
+        ("PBIG's grid, Avril's cells of that many objects".into(), density.into()),
+        ("the same as the second, every cell by balanced rows".into(), small_cell(0)),
+        ("the same, every cell by Avril's mapping".into(), small_cell(u32::MAX)),
+        ("our grid, one entry a box".into(), ours.into()),
+        ("our grid, list sorted".into(), with_our_grid(sorted).into()),
     ]
 }
 
@@ -256,30 +256,30 @@ pub(super) fn on_cpu(scale: &Scale) -> Result<Sheet, Failure> {
         "Section 6.3 as printed with {n} boxes. PBIG's grid on one thread, ours on all. There is nothing to transfer, \
          so neither compression nor pipelining; a redundant check is ended by the rule of the owning cell before the \
          boxes are compared, and our grid, with one entry a box, makes none. Its checks are comparisons of codes. \
-         Stages are of the last call."
+         Stages are of the last call of ours; PBIG's grid does not report them."
     ));
     let boxes = BOXES.boxes(n, 1);
     let settings = settings();
-    let configs = settings.iter().map(|(_, config)| *config);
-    let mut finders = Finders::new(configs, None, [moved(&boxes, 1.0, 2), boxes]);
+    let ways = settings.iter().map(|(_, way)| *way);
+    let mut finders = Finders::new(ways, None, [moved(&boxes, 1.0, 2), boxes]);
     let times = finders.times(effort(n))?;
     finders.pairs()?;
-    for ((name, _), (ms, finder)) in settings.iter().zip(times.iter().zip(&finders.all)) {
-        let report = finder.report();
-        let checks = report.checks;
-        let [plan, map, check, emit, _] = report.stages.named().map(|(_, time)| milliseconds(time));
+    for ((name, _), (ms, side)) in settings.iter().zip(times.iter().zip(&finders.all)) {
+        let checks = side.checks();
+        let stages = side.report().map(|report| report.stages.named().map(|(_, time)| milliseconds(time)));
+        let stage = |k: usize| stages.map(|stages| stages[k]);
         sheet.row(json!([
             name,
             ms,
             times[0] / ms,
-            report.pairs,
+            side.pairs(),
             checks.made,
             checks.unnecessary,
             checks.redundant,
-            plan,
-            map,
-            check,
-            emit,
+            stage(0),
+            stage(1),
+            stage(2),
+            stage(3),
         ]));
     }
     Ok(sheet)
@@ -294,8 +294,8 @@ mod tests {
     fn every_setting_finds_the_pairs_of_brute_force() {
         let boxes = crowded(1500).boxes(1500, 1);
         let pairs = oracle::pairs(&boxes).len() as u64;
-        for (name, config) in settings() {
-            assert_eq!(super::super::once(config, &boxes).expect("found").pairs, pairs, "{name}");
+        for (name, way) in settings() {
+            assert_eq!(super::super::once(way, &boxes).expect("found").pairs, pairs, "{name}");
         }
         let device = Device::best(true);
         for (_, report) in

@@ -15,7 +15,7 @@ pub(super) fn for_parry(boxes: &[Aabb]) -> Vec<ParryAabb> {
 
 /// How a kept tree is brought up to date.
 #[derive(Clone, Copy, PartialEq, Eq)]
-pub(super) enum Refit {
+pub(in crate::bench) enum Refit {
     /// All of it, on one thread, after improving a part.
     Whole,
     /// The same on all threads.
@@ -25,7 +25,7 @@ pub(super) enum Refit {
 }
 
 /// Parry 0.31's tree, kept from frame to frame as rapier keeps it.
-pub(super) struct Parry {
+pub(in crate::bench) struct Parry {
     refit: Refit,
     /// Whether only pairs with a moved box are wanted.
     partial: bool,
@@ -34,6 +34,7 @@ pub(super) struct Parry {
     tree: Bvh,
     workspace: BvhWorkspace,
     updates: Vec<(ParryAabb, u32, f32)>,
+    removed: Vec<u32>,
     changed: Vec<u32>,
     changed_before: Vec<u32>,
     statuses: Vec<BvhLeafUpdateStatus>,
@@ -41,9 +42,11 @@ pub(super) struct Parry {
 }
 
 impl Parry {
-    pub(super) fn new(boxes: &[Aabb], refit: Refit, partial: bool) -> Self {
+    /// Builds the tree of all valid boxes.
+    pub(in crate::bench) fn new(boxes: &[Aabb], refit: Refit, partial: bool) -> Self {
         let mut workspace = BvhWorkspace::default();
-        let mut tree = Bvh::from_iter(BvhBuildStrategy::Binned, for_parry(boxes).into_iter().enumerate());
+        let valid = for_parry(boxes).into_iter().enumerate().filter(|(i, _)| boxes[*i].is_valid());
+        let mut tree = Bvh::from_iter(BvhBuildStrategy::Binned, valid);
         // A new tree's leaves all count as changed, until the next refit.
         tree.refit(&mut workspace);
         Self {
@@ -53,6 +56,7 @@ impl Parry {
             tree,
             workspace,
             updates: vec![],
+            removed: vec![],
             changed: vec![],
             changed_before: vec![],
             statuses: vec![],
@@ -69,20 +73,26 @@ impl Parry {
         }
     }
 
-    /// Takes in what has moved; not measured.
-    pub(super) fn prepare(&mut self, boxes: &[Aabb], moved: &[u32]) {
+    /// Takes in the changed boxes, of which invalid ones are removed; not measured.
+    pub(in crate::bench) fn prepare(&mut self, boxes: &[Aabb], moved: &[u32]) {
         self.updates.clear();
+        self.removed.clear();
         for &id in moved {
-            let aabb = for_parry(&boxes[id as usize..=id as usize])[0];
-            self.updates.push((aabb, id, self.margin));
+            let i = id as usize;
+            if boxes[i].is_valid() {
+                self.updates.push((for_parry(&boxes[i..=i])[0], id, self.margin));
+            } else {
+                self.removed.push(id);
+            }
         }
         self.changed_before = std::mem::replace(&mut self.changed, moved.to_vec());
     }
 
     /// One frame: boxes in, pairs out.
-    pub(super) fn frame(&mut self) {
-        let Self { tree, workspace, updates, statuses, found, .. } = self;
+    pub(in crate::bench) fn frame(&mut self) {
+        let Self { tree, workspace, updates, removed, statuses, found, .. } = self;
         found.clear();
+        removed.iter().for_each(|&id| tree.remove(id));
         if self.refit == Refit::Parallel {
             tree.insert_or_update_batch_partially_parallel(updates, statuses);
             tree.optimize_incremental(workspace);
@@ -104,6 +114,11 @@ impl Parry {
         } else {
             tree.traverse_bvtt_single_tree::<false>(workspace, &mut |a, b| found.push((a, b)));
         }
+    }
+
+    /// The number of pairs of the last frame.
+    pub(in crate::bench) fn pairs(&self) -> usize {
+        self.found.len()
     }
 
     /// All pairs of the tree as it is, to compare; a frame that gives a part of them must give exactly those

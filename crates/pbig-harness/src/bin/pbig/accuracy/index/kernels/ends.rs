@@ -79,7 +79,7 @@ pub(in super::super) fn looked_at(bench: &Bench, quick: bool) -> Result<Vec<Ends
 }
 
 fn of_root(bench: &Bench, root: &Root, most: u32) -> Result<Ends, Failure> {
-    let kernel = (&pbig_shaders::study::ROW_ENDS, root.number);
+    let kernel = (&pbig_harness::study::ROW_ENDS, root.number);
     let mut sums = [Found::default(); 2];
     for batch in batches(most, 2) {
         let params = params(&batch, 2);
@@ -96,7 +96,7 @@ fn lazily(bench: &Bench, most: u32) -> Result<Ends, Failure> {
     let mut places = 0;
     for batch in batches(most, COLUMNS) {
         let params = params(&batch, COLUMNS);
-        let words = run_kernel(bench, (&pbig_shaders::study::LAZY_ENDS, 0), params, params.cells, 2)?;
+        let words = run_kernel(bench, (&pbig_harness::study::LAZY_ENDS, 0), params, params.cells, 2)?;
         let of_n = batch.into_par_iter().zip(words.par_chunks_exact(2 * params.split as usize));
         let counts = of_n.map(|(n, words)| counted(n, words)).collect::<Result<Vec<_>, _>>()?;
         places += counts.iter().sum::<u64>();

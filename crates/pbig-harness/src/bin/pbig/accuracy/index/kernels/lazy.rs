@@ -13,7 +13,13 @@ pub(super) fn estimates(bench: &Bench, n: u32, software: bool) -> Result<Estimat
     let (mut pairs, mut ms) = (Vec::new(), 0.0);
     for identifiers in parts(n, lazy_ids(n.into()) as u64) {
         let run = |cells| {
-            run_kernel(bench, (&pbig_shaders::study::LAZY_PAIRS, 0), identifiers.params(cells), identifiers.count, 2)
+            run_kernel(
+                bench,
+                (&pbig_harness::study::LAZY_PAIRS, 0),
+                identifiers.params(cells),
+                identifiers.count,
+                2,
+            )
         };
         let (words, took) = timed_run(software, run, identifiers.count)?;
         pairs.extend(given(&identifiers, &words)?);

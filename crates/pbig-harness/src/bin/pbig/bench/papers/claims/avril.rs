@@ -6,9 +6,9 @@ use crate::bench::papers::printed::{
 };
 use crate::bench::papers::sheet::{Sheet, short, thousands};
 use pbig_core::pair_index::{index_of, pair_count, pair_of, row_start};
-use pbig_core::plan::density_cell;
 use pbig_core::{Aabb, Pair, oracle};
 use pbig_harness::boxes::cubes;
+use pbig_harness::study::density_cell;
 use serde_json::json;
 
 pub(in crate::bench::papers) fn avril() -> Sheet {

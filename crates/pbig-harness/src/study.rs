@@ -1,0 +1,80 @@
+//! The part of pbig-core that only studies use: PBIG's grid on the CPU, its settings on a GPU, the grid for few boxes.
+//!
+//! Everything else in this crate uses the core as an app does.
+
+use pbig_core::study::PbigPlan;
+use pbig_core::{Aabb, Config, Engine, GpuOptions, Plan};
+
+pub use pbig_core::CellRule;
+pub use pbig_core::study::{PbigFound, density_cell, pbig_grid};
+pub use pbig_shaders::study::{INDEX_PAIRS, LAZY_ENDS, LAZY_PAIRS, ROW_ENDS};
+
+/// Settings of PBIG's grid, of which the CPU reads `cell_rule`, `boxes_per_cell` and `small_cell`.
+pub type PbigSettings = GpuOptions;
+
+/// The settings that the GPU uses by default.
+pub const SETTINGS: PbigSettings = GpuOptions::DEFAULT;
+
+/// Most boxes that a GPU searches without a grid by default.
+pub const ALL_PAIRS_UP_TO: u32 = SETTINGS.all_pairs_up_to;
+
+/// The boxes of one set, as PBIG's rule for the cell length sees them.
+pub struct PbigCells<'a>(&'a [Aabb]);
+
+impl<'a> PbigCells<'a> {
+    /// Reads the boxes.
+    pub fn new(boxes: &'a [Aabb]) -> Self {
+        Self(boxes)
+    }
+
+    /// Returns the cell length that these settings give, in the boxes' length unit.
+    pub fn length(&self, settings: &PbigSettings) -> f32 {
+        PbigPlan::new(self.0, settings).cell
+    }
+}
+
+/// Returns a configuration whose GPU uses this grid for more than `all_pairs_up_to` boxes.
+///
+/// `all_pairs_up_to` is 0 (always the grid) or [`ALL_PAIRS_UP_TO`].
+pub fn with_gpu_grid(config: Config, settings: &PbigSettings, all_pairs_up_to: u32) -> Config {
+    let PbigSettings { cell_rule, boxes_per_cell, small_cell, .. } = *settings;
+    let gpu = GpuOptions { cell_rule, boxes_per_cell, small_cell, all_pairs_up_to, ..config.gpu };
+    Config { gpu, ..config }
+}
+
+/// Returns a configuration that uses our grid on the CPU, however few the boxes.
+pub fn with_our_grid(config: Config) -> Config {
+    Config { engine: Some(Engine::Rebuild), ..config }
+}
+
+/// Returns the name of the algorithm that did the work.
+pub fn algorithm(plan: &Plan) -> &'static str {
+    plan.algorithm.name()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::boxes::cubes;
+    use pbig_core::{Finder, oracle};
+
+    #[test]
+    fn pbigs_grid_finds_the_pairs_of_brute_force_in_the_cells_that_were_foretold() {
+        let boxes = cubes(1000, 4.0, 3.0, 1);
+        for boxes_per_cell in [2.0, 32.0] {
+            let settings = PbigSettings { boxes_per_cell, ..SETTINGS };
+            let mut found = pbig_grid(&boxes, &settings).expect("few boxes");
+            found.pairs.sort_unstable();
+            assert_eq!(found.pairs, oracle::pairs(&boxes));
+            assert_eq!(found.plan.cell, PbigCells::new(&boxes).length(&settings));
+            assert!(found.checks.made >= found.pairs.len() as u64);
+        }
+    }
+
+    #[test]
+    fn our_grid_takes_few_boxes_too() {
+        let mut finder = Finder::new(with_our_grid(Config::DEFAULT));
+        finder.find(&cubes(20, 1.0, 1.0, 1)).expect("few pairs");
+        assert_eq!(algorithm(&finder.report().plan), "grid");
+    }
+}
