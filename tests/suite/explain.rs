@@ -93,27 +93,6 @@ fn statistics_count_what_an_update_was_given_and_sent() {
     });
 }
 
-/// Where much changes the stages are timed; where little does, in a small world, the clock is not read.
-#[test]
-fn stages_are_timed_where_that_takes_less_than_the_work() {
-    for (bodies, timed) in [(63, false), (64, true)] {
-        let mut world = World::with_gravity(glam::Vec3::ZERO);
-        for i in 0..bodies {
-            world.add(World::dynamic(glam::vec3(i as f32 * 0.9, 0.0, 0.0)), ColliderBuilder::ball(0.5));
-        }
-        let handles: Vec<ColliderHandle> = world.colliders.iter().map(|(handle, _)| handle).collect();
-        let mut broad_phase = PbigBroadPhase::new();
-        let World { params, colliders, bodies, .. } = &world;
-        broad_phase.update(params, colliders, bodies, &handles, &[], &mut Vec::new());
-        let stats = broad_phase.stats();
-        assert!(stats.total() >= stats.proxies + stats.set + stats.events);
-        assert_eq!(stats.report.plan.chosen, pbig_core::plan::Chosen::Bitmap, "{}", stats.report.plan);
-        for time in [stats.proxies, stats.report.stages.check, stats.total()] {
-            assert_eq!(!time.is_zero(), timed, "{stats:?}");
-        }
-    }
-}
-
 /// Calls that bring no news end at once. They are counted, their statistics are those of a call without news, and
 /// whatever comes next is seen: a change, a collider behind rapier's lists, an adopted world, a failed update.
 #[test]

@@ -13,7 +13,6 @@ mod gpu;
 mod incremental;
 mod kernels;
 mod overlap;
-mod overlapped;
 mod planted;
 mod precision;
 mod queries;

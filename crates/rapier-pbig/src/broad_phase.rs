@@ -2,10 +2,9 @@
 
 use crate::call::Call;
 use crate::events::{HandleOrder, Outbox};
-use crate::overlap::Overlap;
 use crate::roll::Roll;
 use crate::scene_tree::SceneTree;
-use crate::stats::{Kept, MEASURED_FROM, Totals, Watch};
+use crate::stats::{Kept, Totals};
 use pbig_core::{BroadPhase as Finder, Config, Limits};
 use rapier3d::prelude::{
     BroadPhase, BroadPhasePairEvent, ColliderHandle, ColliderPair, ColliderSet, IntegrationParameters,
@@ -32,8 +31,6 @@ pub struct PbigBroadPhase {
     pub(crate) indices: Vec<u32>,
     pub(crate) tree: SceneTree,
     pub(crate) kept: Kept,
-    /// What [`PbigBroadPhase::overlapped`] needs, if it is on.
-    pub(crate) overlap: Option<Box<Overlap>>,
     /// The last call had nothing to do, and left everything so that another one has not either.
     pub(crate) idle: bool,
     #[cfg(feature = "shadow")]
@@ -113,7 +110,6 @@ impl PbigBroadPhase {
             indices: Vec::new(),
             tree: SceneTree::default(),
             kept: Kept::default(),
-            overlap: None,
             idle: false,
             #[cfg(feature = "shadow")]
             shadow: None,
@@ -136,7 +132,6 @@ impl PbigBroadPhase {
     /// a world that is rolled back to another one of as many under a broad phase that stays has to be adopted, or the
     /// broad phase rolled back with it.
     pub fn adopt(&mut self, narrow_phase: &NarrowPhase) {
-        self.finish_begun();
         let contacts = narrow_phase.contact_pairs().map(|pair| (pair.collider1, pair.collider2));
         let intersections = narrow_phase.intersection_pairs().map(|(one, other, _)| (one, other));
         self.outbox.adopted = contacts.chain(intersections).map(|(a, b)| ColliderPair::new(a, b)).collect();
@@ -159,14 +154,14 @@ impl PbigBroadPhase {
     /// narrow phase drops the pairs of removed and disabled colliders itself.
     pub(crate) fn forget(&mut self, handle: ColliderHandle) {
         if self.roll.strike(handle) {
-            self.take_out(handle.into_raw_parts().0);
+            self.finder.remove(handle.into_raw_parts().0);
         }
     }
 
     /// Keeps a collider on the roll, without a box.
     pub(crate) fn disable(&mut self, handle: ColliderHandle) {
         self.roll.enter(handle);
-        self.take_out(handle.into_raw_parts().0);
+        self.finder.remove(handle.into_raw_parts().0);
     }
 
     /// First what is removed, because a modified collider may have taken the index of a removed one.
@@ -226,22 +221,13 @@ impl PbigBroadPhase {
             tracing::error!("pbig: no pairs in this update: {error}");
             return;
         }
-        let found = match &mut self.overlap {
-            Some(overlap) => {
-                overlap.join(self.finder.events());
-                &overlap.unsent
-            }
-            None => self.finder.events(),
-        };
+        let found = self.finder.events();
         let count = found.added.len() + found.removed.len() + self.outbox.adopted.len();
         if count == 0 {
             return;
         }
-        let mut watch = Watch::new(count >= MEASURED_FROM);
         let _span = tracing::debug_span!(target: "pbig", "events").entered();
         let sent = self.outbox.send(&self.finder, found, &self.roll, events);
-        self.overlap.iter_mut().for_each(|overlap| overlap.forget_sent());
-        self.kept.events = watch.lap();
         (self.kept.added, self.kept.deleted) = sent;
         self.kept.totals.added += sent.0 as u64;
         self.kept.totals.deleted += sent.1 as u64;
@@ -264,22 +250,13 @@ impl PbigBroadPhase {
         self.kept = Kept { modified: modified.len(), removed: removed.len(), totals, ..Kept::default() };
         #[cfg(feature = "shadow")]
         let before = events.len();
-        if !self.leaves_alone(has_news) {
-            self.search(call, events);
-        }
+        self.take_in(call);
+        self.find_and_send(events);
         #[cfg(feature = "shadow")]
         if let Some(checker) = &mut self.shadow {
             checker.watch(call, &events[before..]);
         }
         self.idle = !has_news && self.rests();
-    }
-
-    fn search(&mut self, call: &Call<'_>, events: &mut Vec<BroadPhasePairEvent>) {
-        self.overlap.iter_mut().for_each(|overlap| overlap.start_call());
-        self.finish_begun();
-        self.take_in(call);
-        self.find_and_send(events);
-        self.begin_next();
     }
 }
 

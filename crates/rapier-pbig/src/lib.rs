@@ -48,7 +48,6 @@ mod debug_render;
 mod events;
 mod look;
 mod news;
-mod overlap;
 mod proxy;
 mod queries;
 mod roll;
@@ -65,7 +64,6 @@ pub use broad_phase::PbigBroadPhase;
 #[cfg(feature = "debug-render")]
 pub use debug_render::DebugRenderParts;
 pub use events::HandleOrder;
-pub use overlap::Overlapped;
 /// The finder, for the types of its settings and filters.
 pub use pbig_core;
 #[cfg(feature = "gpu")]

@@ -4,7 +4,6 @@ use crate::PbigBroadPhase;
 use crate::call::Call;
 use crate::news::{News, SecondLook};
 use crate::proxy::{BLOCK, FEW, Growth, Proxy, are_scattered};
-use crate::stats::{MEASURED_FROM, Watch};
 use pbig_core::{Aabb, ProxyFilter};
 use rapier3d::prelude::ColliderHandle;
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
@@ -17,20 +16,14 @@ const SCATTERED_PARALLEL_FROM: usize = 8192;
 impl PbigBroadPhase {
     /// Brings the finder up to date about some colliders.
     pub(crate) fn look_at(&mut self, call: &Call<'_>, listed: &[ColliderHandle]) {
-        if self.overlap.is_some() {
-            return self.look_ahead(call, listed);
-        }
-        let mut watch = Watch::new(listed.len() >= MEASURED_FROM);
         let first = &listed[..listed.len().min(BLOCK)];
         let parallel_from = if are_scattered(first) { SCATTERED_PARALLEL_FROM } else { PARALLEL_FROM };
         if listed.len() < parallel_from || rayon::current_num_threads() == 1 {
             let _span = tracing::debug_span!(target: "pbig", "proxies").entered();
             listed.chunks(BLOCK).for_each(|block| self.look_at_block(call, block));
-            self.kept.proxies += watch.lap();
             return;
         }
         self.look_at_many(call, listed);
-        self.kept.proxies += watch.lap();
     }
 
     /// On several threads, but for colliders that are disabled, gone, or heirs of an index.
@@ -90,7 +83,7 @@ impl PbigBroadPhase {
                 self.roll.enter(handle);
             }
             // What has been set is that of an heir, whose turn comes.
-            None if is_new => self.take_out(index),
+            None if is_new => _ = self.finder.remove(index),
             _ => self.set_proxy(handle, call.proxy(call.fetch(handle), growth)),
         }
     }
@@ -154,7 +147,7 @@ impl PbigBroadPhase {
     fn enter(&mut self, handle: ColliderHandle) {
         if !self.roll.enter(handle) {
             // A predecessor with this index that was never reported as removed.
-            self.take_out(handle.into_raw_parts().0);
+            self.finder.remove(handle.into_raw_parts().0);
         }
     }
 }

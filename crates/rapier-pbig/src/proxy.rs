@@ -52,20 +52,6 @@ impl Growth {
 }
 
 impl<'a> Call<'a> {
-    /// The proxies of at most [`BLOCK`] colliders.
-    pub(crate) fn proxies(&self, growth: Growth, listed: &[ColliderHandle], out: &mut [Proxy]) {
-        let _span = tracing::debug_span!(target: "pbig", "proxies").entered();
-        let mut found = [(None, None); BLOCK];
-        if are_scattered(listed) {
-            self.fetch_scattered(listed, &mut found);
-        } else {
-            self.fetch_all(listed, &mut found);
-        }
-        for (proxy, found) in out.iter_mut().zip(found) {
-            *proxy = self.proxy(found, growth);
-        }
-    }
-
     #[inline]
     pub(crate) fn fetch(&self, handle: ColliderHandle) -> Fetched<'a> {
         let collider = self.colliders.get(handle);

@@ -1,34 +1,14 @@
 //! What an update did, in numbers.
 
 use crate::PbigBroadPhase;
-use crate::overlap::Overlapped;
 use pbig_core::Report;
-use std::time::{Duration, Instant};
 
-/// Colliders or events from which their stages are timed: a reading of the clock takes as long as one.
-pub(crate) const MEASURED_FROM: usize = 64;
-
-/// Reads the clock, or does not.
-pub(crate) struct Watch(Option<Instant>);
-
-impl Watch {
-    pub(crate) fn new(reads: bool) -> Self {
-        Self(reads.then(Instant::now))
-    }
-
-    /// The time since the last lap; zero when the clock is not read.
-    pub(crate) fn lap(&mut self) -> Duration {
-        let Some(clock) = &mut self.0 else { return Duration::ZERO };
-        let now = Instant::now();
-        now.duration_since(std::mem::replace(clock, now))
-    }
-}
-
-/// What the last update did. Rapier makes two in each step: the first sees what the app changed, the second
-/// what the step moved. So after a step these are the numbers of the second; [`Totals`] count both.
+/// Counts of the last update. Rapier makes two updates in each step: the first sees what the app changed, the second what
+/// the step moved. After a step these are the numbers of the second one; [`Totals`] adds up both.
 #[derive(Clone, Copy, Debug)]
+#[non_exhaustive]
 pub struct Stats<'a> {
-    /// Colliders on the roll, disabled ones included.
+    /// Known colliders, disabled ones included.
     pub colliders: usize,
     /// Colliders that rapier listed as modified.
     pub modified: usize,
@@ -38,35 +18,22 @@ pub struct Stats<'a> {
     pub added: usize,
     /// `DeletePair` events sent.
     pub deleted: usize,
-    /// The sums over all updates.
+    /// Sums over all updates.
     pub totals: Totals,
-    /// Time for the boxes and filters of the modified colliders: reading colliders and bodies, and comparing each with
-    /// what is stored. Zero for fewer than 64 colliders: reading the clock would take as long.
-    pub proxies: Duration,
-    /// With [`PbigBroadPhase::overlapped`]: time for comparing those with what is stored, which is a stage of its own.
-    pub set: Duration,
-    /// Time for turning pairs of ids into events. Zero for fewer than 64.
-    pub events: Duration,
-    /// The finder's stages between `set` and `events`, its plan and counts.
+    /// The core's report: stage times, algorithm and counts.
     pub report: &'a Report,
-    /// With [`PbigBroadPhase::overlapped`]: the search that was begun before, and the next one.
-    pub overlapped: Option<Overlapped<'a>>,
 }
 
 /// Sums over all updates so far.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct Totals {
     /// Updates.
     pub updates: u64,
-    /// Those that looked at all colliders, because the world was not the one known so far.
+    /// Updates that read all colliders, because the world was not the one known so far.
     pub rescans: u64,
-    /// Those that failed: `tracing` has the error, and the next one sees the same changes again.
+    /// Updates that failed: `tracing` has the error, and the next one sees the same changes again.
     pub failures: u64,
-    /// With [`PbigBroadPhase::overlapped`]: colliders whose pairs were searched for at once, because they were new or had
-    /// left their stored box.
-    pub left: u64,
-    /// Updates that did so.
-    pub at_once: u64,
     /// `AddPair` events.
     pub added: u64,
     /// `DeletePair` events.
@@ -81,39 +48,13 @@ pub(crate) struct Kept {
     pub(crate) added: usize,
     pub(crate) deleted: usize,
     pub(crate) totals: Totals,
-    pub(crate) proxies: Duration,
-    pub(crate) set: Duration,
-    pub(crate) events: Duration,
-}
-
-impl Stats<'_> {
-    /// The time of all stages that were timed: nearly all of an update in which much changes.
-    pub fn total(&self) -> Duration {
-        let ahead = self.overlapped.map_or(Duration::ZERO, |overlapped| overlapped.report.stages.total());
-        self.proxies + self.set + self.report.stages.total() + ahead + self.events
-    }
 }
 
 impl PbigBroadPhase {
-    /// What the last update did.
+    /// Returns the counts of the last update.
     pub fn stats(&self) -> Stats<'_> {
-        let Kept { modified, removed, added, deleted, totals, proxies, set, events } = self.kept;
+        let Kept { modified, removed, added, deleted, totals } = self.kept;
         let (colliders, report) = (self.roll.len(), self.finder.report());
-        let overlapped = self.overlap.as_deref();
-        let overlapped =
-            overlapped.map(|one| Overlapped { left: one.left, begun: one.begun, report: &one.report });
-        Stats {
-            colliders,
-            modified,
-            removed,
-            added,
-            deleted,
-            totals,
-            proxies,
-            set,
-            events,
-            report,
-            overlapped,
-        }
+        Stats { colliders, modified, removed, added, deleted, totals, report }
     }
 }

@@ -74,8 +74,7 @@ impl PbigBroadPhase {
     pub fn with_shadow(mut self, shadow: Shadow) -> Self {
         self.idle = false;
         let adopted = self.outbox.adopted.iter().copied();
-        let reaches_on = self.overlap.is_some() || self.ulps > 0;
-        let margin = if reaches_on { f32::INFINITY } else { self.relative_margin };
+        let margin = if self.ulps > 0 { f32::INFINITY } else { self.relative_margin };
         let known: Vec<_> = self.pairs().chain(adopted).collect();
         let checker = self.shadow.get_or_insert_with(|| {
             let mut checker = Checker::new(margin).with_replays_in(std::env::temp_dir());
@@ -132,8 +131,7 @@ pub struct Checker {
 
 impl Checker {
     /// Follows events and compares with nothing yet. `relative_margin` is the margin of the broad phase
-    /// in units of `length_unit`: its pairs may be four of them apart, two for each box. Infinite where boxes reach ahead
-    /// ([`PbigBroadPhase::overlapped`]) or are widened ([`PbigBroadPhase::widened_by_ulps`]) and pairs may be any distance
+    /// in units of `length_unit`: its pairs may be four of them apart, two for each box. Infinite where boxes are widened ([`PbigBroadPhase::widened_by_ulps`]) and pairs may be any distance
     /// apart.
     pub fn new(relative_margin: f32) -> Self {
         Self { margin: relative_margin, ..Self::default() }

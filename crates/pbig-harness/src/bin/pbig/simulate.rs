@@ -27,9 +27,6 @@ pub(crate) struct Args {
     /// Where pbig works.
     #[arg(long, value_enum, default_value_t)]
     backend: BackendOption,
-    /// Let pbig search while rapier does something else, and use the results in the next call.
-    #[arg(long)]
-    overlapped: bool,
     /// For the random numbers of the scene.
     #[arg(long, default_value = "1", value_parser = seed, allow_negative_numbers = true)]
     seed: u64,
@@ -71,15 +68,12 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
     let bar = progress(args.steps, "steps");
     let config = Config { backend: args.backend.backend(), ..PbigBroadPhase::CONFIG };
     let ours = PbigBroadPhase::with_config(config);
-    let ours = if args.overlapped { ours.overlapped() } else { ours };
-    // Boxes that reach ahead may pair at any distance.
-    let margin = if args.overlapped { f32::INFINITY } else { config.margin };
     let step = |_| bar.inc(1);
     let (outcome, did) = match args.broad_phase {
         BroadPhaseOption::Stock => (run_scene(task, DefaultBroadPhase::new(), step).0, Did::default()),
         BroadPhaseOption::Pbig => {
             let (outcome, ours) = if args.check {
-                run_checked(task, ours, margin, Path::new("."), step)
+                run_checked(task, ours, config.margin, Path::new("."), step)
             } else {
                 run_scene(task, ours, step)
             };
@@ -93,13 +87,13 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
 }
 
 fn refuse_what_stock_ignores(args: &Args) -> Result<(), Failure> {
-    let of_pbig = [("--check", args.check), ("--overlapped", args.overlapped)];
-    match of_pbig.into_iter().find(|&(_, given)| given) {
-        Some((option, _)) if args.broad_phase == BroadPhaseOption::Stock => Err(Failure::Input(format!(
-            "{option} is for pbig, not for rapier's own broad phase: leave out {option} or --broad-phase stock"
-        ))),
-        _ => Ok(()),
+    if args.check && args.broad_phase == BroadPhaseOption::Stock {
+        return Err(Failure::Input(
+            "--check is for pbig, not for rapier's own broad phase: leave out --check or --broad-phase stock"
+                .into(),
+        ));
     }
+    Ok(())
 }
 
 /// The first difference and where the frames are.
@@ -139,8 +133,6 @@ fn report(args: &Args, bodies: usize, outcome: &Outcome, did: &Did) -> Result<()
             "pairs": outcome.pairs,
             "added": outcome.added,
             "removed": outcome.removed,
-            "left": args.overlapped.then_some(did.totals.left),
-            "at_once": args.overlapped.then_some(did.totals.at_once),
             "updates": did.totals.updates,
             "fallback": fallback,
             "check": outcome.check.as_ref().map(check_object),
