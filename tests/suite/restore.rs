@@ -7,8 +7,8 @@ use pbig_harness::scenes::Scene;
 use pbig_harness::shadow::Shadowed;
 use pbig_harness::world::World;
 use pbig_tests::needs_gpu;
+use rapier_pbig::PbigBroadPhase;
 use rapier_pbig::shadow::Shadow;
-use rapier_pbig::{HandleOrder, PbigBroadPhase};
 use rapier3d::prelude::*;
 use std::collections::BTreeSet;
 
@@ -65,13 +65,11 @@ fn upstream_910_966_a_restored_broad_phase_goes_on_bit_by_bit_on_every_backend()
 #[test]
 fn upstream_675_710_899_options_survive_a_snapshot_also_in_json() {
     let config = Config { margin: 0.03, ..PbigBroadPhase::CONFIG };
-    let ours = PbigBroadPhase::with_config(config).with_handle_order(HandleOrder::LowerIndexFirst);
-    let (mut world, mut ours) = (scene("column", 60), ours);
+    let (mut world, mut ours) = (scene("column", 60), PbigBroadPhase::with_config(config));
     steps(&mut world, &mut ours, 20);
     let json = serde_json::to_string(&ours).expect("JSON");
     let again: PbigBroadPhase = serde_json::from_str(&json).expect("what was saved");
     assert_eq!(saved(&again), saved(&ours));
-    assert!(again.pairs().all(|pair| pair.collider1.into_raw_parts() < pair.collider2.into_raw_parts()));
     assert!(format!("{again:?}").contains("margin: 0.03"), "{again:?}");
 }
 

@@ -1,7 +1,7 @@
 //! `PbigBroadPhase`: rapier's calls translated to the finder's.
 
 use crate::call::Call;
-use crate::events::{HandleOrder, Outbox};
+use crate::events::Outbox;
 use crate::roll::Roll;
 use crate::scene_tree::SceneTree;
 use crate::stats::{Kept, Totals};
@@ -24,8 +24,6 @@ pub struct PbigBroadPhase {
     pub(crate) roll: Roll,
     /// Margin in units of `IntegrationParameters::length_unit`.
     pub(crate) relative_margin: f32,
-    /// By how much boxes are widened.
-    pub(crate) ulps: u32,
     pub(crate) outbox: Outbox,
     /// Indices of the listed colliders of one call.
     pub(crate) indices: Vec<u32>,
@@ -105,7 +103,6 @@ impl PbigBroadPhase {
             finder,
             roll: Roll::default(),
             relative_margin,
-            ulps: 0,
             outbox: Outbox::default(),
             indices: Vec::new(),
             tree: SceneTree::default(),
@@ -114,12 +111,6 @@ impl PbigBroadPhase {
             #[cfg(feature = "shadow")]
             shadow: None,
         }
-    }
-
-    /// Chooses which collider of a pair comes first, for pairs reported from now on.
-    pub fn with_handle_order(mut self, order: HandleOrder) -> Self {
-        self.outbox.order = order;
-        self
     }
 
     /// Starts again beside a world that it has not accompanied: one restored from a snapshot without this broad

@@ -57,13 +57,11 @@ pub mod shadow;
 #[cfg(feature = "serde")]
 mod snapshot;
 mod stats;
-mod ulps;
 mod why;
 
 pub use broad_phase::PbigBroadPhase;
 #[cfg(feature = "debug-render")]
 pub use debug_render::DebugRenderParts;
-pub use events::HandleOrder;
 /// The finder, for the types of its settings and filters.
 pub use pbig_core;
 #[cfg(feature = "gpu")]
@@ -71,5 +69,4 @@ pub use pbig_core::GpuFinder;
 pub use pbig_core::{Backend, Config, Report, Strategy};
 pub use proxy::{collision_aabb, filter_of};
 pub use stats::{Stats, Totals};
-pub use ulps::widened_by_ulps;
 pub use why::Why;

@@ -3,7 +3,7 @@
 use crate::PbigBroadPhase;
 use crate::call::Call;
 use crate::news::{News, SecondLook};
-use crate::proxy::{BLOCK, FEW, Growth, Proxy, are_scattered};
+use crate::proxy::{BLOCK, FEW, Proxy, are_scattered};
 use pbig_core::{Aabb, ProxyFilter};
 use rapier3d::prelude::ColliderHandle;
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
@@ -29,10 +29,9 @@ impl PbigBroadPhase {
     /// On several threads, but for colliders that are disabled, gone, or heirs of an index.
     fn look_at_many(&mut self, call: &Call<'_>, listed: &[ColliderHandle]) {
         let _span = tracing::debug_span!(target: "pbig", "proxies").entered();
-        let growth = Growth::new(call.params, self.ulps);
         let looked = catch_unwind(AssertUnwindSafe(|| {
-            let second = self.set_many(call, growth, listed);
-            second.of(listed).for_each(|handle| self.look_again(call, growth, handle));
+            let second = self.set_many(call, listed);
+            second.of(listed).for_each(|handle| self.look_again(call, handle));
         }));
         if let Err(panic) = looked {
             // A shape of the app's: a box without a collider on the roll would stay for ever.
@@ -47,7 +46,7 @@ impl PbigBroadPhase {
 
     /// Sets the boxes of colliders that are on the roll or new. A second look is due at new ones, and where there was
     /// nothing to set.
-    fn set_many(&mut self, call: &Call<'_>, growth: Growth, listed: &[ColliderHandle]) -> SecondLook {
+    fn set_many(&mut self, call: &Call<'_>, listed: &[ColliderHandle]) -> SecondLook {
         let Self { finder, roll, indices, .. } = self;
         let news = News::new(listed.len());
         indices.clear();
@@ -60,7 +59,7 @@ impl PbigBroadPhase {
             }
         }
         let fetch = |index| (index, call.fetch_known(index, roll, &news));
-        let proxy = |(index, found)| match call.proxy(found, growth) {
+        let proxy = |(index, found)| match call.proxy(found) {
             Proxy::Enabled(aabb, filter) => Some((aabb, filter)),
             Proxy::Disabled | Proxy::Gone => {
                 news.note(index);
@@ -74,7 +73,7 @@ impl PbigBroadPhase {
     }
 
     /// At a collider of which nothing, or only the box, has been set so far, unless it was known and still is there.
-    fn look_again(&mut self, call: &Call<'_>, growth: Growth, handle: ColliderHandle) {
+    fn look_again(&mut self, call: &Call<'_>, handle: ColliderHandle) {
         let index = handle.into_raw_parts().0;
         let is_new = self.roll.handle(index).is_none();
         match call.colliders.get(handle) {
@@ -84,7 +83,7 @@ impl PbigBroadPhase {
             }
             // What has been set is that of an heir, whose turn comes.
             None if is_new => _ = self.finder.remove(index),
-            _ => self.set_proxy(handle, call.proxy(call.fetch(handle), growth)),
+            _ => self.set_proxy(handle, call.proxy(call.fetch(handle))),
         }
     }
 
@@ -93,17 +92,16 @@ impl PbigBroadPhase {
         if are_scattered(listed) {
             return self.look_at_scattered(call, listed);
         }
-        let growth = Growth::new(call.params, self.ulps);
         if listed.len() <= FEW {
             for &handle in listed {
-                self.set_proxy(handle, call.proxy(call.fetch(handle), growth));
+                self.set_proxy(handle, call.proxy(call.fetch(handle)));
             }
             return;
         }
         let mut found = [(None, None); BLOCK];
         call.fetch_all(listed, &mut found);
         for (&handle, found) in listed.iter().zip(found) {
-            self.set_proxy(handle, call.proxy(found, growth));
+            self.set_proxy(handle, call.proxy(found));
         }
     }
 
@@ -118,9 +116,8 @@ impl PbigBroadPhase {
         }
         let mut found = [(None, None); BLOCK];
         call.fetch_scattered(listed, &mut found);
-        let growth = Growth::new(call.params, self.ulps);
         for (&handle, found) in listed.iter().zip(found) {
-            self.set_proxy(handle, call.proxy(found, growth));
+            self.set_proxy(handle, call.proxy(found));
         }
     }
 

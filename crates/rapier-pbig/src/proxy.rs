@@ -4,7 +4,6 @@
 use crate::call::Call;
 use crate::news::News;
 use crate::roll::Roll;
-use crate::ulps::widened_by_ulps;
 use pbig_core::{Aabb, ProxyFilter, TestMode, prefetch};
 use rapier3d::prelude::{
     ActiveCollisionTypes, Collider, ColliderHandle, IntegrationParameters, Isometry, Point, Real, RigidBody,
@@ -28,28 +27,6 @@ pub(crate) const FEW: usize = 8;
 
 /// A collider and its body, as far as they are there.
 pub(crate) type Fetched<'a> = (Option<&'a Collider>, Option<&'a RigidBody>);
-
-/// How far boxes reach beyond shapes, apart from contact skin and margin.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Growth {
-    /// Half the prediction distance.
-    pub(crate) reach: Real,
-    /// As in [`widened_by_ulps`].
-    pub(crate) ulps: u32,
-}
-
-impl Growth {
-    pub(crate) fn new(params: &IntegrationParameters, ulps: u32) -> Self {
-        Self { reach: params.prediction_distance() / 2.0, ulps }
-    }
-
-    /// From the box of a shape. Rapier's own to the bit without ulps; then there is nothing but this one comparison.
-    #[inline(always)]
-    pub(crate) fn of(self, aabb: &Aabb, collider: &Collider) -> Aabb {
-        let aabb = aabb.inflated(collider.contact_skin() + self.reach);
-        if self.ulps == 0 { aabb } else { widened_by_ulps(&aabb, collider.position(), self.ulps) }
-    }
-}
 
 impl<'a> Call<'a> {
     #[inline]
@@ -107,12 +84,12 @@ impl<'a> Call<'a> {
     }
 
     #[inline(always)]
-    pub(crate) fn proxy(&self, (collider, body): Fetched<'_>, growth: Growth) -> Proxy {
+    pub(crate) fn proxy(&self, (collider, body): Fetched<'_>) -> Proxy {
         match collider {
             None => Proxy::Gone,
             Some(collider) if !collider.is_enabled() => Proxy::Disabled,
             Some(collider) => {
-                Proxy::Enabled(aabb_of(self.params.dt, growth, body, collider), filter_with(body, collider))
+                Proxy::Enabled(aabb_of(self.params, body, collider), filter_with(body, collider))
             }
         }
     }
@@ -134,10 +111,10 @@ pub(crate) fn are_scattered(listed: &[ColliderHandle]) -> bool {
 /// The box of a collider in which it may touch another during this step: its shape, half the
 /// prediction distance and its contact skin; with soft CCD, also where it is predicted to be.
 ///
-/// Without the change margin, which is the finder's, and not [`widened_by_ulps`]. A pose with a NaN gives an invalid
+/// Without the change margin, which is the finder's. A pose with a NaN gives an invalid
 /// box, which pairs with nothing.
 pub fn collision_aabb(params: &IntegrationParameters, bodies: &RigidBodySet, collider: &Collider) -> Aabb {
-    aabb_of(params.dt, Growth::new(params, 0), parent_of(bodies, collider), collider)
+    aabb_of(params, parent_of(bodies, collider), collider)
 }
 
 fn parent_of<'a>(bodies: &'a RigidBodySet, collider: &Collider) -> Option<&'a RigidBody> {
@@ -145,14 +122,14 @@ fn parent_of<'a>(bodies: &'a RigidBodySet, collider: &Collider) -> Option<&'a Ri
 }
 
 #[inline(always)]
-fn aabb_of(dt: Real, growth: Growth, parent: Option<&RigidBody>, collider: &Collider) -> Aabb {
+fn aabb_of(params: &IntegrationParameters, parent: Option<&RigidBody>, collider: &Collider) -> Aabb {
     let mut aabb = shape_aabb(collider.shape(), collider.position());
     if let Some(body) = parent.filter(|body| body.soft_ccd_prediction() > 0.0)
-        && let Some(then) = predicted_aabb(dt, body, collider)
+        && let Some(then) = predicted_aabb(params.dt, body, collider)
     {
         aabb = union(&aabb, &then);
     }
-    growth.of(&aabb, collider)
+    aabb.inflated(collider.contact_skin() + params.prediction_distance() / 2.0)
 }
 
 #[inline(always)]

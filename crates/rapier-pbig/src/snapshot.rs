@@ -1,7 +1,6 @@
 //! Saving and restoring, beside rapier's own sets.
 
 use crate::PbigBroadPhase;
-use crate::events::HandleOrder;
 use crate::roll::Roll;
 use pbig_core::{BroadPhase as Finder, Limits};
 use rapier3d::prelude::{ColliderHandle, ColliderPair};
@@ -16,8 +15,6 @@ struct Snapshot<'a> {
     finder: Cow<'a, Finder>,
     generations: Cow<'a, [u32]>,
     relative_margin: f32,
-    ulps: u32,
-    order: HandleOrder,
     adopted: Vec<[RawHandle; 2]>,
 }
 
@@ -28,8 +25,6 @@ impl Serialize for PbigBroadPhase {
             finder: Cow::Borrowed(&self.finder),
             generations: Cow::Borrowed(self.roll.generations()),
             relative_margin: self.relative_margin,
-            ulps: self.ulps,
-            order: self.outbox.order,
             adopted: self.outbox.adopted.iter().map(to_raw).collect(),
         }
         .serialize(serializer)
@@ -38,8 +33,7 @@ impl Serialize for PbigBroadPhase {
 
 impl<'de> Deserialize<'de> for PbigBroadPhase {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        let Snapshot { finder, generations, relative_margin, ulps, order, adopted } =
-            Snapshot::deserialize(deserializer)?;
+        let Snapshot { finder, generations, relative_margin, adopted } = Snapshot::deserialize(deserializer)?;
         let (finder, roll) = (finder.into_owned(), Roll::of_generations(generations.into_owned()));
         let ids = (0..finder.id_count()).filter(|&id| finder.contains(id));
         if let Some(id) = ids.into_iter().find(|&id| roll.handle(id).is_none()) {
@@ -51,9 +45,8 @@ impl<'de> Deserialize<'de> for PbigBroadPhase {
         if finder.config().limits != Limits::UNLIMITED {
             return Err(D::Error::custom("snapshot: a broad phase for rapier has no limits"));
         }
-        let mut restored = Self::around(finder, relative_margin).with_handle_order(order);
+        let mut restored = Self::around(finder, relative_margin);
         restored.roll = roll;
-        restored.ulps = ulps;
         restored.outbox.adopted = adopted.into_iter().map(from_raw).collect();
         Ok(restored)
     }

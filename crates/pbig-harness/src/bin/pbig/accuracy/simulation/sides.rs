@@ -8,9 +8,9 @@ use pbig_harness::mechanics::Mechanics;
 use pbig_harness::numbered::{Apart, Numbered};
 use pbig_harness::reported::Reported;
 use pbig_harness::scenes::Scene;
-use pbig_harness::sorted::Sorted;
+use pbig_harness::sorted::{LowerFirst, Sorted};
 use pbig_harness::world::{World, to_vector};
-use rapier_pbig::{Config, HandleOrder, PbigBroadPhase};
+use rapier_pbig::{Config, PbigBroadPhase};
 use rapier3d::prelude::*;
 use std::hash::{DefaultHasher, Hash, Hasher};
 
@@ -109,9 +109,7 @@ impl Way {
         let stock = DefaultBroadPhase::new();
         let ours = |margin| PbigBroadPhase::with_config(Config { margin, ..PbigBroadPhase::CONFIG });
         match (self.margin, self.order) {
-            (Some(margin), Some(Order::LowerFirst)) => {
-                Box::new(ours(margin).with_handle_order(HandleOrder::LowerIndexFirst))
-            }
+            (Some(margin), Some(Order::LowerFirst)) => Box::new(LowerFirst(ours(margin))),
             (Some(margin), _) => Box::new(ours(margin)),
             (None, Some(Order::Sorted)) => Box::new(Sorted(stock)),
             (None, _) => Box::new(stock),

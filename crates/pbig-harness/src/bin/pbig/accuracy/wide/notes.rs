@@ -17,7 +17,7 @@ pub(super) fn covered() -> f64 {
     f64::from(PbigBroadPhase::CONFIG.margin) * 2f64.powi(22)
 }
 
-/// A bound of rapier's ends too far inside by no more of its ulps, at the poses: proof in `rapier-pbig/src/ulps.rs`.
+/// A bound of rapier's ends too far inside by no more of its ulps, at the poses: proof in `pbig_harness::wide::ulps`.
 const PROVED: f64 = 2.0;
 
 /// Over all worlds at an offset.
