@@ -6,7 +6,7 @@
 use pbig_core::{Config, Strategy};
 use pbig_harness::scenes::Scene;
 use plotters::prelude::*;
-use rapier_pbig::{DebugRenderParts, PbigBroadPhase};
+use rapier_pbig::{DebugRenderParts, PbigBroadPhase, PbigConfig};
 use rapier3d::pipeline::{DebugColor, DebugRenderBackend, DebugRenderObject};
 use rapier3d::prelude::{Point, Real};
 use std::error::Error;
@@ -34,8 +34,8 @@ impl DebugRenderBackend for Lines {
 
 fn main() -> Result<(), Box<dyn Error>> {
     // So few boxes are usually tested without a grid.
-    let config = Config { strategy: Strategy::Grid, ..PbigBroadPhase::CONFIG };
-    let mut broad_phase = PbigBroadPhase::with_config(config);
+    let config = Config { strategy: Strategy::Grid, ..PbigConfig::DEFAULT.into() };
+    let mut broad_phase = PbigBroadPhase::with_core_config(config)?;
     let mut world = Scene::named("rain")?.build(160, 1);
     for _ in 0..60 {
         world.step(&mut broad_phase);

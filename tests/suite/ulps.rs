@@ -1,7 +1,7 @@
 //! Far from the origin: boxes widened by 2 ulps reach as far as the exact boxes of the shapes at their poses, by 3 as far as
 //! those at poses before they were rounded to f32. The margin of a broad phase covers 2 ulps up to `margin x 2^22` away.
 
-use crate::checked::backends;
+use crate::checked::{backends, pbig};
 use pbig_core::{Aabb, Config, Pair};
 use pbig_harness::wide::{Layout, Pose, Truth, Wide, doubt, to_f32, to_f64, widened_by_ulps};
 use proptest::prelude::*;
@@ -135,7 +135,7 @@ fn far_away_a_margin_of_two_ulps_misses_nothing_and_the_default_misses_something
         without += crowd.missed(&mut PbigBroadPhase::new());
         for (name, config) in backends() {
             let margin = 1.01 * offset as f32 / (1 << 22) as f32;
-            let mut ours = PbigBroadPhase::with_config(Config { margin, ..config });
+            let mut ours = pbig(Config { margin, ..config });
             assert_eq!(crowd.missed(&mut ours), 0, "{name}, {offset} away");
         }
     }

@@ -1,4 +1,4 @@
-//! What an update did, in numbers.
+//! Counts of what the updates did.
 
 use crate::PbigBroadPhase;
 use pbig_core::Report;
@@ -20,7 +20,7 @@ pub struct Stats<'a> {
     pub deleted: usize,
     /// Sums over all updates.
     pub totals: Totals,
-    /// The core's report: stage times, algorithm and counts.
+    /// The core's report on its last update: stage times, algorithm and counts.
     pub report: &'a Report,
 }
 
@@ -32,7 +32,7 @@ pub struct Totals {
     pub updates: u64,
     /// Updates that read all colliders, because the world was not the one known so far.
     pub rescans: u64,
-    /// Updates that failed: `tracing` has the error, and the next one sees the same changes again.
+    /// Updates with an error, see [`PbigBroadPhase::last_error`].
     pub failures: u64,
     /// `AddPair` events.
     pub added: u64,
@@ -40,9 +40,9 @@ pub struct Totals {
     pub deleted: u64,
 }
 
-/// The part of [`Stats`] that is kept.
+/// The part of [`Stats`] that the adapter counts.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct Kept {
+pub(crate) struct Counts {
     pub(crate) modified: usize,
     pub(crate) removed: usize,
     pub(crate) added: usize,
@@ -50,11 +50,19 @@ pub(crate) struct Kept {
     pub(crate) totals: Totals,
 }
 
+impl Counts {
+    pub(crate) fn note_events(&mut self, added: usize, deleted: usize) {
+        (self.added, self.deleted) = (added, deleted);
+        self.totals.added += added as u64;
+        self.totals.deleted += deleted as u64;
+    }
+}
+
 impl PbigBroadPhase {
     /// Returns the counts of the last update.
     pub fn stats(&self) -> Stats<'_> {
-        let Kept { modified, removed, added, deleted, totals } = self.kept;
-        let (colliders, report) = (self.roll.len(), self.finder.report());
+        let Counts { modified, removed, added, deleted, totals } = self.counts;
+        let (colliders, report) = (self.registry.len(), self.core.report());
         Stats { colliders, modified, removed, added, deleted, totals, report }
     }
 }

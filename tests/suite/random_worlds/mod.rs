@@ -6,7 +6,7 @@
 
 mod ops;
 
-use crate::checked::{on_cpu, on_gpu};
+use crate::checked::{on_cpu, on_gpu, pbig};
 use ops::{Op, any_op, apply};
 use pbig_core::Config;
 use pbig_harness::shadow::Shadowed;
@@ -48,14 +48,14 @@ struct Subject {
 
 impl Subject {
     fn new(config: Config, plant: Plant) -> Self {
-        Self { pbig: PbigBroadPhase::with_config(config), plant, boxes: HashMap::new(), busy: false }
+        Self { pbig: pbig(config), plant, boxes: HashMap::new(), busy: false }
     }
 
     /// Goes on with what was saved.
     fn restore(&mut self, config: Config) {
         let bytes = postcard::to_stdvec(&self.pbig).expect("a broad phase can be saved");
         self.pbig = match self.plant {
-            Plant::Forgets => PbigBroadPhase::with_config(config),
+            Plant::Forgets => pbig(config),
             _ => postcard::from_bytes(&bytes).expect("these are the bytes of a broad phase"),
         };
     }
@@ -200,7 +200,7 @@ impl Scene {
             }
             Op::Fresh(adopts) => {
                 self.restore_world();
-                let mut fresh = PbigBroadPhase::with_config(self.config);
+                let mut fresh = pbig(self.config);
                 if adopts {
                     fresh.adopt(&self.world.narrow_phase);
                 }

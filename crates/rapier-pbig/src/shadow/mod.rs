@@ -72,8 +72,8 @@ impl PbigBroadPhase {
     /// assert!(broad_phase.differences().is_empty(), "{}", broad_phase.differences()[0]);
     /// ```
     pub fn with_shadow(mut self, shadow: Shadow) -> Self {
-        self.idle = false;
-        let adopted = self.outbox.adopted.iter().copied();
+        self.is_idle = false;
+        let adopted = self.writer.adopted.iter().copied();
         let margin = self.relative_margin;
         let known: Vec<_> = self.pairs().chain(adopted).collect();
         let checker = self.shadow.get_or_insert_with(|| {
