@@ -1,5 +1,5 @@
 //! A call through rapier, ours and stock's, in which all or few colliders move; and the stages of the
-//! finder's update and of the adapter, each on its own.
+//! finder's update, each on its own.
 //!
 //! `cargo bench -p pbig-benches --bench update`; for ratios `pbig bench update` is better, which measures both
 //! in turn.
@@ -64,8 +64,7 @@ fn stages(c: &mut Criterion) {
         let mut update = || {
             let moved = wander.step(frame);
             frame += 1;
-            let fetch = |id: u32| wander.boxes[id as usize];
-            let set = broad_phase.set_many(&moved, fetch, |aabb| Some((aabb, ProxyFilter::ALL)));
+            let set = broad_phase.set_many(&moved, |id| Some((wander.boxes[id as usize], ProxyFilter::ALL)));
             set.and_then(|()| broad_phase.update().map(|_| ())).expect("small ids and few pairs");
             broad_phase.report().stages.named()
         };
@@ -77,32 +76,10 @@ fn stages(c: &mut Criterion) {
     }
 }
 
-/// What the adapter does before and after those: the colliders' boxes, and pairs turned into events.
-fn stages_of_the_adapter(c: &mut Criterion) {
-    let mut group = c.benchmark_group("stages of the adapter, gaussian 100000, all moved");
-    group.sample_size(10);
-    let mut field = Field::new(&boxes("gaussian", 100_000));
-    let movers = Movers::new(100_000, 1.0);
-    let mut broad_phase = PbigBroadPhase::new();
-    let (mut events, mut frame) = (Vec::new(), 0);
-    field.call(&mut broad_phase, &field.colliders, &mut events);
-    let mut call = || {
-        let modified = field.shift(&movers.of(frame), 1.0);
-        frame += 1;
-        events.clear();
-        field.call(&mut broad_phase, &modified, &mut events);
-        let stats = broad_phase.stats();
-        [stats.proxies, stats.events]
-    };
-    for (stage, name) in ["proxies", "events"].into_iter().enumerate() {
-        group.bench_function(name, |b| b.iter_custom(|rounds| sum(rounds, || call()[stage])));
-    }
-}
-
 /// Never zero, of which criterion can make nothing.
 fn sum(rounds: u64, mut measure: impl FnMut() -> Duration) -> Duration {
     (0..rounds).map(|_| measure().max(Duration::from_nanos(1))).sum()
 }
 
-criterion_group!(benches, through_rapier, stages, stages_of_the_adapter);
+criterion_group!(benches, through_rapier, stages);
 criterion_main!(benches);

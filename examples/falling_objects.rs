@@ -9,7 +9,7 @@ use pbig_harness::options::BackendOption;
 use pbig_harness::runner::{Run, Spread, StepTime};
 use pbig_harness::scenes::Scene;
 use pbig_harness::shadow::{Difference, Shadowed};
-use rapier_pbig::{Config, PbigBroadPhase};
+use rapier_pbig::{PbigBroadPhase, PbigConfig};
 use rapier3d::prelude::{BroadPhase, DefaultBroadPhase};
 use std::io::IsTerminal;
 use std::path::PathBuf;
@@ -43,8 +43,8 @@ const CHECK_EVERY: usize = 20;
 
 fn main() -> ExitCode {
     let args = Args::parse();
-    let config = Config { backend: args.backend.backend(), ..PbigBroadPhase::CONFIG };
-    let new = || PbigBroadPhase::with_config(config);
+    let config = PbigConfig { backend: args.backend.backend(), ..PbigConfig::DEFAULT };
+    let new = || PbigBroadPhase::with_config(config).expect("the default margin is a length");
     let mut stock = Run::new(args.scene, args.bodies as usize, args.seed, DefaultBroadPhase::new());
     let mut ours = Run::new(args.scene, args.bodies as usize, args.seed, new());
     let bar = progress(args.steps.into());
@@ -88,7 +88,7 @@ struct Checked {
 }
 
 fn check(args: &Args, broad_phase: PbigBroadPhase) -> Checked {
-    let shadow = Shadowed::new(broad_phase, PbigBroadPhase::CONFIG.margin).every(CHECK_EVERY);
+    let shadow = Shadowed::new(broad_phase, PbigConfig::DEFAULT.margin).every(CHECK_EVERY);
     let mut run = Run::new(args.scene, args.bodies as usize, args.seed, shadow);
     let bar = progress(args.steps.into());
     for _ in 0..args.steps {

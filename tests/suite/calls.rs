@@ -1,6 +1,6 @@
 //! How rapier calls a broad phase, and in which order it is answered.
 
-use crate::checked::{backends, everywhere};
+use crate::checked::{backends, everywhere, pbig};
 use crate::stress::memory;
 use pbig_harness::scenes::Scene;
 use pbig_harness::world::World;
@@ -57,7 +57,7 @@ fn a_step_is_two_calls_and_one_more_for_each_further_substep() {
         // Five metres a step; the second one ends at the wall.
         let bullet = World::dynamic(glam::Vec3::X * -7.0).linvel(vector![300.0, 0.0, 0.0]);
         world.add(bullet.ccd_enabled(true).can_sleep(false), ColliderBuilder::ball(0.1));
-        let mut recorder = Recorder::new(PbigBroadPhase::with_config(config));
+        let mut recorder = Recorder::new(pbig(config));
         world.step(&mut recorder);
         let dt = world.params.dt;
         assert_eq!(recorder.calls, [(2, 0, dt), (1, 0, dt)], "{name}");
@@ -74,7 +74,7 @@ fn a_step_is_two_calls_and_one_more_for_each_further_substep() {
 fn deletions_come_before_additions_each_by_index_and_the_same_on_every_backend() {
     let stream = |(_, config)| {
         let mut world = Scene::named("column").expect("the scene exists").build(150, 4);
-        let mut recorder = Recorder::new(PbigBroadPhase::with_config(config));
+        let mut recorder = Recorder::new(pbig(config));
         (0..60).for_each(|_| world.step(&mut recorder));
         recorder.events
     };
@@ -163,15 +163,13 @@ impl<B: BroadPhase> BroadPhase for Weigher<B> {
 
 #[test]
 fn calls_like_those_before_ask_for_no_memory_but_for_a_plan_now_and_then() {
-    for (broad_phase, name) in [(PbigBroadPhase::new(), "waiting")] {
-        let mut world = Scene::named("column").expect("the scene exists").build(3000, 4);
-        let mut weigher = Weigher { inner: broad_phase, largest: vec![] };
-        (0..200).for_each(|_| world.step(&mut weigher));
-        let late = &weigher.largest[200..];
-        // Half of them have nothing to do.
-        let asking = |least: usize| late.iter().filter(|bytes| **bytes > least).count();
-        assert!(4 * asking(0) < late.len() + 50, "{name}: {} of {} calls", asking(0), late.len());
-        assert!(20 * asking(4096) < late.len(), "{name}: {} calls for more than a plan", asking(4096));
-        assert!(weigher.inner.stats().totals.added > 1000, "{name}");
-    }
+    let mut world = Scene::named("column").expect("the scene exists").build(3000, 4);
+    let mut weigher = Weigher { inner: PbigBroadPhase::new(), largest: vec![] };
+    (0..200).for_each(|_| world.step(&mut weigher));
+    let late = &weigher.largest[200..];
+    // Half of them have nothing to do.
+    let asking = |least: usize| late.iter().filter(|bytes| **bytes > least).count();
+    assert!(4 * asking(0) < late.len() + 50, "{} of {} calls", asking(0), late.len());
+    assert!(20 * asking(4096) < late.len(), "{} calls for more than a plan", asking(4096));
+    assert!(weigher.inner.stats().totals.added > 1000);
 }

@@ -3,7 +3,7 @@
 use pbig_core::{Backend, Coding, Config, Strategy};
 use pbig_harness::shadow::Shadowed;
 use pbig_harness::world::World;
-use rapier_pbig::PbigBroadPhase;
+use rapier_pbig::{PbigBroadPhase, PbigConfig};
 use rapier3d::prelude::*;
 
 /// The world, and the broad phase with its checker around it.
@@ -21,15 +21,20 @@ pub(crate) fn backends() -> Vec<(&'static str, Config)> {
     all.into_iter().filter(|(_, config)| pbig_tests::may_run(config)).collect()
 }
 
+/// Ours, with any settings of the core.
+pub(crate) fn pbig(config: Config) -> PbigBroadPhase {
+    PbigBroadPhase::with_core_config(config).expect("a length")
+}
+
 /// As it comes, and with its grid.
 pub(crate) fn on_cpu() -> [Config; 2] {
-    let cpu = Config { backend: Backend::Cpu, ..PbigBroadPhase::CONFIG };
+    let cpu = Config { backend: Backend::Cpu, ..PbigConfig::DEFAULT.into() };
     [cpu, Config { strategy: Strategy::Grid, ..cpu }]
 }
 
 /// With its grid.
 pub(crate) fn on_gpu() -> Config {
-    Config { margin: PbigBroadPhase::CONFIG.margin, ..pbig_tests::gpu(Coding::Plain) }
+    Config { margin: PbigConfig::DEFAULT.margin, ..pbig_tests::gpu(Coding::Plain) }
 }
 
 /// Runs a test on every backend, each time with a new world.
@@ -44,7 +49,7 @@ impl Checked {
     /// Things stay where they are put: no gravity, and [`Checked::ball`]s that contacts cannot push.
     pub(crate) fn new(config: Config) -> Self {
         let world = World::with_gravity(glam::Vec3::ZERO);
-        let shadow = Shadowed::new(PbigBroadPhase::with_config(config), config.margin);
+        let shadow = Shadowed::new(pbig(config), config.margin);
         Self { world, broad_phase: shadow, config }
     }
 

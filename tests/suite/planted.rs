@@ -6,7 +6,7 @@ use pbig_harness::scenes::Scene;
 use pbig_harness::shadow::Fault;
 use pbig_harness::simulate::{Task, run_checked};
 use pbig_tests::difference;
-use rapier_pbig::PbigBroadPhase;
+use rapier_pbig::{PbigBroadPhase, PbigConfig};
 use rapier3d::prelude::*;
 
 #[test]
@@ -116,7 +116,7 @@ fn the_shadow_checker_notices_each_fault_and_writes_the_frames() {
         let scene = Scene::named("column").expect("the scene exists");
         let task = Task { scene, bodies: 300, steps: 300, seed: 1 };
         let faulty = Faulty { inner: PbigBroadPhase::new(), plant, seen: 0 };
-        let margin = PbigBroadPhase::CONFIG.margin;
+        let margin = PbigConfig::DEFAULT.margin;
         let (outcome, _) = run_checked(task, faulty, margin, folder.path(), |_| ());
         let check = outcome.check.as_ref().expect("a check was asked for");
         let first = check.differences.first().unwrap_or_else(|| panic!("{plant:?} was not noticed"));
@@ -133,7 +133,7 @@ fn the_shadow_checker_notices_a_collider_paired_with_itself() {
     let world = Scene::named("column").expect("the scene exists").build(300, 1);
     let handles: Vec<ColliderHandle> = world.colliders.iter().map(|(handle, _)| handle).collect();
     let faulty = Faulty { inner: PbigBroadPhase::new(), plant: Plant::WithItself, seen: 99 };
-    let mut shadow = Shadowed::new(faulty, PbigBroadPhase::CONFIG.margin);
+    let mut shadow = Shadowed::new(faulty, PbigConfig::DEFAULT.margin);
     // Without a narrow phase, which would panic. Large boxes, so that there are pairs at once.
     let params = IntegrationParameters { normalized_prediction_distance: 1.0, ..world.params };
     shadow.update(&params, &world.colliders, &world.bodies, &handles, &[], &mut Vec::new());

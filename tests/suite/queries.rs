@@ -1,6 +1,6 @@
 //! Scene queries give what rapier's own give.
 
-use crate::checked::backends;
+use crate::checked::{backends, pbig};
 use pbig_harness::scenes::Scene;
 use pbig_harness::world::World;
 use rand::rngs::SmallRng;
@@ -87,7 +87,7 @@ fn queries_agree_with_stock_while_a_world_moves_and_changes() {
     for (name, config) in backends() {
         for scene in ["column", "compounds"] {
             let mut world = Scene::named(scene).expect("the scene exists").build(120, 2);
-            let ours = PbigBroadPhase::with_config(config);
+            let ours = pbig(config);
             let mut both = Both { ours, stock: DefaultBroadPhase::new() };
             let (mut random, mut hits) = (SmallRng::seed_from_u64(9), 0);
             for round in 0..12 {

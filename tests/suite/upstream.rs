@@ -2,11 +2,10 @@
 //! stock and the oracle, on every backend. Numbers are those of issues and pull requests of dimforge/rapier;
 //! `bevy` and `js` mark those of its bindings.
 
-use crate::checked::{Checked, everywhere, on_cpu, on_gpu};
+use crate::checked::{Checked, everywhere, on_cpu, on_gpu, pbig};
 use pbig_core::Config;
 use pbig_harness::world::World;
 use pbig_tests::needs_gpu;
-use rapier_pbig::PbigBroadPhase;
 use rapier3d::prelude::*;
 use std::sync::mpsc::channel;
 
@@ -94,7 +93,7 @@ fn among_fixed_bodies(config: Config, steps: usize, most_checks: u64) {
     let mover =
         RigidBodyBuilder::dynamic().translation(vector![5.0, 0.0, 60.0]).linvel(vector![30.0, 0.0, 0.0]);
     let mover = world.add(mover.can_sleep(false), ColliderBuilder::ball(0.4).sensor(true));
-    let mut broad_phase = PbigBroadPhase::with_config(config);
+    let mut broad_phase = pbig(config);
     world.step(&mut broad_phase);
     for step in 0..steps {
         // Of the two updates of a step, the first has nothing to do: only rapier moves anything.

@@ -1,8 +1,7 @@
 //! More of rapier's old bugs (see `upstream`): colliders that come and go, the `CollisionPipeline`, positions that are none.
 
-use crate::checked::{Checked, backends, everywhere};
+use crate::checked::{Checked, backends, everywhere, pbig};
 use crate::upstream::{collide, loud, touching};
-use rapier_pbig::PbigBroadPhase;
 use rapier3d::prelude::*;
 
 #[test]
@@ -16,8 +15,8 @@ fn upstream_342_343_inserted_and_removed_before_the_collision_pipeline_runs() {
         assert!(collide(&mut scene).is_empty());
         let gone = scene.world.colliders.insert(loud(0.0));
         scene.world.remove_collider(gone);
-        let heir = scene.world.colliders.insert(loud(0.1));
-        assert_eq!(heir.into_raw_parts().0, gone.into_raw_parts().0, "the index is reused");
+        let reusing = scene.world.colliders.insert(loud(0.1));
+        assert_eq!(reusing.into_raw_parts().0, gone.into_raw_parts().0, "the index is reused");
         assert_eq!(collide(&mut scene), [true]);
     });
 }
@@ -86,7 +85,7 @@ fn upstream_865_all_are_removed_and_as_many_added_in_one_step() {
 fn upstream_350_a_position_that_is_not_finite_has_no_pairs_until_it_is_mended() {
     for (name, config) in backends() {
         let (params, bodies) = (IntegrationParameters::default(), RigidBodySet::new());
-        let (mut broad_phase, mut colliders) = (PbigBroadPhase::with_config(config), ColliderSet::new());
+        let (mut broad_phase, mut colliders) = (pbig(config), ColliderSet::new());
         let handles = [0.0, 0.9, 1.8].map(|x| colliders.insert(loud(x)));
         // Without a narrow phase and without stock, which cannot bear it.
         let mut at = |x: f32| {

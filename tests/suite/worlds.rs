@@ -1,12 +1,13 @@
 //! Scenes in rapier: the shadow check finds nothing, and the same scene gives the same bits.
 
+use crate::checked::pbig;
 use pbig_core::{Backend, Config, Strategy};
 use pbig_harness::runner::Run;
 use pbig_harness::scenes::Scene;
 use pbig_harness::shadow::Shadowed;
 use pbig_harness::simulate::{Task, run_checked};
 use pbig_harness::world::World;
-use rapier_pbig::PbigBroadPhase;
+use rapier_pbig::{PbigBroadPhase, PbigConfig};
 use rapier3d::prelude::*;
 
 /// Bodies in a test; `pbig simulate --check` runs the scenes at their full size.
@@ -16,7 +17,7 @@ fn check(scene: Scene, config: Config, steps: usize) {
     let bodies = scene.default_bodies.min(MOST_BODIES);
     let task = Task { scene, bodies, steps, seed: 11 };
     let folder = std::env::temp_dir();
-    let ours = PbigBroadPhase::with_config(config);
+    let ours = pbig(config);
     let (outcome, ours) = run_checked(task, ours, config.margin, &folder, |_| ());
     let check = outcome.check.as_ref().expect("a check was asked for");
     assert!(!outcome.failed(), "{}: {}", scene.name, check.differences[0]);
@@ -32,7 +33,7 @@ fn check(scene: Scene, config: Config, steps: usize) {
 #[test]
 fn every_scene_for_300_steps_beside_stock_and_the_oracle() {
     for scene in Scene::ALL {
-        check(scene, PbigBroadPhase::CONFIG, 300);
+        check(scene, PbigConfig::DEFAULT.into(), 300);
     }
 }
 
@@ -44,7 +45,7 @@ fn every_scene_on_every_strategy() {
         // A software adapter takes its time.
         let steps = if name.starts_with("gpu") { 20 } else { 40 };
         for scene in Scene::ALL {
-            check(scene, Config { margin: PbigBroadPhase::CONFIG.margin, ..config }, steps);
+            check(scene, Config { margin: PbigConfig::DEFAULT.margin, ..config }, steps);
         }
     }
 }
@@ -53,7 +54,7 @@ fn bits(scene: Scene, config: Config, threads: usize, steps: usize) -> Vec<u32> 
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool");
     pool.install(|| {
         let bodies = scene.default_bodies.min(MOST_BODIES);
-        let mut run = Run::new(scene, bodies, 5, PbigBroadPhase::with_config(config));
+        let mut run = Run::new(scene, bodies, 5, pbig(config));
         (0..steps).for_each(|_| run.step());
         run.world.pose_bits()
     })
@@ -62,9 +63,9 @@ fn bits(scene: Scene, config: Config, threads: usize, steps: usize) -> Vec<u32> 
 #[test]
 fn the_same_scene_gives_bit_identical_positions_whatever_the_threads() {
     for scene in Scene::ALL {
-        let wanted = bits(scene, PbigBroadPhase::CONFIG, 1, 120);
+        let wanted = bits(scene, PbigConfig::DEFAULT.into(), 1, 120);
         for threads in [1, 2] {
-            let got = bits(scene, PbigBroadPhase::CONFIG, threads, 120);
+            let got = bits(scene, PbigConfig::DEFAULT.into(), threads, 120);
             assert!(got == wanted, "{} on {threads} threads differs", scene.name);
         }
     }
@@ -92,8 +93,8 @@ fn a_world_large_enough_for_threads_gives_the_same_bits_on_one_and_two() {
 #[test]
 fn every_strategy_gives_the_same_bits() {
     let scene = Scene::named("column").expect("the scene exists");
-    let with = |backend, strategy| Config { backend, strategy, ..PbigBroadPhase::CONFIG };
-    let wanted = bits(scene, PbigBroadPhase::CONFIG, 2, 120);
+    let with = |backend, strategy| Config { backend, strategy, ..PbigConfig::DEFAULT.into() };
+    let wanted = bits(scene, PbigConfig::DEFAULT.into(), 2, 120);
     let configs = [
         with(Backend::Cpu, Strategy::Grid),
         with(Backend::Cpu, Strategy::Pbig),
@@ -131,7 +132,7 @@ fn upstream_14_objects_that_fall_for_ever_are_still_found_at_the_same_cost() {
             let at = glam::vec3((i % 10) as f32 * 0.9, 0.0, (i / 10) as f32 * 0.9);
             world.add(World::dynamic(at).linear_damping(0.0), ColliderBuilder::ball(0.5));
         }
-        let mut broad_phase = Shadowed::new(PbigBroadPhase::with_config(config), config.margin).every(50);
+        let mut broad_phase = Shadowed::new(pbig(config), config.margin).every(50);
         let mut most_bytes = 0;
         for _ in 0..if name == "cpu" { 2000 } else { 700 } {
             world.step(&mut broad_phase);

@@ -93,7 +93,7 @@ pub use filter::{ProxyFilter, TestMode};
 pub use finder::{Finder, find_pairs};
 #[cfg(feature = "gpu")]
 pub use gpu::GpuFinder;
-pub use grid::{NeighbourScan, simd};
+pub use grid::{NeighbourScan, OccupiedCell, simd};
 pub use pair::Pair;
 pub use plan::{Algorithm, Plan};
 pub use policy::NoGpu;

@@ -70,7 +70,7 @@ fn needed(world: &World) -> Vec<Pair> {
 mod tests {
     use super::*;
     use glam::Vec3;
-    use rapier_pbig::{Config, PbigBroadPhase};
+    use rapier_pbig::{PbigBroadPhase, PbigConfig};
     use rapier3d::prelude::*;
 
     /// Reports nothing.
@@ -101,7 +101,8 @@ mod tests {
 
     #[test]
     fn a_wide_margin_has_extra_pairs_and_silence_misses_some() {
-        let with = |margin| PbigBroadPhase::with_config(Config { margin, ..PbigBroadPhase::CONFIG });
+        let config = |margin| PbigConfig { margin, ..PbigConfig::DEFAULT };
+        let with = |margin| PbigBroadPhase::with_config(config(margin)).expect("a length");
         let counts = |needed, extra, missed| Reported { needed, extra, missed };
         assert_eq!(after_a_step(&mut with(0.01)), counts(1, 0, 0));
         assert_eq!(after_a_step(&mut with(0.15)), counts(1, 1, 0));

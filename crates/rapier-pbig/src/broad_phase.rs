@@ -1,38 +1,41 @@
-//! `PbigBroadPhase`: rapier's calls translated to the finder's.
+//! `PbigBroadPhase`: translates rapier's calls into calls of the core.
 
+use crate::PbigConfig;
 use crate::call::Call;
-use crate::events::{HandleOrder, Outbox};
-use crate::roll::Roll;
+use crate::events::{EventWriter, ordered};
+use crate::registry::ColliderRegistry;
 use crate::scene_tree::SceneTree;
-use crate::stats::{Kept, MEASURED_FROM, Totals, Watch};
-use pbig_core::{BroadPhase as Finder, Config, Limits};
+use crate::stats::{Counts, Totals};
+use pbig_core::Error;
 use rapier3d::prelude::{
     BroadPhase, BroadPhasePairEvent, ColliderHandle, ColliderPair, ColliderSet, IntegrationParameters,
     NarrowPhase, RigidBodySet,
 };
 
-/// The broad phase to hand to rapier's `PhysicsPipeline` or `CollisionPipeline`.
+/// The broad phase to pass to rapier's `PhysicsPipeline` or `CollisionPipeline`.
 ///
-/// A collider's index is its id in the finder. Each collider is stored with its box and filter, and
-/// set again whenever rapier lists it as modified: rapier does not tell what has changed, and a
-/// collider whose fat box still holds it and whose filter is the same costs nothing more.
+/// A collider's index is the id of its box in the core. Rapier does not tell what has changed about a modified collider, so
+/// its AABB and its filter are computed again. The core drops the change if the stored AABB, which is larger by the margin,
+/// still contains the collider.
 ///
-/// A clone, and one restored from a snapshot (feature `serde`), goes on as the original does.
+/// A clone, and a broad phase restored from a snapshot (feature `serde`), sends the same events as the original.
 #[derive(Clone)]
 pub struct PbigBroadPhase {
-    pub(crate) finder: Finder,
-    pub(crate) roll: Roll,
+    pub(crate) core: pbig_core::BroadPhase,
+    pub(crate) registry: ColliderRegistry,
     /// Margin in units of `IntegrationParameters::length_unit`.
     pub(crate) relative_margin: f32,
-    /// By how much boxes are widened.
-    pub(crate) ulps: u32,
-    pub(crate) outbox: Outbox,
-    /// Indices of the listed colliders of one call.
-    pub(crate) indices: Vec<u32>,
+    pub(crate) writer: EventWriter,
+    /// Proxies that several threads compute. Kept for its memory.
+    #[cfg(feature = "parallel")]
+    pub(crate) proxies: Vec<crate::proxy::Proxy>,
     pub(crate) tree: SceneTree,
-    pub(crate) kept: Kept,
-    /// The last call had nothing to do, and left everything so that another one has not either.
-    pub(crate) idle: bool,
+    pub(crate) counts: Counts,
+    last_error: Option<Error>,
+    /// The last call had nothing to do and left nothing to do.
+    pub(crate) is_idle: bool,
+    /// A collider's shape panicked while the listed colliders were read, so some of them may not have been.
+    is_interrupted: bool,
     #[cfg(feature = "shadow")]
     pub(crate) shadow: Option<Box<crate::shadow::Checker>>,
 }
@@ -46,220 +49,210 @@ impl Default for PbigBroadPhase {
 impl std::fmt::Debug for PbigBroadPhase {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let mut shown = f.debug_struct("PbigBroadPhase");
-        shown.field("colliders", &self.roll.len()).field("pairs", &self.pair_count());
-        shown.field("config", self.finder.config()).finish_non_exhaustive()
+        shown.field("colliders", &self.registry.len()).field("pairs", &self.pair_count());
+        shown.field("margin", &self.relative_margin).finish_non_exhaustive()
     }
 }
 
 impl PbigBroadPhase {
-    /// The defaults: a margin of 1% of the length unit, as rapier's own broad phase has, and no limit on colliders or pairs,
-    /// as rapier has none. `pbig accuracy` compares margins. Half of this one makes the whole step faster where bodies lie just
-    /// 2% of the length unit apart, so that neighbours pair with this one and do not with half (its scene `pile`); elsewhere
-    /// none from 0 to 0.02 is faster than the noise. Without any, rounding is not covered: pairs were missed from a thousand
-    /// units from the origin on.
-    pub const CONFIG: Config = Config { margin: 0.01, limits: Limits::UNLIMITED, ..Config::DEFAULT };
-
-    /// An empty broad phase with [`PbigBroadPhase::CONFIG`].
+    /// Creates an empty broad phase with [`PbigConfig::DEFAULT`].
     pub fn new() -> Self {
-        Self::with_config(Self::CONFIG)
+        Self::with_config(PbigConfig::DEFAULT).expect("the default margin is a length")
     }
 
-    /// An empty broad phase. [`Config::margin`] is in units of rapier's `length_unit`; one that is
-    /// not a finite length of at least 0 is replaced by the default. Limits are not used: rapier's
-    /// trait knows no errors.
-    pub fn with_config(config: Config) -> Self {
-        Self::on(config, Finder::new)
+    /// Creates an empty broad phase.
+    ///
+    /// # Errors
+    /// [`Error::Margin`].
+    pub fn with_config(config: PbigConfig) -> Result<Self, Error> {
+        pbig_core::BroadPhase::new(config.into()).map(Self::around)
     }
 
-    /// As [`PbigBroadPhase::with_config`], on a given device: with [`pbig_core::Backend::Gpu`] always,
-    /// with [`pbig_core::Backend::Auto`] when it is no software and turns out faster than the CPU.
+    /// As [`PbigBroadPhase::with_config`], on a given device. [`pbig_core::Backend::Gpu`] always uses it.
+    /// [`pbig_core::Backend::Auto`] uses it for large changes, unless it is a software adapter.
+    ///
+    /// # Errors
+    /// [`Error::Margin`].
     #[cfg(feature = "gpu")]
-    pub fn with_gpu(config: Config, gpu: pbig_core::GpuFinder) -> Self {
-        Self::on(config, |config| Finder::with_gpu(config, gpu))
+    pub fn with_gpu(config: PbigConfig, gpu: pbig_core::GpuFinder) -> Result<Self, Error> {
+        pbig_core::BroadPhase::with_gpu(config.into(), gpu).map(Self::around)
     }
 
-    /// Goes on with this device, from the next update: one restored from a snapshot has none.
+    /// Uses this device from the next update on. A broad phase restored from a snapshot has none.
     #[cfg(feature = "gpu")]
     pub fn set_gpu(&mut self, gpu: pbig_core::GpuFinder) {
-        self.finder.set_gpu(gpu);
+        self.core.set_gpu(gpu);
     }
 
-    /// The adapter of the device in use: name, kind and API.
+    /// Returns the name, kind and API of the device in use.
     #[cfg(feature = "gpu")]
     pub fn adapter(&self) -> Option<&str> {
-        self.finder.adapter()
+        self.core.adapter()
     }
 
-    fn on(config: Config, make: impl FnOnce(Config) -> Result<Finder, pbig_core::Error>) -> Self {
-        let margin = if config.margin >= 0.0 && config.margin.is_finite() {
-            config.margin
-        } else {
-            Self::CONFIG.margin
-        };
-        let config = Config { margin, limits: Limits::UNLIMITED, ..config };
-        Self::around(make(config).expect("the margin was checked above"), margin)
+    /// As [`PbigBroadPhase::with_config`], with any settings of the core; its margin is in units of rapier's `length_unit`.
+    /// For studies and tests (feature `unstable-study`).
+    ///
+    /// # Errors
+    /// [`Error::Margin`].
+    #[cfg(feature = "unstable-study")]
+    pub fn with_core_config(config: pbig_core::Config) -> Result<Self, Error> {
+        pbig_core::BroadPhase::new(config).map(Self::around)
     }
 
-    pub(crate) fn around(finder: Finder, relative_margin: f32) -> Self {
+    pub(crate) fn around(core: pbig_core::BroadPhase) -> Self {
         Self {
-            finder,
-            roll: Roll::default(),
-            relative_margin,
-            ulps: 0,
-            outbox: Outbox::default(),
-            indices: Vec::new(),
+            relative_margin: core.config().margin,
+            core,
+            registry: ColliderRegistry::default(),
+            writer: EventWriter::default(),
+            #[cfg(feature = "parallel")]
+            proxies: Vec::new(),
             tree: SceneTree::default(),
-            kept: Kept::default(),
-            idle: false,
+            counts: Counts::default(),
+            last_error: None,
+            is_idle: false,
+            is_interrupted: false,
             #[cfg(feature = "shadow")]
             shadow: None,
         }
     }
 
-    /// Chooses which collider of a pair comes first, for pairs reported from now on.
-    pub fn with_handle_order(mut self, order: HandleOrder) -> Self {
-        self.outbox.order = order;
-        self
-    }
-
-    /// Starts again beside a world that it has not accompanied: one restored from a snapshot without this broad
-    /// phase, or one that rapier's own broad phase has served so far. The next update looks at all
-    /// colliders; pairs that the narrow phase has and that are none end then. Until then [`PbigBroadPhase::why`] and
-    /// queries know of no collider.
+    /// Takes over a world that another broad phase has served so far: one restored from a snapshot without this broad phase,
+    /// or one that used rapier's own. The next update reads all colliders, and ends the narrow phase's pairs that do not
+    /// overlap. Until then [`PbigBroadPhase::why`] and queries know of no collider.
     ///
-    /// Without this call a new broad phase notices such a world too, but not the pairs that ended before it was
-    /// there: the narrow phase keeps those until one of their colliders is removed. It notices by the number of colliders; so
-    /// a world that is rolled back to another one of as many under a broad phase that stays has to be adopted, or the
-    /// broad phase rolled back with it.
+    /// Without this call a new broad phase notices such a world by the number of colliders, but not the pairs that ended
+    /// before: the narrow phase keeps those until one of their colliders is removed. A world that is replaced by one with the
+    /// same number of colliders is not noticed: adopt it, or restore the broad phase together with it.
     pub fn adopt(&mut self, narrow_phase: &NarrowPhase) {
         let contacts = narrow_phase.contact_pairs().map(|pair| (pair.collider1, pair.collider2));
         let intersections = narrow_phase.intersection_pairs().map(|(one, other, _)| (one, other));
-        self.outbox.adopted = contacts.chain(intersections).map(|(a, b)| ColliderPair::new(a, b)).collect();
+        self.writer.adopted = contacts.chain(intersections).map(|(a, b)| ColliderPair::new(a, b)).collect();
         self.forget_all();
-        self.idle = false;
-        self.start_shadow_over();
+        self.is_idle = false;
+        self.restart_shadow();
     }
 
-    /// Pairs that rapier knows of, but for adopted ones before the next update.
+    /// Returns the error of the last update, or `None` if it succeeded. If pairs could not be found, no events were sent, and
+    /// the next update sees the same changes again.
+    pub fn last_error(&self) -> Option<&Error> {
+        self.last_error.as_ref()
+    }
+
+    /// Returns the number of pairs that rapier knows of. Adopted pairs count from the next update on.
     pub fn pair_count(&self) -> usize {
-        self.finder.pair_count()
+        self.core.pair_count()
     }
 
-    /// The pairs that rapier knows of, in no particular order, but for adopted ones before the next update.
+    /// Returns the pairs that rapier knows of, in no particular order. Adopted pairs are among them from the next update on.
     pub fn pairs(&self) -> impl Iterator<Item = ColliderPair> {
-        self.finder.pairs().map(|pair| self.outbox.pair(pair, &self.roll, |id| self.finder.degree(id)))
+        self.core.pairs().map(|pair| ordered(pair, &self.registry, |id| self.core.degree(id)))
     }
 
-    /// Forgets a collider, if this very one is on the roll. Its pairs end without an event: the
-    /// narrow phase drops the pairs of removed and disabled colliders itself.
-    pub(crate) fn forget(&mut self, handle: ColliderHandle) {
-        if self.roll.strike(handle) {
-            self.finder.remove(handle.into_raw_parts().0);
-        }
-    }
-
-    /// Keeps a collider on the roll, without a box.
-    pub(crate) fn disable(&mut self, handle: ColliderHandle) {
-        self.roll.enter(handle);
-        self.finder.remove(handle.into_raw_parts().0);
-    }
-
-    /// First what is removed, because a modified collider may have taken the index of a removed one.
-    fn take_in(&mut self, call: &Call<'_>) {
+    /// Removes first, because a modified collider may reuse the index of a removed one.
+    fn read(&mut self, call: &Call<'_>) {
         for &handle in call.removed {
-            // Disabled colliders are listed as removed, too.
+            // Rapier lists disabled colliders as removed, too.
             if call.colliders.contains(handle) { self.disable(handle) } else { self.forget(handle) }
         }
-        self.outbox.purge(call.removed);
-        // A length unit that makes no sense leaves the margin as it was.
-        let _ = self.finder.set_margin(self.relative_margin * call.params.length_unit);
-        self.look_at(call, call.modified);
-        if self.roll.is_behind(call.colliders) {
+        self.writer.forget_adopted(call.removed);
+        if let Err(error) = self.core.set_margin(self.relative_margin * call.params.length_unit) {
+            self.note_error(error);
+        }
+        let was_interrupted = std::mem::replace(&mut self.is_interrupted, true);
+        if was_interrupted {
+            self.read_listed(call, &all_of(call.colliders));
+        } else {
+            self.read_listed(call, call.modified);
+        }
+        if self.registry.differs_from(call.colliders) {
             self.rescan(call);
+        }
+        self.is_interrupted = false;
+    }
+
+    /// Reads all colliders of a world that is not the one known so far. Rapier lists a collider that neither moves nor changes
+    /// only once, and this broad phase missed it. Nothing that is stored can be trusted. (Adding a pair again does no harm.)
+    fn rescan(&mut self, call: &Call<'_>) {
+        self.forget_all();
+        let all = all_of(call.colliders);
+        tracing::debug!("pbig: another world, all {} colliders are read", all.len());
+        self.read_listed(call, &all);
+        self.counts.totals.rescans += 1;
+        self.restart_shadow();
+    }
+
+    fn forget_all(&mut self) {
+        self.registry.clear();
+        (0..self.core.id_count()).for_each(|id| _ = self.core.remove(id));
+        self.tree = SceneTree::default();
+    }
+
+    fn restart_shadow(&mut self) {
+        #[cfg(feature = "shadow")]
+        if let Some(checker) = &mut self.shadow {
+            checker.start_over(self.writer.adopted.iter().copied());
         }
     }
 
-    /// Rapier lists a collider that neither moves nor changes only once, and this broad phase was not there: it is
-    /// new beside a world restored from a snapshot, or the world has been replaced. Then nothing that is stored can
-    /// be trusted. (A pair that is added again does no harm.)
-    fn rescan(&mut self, call: &Call<'_>) {
-        self.forget_all();
-        let all: Vec<ColliderHandle> = call.colliders.iter().map(|(handle, _)| handle).collect();
-        tracing::debug!("pbig: another world, all {} colliders are looked at", all.len());
-        self.look_at(call, &all);
-        self.kept.totals.rescans += 1;
-        self.start_shadow_over();
+    fn find_and_send(&mut self, events: &mut Vec<BroadPhasePairEvent>) {
+        if self.tree.is_used() {
+            self.tree.note(self.core.changes(), self.registry.len());
+        }
+        if let Err(error) = self.core.update() {
+            return self.note_error(error);
+        }
+        let found = self.core.events();
+        if found.added.is_empty() && found.removed.is_empty() && self.writer.adopted.is_empty() {
+            return;
+        }
+        let _span = tracing::debug_span!(target: "pbig", "events").entered();
+        let degree = |id| self.core.degree(id);
+        let (added, deleted) = self.writer.write(found, &self.registry, degree, events);
+        self.counts.note_events(added, deleted);
     }
 
-    /// Whether nothing is left to do: no change that an update which failed has left behind, no adopted pair, and no
-    /// checker that wants to see every call.
-    fn rests(&self) -> bool {
+    pub(crate) fn note_error(&mut self, error: Error) {
+        tracing::error!("pbig: {error}");
+        self.last_error = Some(error);
+    }
+
+    /// Handles a call that has something to do.
+    // Not inlined, so that idle calls do not reserve its stack.
+    #[inline(never)]
+    fn handle(&mut self, call: &Call<'_>, has_changes: bool, events: &mut Vec<BroadPhasePairEvent>) {
+        let (modified, removed) = (call.modified.len(), call.removed.len());
+        let _span = tracing::debug_span!(target: "pbig", "update", modified).entered();
+        let totals = Totals { updates: self.counts.totals.updates + 1, ..self.counts.totals };
+        self.counts = Counts { modified, removed, totals, ..Counts::default() };
+        (self.last_error, self.is_idle) = (None, false);
+        #[cfg(feature = "shadow")]
+        let start = events.len();
+        self.read(call);
+        self.find_and_send(events);
+        self.counts.totals.failures += u64::from(self.last_error.is_some());
+        #[cfg(feature = "shadow")]
+        if let Some(checker) = &mut self.shadow {
+            checker.watch(call, &events[start..]);
+        }
+        self.is_idle = !has_changes && self.has_nothing_left();
+    }
+
+    /// Returns true if nothing is left to do: no change or error of a failed update, no adopted pair, and no checker, which
+    /// sees every call.
+    fn has_nothing_left(&self) -> bool {
         #[cfg(feature = "shadow")]
         let is_watched = self.shadow.is_some();
         #[cfg(not(feature = "shadow"))]
         let is_watched = false;
-        !is_watched && self.outbox.adopted.is_empty() && self.finder.changes().next().is_none()
+        let is_done = self.last_error.is_none() && self.core.changes().next().is_none();
+        is_done && !is_watched && self.writer.adopted.is_empty()
     }
+}
 
-    fn start_shadow_over(&mut self) {
-        #[cfg(feature = "shadow")]
-        if let Some(checker) = &mut self.shadow {
-            checker.start_over(self.outbox.adopted.iter().copied());
-        }
-    }
-
-    fn forget_all(&mut self) {
-        let all: Vec<ColliderHandle> = self.roll.handles().collect();
-        all.into_iter().for_each(|handle| self.forget(handle));
-        self.tree = SceneTree::default();
-    }
-
-    fn find_and_send(&mut self, events: &mut Vec<BroadPhasePairEvent>) {
-        self.note_for_queries();
-        if let Err(error) = self.finder.update() {
-            self.kept.totals.failures += 1;
-            tracing::error!("pbig: no pairs in this update: {error}");
-            return;
-        }
-        let found = self.finder.events();
-        let count = found.added.len() + found.removed.len() + self.outbox.adopted.len();
-        if count == 0 {
-            return;
-        }
-        let mut watch = Watch::new(count >= MEASURED_FROM);
-        let _span = tracing::debug_span!(target: "pbig", "events").entered();
-        let sent = self.outbox.send(&self.finder, found, &self.roll, events);
-        self.kept.events = watch.lap();
-        (self.kept.added, self.kept.deleted) = sent;
-        self.kept.totals.added += sent.0 as u64;
-        self.kept.totals.deleted += sent.1 as u64;
-    }
-
-    /// Boxes that have changed, for the tree of those who ask.
-    pub(crate) fn note_for_queries(&mut self) {
-        if self.tree.is_used() {
-            self.tree.note(self.finder.changes(), self.roll.len());
-        }
-    }
-
-    /// A call with news, or after one that left something to do. (Apart, as what it puts on the stack would be there for
-    /// calls at rest, too.)
-    #[inline(never)]
-    fn take(&mut self, call: &Call<'_>, has_news: bool, events: &mut Vec<BroadPhasePairEvent>) {
-        let (modified, removed) = (call.modified, call.removed);
-        let _span = tracing::debug_span!(target: "pbig", "update", modified = modified.len()).entered();
-        let totals = Totals { updates: self.kept.totals.updates + 1, ..self.kept.totals };
-        self.kept = Kept { modified: modified.len(), removed: removed.len(), totals, ..Kept::default() };
-        #[cfg(feature = "shadow")]
-        let before = events.len();
-        self.take_in(call);
-        self.find_and_send(events);
-        #[cfg(feature = "shadow")]
-        if let Some(checker) = &mut self.shadow {
-            checker.watch(call, &events[before..]);
-        }
-        self.idle = !has_news && self.rests();
-    }
+fn all_of(colliders: &ColliderSet) -> Vec<ColliderHandle> {
+    colliders.iter().map(|(handle, _)| handle).collect()
 }
 
 impl BroadPhase for PbigBroadPhase {
@@ -273,42 +266,16 @@ impl BroadPhase for PbigBroadPhase {
         events: &mut Vec<BroadPhasePairEvent>,
     ) {
         let (modified, removed) = (modified_colliders, removed_colliders);
-        let has_news = !modified.is_empty() || !removed.is_empty() || self.roll.is_behind(colliders);
-        if self.idle && !has_news {
-            // A world at rest: a few comparisons. The statistics of the call before hold for this one.
-            self.kept.totals.updates += 1;
+        let has_changes =
+            !modified.is_empty() || !removed.is_empty() || self.registry.differs_from(colliders);
+        if self.is_idle && !has_changes {
+            // A sleeping world: a few comparisons. The counts of the last call are those of this one.
+            self.counts.totals.updates += 1;
             return;
         }
-        self.take(&Call { params, colliders, bodies, modified, removed }, has_news, events);
+        self.handle(&Call { params, colliders, bodies, modified, removed }, has_changes, events);
     }
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use rapier3d::prelude::{ColliderBuilder, RigidBodyBuilder, nalgebra, vector};
-
-    #[test]
-    fn an_update_that_fails_sends_nothing_and_the_next_one_sees_its_changes() {
-        let (mut bodies, mut colliders) = (RigidBodySet::new(), ColliderSet::new());
-        let mut ball = |x: f32| {
-            let body = bodies.insert(RigidBodyBuilder::dynamic().translation(vector![x, 0.0, 0.0]));
-            colliders.insert_with_parent(ColliderBuilder::ball(0.5), body, &mut bodies)
-        };
-        let handles: Vec<ColliderHandle> = (0..12).map(|i| ball(0.1 * i as f32)).collect();
-        let limits = Limits { max_pairs: 3, ..Limits::UNLIMITED };
-        let finder = Finder::new(Config { limits, ..PbigBroadPhase::CONFIG }).expect("a margin");
-        let mut broad_phase = PbigBroadPhase::around(finder, 0.01);
-        let params = IntegrationParameters::default();
-        let mut update = |modified: &[ColliderHandle], removed: &[ColliderHandle]| {
-            let mut events = Vec::new();
-            broad_phase.update(&params, &colliders, &bodies, modified, removed, &mut events);
-            (events.len(), broad_phase.stats().totals.failures, broad_phase.pair_count())
-        };
-        assert_eq!(update(&handles, &[]), (0, 1, 0), "66 pairs");
-        assert_eq!(update(&[], &[]), (0, 2, 0), "still");
-        // Disabled, as far as a broad phase is told.
-        assert_eq!(update(&[], &handles[3..]), (3, 2, 3));
-        assert_eq!(update(&[], &[]), (0, 2, 3));
-    }
-}
+mod tests;

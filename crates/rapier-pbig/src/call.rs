@@ -1,4 +1,4 @@
-//! What rapier hands to a broad phase.
+//! The arguments that rapier passes to a broad phase.
 
 use rapier3d::prelude::{ColliderHandle, ColliderSet, IntegrationParameters, RigidBodySet};
 
@@ -10,10 +10,10 @@ pub struct Call<'a> {
     pub params: &'a IntegrationParameters,
     /// The colliders.
     pub colliders: &'a ColliderSet,
-    /// Their bodies.
+    /// The bodies of the colliders.
     pub bodies: &'a RigidBodySet,
     /// Colliders that may have changed.
     pub modified: &'a [ColliderHandle],
-    /// Colliders that are gone or disabled.
+    /// Colliders that were removed or disabled.
     pub removed: &'a [ColliderHandle],
 }

@@ -1,4 +1,4 @@
-//! Pictures of the broad phase through rapier's debug renderer.
+//! Draws the broad phase through rapier's debug renderer.
 
 use crate::PbigBroadPhase;
 use pbig_core::Aabb;
@@ -6,13 +6,13 @@ use rapier3d::parry::bounding_volume::Aabb as DrawnAabb;
 use rapier3d::pipeline::{DebugColor, DebugRenderBackend, DebugRenderObject};
 use rapier3d::prelude::{Collider, ColliderHandle, ColliderSet, Isometry, Point, Vector};
 
-/// What is drawn.
+/// The parts that [`PbigBroadPhase::debug_render`] draws.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct DebugRenderParts {
-    /// The stored boxes, with their margins. Their hue tells the level of their grid: green, blue, violet, ...,
-    /// each grid of boxes at rest and of boxes that have moved from the start; grey for those that are tested against all others, or that no grid holds.
+    /// The stored AABBs, with their margins. The hue tells the level of the grid, from the finest on: green, blue, violet, ...;
+    /// boxes in no grid are grey.
     pub fat_boxes: bool,
-    /// The occupied cells of the grids. Their lightness tells how many boxes lie in one: white with eight or more.
+    /// The occupied cells of the grids. The lightness tells how many boxes lie in one: white for eight or more.
     pub cells: bool,
 }
 
@@ -21,48 +21,46 @@ impl DebugRenderParts {
     pub const ALL: Self = Self { fat_boxes: true, cells: true };
 }
 
-/// Alpha of boxes, and of the more numerous cells.
-const OPAQUE: [f32; 2] = [1.0, 0.5];
+/// The alpha of boxes and of cells, which are more numerous.
+const ALPHA: [f32; 2] = [1.0, 0.5];
 
 impl PbigBroadPhase {
-    /// Draws what the broad phase has stored, with lines, through the renderer that also draws rapier's own pictures.
-    /// Boxes and cells come as [`DebugRenderObject::ColliderAabb`], a cell with the first collider in it. There are cells
-    /// where the CPU searches with a grid; a few boxes, or all on a GPU, have none.
+    /// Draws the stored boxes and cells as lines, through the renderer that also draws rapier's own pictures. Each is passed as
+    /// a [`DebugRenderObject::ColliderAabb`], a cell with the first collider in it. There are no cells for few boxes, which
+    /// need no grid, and on a GPU.
     pub fn debug_render(
         &self,
         colliders: &ColliderSet,
         parts: DebugRenderParts,
         backend: &mut dyn DebugRenderBackend,
     ) {
-        let cells = self.finder.cells();
-        let mut levels = vec![None; self.roll.generations().len()];
+        let cells = self.core.cells();
+        let mut in_grid = vec![false; self.core.id_count() as usize];
         for cell in &cells {
-            cell.ids.iter().for_each(|&id| levels[id as usize] = Some(cell.level));
+            cell.ids.iter().for_each(|&id| in_grid[id as usize] = true);
             let first = cell.ids.iter().find_map(|&id| self.collider(colliders, id));
             if let (true, Some((handle, collider))) = (parts.cells, first) {
                 let lightness = 0.2 + 0.1 * (cell.ids.len().min(8) as f32);
-                draw(backend, (handle, collider), &cell.aabb, hsla(Some(cell.level), lightness, OPAQUE[1]));
+                draw(backend, (handle, collider), &cell.aabb, hsla(true, lightness, ALPHA[1]));
             }
         }
-        for (id, level) in levels.into_iter().enumerate().filter(|_| parts.fat_boxes) {
-            let aabb = self.finder.fat_aabb(id as u32);
+        for (id, in_grid) in in_grid.into_iter().enumerate().filter(|_| parts.fat_boxes) {
+            let aabb = self.core.fat_aabb(id as u32);
             if let (Some(aabb), Some(drawn)) = (aabb, self.collider(colliders, id as u32)) {
-                draw(backend, drawn, &aabb, hsla(level, 0.5, OPAQUE[0]));
+                draw(backend, drawn, &aabb, hsla(in_grid, 0.5, ALPHA[0]));
             }
         }
     }
 
     fn collider<'a>(&self, colliders: &'a ColliderSet, id: u32) -> Option<(ColliderHandle, &'a Collider)> {
-        let handle = self.roll.handle(id)?;
+        let handle = self.registry.handle(id)?;
         Some((handle, colliders.get(handle)?))
     }
 }
 
-fn hsla(level: Option<u32>, lightness: f32, alpha: f32) -> DebugColor {
-    match level {
-        Some(level) => [(120.0 + 75.0 * level as f32) % 360.0, 1.0, lightness, alpha],
-        None => [0.0, 0.0, lightness, alpha],
-    }
+/// Green for cells and the boxes in them, grey for boxes in no cell.
+fn hsla(in_grid: bool, lightness: f32, alpha: f32) -> DebugColor {
+    if in_grid { [120.0, 1.0, lightness, alpha] } else { [0.0, 0.0, lightness, alpha] }
 }
 
 fn draw(

@@ -25,51 +25,50 @@
 //! assert!((bodies[ball].translation().y - 0.5).abs() < 0.01, "the ball rests on the ground");
 //! ```
 //!
-//! What it reports is what rapier's own broad phase reports, less the pairs that rapier's narrow
-//! phase would throw away again: colliders of one body, kinds of bodies that do not collide, and
-//! groups that exclude each other. Events come in an order that depends on the scene alone.
+//! It reports the pairs that rapier's own broad phase reports, except those that rapier's narrow phase would discard: colliders
+//! of one body, types of bodies that do not collide, and groups that exclude each other. The order of events depends on the
+//! scene alone.
 //!
 //! | feature | adds |
 //! | --- | --- |
+//! | `parallel` (default) | several threads read the modified colliders, and search |
 //! | `gpu` | the GPU backend |
 //! | `serde` | `Serialize` and `Deserialize`, as rapier's `serde-serialize` |
 //! | `debug-render` | [`PbigBroadPhase::debug_render`], as rapier's |
-//! | `shadow` | [`PbigBroadPhase::with_shadow`]: rapier's own broad phase and brute force beside it |
+//! | `shadow` | [`PbigBroadPhase::with_shadow`]: rapier's own broad phase and brute force run beside it |
+//! | `unstable-study` | what studies and tests need; may change in any release |
 
-/// The programs in the README are tests.
+/// Runs the programs in the README as tests.
 #[cfg(doctest)]
 #[doc = include_str!("../../../README.md")]
 struct Readme;
 
 mod broad_phase;
 mod call;
+mod config;
 #[cfg(feature = "debug-render")]
 mod debug_render;
 mod events;
-mod look;
-mod news;
+mod listed;
 mod proxy;
 mod queries;
-mod roll;
+mod registry;
 mod scene_tree;
 #[cfg(feature = "shadow")]
 pub mod shadow;
 #[cfg(feature = "serde")]
 mod snapshot;
 mod stats;
-mod ulps;
 mod why;
 
 pub use broad_phase::PbigBroadPhase;
+pub use config::PbigConfig;
 #[cfg(feature = "debug-render")]
 pub use debug_render::DebugRenderParts;
-pub use events::HandleOrder;
-/// The finder, for the types of its settings and filters.
-pub use pbig_core;
 #[cfg(feature = "gpu")]
 pub use pbig_core::GpuFinder;
-pub use pbig_core::{Backend, Config, Report, Strategy};
+pub use pbig_core::{Backend, Error, Report};
+#[cfg(feature = "unstable-study")]
 pub use proxy::{collision_aabb, filter_of};
 pub use stats::{Stats, Totals};
-pub use ulps::widened_by_ulps;
 pub use why::Why;

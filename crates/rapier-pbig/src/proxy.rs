@@ -1,157 +1,51 @@
-//! From a collider to what the finder needs: its box and its filter. Both as rapier 0.27's own
-//! broad phase and narrow phase compute them.
+//! Computes the AABB and the filter of a collider, as rapier 0.27's own broad phase and narrow phase do.
 
 use crate::call::Call;
-use crate::news::News;
-use crate::roll::Roll;
-use crate::ulps::widened_by_ulps;
-use pbig_core::{Aabb, ProxyFilter, TestMode, prefetch};
+use pbig_core::{Aabb, ProxyFilter, TestMode};
 use rapier3d::prelude::{
     ActiveCollisionTypes, Collider, ColliderHandle, IntegrationParameters, Isometry, Point, Real, RigidBody,
     RigidBodySet, RigidBodyType, Shape, TypedShape,
 };
 
-/// What the finder is to be told about a collider.
+/// The state of a listed collider, as the core stores it.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Proxy {
+    /// Not in rapier's set.
     Gone,
+    /// It or its body is disabled.
     Disabled,
     Enabled(Aabb, ProxyFilter),
 }
 
-/// Colliders whose memory is asked for together. Most of the time goes into waiting for that of each collider and its
-/// body; asked for one by one, a processor waits for one or two at a time.
-pub(crate) const BLOCK: usize = 64;
-
-/// Colliders for which no memory is asked for ahead: to make room for a block took longer than to look at one.
-pub(crate) const FEW: usize = 8;
-
-/// A collider and its body, as far as they are there.
+/// A collider and its body, if they exist.
 pub(crate) type Fetched<'a> = (Option<&'a Collider>, Option<&'a RigidBody>);
 
-/// How far boxes reach beyond shapes, apart from contact skin and margin.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Growth {
-    /// Half the prediction distance.
-    pub(crate) reach: Real,
-    /// As in [`widened_by_ulps`].
-    pub(crate) ulps: u32,
-}
-
-impl Growth {
-    pub(crate) fn new(params: &IntegrationParameters, ulps: u32) -> Self {
-        Self { reach: params.prediction_distance() / 2.0, ulps }
-    }
-
-    /// From the box of a shape. Rapier's own to the bit without ulps; then there is nothing but this one comparison.
-    #[inline(always)]
-    pub(crate) fn of(self, aabb: &Aabb, collider: &Collider) -> Aabb {
-        let aabb = aabb.inflated(collider.contact_skin() + self.reach);
-        if self.ulps == 0 { aabb } else { widened_by_ulps(&aabb, collider.position(), self.ulps) }
-    }
-}
-
 impl<'a> Call<'a> {
-    /// The proxies of at most [`BLOCK`] colliders.
-    pub(crate) fn proxies(&self, growth: Growth, listed: &[ColliderHandle], out: &mut [Proxy]) {
-        let _span = tracing::debug_span!(target: "pbig", "proxies").entered();
-        let mut found = [(None, None); BLOCK];
-        if are_scattered(listed) {
-            self.fetch_scattered(listed, &mut found);
-        } else {
-            self.fetch_all(listed, &mut found);
-        }
-        for (proxy, found) in out.iter_mut().zip(found) {
-            *proxy = self.proxy(found, growth);
-        }
-    }
-
-    #[inline]
+    #[inline(always)]
     pub(crate) fn fetch(&self, handle: ColliderHandle) -> Fetched<'a> {
         let collider = self.colliders.get(handle);
-        (collider, self.body(collider))
-    }
-
-    /// The collider with an index; none if another one with it is on the roll. It is news if none is. What [`Call::proxy`]
-    /// reads of it is asked for: a tenth of an update of 100,000 colliders.
-    pub(crate) fn fetch_known(&self, index: u32, roll: &Roll, news: &News) -> Fetched<'a> {
-        let Some((collider, handle)) = self.colliders.get_unknown_gen(index) else { return (None, None) };
-        let known = roll.handle(index);
-        if known.is_none() {
-            news.note(index);
-        }
-        if known.is_some_and(|known| known != handle) {
-            return (None, None);
-        }
-        prefetch(&collider.position().translation);
-        let body = self.body(Some(collider));
-        ask_for_what_it_refers_to(&(Some(collider), body));
-        (Some(collider), body)
-    }
-
-    /// Of at most [`BLOCK`] colliders.
-    pub(crate) fn fetch_all(&self, listed: &[ColliderHandle], found: &mut [Fetched<'a>; BLOCK]) {
-        for (found, &handle) in found.iter_mut().zip(listed) {
-            found.0 = self.colliders.get(handle);
-        }
-        for found in &mut found[..listed.len()] {
-            found.1 = self.body(found.0);
-        }
-    }
-
-    /// The same of [`are_scattered`] ones, and asks for most of what [`Call::proxy`] reads: the collider, its shape, and the
-    /// beginning of its body.
-    pub(crate) fn fetch_scattered(&self, listed: &[ColliderHandle], found: &mut [Fetched<'a>; BLOCK]) {
-        for (found, &handle) in found.iter_mut().zip(listed) {
-            found.0 = self.colliders.get(handle);
-            if let Some(collider) = found.0 {
-                prefetch(collider.shared_shape());
-                prefetch(&collider.position().translation);
-                prefetch(&collider.user_data);
-            }
-        }
-        for found in &mut found[..listed.len()] {
-            found.1 = self.body(found.0);
-            ask_for_what_it_refers_to(found);
-        }
-    }
-
-    fn body(&self, collider: Option<&Collider>) -> Option<&'a RigidBody> {
-        collider.and_then(Collider::parent).and_then(|handle| self.bodies.get(handle))
+        (collider, collider.and_then(|collider| parent_of(self.bodies, collider)))
     }
 
     #[inline(always)]
-    pub(crate) fn proxy(&self, (collider, body): Fetched<'_>, growth: Growth) -> Proxy {
+    pub(crate) fn proxy(&self, (collider, body): Fetched<'_>) -> Proxy {
         match collider {
             None => Proxy::Gone,
             Some(collider) if !collider.is_enabled() => Proxy::Disabled,
             Some(collider) => {
-                Proxy::Enabled(aabb_of(self.params.dt, growth, body, collider), filter_with(body, collider))
+                Proxy::Enabled(aabb_of(self.params, body, collider), filter_with(body, collider))
             }
         }
     }
 }
 
-#[inline(always)]
-fn ask_for_what_it_refers_to((collider, body): &Fetched<'_>) {
-    collider.iter().for_each(|collider| prefetch(collider.shape()));
-    body.iter().for_each(|body| prefetch(*body));
-}
-
-/// Whether the memory of these colliders lies so far apart that a processor does not fetch that of the next one by itself.
-pub(crate) fn are_scattered(listed: &[ColliderHandle]) -> bool {
-    let [first, .., last] = listed else { return false };
-    let range = first.into_raw_parts().0.abs_diff(last.into_raw_parts().0);
-    listed.len() > FEW && range as usize > 4 * listed.len()
-}
-
-/// The box of a collider in which it may touch another during this step: its shape, half the
-/// prediction distance and its contact skin; with soft CCD, also where it is predicted to be.
+/// Returns the AABB in which a collider may touch another one during this step: its shape, half the prediction distance and
+/// its contact skin; with soft CCD, also the AABB at the predicted pose.
 ///
-/// Without the change margin, which is the finder's, and not [`widened_by_ulps`]. A pose with a NaN gives an invalid
-/// box, which pairs with nothing.
+/// The margin is not included. A pose with a NaN gives an invalid AABB, which pairs with nothing.
+#[cfg(feature = "unstable-study")]
 pub fn collision_aabb(params: &IntegrationParameters, bodies: &RigidBodySet, collider: &Collider) -> Aabb {
-    aabb_of(params.dt, Growth::new(params, 0), parent_of(bodies, collider), collider)
+    aabb_of(params, parent_of(bodies, collider), collider)
 }
 
 fn parent_of<'a>(bodies: &'a RigidBodySet, collider: &Collider) -> Option<&'a RigidBody> {
@@ -159,19 +53,19 @@ fn parent_of<'a>(bodies: &'a RigidBodySet, collider: &Collider) -> Option<&'a Ri
 }
 
 #[inline(always)]
-fn aabb_of(dt: Real, growth: Growth, parent: Option<&RigidBody>, collider: &Collider) -> Aabb {
+fn aabb_of(params: &IntegrationParameters, parent: Option<&RigidBody>, collider: &Collider) -> Aabb {
     let mut aabb = shape_aabb(collider.shape(), collider.position());
     if let Some(body) = parent.filter(|body| body.soft_ccd_prediction() > 0.0)
-        && let Some(then) = predicted_aabb(dt, body, collider)
+        && let Some(then) = predicted_aabb(params.dt, body, collider)
     {
         aabb = union(&aabb, &then);
     }
-    growth.of(&aabb, collider)
+    aabb.inflated(collider.contact_skin() + params.prediction_distance() / 2.0)
 }
 
 #[inline(always)]
 fn shape_aabb(shape: &dyn Shape, pose: &Isometry<Real>) -> Aabb {
-    // What the shape does itself, but inlined: a result that comes by memory is waited for.
+    // As `Shape::compute_aabb`, but inlined: a virtual call returns the box through memory, which costs a wait.
     let aabb = match shape.as_typed_shape() {
         TypedShape::Cuboid(cuboid) => cuboid.aabb(pose),
         TypedShape::Ball(ball) => ball.aabb(pose),
@@ -180,12 +74,11 @@ fn shape_aabb(shape: &dyn Shape, pose: &Isometry<Real>) -> Aabb {
     Aabb::new(aabb.mins.coords.into(), aabb.maxs.coords.into())
 }
 
-/// Where soft CCD expects the collider after `dt`, at most its prediction distance away.
+/// Returns the AABB where soft CCD expects the collider after `dt`, at most its prediction distance away.
 ///
-/// Rapier's clamped prediction is private. Below the distance the public one is the same. Beyond,
-/// the path of the centre of mass is cut off at the distance, which is exact, and the orientation
-/// there, which is not known, is covered by a ball around it: conservative, and never larger than a
-/// ball. (A union with the unclamped pose alone can miss a collider that spins.)
+/// Rapier's clamped prediction is private. Up to the distance, the public prediction is the same. Beyond it, the path of the
+/// centre of mass is cut off at the distance, which is exact. The orientation there is not known, so the AABB encloses the
+/// shape's bounding sphere in every orientation. (A union with the unclamped pose alone can miss a collider that spins.)
 #[cold]
 fn predicted_aabb(dt: Real, body: &RigidBody, collider: &Collider) -> Option<Aabb> {
     let pose_in_body = collider.position_wrt_parent()?;
@@ -199,7 +92,7 @@ fn predicted_aabb(dt: Real, body: &RigidBody, collider: &Collider) -> Option<Aab
     let sphere = collider.shape().compute_bounding_sphere(collider.position());
     let radius = sphere.radius + (sphere.center - center).norm();
     let end: Point<Real> = center + path * (farthest / length);
-    // For the rounding of the norm and of rapier's own clamping, and of positions far from the origin.
+    // Covers the rounding of the norm, of rapier's own clamping, and of positions far from the origin.
     let rounding = 1e-5 * farthest + 4.0 * Real::EPSILON * center.coords.amax();
     Some(Aabb::from_center(end.coords.into(), [radius + rounding; 3]))
 }
@@ -211,8 +104,9 @@ fn union(a: &Aabb, b: &Aabb) -> Aabb {
     )
 }
 
-/// Rapier's early filters for a collider: parent body, body type against active collision types,
-/// collision groups. What stock's narrow phase tests before it computes contacts, nothing else.
+/// Returns the filters that rapier's narrow phase applies before it computes contacts: parent body, body type against active
+/// collision types, collision groups.
+#[cfg(feature = "unstable-study")]
 pub fn filter_of(bodies: &RigidBodySet, collider: &Collider) -> ProxyFilter {
     filter_with(parent_of(bodies, collider), collider)
 }
@@ -236,8 +130,8 @@ fn kind_bit(kind: RigidBodyType) -> u8 {
     1 << kind as u8
 }
 
-/// The kinds that a collider on a body of this kind may meet. Rapier's table has four bits for each kind, and tests
-/// both ways: a row of it and a column.
+/// Returns the kinds that a collider on a body of this kind may pair with. Rapier's table has four bits for each kind and is
+/// tested both ways: one row and one column.
 fn accepted_kinds(kind: RigidBodyType, types: ActiveCollisionTypes) -> u8 {
     let table = types.bits();
     let row = table >> (4 * kind as u32);
@@ -249,17 +143,6 @@ fn accepted_kinds(kind: RigidBodyType, types: ActiveCollisionTypes) -> u8 {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn colliders_far_from_each_other_are_scattered_unless_they_are_few() {
-        let listed = |count: u32, step: u32| -> Vec<ColliderHandle> {
-            (0..count).map(|i| ColliderHandle::from_raw_parts(7 + i * step, 0)).collect()
-        };
-        let backwards: Vec<ColliderHandle> = listed(64, 5).into_iter().rev().collect();
-        assert!(are_scattered(&listed(64, 5)) && are_scattered(&backwards));
-        assert!(!are_scattered(&listed(64, 4)) && !are_scattered(&listed(FEW as u32, 1000)));
-        assert!(!are_scattered(&[]) && !are_scattered(&listed(1, 1)));
-    }
 
     #[test]
     fn accepted_kinds_are_those_that_rapier_tests() {

@@ -1,4 +1,4 @@
-//! Scene queries, as rapier's own broad phase offers them.
+//! Offers scene queries, as rapier's own broad phase does.
 
 use crate::PbigBroadPhase;
 use rapier3d::parry::partitioning::Bvh;
@@ -6,11 +6,11 @@ use rapier3d::parry::query::QueryDispatcher;
 use rapier3d::prelude::{ColliderSet, QueryFilter, QueryPipeline, QueryPipelineMut, RigidBodySet};
 
 impl PbigBroadPhase {
-    /// Rapier's [`QueryPipeline`] for ray casts, shape casts, projections and intersections, with the colliders as
-    /// the last update saw them: as `DefaultBroadPhase::as_query_pipeline`.
+    /// Returns rapier's [`QueryPipeline`] for ray casts, shape casts, projections and intersections. It sees the colliders as
+    /// they were in the last update. The counterpart of `DefaultBroadPhase::as_query_pipeline`.
     ///
-    /// The tree behind it is built by the first call (10,000 colliders: 4.3 ms) and brought up to date by the first call
-    /// after an update that changed something (0.9 ms while they fall). An app that never calls this never pays for it.
+    /// The first call builds a tree (10,000 colliders: 4.3 ms). The first call after an update that changed something updates
+    /// the tree (0.9 ms while they fall). An app that never calls this function never pays for it.
     ///
     /// ```
     /// use rapier3d::parry::query::DefaultQueryDispatcher;
@@ -38,7 +38,7 @@ impl PbigBroadPhase {
         QueryPipeline { dispatcher, bvh: self.bvh(), bodies, colliders, filter }
     }
 
-    /// As [`PbigBroadPhase::as_query_pipeline`], with sets that the caller may change meanwhile.
+    /// As [`PbigBroadPhase::as_query_pipeline`], for sets that the caller changes.
     pub fn as_query_pipeline_mut<'a>(
         &'a self,
         dispatcher: &'a dyn QueryDispatcher,
@@ -50,6 +50,6 @@ impl PbigBroadPhase {
     }
 
     fn bvh(&self) -> &Bvh {
-        self.tree.get(self.roll.generations().len() as u32, |id| self.finder.fat_aabb(id))
+        self.tree.get(self.core.id_count(), |id| self.core.fat_aabb(id))
     }
 }

@@ -1,8 +1,8 @@
-//! The tree for scene queries: built when first asked for, kept up to date only while it is used.
+//! The tree for scene queries. The first query builds it; it is updated only while queries use it.
 //!
-//! Rapier's queries walk a parry `Bvh` of collider indices. Its own broad phase is one; ours has none, so the
-//! boxes go into one when a query wants it. An update only notes which boxes have changed since, and only while
-//! there is a tree; the next query brings it up to date, or builds it anew when too much has changed.
+//! Rapier's queries walk a parry `Bvh` of collider indices. Rapier's own broad phase is such a tree; ours has grids, so it
+//! builds the tree for queries. While there is a tree, each update notes which boxes change. The next query updates the tree,
+//! or rebuilds it if too many boxes changed.
 
 use pbig_core::Aabb;
 use rapier3d::parry::bounding_volume::Aabb as TreeAabb;
@@ -12,9 +12,9 @@ use std::sync::{Mutex, OnceLock, PoisonError};
 
 #[derive(Debug, Default)]
 pub(crate) struct SceneTree {
-    /// Up to date.
+    /// The tree, if it is up to date.
     current: OnceLock<Tree>,
-    /// Up to date at the last query.
+    /// The tree as of the last query, if boxes have changed since.
     stale: Mutex<Option<Stale>>,
 }
 
@@ -30,7 +30,7 @@ impl std::fmt::Debug for Tree {
     }
 }
 
-/// A tree, and the ids of boxes that have changed since, perhaps repeatedly.
+/// A tree, and the ids of boxes that have changed since. An id may occur several times.
 #[derive(Debug)]
 struct Stale {
     tree: Tree,
@@ -38,15 +38,15 @@ struct Stale {
 }
 
 impl Clone for SceneTree {
-    /// The clone builds its own when asked.
+    /// Returns an empty tree: the clone builds its own for its first query.
     fn clone(&self) -> Self {
         Self::default()
     }
 }
 
 impl SceneTree {
-    /// Notes the boxes, of `boxes` in all, that an update changes. When more have changed since the last query than
-    /// there are, nobody seems to use the tree, and building it costs little more than bringing it up to date.
+    /// Notes the boxes, of `boxes` in all, that an update changes. The tree is dropped once more boxes have changed since the
+    /// last query than there are: a rebuild then costs little more than an update, and perhaps there are no more queries.
     pub(crate) fn note(&mut self, changed: impl Iterator<Item = u32>, boxes: usize) {
         let mut changed = changed.peekable();
         if changed.peek().is_none() {
@@ -64,13 +64,13 @@ impl SceneTree {
         }
     }
 
-    /// Whether there is a tree to keep up to date.
+    /// Returns true if there is a tree to keep up to date.
     pub(crate) fn is_used(&mut self) -> bool {
         let stale = self.stale.get_mut().unwrap_or_else(PoisonError::into_inner);
         self.current.get().is_some() || stale.is_some()
     }
 
-    /// The tree of the boxes with ids below `ids`.
+    /// Returns the tree of the boxes with ids below `ids`.
     pub(crate) fn get(&self, ids: u32, aabb: impl Fn(u32) -> Option<Aabb>) -> &Bvh {
         let make = || match self.stale.lock().unwrap_or_else(PoisonError::into_inner).take() {
             Some(stale) => stale.updated(ids, aabb),
@@ -81,8 +81,8 @@ impl SceneTree {
 }
 
 impl Stale {
-    /// Removals first: they read the boxes of a leaf's ancestors. They leave nodes behind, which parry 0.22's optimiser
-    /// may take for leaves; refitting drops them, but not in a tree of one or two leaves.
+    /// Removes first, because a removal reads the boxes of a leaf's ancestors. It leaves nodes behind that parry 0.22's optimiser
+    /// may take for leaves. Refitting drops these nodes, except in a tree of one or two leaves.
     fn updated(self, ids: u32, aabb: impl Fn(u32) -> Option<Aabb>) -> Tree {
         let Self { mut tree, mut changed } = self;
         changed.sort_unstable();
@@ -123,7 +123,7 @@ impl Tree {
     }
 }
 
-/// Infinite boxes as rapier's half-spaces have them: the tree computes centres.
+/// Clamps infinite boxes to the size of rapier's half-spaces, because the tree computes centres.
 fn tree_aabb(aabb: &Aabb) -> TreeAabb {
     let corner = |corner: [f32; 3]| Point::from(corner.map(|x| x.clamp(Real::MIN / 2.0, Real::MAX / 2.0)));
     TreeAabb::new(corner(aabb.min), corner(aabb.max))
@@ -137,7 +137,7 @@ mod tests {
         Some(Aabb::from_center([x, 0.0, 0.0], [0.4; 3]))
     }
 
-    /// Ids of boxes at `x`, in order.
+    /// Returns the ids of the boxes at `x`, in ascending order.
     fn at(bvh: &Bvh, x: f32) -> Vec<u32> {
         let point = TreeAabb::new(Point::new(x, 0.0, 0.0), Point::new(x, 0.0, 0.0));
         let mut ids: Vec<u32> = bvh.intersect_aabb(&point).collect();
@@ -158,7 +158,7 @@ mod tests {
                     assert!(at(bvh, center).contains(&id), "{n} boxes, round {round}: {id} at {center}");
                 }
                 assert_eq!(bvh.leaf_count() as usize, boxes.iter().flatten().count());
-                // One goes or comes back, one moves; in some rounds all do, or all but one or two go.
+                // One box goes or comes back and one moves. In some rounds all move, or all but one or two go.
                 let mut changed = vec![round * 7 % n.max(1), round * 3 % n.max(1)];
                 if round % 10 == 9 {
                     changed.extend(0..n);

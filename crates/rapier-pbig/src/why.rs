@@ -1,44 +1,44 @@
-//! Why two colliders are a pair, or are none.
+//! Explains why two colliders are a pair or not.
 
 use crate::PbigBroadPhase;
 use pbig_core::{Pair, ProxyFilter};
-use rapier3d::prelude::ColliderHandle;
+use rapier3d::prelude::{ColliderHandle, Group, InteractionGroups, RigidBodyType};
 use std::fmt;
 
-/// Whether a pair of colliders is reported and, if not, the first test that ended it. Its `Display` says it in words.
+/// The reason why two colliders are a pair, or the first test that they fail. `Display` puts it in words.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub enum Why {
-    /// The narrow phase has been told of the pair. Whether the shapes touch is its business.
+    /// The pair was reported to the narrow phase, which finds out whether the shapes touch.
     Reported,
     /// Both handles are the same.
     SameCollider,
-    /// The broad phase has never heard of this collider, or has been told that it is gone. One that was
-    /// inserted since the last step is heard of in the next.
+    /// The broad phase does not know this collider, or rapier removed it. A collider that was inserted since the last step
+    /// becomes known in the next one.
     Unknown(ColliderHandle),
     /// The collider or its body is disabled.
     Disabled(ColliderHandle),
-    /// The box of this collider has a NaN, or a lower corner above the upper one.
+    /// The AABB of this collider has a NaN, or a lower corner above the upper one.
     InvalidBox(ColliderHandle),
-    /// The boxes, with the margins, are apart.
+    /// The AABBs, with their margins, do not overlap.
     Apart {
-        /// The axis on which they are furthest apart: 0, 1 or 2.
+        /// The axis with the largest gap: 0, 1 or 2.
         axis: usize,
-        /// The gap between them there, in the world's length unit.
+        /// The gap on that axis, in the world's length unit.
         gap: f32,
     },
     /// Both belong to one body.
     SameBody,
     /// Neither collider's `ActiveCollisionTypes` accept the other's type of body.
-    Kinds([ProxyFilter; 2]),
+    BodyTypes([RigidBodyType; 2]),
     /// The collision groups exclude each other.
-    Groups([ProxyFilter; 2]),
-    /// Nothing speaks against the pair, but it has not been searched for since one of the two changed: the last
-    /// update failed, or there was none.
+    Groups([InteractionGroups; 2]),
+    /// The two may be a pair, but no update succeeded since one of them changed.
     NotYet,
 }
 
 impl PbigBroadPhase {
-    /// Whether the last update left these two as a pair, and if not, which test ended it.
+    /// Returns why these two colliders are a pair since the last update, or the first test that they fail.
     ///
     /// ```
     /// use rapier3d::prelude::*;
@@ -50,7 +50,7 @@ impl PbigBroadPhase {
     /// let handles = [0.0, 0.9, 5.0].map(|x| colliders.insert(ball(x)));
     /// let params = IntegrationParameters::default();
     /// broad_phase.update(&params, &colliders, &bodies, &handles, &[], &mut Vec::new());
-    /// assert!(matches!(broad_phase.why(handles[0], handles[1]), Why::Kinds(_)), "both are fixed");
+    /// assert!(matches!(broad_phase.why(handles[0], handles[1]), Why::BodyTypes(_)), "both are fixed");
     /// let why = broad_phase.why(handles[0], handles[2]);
     /// assert_eq!(why.to_string(), "not reported: the boxes are 3.978 apart on the x axis");
     /// ```
@@ -62,39 +62,39 @@ impl PbigBroadPhase {
         obstacle.unwrap_or_else(|| self.why_not(one.into_raw_parts().0, other.into_raw_parts().0))
     }
 
-    /// What keeps a collider from any pair.
+    /// Returns the reason why a collider is in no pair at all.
     fn obstacle(&self, handle: ColliderHandle) -> Option<Why> {
         let id = handle.into_raw_parts().0;
-        if !self.roll.has(handle) {
+        if !self.registry.contains(handle) {
             Some(Why::Unknown(handle))
-        } else if !self.finder.contains(id) {
+        } else if !self.core.contains(id) {
             Some(Why::Disabled(handle))
-        } else if self.finder.fat_aabb(id).is_none() {
+        } else if self.core.fat_aabb(id).is_none() {
             Some(Why::InvalidBox(handle))
         } else {
             None
         }
     }
 
-    /// For two different colliders that may have pairs.
+    /// Explains two different colliders that may be in pairs.
     fn why_not(&self, a: u32, b: u32) -> Why {
-        if self.finder.has_pair(Pair::new(a, b)) {
+        if self.core.has_pair(Pair::new(a, b)) {
             return Why::Reported;
         }
         if let Some((axis, gap)) = self.gap(a, b) {
             return Why::Apart { axis, gap };
         }
-        match [a, b].map(|id| self.finder.filter(id).copied().unwrap_or_default()) {
+        match [a, b].map(|id| self.core.filter(id).copied().unwrap_or_default()) {
             [x, y] if !x.bodies_allow(&y) => Why::SameBody,
-            both @ [x, y] if !x.kinds_allow(&y) => Why::Kinds(both),
-            both @ [x, y] if !x.groups_allow(&y) => Why::Groups(both),
+            both @ [x, y] if !x.kinds_allow(&y) => Why::BodyTypes(both.map(|filter| body_type(&filter))),
+            both @ [x, y] if !x.groups_allow(&y) => Why::Groups(both.map(|filter| groups(&filter))),
             _ => Why::NotYet,
         }
     }
 
-    /// The axis on which two boxes are furthest apart, if there is one, and by how much.
+    /// Returns the axis with the largest gap between two AABBs, and the gap, unless they overlap.
     fn gap(&self, a: u32, b: u32) -> Option<(usize, f32)> {
-        let (a, b) = (self.finder.fat_aabb(a)?, self.finder.fat_aabb(b)?);
+        let (a, b) = (self.core.fat_aabb(a)?, self.core.fat_aabb(b)?);
         let gaps = (0..3).map(|k| (k, (a.min[k] - b.max[k]).max(b.min[k] - a.max[k])));
         // Between equal infinities a gap is NaN.
         let (axis, gap) = gaps.filter(|(_, gap)| !gap.is_nan()).max_by(|x, y| x.1.total_cmp(&y.1))?;
@@ -108,7 +108,6 @@ impl fmt::Display for Why {
             return write!(f, "reported: the boxes overlap and no filter excludes the pair");
         }
         write!(f, "not reported: ")?;
-        let both = |bits: fn(&ProxyFilter) -> u32, filters: &[ProxyFilter; 2]| filters.map(|one| bits(&one));
         match self {
             Self::Reported => Ok(()),
             Self::SameCollider => write!(f, "both handles are the same"),
@@ -123,13 +122,13 @@ impl fmt::Display for Why {
                 write!(f, "the boxes are {gap:.3} apart on the {} axis", ["x", "y", "z"][axis % 3])
             }
             Self::SameBody => write!(f, "both belong to one body"),
-            Self::Kinds(filters) => {
-                let [a, b] = both(|one| one.kind.trailing_zeros(), filters).map(kind_name);
+            Self::BodyTypes(types) => {
+                let [a, b] = types.map(name_of);
                 write!(f, "a {a} and a {b} body do not collide with these ActiveCollisionTypes")
             }
-            Self::Groups(filters) => {
-                let [a, b] = both(|one| one.memberships, filters);
-                let [c, d] = both(|one| one.mask, filters);
+            Self::Groups(groups) => {
+                let [a, b] = groups.map(|one| one.memberships.bits());
+                let [c, d] = groups.map(|one| one.filter.bits());
                 write!(f, "groups exclude each other: {a:#x} that meets {c:#x}, {b:#x} that meets {d:#x}")
             }
             Self::NotYet => write!(f, "no update since one of them changed"),
@@ -137,10 +136,26 @@ impl fmt::Display for Why {
     }
 }
 
-/// In the order of rapier's `RigidBodyType`.
-fn kind_name(kind: u32) -> &'static str {
-    ["dynamic", "fixed", "position-based kinematic", "velocity-based kinematic"]
-        .get(kind as usize)
-        .copied()
-        .unwrap_or("unknown")
+fn name_of(body_type: RigidBodyType) -> &'static str {
+    match body_type {
+        RigidBodyType::Dynamic => "dynamic",
+        RigidBodyType::Fixed => "fixed",
+        RigidBodyType::KinematicPositionBased => "position-based kinematic",
+        RigidBodyType::KinematicVelocityBased => "velocity-based kinematic",
+    }
+}
+
+/// Returns the type of body whose bit `proxy::filter_of` has set.
+fn body_type(filter: &ProxyFilter) -> RigidBodyType {
+    match filter.kind.trailing_zeros() {
+        0 => RigidBodyType::Dynamic,
+        2 => RigidBodyType::KinematicPositionBased,
+        3 => RigidBodyType::KinematicVelocityBased,
+        _ => RigidBodyType::Fixed,
+    }
+}
+
+fn groups(filter: &ProxyFilter) -> InteractionGroups {
+    let [memberships, mask] = [filter.memberships, filter.mask].map(Group::from_bits_retain);
+    InteractionGroups { memberships, filter: mask }
 }

@@ -4,11 +4,9 @@
 //! The suite plays the same ones each time, on the CPU about 100,000; with `PROPTEST_CASES=6300` about a million new
 //! ones.
 
-mod kind;
 mod ops;
 
-use crate::checked::{on_cpu, on_gpu};
-use kind::Kind;
+use crate::checked::{on_cpu, on_gpu, pbig};
 use ops::{Op, any_op, apply};
 use pbig_core::Config;
 use pbig_harness::shadow::Shadowed;
@@ -49,15 +47,15 @@ struct Subject {
 }
 
 impl Subject {
-    fn new(kind: Kind, plant: Plant) -> Self {
-        Self { pbig: kind.pbig(), plant, boxes: HashMap::new(), busy: false }
+    fn new(config: Config, plant: Plant) -> Self {
+        Self { pbig: pbig(config), plant, boxes: HashMap::new(), busy: false }
     }
 
     /// Goes on with what was saved.
-    fn restore(&mut self, kind: Kind) {
+    fn restore(&mut self, config: Config) {
         let bytes = postcard::to_stdvec(&self.pbig).expect("a broad phase can be saved");
         self.pbig = match self.plant {
-            Plant::Forgets => kind.pbig(),
+            Plant::Forgets => pbig(config),
             _ => postcard::from_bytes(&bytes).expect("these are the bytes of a broad phase"),
         };
     }
@@ -179,17 +177,17 @@ impl Outcome {
 struct Scene {
     world: World,
     broad_phase: Shadowed<Subject>,
-    kind: Kind,
+    config: Config,
     tally: Tally,
 }
 
 impl Scene {
-    fn new(kind: Kind, plant: Plant) -> Self {
+    fn new(config: Config, plant: Plant) -> Self {
         let mut world = World::with_gravity(glam::Vec3::ZERO);
         // With CCD, calls between the two of a step, for a part of it.
         world.params.max_ccd_substeps = 3;
-        let broad_phase = Shadowed::new(Subject::new(kind, plant), kind.margin());
-        Self { world, broad_phase, kind, tally: Tally { runs: 1, ..Tally::default() } }
+        let broad_phase = Shadowed::new(Subject::new(config, plant), config.margin);
+        Self { world, broad_phase, config, tally: Tally { runs: 1, ..Tally::default() } }
     }
 
     fn play(&mut self, op: Op) -> Result<(), End> {
@@ -198,11 +196,11 @@ impl Scene {
             Op::Step(steps) => return (0..steps).try_for_each(|_| self.step()),
             Op::Snapshot => {
                 self.restore_world();
-                self.broad_phase.inner.restore(self.kind);
+                self.broad_phase.inner.restore(self.config);
             }
             Op::Fresh(adopts) => {
                 self.restore_world();
-                let mut fresh = self.kind.pbig();
+                let mut fresh = pbig(self.config);
                 if adopts {
                     fresh.adopt(&self.world.narrow_phase);
                 }
@@ -255,8 +253,8 @@ impl Scene {
 }
 
 /// Plays the operations and another step, so that the last one is seen too; or says what was wrong.
-fn run(ops: &[Op], kind: Kind, plant: Plant) -> Result<Outcome, String> {
-    let mut scene = Scene::new(kind, plant);
+fn run(ops: &[Op], config: Config, plant: Plant) -> Result<Outcome, String> {
+    let mut scene = Scene::new(config, plant);
     match ops.iter().copied().chain([Op::Step(1)]).try_for_each(|op| scene.play(op)) {
         Ok(()) => Ok(scene.outcome()),
         Err(End::Wrong(what)) => Err(what),
@@ -331,13 +329,13 @@ fn on_random_ops(cases: u32, test: impl Fn(&[Op]) -> Result<Outcome, String>) ->
 fn random_worlds_agree_with_stock_and_the_oracle() {
     let [cpu, grid] = on_cpu();
     let [on_cpu, on_grid] =
-        [cpu, grid].map(|config| on_random_ops(700, |ops| run(ops, config.into(), Plant::Nothing)));
+        [cpu, grid].map(|config| on_random_ops(700, |ops| run(ops, config, Plant::Nothing)));
     let tally = on_cpu.plus(on_grid);
     tally.assert_that_much_happened();
     assert!(tally.ops >= 100_000 || std::env::var_os("PROPTEST_CASES").is_some(), "{tally:?}");
     for (_, config) in asked().into_iter().take(3) {
         let config = Config { margin: cpu.margin, ..config };
-        on_random_ops(100, |ops| run(ops, config.into(), Plant::Nothing)).assert_that_much_happened();
+        on_random_ops(100, |ops| run(ops, config, Plant::Nothing)).assert_that_much_happened();
     }
 }
 
@@ -345,8 +343,8 @@ fn random_worlds_agree_with_stock_and_the_oracle() {
 fn random_worlds_on_a_gpu_agree_too_and_have_the_bits_of_the_cpu() {
     needs_gpu!();
     let tally = on_random_ops(20, |ops| {
-        let found = run(ops, on_gpu().into(), Plant::Nothing)?;
-        found.compare(&run(ops, on_cpu()[0].into(), Plant::Nothing)?)?;
+        let found = run(ops, on_gpu(), Plant::Nothing)?;
+        found.compare(&run(ops, on_cpu()[0], Plant::Nothing)?)?;
         Ok(found)
     });
     tally.assert_that_much_happened();
@@ -354,17 +352,14 @@ fn random_worlds_on_a_gpu_agree_too_and_have_the_bits_of_the_cpu() {
 
 #[test]
 fn a_snapshot_anywhere_continues_bit_identically() {
-    snapshots_continue(60, on_cpu()[0].into());
-}
-
-fn snapshots_continue(cases: u32, kind: Kind) {
-    let tally = on_random_ops(cases, |ops| {
+    let config = on_cpu()[0];
+    let tally = on_random_ops(60, |ops| {
         // A fresh broad phase has other fat boxes than one that was there all along, so other pairs.
         let saved = |op: &Op| if matches!(op, Op::Fresh(_)) { Op::Snapshot } else { *op };
         let ops: Vec<Op> = ops.iter().map(saved).collect();
         let kept: Vec<Op> = ops.iter().copied().filter(|op| !matches!(op, Op::Snapshot)).collect();
-        let with = run(&ops, kind, Plant::Nothing)?;
-        with.compare(&run(&kept, kind, Plant::Nothing)?)?;
+        let with = run(&ops, config, Plant::Nothing)?;
+        with.compare(&run(&kept, config, Plant::Nothing)?)?;
         Ok(with)
     });
     tally.assert_that_much_happened();
@@ -373,7 +368,7 @@ fn snapshots_continue(cases: u32, kind: Kind) {
 #[test]
 fn planted_faults_are_noticed_and_shrink_to_a_few_operations() {
     for plant in [Plant::RoomForTwo, Plant::OnlyMoved, Plant::Forgets] {
-        let failing = |ops: &[Op]| run(ops, on_cpu()[0].into(), plant).map(|_| ());
+        let failing = |ops: &[Op]| run(ops, on_cpu()[0], plant).map(|_| ());
         let (why, ops) = try_random_ops(100, &failing).expect_err("the fault is noticed");
         println!("{plant:?}: {why}\n{}", listed(&ops));
         assert!(ops.len() <= 6, "{plant:?} needs {} operations:\n{}", ops.len(), listed(&ops));

@@ -7,7 +7,7 @@ use pbig_harness::shadow::Shadowed;
 use pbig_harness::world::World;
 use rand::rngs::StdRng;
 use rand::{RngExt, SeedableRng};
-use rapier_pbig::PbigBroadPhase;
+use rapier_pbig::{PbigBroadPhase, PbigConfig};
 use rapier3d::prelude::*;
 use std::collections::VecDeque;
 
@@ -113,8 +113,7 @@ fn soak_of_a_rapier_world_that_comes_and_goes() {
         let steps = steps();
         let mut tray = Tray::new();
         let weighed = Weighed { inner: PbigBroadPhase::new(), bytes: 0 };
-        let mut broad_phase =
-            Shadowed::new(weighed, PbigBroadPhase::CONFIG.margin).every((steps / 5000).max(1));
+        let mut broad_phase = Shadowed::new(weighed, PbigConfig::DEFAULT.margin).every((steps / 5000).max(1));
         let mut early = 0;
         for step in 0..steps {
             tray.churn(step);

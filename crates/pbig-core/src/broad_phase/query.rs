@@ -2,7 +2,7 @@
 
 use super::{BroadPhase, Events};
 use crate::report::Report;
-use crate::{Aabb, Config, Pair, ProxyFilter};
+use crate::{Aabb, Config, OccupiedCell, Pair, ProxyFilter};
 
 impl BroadPhase {
     /// Returns the settings in force.
@@ -91,7 +91,13 @@ impl BroadPhase {
         !self.world.was_removed(pair.a) && !self.world.was_removed(pair.b)
     }
 
-    /// Yields the ids of all stored (fat) boxes that overlap a box, in no particular order. Filters are not asked.
+    /// Returns the cells of the grid in which boxes lie, for a picture of them; none where the last update needed no grid,
+    /// or ran on a GPU. Takes time and memory in proportion to the cells.
+    pub fn cells(&self) -> Vec<OccupiedCell> {
+        if self.has_grid { self.grid.occupied_cells() } else { Vec::new() }
+    }
+
+    /// Returns the ids of all stored (fat) boxes that overlap a box, in no particular order. Filters are not asked.
     ///
     /// ```
     /// use pbig_core::{Aabb, BroadPhase, ProxyFilter};

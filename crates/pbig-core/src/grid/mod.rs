@@ -14,6 +14,7 @@ mod cells;
 mod edit;
 mod hits;
 mod lookup;
+mod occupied;
 mod oversize;
 mod plan;
 mod record;
@@ -28,6 +29,7 @@ pub(crate) use simd::{BLOCK, EightBoxes, Kernel, Simd, dispatch, prefetch};
 pub use simd::simd;
 pub(crate) use hits::{Hits, Rule};
 pub(crate) use lookup::{Candidates, Meet, Place};
+pub use occupied::OccupiedCell;
 pub(crate) use oversize::brute_force;
 
 use build::Counts;

@@ -4,11 +4,13 @@ mod layout;
 mod pairs;
 mod plain;
 mod shape;
+mod ulps;
 mod world;
 
 pub use layout::{Layout, to_f32, to_f64};
 pub use pairs::{Differences, Truth, pairs};
 pub use shape::aabb;
+pub use ulps::widened_by_ulps;
 pub use world::{WideWorld, moved};
 
 use pbig_core::Aabb;

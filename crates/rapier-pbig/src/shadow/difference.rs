@@ -1,37 +1,37 @@
-//! What a checker found wrong, in words.
+//! Describes what a checker found wrong.
 
 use pbig_core::Aabb;
 use rapier3d::prelude::*;
 use std::fmt;
 use std::path::PathBuf;
 
-/// What is wrong with a pair.
+/// The fault of a pair.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Fault {
-    /// Boxes overlap and filters allow the pair, but it was not reported.
+    /// The AABBs overlap and the filters allow the pair, but it was not reported.
     Missing,
-    /// Only stock reports it, and parry finds a contact within the prediction distance.
+    /// Only stock reports the pair, and parry finds a contact within the prediction distance.
     MissingContact,
-    /// Reported, although the boxes are further apart than the margins, or a filter excludes it, or
-    /// a collider is gone or disabled.
+    /// The pair was reported, although the AABBs are further apart than the margins, a filter excludes the pair, or a collider
+    /// is removed or disabled.
     Spurious,
-    /// `AddPair` for a pair that is there.
+    /// An `AddPair` for a pair that the narrow phase has.
     AddedTwice,
-    /// `DeletePair` for a pair that is not there.
+    /// A `DeletePair` for a pair that the narrow phase does not have.
     DeletedUnknown,
-    /// Deleted and added in one call: the narrow phase would lose the pair's contacts.
+    /// The pair was deleted and added in one call: the narrow phase would lose its contacts.
     Flickered,
     /// A pair of a collider with itself, at which rapier panics.
     WithItself,
 }
 
 impl Fault {
-    /// Whether a pair should have been there and was not.
+    /// Returns true if the pair should have been reported and was not.
     pub fn is_missing(self) -> bool {
         matches!(self, Self::Missing | Self::MissingContact)
     }
 
-    /// The reason, in words.
+    /// Returns the reason in words.
     pub const fn reason(self) -> &'static str {
         match self {
             Self::Missing => "missing: the boxes overlap and no filter excludes the pair",
@@ -45,18 +45,18 @@ impl Fault {
     }
 }
 
-/// A collider of a difference, as it was then.
+/// A collider of a difference, at the time of the call.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Side {
-    /// Its box, without any margin; none when it is disabled.
+    /// Its AABB without margin; `None` if it is disabled.
     pub aabb: Option<Aabb>,
-    /// The body that it belongs to.
+    /// Its body.
     pub parent: Option<RigidBodyHandle>,
-    /// That body's type; `Fixed` without one.
+    /// The type of its body; `Fixed` without a body.
     pub body_type: RigidBodyType,
-    /// Which types may meet.
+    /// The types of bodies that it may collide with.
     pub active_collision_types: ActiveCollisionTypes,
-    /// Which groups may meet.
+    /// Its collision groups.
     pub groups: InteractionGroups,
 }
 
@@ -76,19 +76,19 @@ impl fmt::Display for Side {
     }
 }
 
-/// A pair about which the broad phase is wrong.
+/// A pair that the broad phase got wrong.
 #[derive(Clone, Debug)]
 pub struct Difference {
-    /// The call in which it was noticed, from 0.
+    /// The number of the call in which the fault was noticed, from 0.
     pub call: usize,
-    /// What is wrong.
+    /// The fault.
     pub fault: Fault,
     /// The pair.
     pub pair: (ColliderHandle, ColliderHandle),
-    /// Both colliders; none for one that is gone.
+    /// Both colliders; `None` for a removed one.
     pub sides: [Option<Side>; 2],
-    /// For the first difference, when a folder was given: the file for `pbig replay` with the boxes of
-    /// the calls up to it, or why it could not be written.
+    /// The file for `pbig replay` with the AABBs of the calls up to the difference, or why it could not be written. Only for
+    /// the first difference, and only if a folder was given.
     pub replay: Option<Result<PathBuf, String>>,
 }
 

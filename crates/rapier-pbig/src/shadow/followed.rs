@@ -1,4 +1,4 @@
-//! The pairs that a narrow phase has after following some events.
+//! Follows events and keeps the pairs that the narrow phase has after them.
 
 use super::{Fault, HandlePair, ordered};
 use rapier3d::prelude::*;
@@ -12,7 +12,7 @@ impl Followed {
         Self(pairs.into_iter().map(|pair| ordered(pair.collider1, pair.collider2)).collect())
     }
 
-    /// The narrow phase drops the pairs of removed and disabled colliders itself.
+    /// Drops the pairs of removed and disabled colliders, as the narrow phase does by itself.
     pub(super) fn purge(&mut self, removed: &[ColliderHandle]) {
         if !removed.is_empty() {
             let gone: HashSet<_> = removed.iter().collect();

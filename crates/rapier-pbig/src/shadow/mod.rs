@@ -1,15 +1,13 @@
-//! Shadow mode: a broad phase watched by rapier's own and by the oracle, on the same world, compared
-//! after every call.
+//! Compares every update of a broad phase with rapier's own broad phase ("stock") and with brute force (the "oracle").
 //!
-//! A [`Checker`] keeps what the narrow phase believes, by following the events, and holds three
-//! things against it: the oracle over boxes and filters taken straight from rapier's public functions,
-//! the pairs that stock reports, and the rule that every pair has a reason. It shares no code with the
-//! broad phase that it checks but the definition of overlap.
+//! A [`Checker`] follows the events, so it knows the pairs that the narrow phase has. It compares them with the oracle, whose
+//! AABBs and filters come from rapier's public functions, with the pairs that stock reports, and with the rule that every pair
+//! has a reason. It shares only the definition of overlap with the broad phase that it checks.
 //!
-//! What it cannot see: a pair that only soft CCD would need where its distance cuts off the way, and the order of events. Calls in which nothing is modified are followed but not compared. It takes the present
-//! prediction distance, length unit and contact skin for all colliders, where a broad phase learns of those of listed ones
-//! only: an app that changes these should touch all colliders, or the checker may see pairs missing that rapier's own broad
-//! phase misses too.
+//! The checker does not see the order of events, nor a pair that only soft CCD needs beyond its prediction distance. It does
+//! not compare after a call in which nothing is modified. It uses the present prediction distance, length unit and contact skin
+//! for all colliders; a broad phase applies them to listed colliders only. An app that changes these should modify all
+//! colliders, or the checker reports missing pairs that rapier's own broad phase misses, too.
 
 mod difference;
 mod followed;
@@ -41,24 +39,22 @@ fn sorted(pair: &HandlePair) -> [(u32, u32); 2] {
     [pair.0.into_raw_parts(), pair.1.into_raw_parts()]
 }
 
-/// What a broad phase is compared with.
+/// The reference that a broad phase is compared with.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Shadow {
-    /// Rapier's own broad phase on the same world: a pair that only it reports must be no contact.
-    /// Costs what it costs.
+    /// Rapier's own broad phase on the same world. A pair that only stock reports must not be in contact.
     Stock,
-    /// Brute force over the boxes, the definition of right: every overlapping pair that no filter
-    /// excludes must be reported. Quadratic: 0.1 s a call with 10,000 colliders.
+    /// Brute force over the AABBs: every overlapping pair that no filter excludes must be reported. Quadratic: 0.1 s a call
+    /// with 10,000 colliders.
     Oracle,
 }
 
 impl PbigBroadPhase {
-    /// Compares every update with this; a second call adds the other one. The first difference is kept in
-    /// [`PbigBroadPhase::differences`], goes to `tracing` as an error, and the boxes of the calls up to it into a file in
-    /// the system's folder for temporary files, for `pbig replay`. (Boxes alone: `pbig replay` knows no filters, and its
-    /// `--margin` is 0 unless told.)
+    /// Compares every update with this reference; a second call adds the other one. [`PbigBroadPhase::differences`] lists what
+    /// is wrong. The first difference is also a `tracing` error, and the AABBs of the calls up to it are written into a file
+    /// for `pbig replay` in the system's folder for temporary files. (The file has no filters and no margin.)
     ///
-    /// For tests, and for an app in which something seems to be missed. See [`Shadow`] for what it costs.
+    /// For tests, and for an app that seems to miss a pair. See [`Shadow`] for the cost.
     ///
     /// ```
     /// use rapier3d::prelude::*;
@@ -72,10 +68,9 @@ impl PbigBroadPhase {
     /// assert!(broad_phase.differences().is_empty(), "{}", broad_phase.differences()[0]);
     /// ```
     pub fn with_shadow(mut self, shadow: Shadow) -> Self {
-        self.idle = false;
-        let adopted = self.outbox.adopted.iter().copied();
-        let reaches_on = self.ulps > 0;
-        let margin = if reaches_on { f32::INFINITY } else { self.relative_margin };
+        self.is_idle = false;
+        let adopted = self.writer.adopted.iter().copied();
+        let margin = self.relative_margin;
         let known: Vec<_> = self.pairs().chain(adopted).collect();
         let checker = self.shadow.get_or_insert_with(|| {
             let mut checker = Checker::new(margin).with_replays_in(std::env::temp_dir());
@@ -86,29 +81,29 @@ impl PbigBroadPhase {
         self
     }
 
-    /// The shadow, if there is one: what it has compared.
+    /// Returns the checker, if there is one.
     pub fn shadow(&self) -> Option<&Checker> {
         self.shadow.as_deref()
     }
 
-    /// What the shadow found wrong so far, oldest first; nothing without one.
+    /// Returns what the checker found wrong so far, oldest first.
     pub fn differences(&self) -> &[Difference] {
         self.shadow.as_ref().map_or(&[], |checker| &checker.differences)
     }
 }
 
-/// How many frames before a fault are kept for a replay.
+/// Frames that are kept for a replay.
 const FRAMES_KEPT: usize = 8;
 
-/// Most differences that are kept.
+/// Maximum number of differences that are kept.
 const KEPT: usize = 1000;
 
-/// Watches the calls and events of a broad phase.
+/// Follows the calls and events of a broad phase, and compares its pairs with the references.
 #[derive(Clone, Default)]
 pub struct Checker {
-    /// Everything wrong so far, each once, oldest first, at most a thousand.
+    /// Everything wrong so far, each fault of a pair once, oldest first, at most a thousand.
     pub differences: Vec<Difference>,
-    /// Boxes without margin by collider index, the last few calls.
+    /// AABBs without margin by collider index, for the last few calls.
     pub frames: VecDeque<Vec<Aabb>>,
     /// Calls that were compared.
     pub compared: usize,
@@ -121,29 +116,23 @@ pub struct Checker {
     folder: Option<PathBuf>,
     known: Followed,
     margin: f32,
-    /// One in so many calls is compared; 0 as 1.
+    /// One call in this many is compared; 0 means 1.
     every: usize,
     calls: usize,
     /// Calls in which something was modified.
     comparable: usize,
-    /// Whether this is another world than before.
+    /// True before the first call on another world.
     fresh: bool,
 }
 
 impl Checker {
-    /// Follows events and compares with nothing yet. `relative_margin` is the margin of the broad phase
-    /// in units of `length_unit`: its pairs may be four of them apart, two for each box. Infinite where boxes reach ahead
-    /// or are widened ([`PbigBroadPhase::widened_by_ulps`]) and pairs may be any distance
-    /// apart.
+    /// Creates a checker without a reference. `relative_margin` is the margin of the broad phase in units of `length_unit`: the
+    /// AABBs of a pair may be four margins apart, two for each box.
     pub fn new(relative_margin: f32) -> Self {
         Self { margin: relative_margin, ..Self::default() }
     }
 
-    pub(crate) fn expect_any_distance(&mut self) {
-        self.margin = f32::INFINITY;
-    }
-
-    /// Compares with this, too.
+    /// Adds a reference.
     pub fn with(mut self, shadow: Shadow) -> Self {
         self.add(shadow);
         self
@@ -157,18 +146,18 @@ impl Checker {
         }
     }
 
-    /// Compares in one of `every` calls that modify something; events are followed in all of them.
+    /// Compares in one of `every` calls that modify something. The events of all calls are followed.
     pub fn every(self, every: usize) -> Self {
         Self { every, ..self }
     }
 
-    /// Writes the boxes of the calls up to the first difference into this folder.
+    /// Writes the AABBs of the calls up to the first difference into this folder.
     pub fn with_replays_in(self, folder: PathBuf) -> Self {
         Self { folder: Some(folder), ..self }
     }
 
-    /// Goes on beside another world, or one that is not new: takes these for the pairs that the narrow phase has, and
-    /// shows stock all colliders in the next call.
+    /// Prepares for another world, or one that is not new. `pairs` are those that the narrow phase has. Stock sees all colliders
+    /// in the next call.
     pub fn start_over(&mut self, pairs: impl IntoIterator<Item = ColliderPair>) {
         self.known = Followed::of(pairs);
         self.fresh = true;
@@ -177,12 +166,12 @@ impl Checker {
         }
     }
 
-    /// Whether stock is (still) compared with: it is not after it has panicked.
+    /// Returns true if stock is a reference and has not panicked.
     pub fn has_stock(&self) -> bool {
         self.stock.as_ref().is_some_and(|stock| !stock.panicked)
     }
 
-    /// Looks at a call that the broad phase has just answered with `events`.
+    /// Checks a call that the broad phase has just answered with `events`.
     pub fn watch(&mut self, call: &Call<'_>, events: &[BroadPhasePairEvent]) {
         let scene = SceneView::new(call);
         let mut faults = Vec::new();
@@ -191,7 +180,7 @@ impl Checker {
         if let Some(stock) = &mut self.stock {
             stock.update(call);
         }
-        // Where nothing was modified, nothing but pairs of removed colliders may have changed.
+        // If nothing was modified, only pairs of removed colliders can have changed.
         let fresh = std::mem::take(&mut self.fresh);
         if fresh || !call.modified.is_empty() || !events.is_empty() {
             self.keep_frame(&scene);
@@ -242,7 +231,7 @@ impl Checker {
         faults[from..].sort_by_key(|(_, pair)| sorted(pair));
     }
 
-    /// Writes the frames that led to the first difference, and tells.
+    /// Writes the frames up to the first difference, and logs the difference.
     fn report_first(&mut self) {
         let Some(first) = self.differences.first_mut() else { return };
         if let Some(folder) = &self.folder {

@@ -1,4 +1,4 @@
-//! Frames of boxes as a file, for `pbig replay`.
+//! Writes frames of boxes into a file for `pbig replay`.
 
 use ndarray::Array3;
 use ndarray_npy::{WriteNpyError, WriteNpyExt};
@@ -9,20 +9,20 @@ use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
 use std::time::SystemTime;
 
-/// Why frames could not be written.
+/// The reason why frames could not be written.
 #[derive(Debug, thiserror::Error)]
 #[error("{}: {cause}", file.display())]
 pub struct ReplayError {
     /// The file.
     pub file: PathBuf,
-    /// What went wrong.
+    /// The cause.
     pub cause: WriteNpyError,
 }
 
-/// Frames as `.npy` (F,N,6) float32, readable by `pbig replay`; boxes that a frame lacks are NaN.
+/// Writes frames as `.npy` (F,N,6) float32, as `pbig replay` reads them. Boxes that a frame lacks are NaN.
 ///
 /// # Errors
-/// When the file cannot be written.
+/// The file cannot be written.
 pub fn write_frames<'a>(
     file: &Path,
     frames: impl IntoIterator<Item = &'a Vec<Aabb>>,
@@ -41,7 +41,7 @@ pub fn write_frames<'a>(
     write().map_err(|cause| ReplayError { file: file.into(), cause })
 }
 
-/// A new file in `folder`: two processes, or two runs, never write the same one.
+/// Writes a new file into `folder`. Its name has the time and the process, so that no two runs write the same file.
 pub(super) fn write_into(folder: &Path, frames: &VecDeque<Vec<Aabb>>) -> Result<PathBuf, ReplayError> {
     let now = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).unwrap_or_default();
     let name = format!("pbig-difference-{}-{}.npy", now.as_nanos(), std::process::id());

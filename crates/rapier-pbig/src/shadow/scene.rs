@@ -1,4 +1,4 @@
-//! The world as a broad phase sees it, through rapier's own functions.
+//! Computes what a broad phase should see of a world, through rapier's own functions.
 
 use super::{Call, HandlePair, Side, ordered};
 use pbig_core::{Aabb, oracle};
@@ -35,7 +35,8 @@ impl<'a> SceneView<'a> {
         Some(Aabb::new(aabb.mins.coords.into(), aabb.maxs.coords.into()))
     }
 
-    /// Where soft CCD expects a collider, which a broad phase learns when that is listed, if that is within its distance: beyond, rapier cuts off the way in private.
+    /// Returns the pose that soft CCD predicts for a listed collider, if it is within the prediction distance: beyond, rapier
+    /// clamps the motion in a private function.
     fn predicted(&self, collider: &Collider) -> Option<Isometry<Real>> {
         let body = self.bodies.get(collider.parent()?)?;
         let predicted = body.predict_position_using_velocity_and_forces(self.params.dt);
@@ -45,7 +46,7 @@ impl<'a> SceneView<'a> {
         within.then_some(predicted * collider.position_wrt_parent()?)
     }
 
-    /// A collider as a difference shows it.
+    /// Returns a collider as a difference shows it.
     pub(super) fn side(&self, handle: ColliderHandle) -> Option<Side> {
         let collider = self.colliders.get(handle)?;
         Some(Side {
@@ -57,13 +58,13 @@ impl<'a> SceneView<'a> {
         })
     }
 
-    /// A collider without a body counts as fixed.
+    /// Returns the type of the collider's body. A collider without a body counts as fixed.
     fn body_type(&self, collider: &Collider) -> RigidBodyType {
         let body = collider.parent().and_then(|handle| self.bodies.get(handle));
         body.map_or(RigidBodyType::Fixed, |body| body.body_type())
     }
 
-    /// By collider index; nowhere where there is none.
+    /// Returns the AABBs by collider index, and [`Aabb::NOWHERE`] for an unused index.
     pub(super) fn boxes(&self) -> Vec<Aabb> {
         let mut boxes = Vec::new();
         for (handle, _) in self.colliders.iter_enabled() {
@@ -82,7 +83,7 @@ impl<'a> SceneView<'a> {
         found.into_iter().map(|p| pair(p.a, p.b)).collect()
     }
 
-    /// The narrow phase's own early filters, in its words.
+    /// Applies the filters that the narrow phase applies before it computes contacts.
     pub(super) fn allowed(&self, (a, b): HandlePair) -> bool {
         let (Some(a), Some(b)) = (self.enabled(a), self.enabled(b)) else { return false };
         let same_body = a.parent().is_some() && a.parent() == b.parent();
@@ -91,10 +92,9 @@ impl<'a> SceneView<'a> {
         !same_body && kinds && a.collision_groups().test(b.collision_groups())
     }
 
-    /// Whether parry finds a contact at which rapier would look. Parry 0.22's contact query between
-    /// a cuboid and a compound can report a penetration where they are 0.08 apart (seen in the scene
-    /// `compounds`), so its distance query has a say too. Shapes that parry cannot compare count by
-    /// their boxes.
+    /// Returns true if parry finds a contact within rapier's prediction distance. Parry 0.22's contact query between a cuboid and
+    /// a compound can report a penetration for shapes 0.08 apart (in the scene `compounds`), so its distance query must agree.
+    /// If parry cannot compare the shapes, their AABBs decide.
     pub(super) fn in_contact(&self, (a, b): HandlePair) -> bool {
         let (Some(x), Some(y)) = (self.enabled(a), self.enabled(b)) else { return false };
         let reach = self.params.prediction_distance() + x.contact_skin() + y.contact_skin();
@@ -105,8 +105,8 @@ impl<'a> SceneView<'a> {
         }
     }
 
-    /// Whether a pair has a reason: both there, allowed, and near enough for a margin on each box.
-    /// With soft CCD boxes reach further; such pairs are not judged.
+    /// Returns true if a pair has a reason: both colliders exist, the filters allow it, and the AABBs are near enough. AABBs with
+    /// soft CCD reach further, so such pairs always pass.
     pub(super) fn may_pair(&self, (a, b): HandlePair, relative_margin: f32) -> bool {
         let soft_ccd = |handle: ColliderHandle| {
             let body = self.enabled(handle).and_then(Collider::parent).and_then(|body| self.bodies.get(body));
@@ -120,7 +120,7 @@ impl<'a> SceneView<'a> {
     }
 }
 
-/// Inflated, and by an ulp at least.
+/// Inflates an AABB by at least one unit in the last place.
 fn inflated_by_more(aabb: &Aabb, reach: f32) -> Aabb {
     let grown = aabb.inflated(reach);
     Aabb::new(grown.min.map(f32::next_down), grown.max.map(f32::next_up))
@@ -130,7 +130,7 @@ fn inflated_by_more(aabb: &Aabb, reach: f32) -> Aabb {
 pub(super) mod tests {
     use super::*;
 
-    /// Two balls of radius 0.5 with this distance between their centres.
+    /// Returns two balls of radius 0.5 with this distance between their centres.
     pub(in crate::shadow) fn balls(apart: f32) -> (ColliderSet, HandlePair) {
         let mut colliders = ColliderSet::new();
         let mut ball = |x: f32| {

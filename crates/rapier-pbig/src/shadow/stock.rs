@@ -1,4 +1,4 @@
-//! Rapier's own broad phase beside the one that is checked.
+//! Runs rapier's own broad phase beside the one that is checked.
 
 use super::Call;
 use super::followed::Followed;
@@ -8,17 +8,17 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 #[derive(Clone, Default)]
 pub(super) struct Stock {
     broad_phase: DefaultBroadPhase,
-    /// The pairs that a narrow phase would have after its events.
+    /// The pairs that a narrow phase would have after stock's events.
     pub(super) known: Followed,
-    /// It is of no further use then.
+    /// True once stock has panicked. It is not used afterwards.
     pub(super) panicked: bool,
-    /// Whether it has seen the world.
+    /// True after the first call, in which stock sees all colliders.
     started: bool,
 }
 
 impl Stock {
-    /// Rapier 0.27's broad phase can panic when several colliders are removed or disabled at once.
-    /// That must not end the app that is being checked.
+    /// Calls stock, and catches its panics: rapier 0.27's broad phase can panic if several colliders are removed or disabled
+    /// in one step.
     pub(super) fn update(&mut self, call: &Call<'_>) {
         if self.panicked {
             return;
@@ -42,7 +42,8 @@ impl Stock {
     }
 }
 
-/// Stock skips colliders that have not changed, and the world may be older than the checker: so they change, in a copy.
+/// Shows all colliders to stock, because the world may be older than the checker. Stock skips colliders that have not changed,
+/// so a copy of them is marked as changed.
 fn show_all(stock: &mut DefaultBroadPhase, call: &Call<'_>, events: &mut Vec<BroadPhasePairEvent>) {
     let mut colliders = call.colliders.clone();
     let all: Vec<ColliderHandle> = colliders.iter_enabled().map(|(handle, _)| handle).collect();

@@ -6,7 +6,7 @@ use clap::ValueEnum;
 use pbig_harness::options::BackendOption;
 use pbig_harness::scenes::Scene;
 use pbig_harness::simulate::{Check, Outcome, Task, run as run_scene, run_checked};
-use rapier_pbig::{Config, PbigBroadPhase};
+use rapier_pbig::{PbigBroadPhase, PbigConfig};
 use rapier3d::prelude::DefaultBroadPhase;
 use std::path::Path;
 
@@ -66,8 +66,8 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
     let task = Task { scene, bodies, steps: args.steps, seed: args.seed };
     refuse_what_stock_ignores(args)?;
     let bar = progress(args.steps, "steps");
-    let config = Config { backend: args.backend.backend(), ..PbigBroadPhase::CONFIG };
-    let ours = PbigBroadPhase::with_config(config);
+    let config = PbigConfig { backend: args.backend.backend(), ..PbigConfig::DEFAULT };
+    let ours = PbigBroadPhase::with_config(config).expect("the default margin is a length");
     let step = |_| bar.inc(1);
     let (outcome, did) = match args.broad_phase {
         BroadPhaseOption::Stock => (run_scene(task, DefaultBroadPhase::new(), step).0, Did::default()),

@@ -9,7 +9,7 @@ use super::study::{Cell, Point, Study, Table};
 use crate::output::Failure;
 use pbig_harness::reported::Reported;
 use pbig_harness::runner::StepTime;
-use rapier_pbig::PbigBroadPhase;
+use rapier_pbig::PbigConfig;
 use tally::{MARGINS, Passes};
 use verdict::{against_default, criterion, over_all, without_each_scene};
 
@@ -133,7 +133,7 @@ const STEP: Time = Time { what: "the whole step of rapier", of: |row| row.step, 
 
 /// Which of [`MARGINS`] is rapier-pbig's default.
 fn default_margin() -> usize {
-    MARGINS.iter().position(|margin| *margin as f32 == PbigBroadPhase::CONFIG.margin).unwrap_or_default()
+    MARGINS.iter().position(|margin| *margin as f32 == PbigConfig::DEFAULT.margin).unwrap_or_default()
 }
 
 /// The fastest margin of a case, and the default's time over its.
@@ -232,7 +232,7 @@ pub(super) mod tests {
 
     #[test]
     fn the_default_is_one_of_the_margins() {
-        assert_eq!(MARGINS[default_margin()] as f32, PbigBroadPhase::CONFIG.margin);
+        assert_eq!(MARGINS[default_margin()] as f32, PbigConfig::DEFAULT.margin);
     }
 
     #[test]

@@ -160,8 +160,7 @@ fn agree(name: &str, ours: usize, others: &[usize]) -> Result<u64, Failure> {
 }
 
 fn update(broad_phase: &mut BroadPhase, boxes: &[Aabb], moved: &[u32]) -> Result<(), Failure> {
-    let fetch = |id: u32| boxes[id as usize];
-    let set = broad_phase.set_many(moved, fetch, |aabb| Some((aabb, ProxyFilter::ALL)));
+    let set = broad_phase.set_many(moved, |id| Some((boxes[id as usize], ProxyFilter::ALL)));
     let done = set.and_then(|()| broad_phase.update().map(|_| ()));
     done.map_err(|error| Failure::Input(error.to_string()))
 }

@@ -102,8 +102,7 @@ impl Alone {
             }
             Way::Events(broad_phase) => {
                 let (done, set) = timed(|| {
-                    let fetch = |id: u32| boxes[id as usize];
-                    broad_phase.set_many(moved, fetch, |aabb| Some((aabb, ProxyFilter::ALL)))
+                    broad_phase.set_many(moved, |id| Some((boxes[id as usize], ProxyFilter::ALL)))
                 });
                 done?;
                 let (done, update) = timed(|| broad_phase.update().map(|_| ()));

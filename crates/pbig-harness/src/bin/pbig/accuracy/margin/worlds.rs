@@ -8,7 +8,7 @@ use pbig_harness::reported::Reported;
 use pbig_harness::runner::{Run, StepTime, Timed};
 use pbig_harness::scenes::Scene;
 use pbig_harness::world::World;
-use rapier_pbig::{Config, PbigBroadPhase, collision_aabb};
+use rapier_pbig::{PbigBroadPhase, PbigConfig, collision_aabb};
 
 /// A scene, and when it is looked at.
 struct Windows {
@@ -88,7 +88,8 @@ impl Worlds {
             let world = World::from_bytes(saved);
             let world = world.map_err(|error| Failure::Input(format!("{case}: its snapshot: {error}")))?;
             let mut broad_phase =
-                PbigBroadPhase::with_config(Config { margin: margin as f32, ..PbigBroadPhase::CONFIG });
+                PbigBroadPhase::with_config(PbigConfig { margin: margin as f32, ..PbigConfig::DEFAULT })
+                    .expect("a length");
             broad_phase.adopt(&world.narrow_phase);
             Ok(Run { world, broad_phase: Timed::new(broad_phase), times: vec![] })
         };

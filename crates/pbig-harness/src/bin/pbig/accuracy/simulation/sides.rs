@@ -8,9 +8,9 @@ use pbig_harness::mechanics::Mechanics;
 use pbig_harness::numbered::{Apart, Numbered};
 use pbig_harness::reported::Reported;
 use pbig_harness::scenes::Scene;
-use pbig_harness::sorted::Sorted;
+use pbig_harness::sorted::{LowerFirst, Sorted};
 use pbig_harness::world::{World, to_vector};
-use rapier_pbig::{Config, HandleOrder, PbigBroadPhase};
+use rapier_pbig::{PbigBroadPhase, PbigConfig};
 use rapier3d::prelude::*;
 use std::hash::{DefaultHasher, Hash, Hasher};
 
@@ -51,7 +51,7 @@ const fn again(name: &'static str, way: Way) -> Way {
 const STOCK: Way = stock("stock", None);
 /// What tells how much of a difference is that of the order of events.
 const SORTED: Way = stock("stock sorted", Some(Order::Sorted));
-const PBIG: Way = pbig("pbig", PbigBroadPhase::CONFIG.margin);
+const PBIG: Way = pbig("pbig", PbigConfig::DEFAULT.margin);
 
 /// So many orders of insertion beside the scene's: a run that is one more of them is farther than all these once in 20 times.
 pub(super) const PERMUTED: usize = 19;
@@ -107,11 +107,10 @@ impl Way {
 
     fn broad_phase(&self) -> Box<dyn BroadPhase> {
         let stock = DefaultBroadPhase::new();
-        let ours = |margin| PbigBroadPhase::with_config(Config { margin, ..PbigBroadPhase::CONFIG });
+        let config = |margin| PbigConfig { margin, ..PbigConfig::DEFAULT };
+        let ours = |margin| PbigBroadPhase::with_config(config(margin)).expect("a length");
         match (self.margin, self.order) {
-            (Some(margin), Some(Order::LowerFirst)) => {
-                Box::new(ours(margin).with_handle_order(HandleOrder::LowerIndexFirst))
-            }
+            (Some(margin), Some(Order::LowerFirst)) => Box::new(LowerFirst(ours(margin))),
             (Some(margin), _) => Box::new(ours(margin)),
             (None, Some(Order::Sorted)) => Box::new(Sorted(stock)),
             (None, _) => Box::new(stock),

@@ -4,7 +4,7 @@ use super::OFFSETS;
 use super::place::{AT_POSES, Along, IN_WORLD, Row, WAYS, Way};
 use super::times::{Time, ways};
 use crate::accuracy::study::plain;
-use rapier_pbig::PbigBroadPhase;
+use rapier_pbig::PbigConfig;
 
 /// The first crowd, of any size, along the diagonal.
 pub(super) fn is_crowd(row: &Row) -> bool {
@@ -14,10 +14,10 @@ pub(super) fn is_crowd(row: &Row) -> bool {
 /// How far from the origin the margin covers what rounding takes off a box and off the margin itself: 2 ulps, which
 /// are 2^-22 of the distance at most.
 pub(super) fn covered() -> f64 {
-    f64::from(PbigBroadPhase::CONFIG.margin) * 2f64.powi(22)
+    f64::from(PbigConfig::DEFAULT.margin) * 2f64.powi(22)
 }
 
-/// A bound of rapier's ends too far inside by no more of its ulps, at the poses: proof in `rapier-pbig/src/ulps.rs`.
+/// A bound of rapier's ends too far inside by no more of its ulps, at the poses: proof in `pbig_harness::wide::ulps`.
 const PROVED: f64 = 2.0;
 
 /// Over all worlds at an offset.
@@ -87,7 +87,7 @@ fn margin_note(rows: &[Row]) -> String {
         "With the margin that boxes are stored with, {}, they miss: {missed}; of touching shapes: {deep}. It \
          covers the rounding of boxes, and its own, while two ulps are no more than it: up to the margin times \
          2^22, {:.0} length units.",
-        PbigBroadPhase::CONFIG.margin,
+        PbigConfig::DEFAULT.margin,
         covered()
     )
 }

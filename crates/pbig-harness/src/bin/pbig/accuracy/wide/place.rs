@@ -3,8 +3,8 @@
 use crate::output::Failure;
 use pbig_core::{Aabb, Config, Finder, Limits, Pair};
 use pbig_harness::scenes::Scene;
-use pbig_harness::wide::{Differences, Layout, Pose, Truth, Wide, doubt, to_f32, to_f64};
-use rapier_pbig::{PbigBroadPhase, collision_aabb, widened_by_ulps};
+use pbig_harness::wide::{Differences, Layout, Pose, Truth, Wide, doubt, to_f32, to_f64, widened_by_ulps};
+use rapier_pbig::{PbigConfig, collision_aabb};
 use rapier3d::prelude::{Collider, IntegrationParameters, RigidBodySet};
 
 /// How boxes in f32 are made.
@@ -140,7 +140,7 @@ impl<'a> Place<'a> {
         match way {
             Way::Ulps(ulps) => self.rapiers(ulps),
             Way::Margin(ulps) => {
-                let margin = PbigBroadPhase::CONFIG.margin;
+                let margin = PbigConfig::DEFAULT.margin;
                 self.rapiers(ulps).iter().map(|aabb| aabb.inflated(margin)).collect()
             }
             Way::Outward => {

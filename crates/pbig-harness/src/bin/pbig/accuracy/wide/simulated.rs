@@ -9,10 +9,10 @@ use super::place::{Along, Place, Row, finder, rapiers};
 use crate::output::Failure;
 use pbig_core::Pair;
 use pbig_harness::scenes::Scene;
-use pbig_harness::sorted::Sorted;
+use pbig_harness::sorted::{LowerFirst, Sorted};
 use pbig_harness::wide::{Differences, Layout, Pose, WideWorld, moved, to_f64};
 use pbig_harness::world::World;
-use rapier_pbig::{HandleOrder, PbigBroadPhase};
+use rapier_pbig::PbigBroadPhase;
 use rapier3d::prelude::{BroadPhase, Collider, DefaultBroadPhase};
 pub(super) use tables::tables;
 
@@ -39,7 +39,7 @@ type Kind = (&'static str, fn() -> Box<dyn BroadPhase>);
 /// pair is the first is as stock has it; and events are sorted as ours are.
 const KINDS: [Kind; 4] = [
     ("pbig", || Box::new(PbigBroadPhase::new())),
-    ("pbig lower first", || Box::new(PbigBroadPhase::new().with_handle_order(HandleOrder::LowerIndexFirst))),
+    ("pbig lower first", || Box::new(LowerFirst(PbigBroadPhase::new()))),
     ("stock", || Box::new(DefaultBroadPhase::new())),
     ("stock sorted", || Box::new(Sorted(DefaultBroadPhase::new()))),
 ];

@@ -127,8 +127,7 @@ fn update(broad_phase: &mut BroadPhase, moved: &[u32], boxes: &[Aabb]) -> Result
 }
 
 fn set(broad_phase: &mut BroadPhase, moved: &[u32], boxes: &[Aabb]) -> Result<(), Failure> {
-    let fetch = |id: u32| boxes[id as usize];
-    broad_phase.set_many(moved, fetch, |aabb| Some((aabb, ProxyFilter::ALL))).map_err(failure)
+    broad_phase.set_many(moved, |id| Some((boxes[id as usize], ProxyFilter::ALL))).map_err(failure)
 }
 
 /// What the device did; an update that it left to the CPU is no measurement.

@@ -171,7 +171,7 @@ fn update(broad_phase: &mut BroadPhase, boxes: &[Aabb], changed: &[Vec<u32>; 2])
     for &id in absent {
         broad_phase.remove(id);
     }
-    broad_phase.set_many(present, |id| boxes[id as usize], |aabb| Some((aabb, ProxyFilter::ALL)))?;
+    broad_phase.set_many(present, |id| Some((boxes[id as usize], ProxyFilter::ALL)))?;
     broad_phase.update().map(|_| ())
 }
 

@@ -21,38 +21,11 @@
 //! apart: **with 2, whatever overlaps exactly still does**. A position that was rounded from f64 is off by half an ulp
 //! more, its rotation by 8 `u E`: with 3, also what overlaps there. (Above 10^-30 in size, where products do not underflow.)
 
-use crate::PbigBroadPhase;
 use pbig_core::Aabb;
 use rapier3d::prelude::{Isometry, Real};
 
 /// What rotations may take off, as a part of the size: half of it for each of two ulps.
 const ROTATION: f32 = 128.0 / (1 << 24) as f32;
-
-impl PbigBroadPhase {
-    /// For worlds far from the origin: boxes are widened as by [`widened_by_ulps`], those of colliders listed from now on. With
-    /// 0, the default, they are rapier's own.
-    ///
-    /// Parry's boxes are rounded in f32 to where shapes are, and so are the prediction distance and the margin that cover
-    /// that: they do up to `margin x 2^22` from the origin, 40 km with the default margin of 1 cm. Beyond, pairs can be
-    /// missed, as rapier's own broad phase misses them. With 2 ulps none is whose boxes overlap at the poses that rapier has,
-    /// however far away; with 3 none that would be one in f64. There are more pairs that do not touch: 2 ulps are an eighth of
-    /// a millimetre 1 km from the origin, 1.6 cm at 10^5 m, 2 m at 10^7 m.
-    ///
-    /// With soft CCD the box where a shape is going to be is widened by what it takes where the shape is now.
-    ///
-    /// ```
-    /// use rapier_pbig::PbigBroadPhase;
-    /// let broad_phase = PbigBroadPhase::new().widened_by_ulps(2); // was: PbigBroadPhase::new()
-    /// ```
-    pub fn widened_by_ulps(mut self, ulps: u32) -> Self {
-        self.ulps = ulps;
-        #[cfg(feature = "shadow")]
-        if let Some(checker) = self.shadow.as_mut().filter(|_| ulps > 0) {
-            checker.expect_any_distance();
-        }
-        self
-    }
-}
 
 /// The box with every bound moved outward by so many units in the last place (ulps) of the numbers that it was computed
 /// from: the position of the shape on that axis and the box's reach, with 2^-17 of that for rotations.
@@ -62,7 +35,8 @@ impl PbigBroadPhase {
 /// hundred-thousandth of the size. An invalid box stays as it is, and so do bounds that are infinite.
 ///
 /// ```
-/// use rapier_pbig::{pbig_core::Aabb, widened_by_ulps};
+/// use pbig_core::Aabb;
+/// use pbig_harness::wide::widened_by_ulps;
 /// use rapier3d::prelude::*;
 /// // Floats are 1 apart there, and the ball lies in no box of corners half a unit from its centre.
 /// let (ball, pose) = (Ball::new(0.5), Isometry::translation(1e7, 0.0, 0.0));
