@@ -24,6 +24,10 @@ pub fn corpus() -> Vec<Case> {
 
 /// Returns, in words, the first difference between a list of pairs and the oracle's list.
 pub fn difference(found: &[Pair], wanted: &[Pair]) -> Option<String> {
+    // The oracle's list is sorted and free of duplicates, so an equal one is, too.
+    if found == wanted {
+        return None;
+    }
     if let Some(pair) = found.iter().find(|pair| pair.a >= pair.b) {
         return Some(format!("{pair:?} is not a < b"));
     }
