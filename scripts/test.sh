@@ -5,35 +5,7 @@
 # what needs one, and says so. With CI=true a missing part is a failure.
 set -euo pipefail
 cd "$(dirname "$0")/.."
-PATH=$PATH:/usr/sbin:/sbin
-
-as_root() {
-    if [ "$(id -u)" = 0 ]; then env "$@"; else sudo -n env "$@"; fi
-}
-
-may_install() {
-    command -v apt-get >/dev/null && { [ "$(id -u)" = 0 ] || sudo -n true 2>/dev/null; }
-}
-
-# give_up WHAT COMMAND: what a person has to run.
-give_up() {
-    echo "== $1 is missing; install it with: $2"
-    [ "${CI:-}" != true ] || exit 1
-}
-
-# require WHAT PACKAGE...: installs the packages that bring WHAT, or says how.
-require() {
-    local what=$1
-    shift
-    if may_install; then
-        echo "== $what is missing: installing $*"
-        as_root apt-get update -qq
-        as_root DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends "$@" >/dev/null ||
-            give_up "$what" "sudo apt-get install $*"
-    else
-        give_up "$what" "sudo apt-get install $*"
-    fi
-}
+. scripts/packages.sh
 
 # On Linux the adapters are Vulkan's; other systems bring theirs.
 has_vulkan() {
@@ -61,11 +33,6 @@ require_rust() {
         export RUSTUP_TOOLCHAIN=stable
     fi
     has_rust || give_up "Rust with rustfmt and clippy" "curl -sSf https://sh.rustup.rs | sh"
-}
-
-step() {
-    echo "== $*"
-    "$@"
 }
 
 # look_for_adapter: sets `has_gpu`, by the program once it is built.

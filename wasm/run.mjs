@@ -1,0 +1,41 @@
+// Runs the corpus in a WebAssembly module, then the planted faults: node wasm/run.mjs MODULE
+import { readFile } from "node:fs/promises";
+
+const module = await WebAssembly.compile(await readFile(process.argv[2]));
+const imports = WebAssembly.Module.imports(module);
+if (imports.length > 0) {
+    // A page without a binding generator could not load such a module.
+    fail(`the module imports ${imports.map(({ module, name }) => `${module}.${name}`).join(", ")}`);
+}
+const { exports } = await WebAssembly.instantiate(module);
+
+function fail(why) {
+    console.log(`failed: ${why}`);
+    process.exit(1);
+}
+
+function text() {
+    const bytes = new Uint8Array(exports.memory.buffer, exports.text_address(), exports.text_length());
+    return new TextDecoder().decode(bytes);
+}
+
+// A panic ends in a trap; the module keeps its message.
+function call(name, ...numbers) {
+    try {
+        return exports[name](...numbers);
+    } catch (trap) {
+        return fail(`${name}: ${text() || "no message"} (${trap})`);
+    }
+}
+
+call("keep_panics");
+const failed = call("run_corpus");
+const cases = call("case_count");
+console.log(`${cases - failed} cases passed, ${failed} failed`);
+if (failed > 0 || cases === 0) fail(text() || "the corpus is empty");
+
+const faults = call("fault_count");
+for (let fault = 0; fault < faults; fault++) {
+    if (call("run_with_fault", fault) !== 1) fail(`the checks overlook a planted fault: ${text()}`);
+}
+console.log(`${faults} planted faults noticed`);
