@@ -1,10 +1,10 @@
-//! The corpus, with the strategies to try on it.
+//! The corpus, with the backends and engines to try on it.
 
 mod corpus;
 
 pub use corpus::{Case, corpus, difference};
 
-use pbig_core::{Backend, CellRule, Coding, Config, GpuOptions, Grids, Look, Strategy, Study, Updates};
+use pbig_core::{Backend, CellRule, Coding, Config, Engine, GpuOptions};
 // `corpus.rs` finds the generator as `crate::boxes`, because the crate in `wasm/` includes both files.
 use pbig_harness::boxes;
 use std::io::Write;
@@ -59,45 +59,38 @@ macro_rules! needs_gpu {
     };
 }
 
-/// Every way to find pairs, by name.
+/// Every backend that finds pairs, by name.
 pub fn strategies() -> Vec<(&'static str, Config)> {
-    let with = |backend, strategy| Config { backend, strategy, ..Config::DEFAULT };
+    let on = |backend| Config { backend, ..Config::DEFAULT };
     let all = vec![
         ("auto", Config::DEFAULT),
-        ("grid", with(Backend::Cpu, Strategy::Grid)),
-        ("pbig", with(Backend::Cpu, Strategy::Pbig)),
-        ("pbig by density", by_density(with(Backend::Cpu, Strategy::Pbig))),
-        ("pbig rows", by_rows(with(Backend::Cpu, Strategy::Pbig))),
-        ("brute", with(Backend::Brute, Strategy::Auto)),
-        ("gpu", with(Backend::Gpu, Strategy::Auto)),
+        ("grid", grid()),
+        ("brute", on(Backend::Brute)),
+        ("gpu", on(Backend::Gpu)),
         ("gpu grid", gpu(Coding::Plain)),
         ("gpu grid packed", gpu(Coding::Packed)),
     ];
     all.into_iter().filter(|(_, config)| may_run(config)).collect()
 }
 
-fn by_density(config: Config) -> Config {
-    Config { gpu: GpuOptions { cell_rule: CellRule::Density, ..config.gpu }, ..config }
+/// The CPU's grid, however few the boxes.
+pub fn grid() -> Config {
+    Config { backend: Backend::Cpu, engine: Some(Engine::Rebuild), ..Config::DEFAULT }
 }
 
-fn by_rows(config: Config) -> Config {
-    Config { gpu: GpuOptions { small_cell: 1, ..config.gpu }, ..config }
+/// The CPU's engines for updates where the policy would not choose them, by name.
+pub fn engines() -> Vec<(&'static str, Config)> {
+    let by = |engine| Config { engine: Some(engine), ..grid() };
+    vec![("sweep", by(Engine::Sweep)), ("edit", by(Engine::Edit)), ("rebuild", by(Engine::Rebuild))]
 }
 
-/// Ways on the CPU that the plan would not choose everywhere, by name.
-pub fn asked() -> Vec<(&'static str, Config)> {
-    let grid = Config { backend: Backend::Cpu, strategy: Strategy::Grid, ..Config::DEFAULT };
-    let with = |study| Config { study, ..grid };
-    let by = |updates| with(Study { updates, ..Study::DEFAULT });
-    let of = |grids, look| with(Study { grids, look, ..Study::DEFAULT });
+/// The settings of PBIG's grid on the CPU, by name.
+pub fn pbig_grids() -> Vec<(&'static str, GpuOptions)> {
+    let options = GpuOptions::DEFAULT;
     vec![
-        ("edits", by(Updates::Edits)),
-        ("grid anew", by(Updates::Anew)),
-        ("near pairs", by(Updates::Near)),
-        ("levels, rows everywhere", of(Grids::Levels, Look::Everywhere)),
-        ("levels, trimmed rows", of(Grids::Levels, Look::Trimmed)),
-        ("one grid, trimmed rows", of(Grids::One, Look::Trimmed)),
-        ("one grid, rows seldom", of(Grids::One, Look::Seldom)),
+        ("pbig", options),
+        ("pbig by density", GpuOptions { cell_rule: CellRule::Density, ..options }),
+        ("pbig rows", GpuOptions { small_cell: 1, ..options }),
     ]
 }
 

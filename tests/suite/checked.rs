@@ -1,6 +1,6 @@
 //! A world whose every call of the broad phase is checked beside stock and the oracle.
 
-use pbig_core::{Backend, Coding, Config, Strategy};
+use pbig_core::{Backend, Coding, Config, Engine};
 use pbig_harness::shadow::Shadowed;
 use pbig_harness::world::World;
 use rapier_pbig::{PbigBroadPhase, PbigConfig};
@@ -13,7 +13,7 @@ pub(crate) struct Checked {
     pub(crate) config: Config,
 }
 
-/// The backends on which rapier's semantics are tested: the CPU as it comes, which tests each two boxes of a small world,
+/// The backends on which rapier's semantics are tested: the CPU as it comes, which sweeps a small world,
 /// the CPU with its grid and a GPU with its grid, however small the world.
 pub(crate) fn backends() -> Vec<(&'static str, Config)> {
     let [cpu, grid] = on_cpu();
@@ -29,7 +29,7 @@ pub(crate) fn pbig(config: Config) -> PbigBroadPhase {
 /// As it comes, and with its grid.
 pub(crate) fn on_cpu() -> [Config; 2] {
     let cpu = Config { backend: Backend::Cpu, ..PbigConfig::DEFAULT.into() };
-    [cpu, Config { strategy: Strategy::Grid, ..cpu }]
+    [cpu, Config { engine: Some(Engine::Rebuild), ..cpu }]
 }
 
 /// With its grid.

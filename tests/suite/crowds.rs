@@ -1,4 +1,4 @@
-//! Crowds of boxes that may not pair with each other: no pair is missed, and they cost nearly nothing.
+//! Crowds of boxes that may not pair with each other, and clusters far apart: no pair is missed.
 
 use crate::follower::Follower;
 use pbig_core::{Aabb, Config, Finder, ProxyFilter, oracle};
@@ -36,7 +36,7 @@ fn crowds_that_change_sides_agree_with_the_oracle_on_every_strategy() {
             let mut world = Follower::new(Config { margin: 0.01, ..config }, ids);
             for round in 0..12u32 {
                 let changes = if round % 4 == 0 { ids } else { ids / 12 };
-                // First most are debris, then few, then most again: camps come and go.
+                // First most are debris, then few, then most again.
                 let share = [6, 0, 5][round as usize / 4];
                 for i in 0..changes {
                     let id = if changes == ids { i as u32 } else { random.random_range(0..ids as u32) };
@@ -58,7 +58,7 @@ fn crowd(parts: &[(ProxyFilter, usize)]) -> (Vec<Aabb>, Vec<ProxyFilter>) {
 }
 
 #[test]
-fn a_crowd_that_excludes_itself_costs_nearly_nothing() {
+fn crowds_that_exclude_themselves_agree_with_the_oracle() {
     let body = |body: u32| ProxyFilter { body, ..MOVING };
     let ground = Aabb::new([-1e3, -1.0, -1e3], [1e3, 0.6, 1e3]);
     for (what, parts, pairs) in [
@@ -78,30 +78,7 @@ fn a_crowd_that_excludes_itself_costs_nearly_nothing() {
         let found = finder.find_filtered(&boxes, &filters).expect("within the limits").to_vec();
         assert_eq!(found.len(), pairs, "{what}");
         assert!(found == oracle::pairs_filtered(&boxes, &filters), "{what}");
-        let (checks, plan) = (finder.report().checks.made, &finder.report().plan);
-        assert!(checks <= 4 * pairs as u64 + 8000, "{what}: {checks} checks for {pairs} pairs: {plan}");
     }
-}
-
-#[test]
-fn one_that_moves_in_a_crowd_that_excludes_it_is_tested_against_the_others_only() {
-    let mut world = Follower::new(Config { margin: 0.01, ..Config::DEFAULT }, 2002);
-    let at = |x: f32| Aabb::from_center([x, 0.0, 0.0], [0.5; 3]);
-    for id in 0..2000 {
-        world.set(id, at(0.0), DEBRIS);
-    }
-    world.set(2000, at(0.9), MOVING);
-    world.set(2001, at(0.0), DEBRIS);
-    world.update("all new");
-    let mut moved_checks = |x: f32, filter: ProxyFilter| {
-        world.set(2001, at(x), filter);
-        world.update("one moved");
-        world.broad_phase.report().checks.made
-    };
-    assert!(moved_checks(0.1, DEBRIS) < 10);
-    assert!(moved_checks(0.2, DEBRIS) < 10);
-    assert!(moved_checks(0.2, MOVING) >= 2000, "it has changed sides: all are to be met");
-    assert!(moved_checks(0.3, DEBRIS) < 10, "and back");
 }
 
 /// Two towns far apart, each 1000 places with `fixed` fixed pieces and a moving ball in each.
@@ -120,18 +97,13 @@ fn towns(fixed: usize) -> (Vec<Aabb>, Vec<ProxyFilter>) {
 }
 
 #[test]
-fn camps_in_clusters_far_apart_get_cells_as_small_as_others() {
-    for fixed in [8, 16, 40, 80] {
+fn clusters_far_apart_get_cells_as_small_as_others() {
+    for fixed in [8, 16, 40] {
         let (boxes, filters) = towns(fixed);
         let mut finder = Finder::default();
-        let mut checks = Vec::new();
-        for _ in 0..3 {
-            finder.find_filtered(&boxes, &filters).expect("within the limits");
-            checks.push(finder.report().checks.made);
-        }
-        // Forty and more pieces in a place are a camp, which balls alone search.
+        finder.find_filtered(&boxes, &filters).expect("within the limits");
         let report = finder.report();
-        let most = if fixed < 40 { 10 * (boxes.len() * fixed) as u64 } else { 6 * report.pairs };
-        assert!(checks.iter().all(|made| *made < most), "{fixed}: {checks:?}, {most}: {}", report.plan);
+        let most = 10 * (boxes.len() * fixed) as u64;
+        assert!(report.checks.made < most, "{fixed}: {} of {most}: {}", report.checks.made, report.plan);
     }
 }

@@ -1,16 +1,15 @@
-//! Few boxes of many change: edits, beside which several threads walk the kept pairs, against a search of all.
+//! Few boxes of many change: edits, shared by threads, against a search of all.
 
-use pbig_core::plan::Chosen;
 use pbig_core::{
-    Aabb, BroadPhase, Config, Error, Events, Finder, Limits, Pair, ProxyFilter, Study, Updates, oracle,
+    Aabb, Algorithm, BroadPhase, Config, Engine, Error, Events, Finder, Limits, Pair, ProxyFilter, oracle,
 };
 use pbig_harness::boxes::BoxSet;
 use rayon::ThreadPoolBuilder;
 
 const BOXES: usize = 20_000;
 
-/// Boxes that change in a round: enough for threads to share edits and walk.
-const CHANGED: usize = 1000;
+/// Boxes that change in a round: enough for threads to share edits.
+const CHANGED: usize = 1500;
 
 /// Less than the pairs of so many boxes in one place.
 const LIMIT: u64 = 300_000;
@@ -36,9 +35,8 @@ struct World {
 impl World {
     fn new() -> Self {
         let boxes = BoxSet::named("pile").expect("the set exists").boxes(BOXES, 3);
-        let study = Study { updates: Updates::Edits, ..Study::DEFAULT };
-        let config =
-            Config { study, limits: Limits { max_pairs: LIMIT, ..Limits::DEFAULT }, ..Config::DEFAULT };
+        let limits = Limits { max_pairs: LIMIT, ..Limits::DEFAULT };
+        let config = Config { engine: Some(Engine::Edit), limits, ..Config::DEFAULT };
         Self {
             boxes,
             filters: vec![ProxyFilter::ALL; BOXES],
@@ -73,7 +71,7 @@ impl World {
         let events = self.tested.update().expect("few pairs");
         assert!(events == &wanted, "{what}: {} of {} added", events.added.len(), wanted.added.len());
         assert_eq!(self.tested.pair_count(), now.len(), "{what}");
-        self.edits += usize::from(self.tested.report().plan.chosen == Chosen::Edit);
+        self.edits += usize::from(self.tested.report().plan.algorithm == Algorithm::Edit);
         (self.pairs, self.gone) = (now, vec![]);
     }
 
@@ -132,7 +130,7 @@ fn rounds() {
     }
     world.crowd_and_part();
     world.check("after an error");
-    assert_eq!(world.tested.report().plan.chosen, Chosen::Edit);
+    assert_eq!(world.tested.report().plan.algorithm, Algorithm::Grid, "all are searched again");
     assert!(!world.tested.events().removed.is_empty());
     world.change(13);
     world.check("the last");

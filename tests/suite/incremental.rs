@@ -2,10 +2,9 @@
 //! boxes, and the events lead from one state to the next.
 
 use crate::follower::Follower;
-use pbig_core::plan::Chosen;
-use pbig_core::{Aabb, BroadPhase, Config, Error, Limits, Pair, Plan, ProxyFilter, Strategy, Study, Updates};
+use pbig_core::{Aabb, Algorithm, BroadPhase, Config, Engine, Error, Limits, Pair, Plan, ProxyFilter};
 use pbig_harness::boxes::{BoxSet, moved};
-use pbig_tests::{asked, strategies};
+use pbig_tests::{engines, strategies};
 use rand::rngs::StdRng;
 use rand::{RngExt, SeedableRng};
 use std::collections::BTreeSet;
@@ -13,7 +12,7 @@ use std::collections::BTreeSet;
 #[test]
 fn random_worlds_with_churn_on_every_strategy() {
     let degenerate = BoxSet::named("degenerate").expect("the set exists");
-    for (strategy, config) in strategies().into_iter().chain(asked()) {
+    for (strategy, config) in strategies().into_iter().chain(engines()) {
         for seed in 0..60 {
             let mut rng = StdRng::seed_from_u64(seed);
             let margin = [0.0, 0.01, 0.3][seed as usize % 3];
@@ -52,25 +51,22 @@ fn change(world: &mut Follower, rng: &mut StdRng, id: u32, new: Aabb) {
 fn moving_sets_where_all_or_a_few_boxes_move() {
     for (name, distance) in [("unit", 0.1), ("mixed", 0.1), ("pile", 0.02)] {
         for share in [1.0, 0.01] {
-            play(name, distance, share, Updates::Auto);
-            let edits = play(name, distance, share, Updates::Edits);
-            assert!(
-                share == 1.0 || edits.iter().all(|plan| plan.chosen == Chosen::Edit),
-                "{name}: {edits:?}"
-            );
-            let anew = play(name, distance, share, Updates::Anew);
-            assert!(anew.iter().all(|plan| plan.chosen == Chosen::Grid), "{name}: {anew:?}");
-            let near = play(name, distance, share, Updates::Near);
-            assert!(near.iter().all(|plan| plan.near.is_some()), "{name}: {near:?}");
+            play(name, distance, share, None);
+            let all_by = |engine, algorithm| {
+                let plans = play(name, distance, share, Some(engine));
+                assert!(plans.iter().all(|plan| plan.algorithm == algorithm), "{name}: {plans:?}");
+            };
+            all_by(Engine::Edit, Algorithm::Edit);
+            all_by(Engine::Rebuild, Algorithm::Grid);
+            all_by(Engine::Sweep, Algorithm::Sweep);
         }
     }
 }
 
-/// Frames of a set by one way; the plans of all updates after the first.
-fn play(name: &str, distance: f32, share: f64, updates: Updates) -> Vec<Plan> {
+/// Plays frames of a set with one engine, and returns the plans of all updates after the first.
+fn play(name: &str, distance: f32, share: f64, engine: Option<Engine>) -> Vec<Plan> {
     let mut boxes = BoxSet::named(name).expect("the set exists").boxes(4000, 5);
-    let study = Study { updates, ..Study::DEFAULT };
-    let mut world = Follower::new(Config { margin: 0.01, study, ..Config::DEFAULT }, boxes.len());
+    let mut world = Follower::new(Config { margin: 0.01, engine, ..Config::DEFAULT }, boxes.len());
     let (mut rng, mut plans) = (StdRng::seed_from_u64(1), vec![]);
     for frame in 0..12 {
         let next = moved(&boxes, distance, frame);
@@ -80,13 +76,13 @@ fn play(name: &str, distance: f32, share: f64, updates: Updates) -> Vec<Plan> {
                 world.set(id as u32, next, ProxyFilter::ALL);
             }
         }
-        world.update(&format!("{name}, share {share}, frame {frame}, {updates:?}"));
+        world.update(&format!("{name}, share {share}, frame {frame}, {engine:?}"));
         plans.push(world.broad_phase.report().plan.clone());
     }
     plans.split_off(1)
 }
 
-/// As many as a bitmap of each width holds, one less and one more; whether all or a few change, and filters with them.
+/// Small worlds up to the largest that is swept and beyond, whether all or a few boxes change, and filters with them.
 #[test]
 fn small_worlds_of_every_width_with_all_kinds_of_boxes() {
     let degenerate = BoxSet::named("degenerate").expect("the set exists");
@@ -141,9 +137,9 @@ fn a_few_boxes_that_stay_in_their_cells_leave_them_and_come_back() {
             }
             world.update(&format!("{name}, frame {frame}"));
             let plan = &world.broad_phase.report().plan;
-            edits += u32::from(plan.chosen == Chosen::Edit);
-            out_of_order = out_of_order.max(plan.moved);
-            in_order += u32::from(plan.chosen == Chosen::Edit && u64::from(plan.moved) < changes);
+            edits += u32::from(plan.algorithm == Algorithm::Edit);
+            out_of_order = out_of_order.max(plan.spilled);
+            in_order += u32::from(plan.algorithm == Algorithm::Edit && u64::from(plan.spilled) < changes);
         }
     }
     assert!(edits > 120 && out_of_order > 200 && in_order > 20, "{edits} {out_of_order} {in_order}");
@@ -190,12 +186,12 @@ fn an_update_that_finds_too_many_pairs_can_be_repeated() {
 
 #[test]
 fn an_edit_that_finds_too_many_pairs_can_be_repeated() {
-    [Strategy::Grid, Strategy::Auto].into_iter().for_each(finds_too_many);
+    [None, Some(Engine::Sweep), Some(Engine::Edit), Some(Engine::Rebuild)].into_iter().for_each(finds_too_many);
 }
 
-fn finds_too_many(strategy: Strategy) {
+fn finds_too_many(engine: Option<Engine>) {
     let limits = Limits { max_pairs: 150, ..Limits::DEFAULT };
-    let config = Config { limits, strategy, ..Config::DEFAULT };
+    let config = Config { limits, engine, ..Config::DEFAULT };
     let mut broad_phase = BroadPhase::new(config).expect("a good margin");
     let boxes = BoxSet::named("unit").expect("the set exists").boxes(100, 1);
     for (id, aabb) in boxes.iter().enumerate() {
@@ -249,7 +245,7 @@ fn a_margin_that_changes_applies_to_boxes_set_afterwards() {
 }
 
 #[test]
-fn the_same_events_on_one_thread_and_on_two() {
+fn the_same_events_on_any_number_of_threads() {
     let boxes = BoxSet::named("pile").expect("the set exists").boxes(20_000, 2);
     let run = |threads| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool");
@@ -265,7 +261,8 @@ fn the_same_events_on_one_thread_and_on_two() {
             all
         })
     };
-    assert!(run(1) == run(2));
+    let wanted = run(1);
+    assert!([2, 5, 16].into_iter().all(|threads| run(threads) == wanted));
 }
 
 #[test]

@@ -1,7 +1,7 @@
 //! Scenes in rapier: the shadow check finds nothing, and the same scene gives the same bits.
 
 use crate::checked::pbig;
-use pbig_core::{Backend, Config, Strategy};
+use pbig_core::{Backend, Config, Engine};
 use pbig_harness::runner::Run;
 use pbig_harness::scenes::Scene;
 use pbig_harness::shadow::Shadowed;
@@ -93,13 +93,13 @@ fn a_world_large_enough_for_threads_gives_the_same_bits_on_one_and_two() {
 #[test]
 fn every_strategy_gives_the_same_bits() {
     let scene = Scene::named("column").expect("the scene exists");
-    let with = |backend, strategy| Config { backend, strategy, ..PbigConfig::DEFAULT.into() };
+    let with = |backend, engine| Config { backend, engine, ..PbigConfig::DEFAULT.into() };
     let wanted = bits(scene, PbigConfig::DEFAULT.into(), 2, 120);
     let configs = [
-        with(Backend::Cpu, Strategy::Grid),
-        with(Backend::Cpu, Strategy::Pbig),
-        with(Backend::Brute, Strategy::Auto),
-        with(Backend::Gpu, Strategy::Auto),
+        with(Backend::Cpu, Some(Engine::Rebuild)),
+        with(Backend::Cpu, Some(Engine::Edit)),
+        with(Backend::Brute, None),
+        with(Backend::Gpu, None),
     ];
     for config in configs.into_iter().filter(pbig_tests::may_run) {
         assert!(bits(scene, config, 2, 120) == wanted, "{config:?}");

@@ -101,7 +101,7 @@ impl Aabb {
     /// Returns both corners, three lanes each; the fourth holds anything.
     #[cfg(target_arch = "x86_64")]
     #[inline(always)]
-    fn corners(&self) -> (std::arch::x86_64::__m128, std::arch::x86_64::__m128) {
+    pub(crate) fn corners(&self) -> (std::arch::x86_64::__m128, std::arch::x86_64::__m128) {
         use std::arch::x86_64::{_mm_loadu_ps, _mm_shuffle_ps};
         // SAFETY: SSE is part of the architecture. A box is six numbers; the loads are of the first four and the last four.
         unsafe {

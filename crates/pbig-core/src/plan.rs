@@ -54,6 +54,8 @@ pub struct Plan {
     pub algorithm: Algorithm,
     /// Valid boxes.
     pub boxes: u32,
+    /// Where the cells begin, in the boxes' length unit.
+    pub origin: [f64; 3],
     /// Edges of a cell, in the boxes' length unit ([`Algorithm::Grid`] and [`Algorithm::Edit`]).
     pub cell: [f32; 3],
     /// Cells by axis.
@@ -78,6 +80,7 @@ impl Plan {
         Self {
             algorithm,
             boxes: (grid.len + grid.oversize.len()) as u32,
+            origin: grid.plan.cells.origin(),
             cell: grid.plan.cells.edges(),
             dims: grid.plan.cells.dims(),
             scan: grid.plan.scan,

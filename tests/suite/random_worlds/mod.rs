@@ -11,7 +11,7 @@ use ops::{Op, any_op, apply};
 use pbig_core::Config;
 use pbig_harness::shadow::Shadowed;
 use pbig_harness::world::World;
-use pbig_tests::{asked, needs_gpu};
+use pbig_tests::{engines, needs_gpu};
 use proptest::collection::vec;
 use proptest::prelude::ProptestConfig;
 use proptest::test_runner::{RngAlgorithm, TestCaseError, TestError, TestRng, TestRunner};
@@ -333,7 +333,7 @@ fn random_worlds_agree_with_stock_and_the_oracle() {
     let tally = on_cpu.plus(on_grid);
     tally.assert_that_much_happened();
     assert!(tally.ops >= 100_000 || std::env::var_os("PROPTEST_CASES").is_some(), "{tally:?}");
-    for (_, config) in asked().into_iter().take(3) {
+    for (_, config) in engines() {
         let config = Config { margin: cpu.margin, ..config };
         on_random_ops(100, |ops| run(ops, config, Plant::Nothing)).assert_that_much_happened();
     }

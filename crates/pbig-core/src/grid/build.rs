@@ -124,15 +124,8 @@ impl Grid {
             // SAFETY: each piece has its own counts.
             let next = unsafe { &mut counts.part(piece..piece + 1)[0].0 };
             let range = piece_range(boxes.len(), piece, split.pieces);
-            let start = range.start;
-            for (i, (aabb, &key)) in boxes[range.clone()].iter().zip(&keys[range]).enumerate() {
-                if key < INVALID {
-                    let place = &mut next[(key >> split.shift) as usize];
-                    // SAFETY: no two boxes of any pieces have the same place.
-                    unsafe { coarse.write(*place as usize, Record::new(*aabb, (start + i) as u32, key)) };
-                    *place += 1;
-                }
-            }
+            let (boxes, keys, first_id) = (&boxes[range.clone()], &keys[range.clone()], range.start as u32);
+            dispatch(ScatterRecords { boxes, keys, first_id, next, coarse, shift: split.shift });
         });
     }
 
@@ -174,9 +167,10 @@ impl Kernel for CountKeys<'_> {
         let (cells, shift) = (self.plan.cells, self.shift);
         for (aabb, to) in self.boxes.iter().zip(self.keys) {
             // SAFETY: the caller has the instructions.
-            let (low, _) = unsafe { S::steps(&cells, aabb) };
-            let (mut key, mut bucket) = (cells.key(cells.cell(low)), 0);
-            if cells.takes(aabb) {
+            let (takes, mut key) =
+                unsafe { (S::takes(&cells, aabb), S::key(&cells, S::steps(&cells, aabb).0)) };
+            let mut bucket = 0;
+            if takes {
                 bucket += (key >> shift) as usize;
             } else {
                 (key, bucket) =
@@ -184,6 +178,33 @@ impl Kernel for CountKeys<'_> {
             }
             *to = key;
             self.counts.0[bucket] += 1;
+        }
+    }
+}
+
+struct ScatterRecords<'a> {
+    boxes: &'a [Aabb],
+    keys: &'a [u32],
+    first_id: u32,
+    /// By bucket: the next place.
+    next: &'a mut [u32],
+    coarse: SharedSlice<Record>,
+    shift: u32,
+}
+
+impl Kernel for ScatterRecords<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    unsafe fn run<S: Simd>(self) {
+        let Self { boxes, keys, first_id, next, coarse, shift } = self;
+        for ((aabb, &key), id) in boxes.iter().zip(keys).zip(first_id..) {
+            if key < INVALID {
+                let place = &mut next[(key >> shift) as usize];
+                // SAFETY: no two boxes of any pieces have the same place.
+                unsafe { coarse.write(*place as usize, Record::new(*aabb, id, key)) };
+                *place += 1;
+            }
         }
     }
 }

@@ -51,6 +51,11 @@ impl Cells {
         self.dims.map(|dim| dim as u32)
     }
 
+    /// Returns where the cells begin.
+    pub(crate) fn origin(&self) -> [f64; 3] {
+        [self.origin[0], self.origin[1], self.origin[2]]
+    }
+
     /// Returns the edges of a cell, in the boxes' unit.
     pub(crate) fn edges(&self) -> [f32; 3] {
         std::array::from_fn(|k| (f64::from(1u32 << self.shift) / self.scale[k]) as f32)

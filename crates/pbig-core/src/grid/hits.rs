@@ -37,7 +37,6 @@ pub(crate) struct Rule<'a> {
 pub(crate) struct Hits {
     /// A hit each: slot of the query, first slot of the block, mask (28, 28 and 8 bits).
     blocks: Vec<u64>,
-    len: usize,
     queries: Vec<u32>,
     places: Vec<u32>,
     /// The pairs, in no particular order.
@@ -56,6 +55,35 @@ pub(crate) struct Hits {
     pub(super) records: Vec<Record>,
 }
 
+/// Writes hits. A value of its own, so that a loop keeps it in registers.
+pub(super) struct HitWriter {
+    blocks: *mut u64,
+    len: usize,
+    /// Candidates tested.
+    pub(super) tests: u64,
+}
+
+impl HitWriter {
+    /// Adds a hit unless its mask is empty.
+    ///
+    /// # Safety
+    /// The hits that the writer is of still live. At most [`SLACK`] hits are added between two calls of
+    /// [`HitWriter::has_room`] that return true, or a flush.
+    #[inline(always)]
+    pub(super) unsafe fn push(&mut self, query: usize, first: usize, mask: u32) {
+        debug_assert!(self.len < ROOM + SLACK);
+        // SAFETY: the caller keeps the room.
+        unsafe { *self.blocks.add(self.len) = (query as u64) << 36 | (first as u64) << 8 | u64::from(mask) };
+        self.len += usize::from(mask != 0);
+    }
+
+    /// Returns true if [`SLACK`] more hits fit.
+    #[inline(always)]
+    pub(super) fn has_room(&self) -> bool {
+        self.len <= ROOM
+    }
+}
+
 impl Hits {
     /// Forgets the pairs of an earlier search; counts those of the next one in `groups` groups of `1 << shift` ids.
     pub(crate) fn begin(&mut self, groups: usize, shift: u32) {
@@ -66,7 +94,7 @@ impl Hits {
         self.groups.clear();
         self.groups.resize(groups, 0);
         self.group_shift = shift;
-        (self.len, self.tests, self.overlaps, self.accounted, self.is_full) = (0, 0, 0, 0, false);
+        (self.tests, self.overlaps, self.accounted, self.is_full) = (0, 0, 0, false);
     }
 
     /// Returns true if more pairs were found than may be.
@@ -74,24 +102,10 @@ impl Hits {
         self.is_full
     }
 
-    /// Adds a hit unless its mask is empty.
-    ///
-    /// # Safety
-    /// At most [`SLACK`] hits are added between two calls of [`Hits::has_room`] that return true.
+    /// Returns a writer of hits, which begins with none.
     #[inline(always)]
-    pub(super) unsafe fn push(&mut self, query: usize, first: usize, mask: u32) {
-        debug_assert!(self.len < self.blocks.len());
-        // SAFETY: the caller keeps the room.
-        unsafe {
-            *self.blocks.get_unchecked_mut(self.len) = (query as u64) << 36 | (first as u64) << 8 | u64::from(mask);
-        }
-        self.len += usize::from(mask != 0);
-    }
-
-    /// Returns true if [`SLACK`] more hits fit.
-    #[inline(always)]
-    pub(super) fn has_room(&self) -> bool {
-        self.len <= ROOM
+    pub(super) fn writer(&mut self) -> HitWriter {
+        HitWriter { blocks: self.blocks.as_mut_ptr(), len: 0, tests: 0 }
     }
 
     /// Tests all hits exactly and keeps the pairs that the rule allows.
@@ -99,20 +113,20 @@ impl Hits {
     /// # Safety
     /// The slots of all hits are inside `records`, and the processor has the instructions.
     #[inline(always)]
-    pub(super) unsafe fn flush<S: Simd>(&mut self, records: &[Record], rule: &Rule<'_>) {
+    pub(super) unsafe fn flush<S: Simd>(&mut self, writer: &mut HitWriter, records: &[Record], rule: &Rule<'_>) {
         // SAFETY: the caller's promise; the lists have room for all candidates, and `AHEAD` more are read.
         unsafe {
-            let candidates = self.expand::<S>();
+            let candidates = self.expand::<S>(writer.len);
             self.test(records, candidates, rule);
         }
-        self.len = 0;
+        writer.len = 0;
     }
 
     #[inline(always)]
-    unsafe fn expand<S: Simd>(&mut self) -> usize {
+    unsafe fn expand<S: Simd>(&mut self, len: usize) -> usize {
         let (queries, places) = (self.queries.as_mut_ptr(), self.places.as_mut_ptr());
         let mut count = 0;
-        for hit in &self.blocks[..self.len] {
+        for hit in &self.blocks[..len] {
             let (query, first, mask) = ((hit >> 36) as u32, (hit >> 8) as u32 & 0xFFF_FFFF, *hit as u32 & 255);
             // SAFETY: `ROOM + SLACK` blocks fit.
             count += unsafe { S::expand(query, first, mask, queries.add(count), places.add(count)) };

@@ -4,7 +4,7 @@ use crate::Aabb;
 
 /// A box with its id and the key of its cell.
 #[repr(C, align(32))]
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, bytemuck::Pod, bytemuck::Zeroable)]
 pub(crate) struct Record {
     pub(crate) aabb: Aabb,
     pub(crate) id: u32,
@@ -16,8 +16,12 @@ const _: () = assert!(size_of::<Record>() == 32);
 impl Record {
     pub(crate) const EMPTY: Self = Self { aabb: Aabb::NOWHERE, id: 0, key: 0 };
 
-    pub(crate) const fn new(aabb: Aabb, id: u32, key: u32) -> Self {
-        Self { aabb, id, key }
+    /// Makes a record. By words of eight bytes: built number by number it would be waited for when it is copied.
+    #[inline(always)]
+    pub(crate) fn new(aabb: Aabb, id: u32, key: u32) -> Self {
+        let [x, y, z]: [u64; 3] = bytemuck::cast(aabb);
+        let tail = u64::from_ne_bytes(bytemuck::cast([id, key]));
+        bytemuck::cast([x, y, z, tail])
     }
 
     /// The exact test of two valid boxes, see [`Aabb::overlaps`]. A record has two numbers behind its box, so that both

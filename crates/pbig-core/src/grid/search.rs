@@ -2,7 +2,7 @@
 //! cell is lower.
 
 use super::cells::{Cells, query_of};
-use super::hits::{Hits, Rule};
+use super::hits::{HitWriter, Hits, Rule};
 use super::plan::NeighbourScan;
 use super::record::Record;
 use super::simd::{BLOCK, Kernel, Simd, dispatch};
@@ -84,6 +84,7 @@ impl Scan<'_, '_> {
         let (dx, layer) = (self.cells.dims[0] as usize, (self.cells.dims[0] * self.cells.dims[1]) as usize);
         let (starts, records) = (self.grid.starts.as_ptr(), self.grid.records.as_ptr());
         let codes = self.grid.codes.as_ptr();
+        let mut writer = hits.writer();
         for slot in slots {
             // SAFETY: the ring of border cells is never a box's own: all keys below are inside `starts`, all slots
             // inside `codes`, which has two blocks more.
@@ -91,68 +92,80 @@ impl Scan<'_, '_> {
                 let query = query_of(*codes.add(slot));
                 let cell = starts.add((*records.add(slot)).key as usize);
                 let row = |first: *const u32| (*first as usize, *first.add(3) as usize);
-                self.run::<S>(query, slot, (slot + 1, *cell.add(2) as usize), hits);
-                self.run::<S>(query, slot, row(cell.add(dx - 1)), hits);
-                self.run::<S>(query, slot, row(cell.add(layer - dx - 1)), hits);
-                self.run::<S>(query, slot, row(cell.add(layer - 1)), hits);
-                self.run::<S>(query, slot, row(cell.add(layer + dx - 1)), hits);
+                let runs = [
+                    (slot + 1, *cell.add(2) as usize),
+                    row(cell.add(dx - 1)),
+                    row(cell.add(layer - dx - 1)),
+                    row(cell.add(layer - 1)),
+                    row(cell.add(layer + dx - 1)),
+                ];
+                let mut longest = 0;
+                for (first, end) in runs {
+                    self.block::<S>(query, slot, (first, end), &mut writer);
+                    writer.tests += (end - first) as u64;
+                    longest = longest.max(end - first);
+                }
+                if longest > BLOCK {
+                    for (first, end) in runs {
+                        self.rest::<S>(query, slot, (first + BLOCK, end), &mut writer, hits);
+                    }
+                }
             }
-            self.make_room::<S>(hits);
+            self.make_room::<S>(&mut writer, hits);
         }
-        self.finish::<S>(hits);
-    }
-
-    /// Tests a run of slots of which the first block is read unseen.
-    #[inline(always)]
-    unsafe fn run<S: Simd>(&self, query: u64, slot: usize, (first, end): (usize, usize), hits: &mut Hits) {
-        // SAFETY: as the caller says.
-        unsafe { self.block::<S>(query, slot, first, end, hits) };
-        hits.tests += (end - first) as u64;
-        if end > first + BLOCK {
-            // SAFETY: as above.
-            unsafe { self.rest::<S>(query, slot, (first + BLOCK, end), hits) };
-        }
+        self.finish::<S>(writer, hits);
     }
 
     /// Tests the blocks of a run that are left.
     #[inline(always)]
-    unsafe fn rest<S: Simd>(&self, query: u64, slot: usize, (first, end): (usize, usize), hits: &mut Hits) {
-        for first in (first..end).step_by(BLOCK) {
+    unsafe fn rest<S: Simd>(
+        &self,
+        query: u64,
+        slot: usize,
+        (first, end): (usize, usize),
+        writer: &mut HitWriter,
+        hits: &mut Hits,
+    ) {
+        let mut first = first;
+        while first < end {
             // SAFETY: as the caller says.
-            unsafe { self.block::<S>(query, slot, first, end, hits) };
-            self.make_room::<S>(hits);
+            unsafe { self.block::<S>(query, slot, (first, end), writer) };
+            self.make_room::<S>(writer, hits);
+            first += BLOCK;
         }
     }
 
     /// Tests the block from `first` on, up to `end`.
     #[inline(always)]
-    unsafe fn block<S: Simd>(&self, query: u64, slot: usize, first: usize, end: usize, hits: &mut Hits) {
+    unsafe fn block<S: Simd>(&self, query: u64, slot: usize, (first, end): (usize, usize), writer: &mut HitWriter) {
         // SAFETY: the codes are padded by two blocks of tombstones; the caller keeps the room.
         unsafe {
             let mask = S::test(query, self.grid.codes.as_ptr().add(first));
             let beyond = (end - first).min(BLOCK) as u32;
-            hits.push(slot, first, mask & ((1u32 << beyond) - 1));
+            writer.push(slot, first, mask & ((1u32 << beyond) - 1));
         }
     }
 
     #[inline(always)]
-    fn make_room<S: Simd>(&self, hits: &mut Hits) {
-        if !hits.has_room() {
+    fn make_room<S: Simd>(&self, writer: &mut HitWriter, hits: &mut Hits) {
+        if !writer.has_room() {
             // SAFETY: hits have slots of this grid; the caller has the instructions.
-            unsafe { hits.flush::<S>(&self.grid.records, self.rule) };
+            unsafe { hits.flush::<S>(writer, &self.grid.records, self.rule) };
         }
     }
 
     #[inline(always)]
-    fn finish<S: Simd>(&self, hits: &mut Hits) {
+    fn finish<S: Simd>(&self, mut writer: HitWriter, hits: &mut Hits) {
         // SAFETY: as above.
-        unsafe { hits.flush::<S>(&self.grid.records, self.rule) };
+        unsafe { hits.flush::<S>(&mut writer, &self.grid.records, self.rule) };
+        hits.tests += writer.tests;
     }
 
     /// Visits, for each box, the cells after its own in which the lower corner of an overlapping box can lie.
     #[inline(always)]
     unsafe fn windows<S: Simd, const WRAPS: bool>(&self, slots: Range<usize>, hits: &mut Hits) {
         let cells = &self.cells;
+        let mut writer = hits.writer();
         for slot in slots {
             let record: &Record = &self.grid.records[slot];
             // SAFETY: the caller has the instructions; slots come from `starts`.
@@ -166,41 +179,55 @@ impl Scan<'_, '_> {
                 let key = record.key as usize;
                 let own_row = if WRAPS { 0 } else { (window.high[0] - own[0]) as usize };
                 let rest_of_row = (slot + 1, self.grid.starts[key + own_row + 1] as usize);
-                self.slots::<S>(query, slot, rest_of_row, hits);
+                self.slots::<S>(query, slot, rest_of_row, &mut writer, hits);
                 if WRAPS {
                     let row = cells.row::<WRAPS>([own[0] + 1, own[1], own[2]], window.high[0]);
-                    self.row::<S>(query, slot, row, hits);
+                    self.row::<S>(query, slot, row, &mut writer, hits);
                 }
                 for y in own[1] + 1..=window.high[1] {
                     let row = cells.row::<WRAPS>([window.low[0], y, own[2]], window.high[0]);
-                    self.row::<S>(query, slot, row, hits);
+                    self.row::<S>(query, slot, row, &mut writer, hits);
                 }
                 for z in own[2] + 1..=window.high[2] {
                     for y in window.low[1]..=window.high[1] {
                         let row = cells.row::<WRAPS>([window.low[0], y, z], window.high[0]);
-                        self.row::<S>(query, slot, row, hits);
+                        self.row::<S>(query, slot, row, &mut writer, hits);
                     }
                 }
             }
         }
-        self.finish::<S>(hits);
+        self.finish::<S>(writer, hits);
     }
 
     /// Tests a row of cells.
     #[inline(always)]
-    unsafe fn row<S: Simd>(&self, query: u64, slot: usize, row: [KeyRun; 2], hits: &mut Hits) {
+    unsafe fn row<S: Simd>(
+        &self,
+        query: u64,
+        slot: usize,
+        row: [KeyRun; 2],
+        writer: &mut HitWriter,
+        hits: &mut Hits,
+    ) {
         for run in row {
             // SAFETY: as the caller says.
-            unsafe { self.slots::<S>(query, slot, self.grid.slots(run), hits) };
+            unsafe { self.slots::<S>(query, slot, self.grid.slots(run), writer, hits) };
         }
     }
 
     /// Tests a run of slots, and counts the tests.
     #[inline(always)]
-    unsafe fn slots<S: Simd>(&self, query: u64, slot: usize, slots: (usize, usize), hits: &mut Hits) {
-        hits.tests += (slots.1 - slots.0) as u64;
+    unsafe fn slots<S: Simd>(
+        &self,
+        query: u64,
+        slot: usize,
+        slots: (usize, usize),
+        writer: &mut HitWriter,
+        hits: &mut Hits,
+    ) {
+        writer.tests += (slots.1 - slots.0) as u64;
         // SAFETY: as the caller says.
-        unsafe { self.rest::<S>(query, slot, slots, hits) };
+        unsafe { self.rest::<S>(query, slot, slots, writer, hits) };
     }
 }
 

@@ -17,6 +17,12 @@ pub(crate) trait Simd {
     /// Returns both corners of a box in steps.
     unsafe fn steps(cells: &Cells, aabb: &Aabb) -> (Steps, Steps);
 
+    /// Returns the key of the cell of a point, see [`Cells::cell`].
+    unsafe fn key(cells: &Cells, point: Steps) -> u32;
+
+    /// Returns true for a valid box that is not oversize, see [`Cells::takes`].
+    unsafe fn takes(cells: &Cells, aabb: &Aabb) -> bool;
+
     /// Returns the code of a box.
     unsafe fn code(low: Steps, high: Steps) -> u64;
 
@@ -45,6 +51,16 @@ impl Simd for Portable {
     #[inline(always)]
     unsafe fn steps(cells: &Cells, aabb: &Aabb) -> (Steps, Steps) {
         steps_portable(cells, aabb)
+    }
+
+    #[inline(always)]
+    unsafe fn key(cells: &Cells, point: Steps) -> u32 {
+        cells.key(cells.cell(point))
+    }
+
+    #[inline(always)]
+    unsafe fn takes(cells: &Cells, aabb: &Aabb) -> bool {
+        cells.takes(aabb)
     }
 
     #[inline(always)]
@@ -141,9 +157,7 @@ impl Simd for Avx2 {
         use std::arch::x86_64::*;
         // SAFETY: the loads lie inside the box and the cells; the caller has AVX2.
         unsafe {
-            let first = std::ptr::from_ref(aabb).cast::<f32>();
-            let max = _mm_loadu_ps(first.add(2));
-            let (min, max) = (_mm_loadu_ps(first), _mm_shuffle_ps::<0b00_11_10_01>(max, max));
+            let (min, max) = aabb.corners();
             let origin = _mm256_loadu_pd(cells.origin.as_ptr());
             let scale = _mm256_loadu_pd(cells.scale.as_ptr());
             let steps = |corner: __m128| -> Steps {
@@ -153,6 +167,39 @@ impl Simd for Avx2 {
                 std::mem::transmute(_mm256_cvtpd_epi32(x))
             };
             (steps(min), steps(max))
+        }
+    }
+
+    #[inline(always)]
+    unsafe fn key(cells: &Cells, point: Steps) -> u32 {
+        use std::arch::x86_64::*;
+        let [x, y, z] = cells.dims;
+        // SAFETY: the caller has AVX2.
+        unsafe {
+            let point = std::mem::transmute::<Steps, __m128i>(point);
+            let cell = _mm_sra_epi32(point, _mm_cvtsi32_si128(cells.shift as i32));
+            let cell = if cells.wraps {
+                _mm_and_si128(cell, _mm_setr_epi32(x - 1, y - 1, z - 1, 0))
+            } else {
+                let most = _mm_setr_epi32(x - 2, y - 2, z - 2, 0);
+                _mm_min_epi32(_mm_max_epi32(cell, _mm_set1_epi32(1)), most)
+            };
+            let key = _mm_mullo_epi32(cell, _mm_setr_epi32(1, x, x.wrapping_mul(y), 0));
+            let key = _mm_add_epi32(key, _mm_shuffle_epi32::<0b01_00_11_10>(key));
+            _mm_cvtsi128_si32(_mm_add_epi32(key, _mm_shuffle_epi32::<0b10_11_00_01>(key))) as u32
+        }
+    }
+
+    #[inline(always)]
+    unsafe fn takes(cells: &Cells, aabb: &Aabb) -> bool {
+        use std::arch::x86_64::*;
+        let [x, y, z] = cells.max_extent;
+        // SAFETY: the caller has AVX2.
+        unsafe {
+            let (min, max) = aabb.corners();
+            let extent = _mm_sub_ps(max, min);
+            let fits = _mm_cmple_ps(extent, _mm_setr_ps(x, y, z, 0.0));
+            _mm_movemask_ps(_mm_and_ps(_mm_cmpge_ps(extent, _mm_setzero_ps()), fits)) & 7 == 7
         }
     }
 
