@@ -1,23 +1,23 @@
-//! A finder's pairs are the oracle's, bit by bit, also in its second call and with filters.
+//! The pairs of a finder are the oracle's, bit by bit, also in its second call and with filters.
 
-use super::input::{Input, config};
-use pbig_core::{Aabb, Finder, Pair, ProxyFilter, oracle};
+use super::input::Input;
+use pbig_core::{Aabb, Backend, CellRule, Config, Engine, Finder, GpuOptions, Order, ProxyFilter};
+use pbig_core::{oracle, study};
 
-/// One byte of settings, then boxes, each with a filter where the settings say so.
+/// One byte of settings, then boxes, each with a filter if the settings ask for filters.
 pub fn finder_against_oracle(data: &[u8]) {
     let mut input = Input(data);
     let Some(settings) = input.byte() else { return };
-    let mut finder = Finder::new(config(settings & 15));
+    let config = config(settings);
+    let mut finder = Finder::new(config);
     let filtered = settings & 16 != 0;
     let (boxes, filters) = read(&mut input, filtered);
-    // Half of them a second time: nothing of the first call may be left.
+    // Half of the boxes a second time: nothing of the first call may be left.
     for n in [boxes.len(), boxes.len() / 2] {
-        let (boxes, filters) = (&boxes[..n], &filters[..n]);
-        let open = vec![ProxyFilter::ALL; n];
-        let wanted = oracle::pairs_filtered(boxes, if filtered { filters } else { &open });
-        let found = if filtered { finder.find_filtered(boxes, filters) } else { finder.find(boxes) };
-        let found = found.map(<[Pair]>::to_vec);
-        assert_eq!(found, Ok(wanted), "{}", finder.report().plan);
+        check_finder(&mut finder, config.order, &boxes[..n], filtered.then_some(&filters[..n]));
+    }
+    if !filtered {
+        check_pbig(&boxes, &pbig_options(settings));
     }
 }
 
@@ -28,4 +28,47 @@ fn read(input: &mut Input, filtered: bool) -> (Vec<Aabb>, Vec<ProxyFilter>) {
         filters.push(if filtered { input.filter().unwrap_or_default() } else { ProxyFilter::ALL });
     }
     (boxes, filters)
+}
+
+/// Returns the settings of the finder. A forced engine takes a grid even for few boxes.
+fn config(settings: u8) -> Config {
+    let base = Config { backend: Backend::Cpu, ..Config::DEFAULT };
+    let grid = Config { engine: Some(Engine::Rebuild), ..base };
+    match settings & 3 {
+        0 => base,
+        1 => grid,
+        2 => Config { order: Order::Unspecified, ..grid },
+        _ => Config { backend: Backend::Brute, ..base },
+    }
+}
+
+fn check_finder(finder: &mut Finder, order: Order, boxes: &[Aabb], filters: Option<&[ProxyFilter]>) {
+    let found = match filters {
+        Some(filters) => finder.find_filtered(boxes, filters),
+        None => finder.find(boxes),
+    };
+    let mut found = found.expect("few boxes").to_vec();
+    if order == Order::Unspecified {
+        found.sort_unstable();
+    }
+    let wanted = filters.map_or_else(|| oracle::pairs(boxes), |filters| oracle::pairs_filtered(boxes, filters));
+    assert_eq!(found, wanted, "{}", finder.report().plan);
+}
+
+fn pbig_options(settings: u8) -> GpuOptions {
+    GpuOptions {
+        cell_rule: if settings & 32 == 0 { CellRule::Objective } else { CellRule::Density },
+        small_cell: if settings & 64 == 0 { 32 } else { 1 },
+        boxes_per_cell: if settings & 128 == 0 { 4.0 } else { 1.0 },
+        ..GpuOptions::DEFAULT
+    }
+}
+
+/// Compares PBIG's grid, and its counts of tests, with the oracle.
+fn check_pbig(boxes: &[Aabb], options: &GpuOptions) {
+    let found = study::pbig_grid(boxes, options).expect("few boxes");
+    let wanted = oracle::pairs(boxes);
+    assert_eq!(found.pairs, wanted, "{}", found.plan);
+    let counted = found.checks.unnecessary + found.checks.redundant + wanted.len() as u64;
+    assert_eq!(found.checks.made, counted, "{}", found.plan);
 }

@@ -1,8 +1,6 @@
 //! Bytes as boxes: short, so that a mutation of one byte is a box that is a little different, equal, touching or odd.
 
-use pbig_core::{
-    Aabb, Backend, CellRule, Config, Costs, GpuOptions, Grids, Look, ProxyFilter, Strategy, Study, Updates,
-};
+use pbig_core::{Aabb, ProxyFilter};
 
 /// Numbers at which something changes: signs, ends of ranges, no numbers.
 const SPECIAL: [f32; 16] = [
@@ -64,31 +62,6 @@ impl Input<'_> {
             memberships: bits(0) | bits(2) << 8,
             mask: bits(4) | bits(6) << 8 | bits(0),
         })
-    }
-}
-
-/// Settings of a search on the CPU. Costs are given: measured ones would make the same input go other ways.
-pub(crate) fn config(choice: u8) -> Config {
-    let base = Config { backend: Backend::Cpu, costs: Some(Costs::REFERENCE), ..Config::DEFAULT };
-    let with = |strategy| Config { strategy, ..base };
-    let grid = with(Strategy::Grid);
-    let by = |updates| Config { study: Study { updates, ..Study::DEFAULT }, ..grid };
-    let of = |grids, look| Config { study: Study { grids, look, ..Study::DEFAULT }, ..grid };
-    match choice % 11 {
-        0 => base,
-        1 => Config { brute_below: 0, ..base },
-        2 => grid,
-        3 => with(Strategy::Pbig),
-        4 => Config {
-            gpu: GpuOptions { cell_rule: CellRule::Density, small_cell: 1, ..GpuOptions::DEFAULT },
-            ..with(Strategy::Pbig)
-        },
-        5 => Config { backend: Backend::Brute, ..base },
-        6 => by(Updates::Edits),
-        7 => by(Updates::Anew),
-        8 => by(Updates::Near),
-        9 => of(Grids::Levels, Look::Trimmed),
-        _ => of(Grids::One, Look::Seldom),
     }
 }
 

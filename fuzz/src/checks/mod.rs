@@ -1,5 +1,6 @@
 //! A check for each fuzz target: bytes in, a panic where a contract is broken.
 
+mod engines;
 mod finder;
 mod input;
 mod readers;

@@ -1,4 +1,4 @@
-//! What the fuzz targets check, without instruments: every input that once failed, and some that are random.
+//! The checks of the fuzz targets, without instruments: on every input that once failed, and on random bytes.
 
 use super::memory;
 use pbig_core::decode;
