@@ -46,11 +46,16 @@ impl AllPairs {
         let may_be_brute = request.config.forced_engine().is_none();
         let is_few = may_be_brute && request.boxes.len() <= policy::BRUTE_FORCE_UP_TO_BOXES;
         let brute = request.config.backend == Backend::Brute || is_few;
-        if brute { self.test_all(request, &rule, report) } else { self.search(request, grid, &rule, report) }
+        if brute {
+            self.test_all(request, &rule, report)
+        } else {
+            self.search(request, grid, &rule, report)
+        }
         let sum = |of: fn(&Hits) -> u64| self.hits.iter().map(of).sum::<u64>();
         let (made, overlaps) = (sum(|hits| hits.tests), sum(|hits| hits.overlaps));
         report.checks = Checks { made, unnecessary: made - overlaps, redundant: 0 };
-        let is_too_many = self.hits.iter().any(Hits::is_full) || sum(|hits| hits.pairs.len() as u64) > max_pairs;
+        let is_too_many =
+            self.hits.iter().any(Hits::is_full) || sum(|hits| hits.pairs.len() as u64) > max_pairs;
         if is_too_many { Err(Error::TooManyPairs { limit: max_pairs }) } else { Ok(!brute) }
     }
 

@@ -1,10 +1,10 @@
 //! The GPU of a finder or a broad phase, if it has one, and what is reported when it cannot do the work.
 
-use crate::policy::{AvailableDevice, Choice, choose_backend};
-use crate::report::Report;
 use crate::Config;
 #[cfg(feature = "gpu")]
 use crate::gpu::{ChangeRequest, Failure, GpuFinder, GpuFound, SearchRequest, available};
+use crate::policy::{AvailableDevice, Choice, choose_backend};
+use crate::report::Report;
 #[cfg(feature = "gpu")]
 use crate::report::{Clock, stage};
 #[cfg(feature = "gpu")]

@@ -113,7 +113,9 @@ impl fmt::Display for Plan {
             Algorithm::Sweep => return write!(f, "sweep: changed boxes are tested against all {boxes}"),
             Algorithm::Gpu => return self.write_gpu(f),
             Algorithm::Grid => write!(f, "grid: {boxes} boxes are sorted and searched")?,
-            Algorithm::Edit => write!(f, "edit: {} of {boxes} boxes are out of the grid's order", self.spilled)?,
+            Algorithm::Edit => {
+                write!(f, "edit: {} of {boxes} boxes are out of the grid's order", self.spilled)?
+            }
         }
         let ([x, y, z], [dx, dy, dz]) = (self.cell, self.dims);
         write!(f, "; {dx} x {dy} x {dz} cells of {x:.3} x {y:.3} x {z:.3}")?;

@@ -3,7 +3,7 @@
 
 use super::memory;
 use crate::follower::Follower;
-use pbig_core::{Aabb, Backend, Coding, Config, ProxyFilter, Report, Engine};
+use pbig_core::{Aabb, Backend, Coding, Config, Engine, ProxyFilter, Report};
 use pbig_harness::boxes::BoxSet;
 use pbig_tests::{gpu, needs_gpu};
 use rand::rngs::StdRng;

@@ -28,7 +28,9 @@ impl<'de> Deserialize<'de> for Version {
         if version == VERSION {
             return Ok(Self(version));
         }
-        let why = format!("snapshot: format {version}, but this pbig-core reads format {VERSION}; save the world anew");
+        let why = format!(
+            "snapshot: format {version}, but this pbig-core reads format {VERSION}; save the world anew"
+        );
         Err(D::Error::custom(why))
     }
 }
@@ -100,7 +102,8 @@ impl Snapshot {
 
     fn check(&self) -> Result<(), String> {
         let ids = self.boxes.len();
-        if self.filters.len() != ids || self.present.len() != ids || ids as u64 > Limits::UNLIMITED.max_boxes {
+        if self.filters.len() != ids || self.present.len() != ids || ids as u64 > Limits::UNLIMITED.max_boxes
+        {
             let (filters, present) = (self.filters.len(), self.present.len());
             return Err(format!("snapshot: {ids} boxes, {filters} filters, {present} flags of presence"));
         }

@@ -100,8 +100,7 @@ impl Sweep {
         if is_other_s {
             return;
         }
-        let allows = !world.is_filtered
-            || world.filters[id as usize].allows(&world.filters[other as usize]);
+        let allows = !world.is_filtered || world.filters[id as usize].allows(&world.filters[other as usize]);
         let (was, is) = (was && self.paired_before(world, id, other), is && allows);
         let ended = was && (world.was_removed(id) || world.was_removed(other));
         let pair = Pair::new(id, other);

@@ -164,7 +164,8 @@ fn pairs_of_a_box_and_boxes_in_a_box_are_those_of_the_last_update() {
         let mut found = world.broad_phase.overlapping(&looked_for);
         found.sort_unstable();
         let overlaps = |id: &u32| {
-            looked_for.is_valid() && world.broad_phase.fat_aabb(*id).is_some_and(|fat| fat.overlaps(&looked_for))
+            looked_for.is_valid()
+                && world.broad_phase.fat_aabb(*id).is_some_and(|fat| fat.overlaps(&looked_for))
         };
         assert!((0..1100).filter(overlaps).eq(found));
     }

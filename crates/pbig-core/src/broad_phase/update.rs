@@ -113,7 +113,8 @@ impl BroadPhase {
         let world = &self.world;
         let grouping = Grouping::new(world.ids());
         let filters = world.is_filtered.then_some(&world.filters[..]);
-        let request = Request { boxes: &world.boxes, filters, config: &self.config, grouping: Some(grouping) };
+        let request =
+            Request { boxes: &world.boxes, filters, config: &self.config, grouping: Some(grouping) };
         let invalid = self.report.invalid;
         self.sweep.expire();
         self.has_grid = self.all_pairs.find(&request, &mut self.grid, &mut self.report)?;

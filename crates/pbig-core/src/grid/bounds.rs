@@ -9,7 +9,6 @@ const FARTHEST: f32 = 1e37;
 /// Boxes of a sample.
 pub(super) const SAMPLE_SIZE: usize = 128;
 
-
 /// Boxes looked at for a sample: some may be invalid.
 const SAMPLE_TRIES: usize = 1024;
 

@@ -80,8 +80,7 @@ impl Grid {
         run(workers, split.pieces, |_, piece| {
             let range = piece_range(boxes.len(), piece, split.pieces);
             // SAFETY: each piece has its own boxes and counts.
-            let (keys, counts) =
-                unsafe { (keys.part(range.clone()), &mut counts.part(piece..piece + 1)[0]) };
+            let (keys, counts) = unsafe { (keys.part(range.clone()), &mut counts.part(piece..piece + 1)[0]) };
             counts.0[..=split.buckets].fill(0);
             (counts.0[Counts::OVERSIZE], counts.0[Counts::INVALID]) = (0, 0);
             dispatch(CountKeys { plan, boxes: &boxes[range], keys, counts, shift: split.shift });

@@ -145,7 +145,9 @@ fn round_to_i32(x: f64) -> i32 {
 pub(super) fn code_portable(low: Steps, high: Steps) -> u64 {
     let field = |step: i32, k: usize| u64::from(step as u32 & 511) << (10 * k);
     let half = |of: Steps, sign: i32| {
-        field(sign.wrapping_mul(of[0]), 0) | field(sign.wrapping_mul(of[1]), 1) | field(sign.wrapping_mul(of[2]), 2)
+        field(sign.wrapping_mul(of[0]), 0)
+            | field(sign.wrapping_mul(of[1]), 1)
+            | field(sign.wrapping_mul(of[2]), 2)
     };
     half(low, -1) | half(high, 1) << 32
 }

@@ -5,11 +5,11 @@
 
 use super::cells::TOMBSTONE;
 use super::lookup::Place;
+use super::plan::GridPlan;
 use super::record::Record;
+use super::search::KeyRun;
 use super::simd::{Kernel, Simd, dispatch, prefetch};
 use super::{Grid, Sorted};
-use super::plan::GridPlan;
-use super::search::KeyRun;
 use crate::Aabb;
 
 /// Boxes between a prefetch and the move.

@@ -113,7 +113,12 @@ impl Hits {
     /// # Safety
     /// The slots of all hits are inside `records`, and the processor has the instructions.
     #[inline(always)]
-    pub(super) unsafe fn flush<S: Simd>(&mut self, writer: &mut HitWriter, records: &[Record], rule: &Rule<'_>) {
+    pub(super) unsafe fn flush<S: Simd>(
+        &mut self,
+        writer: &mut HitWriter,
+        records: &[Record],
+        rule: &Rule<'_>,
+    ) {
         // SAFETY: the caller's promise; the lists have room for all candidates, and `AHEAD` more are read.
         unsafe {
             let candidates = self.expand::<S>(writer.len);
@@ -127,7 +132,8 @@ impl Hits {
         let (queries, places) = (self.queries.as_mut_ptr(), self.places.as_mut_ptr());
         let mut count = 0;
         for hit in &self.blocks[..len] {
-            let (query, first, mask) = ((hit >> 36) as u32, (hit >> 8) as u32 & 0xFFF_FFFF, *hit as u32 & 255);
+            let (query, first, mask) =
+                ((hit >> 36) as u32, (hit >> 8) as u32 & 0xFFF_FFFF, *hit as u32 & 255);
             // SAFETY: `ROOM + SLACK` blocks fit.
             count += unsafe { S::expand(query, first, mask, queries.add(count), places.add(count)) };
         }

@@ -22,15 +22,15 @@ mod search;
 mod simd;
 
 pub(crate) use edit::EditedGrid;
-pub use plan::NeighbourScan;
-pub(crate) use plan::GridPlan;
-pub(crate) use record::Record;
-pub(crate) use simd::{BLOCK, EightBoxes, Kernel, Simd, dispatch, prefetch};
-pub use simd::simd;
 pub(crate) use hits::{Hits, Rule};
 pub(crate) use lookup::{Candidates, Meet, Place};
 pub use occupied::OccupiedCell;
 pub(crate) use oversize::brute_force;
+pub(crate) use plan::GridPlan;
+pub use plan::NeighbourScan;
+pub(crate) use record::Record;
+pub use simd::simd;
+pub(crate) use simd::{BLOCK, EightBoxes, Kernel, Simd, dispatch, prefetch};
 
 use build::Counts;
 

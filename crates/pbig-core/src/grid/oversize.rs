@@ -35,7 +35,11 @@ impl Grid {
             for y in window.low[1]..=window.high[1] {
                 let first = [window.low[0], y, z];
                 let last = window.high[0];
-                let row = if cells.wraps { cells.row::<true>(first, last) } else { cells.row::<false>(first, last) };
+                let row = if cells.wraps {
+                    cells.row::<true>(first, last)
+                } else {
+                    cells.row::<false>(first, last)
+                };
                 row.into_iter().filter(|(_, count)| *count > 0).for_each(&mut visit);
             }
         }

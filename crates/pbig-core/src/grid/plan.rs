@@ -30,7 +30,7 @@ impl GridPlan {
         let space = all.trimmed(&sample);
         let is_mixed = all.largest() > policy::MIXED_SIZE_RATIO * sample.median_extent();
         let extent = if is_mixed {
-            cheapest_extent(&size_classes(boxes, workers)[..], boxes.len(), &space)
+            cheapest_extent(&size_classes(boxes, workers)[..], &space)
         } else {
             std::array::from_fn(|k| all.extent[k])
         };
@@ -40,7 +40,7 @@ impl GridPlan {
 
 /// Returns the extent of the largest boxes that the grid should take: the larger it is, the more boxes share a cell; the
 /// smaller, the more boxes are oversize. The costs are those of a test, in ns.
-fn cheapest_extent(classes: &[SizeClass], boxes: usize, space: &Bounds) -> [f32; 3] {
+fn cheapest_extent(classes: &[SizeClass], space: &Bounds) -> [f32; 3] {
     const LARGEST_CLASS: usize = 227; // 2^100: the inverse of a cell of that size is still a normal f32
     let (mut best, mut cheapest) = ([0.0; 3], f64::MAX);
     let (mut taken, mut extent) = (0, [0.0f32; 3]);
@@ -54,7 +54,6 @@ fn cheapest_extent(classes: &[SizeClass], boxes: usize, space: &Bounds) -> [f32;
             (cheapest, best) = (cost, extent);
         }
     }
-    let _ = boxes;
     best
 }
 
@@ -127,7 +126,8 @@ impl Spacing {
 
     /// Estimates how many others a box has in its cell; 0 where the sample is too small to tell.
     fn crowd(&self, sample: &Sample) -> f64 {
-        let cell = |k: usize, x: f32| ((f64::from(x) - f64::from(self.space.low[k])) / (64.0 * self.step(k))) as i64;
+        let cell =
+            |k: usize, x: f32| ((f64::from(x) - f64::from(self.space.low[k])) / (64.0 * self.step(k))) as i64;
         let mut cells = [[0i64; 3]; SAMPLE_SIZE];
         let boxes = sample.boxes();
         for (to, aabb) in cells.iter_mut().zip(boxes) {

@@ -137,7 +137,13 @@ impl Scan<'_, '_> {
 
     /// Tests the block from `first` on, up to `end`.
     #[inline(always)]
-    unsafe fn block<S: Simd>(&self, query: u64, slot: usize, (first, end): (usize, usize), writer: &mut HitWriter) {
+    unsafe fn block<S: Simd>(
+        &self,
+        query: u64,
+        slot: usize,
+        (first, end): (usize, usize),
+        writer: &mut HitWriter,
+    ) {
         // SAFETY: the codes are padded by two blocks of tombstones; the caller keeps the room.
         unsafe {
             let mask = S::test(query, self.grid.codes.as_ptr().add(first));

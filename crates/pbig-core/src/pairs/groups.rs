@@ -178,7 +178,12 @@ pub(super) struct Sorter {
 }
 
 /// Sorts pairs by the highest bits of `b`, so that rows made of them in turn are nearly sorted.
-fn sort_roughly<'a>(pairs: &[Pair], by_b: &'a mut Vec<Pair>, counts: &mut Vec<u32>, ids: usize) -> &'a [Pair] {
+fn sort_roughly<'a>(
+    pairs: &[Pair],
+    by_b: &'a mut Vec<Pair>,
+    counts: &mut Vec<u32>,
+    ids: usize,
+) -> &'a [Pair] {
     let shift = (usize::BITS - ids.leading_zeros()).saturating_sub(RADIX_BITS);
     ensure_scratch(by_b, pairs.len(), Pair::default());
     counts.clear();

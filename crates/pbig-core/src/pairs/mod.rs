@@ -10,5 +10,5 @@ mod kept;
 mod row;
 
 pub(crate) use compare::Comparison;
-pub(crate) use groups::{Groups, Grouping};
+pub(crate) use groups::{Grouping, Groups};
 pub(crate) use kept::Kept;

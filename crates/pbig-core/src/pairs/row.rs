@@ -16,7 +16,12 @@ const INSERTION_UP_TO: usize = 64;
 /// # Safety
 /// `from` has [`SHORT`] elements more than the row, and the processor the instructions.
 #[inline(always)]
-pub(super) unsafe fn sort_into<S: Simd>(from: &[u32], range: Range<usize>, to: &mut [u32], is_nearly_sorted: bool) {
+pub(super) unsafe fn sort_into<S: Simd>(
+    from: &[u32],
+    range: Range<usize>,
+    to: &mut [u32],
+    is_nearly_sorted: bool,
+) {
     let Range { start, end } = range;
     debug_assert!(end + SHORT <= from.len() && end <= to.len());
     if end - start > SHORT {

@@ -6,8 +6,8 @@
 mod backend;
 mod engine;
 
-pub(crate) use backend::{AvailableDevice, Choice, choose_backend};
 pub use backend::NoGpu;
+pub(crate) use backend::{AvailableDevice, Choice, choose_backend};
 pub(crate) use engine::{Counts, PARALLEL_FROM_EDITS, choose_engine, old_states_to_keep};
 
 /// Boxes from which several threads share a search: waking one costs about as much as 16,384 boxes take alone.

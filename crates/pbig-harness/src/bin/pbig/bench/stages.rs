@@ -101,9 +101,8 @@ impl Alone {
                 done.map(|()| in_order(whole, 0.0, &finder.report().stages))
             }
             Way::Events(broad_phase) => {
-                let (done, set) = timed(|| {
-                    broad_phase.set_many(moved, |id| Some((boxes[id as usize], ProxyFilter::ALL)))
-                });
+                let (done, set) =
+                    timed(|| broad_phase.set_many(moved, |id| Some((boxes[id as usize], ProxyFilter::ALL))));
                 done?;
                 let (done, update) = timed(|| broad_phase.update().map(|_| ()));
                 done.map(|()| in_order(set + update, set, &broad_phase.report().stages))
