@@ -51,7 +51,8 @@ fn check_finder(finder: &mut Finder, order: Order, boxes: &[Aabb], filters: Opti
     if order == Order::Unspecified {
         found.sort_unstable();
     }
-    let wanted = filters.map_or_else(|| oracle::pairs(boxes), |filters| oracle::pairs_filtered(boxes, filters));
+    let wanted =
+        filters.map_or_else(|| oracle::pairs(boxes), |filters| oracle::pairs_filtered(boxes, filters));
     assert_eq!(found, wanted, "{}", finder.report().plan);
 }
 
