@@ -102,5 +102,7 @@ step target/release/pbig pairs examples/boxes.csv
 step target/release/pbig replay examples/frames.npy
 step target/release/pbig simulate --scene pile --check --backend gpu --bodies 1500 --steps 20
 gpu_step target/release/pbig bench gpu --quick
+# The corpus as a WebAssembly module.
+step scripts/wasm.sh
 RUSTDOCFLAGS="-D warnings" step cargo doc --release --workspace --no-deps --quiet
 if $has_gpu; then echo "== all passed"; else echo "== all passed, but for what was left out"; fi
