@@ -12,9 +12,11 @@ has_std_source() {
 }
 
 # choose_cargo TARGET: sets `cargo` to a command that can build for the target, and `builds_std` to whether it
-# has to build the standard library, too. Without rustup's library for the target, Debian's Rust does that.
+# has to build the standard library, too. Where rustup cannot bring it for the target, Debian's Rust does that.
 choose_cargo() {
     cargo=(cargo) builds_std=false
+    ! has_target "$1" || return 0
+    ! command -v rustup >/dev/null || step rustup target add "$1" || true
     ! has_target "$1" || return 0
     has_std_source || ! may_install || require "Rust for $1" rustc-web cargo-web rust-web-src
     has_std_source || { give_up "the standard library for $1" "rustup target add $1" && return 1; }

@@ -52,6 +52,14 @@ gpu_step() {
     if $has_gpu; then step "$@"; else echo "== left out, there is no GPU adapter: $*"; fi
 }
 
+# lacks PACKAGE CRATE [OPTION...]: fails if the package depends on the crate.
+lacks() {
+    local package=$1 crate=$2 tree
+    shift 2
+    tree=$(cargo tree --package "$package" --edges normal --prefix none "$@")
+    case $'\n'$tree in *$'\n'"$crate v"*) echo "== $package pulls in $crate" && exit 1 ;; esac
+}
+
 if [ -f "${HOME:-}/.cargo/env" ]; then . "$HOME/.cargo/env"; fi
 command -v cc >/dev/null || require "a C compiler, for linking," build-essential
 has_rust || require_rust
@@ -59,11 +67,21 @@ has_vulkan || require "a Vulkan driver (this software one will do)" mesa-vulkan-
 
 # One profile and one set of features: everything is built once, pbig-core alone a second time.
 step cargo fmt --all --check
+# Workspaces of their own.
+for other in fuzz wasm; do
+    step cargo fmt --manifest-path "$other/Cargo.toml" --check
+done
 step cargo clippy --release --workspace --all-targets -- -D warnings
-# As apps build it: without the GPU backend, and with one feature.
+# As apps build them: without the GPU backend, with one feature or with none.
 for feature in '' serde debug-render shadow; do
     step cargo clippy --release -p rapier-pbig --features "$feature" -- -D warnings
 done
+for package in pbig-core rapier-pbig; do
+    step cargo clippy --release -p "$package" --no-default-features -- -D warnings
+    lacks "$package" rayon --no-default-features
+    lacks "$package" wgpu
+done
+lacks pbig-wasm rayon --manifest-path wasm/Cargo.toml
 step cargo build --release --workspace --examples --bins
 look_for_adapter
 # The suite and the program are tested on every backend, and fail where the CPU does a GPU's work.
@@ -72,7 +90,7 @@ $has_gpu || step cargo test --release --workspace --exclude pbig-tests --exclude
 # Rapier's own features beside these are in scripts/features.sh; one of the other kind for all.
 gpu_step scripts/features.sh deterministic
 # Once more with overflow checks and debug assertions, where there is unsafe code and index arithmetic.
-step cargo test -p pbig-core --features serde
+step cargo test -p pbig-core --features serde,unstable-study
 # The commands that the README shows, at a size that takes seconds.
 step target/release/examples/falling_objects --bodies 500 --steps 60
 step target/release/examples/drop_in
@@ -84,7 +102,7 @@ step target/release/pbig pairs examples/boxes.csv
 step target/release/pbig replay examples/frames.npy
 step target/release/pbig simulate --scene pile --check --backend gpu --bodies 1500 --steps 20
 gpu_step target/release/pbig bench gpu --quick
+# The corpus as a WebAssembly module.
+step scripts/wasm.sh
 RUSTDOCFLAGS="-D warnings" step cargo doc --release --workspace --no-deps --quiet
-dependencies=$(cargo tree -p pbig-core --edges normal)
-case $dependencies in *wgpu*) echo "pbig-core pulls in wgpu"; exit 1 ;; esac
 if $has_gpu; then echo "== all passed"; else echo "== all passed, but for what was left out"; fi

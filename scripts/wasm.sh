@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # Runs the corpus as a WebAssembly module under node, without and with SIMD; installs what is missing as test.sh does:
 #   scripts/wasm.sh
-# From clean it takes a few minutes, because Debian's Rust builds the standard library for the target twice.
+# From clean it takes a minute or two; four where Debian's Rust has to build the standard library for the target, twice.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 . scripts/cross.sh

@@ -38,7 +38,7 @@ impl Follower {
         let all = |aabb: &Aabb| Some((*aabb, ProxyFilter::ALL));
         self.boxes = boxes.iter().map(all).collect();
         let ids: Vec<u32> = (0..boxes.len() as u32).collect();
-        let set = self.broad_phase.set_many(&ids, |id| boxes[id as usize], |aabb| all(&aabb));
+        let set = self.broad_phase.set_many(&ids, |id| all(&boxes[id as usize]));
         set.map_err(|error| error.to_string())
     }
 

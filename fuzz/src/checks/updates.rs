@@ -227,7 +227,7 @@ impl Player {
     /// Compares a query by box with a test of all stored boxes.
     fn check_overlapping(&self, input: &mut Input) -> Option<()> {
         let aabb = input.aabb(&self.given)?;
-        let overlaps = |(id, fat): (u32, Aabb)| fat.overlaps(&aabb).then_some(id);
+        let overlaps = |(id, fat): (u32, Aabb)| (aabb.is_valid() && fat.overlaps(&aabb)).then_some(id);
         let wanted: Vec<u32> = self.fat_aabbs().into_iter().filter_map(overlaps).collect();
         let found = self.engines.ask(|one| {
             let mut ids = one.overlapping(&aabb);
