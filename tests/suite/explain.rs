@@ -220,7 +220,8 @@ fn boxes_and_cells_are_drawn_with_twelve_lines_each() {
     }
     // Eight in one cell.
     for _ in 0..8 {
-        world.add(World::dynamic(glam::Vec3::splat(20.0)).can_sleep(false), ColliderBuilder::ball(0.5));
+        let body = World::dynamic(glam::Vec3::splat(20.0)).can_sleep(false).lock_translations();
+        world.add(body, ColliderBuilder::ball(0.5));
     }
     let mut broad_phase = pbig(config);
     world.step(&mut broad_phase);

@@ -192,7 +192,7 @@ fn an_edit_that_finds_too_many_pairs_can_be_repeated() {
 }
 
 fn finds_too_many(engine: Option<Engine>) {
-    let limits = Limits { max_pairs: 150, ..Limits::DEFAULT };
+    let limits = Limits { max_pairs: 250, ..Limits::DEFAULT };
     let config = Config { limits, engine, ..Config::DEFAULT };
     let mut broad_phase = BroadPhase::new(config).expect("a good margin");
     let boxes = BoxSet::named("unit").expect("the set exists").boxes(100, 1);
@@ -204,7 +204,7 @@ fn finds_too_many(engine: Option<Engine>) {
     for id in [3, 4] {
         broad_phase.set(id, Aabb::from_center([0.0; 3], [1e6; 3]), ProxyFilter::ALL).expect("a small id");
     }
-    assert_eq!(broad_phase.update().expect_err("too many pairs"), Error::TooManyPairs { limit: 150 });
+    assert_eq!(broad_phase.update().expect_err("too many pairs"), Error::TooManyPairs { limit: 250 });
     assert_eq!(broad_phase.pairs().collect::<BTreeSet<_>>(), before, "nothing has changed");
     broad_phase.set(4, boxes[4], ProxyFilter::ALL).expect("a small id");
     broad_phase.update().expect("a hundred pairs now");

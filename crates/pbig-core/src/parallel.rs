@@ -95,12 +95,21 @@ impl<T> SharedSlice<T> {
     /// # Safety
     /// `range` is inside the slice, which is still borrowed, and no other thread uses these elements while the part lives.
     #[inline(always)]
-    #[expect(clippy::mut_from_ref, reason = "the caller promises that parts do not overlap")]
     pub(crate) unsafe fn part<'a>(self, range: std::ops::Range<usize>) -> &'a mut [T] {
         debug_assert!(range.start <= range.end && range.end <= self.len);
         // SAFETY: the caller's promise.
         unsafe { std::slice::from_raw_parts_mut(self.start.add(range.start), range.end - range.start) }
     }
+}
+
+/// Runs `work(own, piece)` once for each `piece < pieces`, on at most as many threads as there are `own` values: each thread
+/// has one of them.
+pub(crate) fn run_with<T: Send>(own: &mut [T], pieces: usize, work: impl Fn(&mut T, usize) + Sync) {
+    let (threads, shared) = (own.len(), SharedSlice::new(own));
+    run(threads, pieces, |worker, piece| {
+        // SAFETY: a worker has one piece at a time, and there are as many values as workers.
+        work(unsafe { &mut shared.part(worker..worker + 1)[0] }, piece);
+    });
 }
 
 /// Makes `buffer` at least `len` elements long without copying what it held: its content is scratch.

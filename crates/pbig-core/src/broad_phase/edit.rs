@@ -6,10 +6,10 @@
 use super::world::{Old, World};
 use crate::grid::{Candidates, EditedGrid, Meet, Place, Record};
 use crate::pairs::Comparison;
-use crate::parallel::{SharedSlice, available_threads, piece_range, run};
+use crate::parallel::{SharedSlice, available_threads, piece_range, run_with};
 use crate::policy;
+use crate::report::Checks;
 use crate::{Aabb, Pair, ProxyFilter};
-use std::sync::Mutex;
 
 /// The buffers of the engine.
 #[derive(Clone, Debug, Default)]
@@ -34,8 +34,9 @@ struct Thread {
 }
 
 impl Edit {
-    /// Brings `grid` up to date with the changes of the world, and leaves the events in `events`, sorted.
-    pub(super) fn run(&mut self, world: &World, grid: &mut EditedGrid, events: &mut Comparison) {
+    /// Brings `grid` up to date with the changes of the world, and leaves the events in `events`, sorted. Returns the tests
+    /// made.
+    pub(super) fn run(&mut self, world: &World, grid: &mut EditedGrid, events: &mut Comparison) -> Checks {
         self.list(world, grid);
         let threads = if self.before.len() < policy::PARALLEL_FROM_EDITS { 1 } else { available_threads() };
         self.threads.resize_with(threads.max(self.threads.len()), Thread::default);
@@ -44,6 +45,11 @@ impl Edit {
         grid.move_all(&self.after, &self.places);
         self.find_new(world, grid, threads);
         self.gather(events);
+        let sum = |of: fn(&Candidates) -> u64| {
+            self.threads.iter().map(|thread| of(&thread.candidates)).sum::<u64>()
+        };
+        let (made, met) = (sum(|candidates| candidates.tests), sum(|candidates| candidates.met));
+        Checks { made, unnecessary: made - met, redundant: 0 }
     }
 
     /// Lists changed boxes in the order of their old cells: neighbours share cache lines.
@@ -69,11 +75,10 @@ impl Edit {
         places.clear();
         places.resize(before.len(), Place::Nowhere);
         let places = SharedSlice::new(places);
-        let all: Vec<Mutex<&mut Thread>> = all.iter_mut().map(Mutex::new).collect();
-        run(threads, threads, |_, piece| {
-            let Ok(mut thread) = all[piece].lock() else { return };
+        let (before, after) = (&*before, &*after);
+        run_with(&mut all[..threads], threads, |thread, piece| {
             let range = piece_range(before.len(), piece, threads);
-            let Thread { candidates, removed, dropped, .. } = &mut **thread;
+            let Thread { candidates, removed, dropped, .. } = thread;
             // SAFETY: each piece has its own range.
             let places = unsafe { places.part(range.clone()) };
             let (before, after) = (&before[range.clone()], &after[range]);
@@ -83,11 +88,10 @@ impl Edit {
 
     fn find_new(&mut self, world: &World, grid: &EditedGrid, threads: usize) {
         let Self { before, after, threads: all, .. } = self;
-        let all: Vec<Mutex<&mut Thread>> = all.iter_mut().map(Mutex::new).collect();
-        run(threads, threads, |_, piece| {
-            let Ok(mut thread) = all[piece].lock() else { return };
+        let (before, after) = (&*before, &*after);
+        run_with(&mut all[..threads], threads, |thread, piece| {
             let range = piece_range(after.len(), piece, threads);
-            let Thread { candidates, added, .. } = &mut **thread;
+            let Thread { candidates, added, .. } = thread;
             let (before, after) = (&before[range.clone()], &after[range]);
             grid.look_up(after, candidates, &mut New { world, before, after, added });
         });
@@ -106,7 +110,10 @@ impl Edit {
 
 impl Thread {
     fn clear(&mut self) {
-        (self.added.clear(), self.removed.clear(), self.dropped.clear());
+        self.added.clear();
+        self.removed.clear();
+        self.dropped.clear();
+        (self.candidates.tests, self.candidates.met) = (0, 0);
     }
 }
 

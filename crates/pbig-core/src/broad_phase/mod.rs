@@ -159,7 +159,8 @@ impl BroadPhase {
         (self.sweep, self.edit) = (Sweep::default(), Edit::default());
         (self.all_pairs, self.groups) = (AllPairs::default(), Groups::default());
         self.comparison.shrink();
-        (self.events.added.shrink_to_fit(), self.events.removed.shrink_to_fit());
+        self.events.added.shrink_to_fit();
+        self.events.removed.shrink_to_fit();
     }
 }
 

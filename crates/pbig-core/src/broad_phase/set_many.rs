@@ -45,10 +45,10 @@ impl BroadPhase {
         for ids in ids.chunks(room) {
             let shared = SharedSlice::new(&mut found);
             run(threads, ids.len().div_ceil(BLOCK), |_, block| {
-                for i in block * BLOCK..ids.len().min((block + 1) * BLOCK) {
-                    // SAFETY: each block has its own elements.
-                    unsafe { shared.write(i, of(ids[i])) };
-                }
+                let range = block * BLOCK..ids.len().min((block + 1) * BLOCK);
+                // SAFETY: each block has its own elements.
+                let found = unsafe { shared.part(range.clone()) };
+                found.iter_mut().zip(&ids[range]).for_each(|(found, &id)| *found = of(id));
             });
             result = result.and(self.set_each(ids, |i, _| found[i]));
         }

@@ -13,7 +13,8 @@ impl BroadPhase {
     /// # Errors
     /// [`Error::TooManyPairs`]; the changes are kept, and the next update sees them again.
     pub fn update(&mut self) -> Result<&Events, Error> {
-        (self.events.added.clear(), self.events.removed.clear());
+        self.events.added.clear();
+        self.events.removed.clear();
         self.begin_report();
         if !self.world.changed.is_empty() {
             self.kept.reserve_ids(self.world.ids());
@@ -85,7 +86,7 @@ impl BroadPhase {
     fn run_edit(&mut self) -> Result<(), Error> {
         stage!("edit");
         let mut clock = Clock::start();
-        self.edit.run(&self.world, &mut self.grid, &mut self.comparison);
+        self.report.checks = self.edit.run(&self.world, &mut self.grid, &mut self.comparison);
         self.report.stages.check = clock.lap();
         self.report.plan = Plan::of_grid(Algorithm::Edit, &self.grid);
         self.report.plan.boxes = self.world.valid();

@@ -159,7 +159,9 @@ impl World {
         for &id in &self.changed {
             self.states[id as usize] &= state::PRESENT;
         }
-        (self.changed.clear(), self.old.clear(), self.removed.clear());
+        self.changed.clear();
+        self.old.clear();
+        self.removed.clear();
     }
 
     /// Drops known ids behind the last one that is present, and spare memory.
@@ -168,8 +170,12 @@ impl World {
         if self.changed.is_empty() {
             self.reserve_ids(used);
         }
-        (self.boxes.shrink_to_fit(), self.filters.shrink_to_fit(), self.states.shrink_to_fit());
-        (self.changed.shrink_to_fit(), self.old.shrink_to_fit(), self.removed.shrink_to_fit());
+        self.boxes.shrink_to_fit();
+        self.filters.shrink_to_fit();
+        self.states.shrink_to_fit();
+        self.changed.shrink_to_fit();
+        self.old.shrink_to_fit();
+        self.removed.shrink_to_fit();
     }
 }
 

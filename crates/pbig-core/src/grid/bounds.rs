@@ -162,15 +162,29 @@ impl Sample {
     /// Returns a low and a high quantile (4%) of the lower corners on an axis.
     fn range(&self, k: usize) -> (f32, f32) {
         let mut corners = [0.0; SAMPLE_SIZE];
+        let corners = self.sorted_corners(k, &mut corners);
+        if corners.is_empty() {
+            return (0.0, 0.0);
+        }
+        (corners[self.len / 25], corners[self.len - 1 - self.len / 25])
+    }
+
+    fn sorted_corners<'a>(&self, k: usize, corners: &'a mut [f32; SAMPLE_SIZE]) -> &'a [f32] {
         for (corner, aabb) in corners.iter_mut().zip(self.boxes()) {
             *corner = aabb.min[k].clamp(-FARTHEST, FARTHEST);
         }
         let corners = &mut corners[..self.len];
-        if corners.is_empty() {
-            return (0.0, 0.0);
-        }
         corners.sort_unstable_by(f32::total_cmp);
-        (corners[self.len / 25], corners[self.len - 1 - self.len / 25])
+        corners
+    }
+
+    /// Returns the median of the lower corners, axis by axis: a few far boxes do not move it.
+    pub(super) fn middle(&self) -> [f64; 3] {
+        std::array::from_fn(|k| {
+            let mut corners = [0.0; SAMPLE_SIZE];
+            let corners = self.sorted_corners(k, &mut corners);
+            corners.get(self.len / 2).map_or(0.0, |&corner| f64::from(corner))
+        })
     }
 
     /// Returns the median of the boxes' largest extents.
@@ -203,17 +217,17 @@ pub(super) struct SizeClass {
 
 /// Counts valid boxes by size class. Counted rather than sampled: a sample misses a thousand large boxes among a million
 /// small ones.
-pub(super) fn size_classes(boxes: &[Aabb], workers: usize) -> Box<[SizeClass; CLASSES]> {
+pub(super) fn size_classes(boxes: &[Aabb], workers: usize) -> [SizeClass; CLASSES] {
     let pieces = workers.clamp(1, 16);
-    let mut parts = vec![[SizeClass::default(); CLASSES]; pieces];
+    let mut parts = [[SizeClass::default(); CLASSES]; 16];
     let shared = SharedSlice::new(&mut parts);
     run(workers, pieces, |_, piece| {
         // SAFETY: each piece has its own part.
         let part = unsafe { &mut shared.part(piece..piece + 1)[0] };
         boxes[piece_range(boxes.len(), piece, pieces)].iter().for_each(|aabb| count(part, aabb));
     });
-    let mut all = Box::new(parts[0]);
-    for part in &parts[1..] {
+    let mut all = parts[0];
+    for part in &parts[1..pieces] {
         all.iter_mut().zip(part).for_each(|(all, part)| all.add(part.boxes, part.extent));
     }
     all

@@ -54,9 +54,10 @@ impl Spill {
     /// Visits the entries of a run of cells.
     #[inline]
     pub(super) fn visit(&self, (key, count): KeyRun, mut visit: impl FnMut(u32)) {
-        let end = key + count;
+        // Cells beyond those of the last insertion have no entries.
+        let end = (key + count).min(self.heads.len());
         let mut key = key;
-        while key < end && !self.occupied.is_empty() {
+        while key < end {
             let bits = self.occupied[key / 64] >> (key % 64);
             if bits == 0 {
                 key = (key / 64 + 1) * 64;
@@ -83,7 +84,9 @@ impl Spill {
                 self.occupied[record.key as usize / 64] = 0;
             }
         }
-        (self.records.clear(), self.next.clear(), self.free.clear());
+        self.records.clear();
+        self.next.clear();
+        self.free.clear();
     }
 
     fn insert(&mut self, record: Record, cells: usize) {

@@ -37,6 +37,10 @@ pub(crate) struct Candidates {
     boxes: Vec<u32>,
     places: Vec<u32>,
     len: usize,
+    /// Stored boxes tested.
+    pub(crate) tests: u64,
+    /// Stored boxes that overlapped, each box itself included.
+    pub(crate) met: u64,
 }
 
 /// Marks an entry of the spill list. Slots are below 2^28.
@@ -50,36 +54,34 @@ impl EditedGrid {
         candidates.len = 0;
         dispatch(LookUp { grid: self, boxes, candidates, meet });
         for (i, one) in boxes.iter().enumerate().filter(|(_, one)| one.aabb.is_valid()) {
-            self.meet_oversize(i, one, meet);
+            self.meet_oversize(i, one, candidates, meet);
         }
     }
 
-    fn meet_oversize<M: Meet>(&self, i: usize, one: &Record, meet: &mut M) {
-        for (place, stored) in self.grid.oversize.iter().enumerate() {
+    fn meet_oversize<M: Meet>(&self, i: usize, one: &Record, counts: &mut Candidates, meet: &mut M) {
+        let mut counted = |stored: &Record, place: Place| {
+            counts.tests += 1;
             if one.overlaps(stored) {
-                meet.meet(i, stored, Place::Oversize(place as u32));
+                counts.met += 1;
+                meet.meet(i, stored, place);
             }
+        };
+        for (place, stored) in self.grid.oversize.iter().enumerate() {
+            counted(stored, Place::Oversize(place as u32));
         }
         if !self.grid.plan.cells.takes(&one.aabb) {
-            self.meet_all_reached(i, one, meet);
+            self.visit_reached(&one.aabb, counted);
         }
     }
 
-    /// Meets an oversize box with all boxes in the cells that it reaches.
-    fn meet_all_reached<M: Meet>(&self, i: usize, one: &Record, meet: &mut M) {
-        self.grid.reached_by(&one.aabb, |run| {
+    /// Visits all boxes in the cells that an oversize box reaches.
+    fn visit_reached(&self, aabb: &Aabb, mut visit: impl FnMut(&Record, Place)) {
+        self.grid.reached_by(aabb, |run| {
             let (first, end) = self.grid.slots(run);
             for (slot, stored) in (first..end).zip(&self.grid.records[first..end]) {
-                if one.overlaps(stored) {
-                    meet.meet(i, stored, Place::Slot(slot as u32));
-                }
+                visit(stored, Place::Slot(slot as u32));
             }
-            self.spill.visit(run, |entry| {
-                let stored = self.spill.record(entry);
-                if one.overlaps(stored) {
-                    meet.meet(i, stored, Place::Spill(entry));
-                }
-            });
+            self.spill.visit(run, |entry| visit(self.spill.record(entry), Place::Spill(entry)));
         });
     }
 
@@ -183,9 +185,10 @@ impl<M: Meet> LookUp<'_, M> {
     unsafe fn run_of_cells<S: Simd>(&mut self, i: usize, query: u64, run: KeyRun) {
         let grid = &self.grid.grid;
         let (first, end) = grid.slots(run);
+        self.candidates.tests += (end - first) as u64;
         for first in (first..end).step_by(BLOCK) {
             let beyond = (end - first).min(BLOCK) as u32;
-            let Candidates { boxes, places, len } = &mut *self.candidates;
+            let Candidates { boxes, places, len, .. } = &mut *self.candidates;
             // SAFETY: codes are padded by two blocks; the lists have room for a block more than `ROOM`.
             unsafe {
                 let mask = S::test(query, grid.codes.as_ptr().add(first)) & ((1u32 << beyond) - 1);
@@ -209,6 +212,7 @@ impl<M: Meet> LookUp<'_, M> {
             let at = self.candidates.len;
             (self.candidates.boxes[at], self.candidates.places[at]) = (i as u32, entry | SPILL);
             self.candidates.len += 1;
+            self.candidates.tests += 1;
             if self.candidates.len > ROOM {
                 self.test();
             }
@@ -227,6 +231,7 @@ impl<M: Meet> LookUp<'_, M> {
                 (self.grid.spill.record(place & !SPILL), Place::Spill(place & !SPILL))
             };
             if self.boxes[i].overlaps(stored) {
+                self.candidates.met += 1;
                 self.meet.meet(i, stored, place);
             }
         }

@@ -7,7 +7,7 @@ use crate::Aabb;
 /// A cell of a grid, and the boxes whose lower corners lie in it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct OccupiedCell {
-    /// The cell; of a box beyond the grid's border, where a cell would be.
+    /// The cell; a border cell reaches to the lower corners of the boxes beyond the border.
     pub aabb: Aabb,
     /// The ids of the boxes.
     pub ids: Vec<u32>,
@@ -25,7 +25,9 @@ impl EditedGrid {
         let in_slots = self.grid.records[first..end].iter();
         let mut records: Vec<_> = in_slots.filter(|record| record.aabb.is_valid()).collect();
         self.spill.visit((key, 1), |entry| records.push(self.spill.record(entry)));
-        let aabb = self.cell_around(&records.first()?.aabb);
+        let first = self.cell_around(&records.first()?.aabb);
+        let with = |cell: Aabb, corner: [f32; 3]| cell.union(&Aabb::new(corner, corner));
+        let aabb = records.iter().fold(first, |cell, record| with(cell, record.aabb.min));
         Some(OccupiedCell { aabb, ids: records.iter().map(|record| record.id).collect() })
     }
 

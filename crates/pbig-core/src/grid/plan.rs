@@ -80,6 +80,8 @@ struct Spacing {
     extent: [f32; 3],
     /// The edge of a cell that holds the wanted number of boxes.
     edge: f64,
+    /// Where the cells begin, by axis.
+    origin: [f64; 3],
     wraps: bool,
 }
 
@@ -87,7 +89,8 @@ impl Spacing {
     fn new(boxes: usize, space: Bounds, extent: [f32; 3]) -> Self {
         let volume: f64 = (0..3).map(|k| space.width(k)).product();
         let edge = (policy::BOXES_PER_CELL * volume / boxes.max(1) as f64).cbrt();
-        let mut spacing = Self { boxes, space, extent, edge, wraps: false };
+        let origin = std::array::from_fn(|k| f64::from(space.low[k]));
+        let mut spacing = Self { boxes, space, extent, edge, origin, wraps: false };
         while spacing.count() > spacing.most_cells() {
             spacing.edge *= 1.5;
         }
@@ -100,8 +103,7 @@ impl Spacing {
 
     /// Returns the length of a step on an axis, for cells of 64 steps.
     fn step(&self, k: usize) -> f64 {
-        let least = self.space.width(k) * 1e-9;
-        (f64::from(self.extent[k]) / (MAX_STEPS_PER_BOX - 1.0)).max(self.edge / 64.0).max(least).max(1e-36)
+        (f64::from(self.extent[k]) / (MAX_STEPS_PER_BOX - 1.0)).max(self.edge / 64.0).max(1e-36)
     }
 
     /// Returns the number of cells that the space has on an axis.
@@ -116,11 +118,17 @@ impl Spacing {
     /// Makes cells smaller where the sample says that boxes lie in a few clusters far apart: then the cells wrap around, as
     /// a grid of the whole space would have too many.
     fn uncrowded(mut self, sample: &Sample) -> Self {
-        let smallest = self.edge * 1e-6;
-        while self.edge > smallest && self.crowd(sample) > policy::MAX_CROWD {
+        if self.crowd(sample) <= policy::MAX_CROWD {
+            return self;
+        }
+        let smallest = self.edge * 1e-12;
+        while self.edge > smallest && self.crowd(sample) > policy::WANTED_CROWD {
             self.edge *= 0.5;
         }
         self.wraps = self.count() > self.most_cells();
+        if self.wraps {
+            self.origin = sample.middle();
+        }
         self
     }
 
@@ -147,11 +155,12 @@ impl Spacing {
         let mut cells = Cells { shift, wraps: self.wraps, ..Cells::default() };
         for k in 0..3 {
             let step = self.step(k);
-            cells.origin[k] = f64::from(self.space.low[k]) - 64.0 * step;
+            cells.origin[k] = self.origin[k] - 64.0 * step;
             cells.scale[k] = 1.0 / step;
             cells.max_extent[k] = self.extent[k];
             cells.reach[k] = (f64::from(self.extent[k]) / step).ceil() as i32 + 2;
-            cells.dims[k] = ((self.space.width(k) / step + 128.0) / f64::from(1u32 << shift)) as i32 + 3;
+            let needed = (self.space.width(k) / step + 128.0) / f64::from(1u32 << shift);
+            cells.dims[k] = needed.min(f64::from(1 << 24)) as i32 + 3;
         }
         if self.wraps {
             cells.dims = wrapped_dims(cells.dims, self.most_cells());

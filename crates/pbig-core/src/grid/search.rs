@@ -7,10 +7,9 @@ use super::plan::NeighbourScan;
 use super::record::Record;
 use super::simd::{BLOCK, Kernel, Simd, dispatch};
 use super::{Grid, Sorted};
-use crate::parallel::run;
+use crate::parallel::run_with;
 use crate::policy::PARALLEL_FROM_BOXES;
 use std::ops::Range;
-use std::sync::Mutex;
 
 /// Boxes in a piece of work: enough to hide the cost of handing it out, few enough to balance.
 const PIECE: Range<usize> = 512..16_384;
@@ -26,20 +25,17 @@ impl Sorted<'_> {
         let piece = (grid.len / (8 * workers)).clamp(PIECE.start, PIECE.end);
         let in_grid = grid.len.div_ceil(piece);
         let pieces = in_grid + grid.oversize.len().div_ceil(OVERSIZE_PIECE);
-        let hits: Vec<Mutex<&mut Hits>> = hits.iter_mut().map(Mutex::new).collect();
-        run(workers, pieces, |worker, i| {
-            // No other thread has this worker's list.
-            let Ok(mut hits) = hits[worker].lock() else { return };
+        run_with(&mut hits[..workers], pieces, |hits, i| {
             if hits.is_full {
                 return;
             }
             if i < in_grid {
                 let slots = i * piece..grid.len.min((i + 1) * piece);
-                dispatch(SearchPiece { grid, slots, rule, hits: &mut hits });
+                dispatch(SearchPiece { grid, slots, rule, hits });
             } else {
                 let first = (i - in_grid) * OVERSIZE_PIECE;
                 let last = grid.oversize.len().min(first + OVERSIZE_PIECE);
-                (first..last).for_each(|i| grid.sweep(i, rule, &mut hits));
+                (first..last).for_each(|i| grid.sweep(i, rule, hits));
             }
         });
     }

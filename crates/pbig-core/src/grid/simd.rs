@@ -164,7 +164,7 @@ impl Simd for Avx2 {
                 let x = _mm256_mul_pd(_mm256_sub_pd(_mm256_cvtps_pd(corner), origin), scale);
                 // The second operand wins where the first is NaN.
                 let x = _mm256_max_pd(_mm256_min_pd(x, _mm256_set1_pd(MAX_STEP)), _mm256_set1_pd(-MAX_STEP));
-                std::mem::transmute(_mm256_cvtpd_epi32(x))
+                std::mem::transmute::<__m128i, Steps>(_mm256_cvtpd_epi32(x))
             };
             (steps(min), steps(max))
         }
@@ -208,7 +208,7 @@ impl Simd for Avx2 {
         use std::arch::x86_64::*;
         // SAFETY: the caller has AVX2.
         unsafe {
-            let (low, high): (__m128i, __m128i) = (std::mem::transmute(low), std::mem::transmute(high));
+            let [low, high] = [low, high].map(|steps| std::mem::transmute::<Steps, __m128i>(steps));
             let (mask, shifts) = (_mm_setr_epi32(511, 511, 511, 0), _mm_setr_epi32(0, 10, 20, 0));
             let field = |steps| _mm_sllv_epi32(_mm_and_si128(steps, mask), shifts);
             let (low, high) = (field(_mm_sub_epi32(_mm_setzero_si128(), low)), field(high));
@@ -270,7 +270,7 @@ impl Simd for Avx2 {
             let v = step!(v, reversed, 0b1111_0000);
             let v = step!(v, _mm256_shuffle_epi32::<0b01_00_11_10>(v), 0b1100_1100);
             let v = step!(v, _mm256_shuffle_epi32::<0b10_11_00_01>(v), 0b1010_1010);
-            std::mem::transmute(v)
+            std::mem::transmute::<__m256i, [u32; 8]>(v)
         }
     }
 

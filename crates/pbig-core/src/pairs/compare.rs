@@ -66,7 +66,9 @@ impl Comparison {
 
     /// Forgets all events.
     pub(crate) fn clear(&mut self) {
-        (self.added.clear(), self.removed.clear(), self.dropped.clear());
+        self.added.clear();
+        self.removed.clear();
+        self.dropped.clear();
     }
 
     /// Sorts events that were found in any order.
@@ -145,7 +147,9 @@ impl Kernel for CompareRows<'_> {
 
 impl Part {
     fn clear(&mut self) {
-        (self.added.clear(), self.removed.clear(), self.dropped.clear());
+        self.added.clear();
+        self.removed.clear();
+        self.dropped.clear();
     }
 
     /// Compares as if the kept pairs of removed boxes had never been.

@@ -3,9 +3,8 @@
 use super::row::{self, SHORT};
 use crate::Pair;
 use crate::grid::{Hits, Kernel, Simd, dispatch};
-use crate::parallel::{SharedSlice, ensure_scratch, run};
+use crate::parallel::{SharedSlice, ensure_scratch, run, run_with};
 use std::ops::Range;
-use std::sync::Mutex;
 
 /// log2 of the ids in a group, at least.
 const MIN_SHIFT: u32 = 10;
@@ -72,10 +71,11 @@ impl Groups {
         let count = self.place(hits);
         ensure_scratch(&mut self.pairs, count, Pair::default());
         let pairs = SharedSlice::new(&mut self.pairs);
-        let hits: Vec<Mutex<&mut Hits>> = hits.iter_mut().map(Mutex::new).collect();
-        run(workers, hits.len(), |_, list| {
-            let Ok(mut hits) = hits[list].lock() else { return };
-            let Hits { pairs: found, groups: next, .. } = &mut **hits;
+        let lists = hits.len();
+        let hits = SharedSlice::new(hits);
+        run(workers, lists, |_, list| {
+            // SAFETY: each piece has its own list.
+            let Hits { pairs: found, groups: next, .. } = unsafe { &mut hits.part(list..list + 1)[0] };
             for pair in found.iter() {
                 let place = &mut next[(pair.a >> grouping.shift) as usize];
                 // SAFETY: every pair of every list has its own place.
@@ -135,12 +135,7 @@ impl Groups {
         let mut sorters = std::mem::take(&mut self.sorters);
         sorters.resize_with(workers.max(sorters.len()), Sorter::default);
         let groups = &*self;
-        let by_worker: Vec<Mutex<&mut Sorter>> = sorters.iter_mut().map(Mutex::new).collect();
-        run(workers, groups.grouping.count, |worker, group| {
-            if let Ok(mut sorter) = by_worker[worker].lock() {
-                work(groups, &mut sorter, group);
-            }
-        });
+        run_with(&mut sorters[..workers], groups.grouping.count, |sorter, group| work(groups, sorter, group));
         self.sorters = sorters;
     }
 

@@ -32,7 +32,10 @@ pub(crate) const RUNS_UP_TO_PER_CELL: f64 = 3.0;
 pub(crate) const HALF_CELLS_FROM_PER_CELL: f64 = 16.0;
 
 /// Others in a box's cell, by the sample, from which cells are made smaller: boxes lie in clusters far apart.
-pub(crate) const MAX_CROWD: f64 = 64.0;
+pub(crate) const MAX_CROWD: f64 = 32.0;
+
+/// Others in a box's cell at which cells are small enough then.
+pub(crate) const WANTED_CROWD: f64 = 8.0;
 
 /// Coincidences in the sample that say something: a few may be chance.
 pub(crate) const MIN_COINCIDENCES: usize = 16;
