@@ -162,7 +162,8 @@ impl Player {
     fn clear_or_shrink(&mut self, choice: u8) {
         if choice < 32 {
             self.engines.change(|one| one.clear());
-            (self.proxies.clear(), self.pairs.clear());
+            self.proxies.clear();
+            self.pairs.clear();
         } else {
             self.engines.change(|one| one.shrink_to_fit());
         }
