@@ -12,7 +12,15 @@ pub enum Error {
         /// The limit in force.
         limit: u64,
     },
-    /// More overlapping pairs than [`crate::Limits::max_pairs`].
+    /// An id so far above the known ones that the tables by id would be nearly empty.
+    #[error("id {id} is far above the {known} ids known so far; number boxes densely from 0")]
+    SparseId {
+        /// The id asked for.
+        id: u32,
+        /// One more than the largest id known so far.
+        known: u32,
+    },
+    /// More pairs than [`crate::Limits::max_pairs`].
     #[error(
         "more than Limits::max_pairs = {limit} overlapping pairs; raise it (8 bytes a pair) or split the set"
     )]

@@ -117,6 +117,6 @@ pub(crate) fn ensure_scratch<T: Copy>(buffer: &mut Vec<T>, len: usize, fill: T) 
     if buffer.len() < len {
         buffer.clear();
         buffer.shrink_to(0);
-        buffer.resize(len + len / 8, fill);
+        buffer.resize(len + len / 8 + 1024, fill);
     }
 }

@@ -22,6 +22,7 @@ use crate::finder::check_count;
 use crate::gpu_slot::GpuSlot;
 use crate::grid::EditedGrid;
 use crate::pairs::{Comparison, Groups, Kept};
+use crate::policy;
 use crate::report::Report;
 use crate::{Aabb, Config, Error, Pair, ProxyFilter};
 use edit::Edit;
@@ -104,7 +105,8 @@ impl BroadPhase {
     /// Inserts a box or moves it. An invalid box pairs with nothing until it becomes valid.
     ///
     /// # Errors
-    /// [`Error::TooManyBoxes`] when the id is not below [`crate::Limits::max_boxes`].
+    /// [`Error::TooManyBoxes`] when the id is not below [`crate::Limits::max_boxes`]; [`Error::SparseId`] when it is 2^24
+    /// or more, and over 64 times as large as any before.
     #[inline(always)]
     pub fn set(&mut self, id: u32, aabb: Aabb, filter: ProxyFilter) -> Result<(), Error> {
         if self.world.contains(id) {
@@ -119,10 +121,17 @@ impl BroadPhase {
     fn insert(&mut self, id: u32, aabb: Aabb, filter: ProxyFilter) -> Result<(), Error> {
         if id as usize >= self.world.ids() {
             check_count(u64::from(id) + 1, &self.config.limits)?;
+            self.check_density(id)?;
             self.world.reserve_ids(id as usize + 1);
         }
         self.world.insert(id, aabb, filter, self.config.margin);
         Ok(())
+    }
+
+    fn check_density(&self, id: u32) -> Result<(), Error> {
+        let known = self.world.ids() as u32;
+        let is_sparse = id >= policy::SPARSE_FROM_ID && id / policy::MAX_ID_GROWTH > known;
+        if is_sparse { Err(Error::SparseId { id, known }) } else { Ok(()) }
     }
 
     /// Changes the filter of a box. Returns false when there is none.

@@ -193,6 +193,17 @@ fn boxes_are_counted_and_given_back() {
 }
 
 #[test]
+fn an_id_far_above_the_others_is_an_error_and_takes_no_memory() {
+    let mut broad_phase = BroadPhase::default();
+    let cube = Aabb::new([0.0; 3], [1.0; 3]);
+    broad_phase.set(3, cube, ProxyFilter::ALL).expect("a small id");
+    let id = 100_000_000;
+    assert_eq!(broad_phase.set(id, cube, ProxyFilter::ALL), Err(Error::SparseId { id, known: 4 }));
+    assert_eq!((broad_phase.len(), broad_phase.id_count()), (1, 4));
+    broad_phase.set(1 << 20, cube, ProxyFilter::ALL).expect("an id that costs 44 MB");
+}
+
+#[test]
 fn a_margin_that_is_no_length_is_an_error() {
     for margin in [-1.0, f32::NAN, f32::INFINITY] {
         assert!(matches!(BroadPhase::new(Config { margin, ..Config::DEFAULT }), Err(Error::Margin { .. })));

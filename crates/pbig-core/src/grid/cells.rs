@@ -12,8 +12,10 @@ pub(crate) type Steps = [i32; 4];
 /// that overlap differ by at most 2 * (62 + 2) < 256 steps, which the nine bits of a code can tell from "apart".
 pub(crate) const MAX_STEPS_PER_BOX: f64 = 62.0;
 
-/// Coordinates beyond so many steps from the origin are clamped: they must fit an `i32` with room for a window.
-pub(super) const MAX_STEP: f64 = (1u32 << 29) as f64;
+/// Coordinates beyond these steps are clamped: steps must fit an `i32` with room for a window. Both ends lie in different
+/// cells of a grid that wraps, so that what is far away on different sides does not meet there.
+pub(super) const MIN_STEP: f64 = -((1u32 << 29) as f64);
+pub(super) const MAX_STEP: f64 = ((1u32 << 29) + 21 * 64) as f64;
 
 /// The sign bits of a code's six fields.
 pub(super) const APART: u64 = 0x1004_0100_1004_0100;
@@ -126,7 +128,7 @@ pub(super) fn steps_portable(cells: &Cells, aabb: &Aabb) -> (Steps, Steps) {
         let x = (f64::from(x) - cells.origin[k]) * cells.scale[k];
         // Comparisons rather than `clamp`, which keeps a NaN.
         let x = if x < MAX_STEP { x } else { MAX_STEP };
-        let x = if x > -MAX_STEP { x } else { -MAX_STEP };
+        let x = if x > MIN_STEP { x } else { MIN_STEP };
         round_to_i32(x)
     };
     let corner = |corner: &[f32; 3]| [step(0, corner[0]), step(1, corner[1]), step(2, corner[2]), 0];

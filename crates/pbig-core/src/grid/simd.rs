@@ -153,7 +153,7 @@ static SET_BITS: [u64; 256] = {
 impl Simd for Avx2 {
     #[inline(always)]
     unsafe fn steps(cells: &Cells, aabb: &Aabb) -> (Steps, Steps) {
-        use super::cells::MAX_STEP;
+        use super::cells::{MAX_STEP, MIN_STEP};
         use std::arch::x86_64::*;
         // SAFETY: the loads lie inside the box and the cells; the caller has AVX2.
         unsafe {
@@ -163,7 +163,7 @@ impl Simd for Avx2 {
             let steps = |corner: __m128| -> Steps {
                 let x = _mm256_mul_pd(_mm256_sub_pd(_mm256_cvtps_pd(corner), origin), scale);
                 // The second operand wins where the first is NaN.
-                let x = _mm256_max_pd(_mm256_min_pd(x, _mm256_set1_pd(MAX_STEP)), _mm256_set1_pd(-MAX_STEP));
+                let x = _mm256_max_pd(_mm256_min_pd(x, _mm256_set1_pd(MAX_STEP)), _mm256_set1_pd(MIN_STEP));
                 std::mem::transmute::<__m128i, Steps>(_mm256_cvtpd_epi32(x))
             };
             (steps(min), steps(max))
