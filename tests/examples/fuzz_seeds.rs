@@ -22,7 +22,7 @@ fn main() -> std::io::Result<()> {
     for (i, case) in corpus().iter().enumerate() {
         let boxes = &case.boxes[..case.boxes.len().min(MOST)];
         // All finders and all options of PBIG's grid, without filters, for which these bytes have no room.
-        let settings = (i % 4 | i / 4 % 8 << 5) as u8;
+        let settings = ((i % 4) | ((i / 4 % 8) << 5)) as u8;
         write("finder_against_oracle", i, &[&[settings][..], &concat(boxes)].concat())?;
         write("csv_reader", i, csv(boxes).as_bytes())?;
         write("npy_reader", i, &npy(boxes, 1))?;
@@ -30,7 +30,7 @@ fn main() -> std::io::Result<()> {
     }
     for (i, scene) in Scene::ALL.iter().enumerate() {
         let frames = frames(scene);
-        write("updates_against_scratch", i, &updates((i % 8 << 4) as u8, &frames))?;
+        write("updates_against_scratch", i, &updates(((i % 8) << 4) as u8, &frames))?;
         write("npy_reader", 1000 + i, &npy(&frames[..2].concat(), 2))?;
         write("decode", 1000 + i, &snapshot(&frames))?;
     }

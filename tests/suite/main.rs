@@ -12,6 +12,7 @@ mod follower;
 mod gpu;
 mod incremental;
 mod kernels;
+mod motions;
 mod planted;
 mod precision;
 mod queries;

@@ -20,6 +20,8 @@ mod plan;
 mod record;
 mod search;
 mod simd;
+#[cfg(test)]
+mod tests;
 
 pub(crate) use edit::EditedGrid;
 pub(crate) use hits::{Hits, Rule};

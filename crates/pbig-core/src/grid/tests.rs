@@ -1,0 +1,155 @@
+//! Cells and codes never lose an overlapping pair, and every implementation of the inner loops gives the same values.
+
+use super::cells::{Cells, query_of};
+use super::plan::GridPlan;
+use super::simd::{BLOCK, EightBoxes, Kernel, Simd, dispatch, run_portable};
+use crate::Aabb;
+use rand::rngs::StdRng;
+use rand::{RngExt, SeedableRng};
+
+/// All that the inner loops compute of a box.
+#[derive(Debug, PartialEq)]
+struct Values {
+    takes: bool,
+    key: u32,
+    code: u64,
+}
+
+struct ValuesOf<'a>(&'a Cells, &'a Aabb);
+
+impl Kernel for ValuesOf<'_> {
+    type Output = Values;
+
+    #[inline(always)]
+    unsafe fn run<S: Simd>(self) -> Values {
+        let Self(cells, aabb) = self;
+        // SAFETY: the caller has the instructions.
+        unsafe {
+            let (low, high) = S::steps(cells, aabb);
+            Values { takes: S::takes(cells, aabb), key: S::key(cells, low), code: S::code(low, high) }
+        }
+    }
+}
+
+struct MayOverlap(u64, [u64; BLOCK]);
+
+impl Kernel for MayOverlap {
+    type Output = u32;
+
+    #[inline(always)]
+    unsafe fn run<S: Simd>(self) -> u32 {
+        // SAFETY: a block of codes; the caller has the instructions.
+        unsafe { S::test(query_of(self.0), self.1.as_ptr()) }
+    }
+}
+
+/// Boxes of edge 1, some of them flat, touching or far away; in one space or in three far apart.
+fn random_boxes(random: &mut StdRng, clusters: u32) -> Vec<Aabb> {
+    let mut one = |_: usize| {
+        let cluster = random.random_range(0..clusters) as f32 * 1e6;
+        let corner: [f32; 3] = std::array::from_fn(|_| cluster + random.random_range(0.0..12.0f32));
+        let corner = if random.random_ratio(1, 3) { corner.map(f32::round) } else { corner };
+        let corner = if random.random_ratio(1, 40) { corner.map(|x| x * 1e9) } else { corner };
+        let extent: [f32; 3] = std::array::from_fn(|_| random.random_range(0.0..=1.0f32));
+        Aabb::new(corner, std::array::from_fn(|k| corner[k] + extent[k]))
+    };
+    (0..600).map(&mut one).collect()
+}
+
+#[test]
+fn overlapping_boxes_have_codes_that_may_overlap() {
+    let mut random = StdRng::seed_from_u64(1);
+    let mut met = [0; 2];
+    for round in 0..12 {
+        let boxes = random_boxes(&mut random, [1, 3][round % 2]);
+        let cells = GridPlan::new(&boxes, 1).cells;
+        let values: Vec<Values> = boxes.iter().map(|aabb| dispatch(ValuesOf(&cells, aabb))).collect();
+        for (i, one) in boxes.iter().enumerate().filter(|(i, _)| values[*i].takes) {
+            for (j, other) in boxes.iter().enumerate().filter(|(j, _)| values[*j].takes) {
+                if one.overlaps(other) {
+                    assert_eq!(dispatch(MayOverlap(values[i].code, [values[j].code; BLOCK])), 255);
+                    met[usize::from(cells.wraps)] += 1;
+                }
+            }
+        }
+    }
+    assert!(met.iter().all(|pairs| *pairs > 1000), "{met:?} in clamped and wrapped grids");
+}
+
+#[test]
+fn every_implementation_computes_the_same_values() {
+    let mut random = StdRng::seed_from_u64(2);
+    let infinite = Aabb::new([f32::NEG_INFINITY; 3], [f32::INFINITY; 3]);
+    for clusters in [1, 3] {
+        let mut boxes = random_boxes(&mut random, clusters);
+        let cells = GridPlan::new(&boxes, 1).cells;
+        boxes.extend([Aabb::NOWHERE, infinite, Aabb::new([f32::MAX; 3], [f32::MIN; 3])]);
+        for aabb in &boxes {
+            assert_eq!(dispatch(ValuesOf(&cells, aabb)), run_portable(ValuesOf(&cells, aabb)), "{aabb:?}");
+        }
+    }
+    for _ in 0..2000 {
+        let query = random.random::<u64>() & 0x1FF7_FDFF_1FF7_FDFF;
+        let codes: [u64; BLOCK] = std::array::from_fn(|_| random.random::<u64>() & 0x5FF7_FDFF_5FF7_FDFF);
+        assert_eq!(dispatch(MayOverlap(query, codes)), run_portable(MayOverlap(query, codes)));
+    }
+}
+
+struct Rows(Vec<u32>, usize);
+
+impl Kernel for Rows {
+    type Output = (Vec<u32>, [bool; 2]);
+
+    #[inline(always)]
+    unsafe fn run<S: Simd>(self) -> Self::Output {
+        let Self(row, len) = self;
+        let mut other = row.clone();
+        // SAFETY: rows of eight numbers; the caller has the instructions.
+        unsafe {
+            let sorted = S::sorted_short(row.as_ptr(), len)[..len].to_vec();
+            let same = S::same_short(row.as_ptr(), other.as_ptr(), len);
+            other[len - 1] += 1;
+            (sorted, [same, S::same_short(row.as_ptr(), other.as_ptr(), len)])
+        }
+    }
+}
+
+#[test]
+fn short_rows_are_sorted_and_compared() {
+    let mut random = StdRng::seed_from_u64(3);
+    for _ in 0..3000 {
+        let len = random.random_range(1..=8);
+        let row: Vec<u32> = (0..8).map(|_| random.random_range(0..20)).collect();
+        let mut wanted = row[..len].to_vec();
+        wanted.sort_unstable();
+        for (sorted, same) in [dispatch(Rows(row.clone(), len)), run_portable(Rows(row.clone(), len))] {
+            assert_eq!((sorted, same), (wanted.clone(), [true, false]));
+        }
+    }
+}
+
+struct Overlaps<'a>(&'a EightBoxes, &'a Aabb);
+
+impl Kernel for Overlaps<'_> {
+    type Output = u32;
+
+    #[inline(always)]
+    unsafe fn run<S: Simd>(self) -> u32 {
+        // SAFETY: the caller has the instructions.
+        unsafe { S::overlaps_eight(self.0, self.1) }
+    }
+}
+
+#[test]
+fn eight_boxes_at_once_overlap_as_one_by_one() {
+    let mut random = StdRng::seed_from_u64(4);
+    let boxes = random_boxes(&mut random, 1);
+    for (eight, one) in boxes.chunks_exact(BLOCK).zip(&boxes) {
+        let value = |aabb: &Aabb, row: usize| if row < 3 { aabb.min[row] } else { aabb.max[row - 3] };
+        let columns: EightBoxes =
+            std::array::from_fn(|row| std::array::from_fn(|lane| value(&eight[lane], row)));
+        let wanted = (0..BLOCK).fold(0, |mask, lane| mask | u32::from(eight[lane].overlaps(one)) << lane);
+        assert_eq!(dispatch(Overlaps(&columns, one)), wanted);
+        assert_eq!(run_portable(Overlaps(&columns, one)), wanted);
+    }
+}
