@@ -41,7 +41,7 @@ impl AllPairs {
     ) -> Result<bool, Error> {
         self.begin(request);
         let found = AtomicU64::new(0);
-        let max_pairs = request.config.limits.max_pairs;
+        let max_pairs = request.config.limits.pairs();
         let rule = Rule { filters: request.filters, max_pairs, found: &found };
         let may_be_brute = request.config.forced_engine().is_none();
         let is_few = may_be_brute && request.boxes.len() <= policy::BRUTE_FORCE_UP_TO_BOXES;
@@ -122,5 +122,25 @@ impl AllPairs {
         pairs.clear();
         pairs.reserve(self.hits.iter().map(|hits| hits.pairs.len()).sum());
         self.hits.iter().for_each(|hits| pairs.extend_from_slice(&hits.pairs));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{Limits, Order};
+
+    #[test]
+    fn a_search_that_finds_too_many_pairs_ends_long_before_it_has_them_all() {
+        let limits = Limits { max_pairs: 1000, ..Limits::DEFAULT };
+        let config = Config { limits, order: Order::Unspecified, ..Config::DEFAULT };
+        // 2 * 10^8 pairs, 1.6 GB.
+        let boxes = vec![Aabb::new([0.0; 3], [1.0; 3]); 20_000];
+        let request = Request { boxes: &boxes, filters: None, config: &config, grouping: None };
+        let mut all = AllPairs::default();
+        let found = all.find(&request, &mut EditedGrid::default(), &mut Report::default());
+        assert_eq!(found, Err(Error::TooManyPairs { limit: 1000 }));
+        let kept: usize = all.hits.iter().map(|hits| hits.pairs.capacity()).sum();
+        assert!(kept < 1_000_000, "room for {kept} pairs");
     }
 }

@@ -46,6 +46,13 @@ impl Limits {
     pub const UNLIMITED: Self = Self { max_boxes: 1 << 28, max_pairs: 1 << 31 };
 }
 
+impl Limits {
+    /// Returns the most pairs, at most as many as the numbers inside can tell apart.
+    pub(crate) fn pairs(&self) -> u64 {
+        self.max_pairs.min(Self::UNLIMITED.max_pairs)
+    }
+}
+
 impl Default for Limits {
     fn default() -> Self {
         Self::DEFAULT

@@ -24,12 +24,12 @@
 //!
 //! For rapier worlds use the crate `rapier-pbig`, which feeds colliders to this one. Use this crate
 //! for boxes of your own: from ten to a hundred million, of any mix of sizes, anywhere in f32. It
-//! knows boxes only: no rays, no queries, no shapes.
+//! knows boxes only: no rays, no shapes.
 //!
 //! # What is guaranteed
 //!
 //! * Two boxes pair when `a.min <= b.max && b.min <= a.max` on all three axes, in f32, exactly, as
-//!   [`oracle`] defines it; every strategy gives the same pairs, in the same order, whatever the
+//!   [`oracle`] defines it; every backend gives the same pairs, in the same order, whatever the
 //!   number of threads. Threads are the one that calls, and those of its rayon pool.
 //! * A call is complete or an [`Error`]; there are no partial results.
 //! * A box with a NaN, or with `min > max`, pairs with nothing and harms no other box.

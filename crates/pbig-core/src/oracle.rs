@@ -1,4 +1,4 @@
-//! Brute force: the definition of right. Every strategy must return this set.
+//! Brute force: the definition of right. Every backend must return this set.
 
 use crate::{Aabb, Pair, ProxyFilter};
 

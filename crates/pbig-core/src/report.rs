@@ -6,7 +6,7 @@ use std::time::Duration;
 /// Wall time of each stage of the last call. All zero on wasm32-unknown-unknown, which has no clock.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct StageTimes {
-    /// Looking at the boxes and choosing strategy and cell sizes.
+    /// Measuring the boxes and choosing the cells.
     pub plan: Duration,
     /// Sorting boxes into cells.
     pub map: Duration,

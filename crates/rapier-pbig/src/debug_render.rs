@@ -9,10 +9,9 @@ use rapier3d::prelude::{Collider, ColliderHandle, ColliderSet, Isometry, Point, 
 /// The parts that [`PbigBroadPhase::debug_render`] draws.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct DebugRenderParts {
-    /// The stored AABBs, with their margins. The hue tells the level of the grid, from the finest on: green, blue, violet, ...;
-    /// boxes in no grid are grey.
+    /// The stored AABBs, with their margins. Boxes in a cell are green, others grey.
     pub fat_boxes: bool,
-    /// The occupied cells of the grids. The lightness tells how many boxes lie in one: white for eight or more.
+    /// The occupied cells of the grid. The lightness tells how many boxes lie in one: white for eight or more.
     pub cells: bool,
 }
 

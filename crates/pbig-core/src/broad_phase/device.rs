@@ -35,7 +35,12 @@ impl BroadPhase {
     /// Leaves the events in `comparison` if a device has found them. False if the CPU has to do it.
     pub(super) fn find_on_gpu(&mut self) -> Result<bool, Error> {
         let world = &self.world;
-        if !world.knows_old() || !self.gpu.is_wanted(&self.config, world.changed.len(), &mut self.report) {
+        if !self.gpu.is_wanted(&self.config, world.changed.len(), &mut self.report) {
+            return Ok(false);
+        }
+        if !world.knows_old() {
+            let why = "what boxes were is not known after a restore: the CPU does this update";
+            self.report.fallback = Some(why.into());
             return Ok(false);
         }
         let old = world.changed.iter().zip(&world.old);
@@ -71,7 +76,7 @@ impl BroadPhase {
         let was_kept = |pair: &Pair| kept.contains(*pair) && existed(pair);
         for pair in found.pairs.iter().flatten() {
             if !overlaps(pair) {
-                events.removed.push(*pair);
+                events.removed.extend(kept.contains(*pair).then_some(*pair));
             } else if !was_kept(pair) {
                 // The device takes pairs of boxes that it treats as new for new ones.
                 events.added.push(*pair);

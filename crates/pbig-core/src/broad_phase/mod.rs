@@ -155,6 +155,7 @@ impl BroadPhase {
 
     /// Removes all boxes; their pairs end without an event.
     pub fn clear(&mut self) {
+        // Two numbers on, so that a device does not go on from an update of before.
         let (gpu, updates) = (std::mem::take(&mut self.gpu), self.updates + 2);
         *self = Self { config: self.config, gpu, updates, ..Self::default() };
         self.world.keep_old = self.old_to_keep();

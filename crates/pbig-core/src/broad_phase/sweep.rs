@@ -41,7 +41,7 @@ impl Sweep {
         self.is_current = false;
     }
 
-    /// Leaves the events of an update in `events`, sorted. The first time, `kept` says what was: none may be given then.
+    /// Leaves the events of an update in `events`, sorted.
     pub(super) fn run(&mut self, world: &World, events: &mut Comparison) {
         events.clear();
         self.reserve(world.ids());
@@ -95,9 +95,9 @@ impl Sweep {
 
     /// Sorts out the boxes of a block that `id` overlapped or overlaps.
     #[cold]
-    fn settle(&self, world: &World, id: u32, was: bool, is: bool, other: u32, events: &mut Comparison) {
-        let is_other_s = other == id || other < id && world.change_of(other).is_some();
-        if is_other_s {
+    fn sort_pair(&self, world: &World, id: u32, was: bool, is: bool, other: u32, events: &mut Comparison) {
+        let is_met_twice = other == id || other < id && world.change_of(other).is_some();
+        if is_met_twice {
             return;
         }
         let allows = !world.is_filtered || world.filters[id as usize].allows(&world.filters[other as usize]);
@@ -138,7 +138,7 @@ impl Kernel for SweepAll<'_> {
                     let lane = look.trailing_zeros();
                     look &= look - 1;
                     let other = (block * BLOCK) as u32 + lane;
-                    sweep.settle(world, id, was >> lane & 1 != 0, is >> lane & 1 != 0, other, events);
+                    sweep.sort_pair(world, id, was >> lane & 1 != 0, is >> lane & 1 != 0, other, events);
                 }
             }
         }

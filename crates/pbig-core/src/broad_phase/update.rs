@@ -100,7 +100,7 @@ impl BroadPhase {
     fn apply_events(&mut self) -> Result<(), Error> {
         let events = &self.comparison;
         let gone = events.removed.len() + events.dropped.len();
-        let limit = self.config.limits.max_pairs;
+        let limit = self.config.limits.pairs();
         if (self.kept.len() + events.added.len() - gone) as u64 > limit {
             return Err(Error::TooManyPairs { limit });
         }

@@ -35,7 +35,7 @@ impl<'a> Task<'a> {
     /// Returns the task to find all pairs of a request.
     pub(super) fn all_pairs(request: &SearchRequest<'a>) -> Self {
         let &SearchRequest { boxes, filters, config } = request;
-        Self { boxes, filters, changes: None, limit: config.limits.max_pairs, options: &config.gpu }
+        Self { boxes, filters, changes: None, limit: config.limits.pairs(), options: &config.gpu }
     }
 }
 

@@ -98,12 +98,17 @@ impl Spacing {
     }
 
     fn most_cells(&self) -> f64 {
-        policy::MAX_CELLS_PER_BOX * self.boxes as f64 + policy::MIN_CELLS
+        (policy::MAX_CELLS_PER_BOX * self.boxes as f64 + policy::MIN_CELLS).min(f64::from(1 << 30))
     }
 
     /// Returns the length of a step on an axis, for cells of 64 steps.
     fn step(&self, k: usize) -> f64 {
         (f64::from(self.extent[k]) / (MAX_STEPS_PER_BOX - 1.0)).max(self.edge / 64.0).max(1e-36)
+    }
+
+    /// Returns true if the edge decides about the step on an axis; otherwise the largest box does.
+    fn decides(&self) -> bool {
+        (0..3).any(|k| self.edge / 64.0 > f64::from(self.extent[k]) / (MAX_STEPS_PER_BOX - 1.0))
     }
 
     /// Returns the number of cells that the space has on an axis.
@@ -122,7 +127,7 @@ impl Spacing {
             return self;
         }
         let smallest = self.edge * 1e-12;
-        while self.edge > smallest && self.crowd(sample) > policy::WANTED_CROWD {
+        while self.edge > smallest && self.decides() && self.crowd(sample) > policy::WANTED_CROWD {
             self.edge *= 0.5;
         }
         self.wraps = self.count() > self.most_cells();

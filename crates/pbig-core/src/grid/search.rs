@@ -108,6 +108,9 @@ impl Scan<'_, '_> {
                 }
             }
             self.make_room::<S>(&mut writer, hits);
+            if hits.is_full {
+                break;
+            }
         }
         self.finish::<S>(writer, hits);
     }
@@ -169,6 +172,9 @@ impl Scan<'_, '_> {
         let cells = &self.cells;
         let mut writer = hits.writer();
         for slot in slots {
+            if hits.is_full {
+                break;
+            }
             let record: &Record = &self.grid.records[slot];
             // SAFETY: the caller has the instructions; slots come from `starts`.
             unsafe {

@@ -6,6 +6,7 @@ use super::row;
 use crate::Pair;
 use crate::grid::{Kernel, Simd, dispatch};
 use crate::parallel::SharedSlice;
+use std::ops::Range;
 
 /// What a comparison has found. All lists are sorted.
 #[derive(Clone, Debug, Default)]
@@ -116,10 +117,14 @@ impl NewRows<'_> {
     /// Yields each id with its row.
     #[inline(always)]
     fn rows(&self) -> impl Iterator<Item = (u32, &[u32])> {
-        (self.first_id..).zip(self.spans).map(|(a, span)| {
-            let start = (span.start - self.first_place) as usize;
-            (a, &self.pool[start..start + span.len as usize])
-        })
+        (self.first_id..).zip(self.spans).map(|(a, span)| (a, &self.pool[self.range(*span)]))
+    }
+
+    /// Returns where a row lies in the pool of the group.
+    #[inline(always)]
+    fn range(&self, span: Span) -> Range<usize> {
+        let start = (span.start - self.first_place) as usize;
+        start..start + span.len as usize
     }
 }
 
@@ -136,9 +141,11 @@ impl Kernel for CompareRows<'_> {
     #[inline(always)]
     unsafe fn run<S: Simd>(self) {
         let Self { part, old, new } = self;
-        for (a, is) in new.rows() {
-            let was = old.row(a);
-            if !row::are_same::<S>(was, is, &old.pool, new.pool) {
+        for (a, span) in (new.first_id..).zip(new.spans) {
+            let (was, is) = (old.spans[a as usize].range(), new.range(*span));
+            // SAFETY: the caller has the instructions.
+            if !unsafe { row::are_same::<S>((&old.pool, was.clone()), (new.pool, is.clone())) } {
+                let (was, is) = (&old.pool[was], &new.pool[is]);
                 row::differences(a, was, is, &mut part.added, &mut part.removed);
             }
         }

@@ -55,18 +55,25 @@ fn sort_long(row: &mut [u32], is_nearly_sorted: bool) {
     }
 }
 
-/// Returns true if two rows, which lie in pools, are the same.
+/// Returns true if two rows are the same, each at a range of its pool.
+///
+/// # Safety
+/// The processor has the instructions.
 #[inline(always)]
-pub(super) fn are_same<S: Simd>(one: &[u32], other: &[u32], pool: &[u32], other_pool: &[u32]) -> bool {
-    let fits = |row: &[u32], pool: &[u32]| row.as_ptr().wrapping_add(SHORT) <= pool.as_ptr_range().end;
+pub(super) unsafe fn are_same<S: Simd>(
+    (pool, one): (&[u32], Range<usize>),
+    (other_pool, other): (&[u32], Range<usize>),
+) -> bool {
     if one.len() != other.len() {
         return false;
     }
-    if one.len() <= SHORT && fits(one, pool) && fits(other, other_pool) {
-        // SAFETY: there are that many elements in both pools; `S` is what the caller runs with.
-        return unsafe { S::same_short(one.as_ptr(), other.as_ptr(), one.len()) };
+    let fits = one.start + SHORT <= pool.len() && other.start + SHORT <= other_pool.len();
+    if one.len() <= SHORT && fits {
+        let (row, other_row) = (&pool[one.start..], &other_pool[other.start..]);
+        // SAFETY: both pools have that many elements there; the caller has the instructions.
+        return unsafe { S::same_short(row.as_ptr(), other_row.as_ptr(), one.len()) };
     }
-    one == other
+    pool[one] == other_pool[other]
 }
 
 /// Appends the pairs of `a` that are in one of two sorted rows only.
