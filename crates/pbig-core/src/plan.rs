@@ -69,7 +69,7 @@ pub struct Plan {
     /// The grid on the GPU ([`Algorithm::Gpu`]); none where every pair was tested.
     #[cfg(feature = "gpu")]
     pub gpu: Option<crate::gpu::GpuPlan>,
-    /// The reason that kept [`crate::Backend::Auto`] from a GPU.
+    /// The reason that kept a call from a GPU.
     pub no_gpu: Option<NoGpu>,
 }
 

@@ -2,7 +2,7 @@
 
 use super::BroadPhase;
 use crate::gpu::{Change, ChangeRequest, GpuFinder, GpuFound};
-use crate::{Aabb, Backend, Config, Error, Pair};
+use crate::{Aabb, Backend, Config, Error, NoGpu, Pair};
 
 impl BroadPhase {
     /// As [`BroadPhase::new`], on a given device: with [`Backend::Gpu`] always, with [`Backend::Auto`] if it is no
@@ -39,8 +39,7 @@ impl BroadPhase {
             return Ok(false);
         }
         if !world.knows_old() {
-            let why = "what boxes were is not known after a restore: the CPU does this update";
-            self.report.fallback = Some(why.into());
+            self.report.plan.no_gpu = Some(NoGpu::OldBoxesUnknown);
             return Ok(false);
         }
         let old = world.changed.iter().zip(&world.old);

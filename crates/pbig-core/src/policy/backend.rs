@@ -34,7 +34,7 @@ impl Choice {
     }
 }
 
-/// Reason that keeps [`Backend::Auto`] from the GPU.
+/// Reason that keeps a call from the GPU.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum NoGpu {
@@ -46,6 +46,8 @@ pub enum NoGpu {
     Software,
     /// Too few boxes have changed.
     FewChanged,
+    /// The boxes of the last update are not known, after a restore: the CPU does one update, also with [`Backend::Gpu`].
+    OldBoxesUnknown,
 }
 
 impl fmt::Display for NoGpu {
@@ -55,6 +57,7 @@ impl fmt::Display for NoGpu {
             Self::NotGiven => "no device was given",
             Self::Software => "the given device is software",
             Self::FewChanged => "too few boxes have changed",
+            Self::OldBoxesUnknown => "the boxes of the last update are not known",
         })
     }
 }
