@@ -8,7 +8,7 @@ use crate::report::{Checks, Clock, Report, stage};
 use crate::{Aabb, Algorithm, Backend, Config, Error, Pair, Plan, ProxyFilter};
 use std::sync::atomic::AtomicU64;
 
-/// What is searched.
+/// A search: boxes, filters and settings.
 #[derive(Clone, Copy)]
 pub(crate) struct Request<'a> {
     pub(crate) boxes: &'a [Aabb],

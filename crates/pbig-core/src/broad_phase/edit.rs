@@ -16,7 +16,7 @@ use crate::{Aabb, Pair, ProxyFilter};
 pub(super) struct Edit {
     /// Changed boxes as they were, in the order of cells.
     before: Vec<Record>,
-    /// The same boxes as they are.
+    /// Changed boxes as they are, in the same order.
     after: Vec<Record>,
     /// Where each one was found.
     places: Vec<Place>,
@@ -24,7 +24,7 @@ pub(super) struct Edit {
     order: Vec<(u32, u32)>,
 }
 
-/// What one thread finds.
+/// The findings and buffers of one thread.
 #[derive(Clone, Debug, Default)]
 struct Thread {
     candidates: Candidates,

@@ -1,4 +1,4 @@
-//! What a broad phase knows: boxes, pairs, and what the last update did.
+//! Questions to a broad phase: its boxes, its pairs, and the report of the last update.
 
 use super::{BroadPhase, Events};
 use crate::report::Report;

@@ -29,7 +29,7 @@ pub(crate) struct World {
     states: Vec<u32>,
     /// Ids that have changed since the last update, each once.
     pub(super) changed: Vec<u32>,
-    /// What the first ones of `changed` were. Shorter than `changed` if so many have changed that nobody will ask.
+    /// Old states of the first ids in `changed`. Shorter than `changed` if too many have changed for an edit.
     pub(super) old: Vec<Old>,
     /// Changed boxes of which the old state is kept, at most.
     pub(super) keep_old: usize,

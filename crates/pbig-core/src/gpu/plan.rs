@@ -56,7 +56,7 @@ impl GpuPlan {
     /// `cell_factor` scales the cells: 1, or less where earlier cells held too many boxes.
     pub(crate) fn new(summary: &Summary, options: &GpuOptions, cell_factor: f32, max_cells: u32) -> Self {
         let split = levels(summary);
-        // Of too many levels the coarsest are kept: finer boxes then share the first of these.
+        // The coarsest levels are kept if there are too many: finer boxes then share the first of these.
         let split = &split[split.len().saturating_sub(MAX_LEVELS - 1)..];
         let (space, low) = space_of(summary, &ordinary(summary));
         let edges = split.iter().map(|level| edge(level, summary, space, options, cell_factor));

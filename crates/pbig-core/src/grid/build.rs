@@ -31,7 +31,7 @@ impl Counts {
     const INVALID: usize = MAX_BUCKETS + 2;
 }
 
-/// How keys fall into buckets, and boxes into pieces.
+/// Division of keys into buckets, and of boxes into pieces.
 #[derive(Clone, Copy)]
 struct Split {
     /// log2 of the cells in a bucket.

@@ -21,7 +21,7 @@ const AHEAD: usize = 24;
 /// Pairs that a thread gathers before it accounts for them.
 const BATCH: usize = 4096;
 
-/// What a search reports, besides that two boxes overlap.
+/// Conditions for a found pair, besides that its boxes overlap.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Rule<'a> {
     /// By id; none if all may pair.

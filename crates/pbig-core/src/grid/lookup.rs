@@ -13,7 +13,7 @@ const ROOM: usize = 4096;
 /// Boxes between the prefetch of a box's cells and its turn; half of them for the codes in the cells.
 const AHEAD: usize = 16;
 
-/// Where a stored box is.
+/// Place of a stored box.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Place {
     /// A slot of the grid.
@@ -26,7 +26,7 @@ pub(crate) enum Place {
     Nowhere,
 }
 
-/// What is done with a stored box that overlaps the `i`-th of the boxes that are looked up.
+/// Receiver of the stored boxes that overlap the boxes looked up; `i` is the number of such a box.
 pub(crate) trait Meet {
     fn meet(&mut self, i: usize, stored: &Record, place: Place);
 }

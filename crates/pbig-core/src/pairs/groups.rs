@@ -18,7 +18,7 @@ const RADIX_FROM: usize = 6;
 /// Bits of `b` by which it is.
 const RADIX_BITS: u32 = 11;
 
-/// How ids fall into groups.
+/// Division of ids into groups.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Grouping {
     pub(crate) ids: usize,
@@ -39,7 +39,7 @@ impl Grouping {
     }
 }
 
-/// Where a row of pairs lies.
+/// Place and length of a row of pairs.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct Span {
     pub(super) start: u32,

@@ -18,7 +18,7 @@ pub(crate) const SPILL_UP_TO_ONE_IN: usize = 2;
 /// Changed boxes from which several threads look them up.
 pub(crate) const PARALLEL_FROM_EDITS: usize = 1024;
 
-/// What is known when an engine is chosen.
+/// Counts from which an engine is chosen.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Counts {
     /// Boxes that are present.
