@@ -32,7 +32,7 @@ pub(crate) struct Cells {
     pub(super) scale: [f64; 4],
     /// Extent of the largest box that the grid takes, by axis; larger ones are oversize.
     pub(super) max_extent: [f32; 3],
-    /// The same in steps, rounded up.
+    /// `max_extent` in steps, rounded up.
     pub(super) reach: Steps,
     /// log2 of the steps in a cell.
     pub(super) shift: u32,

@@ -339,7 +339,7 @@ pub fn simd() -> &'static str {
 /// Work that is compiled once for each implementation. `run` and all that it calls must be `#[inline(always)]`: a
 /// function that is not inlined is compiled without the instructions (one such helper made the search 6 times slower).
 pub(crate) trait Kernel {
-    /// What the work returns.
+    /// The result of the work.
     type Output;
 
     /// Does the work.

@@ -24,7 +24,7 @@ pub struct PbigFound {
 
 /// Finds all overlapping pairs with PBIG's grid, on one thread.
 ///
-/// Of the options it uses `cell_rule`, `boxes_per_cell` and `small_cell`.
+/// It uses the options `cell_rule`, `boxes_per_cell` and `small_cell`.
 ///
 /// # Errors
 /// [`Error::TooManyBoxes`] and [`Error::TooManyPairs`], by [`Limits::DEFAULT`].

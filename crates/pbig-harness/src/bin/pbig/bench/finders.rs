@@ -75,7 +75,7 @@ impl Side {
         }
     }
 
-    /// What our finder reports; PBIG's grid has no report.
+    /// The report of our finder; PBIG's grid has none.
     pub(super) fn report(&self) -> Option<&Report> {
         match self {
             Self::Finder(finder) => Some(finder.report()),

@@ -25,7 +25,7 @@ pub(in crate::bench) struct Row {
     events: usize,
     pub(in crate::bench) cpu: Spread,
     pub(in crate::bench) gpu: Spread,
-    /// Of the last round.
+    /// Values of the last round.
     report: GpuReport,
 }
 
