@@ -91,7 +91,7 @@ impl BroadPhase {
             let pairs = kept.partners(id).map(|other| Pair::new(id, other));
             events.removed.extend(pairs.filter(|pair| existed(pair) && !(overlaps(pair) && allows(pair))));
         }
-        events.sort();
+        events.sort(world.ids());
         events.removed.dedup();
         events.dropped.sort_unstable();
         events.dropped.dedup();

@@ -21,7 +21,10 @@ pub(super) struct Edit {
     /// Where each one was found.
     places: Vec<Place>,
     threads: Vec<Thread>,
-    order: Vec<(u32, u32)>,
+    /// Changed boxes as they were, in the order of their changes.
+    listed: Vec<Record>,
+    /// Key and place in that list.
+    order: Vec<u64>,
 }
 
 /// The findings and buffers of one thread.
@@ -44,7 +47,7 @@ impl Edit {
         self.find_ended(world, grid, threads);
         grid.move_all(&self.after, &self.places);
         self.find_new(world, grid, threads);
-        self.gather(events);
+        self.gather(events, world.ids());
         let sum = |of: fn(&Candidates) -> u64| {
             self.threads.iter().map(|thread| of(&thread.candidates)).sum::<u64>()
         };
@@ -54,19 +57,18 @@ impl Edit {
 
     /// Lists changed boxes in the order of their old cells: neighbours share cache lines.
     fn list(&mut self, world: &World, grid: &EditedGrid) {
-        let Self { before, after, order, .. } = self;
-        let changed = world.changed.iter().zip(&world.old);
-        before.clear();
-        before.extend(changed.map(|(&id, old)| Record::new(old.aabb, id, 0)));
-        grid.keys(before);
+        let Self { before, after, listed, order, .. } = self;
+        listed.clear();
+        let old = |(&id, old): (&u32, &Old)| Record::new(old.aabb, id, 0);
+        listed.extend(world.changed.iter().zip(&world.old).map(old));
+        grid.keys(listed);
         order.clear();
-        order.extend(before.iter().map(|record| (record.key, record.id)));
+        order.extend(listed.iter().enumerate().map(|(i, record)| u64::from(record.key) << 32 | i as u64));
         order.sort_unstable();
-        let old = |id: u32| world.change_of(id).map_or(Aabb::NOWHERE, |at| world.old[at].aabb);
         before.clear();
-        before.extend(order.iter().map(|&(key, id)| Record::new(old(id), id, key)));
+        before.extend(order.iter().map(|&word| listed[word as u32 as usize]));
         after.clear();
-        after.extend(order.iter().map(|&(_, id)| Record::new(world.boxes[id as usize], id, 0)));
+        after.extend(before.iter().map(|record| Record::new(world.boxes[record.id as usize], record.id, 0)));
         grid.keys(after);
     }
 
@@ -97,14 +99,14 @@ impl Edit {
         });
     }
 
-    fn gather(&mut self, events: &mut Comparison) {
+    fn gather(&mut self, events: &mut Comparison, ids: usize) {
         events.clear();
         for thread in &self.threads {
             events.added.extend_from_slice(&thread.added);
             events.removed.extend_from_slice(&thread.removed);
             events.dropped.extend_from_slice(&thread.dropped);
         }
-        events.sort();
+        events.sort(ids);
     }
 }
 

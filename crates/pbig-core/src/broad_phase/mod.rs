@@ -109,8 +109,7 @@ impl BroadPhase {
     /// or more, and over 64 times as large as any before.
     #[inline(always)]
     pub fn set(&mut self, id: u32, aabb: Aabb, filter: ProxyFilter) -> Result<(), Error> {
-        if self.world.contains(id) {
-            self.world.set(id, aabb, filter, self.config.margin);
+        if self.world.set(id, aabb, filter, self.config.margin) {
             Ok(())
         } else {
             self.insert(id, aabb, filter)

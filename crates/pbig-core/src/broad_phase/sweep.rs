@@ -49,7 +49,7 @@ impl Sweep {
             self.after.put(id as usize, &world.boxes[id as usize]);
         }
         dispatch(SweepAll { sweep: self, world, events });
-        events.sort();
+        events.sort(world.ids());
     }
 
     /// Takes over the world as it is now.

@@ -90,17 +90,28 @@ impl World {
         self.states.resize(ids, 0);
     }
 
-    /// Moves a box that is present.
+    /// Moves a box that is present. Returns false, and does nothing, if it is not.
+    ///
+    /// A stored box that is valid is present; while it holds the new one its state is not read, and its filter only if any
+    /// box was ever filtered.
     #[inline(always)]
-    pub(super) fn set(&mut self, id: u32, aabb: Aabb, filter: ProxyFilter, margin: f32) {
+    pub(super) fn set(&mut self, id: u32, aabb: Aabb, filter: ProxyFilter, margin: f32) -> bool {
         let i = id as usize;
-        if !still_holds(&self.boxes[i], &aabb, margin) {
+        let Some(fat) = self.boxes.get(i) else { return false };
+        let gaps = aabb.gaps_are_within(fat, slack(margin));
+        let is_held = gaps == Some(true) && aabb.is_valid();
+        if !is_held && !self.contains(id) {
+            return false;
+        }
+        if !is_held && (gaps.is_some() || !holds_exactly(fat, aabb, slack(margin))) {
             self.note_change(id);
             self.put(i, aabb, margin);
         }
-        if !self.filters[i].is(&filter) {
+        let is_unfiltered = !self.is_filtered && filter.is(&ProxyFilter::ALL);
+        if !is_unfiltered && !self.filters[i].is(&filter) {
             self.set_filter(id, filter);
         }
+        true
     }
 
     #[cold]
@@ -179,19 +190,14 @@ impl World {
     }
 }
 
-/// Returns true if a stored fat box still contains the box, by at most twice the margin: a box that has shrunk is stored
-/// anew, so that only boxes near each other pair.
+/// Returns the widest gap between a stored box and one that it still holds: twice the margin, as a box that has shrunk is
+/// stored anew, so that only boxes near each other pair. A little less, because gaps are rounded.
 #[inline(always)]
-fn still_holds(fat: &Aabb, aabb: &Aabb, margin: f32) -> bool {
-    // A little less than two margins, because the gaps are rounded.
-    let slack = 2.0 * margin * (1.0 - 2.0 * f32::EPSILON);
-    match aabb.gaps_are_within(fat, slack) {
-        Some(holds) => holds & aabb.is_valid(),
-        None => holds_exactly(fat, *aabb, slack),
-    }
+fn slack(margin: f32) -> f32 {
+    2.0 * margin * (1.0 - 2.0 * f32::EPSILON)
 }
 
-/// As [`still_holds`], some coordinates infinite or NaN.
+/// Returns true if a stored box still holds another one, where some coordinates are infinite or NaN.
 #[cold]
 fn holds_exactly(fat: &Aabb, aabb: Aabb, slack: f32) -> bool {
     if !aabb.is_valid() {

@@ -52,28 +52,44 @@ impl Spill {
     }
 
     /// Visits the entries of a run of cells.
-    #[inline]
+    #[inline(always)]
     pub(super) fn visit(&self, (key, count): KeyRun, mut visit: impl FnMut(u32)) {
         // Cells beyond those of the last insertion have no entries.
         let end = (key + count).min(self.heads.len());
-        let mut key = key;
-        while key < end {
-            let bits = self.occupied[key / 64] >> (key % 64);
-            if bits == 0 {
-                key = (key / 64 + 1) * 64;
-                continue;
+        for first in (key..end).step_by(64) {
+            let beyond = (end - first).min(64);
+            let mut bits = self.occupied_from(first) & (u64::MAX >> (64 - beyond));
+            while bits != 0 {
+                let mut entry = self.heads[first + bits.trailing_zeros() as usize];
+                bits &= bits - 1;
+                while entry != NONE {
+                    visit(entry);
+                    entry = self.next[entry as usize];
+                }
             }
-            key += bits.trailing_zeros() as usize;
-            if key >= end {
-                return;
-            }
-            let mut entry = self.heads[key];
-            while entry != NONE {
-                visit(entry);
-                entry = self.next[entry as usize];
-            }
-            key += 1;
         }
+    }
+
+    /// Returns the bits of 64 cells, any key first.
+    #[inline(always)]
+    fn occupied_from(&self, key: usize) -> u64 {
+        let (word, bit) = (key / 64, key % 64);
+        // In two steps, as a shift by 64 is none.
+        self.occupied[word] >> bit | self.occupied[word + 1] << 1 << (63 - bit)
+    }
+
+    /// Prefetches what a visit reads next.
+    #[inline(always)]
+    pub(super) fn prefetch_heads(&self, (key, count): KeyRun) {
+        if key + count <= self.heads.len() && self.occupied_from(key) << (64 - count.clamp(1, 64)) != 0 {
+            prefetch(&self.heads[key + self.occupied_from(key).trailing_zeros() as usize]);
+        }
+    }
+
+    /// Prefetches what a visit reads first.
+    #[inline(always)]
+    pub(super) fn prefetch(&self, key: usize) {
+        prefetch(self.occupied.as_ptr().wrapping_add(key / 64));
     }
 
     /// Forgets all entries.
@@ -92,7 +108,7 @@ impl Spill {
     fn insert(&mut self, record: Record, cells: usize) {
         if self.heads.len() < cells {
             self.heads.resize(cells, NONE);
-            self.occupied.resize(cells / 64 + 1, 0);
+            self.occupied.resize(cells / 64 + 2, 0);
         }
         let key = record.key as usize;
         let entry = self.free.pop().unwrap_or(self.records.len() as u32);
@@ -149,6 +165,15 @@ impl EditedGrid {
     /// Returns the key of the cell in which a box lies, for sorting: movers are looked up in the order of cells.
     pub(crate) fn keys(&self, boxes: &mut [Record]) {
         dispatch(Keys { grid: self, boxes });
+    }
+
+    /// Prefetches what the move of a box reads and writes, where it is and where it goes.
+    #[inline(always)]
+    fn prefetch(&self, moved: &[Record], places: &[Place], i: usize) {
+        let Some(Place::Slot(slot)) = places.get(i) else { return };
+        prefetch(self.grid.records.as_ptr().wrapping_add(*slot as usize));
+        prefetch(self.grid.codes.as_ptr().wrapping_add(*slot as usize));
+        prefetch(self.grid.starts.as_ptr().wrapping_add(moved[i].key as usize));
     }
 
     fn take_out(&mut self, place: Place, moved: &mut Vec<u32>) {
@@ -232,9 +257,7 @@ impl Kernel for MoveAll<'_> {
         let cells = grid.grid.plan.cells;
         let (mut no_longer_oversize, mut oversize) = (vec![], vec![]);
         for (i, (record, &place)) in moved.iter().zip(places).enumerate() {
-            if let Some(Place::Slot(slot)) = places.get(i + AHEAD) {
-                prefetch(grid.grid.records.as_ptr().wrapping_add(*slot as usize));
-            }
+            grid.prefetch(moved, places, i + AHEAD);
             if !cells.takes(&record.aabb) {
                 grid.take_out(place, &mut no_longer_oversize);
                 oversize.extend(record.aabb.is_valid().then_some(*record));

@@ -10,8 +10,8 @@ use crate::Aabb;
 /// Candidates that are tested together.
 const ROOM: usize = 4096;
 
-/// Boxes between the prefetch of a box's cells and its turn; half of them for the codes in the cells.
-const AHEAD: usize = 16;
+/// Rows of cells that are looked through together: enough that the first one's codes are there when the last is asked for.
+const ROWS: usize = 256;
 
 /// Place of a stored box.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -31,9 +31,27 @@ pub(crate) trait Meet {
     fn meet(&mut self, i: usize, stored: &Record, place: Place);
 }
 
+/// A row of cells to look through for a box.
+#[derive(Clone, Copy, Debug)]
+struct Row {
+    query: u64,
+    /// The number of the box.
+    i: u32,
+    /// The first key and the one after the last; later the slots.
+    first: u32,
+    end: u32,
+}
+
+impl Row {
+    fn cells(&self) -> KeyRun {
+        (self.first as usize, (self.end - self.first) as usize)
+    }
+}
+
 /// Buffers of a look-up: candidates as the number of the box and a slot, or an entry of the spill list.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Candidates {
+    rows: Vec<Row>,
     boxes: Vec<u32>,
     places: Vec<u32>,
     len: usize,
@@ -121,79 +139,89 @@ impl<M: Meet> Kernel for LookUp<'_, M> {
     }
 }
 
+/// In three rounds over many rows, so that memory is asked for long before it is read: where the cells begin, then the codes
+/// in them, then the records of those that match.
 impl<M: Meet> LookUp<'_, M> {
     #[inline(always)]
     unsafe fn all<S: Simd, const WRAPS: bool>(&mut self) {
+        self.candidates.rows.clear();
         for i in 0..self.boxes.len() {
-            // SAFETY: the caller has the instructions.
-            unsafe {
-                if let Some(ahead) = self.boxes.get(i + AHEAD) {
-                    self.prefetch::<S, WRAPS>(&ahead.aabb, false);
-                }
-                if let Some(ahead) = self.boxes.get(i + AHEAD / 2) {
-                    self.prefetch::<S, WRAPS>(&ahead.aabb, true);
-                }
-                if self.grid.grid.plan.cells.takes(&self.boxes[i].aabb) {
-                    self.one::<S, WRAPS>(i);
-                }
+            if self.grid.grid.plan.cells.takes(&self.boxes[i].aabb) {
+                // SAFETY: the caller has the instructions.
+                unsafe { self.list::<S, WRAPS>(i) };
+            }
+            if self.candidates.rows.len() >= ROWS {
+                // SAFETY: as above.
+                unsafe { self.look_through::<S>() };
             }
         }
+        // SAFETY: as above.
+        unsafe { self.look_through::<S>() };
         self.test();
     }
 
-    /// Prefetches where the cells of a box begin, or the codes there.
+    /// Lists the rows of cells in which the lower corner of an overlapping box can lie.
     #[inline(always)]
-    unsafe fn prefetch<S: Simd, const WRAPS: bool>(&self, aabb: &Aabb, codes: bool) {
-        let grid = &self.grid.grid;
-        let cells = &grid.plan.cells;
-        if !cells.takes(aabb) {
-            return;
-        }
-        // SAFETY: the caller has the instructions.
-        let (low, high) = unsafe { S::steps(cells, aabb) };
-        let window = cells.window(low, high);
-        for z in window.low[2]..=window.high[2] {
-            for y in window.low[1]..=window.high[1] {
-                let [(key, _), _] = cells.row::<WRAPS>([window.low[0], y, z], window.high[0]);
-                if codes {
-                    prefetch(grid.codes.as_ptr().wrapping_add(grid.starts[key] as usize));
-                } else {
-                    prefetch(grid.starts.as_ptr().wrapping_add(key));
-                }
-            }
-        }
-    }
-
-    #[inline(always)]
-    unsafe fn one<S: Simd, const WRAPS: bool>(&mut self, i: usize) {
+    unsafe fn list<S: Simd, const WRAPS: bool>(&mut self, i: usize) {
         let cells = &self.grid.grid.plan.cells;
         // SAFETY: the caller has the instructions.
-        let (low, high) = unsafe { S::steps(cells, &self.boxes[i].aabb) };
-        // SAFETY: as above.
-        let (query, window) = (query_of(unsafe { S::code(low, high) }), cells.window(low, high));
+        let (query, window) = unsafe {
+            let (low, high) = S::steps(cells, &self.boxes[i].aabb);
+            (query_of(S::code(low, high)), cells.window(low, high))
+        };
         for z in window.low[2]..=window.high[2] {
             for y in window.low[1]..=window.high[1] {
-                for run in cells.row::<WRAPS>([window.low[0], y, z], window.high[0]) {
-                    // SAFETY: as above.
-                    unsafe { self.run_of_cells::<S>(i, query, run) };
+                let [run, rest] = cells.row::<WRAPS>([window.low[0], y, z], window.high[0]);
+                self.push(i, query, run);
+                if WRAPS && rest.1 > 0 {
+                    self.push(i, query, rest);
                 }
             }
         }
     }
 
     #[inline(always)]
-    unsafe fn run_of_cells<S: Simd>(&mut self, i: usize, query: u64, run: KeyRun) {
+    fn push(&mut self, i: usize, query: u64, (key, count): KeyRun) {
+        prefetch(self.grid.grid.starts.as_ptr().wrapping_add(key));
+        self.grid.spill.prefetch(key);
+        let row = Row { query, i: i as u32, first: key as u32, end: (key + count) as u32 };
+        self.candidates.rows.push(row);
+    }
+
+    /// Gathers the candidates of all rows listed.
+    #[inline(always)]
+    unsafe fn look_through<S: Simd>(&mut self) {
+        let mut rows = std::mem::take(&mut self.candidates.rows);
         let grid = &self.grid.grid;
-        let (first, end) = grid.slots(run);
-        self.candidates.tests += (end - first) as u64;
-        for first in (first..end).step_by(BLOCK) {
-            let beyond = (end - first).min(BLOCK) as u32;
+        if !self.grid.spill.is_empty() {
+            rows.iter().for_each(|row| self.grid.spill.prefetch_heads(row.cells()));
+            rows.iter().for_each(|row| self.spilled(row));
+        }
+        for row in &mut rows {
+            (row.first, row.end) = (grid.starts[row.first as usize], grid.starts[row.end as usize]);
+            prefetch(grid.codes.as_ptr().wrapping_add(row.first as usize));
+        }
+        for row in &rows {
+            // SAFETY: the caller has the instructions.
+            unsafe { self.slots::<S>(row) };
+        }
+        rows.clear();
+        self.candidates.rows = rows;
+    }
+
+    /// Gathers the candidates of a run of slots.
+    #[inline(always)]
+    unsafe fn slots<S: Simd>(&mut self, row: &Row) {
+        let grid = &self.grid.grid;
+        self.candidates.tests += u64::from(row.end - row.first);
+        for first in (row.first..row.end).step_by(BLOCK) {
+            let beyond = (row.end - first).min(BLOCK as u32);
             let Candidates { boxes, places, len, .. } = &mut *self.candidates;
             // SAFETY: codes are padded by two blocks; the lists have room for a block more than `ROOM`.
             unsafe {
-                let mask = S::test(query, grid.codes.as_ptr().add(first)) & ((1u32 << beyond) - 1);
+                let mask = S::test(row.query, grid.codes.as_ptr().add(first as usize)) & ((1u32 << beyond) - 1);
                 let (boxes, places) = (boxes.as_mut_ptr().add(*len), places.as_mut_ptr().add(*len));
-                let count = S::expand(i as u32, first as u32, mask, boxes, places);
+                let count = S::expand(row.i, first, mask, boxes, places);
                 prefetch(grid.records.as_ptr().wrapping_add(*places as usize & 0xFFF_FFFF));
                 *len += count;
             }
@@ -201,16 +229,16 @@ impl<M: Meet> LookUp<'_, M> {
                 self.test();
             }
         }
-        if !self.grid.spill.is_empty() {
-            self.spilled(i, run);
-        }
     }
 
-    fn spilled(&mut self, i: usize, run: KeyRun) {
+    /// Gathers the spilled boxes of a run of cells.
+    #[inline(always)]
+    fn spilled(&mut self, row: &Row) {
         let grid = self.grid;
-        grid.spill.visit(run, |entry| {
+        grid.spill.visit(row.cells(), |entry| {
+            prefetch(grid.spill.record(entry));
             let at = self.candidates.len;
-            (self.candidates.boxes[at], self.candidates.places[at]) = (i as u32, entry | SPILL);
+            (self.candidates.boxes[at], self.candidates.places[at]) = (row.i, entry | SPILL);
             self.candidates.len += 1;
             self.candidates.tests += 1;
             if self.candidates.len > ROOM {

@@ -39,6 +39,9 @@ pub(crate) trait Simd {
     /// Returns true if the first `len` (at most 8) of 8 numbers each are the same.
     unsafe fn same_short(one: *const u32, other: *const u32, len: usize) -> bool;
 
+    /// Returns a bit for each of 8 numbers that is not among the first `len` (at most 8) of 8 others.
+    unsafe fn absent(numbers: *const u32, others: *const u32, len: usize) -> u32;
+
     /// Returns a bit for each of 8 boxes, given axis by axis, that overlaps a box.
     unsafe fn overlaps_eight(boxes: &EightBoxes, aabb: &Aabb) -> u32;
 }
@@ -110,6 +113,13 @@ impl Simd for Portable {
     unsafe fn same_short(one: *const u32, other: *const u32, len: usize) -> bool {
         // SAFETY: the caller has as many.
         (0..len).all(|i| unsafe { *one.add(i) == *other.add(i) })
+    }
+
+    #[inline(always)]
+    unsafe fn absent(numbers: *const u32, others: *const u32, len: usize) -> u32 {
+        // SAFETY: the caller has 8 numbers each.
+        let (numbers, others) = unsafe { (*numbers.cast::<[u32; 8]>(), std::slice::from_raw_parts(others, len)) };
+        (0..8).fold(0, |mask, i| mask | u32::from(!others.contains(&numbers[i])) << i)
     }
 
     #[inline(always)]
@@ -282,6 +292,26 @@ impl Simd for Avx2 {
             let same = _mm256_cmpeq_epi32(_mm256_loadu_si256(one.cast()), _mm256_loadu_si256(other.cast()));
             let same = _mm256_movemask_ps(_mm256_castsi256_ps(same)) as u32;
             !same & ((1 << len) - 1) == 0
+        }
+    }
+
+    #[inline(always)]
+    unsafe fn absent(numbers: *const u32, others: *const u32, len: usize) -> u32 {
+        use std::arch::x86_64::*;
+        // SAFETY: the caller has 8 numbers each, and AVX2.
+        unsafe {
+            let lanes = _mm256_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7);
+            let behind = _mm256_cmpgt_epi32(lanes, _mm256_set1_epi32(len as i32 - 1));
+            let numbers = _mm256_loadu_si256(numbers.cast());
+            // No id is the largest number.
+            let mut others = _mm256_or_si256(_mm256_loadu_si256(others.cast()), behind);
+            let next = _mm256_setr_epi32(1, 2, 3, 4, 5, 6, 7, 0);
+            let mut found = _mm256_cmpeq_epi32(numbers, others);
+            for _ in 1..8 {
+                others = _mm256_permutevar8x32_epi32(others, next);
+                found = _mm256_or_si256(found, _mm256_cmpeq_epi32(numbers, others));
+            }
+            !_mm256_movemask_ps(_mm256_castsi256_ps(found)) as u32 & 255
         }
     }
 

@@ -1,6 +1,6 @@
 //! The comparison: found pairs against the kept ones, group by group, in the order of ids.
 
-use super::groups::{Groups, Span};
+use super::groups::{self, Groups, Span};
 use super::kept::{Kept, Rows};
 use super::row;
 use crate::Pair;
@@ -17,6 +17,9 @@ pub(crate) struct Comparison {
     pub(crate) dropped: Vec<Pair>,
     /// By group.
     parts: Vec<Part>,
+    /// Buffers of a sort.
+    sorted: Vec<Pair>,
+    counts: Vec<u32>,
 }
 
 /// The events of one group.
@@ -53,7 +56,7 @@ impl Comparison {
             let (part, spans, pool) =
                 unsafe { (&mut parts.part(group..group + 1)[0], spans.part(ids), pool.part(places)) };
             part.clear();
-            found.sort(group, sorter, spans, pool, first_place);
+            found.sort::<false>(group, sorter, spans, pool, first_place);
             let new = NewRows { first_id, first_place, spans, pool };
             match is_removed {
                 Some(is_removed) => part.compare_stripped(old, &new, is_removed),
@@ -73,15 +76,16 @@ impl Comparison {
     }
 
     /// Sorts events that were found in any order.
-    pub(crate) fn sort(&mut self) {
-        for events in [&mut self.added, &mut self.removed] {
-            events.sort_unstable_by_key(|pair| u64::from(pair.a) << 32 | u64::from(pair.b));
+    pub(crate) fn sort(&mut self, ids: usize) {
+        let Self { added, removed, sorted, counts, .. } = self;
+        for events in [added, removed] {
+            groups::sort(events, sorted, counts, ids);
         }
     }
 
     fn gather(&mut self) {
         self.clear();
-        let Self { added, removed, dropped, parts } = self;
+        let Self { added, removed, dropped, parts, .. } = self;
         for part in parts {
             added.extend_from_slice(&part.added);
             removed.extend_from_slice(&part.removed);
@@ -144,9 +148,8 @@ impl Kernel for CompareRows<'_> {
         for (a, span) in (new.first_id..).zip(new.spans) {
             let (was, is) = (old.spans[a as usize].range(), new.range(*span));
             // SAFETY: the caller has the instructions.
-            if !unsafe { row::are_same::<S>((&old.pool, was.clone()), (new.pool, is.clone())) } {
-                let (was, is) = (&old.pool[was], &new.pool[is]);
-                row::differences(a, was, is, &mut part.added, &mut part.removed);
+            unsafe {
+                row::compare::<S>(a, (&old.pool, was), (new.pool, is), &mut part.added, &mut part.removed);
             }
         }
     }

@@ -10,7 +10,7 @@ use std::ops::Range;
 const MIN_SHIFT: u32 = 10;
 
 /// Groups, at most, about: each thread has a write position for each.
-const MAX_GROUPS: usize = 500;
+const MAX_GROUPS: usize = 40;
 
 /// Pairs of a row, on average, from which a group is sorted roughly by `b` first: rows are longer than a register.
 const RADIX_FROM: usize = 6;
@@ -112,22 +112,24 @@ impl Groups {
 
     /// Replaces `list` by all pairs in order.
     pub(crate) fn list(&mut self, list: &mut Vec<Pair>, workers: usize) {
-        list.resize(self.len(), Pair::default());
-        let list = SharedSlice::new(list);
+        list.clear();
+        list.reserve(self.len());
+        let pairs = SharedSlice::new(list.spare_capacity_mut());
         self.for_each(workers, |groups, sorter, group| {
-            let places = groups.range(group);
             // SAFETY: groups have different pairs.
-            let list = unsafe { list.part(places.clone()) };
+            let pairs = unsafe { pairs.part(groups.range(group)) };
             let spans = &mut std::mem::take(&mut sorter.spans);
             let others = &mut std::mem::take(&mut sorter.others);
             spans.resize(groups.grouping.ids_of(group).len(), Span::default());
-            ensure_scratch(others, list.len(), 0);
-            groups.sort(group, sorter, spans, &mut others[..list.len()], 0);
-            for ((to, &a), &b) in list.iter_mut().zip(&sorter.firsts).zip(&*others) {
-                *to = Pair { a, b };
+            ensure_scratch(others, pairs.len(), 0);
+            groups.sort::<true>(group, sorter, spans, &mut others[..pairs.len()], 0);
+            for ((to, &a), &b) in pairs.iter_mut().zip(&sorter.firsts).zip(&*others) {
+                to.write(Pair { a, b });
             }
             (sorter.spans, sorter.others) = (std::mem::take(spans), std::mem::take(others));
         });
+        // SAFETY: all groups have written their pairs.
+        unsafe { list.set_len(self.len()) };
     }
 
     /// Hands each group to `work`, with the buffers of a thread.
@@ -139,8 +141,9 @@ impl Groups {
         self.sorters = sorters;
     }
 
-    /// Sorts a group: the `b` of each pair into `others`, row by row, and where each row lies, counted from `base`.
-    pub(super) fn sort(
+    /// Sorts a group: the `b` of each pair into `others`, row by row, and where each row lies, counted from `base`; with
+    /// `LIST`, the `a` of each pair into the sorter's `firsts`.
+    pub(super) fn sort<const LIST: bool>(
         &self,
         group: usize,
         sorter: &mut Sorter,
@@ -152,10 +155,16 @@ impl Groups {
         let first_id = self.grouping.ids_of(group).start as u32;
         let pairs = &self.pairs[self.range(group)];
         let is_long = pairs.len() > RADIX_FROM * spans.len();
-        let pairs = if is_long { sort_roughly(pairs, by_b, counts, self.grouping.ids) } else { pairs };
-        ensure_scratch(firsts, pairs.len(), 0);
+        let mut pairs = pairs;
+        if is_long {
+            sort_roughly(pairs, by_b, counts, self.grouping.ids, |pair| pair.b);
+            pairs = &by_b[..pairs.len()];
+        }
+        if LIST {
+            ensure_scratch(firsts, pairs.len(), 0);
+        }
         ensure_scratch(unsorted, pairs.len() + SHORT, 0);
-        dispatch(SortRows { pairs, first_id, base, spans, others, firsts, unsorted, is_long });
+        dispatch(SortRows::<LIST> { pairs, first_id, base, spans, others, firsts, unsorted, is_long });
     }
 }
 
@@ -172,32 +181,48 @@ pub(super) struct Sorter {
     counts: Vec<u32>,
 }
 
-/// Sorts pairs by the highest bits of `b`, so that rows made of them in turn are nearly sorted.
-fn sort_roughly<'a>(
+/// Sorts pairs by the highest bits of one of their ids, into `to`.
+fn sort_roughly(
     pairs: &[Pair],
-    by_b: &'a mut Vec<Pair>,
+    to: &mut Vec<Pair>,
     counts: &mut Vec<u32>,
     ids: usize,
-) -> &'a [Pair] {
+    id: impl Fn(&Pair) -> u32,
+) {
     let shift = (usize::BITS - ids.leading_zeros()).saturating_sub(RADIX_BITS);
-    ensure_scratch(by_b, pairs.len(), Pair::default());
+    ensure_scratch(to, pairs.len(), Pair::default());
     counts.clear();
     counts.resize(1 << RADIX_BITS, 0);
-    pairs.iter().for_each(|pair| counts[(pair.b >> shift) as usize] += 1);
+    pairs.iter().for_each(|pair| counts[(id(pair) >> shift) as usize] += 1);
     let mut next = 0;
     for count in counts.iter_mut() {
         next += std::mem::replace(count, next);
     }
     for pair in pairs {
-        let place = &mut counts[(pair.b >> shift) as usize];
-        by_b[*place as usize] = *pair;
+        let place = &mut counts[(id(pair) >> shift) as usize];
+        to[*place as usize] = *pair;
         *place += 1;
     }
-    &by_b[..pairs.len()]
+}
+
+/// Sorts pairs: roughly by `a` first if they are many.
+pub(super) fn sort(pairs: &mut Vec<Pair>, sorted: &mut Vec<Pair>, counts: &mut Vec<u32>, ids: usize) {
+    let word = |pair: &Pair| u64::from(pair.a) << 32 | u64::from(pair.b);
+    if pairs.len() < 1 << RADIX_BITS {
+        return pairs.sort_unstable_by_key(word);
+    }
+    sort_roughly(pairs, sorted, counts, ids, |pair| pair.a);
+    sorted.truncate(pairs.len());
+    std::mem::swap(pairs, sorted);
+    let mut start = 0;
+    for &end in &*counts {
+        pairs[start..end as usize].sort_unstable_by_key(word);
+        start = end as usize;
+    }
 }
 
 /// Scatters the `b` of pairs into rows, and sorts the rows.
-struct SortRows<'a> {
+struct SortRows<'a, const LIST: bool> {
     pairs: &'a [Pair],
     first_id: u32,
     base: u32,
@@ -208,7 +233,7 @@ struct SortRows<'a> {
     is_long: bool,
 }
 
-impl Kernel for SortRows<'_> {
+impl<const LIST: bool> Kernel for SortRows<'_, LIST> {
     type Output = ();
 
     #[inline(always)]
@@ -226,7 +251,10 @@ impl Kernel for SortRows<'_> {
         for pair in pairs {
             let span = &mut spans[(pair.a - first_id) as usize];
             let place = (span.start + span.len) as usize;
-            (firsts[place], unsorted[place]) = (pair.a, pair.b);
+            unsorted[place] = pair.b;
+            if LIST {
+                firsts[place] = pair.a;
+            }
             span.len += 1;
         }
         for span in spans {

@@ -55,25 +55,49 @@ fn sort_long(row: &mut [u32], is_nearly_sorted: bool) {
     }
 }
 
-/// Returns true if two rows are the same, each at a range of its pool.
+/// A row at a range of a pool.
+type RowAt<'a> = (&'a [u32], Range<usize>);
+
+/// Appends the pairs of `a` that are in one of two sorted rows only: to `removed` if in the old one.
 ///
 /// # Safety
 /// The processor has the instructions.
 #[inline(always)]
-pub(super) unsafe fn are_same<S: Simd>(
-    (pool, one): (&[u32], Range<usize>),
-    (other_pool, other): (&[u32], Range<usize>),
-) -> bool {
-    if one.len() != other.len() {
-        return false;
+pub(super) unsafe fn compare<S: Simd>(
+    a: u32,
+    (old, was): RowAt<'_>,
+    (new, is): RowAt<'_>,
+    added: &mut Vec<Pair>,
+    removed: &mut Vec<Pair>,
+) {
+    let is_short = was.len().max(is.len()) <= SHORT;
+    let fits = was.start + SHORT <= old.len() && is.start + SHORT <= new.len();
+    if !(is_short && fits) {
+        let (was, is) = (&old[was], &new[is]);
+        return if was != is { differences(a, was, is, added, removed) };
     }
-    let fits = one.start + SHORT <= pool.len() && other.start + SHORT <= other_pool.len();
-    if one.len() <= SHORT && fits {
-        let (row, other_row) = (&pool[one.start..], &other_pool[other.start..]);
-        // SAFETY: both pools have that many elements there; the caller has the instructions.
-        return unsafe { S::same_short(row.as_ptr(), other_row.as_ptr(), one.len()) };
+    // SAFETY: both pools have that many elements there; the caller has the instructions.
+    unsafe {
+        let (old, new) = (old.as_ptr().add(was.start), new.as_ptr().add(is.start));
+        if was.len() == is.len() && S::same_short(old, new, is.len()) {
+            return;
+        }
+        push(a, old, S::absent(old, new, is.len()) & ((1 << was.len()) - 1), removed);
+        push(a, new, S::absent(new, old, was.len()) & ((1 << is.len()) - 1), added);
     }
-    pool[one] == other_pool[other]
+}
+
+/// Appends the pairs of `a` with the elements of a mask.
+///
+/// # Safety
+/// `row` has the elements.
+#[inline(always)]
+unsafe fn push(a: u32, row: *const u32, mut mask: u32, pairs: &mut Vec<Pair>) {
+    while mask != 0 {
+        // SAFETY: the caller's promise.
+        pairs.push(Pair { a, b: unsafe { *row.add(mask.trailing_zeros() as usize) } });
+        mask &= mask - 1;
+    }
 }
 
 /// Appends the pairs of `a` that are in one of two sorted rows only.
