@@ -54,9 +54,9 @@ impl Sweep {
 
     /// Takes over the world as it is now.
     pub(super) fn advance(&mut self, world: &World) {
+        self.before.0.copy_from_slice(&self.after.0);
         for &id in &world.changed {
             let i = id as usize;
-            self.before.put(i, &world.boxes[i]);
             self.boxes_before[i] = world.boxes[i];
             self.filters_before[i] = world.filters[i];
         }
@@ -128,9 +128,13 @@ impl Kernel for SweepAll<'_> {
     unsafe fn run<S: Simd>(self) {
         let Self { sweep, world, events } = self;
         let must_look = world.is_filtered || world.has_removed();
+        // Where all have changed, each pair is met from its first box.
+        let all_changed = world.changed.len() == world.ids();
         for &id in &world.changed {
             let (before, after) = (sweep.boxes_before[id as usize], world.boxes[id as usize]);
-            for (block, (was, is)) in sweep.before.0.iter().zip(&sweep.after.0).enumerate() {
+            let first = if all_changed { id as usize / BLOCK } else { 0 };
+            let blocks = sweep.before.0.iter().zip(&sweep.after.0).enumerate().skip(first);
+            for (block, (was, is)) in blocks {
                 // SAFETY: the caller has the instructions.
                 let (was, is) = unsafe { (S::overlaps_eight(was, &before), S::overlaps_eight(is, &after)) };
                 let mut look = if must_look { was | is } else { was ^ is };

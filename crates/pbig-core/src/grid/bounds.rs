@@ -161,41 +161,29 @@ impl Sample {
 
     /// Returns a low and a high quantile (4%) of the lower corners on an axis.
     fn range(&self, k: usize) -> (f32, f32) {
-        let mut corners = [0.0; SAMPLE_SIZE];
-        let corners = self.sorted_corners(k, &mut corners);
-        if corners.is_empty() {
-            return (0.0, 0.0);
-        }
-        (corners[self.len / 25], corners[self.len - 1 - self.len / 25])
-    }
-
-    fn sorted_corners<'a>(&self, k: usize, corners: &'a mut [f32; SAMPLE_SIZE]) -> &'a [f32] {
-        for (corner, aabb) in corners.iter_mut().zip(self.boxes()) {
-            *corner = aabb.min[k].clamp(-FARTHEST, FARTHEST);
-        }
-        let corners = &mut corners[..self.len];
-        corners.sort_unstable_by(f32::total_cmp);
-        corners
+        let lowest = self.len / 25;
+        let corner = |aabb: &Aabb| aabb.min[k].clamp(-FARTHEST, FARTHEST);
+        (self.nth(lowest, corner), self.nth(self.len.saturating_sub(1 + lowest), corner))
     }
 
     /// Returns the median of the lower corners, axis by axis: a few far boxes do not move it.
     pub(super) fn middle(&self) -> [f64; 3] {
         std::array::from_fn(|k| {
-            let mut corners = [0.0; SAMPLE_SIZE];
-            let corners = self.sorted_corners(k, &mut corners);
-            corners.get(self.len / 2).map_or(0.0, |&corner| f64::from(corner))
+            f64::from(self.nth(self.len / 2, |aabb| aabb.min[k].clamp(-FARTHEST, FARTHEST)))
         })
     }
 
     /// Returns the median of the boxes' largest extents.
     pub(super) fn median_extent(&self) -> f32 {
-        let mut extents = [0.0; SAMPLE_SIZE];
-        for (extent, aabb) in extents.iter_mut().zip(self.boxes()) {
-            *extent = largest(&aabb.extents());
-        }
-        let extents = &mut extents[..self.len];
-        extents.sort_unstable_by(f32::total_cmp);
-        extents.get(self.len / 2).copied().unwrap_or(0.0)
+        self.nth(self.len / 2, |aabb| largest(&aabb.extents()))
+    }
+
+    /// Returns the value that has `n` lesser ones; 0 where there is none.
+    fn nth(&self, n: usize, value: impl Fn(&Aabb) -> f32) -> f32 {
+        let mut values = [0.0; SAMPLE_SIZE];
+        values.iter_mut().zip(self.boxes()).for_each(|(to, aabb)| *to = value(aabb));
+        let values = &mut values[..self.len];
+        if values.is_empty() { 0.0 } else { *values.select_nth_unstable_by(n, f32::total_cmp).1 }
     }
 }
 

@@ -141,10 +141,10 @@ impl Spacing {
     fn crowd(&self, sample: &Sample) -> f64 {
         let cell =
             |k: usize, x: f32| ((f64::from(x) - f64::from(self.space.low[k])) / (64.0 * self.step(k))) as i64;
-        let mut cells = [[0i64; 3]; SAMPLE_SIZE];
-        let boxes = sample.boxes();
+        let (mut cells, boxes) = ([0; SAMPLE_SIZE], sample.boxes());
         for (to, aabb) in cells.iter_mut().zip(boxes) {
-            *to = std::array::from_fn(|k| cell(k, aabb.min[k]));
+            // A number for each cell; two that share one by chance are too few to matter.
+            *to = (0..3).fold(0, |cells: i64, k| cells.wrapping_mul(0x1000_0001_B3) ^ cell(k, aabb.min[k]));
         }
         let cells = &mut cells[..boxes.len()];
         cells.sort_unstable();

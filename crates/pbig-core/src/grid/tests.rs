@@ -98,7 +98,7 @@ fn every_implementation_computes_the_same_values() {
 struct Rows(Vec<u32>, usize);
 
 impl Kernel for Rows {
-    type Output = (Vec<u32>, [bool; 2]);
+    type Output = (Vec<u32>, [bool; 2], [u32; 2]);
 
     #[inline(always)]
     unsafe fn run<S: Simd>(self) -> Self::Output {
@@ -108,8 +108,10 @@ impl Kernel for Rows {
         unsafe {
             let sorted = S::sorted_short(row.as_ptr(), len)[..len].to_vec();
             let same = S::same_short(row.as_ptr(), other.as_ptr(), len);
-            other[len - 1] += 1;
-            (sorted, [same, S::same_short(row.as_ptr(), other.as_ptr(), len)])
+            other[len - 1] += 100;
+            let same = [same, S::same_short(row.as_ptr(), other.as_ptr(), len)];
+            let absent = [&row, &other].map(|numbers| S::absent(numbers.as_ptr(), row.as_ptr(), len));
+            (sorted, same, absent.map(|mask| mask & ((1 << len) - 1)))
         }
     }
 }
@@ -122,8 +124,8 @@ fn short_rows_are_sorted_and_compared() {
         let row: Vec<u32> = (0..8).map(|_| random.random_range(0..20)).collect();
         let mut wanted = row[..len].to_vec();
         wanted.sort_unstable();
-        for (sorted, same) in [dispatch(Rows(row.clone(), len)), run_portable(Rows(row.clone(), len))] {
-            assert_eq!((sorted, same), (wanted.clone(), [true, false]));
+        for found in [dispatch(Rows(row.clone(), len)), run_portable(Rows(row.clone(), len))] {
+            assert_eq!(found, (wanted.clone(), [true, false], [0, 1 << (len - 1)]));
         }
     }
 }

@@ -67,7 +67,11 @@ pub(crate) fn choose_engine(counts: &Counts, forced: Option<Engine>) -> Engine {
 
 /// Returns of how many changed boxes the old state is worth keeping, until the next update.
 pub(crate) fn old_states_to_keep(boxes: usize, ids: usize, forced: Option<Engine>) -> usize {
-    if forced.is_some() || ids <= SWEEP_UP_TO_BOXES { usize::MAX } else { boxes / EDIT_UP_TO_ONE_IN }
+    match forced {
+        Some(_) => usize::MAX,
+        None if ids <= SWEEP_UP_TO_BOXES => SWEEP_UP_TO_TESTS / ids.max(1),
+        None => boxes / EDIT_UP_TO_ONE_IN,
+    }
 }
 
 #[cfg(test)]

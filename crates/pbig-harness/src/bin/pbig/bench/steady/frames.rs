@@ -123,10 +123,12 @@ impl Race {
         }
     }
 
-    /// Measures every side once; another one is first in the next frame, as the first warms the caches for the others.
+    /// Measures every side once. Each warms the caches for the next one, so the first one changes from frame to frame, and
+    /// every second frame runs the other way round.
     fn frame(&mut self, frame: usize, name: &str) -> Result<(), Failure> {
         for place in 0..NAMES.len() {
-            let side = (frame + place) % NAMES.len();
+            let place = if frame % 2 == 0 { place } else { NAMES.len() - 1 - place };
+            let side = (frame / 2 + place) % NAMES.len();
             let (done, ms) = self.run(side);
             done.map_err(failure)?;
             self.ms[side].push(ms);
