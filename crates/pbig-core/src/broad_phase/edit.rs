@@ -37,16 +37,22 @@ struct Thread {
 }
 
 impl Edit {
-    /// Brings `grid` up to date with the changes of the world, and leaves the events in `events`, sorted. Returns the tests
-    /// made.
-    pub(super) fn run(&mut self, world: &World, grid: &mut EditedGrid, events: &mut Comparison) -> Checks {
+    /// Brings `grid` up to date with the changes of the world, and leaves the events in `events`, sorted: all, or more new
+    /// pairs than `max_pairs`. Returns the tests made.
+    pub(super) fn run(
+        &mut self,
+        world: &World,
+        grid: &mut EditedGrid,
+        events: &mut Comparison,
+        max_pairs: u64,
+    ) -> Checks {
         self.list(world, grid);
         let threads = if self.before.len() < policy::PARALLEL_FROM_EDITS { 1 } else { available_threads() };
         self.threads.resize_with(threads.max(self.threads.len()), Thread::default);
         self.threads.iter_mut().for_each(Thread::clear);
         self.find_ended(world, grid, threads);
         grid.move_all(&self.after, &self.places);
-        self.find_new(world, grid, threads);
+        self.find_new(world, grid, threads, max_pairs);
         self.gather(events, world.ids());
         let sum = |of: fn(&Candidates) -> u64| {
             self.threads.iter().map(|thread| of(&thread.candidates)).sum::<u64>()
@@ -88,14 +94,14 @@ impl Edit {
         });
     }
 
-    fn find_new(&mut self, world: &World, grid: &EditedGrid, threads: usize) {
+    fn find_new(&mut self, world: &World, grid: &EditedGrid, threads: usize, max_pairs: u64) {
         let Self { before, after, threads: all, .. } = self;
         let (before, after) = (&*before, &*after);
         run_with(&mut all[..threads], threads, |thread, piece| {
             let range = piece_range(after.len(), piece, threads);
             let Thread { candidates, added, .. } = thread;
             let (before, after) = (&before[range.clone()], &after[range]);
-            grid.look_up(after, candidates, &mut New { world, before, after, added });
+            grid.look_up(after, candidates, &mut New { world, before, after, added, max_pairs });
         });
     }
 
@@ -204,6 +210,8 @@ struct New<'a> {
     before: &'a [Record],
     after: &'a [Record],
     added: &'a mut Vec<Pair>,
+    /// Beyond, the update fails, and no more pairs are listed.
+    max_pairs: u64,
 }
 
 impl Meet for New<'_> {
@@ -222,7 +230,7 @@ impl Meet for New<'_> {
         };
         let paired = || world.state_before(id).pairs_with(&world.state_before(other));
         let existed = world.existed(id, other) && overlapped() && (!world.is_filtered || paired());
-        if !existed {
+        if !existed && self.added.len() as u64 <= self.max_pairs {
             self.added.push(Pair::new(id, other));
         }
     }

@@ -34,7 +34,7 @@ impl BroadPhase {
         let mut result = Ok(());
         for (i, &id) in ids.iter().enumerate() {
             if let Some(&ahead) = ids.get(i + AHEAD) {
-                self.ask_for(ahead);
+                self.prefetch(ahead);
             }
             if let Some((aabb, filter)) = of(id)
                 && let Err(error) = self.set(id, aabb, filter)
@@ -47,7 +47,7 @@ impl BroadPhase {
 
     /// Prefetches what [`BroadPhase::set`] reads of an id: worth it for ids that lie apart, a dozen ahead of their turn.
     #[inline(always)]
-    pub fn ask_for(&self, id: u32) {
+    pub fn prefetch(&self, id: u32) {
         prefetch(self.world.boxes.as_ptr().wrapping_add(id as usize));
         prefetch(self.world.filters.as_ptr().wrapping_add(id as usize));
     }

@@ -6,7 +6,7 @@
 use super::world::World;
 use crate::grid::{BLOCK, EightBoxes, Kernel, Simd, dispatch};
 use crate::pairs::Comparison;
-use crate::{Aabb, Pair, ProxyFilter};
+use crate::{Aabb, Checks, Pair, ProxyFilter};
 
 /// Boxes axis by axis, eight to a block. Padded with boxes that overlap nothing.
 #[derive(Clone, Debug, Default)]
@@ -41,15 +41,16 @@ impl Sweep {
         self.is_current = false;
     }
 
-    /// Leaves the events of an update in `events`, sorted.
-    pub(super) fn run(&mut self, world: &World, events: &mut Comparison) {
+    /// Leaves the events of an update in `events`, sorted. Returns the tests made.
+    pub(super) fn run(&mut self, world: &World, events: &mut Comparison) -> Checks {
         events.clear();
         self.reserve(world.ids());
         for &id in &world.changed {
             self.after.put(id as usize, &world.boxes[id as usize]);
         }
-        dispatch(SweepAll { sweep: self, world, events });
+        let (made, met) = dispatch(SweepAll { sweep: self, world, events });
         events.sort(world.ids());
+        Checks { made, unnecessary: made - met, redundant: 0 }
     }
 
     /// Takes over the world as it is now.
@@ -122,21 +123,25 @@ struct SweepAll<'a> {
 }
 
 impl Kernel for SweepAll<'_> {
-    type Output = ();
+    /// Boxes tested, and those that overlap or did.
+    type Output = (u64, u64);
 
     #[inline(always)]
-    unsafe fn run<S: Simd>(self) {
+    unsafe fn run<S: Simd>(self) -> (u64, u64) {
         let Self { sweep, world, events } = self;
+        let (mut made, mut met) = (0, 0);
         let must_look = world.is_filtered || world.has_removed();
         // Where all have changed, each pair is met from its first box.
         let all_changed = world.changed.len() == world.ids();
         for &id in &world.changed {
             let (before, after) = (sweep.boxes_before[id as usize], world.boxes[id as usize]);
             let first = if all_changed { id as usize / BLOCK } else { 0 };
+            made += world.ids() as u64 - (first * BLOCK) as u64;
             let blocks = sweep.before.0.iter().zip(&sweep.after.0).enumerate().skip(first);
             for (block, (was, is)) in blocks {
                 // SAFETY: the caller has the instructions.
                 let (was, is) = unsafe { (S::overlaps_eight(was, &before), S::overlaps_eight(is, &after)) };
+                met += u64::from((was | is).count_ones());
                 let mut look = if must_look { was | is } else { was ^ is };
                 while look != 0 {
                     let lane = look.trailing_zeros();
@@ -146,5 +151,6 @@ impl Kernel for SweepAll<'_> {
                 }
             }
         }
+        (made, met)
     }
 }

@@ -144,6 +144,22 @@ fn an_update_with_too_many_pairs_changes_nothing_but_the_grid() {
 }
 
 #[test]
+fn an_edit_that_finds_too_many_pairs_does_not_list_them_all() {
+    let limits = Limits { max_pairs: 1000, ..Limits::DEFAULT };
+    let config = Config { limits, engine: Some(Engine::Edit), ..Config::DEFAULT };
+    let mut broad_phase = BroadPhase::new(config).expect("a margin");
+    let cube = |id: u32| Aabb::from_center([10.0 * id as f32, 0.0, 0.0], [0.5; 3]);
+    (0..2000).for_each(|id| broad_phase.set(id, cube(id), ProxyFilter::ALL).expect("room"));
+    assert_eq!(broad_phase.update().expect("no pairs").added, []);
+    let all = Aabb::new([-1.0; 3], [20_001.0; 3]);
+    (0..50).for_each(|id| broad_phase.set(id, all, ProxyFilter::ALL).expect("room"));
+    assert_eq!(broad_phase.update(), Err(Error::TooManyPairs { limit: 1000 }));
+    // 97,000 pairs.
+    let listed = broad_phase.comparison.added.len();
+    assert!(listed > 1000 && listed <= 1001 * crate::parallel::available_threads(), "{listed} pairs listed");
+}
+
+#[test]
 fn pairs_of_a_box_and_boxes_in_a_box_are_those_of_the_last_update() {
     let mut random = StdRng::seed_from_u64(3);
     let mut world = Checked::new(None, 1100);

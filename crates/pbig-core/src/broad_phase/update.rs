@@ -72,11 +72,10 @@ impl BroadPhase {
         if !self.sweep.is_current() {
             self.sweep.copy(&self.world);
         }
-        self.sweep.run(&self.world, &mut self.comparison);
+        self.report.checks = self.sweep.run(&self.world, &mut self.comparison);
         self.report.stages.check = clock.lap();
         self.report.plan.algorithm = Algorithm::Sweep;
-        let tests = (self.world.changed.len() * self.world.ids()) as u64;
-        (self.report.checks.made, self.has_grid) = (tests, false);
+        self.has_grid = false;
         self.apply_events()?;
         self.sweep.advance(&self.world);
         self.report.stages.diff = clock.lap();
@@ -86,7 +85,8 @@ impl BroadPhase {
     fn run_edit(&mut self) -> Result<(), Error> {
         stage!("edit");
         let mut clock = Clock::start();
-        self.report.checks = self.edit.run(&self.world, &mut self.grid, &mut self.comparison);
+        let limit = self.config.limits.pairs();
+        self.report.checks = self.edit.run(&self.world, &mut self.grid, &mut self.comparison, limit);
         self.report.stages.check = clock.lap();
         self.report.plan = Plan::of_grid(Algorithm::Edit, &self.grid);
         self.report.plan.boxes = self.world.valid();

@@ -23,9 +23,9 @@ const INVALID: u32 = u32::MAX - 1;
 
 /// By bucket: boxes of one piece, then their place. The last two are oversize and invalid boxes.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Counts([u32; MAX_BUCKETS + 3]);
+pub(super) struct BucketCounts([u32; MAX_BUCKETS + 3]);
 
-impl Counts {
+impl BucketCounts {
     const ZERO: Self = Self([0; MAX_BUCKETS + 3]);
     const OVERSIZE: usize = MAX_BUCKETS + 1;
     const INVALID: usize = MAX_BUCKETS + 2;
@@ -74,7 +74,7 @@ impl Grid {
 
     /// Computes keys, and counts boxes by bucket.
     fn count(&mut self, boxes: &[Aabb], split: Split, workers: usize) {
-        self.counts.resize(split.pieces.max(self.counts.len()), Counts::ZERO);
+        self.counts.resize(split.pieces.max(self.counts.len()), BucketCounts::ZERO);
         let (keys, counts) = (SharedSlice::new(&mut self.keys), SharedSlice::new(&mut self.counts));
         let plan = &self.plan;
         run(workers, split.pieces, |_, piece| {
@@ -82,7 +82,7 @@ impl Grid {
             // SAFETY: each piece has its own boxes and counts.
             let (keys, counts) = unsafe { (keys.part(range.clone()), &mut counts.part(piece..piece + 1)[0]) };
             counts.0[..=split.buckets].fill(0);
-            (counts.0[Counts::OVERSIZE], counts.0[Counts::INVALID]) = (0, 0);
+            (counts.0[BucketCounts::OVERSIZE], counts.0[BucketCounts::INVALID]) = (0, 0);
             dispatch(CountKeys { plan, boxes: &boxes[range], keys, counts, shift: split.shift });
         });
     }
@@ -101,7 +101,7 @@ impl Grid {
         }
         starts.push(next);
         self.len = next as usize;
-        self.invalid = counts.iter().map(|counts| counts.0[Counts::INVALID]).sum();
+        self.invalid = counts.iter().map(|counts| counts.0[BucketCounts::INVALID]).sum();
         starts
     }
 
@@ -153,7 +153,7 @@ struct CountKeys<'a> {
     plan: &'a GridPlan,
     boxes: &'a [Aabb],
     keys: &'a mut [u32],
-    counts: &'a mut Counts,
+    counts: &'a mut BucketCounts,
     shift: u32,
 }
 
@@ -172,8 +172,11 @@ impl Kernel for CountKeys<'_> {
             if takes {
                 bucket += (key >> shift) as usize;
             } else {
-                (key, bucket) =
-                    if aabb.is_valid() { (OVERSIZE, Counts::OVERSIZE) } else { (INVALID, Counts::INVALID) };
+                (key, bucket) = if aabb.is_valid() {
+                    (OVERSIZE, BucketCounts::OVERSIZE)
+                } else {
+                    (INVALID, BucketCounts::INVALID)
+                };
             }
             *to = key;
             self.counts.0[bucket] += 1;

@@ -7,8 +7,11 @@ use super::search::KeyRun;
 use super::simd::{BLOCK, Kernel, Simd, dispatch, prefetch};
 use crate::Aabb;
 
-/// Candidates that are tested together.
+/// Candidates that are tested together, at most.
 const ROOM: usize = 4096;
+
+/// Candidates that are tested together for each box of a short list.
+const ROOM_PER_BOX: usize = 32;
 
 /// Rows of cells that are looked through together: enough that the first one's codes are there when the last is asked for.
 const ROWS: usize = 256;
@@ -55,10 +58,21 @@ pub(crate) struct Candidates {
     boxes: Vec<u32>,
     places: Vec<u32>,
     len: usize,
+    room: usize,
     /// Stored boxes tested.
     pub(crate) tests: u64,
     /// Stored boxes that overlapped, each box itself included.
     pub(crate) met: u64,
+}
+
+impl Candidates {
+    /// Makes room for the candidates of some boxes.
+    fn begin(&mut self, boxes: usize) {
+        self.room = ROOM.min(boxes * ROOM_PER_BOX).max(self.room);
+        self.boxes.resize(self.room + 2 * BLOCK, 0);
+        self.places.resize(self.room + 2 * BLOCK, 0);
+        self.len = 0;
+    }
 }
 
 /// Marks an entry of the spill list. Slots are below 2^28.
@@ -67,9 +81,7 @@ const SPILL: u32 = 1 << 31;
 impl EditedGrid {
     /// Hands every stored box that overlaps one of `boxes` to `meet`. Invalid boxes meet nothing.
     pub(crate) fn look_up<M: Meet>(&self, boxes: &[Record], candidates: &mut Candidates, meet: &mut M) {
-        candidates.boxes.resize(ROOM + 2 * BLOCK, 0);
-        candidates.places.resize(ROOM + 2 * BLOCK, 0);
-        candidates.len = 0;
+        candidates.begin(boxes.len());
         dispatch(LookUp { grid: self, boxes, candidates, meet });
         for (i, one) in boxes.iter().enumerate().filter(|(_, one)| one.aabb.is_valid()) {
             self.meet_oversize(i, one, candidates, meet);
@@ -217,15 +229,16 @@ impl<M: Meet> LookUp<'_, M> {
         for first in (row.first..row.end).step_by(BLOCK) {
             let beyond = (row.end - first).min(BLOCK as u32);
             let Candidates { boxes, places, len, .. } = &mut *self.candidates;
-            // SAFETY: codes are padded by two blocks; the lists have room for a block more than `ROOM`.
+            // SAFETY: codes are padded by two blocks; the lists have room for a block more than `room`.
             unsafe {
-                let mask = S::test(row.query, grid.codes.as_ptr().add(first as usize)) & ((1u32 << beyond) - 1);
+                let mask =
+                    S::test(row.query, grid.codes.as_ptr().add(first as usize)) & ((1u32 << beyond) - 1);
                 let (boxes, places) = (boxes.as_mut_ptr().add(*len), places.as_mut_ptr().add(*len));
                 let count = S::expand(row.i, first, mask, boxes, places);
                 prefetch(grid.records.as_ptr().wrapping_add(*places as usize & 0xFFF_FFFF));
                 *len += count;
             }
-            if self.candidates.len > ROOM {
+            if self.candidates.len > self.candidates.room {
                 self.test();
             }
         }
@@ -241,7 +254,7 @@ impl<M: Meet> LookUp<'_, M> {
             (self.candidates.boxes[at], self.candidates.places[at]) = (row.i, entry | SPILL);
             self.candidates.len += 1;
             self.candidates.tests += 1;
-            if self.candidates.len > ROOM {
+            if self.candidates.len > self.candidates.room {
                 self.test();
             }
         });

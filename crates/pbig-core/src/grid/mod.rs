@@ -34,7 +34,7 @@ pub(crate) use record::Record;
 pub use simd::simd;
 pub(crate) use simd::{BLOCK, EightBoxes, Kernel, Simd, dispatch, prefetch};
 
-use build::Counts;
+use build::BucketCounts;
 
 /// A grid with its buffers.
 #[derive(Clone, Debug, Default)]
@@ -56,7 +56,7 @@ pub(crate) struct Grid {
     keys: Vec<u32>,
     /// The records by bucket, of the last build.
     coarse: Vec<Record>,
-    counts: Vec<Counts>,
+    counts: Vec<BucketCounts>,
     bucket_starts: Vec<u32>,
 }
 

@@ -10,7 +10,7 @@ use crate::{Aabb, Pair};
 
 impl Grid {
     /// Finds the pairs of an oversize box with the boxes in the grid, and with the oversize boxes after it.
-    pub(super) fn sweep(&self, i: usize, rule: &Rule<'_>, hits: &mut Hits) {
+    pub(super) fn find_oversize_pairs(&self, i: usize, rule: &Rule<'_>, hits: &mut Hits) {
         let one = &self.oversize[i];
         let from = hits.pairs.len();
         self.reached_by(&one.aabb, |run| {

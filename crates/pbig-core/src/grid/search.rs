@@ -35,7 +35,7 @@ impl Sorted<'_> {
             } else {
                 let first = (i - in_grid) * OVERSIZE_PIECE;
                 let last = grid.oversize.len().min(first + OVERSIZE_PIECE);
-                (first..last).for_each(|i| grid.sweep(i, rule, hits));
+                (first..last).for_each(|i| grid.find_oversize_pairs(i, rule, hits));
             }
         });
     }

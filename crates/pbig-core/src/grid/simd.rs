@@ -118,7 +118,8 @@ impl Simd for Portable {
     #[inline(always)]
     unsafe fn absent(numbers: *const u32, others: *const u32, len: usize) -> u32 {
         // SAFETY: the caller has 8 numbers each.
-        let (numbers, others) = unsafe { (*numbers.cast::<[u32; 8]>(), std::slice::from_raw_parts(others, len)) };
+        let (numbers, others) =
+            unsafe { (*numbers.cast::<[u32; 8]>(), std::slice::from_raw_parts(others, len)) };
         (0..8).fold(0, |mask, i| mask | u32::from(!others.contains(&numbers[i])) << i)
     }
 

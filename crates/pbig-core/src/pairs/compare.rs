@@ -104,7 +104,6 @@ impl Rows {
     fn prepare(&mut self, ids: usize, pairs: usize) {
         self.spans.resize(ids, Span::default());
         self.pool.resize(pairs, 0);
-        self.set_packed(pairs);
     }
 }
 

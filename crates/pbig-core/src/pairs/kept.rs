@@ -8,16 +8,17 @@ use std::sync::OnceLock;
 /// Room of a row that has outgrown its place, at least.
 const MIN_ROOM: u32 = 4;
 
+/// Marks a spare place of a row; the other bits are the row's id. Ids are below 2^28.
+const SPARE: u32 = 1 << 31;
+
 /// Pairs ahead of the one at hand whose rows are prefetched.
 const AHEAD: usize = 8;
 
-/// Sorted rows of ids, by id.
+/// Sorted rows of ids, by id. Spare places behind a row are marked as its own.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Rows {
     pub(super) spans: Vec<Span>,
     pub(super) pool: Vec<u32>,
-    /// Rows that begin up to this place have no spare room; others have room for the next power of two.
-    pub(super) packed: u32,
 }
 
 impl Rows {
@@ -25,13 +26,10 @@ impl Rows {
         self.spans.get(id as usize).map_or(&[], |span| &self.pool[span.range()])
     }
 
-    fn room(&self, span: Span) -> u32 {
-        if span.start <= self.packed { span.len } else { span.len.next_power_of_two().max(MIN_ROOM) }
-    }
-
     fn insert(&mut self, id: u32, other: u32) {
         let span = self.spans[id as usize];
-        let span = if span.len == self.room(span) { self.move_to_end(span) } else { span };
+        let has_room = self.pool.get(span.range().end) == Some(&(SPARE | id));
+        let span = if has_room { span } else { self.move_to_end(id, span) };
         let row = &mut self.pool[span.start as usize..][..span.len as usize + 1];
         let mut place = span.len as usize;
         while place > 0 && row[place - 1] > other {
@@ -42,17 +40,11 @@ impl Rows {
         self.spans[id as usize] = Span { len: span.len + 1, ..span };
     }
 
-    /// Says that all rows lie in the first places, without spare room. An empty row at the end lies there, too.
-    pub(super) fn set_packed(&mut self, places: usize) {
-        self.packed = places as u32;
-    }
-
-    fn move_to_end(&mut self, span: Span) -> Span {
-        self.pool.resize(self.pool.len().max(self.packed as usize + 1), 0);
+    fn move_to_end(&mut self, id: u32, span: Span) -> Span {
         let start = self.pool.len() as u32;
         let room = (span.len + 1).next_power_of_two().max(MIN_ROOM);
         self.pool.extend_from_within(span.range());
-        self.pool.resize((start + room) as usize, 0);
+        self.pool.resize((start + room) as usize, SPARE | id);
         Span { start, len: span.len }
     }
 
@@ -61,6 +53,7 @@ impl Rows {
         let row = &mut self.pool[span.range()];
         if let Ok(place) = row.binary_search(&other) {
             row.copy_within(place + 1.., place);
+            row[row.len() - 1] = SPARE | id;
             self.spans[id as usize] = Span { len: span.len - 1, ..span };
         }
     }
@@ -76,7 +69,6 @@ impl Rows {
             pool.extend_from_slice(&self.pool[span.range()]);
             span.start = start;
         }
-        self.set_packed(pool.len());
         self.pool = pool;
     }
 }
@@ -146,9 +138,7 @@ impl Kept {
             pool[span.range().end] = pair.a;
             span.len += 1;
         }
-        let mut rows = Rows { spans, pool, packed: 0 };
-        rows.set_packed(next as usize);
-        rows
+        Rows { spans, pool }
     }
 
     /// Brings the rows up to date with pairs that exist now, and with those that no longer do.
@@ -207,7 +197,6 @@ impl Kept {
             span.len += 1;
             self.forward.pool.push(pair.b);
         }
-        self.forward.set_packed(pairs.len());
         self.count(pairs, &[]);
     }
 
@@ -216,5 +205,38 @@ impl Kept {
         self.next = Rows::default();
         self.backward.take();
         self.forward.pool.shrink_to_fit();
+        self.forward.spans.shrink_to_fit();
+        self.lower.shrink_to_fit();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_row_that_grows_and_shrinks_again_and_again_keeps_its_place() {
+        let mut kept = Kept::default();
+        kept.reserve_ids(100);
+        let row = |len: u32| (0..len).flat_map(|i| [Pair { a: 3, b: 10 + i }, Pair { a: 4, b: 10 + i }]);
+        for (shorter, longer) in [(4, 5), (0, 1), (7, 9)] {
+            kept.apply(&row(longer).collect::<Vec<_>>(), &[]);
+            let places = kept.forward.pool.len();
+            for _ in 0..1000 {
+                let last: Vec<Pair> = row(longer).skip(2 * shorter as usize).collect();
+                kept.apply(&[], &last);
+                assert!(kept.iter().eq(sorted(row(shorter))));
+                kept.apply(&last, &[]);
+                assert!(kept.iter().eq(sorted(row(longer))));
+            }
+            assert_eq!(kept.forward.pool.len(), places);
+            kept.apply(&[], &row(longer).collect::<Vec<_>>());
+        }
+    }
+
+    fn sorted(pairs: impl Iterator<Item = Pair>) -> std::vec::IntoIter<Pair> {
+        let mut pairs: Vec<Pair> = pairs.collect();
+        pairs.sort_unstable();
+        pairs.into_iter()
     }
 }

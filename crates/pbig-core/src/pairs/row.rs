@@ -74,7 +74,9 @@ pub(super) unsafe fn compare<S: Simd>(
     let fits = was.start + SHORT <= old.len() && is.start + SHORT <= new.len();
     if !(is_short && fits) {
         let (was, is) = (&old[was], &new[is]);
-        return if was != is { differences(a, was, is, added, removed) };
+        return if was != is {
+            differences(a, was, is, added, removed)
+        };
     }
     // SAFETY: both pools have that many elements there; the caller has the instructions.
     unsafe {
