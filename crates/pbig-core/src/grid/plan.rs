@@ -144,7 +144,7 @@ impl Spacing {
         let (mut cells, boxes) = ([0; SAMPLE_SIZE], sample.boxes());
         for (to, aabb) in cells.iter_mut().zip(boxes) {
             // A number for each cell; two that share one by chance are too few to matter.
-            *to = (0..3).fold(0, |cells: i64, k| cells.wrapping_mul(0x1000_0001_B3) ^ cell(k, aabb.min[k]));
+            *to = (0..3).fold(0, |cells: i64, k| cells.wrapping_mul(0x0010_0000_01B3) ^ cell(k, aabb.min[k]));
         }
         let cells = &mut cells[..boxes.len()];
         cells.sort_unstable();
