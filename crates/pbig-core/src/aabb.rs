@@ -5,7 +5,8 @@ use bytemuck::{Pod, Zeroable};
 /// A closed axis-aligned box in f32, in the caller's length unit.
 ///
 /// A box is *valid* when `min <= max` on all three axes; a NaN makes it invalid. Extents may be
-/// infinite. An invalid box overlaps nothing, itself included.
+/// infinite. [`crate::Finder`], [`crate::BroadPhase`] and [`crate::oracle`] pair an invalid box with nothing.
+/// [`Aabb::overlaps`] alone does not: it compares corners, and is true for some inverted boxes.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -17,23 +18,24 @@ pub struct Aabb {
 }
 
 impl Aabb {
-    /// An invalid box: what an absent proxy is stored as.
+    /// An invalid box whose coordinates are all NaN: the box of an absent proxy. [`Aabb::overlaps`] is false for it and
+    /// any other box.
     pub const NOWHERE: Self = Self::new([f32::NAN; 3], [f32::NAN; 3]);
 
-    /// The box from one corner to the other.
+    /// Returns the box from one corner to the other.
     #[inline]
     pub const fn new(min: [f32; 3], max: [f32; 3]) -> Self {
         Self { min, max }
     }
 
-    /// The box around `center` that reaches `half` to each side.
+    /// Returns the box around `center` that reaches `half` to each side.
     pub fn from_center(center: [f32; 3], half: [f32; 3]) -> Self {
         let corner = |sign: f32| std::array::from_fn(|k| center[k] + sign * half[k]);
         Self::new(corner(-1.0), corner(1.0))
     }
 
-    /// The smallest f32 box that contains the f64 box `[min, max]` (rounded outward). A box that
-    /// is invalid in f64 stays invalid, even where rounding would close the gap.
+    /// Returns the smallest f32 box that contains the f64 box `[min, max]` (rounded outward). A box that is invalid in f64
+    /// gives [`Aabb::NOWHERE`], even where rounding would close the gap.
     ///
     /// ```
     /// let b = pbig_core::Aabb::from_f64([0.1; 3], [0.1; 3]);
@@ -46,14 +48,24 @@ impl Aabb {
         Self::new(min.map(round_down), max.map(|x| -round_down(-x)))
     }
 
-    /// Whether `min <= max` on all axes (false when a value is NaN).
+    /// Returns true if `min <= max` on all axes. A NaN makes it false.
     #[inline]
     pub fn is_valid(&self) -> bool {
         (self.min[0] <= self.max[0]) & (self.min[1] <= self.max[1]) & (self.min[2] <= self.max[2])
     }
 
-    /// Whether two boxes share a point: PBIG's equation 1, closed intervals, exactly.
-    /// For valid boxes only: an inverted box can pass this test, see [`Aabb::is_valid`].
+    /// Returns true if `a.min <= b.max && b.min <= a.max` on all axes: PBIG's equation 1, closed intervals, exactly. Two
+    /// valid boxes then share a point.
+    ///
+    /// An invalid box is not singled out: with a NaN in the compared corners the result is false, but an inverted box can
+    /// overlap a box around it. Ask [`Aabb::is_valid`] first where boxes may be inverted.
+    ///
+    /// ```
+    /// use pbig_core::Aabb;
+    /// let (around, inverted) = (Aabb::new([0.0; 3], [9.0; 3]), Aabb::new([5.0; 3], [4.0; 3]));
+    /// assert!(around.overlaps(&inverted) && !inverted.is_valid());
+    /// assert!(!around.overlaps(&Aabb::NOWHERE));
+    /// ```
     #[inline(always)]
     pub fn overlaps(&self, other: &Self) -> bool {
         // Branches are one at most, on the result: six of them took three times as long.
@@ -111,7 +123,7 @@ impl Aabb {
         }
     }
 
-    /// Every x86-64 has the instructions for all axes at once: 11 of them where one axis after the other takes 30.
+    /// Compares all axes at once with instructions of every x86-64: 11 of them, where one axis after the other takes 30.
     #[cfg(target_arch = "x86_64")]
     #[inline(always)]
     fn overlaps_by_lanes(&self, other: &Self) -> bool {
@@ -124,7 +136,7 @@ impl Aabb {
             let lanes = |aabb: &Self| -> (__m128, __m128) {
                 let first = std::ptr::from_ref(aabb).cast::<f32>();
                 let max = _mm_loadu_ps(first.add(2));
-                // What is in the fourth lane does not count.
+                // The fourth lane holds another number, which is ignored.
                 (_mm_loadu_ps(first), _mm_shuffle_ps::<0b00_11_10_01>(max, max))
             };
             let ((a_min, a_max), (b_min, b_max)) = (lanes(self), lanes(other));
@@ -144,13 +156,13 @@ impl Aabb {
             & (other.min[2] <= self.max[2])
     }
 
-    /// The box grown by `margin` on every side, rounded to nearest.
+    /// Returns the box grown by `margin` on every side, rounded to nearest.
     #[inline]
     pub fn inflated(&self, margin: f32) -> Self {
         Self::new(self.min.map(|x| x - margin), self.max.map(|x| x + margin))
     }
 
-    /// The smallest box around both, of which an invalid one does not count.
+    /// Returns the smallest box around both. An invalid box does not count; of two, this one is returned.
     #[inline]
     pub fn union(&self, other: &Self) -> Self {
         match (self.is_valid(), other.is_valid()) {
@@ -163,8 +175,8 @@ impl Aabb {
         }
     }
 
-    /// The box around this one and where it is after `motion`, a displacement in the same unit: velocity times time.
-    /// A motion that is no number leaves the box as it is.
+    /// Returns the box around this one before and after `motion`, a displacement in the same unit: velocity times time.
+    /// A motion with a NaN leaves the box as it is.
     ///
     /// ```
     /// use pbig_core::Aabb;
@@ -178,20 +190,20 @@ impl Aabb {
         self.union(&Self::new(moved(self.min), moved(self.max)))
     }
 
-    /// Whether a box lies in this one, its border included; false where a number is NaN.
+    /// Returns true if `other` lies in this box, its border included. A NaN makes it false.
     #[inline]
     pub fn contains(&self, other: &Self) -> bool {
         (0..3).all(|k| self.min[k] <= other.min[k] && other.max[k] <= self.max[k])
     }
 
-    /// Edge lengths; infinite where they overflow, as for a half-space.
+    /// Returns the edge lengths; infinite where they overflow, as for a half-space.
     #[inline]
     pub fn extents(&self) -> [f32; 3] {
         std::array::from_fn(|k| self.max[k] - self.min[k])
     }
 }
 
-/// The largest f32 that is not above `x`.
+/// Returns the largest f32 that is not above `x`.
 fn round_down(x: f64) -> f32 {
     let nearest = x as f32;
     if f64::from(nearest) > x { nearest.next_down() } else { nearest }

@@ -1,15 +1,15 @@
-//! What a caller can choose. Every field says its unit, why one would change it, and what follows.
+//! The settings. Every field says its unit, why one would change it, and what follows.
 
 use std::time::Duration;
 
-/// Where the work runs.
+/// The processor that does the work.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Backend {
-    /// The CPU; a GPU that was given, if it is no software and the boxes are many.
+    /// The CPU. A GPU that was given, if it is hardware and the boxes are many.
     #[default]
     Auto,
-    /// The CPU, with rayon's threads when the scene is worth it.
+    /// The CPU, with rayon's threads if there are enough boxes.
     Cpu,
     /// A GPU. Without one the call finishes on the CPU and [`crate::Report::fallback`] says so.
     Gpu,
@@ -17,7 +17,7 @@ pub enum Backend {
     Brute,
 }
 
-/// In which order lists of pairs come.
+/// The order of lists of pairs.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Order {
@@ -148,17 +148,17 @@ impl Default for GpuOptions {
     }
 }
 
-/// Everything that a caller can choose; the defaults are right for most.
+/// The settings of a [`crate::Finder`] or [`crate::BroadPhase`]. The defaults suit most programs.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Config {
-    /// Where the work runs.
+    /// The processor that does the work.
     pub backend: Backend,
     /// Order of lists of pairs; events are always sorted.
     pub order: Order,
     /// Limits beyond which a call ends with an error.
     pub limits: Limits,
-    /// How far a stored box reaches beyond the box that was given ([`crate::BroadPhase`] only), in the caller's length
-    /// unit. A larger margin means fewer changed boxes, and more reported pairs that do not touch yet.
+    /// The distance by which a stored box is larger than the given one on every side, in the caller's length unit
+    /// ([`crate::BroadPhase`] only). A larger margin means fewer changed boxes, and more reported pairs that do not touch yet.
     pub margin: f32,
     /// Settings of the GPU backend.
     pub gpu: GpuOptions,

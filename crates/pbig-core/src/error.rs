@@ -1,6 +1,6 @@
-//! Everything that can go wrong, each with what to do about it.
+//! The errors. Each message says what to do about it.
 
-/// Why a call could not be completed. There is no partial result beside an error.
+/// The reason why a call could not be completed. There is no partial result beside an error.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {

@@ -1,8 +1,8 @@
-//! Who may pair with whom: tested where pairs are found, not afterwards (contract 6).
+//! Filters that exclude pairs. They are tested where pairs are found, not afterwards (contract 6).
 
 use bytemuck::{Pod, Zeroable};
 
-/// What decides, besides overlap, whether two boxes may pair: all of rapier's early filters.
+/// The properties of a box, besides its AABB, that decide about its pairs: all of rapier's early filters.
 ///
 /// 16 bytes, one `vec4<u32>` on a GPU. Two boxes may pair when
 /// 1. they have different bodies (or no body), and
@@ -26,7 +26,7 @@ pub struct ProxyFilter {
     pub kind: u8,
     /// The kinds that the box accepts, a bit each.
     pub accepted_kinds: u8,
-    /// How the groups are combined: a [`TestMode`] as an integer, of which the lowest bit counts.
+    /// The [`TestMode`] that combines the groups, as an integer of which the lowest bit counts.
     pub test_mode: u16,
     /// Groups that the box is a member of, a bit each.
     pub memberships: u32,
@@ -34,7 +34,7 @@ pub struct ProxyFilter {
     pub mask: u32,
 }
 
-/// How memberships and masks are combined.
+/// The rule that combines memberships and masks.
 #[repr(u16)]
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum TestMode {
@@ -58,31 +58,31 @@ impl ProxyFilter {
         mask: u32::MAX,
     };
 
-    /// Whether the two are the same: one comparison rather than six.
+    /// Returns true if both filters are equal. One comparison rather than six.
     #[inline]
     pub(crate) fn is(&self, other: &Self) -> bool {
         bytemuck::cast::<_, [u64; 2]>(*self) == bytemuck::cast::<_, [u64; 2]>(*other)
     }
 
-    /// Whether the two boxes may pair. Symmetric.
+    /// Returns true if the two boxes may pair. Symmetric.
     #[inline]
     pub fn allows(&self, other: &Self) -> bool {
         self.bodies_allow(other) & self.kinds_allow(other) & self.groups_allow(other)
     }
 
-    /// The first of the three tests: different bodies, or none.
+    /// Returns true if the boxes pass the first of the three tests: different bodies, or no body.
     #[inline]
     pub fn bodies_allow(&self, other: &Self) -> bool {
         (self.body != other.body) | (self.body == Self::NO_BODY)
     }
 
-    /// The second: either one accepts the other's kind.
+    /// Returns true if the boxes pass the second test: either one accepts the other's kind.
     #[inline]
     pub fn kinds_allow(&self, other: &Self) -> bool {
         (self.accepted_kinds & other.kind) | (other.accepted_kinds & self.kind) != 0
     }
 
-    /// The third: memberships and masks.
+    /// Returns true if the boxes pass the third test: memberships and masks.
     #[inline]
     pub fn groups_allow(&self, other: &Self) -> bool {
         let forth = self.memberships & other.mask != 0;

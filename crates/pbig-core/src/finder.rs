@@ -1,4 +1,4 @@
-//! All pairs of a list of boxes, from nothing each time.
+//! `Finder`: all pairs of a list of boxes, with nothing kept between calls but memory.
 
 use crate::all_pairs::{AllPairs, Request};
 #[cfg(feature = "gpu")]
@@ -28,7 +28,7 @@ pub fn find_pairs(boxes: &[Aabb]) -> Result<Vec<Pair>, Error> {
     Ok(finder.pairs)
 }
 
-/// Finds pairs again and again, keeping its buffers.
+/// Finds all pairs of lists of boxes, and keeps its buffers between calls.
 ///
 /// ```
 /// use pbig_core::{Aabb, Config, Finder, ProxyFilter};

@@ -28,11 +28,12 @@
 //!
 //! # What is guaranteed
 //!
-//! * Two boxes pair when `a.min <= b.max && b.min <= a.max` on all three axes, in f32, exactly, as
-//!   [`oracle`] defines it; every backend gives the same pairs, in the same order, whatever the
-//!   number of threads. Threads are the one that calls, and those of its rayon pool.
+//! * Two valid boxes pair when `a.min <= b.max && b.min <= a.max` on all three axes, in f32, exactly, as
+//!   [`oracle`] defines it. The pairs and their order are the same for every backend and thread count.
+//!   The threads are the calling one and those of its rayon pool.
 //! * A call is complete or an [`Error`]; there are no partial results.
-//! * A box with a NaN, or with `min > max`, pairs with nothing and harms no other box.
+//! * A box with a NaN, or with `min > max`, is invalid: it pairs with nothing and harms no other box.
+//!   ([`Aabb::overlaps`] compares corners only, and is true for some inverted boxes.)
 //!
 //! # Sources
 //!

@@ -2,7 +2,7 @@
 
 use crate::{Aabb, Pair, ProxyFilter};
 
-/// Every pair of valid boxes that overlap, sorted. Quadratic time.
+/// Returns every pair of valid boxes that overlap, sorted. Quadratic time.
 ///
 /// ```
 /// use pbig_core::{oracle, Aabb, Pair};
@@ -13,8 +13,8 @@ pub fn pairs(boxes: &[Aabb]) -> Vec<Pair> {
     pairs_where(boxes, |_, _| true)
 }
 
-/// As [`pairs`], with only the pairs that both filters allow. `filters[i]` is that of `boxes[i]`; a
-/// box without one pairs with nothing.
+/// Returns the [`pairs`] that both filters allow. `filters[i]` is the filter of `boxes[i]`; a box without a filter pairs with
+/// nothing.
 pub fn pairs_filtered(boxes: &[Aabb], filters: &[ProxyFilter]) -> Vec<Pair> {
     let filter = |id: u32| filters.get(id as usize);
     pairs_where(boxes, |a, b| filter(a).zip(filter(b)).is_some_and(|(a, b)| a.allows(b)))
@@ -23,7 +23,7 @@ pub fn pairs_filtered(boxes: &[Aabb], filters: &[ProxyFilter]) -> Vec<Pair> {
 /// Boxes tested against one box before their results are looked at.
 const BLOCK: usize = 32;
 
-/// As [`pairs`], with only the pairs for which `allowed(a, b)`, `a < b`.
+/// Returns the [`pairs`] for which `allowed(a, b)` is true, `a < b`.
 ///
 /// The columns let the compiler test a block of boxes at once: 0.4 ns a pair instead of the 1.3
 /// of two nested loops over boxes, and still nothing but equation 1 on every pair.
@@ -65,7 +65,7 @@ impl Columns {
         }
     }
 
-    /// For each box of a block, whether it overlaps `one`: a word each, as wide as a coordinate.
+    /// Returns a word for each box of a block, as wide as a coordinate: 1 if the box overlaps `one`.
     fn overlaps(&self, one: &Aabb, start: usize) -> [u32; BLOCK] {
         let mut hits = [1; BLOCK];
         for k in 0..3 {

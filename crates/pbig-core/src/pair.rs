@@ -14,7 +14,7 @@ pub struct Pair {
 }
 
 impl Pair {
-    /// The pair of two different ids, in either order.
+    /// Returns the pair of two different ids, given in either order.
     #[inline(always)]
     pub fn new(i: u32, j: u32) -> Self {
         Self { a: i.min(j), b: i.max(j) }

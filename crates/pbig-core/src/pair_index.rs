@@ -1,4 +1,4 @@
-//! From the index of a pair to the pair and back, without memory access (Avril et al. 2012, 3.2).
+//! Conversion of the index of a pair to the pair and back, without memory access (Avril et al. 2012, 3.2).
 //!
 //! All pairs `(a, b)`, `a < b < n`, are numbered row by row: `(0, 1), (0, 2), .., (n-2, n-1)`.
 //! Everything here is 0-based; the paper numbers boxes from 1 and pairs from 0.
@@ -14,14 +14,14 @@
 //! assert_eq!(index_of(74, 302, 1000), 71_452);
 //! ```
 
-/// How many pairs `n <= 2^32` boxes have.
+/// Returns the number of pairs of `n <= 2^32` boxes.
 #[inline]
 pub const fn pair_count(n: u64) -> u64 {
     // One of n, n - 1 is even: halve that one, so that the product stays below 2^63.
     if n.is_multiple_of(2) { n / 2 * n.saturating_sub(1) } else { (n - 1) / 2 * n }
 }
 
-/// Index of the first pair of row `a < n <= 2^32` (the paper's S_a): `a (2n - a - 1) / 2`.
+/// Returns the index of the first pair of row `a < n <= 2^32` (the paper's S_a): `a (2n - a - 1) / 2`.
 ///
 /// # Panics
 /// If `a` is not below `n`.
@@ -32,7 +32,7 @@ pub fn row_start(a: u64, n: u64) -> u64 {
     if a.is_multiple_of(2) { a / 2 * other } else { other / 2 * a }
 }
 
-/// Index of the pair `(a, b)`, `a < b < n <= 2^32` (equation 2, solved for k).
+/// Returns the index of the pair `(a, b)`, `a < b < n <= 2^32` (equation 2, solved for k).
 ///
 /// # Panics
 /// If not `a < b < n`.
@@ -42,7 +42,7 @@ pub fn index_of(a: u64, b: u64, n: u64) -> u64 {
     row_start(a, n) + (b - a - 1)
 }
 
-/// The pair with index `k < pair_count(n)`, for every `2 <= n <= 2^32` (equations 1 and 2).
+/// Returns the pair with index `k < pair_count(n)`, for every `2 <= n <= 2^32` (equations 1 and 2).
 ///
 /// The square root gives the row to within one or two, whatever its rounding; the integer
 /// correction that follows makes it exact. The paper corrects from the resulting pair instead,
@@ -53,7 +53,7 @@ pub fn pair_of(k: u64, n: u64) -> (u64, u64) {
     (a, a + 1 + (k - row_start(a, n)))
 }
 
-/// Equation 1 in f64, 0-based: `(2n - 1 - sqrt((2n - 1)^2 - 8k)) / 2`.
+/// Estimates the row by equation 1 in f64, 0-based: `(2n - 1 - sqrt((2n - 1)^2 - 8k)) / 2`.
 fn estimated_row(k: u64, n: u64) -> u64 {
     let m = u128::from(2 * n - 1);
     let discriminant = m * m - 8 * u128::from(k);
@@ -61,7 +61,7 @@ fn estimated_row(k: u64, n: u64) -> u64 {
     (row as u64).min(n - 2)
 }
 
-/// The row that contains `k`, found from a nearby one by integers alone.
+/// Returns the row that contains `k`, found from a nearby row by integers alone.
 fn exact_row(mut a: u64, k: u64, n: u64) -> u64 {
     while row_start(a, n) > k {
         a -= 1;
@@ -72,15 +72,15 @@ fn exact_row(mut a: u64, k: u64, n: u64) -> u64 {
     a
 }
 
-/// How many partners row `i` of `n` boxes has when rows are balanced: PBIG's equation 7 with
-/// `m = n`, less the diagonal, where a box meets itself.
+/// Returns the number of partners in balanced row `i` of `n` boxes: PBIG's equation 7 with `m = n`, less the diagonal, where a
+/// box meets itself.
 #[inline]
 pub fn row_len(i: u32, n: u32) -> u32 {
     let longer = n.is_multiple_of(2) && i < n / 2;
     n.saturating_sub(1) / 2 + u32::from(longer)
 }
 
-/// The `k`-th partner of row `i`, `k < row_len(i, n)`: the next boxes, around the end (the shifted
+/// Returns the `k`-th pair of row `i`, `k < row_len(i, n)`: the next boxes, around the end (the shifted
 /// elements of PBIG's figure 3).
 #[inline]
 pub fn row_pair(i: u32, k: u32, n: u32) -> (u32, u32) {

@@ -1,4 +1,4 @@
-//! What a call did: times, counts and the plan, for a user who wants to know why.
+//! The report of a call: times, counts and the plan.
 
 use crate::plan::Plan;
 use std::time::Duration;
@@ -19,7 +19,7 @@ pub struct StageTimes {
 }
 
 impl StageTimes {
-    /// The stages by name, in the order in which they run.
+    /// Returns the stages by name, in the order in which they run.
     pub fn named(&self) -> [(&'static str, Duration); 5] {
         [
             ("plan", self.plan),
@@ -30,7 +30,7 @@ impl StageTimes {
         ]
     }
 
-    /// The sum of all stages.
+    /// Returns the sum of all stages.
     pub fn total(&self) -> Duration {
         self.named().iter().map(|(_, time)| *time).sum()
     }
@@ -74,8 +74,8 @@ impl Clock {
     }
 }
 
-/// Counts of box tests, as PBIG's section 4.1 defines them. On the CPU's grid most are of codes, which tell
-/// whether two boxes may overlap; what those leave is then tested exactly, and not counted again.
+/// Counts of box tests, as PBIG's section 4.1 defines them. On the CPU's grid most tests compare codes, which tell that two
+/// boxes are apart or may overlap. The exact test of a pair that may overlap is not counted again.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Checks {
     /// Box pairs tested, counting each test.
@@ -86,7 +86,7 @@ pub struct Checks {
     pub redundant: u64,
 }
 
-/// What the last call of a [`crate::Finder`] or [`crate::BroadPhase`] did.
+/// The report on the last call of a [`crate::Finder`] or [`crate::BroadPhase`].
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Report {
     /// Wall time by stage.
@@ -101,18 +101,18 @@ pub struct Report {
     pub checks: Checks,
     /// Pairs reported ([`crate::BroadPhase`]: pairs that exist now).
     pub pairs: u64,
-    /// How the work was done, and why.
+    /// The plan: the algorithm, the grid and the reasons.
     pub plan: Plan,
-    /// Why the wanted backend was not used, if it was not.
+    /// The reason why the CPU did the work of a wanted GPU, if it did.
     pub fallback: Option<String>,
-    /// What the GPU did, if it did the work.
+    /// The report on the GPU, if it did the work.
     pub gpu: Option<GpuReport>,
 }
 
-/// What a call did on a GPU.
+/// The report on a call that ran on a GPU.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct GpuReport {
-    /// The adapter's name, and whether it is software.
+    /// The adapter's name, kind and API.
     pub adapter: String,
     /// Time of the host: packing and sending what changed.
     pub upload: Duration,
@@ -136,6 +136,6 @@ pub struct GpuReport {
     pub parts: u32,
     /// Times that the map or a chunk was repeated for want of room.
     pub repeats: u32,
-    /// Whether the kernels for subgroups ran.
+    /// True if the kernels for subgroups ran.
     pub subgroups: bool,
 }

@@ -9,9 +9,9 @@ use rand_distr::{Distribution, Normal};
 /// A named generator: `n` boxes from a seed, the same ones every time.
 #[derive(Clone, Copy, Debug)]
 pub struct BoxSet {
-    /// How to ask for it.
+    /// The name on the command line.
     pub name: &'static str,
-    /// What it is.
+    /// A description in a few words.
     pub about: &'static str,
     make: fn(usize, &mut StdRng) -> Vec<Aabb>,
 }
@@ -76,11 +76,11 @@ pub fn cubes(n: usize, spread: f32, pairs: f32, seed: u64) -> Vec<Aabb> {
     })
 }
 
-/// Who moves in which frame: a share of all, others each time.
+/// The boxes that move in each frame: a share of all, others each time.
 #[derive(Clone, Debug)]
 pub struct Movers {
     order: Vec<u32>,
-    /// How many move in a frame.
+    /// Returns the number of boxes that move in a frame.
     pub count: usize,
 }
 
@@ -106,13 +106,13 @@ impl Movers {
 /// returns. So a set stays what it is, however many frames there are.
 #[derive(Clone, Debug)]
 pub struct Wander {
-    /// Where they are.
+    /// The boxes in the present frame.
     pub boxes: Vec<Aabb>,
     home: Vec<Aabb>,
     is_away: Vec<bool>,
     movers: Movers,
     distance: f32,
-    /// Of boxes that do not return: how far each goes in a frame.
+    /// The displacement of each box per frame, for boxes that do not return.
     velocities: Vec<[f32; 3]>,
 }
 

@@ -77,7 +77,7 @@ pub fn largest() -> usize {
     LARGEST.replace(0)
 }
 
-/// How often this thread has asked for memory.
+/// Returns the number of requests for memory that this thread has made.
 pub fn requests() -> u64 {
     REQUESTS.get()
 }

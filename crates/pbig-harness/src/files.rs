@@ -16,10 +16,10 @@ use std::path::Path;
 /// The columns of a `.csv` file.
 const COLUMNS: [&str; 6] = ["min_x", "min_y", "min_z", "max_x", "max_y", "max_z"];
 
-/// What is wrong with a file, in one line that names it.
+/// A message about a file, in one line that names it.
 pub type FileError = String;
 
-/// The same about its content, before it is known which file that is.
+/// A message about the content of a file whose name is not known yet.
 type ContentError = String;
 
 fn at(path: &Path, what: impl std::fmt::Display) -> FileError {
@@ -66,7 +66,7 @@ fn read<T>(path: &Path, content: fn(&[u8]) -> Result<T, ContentError>) -> Result
     content(&bytes).map_err(|what| at(path, what))
 }
 
-/// What a file of frames holds.
+/// The content of a file of frames.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Frames {
     /// Boxes in each frame.
@@ -114,7 +114,7 @@ fn extension(path: &Path) -> String {
 /// The content of a `.csv` file of boxes, see [`read_boxes`].
 ///
 /// # Errors
-/// What is wrong and in which line, in one line.
+/// Returns a message in one line that names the line of the file.
 pub fn csv_boxes(bytes: &[u8]) -> Result<Vec<Aabb>, ContentError> {
     let text = text(bytes)?;
     let mut reader =
@@ -150,7 +150,7 @@ fn plain(field: &str) -> &str {
     field.trim_start_matches('\u{feff}')
 }
 
-/// What is wrong with the whole file rather than with a value.
+/// Returns a message about the whole file rather than a value.
 fn wrong_throughout(record: &csv::StringRecord, number: usize) -> Option<ContentError> {
     for (separator, name) in [(';', "semicolons"), ('\t', "tabs")] {
         if record.iter().any(|field| field.contains(separator)) {
@@ -182,7 +182,7 @@ fn csv_box(record: &csv::StringRecord) -> Result<Aabb, String> {
     Ok(f32_box(values))
 }
 
-/// Whether [`write_pairs`] knows the extension: to be asked before the work, not after.
+/// Checks that [`write_pairs`] knows the extension. Call it before the work, not after.
 ///
 /// # Errors
 /// A message that names the file.
@@ -207,7 +207,7 @@ pub fn write_pairs(path: &Path, pairs: &[Pair]) -> Result<(), FileError> {
     }
 }
 
-/// Whether [`write_csv`] accepts the extension: to be asked before the work, not after.
+/// Checks that [`write_csv`] accepts the extension. Call it before the work, not after.
 ///
 /// # Errors
 /// A message that names the file.

@@ -1,4 +1,4 @@
-//! What can be measured about a world's mechanics: contacts, penetration, energy and momentum.
+//! Measurements of a world's mechanics: contacts, penetration, energy and momentum.
 
 use crate::world::{World, to_vector};
 use rapier3d::prelude::*;
@@ -10,9 +10,9 @@ pub struct Mechanics {
     pub contacts: u64,
     /// Their contact points.
     pub points: u64,
-    /// How far the deepest point is inside, metres; 0 if none is.
+    /// The depth of the deepest point, in metres; 0 if none is inside.
     pub deepest: f64,
-    /// Of all points, how far they are inside, metres; those outside count as 0.
+    /// The mean depth of all points, in metres. A point outside counts as 0.
     pub mean_penetration: f64,
     /// Joules.
     pub kinetic: f64,

@@ -1,6 +1,6 @@
 //! Boxes in motion, frame by frame: nine kinds of motion at three densities.
 //!
-//! The same motion, density, number and seed give the same boxes in every frame.
+//! Equal motions, densities, numbers and seeds give equal boxes in every frame.
 
 mod space;
 #[cfg(test)]
@@ -151,7 +151,7 @@ pub struct Scene {
     changed: Vec<u32>,
 }
 
-/// What the next center of a box depends on, beside its center.
+/// The state, besides its center, on which the next center of a box depends.
 #[derive(Debug)]
 enum Paths {
     Free,

@@ -15,12 +15,12 @@ pub struct Numbered {
     pub bodies: Vec<RigidBodyHandle>,
 }
 
-/// How far the bodies of two worlds are from each other, in the world's unit of length.
+/// The distances between the bodies of two worlds, in the world's length unit.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Apart {
     /// Over all bodies.
     pub mean: f64,
-    /// Of the two that are farthest.
+    /// The largest distance.
     pub max: f64,
 }
 
@@ -38,8 +38,8 @@ impl Numbered {
         self.inserted(&order)
     }
 
-    /// The same world before its first step, bodies inserted in the given order of numbers: their colliders in that
-    /// order too, after those that have no body. Articulations are left out; no scene has any.
+    /// Returns this world before its first step, with bodies inserted in the given order of numbers. Their colliders are in
+    /// that order too, after those that have no body. Articulations are left out; no scene has any.
     pub fn inserted(&self, order: &[usize]) -> Self {
         let from = &self.world;
         let mut world = World::with_gravity(from.gravity);

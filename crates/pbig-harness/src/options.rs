@@ -6,7 +6,7 @@ use pbig_core::Backend;
 /// `--backend`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
 pub enum BackendOption {
-    /// What is expected to be fastest.
+    /// The backend that the policy chooses.
     #[default]
     Auto,
     /// The CPU.

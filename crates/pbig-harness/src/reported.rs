@@ -18,7 +18,7 @@ pub struct Reported {
 }
 
 impl Reported {
-    /// What was reported, in any order, against what is needed.
+    /// Compares reported pairs, in any order, with the needed ones.
     pub fn compare(mut reported: Vec<Pair>, needed: &[Pair]) -> Self {
         reported.sort_unstable();
         reported.dedup();

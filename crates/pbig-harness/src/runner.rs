@@ -55,7 +55,7 @@ impl<B: BroadPhase> BroadPhase for Timed<B> {
 pub struct StepTime {
     /// Inside the broad phase, all its calls.
     pub broad_phase: f64,
-    /// Of the whole step, the broad phase included.
+    /// Time of the whole step, the broad phase included.
     pub step: f64,
 }
 
@@ -107,7 +107,7 @@ pub struct Spread {
 }
 
 impl Spread {
-    /// Of any number of times; zeros for none.
+    /// Summarizes any number of times; zeros for none.
     pub fn of(times: impl IntoIterator<Item = f64>) -> Self {
         let mut times: Vec<f64> = times.into_iter().collect();
         times.sort_unstable_by(f64::total_cmp);

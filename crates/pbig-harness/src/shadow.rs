@@ -10,7 +10,7 @@ use rapier3d::prelude::*;
 pub struct Shadowed<B> {
     /// The broad phase under test.
     pub inner: B,
-    /// What has been compared, and what was wrong.
+    /// The checker, with its counts and differences.
     pub checker: Checker,
 }
 

@@ -7,20 +7,20 @@ use rapier_pbig::shadow::write_frames;
 use rapier3d::prelude::BroadPhase;
 use std::path::{Path, PathBuf};
 
-/// What to simulate.
+/// The simulation to run.
 #[derive(Clone, Copy)]
 pub struct Task {
     /// The scene.
     pub scene: Scene,
-    /// How many bodies.
+    /// Number of bodies.
     pub bodies: usize,
-    /// How many steps.
+    /// Number of steps.
     pub steps: usize,
     /// For the random numbers of the scene.
     pub seed: u64,
 }
 
-/// What came of it.
+/// The results of a simulation.
 pub struct Outcome {
     /// Steps that were made; fewer than asked for when a check failed.
     pub steps: usize,
@@ -40,7 +40,7 @@ pub struct Outcome {
     pub check: Option<Check>,
 }
 
-/// What the shadow checker saw.
+/// The results of the shadow checker.
 pub struct Check {
     /// Calls compared.
     pub calls: usize,
@@ -48,7 +48,7 @@ pub struct Check {
     pub oracle_pairs: u64,
     /// Pairs that only stock reported, in all calls: excluded by a filter, or not in contact.
     pub stock_only: u64,
-    /// What was wrong.
+    /// The faults that it found.
     pub differences: Vec<Difference>,
     /// After a failure, where the boxes of the calls up to it are, for `pbig replay`; or why they could
     /// not be written.
@@ -63,7 +63,7 @@ impl Check {
 }
 
 impl Outcome {
-    /// Whether a check was made and failed.
+    /// Returns true if a check was made and failed.
     pub fn failed(&self) -> bool {
         self.check.as_ref().is_some_and(|check| !check.differences.is_empty())
     }

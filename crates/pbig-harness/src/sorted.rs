@@ -48,7 +48,7 @@ impl<B: BroadPhase> BroadPhase for LowerFirst<B> {
     }
 }
 
-/// Whether it is an addition, and the indices of the colliders.
+/// Returns the sort key of an event: true for an addition, and the indices of the colliders.
 fn key(event: &BroadPhasePairEvent) -> (bool, [u32; 2]) {
     let (is_added, pair) = match event {
         BroadPhasePairEvent::DeletePair(pair) => (false, pair),

@@ -34,8 +34,9 @@ pub struct PbigBroadPhase {
     last_error: Option<Error>,
     /// The last call had nothing to do and left nothing to do.
     pub(crate) is_idle: bool,
-    /// A collider's shape panicked while the listed colliders were read, so some of them may not have been.
-    is_interrupted: bool,
+    /// The last call stored only some of the listed colliders: a shape panicked, or the core refused a box. The next call
+    /// reads all colliders, because rapier lists a change only once.
+    is_incomplete: bool,
     #[cfg(feature = "shadow")]
     pub(crate) shadow: Option<Box<crate::shadow::Checker>>,
 }
@@ -112,7 +113,7 @@ impl PbigBroadPhase {
             counts: Counts::default(),
             last_error: None,
             is_idle: false,
-            is_interrupted: false,
+            is_incomplete: false,
             #[cfg(feature = "shadow")]
             shadow: None,
         }
@@ -135,7 +136,7 @@ impl PbigBroadPhase {
     }
 
     /// Returns the error of the last update, or `None` if it succeeded. If pairs could not be found, no events were sent, and
-    /// the next update sees the same changes again.
+    /// the next update sees the same changes again. If a box could not be stored, the next update reads all colliders.
     pub fn last_error(&self) -> Option<&Error> {
         self.last_error.as_ref()
     }
@@ -145,9 +146,16 @@ impl PbigBroadPhase {
         self.core.pair_count()
     }
 
-    /// Returns the pairs that rapier knows of, in no particular order. Adopted pairs are among them from the next update on.
+    /// Returns the pairs that rapier knows of, in no particular order; the collider with fewer pairs comes first in each.
+    /// Adopted pairs are among them from the next update on.
     pub fn pairs(&self) -> impl Iterator<Item = ColliderPair> {
-        self.core.pairs().map(|pair| ordered(pair, &self.registry, |id| self.core.degree(id)))
+        // Counted here: after a failed update the core would look at all pairs of a collider for each of its pairs.
+        let mut degrees = vec![0; self.core.id_count() as usize];
+        for pair in self.core.pairs() {
+            degrees[pair.a as usize] += 1;
+            degrees[pair.b as usize] += 1;
+        }
+        self.core.pairs().map(move |pair| ordered(pair, &self.registry, |id| degrees[id as usize]))
     }
 
     /// Removes first, because a modified collider may reuse the index of a removed one.
@@ -157,11 +165,8 @@ impl PbigBroadPhase {
             if call.colliders.contains(handle) { self.disable(handle) } else { self.forget(handle) }
         }
         self.writer.forget_adopted(call.removed);
-        if let Err(error) = self.core.set_margin(self.relative_margin * call.params.length_unit) {
-            self.note_error(error);
-        }
-        let was_interrupted = std::mem::replace(&mut self.is_interrupted, true);
-        if was_interrupted {
+        let margin = self.core.set_margin(self.relative_margin * call.params.length_unit);
+        if std::mem::replace(&mut self.is_incomplete, true) {
             self.read_listed(call, &all_of(call.colliders));
         } else {
             self.read_listed(call, call.modified);
@@ -169,7 +174,11 @@ impl PbigBroadPhase {
         if self.registry.differs_from(call.colliders) {
             self.rescan(call);
         }
-        self.is_interrupted = false;
+        // So far only a refused box is an error.
+        self.is_incomplete = self.last_error.is_some();
+        if let Err(error) = margin {
+            self.note_error(error);
+        }
     }
 
     /// Reads all colliders of a world that is not the one known so far. Rapier lists a collider that neither moves nor changes
@@ -185,7 +194,7 @@ impl PbigBroadPhase {
 
     fn forget_all(&mut self) {
         self.registry.clear();
-        (0..self.core.id_count()).for_each(|id| _ = self.core.remove(id));
+        self.core.clear();
         self.tree = SceneTree::default();
     }
 

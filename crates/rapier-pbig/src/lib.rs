@@ -50,6 +50,7 @@ mod config;
 mod debug_render;
 mod events;
 mod listed;
+mod policy;
 mod proxy;
 mod queries;
 mod registry;

@@ -2,34 +2,20 @@
 
 use crate::PbigBroadPhase;
 use crate::call::Call;
+use crate::policy;
 use crate::proxy::Proxy;
 use pbig_core::{Aabb, ProxyFilter};
 use rapier3d::prelude::ColliderHandle;
 #[cfg(feature = "parallel")]
 use rayon::prelude::*;
 
-/// Colliders that are fetched before the first of them is read, so that the processor waits for several at a time.
-const BLOCK: usize = 16;
-
-/// Minimum number of listed colliders for several threads: for fewer, waking a second thread costs more than it saves.
-#[cfg(feature = "parallel")]
-const PARALLEL_FROM: usize = 8192;
-
-/// Proxies that several threads compute before they are set: about 700 kB, which stays in a processor's cache.
-#[cfg(feature = "parallel")]
-const BATCH: usize = 16_384;
-
-/// Colliders that one thread computes at a time.
-#[cfg(feature = "parallel")]
-const CHUNK: usize = 512;
-
 impl PbigBroadPhase {
     /// Sets or removes the boxes of listed colliders, in the order of the list.
     pub(crate) fn read_listed(&mut self, call: &Call<'_>, listed: &[ColliderHandle]) {
         let _span = tracing::debug_span!(target: "pbig", "proxies").entered();
         #[cfg(feature = "parallel")]
-        if listed.len() >= PARALLEL_FROM && rayon::current_num_threads() > 1 {
-            return listed.chunks(BATCH).for_each(|batch| self.read_batch(call, batch));
+        if listed.len() >= policy::PARALLEL_FROM_COLLIDERS && rayon::current_num_threads() > 1 {
+            return listed.chunks(policy::PROXIES_PER_BATCH).for_each(|batch| self.read_batch(call, batch));
         }
         call.for_each_proxy(listed, |handle, proxy| self.set_proxy(handle, proxy));
     }
@@ -39,9 +25,14 @@ impl PbigBroadPhase {
     fn read_batch(&mut self, call: &Call<'_>, batch: &[ColliderHandle]) {
         let mut proxies = std::mem::take(&mut self.proxies);
         proxies.resize(batch.len(), Proxy::Gone);
-        batch.par_chunks(CHUNK).zip(proxies.par_chunks_mut(CHUNK)).for_each(|(chunk, proxies)| {
+        let pieces = batch.par_chunks(policy::PROXIES_PER_PIECE);
+        pieces.zip(proxies.par_chunks_mut(policy::PROXIES_PER_PIECE)).for_each(|(handles, proxies)| {
             let mut slots = proxies.iter_mut();
-            call.for_each_proxy(chunk, |_, proxy| slots.by_ref().take(1).for_each(|slot| *slot = proxy));
+            call.for_each_proxy(handles, |_, proxy| {
+                if let Some(slot) = slots.next() {
+                    *slot = proxy;
+                }
+            });
         });
         for (&handle, &proxy) in batch.iter().zip(&proxies) {
             self.set_proxy(handle, proxy);
@@ -94,8 +85,8 @@ impl PbigBroadPhase {
 impl Call<'_> {
     /// Calls `take` with each listed collider and its proxy, in the order of the list.
     fn for_each_proxy(&self, listed: &[ColliderHandle], mut take: impl FnMut(ColliderHandle, Proxy)) {
-        for block in listed.chunks(BLOCK) {
-            let mut fetched = [(None, None); BLOCK];
+        for block in listed.chunks(policy::COLLIDERS_PER_BLOCK) {
+            let mut fetched = [(None, None); policy::COLLIDERS_PER_BLOCK];
             for (fetched, &handle) in fetched.iter_mut().zip(block) {
                 *fetched = self.fetch(handle);
             }

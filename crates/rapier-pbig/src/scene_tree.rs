@@ -4,6 +4,7 @@
 //! builds the tree for queries. While there is a tree, each update notes which boxes change. The next query updates the tree,
 //! or rebuilds it if too many boxes changed.
 
+use crate::policy;
 use pbig_core::Aabb;
 use rapier3d::parry::bounding_volume::Aabb as TreeAabb;
 use rapier3d::parry::partitioning::{Bvh, BvhBuildStrategy, BvhWorkspace};
@@ -45,9 +46,9 @@ impl Clone for SceneTree {
 }
 
 impl SceneTree {
-    /// Notes the boxes, of `boxes` in all, that an update changes. The tree is dropped once more boxes have changed since the
-    /// last query than there are: a rebuild then costs little more than an update, and perhaps there are no more queries.
-    pub(crate) fn note(&mut self, changed: impl Iterator<Item = u32>, boxes: usize) {
+    /// Notes the boxes that an update changes, and drops a tree that has missed too many changes. `colliders` is the number
+    /// of known colliders.
+    pub(crate) fn note(&mut self, changed: impl Iterator<Item = u32>, colliders: usize) {
         let mut changed = changed.peekable();
         if changed.peek().is_none() {
             return;
@@ -58,7 +59,7 @@ impl SceneTree {
         }
         if let Some(kept) = stale {
             kept.changed.extend(changed);
-            if kept.changed.len() > boxes {
+            if kept.changed.len() > policy::TREE_CHANGES_PER_COLLIDER * colliders {
                 *stale = None;
             }
         }

@@ -1,8 +1,8 @@
-//! Random operations on small worlds: each call of the broad phase is held against rapier's own and against
-//! brute force. A failure shrinks to a few operations.
+//! Random operations on small worlds: each call of the broad phase is compared with rapier's own and with brute force. A
+//! failure shrinks to a few operations.
 //!
-//! The suite plays the same ones each time, on the CPU about 100,000; with `PROPTEST_CASES=6300` about a million new
-//! ones.
+//! The suite plays the same operations each time, about 110,000 on the CPU and 25,000 more on its engines one by one. With
+//! `PROPTEST_CASES=6400` it plays new ones: about 10^6 on the CPU, and 1.5 x 10^6 on its engines.
 
 mod ops;
 

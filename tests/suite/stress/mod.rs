@@ -1,5 +1,5 @@
-//! Numbers and worlds at which broad phases break, each through the finder and through updates, on every strategy, against
-//! the oracle. docs/STRESS.md says which test stands for what.
+//! Numbers and worlds at which broad phases break, compared with the oracle: each through the finder on every backend, and
+//! through updates with every engine. docs/STRESS.md lists the tests.
 
 mod extremes;
 mod fuzzed;
@@ -13,30 +13,32 @@ mod soak_worlds;
 
 use crate::finder::check;
 use crate::follower::Follower;
-use pbig_core::{Aabb, Config, ProxyFilter};
-use pbig_tests::strategies;
+use pbig_core::{Aabb, Backend, Coding, Config, ProxyFilter};
+use pbig_tests::{engines, gpu, may_run};
 
-/// Whether sizes that take minutes or gigabytes are wanted, too: `PBIG_STRESS=1`.
+/// Returns true if sizes that take minutes or gigabytes are tested, too: `PBIG_STRESS=1`.
 fn at_length() -> bool {
     std::env::var_os("PBIG_STRESS").is_some()
 }
 
-/// A set through the finder, and through updates in which its boxes change places.
+/// Tests a set through the finder, and through updates in which its boxes change places.
 fn everywhere(name: &str, boxes: &[Aabb]) {
     check(name, boxes);
     through_updates(name, &shuffled(boxes));
 }
 
-/// The ways to update: of the other strategies each is a search of everything, and the finder's tests have that.
+/// Returns the ways to update: as the policy chooses, with each engine of the CPU, and with the grid of a GPU.
 fn ways_to_update() -> Vec<(&'static str, Config)> {
-    let wanted = |name: &str| ["auto", "grid", "pbig", "gpu grid"].contains(&name);
-    strategies().into_iter().filter(|(name, _)| wanted(name)).collect()
+    let mut ways = vec![("auto", Config::DEFAULT)];
+    ways.extend(engines());
+    ways.push(("gpu grid", gpu(Coding::Plain)));
+    ways.into_iter().filter(|(_, config)| may_run(config)).collect()
 }
 
-/// The frames of a world one after the other; where little is searched, also with a margin.
+/// Plays the frames of a world one after the other. On the CPU also with a margin; on a GPU that would take too long.
 fn through_updates(name: &str, frames: &[Vec<Aabb>]) {
     for (strategy, config) in ways_to_update() {
-        let margins: &[f32] = if ["auto", "grid"].contains(&strategy) { &[0.0, 0.01] } else { &[0.0] };
+        let margins: &[f32] = if config.backend == Backend::Gpu { &[0.0] } else { &[0.0, 0.01] };
         for &margin in margins {
             let ids = frames.iter().map(Vec::len).max().unwrap_or(0);
             let mut world = Follower::new(Config { margin, ..config }, ids);

@@ -29,24 +29,25 @@ use edit::Edit;
 use sweep::Sweep;
 use world::World;
 
-/// What an update changed. Both lists are sorted and free of duplicates, and have no pair in common.
+/// The changes of an update. Both lists are sorted and free of duplicates, and have no pair in common.
 ///
-/// A box that was removed (see [`BroadPhase::remove`]) is in neither list, and one that was removed and set again can be
-/// in `added` although its pair was there before.
+/// No pair of a removed box is in `removed` (see [`BroadPhase::remove`]). If the box was set again, a pair can be in `added`
+/// that existed before.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Events {
-    /// Pairs that overlap now (fat boxes) and did not after the last update.
+    /// Pairs whose fat boxes overlap now and did not after the previous update.
     pub added: Vec<Pair>,
-    /// Pairs that did and no longer do.
+    /// Pairs whose fat boxes overlapped after the previous update and no longer do.
     pub removed: Vec<Pair>,
 }
 
 /// Boxes by id, and the pairs between them, kept from update to update.
 ///
-/// Each box is stored fat, grown by [`Config::margin`]; while later boxes stay inside, nothing has changed and nothing is
-/// done. Ids should be dense: about 50 bytes are kept for every id up to the largest.
+/// Each box is stored fat, grown by [`Config::margin`]. While a later box stays inside its fat box, nothing has changed and
+/// nothing is done. Ids should be dense: each id up to the largest takes 64 bytes, used or not. The grid and the pairs come on
+/// top.
 ///
-/// An update in which few boxes have changed looks only at these. One in which many have changed sorts all boxes into a
+/// An update in which few boxes have changed tests only these. An update in which many have changed sorts all boxes into a
 /// grid, searches it, and compares the pairs with those of the last update.
 ///
 /// ```

@@ -15,12 +15,12 @@ impl BroadPhase {
         &self.events
     }
 
-    /// Returns what the last update did.
+    /// Returns the report on the last update.
     pub fn report(&self) -> &Report {
         &self.report
     }
 
-    /// Returns how many boxes were set and not removed, invalid ones included.
+    /// Returns the number of boxes that were set and not removed, invalid ones included.
     pub fn len(&self) -> usize {
         self.world.present() as usize
     }
@@ -55,13 +55,14 @@ impl BroadPhase {
         self.world.boxes.get(id as usize).copied().filter(Aabb::is_valid)
     }
 
-    /// Yields the ids of boxes that the next update will look at: set beyond their margin, given another filter, or
-    /// removed since the last one.
+    /// Yields the ids of changed boxes: set outside their fat box, given another filter, inserted or removed since the last
+    /// update.
     pub fn changes(&self) -> impl Iterator<Item = u32> {
         self.world.changed.iter().copied()
     }
 
-    /// Returns how many pairs exist: those of the last update, less those of boxes removed since.
+    /// Returns the number of pairs: those of the last update, less those of boxes removed since. After a removal, and until
+    /// the next update, it looks at all pairs.
     pub fn pair_count(&self) -> usize {
         if self.world.has_removed() { self.pairs().count() } else { self.kept.len() }
     }
@@ -71,13 +72,14 @@ impl BroadPhase {
         self.kept.iter().filter(|pair| self.exists(pair))
     }
 
-    /// Yields the pairs of one box (see [`BroadPhase::pair_count`]), sorted by the other one. The first call after an
-    /// update in which many boxes have changed looks at all pairs, later ones at those of the box.
+    /// Yields the pairs of one box (see [`BroadPhase::pair_count`]), sorted by the other one. The first call after a
+    /// rebuild looks at all pairs, later calls at the pairs of the box.
     pub fn pairs_of(&self, id: u32) -> impl Iterator<Item = Pair> {
         self.kept.partners(id).map(move |other| Pair::new(id, other)).filter(|pair| self.exists(pair))
     }
 
-    /// Returns how many pairs a box has (see [`BroadPhase::pair_count`]).
+    /// Returns the number of pairs of a box (see [`BroadPhase::pair_count`]). After a removal, and until the next update, it
+    /// looks at all pairs of the box.
     pub fn degree(&self, id: u32) -> u32 {
         if self.world.has_removed() { self.pairs_of(id).count() as u32 } else { self.kept.degree(id) }
     }
@@ -91,13 +93,13 @@ impl BroadPhase {
         !self.world.was_removed(pair.a) && !self.world.was_removed(pair.b)
     }
 
-    /// Returns the cells of the grid in which boxes lie, for a picture of them; none where the last update needed no grid,
-    /// or ran on a GPU. Takes time and memory in proportion to the cells.
+    /// Returns the occupied cells of the grid, for pictures. There are none if the last update needed no grid or ran on a GPU.
+    /// Takes time and memory in proportion to the cells.
     pub fn cells(&self) -> Vec<OccupiedCell> {
         if self.has_grid { self.grid.occupied_cells() } else { Vec::new() }
     }
 
-    /// Returns the ids of all stored (fat) boxes that overlap a box, in no particular order. Filters are not asked.
+    /// Returns the ids of all stored (fat) boxes that overlap a box, in no particular order. Filters are ignored.
     ///
     /// ```
     /// use pbig_core::{Aabb, BroadPhase, ProxyFilter};

@@ -1,8 +1,7 @@
-//! Saving and restoring: the boxes, their pairs and what has changed. Grids are built again.
+//! Snapshots: boxes, filters, pairs, pending changes and settings. Grids are built again.
 //!
-//! Events are a function of just that, so a restored broad phase goes on with the same events. Boxes are saved as bits:
-//! exact in any format, also where it has no NaN or infinity. Whatever is restored is checked: no bytes make later calls
-//! panic.
+//! Events are a function of these, so a restored broad phase sends the same events. Boxes are saved as bits, which are exact
+//! in any format, even in one without NaN or infinity. All that is read is checked: no bytes make later calls panic.
 
 use super::BroadPhase;
 use crate::{Aabb, Backend, Config, Limits, Order, Pair, ProxyFilter};
@@ -91,8 +90,8 @@ impl Snapshot {
         for (id, _) in self.present.iter().enumerate().filter(|(_, present)| **present) {
             world.insert(id as u32, bytemuck::cast(self.boxes[id]), self.filters[id], 0.0);
         }
-        // Insertions are no changes; those of the snapshot are. What boxes were is not known: the next update compares
-        // all pairs, and finds the same events.
+        // Only the changes of the snapshot count, not these insertions. Old states are not saved: the next update compares all
+        // pairs, and finds the same events.
         world.forget_changes();
         world.keep_old = 0;
         self.changed.iter().for_each(|&id| world.note_change(id));

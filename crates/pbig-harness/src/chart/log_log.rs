@@ -15,7 +15,7 @@ pub struct Line {
 
 /// Lines over logarithmic axes.
 pub struct LogLog {
-    /// Of the file, without its ending.
+    /// Name of the file, without its extension.
     pub name: String,
     /// Above the chart.
     pub title: String,
@@ -23,9 +23,9 @@ pub struct LogLog {
     pub x: &'static str,
     /// Along the y axis.
     pub y: &'static str,
-    /// What is drawn.
+    /// The lines.
     pub lines: Vec<Line>,
-    /// Whether the legend says how each line grows: a curve that has a least is no power.
+    /// True if the legend shows the growth of each line as a power. (A curve with a minimum is none.)
     pub exponents: bool,
 }
 
@@ -76,7 +76,7 @@ impl LogLog {
         if low > high { 1.0..10.0 } else { low / 1.3..high * 1.3 }
     }
 
-    /// Where the legend hides least of the lines.
+    /// Returns the corner where the legend hides least of the lines.
     fn emptiest_corner(&self) -> SeriesLabelPosition {
         use SeriesLabelPosition::{LowerLeft, LowerRight, UpperLeft, UpperRight};
         let corners =

@@ -9,7 +9,7 @@ use std::path::Path;
 /// Points of time and error over logarithmic axes. An error of 0, which has no logarithm, is drawn on a line of
 /// its own: a decade below the smallest error there is, labelled 0.
 pub struct Pareto {
-    /// Of the file, without its ending.
+    /// Name of the file, without its extension.
     pub name: String,
     /// Above the chart.
     pub title: String,
@@ -17,9 +17,9 @@ pub struct Pareto {
     pub x: &'static str,
     /// Along the y axis: the error.
     pub y: &'static str,
-    /// What is drawn; times above 0, errors not below, all finite: others are left out.
+    /// The points: times above 0 and errors of at least 0, all finite. Others are left out.
     pub lines: Vec<Line>,
-    /// Whether points of a line are joined.
+    /// True if the points of a line are joined.
     pub joined: bool,
 }
 
@@ -53,7 +53,7 @@ impl Pareto {
         if low > high { (1.0, 10.0) } else { (low, high) }
     }
 
-    /// Where an error of 0 is drawn: at a power of ten, which the axis labels.
+    /// Returns the place of an error of 0: a power of ten, which the axis labels.
     fn floor(&self) -> f64 {
         10f64.powf(self.ends(|p| p.1).0.log10().floor() - 1.0)
     }

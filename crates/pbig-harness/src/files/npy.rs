@@ -6,13 +6,13 @@ use ndarray_npy::npy::header::Header;
 use ndarray_npy::{ReadNpyError, ReadNpyExt};
 use pbig_core::Aabb;
 
-/// How every `.npy` file begins.
+/// The first bytes of every `.npy` file.
 const MAGIC: &[u8] = b"\x93NUMPY";
 
 /// The content of an `.npy` file of boxes, see [`super::read_boxes`].
 ///
 /// # Errors
-/// What is wrong, in one line.
+/// A message in one line.
 pub fn npy_boxes(bytes: &[u8]) -> Result<Vec<Aabb>, ContentError> {
     let wrong = |shape: &[usize]| match (shape, shape_text(shape)) {
         ([_, _, 6], found) => {
@@ -29,7 +29,7 @@ pub fn npy_boxes(bytes: &[u8]) -> Result<Vec<Aabb>, ContentError> {
 /// The content of an `.npy` file of frames, see [`super::read_frames`].
 ///
 /// # Errors
-/// What is wrong, in one line.
+/// A message in one line.
 pub fn npy_frames(bytes: &[u8]) -> Result<Frames, ContentError> {
     let wrong = |shape: &[usize]| match (shape, shape_text(shape)) {
         ([_, 6], found) => {
@@ -105,7 +105,7 @@ fn values_text(kind: Option<&String>) -> ContentError {
     one_line(format!("values are {found}; expected float32 or float64 (numpy: `.astype('float32')`)"))
 }
 
-/// What numpy calls the values that a header describes as, say, `<i4`.
+/// Returns numpy's name of the values that a header describes as, say, `<i4`.
 fn value_name(kind: &str) -> String {
     let plain = kind.trim_start_matches(ORDERS);
     let (letter, bytes) = plain.split_at_checked(1).unwrap_or((plain, ""));
@@ -121,7 +121,7 @@ fn value_name(kind: &str) -> String {
     name.unwrap_or_else(|| format!("of type '{}'", brief(kind)))
 }
 
-/// Whether this is a `.npy` file at all.
+/// Checks that this is a `.npy` file.
 fn check_start(bytes: &[u8]) -> Result<(), ContentError> {
     match bytes {
         [] => Err("the file is empty".into()),
@@ -130,7 +130,7 @@ fn check_start(bytes: &[u8]) -> Result<(), ContentError> {
     }
 }
 
-/// Whether the file holds as many bytes as its header promises. The reader allocates what the header says, so a header
+/// Checks that the file holds as many bytes as its header promises. The reader allocates what the header says, so a header
 /// that lies must be noticed before: by the reader's own parser, or the two would understand different things. What that
 /// cannot understand it will not read either.
 fn check_size(bytes: &[u8]) -> Result<(), ContentError> {
@@ -162,7 +162,7 @@ fn check_size(bytes: &[u8]) -> Result<(), ContentError> {
     }
 }
 
-/// Whether the header is all there and its parser will not take for ever. That allocates what the header's length says, up
+/// Checks that the header is complete and that its parser will not take for ever. That allocates what the header's length says, up
 /// to 4 GiB, and takes twice as long for each bracket within another.
 fn check_header(bytes: &[u8]) -> Result<(), ContentError> {
     const LONGEST: u32 = 1 << 16;
@@ -183,7 +183,7 @@ fn check_header(bytes: &[u8]) -> Result<(), ContentError> {
     Ok(())
 }
 
-/// What follows the length of the header, and this length.
+/// Returns the bytes after the length of the header, and this length.
 fn header_length(bytes: &[u8]) -> Option<(&[u8], u32)> {
     let rest = bytes.strip_prefix(MAGIC)?;
     match *rest.first()? {

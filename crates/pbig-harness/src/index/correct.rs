@@ -1,4 +1,4 @@
-//! What follows an estimated row: nothing, the paper's rules, or integers; and the lazy way, which needs no row.
+//! The corrections of an estimated row: none, the paper's rules, or integers; and the lazy way, which needs no row.
 
 use super::row_start;
 
@@ -66,7 +66,7 @@ pub(super) fn searched_row(k: i64, n: i64) -> i64 {
     low
 }
 
-/// What is measured of the lazy way, wherever it is: documents are to mean the same by it.
+/// The measured part of the lazy way, so that all documents mean the same by it.
 pub const LAZY: &str = "The lazy way looks at n^2 - n identifiers, as in the paper (3.2.2). Half of them are pairs. Its \
     time for a pair is that of all these identifiers over the number of pairs.";
 

@@ -46,7 +46,7 @@ fn each_run<R: Root>(n: i64, row: i64, mut found: impl FnMut(Run)) {
     }
 }
 
-/// What indices test.
+/// The pairs that indices give.
 struct Tested {
     n: i64,
     wrong: u64,

@@ -5,11 +5,11 @@ use super::{AsItIs, Correction, correct, discriminant, lazy_ids, lazy_pair, pair
 
 /// A way without an estimate.
 pub struct Exact {
-    /// What it is called.
+    /// Its name.
     pub name: &'static str,
     /// Over all pairs of some boxes.
     pub tally: fn(i64) -> Tally,
-    /// Of the first and last indices of rows, or identifiers, how many do not give what they should.
+    /// Returns the number of first and last indices of rows, or identifiers, that give a wrong pair.
     pub wrong_ends: fn(i64) -> u64,
 }
 

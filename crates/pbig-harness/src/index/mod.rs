@@ -24,7 +24,7 @@ use pbig_core::pair_index::pair_count;
 /// A way of estimating the row, with what can be asked of it.
 #[derive(Clone, Copy)]
 pub struct Way {
-    /// Of the root, without its steps.
+    /// Name of the root, without its steps.
     pub name: &'static str,
     /// Newton's steps, where there are any.
     pub steps: Option<u32>,
@@ -69,7 +69,7 @@ pub const WAYS: [Way; 12] = [
     way::<Printed>("as printed, in f32", None),
 ];
 
-/// What follows the estimate, in the order of the arrays of a [`Way`].
+/// The corrections of an estimate, in the order of the arrays of a [`Way`].
 pub const CORRECTIONS: [&str; 3] = ["as it is", "the paper's rules", "integers"];
 
 /// Index of the first pair of row `a`, also of rows that there are not.
@@ -78,7 +78,7 @@ const fn row_start(a: i64, n: i64) -> i64 {
     a * (2 * n - a - 1) / 2
 }
 
-/// What stands under the root of equation 1.
+/// Returns the number under the root of equation 1.
 #[inline(always)]
 const fn discriminant(k: i64, n: i64) -> i64 {
     let m = 2 * n - 1;
@@ -95,7 +95,7 @@ pub fn pass<R: Root, C: Correction>(n: i64, blocks: &[Block]) -> i64 {
     sum(blocks, pair)
 }
 
-/// The same without a root: bisection over the starts of rows, as the kernel does it.
+/// Makes a pass without a root: by bisection over the starts of rows, as the kernel does it.
 pub fn pass_bisection(n: i64, blocks: &[Block]) -> i64 {
     sum(blocks, |k| {
         let row = correct::searched_row(k, n);
@@ -103,7 +103,7 @@ pub fn pass_bisection(n: i64, blocks: &[Block]) -> i64 {
     })
 }
 
-/// The same by the root of an integer, rounded up.
+/// Makes a pass by the root of an integer, rounded up.
 pub fn pass_integer_root(n: i64, blocks: &[Block]) -> i64 {
     sum(blocks, |k| {
         let row = root::integer_row(2 * n - 1, discriminant(k, n));

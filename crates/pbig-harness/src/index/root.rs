@@ -12,7 +12,7 @@ pub trait Root {
     /// The estimate from `m = 2n - 1` and `x = m^2 - 8k`.
     fn row(m: i64, x: i64) -> i64;
 
-    /// Whether the estimate lies between `a` and `a + 1`, for numbers that processors convert four at a time.
+    /// Returns true if the estimate lies between `a` and `a + 1`, for numbers that processors convert four at a time.
     /// (Row 0 is estimated right from a little below 0, too, where this says no.)
     fn lies_in(a: i32, m: i32, x: i32) -> bool;
 
@@ -51,7 +51,7 @@ impl<const MAGIC: u32, const STEPS: u32> SingleRoot for Newton<MAGIC, STEPS> {
     }
 }
 
-/// The same with each step computed in f64 and rounded to f32 once, as processors do that compute in wider registers.
+/// Newton steps, each computed in f64 and rounded to f32 once, as processors do that compute in wider registers.
 /// The paper's figures for two steps are those of this one, digit by digit.
 pub struct WideNewton<const MAGIC: u32, const STEPS: u32>;
 

@@ -1,7 +1,7 @@
 //! Newton's steps in every order and rounding that a machine may have: what of Avril's table 3 is the machine's, not the
 //! method's.
 
-/// What becomes of the result of one operation.
+/// The rounding of the result of one operation.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Rounding {
     /// To the nearest f32.
@@ -27,12 +27,12 @@ impl Rounding {
     }
 }
 
-/// How one step `y (1.5 - h y y)` is computed.
+/// The computation of one step `y (1.5 - h y y)`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Step {
     /// `h (y y)`, else `(h y) y`.
     square_first: bool,
-    /// Of both products, of the difference, of the new `y`.
+    /// Roundings of both products, of the difference, and of the new `y`.
     roundings: [Rounding; 4],
 }
 
@@ -54,7 +54,7 @@ impl Step {
     }
 }
 
-/// What is made of the `y` that steps give.
+/// The use of the `y` that the steps give.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Form {
     /// `x y` without its fraction.
@@ -78,7 +78,7 @@ impl Form {
         }
     }
 
-    /// What an exact root gives.
+    /// Returns the result of an exact root.
     fn exact(self, x: u32) -> u32 {
         let root = x.isqrt();
         root + u32::from(self == Self::Up && root * root < x)
@@ -91,7 +91,7 @@ pub struct Rounded {
     early: Step,
     late: Step,
     form: Form,
-    /// Of the last product, or of the reciprocal.
+    /// Rounding of the last product, or of the reciprocal.
     last: Rounding,
 }
 

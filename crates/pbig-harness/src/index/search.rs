@@ -1,4 +1,4 @@
-//! How far roots are off, and the smallest number of boxes for which the paper's rules are wrong.
+//! The errors of roots, and the smallest number of boxes for which the paper's rules are wrong.
 
 use super::{AsItIs, Correction, Root, Rules, Single, SingleRoot, discriminant, row_start};
 
@@ -9,7 +9,7 @@ pub struct Counterexample {
     pub n: i64,
     /// The index.
     pub k: i64,
-    /// What comes out.
+    /// The resulting pair.
     pub given: (i64, i64),
     /// Its pair.
     pub right: (i64, i64),

@@ -10,10 +10,10 @@ pub const MOST_EXHAUSTIVE: i64 = 16_384;
 /// time.)
 const BLOCK: i64 = 32;
 
-/// What comes of all pairs.
+/// Counts of right and wrong indices of all pairs.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Tally {
-    /// How many there are.
+    /// Number of pairs.
     pub pairs: u64,
     /// Indices that give anything but their pair, the lesser box first.
     pub wrong: u64,
@@ -81,7 +81,7 @@ fn wrong_at<R: Root>(n: i64, row: i64, k: i64) -> Option<Wrong> {
     (estimate != row).then_some(Wrong { k: k as u32, estimate: estimate as i32, row: row as i32 })
 }
 
-/// What is left after a correction.
+/// Counts the errors that a correction leaves.
 fn judged<C: Correction>(n: i64, wrong: &[Wrong]) -> Tally {
     let mut left = Left::new(n);
     for w in wrong {
@@ -91,7 +91,7 @@ fn judged<C: Correction>(n: i64, wrong: &[Wrong]) -> Tally {
     left.tally()
 }
 
-/// What comes of pairs given one by one, in the order of all pairs of `n >= 2` boxes.
+/// Counts pairs given one by one, in the order of all pairs of `n >= 2` boxes.
 pub fn of(n: i64, mut given: impl Iterator<Item = (i64, i64)>) -> Tally {
     let mut left = Left::new(n);
     let pairs = (0..n - 1).flat_map(|a| (a + 1..n).map(move |b| (a, b)));
@@ -139,7 +139,7 @@ pub(super) fn tested((a, b): (i64, i64), n: i64) -> Option<i64> {
     (0 <= a && a < b && b < n).then(|| row_start(a, n) + b - a - 1)
 }
 
-/// Of the pairs of wrong indices, those that none of them gives.
+/// Returns the number of pairs of wrong indices that no wrong index gives.
 fn missed(left: &[(i64, Option<i64>)], pairs: u64) -> u64 {
     if left.is_empty() {
         return 0;
@@ -152,7 +152,7 @@ fn missed(left: &[(i64, Option<i64>)], pairs: u64) -> u64 {
     left.iter().filter(|(k, _)| is_missed(*k)).count() as u64
 }
 
-/// What comes of the ends of all rows, and of indices in between.
+/// Counts at the ends of all rows, and at indices in between.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Sample {
     /// First and last indices of rows.
@@ -195,7 +195,7 @@ mod tests {
     use super::*;
     use std::collections::BTreeMap;
 
-    /// The same counts from a list of what each index gives.
+    /// Returns the counts from a list of the pair of each index.
     fn slowly<R: Root, C: Correction>(n: i64) -> Tally {
         let mut given = BTreeMap::<_, u64>::new();
         let mut tally = Tally { pairs: pairs_of(n) as u64, ..Tally::default() };

@@ -1,4 +1,4 @@
-//! How large a space is in which boxes have a wanted number of pairs.
+//! The size of the space in which boxes have a wanted number of pairs.
 
 /// Random edges are replaced by so many typical ones.
 const SAMPLES: usize = 32;

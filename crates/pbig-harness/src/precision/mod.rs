@@ -13,13 +13,13 @@ use pbig_core::Aabb;
 pub trait Coordinates: Copy {
     /// For tables.
     const NAME: &'static str;
-    /// Whether it says of no two boxes that they may overlap which do not.
+    /// True if the answer is exact: only boxes that overlap may overlap.
     const EXACT: bool = false;
 
     /// From a box without NaN whose extents are at most a cell.
     fn of(aabb: &Aabb, scale: &Scale) -> Self;
 
-    /// Whether two boxes may overlap whose lower corners are in cells that touch.
+    /// Returns true if two boxes may overlap whose lower corners lie in touching cells.
     fn may_overlap(self, other: Self) -> bool;
 }
 

@@ -39,7 +39,7 @@ pub fn half_up(x: f32) -> i16 {
 /// From coordinates to steps of cells.
 #[derive(Clone, Copy, Debug)]
 pub struct Scale {
-    /// Where cell 0 begins.
+    /// The lower corner of cell 0.
     pub origin: [f32; 3],
     /// The edge of a cell; above 0.
     pub cell: f32,

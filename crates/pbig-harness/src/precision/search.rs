@@ -15,14 +15,14 @@ pub struct Candidates {
     runs: Vec<[u32; 3]>,
 }
 
-/// What tests in some coordinates have found.
+/// The findings of tests in some kind of coordinates.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Found {
     /// Tests.
     pub tests: u64,
     /// Pairs that may overlap.
     pub candidates: u64,
-    /// Of those, pairs that do.
+    /// Number of these candidates that overlap.
     pub pairs: u64,
     /// Rounding the boxes.
     pub encode: Duration,
@@ -33,7 +33,7 @@ pub struct Found {
 }
 
 impl Candidates {
-    /// Of boxes that are valid and finite; none for any other.
+    /// Sorts boxes by cell. Returns none if there is no box, or if one is invalid or infinite.
     pub fn new(boxes: &[Aabb]) -> Option<Self> {
         let is_finite = |b: &Aabb| b.is_valid() && b.min.iter().chain(&b.max).all(|x| x.is_finite());
         if boxes.is_empty() || !boxes.iter().all(is_finite) {

@@ -12,9 +12,9 @@ use rapier3d::prelude::*;
 /// A named scene.
 #[derive(Clone, Copy)]
 pub struct Scene {
-    /// How to ask for it.
+    /// The name on the command line.
     pub name: &'static str,
-    /// What happens in it.
+    /// A description in a few words.
     pub about: &'static str,
     /// Bodies when the user does not say how many.
     pub default_bodies: usize,

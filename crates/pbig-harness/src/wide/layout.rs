@@ -46,12 +46,12 @@ impl Layout {
         Self { placed: (0..count).map(&mut place).collect() }
     }
 
-    /// How many shapes.
+    /// Returns the number of shapes.
     pub fn len(&self) -> usize {
         self.placed.len()
     }
 
-    /// Whether there is none.
+    /// Returns true if there is no shape.
     pub fn is_empty(&self) -> bool {
         self.placed.is_empty()
     }

@@ -1,4 +1,4 @@
-//! The same world in f64: poses, boxes and pairs to hold those of f32 against, near the origin and far from it.
+//! A world in f64, beside the one in f32: its poses, boxes and pairs are the reference, near the origin and far from it.
 
 mod layout;
 mod pairs;
@@ -44,15 +44,16 @@ impl Wide {
         Aabb::from_f64(self.min, self.max)
     }
 
-    /// How far a box in f32 ends inside this one, on each axis: 0 where it reaches as far.
+    /// Returns the distance by which a box in f32 ends inside this one, on each axis; 0 where it does not.
     pub fn shortfall(&self, aabb: &Aabb) -> [f64; 3] {
         let [min, max] = [aabb.min, aabb.max].map(|corner| corner.map(f64::from));
         std::array::from_fn(|k| (min[k] - self.min[k]).max(self.max[k] - max[k]).max(0.0))
     }
 }
 
-/// What rounding in f64 may have done to the distance of two boxes of poses that are `farthest` from the origin at most: nearer
-/// than that they neither touch nor are they apart. Tens of roundings, each by 2^-53 of that.
+/// Returns the largest error of a distance between two boxes in f64 whose poses are at most `farthest` from the origin. If
+/// boxes are nearer to each other than that, they count neither as touching nor as apart. The error is tens of roundings,
+/// each by 2^-53 of `farthest`.
 pub fn doubt(farthest: f64) -> f64 {
     (farthest + 1.0) * 64.0 * f64::EPSILON
 }

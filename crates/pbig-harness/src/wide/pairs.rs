@@ -38,12 +38,12 @@ pub struct Truth {
     pub doubt: f64,
 }
 
-/// How pairs differ from the true ones.
+/// The differences of pairs from the true ones.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Differences {
     /// True pairs that are not among them.
     pub missed: u64,
-    /// Of these, pairs whose boxes overlap by more than asked for.
+    /// Missed pairs whose boxes overlap by more than the given depth.
     pub missed_deep: u64,
     /// Others that are.
     pub added: u64,

@@ -1,9 +1,9 @@
-//! What a world in f64 takes over of one in f32: all else is refused, as the two would not be the same world.
+//! The properties of a world in f32 that a world in f64 takes over. All else is refused, because the worlds would differ.
 
 use crate::world::World;
 use rapier3d::prelude::*;
 
-/// What is asked of something, and whether it is so.
+/// A requirement in words, and true if it is met.
 type Check = (&'static str, bool);
 
 fn first_refused(checks: &[Check]) -> Result<(), String> {
@@ -13,7 +13,7 @@ fn first_refused(checks: &[Check]) -> Result<(), String> {
     }
 }
 
-/// What [`super::WideWorld`] would lose of a world but for its bodies and colliders.
+/// Checks that [`super::WideWorld`] loses nothing of a world besides its bodies and colliders.
 pub(super) fn check_world(world: &World) -> Result<(), String> {
     let has_articulations = world.multibody_joints.multibodies().next().is_some();
     first_refused(&[
@@ -24,7 +24,7 @@ pub(super) fn check_world(world: &World) -> Result<(), String> {
     ])
 }
 
-/// Of a body all is taken over but where it is and how fast: the rest must be what rapier gives a dynamic one.
+/// Checks a body. Its pose and velocity are taken over; the rest must be rapier's defaults for a dynamic body.
 pub(super) fn check_body(body: &RigidBody) -> Result<(), String> {
     let has_no_force = body.user_force() == Vector::zeros() && body.user_torque() == AngVector::zeros();
     first_refused(&[
@@ -42,7 +42,7 @@ pub(super) fn check_body(body: &RigidBody) -> Result<(), String> {
     ])
 }
 
-/// Of a collider shape, place, density, friction and restitution are taken over.
+/// Checks a collider. Shape, place, density, friction and restitution are taken over; the rest must be rapier's defaults.
 pub(super) fn check_collider(collider: &Collider) -> Result<(), String> {
     let all = InteractionGroups::all();
     let rules = [collider.friction_combine_rule(), collider.restitution_combine_rule()];

@@ -1,4 +1,4 @@
-//! What rounding takes off a box that is computed in f32, and boxes widened by as much.
+//! The loss of a box by rounding to f32, and boxes widened by as much.
 //!
 //! An *ulp*, a unit in the last place, is the distance from a float to the next. Far from the origin it is large: 1/128
 //! of a length unit at 10^5, 1 at 10^7. Let `u` be 2^-24, so that an operation rounds by at most `u` times its result and by
@@ -24,7 +24,7 @@
 use pbig_core::Aabb;
 use rapier3d::prelude::{Isometry, Real};
 
-/// What rotations may take off, as a part of the size: half of it for each of two ulps.
+/// The loss by rotations, as a part of the size: half of it for each of two ulps.
 const ROTATION: f32 = 128.0 / (1 << 24) as f32;
 
 /// The box with every bound moved outward by so many units in the last place (ulps) of the numbers that it was computed

@@ -25,7 +25,7 @@ pub struct WideWorld {
 }
 
 impl WideWorld {
-    /// The same world at a distance from where it is.
+    /// Returns this world in f64, moved by `offset`.
     ///
     /// # Errors
     /// If it has what a world in f64 does not get: other shapes than balls, cuboids and half-spaces, other bodies than awake
@@ -102,7 +102,7 @@ impl WideWorld {
         );
     }
 
-    /// Where all colliders are but half-spaces, in the order of [`super::Layout::of_world`].
+    /// Returns the poses of all colliders except half-spaces, in the order of [`super::Layout::of_world`].
     pub fn poses(&self) -> Vec<Pose> {
         self.bounded.iter().map(|&handle| *self.colliders[handle].position()).collect()
     }
@@ -155,7 +155,7 @@ mod tests {
         Scene::named(name).expect("a scene").build(27, 1)
     }
 
-    /// How far colliders are apart in the two at most, after so many steps.
+    /// Returns the largest distance between colliders of the two worlds after `steps` steps.
     fn apart(offset: f64, steps: usize) -> f64 {
         let world = scene("column");
         let layout = Layout::of_world(&world);

@@ -65,6 +65,58 @@ fn an_update_that_fails_sends_nothing_tells_why_and_the_next_one_sees_its_change
     assert_eq!(call(&[], &[]), (0, None, 2, 3));
 }
 
+/// A ground and balls on it, in an update that has too many pairs after some balls were removed.
+#[test]
+fn after_a_failed_update_the_pairs_are_those_of_colliders_that_are_there() {
+    let mut colliders = ColliderSet::new();
+    let ground = colliders.insert(ColliderBuilder::cuboid(100.0, 1.0, 1.0));
+    let mut ball = |i: usize| {
+        let at = vector![3.0 * i as f32, 0.0, 0.0];
+        let all = ActiveCollisionTypes::all();
+        colliders.insert(ColliderBuilder::ball(0.5).translation(at).active_collision_types(all))
+    };
+    let [balls, more] = [0..20, 0..21].map(|range| range.map(&mut ball).collect::<Vec<_>>());
+    let config = PbigConfig { max_pairs: 20, ..PbigConfig::DEFAULT };
+    let mut broad_phase = PbigBroadPhase::with_config(config).expect("a length");
+    let mut old = colliders.clone();
+    more.iter()
+        .for_each(|&ball| _ = old.remove(ball, &mut IslandManager::new(), &mut RigidBodySet::new(), false));
+    assert_eq!(update(&mut broad_phase, &old, &[&[ground], &balls[..]].concat(), &[]), 20);
+    let (gone, left) = balls.split_at(5);
+    gone.iter().for_each(|&ball| {
+        _ = colliders.remove(ball, &mut IslandManager::new(), &mut RigidBodySet::new(), false)
+    });
+    assert_eq!(update(&mut broad_phase, &colliders, &more, gone), 0);
+    assert_eq!(broad_phase.last_error(), Some(&Error::TooManyPairs { limit: 20 }));
+    let pairs: Vec<ColliderPair> = broad_phase.pairs().collect();
+    let wanted: Vec<ColliderPair> = left.iter().map(|&ball| ColliderPair::new(ball, ground)).collect();
+    assert_eq!(
+        (pairs, broad_phase.pair_count()),
+        (wanted, 15),
+        "the ground has more pairs, so it comes second"
+    );
+}
+
+#[test]
+fn a_box_that_the_core_refuses_is_an_error_in_each_update_until_there_is_room() {
+    let (mut colliders, handles) = row(5);
+    let limits = pbig_core::Limits { max_boxes: 4, ..pbig_core::Limits::DEFAULT };
+    let config = pbig_core::Config { limits, ..PbigConfig::DEFAULT.into() };
+    let mut broad_phase = PbigBroadPhase::around(pbig_core::BroadPhase::new(config).expect("a length"));
+    let error = Some(Error::TooManyBoxes { boxes: 5, limit: 4 });
+    assert_eq!(update(&mut broad_phase, &colliders, &handles, &[]), 3, "the others pair");
+    assert_eq!(broad_phase.last_error().cloned(), error);
+    assert_eq!(update(&mut broad_phase, &colliders, &[], &[]), 0);
+    assert_eq!(
+        broad_phase.last_error().cloned(),
+        error,
+        "the collider is read again, although it is not listed"
+    );
+    colliders.remove(handles[4], &mut IslandManager::new(), &mut RigidBodySet::new(), false);
+    assert_eq!(update(&mut broad_phase, &colliders, &[], &handles[4..]), 0);
+    assert_eq!((broad_phase.last_error(), broad_phase.pair_count()), (None, 3));
+}
+
 #[test]
 fn a_length_unit_that_is_no_length_is_an_error_until_it_is_mended() {
     let (colliders, handles) = row(3);

@@ -19,7 +19,7 @@ pub use crate::call::Call;
 pub use difference::{Difference, Fault, Side};
 pub use replay::{ReplayError, write_frames};
 
-use crate::PbigBroadPhase;
+use crate::{PbigBroadPhase, policy};
 use followed::Followed;
 use pbig_core::Aabb;
 use rapier3d::prelude::*;
@@ -91,12 +91,6 @@ impl PbigBroadPhase {
         self.shadow.as_ref().map_or(&[], |checker| &checker.differences)
     }
 }
-
-/// Frames that are kept for a replay.
-const FRAMES_KEPT: usize = 8;
-
-/// Maximum number of differences that are kept.
-const KEPT: usize = 1000;
 
 /// Follows the calls and events of a broad phase, and compares its pairs with the references.
 #[derive(Clone, Default)]
@@ -199,14 +193,14 @@ impl Checker {
 
     fn keep_frame(&mut self, scene: &SceneView<'_>) {
         self.frames.push_back(scene.boxes());
-        while self.frames.len() > FRAMES_KEPT {
+        while self.frames.len() > policy::REPLAY_FRAMES {
             self.frames.pop_front();
         }
     }
 
     fn note(&mut self, fault: Fault, pair: HandlePair, scene: &SceneView<'_>) {
         let noted = |one: &Difference| (one.fault, one.pair) == (fault, pair);
-        if self.differences.len() < KEPT && !self.differences.iter().any(noted) {
+        if self.differences.len() < policy::MAX_DIFFERENCES && !self.differences.iter().any(noted) {
             let sides = [pair.0, pair.1].map(|handle| scene.side(handle));
             self.differences.push(Difference { call: self.calls, fault, pair, sides, replay: None });
         }
@@ -262,6 +256,26 @@ mod tests {
         let faults: Vec<Fault> = checker.differences.iter().map(|d| d.fault).collect();
         assert_eq!(faults, [Fault::Missing]);
         assert_eq!((checker.compared, checker.oracle_pairs, checker.stock_only), (1, 1, 1));
+    }
+
+    /// Contract 7: numbers that no length is, for which rapier's own functions panic, end the pairs and not the program.
+    #[test]
+    fn contact_skins_and_predictions_that_are_no_lengths_are_checked_like_any_other() {
+        for bad in [-3.0, f32::NAN, f32::NEG_INFINITY] {
+            for is_skin in [true, false] {
+                let (mut colliders, pair) = scene::tests::balls(0.9);
+                let (mut params, bodies) = (IntegrationParameters::default(), RigidBodySet::new());
+                if is_skin {
+                    colliders[pair.0].set_contact_skin(bad);
+                } else {
+                    params.normalized_prediction_distance = bad;
+                }
+                let ours = PbigBroadPhase::new().with_shadow(Shadow::Stock);
+                let (mut ours, mut events) = (ours.with_shadow(Shadow::Oracle), Vec::new());
+                ours.update(&params, &colliders, &bodies, &[pair.0, pair.1], &[], &mut events);
+                assert_eq!((events.len(), ours.differences().len()), (0, 0), "{bad}, {is_skin}");
+            }
+        }
     }
 
     #[test]

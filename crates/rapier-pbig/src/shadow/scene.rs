@@ -26,13 +26,13 @@ impl<'a> SceneView<'a> {
 
     fn aabb(&self, handle: ColliderHandle) -> Option<Aabb> {
         let collider = self.enabled(handle)?;
-        let reach = self.params.prediction_distance() / 2.0;
-        let mut aabb = collider.compute_collision_aabb(reach);
+        let mut aabb = collider.compute_aabb();
         if let Some(predicted) = self.predicted(collider).filter(|_| self.listed.contains(&handle)) {
-            let then = collider.shape().compute_aabb(&predicted).loosened(collider.contact_skin() + reach);
-            aabb.merge(&then);
+            aabb.merge(&collider.shape().compute_aabb(&predicted));
         }
-        Some(Aabb::new(aabb.mins.coords.into(), aabb.maxs.coords.into()))
+        // As `compute_collision_aabb`, which panics if the distance is negative or NaN.
+        let reach = Vector::repeat(self.params.prediction_distance() / 2.0 + collider.contact_skin());
+        Some(Aabb::new((aabb.mins - reach).coords.into(), (aabb.maxs + reach).coords.into()))
     }
 
     /// Returns the pose that soft CCD predicts for a listed collider, if it is within the prediction distance: beyond, rapier

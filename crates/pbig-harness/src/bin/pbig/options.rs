@@ -46,7 +46,7 @@ pub(crate) fn bodies(text: &str) -> Result<usize, String> {
     count_up_to(text, 10_000_000)
 }
 
-/// What random numbers begin with.
+/// Parses the seed of random numbers.
 pub(crate) fn seed(text: &str) -> Result<u64, String> {
     whole(text, 0, u64::MAX)
 }
@@ -61,7 +61,7 @@ pub(crate) fn margin(text: &str) -> Result<f32, String> {
     }
 }
 
-/// What a search says, with a way out that the program's user has.
+/// Returns the message of an error, with a remedy that the program's user has.
 pub(crate) fn search_text(error: &Error) -> String {
     let way_out = "for more, use the crate pbig-core with larger `Limits`";
     match error {

@@ -1,10 +1,10 @@
-//! What the program prints, and how it ends.
+//! The output of the program, and its exit status.
 
 use std::fmt;
 use std::io::{ErrorKind, IsTerminal, Write};
 use std::process::ExitCode;
 
-/// Why the program ends with a status other than 0.
+/// The reason why the program ends with a status other than 0.
 #[derive(Debug)]
 pub(crate) enum Failure {
     /// A check failed: status 1.

@@ -27,7 +27,7 @@ pub(crate) struct Args {
     json: bool,
 }
 
-/// What happened, frame by frame.
+/// The events, frame by frame.
 #[derive(Default)]
 struct Replay {
     lines: Vec<String>,

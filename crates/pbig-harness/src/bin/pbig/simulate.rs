@@ -106,10 +106,10 @@ fn failure_line(outcome: &Outcome) -> String {
     }
 }
 
-/// What did the work.
+/// The backend that did the work.
 #[derive(Default)]
 struct Did {
-    /// Why it was not the backend asked for.
+    /// The reason why it was not the wanted backend.
     fallback: Option<String>,
     adapter: Option<String>,
     /// Number of updates.

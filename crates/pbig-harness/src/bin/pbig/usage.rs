@@ -1,11 +1,11 @@
-//! What is wrong with the arguments, in one line as for any other bad input; clap's own message has several.
+//! Messages about the arguments, in one line as for any other bad input; clap's own have several.
 
 use crate::output::Failure;
 use clap::error::{ContextKind, ContextValue, ErrorKind};
 use std::error::Error;
 use std::ffi::OsString;
 
-/// What clap found, and the command whose options those are.
+/// Clap's finding, and the command whose options those are.
 pub(crate) fn failure(error: &clap::Error, cli: &clap::Command, first: Option<OsString>) -> Failure {
     let command = first.and_then(|name| cli.find_subcommand(name));
     let command = command.map_or(String::new(), |command| format!("{} ", command.get_name()));

@@ -238,7 +238,7 @@ fn notes(rows: &[Row]) -> Vec<String> {
     ]
 }
 
-/// Whether 16 bits would pay beside what is there: the code, with the exact test behind it.
+/// Says if 16 bits are faster than the present codes with the exact test behind them.
 fn verdict(rows: &[Row]) -> String {
     let best = (1..KINDS.len() - 1).min_by(|&a, &b| mean(rows, a).time.total_cmp(&mean(rows, b).time));
     let best = best.unwrap_or(1);

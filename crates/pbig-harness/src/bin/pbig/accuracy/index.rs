@@ -78,7 +78,7 @@ impl Found {
     }
 }
 
-/// What comes of all pairs, for many n.
+/// The counts of all pairs, for many n.
 struct Every {
     way: Way,
     /// Every n, ascending.
@@ -87,7 +87,7 @@ struct Every {
     tallies: [Tally; 3],
     /// The smallest n with a wrong pair.
     first: [Option<i64>; 3],
-    /// What the ends of rows alone would have shown.
+    /// The counts of the ends of rows alone.
     at_ends: [Shown; 3],
 }
 

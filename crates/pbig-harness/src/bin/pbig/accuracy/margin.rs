@@ -1,4 +1,4 @@
-//! How far a stored box reaches beyond its collider: the wider, the fewer boxes change and the more pairs are extra.
+//! The study of the margin: with a wider one fewer boxes change and more pairs are extra.
 
 mod boxes;
 mod tally;
@@ -118,7 +118,7 @@ fn table(rows: &[Row]) -> Table {
     table
 }
 
-/// What is compared.
+/// A compared time.
 struct Time {
     what: &'static str,
     /// Of the shorter time of each step.

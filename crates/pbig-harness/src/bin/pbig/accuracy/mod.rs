@@ -82,7 +82,7 @@ fn told_quick(quick: &Result<Option<f64>, Failure>) -> Option<Result<f64, String
     quick.as_ref().map_err(Failure::to_string).copied().transpose()
 }
 
-/// How long a run has taken, and how long the same takes with `--quick`, where that is told.
+/// The time of a run, and the time of the same run with `--quick`, if it is reported.
 struct Took {
     seconds: f64,
     is_quick: bool,
@@ -90,7 +90,7 @@ struct Took {
 }
 
 impl Took {
-    /// What is promised of the run.
+    /// Returns the promised maximum of the run, in seconds.
     fn most_seconds(&self) -> f64 {
         MOST_SECONDS[usize::from(self.is_quick)]
     }
@@ -116,7 +116,7 @@ impl Took {
     }
 }
 
-/// How long all studies take with `--quick`: a run without it tells that too, as that one writes no document.
+/// Returns the time of all studies with `--quick`. A full run reports it, because a quick one writes no document.
 fn quick_seconds() -> Result<f64, Failure> {
     let clock = Instant::now();
     STUDIES.iter().try_for_each(|(_, run)| run(true).map(|_| ()))?;

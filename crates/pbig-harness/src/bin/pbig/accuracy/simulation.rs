@@ -1,4 +1,4 @@
-//! What becomes of a scene with pbig's broad phase instead of rapier's own: contacts, energy, and where bodies go.
+//! Scenes with pbig's broad phase instead of rapier's own: contacts, energy, and the paths of bodies.
 //! Events come in another order, so rapier solves contacts in another order; how far that leads is held against what
 //! another order of insertion does, and what our order of events does to rapier's own broad phase.
 

@@ -1,4 +1,4 @@
-//! What a study has found: tables of typed values, what a reader must know, and points of time against error.
+//! The results of a study: tables of typed values, notes for the reader, and points of time against error.
 
 use pbig_harness::chart::{Line, Pareto};
 use serde_json::{Map, Value, json};
@@ -131,7 +131,7 @@ impl Table {
     }
 }
 
-/// What something costs, and how wrong it is.
+/// The cost of something, and its error.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Point {
     /// Points of one series have one colour, and may be joined in the order given.
@@ -148,14 +148,14 @@ pub(super) struct Study {
     pub(super) name: &'static str,
     /// Above its part of the document, and above the chart.
     pub(super) title: &'static str,
-    /// What a reader must know and what it shows, a line each.
+    /// Notes for the reader and findings, a line each.
     pub(super) notes: Vec<String>,
     pub(super) tables: Vec<Table>,
     /// The chart's axes, with their units.
     pub(super) time: &'static str,
     pub(super) error: &'static str,
     pub(super) points: Vec<Point>,
-    /// Whether the points of a series are joined: where the order means something.
+    /// True if the points of a series are joined, because their order means something.
     pub(super) joined: bool,
 }
 

@@ -51,7 +51,7 @@ fn rows(worlds: &[World]) -> Result<Vec<Row>, Failure> {
     places.map(|(world, (offset, along))| Row::new(world, offset, along)).collect()
 }
 
-/// What has been proved must hold: no pair is missed by boxes that are widened by 2 ulps, at the poses that rapier
+/// Checks the proved statements: no pair is missed by boxes that are widened by 2 ulps, at the poses that rapier
 /// holds; by 3, in the world; by boxes in f64 that are rounded outward; nor, at the poses, as far out as the margin
 /// does.
 fn check(row: &Row) -> Result<(), Failure> {

@@ -24,7 +24,7 @@ struct Row {
     gpu: Spread,
     /// None has, so nothing is sent.
     still: Spread,
-    /// Of the last call with all boxes moved.
+    /// The report on the last call with all boxes moved.
     report: GpuReport,
 }
 
@@ -111,7 +111,7 @@ fn time(finder: &mut Finder, boxes: &[Aabb], name: &str) -> Result<f64, Failure>
     found.map_err(|error| Failure::Input(format!("{name} {}: {error}", boxes.len())))
 }
 
-/// What the device did; a call that it left to the CPU is no measurement.
+/// Returns the report of the device. A call that it left to the CPU is no measurement, but an error.
 fn did(finder: &Finder, name: &str, n: usize) -> Result<GpuReport, Failure> {
     let report = finder.report();
     let why = || report.fallback.clone().unwrap_or_default();

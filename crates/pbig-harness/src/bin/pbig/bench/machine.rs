@@ -1,4 +1,4 @@
-//! What the times were measured on.
+//! The machine on which times are measured.
 
 use crate::doctor::simd_found;
 use serde_json::{Value, json};

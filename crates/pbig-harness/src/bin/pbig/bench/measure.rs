@@ -9,17 +9,17 @@ pub(crate) const MOST_SECONDS: [f64; 2] = [1200.0, 60.0];
 
 /// Sides that do the same work, round by round.
 pub(crate) trait Contest {
-    /// How many take part.
+    /// Returns the number of sides.
     fn sides(&self) -> usize;
 
-    /// What comes before a round and is not measured.
+    /// Prepares a round. This is not measured.
     fn prepare(&mut self, round: usize);
 
     /// One side's work in this round, and its milliseconds.
     fn run(&mut self, side: usize) -> Result<f64, Failure>;
 }
 
-/// How long to measure.
+/// The length of a measurement.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Effort {
     /// Rounds that do not count: they allocate, fill caches, and learn how boxes move.
@@ -39,11 +39,11 @@ impl Effort {
     }
 }
 
-/// What a side took: milliseconds.
+/// The times of a side, in milliseconds.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Took {
     pub(crate) median: f64,
-    /// Of all rounds: work that is done in one round for many has its part in this.
+    /// The mean of all rounds. It includes its share of work that one round does for many.
     pub(crate) mean: f64,
 }
 
@@ -52,7 +52,7 @@ pub(crate) fn medians(contest: &mut impl Contest, effort: Effort) -> Result<Vec<
     Ok(measured(contest, effort)?.iter().map(|took| took.median).collect())
 }
 
-/// What each side took. The sides change places from round to round, as the first in a round warms
+/// Measures the sides. They change places from round to round, as the first in a round warms
 /// the caches for the next: a side's median is the mean, over its places, of its median there.
 pub(crate) fn measured(contest: &mut impl Contest, effort: Effort) -> Result<Vec<Took>, Failure> {
     let sides = contest.sides();

@@ -1,4 +1,4 @@
-//! How much memory finding pairs takes, measured in a process that does nothing else.
+//! The memory that finding pairs takes, measured in a process that does nothing else.
 
 use super::table::{Row, Target, Unit};
 use crate::output::{Failure, print};
@@ -11,7 +11,7 @@ use std::process::Command;
 /// Updates of the incremental probes: enough for every buffer to reach its size.
 const UPDATES: usize = 30;
 
-/// How far a box moves in one.
+/// The distance that a box moves in one update.
 const STEP: f32 = 0.1;
 
 #[derive(clap::Args)]
@@ -19,7 +19,7 @@ pub(crate) struct Args {
     /// Which way in.
     #[arg(value_enum)]
     way: Way,
-    /// How many boxes, of the set `unit`.
+    /// Number of boxes, of the set `unit`.
     boxes: usize,
 }
 
@@ -35,7 +35,7 @@ enum Way {
     Scratch,
 }
 
-/// How boxes move: each so many-th, by so much, by its id and the update.
+/// The motion of boxes: each so many-th, by so much, by its id and the update.
 #[derive(Clone, Copy)]
 pub(super) struct Motion {
     one_in: usize,

@@ -23,7 +23,7 @@ use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 use table::Row;
 
-/// Where documents are kept, in the project's folder; the results are in a folder in it.
+/// The folder of documents in the project; results are in a folder in it.
 pub(crate) const DOCUMENTS: &str = "docs/benchmarks";
 
 #[derive(clap::Args)]
@@ -63,10 +63,10 @@ enum Suite {
     Gpu,
 }
 
-/// What a suite found out.
+/// The results of a suite.
 struct Outcome {
     rows: Vec<Row>,
-    /// What a reader must know to read the rows, a line each.
+    /// Notes that a reader of the rows needs, a line each.
     notes: Vec<String>,
     charts: Vec<LogLog>,
 }

@@ -11,7 +11,7 @@ use pbig_harness::boxes::{BoxSet, Wander};
 use rayon::{ThreadPool, ThreadPoolBuilder};
 use trees::{Obvhs, Parry, Refit, parry_rebuilt};
 
-/// How far a box of a set moves between two frames, along each axis: what is settled hardly does.
+/// Returns the distance that a box of a set moves between two frames, along each axis. Settled boxes hardly move.
 fn distance(set: &str) -> f32 {
     if set == "pile" { 0.02 } else { 0.1 }
 }
@@ -99,7 +99,7 @@ fn notes() -> Vec<String> {
     ]
 }
 
-/// How boxes move.
+/// The motion of boxes.
 #[derive(Clone, Copy)]
 enum Motion {
     /// A share of them, to and fro.
@@ -113,7 +113,7 @@ struct Frames {
     wander: Wander,
     moved: Vec<u32>,
     ours: BroadPhase,
-    /// The same again, on one thread.
+    /// Ours once more, on one thread.
     lone: BroadPhase,
     pool: ThreadPool,
     trees: Vec<Parry>,
@@ -220,7 +220,7 @@ struct Scratch {
     for_parry: Vec<parry_peer::bounding_volume::Aabb>,
     ours: Finder,
     obvhs: Obvhs,
-    /// What each side found last.
+    /// Number of pairs that each side found last.
     pairs: [usize; 3],
     found: Vec<(u32, u32)>,
 }

@@ -1,4 +1,4 @@
-//! How often a broad phase in steady state asks for memory. On one thread it should never do so. On several, rayon asks for
+//! The number of requests for memory of a broad phase in steady state. On one thread it should be zero. On several, rayon asks for
 //! memory to hand work from thread to thread.
 
 use super::memory::{Motion, Moving};

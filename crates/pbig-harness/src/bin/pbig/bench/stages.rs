@@ -10,7 +10,7 @@ use pbig_harness::chart::{Line, LogLog};
 use pbig_harness::runner::{Spread, milliseconds};
 use pbig_harness::study::algorithm;
 
-/// How far a box moves between two frames, along each axis; edges are around 1.
+/// The distance that a box moves between two frames, along each axis; edges are around 1.
 const DISTANCE: f32 = 0.1;
 
 const CONFIG: Config = Config { limits: Limits::UNLIMITED, order: Order::Unspecified, ..Config::DEFAULT };
@@ -32,20 +32,20 @@ pub(super) struct Alone {
     wander: Wander,
     moved: Vec<u32>,
     times: Vec<Times>,
-    /// What the plan chose, round by round.
+    /// The algorithm of each round.
     chosen: Vec<&'static str>,
 }
 
-/// What the rounds took, and what they were.
+/// The times of the rounds, and their algorithms.
 pub(super) struct Measured {
     pub(super) median: Times,
     pub(super) mean: Times,
     pub(super) pairs: u64,
-    /// What the plan chose, and how often.
+    /// The algorithms, and the number of rounds of each.
     pub(super) chosen: String,
 }
 
-/// How often each name occurs, the most frequent first.
+/// Counts each name, and lists the most frequent first.
 pub(super) fn counted(names: &[&'static str]) -> String {
     let mut counts: Vec<(&str, usize)> = vec![];
     for name in names {
@@ -138,7 +138,7 @@ impl Contest for Alone {
     }
 }
 
-/// What is varied, and the boxes at each value.
+/// The varied quantity, and the boxes at each value.
 struct Sweep {
     name: &'static str,
     /// Along the x axis; also in the rows' case.

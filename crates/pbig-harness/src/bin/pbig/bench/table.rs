@@ -3,7 +3,7 @@
 use super::measure::Took;
 use serde_json::{Map, Value, json};
 
-/// What a row is printed in; times are kept in milliseconds, memory in MB, and some are plain counts.
+/// The unit of a printed row. Times are kept in milliseconds, memory in MB, and some are plain counts.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Unit {
     Ms,
@@ -36,7 +36,7 @@ impl Unit {
     }
 }
 
-/// What a row should show.
+/// The target of a row.
 #[derive(Clone, Copy)]
 pub(crate) enum Target {
     /// So many times faster than the other.
@@ -107,13 +107,13 @@ impl Row {
         Self { note: Some(note.into()), ..self }
     }
 
-    /// How many times as much the other takes.
+    /// Returns the ratio of the other to ours.
     pub(crate) fn ratio(&self) -> Option<f64> {
         // No clock means 0.
         Some(self.other?.1 / self.ours?.max(1e-9))
     }
 
-    /// What ours takes for each box and each pair.
+    /// Returns the cost of ours for each box and each pair.
     pub(crate) fn cost(&self) -> Option<f64> {
         Some(self.ours? / (self.boxes as u64 + self.pairs).max(1) as f64)
     }
@@ -206,7 +206,7 @@ pub(crate) fn text(rows: &[Row]) -> String {
     lines.iter().map(line).collect::<Vec<_>>().join("\n")
 }
 
-/// The same for a document.
+/// Returns the rows as a table for a document.
 pub(crate) fn markdown(rows: &[Row]) -> String {
     let line = |cells: [String; 9]| format!("| {} |\n", cells.join(" | "));
     let rule = HEAD.map(|_| "---".to_owned());
@@ -214,7 +214,7 @@ pub(crate) fn markdown(rows: &[Row]) -> String {
     all.map(line).collect()
 }
 
-/// How many targets there are and how many are met, and the row that is worst for us.
+/// Returns the number of targets, the number of targets that are met, and the row that is worst for us.
 pub(crate) fn summary(rows: &[Row]) -> Vec<String> {
     let judged: Vec<&Row> = rows.iter().filter(|row| row.met().is_some()).collect();
     let met = judged.iter().filter(|row| row.met() == Some(true)).count();

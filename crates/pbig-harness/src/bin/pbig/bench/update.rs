@@ -13,7 +13,7 @@ use rapier3d::prelude::*;
 use rayon::prelude::*;
 use std::hint::black_box;
 
-/// How far the boxes of these sets, with edges of 1 to 100, move in a frame: far beyond any margin.
+/// The distance that boxes of these sets, with edges of 1 to 100, move in a frame: far beyond any margin.
 const DISTANCE: f32 = 1.0;
 
 /// Calls in which nothing has moved are measured together: one is shorter than a clock can tell.

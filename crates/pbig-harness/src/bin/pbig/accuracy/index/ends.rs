@@ -1,4 +1,4 @@
-//! What the ends of rows show of all pairs: on the CPU both are looked at; as kernels, for every n, the ends alone.
+//! The ends of rows as a sample of all pairs. The CPU tests both; kernels test the ends alone, for every n.
 
 use super::super::study::Cell;
 use super::Every;
@@ -43,7 +43,7 @@ pub(super) fn shown(way: &Way, n: i64, tallies: &[Tally; 3]) -> [Shown; 3] {
     })
 }
 
-/// How far ends stand for all pairs, and where they did not.
+/// Says how well the ends stand for all pairs, and where they do not.
 pub(super) fn note(every: &[Every]) -> String {
     let most = every.iter().map(Every::most).max().unwrap_or(0);
     let inside = told(every, |_, shown| (shown.inside > 0).then_some([shown.inside, shown.wrong]));

@@ -3,7 +3,7 @@
 use pbig_harness::index::{EXACT, Exact, Tally};
 use rayon::prelude::*;
 
-/// What comes of all pairs, for some n.
+/// The counts of all pairs, for some n.
 pub(super) struct Exactly {
     pub(super) name: &'static str,
     pub(super) values: u64,
@@ -47,7 +47,7 @@ fn of(way: &Exact, boxes: &[i64], ends_up_to: i64) -> Exactly {
     Exactly { name: way.name, values: boxes.len() as u64, most, ends_up_to, tally, first }
 }
 
-/// What was looked at, in words.
+/// Says which pairs were tested.
 pub(super) fn told(exact: &[Exactly]) -> String {
     let names: Vec<&str> = exact.iter().map(|one| one.name).collect();
     let (values, most, ends_up_to) =

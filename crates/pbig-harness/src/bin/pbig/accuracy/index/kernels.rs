@@ -54,7 +54,7 @@ fn number(way: &Way) -> Option<u32> {
     }
 }
 
-/// What comes of the rows that a root estimates for some boxes.
+/// The rows that a root estimates for some boxes.
 pub(super) struct Estimates {
     n: u32,
     name: String,
@@ -161,7 +161,7 @@ fn parts(n: u32, all: u64) -> Vec<Indices> {
     }
 }
 
-/// What comes out of the run of a kernel, and the shortest time of some, less that of calls which compute none.
+/// Returns the output of a kernel and the shortest time of several runs, less the time of runs that compute nothing.
 fn timed_run(
     software: bool,
     run: impl Fn(u32) -> Result<Vec<u32>, Failure>,
@@ -229,7 +229,7 @@ fn sampled(n: u32, given: impl Iterator<Item = (u32, (i64, i64))>) -> Tally {
     tally
 }
 
-/// What was looked at as kernels, and what not.
+/// Says which ways were tested as kernels, and which were not.
 pub(super) fn notes(estimates: &[Estimates]) -> Vec<String> {
     let most = |number: u32| Root::all().find(|root| root.number == number).map_or(0, |r| r.most_boxes());
     let largest = estimates.iter().map(|one| one.n).filter(|n| *n <= MOST_WHOLE).max().unwrap_or(0);

@@ -1,4 +1,4 @@
-//! What the study of indices shows, in words.
+//! The findings of the study of indices, in words.
 
 use super::super::study::plain;
 use super::times::{Times, label};
@@ -35,7 +35,7 @@ pub(super) fn notes(found: &Found) -> Vec<String> {
     notes
 }
 
-/// Whether errors are what Avril says they are.
+/// Compares the errors with Avril's statement.
 fn doubled_note(Found { every, .. }: &Found) -> String {
     let told = every.iter().filter(|every| every.tallies[0].wrong > 0).map(|every| {
         let tally = every.tallies[0];
@@ -111,7 +111,7 @@ fn root_note(Found { every, counterexamples, .. }: &Found) -> String {
     )
 }
 
-/// How the lazy way compares with a root, over the paper's sizes.
+/// Compares the lazy way with a root, over the paper's sizes.
 fn lazy_note(found: &Found) -> String {
     let of_paper = |times: &&Times| paper::TABLE_2.iter().any(|row| row.0 == times.n as u64);
     let sizes: Vec<String> = found.times.iter().filter(of_paper).map(|times| times.n.to_string()).collect();
@@ -183,7 +183,7 @@ fn timed(found: &Found) -> Vec<String> {
     of_many(found).map(|times| times.n.to_string()).collect()
 }
 
-/// Whether the order depends on the number of boxes.
+/// Says if the order depends on the number of boxes.
 fn each_size_note(found: &Found) -> String {
     let right = right_ones(found);
     let first = |k: usize| right.iter().min_by(|a, b| a.1[k].total_cmp(&b.1[k]));

@@ -93,7 +93,7 @@ pub(super) fn table_3(quick: bool) -> Table {
     table
 }
 
-/// How many figures of the table are the paper's, by the number of steps: for each way to compute and to judge a root.
+/// Counts the figures that equal the paper's, by the number of steps, for each way to compute and to judge a root.
 pub(super) fn table_3_note(table: &Table) -> String {
     let told =
         |column: usize| (2..=4).map(|steps| agreement(table, steps, column)).collect::<Vec<_>>().join("; ");
@@ -123,7 +123,7 @@ fn agreement(table: &Table, steps: u64, column: usize) -> String {
     format!("{right} of {} with {steps} steps{most}", rows.len())
 }
 
-/// Whether a row of ours is the paper's to 0.0001%.
+/// Returns true if a row of ours equals the paper's to 0.0001%.
 fn is_papers(row: &[Cell], column: usize) -> bool {
     match (&row[3], &row[column]) {
         (Cell::Number(paper), Cell::Number(ours)) => (paper - ours).abs() < 1e-4,
@@ -131,7 +131,7 @@ fn is_papers(row: &[Cell], column: usize) -> bool {
     }
 }
 
-/// How many times as long as the processor's root each number of steps takes here, at most numbers, and as printed.
+/// Compares each number of steps with the processor's root: here, at most numbers, and as printed.
 pub(super) fn table_4_note(table: &Table) -> String {
     let number = |column: usize| match table.rows.last().map(|row| &row[column]) {
         Some(Cell::Number(ms)) => *ms,

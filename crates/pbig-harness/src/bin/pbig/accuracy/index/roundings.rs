@@ -1,4 +1,4 @@
-//! Whether any rounding of Newton's steps gives Avril's table 3.
+//! A search for a rounding of Newton's steps that gives Avril's table 3.
 
 use super::paper::TABLE_3;
 use pbig_harness::index::{CARMACK, Form, LOMONT, Newton, Rounded, SingleRoot, Step, WideNewton};
@@ -85,7 +85,7 @@ fn rows(way: &Rounded, (magic, column): (u32, usize), steps: u32, most: usize) -
     (0..most).take_while(is_printed).count()
 }
 
-/// What rounding can tell of the table.
+/// Says how far rounding explains the table.
 pub(super) fn note() -> String {
     let forms = Form::ALL.map(|form| (form.name(), found(form)));
     let told = forms.map(|(name, counts)| {
@@ -108,7 +108,7 @@ pub(super) fn note() -> String {
     )
 }
 
-/// Whether two forms have the same counts.
+/// Says if two forms have the same counts.
 fn alike(forms: &[(&str, Counts); 3]) -> String {
     match forms {
         [_, (up, one), (reciprocal, other)] if one == other => {
@@ -151,7 +151,7 @@ fn wrong(root: fn(f32) -> f32) -> [u32; 3] {
     [all, squares, (1..=(TESTS - 1).isqrt()).map(ulps).max().unwrap_or(0)]
 }
 
-/// What is wrong with three steps, and how many squares the paper's figures would be.
+/// Says which roots are wrong with three steps, and how many squares the paper's figures would be.
 pub(super) fn squares_note() -> String {
     let told = [
         ("in f64", WideNewton::<CARMACK, 3>::root as fn(f32) -> f32),
@@ -177,7 +177,7 @@ pub(super) fn squares_note() -> String {
     )
 }
 
-/// Whether numbers of wrong ones could be of squares alone: by tests, wrong ones, squares.
+/// Says if the wrong ones could be squares alone. Each entry: tests, wrong ones, squares.
 fn only_squares(papers: &[(u32, u32, u32)]) -> String {
     let beyond: Vec<_> =
         papers.iter().filter(|(_, wrong, squares)| wrong > squares).map(|row| row.0.to_string()).collect();

@@ -15,7 +15,7 @@ pub(super) struct Searched {
 }
 
 impl Searched {
-    /// What the rules give at the ends of rows, in words.
+    /// Describes the results of the rules at the ends of rows.
     pub(super) fn ends(&self) -> String {
         match self.found {
             Some(it) => format!("at the ends of rows they are wrong from n = {} on", it.n),
@@ -136,7 +136,7 @@ fn harmless_below(way: &Way) -> i64 {
     (1.0 / ((way.worst_relative)() + roundings)) as i64
 }
 
-/// Whether the first n of those whose pairs were all looked at is another one than at the ends of rows.
+/// Returns true if the first wrong n differs between all pairs and the ends of rows.
 fn differ(every: &Every, ends: Option<i64>) -> bool {
     let all = every.first[1];
     let is_earlier = all.is_some_and(|n| ends.is_none_or(|at_ends| n < at_ends));

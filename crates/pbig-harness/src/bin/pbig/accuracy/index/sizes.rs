@@ -39,7 +39,7 @@ impl Size {
         Self { n, way: 0, looked: Looked::AtSome([wrong; 3]) }
     }
 
-    /// Whether nothing that was looked at is wrong after a correction.
+    /// Returns true if no tested pair is wrong after a correction.
     pub(super) fn is_right(&self, correction: usize) -> bool {
         match &self.looked {
             Looked::AtAll(tallies) => tallies[correction].wrong == 0,

@@ -9,7 +9,7 @@ use pbig_harness::boxes::{BoxSet, Wander};
 use pbig_harness::reported::Reported;
 use pbig_harness::runner::StepTime;
 
-/// How boxes move, each by up to this along each axis, in edges: as fast as things that fall, or as little as what
+/// The motions: the largest distance along each axis, in edges. As fast as things that fall, or as little as a thing that
 /// leans on something.
 const MOTIONS: [(&str, f32, Start); 2] =
     [("drifting", 0.02, Wander::drifting), ("trembling", 0.004, |boxes, by| Wander::new(boxes, 1.0, by))];

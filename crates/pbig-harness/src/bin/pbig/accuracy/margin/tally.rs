@@ -1,4 +1,4 @@
-//! What each margin has cost and done: the same rounds several times over, all margins in turn in each round.
+//! The times and pairs of each margin: the same rounds several times over, all margins in turn in each round.
 
 use crate::bench::measure::{Contest, Effort, medians};
 use crate::output::Failure;
@@ -35,7 +35,7 @@ pub(super) struct Tally {
 }
 
 impl Tally {
-    /// Whether pairs are compared in the round that is under way.
+    /// Returns true if pairs are compared in this round.
     pub(super) fn compares(round: usize) -> bool {
         round >= WARM_UP && (round + 1).is_multiple_of(COMPARED)
     }
@@ -87,7 +87,7 @@ pub(super) trait Tallied: Contest {
     fn tallies(self) -> Vec<Tally>;
 }
 
-/// What the passes have given.
+/// The results of the passes.
 pub(super) struct Passes {
     /// By margin.
     pub(super) tallies: Vec<Tally>,

@@ -1,4 +1,4 @@
-//! Whether the default margin is the right one, as far as the times can tell.
+//! The verdict on the default margin, as far as times can tell.
 
 use super::tally::MARGINS;
 use super::{Row, STEP, Time, default_margin, fastest, largest_extra};
@@ -81,7 +81,7 @@ impl Rival {
         self.margin == default_margin()
     }
 
-    /// Whether it is faster than the default by more than the noise.
+    /// Returns true if it is faster than the default by more than the noise.
     fn is_better(&self) -> bool {
         !self.is_default() && self.longer > self.noise
     }
@@ -99,7 +99,7 @@ impl Rival {
     }
 }
 
-/// How the default is chosen, and what the times say to that.
+/// Says how the default was chosen, and compares that with the times.
 pub(super) fn criterion(rows: &[Row]) -> String {
     format!(
         "Criterion. The default, {}, is what rapier's own broad phase has. Another margin would replace it if it made the \

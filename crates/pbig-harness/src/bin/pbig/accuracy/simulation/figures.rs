@@ -37,7 +37,7 @@ pub(super) struct Figures {
     pub(super) awake: f64,
     /// Pairs that ended while their colliders touched.
     pub(super) parted: u64,
-    /// How many there were.
+    /// Number of steps.
     pub(super) steps: usize,
     /// At the end.
     pub(super) moving: Moving,
@@ -102,7 +102,7 @@ impl Figures {
     }
 }
 
-/// What all percentages of energy are of.
+/// Returns the energy to which all percentages refer.
 fn first_energy(all: &[Mechanics]) -> f64 {
     all.first().map_or(1.0, |m| m.energy().abs()).max(f64::MIN_POSITIVE)
 }
@@ -146,7 +146,7 @@ pub(super) struct Quantity {
     pub(super) name: &'static str,
     /// None where it has no meaning.
     pub(super) of: fn(&Figures) -> Option<f64>,
-    /// Whether it came about in a run: where in neither of two, there is nothing to compare.
+    /// Returns true if the quantity occurred in a run. If it did in neither of two, there is nothing to compare.
     came: fn(&Figures) -> bool,
     /// Less is no difference.
     resolution: f64,
@@ -156,7 +156,7 @@ const fn quantity(name: &'static str, of: fn(&Figures) -> Option<f64>) -> Quanti
     Quantity { name, of, came: |_| true, resolution: 0.0 }
 }
 
-/// How far bodies have come from those of the first way.
+/// The mean distance of bodies from those of the first way.
 pub(super) const DISTANCE: Quantity = quantity("mean distance at the end", |f| Some(f.apart.mean));
 
 /// All in which runs are compared.
@@ -178,16 +178,16 @@ pub(super) const QUANTITIES: [Quantity; 10] = [
     quantity("largest distance at the end", |f| Some(f.apart.max)),
 ];
 
-/// How far a run is from the first one in a quantity.
+/// The distance of a run from the first one in a quantity.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Multiple {
     /// As a multiple of the farthest of the yardsticks. None where the quantity came about in neither run.
     pub(super) times: Option<f64>,
     /// The run's, the first one's, and that of the yardstick that is farthest from the first.
     pub(super) values: [f64; 3],
-    /// How many of the yardsticks are nearer to the first than the run, by more than the resolution.
+    /// Number of yardsticks that are nearer to the first than the run, by more than the resolution.
     pub(super) nearer: usize,
-    /// Whether the run and all yardsticks are as far from the first, so that none of them could be the farthest.
+    /// True if the run and all yardsticks are equally far from the first, so that none is the farthest.
     pub(super) is_tied: bool,
 }
 

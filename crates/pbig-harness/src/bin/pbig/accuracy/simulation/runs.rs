@@ -5,7 +5,7 @@ use super::Ways;
 use super::figures::Figures;
 use super::sides::{PERMUTED, WAYS, Way};
 
-/// What is told of the permuted runs, column by column: of their values in order, the first, the middle and the last.
+/// The columns about permuted runs: the first, the middle and the last of their sorted values.
 const OF_PERMUTED: [(&str, usize); 3] = [("least", 0), ("median", PERMUTED / 2), ("most", PERMUTED - 1)];
 
 pub(super) fn table(scenes: &[Ways]) -> Table {

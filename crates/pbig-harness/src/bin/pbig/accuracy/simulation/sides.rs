@@ -14,7 +14,7 @@ use rapier_pbig::{PbigBroadPhase, PbigConfig};
 use rapier3d::prelude::*;
 use std::hash::{DefaultHasher, Hash, Hasher};
 
-/// What is in another order than rapier's own broad phase has it in the scene.
+/// The things whose order differs from rapier's own broad phase in the scene.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Order {
     /// Bodies, as they are inserted; of a seed.
@@ -49,7 +49,7 @@ const fn again(name: &'static str, way: Way) -> Way {
 }
 
 const STOCK: Way = stock("stock", None);
-/// What tells how much of a difference is that of the order of events.
+/// The control that shows which part of a difference is due to the order of events.
 const SORTED: Way = stock("stock sorted", Some(Order::Sorted));
 const PBIG: Way = pbig("pbig", PbigConfig::DEFAULT.margin);
 
@@ -81,7 +81,7 @@ impl Way {
         self.margin.is_some()
     }
 
-    /// What the chart calls it: runs with one broad phase are of one kind, whatever their order and however often.
+    /// Returns its name in the chart. Runs with one broad phase are of one kind, in any order and number.
     pub(super) fn kind(&self) -> &'static str {
         match self.margin {
             None => STOCK.name,
@@ -166,7 +166,7 @@ fn cloud(bodies: usize) -> World {
     world
 }
 
-/// What one way has come to after a step.
+/// The state of one way after a step.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Sample {
     pub(super) mechanics: Mechanics,

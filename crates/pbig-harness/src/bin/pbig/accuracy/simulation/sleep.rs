@@ -5,7 +5,7 @@ use super::Ways;
 use super::figures::Figures;
 use rapier3d::prelude::RigidBodyActivation;
 
-/// Where no run falls asleep there is nothing to tell.
+/// Describes the runs that fall asleep; nothing if there is none.
 pub(super) fn note(scenes: &[Ways]) -> String {
     let told = |tell: fn(&Ways) -> Option<String>| {
         let told: Vec<String> = scenes.iter().filter_map(tell).collect();

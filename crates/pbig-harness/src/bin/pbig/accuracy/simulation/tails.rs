@@ -6,7 +6,7 @@ use super::Ways;
 use super::figures::{Figures, Multiple, QUANTITIES, Quantity, multiple};
 use super::sides::{PERMUTED, WAYS, Way};
 
-/// How a run in a place stands among others of its scene, where that has a meaning and not all are as far from stock.
+/// Returns the standing of a run among others of its scene; none if it has no meaning or all are equally far from stock.
 fn standing(ways: &Ways, place: usize, others: &[usize], quantity: Quantity) -> Option<Multiple> {
     let others: Vec<&Figures> = others.iter().map(|&other| &ways.runs[other]).collect();
     let found = multiple(&ways.runs[place], ways.first(), &others, quantity)?;

@@ -1,4 +1,4 @@
-//! What whole runs show, in words.
+//! The findings of whole runs, in words.
 
 use super::super::study::plain;
 use super::Ways;
@@ -97,7 +97,7 @@ fn without_mean(times: &[f64]) -> impl Iterator<Item = String> {
     told.into_iter().flatten()
 }
 
-/// How many scenes have just this multiple; none: nothing is to be told.
+/// Counts the scenes with just this multiple; none if there is no such scene.
 fn scenes_with(value: f64, times: &[f64]) -> Option<String> {
     match times.iter().filter(|times| **times == value).count() {
         0 => None,
@@ -106,7 +106,7 @@ fn scenes_with(value: f64, times: &[f64]) -> Option<String> {
     }
 }
 
-/// Whether the same run is the same, of a way that was run twice.
+/// Compares the two runs of a way that was run twice.
 fn again(scenes: &[Ways], way: &str) -> Option<String> {
     let mut others = Vec::new();
     for Ways { scene, repeats, .. } in scenes {

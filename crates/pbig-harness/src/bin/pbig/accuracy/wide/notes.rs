@@ -1,4 +1,4 @@
-//! What the rows show, in words.
+//! The findings of the rows, in words.
 
 use super::OFFSETS;
 use super::place::{AT_POSES, Along, IN_WORLD, Row, WAYS, Way};
@@ -11,7 +11,7 @@ pub(super) fn is_crowd(row: &Row) -> bool {
     row.world.starts_with("crowd") && row.along == Along::Diagonal
 }
 
-/// How far from the origin the margin covers what rounding takes off a box and off the margin itself: 2 ulps, which
+/// Returns the distance from the origin up to which the margin covers the loss by rounding, its own included: 2 ulps, which
 /// are 2^-22 of the distance at most.
 pub(super) fn covered() -> f64 {
     f64::from(PbigConfig::DEFAULT.margin) * 2f64.powi(22)
@@ -115,7 +115,7 @@ fn ulps_note(rows: &[Row]) -> String {
     )
 }
 
-/// Where the world that rapier holds is another one.
+/// Describes the places at which the world that rapier holds is another one.
 fn world_note(rows: &[Row]) -> String {
     let wrong = |row: &Row| row.wrong_percent(Way::Ulps(0));
     let largest = |percent: f64| {
@@ -130,7 +130,7 @@ fn world_note(rows: &[Row]) -> String {
     )
 }
 
-/// What widening adds to the crowd.
+/// Describes the cost of widening in the crowd.
 fn cost_note(rows: &[Row], timed: &[(f64, Vec<Time>)]) -> String {
     let at = |way: Way| ways().position(|one| one == way).unwrap_or(0);
     let mean = |way: Way| {

@@ -7,7 +7,7 @@ use pbig_harness::wide::{Differences, Layout, Pose, Truth, Wide, doubt, to_f32, 
 use rapier_pbig::{PbigConfig, collision_aabb};
 use rapier3d::prelude::{Collider, IntegrationParameters, RigidBodySet};
 
-/// How boxes in f32 are made.
+/// The way to make boxes in f32.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Way {
     /// Rapier's, widened by so many ulps.
@@ -30,10 +30,10 @@ pub(super) const WAYS: [Way; 8] = [
     Way::Margin(2),
 ];
 
-/// What misses nothing at the poses that rapier holds.
+/// The way that misses nothing at the poses that rapier holds.
 pub(super) const AT_POSES: Way = Way::Ulps(2);
 
-/// What misses nothing of the world, whose poses are in f64.
+/// The way that misses nothing of the world, whose poses are in f64.
 pub(super) const IN_WORLD: Way = Way::Ulps(3);
 
 impl Way {
@@ -60,7 +60,7 @@ pub(super) struct World {
     /// About how large its shapes are.
     pub(super) size: f64,
     pub(super) layout: Layout,
-    /// Whether it is moved along one axis, too.
+    /// True if it is moved along one axis, too.
     pub(super) along_x: bool,
 }
 
@@ -154,7 +154,7 @@ impl<'a> Place<'a> {
         rapiers(&self.params, self.colliders.iter(), ulps)
     }
 
-    /// How the pairs of boxes in f32 differ from those in f64: at the poses that rapier holds, and in the world.
+    /// Compares the pairs of boxes in f32 with those in f64: at the poses that rapier holds, and in the world.
     fn differences(&self, way: Way) -> Result<[Differences; 2], Failure> {
         let mut finder = finder();
         let found = finder.find(&self.boxes(way));
@@ -162,7 +162,7 @@ impl<'a> Place<'a> {
         Ok([&self.held, &self.world].map(|truth| truth.differences(found, self.reach())))
     }
 
-    /// How far a bound of rapier's boxes ends inside that in f64 at most, in ulps as [`widened_by_ulps`] has them.
+    /// Returns the largest distance by which a bound of rapier's boxes ends inside the one in f64, in ulps of [`widened_by_ulps`].
     fn shortfall(&self) -> f64 {
         let short = |((wide, aabb), collider): ((&Wide, &Aabb), &Collider)| {
             let units = units(aabb, collider);
@@ -209,7 +209,7 @@ pub(super) fn ulp(x: f64) -> f64 {
     f64::from(f32::EPSILON) * x.abs().log2().floor().exp2()
 }
 
-/// What became of a world at a place.
+/// The results of a world at a place.
 #[derive(Clone)]
 pub(super) struct Row {
     pub(super) world: &'static str,
@@ -282,7 +282,7 @@ impl Row {
         (missed + added) as f64 / self.pairs.max(1) as f64 * 100.0
     }
 
-    /// How many ulps at this distance the shapes are large.
+    /// Returns the size of the shapes in ulps at this distance.
     pub(super) fn size_in_ulps(&self) -> f64 {
         self.size / ulp(self.offset.max(self.size))
     }

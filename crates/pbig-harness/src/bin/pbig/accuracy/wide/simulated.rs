@@ -16,7 +16,7 @@ use rapier_pbig::PbigBroadPhase;
 use rapier3d::prelude::{BroadPhase, Collider, DefaultBroadPhase};
 pub(super) use tables::tables;
 
-/// What moves.
+/// The moving things.
 #[derive(Clone, Copy)]
 struct Scenery {
     scene: &'static str,
@@ -53,7 +53,7 @@ pub(super) struct Simulated {
     own: [Own; KINDS.len()],
 }
 
-/// What has become of a world that rapier simulates in f32.
+/// The state of a world that rapier simulates in f32.
 #[derive(Clone, Copy, Debug, Default)]
 struct Own {
     /// All steps together: its pairs against those of the one in f64.
@@ -160,7 +160,7 @@ impl Simulated {
     }
 }
 
-/// What the rows say, in words.
+/// Returns the findings of the rows, in words.
 pub(super) fn notes(all: &[Simulated]) -> Vec<String> {
     let mut names: Vec<&str> = all.iter().map(|one| one.row.world).collect();
     names.dedup();
@@ -211,7 +211,7 @@ fn beyond<'a>(mut all: impl Iterator<Item = &'a Simulated>, kind: usize, most: f
     first.map_or("nowhere".into(), |one| format!("from {:e} on", one.row.offset))
 }
 
-/// How far a world in f32 is from f64, over how far that of a control is.
+/// Compares the distance of a world in f32 from f64 with that of a control.
 fn over<'a>(all: impl Iterator<Item = &'a Simulated>, kind: usize, control: usize) -> String {
     let all: Vec<&Simulated> = all.collect();
     let ratios = |of: fn(&Simulated, usize) -> f64| {

@@ -1,4 +1,4 @@
-//! What boxes in f32 take, by way: computed and searched, in turn in one run.
+//! The times of boxes in f32, by way: computed and searched, in turn in one run.
 
 use super::place::{Place, WAYS, Way, finder};
 use crate::bench::measure::{Contest, Effort, medians, timed};

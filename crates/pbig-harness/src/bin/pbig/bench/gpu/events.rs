@@ -99,7 +99,7 @@ impl Race {
         Ok(Row { boxes, share, pairs, events, cpu, gpu, report })
     }
 
-    /// What the update took on either backend.
+    /// Returns the time of the update on each backend.
     fn round(&mut self, round: usize) -> Result<[Duration; 2], Failure> {
         let moved = self.wander.step(round);
         let boxes = &self.wander.boxes;
@@ -130,7 +130,7 @@ fn set(broad_phase: &mut BroadPhase, moved: &[u32], boxes: &[Aabb]) -> Result<()
     broad_phase.set_many(moved, |id| Some((boxes[id as usize], ProxyFilter::ALL))).map_err(failure)
 }
 
-/// What the device did; an update that it left to the CPU is no measurement.
+/// Returns the report of the device. An update that it left to the CPU is no measurement, but an error.
 fn did(broad_phase: &BroadPhase) -> Result<GpuReport, Failure> {
     let report = broad_phase.report();
     let why = || Failure::Check(format!("events: {}", report.fallback.as_deref().unwrap_or("on the CPU")));

@@ -67,7 +67,7 @@ fn rate(bytes: u64, us: f64) -> f64 {
     bytes as f64 / us / 1e3
 }
 
-/// What the printed times of table 5 say, as far as they do.
+/// Describes the printed times of table 5.
 fn about_rates() -> String {
     let large = AVRIL_5.iter().filter(|(n, ..)| *n >= 1000);
     let rates = large.flat_map(|&(n, byte, bit)| {

@@ -1,4 +1,4 @@
-//! Where a paper contradicts itself, is wrong or is silent, each with evidence that is computed here.
+//! Places where a paper contradicts itself, is wrong or is silent, each with evidence that is computed here.
 
 mod avril;
 

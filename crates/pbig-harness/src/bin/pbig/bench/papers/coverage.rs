@@ -71,7 +71,7 @@ fn furthest(off: impl Iterator<Item = f64>) -> f64 {
 /// Checks off by no more than this, in per cent, are the printed ones.
 const CLOSE: f64 = 1.0;
 
-/// Whether the printed "128 x 128 x 128" are lengths of cells or numbers of them.
+/// Says if the printed "128 x 128 x 128" are lengths of cells or numbers of them.
 fn about_lengths() -> String {
     let printed = || TABLE_III.iter().filter_map(|row| Some((row, row.cell?)));
     let as_length = furthest(printed().map(|(row, cell)| off_checks(row, cell)));

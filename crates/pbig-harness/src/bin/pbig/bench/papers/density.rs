@@ -162,7 +162,7 @@ fn verdict() -> String {
     )
 }
 
-/// What follows from the readings that fit, where they agree on it.
+/// Says in what the fitting readings agree.
 fn in_common(fits: &[&Reading]) -> String {
     let all = |holds: &dyn Fn(&Edges) -> bool| {
         fits.iter()

@@ -10,7 +10,7 @@ use std::time::Duration;
 
 pub(super) struct Device {
     gpu: Option<GpuFinder>,
-    /// Why there is none.
+    /// The reason why there is none.
     missing: String,
     quick: bool,
 }
@@ -145,7 +145,7 @@ pub(super) fn written(report: &Report) -> Option<u64> {
     (report.pairs > 0).then(|| (gpu.compression * 8.0 * report.pairs as f64).round() as u64)
 }
 
-/// What columns of bytes mean.
+/// Explains the columns of bytes.
 pub(super) fn about_bytes() -> &'static str {
     "Bytes written are the words of output of the kernels, what the papers' sizes are of. Bytes fetched are all that \
      comes back: with each chunk of work its counters and times, and words that are fetched before it is known how \

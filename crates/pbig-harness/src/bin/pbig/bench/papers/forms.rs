@@ -95,7 +95,7 @@ pub(super) fn on_cpu() -> Result<Sheet, Failure> {
     Ok(sheet)
 }
 
-/// What is written, what is read from it, and milliseconds of both.
+/// Returns the written bytes, the pairs read from them, and the milliseconds of both.
 fn measure(form: &Form, boxes: &[Aabb]) -> (Vec<u8>, Vec<Pair>, [f64; 2]) {
     let (mut out, mut pairs) = (vec![], vec![]);
     let (mut write, mut read) = (vec![], vec![]);

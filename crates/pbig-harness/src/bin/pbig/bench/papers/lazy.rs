@@ -80,7 +80,7 @@ const WAYS: [(&str, Search); 4] = [
 /// The last of [`WAYS`].
 const IS_LAZY: usize = WAYS.len() - 1;
 
-/// What one way came to.
+/// The results of one way.
 struct Took {
     found: u64,
     /// The shortest of the calls, for all ids.
@@ -110,7 +110,7 @@ impl Took {
         (self.ms, self.longest) = (self.ms.min(ms * times), self.longest.max(ms * times));
     }
 
-    /// Whether this way is faster than another: neither if calls of both overlap.
+    /// Returns true if this way is faster than another; none if the times of both overlap.
     fn is_faster(&self, other: &Self) -> Option<bool> {
         match () {
             () if self.longest < other.ms => Some(true),
@@ -176,7 +176,7 @@ fn row(printed: [f64; 4], all: &[Took]) -> serde_json::Value {
     printed.chain(times).chain(ratios).chain([pairs, share(first), share(lazy)]).collect()
 }
 
-/// What is measured, and what comes of the paper's claim.
+/// Describes the measurement, and the result for the paper's claim.
 fn abouts(rows: &[Vec<Took>], most: u64) -> [String; 3] {
     let (seconds, times) = AVRIL_LAZY_ON_CPU;
     let against = |way: usize| {
@@ -209,7 +209,7 @@ fn abouts(rows: &[Vec<Took>], most: u64) -> [String; 3] {
     ]
 }
 
-/// Whether the lazy way is faster, from each number of objects with each root whether it is, if that can be told.
+/// Says if the lazy way is faster, from the answer for each number of objects and each root.
 fn verdict(rows: &[[Option<bool>; IS_LAZY]]) -> String {
     let count = |wanted: Option<bool>| rows.iter().flatten().filter(|is| **is == wanted).count();
     let [faster, slower, same] = [Some(true), Some(false), None].map(count);
@@ -225,7 +225,7 @@ fn verdict(rows: &[[Option<bool>; IS_LAZY]]) -> String {
     }
 }
 
-/// Whether the lazy way is faster than some roots and slower than others, at every number of objects the same ones.
+/// Returns true if the lazy way is faster than some roots and slower than others, the same ones at every number of objects.
 fn is_by_root(rows: &[[Option<bool>; IS_LAZY]]) -> bool {
     let differs = |row: &[Option<bool>; IS_LAZY]| row.contains(&Some(true)) && row.contains(&Some(false));
     rows.len() > 1 && rows.iter().all(|row| *row == rows[0] && differs(row))

@@ -22,7 +22,7 @@ const LONGEST: f64 = 40_000.0;
 const CALLS: usize = 3;
 const LONG_CALLS: usize = 2;
 
-/// How often a row is run whose first call took so many milliseconds.
+/// Returns the number of calls of a row whose first call took `first_ms`.
 fn calls(first_ms: f64) -> usize {
     match first_ms {
         ms if ms < LONG => CALLS,
@@ -43,7 +43,7 @@ const COLUMNS: [&str; 9] = [
     "longest call / shortest",
 ];
 
-/// What decides the length of cells.
+/// The rule for the length of cells.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Wanted {
     Length(f64),
@@ -87,7 +87,7 @@ impl Wanted {
     }
 }
 
-/// What cells of one length came to.
+/// The results of cells of one length.
 struct Ran {
     wanted: Wanted,
     cell: f64,
@@ -186,7 +186,7 @@ fn of_number(sheet: &mut Sheet, n: usize, device: &Device) -> Result<Vec<Ran>, F
     Ok(rows)
 }
 
-/// How long so many checks take at the pace of the row before, if that is long.
+/// Says how long so many checks take at the pace of the row before, if that is long.
 fn would_take(checks: f64, before: Option<&Ran>) -> String {
     let Some(before) = before.filter(|_| checks > MOST_CHECKS) else { return String::new() };
     let ns = before.ms() * 1e6 / before.checks.made.max(1) as f64;
@@ -241,7 +241,7 @@ fn about_cells(n: usize, rows: &[Ran], noise: f64) -> String {
     )
 }
 
-/// What these rows say of the claim that cells of 256 are better than 64 and 1024 at 10^7 boxes.
+/// Compares these rows with the claim that cells of 256 are better than 64 and 1024 at 10^7 boxes.
 fn about_claim(rows: &[Ran], noise: f64) -> String {
     let ms = |cell: f64| of_length(rows, cell).map(Ran::ms);
     let against = |cell: f64| match ms(256.0).zip(ms(cell)) {
@@ -262,7 +262,7 @@ fn of_length(rows: &[Ran], cell: f64) -> Option<&Ran> {
     rows.iter().find(|row| row.wanted == Wanted::Length(cell))
 }
 
-/// Where one of two lengths did not run: their checks, measured where they were.
+/// Compares two lengths, of which one did not run, by checks that were measured elsewhere.
 fn by_checks(rows: &[Ran], cells: [f64; 2]) -> String {
     let calculated = |cell| expected_checks(&UNIFORM, MOST_BOXES, cell);
     let checks = |cell| of_length(rows, cell).map_or_else(|| calculated(cell), |row| row.checks.made as f64);

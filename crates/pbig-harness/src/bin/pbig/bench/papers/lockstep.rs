@@ -2,7 +2,7 @@
 
 use pbig_core::pair_index::{index_of, pair_count};
 
-/// Where equation 7 counts rows from.
+/// The number from which equation 7 counts rows.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Rows {
     /// As algorithm 2 and figure 3 do.

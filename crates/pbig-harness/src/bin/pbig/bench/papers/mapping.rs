@@ -10,7 +10,7 @@ use pbig_harness::boxes::cubes;
 use pbig_harness::study::{PbigSettings, SETTINGS, with_gpu_grid};
 use serde_json::json;
 
-/// What `GpuOptions::root` can be, in words.
+/// The values of `GpuOptions::root`, in words.
 const ROOTS: [(u32, &str); 8] = [
     (0, "the device's square root"),
     (2, "Carmack, 2 steps"),

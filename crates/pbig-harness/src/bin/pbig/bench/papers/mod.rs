@@ -1,6 +1,6 @@
 //! `pbig bench papers`: the experiments of PBIG's and Avril's papers, the printed figures beside ours.
 //!
-//! What is printed is in `printed`, each number with its place. Counts compare as numbers; times are of other
+//! The printed numbers are in `printed`, each with its place. Counts compare as numbers; times are of other
 //! machines and stand beside ours to show how they grow.
 
 mod avril;
@@ -41,7 +41,7 @@ use timing::Timing;
 /// Unlimited and in no order, as the papers' programs.
 const UNSORTED: Config = Config { limits: Limits::UNLIMITED, order: Order::Unspecified, ..Config::DEFAULT };
 
-/// How far the experiments go.
+/// The size of the experiments.
 struct Scale {
     quick: bool,
     /// Boxes of the experiment on readings of DoC.
@@ -69,7 +69,7 @@ fn effort(boxes: usize) -> Effort {
     Effort { warm_up, rounds, budget: Duration::from_secs(5) }
 }
 
-/// What one call from nothing gave, and its time.
+/// The results of one call from nothing, and its time.
 struct Once {
     pairs: u64,
     checks: Checks,

@@ -6,7 +6,7 @@ use rand::rngs::StdRng;
 use rand::{RngExt, SeedableRng};
 use rand_distr::{Distribution, Normal};
 
-/// How points lie along each axis.
+/// The distribution of points along each axis.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Space {
     /// Uniform over this length.

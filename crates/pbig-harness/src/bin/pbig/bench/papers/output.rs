@@ -12,7 +12,7 @@ use pbig_core::{Coding, GpuOptions};
 use pbig_harness::study::{ALL_PAIRS_UP_TO, PbigSettings, SETTINGS, with_gpu_grid};
 use serde_json::{Value, json};
 
-/// What the paper's MB is where it is not 10^6.
+/// The paper's MB in bytes, where it is not 10^6.
 const MEBI: f64 = 1_048_576.0;
 
 /// Bytes of the output against equations 9 and 10, and ours.
@@ -93,7 +93,7 @@ const HEADER: f64 = 12.0;
 const ROW: f64 = 4.0;
 const ALONE: f64 = 12.0;
 
-/// Why ours are longer than what is printed.
+/// Explains why ours are longer than printed.
 fn about_ours(sparse: &Ours, dense: &Ours) -> String {
     let [first, .., last] = &TABLE_III;
     let printed = |row: &Coverage| row.output * MEBI / row.pairs as f64;
@@ -126,7 +126,7 @@ fn about_ours(sparse: &Ours, dense: &Ours) -> String {
     )
 }
 
-/// What MB is.
+/// Explains the unit MB.
 fn about_units() -> String {
     let input = INPUT_MB * 1e6 / MOST_BOXES as f64;
     let densest = |unit: f64| DENSEST_PLAIN_MB * unit / TABLE_III[4].pairs as f64;
@@ -143,7 +143,7 @@ fn about_units() -> String {
     )
 }
 
-/// Whether equation 9 can be what was measured.
+/// Says if equation 9 can be what was measured.
 fn about_equation_9() -> String {
     let (single, many) = (equation_9(1.0), equation_9(1e12));
     let a_pair = |row: &Coverage| row.output * MEBI / row.pairs as f64;

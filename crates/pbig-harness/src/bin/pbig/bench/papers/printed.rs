@@ -1,4 +1,4 @@
-//! What the two papers print, each number with its place. *PBIG*: Lo et al. 2013. *Avril*: Avril et al. 2012.
+//! The numbers that the two papers print, each with its place. *PBIG*: Lo et al. 2013. *Avril*: Avril et al. 2012.
 //! The figures are drawings without numbers; of them only what the text says is here.
 
 /// PBIG 6.1: edge of the cubic space.
@@ -135,7 +135,7 @@ pub(super) struct Roots {
     pub(super) approximate: f64,
     /// Milliseconds of CUDA's own.
     pub(super) cuda: f64,
-    /// What the last digit of both counts.
+    /// The value of the last digit of both.
     pub(super) digit: f64,
     /// "% of computation time reduction"
     pub(super) gamma: f64,

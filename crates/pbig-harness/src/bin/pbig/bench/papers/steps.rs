@@ -13,10 +13,10 @@ use pbig_harness::boxes::cubes;
 use pbig_harness::chart::Line;
 use serde_json::{Value, json};
 
-/// How far cubes with edges of 1 move in a step, along each axis.
+/// The distance that cubes with edges of 1 move in a step, along each axis.
 pub(super) const DISTANCE: f32 = 0.1;
 
-/// What `plan` and `map` are, and what the last column of ours says.
+/// Explains `plan`, `map` and the last column of ours.
 const WORK: &str = "Ours are means; the last column counts the updates of each algorithm. With `grid` plan and map rebuild \
                     the grid; with `edit` map moves the changed boxes to other cells of the grid.";
 
@@ -61,7 +61,7 @@ pub(super) fn steps(scale: &Scale, device: &Device) -> Result<Sheet, Failure> {
     Ok(sheet.chart(chart("steps", "Avril table 6 and figure 5: a step, all moving", "objects", lines)))
 }
 
-/// What is said of times of a device, medians of which each has its events compared.
+/// Explains the times of a device: medians, with the events of each call compared.
 fn about_device(device: &Device) -> String {
     format!("On a device the median of a few updates, the same events as the CPU in each. {}", device.about())
 }
@@ -126,7 +126,7 @@ fn beside(device: &Device, n: usize, share: f64) -> Result<Value, Failure> {
     Ok(json!([n, row.gpu.median, row.cpu.median]))
 }
 
-/// What the rows say about both sides, and no more.
+/// Compares the two sides of the rows.
 fn about_movers(rows: &[Moved]) -> String {
     let at = |holds: &dyn Fn(&Moved) -> bool| {
         let shares: Vec<String> = rows.iter().filter(|row| holds(row)).map(percent).collect();

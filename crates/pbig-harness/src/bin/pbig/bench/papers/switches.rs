@@ -119,7 +119,7 @@ fn optimisations(n: usize, runs: &[(f64, Report)], device: &Device) -> Sheet {
     if runs.is_empty() { sheet } else { sheet.about(about_checks(&checks)) }
 }
 
-/// Why calls that find the same pairs may count different numbers of tests, if these do.
+/// Explains why calls that find the same pairs may count different numbers of tests, if they do.
 fn about_checks(checks: &[u64]) -> String {
     let (least, most) = checks.iter().fold((u64::MAX, 0), |(least, most), &n| (least.min(n), most.max(n)));
     if least >= most {
@@ -177,7 +177,7 @@ fn sum(tasks: &[Option<f64>]) -> f64 {
     tasks.iter().flatten().sum()
 }
 
-/// How much of the totals is in no task, as printed and here, where tasks follow one another and where they overlap.
+/// Returns the part of the totals that is in no task, printed and here, for consecutive and for overlapping tasks.
 fn about_rest(runs: &[(f64, Report)]) -> String {
     let printed = |row: &Breakdown| 100.0 * (1.0 - tasks_of(row) as f64 / row.total as f64);
     let ours = |(total, report): &(f64, Report)| 100.0 * (1.0 - sum(&of_tasks(report)) / total);
@@ -202,7 +202,7 @@ fn between(values: impl Iterator<Item = f64>) -> String {
     format!("{} to {}", short(least), short(most))
 }
 
-/// What a call on a device took by the paper's tasks.
+/// Returns the times of a call on a device by the paper's tasks.
 fn of_tasks(report: &Report) -> [Option<f64>; 7] {
     let is_check = |name: &str| name.starts_with("check");
     let is_schedule = |name: &str| matches!(name, "schedule" | "arrange");
@@ -216,7 +216,7 @@ fn of_tasks(report: &Report) -> [Option<f64>; 7] {
     [upload, Some(milliseconds(report.stages.plan)), map, schedule, check, out, decode]
 }
 
-/// What can be switched on the CPU.
+/// Returns the settings that can be switched on the CPU.
 fn settings() -> [(String, Way); 7] {
     let wanted = |boxes_per_cell: f32| {
         let name = format!("PBIG's grid, equation 6, W = {boxes_per_cell}");

@@ -1,4 +1,4 @@
-//! How long `pbig bench papers` itself takes, which is promised to be short.
+//! The time of `pbig bench papers` itself, which is promised to be short.
 
 use crate::bench::measure::MOST_SECONDS;
 use serde_json::{Value, json};
@@ -8,7 +8,7 @@ use std::time::Duration;
 pub(super) struct Timing {
     parts: Vec<(&'static str, f64)>,
     most_seconds: f64,
-    /// What the same takes with `--quick`, which writes no document of its own.
+    /// The time with `--quick`, which writes no document of its own.
     with_quick: Option<Result<f64, String>>,
 }
 

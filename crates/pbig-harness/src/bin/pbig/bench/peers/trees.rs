@@ -13,12 +13,12 @@ pub(super) fn for_parry(boxes: &[Aabb]) -> Vec<ParryAabb> {
     boxes.iter().map(|b| ParryAabb::new(vector(b.min), vector(b.max))).collect()
 }
 
-/// How a kept tree is brought up to date.
+/// The way to bring a kept tree up to date.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub(in crate::bench) enum Refit {
     /// All of it, on one thread, after improving a part.
     Whole,
-    /// The same on all threads.
+    /// As above, on all threads.
     Parallel,
     /// Only what is above the changed leaves; improves nothing.
     Part,
@@ -27,7 +27,7 @@ pub(in crate::bench) enum Refit {
 /// Parry 0.31's tree, kept from frame to frame as rapier keeps it.
 pub(in crate::bench) struct Parry {
     refit: Refit,
-    /// Whether only pairs with a moved box are wanted.
+    /// True if only pairs with a moved box are wanted.
     partial: bool,
     /// 0 leaves no leaf marked as changed; the smallest number marks them and makes no box larger.
     margin: f32,

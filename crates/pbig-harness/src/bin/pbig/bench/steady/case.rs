@@ -47,7 +47,7 @@ impl Figures {
     }
 }
 
-/// What ours should reach.
+/// The targets for ours.
 #[derive(Clone, Copy, Default)]
 pub(super) struct Wanted {
     /// Against a side of this name: the other's mean over ours.

@@ -17,7 +17,7 @@ use std::ops::Range;
 /// The most places of a call.
 const MOST_PLACES: u32 = 1 << 20;
 
-/// What comes of some estimates.
+/// The counts of some estimates.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 struct Found {
     places: u64,
@@ -154,7 +154,7 @@ fn on_the_cpu(row: fn(i64, i64) -> i64, k: i64, n: i64) -> i64 {
 /// Identifiers of a row that are looked at: the first and the last, and those about the diagonal.
 const COLUMNS: u32 = 5;
 
-/// How many there are, if each gives its pair, or none.
+/// Returns the number of words, if each gives its pair, or none.
 fn counted(n: u32, words: &[u32]) -> Result<u64, Failure> {
     let columns = |row: u32| [0, row.saturating_sub(1), row, row + 1, n - 1].map(|column| (row, column));
     for ((row, column), words) in (0..n - 1).flat_map(columns).zip(words.chunks_exact(2)) {
@@ -198,7 +198,7 @@ impl Ends {
     }
 }
 
-/// What was looked at, and what was found to be wrong.
+/// Says which ends were tested, and which are wrong.
 pub(in super::super) fn note(ends: &[Ends]) -> String {
     let most = ends.first().map_or(0, |one| one.most);
     let told = |found: fn(&Ends) -> Option<Found>| {

@@ -8,7 +8,7 @@ use pbig_harness::index::{LAZY, Tally, lazy_ids, lazy_pair, tally_of};
 /// The most boxes for which identifiers have 32 bits.
 pub(super) const MOST_BOXES: u32 = 1 << 16;
 
-/// What comes of identifiers, all or some as of indices; a wrong one is a failed check.
+/// Tests all or some identifiers, as indices. A wrong one is a failed check.
 pub(super) fn estimates(bench: &Bench, n: u32, software: bool) -> Result<Estimates, Failure> {
     let (mut pairs, mut ms) = (Vec::new(), 0.0);
     for identifiers in parts(n, lazy_ids(n.into()) as u64) {

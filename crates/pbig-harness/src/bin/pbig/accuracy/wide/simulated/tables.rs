@@ -1,4 +1,4 @@
-//! What the two simulations are held against, in tables.
+//! Tables that compare the two simulations with their references.
 
 use super::super::super::study::{Cell, Table};
 use super::super::place::{IN_WORLD, Way};

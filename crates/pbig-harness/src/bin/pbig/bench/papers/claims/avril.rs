@@ -118,7 +118,7 @@ fn without_grid() -> [String; 4] {
     ]
 }
 
-/// Whether the reduction that is printed can come from times that round to those that are, itself rounded to a tenth.
+/// Returns true if times that round to the printed ones can give the printed reduction, rounded to a tenth.
 fn follows(row: &Roots) -> bool {
     row.reduction(-1.0) <= row.gamma + 0.05 && row.gamma - 0.05 <= row.reduction(1.0)
 }
@@ -286,7 +286,7 @@ mod tests {
         assert!(!follows(&row(14.6)) && !follows(&row(10.4)));
     }
 
-    /// What is said in the third column, of numbers that are printed.
+    /// The third column contradicts printed numbers.
     #[test]
     fn what_is_printed_contradicts_itself_as_is_said() {
         let roots_alone = |n: u64| pair_count(n) as f64 / a_second_of(&AVRIL_4[3]) * 1e3;
