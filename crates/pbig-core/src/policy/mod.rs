@@ -49,7 +49,7 @@ pub(crate) const NS_PER_BOX: f64 = 40.0;
 pub(crate) const NS_PER_CANDIDATE: f64 = 0.35;
 pub(crate) const NS_PER_OVERSIZE_TEST: f64 = 0.7;
 
-/// Ids from which a jump far above the known ones is an error: the tables by id take 44 bytes for each id below.
+/// Ids from which a jump far above the known ones is an error: the tables by id take 64 bytes for each id below.
 pub(crate) const SPARSE_FROM_ID: u32 = 1 << 24;
 
 /// By how much an id may be larger than all before, from there on.
