@@ -2,13 +2,17 @@
 //! seeds and every input that once failed are run again without any.
 
 // The decoder's and the readers' own files rather than their crates: these would bring wgpu and rapier.
-pub use pbig_core::{Aabb, Pair, ProxyFilter, pair_index};
+pub use pbig_core::{Aabb, Pair, ProxyFilter};
 #[path = "../../crates/pbig-core/src/decode.rs"]
 pub mod decode;
 #[path = "../../crates/pbig-harness/src/files.rs"]
 pub mod files;
 #[path = "../../crates/pbig-core/src/layout.rs"]
 pub mod layout;
+#[path = "../../crates/pbig-harness/src/pair_index.rs"]
+pub mod pair_index;
+#[path = "../../crates/pbig-harness/src/pbig_grid.rs"]
+pub mod pbig_grid;
 
 pub mod checks;
 pub use checks::*;

@@ -1,8 +1,8 @@
 //! Contract 1: every strategy returns the oracle's pairs, sorted, whatever the boxes and threads.
 
-use pbig_core::study::pbig_grid;
 use pbig_core::{Aabb, Coding, Config, Error, Finder, Limits, Order, Pair, ProxyFilter, oracle};
 use pbig_harness::boxes::BoxSet;
+use pbig_harness::pbig_grid::pbig_grid;
 use pbig_tests::{corpus, difference, gpu, may_run, pbig_grids, strategies};
 use proptest::prelude::*;
 

@@ -2,6 +2,7 @@
 //! an adapter, which may be software, and fails without one.
 
 mod failures;
+mod turns;
 
 use pbig_core::gpu::adapters;
 use pbig_core::layout::DeviceBox;

@@ -44,9 +44,7 @@ impl Limits {
     pub const DEFAULT: Self = Self { max_boxes: 1 << 27, max_pairs: 1 << 28 };
     /// 2^28 boxes and 2^30 pairs: as many as the numbers inside can tell apart.
     pub const UNLIMITED: Self = Self { max_boxes: 1 << 28, max_pairs: 1 << 30 };
-}
 
-impl Limits {
     /// Returns the most pairs, at most as many as the numbers inside can tell apart.
     pub(crate) fn pairs(&self) -> u64 {
         self.max_pairs.min(Self::UNLIMITED.max_pairs)

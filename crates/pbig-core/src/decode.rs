@@ -4,7 +4,6 @@
 
 use crate::Pair;
 use crate::layout::{BOX_BITS, LANES};
-use crate::pair_index::{pair_count, row_start};
 use rayon::prelude::*;
 
 /// Words that break the format.
@@ -140,16 +139,23 @@ impl Reader<'_> {
     }
 }
 
-/// Decodes one bit for each pair of `boxes` boxes, in Avril's numbering.
+/// Returns the number of pairs of so many boxes.
+pub(crate) fn pair_count(boxes: u32) -> u64 {
+    u64::from(boxes) * u64::from(boxes.saturating_sub(1)) / 2
+}
+
+/// Decodes one bit for each pair of `boxes` boxes, in Avril's numbering: (0, 1), (0, 2), .., (1, 2), ..
 ///
 /// # Errors
 /// If the number of words is not that of the pairs' bits, or if a bit beyond the last pair is set.
 pub fn bits(words: &[u32], boxes: u32) -> Result<Vec<Vec<Pair>>, DecodeError> {
-    let all = pair_count(u64::from(boxes));
+    let all = pair_count(boxes);
     if words.len() as u64 != all.div_ceil(32) {
         return Err(DecodeError { what: "not one bit a pair", at: words.len() });
     }
-    let (mut pairs, mut a, n) = (Vec::new(), 0u64, u64::from(boxes));
+    let mut pairs = Vec::new();
+    // The row of pairs (a, b) of the last bit, and the numbers of the row's pairs.
+    let (mut a, mut row) = (0, 0..u64::from(boxes).saturating_sub(1));
     for (at, &word) in words.iter().enumerate() {
         let mut rest = word;
         while rest != 0 {
@@ -158,56 +164,12 @@ pub fn bits(words: &[u32], boxes: u32) -> Result<Vec<Vec<Pair>>, DecodeError> {
             if k >= all {
                 return Err(DecodeError { what: "a bit beyond the last pair", at });
             }
-            while a + 2 < n && row_start(a + 1, n) <= k {
+            while k >= row.end {
                 a += 1;
+                row = row.end..row.end + u64::from(boxes - 1 - a);
             }
-            pairs.push(Pair { a: a as u32, b: (a + 1 + k - row_start(a, n)) as u32 });
+            pairs.push(Pair { a, b: a + 1 + (k - row.start) as u32 });
         }
     }
     Ok(vec![pairs])
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::layout::AXIS_BITS;
-
-    fn pair(a: u32, b: u32) -> Pair {
-        Pair::new(a, b)
-    }
-
-    #[test]
-    fn the_example_of_the_format() {
-        // docs/PAIR_FORMAT.md: a cell whose entries begin at 2, its first box with three others.
-        let entries = [9, 9, 4, 1 | 7 << AXIS_BITS, 6, 0];
-        let row = u32::from_le_bytes([0, 2, 1, 2]);
-        let words = [2, 2, 0, row, 3, PLAIN | 1, 7, 8];
-        let wanted = vec![vec![pair(1, 4), pair(4, 6), pair(0, 4), pair(7, 8)]];
-        assert_eq!(records(&words, &entries, 10), Ok(wanted));
-        assert_eq!(plain(&[1, 2, 0, 9], 10), Ok(vec![vec![pair(1, 2), pair(0, 9)]]));
-        // Pairs 0 (0, 1) and 4 (1, 3) of four boxes.
-        assert_eq!(bits(&[0b01_0001], 4), Ok(vec![vec![pair(0, 1), pair(1, 3)]]));
-    }
-
-    #[test]
-    fn broken_words_are_errors() {
-        let entries = [0, 1, 2];
-        let what = |result: Result<Vec<Vec<Pair>>, DecodeError>| result.unwrap_err().what;
-        assert_eq!(what(records(&[5, 0, 0], &entries, 3)), "a record is cut off");
-        assert_eq!(what(records(&[PLAIN | 0x7FFF_FFFF], &entries, 3)), "a record is cut off");
-        assert_eq!(
-            what(records(&[1, 0, 0, u32::from_le_bytes([0, 9, 1, 2])], &entries, 3)),
-            "a row is cut off"
-        );
-        assert_eq!(what(records(&[1, 2, 0, u32::from_le_bytes([0, 0, 1, 0])], &entries, 3)), "no such entry");
-        assert_eq!(
-            what(records(&[1, 0, 0, u32::from_le_bytes([1, 0, 1, 0])], &entries, 3)),
-            "a box paired with itself"
-        );
-        assert_eq!(what(plain(&[1], 3)), "half a pair");
-        assert_eq!(what(plain(&[2, 1], 3)), "not a < b < boxes");
-        assert_eq!(what(plain(&[1, 3], 3)), "not a < b < boxes");
-        assert_eq!(what(bits(&[0b1000], 3)), "a bit beyond the last pair");
-        assert_eq!(what(bits(&[], 3)), "not one bit a pair");
-    }
 }

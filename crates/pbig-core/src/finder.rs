@@ -99,9 +99,11 @@ impl Finder {
         // A copy, so that the finder is free for its backends.
         let config = self.config;
         let request = Request { boxes, filters, config: &config, grouping };
-        let is_wanted = self.gpu.is_wanted(&self.config, boxes.len(), &mut self.report);
+        let is_found = self.gpu.is_wanted(&self.config, boxes.len(), &mut self.report);
         let no_gpu = self.report.plan.no_gpu;
-        if !(is_wanted && self.find_on_gpu(&request)?) {
+        #[cfg(feature = "gpu")]
+        let is_found = is_found && self.find_on_gpu(&request)?;
+        if !is_found {
             self.all_pairs.find(&request, &mut self.grid, &mut self.report)?;
             self.report.plan.no_gpu = no_gpu;
         }
@@ -114,17 +116,12 @@ impl Finder {
     #[cfg(feature = "gpu")]
     fn find_on_gpu(&mut self, request: &Request<'_>) -> Result<bool, Error> {
         let Request { boxes, filters, config, grouping } = *request;
-        let found = self.gpu.find(&SearchRequest { boxes, filters, config }, &mut self.report)?;
+        let request = SearchRequest { boxes, filters, changes: None, config };
+        let found = self.gpu.call(&mut self.report, |gpu| gpu.find(&request))?;
         let Some(found) = found else { return Ok(false) };
         self.report.invalid = boxes.len() as u64 - u64::from(found.valid);
         self.all_pairs.take(found.pairs, grouping);
         Ok(true)
-    }
-
-    #[cfg(not(feature = "gpu"))]
-    #[expect(clippy::unused_self, clippy::unnecessary_wraps, reason = "as with a GPU backend")]
-    fn find_on_gpu(&mut self, _: &Request<'_>) -> Result<bool, Error> {
-        Ok(false)
     }
 
     /// Brings the pairs of all threads into one list, in order if there is a grouping.

@@ -1,14 +1,14 @@
 //! The GPU of a finder or a broad phase, if it has one, and what is reported when it cannot do the work.
 
 use crate::Config;
-#[cfg(feature = "gpu")]
-use crate::gpu::{ChangeRequest, Failure, GpuFinder, GpuFound, SearchRequest, available};
 use crate::policy::{AvailableDevice, Choice, choose_backend};
 use crate::report::Report;
 #[cfg(feature = "gpu")]
-use crate::report::{Clock, stage};
-#[cfg(feature = "gpu")]
-use crate::{Algorithm, Error, Plan};
+use crate::{
+    Algorithm, Error, Plan,
+    gpu::{Failure, GpuFinder, GpuFound, available},
+    report::{Clock, stage},
+};
 
 /// Room for a GPU.
 #[derive(Clone, Debug, Default)]
@@ -33,15 +33,11 @@ impl GpuSlot {
         choice == Choice::Gpu
     }
 
-    #[cfg(not(feature = "gpu"))]
-    #[expect(clippy::unused_self, reason = "as with a GPU backend")]
     fn device(&self) -> AvailableDevice {
+        #[cfg(feature = "gpu")]
+        return available(self.gpu.as_ref());
+        #[cfg(not(feature = "gpu"))]
         AvailableDevice::NotBuilt
-    }
-
-    #[cfg(feature = "gpu")]
-    fn device(&self) -> AvailableDevice {
-        available(self.gpu.as_ref())
     }
 
     /// Reports that the wanted backend could not do the work: every time in the report, once as a warning.
@@ -66,25 +62,8 @@ impl GpuSlot {
         self.gpu.as_ref().and_then(GpuFinder::working_adapter)
     }
 
-    /// Finds all pairs. Returns none if the device could not do it; the report says why.
-    pub(crate) fn find(
-        &mut self,
-        request: &SearchRequest<'_>,
-        report: &mut Report,
-    ) -> Result<Option<GpuFound>, Error> {
-        self.call(report, |gpu| gpu.find(request))
-    }
-
-    /// Finds what has changed. Returns none if the device could not do it; the report says why.
-    pub(crate) fn changes(
-        &mut self,
-        request: &ChangeRequest<'_>,
-        report: &mut Report,
-    ) -> Result<Option<GpuFound>, Error> {
-        self.call(report, |gpu| gpu.changes(request))
-    }
-
-    fn call(
+    /// Runs a call on the device. Returns none if the device could not do it; the report says why.
+    pub(crate) fn call(
         &mut self,
         report: &mut Report,
         call: impl FnOnce(&mut GpuFinder) -> Result<GpuFound, Failure>,

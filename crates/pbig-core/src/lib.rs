@@ -54,33 +54,28 @@ mod gpu_slot;
 mod grid;
 pub mod oracle;
 mod pair;
-pub mod pair_index;
 mod pairs;
 mod parallel;
-#[cfg(any(feature = "gpu", feature = "unstable-study"))]
-#[cfg_attr(not(feature = "unstable-study"), allow(unreachable_pub, reason = "`study` shows parts of it"))]
-mod pbig;
 mod plan;
 mod policy;
 mod report;
-#[cfg(feature = "unstable-study")]
-pub mod study;
 
 #[cfg(all(feature = "gpu", feature = "unstable-study"))]
 pub mod decode;
 #[cfg(all(feature = "gpu", feature = "unstable-study"))]
 pub mod layout;
+#[cfg(feature = "unstable-study")]
+pub mod pbig;
 
 #[cfg(all(feature = "gpu", not(feature = "unstable-study")))]
 #[allow(unreachable_pub, reason = "public with `unstable-study`")]
 mod decode;
 #[cfg(all(feature = "gpu", not(feature = "unstable-study")))]
-#[allow(
-    dead_code,
-    unreachable_pub,
-    reason = "public with `unstable-study`, and some constants are for tests of the kernels"
-)]
+#[allow(dead_code, unreachable_pub, reason = "public with `unstable-study`, where tests of kernels use all")]
 mod layout;
+#[cfg(all(feature = "gpu", not(feature = "unstable-study")))]
+#[allow(unreachable_pub, reason = "public with `unstable-study`")]
+mod pbig;
 
 pub use aabb::Aabb;
 pub use broad_phase::{BroadPhase, Events};

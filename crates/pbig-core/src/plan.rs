@@ -89,9 +89,7 @@ impl Plan {
             ..Self::default()
         }
     }
-}
 
-impl Plan {
     fn write_gpu(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "GPU: {} boxes", self.boxes)?;
         #[cfg(feature = "gpu")]
@@ -101,22 +99,8 @@ impl Plan {
         }
         Ok(())
     }
-}
 
-impl fmt::Display for Plan {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let boxes = self.boxes;
-        match self.algorithm {
-            Algorithm::Nothing if boxes < 2 => return write!(f, "nothing to do: fewer than two valid boxes"),
-            Algorithm::Nothing => return write!(f, "nothing to do: no box has changed"),
-            Algorithm::Brute => return write!(f, "brute force: every pair of {boxes} boxes is tested"),
-            Algorithm::Sweep => return write!(f, "sweep: changed boxes are tested against all {boxes}"),
-            Algorithm::Gpu => return self.write_gpu(f),
-            Algorithm::Grid => write!(f, "grid: {boxes} boxes are sorted and searched")?,
-            Algorithm::Edit => {
-                write!(f, "edit: {} of {boxes} boxes are out of the grid's order", self.spilled)?
-            }
-        }
+    fn write_cells(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let ([x, y, z], [dx, dy, dz]) = (self.cell, self.dims);
         write!(f, "; {dx} x {dy} x {dz} cells of {x:.3} x {y:.3} x {z:.3}")?;
         if self.scan == NeighbourScan::Windows {
@@ -125,10 +109,46 @@ impl fmt::Display for Plan {
         if self.oversize > 0 {
             write!(f, "; {} oversize boxes are tested against all in reach", self.oversize)?;
         }
-        // Without a GPU backend nobody expects one.
-        if let Some(why) = self.no_gpu.filter(|why| *why != NoGpu::NotBuilt) {
-            write!(f, "; no GPU: {why}")?;
-        }
         Ok(())
+    }
+}
+
+impl fmt::Display for Plan {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let boxes = self.boxes;
+        match self.algorithm {
+            Algorithm::Nothing if boxes < 2 => write!(f, "nothing to do: fewer than two valid boxes")?,
+            Algorithm::Nothing => write!(f, "nothing to do: no box has changed")?,
+            Algorithm::Brute => write!(f, "brute force: every pair of {boxes} boxes is tested")?,
+            Algorithm::Sweep => write!(f, "sweep: changed boxes are tested against all {boxes}")?,
+            Algorithm::Gpu => self.write_gpu(f)?,
+            Algorithm::Grid => write!(f, "grid: {boxes} boxes are sorted and searched")?,
+            Algorithm::Edit => {
+                write!(f, "edit: {} of {boxes} boxes are out of the grid's order", self.spilled)?
+            }
+        }
+        if matches!(self.algorithm, Algorithm::Grid | Algorithm::Edit) {
+            self.write_cells(f)?;
+        }
+        // Without a GPU backend nobody expects one.
+        match self.no_gpu {
+            Some(why) if why != NoGpu::NotBuilt => write!(f, "; no GPU: {why}"),
+            _ => Ok(()),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_algorithm_says_why_no_gpu_was_used() {
+        use Algorithm::{Brute, Edit, Grid, Nothing, Sweep};
+        for algorithm in [Nothing, Brute, Sweep, Grid, Edit] {
+            let shown = |no_gpu| Plan { algorithm, boxes: 9, no_gpu, ..Plan::default() }.to_string();
+            assert!(shown(Some(NoGpu::Software)).ends_with("; no GPU: the given device is software"));
+            assert!(!shown(Some(NoGpu::NotBuilt)).contains("GPU") && !shown(None).contains("GPU"));
+        }
     }
 }

@@ -1,12 +1,12 @@
-//! The part of pbig-core that only studies use: PBIG's grid on the CPU, its settings on a GPU, the grid for few boxes.
-//!
-//! Everything else in this crate uses the core as an app does.
+//! What only studies use: PBIG's grid on the CPU, its settings on a GPU, the grid for few boxes.
 
-use pbig_core::study::PbigPlan;
+use crate::pbig_grid::PbigPlan;
+use pbig_core::pbig::Summary;
 use pbig_core::{Aabb, Config, Engine, GpuOptions, Plan};
 
+pub use crate::pbig_grid::{PbigFound, pbig_grid};
 pub use pbig_core::CellRule;
-pub use pbig_core::study::{PbigFound, density_cell, pbig_grid};
+pub use pbig_core::pbig::density_cell;
 pub use pbig_shaders::study::{INDEX_PAIRS, LAZY_ENDS, LAZY_PAIRS, ROW_ENDS};
 
 /// Settings of PBIG's grid, of which the CPU reads `cell_rule`, `boxes_per_cell` and `small_cell`.
@@ -19,17 +19,17 @@ pub const SETTINGS: PbigSettings = GpuOptions::DEFAULT;
 pub const ALL_PAIRS_UP_TO: u32 = SETTINGS.all_pairs_up_to;
 
 /// The boxes of one set, as PBIG's rule for the cell length sees them.
-pub struct PbigCells<'a>(&'a [Aabb]);
+pub struct PbigCells(Summary);
 
-impl<'a> PbigCells<'a> {
-    /// Reads the boxes.
-    pub fn new(boxes: &'a [Aabb]) -> Self {
-        Self(boxes)
+impl PbigCells {
+    /// Reads the boxes, once for all lengths.
+    pub fn new(boxes: &[Aabb]) -> Self {
+        Self(Summary::of(boxes))
     }
 
     /// Returns the cell length that these settings give, in the boxes' length unit.
     pub fn length(&self, settings: &PbigSettings) -> f32 {
-        PbigPlan::new(self.0, settings).cell
+        PbigPlan::new(&self.0, settings).cell
     }
 }
 

@@ -1,8 +1,8 @@
 //! The pairs of a finder are the oracle's, bit by bit, also in its second call and with filters.
 
+use super::super::pbig_grid::pbig_grid;
 use super::input::Input;
-use pbig_core::{Aabb, Backend, CellRule, Config, Engine, Finder, GpuOptions, Order, ProxyFilter};
-use pbig_core::{oracle, study};
+use pbig_core::{Aabb, Backend, CellRule, Config, Engine, Finder, GpuOptions, Order, ProxyFilter, oracle};
 
 /// One byte of settings, then boxes, each with a filter if the settings ask for filters.
 pub fn finder_against_oracle(data: &[u8]) {
@@ -67,7 +67,7 @@ fn pbig_options(settings: u8) -> GpuOptions {
 
 /// Compares PBIG's grid, and its counts of tests, with the oracle.
 fn check_pbig(boxes: &[Aabb], options: &GpuOptions) {
-    let found = study::pbig_grid(boxes, options).expect("few boxes");
+    let found = pbig_grid(boxes, options).expect("few boxes");
     let wanted = oracle::pairs(boxes);
     assert_eq!(found.pairs, wanted, "{}", found.plan);
     let counted = found.checks.unnecessary + found.checks.redundant + wanted.len() as u64;

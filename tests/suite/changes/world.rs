@@ -1,7 +1,7 @@
 //! A world of boxes with its pairs by brute force, and its updates on a device.
 
-use pbig_core::gpu::study::{Change, ChangeRequest, Tracked, Tracker};
-use pbig_core::{Aabb, Config, Pair, ProxyFilter, oracle};
+use pbig_core::gpu::study::{Change, ChangeRequest, GpuFound};
+use pbig_core::{Aabb, Config, GpuFinder, Pair, ProxyFilter, oracle};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// The state of a broad phase, in the plainest form.
@@ -65,7 +65,7 @@ impl World {
     }
 
     /// Runs an update on a device and compares it with brute force.
-    pub(super) fn follow(&mut self, tracker: &mut Tracker, config: &Config) -> Result<Tracked, String> {
+    pub(super) fn follow(&mut self, gpu: &mut GpuFinder, config: &Config) -> Result<GpuFound, String> {
         let changed: Vec<_> = self.changed.values().copied().collect();
         let request = ChangeRequest {
             boxes: &self.boxes,
@@ -75,12 +75,12 @@ impl World {
             kept: self.kept.len() as u64,
             config,
         };
-        let tracked = tracker.update(&request).map_err(|error| error.to_string())?;
-        assert_eq!(self.fault(&tracked), None, "update {}", self.update);
-        let pairs = self.completed(&tracked);
+        let found = gpu.search_changes(&request)?;
+        assert_eq!(self.fault(&found), None, "update {}", self.update);
+        let pairs = self.completed(&found);
         self.advance();
         assert_eq!(pairs, self.kept, "update {}: what a caller makes of it", self.update);
-        Ok(tracked)
+        Ok(found)
     }
 
     /// Runs an update without the device.
@@ -91,28 +91,28 @@ impl World {
     }
 
     /// Returns the first difference between the found pairs and those that are in one of the two states only.
-    fn fault(&self, tracked: &Tracked) -> Option<String> {
+    fn fault(&self, found: &GpuFound) -> Option<String> {
         let mut before = self.boxes.clone();
         for change in self.changed.values() {
-            let restarted = tracked.restarted.contains(&change.id);
+            let restarted = found.restarted.contains(&change.id);
             before[change.id as usize] = if restarted { Aabb::NOWHERE } else { change.aabb };
         }
         let pairs = |boxes: &[Aabb]| -> BTreeSet<Pair> {
             oracle::pairs_filtered(boxes, &self.filters).into_iter().collect()
         };
         let wanted: Vec<Pair> = (&pairs(&self.boxes) ^ &pairs(&before)).into_iter().collect();
-        let mut found = tracked.pairs.clone();
-        found.sort_unstable();
-        pbig_tests::difference(&found, &wanted)
+        let mut pairs = found.pairs.concat();
+        pairs.sort_unstable();
+        pbig_tests::difference(&pairs, &wanted)
     }
 
-    /// Returns the pairs after the update, completed as the rules of `GpuFinder::changes` say.
-    fn completed(&self, tracked: &Tracked) -> BTreeSet<Pair> {
-        let again = |pair: &Pair| [pair.a, pair.b].iter().any(|id| tracked.restarted.contains(id));
+    /// Returns the pairs after the update, completed as the rules of a search for changes say.
+    fn completed(&self, found: &GpuFound) -> BTreeSet<Pair> {
+        let again = |pair: &Pair| [pair.a, pair.b].iter().any(|id| found.restarted.contains(id));
         let overlaps = |pair: &Pair| self.boxes[pair.a as usize].overlaps(&self.boxes[pair.b as usize]);
         let allowed = |pair: &Pair| self.filters[pair.a as usize].allows(&self.filters[pair.b as usize]);
         let mut pairs = self.kept.clone();
-        for pair in &tracked.pairs {
+        for pair in found.pairs.iter().flatten() {
             let news = if overlaps(pair) { pairs.insert(*pair) } else { pairs.remove(pair) };
             assert!(news || again(pair), "{pair:?} is no news");
         }

@@ -1,7 +1,8 @@
 //! Contract: a device that fails or is lost at any moment costs no pair and no event.
 
 use super::{find, on_cpu, set, with};
-use pbig_core::gpu::{Fault, adapters};
+use pbig_core::gpu::adapters;
+use pbig_core::gpu::study::Fault;
 use pbig_core::{
     Aabb, Backend, BroadPhase, Coding, Config, Events, Finder, GpuFinder, GpuOptions, ProxyFilter, oracle,
 };

@@ -5,7 +5,7 @@ use super::*;
 /// Returns the device that all tests share: one with subgroups, if the adapter has them, and one without.
 pub(super) fn bench(subgroups: bool) -> &'static Bench {
     static BENCHES: [OnceLock<Bench>; 2] = [const { OnceLock::new() }; 2];
-    let open = || Bench::on_adapter(None, subgroups).expect("a device, be it a software one");
+    let open = || Bench::with_subgroups(subgroups).expect("a device, be it a software one");
     BENCHES[usize::from(subgroups)].get_or_init(open)
 }
 

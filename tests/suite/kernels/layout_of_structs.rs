@@ -1,4 +1,4 @@
-//! Contract: structs, constants and bindings are the same in Rust and in WGSL.
+//! Contract: structs, constants and bindings are the same in Rust and in WGSL, and integers keep the order of floats.
 
 use super::*;
 
@@ -124,5 +124,34 @@ fn bindings_are_those_of_the_kernels() {
         let bound = variables.filter_map(|v| Some((v.binding.as_ref()?.binding, v.name.as_deref()?)));
         let wanted: Vec<_> = (0u32..).zip(kernel.bindings.iter().map(|buffer| buffer.name())).collect();
         assert_eq!(sorted(&bound.collect::<Vec<_>>()), wanted, "{}", kernel.name);
+    }
+}
+
+#[test]
+fn ordered_integers_keep_the_order_of_all_floats() {
+    let rising = [
+        f32::NEG_INFINITY,
+        f32::MIN,
+        -1.0,
+        -f32::MIN_POSITIVE,
+        -1e-45,
+        0.0,
+        1e-45,
+        f32::MIN_POSITIVE,
+        1.0,
+        f32::MAX,
+        f32::INFINITY,
+    ];
+    assert!(rising.windows(2).all(|two| layout::ordered(two[0]) < layout::ordered(two[1])));
+    assert_eq!(layout::ordered(-0.0), layout::ordered(0.0));
+}
+
+#[test]
+fn an_invalid_box_overlaps_nothing_not_even_everything() {
+    let all = DeviceBox::new(&Aabb::new([f32::NEG_INFINITY; 3], [f32::INFINITY; 3]));
+    for invalid in [Aabb::NOWHERE, Aabb::new([f32::INFINITY; 3], [f32::NEG_INFINITY; 3])] {
+        let invalid = DeviceBox::new(&invalid);
+        assert_eq!(invalid, DeviceBox::INVALID);
+        assert!(!(0..3).any(|k| invalid.low[k] <= all.high[k] || all.low[k] <= invalid.high[k]));
     }
 }

@@ -8,8 +8,10 @@ mod compare;
 mod device;
 mod indices;
 mod layout_of_structs;
+mod plans;
 mod state;
 mod twins;
+mod words;
 
 use bytemuck::{bytes_of_mut, cast_slice_mut};
 use changes::*;
@@ -17,15 +19,16 @@ use compare::*;
 use device::*;
 use indices::*;
 use pbig_core::decode::{self, PLAIN};
-use pbig_core::gpu::study::{Bench, plan_params};
+use pbig_core::gpu::study::plan_params;
 use pbig_core::layout::{
     self, AXIS_BITS, BITS, BOX_BITS, BoxChange, CELLS_PER_BLOCK, Cell, Chunk, Counters, DeviceBox, FILTERED,
     FilterChange, LANES, LargeItem, Level, Located, MAX_SPAN, MOVED, Motion, NO_LEVEL, PACKED, Params, Slot,
     SmallItem, Totals, WAS_ABSENT, halves, wide,
 };
-use pbig_core::pair_index::{index_of, pair_count, pair_of};
 use pbig_core::{Aabb, GpuOptions, Pair, ProxyFilter, oracle};
 use pbig_harness::boxes::BoxSet;
+use pbig_harness::kernels::Bench;
+use pbig_harness::pair_index::{index_of, pair_count, pair_of};
 use pbig_shaders::{self as shaders, Buffer, KERNELS, Kernel};
 use pbig_tests::{corpus, difference, needs_gpu, without_gpu};
 use state::*;

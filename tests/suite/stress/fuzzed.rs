@@ -2,7 +2,7 @@
 
 use super::memory;
 use pbig_core::decode;
-use pbig_harness::files;
+use pbig_harness::{files, pbig_grid};
 use rand::rngs::StdRng;
 use rand::{RngExt, SeedableRng};
 

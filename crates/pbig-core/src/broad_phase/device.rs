@@ -1,6 +1,8 @@
 //! An update on a GPU: only what has changed goes there, only pairs that were added or removed come back.
 
 use super::BroadPhase;
+#[cfg(feature = "unstable-study")]
+use crate::Limits;
 use crate::gpu::{Change, ChangeRequest, GpuFinder, GpuFound};
 use crate::{Aabb, Backend, Config, Error, NoGpu, Pair};
 
@@ -20,6 +22,12 @@ impl BroadPhase {
     pub fn set_gpu(&mut self, gpu: GpuFinder) {
         self.gpu.gpu = Some(gpu);
         self.world.keep_old = usize::MAX;
+    }
+
+    /// Sets where the next updates run, and their limits.
+    #[cfg(feature = "unstable-study")]
+    pub fn set_backend(&mut self, backend: Backend, limits: Limits) {
+        (self.config.backend, self.config.limits) = (backend, limits);
     }
 
     /// Returns the adapter of the device in use: name, kind and API. None while there is no device or it has failed.
@@ -57,7 +65,7 @@ impl BroadPhase {
             config: &self.config,
         };
         let invalid = self.report.invalid;
-        let found = self.gpu.changes(&request, &mut self.report)?;
+        let found = self.gpu.call(&mut self.report, |gpu| gpu.changes(&request))?;
         self.report.invalid = invalid;
         let Some(found) = found else { return Ok(false) };
         self.has_grid = false;
@@ -97,6 +105,3 @@ impl BroadPhase {
         events.dropped.dedup();
     }
 }
-
-#[cfg(test)]
-mod tests;

@@ -1,9 +1,6 @@
-//! The choice of an adapter, and opening a device on it.
+//! The choice of an adapter.
 
 use super::GpuError;
-
-/// Features that pbig uses if the adapter has them.
-const WANTED: wgpu::Features = wgpu::Features::SUBGROUP.union(wgpu::Features::TIMESTAMP_QUERY);
 
 /// Returns all adapters, best first: discrete, integrated, virtual, unknown, software.
 ///
@@ -31,42 +28,27 @@ fn rank(kind: wgpu::DeviceType, low_power: bool) -> u32 {
 /// case.
 pub(super) fn choose(name: Option<&str>) -> Result<wgpu::Adapter, GpuError> {
     if let Some(value) = unknown_api() {
-        return Err(GpuError::UnknownApi { value });
+        return Err(GpuError::UnknownApi(value));
     }
     let wanted = name.map(str::to_owned).or_else(|| std::env::var("WGPU_ADAPTER_NAME").ok());
     let all = adapters();
-    let found = all.iter().map(|a| a.get_info().name).collect::<Vec<_>>().join(", ");
-    let matches = |a: &wgpu::Adapter| match &wanted {
-        Some(name) => a.get_info().name.to_lowercase().contains(&name.to_lowercase()),
-        None => true,
+    let name_of = |adapter: &wgpu::Adapter| adapter.get_info().name;
+    let matches = |adapter: &&wgpu::Adapter| {
+        wanted.as_ref().is_none_or(|name| name_of(adapter).to_lowercase().contains(&name.to_lowercase()))
     };
-    let none = || GpuError::NoAdapter {
-        wanted: wanted.as_ref().map(|name| format!(" named {name:?}")).unwrap_or_default(),
-        found: if found.is_empty() { "none".into() } else { found.clone() },
-    };
-    all.iter().find(|a| matches(a)).cloned().ok_or_else(none)
+    all.iter().find(matches).cloned().ok_or_else(|| {
+        let found = all.iter().map(name_of).collect::<Vec<_>>().join(", ");
+        GpuError::NoAdapter {
+            wanted: wanted.as_ref().map(|name| format!(" named {name:?}")).unwrap_or_default(),
+            found: if found.is_empty() { "none".into() } else { found },
+        }
+    })
 }
 
 /// Returns the value of `WGPU_BACKEND` if it names no API that wgpu knows.
 fn unknown_api() -> Option<String> {
     let value = std::env::var("WGPU_BACKEND").ok()?;
     wgpu::Backends::from_comma_list(&value).is_empty().then_some(value)
-}
-
-/// Opens a device with the adapter's limits, and the features that pbig uses.
-pub(super) fn open(adapter: &wgpu::Adapter) -> Result<(wgpu::Device, wgpu::Queue), GpuError> {
-    let descriptor = wgpu::DeviceDescriptor {
-        label: Some("pbig"),
-        required_features: adapter.features() & WANTED,
-        required_limits: adapter.limits(),
-        memory_hints: wgpu::MemoryHints::MemoryUsage,
-        ..Default::default()
-    };
-    let failed = |why: wgpu::RequestDeviceError| GpuError::NoDevice {
-        adapter: adapter.get_info().name,
-        why: why.to_string(),
-    };
-    pollster::block_on(adapter.request_device(&descriptor)).map_err(failed)
 }
 
 /// Returns an adapter's name, kind and API, as reports show them.

@@ -1,15 +1,13 @@
 //! The search for changes: instead of all pairs, it finds those that an update adds or removes.
 //!
-//! The device has each box now and at the last update (`shaders/shared/search_changes.wgsl`). An update stores the boxes as
-//! those of the last update and applies the changed boxes. One search then goes over the cells that each box touches, now
-//! or before, and emits every pair that overlaps now and did not before, or the other way round. So transfers in both
+//! The device has each box now and at the last update (`shaders/shared/search_changes.wgsl`). So transfers in both
 //! directions are proportional to the number of changes.
 
-use super::search::{Task, search};
-use super::upload::{PIECE, follows};
+use super::search::{SearchRequest, search};
+use super::upload::PIECE;
 use super::{Failure, GpuFinder, GpuFound};
 use crate::layout::{BoxChange, DeviceBox, FilterChange, Motion, WAS_ABSENT};
-use crate::{Aabb, Config, Error, ProxyFilter};
+use crate::{Aabb, Config, ProxyFilter};
 use rayon::prelude::*;
 use std::ops::Range;
 
@@ -59,21 +57,9 @@ impl ChangeRequest<'_> {
         if self.is_restarted(change) { Aabb::NOWHERE } else { change.aabb }
     }
 
-    /// Returns the ids of the boxes that the device treats as new.
     fn restarted(&self) -> Vec<u32> {
         let changed = self.changed.par_iter().with_min_len(PIECE);
         changed.filter(|change| self.is_restarted(change)).map(|change| change.id).collect()
-    }
-
-    fn task<'a>(&'a self, bounds: &'a MotionBounds) -> Task<'a> {
-        Task {
-            boxes: &bounds.boxes,
-            filters: Some(self.filters),
-            changes: Some(self),
-            // Removed pairs were kept. So with more changes than this, more pairs were added than there may be.
-            limit: self.config.limits.max_pairs.saturating_add(self.kept),
-            options: &self.config.gpu,
-        }
     }
 
     /// Returns boxes now and before, for a device that does not have them.
@@ -121,7 +107,8 @@ impl MotionBounds {
     /// Brings the bounds to an update. If they are those of the last update, the time is proportional to the changes.
     fn follow(&mut self, request: &ChangeRequest<'_>) {
         let boxes = request.boxes;
-        self.boxes.truncate(if follows(self.update, request.update) { boxes.len() } else { 0 });
+        let follows = self.update.and_then(|update| update.checked_add(1)) == Some(request.update);
+        self.boxes.truncate(if follows { boxes.len() } else { 0 });
         for id in self.moved.drain(..) {
             if let Some(bounds) = self.boxes.get_mut(id as usize) {
                 *bounds = boxes[id as usize];
@@ -129,8 +116,8 @@ impl MotionBounds {
         }
         self.boxes.extend_from_slice(&boxes[self.boxes.len()..]);
         let bounds = |change: &Change| boxes[change.id as usize].union(&request.before(change));
-        let changed = request.changed.par_iter().with_min_len(PIECE);
-        for (change, bounds) in request.changed.iter().zip(changed.map(bounds).collect::<Vec<_>>()) {
+        let changed: Vec<Aabb> = request.changed.par_iter().with_min_len(PIECE).map(bounds).collect();
+        for (change, bounds) in request.changed.iter().zip(changed) {
             self.boxes[change.id as usize] = bounds;
             self.moved.push(change.id);
         }
@@ -142,38 +129,18 @@ impl GpuFinder {
     /// Finds the pairs that the filters allow and that overlap now and did not at the last update, or the other way
     /// round. The boxes tell which of the two.
     ///
-    /// The device treats the boxes in [`GpuFound::restarted`] as new. So the caller completes the answer for them:
-    ///
-    /// - a kept pair that no longer holds has ended, and is not in the result;
-    /// - a kept pair that still holds is in the result like a new one, and must not be added again.
-    ///
-    /// After an error the next call uploads all boxes, so nothing is missed.
+    /// The caller completes the answer for boxes in [`GpuFound::restarted`], which the device treats as new: kept pairs
+    /// that no longer hold are not in the result, and those that still hold are.
     pub(crate) fn changes(&mut self, request: &ChangeRequest<'_>) -> Result<GpuFound, Failure> {
-        let result = self.try_changes(request);
-        result.inspect_err(|failure| self.fail(failure))
-    }
-
-    fn try_changes(&mut self, request: &ChangeRequest<'_>) -> Result<GpuFound, Failure> {
-        self.check_pause(request.config)?;
-        let cell_factor = self.cell_factor;
-        let session = self.session(&request.config.gpu)?;
-        let device = session.device.clone();
-        // After an error the bounds stay empty.
-        let mut bounds = std::mem::take(&mut session.motion_bounds);
-        bounds.follow(request);
-        let found = device.watch(|| search(session, &request.task(&bounds), cell_factor));
-        let found = found.map_err(|failure| with_limit(failure, request.config.limits.max_pairs))?;
-        session.motion_bounds = bounds;
-        session.end_call();
-        self.succeed(&found, request.boxes.len() as u64 + request.kept);
-        Ok(GpuFound { restarted: request.restarted(), ..found })
-    }
-}
-
-/// Returns a failure with the caller's limit of pairs, instead of the larger one that the device got.
-fn with_limit(failure: Failure, limit: u64) -> Failure {
-    match failure {
-        Failure::Call(Error::TooManyPairs { .. }) => Failure::Call(Error::TooManyPairs { limit }),
-        other => other,
+        let &ChangeRequest { filters, config, kept, .. } = request;
+        self.run(config, kept, |session| {
+            // After an error the bounds stay empty.
+            let mut bounds = std::mem::take(&mut session.motion_bounds);
+            bounds.follow(request);
+            let (boxes, filters, changes) = (&bounds.boxes[..], Some(filters), Some(request));
+            let found = search(session, &SearchRequest { boxes, filters, changes, config })?;
+            session.motion_bounds = bounds;
+            Ok(GpuFound { restarted: request.restarted(), ..found })
+        })
     }
 }

@@ -5,7 +5,7 @@ use crate::config::GpuOptions;
 use pbig_shaders::Kernel;
 use std::collections::HashMap;
 use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 use std::time::Duration;
 
@@ -38,11 +38,6 @@ impl Variant {
         Self { root: options.root.min(9), is_balanced: options.load_balancing, changes }
     }
 
-    /// Returns the variant without the choices that the kernel does not depend on.
-    fn reduced_to(self, kernel: &Kernel) -> Self {
-        Self { changes: self.changes && kernel.depends_on_search(), ..self }
-    }
-
     /// Returns the values of the overrides that the source declares.
     fn constants(self, source: &str) -> Vec<(&'static str, f64)> {
         let all = [("ROOT", f64::from(self.root)), ("BALANCED", f64::from(u8::from(self.is_balanced)))];
@@ -61,9 +56,8 @@ pub(crate) struct GpuDevice {
     pub(super) has_timestamps: bool,
     pipelines: Mutex<HashMap<(&'static str, Variant), wgpu::ComputePipeline>>,
     is_lost: AtomicBool,
-    fault: Mutex<Option<Fault>>,
-    /// Submissions until the fault.
-    countdown: AtomicU32,
+    /// An injected fault, and the number of submissions until it happens.
+    fault: Mutex<Option<(Fault, u32)>>,
 }
 
 impl GpuDevice {
@@ -80,13 +74,23 @@ impl GpuDevice {
             pipelines: Mutex::default(),
             is_lost: AtomicBool::new(false),
             fault: Mutex::default(),
-            countdown: AtomicU32::new(0),
         })
     }
 
-    /// Opens a device on an adapter.
+    /// Opens a device on an adapter, with its limits and the features that pbig uses.
     pub(super) fn on(adapter: &wgpu::Adapter) -> Result<Self, GpuError> {
-        let (device, queue) = adapter::open(adapter)?;
+        let wanted = wgpu::Features::SUBGROUP | wgpu::Features::TIMESTAMP_QUERY;
+        let descriptor = wgpu::DeviceDescriptor {
+            label: Some("pbig"),
+            required_features: adapter.features() & wanted,
+            required_limits: adapter.limits(),
+            memory_hints: wgpu::MemoryHints::MemoryUsage,
+            ..Default::default()
+        };
+        let name = || adapter.get_info().name;
+        let opened = pollster::block_on(adapter.request_device(&descriptor));
+        let (device, queue) =
+            opened.map_err(|why| GpuError::NoDevice { adapter: name(), why: why.to_string() })?;
         Self::new(device, queue)
     }
 
@@ -105,50 +109,20 @@ impl GpuDevice {
         }
     }
 
-    /// Returns true if the device is lost, or was given up.
     pub(super) fn is_lost(&self) -> bool {
         self.is_lost.load(Ordering::Relaxed)
     }
 
-    /// Returns in words which variants the device runs, and why.
-    pub(super) fn variants(&self) -> Vec<String> {
-        let scan = if self.has_subgroups {
-            "with subgroups: the adapter has them"
-        } else {
-            "without subgroups: the adapter has none"
-        };
-        let times = if self.has_timestamps { "by timestamps" } else { "none: the adapter has no timestamps" };
-        let most = self.max_buffer_bytes(&GpuOptions::DEFAULT);
-        vec![
-            format!("scan, schedule: {scan}"),
-            "check, small cells: the device's square root, corrected by integers; large cells: balanced rows"
-                .into(),
-            format!("times of kernels: {times}"),
-            format!(
-                "sets are searched in parts from {} boxes on",
-                most / size_of::<crate::layout::Located>() as u64
-            ),
-        ]
-    }
-
-    /// Makes a fault happen after so many submissions.
     #[cfg(feature = "unstable-study")]
     pub(super) fn inject(&self, fault: Fault, submissions: u32) {
-        *lock(&self.fault) = Some(fault);
-        self.countdown.store(submissions, Ordering::Relaxed);
+        *lock(&self.fault) = Some((fault, submissions));
     }
 
     /// Returns true, once, if the given fault is due.
     fn is_due(&self, fault: Fault) -> bool {
-        let mut armed = lock(&self.fault);
-        let due = *armed == Some(fault) && self.countdown.load(Ordering::Relaxed) == 0;
-        if due {
-            *armed = None;
-        }
-        due
+        lock(&self.fault).take_if(|armed| *armed == (fault, 0)).is_some()
     }
 
-    /// Returns the largest size of a buffer or binding, in bytes.
     pub(super) fn max_buffer_bytes(&self, options: &GpuOptions) -> u64 {
         let limits = self.handle.limits();
         let most = limits.max_buffer_size.min(limits.max_storage_buffer_binding_size);
@@ -172,7 +146,6 @@ impl GpuDevice {
         }
     }
 
-    /// Returns true if the device still finishes a submission.
     fn is_alive(&self) -> bool {
         self.is_idle_within(Duration::from_secs(1))
     }
@@ -193,7 +166,8 @@ impl GpuDevice {
         kernel: &'static Kernel,
         variant: Variant,
     ) -> Result<wgpu::ComputePipeline, GpuError> {
-        let variant = variant.reduced_to(kernel);
+        // Most kernels do not depend on what is searched for.
+        let variant = Variant { changes: variant.changes && kernel.depends_on_search(), ..variant };
         let mut pipelines = lock(&self.pipelines);
         if let Some(pipeline) = pipelines.get(&(kernel.name, variant)) {
             return Ok(pipeline.clone());
@@ -225,7 +199,6 @@ impl GpuDevice {
         })
     }
 
-    /// Makes a buffer.
     pub(super) fn buffer(
         &self,
         label: &str,
@@ -240,13 +213,13 @@ impl GpuDevice {
         Ok(self.handle.create_buffer(&descriptor))
     }
 
-    /// Submits commands.
     pub(super) fn submit(&self, encoder: wgpu::CommandEncoder) -> wgpu::SubmissionIndex {
         if self.is_due(Fault::LoseDevice) {
             self.handle.destroy();
         }
-        let left = self.countdown.load(Ordering::Relaxed);
-        self.countdown.store(left.saturating_sub(1), Ordering::Relaxed);
+        if let Some((_, left)) = &mut *lock(&self.fault) {
+            *left = left.saturating_sub(1);
+        }
         self.queue.submit([encoder.finish()])
     }
 
@@ -287,7 +260,6 @@ impl GpuDevice {
         }
     }
 
-    /// Marks a device that was given up as working again.
     pub(super) fn take_back(&self) {
         self.is_lost.store(false, Ordering::Relaxed);
     }
@@ -304,7 +276,6 @@ pub(super) fn lock<T>(mutex: &Mutex<T>) -> std::sync::MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Returns the first lines of a message, joined.
 fn first_lines(text: &str) -> String {
     text.lines().map(str::trim).filter(|line| !line.is_empty()).take(3).collect::<Vec<_>>().join(": ")
 }

@@ -16,12 +16,9 @@ pub enum GpuError {
         /// The adapters that exist.
         found: String,
     },
-    /// `WGPU_BACKEND` names no API that wgpu knows, so no adapter is looked for.
-    #[error("no GPU adapter: WGPU_BACKEND={value:?} names no API (known: vulkan, metal, dx12, gl)")]
-    UnknownApi {
-        /// The value of the variable.
-        value: String,
-    },
+    /// `WGPU_BACKEND` has this value, which names no API that wgpu knows, so no adapter is looked for.
+    #[error("no GPU adapter: WGPU_BACKEND={0:?} names no API (known: vulkan, metal, dx12, gl)")]
+    UnknownApi(String),
     /// The adapter refused to open a device.
     #[error("the adapter {adapter} opened no device: {why}")]
     NoDevice {

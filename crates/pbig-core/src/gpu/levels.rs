@@ -3,8 +3,7 @@
 //! Each split has a cost by the counts of boxes. The cheapest split is found by dynamic programming over the size
 //! classes. Boxes of the largest classes may be left without a level: they go into the last level's single cell.
 
-use crate::pbig::Summary;
-use crate::pbig::summary::OVERSIZE_CLASS;
+use crate::pbig::{OVERSIZE_CLASS, SizeClass, Summary};
 
 /// Cost of a test of two boxes in the last level's single cell. All costs here are ratios; they are not fitted to a
 /// device.
@@ -53,6 +52,7 @@ impl SizeRange {
 /// Returns the cheapest levels, finest first. Boxes larger than those of the last level have none.
 pub(super) fn levels(summary: &Summary) -> Vec<SizeRange> {
     let groups = groups(summary);
+    let length = |(low, high): (f32, f32)| (high - low).clamp(0.0, f32::MAX);
     let space = Space { lengths: std::array::from_fn(|k| length(summary.range(k))) };
     let steps = space.cheapest(&groups);
     let (mut levels, mut end) = (Vec::new(), groups.len());
@@ -67,14 +67,10 @@ pub(super) fn levels(summary: &Summary) -> Vec<SizeRange> {
     levels
 }
 
-fn length((low, high): (f32, f32)) -> f32 {
-    (high - low).clamp(0.0, f32::MAX)
-}
-
 /// Returns the classes in use, neighbours joined so that at most [`MAX_GROUPS`] are left.
 fn groups(summary: &Summary) -> Vec<SizeRange> {
     let used = summary.classes[..OVERSIZE_CLASS].iter().enumerate().filter(|(_, class)| class.boxes > 0);
-    let one = |(i, class): (usize, &crate::pbig::summary::SizeClass)| SizeRange {
+    let one = |(i, class): (usize, &SizeClass)| SizeRange {
         classes: (i, i),
         boxes: class.boxes,
         max_extent: class.max_extent.map(|extent| (extent * EXTENT_ALLOWANCE).next_up().min(f32::MAX)),
@@ -133,7 +129,9 @@ impl Space {
     /// Returns the number of boxes of `level` that an average box of `ranges` is tested against, in an even spread.
     fn candidates(&self, ranges: &[SizeRange], level: &[SizeRange]) -> f64 {
         let all = SizeRange::of(level);
-        let cell = self.cell(&all);
+        let spacing = spacing(self.lengths, all.boxes) as f32;
+        // A cell holds the largest box.
+        let cell = all.max_extent.map(|x| (x * CELL_PER_EXTENT).max(spacing).max(SMALLEST_CELL));
         let share = |own: &[f32; 3], k: usize| {
             let window = own[k] + all.max_extent[k] + cell[k];
             f64::from(window) / f64::from(self.lengths[k].max(window))
@@ -144,12 +142,6 @@ impl Space {
         };
         let sum: f64 = ranges.iter().map(weighted).sum();
         f64::from(all.boxes) * sum / f64::from(count(ranges).max(1))
-    }
-
-    /// Returns the cell of a level for the costs: it holds the largest box.
-    fn cell(&self, level: &SizeRange) -> [f32; 3] {
-        let spacing = spacing(self.lengths, level.boxes) as f32;
-        level.max_extent.map(|extent| (extent * CELL_PER_EXTENT).max(spacing).max(SMALLEST_CELL))
     }
 }
 

@@ -6,15 +6,7 @@
 //!
 //! A call is one submission and one wait, unless there is more work or output than fits in one chunk.
 //!
-//! | file | content |
-//! | --- | --- |
-//! | `device`, `adapter` | the device and its pipelines, shared by finders |
-//! | `session`, `storage`, `upload` | the state of one finder on a device: buffers, and what they hold |
-//! | `search`, `parts` | a call: all boxes at once, or parts of a set that exceeds the device's limits |
-//! | `start`, `map`, `chunk`, `readback` | a submission: recording, submitting, waiting, decoding |
-//! | `changes` | the search for pairs that an update added or removed |
-//! | `plan`, `levels` | the choice of levels and cells |
-//!
+//! `docs/GPU.md` says why it is right and which file has what.
 //! The kernels are in the crate `pbig-shaders`. The module `layout` has the structs that their buffers hold.
 //!
 //! Most callers set [`crate::Backend::Gpu`] and need nothing from here. An app that has a wgpu device passes it on:
@@ -27,25 +19,21 @@
 //! # Ok(()) }
 //! ```
 
+#![cfg_attr(not(feature = "unstable-study"), allow(unreachable_pub, reason = "`study` shows parts of it"))]
+
 mod adapter;
-#[cfg_attr(not(feature = "unstable-study"), allow(unreachable_pub, reason = "`study` shows parts of it"))]
 mod changes;
 mod chunk;
 mod coding;
-mod commands;
-#[cfg_attr(not(feature = "unstable-study"), allow(unreachable_pub, reason = "`Fault` is public with it"))]
 mod device;
 mod error;
-mod found;
 mod levels;
-mod map;
-mod parts;
+mod passes;
 mod plan;
 mod readback;
 mod search;
 mod session;
 mod sink;
-mod start;
 mod storage;
 #[cfg(feature = "unstable-study")]
 pub mod study;
@@ -53,18 +41,17 @@ mod upload;
 
 pub use adapter::{adapters, describe};
 pub(crate) use changes::{Change, ChangeRequest};
-#[cfg(feature = "unstable-study")]
-pub use device::Fault;
 pub(crate) use error::Failure;
 pub use error::GpuError;
-pub(crate) use found::GpuFound;
 pub use plan::GpuPlan;
+pub(crate) use sink::GpuFound;
 
 use crate::policy::AvailableDevice;
-use crate::{Aabb, Config, GpuOptions, ProxyFilter};
+use crate::{Config, GpuOptions};
 use changes::MotionBounds;
 use device::GpuDevice;
-use search::{Task, search};
+pub(crate) use search::SearchRequest;
+use search::search;
 use session::Session;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -88,10 +75,8 @@ enum Source {
 pub struct GpuFinder {
     source: Source,
     device: Option<Arc<GpuDevice>>,
-    session: Option<(GpuOptions, Session)>,
+    session: Option<Session>,
     failed: Option<(Instant, String)>,
-    /// Factor on the cell size: smaller while cells hold too many boxes.
-    cell_factor: f32,
     /// [`crate::Backend::Auto`] takes a software adapter for hardware, in tests.
     pretends_hardware: bool,
 }
@@ -101,14 +86,6 @@ impl Clone for GpuFinder {
     fn clone(&self) -> Self {
         Self { source: self.source.clone(), device: self.device.clone(), ..Self::shared() }
     }
-}
-
-/// A search for all pairs.
-#[derive(Clone, Copy)]
-pub(crate) struct SearchRequest<'a> {
-    pub(crate) boxes: &'a [Aabb],
-    pub(crate) filters: Option<&'a [ProxyFilter]>,
-    pub(crate) config: &'a Config,
 }
 
 impl GpuFinder {
@@ -133,8 +110,7 @@ impl GpuFinder {
     /// # Errors
     /// If the adapter gives no device that the kernels can run on.
     pub fn on(adapter: &wgpu::Adapter) -> Result<Self, GpuError> {
-        let device = Some(Arc::new(GpuDevice::on(adapter)?));
-        Ok(Self { source: Source::Own(Some(adapter.get_info().name)), device, ..Self::shared() })
+        Ok(Self::with(Source::Own(Some(adapter.get_info().name)), GpuDevice::on(adapter)?))
     }
 
     /// Uses the app's own device, which is never replaced: after its loss, calls run on the CPU.
@@ -142,25 +118,21 @@ impl GpuFinder {
     /// # Errors
     /// [`GpuError::TooLimited`] if the device allows less than WebGPU guarantees.
     pub fn from_device(device: wgpu::Device, queue: wgpu::Queue) -> Result<Self, GpuError> {
-        let device = Some(Arc::new(GpuDevice::new(device, queue)?));
-        Ok(Self { source: Source::Given, device, ..Self::shared() })
+        Ok(Self::with(Source::Given, GpuDevice::new(device, queue)?))
     }
 
     fn open(name: Option<String>) -> Result<Self, GpuError> {
-        let device = Some(Arc::new(GpuDevice::on(&adapter::choose(name.as_deref())?)?));
-        Ok(Self { source: Source::Own(name), device, ..Self::shared() })
+        let device = GpuDevice::on(&adapter::choose(name.as_deref())?)?;
+        Ok(Self::with(Source::Own(name), device))
+    }
+
+    fn with(source: Source, device: GpuDevice) -> Self {
+        Self { source, device: Some(Arc::new(device)), ..Self::shared() }
     }
 
     /// Returns a finder on the device that the process shares. The first call opens it.
     pub(crate) fn shared() -> Self {
-        Self {
-            source: Source::Shared,
-            device: None,
-            session: None,
-            failed: None,
-            cell_factor: 1.0,
-            pretends_hardware: false,
-        }
+        Self { source: Source::Shared, device: None, session: None, failed: None, pretends_hardware: false }
     }
 
     /// Returns the adapter's name, kind and API; empty before the first call on a shared device.
@@ -178,29 +150,36 @@ impl GpuFinder {
         self.device.as_ref().is_some_and(|device| device.is_software)
     }
 
-    /// Returns in words which variant of each stage runs on the device, and why.
-    pub fn variants(&self) -> Vec<String> {
-        self.device.as_ref().map_or(Vec::new(), |device| device.variants())
-    }
-
-    /// Makes [`crate::Backend::Auto`] take a software adapter for hardware.
-    #[cfg(feature = "unstable-study")]
-    pub fn pretend_hardware(&mut self) {
-        self.pretends_hardware = true;
-    }
-
-    /// Makes the device fail after so many more submissions.
-    #[cfg(feature = "unstable-study")]
-    pub fn inject(&self, fault: Fault, submissions: u32) {
-        if let Some(device) = &self.device {
-            device.inject(fault, submissions);
-        }
-    }
-
-    /// Finds all pairs of a request.
     pub(crate) fn find(&mut self, request: &SearchRequest<'_>) -> Result<GpuFound, Failure> {
-        let result = self.try_find(request);
-        result.inspect_err(|failure| self.fail(failure))
+        self.run(request.config, 0, |session| search(session, request))
+    }
+
+    /// Runs a search, of a set with so many kept pairs, and notes how it went.
+    fn run(
+        &mut self,
+        config: &Config,
+        kept: u64,
+        search: impl FnOnce(&mut Session) -> Result<GpuFound, Failure>,
+    ) -> Result<GpuFound, Failure> {
+        let result = self.try_run(config, search);
+        match (&result, &mut self.session) {
+            (Err(failure), _) => self.fail(failure),
+            (Ok(found), session) => {
+                self.failed = None;
+                session.iter_mut().for_each(|session| session.end_call(found, kept));
+            }
+        }
+        result
+    }
+
+    fn try_run(
+        &mut self,
+        config: &Config,
+        search: impl FnOnce(&mut Session) -> Result<GpuFound, Failure>,
+    ) -> Result<GpuFound, Failure> {
+        self.check_pause(config)?;
+        let session = self.session(&config.gpu)?;
+        session.device.clone().watch(|| search(session))
     }
 
     /// Drops all state that a failed call may have left wrong.
@@ -220,7 +199,7 @@ impl GpuFinder {
     /// To be called after an update that failed although the device had found its changes: the device has gone on to
     /// the new boxes, the caller has not.
     pub(crate) fn forget_changes(&mut self) {
-        if let Some((_, session)) = &mut self.session {
+        if let Some(session) = &mut self.session {
             session.uploaded.forget_motions();
             session.motion_bounds = MotionBounds::default();
         }
@@ -237,7 +216,6 @@ impl GpuFinder {
         }
     }
 
-    /// Returns the session, on a device that is not lost.
     fn session(&mut self, options: &GpuOptions) -> Result<&mut Session, GpuError> {
         if let Some(device) = self.device.take_if(|device| device.is_lost()) {
             self.session = None;
@@ -255,43 +233,11 @@ impl GpuFinder {
             (None, Source::Given) => return Err(GpuError::Lost),
         };
         self.device = Some(device.clone());
-        let kept = self.session.take().filter(|(known, _)| known == options).map(|(_, session)| session);
-        let session = match kept {
+        let session = match self.session.take().filter(|session| session.options == *options) {
             Some(session) => session,
             None => device.clone().watch(|| Session::new(device, options))?,
         };
-        Ok(&mut self.session.insert((*options, session)).1)
-    }
-
-    fn try_find(&mut self, request: &SearchRequest<'_>) -> Result<GpuFound, Failure> {
-        self.check_pause(request.config)?;
-        let cell_factor = self.cell_factor;
-        let session = self.session(&request.config.gpu)?;
-        let device = session.device.clone();
-        let found = device.watch(|| search(session, &Task::all_pairs(request), cell_factor))?;
-        session.end_call();
-        let pairs = found.pairs.iter().map(Vec::len).sum::<usize>();
-        self.succeed(&found, (request.boxes.len() + pairs) as u64);
-        Ok(found)
-    }
-
-    /// Ends a pause, and adapts the cell size. A search of boxes and pairs takes `useful` tests at least.
-    fn succeed(&mut self, found: &GpuFound, useful: u64) {
-        self.failed = None;
-        if found.plan.is_some() {
-            self.adapt_cells(found.checks.made / useful.max(1));
-        }
-    }
-
-    /// Makes the cells of the next search finer if these held far too many boxes, coarser if they were nearly empty.
-    fn adapt_cells(&mut self, tests_per_useful_test: u64) {
-        const TOO_FULL: u64 = 64;
-        const NEARLY_EMPTY: u64 = 4;
-        if tests_per_useful_test > TOO_FULL {
-            self.cell_factor = (self.cell_factor * 0.5).max(1.0 / 64.0);
-        } else if tests_per_useful_test < NEARLY_EMPTY {
-            self.cell_factor = (self.cell_factor * 2.0).min(1.0);
-        }
+        Ok(self.session.insert(session))
     }
 }
 

@@ -8,9 +8,7 @@ use super::levels::{SizeRange, levels};
 use crate::Aabb;
 use crate::config::{CellRule, GpuOptions};
 use crate::layout::{FEWEST_CELLS, Level, MAX_LEVELS, MAX_SPAN, Params, ordered};
-use crate::pbig::Summary;
-use crate::pbig::cell_size::{cell_size, ordinary, space_of};
-use crate::pbig::summary::size_class_of;
+use crate::pbig::{Summary, cell_size, ordinary, size_class_of, space_of};
 use std::fmt;
 
 /// Most cells of a level per box. With more cells, the scan costs more than full cells do.
@@ -199,81 +197,4 @@ fn dims(space: [f32; 3], cell: f64, most: f64) -> [u32; 3] {
         *longest = (*longest * 3 / 4).max(FEWEST_CELLS);
     }
     dims
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn plan(boxes: &[Aabb]) -> GpuPlan {
-        let plan = GpuPlan::new(&Summary::of(boxes), &GpuOptions::DEFAULT, 1.0, 1 << 24);
-        validate(&plan);
-        plan
-    }
-
-    /// Asserts what the kernels rely on.
-    fn validate(plan: &GpuPlan) {
-        let mut first = 0;
-        for level in &plan.levels {
-            assert_eq!(level.first_cell, first, "{plan}");
-            assert!(level.dims.iter().all(|&d| d == 1 || d >= FEWEST_CELLS), "{plan}");
-            first += level.dims.iter().product::<u32>();
-        }
-        assert_eq!(plan.cells, first);
-        assert!(plan.levels.len() <= MAX_LEVELS);
-        let (last, finer) = plan.levels.split_last().expect("at least one level");
-        assert_eq!(last.dims, [1; 3]);
-        assert!(finer.windows(2).all(|two| two[0].shift < two[1].shift), "{plan}");
-        for k in 0..3 {
-            // Undivided once, undivided in every coarser level: a box never spans more cells there.
-            assert!(plan.levels.windows(2).all(|two| two[0].dims[k] > 1 || two[1].dims[k] == 1), "{plan}");
-        }
-    }
-
-    fn lattice(n: u32, step: f32, half: f32) -> Vec<Aabb> {
-        let at = |i: u32, d: u32| (i / d % n) as f32 * step;
-        (0..n * n * n).map(|i| Aabb::from_center([at(i, 1), at(i, n), at(i, n * n)], [half; 3])).collect()
-    }
-
-    #[test]
-    fn one_size_has_one_level_beside_the_cell_for_everything() {
-        let plan = plan(&lattice(20, 1.0, 0.4));
-        assert_eq!(plan.levels.len(), 2, "{plan}");
-        assert!((0.4..4.0).contains(&plan.cell), "{plan}");
-    }
-
-    #[test]
-    fn clusters_far_apart_do_not_share_a_cell_each() {
-        let mut boxes = lattice(12, 1.0, 0.4);
-        for apart in [1e4f32, 1e7] {
-            boxes.truncate(1728);
-            let away = |b: &Aabb| Aabb::new(b.min.map(|x| x + apart), b.max.map(|x| x + apart));
-            boxes.extend(lattice(12, 1.0, 0.4).iter().map(away));
-            let plan = plan(&boxes);
-            assert!(plan.cell < 4.0, "{apart} apart: {plan}");
-        }
-        // No cell parts identical boxes, so none is looked for.
-        let plan = plan(&[lattice(12, 1.0, 0.4), vec![Aabb::new([3.0; 3], [3.8; 3]); 3000]].concat());
-        assert!(plan.cell > 0.2, "{plan}");
-    }
-
-    #[test]
-    fn twelve_decades_fit_the_integers() {
-        let boxes: Vec<_> = (0..600)
-            .map(|i| Aabb::from_center([(i % 7) as f32; 3], [10f32.powf((i % 121) as f32 / 10.0 - 6.0); 3]))
-            .collect();
-        plan(&boxes);
-    }
-
-    #[test]
-    fn extreme_sets_have_a_plan() {
-        plan(&[]);
-        plan(&[Aabb::NOWHERE; 5]);
-        plan(&[Aabb::new([f32::NEG_INFINITY; 3], [f32::INFINITY; 3]); 5]);
-        plan(&vec![Aabb::new([f32::MAX; 3], [f32::MAX; 3]); 500]);
-        plan(&vec![Aabb::new([1e-42; 3], [2e-42; 3]); 500]);
-        let flat: Vec<_> =
-            (0..900).map(|i| Aabb::from_center([(i % 30) as f32, 0.0, 0.0], [0.5; 3])).collect();
-        plan(&flat);
-    }
 }

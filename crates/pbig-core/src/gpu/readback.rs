@@ -1,8 +1,8 @@
 //! Readback: copies the output of a submission to the host.
 
 use super::GpuError;
-use super::commands::{Commands, MAX_PASSES};
 use super::device::GpuDevice;
+use super::passes::{MAX_PASSES, Recording};
 use super::storage::BufferId;
 use crate::layout::{Counters, Totals};
 use bytemuck::{Pod, Zeroable};
@@ -26,12 +26,14 @@ const TICKS_AT: u64 = TOTALS_AT + size_of::<Totals>() as u64;
 
 impl Header {
     /// Returns the device time of each pass. Some drivers' ticks run backwards across a reset: then it is 0.
-    pub(super) fn times(&self, passes: &[&'static str], period: f32) -> Vec<(&'static str, Duration)> {
-        let time = |i: usize| {
-            let ticks = self.ticks[2 * i + 1].saturating_sub(self.ticks[2 * i]);
-            Duration::from_nanos((ticks as f64 * f64::from(period)) as u64)
-        };
-        passes.iter().enumerate().map(|(i, &name)| (name, time(i))).collect()
+    pub(super) fn times(
+        &self,
+        passes: &[&'static str],
+        period: f32,
+    ) -> impl Iterator<Item = (&'static str, Duration)> {
+        passes.iter().zip(self.ticks.as_chunks::<2>().0).map(move |(&name, [start, end])| {
+            (name, Duration::from_nanos((end.saturating_sub(*start) as f64 * f64::from(period)) as u64))
+        })
     }
 }
 
@@ -43,40 +45,34 @@ pub(super) struct Timestamps {
 }
 
 impl Timestamps {
-    /// Makes the query set, if the device has timestamps.
     pub(super) fn new(device: &GpuDevice) -> Result<Option<Self>, GpuError> {
         if !device.has_timestamps {
             return Ok(None);
         }
-        let count = 2 * MAX_PASSES;
+        let (label, ty, count) = (Some("times"), wgpu::QueryType::Timestamp, 2 * MAX_PASSES);
+        let queries = device.handle.create_query_set(&wgpu::QuerySetDescriptor { label, ty, count });
         let usage = wgpu::BufferUsages::QUERY_RESOLVE | wgpu::BufferUsages::COPY_SRC;
-        Ok(Some(Self {
-            queries: device.handle.create_query_set(&wgpu::QuerySetDescriptor {
-                label: Some("times"),
-                ty: wgpu::QueryType::Timestamp,
-                count,
-            }),
-            resolved: device.buffer("times", u64::from(count) * 8, usage)?,
-        }))
+        Ok(Some(Self { queries, resolved: device.buffer("times", u64::from(count) * 8, usage)? }))
     }
 }
 
 /// Records the copies that end a submission: the header, and the first `prefetch` bytes of output, about as many as the
 /// last call needed (PBIG 5.3).
-pub(super) fn record(commands: &mut Commands<'_>, timestamps: Option<&Timestamps>, prefetch: u64) {
-    let staging = commands.storage.get(BufferId::Staging(commands.side));
-    let (totals, out) = (commands.buffer(Buffer::Totals), commands.buffer(Buffer::Out));
-    let counters = commands.buffer(Buffer::Counters);
-    let encoder = &mut commands.encoder;
-    encoder.copy_buffer_to_buffer(counters, 0, staging, 0, TOTALS_AT);
-    encoder.copy_buffer_to_buffer(totals, 0, staging, TOTALS_AT, size_of::<Totals>() as u64);
+pub(super) fn record(recording: &mut Recording<'_>, timestamps: Option<&Timestamps>, prefetch: u64) {
+    let Recording { storage, encoder, side, passes, .. } = recording;
+    let staging = storage.get(BufferId::Staging(*side));
+    let mut copy = |buffer, at, bytes| {
+        encoder.copy_buffer_to_buffer(storage.get(BufferId::of(buffer, *side)), 0, staging, at, bytes);
+    };
+    copy(Buffer::Counters, 0, TOTALS_AT);
+    copy(Buffer::Totals, TOTALS_AT, TICKS_AT - TOTALS_AT);
+    if prefetch > 0 {
+        copy(Buffer::Out, HEADER_BYTES, prefetch);
+    }
     if let Some(timestamps) = timestamps {
-        let used = 2 * commands.passes.len() as u32;
+        let used = 2 * passes.len() as u32;
         encoder.resolve_query_set(&timestamps.queries, 0..used, &timestamps.resolved, 0);
         encoder.copy_buffer_to_buffer(&timestamps.resolved, 0, staging, TICKS_AT, u64::from(used) * 8);
-    }
-    if prefetch > 0 {
-        encoder.copy_buffer_to_buffer(out, 0, staging, HEADER_BYTES, prefetch);
     }
 }
 

@@ -1,13 +1,17 @@
-//! A call: searches all boxes at once if they fit, else in parts.
+//! A call: searches all boxes at once if they fit, else in parts, which have all pairs together (contract 2).
+//!
+//! For parts the boxes are sorted along an axis and cut into blocks of half the size that fits. Each block is searched
+//! alone, and together with every later block that its boxes reach. This assumes nothing about the boxes: in the worst case
+//! each block is searched with all others.
 
 use super::error::Failure;
-use super::session::{Input, Job, Session};
-use super::sink::Sink;
-use super::{ChangeRequest, GpuError, GpuFound, GpuPlan, SearchRequest, parts};
-use crate::layout::{BOX_BITS, Located, Motion};
+use super::session::{Input, Job, Session, Sizes};
+use super::sink::{GpuFound, Sink};
+use super::{ChangeRequest, GpuError, GpuPlan};
+use crate::layout::{BOX_BITS, Located, Motion, ordered};
 use crate::pbig::Summary;
-use crate::report::{Checks, GpuReport};
-use crate::{Aabb, GpuOptions, Pair, ProxyFilter};
+use crate::report::GpuReport;
+use crate::{Aabb, Config, Pair, ProxyFilter};
 use rayon::prelude::*;
 
 /// Most boxes of one cell: their work items, 2^17 rows by 2^17 / 8 groups of 8 columns, fit 32 bits.
@@ -20,126 +24,99 @@ const MIN_SPLIT_BOXES: usize = 256;
 const MAX_CELLS: u64 = 1 << 28;
 
 /// A search for all pairs or for changes.
-pub(super) struct Task<'a> {
+pub(crate) struct SearchRequest<'a> {
     /// The boxes; in a search for changes the bounds of each box now and at the last update.
-    pub(super) boxes: &'a [Aabb],
-    pub(super) filters: Option<&'a [ProxyFilter]>,
+    pub(crate) boxes: &'a [Aabb],
+    pub(crate) filters: Option<&'a [ProxyFilter]>,
     /// The changes; none in a search for all pairs.
-    pub(super) changes: Option<&'a ChangeRequest<'a>>,
-    /// Most pairs.
-    pub(super) limit: u64,
-    pub(super) options: &'a GpuOptions,
+    pub(crate) changes: Option<&'a ChangeRequest<'a>>,
+    pub(crate) config: &'a Config,
 }
 
-impl<'a> Task<'a> {
-    /// Returns the task to find all pairs of a request.
-    pub(super) fn all_pairs(request: &SearchRequest<'a>) -> Self {
-        let &SearchRequest { boxes, filters, config } = request;
-        Self { boxes, filters, changes: None, limit: config.limits.pairs(), options: &config.gpu }
+impl SearchRequest<'_> {
+    fn sink(&self, session: &Session) -> Sink {
+        let (adapter, subgroups) = (session.device.name.clone(), session.device.has_subgroups);
+        let report = GpuReport { adapter, subgroups, parts: 1, ..GpuReport::default() };
+        let found = GpuFound { report, ..GpuFound::default() };
+        let kept = self.changes.map_or(0, |changes| changes.kept);
+        Sink { found, limit: self.config.limits.pairs(), kept, ..Sink::default() }
+    }
+
+    fn plan(&self, session: &Session, summary: &Summary) -> Result<GpuPlan, GpuError> {
+        let max_cells = (session.storage.max_buffer_bytes / 8).min(MAX_CELLS) as u32;
+        let plan = GpuPlan::new(summary, &self.config.gpu, session.cell_factor, max_cells);
+        // A box has up to 4 x 4 x 4 entries in each level but the last. 32 bits count them.
+        let entries = u64::from(summary.valid) * (64 * (plan.levels.len() as u64 - 1) + 1);
+        let limit = u64::from(u32::MAX);
+        if entries > limit {
+            return Err(GpuError::TooLarge { what: "entries", bytes: entries, limit });
+        }
+        Ok(plan)
+    }
+
+    /// Returns the most boxes that fit every buffer, and an entry's bits.
+    fn max_boxes(&self, session: &Session) -> usize {
+        let largest = if self.changes.is_some() { size_of::<Motion>() } else { size_of::<Located>() };
+        let by_bytes = session.storage.max_buffer_bytes / largest as u64;
+        by_bytes.min(1 << BOX_BITS).min(MAX_BOXES_PER_CELL) as usize
     }
 }
 
 /// Searches in as few parts as fit.
-pub(super) fn search(session: &mut Session, task: &Task<'_>, cell_factor: f32) -> Result<GpuFound, Failure> {
-    let summary = Summary::of(task.boxes);
-    let len = task.boxes.len();
-    let mut most = boxes_at_once(session, task);
+pub(super) fn search(session: &mut Session, request: &SearchRequest<'_>) -> Result<GpuFound, Failure> {
+    let summary = Summary::of(request.boxes);
+    let len = request.boxes.len();
+    // The lists of a set say nothing about a set of another size.
+    session.split = session.split.filter(|&(split, _)| split / 2 <= len && len / 2 <= split);
+    let mut most = request.max_boxes(session).min(session.split.map_or(usize::MAX, |(_, most)| most));
     loop {
-        let mut sink = new_sink(session, task.limit);
+        let mut sink = request.sink(session);
         let result = if len <= most {
-            search_whole(session, task, &summary, cell_factor, &mut sink)
+            search_whole(session, request, &summary, &mut sink)
         } else {
-            search_parts(session, task, &summary, cell_factor, most, &mut sink)
+            search_parts(session, request, &summary, most, &mut sink)
         };
         match result {
             // Only the device knew the length of the list that was too large. Fewer boxes make it shorter.
             Err(Failure::Device(GpuError::TooLarge { .. })) if most > MIN_SPLIT_BOXES => {
                 most = (most.min(len) / 2).max(MIN_SPLIT_BOXES);
                 session.split = Some((len, most));
-                session.reset_capacities();
+                // A set that was too large says nothing about its parts.
+                session.sizes = Sizes::default();
             }
-            Err(failure) => return Err(failure),
-            Ok(plan) => return Ok(found(sink, plan, summary.valid)),
+            result => return result.map(|plan| sink.end(plan, summary.valid)),
         }
     }
 }
 
-fn new_sink(session: &Session, limit: u64) -> Sink {
-    let device = &session.device;
-    let (adapter, subgroups) = (device.name.clone(), device.has_subgroups);
-    let report = GpuReport { adapter, subgroups, parts: 1, ..GpuReport::default() };
-    Sink { pairs: Vec::new(), pair_count: 0, words: 0, limit, checks: Checks::default(), report }
-}
-
-fn found(sink: Sink, plan: Option<GpuPlan>, valid: u32) -> GpuFound {
-    let Sink { pairs, pair_count, words, checks, mut report, .. } = sink;
-    report.compression = if pair_count > 0 { words as f64 / (2 * pair_count) as f64 } else { 0.0 };
-    GpuFound { pairs, restarted: Vec::new(), valid, plan, checks, report }
-}
-
-/// Returns the most boxes to search at once, by the limits and by earlier calls.
-fn boxes_at_once(session: &mut Session, task: &Task<'_>) -> usize {
-    let len = task.boxes.len();
-    // The lists of a set say nothing about a set of another size.
-    session.split = session.split.filter(|&(split, _)| split / 2 <= len && len / 2 <= split);
-    max_boxes(session, task).min(session.split.map_or(usize::MAX, |(_, most)| most))
-}
-
-/// Returns the most boxes that fit every buffer, and an entry's bits.
-fn max_boxes(session: &Session, task: &Task<'_>) -> usize {
-    let largest = if task.changes.is_some() { size_of::<Motion>() } else { size_of::<Located>() };
-    let by_bytes = session.storage.max_buffer_bytes() / largest as u64;
-    by_bytes.min(1 << BOX_BITS).min(MAX_BOXES_PER_CELL) as usize
-}
-
-/// Returns an error if there may be more entries than 32 bits count: 4 x 4 x 4 for a box in each level but the last.
-fn check_entries(plan: &GpuPlan, boxes: usize) -> Result<(), GpuError> {
-    let entries = boxes as u64 * (64 * (plan.levels.len() as u64 - 1) + 1);
-    let limit = u64::from(u32::MAX);
-    if entries <= limit { Ok(()) } else { Err(GpuError::TooLarge { what: "entries", bytes: entries, limit }) }
-}
-
 fn search_whole(
     session: &mut Session,
-    task: &Task<'_>,
+    request: &SearchRequest<'_>,
     summary: &Summary,
-    cell_factor: f32,
     sink: &mut Sink,
 ) -> Result<Option<GpuPlan>, Failure> {
     if summary.valid < 2 {
         return Ok(None);
     }
-    let needs_grid = task.boxes.len() > task.options.all_pairs_up_to as usize;
-    let plan = if needs_grid { Some(plan(session, summary, task, cell_factor)?) } else { None };
-    let input = task.changes.map_or(Input::Boxes(task.boxes), Input::Changes);
-    session.run(&Job { input, filters: task.filters, split: 0, plan: plan.as_ref() }, sink)?;
+    let needs_grid = request.boxes.len() > request.config.gpu.all_pairs_up_to as usize;
+    let plan = needs_grid.then(|| request.plan(session, summary)).transpose()?;
+    let input = request.changes.map_or(Input::Boxes(request.boxes), Input::Changes);
+    session.run(&Job { input, filters: request.filters, split: 0, plan: plan.as_ref() }, sink)?;
     Ok(plan)
-}
-
-fn plan(
-    session: &Session,
-    summary: &Summary,
-    task: &Task<'_>,
-    cell_factor: f32,
-) -> Result<GpuPlan, GpuError> {
-    let max_cells = (session.storage.max_buffer_bytes() / 8).min(MAX_CELLS) as u32;
-    let plan = GpuPlan::new(summary, task.options, cell_factor, max_cells);
-    check_entries(&plan, summary.valid as usize).map(|()| plan)
 }
 
 fn search_parts(
     session: &mut Session,
-    task: &Task<'_>,
+    request: &SearchRequest<'_>,
     summary: &Summary,
-    cell_factor: f32,
     most: usize,
     sink: &mut Sink,
 ) -> Result<Option<GpuPlan>, Failure> {
-    let (sorted, axis) = parts::sorted(task.boxes, summary);
-    let parts = parts::parts(task.boxes, &sorted, axis, most / 2);
+    let (sorted, axis) = sorted(request.boxes, summary);
+    let parts = parts(request.boxes, &sorted, axis, most / 2);
     // The device gets one part after the other.
     session.uploaded.forget_motions();
-    let motions = task.changes.map(|changes| changes.motions(0..task.boxes.len()));
+    let motions = request.changes.map(|changes| changes.motions(0..request.boxes.len()));
     let mut last = None;
     for part in &parts {
         let ids: Vec<u32> = [part.first, part.second].concat();
@@ -148,16 +125,16 @@ fn search_parts(
         if motions.as_ref().is_some_and(|motions| motions.iter().all(|motion| motion.now == motion.before)) {
             continue;
         }
-        let boxes = of_ids(task.boxes, &ids);
-        let filters = task.filters.map(|all| of_ids(all, &ids));
-        let plan = plan(session, &Summary::of(&boxes), task, cell_factor)?;
+        let boxes = of_ids(request.boxes, &ids);
+        let filters = request.filters.map(|all| of_ids(all, &ids));
+        let plan = request.plan(session, &Summary::of(&boxes))?;
         let input = motions.as_deref().map_or(Input::Boxes(&boxes), Input::Motions);
-        let before = sink.pairs.len();
+        let before = sink.found.pairs.len();
         session.run(&Job { input, filters: filters.as_deref(), split, plan: Some(&plan) }, sink)?;
-        name_pairs(&mut sink.pairs[before..], &ids);
+        name_pairs(&mut sink.found.pairs[before..], &ids);
         last = Some(plan);
     }
-    sink.report.parts = parts.len() as u32;
+    sink.found.report.parts = parts.len() as u32;
     Ok(last)
 }
 
@@ -169,4 +146,72 @@ fn of_ids<T: Copy>(all: &[T], ids: &[u32]) -> Vec<T> {
 fn name_pairs(pairs: &mut [Vec<Pair>], ids: &[u32]) {
     let name = |pair: &mut Pair| *pair = Pair::new(ids[pair.a as usize], ids[pair.b as usize]);
     pairs.par_iter_mut().for_each(|piece| piece.iter_mut().for_each(name));
+}
+
+/// Ids of boxes to search: for all pairs of `first`, or for pairs between `first` and `second`.
+#[derive(Debug, PartialEq)]
+struct Part<'a> {
+    first: &'a [u32],
+    second: &'a [u32],
+}
+
+/// Returns the ids of the valid boxes, sorted along the axis on which they are spread most, and that axis.
+fn sorted(boxes: &[Aabb], summary: &Summary) -> (Vec<u32>, usize) {
+    let width = |k: usize| {
+        let ends = summary.sample.iter().map(|b| b.min[k]);
+        ends.clone().fold(f32::MIN, f32::max) - ends.fold(f32::MAX, f32::min)
+    };
+    let axis = (0..3).max_by(|&j, &k| width(j).total_cmp(&width(k))).unwrap_or(0);
+    let mut ids: Vec<u32> = (0..boxes.len() as u32).filter(|&id| boxes[id as usize].is_valid()).collect();
+    ids.sort_unstable_by_key(|&id| (ordered(boxes[id as usize].min[axis]), id));
+    (ids, axis)
+}
+
+/// Returns the parts for blocks of `size` sorted ids.
+fn parts<'a>(boxes: &[Aabb], ids: &'a [u32], axis: usize, size: usize) -> Vec<Part<'a>> {
+    let blocks: Vec<&[u32]> = ids.chunks(size.max(1)).collect();
+    let mut parts = Vec::new();
+    for (i, first) in blocks.iter().enumerate() {
+        parts.push(Part { first, second: &[] });
+        let end = first.iter().map(|&id| ordered(boxes[id as usize].max[axis])).max();
+        // Blocks are sorted: after the first block that begins beyond the end, all do.
+        let begins = |block: &&&[u32]| Some(ordered(boxes[block[0] as usize].min[axis])) <= end;
+        parts.extend(blocks[i + 1..].iter().take_while(begins).map(|second| Part { first, second }));
+    }
+    parts
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::oracle;
+    use std::collections::BTreeSet;
+
+    #[test]
+    fn every_overlapping_pair_is_in_exactly_one_part() {
+        let mut boxes: Vec<_> = (0..300u32)
+            .map(|i| Aabb::from_center([(i * 37 % 101) as f32, (i * 53 % 7) as f32, 0.0], [1.0; 3]))
+            .collect();
+        boxes.push(Aabb::new([f32::NEG_INFINITY; 3], [f32::INFINITY; 3]));
+        boxes.push(Aabb::NOWHERE);
+        for size in [1, 7, 50, 1000] {
+            let (ids, axis) = sorted(&boxes, &Summary::of(&boxes));
+            assert_eq!((ids.len(), axis), (301, 0));
+            let mut found = Vec::new();
+            for part in parts(&boxes, &ids, axis, size) {
+                let pairs = |one: &[u32], other: &[u32]| -> Vec<(u32, u32)> {
+                    one.iter().flat_map(|&a| other.iter().map(move |&b| (a.min(b), a.max(b)))).collect()
+                };
+                let own = pairs(part.first, part.first).into_iter().filter(|(a, b)| a < b);
+                let own: BTreeSet<_> = if part.second.is_empty() { own.collect() } else { BTreeSet::new() };
+                found.extend(own);
+                found.extend(pairs(part.first, part.second));
+            }
+            let overlap = |&(a, b): &(u32, u32)| boxes[a as usize].overlaps(&boxes[b as usize]);
+            let mut overlapping: Vec<_> = found.into_iter().filter(overlap).collect();
+            overlapping.sort_unstable();
+            let wanted: Vec<_> = oracle::pairs(&boxes).iter().map(|p| (p.a, p.b)).collect();
+            assert_eq!(overlapping, wanted, "blocks of {size}");
+        }
+    }
 }

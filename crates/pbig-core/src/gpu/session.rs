@@ -4,49 +4,38 @@
 use super::changes::MotionBounds;
 use super::chunk::{ChunkResult, PendingChunk};
 use super::coding::CodingChoice;
-use super::commands::{BindGroups, Groups};
 use super::device::GpuDevice;
 use super::error::Failure;
+use super::passes::{self, Groups, Step};
 use super::readback::Timestamps;
-use super::sink::Sink;
-use super::start::{FirstSubmission, bit_words};
-use super::storage::{Side, Storage};
-use super::upload::{PendingChanges, UploadCache};
-use super::{ChangeRequest, GpuError, GpuPlan, map};
+use super::sink::{GpuFound, Sink};
+use super::storage::Storage;
+use super::upload::UploadCache;
+use super::{ChangeRequest, GpuError, GpuPlan};
 use crate::config::{Coding, GpuOptions};
+use crate::decode::pair_count;
 use crate::layout::{BITS, Chunk, Counters, FILTERED, LANES, Motion, PACKED, Params};
+use crate::report::{Clock, GpuReport};
 use crate::{Aabb, ProxyFilter};
-use pbig_shaders as shaders;
+use pbig_shaders::CHECK_ALL;
 use std::collections::VecDeque;
 use std::sync::Arc;
 
 /// Most repetitions of a map before the call goes to the CPU. Each one has the capacities that the last one asked for.
 const MAX_REPEATS: u32 = 6;
 
-/// The boxes of a job.
+/// Most words of output per changed box that are prefetched: four pairs. The output of a burst of pairs says nothing about
+/// an update with few changes.
+const PREFETCHED_WORDS_PER_CHANGE: u64 = 8;
+
 #[derive(Clone, Copy)]
 pub(super) enum Input<'a> {
-    /// Boxes now.
     Boxes(&'a [Aabb]),
     /// Boxes now and at the last update.
     Motions(&'a [Motion]),
     /// The same as changes, for a device that has the boxes of the last update.
     Changes(&'a ChangeRequest<'a>),
 }
-
-impl Input<'_> {
-    pub(super) fn len(self) -> usize {
-        match self {
-            Self::Boxes(boxes) => boxes.len(),
-            Self::Motions(motions) => motions.len(),
-            Self::Changes(request) => request.boxes.len(),
-        }
-    }
-}
-
-/// Most words of output per changed box that are prefetched: four pairs. The output of a burst of pairs says nothing about
-/// an update with few changes.
-const PREFETCHED_WORDS_PER_CHANGE: u64 = 8;
 
 /// A search of boxes that fit the device at once.
 pub(super) struct Job<'a> {
@@ -58,195 +47,176 @@ pub(super) struct Job<'a> {
     pub(super) plan: Option<&'a GpuPlan>,
 }
 
-/// The state of a finder on a device, kept from call to call.
-#[derive(Debug)]
-pub(super) struct Session {
-    pub(super) device: Arc<GpuDevice>,
-    pub(super) storage: Storage,
-    pub(super) uploaded: UploadCache,
-    /// Uploaded changes that no submission has applied yet.
-    pub(super) pending_changes: Option<PendingChanges>,
-    pub(super) motion_bounds: MotionBounds,
-    /// This job searches for changes instead of all overlaps.
-    pub(super) finds_changes: bool,
-    pub(super) bind_groups: BindGroups,
-    pub(super) timestamps: [Option<Timestamps>; 2],
-    pub(super) capacities: map::Capacities,
-    /// Number of boxes of a set that needed parts, and of its parts, until the next window of [`Storage::end_call`].
-    pub(super) split: Option<(usize, usize)>,
+/// Lengths of lists and output that earlier calls needed.
+#[derive(Debug, Default)]
+pub(super) struct Sizes {
+    /// Lengths of the lists of the map in the last call.
+    pub(super) lists: Counters,
     /// Expected words of output of a chunk: these are prefetched.
     pub(super) expected_words: u64,
     /// Most words of a chunk of this job.
     pub(super) max_words: u64,
-    /// Capacity for output, in words.
     pub(super) word_capacity: u64,
-    pub(super) coding: CodingChoice,
+}
+
+/// The state of a finder on a device, kept from call to call.
+#[derive(Debug)]
+pub(super) struct Session {
+    pub(super) device: Arc<GpuDevice>,
     pub(super) options: GpuOptions,
+    pub(super) storage: Storage,
+    pub(super) uploaded: UploadCache,
+    pub(super) motion_bounds: MotionBounds,
+    pub(super) timestamps: [Option<Timestamps>; 2],
+    pub(super) sizes: Sizes,
+    pub(super) coding: CodingChoice,
+    /// Factor on the cell size: smaller while cells hold too many boxes.
+    pub(super) cell_factor: f32,
+    /// Number of boxes of a set that needed parts, and of its parts, until the next window of [`Storage::end_call`].
+    pub(super) split: Option<(usize, usize)>,
+    /// This job searches for changes instead of all overlaps.
+    pub(super) finds_changes: bool,
+    /// Changes were uploaded that no submission has applied yet.
+    pub(super) has_pending_changes: bool,
     /// Entries of this job's map, once fetched.
     pub(super) table: Option<Vec<u32>>,
 }
 
 impl Session {
     pub(super) fn new(device: Arc<GpuDevice>, options: &GpuOptions) -> Result<Self, GpuError> {
-        let timestamps = [Timestamps::new(&device)?, Timestamps::new(&device)?];
         Ok(Self {
-            storage: Storage::new(&device, options),
-            uploaded: UploadCache::default(),
-            pending_changes: None,
-            motion_bounds: MotionBounds::default(),
-            finds_changes: false,
-            bind_groups: BindGroups::default(),
-            timestamps,
-            capacities: map::Capacities::default(),
-            split: None,
-            expected_words: 0,
-            max_words: 0,
-            word_capacity: 0,
-            coding: CodingChoice::default(),
             options: *options,
+            storage: Storage::new(device.clone(), options),
+            uploaded: UploadCache::default(),
+            motion_bounds: MotionBounds::default(),
+            timestamps: [Timestamps::new(&device)?, Timestamps::new(&device)?],
+            sizes: Sizes::default(),
+            coding: CodingChoice::default(),
+            cell_factor: 1.0,
+            split: None,
+            finds_changes: false,
+            has_pending_changes: false,
             table: None,
             device,
         })
     }
 
-    /// Finds all pairs of a job.
-    pub(super) fn run(&mut self, job: &Job<'_>, sink: &mut Sink) -> Result<(), Failure> {
-        let first = self.start(job, sink.left(), &mut sink.report)?;
-        let result =
-            if job.plan.is_some() { self.search_grid(first, sink) } else { self.search_all(first, sink) };
-        sink.report.device_bytes = sink.report.device_bytes.max(self.storage.bytes());
-        result
-    }
-
-    /// Uploads the boxes of a job.
-    pub(super) fn upload(&mut self, job: &Job<'_>) -> Result<(), GpuError> {
-        let (device, storage, uploaded) = (&self.device, &mut self.storage, &mut self.uploaded);
-        self.finds_changes = !matches!(job.input, Input::Boxes(_));
-        self.pending_changes = None;
-        match job.input {
-            Input::Boxes(boxes) => uploaded.upload(device, storage, boxes, job.filters)?,
-            Input::Motions(motions) => uploaded.upload_motions(device, storage, motions, job.filters)?,
-            Input::Changes(request) => {
-                self.pending_changes = uploaded.upload_changes(device, storage, request)?;
-                self.expected_words =
-                    self.expected_words.min(PREFETCHED_WORDS_PER_CHANGE * request.changed.len() as u64);
-            }
-        }
-        Ok(())
-    }
-
-    /// Notes the end of a call, which is one job or several.
-    pub(super) fn end_call(&mut self) {
+    /// Notes the end of a call, which is one job or several. Makes the cells of the next search finer if these held far
+    /// too many boxes, coarser if they were nearly empty.
+    pub(super) fn end_call(&mut self, found: &GpuFound, kept: u64) {
+        const TOO_FULL: u64 = 64;
+        const NEARLY_EMPTY: u64 = 4;
         if self.storage.end_call() {
             self.split = None;
         }
-    }
-
-    /// Resets the capacities: a set that was too large says nothing about its parts.
-    pub(super) fn reset_capacities(&mut self) {
-        self.capacities = map::Capacities::default();
-        (self.expected_words, self.max_words, self.word_capacity) = (0, 0, 0);
-    }
-
-    /// Returns the parameters of a job, without capacities.
-    pub(super) fn params(&self, job: &Job<'_>) -> Params {
-        let mut params = job.plan.map_or(Params::default(), GpuPlan::params);
-        params.boxes = job.input.len() as u32;
-        params.small_cell = self.options.small_cell.clamp(1, LANES);
-        // The output of a work item must fit the smallest buffer.
-        params.columns = if self.storage.max_buffer_bytes() < 8 << 20 { 1 } else { 8 };
-        params.flags = if job.filters.is_some() { FILTERED } else { 0 };
-        params.split = job.split;
-        if let Some(changes) = self.pending_changes {
-            params.known = changes.known;
-            (params.box_changes, params.filter_changes) = (changes.boxes, changes.filters);
+        let pairs = found.pairs.iter().map(|piece| piece.len() as u64).sum::<u64>();
+        let useful_tests = (u64::from(found.valid) + kept.max(pairs)).max(1);
+        match found.checks.made / useful_tests {
+            _ if found.plan.is_none() => {}
+            0..NEARLY_EMPTY => self.cell_factor = (self.cell_factor * 2.0).min(1.0),
+            NEARLY_EMPTY..=TOO_FULL => {}
+            _ => self.cell_factor = (self.cell_factor * 0.5).max(1.0 / 64.0),
         }
-        params
     }
 
-    /// Returns the coding. Changes are rarely so many that records or bits are smaller, and bursts of them end.
-    pub(super) fn coding(&self) -> Coding {
-        match self.options.coding {
-            Coding::Auto if self.finds_changes => Coding::Plain,
-            coding => coding,
+    pub(super) fn run(&mut self, job: &Job<'_>, sink: &mut Sink) -> Result<(), Failure> {
+        let params = self.upload(job, &mut sink.found.report)?;
+        let result = self.search(params, sink);
+        let report = &mut sink.found.report;
+        report.device_bytes = report.device_bytes.max(self.storage.bytes());
+        result
+    }
+
+    /// Uploads the boxes of a job. Returns its parameters, without capacities.
+    fn upload(&mut self, job: &Job<'_>, report: &mut GpuReport) -> Result<Params, GpuError> {
+        self.table = None;
+        self.sizes.expected_words = std::mem::take(&mut self.sizes.max_words);
+        self.sizes.word_capacity = self.sizes.expected_words;
+        self.finds_changes = !matches!(job.input, Input::Boxes(_));
+        self.storage.bytes_sent = 0;
+        let mut params = self.params(job);
+        let mut clock = Clock::start();
+        let (storage, uploaded) = (&mut self.storage, &mut self.uploaded);
+        params.boxes = match job.input {
+            Input::Boxes(boxes) => uploaded.upload(storage, boxes, job.filters)?,
+            Input::Motions(motions) => uploaded.upload_motions(storage, motions, job.filters)?,
+            Input::Changes(request) => {
+                let most = PREFETCHED_WORDS_PER_CHANGE * request.changed.len() as u64;
+                self.sizes.expected_words = self.sizes.expected_words.min(most);
+                uploaded.upload_changes(storage, request, &mut params)?
+            }
+        };
+        report.uploaded += self.storage.bytes_sent;
+        report.upload += clock.lap();
+        self.has_pending_changes = params.known > 0;
+        // Changes are rarely so many that records or bits are smaller, and bursts of them end.
+        let is_auto = self.options.coding == Coding::Auto;
+        let coding = if is_auto && self.finds_changes { Coding::Plain } else { self.options.coding };
+        params.flags |= self.coding.flag(coding, &params);
+        Ok(params)
+    }
+
+    fn params(&self, job: &Job<'_>) -> Params {
+        Params {
+            small_cell: self.options.small_cell.clamp(1, LANES),
+            // The output of a work item must fit the smallest buffer.
+            columns: if self.storage.max_buffer_bytes < 8 << 20 { 1 } else { 8 },
+            flags: if job.filters.is_some() { FILTERED } else { 0 },
+            split: job.split,
+            ..job.plan.map_or(Params::default(), GpuPlan::params)
         }
+    }
+
+    /// Searches with a grid, or tests every pair (Avril 3.2).
+    fn search(&mut self, mut params: Params, sink: &mut Sink) -> Result<(), Failure> {
+        let has_grid = params.levels > 0;
+        let before = (sink.pairs, sink.words);
+        for _ in 0..MAX_REPEATS {
+            let chunk = self.submit_first(&mut params, sink.left())?;
+            let first = chunk.items;
+            let done = match self.finish(chunk, &params, sink)? {
+                ChunkResult::Done => Some(first),
+                ChunkResult::MapTooLarge => None,
+                ChunkResult::OutputTooLarge(words) => {
+                    self.sizes.word_capacity = words;
+                    // The map is there, so only the checks are repeated.
+                    has_grid.then(Chunk::default)
+                }
+            };
+            if let Some(done) = done.filter(|_| has_grid) {
+                self.search_rest(&params, rest(&self.sizes.lists, &done), sink)?;
+                let (pairs, words) = (sink.pairs - before.0, sink.words - before.1);
+                self.coding.learn(params.flags & PACKED != 0, pairs, words, self.sizes.lists.entries);
+            }
+            if done.is_some() {
+                return Ok(());
+            }
+            if !has_grid && self.sizes.word_capacity > self.storage.max_buffer_bytes / 4 {
+                // One bit a pair fits the smallest buffer.
+                params.flags |= BITS;
+            }
+        }
+        Err(self.too_large().into())
+    }
+
+    /// Submits the first chunk: with a grid also map and schedule, without one all pairs.
+    fn submit_first(&mut self, params: &mut Params, left: u64) -> Result<PendingChunk, GpuError> {
+        if params.levels == 0 {
+            let small_items = pair_count(params.boxes).div_ceil(u64::from(LANES)) as u32;
+            let items = Chunk { small_items, ..Chunk::default() };
+            let steps = [Step::Run(&CHECK_ALL, Groups::Direct(small_items))];
+            return self.submit(params, items, 0, &steps, left);
+        }
+        passes::make_buffers(&mut self.storage, params, &self.sizes.lists, self.options.first_bytes)?;
+        let [small_items, large_items] = self.chunk_items();
+        let items = Chunk { small_items, large_items, ..Chunk::default() };
+        self.submit(params, items, 0, &passes::map_and_check(params), left)
     }
 
     /// Returns the work items of a chunk. A software adapter gets fewer, so that it answers in time.
-    pub(super) fn chunk_items(&self) -> [u32; 2] {
+    fn chunk_items(&self) -> [u32; 2] {
         let share = if self.device.is_software { 4 } else { 1 };
         self.options.chunk.map(|items| (items / share).max(1))
-    }
-
-    /// Tests every pair (Avril 3.2), in one submission.
-    fn search_all(&mut self, first: FirstSubmission, sink: &mut Sink) -> Result<(), Failure> {
-        let (mut params, mut first) = (first.params, Some(first.chunk));
-        for _ in 0..MAX_REPEATS {
-            let chunk = match first.take() {
-                Some(chunk) => chunk,
-                None => self.submit_all(&params, sink.left())?,
-            };
-            let fixed = (params.flags & BITS != 0).then(|| bit_words(&params));
-            match self.finish_chunk(chunk, &params, fixed, sink)?.1 {
-                ChunkResult::Done => {
-                    sink.report.chunks += 1;
-                    return Ok(());
-                }
-                ChunkResult::OutputTooLarge(words) => self.word_capacity = words,
-                ChunkResult::MapTooLarge => {}
-            }
-            // One bit a pair fits the smallest buffer.
-            params.flags |= if self.word_capacity > self.storage.max_buffer_bytes() / 4 { BITS } else { 0 };
-            sink.report.repeats += 1;
-        }
-        Err(self.too_large().into())
-    }
-
-    /// Searches with a grid: map, schedule and the first chunk in one submission, then the other chunks.
-    fn search_grid(&mut self, first: FirstSubmission, sink: &mut Sink) -> Result<(), Failure> {
-        let (mut params, mut first) = (first.params, Some(first.chunk));
-        let packed = params.flags & PACKED != 0;
-        let before = (sink.pair_count, sink.words);
-        for _ in 0..MAX_REPEATS {
-            let chunk = match first.take() {
-                Some(chunk) => chunk,
-                None => self.submit_grid(&mut params, sink.left())?,
-            };
-            let (counters, result) = self.finish_chunk(chunk, &params, None, sink)?;
-            self.capacities.needed = counters;
-            if !matches!(result, ChunkResult::MapTooLarge) {
-                let rest = self.after_first(result, self.first_chunk(), counters, sink);
-                self.search_rest(&params, rest, sink)?;
-                let (pairs, words) = (sink.pair_count - before.0, sink.words - before.1);
-                self.coding.learn(packed, pairs, words, counters.entries);
-                return Ok(());
-            }
-            sink.report.repeats += 1;
-        }
-        Err(self.too_large().into())
-    }
-
-    /// Returns the work items that are left after the first chunk: all of them if its output did not fit.
-    fn after_first(&mut self, result: ChunkResult, first: Chunk, found: Counters, sink: &mut Sink) -> Chunk {
-        let is_done = matches!(result, ChunkResult::Done);
-        let done = match result {
-            ChunkResult::Done | ChunkResult::MapTooLarge => first,
-            ChunkResult::OutputTooLarge(words) => {
-                self.word_capacity = words;
-                sink.report.repeats += 1;
-                Chunk::default()
-            }
-        };
-        sink.report.chunks += u32::from(is_done);
-        let (first_small, first_large) =
-            (found.small_items.min(done.small_items), found.large_items.min(done.large_items));
-        Chunk {
-            first_small,
-            small_items: found.small_items - first_small,
-            first_large,
-            large_items: found.large_items - first_large,
-            ..Chunk::default()
-        }
     }
 
     /// Searches the other chunks, two at a time: the device checks one while the host decodes the other (PBIG 5.3).
@@ -254,61 +224,48 @@ impl Session {
         let mut pending: VecDeque<Chunk> = cut(rest, self.chunk_items()).into();
         let mut in_progress: VecDeque<PendingChunk> = VecDeque::new();
         let most = if self.options.pipelining { 2 } else { 1 };
-        let mut side = Side::First;
+        let mut side = 0;
         loop {
             while in_progress.len() < most
                 && let Some(items) = pending.pop_front()
             {
-                side = side.other();
-                in_progress.push_back(self.submit_items(params, items, side, sink.left())?);
+                side = 1 - side;
+                let steps = passes::check(items.small_items, items.large_items);
+                in_progress.push_back(self.submit(params, items, side, &steps, sink.left())?);
             }
             let Some(chunk) = in_progress.pop_front() else { return Ok(()) };
             let items = chunk.items;
-            match self.finish_chunk(chunk, params, None, sink)?.1 {
-                ChunkResult::Done | ChunkResult::MapTooLarge => sink.report.chunks += 1,
-                ChunkResult::OutputTooLarge(words) => {
-                    sink.report.repeats += 1;
-                    for part in self.smaller(items, words)?.into_iter().rev() {
-                        pending.push_front(part);
-                    }
-                }
+            if let ChunkResult::OutputTooLarge(words) = self.finish(chunk, params, sink)? {
+                let smaller = self.smaller(items, words)?;
+                smaller.into_iter().rev().for_each(|part| pending.push_front(part));
             }
         }
     }
 
     /// Returns a chunk whose output was too large: whole with more capacity, or in halves if a buffer cannot be so large.
     fn smaller(&mut self, chunk: Chunk, words: u64) -> Result<Vec<Chunk>, GpuError> {
-        if words <= self.storage.max_buffer_bytes() / 4 {
-            self.word_capacity = self.word_capacity.max(words);
+        let most = self.storage.max_buffer_bytes / 4;
+        if words <= most {
+            self.sizes.word_capacity = self.sizes.word_capacity.max(words);
             return Ok(vec![chunk]);
         }
-        self.word_capacity = self.storage.max_buffer_bytes() / 4;
-        let halves = cut(chunk, [chunk.small_items.div_ceil(2).max(1), chunk.large_items.div_ceil(2).max(1)]);
+        self.sizes.word_capacity = most;
+        let halves = cut(chunk, [chunk.small_items.div_ceil(2), chunk.large_items.div_ceil(2)]);
         if halves.len() < 2 { Err(self.too_large()) } else { Ok(halves) }
     }
 
     fn too_large(&self) -> GpuError {
-        let limit = self.storage.max_buffer_bytes();
-        GpuError::TooLarge { what: "the output of one work item", bytes: 4 * self.word_capacity, limit }
+        let limit = self.storage.max_buffer_bytes;
+        GpuError::TooLarge { what: "the output of one work item", bytes: 4 * self.sizes.word_capacity, limit }
     }
+}
 
-    fn submit_items(
-        &mut self,
-        params: &Params,
-        items: Chunk,
-        side: Side,
-        left: u64,
-    ) -> Result<PendingChunk, GpuError> {
-        self.submit_chunk(params, items, side, self.word_capacity, left, &mut |commands| {
-            if items.small_items > 0 {
-                commands.run(&shaders::CHECK_SMALL, Groups::Direct(items.small_items))?;
-            }
-            if items.large_items > 0 {
-                commands.run(&shaders::CHECK_LARGE, Groups::Direct(items.large_items))?;
-            }
-            Ok(())
-        })
-    }
+/// Returns the work items that are left after the first chunk.
+fn rest(all: &Counters, done: &Chunk) -> Chunk {
+    let first_small = all.small_items.min(done.small_items);
+    let first_large = all.large_items.min(done.large_items);
+    let (small_items, large_items) = (all.small_items - first_small, all.large_items - first_large);
+    Chunk { first_small, small_items, first_large, large_items, ..Chunk::default() }
 }
 
 /// Cuts a range of work items into chunks.

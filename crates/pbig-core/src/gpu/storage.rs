@@ -1,10 +1,13 @@
-//! The buffers of a finder on the device. They grow when needed and shrink when they are hardly used.
+//! The buffers of a finder on the device, and the bind groups made of them. Buffers grow when needed and shrink when they
+//! are hardly used.
 
 use super::GpuError;
-use super::device::GpuDevice;
+use super::device::{GpuDevice, Variant};
 use crate::config::GpuOptions;
-use pbig_shaders::Buffer;
+use bytemuck::Pod;
+use pbig_shaders::{Buffer, Kernel};
 use std::collections::HashMap;
+use std::sync::Arc;
 
 /// Calls after which a buffer is freed if none of them used a quarter of it.
 const CALLS_PER_WINDOW: u32 = 64;
@@ -15,62 +18,50 @@ const MIN_BUFFER_BYTES: u64 = 256;
 /// Largest size of a buffer that is kept however little it is used, in bytes.
 const ALWAYS_KEPT_BYTES: u64 = 1 << 16;
 
-/// One of the two sets of buffers for chunks: two chunks can be in progress (PBIG 5.3).
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub(super) enum Side {
-    First,
-    Second,
-}
-
-impl Side {
-    pub(super) fn other(self) -> Self {
-        match self {
-            Self::First => Self::Second,
-            Self::Second => Self::First,
-        }
-    }
-}
+/// One of the two sets of buffers for chunks, 0 or 1: two chunks can be in progress (PBIG 5.3).
+pub(super) type Side = usize;
 
 /// A buffer of a finder.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub(super) enum BufferId {
-    /// A buffer that kernels bind.
-    Bound(Buffer),
-    /// A buffer that kernels bind, one for each side.
-    Sided(Buffer, Side),
+    /// A buffer that kernels bind. Only those of a chunk have a second side.
+    Bound(Buffer, Side),
     /// The buffer through which the host reads a chunk's output.
     Staging(Side),
     /// The buffer through which the host reads parts of other buffers.
     FetchStaging,
 }
 
+impl From<Buffer> for BufferId {
+    fn from(buffer: Buffer) -> Self {
+        Self::Bound(buffer, 0)
+    }
+}
+
 impl BufferId {
     /// Returns the buffer for a binding in a submission on `side`.
     pub(super) fn of(binding: Buffer, side: Side) -> Self {
         match binding {
-            Buffer::Chunk | Buffer::Totals | Buffer::Out => Self::Sided(binding, side),
-            other => Self::Bound(other),
+            Buffer::Chunk | Buffer::Totals | Buffer::Out => Self::Bound(binding, side),
+            other => other.into(),
         }
     }
 
     fn name(self) -> &'static str {
         match self {
-            Self::Bound(buffer) | Self::Sided(buffer, _) => buffer.name(),
+            Self::Bound(buffer, _) => buffer.name(),
             Self::Staging(_) => "staging",
             Self::FetchStaging => "fetch staging",
         }
     }
 
-    /// Returns the usage. All buffers but uniforms and those that the host reads can be bound, written and copied.
     fn usage(self) -> wgpu::BufferUsages {
         use wgpu::BufferUsages as Usage;
         match self {
             Self::Staging(_) | Self::FetchStaging => Usage::MAP_READ | Usage::COPY_DST,
-            Self::Bound(Buffer::Dispatches) => Usage::STORAGE | Usage::INDIRECT,
-            Self::Bound(buffer) | Self::Sided(buffer, _) if buffer.is_uniform() => {
-                Usage::UNIFORM | Usage::COPY_DST
-            }
-            Self::Bound(_) | Self::Sided(..) => Usage::STORAGE | Usage::COPY_DST | Usage::COPY_SRC,
+            Self::Bound(Buffer::Dispatches, _) => Usage::STORAGE | Usage::INDIRECT,
+            Self::Bound(buffer, _) if buffer.is_uniform() => Usage::UNIFORM | Usage::COPY_DST,
+            Self::Bound(..) => Usage::STORAGE | Usage::COPY_DST | Usage::COPY_SRC,
         }
     }
 }
@@ -85,28 +76,29 @@ struct KeptBuffer {
 /// The buffers of a finder.
 #[derive(Debug)]
 pub(super) struct Storage {
+    pub(super) device: Arc<GpuDevice>,
+    /// Largest size of a buffer, in bytes.
+    pub(super) max_buffer_bytes: u64,
+    /// Bytes written since the last reset.
+    pub(super) bytes_sent: u64,
     buffers: HashMap<BufferId, KeptBuffer>,
-    /// Number of changes of any buffer. Bind groups of an earlier generation are stale.
-    pub(super) generation: u64,
+    /// Bind groups of the present buffers.
+    bind_groups: HashMap<(&'static str, Variant, Side), wgpu::BindGroup>,
     calls: u32,
-    max_buffer_bytes: u64,
 }
 
 impl Storage {
-    pub(super) fn new(device: &GpuDevice, options: &GpuOptions) -> Self {
+    pub(super) fn new(device: Arc<GpuDevice>, options: &GpuOptions) -> Self {
         let max_buffer_bytes = device.max_buffer_bytes(options);
-        Self { buffers: HashMap::new(), generation: 0, calls: 0, max_buffer_bytes }
-    }
-
-    /// Returns the largest size of a buffer, in bytes.
-    pub(super) fn max_buffer_bytes(&self) -> u64 {
-        self.max_buffer_bytes
+        let (buffers, bind_groups) = (HashMap::new(), HashMap::new());
+        Self { device, max_buffer_bytes, bytes_sent: 0, buffers, bind_groups, calls: 0 }
     }
 
     /// Makes a buffer at least `bytes` long. A buffer that has to grow loses its content; the result is then true.
-    pub(super) fn ensure(&mut self, device: &GpuDevice, id: BufferId, bytes: u64) -> Result<bool, GpuError> {
-        if bytes > self.max_buffer_bytes {
-            return Err(GpuError::TooLarge { what: id.name(), bytes, limit: self.max_buffer_bytes });
+    pub(super) fn ensure(&mut self, id: impl Into<BufferId>, bytes: u64) -> Result<bool, GpuError> {
+        let (id, limit) = (id.into(), self.max_buffer_bytes);
+        if bytes > limit {
+            return Err(GpuError::TooLarge { what: id.name(), bytes, limit });
         }
         let bytes = bytes.max(MIN_BUFFER_BYTES);
         if let Some(kept) = self.buffers.get_mut(&id).filter(|kept| kept.buffer.size() >= bytes) {
@@ -114,44 +106,64 @@ impl Storage {
             return Ok(false);
         }
         // A quarter more, so that a growing scene does not allocate with every call.
-        let size =
-            (bytes + bytes / 4).min(self.max_buffer_bytes).div_ceil(MIN_BUFFER_BYTES) * MIN_BUFFER_BYTES;
+        let size = (bytes + bytes / 4).min(limit).next_multiple_of(MIN_BUFFER_BYTES);
         // The old buffer goes first, because both at once may not fit.
         self.buffers.remove(&id);
-        let buffer = device.buffer(id.name(), size, id.usage())?;
+        self.bind_groups.clear();
+        let buffer = self.device.buffer(id.name(), size, id.usage())?;
         self.buffers.insert(id, KeptBuffer { buffer, used: bytes });
-        self.generation += 1;
         Ok(true)
     }
 
-    /// Makes a buffer that kernels bind at least `bytes` long, see [`Storage::ensure`].
-    pub(super) fn ensure_bound(
-        &mut self,
-        device: &GpuDevice,
-        buffer: Buffer,
-        bytes: u64,
-    ) -> Result<bool, GpuError> {
-        self.ensure(device, BufferId::Bound(buffer), bytes)
-    }
-
     /// Returns a buffer that [`Storage::ensure`] has made.
-    pub(super) fn get(&self, id: BufferId) -> &wgpu::Buffer {
-        &self.buffers[&id].buffer
-    }
-
-    /// Returns a buffer that kernels bind.
-    pub(super) fn bound(&self, buffer: Buffer) -> &wgpu::Buffer {
-        self.get(BufferId::Bound(buffer))
+    pub(super) fn get(&self, id: impl Into<BufferId>) -> &wgpu::Buffer {
+        &self.buffers[&id.into()].buffer
     }
 
     /// Returns the size of a buffer in bytes, or 0 if there is none.
-    pub(super) fn size(&self, id: BufferId) -> u64 {
-        self.buffers.get(&id).map_or(0, |kept| kept.buffer.size())
+    pub(super) fn size(&self, id: impl Into<BufferId>) -> u64 {
+        self.buffers.get(&id.into()).map_or(0, |kept| kept.buffer.size())
     }
 
-    /// Returns the bytes of all buffers.
     pub(super) fn bytes(&self) -> u64 {
         self.buffers.values().map(|kept| kept.buffer.size()).sum()
+    }
+
+    /// Writes elements into a buffer, from the element `start` on.
+    pub(super) fn write<T: Pod>(&mut self, id: impl Into<BufferId>, start: usize, data: &[T]) {
+        let at = (start * size_of::<T>()) as u64;
+        self.device.queue.write_buffer(self.get(id), at, bytemuck::cast_slice(data));
+        self.bytes_sent += size_of_val(data) as u64;
+    }
+
+    pub(super) fn upload<T: Pod>(&mut self, id: impl Into<BufferId>, data: &[T]) -> Result<(), GpuError> {
+        let id = id.into();
+        self.ensure(id, size_of_val(data) as u64)?;
+        self.write(id, 0, data);
+        Ok(())
+    }
+
+    pub(super) fn bind_group(
+        &mut self,
+        kernel: &'static Kernel,
+        variant: Variant,
+        side: Side,
+        pipeline: &wgpu::ComputePipeline,
+    ) -> wgpu::BindGroup {
+        let key = (kernel.name, variant, side);
+        if let Some(known) = self.bind_groups.get(&key) {
+            return known.clone();
+        }
+        let entry = |(binding, &buffer): (u32, &Buffer)| wgpu::BindGroupEntry {
+            binding,
+            resource: self.get(BufferId::of(buffer, side)).as_entire_binding(),
+        };
+        let entries: Vec<_> = (0..).zip(kernel.bindings).map(entry).collect();
+        let layout = &pipeline.get_bind_group_layout(0);
+        let descriptor = wgpu::BindGroupDescriptor { label: Some(kernel.name), layout, entries: &entries };
+        let made = self.device.handle.create_bind_group(&descriptor);
+        self.bind_groups.insert(key, made.clone());
+        made
     }
 
     /// Notes the end of a call. Once in a window frees buffers that were hardly used, and returns true.
@@ -161,10 +173,9 @@ impl Storage {
             return false;
         }
         self.calls = 0;
-        let before = self.buffers.len();
         self.buffers.retain(|_, kept| kept.buffer.size() <= (4 * kept.used).max(ALWAYS_KEPT_BYTES));
         self.buffers.values_mut().for_each(|kept| kept.used = 0);
-        self.generation += u64::from(self.buffers.len() < before);
+        self.bind_groups.clear();
         true
     }
 }

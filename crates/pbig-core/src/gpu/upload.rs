@@ -3,13 +3,11 @@
 
 use super::ChangeRequest;
 use super::GpuError;
-use super::commands::{Commands, Groups};
-use super::device::GpuDevice;
 use super::storage::Storage;
-use crate::layout::{DeviceBox, LANES, Motion};
+use crate::layout::{DeviceBox, Motion, Params};
 use crate::{Aabb, ProxyFilter};
 use bytemuck::{Pod, cast_slice};
-use pbig_shaders::{self as shaders, Buffer};
+use pbig_shaders::Buffer;
 use rayon::prelude::*;
 use std::ops::Range;
 
@@ -31,148 +29,99 @@ pub(super) const PIECE: usize = 1 << 14;
 pub(super) struct UploadCache {
     boxes: Vec<Aabb>,
     filters: Vec<ProxyFilter>,
-    /// In place of both lists: the update whose motions the device has.
-    motions: Option<KnownMotions>,
-    /// Bytes sent in this call.
-    pub(super) bytes_sent: u64,
+    /// In place of both lists: the update whose motions the device has, and their number.
+    motions: Option<(u64, usize)>,
 }
 
-/// An update whose boxes the device has, now and before.
-#[derive(Clone, Copy, Debug)]
-struct KnownMotions {
-    update: u64,
-    boxes: usize,
-}
-
-/// Uploaded lists of changes, which the kernels `store_previous` and `apply_changes` have yet to apply.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct PendingChanges {
-    /// Number of boxes that the device has.
-    pub(super) known: u32,
-    /// Length of the list of changed boxes.
-    pub(super) boxes: u32,
-    /// Length of the list of changed filters.
-    pub(super) filters: u32,
-}
-
-impl PendingChanges {
-    /// Records the kernels that apply the changes.
-    pub(super) fn record(self, commands: &mut Commands<'_>) -> Result<(), GpuError> {
-        commands.run(&shaders::STORE_PREVIOUS, Groups::Direct(self.known.div_ceil(LANES)))?;
-        let longest = self.boxes.max(self.filters);
-        commands.run(&shaders::APPLY_CHANGES, Groups::Direct(longest.div_ceil(LANES)))
-    }
-}
-
-/// Returns true if an update comes right after another.
-pub(super) fn follows(before: Option<u64>, update: u64) -> bool {
-    before.is_some_and(|before| before.checked_add(1) == Some(update))
-}
-
+/// Each upload returns the number of boxes that the device then has.
 impl UploadCache {
     /// Forgets which motions the device has: the next search for changes uploads all boxes.
     pub(super) fn forget_motions(&mut self) {
         self.motions = None;
     }
 
-    /// Uploads boxes now and before, whatever the device has.
-    pub(super) fn upload_motions(
-        &mut self,
-        device: &GpuDevice,
-        storage: &mut Storage,
-        motions: &[Motion],
-        filters: Option<&[ProxyFilter]>,
-    ) -> Result<(), GpuError> {
-        // The buffers no longer hold what a search for all pairs has left.
-        self.boxes.clear();
-        self.filters.clear();
-        self.motions = None;
-        storage.ensure_bound(device, Buffer::Boxes, size_of_val(motions) as u64)?;
-        self.bytes_sent = write(device, storage, Buffer::Boxes, 0, motions);
-        let filters = filters.unwrap_or(&[]);
-        storage.ensure_bound(device, Buffer::Filters, size_of_val(filters) as u64)?;
-        self.bytes_sent += write(device, storage, Buffer::Filters, 0, filters);
-        Ok(())
-    }
-
-    /// Uploads the changes, or all boxes to a device that does not have those of the last update.
-    pub(super) fn upload_changes(
-        &mut self,
-        device: &GpuDevice,
-        storage: &mut Storage,
-        request: &ChangeRequest<'_>,
-    ) -> Result<Option<PendingChanges>, GpuError> {
-        let len = request.boxes.len();
-        let known = self.motions.filter(|known| follows(Some(known.update), request.update));
-        let (boxes, filters) = (len * size_of::<Motion>(), size_of_val(request.filters));
-        let lost_content = storage.ensure_bound(device, Buffer::Boxes, boxes as u64)?
-            | storage.ensure_bound(device, Buffer::Filters, filters as u64)?;
-        let pending = match known.filter(|_| !lost_content) {
-            Some(known) => Some(self.send_changes(device, storage, request, known.boxes.min(len))?),
-            None => {
-                let motions = request.motions(0..len);
-                self.upload_motions(device, storage, &motions, Some(request.filters))?;
-                None
-            }
-        };
-        self.motions = Some(KnownMotions { update: request.update, boxes: len });
-        Ok(pending)
-    }
-
-    /// Sends the lists of changes of the first `known` boxes, and the boxes after these.
-    fn send_changes(
-        &mut self,
-        device: &GpuDevice,
-        storage: &mut Storage,
-        request: &ChangeRequest<'_>,
-        known: usize,
-    ) -> Result<PendingChanges, GpuError> {
-        let (boxes, filters) = request.lists(known);
-        storage.ensure_bound(device, Buffer::BoxChanges, size_of_val(&boxes[..]) as u64)?;
-        storage.ensure_bound(device, Buffer::FilterChanges, size_of_val(&filters[..]) as u64)?;
-        let new = request.motions(known..request.boxes.len());
-        self.bytes_sent = write(device, storage, Buffer::BoxChanges, 0, &boxes)
-            + write(device, storage, Buffer::FilterChanges, 0, &filters)
-            + write(device, storage, Buffer::Boxes, known, &new)
-            + write(device, storage, Buffer::Filters, known, &request.filters[known..]);
-        let (boxes, filters) = (boxes.len() as u32, filters.len() as u32);
-        Ok(PendingChanges { known: known as u32, boxes, filters })
-    }
-
     /// Uploads the blocks of boxes and filters that differ from those on the device.
     pub(super) fn upload(
         &mut self,
-        device: &GpuDevice,
         storage: &mut Storage,
         boxes: &[Aabb],
         filters: Option<&[ProxyFilter]>,
-    ) -> Result<(), GpuError> {
-        self.bytes_sent = 0;
+    ) -> Result<u32, GpuError> {
         self.motions = None;
-        if storage.ensure_bound(device, Buffer::Boxes, size_of_val(boxes) as u64)? {
-            self.boxes.clear();
+        send_changed(storage, Buffer::Boxes, &mut self.boxes, boxes, DeviceBox::new)?;
+        send_changed(storage, Buffer::Filters, &mut self.filters, filters.unwrap_or(&[]), |filter| *filter)?;
+        Ok(boxes.len() as u32)
+    }
+
+    /// Uploads boxes now and before, whatever the device has.
+    pub(super) fn upload_motions(
+        &mut self,
+        storage: &mut Storage,
+        motions: &[Motion],
+        filters: Option<&[ProxyFilter]>,
+    ) -> Result<u32, GpuError> {
+        // The buffers no longer hold what a search for all pairs has left.
+        *self = Self::default();
+        storage.upload(Buffer::Boxes, motions)?;
+        storage.upload(Buffer::Filters, filters.unwrap_or(&[]))?;
+        Ok(motions.len() as u32)
+    }
+
+    /// Uploads the changes, or all boxes to a device that does not have those of the last update. `params` gets the
+    /// lengths of the lists of changes, which two kernels have yet to apply.
+    pub(super) fn upload_changes(
+        &mut self,
+        storage: &mut Storage,
+        request: &ChangeRequest<'_>,
+        params: &mut Params,
+    ) -> Result<u32, GpuError> {
+        let len = request.boxes.len();
+        let known = self.motions.filter(|(update, _)| update.checked_add(1) == Some(request.update));
+        let (boxes, filters) = (len * size_of::<Motion>(), size_of_val(request.filters));
+        let lost_content =
+            storage.ensure(Buffer::Boxes, boxes as u64)? | storage.ensure(Buffer::Filters, filters as u64)?;
+        match known.filter(|_| !lost_content) {
+            Some((_, known)) => send_lists(storage, request, known.min(len), params)?,
+            None => _ = self.upload_motions(storage, &request.motions(0..len), Some(request.filters))?,
         }
-        for range in update_copy(&mut self.boxes, boxes) {
-            let packed = boxes[range.clone()].par_iter().with_min_len(PIECE).map(DeviceBox::new);
-            let packed: Vec<DeviceBox> = packed.collect();
-            self.bytes_sent += write(device, storage, Buffer::Boxes, range.start, &packed);
-        }
-        let filters = filters.unwrap_or(&[]);
-        if storage.ensure_bound(device, Buffer::Filters, size_of_val(filters) as u64)? {
-            self.filters.clear();
-        }
-        for range in update_copy(&mut self.filters, filters) {
-            let changed = &filters[range.clone()];
-            self.bytes_sent += write(device, storage, Buffer::Filters, range.start, changed);
-        }
-        Ok(())
+        self.motions = Some((request.update, len));
+        Ok(len as u32)
     }
 }
 
-/// Writes elements into a buffer, from the element `start` on. Returns the bytes sent.
-fn write<T: Pod>(device: &GpuDevice, storage: &Storage, buffer: Buffer, start: usize, data: &[T]) -> u64 {
-    device.queue.write_buffer(storage.bound(buffer), (start * size_of::<T>()) as u64, cast_slice(data));
-    size_of_val(data) as u64
+/// Sends the lists of changes of the first `known` boxes, and the boxes after these.
+fn send_lists(
+    storage: &mut Storage,
+    request: &ChangeRequest<'_>,
+    known: usize,
+    params: &mut Params,
+) -> Result<(), GpuError> {
+    let (boxes, filters) = request.lists(known);
+    storage.upload(Buffer::BoxChanges, &boxes)?;
+    storage.upload(Buffer::FilterChanges, &filters)?;
+    storage.write(Buffer::Boxes, known, &request.motions(known..request.boxes.len()));
+    storage.write(Buffer::Filters, known, &request.filters[known..]);
+    params.known = known as u32;
+    (params.box_changes, params.filter_changes) = (boxes.len() as u32, filters.len() as u32);
+    Ok(())
+}
+
+/// Sends the changed blocks of a list, of which the device has `old`.
+fn send_changed<T: Pod + Send + Sync, D: Pod + Send>(
+    storage: &mut Storage,
+    buffer: Buffer,
+    old: &mut Vec<T>,
+    new: &[T],
+    pack: fn(&T) -> D,
+) -> Result<(), GpuError> {
+    if storage.ensure(buffer, (new.len() * size_of::<D>()) as u64)? {
+        old.clear();
+    }
+    for range in update_copy(old, new) {
+        let packed: Vec<D> = new[range.clone()].par_iter().with_min_len(PIECE).map(pack).collect();
+        storage.write(buffer, range.start, &packed);
+    }
+    Ok(())
 }
 
 /// Makes `old` equal to `new`, and returns the ranges of `new` that differed. Changed blocks near each other are one range.

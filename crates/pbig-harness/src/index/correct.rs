@@ -86,7 +86,7 @@ pub fn lazy_pair(id: i64, n: i64) -> Option<(i64, i64)> {
 mod tests {
     use super::super::pairs_of;
     use super::*;
-    use pbig_core::pair_index::pair_of;
+    use crate::pair_index::pair_of;
 
     fn right(k: i64, n: i64) -> (i64, i64) {
         let (a, b) = pair_of(k as u64, n as u64);

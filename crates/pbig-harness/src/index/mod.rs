@@ -1,7 +1,7 @@
 //! Ways from the index of a pair to the pair (Avril et al. 2012, 3.2 and 3.3), right or nearly: each root by
 //! which the row can be estimated, each correction of what it gets wrong, and counts of what is left.
 //!
-//! All of them are for study. The way that pbig takes is [`pbig_core::pair_index`]; rows, columns and indices
+//! All of them are for study. The way that pbig takes is [`crate::pair_index`]; rows, columns and indices
 //! are 0-based here as there, and every estimate is equation 1 in that form.
 
 mod correct;
@@ -19,7 +19,7 @@ pub use rounded::{Form, Rounded, Step};
 pub use search::{Counterexample, counterexample, root_differences, root_errors};
 pub use tally::{MOST_EXHAUSTIVE, Sample, Tally, of as tally_of};
 
-use pbig_core::pair_index::pair_count;
+use crate::pair_index::pair_count;
 
 /// A way of estimating the row, with what can be asked of it.
 #[derive(Clone, Copy)]

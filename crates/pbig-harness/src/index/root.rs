@@ -176,7 +176,7 @@ pub(super) fn integer_row(m: i64, x: i64) -> i64 {
 mod tests {
     use super::super::{discriminant, pairs_of};
     use super::*;
-    use pbig_core::pair_index::pair_of;
+    use crate::pair_index::pair_of;
 
     #[test]
     fn the_integer_root_gives_every_row() {

@@ -2,6 +2,7 @@
 
 use crate::output::{Failure, print};
 use pbig_core::gpu::{GpuError, adapters};
+use pbig_core::layout::Located;
 use pbig_core::{Aabb, Backend, Coding, Config, Finder, GpuFinder, GpuOptions, Limits, Pair, oracle};
 use pbig_harness::boxes::BoxSet;
 use pbig_harness::study::{SETTINGS, pbig_grid, with_gpu_grid};
@@ -50,13 +51,34 @@ fn describe_adapters() -> Result<Vec<(String, GpuFinder)>, Failure> {
     Ok(usable)
 }
 
+/// Which variant of each stage runs on an adapter, and why.
+fn variants(adapter: &wgpu::Adapter) -> [String; 4] {
+    let (features, limits) = (adapter.features(), adapter.limits());
+    let scan = match features.contains(wgpu::Features::SUBGROUP) {
+        true => "with subgroups: the adapter has them",
+        false => "without subgroups: the adapter has none",
+    };
+    let times = match features.contains(wgpu::Features::TIMESTAMP_QUERY) {
+        true => "by timestamps",
+        false => "none: the adapter has no timestamps",
+    };
+    let most = limits.max_buffer_size.min(limits.max_storage_buffer_binding_size) / 256 * 256;
+    [
+        format!("scan, schedule: {scan}"),
+        "check, small cells: the device's square root, corrected by integers; large cells: balanced rows"
+            .into(),
+        format!("times of kernels: {times}"),
+        format!("sets are searched in parts from {} boxes on", most / size_of::<Located>() as u64),
+    ]
+}
+
 /// An adapter, its limits, and the variant of each stage that runs on it and why.
 fn describe(i: usize, adapter: &wgpu::Adapter, opened: &Result<GpuFinder, GpuError>) -> String {
     let (info, limits) = (adapter.get_info(), adapter.limits());
     let chosen = if i == 0 { ", used by `--backend gpu` unless WGPU_ADAPTER_NAME names another" } else { "" };
     let mib = |bytes: u64| bytes >> 20;
     let features = match opened {
-        Ok(gpu) => gpu.variants().join("\n    "),
+        Ok(_) => variants(adapter).join("\n    "),
         Err(why) => format!("not usable: {why}"),
     };
     format!(

@@ -14,8 +14,8 @@ use super::study::{Cell, Point, Study, Table};
 use crate::output::Failure;
 use ends::Shown;
 use exact::Exactly;
-use pbig_core::gpu::study::Bench;
 use pbig_harness::index::{CORRECTIONS, Tally, WAYS, Way};
+use pbig_harness::kernels::Bench;
 use rayon::prelude::*;
 use times::{Times, label};
 

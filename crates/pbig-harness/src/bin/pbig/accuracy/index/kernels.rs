@@ -9,10 +9,10 @@ use super::times::label;
 use crate::bench::measure::timed;
 use crate::output::Failure;
 use pbig_core::GpuOptions;
-use pbig_core::gpu::study::Bench;
 use pbig_core::layout::{LANES, Params};
-use pbig_core::pair_index::{pair_count, pair_of};
 use pbig_harness::index::{AsItIs, Correction, Rules, Tally, WAYS, Way, tally_of};
+use pbig_harness::kernels::Bench;
+use pbig_harness::pair_index::{pair_count, pair_of};
 use pbig_shaders::Kernel;
 
 /// Up to so many boxes all indices are looked at.

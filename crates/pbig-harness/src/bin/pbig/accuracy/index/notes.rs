@@ -3,8 +3,8 @@
 use super::super::study::plain;
 use super::times::{Times, label};
 use super::{Found, ends, exact, paper, percent, roundings, rules};
-use pbig_core::pair_index::pair_of;
 use pbig_harness::index::{CORRECTIONS, LAZY, MOST_EXHAUSTIVE};
+use pbig_harness::pair_index::pair_of;
 
 pub(super) fn notes(found: &Found) -> Vec<String> {
     let mut notes = vec![

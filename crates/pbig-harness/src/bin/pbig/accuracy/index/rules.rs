@@ -3,8 +3,8 @@
 use super::super::study::{Cell, Table, plain};
 use super::times::label;
 use super::{Every, Found};
-use pbig_core::pair_index::{pair_count, pair_of};
 use pbig_harness::index::{Correction, Counterexample, Rules, WAYS, Way};
+use pbig_harness::pair_index::{pair_count, pair_of};
 use rayon::prelude::*;
 
 /// A way, how far counterexamples were searched, and what was found.

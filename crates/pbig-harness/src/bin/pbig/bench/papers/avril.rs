@@ -8,10 +8,10 @@ use super::{Scale, UNSORTED, chart, effort, once};
 use crate::bench::finders::{Finders, Way};
 use crate::bench::measure::Effort;
 use crate::output::Failure;
-use pbig_core::pair_index::pair_count;
 use pbig_core::{Backend, Config, GpuOptions};
 use pbig_harness::boxes::{cubes, moved};
 use pbig_harness::chart::Line;
+use pbig_harness::pair_index::pair_count;
 use pbig_harness::study::{ALL_PAIRS_UP_TO, CellRule, PbigSettings, SETTINGS, with_gpu_grid, with_our_grid};
 use serde_json::json;
 

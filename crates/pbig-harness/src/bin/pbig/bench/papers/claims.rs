@@ -7,7 +7,7 @@ pub(super) use avril::avril;
 use super::lockstep::{Rows, algorithm_1, algorithm_2, equation_7};
 use super::printed::{GAUSSIAN_GB, MOST_SPEED_UPS, OVER_PRI, SEGMENT, SPEED_UPS, TABLE_VI};
 use super::sheet::{Sheet, short, thousands};
-use pbig_core::pair_index::pair_count;
+use pbig_harness::pair_index::pair_count;
 use serde_json::json;
 
 const COLUMNS: [&str; 4] = ["where", "printed", "what is so", "evidence"];

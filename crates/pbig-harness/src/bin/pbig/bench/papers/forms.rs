@@ -6,9 +6,9 @@ use super::printed::AVRIL_5;
 use super::sheet::Sheet;
 use crate::bench::measure::timed;
 use crate::output::Failure;
-use pbig_core::pair_index::pair_of;
 use pbig_core::{Aabb, Coding, GpuOptions, Pair};
 use pbig_harness::boxes::cubes;
+use pbig_harness::pair_index::pair_of;
 use pbig_harness::runner::{Spread, milliseconds};
 use serde_json::json;
 

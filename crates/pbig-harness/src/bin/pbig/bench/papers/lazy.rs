@@ -6,9 +6,9 @@ use super::sheet::{Sheet, short};
 use crate::bench::measure::timed;
 use crate::output::Failure;
 use pbig_core::Aabb;
-use pbig_core::pair_index::{pair_count, pair_of};
 use pbig_harness::boxes::cubes;
 use pbig_harness::index::{AsItIs, Correction, Double, LAZY, Root, Rules, Single, lazy_ids, lazy_pair};
+use pbig_harness::pair_index::{pair_count, pair_of};
 use serde_json::json;
 use std::ops::Range;
 

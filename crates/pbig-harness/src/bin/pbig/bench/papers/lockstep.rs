@@ -1,6 +1,6 @@
 //! PBIG's algorithms 1 and 2 line by line, without boxes: which pairs of a cell they compare, and how often.
 
-use pbig_core::pair_index::{index_of, pair_count};
+use pbig_harness::pair_index::{index_of, pair_count};
 
 /// The number from which equation 7 counts rows.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -5,9 +5,9 @@ use super::printed::{AVRIL_1, AVRIL_EXAMPLES};
 use super::sheet::{Sheet, thousands};
 use crate::output::Failure;
 use pbig_core::GpuOptions;
-use pbig_core::gpu::study::Bench;
 use pbig_core::layout::{LANES, Params};
-use pbig_core::pair_index::{index_of, pair_count, pair_of};
+use pbig_harness::kernels::Bench;
+use pbig_harness::pair_index::{index_of, pair_count, pair_of};
 use serde_json::json;
 
 /// Objects with which the table's elements are numbers; those of the paper's examples.

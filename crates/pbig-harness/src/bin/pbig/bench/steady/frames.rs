@@ -127,7 +127,7 @@ impl Race {
     /// every second frame runs the other way round.
     fn frame(&mut self, frame: usize, name: &str) -> Result<(), Failure> {
         for place in 0..NAMES.len() {
-            let place = if frame % 2 == 0 { place } else { NAMES.len() - 1 - place };
+            let place = if frame.is_multiple_of(2) { place } else { NAMES.len() - 1 - place };
             let side = (frame / 2 + place) % NAMES.len();
             let (done, ms) = self.run(side);
             done.map_err(failure)?;

@@ -7,10 +7,10 @@ use super::super::super::study::{Cell, Table};
 use super::super::percent;
 use super::{Root, run_kernel};
 use crate::output::Failure;
-use pbig_core::gpu::study::Bench;
 use pbig_core::layout::Params;
-use pbig_core::pair_index::index_of;
 use pbig_harness::index::{AsItIs, Correction, Rules, lazy_pair};
+use pbig_harness::kernels::Bench;
+use pbig_harness::pair_index::index_of;
 use rayon::prelude::*;
 use std::ops::Range;
 

@@ -2,8 +2,8 @@
 
 use super::{Estimates, Indices, parts, run_kernel, timed_run};
 use crate::output::Failure;
-use pbig_core::gpu::study::Bench;
 use pbig_harness::index::{LAZY, Tally, lazy_ids, lazy_pair, tally_of};
+use pbig_harness::kernels::Bench;
 
 /// The most boxes for which identifiers have 32 bits.
 pub(super) const MOST_BOXES: u32 = 1 << 16;

@@ -5,9 +5,9 @@ use crate::bench::papers::printed::{
     AVRIL_2, AVRIL_4, AVRIL_4_MEAN, AVRIL_5, AVRIL_6, AVRIL_7, AVRIL_EXAMPLES, AVRIL_FEW, Roots,
 };
 use crate::bench::papers::sheet::{Sheet, short, thousands};
-use pbig_core::pair_index::{index_of, pair_count, pair_of, row_start};
 use pbig_core::{Aabb, Pair, oracle};
 use pbig_harness::boxes::cubes;
+use pbig_harness::pair_index::{index_of, pair_count, pair_of, row_start};
 use pbig_harness::study::density_cell;
 use serde_json::json;
 

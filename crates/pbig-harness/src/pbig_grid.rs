@@ -1,15 +1,63 @@
-//! PBIG's grid (Lo et al. 2013, 4.2 and 4.3), plain and scalar.
+//! PBIG's grid on the CPU (Lo et al. 2013, 4.2 and 4.3): the plain scalar twin of the GPU kernels.
 //!
+//! Every box has an entry in each cell that it touches, and pairs are tested within a cell.
 //! A cell of few boxes is tested through Avril's mapping from indices to pairs, a larger one by PBIG's balanced rows. A pair
 //! that meets in several cells is reported by its owner: the component-wise maximum of the lowest cells of its boxes. The
 //! paper calls this cell the "corner of the intersection with the largest coordinates". It is an integer here, so it is
 //! exact (contract 3).
 
-use super::PbigPlan;
-use crate::config::{GpuOptions, Limits};
 use crate::pair_index::{pair_count, pair_of, row_len, row_pair};
-use crate::report::Checks;
-use crate::{Aabb, Error, Pair};
+use pbig_core::pbig::{Summary, cell_size, cells_along, cells_in, ordinary, pbig_objective, space_of};
+use pbig_core::{Aabb, Checks, Error, GpuOptions, Limits, Pair};
+use std::fmt;
+
+/// Most cells per box. With more cells, empty cells cost more than full ones.
+const MAX_CELLS_PER_BOX: f64 = 4.0;
+
+/// Most cells that a box touches before it is tested against all others instead.
+const MAX_TOUCHED_CELLS: u32 = 512;
+
+/// The grid of [`pbig_grid`]: one entry for each cell that a box touches.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PbigPlan {
+    /// Edge of the cubic cells, in the boxes' length unit.
+    pub cell: f32,
+    /// Lower corner of cell 0, in the boxes' length unit.
+    pub origin: [f32; 3],
+    /// Number of cells on each axis. Boxes beyond are clamped into the border cells.
+    pub dims: [u32; 3],
+    /// Most cells that a box touches before it is tested against all others instead.
+    pub max_cells_per_box: u32,
+    /// `f` of equation 2 at this cell size: average entries per cell.
+    pub objective: f32,
+}
+
+/// `16 x 16 x 16 cells of 1.5, f = 4 entries a cell`.
+impl fmt::Display for PbigPlan {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let [x, y, z] = self.dims;
+        write!(f, "{x} x {y} x {z} cells of {}, f = {} entries a cell", self.cell, self.objective)
+    }
+}
+
+impl PbigPlan {
+    /// Plans the grid for the boxes behind `summary`, with the cell size by [`GpuOptions::cell_rule`] and
+    /// [`GpuOptions::boxes_per_cell`].
+    pub fn new(summary: &Summary, options: &GpuOptions) -> Self {
+        let sample = ordinary(summary);
+        let (space, origin) = space_of(summary, &sample);
+        let n = summary.valid;
+        let mut cell = cell_size(options.cell_rule, &sample, n, space, options.boxes_per_cell.max(1.0));
+        // Oversize boxes in the sample raise alpha, and with it f, at any cell size. Equation 6 would then have a billion
+        // cells for a handful of boxes.
+        while cells_in(space, cell) > f64::from(n.max(64)) * MAX_CELLS_PER_BOX {
+            cell *= 1.25;
+        }
+        let dims = space.map(|length| cells_along(length, cell) as u32);
+        let objective = pbig_objective(&sample, n, space, cell);
+        Self { cell, origin, dims, max_cells_per_box: MAX_TOUCHED_CELLS, objective }
+    }
+}
 
 /// The result of [`pbig_grid`].
 #[derive(Clone, Debug, PartialEq)]
@@ -28,20 +76,12 @@ pub struct PbigFound {
 ///
 /// # Errors
 /// [`Error::TooManyBoxes`] and [`Error::TooManyPairs`], by [`Limits::DEFAULT`].
-///
-/// ```
-/// use pbig_core::{Aabb, GpuOptions, Pair, study};
-/// let boxes = [0.0, 0.9, 5.0].map(|x| Aabb::from_center([x, 0.0, 0.0], [0.5; 3]));
-/// let found = study::pbig_grid(&boxes, &GpuOptions::DEFAULT)?;
-/// assert_eq!(found.pairs, [Pair::new(0, 1)]);
-/// # Ok::<(), pbig_core::Error>(())
-/// ```
 pub fn pbig_grid(boxes: &[Aabb], options: &GpuOptions) -> Result<PbigFound, Error> {
     let limit = Limits::DEFAULT.max_boxes;
     if boxes.len() as u64 > limit {
         return Err(Error::TooManyBoxes { boxes: boxes.len() as u64, limit });
     }
-    let plan = PbigPlan::new(boxes, options);
+    let plan = PbigPlan::new(&Summary::of(boxes), options);
     let grid = PbigGrid::new(&plan, boxes);
     let mut search = PbigSearch { grid: &grid, pairs: Vec::new(), checks: Checks::default() };
     for key in 0..grid.offsets.len() - 1 {
@@ -225,8 +265,8 @@ impl PbigSearch<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::config::CellRule;
-    use crate::oracle;
+    use pbig_core::pbig::{density_cell, pbig_cell};
+    use pbig_core::{CellRule, oracle};
 
     fn boxes() -> Vec<Aabb> {
         let at = |i: u32| [i * 37 % 101, i * 53 % 29, i * 17 % 7].map(|x| x as f32 * 0.7);
@@ -258,5 +298,49 @@ mod tests {
         for boxes in [&[][..], &[Aabb::NOWHERE; 3], &[Aabb::new([0.0; 3], [1.0; 3])]] {
             assert_eq!(pbig_grid(boxes, &GpuOptions::DEFAULT).map(|found| found.pairs), Ok(vec![]));
         }
+    }
+
+    #[test]
+    fn a_ground_under_a_pile_does_not_enlarge_the_cells() {
+        let at = |i: u32| [i % 10, i / 10 % 10, i / 100].map(|c| c as f32 * 2.0);
+        let mut boxes: Vec<Aabb> = (0..999).map(|i| Aabb::from_center(at(i), [0.5; 3])).collect();
+        for half in [1e3, 1e6, 0.5 * f32::MAX] {
+            boxes.push(Aabb::from_center([0.0; 3], [half; 3]));
+            let plan = PbigPlan::new(&Summary::of(&boxes), &GpuOptions::DEFAULT);
+            assert!(plan.cell < 10.0, "ground of {half}: {plan}");
+        }
+    }
+
+    fn cubes(n: usize, edge: f32) -> Vec<Aabb> {
+        vec![Aabb::new([0.0; 3], [edge; 3]); n]
+    }
+
+    #[test]
+    fn objective_by_hand() {
+        // 10^3 boxes of edge 15 in 100^3, cells of 10: M = 1000, alpha = 2^3, f = 8.
+        assert_eq!(pbig_objective(&cubes(10, 15.0), 1000, [100.0; 3], 10.0), 8.0);
+    }
+
+    #[test]
+    fn the_constraint_holds_and_a_smaller_cell_would_break_it() {
+        let (sample, space) = (cubes(1000, 50.0), [1e4; 3]);
+        for wanted in [2.0, 8.0, 32.0] {
+            let cell = pbig_cell(&sample, 1_000_000, space, wanted);
+            let f = |cell| pbig_objective(&sample, 1_000_000, space, cell);
+            assert!(f(cell) >= wanted && f(cell * 0.98) < wanted, "W = {wanted}: cell {cell}");
+        }
+    }
+
+    #[test]
+    fn too_few_boxes_for_the_constraint_get_one_cell() {
+        let cell = pbig_cell(&cubes(5, 1.0), 5, [100.0; 3], 32.0);
+        assert!((cell - 100.0).abs() < 1e-3, "{cell}");
+    }
+
+    #[test]
+    fn density_rule_puts_the_wanted_boxes_into_a_cell_that_fits() {
+        let cell = density_cell(1_000_000, [1000.0; 3], 8.0);
+        assert!((cell - 20.0).abs() < 1e-3, "{cell}");
+        assert_eq!(density_cell(1, [10.0, 5.0, 5.0], 1e9), 10.0);
     }
 }

@@ -8,7 +8,7 @@
 //! many partners.
 //!
 //! ```
-//! use pbig_core::pair_index::{index_of, pair_of};
+//! use pbig_harness::pair_index::{index_of, pair_of};
 //! // The paper's example, n = 1000: pair 71452 is (75, 303) counted from 1.
 //! assert_eq!(pair_of(71_452, 1000), (74, 302));
 //! assert_eq!(index_of(74, 302, 1000), 71_452);

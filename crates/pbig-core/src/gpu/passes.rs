@@ -1,0 +1,157 @@
+//! The kernels and buffers of a submission, as tables. Each kernel is a compute pass with its buffers, its name and its
+//! times.
+
+use super::GpuError;
+use super::device::Variant;
+use super::storage::{BufferId, Side, Storage};
+use crate::layout::{CELLS_PER_BLOCK, Cell, Counters, LANES, LargeItem, Located, Params, Slot, SmallItem};
+use pbig_shaders::{self as shaders, Buffer, Kernel};
+
+/// Workgroups in a row of a dispatch. The portable limit is 65,535.
+const GROUPS_PER_ROW: u32 = 32_768;
+
+/// Most kernels in one submission. Each takes two timestamps.
+pub(super) const MAX_PASSES: u32 = 16;
+
+/// The number of workgroups of a kernel.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Groups {
+    /// A number that the host knows. 0 leaves the kernel out.
+    Direct(u32),
+    /// A number that the device has written into [`Buffer::Dispatches`], at this byte.
+    Indirect(u64),
+}
+
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Step {
+    /// Sets the first bytes of a buffer to 0.
+    Clear(Buffer, u64),
+    Run(&'static Kernel, Groups),
+}
+
+use Groups::{Direct, Indirect};
+use Step::{Clear, Run};
+
+/// Returns the steps that apply uploaded changes.
+pub(super) fn apply_changes(params: &Params) -> [Step; 2] {
+    let longest = params.box_changes.max(params.filter_changes);
+    [
+        Run(&shaders::STORE_PREVIOUS, Direct(params.known.div_ceil(LANES))),
+        Run(&shaders::APPLY_CHANGES, Direct(longest.div_ceil(LANES))),
+    ]
+}
+
+/// Returns the steps that turn boxes into work items, without a round trip to the host, and check the first of these.
+pub(super) fn map_and_check(params: &Params) -> [Step; 12] {
+    let by_box = Direct(params.boxes.div_ceil(LANES));
+    let by_block = Direct(params.cells.div_ceil(CELLS_PER_BLOCK));
+    [
+        Clear(Buffer::Cells, bytes_of::<Cell>(params.cells)),
+        Clear(Buffer::Counters, bytes_of::<Counters>(1)),
+        Run(&shaders::LOCATE, by_box),
+        Run(&shaders::VISIT, if params.levels > 1 { by_box } else { Direct(0) }),
+        Run(&shaders::SCAN_BLOCKS, by_block),
+        Run(&shaders::SCAN_SUMS, Direct(1)),
+        Run(&shaders::SCAN_ADD, Direct(params.cells.div_ceil(LANES))),
+        Run(&shaders::SCHEDULE, by_block),
+        Run(&shaders::SCATTER, by_box),
+        Run(&shaders::ARRANGE, Direct(1)),
+        Run(&shaders::CHECK_SMALL, Indirect(0)),
+        Run(&shaders::CHECK_LARGE, Indirect(12)),
+    ]
+}
+
+pub(super) fn check(small_items: u32, large_items: u32) -> [Step; 2] {
+    [Run(&shaders::CHECK_SMALL, Direct(small_items)), Run(&shaders::CHECK_LARGE, Direct(large_items))]
+}
+
+fn bytes_of<T>(elements: u32) -> u64 {
+    u64::from(elements) * size_of::<T>() as u64
+}
+
+/// Makes the buffers of the map. The device finds out the lengths of the lists: `needed` has those of the last call, and
+/// `params` gets the capacities.
+pub(super) fn make_buffers(
+    storage: &mut Storage,
+    params: &mut Params,
+    needed: &Counters,
+    first_bytes: u64,
+) -> Result<(), GpuError> {
+    let buffers = [
+        (Buffer::Located, bytes_of::<Located>(params.boxes)),
+        (Buffer::Cells, bytes_of::<Cell>(params.cells)),
+        (Buffer::Starts, bytes_of::<u32>(params.cells)),
+        (Buffer::Sums, bytes_of::<u32>(params.cells.div_ceil(CELLS_PER_BLOCK))),
+        (Buffer::Dispatches, bytes_of::<[u32; 3]>(2)),
+    ];
+    for (buffer, bytes) in buffers {
+        storage.ensure(buffer, bytes)?;
+    }
+    let lists = [
+        (Buffer::Entries, needed.entries, size_of::<u32>(), &mut params.entry_capacity),
+        (Buffer::Slots, needed.slots, size_of::<Slot>(), &mut params.slot_capacity),
+        (Buffer::SmallItems, needed.small_items, size_of::<SmallItem>(), &mut params.small_capacity),
+        (Buffer::LargeItems, needed.large_items, size_of::<LargeItem>(), &mut params.large_capacity),
+    ];
+    for (buffer, len, size, capacity) in lists {
+        let bytes = u64::from(len) * size as u64;
+        storage.ensure(buffer, bytes.max(first_bytes.min(storage.max_buffer_bytes)))?;
+        *capacity = u32::try_from(storage.size(buffer) / size as u64).unwrap_or(u32::MAX);
+    }
+    Ok(())
+}
+
+/// Returns true if all lists of the map fitted into their buffers.
+pub(super) fn lists_fit(params: &Params, found: &Counters) -> bool {
+    found.entries <= params.entry_capacity
+        && found.slots <= params.slot_capacity
+        && found.small_items <= params.small_capacity
+        && found.large_items <= params.large_capacity
+}
+
+/// A submission that is being recorded.
+pub(super) struct Recording<'a> {
+    pub(super) storage: &'a mut Storage,
+    pub(super) encoder: wgpu::CommandEncoder,
+    pub(super) side: Side,
+    pub(super) variant: Variant,
+    pub(super) queries: Option<&'a wgpu::QuerySet>,
+    pub(super) passes: Vec<&'static str>,
+}
+
+impl Recording<'_> {
+    pub(super) fn record(&mut self, steps: &[Step]) -> Result<(), GpuError> {
+        for &step in steps {
+            match step {
+                Clear(buffer, bytes) => {
+                    let buffer = self.storage.get(BufferId::of(buffer, self.side));
+                    self.encoder.clear_buffer(buffer, 0, Some(bytes));
+                }
+                Run(_, Direct(0)) => {}
+                Run(kernel, groups) => self.run(kernel, groups)?,
+            }
+        }
+        Ok(())
+    }
+
+    fn run(&mut self, kernel: &'static Kernel, groups: Groups) -> Result<(), GpuError> {
+        let pipeline = self.storage.device.pipeline(kernel, self.variant)?;
+        let bind_group = self.storage.bind_group(kernel, self.variant, self.side, &pipeline);
+        let first_query = 2 * self.passes.len() as u32;
+        let timestamp_writes = self.queries.map(|query_set| wgpu::ComputePassTimestampWrites {
+            query_set,
+            beginning_of_pass_write_index: Some(first_query),
+            end_of_pass_write_index: Some(first_query + 1),
+        });
+        self.passes.push(kernel.name);
+        let descriptor = wgpu::ComputePassDescriptor { label: Some(kernel.name), timestamp_writes };
+        let mut pass = self.encoder.begin_compute_pass(&descriptor);
+        pass.set_pipeline(&pipeline);
+        pass.set_bind_group(0, &bind_group, &[]);
+        match groups {
+            Direct(n) => pass.dispatch_workgroups(n.min(GROUPS_PER_ROW), n.div_ceil(GROUPS_PER_ROW), 1),
+            Indirect(at) => pass.dispatch_workgroups_indirect(self.storage.get(Buffer::Dispatches), at),
+        }
+        Ok(())
+    }
+}
