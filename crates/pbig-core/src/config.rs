@@ -42,8 +42,8 @@ pub struct Limits {
 impl Limits {
     /// 2^27 boxes (3 GiB of boxes alone) and 2^28 pairs (2 GiB).
     pub const DEFAULT: Self = Self { max_boxes: 1 << 27, max_pairs: 1 << 28 };
-    /// 2^28 boxes and 2^30 pairs: as many as the numbers inside can tell apart.
-    pub const UNLIMITED: Self = Self { max_boxes: 1 << 28, max_pairs: 1 << 30 };
+    /// 2^28 boxes and 2^29 pairs: as many as the numbers inside can tell apart.
+    pub const UNLIMITED: Self = Self { max_boxes: 1 << 28, max_pairs: 1 << 29 };
 
     /// Returns the most pairs, at most as many as the numbers inside can tell apart.
     pub(crate) fn pairs(&self) -> u64 {

@@ -114,9 +114,12 @@ pub(crate) fn run_with<T: Send>(own: &mut [T], pieces: usize, work: impl Fn(&mut
 
 /// Makes `buffer` at least `len` elements long without copying what it held: its content is scratch.
 pub(crate) fn ensure_scratch<T: Copy>(buffer: &mut Vec<T>, len: usize, fill: T) {
-    if buffer.len() < len {
+    if buffer.capacity() < len {
         buffer.clear();
         buffer.shrink_to(0);
-        buffer.resize(len + len / 8 + 1024, fill);
+        buffer.reserve_exact(len + len / 8 + 1024);
+    }
+    if buffer.len() < len {
+        buffer.resize(buffer.capacity(), fill);
     }
 }

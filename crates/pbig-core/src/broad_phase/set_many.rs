@@ -49,6 +49,8 @@ impl BroadPhase {
     #[inline(always)]
     pub fn prefetch(&self, id: u32) {
         prefetch(self.world.boxes.as_ptr().wrapping_add(id as usize));
-        prefetch(self.world.filters.as_ptr().wrapping_add(id as usize));
+        if self.world.is_filtered {
+            prefetch(self.world.filters.as_ptr().wrapping_add(id as usize));
+        }
     }
 }

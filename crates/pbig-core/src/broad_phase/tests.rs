@@ -216,7 +216,7 @@ fn an_id_far_above_the_others_is_an_error_and_takes_no_memory() {
     let id = 100_000_000;
     assert_eq!(broad_phase.set(id, cube, ProxyFilter::ALL), Err(Error::SparseId { id, known: 4 }));
     assert_eq!((broad_phase.len(), broad_phase.id_count()), (1, 4));
-    broad_phase.set(1 << 20, cube, ProxyFilter::ALL).expect("an id that costs 44 MB");
+    broad_phase.set(1 << 20, cube, ProxyFilter::ALL).expect("an id that costs 64 MB");
 }
 
 #[test]

@@ -59,7 +59,6 @@ impl BroadPhase {
             ids: self.world.ids(),
             changed: self.world.changed.len(),
             knows_old: self.world.knows_old(),
-            knows_world: self.sweep.is_current(),
             has_grid: self.has_grid,
             spilled: self.grid.spilled(),
         };
@@ -69,15 +68,11 @@ impl BroadPhase {
     fn run_sweep(&mut self) -> Result<(), Error> {
         stage!("check");
         let mut clock = Clock::start();
-        if !self.sweep.is_current() {
-            self.sweep.copy(&self.world);
-        }
-        self.report.checks = self.sweep.run(&self.world, &mut self.comparison);
+        self.report.checks = self.sweep.run(&self.world, &self.kept, &mut self.comparison);
         self.report.stages.check = clock.lap();
         self.report.plan.algorithm = Algorithm::Sweep;
         self.has_grid = false;
         self.apply_events()?;
-        self.sweep.advance(&self.world);
         self.report.stages.diff = clock.lap();
         Ok(())
     }
@@ -152,13 +147,13 @@ impl BroadPhase {
         self.updates += 1;
     }
 
-    /// Returns of how many boxes the next update wants to know what they were.
+    /// Returns the number of old states that are worth keeping until the next update.
     pub(super) fn old_to_keep(&self) -> usize {
         #[cfg(feature = "gpu")]
         if self.may_use_gpu() {
             return usize::MAX;
         }
-        policy::old_states_to_keep(self.len(), self.world.ids(), self.config.forced_engine())
+        policy::old_states_to_keep(self.len(), self.config.forced_engine())
     }
 
     /// Begins a report of nothing done yet.

@@ -8,6 +8,8 @@
 //! A search visits half of each box's neighbouring cells as contiguous runs of slots, tests 64-bit codes (`cells`), and
 //! tests exactly what these leave over.
 
+#[cfg(target_arch = "x86_64")]
+mod avx2;
 mod bounds;
 mod build;
 mod cells;

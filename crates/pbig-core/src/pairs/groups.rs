@@ -4,18 +4,18 @@ use super::row::{self, SHORT};
 use crate::Pair;
 use crate::grid::{Hits, Kernel, Simd, dispatch};
 use crate::parallel::{SharedSlice, ensure_scratch, run, run_with};
-use std::ops::Range;
+use std::ops::{Range, RangeInclusive};
 
-/// log2 of the ids in a group, at least.
-const MIN_SHIFT: u32 = 10;
+/// log2 of the ids in a group: in larger groups the rows do not fit the cache.
+const SHIFTS: RangeInclusive<u32> = 10..=14;
 
-/// Groups, at most, about: each thread has a write position for each.
+/// Groups, about, up to a million ids: so many places to write to fit the processor's table of pages.
 const MAX_GROUPS: usize = 40;
 
 /// Pairs of a row, on average, from which a group is sorted roughly by `b` first: rows are longer than a register.
 const RADIX_FROM: usize = 6;
 
-/// Bits of `b` by which it is.
+/// Bits of an id by which pairs are sorted roughly.
 const RADIX_BITS: u32 = 11;
 
 /// Division of ids into groups.
@@ -29,7 +29,8 @@ pub(crate) struct Grouping {
 impl Grouping {
     /// Groups for so many ids.
     pub(crate) fn new(ids: usize) -> Self {
-        let shift = (MIN_SHIFT..u32::BITS).find(|shift| ids >> shift <= MAX_GROUPS).unwrap_or(MIN_SHIFT);
+        let mut shifts = SHIFTS;
+        let shift = shifts.find(|shift| ids >> shift <= MAX_GROUPS).unwrap_or(*SHIFTS.end());
         Self { ids, shift, count: (ids >> shift) + 1 }
     }
 
@@ -262,6 +263,27 @@ impl<const LIST: bool> Kernel for SortRows<'_, LIST> {
             // SAFETY: the unsorted list is longer by a register.
             unsafe { row::sort_into::<S>(unsorted, range, others, is_long) };
             span.start += base;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn many_events_are_sorted_whatever_the_number_of_ids() {
+        let (mut sorted, mut counts) = (vec![], vec![]);
+        for ids in [2047, 2048, 2049, (1 << 20) - 1, 1 << 20, (1 << 20) + 1] {
+            for len in [0, 10, 2047, 2048, 5000] {
+                let id = |i: u64| (i * 0x9E37_79B9 % ids) as u32;
+                let mut pairs: Vec<Pair> = (0..len).map(|i| Pair::new(id(i), id(i + len))).collect();
+                pairs.push(Pair { a: ids as u32 - 2, b: ids as u32 - 1 });
+                let mut wanted = pairs.clone();
+                wanted.sort_unstable();
+                sort(&mut pairs, &mut sorted, &mut counts, ids as usize);
+                assert_eq!(pairs, wanted, "{len} pairs of {ids} ids");
+            }
         }
     }
 }

@@ -31,11 +31,8 @@ impl Rows {
         let has_room = self.pool.get(span.range().end) == Some(&(SPARE | id));
         let span = if has_room { span } else { self.move_to_end(id, span) };
         let row = &mut self.pool[span.start as usize..][..span.len as usize + 1];
-        let mut place = span.len as usize;
-        while place > 0 && row[place - 1] > other {
-            row[place] = row[place - 1];
-            place -= 1;
-        }
+        let place = row[..span.len as usize].partition_point(|&before| before < other);
+        row.copy_within(place..span.len as usize, place + 1);
         row[place] = other;
         self.spans[id as usize] = Span { len: span.len + 1, ..span };
     }
@@ -112,6 +109,11 @@ impl Kept {
     pub(crate) fn partners(&self, id: u32) -> impl Iterator<Item = u32> {
         let backward = self.backward.get_or_init(|| self.reversed());
         backward.row(id).iter().chain(self.forward.row(id)).copied()
+    }
+
+    /// Yields the partners of a box with larger ids, sorted.
+    pub(crate) fn later_partners(&self, id: u32) -> impl Iterator<Item = u32> {
+        self.forward.row(id).iter().copied()
     }
 
     /// Returns the number of pairs of a box.
@@ -232,6 +234,21 @@ mod tests {
             assert_eq!(kept.forward.pool.len(), places);
             kept.apply(&[], &row(longer).collect::<Vec<_>>());
         }
+    }
+
+    #[test]
+    fn spare_places_survive_compaction() {
+        let mut kept = Kept::default();
+        kept.reserve_ids(300);
+        let pairs = |from: u32, to: u32| (from..to).map(|i| Pair { a: i % 7, b: 10 + i }).collect::<Vec<_>>();
+        kept.apply(&pairs(0, 280), &[]);
+        kept.apply(&[], &pairs(20, 280));
+        for round in 0..50 {
+            kept.apply(&pairs(20, 100 + round), &[]);
+            assert!(kept.iter().eq(sorted(pairs(0, 100 + round).into_iter())));
+            kept.apply(&[], &pairs(20, 100 + round));
+        }
+        assert!(kept.forward.pool.len() <= 2 * 150 + 300, "{} places", kept.forward.pool.len());
     }
 
     fn sorted(pairs: impl Iterator<Item = Pair>) -> std::vec::IntoIter<Pair> {

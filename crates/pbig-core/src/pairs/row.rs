@@ -102,22 +102,22 @@ unsafe fn push(a: u32, row: *const u32, mut mask: u32, pairs: &mut Vec<Pair>) {
     }
 }
 
-/// Appends the pairs of `a` that are in one of two sorted rows only.
+/// Appends the pairs of an id that are in one of two sorted rows only.
 #[inline(always)]
-pub(super) fn differences(a: u32, old: &[u32], new: &[u32], added: &mut Vec<Pair>, removed: &mut Vec<Pair>) {
+pub(crate) fn differences(id: u32, old: &[u32], new: &[u32], added: &mut Vec<Pair>, removed: &mut Vec<Pair>) {
     let (mut i, mut j) = (0, 0);
     while i < old.len() && j < new.len() {
         let (was, is) = (old[i], new[j]);
         if was < is {
-            removed.push(Pair { a, b: was });
+            removed.push(Pair::new(id, was));
         } else if is < was {
-            added.push(Pair { a, b: is });
+            added.push(Pair::new(id, is));
         }
         i += usize::from(was <= is);
         j += usize::from(is <= was);
     }
-    removed.extend(old[i..].iter().map(|&b| Pair { a, b }));
-    added.extend(new[j..].iter().map(|&b| Pair { a, b }));
+    removed.extend(old[i..].iter().map(|&other| Pair::new(id, other)));
+    added.extend(new[j..].iter().map(|&other| Pair::new(id, other)));
 }
 
 #[cfg(test)]
@@ -133,5 +133,32 @@ mod tests {
         differences(5, &[], &[7], &mut added, &mut removed);
         differences(6, &[8], &[], &mut added, &mut removed);
         assert_eq!((added[2], removed[2]), (Pair { a: 5, b: 7 }, Pair { a: 6, b: 8 }));
+    }
+
+    struct Compared<'a>(&'a [u32], &'a [u32]);
+
+    impl crate::grid::Kernel for Compared<'_> {
+        type Output = [Vec<Pair>; 2];
+
+        #[inline(always)]
+        unsafe fn run<S: Simd>(self) -> Self::Output {
+            let Self(old, new) = self;
+            let [mut added, mut removed] = [vec![], vec![]];
+            // SAFETY: the caller has the instructions.
+            unsafe { compare::<S>(1, (old, 0..3), (new, 0..4), &mut added, &mut removed) };
+            [added, removed]
+        }
+    }
+
+    #[test]
+    fn rows_are_compared_alike_in_the_middle_of_a_pool_and_at_its_end() {
+        // Behind the rows, numbers of the other one.
+        let old = [2, 4, 6, 5, 7, 5, 7, 5, 7];
+        let new = [4, 5, 6, 7, 2, 2, 2, 2, 2];
+        for (old, new) in [(&old[..], &new[..]), (&old[..3], &new[..4]), (&old[..], &new[..4])] {
+            let [added, removed] = crate::grid::dispatch(Compared(old, new));
+            assert_eq!(added, [5, 7].map(|b| Pair { a: 1, b }));
+            assert_eq!(removed, [Pair { a: 1, b: 2 }]);
+        }
     }
 }

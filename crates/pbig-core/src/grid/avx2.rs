@@ -1,0 +1,189 @@
+//! The inner loops by AVX2, which all x86-64 processors of the last ten years have.
+
+use super::cells::{APART, Cells, MAX_STEP, MIN_STEP, Steps, TOMBSTONE};
+use super::simd::{BLOCK, EightBoxes, Simd};
+use crate::Aabb;
+use std::arch::x86_64::*;
+
+/// Four codes to a register of 256 bits. (512 bits were slower on Zen 4: every other load crosses a cache line.)
+#[derive(Clone, Copy)]
+pub(crate) struct Avx2;
+
+/// By mask: the numbers of its set bits, a byte each, lowest first.
+static SET_BITS: [u64; 256] = {
+    let mut table = [0; 256];
+    let mut mask = 0;
+    while mask < 256 {
+        let (mut bit, mut shift) = (0, 0);
+        while bit < 8 {
+            if mask >> bit & 1 == 1 {
+                table[mask] |= (bit as u64) << shift;
+                shift += 8;
+            }
+            bit += 1;
+        }
+        mask += 1;
+    }
+    table
+};
+
+impl Simd for Avx2 {
+    #[inline(always)]
+    unsafe fn steps(cells: &Cells, aabb: &Aabb) -> (Steps, Steps) {
+        // SAFETY: the loads lie inside the box and the cells; the caller has AVX2.
+        unsafe {
+            let (min, max) = aabb.corners();
+            let origin = _mm256_loadu_pd(cells.origin.as_ptr());
+            let scale = _mm256_loadu_pd(cells.scale.as_ptr());
+            let steps = |corner: __m128| -> Steps {
+                let x = _mm256_mul_pd(_mm256_sub_pd(_mm256_cvtps_pd(corner), origin), scale);
+                // The second operand wins where the first is NaN.
+                let x = _mm256_max_pd(_mm256_min_pd(x, _mm256_set1_pd(MAX_STEP)), _mm256_set1_pd(MIN_STEP));
+                std::mem::transmute::<__m128i, Steps>(_mm256_cvtpd_epi32(x))
+            };
+            (steps(min), steps(max))
+        }
+    }
+
+    #[inline(always)]
+    unsafe fn key(cells: &Cells, point: Steps) -> u32 {
+        let [x, y, z] = cells.dims;
+        // SAFETY: the caller has AVX2.
+        unsafe {
+            let point = std::mem::transmute::<Steps, __m128i>(point);
+            let cell = _mm_sra_epi32(point, _mm_cvtsi32_si128(cells.shift as i32));
+            let cell = if cells.wraps {
+                _mm_and_si128(cell, _mm_setr_epi32(x - 1, y - 1, z - 1, 0))
+            } else {
+                let most = _mm_setr_epi32(x - 2, y - 2, z - 2, 0);
+                _mm_min_epi32(_mm_max_epi32(cell, _mm_set1_epi32(1)), most)
+            };
+            let key = _mm_mullo_epi32(cell, _mm_setr_epi32(1, x, x.wrapping_mul(y), 0));
+            let key = _mm_add_epi32(key, _mm_shuffle_epi32::<0b01_00_11_10>(key));
+            _mm_cvtsi128_si32(_mm_add_epi32(key, _mm_shuffle_epi32::<0b10_11_00_01>(key))) as u32
+        }
+    }
+
+    #[inline(always)]
+    unsafe fn takes(cells: &Cells, aabb: &Aabb) -> bool {
+        let [x, y, z] = cells.max_extent;
+        // SAFETY: the caller has AVX2.
+        unsafe {
+            let (min, max) = aabb.corners();
+            let extent = _mm_sub_ps(max, min);
+            let fits = _mm_cmple_ps(extent, _mm_setr_ps(x, y, z, 0.0));
+            _mm_movemask_ps(_mm_and_ps(_mm_cmpge_ps(extent, _mm_setzero_ps()), fits)) & 7 == 7
+        }
+    }
+
+    #[inline(always)]
+    unsafe fn code(low: Steps, high: Steps) -> u64 {
+        // SAFETY: the caller has AVX2.
+        unsafe {
+            let [low, high] = [low, high].map(|steps| std::mem::transmute::<Steps, __m128i>(steps));
+            let (mask, shifts) = (_mm_setr_epi32(511, 511, 511, 0), _mm_setr_epi32(0, 10, 20, 0));
+            let field = |steps| _mm_sllv_epi32(_mm_and_si128(steps, mask), shifts);
+            let (low, high) = (field(_mm_sub_epi32(_mm_setzero_si128(), low)), field(high));
+            let or = _mm_or_si128(_mm_unpacklo_epi32(low, high), _mm_unpackhi_epi32(low, high));
+            _mm_cvtsi128_si64(_mm_or_si128(or, _mm_shuffle_epi32::<0b01_00_11_10>(or))) as u64
+        }
+    }
+
+    #[inline(always)]
+    unsafe fn test(query: u64, codes: *const u64) -> u32 {
+        // SAFETY: the caller has a block of codes there, and AVX2.
+        unsafe {
+            let query = _mm256_set1_epi64x(query as i64);
+            let apart = _mm256_set1_epi64x((APART | TOMBSTONE) as i64);
+            let half = |at: usize| {
+                let codes = _mm256_loadu_si256(codes.add(at).cast());
+                let sum = _mm256_and_si256(_mm256_add_epi64(query, codes), apart);
+                let near = _mm256_cmpeq_epi64(sum, _mm256_setzero_si256());
+                _mm256_movemask_pd(_mm256_castsi256_pd(near)) as u32
+            };
+            half(0) | half(BLOCK / 2) << (BLOCK / 2)
+        }
+    }
+
+    #[inline(always)]
+    unsafe fn expand(query: u32, first: u32, mask: u32, queries: *mut u32, places: *mut u32) -> usize {
+        // SAFETY: the caller has room for a block, and AVX2; a mask has eight bits.
+        unsafe {
+            let bits = _mm_cvtsi64_si128(SET_BITS[mask as usize & 255] as i64);
+            let found = _mm256_add_epi32(_mm256_set1_epi32(first as i32), _mm256_cvtepu8_epi32(bits));
+            _mm256_storeu_si256(queries.cast(), _mm256_set1_epi32(query as i32));
+            _mm256_storeu_si256(places.cast(), found);
+        }
+        mask.count_ones() as usize
+    }
+
+    /// A sorting network of six steps; numbers behind the row take part as the largest ones.
+    #[inline(always)]
+    unsafe fn sorted_short(row: *const u32, len: usize) -> [u32; 8] {
+        macro_rules! step {
+            ($row:ident, $swapped:expr, $upper:literal) => {{
+                let swapped = $swapped;
+                _mm256_blend_epi32::<$upper>(_mm256_min_epu32($row, swapped), _mm256_max_epu32($row, swapped))
+            }};
+        }
+        // SAFETY: the caller has 8 numbers there, and AVX2.
+        unsafe {
+            let lanes = _mm256_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7);
+            let behind = _mm256_cmpgt_epi32(lanes, _mm256_set1_epi32(len as i32 - 1));
+            let v = _mm256_or_si256(_mm256_loadu_si256(row.cast()), behind);
+            let v = step!(v, _mm256_shuffle_epi32::<0b10_11_00_01>(v), 0b1010_1010);
+            let v = step!(v, _mm256_shuffle_epi32::<0b00_01_10_11>(v), 0b1100_1100);
+            let v = step!(v, _mm256_shuffle_epi32::<0b10_11_00_01>(v), 0b1010_1010);
+            let reversed =
+                _mm256_permute4x64_epi64::<0b01_00_11_10>(_mm256_shuffle_epi32::<0b00_01_10_11>(v));
+            let v = step!(v, reversed, 0b1111_0000);
+            let v = step!(v, _mm256_shuffle_epi32::<0b01_00_11_10>(v), 0b1100_1100);
+            let v = step!(v, _mm256_shuffle_epi32::<0b10_11_00_01>(v), 0b1010_1010);
+            std::mem::transmute::<__m256i, [u32; 8]>(v)
+        }
+    }
+
+    #[inline(always)]
+    unsafe fn same_short(one: *const u32, other: *const u32, len: usize) -> bool {
+        // SAFETY: the caller has 8 numbers each, and AVX2.
+        unsafe {
+            let same = _mm256_cmpeq_epi32(_mm256_loadu_si256(one.cast()), _mm256_loadu_si256(other.cast()));
+            let same = _mm256_movemask_ps(_mm256_castsi256_ps(same)) as u32;
+            !same & ((1 << len) - 1) == 0
+        }
+    }
+
+    #[inline(always)]
+    unsafe fn absent(numbers: *const u32, others: *const u32, len: usize) -> u32 {
+        // SAFETY: the caller has 8 numbers each, and AVX2.
+        unsafe {
+            let lanes = _mm256_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7);
+            let behind = _mm256_cmpgt_epi32(lanes, _mm256_set1_epi32(len as i32 - 1));
+            let numbers = _mm256_loadu_si256(numbers.cast());
+            // No id is the largest number.
+            let mut others = _mm256_or_si256(_mm256_loadu_si256(others.cast()), behind);
+            let next = _mm256_setr_epi32(1, 2, 3, 4, 5, 6, 7, 0);
+            let mut found = _mm256_cmpeq_epi32(numbers, others);
+            for _ in 1..8 {
+                others = _mm256_permutevar8x32_epi32(others, next);
+                found = _mm256_or_si256(found, _mm256_cmpeq_epi32(numbers, others));
+            }
+            !_mm256_movemask_ps(_mm256_castsi256_ps(found)) as u32 & 255
+        }
+    }
+
+    #[inline(always)]
+    unsafe fn overlaps_eight(boxes: &EightBoxes, aabb: &Aabb) -> u32 {
+        // SAFETY: the caller has AVX2.
+        unsafe {
+            let mut overlaps = _mm256_castsi256_ps(_mm256_set1_epi32(-1));
+            for k in 0..3 {
+                let (min, max) = (_mm256_loadu_ps(boxes[k].as_ptr()), _mm256_loadu_ps(boxes[k + 3].as_ptr()));
+                let below = _mm256_cmp_ps::<_CMP_LE_OQ>(_mm256_set1_ps(aabb.min[k]), max);
+                let above = _mm256_cmp_ps::<_CMP_LE_OQ>(min, _mm256_set1_ps(aabb.max[k]));
+                overlaps = _mm256_and_ps(overlaps, _mm256_and_ps(below, above));
+            }
+            _mm256_movemask_ps(overlaps) as u32
+        }
+    }
+}
