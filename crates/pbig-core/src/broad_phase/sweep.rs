@@ -48,30 +48,42 @@ impl Sweep {
         }
     }
 
-    /// Compares what a box overlaps with its kept pairs. Where few have changed, `id` is one of them, and a pair of two changed
-    /// boxes is the first one's business; otherwise every pair is.
-    fn compare(&mut self, world: &World, kept: &Kept, id: u32, many: bool, events: &mut Comparison) {
+    /// Compares what a changed box overlaps with its kept pairs. A pair of two changed boxes is the first one's business.
+    fn compare_all(&mut self, world: &World, kept: &Kept, id: u32, events: &mut Comparison) {
         let Self { now, was, .. } = self;
-        let has_changed = |other: u32| world.change_of(other).is_some();
-        let is_own = |other: u32| other > id || !many && other < id && !has_changed(other);
-        let filter = &world.filters[id as usize];
-        let allows = |other: u32| !world.is_filtered || filter.allows(&world.filters[other as usize]);
-        now.retain(|&other| is_own(other) && allows(other));
+        let is_own = |other: u32| other > id || other < id && world.change_of(other).is_none();
+        now.retain(|&other| is_own(other));
         was.clear();
-        if many {
-            was.extend(kept.later_partners(id));
-        } else {
-            was.extend(kept.partners(id).filter(|&other| is_own(other)));
-        }
-        if world.has_removed() {
-            let ended = |other: u32| world.was_removed(id) || world.was_removed(other);
-            events
-                .dropped
-                .extend(was.iter().filter(|other| ended(**other)).map(|&other| Pair::new(id, other)));
-            was.retain(|&other| !ended(other));
-        }
-        differences(id, was, now, &mut events.added, &mut events.removed);
+        was.extend(kept.partners(id).filter(|&other| is_own(other)));
+        compare(world, id, was, now, events);
     }
+
+    /// Compares the later boxes that a box overlaps with its kept pairs.
+    #[inline(always)]
+    fn compare_later(&mut self, world: &World, kept: &Kept, id: u32, events: &mut Comparison) {
+        let Self { now, was, .. } = self;
+        let partners = kept.later_partners(id);
+        if partners != &now[..] || world.is_filtered || world.has_removed() {
+            was.clear();
+            was.extend_from_slice(partners);
+            compare(world, id, was, now, events);
+        }
+    }
+}
+
+/// Compares what a box overlaps with its kept partners.
+#[cold]
+fn compare(world: &World, id: u32, was: &mut Vec<u32>, now: &mut Vec<u32>, events: &mut Comparison) {
+    if world.is_filtered {
+        let filter = &world.filters[id as usize];
+        now.retain(|&other| filter.allows(&world.filters[other as usize]));
+    }
+    if world.has_removed() {
+        let ended = |other: u32| world.was_removed(id) || world.was_removed(other);
+        events.dropped.extend(was.iter().filter(|other| ended(**other)).map(|&other| Pair::new(id, other)));
+        was.retain(|&other| !ended(other));
+    }
+    differences(id, was, now, &mut events.added, &mut events.removed);
 }
 
 struct SweepAll<'a> {
@@ -93,19 +105,25 @@ impl Kernel for SweepAll<'_> {
         let count = if many { world.ids() } else { world.changed.len() };
         for i in 0..count {
             let id = if many { i } else { world.changed[i] as usize };
-            let first = if many { id / BLOCK } else { 0 };
+            let (first, mut wanted) =
+                if many { (id / BLOCK, 255 & !((2 << (id % BLOCK)) - 1)) } else { (0, 255) };
             made += (world.ids() - first * BLOCK) as u64;
             sweep.now.clear();
             for (block, boxes) in sweep.blocks.iter().enumerate().skip(first) {
                 // SAFETY: the caller has the instructions.
-                let mut mask = unsafe { S::overlaps_eight(boxes, &world.boxes[id]) };
+                let mut mask = unsafe { S::overlaps_eight(boxes, &world.boxes[id]) } & wanted;
+                wanted = 255;
                 met += u64::from(mask.count_ones());
                 while mask != 0 {
                     sweep.now.push((block * BLOCK) as u32 + mask.trailing_zeros());
                     mask &= mask - 1;
                 }
             }
-            sweep.compare(world, kept, id as u32, many, events);
+            if many {
+                sweep.compare_later(world, kept, id as u32, events);
+            } else {
+                sweep.compare_all(world, kept, id as u32, events);
+            }
         }
         (made, met)
     }

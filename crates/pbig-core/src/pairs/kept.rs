@@ -111,9 +111,9 @@ impl Kept {
         backward.row(id).iter().chain(self.forward.row(id)).copied()
     }
 
-    /// Yields the partners of a box with larger ids, sorted.
-    pub(crate) fn later_partners(&self, id: u32) -> impl Iterator<Item = u32> {
-        self.forward.row(id).iter().copied()
+    /// Returns the partners of a box with larger ids, sorted.
+    pub(crate) fn later_partners(&self, id: u32) -> &[u32] {
+        self.forward.row(id)
     }
 
     /// Returns the number of pairs of a box.
