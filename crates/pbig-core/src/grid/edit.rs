@@ -1,7 +1,7 @@
 //! Editing a grid in place: boxes that moved since it was built.
 //!
-//! A box that stays in its cell is overwritten. One that leaves its cell leaves a tombstone in its slot; it takes over a
-//! tombstone's slot in its new cell, or goes to a *spill* list of that cell.
+//! A box that stays in its cell is overwritten. One that leaves its cell leaves a tombstone in its slot, and goes to a
+//! *spill* list of its new cell.
 
 use super::cells::TOMBSTONE;
 use super::lookup::Place;
@@ -188,18 +188,6 @@ impl EditedGrid {
         }
     }
 
-    fn put(&mut self, record: Record, code: u64) {
-        let key = record.key as usize;
-        let (first, end) = (self.grid.starts[key] as usize, self.grid.starts[key + 1] as usize);
-        let free = self.grid.codes[first..end].iter().position(|code| *code == TOMBSTONE);
-        if let Some(free) = free {
-            self.grid.records[first + free] = record;
-            self.grid.codes[first + free] = code;
-        } else {
-            self.spill.insert(record, self.grid.plan.cells.count());
-        }
-    }
-
     /// Returns true if the box stays in its slot or spill list, where it is overwritten then.
     fn overwrite(&mut self, record: Record, code: u64, place: Place) -> bool {
         match place {
@@ -270,7 +258,7 @@ impl Kernel for MoveAll<'_> {
             };
             if !grid.overwrite(*record, code, place) {
                 grid.take_out(place, &mut no_longer_oversize);
-                grid.put(*record, code);
+                grid.spill.insert(*record, cells.count());
             }
         }
         grid.take_out_oversize(no_longer_oversize);

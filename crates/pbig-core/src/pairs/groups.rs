@@ -12,9 +12,6 @@ const SHIFTS: RangeInclusive<u32> = 10..=14;
 /// Groups, about, up to a million ids: so many places to write to fit the processor's table of pages.
 const MAX_GROUPS: usize = 40;
 
-/// Pairs of a row, on average, from which a group is sorted roughly by `b` first: rows are longer than a register.
-const RADIX_FROM: usize = 6;
-
 /// Bits of an id by which pairs are sorted roughly.
 const RADIX_BITS: u32 = 11;
 
@@ -152,20 +149,14 @@ impl Groups {
         others: &mut [u32],
         base: u32,
     ) {
-        let Sorter { firsts, unsorted, by_b, counts, .. } = sorter;
+        let Sorter { firsts, unsorted, .. } = sorter;
         let first_id = self.grouping.ids_of(group).start as u32;
         let pairs = &self.pairs[self.range(group)];
-        let is_long = pairs.len() > RADIX_FROM * spans.len();
-        let mut pairs = pairs;
-        if is_long {
-            sort_roughly(pairs, by_b, counts, self.grouping.ids, |pair| pair.b);
-            pairs = &by_b[..pairs.len()];
-        }
         if LIST {
             ensure_scratch(firsts, pairs.len(), 0);
         }
         ensure_scratch(unsorted, pairs.len() + SHORT, 0);
-        dispatch(SortRows::<LIST> { pairs, first_id, base, spans, others, firsts, unsorted, is_long });
+        dispatch(SortRows::<LIST> { pairs, first_id, base, spans, others, firsts, unsorted });
     }
 }
 
@@ -178,8 +169,6 @@ pub(super) struct Sorter {
     firsts: Vec<u32>,
     /// The `b` of each pair, by row, in no order within it.
     unsorted: Vec<u32>,
-    by_b: Vec<Pair>,
-    counts: Vec<u32>,
 }
 
 /// Sorts pairs by the highest bits of one of their ids, into `to`.
@@ -231,7 +220,6 @@ struct SortRows<'a, const LIST: bool> {
     others: &'a mut [u32],
     firsts: &'a mut [u32],
     unsorted: &'a mut [u32],
-    is_long: bool,
 }
 
 impl<const LIST: bool> Kernel for SortRows<'_, LIST> {
@@ -239,7 +227,7 @@ impl<const LIST: bool> Kernel for SortRows<'_, LIST> {
 
     #[inline(always)]
     unsafe fn run<S: Simd>(self) {
-        let Self { pairs, first_id, base, spans, others, firsts, unsorted, is_long } = self;
+        let Self { pairs, first_id, base, spans, others, firsts, unsorted } = self;
         spans.fill(Span::default());
         for pair in pairs {
             spans[(pair.a - first_id) as usize].len += 1;
@@ -261,7 +249,7 @@ impl<const LIST: bool> Kernel for SortRows<'_, LIST> {
         for span in spans {
             let range = span.range();
             // SAFETY: the unsorted list is longer by a register.
-            unsafe { row::sort_into::<S>(unsorted, range, others, is_long) };
+            unsafe { row::sort_into::<S>(unsorted, range, others) };
             span.start += base;
         }
     }

@@ -7,27 +7,19 @@ use std::ops::Range;
 /// Ids of a row that one register holds.
 pub(super) const SHORT: usize = 8;
 
-/// Longest row that is sorted by insertion, where it is nearly sorted.
-const INSERTION_UP_TO: usize = 64;
-
 /// Copies the row at `range` of `from` to the same range of `to`, sorted; rows are copied in order, as a short one may
 /// overwrite what comes behind it.
 ///
 /// # Safety
 /// `from` has [`SHORT`] elements more than the row, and the processor the instructions.
 #[inline(always)]
-pub(super) unsafe fn sort_into<S: Simd>(
-    from: &[u32],
-    range: Range<usize>,
-    to: &mut [u32],
-    is_nearly_sorted: bool,
-) {
+pub(super) unsafe fn sort_into<S: Simd>(from: &[u32], range: Range<usize>, to: &mut [u32]) {
     let Range { start, end } = range;
     debug_assert!(end + SHORT <= from.len() && end <= to.len());
     if end - start > SHORT {
         let row = &mut to[start..end];
         row.copy_from_slice(&from[start..end]);
-        return sort_long(row, is_nearly_sorted);
+        return row.sort_unstable();
     }
     // SAFETY: the caller's promise; near the end of `to` only the row itself is copied.
     unsafe {
@@ -37,21 +29,6 @@ pub(super) unsafe fn sort_into<S: Simd>(
         } else {
             to[start..end].copy_from_slice(&sorted[..end - start]);
         }
-    }
-}
-
-#[inline(never)]
-fn sort_long(row: &mut [u32], is_nearly_sorted: bool) {
-    if !is_nearly_sorted || row.len() > INSERTION_UP_TO {
-        return row.sort_unstable();
-    }
-    for i in 1..row.len() {
-        let (value, mut place) = (row[i], i);
-        while place > 0 && row[place - 1] > value {
-            row[place] = row[place - 1];
-            place -= 1;
-        }
-        row[place] = value;
     }
 }
 

@@ -47,7 +47,7 @@ pub(crate) const MIXED_SIZE_RATIO: f32 = 4.0;
 /// of a test against an oversize box.
 pub(crate) const NS_PER_BOX: f64 = 40.0;
 pub(crate) const NS_PER_CANDIDATE: f64 = 0.35;
-pub(crate) const NS_PER_OVERSIZE_TEST: f64 = 0.7;
+pub(crate) const NS_PER_OVERSIZE_TEST: f64 = 1.5;
 
 /// Ids from which a jump far above the known ones is an error: the tables by id take 64 bytes for each id below.
 pub(crate) const SPARSE_FROM_ID: u32 = 1 << 24;
