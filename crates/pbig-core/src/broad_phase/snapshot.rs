@@ -91,7 +91,7 @@ impl Snapshot {
             world.insert(id as u32, bytemuck::cast(self.boxes[id]), self.filters[id], 0.0);
         }
         // Only the changes of the snapshot count, not these insertions. Old states are not saved: the next update
-        // does not edit, and finds the same events.
+        // does not edit, and finds the same events. Saved pairs are trusted, as those of an update are.
         world.forget_changes();
         world.keep_old = 0;
         self.changed.iter().for_each(|&id| world.note_change(id));

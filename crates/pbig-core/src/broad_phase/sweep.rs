@@ -1,5 +1,5 @@
 //! The engine for small worlds: each changed box is tested against all boxes, and what it overlaps is compared with its kept
-//! pairs. Where more than half have changed, each box is tested against those after it.
+//! pairs. If more than half of the boxes changed, each box is tested against the boxes with higher ids.
 //!
 //! Boxes lie axis by axis, so that eight are tested at once. There is no index to keep, and no cost but that of
 //! the tests: a quarter of a microsecond for one changed box of a thousand.
@@ -15,8 +15,9 @@ pub(super) struct Sweep {
     blocks: Vec<EightBoxes>,
     /// True if the blocks hold the boxes of the last update.
     is_current: bool,
-    /// What the box at hand overlaps, and its kept partners: sorted.
+    /// Ids that the box at hand overlaps, sorted.
     now: Vec<u32>,
+    /// Its kept partners, sorted.
     was: Vec<u32>,
 }
 
@@ -48,7 +49,8 @@ impl Sweep {
         }
     }
 
-    /// Compares what a changed box overlaps with its kept pairs. A pair of two changed boxes is the first one's business.
+    /// Compares what a changed box overlaps with its kept pairs. The changed box with the lower id reports a pair
+    /// of two changed boxes.
     fn compare_all(&mut self, world: &World, kept: &Kept, id: u32, events: &mut Comparison) {
         let Self { now, was, .. } = self;
         let is_own = |other: u32| other > id || other < id && world.change_of(other).is_none();
@@ -72,7 +74,7 @@ impl Sweep {
 }
 
 /// Compares what a box overlaps with its kept partners.
-#[cold]
+#[inline(never)]
 fn compare(world: &World, id: u32, was: &mut Vec<u32>, now: &mut Vec<u32>, events: &mut Comparison) {
     if world.is_filtered {
         let filter = &world.filters[id as usize];
@@ -101,12 +103,13 @@ impl Kernel for SweepAll<'_> {
     unsafe fn run<S: Simd>(self) -> (u64, u64) {
         let Self { sweep, world, kept, events } = self;
         let (mut made, mut met) = (0, 0);
-        let many = 2 * world.changed.len() > world.ids();
-        let count = if many { world.ids() } else { world.changed.len() };
+        let are_many = 2 * world.changed.len() > world.ids();
+        let count = if are_many { world.ids() } else { world.changed.len() };
         for i in 0..count {
-            let id = if many { i } else { world.changed[i] as usize };
+            let id = if are_many { i } else { world.changed[i] as usize };
+            // Of the first block, the lanes behind the box.
             let (first, mut wanted) =
-                if many { (id / BLOCK, 255 & !((2 << (id % BLOCK)) - 1)) } else { (0, 255) };
+                if are_many { (id / BLOCK, 255 & !((2 << (id % BLOCK)) - 1)) } else { (0, 255) };
             made += (world.ids() - first * BLOCK) as u64;
             sweep.now.clear();
             for (block, boxes) in sweep.blocks.iter().enumerate().skip(first) {
@@ -119,7 +122,7 @@ impl Kernel for SweepAll<'_> {
                     mask &= mask - 1;
                 }
             }
-            if many {
+            if are_many {
                 sweep.compare_later(world, kept, id as u32, events);
             } else {
                 sweep.compare_all(world, kept, id as u32, events);

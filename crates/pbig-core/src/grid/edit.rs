@@ -173,7 +173,7 @@ impl EditedGrid {
         let Some(Place::Slot(slot)) = places.get(i) else { return };
         prefetch(self.grid.records.as_ptr().wrapping_add(*slot as usize));
         prefetch(self.grid.codes.as_ptr().wrapping_add(*slot as usize));
-        prefetch(self.grid.starts.as_ptr().wrapping_add(moved[i].key as usize));
+        prefetch(self.spill.heads.as_ptr().wrapping_add(moved[i].key as usize));
     }
 
     fn take_out(&mut self, place: Place, moved: &mut Vec<u32>) {

@@ -8,7 +8,7 @@ use crate::grid::{Kernel, Simd, dispatch};
 use crate::parallel::SharedSlice;
 use std::ops::Range;
 
-/// The result of a comparison. All lists are sorted.
+/// The result of a comparison. `added` and `removed` are sorted.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Comparison {
     pub(crate) added: Vec<Pair>,

@@ -9,7 +9,7 @@ use std::ops::{Range, RangeInclusive};
 /// log2 of the ids in a group: in larger groups the rows do not fit the cache.
 const SHIFTS: RangeInclusive<u32> = 10..=14;
 
-/// Groups, about, up to a million ids: so many places to write to fit the processor's table of pages.
+/// Groups, about, up to 650,000 ids: their write positions fit the TLB.
 const MAX_GROUPS: usize = 40;
 
 /// Bits of an id by which pairs are sorted roughly.

@@ -75,7 +75,7 @@ impl Rows {
 pub(crate) struct Kept {
     /// Rows of `b`, by `a`.
     pub(super) forward: Rows,
-    /// Rows of `a`, by `b`: made when somebody asks for the pairs of a box, then kept up to date.
+    /// Rows of `a`, by `b`: made for the first sweep or question after a rebuild, then kept up to date.
     backward: OnceLock<Rows>,
     /// By id: pairs in which it is `b`.
     lower: Vec<u32>,
@@ -237,7 +237,7 @@ mod tests {
     }
 
     #[test]
-    fn spare_places_survive_compaction() {
+    fn rows_survive_compaction() {
         let mut kept = Kept::default();
         kept.reserve_ids(300);
         let pairs = |from: u32, to: u32| (from..to).map(|i| Pair { a: i % 7, b: 10 + i }).collect::<Vec<_>>();

@@ -64,7 +64,11 @@ pub(crate) fn choose_engine(counts: &Counts, forced: Option<Engine>) -> Engine {
 
 /// Returns the number of old states that are worth keeping until the next update.
 pub(crate) fn old_states_to_keep(boxes: usize, forced: Option<Engine>) -> usize {
-    if forced.is_some() { usize::MAX } else { boxes / EDIT_UP_TO_ONE_IN }
+    match forced {
+        Some(Engine::Edit) => usize::MAX,
+        Some(_) => 0,
+        None => boxes / EDIT_UP_TO_ONE_IN,
+    }
 }
 
 #[cfg(test)]
