@@ -1,4 +1,4 @@
-//! What only studies use: PBIG's grid on the CPU, its settings on a GPU, the grid for few boxes.
+//! Parts for studies only: PBIG's grid on the CPU, its settings on a GPU, the grid for few boxes.
 
 use crate::pbig_grid::PbigPlan;
 use pbig_core::pbig::Summary;

@@ -174,7 +174,7 @@ impl PbigBroadPhase {
         if self.registry.differs_from(call.colliders) {
             self.rescan(call);
         }
-        // So far only a refused box is an error.
+        // Up to here only a refused box sets an error; the margin's is noted below.
         self.is_incomplete = self.last_error.is_some();
         if let Err(error) = margin {
             self.note_error(error);

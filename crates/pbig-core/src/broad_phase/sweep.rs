@@ -107,7 +107,7 @@ impl Kernel for SweepAll<'_> {
         let count = if are_many { world.ids() } else { world.changed.len() };
         for i in 0..count {
             let id = if are_many { i } else { world.changed[i] as usize };
-            // Of the first block, the lanes behind the box.
+            // The first block also has the box itself and lower ids: their lanes are masked out.
             let (first, mut wanted) =
                 if are_many { (id / BLOCK, 255 & !((2 << (id % BLOCK)) - 1)) } else { (0, 255) };
             made += (world.ids() - first * BLOCK) as u64;

@@ -1,4 +1,4 @@
-//! What a search on a device has found so far, and in the end.
+//! The pairs of a search on a device: those read back so far, and all of them in the end.
 
 use super::{Failure, GpuPlan};
 use crate::layout::{Totals, wide};

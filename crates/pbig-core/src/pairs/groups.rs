@@ -12,7 +12,7 @@ const SHIFTS: RangeInclusive<u32> = 10..=14;
 /// Groups, about, up to 650,000 ids: their write positions fit the TLB.
 const MAX_GROUPS: usize = 40;
 
-/// Bits of an id by which pairs are sorted roughly.
+/// Bits of `a` by which many events are sorted roughly before each part is sorted.
 const RADIX_BITS: u32 = 11;
 
 /// Division of ids into groups.
@@ -171,25 +171,19 @@ pub(super) struct Sorter {
     unsorted: Vec<u32>,
 }
 
-/// Sorts pairs by the highest bits of one of their ids, into `to`.
-fn sort_roughly(
-    pairs: &[Pair],
-    to: &mut Vec<Pair>,
-    counts: &mut Vec<u32>,
-    ids: usize,
-    id: impl Fn(&Pair) -> u32,
-) {
+/// Sorts pairs by the highest bits of `a`, into `to`.
+fn sort_roughly(pairs: &[Pair], to: &mut Vec<Pair>, counts: &mut Vec<u32>, ids: usize) {
     let shift = (usize::BITS - ids.leading_zeros()).saturating_sub(RADIX_BITS);
     ensure_scratch(to, pairs.len(), Pair::default());
     counts.clear();
     counts.resize(1 << RADIX_BITS, 0);
-    pairs.iter().for_each(|pair| counts[(id(pair) >> shift) as usize] += 1);
+    pairs.iter().for_each(|pair| counts[(pair.a >> shift) as usize] += 1);
     let mut next = 0;
     for count in counts.iter_mut() {
         next += std::mem::replace(count, next);
     }
     for pair in pairs {
-        let place = &mut counts[(id(pair) >> shift) as usize];
+        let place = &mut counts[(pair.a >> shift) as usize];
         to[*place as usize] = *pair;
         *place += 1;
     }
@@ -201,7 +195,7 @@ pub(super) fn sort(pairs: &mut Vec<Pair>, sorted: &mut Vec<Pair>, counts: &mut V
     if pairs.len() < 1 << RADIX_BITS {
         return pairs.sort_unstable_by_key(word);
     }
-    sort_roughly(pairs, sorted, counts, ids, |pair| pair.a);
+    sort_roughly(pairs, sorted, counts, ids);
     sorted.truncate(pairs.len());
     std::mem::swap(pairs, sorted);
     let mut start = 0;
