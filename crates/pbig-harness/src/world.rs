@@ -77,6 +77,11 @@ impl World {
         RigidBodyBuilder::dynamic().translation(to_vector(at))
     }
 
+    /// A half-space, whose surface is at height 0.
+    pub fn ground() -> ColliderBuilder {
+        ColliderBuilder::halfspace(Vector::y_axis())
+    }
+
     /// Removes a body with its colliders.
     pub fn remove(&mut self, body: RigidBodyHandle) {
         let Self { bodies, islands, colliders, impulse_joints, multibody_joints, .. } = self;
@@ -149,4 +154,24 @@ pub fn to_vector(v: Vec3) -> Vector<Real> {
 /// A glam rotation as the scaled axis that rapier's builders take.
 pub fn to_rotation(q: Quat) -> Vector<Real> {
     to_vector(q.to_scaled_axis())
+}
+
+/// A glam vector as a point of rapier's.
+pub fn to_point(v: Vec3) -> Point<Real> {
+    to_vector(v).into()
+}
+
+/// A pose without rotation.
+pub fn pose(at: Vec3) -> Isometry<Real> {
+    Isometry::translation(at.x, at.y, at.z)
+}
+
+/// A square grid of heights.
+pub fn heights(side: usize, height: impl Fn(usize, usize) -> f32) -> DMatrix<Real> {
+    DMatrix::from_fn(side, side, height)
+}
+
+/// Groups that meet if each has a group of the other's filter.
+pub fn groups_that_meet(memberships: Group, filter: Group) -> InteractionGroups {
+    InteractionGroups::new(memberships, filter)
 }

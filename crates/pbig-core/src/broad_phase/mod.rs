@@ -117,6 +117,12 @@ impl BroadPhase {
         }
     }
 
+    /// Moves a box that keeps its filter. Returns false when there is none.
+    #[inline(always)]
+    pub fn set_aabb(&mut self, id: u32, aabb: Aabb) -> bool {
+        self.world.set_aabb(id, aabb, self.config.margin)
+    }
+
     #[cold]
     fn insert(&mut self, id: u32, aabb: Aabb, filter: ProxyFilter) -> Result<(), Error> {
         if id as usize >= self.world.ids() {

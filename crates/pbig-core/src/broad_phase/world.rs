@@ -96,6 +96,20 @@ impl World {
     /// box was ever filtered.
     #[inline(always)]
     pub(super) fn set(&mut self, id: u32, aabb: Aabb, filter: ProxyFilter, margin: f32) -> bool {
+        if !self.set_aabb(id, aabb, margin) {
+            return false;
+        }
+        let i = id as usize;
+        let is_unfiltered = !self.is_filtered && filter.is(&ProxyFilter::ALL);
+        if !is_unfiltered && !self.filters[i].is(&filter) {
+            self.set_filter(id, filter);
+        }
+        true
+    }
+
+    /// As [`World::set`], with the filter that the box has.
+    #[inline(always)]
+    pub(super) fn set_aabb(&mut self, id: u32, aabb: Aabb, margin: f32) -> bool {
         let i = id as usize;
         let Some(fat) = self.boxes.get(i) else { return false };
         let gaps = aabb.gaps_are_within(fat, slack(margin));
@@ -106,10 +120,6 @@ impl World {
         if !is_held && (gaps.is_some() || !holds_exactly(fat, aabb, slack(margin))) {
             self.note_change(id);
             self.put(i, aabb, margin);
-        }
-        let is_unfiltered = !self.is_filtered && filter.is(&ProxyFilter::ALL);
-        if !is_unfiltered && !self.filters[i].is(&filter) {
-            self.set_filter(id, filter);
         }
         true
     }

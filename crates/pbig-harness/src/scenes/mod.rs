@@ -1,8 +1,10 @@
 //! Scenes by name, count and seed. Built with glam; the same world for the same three, every time.
+//!
+//! The workspace for rapier 0.36 builds the same scenes from this file: what differs between versions of rapier is in `world`.
 
 mod ragdolls;
 
-use crate::world::{World, to_rotation, to_vector};
+use crate::world::{World, groups_that_meet, heights, pose, to_rotation, to_vector};
 use glam::{EulerRot, Quat, Vec3};
 use ragdolls::ragdolls;
 use rand::rngs::StdRng;
@@ -142,7 +144,7 @@ impl Builder {
     }
 
     fn ground(&mut self) {
-        self.world.colliders.insert(ColliderBuilder::halfspace(Vector::y_axis()));
+        self.world.colliders.insert(World::ground());
     }
 
     fn falling(&mut self, at: Vec3, collider: ColliderBuilder) -> RigidBodyHandle {
@@ -250,12 +252,13 @@ fn city(b: &mut Builder, n: usize) {
 
 fn rain(b: &mut Builder, n: usize) {
     let wide = (n as f32).sqrt() * 3.0;
-    let heights = DMatrix::from_fn(24, 24, |i, j| (i as f32 * 0.7).sin() + (j as f32 * 0.9).cos());
-    b.world.colliders.insert(ColliderBuilder::heightfield(heights, vector![wide, 1.0, wide]));
+    let hills = heights(24, |i, j| (i as f32 * 0.7).sin() + (j as f32 * 0.9).cos());
+    let scale = to_vector(Vec3::new(wide, 1.0, wide));
+    b.world.colliders.insert(ColliderBuilder::heightfield(hills, scale));
     for _ in 0..n {
         let at = b.random_vec(Vec3::new(wide * 0.49, 0.0, wide * 0.49)) + Vec3::Y * b.random(3.0, 60.0);
         let down = b.random(-40.0, -10.0);
-        let body = World::dynamic(at).linvel(vector![0.0, down, 0.0]).ccd_enabled(true);
+        let body = World::dynamic(at).linvel(to_vector(Vec3::Y * down)).ccd_enabled(true);
         b.world.add(body, ColliderBuilder::ball(0.08).restitution(0.3));
     }
 }
@@ -290,14 +293,14 @@ fn compounds(b: &mut Builder, n: usize) {
         if i % 3 == 0 {
             let cube = || SharedShape::cuboid(0.3, 0.3, 0.3);
             let shapes = vec![
-                (Isometry::translation(-0.4, 0.0, 0.0), cube()),
-                (Isometry::translation(0.4, 0.2, 0.0), cube()),
+                (pose(Vec3::new(-0.4, 0.0, 0.0)), cube()),
+                (pose(Vec3::new(0.4, 0.2, 0.0)), cube()),
             ];
             b.falling(at, ColliderBuilder::compound(shapes));
         } else {
             let body = b.falling(at, ColliderBuilder::ball(0.35));
             for x in [-0.6, 0.6] {
-                let arm = ColliderBuilder::cuboid(0.4, 0.15, 0.15).translation(vector![x, 0.0, 0.0]);
+                let arm = ColliderBuilder::cuboid(0.4, 0.15, 0.15).translation(to_vector(Vec3::X * x));
                 b.world.colliders.insert_with_parent(arm, body, &mut b.world.bodies);
             }
         }
@@ -312,7 +315,7 @@ fn sleeping(b: &mut Builder, n: usize) {
         b.world.add(World::dynamic(at).sleeping(true), ColliderBuilder::cuboid(0.5, 0.5, 0.5));
     }
     let middle = side as f32 * 0.55;
-    let awake = World::dynamic(Vec3::new(middle, 8.0, middle)).linvel(vector![3.0, 0.0, 0.5]);
+    let awake = World::dynamic(Vec3::new(middle, 8.0, middle)).linvel(to_vector(Vec3::new(3.0, 0.0, 0.5)));
     b.world.add(awake.can_sleep(false), ColliderBuilder::ball(0.4));
 }
 
@@ -325,14 +328,14 @@ fn groups(b: &mut Builder, n: usize) {
         let place = lattice(spot, side);
         let at = place * 1.3 + b.random_vec(Vec3::splat(0.05)) + Vec3::Y;
         let own = Group::from_bits_truncate(1 << (i % 3));
-        let groups = InteractionGroups::new(own, own | Group::GROUP_4);
+        let groups = groups_that_meet(own, own | Group::GROUP_4);
         b.falling(at, cube(i).collision_groups(groups));
     }
-    let all = InteractionGroups::new(Group::GROUP_4, Group::ALL);
+    let all = groups_that_meet(Group::GROUP_4, Group::ALL);
     for x in [-4.0, 4.0 + side as f32 * 1.3] {
         let wall = RigidBodyBuilder::kinematic_velocity_based()
-            .translation(vector![x, 3.0, 0.0])
-            .linvel(vector![-x.signum(), 0.0, 0.0]);
+            .translation(to_vector(Vec3::new(x, 3.0, 0.0)))
+            .linvel(to_vector(Vec3::X * -x.signum()));
         let reach = side as f32 * 1.3;
         b.world.add(wall, ColliderBuilder::cuboid(0.5, 3.0, reach).collision_groups(all));
     }

@@ -1,7 +1,7 @@
 //! Bodies of joined limbs.
 
 use super::Builder;
-use crate::world::{World, to_vector};
+use crate::world::{World, to_point, to_vector};
 use glam::Vec3;
 use rapier3d::prelude::*;
 
@@ -46,10 +46,9 @@ fn limb(b: &mut Builder, at: Vec3, parent: RigidBodyHandle, from: Vec3, halves: 
 }
 
 fn join(b: &mut Builder, parent: RigidBodyHandle, at: Vec3, child: RigidBodyHandle, child_at: Vec3) {
-    let point = |v: Vec3| Point::from(to_vector(v));
     let joint = SphericalJointBuilder::new()
-        .local_anchor1(point(at))
-        .local_anchor2(point(child_at))
+        .local_anchor1(to_point(at))
+        .local_anchor2(to_point(child_at))
         .contacts_enabled(false);
     b.world.impulse_joints.insert(parent, child, joint, true);
 }

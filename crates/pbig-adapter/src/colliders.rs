@@ -1,0 +1,264 @@
+//! The colliders of a world by handle, their boxes in the core, and the events for the narrow phase.
+
+use crate::events::{EventWriter, PairEvent, ordered};
+use crate::registry::ColliderRegistry;
+use crate::stats::{Counts, Totals};
+use crate::tree::SceneTree;
+use crate::{Handle, HandlePair, Proxy, Scene, Tree};
+use pbig_core::{Aabb, BroadPhase, Error};
+
+/// The part of a broad phase that does not depend on rapier's version.
+///
+/// A collider's index is the id of its box in the core. The core drops a change if the stored AABB, which is larger by the
+/// margin, still contains the collider.
+///
+/// A clone sends the same events as the original.
+#[derive(Clone, Debug)]
+pub struct Colliders<T> {
+    pub(crate) core: BroadPhase,
+    pub(crate) registry: ColliderRegistry,
+    pub(crate) writer: EventWriter,
+    /// Proxies that several threads compute. Kept for its memory.
+    #[cfg(feature = "parallel")]
+    pub(crate) proxies: Vec<(Handle, Proxy)>,
+    tree: SceneTree<T>,
+    pub(crate) counts: Counts,
+    last_error: Option<Error>,
+    /// The last call had nothing to do and left nothing to do.
+    is_idle: bool,
+    /// The last call stored only some of the listed colliders: a shape panicked, or the core refused a box. The next call
+    /// reads all colliders, because rapier lists a change only once.
+    is_incomplete: bool,
+    /// Boxes of a broad phase that stopped: the next call starts from these.
+    inherited: Vec<(u32, Aabb)>,
+}
+
+impl<T: Tree> Colliders<T> {
+    /// Creates an empty world.
+    pub fn new(core: BroadPhase) -> Self {
+        Self {
+            core,
+            registry: ColliderRegistry::default(),
+            writer: EventWriter::default(),
+            #[cfg(feature = "parallel")]
+            proxies: Vec::new(),
+            tree: SceneTree::default(),
+            counts: Counts::default(),
+            last_error: None,
+            is_idle: false,
+            is_incomplete: false,
+            inherited: Vec::new(),
+        }
+    }
+
+    /// Returns the core. The id of a box is the index of its collider.
+    pub fn core(&self) -> &BroadPhase {
+        &self.core
+    }
+
+    /// Uses this device from the next update on.
+    #[cfg(feature = "gpu")]
+    pub fn set_gpu(&mut self, gpu: pbig_core::GpuFinder) {
+        self.core.set_gpu(gpu);
+    }
+
+    /// Changes the margin for boxes that are set from now on, in the world's unit. One that is no length is an error of this
+    /// update.
+    #[inline(always)]
+    pub fn set_margin(&mut self, margin: f32) {
+        if let Err(error) = self.core.set_margin(margin) {
+            self.note_error(error);
+        }
+    }
+
+    /// Takes over a world whose narrow phase has these pairs. The next update reads all colliders, and ends pairs that do not
+    /// overlap. `boxes` are those of the broad phase before, by collider index: one that holds its collider is kept.
+    pub fn adopt(&mut self, pairs: Vec<HandlePair>, boxes: Vec<(u32, Aabb)>) {
+        self.forget_all();
+        self.writer.adopted = pairs;
+        self.inherited = boxes;
+        (self.is_idle, self.is_incomplete) = (false, true);
+    }
+
+    /// Sets the AABBs of known colliders, with this margin or one of their own, and keeps their filters. Others are left to
+    /// the next update.
+    #[inline(always)]
+    pub fn set_aabbs(&mut self, margin: f32, moved: impl Iterator<Item = (Handle, Aabb, Option<f32>)>) {
+        self.set_margin(margin);
+        for (handle, aabb, own) in moved {
+            if let Some(margin) = own {
+                self.set_margin(margin);
+            }
+            if self.registry.contains(handle) {
+                self.core.set_aabb(handle.index, aabb);
+            }
+        }
+        self.tree.note(self.core.changes(), self.registry.len());
+    }
+
+    /// Returns the tree of the boxes with their margins, for queries.
+    pub fn tree(&self) -> &T {
+        self.tree.get(self.core.id_count(), |id| self.core.fat_aabb(id))
+    }
+
+    /// Updates the boxes that rapier lists, and sends the events.
+    pub fn update(&mut self, scene: &impl Scene, margin: f32, send: impl FnMut(PairEvent)) {
+        let removed = scene.removed().count();
+        let modified = scene.listed_count();
+        let has_changes = modified + removed > 0 || self.differs_from(scene);
+        let _span = tracing::debug_span!(target: "pbig", "update", modified).entered();
+        let totals = Totals { updates: self.counts.totals.updates + 1, ..self.counts.totals };
+        self.counts = Counts { modified, removed, totals, ..Counts::default() };
+        (self.last_error, self.is_idle) = (None, false);
+        self.read(scene, margin);
+        self.tree.note(self.core.changes(), self.registry.len());
+        self.find_and_send(send);
+        self.counts.totals.failures += u64::from(self.last_error.is_some());
+        self.is_idle = !has_changes && self.has_nothing_left();
+    }
+
+    /// Counts an update in which rapier lists nothing, and returns true if there is nothing else to do either.
+    #[inline(always)]
+    pub fn skips(&mut self, scene: &impl Scene) -> bool {
+        let skips = self.is_idle
+            && scene.listed_count() == 0
+            && scene.removed().next().is_none()
+            && self.core.changes().next().is_none()
+            && !self.differs_from(scene);
+        self.counts.totals.updates += u64::from(skips);
+        skips
+    }
+
+    fn differs_from(&self, scene: &impl Scene) -> bool {
+        self.registry.len() != scene.collider_count()
+    }
+
+    /// Returns true if nothing is left to do: no change or error of a failed update, and no adopted pair.
+    fn has_nothing_left(&self) -> bool {
+        let is_done = self.last_error.is_none() && self.core.changes().next().is_none();
+        is_done && self.writer.adopted.is_empty()
+    }
+
+    /// Removes first, because a modified collider may reuse the index of a removed one.
+    fn read(&mut self, scene: &impl Scene, margin: f32) {
+        for (handle, exists) in scene.removed() {
+            // Rapier lists disabled colliders as removed, too.
+            if exists { self.disable(handle) } else { self.forget(handle) }
+        }
+        self.writer.forget_adopted(scene.removed().map(|(handle, _)| handle));
+        let margin = self.core.set_margin(margin);
+        if std::mem::replace(&mut self.is_incomplete, true) {
+            self.read_all(scene);
+        } else {
+            self.read_listed(scene);
+        }
+        if self.differs_from(scene) {
+            self.rescan(scene);
+        }
+        // Up to here only a refused box sets an error; the margin's is noted below.
+        self.is_incomplete = self.last_error.is_some();
+        if let Err(error) = margin {
+            self.note_error(error);
+        }
+    }
+
+    fn read_all(&mut self, scene: &impl Scene) {
+        let inherited = std::mem::take(&mut self.inherited);
+        let margin = self.core.config().margin;
+        if !inherited.is_empty() && self.core.set_margin(0.0).is_ok() {
+            for &(id, aabb) in &inherited {
+                _ = self.core.set(id, aabb, Default::default());
+            }
+            self.set_margin(margin);
+        }
+        scene.for_each_collider(|handle, proxy| {
+            if self.registry.handle(handle.index).is_some_and(|known| known != handle) {
+                self.core.remove(handle.index);
+            }
+            self.set_proxy(scene, handle, proxy);
+        });
+        for (id, _) in inherited {
+            if self.registry.handle(id).is_none() {
+                self.core.remove(id);
+            }
+        }
+    }
+
+    /// Reads all colliders of a world that is not the one known so far. Rapier lists a collider that neither moves nor changes
+    /// only once, and this broad phase missed it. Nothing that is stored can be trusted. (Adding a pair again does no harm.)
+    fn rescan(&mut self, scene: &impl Scene) {
+        self.forget_all();
+        tracing::debug!("pbig: another world, all {} colliders are read", scene.collider_count());
+        self.read_all(scene);
+        self.counts.totals.rescans += 1;
+    }
+
+    fn forget_all(&mut self) {
+        self.registry.clear();
+        self.core.clear();
+        self.tree = SceneTree::default();
+    }
+
+    fn find_and_send(&mut self, send: impl FnMut(PairEvent)) {
+        if let Err(error) = self.core.update() {
+            return self.note_error(error);
+        }
+        let found = self.core.events();
+        if found.added.is_empty() && found.removed.is_empty() && self.writer.adopted.is_empty() {
+            return;
+        }
+        let _span = tracing::debug_span!(target: "pbig", "events").entered();
+        let degree = |id| self.core.degree(id);
+        let (added, deleted) = self.writer.write(found, &self.registry, degree, send);
+        self.counts.note_events(added, deleted);
+    }
+
+    /// Logs an error and keeps it as that of this update.
+    pub fn note_error(&mut self, error: Error) {
+        tracing::error!("pbig: {error}");
+        self.last_error = Some(error);
+    }
+
+    /// Returns the error of the last update, or `None` if it succeeded.
+    pub fn last_error(&self) -> Option<&Error> {
+        self.last_error.as_ref()
+    }
+
+    /// Returns the number of pairs that rapier knows of. Adopted pairs count from the next update on.
+    pub fn pair_count(&self) -> usize {
+        self.core.pair_count()
+    }
+
+    /// Returns the pairs that rapier knows of, in no particular order; the collider with fewer pairs comes first in each.
+    /// Adopted pairs are among them from the next update on.
+    pub fn pairs(&self) -> impl Iterator<Item = HandlePair> {
+        // Counted here: after a failed update the core would look at all pairs of a collider for each of its pairs.
+        let mut degrees = vec![0; self.core.id_count() as usize];
+        for pair in self.core.pairs() {
+            degrees[pair.a as usize] += 1;
+            degrees[pair.b as usize] += 1;
+        }
+        self.core.pairs().map(move |pair| ordered(pair, &self.registry, |id| degrees[id as usize]))
+    }
+
+    /// Returns the pairs that [`Colliders::adopt`] was given and no update has looked at since.
+    pub fn adopted(&self) -> &[HandlePair] {
+        &self.writer.adopted
+    }
+
+    /// Returns the boxes of all colliders that have one, with their margins, by ascending index.
+    pub fn boxes(&self) -> impl Iterator<Item = (Handle, Aabb)> {
+        let of = |id| Some((self.registry.handle(id)?, self.core.fat_aabb(id)?));
+        (0..self.core.id_count()).filter_map(of)
+    }
+
+    /// Returns the number of known colliders, disabled ones included.
+    pub fn len(&self) -> usize {
+        self.registry.len()
+    }
+
+    /// Returns true if no collider is known.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+}

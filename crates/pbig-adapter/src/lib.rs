@@ -1,0 +1,37 @@
+//! What pbig's broad phases for different versions of rapier share. It knows none of rapier's types, which differ from version
+//! to version.
+//!
+//! An adapter implements [`Scene`] for the arguments of rapier's call, and passes them to [`Colliders`], which keeps the
+//! colliders' boxes in `pbig-core` and writes events. Apps use `rapier-pbig`; this crate has no stable interface.
+//!
+//! ```text
+//! rapier's call ─► Scene ─► Colliders ─► pbig_core::BroadPhase ─► events, in an order that depends on the scene alone
+//! ```
+
+mod colliders;
+mod events;
+mod filter;
+mod handle;
+mod listed;
+pub mod policy;
+mod registry;
+mod scene;
+#[cfg(feature = "shadow")]
+pub mod shadow;
+#[cfg(feature = "serde")]
+mod snapshot;
+mod stats;
+mod tree;
+mod why;
+
+pub use colliders::Colliders;
+pub use events::PairEvent;
+pub use filter::{BodyKind, Groups, accepted_kinds, filter_of};
+pub use handle::{Handle, HandlePair};
+pub use pbig_core::{Aabb, Backend, Error, ProxyFilter, Report};
+pub use scene::{Proxy, Scene};
+#[cfg(feature = "serde")]
+pub use snapshot::Snapshot;
+pub use stats::{Stats, Totals};
+pub use tree::Tree;
+pub use why::Why;

@@ -1,0 +1,28 @@
+//! The constants behind the adapters' choices. None of them changes an event.
+
+/// Colliders whose memory is requested before the first of them is read, so that the processor waits for several at a time.
+pub const COLLIDERS_PER_BLOCK: usize = 16;
+
+/// Minimum number of listed colliders for several threads. For fewer, waking a second thread costs more than it saves.
+#[cfg(feature = "parallel")]
+pub(crate) const PARALLEL_FROM_COLLIDERS: usize = 8192;
+
+/// Proxies that several threads compute before one thread stores them. They take 1 MB, which stays in a processor's cache.
+#[cfg(feature = "parallel")]
+pub(crate) const PROXIES_PER_BATCH: usize = 16_384;
+
+/// Proxies that one thread computes at a time: few enough to share a batch evenly, enough to outweigh the hand-over.
+#[cfg(feature = "parallel")]
+pub(crate) const PROXIES_PER_PIECE: usize = 512;
+
+/// Changes since the last scene query, per collider, beyond which the tree for queries is dropped. A rebuild then costs
+/// little more than an update, and perhaps there are no more queries.
+pub(crate) const TREE_CHANGES_PER_COLLIDER: usize = 1;
+
+/// Frames in a file for `pbig replay`: they show the motion that led to a difference, and each costs a copy of all AABBs.
+#[cfg(feature = "shadow")]
+pub(crate) const REPLAY_FRAMES: usize = 8;
+
+/// Maximum number of differences that a checker keeps: a broad phase that reports nothing would fill the memory.
+#[cfg(feature = "shadow")]
+pub(crate) const MAX_DIFFERENCES: usize = 1000;

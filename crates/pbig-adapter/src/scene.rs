@@ -1,0 +1,42 @@
+//! How an adapter shows rapier's colliders.
+
+use crate::Handle;
+use pbig_core::{Aabb, ProxyFilter};
+use std::ops::Range;
+
+/// The state of a listed collider.
+#[derive(Clone, Copy, Debug)]
+pub enum Proxy {
+    /// Not in rapier's set.
+    Gone,
+    /// It or its body is disabled.
+    Disabled,
+    /// Nothing about it concerns the broad phase, or its AABB is not finite: a known collider stays as it is.
+    Unchanged,
+    /// Its AABB without margin, and its filter.
+    Enabled(Aabb, ProxyFilter),
+}
+
+/// What rapier passes to an update.
+pub trait Scene: Sync {
+    /// Returns the number of colliders in rapier's set.
+    fn collider_count(&self) -> usize;
+
+    /// Returns the number of colliders that rapier lists as modified.
+    fn listed_count(&self) -> usize;
+
+    /// Calls `take` with each of these listed colliders and its proxy, in the order of the list.
+    fn for_each_listed(&self, range: Range<usize>, take: impl FnMut(Handle, Proxy));
+
+    /// Calls `take` with each collider in rapier's set and its proxy.
+    fn for_each_collider(&self, take: impl FnMut(Handle, Proxy));
+
+    /// Returns the colliders that rapier lists as removed or disabled, and whether rapier's set still has them.
+    fn removed(&self) -> impl Iterator<Item = (Handle, bool)>;
+
+    /// Returns the margin of a box, if it is not the same for all.
+    #[inline(always)]
+    fn margin(&self, _aabb: &Aabb) -> Option<f32> {
+        None
+    }
+}

@@ -1,0 +1,113 @@
+//! The tree for scene queries. The first query builds it; it is updated only while queries use it.
+//!
+//! Rapier's queries walk a parry `Bvh` of collider indices. Rapier's own broad phase is such a tree; ours has grids, so it
+//! builds the tree for queries. While there is a tree, each change of boxes is noted. The next query updates the tree, or
+//! rebuilds it if too many boxes changed.
+
+use crate::policy;
+use pbig_core::Aabb;
+use std::sync::{Mutex, OnceLock, PoisonError};
+
+/// Parry's tree, in the version that rapier uses. The AABBs can be infinite.
+pub trait Tree {
+    /// Builds the tree of these leaves.
+    fn build(leaves: impl Iterator<Item = (u32, Aabb)> + Clone) -> Self;
+
+    /// Removes these leaves, and makes the tree ready for further changes.
+    fn remove(&mut self, gone: &[u32]);
+
+    /// Inserts leaves or moves them. Afterwards the tree is ready for queries.
+    fn update(&mut self, leaves: impl Iterator<Item = (u32, Aabb)>);
+}
+
+/// A tree for queries, if there are any.
+#[derive(Debug)]
+pub(crate) struct SceneTree<T> {
+    /// The tree, if it is up to date.
+    current: OnceLock<T>,
+    /// The tree as of the last query, if boxes have changed since.
+    stale: Mutex<Option<Stale<T>>>,
+}
+
+/// A tree, and the ids of boxes that have changed since. An id may occur several times.
+#[derive(Debug)]
+struct Stale<T> {
+    tree: T,
+    changed: Vec<u32>,
+}
+
+impl<T> Default for SceneTree<T> {
+    fn default() -> Self {
+        Self { current: OnceLock::new(), stale: Mutex::new(None) }
+    }
+}
+
+impl<T> Clone for SceneTree<T> {
+    /// Returns an empty tree: the clone builds its own for its first query.
+    fn clone(&self) -> Self {
+        Self::default()
+    }
+}
+
+impl<T: Tree> SceneTree<T> {
+    /// Notes the boxes that change, and drops a tree that has missed too many changes. `colliders` is the number of known
+    /// colliders. Does nothing while nobody has asked for the tree.
+    pub(crate) fn note(&mut self, changed: impl Iterator<Item = u32>, colliders: usize) {
+        if !self.is_used() {
+            return;
+        }
+        let mut changed = changed.peekable();
+        if changed.peek().is_none() {
+            return;
+        }
+        let stale = self.stale.get_mut().unwrap_or_else(PoisonError::into_inner);
+        if let Some(tree) = self.current.take() {
+            *stale = Some(Stale { tree, changed: Vec::new() });
+        }
+        if let Some(kept) = stale {
+            kept.changed.extend(changed);
+            if kept.changed.len() > policy::TREE_CHANGES_PER_COLLIDER * colliders {
+                *stale = None;
+            }
+        }
+    }
+
+    /// Returns true if there is a tree to keep up to date.
+    fn is_used(&mut self) -> bool {
+        let stale = self.stale.get_mut().unwrap_or_else(PoisonError::into_inner);
+        self.current.get().is_some() || stale.is_some()
+    }
+
+    /// Returns the tree of the boxes with ids below `ids`.
+    pub(crate) fn get(&self, ids: u32, aabb: impl Fn(u32) -> Option<Aabb>) -> &T {
+        let make = || match self.stale.lock().unwrap_or_else(PoisonError::into_inner).take() {
+            Some(stale) => stale.updated(ids, aabb),
+            None => build(ids, aabb),
+        };
+        self.current.get_or_init(make)
+    }
+}
+
+fn build<T: Tree>(ids: u32, aabb: impl Fn(u32) -> Option<Aabb>) -> T {
+    let aabb = &aabb;
+    T::build((0..ids).filter_map(move |id| Some((id, aabb(id)?))))
+}
+
+impl<T: Tree> Stale<T> {
+    /// Removes first, because a removal reads the boxes of a leaf's ancestors.
+    fn updated(self, ids: u32, aabb: impl Fn(u32) -> Option<Aabb>) -> T {
+        let Self { mut tree, mut changed } = self;
+        changed.sort_unstable();
+        changed.dedup();
+        let gone: Vec<u32> = changed.iter().copied().filter(|&id| aabb(id).is_none()).collect();
+        // Parry's trees of one or two leaves have a layout of their own, in which removals leave traces.
+        if !gone.is_empty() && (0..ids).filter(|&id| aabb(id).is_some()).nth(2).is_none() {
+            return build(ids, aabb);
+        }
+        if !gone.is_empty() {
+            tree.remove(&gone);
+        }
+        tree.update(changed.into_iter().filter_map(|id| Some((id, aabb(id)?))));
+        tree
+    }
+}

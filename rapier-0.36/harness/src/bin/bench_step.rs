@@ -1,0 +1,91 @@
+//! Whole steps of rapier 0.36.1 with its own broad phase and with pbig, in turn: `cargo run --release --bin bench_step -- --help`.
+
+use clap::Parser;
+use pbig_harness_036::run::{Run, StepTime, Summary};
+use pbig_harness_036::scenes::Scene;
+use rapier3d::prelude::BroadPhaseBvh;
+use std::fs::File;
+use std::io::Write;
+use std::path::PathBuf;
+use std::process::ExitCode;
+use std::time::{Duration, Instant};
+
+/// Whole steps of rapier 0.36.1, with its own broad phase ("stock") and with pbig, step by step in turn.
+#[derive(Parser)]
+struct Args {
+    /// Bodies, several separated by commas.
+    #[arg(long, value_delimiter = ',', default_value = "1000,10000")]
+    bodies: Vec<usize>,
+    /// Scenes, several separated by commas; all by default.
+    #[arg(long, value_delimiter = ',', value_parser = Scene::named)]
+    scenes: Vec<Scene>,
+    /// Steps of 1/60 s.
+    #[arg(long, default_value_t = 300)]
+    steps: usize,
+    /// Seconds for each scene, after which it stops earlier.
+    #[arg(long, default_value_t = 60)]
+    seconds: u64,
+    /// Where to write all rows (CSV).
+    #[arg(long)]
+    write: Option<PathBuf>,
+}
+
+/// The heading of the CSV file, in ms.
+const HEADING: &str = "scene,bodies,steps,stock_broad_mean,pbig_broad_mean,stock_broad_p99,pbig_broad_p99,\
+stock_step_mean,pbig_step_mean,stock_step_p99,pbig_step_p99,stock_pairs,pbig_pairs";
+
+fn main() -> ExitCode {
+    let mut args = Args::parse();
+    if args.scenes.is_empty() {
+        args.scenes = Scene::ALL.to_vec();
+    }
+    println!("scene        bodies  steps   broad phase, ms: stock   pbig      x   p99 x   step, ms: stock   pbig      x");
+    let mut rows = vec![HEADING.to_string()];
+    for &bodies in &args.bodies {
+        for &scene in &args.scenes {
+            rows.push(measure(scene, bodies, &args));
+        }
+    }
+    match args.write.map(|file| File::create(&file).and_then(|mut out| writeln!(out, "{}", rows.join("\n")))) {
+        Some(Err(error)) => {
+            eprintln!("the rows cannot be written: {error}");
+            ExitCode::FAILURE
+        }
+        _ => ExitCode::SUCCESS,
+    }
+}
+
+fn measure(scene: Scene, bodies: usize, args: &Args) -> String {
+    let mut stock = Run::new(scene, bodies, 1, BroadPhaseBvh::new());
+    let mut ours = Run::new(scene, bodies, 1, rapier_pbig::broad_phase());
+    let (clock, limit) = (Instant::now(), Duration::from_secs(args.seconds));
+    for step in 0..args.steps {
+        // Each goes first in every other step.
+        let [first, second] = if step % 2 == 0 { [&mut stock, &mut ours] } else { [&mut ours, &mut stock] };
+        first.step();
+        second.step();
+        if clock.elapsed() > limit {
+            break;
+        }
+    }
+    let of = |run: &Run, time: fn(&StepTime) -> f64| Summary::of(run.times.iter().map(time));
+    let [stock_broad, ours_broad] = [&stock, &ours].map(|run| of(run, |time| time.broad_phase));
+    let [stock_step, ours_step] = [&stock, &ours].map(|run| of(run, |time| time.step));
+    println!(
+        "{:<12} {bodies:>6} {:>6} {:>24.3} {:>6.3} {:>5.2}x {:>6.2}x {:>17.3} {:>6.3} {:>5.2}x",
+        scene.name,
+        ours.times.len(),
+        stock_broad.mean,
+        ours_broad.mean,
+        stock_broad.mean / ours_broad.mean,
+        stock_broad.p99 / ours_broad.p99,
+        stock_step.mean,
+        ours_step.mean,
+        stock_step.mean / ours_step.mean,
+    );
+    let pairs = [stock_broad, ours_broad, stock_step, ours_step];
+    let [broad, step] = [[pairs[0], pairs[1]], [pairs[2], pairs[3]]];
+    let columns = |[a, b]: [Summary; 2]| format!("{:.4},{:.4},{:.4},{:.4}", a.mean, b.mean, a.p99, b.p99);
+    let (steps, broad, step) = (ours.times.len(), columns(broad), columns(step));
+    format!("{},{bodies},{steps},{broad},{step},{},{}", scene.name, stock.pairs(), ours.pairs())
+}

@@ -1,0 +1,6 @@
+//! Scenes and measurements for rapier3d 0.36.1.
+
+pub mod run;
+#[path = "../../../crates/pbig-harness/src/scenes/mod.rs"]
+pub mod scenes;
+pub mod world;

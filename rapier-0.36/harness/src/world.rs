@@ -1,0 +1,177 @@
+//! A headless rapier world, and the conversion from glam, in which scenes are built.
+
+use glam::{Quat, Vec3};
+use rapier3d::math::{Pose, Vector};
+use rapier3d::na::Unit;
+use rapier3d::parry::utils::Array2;
+use rapier3d::prelude::*;
+
+/// Everything that rapier keeps apart, together; the broad phase is lent to each step.
+pub struct World {
+    /// Rigid bodies.
+    pub bodies: RigidBodySet,
+    /// Colliders.
+    pub colliders: ColliderSet,
+    /// Joints between bodies.
+    pub impulse_joints: ImpulseJointSet,
+    /// Articulations.
+    pub multibody_joints: MultibodyJointSet,
+    /// Bodies that bend.
+    pub soft_bodies: SoftBodySet,
+    /// Contacts and intersections.
+    pub narrow_phase: NarrowPhase,
+    /// Acceleration, m/s^2.
+    pub gravity: Vec3,
+    /// Step length and the like.
+    pub params: IntegrationParameters,
+    /// Groups of touching bodies.
+    pub islands: IslandManager,
+    /// Steps and their times.
+    pub pipeline: PhysicsPipeline,
+    ccd_solver: CCDSolver,
+}
+
+impl Default for World {
+    fn default() -> Self {
+        Self {
+            bodies: RigidBodySet::new(),
+            colliders: ColliderSet::new(),
+            impulse_joints: ImpulseJointSet::new(),
+            multibody_joints: MultibodyJointSet::new(),
+            soft_bodies: SoftBodySet::new(),
+            narrow_phase: NarrowPhase::new(),
+            gravity: Vec3::new(0.0, -9.81, 0.0),
+            params: IntegrationParameters::default(),
+            islands: IslandManager::new(),
+            pipeline: PhysicsPipeline::new(),
+            ccd_solver: CCDSolver::new(),
+        }
+    }
+}
+
+impl World {
+    /// One step of rapier's physics pipeline.
+    pub fn step(&mut self, broad_phase: &mut BroadPhaseBvh) {
+        self.pipeline.step(
+            to_vector(self.gravity),
+            &self.params,
+            &mut self.islands,
+            broad_phase,
+            &mut self.narrow_phase,
+            &mut self.bodies,
+            &mut self.colliders,
+            &mut self.impulse_joints,
+            &mut self.multibody_joints,
+            &mut self.soft_bodies,
+            &mut self.ccd_solver,
+            &(),
+            &(),
+        );
+    }
+
+    /// Adds a body with one collider.
+    pub fn add(&mut self, body: RigidBodyBuilder, collider: ColliderBuilder) -> RigidBodyHandle {
+        let handle = self.bodies.insert(body);
+        self.colliders.insert_with_parent(collider, handle, &mut self.bodies);
+        handle
+    }
+
+    /// A dynamic body at a place.
+    pub fn dynamic(at: Vec3) -> RigidBodyBuilder {
+        RigidBodyBuilder::dynamic().translation(to_vector(at))
+    }
+
+    /// A half-space, whose surface is at height 0.
+    pub fn ground() -> ColliderBuilder {
+        ColliderBuilder::halfspace(Unit::new_unchecked(Vector::Y))
+    }
+
+    /// Removes a body with its colliders.
+    pub fn remove(&mut self, body: RigidBodyHandle) {
+        let Self { bodies, islands, colliders, impulse_joints, multibody_joints, soft_bodies, .. } = self;
+        bodies.remove(body, islands, colliders, impulse_joints, multibody_joints, soft_bodies, true);
+    }
+
+    /// Removes a collider.
+    pub fn remove_collider(&mut self, collider: ColliderHandle) {
+        let Self { colliders, islands, bodies, soft_bodies, .. } = self;
+        colliders.remove(collider, islands, bodies, soft_bodies, true);
+    }
+
+    /// Everything with its broad phase, bit by bit.
+    ///
+    /// # Panics
+    /// If a part cannot be saved, which none of rapier's refuses.
+    pub fn to_bytes(&self, broad_phase: &BroadPhaseBvh) -> Vec<u8> {
+        let sets = (&self.bodies, &self.colliders, &self.impulse_joints, &self.multibody_joints);
+        let rest = (&self.narrow_phase, &self.params, &self.islands, &self.ccd_solver, &self.soft_bodies);
+        let all = (sets, rest, self.gravity.to_array(), broad_phase);
+        postcard::to_stdvec(&all).expect("rapier's sets can be saved")
+    }
+
+    /// The world and the broad phase that were saved.
+    ///
+    /// # Errors
+    /// If these are not the bytes of a world.
+    pub fn from_bytes(bytes: &[u8]) -> Result<(Self, BroadPhaseBvh), postcard::Error> {
+        let (sets, rest, gravity, broad_phase): (_, _, [f32; 3], _) = postcard::from_bytes(bytes)?;
+        let (bodies, colliders, impulse_joints, multibody_joints) = sets;
+        let (narrow_phase, params, islands, ccd_solver, soft_bodies) = rest;
+        let (gravity, pipeline) = (Vec3::from_array(gravity), PhysicsPipeline::new());
+        let world = Self {
+            bodies,
+            colliders,
+            impulse_joints,
+            multibody_joints,
+            soft_bodies,
+            narrow_phase,
+            gravity,
+            params,
+            islands,
+            pipeline,
+            ccd_solver,
+        };
+        Ok((world, broad_phase))
+    }
+
+    /// Every number that makes up the poses of all bodies, bit by bit, in order: equal exactly when two worlds are.
+    pub fn pose_bits(&self) -> Vec<u32> {
+        let bits = |(_, body): (RigidBodyHandle, &RigidBody)| {
+            let (at, turn) = (body.translation(), body.rotation());
+            [at.x, at.y, at.z, turn.x, turn.y, turn.z, turn.w].map(f32::to_bits)
+        };
+        self.bodies.iter().flat_map(bits).collect()
+    }
+}
+
+/// glam's vector as rapier's, which is of another version of glam.
+pub fn to_vector(v: Vec3) -> Vector {
+    Vector::new(v.x, v.y, v.z)
+}
+
+/// A glam rotation as the scaled axis that rapier's builders take.
+pub fn to_rotation(q: Quat) -> Vector {
+    to_vector(q.to_scaled_axis())
+}
+
+/// A glam vector as a point of rapier's, for which 0.36 has no type.
+pub fn to_point(v: Vec3) -> Vector {
+    to_vector(v)
+}
+
+/// A pose without rotation.
+pub fn pose(at: Vec3) -> Pose {
+    Pose::from_translation(to_vector(at))
+}
+
+/// A square grid of heights.
+pub fn heights(side: usize, height: impl Fn(usize, usize) -> f32) -> Array2<Real> {
+    // Column by column.
+    let heights = (0..side * side).map(|at| height(at % side, at / side));
+    Array2::new(side, side, heights.collect())
+}
+
+/// Groups that meet if each has a group of the other's filter.
+pub fn groups_that_meet(memberships: Group, filter: Group) -> InteractionGroups {
+    InteractionGroups::new(memberships, filter, InteractionTestMode::And)
+}

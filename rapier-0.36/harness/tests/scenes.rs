@@ -1,0 +1,25 @@
+//! Every scene beside rapier's own broad phase and the oracle.
+
+use pbig_harness_036::scenes::Scene;
+use rapier_pbig::PbigFinder;
+use rapier_pbig::shadow::Shadow;
+use rapier3d::prelude::BroadPhaseBvh;
+
+#[test]
+fn every_scene_has_the_pairs_of_the_oracle_and_misses_no_contact_of_stock() {
+    for scene in Scene::ALL {
+        let mut broad_phase = BroadPhaseBvh::new();
+        let finder = PbigFinder::default().with_shadow(Shadow::Stock).with_shadow(Shadow::Oracle);
+        rapier_pbig::install_finder(&mut broad_phase, finder.compared_every(3));
+        let mut world = scene.build(250, 1);
+        for _ in 0..150 {
+            world.step(&mut broad_phase);
+        }
+        let finder = rapier_pbig::finder(&broad_phase).expect("it is installed");
+        let checker = finder.shadow().expect("it was added");
+        assert!(finder.differences().is_empty(), "{}: {}", scene.name, finder.differences()[0]);
+        assert!(checker.compared > 5, "{}: {}", scene.name, checker.compared);
+        assert!(checker.oracle_pairs > 0 && checker.has_stock(), "{}", scene.name);
+        assert!(finder.last_error().is_none());
+    }
+}

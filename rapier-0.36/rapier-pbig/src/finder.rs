@@ -1,0 +1,183 @@
+//! `PbigFinder`: translates rapier's calls into calls of the core.
+
+use crate::PbigConfig;
+use crate::scene::{Call, handle, own_margin};
+use crate::tree::{ParryTree, from_tree, to_tree};
+use pbig_adapter::{Colliders, Error, HandlePair, PairEvent, Stats, Why};
+use rapier3d::geometry::PairFinder;
+use rapier3d::parry::bounding_volume::Aabb as TreeAabb;
+use rapier3d::parry::partitioning::Bvh;
+use rapier3d::prelude::{
+    BroadPhasePairEvent, ColliderHandle, ColliderPair, ColliderSet, IntegrationParameters, RigidBodySet,
+};
+
+/// What finds the pairs of a `BroadPhaseBvh` instead of its tree. The tree for scene queries and CCD is built when something
+/// asks for it, and kept up to date only while something does.
+#[derive(Clone, Debug)]
+pub struct PbigFinder {
+    pub(crate) colliders: Colliders<ParryTree>,
+    /// In units of `IntegrationParameters::length_unit`.
+    pub(crate) relative_margin: f32,
+    #[cfg(feature = "shadow")]
+    pub(crate) shadow: Option<Box<crate::shadow::Watcher>>,
+}
+
+impl Default for PbigFinder {
+    fn default() -> Self {
+        Self::with_config(PbigConfig::DEFAULT).expect("the default margin is a length")
+    }
+}
+
+impl PbigFinder {
+    /// Creates an empty finder.
+    ///
+    /// # Errors
+    /// [`Error::Margin`].
+    pub fn with_config(config: PbigConfig) -> Result<Self, Error> {
+        pbig_core::BroadPhase::new(config.into()).map(Self::around)
+    }
+
+    /// As [`PbigFinder::with_config`], on a given device. [`pbig_core::Backend::Gpu`] always uses it.
+    /// [`pbig_core::Backend::Auto`] uses it for large changes, unless it is a software adapter.
+    ///
+    /// # Errors
+    /// [`Error::Margin`].
+    #[cfg(feature = "gpu")]
+    pub fn with_gpu(config: PbigConfig, gpu: pbig_core::GpuFinder) -> Result<Self, Error> {
+        pbig_core::BroadPhase::with_gpu(config.into(), gpu).map(Self::around)
+    }
+
+    fn around(core: pbig_core::BroadPhase) -> Self {
+        Self {
+            relative_margin: core.config().margin,
+            colliders: Colliders::new(core),
+            #[cfg(feature = "shadow")]
+            shadow: None,
+        }
+    }
+
+    /// Returns the counts of the last update.
+    pub fn stats(&self) -> Stats<'_> {
+        self.colliders.stats()
+    }
+
+    /// Returns the error of the last update, or `None` if it succeeded. If pairs could not be found, no events were sent, and
+    /// the next update sees the same changes again. If a box could not be stored, the next update reads all colliders.
+    pub fn last_error(&self) -> Option<&Error> {
+        self.colliders.last_error()
+    }
+
+    /// Returns the number of pairs that rapier knows of.
+    pub fn pair_count(&self) -> usize {
+        self.colliders.pair_count()
+    }
+
+    /// Returns the pairs that rapier knows of, in no particular order.
+    pub fn pairs(&self) -> impl Iterator<Item = ColliderPair> {
+        self.colliders.pairs().map(to_pair)
+    }
+
+    /// Returns why these two colliders are a pair since the last update, or the first test that they fail.
+    pub fn why(&self, one: ColliderHandle, other: ColliderHandle) -> Why {
+        self.colliders.why(handle(one), handle(other))
+    }
+
+    fn find(&mut self, call: &Call<'_>, events: &mut Vec<BroadPhasePairEvent>) {
+        if self.skips(call) {
+            return;
+        }
+        let margin = self.relative_margin * call.params.length_unit;
+        self.colliders.update(call, margin, |event| events.push(to_event(event)));
+    }
+
+    fn skips(&mut self, call: &Call<'_>) -> bool {
+        #[cfg(feature = "shadow")]
+        if self.shadow.is_some() {
+            return false;
+        }
+        self.colliders.skips(call)
+    }
+}
+
+fn to_handle(handle: pbig_adapter::Handle) -> ColliderHandle {
+    ColliderHandle::from_raw_parts(handle.index, handle.generation)
+}
+
+fn to_pair(HandlePair(a, b): HandlePair) -> ColliderPair {
+    ColliderPair::new(to_handle(a), to_handle(b))
+}
+
+fn to_event(event: PairEvent) -> BroadPhasePairEvent {
+    match event {
+        PairEvent::Add(pair) => BroadPhasePairEvent::AddPair(to_pair(pair)),
+        PairEvent::Delete(pair) => BroadPhasePairEvent::DeletePair(to_pair(pair)),
+    }
+}
+
+impl PairFinder for PbigFinder {
+    fn update(
+        &mut self,
+        params: &IntegrationParameters,
+        adaptive_margin: bool,
+        colliders: &ColliderSet,
+        bodies: &RigidBodySet,
+        modified_colliders: &[ColliderHandle],
+        removed_colliders: &[ColliderHandle],
+        events: &mut Vec<BroadPhasePairEvent>,
+    ) {
+        let (modified, removed) = (modified_colliders, removed_colliders);
+        let call = Call { params, adaptive_margin, colliders, bodies, modified, removed };
+        #[cfg(feature = "shadow")]
+        let start = events.len();
+        self.find(&call, events);
+        #[cfg(feature = "shadow")]
+        if let Some(shadow) = &mut self.shadow {
+            shadow.watch(&call, &events[start..]);
+        }
+    }
+
+    fn set_aabbs(
+        &mut self,
+        params: &IntegrationParameters,
+        adaptive_margin: bool,
+        aabbs: &[(ColliderHandle, TreeAabb)],
+    ) {
+        let unit = params.length_unit;
+        let moved = aabbs.iter().map(|&(moved, aabb)| {
+            let aabb = from_tree(&aabb);
+            (handle(moved), aabb, adaptive_margin.then(|| own_margin(&aabb, unit)))
+        });
+        self.colliders.set_aabbs(self.relative_margin * unit, moved);
+        #[cfg(feature = "shadow")]
+        if let Some(shadow) = &mut self.shadow {
+            shadow.note_moved(params, aabbs);
+        }
+    }
+
+    fn tree(&self) -> &Bvh {
+        &self.colliders.tree().bvh
+    }
+
+    fn state(&self) -> (Vec<(ColliderHandle, TreeAabb)>, Vec<(ColliderHandle, ColliderHandle)>) {
+        let boxes = self.colliders.boxes().map(|(handle, aabb)| (to_handle(handle), to_tree(&aabb)));
+        let pairs = self.colliders.pairs().chain(self.colliders.adopted().iter().copied());
+        let sorted = pairs.map(|pair| HandlePair::sorted(pair.0, pair.1));
+        let mut pairs: Vec<_> = sorted.map(|pair| (to_handle(pair.0), to_handle(pair.1))).collect();
+        pairs.sort_unstable_by_key(|(a, b)| (a.into_raw_parts(), b.into_raw_parts()));
+        (boxes.collect(), pairs)
+    }
+
+    fn start_from(&mut self, aabbs: Vec<(u32, TreeAabb)>, pairs: Vec<(ColliderHandle, ColliderHandle)>) {
+        let pairs: Vec<_> = pairs.into_iter().map(|(a, b)| HandlePair(handle(a), handle(b))).collect();
+        #[cfg(feature = "shadow")]
+        if let Some(shadow) = &mut self.shadow {
+            shadow.start_over(&pairs);
+        }
+        let boxes = aabbs.iter().map(|(id, aabb)| (*id, from_tree(aabb))).collect();
+        self.colliders.adopt(pairs, boxes);
+    }
+
+    fn clone_box(&self) -> Box<dyn PairFinder> {
+        Box::new(self.clone())
+    }
+}

@@ -1,0 +1,93 @@
+//! Shows rapier's colliders to the part of the broad phase that knows no rapier.
+
+use crate::tree::from_tree;
+use pbig_adapter::{Aabb, BodyKind, Groups, Handle, Proxy, ProxyFilter, Scene, filter_of};
+use pbig_core::TestMode;
+use rapier3d::prelude::*;
+use std::ops::Range;
+
+/// The arguments of one update.
+#[derive(Clone, Copy)]
+pub(crate) struct Call<'a> {
+    pub(crate) params: &'a IntegrationParameters,
+    pub(crate) adaptive_margin: bool,
+    pub(crate) colliders: &'a ColliderSet,
+    pub(crate) bodies: &'a RigidBodySet,
+    pub(crate) modified: &'a [ColliderHandle],
+    pub(crate) removed: &'a [ColliderHandle],
+}
+
+impl Call<'_> {
+    fn proxy(&self, handle: ColliderHandle) -> Proxy {
+        let Some(collider) = self.colliders.get(handle) else { return Proxy::Gone };
+        if !collider.is_enabled() {
+            return Proxy::Disabled;
+        }
+        let aabb = from_tree(&collider.compute_broad_phase_aabb(self.params, self.bodies));
+        // Rapier's own broad phase keeps the box of before, too. Rapier disables such a collider at the end of the step.
+        let is_finite = aabb.min.iter().chain(&aabb.max).all(|x| x.is_finite());
+        if is_finite { Proxy::Enabled(aabb, self.filter(collider)) } else { Proxy::Unchanged }
+    }
+
+    pub(crate) fn filter(&self, collider: &Collider) -> ProxyFilter {
+        let groups = groups_of(collider.collision_groups());
+        let body = collider.parent().map(|body| body.into_raw_parts().into());
+        filter_of(body, self.kind(collider), collider.active_collision_types().bits(), groups)
+    }
+
+    /// Returns the type of the collider's body. A collider without a body counts as fixed.
+    pub(crate) fn kind(&self, collider: &Collider) -> BodyKind {
+        let body = collider.parent().and_then(|handle| self.bodies.get(handle));
+        body.map_or(BodyKind::Fixed, |body| BodyKind::from_number(body.body_type() as u32))
+    }
+}
+
+pub(crate) fn groups_of(groups: InteractionGroups) -> Groups {
+    let mode = match groups.test_mode {
+        InteractionTestMode::And => TestMode::And,
+        InteractionTestMode::Or => TestMode::Or,
+    };
+    Groups { memberships: groups.memberships.bits(), mask: groups.filter.bits(), mode }
+}
+
+pub(crate) fn handle(handle: ColliderHandle) -> Handle {
+    handle.into_raw_parts().into()
+}
+
+/// Returns the margin of rapier's `adaptive_change_detection_margin`: an eighth of the box's smallest extent, within limits.
+#[inline(always)]
+pub(crate) fn own_margin(aabb: &Aabb, length_unit: f32) -> f32 {
+    let extent = (0..3).map(|k| aabb.max[k] - aabb.min[k]).fold(f32::INFINITY, f32::min);
+    (0.125 * extent).max(crate::MARGIN * length_unit).min(crate::MAX_ADAPTIVE_MARGIN * length_unit)
+}
+
+impl Scene for Call<'_> {
+    fn collider_count(&self) -> usize {
+        self.colliders.len()
+    }
+
+    fn listed_count(&self) -> usize {
+        self.modified.len()
+    }
+
+    fn for_each_listed(&self, range: Range<usize>, mut take: impl FnMut(Handle, Proxy)) {
+        for &listed in &self.modified[range] {
+            take(handle(listed), self.proxy(listed));
+        }
+    }
+
+    fn for_each_collider(&self, mut take: impl FnMut(Handle, Proxy)) {
+        for (each, _) in self.colliders.iter() {
+            take(handle(each), self.proxy(each));
+        }
+    }
+
+    fn removed(&self) -> impl Iterator<Item = (Handle, bool)> {
+        self.removed.iter().map(|&removed| (handle(removed), self.colliders.contains(removed)))
+    }
+
+    #[inline(always)]
+    fn margin(&self, aabb: &Aabb) -> Option<f32> {
+        self.adaptive_margin.then(|| own_margin(aabb, self.params.length_unit))
+    }
+}

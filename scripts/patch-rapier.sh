@@ -1,0 +1,81 @@
+#!/usr/bin/env bash
+# Puts a patched copy of rapier3d 0.36.1 beside a project, so that pbig can find its pairs.
+#
+#     patch-rapier.sh [PROJECT]          makes PROJECT/patched/rapier3d-0.36.1 (PROJECT: the current folder)
+#     patch-rapier.sh --undo [PROJECT]   removes it again
+#
+# It needs cargo and patch. The source comes from the registry that cargo uses. Run it again at any time: it starts over.
+set -euo pipefail
+
+version=0.36.1
+patch_file="$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)/patches/rapier3d+$version.patch"
+
+fail() {
+    echo "patch-rapier: $*" >&2
+    exit 1
+}
+
+is_undo=false
+if [ "${1:-}" = --undo ]; then
+    is_undo=true
+    shift
+fi
+project="${1:-.}"
+[ -f "$project/Cargo.toml" ] || fail "no Cargo.toml in '$project': name the folder of your project"
+project="$(cd "$project" && pwd)"
+copy="$project/patched/rapier3d-$version"
+
+if $is_undo; then
+    rm -rf "$copy"
+    rmdir "$project/patched" 2>/dev/null || true
+    echo "Removed $copy. Remove the line 'rapier3d = { path = ... }' under [patch.crates-io], too."
+    exit 0
+fi
+
+command -v patch >/dev/null || fail "the program 'patch' is missing: install it (Debian: apt install patch)"
+[ -f "$patch_file" ] || fail "$patch_file is missing: run the script from a copy of pbig's repository"
+
+# What the project has now: another version would not be replaced by the patched one.
+if [ -f "$project/Cargo.lock" ]; then
+    found="$(awk '$1 == "name" && $3 == "\"rapier3d\"" { getline; gsub(/"/, "", $3); print $3 }' "$project/Cargo.lock")"
+    for one in $found; do
+        [ "$one" = "$version" ] || fail "$project/Cargo.lock has rapier3d $one; the patch is for $version: change your \
+dependency, or run 'cargo update -p rapier3d@$one --precise $version'"
+    done
+fi
+
+# A project of its own, so that a missing or wrong entry in the user's Cargo.toml is no obstacle.
+work="$(mktemp -d)"
+trap 'rm -rf "$work"' EXIT
+mkdir -p "$work/src"
+touch "$work/src/lib.rs"
+cat >"$work/Cargo.toml" <<TOML
+[package]
+name = "fetch-rapier"
+version = "0.0.0"
+edition = "2024"
+[dependencies]
+rapier3d = "=$version"
+[workspace]
+TOML
+metadata="$(cd "$work" && cargo metadata --format-version 1 ${CARGO_NET_OFFLINE:+--offline})" ||
+    fail "cargo cannot fetch rapier3d $version"
+manifest="$(grep -o '"manifest_path":"[^"]*rapier3d-'"$version"'/Cargo.toml"' <<<"$metadata" | head -1 | cut -d'"' -f4)"
+[ -f "$manifest" ] || fail "cargo has fetched no rapier3d $version"
+
+# Made aside and moved into place, so that no half-patched copy stays behind.
+cp -r "$(dirname "$manifest")" "$work/rapier3d"
+chmod -R u+w "$work/rapier3d"
+patch --quiet --forward --strip=1 --directory="$work/rapier3d" <"$patch_file" ||
+    fail "the patch does not apply to $(dirname "$manifest"): is it unchanged?"
+rm -rf "$copy"
+mkdir -p "$(dirname "$copy")"
+mv "$work/rapier3d" "$copy"
+
+cat <<TEXT
+Made $copy.
+Add to Cargo.toml (of the workspace, if there is one):
+
+    [patch.crates-io]
+    rapier3d = { path = "patched/rapier3d-$version" }
+TEXT
