@@ -93,12 +93,14 @@ impl<T: Tree> Colliders<T> {
                 self.core.set_aabb(handle.index, aabb);
             }
         }
-        self.tree.note(self.core.changes(), self.registry.len());
+        if self.core.changes().next().is_some() {
+            self.tree.expire();
+        }
     }
 
     /// Returns the tree of the boxes with their margins, for queries.
     pub fn tree(&self) -> &T {
-        self.tree.get(self.core.id_count(), |id| self.core.fat_aabb(id))
+        self.tree.get(self.core.id_count(), self.core.changes(), |id| self.core.fat_aabb(id))
     }
 
     /// Updates the boxes that rapier lists, and sends the events.

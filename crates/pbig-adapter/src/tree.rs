@@ -50,20 +50,23 @@ impl<T> Clone for SceneTree<T> {
 }
 
 impl<T: Tree> SceneTree<T> {
-    /// Notes the boxes that change, and drops a tree that has missed too many changes. `colliders` is the number of known
-    /// colliders. Does nothing while nobody has asked for the tree.
-    pub(crate) fn note(&mut self, changed: impl Iterator<Item = u32>, colliders: usize) {
-        if !self.is_used() {
-            return;
+    /// Says that boxes have changed since the last query.
+    pub(crate) fn expire(&mut self) {
+        if let Some(tree) = self.current.take() {
+            *self.stale.get_mut().unwrap_or_else(PoisonError::into_inner) =
+                Some(Stale { tree, changed: Vec::new() });
         }
+    }
+
+    /// Notes the boxes that have changed before an update forgets them, and drops a tree that has missed too many changes.
+    /// `colliders` is the number of known colliders. Does nothing while nobody has asked for the tree.
+    pub(crate) fn note(&mut self, changed: impl Iterator<Item = u32>, colliders: usize) {
         let mut changed = changed.peekable();
         if changed.peek().is_none() {
             return;
         }
+        self.expire();
         let stale = self.stale.get_mut().unwrap_or_else(PoisonError::into_inner);
-        if let Some(tree) = self.current.take() {
-            *stale = Some(Stale { tree, changed: Vec::new() });
-        }
         if let Some(kept) = stale {
             kept.changed.extend(changed);
             if kept.changed.len() > policy::TREE_CHANGES_PER_COLLIDER * colliders {
@@ -72,16 +75,18 @@ impl<T: Tree> SceneTree<T> {
         }
     }
 
-    /// Returns true if there is a tree to keep up to date.
-    fn is_used(&mut self) -> bool {
-        let stale = self.stale.get_mut().unwrap_or_else(PoisonError::into_inner);
-        self.current.get().is_some() || stale.is_some()
-    }
-
-    /// Returns the tree of the boxes with ids below `ids`.
-    pub(crate) fn get(&self, ids: u32, aabb: impl Fn(u32) -> Option<Aabb>) -> &T {
+    /// Returns the tree of the boxes with ids below `ids`. `pending` are those that have changed since the last update.
+    pub(crate) fn get(
+        &self,
+        ids: u32,
+        pending: impl Iterator<Item = u32>,
+        aabb: impl Fn(u32) -> Option<Aabb>,
+    ) -> &T {
         let make = || match self.stale.lock().unwrap_or_else(PoisonError::into_inner).take() {
-            Some(stale) => stale.updated(ids, aabb),
+            Some(mut stale) => {
+                stale.changed.extend(pending);
+                stale.updated(ids, aabb)
+            }
             None => build(ids, aabb),
         };
         self.current.get_or_init(make)

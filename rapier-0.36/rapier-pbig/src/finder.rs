@@ -5,7 +5,7 @@ use crate::scene::{Call, handle, own_margin};
 use crate::tree::{ParryTree, from_tree, to_tree};
 use pbig_adapter::{Colliders, Error, HandlePair, PairEvent, Stats, Why};
 use rapier3d::geometry::PairFinder;
-use rapier3d::parry::bounding_volume::Aabb as TreeAabb;
+use rapier3d::parry::bounding_volume::{Aabb as TreeAabb, BoundingVolume};
 use rapier3d::parry::partitioning::Bvh;
 use rapier3d::prelude::{
     BroadPhasePairEvent, ColliderHandle, ColliderPair, ColliderSet, IntegrationParameters, RigidBodySet,
@@ -156,6 +156,13 @@ impl PairFinder for PbigFinder {
 
     fn tree(&self) -> &Bvh {
         &self.colliders.tree().bvh
+    }
+
+    /// Asks the grid, if there is one, so that continuous collision detection needs no tree.
+    fn intersect_aabb(&self, aabb: &TreeAabb, found: &mut dyn FnMut(u32)) {
+        if !self.colliders.core().overlapping_in_grid(&from_tree(aabb), found) {
+            self.tree().leaves(|node| node.aabb().intersects(aabb)).for_each(found);
+        }
     }
 
     fn state(&self) -> (Vec<(ColliderHandle, TreeAabb)>, Vec<(ColliderHandle, ColliderHandle)>) {

@@ -114,12 +114,21 @@ impl BroadPhase {
         if !aabb.is_valid() {
             return ids;
         }
-        if self.has_grid && self.world.changed.is_empty() {
-            self.grid.overlapping(aabb, &mut |id| ids.push(id));
+        if self.overlapping_in_grid(aabb, &mut |id| ids.push(id)) {
             return ids;
         }
         let overlaps = |(_, stored): &(usize, &Aabb)| aabb.overlaps(stored);
         ids.extend(self.world.boxes.iter().enumerate().filter(overlaps).map(|(id, _)| id as u32));
         ids
+    }
+
+    /// As [`BroadPhase::overlapping`], if there is a grid of all boxes. Returns false, and finds nothing, if there is none:
+    /// the last update used none, or boxes have changed since.
+    pub fn overlapping_in_grid(&self, aabb: &Aabb, found: &mut dyn FnMut(u32)) -> bool {
+        let has_grid = self.has_grid && self.world.changed.is_empty();
+        if has_grid && aabb.is_valid() {
+            self.grid.overlapping(aabb, found);
+        }
+        has_grid
     }
 }
