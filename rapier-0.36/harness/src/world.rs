@@ -98,6 +98,13 @@ impl World {
         colliders.remove(collider, islands, bodies, soft_bodies, true);
     }
 
+    /// Adds a cube that bends, half an edge long in each direction.
+    pub fn add_soft(&mut self, at: Vec3, half: f32) -> SoftBodyHandle {
+        let cube = SoftBodyBuilder::cuboid(to_vector(at), Vector::splat(half), 3, 3, 3).particle_mass(0.2);
+        let Self { soft_bodies, bodies, colliders, .. } = self;
+        soft_bodies.insert(cube, bodies, colliders)
+    }
+
     /// Everything with its broad phase, bit by bit.
     ///
     /// # Panics

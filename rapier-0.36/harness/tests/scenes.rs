@@ -2,7 +2,7 @@
 
 use pbig_harness_036::scenes::Scene;
 use rapier_pbig::PbigFinder;
-use rapier_pbig::shadow::Shadow;
+use rapier_pbig::shadow::{Shadow, checker};
 use rapier3d::prelude::BroadPhaseBvh;
 
 #[test]
@@ -10,14 +10,14 @@ fn every_scene_has_the_pairs_of_the_oracle_and_misses_no_contact_of_stock() {
     for scene in Scene::ALL {
         let mut broad_phase = BroadPhaseBvh::new();
         let finder = PbigFinder::default().with_shadow(Shadow::Stock).with_shadow(Shadow::Oracle);
-        rapier_pbig::install_finder(&mut broad_phase, finder.compared_every(3));
+        rapier_pbig::install_finder(&mut broad_phase, finder.every(3));
         let mut world = scene.build(250, 1);
         for _ in 0..150 {
             world.step(&mut broad_phase);
         }
         let finder = rapier_pbig::finder(&broad_phase).expect("it is installed");
-        let checker = finder.shadow().expect("it was added");
-        assert!(finder.differences().is_empty(), "{}: {}", scene.name, finder.differences()[0]);
+        let checker = checker(&broad_phase).expect("it was added");
+        assert!(checker.differences.is_empty(), "{}: {}", scene.name, checker.differences[0]);
         assert!(checker.compared > 5, "{}: {}", scene.name, checker.compared);
         assert!(checker.oracle_pairs > 0 && checker.has_stock(), "{}", scene.name);
         assert!(finder.last_error().is_none());

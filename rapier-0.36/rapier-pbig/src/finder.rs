@@ -18,8 +18,6 @@ pub struct PbigFinder {
     pub(crate) colliders: Colliders<ParryTree>,
     /// In units of `IntegrationParameters::length_unit`.
     pub(crate) relative_margin: f32,
-    #[cfg(feature = "shadow")]
-    pub(crate) shadow: Option<Box<crate::shadow::Watcher>>,
 }
 
 impl Default for PbigFinder {
@@ -48,12 +46,7 @@ impl PbigFinder {
     }
 
     fn around(core: pbig_core::BroadPhase) -> Self {
-        Self {
-            relative_margin: core.config().margin,
-            colliders: Colliders::new(core),
-            #[cfg(feature = "shadow")]
-            shadow: None,
-        }
+        Self { relative_margin: core.config().margin, colliders: Colliders::new(core) }
     }
 
     /// Returns the counts of the last update.
@@ -82,21 +75,6 @@ impl PbigFinder {
         self.colliders.why(handle(one), handle(other))
     }
 
-    fn find(&mut self, call: &Call<'_>, events: &mut Vec<BroadPhasePairEvent>) {
-        if self.skips(call) {
-            return;
-        }
-        let margin = self.relative_margin * call.params.length_unit;
-        self.colliders.update(call, margin, |event| events.push(to_event(event)));
-    }
-
-    fn skips(&mut self, call: &Call<'_>) -> bool {
-        #[cfg(feature = "shadow")]
-        if self.shadow.is_some() {
-            return false;
-        }
-        self.colliders.skips(call)
-    }
 }
 
 fn to_handle(handle: pbig_adapter::Handle) -> ColliderHandle {
@@ -127,12 +105,9 @@ impl PairFinder for PbigFinder {
     ) {
         let (modified, removed) = (modified_colliders, removed_colliders);
         let call = Call { params, adaptive_margin, colliders, bodies, modified, removed };
-        #[cfg(feature = "shadow")]
-        let start = events.len();
-        self.find(&call, events);
-        #[cfg(feature = "shadow")]
-        if let Some(shadow) = &mut self.shadow {
-            shadow.watch(&call, &events[start..]);
+        if !self.colliders.skips(&call) {
+            let margin = self.relative_margin * params.length_unit;
+            self.colliders.update(&call, margin, |event| events.push(to_event(event)));
         }
     }
 
@@ -148,10 +123,6 @@ impl PairFinder for PbigFinder {
             (handle(moved), aabb, adaptive_margin.then(|| own_margin(&aabb, unit)))
         });
         self.colliders.set_aabbs(self.relative_margin * unit, moved);
-        #[cfg(feature = "shadow")]
-        if let Some(shadow) = &mut self.shadow {
-            shadow.note_moved(params, aabbs);
-        }
     }
 
     fn tree(&self) -> &Bvh {
@@ -176,10 +147,6 @@ impl PairFinder for PbigFinder {
 
     fn start_from(&mut self, aabbs: Vec<(u32, TreeAabb)>, pairs: Vec<(ColliderHandle, ColliderHandle)>) {
         let pairs: Vec<_> = pairs.into_iter().map(|(a, b)| HandlePair(handle(a), handle(b))).collect();
-        #[cfg(feature = "shadow")]
-        if let Some(shadow) = &mut self.shadow {
-            shadow.start_over(&pairs);
-        }
         let boxes = aabbs.iter().map(|(id, aabb)| (*id, from_tree(aabb))).collect();
         self.colliders.adopt(pairs, boxes);
     }

@@ -51,7 +51,9 @@ pub use pbig_adapter::{Backend, Error, Handle, Report, Stats, Totals, Why};
 #[cfg(feature = "gpu")]
 pub use pbig_core::GpuFinder;
 
+use rapier3d::geometry::PairFinder;
 use rapier3d::prelude::BroadPhaseBvh;
+use std::any::Any;
 
 /// The margin of rapier's own broad phase, in units of `length_unit`.
 const MARGIN: f32 = 0.04;
@@ -83,8 +85,8 @@ pub fn install_with(broad_phase: &mut BroadPhaseBvh, config: PbigConfig) -> Resu
     Ok(())
 }
 
-/// As [`install`], with a finder of your own settings.
-pub fn install_finder(broad_phase: &mut BroadPhaseBvh, finder: PbigFinder) {
+/// As [`install`], with a finder of your own settings, perhaps a shadowed one.
+pub fn install_finder(broad_phase: &mut BroadPhaseBvh, finder: impl PairFinder) {
     broad_phase.set_pair_finder(Some(Box::new(finder)));
 }
 
@@ -101,5 +103,10 @@ pub fn uninstall(broad_phase: &mut BroadPhaseBvh) {
 /// assert_eq!(finder.stats().totals.updates, 0);
 /// ```
 pub fn finder(broad_phase: &BroadPhaseBvh) -> Option<&PbigFinder> {
-    (broad_phase.pair_finder()? as &dyn std::any::Any).downcast_ref()
+    let finder = broad_phase.pair_finder()? as &dyn Any;
+    #[cfg(feature = "shadow")]
+    if let Some(shadowed) = finder.downcast_ref::<shadow::Shadowed<PbigFinder>>() {
+        return Some(&shadowed.inner);
+    }
+    finder.downcast_ref()
 }

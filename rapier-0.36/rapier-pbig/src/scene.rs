@@ -35,10 +35,15 @@ impl Call<'_> {
         filter_of(body, self.kind(collider), collider.active_collision_types().bits(), groups)
     }
 
-    /// Returns the type of the collider's body. A collider without a body counts as fixed.
+    /// Returns the type of the collider's body. A collider without a body counts as fixed, the frame of a soft body as dynamic.
     pub(crate) fn kind(&self, collider: &Collider) -> BodyKind {
         let body = collider.parent().and_then(|handle| self.bodies.get(handle));
-        body.map_or(BodyKind::Fixed, |body| BodyKind::from_number(body.body_type() as u32))
+        match body.map_or(RigidBodyType::Fixed, RigidBody::body_type) {
+            RigidBodyType::Dynamic | RigidBodyType::SoftFrame => BodyKind::Dynamic,
+            RigidBodyType::Fixed => BodyKind::Fixed,
+            RigidBodyType::KinematicPositionBased => BodyKind::KinematicPositionBased,
+            RigidBodyType::KinematicVelocityBased => BodyKind::KinematicVelocityBased,
+        }
     }
 }
 

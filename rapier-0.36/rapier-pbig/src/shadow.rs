@@ -9,60 +9,51 @@ use crate::scene::{Call, groups_of, handle};
 use crate::tree::from_tree;
 use pbig_adapter::shadow::Watched;
 use pbig_adapter::{Aabb, Handle, HandlePair, PairEvent};
+use rapier3d::geometry::PairFinder;
 use rapier3d::parry::bounding_volume::Aabb as TreeAabb;
+use rapier3d::parry::partitioning::Bvh;
 use rapier3d::parry::query::{contact, distance};
 use rapier3d::prelude::*;
+use std::any::Any;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
 impl PbigFinder {
-    /// Compares every update with this reference; a second call adds the other one. [`PbigFinder::differences`] lists what
-    /// is wrong. The first difference is also a `tracing` error, and the AABBs of the calls up to it are written into a file
-    /// for `pbig replay` in the system's folder for temporary files. (The file has no filters and no margin.)
+    /// Compares every update with this reference; [`Shadowed::with_shadow`] adds the other one. The first difference is also a
+    /// `tracing` error, and the AABBs of the calls up to it are written into a file for `pbig replay` in the system's folder
+    /// for temporary files. (The file has no filters and no margin.)
     ///
-    /// For tests, and for an app that seems to miss a pair. Add it before the finder is installed. See [`Shadow`] for the
-    /// cost.
+    /// For tests, and for an app that seems to miss a pair. See [`Shadow`] for the cost.
     ///
     /// ```
-    /// use rapier_pbig::{PbigFinder, shadow::Shadow};
+    /// use rapier_pbig::{PbigFinder, shadow::{self, Shadow}};
     /// use rapier3d::prelude::BroadPhaseBvh;
     ///
     /// let mut broad_phase = BroadPhaseBvh::new();
     /// let finder = PbigFinder::default().with_shadow(Shadow::Stock).with_shadow(Shadow::Oracle);
     /// rapier_pbig::install_finder(&mut broad_phase, finder);
     /// // The app's steps.
-    /// let finder = rapier_pbig::finder(&broad_phase).expect("it is installed");
-    /// assert!(finder.differences().is_empty(), "{}", finder.differences()[0]);
+    /// let checker = shadow::checker(&broad_phase).expect("it is installed");
+    /// assert!(checker.differences.is_empty(), "{}", checker.differences[0]);
     /// ```
-    pub fn with_shadow(mut self, shadow: Shadow) -> Self {
-        let new = || Watcher::new(Checker::new().with_replays_in(std::env::temp_dir()), self.relative_margin);
-        let watcher = self.shadow.get_or_insert_with(|| Box::new(new()));
-        watcher.checker.add(shadow);
-        self
-    }
-
-    /// Compares in one of `every` updates that modify something. The events of all updates are followed.
-    pub fn compared_every(mut self, every: usize) -> Self {
-        if let Some(watcher) = &mut self.shadow {
-            watcher.checker = std::mem::take(&mut watcher.checker).every(every);
-        }
-        self
-    }
-
-    /// Returns the checker, if there is one.
-    pub fn shadow(&self) -> Option<&Checker> {
-        self.shadow.as_ref().map(|watcher| &watcher.checker)
-    }
-
-    /// Returns what the checker found wrong so far, oldest first.
-    pub fn differences(&self) -> &[Difference] {
-        self.shadow().map_or(&[], |checker| &checker.differences)
+    pub fn with_shadow(self, shadow: Shadow) -> Shadowed<Self> {
+        let margin = self.relative_margin;
+        Shadowed::new(self, margin).with_shadow(shadow)
     }
 }
 
-/// A checker, and stock beside it.
+/// Returns the checker of a finder that was installed with a shadow.
+pub fn checker(broad_phase: &BroadPhaseBvh) -> Option<&Checker> {
+    let finder = broad_phase.pair_finder()? as &dyn Any;
+    finder.downcast_ref::<Shadowed<PbigFinder>>().map(|shadowed| &shadowed.checker)
+}
+
+/// A finder, and a checker of what it answers.
 #[derive(Clone)]
-pub(crate) struct Watcher {
-    pub(crate) checker: Checker,
+pub struct Shadowed<F> {
+    /// The finder.
+    pub inner: F,
+    /// What was found so far.
+    pub checker: Checker,
     relative_margin: f32,
     /// None after it has panicked.
     stock: Option<BroadPhaseBvh>,
@@ -72,31 +63,26 @@ pub(crate) struct Watcher {
     started: bool,
 }
 
-impl std::fmt::Debug for Watcher {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.debug_struct("Watcher").field("differences", &self.checker.differences).finish_non_exhaustive()
-    }
-}
-
-impl Watcher {
-    fn new(checker: Checker, relative_margin: f32) -> Self {
-        Self { checker, relative_margin, stock: Some(BroadPhaseBvh::new()), has_moved: false, started: false }
+impl<F> Shadowed<F> {
+    /// Creates a checker without references. `relative_margin` is the finder's margin in units of `length_unit`.
+    pub fn new(inner: F, relative_margin: f32) -> Self {
+        let checker = Checker::new().with_replays_in(std::env::temp_dir());
+        let stock = Some(BroadPhaseBvh::new());
+        Self { inner, checker, relative_margin, stock, has_moved: false, started: false }
     }
 
-    /// Goes on with a world whose narrow phase has these pairs.
-    pub(crate) fn start_over(&mut self, pairs: &[HandlePair]) {
-        self.checker.start_over(pairs.iter().copied());
-        (self.stock, self.started) = (Some(BroadPhaseBvh::new()), false);
+    /// Adds a reference.
+    pub fn with_shadow(mut self, shadow: Shadow) -> Self {
+        self.checker.add(shadow);
+        self
     }
 
-    pub(crate) fn note_moved(&mut self, params: &IntegrationParameters, aabbs: &[(ColliderHandle, TreeAabb)]) {
-        self.has_moved |= !aabbs.is_empty();
-        if let Some(stock) = &mut self.stock {
-            aabbs.iter().for_each(|(handle, aabb)| stock.set_aabb(params, *handle, *aabb));
-        }
+    /// Compares in one of `every` updates that modify something. The events of all updates are followed.
+    pub fn every(self, every: usize) -> Self {
+        Self { checker: self.checker.every(every), ..self }
     }
 
-    pub(crate) fn watch(&mut self, call: &Call<'_>, events: &[BroadPhasePairEvent]) {
+    fn watch(&mut self, call: &Call<'_>, events: &[BroadPhasePairEvent]) {
         let stock = self.update_stock(call);
         let (events, removed) = (pair_events(events), removed(call));
         let is_modified = std::mem::take(&mut self.has_moved) || !call.modified.is_empty();
@@ -124,6 +110,54 @@ impl Watcher {
             return None;
         }
         Some(pair_events(&events))
+    }
+}
+
+impl<F: PairFinder + Clone> PairFinder for Shadowed<F> {
+    fn update(
+        &mut self,
+        params: &IntegrationParameters,
+        adaptive_margin: bool,
+        colliders: &ColliderSet,
+        bodies: &RigidBodySet,
+        modified: &[ColliderHandle],
+        removed: &[ColliderHandle],
+        events: &mut Vec<BroadPhasePairEvent>,
+    ) {
+        let start = events.len();
+        self.inner.update(params, adaptive_margin, colliders, bodies, modified, removed, events);
+        let call = Call { params, adaptive_margin, colliders, bodies, modified, removed };
+        self.watch(&call, &events[start..]);
+    }
+
+    fn set_aabbs(&mut self, params: &IntegrationParameters, adaptive: bool, aabbs: &[(ColliderHandle, TreeAabb)]) {
+        self.inner.set_aabbs(params, adaptive, aabbs);
+        self.has_moved |= !aabbs.is_empty();
+        if let Some(stock) = &mut self.stock {
+            stock.set_aabbs(params, aabbs);
+        }
+    }
+
+    fn tree(&self) -> &Bvh {
+        self.inner.tree()
+    }
+
+    fn intersect_aabb(&self, aabb: &TreeAabb, found: &mut dyn FnMut(u32)) {
+        self.inner.intersect_aabb(aabb, found);
+    }
+
+    fn state(&self) -> (Vec<(ColliderHandle, TreeAabb)>, Vec<(ColliderHandle, ColliderHandle)>) {
+        self.inner.state()
+    }
+
+    fn start_from(&mut self, aabbs: Vec<(u32, TreeAabb)>, pairs: Vec<(ColliderHandle, ColliderHandle)>) {
+        self.checker.start_over(pairs.iter().map(|&(a, b)| HandlePair(handle(a), handle(b))));
+        (self.stock, self.started) = (Some(BroadPhaseBvh::new()), false);
+        self.inner.start_from(aabbs, pairs);
+    }
+
+    fn clone_box(&self) -> Box<dyn PairFinder> {
+        Box::new(self.clone())
     }
 }
 

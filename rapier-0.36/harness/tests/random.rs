@@ -1,0 +1,338 @@
+//! Random operations on small worlds: each update is compared with rapier's own broad phase and with brute force.
+//!
+//! Each run is named by its seed. `PBIG_RUNS=20000` plays more runs (about 10^6 operations).
+
+use glam::Vec3;
+use pbig_harness_036::world::{World, groups_that_meet, to_rotation, to_vector};
+use rand::rngs::StdRng;
+use rand::{RngExt, SeedableRng};
+use rapier_pbig::{PbigConfig, PbigFinder};
+use rapier_pbig::shadow::{Shadow, Shadowed};
+use rapier3d::geometry::PairFinder;
+use rapier3d::parry::bounding_volume::Aabb;
+use rapier3d::parry::partitioning::Bvh;
+use rapier3d::prelude::*;
+use std::any::Any;
+use std::cell::Cell;
+use std::collections::HashSet;
+use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
+
+/// Operations in a run.
+const OPS: usize = 60;
+
+thread_local! {
+    /// In the middle of a call of the finder, where a panic is ours and not rapier's.
+    static BUSY: Cell<bool> = const { Cell::new(false) };
+}
+
+/// What the finder under test does wrong.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Plant {
+    Nothing,
+    /// The AABBs that a step has moved do not arrive.
+    Unmoved,
+    /// The third event of a call and those after it are lost.
+    RoomForTwo,
+    /// Nothing is listed as modified but what is new.
+    OnlyNew,
+}
+
+/// A finder with a fault planted in front of it or behind.
+#[derive(Clone)]
+struct Planted {
+    finder: PbigFinder,
+    plant: Plant,
+    known: HashSet<ColliderHandle>,
+}
+
+impl PairFinder for Planted {
+    fn update(
+        &mut self,
+        params: &IntegrationParameters,
+        adaptive_margin: bool,
+        colliders: &ColliderSet,
+        bodies: &RigidBodySet,
+        modified: &[ColliderHandle],
+        removed: &[ColliderHandle],
+        events: &mut Vec<BroadPhasePairEvent>,
+    ) {
+        let is_new = |handle: &&ColliderHandle| self.plant != Plant::OnlyNew || self.known.insert(**handle);
+        let shown: Vec<_> = modified.iter().filter(is_new).copied().collect();
+        BUSY.set(true);
+        self.finder.update(params, adaptive_margin, colliders, bodies, &shown, removed, events);
+        BUSY.set(false);
+        if self.plant == Plant::RoomForTwo {
+            events.truncate(2);
+        }
+    }
+
+    fn set_aabbs(&mut self, params: &IntegrationParameters, adaptive: bool, aabbs: &[(ColliderHandle, Aabb)]) {
+        if self.plant != Plant::Unmoved {
+            BUSY.set(true);
+            self.finder.set_aabbs(params, adaptive, aabbs);
+            BUSY.set(false);
+        }
+    }
+
+    fn tree(&self) -> &Bvh {
+        self.finder.tree()
+    }
+
+    fn state(&self) -> (Vec<(ColliderHandle, Aabb)>, Vec<(ColliderHandle, ColliderHandle)>) {
+        self.finder.state()
+    }
+
+    fn start_from(&mut self, aabbs: Vec<(u32, Aabb)>, pairs: Vec<(ColliderHandle, ColliderHandle)>) {
+        self.finder.start_from(aabbs, pairs);
+    }
+
+    fn clone_box(&self) -> Box<dyn PairFinder> {
+        Box::new(self.clone())
+    }
+}
+
+/// A world under random operations.
+struct Player {
+    world: World,
+    broad_phase: BroadPhaseBvh,
+    rng: StdRng,
+    is_adaptive: bool,
+    plant: Plant,
+}
+
+/// What happened, summed up.
+#[derive(Default)]
+struct Tally {
+    steps: u64,
+    compared: u64,
+    oracle_pairs: u64,
+    contacts: u64,
+    queries: u64,
+    restores: u64,
+    soft: u64,
+    /// Runs that a panic of rapier's has cut short: it panics at a joint between bodies of which none is dynamic any more.
+    cut_short: u64,
+}
+
+type Subject = Shadowed<Planted>;
+
+fn subject(plant: Plant) -> Subject {
+    let planted = Planted { finder: PbigFinder::default(), plant, known: HashSet::new() };
+    Shadowed::new(planted, PbigConfig::DEFAULT.margin).with_shadow(Shadow::Stock).with_shadow(Shadow::Oracle)
+}
+
+fn subject_in(broad_phase: &BroadPhaseBvh) -> &Subject {
+    let finder = broad_phase.pair_finder().expect("it is installed") as &dyn Any;
+    finder.downcast_ref().expect("it is ours")
+}
+
+impl Player {
+    fn new(seed: u64, plant: Plant) -> Self {
+        let mut broad_phase = BroadPhaseBvh::new();
+        rapier_pbig::install_finder(&mut broad_phase, subject(plant));
+        let (mut world, mut rng) = (World::default(), StdRng::seed_from_u64(seed));
+        world.colliders.insert(World::ground());
+        world.params.max_ccd_substeps = rng.random_range(0..4);
+        let is_adaptive = rng.random_range(0..4) == 0;
+        broad_phase.adaptive_change_detection_margin = is_adaptive;
+        Self { world, broad_phase, rng, is_adaptive, plant }
+    }
+
+    fn place(&mut self) -> Vec3 {
+        let mut along = |low: f32, high: f32| self.rng.random_range(low..high);
+        Vec3::new(along(-3.0, 3.0), along(0.3, 5.0), along(-3.0, 3.0))
+    }
+
+    fn collider(&mut self) -> ColliderBuilder {
+        let half = self.rng.random_range(0.1..0.9);
+        let shape = match self.rng.random_range(0..4) {
+            0 => ColliderBuilder::ball(half),
+            1 => ColliderBuilder::cuboid(half, 0.2, half),
+            2 => ColliderBuilder::capsule_y(half, 0.2),
+            _ => ColliderBuilder::cuboid(half, half, half),
+        };
+        let groups = self.groups();
+        let types = [ActiveCollisionTypes::default(), ActiveCollisionTypes::all()];
+        let types = types[self.rng.random_range(0..2)];
+        let is_sensor = self.rng.random_range(0..6) == 0;
+        shape.sensor(is_sensor).collision_groups(groups).active_collision_types(types)
+    }
+
+    fn groups(&mut self) -> InteractionGroups {
+        let own = [Group::GROUP_1, Group::GROUP_2, Group::ALL][self.rng.random_range(0..3)];
+        let mask = [Group::ALL, Group::GROUP_1][self.rng.random_range(0..2)];
+        groups_that_meet(own, mask)
+    }
+
+    fn body(&mut self) -> RigidBodyBuilder {
+        let at = to_vector(self.place());
+        let body = match self.rng.random_range(0..6) {
+            0 => RigidBodyBuilder::fixed(),
+            1 => RigidBodyBuilder::kinematic_velocity_based().linvel(to_vector(Vec3::X)),
+            _ => RigidBodyBuilder::dynamic(),
+        };
+        let fast = Vec3::new(self.rng.random_range(-30.0..30.0), -20.0, 0.0);
+        let speed = if self.rng.random_range(0..4) == 0 { fast } else { Vec3::ZERO };
+        let soft_ccd = if self.rng.random_range(0..6) == 0 { 0.5 } else { 0.0 };
+        let turn = to_rotation(glam::Quat::from_rotation_z(self.rng.random_range(-3.0..3.0)));
+        let body = body.translation(at).rotation(turn).linvel(to_vector(speed));
+        body.soft_ccd_prediction(soft_ccd).ccd_enabled(self.rng.random_range(0..3) == 0)
+    }
+
+    fn any_body(&mut self) -> Option<RigidBodyHandle> {
+        let bodies: Vec<_> = self.world.bodies.iter().filter(|(_, body)| !body.is_soft_frame()).collect();
+        let count = bodies.len();
+        (count > 0).then(|| bodies[self.rng.random_range(0..count)].0)
+    }
+
+    fn any_collider(&mut self) -> Option<ColliderHandle> {
+        let handles: Vec<_> = self.world.colliders.iter().map(|(handle, _)| handle).collect();
+        (!handles.is_empty()).then(|| handles[self.rng.random_range(0..handles.len())])
+    }
+
+    fn play(&mut self, tally: &mut Tally) {
+        let op = self.rng.random_range(0..20);
+        let (body, collider) = (self.any_body(), self.any_collider());
+        let (Some(body), Some(collider)) = (body, collider) else { return self.add() };
+        let is_soft = self.world.colliders[collider].parent().is_some_and(|parent| {
+            self.world.bodies.get(parent).is_some_and(RigidBody::is_soft_frame)
+        });
+        match op {
+            0..5 => self.add(),
+            5 => self.world.remove(body),
+            6 if !is_soft => self.world.remove_collider(collider),
+            7 => self.world.bodies[body].set_enabled(false),
+            8 => self.world.bodies[body].set_enabled(true),
+            9 if !is_soft => self.world.colliders[collider].set_enabled(false),
+            10 => self.world.colliders[collider].set_enabled(true),
+            11 => {
+                let at = to_vector(self.place());
+                self.world.bodies[body].set_translation(at, true);
+            }
+            12 if !is_soft => {
+                let World { colliders, bodies, .. } = &mut self.world;
+                colliders.set_parent(collider, Some(body), bodies);
+            }
+            // Rapier panics at a joint between bodies of which none is dynamic.
+            13 if self.world.impulse_joints.attached_joints(body).next().is_none() => {
+                let kinds = [RigidBodyType::Fixed, RigidBodyType::Dynamic, RigidBodyType::KinematicPositionBased];
+                let kind = kinds[self.rng.random_range(0..3)];
+                self.world.bodies[body].set_body_type(kind, true);
+            }
+            14 => {
+                let groups = self.groups();
+                self.world.colliders[collider].set_collision_groups(groups);
+            }
+            15 => self.join(body),
+            16 => self.query(tally),
+            17 => self.restore(tally),
+            18 if self.rng.random_range(0..8) == 0 => {
+                let at = self.place();
+                self.world.add_soft(at, 0.5);
+                tally.soft += 1;
+            }
+            _ => self.quarantine_test(body),
+        }
+    }
+
+    fn add(&mut self) {
+        let (body, collider) = (self.body(), self.collider());
+        self.world.add(body, collider);
+    }
+
+    fn join(&mut self, body: RigidBodyHandle) {
+        let other = self.any_body().filter(|&other| other != body);
+        if let Some(other) = other.filter(|&other| [body, other].iter().all(|&one| self.world.bodies[one].is_dynamic())) {
+            self.world.impulse_joints.insert(body, other, SphericalJointBuilder::new(), true);
+        }
+    }
+
+    /// A query between steps finds each collider that the finder knows by its own AABB.
+    fn query(&mut self, tally: &mut Tally) {
+        let World { narrow_phase, bodies, colliders, .. } = &self.world;
+        let (subject, filter) = (subject_in(&self.broad_phase), QueryFilter::default());
+        let queries = self.broad_phase.as_query_pipeline(narrow_phase.query_dispatcher(), bodies, colliders, filter);
+        let (boxes, _) = subject.state();
+        for (handle, aabb) in boxes {
+            let found = queries.intersect_aabb_conservative(aabb).any(|(found, _)| found == handle);
+            assert!(found || !colliders.contains(handle), "{handle:?} at {aabb:?}");
+            tally.queries += 1;
+        }
+    }
+
+    /// Saves and restores the world. Half the time its tree goes on for a step before pbig takes over again.
+    fn restore(&mut self, tally: &mut Tally) {
+        let bytes = self.world.to_bytes(&self.broad_phase);
+        let (world, broad_phase) = World::from_bytes(&bytes).expect("these are the bytes of a world");
+        (self.world, self.broad_phase) = (world, broad_phase);
+        self.broad_phase.adaptive_change_detection_margin = self.is_adaptive;
+        if self.rng.random_range(0..2) == 0 {
+            self.world.step(&mut self.broad_phase);
+        }
+        rapier_pbig::install_finder(&mut self.broad_phase, subject(self.plant));
+        tally.restores += 1;
+    }
+
+    /// A body whose velocity is no number is put out of action by rapier.
+    fn quarantine_test(&mut self, body: RigidBodyHandle) {
+        if self.rng.random_range(0..10) == 0 {
+            self.world.bodies[body].set_linvel(to_vector(Vec3::new(f32::NAN, 0.0, 0.0)), true);
+        }
+    }
+
+    fn check(&self, seed: u64) -> Result<(), String> {
+        let subject = subject_in(&self.broad_phase);
+        match (&subject.checker.differences[..], subject.inner.finder.last_error()) {
+            ([], None) => Ok(()),
+            ([first, ..], _) => Err(format!("seed {seed}: {first}")),
+            (_, Some(error)) => Err(format!("seed {seed}: {error}")),
+        }
+    }
+}
+
+fn run(seed: u64, plant: Plant, tally: &mut Tally) -> Result<(), String> {
+    let mut player = Player::new(seed, plant);
+    for _ in 0..OPS {
+        let mut play = || {
+            player.play(tally);
+            if player.rng.random_range(0..2) == 0 {
+                player.world.step(&mut player.broad_phase);
+                tally.steps += 1;
+            }
+        };
+        if let Err(panic) = catch_unwind(AssertUnwindSafe(&mut play)) {
+            if BUSY.get() {
+                resume_unwind(panic);
+            }
+            tally.cut_short += 1;
+            return Ok(());
+        }
+        player.check(seed)?;
+    }
+    let checker = &subject_in(&player.broad_phase).checker;
+    tally.compared += checker.compared as u64;
+    tally.oracle_pairs += checker.oracle_pairs;
+    tally.contacts += player.world.narrow_phase.contact_pairs().count() as u64;
+    Ok(())
+}
+
+#[test]
+fn random_worlds_have_the_pairs_of_the_oracle_and_miss_no_contact_of_stock() {
+    let runs = std::env::var("PBIG_RUNS").ok().and_then(|runs| runs.parse().ok()).unwrap_or(300);
+    let mut tally = Tally::default();
+    for seed in 0..runs {
+        run(seed, Plant::Nothing, &mut tally).unwrap_or_else(|difference| panic!("{difference}"));
+    }
+    let Tally { steps, compared, oracle_pairs, contacts, queries, restores, soft, cut_short } = tally;
+    println!("{steps} steps, {compared} compared, {oracle_pairs} pairs, {contacts} contacts, {queries} queries, {restores} restores, {soft} soft, {cut_short} cut short");
+    assert!(compared > 5 * runs && oracle_pairs > 10 * runs && contacts > runs);
+    assert!(queries > runs && restores > runs && soft > runs / 20 && cut_short < runs / 5);
+}
+
+#[test]
+fn planted_faults_are_noticed() {
+    for plant in [Plant::Unmoved, Plant::RoomForTwo, Plant::OnlyNew] {
+        let noticed = (0..40).filter(|&seed| run(seed, plant, &mut Tally::default()).is_err()).count();
+        assert!(noticed >= 10, "{plant:?}: {noticed} of 40");
+    }
+}

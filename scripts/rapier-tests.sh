@@ -1,0 +1,76 @@
+#!/usr/bin/env bash
+# Runs rapier 0.36.1's own tests on a patched copy, without and with pbig's finder in every broad phase.
+#
+#     scripts/rapier-tests.sh [ARGUMENTS OF cargo test]
+#
+# The copy contains rapier-pbig as a module, because a crate's unit tests cannot use a crate that depends on it. The variable
+# RAPIER_PBIG installs the finder in every new broad phase. Without arguments it runs the unit tests and those of tests/.
+set -euo pipefail
+cd "$(dirname "${BASH_SOURCE[0]}")/.."
+root="$PWD"
+copy="$root/target/rapier-tests/rapier3d"
+
+rm -rf "$copy"
+mkdir -p "$copy"
+touch "$copy/../Cargo.toml"
+rm "$copy/../Cargo.toml"
+[ -d rapier-0.36/patched/rapier3d-0.36.1 ] || scripts/patch-rapier.sh rapier-0.36
+cp -r rapier-0.36/patched/rapier3d-0.36.1/. "$copy"
+
+# pbig's finder as a module: its `crate::` is `crate::pbig::` here.
+mkdir "$copy/src/pbig"
+for file in config finder scene tree; do
+    { sed 's/crate::/crate::pbig::/g; s/use rapier3d::/use crate::/' "rapier-0.36/rapier-pbig/src/$file.rs"
+      echo '#[allow(unused_imports)] use std::prelude::rust_2024::*;'
+    } >"$copy/src/pbig/$file.rs"
+done
+cat >"$copy/src/pbig/mod.rs" <<'RUST'
+#![allow(missing_docs, dead_code)]
+mod config;
+mod finder;
+mod scene;
+mod tree;
+pub(crate) use config::PbigConfig;
+pub(crate) use finder::PbigFinder;
+const MARGIN: f32 = 0.04;
+const MAX_ADAPTIVE_MARGIN: f32 = 0.25;
+
+pub(crate) fn wanted() -> Option<std::boxed::Box<dyn crate::geometry::PairFinder>> {
+    std::env::var_os("RAPIER_PBIG").map(|_| std::boxed::Box::<PbigFinder>::default() as _)
+}
+RUST
+sed -i 's/^pub mod control;/pub(crate) mod pbig;\npub mod control;/' "$copy/src/lib.rs"
+sed -i '/pub fn new() -> Self {/{n;s/Self::default()/Self { pair_finder: crate::pbig::wanted(), ..Self::default() }/}' \
+    "$copy/src/geometry/broad_phase_bvh/mod.rs"
+sed -i 's/DefaultBroadPhase::default()/DefaultBroadPhase::new()/' "$copy/src/pipeline/physics_world.rs"
+cat >>"$copy/Cargo.toml" <<TOML
+
+[dependencies.pbig-core]
+path = "$root/crates/pbig-core"
+default-features = false
+[dependencies.pbig-adapter]
+path = "$root/crates/pbig-adapter"
+default-features = false
+[dependencies.tracing]
+version = "0.1"
+default-features = false
+features = ["std"]
+
+[workspace]
+TOML
+grep -q 'pbig::wanted' "$copy/src/geometry/broad_phase_bvh/mod.rs" || { echo "the finder is not installed" >&2; exit 1; }
+
+cd "$copy"
+export CARGO_TARGET_DIR="${CARGO_TARGET_DIR:-$root/target/rapier-tests/target}"
+arguments=("$@")
+[ $# -gt 0 ] || arguments=(--lib --tests)
+failed=0
+for finder in "" pbig; do
+    echo "== rapier's tests, finder: ${finder:-none}"
+    if [ -n "$finder" ]; then export RAPIER_PBIG=1; else unset RAPIER_PBIG; fi
+    cargo test --no-fail-fast --features serde-serialize "${arguments[@]}" >"$copy/../${finder:-stock}.log" 2>&1 || failed=1
+    grep -E '^test .*FAILED|^error|panicked at|^test result: .* failed' "$copy/../${finder:-stock}.log" |
+        grep -v ' 0 failed' || true
+    grep -hE '^test result' "$copy/../${finder:-stock}.log" | awk '{ passed += $4; failed += $6 } END { print passed " passed, " failed " failed" }'
+done
+exit $failed
