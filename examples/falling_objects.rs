@@ -97,8 +97,12 @@ fn check(args: &Args, broad_phase: PbigBroadPhase) -> Checked {
     }
     bar.finish_and_clear();
     let shadow = run.broad_phase.inner;
-    let missing = shadow.checker.differences.iter().filter(|d| d.fault.is_missing()).count();
-    Checked { comparisons: shadow.checker.compared, missing, differences: shadow.checker.differences }
+    let missing = shadow.checker().differences.iter().filter(|d| d.fault.is_missing()).count();
+    Checked {
+        comparisons: shadow.checker().compared,
+        missing,
+        differences: shadow.checker().differences.clone(),
+    }
 }
 
 fn print_table(stock: &Run<DefaultBroadPhase>, ours: &Run<PbigBroadPhase>, checked: &Checked) {

@@ -21,7 +21,7 @@ fn why_names_the_test_that_ended_a_pair() {
         let c = scene.attach(b_body);
         let (_, far) = scene.ball(10.0);
         let early = scene.broad_phase.inner.why(a, b);
-        assert_eq!(early, Why::Unknown(a), "before the first step");
+        assert_eq!(early, Why::Unknown(a.into_raw_parts().into()), "before the first step");
         scene.step();
         let why = |scene: &Checked, x, y| scene.broad_phase.inner.why(x, y);
         assert_eq!(why(&scene, a, b), Why::Reported);
@@ -33,10 +33,10 @@ fn why_names_the_test_that_ended_a_pair() {
         assert!(matches!(why(&scene, a, b), Why::Groups(_)));
         scene.world.colliders[a].set_enabled(false);
         scene.step();
-        assert_eq!(why(&scene, a, b), Why::Disabled(a));
+        assert_eq!(why(&scene, a, b), Why::Disabled(a.into_raw_parts().into()));
         scene.world.remove_collider(far);
         scene.step();
-        assert_eq!(why(&scene, b, far), Why::Unknown(far));
+        assert_eq!(why(&scene, b, far), Why::Unknown(far.into_raw_parts().into()));
     });
 }
 
@@ -54,9 +54,13 @@ fn why_speaks_of_kinds_and_of_boxes_without_a_place() {
     let lost = world.colliders.insert(lost);
     let World { params, colliders, bodies, .. } = &world;
     broad_phase.update(params, colliders, bodies, &[lost], &[], &mut Vec::new());
-    assert_eq!(broad_phase.why(fixed[0], lost), Why::InvalidBox(lost));
+    assert_eq!(broad_phase.why(fixed[0], lost), Why::InvalidBox(lost.into_raw_parts().into()));
     broad_phase.adopt(&world.narrow_phase);
-    assert_eq!(broad_phase.why(fixed[0], fixed[1]), Why::Unknown(fixed[0]), "before the next update");
+    assert_eq!(
+        broad_phase.why(fixed[0], fixed[1]),
+        Why::Unknown(fixed[0].into_raw_parts().into()),
+        "before the next update"
+    );
 }
 
 #[test]

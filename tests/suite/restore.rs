@@ -175,7 +175,7 @@ fn a_running_world_goes_over_from_rapiers_broad_phase_to_ours() {
     assert_eq!(known, edges(&world), "both know the same pairs");
     let mut shadow = Shadowed::new(ours, PbigConfig::DEFAULT.margin);
     let pairs: Vec<ColliderPair> = shadow.inner.pairs().collect();
-    shadow.checker.start_over(pairs);
+    shadow.start_over(pairs);
     steps(&mut world, &mut shadow, 60);
     assert!(shadow.first_difference().is_none(), "{}", shadow.first_difference().expect("one"));
 }

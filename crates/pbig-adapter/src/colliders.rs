@@ -71,13 +71,13 @@ impl<T: Tree> Colliders<T> {
         }
     }
 
-    /// Takes over a world whose narrow phase has these pairs. The next update reads all colliders, and ends pairs that do not
-    /// overlap. `boxes` are those of the broad phase before, by collider index: one that holds its collider is kept.
+    /// Takes over a world whose narrow phase has these pairs. The next update finds no collider known, so it reads all, and ends
+    /// pairs that do not overlap. `boxes` are those of the broad phase before, by collider index: one that holds its collider is kept.
     pub fn adopt(&mut self, pairs: Vec<HandlePair>, boxes: Vec<(u32, Aabb)>) {
         self.forget_all();
         self.writer.adopted = pairs;
         self.inherited = boxes;
-        (self.is_idle, self.is_incomplete) = (false, true);
+        (self.is_idle, self.is_incomplete) = (false, false);
     }
 
     /// Sets the AABBs of known colliders, with this margin or one of their own, and keeps their filters. Others are left to
@@ -159,6 +159,7 @@ impl<T: Tree> Colliders<T> {
         }
         // Up to here only a refused box sets an error; the margin's is noted below.
         self.is_incomplete = self.last_error.is_some();
+        self.inherited.clear();
         if let Err(error) = margin {
             self.note_error(error);
         }
@@ -221,6 +222,11 @@ impl<T: Tree> Colliders<T> {
         self.last_error = Some(error);
     }
 
+    /// Makes the next update look at the world although rapier lists nothing.
+    pub fn wake_up(&mut self) {
+        self.is_idle = false;
+    }
+
     /// Returns the error of the last update, or `None` if it succeeded.
     pub fn last_error(&self) -> Option<&Error> {
         self.last_error.as_ref()
@@ -252,6 +258,11 @@ impl<T: Tree> Colliders<T> {
     pub fn boxes(&self) -> impl Iterator<Item = (Handle, Aabb)> {
         let of = |id| Some((self.registry.handle(id)?, self.core.fat_aabb(id)?));
         (0..self.core.id_count()).filter_map(of)
+    }
+
+    /// Returns the known collider with this index.
+    pub fn handle(&self, index: u32) -> Option<Handle> {
+        self.registry.handle(index)
     }
 
     /// Returns the number of known colliders, disabled ones included.

@@ -126,7 +126,7 @@ fn leave_out_checks<B: BroadPhase>(run: &mut Run<Shadowed<Timed<B>>>) {
 }
 
 fn check<B>(task: Task, shadow: &Shadowed<B>, steps: usize, folder: &Path) -> Check {
-    let checker = &shadow.checker;
+    let checker = shadow.checker();
     let file = folder.join(format!("pbig-{}-{steps}-failed.npy", task.scene.name));
     let failed = !checker.differences.is_empty();
     Check {

@@ -33,8 +33,8 @@ impl PbigBroadPhase {
         parts: DebugRenderParts,
         backend: &mut dyn DebugRenderBackend,
     ) {
-        let cells = self.core.cells();
-        let mut in_grid = vec![false; self.core.id_count() as usize];
+        let cells = self.colliders.core().cells();
+        let mut in_grid = vec![false; self.colliders.core().id_count() as usize];
         for cell in &cells {
             cell.ids.iter().for_each(|&id| in_grid[id as usize] = true);
             let first = cell.ids.iter().find_map(|&id| self.collider(colliders, id));
@@ -44,7 +44,7 @@ impl PbigBroadPhase {
             }
         }
         for (id, in_grid) in in_grid.into_iter().enumerate().filter(|_| parts.fat_boxes) {
-            let aabb = self.core.fat_aabb(id as u32);
+            let aabb = self.colliders.core().fat_aabb(id as u32);
             if let (Some(aabb), Some(drawn)) = (aabb, self.collider(colliders, id as u32)) {
                 draw(backend, drawn, &aabb, hsla(in_grid, 0.5, ALPHA[0]));
             }
@@ -52,7 +52,7 @@ impl PbigBroadPhase {
     }
 
     fn collider<'a>(&self, colliders: &'a ColliderSet, id: u32) -> Option<(ColliderHandle, &'a Collider)> {
-        let handle = self.registry.handle(id)?;
+        let handle = crate::scene::to_collider(self.colliders.handle(id)?);
         Some((handle, colliders.get(handle)?))
     }
 }

@@ -48,28 +48,20 @@ mod call;
 mod config;
 #[cfg(feature = "debug-render")]
 mod debug_render;
-mod events;
-mod listed;
-mod policy;
-mod proxy;
 mod queries;
-mod registry;
-mod scene_tree;
+mod scene;
 #[cfg(feature = "shadow")]
 pub mod shadow;
 #[cfg(feature = "serde")]
 mod snapshot;
-mod stats;
-mod why;
+mod tree;
 
 pub use broad_phase::PbigBroadPhase;
 pub use config::PbigConfig;
 #[cfg(feature = "debug-render")]
 pub use debug_render::DebugRenderParts;
+pub use pbig_adapter::{Backend, Error, Handle, Report, Stats, Totals, Why};
 #[cfg(feature = "gpu")]
 pub use pbig_core::GpuFinder;
-pub use pbig_core::{Backend, Error, Report};
 #[cfg(feature = "unstable-study")]
-pub use proxy::{collision_aabb, filter_of};
-pub use stats::{Stats, Totals};
-pub use why::Why;
+pub use scene::{collision_aabb, filter_of};

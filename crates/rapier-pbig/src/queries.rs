@@ -50,6 +50,6 @@ impl PbigBroadPhase {
     }
 
     fn bvh(&self) -> &Bvh {
-        self.tree.get(self.core.id_count(), |id| self.core.fat_aabb(id))
+        &self.colliders.tree().bvh
     }
 }

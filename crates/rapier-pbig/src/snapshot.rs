@@ -1,85 +1,24 @@
 //! Saves and restores a broad phase, next to rapier's own sets.
 
 use crate::PbigBroadPhase;
-use crate::registry::ColliderRegistry;
-use rapier3d::prelude::{ColliderHandle, ColliderPair};
+use pbig_adapter::Snapshot;
 use serde::de::Error as _;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
-use std::borrow::Cow;
-
-/// The version of [`Snapshot`]'s layout. Increased whenever the layout changes.
-const VERSION: u32 = 1;
-
-type RawHandle = (u32, u32);
-
-/// Everything that later events depend on. The tree for queries, the device and a shadow are not part of it.
-#[derive(Serialize, Deserialize)]
-struct Snapshot<'a> {
-    /// The first field, so that another version is named before its layout is misread.
-    #[serde(deserialize_with = "this_version")]
-    version: u32,
-    core: Cow<'a, pbig_core::BroadPhase>,
-    generations: Cow<'a, [u32]>,
-    relative_margin: f32,
-    adopted: Vec<[RawHandle; 2]>,
-}
-
-/// Reads the version, and fails if it is another one.
-fn this_version<'de, D: Deserializer<'de>>(deserializer: D) -> Result<u32, D::Error> {
-    match u32::deserialize(deserializer)? {
-        VERSION => Ok(VERSION),
-        other => Err(D::Error::custom(format!(
-            "the snapshot of the broad phase has version {other}, but this rapier-pbig reads version {VERSION}: \
-             save the world again, or adopt it with a new broad phase"
-        ))),
-    }
-}
 
 impl Serialize for PbigBroadPhase {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        Snapshot {
-            version: VERSION,
-            core: Cow::Borrowed(&self.core),
-            generations: Cow::Borrowed(self.registry.generations()),
-            relative_margin: self.relative_margin,
-            adopted: self.writer.adopted.iter().map(to_raw).collect(),
-        }
-        .serialize(serializer)
+        self.colliders.snapshot(self.relative_margin).serialize(serializer)
     }
 }
 
 impl<'de> Deserialize<'de> for PbigBroadPhase {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        Snapshot::deserialize(deserializer)?.restore().map_err(D::Error::custom)
-    }
-}
-
-impl Snapshot<'_> {
-    fn restore(self) -> Result<PbigBroadPhase, String> {
-        let core = self.core.into_owned();
-        let registry = ColliderRegistry::from_generations(self.generations.into_owned());
-        let mut ids = (0..core.id_count()).filter(|&id| core.contains(id));
-        if let Some(id) = ids.find(|&id| registry.handle(id).is_none()) {
-            return Err(format!("snapshot: box {id} belongs to no collider"));
-        }
-        let relative_margin = self.relative_margin;
-        if !(relative_margin >= 0.0 && relative_margin.is_finite()) {
-            return Err(format!("snapshot: margin {relative_margin} is not a length"));
-        }
-        let mut restored = PbigBroadPhase::around(core);
-        (restored.registry, restored.relative_margin) = (registry, relative_margin);
-        restored.writer.adopted = self.adopted.into_iter().map(from_raw).collect();
+        let (colliders, relative_margin) =
+            Snapshot::deserialize(deserializer)?.restore().map_err(D::Error::custom)?;
+        let mut restored = Self::new();
+        (restored.colliders, restored.relative_margin) = (colliders, relative_margin);
         Ok(restored)
     }
-}
-
-fn to_raw(pair: &ColliderPair) -> [RawHandle; 2] {
-    [pair.collider1.into_raw_parts(), pair.collider2.into_raw_parts()]
-}
-
-fn from_raw(pair: [RawHandle; 2]) -> ColliderPair {
-    let [a, b] = pair.map(|(index, generation)| ColliderHandle::from_raw_parts(index, generation));
-    ColliderPair::new(a, b)
 }
 
 #[cfg(test)]
@@ -99,8 +38,8 @@ mod tests {
 
     #[test]
     fn a_snapshot_of_another_version_is_an_error_that_names_both() {
-        assert_eq!(saved()["version"], VERSION);
-        let error = error_with("version", json!(VERSION + 1));
+        assert_eq!(saved()["version"], 1);
+        let error = error_with("version", json!(2));
         assert!(error.contains("version 2, but this rapier-pbig reads version 1"), "{error}");
         // The version comes first, so that a newer layout is not misread.
         let text = serde_json::to_string(&PbigBroadPhase::new()).expect("a snapshot");

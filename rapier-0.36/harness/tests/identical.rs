@@ -20,7 +20,9 @@ fn poses(name: &str, bodies: usize, steps: usize) -> Vec<u32> {
 
 #[test]
 fn a_second_run_and_any_number_of_threads_give_the_same_poses() {
-    for (name, bodies, steps) in [("column", 9000, 12), ("mixed", 300, 60), ("rain", 3000, 40), ("groups", 300, 60)] {
+    for (name, bodies, steps) in
+        [("column", 9000, 12), ("mixed", 300, 60), ("rain", 3000, 40), ("groups", 300, 60)]
+    {
         let wanted = poses(name, bodies, steps);
         for threads in [1, 2, 5] {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool");
@@ -52,7 +54,9 @@ fn a_restored_world_goes_on_as_if_it_had_never_been_saved() {
 #[test]
 fn pbig_and_the_tree_take_over_from_each_other() {
     let (mut world, mut broad_phase) = (scene("pile").build(100, 1), BroadPhaseBvh::new());
-    let pairs = |world: &World| world.narrow_phase.contact_pairs().filter(|pair| pair.has_any_active_contact()).count();
+    let pairs = |world: &World| {
+        world.narrow_phase.contact_pairs().filter(|pair| pair.has_any_active_contact()).count()
+    };
     for _ in 0..60 {
         world.step(&mut broad_phase);
     }
@@ -135,7 +139,8 @@ fn questions_are_answered_and_bad_settings_are_errors() {
     let bad = PbigConfig { margin: f32::NAN, ..PbigConfig::DEFAULT };
     assert!(rapier_pbig::install_with(&mut broad_phase, bad).is_err());
     rapier_pbig::install(&mut broad_phase);
-    let bodies = [0.0, 0.9, 5.0].map(|x| world.add(World::dynamic(glam::Vec3::X * x), ColliderBuilder::ball(0.5)));
+    let bodies =
+        [0.0, 0.9, 5.0].map(|x| world.add(World::dynamic(glam::Vec3::X * x), ColliderBuilder::ball(0.5)));
     world.gravity = glam::Vec3::ZERO;
     world.step(&mut broad_phase);
     let finder = rapier_pbig::finder(&broad_phase).expect("it is installed");

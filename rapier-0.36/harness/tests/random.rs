@@ -6,8 +6,8 @@ use glam::Vec3;
 use pbig_harness_036::world::{World, groups_that_meet, to_rotation, to_vector};
 use rand::rngs::StdRng;
 use rand::{RngExt, SeedableRng};
-use rapier_pbig::{PbigConfig, PbigFinder};
 use rapier_pbig::shadow::{Shadow, Shadowed};
+use rapier_pbig::{PbigConfig, PbigFinder};
 use rapier3d::geometry::PairFinder;
 use rapier3d::parry::bounding_volume::Aabb;
 use rapier3d::parry::partitioning::Bvh;
@@ -66,7 +66,12 @@ impl PairFinder for Planted {
         }
     }
 
-    fn set_aabbs(&mut self, params: &IntegrationParameters, adaptive: bool, aabbs: &[(ColliderHandle, Aabb)]) {
+    fn set_aabbs(
+        &mut self,
+        params: &IntegrationParameters,
+        adaptive: bool,
+        aabbs: &[(ColliderHandle, Aabb)],
+    ) {
         if self.plant != Plant::Unmoved {
             BUSY.set(true);
             self.finder.set_aabbs(params, adaptive, aabbs);
@@ -194,9 +199,9 @@ impl Player {
         let op = self.rng.random_range(0..20);
         let (body, collider) = (self.any_body(), self.any_collider());
         let (Some(body), Some(collider)) = (body, collider) else { return self.add() };
-        let is_soft = self.world.colliders[collider].parent().is_some_and(|parent| {
-            self.world.bodies.get(parent).is_some_and(RigidBody::is_soft_frame)
-        });
+        let is_soft = self.world.colliders[collider]
+            .parent()
+            .is_some_and(|parent| self.world.bodies.get(parent).is_some_and(RigidBody::is_soft_frame));
         match op {
             0..5 => self.add(),
             5 => self.world.remove(body),
@@ -215,7 +220,8 @@ impl Player {
             }
             // Rapier panics at a joint between bodies of which none is dynamic.
             13 if self.world.impulse_joints.attached_joints(body).next().is_none() => {
-                let kinds = [RigidBodyType::Fixed, RigidBodyType::Dynamic, RigidBodyType::KinematicPositionBased];
+                let kinds =
+                    [RigidBodyType::Fixed, RigidBodyType::Dynamic, RigidBodyType::KinematicPositionBased];
                 let kind = kinds[self.rng.random_range(0..3)];
                 self.world.bodies[body].set_body_type(kind, true);
             }
@@ -242,7 +248,9 @@ impl Player {
 
     fn join(&mut self, body: RigidBodyHandle) {
         let other = self.any_body().filter(|&other| other != body);
-        if let Some(other) = other.filter(|&other| [body, other].iter().all(|&one| self.world.bodies[one].is_dynamic())) {
+        if let Some(other) =
+            other.filter(|&other| [body, other].iter().all(|&one| self.world.bodies[one].is_dynamic()))
+        {
             self.world.impulse_joints.insert(body, other, SphericalJointBuilder::new(), true);
         }
     }
@@ -251,7 +259,8 @@ impl Player {
     fn query(&mut self, tally: &mut Tally) {
         let World { narrow_phase, bodies, colliders, .. } = &self.world;
         let (subject, filter) = (subject_in(&self.broad_phase), QueryFilter::default());
-        let queries = self.broad_phase.as_query_pipeline(narrow_phase.query_dispatcher(), bodies, colliders, filter);
+        let queries =
+            self.broad_phase.as_query_pipeline(narrow_phase.query_dispatcher(), bodies, colliders, filter);
         let (boxes, _) = subject.state();
         for (handle, aabb) in boxes {
             let found = queries.intersect_aabb_conservative(aabb).any(|(found, _)| found == handle);
@@ -324,7 +333,9 @@ fn random_worlds_have_the_pairs_of_the_oracle_and_miss_no_contact_of_stock() {
         run(seed, Plant::Nothing, &mut tally).unwrap_or_else(|difference| panic!("{difference}"));
     }
     let Tally { steps, compared, oracle_pairs, contacts, queries, restores, soft, cut_short } = tally;
-    println!("{steps} steps, {compared} compared, {oracle_pairs} pairs, {contacts} contacts, {queries} queries, {restores} restores, {soft} soft, {cut_short} cut short");
+    println!(
+        "{steps} steps, {compared} compared, {oracle_pairs} pairs, {contacts} contacts, {queries} queries, {restores} restores, {soft} soft, {cut_short} cut short"
+    );
     assert!(compared > 5 * runs && oracle_pairs > 10 * runs && contacts > runs);
     assert!(queries > runs && restores > runs && soft > runs / 20 && cut_short < runs / 5);
 }

@@ -74,7 +74,6 @@ impl PbigFinder {
     pub fn why(&self, one: ColliderHandle, other: ColliderHandle) -> Why {
         self.colliders.why(handle(one), handle(other))
     }
-
 }
 
 fn to_handle(handle: pbig_adapter::Handle) -> ColliderHandle {

@@ -130,7 +130,12 @@ impl<F: PairFinder + Clone> PairFinder for Shadowed<F> {
         self.watch(&call, &events[start..]);
     }
 
-    fn set_aabbs(&mut self, params: &IntegrationParameters, adaptive: bool, aabbs: &[(ColliderHandle, TreeAabb)]) {
+    fn set_aabbs(
+        &mut self,
+        params: &IntegrationParameters,
+        adaptive: bool,
+        aabbs: &[(ColliderHandle, TreeAabb)],
+    ) {
         self.inner.set_aabbs(params, adaptive, aabbs);
         self.has_moved |= !aabbs.is_empty();
         if let Some(stock) = &mut self.stock {
@@ -243,7 +248,8 @@ impl View for Call<'_> {
 
     /// A soft body's collider, too, has a larger AABB: it may deform during the step.
     fn reaches_further(&self, wanted: Handle) -> bool {
-        let body = self.find_enabled(wanted).and_then(Collider::parent).and_then(|body| self.bodies.get(body));
+        let body =
+            self.find_enabled(wanted).and_then(Collider::parent).and_then(|body| self.bodies.get(body));
         let collider = self.find_enabled(wanted);
         let (Some(body), Some(collider)) = (body, collider) else { return false };
         let usual = collider.compute_collision_aabb(self.params.prediction_distance() / 2.0);

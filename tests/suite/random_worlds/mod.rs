@@ -113,7 +113,7 @@ struct Tally {
     runs: u64,
     ops: u64,
     steps: u64,
-    /// Steps after which rapier's broad phase was still compared with: see `Checker::has_stock`.
+    /// Steps after which rapier's broad phase was still compared with: see `Shadowed::has_stock`.
     beside_stock: u64,
     oracle_pairs: u64,
     contacts: u64,
@@ -206,7 +206,7 @@ impl Scene {
                 }
                 // Else it adds all pairs again, which does rapier no harm.
                 let known = if adopts { self.world.pairs().collect() } else { vec![] };
-                self.broad_phase.checker.start_over(known);
+                self.broad_phase.start_over(known);
                 self.broad_phase.inner.pbig = fresh;
             }
             op => apply(&mut self.world, op),
@@ -240,8 +240,8 @@ impl Scene {
         let touching = self.world.narrow_phase.contact_pairs().filter(|pair| pair.has_any_active_contact);
         self.tally.contacts += touching.count() as u64;
         self.tally.steps += 1;
-        self.tally.beside_stock += u64::from(self.broad_phase.checker.has_stock());
-        self.tally.oracle_pairs = self.broad_phase.checker.oracle_pairs;
+        self.tally.beside_stock += u64::from(self.broad_phase.has_stock());
+        self.tally.oracle_pairs = self.broad_phase.checker().oracle_pairs;
     }
 
     fn outcome(&self) -> Outcome {

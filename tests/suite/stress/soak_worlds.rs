@@ -124,10 +124,10 @@ fn soak_of_a_rapier_world_that_comes_and_goes() {
             assert!(
                 broad_phase.first_difference().is_none(),
                 "step {step}: {:?}",
-                broad_phase.checker.differences
+                broad_phase.checker().differences
             );
         }
-        let checker = &broad_phase.checker;
+        let checker = broad_phase.checker();
         assert!(checker.compared > 0 && checker.oracle_pairs as usize > 10 * checker.compared, "few pairs");
         println!(
             "{steps} steps, {} compared, {} bytes held, at first {early}",

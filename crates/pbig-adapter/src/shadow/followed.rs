@@ -20,11 +20,7 @@ impl Followed {
         }
     }
 
-    pub(super) fn follow(
-        &mut self,
-        events: &[PairEvent],
-        mut fault: impl FnMut(Fault, HandlePair),
-    ) {
+    pub(super) fn follow(&mut self, events: &[PairEvent], mut fault: impl FnMut(Fault, HandlePair)) {
         let mut deleted = HashSet::new();
         for event in events {
             let (pair, added) = match event {

@@ -292,10 +292,8 @@ fn compounds(b: &mut Builder, n: usize) {
         let at = place * 2.6 + b.random_vec(Vec3::splat(0.1)) + Vec3::Y * 2.0;
         if i % 3 == 0 {
             let cube = || SharedShape::cuboid(0.3, 0.3, 0.3);
-            let shapes = vec![
-                (pose(Vec3::new(-0.4, 0.0, 0.0)), cube()),
-                (pose(Vec3::new(0.4, 0.2, 0.0)), cube()),
-            ];
+            let shapes =
+                vec![(pose(Vec3::new(-0.4, 0.0, 0.0)), cube()), (pose(Vec3::new(0.4, 0.2, 0.0)), cube())];
             b.falling(at, ColliderBuilder::compound(shapes));
         } else {
             let body = b.falling(at, ColliderBuilder::ball(0.35));

@@ -44,7 +44,10 @@ fn a_bad_margin_is_an_error_and_no_other_margin_is_taken() {
     }
     let wide = PbigConfig { margin: 0.5, backend: Backend::Cpu, ..PbigConfig::default() };
     let broad_phase = PbigBroadPhase::with_config(wide).expect("a length");
-    assert_eq!((broad_phase.relative_margin, broad_phase.core.config().backend), (0.5, Backend::Cpu));
+    assert_eq!(
+        (broad_phase.relative_margin, broad_phase.colliders.core().config().backend),
+        (0.5, Backend::Cpu)
+    );
 }
 
 #[test]
@@ -138,7 +141,7 @@ fn adopting_a_world_leaves_no_collider_and_nothing_to_draw_or_ask_about() {
         (broad_phase.pair_count(), broad_phase.pairs().count(), broad_phase.stats().colliders),
         (0, 0, 0)
     );
-    assert_eq!(broad_phase.why(handles[0], handles[1]), Why::Unknown(handles[0]));
+    assert_eq!(broad_phase.why(handles[0], handles[1]), Why::Unknown(crate::scene::handle(handles[0])));
     assert_eq!(update(&mut broad_phase, &colliders, &[], &[]), 99, "all are read again");
 }
 

@@ -1,15 +1,12 @@
 //! Runs rapier's own broad phase beside the one that is checked.
 
 use super::Call;
-use super::followed::Followed;
 use rapier3d::prelude::*;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
 #[derive(Clone, Default)]
 pub(super) struct Stock {
     broad_phase: DefaultBroadPhase,
-    /// The pairs that a narrow phase would have after stock's events.
-    pub(super) known: Followed,
     /// True once stock has panicked. It is not used afterwards.
     pub(super) panicked: bool,
     /// True after the first call, in which stock sees all colliders.
@@ -17,11 +14,11 @@ pub(super) struct Stock {
 }
 
 impl Stock {
-    /// Calls stock, and catches its panics: rapier 0.27's broad phase can panic if several colliders are removed or disabled
+    /// Calls stock, returns its events, and catches its panics: rapier 0.27's broad phase can panic if several colliders are removed or disabled
     /// in one step.
-    pub(super) fn update(&mut self, call: &Call<'_>) {
+    pub(super) fn update(&mut self, call: &Call<'_>) -> Option<Vec<BroadPhasePairEvent>> {
         if self.panicked {
-            return;
+            return None;
         }
         let mut events = Vec::new();
         let Call { params, colliders, bodies, modified, removed } = *call;
@@ -36,9 +33,9 @@ impl Stock {
         if catch_unwind(AssertUnwindSafe(update)).is_err() {
             tracing::warn!("pbig: rapier's own broad phase has panicked and is no longer compared with");
             self.panicked = true;
+            return None;
         }
-        self.known.purge(removed);
-        self.known.follow(&events, |_, _| ());
+        Some(events)
     }
 }
 

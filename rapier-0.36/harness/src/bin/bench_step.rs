@@ -39,14 +39,17 @@ fn main() -> ExitCode {
     if args.scenes.is_empty() {
         args.scenes = Scene::ALL.to_vec();
     }
-    println!("scene        bodies  steps   broad phase, ms: stock   pbig      x   p99 x   step, ms: stock   pbig      x");
+    println!(
+        "scene        bodies  steps   broad phase, ms: stock   pbig      x   p99 x   step, ms: stock   pbig      x"
+    );
     let mut rows = vec![HEADING.to_string()];
     for &bodies in &args.bodies {
         for &scene in &args.scenes {
             rows.push(measure(scene, bodies, &args));
         }
     }
-    match args.write.map(|file| File::create(&file).and_then(|mut out| writeln!(out, "{}", rows.join("\n")))) {
+    match args.write.map(|file| File::create(&file).and_then(|mut out| writeln!(out, "{}", rows.join("\n"))))
+    {
         Some(Err(error)) => {
             eprintln!("the rows cannot be written: {error}");
             ExitCode::FAILURE

@@ -1,21 +1,15 @@
-//! Computes the AABB and the filter of a collider, as rapier 0.27's own broad phase and narrow phase do.
+//! Shows rapier's colliders to the part of the broad phase that knows no rapier: the AABB and the filter of each, as rapier
+//! 0.27's own broad phase and narrow phase compute them.
 
 use crate::call::Call;
+use pbig_adapter::policy::COLLIDERS_PER_BLOCK;
+use pbig_adapter::{BodyKind, Groups, Handle, Proxy, Scene};
 use pbig_core::{Aabb, ProxyFilter, TestMode};
 use rapier3d::prelude::{
-    ActiveCollisionTypes, Collider, ColliderHandle, IntegrationParameters, Isometry, Point, Real, RigidBody,
+    Collider, ColliderHandle, IntegrationParameters, InteractionGroups, Isometry, Point, Real, RigidBody,
     RigidBodySet, RigidBodyType, Shape, TypedShape,
 };
-
-/// The state of a listed collider, as the core stores it.
-#[derive(Clone, Copy, Debug)]
-pub(crate) enum Proxy {
-    /// Not in rapier's set.
-    Gone,
-    /// It or its body is disabled.
-    Disabled,
-    Enabled(Aabb, ProxyFilter),
-}
+use std::ops::Range;
 
 /// A collider and its body, if they exist.
 pub(crate) type Fetched<'a> = (Option<&'a Collider>, Option<&'a RigidBody>);
@@ -113,36 +107,72 @@ pub fn filter_of(bodies: &RigidBodySet, collider: &Collider) -> ProxyFilter {
 
 #[inline(always)]
 fn filter_with(body: Option<&RigidBody>, collider: &Collider) -> ProxyFilter {
-    // A collider without a body counts as fixed.
-    let kind = body.map_or(RigidBodyType::Fixed, RigidBody::body_type);
-    let groups = collider.collision_groups();
-    ProxyFilter {
-        body: collider.parent().map_or(ProxyFilter::NO_BODY, |handle| handle.into_raw_parts().0),
-        kind: kind_bit(kind),
-        accepted_kinds: accepted_kinds(kind, collider.active_collision_types()),
-        test_mode: TestMode::And as u16,
-        memberships: groups.memberships.bits(),
-        mask: groups.filter.bits(),
+    let parent = collider.parent().map(|handle| handle.into_raw_parts().into());
+    let types = collider.active_collision_types().bits();
+    pbig_adapter::filter_of(parent, kind_of(body), types, groups_of(collider.collision_groups()))
+}
+
+/// Returns the type of a collider's body. A collider without a body counts as fixed.
+#[inline(always)]
+pub(crate) fn kind_of(body: Option<&RigidBody>) -> BodyKind {
+    BodyKind::from_number(body.map_or(RigidBodyType::Fixed, RigidBody::body_type) as u32)
+}
+
+pub(crate) fn groups_of(groups: InteractionGroups) -> Groups {
+    Groups { memberships: groups.memberships.bits(), mask: groups.filter.bits(), mode: TestMode::And }
+}
+
+pub(crate) fn handle(handle: ColliderHandle) -> Handle {
+    handle.into_raw_parts().into()
+}
+
+pub(crate) fn to_collider(handle: Handle) -> ColliderHandle {
+    ColliderHandle::from_raw_parts(handle.index, handle.generation)
+}
+
+impl Call<'_> {
+    /// Calls `take` with each of these colliders and its proxy, in the order of the list.
+    #[inline(always)]
+    fn for_each_of(&self, listed: &[ColliderHandle], mut take: impl FnMut(Handle, Proxy)) {
+        for block in listed.chunks(COLLIDERS_PER_BLOCK) {
+            let mut fetched = [(None, None); COLLIDERS_PER_BLOCK];
+            for (fetched, &handle) in fetched.iter_mut().zip(block) {
+                *fetched = self.fetch(handle);
+            }
+            for (&listed, fetched) in block.iter().zip(fetched) {
+                take(handle(listed), self.proxy(fetched));
+            }
+        }
     }
 }
 
-fn kind_bit(kind: RigidBodyType) -> u8 {
-    1 << kind as u8
-}
+impl Scene for Call<'_> {
+    fn collider_count(&self) -> usize {
+        self.colliders.len()
+    }
 
-/// Returns the kinds that a collider on a body of this kind may pair with. Rapier's table has four bits for each kind and is
-/// tested both ways: one row and one column.
-fn accepted_kinds(kind: RigidBodyType, types: ActiveCollisionTypes) -> u8 {
-    let table = types.bits();
-    let row = table >> (4 * kind as u32);
-    let column = table >> kind as u32 & 0b0001_0001_0001_0001;
-    let column = column | column >> 3 | column >> 6 | column >> 9;
-    ((row | column) & 0b1111) as u8
+    fn listed_count(&self) -> usize {
+        self.modified.len()
+    }
+
+    fn for_each_listed(&self, range: Range<usize>, take: impl FnMut(Handle, Proxy)) {
+        self.for_each_of(&self.modified[range], take);
+    }
+
+    fn for_each_collider(&self, take: impl FnMut(Handle, Proxy)) {
+        let all: Vec<ColliderHandle> = self.colliders.iter().map(|(handle, _)| handle).collect();
+        self.for_each_of(&all, take);
+    }
+
+    fn removed(&self) -> impl Iterator<Item = (Handle, bool)> {
+        self.removed.iter().map(|&removed| (handle(removed), self.colliders.contains(removed)))
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use rapier3d::prelude::ActiveCollisionTypes;
 
     #[test]
     fn accepted_kinds_are_those_that_rapier_tests() {
@@ -156,8 +186,9 @@ mod tests {
         let mut tested = 0;
         for (types, kind) in sets.flat_map(|types| KINDS.map(|kind| (types, kind))) {
             let accepted = KINDS.into_iter().filter(|other| types.test(kind, *other));
-            let wanted = accepted.fold(0, |bits, other| bits | kind_bit(other));
-            assert_eq!(accepted_kinds(kind, types), wanted, "{types:?} {kind:?}");
+            let wanted = accepted.fold(0, |bits, other| bits | 1 << other as u8);
+            let kind = BodyKind::from_number(kind as u32);
+            assert_eq!(pbig_adapter::accepted_kinds(kind, types.bits()), wanted, "{types:?} {kind:?}");
             tested += 1;
         }
         assert!(tested >= 4 * 64, "{tested}");
