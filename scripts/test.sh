@@ -91,6 +91,12 @@ $has_gpu || step cargo test --release --workspace --exclude pbig-tests --exclude
 gpu_step scripts/features.sh deterministic
 # Once more with overflow checks and debug assertions, where there is unsafe code and index arithmetic.
 step cargo test -p pbig-core --features serde,unstable-study
+# The adapter for rapier 0.36, in a workspace of its own: cargo replaces rapier there by a patched copy.
+step scripts/patch-rapier.sh rapier-0.36
+in_036="--manifest-path rapier-0.36/Cargo.toml"
+step cargo fmt $in_036 -p rapier-pbig -p pbig-harness-036 --check
+step cargo clippy --release $in_036 -p rapier-pbig -p pbig-harness-036 --all-targets -- -D warnings
+step cargo test --release $in_036 -p rapier-pbig -p pbig-harness-036
 # The commands that the README shows, at a size that takes seconds.
 step target/release/examples/falling_objects --bodies 500 --steps 60
 step target/release/examples/drop_in

@@ -116,3 +116,79 @@ impl<T: Tree> Stale<T> {
         tree
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::cell::Cell;
+
+    /// A list of leaves, and how it came about.
+    #[derive(Debug, Default, PartialEq)]
+    struct List {
+        leaves: Vec<(u32, Aabb)>,
+        updates: usize,
+    }
+
+    impl Tree for List {
+        fn build(leaves: impl Iterator<Item = (u32, Aabb)> + Clone) -> Self {
+            Self { leaves: leaves.collect(), updates: 0 }
+        }
+
+        fn remove(&mut self, gone: &[u32]) {
+            self.leaves.retain(|(id, _)| !gone.contains(id));
+        }
+
+        fn update(&mut self, leaves: impl Iterator<Item = (u32, Aabb)>) {
+            for leaf in leaves {
+                self.leaves.retain(|(id, _)| *id != leaf.0);
+                self.leaves.push(leaf);
+            }
+            self.leaves.sort_by_key(|leaf| leaf.0);
+            self.updates += 1;
+        }
+    }
+
+    fn cube(x: f32) -> Option<Aabb> {
+        Some(Aabb::from_center([x, 0.0, 0.0], [0.4; 3]))
+    }
+
+    #[test]
+    fn a_tree_follows_its_boxes_through_all_sizes() {
+        for n in [1u32, 2, 3, 50] {
+            let (mut tree, mut updates) = (SceneTree::<List>::default(), 0);
+            let mut boxes: Vec<Option<Aabb>> = (0..n).map(|i| cube(i as f32)).collect();
+            for round in 0..100u32 {
+                // One box goes or comes back, and one moves; some of it after the update, as at the end of a step.
+                let [first, second] = [round * 7 % n, round * 3 % n];
+                boxes[first as usize] = if boxes[first as usize].is_some() { None } else { cube(0.5) };
+                tree.note([first].into_iter(), 2 * n as usize);
+                boxes[second as usize] = cube(round as f32);
+                tree.expire();
+                let found = tree.get(n, [second].into_iter(), |id| boxes[id as usize]);
+                let wanted = boxes.iter().enumerate().filter_map(|(id, one)| Some((id as u32, (*one)?)));
+                assert_eq!(found.leaves, wanted.collect::<Vec<_>>(), "{n} boxes, round {round}");
+                updates = updates.max(found.updates);
+            }
+            assert!(updates > 10 || n < 4, "{n} boxes: rebuilt each time");
+        }
+    }
+
+    #[test]
+    fn a_tree_that_nobody_asks_for_is_not_kept_and_one_without_changes_not_touched() {
+        let (mut tree, asked) = (SceneTree::<List>::default(), Cell::new(0));
+        let aabb = |id: u32| {
+            asked.set(asked.get() + 1);
+            cube(id as f32)
+        };
+        tree.note(0..100, 100);
+        assert_eq!(tree.get(100, [].into_iter(), aabb).leaves.len(), 100);
+        let before = asked.get();
+        assert_eq!((tree.get(100, [].into_iter(), aabb).updates, asked.get()), (0, before));
+        for _ in 0..10 {
+            tree.note(0..10, 100);
+        }
+        assert_eq!(tree.get(100, [].into_iter(), aabb).updates, 1, "100 changes are few enough");
+        (0..11).for_each(|_| tree.note(0..10, 100));
+        assert_eq!(tree.get(100, [].into_iter(), aabb).updates, 0, "110 are too many: built anew");
+    }
+}
