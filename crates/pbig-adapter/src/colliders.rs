@@ -4,7 +4,7 @@ use crate::events::{EventWriter, PairEvent, ordered};
 use crate::registry::ColliderRegistry;
 use crate::stats::{Counts, Totals};
 use crate::tree::SceneTree;
-use crate::{Handle, HandlePair, Proxy, Scene, Tree};
+use crate::{Handle, HandlePair, Scene, Tree};
 use pbig_core::{Aabb, BroadPhase, Error};
 
 /// The part of a broad phase that does not depend on rapier's version.
@@ -20,7 +20,7 @@ pub struct Colliders<T> {
     pub(crate) writer: EventWriter,
     /// Proxies that several threads compute. Kept for its memory.
     #[cfg(feature = "parallel")]
-    pub(crate) proxies: Vec<(Handle, Proxy)>,
+    pub(crate) proxies: Vec<(Handle, crate::Proxy)>,
     tree: SceneTree<T>,
     pub(crate) counts: Counts,
     last_error: Option<Error>,

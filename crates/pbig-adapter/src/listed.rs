@@ -1,5 +1,6 @@
 //! Reads the colliders that rapier lists and sets their boxes in the core.
 
+#[cfg(feature = "parallel")]
 use crate::policy;
 use crate::{Colliders, Handle, Proxy, Scene, Tree};
 use pbig_core::{Aabb, ProxyFilter};
