@@ -9,7 +9,7 @@
 //! let mut broad_phase = rapier_pbig::broad_phase(); // was: BroadPhaseBvh::new()
 //!
 //! let (mut bodies, mut colliders) = (RigidBodySet::new(), ColliderSet::new());
-//! colliders.insert(ColliderBuilder::halfspace(Vector::Y));
+//! colliders.insert(ColliderBuilder::cuboid(10.0, 0.5, 10.0).translation(Vector::new(0.0, -0.5, 0.0)));
 //! let ball = bodies.insert(RigidBodyBuilder::dynamic().translation(Vector::new(0.0, 3.0, 0.0)));
 //! colliders.insert_with_parent(ColliderBuilder::ball(0.5), ball, &mut bodies);
 //!
