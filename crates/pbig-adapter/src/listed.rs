@@ -55,7 +55,7 @@ impl<T: Tree> Colliders<T> {
                 self.enable(handle, aabb, filter);
             }
             Proxy::Disabled => self.disable(handle),
-            Proxy::Unchanged => self.note_unchanged(handle),
+            Proxy::Unplaced(filter) => self.keep_box(handle, filter),
             Proxy::Gone => self.forget(handle),
         }
     }
@@ -79,12 +79,12 @@ impl<T: Tree> Colliders<T> {
     }
 
     /// Keeps a collider with the box that it has. One that never had a box gets an invalid one.
-    fn note_unchanged(&mut self, handle: Handle) {
+    fn keep_box(&mut self, handle: Handle, filter: ProxyFilter) {
         if !self.registry.contains(handle) {
             self.register(handle);
         }
-        if !self.core.contains(handle.index) {
-            self.enable(handle, Aabb::NOWHERE, ProxyFilter::ALL);
+        if !self.core.set_filter(handle.index, filter) {
+            self.enable(handle, Aabb::NOWHERE, filter);
         }
     }
 

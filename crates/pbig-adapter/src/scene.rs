@@ -11,8 +11,8 @@ pub enum Proxy {
     Gone,
     /// It or its body is disabled.
     Disabled,
-    /// Nothing about it concerns the broad phase, or its AABB is not finite: a known collider stays as it is.
-    Unchanged,
+    /// Its AABB is not finite: it keeps the box of before, and has this filter.
+    Unplaced(ProxyFilter),
     /// Its AABB without margin, and its filter.
     Enabled(Aabb, ProxyFilter),
 }

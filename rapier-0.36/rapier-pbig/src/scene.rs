@@ -3,6 +3,7 @@
 use crate::tree::from_tree;
 use pbig_adapter::{Aabb, BodyKind, Groups, Handle, Proxy, ProxyFilter, Scene, filter_of};
 use pbig_core::TestMode;
+use rapier3d::parry::bounding_volume::Aabb as TreeAabb;
 use rapier3d::prelude::*;
 use std::ops::Range;
 
@@ -23,10 +24,20 @@ impl Call<'_> {
         if !collider.is_enabled() {
             return Proxy::Disabled;
         }
-        let aabb = from_tree(&collider.compute_broad_phase_aabb(self.params, self.bodies));
-        // Rapier's own broad phase keeps the box of before, too. Rapier disables such a collider at the end of the step.
-        let is_finite = aabb.min.iter().chain(&aabb.max).all(|x| x.is_finite());
-        if is_finite { Proxy::Enabled(aabb, self.filter(collider)) } else { Proxy::Unchanged }
+        let filter = self.filter(collider);
+        match self.aabb_of(collider) {
+            Some(aabb) => Proxy::Enabled(from_tree(&aabb), filter),
+            // Rapier's own broad phase keeps the box of before, too. Rapier disables such a collider at the end of the step.
+            None => Proxy::Unplaced(filter),
+        }
+    }
+
+    /// Returns the AABB of rapier's own broad phase, or, when soft CCD predicts nothing finite, the one without prediction.
+    fn aabb_of(&self, collider: &Collider) -> Option<TreeAabb> {
+        let is_finite = |aabb: &TreeAabb| aabb.mins.is_finite() && aabb.maxs.is_finite();
+        let predicted = Some(collider.compute_broad_phase_aabb(self.params, self.bodies)).filter(is_finite);
+        let now = || collider.compute_collision_aabb(self.params.prediction_distance() / 2.0);
+        predicted.or_else(|| Some(now()).filter(is_finite))
     }
 
     pub(crate) fn filter(&self, collider: &Collider) -> ProxyFilter {
