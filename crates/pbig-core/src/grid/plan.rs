@@ -156,8 +156,8 @@ impl Spacing {
     fn plan(&self) -> GridPlan {
         let per_cell = self.boxes as f64 / (0..3).map(|k| self.cells_along(k)).product::<f64>();
         let is_crowded = self.wraps || per_cell > policy::RUNS_UP_TO_PER_CELL;
-        let has_half_cells = self.wraps || per_cell > policy::HALF_CELLS_FROM_PER_CELL;
-        let shift = if has_half_cells { 5 } else { 6 };
+        // Half cells where the grid wraps: those that fold onto one place hold fewer boxes then.
+        let shift = if self.wraps { 5 } else { 6 };
         let mut cells = Cells { shift, wraps: self.wraps, ..Cells::default() };
         for k in 0..3 {
             let step = self.step(k);

@@ -28,9 +28,6 @@ pub(crate) const MIN_CELLS: f64 = 4096.0;
 /// Boxes in a cell up to which the five runs of the half neighbourhood are visited unseen.
 pub(crate) const RUNS_UP_TO_PER_CELL: f64 = 3.0;
 
-/// Boxes in a cell from which cells are half as large as the largest box.
-pub(crate) const HALF_CELLS_FROM_PER_CELL: f64 = 16.0;
-
 /// Others in a box's cell, by the sample, from which cells are made smaller: boxes lie in clusters far apart.
 pub(crate) const MAX_CROWD: f64 = 32.0;
 
