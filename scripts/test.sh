@@ -65,6 +65,11 @@ command -v cc >/dev/null || require "a C compiler, for linking," build-essential
 has_rust || require_rust
 has_vulkan || require "a Vulkan driver (this software one will do)" mesa-vulkan-drivers libvulkan1
 
+# Planted faults leave files for `pbig replay` in the folder for temporary files.
+TMPDIR=$(mktemp -d)
+export TMPDIR
+trap 'rm -rf "$TMPDIR"' EXIT
+
 # One profile and one set of features: everything is built once, pbig-core alone a second time.
 step cargo fmt --all --check
 # Workspaces of their own.
@@ -96,7 +101,13 @@ step scripts/patch-rapier.sh rapier-0.36
 in_036="--manifest-path rapier-0.36/Cargo.toml"
 step cargo fmt $in_036 -p rapier-pbig -p pbig-harness-036 --check
 step cargo clippy --release $in_036 -p rapier-pbig -p pbig-harness-036 --all-targets -- -D warnings
+for options in '--no-default-features' '--features gpu,shadow'; do
+    step cargo clippy --release $in_036 -p rapier-pbig $options -- -D warnings
+done
 step cargo test --release $in_036 -p rapier-pbig -p pbig-harness-036
+step cargo test --release $in_036 -p pbig-harness-036 --no-default-features --features enhanced-determinism
+step cargo run --release $in_036 --example falling_objects -- --bodies 500 --steps 60
+RUSTDOCFLAGS="-D warnings" step cargo doc --release $in_036 -p rapier-pbig --features shadow --no-deps --quiet
 # The commands that the README shows, at a size that takes seconds.
 step target/release/examples/falling_objects --bodies 500 --steps 60
 step target/release/examples/drop_in

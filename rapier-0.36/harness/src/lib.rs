@@ -1,5 +1,7 @@
 //! Scenes and measurements for rapier3d 0.36.1.
 
+#[path = "../../../crates/pbig-harness/src/chart/mod.rs"]
+pub mod chart;
 pub mod run;
 #[path = "../../../crates/pbig-harness/src/scenes/mod.rs"]
 pub mod scenes;

@@ -47,11 +47,13 @@ impl Run {
     }
 }
 
-/// Mean and 99th percentile of some times, in ms; zeros for none.
+/// Mean, median and 99th percentile of some times, in ms; zeros for none.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Summary {
     /// The mean.
     pub mean: f64,
+    /// The time that half of them exceed.
+    pub median: f64,
     /// The time that one in a hundred exceeds.
     pub p99: f64,
 }
@@ -61,9 +63,9 @@ impl Summary {
     pub fn of(times: impl IntoIterator<Item = f64>) -> Self {
         let mut times: Vec<f64> = times.into_iter().collect();
         times.sort_unstable_by(f64::total_cmp);
-        let last = times.len().saturating_sub(1);
-        let p99 = times.get(last.min(times.len() * 99 / 100)).copied().unwrap_or_default();
-        Self { mean: times.iter().sum::<f64>() / times.len().max(1) as f64, p99 }
+        let at = |percent: usize| times.get(times.len() * percent / 100).copied().unwrap_or_default();
+        let mean = times.iter().sum::<f64>() / times.len().max(1) as f64;
+        Self { mean, median: at(50), p99: at(99) }
     }
 }
 
@@ -73,7 +75,7 @@ mod tests {
 
     #[test]
     fn a_summary_by_hand() {
-        assert_eq!(Summary::of([3.0, 1.0, 2.0]), Summary { mean: 2.0, p99: 3.0 });
+        assert_eq!(Summary::of([3.0, 1.0, 2.0]), Summary { mean: 2.0, median: 2.0, p99: 3.0 });
         assert_eq!(Summary::of((0..200).map(f64::from)).p99, 198.0);
         assert_eq!(Summary::of([]), Summary::default());
     }
