@@ -63,6 +63,7 @@ lacks() {
 if [ -f "${HOME:-}/.cargo/env" ]; then . "$HOME/.cargo/env"; fi
 command -v cc >/dev/null || require "a C compiler, for linking," build-essential
 has_rust || require_rust
+command -v patch >/dev/null || require "the program patch" patch
 has_vulkan || require "a Vulkan driver (this software one will do)" mesa-vulkan-drivers libvulkan1
 
 # Planted faults leave files for `pbig replay` in the folder for temporary files.
@@ -98,6 +99,7 @@ gpu_step scripts/features.sh deterministic
 step cargo test -p pbig-core --features serde,unstable-study
 # The adapter for rapier 0.36, in a workspace of its own: cargo replaces rapier there by a patched copy.
 step scripts/patch-rapier.sh rapier-0.36
+step scripts/patch-rapier-test.sh
 in_036="--manifest-path rapier-0.36/Cargo.toml"
 step cargo fmt $in_036 -p rapier-pbig -p pbig-harness-036 --check
 step cargo clippy --release $in_036 -p rapier-pbig -p pbig-harness-036 --all-targets -- -D warnings
