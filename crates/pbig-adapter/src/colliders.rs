@@ -5,7 +5,8 @@ use crate::registry::ColliderRegistry;
 use crate::stats::{Counts, Totals};
 use crate::tree::SceneTree;
 use crate::{Handle, HandlePair, Scene, Tree};
-use pbig_core::{Aabb, BroadPhase, Error};
+use pbig_core::{Aabb, BroadPhase, Error, ProxyFilter};
+use std::collections::HashSet;
 
 /// The part of a broad phase that does not depend on rapier's version.
 ///
@@ -75,13 +76,12 @@ impl<T: Tree> Colliders<T> {
     /// pairs that do not overlap. `boxes` are those of the broad phase before, by collider index: one that holds its collider is kept.
     pub fn adopt(&mut self, pairs: Vec<HandlePair>, boxes: Vec<(u32, Aabb)>) {
         self.forget_all();
-        self.writer.adopted = pairs;
-        self.inherited = boxes;
-        (self.is_idle, self.is_incomplete) = (false, false);
+        (self.is_idle, self.is_incomplete) = (false, !pairs.is_empty() || !boxes.is_empty());
+        (self.writer.adopted, self.inherited) = (pairs, boxes);
     }
 
-    /// Sets the AABBs of known colliders, with this margin or one of their own, and keeps their filters. Others are left to
-    /// the next update.
+    /// Sets the AABBs of colliders, with this margin or one of their own, and keeps their filters. A new collider gets a filter
+    /// that admits all, until the next update sets its own before it looks for pairs.
     #[inline(always)]
     pub fn set_aabbs(&mut self, margin: f32, moved: impl Iterator<Item = (Handle, Aabb, Option<f32>)>) {
         self.set_margin(margin);
@@ -91,6 +91,8 @@ impl<T: Tree> Colliders<T> {
             }
             if self.registry.contains(handle) {
                 self.core.set_aabb(handle.index, aabb);
+            } else {
+                self.enable(handle, aabb, ProxyFilter::ALL);
             }
         }
         if self.core.changes().next().is_some() {
@@ -166,7 +168,12 @@ impl<T: Tree> Colliders<T> {
     }
 
     fn read_all(&mut self, scene: &impl Scene) {
-        let inherited = std::mem::take(&mut self.inherited);
+        let mut inherited = std::mem::take(&mut self.inherited);
+        if !inherited.is_empty() {
+            // Another collider may use the index of a removed one.
+            let gone: HashSet<u32> = scene.removed().map(|(handle, _)| handle.index).collect();
+            inherited.retain(|(id, _)| !gone.contains(id));
+        }
         let margin = self.core.config().margin;
         if !inherited.is_empty() && self.core.set_margin(0.0).is_ok() {
             for &(id, aabb) in &inherited {

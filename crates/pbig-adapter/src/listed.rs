@@ -61,7 +61,7 @@ impl<T: Tree> Colliders<T> {
     }
 
     #[inline(always)]
-    fn enable(&mut self, handle: Handle, aabb: Aabb, filter: ProxyFilter) {
+    pub(crate) fn enable(&mut self, handle: Handle, aabb: Aabb, filter: ProxyFilter) {
         if !self.registry.contains(handle) {
             self.register(handle);
         }

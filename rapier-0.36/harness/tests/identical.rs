@@ -2,7 +2,8 @@
 
 use pbig_harness_036::scenes::Scene;
 use pbig_harness_036::world::{World, to_vector};
-use rapier_pbig::{PbigConfig, Why};
+use rapier_pbig::{PbigConfig, PbigFinder, Why};
+use rapier3d::geometry::{Aabb, PairFinder};
 use rapier3d::prelude::*;
 
 fn scene(name: &str) -> Scene {
@@ -31,13 +32,42 @@ fn a_second_run_and_any_number_of_threads_give_the_same_poses() {
     }
 }
 
+fn pbig_in(broad_phase: &BroadPhaseBvh) -> &PbigFinder {
+    rapier_pbig::finder(broad_phase).expect("it is installed")
+}
+
+/// The boxes, margins included, and the pairs.
+fn state(broad_phase: &BroadPhaseBvh) -> impl PartialEq {
+    pbig_in(broad_phase).state()
+}
+
+/// What rapier does with them depends on the order, and neither grid nor tree has one that depends on the world alone.
+#[test]
+fn what_a_box_intersects_is_sorted() {
+    for bodies in [200, 3000] {
+        let (mut world, mut broad_phase) = (scene("column").build(bodies, 1), rapier_pbig::broad_phase());
+        for _ in 0..3 {
+            world.step(&mut broad_phase);
+        }
+        let (mut found, all) = (Vec::new(), Aabb::from_half_extents(Vector::ZERO, Vector::splat(1e3)));
+        pbig_in(&broad_phase).intersect_aabb(&all, &mut |id| found.push(id));
+        assert!(found.len() > bodies / 2 && found.is_sorted(), "{bodies} bodies, {} found", found.len());
+    }
+}
+
 #[test]
 fn a_restored_world_goes_on_as_if_it_had_never_been_saved() {
-    for name in ["column", "mixed", "compounds", "ragdolls", "sensors", "pile"] {
+    for name in ["column", "mixed", "compounds", "ragdolls", "sensors", "pile", "rain"] {
         let (mut world, mut broad_phase) = (scene(name).build(150, 1), rapier_pbig::broad_phase());
         for _ in 0..50 {
             world.step(&mut broad_phase);
         }
+        // The index of the last collider is used again before the save, at the same place.
+        let (last, collider) = world.colliders.iter().last().expect("there are colliders");
+        let place = collider.translation();
+        world.remove_collider(last);
+        let new = world.add(RigidBodyBuilder::dynamic().translation(place), ColliderBuilder::ball(0.1));
+        assert_eq!(world.bodies[new].colliders()[0].into_raw_parts().0, last.into_raw_parts().0);
         let bytes = world.to_bytes(&broad_phase);
         let (mut restored, mut second) = World::from_bytes(&bytes).expect("these are the bytes of a world");
         assert!(rapier_pbig::finder(&second).is_none(), "a finder is not saved");
@@ -46,6 +76,7 @@ fn a_restored_world_goes_on_as_if_it_had_never_been_saved() {
             world.step(&mut broad_phase);
             restored.step(&mut second);
             assert!(world.pose_bits() == restored.pose_bits(), "{name}, step {step}");
+            assert!(state(&broad_phase) == state(&second), "{name}, step {step}");
         }
     }
 }
@@ -81,18 +112,22 @@ fn pbig_and_the_tree_take_over_from_each_other() {
 
 #[test]
 fn a_clone_goes_on_as_the_original() {
-    let (mut world, mut broad_phase) = (scene("cubes").build(100, 1), rapier_pbig::broad_phase());
-    for _ in 0..40 {
-        world.step(&mut broad_phase);
+    for name in ["cubes", "rain"] {
+        let (mut world, mut broad_phase) = (scene(name).build(100, 1), rapier_pbig::broad_phase());
+        for _ in 0..40 {
+            world.step(&mut broad_phase);
+        }
+        let bytes = world.to_bytes(&broad_phase);
+        let (mut copied, _) = World::from_bytes(&bytes).expect("these are the bytes of a world");
+        let mut copy = broad_phase.clone();
+        for step in 0..40 {
+            // The original has a tree, the clone has none.
+            _ = top(&world, &broad_phase);
+            world.step(&mut broad_phase);
+            copied.step(&mut copy);
+            assert!(world.pose_bits() == copied.pose_bits(), "{name}, step {step}");
+        }
     }
-    let bytes = world.to_bytes(&broad_phase);
-    let (mut copied, _) = World::from_bytes(&bytes).expect("these are the bytes of a world");
-    let mut copy = broad_phase.clone();
-    for _ in 0..40 {
-        world.step(&mut broad_phase);
-        copied.step(&mut copy);
-    }
-    assert!(world.pose_bits() == copied.pose_bits());
 }
 
 #[test]
@@ -108,29 +143,100 @@ fn a_body_whose_pose_is_no_number_disturbs_nobody() {
             _ => (),
         }
         world.step(&mut broad_phase);
-        let finder = rapier_pbig::finder(&broad_phase).expect("it is installed");
+        let finder = pbig_in(&broad_phase);
         assert!(finder.last_error().is_none());
     }
     let low = world.bodies.iter().filter(|(_, body)| body.translation().y < -0.1).count();
     assert!(low <= 3, "{low} bodies fell through the ground");
 }
 
+/// Returns the height at which a ray from above hits something.
+fn top(world: &World, broad_phase: &BroadPhaseBvh) -> Option<f32> {
+    let World { bodies, colliders, narrow_phase, .. } = world;
+    let dispatcher = narrow_phase.query_dispatcher();
+    let queries = broad_phase.as_query_pipeline(dispatcher, bodies, colliders, QueryFilter::default());
+    let ray = Ray::new(to_vector(glam::Vec3::Y * 100.0), to_vector(-glam::Vec3::Y));
+    queries.cast_ray(&ray, 200.0, true).map(|(_, distance)| 100.0 - distance)
+}
+
 #[test]
 fn a_scene_that_never_asks_builds_no_tree_and_one_that_asks_finds_what_moved() {
     let (mut world, mut broad_phase) = (World::default(), rapier_pbig::broad_phase());
     let ball = world.add(World::dynamic(glam::Vec3::Y * 3.0), ColliderBuilder::ball(0.5));
-    let hit = |world: &World, broad_phase: &BroadPhaseBvh| {
-        let World { bodies, colliders, narrow_phase, .. } = world;
-        let dispatcher = narrow_phase.query_dispatcher();
-        let queries = broad_phase.as_query_pipeline(dispatcher, bodies, colliders, QueryFilter::default());
-        let ray = Ray::new(to_vector(glam::Vec3::Y * 100.0), to_vector(-glam::Vec3::Y));
-        queries.cast_ray(&ray, 200.0, true).map(|(_, distance)| 100.0 - distance)
+    let has_tree = |broad_phase: &BroadPhaseBvh| {
+        let finder = pbig_in(broad_phase);
+        !format!("{finder:?}").contains("current: OnceLock(<uninit>), stale: Mutex { data: None")
     };
     for _ in 0..30 {
         world.step(&mut broad_phase);
-        let top = hit(&world, &broad_phase).expect("the ray hits the ball");
-        assert!((top - world.bodies[ball].translation().y - 0.5).abs() < 1e-3, "{top}");
+        assert!(!has_tree(&broad_phase));
     }
+    for _ in 0..30 {
+        world.step(&mut broad_phase);
+        let top = top(&world, &broad_phase).expect("the ray hits the ball");
+        assert!((top - world.bodies[ball].translation().y - 0.5).abs() < 1e-3, "{top}");
+        assert!(has_tree(&broad_phase));
+    }
+}
+
+/// Until its first update a finder has seen nothing: rapier's tree answers, is saved, and takes over again.
+#[test]
+fn a_finder_before_its_first_update_hides_nothing() {
+    let (mut world, mut broad_phase) = (World::default(), BroadPhaseBvh::new());
+    world.colliders.insert(World::ground());
+    let ball = world.add(World::dynamic(glam::Vec3::Y * 3.0), ColliderBuilder::ball(0.5));
+    for _ in 0..3 {
+        world.step(&mut broad_phase);
+    }
+    let (before, saved) = (top(&world, &broad_phase), world.to_bytes(&broad_phase));
+    rapier_pbig::install(&mut broad_phase);
+    assert!(before.is_some_and(|top| top > 3.0) && top(&world, &broad_phase) == before);
+    assert!(world.to_bytes(&broad_phase) == saved);
+    rapier_pbig::uninstall(&mut broad_phase);
+    for _ in 0..120 {
+        world.step(&mut broad_phase);
+    }
+    assert!((world.bodies[ball].translation().y - 0.5).abs() < 0.02, "it fell through the ground");
+}
+
+#[test]
+fn a_collider_whose_box_is_set_before_the_first_step_is_found() {
+    for mut broad_phase in [BroadPhaseBvh::new(), rapier_pbig::broad_phase()] {
+        let mut world = World::default();
+        world.add(World::dynamic(glam::Vec3::X * 50.0), ColliderBuilder::ball(0.5));
+        world.step(&mut broad_phase);
+        assert_eq!(top(&world, &broad_phase), None);
+        let new = world.add(World::dynamic(glam::Vec3::Y * 3.0), ColliderBuilder::ball(0.5));
+        let collider = world.bodies[new].colliders()[0];
+        world.colliders[collider].set_translation(to_vector(glam::Vec3::Y * 3.0));
+        let aabb = world.colliders[collider].compute_aabb();
+        broad_phase.set_aabb(&world.params, collider, aabb);
+        assert_eq!(top(&world, &broad_phase), Some(3.5));
+        world.step(&mut broad_phase);
+        assert!(top(&world, &broad_phase).is_some_and(|top| top > 3.4));
+    }
+}
+
+#[test]
+fn a_step_of_no_length_changes_nothing_about_who_finds_the_pairs() {
+    let (mut world, mut broad_phase) = (scene("column").build(60, 1), BroadPhaseBvh::new());
+    for round in 0..6 {
+        if round % 2 == 0 {
+            rapier_pbig::install(&mut broad_phase);
+        } else {
+            rapier_pbig::uninstall(&mut broad_phase);
+        }
+        for dt in [0.0, 1.0 / 60.0, 0.0, 1.0 / 60.0, 0.0] {
+            world.params.dt = dt;
+            world.step(&mut broad_phase);
+        }
+    }
+    world.params.dt = 1.0 / 60.0;
+    for _ in 0..120 {
+        world.step(&mut broad_phase);
+    }
+    let low = world.bodies.iter().filter(|(_, body)| body.translation().y < -0.1).count();
+    assert_eq!(low, 0, "{low} bodies fell through the ground");
 }
 
 #[test]
@@ -143,7 +249,7 @@ fn questions_are_answered_and_bad_settings_are_errors() {
         [0.0, 0.9, 5.0].map(|x| world.add(World::dynamic(glam::Vec3::X * x), ColliderBuilder::ball(0.5)));
     world.gravity = glam::Vec3::ZERO;
     world.step(&mut broad_phase);
-    let finder = rapier_pbig::finder(&broad_phase).expect("it is installed");
+    let finder = pbig_in(&broad_phase);
     let [a, b, c] = bodies.map(|body| world.bodies[body].colliders()[0]);
     assert_eq!((finder.why(a, b), finder.pair_count(), finder.pairs().count()), (Why::Reported, 1, 1));
     assert!(matches!(finder.why(a, c), Why::Apart { axis: 0, .. }));

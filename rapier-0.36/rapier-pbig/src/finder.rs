@@ -128,11 +128,15 @@ impl PairFinder for PbigFinder {
         &self.colliders.tree().bvh
     }
 
-    /// Asks the grid, if there is one, so that continuous collision detection needs no tree.
+    /// Asks the grid, if there is one, so that continuous collision detection needs no tree. Sorted, because rapier's result can
+    /// depend on the order, and that of a grid or a tree depends on the past.
     fn intersect_aabb(&self, aabb: &TreeAabb, found: &mut dyn FnMut(u32)) {
-        if !self.colliders.core().overlapping_in_grid(&from_tree(aabb), found) {
-            self.tree().leaves(|node| node.aabb().intersects(aabb)).for_each(found);
+        let mut all = Vec::new();
+        if !self.colliders.core().overlapping_in_grid(&from_tree(aabb), &mut |id| all.push(id)) {
+            all.extend(self.tree().leaves(|node| node.aabb().intersects(aabb)));
         }
+        all.sort_unstable();
+        all.into_iter().for_each(found);
     }
 
     fn state(&self) -> (Vec<(ColliderHandle, TreeAabb)>, Vec<(ColliderHandle, ColliderHandle)>) {

@@ -92,24 +92,31 @@ impl<F> Shadowed<F> {
         self.checker.watch(&Watched { view: call, margin, removed, is_modified, events, stock });
     }
 
-    /// Updates stock and catches its panics. Returns its events, if it is a reference.
+    /// Updates stock. Returns its events, if it is a reference.
     fn update_stock(&mut self, call: &Call<'_>) -> Option<Vec<PairEvent>> {
-        let stock = self.stock.as_mut().filter(|_| self.checker.has_stock())?;
-        stock.adaptive_change_detection_margin = call.adaptive_margin;
+        if !self.checker.has_stock() {
+            return None;
+        }
         let (Call { params, colliders, bodies, modified, removed, .. }, mut events) = (*call, Vec::new());
         let first = !std::mem::replace(&mut self.started, true);
-        let update = || {
+        self.guard(|stock| {
+            stock.adaptive_change_detection_margin = call.adaptive_margin;
             if first {
                 show_all(stock, call, &mut events);
             }
             stock.update(params, colliders, bodies, modified, removed, &mut events);
-        };
-        if catch_unwind(AssertUnwindSafe(update)).is_err() {
+        })?;
+        Some(pair_events(&events))
+    }
+
+    /// Does something with stock. If it panics, there is no stock any more.
+    fn guard(&mut self, work: impl FnOnce(&mut BroadPhaseBvh)) -> Option<()> {
+        let stock = self.stock.as_mut()?;
+        if catch_unwind(AssertUnwindSafe(|| work(stock))).is_err() {
             tracing::warn!("pbig: rapier's own broad phase has panicked and is no longer compared with");
             self.stock = None;
-            return None;
         }
-        Some(pair_events(&events))
+        self.stock.as_ref().map(|_| ())
     }
 }
 
@@ -138,8 +145,8 @@ impl<F: PairFinder + Clone> PairFinder for Shadowed<F> {
     ) {
         self.inner.set_aabbs(params, adaptive, aabbs);
         self.has_moved |= !aabbs.is_empty();
-        if let Some(stock) = &mut self.stock {
-            stock.set_aabbs(params, aabbs);
+        if self.checker.has_stock() {
+            self.guard(|stock| stock.set_aabbs(params, aabbs));
         }
     }
 
