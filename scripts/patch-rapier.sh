@@ -23,12 +23,20 @@ fi
 project="${1:-.}"
 [ -f "$project/Cargo.toml" ] || fail "no Cargo.toml in '$project': name the folder of your project"
 project="$(cd "$project" && pwd)"
+# The workspace, if there is one: cargo reads patches and versions there.
+if manifest="$(cd "$project" && cargo locate-project --workspace --message-format plain 2>/dev/null)"; then
+    project="$(dirname "$manifest")"
+fi
 copy="$project/patched/rapier3d-$version"
 
 if $is_undo; then
     rm -rf "$copy"
     rmdir "$project/patched" 2>/dev/null || true
-    echo "Removed $copy. Remove the line 'rapier3d = { path = ... }' under [patch.crates-io], too."
+    cat <<TEXT
+Removed $copy.
+Remove from $project/Cargo.toml the line 'rapier3d = { path = ... }' under [patch.crates-io] and the dependency rapier-pbig,
+and its use in the code.
+TEXT
     exit 0
 fi
 
@@ -38,43 +46,46 @@ command -v patch >/dev/null || fail "the program 'patch' is missing: install it 
 # What the project has now: another version would not be replaced by the patched one.
 if [ -f "$project/Cargo.lock" ]; then
     found="$(awk '$1 == "name" && $3 == "\"rapier3d\"" { getline; gsub(/"/, "", $3); print $3 }' "$project/Cargo.lock")"
-    for one in $found; do
-        [ "$one" = "$version" ] || fail "$project/Cargo.lock has rapier3d $one; the patch is for $version: change your \
-dependency, or run 'cargo update -p rapier3d@$one --precise $version'"
-    done
+    case $'\n'$found$'\n' in
+    *$'\n'"$version"$'\n'* | $'\n\n') ;;
+    *) fail "$project/Cargo.lock has rapier3d ${found//$'\n'/, }; the patch is for $version: change your dependency, or run" \
+        "'cargo update -p rapier3d --precise $version'" ;;
+    esac
 fi
 
 # A project of its own, so that a missing or wrong entry in the user's Cargo.toml is no obstacle.
 work="$(mktemp -d)"
-trap 'rm -rf "$work"' EXIT
+trap 'rm -rf "$work" "$copy.new"' EXIT
 mkdir -p "$work/src"
 touch "$work/src/lib.rs"
 cat >"$work/Cargo.toml" <<TOML
 [package]
 name = "fetch-rapier"
 version = "0.0.0"
-edition = "2024"
+edition = "2021"
 [dependencies]
 rapier3d = "=$version"
 [workspace]
 TOML
-metadata="$(cd "$work" && cargo metadata --format-version 1 ${CARGO_NET_OFFLINE:+--offline})" ||
+# Run in the project, whose configuration of cargo counts.
+metadata="$(cd "$project" && cargo metadata --format-version 1 --manifest-path "$work/Cargo.toml")" ||
     fail "cargo cannot fetch rapier3d $version"
-manifest="$(grep -o '"manifest_path":"[^"]*rapier3d-'"$version"'/Cargo.toml"' <<<"$metadata" | head -1 | cut -d'"' -f4)"
+manifest="$(grep -oE '"manifest_path":"[^"]*/rapier3d(-'"$version"')?/Cargo.toml"' <<<"$metadata" | head -1 | cut -d'"' -f4)"
 [ -f "$manifest" ] || fail "cargo has fetched no rapier3d $version"
 
 # Made aside and moved into place, so that no half-patched copy stays behind.
-cp -r "$(dirname "$manifest")" "$work/rapier3d"
-chmod -R u+w "$work/rapier3d"
-patch --quiet --forward --strip=1 --directory="$work/rapier3d" <"$patch_file" ||
+rm -rf "$copy.new"
+mkdir -p "$(dirname "$copy")"
+cp -r "$(dirname "$manifest")" "$copy.new"
+chmod -R u+w "$copy.new"
+patch --quiet --forward --strip=1 --directory="$copy.new" <"$patch_file" ||
     fail "the patch does not apply to $(dirname "$manifest"): is it unchanged?"
 rm -rf "$copy"
-mkdir -p "$(dirname "$copy")"
-mv "$work/rapier3d" "$copy"
+mv "$copy.new" "$copy"
 
 cat <<TEXT
 Made $copy.
-Add to Cargo.toml (of the workspace, if there is one):
+Add to $project/Cargo.toml:
 
     [patch.crates-io]
     rapier3d = { path = "patched/rapier3d-$version" }
