@@ -13,9 +13,7 @@ copy="$root/target/rapier-tests/rapier3d"
 
 rm -rf "$copy"
 mkdir -p "$copy"
-touch "$copy/../Cargo.toml"
-rm "$copy/../Cargo.toml"
-[ -d rapier-0.36/patched/rapier3d-0.36.1 ] || scripts/patch-rapier.sh rapier-0.36
+scripts/patch-rapier.sh rapier-0.36
 cp -r rapier-0.36/patched/rapier3d-0.36.1/. "$copy"
 
 # pbig's finder as a module: its `crate::` is `crate::pbig::` here.

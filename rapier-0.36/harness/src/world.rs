@@ -88,8 +88,17 @@ impl World {
 
     /// Removes a body with its colliders.
     pub fn remove(&mut self, body: RigidBodyHandle) {
+        self.remove_body(body, true);
+    }
+
+    /// Removes a body. Its colliders stay, without a body.
+    pub fn remove_body_alone(&mut self, body: RigidBodyHandle) {
+        self.remove_body(body, false);
+    }
+
+    fn remove_body(&mut self, body: RigidBodyHandle, colliders_too: bool) {
         let Self { bodies, islands, colliders, impulse_joints, multibody_joints, soft_bodies, .. } = self;
-        bodies.remove(body, islands, colliders, impulse_joints, multibody_joints, soft_bodies, true);
+        bodies.remove(body, islands, colliders, impulse_joints, multibody_joints, soft_bodies, colliders_too);
     }
 
     /// Removes a collider.

@@ -196,7 +196,7 @@ impl Player {
     }
 
     fn play(&mut self, tally: &mut Tally) {
-        let op = self.rng.random_range(0..20);
+        let op = self.rng.random_range(0..24);
         let (body, collider) = (self.any_body(), self.any_collider());
         let (Some(body), Some(collider)) = (body, collider) else { return self.add() };
         let is_soft = self.world.colliders[collider]
@@ -237,8 +237,26 @@ impl Player {
                 self.world.add_soft(at, 0.5);
                 tally.soft += 1;
             }
+            19 => {
+                let types = [ActiveCollisionTypes::empty(), ActiveCollisionTypes::all()];
+                let types = types[self.rng.random_range(0..2)];
+                self.world.colliders[collider].set_active_collision_types(types);
+            }
+            20 if !is_soft => self.reshape(collider),
+            21 => {
+                let is_sensor = self.rng.random_range(0..2) == 0;
+                self.world.colliders[collider].set_sensor(is_sensor);
+            }
+            22 => self.world.remove_body_alone(body),
             _ => self.quarantine_test(body),
         }
+    }
+
+    fn reshape(&mut self, collider: ColliderHandle) {
+        let (size, skin) = (self.rng.random_range(0.1..1.5), self.rng.random_range(0.0..0.2));
+        let collider = &mut self.world.colliders[collider];
+        collider.set_shape(SharedShape::cuboid(size, 0.3, size));
+        collider.set_contact_skin(skin);
     }
 
     fn add(&mut self) {
