@@ -85,7 +85,10 @@ mv "$copy.new" "$copy"
 
 cat <<TEXT
 Made $copy.
-Add to $project/Cargo.toml:
+Add to $project/Cargo.toml, unless it has them:
+
+    [dependencies]
+    rapier-pbig = { path = "$(dirname "$(dirname "$patch_file")")/rapier-0.36/rapier-pbig" }
 
     [patch.crates-io]
     rapier3d = { path = "patched/rapier3d-$version" }

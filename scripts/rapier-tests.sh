@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # Runs rapier 0.36.1's own tests on a patched copy, without and with pbig's finder in every broad phase.
 #
-#     scripts/rapier-tests.sh [ARGUMENTS OF cargo test]
+#     scripts/rapier-tests.sh [ARGUMENTS OF cargo test]     (with arguments PBIG_EXPECTED names the tests that fail with pbig)
 #
 # The copy contains rapier-pbig as a module, because a crate's unit tests cannot use a crate that depends on it. The variable
 # RAPIER_PBIG installs the finder in every new broad phase. Without arguments it runs the unit tests, and those of tests/ that
@@ -69,13 +69,24 @@ if [ $# -eq 0 ]; then
         case "$name" in soft_* | fem_* | joint_stability | *prismatic*) ;; *) arguments+=(--test "$name") ;; esac
     done
 fi
-failed=0
-for finder in "" pbig; do
-    echo "== rapier's tests, finder: ${finder:-none}"
-    if [ -n "$finder" ]; then export RAPIER_PBIG=1; else unset RAPIER_PBIG; fi
-    cargo test --no-fail-fast --features serde-serialize "${arguments[@]}" >"$copy/../${finder:-stock}.log" 2>&1 || failed=1
-    grep -aE '^test .*FAILED|^error|panicked at|^test result: .* failed' "$copy/../${finder:-stock}.log" |
-        grep -av ' 0 failed' || true
-    grep -ahE '^test result' "$copy/../${finder:-stock}.log" | awk '{ passed += $4; failed += $6 } END { print passed " passed, " failed " failed" }'
-done
-exit $failed
+
+# The tests that fail with pbig, each explained in docs/RAPIER_VERSIONS.md.
+expected="awake_pile ccd_bodies geometry::narrow_phase::test::collider_set_parent_no_self_intersection joints_and_sensor \
+multibody_articulation restoring_into_a_live_pipeline sleeping_pile structural_changes"
+[ $# -eq 0 ] || expected="${PBIG_EXPECTED:-}"
+
+# run LOG: runs the tests, and prints those that failed, in order.
+run() {
+    cargo test --no-fail-fast --features serde-serialize "${arguments[@]}" >"$1" 2>&1 || true
+    if ! grep -qa '^test result' "$1" || grep -qa '(signal: ' "$1"; then tail "$1" >&2 && exit 1; fi
+    grep -aE '^test .*FAILED' "$1" | cut -d' ' -f2 | LC_ALL=C sort | paste -sd' '
+    grep -ahE '^test result' "$1" | awk '{ passed += $4; failed += $6 } END { print passed " passed, " failed " failed" }' >&2
+}
+
+echo "== rapier's tests without a finder"
+failed=$(run "$copy/../stock.log")
+[ -z "$failed" ] || { echo "failed: $failed" && exit 1; }
+echo "== rapier's tests with pbig"
+failed=$(RAPIER_PBIG=1 run "$copy/../pbig.log")
+[ "$failed" = "$expected" ] || { echo "failed: $failed; expected: $expected" && exit 1; }
+echo "== as expected"
