@@ -79,7 +79,7 @@ multibody_articulation restoring_into_a_live_pipeline sleeping_pile structural_c
 run() {
     cargo test --no-fail-fast --features serde-serialize "${arguments[@]}" >"$1" 2>&1 || true
     if ! grep -qa '^test result' "$1" || grep -qa '(signal: ' "$1"; then tail "$1" >&2 && exit 1; fi
-    grep -aE '^test .*FAILED' "$1" | cut -d' ' -f2 | LC_ALL=C sort | paste -sd' '
+    grep -aE '^test .* \.\.\. FAILED' "$1" | cut -d' ' -f2 | LC_ALL=C sort | paste -sd' '
     grep -ahE '^test result' "$1" | awk '{ passed += $4; failed += $6 } END { print passed " passed, " failed " failed" }' >&2
 }
 
