@@ -72,6 +72,9 @@ metadata="$(cd "$project" && cargo metadata --format-version 1 --manifest-path "
     fail "cargo cannot fetch rapier3d $version"
 manifest="$(grep -oE '"manifest_path":"[^"]*/rapier3d(-'"$version"')?/Cargo.toml"' <<<"$metadata" | head -1 | cut -d'"' -f4)"
 [ -f "$manifest" ] || fail "cargo has fetched no rapier3d $version"
+# A configuration of cargo may replace rapier3d already, by the copy of the last run.
+[ "$(dirname "$manifest")" != "$copy" ] ||
+    fail "cargo's configuration takes rapier3d from $copy: move [patch.crates-io] into $project/Cargo.toml, or remove the copy by --undo"
 
 # Made aside and moved into place, so that no half-patched copy stays behind.
 rm -rf "$copy.new"
@@ -92,4 +95,6 @@ Add to $project/Cargo.toml, unless it has them:
 
     [patch.crates-io]
     rapier3d = { path = "patched/rapier3d-$version" }
+
+In a workspace also: exclude = ["patched"]. Leave patched/ out of version control: this script makes it again.
 TEXT

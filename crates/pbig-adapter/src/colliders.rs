@@ -80,7 +80,7 @@ impl<T: Tree> Colliders<T> {
         (self.writer.adopted, self.inherited) = (pairs, boxes);
     }
 
-    /// Sets the AABBs of colliders, with this margin or one of their own, and keeps their filters. A new collider gets a filter
+    /// Sets the AABBs of colliders, with this margin or one of their own, and keeps their filters. A collider without a box gets a filter
     /// that admits all, until the next update sets its own before it looks for pairs.
     #[inline(always)]
     pub fn set_aabbs(&mut self, margin: f32, moved: impl Iterator<Item = (Handle, Aabb, Option<f32>)>) {
@@ -89,9 +89,8 @@ impl<T: Tree> Colliders<T> {
             if let Some(margin) = own {
                 self.set_margin(margin);
             }
-            if self.registry.contains(handle) {
-                self.core.set_aabb(handle.index, aabb);
-            } else {
+            // A collider that was disabled is known but has no box.
+            if !(self.registry.contains(handle) && self.core.set_aabb(handle.index, aabb)) {
                 self.enable(handle, aabb, ProxyFilter::ALL);
             }
         }
@@ -181,12 +180,7 @@ impl<T: Tree> Colliders<T> {
             }
             self.set_margin(margin);
         }
-        scene.for_each_collider(|handle, proxy| {
-            if self.registry.handle(handle.index).is_some_and(|known| known != handle) {
-                self.core.remove(handle.index);
-            }
-            self.set_proxy(scene, handle, proxy);
-        });
+        scene.for_each_collider(|handle, proxy| self.set_proxy(scene, handle, proxy));
         for (id, _) in inherited {
             if self.registry.handle(id).is_none() {
                 self.core.remove(id);

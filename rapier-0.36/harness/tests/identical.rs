@@ -4,6 +4,7 @@ use pbig_harness_036::scenes::Scene;
 use pbig_harness_036::world::{World, to_vector};
 use rapier_pbig::{PbigConfig, PbigFinder, Why};
 use rapier3d::geometry::{Aabb, PairFinder};
+use rapier3d::parry::bounding_volume::BoundingVolume;
 use rapier3d::prelude::*;
 
 fn scene(name: &str) -> Scene {
@@ -52,6 +53,24 @@ fn what_a_box_intersects_is_sorted() {
         let (mut found, all) = (Vec::new(), Aabb::from_half_extents(Vector::ZERO, Vector::splat(1e3)));
         pbig_in(&broad_phase).intersect_aabb(&all, &mut |id| found.push(id));
         assert!(found.len() > bodies / 2 && found.is_sorted(), "{bodies} bodies, {} found", found.len());
+    }
+}
+
+/// CCD asks the grid of a large world. The tree, which scene queries use, has the same boxes.
+#[test]
+fn the_grid_and_the_tree_find_the_same_colliders() {
+    let (mut world, mut broad_phase) = (scene("column").build(3000, 1), rapier_pbig::broad_phase());
+    for step in 0..20 {
+        world.step(&mut broad_phase);
+        let finder = pbig_in(&broad_phase);
+        for (_, collider) in world.colliders.iter().step_by(97) {
+            let reach = collider.compute_aabb().loosened(0.1 * step as f32);
+            let (mut of_grid, mut of_tree) = (Vec::new(), Vec::new());
+            finder.intersect_aabb(&reach, &mut |id| of_grid.push(id));
+            of_tree.extend(finder.tree().leaves(|node| node.aabb().intersects(&reach)));
+            of_tree.sort_unstable();
+            assert!(of_grid == of_tree, "step {step}: {of_grid:?} and {of_tree:?}");
+        }
     }
 }
 

@@ -83,6 +83,10 @@ impl PairFinder for Planted {
         self.finder.tree()
     }
 
+    fn intersect_aabb(&self, aabb: &Aabb, found: &mut dyn FnMut(u32)) {
+        self.finder.intersect_aabb(aabb, found);
+    }
+
     fn state(&self) -> (Vec<(ColliderHandle, Aabb)>, Vec<(ColliderHandle, ColliderHandle)>) {
         self.finder.state()
     }
@@ -196,7 +200,7 @@ impl Player {
     }
 
     fn play(&mut self, tally: &mut Tally) {
-        let op = self.rng.random_range(0..24);
+        let op = self.rng.random_range(0..28);
         let (body, collider) = (self.any_body(), self.any_collider());
         let (Some(body), Some(collider)) = (body, collider) else { return self.add() };
         let is_soft = self.world.colliders[collider]
@@ -248,6 +252,10 @@ impl Player {
                 self.world.colliders[collider].set_sensor(is_sensor);
             }
             22 => self.world.remove_body_alone(body),
+            23 => self.tell_aabb(collider),
+            24 => self.replace_by_clone(),
+            25 => self.change_margin(),
+            26 if self.rng.random_range(0..4) == 0 => self.go_on_with_the_tree(),
             _ => self.quarantine_test(body),
         }
     }
@@ -298,6 +306,44 @@ impl Player {
         }
         rapier_pbig::install_finder(&mut self.broad_phase, subject(self.plant));
         tally.restores += 1;
+    }
+
+    /// An app may tell the AABB of a collider before the step; a query must find it there.
+    fn tell_aabb(&mut self, collider: ColliderHandle) {
+        self.world.colliders[collider].set_enabled(true);
+        let one = &self.world.colliders[collider];
+        let is_enabled = one.is_enabled();
+        let aabb = one.compute_broad_phase_aabb(&self.world.params, &self.world.bodies);
+        if !is_enabled || !(aabb.mins.is_finite() && aabb.maxs.is_finite()) {
+            return;
+        }
+        self.broad_phase.set_aabb(&self.world.params, collider, aabb);
+        let World { narrow_phase, bodies, colliders, .. } = &self.world;
+        let dispatcher = narrow_phase.query_dispatcher();
+        let queries =
+            self.broad_phase.as_query_pipeline(dispatcher, bodies, colliders, QueryFilter::default());
+        assert!(queries.intersect_aabb_conservative(aabb).any(|(found, _)| found == collider), "{collider:?}");
+    }
+
+    fn replace_by_clone(&mut self) {
+        self.broad_phase = self.broad_phase.clone();
+    }
+
+    /// Changes what the margin depends on. Only larger ones: boxes of before would have pairs that the new margin has not.
+    fn change_margin(&mut self) {
+        if self.rng.random_range(0..2) == 0 {
+            self.is_adaptive = true;
+            self.broad_phase.adaptive_change_detection_margin = true;
+        } else {
+            self.world.params.length_unit *= 1.25;
+        }
+    }
+
+    /// Rapier's tree finds the pairs of a step, then pbig again.
+    fn go_on_with_the_tree(&mut self) {
+        rapier_pbig::uninstall(&mut self.broad_phase);
+        self.world.step(&mut self.broad_phase);
+        rapier_pbig::install_finder(&mut self.broad_phase, subject(self.plant));
     }
 
     /// A body whose velocity is no number is put out of action by rapier.

@@ -11,7 +11,7 @@ use rapier3d::prelude::{
     BroadPhasePairEvent, ColliderHandle, ColliderPair, ColliderSet, IntegrationParameters, RigidBodySet,
 };
 
-/// What finds the pairs of a `BroadPhaseBvh` instead of its tree. The tree for scene queries and CCD is built when something
+/// Finds the pairs of a `BroadPhaseBvh` instead of its tree. The tree for scene queries and CCD is built when something
 /// asks for it, and kept up to date only while something does.
 #[derive(Clone, Debug)]
 pub struct PbigFinder {

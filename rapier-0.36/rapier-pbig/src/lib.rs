@@ -68,12 +68,15 @@ pub fn broad_phase() -> BroadPhaseBvh {
     broad_phase
 }
 
-/// Lets pbig find the pairs from the next step on. It goes on where the broad phase stopped: no contact is lost.
+/// Lets pbig find the pairs from the next step on. It resumes where the broad phase stopped: no contact is lost. Does nothing
+/// where pbig is installed already.
 ///
-/// A broad phase that was saved and restored has to be given pbig again by this function. Without it, it goes on with
-/// rapier's tree.
+/// A broad phase that was saved and restored has to be given pbig again by this function. Without it, rapier's tree finds the
+/// pairs. To give a running world pbig, call this function; a new broad phase does not know the pairs of the old one.
 pub fn install(broad_phase: &mut BroadPhaseBvh) {
-    install_finder(broad_phase, PbigFinder::default());
+    if finder(broad_phase).is_none() {
+        install_finder(broad_phase, PbigFinder::default());
+    }
 }
 
 /// As [`install`], with settings.
@@ -90,7 +93,7 @@ pub fn install_finder(broad_phase: &mut BroadPhaseBvh, finder: impl PairFinder) 
     broad_phase.set_pair_finder(Some(Box::new(finder)));
 }
 
-/// Lets rapier's tree find the pairs again. It goes on where pbig stopped.
+/// Lets rapier's tree find the pairs again. It resumes where pbig stopped.
 pub fn uninstall(broad_phase: &mut BroadPhaseBvh) {
     broad_phase.set_pair_finder(None);
 }

@@ -60,7 +60,7 @@ pub struct Shadowed<F> {
     /// Something was moved by the step since the last update.
     has_moved: bool,
     /// Stock has seen all colliders.
-    started: bool,
+    has_started: bool,
 }
 
 impl<F> Shadowed<F> {
@@ -68,7 +68,7 @@ impl<F> Shadowed<F> {
     pub fn new(inner: F, relative_margin: f32) -> Self {
         let checker = Checker::new().with_replays_in(std::env::temp_dir());
         let stock = Some(BroadPhaseBvh::new());
-        Self { inner, checker, relative_margin, stock, has_moved: false, started: false }
+        Self { inner, checker, relative_margin, stock, has_moved: false, has_started: false }
     }
 
     /// Adds a reference.
@@ -98,7 +98,7 @@ impl<F> Shadowed<F> {
             return None;
         }
         let (Call { params, colliders, bodies, modified, removed, .. }, mut events) = (*call, Vec::new());
-        let first = !std::mem::replace(&mut self.started, true);
+        let first = !std::mem::replace(&mut self.has_started, true);
         self.guard(|stock| {
             stock.adaptive_change_detection_margin = call.adaptive_margin;
             if first {
@@ -164,7 +164,7 @@ impl<F: PairFinder + Clone> PairFinder for Shadowed<F> {
 
     fn start_from(&mut self, aabbs: Vec<(u32, TreeAabb)>, pairs: Vec<(ColliderHandle, ColliderHandle)>) {
         self.checker.start_over(pairs.iter().map(|&(a, b)| HandlePair(handle(a), handle(b))));
-        (self.stock, self.started) = (Some(BroadPhaseBvh::new()), false);
+        (self.stock, self.has_started) = (Some(BroadPhaseBvh::new()), false);
         self.inner.start_from(aabbs, pairs);
     }
 

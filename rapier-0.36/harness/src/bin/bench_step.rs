@@ -30,9 +30,13 @@ struct Args {
     write: Option<PathBuf>,
 }
 
-/// The heading of the CSV file, in ms.
-const HEADING: &str = "scene,bodies,steps,stock_broad_mean,pbig_broad_mean,stock_broad_p99,pbig_broad_p99,\
-stock_step_mean,pbig_step_mean,stock_step_p99,pbig_step_p99,stock_pairs,pbig_pairs";
+/// The heading of the CSV file, in ms. With fewer than 100 steps p99 is the worst step.
+const HEADING: &str = "scene,bodies,threads,steps,stock_broad_mean,pbig_broad_mean,stock_broad_median,pbig_broad_median,\
+stock_broad_p99,pbig_broad_p99,stock_step_mean,pbig_step_mean,stock_step_median,pbig_step_median,stock_step_p99,\
+pbig_step_p99,stock_pairs,pbig_pairs";
+
+/// The threads that rapier uses.
+const THREADS: &str = if cfg!(feature = "parallel") { "all" } else { "1" };
 
 fn main() -> ExitCode {
     let mut args = Args::parse();
@@ -40,7 +44,7 @@ fn main() -> ExitCode {
         args.scenes = Scene::ALL.to_vec();
     }
     println!(
-        "scene        bodies  steps   broad phase, ms: stock   pbig      x   p99 x   step, ms: stock   pbig      x"
+        "scene        bodies  steps   broad phase, ms: stock   pbig      x   p99 x   step, ms: stock   pbig      x median x"
     );
     let mut rows = vec![HEADING.to_string()];
     for &bodies in &args.bodies {
@@ -75,7 +79,7 @@ fn measure(scene: Scene, bodies: usize, args: &Args) -> String {
     let [stock_broad, ours_broad] = [&stock, &ours].map(|run| of(run, |time| time.broad_phase));
     let [stock_step, ours_step] = [&stock, &ours].map(|run| of(run, |time| time.step));
     println!(
-        "{:<12} {bodies:>6} {:>6} {:>24.3} {:>6.3} {:>5.2}x {:>6.2}x {:>17.3} {:>6.3} {:>5.2}x",
+        "{:<12} {bodies:>6} {:>6} {:>24.3} {:>6.3} {:>5.2}x {:>6.2}x {:>17.3} {:>6.3} {:>5.2}x {:>7.2}x",
         scene.name,
         ours.times.len(),
         stock_broad.mean,
@@ -85,10 +89,12 @@ fn measure(scene: Scene, bodies: usize, args: &Args) -> String {
         stock_step.mean,
         ours_step.mean,
         stock_step.mean / ours_step.mean,
+        stock_step.median / ours_step.median,
     );
-    let pairs = [stock_broad, ours_broad, stock_step, ours_step];
-    let [broad, step] = [[pairs[0], pairs[1]], [pairs[2], pairs[3]]];
-    let columns = |[a, b]: [Summary; 2]| format!("{:.4},{:.4},{:.4},{:.4}", a.mean, b.mean, a.p99, b.p99);
-    let (steps, broad, step) = (ours.times.len(), columns(broad), columns(step));
-    format!("{},{bodies},{steps},{broad},{step},{},{}", scene.name, stock.pairs(), ours.pairs())
+    let sides = |[a, b]: [Summary; 2]| {
+        [a.mean, b.mean, a.median, b.median, a.p99, b.p99].map(|ms| format!("{ms:.4}")).join(",")
+    };
+    let (broad, step) = (sides([stock_broad, ours_broad]), sides([stock_step, ours_step]));
+    let (steps, pairs) = (ours.times.len(), format!("{},{}", stock.pairs(), ours.pairs()));
+    format!("{},{bodies},{THREADS},{steps},{broad},{step},{pairs}", scene.name)
 }
