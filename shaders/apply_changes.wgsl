@@ -1,15 +1,12 @@
-// Changes, step 2: applies the lists of changed boxes and of changed filters.
+// Changes: applies the lists of changed boxes and of changed filters, and notes which boxes have changed.
 
 @group(0) @binding(0) var<uniform> params: Params;
 @group(0) @binding(1) var<storage, read> box_changes: array<BoxChange>;
 @group(0) @binding(2) var<storage, read> filter_changes: array<FilterChange>;
 @group(0) @binding(3) var<storage, read_write> boxes: array<Motion>;
 @group(0) @binding(4) var<storage, read_write> filters: array<vec4<u32>>;
-
-const NOWHERE = DeviceBox(
-    array<i32, 3>(0x7fffffff, 0x7fffffff, 0x7fffffff),
-    array<i32, 3>(-0x7fffffff - 1, -0x7fffffff - 1, -0x7fffffff - 1),
-);
+// A bit for each box.
+@group(0) @binding(5) var<storage, read_write> changed: array<atomic<u32>>;
 
 @compute @workgroup_size(LANES)
 fn apply_changes(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>,
@@ -17,10 +14,14 @@ fn apply_changes(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroup
     let i = linear(group, groups) * LANES + lane;
     if i < params.box_changes {
         let id = box_changes[i].marked_id & ~WAS_ABSENT;
-        boxes[id].now = box_changes[i].now;
-        if (box_changes[i].marked_id & WAS_ABSENT) != 0u {
+        let was_absent = (box_changes[i].marked_id & WAS_ABSENT) != 0u;
+        if was_absent {
             boxes[id].before = NOWHERE;
+        } else {
+            boxes[id].before = boxes[id].now;
         }
+        boxes[id].now = box_changes[i].now;
+        atomicOr(&changed[id / 32u], 1u << (id % 32u));
     }
     if i < params.filter_changes {
         let new_filter = filter_changes[i];

@@ -4,9 +4,10 @@
 @group(0) @binding(0) var<uniform> params: Params;
 @group(0) @binding(1) var<uniform> chunk: Chunk;
 @group(0) @binding(2) var<storage, read> boxes: array<KnownBox>;
-@group(0) @binding(3) var<storage, read> filters: array<vec4<u32>>;
-@group(0) @binding(4) var<storage, read_write> totals: array<atomic<u32>, 10>;
-@group(0) @binding(5) var<storage, read_write> out: array<u32>;
+@group(0) @binding(3) var<storage, read> changed: array<u32>;
+@group(0) @binding(4) var<storage, read> filters: array<vec4<u32>>;
+@group(0) @binding(5) var<storage, read_write> totals: array<atomic<u32>, 12>;
+@group(0) @binding(6) var<storage, read_write> out: array<u32>;
 
 var<workgroup> bits: array<atomic<u32>, 8>;
 
@@ -21,12 +22,15 @@ fn check_all(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) g
     }
     var hit = false;
     var pair = vec2<u32>(0u);
+    var mark = 0u;
     if first + lane < all {
         pair = pair_at(first + lane, n);
-        let found = is_wanted(boxes[pair.x], boxes[pair.y]);
-        atomicAdd(&tally[2], u32(found));
-        hit = found
-            && ((params.flags & FILTERED) == 0u || filters_allow(filters[pair.x], filters[pair.y]));
+        let one = known_box(pair.x);
+        let other = known_box(pair.y);
+        let found = is_wanted(one, other);
+        mark = mark_of(one, other);
+        note_test(2u, u32(found));
+        hit = found && (!has_flag(FILTERED) || filters_allow(filters[pair.x], filters[pair.y]));
     }
     var rank = 0u;
     if hit {
@@ -41,7 +45,7 @@ fn check_all(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) g
         add_tests();
         let hits = atomicLoad(&tally[HITS]);
         placed = Placed(NO_SPACE, 0u, 0u, 0u);
-        if (params.flags & BITS) != 0u {
+        if has_flag(BITS) {
             add_total(PAIRS, hits);
         } else if hits > 0u {
             placed = place_plain(hits);
@@ -49,10 +53,10 @@ fn check_all(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) g
     }
     let at = workgroupUniformLoad(&placed).at;
     let word = first / 32u + lane;
-    if (params.flags & BITS) != 0u && lane < 8u && word < chunk.word_capacity {
+    if has_flag(BITS) && lane < 8u && word < chunk.word_capacity {
         out[word] = atomicLoad(&bits[lane]);
     }
     if hit && at != NO_SPACE {
-        write_pair(at + 2u * rank, pair.x, pair.y);
+        write_pair(at + 2u * rank, pair.x, pair.y, mark);
     }
 }

@@ -8,7 +8,7 @@
 @group(0) @binding(4) var<storage, read> entries: array<u32>;
 @group(0) @binding(5) var<storage, read> counters: Counters;
 @group(0) @binding(6) var<storage, read> large_items: array<LargeItem>;
-@group(0) @binding(7) var<storage, read_write> totals: array<atomic<u32>, 10>;
+@group(0) @binding(7) var<storage, read_write> totals: array<atomic<u32>, 12>;
 @group(0) @binding(8) var<storage, read_write> out: array<u32>;
 
 // If true, the rows of one segment get equally many pairs (PBIG 5.1). If false, a row gets all boxes after it.
@@ -69,16 +69,16 @@ fn test_row(lane: u32, row: u32, entry: u32, one: KnownBox, item: LargeItem, n: 
                 continue;
             }
             counts.z += 1u;
-            if (params.flags & FILTERED) == 0u || filters_allow(filters[a], filters[b]) {
+            if !has_flag(FILTERED) || filters_allow(filters[a], filters[b]) {
                 bits |= 1u << (k % 32u);
             }
         }
         mask[w] = bits;
         hits += countOneBits(bits);
     }
-    atomicAdd(&tally[0], counts.x);
-    atomicAdd(&tally[1], counts.y);
-    atomicAdd(&tally[2], counts.z);
+    note_test(0u, counts.x);
+    note_test(1u, counts.y);
+    note_test(2u, counts.z);
     return hits;
 }
 
@@ -90,7 +90,7 @@ fn place(item: LargeItem, column: u32) -> Placed {
     if hits == 0u {
         return Placed(NO_SPACE, 0u, 0u, 0u);
     }
-    if (params.flags & PACKED) == 0u || words > 1u + 2u * hits {
+    if !has_flag(PACKED) || words > 1u + 2u * hits {
         return place_plain(hits);
     }
     let at = reserve(words, hits);
@@ -164,12 +164,12 @@ fn check_large(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups)
             write_row(to.at + word_rank, lane, hits, within, n);
         }
         if written && to.packed == 0u {
-            write_pairs(to.at + 2u * rank, lane, row_entry, within, n);
+            write_pairs(to.at + 2u * rank, lane, row_entry, row_box, within, n);
         }
     }
 }
 
-fn write_pairs(start: u32, lane: u32, entry: u32, within: bool, n: u32) {
+fn write_pairs(start: u32, lane: u32, entry: u32, one: KnownBox, within: bool, n: u32) {
     var at = start;
     for (var w = 0u; w < 8u; w++) {
         var bits = mask[w];
@@ -177,7 +177,7 @@ fn write_pairs(start: u32, lane: u32, entry: u32, within: bool, n: u32) {
             let k = 32u * w + firstTrailingBit(bits);
             bits &= bits - 1u;
             let j = select(k, row_partner(lane, k, n), within);
-            write_pair(at, box_of(entry), box_of(column_entries[j]));
+            write_pair(at, box_of(entry), box_of(column_entries[j]), mark_of(one, column_boxes[j]));
             at += 2u;
         }
     }

@@ -9,7 +9,7 @@
 @group(0) @binding(5) var<storage, read> counters: Counters;
 @group(0) @binding(6) var<storage, read> slots: array<Slot>;
 @group(0) @binding(7) var<storage, read> small_items: array<SmallItem>;
-@group(0) @binding(8) var<storage, read_write> totals: array<atomic<u32>, 10>;
+@group(0) @binding(8) var<storage, read_write> totals: array<atomic<u32>, 12>;
 @group(0) @binding(9) var<storage, read_write> out: array<u32>;
 
 var<workgroup> first_pairs: array<u32, LANES>;
@@ -32,19 +32,23 @@ fn slot_of(pair: u32, count: u32) -> u32 {
     return low;
 }
 
+// The mark of the lane's hit.
+var<private> mark: u32;
+
 // Tests one pair, cheapest test first, and counts for the report.
 fn is_pair(a: u32, b: u32) -> bool {
     let i = box_of(a);
     let j = box_of(b);
     if !owns(a, b) || !may_be_wanted(a | b) || (params.split > 0u && (i < params.split) == (j < params.split)) {
-        atomicAdd(&tally[1], 1u);
+        note_test(1u, 1u);
         return false;
     }
     if !is_wanted(boxes[i], boxes[j]) {
         return false;
     }
-    atomicAdd(&tally[2], 1u);
-    return (params.flags & FILTERED) == 0u || filters_allow(filters[i], filters[j]);
+    note_test(2u, 1u);
+    mark = mark_of(boxes[i], boxes[j]);
+    return !has_flag(FILTERED) || filters_allow(filters[i], filters[j]);
 }
 
 // Decides, by one lane, how and where the workgroup's hits are written. As records they take `words` words.
@@ -54,7 +58,7 @@ fn place(words: u32) -> Placed {
     if hits == 0u {
         return Placed(NO_SPACE, 0u, 0u, 0u);
     }
-    if (params.flags & PACKED) == 0u || 1u + 2u * hits < words {
+    if !has_flag(PACKED) || 1u + 2u * hits < words {
         return place_plain(hits);
     }
     return Placed(reserve(words, hits), hits, words, 1u);
@@ -98,7 +102,7 @@ fn check_small(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups)
     }
     workgroupBarrier();
     var words = 0u;
-    if (params.flags & PACKED) != 0u {
+    if has_flag(PACKED) {
         // Each lane takes a slot: three words, and one for each hit.
         let hits = atomicLoad(&slot_hits[lane]);
         slot_at[lane] = block_scan(select(0u, 3u + hits, hits > 0u), lane);
@@ -112,7 +116,8 @@ fn check_small(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups)
         return;
     }
     if to.packed == 0u {
-        write_pair(to.at + 2u * rank, box_of(entries[start + pair.x]), box_of(entries[start + pair.y]));
+        write_pair(to.at + 2u * rank, box_of(entries[start + pair.x]), box_of(entries[start + pair.y]),
+            mark);
         return;
     }
     let record = to.at + slot_at[slot];

@@ -7,7 +7,7 @@
 //! ```
 //! let locate = pbig_shaders::LOCATE;
 //! assert_eq!(locate.name, "locate");
-//! assert!(locate.source(false, false).contains("fn locate("));
+//! assert!(locate.source(false).contains("fn locate("));
 //! ```
 
 pub mod study;
@@ -27,13 +27,15 @@ pub enum Buffer {
     BoxChanges,
     /// Filters that have changed since the last update.
     FilterChanges,
+    /// A bit for each box: it has changed since the last update.
+    Changed,
+    /// Number and largest extents of the boxes of each size class.
+    Classes,
     /// Cells and level of each box.
     Located,
-    /// Entries of each cell: counts, then ends of its lists.
+    /// Entries of each cell: counts, then ends of its lists, then their starts.
     Cells,
-    /// First entry of each cell.
-    Starts,
-    /// Entries of each block of cells.
+    /// Entries in the blocks before each block of cells, or pairs before each block of rows.
     Sums,
     /// Lengths of the lists that the device makes.
     Counters,
@@ -51,6 +53,15 @@ pub enum Buffer {
     Totals,
     /// Pairs.
     Out,
+    /// Pairs of each first box: counts, then ends, then starts.
+    Rows,
+    /// Pairs by first box.
+    Grouped,
+    /// Start and end of the rows that are sorted through a bitmap.
+    LongRows,
+    /// Size of the indirect dispatch for these rows. The kernel that counts them is dispatched indirectly itself, and may not
+    /// write what it is dispatched from.
+    LongDispatch,
 }
 
 impl Buffer {
@@ -63,9 +74,10 @@ impl Buffer {
             Self::Filters => "filters",
             Self::BoxChanges => "box_changes",
             Self::FilterChanges => "filter_changes",
+            Self::Changed => "changed",
+            Self::Classes => "classes",
             Self::Located => "located",
             Self::Cells => "cells",
-            Self::Starts => "starts",
             Self::Sums => "sums",
             Self::Counters => "counters",
             Self::Slots => "slots",
@@ -75,6 +87,10 @@ impl Buffer {
             Self::Dispatches => "dispatches",
             Self::Totals => "totals",
             Self::Out => "out",
+            Self::Rows => "rows",
+            Self::Grouped => "grouped",
+            Self::LongRows => "long_rows",
+            Self::LongDispatch => "long_dispatch",
         }
     }
 
@@ -96,22 +112,14 @@ pub struct Kernel {
 }
 
 impl Kernel {
-    /// Returns the whole WGSL text, for devices with or without subgroups, and for a search for changes or for all
-    /// overlaps.
-    pub fn source(&self, subgroups: bool, changes: bool) -> String {
+    /// Returns the whole WGSL text, for a search for changes or for all overlaps.
+    pub fn source(&self, changes: bool) -> String {
         let part = |&part: &&'static str| match part {
-            BLOCK_SCAN if subgroups => BLOCK_SCAN_SUBGROUPS,
             SEARCH_OVERLAPS if changes => SEARCH_CHANGES,
             part => part,
         };
         let parts = self.parts.iter().map(part);
-        // The standard asks for `enable subgroups`. naga 30 does not know that, nor does it need it.
         [TYPES].into_iter().chain(parts).chain([self.body]).collect::<Vec<_>>().join("\n")
-    }
-
-    /// Returns true if there is a faster text for devices with subgroups.
-    pub fn gains_from_subgroups(&self) -> bool {
-        self.parts.contains(&BLOCK_SCAN)
     }
 
     /// Returns true if a search for changes has a text of its own.
@@ -121,9 +129,14 @@ impl Kernel {
 }
 
 const TYPES: &str = include_str!("shared/types.wgsl");
+const FLOATS: &str = include_str!("shared/floats.wgsl");
+const KNOWN_BOX: &str = include_str!("shared/known_box.wgsl");
 const CELLS: &str = include_str!("shared/cells.wgsl");
+const SCANNED: &str = include_str!("shared/scanned.wgsl");
+const ENDS: &str = include_str!("shared/ends.wgsl");
+const DISPATCH: &str = include_str!("shared/dispatch.wgsl");
+const ROWS: &str = include_str!("shared/rows.wgsl");
 const BLOCK_SCAN: &str = include_str!("shared/block_scan.wgsl");
-const BLOCK_SCAN_SUBGROUPS: &str = include_str!("shared/block_scan_subgroups.wgsl");
 const PAIR_INDEX: &str = include_str!("shared/pair_index.wgsl");
 const SEARCH_OVERLAPS: &str = include_str!("shared/search_overlaps.wgsl");
 const SEARCH_CHANGES: &str = include_str!("shared/search_changes.wgsl");
@@ -149,32 +162,43 @@ pub(crate) use kernels;
 kernels! {
     /// Every kernel of a search, in the order in which they run.
     in "";
-    /// Changes: stores each box as the box at the last update.
-    STORE_PREVIOUS "store_previous" [] (Params, Boxes);
     /// Changes: applies the changes of boxes and filters.
-    APPLY_CHANGES "apply_changes" [] (Params, BoxChanges, FilterChanges, Boxes, Filters);
+    APPLY_CHANGES "apply_changes" [] (Params, BoxChanges, FilterChanges, Boxes, Filters, Changed);
+    /// Plan: counts the boxes of each size.
+    MEASURE "measure" [FLOATS, SEARCH_OVERLAPS, KNOWN_BOX] (Params, Boxes, Changed, Classes);
     /// Map: computes the cells and the level of each box, and counts the residents of each cell.
-    LOCATE "locate" [SEARCH_OVERLAPS, CELLS] (Params, Boxes, Located, Cells);
+    LOCATE "locate" [FLOATS, SEARCH_OVERLAPS, KNOWN_BOX, CELLS]
+        (Params, Boxes, Changed, Located, Cells, Counters);
     /// Map: counts the visitors of each cell.
     VISIT "visit" [CELLS] (Params, Located, Cells);
-    /// Map: computes prefix sums within blocks of cells.
-    SCAN_BLOCKS "scan_blocks" [BLOCK_SCAN] (Params, Cells, Starts, Sums);
-    /// Map: computes prefix sums over the blocks.
-    SCAN_SUMS "scan_sums" [BLOCK_SCAN] (Params, Sums, Counters);
-    /// Map: adds both, and computes where the scatter begins.
-    SCAN_ADD "scan_add" [] (Params, Sums, Starts, Cells);
+    /// Scan: computes prefix sums within blocks of lists.
+    SCAN_BLOCKS "scan_blocks" [SCANNED, BLOCK_SCAN] (Params, Cells, Sums);
+    /// Scan: computes prefix sums over the blocks.
+    SCAN_SUMS "scan_sums" [SCANNED, BLOCK_SCAN] (Params, Sums, Counters);
     /// Schedule: turns cells into work items.
-    SCHEDULE "schedule" [BLOCK_SCAN] (Params, Cells, Starts, Slots, SmallItems, LargeItems, Counters);
+    SCHEDULE "schedule" [ENDS, BLOCK_SCAN] (Params, Cells, Sums, Slots, SmallItems, LargeItems, Counters);
     /// Map: scatters boxes into cells.
-    SCATTER "scatter" [CELLS] (Params, Located, Starts, Counters, Cells, Entries);
+    SCATTER "scatter" [ENDS, CELLS] (Params, Located, Sums, Counters, Cells, Entries);
     /// Schedule: computes the sizes of the dispatches that follow.
-    ARRANGE "arrange" [] (Params, Chunk, Counters, Dispatches);
+    ARRANGE "arrange" [DISPATCH] (Params, Chunk, Counters, Dispatches);
     /// Check: tests the pairs of small cells.
-    CHECK_SMALL "check_small" [SEARCH_OVERLAPS, BLOCK_SCAN, PAIR_INDEX, EMIT]
+    CHECK_SMALL "check_small" [FLOATS, SEARCH_OVERLAPS, BLOCK_SCAN, PAIR_INDEX, EMIT]
         (Params, Chunk, Boxes, Filters, Entries, Counters, Slots, SmallItems, Totals, Out);
     /// Check: tests the pairs of large cells.
-    CHECK_LARGE "check_large" [SEARCH_OVERLAPS, EMIT]
+    CHECK_LARGE "check_large" [FLOATS, SEARCH_OVERLAPS, EMIT]
         (Params, Chunk, Boxes, Filters, Entries, Counters, LargeItems, Totals, Out);
     /// Check: tests all pairs, without a grid.
-    CHECK_ALL "check_all" [SEARCH_OVERLAPS, PAIR_INDEX, EMIT] (Params, Chunk, Boxes, Filters, Totals, Out);
+    CHECK_ALL "check_all" [FLOATS, SEARCH_OVERLAPS, KNOWN_BOX, PAIR_INDEX, EMIT]
+        (Params, Chunk, Boxes, Changed, Filters, Totals, Out);
+    /// Sort: computes the sizes of the dispatches that follow.
+    ARRANGE_ROWS "arrange_rows" [ROWS, DISPATCH] (Params, Chunk, Counters, Totals, Dispatches, LongDispatch);
+    /// Sort: counts the pairs of each first box.
+    COUNT_PAIRS "count_pairs" [] (Totals, Out, Rows);
+    /// Sort: groups the pairs by first box.
+    PLACE_PAIRS "place_pairs" [ENDS] (Totals, Out, Sums, Rows, Grouped);
+    /// Sort: orders short rows.
+    RANK_PAIRS "rank_pairs" [ENDS, ROWS]
+        (Params, Totals, Sums, Rows, Grouped, Counters, LongDispatch, LongRows, Out);
+    /// Sort: orders long rows.
+    RANK_LONG_ROWS "rank_long_rows" [ROWS, BLOCK_SCAN] (Counters, Grouped, LongRows, Out);
 }

@@ -1,15 +1,17 @@
 // Map, step 1 (PBIG 4.2, count): computes the cells that each box touches and its level. Counts the residents of each
-// cell: boxes of the cell's own level.
+// cell: boxes of the cell's own level. Brings boxes into the form that the checks need, and counts the valid ones.
 
 @group(0) @binding(0) var<uniform> params: Params;
-@group(0) @binding(1) var<storage, read> boxes: array<KnownBox>;
-@group(0) @binding(2) var<storage, read_write> located: array<Located>;
-@group(0) @binding(3) var<storage, read_write> cells: array<atomic<u32>>;
+@group(0) @binding(1) var<storage, read_write> boxes: array<KnownBox>;
+@group(0) @binding(2) var<storage, read> changed: array<u32>;
+@group(0) @binding(3) var<storage, read_write> located: array<Located>;
+@group(0) @binding(4) var<storage, read_write> cells: array<atomic<u32>>;
+// Counters, as atomics.
+@group(0) @binding(5) var<storage, read_write> counters: array<atomic<u32>, 8>;
 
-// Returns the float of an ordered integer.
-fn float_of(key: i32) -> f32 {
-    return bitcast<f32>(key ^ ((key >> 31u) & 0x7fffffff));
-}
+const VALID = 4u;
+
+var<workgroup> valid: atomic<u32>;
 
 // Returns the cell of a coordinate. Each step is monotone in `key`: clamp, subtraction, multiplication by a positive
 // number, rounding.
@@ -39,15 +41,26 @@ fn level_of(low: vec3<i32>, high: vec3<i32>) -> u32 {
 fn locate(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>,
           @builtin(local_invocation_index) lane: u32) {
     let id = linear(group, groups) * LANES + lane;
-    if id >= params.boxes {
-        return;
+    if id < params.boxes {
+        locate_one(id);
     }
-    let known = boxes[id];
+    workgroupBarrier();
+    if lane == 0u {
+        atomicAdd(&counters[VALID], atomicLoad(&valid));
+    }
+}
+
+fn locate_one(id: u32) {
+    let known = known_box(id);
+    if is_stale(boxes[id], has_changed(id)) {
+        boxes[id] = known;
+    }
     let one = bounds_of(known);
     if one.low[0] > one.high[0] {
         located[id].level = NO_LEVEL;
         return;
     }
+    atomicAdd(&valid, 1u);
     var at: Located;
     for (var axis = 0u; axis < 3u; axis++) {
         at.low[axis] = finest_cell(one.low[axis], axis);

@@ -1,14 +1,14 @@
-// Map, step 4: one workgroup turns the totals of the blocks into prefix sums, and counts all entries.
+// Scan, step 2: one workgroup turns the totals of the blocks into exclusive prefix sums, and counts all entries of cells.
 
 @group(0) @binding(0) var<uniform> params: Params;
 @group(0) @binding(1) var<storage, read_write> sums: array<u32>;
 @group(0) @binding(2) var<storage, read_write> counters: Counters;
 
-const CELLS_PER_BLOCK = 1024u;
+const COUNTS_PER_BLOCK = 1024u;
 
 @compute @workgroup_size(LANES)
 fn scan_sums(@builtin(local_invocation_index) lane: u32) {
-    let blocks = (params.cells + CELLS_PER_BLOCK - 1u) / CELLS_PER_BLOCK;
+    let blocks = (scanned() + COUNTS_PER_BLOCK - 1u) / COUNTS_PER_BLOCK;
     var sum = 0u;
     for (var first = 0u; first < blocks; first += LANES) {
         var value = 0u;
@@ -22,7 +22,7 @@ fn scan_sums(@builtin(local_invocation_index) lane: u32) {
         }
         sum += total;
     }
-    if lane == 0u {
+    if lane == 0u && !ROWS {
         counters.entries = sum;
     }
 }

@@ -3,7 +3,7 @@
 
 @group(0) @binding(0) var<uniform> params: Params;
 @group(0) @binding(1) var<storage, read> located: array<Located>;
-@group(0) @binding(2) var<storage, read> starts: array<u32>;
+@group(0) @binding(2) var<storage, read> sums: array<u32>;
 @group(0) @binding(3) var<storage, read> counters: Counters;
 @group(0) @binding(4) var<storage, read_write> cells: array<atomic<u32>>;
 @group(0) @binding(5) var<storage, read_write> entries: array<u32>;
@@ -25,8 +25,7 @@ fn scatter(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) gro
     var visits_last = false;
     if id < params.boxes && located[id].level != NO_LEVEL {
         let at = located[id];
-        visits_last = own_level(at) < last
-            && atomicLoad(&cells[2u * last_cell + 1u]) > starts[last_cell];
+        visits_last = own_level(at) < last && takes_visitors(last_cell);
         place_all(id, at, last);
     }
     var rank = 0u;
@@ -37,7 +36,7 @@ fn scatter(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) gro
     if lane == 0u {
         let visitors = atomicLoad(&last_visitors);
         if visitors > 0u {
-            last_end = atomicSub(&cells[2u * last_cell + 1u], visitors);
+            last_end = atomicSub(&cells[2u * last_cell + 1u], visitors) + block_start(2u * last_cell);
         }
     }
     let end = workgroupUniformLoad(&last_end);
@@ -60,11 +59,17 @@ fn place_all(id: u32, at: Located, last: u32) {
     }
 }
 
-// Writes an entry. A cell without residents has no visitors counted, so its cursors stay at its start.
+// Returns true if visitors of a cell were counted; asked by a visitor that is not placed yet. Until then the end of the
+// visitors is above that of the residents, whatever was placed. Without residents both stay equal.
+fn takes_visitors(cell: u32) -> bool {
+    return atomicLoad(&cells[2u * cell + 1u]) > atomicLoad(&cells[2u * cell]);
+}
+
+// Writes an entry. Both lists of a cell are counted in one block.
 fn place(cell: u32, entry: u32, resident: bool) {
     if resident {
-        entries[atomicSub(&cells[2u * cell], 1u) - 1u] = entry;
-    } else if atomicLoad(&cells[2u * cell + 1u]) > starts[cell] {
-        entries[atomicSub(&cells[2u * cell + 1u], 1u) - 1u] = entry;
+        entries[block_start(2u * cell) + atomicSub(&cells[2u * cell], 1u) - 1u] = entry;
+    } else if takes_visitors(cell) {
+        entries[block_start(2u * cell) + atomicSub(&cells[2u * cell + 1u], 1u) - 1u] = entry;
     }
 }

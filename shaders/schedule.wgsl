@@ -3,15 +3,19 @@
 
 @group(0) @binding(0) var<uniform> params: Params;
 @group(0) @binding(1) var<storage, read> cells: array<Cell>;
-@group(0) @binding(2) var<storage, read> starts: array<u32>;
+@group(0) @binding(2) var<storage, read> sums: array<u32>;
 @group(0) @binding(3) var<storage, read_write> slots: array<Slot>;
 @group(0) @binding(4) var<storage, read_write> small_items: array<SmallItem>;
 @group(0) @binding(5) var<storage, read_write> large_items: array<LargeItem>;
-// Entries, slots, small items, large items: Counters, as atomics.
-@group(0) @binding(6) var<storage, read_write> counters: array<atomic<u32>, 4>;
+// Counters, as atomics.
+@group(0) @binding(6) var<storage, read_write> counters: array<atomic<u32>, 8>;
 
 const CELLS_PER_LANE = 4u;
 const CELLS_PER_BLOCK = 1024u;
+const SLOTS = 1u;
+const SMALL_ITEMS = 2u;
+const LARGE_ITEMS = 3u;
+const TESTS = 5u;
 
 var<workgroup> slot_base: u32;
 var<workgroup> item_base: u32;
@@ -19,16 +23,31 @@ var<workgroup> large_count: atomic<u32>;
 var<workgroup> large_seen: u32;
 var<workgroup> large_cells: array<u32, CELLS_PER_BLOCK>;
 
+// Returns the first entry of a cell.
+fn start_of(index: u32) -> u32 {
+    if index == 0u {
+        return 0u;
+    }
+    return cells[index - 1u].visitors + block_start(2u * index - 1u);
+}
+
 // Returns the counts of a cell, from the ends of its entries.
 fn counts_of(index: u32) -> Cell {
     let ends = cells[index];
-    return Cell(ends.residents - starts[index], ends.visitors - ends.residents);
+    let before = start_of(index) - block_start(2u * index);
+    return Cell(ends.residents - before, ends.visitors - ends.residents);
 }
 
 // Returns the number of pairs with at least one resident. In Avril's numbering these are the pairs of the first rows.
 fn pairs_of(cell: Cell) -> u32 {
     let n = cell.residents + cell.visitors;
     return cell.residents * (2u * n - cell.residents - 1u) / 2u;
+}
+
+// Returns about as many tests as a large cell needs, in units of LANES.
+fn large_tests(cell: Cell) -> u32 {
+    let n = f32(cell.residents) * f32(cell.residents + 2u * cell.visitors) / f32(2u * LANES);
+    return u32(min(n, 1073741824.0)) + 1u;
 }
 
 fn is_small(cell: Cell) -> bool {
@@ -72,8 +91,10 @@ fn schedule(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) gr
     let all_slots = block_sum();
     if lane == 0u {
         large_seen = atomicLoad(&large_count);
-        slot_base = atomicAdd(&counters[1], all_slots);
-        item_base = atomicAdd(&counters[2], (all_pairs + LANES - 1u) / LANES);
+        slot_base = atomicAdd(&counters[SLOTS], all_slots);
+        let all_items = (all_pairs + LANES - 1u) / LANES;
+        item_base = atomicAdd(&counters[SMALL_ITEMS], all_items);
+        atomicAdd(&counters[TESTS], all_items);
     }
     let base = workgroupUniformLoad(&slot_base);
     let items = workgroupUniformLoad(&item_base);
@@ -88,7 +109,7 @@ fn schedule(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) gr
             continue;
         }
         if base + rank < params.slot_capacity {
-            slots[base + rank] = Slot(starts[first + i], n | (cell.residents << 16u), pair);
+            slots[base + rank] = Slot(start_of(first + i), n | (cell.residents << 16u), pair);
         }
         let end = pair + pairs_of(cell);
         // Writes the items that begin in this cell.
@@ -115,14 +136,16 @@ fn schedule_large(lane: u32) {
         let rows = (cell.residents + LANES - 1u) / LANES;
         let columns = (n + LANES - 1u) / LANES;
         if lane == 0u {
-            item_base = atomicAdd(&counters[3], items_before(rows, columns));
+            item_base = atomicAdd(&counters[LARGE_ITEMS], items_before(rows, columns));
+            atomicAdd(&counters[TESTS], large_tests(cell));
         }
         let items = workgroupUniformLoad(&item_base);
+        let start = start_of(index);
         for (var row = lane; row < rows; row += LANES) {
             var at = items + items_before(row, columns);
             for (var column = row - row % params.columns; column < columns; column += params.columns) {
                 if at < params.large_capacity {
-                    large_items[at] = LargeItem(starts[index], n, cell.residents, row,
+                    large_items[at] = LargeItem(start, n, cell.residents, row,
                         max(column, row), min(column + params.columns, columns));
                 }
                 at += 1u;

@@ -1,6 +1,6 @@
 // Emit: counts and output of the check kernels. docs/PAIR_FORMAT.md defines the words.
 
-// Indices into `totals`. Each count has a low and a high half, because pairs may be more than 2^32.
+// Indices into `totals`, see Totals. Each count has a low and a high half, because pairs may be more than 2^32.
 const WORDS = 0u;
 const PAIRS = 1u;
 const MADE = 2u;
@@ -18,28 +18,44 @@ fn add_total(index: u32, amount: u32) -> u32 {
     return before;
 }
 
+// Returns true if a bit of the flags is set.
+fn has_flag(flag: u32) -> bool {
+    return (params.flags & flag) != 0u;
+}
+
 // Place of output that does not fit: nothing is written.
 const NO_SPACE = 0xffffffffu;
 
-// Reserves words for the workgroup (PBIG algorithm 2, line 27), by one lane. The counter runs past the capacity, so the
-// host knows how many words are needed.
+// Reserves words for the workgroup (PBIG algorithm 2, line 27), by one lane: for plain pairs one atomic operation in all. The
+// counter runs past the capacity, so the host knows how many words are needed. Records do not tell the number of pairs.
 fn reserve(words: u32, pairs: u32) -> u32 {
     let at = add_total(WORDS, words);
-    add_total(PAIRS, pairs);
+    if has_flag(PACKED) {
+        add_total(PAIRS, pairs);
+    }
     let fits = at <= chunk.word_capacity && words <= chunk.word_capacity - at;
     return select(NO_SPACE, at, fits);
 }
 
+// Returns both halves of the number of pairs so far. They are read one after the other. A carry in between can only happen
+// long after the output has overflowed.
+fn pairs_so_far() -> vec2<u32> {
+    if has_flag(PACKED | BITS) {
+        return vec2<u32>(atomicLoad(&totals[2u * PAIRS]), atomicLoad(&totals[2u * PAIRS + 1u]));
+    }
+    let low = atomicLoad(&totals[2u * WORDS]);
+    let high = atomicLoad(&totals[2u * WORDS + 1u]);
+    return vec2<u32>((low >> 1u) | (high << 31u), high >> 1u);
+}
+
 var<workgroup> is_over_limit: u32;
 
-// Returns true if the call has passed its limit of pairs, so the rest need not be tested. The two halves are read one
-// after the other. A carry in between can only happen long after the output has overflowed.
+// Returns true if the call has passed its limit of pairs, so the rest need not be tested.
 fn beyond_limit(lane: u32) -> bool {
     if lane == 0u {
-        let low = atomicLoad(&totals[2u * PAIRS]);
-        let high = atomicLoad(&totals[2u * PAIRS + 1u]);
+        let found = pairs_so_far();
         let left = chunk.pairs_left;
-        is_over_limit = u32(high > left.y || (high == left.y && low > left.x));
+        is_over_limit = u32(found.y > left.y || (found.y == left.y && found.x > left.x));
     }
     return workgroupUniformLoad(&is_over_limit) != 0u;
 }
@@ -49,8 +65,18 @@ const HITS = 3u;
 const ROW_WORDS = 4u;
 var<workgroup> tally: array<atomic<u32>, 5>;
 
+// Counts a test of a lane, if tests are counted.
+fn note_test(index: u32, amount: u32) {
+    if has_flag(COUNTED) {
+        atomicAdd(&tally[index], amount);
+    }
+}
+
 // Adds the tests to the totals, by one lane, after a barrier.
 fn add_tests() {
+    if !has_flag(COUNTED) {
+        return;
+    }
     for (var i = 0u; i < 3u; i++) {
         let sum = atomicExchange(&tally[i], 0u);
         if sum > 0u {
@@ -72,7 +98,7 @@ var<workgroup> placed: Placed;
 
 // Reserves plain pairs, behind a mark if the output has records.
 fn place_plain(hits: u32) -> Placed {
-    let mark = u32((params.flags & PACKED) != 0u);
+    let mark = u32(has_flag(PACKED));
     let at = reserve(mark + 2u * hits, hits);
     if mark != 0u && at != NO_SPACE {
         out[at] = PLAIN | hits;
@@ -80,7 +106,8 @@ fn place_plain(hits: u32) -> Placed {
     return Placed(select(at + mark, NO_SPACE, at == NO_SPACE), hits, 2u * hits, 0u);
 }
 
-fn write_pair(at: u32, a: u32, b: u32) {
+// Writes a pair. `mark` tells an update's ended pairs from its new ones.
+fn write_pair(at: u32, a: u32, b: u32, mark: u32) {
     out[at] = min(a, b);
-    out[at + 1u] = max(a, b);
+    out[at + 1u] = max(a, b) | mark;
 }

@@ -3,6 +3,16 @@
 
 alias KnownBox = Motion;
 
+// Returns true if a stored box is not yet as the checks need it: an earlier update has changed it, this one has not.
+fn is_stale(one: KnownBox, has_changed: bool) -> bool {
+    return !has_changed && has_moved(one);
+}
+
+// Returns a stale box as the checks need it.
+fn renewed(one: KnownBox) -> KnownBox {
+    return Motion(one.now, one.now);
+}
+
 fn low_corner(one: DeviceBox) -> vec3<i32> {
     return vec3<i32>(one.low[0], one.low[1], one.low[2]);
 }
@@ -31,4 +41,9 @@ fn may_be_wanted(marks: u32) -> bool {
 
 fn is_wanted(a: KnownBox, b: KnownBox) -> bool {
     return overlap(a.now, b.now) != overlap(a.before, b.before);
+}
+
+// Returns the mark of a wanted pair in the output.
+fn mark_of(a: KnownBox, b: KnownBox) -> u32 {
+    return select(ENDED, 0u, overlap(a.now, b.now));
 }

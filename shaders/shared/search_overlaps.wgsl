@@ -2,6 +2,16 @@
 
 alias KnownBox = DeviceBox;
 
+// Returns true if a stored box is not yet as the checks need it.
+fn is_stale(one: KnownBox, has_changed: bool) -> bool {
+    return (params.flags & RAW) != 0u;
+}
+
+// Returns a stale box as the checks need it.
+fn renewed(one: KnownBox) -> KnownBox {
+    return ordered_box(one);
+}
+
 // Returns the box whose cells the known box is sorted into.
 fn bounds_of(one: KnownBox) -> DeviceBox {
     return one;
@@ -19,4 +29,9 @@ fn may_be_wanted(marks: u32) -> bool {
 // Returns true if a pair is wanted, by its boxes.
 fn is_wanted(a: KnownBox, b: KnownBox) -> bool {
     return overlap(a, b);
+}
+
+// Returns the mark of a wanted pair in the output.
+fn mark_of(a: KnownBox, b: KnownBox) -> u32 {
+    return 0u;
 }

@@ -13,6 +13,12 @@ const NO_LEVEL = 0xffffffffu;
 const FILTERED = 1u;
 const PACKED = 2u;
 const BITS = 4u;
+// The boxes are floats; `locate` turns them into ordered integers.
+const RAW = 8u;
+// Plain pairs are sorted, if one chunk has them all.
+const SORTED = 16u;
+// The checks count redundant tests and overlaps.
+const COUNTED = 32u;
 
 // An AABB whose coordinates are integers in the order of the floats. Comparisons of integers are exact on every device,
 // whatever it does to denormals, infinities and NaN. An invalid box has all of `low` above all of `high`.
@@ -21,7 +27,12 @@ struct DeviceBox {
     high: array<i32, 3>,
 }
 
-// A box now and at the last update.
+const NOWHERE = DeviceBox(
+    array<i32, 3>(0x7fffffff, 0x7fffffff, 0x7fffffff),
+    array<i32, 3>(-0x7fffffff - 1, -0x7fffffff - 1, -0x7fffffff - 1),
+);
+
+// A box now and at the last update. Unless Params says that the box has changed, `before` may be older.
 struct Motion {
     now: DeviceBox,
     before: DeviceBox,
@@ -85,6 +96,12 @@ struct Params {
     known: u32,
     box_changes: u32,
     filter_changes: u32,
+    // Number of pairs that can be sorted.
+    pair_capacity: u32,
+    // Counters.tests beyond which nothing is checked: the grid was made for other boxes.
+    most_tests: u32,
+    unused0: u32,
+    unused1: u32,
     level: array<Level, MAX_LEVELS>,
 }
 
@@ -102,7 +119,8 @@ struct Chunk {
 }
 
 // Entries of a cell. Residents are boxes of the cell's own level, visitors those of finer levels. Two visitors meet in a
-// cell of their own levels. Until scan_add these are counts, then the ends of both lists of entries.
+// cell of their own levels. Until the scan these are counts, then the ends of both lists of entries (ends.wgsl), and after
+// the scatter their starts.
 struct Cell {
     residents: u32,
     visitors: u32,
@@ -142,12 +160,32 @@ struct Counters {
     slots: u32,
     small_items: u32,
     large_items: u32,
+    // Number of valid boxes.
+    valid: u32,
+    // Tests that the checks may make, in units of LANES.
+    tests: u32,
+    // Rows of more than SHORT_ROW pairs.
+    long_rows: u32,
+    unused: u32,
+}
+
+// Counts of the checks, in two halves each, and 1 if the pairs are sorted.
+struct Totals {
+    words: vec2<u32>,
+    pairs: vec2<u32>,
+    made: vec2<u32>,
+    redundant: vec2<u32>,
+    overlaps: vec2<u32>,
+    sorted: u32,
+    unused: u32,
 }
 
 // Bits of an entry of a cell: the box, MOVED, and for each axis a bit that is set if this is the box's lowest cell there.
 const BOX_BITS = 28u;
 const AXIS_BITS = 29u;
 const MOVED = 1u << BOX_BITS;
+// Bit of the second id of a pair of output: the boxes overlapped at the last update, and no longer do.
+const ENDED = 0x80000000u;
 // Bit of BoxChange.marked_id: at the last update the box overlapped nothing.
 const WAS_ABSENT = 0x80000000u;
 

@@ -4,19 +4,17 @@
 use naga::valid::{Capabilities, ValidationFlags, Validator};
 use pbig_shaders::{Buffer, KERNELS, Kernel, study};
 
-fn parse(kernel: &Kernel, subgroups: bool, changes: bool) -> naga::Module {
-    let source = kernel.source(subgroups, changes);
+fn parse(kernel: &Kernel, changes: bool) -> naga::Module {
+    let source = kernel.source(changes);
     naga::front::wgsl::parse_str(&source)
         .unwrap_or_else(|error| panic!("{}: {}", kernel.name, error.emit_to_string(&source)))
 }
 
-fn validate(kernel: &Kernel, subgroups: bool, changes: bool) -> naga::Module {
-    let module = parse(kernel, subgroups, changes);
-    let capabilities = if subgroups { Capabilities::SUBGROUP } else { Capabilities::empty() };
-    let result = Validator::new(ValidationFlags::all(), capabilities).validate(&module);
-    result.unwrap_or_else(|error| {
-        panic!("{}: {}", kernel.name, error.emit_to_string(&kernel.source(subgroups, changes)))
-    });
+fn validate(kernel: &Kernel, changes: bool) -> naga::Module {
+    let module = parse(kernel, changes);
+    let result = Validator::new(ValidationFlags::all(), Capabilities::empty()).validate(&module);
+    result
+        .unwrap_or_else(|error| panic!("{}: {}", kernel.name, error.emit_to_string(&kernel.source(changes))));
     module
 }
 
@@ -28,19 +26,17 @@ fn texts() -> impl Iterator<Item = (&'static &'static Kernel, bool)> {
 #[test]
 fn every_text_of_every_kernel_is_valid() {
     for (kernel, changes) in texts() {
-        validate(kernel, false, changes);
-        validate(kernel, true, changes);
-        let texts = [kernel.source(true, false), kernel.source(true, true)];
+        validate(kernel, changes);
+        let texts = [kernel.source(false), kernel.source(true)];
         assert_eq!(texts[0] != texts[1], kernel.depends_on_search(), "{}", kernel.name);
     }
-    assert!(KERNELS.iter().any(|kernel| kernel.gains_from_subgroups()));
     assert!(KERNELS.iter().any(|kernel| kernel.depends_on_search()));
 }
 
 #[test]
 fn bindings_are_numbered_as_listed_and_there_are_no_others() {
     for (kernel, changes) in texts() {
-        let module = validate(kernel, false, changes);
+        let module = validate(kernel, changes);
         let mut bound: Vec<(u32, String)> = module
             .global_variables
             .iter()
@@ -77,7 +73,7 @@ fn the_lists_of_kernels_are_the_lists_of_files() {
 #[test]
 fn uniform_buffers_are_the_ones_that_say_so() {
     for (kernel, changes) in texts() {
-        let module = validate(kernel, false, changes);
+        let module = validate(kernel, changes);
         for (_, variable) in module.global_variables.iter().filter(|(_, v)| v.binding.is_some()) {
             let is_uniform = variable.space == naga::AddressSpace::Uniform;
             let name = variable.name.as_deref();
@@ -90,7 +86,7 @@ fn uniform_buffers_are_the_ones_that_say_so() {
 #[test]
 fn kernels_stay_within_the_limits_that_every_device_has() {
     for (kernel, changes) in texts() {
-        let module = validate(kernel, false, changes);
+        let module = validate(kernel, changes);
         let entry = &module.entry_points[0];
         assert_eq!((module.entry_points.len(), entry.name.as_str()), (1, kernel.name));
         assert!(entry.workgroup_size.iter().product::<u32>() <= 256, "{}: invocations", kernel.name);

@@ -1,6 +1,6 @@
 //! Contract 1: every strategy returns the oracle's pairs, sorted, whatever the boxes and threads.
 
-use pbig_core::{Aabb, Coding, Config, Error, Finder, Limits, Order, Pair, ProxyFilter, oracle};
+use pbig_core::{Aabb, Backend, Coding, Config, Error, Finder, Limits, Order, Pair, ProxyFilter, oracle};
 use pbig_harness::boxes::BoxSet;
 use pbig_harness::pbig_grid::pbig_grid;
 use pbig_tests::{corpus, difference, gpu, may_run, pbig_grids, strategies};
@@ -21,8 +21,10 @@ pub(crate) fn check_on(strategies: Vec<(&str, Config)>, name: &str, boxes: &[Aab
         assert_eq!(report.fallback, None, "{name}, {strategy}: a GPU's work must not be done by the CPU");
         assert_eq!((report.boxes, report.invalid), (boxes.len() as u64, invalid), "{name}, {strategy}");
         assert_eq!(report.pairs, wanted.len() as u64);
-        let useful = report.checks.made - report.checks.unnecessary - report.checks.redundant;
-        assert_eq!(useful, wanted.len() as u64, "{name}, {strategy}: each pair has one useful check");
+        if config.backend != Backend::Gpu || config.gpu.count_tests {
+            let useful = report.checks.made - report.checks.unnecessary - report.checks.redundant;
+            assert_eq!(useful, wanted.len() as u64, "{name}, {strategy}: each pair has one useful check");
+        }
     }
 }
 

@@ -5,9 +5,8 @@ mod failures;
 mod turns;
 
 use pbig_core::gpu::adapters;
-use pbig_core::layout::DeviceBox;
 use pbig_core::{
-    Aabb, Backend, BroadPhase, Coding, Config, Finder, GpuFinder, GpuOptions, GpuReport, NoGpu, Pair,
+    Aabb, Backend, BroadPhase, Coding, Config, Finder, GpuFinder, GpuOptions, GpuReport, NoGpu, Order, Pair,
     ProxyFilter,
 };
 use pbig_harness::boxes::BoxSet;
@@ -19,7 +18,7 @@ fn set(name: &str, n: usize) -> Vec<Aabb> {
 
 /// Returns settings for a device that always makes a grid.
 fn with(options: GpuOptions) -> Config {
-    Config { gpu: GpuOptions { all_pairs_up_to: 0, ..options }, ..gpu(options.coding) }
+    Config { gpu: GpuOptions { all_pairs_up_to: 0, count_tests: true, ..options }, ..gpu(options.coding) }
 }
 
 /// Returns the pairs, which a device must have found, and its report.
@@ -198,7 +197,7 @@ fn a_small_scene_needs_no_grid_and_may_answer_in_bits() {
 fn packed_output_is_an_eighth_of_plain_where_boxes_crowd_and_is_chosen_when_it_pays() {
     needs_gpu!();
     let boxes = cubes(1500);
-    let mut finder = Finder::new(with(GpuOptions::DEFAULT));
+    let mut finder = Finder::new(Config { order: Order::Unspecified, ..with(GpuOptions::DEFAULT) });
     assert_eq!(find(&mut finder, &boxes).1.compression, 1.0, "nothing is known in the first call");
     let (_, report) = find(&mut finder, &boxes);
     assert!(report.compression < 0.14, "{}", report.compression);
@@ -208,17 +207,44 @@ fn packed_output_is_an_eighth_of_plain_where_boxes_crowd_and_is_chosen_when_it_p
 }
 
 #[test]
-fn only_what_changed_is_sent() {
+fn a_call_sends_each_box_once_and_gets_each_pair_once_in_order() {
     needs_gpu!();
     let mut boxes = set("unit", 20_000);
     let mut finder = Finder::new(with(GpuOptions::DEFAULT));
     let all = size_of_val(boxes.as_slice()) as u64;
-    assert_eq!(find(&mut finder, &boxes).1.uploaded, all);
-    assert_eq!(find(&mut finder, &boxes).1.uploaded, 0);
-    boxes[777] = boxes[778];
-    let (pairs, report) = find(&mut finder, &boxes);
-    assert_eq!(report.uploaded, 256 * size_of::<DeviceBox>() as u64);
-    assert_eq!(difference(&pairs, &on_cpu(&boxes)), None);
+    for _ in 0..3 {
+        let (pairs, report) = find(&mut finder, &boxes);
+        assert_eq!(report.uploaded, all);
+        assert_eq!(difference(&pairs, &on_cpu(&boxes)), None);
+        assert!(report.kernels.iter().any(|(name, _)| *name == "rank_pairs"), "{:?}", report.kernels);
+        boxes[777] = boxes[778];
+    }
+    let (_, report) = find(&mut finder, &boxes);
+    let pairs = finder.pairs().len() as u64;
+    assert!(report.downloaded <= 1000 + 8 * pairs * 5 / 4, "{} bytes for {pairs} pairs", report.downloaded);
+}
+
+/// A plan that was made for other boxes must not keep the device busy: it is noticed before anything is tested.
+#[test]
+fn boxes_that_jump_into_one_place_or_far_apart_get_another_plan_in_the_same_call() {
+    needs_gpu!();
+    let spread = set("unit", 20_000);
+    let factor = |boxes: &[Aabb], by: f32| -> Vec<Aabb> {
+        boxes.iter().map(|b| Aabb::from_center(b.min.map(|x| x * by), [0.001; 3])).collect()
+    };
+    let mut finder = Finder::new(Config { order: Order::Unspecified, ..with(GpuOptions::DEFAULT) });
+    let mut plans = Vec::new();
+    for boxes in [&spread, &factor(&spread, 1e-3), &factor(&spread, 1e4), &spread, &spread] {
+        let (mut pairs, _) = find(&mut finder, boxes);
+        pairs.sort_unstable();
+        assert_eq!(difference(&pairs, &on_cpu(boxes)), None);
+        let report = finder.report();
+        let useful = boxes.len() as u64 + pairs.len() as u64;
+        assert!(report.checks.made < 100 * useful, "{} tests, {}", report.checks.made, report.plan);
+        plans.push(report.plan.to_string());
+    }
+    assert_ne!(plans[0], plans[1]);
+    assert_eq!(plans[3], plans[4], "a plan that suits is kept");
 }
 
 #[test]

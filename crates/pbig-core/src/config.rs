@@ -119,6 +119,9 @@ pub struct GpuOptions {
     /// Most boxes of a set whose pairs are all tested, without a grid. 0: there is always a grid. Avril's table 7 puts the
     /// crossover at 1000.
     pub all_pairs_up_to: u32,
+    /// If true, the device counts the tests that it makes, those that repeat another and those of boxes that are apart. It
+    /// costs four more atomic operations for each workgroup.
+    pub count_tests: bool,
 }
 
 impl GpuOptions {
@@ -137,6 +140,7 @@ impl GpuOptions {
         cell_rule: CellRule::Objective,
         small_cell: 32,
         all_pairs_up_to: 1024,
+        count_tests: false,
     };
 }
 

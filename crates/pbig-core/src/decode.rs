@@ -3,8 +3,10 @@
 //! Words that break the format give an error, never a panic: the output of a device is untrusted input.
 
 use crate::Pair;
-use crate::layout::{BOX_BITS, LANES};
+use crate::layout::{BOX_BITS, ENDED, LANES};
 use rayon::prelude::*;
+use std::ops::Range;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Words that break the format.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
@@ -22,47 +24,110 @@ pub const PLAIN: u32 = 1 << 31;
 /// Number of words that a thread decodes at a time.
 const PIECE: usize = 1 << 15;
 
-/// Decodes plain pairs: two ids each, the smaller first.
+/// Appends plain pairs: two ids each, the smaller first. If `is_sorted`, they must be in order.
 ///
 /// # Errors
-/// If the number of words is odd, or a pair is not `a < b < boxes`.
-pub fn plain(words: &[u32], boxes: u32) -> Result<Vec<Vec<Pair>>, DecodeError> {
-    if !words.len().is_multiple_of(2) {
-        return Err(DecodeError { what: "half a pair", at: words.len() });
-    }
-    let pieces = words.par_chunks(PIECE).enumerate();
-    pieces.map(|(i, piece)| plain_piece(piece, boxes, i * PIECE)).collect()
-}
-
-fn plain_piece(words: &[u32], boxes: u32, at: usize) -> Result<Vec<Pair>, DecodeError> {
-    let pair = |(i, two): (usize, &[u32])| {
-        let (a, b) = (two[0], two[1]);
-        let wrong = DecodeError { what: "not a < b < boxes", at: at + 2 * i };
-        if a < b && b < boxes { Ok(Pair { a, b }) } else { Err(wrong) }
+/// If the number of words is odd, a pair is not `a < b < boxes`, or the order is broken. Then some pairs were appended.
+pub fn plain(words: &[u32], boxes: u32, is_sorted: bool, pairs: &mut Vec<Pair>) -> Result<(), DecodeError> {
+    let given = whole_pairs(words)?;
+    let fault = |i: usize| match given[i] {
+        Pair { a, b } if a >= b || b >= boxes => Some("not a < b < boxes"),
+        pair if is_sorted && i > 0 && given[i - 1] >= pair => Some("pairs out of order"),
+        _ => None,
     };
-    words.chunks_exact(2).enumerate().map(pair).collect()
+    let is_faulty = AtomicBool::new(false);
+    // Copied in the same pass: the words may lie in memory of a device.
+    pairs.par_extend((0..given.len()).into_par_iter().with_min_len(PIECE).map(|i| {
+        if fault(i).is_some() {
+            is_faulty.store(true, Ordering::Relaxed);
+        }
+        given[i]
+    }));
+    if !is_faulty.into_inner() {
+        return Ok(());
+    }
+    let first = (0..given.len()).find_map(|i| Some((fault(i)?, i)));
+    first.map_or(Ok(()), |(what, i)| Err(DecodeError { what, at: 2 * i }))
 }
 
-/// Decodes records. They name boxes by their index in `entries`, the boxes of all cells.
+fn whole_pairs(words: &[u32]) -> Result<&[Pair], DecodeError> {
+    let half = DecodeError { what: "half a pair", at: words.len() };
+    bytemuck::try_cast_slice(words).map_err(|_| half)
+}
+
+/// Appends the pairs of an update to those that were added or to those that ended, by their marks ([`ENDED`]).
 ///
 /// # Errors
-/// If a record is cut off, or names an entry or a box that does not exist.
-pub fn records(words: &[u32], entries: &[u32], boxes: u32) -> Result<Vec<Vec<Pair>>, DecodeError> {
+/// As [`plain`].
+pub fn events(
+    words: &[u32],
+    boxes: u32,
+    added: &mut Vec<Pair>,
+    ended: &mut Vec<Pair>,
+) -> Result<(), DecodeError> {
+    for (i, &Pair { a, b: marked }) in whole_pairs(words)?.iter().enumerate() {
+        let b = marked & !ENDED;
+        if a >= b || b >= boxes {
+            return Err(DecodeError { what: "not a < b < boxes", at: 2 * i });
+        }
+        let list = if b == marked { &mut *added } else { &mut *ended };
+        list.push(Pair { a, b });
+    }
+    Ok(())
+}
+
+/// Appends the pairs of records. They name boxes by their index in `entries`, the boxes of all cells.
+///
+/// # Errors
+/// If a record is cut off, or names an entry or a box that does not exist. Then nothing useful was appended.
+pub fn records(words: &[u32], entries: &[u32], boxes: u32, pairs: &mut Vec<Pair>) -> Result<(), DecodeError> {
     let pieces = pieces(words)?;
-    pieces
-        .into_par_iter()
-        .map(|range| {
-            let mut reader = Reader { words, entries, boxes, at: range.start, pairs: Vec::new() };
-            while reader.at < range.end {
-                reader.record()?;
-            }
-            Ok(reader.pairs)
-        })
-        .collect()
+    let counts: Vec<usize> = pieces.par_iter().map(|piece| count(words, piece)).collect();
+    let start = pairs.len();
+    pairs.resize(start + counts.iter().sum::<usize>(), Pair::default());
+    let (mut places, mut rest) = (Vec::new(), &mut pairs[start..]);
+    for count in counts {
+        let (place, behind) = rest.split_at_mut(count);
+        places.push(place);
+        rest = behind;
+    }
+    pieces.into_par_iter().zip(places).try_for_each(|(range, place)| {
+        let mut reader = Reader { words, entries, boxes, at: range.start, places: place.iter_mut() };
+        while reader.at < range.end {
+            reader.record()?;
+        }
+        Ok(())
+    })
+}
+
+/// Returns the number of pairs of whole records, if no row is longer than its record.
+fn count(words: &[u32], range: &Range<usize>) -> usize {
+    let (mut at, mut pairs) = (range.start, 0);
+    while at < range.end {
+        let end = at + record_len(words[at]);
+        if words[at] & PLAIN != 0 {
+            pairs += (end - at - 1) / 2;
+            at = end;
+            continue;
+        }
+        at += 3;
+        while at < end {
+            let partners = (words[at] >> 8 & 0xFF) as usize + 1;
+            pairs += partners;
+            at += row_len(partners);
+        }
+        at = end;
+    }
+    pairs
+}
+
+/// Returns the number of words of a row with so many partners.
+fn row_len(partners: usize) -> usize {
+    (partners + 2).div_ceil(4)
 }
 
 /// Cuts the words between records into pieces of about [`PIECE`] words.
-fn pieces(words: &[u32]) -> Result<Vec<std::ops::Range<usize>>, DecodeError> {
+fn pieces(words: &[u32]) -> Result<Vec<Range<usize>>, DecodeError> {
     let (mut pieces, mut start, mut at) = (Vec::new(), 0, 0);
     while at < words.len() {
         at += record_len(words[at]);
@@ -87,7 +152,8 @@ struct Reader<'a> {
     entries: &'a [u32],
     boxes: u32,
     at: usize,
-    pairs: Vec<Pair>,
+    /// Places for the pairs, as many as [`count`] has counted.
+    places: std::slice::IterMut<'a, Pair>,
 }
 
 impl Reader<'_> {
@@ -96,7 +162,13 @@ impl Reader<'_> {
         let first = self.words[self.at];
         let end = self.at + record_len(first);
         if first & PLAIN != 0 {
-            self.pairs.extend(plain_piece(&self.words[self.at + 1..end], self.boxes, self.at + 1)?);
+            for i in (self.at + 1..end).step_by(2) {
+                let (a, b) = (self.words[i], self.words[i + 1]);
+                if a >= b || b >= self.boxes {
+                    return Err(DecodeError { what: "not a < b < boxes", at: i });
+                }
+                self.write(Pair { a, b });
+            }
             self.at = end;
             return Ok(());
         }
@@ -117,7 +189,7 @@ impl Reader<'_> {
         let at = self.at;
         let [row, more, ..] = self.words[at].to_le_bytes();
         let partners = usize::from(more) + 1;
-        self.at += (partners + 2).div_ceil(4);
+        self.at += row_len(partners);
         if self.at > end {
             return Err(DecodeError { what: "a row is cut off", at });
         }
@@ -128,9 +200,15 @@ impl Reader<'_> {
             if one == other {
                 return Err(DecodeError { what: "a box paired with itself", at });
             }
-            self.pairs.push(Pair::new(one, other));
+            self.write(Pair::new(one, other));
         }
         Ok(())
+    }
+
+    fn write(&mut self, pair: Pair) {
+        if let Some(place) = self.places.next() {
+            *place = pair;
+        }
     }
 
     fn id(&self, place: usize) -> Result<u32, DecodeError> {
@@ -144,16 +222,15 @@ pub(crate) fn pair_count(boxes: u32) -> u64 {
     u64::from(boxes) * u64::from(boxes.saturating_sub(1)) / 2
 }
 
-/// Decodes one bit for each pair of `boxes` boxes, in Avril's numbering: (0, 1), (0, 2), .., (1, 2), ..
+/// Appends, in order, the pairs of one bit for each pair of `boxes` boxes, in Avril's numbering: (0, 1), (0, 2), .., (1, 2), ..
 ///
 /// # Errors
 /// If the number of words is not that of the pairs' bits, or if a bit beyond the last pair is set.
-pub fn bits(words: &[u32], boxes: u32) -> Result<Vec<Vec<Pair>>, DecodeError> {
+pub fn bits(words: &[u32], boxes: u32, pairs: &mut Vec<Pair>) -> Result<(), DecodeError> {
     let all = pair_count(boxes);
     if words.len() as u64 != all.div_ceil(32) {
         return Err(DecodeError { what: "not one bit a pair", at: words.len() });
     }
-    let mut pairs = Vec::new();
     // The row of pairs (a, b) of the last bit, and the numbers of the row's pairs.
     let (mut a, mut row) = (0, 0..u64::from(boxes).saturating_sub(1));
     for (at, &word) in words.iter().enumerate() {
@@ -171,5 +248,5 @@ pub fn bits(words: &[u32], boxes: u32) -> Result<Vec<Vec<Pair>>, DecodeError> {
             pairs.push(Pair { a, b: a + 1 + (k - row.start) as u32 });
         }
     }
-    Ok(vec![pairs])
+    Ok(())
 }

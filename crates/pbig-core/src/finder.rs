@@ -106,21 +106,27 @@ impl Finder {
         if !is_found {
             self.all_pairs.find(&request, &mut self.grid, &mut self.report)?;
             self.report.plan.no_gpu = no_gpu;
+            self.emit(grouping);
         }
-        self.emit(grouping);
         self.report.pairs = self.pairs.len() as u64;
         Ok(&self.pairs)
     }
 
-    /// Leaves the pairs where a search on the CPU leaves them, if a device has found them.
+    /// Returns true if a device has found the pairs.
     #[cfg(feature = "gpu")]
     fn find_on_gpu(&mut self, request: &Request<'_>) -> Result<bool, Error> {
         let Request { boxes, filters, config, grouping } = *request;
         let request = SearchRequest { boxes, filters, changes: None, config };
-        let found = self.gpu.call(&mut self.report, |gpu| gpu.find(&request))?;
+        let pairs = std::mem::take(&mut self.pairs);
+        let found = self.gpu.call(&mut self.report, |gpu| gpu.find(&request, pairs))?;
         let Some(found) = found else { return Ok(false) };
         self.report.invalid = boxes.len() as u64 - u64::from(found.valid);
-        self.all_pairs.take(found.pairs, grouping);
+        if found.is_sorted || grouping.is_none() {
+            self.pairs = found.pairs;
+        } else {
+            self.all_pairs.take(vec![found.pairs], grouping);
+            self.emit(grouping);
+        }
         Ok(true)
     }
 

@@ -15,14 +15,22 @@ pub const MAX_SPAN: u32 = 4;
 pub const FEWEST_CELLS: u32 = 2 * MAX_SPAN;
 /// Level of an invalid box.
 pub const NO_LEVEL: u32 = u32::MAX;
-/// Number of cells of a workgroup of the scan and of the schedule.
+/// Number of cells of a workgroup of the schedule.
 pub const CELLS_PER_BLOCK: u32 = 4 * LANES;
+/// Number of lists of a workgroup of the scan.
+pub const COUNTS_PER_BLOCK: u32 = 4 * LANES;
+/// Most pairs of a row that is ordered by counting.
+pub const SHORT_ROW: u32 = 512;
+/// Second boxes of a long row that a workgroup orders.
+pub const WINDOW: u32 = 32_768;
 /// Number of bits of an entry for the box. Above them are [`MOVED`] and the axes.
 pub const BOX_BITS: u32 = 28;
 /// The first of three bits of an entry, one for each axis. A bit is set if this is the box's lowest cell on the axis.
 pub const AXIS_BITS: u32 = 29;
 /// Bit of an entry and of [`Located::level`] in a search for changes: the box has changed.
 pub const MOVED: u32 = 1 << BOX_BITS;
+/// Bit of the second id of a pair of output: the boxes overlapped at the last update, and no longer do.
+pub const ENDED: u32 = 1 << 31;
 /// Bit of [`BoxChange::marked_id`]: at the last update the box overlapped nothing.
 pub const WAS_ABSENT: u32 = 1 << 31;
 /// Bit of [`Params::flags`]: filters are tested.
@@ -31,6 +39,12 @@ pub const FILTERED: u32 = 1;
 pub const PACKED: u32 = 2;
 /// Bit of [`Params::flags`]: the output of `check_all` is one bit a pair.
 pub const BITS: u32 = 4;
+/// Bit of [`Params::flags`]: the boxes are floats.
+pub const RAW: u32 = 8;
+/// Bit of [`Params::flags`]: plain pairs are sorted, if one chunk has them all.
+pub const SORTED: u32 = 16;
+/// Bit of [`Params::flags`]: redundant tests and overlaps are counted.
+pub const COUNTED: u32 = 32;
 
 /// Declares structs of plain 32-bit numbers.
 macro_rules! shared_structs {
@@ -61,14 +75,15 @@ shared_structs! {
         origin: [f32; 3], scale: f32, clamp_low: [i32; 3], boxes: u32, clamp_high: [i32; 3], levels: u32,
         cells: u32, small_cell: u32, columns: u32, flags: u32, split: u32,
         entry_capacity: u32, slot_capacity: u32, small_capacity: u32, large_capacity: u32,
-        known: u32, box_changes: u32, filter_changes: u32, level: [Level; MAX_LEVELS]
+        known: u32, box_changes: u32, filter_changes: u32, pair_capacity: u32,
+        most_tests: u32, unused: [u32; 2], level: [Level; MAX_LEVELS]
     }
     /// Range of the work items of one dispatch of the check kernels.
     Chunk {
         first_small: u32, small_items: u32, first_large: u32, large_items: u32,
         word_capacity: u32, unused: u32, pairs_left: [u32; 2]
     }
-    /// Entries of a cell by kind: until `scan_add` counts, then the ends of both lists.
+    /// Entries of a cell by kind: until the scan counts, then the ends of both lists, then their starts.
     Cell { residents: u32, visitors: u32 }
     /// A small cell in the schedule.
     #[derive(Eq, PartialOrd, Ord)]
@@ -79,12 +94,17 @@ shared_structs! {
     /// A work item: a segment of rows of a large cell against some segments of columns.
     #[derive(Eq, PartialOrd, Ord)]
     LargeItem { start: u32, boxes: u32, residents: u32, row: u32, column: u32, end_column: u32 }
-    /// Lengths of the lists that the map makes, even if they do not fit.
-    Counters { entries: u32, slots: u32, small_items: u32, large_items: u32 }
+    /// Lengths of the lists that the map makes, even if they do not fit; valid boxes; tests in units of [`LANES`].
+    Counters {
+        entries: u32, slots: u32, small_items: u32, large_items: u32,
+        valid: u32, tests: u32, long_rows: u32, unused: u32
+    }
     /// Counts of a check, even if its output does not fit. Each has a low and a high half. A test is redundant if the
     /// entries alone decide it: another cell owns the pair, or, in a search for changes, neither box has changed. Overlaps
-    /// include pairs that filters forbid.
-    Totals { words: [u32; 2], pairs: [u32; 2], made: [u32; 2], redundant: [u32; 2], overlaps: [u32; 2] }
+    /// include pairs that filters forbid. Without [`COUNTED`] there are only the words, and without [`PACKED`] no pairs.
+    /// `sorted` is 1 if plain pairs are in order.
+    Totals { words: [u32; 2], pairs: [u32; 2], made: [u32; 2], redundant: [u32; 2], overlaps: [u32; 2],
+        sorted: u32, unused: u32 }
 }
 
 impl DeviceBox {

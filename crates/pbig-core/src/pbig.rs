@@ -13,6 +13,9 @@ pub struct SizeClass {
     pub max_extent: [f32; 3],
 }
 
+/// Number of size classes: exponents of f32.
+pub const CLASSES: usize = 256;
+
 /// First size class that belongs to no level (2^100). A cell of that size, or its inverse, would leave the normal range
 /// of f32.
 pub const OVERSIZE_CLASS: usize = 227;
@@ -26,7 +29,7 @@ pub struct Summary {
     /// Number of valid boxes.
     pub valid: u32,
     /// Size classes by the exponent of the largest extent, from 0 (denormal) to 255 (infinite).
-    pub classes: Box<[SizeClass; 256]>,
+    pub classes: Box<[SizeClass; CLASSES]>,
     /// At most [`Summary::SAMPLE`] valid boxes, spread evenly over the list. Oversize boxes are left out.
     pub sample: Vec<Aabb>,
 }
@@ -37,14 +40,18 @@ impl Summary {
 
     /// Returns the summary of the boxes.
     pub fn of(boxes: &[Aabb]) -> Self {
-        let classes = Box::new([SizeClass::default(); 256]);
+        let classes = Box::new([SizeClass::default(); CLASSES]);
         let mut summary = Self { valid: 0, classes, sample: Vec::new() };
         boxes.iter().for_each(|b| summary.count(b));
-        let sampled = spread_evenly(boxes.len(), Self::SAMPLE).map(|i| boxes[i]);
+        summary.sample = sampled(boxes);
         summary
-            .sample
-            .extend(sampled.filter(|b| b.is_valid() && size_class_of(b.extents()) < OVERSIZE_CLASS));
-        summary
+    }
+
+    /// Returns the summary of boxes whose classes are counted.
+    #[cfg(feature = "gpu")]
+    pub(crate) fn of_classes(classes: Box<[SizeClass; CLASSES]>, boxes: &[Aabb]) -> Self {
+        let valid = classes.iter().map(|class| class.boxes).sum();
+        Self { valid, classes, sample: sampled(boxes) }
     }
 
     fn count(&mut self, one: &Aabb) {
@@ -74,6 +81,12 @@ impl Summary {
         let widening = (high - low) * 0.125;
         (low - widening, high + widening)
     }
+}
+
+/// Returns the sample of [`Summary`].
+pub fn sampled(boxes: &[Aabb]) -> Vec<Aabb> {
+    let sampled = spread_evenly(boxes.len(), Summary::SAMPLE).map(|i| boxes[i]);
+    sampled.filter(|b| b.is_valid() && size_class_of(b.extents()) < OVERSIZE_CLASS).collect()
 }
 
 /// Returns at most `most` numbers below `len`, by a golden-ratio walk.

@@ -97,7 +97,8 @@ pub struct Report {
     pub invalid: u64,
     /// Boxes that had changed ([`crate::BroadPhase`]: beyond their margin, or filter).
     pub changed: u64,
-    /// Tests made.
+    /// Tests made. On a GPU the map's estimate, without unnecessary and redundant ones, unless
+    /// [`crate::GpuOptions::count_tests`] is set.
     pub checks: Checks,
     /// Pairs reported ([`crate::BroadPhase`]: pairs that exist now).
     pub pairs: u64,
@@ -114,8 +115,12 @@ pub struct Report {
 pub struct GpuReport {
     /// The adapter's name, kind and API.
     pub adapter: String,
-    /// Time of the host: packing and sending what changed.
+    /// Time of the host: copying boxes or changes into the device's staging memory.
     pub upload: Duration,
+    /// Time of the host: choosing cells. Zero where the plan of an earlier call is kept.
+    pub plan: Duration,
+    /// Time of the host: recording and submitting the kernels.
+    pub record: Duration,
     /// Time of the host: waiting for the device, transfers included.
     pub wait: Duration,
     /// Time of the host: decoding.
@@ -136,6 +141,4 @@ pub struct GpuReport {
     pub parts: u32,
     /// Times that the map or a chunk was repeated for want of room.
     pub repeats: u32,
-    /// True if the kernels for subgroups ran.
-    pub subgroups: bool,
 }

@@ -16,7 +16,6 @@ const GROUPS_PER_ROW: u32 = 32_768;
 #[derive(Debug)]
 pub struct Bench {
     gpu: GpuFinder,
-    has_subgroups: bool,
 }
 
 impl Bench {
@@ -25,25 +24,7 @@ impl Bench {
     /// # Errors
     /// If there is no adapter, or it gives no device that the kernels can run on.
     pub fn new() -> Result<Self, GpuError> {
-        Self::with_subgroups(true)
-    }
-
-    /// As [`Bench::new`], with or without the adapter's subgroups.
-    ///
-    /// # Errors
-    /// As [`Bench::new`].
-    pub fn with_subgroups(subgroups: bool) -> Result<Self, GpuError> {
-        let mut gpu = GpuFinder::new()?;
-        if !subgroups {
-            gpu.leave_subgroups();
-        }
-        let has = gpu.on_device(|device, _| Ok(device.features().contains(wgpu::Features::SUBGROUP)))?;
-        Ok(Self { gpu, has_subgroups: has && subgroups })
-    }
-
-    /// Returns true if the kernels for subgroups run.
-    pub fn subgroups(&self) -> bool {
-        self.has_subgroups
+        Ok(Self { gpu: GpuFinder::new()? })
     }
 
     /// Returns the bytes per second that the device reads and writes while it copies; a copied byte counts twice.

@@ -100,8 +100,12 @@ impl World {
         let pairs = |boxes: &[Aabb]| -> BTreeSet<Pair> {
             oracle::pairs_filtered(boxes, &self.filters).into_iter().collect()
         };
+        let overlap = |pair: &&Pair| self.boxes[pair.a as usize].overlaps(&self.boxes[pair.b as usize]);
+        if let Some(pair) = found.ended.iter().find(overlap) {
+            return Some(format!("{pair:?} has not ended"));
+        }
         let wanted: Vec<Pair> = (&pairs(&self.boxes) ^ &pairs(&before)).into_iter().collect();
-        let mut pairs = found.pairs.concat();
+        let mut pairs = [&found.pairs[..], &found.ended[..]].concat();
         pairs.sort_unstable();
         pbig_tests::difference(&pairs, &wanted)
     }
@@ -112,7 +116,7 @@ impl World {
         let overlaps = |pair: &Pair| self.boxes[pair.a as usize].overlaps(&self.boxes[pair.b as usize]);
         let allowed = |pair: &Pair| self.filters[pair.a as usize].allows(&self.filters[pair.b as usize]);
         let mut pairs = self.kept.clone();
-        for pair in found.pairs.iter().flatten() {
+        for pair in found.pairs.iter().chain(&found.ended) {
             let news = if overlaps(pair) { pairs.insert(*pair) } else { pairs.remove(pair) };
             assert!(news || again(pair), "{pair:?} is no news");
         }

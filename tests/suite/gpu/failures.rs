@@ -96,9 +96,8 @@ fn an_app_shares_its_device_and_a_lost_one_is_not_replaced() {
     let options = GpuOptions { pause: Duration::ZERO, ..GpuOptions::DEFAULT };
     let mut finder = Finder::with_gpu(with(options), finder);
     for case in corpus() {
-        let (pairs, report) = find(&mut finder, &case.boxes);
+        let (pairs, _) = find(&mut finder, &case.boxes);
         assert_eq!(difference(&pairs, &oracle::pairs(&case.boxes)), None, "{}", case.name);
-        assert!(!report.subgroups, "the device was made without them");
     }
     device.destroy();
     let boxes = set("pile", 2000);

@@ -2,21 +2,15 @@
 
 use super::*;
 
-/// Returns the device that all tests share: one with subgroups, if the adapter has them, and one without.
-pub(super) fn bench(subgroups: bool) -> &'static Bench {
-    static BENCHES: [OnceLock<Bench>; 2] = [const { OnceLock::new() }; 2];
-    let open = || Bench::with_subgroups(subgroups).expect("a device, be it a software one");
-    BENCHES[usize::from(subgroups)].get_or_init(open)
+/// Returns the device that all tests share.
+pub(super) fn bench() -> &'static Bench {
+    static BENCH: OnceLock<Bench> = OnceLock::new();
+    BENCH.get_or_init(|| Bench::new().expect("a device, be it a software one"))
 }
 
-/// Returns the devices on which a kernel has different texts. There are none if `PBIG_GPU=none`.
-pub(super) fn benches(kernel: &Kernel) -> Vec<&'static Bench> {
-    if without_gpu() {
-        return Vec::new();
-    }
-    let first = bench(true);
-    let second = (kernel.gains_from_subgroups() && first.subgroups()).then(|| bench(false));
-    [first].into_iter().chain(second).collect()
+/// Returns the device, or none if `PBIG_GPU=none`.
+pub(super) fn benches() -> Option<&'static Bench> {
+    (!without_gpu()).then(bench)
 }
 
 /// Runs a kernel on a state, and returns the state afterwards.
@@ -43,8 +37,12 @@ pub(super) fn padded(bytes: &[u8]) -> Vec<u8> {
     bytes
 }
 
-/// Returns the state with capacity for exactly the words that the twin wrote, or that records may take.
+/// Returns the state with capacity for exactly the words that the twin wrote, or that records may take. The input of a sort
+/// stays.
 pub(super) fn with_capacity_for(before: &State, wanted: &State) -> State {
+    if !before.out.is_empty() {
+        return before.clone();
+    }
     let words = if before.has(PACKED) { 3 * hits(wanted) as usize } else { wanted.out.len() };
     let mut before = State { out: vec![0; words], ..before.clone() };
     before.chunk.word_capacity = words as u32;
@@ -61,11 +59,9 @@ pub(super) fn after_twin(twin: &Twin, before: &State) -> State {
 pub(super) fn fault(twin: &Twin, options: &GpuOptions, before: &State) -> Option<String> {
     let wanted = after_twin(twin, before);
     let before = with_capacity_for(before, &wanted);
-    benches(twin.kernel).into_iter().find_map(|bench| {
-        let found = on_device(bench, twin, options, &before);
-        let fault = (twin.compare)(&before, &found, &wanted)?;
-        Some(format!("{}, subgroups {}: {fault}", twin.kernel.name, bench.subgroups()))
-    })
+    let found = on_device(benches()?, twin, options, &before);
+    let fault = (twin.compare)(&before, &found, &wanted)?;
+    Some(format!("{}: {fault}", twin.kernel.name))
 }
 
 /// Compares a kernel with its twin on all sets, at rest and moving.

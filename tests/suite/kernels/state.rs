@@ -15,19 +15,24 @@ pub(super) struct State {
     pub(super) motions: Vec<Motion>,
     pub(super) box_changes: Vec<BoxChange>,
     pub(super) filter_changes: Vec<FilterChange>,
+    pub(super) changed: Vec<u32>,
+    pub(super) classes: Vec<[u32; 4]>,
     pub(super) filters: Vec<ProxyFilter>,
     pub(super) located: Vec<Located>,
     pub(super) cells: Vec<Cell>,
-    pub(super) starts: Vec<u32>,
     pub(super) sums: Vec<u32>,
     pub(super) counters: Counters,
     pub(super) slots: Vec<Slot>,
     pub(super) small_items: Vec<SmallItem>,
     pub(super) large_items: Vec<LargeItem>,
     pub(super) entries: Vec<u32>,
-    pub(super) dispatches: [u32; 6],
+    pub(super) dispatches: [u32; 9],
     pub(super) totals: Totals,
     pub(super) out: Vec<u32>,
+    pub(super) rows: Vec<u32>,
+    pub(super) grouped: Vec<[u32; 2]>,
+    pub(super) long_rows: Vec<[u32; 2]>,
+    pub(super) long_dispatch: [u32; 3],
 }
 
 /// A set of boxes, and the settings of the schedule.
@@ -88,7 +93,8 @@ impl State {
         let n = case.boxes.len();
         let (small_cell, columns) = (case.small_cell, case.columns);
         let plan = plan_params(&all_bounds(case), &GpuOptions::DEFAULT, 1 << 20);
-        let params = Params { boxes: n as u32, small_cell, columns, ..plan };
+        let (flags, most_tests) = (COUNTED, u32::MAX);
+        let params = Params { boxes: n as u32, small_cell, columns, flags, most_tests, ..plan };
         let mut state = Self {
             params,
             chunk: Chunk {
@@ -101,14 +107,15 @@ impl State {
             filters: (0..n as u32).map(filter).collect(),
             located: vec![Located::default(); n],
             cells: vec![Cell::default(); params.cells as usize],
-            starts: vec![0; params.cells as usize],
-            sums: vec![0; params.cells.div_ceil(CELLS_PER_BLOCK) as usize],
+            sums: vec![0; (2 * params.cells).div_ceil(COUNTS_PER_BLOCK) as usize],
+            classes: vec![[0; 4]; 256],
             totals: Totals {
                 words: [0; 2],
                 pairs: NEARLY,
                 made: NEARLY,
                 redundant: NEARLY,
                 overlaps: NEARLY,
+                ..Totals::default()
             },
             ..Self::default()
         };
@@ -122,7 +129,7 @@ impl State {
         let mut dry = self.clone();
         set_capacities(&mut dry.params, &[u32::MAX; 4]);
         TWINS.iter().take_while(|twin| twin.kernel.name != "scatter").for_each(|twin| (twin.run)(&mut dry));
-        let Counters { entries, slots, small_items, large_items } = dry.counters;
+        let Counters { entries, slots, small_items, large_items, .. } = dry.counters;
         set_capacities(&mut self.params, &[entries, slots, small_items, large_items]);
         self.entries = vec![0; entries as usize];
         self.slots = vec![Slot::default(); slots as usize];
@@ -138,8 +145,16 @@ impl State {
         if let "row_ends" | "lazy_ends" = kernel {
             return ends(300, 350, if kernel == "row_ends" { 2 } else { 5 });
         }
+        if let "arrange_rows" | "count_pairs" | "place_pairs" | "rank_pairs" | "rank_long_rows" = kernel {
+            return pairs_to_sort(kernel, case);
+        }
         let mut state = Self::new(case);
+        // Without a grid no box is located.
+        let skipped = if kernel == "check_all" { "locate" } else { "check" };
         for twin in TWINS.iter().take_while(|twin| twin.kernel.name != kernel) {
+            if kernel == "check_all" && twin.kernel.name == skipped {
+                break;
+            }
             // The checks do not depend on each other.
             if !twin.kernel.name.starts_with("check") {
                 (twin.run)(&mut state);
@@ -149,12 +164,31 @@ impl State {
     }
 
     pub(super) fn with(mut self, flags: u32, split: u32) -> Self {
-        (self.params.flags, self.params.split) = (flags, split);
+        (self.params.flags, self.params.split) = (flags | COUNTED, split);
         self
     }
 
     pub(super) fn has(&self, flag: u32) -> bool {
         self.params.flags & flag != 0
+    }
+
+    /// Returns the end of a list of entries, after the scan.
+    pub(super) fn end_at(&self, list: usize) -> u32 {
+        let cell = &self.cells[list / 2];
+        let end = if list % 2 == 0 { cell.residents } else { cell.visitors };
+        end + self.sums[list / COUNTS_PER_BLOCK as usize]
+    }
+
+    /// Returns the first entry of a cell, after the scan.
+    pub(super) fn start_of(&self, cell: usize) -> u32 {
+        if cell == 0 { 0 } else { self.end_at(2 * cell - 1) }
+    }
+
+    /// Returns the counts of a cell, after the scan.
+    pub(super) fn counts_of(&self, cell: usize) -> Cell {
+        let (start, residents, visitors) =
+            (self.start_of(cell), self.end_at(2 * cell), self.end_at(2 * cell + 1));
+        Cell { residents: residents - start, visitors: visitors - residents }
     }
 
     /// Returns the bytes of a buffer.
@@ -166,10 +200,11 @@ impl State {
             Buffer::Boxes => cast_slice_mut(&mut self.boxes),
             Buffer::BoxChanges => cast_slice_mut(&mut self.box_changes),
             Buffer::FilterChanges => cast_slice_mut(&mut self.filter_changes),
+            Buffer::Changed => cast_slice_mut(&mut self.changed),
+            Buffer::Classes => cast_slice_mut(&mut self.classes),
             Buffer::Filters => cast_slice_mut(&mut self.filters),
             Buffer::Located => cast_slice_mut(&mut self.located),
             Buffer::Cells => cast_slice_mut(&mut self.cells),
-            Buffer::Starts => cast_slice_mut(&mut self.starts),
             Buffer::Sums => cast_slice_mut(&mut self.sums),
             Buffer::Counters => bytes_of_mut(&mut self.counters),
             Buffer::Slots => cast_slice_mut(&mut self.slots),
@@ -179,6 +214,10 @@ impl State {
             Buffer::Dispatches => bytes_of_mut(&mut self.dispatches),
             Buffer::Totals => bytes_of_mut(&mut self.totals),
             Buffer::Out => cast_slice_mut(&mut self.out),
+            Buffer::Rows => cast_slice_mut(&mut self.rows),
+            Buffer::Grouped => cast_slice_mut(&mut self.grouped),
+            Buffer::LongRows => cast_slice_mut(&mut self.long_rows),
+            Buffer::LongDispatch => bytes_of_mut(&mut self.long_dispatch),
         }
     }
 }

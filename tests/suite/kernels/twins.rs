@@ -12,25 +12,24 @@ pub(super) struct Twin {
 }
 
 /// The twins, in the order in which the kernels run.
-pub(super) static TWINS: [Twin; 17] = [
-    Twin {
-        kernel: &shaders::STORE_PREVIOUS,
-        run: store_previous,
-        groups: by_known,
-        compare: compare_motions,
-    },
+pub(super) static TWINS: [Twin; 21] = [
     Twin { kernel: &shaders::APPLY_CHANGES, run: apply_changes, groups: by_change, compare: compare_motions },
+    Twin { kernel: &shaders::MEASURE, run: measure, groups: few, compare: compare_classes },
     Twin { kernel: &shaders::LOCATE, run: locate, groups: by_box, compare: compare_located },
     Twin { kernel: &shaders::VISIT, run: visit, groups: by_box, compare: compare_cells },
     Twin { kernel: &shaders::SCAN_BLOCKS, run: scan_blocks, groups: by_block, compare: compare_blocks },
     Twin { kernel: &shaders::SCAN_SUMS, run: scan_sums, groups: one, compare: compare_sums },
-    Twin { kernel: &shaders::SCAN_ADD, run: scan_add, groups: by_cell, compare: compare_starts },
-    Twin { kernel: &shaders::SCHEDULE, run: schedule, groups: by_block, compare: compare_schedules },
+    Twin { kernel: &shaders::SCHEDULE, run: schedule, groups: by_cell_block, compare: compare_schedules },
     Twin { kernel: &shaders::SCATTER, run: scatter, groups: by_box, compare: compare_entries },
     Twin { kernel: &shaders::ARRANGE, run: arrange, groups: one, compare: compare_dispatches },
     Twin { kernel: &shaders::CHECK_SMALL, run: check_small, groups: by_small_item, compare: compare_checks },
     Twin { kernel: &shaders::CHECK_LARGE, run: check_large, groups: by_large_item, compare: compare_checks },
     Twin { kernel: &shaders::CHECK_ALL, run: check_all, groups: by_pair, compare: compare_checks },
+    Twin { kernel: &shaders::ARRANGE_ROWS, run: arrange_rows, groups: one, compare: compare_row_dispatches },
+    Twin { kernel: &shaders::COUNT_PAIRS, run: count_pairs, groups: by_found_pair, compare: compare_rows },
+    Twin { kernel: &shaders::PLACE_PAIRS, run: place_pairs, groups: by_found_pair, compare: compare_grouped },
+    Twin { kernel: &shaders::RANK_PAIRS, run: rank_pairs, groups: by_found_pair, compare: compare_ranked },
+    Twin { kernel: &shaders::RANK_LONG_ROWS, run: rank_long_rows, groups: by_window, compare: compare_out },
     Twin {
         kernel: &shaders::study::INDEX_PAIRS,
         run: index_pairs,
@@ -59,7 +58,16 @@ pub(super) fn by_cell(s: &State) -> u32 {
 }
 
 pub(super) fn by_block(s: &State) -> u32 {
+    (2 * s.params.cells).div_ceil(COUNTS_PER_BLOCK)
+}
+
+pub(super) fn by_cell_block(s: &State) -> u32 {
     s.params.cells.div_ceil(CELLS_PER_BLOCK)
+}
+
+/// Returns fewer workgroups than there are boxes for.
+pub(super) fn few(_: &State) -> u32 {
+    3
 }
 
 pub(super) fn by_small_item(s: &State) -> u32 {
@@ -74,13 +82,37 @@ pub(super) fn by_pair(s: &State) -> u32 {
     pair_count(s.params.boxes.into()).div_ceil(LANES.into()) as u32
 }
 
+/// Counts the boxes of each class by the bits of floats.
+pub(super) fn measure(s: &mut State) {
+    let mut fresh = s.clone();
+    fresh.renew();
+    let edge = |low: i32, high: i32| {
+        let (low, high) = (float_of(low), float_of(high));
+        if low.is_infinite() || high.is_infinite() { f32::INFINITY } else { high - low }
+    };
+    for id in 0..fresh.boxes.len() {
+        let one = fresh.bounds(id);
+        if one.low[0] > one.high[0] {
+            continue;
+        }
+        let edges = [0, 1, 2].map(|k| edge(one.low[k], one.high[k]).to_bits());
+        let class = edges.iter().max().expect("three edges") >> 23;
+        s.classes[class as usize][0] += 1;
+        for (most, edge) in s.classes[class as usize][1..].iter_mut().zip(edges) {
+            *most = edge.max(*most);
+        }
+    }
+}
+
 pub(super) fn locate(s: &mut State) {
+    s.renew();
     for id in 0..s.boxes.len() {
         let one = s.bounds(id);
         if one.low[0] > one.high[0] {
             s.located[id].level = NO_LEVEL;
             continue;
         }
+        s.counters.valid += 1;
         let cells = |corner: [i32; 3]| [0, 1, 2].map(|k| finest_cell(&s.params, corner[k], k));
         let mut at = Located { low: cells(one.low), high: cells(one.high), level: 0 };
         let level = level_of(&s.params, &at);
@@ -150,14 +182,15 @@ pub(super) fn entries_of(cell: &Cell) -> u32 {
     cell.residents + cell.visitors
 }
 
+/// Turns the counts of each block into the ends of the lists within it.
 pub(super) fn scan_blocks(s: &mut State) {
-    for (block, cells) in s.cells.chunks(CELLS_PER_BLOCK as usize).enumerate() {
-        let mut sum = 0;
-        for (i, cell) in cells.iter().enumerate() {
-            s.starts[block * CELLS_PER_BLOCK as usize + i] = sum;
-            sum += entries_of(cell);
+    let counts: &mut [u32] = cast_slice_mut(&mut s.cells);
+    for (block, sum) in counts.chunks_mut(COUNTS_PER_BLOCK as usize).zip(&mut s.sums) {
+        *sum = 0;
+        for count in block {
+            *sum += *count;
+            *count = *sum;
         }
-        s.sums[block] = sum;
     }
 }
 
@@ -171,35 +204,30 @@ pub(super) fn scan_sums(s: &mut State) {
     s.counters.entries = sum;
 }
 
-/// Turns the counts of each cell into the ends of its residents and of its visitors behind them.
-pub(super) fn scan_add(s: &mut State) {
-    for (i, (start, cell)) in s.starts.iter_mut().zip(&mut s.cells).enumerate() {
-        *start += s.sums[i / CELLS_PER_BLOCK as usize];
-        cell.residents += *start;
-        cell.visitors += cell.residents;
-    }
-}
-
-/// Returns the counts of a cell after scan_add.
-pub(super) fn counts_of(ends: &Cell, start: u32) -> Cell {
-    Cell { residents: ends.residents - start, visitors: ends.visitors - ends.residents }
-}
-
 pub(super) fn schedule(s: &mut State) {
     let (mut slots, mut small, mut large) = (Vec::new(), Vec::new(), Vec::new());
     let (small_cell, columns) = (s.params.small_cell, s.params.columns);
+    let mut tests = 0;
     for first in (0..s.cells.len()).step_by(CELLS_PER_BLOCK as usize) {
         let block = first..(first + CELLS_PER_BLOCK as usize).min(s.cells.len());
-        let cell = |i: usize| (counts_of(&s.cells[i], s.starts[i]), s.starts[i]);
+        let cell = |i: usize| (s.counts_of(i), s.start_of(i));
         let cells = block.map(cell).filter(|(c, _)| has_work(c));
         let (few, many): (Vec<_>, Vec<_>) = cells.partition(|(c, _)| entries_of(c) <= small_cell);
         schedule_small(&few, &mut slots, &mut small);
+        tests += many.iter().map(|(cell, _)| large_tests(cell)).sum::<u32>();
         large.extend(many.iter().flat_map(|(cell, start)| large_items(cell, *start, columns)));
     }
     s.counters.slots = slots.len() as u32;
     s.counters.small_items = small.len() as u32;
     s.counters.large_items = large.len() as u32;
+    s.counters.tests = tests + small.len() as u32;
     (s.slots, s.small_items, s.large_items) = (slots, small, large);
+}
+
+/// Returns about as many tests as a large cell needs, in units of LANES.
+fn large_tests(cell: &Cell) -> u32 {
+    let all = cell.residents as f32 * (cell.residents + 2 * cell.visitors) as f32 / (2 * LANES) as f32;
+    all.min(1073741824.0) as u32 + 1
 }
 
 pub(super) fn has_work(cell: &Cell) -> bool {
@@ -261,12 +289,14 @@ pub(super) fn scatter(s: &mut State) {
 
 /// Writes an entry at the end of the residents or visitors of a cell, and moves that end down.
 pub(super) fn place(s: &mut State, cell: usize, entry: u32, resident: bool) {
-    let (ends, start) = (&mut s.cells[cell], s.starts[cell]);
-    let end = if resident { &mut ends.residents } else { &mut ends.visitors };
+    let base = s.sums[2 * cell / COUNTS_PER_BLOCK as usize];
+    let ends = &mut s.cells[cell];
     // A cell without residents has no visitors counted, so its ends are its start.
-    if *end > start {
+    let takes_visitors = ends.visitors > ends.residents;
+    let end = if resident { &mut ends.residents } else { &mut ends.visitors };
+    if resident || takes_visitors {
         *end -= 1;
-        s.entries[*end as usize] = entry;
+        s.entries[(base + *end) as usize] = entry;
     }
 }
 
@@ -275,11 +305,12 @@ pub(super) fn arrange(s: &mut State) {
     let fits = found.entries <= room.entry_capacity
         && found.slots <= room.slot_capacity
         && found.small_items <= room.small_capacity
-        && found.large_items <= room.large_capacity;
+        && found.large_items <= room.large_capacity
+        && found.tests <= room.most_tests;
     let groups = |items: u32| if fits { [items.min(32_768), items.div_ceil(32_768)] } else { [0, 0] };
     let [x, y] = groups(found.small_items.min(s.chunk.small_items));
     let [u, v] = groups(found.large_items.min(s.chunk.large_items));
-    s.dispatches = [x, y, 1, u, v, 1];
+    s.dispatches[..6].copy_from_slice(&[x, y, 1, u, v, 1]);
 }
 
 /// The result of a check.
@@ -317,14 +348,15 @@ impl Checked {
 
     /// Writes the result into the state, unless the limit of pairs was passed before.
     pub(super) fn leave(self, s: &mut State) {
-        if wide(s.totals.pairs) > wide(s.chunk.pairs_left) {
+        if s.has(PACKED | BITS) && wide(s.totals.pairs) > wide(s.chunk.pairs_left) {
             return;
         }
         s.out = encoded(s, &self.pairs);
         let words = if s.has(BITS) { 0 } else { s.out.len() as u64 };
+        let counted = if s.has(PACKED | BITS) { self.pairs.len() as u64 } else { 0 };
         let add = |total: &mut [u32; 2], more: u64| *total = halves(wide(*total) + more);
         add(&mut s.totals.words, words);
-        add(&mut s.totals.pairs, self.pairs.len() as u64);
+        add(&mut s.totals.pairs, counted);
         add(&mut s.totals.made, self.made);
         add(&mut s.totals.redundant, self.redundant);
         add(&mut s.totals.overlaps, self.overlaps);
@@ -385,11 +417,14 @@ pub(super) fn check_large_item(s: &State, item: &LargeItem, checked: &mut Checke
 }
 
 pub(super) fn check_all(s: &mut State) {
-    let mut checked = Checked::default();
+    let (mut checked, mut fresh) = (Checked::default(), s.clone());
+    fresh.renew();
     for a in 0..s.params.boxes {
         for b in a + 1..s.params.boxes {
-            checked.test_boxes(s, a, b);
+            checked.test_boxes(&fresh, a, b);
         }
     }
+    let stored = std::mem::replace(&mut s.motions, fresh.motions);
     checked.leave(s);
+    s.motions = stored;
 }

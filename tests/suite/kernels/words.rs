@@ -2,7 +2,23 @@
 
 use super::AXIS_BITS;
 use pbig_core::Pair;
-use pbig_core::decode::{DecodeError, PLAIN, bits, plain, records};
+use pbig_core::decode::{self, DecodeError, PLAIN};
+use pbig_core::layout::ENDED;
+
+fn plain(words: &[u32], boxes: u32, is_sorted: bool) -> Result<Vec<Pair>, DecodeError> {
+    let mut pairs = vec![pair(0, 1)];
+    decode::plain(words, boxes, is_sorted, &mut pairs).map(|()| pairs.split_off(1))
+}
+
+fn records(words: &[u32], entries: &[u32], boxes: u32) -> Result<Vec<Pair>, DecodeError> {
+    let mut pairs = vec![pair(0, 1)];
+    decode::records(words, entries, boxes, &mut pairs).map(|()| pairs.split_off(1))
+}
+
+fn bits(words: &[u32], boxes: u32) -> Result<Vec<Pair>, DecodeError> {
+    let mut pairs = vec![pair(0, 1)];
+    decode::bits(words, boxes, &mut pairs).map(|()| pairs.split_off(1))
+}
 
 fn pair(a: u32, b: u32) -> Pair {
     Pair::new(a, b)
@@ -14,17 +30,21 @@ fn the_example_of_the_format() {
     let entries = [9, 9, 4, 1 | 7 << AXIS_BITS, 6, 0];
     let row = u32::from_le_bytes([0, 2, 1, 2]);
     let words = [2, 2, 0, row, 3, PLAIN | 1, 7, 8];
-    let wanted = vec![vec![pair(1, 4), pair(4, 6), pair(0, 4), pair(7, 8)]];
+    let wanted = vec![pair(1, 4), pair(4, 6), pair(0, 4), pair(7, 8)];
     assert_eq!(records(&words, &entries, 10), Ok(wanted));
-    assert_eq!(plain(&[1, 2, 0, 9], 10), Ok(vec![vec![pair(1, 2), pair(0, 9)]]));
+    assert_eq!(plain(&[1, 2, 0, 9], 10, false), Ok(vec![pair(1, 2), pair(0, 9)]));
+    assert_eq!(plain(&[0, 9, 1, 2], 10, true), Ok(vec![pair(0, 9), pair(1, 2)]));
+    let (mut added, mut ended) = (Vec::new(), Vec::new());
+    assert_eq!(decode::events(&[1, 2 | ENDED, 0, 9], 10, &mut added, &mut ended), Ok(()));
+    assert_eq!((added, ended), (vec![pair(0, 9)], vec![pair(1, 2)]));
     // Pairs 0 (0, 1) and 4 (1, 3) of four boxes.
-    assert_eq!(bits(&[0b01_0001], 4), Ok(vec![vec![pair(0, 1), pair(1, 3)]]));
+    assert_eq!(bits(&[0b01_0001], 4), Ok(vec![pair(0, 1), pair(1, 3)]));
 }
 
 #[test]
 fn broken_words_are_errors() {
     let entries = [0, 1, 2];
-    let what = |result: Result<Vec<Vec<Pair>>, DecodeError>| result.unwrap_err().what;
+    let what = |result: Result<Vec<Pair>, DecodeError>| result.unwrap_err().what;
     assert_eq!(what(records(&[5, 0, 0], &entries, 3)), "a record is cut off");
     assert_eq!(what(records(&[PLAIN | 0x7FFF_FFFF], &entries, 3)), "a record is cut off");
     assert_eq!(what(records(&[1, 0, 0, u32::from_le_bytes([0, 9, 1, 2])], &entries, 3)), "a row is cut off");
@@ -33,9 +53,14 @@ fn broken_words_are_errors() {
         what(records(&[1, 0, 0, u32::from_le_bytes([1, 0, 1, 0])], &entries, 3)),
         "a box paired with itself"
     );
-    assert_eq!(what(plain(&[1], 3)), "half a pair");
-    assert_eq!(what(plain(&[2, 1], 3)), "not a < b < boxes");
-    assert_eq!(what(plain(&[1, 3], 3)), "not a < b < boxes");
+    assert_eq!(what(plain(&[1], 3, false)), "half a pair");
+    assert_eq!(what(plain(&[2, 1], 3, false)), "not a < b < boxes");
+    assert_eq!(what(plain(&[1, 3], 3, false)), "not a < b < boxes");
+    assert_eq!(what(plain(&[0, 2, 0, 1], 3, true)), "pairs out of order");
+    assert_eq!(what(plain(&[0, 1, 0, 1], 3, true)), "pairs out of order");
+    let events = |words: &[u32]| decode::events(words, 3, &mut Vec::new(), &mut Vec::new()).unwrap_err().what;
+    assert_eq!(events(&[1 | ENDED, 2]), "not a < b < boxes");
+    assert_eq!(events(&[1, 3 | ENDED]), "not a < b < boxes");
     assert_eq!(what(bits(&[0b1000], 3)), "a bit beyond the last pair");
     assert_eq!(what(bits(&[], 3)), "not one bit a pair");
 }

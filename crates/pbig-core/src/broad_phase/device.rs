@@ -78,29 +78,24 @@ impl BroadPhase {
     fn sort_out(&mut self, found: &GpuFound) {
         let (world, kept, events) = (&self.world, &self.kept, &mut self.comparison);
         events.clear();
-        let overlaps = |pair: &Pair| world.boxes[pair.a as usize].overlaps(&world.boxes[pair.b as usize]);
         let existed = |pair: &Pair| !world.was_removed(pair.a) && !world.was_removed(pair.b);
-        let was_kept = |pair: &Pair| kept.contains(*pair) && existed(pair);
-        for pair in found.pairs.iter().flatten() {
-            if !overlaps(pair) {
-                events.removed.extend(kept.contains(*pair).then_some(*pair));
-            } else if !was_kept(pair) {
-                // The device takes pairs of boxes that it treats as new for new ones.
-                events.added.push(*pair);
-            }
+        events.removed.extend(found.ended.iter().filter(|pair| kept.contains(**pair)));
+        // The device takes pairs of boxes that it treats as new for new ones.
+        let is_new = |pair: &&Pair| !(kept.contains(**pair) && existed(pair));
+        events.added.extend(found.pairs.iter().filter(is_new));
+        for &id in world.removed() {
+            events.dropped.extend(kept.partners(id).map(|other| Pair::new(id, other)));
         }
-        for &id in &world.changed {
-            if world.was_removed(id) {
-                events.dropped.extend(kept.partners(id).map(|other| Pair::new(id, other)));
-            }
-        }
+        let overlaps = |pair: &Pair| world.boxes[pair.a as usize].overlaps(&world.boxes[pair.b as usize]);
         let allows = |pair: &Pair| world.filters[pair.a as usize].allows(&world.filters[pair.b as usize]);
         for &id in &found.restarted {
             let pairs = kept.partners(id).map(|other| Pair::new(id, other));
             events.removed.extend(pairs.filter(|pair| existed(pair) && !(overlaps(pair) && allows(pair))));
         }
-        events.sort(world.ids());
-        events.removed.dedup();
+        if !found.is_sorted || !found.restarted.is_empty() {
+            events.sort(world.ids());
+            events.removed.dedup();
+        }
         events.dropped.sort_unstable();
         events.dropped.dedup();
     }

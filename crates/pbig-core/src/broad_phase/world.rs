@@ -67,6 +67,12 @@ impl World {
         self.states[id as usize] & state::REMOVED != 0
     }
 
+    /// Returns the ids whose box of the last update was removed since.
+    #[cfg(feature = "gpu")]
+    pub(super) fn removed(&self) -> &[u32] {
+        &self.removed
+    }
+
     /// Returns true if any box was removed since the last update.
     pub(super) fn has_removed(&self) -> bool {
         !self.removed.is_empty()

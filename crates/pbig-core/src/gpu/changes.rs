@@ -95,51 +95,27 @@ impl ChangeRequest<'_> {
     }
 }
 
-/// The bounds of each box now and at the last update. The search for changes is planned for them.
-#[derive(Debug, Default)]
-pub(super) struct MotionBounds {
-    update: Option<u64>,
-    boxes: Vec<Aabb>,
-    moved: Vec<u32>,
-}
-
-impl MotionBounds {
-    /// Brings the bounds to an update. If they are those of the last update, the time is proportional to the changes.
-    fn follow(&mut self, request: &ChangeRequest<'_>) {
-        let boxes = request.boxes;
-        let follows = self.update.and_then(|update| update.checked_add(1)) == Some(request.update);
-        self.boxes.truncate(if follows { boxes.len() } else { 0 });
-        for id in self.moved.drain(..) {
-            if let Some(bounds) = self.boxes.get_mut(id as usize) {
-                *bounds = boxes[id as usize];
-            }
-        }
-        self.boxes.extend_from_slice(&boxes[self.boxes.len()..]);
-        let bounds = |change: &Change| boxes[change.id as usize].union(&request.before(change));
-        let changed: Vec<Aabb> = request.changed.par_iter().with_min_len(PIECE).map(bounds).collect();
-        for (change, bounds) in request.changed.iter().zip(changed) {
-            self.boxes[change.id as usize] = bounds;
-            self.moved.push(change.id);
-        }
-        self.update = Some(request.update);
+/// Returns the bounds of each box now and at the last update.
+pub(super) fn bounds_of(request: &ChangeRequest<'_>) -> Vec<Aabb> {
+    let mut bounds = request.boxes.to_vec();
+    for change in request.changed {
+        let one = &mut bounds[change.id as usize];
+        *one = one.union(&request.before(change));
     }
+    bounds
 }
 
 impl GpuFinder {
     /// Finds the pairs that the filters allow and that overlap now and did not at the last update, or the other way
-    /// round. The boxes tell which of the two.
+    /// round.
     ///
     /// The caller completes the answer for boxes in [`GpuFound::restarted`], which the device treats as new: kept pairs
     /// that no longer hold are not in the result, and those that still hold are.
     pub(crate) fn changes(&mut self, request: &ChangeRequest<'_>) -> Result<GpuFound, Failure> {
         let &ChangeRequest { filters, config, kept, .. } = request;
         self.run(config, kept, |session| {
-            // After an error the bounds stay empty.
-            let mut bounds = std::mem::take(&mut session.motion_bounds);
-            bounds.follow(request);
-            let (boxes, filters, changes) = (&bounds.boxes[..], Some(filters), Some(request));
-            let found = search(session, &SearchRequest { boxes, filters, changes, config })?;
-            session.motion_bounds = bounds;
+            let (boxes, filters, changes) = (request.boxes, Some(filters), Some(request));
+            let found = search(session, &SearchRequest { boxes, filters, changes, config }, Vec::new())?;
             Ok(GpuFound { restarted: request.restarted(), ..found })
         })
     }

@@ -4,15 +4,17 @@ use super::GpuError;
 use super::coding::bit_words;
 use super::device::Variant;
 use super::error::Failure;
-use super::passes::{Recording, Step, apply_changes, lists_fit};
+use super::passes::{CLASSES_BYTES, Recording, Step, apply_changes, lists_fit, measure};
 use super::readback::{self, HEADER_BYTES, Header};
 use super::session::Session;
 use super::sink::Sink;
 use super::storage::{BufferId, Side};
-use crate::layout::{BITS, Chunk, Counters, PACKED, Params, Totals, halves, wide};
-use crate::report::Clock;
-use crate::{Pair, decode};
+use crate::decode;
+use crate::layout::{BITS, Chunk, Counters, PACKED, Params, RAW, Totals, halves, wide};
+use crate::pbig::{CLASSES, SizeClass};
+use crate::report::{Clock, GpuReport};
 use pbig_shaders::Buffer;
+use std::borrow::Cow;
 
 /// A chunk that the device is working on.
 #[derive(Debug)]
@@ -30,12 +32,14 @@ pub(super) enum ChunkResult {
     Done,
     /// A list of the map did not fit, so nothing was checked.
     MapTooLarge,
+    /// The plan was made for other boxes, so nothing was checked.
+    TooManyTests,
     /// The output needs this many words.
     OutputTooLarge(u64),
 }
 
 impl Session {
-    /// Submits a chunk: changes that wait, and `steps`. The device stops counting beyond `left` pairs.
+    /// Submits a chunk: uploads and changes that wait, and `steps`. The device stops counting beyond `left` pairs.
     pub(super) fn submit(
         &mut self,
         params: &Params,
@@ -44,16 +48,37 @@ impl Session {
         steps: &[Step],
         left: u64,
     ) -> Result<PendingChunk, GpuError> {
+        let mut clock = Clock::start();
         let prefetched = self.make_room(params, side)?;
         let capacity = self.storage.size(BufferId::of(Buffer::Out, side)) / 4;
         items.word_capacity = capacity.min(u64::from(u32::MAX) - 1) as u32;
         items.pairs_left = halves(left);
-        self.storage.upload(Buffer::Params, &[*params])?;
-        self.storage.upload(BufferId::of(Buffer::Chunk, side), &[items])?;
-        let timestamps = self.timestamps[side].as_ref();
+        self.storage.write(BufferId::of(Buffer::Chunk, side), &[items])?;
+        let clear = Step::Clear(Buffer::Totals, size_of::<Totals>() as u64);
+        let steps: Vec<Step> = [clear].into_iter().chain(steps.iter().copied()).collect();
+        let (submission, passes) = self.record(params, side, &steps, Some(prefetched))?;
+        // A map has turned the boxes into ordered integers.
+        self.has_raw_boxes &= params.flags & RAW == 0;
+        self.recording += clock.lap();
+        Ok(PendingChunk { items, side, submission, prefetched, passes })
+    }
+
+    /// Records and submits uploads and changes that wait, `steps`, and a readback of some bytes of output, if they are told.
+    /// Returns the names of the kernels.
+    fn record(
+        &mut self,
+        params: &Params,
+        side: Side,
+        steps: &[Step],
+        prefetched: Option<u64>,
+    ) -> Result<(wgpu::SubmissionIndex, Vec<&'static str>), GpuError> {
+        self.storage.write(Buffer::Params, &[*params])?;
+        let timestamps = self.timestamps[side].as_ref().filter(|_| prefetched.is_some());
         let descriptor = wgpu::CommandEncoderDescriptor { label: Some("pbig") };
+        let mut encoder = self.device.handle.create_command_encoder(&descriptor);
+        let has_copies = self.storage.record_copies(&mut encoder);
         let mut recording = Recording {
-            encoder: self.device.handle.create_command_encoder(&descriptor),
+            encoder,
             storage: &mut self.storage,
             side,
             variant: Variant::new(&self.options, self.finds_changes),
@@ -64,12 +89,36 @@ impl Session {
         if std::mem::take(&mut self.has_pending_changes) {
             recording.record(&apply_changes(params))?;
         }
-        recording.record(&[Step::Clear(Buffer::Totals, size_of::<Totals>() as u64)])?;
         recording.record(steps)?;
-        readback::record(&mut recording, timestamps, prefetched);
+        if let Some(prefetched) = prefetched {
+            readback::record(&mut recording, timestamps, prefetched);
+        }
         let Recording { encoder, passes, .. } = recording;
         let submission = self.device.submit(encoder);
-        Ok(PendingChunk { items, side, submission, prefetched, passes })
+        if has_copies {
+            self.storage.take_staging_back();
+        }
+        Ok((submission, passes))
+    }
+
+    /// Counts the boxes on the device by size.
+    pub(super) fn measure(
+        &mut self,
+        params: &Params,
+        report: &mut GpuReport,
+    ) -> Result<Box<[SizeClass; CLASSES]>, GpuError> {
+        self.storage.ensure(Buffer::Classes, CLASSES_BYTES)?;
+        let mut clock = Clock::start();
+        self.record(params, 0, &measure(params), None)?;
+        self.recording += clock.lap();
+        let words = self.fetch(Buffer::Classes.into(), 0, CLASSES_BYTES / 4, report)?;
+        report.wait += clock.lap();
+        let mut classes = Box::new([SizeClass::default(); CLASSES]);
+        for (class, four) in classes.iter_mut().zip(words.as_chunks::<4>().0) {
+            let [boxes, x, y, z] = *four;
+            *class = SizeClass { boxes, max_extent: [x, y, z].map(f32::from_bits) };
+        }
+        Ok(classes)
     }
 
     /// Makes the buffers for the output of a chunk. Returns the bytes to prefetch.
@@ -91,108 +140,144 @@ impl Session {
         Ok(prefetched)
     }
 
-    /// Waits for a chunk and decodes its output, if everything fitted.
+    /// Waits for a chunk and decodes its output where it lies, if everything fitted.
     pub(super) fn finish(
         &mut self,
         chunk: PendingChunk,
         params: &Params,
         sink: &mut Sink,
     ) -> Result<ChunkResult, Failure> {
-        let (Header { totals, counters, .. }, mut words) = self.receive(&chunk, params, sink)?;
-        sink.check(wide(totals.pairs))?;
+        let staging = self.storage.get(BufferId::Staging(chunk.side));
+        let bytes = HEADER_BYTES + chunk.prefetched;
+        let mut clock = Clock::start();
+        let received =
+            readback::read(&self.device, staging, bytes, chunk.submission.clone(), self.options.patience)?;
+        let report = &mut sink.found.report;
+        report.wait += clock.lap();
+        report.downloaded += bytes;
+        let (header, prefetched) = received.split_at(HEADER_BYTES as usize);
+        let header: Header = bytemuck::pod_read_unaligned(header);
+        self.note_times(&chunk, &header, sink);
+        let Header { totals, counters, .. } = header;
+        sink.check(found_pairs(params, &totals))?;
         let (out, needed) = (BufferId::of(Buffer::Out, chunk.side), output_words(params, &totals));
-        if params.levels > 0 {
-            self.sizes.lists = counters;
-            if !lists_fit(params, &counters) {
-                sink.found.report.repeats += 1;
-                return Ok(ChunkResult::MapTooLarge);
-            }
-        }
-        if needed > self.storage.size(out) / 4 {
+        if let Some(repeat) = self.repeat(params, &counters, needed, out) {
             sink.found.report.repeats += 1;
-            return Ok(ChunkResult::OutputTooLarge(needed));
+            return Ok(repeat);
         }
         sink.found.report.chunks += 1;
-        let mut clock = Clock::start();
-        words.extend(self.fetch(out, words.len() as u64, needed, sink)?);
+        let words = self.words(bytemuck::cast_slice(prefetched), out, needed, sink)?;
         sink.found.report.wait += clock.lap();
         self.sizes.max_words = self.sizes.max_words.max(needed);
         self.sizes.expected_words = self.sizes.max_words;
-        self.coding.pairs = wide(totals.pairs);
-        sink.count(&totals, needed);
-        let pieces = self.decode(&words, params, sink)?;
-        sink.add(pieces)?;
+        self.coding.pairs = found_pairs(params, &totals);
+        sink.count(params, &counters, &totals, needed);
+        self.decode(&words, params, totals.sorted != 0, sink)?;
+        sink.check(0)?;
         sink.found.report.decode += clock.lap();
         Ok(ChunkResult::Done)
     }
 
-    /// Waits for a chunk. Returns its counts and the prefetched part of its output.
-    fn receive(
+    /// Returns why the map or the chunk has to be repeated, if it has.
+    fn repeat(
         &mut self,
-        chunk: &PendingChunk,
         params: &Params,
+        counters: &Counters,
+        needed: u64,
+        out: BufferId,
+    ) -> Option<ChunkResult> {
+        if params.levels > 0 {
+            self.sizes.lists = *counters;
+            if !lists_fit(params, counters) {
+                return Some(ChunkResult::MapTooLarge);
+            }
+            if counters.tests > params.most_tests {
+                return Some(ChunkResult::TooManyTests);
+            }
+        }
+        (needed > self.storage.size(out) / 4).then_some(ChunkResult::OutputTooLarge(needed))
+    }
+
+    /// Returns the words of output: those that came with the header, and the rest if there are more.
+    fn words<'a>(
+        &mut self,
+        prefetched: &'a [u32],
+        out: BufferId,
+        needed: u64,
         sink: &mut Sink,
-    ) -> Result<(Header, Vec<u32>), GpuError> {
-        let device = &self.device;
-        let staging = self.storage.get(BufferId::Staging(chunk.side));
-        let (bytes, submission) = (HEADER_BYTES + chunk.prefetched, chunk.submission.clone());
-        let mut clock = Clock::start();
-        // The copy frees the buffer for the next chunk before this one is decoded.
-        let read = |bytes: &[u8]| {
-            let (header, words) = bytes.split_at(HEADER_BYTES as usize);
-            let header: Header = bytemuck::pod_read_unaligned(header);
-            let used = output_words(params, &header.totals).saturating_mul(4).min(words.len() as u64);
-            (header, bytemuck::pod_collect_to_vec::<u8, u32>(&words[..used as usize]))
-        };
-        let (header, words) =
-            readback::read(device, staging, bytes, submission, self.options.patience, read)?;
-        sink.found.report.downloaded += bytes;
-        sink.found.report.wait += clock.lap();
-        if device.has_timestamps {
-            let times = header.times(&chunk.passes, device.queue.get_timestamp_period());
+    ) -> Result<Cow<'a, [u32]>, GpuError> {
+        let have = prefetched.len() as u64;
+        if needed <= have {
+            return Ok(Cow::Borrowed(&prefetched[..needed as usize]));
+        }
+        let mut words = prefetched.to_vec();
+        words.extend(self.fetch(out, have, needed, &mut sink.found.report)?);
+        Ok(Cow::Owned(words))
+    }
+
+    fn note_times(&self, chunk: &PendingChunk, header: &Header, sink: &mut Sink) {
+        if self.device.has_timestamps {
+            let times = header.times(&chunk.passes, self.device.queue.get_timestamp_period());
             times.for_each(|(name, time)| sink.add_time(name, time));
         }
-        Ok((header, words))
     }
 
     fn decode(
         &mut self,
         words: &[u32],
         params: &Params,
+        is_sorted: bool,
         sink: &mut Sink,
-    ) -> Result<Vec<Vec<Pair>>, GpuError> {
-        if params.flags & BITS != 0 {
-            return Ok(decode::bits(words, params.boxes)?);
-        }
-        if params.flags & PACKED == 0 {
-            return Ok(decode::plain(words, params.boxes)?);
-        }
-        if self.table.is_none() && !words.is_empty() {
+    ) -> Result<(), GpuError> {
+        if params.flags & PACKED != 0 && self.table.is_none() && !words.is_empty() {
             let entries = u64::from(self.sizes.lists.entries);
-            self.table = Some(self.fetch(Buffer::Entries.into(), 0, entries, sink)?);
+            self.table = Some(self.fetch(Buffer::Entries.into(), 0, entries, &mut sink.found.report)?);
         }
-        Ok(decode::records(words, self.table.as_deref().unwrap_or(&[]), params.boxes)?)
+        let (pairs, boxes) = (&mut sink.found.pairs, params.boxes);
+        let is_first = pairs.is_empty() && sink.found.report.chunks == 1;
+        sink.found.is_sorted = is_first && (is_sorted || params.flags & BITS != 0);
+        if params.flags & BITS != 0 {
+            decode::bits(words, boxes, pairs)?;
+        } else if params.flags & PACKED != 0 {
+            decode::records(words, self.table.as_deref().unwrap_or(&[]), boxes, pairs)?;
+        } else if self.finds_changes {
+            decode::events(words, boxes, pairs, &mut sink.found.ended)?;
+        } else {
+            decode::plain(words, boxes, is_sorted, pairs)?;
+        }
+        Ok(())
     }
 
     /// Reads the words `from..to` of a buffer, in a submission of its own.
-    fn fetch(&mut self, source: BufferId, from: u64, to: u64, sink: &mut Sink) -> Result<Vec<u32>, GpuError> {
+    fn fetch(
+        &mut self,
+        source: BufferId,
+        from: u64,
+        to: u64,
+        report: &mut GpuReport,
+    ) -> Result<Vec<u32>, GpuError> {
         if from >= to {
             return Ok(Vec::new());
         }
         let bytes = 4 * (to - from);
         self.storage.ensure(BufferId::FetchStaging, bytes)?;
-        sink.found.report.downloaded += bytes;
+        report.downloaded += bytes;
         let staging = self.storage.get(BufferId::FetchStaging);
         let descriptor = wgpu::CommandEncoderDescriptor { label: Some("pbig fetch") };
         let mut encoder = self.device.handle.create_command_encoder(&descriptor);
         encoder.copy_buffer_to_buffer(self.storage.get(source), 4 * from, staging, 0, bytes);
         let submission = self.device.submit(encoder);
-        let read = bytemuck::pod_collect_to_vec;
-        readback::read(&self.device, staging, bytes, submission, self.options.patience, read)
+        let read = readback::read(&self.device, staging, bytes, submission, self.options.patience)?;
+        Ok(bytemuck::pod_collect_to_vec(&read))
     }
 }
 
 /// Returns the number of words of output. The device does not count bits.
 fn output_words(params: &Params, totals: &Totals) -> u64 {
     if params.flags & BITS == 0 { wide(totals.words) } else { bit_words(params) }
+}
+
+/// Returns the number of pairs. The device does not count plain ones.
+fn found_pairs(params: &Params, totals: &Totals) -> u64 {
+    if params.flags & (PACKED | BITS) == 0 { wide(totals.words) / 2 } else { wide(totals.pairs) }
 }

@@ -46,6 +46,11 @@ impl CodingChoice {
     }
 }
 
+/// Returns the flag of one bit a pair if all fit a buffer of so many bytes. The order of bits is that of the pairs.
+pub(super) fn bits_that_fit(params: &Params, max_bytes: u64) -> u32 {
+    if 4 * bit_words(params) <= max_bytes { BITS } else { 0 }
+}
+
 /// Returns the words of output with one bit a pair.
 pub(super) fn bit_words(params: &Params) -> u64 {
     pair_count(params.boxes).div_ceil(32)

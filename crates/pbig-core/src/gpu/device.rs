@@ -2,7 +2,7 @@
 
 use super::{GpuError, adapter};
 use crate::config::GpuOptions;
-use pbig_shaders::Kernel;
+use pbig_shaders::{Buffer, Kernel};
 use std::collections::HashMap;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -31,16 +31,29 @@ pub(super) struct Variant {
     is_balanced: bool,
     /// The search is for changes instead of all pairs.
     changes: bool,
+    /// The scan is of rows of pairs instead of cells.
+    rows: bool,
 }
 
 impl Variant {
     pub(super) fn new(options: &GpuOptions, changes: bool) -> Self {
-        Self { root: options.root.min(9), is_balanced: options.load_balancing, changes }
+        Self { root: options.root.min(9), is_balanced: options.load_balancing, changes, rows: false }
+    }
+
+    pub(super) fn of_rows(self) -> Self {
+        Self { rows: true, ..self }
+    }
+
+    /// Returns the buffer for a binding.
+    pub(super) fn bound(self, binding: Buffer) -> Buffer {
+        if self.rows && binding == Buffer::Cells { Buffer::Rows } else { binding }
     }
 
     /// Returns the values of the overrides that the source declares.
     fn constants(self, source: &str) -> Vec<(&'static str, f64)> {
-        let all = [("ROOT", f64::from(self.root)), ("BALANCED", f64::from(u8::from(self.is_balanced)))];
+        let flag = |is_set: bool| f64::from(u8::from(is_set));
+        let all =
+            [("ROOT", f64::from(self.root)), ("BALANCED", flag(self.is_balanced)), ("ROWS", flag(self.rows))];
         all.into_iter().filter(|(name, _)| source.contains(&format!("override {name}"))).collect()
     }
 }
@@ -52,7 +65,6 @@ pub(crate) struct GpuDevice {
     pub(super) queue: wgpu::Queue,
     pub(super) name: String,
     pub(super) is_software: bool,
-    pub(super) has_subgroups: bool,
     pub(super) has_timestamps: bool,
     pipelines: Mutex<HashMap<(&'static str, Variant), wgpu::ComputePipeline>>,
     is_lost: AtomicBool,
@@ -67,7 +79,6 @@ impl GpuDevice {
         Ok(Self {
             name: adapter::describe(&info),
             is_software: info.device_type == wgpu::DeviceType::Cpu,
-            has_subgroups: features.contains(wgpu::Features::SUBGROUP),
             has_timestamps: features.contains(wgpu::Features::TIMESTAMP_QUERY),
             handle: device,
             queue,
@@ -79,10 +90,9 @@ impl GpuDevice {
 
     /// Opens a device on an adapter, with its limits and the features that pbig uses.
     pub(super) fn on(adapter: &wgpu::Adapter) -> Result<Self, GpuError> {
-        let wanted = wgpu::Features::SUBGROUP | wgpu::Features::TIMESTAMP_QUERY;
         let descriptor = wgpu::DeviceDescriptor {
             label: Some("pbig"),
-            required_features: adapter.features() & wanted,
+            required_features: adapter.features() & wgpu::Features::TIMESTAMP_QUERY,
             required_limits: adapter.limits(),
             memory_hints: wgpu::MemoryHints::MemoryUsage,
             ..Default::default()
@@ -172,7 +182,7 @@ impl GpuDevice {
         if let Some(pipeline) = pipelines.get(&(kernel.name, variant)) {
             return Ok(pipeline.clone());
         }
-        let mut source = kernel.source(self.has_subgroups, variant.changes);
+        let mut source = kernel.source(variant.changes);
         if self.is_due(Fault::RefuseShader) {
             source.push_str("this is no WGSL");
         }
@@ -204,12 +214,12 @@ impl GpuDevice {
         label: &str,
         size: u64,
         usage: wgpu::BufferUsages,
+        mapped_at_creation: bool,
     ) -> Result<wgpu::Buffer, GpuError> {
         if self.is_due(Fault::OutOfMemory) {
             return Err(GpuError::OutOfMemory);
         }
-        let descriptor =
-            wgpu::BufferDescriptor { label: Some(label), size, usage, mapped_at_creation: false };
+        let descriptor = wgpu::BufferDescriptor { label: Some(label), size, usage, mapped_at_creation };
         Ok(self.handle.create_buffer(&descriptor))
     }
 

@@ -1,10 +1,10 @@
 //! The GPU backend: PBIG's pipeline in WGSL, on any device that wgpu supports.
 //!
 //! ```text
-//! upload ─► locate ─► visit ─► scan ─► schedule ─► scatter ─► arrange ─► check small, large ─► readback ─► decode
+//! upload ─► locate ─► visit ─► scan ─► schedule ─► scatter ─► check ─► count, place and rank pairs ─► readback
 //! ```
 //!
-//! A call is one submission and one wait, unless there is more work or output than fits in one chunk.
+//! A call is one submission and one wait, unless there is more work or output than fits in one chunk, or no plan yet.
 //!
 //! `docs/GPU.md` says why it is right and which file has what.
 //! The kernels are in the crate `pbig-shaders`. The module `layout` has the structs that their buffers hold.
@@ -27,6 +27,7 @@ mod chunk;
 mod coding;
 mod device;
 mod error;
+mod kept_plan;
 mod levels;
 mod passes;
 mod plan;
@@ -47,8 +48,7 @@ pub use plan::GpuPlan;
 pub(crate) use sink::GpuFound;
 
 use crate::policy::AvailableDevice;
-use crate::{Config, GpuOptions};
-use changes::MotionBounds;
+use crate::{Config, GpuOptions, Pair};
 use device::GpuDevice;
 pub(crate) use search::SearchRequest;
 use search::search;
@@ -150,8 +150,13 @@ impl GpuFinder {
         self.device.as_ref().is_some_and(|device| device.is_software)
     }
 
-    pub(crate) fn find(&mut self, request: &SearchRequest<'_>) -> Result<GpuFound, Failure> {
-        self.run(request.config, 0, |session| search(session, request))
+    /// Finds all pairs. The result uses the memory of `pairs`.
+    pub(crate) fn find(
+        &mut self,
+        request: &SearchRequest<'_>,
+        pairs: Vec<Pair>,
+    ) -> Result<GpuFound, Failure> {
+        self.run(request.config, 0, |session| search(session, request, pairs))
     }
 
     /// Runs a search, of a set with so many kept pairs, and notes how it went.
@@ -201,7 +206,6 @@ impl GpuFinder {
     pub(crate) fn forget_changes(&mut self) {
         if let Some(session) = &mut self.session {
             session.uploaded.forget_motions();
-            session.motion_bounds = MotionBounds::default();
         }
     }
 

@@ -4,22 +4,32 @@
 use super::GpuError;
 use super::device::Variant;
 use super::storage::{BufferId, Side, Storage};
-use crate::layout::{CELLS_PER_BLOCK, Cell, Counters, LANES, LargeItem, Located, Params, Slot, SmallItem};
+use crate::Pair;
+use crate::layout::{
+    CELLS_PER_BLOCK, COUNTS_PER_BLOCK, Cell, Counters, LANES, LargeItem, Located, Params, SHORT_ROW, SORTED,
+    Slot, SmallItem,
+};
 use pbig_shaders::{self as shaders, Buffer, Kernel};
 
 /// Workgroups in a row of a dispatch. The portable limit is 65,535.
 const GROUPS_PER_ROW: u32 = 32_768;
 
 /// Most kernels in one submission. Each takes two timestamps.
-pub(super) const MAX_PASSES: u32 = 16;
+pub(super) const MAX_PASSES: u32 = 24;
+
+/// Most workgroups that measure the boxes. Each adds its counts to those of all.
+const MEASURE_GROUPS: u32 = 64;
+
+/// Bytes of the counts of size classes.
+pub(super) const CLASSES_BYTES: u64 = 256 * 16;
 
 /// The number of workgroups of a kernel.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Groups {
     /// A number that the host knows. 0 leaves the kernel out.
     Direct(u32),
-    /// A number that the device has written into [`Buffer::Dispatches`], at this byte.
-    Indirect(u64),
+    /// A number that the device has written into a buffer, at this byte.
+    Indirect(Buffer, u64),
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -27,37 +37,68 @@ pub(super) enum Step {
     /// Sets the first bytes of a buffer to 0.
     Clear(Buffer, u64),
     Run(&'static Kernel, Groups),
+    /// Runs a kernel of the scan on the rows of pairs instead of the cells.
+    RunOnRows(&'static Kernel, Groups),
 }
 
+use Buffer::{Dispatches, LongDispatch};
 use Groups::{Direct, Indirect};
-use Step::{Clear, Run};
+use Step::{Clear, Run, RunOnRows};
 
 /// Returns the steps that apply uploaded changes.
 pub(super) fn apply_changes(params: &Params) -> [Step; 2] {
     let longest = params.box_changes.max(params.filter_changes);
     [
-        Run(&shaders::STORE_PREVIOUS, Direct(params.known.div_ceil(LANES))),
+        Clear(Buffer::Changed, changed_bytes(params.known)),
         Run(&shaders::APPLY_CHANGES, Direct(longest.div_ceil(LANES))),
     ]
 }
 
-/// Returns the steps that turn boxes into work items, without a round trip to the host, and check the first of these.
-pub(super) fn map_and_check(params: &Params) -> [Step; 12] {
+/// Returns the bytes of a bit for each box.
+pub(super) fn changed_bytes(boxes: u32) -> u64 {
+    4 * u64::from(boxes.div_ceil(32))
+}
+
+/// Returns the steps that count the boxes of each size.
+pub(super) fn measure(params: &Params) -> [Step; 2] {
+    let groups = params.boxes.div_ceil(LANES).min(MEASURE_GROUPS);
+    [Clear(Buffer::Classes, CLASSES_BYTES), Run(&shaders::MEASURE, Direct(groups))]
+}
+
+/// Returns the steps that turn boxes into work items, without a round trip to the host, check the first of these, and sort
+/// the pairs if the flags say so.
+pub(super) fn map_and_check(params: &Params) -> Vec<Step> {
     let by_box = Direct(params.boxes.div_ceil(LANES));
-    let by_block = Direct(params.cells.div_ceil(CELLS_PER_BLOCK));
-    [
+    let mut steps = vec![
         Clear(Buffer::Cells, bytes_of::<Cell>(params.cells)),
         Clear(Buffer::Counters, bytes_of::<Counters>(1)),
         Run(&shaders::LOCATE, by_box),
         Run(&shaders::VISIT, if params.levels > 1 { by_box } else { Direct(0) }),
-        Run(&shaders::SCAN_BLOCKS, by_block),
+        Run(&shaders::SCAN_BLOCKS, Direct((2 * params.cells).div_ceil(COUNTS_PER_BLOCK))),
         Run(&shaders::SCAN_SUMS, Direct(1)),
-        Run(&shaders::SCAN_ADD, Direct(params.cells.div_ceil(LANES))),
-        Run(&shaders::SCHEDULE, by_block),
+        Run(&shaders::SCHEDULE, Direct(params.cells.div_ceil(CELLS_PER_BLOCK))),
         Run(&shaders::SCATTER, by_box),
         Run(&shaders::ARRANGE, Direct(1)),
-        Run(&shaders::CHECK_SMALL, Indirect(0)),
-        Run(&shaders::CHECK_LARGE, Indirect(12)),
+        Run(&shaders::CHECK_SMALL, Indirect(Dispatches, 0)),
+        Run(&shaders::CHECK_LARGE, Indirect(Dispatches, 12)),
+    ];
+    if params.flags & SORTED != 0 {
+        steps.extend(sort(params));
+    }
+    steps
+}
+
+/// Returns the steps that sort the pairs, where the chunk has all and they fit.
+fn sort(params: &Params) -> [Step; 8] {
+    [
+        Run(&shaders::ARRANGE_ROWS, Direct(1)),
+        Clear(Buffer::Rows, bytes_of::<u32>(params.boxes)),
+        Run(&shaders::COUNT_PAIRS, Indirect(Dispatches, 24)),
+        RunOnRows(&shaders::SCAN_BLOCKS, Direct(params.boxes.div_ceil(COUNTS_PER_BLOCK))),
+        RunOnRows(&shaders::SCAN_SUMS, Direct(1)),
+        Run(&shaders::PLACE_PAIRS, Indirect(Dispatches, 24)),
+        Run(&shaders::RANK_PAIRS, Indirect(Dispatches, 24)),
+        Run(&shaders::RANK_LONG_ROWS, Indirect(LongDispatch, 0)),
     ]
 }
 
@@ -77,12 +118,12 @@ pub(super) fn make_buffers(
     needed: &Counters,
     first_bytes: u64,
 ) -> Result<(), GpuError> {
+    let lists = (2 * params.cells).max(params.boxes);
     let buffers = [
         (Buffer::Located, bytes_of::<Located>(params.boxes)),
         (Buffer::Cells, bytes_of::<Cell>(params.cells)),
-        (Buffer::Starts, bytes_of::<u32>(params.cells)),
-        (Buffer::Sums, bytes_of::<u32>(params.cells.div_ceil(CELLS_PER_BLOCK))),
-        (Buffer::Dispatches, bytes_of::<[u32; 3]>(2)),
+        (Buffer::Sums, bytes_of::<u32>(lists.div_ceil(COUNTS_PER_BLOCK))),
+        (Buffer::Dispatches, bytes_of::<[u32; 3]>(3)),
     ];
     for (buffer, bytes) in buffers {
         storage.ensure(buffer, bytes)?;
@@ -98,6 +139,21 @@ pub(super) fn make_buffers(
         storage.ensure(buffer, bytes.max(first_bytes.min(storage.max_buffer_bytes)))?;
         *capacity = u32::try_from(storage.size(buffer) / size as u64).unwrap_or(u32::MAX);
     }
+    Ok(())
+}
+
+/// Makes the buffers of the sort, for the pairs of so many words. `params` gets the capacity.
+pub(super) fn make_sort_buffers(
+    storage: &mut Storage,
+    params: &mut Params,
+    words: u64,
+) -> Result<(), GpuError> {
+    storage.ensure(Buffer::Rows, bytes_of::<u32>(params.boxes))?;
+    storage.ensure(Buffer::LongDispatch, bytes_of::<[u32; 3]>(1))?;
+    storage.ensure(Buffer::Grouped, 4 * words)?;
+    let pairs = storage.size(Buffer::Grouped) / size_of::<Pair>() as u64;
+    storage.ensure(Buffer::LongRows, 8 * (pairs / u64::from(SHORT_ROW) + 1))?;
+    params.pair_capacity = u32::try_from(pairs).unwrap_or(u32::MAX);
     Ok(())
 }
 
@@ -128,15 +184,16 @@ impl Recording<'_> {
                     self.encoder.clear_buffer(buffer, 0, Some(bytes));
                 }
                 Run(_, Direct(0)) => {}
-                Run(kernel, groups) => self.run(kernel, groups)?,
+                Run(kernel, groups) => self.run(kernel, groups, self.variant)?,
+                RunOnRows(kernel, groups) => self.run(kernel, groups, self.variant.of_rows())?,
             }
         }
         Ok(())
     }
 
-    fn run(&mut self, kernel: &'static Kernel, groups: Groups) -> Result<(), GpuError> {
-        let pipeline = self.storage.device.pipeline(kernel, self.variant)?;
-        let bind_group = self.storage.bind_group(kernel, self.variant, self.side, &pipeline);
+    fn run(&mut self, kernel: &'static Kernel, groups: Groups, variant: Variant) -> Result<(), GpuError> {
+        let pipeline = self.storage.device.pipeline(kernel, variant)?;
+        let bind_group = self.storage.bind_group(kernel, variant, self.side, &pipeline);
         let first_query = 2 * self.passes.len() as u32;
         let timestamp_writes = self.queries.map(|query_set| wgpu::ComputePassTimestampWrites {
             query_set,
@@ -150,7 +207,7 @@ impl Recording<'_> {
         pass.set_bind_group(0, &bind_group, &[]);
         match groups {
             Direct(n) => pass.dispatch_workgroups(n.min(GROUPS_PER_ROW), n.div_ceil(GROUPS_PER_ROW), 1),
-            Indirect(at) => pass.dispatch_workgroups_indirect(self.storage.get(Buffer::Dispatches), at),
+            Indirect(buffer, at) => pass.dispatch_workgroups_indirect(self.storage.get(buffer), at),
         }
         Ok(())
     }

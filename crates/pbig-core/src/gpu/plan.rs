@@ -80,8 +80,8 @@ impl GpuPlan {
         self.cells += dims.iter().product::<u32>();
     }
 
-    /// Returns the kernels' parameters, as far as the plan sets them; all others are 0.
-    pub(crate) fn params(&self) -> Params {
+    /// Returns the kernels' parameters with those that the plan sets.
+    pub(crate) fn add_to(&self, params: Params) -> Params {
         let scale = (1.0 / f64::from(self.cell)) as f32;
         let reach = 0.99 * MAX_CELL / f64::from(scale);
         let bound = |k: usize, sign: f64| {
@@ -96,7 +96,7 @@ impl GpuPlan {
             clamp_high: std::array::from_fn(|k| bound(k, 1.0)),
             levels: self.levels.len() as u32,
             cells: self.cells,
-            ..Params::default()
+            ..params
         };
         params.level[..self.levels.len()].copy_from_slice(&self.levels);
         params

@@ -16,7 +16,7 @@ use std::time::Duration;
 pub(super) struct Header {
     pub(super) counters: Counters,
     pub(super) totals: Totals,
-    /// Begins at byte 56: timestamps must begin at a multiple of 8.
+    /// Begins at byte 80: timestamps must begin at a multiple of 8.
     ticks: [u64; 2 * MAX_PASSES as usize],
 }
 
@@ -52,7 +52,7 @@ impl Timestamps {
         let (label, ty, count) = (Some("times"), wgpu::QueryType::Timestamp, 2 * MAX_PASSES);
         let queries = device.handle.create_query_set(&wgpu::QuerySetDescriptor { label, ty, count });
         let usage = wgpu::BufferUsages::QUERY_RESOLVE | wgpu::BufferUsages::COPY_SRC;
-        Ok(Some(Self { queries, resolved: device.buffer("times", u64::from(count) * 8, usage)? }))
+        Ok(Some(Self { queries, resolved: device.buffer("times", u64::from(count) * 8, usage, false)? }))
     }
 }
 
@@ -76,15 +76,35 @@ pub(super) fn record(recording: &mut Recording<'_>, timestamps: Option<&Timestam
     }
 }
 
-/// Waits for a submission, and passes the first `bytes` of the staging buffer that it has filled to `read`.
-pub(super) fn read<T>(
+/// The content of a staging buffer, read where it lies.
+pub(super) struct Mapped {
+    view: Option<wgpu::BufferView>,
+    buffer: wgpu::Buffer,
+}
+
+impl std::ops::Deref for Mapped {
+    type Target = [u8];
+
+    fn deref(&self) -> &[u8] {
+        self.view.as_deref().unwrap_or(&[])
+    }
+}
+
+impl Drop for Mapped {
+    fn drop(&mut self) {
+        self.view = None;
+        self.buffer.unmap();
+    }
+}
+
+/// Waits for a submission. Returns the first `bytes` of the staging buffer that it has filled.
+pub(super) fn read(
     device: &GpuDevice,
     staging: &wgpu::Buffer,
     bytes: u64,
     submission: wgpu::SubmissionIndex,
     patience: Duration,
-    read: impl FnOnce(&[u8]) -> T,
-) -> Result<T, GpuError> {
+) -> Result<Mapped, GpuError> {
     let (sender, mapped) = mpsc::channel();
     staging.map_async(wgpu::MapMode::Read, 0..bytes, move |result| {
         // The receiver is gone if the wait was given up.
@@ -96,8 +116,5 @@ pub(super) fn read<T>(
         return Err(device.give_up());
     }
     let view = staging.get_mapped_range(0..bytes).map_err(|_| device.give_up())?;
-    let result = read(&view);
-    drop(view);
-    staging.unmap();
-    Ok(result)
+    Ok(Mapped { view: Some(view), buffer: staging.clone() })
 }

@@ -4,14 +4,16 @@
 //! alone, and together with every later block that its boxes reach. This assumes nothing about the boxes: in the worst case
 //! each block is searched with all others.
 
+use super::changes::bounds_of;
 use super::error::Failure;
 use super::session::{Input, Job, Session, Sizes};
 use super::sink::{GpuFound, Sink};
-use super::{ChangeRequest, GpuError, GpuPlan};
+use super::upload::PIECE;
+use super::{ChangeRequest, GpuError};
 use crate::layout::{BOX_BITS, Located, Motion, ordered};
-use crate::pbig::Summary;
+use crate::pbig::sampled;
 use crate::report::GpuReport;
-use crate::{Aabb, Config, Pair, ProxyFilter};
+use crate::{Aabb, Config, Order, Pair, ProxyFilter};
 use rayon::prelude::*;
 
 /// Most boxes of one cell: their work items, 2^17 rows by 2^17 / 8 groups of 8 columns, fit 32 bits.
@@ -20,12 +22,9 @@ const MAX_BOXES_PER_CELL: u64 = 1 << 25;
 /// Fewest boxes of a part that is split further because a list was too large.
 const MIN_SPLIT_BOXES: usize = 256;
 
-/// Most cells of a plan.
-const MAX_CELLS: u64 = 1 << 28;
-
 /// A search for all pairs or for changes.
 pub(crate) struct SearchRequest<'a> {
-    /// The boxes; in a search for changes the bounds of each box now and at the last update.
+    /// The boxes now.
     pub(crate) boxes: &'a [Aabb],
     pub(crate) filters: Option<&'a [ProxyFilter]>,
     /// The changes; none in a search for all pairs.
@@ -33,25 +32,27 @@ pub(crate) struct SearchRequest<'a> {
     pub(crate) config: &'a Config,
 }
 
-impl SearchRequest<'_> {
-    fn sink(&self, session: &Session) -> Sink {
-        let (adapter, subgroups) = (session.device.name.clone(), session.device.has_subgroups);
-        let report = GpuReport { adapter, subgroups, parts: 1, ..GpuReport::default() };
-        let found = GpuFound { report, ..GpuFound::default() };
+impl<'a> SearchRequest<'a> {
+    /// Returns an empty result, which uses the memory of an old list of pairs.
+    fn sink(&self, session: &Session, mut pairs: Vec<Pair>) -> Sink {
+        pairs.clear();
+        let adapter = session.device.name.clone();
+        let report = GpuReport { adapter, parts: 1, ..GpuReport::default() };
+        let found = GpuFound { report, pairs, ..GpuFound::default() };
         let kept = self.changes.map_or(0, |changes| changes.kept);
         Sink { found, limit: self.config.limits.pairs(), kept, ..Sink::default() }
     }
 
-    fn plan(&self, session: &Session, summary: &Summary) -> Result<GpuPlan, GpuError> {
-        let max_cells = (session.storage.max_buffer_bytes / 8).min(MAX_CELLS) as u32;
-        let plan = GpuPlan::new(summary, &self.config.gpu, session.cell_factor, max_cells);
-        // A box has up to 4 x 4 x 4 entries in each level but the last. 32 bits count them.
-        let entries = u64::from(summary.valid) * (64 * (plan.levels.len() as u64 - 1) + 1);
-        let limit = u64::from(u32::MAX);
-        if entries > limit {
-            return Err(GpuError::TooLarge { what: "entries", bytes: entries, limit });
+    /// Returns the job of all boxes at once.
+    fn whole(&self) -> Job<'a> {
+        Job {
+            boxes: self.boxes,
+            input: self.changes.map_or(Input::Boxes, Input::Changes),
+            filters: self.filters,
+            split: 0,
+            needs_grid: self.boxes.len() > self.config.gpu.all_pairs_up_to as usize,
+            is_sorted: self.changes.is_some() || self.config.order == Order::Sorted,
         }
-        Ok(plan)
     }
 
     /// Returns the most boxes that fit every buffer, and an entry's bits.
@@ -62,19 +63,22 @@ impl SearchRequest<'_> {
     }
 }
 
-/// Searches in as few parts as fit.
-pub(super) fn search(session: &mut Session, request: &SearchRequest<'_>) -> Result<GpuFound, Failure> {
-    let summary = Summary::of(request.boxes);
+/// Searches in as few parts as fit. The result uses the memory of `pairs`.
+pub(super) fn search(
+    session: &mut Session,
+    request: &SearchRequest<'_>,
+    mut pairs: Vec<Pair>,
+) -> Result<GpuFound, Failure> {
     let len = request.boxes.len();
     // The lists of a set say nothing about a set of another size.
     session.split = session.split.filter(|&(split, _)| split / 2 <= len && len / 2 <= split);
     let mut most = request.max_boxes(session).min(session.split.map_or(usize::MAX, |(_, most)| most));
     loop {
-        let mut sink = request.sink(session);
+        let mut sink = request.sink(session, std::mem::take(&mut pairs));
         let result = if len <= most {
-            search_whole(session, request, &summary, &mut sink)
+            search_whole(session, request, &mut sink)
         } else {
-            search_parts(session, request, &summary, most, &mut sink)
+            search_parts(session, request, most, &mut sink)
         };
         match result {
             // Only the device knew the length of the list that was too large. Fewer boxes make it shorter.
@@ -82,42 +86,34 @@ pub(super) fn search(session: &mut Session, request: &SearchRequest<'_>) -> Resu
                 most = (most.min(len) / 2).max(MIN_SPLIT_BOXES);
                 session.split = Some((len, most));
                 // A set that was too large says nothing about its parts.
-                session.sizes = Sizes::default();
+                (session.sizes, session.plan) = (Sizes::default(), None);
             }
-            result => return result.map(|plan| sink.end(plan, summary.valid)),
+            result => return result.map(|()| sink.end()),
         }
     }
 }
 
-fn search_whole(
-    session: &mut Session,
-    request: &SearchRequest<'_>,
-    summary: &Summary,
-    sink: &mut Sink,
-) -> Result<Option<GpuPlan>, Failure> {
-    if summary.valid < 2 {
-        return Ok(None);
+fn search_whole(session: &mut Session, request: &SearchRequest<'_>, sink: &mut Sink) -> Result<(), Failure> {
+    if request.boxes.len() < 2 {
+        sink.found.valid = request.boxes.iter().filter(|one| one.is_valid()).count() as u32;
+        return Ok(());
     }
-    let needs_grid = request.boxes.len() > request.config.gpu.all_pairs_up_to as usize;
-    let plan = needs_grid.then(|| request.plan(session, summary)).transpose()?;
-    let input = request.changes.map_or(Input::Boxes(request.boxes), Input::Changes);
-    session.run(&Job { input, filters: request.filters, split: 0, plan: plan.as_ref() }, sink)?;
-    Ok(plan)
+    session.run(&request.whole(), sink)
 }
 
 fn search_parts(
     session: &mut Session,
     request: &SearchRequest<'_>,
-    summary: &Summary,
     most: usize,
     sink: &mut Sink,
-) -> Result<Option<GpuPlan>, Failure> {
-    let (sorted, axis) = sorted(request.boxes, summary);
-    let parts = parts(request.boxes, &sorted, axis, most / 2);
+) -> Result<(), Failure> {
+    let bounds = request.changes.map(bounds_of);
+    let bounds = bounds.as_deref().unwrap_or(request.boxes);
+    let (sorted, axis) = sorted(bounds);
+    let parts = parts(bounds, &sorted, axis, most / 2);
     // The device gets one part after the other.
     session.uploaded.forget_motions();
     let motions = request.changes.map(|changes| changes.motions(0..request.boxes.len()));
-    let mut last = None;
     for part in &parts {
         let ids: Vec<u32> = [part.first, part.second].concat();
         let split = if part.second.is_empty() { 0 } else { part.first.len() as u32 };
@@ -125,17 +121,21 @@ fn search_parts(
         if motions.as_ref().is_some_and(|motions| motions.iter().all(|motion| motion.now == motion.before)) {
             continue;
         }
-        let boxes = of_ids(request.boxes, &ids);
-        let filters = request.filters.map(|all| of_ids(all, &ids));
-        let plan = request.plan(session, &Summary::of(&boxes))?;
-        let input = motions.as_deref().map_or(Input::Boxes(&boxes), Input::Motions);
-        let before = sink.found.pairs.len();
-        session.run(&Job { input, filters: filters.as_deref(), split, plan: Some(&plan) }, sink)?;
-        name_pairs(&mut sink.found.pairs[before..], &ids);
-        last = Some(plan);
+        let (boxes, filters) = (of_ids(request.boxes, &ids), request.filters.map(|all| of_ids(all, &ids)));
+        let input = motions.as_deref().map_or(Input::Boxes, Input::Motions);
+        let filters = filters.as_deref();
+        let (found, ended) = (sink.found.pairs.len(), sink.found.ended.len());
+        let job = Job { boxes: &boxes, input, filters, split, needs_grid: true, is_sorted: false };
+        // Each part lies elsewhere.
+        session.plan = None;
+        session.run(&job, sink)?;
+        name_pairs(&mut sink.found.pairs[found..], &ids);
+        name_pairs(&mut sink.found.ended[ended..], &ids);
     }
+    session.plan = None;
+    (sink.found.valid, sink.found.is_sorted) = (sorted.len() as u32, false);
     sink.found.report.parts = parts.len() as u32;
-    Ok(last)
+    Ok(())
 }
 
 fn of_ids<T: Copy>(all: &[T], ids: &[u32]) -> Vec<T> {
@@ -143,9 +143,9 @@ fn of_ids<T: Copy>(all: &[T], ids: &[u32]) -> Vec<T> {
 }
 
 /// Replaces indices into a part by the ids of its boxes.
-fn name_pairs(pairs: &mut [Vec<Pair>], ids: &[u32]) {
+fn name_pairs(pairs: &mut [Pair], ids: &[u32]) {
     let name = |pair: &mut Pair| *pair = Pair::new(ids[pair.a as usize], ids[pair.b as usize]);
-    pairs.par_iter_mut().for_each(|piece| piece.iter_mut().for_each(name));
+    pairs.par_iter_mut().with_min_len(PIECE).for_each(name);
 }
 
 /// Ids of boxes to search: for all pairs of `first`, or for pairs between `first` and `second`.
@@ -156,9 +156,10 @@ struct Part<'a> {
 }
 
 /// Returns the ids of the valid boxes, sorted along the axis on which they are spread most, and that axis.
-fn sorted(boxes: &[Aabb], summary: &Summary) -> (Vec<u32>, usize) {
+fn sorted(boxes: &[Aabb]) -> (Vec<u32>, usize) {
+    let sample = sampled(boxes);
     let width = |k: usize| {
-        let ends = summary.sample.iter().map(|b| b.min[k]);
+        let ends = sample.iter().map(|b| b.min[k]);
         ends.clone().fold(f32::MIN, f32::max) - ends.fold(f32::MAX, f32::min)
     };
     let axis = (0..3).max_by(|&j, &k| width(j).total_cmp(&width(k))).unwrap_or(0);
@@ -195,7 +196,7 @@ mod tests {
         boxes.push(Aabb::new([f32::NEG_INFINITY; 3], [f32::INFINITY; 3]));
         boxes.push(Aabb::NOWHERE);
         for size in [1, 7, 50, 1000] {
-            let (ids, axis) = sorted(&boxes, &Summary::of(&boxes));
+            let (ids, axis) = sorted(&boxes);
             assert_eq!((ids.len(), axis), (301, 0));
             let mut found = Vec::new();
             for part in parts(&boxes, &ids, axis, size) {

@@ -1,25 +1,27 @@
 //! The state of a finder on a device, and the search of one job: one submission and one wait, unless there is more work or
-//! output than fits.
+//! output than fits, or no plan.
 
-use super::changes::MotionBounds;
 use super::chunk::{ChunkResult, PendingChunk};
-use super::coding::CodingChoice;
+use super::coding::{CodingChoice, bits_that_fit};
 use super::device::GpuDevice;
 use super::error::Failure;
+use super::kept_plan::KeptPlan;
 use super::passes::{self, Groups, Step};
 use super::readback::Timestamps;
 use super::sink::{GpuFound, Sink};
 use super::storage::Storage;
 use super::upload::UploadCache;
-use super::{ChangeRequest, GpuError, GpuPlan};
+use super::{Change, ChangeRequest, GpuError, GpuPlan};
 use crate::config::{Coding, GpuOptions};
 use crate::decode::pair_count;
-use crate::layout::{BITS, Chunk, Counters, FILTERED, LANES, Motion, PACKED, Params};
+use crate::layout::{BITS, COUNTED, Chunk, Counters, FILTERED, LANES, Motion, PACKED, Params, RAW, SORTED};
+use crate::pbig::Summary;
 use crate::report::{Clock, GpuReport};
 use crate::{Aabb, ProxyFilter};
 use pbig_shaders::CHECK_ALL;
 use std::collections::VecDeque;
 use std::sync::Arc;
+use std::time::Duration;
 
 /// Most repetitions of a map before the call goes to the CPU. Each one has the capacities that the last one asked for.
 const MAX_REPEATS: u32 = 6;
@@ -28,9 +30,12 @@ const MAX_REPEATS: u32 = 6;
 /// an update with few changes.
 const PREFETCHED_WORDS_PER_CHANGE: u64 = 8;
 
+/// Most cells of a plan.
+const MAX_CELLS: u64 = 1 << 28;
+
 #[derive(Clone, Copy)]
 pub(super) enum Input<'a> {
-    Boxes(&'a [Aabb]),
+    Boxes,
     /// Boxes now and at the last update.
     Motions(&'a [Motion]),
     /// The same as changes, for a device that has the boxes of the last update.
@@ -39,12 +44,26 @@ pub(super) enum Input<'a> {
 
 /// A search of boxes that fit the device at once.
 pub(super) struct Job<'a> {
+    /// The boxes now.
+    pub(super) boxes: &'a [Aabb],
     pub(super) input: Input<'a>,
     pub(super) filters: Option<&'a [ProxyFilter]>,
     /// If not 0: only pairs of a box below this index and a box from it on are wanted.
     pub(super) split: u32,
-    /// The grid; without one every pair is tested.
-    pub(super) plan: Option<&'a GpuPlan>,
+    /// Without a grid every pair is tested.
+    pub(super) needs_grid: bool,
+    /// The caller wants the pairs in order.
+    pub(super) is_sorted: bool,
+}
+
+impl Job<'_> {
+    /// Returns the number of boxes that are valid now or were at the last update.
+    fn valid(&self) -> u32 {
+        let now = self.boxes.iter().filter(|one| one.is_valid()).count();
+        let Input::Changes(request) = self.input else { return now as u32 };
+        let ended = |change: &&Change| change.aabb.is_valid() && !self.boxes[change.id as usize].is_valid();
+        (now + request.changed.iter().filter(ended).count()) as u32
+    }
 }
 
 /// Lengths of lists and output that earlier calls needed.
@@ -66,10 +85,10 @@ pub(super) struct Session {
     pub(super) options: GpuOptions,
     pub(super) storage: Storage,
     pub(super) uploaded: UploadCache,
-    pub(super) motion_bounds: MotionBounds,
     pub(super) timestamps: [Option<Timestamps>; 2],
     pub(super) sizes: Sizes,
     pub(super) coding: CodingChoice,
+    pub(super) plan: Option<KeptPlan>,
     /// Factor on the cell size: smaller while cells hold too many boxes.
     pub(super) cell_factor: f32,
     /// Number of boxes of a set that needed parts, and of its parts, until the next window of [`Storage::end_call`].
@@ -78,8 +97,12 @@ pub(super) struct Session {
     pub(super) finds_changes: bool,
     /// Changes were uploaded that no submission has applied yet.
     pub(super) has_pending_changes: bool,
+    /// The boxes on the device are floats: no map has turned them into ordered integers yet.
+    pub(super) has_raw_boxes: bool,
     /// Entries of this job's map, once fetched.
     pub(super) table: Option<Vec<u32>>,
+    /// Time of the host in this job, recording and submitting.
+    pub(super) recording: Duration,
 }
 
 impl Session {
@@ -88,15 +111,17 @@ impl Session {
             options: *options,
             storage: Storage::new(device.clone(), options),
             uploaded: UploadCache::default(),
-            motion_bounds: MotionBounds::default(),
             timestamps: [Timestamps::new(&device)?, Timestamps::new(&device)?],
             sizes: Sizes::default(),
             coding: CodingChoice::default(),
+            plan: None,
             cell_factor: 1.0,
             split: None,
             finds_changes: false,
             has_pending_changes: false,
+            has_raw_boxes: false,
             table: None,
+            recording: Duration::ZERO,
             device,
         })
     }
@@ -109,91 +134,177 @@ impl Session {
         if self.storage.end_call() {
             self.split = None;
         }
-        let pairs = found.pairs.iter().map(|piece| piece.len() as u64).sum::<u64>();
+        if found.plan.is_none() {
+            return;
+        }
+        let pairs = (found.pairs.len() + found.ended.len()) as u64;
         let useful_tests = (u64::from(found.valid) + kept.max(pairs)).max(1);
-        match found.checks.made / useful_tests {
-            _ if found.plan.is_none() => {}
-            0..NEARLY_EMPTY => self.cell_factor = (self.cell_factor * 2.0).min(1.0),
-            NEARLY_EMPTY..=TOO_FULL => {}
-            _ => self.cell_factor = (self.cell_factor * 0.5).max(1.0 / 64.0),
+        let factor = match found.checks.made / useful_tests {
+            0..NEARLY_EMPTY => (self.cell_factor * 2.0).min(1.0),
+            NEARLY_EMPTY..=TOO_FULL => self.cell_factor,
+            _ => (self.cell_factor * 0.5).max(1.0 / 64.0),
+        };
+        if factor != self.cell_factor {
+            (self.cell_factor, self.plan) = (factor, None);
         }
     }
 
     pub(super) fn run(&mut self, job: &Job<'_>, sink: &mut Sink) -> Result<(), Failure> {
         let params = self.upload(job, &mut sink.found.report)?;
-        let result = self.search(params, sink);
+        let result = self.search(job, params, sink);
+        sink.found.valid = if job.needs_grid { self.sizes.lists.valid } else { job.valid() };
         let report = &mut sink.found.report;
         report.device_bytes = report.device_bytes.max(self.storage.bytes());
+        report.record += std::mem::take(&mut self.recording);
         result
     }
 
-    /// Uploads the boxes of a job. Returns its parameters, without capacities.
+    /// Uploads the boxes of a job. Returns its parameters, without grid and capacities.
     fn upload(&mut self, job: &Job<'_>, report: &mut GpuReport) -> Result<Params, GpuError> {
         self.table = None;
         self.sizes.expected_words = std::mem::take(&mut self.sizes.max_words);
         self.sizes.word_capacity = self.sizes.expected_words;
-        self.finds_changes = !matches!(job.input, Input::Boxes(_));
+        self.finds_changes = !matches!(job.input, Input::Boxes);
         self.storage.bytes_sent = 0;
         let mut params = self.params(job);
         let mut clock = Clock::start();
-        let (storage, uploaded) = (&mut self.storage, &mut self.uploaded);
-        params.boxes = match job.input {
-            Input::Boxes(boxes) => uploaded.upload(storage, boxes, job.filters)?,
-            Input::Motions(motions) => uploaded.upload_motions(storage, motions, job.filters)?,
+        let (storage, uploaded, filters) = (&mut self.storage, &mut self.uploaded, job.filters);
+        match job.input {
+            Input::Boxes if job.needs_grid => {
+                uploaded.upload_raw(storage, job.boxes, filters, &mut params)?;
+            }
+            Input::Boxes => uploaded.upload_few(storage, job.boxes, filters, &mut params)?,
+            Input::Motions(motions) => uploaded.upload_motions(storage, motions, filters, &mut params)?,
             Input::Changes(request) => {
                 let most = PREFETCHED_WORDS_PER_CHANGE * request.changed.len() as u64;
                 self.sizes.expected_words = self.sizes.expected_words.min(most);
-                uploaded.upload_changes(storage, request, &mut params)?
+                uploaded.upload_changes(storage, request, &mut params)?;
             }
         };
         report.uploaded += self.storage.bytes_sent;
         report.upload += clock.lap();
         self.has_pending_changes = params.known > 0;
-        // Changes are rarely so many that records or bits are smaller, and bursts of them end.
-        let is_auto = self.options.coding == Coding::Auto;
-        let coding = if is_auto && self.finds_changes { Coding::Plain } else { self.options.coding };
-        params.flags |= self.coding.flag(coding, &params);
+        self.has_raw_boxes = params.flags & RAW != 0;
         Ok(params)
     }
 
     fn params(&self, job: &Job<'_>) -> Params {
+        let flags = [(job.filters.is_some(), FILTERED), (self.options.count_tests, COUNTED)];
         Params {
             small_cell: self.options.small_cell.clamp(1, LANES),
             // The output of a work item must fit the smallest buffer.
             columns: if self.storage.max_buffer_bytes < 8 << 20 { 1 } else { 8 },
-            flags: if job.filters.is_some() { FILTERED } else { 0 },
+            flags: flags.into_iter().filter(|(is_set, _)| *is_set).map(|(_, flag)| flag).sum(),
             split: job.split,
-            ..job.plan.map_or(Params::default(), GpuPlan::params)
+            ..Params::default()
         }
     }
 
-    /// Searches with a grid, or tests every pair (Avril 3.2).
-    fn search(&mut self, mut params: Params, sink: &mut Sink) -> Result<(), Failure> {
+    /// Adds to the parameters of a job what a plan and the coding of the output set.
+    fn with_plan(
+        &mut self,
+        job: &Job<'_>,
+        mut params: Params,
+        report: &mut GpuReport,
+    ) -> Result<Params, GpuError> {
+        if !self.has_raw_boxes {
+            params.flags &= !RAW;
+        }
+        if job.needs_grid {
+            let kept = self.plan(job, &params, report)?;
+            params = kept.plan.add_to(params);
+            params.most_tests = kept.most_tests(params.boxes);
+        }
+        params.flags |= self.coding_flags(job, &params);
+        Ok(params)
+    }
+
+    /// Returns the plan: the kept one, or one for the boxes that the device has now.
+    fn plan(
+        &mut self,
+        job: &Job<'_>,
+        params: &Params,
+        report: &mut GpuReport,
+    ) -> Result<&KeptPlan, GpuError> {
+        let plan = match self.plan.take_if(|kept| kept.suits(job.boxes.len())) {
+            Some(kept) => kept,
+            None => {
+                let classes = self.measure(params, report)?;
+                let mut clock = Clock::start();
+                let plan = self.plan_for(&Summary::of_classes(classes, job.boxes))?;
+                report.plan += clock.lap();
+                KeptPlan::new(plan, params.boxes)
+            }
+        };
+        Ok(self.plan.insert(plan))
+    }
+
+    fn plan_for(&self, summary: &Summary) -> Result<GpuPlan, GpuError> {
+        let max_cells = (self.storage.max_buffer_bytes / 8).min(MAX_CELLS) as u32;
+        let plan = GpuPlan::new(summary, &self.options, self.cell_factor, max_cells);
+        // A box has up to 4 x 4 x 4 entries in each level but the last. 32 bits count them.
+        let entries = u64::from(summary.valid) * (64 * (plan.levels.len() as u64 - 1) + 1);
+        let limit = u64::from(u32::MAX);
+        if entries > limit {
+            return Err(GpuError::TooLarge { what: "entries", bytes: entries, limit });
+        }
+        Ok(plan)
+    }
+
+    /// Returns the flags of the coding: plain pairs where the device sorts, and for changes. These are rarely so many that
+    /// records or bits are smaller, and need a mark.
+    fn coding_flags(&self, job: &Job<'_>, params: &Params) -> u32 {
         let has_grid = params.levels > 0;
-        let before = (sink.pairs, sink.words);
+        let flags = match self.options.coding {
+            _ if self.finds_changes => 0,
+            Coding::Auto if job.is_sorted && has_grid => 0,
+            Coding::Auto if job.is_sorted => bits_that_fit(params, self.storage.max_buffer_bytes),
+            wanted => self.coding.flag(wanted, params),
+        };
+        if flags == 0 && has_grid && job.is_sorted { SORTED } else { flags }
+    }
+
+    /// Searches with a grid, or tests every pair (Avril 3.2).
+    fn search(&mut self, job: &Job<'_>, uploaded: Params, sink: &mut Sink) -> Result<(), Failure> {
+        let before = (sink.pairs(), sink.words);
+        let mut forced_flags = 0;
         for _ in 0..MAX_REPEATS {
+            let mut params = self.with_plan(job, uploaded, &mut sink.found.report)?;
+            params.flags |= forced_flags;
+            let has_grid = params.levels > 0;
+            if has_grid {
+                sink.found.plan = self.plan.as_ref().map(|kept| kept.plan.clone());
+            }
             let chunk = self.submit_first(&mut params, sink.left())?;
             let first = chunk.items;
             let done = match self.finish(chunk, &params, sink)? {
                 ChunkResult::Done => Some(first),
                 ChunkResult::MapTooLarge => None,
+                ChunkResult::TooManyTests => {
+                    self.plan = None;
+                    None
+                }
                 ChunkResult::OutputTooLarge(words) => {
                     self.sizes.word_capacity = words;
-                    // The map is there, so only the checks are repeated.
-                    has_grid.then(Chunk::default)
+                    // The map is there, so only the checks are repeated, unless the pairs can be sorted with it.
+                    let is_sorted = params.flags & SORTED != 0 && words <= self.storage.max_buffer_bytes / 4;
+                    (has_grid && !is_sorted).then(Chunk::default)
                 }
             };
             if let Some(done) = done.filter(|_| has_grid) {
-                self.search_rest(&params, rest(&self.sizes.lists, &done), sink)?;
-                let (pairs, words) = (sink.pairs - before.0, sink.words - before.1);
+                let rest = rest(&self.sizes.lists, &done);
+                self.search_rest(&params, rest, sink)?;
+                let (pairs, words) = (sink.pairs() - before.0, sink.words - before.1);
                 self.coding.learn(params.flags & PACKED != 0, pairs, words, self.sizes.lists.entries);
+                let lists = self.sizes.lists;
+                self.plan.take_if(|kept| kept.is_outgrown_after(&lists));
             }
             if done.is_some() {
                 return Ok(());
             }
             if !has_grid && self.sizes.word_capacity > self.storage.max_buffer_bytes / 4 {
                 // One bit a pair fits the smallest buffer.
-                params.flags |= BITS;
+                forced_flags = BITS;
             }
         }
         Err(self.too_large().into())
@@ -208,6 +319,11 @@ impl Session {
             return self.submit(params, items, 0, &steps, left);
         }
         passes::make_buffers(&mut self.storage, params, &self.sizes.lists, self.options.first_bytes)?;
+        if params.flags & SORTED != 0 {
+            let most = self.storage.max_buffer_bytes;
+            let words = (4 * self.sizes.word_capacity).clamp(self.options.first_bytes.min(most), most) / 4;
+            passes::make_sort_buffers(&mut self.storage, params, words)?;
+        }
         let [small_items, large_items] = self.chunk_items();
         let items = Chunk { small_items, large_items, ..Chunk::default() };
         self.submit(params, items, 0, &passes::map_and_check(params), left)

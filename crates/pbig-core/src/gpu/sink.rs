@@ -1,7 +1,8 @@
 //! The pairs of a search on a device: those read back so far, and all of them in the end.
 
 use super::{Failure, GpuPlan};
-use crate::layout::{Totals, wide};
+use crate::decode::pair_count;
+use crate::layout::{COUNTED, Counters, LANES, Params, Totals, wide};
 use crate::report::{Checks, GpuReport};
 use crate::{Error, Pair};
 use std::time::Duration;
@@ -9,10 +10,13 @@ use std::time::Duration;
 /// The pairs that a device found, and how it found them. There is none of a search that failed.
 #[derive(Debug, Default)]
 pub struct GpuFound {
-    /// Pairs, each once, in no particular order: a list for each piece of decoded output. A search for all pairs finds
-    /// those that overlap and that the filters allow; a search for changes, allowed pairs that overlap now and did not at
-    /// the last update, or the other way round.
-    pub pairs: Vec<Vec<Pair>>,
+    /// Pairs that overlap and that the filters allow, each once; of a search for changes, those that did not at the last
+    /// update.
+    pub pairs: Vec<Pair>,
+    /// Of a search for changes, allowed pairs that overlapped at the last update and no longer do, each once.
+    pub ended: Vec<Pair>,
+    /// The pairs are in order.
+    pub is_sorted: bool,
     /// Ids of boxes that a search for changes treated as new.
     pub restarted: Vec<u32>,
     /// Number of valid boxes; in a search for changes, of boxes that are valid now or were at the last update.
@@ -29,7 +33,6 @@ pub struct GpuFound {
 #[derive(Default)]
 pub(super) struct Sink {
     pub(super) found: GpuFound,
-    pub(super) pairs: u64,
     /// Words of output so far.
     pub(super) words: u64,
     /// The caller's limit of pairs.
@@ -39,32 +42,40 @@ pub(super) struct Sink {
 }
 
 impl Sink {
+    /// Returns the number of pairs so far.
+    pub(super) fn pairs(&self) -> u64 {
+        (self.found.pairs.len() + self.found.ended.len()) as u64
+    }
+
     pub(super) fn left(&self) -> u64 {
-        self.limit.saturating_add(self.kept).saturating_sub(self.pairs)
+        self.limit.saturating_add(self.kept).saturating_sub(self.pairs())
     }
 
-    /// Returns an error if `more` pairs are too many.
+    /// Returns an error if `more` pairs are too many, or those so far.
     pub(super) fn check(&self, more: u64) -> Result<(), Failure> {
-        let limit = self.limit;
-        if more > self.left() { Err(Failure::Call(Error::TooManyPairs { limit })) } else { Ok(()) }
+        let (limit, all) = (self.limit, self.limit.saturating_add(self.kept));
+        if self.pairs().saturating_add(more) > all {
+            Err(Failure::Call(Error::TooManyPairs { limit }))
+        } else {
+            Ok(())
+        }
     }
 
-    pub(super) fn add(&mut self, mut pieces: Vec<Vec<Pair>>) -> Result<(), Failure> {
-        let pairs = pieces.iter().map(|piece| piece.len() as u64).sum();
-        self.check(pairs)?;
-        self.pairs += pairs;
-        self.found.pairs.append(&mut pieces);
-        Ok(())
-    }
-
-    /// Adds the counts of a chunk with so many words of output.
-    pub(super) fn count(&mut self, totals: &Totals, words: u64) {
+    /// Adds the counts of a chunk with so many words of output. Only a device that was told to counts tests; otherwise the
+    /// map tells about how many there are.
+    pub(super) fn count(&mut self, params: &Params, counters: &Counters, totals: &Totals, words: u64) {
         self.words += words;
-        let (made, redundant, overlaps) = (wide(totals.made), wide(totals.redundant), wide(totals.overlaps));
         let checks = &mut self.found.checks;
-        checks.made += made;
-        checks.redundant += redundant;
-        checks.unnecessary += made.saturating_sub(redundant + overlaps);
+        if params.flags & COUNTED != 0 {
+            let (made, redundant) = (wide(totals.made), wide(totals.redundant));
+            checks.made += made;
+            checks.redundant += redundant;
+            checks.unnecessary += made.saturating_sub(redundant + wide(totals.overlaps));
+        } else if params.levels == 0 {
+            checks.made = pair_count(params.boxes);
+        } else {
+            checks.made = u64::from(LANES) * u64::from(counters.tests);
+        }
     }
 
     pub(super) fn add_time(&mut self, name: &'static str, time: Duration) {
@@ -75,10 +86,9 @@ impl Sink {
         }
     }
 
-    pub(super) fn end(mut self, plan: Option<GpuPlan>, valid: u32) -> GpuFound {
-        (self.found.plan, self.found.valid) = (plan, valid);
-        let ratio = self.words as f64 / (2 * self.pairs) as f64;
-        self.found.report.compression = if self.pairs > 0 { ratio } else { 0.0 };
+    pub(super) fn end(mut self) -> GpuFound {
+        let ratio = self.words as f64 / (2 * self.pairs()) as f64;
+        self.found.report.compression = if self.pairs() > 0 { ratio } else { 0.0 };
         self.found
     }
 }

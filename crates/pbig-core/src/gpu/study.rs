@@ -10,11 +10,10 @@ use crate::layout::Params;
 use crate::pbig::Summary;
 use crate::{Aabb, Config};
 use pbig_shaders::Kernel;
-use std::sync::Arc;
 
 /// Returns the kernels' parameters for a grid of the boxes with at most `max_cells` cells, as far as the plan sets them.
 pub fn plan_params(boxes: &[Aabb], options: &GpuOptions, max_cells: u32) -> Params {
-    GpuPlan::new(&Summary::of(boxes), options, 1.0, max_cells).params()
+    GpuPlan::new(&Summary::of(boxes), options, 1.0, max_cells).add_to(Params::default())
 }
 
 impl GpuFinder {
@@ -27,13 +26,6 @@ impl GpuFinder {
     pub fn inject(&self, fault: Fault, submissions: u32) {
         if let Some(device) = &self.device {
             device.inject(fault, submissions);
-        }
-    }
-
-    /// Leaves subgroups unused, on a device that no other finder shares.
-    pub fn leave_subgroups(&mut self) {
-        if let Some(device) = self.device.as_mut().and_then(Arc::get_mut) {
-            device.has_subgroups = false;
         }
     }
 
@@ -59,7 +51,8 @@ impl GpuFinder {
 
     /// Finds all pairs of boxes, in no particular order. An error is in words.
     pub fn search_all(&mut self, boxes: &[Aabb], config: &Config) -> Result<GpuFound, String> {
-        self.find(&SearchRequest { boxes, filters: None, changes: None, config }).map_err(in_words)
+        self.find(&SearchRequest { boxes, filters: None, changes: None, config }, Vec::new())
+            .map_err(in_words)
     }
 
     /// Finds the pairs that an update changes. An error is in words.

@@ -52,19 +52,14 @@ fn describe_adapters() -> Result<Vec<(String, GpuFinder)>, Failure> {
 }
 
 /// Which variant of each stage runs on an adapter, and why.
-fn variants(adapter: &wgpu::Adapter) -> [String; 4] {
+fn variants(adapter: &wgpu::Adapter) -> [String; 3] {
     let (features, limits) = (adapter.features(), adapter.limits());
-    let scan = match features.contains(wgpu::Features::SUBGROUP) {
-        true => "with subgroups: the adapter has them",
-        false => "without subgroups: the adapter has none",
-    };
     let times = match features.contains(wgpu::Features::TIMESTAMP_QUERY) {
         true => "by timestamps",
         false => "none: the adapter has no timestamps",
     };
     let most = limits.max_buffer_size.min(limits.max_storage_buffer_binding_size) / 256 * 256;
     [
-        format!("scan, schedule: {scan}"),
         "check, small cells: the device's square root, corrected by integers; large cells: balanced rows"
             .into(),
         format!("times of kernels: {times}"),

@@ -1,0 +1,23 @@
+// Sort, step 1: computes the number of workgroups of the kernels that sort pairs. There are none unless this chunk has all
+// pairs and they fit: then the host sorts.
+
+@group(0) @binding(0) var<uniform> params: Params;
+@group(0) @binding(1) var<uniform> chunk: Chunk;
+@group(0) @binding(2) var<storage, read> counters: Counters;
+@group(0) @binding(3) var<storage, read_write> totals: Totals;
+@group(0) @binding(4) var<storage, read_write> dispatches: array<u32, 9>;
+@group(0) @binding(5) var<storage, read_write> long_dispatch: array<u32, 3>;
+
+@compute @workgroup_size(1)
+fn arrange_rows() {
+    let pairs = totals.words.x / 2u;
+    let has_all = counters.small_items <= chunk.small_items && counters.large_items <= chunk.large_items;
+    let fits = totals.words.y == 0u && totals.words.x <= chunk.word_capacity && pairs <= params.pair_capacity;
+    let sorted = has_all && fits;
+    totals.sorted = u32(sorted);
+    write_dispatch(6u, select(0u, (pairs + LANES - 1u) / LANES, sorted));
+    // A workgroup for each window of each long row. rank_pairs counts these rows.
+    long_dispatch[0] = (params.boxes + WINDOW - 1u) / WINDOW;
+    long_dispatch[1] = 0u;
+    long_dispatch[2] = 1u;
+}

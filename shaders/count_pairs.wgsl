@@ -1,0 +1,14 @@
+// Sort, step 2: counts the pairs of each first box.
+
+@group(0) @binding(0) var<storage, read> totals: Totals;
+@group(0) @binding(1) var<storage, read> out: array<u32>;
+@group(0) @binding(2) var<storage, read_write> rows: array<atomic<u32>>;
+
+@compute @workgroup_size(LANES)
+fn count_pairs(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>,
+               @builtin(local_invocation_index) lane: u32) {
+    let i = linear(group, groups) * LANES + lane;
+    if 2u * i < totals.words.x {
+        atomicAdd(&rows[out[2u * i]], 1u);
+    }
+}

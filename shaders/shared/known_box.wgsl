@@ -1,0 +1,14 @@
+// The boxes as the host has left them, and as the checks need them.
+
+// Returns true if this update has changed a box, or if the device got the box now and before.
+fn has_changed(id: u32) -> bool {
+    return id >= params.known || ((changed[id / 32u] >> (id % 32u)) & 1u) != 0u;
+}
+
+fn known_box(id: u32) -> KnownBox {
+    let one = boxes[id];
+    if is_stale(one, has_changed(id)) {
+        return renewed(one);
+    }
+    return one;
+}
