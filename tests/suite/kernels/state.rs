@@ -175,7 +175,7 @@ impl State {
     /// Returns the end of a list of entries, after the scan.
     pub(super) fn end_at(&self, list: usize) -> u32 {
         let cell = &self.cells[list / 2];
-        let end = if list % 2 == 0 { cell.residents } else { cell.visitors };
+        let end = if list.is_multiple_of(2) { cell.residents } else { cell.visitors };
         end + self.sums[list / COUNTS_PER_BLOCK as usize]
     }
 
