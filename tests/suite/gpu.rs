@@ -18,7 +18,10 @@ fn set(name: &str, n: usize) -> Vec<Aabb> {
 
 /// Returns settings for a device that always makes a grid.
 fn with(options: GpuOptions) -> Config {
-    Config { gpu: GpuOptions { all_pairs_up_to: 0, count_tests: true, ..options }, ..gpu(options.coding) }
+    Config {
+        gpu: GpuOptions { all_pairs_up_to: 0, count_tests: true, time_kernels: true, ..options },
+        ..gpu(options.coding)
+    }
 }
 
 /// Returns the pairs, which a device must have found, and its report.

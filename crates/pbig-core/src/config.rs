@@ -122,6 +122,9 @@ pub struct GpuOptions {
     /// If true, the device counts the tests that it makes, those that repeat another and those of boxes that are apart. It
     /// costs four more atomic operations for each workgroup.
     pub count_tests: bool,
+    /// If true, the device measures the time of each kernel, where it can. It then finishes one before the next begins, and
+    /// recording takes the host twice as long.
+    pub time_kernels: bool,
 }
 
 impl GpuOptions {
@@ -141,6 +144,7 @@ impl GpuOptions {
         small_cell: 32,
         all_pairs_up_to: 1024,
         count_tests: false,
+        time_kernels: false,
     };
 }
 

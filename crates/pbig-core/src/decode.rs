@@ -6,7 +6,6 @@ use crate::Pair;
 use crate::layout::{BOX_BITS, ENDED, LANES};
 use rayon::prelude::*;
 use std::ops::Range;
-use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Words that break the format.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
@@ -30,24 +29,34 @@ const PIECE: usize = 1 << 15;
 /// If the number of words is odd, a pair is not `a < b < boxes`, or the order is broken. Then some pairs were appended.
 pub fn plain(words: &[u32], boxes: u32, is_sorted: bool, pairs: &mut Vec<Pair>) -> Result<(), DecodeError> {
     let given = whole_pairs(words)?;
-    let fault = |i: usize| match given[i] {
-        Pair { a, b } if a >= b || b >= boxes => Some("not a < b < boxes"),
-        pair if is_sorted && i > 0 && given[i - 1] >= pair => Some("pairs out of order"),
-        _ => None,
-    };
-    let is_faulty = AtomicBool::new(false);
-    // Copied in the same pass: the words may lie in memory of a device.
-    pairs.par_extend((0..given.len()).into_par_iter().with_min_len(PIECE).map(|i| {
-        if fault(i).is_some() {
-            is_faulty.store(true, Ordering::Relaxed);
-        }
-        given[i]
-    }));
-    if !is_faulty.into_inner() {
-        return Ok(());
+    let start = pairs.len();
+    if given.len() < 2 * PIECE {
+        pairs.extend_from_slice(given);
+    } else {
+        pairs.par_extend(given.par_iter().with_min_len(PIECE).copied());
     }
-    let first = (0..given.len()).find_map(|i| Some((fault(i)?, i)));
-    first.map_or(Ok(()), |(what, i)| Err(DecodeError { what, at: 2 * i }))
+    // The copy is checked: the words may lie in memory of a device, which is slow to read.
+    let copied = &pairs[start..];
+    let pieces = copied.par_chunks(2 * PIECE).enumerate();
+    let faulty = pieces.find_first(|(i, piece)| {
+        let before = if *i == 0 { None } else { Some(copied[2 * PIECE * i - 1]) };
+        !are_pairs(piece, boxes)
+            || is_sorted && !(piece.is_sorted_by(|a, b| a < b) && before < Some(piece[0]))
+    });
+    faulty.map_or(Ok(()), |(i, piece)| Err(fault_of(piece, boxes, 4 * PIECE * i)))
+}
+
+fn are_pairs(piece: &[Pair], boxes: u32) -> bool {
+    // Without an early end, so that the compiler uses SIMD.
+    piece.iter().fold(true, |all, pair| all & (pair.a < pair.b) & (pair.b < boxes))
+}
+
+/// Returns the error of a piece whose first word is `at`.
+fn fault_of(piece: &[Pair], boxes: u32, at: usize) -> DecodeError {
+    match piece.iter().position(|pair| pair.a >= pair.b || pair.b >= boxes) {
+        Some(i) => DecodeError { what: "not a < b < boxes", at: at + 2 * i },
+        None => DecodeError { what: "pairs out of order", at },
+    }
 }
 
 fn whole_pairs(words: &[u32]) -> Result<&[Pair], DecodeError> {

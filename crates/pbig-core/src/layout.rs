@@ -107,6 +107,13 @@ shared_structs! {
         sorted: u32, unused: u32 }
 }
 
+impl Chunk {
+    /// Returns true if there are no work items.
+    pub fn is_empty(&self) -> bool {
+        self.small_items == 0 && self.large_items == 0
+    }
+}
+
 impl DeviceBox {
     /// A box that overlaps nothing: all of `low` lies above all of `high`, beyond the infinities.
     pub const INVALID: Self = Self { low: [i32::MAX; 3], high: [i32::MIN; 3] };

@@ -125,7 +125,7 @@ pub struct GpuReport {
     pub wait: Duration,
     /// Time of the host: decoding.
     pub decode: Duration,
-    /// Time on the device by kernel, where the adapter measures it.
+    /// Time on the device by kernel, where the adapter measures it, if [`crate::GpuOptions::time_kernels`] is set.
     pub kernels: Vec<(&'static str, Duration)>,
     /// Bytes sent to the device.
     pub uploaded: u64,

@@ -79,9 +79,15 @@ impl BroadPhase {
         let (world, kept, events) = (&self.world, &self.kept, &mut self.comparison);
         events.clear();
         let existed = |pair: &Pair| !world.was_removed(pair.a) && !world.was_removed(pair.b);
+        // A pair that is not kept cannot end: a device that says so is wrong, and does no harm.
         events.removed.extend(found.ended.iter().filter(|pair| kept.contains(**pair)));
         // The device takes pairs of boxes that it treats as new for new ones.
-        let is_new = |pair: &&Pair| !(kept.contains(**pair) && existed(pair));
+        let restarted = &found.restarted;
+        let is_restarted = |id: u32| restarted.binary_search(&id).is_ok();
+        let may_be_kept = |pair: &Pair| is_restarted(pair.a) || is_restarted(pair.b);
+        let is_new = |pair: &&Pair| {
+            restarted.is_empty() || !may_be_kept(pair) || !(kept.contains(**pair) && existed(pair))
+        };
         events.added.extend(found.pairs.iter().filter(is_new));
         for &id in world.removed() {
             events.dropped.extend(kept.partners(id).map(|other| Pair::new(id, other)));

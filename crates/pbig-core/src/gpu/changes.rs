@@ -59,7 +59,10 @@ impl ChangeRequest<'_> {
 
     fn restarted(&self) -> Vec<u32> {
         let changed = self.changed.par_iter().with_min_len(PIECE);
-        changed.filter(|change| self.is_restarted(change)).map(|change| change.id).collect()
+        let mut ids: Vec<u32> =
+            changed.filter(|change| self.is_restarted(change)).map(|change| change.id).collect();
+        ids.sort_unstable();
+        ids
     }
 
     /// Returns boxes now and before, for a device that does not have them.

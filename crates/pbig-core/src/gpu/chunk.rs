@@ -4,13 +4,13 @@ use super::GpuError;
 use super::coding::bit_words;
 use super::device::Variant;
 use super::error::Failure;
-use super::passes::{CLASSES_BYTES, Recording, Step, apply_changes, lists_fit, measure};
+use super::passes::{CLASSES_BYTES, Recording, Step, apply_changes, check, lists_fit, measure, sort};
 use super::readback::{self, HEADER_BYTES, Header};
-use super::session::Session;
+use super::session::{Session, rest};
 use super::sink::Sink;
 use super::storage::{BufferId, Side};
 use crate::decode;
-use crate::layout::{BITS, Chunk, Counters, PACKED, Params, RAW, Totals, halves, wide};
+use crate::layout::{BITS, Chunk, Counters, PACKED, Params, RAW, SORTED, Totals, halves, wide};
 use crate::pbig::{CLASSES, SizeClass};
 use crate::report::{Clock, GpuReport};
 use pbig_shaders::Buffer;
@@ -36,6 +36,8 @@ pub(super) enum ChunkResult {
     TooManyTests,
     /// The output needs this many words.
     OutputTooLarge(u64),
+    /// The pairs are on the device, to be sorted when the other chunks are done.
+    Unsorted,
 }
 
 impl Session {
@@ -43,24 +45,45 @@ impl Session {
     pub(super) fn submit(
         &mut self,
         params: &Params,
-        mut items: Chunk,
+        items: Chunk,
         side: Side,
         steps: &[Step],
         left: u64,
     ) -> Result<PendingChunk, GpuError> {
         let mut clock = Clock::start();
         let prefetched = self.make_room(params, side)?;
-        let capacity = self.storage.size(BufferId::of(Buffer::Out, side)) / 4;
-        items.word_capacity = capacity.min(u64::from(u32::MAX) - 1) as u32;
-        items.pairs_left = halves(left);
-        self.storage.write(BufferId::of(Buffer::Chunk, side), &[items])?;
-        let clear = Step::Clear(Buffer::Totals, size_of::<Totals>() as u64);
-        let steps: Vec<Step> = [clear].into_iter().chain(steps.iter().copied()).collect();
-        let (submission, passes) = self.record(params, side, &steps, Some(prefetched))?;
+        self.write_chunk(items, side, left)?;
+        let (submission, passes) = self.record(params, side, steps, Some(prefetched))?;
         // A map has turned the boxes into ordered integers.
         self.has_raw_boxes &= params.flags & RAW == 0;
         self.recording += clock.lap();
         Ok(PendingChunk { items, side, submission, prefetched, passes })
+    }
+
+    /// Checks the other chunks of sorted pairs, which add their output to that of the first, and sorts all.
+    pub(super) fn submit_rest_and_sort(
+        &mut self,
+        params: &Params,
+        rest: &[Chunk],
+        left: u64,
+    ) -> Result<PendingChunk, GpuError> {
+        for items in rest {
+            let mut clock = Clock::start();
+            self.write_chunk(*items, 0, left)?;
+            let steps = check(items.small_items, items.large_items);
+            self.record(params, 0, &steps, None)?;
+            self.recording += clock.lap();
+        }
+        let all = Chunk { small_items: u32::MAX, large_items: u32::MAX, ..Chunk::default() };
+        self.submit(params, all, 0, &sort(params), left)
+    }
+
+    /// Tells the kernels which work items to check, and how much output there may be.
+    fn write_chunk(&mut self, items: Chunk, side: Side, left: u64) -> Result<(), GpuError> {
+        let capacity = self.storage.size(BufferId::of(Buffer::Out, side)) / 4;
+        let word_capacity = capacity.min(u64::from(u32::MAX) - 1) as u32;
+        let items = Chunk { word_capacity, pairs_left: halves(left), ..items };
+        self.storage.write(BufferId::of(Buffer::Chunk, side), &[items])
     }
 
     /// Records and submits uploads and changes that wait, `steps`, and a readback of some bytes of output, if they are told.
@@ -73,7 +96,8 @@ impl Session {
         prefetched: Option<u64>,
     ) -> Result<(wgpu::SubmissionIndex, Vec<&'static str>), GpuError> {
         self.storage.write(Buffer::Params, &[*params])?;
-        let timestamps = self.timestamps[side].as_ref().filter(|_| prefetched.is_some());
+        let is_timed = prefetched.is_some() && self.options.time_kernels;
+        let timestamps = self.timestamps[side].as_ref().filter(|_| is_timed);
         let descriptor = wgpu::CommandEncoderDescriptor { label: Some("pbig") };
         let mut encoder = self.device.handle.create_command_encoder(&descriptor);
         let has_copies = self.storage.record_copies(&mut encoder);
@@ -86,10 +110,10 @@ impl Session {
             passes: Vec::new(),
         };
         // Applied once, however often a map or a chunk is repeated.
-        if std::mem::take(&mut self.has_pending_changes) {
-            recording.record(&apply_changes(params))?;
-        }
-        recording.record(steps)?;
+        let has_changes = std::mem::take(&mut self.has_pending_changes);
+        let changes = has_changes.then(|| apply_changes(params));
+        let steps: Vec<Step> = changes.into_iter().flatten().chain(steps.iter().copied()).collect();
+        recording.record(&steps)?;
         if let Some(prefetched) = prefetched {
             readback::record(&mut recording, timestamps, prefetched);
         }
@@ -166,6 +190,9 @@ impl Session {
             return Ok(repeat);
         }
         sink.found.report.chunks += 1;
+        if params.flags & SORTED != 0 && totals.sorted == 0 && !rest(&counters, &chunk.items).is_empty() {
+            return Ok(ChunkResult::Unsorted);
+        }
         let words = self.words(bytemuck::cast_slice(prefetched), out, needed, sink)?;
         sink.found.report.wait += clock.lap();
         self.sizes.max_words = self.sizes.max_words.max(needed);
@@ -216,7 +243,7 @@ impl Session {
     }
 
     fn note_times(&self, chunk: &PendingChunk, header: &Header, sink: &mut Sink) {
-        if self.device.has_timestamps {
+        if self.device.has_timestamps && self.options.time_kernels {
             let times = header.times(&chunk.passes, self.device.queue.get_timestamp_period());
             times.for_each(|(name, time)| sink.add_time(name, time));
         }

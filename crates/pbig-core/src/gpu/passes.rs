@@ -1,5 +1,4 @@
-//! The kernels and buffers of a submission, as tables. Each kernel is a compute pass with its buffers, its name and its
-//! times.
+//! The kernels and buffers of a submission, as tables.
 
 use super::GpuError;
 use super::device::Variant;
@@ -7,7 +6,7 @@ use super::storage::{BufferId, Side, Storage};
 use crate::Pair;
 use crate::layout::{
     CELLS_PER_BLOCK, COUNTS_PER_BLOCK, Cell, Counters, LANES, LargeItem, Located, Params, SHORT_ROW, SORTED,
-    Slot, SmallItem,
+    Slot, SmallItem, Totals,
 };
 use pbig_shaders::{self as shaders, Buffer, Kernel};
 
@@ -41,6 +40,9 @@ pub(super) enum Step {
     RunOnRows(&'static Kernel, Groups),
 }
 
+/// The step that begins the counts of a check anew.
+pub(super) const CLEAR_TOTALS: Step = Clear(Buffer::Totals, size_of::<Totals>() as u64);
+
 use Buffer::{Dispatches, LongDispatch};
 use Groups::{Direct, Indirect};
 use Step::{Clear, Run, RunOnRows};
@@ -66,10 +68,11 @@ pub(super) fn measure(params: &Params) -> [Step; 2] {
 }
 
 /// Returns the steps that turn boxes into work items, without a round trip to the host, check the first of these, and sort
-/// the pairs if the flags say so.
-pub(super) fn map_and_check(params: &Params) -> Vec<Step> {
+/// the pairs if the flags say so and these items are expected to be all.
+pub(super) fn map_and_check(params: &Params, is_all: bool) -> Vec<Step> {
     let by_box = Direct(params.boxes.div_ceil(LANES));
     let mut steps = vec![
+        CLEAR_TOTALS,
         Clear(Buffer::Cells, bytes_of::<Cell>(params.cells)),
         Clear(Buffer::Counters, bytes_of::<Counters>(1)),
         Run(&shaders::LOCATE, by_box),
@@ -82,14 +85,14 @@ pub(super) fn map_and_check(params: &Params) -> Vec<Step> {
         Run(&shaders::CHECK_SMALL, Indirect(Dispatches, 0)),
         Run(&shaders::CHECK_LARGE, Indirect(Dispatches, 12)),
     ];
-    if params.flags & SORTED != 0 {
+    if is_all && params.flags & SORTED != 0 {
         steps.extend(sort(params));
     }
     steps
 }
 
 /// Returns the steps that sort the pairs, where the chunk has all and they fit.
-fn sort(params: &Params) -> [Step; 8] {
+pub(super) fn sort(params: &Params) -> [Step; 8] {
     [
         Run(&shaders::ARRANGE_ROWS, Direct(1)),
         Clear(Buffer::Rows, bytes_of::<u32>(params.boxes)),
@@ -175,8 +178,18 @@ pub(super) struct Recording<'a> {
     pub(super) passes: Vec<&'static str>,
 }
 
+/// A kernel that is ready to run.
+struct Ready {
+    name: &'static str,
+    pipeline: wgpu::ComputePipeline,
+    bind_group: wgpu::BindGroup,
+    groups: Groups,
+}
+
 impl Recording<'_> {
+    /// Records steps: first everything that is cleared, then the kernels. They share a pass, unless each is timed.
     pub(super) fn record(&mut self, steps: &[Step]) -> Result<(), GpuError> {
+        let mut kernels = Vec::with_capacity(steps.len());
         for &step in steps {
             match step {
                 Clear(buffer, bytes) => {
@@ -184,31 +197,52 @@ impl Recording<'_> {
                     self.encoder.clear_buffer(buffer, 0, Some(bytes));
                 }
                 Run(_, Direct(0)) => {}
-                Run(kernel, groups) => self.run(kernel, groups, self.variant)?,
-                RunOnRows(kernel, groups) => self.run(kernel, groups, self.variant.of_rows())?,
+                Run(kernel, groups) => kernels.push(self.ready(kernel, groups, self.variant)?),
+                RunOnRows(kernel, groups) => {
+                    kernels.push(self.ready(kernel, groups, self.variant.of_rows())?);
+                }
             }
+        }
+        self.passes.extend(kernels.iter().map(|kernel| kernel.name));
+        let Some(query_set) = self.queries else {
+            self.run(&kernels, None);
+            return Ok(());
+        };
+        for (i, kernel) in (0u32..).zip(&kernels) {
+            let (beginning, end) = (Some(2 * i), Some(2 * i + 1));
+            let writes = wgpu::ComputePassTimestampWrites {
+                query_set,
+                beginning_of_pass_write_index: beginning,
+                end_of_pass_write_index: end,
+            };
+            self.run(std::slice::from_ref(kernel), Some(writes));
         }
         Ok(())
     }
 
-    fn run(&mut self, kernel: &'static Kernel, groups: Groups, variant: Variant) -> Result<(), GpuError> {
+    fn ready(
+        &mut self,
+        kernel: &'static Kernel,
+        groups: Groups,
+        variant: Variant,
+    ) -> Result<Ready, GpuError> {
         let pipeline = self.storage.device.pipeline(kernel, variant)?;
         let bind_group = self.storage.bind_group(kernel, variant, self.side, &pipeline);
-        let first_query = 2 * self.passes.len() as u32;
-        let timestamp_writes = self.queries.map(|query_set| wgpu::ComputePassTimestampWrites {
-            query_set,
-            beginning_of_pass_write_index: Some(first_query),
-            end_of_pass_write_index: Some(first_query + 1),
-        });
-        self.passes.push(kernel.name);
-        let descriptor = wgpu::ComputePassDescriptor { label: Some(kernel.name), timestamp_writes };
+        Ok(Ready { name: kernel.name, pipeline, bind_group, groups })
+    }
+
+    /// Records a pass.
+    fn run(&mut self, kernels: &[Ready], timestamp_writes: Option<wgpu::ComputePassTimestampWrites<'_>>) {
+        let descriptor = wgpu::ComputePassDescriptor { label: Some("pbig"), timestamp_writes };
         let mut pass = self.encoder.begin_compute_pass(&descriptor);
-        pass.set_pipeline(&pipeline);
-        pass.set_bind_group(0, &bind_group, &[]);
-        match groups {
-            Direct(n) => pass.dispatch_workgroups(n.min(GROUPS_PER_ROW), n.div_ceil(GROUPS_PER_ROW), 1),
-            Indirect(buffer, at) => pass.dispatch_workgroups_indirect(self.storage.get(buffer), at),
+        for Ready { name, pipeline, bind_group, groups } in kernels {
+            pass.insert_debug_marker(name);
+            pass.set_pipeline(pipeline);
+            pass.set_bind_group(0, bind_group, &[]);
+            match *groups {
+                Direct(n) => pass.dispatch_workgroups(n.min(GROUPS_PER_ROW), n.div_ceil(GROUPS_PER_ROW), 1),
+                Indirect(buffer, at) => pass.dispatch_workgroups_indirect(self.storage.get(buffer), at),
+            }
         }
-        Ok(())
     }
 }

@@ -6,7 +6,7 @@ use super::coding::{CodingChoice, bits_that_fit};
 use super::device::GpuDevice;
 use super::error::Failure;
 use super::kept_plan::KeptPlan;
-use super::passes::{self, Groups, Step};
+use super::passes::{self, CLEAR_TOTALS, Groups, Step};
 use super::readback::Timestamps;
 use super::sink::{GpuFound, Sink};
 use super::storage::Storage;
@@ -276,9 +276,18 @@ impl Session {
                 sink.found.plan = self.plan.as_ref().map(|kept| kept.plan.clone());
             }
             let chunk = self.submit_first(&mut params, sink.left())?;
-            let first = chunk.items;
-            let done = match self.finish(chunk, &params, sink)? {
+            let mut first = chunk.items;
+            let mut result = self.finish(chunk, &params, sink)?;
+            if matches!(result, ChunkResult::Unsorted) {
+                let rest = cut(rest(&self.sizes.lists, &first), self.chunk_items());
+                let chunk = self.submit_rest_and_sort(&params, &rest, sink.left())?;
+                first = chunk.items;
+                result = self.finish(chunk, &params, sink)?;
+            }
+            let done = match result {
                 ChunkResult::Done => Some(first),
+                // The last chunk has all, so it is sorted, or too large.
+                ChunkResult::Unsorted => return Err(self.too_large().into()),
                 ChunkResult::MapTooLarge => None,
                 ChunkResult::TooManyTests => {
                     self.plan = None;
@@ -315,7 +324,7 @@ impl Session {
         if params.levels == 0 {
             let small_items = pair_count(params.boxes).div_ceil(u64::from(LANES)) as u32;
             let items = Chunk { small_items, ..Chunk::default() };
-            let steps = [Step::Run(&CHECK_ALL, Groups::Direct(small_items))];
+            let steps = [CLEAR_TOTALS, Step::Run(&CHECK_ALL, Groups::Direct(small_items))];
             return self.submit(params, items, 0, &steps, left);
         }
         passes::make_buffers(&mut self.storage, params, &self.sizes.lists, self.options.first_bytes)?;
@@ -326,7 +335,8 @@ impl Session {
         }
         let [small_items, large_items] = self.chunk_items();
         let items = Chunk { small_items, large_items, ..Chunk::default() };
-        self.submit(params, items, 0, &passes::map_and_check(params), left)
+        let is_all = rest(&self.sizes.lists, &items).is_empty();
+        self.submit(params, items, 0, &passes::map_and_check(params, is_all), left)
     }
 
     /// Returns the work items of a chunk. A software adapter gets fewer, so that it answers in time.
@@ -346,7 +356,8 @@ impl Session {
                 && let Some(items) = pending.pop_front()
             {
                 side = 1 - side;
-                let steps = passes::check(items.small_items, items.large_items);
+                let [small, large] = passes::check(items.small_items, items.large_items);
+                let steps = [CLEAR_TOTALS, small, large];
                 in_progress.push_back(self.submit(params, items, side, &steps, sink.left())?);
             }
             let Some(chunk) = in_progress.pop_front() else { return Ok(()) };
@@ -377,7 +388,7 @@ impl Session {
 }
 
 /// Returns the work items that are left after the first chunk.
-fn rest(all: &Counters, done: &Chunk) -> Chunk {
+pub(super) fn rest(all: &Counters, done: &Chunk) -> Chunk {
     let first_small = all.small_items.min(done.small_items);
     let first_large = all.large_items.min(done.large_items);
     let (small_items, large_items) = (all.small_items - first_small, all.large_items - first_large);

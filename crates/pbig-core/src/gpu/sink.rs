@@ -17,7 +17,7 @@ pub struct GpuFound {
     pub ended: Vec<Pair>,
     /// The pairs are in order.
     pub is_sorted: bool,
-    /// Ids of boxes that a search for changes treated as new.
+    /// Ids of boxes that a search for changes treated as new, ascending.
     pub restarted: Vec<u32>,
     /// Number of valid boxes; in a search for changes, of boxes that are valid now or were at the last update.
     pub valid: u32,
