@@ -38,10 +38,11 @@
 //! | `shadow` | [`PbigBroadPhase::with_shadow`]: rapier's own broad phase and brute force run beside it |
 //! | `unstable-study` | what studies and tests need; may change in any release |
 
-/// Runs the programs in the README as tests.
+/// Runs the programs in the documents as tests.
 #[cfg(doctest)]
 #[doc = include_str!("../../../README.md")]
-struct Readme;
+#[doc = include_str!("../../../docs/GETTING_STARTED.md")]
+struct Documents;
 
 mod broad_phase;
 mod call;
