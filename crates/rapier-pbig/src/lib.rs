@@ -38,11 +38,10 @@
 //! | `shadow` | [`PbigBroadPhase::with_shadow`]: rapier's own broad phase and brute force run beside it |
 //! | `unstable-study` | what studies and tests need; may change in any release |
 
-/// Runs the programs in the documents as tests.
+/// Runs the programs in the README as tests.
 #[cfg(doctest)]
 #[doc = include_str!("../../../README.md")]
-#[doc = include_str!("../../../docs/GETTING_STARTED.md")]
-struct Documents;
+struct Readme;
 
 mod broad_phase;
 mod call;
