@@ -1,1 +1,6 @@
 //! Runnable examples of pbig; each file beside this one is a program of its own.
+
+/// Runs the programs in the first steps as tests.
+#[cfg(doctest)]
+#[doc = include_str!("../docs/GETTING_STARTED.md")]
+struct GettingStarted;

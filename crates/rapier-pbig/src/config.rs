@@ -15,7 +15,7 @@ pub struct PbigConfig {
     /// The distance by which a stored AABB is larger than its collider's, in units of rapier's `length_unit`. A larger margin
     /// means that fewer colliders count as moved, and that more pairs are reported that do not touch yet. The default, 0.01,
     /// is that of rapier's own broad phase. The margin also covers rounding: without one, pairs are missed from a thousand
-    /// units from the origin on (docs/benchmarks/accuracy.md).
+    /// units from the origin on (docs/ACCURACY.md).
     pub margin: f32,
     /// The processor that searches for pairs.
     pub backend: Backend,

@@ -1,7 +1,7 @@
 //! pbig for rapier3d 0.36.1: finds the pairs of colliders in place of rapier's own broad phase.
 //!
-//! Rapier 0.36 has no interface for a broad phase of another crate. A small patch adds one; see the README of pbig for the
-//! command that applies it. Then one line changes, and the type of the broad phase stays:
+//! Rapier 0.36 has no interface for a broad phase of another crate. A small patch adds one; docs/RAPIER_VERSIONS.md of pbig has
+//! the command that applies it. Then one line changes, and the type of the broad phase stays:
 //!
 //! ```
 //! use rapier3d::prelude::*;
