@@ -1,1 +1,6 @@
 //! Runnable examples of pbig; each file beside this one is a program of its own.
+
+/// Runs the programs in the repository's README as tests.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;
