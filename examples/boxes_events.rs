@@ -31,7 +31,11 @@ fn main() -> Result<(), Error> {
 
     // Questions between updates.
     let around: Vec<u32> = broad_phase.pairs_of(MOVER).map(|pair| pair.a).collect();
-    println!("{} boxes, {} pairs; box {MOVER} is near {around:?}", broad_phase.len(), broad_phase.pair_count());
+    println!(
+        "{} boxes, {} pairs; box {MOVER} is near {around:?}",
+        broad_phase.len(),
+        broad_phase.pair_count()
+    );
     println!("boxes in a corner: {:?}", broad_phase.overlapping(&cube(0.75, 0.75)));
 
     // The pairs of a removed box end without events.

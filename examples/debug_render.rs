@@ -22,8 +22,9 @@ impl DebugRenderBackend for Picture {
     }
 
     fn draw_line(&mut self, _: DebugRenderObject, a: Point<Real>, b: Point<Real>, color: DebugColor) {
-        let [[x1, y1], [x2, y2]] =
-            [a, b].map(|p| [10.0 * (p.x - p.z), -10.0 * p.y - 4.0 * (p.x + p.z)].map(|x| (10.0 * x).round() / 10.0));
+        let [[x1, y1], [x2, y2]] = [a, b].map(|p| {
+            [10.0 * (p.x - p.z), -10.0 * p.y - 4.0 * (p.x + p.z)].map(|x| (10.0 * x).round() / 10.0)
+        });
         // Rapier's colours are hue in degrees, saturation, lightness and opacity.
         let [hue, saturation, lightness, alpha] = color;
         let color = format!("hsla({hue}, {}%, {}%, {alpha})", 100.0 * saturation, 100.0 * lightness);

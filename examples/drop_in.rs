@@ -41,6 +41,11 @@ fn main() {
     let lowest = bodies.iter().map(|(_, body)| body.translation().y).fold(f32::MAX, f32::min);
     println!("after four seconds the lowest of {} balls is at {lowest:.3}", bodies.len());
     let totals = broad_phase.stats().totals;
-    println!("{} pairs now; {} added, {} deleted so far", broad_phase.pair_count(), totals.added, totals.deleted);
+    println!(
+        "{} pairs now; {} added, {} deleted so far",
+        broad_phase.pair_count(),
+        totals.added,
+        totals.deleted
+    );
     println!("last update: {}", broad_phase.stats().report.plan);
 }

@@ -2,11 +2,19 @@
 //! DirectX 12. The SPIR-V passes `spirv-val`, if the machine has that program.
 
 use super::{texts, validate};
+use naga::back::pipeline_constants::process_overrides;
 use naga::back::{hlsl, msl, spv};
 use naga::valid::ModuleInfo;
 use pbig_shaders::{KERNELS, Kernel};
 use std::path::Path;
 use std::process::{Command, Output};
+
+/// Replaces the overridable constants of a module by their values.
+fn with_constants((module, info): &(naga::Module, ModuleInfo)) -> (naga::Module, ModuleInfo) {
+    let (module, info) =
+        process_overrides(module, info, None, &Default::default()).expect("every override has a default");
+    (module.into_owned(), info.into_owned())
+}
 
 /// Returns every kernel with its module, without subgroups and, where that is another text, with them.
 fn modules() -> impl Iterator<Item = (&'static Kernel, bool, (naga::Module, ModuleInfo))> {
@@ -14,7 +22,9 @@ fn modules() -> impl Iterator<Item = (&'static Kernel, bool, (naga::Module, Modu
     let distinct = variants.filter(|(kernel, changes, subgroups)| {
         (!changes || kernel.depends_on_search()) && (!subgroups || kernel.gains_from_subgroups())
     });
-    distinct.map(|(kernel, changes, subgroups)| (*kernel, subgroups, validate(kernel, subgroups, changes)))
+    distinct.map(|(kernel, changes, subgroups)| {
+        (*kernel, subgroups, with_constants(&validate(kernel, subgroups, changes)))
+    })
 }
 
 fn spirv(module: &naga::Module, info: &ModuleInfo, subgroups: bool) -> Vec<u32> {
