@@ -31,6 +31,8 @@ check() {
         echo "-- the command above failed with status $status after $((SECONDS - start)) s; the last lines of its output:"
         tail -n 300 "$log"
         echo "--"
+    else
+        sed -n 's/^== /      /p' "$log"
     fi
     return "$status"
 }
