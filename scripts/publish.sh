@@ -13,6 +13,11 @@ for package in $packages; do
         case $'\n'$files$'\n' in *$'\n'"$file"$'\n'*) ;; *) echo "$package has no $file" && exit 1 ;; esac
     done
 done
+# Copies, because links break on Windows.
+for folder in shaders crates/pbig-core crates/pbig-adapter crates/rapier-pbig; do
+    cmp LICENSE-MIT "$folder/LICENSE-MIT"
+    cmp LICENSE-APACHE "$folder/LICENSE-APACHE"
+done
 # Each is built from its package, against the others' packages.
 step cargo publish --dry-run --locked --allow-dirty $options
 
@@ -26,6 +31,15 @@ if has cargo-deny; then
     fi
 else
     left_out "cargo-deny"
+fi
+
+# Once there is a release, its interface is compared with this one's.
+if tag=$(git describe --tags --abbrev=0 --match 'v*' 2>/dev/null); then
+    if has cargo-semver-checks; then
+        step cargo semver-checks --baseline-rev "$tag" $options
+    else
+        left_out "a comparison with $tag, for which cargo-semver-checks is missing"
+    fi
 fi
 
 version=$(sed -n 's/^rust-version = "\(.*\)"/\1/p' Cargo.toml)

@@ -18,17 +18,18 @@ count() {
         }' "$1"
 }
 
-# check COMMAND...: runs a command of a step. What it prints is shown only if it fails.
+# check COMMAND...: runs a command of a step. If it fails, its output is shown, otherwise its headings.
 check() {
     local status=0 start=$SECONDS counts
     echo "   $*"
     "$@" >"$log" 2>&1 </dev/null || status=$?
     counts=$(count "$log" "$status")
     passed=$((passed + ${counts% *})) failed=$((failed + ${counts#* }))
+    echo "      $((SECONDS - start)) s, ${counts% *} passed, ${counts#* } failed"
     # A script that leaves a part out says so.
     note=${note:-$(sed -n 's/^== left out: /left out: /p' "$log" | head -n 1)}
     if [ "$status" != 0 ]; then
-        echo "-- the command above failed with status $status after $((SECONDS - start)) s; the last lines of its output:"
+        echo "-- the command above failed with status $status; the last lines of its output:"
         tail -n 300 "$log"
         echo "--"
     else
