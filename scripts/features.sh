@@ -3,7 +3,7 @@
 #   scripts/features.sh [KIND...]     without a kind: none parallel simd deterministic
 # none, parallel, simd, deterministic: all that depends on rapier, with this feature of rapier alone beside its serde-serialize
 #   (parallel, simd-stable and enhanced-determinism in rapier; scripts/test.sh tests the first two together).
-# powerset: lints pbig-core and rapier-pbig with every set of their features.
+# powerset: lints rapier-pbig, and the crates of this workspace that it depends on, with every set of its features.
 # powerset-0.36: the same for rapier-pbig of rapier 0.36.
 set -euo pipefail
 cd "$(dirname "$0")/.."
@@ -20,7 +20,7 @@ sets() {
     done
 }
 
-# lint PACKAGE OPTIONS FEATURE...: lints a package with every set of the features.
+# lint PACKAGE OPTIONS FEATURE...: lints a package, and its dependencies of the workspace, with every set of the features.
 lint() {
     local package=$1 options=$2 set
     shift 2
@@ -45,8 +45,8 @@ test_with() {
 for kind in "$@"; do
     case $kind in
     powerset)
-        lint pbig-core "" parallel gpu serde unstable-study
         lint rapier-pbig "" parallel gpu serde debug-render shadow
+        lint pbig-core "" gpu unstable-study
         ;;
     powerset-0.36) lint rapier-pbig "--manifest-path rapier-0.36/Cargo.toml" parallel gpu shadow ;;
     *) test_with "$kind" ;;
