@@ -55,7 +55,8 @@ fn main() -> std::io::Result<()> {
     broad_phase.debug_render(&colliders, DebugRenderParts::ALL, &mut picture);
 
     std::fs::create_dir_all("out")?;
-    let head = r#"<svg xmlns="http://www.w3.org/2000/svg" viewBox="-500 -500 1000 800" style="background: #181820">"#;
+    let head = "<svg xmlns='http://www.w3.org/2000/svg' viewBox='-450 -480 900 570' stroke-width='0.4' \
+        style='background: #181820'>";
     std::fs::write("out/debug_render.svg", format!("{head}{}</svg>", picture.lines))?;
     println!("{}", broad_phase.stats().report.plan);
     println!("{} lines in out/debug_render.svg", picture.count);
