@@ -1,82 +1,64 @@
-//! A picture of what the broad phase has stored: boxes with their margins, and the cells of its grid. Any renderer that
-//! draws rapier's own debug lines draws these too; here they go into an SVG.
+//! Draws what the broad phase has stored: boxes with their margins, and the cells of its grid. A renderer that draws rapier's
+//! debug lines draws these too; here they go into an SVG.
 //!
 //! `cargo run --release --example debug_render` writes out/debug_render.svg
 
-use pbig_harness::scenes::Scene;
-use plotters::prelude::*;
 use rapier_pbig::{DebugRenderParts, PbigBroadPhase};
 use rapier3d::pipeline::{DebugColor, DebugRenderBackend, DebugRenderObject};
-use rapier3d::prelude::{Point, Real};
-use std::error::Error;
-use std::path::Path;
+use rapier3d::prelude::*;
+use std::fmt::Write;
 
-/// A line on the paper, and its colour.
-type Line = ([(f64, f64); 2], DebugColor);
-
-/// Remembers lines, seen obliquely from above.
+/// Lines of an SVG, seen obliquely from above.
 #[derive(Default)]
-struct Lines(Vec<Line>);
+struct Picture {
+    lines: String,
+    count: usize,
+}
 
-impl DebugRenderBackend for Lines {
-    /// A ground is larger than any paper.
+impl DebugRenderBackend for Picture {
+    /// Leaves out the ground, which is larger than any paper.
     fn filter_object(&self, object: DebugRenderObject) -> bool {
-        matches!(object, DebugRenderObject::ColliderAabb(_, _, aabb) if aabb.extents().amax() < 20.0)
+        matches!(object, DebugRenderObject::ColliderAabb(_, _, aabb) if aabb.extents().amax() < 100.0)
     }
 
     fn draw_line(&mut self, _: DebugRenderObject, a: Point<Real>, b: Point<Real>, color: DebugColor) {
-        let seen =
-            |p: Point<Real>| (f64::from(p.x - p.z) * 0.87, f64::from(p.y) + f64::from(p.x + p.z) * 0.3);
-        self.0.push(([seen(a), seen(b)], color));
+        let [[x1, y1], [x2, y2]] = [a, b].map(|p| {
+            [10.0 * (p.x - p.z), -10.0 * p.y - 4.0 * (p.x + p.z)].map(|x| (10.0 * x).round() / 10.0)
+        });
+        // Rapier's colours are hue in degrees, saturation, lightness and opacity.
+        let [hue, saturation, lightness, alpha] = color;
+        let color = format!("hsla({hue}, {}%, {}%, {alpha})", 100.0 * saturation, 100.0 * lightness);
+        let written = writeln!(self.lines, r#"<path d="M{x1} {y1}L{x2} {y2}" stroke="{color}"/>"#);
+        written.expect("a string takes everything");
+        self.count += 1;
     }
 }
 
-fn main() -> Result<(), Box<dyn Error>> {
-    // A few hundred boxes would need no grid, so there would be no cells to draw.
+/// Returns a broad phase that has seen 1,500 balls in a spiral. Few boxes would need no grid.
+fn spiral(bodies: &RigidBodySet, colliders: &mut ColliderSet) -> PbigBroadPhase {
+    colliders.insert(ColliderBuilder::halfspace(Vector::y_axis()));
+    for i in 0..1500 {
+        let (turn, radius) = (0.05 * i as f32, 5.0 + 0.015 * i as f32);
+        let at = vector![radius * turn.cos(), 0.02 * i as f32, radius * turn.sin()];
+        colliders.insert(ColliderBuilder::ball(0.5).translation(at));
+    }
+    let handles: Vec<ColliderHandle> = colliders.iter().map(|(handle, _)| handle).collect();
     let mut broad_phase = PbigBroadPhase::new();
-    let mut world = Scene::named("rain")?.build(1500, 1);
-    for _ in 0..60 {
-        world.step(&mut broad_phase);
-    }
+    broad_phase.update(&IntegrationParameters::default(), colliders, bodies, &handles, &[], &mut Vec::new());
+    broad_phase
+}
 
-    let draw = |parts: DebugRenderParts| {
-        let mut lines = Lines::default();
-        broad_phase.debug_render(&world.colliders, parts, &mut lines);
-        lines.0
-    };
-    let file = Path::new("out/debug_render.svg");
+fn main() -> std::io::Result<()> {
+    let (bodies, mut colliders) = (RigidBodySet::new(), ColliderSet::new());
+    let broad_phase = spiral(&bodies, &mut colliders);
+    let mut picture = Picture::default();
+    broad_phase.debug_render(&colliders, DebugRenderParts::ALL, &mut picture);
+
     std::fs::create_dir_all("out")?;
-    let boxes = draw(DebugRenderParts { fat_boxes: true, cells: false });
-    let all = draw(DebugRenderParts::ALL);
-    paint(file, [("boxes with their margins", boxes), ("and the cells that they are sorted into", all)])?;
-    println!("{} pairs; {}", broad_phase.pair_count(), broad_phase.stats().report.plan);
-    println!("the picture is {}", file.display());
+    let head = "<svg xmlns='http://www.w3.org/2000/svg' viewBox='-450 -480 900 570' stroke-width='0.4' \
+        style='background: #181820'>";
+    std::fs::write("out/debug_render.svg", format!("{head}{}</svg>", picture.lines))?;
+    println!("{}", broad_phase.stats().report.plan);
+    println!("{} lines in out/debug_render.svg", picture.count);
     Ok(())
-}
-
-/// Two pictures side by side.
-fn paint(file: &Path, pictures: [(&str, Vec<Line>); 2]) -> Result<(), Box<dyn Error>> {
-    let root = SVGBackend::new(file, (1200, 700)).into_drawing_area();
-    root.fill(&RGBColor(24, 24, 32))?;
-    let points = || pictures[1].1.iter().flat_map(|(line, _)| line);
-    let range = |of: fn(&(f64, f64)) -> f64| {
-        let (low, high) = points().map(of).fold((f64::MAX, f64::MIN), |(l, h), x| (l.min(x), h.max(x)));
-        low - 0.5..high + 0.5
-    };
-    for (area, (title, lines)) in root.split_evenly((1, 2)).iter().zip(&pictures) {
-        let mut chart = ChartBuilder::on(area)
-            .caption(title, ("sans-serif", 20, &WHITE))
-            .margin(10)
-            .build_cartesian_2d(range(|p| p.0), range(|p| p.1))?;
-        let path = |(line, color): &Line| PathElement::new(line.to_vec(), paint_of(*color));
-        chart.draw_series(lines.iter().map(path))?;
-    }
-    root.present()?;
-    Ok(())
-}
-
-/// Rapier's colours are hue in degrees, saturation, lightness and opacity.
-fn paint_of([hue, saturation, lightness, opacity]: DebugColor) -> RGBAColor {
-    let [hue, saturation, lightness] = [hue / 360.0, saturation, lightness].map(f64::from);
-    HSLColor(hue, saturation, lightness).mix(f64::from(opacity))
 }

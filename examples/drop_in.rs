@@ -1,4 +1,4 @@
-//! Any rapier app, with one line changed.
+//! A rapier app in which one line changed.
 //!
 //! `cargo run --release --example drop_in`
 
@@ -40,5 +40,12 @@ fn main() {
 
     let lowest = bodies.iter().map(|(_, body)| body.translation().y).fold(f32::MAX, f32::min);
     println!("after four seconds the lowest of {} balls is at {lowest:.3}", bodies.len());
-    println!("{} pairs; {}", broad_phase.pair_count(), broad_phase.stats().report.plan);
+    let totals = broad_phase.stats().totals;
+    println!(
+        "{} pairs now; {} added, {} deleted so far",
+        broad_phase.pair_count(),
+        totals.added,
+        totals.deleted
+    );
+    println!("last update: {}", broad_phase.stats().report.plan);
 }

@@ -4,3 +4,8 @@
 #[cfg(doctest)]
 #[doc = include_str!("../docs/GETTING_STARTED.md")]
 struct GettingStarted;
+
+/// Runs the programs in the repository's README as tests.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

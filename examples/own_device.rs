@@ -1,12 +1,11 @@
-//! An app that has a wgpu device shares it with the finder: boxes go to the same GPU, no second device
-//! is opened.
+//! Shares an app's wgpu device with the finder, so that no second device is opened.
 //!
-//! cargo run --release --example own_device
+//! `cargo run --release --example own_device`
 
 use pbig_core::{Aabb, Backend, Config, Finder, GpuFinder};
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
-    // What an app does anyway.
+    // An app has these already.
     let instance = wgpu::Instance::new(wgpu::InstanceDescriptor::new_without_display_handle_from_env());
     let adapter = pollster::block_on(instance.request_adapter(&wgpu::RequestAdapterOptions::default()))?;
     let (device, queue) = pollster::block_on(adapter.request_device(&wgpu::DeviceDescriptor::default()))?;
@@ -15,7 +14,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     println!("on {}", gpu.adapter());
     let mut finder = Finder::with_gpu(Config { backend: Backend::Gpu, ..Config::DEFAULT }, gpu);
 
-    // A million cubes would do as well; this many take a moment on a software adapter too.
+    // A hardware GPU takes a million as well. A software adapter takes a moment for this many.
     let boxes: Vec<Aabb> = (0..20_000u32)
         .map(|i| Aabb::from_center([(i % 100) as f32, (i / 100 % 100) as f32, (i / 10_000) as f32], [0.5; 3]))
         .collect();

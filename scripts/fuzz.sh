@@ -10,14 +10,21 @@ seconds=${1:-600}
 shift || true
 [ $# -gt 0 ] || set -- finder_against_oracle updates_against_scratch decode csv_reader npy_reader
 
-# Lengths at which an input takes milliseconds, and no allocation that the input does not account for.
-declare -A length=([finder_against_oracle]=1600 [updates_against_scratch]=800)
+# length TARGET: the length in bytes at which an input takes milliseconds, and no allocation that the input does not account for.
+length() {
+    case $1 in
+    finder_against_oracle) echo 1600 ;;
+    updates_against_scratch) echo 800 ;;
+    *) echo 4096 ;;
+    esac
+}
+
 cargo run --release -p pbig-tests --example fuzz_seeds
 for target in "$@"; do
     echo "== $target"
-    words=()
-    [ ! -f "fuzz/$target.dict" ] || words=(-dict="fuzz/$target.dict")
+    words=''
+    [ ! -f "fuzz/$target.dict" ] || words="-dict=fuzz/$target.dict"
     # Inputs of every length from the beginning: by itself libFuzzer stays below 30 bytes for minutes.
-    cargo +nightly fuzz run "$target" -- -len_control=0 -max_total_time="$seconds" -max_len="${length[$target]:-4096}" \
-        -malloc_limit_mb=64 -timeout=60 -print_final_stats=1 "${words[@]}"
+    cargo +nightly fuzz run "$target" -- -len_control=0 -max_total_time="$seconds" -max_len="$(length "$target")" \
+        -malloc_limit_mb=64 -timeout=60 -print_final_stats=1 $words
 done

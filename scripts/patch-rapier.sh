@@ -46,9 +46,10 @@ command -v patch >/dev/null || fail "the program 'patch' is missing: install it 
 # What the project has now: another version would not be replaced by the patched one.
 if [ -f "$project/Cargo.lock" ]; then
     found="$(awk '$1 == "name" && $3 == "\"rapier3d\"" { getline; gsub(/"/, "", $3); print $3 }' "$project/Cargo.lock")"
-    case $'\n'$found$'\n' in
-    *$'\n'"$version"$'\n'* | $'\n\n') ;;
-    *) fail "$project/Cargo.lock has rapier3d ${found//$'\n'/, }; the patch is for $version: change your dependency, or run" \
+    newline=$'\n'
+    case $newline$found$newline in
+    *"$newline$version$newline"* | "$newline$newline") ;;
+    *) fail "$project/Cargo.lock has rapier3d ${found//$newline/, }; the patch is for $version: change your dependency, or run" \
         "'cargo update -p rapier3d --precise $version'" ;;
     esac
 fi

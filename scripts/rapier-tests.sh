@@ -9,7 +9,9 @@
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 root="$PWD"
-copy="$root/target/rapier-tests/rapier3d"
+. scripts/common.sh
+folder="$(target_folder)/rapier-tests"
+copy="$folder/rapier3d"
 
 rm -rf "$copy"
 mkdir -p "$copy"
@@ -38,10 +40,15 @@ pub(crate) fn wanted() -> Option<std::boxed::Box<dyn crate::geometry::PairFinder
     std::env::var_os("RAPIER_PBIG").map(|_| std::boxed::Box::<PbigFinder>::default() as _)
 }
 RUST
-sed -i 's/^pub mod control;/pub(crate) mod pbig;\npub mod control;/' "$copy/src/lib.rs"
-sed -i '/pub fn new() -> Self {/{n;s/Self::default()/Self { pair_finder: crate::pbig::wanted(), ..Self::default() }/}' \
-    "$copy/src/geometry/broad_phase_bvh/mod.rs"
-sed -i 's/DefaultBroadPhase::default()/DefaultBroadPhase::new()/' "$copy/src/pipeline/physics_world.rs"
+# edit FILE COMMAND: edits a file in place. Not every sed has -i without a suffix, nor \n for a new line.
+edit() {
+    sed "$2" "$copy/src/$1" >"$copy/edited"
+    mv "$copy/edited" "$copy/src/$1"
+}
+edit lib.rs 's/^pub mod control;/pub(crate) mod pbig; pub mod control;/'
+edit geometry/broad_phase_bvh/mod.rs \
+    '/pub fn new() -> Self {/{n;s/Self::default()/Self { pair_finder: crate::pbig::wanted(), ..Self::default() }/;}'
+edit pipeline/physics_world.rs 's/DefaultBroadPhase::default()/DefaultBroadPhase::new()/'
 cat >>"$copy/Cargo.toml" <<TOML
 
 [dependencies.pbig-core]
@@ -60,7 +67,7 @@ TOML
 grep -q 'pbig::wanted' "$copy/src/geometry/broad_phase_bvh/mod.rs" || { echo "the finder is not installed" >&2; exit 1; }
 
 cd "$copy"
-export CARGO_TARGET_DIR="${CARGO_TARGET_DIR:-$root/target/rapier-tests/target}"
+export CARGO_TARGET_DIR="$folder/target"
 arguments=("$@")
 if [ $# -eq 0 ]; then
     arguments=(--lib)
@@ -79,7 +86,7 @@ multibody_articulation restoring_into_a_live_pipeline sleeping_pile structural_c
 run() {
     cargo test --no-fail-fast --features serde-serialize "${arguments[@]}" >"$1" 2>&1 || true
     if ! grep -qa '^test result' "$1" || grep -qa '(signal: ' "$1"; then tail "$1" >&2 && exit 1; fi
-    grep -aE '^test .* \.\.\. FAILED' "$1" | cut -d' ' -f2 | LC_ALL=C sort | paste -sd' '
+    grep -aE '^test .* \.\.\. FAILED' "$1" | cut -d' ' -f2 | LC_ALL=C sort | paste -sd' ' -
     grep -ahE '^test result' "$1" | awk '{ passed += $4; failed += $6 } END { print passed " passed, " failed " failed" }' >&2
 }
 

@@ -12,6 +12,8 @@
 # LLVM beside their standard library.
 set -euo pipefail
 cd "$(dirname "$0")/.."
+. scripts/common.sh
+folder=$(target_folder)
 [ $# -gt 0 ] || set -- address thread
 if [ -n "${PBIG_RUST:-}" ]; then
     export RUSTC="$PBIG_RUST/rustc" RUSTC_BOOTSTRAP=1
@@ -38,7 +40,7 @@ for sanitizer in "$@"; do
     fi
     gpu=()
     if [ "$sanitizer" = thread ] && [ -n "${PBIG_SUITE:-}" ]; then gpu=(PBIG_GPU=none); fi
-    echo "== $sanitizer sanitizer${std:+, standard library included}${gpu:+, ${gpu[*]}}"
-    env "${gpu[@]}" RUSTFLAGS="-Zsanitizer=$sanitizer" "${cargo[@]}" test "${std[@]}" --target "$host" \
-        --target-dir "target/sanitize-$sanitizer" "${what[@]}"
+    echo "== $sanitizer sanitizer${std[0]+, standard library included}${gpu[0]+, ${gpu[*]}}"
+    env ${gpu[@]+"${gpu[@]}"} RUSTFLAGS="-Zsanitizer=$sanitizer" "${cargo[@]}" test ${std[@]+"${std[@]}"} --target "$host" \
+        --target-dir "$folder/sanitize-$sanitizer" "${what[@]}"
 done

@@ -1,35 +1,27 @@
 #!/usr/bin/env bash
-# Runs the corpus as a WebAssembly module under node, without and with SIMD; installs what is missing as test.sh does:
-#   scripts/wasm.sh
-# From clean it takes a minute or two; four where Debian's Rust has to build the standard library for the target, twice.
+# Runs the corpus and a rapier world as a WebAssembly module under node, without and with SIMD:
+#   scripts/wasm.sh [--no-setup]     it calls setup.sh first, unless told not to
+# From clean it takes two minutes; more where Debian's Rust has to build the standard library for the target, twice.
 set -euo pipefail
 cd "$(dirname "$0")/.."
-. scripts/cross.sh
+[ "${1:-}" = --no-setup ] || scripts/setup.sh rust wasm || true
+. scripts/common.sh
 target=wasm32-unknown-unknown
-
-# require_linker: rustup brings a linker for the target; Debian's Rust needs the one of its own LLVM.
-require_linker() {
-    local llvm linker
-    llvm=$(/usr/bin/rustc -vV | sed -n 's/^LLVM version: \([0-9]*\).*/\1/p')
-    linker=/usr/bin/wasm-ld-$llvm
-    [ -x "$linker" ] || require "a linker for WebAssembly" "lld-$llvm"
-    export CARGO_TARGET_WASM32_UNKNOWN_UNKNOWN_LINKER=$linker
-    [ -x "$linker" ]
-}
 
 # run NAME FLAGS: builds the module with these flags of rustc, and runs it.
 run() {
     echo "== WebAssembly $1"
-    RUSTFLAGS=$2 step "${cargo[@]}" build --quiet --release --lib --manifest-path wasm/Cargo.toml \
-        --target "$target" --target-dir target/wasm
-    step node wasm/run.mjs "target/wasm/$target/release/pbig_wasm.wasm"
+    RUSTFLAGS=$2 step "${cargo[@]}" build --locked --quiet --release --lib --manifest-path wasm/Cargo.toml \
+        --target "$target" --target-dir "$folder"
+    step node wasm/run.mjs "$folder/$target/release/pbig_wasm.wasm"
 }
 
-if [ -f "${HOME:-}/.cargo/env" ]; then . "$HOME/.cargo/env"; fi
-choose_cargo "$target" || left_out "$target"
-! $builds_std || require_linker || left_out "$target"
-command -v node >/dev/null || require node nodejs
-command -v node >/dev/null || left_out "$target"
+choose_cargo "$target" && has node || { left_out "$target" && exit 0; }
+if $builds_std; then
+    export CARGO_TARGET_WASM32_UNKNOWN_UNKNOWN_LINKER
+    CARGO_TARGET_WASM32_UNKNOWN_UNKNOWN_LINKER=$(wasm_linker)
+fi
+folder="$(target_folder)/wasm"
 run "without SIMD" ""
 run "with SIMD" "-C target-feature=+simd128"
 echo "== WebAssembly: all passed"

@@ -10,6 +10,11 @@
 //! assert!(locate.source(false).contains("fn locate("));
 //! ```
 
+/// Runs the program in the README as a test.
+#[cfg(doctest)]
+#[doc = include_str!("README.md")]
+struct Readme;
+
 pub mod study;
 
 /// A buffer that kernels bind.

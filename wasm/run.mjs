@@ -1,4 +1,4 @@
-// Runs the corpus in a WebAssembly module, then the planted faults: node wasm/run.mjs MODULE
+// Runs the corpus and a rapier world in a WebAssembly module, then the planted faults: node wasm/run.mjs MODULE
 import { readFile } from "node:fs/promises";
 
 const module = await WebAssembly.compile(await readFile(process.argv[2]));
@@ -29,10 +29,12 @@ function call(name, ...numbers) {
 }
 
 call("keep_panics");
-const failed = call("run_corpus");
+const failed = call("run_cases");
 const cases = call("case_count");
 console.log(`${cases - failed} cases passed, ${failed} failed`);
 if (failed > 0 || cases === 0) fail(text() || "the corpus is empty");
+call("describe_world");
+console.log(text());
 
 const faults = call("fault_count");
 for (let fault = 0; fault < faults; fault++) {

@@ -15,15 +15,17 @@ pub enum Fault {
     AddedLost,
     /// Events without one of the removed pairs.
     RemovedLost,
+    /// Events of a rapier world without one of the added pairs.
+    WorldLoses,
 }
 
 impl Fault {
     /// The faults that a run must notice.
-    pub const PLANTED: [Self; 4] =
-        [Self::FinderLoses, Self::FinderRepeats, Self::AddedLost, Self::RemovedLost];
+    pub const PLANTED: [Self; 5] =
+        [Self::FinderLoses, Self::FinderRepeats, Self::AddedLost, Self::RemovedLost, Self::WorldLoses];
 
-    /// Removes the middle pair of a list if `at` is this fault.
-    pub(crate) fn lose(self, at: Self, pairs: &mut Vec<Pair>) {
+    /// Removes the middle one of a list of pairs or events if `at` is this fault.
+    pub(crate) fn lose<T>(self, at: Self, pairs: &mut Vec<T>) {
         if self == at && !pairs.is_empty() {
             pairs.remove(pairs.len() / 2);
         }

@@ -1,4 +1,4 @@
-//! Runs the corpus through `Finder` and `BroadPhase` on targets where the test suite cannot run.
+//! Runs the corpus through `Finder` and `BroadPhase`, and a rapier world, on targets where the test suite cannot run.
 //!
 //! `run.mjs` calls the exported functions in node; `main.rs` calls the same checks in a native program.
 
@@ -11,6 +11,7 @@ mod fault;
 mod finder;
 mod follower;
 mod motion;
+mod world;
 
 use corpus::{Case, corpus};
 pub use fault::Fault;
@@ -28,26 +29,39 @@ pub struct Outcome {
     pub failed: u32,
     /// Text of the first failure; empty without one.
     pub first: String,
+    /// What happened in the rapier world.
+    pub world: String,
 }
 
-/// Runs every case of the corpus.
+impl Outcome {
+    /// Counts a case. Returns what it produced, if it passed.
+    fn count<T>(&mut self, result: Result<T, String>) -> Option<T> {
+        self.cases += 1;
+        result
+            .inspect_err(|why| {
+                self.failed += 1;
+                if self.first.is_empty() {
+                    self.first.clone_from(why);
+                }
+            })
+            .ok()
+    }
+}
+
+/// Runs every case of the corpus, and the rapier world as one more case.
 pub fn run() -> Outcome {
     let mut outcome = Outcome::default();
     for case in corpus() {
-        outcome.cases += 1;
-        if let Err(why) = check(&case, Fault::None) {
-            outcome.failed += 1;
-            if outcome.first.is_empty() {
-                outcome.first = why;
-            }
-        }
+        outcome.count(check(&case, Fault::None));
     }
+    outcome.world = outcome.count(world::check(Fault::None)).unwrap_or_default();
     outcome
 }
 
-/// Returns the failure that a planted fault causes in the corpus, or none if the checks overlook it.
+/// Returns the failure that a planted fault causes, or none if the checks overlook it.
 pub fn notice(fault: Fault) -> Option<String> {
-    corpus().iter().find_map(|case| check(case, fault).err())
+    let in_corpus = || corpus().iter().find_map(|case| check(case, fault).err());
+    if fault == Fault::WorldLoses { world::check(fault).err() } else { in_corpus() }
 }
 
 /// Checks one case on every backend, all at once and in motion.

@@ -1,4 +1,4 @@
-//! The corpus and the planted faults in a native program: for processors that an emulator runs.
+//! The corpus, the rapier world and the planted faults in a native program: for processors that an emulator runs.
 
 use pbig_wasm::{Fault, notice, run};
 use std::process::ExitCode;
@@ -9,6 +9,7 @@ fn main() -> ExitCode {
     if outcome.failed > 0 {
         println!("{}", outcome.first);
     }
+    println!("{}", outcome.world);
     let overlooked: Vec<_> = Fault::PLANTED.into_iter().filter(|fault| notice(*fault).is_none()).collect();
     println!("{} planted faults, overlooked: {overlooked:?}", Fault::PLANTED.len());
     if outcome.failed == 0 && overlooked.is_empty() { ExitCode::SUCCESS } else { ExitCode::FAILURE }

@@ -8,6 +8,9 @@
 //! rapier's call ─► Scene ─► Colliders ─► pbig_core::BroadPhase ─► events, in an order that depends on the scene alone
 //! ```
 
+// Labels each item in the documentation with the feature that it needs; on docs.rs only, as it takes nightly Rust.
+#![cfg_attr(docsrs, feature(doc_cfg))]
+
 mod colliders;
 mod events;
 mod filter;

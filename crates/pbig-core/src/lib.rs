@@ -41,6 +41,14 @@
 //! Simulations", ACM TOMACS 23(3), 2013 (*PBIG*). Avril, Gouranton, Arnaldi: "Fast Collision
 //! Culling in Large-Scale Environments Using GPU Mapping Function", EGPGV 2012 (*Avril*).
 
+// Labels each item in the documentation with the feature that it needs; on docs.rs only, as it takes nightly Rust.
+#![cfg_attr(docsrs, feature(doc_cfg))]
+
+/// Runs the programs in the README as tests.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;
+
 mod aabb;
 mod all_pairs;
 mod broad_phase;

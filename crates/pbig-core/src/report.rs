@@ -5,6 +5,7 @@ use std::time::Duration;
 
 /// Wall time of each stage of the last call. All zero on wasm32-unknown-unknown, which has no clock.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct StageTimes {
     /// Measuring the boxes and choosing the cells.
     pub plan: Duration,
@@ -77,6 +78,7 @@ impl Clock {
 /// Counts of box tests, as PBIG's section 4.1 defines them. On the CPU's grid most tests compare codes, which tell that two
 /// boxes are apart or may overlap. The exact test of a pair that may overlap is not counted again.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct Checks {
     /// Box pairs tested, counting each test.
     pub made: u64,
@@ -88,6 +90,7 @@ pub struct Checks {
 
 /// The report on the last call of a [`crate::Finder`] or [`crate::BroadPhase`].
 #[derive(Clone, Debug, Default, PartialEq)]
+#[non_exhaustive]
 pub struct Report {
     /// Wall time by stage.
     pub stages: StageTimes,
@@ -112,6 +115,7 @@ pub struct Report {
 
 /// The report on a call that ran on a GPU.
 #[derive(Clone, Debug, Default, PartialEq)]
+#[non_exhaustive]
 pub struct GpuReport {
     /// The adapter's name, kind and API.
     pub adapter: String,

@@ -38,9 +38,12 @@
 //! | `shadow` | [`PbigBroadPhase::with_shadow`]: rapier's own broad phase and brute force run beside it |
 //! | `unstable-study` | what studies and tests need; may change in any release |
 
+// Labels each item in the documentation with the feature that it needs; on docs.rs only, as it takes nightly Rust.
+#![cfg_attr(docsrs, feature(doc_cfg))]
+
 /// Runs the programs in the README as tests.
 #[cfg(doctest)]
-#[doc = include_str!("../../../README.md")]
+#[doc = include_str!("../README.md")]
 struct Readme;
 
 mod broad_phase;

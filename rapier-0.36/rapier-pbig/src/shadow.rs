@@ -66,7 +66,7 @@ pub struct Shadowed<F> {
 impl<F> Shadowed<F> {
     /// Creates a checker without references. `relative_margin` is the finder's margin in units of `length_unit`.
     pub fn new(inner: F, relative_margin: f32) -> Self {
-        let checker = Checker::new().with_replays_in(std::env::temp_dir());
+        let checker = Checker::new().with_replays();
         let stock = Some(BroadPhaseBvh::new());
         Self { inner, checker, relative_margin, stock, has_moved: false, has_started: false }
     }

@@ -78,6 +78,7 @@ impl fmt::Display for Side {
 
 /// A pair that the broad phase got wrong.
 #[derive(Clone, Debug)]
+#[non_exhaustive]
 pub struct Difference {
     /// The number of the call in which the fault was noticed, from 0.
     pub call: usize,

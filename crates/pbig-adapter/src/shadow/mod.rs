@@ -120,6 +120,14 @@ impl Checker {
         Self { folder: Some(folder), ..self }
     }
 
+    /// As [`Checker::with_replays_in`], with the system's folder for temporary files. wasm32-unknown-unknown has none.
+    pub fn with_replays(self) -> Self {
+        if cfg!(all(target_family = "wasm", target_os = "unknown")) {
+            return self;
+        }
+        self.with_replays_in(std::env::temp_dir())
+    }
+
     /// Prepares for another world, or one that is not new. `pairs` are those that the narrow phase has. Stock must see all
     /// colliders in the next call.
     pub fn start_over(&mut self, pairs: impl IntoIterator<Item = HandlePair>) {

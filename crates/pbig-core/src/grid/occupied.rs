@@ -6,6 +6,7 @@ use crate::Aabb;
 
 /// A cell of a grid, and the boxes whose lower corners lie in it.
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct OccupiedCell {
     /// The cell; a border cell reaches to the lower corners of the boxes beyond the border.
     pub aabb: Aabb,

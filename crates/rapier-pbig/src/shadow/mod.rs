@@ -40,7 +40,7 @@ impl PbigBroadPhase {
         let margin = self.relative_margin;
         let watcher = self.shadow.get_or_insert_with(|| {
             let mut watcher = Watcher::new(margin);
-            watcher.checker = std::mem::take(&mut watcher.checker).with_replays_in(std::env::temp_dir());
+            watcher.checker = std::mem::take(&mut watcher.checker).with_replays();
             watcher.start_over(known);
             Box::new(watcher)
         });

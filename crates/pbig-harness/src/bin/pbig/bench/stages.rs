@@ -112,7 +112,7 @@ impl Alone {
 }
 
 fn in_order(whole: f64, set: f64, stages: &StageTimes) -> Times {
-    let StageTimes { plan, map, check, emit, diff } = *stages;
+    let StageTimes { plan, map, check, emit, diff, .. } = *stages;
     let [plan, map, check, emit, diff] = [plan, map, check, emit, diff].map(milliseconds);
     [whole, set, plan, map, check, emit, diff]
 }

@@ -172,9 +172,15 @@ mod tests {
     use pbig_core::oracle;
     use pbig_harness::boxes::cubes;
 
+    fn report(pairs: u64) -> Report {
+        let mut report = Report::default();
+        report.pairs = pairs;
+        report
+    }
+
     #[test]
     fn the_call_in_the_middle_is_taken_with_its_own_report() {
-        let call = |ms: f64| (ms, Report { pairs: ms as u64, ..Report::default() });
+        let call = |ms: f64| (ms, report(ms as u64));
         let taken =
             |times: &[f64]| middle(times.iter().copied().map(call)).map(|(ms, report)| (ms, report.pairs));
         assert_eq!(taken(&[9.0, 1.0, 4.0]), Some((4.0, 4)));
@@ -184,7 +190,7 @@ mod tests {
 
     #[test]
     fn other_pairs_than_the_cpu_has_are_a_failed_check() {
-        let run = |pairs: u64| (1.0, Report { pairs, ..Report::default() });
+        let run = |pairs: u64| (1.0, report(pairs));
         assert!(same_pairs(&[run(3), run(3)], 3).is_ok() && same_pairs(&[], 3).is_ok());
         assert!(matches!(same_pairs(&[run(3), run(4)], 3), Err(Failure::Check(_))));
     }

@@ -280,7 +280,8 @@ mod tests {
     use super::*;
 
     fn ran(wanted: Wanted, cell: f64, made: u64, times: &[f64]) -> Ran {
-        let checks = Checks { made, ..Checks::default() };
+        let mut checks = Checks::default();
+        checks.made = made;
         Ran { wanted, cell, pairs: 0, checks, times: times.to_vec() }
     }
 

@@ -1,7 +1,9 @@
 //! Contracts of the kernels' texts: every kernel is valid WGSL, its bindings are the listed ones, and no file is missing
 //! in the lists. These tests need no device.
 
-use naga::valid::{Capabilities, ValidationFlags, Validator};
+mod translate;
+
+use naga::valid::{Capabilities, ModuleInfo, ValidationFlags, Validator};
 use pbig_shaders::{Buffer, KERNELS, Kernel, study};
 
 fn parse(kernel: &Kernel, changes: bool) -> naga::Module {
@@ -10,12 +12,12 @@ fn parse(kernel: &Kernel, changes: bool) -> naga::Module {
         .unwrap_or_else(|error| panic!("{}: {}", kernel.name, error.emit_to_string(&source)))
 }
 
-fn validate(kernel: &Kernel, changes: bool) -> naga::Module {
+fn validate(kernel: &Kernel, changes: bool) -> (naga::Module, ModuleInfo) {
     let module = parse(kernel, changes);
     let result = Validator::new(ValidationFlags::all(), Capabilities::empty()).validate(&module);
-    result
+    let info = result
         .unwrap_or_else(|error| panic!("{}: {}", kernel.name, error.emit_to_string(&kernel.source(changes))));
-    module
+    (module, info)
 }
 
 /// Returns every kernel, those of the studies too, for a search for overlaps and for one for changes.
@@ -36,7 +38,7 @@ fn every_text_of_every_kernel_is_valid() {
 #[test]
 fn bindings_are_numbered_as_listed_and_there_are_no_others() {
     for (kernel, changes) in texts() {
-        let module = validate(kernel, changes);
+        let (module, _) = validate(kernel, changes);
         let mut bound: Vec<(u32, String)> = module
             .global_variables
             .iter()
@@ -73,7 +75,7 @@ fn the_lists_of_kernels_are_the_lists_of_files() {
 #[test]
 fn uniform_buffers_are_the_ones_that_say_so() {
     for (kernel, changes) in texts() {
-        let module = validate(kernel, changes);
+        let (module, _) = validate(kernel, changes);
         for (_, variable) in module.global_variables.iter().filter(|(_, v)| v.binding.is_some()) {
             let is_uniform = variable.space == naga::AddressSpace::Uniform;
             let name = variable.name.as_deref();
@@ -86,7 +88,7 @@ fn uniform_buffers_are_the_ones_that_say_so() {
 #[test]
 fn kernels_stay_within_the_limits_that_every_device_has() {
     for (kernel, changes) in texts() {
-        let module = validate(kernel, changes);
+        let (module, _) = validate(kernel, changes);
         let entry = &module.entry_points[0];
         assert_eq!((module.entry_points.len(), entry.name.as_str()), (1, kernel.name));
         assert!(entry.workgroup_size.iter().product::<u32>() <= 256, "{}: invocations", kernel.name);
@@ -102,6 +104,6 @@ fn kernels_stay_within_the_limits_that_every_device_has() {
 
 #[test]
 fn a_broken_kernel_does_not_pass() {
-    let broken = pbig_shaders::LOCATE.source(false, false).replace("params.boxes", "params.bodies");
+    let broken = pbig_shaders::LOCATE.source(false).replace("params.boxes", "params.bodies");
     assert!(naga::front::wgsl::parse_str(&broken).is_err());
 }
