@@ -92,7 +92,7 @@ step cargo build --release --workspace --examples --bins
 look_for_adapter
 # The suite and the program are tested on every backend, and fail where the CPU does a GPU's work.
 gpu_step cargo test --release --workspace
-$has_gpu || step cargo test --release --workspace --exclude pbig-tests --exclude pbig-harness
+$has_gpu || step cargo test --release --workspace --exclude pbig-tests --exclude pbig-cli --exclude pbig-studies
 # Rapier's own features beside these are in scripts/features.sh; one of the other kind for all.
 gpu_step scripts/features.sh deterministic
 # Once more with overflow checks and debug assertions, where there is unsafe code and index arithmetic.

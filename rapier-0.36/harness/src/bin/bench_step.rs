@@ -30,9 +30,9 @@ struct Args {
     write: Option<PathBuf>,
 }
 
-/// The heading of the CSV file, in ms.
-const HEADING: &str = "scene,bodies,steps,stock_broad_mean,pbig_broad_mean,stock_broad_p99,pbig_broad_p99,\
-stock_step_mean,pbig_step_mean,stock_step_p99,pbig_step_p99,stock_pairs,pbig_pairs";
+/// The heading of the CSV file.
+const HEADING: &str = "scene,bodies,steps,stock_broad_mean_ms,pbig_broad_mean_ms,stock_broad_p99_ms,pbig_broad_p99_ms,\
+stock_step_mean_ms,pbig_step_mean_ms,stock_step_p99_ms,pbig_step_p99_ms,stock_pairs,pbig_pairs";
 
 fn main() -> ExitCode {
     let mut args = Args::parse();
