@@ -149,8 +149,7 @@ fn kernels(quick: bool) -> Result<(Vec<Table>, String), Failure> {
     let adapter = pbig_core::GpuFinder::new().map(|gpu| (gpu.adapter().to_owned(), gpu.is_software()));
     match (Bench::new(), adapter) {
         (Ok(bench), Ok((name, software))) => {
-            let tables = [kernels::table(&bench, software, quick)?, kernels::ends::table(&bench, quick)?];
-            Ok((tables.into(), name))
+            Ok((vec![kernels::table(&bench, software, quick)?], name))
         }
         (Err(why), _) | (_, Err(why)) => Ok((vec![], format!("none: {why}"))),
     }

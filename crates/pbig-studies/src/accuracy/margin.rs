@@ -10,7 +10,7 @@ use crate::reported::Reported;
 use pbig_harness::cells;
 use pbig_harness::output::Failure;
 use pbig_harness::report::Report;
-use pbig_harness::runner::{Spread, StepTime};
+use pbig_harness::runner::StepTime;
 use pbig_harness::table::{Cell, Table};
 use rapier_pbig::PbigConfig;
 use tally::{MARGINS, Passes};
@@ -18,7 +18,7 @@ use tally::{MARGINS, Passes};
 pub(super) fn run(quick: bool) -> Result<Report, Failure> {
     let mut rows = worlds::measured(quick)?;
     rows.extend(boxes::measured(quick)?);
-    let tables = vec![table(&rows), fastest_table(&rows), means(&rows), without_each_scene(&rows)];
+    let tables = vec![table(&rows), means(&rows)];
     let axes = ["broad phase, ms a step", "extra pairs, % of those that overlap"];
     // The first case of each scene.
     let mut firsts: Vec<&[Row]> = rows.chunks(MARGINS.len()).collect();
@@ -115,38 +115,6 @@ fn default_margin() -> usize {
     MARGINS.iter().position(|margin| *margin as f32 == PbigConfig::DEFAULT.margin).unwrap_or_default()
 }
 
-/// Returns the fastest margin of a case, and the default's time over its.
-fn fastest(case: &[Row], (time, _): Time) -> Option<(f64, f64)> {
-    let timed = case.iter().filter_map(|row| Some((row.margin, time(row)?)));
-    let (margin, least) = timed.min_by(|a, b| a.1.total_cmp(&b.1))?;
-    Some((margin, time(&case[default_margin()])? / least))
-}
-
-/// The fastest margin of each case, how many times as long the default takes, and by how much two passes of the same steps
-/// differ (the median over margins).
-fn fastest_table(rows: &[Row]) -> Table {
-    let columns = [
-        "case",
-        "for_the_broad_phase",
-        "default_times",
-        "for_the_whole_step",
-        "default_times_step",
-        "passes_differ_percent",
-    ];
-    let mut table = Table::new("fastest", columns);
-    for case in rows.chunks(MARGINS.len()) {
-        let times = [BROAD_PHASE, STEP].map(|time| fastest(case, time).unzip());
-        let times = times.into_iter().flat_map(|(margin, times)| cells![margin, times]);
-        let differ = |row: &Row| {
-            let ms = || row.passes.iter().map(|time| time.broad_phase);
-            ms().fold(0.0, f64::max) / ms().fold(f64::MAX, f64::min) - 1.0
-        };
-        let differ = Spread::of(case.iter().map(differ)).median * 100.0;
-        table.row(cells![&case[0].case].into_iter().chain(times).chain([differ.into()]));
-    }
-    table
-}
-
 /// Returns a margin's time over the default's: the geometric mean over cases and passes, and two standard errors of it in
 /// percent.
 fn against_default<'a>(
@@ -202,21 +170,6 @@ fn scene(row: &Row) -> &str {
     row.case.split(' ').next().unwrap_or_default()
 }
 
-/// The whole step's means without one scene, which may be a special one.
-fn without_each_scene(rows: &[Row]) -> Table {
-    let mut table =
-        Table::new("without_a_scene", ["left_out", "margin", "whole_step", "whole_step_noise_percent"]);
-    let mut scenes: Vec<&str> = rows.iter().filter(|row| row.step.is_some()).map(scene).collect();
-    scenes.sort_unstable();
-    scenes.dedup();
-    for (left_out, k) in scenes.iter().flat_map(|scene| (0..MARGINS.len()).map(move |k| (*scene, k))) {
-        let others = rows.chunks_exact(MARGINS.len()).filter(|case| scene(&case[0]) != left_out);
-        let [times, noise] = against_default(others, k, STEP);
-        table.row(cells![left_out, MARGINS[k], times, noise]);
-    }
-    table
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -255,7 +208,5 @@ mod tests {
             let found = against(&made(&vec![[1.0; MARGINS.len()]; cases]))[1];
             assert!((found - noise).abs() < 5e-3, "{cases} cases: {found}");
         }
-        let rows = made(&[[4.0, 3.0, 2.0, 1.0, 2.0, 3.0, 4.0, 5.0]]);
-        assert_eq!((fastest(&rows, BROAD_PHASE), fastest(&rows, STEP)), (Some((MARGINS[3], 2.0)), None));
     }
 }

@@ -5,10 +5,9 @@
 mod figures;
 mod runs;
 mod sides;
-mod tails;
 
 use super::report;
-use figures::{Figures, Multiple, QUANTITIES, multiple};
+use figures::Figures;
 use pbig_harness::cells;
 use pbig_harness::output::Failure;
 use pbig_harness::report::Report;
@@ -35,9 +34,6 @@ pub(super) fn run(quick: bool) -> Result<Report, Failure> {
     let tables = vec![
         runs::table(&scenes),
         distances(&scenes),
-        tails::table(&scenes),
-        tails::counts(&scenes),
-        multiples(&scenes),
         repeated(&scenes),
     ];
     let axes = ["whole step, ms", "mean distance from stock's bodies at the end, m"];
@@ -56,32 +52,6 @@ struct Ways {
     instants: Vec<(usize, Vec<[f64; 2]>)>,
     /// Ways that were run twice, and the step from which on the two differ.
     repeats: Vec<(&'static str, Option<usize>)>,
-}
-
-impl Ways {
-    fn first(&self) -> &Figures {
-        &self.runs[0]
-    }
-
-    fn yardsticks(&self) -> Vec<&Figures> {
-        self.of(sides::Way::is_permuted).collect()
-    }
-
-    /// The runs that are held against the permuted ones.
-    fn held(&self) -> impl Iterator<Item = &Figures> {
-        self.of(sides::Way::is_held_against_stock)
-    }
-
-    fn of(&self, wanted: fn(&sides::Way) -> bool) -> impl Iterator<Item = &Figures> {
-        WAYS.iter().zip(&self.runs).filter(move |(way, _)| wanted(way)).map(|(_, run)| run)
-    }
-
-    /// A run in each quantity that has a meaning here.
-    fn multiples<'a>(&'a self, run: &'a Figures) -> impl Iterator<Item = (&'static str, Multiple)> + 'a {
-        QUANTITIES.into_iter().filter_map(|quantity| {
-            Some((quantity.name, multiple(run, self.first(), &self.yardsticks(), quantity)?))
-        })
-    }
 }
 
 fn scene(case: Case) -> Result<Ways, Failure> {
@@ -157,18 +127,3 @@ fn at_an_instant(ways: &[[f64; 2]]) -> Vec<[f64; 2]> {
     [permuted].into_iter().chain(of(sides::Way::is_held_against_stock)).collect()
 }
 
-/// Distances from stock as multiples of the farthest permuted run. Empty: the quantity came about in neither; infinite: no
-/// permuted run differs from stock.
-fn multiples(scenes: &[Ways]) -> Table {
-    let columns = ["scene", "broad_phase", "quantity", "times", "permuted_runs_nearer_percent"];
-    let mut table = Table::new("multiples", columns);
-    for ways in scenes {
-        for run in ways.held() {
-            for (quantity, Multiple { times, nearer, .. }) in ways.multiples(run) {
-                let percent = times.map(|_| 100.0 * nearer as f64 / ways.yardsticks().len().max(1) as f64);
-                table.row(cells![ways.scene, run.way, quantity, times, percent]);
-            }
-        }
-    }
-    table
-}

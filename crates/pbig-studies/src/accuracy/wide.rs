@@ -14,7 +14,7 @@ use crate::wide::Differences;
 use pbig_harness::cells;
 use pbig_harness::output::Failure;
 use pbig_harness::report::Report;
-use pbig_harness::table::{Cell, Table};
+use pbig_harness::table::Table;
 use place::{AT_POSES, Along, IN_WORLD, Place, Row, WAYS, Way, World, ulp, worlds};
 use rapier_pbig::PbigConfig;
 use times::{Time, times, ways};
@@ -27,7 +27,7 @@ pub(super) fn run(quick: bool) -> Result<Report, Failure> {
     rows.iter().chain(simulated.iter().map(|one| &one.row)).try_for_each(check)?;
     let timed = all_times(&worlds[0], quick)?;
     let [in_f64, in_f32] = simulated::tables(&simulated);
-    let others = [sizes_table(&rows), ways_table(&rows), times_table(&timed)];
+    let others = [ways_table(&rows), times_table(&timed)];
     let tables = [pairs_table(&rows), in_f64, in_f32].into_iter().chain(others).collect();
     let axes = ["time, ns per box, computed and searched for", "pairs missed and added, % of those in f64"];
     Ok(report(
@@ -121,32 +121,6 @@ fn along(along: Along) -> &'static str {
 /// Of a position there; near the origin of a shape's size.
 fn coarseness(row: &Row) -> f64 {
     ulp(row.offset.max(row.size))
-}
-
-/// By size over ulp: what a world is like that rapier holds.
-fn sizes_table(rows: &[Row]) -> Table {
-    let columns = [
-        "size",
-        "offset",
-        "size_in_ulps",
-        "pairs",
-        "missed_by_poses_percent",
-        "added_by_poses_percent",
-        "missed_percent",
-        "added_percent",
-        "missed_with_2_ulps_percent",
-        "added_with_2_ulps_percent",
-    ];
-    let mut table = Table::new("sizes", columns);
-    let mut rows: Vec<&Row> = rows.iter().filter(|row| is_crowd(row)).collect();
-    rows.sort_by(|a, b| b.size_in_ulps().total_cmp(&a.size_in_ulps()));
-    for row in rows {
-        let percent = |count: u64| Cell::from(percent(count, row.pairs));
-        let counts = [row.poses, row.in_all(Way::Ulps(0)), row.in_all(AT_POSES)];
-        let head = cells![row.size, row.offset, row.size_in_ulps(), row.pairs];
-        table.row(head.into_iter().chain(counts.into_iter().flat_map(|d| [d.missed, d.added]).map(percent)));
-    }
-    table
 }
 
 /// All worlds and directions together.

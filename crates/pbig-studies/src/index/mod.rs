@@ -5,7 +5,6 @@
 //! are 0-based here as there, and every estimate is equation 1 in that form.
 
 mod correct;
-mod dense;
 mod exact;
 mod root;
 mod rounded;
@@ -17,7 +16,7 @@ pub use exact::{EXACT, Exact};
 pub use root::{AllSingle, CARMACK, Double, LOMONT, Newton, Printed, Root, Single, SingleRoot, WideNewton};
 pub use rounded::{Form, Rounded, Step};
 pub use search::{Counterexample, counterexample, root_differences, root_errors};
-pub use tally::{MOST_EXHAUSTIVE, Sample, Tally, of as tally_of};
+pub use tally::{MOST_EXHAUSTIVE, Sample, Tally};
 
 use pbig_harness::pair_index::pair_count;
 
@@ -47,9 +46,7 @@ pub type Block = (i64, i64);
 
 const fn way<R: Root>(name: &'static str, steps: Option<u32>) -> Way {
     let passes = [pass::<R, AsItIs>, pass::<R, Rules>, pass::<R, Integers>];
-    // After one step most rows are wrong.
-    let tally = if matches!(steps, Some(1)) { dense::all::<R> } else { tally::all::<R> };
-    let (sample, counterexample) = (tally::some::<R>, counterexample::<R>);
+    let (tally, sample, counterexample) = (tally::all::<R>, tally::some::<R>, counterexample::<R>);
     Way { name, steps, row: R::row, tally, sample, worst_relative: R::worst_relative, counterexample, passes }
 }
 

@@ -12,10 +12,6 @@ pub trait Root {
     /// The estimate from `m = 2n - 1` and `x = m^2 - 8k`.
     fn row(m: i64, x: i64) -> i64;
 
-    /// Returns true if the estimate lies between `a` and `a + 1`, for numbers that processors convert four at a time.
-    /// (Row 0 is estimated right from a little below 0, too, where this says no.)
-    fn lies_in(a: i32, m: i32, x: i32) -> bool;
-
     /// The largest relative error of the root.
     fn worst_relative() -> f64;
 }
@@ -74,12 +70,6 @@ impl<R: SingleRoot> Root for R {
         ((m as f32 - R::root(x as f32)) * 0.5) as i64
     }
 
-    #[inline(always)]
-    fn lies_in(a: i32, m: i32, x: i32) -> bool {
-        let row = (m as f32 - R::root(x as f32)) * 0.5;
-        (row >= a as f32) & (row < (a + 1) as f32)
-    }
-
     /// Over all floats from 1 to 4, as every root treats a number and four times that number alike.
     fn worst_relative() -> f64 {
         let floats = (1f32.to_bits()..4f32.to_bits()).map(f32::from_bits);
@@ -94,12 +84,6 @@ impl Root for Double {
     #[inline(always)]
     fn row(m: i64, x: i64) -> i64 {
         ((m as f64 - (x as f64).sqrt()) * 0.5) as i64
-    }
-
-    #[inline(always)]
-    fn lies_in(a: i32, m: i32, x: i32) -> bool {
-        let row = (f64::from(m) - f64::from(x).sqrt()) * 0.5;
-        (row >= f64::from(a)) & (row < f64::from(a + 1))
     }
 
     fn worst_relative() -> f64 {
@@ -123,12 +107,6 @@ impl Root for AllSingle {
         Self::estimate(m as f32, (m * m - x) as f32) as i64
     }
 
-    #[inline(always)]
-    fn lies_in(a: i32, m: i32, x: i32) -> bool {
-        let row = Self::estimate(m as f32, (m * m - x) as f32);
-        (row >= a as f32) & (row < (a + 1) as f32)
-    }
-
     /// Two large numbers are subtracted: nothing of a small root need be left.
     fn worst_relative() -> f64 {
         f64::INFINITY
@@ -149,12 +127,6 @@ impl Root for Printed {
     #[inline(always)]
     fn row(m: i64, x: i64) -> i64 {
         Self::estimate(((m + 1) / 2) as f32, ((m * m - x) / 8) as f32).floor() as i64
-    }
-
-    #[inline(always)]
-    fn lies_in(a: i32, m: i32, x: i32) -> bool {
-        let row = Self::estimate(((m + 1) / 2) as f32, ((m * m - x) / 8) as f32);
-        (row >= a as f32) & (row < (a + 1) as f32)
     }
 
     /// As of [`AllSingle`].
@@ -197,22 +169,4 @@ mod tests {
         assert!(Single::worst_relative() < 6e-8);
     }
 
-    #[test]
-    fn both_forms_of_an_estimate_agree() {
-        fn check<R: Root>(n: i64) {
-            for k in 0..pairs_of(n) {
-                let x = discriminant(k, n);
-                let row = R::row(2 * n - 1, x);
-                // A little below row 0, the narrow form says no.
-                let lies = R::lies_in(row as i32, (2 * n - 1) as i32, x as i32);
-                assert!(lies || row == 0, "n {n}, k {k}");
-            }
-        }
-        check::<Single>(1500);
-        check::<Double>(1500);
-        check::<AllSingle>(1500);
-        check::<Printed>(1500);
-        check::<Newton<CARMACK, 1>>(1500);
-        check::<Newton<LOMONT, 3>>(1500);
-    }
 }

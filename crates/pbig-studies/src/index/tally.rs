@@ -1,14 +1,11 @@
-//! Counts of wrong, missed and doubled pairs.
+//! Counts of wrong, missed and doubled pairs. Runs of indices of one row whose estimates are the same are looked at together, and
+//! the pairs that they test are marked in bits.
 
 use super::{AsItIs, Correction, Integers, Root, Rules, discriminant, pairs_of, row_start};
 use std::ops::AddAssign;
 
 /// The most boxes whose pairs are all looked at: as far as `(2n - 1)^2` is below 2^30.
 pub const MOST_EXHAUSTIVE: i64 = 16_384;
-
-/// Estimates looked at together; only blocks with a wrong one are looked at one by one. (Of 128, that was most of the
-/// time.)
-const BLOCK: i64 = 32;
 
 /// Counts of right and wrong indices of all pairs.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -39,117 +36,138 @@ impl AddAssign for Tally {
     }
 }
 
-/// An index whose row is estimated wrong.
-struct Wrong {
-    k: u32,
-    estimate: i32,
-    row: i32,
-}
+/// Estimates computed together.
+const BLOCK: i64 = 64;
 
 /// All pairs of `n` boxes, `2 <= n <= MOST_EXHAUSTIVE`: as it is, by the rules, by integers.
 pub(super) fn all<R: Root>(n: i64) -> [Tally; 3] {
     debug_assert!((2..=MOST_EXHAUSTIVE).contains(&n));
-    let wrong = wrong_rows::<R>(n);
-    [judged::<AsItIs>(n, &wrong), judged::<Rules>(n, &wrong), judged::<Integers>(n, &wrong)]
+    let (mut as_it_is, mut rules, mut integers) = (Tested::new(n), Tested::new(n), Tested::new(n));
+    for row in 0..n - 1 {
+        each_run::<R>(n, row, |run| {
+            as_it_is.note::<AsItIs>(&run);
+            rules.note::<Rules>(&run);
+            integers.note::<Integers>(&run);
+        });
+    }
+    [as_it_is.tally(), rules.tally(), integers.tally()]
 }
 
-fn wrong_rows<R: Root>(n: i64) -> Vec<Wrong> {
-    let mut wrong = Vec::new();
-    for row in 0..n - 1 {
-        let (start, end) = (row_start(row, n), row_start(row + 1, n));
-        let mut first = start;
-        while first < end {
-            let count = BLOCK.min(end - first);
-            if wrong_in_block::<R>(n as i32, row as i32, first as i32, count as i32) > 0 {
-                wrong.extend((first..first + count).filter_map(|k| wrong_at::<R>(n, row, k)));
-            }
+/// Consecutive indices of a row, all with the same estimate.
+struct Run {
+    row: i64,
+    estimate: i64,
+    first: i64,
+    count: i64,
+}
+
+fn each_run<R: Root>(n: i64, row: i64, mut found: impl FnMut(Run)) {
+    let (start, end) = (row_start(row, n), row_start(row + 1, n));
+    let mut estimates = [0; BLOCK as usize];
+    for from in (start..end).step_by(BLOCK as usize) {
+        let block = &mut estimates[..BLOCK.min(end - from) as usize];
+        for (k, estimate) in (from..).zip(&mut *block) {
+            *estimate = R::row(2 * n - 1, discriminant(k, n));
+        }
+        let mut first = from;
+        for same in block.chunk_by(|a, b| a == b) {
+            let count = same.len() as i64;
+            found(Run { row, estimate: same[0], first, count });
             first += count;
         }
     }
-    wrong
 }
 
-/// Without branches, so that several are computed at once: all pairs of all n up to 5,000 are 2 * 10^10.
-fn wrong_in_block<R: Root>(n: i32, row: i32, first: i32, count: i32) -> u32 {
-    let m = 2 * n - 1;
-    let x = m * m - 8 * first;
-    (0..count).map(|i| u32::from(!R::lies_in(row, m, x - 8 * i))).sum()
-}
-
-fn wrong_at<R: Root>(n: i64, row: i64, k: i64) -> Option<Wrong> {
-    let estimate = R::row(2 * n - 1, discriminant(k, n));
-    (estimate != row).then_some(Wrong { k: k as u32, estimate: estimate as i32, row: row as i32 })
-}
-
-/// Counts the errors that a correction leaves.
-fn judged<C: Correction>(n: i64, wrong: &[Wrong]) -> Tally {
-    let mut left = Left::new(n);
-    for w in wrong {
-        let (k, row) = (i64::from(w.k), i64::from(w.row));
-        left.note(k, AsItIs::pair(row, k, n), C::pair(w.estimate.into(), k, n));
-    }
-    left.tally()
-}
-
-/// Counts pairs given one by one, in the order of all pairs of `n >= 2` boxes.
-pub fn of(n: i64, mut given: impl Iterator<Item = (i64, i64)>) -> Tally {
-    let mut left = Left::new(n);
-    let pairs = (0..n - 1).flat_map(|a| (a + 1..n).map(move |b| (a, b)));
-    for (k, pair) in (0..).zip(pairs) {
-        left.note(k, pair, given.next().unwrap_or((-1, -1)));
-    }
-    let tally = left.tally();
-    let more = given.count() as u64;
-    Tally { wrong: tally.wrong + more, doubled: tally.doubled + more, ..tally }
-}
-
-/// Wrong indices, each with the index of the pair that it gives, if it gives one.
-struct Left {
+/// The pairs that indices give.
+struct Tested {
     n: i64,
+    wrong: u64,
+    none: u64,
     worst_row: u64,
-    wrong: Vec<(i64, Option<i64>)>,
+    /// A bit for each pair.
+    is_tested: Vec<u64>,
 }
 
-impl Left {
+impl Tested {
     fn new(n: i64) -> Self {
-        Self { n, worst_row: 0, wrong: Vec::new() }
+        let words = (pairs_of(n) as u64).div_ceil(64) as usize;
+        Self { n, wrong: 0, none: 0, worst_row: 0, is_tested: vec![0; words] }
     }
 
-    fn note(&mut self, k: i64, right: (i64, i64), given: (i64, i64)) {
-        if given != right {
-            self.worst_row = self.worst_row.max(given.0.abs_diff(right.0));
-            self.wrong.push((k, tested(given, self.n)));
+    /// What a correction makes of a run. From the same estimate for the same row it takes the same way, so that the
+    /// first and the last pair say all where they are of one row, and the pairs between those between: the rules ask
+    /// whether `b > n`, which it is from the start of the row after the estimated one on, and whether `a >= b`, which it is
+    /// below the start of the estimated one; both are borders of rows.
+    #[inline(always)]
+    fn note<C: Correction>(&mut self, run: &Run) {
+        let Self { n, .. } = *self;
+        let pair = |k| C::pair(run.estimate, k, n);
+        let (first, last) = (pair(run.first), pair(run.first + run.count - 1));
+        let right = AsItIs::pair(run.row, run.first, n);
+        if first != right || last.0 != right.0 {
+            self.wrong += run.count as u64;
+            self.worst_row = self.worst_row.max(first.0.abs_diff(right.0));
+        }
+        let is_one_row = first.0 == last.0 && last.1 - first.1 == run.count - 1;
+        if is_one_row && first.1 >= n {
+            self.none += run.count as u64;
+        } else if let (true, true, Some(index)) = (is_one_row, last.1 < n, in_order(first, n)) {
+            self.mark(index as u64, run.count as u64);
+        } else {
+            (run.first..run.first + run.count).for_each(|k| self.mark_one(tested(pair(k), n)));
         }
     }
 
-    /// An index that is right tests its own pair, so a pair is missed when its index is wrong and no wrong index
-    /// tests it.
+    fn mark_one(&mut self, index: Option<i64>) {
+        match index {
+            Some(index) => self.mark(index as u64, 1),
+            None => self.none += 1,
+        }
+    }
+
+    /// At most [`BLOCK`] bits.
+    fn mark(&mut self, first: u64, count: u64) {
+        let (word, bit) = ((first / 64) as usize, first % 64);
+        let bits = u128::from(u64::MAX >> (64 - count)) << bit;
+        self.is_tested[word] |= bits as u64;
+        if bits >> 64 != 0 {
+            self.is_tested[word + 1] |= (bits >> 64) as u64;
+        }
+    }
+
     fn tally(&self) -> Tally {
-        let (pairs, wrong) = (pairs_of(self.n) as u64, self.wrong.len() as u64);
-        let missed = missed(&self.wrong, pairs);
-        let none = self.wrong.iter().filter(|(_, given)| given.is_none()).count() as u64;
-        // There are as many indices as pairs: those missed have theirs on no pair, or on one that another tests.
-        Tally { pairs, wrong, worst_row: self.worst_row, missed, doubled: missed - none, none }
+        let Self { n, wrong, none, worst_row, .. } = *self;
+        let pairs = pairs_of(n) as u64;
+        let tested: u64 = self.is_tested.iter().map(|word| u64::from(word.count_ones())).sum();
+        let missed = pairs - tested;
+        Tally { pairs, wrong, worst_row, missed, doubled: missed - none, none }
     }
 }
 
+/// The index of a pair whose lesser box comes first.
+fn in_order(pair: (i64, i64), n: i64) -> Option<i64> {
+    if pair.0 < pair.1 { tested(pair, n) } else { None }
+}
+
 /// The index of the pair that is tested: (1, 0) tests 0 and 1, as (0, 1) does.
-pub(super) fn tested((a, b): (i64, i64), n: i64) -> Option<i64> {
+fn tested((a, b): (i64, i64), n: i64) -> Option<i64> {
     let (a, b) = (a.min(b), a.max(b));
     (0 <= a && a < b && b < n).then(|| row_start(a, n) + b - a - 1)
 }
 
-/// Returns the number of pairs of wrong indices that no wrong index gives.
-fn missed(left: &[(i64, Option<i64>)], pairs: u64) -> u64 {
-    if left.is_empty() {
-        return 0;
+/// Counts pairs given one by one, in the order of all pairs of `n >= 2` boxes.
+pub(super) fn of(n: i64, mut given: impl Iterator<Item = (i64, i64)>) -> Tally {
+    let mut counts = Tested::new(n);
+    for right in (0..n - 1).flat_map(|a| (a + 1..n).map(move |b| (a, b))) {
+        let pair = given.next().unwrap_or((-1, -1));
+        if pair != right {
+            counts.wrong += 1;
+            counts.worst_row = counts.worst_row.max(pair.0.abs_diff(right.0));
+        }
+        counts.mark_one(tested(pair, n));
     }
-    let mut is_given = vec![0u64; pairs.div_ceil(64) as usize];
-    for given in left.iter().filter_map(|(_, given)| *given) {
-        is_given[(given / 64) as usize] |= 1 << (given % 64);
-    }
-    let is_missed = |k: i64| is_given[(k / 64) as usize] >> (k % 64) & 1 == 0;
-    left.iter().filter(|(k, _)| is_missed(*k)).count() as u64
+    let (tally, more) = (counts.tally(), given.count() as u64);
+    Tally { wrong: tally.wrong + more, doubled: tally.doubled + more, ..tally }
 }
 
 /// Counts at the ends of all rows, and at indices in between.
@@ -191,7 +209,7 @@ fn sampled<R: Root, C: Correction>(n: i64, indices: &[i64]) -> Sample {
 
 #[cfg(test)]
 mod tests {
-    use super::super::{CARMACK, Double, Newton, Single};
+    use super::super::{CARMACK, Double, Newton, Printed, Single};
     use super::*;
     use std::collections::BTreeMap;
 
@@ -221,9 +239,6 @@ mod tests {
         fn row(m: i64, x: i64) -> i64 {
             Double::row(m, x) + 3
         }
-        fn lies_in(_: i32, _: i32, _: i32) -> bool {
-            false
-        }
         fn worst_relative() -> f64 {
             1.0
         }
@@ -240,6 +255,7 @@ mod tests {
             check::<Newton<CARMACK, 2>>(n);
             check::<Single>(n);
             check::<OffByThree>(n);
+            check::<Printed>(n);
         }
         let [as_it_is, rules, integers] = all::<OffByThree>(50);
         assert!(as_it_is.wrong == as_it_is.pairs && as_it_is.worst_row == 3 && as_it_is.missed > 0);

@@ -115,24 +115,24 @@ mod tests {
             let found = report.tables.iter().find(|table| table.name.contains(name));
             found.unwrap_or_else(|| panic!("no table {name}"))
         };
-        for name in ["table III: what", "figure 8", "figure 9", "figure 10", "figure 11", "tables V and VI"] {
-            assert!(!table(&format!("PBIG {name}")).rows.is_empty() || name == "figure 10", "{name}");
-        }
         for name in [
-            "table 1:",
-            "table 2:",
-            "tables 2 and 4",
-            "table 5",
-            "figure 3",
-            "figure 4",
-            "table 6",
-            "figure 6",
-            "table 7",
+            "PBIG table III: what",
+            "PBIG table III and figure 10",
+            "PBIG figure 8",
+            "PBIG figure 9",
+            "PBIG figure 11",
+            "PBIG tables V and VI",
+            "Avril table 1:",
+            "Avril table 2:",
+            "Avril tables 2 and 4",
+            "Avril table 5",
+            "Avril figure 3",
+            "Avril figure 4",
+            "Avril table 6",
+            "Avril figure 6",
+            "Avril table 7",
         ] {
-            assert!(
-                report.tables.iter().any(|table| table.name.contains("Avril") && table.name.contains(name)),
-                "{name}"
-            );
+            assert!(!table(name).rows.is_empty(), "{name}");
         }
         for name in ["PBIG figure 8", "PBIG figure 11"] {
             let off = table(name).column("off, standard deviations").filter_map(|cell| cell.number());

@@ -21,15 +21,6 @@ pub(super) const WARP: f64 = 32.0;
 pub(super) const SEGMENT: u64 = 256;
 /// PBIG 6.1: lengths of the cells of figure 9, beside that of equation 6.
 pub(super) const CELLS: [f64; 5] = [64.0, 128.0, 256.0, 512.0, 1024.0];
-/// Speed-up over CGAL: PBIG section 1 and 7 ("up to", of no number of boxes), and section 6.1, at 10^7 boxes.
-pub(super) const SPEED_UPS: [f64; 2] = [110.0, 116.0];
-/// The most over BULLET and PRI: PBIG sections 1 and 7.
-pub(super) const MOST_SPEED_UPS: [f64; 2] = [10.0, 3.0];
-/// Over PRI at 10^7 boxes: PBIG section 6.1.
-pub(super) const OVER_PRI: f64 = 3.3;
-/// Over CGAL at 10^7 boxes with normal centres: PBIG section 6.3.
-pub(super) const OVER_CGAL_GAUSSIAN: f64 = 65.66;
-
 /// A row of PBIG's table III, for 10^7 boxes.
 pub(super) struct Coverage {
     pub(super) doc: f64,
@@ -112,9 +103,6 @@ pub(super) const AVRIL_1: [Element; 10] = [
 pub(super) const AVRIL_2: [(u64, f64, f64); 3] =
     [(1000, 0.21, 0.25), (10_000, 2.25, 4.28), (100_000, 29.66, 58.24)];
 
-/// Avril 3.2.2: seconds of the lazy way for 10,000 objects on a CPU, and how many times faster it is there.
-pub(super) const AVRIL_LAZY_ON_CPU: (f64, f64) = (4.51, 4.0);
-
 /// A row of Avril's table 4.
 pub(super) struct Roots {
     pub(super) roots: u64,
@@ -170,9 +158,6 @@ pub(super) const AVRIL_6: [(usize, [f64; 4]); 4] = [
 /// Avril, table 7: objects; milliseconds without the grid and with it.
 pub(super) const AVRIL_7: [(usize, f64, f64); 3] =
     [(100, 0.046, 1.020), (1000, 0.872, 1.840), (10_000, 31.450, 3.257)];
-
-/// Avril 6: objects ("300 spheres and 4 cones"), and the milliseconds "exactly" of the broad phase with the grid.
-pub(super) const AVRIL_FEW: (u64, f64) = (304, 0.41);
 
 /// Avril 3.1: boxes, index of a pair counted from 0, and the pair counted from 1.
 pub(super) const AVRIL_EXAMPLES: [(u64, u64, (u64, u64)); 2] =

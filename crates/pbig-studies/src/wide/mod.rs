@@ -2,7 +2,6 @@
 
 mod layout;
 mod pairs;
-mod plain;
 mod shape;
 mod ulps;
 mod world;

@@ -1,255 +1,188 @@
-//! The same roots as kernels: the row that a device estimates, and the exact pair; and the lazy way.
+//! The same roots as kernels: the row that a device estimates at both ends of each row, for every n, and the exact pair. All pairs
+//! of every n would be too many. An error shows where a row begins or ends before it shows within, as the estimated number falls
+//! with the index: the table of all pairs has how far that holds.
 
-pub(super) mod ends;
-mod lazy;
-
-use super::percent;
+use super::super::percent;
 use super::times::label;
-use crate::index::{AsItIs, Correction, Rules, Tally, WAYS, Way, tally_of};
+use crate::index::{AsItIs, Correction, Rules, WAYS, Way};
+use crate::study::{INDEX_PAIRS, ROW_ENDS};
 use pbig_core::GpuOptions;
 use pbig_core::layout::{LANES, Params};
 use pbig_harness::bench::timed;
 use pbig_harness::cells;
 use pbig_harness::kernels::Bench;
 use pbig_harness::output::Failure;
-use pbig_harness::pair_index::{pair_count, pair_of};
+use pbig_harness::pair_index::index_of;
 use pbig_harness::table::{Cell, Table};
 use pbig_shaders::Kernel;
+use std::ops::Range;
 
-/// Up to so many boxes all indices are looked at.
-const MOST_WHOLE: u32 = 5000;
-/// Parts of all indices that are looked at beyond, evenly spread, and the most indices of a call.
-const PARTS: u64 = 8;
-const MOST: u32 = 1 << 17;
+/// The most places of a call, two for each row.
+const MOST_PLACES: u32 = 1 << 20;
 
-/// A root by the kernel's number (`GpuOptions::root`), with our name for it.
-struct Root {
-    number: u32,
-    name: String,
-    /// The same on the CPU, of ways that estimate a row ([`Way::row`]).
-    row: Option<fn(i64, i64) -> i64>,
-}
+/// A root by the kernel's number (`GpuOptions::root`), with our name for it; of ways that estimate a row, the same on the CPU.
+type Root = (u32, String, Option<fn(i64, i64) -> i64>);
 
-const BISECTION: u32 = 9;
-
-impl Root {
-    fn all() -> impl Iterator<Item = Self> {
-        let of_way = |way: &Way| Some(Self { number: number(way)?, name: label(way), row: Some(way.row) });
-        let bisection = Self { number: BISECTION, name: "bisection over rows".to_owned(), row: None };
-        WAYS.iter().filter_map(of_way).chain([bisection])
-    }
-
-    /// The most boxes for which the kernel's 32-bit integers suffice: with a root for `(2n - 1)^2`, by bisection for
-    /// `n (n - 1)`.
-    fn most_boxes(&self) -> u32 {
-        if self.number == BISECTION { 1 << 16 } else { 1 << 15 }
-    }
-}
-
-fn number(way: &Way) -> Option<u32> {
-    match (way.name, way.steps) {
+fn roots() -> impl Iterator<Item = Root> {
+    let number = |way: &Way| match (way.name, way.steps) {
         ("f32 sqrt", _) => Some(0),
         ("Carmack", steps) => steps,
         ("Lomont", steps) => steps.map(|steps| steps + 4),
         _ => None,
+    };
+    let of_way = move |way: &Way| Some((number(way)?, label(way), Some(way.row)));
+    WAYS.iter().filter_map(of_way).chain([(9, "bisection over rows".to_owned(), None)])
+}
+
+/// What was found at the ends of rows.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+struct Found {
+    wrong: u64,
+    /// The number of rows by which the worst place is off.
+    worst_row: u64,
+    /// Values of n with a wrong place, and the smallest of them.
+    values: u64,
+    first: Option<u32>,
+}
+
+impl Found {
+    /// Adds the wrong places of one n, which ascends.
+    fn add(&mut self, n: u32, (wrong, worst_row): (u64, u64)) {
+        self.wrong += wrong;
+        self.worst_row = self.worst_row.max(worst_row);
+        self.values += u64::from(wrong > 0);
+        self.first = self.first.or((wrong > 0).then_some(n));
+    }
+
+    fn cells(&self, places: u64) -> Vec<Cell> {
+        cells![self.wrong, percent(self.wrong, places), self.values, self.first, self.worst_row]
     }
 }
 
-/// The rows that a root estimates for some boxes.
-pub(super) struct Estimates {
-    n: u32,
-    name: String,
-    /// As it is. Unless all indices were looked at, without what is missed, doubled and no pair.
-    tally: Tally,
-    /// The same by the rules, of ways that estimate a row.
-    by_rules: Option<Tally>,
-    /// Milliseconds for all these indices.
-    ms: Option<f64>,
-}
+const COLUMNS: [&str; 14] = [
+    "root",
+    "looked_at",
+    "wrong",
+    "wrong_percent",
+    "values_of_n_with_wrong_ones",
+    "first_wrong_n",
+    "worst_row",
+    "wrong_by_the_rules",
+    "wrong_by_the_rules_percent",
+    "values_of_n_with_wrong_ones_by_the_rules",
+    "first_wrong_n_by_the_rules",
+    "worst_row_by_the_rules",
+    "rows_other_than_on_the_CPU",
+    "ns_per_pair",
+];
 
-/// Estimates and exact pairs on the best adapter; times where it is no software.
-fn estimates(bench: &Bench, software: bool, quick: bool) -> Result<Vec<Estimates>, Failure> {
-    let sizes: &[u32] =
-        if quick { &[2, 300] } else { &[2, 300, 1000, 2000, MOST_WHOLE, 16_384, 1 << 15, 1 << 16] };
-    let all = sizes.iter().flat_map(|&n| Root::all().map(move |root| (n, root)));
-    let within = all.filter(|(n, root)| *n <= root.most_boxes());
-    let rows = within.map(|(n, root)| Estimates::of(bench, n, root, software));
-    let lazy = sizes.iter().filter(|n| **n <= lazy::MOST_BOXES).map(|&n| lazy::estimates(bench, n, software));
-    rows.chain(lazy).collect()
-}
-
-impl Estimates {
-    fn of(bench: &Bench, n: u32, Root { number, name, .. }: Root, software: bool) -> Result<Self, Failure> {
-        let (mut rows, mut ms) = (Vec::new(), 0.0);
-        for indices in parts(n, pair_count(n.into())) {
-            let (words, took) =
-                timed_run(software, |cells| run(bench, number, &indices, cells), indices.count)?;
-            rows.extend(estimated(&indices, &words)?);
-            ms += took;
-        }
-        let (tally, by_rules) = (judged::<AsItIs>(n, &rows), Some(judged::<Rules>(n, &rows)));
-        Ok(Self { n, name, tally, by_rules, ms: (!software && ms > 0.0).then_some(ms) })
-    }
-
-    fn row(&self) -> Vec<Cell> {
-        let indices = self.tally.pairs;
-        let ns = self.ms.map(|ms| ms * 1e6 / indices as f64);
-        let counts = [Some(self.tally), self.by_rules].map(|tally| self.counts(tally)).concat();
-        [cells![self.n, &self.name, indices], counts, cells![ns]].concat()
-    }
-
-    fn counts(&self, tally: Option<Tally>) -> Vec<Cell> {
-        let Some(tally) = tally else { return vec![Cell::Nothing; 5] };
-        let [missed, doubled, none] =
-            [tally.missed, tally.doubled, tally.none].map(|count| self.is_whole().then_some(count));
-        cells![percent(tally.wrong, tally.pairs), tally.worst_row, missed, doubled, none]
-    }
-
-    fn is_whole(&self) -> bool {
-        self.n <= MOST_WHOLE
-    }
-}
-/// Estimated rows, as they are and by the paper's rules. A pair that is wrong by integers is a failed check.
+/// Returns the table. A pair that is wrong by integers is a failed check. Times are of a call for 2^17 pairs of 5000 boxes, less that
+/// of a call which computes nothing, where the adapter is no software.
 pub(super) fn table(bench: &Bench, software: bool, quick: bool) -> Result<Table, Failure> {
-    let columns = [
-        "boxes",
-        "root",
-        "indices",
-        "wrong_percent",
-        "worst_row",
-        "missed",
-        "doubled",
-        "no_pair",
-        "wrong_by_the_rules_percent",
-        "worst_row_by_the_rules",
-        "missed_by_the_rules",
-        "doubled_by_the_rules",
-        "no_pair_by_the_rules",
-        "ns_per_pair",
-    ];
-    let mut table = Table::new("kernels", columns);
-    estimates(bench, software, quick)?.iter().for_each(|one| table.row(one.row()));
+    let (most, mut table) = (if quick { 250 } else { 5000 }, Table::new("kernels_at_ends", COLUMNS));
+    for (number, name, row) in roots() {
+        let (mut places, mut otherwise, mut found) = (0, 0, [Found::default(); 2]);
+        for batch in batches(most) {
+            let params = params(&batch);
+            let words = run(bench, &ROW_ENDS, number, params, params.cells)?;
+            for (n, words) in batch.zip(words.chunks_exact(3 * params.split as usize)) {
+                let (wrong, others) = judged(n, words, row)?;
+                found.iter_mut().zip(wrong).for_each(|(found, wrong)| found.add(n, wrong));
+                (places, otherwise) = (places + 2 * u64::from(n - 1), otherwise + others);
+            }
+        }
+        let rules = row.map_or(vec![Cell::Nothing; 5], |_| found[1].cells(places));
+        let rest = cells![row.map(|_| otherwise), if software { None } else { Some(ns_per_pair(bench, number)?) }];
+        table.row([cells![name, places], found[0].cells(places), rules, rest].concat());
+    }
     Ok(table)
 }
 
-/// Consecutive indices.
-struct Indices {
-    n: u32,
-    first: u32,
-    count: u32,
-}
-
-impl Indices {
-    fn between(n: u32, first: u64, end: u64) -> Self {
-        Self { n, first: first as u32, count: ((end - first) as u32).min(MOST) }
+/// Returns the values of n that are looked at in one call.
+fn batches(most: u32) -> Vec<Range<u32>> {
+    let (mut batches, mut low) = (vec![], 2);
+    while low <= most {
+        let fits = |high: &u32| 2 * (high - 1) * (high - low + 1) <= MOST_PLACES;
+        let high = (low..=most).take_while(fits).last().unwrap_or(low);
+        batches.push(low..high + 1);
+        low = high + 1;
     }
-
-    /// For so many of them.
-    fn params(&self, cells: u32) -> Params {
-        Params { boxes: self.n, split: self.first, cells, ..Params::default() }
-    }
+    batches
 }
 
-/// All of so many, or some of each part of all.
-fn parts(n: u32, all: u64) -> Vec<Indices> {
-    if n <= MOST_WHOLE {
-        (0..all).step_by(MOST as usize).map(|first| Indices::between(n, first, all)).collect()
-    } else {
-        let start = |part: u64| all * part / PARTS;
-        (0..PARTS).map(|part| Indices::between(n, start(part), start(part + 1))).collect()
-    }
+/// All of a batch have as many places as the largest, so that a thread finds its n by a division.
+fn params(batch: &Range<u32>) -> Params {
+    let split = 2 * (batch.end - 2);
+    Params { boxes: batch.start, split, cells: split * batch.len() as u32, ..Params::default() }
 }
 
-/// Returns the output of a kernel and the shortest time of several runs, less the time of runs that compute nothing.
-fn timed_run(
-    software: bool,
-    run: impl Fn(u32) -> Result<Vec<u32>, Failure>,
-    count: u32,
-) -> Result<(Vec<u32>, f64), Failure> {
-    let mut best = [f64::MAX; 2];
-    let mut out = Vec::new();
-    for _ in 0..if software { 1 } else { 3 } {
-        let (none, idle) = timed(|| run(0));
-        let (words, busy) = timed(|| run(count));
-        (_, out) = (none?, words?);
-        best = [best[0].min(idle), best[1].min(busy)];
-    }
-    Ok((out, best[1] - best[0]))
-}
-
-/// With room for all indices, of which `cells` are computed.
-fn run(bench: &Bench, root: u32, indices: &Indices, cells: u32) -> Result<Vec<u32>, Failure> {
-    run_kernel(bench, (&crate::study::INDEX_PAIRS, root), indices.params(cells), indices.count, 3)
-}
-
-/// A kernel with a root, and room for so many cells of so many words each.
-fn run_kernel(
+/// Runs a kernel with a root, with room for so many cells of three words.
+fn run(
     bench: &Bench,
-    (kernel, root): (&'static Kernel, u32),
+    kernel: &'static Kernel,
+    root: u32,
     params: Params,
     room: u32,
-    words: usize,
 ) -> Result<Vec<u32>, Failure> {
     let options = GpuOptions { root, ..GpuOptions::DEFAULT };
-    let bindings = [bytemuck::bytes_of(&params).to_vec(), vec![0; 4 * words * room as usize]];
+    let bindings = [bytemuck::bytes_of(&params).to_vec(), vec![0; 12 * room as usize]];
     let found = bench.run(kernel, &options, false, &bindings, room.div_ceil(LANES));
     let found = found.map_err(|error| Failure::Input(format!("{}: {error}", kernel.name)))?;
     Ok(bytemuck::pod_collect_to_vec(&found[1]))
 }
 
-/// Each index with its estimated row. A pair that is wrong after the correction by integers is a failed check.
-fn estimated(&Indices { n, first, .. }: &Indices, words: &[u32]) -> Result<Vec<(u32, u32)>, Failure> {
-    let row = |(k, words): (u32, &[u32])| {
-        let right = pair_of(k.into(), n.into());
-        if right != (words[1].into(), words[2].into()) {
-            let given = &words[1..];
-            return Err(Failure::Check(format!("index {k} of {n} boxes: the kernel gives {given:?}")));
-        }
-        Ok((k, words[0]))
-    };
-    (first..).zip(words.chunks_exact(3)).map(row).collect()
-}
-
-/// The pairs that a correction makes of estimated rows.
-fn judged<C: Correction>(n: u32, rows: &[(u32, u32)]) -> Tally {
-    let given = rows.iter().map(|&(k, row)| (k, C::pair(row.into(), k.into(), n.into())));
-    if n <= MOST_WHOLE { tally_of(n.into(), given.map(|(_, pair)| pair)) } else { sampled(n, given) }
-}
-
-fn sampled(n: u32, given: impl Iterator<Item = (u32, (i64, i64))>) -> Tally {
-    let mut tally = Tally::default();
-    for (k, pair) in given {
-        let (a, b) = pair_of(k.into(), n.into());
-        let right = (a as i64, b as i64);
-        tally.pairs += 1;
-        tally.wrong += u64::from(pair != right);
-        tally.worst_row = tally.worst_row.max(pair.0.abs_diff(right.0));
+fn ns_per_pair(bench: &Bench, root: u32) -> Result<f64, Failure> {
+    let (count, mut best) = (1 << 17, [f64::MAX; 2]);
+    for (k, cells) in [0, count, 0, count, 0, count].into_iter().enumerate() {
+        let params = Params { boxes: 5000, cells, ..Params::default() };
+        let (done, ms) = timed(|| run(bench, &INDEX_PAIRS, root, params, count));
+        done?;
+        best[k % 2] = best[k % 2].min(ms);
     }
-    tally
+    Ok((best[1] - best[0]) * 1e6 / f64::from(count))
+}
+
+/// The wrong places of one n and by how many rows the worst is off, as it is and by the rules; and estimates other than the CPU's.
+type Judged = ([(u64, u64); 2], u64);
+
+fn judged(n: u32, words: &[u32], row: Option<fn(i64, i64) -> i64>) -> Result<Judged, Failure> {
+    let (mut found, mut otherwise) = ([(0, 0); 2], 0);
+    let ends = (0..n - 1).flat_map(|row| [(row, row + 1), (row, n - 1)]);
+    for (right, words) in ends.zip(words.chunks_exact(3)) {
+        if words[1..] != [right.0, right.1] {
+            let given = &words[1..];
+            return Err(Failure::Check(format!("{right:?} of {n} boxes: the kernel gives {given:?}")));
+        }
+        let (estimate, n) = (i64::from(words[0]), i64::from(n));
+        let k = index_of(right.0.into(), right.1.into(), n as u64) as i64;
+        let right = (right.0.into(), right.1.into());
+        for ((wrong, worst), given) in found.iter_mut().zip([AsItIs::pair(estimate, k, n), Rules::pair(estimate, k, n)]) {
+            *wrong += u64::from(given != right);
+            *worst = given.0.abs_diff(right.0).max(*worst);
+        }
+        let m = 2 * n - 1;
+        // Kept among the rows that there are, as kernels keep it.
+        let is_other = |row: fn(i64, i64) -> i64| row(m, m * m - 8 * k).clamp(0, n - 2) != estimate;
+        otherwise += u64::from(row.is_some_and(is_other));
+    }
+    Ok((found, otherwise))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
+    /// Of 4 boxes, by a root that the CPU has estimate row 1 everywhere.
     #[test]
-    fn a_wrong_pair_is_a_failure_and_what_is_missed_and_doubled_is_counted() {
-        let indices = |count| Indices { n: 4, first: 0, count };
-        assert_eq!(estimated(&indices(2), &[0, 0, 1, 7, 0, 2]).expect("right pairs"), [(0, 0), (1, 7)]);
-        assert!(estimated(&indices(1), &[0, 0, 2]).is_err());
-        // As it is, index 1 gives (1, 0), which index 0 tests, 2 gives (1, 1), 3 gives (3, 1), which 4 tests, 5 gives (0, 6).
-        let rows = [(0, 0), (1, 1), (2, 1), (3, 3), (4, 1), (5, 0)];
-        let counts = |tally: Tally| [tally.wrong, tally.worst_row, tally.missed, tally.doubled, tally.none];
-        assert_eq!(counts(judged::<AsItIs>(4, &rows)), [4, 2, 4, 2, 2]);
-        assert_eq!(counts(judged::<Rules>(4, &rows)), [2, 1, 1, 0, 1]);
-    }
-
-    #[test]
-    fn as_many_boxes_as_32_bits_suffice_for() {
-        for root in Root::all() {
-            let largest = |n: u64| if root.number == BISECTION { n * (n - 1) } else { (2 * n - 1).pow(2) };
-            let most = u64::from(root.most_boxes());
-            assert!(largest(most) < 1 << 32 && largest(most + 1) >= 1 << 32, "{}", root.name);
+    fn wrong_estimates_are_counted_and_a_wrong_pair_is_a_failure() {
+        let mut words = [[1, 0, 1], [0, 0, 3], [1, 1, 2], [1, 1, 3], [0, 2, 3], [2, 2, 3]].concat();
+        let row: fn(i64, i64) -> i64 = |_, _| 1;
+        assert_eq!(judged(4, &words, Some(row)).expect("right pairs"), ([(2, 2), (1, 1)], 3));
+        words[4] = 1;
+        assert!(judged(4, &words, None).is_err());
+        for most in [2, 250, 5000] {
+            assert!(batches(most).iter().cloned().flatten().eq(2..=most));
+            assert!(batches(most).iter().all(|batch| params(batch).cells <= MOST_PLACES));
         }
     }
 }

@@ -1,4 +1,4 @@
-//! One run in figures, and how far two runs are from each other in each.
+//! One run in figures.
 
 use super::sides::{Moving, Side};
 use crate::mechanics::Mechanics;
@@ -94,10 +94,6 @@ impl Figures {
             let what = format!("{scene}, {}: {missed} of {needed} pairs that overlap are missing", self.way);
             return Err(Failure::Check(what));
         }
-        let no_number = |quantity: &&Quantity| (quantity.of)(&self).is_some_and(|value| !value.is_finite());
-        if let Some(Quantity { name, .. }) = QUANTITIES.iter().find(no_number) {
-            return Err(Failure::Check(format!("{scene}, {}: {name} is no number", self.way)));
-        }
         Ok(self)
     }
 }
@@ -140,102 +136,9 @@ fn lasts<T>(all: &[T], is_so: impl Fn(&T) -> bool) -> Option<usize> {
     (last < all.len()).then_some(last + 1)
 }
 
-/// One of the figures.
-#[derive(Clone, Copy)]
-pub(super) struct Quantity {
-    pub(super) name: &'static str,
-    /// None where it has no meaning.
-    pub(super) of: fn(&Figures) -> Option<f64>,
-    /// Returns true if the quantity occurred in a run. If it did in neither of two, there is nothing to compare.
-    came: fn(&Figures) -> bool,
-    /// Less is no difference.
-    resolution: f64,
-}
-
-const fn quantity(name: &'static str, of: fn(&Figures) -> Option<f64>) -> Quantity {
-    Quantity { name, of, came: |_| true, resolution: 0.0 }
-}
-
-/// All in which runs are compared.
-pub(super) const QUANTITIES: [Quantity; 10] = [
-    quantity("contacts", |f| Some(f.contacts)),
-    quantity("contact points", |f| Some(f.points)),
-    quantity("deepest penetration", |f| Some(f.deepest)),
-    quantity("mean penetration", |f| Some(f.penetration)),
-    quantity("energy at the end", |f| Some(f.energy)),
-    quantity("rise of energy", |f| Some(f.rise)),
-    quantity("drift of momentum", |f| f.momentum),
-    // One that never rests does so after the run.
-    Quantity {
-        resolution: 1.0,
-        came: |f| f.rest.is_some(),
-        ..quantity("time to rest", |f| Some(f.rest.unwrap_or(f.steps + 1) as f64))
-    },
-    quantity("mean distance at the end", |f| Some(f.apart.mean)),
-    quantity("largest distance at the end", |f| Some(f.apart.max)),
-];
-
-/// The distance of a run from the first one in a quantity.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Multiple {
-    /// As a multiple of the farthest of the yardsticks. None where the quantity came about in neither run.
-    pub(super) times: Option<f64>,
-    /// Number of yardsticks that are nearer to the first than the run, by more than the resolution.
-    pub(super) nearer: usize,
-    /// True if the run and all yardsticks are equally far from the first, so that none is the farthest.
-    pub(super) is_tied: bool,
-}
-
-/// None where the quantity has no meaning for one of them.
-pub(super) fn multiple(
-    run: &Figures,
-    first: &Figures,
-    yardsticks: &[&Figures],
-    Quantity { of, came, resolution, .. }: Quantity,
-) -> Option<Multiple> {
-    let [here, there] = [of(run)?, of(first)?];
-    let values = yardsticks.iter().map(|figures| of(figures)).collect::<Option<Vec<_>>>()?;
-    let from_there = |value: f64| (value - there).abs();
-    let is_nearer = |value: &&f64| from_there(here) > from_there(**value).max(resolution);
-    let nearer = values.iter().filter(is_nearer).count();
-    let reached = |value: f64| from_there(value).max(resolution);
-    let is_tied = values.iter().all(|value| reached(*value) == reached(here));
-    let farthest =
-        values.into_iter().max_by(|a, b| from_there(*a).total_cmp(&from_there(*b))).unwrap_or(there);
-    let (far, reach) = (from_there(here), reached(farthest));
-    let times = if far == 0.0 { 0.0 } else { far / reach };
-    let is_there = came(run) || came(first);
-    Some(Multiple { times: is_there.then_some(times), nearer, is_tied })
-}
-
 #[cfg(test)]
-pub(super) mod tests {
+mod tests {
     use super::*;
-
-    /// The figures of a run in which nothing has happened.
-    pub(in super::super) fn nothing() -> Figures {
-        Figures {
-            way: "some way",
-            contacts: 0.0,
-            points: 0.0,
-            deepest: 0.0,
-            penetration: 0.0,
-            energy: 100.0,
-            rise: 0.0,
-            momentum: None,
-            rest: None,
-            asleep: None,
-            awake: 100.0,
-            parted: 0,
-            steps: 100,
-            moving: Moving::default(),
-            apart: Apart::default(),
-            differs: None,
-            ms: 1.0,
-            reported: Reported::default(),
-            compared: 1,
-        }
-    }
 
     #[test]
     fn energy_momentum_and_rest_by_hand() {
@@ -246,18 +149,5 @@ pub(super) mod tests {
         assert_eq!(momentum_drift(&[with([1.0, 0.0, 0.0]), with([4.0, 4.0, 0.0])]), 10.0);
         assert_eq!(rest(&[1.0, REST, 1.0, REST, REST].map(of)), Some(4));
         assert_eq!(rest(&[REST, 1.0].map(of)), None);
-    }
-
-    #[test]
-    fn distances_are_multiples_of_the_farthest_yardstick() {
-        let with = |contacts| Figures { contacts, ..nothing() };
-        let (first, far, near) = (with(100.0), with(110.0), with(98.0));
-        let found =
-            |run| multiple(&with(run), &first, &[&near, &far], QUANTITIES[0]).expect("it has a meaning");
-        assert_eq!([130.0, 95.0, 100.0].map(|run| found(run).times), [Some(3.0), Some(0.5), Some(0.0)]);
-        assert_eq!([130.0, 95.0, 101.0].map(|run| found(run).nearer), [2, 1, 0], "than 10 and 2");
-        assert_eq!(multiple(&far, &first, &[&near], QUANTITIES[6]), None);
-        let never = multiple(&nothing(), &nothing(), &[&nothing()], QUANTITIES[7]).expect("a row");
-        assert_eq!(never.times, None, "neither run comes to rest");
     }
 }

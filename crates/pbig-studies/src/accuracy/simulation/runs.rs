@@ -44,9 +44,11 @@ pub(super) fn table(scenes: &[Ways]) -> Table {
 /// The permuted ones where the first of them is.
 fn rows(ways: &Ways) -> Vec<Vec<Cell>> {
     let all = WAYS.iter().zip(&ways.runs);
-    let one = |(way, run): (&Way, &Figures)| (!way.is_permuted()).then(|| cells(ways.scene, run));
-    let mut rows: Vec<_> = all.filter_map(one).collect();
-    let permuted: Vec<_> = ways.yardsticks().into_iter().map(|run| cells(ways.scene, run)).collect();
+    let (permuted, others): (Vec<_>, Vec<_>) = all.partition(|(way, _)| way.is_permuted());
+    let cells = |runs: Vec<(&Way, &Figures)>| -> Vec<Vec<Cell>> {
+        runs.into_iter().map(|(_, run)| cells(ways.scene, run)).collect()
+    };
+    let (permuted, mut rows) = (cells(permuted), cells(others));
     let of_permuted = OF_PERMUTED.map(|(name, place)| among(&permuted, name, place));
     let first = WAYS.iter().position(Way::is_permuted).unwrap_or(0);
     rows.splice(first..first, of_permuted);

@@ -81,11 +81,6 @@ impl Way {
         self.margin.is_some()
     }
 
-    /// Stock once more: what chance does where a run does not repeat.
-    pub(super) fn is_stock_again(&self) -> bool {
-        self.is_again && self.margin.is_none() && self.order.is_none()
-    }
-
     /// Pbig's, or stock in our order of events; for the first time.
     pub(super) fn is_held_against_stock(&self) -> bool {
         (self.is_pbig() || self.order == Some(Order::Sorted)) && !self.is_again

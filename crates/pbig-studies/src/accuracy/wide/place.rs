@@ -282,10 +282,6 @@ impl Row {
         (missed + added) as f64 / self.pairs.max(1) as f64 * 100.0
     }
 
-    /// Returns the size of the shapes in ulps at this distance.
-    pub(super) fn size_in_ulps(&self) -> f64 {
-        self.size / ulp(self.offset.max(self.size))
-    }
 }
 
 #[cfg(test)]
