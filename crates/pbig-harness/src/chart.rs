@@ -68,8 +68,9 @@ pub struct Chart {
 }
 
 impl Chart {
-    /// Returns a chart of one plot with marks over logarithmic axes.
-    pub fn log(name: &str, title: &str, [x, y]: [&str; 2], lines: Vec<Line>) -> Self {
+    /// Returns a chart of one plot with marks over logarithmic axes. Lines without points are left out.
+    pub fn log(name: &str, title: &str, [x, y]: [&str; 2], mut lines: Vec<Line>) -> Self {
+        lines.retain(|line| !line.points.is_empty());
         let (title, x, y) = (title.into(), x.into(), y.into());
         Self {
             name: name.into(),
@@ -278,17 +279,20 @@ pub struct Panel<'a> {
 /// # Errors
 /// Returns a message that names the file, if it cannot be written.
 pub fn write(path: &Path, panels: &[Panel<'_>]) -> Result<(), String> {
-    Chart { name: String::new(), plots: panels.iter().map(steps).collect() }.write(path)
+    Chart { name: String::new(), plots: panels.iter().map(Plot::of).collect() }.write(path)
 }
 
-fn steps(panel: &Panel<'_>) -> Plot {
-    let line = |series: &Series<'_>| {
-        let points = series.values.iter().enumerate().map(|(step, &ms)| (step as f64, ms));
-        Line { name: series.name.to_owned(), points: points.collect() }
-    };
-    let lines = panel.series.iter().map(line).collect();
-    let (x, y) = ("step".into(), "time, ms".into());
-    Plot { title: panel.title.to_owned(), x, y, is_log: false, is_joined: true, has_marks: false, lines }
+impl Plot {
+    /// Returns milliseconds against steps.
+    pub fn of(panel: &Panel<'_>) -> Self {
+        let line = |series: &Series<'_>| {
+            let points = series.values.iter().enumerate().map(|(step, &ms)| (step as f64, ms));
+            Line { name: series.name.to_owned(), points: points.collect() }
+        };
+        let lines = panel.series.iter().map(line).collect();
+        let (x, y) = ("step".into(), "time, ms".into());
+        Self { title: panel.title.to_owned(), x, y, is_log: false, is_joined: true, has_marks: false, lines }
+    }
 }
 
 #[cfg(test)]
@@ -319,7 +323,7 @@ mod tests {
         let axis = Axis::new(vec![0.0, 3e-4, 50.0], true);
         assert_eq!(axis.format_ext(&axis.zero.expect("a zero")), "0");
         assert!(axis.zero.is_some_and(|zero| zero < 1e-4 && zero > axis.low));
-        assert!(drawn(&[]).contains("a line"));
+        assert!(drawn(&[]).contains("time, ns"));
     }
 
     #[test]

@@ -1,5 +1,6 @@
 //! The one kind of table: named columns of typed cells.
 
+use crate::chart::Line;
 use serde_json::{Map, Value, json};
 
 /// One value in a table.
@@ -145,6 +146,17 @@ impl Table {
         let place = self.columns.iter().position(|column| column == name);
         let place = place.unwrap_or_else(|| panic!("{} has no column {name}", self.name));
         self.rows.iter().map(move |row| &row[place])
+    }
+
+    /// Returns a line of a chart: a column against another one, in the rows that are wanted and have numbers in both.
+    ///
+    /// # Panics
+    /// If there is no such column.
+    pub fn line(&self, name: &str, [x, y]: [&str; 2], is_wanted: impl Fn(&[Cell]) -> bool) -> Line {
+        let places = self.rows.iter().zip(self.column(x)).zip(self.column(y));
+        let wanted = places.filter(|((row, _), _)| is_wanted(row));
+        let points = wanted.filter_map(|((_, x), y)| Some((x.number()?, y.number()?))).collect();
+        Line { name: name.into(), points }
     }
 
     /// Returns how many of the first columns it takes to tell all rows apart.

@@ -5,6 +5,7 @@ use crate::trees::{Parry, Refit};
 use pbig_core::{Aabb, BroadPhase, Config, Error, Finder, Limits, Order, ProxyFilter};
 use pbig_harness::bench::{Effort, Figures, timed};
 use pbig_harness::cells;
+use pbig_harness::chart::{Chart, Panel, Plot, Series};
 use pbig_harness::duel::Duel;
 use pbig_harness::motions::{Density, Motion, Scene};
 use pbig_harness::output::{Failure, progress};
@@ -44,12 +45,22 @@ pub fn run(quick: bool, given: &[usize]) -> Result<Report, Failure> {
     let boxes = sizes(&[1000, 10_000, 100_000, 1_000_000], &[1000, 10_000]);
     let bodies = sizes(&[10, 100, 1000, 10_000, 100_000], &[10, 100]);
     let mut table = Table::new("steady", COLUMNS);
-    motions(&boxes, quick, &mut table)?;
+    let plots = motions(&boxes, quick, &mut table)?;
     through_rapier(&bodies, quick, &mut table);
-    Ok(Report::new("steady", vec![table]))
+    let chart = Chart { name: "steady-frames".into(), plots };
+    let charts = if chart.plots.is_empty() { vec![] } else { vec![chart] };
+    Ok(Report { charts, ..Report::new("steady", vec![table]) })
 }
 
-fn motions(sizes: &[usize], quick: bool, table: &mut Table) -> Result<(), Failure> {
+/// The motions whose frames are drawn, of the largest of the sizes up to [`MOST_DRAWN`].
+const DRAWN: [Motion; 4] = [Motion::Drift, Motion::Fall, Motion::Burst, Motion::Shares];
+
+const MOST_DRAWN: usize = 100_000;
+
+/// Returns a plot of each drawn motion.
+fn motions(sizes: &[usize], quick: bool, table: &mut Table) -> Result<Vec<Plot>, Failure> {
+    let largest = sizes.iter().copied().filter(|n| *n <= MOST_DRAWN).max();
+    let mut plots = vec![];
     let bar = progress(sizes.len() * scenes().count(), "motions");
     for (&n, (motion, density)) in sizes.iter().flat_map(|n| scenes().map(move |scene| (n, scene))) {
         let name = format!("{}, {}, {n} boxes", motion.name(), density.name());
@@ -63,10 +74,20 @@ fn motions(sizes: &[usize], quick: bool, table: &mut Table) -> Result<(), Failur
             let threads = if k == 1 { 1 } else { rayon::current_num_threads() };
             row([motion.name(), density.name(), NAMES[k]], [n, threads], ms, table);
         }
+        if Some(n) == largest && density == Density::Dense && DRAWN.contains(&motion) {
+            plots.push(plot(&name, &race.ms));
+        }
         bar.inc(1);
     }
     bar.finish_and_clear();
-    Ok(())
+    Ok(plots)
+}
+
+/// The first frame is left out: it is longer than all others and would flatten their lines.
+fn plot(title: &str, ms: &[Vec<f64>]) -> Plot {
+    let names = ["pbig", "pbig, one thread", NAMES[2], NAMES[3]];
+    let series = names.into_iter().zip(ms).map(|(name, ms)| Series { name, values: ms[1..].to_vec() });
+    Plot::of(&Panel { title, series: series.collect() })
 }
 
 fn row([motion, density, side]: [&str; 3], [boxes, threads]: [usize; 2], ms: &[f64], table: &mut Table) {

@@ -27,15 +27,14 @@ pub(super) fn run(quick: bool) -> Result<Report, Failure> {
     check(&every, &exact, &sizes)?;
     let at = if quick { vec![1000, 1 << 20] } else { vec![16, 128, 1000, 5000, 10_000, 100_000, 1 << 20] };
     let times = at.iter().map(|&n| Times::measure(n, quick)).collect::<Result<Vec<_>, _>>()?;
-    let mut tables = vec![every_table(&every, &exact), sizes::table(&sizes)];
-    tables.extend(rules::tables(quick));
+    let mut tables = vec![every_table(&every, &exact), sizes::table(&sizes), rules::counterexamples(quick)];
     tables.extend([
         times::table(&times),
         paper::table_2(&times),
         paper::table_3(quick),
         paper::table_4(quick),
+        roundings::ways(),
     ]);
-    tables.extend(roundings::tables());
     let (kernels, adapter) = kernels(quick)?;
     tables.extend(kernels);
     let axes = ["time, ns per pair (one thread, 5,000 boxes)", "wrong pairs, % of all n looked at"];
@@ -148,9 +147,7 @@ fn counts(tally: &Tally, first: Option<i64>) -> Vec<Cell> {
 fn kernels(quick: bool) -> Result<(Vec<Table>, String), Failure> {
     let adapter = pbig_core::GpuFinder::new().map(|gpu| (gpu.adapter().to_owned(), gpu.is_software()));
     match (Bench::new(), adapter) {
-        (Ok(bench), Ok((name, software))) => {
-            Ok((vec![kernels::table(&bench, software, quick)?], name))
-        }
+        (Ok(bench), Ok((name, software))) => Ok((vec![kernels::table(&bench, software, quick)?], name)),
         (Err(why), _) | (_, Err(why)) => Ok((vec![], format!("none: {why}"))),
     }
 }

@@ -31,11 +31,7 @@ const INSTANTS: usize = 10;
 pub(super) fn run(quick: bool) -> Result<Report, Failure> {
     let cases: &[Case] = if quick { &QUICK } else { &FULL };
     let scenes = cases.iter().map(|case| scene(*case)).collect::<Result<Vec<_>, _>>()?;
-    let tables = vec![
-        runs::table(&scenes),
-        distances(&scenes),
-        repeated(&scenes),
-    ];
+    let tables = vec![runs::table(&scenes), distances(&scenes), repeated(&scenes)];
     let axes = ["whole step, ms", "mean distance from stock's bodies at the end, m"];
     let mut report = report("simulation", tables, ("Whole simulations", axes), points(&scenes));
     // Runs have no order.
@@ -126,4 +122,3 @@ fn at_an_instant(ways: &[[f64; 2]]) -> Vec<[f64; 2]> {
     let permuted = of(sides::Way::is_permuted).fold([0.0; 2], larger);
     [permuted].into_iter().chain(of(sides::Way::is_held_against_stock)).collect()
 }
-

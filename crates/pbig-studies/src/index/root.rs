@@ -168,5 +168,4 @@ mod tests {
         assert!(Newton::<LOMONT, 1>::worst_relative() < carmack);
         assert!(Single::worst_relative() < 6e-8);
     }
-
 }

@@ -12,6 +12,7 @@ mod figures;
 mod finders;
 mod model;
 mod printed;
+mod readings;
 mod roots;
 mod steps;
 mod switches;
@@ -20,9 +21,10 @@ use device::Device;
 use finders::{Side, Way};
 use pbig_core::{Aabb, Checks, Config, Limits, Order};
 use pbig_harness::bench::{Effort, timed};
+use pbig_harness::chart::Chart;
 use pbig_harness::output::{Failure, progress};
 use pbig_harness::report::Report;
-use pbig_harness::table::Table;
+use pbig_harness::table::{Cell, Table};
 use std::time::Duration;
 
 /// Unlimited and in no order, as the papers' programs.
@@ -100,7 +102,35 @@ pub fn run(quick: bool) -> Result<Report, Failure> {
     bar.finish_and_clear();
     tables.push(claims::table());
     let head = vec![("adapter", device.name()), ("software", device.is_software().to_string())];
-    Ok(Report { head, ..Report::new("papers", tables) })
+    Ok(Report { head, charts: charts(&tables), ..Report::new("papers", tables) })
+}
+
+/// Draws PBIG's figures 8 and 9 and Avril's figure 5.
+fn charts(tables: &[Table]) -> Vec<Chart> {
+    let table = |start: &str| tables.iter().find(|table| table.name.starts_with(start)).expect("made before");
+    let (uniform, cells, steps) = (table("PBIG figure 8"), table("PBIG figure 9"), table("Avril table 6"));
+    let of_uniform = [
+        ("pbig's grid, CPU", "ms, our grid, CPU"),
+        ("PBIG's grid, CPU, one thread", "ms, PBIG's grid, CPU, one thread"),
+        ("pbig, GPU", "ms, GPU"),
+    ];
+    let of_uniform = of_uniform.map(|(name, y)| uniform.line(name, ["boxes", y], |_| true)).into();
+    let mut sizes: Vec<String> = cells.column("boxes").map(Cell::text).collect();
+    sizes.dedup();
+    let of_size = |size: String| {
+        let columns = ["cell", "ms, PBIG's grid, CPU, one thread"];
+        cells.line(&format!("{size} boxes"), columns, |row| row[0].text() == size)
+    };
+    let of_cells = sizes.into_iter().map(of_size).collect();
+    let of_steps = [("printed", "printed"), ("pbig, CPU", "ours, CPU"), ("pbig, GPU", "ours, GPU")];
+    let of_steps =
+        of_steps.map(|(name, side)| steps.line(name, ["objects", "whole, ms"], |row| row[1].text() == side));
+    let (titles, time) = (["PBIG figure 8: uniform boxes", "PBIG figure 9: size of cells"], "time, ms");
+    vec![
+        Chart::log("papers-uniform", titles[0], ["boxes", time], of_uniform),
+        Chart::log("papers-cells", titles[1], ["length of a cell", time], of_cells),
+        Chart::log("papers-steps", "Avril figure 5: a step, all moving", ["objects", time], of_steps.into()),
+    ]
 }
 
 #[cfg(test)]
@@ -125,8 +155,7 @@ mod tests {
             "Avril table 1:",
             "Avril table 2:",
             "Avril tables 2 and 4",
-            "Avril table 5",
-            "Avril figure 3",
+            "Avril table 5 and figure 3",
             "Avril figure 4",
             "Avril table 6",
             "Avril figure 6",

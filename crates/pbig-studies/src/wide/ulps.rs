@@ -36,7 +36,7 @@ const ROTATION: f32 = 128.0 / (1 << 24) as f32;
 ///
 /// ```
 /// use pbig_core::Aabb;
-/// use crate::wide::widened_by_ulps;
+/// use pbig_studies::wide::widened_by_ulps;
 /// use rapier3d::prelude::*;
 /// // Floats are 1 apart there, and the ball lies in no box of corners half a unit from its centre.
 /// let (ball, pose) = (Ball::new(0.5), Isometry::translation(1e7, 0.0, 0.0));

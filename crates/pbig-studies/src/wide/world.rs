@@ -186,5 +186,4 @@ mod tests {
         assert!((0.1..0.2).contains(&fallen), "{fallen}: g t^2 / 2 is 0.136");
         assert!(apart(0.0, 10) < 1e-4, "{}", apart(0.0, 10));
     }
-
 }

@@ -92,7 +92,8 @@ pub(super) fn table(bench: &Bench, software: bool, quick: bool) -> Result<Table,
             }
         }
         let rules = row.map_or(vec![Cell::Nothing; 5], |_| found[1].cells(places));
-        let rest = cells![row.map(|_| otherwise), if software { None } else { Some(ns_per_pair(bench, number)?) }];
+        let rest =
+            cells![row.map(|_| otherwise), if software { None } else { Some(ns_per_pair(bench, number)?) }];
         table.row([cells![name, places], found[0].cells(places), rules, rest].concat());
     }
     Ok(table)
@@ -156,7 +157,9 @@ fn judged(n: u32, words: &[u32], row: Option<fn(i64, i64) -> i64>) -> Result<Jud
         let (estimate, n) = (i64::from(words[0]), i64::from(n));
         let k = index_of(right.0.into(), right.1.into(), n as u64) as i64;
         let right = (right.0.into(), right.1.into());
-        for ((wrong, worst), given) in found.iter_mut().zip([AsItIs::pair(estimate, k, n), Rules::pair(estimate, k, n)]) {
+        for ((wrong, worst), given) in
+            found.iter_mut().zip([AsItIs::pair(estimate, k, n), Rules::pair(estimate, k, n)])
+        {
             *wrong += u64::from(given != right);
             *worst = given.0.abs_diff(right.0).max(*worst);
         }

@@ -1,7 +1,7 @@
 //! A search for a rounding of Newton's steps that gives Avril's table 3.
 
 use super::paper::TABLE_3;
-use crate::index::{CARMACK, Form, LOMONT, Newton, Rounded, SingleRoot, Step, WideNewton};
+use crate::index::{CARMACK, Form, LOMONT, Rounded, Step};
 use pbig_harness::cells;
 use pbig_harness::table::Table;
 use rayon::prelude::*;
@@ -79,14 +79,10 @@ fn rows(way: &Rounded, (magic, column): (u32, usize), steps: u32, most: usize) -
     };
     (0..most).take_while(is_printed).count()
 }
-/// Ways to round, and how many of them give the figures of table 3; and what three steps get wrong.
-pub(super) fn tables() -> [Table; 2] {
-    [ways(), squares()]
-}
 
 /// Each result of the four operations of a step can be rounded to the nearest f32, cut to the next towards zero, or stay wide;
 /// the first two steps go one way, others another. Rows of table 3 beyond 1,000,000 tests are not looked at.
-fn ways() -> Table {
+pub(super) fn ways() -> Table {
     let columns = [
         "result",
         "steps",
@@ -106,48 +102,14 @@ fn ways() -> Table {
     table
 }
 
-const TESTS: u32 = 1_000_000;
-
-/// Of the whole numbers below [`TESTS`]: those whose root without its fraction is wrong, the squares among them, and by how
-/// many ulps the root of a square is off at most.
-fn wrong(root: fn(f32) -> f32) -> [u32; 3] {
-    let is_square = |x: u32| x.isqrt().pow(2) == x;
-    let is_wrong = |x: &u32| root(*x as f32) as u32 != x.isqrt();
-    let all = (1..TESTS).filter(is_wrong);
-    let (all, squares) = all.fold((0, 0), |(all, squares), x| (all + 1, squares + u32::from(is_square(x))));
-    let ulps = |x: u32| root((x * x) as f32).to_bits().abs_diff((x as f32).to_bits());
-    [all, squares, (1..=(TESTS - 1).isqrt()).map(ulps).max().unwrap_or(0)]
-}
-
-/// Wrong roots with three steps of Carmack's, the squares among them, and the ulps by which the root of a square is off at
-/// most; and how many wrong ones table 3 has, and how many squares there are.
-fn squares() -> Table {
-    let mut table = Table::new("squares", ["side", "tests", "wrong", "squares", "ulps_off_at_squares"]);
-    let roots = [
-        ("steps in f64", WideNewton::<CARMACK, 3>::root as fn(f32) -> f32),
-        ("steps in f32", Newton::<CARMACK, 3>::root),
-    ];
-    for (name, root) in roots {
-        let [wrong, squares, ulps] = wrong(root);
-        table.row(cells![name, TESTS, wrong, squares, ulps]);
-    }
-    for (tests, percent) in TABLE_3 {
-        let wrong = (percent[2] / 100.0 * f64::from(tests)).round() as u64;
-        table.row(cells!["the paper", tests, wrong, (tests - 1).isqrt(), None::<u64>]);
-    }
-    table
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
 
     #[test]
-    fn a_cut_product_gives_the_figures_of_two_steps_and_with_three_only_squares_are_wrong() {
+    fn a_cut_product_gives_the_figures_of_two_steps() {
         let cut = found(Form::Cut);
         assert_eq!((cut[0].ways, cut[1].ways, cut[3].ways), (3 * 162, 3 * 162 * 162, 3 * 162 * 162));
         assert!(cut[0].all > 0 && cut[0].all < cut[0].ways / 10 && cut[1].all == 0, "{cut:?}");
-        assert_eq!(wrong(WideNewton::<CARMACK, 3>::root), [67, 67, 1]);
-        assert_eq!(wrong(Newton::<CARMACK, 3>::root)[..2], [214, 214]);
     }
 }

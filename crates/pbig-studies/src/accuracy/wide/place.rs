@@ -281,7 +281,6 @@ impl Row {
         let Differences { missed, added, .. } = self.in_all(way);
         (missed + added) as f64 / self.pairs.max(1) as f64 * 100.0
     }
-
 }
 
 #[cfg(test)]
