@@ -47,7 +47,7 @@ fn index_integers_are_right_and_every_error_is_counted() {
             ["paper_percent", "ours_steps_in_f64_percent"].map(|c| numbers(table, constant, c));
         assert!((paper[0] - ours[0]).abs() < 1e-4, "two steps in f64 give the paper's figures");
     }
-    for name in ["sizes", "counterexamples", "times", "table_2", "table_4", "roundings_of_table_3"] {
+    for name in ["sizes", "counterexamples", "times", "table_4", "roundings_of_table_3"] {
         assert!(!table(&report, name).rows.is_empty(), "{name}");
     }
 }

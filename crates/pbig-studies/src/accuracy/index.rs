@@ -30,7 +30,6 @@ pub(super) fn run(quick: bool) -> Result<Report, Failure> {
     let mut tables = vec![every_table(&every, &exact), sizes::table(&sizes), rules::counterexamples(quick)];
     tables.extend([
         times::table(&times),
-        paper::table_2(&times),
         paper::table_3(quick),
         paper::table_4(quick),
         roundings::ways(),

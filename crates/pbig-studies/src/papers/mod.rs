@@ -119,7 +119,9 @@ fn charts(tables: &[Table]) -> Vec<Chart> {
     sizes.dedup();
     let of_size = |size: String| {
         let columns = ["cell", "ms, PBIG's grid, CPU, one thread"];
-        cells.line(&format!("{size} boxes"), columns, |row| row[0].text() == size)
+        let mut line = cells.line(&format!("{size} boxes"), columns, |row| row[0].text() == size);
+        line.points.sort_by(|a, b| a.0.total_cmp(&b.0));
+        line
     };
     let of_cells = sizes.into_iter().map(of_size).collect();
     let of_steps = [("printed", "printed"), ("pbig, CPU", "ours, CPU"), ("pbig, GPU", "ours, GPU")];

@@ -1,14 +1,10 @@
 //! Figures of Avril et al. 2012, and ours beside them.
 
-use super::times::Times;
 use crate::index::{CARMACK, LOMONT, Newton, Single, SingleRoot, WideNewton};
 use crate::index::{root_differences, root_errors};
 use pbig_harness::bench::timed;
 use pbig_harness::cells;
 use pbig_harness::table::{Cell, Table};
-
-/// Table 2: objects, ms with a square root, ms without (the lazy way).
-const TABLE_2: [(u64, f64, f64); 3] = [(1000, 0.21, 0.25), (10_000, 2.25, 4.28), (100_000, 29.66, 58.24)];
 
 /// Table 3: tests, % of errors with two steps (Carmack, Lomont) and with three; four are said to be as three.
 pub(super) const TABLE_3: [(u32, [f64; 4]); 6] = [
@@ -27,44 +23,6 @@ const TABLE_4: [(u32, [f64; 3]); 4] = [
     (100_000_000, [4.102, 4.102, 4.722]),
     (1_000_000_000, [41.01, 41.01, 48.01]),
 ];
-
-fn pairs(objects: u64) -> u64 {
-    objects * (objects - 1) / 2
-}
-
-/// Table 2. `times` has the times at each number of objects.
-pub(super) fn table_2(times: &[Times]) -> Table {
-    let columns = [
-        "objects",
-        "pairs",
-        "paper_with_root_ms",
-        "paper_lazy_ms",
-        "paper_with_root_ns_per_pair",
-        "paper_lazy_ns_per_pair",
-        "ours_f32_sqrt_as_it_is_ns_per_pair",
-        "ours_f32_sqrt_by_the_rules_ns_per_pair",
-        "ours_f64_sqrt_ns_per_pair",
-        "ours_lazy_ns_per_pair",
-        "lazy_times_f32_by_the_rules",
-        "lazy_times_f64",
-    ];
-    let mut table = Table::new("table_2", columns);
-    for (objects, with, lazy) in TABLE_2 {
-        let per_pair = |ms: f64| Cell::from(ms * 1e6 / pairs(objects) as f64);
-        let ours = times.iter().find(|times| times.n as u64 == objects).map(ours_of_table_2);
-        let ours = (0..6).map(|column| Cell::from(ours.map(|all| all[column])));
-        let paper = cells![objects, pairs(objects), with, lazy];
-        table.row(paper.into_iter().chain([per_pair(with), per_pair(lazy)]).chain(ours));
-    }
-    table
-}
-
-/// Nanoseconds for a pair: f32 root as it is and by the rules, f64 root, lazy way; and the latter over the two before it
-/// that give every pair.
-fn ours_of_table_2(times: &Times) -> [f64; 6] {
-    let ([as_it_is, by_rules], wide, lazy) = (times.f32_root(), times.f64_root(), times.lazy());
-    [as_it_is, by_rules, wide, lazy, lazy / by_rules, lazy / wide]
-}
 
 /// Table 3: how many of the whole numbers below N have another root, without fractions. The root that ours are held against
 /// is exact, but for the last column.

@@ -40,20 +40,6 @@ impl Times {
             exact: std::array::from_fn(|k| exact[k]),
         })
     }
-
-    /// With the processor's root in f32: as it is, by the rules.
-    pub(super) fn f32_root(&self) -> [f64; 2] {
-        [self.ways[0][0], self.ways[0][1]]
-    }
-
-    /// With the processor's root in f64, as it is.
-    pub(super) fn f64_root(&self) -> f64 {
-        self.ways[1][0]
-    }
-
-    pub(super) fn lazy(&self) -> f64 {
-        self.exact[2]
-    }
 }
 
 /// Blocks spread over what there is; all of it, as often as makes as many indices, if there are fewer.
