@@ -2,7 +2,7 @@
 //! coordinates of the study.
 
 use pbig_core::Aabb;
-use pbig_harness::precision::{
+use pbig_studies::precision::{
     CODE_STEPS, Code, Coordinates, Exact, FARTHEST, FIXED_STEPS, Fixed, Half, Scale, half_down, half_up,
     half_value,
 };

@@ -3,7 +3,7 @@
 
 use crate::checked::{backends, pbig};
 use pbig_core::{Aabb, Config, Pair};
-use pbig_harness::wide::{Layout, Pose, Truth, Wide, doubt, to_f32, to_f64, widened_by_ulps};
+use pbig_studies::wide::{Layout, Pose, Truth, Wide, doubt, to_f32, to_f64, widened_by_ulps};
 use proptest::prelude::*;
 use rapier_pbig::{PbigBroadPhase, collision_aabb};
 use rapier3d::prelude::*;

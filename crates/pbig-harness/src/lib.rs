@@ -1,25 +1,24 @@
-//! Scenes, box sets, the headless runner and the shadow checker behind the `pbig` program.
+//! Scenes, box sets, motions, files, the headless runner and the frame of measurements behind the program `pbig`, the
+//! studies, the tests and the examples.
 
+pub mod bench;
 pub mod boxes;
 pub mod chart;
 pub mod counting;
+pub mod duel;
 pub mod field;
 pub mod files;
-pub mod index;
+pub mod gpu_race;
 pub mod kernels;
-pub mod mechanics;
 pub mod motions;
-pub mod numbered;
 pub mod options;
+pub mod output;
 pub mod pair_index;
 pub mod pbig_grid;
-pub mod precision;
-pub mod reported;
+pub mod report;
 pub mod runner;
 pub mod scenes;
 pub mod shadow;
 pub mod simulate;
-pub mod sorted;
-pub mod study;
-pub mod wide;
+pub mod table;
 pub mod world;

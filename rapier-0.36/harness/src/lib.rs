@@ -1,6 +1,6 @@
 //! Scenes and measurements for rapier3d 0.36.1.
 
-#[path = "../../../crates/pbig-harness/src/chart/mod.rs"]
+#[path = "../../../crates/pbig-harness/src/chart.rs"]
 pub mod chart;
 pub mod run;
 #[path = "../../../crates/pbig-harness/src/scenes/mod.rs"]

@@ -30,13 +30,13 @@ struct Args {
     write: Option<PathBuf>,
 }
 
-/// The heading of the CSV file, in ms. With fewer than 100 steps p99 is the worst step.
-const HEADING: &str = "scene,bodies,threads,steps,stock_broad_mean,pbig_broad_mean,stock_broad_median,pbig_broad_median,\
-stock_broad_p99,pbig_broad_p99,stock_step_mean,pbig_step_mean,stock_step_median,pbig_step_median,stock_step_p99,\
-pbig_step_p99,stock_pairs,pbig_pairs";
+/// The heading of the CSV file. With fewer than 100 steps p99 is the worst step.
+const HEADING: &str = "scene,bodies,threads,steps,stock_broad_mean_ms,pbig_broad_mean_ms,stock_broad_median_ms,\
+pbig_broad_median_ms,stock_broad_p99_ms,pbig_broad_p99_ms,stock_step_mean_ms,pbig_step_mean_ms,stock_step_median_ms,\
+pbig_step_median_ms,stock_step_p99_ms,pbig_step_p99_ms,stock_pairs,pbig_pairs";
 
 /// The threads that rapier uses.
-const THREADS: &str = if cfg!(feature = "parallel") { "all" } else { "1" };
+const THREADS: &str = if cfg!(feature = "parallel") { "2" } else { "1" };
 
 fn main() -> ExitCode {
     let mut args = Args::parse();

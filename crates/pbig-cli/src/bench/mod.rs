@@ -1,0 +1,76 @@
+//! `pbig bench SUITE`: pbig and the other side, in turn in one run.
+
+mod gpu;
+pub(crate) mod memory;
+mod requests;
+mod step;
+mod update;
+
+use crate::options::bodies;
+use crate::studies;
+use clap::ValueEnum;
+use pbig_harness::output::Failure;
+use std::ffi::OsString;
+use std::path::PathBuf;
+
+#[derive(clap::Args)]
+pub(crate) struct Args {
+    /// What to measure.
+    #[arg(value_enum)]
+    suite: Suite,
+    /// Print one JSON object.
+    #[arg(long)]
+    json: bool,
+    /// Small sizes only, in seconds.
+    #[arg(long)]
+    quick: bool,
+    /// Write the numbers as CSV, and the charts, into this folder.
+    #[arg(long, value_name = "DIR")]
+    write: Option<PathBuf>,
+    /// Of `steady`: numbers of boxes, and of bodies, instead of its own.
+    #[arg(long, value_name = "N,N", value_parser = bodies, value_delimiter = ',', allow_negative_numbers = true)]
+    boxes: Vec<usize>,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum Suite {
+    /// Ours alone, stage by stage: against boxes, movers, density and the spread of sizes (of `pbig-studies`).
+    Stages,
+    /// A broad phase's call through rapier, beside stock's on the same world; and memory.
+    Update,
+    /// The finder alone, beside parry's tree and obvhs (of `pbig-studies`).
+    Peers,
+    /// Every scene at every size, stock beside ours in each step.
+    Step,
+    /// How long updates take, and how evenly, by motion and of every scene (of `pbig-studies`).
+    Steady,
+    /// The experiments of PBIG's and Avril's papers, the printed figures beside ours (of `pbig-studies`).
+    Papers,
+    /// The GPU pipeline: upload, each kernel, readback, decode, whole call.
+    Gpu,
+}
+
+pub(crate) fn run(args: &Args) -> Result<(), Failure> {
+    if !args.boxes.is_empty() && args.suite != Suite::Steady {
+        return Err(Failure::Input("--boxes is for `pbig bench steady`, not for other suites".into()));
+    }
+    let report = match args.suite {
+        Suite::Update => update::run(args.quick)?,
+        Suite::Step => step::run(args.quick)?,
+        Suite::Gpu => gpu::run(args.quick)?,
+        Suite::Stages | Suite::Peers | Suite::Steady | Suite::Papers => return forward(args),
+    };
+    report.finish(args.json, args.write.as_deref())
+}
+
+fn forward(args: &Args) -> Result<(), Failure> {
+    let name = args.suite.to_possible_value().expect("none is skipped");
+    let flags = [("--json", args.json), ("--quick", args.quick)];
+    let mut options: Vec<OsString> = flags.iter().filter(|flag| flag.1).map(|flag| flag.0.into()).collect();
+    options.extend(args.write.iter().flat_map(|folder| ["--write".into(), folder.into()]));
+    if !args.boxes.is_empty() {
+        let boxes: Vec<String> = args.boxes.iter().map(usize::to_string).collect();
+        options.extend(["--boxes".into(), boxes.join(",").into()]);
+    }
+    studies::run(name.get_name(), options)
+}

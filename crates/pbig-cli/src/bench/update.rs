@@ -1,0 +1,174 @@
+//! `pbig bench update`: a broad phase's call through rapier, ours and stock's in turn on the same world.
+
+use super::{memory, requests};
+use pbig_core::Aabb;
+use pbig_harness::bench::{COMPARED, Contest, Effort, MS, Took, compared, measured, medians, timed};
+use pbig_harness::boxes::{BoxSet, Movers};
+use pbig_harness::chart::{Chart, Line};
+use pbig_harness::field::Field;
+use pbig_harness::output::{Failure, progress};
+use pbig_harness::report::Report;
+use pbig_harness::table::Table;
+use rapier_pbig::PbigBroadPhase;
+use rapier3d::prelude::*;
+use rayon::prelude::*;
+use std::hint::black_box;
+
+/// The distance that boxes of these sets, with edges of 1 to 100, move in a frame: far beyond any margin.
+const DISTANCE: f32 = 1.0;
+
+/// Calls in which nothing has moved are measured together: one is shorter than a clock can tell.
+const STILL_CALLS: usize = 1000;
+
+/// Ours and stock's broad phase beside the same world; and the floor below both, merely computing the
+/// boxes of what has moved, on one thread and on all.
+struct Calls {
+    field: Field,
+    movers: Option<Movers>,
+    modified: Vec<ColliderHandle>,
+    ours: PbigBroadPhase,
+    stock: DefaultBroadPhase,
+    events: Vec<BroadPhasePairEvent>,
+    boxes: Vec<rapier3d::parry::bounding_volume::Aabb>,
+    with_floor: bool,
+}
+
+const OURS: usize = 0;
+const STOCK: usize = 1;
+const FLOOR: usize = 2;
+const FLOOR_PARALLEL: usize = 3;
+
+impl Calls {
+    /// A world with two broad phases that know it. Without movers nothing moves.
+    fn new(boxes: &[Aabb], share: Option<f64>, with_floor: bool) -> Self {
+        let mut calls = Self {
+            field: Field::new(boxes),
+            movers: share.map(|share| Movers::new(boxes.len(), share)),
+            modified: vec![],
+            ours: PbigBroadPhase::new(),
+            stock: DefaultBroadPhase::new(),
+            events: vec![],
+            boxes: vec![],
+            with_floor,
+        };
+        calls.modified.clone_from(&calls.field.colliders);
+        calls.update(OURS);
+        calls.update(STOCK);
+        calls.modified.clear();
+        calls
+    }
+
+    fn update(&mut self, side: usize) {
+        let broad_phase: &mut dyn BroadPhase = if side == OURS { &mut self.ours } else { &mut self.stock };
+        self.events.clear();
+        self.field.call(broad_phase, &self.modified, &mut self.events);
+    }
+
+    fn floor(&mut self, parallel: bool) {
+        let world = &self.field.world;
+        let reach = world.params.prediction_distance() / 2.0;
+        let aabb = |&handle: &ColliderHandle| world.colliders[handle].compute_collision_aabb(reach);
+        if parallel {
+            self.modified.par_iter().map(aabb).collect_into_vec(&mut self.boxes);
+        } else {
+            self.boxes.clear();
+            self.boxes.extend(self.modified.iter().map(aabb));
+        }
+        black_box(&mut self.boxes);
+    }
+}
+
+impl Contest for Calls {
+    fn sides(&self) -> usize {
+        if self.with_floor { 4 } else { 2 }
+    }
+
+    fn prepare(&mut self, round: usize) {
+        if let Some(movers) = &self.movers {
+            self.modified = self.field.shift(&movers.of(round), DISTANCE);
+        }
+    }
+
+    fn run(&mut self, side: usize) -> Result<f64, Failure> {
+        let calls = if self.movers.is_none() { STILL_CALLS } else { 1 };
+        let ((), time) = timed(|| {
+            for _ in 0..calls {
+                match side {
+                    OURS | STOCK => self.update(side),
+                    _ => self.floor(side == FLOOR_PARALLEL),
+                }
+            }
+        });
+        Ok(time / calls as f64)
+    }
+}
+
+/// A set of boxes, and the share that moves; none: nothing moves.
+type Case = (&'static str, usize, Option<f64>);
+
+fn cases(quick: bool) -> Vec<Case> {
+    let sizes: &[usize] = if quick { &[1000, 10_000] } else { &[1000, 10_000, 100_000, 1_000_000] };
+    let others: &[Case] = if quick {
+        &[("gaussian", 10_000, Some(1.0)), ("uniform", 10_000, Some(0.01))]
+    } else {
+        &[
+            ("gaussian", 100_000, Some(1.0)),
+            ("uniform", 100_000, Some(0.01)),
+            ("uniform", 1_000_000, Some(0.01)),
+        ]
+    };
+    let of = |share| sizes.iter().map(move |&boxes| ("uniform", boxes, share));
+    of(Some(1.0)).chain(others.iter().copied()).chain(of(None)).collect()
+}
+
+/// The sides of a call beside ours; the two floors only where all boxes move.
+const OTHERS: [(usize, &str); 3] =
+    [(STOCK, "stock"), (FLOOR, "floor, one thread"), (FLOOR_PARALLEL, "floor, all threads")];
+
+pub(super) fn run(quick: bool) -> Result<Report, Failure> {
+    let cases = cases(quick);
+    let bar = progress(cases.len() + 1, "cases");
+    let mut table = Table::new("update", COMPARED);
+    let mut lines =
+        ["pbig", "stock", "floor, one thread"].map(|name| Line { name: name.into(), points: vec![] });
+    for &case in &cases {
+        let times = measure(case, Effort::new(quick), &mut table)?;
+        if times.len() > 2 {
+            let place = |took: &Took| (case.1 as f64, took.median);
+            lines.iter_mut().zip(&times).for_each(|(line, took)| line.points.push(place(took)));
+        }
+        bar.inc(1);
+    }
+    memory::rows(quick, &mut table)?;
+    requests::rows(quick, &mut table)?;
+    bar.finish_and_clear();
+    let title = "a call through rapier, uniform boxes, all moved";
+    let chart = Chart::log("update-boxes", title, ["boxes", "time, ms"], lines.into());
+    Ok(Report { charts: vec![chart], ..Report::new("update", vec![table]) })
+}
+
+/// Appends the rows of a case; returns the times of all sides.
+fn measure((set, n, share): Case, effort: Effort, table: &mut Table) -> Result<Vec<Took>, Failure> {
+    let boxes = BoxSet::named(set).expect("a set of the harness").boxes(n, 1);
+    let with_floor = set == "uniform" && share == Some(1.0);
+    let mut calls = Calls::new(&boxes, share, with_floor);
+    let times = measured(&mut calls, effort)?;
+    let moved = match share {
+        None => "nothing".into(),
+        Some(1.0) => "all".into(),
+        Some(share) => format!("{}%", share * 100.0),
+    };
+    let (case, pairs) = (format!("{set}, {moved} moved"), calls.ours.pair_count() as u64);
+    let unit = if share.is_none() { ("us", 1e3) } else { MS };
+    for (side, name) in OTHERS.into_iter().take(times.len() - 1) {
+        table.row(compared(&case, n, pairs, unit, times[OURS], (name, times[side])));
+    }
+    Ok(times)
+}
+
+/// Returns ours and stock's milliseconds if a share of some boxes moves, and the pairs.
+pub(super) fn shares(boxes: &[Aabb], share: f64, effort: Effort) -> Result<(f64, f64, u64), Failure> {
+    let mut calls = Calls::new(boxes, Some(share), false);
+    let times = medians(&mut calls, effort)?;
+    Ok((times[OURS], times[STOCK], calls.ours.pair_count() as u64))
+}

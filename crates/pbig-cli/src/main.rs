@@ -1,0 +1,77 @@
+//! The program `pbig`. Its commands, files, JSON and exit status are in docs/CLI.md; other programs
+//! rely on them.
+
+mod bench;
+mod doctor;
+mod options;
+mod pairs;
+mod replay;
+mod simulate;
+mod studies;
+mod usage;
+
+use clap::{CommandFactory, Parser, Subcommand};
+use pbig_harness::counting::Counting;
+use pbig_harness::output::{Failure, finish, print};
+use std::ffi::OsString;
+use std::process::ExitCode;
+
+/// For `bench update`, which counts an update's requests for memory.
+#[global_allocator]
+static COUNTING: Counting<false> = Counting;
+
+/// Finds every pair of overlapping axis-aligned boxes.
+#[derive(Parser)]
+#[command(name = "pbig", version, about = "Finds every pair of overlapping axis-aligned boxes")]
+struct Cli {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    /// All overlapping pairs of the boxes in a file.
+    Pairs(pairs::Args),
+    /// Pairs that come and go while boxes move from frame to frame.
+    Replay(replay::Args),
+    /// A headless rapier world.
+    Simulate(simulate::Args),
+    /// The scenes for `simulate`, with a line each.
+    Scenes,
+    /// How fast it is here; written into a folder with --write.
+    Bench(bench::Args),
+    /// Run time against error: `pbig-studies accuracy`.
+    #[command(disable_help_flag = true)]
+    Accuracy {
+        /// Options of `pbig-studies accuracy`.
+        #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
+        options: Vec<OsString>,
+    },
+    /// Finds pairs and says how much memory that took: a process of its own for `bench`.
+    #[command(hide = true)]
+    MemoryProbe(bench::memory::Args),
+    /// What this machine offers, what is chosen and why, and a self-test.
+    Doctor,
+}
+
+fn main() -> ExitCode {
+    let result = match Cli::try_parse() {
+        Ok(cli) => run(cli.command),
+        Err(error) if !error.use_stderr() => print(&error.to_string()),
+        Err(error) => Err(usage::failure(&error, &Cli::command(), std::env::args_os().nth(1))),
+    };
+    finish("pbig", result)
+}
+
+fn run(command: Command) -> Result<(), Failure> {
+    match command {
+        Command::Pairs(args) => pairs::run(&args),
+        Command::Replay(args) => replay::run(&args),
+        Command::Simulate(args) => simulate::run(&args),
+        Command::Scenes => simulate::list(),
+        Command::Bench(args) => bench::run(&args),
+        Command::Accuracy { options } => studies::run("accuracy", options),
+        Command::MemoryProbe(args) => bench::memory::probe(&args),
+        Command::Doctor => doctor::run(),
+    }
+}

@@ -1,0 +1,99 @@
+//! `pbig pairs`: all overlapping pairs of the boxes in a file.
+
+use crate::options::{plan_text, positive, search_text, stages, threads, with_threads};
+use pbig_core::{Aabb, Config, Finder};
+use pbig_harness::files::{check_pairs_path, read_boxes, write_pairs};
+use pbig_harness::options::BackendOption;
+use pbig_harness::output::{Failure, print, progress};
+use pbig_harness::runner::{Spread, milliseconds};
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+#[derive(clap::Args)]
+pub(crate) struct Args {
+    /// Boxes: .npy (N,6) float32 or float64, or .csv, columns min_x,min_y,min_z,max_x,max_y,max_z.
+    input: PathBuf,
+    /// Where to write the pairs: .npy (K,2) uint32 or .csv.
+    #[arg(short, value_name = "OUT")]
+    output: Option<PathBuf>,
+    /// Where the work runs.
+    #[arg(long, value_enum, default_value_t)]
+    backend: BackendOption,
+    /// Threads; all by default.
+    #[arg(long, value_name = "N", value_parser = threads, allow_negative_numbers = true)]
+    threads: Option<usize>,
+    /// How often to find the pairs, for the times.
+    #[arg(long, value_name = "K", default_value = "1", value_parser = positive, allow_negative_numbers = true)]
+    repeat: usize,
+    /// An invalid box (NaN, or min > max) is an error.
+    #[arg(long)]
+    strict: bool,
+    /// Print one JSON object.
+    #[arg(long)]
+    json: bool,
+}
+
+pub(crate) fn run(args: &Args) -> Result<(), Failure> {
+    if let Some(output) = &args.output {
+        check_pairs_path(output)?;
+    }
+    let boxes = read_boxes(&args.input)?;
+    if args.strict {
+        refuse_invalid(&args.input, &boxes)?;
+    }
+    let mut finder = Finder::new(Config { backend: args.backend.backend(), ..Config::DEFAULT });
+    let times = with_threads(args.threads, || find(&mut finder, &boxes, args))?;
+    if let Some(output) = &args.output {
+        write_pairs(output, finder.pairs())?;
+    }
+    report(args, &finder, Spread::of(times))
+}
+
+fn refuse_invalid(path: &Path, boxes: &[Aabb]) -> Result<(), Failure> {
+    match boxes.iter().position(|b| !b.is_valid()) {
+        Some(row) => {
+            let what = "has a NaN or a minimum above its maximum; mend it, or leave out --strict";
+            Err(Failure::Input(format!("{}: box {row} (counted from 0) {what}", path.display())))
+        }
+        None => Ok(()),
+    }
+}
+
+fn find(finder: &mut Finder, boxes: &[Aabb], args: &Args) -> Result<Vec<f64>, Failure> {
+    let bar = progress(args.repeat, "finding pairs");
+    let once = |_| {
+        let clock = Instant::now();
+        let found = finder.find(boxes).map(|_| milliseconds(clock.elapsed()));
+        bar.inc(1);
+        found.map_err(|error| Failure::Input(format!("{}: {}", args.input.display(), search_text(&error))))
+    };
+    let times = (0..args.repeat).map(once).collect();
+    bar.finish_and_clear();
+    times
+}
+
+fn report(args: &Args, finder: &Finder, ms: Spread) -> Result<(), Failure> {
+    let report = finder.report();
+    let (boxes, pairs, invalid) = (report.boxes, report.pairs, report.invalid);
+    if args.json {
+        let object = serde_json::json!({
+            "boxes": boxes,
+            "pairs": pairs,
+            "invalid": invalid,
+            "backend": args.backend.in_use(report.fallback.as_deref()),
+            "adapter": report.gpu.as_ref().map(|gpu| &gpu.adapter),
+            "plan": plan_text(report),
+            "ms": ms,
+            "stages": stages(report),
+        });
+        return print(&object.to_string());
+    }
+    print(&format!(
+        "{boxes} boxes ({invalid} invalid), {pairs} overlapping pairs\n{:.3} ms (median of {}; {:.3} to {:.3})\n{}",
+        ms.median,
+        args.repeat,
+        ms.min,
+        ms.max,
+        plan_text(report)
+    ))
+}

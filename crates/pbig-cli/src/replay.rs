@@ -1,0 +1,136 @@
+//! `pbig replay`: the incremental path over frames of boxes.
+
+use crate::options::{margin, plan_text, search_text, stages};
+use pbig_core::{BroadPhase, Config, Pair, ProxyFilter};
+use pbig_harness::files::{FrameBox, Frames, check_csv_path, read_frames, write_csv};
+use pbig_harness::options::BackendOption;
+use pbig_harness::output::{Failure, print, progress};
+use pbig_harness::runner::{Spread, milliseconds};
+use std::path::PathBuf;
+use std::time::Instant;
+
+#[derive(clap::Args)]
+pub(crate) struct Args {
+    /// Frames: .npy (F,N,6) float32 or float64; a box of six NaN is absent in that frame.
+    frames: PathBuf,
+    /// Where to write the events: .csv with frame,event,a,b.
+    #[arg(short, value_name = "EVENTS.csv")]
+    output: Option<PathBuf>,
+    /// Where the work runs.
+    #[arg(long, value_enum, default_value_t)]
+    backend: BackendOption,
+    /// How far a stored box reaches beyond the box it was given.
+    #[arg(long, value_name = "M", default_value = "0", value_parser = margin, allow_negative_numbers = true)]
+    margin: f32,
+    /// Print one JSON object.
+    #[arg(long)]
+    json: bool,
+}
+
+/// The events, frame by frame.
+#[derive(Default)]
+struct Replay {
+    lines: Vec<String>,
+    times: Vec<f64>,
+    added: u64,
+    removed: u64,
+    invalid: u64,
+}
+
+pub(crate) fn run(args: &Args) -> Result<(), Failure> {
+    if let Some(output) = &args.output {
+        check_csv_path(output)?;
+    }
+    let frames = read_frames(&args.frames)?;
+    let config = Config { margin: args.margin, backend: args.backend.backend(), ..Config::DEFAULT };
+    let about = |error| Failure::Input(format!("{}: {}", args.frames.display(), search_text(&error)));
+    let mut broad_phase =
+        BroadPhase::new(config).map_err(|error| Failure::Input(format!("--margin: {error}")))?;
+    let mut replay = Replay::default();
+    let bar = progress(frames.frames.len(), "frames");
+    for (number, frame) in frames.frames.iter().enumerate() {
+        replay.step(&mut broad_phase, number, frame, args.output.is_some()).map_err(about)?;
+        bar.inc(1);
+    }
+    bar.finish_and_clear();
+    if let Some(output) = &args.output {
+        write_csv(output, "frame,event,a,b", std::mem::take(&mut replay.lines))?;
+    }
+    report(args, &frames, &replay, &broad_phase)
+}
+
+impl Replay {
+    fn step(
+        &mut self,
+        broad_phase: &mut BroadPhase,
+        number: usize,
+        frame: &[FrameBox],
+        keep_lines: bool,
+    ) -> Result<(), pbig_core::Error> {
+        // Pairs of a box that leaves end here: the broad phase ends them without an event.
+        let mut left: Vec<Pair> = Vec::new();
+        let clock = Instant::now();
+        for (id, now) in frame.iter().enumerate() {
+            match now {
+                FrameBox::Present(aabb) => broad_phase.set(id as u32, *aabb, ProxyFilter::ALL)?,
+                FrameBox::Absent => {
+                    left.extend(broad_phase.pairs_of(id as u32));
+                    broad_phase.remove(id as u32);
+                }
+            }
+        }
+        broad_phase.update()?;
+        self.times.push(milliseconds(clock.elapsed()));
+        self.invalid += broad_phase.report().invalid;
+        self.count(broad_phase, number, left, keep_lines);
+        Ok(())
+    }
+
+    fn count(&mut self, broad_phase: &BroadPhase, number: usize, left: Vec<Pair>, keep_lines: bool) {
+        let events = broad_phase.events();
+        let mut removed = left;
+        removed.extend_from_slice(&events.removed);
+        removed.sort_unstable();
+        self.added += events.added.len() as u64;
+        self.removed += removed.len() as u64;
+        if keep_lines {
+            let line = |sign: char| move |pair: &Pair| format!("{number},{sign},{},{}", pair.a, pair.b);
+            self.lines.extend(removed.iter().map(line('-')));
+            self.lines.extend(events.added.iter().map(line('+')));
+        }
+    }
+}
+
+fn report(args: &Args, frames: &Frames, replay: &Replay, broad_phase: &BroadPhase) -> Result<(), Failure> {
+    let (boxes, count) = (frames.boxes, frames.frames.len());
+    let ms = Spread::of(replay.times.iter().copied());
+    let (added, removed) = (replay.added, replay.removed);
+    let report = broad_phase.report();
+    if args.json {
+        let object = serde_json::json!({
+            "frames": count,
+            "boxes": boxes,
+            "added": added,
+            "removed": removed,
+            "ms": { "min": ms.min, "median": ms.median, "max": ms.max, "per_frame": replay.times },
+            "invalid": replay.invalid,
+            "pairs": broad_phase.pair_count(),
+            "margin": args.margin.abs(),
+            "backend": args.backend.in_use(report.fallback.as_deref()),
+            "adapter": broad_phase.adapter(),
+            "plan": plan_text(report),
+            "stages": stages(report),
+            "fallback": report.fallback,
+        });
+        return print(&object.to_string());
+    }
+    print(&format!(
+        "{} frames of {boxes} boxes: {added} pairs added, {removed} removed, {} at the end\n{:.3} ms a frame (median; {:.3} to {:.3})\nlast frame: {}",
+        count,
+        broad_phase.pair_count(),
+        ms.median,
+        ms.min,
+        ms.max,
+        plan_text(report)
+    ))
+}

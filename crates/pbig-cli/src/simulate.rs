@@ -1,0 +1,195 @@
+//! `pbig simulate` and `pbig scenes`: headless rapier worlds.
+
+use crate::options::{bodies, positive, seed};
+use clap::ValueEnum;
+use pbig_harness::options::BackendOption;
+use pbig_harness::output::{Failure, print, progress};
+use pbig_harness::scenes::Scene;
+use pbig_harness::simulate::{Check, Outcome, Task, run as run_scene, run_checked};
+use rapier_pbig::{PbigBroadPhase, PbigConfig};
+use rapier3d::prelude::DefaultBroadPhase;
+use std::path::Path;
+
+#[derive(clap::Args)]
+pub(crate) struct Args {
+    /// The scene; `pbig scenes` lists them.
+    #[arg(long, value_name = "NAME")]
+    scene: String,
+    /// Bodies; each scene has its own default.
+    #[arg(long, value_name = "N", value_parser = bodies, allow_negative_numbers = true)]
+    bodies: Option<usize>,
+    /// Steps of 1/60 s.
+    #[arg(long, value_name = "K", default_value = "300", value_parser = positive, allow_negative_numbers = true)]
+    steps: usize,
+    /// Which broad phase drives the world.
+    #[arg(long, value_enum, default_value_t)]
+    broad_phase: BroadPhaseOption,
+    /// Where pbig works.
+    #[arg(long, value_enum, default_value_t)]
+    backend: BackendOption,
+    /// For the random numbers of the scene.
+    #[arg(long, default_value = "1", value_parser = seed, allow_negative_numbers = true)]
+    seed: u64,
+    /// Run rapier's broad phase and the oracle beside pbig and compare after every call.
+    #[arg(long)]
+    check: bool,
+    /// Print one JSON object.
+    #[arg(long)]
+    json: bool,
+}
+
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+enum BroadPhaseOption {
+    #[default]
+    Pbig,
+    Stock,
+}
+
+impl BroadPhaseOption {
+    fn name(self) -> &'static str {
+        match self {
+            Self::Pbig => "pbig",
+            Self::Stock => "stock",
+        }
+    }
+}
+
+pub(crate) fn list() -> Result<(), Failure> {
+    let line =
+        |scene: Scene| format!("{:<11} {} ({} bodies)\n", scene.name, scene.about, scene.default_bodies);
+    print(&Scene::ALL.map(line).concat())
+}
+
+pub(crate) fn run(args: &Args) -> Result<(), Failure> {
+    let scene = Scene::named(&args.scene)?;
+    let bodies = args.bodies.unwrap_or(scene.default_bodies);
+    let task = Task { scene, bodies, steps: args.steps, seed: args.seed };
+    refuse_what_stock_ignores(args)?;
+    let bar = progress(args.steps, "steps");
+    let config = PbigConfig { backend: args.backend.backend(), ..PbigConfig::DEFAULT };
+    let ours = PbigBroadPhase::with_config(config).expect("the default margin is a length");
+    let step = |_| bar.inc(1);
+    let (outcome, did) = match args.broad_phase {
+        BroadPhaseOption::Stock => (run_scene(task, DefaultBroadPhase::new(), step).0, Did::default()),
+        BroadPhaseOption::Pbig => {
+            let (outcome, ours) = if args.check {
+                run_checked(task, ours, config.margin, Path::new("."), step)
+            } else {
+                run_scene(task, ours, step)
+            };
+            (outcome, Did::of(&ours))
+        }
+    };
+    bar.finish_and_clear();
+    report(args, bodies, &outcome, &did)?;
+    if outcome.failed() { Err(Failure::Check(failure_line(&outcome))) } else { Ok(()) }
+}
+
+fn refuse_what_stock_ignores(args: &Args) -> Result<(), Failure> {
+    if args.check && args.broad_phase == BroadPhaseOption::Stock {
+        return Err(Failure::Input(
+            "--check is for pbig, not for rapier's own broad phase: leave out --check or --broad-phase stock"
+                .into(),
+        ));
+    }
+    Ok(())
+}
+
+/// The first difference and where the frames are.
+fn failure_line(outcome: &Outcome) -> String {
+    let check = outcome.check.as_ref();
+    let first = check.and_then(|c| c.differences.first()).map_or(String::new(), ToString::to_string);
+    match check.and_then(|c| c.frames_file.as_ref()) {
+        Some(Ok(file)) => format!("{first}; the frames up to there are in {}", file.display()),
+        Some(Err(why)) => format!("{first}; the frames could not be written: {why}"),
+        None => first,
+    }
+}
+
+/// The backend that did the work.
+#[derive(Default)]
+struct Did {
+    /// The reason why it was not the wanted backend.
+    fallback: Option<String>,
+    adapter: Option<String>,
+    /// Number of updates.
+    updates: u64,
+}
+
+impl Did {
+    fn of(broad_phase: &PbigBroadPhase) -> Self {
+        let stats = broad_phase.stats();
+        Self {
+            fallback: stats.report.fallback.clone(),
+            adapter: broad_phase.adapter().map(str::to_owned),
+            updates: stats.totals.updates,
+        }
+    }
+}
+
+fn report(args: &Args, bodies: usize, outcome: &Outcome, did: &Did) -> Result<(), Failure> {
+    let fallback = did.fallback.as_deref();
+    let stock = args.broad_phase == BroadPhaseOption::Stock;
+    let backend = if stock { "cpu" } else { args.backend.in_use(fallback) };
+    if args.json {
+        let object = serde_json::json!({
+            "scene": args.scene,
+            "bodies": bodies,
+            "colliders": outcome.colliders,
+            "steps": outcome.steps,
+            "broad_phase": args.broad_phase.name(),
+            "backend": backend,
+            "adapter": did.adapter,
+            "ms": { "broad_phase": outcome.broad_phase, "step": outcome.step },
+            "pairs": outcome.pairs,
+            "added": outcome.added,
+            "removed": outcome.removed,
+            "updates": did.updates,
+            "fallback": fallback,
+            "check": outcome.check.as_ref().map(check_object),
+        });
+        return print(&object.to_string());
+    }
+    let note = fallback.map_or(String::new(), |why| format!("\nnote: {why}"));
+    let (broad_phase, step) = (outcome.broad_phase, outcome.step);
+    print(&format!(
+        "{}: {bodies} bodies, {} colliders, {} steps with the {} broad phase\n\
+         broad phase {:.3} ms a step (median; {:.3} to {:.3}), whole step {:.3} ms ({:.3} to {:.3})\n\
+         {} pairs at the end; {} added, {} removed\n{}",
+        args.scene,
+        outcome.colliders,
+        outcome.steps,
+        args.broad_phase.name(),
+        broad_phase.median,
+        broad_phase.min,
+        broad_phase.max,
+        step.median,
+        step.min,
+        step.max,
+        outcome.pairs,
+        outcome.added,
+        outcome.removed,
+        outcome.check.as_ref().map_or(String::new(), check_line) + &note,
+    ))
+}
+
+fn check_object(check: &Check) -> serde_json::Value {
+    serde_json::json!({
+        "calls": check.calls,
+        "oracle_pairs": check.oracle_pairs,
+        "stock_only": check.stock_only,
+        "missing": check.missing(),
+        "differences": check.differences.iter().map(ToString::to_string).collect::<Vec<_>>(),
+        "frames_file": check.frames_file.as_ref().and_then(|file| file.as_ref().ok()),
+    })
+}
+
+fn check_line(check: &Check) -> String {
+    format!(
+        "checked {} calls: {} missing pairs of {} that the oracle found; {} pairs that only stock reports",
+        check.calls,
+        check.missing(),
+        check.oracle_pairs,
+        check.stock_only
+    )
+}

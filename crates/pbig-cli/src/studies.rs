@@ -1,0 +1,20 @@
+//! Commands of the program `pbig-studies`, which is built apart: it needs rapier in f64 and other libraries' trees.
+
+use pbig_harness::output::Failure;
+use std::ffi::OsString;
+use std::process::Command;
+
+/// Runs a command of `pbig-studies`, if the program lies beside this one, and ends with its exit status.
+pub(crate) fn run(command: &str, options: Vec<OsString>) -> Result<(), Failure> {
+    let here = std::env::current_exe().map_err(|error| Failure::Input(error.to_string()))?;
+    let beside = here.with_file_name(format!("pbig-studies{}", std::env::consts::EXE_SUFFIX));
+    if beside.is_file() {
+        let status = Command::new(&beside).arg(command).args(options).status();
+        let status = status.map_err(|error| Failure::Input(format!("{}: {error}", beside.display())))?;
+        std::process::exit(status.code().unwrap_or(1));
+    }
+    let options: Vec<_> = options.iter().map(|option| option.to_string_lossy().into_owned()).collect();
+    let line =
+        [&["cargo run --release -p pbig-studies --", command].map(str::to_owned)[..], &options].concat();
+    Err(Failure::Input(format!("{command} is a study; run it with: {}", line.join(" "))))
+}

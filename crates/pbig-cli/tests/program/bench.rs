@@ -1,0 +1,93 @@
+//! `pbig bench`: each suite's shape, and that its figures are finite; never how large they are.
+
+use super::{json, pbig, refused};
+use serde_json::Value;
+use std::path::Path;
+
+/// The tables of a quick run, which writes nothing into the folder.
+fn tables(suite: &str) -> Value {
+    let folder = tempfile::tempdir().expect("a folder");
+    let object = json(&pbig(folder.path(), &["bench", suite, "--quick", "--json"]));
+    assert_eq!(std::fs::read_dir(folder.path()).expect("the folder").count(), 0, "nothing is written");
+    assert_eq!(object["suite"], suite);
+    for key in ["machine", "cores", "threads", "simd", "day", "commit"] {
+        assert!(object["head"][key].is_string(), "{key} is missing");
+    }
+    object["tables"].clone()
+}
+
+fn rows<'a>(tables: &'a Value, name: &str) -> &'a Vec<Value> {
+    tables[name].as_array().unwrap_or_else(|| panic!("no table {name}"))
+}
+
+fn number(row: &Value, key: &str) -> f64 {
+    row[key].as_f64().unwrap_or_else(|| panic!("{key}: {row}"))
+}
+
+/// Returns how many rows are about something.
+fn about(rows: &[Value], word: &str) -> usize {
+    rows.iter().filter(|row| format!("{} {}", row["case"], row["other"]).contains(word)).count()
+}
+
+#[test]
+fn bench_update_compares_with_stock_and_the_floor_and_measures_memory() {
+    let tables = tables("update");
+    let rows = rows(&tables, "update");
+    for word in ["stock", "floor, one thread", "floor, all threads", "nothing moved", "1% moved"] {
+        assert!(about(rows, word) > 0, "{word}");
+    }
+    for row in rows.iter().filter(|row| row["other"].is_string()) {
+        assert!(number(row, "other_over_pbig_median") > 0.0 && number(row, "pbig_mean") > 0.0, "{row}");
+    }
+    let memory = rows.iter().filter(|row| row["unit"] == "MB");
+    assert!(memory.clone().count() > 2);
+    assert!(!cfg!(target_os = "linux") || memory.clone().all(|row| number(row, "pbig_median") > 0.0));
+    let requests: Vec<_> = rows.iter().filter(|row| row["unit"] == "requests").collect();
+    assert!(requests.len() > 2 && number(requests[0], "pbig_median") == 0.0, "{}", requests[0]);
+}
+
+#[test]
+fn bench_step_has_every_scene_and_writes_into_a_folder_that_is_named() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let object = json(&pbig(folder.path(), &["bench", "step", "--quick", "--json", "--write", "out"]));
+    let rows = rows(&object["tables"], "step");
+    for scene in pbig_harness::scenes::Scene::ALL {
+        assert!(about(rows, scene.name) > 0, "{}", scene.name);
+    }
+    assert!(about(rows, "uniform, 100% moved") > 0);
+    assert!(rows.iter().all(|row| number(row, "stock_over_pbig") > 0.0 && row["boxes"].is_u64()));
+    let text = std::fs::read_to_string(folder.path().join("out/step.csv")).expect("the file");
+    assert!(text.starts_with("# machine: ") && text.contains("\ncase,boxes,pairs,steps,"), "{text}");
+    assert_eq!(text.lines().filter(|line| !line.starts_with('#')).count(), 1 + rows.len());
+}
+
+/// On whatever adapter there is: what goes up and comes back is a matter of counts.
+#[test]
+fn bench_gpu_has_both_backends_and_moves_no_more_bytes_than_have_changed() {
+    let tables = tables("gpu");
+    let searches = rows(&tables, "searches");
+    assert!(searches.len() == 6 && searches.iter().all(|row| number(row, "cpu_over_gpu") > 0.0));
+    let events = rows(&tables, "events");
+    assert_eq!(events.len(), 4);
+    for row in events {
+        assert!(number(row, "cpu_ms") > 0.0 && number(row, "gpu_ms") > 0.0, "{row}");
+        let changed = number(row, "boxes") * number(row, "share");
+        assert!(number(row, "uploaded_bytes") < 64.0 * changed + 4096.0, "{row}");
+        assert!(number(row, "downloaded_bytes") < 32.0 * number(row, "events") + 4096.0, "{row}");
+    }
+    assert!(number(&events[3], "events") > 1000.0);
+}
+
+#[test]
+fn studies_are_named_where_their_program_is_not_beside_this_one() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let alone = folder.path().join("pbig");
+    std::fs::copy(env!("CARGO_BIN_EXE_pbig"), &alone).expect("a copy");
+    let run = |args: &[&str]| std::process::Command::new(&alone).args(args).output().expect("it starts");
+    let studies = "cargo run --release -p pbig-studies --";
+    refused(&run(&["bench", "papers", "--quick"]), &[&format!("{studies} papers --quick")]);
+    let steady = run(&["bench", "steady", "--boxes", "10,20", "--write", "out"]);
+    refused(&steady, &[&format!("{studies} steady --write out --boxes 10,20")]);
+    refused(&run(&["accuracy", "--only", "index"]), &[&format!("{studies} accuracy --only index")]);
+    refused(&pbig(Path::new("."), &["bench", "step", "--boxes", "60"]), &["--boxes", "steady"]);
+}

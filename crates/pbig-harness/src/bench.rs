@@ -1,0 +1,222 @@
+//! Times of several sides that do the same work, in turn in one run: only such times compare.
+
+use crate::cells;
+use crate::output::Failure;
+use crate::runner::{Spread, milliseconds};
+use crate::table::Cell;
+use std::time::{Duration, Instant};
+
+/// Sides that do the same work, round by round.
+pub trait Contest {
+    /// Returns the number of sides.
+    fn sides(&self) -> usize;
+
+    /// Prepares a round. This is not measured.
+    fn prepare(&mut self, round: usize);
+
+    /// Does one side's work in this round; returns its milliseconds.
+    ///
+    /// # Errors
+    /// If the work fails.
+    fn run(&mut self, side: usize) -> Result<f64, Failure>;
+}
+
+/// The length of a measurement.
+#[derive(Clone, Copy, Debug)]
+pub struct Effort {
+    /// Rounds that do not count: they allocate, fill caches, and learn how boxes move.
+    pub warm_up: usize,
+    /// Rounds that do, at most.
+    pub rounds: usize,
+    /// Time after which no further round starts, once there are enough for a median.
+    pub budget: Duration,
+}
+
+impl Effort {
+    /// Seconds for a row, or a fraction of one.
+    pub fn new(quick: bool) -> Self {
+        let (rounds, budget) = if quick { (31, 250) } else { (61, 6000) };
+        let warm_up = if quick { 3 } else { 12 };
+        Self { warm_up, rounds, budget: Duration::from_millis(budget) }
+    }
+}
+
+/// The times of a side, in milliseconds.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Took {
+    /// The median.
+    pub median: f64,
+    /// The mean of all rounds. It includes its share of work that one round does for many.
+    pub mean: f64,
+}
+
+/// The columns of a table in which pbig stands beside another side.
+pub const COMPARED: [&str; 11] = [
+    "case",
+    "boxes",
+    "pairs",
+    "unit",
+    "pbig_median",
+    "pbig_mean",
+    "other",
+    "other_median",
+    "other_mean",
+    "other_over_pbig_median",
+    "other_over_pbig_mean",
+];
+
+/// A unit, and by what milliseconds are multiplied for it.
+pub type Unit = (&'static str, f64);
+
+/// Milliseconds.
+pub const MS: Unit = ("ms", 1.0);
+
+/// Returns a row of [`COMPARED`].
+pub fn compared(
+    case: &str,
+    boxes: usize,
+    pairs: u64,
+    unit: Unit,
+    ours: Took,
+    other: (&str, Took),
+) -> Vec<Cell> {
+    let (name, theirs) = other;
+    let of = |ms: f64| ms * unit.1;
+    // A clock can tell 0.
+    let times = |ours: f64, theirs: f64| theirs.max(1e-9) / ours.max(1e-9);
+    let means = times(ours.mean, theirs.mean);
+    let ratios = [times(ours.median, theirs.median), means];
+    let (our_times, their_times) = ([of(ours.median), of(ours.mean)], [of(theirs.median), of(theirs.mean)]);
+    let mut row = cells![case, boxes, pairs, unit.0, our_times[0], our_times[1], name];
+    row.extend(their_times.into_iter().chain(ratios).map(Cell::from));
+    row
+}
+
+/// Returns a row of [`COMPARED`] with one value of pbig's alone.
+pub fn alone(case: &str, boxes: usize, pairs: u64, unit: &str, value: Option<f64>) -> Vec<Cell> {
+    let mut row = cells![case, boxes, pairs, unit, value];
+    row.resize(COMPARED.len(), Cell::Nothing);
+    row
+}
+
+/// Returns the medians of [`measured`].
+///
+/// # Errors
+/// If a side's work fails.
+pub fn medians(contest: &mut impl Contest, effort: Effort) -> Result<Vec<f64>, Failure> {
+    Ok(measured(contest, effort)?.iter().map(|took| took.median).collect())
+}
+
+/// Measures the sides. They change places from round to round, as the first in a round warms
+/// the caches for the next: a side's median is the mean, over its places, of its median there.
+///
+/// # Errors
+/// If a side's work fails.
+pub fn measured(contest: &mut impl Contest, effort: Effort) -> Result<Vec<Took>, Failure> {
+    let sides = contest.sides();
+    // By place, then by side.
+    let mut times = vec![vec![Vec::new(); sides]; sides];
+    let enough = effort.warm_up + 3 * sides.min(2);
+    let clock = Instant::now();
+    for round in 0..effort.warm_up + effort.rounds {
+        // After an even number of rounds, boxes that go to and fro are at home: the same pairs in every run.
+        if round >= enough && round.is_multiple_of(2) && clock.elapsed() > effort.budget {
+            break;
+        }
+        contest.prepare(round);
+        for (place, times) in times.iter_mut().enumerate() {
+            let side = (round + place) % sides;
+            let time = contest.run(side)?;
+            if round >= effort.warm_up {
+                times[side].push(time);
+            }
+        }
+    }
+    let took = |side: usize| {
+        let places = || times.iter().map(|times| &times[side][..]);
+        let (sum, count) = places().flatten().fold((0.0, 0), |(sum, count), time| (sum + time, count + 1));
+        Took { median: mean_of_medians(places()), mean: sum / f64::from(count.max(1)) }
+    };
+    Ok((0..sides).map(took).collect())
+}
+
+/// Returns the mean of the medians of all places in which there is a time.
+pub fn mean_of_medians<'a>(places: impl IntoIterator<Item = &'a [f64]>) -> f64 {
+    let median = |times: &[f64]| Spread::of(times.iter().copied()).median;
+    let seen: Vec<f64> = places.into_iter().filter(|times| !times.is_empty()).map(median).collect();
+    seen.iter().sum::<f64>() / seen.len().max(1) as f64
+}
+
+/// Returns a call's result and its milliseconds.
+pub fn timed<T>(call: impl FnOnce() -> T) -> (T, f64) {
+    let clock = Instant::now();
+    let result = call();
+    (result, milliseconds(clock.elapsed()))
+}
+
+/// Milliseconds of some frames; all but `first` leave out the first frame.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Figures {
+    /// The mean.
+    pub mean: f64,
+    /// The median.
+    pub median: f64,
+    /// The 99th percentile, by nearest rank.
+    pub p99: f64,
+    /// The longest.
+    pub worst: f64,
+    /// The first frame.
+    pub first: f64,
+}
+
+impl Figures {
+    /// Summarizes frames; zeros for none.
+    pub fn of(ms: &[f64]) -> Self {
+        let Some((&first, rest)) = ms.split_first() else { return Self::default() };
+        let mut sorted = rest.to_vec();
+        sorted.sort_unstable_by(f64::total_cmp);
+        let Some(&worst) = sorted.last() else { return Self { first, ..Self::default() } };
+        let count = sorted.len();
+        let (median, p99) = (sorted[count / 2], sorted[(99 * count).div_ceil(100) - 1]);
+        Self { mean: sorted.iter().sum::<f64>() / count as f64, median, p99, worst, first }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn figures_by_hand() {
+        let figures = Figures { mean: 3.0, median: 2.0, p99: 6.0, worst: 6.0, first: 9.0 };
+        assert_eq!(Figures::of(&[9.0, 1.0, 2.0, 6.0]), figures);
+        let many: Vec<f64> = std::iter::once(0.0).chain((1..=200).map(f64::from)).collect();
+        assert_eq!((Figures::of(&many).p99, Figures::of(&many).worst), (198.0, 200.0));
+        assert_eq!(Figures::of(&[5.0]), Figures { first: 5.0, ..Figures::default() });
+    }
+
+    /// Side 1 takes twice as long as side 0, and the first of a round 10 more.
+    struct Known(bool);
+
+    impl Contest for Known {
+        fn sides(&self) -> usize {
+            2
+        }
+        fn prepare(&mut self, _: usize) {
+            self.0 = true;
+        }
+        fn run(&mut self, side: usize) -> Result<f64, Failure> {
+            let cold = if std::mem::take(&mut self.0) { 10.0 } else { 0.0 };
+            Ok(cold + [1.0, 2.0][side])
+        }
+    }
+
+    #[test]
+    fn places_in_a_round_favour_no_side() {
+        let effort = Effort { warm_up: 1, rounds: 7, budget: Duration::MAX };
+        assert_eq!(medians(&mut Known(false), effort).expect("no failure"), [6.0, 7.0]);
+        // Side 1 is first in four of seven rounds.
+        let mean = |side: usize| measured(&mut Known(false), effort).expect("no failure")[side].mean;
+        assert_eq!([mean(0), mean(1)], [1.0 + 30.0 / 7.0, 2.0 + 40.0 / 7.0]);
+    }
+}

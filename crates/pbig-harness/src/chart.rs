@@ -1,0 +1,342 @@
+//! Charts as SVG: panels of lines or points over linear or logarithmic axes, with a legend beside each.
+
+use plotters::coord::Shift;
+use plotters::coord::ranged1d::{KeyPointHint, NoDefaultFormatting, Ranged, ValueFormatter};
+use plotters::prelude::*;
+use std::path::Path;
+
+/// Most lines of a panel; more cannot be told apart.
+pub const MAX_LINES: usize = 6;
+
+/// Colours that differ for the colour-blind too (Okabe and Ito).
+const COLOURS: [RGBColor; MAX_LINES] = [
+    RGBColor(213, 94, 0),
+    RGBColor(0, 114, 178),
+    RGBColor(0, 158, 115),
+    RGBColor(0, 0, 0),
+    RGBColor(204, 121, 167),
+    RGBColor(230, 159, 0),
+];
+
+/// Size of a chart in pixels: its width, the height of one panel, and the width of the legend.
+const WIDTH: u32 = 960;
+const HEIGHT: u32 = 440;
+const LEGEND: u32 = 230;
+
+/// Height of text and of titles: 14 and 18 pixels, which the drawing backend divides by this factor.
+const TEXT: f64 = 14.0 * 1.24;
+const TITLE: f64 = 18.0 * 1.24;
+
+/// Most characters of a line of the legend.
+const LEGEND_LETTERS: usize = 28;
+
+/// A named line of a panel.
+#[derive(Clone, Debug)]
+pub struct Line {
+    /// The name in the legend.
+    pub name: String,
+    /// The points, in the order in which they are joined. On logarithmic axes a y of 0 has a line of its own at the bottom;
+    /// other points that have no logarithm are left out.
+    pub points: Vec<(f64, f64)>,
+}
+
+/// One plot.
+#[derive(Clone, Debug)]
+pub struct Plot {
+    /// The title above the plot.
+    pub title: String,
+    /// Label of the x axis, with its unit.
+    pub x: String,
+    /// Label of the y axis, with its unit.
+    pub y: String,
+    /// True if both axes are logarithmic.
+    pub is_log: bool,
+    /// True if the points of a line are joined.
+    pub is_joined: bool,
+    /// True if the points have marks.
+    pub has_marks: bool,
+    /// The lines, at most [`MAX_LINES`].
+    pub lines: Vec<Line>,
+}
+
+/// A chart for a file.
+#[derive(Clone, Debug)]
+pub struct Chart {
+    /// The file's name without its extension.
+    pub name: String,
+    /// The plots, one below the other.
+    pub plots: Vec<Plot>,
+}
+
+impl Chart {
+    /// Returns a chart of one plot with marks over logarithmic axes. Lines without points are left out.
+    pub fn log(name: &str, title: &str, [x, y]: [&str; 2], mut lines: Vec<Line>) -> Self {
+        lines.retain(|line| !line.points.is_empty());
+        let (title, x, y) = (title.into(), x.into(), y.into());
+        Self {
+            name: name.into(),
+            plots: vec![Plot { title, x, y, is_log: true, is_joined: true, has_marks: true, lines }],
+        }
+    }
+
+    /// Writes the chart.
+    ///
+    /// # Errors
+    /// Returns a message that names the file, if it cannot be written.
+    pub fn write(&self, path: &Path) -> Result<(), String> {
+        self.draw(path).map_err(|error| format!("{}: cannot write the chart: {error}", path.display()))
+    }
+
+    fn draw(&self, path: &Path) -> Done {
+        let count = self.plots.len();
+        let root = SVGBackend::new(path, (WIDTH, HEIGHT * count.max(1) as u32)).into_drawing_area();
+        root.fill(&WHITE)?;
+        for (area, plot) in root.split_evenly((count.max(1), 1)).iter().zip(&self.plots) {
+            let (area, legend) = area.split_horizontally(WIDTH - LEGEND);
+            plot.draw(&area)?;
+            plot.draw_legend(&legend)?;
+        }
+        root.present().map_err(owned)
+    }
+}
+
+type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
+type Done = Result<(), Box<dyn std::error::Error>>;
+
+fn owned(error: impl std::error::Error) -> Box<dyn std::error::Error> {
+    error.to_string().into()
+}
+
+impl Plot {
+    fn lines(&self) -> impl Iterator<Item = (&Line, RGBColor)> {
+        self.lines.iter().zip(COLOURS)
+    }
+
+    fn points(&self) -> impl Iterator<Item = (f64, f64)> + '_ {
+        self.lines().flat_map(|(line, _)| &line.points).copied().filter(|point| self.has_place(point))
+    }
+
+    fn has_place(&self, &(x, y): &(f64, f64)) -> bool {
+        x.is_finite() && y.is_finite() && (!self.is_log || (x > 0.0 && y >= 0.0))
+    }
+
+    fn axes(&self) -> [Axis; 2] {
+        let [x, y] = [self.points().map(|p| p.0).collect(), self.points().map(|p| p.1).collect()];
+        [Axis::new(x, self.is_log), Axis::new(y, self.is_log)]
+    }
+
+    fn draw(&self, area: &Area<'_>) -> Done {
+        let [x, y] = self.axes();
+        let mut chart = ChartBuilder::on(area)
+            .caption(&self.title, ("sans-serif", TITLE))
+            .margin(12)
+            .x_label_area_size(48)
+            .y_label_area_size(84)
+            .build_cartesian_2d(x.clone(), y.clone())
+            .map_err(owned)?;
+        let mut mesh = chart.configure_mesh();
+        mesh.x_desc(&self.x).y_desc(&self.y).light_line_style(WHITE);
+        mesh.axis_desc_style(("sans-serif", TEXT)).label_style(("sans-serif", TEXT)).draw().map_err(owned)?;
+        for (line, colour) in self.lines() {
+            let place = |&(x, v): &(f64, f64)| (x, v.max(y.zero.unwrap_or(f64::MIN)));
+            let points: Vec<_> =
+                line.points.iter().filter(|point| self.has_place(point)).map(place).collect();
+            if self.is_joined {
+                chart.draw_series(LineSeries::new(points.clone(), colour.stroke_width(2))).map_err(owned)?;
+            }
+            if self.has_marks {
+                let mark = |at| Circle::new(at, 4, colour.filled());
+                chart.draw_series(points.into_iter().map(mark)).map_err(owned)?;
+            }
+        }
+        Ok(())
+    }
+
+    fn draw_legend(&self, area: &Area<'_>) -> Done {
+        let mut y = 48;
+        for (line, colour) in self.lines() {
+            area.draw(&Rectangle::new([(4, y - 4), (20, y + 4)], colour.filled())).map_err(owned)?;
+            for text in wrapped(&line.name) {
+                let style = ("sans-serif", TEXT).into_font();
+                area.draw(&Text::new(text, (26, y - 7), style)).map_err(owned)?;
+                y += 18;
+            }
+            y += 6;
+        }
+        Ok(())
+    }
+}
+
+/// Splits a name between words into lines of the legend.
+fn wrapped(name: &str) -> Vec<String> {
+    let mut lines = vec![String::new()];
+    for word in name.split(' ') {
+        let last = lines.last_mut().expect("one line at least");
+        match last.is_empty() {
+            true => last.push_str(word),
+            false if last.len() + word.len() < LEGEND_LETTERS => last.extend([" ", word]),
+            false => lines.push(word.to_owned()),
+        }
+    }
+    lines
+}
+
+/// One axis.
+#[derive(Clone, Debug)]
+struct Axis {
+    is_log: bool,
+    low: f64,
+    high: f64,
+    /// On a logarithmic axis, the place of the value 0.
+    zero: Option<f64>,
+}
+
+impl Axis {
+    fn new(values: Vec<f64>, is_log: bool) -> Self {
+        let low = values.iter().copied().filter(|v| !is_log || *v > 0.0).fold(f64::MAX, f64::min);
+        let high = values.iter().copied().fold(f64::MIN, f64::max);
+        let (low, high) = if low > high { (1.0, 10.0) } else { (low, high) };
+        if !is_log {
+            return Self { is_log, low: low.min(0.0), high: high.max(1e-9) * 1.05, zero: None };
+        }
+        let zero = values.contains(&0.0).then(|| 10f64.powf(low.log10().floor() - 1.0));
+        Self { is_log, low: zero.map_or(low / 1.3, |zero| zero / 2.0), high: high * 1.3, zero }
+    }
+
+    /// Returns the labelled values of a logarithmic axis: powers of ten, or 1, 2 and 5 times these.
+    fn powers(&self, most: usize) -> Vec<f64> {
+        let decades = self.low.log10().floor() as i32..=self.high.log10().ceil() as i32;
+        let factors: &[f64] = if decades.clone().count() > 4 { &[1.0] } else { &[1.0, 2.0, 5.0] };
+        let every = (decades.clone().count() * factors.len()).div_ceil(most.max(2));
+        let first = self.zero.map_or(self.low, |zero| zero * 1.5);
+        let all = decades.step_by(if factors.len() == 1 { every } else { 1 });
+        let all = all.flat_map(|power| factors.iter().map(move |factor| factor * 10f64.powi(power)));
+        self.zero.into_iter().chain(all.filter(|v| (first..=self.high).contains(v))).collect()
+    }
+
+    fn steps(&self, most: usize) -> Vec<f64> {
+        let wide = (self.high - self.low) / most.max(2) as f64;
+        let power = 10f64.powf(wide.log10().floor());
+        let step = [1.0, 2.0, 5.0, 10.0].map(|k| k * power).into_iter().find(|step| *step >= wide);
+        let step = step.unwrap_or(wide);
+        (0..)
+            .map(|k| k as f64 * step + (self.low / step).ceil() * step)
+            .take_while(|v| *v <= self.high)
+            .collect()
+    }
+}
+
+impl Ranged for Axis {
+    type FormatOption = NoDefaultFormatting;
+    type ValueType = f64;
+
+    fn map(&self, value: &f64, (from, to): (i32, i32)) -> i32 {
+        let share = match self.is_log {
+            true => (value / self.low).ln() / (self.high / self.low).ln(),
+            false => (value - self.low) / (self.high - self.low),
+        };
+        from + (f64::from(to - from) * share).round() as i32
+    }
+
+    fn key_points<Hint: KeyPointHint>(&self, hint: Hint) -> Vec<f64> {
+        let most = hint.max_num_points().min(12);
+        if self.is_log { self.powers(most) } else { self.steps(most) }
+    }
+
+    fn range(&self) -> std::ops::Range<f64> {
+        self.low..self.high
+    }
+}
+
+impl ValueFormatter<f64> for Axis {
+    fn format_ext(&self, value: &f64) -> String {
+        let rounded = (value * 1e12).round() / 1e12;
+        match value.abs() {
+            _ if self.zero.is_some_and(|zero| *value < 1.01 * zero) => "0".into(),
+            small if self.is_log && !(1e-3..1e6).contains(&small) => format!("{value:e}"),
+            _ => format!("{rounded}"),
+        }
+    }
+}
+
+/// Milliseconds step by step, for [`write`].
+pub struct Series<'a> {
+    /// The name in the legend.
+    pub name: &'a str,
+    /// One value for each step.
+    pub values: Vec<f64>,
+}
+
+/// A panel of such series.
+pub struct Panel<'a> {
+    /// The title above the panel.
+    pub title: &'a str,
+    /// Its lines.
+    pub series: Vec<Series<'a>>,
+}
+
+/// Writes panels one below the other, milliseconds against steps.
+///
+/// # Errors
+/// Returns a message that names the file, if it cannot be written.
+pub fn write(path: &Path, panels: &[Panel<'_>]) -> Result<(), String> {
+    Chart { name: String::new(), plots: panels.iter().map(Plot::of).collect() }.write(path)
+}
+
+impl Plot {
+    /// Returns milliseconds against steps.
+    pub fn of(panel: &Panel<'_>) -> Self {
+        let line = |series: &Series<'_>| {
+            let points = series.values.iter().enumerate().map(|(step, &ms)| (step as f64, ms));
+            Line { name: series.name.to_owned(), points: points.collect() }
+        };
+        let lines = panel.series.iter().map(line).collect();
+        let (x, y) = ("step".into(), "time, ms".into());
+        Self { title: panel.title.to_owned(), x, y, is_log: false, is_joined: true, has_marks: false, lines }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn drawn(points: &[(f64, f64)]) -> String {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("chart.svg");
+        let line = Line { name: "a line with a name that is longer".into(), points: points.to_vec() };
+        Chart::log("chart", "time and error", ["time, ns", "wrong, %"], vec![line])
+            .write(&path)
+            .expect("written");
+        std::fs::read_to_string(&path).expect("text")
+    }
+
+    #[test]
+    fn points_without_a_logarithm_are_left_out_and_zero_has_a_place() {
+        let points =
+            [(1.0, 0.0), (2.0, 3e-4), (3.0, 50.0), (0.0, 1.0), (f64::NAN, 1.0), (1.0, f64::INFINITY)];
+        let text = drawn(&points);
+        assert_eq!(text.matches("<circle").count(), 3);
+        for word in
+            ["time and error", "time, ns", "wrong, %", "a line with a name that is", "fill=\"#FFFFFF\""]
+        {
+            assert!(text.contains(word), "{word} is not in:\n{text}");
+        }
+        let axis = Axis::new(vec![0.0, 3e-4, 50.0], true);
+        assert_eq!(axis.format_ext(&axis.zero.expect("a zero")), "0");
+        assert!(axis.zero.is_some_and(|zero| zero < 1e-4 && zero > axis.low));
+        assert!(drawn(&[]).contains("time, ns"));
+    }
+
+    #[test]
+    fn axes_have_round_labels() {
+        assert_eq!(Axis::new(vec![0.0, 9.0], false).steps(5), [0.0, 2.0, 4.0, 6.0, 8.0]);
+        assert_eq!(Axis::new(vec![1.0, 9.0], true).powers(12), [1.0, 2.0, 5.0, 10.0]);
+        assert_eq!(Axis::new(vec![1e-3, 1e3], true).powers(12).len(), 7);
+    }
+
+    #[test]
+    fn a_chart_that_cannot_be_written_names_its_file() {
+        let nowhere = write(Path::new("no/such/folder.svg"), &[]);
+        assert!(nowhere.is_err_and(|error| error.contains("folder.svg")));
+    }
+}

@@ -1,0 +1,99 @@
+//! Both broad phases in one world, step by step.
+
+use crate::bench::{Effort, mean_of_medians};
+use crate::runner::{Timed, milliseconds};
+use crate::scenes::Scene;
+use crate::world::World;
+use rapier_pbig::PbigBroadPhase;
+use rapier3d::prelude::*;
+use std::time::{Duration, Instant};
+
+/// A step longer than this ends the measurement of its scene.
+const LONGEST: Duration = Duration::from_secs(5);
+
+/// Both broad phases in one world, in turn: they see the same boxes in every step, with caches as cold as the
+/// rest of the step leaves them, or as warm as the other has made them. The world gets our events.
+struct Both {
+    ours: Timed<PbigBroadPhase>,
+    stock: Timed<DefaultBroadPhase>,
+    ours_first: bool,
+    discarded: Vec<BroadPhasePairEvent>,
+}
+
+impl BroadPhase for Both {
+    fn update(
+        &mut self,
+        params: &IntegrationParameters,
+        colliders: &ColliderSet,
+        bodies: &RigidBodySet,
+        modified: &[ColliderHandle],
+        removed: &[ColliderHandle],
+        events: &mut Vec<BroadPhasePairEvent>,
+    ) {
+        let Self { ours, stock, ours_first, discarded } = self;
+        discarded.clear();
+        if *ours_first {
+            ours.update(params, colliders, bodies, modified, removed, events);
+        }
+        stock.update(params, colliders, bodies, modified, removed, discarded);
+        if !*ours_first {
+            ours.update(params, colliders, bodies, modified, removed, events);
+        }
+    }
+}
+
+/// A scene in which ours drives the world, and stock is called beside it.
+pub struct Duel {
+    /// The world.
+    pub world: World,
+    both: Both,
+    /// Ours and stock's milliseconds, by step; in even steps ours is called first.
+    pub times: Vec<[f64; 2]>,
+    too_long: bool,
+}
+
+impl Duel {
+    /// Runs a scene for as many steps as the effort allows.
+    pub fn run(scene: Scene, bodies: usize, effort: Effort) -> Self {
+        let (ours, stock) = (Timed::new(PbigBroadPhase::new()), Timed::new(DefaultBroadPhase::new()));
+        let both = Both { ours, stock, ours_first: false, discarded: vec![] };
+        let mut duel = Self { world: scene.build(bodies, 1), both, times: vec![], too_long: false };
+        let start = Instant::now();
+        while !duel.is_done(effort, start.elapsed()) {
+            duel.step();
+        }
+        duel
+    }
+
+    fn step(&mut self) {
+        let both = &mut self.both;
+        both.ours_first = self.times.len().is_multiple_of(2);
+        let clock = Instant::now();
+        self.world.step(both);
+        self.too_long = clock.elapsed() > LONGEST;
+        self.times.push([both.ours.take(), both.stock.take()].map(milliseconds));
+    }
+
+    fn is_done(&self, effort: Effort, elapsed: Duration) -> bool {
+        let counted = self.times.len().saturating_sub(effort.warm_up);
+        counted >= effort.rounds
+            || (counted >= 6 && elapsed > effort.budget)
+            || (counted >= 2 && self.too_long)
+    }
+
+    /// Returns the pairs that ours has now.
+    pub fn pairs(&self) -> u64 {
+        self.both.ours.inner.pair_count() as u64
+    }
+
+    /// Returns the median of ours and of stock from a step on: the mean of the medians of even and odd steps.
+    pub fn medians(&self, from: usize) -> [f64; 2] {
+        [0, 1].map(|side| {
+            let of = |parity: usize| -> Vec<f64> {
+                let steps = self.times.iter().enumerate().skip(from);
+                steps.filter(|(step, _)| step % 2 == parity).map(|(_, ms)| ms[side]).collect()
+            };
+            mean_of_medians([of(0), of(1)].iter().map(Vec::as_slice))
+        })
+    }
+}

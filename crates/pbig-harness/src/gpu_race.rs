@@ -1,0 +1,67 @@
+//! Two broad phases that see the same boxes, one on the CPU and one on a device.
+
+use crate::bench::timed;
+use crate::boxes::Wander;
+use crate::output::Failure;
+use crate::runner::Spread;
+use pbig_core::{Aabb, Backend, BroadPhase, Config, GpuFinder, GpuReport, Limits, ProxyFilter};
+
+/// The result of a race.
+#[derive(Debug)]
+pub struct Raced {
+    /// Median times of an update on the CPU and on the device, in ms.
+    pub ms: [f64; 2],
+    /// Pairs at the end.
+    pub pairs: usize,
+    /// Pairs that were added or removed in the last round.
+    pub events: usize,
+    /// The device's report on the last round.
+    pub report: GpuReport,
+}
+
+/// Lets a share of these boxes move by up to a distance, for some rounds.
+///
+/// # Errors
+/// A failed check, if CPU and device have different events or if the device leaves an update to the CPU.
+pub fn race(gpu: &GpuFinder, start: Vec<Aabb>, share: f64, distance: f32) -> Result<Raced, Failure> {
+    let config = |backend| Config { backend, limits: Limits::UNLIMITED, ..Config::DEFAULT };
+    let on_gpu = BroadPhase::with_gpu(config(Backend::Gpu), gpu.clone())?;
+    let mut sides = [BroadPhase::new(config(Backend::Cpu))?, on_gpu];
+    let all: Vec<u32> = (0..start.len() as u32).collect();
+    let mut wander = Wander::new(start, share, distance);
+    for side in &mut sides {
+        update(side, &all, &wander.boxes)?;
+    }
+    let (mut times, mut report): ([Vec<f64>; 2], _) = Default::default();
+    for round in 0..if all.len() > 100_000 { 5 } else { 9 } {
+        let moved = wander.step(round);
+        for (side, times) in sides.iter_mut().zip(&mut times) {
+            let ms = update(side, &moved, &wander.boxes)?;
+            // The first rounds allocate and learn.
+            times.extend((round > 1).then_some(ms));
+        }
+        if sides[0].events() != sides[1].events() {
+            let what = format!("events of {} boxes, {share} moved: CPU and GPU differ", all.len());
+            return Err(Failure::Check(what));
+        }
+        report = on_device(&sides[1])?;
+    }
+    let events = sides[1].events().added.len() + sides[1].events().removed.len();
+    let ms = times.map(|times| Spread::of(times).median);
+    Ok(Raced { ms, pairs: sides[1].pair_count(), events, report })
+}
+
+/// Sets what has moved and updates; returns the milliseconds.
+fn update(broad_phase: &mut BroadPhase, moved: &[u32], boxes: &[Aabb]) -> Result<f64, Failure> {
+    let (done, ms) = timed(|| {
+        broad_phase.set_many(moved, |id| Some((boxes[id as usize], ProxyFilter::ALL)))?;
+        broad_phase.update().map(|_| ())
+    });
+    Ok(done.map(|()| ms)?)
+}
+
+fn on_device(broad_phase: &BroadPhase) -> Result<GpuReport, Failure> {
+    let report = broad_phase.report();
+    let why = || Failure::Check(format!("events: {}", report.fallback.as_deref().unwrap_or("on the CPU")));
+    report.gpu.clone().ok_or_else(why)
+}

@@ -1,0 +1,98 @@
+//! The output of a program, and its exit status.
+
+use std::fmt;
+use std::io::{ErrorKind, IsTerminal, Write};
+use std::process::ExitCode;
+
+/// The reason why the program ends with a status other than 0.
+#[derive(Debug)]
+pub enum Failure {
+    /// A check failed: status 1.
+    Check(String),
+    /// Bad usage or bad input: status 2.
+    Input(String),
+}
+
+impl Failure {
+    /// Returns the exit status.
+    pub fn code(&self) -> ExitCode {
+        ExitCode::from(match self {
+            Self::Check(_) => 1,
+            Self::Input(_) => 2,
+        })
+    }
+}
+
+impl fmt::Display for Failure {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let (Self::Check(message) | Self::Input(message)) = self;
+        // One line of bearable length, whatever a file or a name contained.
+        const LONGEST: usize = 600;
+        let plain = message.chars().map(|c| if c.is_control() { ' ' } else { c });
+        let end = if message.chars().count() > LONGEST { "..." } else { "" };
+        write!(f, "{}{end}", plain.take(LONGEST).collect::<String>().trim_end())
+    }
+}
+
+impl From<pbig_core::Error> for Failure {
+    fn from(error: pbig_core::Error) -> Self {
+        Self::Input(error.to_string())
+    }
+}
+
+impl From<String> for Failure {
+    fn from(message: String) -> Self {
+        Self::Input(message)
+    }
+}
+
+/// Prints to stdout. A reader that has gone away (`pbig scenes | head -1`) is no failure.
+///
+/// # Errors
+/// If stdout takes no more.
+pub fn print(text: &str) -> Result<(), Failure> {
+    let mut stdout = std::io::stdout().lock();
+    let newline = if text.ends_with('\n') { "" } else { "\n" };
+    match write!(stdout, "{text}{newline}").and_then(|()| stdout.flush()) {
+        Err(error) if error.kind() != ErrorKind::BrokenPipe => {
+            Err(Failure::Input(format!("stdout: {error}")))
+        }
+        _ => Ok(()),
+    }
+}
+
+/// Ends a program: an error is one line on stderr.
+pub fn finish(program: &str, result: Result<(), Failure>) -> ExitCode {
+    let Err(failure) = result else { return ExitCode::SUCCESS };
+    // Nothing is left to do if stderr is closed too.
+    _ = std::io::stderr().write_all(format!("{program}: {failure}\n").as_bytes());
+    failure.code()
+}
+
+/// A progress bar on stderr, when that is a terminal.
+pub fn progress(length: usize, what: &'static str) -> indicatif::ProgressBar {
+    if !std::io::stderr().is_terminal() {
+        return indicatif::ProgressBar::hidden();
+    }
+    let style = indicatif::ProgressStyle::with_template("{msg} {wide_bar} {pos}/{len} {eta}");
+    let bar = indicatif::ProgressBar::new(length as u64).with_message(what);
+    style.map_or(bar.clone(), |style| bar.with_style(style))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_failed_check_is_1_and_bad_input_is_2() {
+        let code = |failure: Failure| format!("{:?}", failure.code());
+        assert_eq!(code(Failure::Check(String::new())), format!("{:?}", ExitCode::from(1)));
+        assert_eq!(code(Failure::Input(String::new())), format!("{:?}", ExitCode::from(2)));
+    }
+
+    #[test]
+    fn a_message_is_one_line_of_bearable_length() {
+        let text = Failure::Input(format!("a\nb\u{1b}[1m{}", "x".repeat(10_000))).to_string();
+        assert!(text.starts_with("a b [1mx") && text.len() < 700, "{text}");
+    }
+}

@@ -1,0 +1,174 @@
+//! The one way to print and to write what a suite has measured.
+
+use crate::chart::Chart;
+use crate::output::{Failure, print};
+use crate::table::{LONG, Table};
+use serde_json::{Value, json};
+use std::path::Path;
+
+/// The tables and charts of a suite.
+#[derive(Clone, Debug, Default)]
+pub struct Report {
+    /// The name of the suite, and of its file.
+    pub suite: String,
+    /// Conditions of the run besides the machine, each with its name.
+    pub head: Vec<(&'static str, String)>,
+    /// The tables.
+    pub tables: Vec<Table>,
+    /// The charts.
+    pub charts: Vec<Chart>,
+}
+
+impl Report {
+    /// Returns a report without conditions and charts.
+    pub fn new(suite: &str, tables: Vec<Table>) -> Self {
+        Self { suite: suite.into(), tables, ..Self::default() }
+    }
+
+    fn heads(&self) -> impl Iterator<Item = (&'static str, String)> + '_ {
+        machine().into_iter().chain(self.head.clone())
+    }
+
+    /// Returns the file: conditions in lines that begin with `#`, then one row a case; of several tables one row a value.
+    pub fn csv(&self) -> String {
+        let head: String = self.heads().map(|(name, value)| format!("# {name}: {value}\n")).collect();
+        let mut writer = csv::Writer::from_writer(vec![]);
+        let mut write = |record: Vec<String>| writer.write_record(record).expect("memory takes it all");
+        match &self.tables[..] {
+            [one] => {
+                write(one.columns.clone());
+                one.rows.iter().for_each(|row| write(row.iter().map(|cell| cell.text()).collect()));
+            }
+            several => {
+                write(LONG.map(str::to_owned).into());
+                several.iter().flat_map(Table::long).for_each(|value| write(value.into()));
+            }
+        }
+        let rows = writer.into_inner().expect("memory takes it all");
+        head + &String::from_utf8_lossy(&rows)
+    }
+
+    /// Returns one JSON object.
+    pub fn object(&self) -> Value {
+        let head: serde_json::Map<_, _> =
+            self.heads().map(|(name, value)| (name.into(), json!(value))).collect();
+        let tables: serde_json::Map<_, _> =
+            self.tables.iter().map(|table| (table.name.clone(), table.object())).collect();
+        json!({ "suite": self.suite, "head": head, "tables": tables })
+    }
+
+    /// Prints the tables, or one JSON object; writes the file and the charts if there is a folder for them.
+    ///
+    /// # Errors
+    /// If something cannot be written.
+    pub fn finish(&self, as_json: bool, folder: Option<&Path>) -> Result<(), Failure> {
+        if as_json {
+            print(&self.object().to_string())?;
+        } else {
+            let head: String = self.heads().map(|(name, value)| format!("{name}: {value}\n")).collect();
+            print(&(head + &self.tables.iter().map(Table::show).collect::<String>()))?;
+        }
+        folder.map_or(Ok(()), |folder| self.write(folder))
+    }
+
+    /// Writes the file and the charts into a folder, which is made if there is none.
+    ///
+    /// # Errors
+    /// If something cannot be written.
+    pub fn write(&self, folder: &Path) -> Result<(), Failure> {
+        let path = folder.join(format!("{}.csv", self.suite));
+        let written = std::fs::create_dir_all(folder).and_then(|()| std::fs::write(&path, self.csv()));
+        written.map_err(|error| format!("{}: {error}", path.display()))?;
+        self.plot(folder)
+    }
+
+    /// Writes the charts into a folder, which is made if there is none.
+    ///
+    /// # Errors
+    /// If something cannot be written.
+    pub fn plot(&self, folder: &Path) -> Result<(), Failure> {
+        std::fs::create_dir_all(folder).map_err(|error| format!("{}: {error}", folder.display()))?;
+        self.charts.iter().try_for_each(|chart| chart.write(&folder.join(format!("{}.svg", chart.name))))?;
+        Ok(())
+    }
+}
+
+/// Returns the machine, the day and the commit of a run.
+fn machine() -> Vec<(&'static str, String)> {
+    let cores = std::thread::available_parallelism().map_or(1, usize::from);
+    vec![
+        ("machine", cpu_model().unwrap_or_else(|| std::env::consts::ARCH.to_owned())),
+        ("cores", cores.to_string()),
+        ("threads", rayon::current_num_threads().to_string()),
+        ("simd", simd_found().join(" ")),
+        ("day", time::OffsetDateTime::now_utc().date().to_string()),
+        ("commit", commit().unwrap_or_else(|| "unknown".into())),
+    ]
+}
+
+/// Returns the processor's name as Linux gives it.
+fn cpu_model() -> Option<String> {
+    let text = std::fs::read_to_string("/proc/cpuinfo").ok()?;
+    let line = text.lines().find(|line| line.starts_with("model name"))?;
+    Some(line.split_once(':')?.1.trim().to_owned())
+}
+
+/// Returns the commit of the sources, where they still are.
+fn commit() -> Option<String> {
+    let args = ["-C", env!("CARGO_MANIFEST_DIR"), "describe", "--always", "--dirty", "--exclude", "*"];
+    let output = std::process::Command::new("git").args(args).output().ok()?;
+    let name = String::from_utf8(output.stdout).ok()?.trim().to_owned();
+    (output.status.success() && !name.is_empty()).then_some(name)
+}
+
+/// Returns the SIMD extensions of this processor.
+#[cfg(target_arch = "x86_64")]
+pub fn simd_found() -> Vec<&'static str> {
+    let found = [
+        ("sse4.2", is_x86_feature_detected!("sse4.2")),
+        ("avx2", is_x86_feature_detected!("avx2")),
+        ("fma", is_x86_feature_detected!("fma")),
+        ("avx512f", is_x86_feature_detected!("avx512f")),
+    ];
+    found.into_iter().filter(|(_, has)| *has).map(|(name, _)| name).collect()
+}
+
+/// Returns the architecture, which implies its extensions.
+#[cfg(not(target_arch = "x86_64"))]
+pub fn simd_found() -> Vec<&'static str> {
+    vec![std::env::consts::ARCH]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::cells;
+
+    fn table(name: &str) -> Table {
+        let mut table = Table::new(name, ["case", "ms"]);
+        table.row(cells!["a, b", 0.5]);
+        table
+    }
+
+    #[test]
+    fn a_file_has_the_machine_in_its_head_and_a_row_a_case_or_a_value() {
+        let head = vec![("adapter", "some".to_owned())];
+        let one = Report { head, ..Report::new("suite", vec![table("one")]) };
+        let text = one.csv();
+        assert!(text.starts_with("# machine: ") && text.contains("\n# commit: "), "{text}");
+        assert!(text.ends_with("# adapter: some\ncase,ms\n\"a, b\",0.5\n"), "{text}");
+        let two = Report::new("suite", vec![table("one"), table("two")]).csv();
+        assert!(two.ends_with("table,row,column,value\none,\"a, b\",ms,0.5\ntwo,\"a, b\",ms,0.5\n"), "{two}");
+        assert_eq!(one.object()["tables"]["one"][0]["ms"], 0.5);
+    }
+
+    #[test]
+    fn files_are_written_where_they_are_wanted_and_an_error_names_the_file() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let inner = folder.path().join("inner");
+        Report::new("suite", vec![table("one")]).write(&inner).expect("written");
+        assert!(inner.join("suite.csv").is_file());
+        let error = Report::new("suite", vec![]).write(&inner.join("suite.csv")).expect_err("no folder");
+        assert!(error.to_string().contains("suite.csv"), "{error}");
+    }
+}

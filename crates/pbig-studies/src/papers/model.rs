@@ -1,0 +1,193 @@
+//! Random boxes as PBIG's section 6 makes them: how many pairs they have by calculation, and the boxes
+//! themselves.
+
+use pbig_core::Aabb;
+use rand::rngs::StdRng;
+use rand::{RngExt, SeedableRng};
+use rand_distr::{Distribution, Normal};
+
+/// The distribution of points along each axis.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Space {
+    /// Uniform over this length.
+    Even(f64),
+    /// Normal, with this mean and standard deviation.
+    Normal([f64; 2]),
+}
+
+/// Which point of a box is drawn from the space.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Place {
+    Centre,
+    LowerCorner,
+}
+
+/// Lengths of boxes: uniform between two.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Edges {
+    pub(super) low: f64,
+    pub(super) high: f64,
+    /// One length for all axes of a box, or one for each.
+    pub(super) cubes: bool,
+}
+
+impl Edges {
+    pub(super) const fn equal(edge: f64) -> Self {
+        Self { low: edge, high: edge, cubes: true }
+    }
+
+    pub(super) const fn boxes(low: f64, high: f64) -> Self {
+        Self { low, high, cubes: false }
+    }
+
+    pub(super) const fn cubes(low: f64, high: f64) -> Self {
+        Self { low, high, cubes: true }
+    }
+
+    pub(super) fn mean(&self) -> f64 {
+        0.5 * (self.low + self.high)
+    }
+
+    /// The mean of a function of the length: the midpoint rule, exact to 10^-5 for the cubics here.
+    fn average(&self, of: impl Fn(f64) -> f64) -> f64 {
+        const STEPS: usize = 128;
+        let step = (self.high - self.low) / STEPS as f64;
+        (0..STEPS).map(|i| of(self.low + step * (i as f64 + 0.5))).sum::<f64>() / STEPS as f64
+    }
+}
+
+/// A law by which boxes are drawn.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Model {
+    pub(super) space: Space,
+    pub(super) place: Place,
+    pub(super) edges: Edges,
+}
+
+impl Model {
+    /// Expected pairs of `n` boxes.
+    pub(super) fn pairs(&self, n: usize) -> f64 {
+        let n = n as f64;
+        0.5 * n * (n - 1.0) * self.chance().0
+    }
+
+    /// Standard deviation of the pairs: they come and go one by one, and with sizes and places of all boxes. (The
+    /// variance of a U-statistic; `n` boxes with `k` pairs add `4 k^2 / n` times the relative variance of
+    /// a box's own chance.)
+    pub(super) fn deviation(&self, n: usize) -> f64 {
+        let (pairs, relative) = (self.pairs(n), self.chance().1);
+        (pairs + 4.0 * pairs * pairs / n as f64 * relative).sqrt()
+    }
+
+    /// By how many standard deviations a count is off; positive when there are more.
+    pub(super) fn off(&self, n: usize, count: u64) -> f64 {
+        (count as f64 - self.pairs(n)) / self.deviation(n)
+    }
+
+    /// The chance that two boxes overlap, and the relative variance over one box's sizes and places of its
+    /// chance to overlap another.
+    fn chance(&self) -> (f64, f64) {
+        let alike = if self.edges.cubes { 3 } else { 1 };
+        let of_one = |e: f64| self.edges.average(|f| self.on_axis(e, f).powi(alike));
+        let (first, second) = (self.edges.average(of_one), self.edges.average(|e| of_one(e).powi(2)));
+        let axes = 3 / alike;
+        (first.powi(axes), (second / first.powi(2)).powi(axes) * self.crowding().powi(3) - 1.0)
+    }
+
+    /// Along an axis the mean square of a box's chance to meet another, by where it lies, over the square of
+    /// its mean. Normal: `2 / sqrt(3)` whatever the deviation. Even, with mean length `t` of the space: 1 but for
+    /// boxes near the border, which have fewer around them; `4 t^2 (1 - 5 t / 6)` over `4 t^2 (1 - t / 2)^2`.
+    fn crowding(&self) -> f64 {
+        match self.space {
+            Space::Even(length) => {
+                let t = (self.edges.mean() / length).min(0.5);
+                (1.0 - 5.0 * t / 6.0) / (1.0 - 0.5 * t).powi(2)
+            }
+            Space::Normal(_) => 2.0 / 3f64.sqrt(),
+        }
+    }
+
+    /// The chance that two boxes of given lengths overlap along an axis.
+    fn on_axis(&self, e: f64, f: f64) -> f64 {
+        match self.place {
+            Place::Centre => 2.0 * self.within(0.5 * (e + f)),
+            Place::LowerCorner => self.within(e) + self.within(f),
+        }
+    }
+
+    /// The chance that one point lies above another by at most `distance`.
+    fn within(&self, distance: f64) -> f64 {
+        match self.space {
+            Space::Even(length) => {
+                let share = (distance / length).min(1.0);
+                share - 0.5 * share * share
+            }
+            Space::Normal([_, deviation]) => 0.5 * erf(distance / (2.0 * deviation)),
+        }
+    }
+
+    /// `n` boxes, the same ones for the same seed.
+    pub(super) fn boxes(&self, n: usize, seed: u64) -> Vec<Aabb> {
+        let mut rng = StdRng::seed_from_u64(seed);
+        (0..n).map(|_| self.one(&mut rng)).collect()
+    }
+
+    fn one(&self, rng: &mut StdRng) -> Aabb {
+        let Edges { low, high, cubes } = self.edges;
+        let mut edge = || low + (high - low) * rng.random_range(0.0..1.0);
+        let first = edge();
+        let edges = if cubes { [first; 3] } else { [first, edge(), edge()] };
+        let min = edges.map(|edge| {
+            let point = self.point(rng);
+            if self.place == Place::Centre { point - 0.5 * edge } else { point }
+        });
+        Aabb::new(min.map(|x| x as f32), std::array::from_fn(|k| (min[k] + edges[k]) as f32))
+    }
+
+    fn point(&self, rng: &mut StdRng) -> f64 {
+        match self.space {
+            Space::Even(length) => rng.random_range(0.0..length),
+            Space::Normal([mean, deviation]) => {
+                Normal::new(mean, deviation).map_or(mean, |normal| normal.sample(rng))
+            }
+        }
+    }
+}
+
+/// The error function by its Maclaurin series, for arguments up to 1.
+fn erf(x: f64) -> f64 {
+    let (mut term, mut sum) = (x, x);
+    for k in 1..20 {
+        term *= -x * x / f64::from(k);
+        sum += term / f64::from(2 * k + 1);
+    }
+    sum * std::f64::consts::FRAC_2_SQRT_PI
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use pbig_core::oracle;
+
+    const N: usize = 2000;
+
+    /// The calculation against brute force, over several seeds: within 4 standard deviations of the mean.
+    fn agrees(model: &Model) {
+        let seeds = 6;
+        let mean = (0..seeds).map(|seed| oracle::pairs(&model.boxes(N, seed)).len() as f64).sum::<f64>()
+            / seeds as f64;
+        let off = (mean - model.pairs(N)) / (model.deviation(N) / (seeds as f64).sqrt());
+        assert!(off.abs() < 4.0, "{model:?}: {mean} pairs, {} expected, {off} off", model.pairs(N));
+    }
+
+    #[test]
+    fn the_expected_pairs_are_those_of_brute_force() {
+        for place in [Place::Centre, Place::LowerCorner] {
+            for edges in [Edges::equal(900.0), Edges::boxes(0.0, 1500.0), Edges::cubes(100.0, 1500.0)] {
+                for space in [Space::Even(1e4), Space::Normal([5000.0, 2000.0])] {
+                    agrees(&Model { space, place, edges });
+                }
+            }
+        }
+    }
+}

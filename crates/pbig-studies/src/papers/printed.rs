@@ -1,0 +1,164 @@
+//! The numbers that the two papers print, each with its place. *PBIG*: Lo et al. 2013. *Avril*: Avril et al. 2012.
+//! The figures are drawings without numbers; of them only what the text says is here.
+
+/// PBIG 6.1: edge of the cubic space.
+pub(super) const SPACE: f64 = 1e4;
+/// PBIG 6.1: the length of a box in each dimension is uniform in this interval.
+pub(super) const LENGTHS: [f64; 2] = [1.0, 100.0];
+/// PBIG 6.3: mean and standard deviation of the centres.
+pub(super) const NORMAL: [f64; 2] = [5000.0, 1000.0];
+/// PBIG 6.1, 6.2, 6.4: most boxes.
+pub(super) const MOST_BOXES: usize = 10_000_000;
+/// PBIG 6.3: intersecting pairs of 10^7 boxes with normal centres, "approximately".
+pub(super) const GAUSSIAN_PAIRS: u64 = 1_120_000_000;
+/// PBIG 6.4: bytes of those pairs without compression and with, "GB".
+pub(super) const GAUSSIAN_GB: [f64; 2] = [8.968, 1.824];
+/// PBIG 6.2: uncompressed size at DoC = 10, "MB".
+pub(super) const DENSEST_PLAIN_MB: f64 = 377.76;
+/// PBIG 4.1 and 6: threads of a warp, `W` of equation 6.
+pub(super) const WARP: f64 = 32.0;
+/// PBIG 5.2 and 6: boxes of a segment and threads of a block.
+pub(super) const SEGMENT: u64 = 256;
+/// PBIG 6.1: lengths of the cells of figure 9, beside that of equation 6.
+pub(super) const CELLS: [f64; 5] = [64.0, 128.0, 256.0, 512.0, 1024.0];
+/// A row of PBIG's table III, for 10^7 boxes.
+pub(super) struct Coverage {
+    pub(super) doc: f64,
+    pub(super) pairs: u64,
+    pub(super) checks: u64,
+    /// "MB"
+    pub(super) output: f64,
+    /// Length of a cell, where section 6.2 says it.
+    pub(super) cell: Option<f64>,
+}
+
+const fn coverage(doc: f64, pairs: u64, checks: u64, output: f64, cell: Option<f64>) -> Coverage {
+    Coverage { doc, pairs, checks: checks * 1_000_000, output, cell }
+}
+
+/// PBIG, table III.
+pub(super) const TABLE_III: [Coverage; 5] = [
+    coverage(0.001, 6_234, 879, 0.024, None),
+    coverage(0.01, 50_064, 930, 0.183, None),
+    coverage(0.1, 530_689, 1062, 1.334, Some(256.0)),
+    coverage(1.0, 5_165_837, 286, 9.369, Some(128.0)),
+    coverage(10.0, 49_514_252, 744, 44.734, Some(128.0)),
+];
+
+/// PBIG, table III: the size of the input, "MB".
+pub(super) const INPUT_MB: f64 = 280.0;
+
+/// A row of PBIG's table VI, in microseconds (section 6.4 calls 1,941,184 of them 1.941 seconds).
+pub(super) struct Breakdown {
+    /// Data compression.
+    pub(super) c: bool,
+    /// Pipelined execution.
+    pub(super) p: bool,
+    /// Load balancing.
+    pub(super) b: bool,
+    pub(super) total: u64,
+    /// `DataIn`, PLAN, MAP, SCHED.
+    pub(super) before: [u64; 4],
+    /// CHECK, `DataOut`, REPORT; with pipelining one number for the three.
+    pub(super) after: &'static [u64],
+    /// PBIG, table IV.
+    pub(super) speed_up: Option<f64>,
+}
+
+/// PBIG, tables IV and VI.
+#[rustfmt::skip]
+pub(super) const TABLE_VI: [Breakdown; 8] = [
+    Breakdown { c: false, p: false, b: false, total: 10_264_940, before: [50_423, 30, 137_909, 2_644], after: &[4_970_496, 1_740_208, 3_312_812], speed_up: None },
+    Breakdown { c: true, p: false, b: false, total: 5_512_054, before: [52_686, 35, 137_713, 2_709], after: &[3_806_897, 473_857, 995_124], speed_up: Some(1.86) },
+    Breakdown { c: false, p: true, b: false, total: 5_181_014, before: [48_470, 28, 137_649, 2_753], after: &[4_983_314], speed_up: Some(1.98) },
+    Breakdown { c: true, p: true, b: false, total: 3_891_116, before: [49_243, 30, 137_845, 2_684], after: &[3_697_194], speed_up: Some(2.63) },
+    Breakdown { c: false, p: false, b: true, total: 10_167_360, before: [49_926, 31, 137_854, 2_701], after: &[5_039_146, 1_696_377, 3_191_348], speed_up: Some(1.01) },
+    Breakdown { c: true, p: false, b: true, total: 3_562_590, before: [54_857, 39, 137_996, 3_193], after: &[2_097_496, 483_593, 740_671], speed_up: Some(2.88) },
+    Breakdown { c: false, p: true, b: true, total: 5_337_236, before: [48_115, 41, 137_856, 2_837], after: &[5_139_588], speed_up: Some(1.92) },
+    Breakdown { c: true, p: true, b: true, total: 2_132_998, before: [47_760, 35, 137_840, 2_537], after: &[1_941_184], speed_up: Some(4.81) },
+];
+
+/// PBIG, table V: the tasks. Ours: `GpuReport::upload`; `StageTimes::plan` on the host; the kernels `locate` to `scan_add` and
+/// `scatter`; `schedule` and `arrange`; `check_*`; `GpuReport::wait` less the kernels; `GpuReport::decode` and emit.
+pub(super) const TASKS: [&str; 7] = ["DataIn", "PLAN", "MAP", "SCHED", "CHECK", "DataOut", "REPORT"];
+
+/// An element of Avril's table 1: row and column from 1 on with so many objects, what is printed there, and its value.
+pub(super) type Element = (fn(u64) -> (u64, u64), &'static str, fn(u64) -> u64);
+
+/// Avril, table 1.
+pub(super) const AVRIL_1: [Element; 10] = [
+    (|_| (1, 2), "0", |_| 0),
+    (|_| (1, 3), "1", |_| 1),
+    (|n| (1, n - 1), "n-3", |n| n - 3),
+    (|n| (1, n), "n-2", |n| n - 2),
+    (|_| (2, 3), "n-1", |n| n - 1),
+    (|n| (2, n - 1), "2n - 5", |n| 2 * n - 5),
+    (|n| (2, n), "2n - 4", |n| 2 * n - 4),
+    (|n| (3, n - 1), "3n - 8", |n| 3 * n - 8),
+    (|n| (3, n), "3n - 7", |n| 3 * n - 7),
+    (|n| (n - 1, n), "(n^2 - n) / 2", |n| (n * n - n) / 2),
+];
+
+/// Avril, table 2: objects, milliseconds with the square root and the "lazy way" without.
+pub(super) const AVRIL_2: [(u64, f64, f64); 3] =
+    [(1000, 0.21, 0.25), (10_000, 2.25, 4.28), (100_000, 29.66, 58.24)];
+
+/// A row of Avril's table 4.
+pub(super) struct Roots {
+    pub(super) roots: u64,
+    /// Milliseconds by Carmack's or Lomont's approximation, which it has the same for both.
+    pub(super) approximate: f64,
+    /// Milliseconds of CUDA's own.
+    pub(super) cuda: f64,
+    /// The value of the last digit of both.
+    pub(super) digit: f64,
+    /// "% of computation time reduction"
+    pub(super) gamma: f64,
+}
+
+impl Roots {
+    /// The reduction in % that the two times give; each `off` half digits from what is printed, in opposite directions.
+    pub(super) fn reduction(&self, off: f64) -> f64 {
+        let half = 0.5 * off * self.digit;
+        100.0 * (1.0 - (self.approximate - half) / (self.cuda + half))
+    }
+}
+
+const fn roots(roots: u64, approximate: f64, cuda: f64, digit: f64, gamma: f64) -> Roots {
+    Roots { roots, approximate, cuda, digit, gamma }
+}
+
+/// Avril, table 4.
+pub(super) const AVRIL_4: [Roots; 4] = [
+    roots(1_000_000, 0.042, 0.048, 0.001, 12.6),
+    roots(10_000_000, 0.409, 0.478, 0.001, 14.7),
+    roots(100_000_000, 4.102, 4.722, 0.001, 13.2),
+    roots(1_000_000_000, 41.01, 48.01, 0.01, 14.6),
+];
+
+/// Avril 3.3: the mean of that reduction, in %.
+pub(super) const AVRIL_4_MEAN: f64 = 13.7;
+
+/// Avril, table 5: objects; kernel (ms) and output (microseconds) with a byte a pair, and with a bit.
+pub(super) const AVRIL_5: [(u64, [f64; 2], [f64; 2]); 4] = [
+    (100, [0.03, 14.35], [0.03, 7.75]),
+    (1000, [2.70, 842.75], [2.72, 111.18]),
+    (5000, [73.95, 21_428.0], [74.14, 2612.42]),
+    (7500, [163.60, 45_865.94], [162.03, 5687.20]),
+];
+
+/// Avril, table 6: objects; milliseconds of the update of boxes, of the grid, of brute force, in all.
+pub(super) const AVRIL_6: [(usize, [f64; 4]); 4] = [
+    (1000, [0.03, 0.13, 0.09, 0.25]),
+    (10_000, [0.31, 1.45, 0.59, 2.35]),
+    (100_000, [3.38, 11.12, 13.41, 27.91]),
+    (1_000_000, [14.26, 134.91, 142.72, 291.89]),
+];
+
+/// Avril, table 7: objects; milliseconds without the grid and with it.
+pub(super) const AVRIL_7: [(usize, f64, f64); 3] =
+    [(100, 0.046, 1.020), (1000, 0.872, 1.840), (10_000, 31.450, 3.257)];
+
+/// Avril 3.1: boxes, index of a pair counted from 0, and the pair counted from 1.
+pub(super) const AVRIL_EXAMPLES: [(u64, u64, (u64, u64)); 2] =
+    [(1000, 71_452, (75, 303)), (1000, 46_108, (48, 285))];

@@ -1,0 +1,189 @@
+//! A world of rapier3d-f64: what a simulation is held against that runs in f32.
+
+use super::{Pose, to_f32, to_f64};
+use pbig_harness::world::World;
+use rapier3d::na::{Translation3, Vector3};
+use rapier3d::prelude as narrow;
+use rapier3d_f64::prelude::*;
+
+/// The bodies and colliders of a [`World`] in f64, with rapier's own broad phase.
+pub struct WideWorld {
+    bodies: RigidBodySet,
+    colliders: ColliderSet,
+    /// All but half-spaces, in the order of the world they are from.
+    bounded: Vec<ColliderHandle>,
+    gravity: Vector<Real>,
+    params: IntegrationParameters,
+    islands: IslandManager,
+    broad_phase: BroadPhaseBvh,
+    narrow_phase: NarrowPhase,
+    impulse_joints: ImpulseJointSet,
+    multibody_joints: MultibodyJointSet,
+    ccd_solver: CCDSolver,
+    pipeline: PhysicsPipeline,
+}
+
+impl WideWorld {
+    /// Returns this world in f64 before its first step, moved by `offset`: dynamic bodies with one collider in their middle,
+    /// without joints, with rapier's settings but for density, friction and restitution.
+    ///
+    /// # Errors
+    /// If it has other shapes than balls, cuboids and half-spaces.
+    pub fn of(world: &World, offset: [f64; 3]) -> Result<Self, String> {
+        let mut wide = Self::empty(world.gravity.to_array().map(f64::from).into());
+        let by = Translation3::from(Vector3::from(offset));
+        for (_, collider) in world.colliders.iter() {
+            let body = collider.parent().and_then(|handle| world.bodies.get(handle));
+            wide.add(body, collider, &by)?;
+        }
+        Ok(wide)
+    }
+
+    fn empty(gravity: Vector<Real>) -> Self {
+        Self {
+            bodies: RigidBodySet::new(),
+            colliders: ColliderSet::new(),
+            bounded: vec![],
+            gravity,
+            params: IntegrationParameters::default(),
+            islands: IslandManager::new(),
+            broad_phase: BroadPhaseBvh::new(),
+            narrow_phase: NarrowPhase::new(),
+            impulse_joints: ImpulseJointSet::new(),
+            multibody_joints: MultibodyJointSet::new(),
+            ccd_solver: CCDSolver::new(),
+            pipeline: PhysicsPipeline::new(),
+        }
+    }
+
+    /// A collider, with a body of its own where it has one.
+    fn add(
+        &mut self,
+        body: Option<&narrow::RigidBody>,
+        collider: &narrow::Collider,
+        by: &Translation3<f64>,
+    ) -> Result<(), String> {
+        let shape = shape(collider.shape())?;
+        let is_bounded = shape.as_halfspace().is_none();
+        let builder = ColliderBuilder::new(shape)
+            .density(collider.density().into())
+            .friction(collider.friction().into())
+            .restitution(collider.restitution().into());
+        let handle = match body {
+            Some(one) => {
+                let body = self.bodies.insert(dynamic(one).position(by * to_f64(one.position())));
+                self.colliders.insert_with_parent(builder, body, &mut self.bodies)
+            }
+            None => self.colliders.insert(builder.position(by * to_f64(collider.position()))),
+        };
+        self.bounded.extend(is_bounded.then_some(handle));
+        Ok(())
+    }
+
+    /// One step of rapier's physics pipeline.
+    pub fn step(&mut self) {
+        self.pipeline.step(
+            &self.gravity,
+            &self.params,
+            &mut self.islands,
+            &mut self.broad_phase,
+            &mut self.narrow_phase,
+            &mut self.bodies,
+            &mut self.colliders,
+            &mut self.impulse_joints,
+            &mut self.multibody_joints,
+            &mut self.ccd_solver,
+            &(),
+            &(),
+        );
+    }
+
+    /// Returns the poses of all colliders except half-spaces, in the order of [`super::Layout::of_world`].
+    pub fn poses(&self) -> Vec<Pose> {
+        self.bounded.iter().map(|&handle| *self.colliders[handle].position()).collect()
+    }
+}
+
+/// A moving body, nowhere yet.
+fn dynamic(body: &narrow::RigidBody) -> RigidBodyBuilder {
+    let [linear, angular] = [body.linvel(), body.angvel()].map(|velocity| velocity.cast());
+    RigidBodyBuilder::dynamic().linvel(linear).angvel(angular)
+}
+
+fn shape(shape: &dyn narrow::Shape) -> Result<SharedShape, String> {
+    Ok(match shape.as_typed_shape() {
+        narrow::TypedShape::Ball(ball) => SharedShape::ball(ball.radius.into()),
+        narrow::TypedShape::Cuboid(cuboid) => {
+            let half = cuboid.half_extents.cast::<f64>();
+            SharedShape::cuboid(half.x, half.y, half.z)
+        }
+        narrow::TypedShape::HalfSpace(plane) => {
+            SharedShape::halfspace(UnitVector::new_normalize(plane.normal.into_inner().cast()))
+        }
+        _ => return Err(format!("a world in f64 has no {:?}", shape.shape_type())),
+    })
+}
+
+/// The world at a distance from where it is, rounded as f32 has it.
+pub fn moved(mut world: World, offset: [f64; 3]) -> World {
+    let by = Translation3::from(Vector3::from(offset));
+    let elsewhere = |pose: &narrow::Isometry<narrow::Real>| to_f32(&(by * to_f64(pose)));
+    for (_, body) in world.bodies.iter_mut() {
+        let pose = elsewhere(body.position());
+        body.set_position(pose, true);
+    }
+    for (_, collider) in world.colliders.iter_mut().filter(|(_, one)| one.parent().is_none()) {
+        let pose = elsewhere(collider.position());
+        collider.set_position(pose);
+    }
+    world
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::Layout;
+    use super::*;
+    use pbig_harness::scenes::Scene;
+    use rapier_pbig::PbigBroadPhase;
+
+    fn scene(name: &str) -> World {
+        Scene::named(name).expect("a scene").build(27, 1)
+    }
+
+    /// Returns the largest distance between colliders of the two worlds after `steps` steps.
+    fn apart(offset: f64, steps: usize) -> f64 {
+        let world = scene("column");
+        let layout = Layout::of_world(&world);
+        let mut wide = WideWorld::of(&world, [offset; 3]).expect("balls and cuboids");
+        let mut narrow = moved(world, [offset; 3]);
+        let mut broad_phase = PbigBroadPhase::new();
+        for _ in 0..steps {
+            wide.step();
+            narrow.step(&mut broad_phase);
+        }
+        let held = narrow.colliders.iter().filter(|(_, one)| one.parent().is_some());
+        let held: Vec<_> = held.map(|(_, one)| to_f64(one.position()).translation.vector).collect();
+        let poses = wide.poses();
+        assert_eq!([poses.len(), held.len()], [layout.len(); 2]);
+        let distances = poses.iter().zip(held).map(|(pose, at)| (pose.translation.vector - at).norm());
+        distances.fold(0.0, f64::max)
+    }
+
+    /// Both fall by Newton's law until the lowest touch the ground, so much alike that only rounding is between them.
+    #[test]
+    fn in_f64_the_world_goes_where_it_goes_in_f32_while_nothing_touches() {
+        let world = scene("column");
+        let start = WideWorld::of(&world, [5.0; 3]).expect("balls and cuboids").poses();
+        let held: Vec<_> = world.colliders.iter().filter(|(_, one)| one.parent().is_some()).collect();
+        for (pose, (_, one)) in start.iter().zip(held) {
+            let from = to_f64(one.position());
+            assert!((pose.translation.vector - from.translation.vector - Vector3::repeat(5.0)).norm() < 1e-9);
+        }
+        let mut wide = WideWorld::of(&world, [5.0; 3]).expect("balls and cuboids");
+        (0..10).for_each(|_| wide.step());
+        let top = start.len() - 1;
+        let fallen = start[top].translation.y - wide.poses()[top].translation.y;
+        assert!((0.1..0.2).contains(&fallen), "{fallen}: g t^2 / 2 is 0.136");
+        assert!(apart(0.0, 10) < 1e-4, "{}", apart(0.0, 10));
+    }
+}
