@@ -1,8 +1,9 @@
 //! `pbig bench gpu`: the GPU beside the CPU, kernel by kernel, and the floor below both.
 
 mod events;
+mod host;
 
-use pbig_core::{Aabb, Backend, Config, Finder, GpuFinder, GpuReport, Limits};
+use pbig_core::{Aabb, Backend, Config, Finder, GpuFinder, GpuOptions, GpuReport, Limits};
 use pbig_harness::bench::timed;
 use pbig_harness::boxes::{BoxSet, moved};
 use pbig_harness::cells;
@@ -12,20 +13,17 @@ use pbig_harness::report::Report;
 use pbig_harness::runner::{Spread, milliseconds};
 use pbig_harness::table::Table;
 
-/// Medians in ms. `gpu`: all boxes have moved since the call before; `still`: none has, so nothing is sent. The floor is the time
-/// to read all boxes and to write all pairs at the device's copy rate. All after `floor` is of the last call with all moved.
-const COLUMNS: [&str; 15] = [
+/// Medians in ms, of calls between which all boxes move. The floor is the time to read all boxes and to write all pairs at the
+/// device's copy rate. All after `floor` is of the last call.
+const COLUMNS: [&str; 12] = [
     "set",
     "boxes",
     "pairs",
     "cpu_ms",
     "gpu_ms",
-    "gpu_still_ms",
     "cpu_over_gpu",
     "floor_ms",
-    "upload_ms",
     "wait_ms",
-    "decode_ms",
     "uploaded_bytes",
     "downloaded_bytes",
     "device_bytes",
@@ -37,7 +35,7 @@ pub(super) fn run(quick: bool) -> Result<Report, Failure> {
     let rate = Bench::new().and_then(|bench| bench.copy_rate(256 << 20));
     let rate = rate.map_err(|error| Failure::Input(error.to_string()))?;
     let [searches, kernels] = searches(&gpu, rate, quick)?;
-    let tables = vec![searches, kernels, events::table(&gpu, quick)?];
+    let tables = vec![searches, kernels, host::table(&gpu, quick)?, events::table(&gpu, quick)?];
     let head = vec![
         ("adapter", gpu.adapter().to_owned()),
         ("software", gpu.is_software().to_string()),
@@ -61,12 +59,10 @@ fn searches(gpu: &GpuFinder, rate: f64, quick: bool) -> Result<[Table; 2], Failu
         (Table::new("searches", COLUMNS), Table::new("kernels", ["set", "boxes", "kernel", "kernel_ms"]));
     let bar = progress(cases.len(), "sets");
     for (set, n) in cases {
-        let ([cpu, all_moved, still], pairs, report) = measure(gpu, set, n)?;
+        let ([cpu, on_gpu], pairs, report) = measure(gpu, set, n)?;
         // Bytes that must move on the device whatever the algorithm.
         let floor = (24 * n as u64 + 8 * pairs) as f64 / rate * 1e3;
-        let [upload, wait, decode] = [report.upload, report.wait, report.decode].map(milliseconds);
-        let mut row =
-            cells![set, n, pairs, cpu, all_moved, still, cpu / all_moved, floor, upload, wait, decode];
+        let mut row = cells![set, n, pairs, cpu, on_gpu, cpu / on_gpu, floor, milliseconds(report.wait)];
         row.extend(cells![report.uploaded, report.downloaded, report.device_bytes, report.compression]);
         table.row(row);
         report
@@ -79,33 +75,47 @@ fn searches(gpu: &GpuFinder, rate: f64, quick: bool) -> Result<[Table; 2], Failu
     Ok([table, kernels])
 }
 
-/// Medians on the CPU, on the GPU with all boxes moved, and with none; the pairs, and the last report with all moved.
-type Measured = ([f64; 3], u64, GpuReport);
+/// Medians on the CPU and on the GPU, the pairs, and a report with the times of the kernels.
+type Measured = ([f64; 2], u64, GpuReport);
 
-/// Measures both backends on the same boxes, in turn. In every other round all boxes have moved, as they do in a
-/// world: the device must get them anew. In the rounds between they are the same again.
-fn measure(gpu: &GpuFinder, name: &str, n: usize) -> Result<Measured, Failure> {
+/// Returns the boxes of a set, and the same after all have moved.
+fn frames(name: &str, n: usize) -> [Vec<Aabb>; 2] {
     let start = BoxSet::named(name).expect("a set of the harness").boxes(n, 1);
-    let frames = [moved(&start, 1.0, 2), start];
+    [moved(&start, 1.0, 2), start]
+}
+
+/// Measures both backends on the same boxes, in turn.
+fn measure(gpu: &GpuFinder, name: &str, n: usize) -> Result<Measured, Failure> {
+    let frames = frames(name, n);
     let config = |backend| Config { backend, limits: Limits::UNLIMITED, ..Config::DEFAULT };
     let mut on_cpu = Finder::new(config(Backend::Cpu));
     let mut on_gpu = Finder::with_gpu(config(Backend::Gpu), gpu.clone());
-    let (mut times, mut report) = ([vec![], vec![], vec![]], GpuReport::default());
+    let mut times = [vec![], vec![]];
     for round in 0..if n > 100_000 { 4 } else { 7 } {
         let boxes = &frames[round % 2];
-        let (cpu, all_moved) = (time(&mut on_cpu, boxes)?, time(&mut on_gpu, boxes)?);
-        report = on_device(&on_gpu)?;
-        let still = time(&mut on_gpu, boxes)?;
+        let round_times = [time(&mut on_cpu, boxes)?, time(&mut on_gpu, boxes)?];
         on_device(&on_gpu)?;
         if on_cpu.pairs() != on_gpu.pairs() {
             return Err(Failure::Check(format!("{name} {n}: CPU and GPU differ")));
         }
         // The first round compiles, allocates and learns.
         if round > 0 {
-            times.iter_mut().zip([cpu, all_moved, still]).for_each(|(times, ms)| times.push(ms));
+            times.iter_mut().zip(round_times).for_each(|(times, ms)| times.push(ms));
         }
     }
-    Ok((times.map(|times| Spread::of(times).median), on_gpu.report().pairs, report))
+    let report = with_kernels(gpu, &frames)?;
+    Ok((times.map(|times| Spread::of(times).median), on_cpu.pairs().len() as u64, report))
+}
+
+/// Returns the report of a call whose kernels are timed, which takes longer.
+fn with_kernels(gpu: &GpuFinder, frames: &[Vec<Aabb>; 2]) -> Result<GpuReport, Failure> {
+    let options = GpuOptions { time_kernels: true, ..GpuOptions::DEFAULT };
+    let config = Config { backend: Backend::Gpu, limits: Limits::UNLIMITED, gpu: options, ..Config::DEFAULT };
+    let mut finder = Finder::with_gpu(config, gpu.clone());
+    for boxes in frames {
+        time(&mut finder, boxes)?;
+    }
+    on_device(&finder)
 }
 
 fn time(finder: &mut Finder, boxes: &[Aabb]) -> Result<f64, Failure> {

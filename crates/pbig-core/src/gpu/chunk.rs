@@ -65,14 +65,19 @@ impl Session {
         &mut self,
         params: &Params,
         rest: &[Chunk],
-        left: u64,
+        sink: &mut Sink,
     ) -> Result<PendingChunk, GpuError> {
+        let left = sink.left();
         for items in rest {
             let mut clock = Clock::start();
             self.write_chunk(*items, 0, left)?;
             let steps = check(items.small_items, items.large_items);
-            self.record(params, 0, &steps, None)?;
+            let (submission, _) = self.record(params, 0, &steps, None)?;
             self.recording += clock.lap();
+            // One at a time: the next one waits for this one anyway.
+            self.device.wait(submission, self.options.patience)?;
+            sink.found.report.wait += clock.lap();
+            sink.found.report.chunks += 1;
         }
         let all = Chunk { small_items: u32::MAX, large_items: u32::MAX, ..Chunk::default() };
         self.submit(params, all, 0, &sort(params), left)
@@ -261,8 +266,8 @@ impl Session {
             self.table = Some(self.fetch(Buffer::Entries.into(), 0, entries, &mut sink.found.report)?);
         }
         let (pairs, boxes) = (&mut sink.found.pairs, params.boxes);
-        let is_first = pairs.is_empty() && sink.found.report.chunks == 1;
-        sink.found.is_sorted = is_first && (is_sorted || params.flags & BITS != 0);
+        let is_all = pairs.is_empty() && (is_sorted || params.flags & BITS != 0);
+        sink.found.is_sorted = is_all;
         if params.flags & BITS != 0 {
             decode::bits(words, boxes, pairs)?;
         } else if params.flags & PACKED != 0 {

@@ -280,7 +280,7 @@ impl Session {
             let mut result = self.finish(chunk, &params, sink)?;
             if matches!(result, ChunkResult::Unsorted) {
                 let rest = cut(rest(&self.sizes.lists, &first), self.chunk_items());
-                let chunk = self.submit_rest_and_sort(&params, &rest, sink.left())?;
+                let chunk = self.submit_rest_and_sort(&params, &rest, sink)?;
                 first = chunk.items;
                 result = self.finish(chunk, &params, sink)?;
             }
