@@ -28,12 +28,7 @@ pub(super) fn run(quick: bool) -> Result<Report, Failure> {
     let at = if quick { vec![1000, 1 << 20] } else { vec![16, 128, 1000, 5000, 10_000, 100_000, 1 << 20] };
     let times = at.iter().map(|&n| Times::measure(n, quick)).collect::<Result<Vec<_>, _>>()?;
     let mut tables = vec![every_table(&every, &exact), sizes::table(&sizes), rules::counterexamples(quick)];
-    tables.extend([
-        times::table(&times),
-        paper::table_3(quick),
-        paper::table_4(quick),
-        roundings::ways(),
-    ]);
+    tables.extend([times::table(&times), paper::table_3(quick), paper::table_4(quick), roundings::ways()]);
     let (kernels, adapter) = kernels(quick)?;
     tables.extend(kernels);
     let axes = ["time, ns per pair (one thread, 5,000 boxes)", "wrong pairs, % of all n looked at"];
