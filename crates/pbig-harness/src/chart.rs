@@ -23,12 +23,12 @@ const WIDTH: u32 = 960;
 const HEIGHT: u32 = 440;
 const LEGEND: u32 = 230;
 
-/// Height of text and of titles: 14 and 18 pixels, which the drawing backend divides by this factor.
-const TEXT: f64 = 14.0 * 1.24;
-const TITLE: f64 = 18.0 * 1.24;
+/// Height of text and of titles, which the drawing backend divides by 1.24: 14.5 and 18.5 pixels.
+const TEXT: u32 = 18;
+const TITLE: u32 = 23;
 
 /// Most characters of a line of the legend.
-const LEGEND_LETTERS: usize = 28;
+const LEGEND_LETTERS: usize = 26;
 
 /// A named line of a panel.
 #[derive(Clone, Debug)]
