@@ -11,7 +11,8 @@
 fn arrange() {
     let fits = counters.entries <= params.entry_capacity && counters.slots <= params.slot_capacity
         && counters.small_items <= params.small_capacity && counters.large_items <= params.large_capacity
-        && counters.tests <= params.most_tests;
+        && (params.most_tests == 0xffffffffu
+            || (counters.tests <= params.most_tests && counters.too_many_tests == 0u));
     write_dispatch(0u, select(0u, min(counters.small_items, chunk.small_items), fits));
     write_dispatch(3u, select(0u, min(counters.large_items, chunk.large_items), fits));
 }

@@ -1,5 +1,5 @@
-// Sort, step 1: computes the number of workgroups of the kernels that sort pairs. There are none unless this chunk has all
-// pairs and they fit: then the host sorts.
+// Sort, step 1: computes the number of workgroups of the kernels that sort pairs. If items are left to check, or if the pairs
+// do not fit, there are none.
 
 @group(0) @binding(0) var<uniform> params: Params;
 @group(0) @binding(1) var<uniform> chunk: Chunk;

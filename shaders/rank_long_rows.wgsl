@@ -27,18 +27,18 @@ fn rank_long_rows(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgrou
 
 // Notes the pairs of the row in the window, and counts those before.
 fn note(row: vec2<u32>, window: u32, lane: u32) {
+    var below = 0u;
     for (var k = row.x + lane; k < row.y; k += LANES) {
         let word = grouped[2u * k + 1u];
         let second = second_of(word);
         let bit = second % WINDOW;
-        if second / WINDOW < window {
-            atomicAdd(&before, 1u);
-        }
+        below += u32(second / WINDOW < window);
         if second / WINDOW == window {
             atomicOr(&found[bit / 32u], 1u << (bit % 32u));
             atomicOr(&ended[bit / 32u], (word >> 31u) << (bit % 32u));
         }
     }
+    atomicAdd(&before, below);
 }
 
 // Writes the pairs of the window in order, and clears the bitmap for the next row.

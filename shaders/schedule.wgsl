@@ -16,6 +16,7 @@ const SLOTS = 1u;
 const SMALL_ITEMS = 2u;
 const LARGE_ITEMS = 3u;
 const TESTS = 5u;
+const TOO_MANY_TESTS = 7u;
 
 var<workgroup> slot_base: u32;
 var<workgroup> item_base: u32;
@@ -48,6 +49,14 @@ fn pairs_of(cell: Cell) -> u32 {
 fn large_tests(cell: Cell) -> u32 {
     let n = f32(cell.residents) * f32(cell.residents + 2u * cell.visitors) / f32(2u * LANES);
     return u32(min(n, 1073741824.0)) + 1u;
+}
+
+// Adds to the number of tests, by one lane.
+fn add_tests(amount: u32) {
+    let before = atomicAdd(&counters[TESTS], amount);
+    if before + amount < before {
+        atomicMax(&counters[TOO_MANY_TESTS], 1u);
+    }
 }
 
 fn is_small(cell: Cell) -> bool {
@@ -94,7 +103,7 @@ fn schedule(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) gr
         slot_base = atomicAdd(&counters[SLOTS], all_slots);
         let all_items = (all_pairs + LANES - 1u) / LANES;
         item_base = atomicAdd(&counters[SMALL_ITEMS], all_items);
-        atomicAdd(&counters[TESTS], all_items);
+        add_tests(all_items);
     }
     let base = workgroupUniformLoad(&slot_base);
     let items = workgroupUniformLoad(&item_base);
@@ -137,7 +146,7 @@ fn schedule_large(lane: u32) {
         let columns = (n + LANES - 1u) / LANES;
         if lane == 0u {
             item_base = atomicAdd(&counters[LARGE_ITEMS], items_before(rows, columns));
-            atomicAdd(&counters[TESTS], large_tests(cell));
+            add_tests(large_tests(cell));
         }
         let items = workgroupUniformLoad(&item_base);
         let start = start_of(index);

@@ -15,7 +15,7 @@ const PACKED = 2u;
 const BITS = 4u;
 // The boxes are floats; `locate` turns them into ordered integers.
 const RAW = 8u;
-// Plain pairs are sorted, if one chunk has them all.
+// Plain pairs are sorted, if they fit one buffer.
 const SORTED = 16u;
 // The checks count redundant tests and overlaps.
 const COUNTED = 32u;
@@ -166,7 +166,8 @@ struct Counters {
     tests: u32,
     // Rows of more than SHORT_ROW pairs.
     long_rows: u32,
-    unused: u32,
+    // 1 if the tests exceed 32 bits.
+    too_many_tests: u32,
 }
 
 // Counts of the checks, in two halves each, and 1 if the pairs are sorted.

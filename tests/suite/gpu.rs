@@ -227,6 +227,29 @@ fn a_call_sends_each_box_once_and_gets_each_pair_once_in_order() {
     assert!(report.downloaded <= 1000 + 8 * pairs * 5 / 4, "{} bytes for {pairs} pairs", report.downloaded);
 }
 
+/// A world of one part whose first update has more events than a buffer holds: the device cannot sort them.
+#[test]
+fn more_events_than_a_buffer_holds_are_complete() {
+    needs_gpu!();
+    let boxes = cubes(1500);
+    let options = GpuOptions { max_bytes: 1 << 20, ..GpuOptions::DEFAULT };
+    for all_pairs_up_to in [0, 2000] {
+        let config = Config { gpu: GpuOptions { all_pairs_up_to, ..options }, ..with(options) };
+        let mut broad_phase = BroadPhase::new(config).expect("a margin");
+        let ids: Vec<u32> = (0..boxes.len() as u32).collect();
+        broad_phase.set_many(&ids, |id| Some((boxes[id as usize], ProxyFilter::ALL))).expect("ids");
+        let added = broad_phase.update().expect("within the limits").added.clone();
+        assert_eq!(broad_phase.report().fallback, None);
+        assert_eq!(difference(&added, &on_cpu(&boxes)), None);
+        broad_phase
+            .set_many(&ids, |id| Some((Aabb::from_center([9.0 * id as f32; 3], [0.5; 3]), ProxyFilter::ALL)))
+            .expect("ids");
+        let removed = broad_phase.update().expect("within the limits").removed.clone();
+        assert_eq!((removed == added, broad_phase.pair_count()), (true, 0));
+        assert_eq!(broad_phase.report().fallback, None);
+    }
+}
+
 /// A plan that was made for other boxes must not keep the device busy: it is noticed before anything is tested.
 #[test]
 fn boxes_that_jump_into_one_place_or_far_apart_get_another_plan_in_the_same_call() {

@@ -71,13 +71,18 @@ fn whole_pairs(words: &[u32]) -> Result<&[Pair], DecodeError> {
 pub fn events(
     words: &[u32],
     boxes: u32,
+    is_sorted: bool,
     added: &mut Vec<Pair>,
     ended: &mut Vec<Pair>,
 ) -> Result<(), DecodeError> {
+    let mut last = None;
     for (i, &Pair { a, b: marked }) in whole_pairs(words)?.iter().enumerate() {
         let b = marked & !ENDED;
         if a >= b || b >= boxes {
             return Err(DecodeError { what: "not a < b < boxes", at: 2 * i });
+        }
+        if is_sorted && last.replace(Pair { a, b }) >= Some(Pair { a, b }) {
+            return Err(DecodeError { what: "pairs out of order", at: 2 * i });
         }
         let list = if b == marked { &mut *added } else { &mut *ended };
         list.push(Pair { a, b });

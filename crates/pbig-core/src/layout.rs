@@ -41,7 +41,7 @@ pub const PACKED: u32 = 2;
 pub const BITS: u32 = 4;
 /// Bit of [`Params::flags`]: the boxes are floats.
 pub const RAW: u32 = 8;
-/// Bit of [`Params::flags`]: plain pairs are sorted, if one chunk has them all.
+/// Bit of [`Params::flags`]: plain pairs are sorted, if they fit one buffer.
 pub const SORTED: u32 = 16;
 /// Bit of [`Params::flags`]: redundant tests and overlaps are counted.
 pub const COUNTED: u32 = 32;
@@ -94,10 +94,11 @@ shared_structs! {
     /// A work item: a segment of rows of a large cell against some segments of columns.
     #[derive(Eq, PartialOrd, Ord)]
     LargeItem { start: u32, boxes: u32, residents: u32, row: u32, column: u32, end_column: u32 }
-    /// Lengths of the lists that the map makes, even if they do not fit; valid boxes; tests in units of [`LANES`].
+    /// Lengths of the lists that the map makes, even if they do not fit; valid boxes; tests in units of [`LANES`], and 1 if
+    /// their number exceeds 32 bits.
     Counters {
         entries: u32, slots: u32, small_items: u32, large_items: u32,
-        valid: u32, tests: u32, long_rows: u32, unused: u32
+        valid: u32, tests: u32, long_rows: u32, too_many_tests: u32
     }
     /// Counts of a check, even if its output does not fit. Each has a low and a high half. A test is redundant if the
     /// entries alone decide it: another cell owns the pair, or, in a search for changes, neither box has changed. Overlaps

@@ -11,7 +11,7 @@ pub fn decode_words(data: &[u8]) {
     let boxes = if format & 4 == 0 { u32::from(*boxes) } else { u32::MAX - u32::from(*boxes) };
     let (mut pairs, mut ended): (Vec<Pair>, _) = Default::default();
     let found = match format & 3 {
-        0 if format & 8 != 0 => decode::events(output, boxes, &mut pairs, &mut ended),
+        0 if format & 8 != 0 => decode::events(output, boxes, format & 16 != 0, &mut pairs, &mut ended),
         0 => decode::plain(output, boxes, format & 16 != 0, &mut pairs),
         1 => decode::records(output, entries, boxes, &mut pairs),
         2 => decode::bits(output, boxes, &mut pairs),

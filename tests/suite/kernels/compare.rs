@@ -109,7 +109,7 @@ pub(super) fn decoded(s: &State) -> Result<Vec<Pair>, String> {
         // A pair behind a mark of plain pairs may have one of its own.
         decode::records(&unmarked(s, words), &s.entries, n, &mut pairs)
     } else {
-        decode::events(words, n, &mut pairs, &mut ended)
+        decode::events(words, n, false, &mut pairs, &mut ended)
     };
     let wrong = ended.iter().find(|pair| s.mark_of(pair) == 0).or(match s.has(PACKED | BITS) {
         true => None,

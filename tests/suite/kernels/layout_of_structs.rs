@@ -37,7 +37,7 @@ fn shared_structs() -> Vec<SharedStruct> {
         Slot { start, shape, first_pair }
         SmallItem { slot, slots, first_pair, pairs }
         LargeItem { start, boxes, residents, row, column, end_column }
-        Counters { entries, slots, small_items, large_items, valid, tests, long_rows, unused }
+        Counters { entries, slots, small_items, large_items, valid, tests, long_rows, too_many_tests }
         Totals { words, pairs, made, redundant, overlaps, sorted, unused }
     }
 }

@@ -206,6 +206,7 @@ fn arrange_dispatches_nothing_without_capacity_and_rows_of_many() {
     assert_eq!(dispatches(capacities, 5, 77)[..6], [32_768, 2, 1, 5, 1, 1]);
     assert_eq!(dispatches(capacities, u32::MAX >> 1, 77)[..6], [32_768, 2, 1, 32_768, 2, 1]);
     assert_eq!(dispatches(capacities, 5, 76)[..6], [0, 0, 1, 0, 0, 1], "too many tests");
+    assert_eq!(dispatches(capacities, 5, u32::MAX)[..6], [32_768, 2, 1, 5, 1, 1], "any number of tests");
     for list in 0..4 {
         let mut less = capacities;
         less[list] -= 1;

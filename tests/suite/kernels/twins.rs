@@ -207,20 +207,22 @@ pub(super) fn scan_sums(s: &mut State) {
 pub(super) fn schedule(s: &mut State) {
     let (mut slots, mut small, mut large) = (Vec::new(), Vec::new(), Vec::new());
     let (small_cell, columns) = (s.params.small_cell, s.params.columns);
-    let mut tests = 0;
+    let mut tests = 0u64;
     for first in (0..s.cells.len()).step_by(CELLS_PER_BLOCK as usize) {
         let block = first..(first + CELLS_PER_BLOCK as usize).min(s.cells.len());
         let cell = |i: usize| (s.counts_of(i), s.start_of(i));
         let cells = block.map(cell).filter(|(c, _)| has_work(c));
         let (few, many): (Vec<_>, Vec<_>) = cells.partition(|(c, _)| entries_of(c) <= small_cell);
         schedule_small(&few, &mut slots, &mut small);
-        tests += many.iter().map(|(cell, _)| large_tests(cell)).sum::<u32>();
+        tests += many.iter().map(|(cell, _)| u64::from(large_tests(cell))).sum::<u64>();
         large.extend(many.iter().flat_map(|(cell, start)| large_items(cell, *start, columns)));
     }
     s.counters.slots = slots.len() as u32;
     s.counters.small_items = small.len() as u32;
     s.counters.large_items = large.len() as u32;
-    s.counters.tests = tests + small.len() as u32;
+    tests += small.len() as u64;
+    s.counters.tests = tests as u32;
+    s.counters.too_many_tests = u32::from(tests > u32::MAX.into());
     (s.slots, s.small_items, s.large_items) = (slots, small, large);
 }
 
@@ -306,7 +308,7 @@ pub(super) fn arrange(s: &mut State) {
         && found.slots <= room.slot_capacity
         && found.small_items <= room.small_capacity
         && found.large_items <= room.large_capacity
-        && found.tests <= room.most_tests;
+        && (room.most_tests == u32::MAX || found.tests <= room.most_tests && found.too_many_tests == 0);
     let groups = |items: u32| if fits { [items.min(32_768), items.div_ceil(32_768)] } else { [0, 0] };
     let [x, y] = groups(found.small_items.min(s.chunk.small_items));
     let [u, v] = groups(found.large_items.min(s.chunk.large_items));

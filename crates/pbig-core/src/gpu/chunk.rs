@@ -203,7 +203,7 @@ impl Session {
         self.sizes.max_words = self.sizes.max_words.max(needed);
         self.sizes.expected_words = self.sizes.max_words;
         self.coding.pairs = found_pairs(params, &totals);
-        sink.count(params, &counters, &totals, needed);
+        sink.count(params, &totals, needed);
         self.decode(&words, params, totals.sorted != 0, sink)?;
         sink.check(0)?;
         sink.found.report.decode += clock.lap();
@@ -220,11 +220,14 @@ impl Session {
     ) -> Option<ChunkResult> {
         if params.levels > 0 {
             self.sizes.lists = *counters;
+            // First: lists that a plan for other boxes makes are not worth their memory.
+            let is_any_number_allowed = params.most_tests == u32::MAX;
+            if !is_any_number_allowed && (counters.tests > params.most_tests || counters.too_many_tests != 0)
+            {
+                return Some(ChunkResult::TooManyTests);
+            }
             if !lists_fit(params, counters) {
                 return Some(ChunkResult::MapTooLarge);
-            }
-            if counters.tests > params.most_tests {
-                return Some(ChunkResult::TooManyTests);
             }
         }
         (needed > self.storage.size(out) / 4).then_some(ChunkResult::OutputTooLarge(needed))
@@ -273,7 +276,7 @@ impl Session {
         } else if params.flags & PACKED != 0 {
             decode::records(words, self.table.as_deref().unwrap_or(&[]), boxes, pairs)?;
         } else if self.finds_changes {
-            decode::events(words, boxes, pairs, &mut sink.found.ended)?;
+            decode::events(words, boxes, is_sorted, pairs, &mut sink.found.ended)?;
         } else {
             decode::plain(words, boxes, is_sorted, pairs)?;
         }

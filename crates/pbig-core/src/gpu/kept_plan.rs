@@ -63,8 +63,10 @@ impl KeptPlan {
     pub(super) fn is_outgrown_after(&mut self, counters: &Counters) -> bool {
         let now = Work::of(counters);
         let first = *self.first.get_or_insert(now);
-        let (before, now) = (first.all * now.boxes, now.all * first.boxes);
-        now > OUTGROWN * before || before > OUTGROWN * now
+        let product = |all: u64, boxes: u64| u128::from(all) * u128::from(boxes);
+        let (before, now) = (product(first.all, now.boxes), product(now.all, first.boxes));
+        let outgrown = u128::from(OUTGROWN);
+        now > outgrown * before || before > outgrown * now
     }
 }
 

@@ -24,7 +24,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 /// Most repetitions of a map before the call goes to the CPU. Each one has the capacities that the last one asked for.
-const MAX_REPEATS: u32 = 6;
+const MAX_REPEATS: u32 = 8;
 
 /// Most words of output per changed box that are prefetched: four pairs. The output of a burst of pairs says nothing about
 /// an update with few changes.
@@ -153,6 +153,13 @@ impl Session {
         let params = self.upload(job, &mut sink.found.report)?;
         let result = self.search(job, params, sink);
         sink.found.valid = if job.needs_grid { self.sizes.lists.valid } else { job.valid() };
+        if !self.options.count_tests {
+            sink.found.checks.made += if job.needs_grid {
+                u64::from(LANES) * u64::from(self.sizes.lists.tests)
+            } else {
+                pair_count(params.boxes)
+            };
+        }
         let report = &mut sink.found.report;
         report.device_bytes = report.device_bytes.max(self.storage.bytes());
         report.record += std::mem::take(&mut self.recording);
@@ -212,6 +219,7 @@ impl Session {
         }
         if job.needs_grid {
             let kept = self.plan(job, &params, report)?;
+            check_entries(kept, params.boxes)?;
             params = kept.plan.add_to(params);
             params.most_tests = kept.most_tests(params.boxes);
         }
@@ -231,7 +239,7 @@ impl Session {
             None => {
                 let classes = self.measure(params, report)?;
                 let mut clock = Clock::start();
-                let plan = self.plan_for(&Summary::of_classes(classes, job.boxes))?;
+                let plan = self.plan_for(&Summary::of_classes(classes, job.boxes));
                 report.plan += clock.lap();
                 KeptPlan::new(plan, params.boxes)
             }
@@ -239,16 +247,9 @@ impl Session {
         Ok(self.plan.insert(plan))
     }
 
-    fn plan_for(&self, summary: &Summary) -> Result<GpuPlan, GpuError> {
+    fn plan_for(&self, summary: &Summary) -> GpuPlan {
         let max_cells = (self.storage.max_buffer_bytes / 8).min(MAX_CELLS) as u32;
-        let plan = GpuPlan::new(summary, &self.options, self.cell_factor, max_cells);
-        // A box has up to 4 x 4 x 4 entries in each level but the last. 32 bits count them.
-        let entries = u64::from(summary.valid) * (64 * (plan.levels.len() as u64 - 1) + 1);
-        let limit = u64::from(u32::MAX);
-        if entries > limit {
-            return Err(GpuError::TooLarge { what: "entries", bytes: entries, limit });
-        }
-        Ok(plan)
+        GpuPlan::new(summary, &self.options, self.cell_factor, max_cells)
     }
 
     /// Returns the flags of the coding: plain pairs where the device sorts, and for changes. These are rarely so many that
@@ -286,7 +287,7 @@ impl Session {
             }
             let done = match result {
                 ChunkResult::Done => Some(first),
-                // The last chunk has all, so it is sorted, or too large.
+                // The last submission has all pairs, so it is done, or too large.
                 ChunkResult::Unsorted => return Err(self.too_large().into()),
                 ChunkResult::MapTooLarge => None,
                 ChunkResult::TooManyTests => {
@@ -301,8 +302,9 @@ impl Session {
                 }
             };
             if let Some(done) = done.filter(|_| has_grid) {
-                let rest = rest(&self.sizes.lists, &done);
-                self.search_rest(&params, rest, sink)?;
+                // What is left is checked chunk by chunk, and sorted by the host.
+                params.flags &= !SORTED;
+                self.search_rest(&params, rest(&self.sizes.lists, &done), sink)?;
                 let (pairs, words) = (sink.pairs() - before.0, sink.words - before.1);
                 self.coding.learn(params.flags & PACKED != 0, pairs, words, self.sizes.lists.entries);
                 let lists = self.sizes.lists;
@@ -312,6 +314,10 @@ impl Session {
                 return Ok(());
             }
             if !has_grid && self.sizes.word_capacity > self.storage.max_buffer_bytes / 4 {
+                // Bits have no mark that tells ended pairs from new ones: fewer boxes at a time have fewer of both.
+                if self.finds_changes {
+                    break;
+                }
                 // One bit a pair fits the smallest buffer.
                 forced_flags = BITS;
             }
@@ -385,6 +391,13 @@ impl Session {
         let limit = self.storage.max_buffer_bytes;
         GpuError::TooLarge { what: "the output of one work item", bytes: 4 * self.sizes.word_capacity, limit }
     }
+}
+
+/// Returns an error if 32 bits might not count the entries of so many boxes: up to 4 x 4 x 4 in each level but the last.
+fn check_entries(kept: &KeptPlan, boxes: u32) -> Result<(), GpuError> {
+    let entries = u64::from(boxes) * (64 * (kept.plan.levels.len() as u64 - 1) + 1);
+    let limit = u64::from(u32::MAX);
+    if entries > limit { Err(GpuError::TooLarge { what: "entries", bytes: entries, limit }) } else { Ok(()) }
 }
 
 /// Returns the work items that are left after the first chunk.

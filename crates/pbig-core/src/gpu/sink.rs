@@ -1,8 +1,7 @@
 //! The pairs of a search on a device: those read back so far, and all of them in the end.
 
 use super::{Failure, GpuPlan};
-use crate::decode::pair_count;
-use crate::layout::{COUNTED, Counters, LANES, Params, Totals, wide};
+use crate::layout::{COUNTED, Params, Totals, wide};
 use crate::report::{Checks, GpuReport};
 use crate::{Error, Pair};
 use std::time::Duration;
@@ -61,9 +60,8 @@ impl Sink {
         }
     }
 
-    /// Adds the counts of a chunk with so many words of output. Only a device that was told to counts tests; otherwise the
-    /// map tells about how many there are.
-    pub(super) fn count(&mut self, params: &Params, counters: &Counters, totals: &Totals, words: u64) {
+    /// Adds the counts of a chunk with so many words of output. Only a device that was told to counts tests.
+    pub(super) fn count(&mut self, params: &Params, totals: &Totals, words: u64) {
         self.words += words;
         let checks = &mut self.found.checks;
         if params.flags & COUNTED != 0 {
@@ -71,10 +69,6 @@ impl Sink {
             checks.made += made;
             checks.redundant += redundant;
             checks.unnecessary += made.saturating_sub(redundant + wide(totals.overlaps));
-        } else if params.levels == 0 {
-            checks.made = pair_count(params.boxes);
-        } else {
-            checks.made = u64::from(LANES) * u64::from(counters.tests);
         }
     }
 
