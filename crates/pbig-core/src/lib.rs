@@ -82,7 +82,7 @@ mod decode;
 #[allow(dead_code, unreachable_pub, reason = "public with `unstable-study`, where tests of kernels use all")]
 mod layout;
 #[cfg(all(feature = "gpu", not(feature = "unstable-study")))]
-#[allow(unreachable_pub, reason = "public with `unstable-study`")]
+#[allow(dead_code, unreachable_pub, reason = "public with `unstable-study`, where PBIG's grid uses all")]
 mod pbig;
 
 pub use aabb::Aabb;

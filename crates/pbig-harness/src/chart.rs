@@ -259,7 +259,7 @@ impl ValueFormatter<f64> for Axis {
     }
 }
 
-/// Milliseconds step by step, for [`write`].
+/// Milliseconds step by step, for [`write()`].
 pub struct Series<'a> {
     /// The name in the legend.
     pub name: &'a str,
