@@ -322,7 +322,10 @@ impl Player {
         let dispatcher = narrow_phase.query_dispatcher();
         let queries =
             self.broad_phase.as_query_pipeline(dispatcher, bodies, colliders, QueryFilter::default());
-        assert!(queries.intersect_aabb_conservative(aabb).any(|(found, _)| found == collider), "{collider:?}");
+        assert!(
+            queries.intersect_aabb_conservative(aabb).any(|(found, _)| found == collider),
+            "{collider:?}"
+        );
     }
 
     fn replace_by_clone(&mut self) {
