@@ -314,7 +314,7 @@ impl Player {
         let one = &self.world.colliders[collider];
         let is_enabled = one.is_enabled();
         let aabb = one.compute_broad_phase_aabb(&self.world.params, &self.world.bodies);
-        if !is_enabled || !(aabb.mins.is_finite() && aabb.maxs.is_finite()) {
+        if !(is_enabled && aabb.mins.is_finite() && aabb.maxs.is_finite()) {
             return;
         }
         self.broad_phase.set_aabb(&self.world.params, collider, aabb);
