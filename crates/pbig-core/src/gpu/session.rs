@@ -302,7 +302,7 @@ impl Session {
                 }
             };
             if let Some(done) = done.filter(|_| has_grid) {
-                // What is left is checked chunk by chunk, and sorted by the host.
+                // The host sorts the chunks that are left.
                 params.flags &= !SORTED;
                 self.search_rest(&params, rest(&self.sizes.lists, &done), sink)?;
                 let (pairs, words) = (sink.pairs() - before.0, sink.words - before.1);
