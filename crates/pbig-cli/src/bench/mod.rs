@@ -15,7 +15,7 @@ use std::path::PathBuf;
 
 #[derive(clap::Args)]
 pub(crate) struct Args {
-    /// What to measure.
+    /// The suite to run.
     #[arg(value_enum)]
     suite: Suite,
     /// Print one JSON object.
@@ -27,7 +27,7 @@ pub(crate) struct Args {
     /// Write the numbers as CSV, and the charts, into this folder.
     #[arg(long, value_name = "DIR")]
     write: Option<PathBuf>,
-    /// Of `steady`: numbers of boxes, and of bodies, instead of its own.
+    /// Numbers of boxes and of bodies for `steady`, instead of its own.
     #[arg(long, value_name = "N,N", value_parser = bodies, value_delimiter = ',', allow_negative_numbers = true)]
     boxes: Vec<usize>,
 }

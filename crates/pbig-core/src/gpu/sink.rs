@@ -12,7 +12,7 @@ pub struct GpuFound {
     /// Pairs that overlap and that the filters allow, each once; of a search for changes, those that did not at the last
     /// update.
     pub pairs: Vec<Pair>,
-    /// Of a search for changes, allowed pairs that overlapped at the last update and no longer do, each once.
+    /// Allowed pairs that overlapped at the last update and no longer do, each once. Empty in a search for all pairs.
     pub ended: Vec<Pair>,
     /// The pairs are in order.
     pub is_sorted: bool,

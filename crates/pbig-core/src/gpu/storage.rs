@@ -195,7 +195,7 @@ impl Storage {
 
     /// Writes lists into the staging buffer, from where the next submission copies them into their buffers.
     pub(super) fn stage(&mut self, uploads: &[Upload<'_>]) -> Result<(), GpuError> {
-        // Those of a call that failed before it was submitted.
+        // A call that failed before it was submitted leaves copies behind.
         self.pending_copies.clear();
         let bytes: u64 = uploads.iter().map(|upload| aligned(upload.len())).sum();
         if bytes > self.max_buffer_bytes {
