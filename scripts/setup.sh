@@ -1,7 +1,8 @@
 #!/usr/bin/env bash
 # Installs what the scripts need, and says what. Where it may not install, it prints the command to run. With CI=true that is a
 # failure.
-#   scripts/setup.sh [PART...]     parts: rust patch vulkan wasm aarch64 spirv deny msrv semver; without one: all but aarch64
+#   scripts/setup.sh [PART...]     parts: rust patch vulkan wasm aarch64 spirv deny msrv semver viewer pictures; without one:
+#                                  all but aarch64, viewer and pictures
 # Debian and Ubuntu: packages by apt, as root or by sudo without a password. Elsewhere it only says what is missing.
 set -euo pipefail
 cd "$(dirname "$0")/.."
@@ -79,6 +80,16 @@ setup_aarch64() {
     setup_target aarch64-unknown-linux-gnu
     { has aarch64-linux-gnu-gcc && has qemu-aarch64-static; } ||
         require "a linker and an emulator for aarch64" gcc-aarch64-linux-gnu libc6-dev-arm64-cross qemu-user-static || true
+}
+
+# What a window needs at run time, and what tests it without a monitor.
+setup_viewer() {
+    { has Xvfb && has xdotool; } ||
+        require "a screen without a monitor" xvfb xdotool libx11-6 libxcursor1 libxi6 libxkbcommon-x11-0 || true
+}
+
+setup_pictures() {
+    { has img2webp && has pngquant; } || require "what packs pictures" webp pngquant || true
 }
 
 setup_spirv() {

@@ -1,0 +1,7 @@
+//! The viewer as an example: `cargo run --release --example viewer`
+
+use std::process::ExitCode;
+
+fn main() -> ExitCode {
+    pbig_viewer::main()
+}

@@ -1,0 +1,70 @@
+//! The broad phases to choose from.
+
+use clap::ValueEnum;
+use rapier_pbig::Backend;
+
+/// `--backend`: a broad phase, and where it works.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+pub enum Choice {
+    /// Rapier's own broad phase.
+    Stock,
+    /// Pbig, on the backend that its policy chooses.
+    #[default]
+    Auto,
+    /// Pbig on the CPU.
+    Cpu,
+    /// Pbig on a GPU; without one the CPU does the work and the figures say so.
+    Gpu,
+    /// Pbig, which tests every pair.
+    Brute,
+}
+
+impl Choice {
+    /// Returns the name in figures.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Stock => "stock (rapier's own)",
+            Self::Auto => "pbig",
+            Self::Cpu => "pbig on the CPU",
+            Self::Gpu => "pbig on the GPU",
+            Self::Brute => "pbig, every pair tested",
+        }
+    }
+
+    /// Returns the broad phase that the key for the next one chooses: stock, pbig on the CPU and pbig on the GPU in turn.
+    pub const fn next(self) -> Self {
+        match self {
+            Self::Stock => Self::Cpu,
+            Self::Auto | Self::Cpu | Self::Brute => Self::Gpu,
+            Self::Gpu => Self::Stock,
+        }
+    }
+
+    /// Returns pbig's setting, or `None` for stock.
+    pub const fn backend(self) -> Option<Backend> {
+        match self {
+            Self::Stock => None,
+            Self::Auto => Some(Backend::Auto),
+            Self::Cpu => Some(Backend::Cpu),
+            Self::Gpu => Some(Backend::Gpu),
+            Self::Brute => Some(Backend::Brute),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_key_for_the_next_one_reaches_stock_cpu_and_gpu_from_everywhere() {
+        for &start in Choice::value_variants() {
+            let mut reached = vec![start.next()];
+            reached.push(reached[0].next());
+            reached.push(reached[1].next());
+            for wanted in [Choice::Stock, Choice::Cpu, Choice::Gpu] {
+                assert!(reached.contains(&wanted), "{wanted:?} from {start:?}");
+            }
+        }
+    }
+}

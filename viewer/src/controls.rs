@@ -1,0 +1,181 @@
+//! What each key does.
+
+use crate::choice::Choice;
+use crate::palette::Colouring;
+use crate::simulation::{Ball, Simulation};
+use kiss3d::event::Key;
+
+/// What a key asks for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Action {
+    /// Stop, or go on.
+    Pause,
+    /// Make one step, and stop.
+    Step,
+    /// Build the scene again.
+    Reset,
+    /// Build the next scene.
+    NextScene,
+    /// Go on with the next broad phase.
+    NextBroadPhase,
+    /// Go on with this broad phase.
+    Use(Choice),
+    /// Throw a ball to where the camera looks.
+    ThrowBall,
+    /// Colour the objects in the next way.
+    NextColouring,
+    /// Show or hide the cells of the grid.
+    ToggleCells,
+    /// Show or hide the list of keys.
+    ToggleHelp,
+    /// Write a picture of the window.
+    SavePicture,
+    /// End the program.
+    Quit,
+}
+
+/// A key and its action.
+pub struct Binding {
+    /// The key.
+    pub key: Key,
+    /// The key's name on the screen.
+    pub name: &'static str,
+    /// The action.
+    pub action: Action,
+    /// What the action does, in a few words.
+    pub help: &'static str,
+}
+
+const fn bind(key: Key, name: &'static str, action: Action, help: &'static str) -> Binding {
+    Binding { key, name, action, help }
+}
+
+/// Every key.
+pub const BINDINGS: [Binding; 14] = [
+    bind(Key::Space, "Space", Action::Pause, "pause or go on"),
+    bind(Key::S, "S", Action::Step, "one step, then pause"),
+    bind(Key::R, "R", Action::Reset, "build the scene again"),
+    bind(Key::N, "N", Action::NextScene, "next scene"),
+    bind(Key::B, "B", Action::NextBroadPhase, "next broad phase: stock, CPU, GPU"),
+    bind(Key::Key1, "1", Action::Use(Choice::Stock), "stock"),
+    bind(Key::Key2, "2", Action::Use(Choice::Cpu), "pbig on the CPU"),
+    bind(Key::Key3, "3", Action::Use(Choice::Gpu), "pbig on the GPU"),
+    bind(Key::T, "T", Action::ThrowBall, "throw a ball to where you look"),
+    bind(Key::C, "C", Action::NextColouring, "colour by shape, contacts, sleeping, cell"),
+    bind(Key::G, "G", Action::ToggleCells, "show the cells of pbig's grid"),
+    bind(Key::H, "H", Action::ToggleHelp, "hide these keys"),
+    bind(Key::P, "P", Action::SavePicture, "save a picture"),
+    bind(Key::Escape, "Esc", Action::Quit, "quit"),
+];
+
+/// Returns the action of a key.
+pub fn action_of(key: Key) -> Option<Action> {
+    BINDINGS.iter().find(|binding| binding.key == key).map(|binding| binding.action)
+}
+
+/// What is shown, and whether the scene runs.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Controls {
+    /// True while the scene stands still.
+    pub is_paused: bool,
+    /// How objects are coloured.
+    pub colouring: Colouring,
+    /// True if the cells of the grid are shown.
+    pub has_cells: bool,
+    /// True if the keys are listed.
+    pub has_help: bool,
+    /// True once the program is to end.
+    pub is_ending: bool,
+    /// True if the next frame is to be saved.
+    pub is_saving: bool,
+}
+
+impl Controls {
+    /// Returns the controls of a scene that runs, with its keys listed.
+    pub fn new(colouring: Colouring, has_cells: bool) -> Self {
+        let (is_paused, is_ending, is_saving) = (false, false, false);
+        Self { is_paused, colouring, has_cells, has_help: true, is_ending, is_saving }
+    }
+
+    /// Does what a key asks for. `ball` is thrown if the key asks for one.
+    pub fn obey(&mut self, action: Action, simulation: &mut Simulation, ball: Ball) {
+        match action {
+            Action::Pause => self.is_paused = !self.is_paused,
+            Action::Step => {
+                self.is_paused = true;
+                simulation.step();
+            }
+            Action::Reset => simulation.reset(),
+            Action::NextScene => simulation.next_scene(),
+            Action::NextBroadPhase => simulation.swap(simulation.engine.choice().next()),
+            Action::Use(choice) => simulation.swap(choice),
+            Action::ThrowBall => simulation.throw(ball),
+            Action::NextColouring => self.colouring = self.colouring.next(),
+            Action::ToggleCells => self.has_cells = !self.has_cells,
+            Action::ToggleHelp => self.has_help = !self.has_help,
+            Action::SavePicture => self.is_saving = true,
+            Action::Quit => self.is_ending = true,
+        }
+    }
+
+    /// Describes the state in one line, which the program prints after each key.
+    pub fn describe(&self, simulation: &Simulation) -> String {
+        let Self { is_paused, colouring, has_cells, has_help, .. } = self;
+        let scene = simulation.setting.scene.name;
+        let (backend, steps) = (simulation.engine.choice(), simulation.steps);
+        let (bodies, pairs) = (simulation.world.bodies.len(), simulation.pairs());
+        format!(
+            "scene={scene} bodies={bodies} step={steps} paused={is_paused} backend={backend:?} pairs={pairs} \
+             colouring={colouring:?} cells={has_cells} help={has_help}"
+        )
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::simulation::Setting;
+    use pbig_scenes::scenes::Scene;
+
+    const BALL: Ball = Ball { from: [0.0, 90.0, 0.0], velocity: [0.0; 3], radius: 1.0 };
+
+    fn start() -> (Controls, Simulation) {
+        let setting = Setting { scene: Scene::named("column").unwrap(), bodies: 50, seed: 1 };
+        (Controls::new(Colouring::Shape, false), Simulation::new(setting, Choice::Cpu))
+    }
+
+    #[test]
+    fn each_key_has_one_action_and_each_action_changes_the_state() {
+        for (i, binding) in BINDINGS.iter().enumerate() {
+            assert!(BINDINGS[..i].iter().all(|other| other.key != binding.key), "{}", binding.name);
+            let (mut controls, mut simulation) = start();
+            simulation.step();
+            let before = (controls, controls.describe(&simulation));
+            controls.obey(action_of(binding.key).unwrap(), &mut simulation, BALL);
+            let is_same = before == (controls, controls.describe(&simulation));
+            assert_eq!(is_same, binding.action == Action::Use(Choice::Cpu), "{}", binding.name);
+        }
+        assert_eq!(action_of(Key::F12), None);
+    }
+
+    #[test]
+    fn a_step_pauses_and_makes_one_step() {
+        let (mut controls, mut simulation) = start();
+        controls.obey(Action::Step, &mut simulation, BALL);
+        assert!(controls.is_paused && simulation.steps == 1);
+        controls.obey(Action::Step, &mut simulation, BALL);
+        controls.obey(Action::Pause, &mut simulation, BALL);
+        assert!(!controls.is_paused && simulation.steps == 2);
+    }
+
+    #[test]
+    fn every_colouring_comes_in_turn() {
+        let (mut controls, mut simulation) = start();
+        let mut seen = Vec::new();
+        while !seen.contains(&controls.colouring) {
+            seen.push(controls.colouring);
+            controls.obey(Action::NextColouring, &mut simulation, BALL);
+        }
+        assert_eq!(seen, Colouring::ALL);
+    }
+}

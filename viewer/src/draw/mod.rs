@@ -1,0 +1,85 @@
+//! Draws a simulation with kiss3d, in a window or without one.
+
+mod overlay;
+mod stage;
+
+use crate::cells::Cells;
+use crate::controls::Controls;
+use crate::framing::{FIELD_OF_VIEW, Framing};
+use crate::palette::{Colouring, Palette};
+use crate::shapes;
+use crate::sheet::Sheet;
+use crate::simulation::{Ball, Simulation};
+use kiss3d::prelude::{
+    Camera3d, CanvasSetup, CoordinateSystem2d, FixedView2d, NumSamples, OrbitCamera3d, Vec3, Window,
+};
+use overlay::Overlay;
+use stage::Stage;
+
+/// The samples of a pixel, so that edges are smooth.
+const SAMPLES: NumSamples = NumSamples::Four;
+
+/// Returns the set-up of a window and of pictures.
+pub fn canvas_setup() -> CanvasSetup {
+    CanvasSetup { samples: SAMPLES, ..CanvasSetup::default() }
+}
+
+/// A scene's meshes, light and camera, and what is written over them.
+pub struct View {
+    stage: Stage,
+    overlay: Overlay,
+    camera: OrbitCamera3d,
+    flat_camera: FixedView2d,
+    radius: f32,
+    /// The world for which the stage was built: its scene, and its number of resets.
+    scene: &'static str,
+}
+
+impl View {
+    /// Prepares to draw the world of a simulation.
+    pub fn new(window: &mut Window, simulation: &Simulation) -> Self {
+        let framing = Framing::of(&simulation.world);
+        let stage = Stage::new(window, &simulation.world, &framing);
+        let flat_camera = FixedView2d::new(CoordinateSystem2d::TopLeftDown, false);
+        let scene = simulation.setting.scene.name;
+        Self { stage, overlay: Overlay::new(), camera: camera(&framing), flat_camera, radius: framing.radius, scene }
+    }
+
+    /// Returns a ball that flies from the camera to what it looks at.
+    pub fn ball(&self) -> Ball {
+        let (eye, at) = (self.camera.eye().to_array(), self.camera.at().to_array());
+        Framing { eye, at, radius: self.radius }.ball()
+    }
+
+    /// Draws one frame. Returns false once the window is closed.
+    pub async fn render(
+        &mut self,
+        window: &mut Window,
+        simulation: &Simulation,
+        controls: &Controls,
+        sheet: &Sheet,
+    ) -> bool {
+        if self.scene != simulation.setting.scene.name {
+            *self = Self::new(window, simulation);
+        }
+        self.show(simulation, controls);
+        self.overlay.show(window, sheet);
+        let scenes = (Some(&mut self.stage.root), Some(&mut self.overlay.root));
+        window.render(scenes.0, scenes.1, Some(&mut self.camera), Some(&mut self.flat_camera), None, None).await
+    }
+
+    fn show(&mut self, simulation: &Simulation, controls: &Controls) {
+        let is_needed = controls.has_cells || controls.colouring == Colouring::Cell;
+        let cells = if is_needed { Cells::of(simulation) } else { Cells::default() };
+        let palette = Palette::new(controls.colouring, &simulation.world, &cells);
+        let mut instances = Vec::new();
+        shapes::instances(&simulation.world, &palette, &mut instances);
+        self.stage.show(&instances, if controls.has_cells { &cells.occupied } else { &[] });
+    }
+}
+
+fn camera(framing: &Framing) -> OrbitCamera3d {
+    let [eye, at] = [framing.eye, framing.at].map(Vec3::from_array);
+    let distance = eye.distance(at);
+    OrbitCamera3d::new_with_frustum(FIELD_OF_VIEW, 2e-3 * distance, 20.0 * distance, eye, at)
+}

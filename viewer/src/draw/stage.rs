@@ -1,0 +1,164 @@
+//! Meshes, ground and light of a scene.
+
+use crate::cells::Cell;
+use crate::framing::Framing;
+use crate::shapes::{self, Instance, Mesh, Surface};
+use kiss3d::prelude::{Color, Fog, InstanceData3d, Light, Mat3, SceneNode3d, Vec3, Window};
+use pbig_scenes::world::World;
+
+/// The sky, and what far ground fades into.
+const SKY: Color = Color::new(0.80, 0.86, 0.92, 1.0);
+/// The two greys of the ground.
+const GROUND: [f32; 2] = [0.66, 0.72];
+/// Tiles of the ground on each axis.
+const GROUND_TILES: i32 = 64;
+/// The edge of a tile, as a share of the radius of what is seen.
+const TILE_SHARE: f32 = 0.16;
+/// The opacity of sensors.
+const SENSOR_ALPHA: f32 = 0.3;
+/// The thickness of a cell's edges, as a share of the cell's.
+const EDGE_SHARE: f32 = 0.03;
+/// Longitudes and latitudes of a ball. Balls are small on the screen, and drawn by the ten thousand.
+const BALL_PARTS: [u32; 2] = [14, 8];
+
+/// The nodes that kiss3d draws.
+pub(super) struct Stage {
+    pub(super) root: SceneNode3d,
+    solids: [SceneNode3d; Mesh::ALL.len()],
+    sensors: [SceneNode3d; Mesh::ALL.len()],
+    edges: SceneNode3d,
+}
+
+impl Stage {
+    /// Builds what does not move, and empty sets of instances.
+    pub(super) fn new(window: &mut Window, world: &World, framing: &Framing) -> Self {
+        set_light(window, framing);
+        let mut root = SceneNode3d::empty();
+        let sun = Light::directional(Vec3::new(-0.55, -1.0, -0.25)).with_intensity(2.6);
+        root.add_light(sun);
+        let fill = Light::directional(Vec3::new(0.8, -0.3, -0.6)).with_intensity(0.7).with_casts_shadows(false);
+        root.add_light(fill);
+        if shapes::has_ground(world) {
+            add_ground(&mut root, framing);
+        }
+        shapes::surfaces(world).into_iter().for_each(|surface| add_surface(&mut root, surface));
+        let solids = Mesh::ALL.map(|mesh| add_mesh(&mut root, mesh));
+        let sensors = Mesh::ALL.map(|mesh| {
+            add_mesh(&mut root, mesh).set_color(Color::new(1.0, 1.0, 1.0, SENSOR_ALPHA)).set_casts_shadows(false)
+        });
+        let edges = add_mesh(&mut root, Mesh::Cube).set_casts_shadows(false);
+        Self { root, solids, sensors, edges }
+    }
+
+    /// Places the instances and the cells' edges of this frame.
+    pub(super) fn show(&mut self, instances: &[Instance], cells: &[Cell]) {
+        for mesh in Mesh::ALL {
+            for (nodes, is_sensor) in [(&mut self.solids, false), (&mut self.sensors, true)] {
+                let shown = instances.iter().filter(|i| i.mesh == mesh && i.is_sensor == is_sensor);
+                place(&mut nodes[mesh as usize], &shown.map(instance).collect::<Vec<_>>());
+            }
+        }
+        place(&mut self.edges, &cells.iter().flat_map(cell_edges).collect::<Vec<_>>());
+    }
+}
+
+/// Sets sky, fog and shadows to the size of what is seen.
+fn set_light(window: &mut Window, framing: &Framing) {
+    window.set_background_color(SKY);
+    window.set_ambient(0.42);
+    window.set_fog(Fog::linear(SKY, 4.0 * framing.radius, 9.0 * framing.radius));
+    window.set_shadows_enabled(true);
+    window.set_shadow_distance(6.0 * framing.radius);
+    window.set_first_cascade_far_bound(3.0 * framing.radius);
+}
+
+fn place(node: &mut SceneNode3d, instances: &[InstanceData3d]) {
+    node.set_visible(!instances.is_empty());
+    if !instances.is_empty() {
+        node.set_instances(instances);
+    }
+}
+
+fn add_mesh(root: &mut SceneNode3d, mesh: Mesh) -> SceneNode3d {
+    let [around, up] = BALL_PARTS;
+    let mut node = match mesh {
+        Mesh::Ball => root.add_sphere_with_subdiv(0.5, around, up),
+        Mesh::Cube => root.add_cube(1.0, 1.0, 1.0),
+        Mesh::Cylinder => root.add_cylinder_with_subdiv(0.5, 1.0, around),
+        Mesh::Cone => root.add_cone_with_subdiv(0.5, 1.0, around),
+    };
+    node.set_roughness(0.7).set_visible(false)
+}
+
+fn add_ground(root: &mut SceneNode3d, framing: &Framing) {
+    let (edge, half) = (TILE_SHARE * framing.radius, GROUND_TILES / 2);
+    let thick = 0.1 * edge;
+    let tile = |x: i32, z: i32| InstanceData3d {
+        position: Vec3::new(framing.at[0] + x as f32 * edge, -0.5 * thick, framing.at[2] + z as f32 * edge),
+        deformation: Mat3::from_diagonal(Vec3::new(edge, thick, edge)),
+        color: grey(GROUND[(x + z).rem_euclid(2) as usize]),
+        ..InstanceData3d::default()
+    };
+    let tiles: Vec<_> = (-half..half).flat_map(|x| (-half..half).map(move |z| tile(x, z))).collect();
+    // A plane casts no shadow that could be seen, and would enlarge the area that shadows have to cover.
+    place(&mut root.add_cube(1.0, 1.0, 1.0).set_roughness(0.9).set_casts_shadows(false), &tiles);
+}
+
+fn add_surface(root: &mut SceneNode3d, Surface { vertices, triangles }: Surface) {
+    let vertices = vertices.into_iter().map(Vec3::from_array).collect();
+    let mut node = SceneNode3d::trimesh(vertices, triangles, Vec3::ONE, true);
+    // Rapier's triangles may face down.
+    node.set_color(grey(GROUND[1])).set_roughness(0.9).enable_backface_culling(false);
+    root.add_child(node);
+}
+
+fn grey(light: f32) -> Color {
+    Color::new(light, light, light * 1.02, 1.0)
+}
+
+fn instance(instance: &Instance) -> InstanceData3d {
+    let [red, green, blue] = instance.colour;
+    let alpha = if instance.is_sensor { SENSOR_ALPHA } else { 1.0 };
+    InstanceData3d {
+        position: Vec3::from_array(instance.position),
+        deformation: Mat3::from_cols_array_2d(&instance.columns),
+        color: Color::new(red, green, blue, alpha),
+        ..InstanceData3d::default()
+    }
+}
+
+/// Returns the twelve edges of a cell, as thin boxes.
+fn cell_edges(cell: &Cell) -> Vec<InstanceData3d> {
+    let (min, max) = (Vec3::from_array(cell.min), Vec3::from_array(cell.max));
+    let (middle, size) = (0.5 * (min + max), max - min);
+    let thick = EDGE_SHARE * size.min_element();
+    let edge = |axis: usize, corner: usize| {
+        let (mut position, mut extent) = (middle, Vec3::splat(thick));
+        extent[axis] = size[axis];
+        for (bit, other) in [(axis + 1) % 3, (axis + 2) % 3].into_iter().enumerate() {
+            position[other] = if corner >> bit & 1 == 0 { min[other] } else { max[other] };
+        }
+        let color = Color::new(0.05, 0.25 + 0.5 * cell.lightness, 0.15, 1.0);
+        InstanceData3d { position, deformation: Mat3::from_diagonal(extent), color, ..InstanceData3d::default() }
+    };
+    (0..12).map(|i| edge(i / 4, i % 4)).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_cell_has_twelve_edges_from_corner_to_corner() {
+        let cell = Cell { min: [0.0; 3], max: [1.0, 2.0, 3.0], lightness: 1.0 };
+        let edges = cell_edges(&cell);
+        let length = |edge: &InstanceData3d| (edge.deformation * Vec3::ONE).max_element();
+        let mut lengths: Vec<f32> = edges.iter().map(length).collect();
+        lengths.sort_by(f32::total_cmp);
+        assert_eq!(lengths, [[1.0; 4], [2.0; 4], [3.0; 4]].concat());
+        let mut places: Vec<_> = edges.iter().map(|edge| edge.position.to_array()).collect();
+        places.sort_by(|a, b| a.partial_cmp(b).unwrap());
+        places.dedup();
+        assert_eq!(places.len(), 12);
+    }
+}

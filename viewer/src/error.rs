@@ -1,0 +1,33 @@
+//! What can go wrong, in words that say what to do.
+
+use std::fmt;
+use std::path::PathBuf;
+
+/// An error of the viewer.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Error {
+    /// There is no graphics adapter, not even a software one.
+    NoAdapter(String),
+    /// There is no display for a window.
+    NoDisplay,
+    /// A file or folder cannot be written: its path, and the reason.
+    File(PathBuf, String),
+}
+
+impl fmt::Display for Error {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::NoAdapter(why) => write!(
+                f,
+                "there is no graphics adapter: {why}\na software one will do; on Debian and Ubuntu: \
+                 apt install mesa-vulkan-drivers libvulkan1"
+            ),
+            Self::NoDisplay => f.write_str(
+                "there is no display: neither DISPLAY nor WAYLAND_DISPLAY is set; --frames DIR writes pictures without one",
+            ),
+            Self::File(path, why) => write!(f, "{}: {why}", path.display()),
+        }
+    }
+}
+
+impl std::error::Error for Error {}

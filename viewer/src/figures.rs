@@ -1,0 +1,145 @@
+//! The figures on the screen, as text.
+
+use crate::choice::Choice;
+use crate::controls::Controls;
+use crate::history::Summary;
+use crate::simulation::Simulation;
+use rapier_pbig::PbigBroadPhase;
+
+/// The number of characters after which the plan's text is broken.
+const LINE_CHARS: usize = 64;
+
+/// The figures of a simulation at one moment.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Figures {
+    /// The scene, its bodies and its steps.
+    pub scene: String,
+    /// The broad phase, and its adapter on a GPU.
+    pub broad_phase: String,
+    /// Times inside the broad phase and of whole steps.
+    pub times: Vec<String>,
+    /// Pairs and events.
+    pub counts: String,
+    /// The algorithm and the reasons, broken into lines.
+    pub plan: Vec<String>,
+    /// The legend of the colours, and what the cells show.
+    pub legend: String,
+}
+
+impl Figures {
+    /// Gathers the figures.
+    pub fn of(simulation: &Simulation, controls: &Controls) -> Self {
+        let engine = &simulation.engine;
+        let broad_phase = simulation.history.summary(|step| step.broad_phase_ms);
+        let step = simulation.history.summary(|step| step.step_ms);
+        let last = simulation.history.last().map_or([0.0; 2], |step| [step.broad_phase_ms, step.step_ms]);
+        Self {
+            scene: scene_line(simulation, controls),
+            broad_phase: broad_phase_line(engine.choice(), engine.pbig()),
+            times: vec![
+                time_line("broad phase", last[0], broad_phase),
+                time_line("whole step", last[1], step),
+            ],
+            counts: format!("{} pairs, events: {} added, {} removed", simulation.pairs(), engine.added, engine.deleted),
+            plan: wrap(&plan_text(engine.pbig()), LINE_CHARS),
+            legend: legend_line(simulation, controls),
+        }
+    }
+
+    /// Returns all lines, top to bottom.
+    pub fn lines(&self) -> Vec<&str> {
+        let head = [&self.scene, &self.broad_phase];
+        let rest = self.times.iter().chain([&self.counts]).chain(&self.plan).chain([&self.legend]);
+        head.into_iter().chain(rest).map(String::as_str).collect()
+    }
+}
+
+fn scene_line(simulation: &Simulation, controls: &Controls) -> String {
+    let (name, bodies) = (simulation.setting.scene.name, simulation.world.bodies.len());
+    let paused = if controls.is_paused { ", paused" } else { "" };
+    format!("{name}: {bodies} bodies, step {}{paused}", simulation.steps)
+}
+
+fn broad_phase_line(choice: Choice, pbig: Option<&PbigBroadPhase>) -> String {
+    let adapter = pbig.and_then(PbigBroadPhase::adapter).filter(|_| choice == Choice::Gpu);
+    adapter.map_or_else(|| choice.name().to_owned(), |adapter| format!("{}: {adapter}", choice.name()))
+}
+
+fn time_line(name: &str, last: f64, Summary { mean, p99 }: Summary) -> String {
+    format!("{name} {last:.2} ms  (mean {mean:.2}, p99 {p99:.2})")
+}
+
+/// Returns the algorithm and the reasons: the plan of the last update, and why a GPU was not used.
+fn plan_text(pbig: Option<&PbigBroadPhase>) -> String {
+    let Some(pbig) = pbig else { return "a tree of boxes, updated and searched in each step".to_owned() };
+    let report = pbig.stats().report;
+    match &report.fallback {
+        Some(why) => format!("{}; {why}", report.plan),
+        None => report.plan.to_string(),
+    }
+}
+
+fn legend_line(simulation: &Simulation, controls: &Controls) -> String {
+    let legend = controls.colouring.legend();
+    match (controls.has_cells, simulation.engine.pbig()) {
+        (false, _) => legend.to_owned(),
+        (true, None) => format!("{legend}; stock has no cells"),
+        (true, Some(_)) => format!("{legend}; cells of the last step"),
+    }
+}
+
+/// Breaks a text between words into lines of at most `chars` characters. A longer word has a line of its own.
+fn wrap(text: &str, chars: usize) -> Vec<String> {
+    let mut lines: Vec<String> = Vec::new();
+    for word in text.split_whitespace() {
+        match lines.last_mut() {
+            Some(line) if line.chars().count() + 1 + word.chars().count() <= chars => {
+                line.push(' ');
+                line.push_str(word);
+            }
+            _ => lines.push(word.to_owned()),
+        }
+    }
+    lines
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::palette::Colouring;
+    use crate::simulation::Setting;
+    use pbig_scenes::scenes::Scene;
+
+    fn figures(choice: Choice, steps: usize) -> Figures {
+        let setting = Setting { scene: Scene::named("column").unwrap(), bodies: 200, seed: 1 };
+        let mut simulation = Simulation::new(setting, choice);
+        (0..steps).for_each(|_| simulation.step());
+        Figures::of(&simulation, &Controls::new(Colouring::Shape, false))
+    }
+
+    #[test]
+    fn figures_name_scene_broad_phase_and_algorithm() {
+        let pbig = figures(Choice::Cpu, 3);
+        assert_eq!(pbig.scene, "column: 200 bodies, step 3");
+        assert_eq!(pbig.broad_phase, "pbig on the CPU");
+        assert!(pbig.plan.join(" ").starts_with("grid: 201 boxes are sorted and searched"), "{:?}", pbig.plan);
+        let stock = figures(Choice::Stock, 3);
+        assert!(stock.broad_phase.starts_with("stock") && stock.plan[0].starts_with("a tree"));
+        assert!(stock.lines().len() == stock.plan.len() + 6);
+    }
+
+    #[test]
+    fn times_are_those_of_the_steps() {
+        let lines = figures(Choice::Cpu, 5).times;
+        assert!(lines[0].starts_with("broad phase ") && !lines[0].contains("mean 0.00, p99 0.00"), "{lines:?}");
+        let none = figures(Choice::Cpu, 0).times;
+        assert_eq!(none[1], "whole step 0.00 ms  (mean 0.00, p99 0.00)");
+    }
+
+    #[test]
+    fn text_is_broken_between_words() {
+        assert_eq!(wrap("one two three", 7), ["one two", "three"]);
+        assert_eq!(wrap("extraordinary a b", 3), ["extraordinary", "a b"]);
+        assert!(wrap("", 3).is_empty());
+    }
+}

@@ -1,0 +1,92 @@
+//! What is written over the picture: panels, lines and texts in pixels, from the upper left corner.
+
+/// A colour with its opacity, each part from 0 to 1.
+pub type Rgba = [f32; 4];
+
+/// A rectangle of the screen, in pixels.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Area {
+    /// The left border.
+    pub x: f32,
+    /// The upper border.
+    pub y: f32,
+    /// The width.
+    pub width: f32,
+    /// The height.
+    pub height: f32,
+}
+
+impl Area {
+    /// Returns the area without a border of this width.
+    pub fn inner(&self, border: f32) -> Self {
+        let (width, height) = (self.width - 2.0 * border, self.height - 2.0 * border);
+        Self { x: self.x + border, y: self.y + border, width, height }
+    }
+
+    /// Returns the point at shares of the width and the height, the latter from the lower border.
+    pub fn at(&self, x: f32, y: f32) -> [f32; 2] {
+        [self.x + x * self.width, self.y + (1.0 - y) * self.height]
+    }
+}
+
+/// A filled rectangle.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Panel {
+    /// The rectangle.
+    pub area: Area,
+    /// The colour.
+    pub colour: Rgba,
+}
+
+/// A line of text.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Text {
+    /// The text.
+    pub text: String,
+    /// The upper left corner.
+    pub at: [f32; 2],
+    /// The height of the line.
+    pub size: f32,
+    /// The colour.
+    pub colour: Rgba,
+}
+
+/// A straight line.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Line {
+    /// The ends.
+    pub ends: [[f32; 2]; 2],
+    /// The width.
+    pub width: f32,
+    /// The colour.
+    pub colour: Rgba,
+}
+
+/// Everything that is written over one picture; panels lie under lines, and lines under texts.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Sheet {
+    /// Panels.
+    pub panels: Vec<Panel>,
+    /// Lines.
+    pub lines: Vec<Line>,
+    /// Texts.
+    pub texts: Vec<Text>,
+}
+
+impl Sheet {
+    /// Adds a panel.
+    pub fn panel(&mut self, area: Area, colour: Rgba) {
+        self.panels.push(Panel { area, colour });
+    }
+
+    /// Adds a text.
+    pub fn text(&mut self, text: impl Into<String>, at: [f32; 2], size: f32, colour: Rgba) {
+        self.texts.push(Text { text: text.into(), at, size, colour });
+    }
+
+    /// Adds lines from point to point.
+    pub fn path(&mut self, points: &[[f32; 2]], width: f32, colour: Rgba) {
+        let lines = points.windows(2).map(|ends| Line { ends: [ends[0], ends[1]], width, colour });
+        self.lines.extend(lines);
+    }
+}
