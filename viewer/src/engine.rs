@@ -33,7 +33,8 @@ impl Engine {
             None => Kind::Stock(Box::default()),
             Some(backend) => {
                 let config = PbigConfig { backend, ..PbigConfig::DEFAULT };
-                let broad_phase = PbigBroadPhase::with_config(config).expect("the default margin is a length");
+                let broad_phase =
+                    PbigBroadPhase::with_config(config).expect("the default margin is a length");
                 Kind::Pbig(Box::new(broad_phase))
             }
         };

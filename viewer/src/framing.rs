@@ -18,7 +18,7 @@ pub struct Framing {
 /// The vertical field of view, in radians.
 pub const FIELD_OF_VIEW: f32 = 0.7;
 /// The direction from the objects to the camera.
-const TOWARDS_CAMERA: [f32; 3] = [0.55, 0.42, 0.85];
+const TOWARDS_CAMERA: [f32; 3] = [0.55, 0.38, 0.85];
 /// A thrown ball's radius, as a share of what is seen.
 const BALL_SHARE: f32 = 0.05;
 /// A thrown ball reaches the middle of the picture in about this time, in seconds.
@@ -30,9 +30,9 @@ impl Framing {
         let around = bounds(world, true).or_else(|| bounds(world, false));
         let around = around.unwrap_or_else(|| Aabb::from_half_extents(Point::origin(), Vector::repeat(5.0)));
         let radius = around.half_extents().norm().max(2.0);
-        // Objects fall, and lie below the middle for most of the time.
-        let at = around.center() - vector![0.0, 0.25 * around.half_extents().y, 0.0];
-        let distance = 0.95 * radius / (0.5 * FIELD_OF_VIEW).sin();
+        // Objects fall, and lie low for most of the time.
+        let at = around.center() - vector![0.0, 0.4 * around.half_extents().y, 0.0];
+        let distance = radius / (0.5 * FIELD_OF_VIEW).sin();
         let eye = at + Vector::from(TOWARDS_CAMERA).normalize() * distance;
         Self { eye: eye.into(), at: at.into(), radius }
     }
@@ -48,9 +48,8 @@ impl Framing {
 
 /// Returns the box around the colliders of dynamic bodies, or around all that are not endless.
 fn bounds(world: &World, dynamic_only: bool) -> Option<Aabb> {
-    let is_dynamic = |collider: &Collider| {
-        collider.parent().is_some_and(|body| world.bodies[body].is_dynamic())
-    };
+    let is_dynamic =
+        |collider: &Collider| collider.parent().is_some_and(|body| world.bodies[body].is_dynamic());
     let wanted = world.colliders.iter().filter(|(_, collider)| !dynamic_only || is_dynamic(collider));
     let boxes = wanted.map(|(_, collider)| collider.compute_aabb());
     boxes.filter(|aabb| aabb.extents().amax() < 1e5).reduce(|a, b| a.merged(&b))

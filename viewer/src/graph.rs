@@ -89,7 +89,8 @@ mod tests {
 
     #[test]
     fn a_step_is_one_pixel_wide_and_its_time_high() {
-        let points = places(&history(&[(Choice::Cpu, 0.0), (Choice::Cpu, 1.0), (Choice::Cpu, 9.0)]), AREA, 2.0);
+        let points =
+            places(&history(&[(Choice::Cpu, 0.0), (Choice::Cpu, 1.0), (Choice::Cpu, 9.0)]), AREA, 2.0);
         assert_eq!(points, [[10.0, 120.0], [11.0, 70.0], [12.0, 20.0]]);
     }
 
@@ -102,7 +103,12 @@ mod tests {
         assert!(path.windows(2).all(|two| two[0].ends[1] == two[1].ends[0]));
         let colours: Vec<_> = path.iter().map(|line| line.colour).collect();
         assert_eq!(colours, [Choice::Stock, Choice::Cpu, Choice::Gpu].map(colour_of));
-        assert!(sheet.texts.iter().any(|text| text.text == "p99 1.50 ms" && text.colour == colour_of(Choice::Gpu)));
+        assert!(
+            sheet
+                .texts
+                .iter()
+                .any(|text| text.text == "p99 1.50 ms" && text.colour == colour_of(Choice::Gpu))
+        );
     }
 
     #[test]

@@ -101,7 +101,10 @@ mod tests {
     fn old_steps_leave_and_a_swap_starts_a_new_summary() {
         let mut history = History::default();
         (0..HISTORY_STEPS + 5).for_each(|i| history.push(step(Choice::Stock, i as f64)));
-        assert_eq!((history.steps().len(), history.steps().next().unwrap().broad_phase_ms), (HISTORY_STEPS, 5.0));
+        assert_eq!(
+            (history.steps().len(), history.steps().next().unwrap().broad_phase_ms),
+            (HISTORY_STEPS, 5.0)
+        );
         assert_eq!(history.longest_broad_phase_ms(), (HISTORY_STEPS + 4) as f64);
         history.push(step(Choice::Cpu, 1.0));
         history.push(step(Choice::Cpu, 2.0));

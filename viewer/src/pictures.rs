@@ -52,7 +52,8 @@ struct Studio {
 
 impl Studio {
     async fn new(options: &Options) -> Self {
-        let choices = if options.compare { vec![Choice::Stock, pbig(options.backend)] } else { vec![options.backend] };
+        let choices =
+            if options.compare { vec![Choice::Stock, pbig(options.backend)] } else { vec![options.backend] };
         let [width, height] = options.size;
         let mut window =
             Window::new_headless_with_setup(width / choices.len() as u32, height, canvas_setup()).await;
@@ -90,7 +91,8 @@ impl Studio {
             let figures = Figures::of(simulation, &self.controls);
             return hud::viewer(&figures, &simulation.history, &self.controls, size);
         }
-        let longest = self.sides.iter().map(|(side, _)| side.history.longest_broad_phase_ms()).fold(0.0, f64::max);
+        let longest =
+            self.sides.iter().map(|(side, _)| side.history.longest_broad_phase_ms()).fold(0.0, f64::max);
         let (bodies, steps) = (simulation.world.bodies.len(), simulation.steps);
         let title = format!("{bodies} objects, step {steps}: broad phase, ms a step");
         let (choice, history) = (simulation.engine.choice(), &simulation.history);

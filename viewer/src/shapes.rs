@@ -105,14 +105,20 @@ pub fn instances(world: &World, palette: &Palette<'_>, out: &mut Vec<Instance>) 
 }
 
 /// Calls `draw` with each mesh of a shape, its pose and its size. A shape without a mesh is drawn as the box around it.
-fn append(shape: &dyn Shape, pose: &Isometry<Real>, mut draw: impl FnMut(Mesh, Isometry<Real>, Vector<Real>)) {
+fn append(
+    shape: &dyn Shape,
+    pose: &Isometry<Real>,
+    mut draw: impl FnMut(Mesh, Isometry<Real>, Vector<Real>),
+) {
     match shape.as_typed_shape() {
         TypedShape::Ball(ball) => draw(Mesh::Ball, *pose, Vector::repeat(2.0 * ball.radius)),
         TypedShape::Cuboid(cuboid) => draw(Mesh::Cube, *pose, 2.0 * cuboid.half_extents),
         TypedShape::Cylinder(c) => {
             draw(Mesh::Cylinder, *pose, vector![2.0 * c.radius, 2.0 * c.half_height, 2.0 * c.radius]);
         }
-        TypedShape::Cone(c) => draw(Mesh::Cone, *pose, vector![2.0 * c.radius, 2.0 * c.half_height, 2.0 * c.radius]),
+        TypedShape::Cone(c) => {
+            draw(Mesh::Cone, *pose, vector![2.0 * c.radius, 2.0 * c.half_height, 2.0 * c.radius])
+        }
         TypedShape::Capsule(capsule) => append_capsule(capsule, pose, draw),
         TypedShape::HalfSpace(_) | TypedShape::HeightField(_) | TypedShape::TriMesh(_) => {}
         _ => {
@@ -122,7 +128,11 @@ fn append(shape: &dyn Shape, pose: &Isometry<Real>, mut draw: impl FnMut(Mesh, I
     }
 }
 
-fn append_capsule(capsule: &Capsule, pose: &Isometry<Real>, mut draw: impl FnMut(Mesh, Isometry<Real>, Vector<Real>)) {
+fn append_capsule(
+    capsule: &Capsule,
+    pose: &Isometry<Real>,
+    mut draw: impl FnMut(Mesh, Isometry<Real>, Vector<Real>),
+) {
     let wide = 2.0 * capsule.radius;
     for end in [capsule.segment.a, capsule.segment.b] {
         draw(Mesh::Ball, pose * Translation::from(end.coords), Vector::repeat(wide));
@@ -179,7 +189,7 @@ mod tests {
                 })));
             }
         }
-        Aabb::from_points(points.iter())
+        Aabb::from_points(points)
     }
 
     #[test]
@@ -214,7 +224,8 @@ mod tests {
         assert!(!has_ground(&world));
         world.colliders.insert(World::ground());
         let heights = DMatrix::from_element(3, 3, 0.5);
-        let field = ColliderBuilder::heightfield(heights, vector![4.0, 2.0, 4.0]).translation(vector![0.0, 1.0, 0.0]);
+        let field =
+            ColliderBuilder::heightfield(heights, vector![4.0, 2.0, 4.0]).translation(vector![0.0, 1.0, 0.0]);
         world.colliders.insert(field);
         let surfaces = surfaces(&world);
         assert!(has_ground(&world) && surfaces.len() == 1 && surfaces[0].triangles.len() == 8);

@@ -31,8 +31,15 @@ fn spawn(command: &mut Command) -> (Running, BufReader<ChildStdout>) {
 
 /// A screen without a monitor. The server chooses a free number and prints it.
 fn screen() -> (Running, String) {
-    let (server, mut output) =
-        spawn(Command::new("Xvfb").args(["-displayfd", "1", "-screen", "0", "1280x800x24", "-nolisten", "tcp"]));
+    let (server, mut output) = spawn(Command::new("Xvfb").args([
+        "-displayfd",
+        "1",
+        "-screen",
+        "0",
+        "1280x800x24",
+        "-nolisten",
+        "tcp",
+    ]));
     let mut number = String::new();
     output.read_line(&mut number).unwrap();
     (server, format!(":{}", number.trim()))
@@ -52,7 +59,8 @@ impl Viewer {
     fn start(options: &[&str]) -> Self {
         let (server, display) = screen();
         let mut command = Command::new(env!("CARGO_BIN_EXE_viewer"));
-        let (process, output) = spawn(command.args(options).env("DISPLAY", &display).env_remove("WAYLAND_DISPLAY"));
+        let (process, output) =
+            spawn(command.args(options).env("DISPLAY", &display).env_remove("WAYLAND_DISPLAY"));
         let (send, lines) = channel();
         std::thread::spawn(move || output.lines().map_while(Result::ok).try_for_each(|line| send.send(line)));
         let window = String::new();
@@ -66,14 +74,19 @@ impl Viewer {
 
     fn xdotool(&self, arguments: &[&str]) -> String {
         let output = Command::new("xdotool").args(arguments).env("DISPLAY", &self.display).output().unwrap();
-        assert!(output.status.success(), "xdotool {arguments:?}: {}", String::from_utf8_lossy(&output.stderr));
+        assert!(
+            output.status.success(),
+            "xdotool {arguments:?}: {}",
+            String::from_utf8_lossy(&output.stderr)
+        );
         String::from_utf8(output.stdout).unwrap().trim().to_owned()
     }
 
     /// Waits for a line that begins with this word, notes the state in it, and returns the rest of the line.
     fn expect(&mut self, word: &str) -> String {
         loop {
-            let line = self.lines.recv_timeout(PATIENCE).unwrap_or_else(|_| panic!("no line began with '{word}'"));
+            let line =
+                self.lines.recv_timeout(PATIENCE).unwrap_or_else(|_| panic!("no line began with '{word}'"));
             let (first, rest) = line.split_once(' ').unwrap_or((&line, ""));
             if first == word {
                 let pairs = rest.split(' ').filter_map(|part| part.split_once('='));
@@ -140,7 +153,14 @@ fn the_window_obeys_each_key() {
     let folder = out("keys");
     let pictures = folder.to_str().unwrap();
     let mut viewer = Viewer::start(&[
-        "--bodies", "600", "--backend", "stock", "--size", "1000x700", "--pictures", pictures,
+        "--bodies",
+        "600",
+        "--backend",
+        "stock",
+        "--size",
+        "1000x700",
+        "--pictures",
+        pictures,
     ]);
     viewer.press("space", "Pause");
     assert_eq!(viewer.get("paused"), "true");
@@ -233,7 +253,8 @@ fn without_display(options: &[&str]) -> std::process::Output {
 fn pictures_need_no_display() {
     let folder = out("frames");
     let path = folder.to_str().unwrap();
-    let options = ["--frames", path, "--steps", "20", "--every", "10", "--bodies", "300", "--size", "640x480"];
+    let options =
+        ["--frames", path, "--steps", "20", "--every", "10", "--bodies", "300", "--size", "640x480"];
     let output = without_display(&options);
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     let pictures = ["00000.png", "00010.png", "00020.png"].map(|name| open(&folder.join(name)));
@@ -263,5 +284,8 @@ fn a_comparison_shows_the_same_start_on_both_sides() {
 fn without_a_display_the_window_says_what_is_missing() {
     let output = without_display(&["--bodies", "10"]);
     let text = String::from_utf8(output.stderr).unwrap();
-    assert!(!output.status.success() && text.contains("there is no display") && !text.contains("panicked"), "{text}");
+    assert!(
+        !output.status.success() && text.contains("there is no display") && !text.contains("panicked"),
+        "{text}"
+    );
 }

@@ -6,12 +6,12 @@ mod stage;
 use crate::cells::Cells;
 use crate::controls::Controls;
 use crate::framing::{FIELD_OF_VIEW, Framing};
-use crate::palette::{Colouring, Palette};
+use crate::palette::{Colouring, Palette, Rgb};
 use crate::shapes;
 use crate::sheet::Sheet;
 use crate::simulation::{Ball, Simulation};
 use kiss3d::prelude::{
-    Camera3d, CanvasSetup, CoordinateSystem2d, FixedView2d, NumSamples, OrbitCamera3d, Vec3, Window,
+    Camera3d, CanvasSetup, Color, CoordinateSystem2d, FixedView2d, NumSamples, OrbitCamera3d, Vec3, Window,
 };
 use overlay::Overlay;
 use stage::Stage;
@@ -42,7 +42,14 @@ impl View {
         let stage = Stage::new(window, &simulation.world, &framing);
         let flat_camera = FixedView2d::new(CoordinateSystem2d::TopLeftDown, false);
         let scene = simulation.setting.scene.name;
-        Self { stage, overlay: Overlay::new(), camera: camera(&framing), flat_camera, radius: framing.radius, scene }
+        Self {
+            stage,
+            overlay: Overlay::new(),
+            camera: camera(&framing),
+            flat_camera,
+            radius: framing.radius,
+            scene,
+        }
     }
 
     /// Returns a ball that flies from the camera to what it looks at.
@@ -65,7 +72,9 @@ impl View {
         self.show(simulation, controls);
         self.overlay.show(window, sheet);
         let scenes = (Some(&mut self.stage.root), Some(&mut self.overlay.root));
-        window.render(scenes.0, scenes.1, Some(&mut self.camera), Some(&mut self.flat_camera), None, None).await
+        window
+            .render(scenes.0, scenes.1, Some(&mut self.camera), Some(&mut self.flat_camera), None, None)
+            .await
     }
 
     fn show(&mut self, simulation: &Simulation, controls: &Controls) {
@@ -82,4 +91,10 @@ fn camera(framing: &Framing) -> OrbitCamera3d {
     let [eye, at] = [framing.eye, framing.at].map(Vec3::from_array);
     let distance = eye.distance(at);
     OrbitCamera3d::new_with_frustum(FIELD_OF_VIEW, 2e-3 * distance, 20.0 * distance, eye, at)
+}
+
+/// Returns a colour for what kiss3d lights and encodes for the screen, which is all but texts. Our colours are already encoded.
+fn linear([red, green, blue]: Rgb, alpha: f32) -> Color {
+    let [red, green, blue] = [red, green, blue].map(|part: f32| part.powf(2.2));
+    Color::new(red, green, blue, alpha)
 }

@@ -1,5 +1,6 @@
 //! Draws a sheet over the picture.
 
+use super::linear;
 use crate::sheet::{Panel, Rgba, Sheet};
 use kiss3d::prelude::{Color, Font, SceneNode2d, Vec2, Window};
 use std::sync::Arc;
@@ -27,11 +28,12 @@ impl Overlay {
         }
         for line in &sheet.lines {
             let [from, to] = line.ends.map(Vec2::from_array);
-            window.draw_line_2d(from, to, colour(line.colour), line.width);
+            window.draw_line_2d(from, to, encoded(line.colour), line.width);
         }
         for text in &sheet.texts {
             let at = Vec2::from_array(text.at);
-            window.draw_text(&text.text, at, text.size, &self.font, colour(text.colour));
+            let [red, green, blue, alpha] = text.colour;
+            window.draw_text(&text.text, at, text.size, &self.font, Color::new(red, green, blue, alpha));
         }
     }
 }
@@ -41,9 +43,9 @@ fn show_panel(node: &mut SceneNode2d, panel: Option<&Panel>) {
     let Some(Panel { area, colour: rgba }) = panel else { return };
     node.set_local_scale(area.width, area.height);
     node.set_position(Vec2::new(area.x + 0.5 * area.width, area.y + 0.5 * area.height));
-    node.set_color(colour(*rgba));
+    node.set_color(encoded(*rgba));
 }
 
-fn colour([red, green, blue, alpha]: Rgba) -> Color {
-    Color::new(red, green, blue, alpha)
+fn encoded([red, green, blue, alpha]: Rgba) -> Color {
+    linear([red, green, blue], alpha)
 }

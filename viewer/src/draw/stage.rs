@@ -1,15 +1,17 @@
 //! Meshes, ground and light of a scene.
 
+use super::linear;
 use crate::cells::Cell;
 use crate::framing::Framing;
+use crate::palette::Rgb;
 use crate::shapes::{self, Instance, Mesh, Surface};
 use kiss3d::prelude::{Color, Fog, InstanceData3d, Light, Mat3, SceneNode3d, Vec3, Window};
 use pbig_scenes::world::World;
 
 /// The sky, and what far ground fades into.
-const SKY: Color = Color::new(0.80, 0.86, 0.92, 1.0);
+const SKY: Rgb = [0.86, 0.91, 0.96];
 /// The two greys of the ground.
-const GROUND: [f32; 2] = [0.66, 0.72];
+const GROUND: [f32; 2] = [0.74, 0.80];
 /// Tiles of the ground on each axis.
 const GROUND_TILES: i32 = 64;
 /// The edge of a tile, as a share of the radius of what is seen.
@@ -36,7 +38,8 @@ impl Stage {
         let mut root = SceneNode3d::empty();
         let sun = Light::directional(Vec3::new(-0.55, -1.0, -0.25)).with_intensity(2.6);
         root.add_light(sun);
-        let fill = Light::directional(Vec3::new(0.8, -0.3, -0.6)).with_intensity(0.7).with_casts_shadows(false);
+        let fill =
+            Light::directional(Vec3::new(0.8, -0.3, -0.6)).with_intensity(0.7).with_casts_shadows(false);
         root.add_light(fill);
         if shapes::has_ground(world) {
             add_ground(&mut root, framing);
@@ -44,7 +47,9 @@ impl Stage {
         shapes::surfaces(world).into_iter().for_each(|surface| add_surface(&mut root, surface));
         let solids = Mesh::ALL.map(|mesh| add_mesh(&mut root, mesh));
         let sensors = Mesh::ALL.map(|mesh| {
-            add_mesh(&mut root, mesh).set_color(Color::new(1.0, 1.0, 1.0, SENSOR_ALPHA)).set_casts_shadows(false)
+            add_mesh(&mut root, mesh)
+                .set_color(Color::new(1.0, 1.0, 1.0, SENSOR_ALPHA))
+                .set_casts_shadows(false)
         });
         let edges = add_mesh(&mut root, Mesh::Cube).set_casts_shadows(false);
         Self { root, solids, sensors, edges }
@@ -64,9 +69,9 @@ impl Stage {
 
 /// Sets sky, fog and shadows to the size of what is seen.
 fn set_light(window: &mut Window, framing: &Framing) {
-    window.set_background_color(SKY);
+    window.set_background_color(linear(SKY, 1.0));
     window.set_ambient(0.42);
-    window.set_fog(Fog::linear(SKY, 4.0 * framing.radius, 9.0 * framing.radius));
+    window.set_fog(Fog::linear(linear(SKY, 1.0), 4.0 * framing.radius, 9.0 * framing.radius));
     window.set_shadows_enabled(true);
     window.set_shadow_distance(6.0 * framing.radius);
     window.set_first_cascade_far_bound(3.0 * framing.radius);
@@ -113,16 +118,15 @@ fn add_surface(root: &mut SceneNode3d, Surface { vertices, triangles }: Surface)
 }
 
 fn grey(light: f32) -> Color {
-    Color::new(light, light, light * 1.02, 1.0)
+    linear([light, light, light * 1.02], 1.0)
 }
 
 fn instance(instance: &Instance) -> InstanceData3d {
-    let [red, green, blue] = instance.colour;
     let alpha = if instance.is_sensor { SENSOR_ALPHA } else { 1.0 };
     InstanceData3d {
         position: Vec3::from_array(instance.position),
         deformation: Mat3::from_cols_array_2d(&instance.columns),
-        color: Color::new(red, green, blue, alpha),
+        color: linear(instance.colour, alpha),
         ..InstanceData3d::default()
     }
 }
@@ -138,8 +142,13 @@ fn cell_edges(cell: &Cell) -> Vec<InstanceData3d> {
         for (bit, other) in [(axis + 1) % 3, (axis + 2) % 3].into_iter().enumerate() {
             position[other] = if corner >> bit & 1 == 0 { min[other] } else { max[other] };
         }
-        let color = Color::new(0.05, 0.25 + 0.5 * cell.lightness, 0.15, 1.0);
-        InstanceData3d { position, deformation: Mat3::from_diagonal(extent), color, ..InstanceData3d::default() }
+        let color = linear([0.05, 0.25 + 0.5 * cell.lightness, 0.15], 1.0);
+        InstanceData3d {
+            position,
+            deformation: Mat3::from_diagonal(extent),
+            color,
+            ..InstanceData3d::default()
+        }
     };
     (0..12).map(|i| edge(i / 4, i % 4)).collect()
 }
