@@ -9,6 +9,7 @@ use ndarray::{Array2, Array3, ShapeBuilder};
 use ndarray_npy::{ReadNpyExt, WriteNpyExt};
 use pbig_core::{Aabb, Pair, oracle};
 use pbig_harness::boxes::BoxSet;
+use pbig_harness::scenes::Scene;
 use serde_json::Value;
 use std::fs::File;
 use std::path::{Path, PathBuf};

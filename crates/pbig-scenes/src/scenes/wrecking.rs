@@ -43,7 +43,7 @@ fn bricks(b: &mut Builder, at: Vec3, n: usize) -> usize {
 
 /// Adds a heavy ball that is about to swing into the middle of a wall of this height.
 fn ball(b: &mut Builder, at: Vec3, height: f32) {
-    let lowest = (height * 0.6).max(BALL_RADIUS + 0.2);
+    let lowest = (height * 0.4).max(BALL_RADIUS + 0.2);
     let pivot = at + Vec3::Y * (lowest + ROD);
     let hook = b.world.bodies.insert(RigidBodyBuilder::fixed().translation(to_vector(pivot)));
     let turn = Quat::from_rotation_x(SWING + b.random(-0.05, 0.05));
