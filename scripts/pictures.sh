@@ -23,16 +23,16 @@ at_most() {
 }
 
 mkdir -p "$images"
-# One run makes both: pictures of every 6th step, of which one is the README's.
-still=00156
-step "$viewer" --scene column --bodies 10000 --seed 1 --compare --size 1440x720 --steps 300 --every 6 --frames "$work/falling"
+# One run makes both: pictures of every 8th step, of which one is the README's.
+still=00168
+step "$viewer" --scene column --bodies 10000 --seed 1 --compare --size 1440x720 --steps 240 --every 8 --frames "$work/falling"
 pngquant --force --speed 1 --output "$images/falling.png" 256 "$work/falling/$still.png"
 at_most 400000 "$images/falling.png"
-# 10 pictures a second, each of a tenth of a second: real time.
-img2webp -loop 0 -lossy -q 45 -m 6 -d 100 "$work"/falling/*.png -o "$images/falling.webp"
+# Each for the time of its 8 steps, in ms.
+img2webp -loop 0 -lossy -q 45 -m 4 -d 133 "$work"/falling/*.png -o "$images/falling.webp"
 at_most 3000000 "$images/falling.webp"
 
-# A swap in the middle of a run needs keys; this one shows figures, contacts and cells.
+# Figures, the graph and contacts.
 step "$viewer" --scene column --bodies 10000 --seed 1 --backend cpu --colour contacts --size 1280x800 \
     --steps 200 --every 200 --frames "$work/viewer"
 pngquant --force --speed 1 --output "$images/viewer.png" 256 "$work/viewer/00200.png"

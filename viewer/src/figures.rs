@@ -89,7 +89,7 @@ fn legend_line(simulation: &Simulation, controls: &Controls) -> String {
     match (controls.has_cells, simulation.engine.pbig()) {
         (false, _) => legend.to_owned(),
         (true, None) => format!("{legend}; stock has no cells"),
-        (true, Some(_)) => format!("{legend}; cells of the last step"),
+        (true, Some(_)) => format!("{legend}; cells shown"),
     }
 }
 

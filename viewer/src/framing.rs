@@ -31,8 +31,8 @@ impl Framing {
         let around = around.unwrap_or_else(|| Aabb::from_half_extents(Point::origin(), Vector::repeat(5.0)));
         let radius = around.half_extents().norm().max(2.0);
         // Objects fall, and lie low for most of the time.
-        let at = around.center() - vector![0.0, 0.4 * around.half_extents().y, 0.0];
-        let distance = radius / (0.5 * FIELD_OF_VIEW).sin();
+        let at = around.center() - vector![0.0, 0.5 * around.half_extents().y, 0.0];
+        let distance = 1.1 * radius / (0.5 * FIELD_OF_VIEW).sin();
         let eye = at + Vector::from(TOWARDS_CAMERA).normalize() * distance;
         Self { eye: eye.into(), at: at.into(), radius }
     }

@@ -103,7 +103,8 @@ fn add_times(sheet: &mut Sheet, side: &Side<'_>, width: f32, text: f32) {
     sheet.text(name, [0.5 * text, 0.2 * text], 1.35 * text, colour);
     let mean = format!("{:.2} ms", broad_phase.mean);
     let from_right = (mean.chars().count() as f32 * 0.55 + 0.2) * 2.1 * text;
-    sheet.text(mean, [width - from_right, 0.1 * text], 2.1 * text, colour);
+    sheet.text(mean, [width - from_right, 0.05 * text], 2.1 * text, colour);
+    sheet.text("broad phase, mean", [width - from_right, 2.2 * text], 0.75 * text, INK);
     let rest = format!("p99 {:.1} ms, whole step {:.1} ms", broad_phase.p99, step.mean);
     sheet.text(rest, [0.5 * text, 1.85 * text], text, INK);
 }

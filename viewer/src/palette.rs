@@ -50,9 +50,9 @@ impl Colouring {
     pub const fn legend(self) -> &'static str {
         match self {
             Self::Shape => "colour: shape",
-            Self::Contacts => "colour: contacts, from none (blue) to 8 or more (red)",
+            Self::Contacts => "colour: contacts, none (blue) to 8 or more (red)",
             Self::Sleeping => "colour: awake (orange), sleeping (blue)",
-            Self::Cell => "colour: cell of pbig's grid (grey: in no cell)",
+            Self::Cell => "colour: cell of pbig's grid (grey: none)",
         }
     }
 }

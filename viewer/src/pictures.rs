@@ -94,10 +94,17 @@ impl Studio {
         let longest =
             self.sides.iter().map(|(side, _)| side.history.longest_broad_phase_ms()).fold(0.0, f64::max);
         let (bodies, steps) = (simulation.world.bodies.len(), simulation.steps);
-        let title = format!("{bodies} objects, step {steps}: broad phase, ms a step");
+        let title = format!("{} objects, step {steps}: broad phase, ms a step", thousands(bodies));
         let (choice, history) = (simulation.engine.choice(), &simulation.history);
         hud::comparison(&Side { choice, history, end_ms: scale_end_ms(longest), title }, size)
     }
+}
+
+/// Returns a number with a comma before each three digits.
+fn thousands(number: usize) -> String {
+    let digits = number.to_string();
+    let groups = digits.as_bytes().rchunks(3).rev().map(String::from_utf8_lossy);
+    groups.collect::<Vec<_>>().join(",")
 }
 
 /// Returns the choice for the right side of a comparison, which is not stock.
@@ -121,6 +128,11 @@ fn beside(pictures: &[RgbImage]) -> RgbImage {
 mod tests {
     use super::*;
     use image::Rgb;
+
+    #[test]
+    fn numbers_have_a_comma_before_each_three_digits() {
+        assert_eq!([0, 999, 1000, 1234567].map(thousands), ["0", "999", "1,000", "1,234,567"]);
+    }
 
     #[test]
     fn pictures_stand_beside_each_other() {
