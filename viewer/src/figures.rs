@@ -70,7 +70,7 @@ fn broad_phase_line(choice: Choice, pbig: Option<&PbigBroadPhase>) -> String {
     adapter.map_or_else(|| choice.name().to_owned(), |adapter| format!("{}: {adapter}", choice.name()))
 }
 
-fn time_line(name: &str, last: f64, Summary { mean, p99 }: Summary) -> String {
+fn time_line(name: &str, last: f64, Summary { mean, p99, .. }: Summary) -> String {
     format!("{name} {last:.2} ms  (mean {mean:.2}, p99 {p99:.2})")
 }
 

@@ -28,6 +28,8 @@ pub struct History {
 pub struct Summary {
     /// The mean.
     pub mean: f64,
+    /// The median; of an even count, the upper of the two in the middle.
+    pub median: f64,
     /// The 99th percentile: the smallest time that at least 99% of the times do not exceed.
     pub p99: f64,
 }
@@ -40,7 +42,10 @@ impl Summary {
         let rank = (times.len() * 99).div_ceil(100);
         match times.get(rank.wrapping_sub(1)) {
             None => Self::default(),
-            Some(&p99) => Self { mean: times.iter().sum::<f64>() / times.len() as f64, p99 },
+            Some(&p99) => {
+                let mean = times.iter().sum::<f64>() / times.len() as f64;
+                Self { mean, median: times[times.len() / 2], p99 }
+            }
         }
     }
 }
@@ -92,9 +97,12 @@ mod tests {
     #[test]
     fn p99_is_the_nearest_rank() {
         assert_eq!(Summary::of([]), Summary::default());
-        assert_eq!(Summary::of([3.0]), Summary { mean: 3.0, p99: 3.0 });
-        assert_eq!(Summary::of((1..=100).map(f64::from)).p99, 99.0);
-        assert_eq!(Summary::of((1..=101).rev().map(f64::from)), Summary { mean: 51.0, p99: 100.0 });
+        assert_eq!(Summary::of([3.0]), Summary { mean: 3.0, median: 3.0, p99: 3.0 });
+        assert_eq!(Summary::of((1..=100).map(f64::from)), Summary { mean: 50.5, median: 51.0, p99: 99.0 });
+        assert_eq!(
+            Summary::of((1..=101).rev().map(f64::from)),
+            Summary { mean: 51.0, median: 51.0, p99: 100.0 }
+        );
     }
 
     #[test]
@@ -108,7 +116,7 @@ mod tests {
         assert_eq!(history.longest_broad_phase_ms(), (HISTORY_STEPS + 4) as f64);
         history.push(step(Choice::Cpu, 1.0));
         history.push(step(Choice::Cpu, 2.0));
-        assert_eq!(history.summary(|step| step.broad_phase_ms), Summary { mean: 1.5, p99: 2.0 });
+        assert_eq!(history.summary(|step| step.broad_phase_ms), Summary { mean: 1.5, median: 2.0, p99: 2.0 });
         assert_eq!(history.summary(|step| step.step_ms).mean, 15.0);
         history.clear();
         assert_eq!((history.last(), history.longest_broad_phase_ms()), (None, 0.0));

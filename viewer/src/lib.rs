@@ -29,6 +29,7 @@ pub mod simulation;
 pub mod window;
 
 use clap::Parser;
+use draw::Quality;
 use error::Error;
 use options::Options;
 use std::process::ExitCode;
@@ -46,16 +47,18 @@ pub fn main() -> ExitCode {
 }
 
 async fn run(options: &Options) -> Result<(), Error> {
-    check_adapter().await?;
+    let quality = if is_software().await? { Quality::Fast } else { Quality::Fine };
     match &options.frames {
-        None => window::run(options).await,
+        None => window::run(options, quality).await,
         Some(folder) => pictures::run(options, folder).await,
     }
 }
 
-/// The drawing library panics without a graphics adapter, so this says first what is missing.
-async fn check_adapter() -> Result<(), Error> {
+/// Returns true if the graphics adapter is software. The drawing library panics without an adapter, so this says first what is
+/// missing.
+async fn is_software() -> Result<bool, Error> {
     let instance = wgpu::Instance::new(wgpu::InstanceDescriptor::new_without_display_handle());
     let found = instance.request_adapter(&wgpu::RequestAdapterOptions::default()).await;
-    found.map(|_| ()).map_err(|error| Error::NoAdapter(error.to_string()))
+    let adapter = found.map_err(|error| Error::NoAdapter(error.to_string()))?;
+    Ok(adapter.get_info().device_type == wgpu::DeviceType::Cpu)
 }

@@ -2,7 +2,7 @@
 
 use crate::choice::Choice;
 use crate::controls::Controls;
-use crate::draw::{View, canvas_setup};
+use crate::draw::{Quality, View};
 use crate::error::Error;
 use crate::figures::Figures;
 use crate::graph::scale_end_ms;
@@ -55,11 +55,15 @@ impl Studio {
         let choices =
             if options.compare { vec![Choice::Stock, pbig(options.backend)] } else { vec![options.backend] };
         let [width, height] = options.size;
-        let mut window =
-            Window::new_headless_with_setup(width / choices.len() as u32, height, canvas_setup()).await;
+        let mut window = Window::new_headless_with_setup(
+            width / choices.len() as u32,
+            height,
+            Quality::Fine.canvas_setup(),
+        )
+        .await;
         let mut side = |choice| {
             let simulation = Simulation::new(options.setting(), choice);
-            let view = View::new(&mut window, &simulation);
+            let view = View::new(&mut window, &simulation, Quality::Fine);
             (simulation, view)
         };
         let sides = choices.into_iter().map(&mut side).collect();

@@ -1,7 +1,7 @@
 //! The viewer's window.
 
 use crate::controls::{Action, Controls, action_of};
-use crate::draw::{View, canvas_setup};
+use crate::draw::{Quality, View};
 use crate::error::Error;
 use crate::figures::Figures;
 use crate::hud;
@@ -15,13 +15,13 @@ use kiss3d::window::Window;
 ///
 /// # Errors
 /// If there is no display, or a picture cannot be written.
-pub async fn run(options: &Options) -> Result<(), Error> {
+pub async fn run(options: &Options, quality: Quality) -> Result<(), Error> {
     check_display()?;
     let [width, height] = options.size;
-    let mut window = Window::new_with_setup("pbig", width, height, canvas_setup()).await;
+    let mut window = Window::new_with_setup("pbig", width, height, quality.canvas_setup()).await;
     let mut simulation = Simulation::new(options.setting(), options.backend);
     let mut controls = Controls::new(options.colour, options.cells);
-    let mut view = View::new(&mut window, &simulation);
+    let mut view = View::new(&mut window, &simulation, quality);
     println!("ready {}", controls.describe(&simulation));
     while !controls.is_ending && draw(&mut window, &mut view, &simulation, &controls).await {
         if std::mem::take(&mut controls.is_saving) {

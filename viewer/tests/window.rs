@@ -154,18 +154,18 @@ fn the_window_obeys_each_key() {
     let pictures = folder.to_str().unwrap();
     let mut viewer = Viewer::start(&[
         "--bodies",
-        "600",
+        "300",
         "--backend",
         "stock",
         "--size",
-        "1000x700",
+        "800x600",
         "--pictures",
         pictures,
     ]);
     viewer.press("space", "Pause");
     assert_eq!(viewer.get("paused"), "true");
     let stopped = viewer.number("step");
-    for step in 1..=40 {
+    for step in 1..=15 {
         viewer.press("s", "Step");
         assert_eq!(viewer.number("step"), stopped + step, "one step for each press");
     }
@@ -225,13 +225,13 @@ fn obey_looks(viewer: &mut Viewer) {
     let bodies = viewer.number("bodies");
     viewer.press("t", "ThrowBall");
     assert_eq!(viewer.number("bodies"), bodies + 1);
-    (0..10).for_each(|_| viewer.press("s", "Step"));
+    (0..6).for_each(|_| viewer.press("s", "Step"));
     assert!(difference(&before, &viewer.picture()) > 0.005, "a ball flies");
 }
 
 fn obey_scenes(viewer: &mut Viewer) {
     viewer.press("r", "Reset");
-    assert_eq!((viewer.number("step"), viewer.number("bodies"), viewer.get("scene")), (0, 600, "column"));
+    assert_eq!((viewer.number("step"), viewer.number("bodies"), viewer.get("scene")), (0, 300, "column"));
     let before = viewer.picture();
     viewer.press("n", "NextScene");
     assert!(viewer.get("scene") != "column" && viewer.number("step") == 0);
@@ -286,6 +286,21 @@ fn without_a_display_the_window_says_what_is_missing() {
     let text = String::from_utf8(output.stderr).unwrap();
     assert!(
         !output.status.success() && text.contains("there is no display") && !text.contains("panicked"),
+        "{text}"
+    );
+}
+
+#[test]
+#[cfg(target_os = "linux")]
+#[ignore = "needs the software adapter's libraries alone: scripts/viewer.sh"]
+fn without_an_adapter_the_program_says_what_is_missing() {
+    let nothing =
+        ["VK_DRIVER_FILES", "VK_ICD_FILENAMES", "__EGL_VENDOR_LIBRARY_FILENAMES"].map(|name| (name, "/none"));
+    let mut command = Command::new(env!("CARGO_BIN_EXE_viewer"));
+    let output = command.args(["--frames", "out/none", "--bodies", "10"]).envs(nothing).output().unwrap();
+    let text = String::from_utf8(output.stderr).unwrap();
+    assert!(
+        !output.status.success() && text.contains("no graphics adapter") && !text.contains("panicked"),
         "{text}"
     );
 }

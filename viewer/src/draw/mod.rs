@@ -16,12 +16,26 @@ use kiss3d::prelude::{
 use overlay::Overlay;
 use stage::Stage;
 
-/// The samples of a pixel, so that edges are smooth.
-const SAMPLES: NumSamples = NumSamples::Four;
+/// How finely pictures are drawn.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Quality {
+    /// Smooth edges and sharp shadows.
+    Fine,
+    /// For a window on a software adapter, which draws on the CPU.
+    Fast,
+}
 
-/// Returns the set-up of a window and of pictures.
-pub fn canvas_setup() -> CanvasSetup {
-    CanvasSetup { samples: SAMPLES, ..CanvasSetup::default() }
+impl Quality {
+    /// Returns the set-up of a window or of pictures.
+    pub fn canvas_setup(self) -> CanvasSetup {
+        let samples = if self == Self::Fine { NumSamples::Four } else { NumSamples::One };
+        CanvasSetup { samples, ..CanvasSetup::default() }
+    }
+
+    /// Returns the edge of a shadow map, in pixels.
+    fn shadow_pixels(self) -> u32 {
+        if self == Self::Fine { 2048 } else { 512 }
+    }
 }
 
 /// A scene's meshes, light and camera, and what is written over them.
@@ -31,13 +45,15 @@ pub struct View {
     camera: OrbitCamera3d,
     flat_camera: FixedView2d,
     radius: f32,
+    quality: Quality,
     /// The world for which the stage was built: its scene, and its number of resets.
     scene: &'static str,
 }
 
 impl View {
     /// Prepares to draw the world of a simulation.
-    pub fn new(window: &mut Window, simulation: &Simulation) -> Self {
+    pub fn new(window: &mut Window, simulation: &Simulation, quality: Quality) -> Self {
+        window.set_shadow_resolution(quality.shadow_pixels());
         let framing = Framing::of(&simulation.world);
         let stage = Stage::new(window, &simulation.world, &framing);
         let flat_camera = FixedView2d::new(CoordinateSystem2d::TopLeftDown, false);
@@ -48,6 +64,7 @@ impl View {
             camera: camera(&framing),
             flat_camera,
             radius: framing.radius,
+            quality,
             scene,
         }
     }
@@ -67,7 +84,7 @@ impl View {
         sheet: &Sheet,
     ) -> bool {
         if self.scene != simulation.setting.scene.name {
-            *self = Self::new(window, simulation);
+            *self = Self::new(window, simulation, self.quality);
         }
         self.show(simulation, controls);
         self.overlay.show(window, sheet);
