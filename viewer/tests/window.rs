@@ -2,6 +2,8 @@
 //! will do, and those of the window also Xvfb and xdotool. `scripts/viewer.sh` installs them and runs the tests.
 //! Screenshots are left in `out/` beside this folder.
 
+#![allow(clippy::unwrap_used, reason = "helpers of tests end them, too")]
+
 use image::RgbImage;
 use std::collections::HashMap;
 use std::io::{BufRead, BufReader};
