@@ -4,7 +4,8 @@
 
 use crate::Pair;
 use crate::layout::{BOX_BITS, ENDED, LANES};
-use rayon::prelude::*;
+use crate::parallel::{self, SharedSlice};
+use std::mem::MaybeUninit;
 use std::ops::Range;
 
 /// Words that break the format.
@@ -30,20 +31,30 @@ const PIECE: usize = 1 << 15;
 pub fn plain(words: &[u32], boxes: u32, is_sorted: bool, pairs: &mut Vec<Pair>) -> Result<(), DecodeError> {
     let given = whole_pairs(words)?;
     let start = pairs.len();
-    if given.len() < 2 * PIECE {
-        pairs.extend_from_slice(given);
-    } else {
-        pairs.par_extend(given.par_iter().with_min_len(PIECE).copied());
-    }
-    // The copy is checked: the words may lie in memory of a device, which is slow to read.
-    let copied = &pairs[start..];
-    let pieces = copied.par_chunks(2 * PIECE).enumerate();
-    let faulty = pieces.find_first(|(i, piece)| {
-        let before = if *i == 0 { None } else { Some(copied[2 * PIECE * i - 1]) };
-        !are_pairs(piece, boxes)
-            || is_sorted && !(piece.is_sorted_by(|a, b| a < b) && before < Some(piece[0]))
+    let pieces: Vec<&[Pair]> = given.chunks(2 * PIECE).collect();
+    pairs.reserve(given.len());
+    let places = SharedSlice::new(&mut pairs.spare_capacity_mut()[..given.len()]);
+    let are_good = parallel::map(pieces.len(), |i| {
+        let (at, piece) = (2 * PIECE * i, pieces[i]);
+        // SAFETY: the place is inside the reserved memory, and no other piece has it.
+        let copied = copy_into(unsafe { places.part(at..at + piece.len()) }, piece);
+        let before = i.checked_sub(1).and_then(|i| pieces[i].last());
+        let is_in_order = || copied.is_sorted_by(|a, b| a < b) && before < copied.first();
+        are_pairs(copied, boxes) && (!is_sorted || is_in_order())
     });
-    faulty.map_or(Ok(()), |(i, piece)| Err(fault_of(piece, boxes, 4 * PIECE * i)))
+    // SAFETY: as many pairs were reserved, and written.
+    unsafe { pairs.set_len(start + given.len()) };
+    let faulty = are_good.iter().position(|is_good| !is_good);
+    faulty.map_or(Ok(()), |i| Err(fault_of(pieces[i], boxes, 4 * PIECE * i)))
+}
+
+/// Copies pairs, and returns the copy. This is read from then on: the words may lie in memory of a device, which is slow.
+fn copy_into<'a>(place: &'a mut [MaybeUninit<Pair>], pairs: &[Pair]) -> &'a [Pair] {
+    for (place, pair) in place.iter_mut().zip(pairs) {
+        place.write(*pair);
+    }
+    // SAFETY: a pair was written into each place: both are equally long.
+    unsafe { std::slice::from_raw_parts(place.as_ptr().cast(), place.len()) }
 }
 
 fn are_pairs(piece: &[Pair], boxes: u32) -> bool {
@@ -96,22 +107,24 @@ pub fn events(
 /// If a record is cut off, or names an entry or a box that does not exist. Then nothing useful was appended.
 pub fn records(words: &[u32], entries: &[u32], boxes: u32, pairs: &mut Vec<Pair>) -> Result<(), DecodeError> {
     let pieces = pieces(words)?;
-    let counts: Vec<usize> = pieces.par_iter().map(|piece| count(words, piece)).collect();
-    let start = pairs.len();
-    pairs.resize(start + counts.iter().sum::<usize>(), Pair::default());
-    let (mut places, mut rest) = (Vec::new(), &mut pairs[start..]);
-    for count in counts {
-        let (place, behind) = rest.split_at_mut(count);
-        places.push(place);
-        rest = behind;
-    }
-    pieces.into_par_iter().zip(places).try_for_each(|(range, place)| {
-        let mut reader = Reader { words, entries, boxes, at: range.start, places: place.iter_mut() };
-        while reader.at < range.end {
+    let mut end = pairs.len();
+    let places = parallel::map(pieces.len(), |i| count(words, &pieces[i])).into_iter().map(|count| {
+        end += count;
+        end - count..end
+    });
+    let places: Vec<Range<usize>> = places.collect();
+    pairs.resize(end, Pair::default());
+    let shared = SharedSlice::new(pairs);
+    let decoded = parallel::map(pieces.len(), |i| {
+        // SAFETY: the places are inside the list, and no other piece has these.
+        let places = unsafe { shared.part(places[i].clone()) }.iter_mut();
+        let mut reader = Reader { words, entries, boxes, at: pieces[i].start, places };
+        while reader.at < pieces[i].end {
             reader.record()?;
         }
         Ok(())
-    })
+    });
+    decoded.into_iter().collect()
 }
 
 /// Returns the number of pairs of whole records, if no row is longer than its record.

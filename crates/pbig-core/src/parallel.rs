@@ -112,6 +112,18 @@ pub(crate) fn run_with<T: Send>(own: &mut [T], pieces: usize, work: impl Fn(&mut
     });
 }
 
+/// Returns `work(piece)` for each `piece < pieces`, in order.
+#[cfg(feature = "gpu")]
+pub(crate) fn map<T: Send>(pieces: usize, work: impl Fn(usize) -> T + Sync) -> Vec<T> {
+    let mut results: Vec<Option<T>> = std::iter::repeat_with(|| None).take(pieces).collect();
+    let shared = SharedSlice::new(&mut results);
+    run(available_threads(), pieces, |_, piece| {
+        // SAFETY: `results` outlives the call, and each piece has a place of its own.
+        unsafe { shared.part(piece..piece + 1)[0] = Some(work(piece)) }
+    });
+    results.into_iter().flatten().collect()
+}
+
 /// Makes `buffer` at least `len` elements long without copying what it held: its content is scratch.
 pub(crate) fn ensure_scratch<T: Copy>(buffer: &mut Vec<T>, len: usize, fill: T) {
     if buffer.capacity() < len {

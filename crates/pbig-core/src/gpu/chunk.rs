@@ -1,12 +1,13 @@
 //! A chunk of work items: submitted to the device, awaited, and decoded.
 
 use super::GpuError;
+use super::attempts::rest;
 use super::coding::bit_words;
 use super::device::Variant;
 use super::error::Failure;
 use super::passes::{CLASSES_BYTES, Recording, Step, apply_changes, check, lists_fit, measure, sort};
 use super::readback::{self, HEADER_BYTES, Header};
-use super::session::{Session, rest};
+use super::session::Session;
 use super::sink::Sink;
 use super::storage::{BufferId, Side};
 use crate::decode;
@@ -176,14 +177,13 @@ impl Session {
         params: &Params,
         sink: &mut Sink,
     ) -> Result<ChunkResult, Failure> {
+        let (submission, patience) = (chunk.submission.clone(), self.options.patience);
         let staging = self.storage.get(BufferId::Staging(chunk.side));
         let bytes = HEADER_BYTES + chunk.prefetched;
         let mut clock = Clock::start();
-        let received =
-            readback::read(&self.device, staging, bytes, chunk.submission.clone(), self.options.patience)?;
-        let report = &mut sink.found.report;
-        report.wait += clock.lap();
-        report.downloaded += bytes;
+        let received = readback::read(&self.device, staging, bytes, submission, patience)?;
+        sink.found.report.wait += clock.lap();
+        sink.found.report.downloaded += bytes;
         let (header, prefetched) = received.split_at(HEADER_BYTES as usize);
         let header: Header = bytemuck::pod_read_unaligned(header);
         self.note_times(&chunk, &header, sink);
@@ -199,15 +199,27 @@ impl Session {
             return Ok(ChunkResult::Unsorted);
         }
         let words = self.words(bytemuck::cast_slice(prefetched), out, needed, sink)?;
-        sink.found.report.wait += clock.lap();
+        self.take_output(&words, params, &totals, sink)?;
+        Ok(ChunkResult::Done)
+    }
+
+    /// Decodes the output of a chunk, and notes how much it was.
+    fn take_output(
+        &mut self,
+        words: &[u32],
+        params: &Params,
+        totals: &Totals,
+        sink: &mut Sink,
+    ) -> Result<(), Failure> {
+        let needed = words.len() as u64;
         self.sizes.max_words = self.sizes.max_words.max(needed);
         self.sizes.expected_words = self.sizes.max_words;
-        self.coding.pairs = found_pairs(params, &totals);
-        sink.count(params, &totals, needed);
-        self.decode(&words, params, totals.sorted != 0, sink)?;
-        sink.check(0)?;
+        self.coding.pairs = found_pairs(params, totals);
+        sink.count(params, totals, needed);
+        let mut clock = Clock::start();
+        self.decode(words, params, totals.sorted != 0, sink)?;
         sink.found.report.decode += clock.lap();
-        Ok(ChunkResult::Done)
+        sink.check(0)
     }
 
     /// Returns why the map or the chunk has to be repeated, if it has.
@@ -245,8 +257,10 @@ impl Session {
         if needed <= have {
             return Ok(Cow::Borrowed(&prefetched[..needed as usize]));
         }
+        let mut clock = Clock::start();
         let mut words = prefetched.to_vec();
         words.extend(self.fetch(out, have, needed, &mut sink.found.report)?);
+        sink.found.report.wait += clock.lap();
         Ok(Cow::Owned(words))
     }
 
