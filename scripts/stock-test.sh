@@ -28,7 +28,7 @@ $2
 TOML
     cat >"$work/$1/src/main.rs" <<RUST
 //! Prints a hash of each scene's poses and of its broad phase's bytes.
-#[path = "$root/crates/pbig-harness/src/scenes/mod.rs"]
+#[path = "$root/crates/pbig-scenes/src/scenes/mod.rs"]
 pub mod scenes;
 #[path = "$root/rapier-0.36/harness/src/world.rs"]
 #[allow(dead_code)]

@@ -1,4 +1,4 @@
-//! Scenes, box sets, motions, files, the headless runner and the frame of measurements behind the program `pbig`, the
+//! Box sets, motions, files, the headless runner and the frame of measurements behind the program `pbig`, the
 //! studies, the tests and the examples.
 
 pub mod bench;
@@ -17,8 +17,8 @@ pub mod pair_index;
 pub mod pbig_grid;
 pub mod report;
 pub mod runner;
-pub mod scenes;
 pub mod shadow;
 pub mod simulate;
 pub mod table;
-pub mod world;
+
+pub use pbig_scenes::{scenes, world};

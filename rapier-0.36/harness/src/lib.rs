@@ -3,6 +3,6 @@
 #[path = "../../../crates/pbig-harness/src/chart.rs"]
 pub mod chart;
 pub mod run;
-#[path = "../../../crates/pbig-harness/src/scenes/mod.rs"]
+#[path = "../../../crates/pbig-scenes/src/scenes/mod.rs"]
 pub mod scenes;
 pub mod world;

@@ -114,6 +114,12 @@ impl World {
         soft_bodies.insert(cube, bodies, colliders)
     }
 
+    /// Throws a heavy ball with a radius of half a metre; the velocity in m/s.
+    pub fn throw(&mut self, from: Vec3, velocity: Vec3) -> RigidBodyHandle {
+        let ball = Self::dynamic(from).linvel(to_vector(velocity)).ccd_enabled(true);
+        self.add(ball, ColliderBuilder::ball(0.5).density(10.0))
+    }
+
     /// Everything with its broad phase, bit by bit.
     ///
     /// # Panics
@@ -178,6 +184,11 @@ pub fn to_point(v: Vec3) -> Vector {
 /// A pose without rotation.
 pub fn pose(at: Vec3) -> Pose {
     Pose::from_translation(to_vector(at))
+}
+
+/// A joint that turns around one axis, a unit vector.
+pub fn hinge(axis: Vec3) -> RevoluteJointBuilder {
+    RevoluteJointBuilder::new(to_vector(axis))
 }
 
 /// A square grid of heights.

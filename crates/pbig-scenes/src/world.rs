@@ -93,6 +93,33 @@ impl World {
         self.colliders.remove(collider, &mut self.islands, &mut self.bodies, true);
     }
 
+    /// Throws a heavy ball with a radius of half a metre; the velocity in m/s.
+    pub fn throw(&mut self, from: Vec3, velocity: Vec3) -> RigidBodyHandle {
+        let ball = Self::dynamic(from).linvel(to_vector(velocity)).ccd_enabled(true);
+        self.add(ball, ColliderBuilder::ball(0.5).density(10.0))
+    }
+
+    /// The pairs that the narrow phase has: of contacts, and with sensors.
+    pub fn pairs(&self) -> impl Iterator<Item = ColliderPair> {
+        let contacts = self.narrow_phase.contact_pairs().map(|pair| (pair.collider1, pair.collider2));
+        let intersections = self.narrow_phase.intersection_pairs().map(|(one, other, _)| (one, other));
+        contacts.chain(intersections).map(|(one, other)| ColliderPair::new(one, other))
+    }
+
+    /// Every number that makes up the poses of all bodies, bit by bit, in order: equal exactly when
+    /// two worlds are.
+    pub fn pose_bits(&self) -> Vec<u32> {
+        let bits = |(_, body): (RigidBodyHandle, &RigidBody)| {
+            let pose = body.position();
+            let numbers = pose.translation.vector.iter().chain(pose.rotation.coords.iter());
+            numbers.map(|x| x.to_bits()).collect::<Vec<_>>()
+        };
+        self.bodies.iter().flat_map(bits).collect()
+    }
+}
+
+#[cfg(feature = "snapshot")]
+impl World {
     /// Everything, bit by bit.
     ///
     /// # Panics
@@ -126,24 +153,6 @@ impl World {
             pipeline,
         })
     }
-
-    /// The pairs that the narrow phase has: of contacts, and with sensors.
-    pub fn pairs(&self) -> impl Iterator<Item = ColliderPair> {
-        let contacts = self.narrow_phase.contact_pairs().map(|pair| (pair.collider1, pair.collider2));
-        let intersections = self.narrow_phase.intersection_pairs().map(|(one, other, _)| (one, other));
-        contacts.chain(intersections).map(|(one, other)| ColliderPair::new(one, other))
-    }
-
-    /// Every number that makes up the poses of all bodies, bit by bit, in order: equal exactly when
-    /// two worlds are.
-    pub fn pose_bits(&self) -> Vec<u32> {
-        let bits = |(_, body): (RigidBodyHandle, &RigidBody)| {
-            let pose = body.position();
-            let numbers = pose.translation.vector.iter().chain(pose.rotation.coords.iter());
-            numbers.map(|x| x.to_bits()).collect::<Vec<_>>()
-        };
-        self.bodies.iter().flat_map(bits).collect()
-    }
 }
 
 /// glam's vector as rapier's.
@@ -164,6 +173,11 @@ pub fn to_point(v: Vec3) -> Point<Real> {
 /// A pose without rotation.
 pub fn pose(at: Vec3) -> Isometry<Real> {
     Isometry::translation(at.x, at.y, at.z)
+}
+
+/// A joint that turns around one axis, a unit vector.
+pub fn hinge(axis: Vec3) -> RevoluteJointBuilder {
+    RevoluteJointBuilder::new(UnitVector::new_unchecked(to_vector(axis)))
 }
 
 /// A square grid of heights.

@@ -1,0 +1,75 @@
+//! Scenes by name, count and seed. Built with glam; the same world for the same three, every time.
+//!
+//! The workspace for rapier 0.36 builds the same scenes from this folder: what differs between versions of rapier is in `world`.
+
+mod all;
+mod asteroids;
+mod avalanche;
+mod builder;
+mod conveyor;
+mod falling;
+mod filtered;
+mod galton;
+mod jar;
+mod ragdolls;
+mod resting;
+mod traffic;
+mod wrecking;
+
+use crate::world::World;
+use builder::Builder;
+use rand::SeedableRng;
+use rand::rngs::StdRng;
+
+/// A named scene.
+#[derive(Clone, Copy)]
+pub struct Scene {
+    /// The name on the command line.
+    pub name: &'static str,
+    /// A description in a few words.
+    pub about: &'static str,
+    /// The property that makes the scene hard for a broad phase.
+    pub hard: &'static str,
+    /// Bodies when the user does not say how many.
+    pub default_bodies: usize,
+    build: fn(&mut Builder, usize),
+}
+
+impl Scene {
+    /// The scene with this name, or an error that lists them all.
+    pub fn named(name: &str) -> Result<Self, String> {
+        let names = || Self::ALL.map(|scene| scene.name).join(", ");
+        let found = Self::ALL.into_iter().find(|scene| scene.name == name);
+        found.ok_or_else(|| format!("no scene is called '{name}'; there are: {}", names()))
+    }
+
+    /// Builds the world with about `bodies` bodies.
+    pub fn build(&self, bodies: usize, seed: u64) -> World {
+        let mut builder = Builder { world: World::default(), rng: StdRng::seed_from_u64(seed) };
+        (self.build)(&mut builder, bodies);
+        builder.world
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_scene_builds_at_every_size_and_the_same_each_time() {
+        for scene in Scene::ALL {
+            for bodies in [1, 2, 7, 100] {
+                let world = scene.build(bodies, 1);
+                assert!(!world.colliders.is_empty(), "{}, {bodies} bodies", scene.name);
+                assert_eq!(world.pose_bits(), scene.build(bodies, 1).pose_bits(), "{}", scene.name);
+            }
+            assert!(!scene.about.is_empty() && !scene.hard.is_empty());
+        }
+    }
+
+    #[test]
+    fn a_wrong_name_is_answered_with_the_right_ones() {
+        let error = Scene::named("colum").map(|s| s.name).unwrap_err();
+        assert!(error.contains("'colum'") && error.contains("column, spheres"), "{error}");
+    }
+}
