@@ -277,3 +277,60 @@ pub fn bits(words: &[u32], boxes: u32, pairs: &mut Vec<Pair>) -> Result<(), Deco
     }
     Ok(())
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// More pairs than two threads take at a time, in order.
+    fn many() -> Vec<Pair> {
+        (0..5 * PIECE as u32).map(|i| Pair { a: i / 3, b: i / 3 + 1 + i % 3 }).collect()
+    }
+
+    fn words_of(pairs: &[Pair]) -> Vec<u32> {
+        bytemuck::cast_slice(pairs).to_vec()
+    }
+
+    fn decoded(pairs: &[Pair]) -> Result<Vec<Pair>, DecodeError> {
+        let mut all = vec![Pair { a: 7, b: 8 }];
+        plain(&words_of(pairs), u32::MAX, true, &mut all)?;
+        Ok(all.split_off(1))
+    }
+
+    #[test]
+    fn pairs_of_several_pieces_are_appended_in_their_order() {
+        assert_eq!(decoded(&many()), Ok(many()));
+    }
+
+    #[test]
+    fn a_fault_in_any_piece_or_between_two_is_found_and_named() {
+        let piece = 2 * PIECE;
+        for at in [0, 1, piece - 1, piece, 2 * piece, many().len() - 1] {
+            let mut pairs = many();
+            pairs[at].a = pairs[at].b;
+            let wanted = DecodeError { what: "not a < b < boxes", at: 2 * at };
+            assert_eq!(decoded(&pairs), Err(wanted), "at {at}");
+        }
+        for at in [0, piece - 2, piece - 1, piece, 2 * piece - 1] {
+            let mut pairs = many();
+            pairs.swap(at, at + 1);
+            assert_eq!(decoded(&pairs).expect_err("two are swapped").what, "pairs out of order", "at {at}");
+        }
+    }
+
+    /// One record after the other, each a row of three partners.
+    #[test]
+    fn records_of_several_pieces_are_appended_in_their_order() {
+        let entries: Vec<u32> = (0..4).collect();
+        let record = [2, 0, 0, u32::from_le_bytes([0, 2, 1, 2]), u32::from_le_bytes([3, 0, 0, 0])];
+        let repeats = 20_000;
+        let row = [Pair { a: 0, b: 1 }, Pair { a: 0, b: 2 }, Pair { a: 0, b: 3 }];
+        let mut pairs = vec![row[0]];
+        assert_eq!(records(&record.repeat(repeats), &entries, 4, &mut pairs), Ok(()));
+        assert_eq!(pairs, [&row[..1], &row.repeat(repeats)].concat());
+        let mut words = record.repeat(repeats);
+        *words.last_mut().expect("there are words") = 9;
+        let fault = records(&words, &entries, 4, &mut Vec::new()).expect_err("there is no entry 9");
+        assert_eq!((fault.what, fault.at), ("no such entry", words.len()));
+    }
+}

@@ -4,16 +4,17 @@
 use super::GpuError;
 use super::chunk::{ChunkResult, PendingChunk};
 use super::error::Failure;
+use super::items::{cut, rest};
 use super::job::Job;
 use super::passes::{self, CLEAR_TOTALS, Groups, Step};
 use super::session::Session;
 use super::sink::Sink;
 use crate::decode::pair_count;
-use crate::layout::{Chunk, Counters, LANES, PACKED, Params, SORTED};
+use crate::layout::{BITS, Chunk, LANES, PACKED, Params, SORTED};
 use pbig_shaders::CHECK_ALL;
 use std::collections::VecDeque;
 
-/// Most repetitions of a map before the call goes to the CPU. Each one has the capacities that the last one asked for.
+/// Most repetitions of a map before the set is split. Each one has the capacities that the last one asked for.
 const MAX_REPEATS: u32 = 8;
 
 impl Session {
@@ -53,18 +54,19 @@ impl Session {
                 self.plan = None;
                 Ok(None)
             }
-            ChunkResult::OutputTooLarge(words) => self.make_room_for(words, params),
+            ChunkResult::OutputTooLarge(words) => self.note_output(words, params),
             // The last submission has all pairs: it is done, or too large.
             ChunkResult::Unsorted => Err(self.too_large().into()),
         }
     }
 
     /// Notes how much output there is. Returns the items that are done: none of them if the map is still of use.
-    fn make_room_for(&mut self, words: u64, params: &Params) -> Result<Option<Chunk>, Failure> {
+    fn note_output(&mut self, words: u64, params: &Params) -> Result<Option<Chunk>, Failure> {
         self.sizes.word_capacity = words;
         let fits = words <= self.storage.max_buffer_bytes / 4;
-        // Bits, which would fit, have no mark that tells ended pairs from new ones. Fewer boxes at a time have fewer of both.
-        if params.levels == 0 && self.finds_changes && !fits {
+        // What does not fit comes as bits the next time. They have no mark that tells ended pairs from new ones. Fewer boxes at
+        // a time have fewer of both.
+        if params.levels == 0 && !fits && (self.finds_changes || params.flags & BITS != 0) {
             return Err(self.too_large().into());
         }
         // The map is there, so only the checks are repeated, unless the pairs can be sorted with it.
@@ -108,8 +110,8 @@ impl Session {
     }
 
     /// Searches the other chunks, two at a time: the device checks one while the host decodes the other (PBIG 5.3).
-    fn search_rest(&mut self, params: &Params, rest: Chunk, sink: &mut Sink) -> Result<(), Failure> {
-        let mut pending: VecDeque<Chunk> = cut(rest, self.chunk_items()).into();
+    fn search_rest(&mut self, params: &Params, left: Chunk, sink: &mut Sink) -> Result<(), Failure> {
+        let mut pending: VecDeque<Chunk> = cut(left, self.chunk_items()).into();
         let mut in_progress: VecDeque<PendingChunk> = VecDeque::new();
         let most = if self.options.pipelining { 2 } else { 1 };
         let mut side = 0;
@@ -124,9 +126,14 @@ impl Session {
             }
             let Some(chunk) = in_progress.pop_front() else { return Ok(()) };
             let items = chunk.items;
-            if let ChunkResult::OutputTooLarge(words) = self.finish(chunk, params, sink)? {
-                let smaller = self.smaller(items, words)?;
-                smaller.into_iter().rev().for_each(|part| pending.push_front(part));
+            match self.finish(chunk, params, sink)? {
+                ChunkResult::Done => {}
+                ChunkResult::OutputTooLarge(words) => {
+                    let smaller = self.smaller(items, words)?;
+                    smaller.into_iter().rev().for_each(|part| pending.push_front(part));
+                }
+                // The first chunk has said that the map is right, and a map does not change.
+                _ => return Err(GpuError::Refused("a chunk that contradicts the first".into()).into()),
             }
         }
     }
@@ -145,56 +152,10 @@ impl Session {
 
     fn too_large(&self) -> GpuError {
         let limit = self.storage.max_buffer_bytes;
-        GpuError::TooLarge { what: "the output of one work item", bytes: 4 * self.sizes.word_capacity, limit }
-    }
-}
-
-/// Returns the work items that are left after the first chunk.
-pub(super) fn rest(all: &Counters, done: &Chunk) -> Chunk {
-    let first_small = all.small_items.min(done.small_items);
-    let first_large = all.large_items.min(done.large_items);
-    let (small_items, large_items) = (all.small_items - first_small, all.large_items - first_large);
-    Chunk { first_small, small_items, first_large, large_items, ..Chunk::default() }
-}
-
-/// Cuts a range of work items into chunks.
-fn cut(all: Chunk, [small, large]: [u32; 2]) -> Vec<Chunk> {
-    let (small, large) = (small.max(1), large.max(1));
-    let count = all.small_items.div_ceil(small).max(all.large_items.div_ceil(large));
-    let part = |i: u32| {
-        let (s, l) = ((i * small).min(all.small_items), (i * large).min(all.large_items));
-        Chunk {
-            first_small: all.first_small + s,
-            small_items: small.min(all.small_items - s),
-            first_large: all.first_large + l,
-            large_items: large.min(all.large_items - l),
-            ..Chunk::default()
-        }
-    };
-    (0..count).map(part).collect()
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn chunks_cover_every_item_once() {
-        for (small, large) in [(0, 0), (1, 0), (0, 7), (10, 3), (9, 9)] {
-            let all = Chunk {
-                first_small: 5,
-                small_items: small,
-                first_large: 2,
-                large_items: large,
-                ..Chunk::default()
-            };
-            let chunks = cut(all, [3, 2]);
-            let items = |of: fn(&Chunk) -> (u32, u32)| -> Vec<u32> {
-                chunks.iter().map(of).flat_map(|(first, n)| first..first + n).collect()
-            };
-            assert_eq!(items(|c| (c.first_small, c.small_items)), (5..5 + small).collect::<Vec<_>>());
-            assert_eq!(items(|c| (c.first_large, c.large_items)), (2..2 + large).collect::<Vec<_>>());
-            assert!(chunks.iter().all(|c| c.small_items + c.large_items > 0));
+        GpuError::TooLarge {
+            what: "the lists or the output of a search",
+            bytes: 4 * self.sizes.word_capacity,
+            limit,
         }
     }
 }

@@ -57,8 +57,12 @@ impl ChangeRequest<'_> {
     }
 
     fn restarted(&self) -> Vec<u32> {
-        let restarted = self.changed.iter().filter(|change| self.is_restarted(change));
-        let mut ids: Vec<u32> = restarted.map(|change| change.id).collect();
+        let pieces: Vec<&[Change]> = self.changed.chunks(PIECE).collect();
+        let ids = parallel::map(pieces.len(), |i| {
+            let restarted = pieces[i].iter().filter(|change| self.is_restarted(change));
+            restarted.map(|change| change.id).collect::<Vec<_>>()
+        });
+        let mut ids = ids.concat();
         ids.sort_unstable();
         ids
     }

@@ -1,10 +1,10 @@
 //! A chunk of work items: submitted to the device, awaited, and decoded.
 
 use super::GpuError;
-use super::attempts::rest;
 use super::coding::bit_words;
 use super::device::Variant;
 use super::error::Failure;
+use super::items::rest;
 use super::passes::{CLASSES_BYTES, Recording, Step, apply_changes, check, lists_fit, measure, sort};
 use super::readback::{self, HEADER_BYTES, Header};
 use super::session::Session;
@@ -199,6 +199,8 @@ impl Session {
             return Ok(ChunkResult::Unsorted);
         }
         let words = self.words(bytemuck::cast_slice(prefetched), out, needed, sink)?;
+        self.fetch_entries(params, needed, sink)?;
+        sink.found.report.wait += clock.lap();
         self.take_output(&words, params, &totals, sink)?;
         Ok(ChunkResult::Done)
     }
@@ -257,11 +259,18 @@ impl Session {
         if needed <= have {
             return Ok(Cow::Borrowed(&prefetched[..needed as usize]));
         }
-        let mut clock = Clock::start();
         let mut words = prefetched.to_vec();
         words.extend(self.fetch(out, have, needed, &mut sink.found.report)?);
-        sink.found.report.wait += clock.lap();
         Ok(Cow::Owned(words))
+    }
+
+    /// Reads the entries, which records name, once a job.
+    fn fetch_entries(&mut self, params: &Params, words: u64, sink: &mut Sink) -> Result<(), GpuError> {
+        if params.flags & PACKED != 0 && self.table.is_none() && words > 0 {
+            let entries = u64::from(self.sizes.lists.entries);
+            self.table = Some(self.fetch(Buffer::Entries.into(), 0, entries, &mut sink.found.report)?);
+        }
+        Ok(())
     }
 
     fn note_times(&self, chunk: &PendingChunk, header: &Header, sink: &mut Sink) {
@@ -278,10 +287,6 @@ impl Session {
         is_sorted: bool,
         sink: &mut Sink,
     ) -> Result<(), GpuError> {
-        if params.flags & PACKED != 0 && self.table.is_none() && !words.is_empty() {
-            let entries = u64::from(self.sizes.lists.entries);
-            self.table = Some(self.fetch(Buffer::Entries.into(), 0, entries, &mut sink.found.report)?);
-        }
         let (pairs, boxes) = (&mut sink.found.pairs, params.boxes);
         let is_all = pairs.is_empty() && (is_sorted || params.flags & BITS != 0);
         sink.found.is_sorted = is_all;

@@ -4,12 +4,14 @@ use super::{Change, ChangeRequest};
 use crate::layout::Motion;
 use crate::{Aabb, ProxyFilter};
 
+/// What goes up to the device.
 #[derive(Clone, Copy)]
 pub(super) enum Input<'a> {
+    /// The boxes of the job.
     Boxes,
     /// Boxes now and at the last update.
     Motions(&'a [Motion]),
-    /// The same as changes, for a device that has the boxes of the last update.
+    /// Changes, for a device that has the boxes of the last update.
     Changes(&'a ChangeRequest<'a>),
 }
 

@@ -28,6 +28,7 @@ mod chunk;
 mod coding;
 mod device;
 mod error;
+mod items;
 mod job;
 mod kept_plan;
 mod levels;

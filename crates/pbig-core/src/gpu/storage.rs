@@ -4,7 +4,7 @@
 use super::GpuError;
 use super::device::{GpuDevice, Variant};
 use crate::config::GpuOptions;
-use crate::parallel::{self, available_threads};
+use crate::parallel::{self, threads_for};
 use bytemuck::Pod;
 use pbig_shaders::{Buffer, Kernel};
 use std::collections::HashMap;
@@ -210,7 +210,7 @@ impl Storage {
         let pieces = self.plan_copies(uploads);
         let staging = self.get(BufferId::UploadStaging);
         let has_failed = AtomicBool::new(false);
-        parallel::run(available_threads(), pieces.len(), |_, i| {
+        parallel::run(threads_for(pieces.len()), pieces.len(), |_, i| {
             let (from, piece) = pieces[i];
             match staging.get_mapped_range_mut(from..from + piece.len() as u64) {
                 Ok(mut view) => view.copy_from_slice(piece),

@@ -142,8 +142,8 @@ impl Kept {
         if let Some(pair) = pairs.get(2 * AHEAD) {
             prefetch(spans.as_ptr().wrapping_add(pair.a as usize));
         }
-        if let Some(pair) = pairs.get(AHEAD) {
-            prefetch(self.forward.pool.as_ptr().wrapping_add(spans[pair.a as usize].start as usize));
+        if let Some(span) = pairs.get(AHEAD).and_then(|pair| spans.get(pair.a as usize)) {
+            prefetch(self.forward.pool.as_ptr().wrapping_add(span.start as usize));
         }
     }
 
@@ -251,6 +251,18 @@ mod tests {
             assert_eq!(kept.forward.pool.len(), places);
             kept.apply(&[], &row(longer).collect::<Vec<_>>());
         }
+    }
+
+    #[cfg(feature = "gpu")]
+    #[test]
+    fn pairs_that_no_row_has_do_not_exist() {
+        let mut kept = Kept::default();
+        kept.reserve_ids(100);
+        let pairs: Vec<Pair> = (0..60).map(|i| Pair { a: i, b: 99 }).collect();
+        kept.apply(&pairs, &[]);
+        let unknown = [Pair { a: 1, b: 98 }, Pair { a: 70, b: 99 }, Pair { a: 5000, b: 5001 }];
+        let asked = [&unknown[..], &pairs, &unknown].concat();
+        assert!(kept.existing(&asked).eq(pairs));
     }
 
     #[test]
