@@ -66,6 +66,7 @@ fn main() -> ExitCode {
         Ok(()) => println!("chart: {}", args.chart.display()),
         Err(error) => eprintln!("{error}"),
     }
+    print_where_to_watch(&args);
     for difference in checked.differences.iter().take(3) {
         eprintln!("{difference}");
     }
@@ -121,6 +122,16 @@ fn print_table(stock: &Run<DefaultBroadPhase>, ours: &Run<PbigBroadPhase>, check
         "\nTimes are medians over the steps. The two worlds drift apart, so pairs and events differ in number.\n\
          Where a scene has pairs that rapier's narrow phase throws away, pbig leaves them out."
     );
+}
+
+/// Names the programs that show the same objects as they fall.
+fn print_where_to_watch(args: &Args) {
+    let Args { scene, bodies, seed, .. } = args;
+    println!(
+        "\nWatch it: cd viewer && cargo run --release -- --scene {} --bodies {bodies} --seed {seed}",
+        scene.name
+    );
+    println!("In a browser: scripts/page.sh");
 }
 
 fn events<B: BroadPhase>(run: &Run<B>) -> u64 {

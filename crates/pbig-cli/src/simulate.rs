@@ -55,8 +55,10 @@ impl BroadPhaseOption {
 }
 
 pub(crate) fn list() -> Result<(), Failure> {
-    let line =
-        |scene: Scene| format!("{:<11} {} ({} bodies)\n", scene.name, scene.about, scene.default_bodies);
+    let line = |scene: Scene| {
+        let Scene { name, about, hard, default_bodies, .. } = scene;
+        format!("{name:<11} {about}; hard: {hard} ({default_bodies} bodies)\n")
+    };
     print(&Scene::ALL.map(line).concat())
 }
 

@@ -175,6 +175,11 @@ pub fn pose(at: Vec3) -> Isometry<Real> {
     Isometry::translation(at.x, at.y, at.z)
 }
 
+/// A joint that turns around one axis, a unit vector.
+pub fn hinge(axis: Vec3) -> RevoluteJointBuilder {
+    RevoluteJointBuilder::new(UnitVector::new_unchecked(to_vector(axis)))
+}
+
 /// A square grid of heights.
 pub fn heights(side: usize, height: impl Fn(usize, usize) -> f32) -> DMatrix<Real> {
     DMatrix::from_fn(side, side, height)

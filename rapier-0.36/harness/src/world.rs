@@ -186,6 +186,11 @@ pub fn pose(at: Vec3) -> Pose {
     Pose::from_translation(to_vector(at))
 }
 
+/// A joint that turns around one axis, a unit vector.
+pub fn hinge(axis: Vec3) -> RevoluteJointBuilder {
+    RevoluteJointBuilder::new(to_vector(axis))
+}
+
 /// A square grid of heights.
 pub fn heights(side: usize, height: impl Fn(usize, usize) -> f32) -> Array2<Real> {
     // Column by column.

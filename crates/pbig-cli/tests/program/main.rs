@@ -9,6 +9,7 @@ use ndarray::{Array2, Array3, ShapeBuilder};
 use ndarray_npy::{ReadNpyExt, WriteNpyExt};
 use pbig_core::{Aabb, Pair, oracle};
 use pbig_harness::boxes::BoxSet;
+use pbig_harness::scenes::Scene;
 use serde_json::Value;
 use std::fs::File;
 use std::path::{Path, PathBuf};
@@ -232,7 +233,10 @@ fn scenes_and_doctor_say_what_there_is() {
     let folder = tempfile::tempdir().expect("a folder");
     let scenes = pbig(folder.path(), &["scenes"]);
     let text = String::from_utf8_lossy(&scenes.stdout).into_owned();
-    assert!(scenes.status.success() && text.lines().count() == pbig_harness::scenes::Scene::ALL.len());
+    assert!(scenes.status.success() && text.lines().count() == Scene::ALL.len());
+    for (line, scene) in text.lines().zip(Scene::ALL) {
+        assert!(line.starts_with(scene.name) && line.contains(&format!("; hard: {}", scene.hard)), "{line}");
+    }
     let doctor = pbig(folder.path(), &["doctor"]);
     let text = String::from_utf8_lossy(&doctor.stdout).into_owned();
     assert!(doctor.status.success() && text.contains("self-test") && !text.contains("WRONG"), "{text}");

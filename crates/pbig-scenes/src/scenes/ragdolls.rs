@@ -1,54 +1,122 @@
 //! Bodies of joined limbs.
 
-use super::Builder;
-use crate::world::{World, to_point, to_vector};
-use glam::Vec3;
+use super::builder::{Builder, lattice, side_of_square};
+use crate::world::{World, hinge, to_point, to_rotation, to_vector};
+use glam::{Quat, Vec3};
 use rapier3d::prelude::*;
 
-/// Figures of eleven capsules: trunk, head, hips, and two to each limb.
+/// Rigid bodies of a figure: trunk, head, hips, and two to each limb.
+const PARTS: usize = 11;
+/// Figures above each other.
+const LAYERS: usize = 6;
+
+/// Figures that fall in a heap, each turned in its own way.
 pub(super) fn ragdolls(b: &mut Builder, n: usize) {
     b.ground();
-    let side = (n as f32 / 11.0).sqrt().ceil() as usize;
-    for i in 0..n.div_ceil(11) {
-        let at = Vec3::new((i % side) as f32 * 1.5, 2.5 + (i % 3) as f32 * 2.5, (i / side) as f32 * 1.5);
-        ragdoll(b, at);
+    let figures = n.div_ceil(PARTS);
+    let side = side_of_square(figures.div_ceil(LAYERS));
+    for i in 0..figures {
+        let at = lattice(i, side) * 2.4 + Vec3::Y * 1.5;
+        let (turn, velocity) = (b.random_turn(), b.random_vec(Vec3::splat(2.0)));
+        Figure { b, at, turn, velocity }.build();
     }
 }
 
-fn ragdoll(b: &mut Builder, at: Vec3) {
-    let part = |b: &mut Builder, offset: Vec3, half: f32, radius: f32| {
-        let body = World::dynamic(at + offset).linvel(to_vector(b.random_vec(Vec3::splat(1.0))));
-        b.world.add(body, ColliderBuilder::capsule_y(half, radius))
-    };
-    let trunk = part(b, Vec3::ZERO, 0.25, 0.18);
-    let head = part(b, Vec3::Y * 0.65, 0.03, 0.13);
-    join(b, trunk, Vec3::Y * 0.48, head, Vec3::Y * -0.17);
-    let hips = part(b, Vec3::Y * -0.55, 0.05, 0.16);
-    join(b, trunk, Vec3::Y * -0.4, hips, Vec3::Y * 0.15);
-    for side in [-1.0, 1.0] {
-        let arm = Vec3::new(0.3 * side, 0.3, 0.0);
-        let leg = Vec3::new(0.13 * side, -0.1, 0.0);
-        limb(b, at, trunk, arm, [0.14, 0.13], 0.07);
-        limb(b, at + Vec3::Y * -0.55, hips, leg, [0.18, 0.18], 0.09);
+/// A figure in its own coordinates: it stands upright around the origin with its arms stretched out along x, and looks
+/// along z. Lengths in metres.
+struct Figure<'a> {
+    b: &'a mut Builder,
+    at: Vec3,
+    turn: Quat,
+    velocity: Vec3,
+}
+
+/// A rigid body of a figure and where its centre is.
+#[derive(Clone, Copy)]
+struct Part {
+    body: RigidBodyHandle,
+    at: Vec3,
+}
+
+/// Two capsules in a line, from the joint with the trunk on.
+struct Limb {
+    start: Vec3,
+    /// A unit vector, along the axis of the capsule.
+    along: Vec3,
+    capsule: fn(f32, f32) -> ColliderBuilder,
+    half: f32,
+    radius: f32,
+    /// The axis around which knee or elbow bends.
+    axis: Vec3,
+}
+
+impl Figure<'_> {
+    fn build(mut self) {
+        let trunk = self.part(Vec3::ZERO, ColliderBuilder::capsule_y(0.2, 0.17));
+        let head = self.part(Vec3::Y * 0.56, ColliderBuilder::ball(0.16));
+        self.socket(trunk, head, Vec3::Y * 0.39, 0.6);
+        let hips = self.part(Vec3::Y * -0.44, ColliderBuilder::capsule_x(0.08, 0.13));
+        self.socket(trunk, hips, Vec3::Y * -0.34, 0.5);
+        for side in [-1.0, 1.0] {
+            self.limb(trunk, arm(side));
+            self.limb(hips, leg(side));
+        }
+    }
+
+    /// Adds a body.
+    fn part(&mut self, at: Vec3, shape: ColliderBuilder) -> Part {
+        let body = World::dynamic(self.at + self.turn * at)
+            .rotation(to_rotation(self.turn))
+            .linvel(to_vector(self.velocity));
+        Part { body: self.b.world.add(body, shape), at }
+    }
+
+    /// Adds two bodies that hang on a third.
+    fn limb(&mut self, parent: Part, limb: Limb) {
+        let reach = limb.half + limb.radius;
+        let [upper, lower] = [1.0, 3.0].map(|reaches| {
+            self.part(limb.start + limb.along * reach * reaches, (limb.capsule)(limb.half, limb.radius))
+        });
+        self.socket(parent, upper, limb.start, 1.0);
+        let middle = limb.start + limb.along * 2.0 * reach;
+        let bend = hinge(limb.axis).limits([0.0, 2.4]).contacts_enabled(false);
+        let bend = bend.local_anchor1(to_point(middle - upper.at)).local_anchor2(to_point(middle - lower.at));
+        self.b.world.impulse_joints.insert(upper.body, lower.body, bend, true);
+    }
+
+    /// Joins two parts at a point. Each turns by at most `most` radians around each axis.
+    fn socket(&mut self, parent: Part, child: Part, at: Vec3, most: f32) {
+        let joint = SphericalJointBuilder::new()
+            .local_anchor1(to_point(at - parent.at))
+            .local_anchor2(to_point(at - child.at))
+            .limits(JointAxis::AngX, [-most, most])
+            .limits(JointAxis::AngY, [-most, most])
+            .limits(JointAxis::AngZ, [-most, most])
+            .contacts_enabled(false);
+        self.b.world.impulse_joints.insert(parent.body, child.body, joint, true);
     }
 }
 
-/// Two capsules that hang from a point of a body.
-fn limb(b: &mut Builder, at: Vec3, parent: RigidBodyHandle, from: Vec3, halves: [f32; 2], radius: f32) {
-    let (mut parent, mut anchor, mut top) = (parent, from, at + from);
-    for half in halves {
-        let reach = half + radius;
-        let shape = ColliderBuilder::capsule_y(half, radius);
-        let body = b.world.add(World::dynamic(top - Vec3::Y * reach), shape);
-        join(b, parent, anchor, body, Vec3::Y * reach);
-        (parent, anchor, top) = (body, Vec3::Y * -reach, top - Vec3::Y * 2.0 * reach);
+/// Returns an arm that bends forward; `side` is -1 or 1.
+fn arm(side: f32) -> Limb {
+    Limb {
+        start: Vec3::new(0.19 * side, 0.2, 0.0),
+        along: Vec3::X * side,
+        capsule: ColliderBuilder::capsule_x,
+        half: 0.12,
+        radius: 0.065,
+        axis: Vec3::Y * -side,
     }
 }
 
-fn join(b: &mut Builder, parent: RigidBodyHandle, at: Vec3, child: RigidBodyHandle, child_at: Vec3) {
-    let joint = SphericalJointBuilder::new()
-        .local_anchor1(to_point(at))
-        .local_anchor2(to_point(child_at))
-        .contacts_enabled(false);
-    b.world.impulse_joints.insert(parent, child, joint, true);
+/// Returns a leg that bends backward; `side` is -1 or 1.
+fn leg(side: f32) -> Limb {
+    Limb {
+        start: Vec3::new(0.11 * side, -0.5, 0.0),
+        along: Vec3::NEG_Y,
+        capsule: ColliderBuilder::capsule_y,
+        half: 0.14,
+        radius: 0.085,
+        axis: Vec3::X,
+    }
 }

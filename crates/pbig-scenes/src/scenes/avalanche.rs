@@ -1,0 +1,50 @@
+//! An avalanche: boulders roll down a valley.
+
+use super::builder::{Builder, direction, lattice, side_of_square, wave};
+use crate::world::{heights, to_vector};
+use glam::Vec3;
+use rapier3d::prelude::*;
+
+/// Samples of the height field along each axis.
+const SAMPLES: usize = 65;
+/// Height over length of the slope.
+const SLOPE: f32 = 0.7;
+/// Boulders above each other.
+const LAYERS: usize = 3;
+
+/// Boulders lie above the upper part of a valley, which runs out into a plain.
+pub(super) fn avalanche(b: &mut Builder, n: usize) {
+    b.ground();
+    let side = side_of_square(n.div_ceil(LAYERS));
+    let length = (side as f32 * 4.0 + 40.0).max(60.0);
+    let field = heights(SAMPLES, |i, j| {
+        let part = |k: usize| k as f32 / (SAMPLES - 1) as f32 - 0.5;
+        surface(part(j) * length, part(i) * length, length)
+    });
+    let scale = to_vector(Vec3::new(length, 1.0, length));
+    b.world.colliders.insert(ColliderBuilder::heightfield(field, scale).friction(0.4));
+    for i in 0..n {
+        let place = (lattice(i, side) - Vec3::new(side as f32 / 2.0, 0.0, 0.0)) * 1.6;
+        let [x, z] = [place.x, place.z - length * 0.45];
+        let y = surface(x, z, length) + 1.5 + place.y * 1.4;
+        boulder(b, i, Vec3::new(x, y, z));
+    }
+}
+
+/// Returns the height of the valley: it falls along z, rises to both sides, and is rough.
+fn surface(x: f32, z: f32, length: f32) -> f32 {
+    let slope = (length * 0.2 - z).max(0.0) * SLOPE;
+    let aside = (2.0 * x / length) * (2.0 * x / length);
+    let sides = aside * aside * length * 0.15;
+    1.0 + slope + sides + 0.4 * (wave(x * 0.35) + direction(z * 0.5).x)
+}
+
+fn boulder(b: &mut Builder, i: usize, at: Vec3) {
+    let half = b.random_size(0.15, 0.55);
+    let shape = match i % 3 {
+        0 => ColliderBuilder::ball(half),
+        1 => ColliderBuilder::cuboid(half, half * 0.8, half * 0.7),
+        _ => ColliderBuilder::round_cuboid(half * 0.6, half * 0.7, half * 0.5, half * 0.3),
+    };
+    b.falling(at, shape.friction(0.4).restitution(0.2));
+}

@@ -1,0 +1,93 @@
+//! A world under construction.
+
+use crate::world::{World, to_rotation, to_vector};
+use glam::{EulerRot, Quat, Vec2, Vec3};
+use rand::RngExt;
+use rand::rngs::StdRng;
+use rapier3d::prelude::*;
+
+/// A world under construction, with its random numbers.
+pub(super) struct Builder {
+    pub(super) world: World,
+    pub(super) rng: StdRng,
+}
+
+impl Builder {
+    /// Returns a number from `low` up to `high`, which must be larger.
+    pub(super) fn random(&mut self, low: f32, high: f32) -> f32 {
+        self.rng.random_range(low..high)
+    }
+
+    /// Returns a vector with components from `-reach` up to `reach`.
+    pub(super) fn random_vec(&mut self, reach: Vec3) -> Vec3 {
+        let mut along = |r: f32| if r > 0.0 { self.random(-r, r) } else { 0.0 };
+        Vec3::new(along(reach.x), along(reach.y), along(reach.z))
+    }
+
+    /// Returns a rotation.
+    pub(super) fn random_turn(&mut self) -> Quat {
+        let angles = self.random_vec(Vec3::splat(std::f32::consts::PI));
+        Quat::from_euler(EulerRot::XYZ, angles.x, angles.y, angles.z)
+    }
+
+    /// Returns a size whose logarithm is uniform from `low` up to `high`.
+    pub(super) fn random_size(&mut self, low: f32, high: f32) -> f32 {
+        low * power(high / low, self.random(0.0, 1.0))
+    }
+
+    /// Adds a half-space below height 0.
+    pub(super) fn ground(&mut self) {
+        self.world.colliders.insert(World::ground());
+    }
+
+    /// Adds a dynamic body with a random rotation.
+    pub(super) fn falling(&mut self, at: Vec3, collider: ColliderBuilder) -> RigidBodyHandle {
+        let turn = self.random_turn();
+        self.world.add(World::dynamic(at).rotation(to_rotation(turn)), collider)
+    }
+
+    /// Adds a collider without a body.
+    pub(super) fn fixed(&mut self, at: Vec3, collider: ColliderBuilder) {
+        self.world.colliders.insert(collider.translation(to_vector(at)));
+    }
+
+    /// Adds a box without a body, turned around the vertical axis by an angle in radians.
+    pub(super) fn fixed_cuboid(&mut self, at: Vec3, half: Vec3, angle: f32) {
+        let cuboid = ColliderBuilder::cuboid(half.x, half.y, half.z);
+        self.fixed(at, cuboid.rotation(to_vector(Vec3::Y * angle)));
+    }
+}
+
+/// Returns the `i`-th place of a square column, layer by layer from the ground.
+pub(super) fn lattice(i: usize, side: usize) -> Vec3 {
+    Vec3::new((i % side) as f32, (i / side / side) as f32, (i / side % side) as f32)
+}
+
+/// Returns the number of places along an edge of the smallest cube with `places` places, at least 1.
+pub(super) fn side_of_cube(places: usize) -> usize {
+    (1..).find(|side: &usize| side.pow(3) >= places).unwrap_or(1)
+}
+
+/// Returns the number of places along an edge of the smallest square with `places` places, at least 1.
+pub(super) fn side_of_square(places: usize) -> usize {
+    (1..).find(|side: &usize| side.pow(2) >= places).unwrap_or(1)
+}
+
+// glam computes these, because it does so in the same way on every machine. The standard library asks the platform, and a
+// web page would build other worlds.
+
+/// Returns the cosine and the sine of an angle in radians, as x and z.
+pub(super) fn direction(angle: f32) -> Vec3 {
+    let Vec2 { x, y } = Vec2::from_angle(angle);
+    Vec3::new(x, 0.0, y)
+}
+
+/// Returns the sine of an angle in radians.
+pub(super) fn wave(angle: f32) -> f32 {
+    direction(angle).z
+}
+
+/// Returns `base` to the power of `exponent`.
+pub(super) fn power(base: f32, exponent: f32) -> f32 {
+    Vec2::splat(base).powf(exponent).x
+}

@@ -1,0 +1,88 @@
+//! A town of rings: houses, cars that drive around for ever, and barrels in their way.
+
+use super::builder::{Builder, direction};
+use crate::world::{World, to_point, to_rotation, to_vector};
+use glam::{Quat, Vec3};
+use rapier3d::prelude::*;
+use std::f32::consts::TAU;
+
+/// The radius of the first street, and the distance from street to street.
+const FIRST_STREET: f32 = 20.0;
+const STREET_DISTANCE: f32 = 18.0;
+/// From the middle of a street to the middle of a lane.
+const LANE: f32 = 2.2;
+/// Along a street, the space for a house, a car in its lane, and a barrel.
+const HOUSE_EVERY: f32 = 8.0;
+const CAR_EVERY: f32 = 16.0;
+const BARREL_EVERY: f32 = 11.0;
+
+/// Things that stand or drive along a street.
+#[derive(Clone, Copy)]
+enum Kind {
+    House,
+    /// A car in a lane; 1 drives counterclockwise, -1 clockwise.
+    Car(f32),
+    Barrel,
+}
+
+/// Builds streets until all bodies are used; a house counts as a body.
+pub(super) fn traffic(b: &mut Builder, n: usize) {
+    b.ground();
+    let mut left = n;
+    let mut radius = FIRST_STREET;
+    while left > 0 {
+        let kinds = [(Kind::Car(1.0), CAR_EVERY), (Kind::Car(-1.0), CAR_EVERY), (Kind::Barrel, BARREL_EVERY)];
+        for (kind, every) in kinds.into_iter().chain([(Kind::House, HOUSE_EVERY)]) {
+            left -= around(b, radius, kind, every, left);
+        }
+        radius += STREET_DISTANCE;
+    }
+}
+
+/// Places things around a street, at most `most` of them, and returns their number.
+fn around(b: &mut Builder, radius: f32, kind: Kind, every: f32, most: usize) -> usize {
+    let places = (TAU * radius / every) as usize;
+    for i in 0..places.min(most) {
+        let angle = TAU * (i as f32 + b.random(-0.15, 0.15)) / places as f32;
+        match kind {
+            Kind::House => house(b, radius + STREET_DISTANCE / 2.0, angle),
+            Kind::Car(way) => car(b, radius, angle, way),
+            Kind::Barrel => barrel(b, radius, angle),
+        }
+    }
+    places.min(most)
+}
+
+fn house(b: &mut Builder, radius: f32, angle: f32) {
+    let half = Vec3::new(b.random(2.0, 2.8), b.random(2.0, 9.0), b.random(2.0, 3.0));
+    b.fixed_cuboid(direction(angle) * radius + Vec3::Y * half.y, half, -angle);
+}
+
+/// Adds a car, every eighth time a lorry. Its body turns around the middle of the town, so that no one has to steer it: all
+/// mass is there, and none in the collider.
+fn car(b: &mut Builder, radius: f32, angle: f32, way: f32) {
+    let half = if b.random(0.0, 8.0) < 1.0 { Vec3::new(1.2, 1.5, 3.5) } else { Vec3::new(0.9, 0.7, 2.0) };
+    let lane = radius + LANE * way;
+    // All cars of a lane are equally fast, so none runs into another. A positive turn around y drives from z to x.
+    let speed = 8.0 + 4.0 * way;
+    let place = Vec3::new(lane, half.y + 0.05, 0.0);
+    let body = RigidBodyBuilder::kinematic_velocity_based()
+        .rotation(to_rotation(Quat::from_rotation_y(-angle)))
+        .angvel(to_vector(Vec3::Y * -way * speed / lane))
+        .additional_mass_properties(mass_at_origin())
+        // A slow turn counts as rest, however long the way.
+        .can_sleep(false);
+    let shape = ColliderBuilder::cuboid(half.x, half.y, half.z).density(0.0);
+    b.world.add(body, shape.translation(to_vector(place)));
+}
+
+/// Returns one kilogramme in the middle of a body.
+fn mass_at_origin() -> MassProperties {
+    MassProperties::new(to_point(Vec3::ZERO), 1.0, to_vector(Vec3::ONE))
+}
+
+fn barrel(b: &mut Builder, radius: f32, angle: f32) {
+    let side = b.random(-4.0, 4.0);
+    let at = direction(angle) * (radius + side) + Vec3::Y * 0.5;
+    b.world.add(World::dynamic(at), ColliderBuilder::cylinder(0.45, 0.3));
+}

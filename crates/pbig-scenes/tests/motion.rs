@@ -1,0 +1,191 @@
+//! Scenes in motion: nothing explodes, and each scene does what its name says.
+
+use glam::Vec3;
+use pbig_scenes::scenes::Scene;
+use pbig_scenes::world::{World, to_vector};
+use rapier3d::prelude::*;
+
+const STEPS: usize = 300;
+/// Metres a second. Drops of rain begin with up to 40, and gravity adds 49 in 300 steps.
+const MOST_SPEED: f32 = 100.0;
+
+/// A scene under way.
+struct Run {
+    world: World,
+    broad_phase: DefaultBroadPhase,
+    /// Where the bodies began.
+    start: Vec<Vec3>,
+}
+
+impl Run {
+    fn new(name: &str, bodies: usize) -> Self {
+        let world = Scene::named(name).expect("the scene exists").build(bodies, 1);
+        let start = places(&world);
+        Self { world, broad_phase: DefaultBroadPhase::new(), start }
+    }
+
+    fn steps(mut self, steps: usize) -> Self {
+        for _ in 0..steps {
+            self.world.step(&mut self.broad_phase);
+        }
+        self
+    }
+
+    /// Where the dynamic bodies began and where they are.
+    fn dynamic(&self) -> Vec<(Vec3, Vec3)> {
+        let pairs = self.world.bodies.iter().zip(&self.start);
+        let dynamic = pairs.filter(|((_, body), _)| body.is_dynamic());
+        dynamic.map(|((_, body), start)| (*start, place(body))).collect()
+    }
+}
+
+fn place(body: &RigidBody) -> Vec3 {
+    Vec3::from_slice(body.translation().as_slice())
+}
+
+fn places(world: &World) -> Vec<Vec3> {
+    world.bodies.iter().map(|(_, body)| place(body)).collect()
+}
+
+/// Returns the first body that is out of range, or too fast, or nowhere.
+fn fault(run: &Run) -> Option<String> {
+    let start = run.start.iter().fold(0.0, |most: f32, at| most.max(at.length()));
+    // Nothing gets farther than it goes at the highest speed in all the steps.
+    let range = start + MOST_SPEED * STEPS as f32 / 60.0;
+    let is_wrong = |body: &RigidBody| {
+        let (at, speed) = (place(body), body.linvel().norm());
+        // A comparison with a NaN is false.
+        !(at.length() < range && speed < MOST_SPEED)
+    };
+    let (_, body) = run.world.bodies.iter().find(|(_, body)| is_wrong(body))?;
+    Some(format!("{} with {} m/s", place(body), body.linvel().norm()))
+}
+
+#[test]
+fn nothing_explodes_in_300_steps() {
+    for scene in Scene::ALL {
+        for bodies in [10, 300] {
+            let run = Run::new(scene.name, bodies).steps(STEPS);
+            assert_eq!(fault(&run), None, "{}, {bodies} bodies", scene.name);
+        }
+    }
+}
+
+#[test]
+fn a_body_that_explodes_or_is_nowhere_is_a_fault() {
+    let planted: [fn(&mut RigidBody); 3] = [
+        |body| body.set_linvel(to_vector(Vec3::X * 101.0), true),
+        |body| body.set_translation(to_vector(Vec3::Y * 1e4), true),
+        |body| body.set_translation(to_vector(Vec3::NAN), true),
+    ];
+    for plant in planted {
+        let mut run = Run::new("column", 100).steps(10);
+        assert_eq!(fault(&run), None);
+        plant(run.world.bodies.iter_mut().next().expect("there are bodies").1);
+        assert!(fault(&run).is_some());
+    }
+}
+
+#[test]
+fn a_thrown_ball_knocks_bodies_over() {
+    let mut run = Run::new("sleeping", 400);
+    let ball = run.world.throw(Vec3::new(-10.0, 1.0, 10.0), Vec3::X * 30.0);
+    run.start = places(&run.world);
+    let run = run.steps(60);
+    assert!(place(&run.world.bodies[ball]).x > -5.0);
+    assert!(run.dynamic().iter().filter(|(start, now)| start.distance(*now) > 0.5).count() > 3);
+}
+
+#[test]
+fn the_balls_of_a_galton_board_fall_into_the_middle_bins_more_than_into_the_outer_ones() {
+    let run = Run::new("galton", 50).steps(2 * STEPS);
+    let landed: Vec<f32> =
+        run.dynamic().iter().map(|(_, now)| *now).filter(|at| at.y < 3.0).map(|at| at.x).collect();
+    assert!(landed.len() > 40, "{} of 50 balls are in bins", landed.len());
+    let middle = landed.iter().filter(|x| x.abs() < 1.1).count();
+    assert!(middle * 2 > landed.len(), "{middle} of {} balls are in the three middle bins", landed.len());
+    assert!(landed.iter().any(|x| *x < -1.0) && landed.iter().any(|x| *x > 1.0), "{landed:?}");
+}
+
+#[test]
+fn a_wrecking_ball_breaks_its_wall() {
+    let moved = |run: &Run| run.dynamic().iter().filter(|(start, now)| start.distance(*now) > 1.0).count();
+    let early = Run::new("wrecking", 250).steps(60);
+    assert_eq!(moved(&early), 1, "only the ball moves");
+    let late = early.steps(STEPS);
+    assert!(moved(&late) > 50, "{} of 250 have moved", moved(&late));
+}
+
+#[test]
+fn cars_keep_to_their_lane_and_knock_barrels_about() {
+    let run = Run::new("traffic", 300);
+    let cars: Vec<ColliderHandle> = (run.world.bodies.iter())
+        .filter(|(_, body)| body.is_kinematic())
+        .map(|(_, body)| body.colliders()[0])
+        .collect();
+    let at = |run: &Run| -> Vec<Vec3> {
+        let places = cars.iter().map(|&car| run.world.colliders[car].translation());
+        places.map(|at| Vec3::from_slice(at.as_slice())).collect()
+    };
+    let before = at(&run);
+    let run = run.steps(STEPS);
+    assert!(cars.len() > 50);
+    for (before, after) in before.into_iter().zip(at(&run)) {
+        assert!((before.length() - after.length()).abs() < 0.05, "{before} {after}");
+        assert!(before.distance(after) > 10.0, "{before} {after}");
+    }
+    let moved = run.dynamic().iter().filter(|(start, now)| start.distance(*now) > 2.0).count();
+    assert!(moved > 5, "{moved} barrels moved");
+}
+
+#[test]
+fn crates_pass_through_the_gates_of_a_conveyor() {
+    let mut run = Run::new("conveyor", 140);
+    for _ in 0..10 {
+        run = run.steps(20);
+        let inside =
+            run.world.narrow_phase.intersection_pairs().filter(|(_, _, is_inside)| *is_inside).count();
+        assert!(inside > 5, "{inside} crates in gates");
+    }
+    let carried = run.dynamic().iter().filter(|(start, now)| now.x > start.x + 1.0).count();
+    assert!(carried > 30, "{carried} of 40 crates were carried");
+}
+
+#[test]
+fn boulders_roll_down_the_valley() {
+    let run = Run::new("avalanche", 300).steps(STEPS);
+    let down =
+        run.dynamic().iter().filter(|(start, now)| now.z > start.z + 5.0 && now.y < start.y - 5.0).count();
+    assert!(down > 200, "{down} of 300");
+}
+
+#[test]
+fn a_jar_holds_what_falls_into_it() {
+    let run = Run::new("jar", 500).steps(STEPS);
+    let widest = run.start.iter().fold(0.0, |most: f32, at| most.max(Vec3::new(at.x, 0.0, at.z).length()));
+    for (start, now) in run.dynamic() {
+        assert!(Vec3::new(now.x, 0.0, now.z).length() < widest + 0.7 && now.y > 0.0, "{start} {now}");
+    }
+}
+
+#[test]
+fn asteroids_do_not_fall_and_differ_in_size() {
+    let run = Run::new("asteroids", 500);
+    let sizes = run.world.colliders.iter().map(|(_, collider)| collider.compute_aabb().half_extents().max());
+    let (least, most) =
+        sizes.fold((f32::MAX, 0.0), |(least, most): (f32, f32), size| (least.min(size), most.max(size)));
+    assert!(most > 20.0 * least, "{least} to {most}");
+    let height = |run: &Run| run.dynamic().iter().map(|(_, now)| now.y).sum::<f32>() / 500.0;
+    let before = height(&run);
+    assert!((height(&run.steps(STEPS)) - before).abs() < 5.0);
+}
+
+#[test]
+fn the_joints_of_ragdolls_hold() {
+    let run = Run::new("ragdolls", 110).steps(STEPS);
+    for (_, joint) in run.world.impulse_joints.iter() {
+        let [one, other] = [joint.body1, joint.body2].map(|body| run.world.bodies[body].position());
+        let apart = (one * joint.data.local_anchor1() - other * joint.data.local_anchor2()).norm();
+        assert!(apart < 0.1, "{apart} m");
+    }
+}
