@@ -31,12 +31,19 @@ pub struct SceneInfo {
     pub name: String,
     /// Description in a few words.
     pub about: String,
+    /// Property that makes it hard for a broad phase.
+    pub hard: String,
 }
 
 /// Returns every scene.
 #[wasm_bindgen]
 pub fn scenes() -> Vec<SceneInfo> {
-    Scene::ALL.iter().map(|scene| SceneInfo { name: scene.name.into(), about: scene.about.into() }).collect()
+    let info = |scene: &Scene| SceneInfo {
+        name: scene.name.into(),
+        about: scene.about.into(),
+        hard: scene.hard.into(),
+    };
+    Scene::ALL.iter().map(info).collect()
 }
 
 /// Triangles of a shape that is drawn as a mesh.

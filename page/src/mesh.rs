@@ -23,7 +23,6 @@ impl Mesh {
             TypedShape::HeightField(it) => it.to_trimesh(),
             TypedShape::ConvexPolyhedron(it) => it.to_trimesh(),
             TypedShape::RoundConvexPolyhedron(it) => it.inner_shape.to_trimesh(),
-            TypedShape::RoundCuboid(it) => it.inner_shape.to_trimesh(),
             TypedShape::RoundCylinder(it) => it.inner_shape.to_trimesh(sides),
             TypedShape::RoundCone(it) => it.inner_shape.to_trimesh(sides),
             TypedShape::Voxels(it) => it.to_trimesh(),

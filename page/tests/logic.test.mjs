@@ -19,7 +19,7 @@ test("mean and p99 by hand", () => {
 
 test("times keep the last steps of each broad phase", () => {
     const times = new Times();
-    const add = (step, broadPhase, ms) => times.add({ step, broadPhase, times: { broadPhase: ms, step: 2 * ms } });
+    const add = (steps, broadPhase, ms) => times.add({ steps, broadPhase, times: { broadPhase: ms, step: 2 * ms } });
     add(1, "stock", 4);
     for (let step = 2; step <= WINDOW_STEPS + 10; step++) add(step, "pbig", step < 11 ? 100 : 1);
     assert.equal(times.figure("stock", "step", "mean"), 8);

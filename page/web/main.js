@@ -13,6 +13,7 @@ const NARROW_SCREEN = "(max-width: 760px)";
 // Where drawing is slow, steps go on between the frames.
 const SLOW_FRAME_MS = 2 * STEP_MS;
 const TIMER_MS = STEP_MS / 2;
+const CONTEXT_LOST = new Error("The browser took the graphics context away. Reload the page.");
 
 class Page {
     #settings;
@@ -34,7 +35,7 @@ class Page {
         if (missing) return showMessage(`This browser has no ${missing.name}`, `The page needs it. ${missing.advice}`);
         try {
             this.#settings = parseSettings(location.search, matchMedia(NARROW_SCREEN).matches);
-            this.#stage = new Stage(document.getElementById("canvas"), () => this.#fail(new Error("The browser took the graphics context away. Reload the page.")));
+            this.#stage = new Stage(document.getElementById("canvas"), () => this.#fail(CONTEXT_LOST));
         } catch (error) {
             return showMessage("The page could not start", error.message);
         }
@@ -92,9 +93,7 @@ class Page {
     }
 
     #build() {
-        if (this.#hasFailed) this.#simulation?.end();
-        if (this.#hasFailed) this.#simulation = undefined;
-        this.#hasFailed = false;
+        if (this.#hasFailed) this.#dropSimulation();
         showMessage("Loading…");
         this.#do(async () => {
             this.#simulation ??= await this.#load();
@@ -107,17 +106,27 @@ class Page {
         });
     }
 
+    // A module that trapped cannot be used again.
+    #dropSimulation() {
+        this.#simulation?.end();
+        this.#simulation = undefined;
+        this.#hasFailed = false;
+    }
+
     async #load() {
         const simulation = new Simulation();
-        const scenes = await simulation.load();
-        this.#panel.fill(scenes, this.#settings);
+        try {
+            this.#panel.fill(await simulation.load(), this.#settings);
+        } catch (error) {
+            simulation.end();
+            throw error;
+        }
         return simulation;
     }
 
     async #step() {
-        const { broadPhase } = this.#settings;
         const frame = await this.#simulation.step();
-        this.#times.add({ step: frame.steps, broadPhase, times: frame.times });
+        this.#times.add(frame);
         this.#show(frame);
     }
 

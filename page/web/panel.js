@@ -9,8 +9,9 @@ const formatCount = (count) => count.toLocaleString("en");
 // Charts and tables are redrawn this often: every step would only flicker.
 const STEPS_PER_REDRAW = 6;
 
-/** The panel. `actions` has a function for each control. */
+/** The panel. Its parameter has a function for each control. */
 export class Panel {
+    #scenes = [];
     #charts = {
         broadPhase: createChart(element("chart-broad-phase")),
         step: createChart(element("chart-step")),
@@ -27,10 +28,12 @@ export class Panel {
     }
 
     /** Fills the lists of scenes and numbers of bodies, and switches the controls on. */
-    fill(scenes, { bodies }) {
+    fill(scenes, { scene, bodies }) {
         element("scene").replaceChildren(...scenes.map(({ name }) => new Option(name)));
         element("bodies").replaceChildren(...bodyChoices(bodies).map((n) => new Option(formatCount(n), n)));
-        this.scenes = scenes;
+        // Empty if there is no such scene.
+        element("scene").value = scene;
+        this.#scenes = scenes;
         for (const control of document.querySelectorAll("#controls :disabled")) control.disabled = false;
     }
 
@@ -38,7 +41,9 @@ export class Panel {
     showSettings({ scene, bodies, broadPhase }) {
         element("scene").value = scene;
         element("bodies").value = bodies;
-        element("about").textContent = this.scenes?.find(({ name }) => name === scene)?.about ?? "";
+        const info = this.#scenes.find(({ name }) => name === scene);
+        element("about").textContent = info?.about ?? "";
+        element("hard").textContent = info ? `Hard for a broad phase: ${info.hard}.` : "";
         document.querySelector(`[name=broad-phase][value=${broadPhase}]`).checked = true;
     }
 

@@ -12,7 +12,7 @@ export class Simulation {
         this.#worker.onerror = (event) => this.#failAll(event.message || `${url} could not be loaded`);
     }
 
-    /** Loads the module, and returns the scenes: `{ name, about }`. */
+    /** Loads the module, and returns the scenes: `{ name, about, hard }`. */
     load() {
         return this.#call("load");
     }

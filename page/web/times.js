@@ -16,7 +16,7 @@ export function p99(numbers) {
 
 const FIGURES = { mean, p99 };
 
-/** The last steps: `{ step, broadPhase, times: { broadPhase, step } }`, times in milliseconds. */
+/** The last steps: `{ steps, broadPhase, times: { broadPhase, step } }`, times in milliseconds. */
 export class Times {
     #all = [];
     #byBroadPhase = { stock: [], pbig: [] };
@@ -38,7 +38,7 @@ export class Times {
     columns(time) {
         const of = (name) =>
             this.#all.map(({ broadPhase, times }) => (broadPhase === name ? times[time] : null));
-        return [this.#all.map(({ step }) => step), of("stock"), of("pbig")];
+        return [this.#all.map(({ steps }) => steps), of("stock"), of("pbig")];
     }
 }
 

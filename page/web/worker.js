@@ -4,18 +4,21 @@ import init, { Simulation, panic_message, scenes } from "pbig-page-module";
 
 const MODULE = "pbig_page_bg.wasm";
 let simulation;
+// The broad phase in use.
+let broadPhase;
 
 const methods = {
     async load() {
         const response = await fetch(MODULE);
         if (!response.ok) throw new Error(`${MODULE} could not be loaded: status ${response.status}`);
         await init({ module_or_path: await response.arrayBuffer() });
-        return scenes().map(({ name, about }) => ({ name, about }));
+        return scenes().map(({ name, about, hard }) => ({ name, about, hard }));
     },
 
     build(settings) {
         simulation?.free();
         simulation = create(settings);
+        broadPhase = settings.broadPhase;
         return { ...readScenery(), ...readFrame() };
     },
 
@@ -26,6 +29,7 @@ const methods = {
 
     changeBroadPhase(name) {
         simulation.change_broad_phase(name);
+        broadPhase = name;
     },
 
     pairs(settings, steps) {
@@ -37,8 +41,8 @@ const methods = {
     },
 };
 
-function create({ scene, bodies, seed, broadPhase }) {
-    return new Simulation(scene, bodies, seed, broadPhase);
+function create(settings) {
+    return new Simulation(settings.scene, settings.bodies, settings.seed, settings.broadPhase);
 }
 
 /** Reads what stays the same from step to step. */
@@ -62,6 +66,7 @@ function readFrame() {
         bodies: simulation.body_count(),
         pairs: simulation.pair_count(),
         plan: simulation.plan(),
+        broadPhase,
         times: { broadPhase: simulation.broad_phase_ms(), step: simulation.step_ms() },
     };
 }

@@ -76,6 +76,18 @@ fn the_check_notices_a_broad_phase_that_starts_empty() {
     assert!(lost.is_err());
 }
 
+/// Pairs that pbig had and stock does not have stay in the narrow phase if nobody ends them.
+#[test]
+fn the_check_notices_pairs_that_are_left_behind() {
+    let left = run("column", 7, |run, choice| {
+        run.change_broad_phase(choice);
+        if choice == Choice::Stock {
+            run.replace_broad_phase(ExchangeableBroadPhase::new(choice));
+        }
+    });
+    assert!(left.is_err());
+}
+
 #[test]
 fn a_wrong_name_is_answered_with_the_right_ones() {
     assert_eq!("pbig".parse(), Ok(Choice::Pbig));
