@@ -23,16 +23,20 @@ tools=page/node_modules/.bin
 # The workspace's own folder for what it builds, as an absolute path.
 built=$(cargo metadata --no-deps --format-version 1 --manifest-path "$manifest" | sed 's/.*"target_directory":"\([^"]*\)".*/\1/')
 
-# build_module: rapier and pbig as a WebAssembly module with SIMD. The target has no unwinding.
+# build_module FOLDER [OPTION...]: rapier and pbig as a WebAssembly module, and the JavaScript beside it. The module has SIMD,
+# and no unwinding. The program that writes the JavaScript is small: optimizing it would take longer than it runs.
 build_module() {
+    local folder=$1
+    shift
     RUSTFLAGS="-C target-feature=+simd128" CARGO_PROFILE_RELEASE_PANIC=abort step "${cargo[@]}" build --locked --release \
-        --lib --manifest-path "$manifest" --target "$target" --target-dir "$built/wasm"
+        --lib --manifest-path "$manifest" --target "$target" --target-dir "$built/wasm" "$@"
+    step cargo run --quiet --locked --manifest-path "$manifest" --package pbig-page-bindgen -- \
+        "$built/wasm/$target/release/pbig_page.wasm" "$folder"
 }
 
-# build_bindings: the JavaScript beside the module. The program is small: optimizing it would take longer than it runs.
-build_bindings() {
-    step cargo run --quiet --locked --manifest-path "$manifest" --package pbig-page-bindgen -- \
-        "$built/wasm/$target/release/pbig_page.wasm" "$built/bindings"
+# build_native [OPTION...]: the native program whose pairs are compared with the module's.
+build_native() {
+    step cargo build --quiet --locked --release --manifest-path "$manifest" --package pbig-page --bin native_pairs "$@"
 }
 
 install_tools() {
@@ -53,12 +57,22 @@ bundle() {
     done
 }
 
+# build_deterministic: module and native program with mathematics that are the same on both sides.
+build_deterministic() {
+    local options="--no-default-features --features deterministic" folder=$built/deterministic
+    build_module "$folder" $options
+    build_native $options
+    cp "$built/release/native_pairs" "$folder"
+    mv "$folder/pbig_page.js" "$folder/pbig_page.mjs"
+}
+
 # test_page: the logic natively and in node, then the page in a browser, one test file after another.
 test_page() {
     step cargo test --quiet --locked --release --manifest-path "$manifest" --package pbig-page
-    step cargo build --quiet --locked --release --manifest-path "$manifest" --package pbig-page --bin native_pairs
-    PAGE_FOLDER=$(cd "$out" && pwd) NATIVE_PAIRS=$built/release/native_pairs SHOTS=$PWD/out/page-shots \
-        step node --test --test-reporter=spec --test-concurrency=1 page/tests/*.test.mjs
+    build_deterministic
+    build_native
+    PAGE_FOLDER=$(cd "$out" && pwd) NATIVE_PAIRS=$built/release/native_pairs DETERMINISTIC=$built/deterministic \
+        SHOTS=$PWD/out/page-shots step node --test --test-reporter=spec --test-concurrency=1 page/tests/*.test.mjs
 }
 
 choose_cargo "$target" && has npm || { left_out "$target or npm" && exit 0; }
@@ -66,9 +80,8 @@ if $builds_std; then
     export CARGO_TARGET_WASM32_UNKNOWN_UNKNOWN_LINKER
     CARGO_TARGET_WASM32_UNKNOWN_UNKNOWN_LINKER=$(wasm_linker)
 fi
-build_module
+build_module "$built/bindings"
 install_tools
-build_bindings
 bundle
 echo "== the page is in $out; serve it with: python3 -m http.server -d $out"
 if $test; then

@@ -62,8 +62,8 @@ pub struct GroupData {
     pub kind: String,
     /// Number of the mesh, if the kind is `mesh`.
     pub mesh: Option<u32>,
-    /// True for parts of sensors.
-    pub is_sensor: bool,
+    /// True for parts that are drawn translucent.
+    pub is_translucent: bool,
     /// Number of parts.
     pub count: u32,
 }
@@ -186,7 +186,7 @@ fn group_data(group: &crate::Group) -> GroupData {
         Kind::HalfSpace => ("half-space", None),
         Kind::Mesh(number) => ("mesh", Some(number)),
     };
-    GroupData { kind: kind.into(), mesh, is_sensor: group.is_sensor, count: group.count }
+    GroupData { kind: kind.into(), mesh, is_translucent: group.is_translucent, count: group.count }
 }
 
 fn to_js(message: String) -> JsError {

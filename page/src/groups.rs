@@ -7,26 +7,26 @@ use rapier3d::prelude::*;
 /// Floats of one matrix.
 const MATRIX_FLOATS: usize = 16;
 
-/// Parts of one kind. Sensors are apart because they are drawn translucent.
+/// Parts of one kind. Those that are drawn translucent are apart.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Group {
     /// Shape before scaling.
     pub kind: Kind,
-    /// True if the parts belong to sensors.
-    pub is_sensor: bool,
+    /// True for parts that would hide what happens: those of sensors, and walls.
+    pub is_translucent: bool,
     /// Number of parts.
     pub count: u32,
 }
 
 struct Member {
     collider: ColliderHandle,
-    is_sensor: bool,
+    is_translucent: bool,
     part: Part,
 }
 
 impl Member {
     fn key(&self) -> (Kind, bool) {
-        (self.part.kind, self.is_sensor)
+        (self.part.kind, self.is_translucent)
     }
 }
 
@@ -81,8 +81,8 @@ fn matrix(pose: &Isometry<Real>, part: &Part) -> Matrix4 {
 }
 
 fn group(members: &[Member]) -> Group {
-    let (kind, is_sensor) = members[0].key();
-    Group { kind, is_sensor, count: members.len() as u32 }
+    let (kind, is_translucent) = members[0].key();
+    Group { kind, is_translucent, count: members.len() as u32 }
 }
 
 fn append_members(
@@ -99,7 +99,9 @@ fn append_members(
         if is_fixed {
             part.colour = crate::parts::Colour::Fixed;
         }
-        members.push(Member { collider: handle, is_sensor: collider.is_sensor(), part });
+        let is_ground = matches!(part.kind, Kind::HalfSpace | Kind::Mesh(_));
+        let is_translucent = collider.is_sensor() || is_fixed && !is_ground;
+        members.push(Member { collider: handle, is_translucent, part });
     }
 }
 

@@ -2,17 +2,16 @@
 // Environment: NATIVE_PAIRS, the native program; SHOTS, a folder for screenshots.
 
 import assert from "node:assert/strict";
-import { execFileSync } from "node:child_process";
 import { mkdirSync } from "node:fs";
 import { after, before, test } from "node:test";
 import { launch, numberOf, open, serve, textOf, waitForSteps } from "./browser.mjs";
+import { firstDifference, nativePairs, PAIR_STEPS } from "./pairs.mjs";
 
-const nativePairs = process.env.NATIVE_PAIRS;
+const program = process.env.NATIVE_PAIRS;
 const shots = process.env.SHOTS ?? "../out/page-shots";
 const STEPS = 300;
-const PAIR_STEPS = 60;
 // Scenes in which rapier's numbers are the same on both sides for so many steps; page/README.md says why others' are not.
-const EQUAL_SCENES = ["column", "ragdolls", "rain", "sensors"];
+const EQUAL_SCENES = ["column", "galton", "rain", "sensors"];
 const DESKTOP = { width: 1280, height: 800 };
 const PHONE = { width: 390, height: 844, deviceScaleFactor: 2, isMobile: true, hasTouch: true };
 
@@ -127,28 +126,17 @@ test("every scene builds and draws", async () => {
     await page.close();
 });
 
-function nativePairsOf({ scene, bodies, seed, broadPhase }) {
-    const output = execFileSync(nativePairs, [scene, bodies, seed, PAIR_STEPS, broadPhase], { maxBuffer: 2 ** 30 });
-    return output.toString().trim().split("\n").map((line) => JSON.parse(line));
-}
-
-/** Returns the first step, from 1, in which two runs have other pairs; undefined if they are equal. */
-function firstDifference(one, other) {
-    const step = one.findIndex((pairs, at) => pairs.join() !== other[at].join());
-    return step < 0 ? undefined : step + 1;
-}
-
-test("the pairs of 60 steps are those of the native build", { skip: !nativePairs && "NATIVE_PAIRS is not set" }, async () => {
+test("the pairs of 60 steps are those of the native build", { skip: !program && "NATIVE_PAIRS is not set" }, async () => {
     const page = await openScene("?bodies=100");
     await waitForSteps(page, 1);
     for (const scene of EQUAL_SCENES) {
         const settings = { scene, bodies: 1000, seed: 1, broadPhase: "pbig" };
         const inPage = await page.evaluate((s, n) => window.pbigPage.pairs(s, n), settings, PAIR_STEPS);
-        const native = nativePairsOf(settings);
+        const native = nativePairs(program, settings);
         assert.equal(native.length, PAIR_STEPS);
         assert.equal(firstDifference(inPage, native), undefined, `${scene}: the first step that differs`);
         // Planted faults: another seed, and a pair that is lost in the last step.
-        assert.notEqual(firstDifference(inPage, nativePairsOf({ ...settings, seed: 2 })), undefined, scene);
+        assert.notEqual(firstDifference(inPage, nativePairs(program, { ...settings, seed: 2 })), undefined, scene);
         native.at(-1).splice(0, 2);
         assert.equal(firstDifference(inPage, native), PAIR_STEPS, scene);
         console.log(`${scene}: ${inPage.at(-1).length / 2} pairs in step ${PAIR_STEPS}, all steps equal`);

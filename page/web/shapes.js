@@ -8,7 +8,7 @@ const FINE_PARTS = 3000;
 const GROUND_SIZE = 4000;
 // The classes of `Colour` in src/parts.rs, in their order.
 const COLOURS = ["--fixed", "--ball", "--cuboid", "--slab", "--capsule", "--other"];
-const SENSOR_OPACITY = 0.25;
+const OPACITY = 0.35;
 
 const unitGeometries = {
     ball: (fine) => new THREE.SphereGeometry(1, fine ? 20 : 10, fine ? 14 : 7),
@@ -25,8 +25,8 @@ export function createMesh(group, meshes) {
     mesh.instanceMatrix.setUsage(THREE.DynamicDrawUsage);
     // The bounding sphere of the instances would have to follow them.
     mesh.frustumCulled = false;
-    mesh.castShadow = !group.isSensor && group.kind !== "half-space";
-    mesh.receiveShadow = !group.isSensor;
+    mesh.castShadow = !group.isTranslucent && group.kind !== "half-space";
+    mesh.receiveShadow = !group.isTranslucent;
     return mesh;
 }
 
@@ -54,8 +54,8 @@ function meshGeometry({ coordinates, indices }) {
     return geometry;
 }
 
-function material({ kind, isSensor }) {
+function material({ kind, isTranslucent }) {
     const side = kind === "mesh" ? THREE.DoubleSide : THREE.FrontSide;
-    const seeThrough = { transparent: true, opacity: SENSOR_OPACITY, depthWrite: false };
-    return new THREE.MeshLambertMaterial({ side, ...(isSensor && seeThrough) });
+    const seeThrough = { transparent: true, opacity: OPACITY, depthWrite: false };
+    return new THREE.MeshLambertMaterial({ side, ...(isTranslucent && seeThrough) });
 }

@@ -47,7 +47,7 @@ function create(settings) {
 
 /** Reads what stays the same from step to step. */
 function readScenery() {
-    const copyGroup = ({ kind, mesh, is_sensor, count }) => ({ kind, mesh, isSensor: is_sensor, count });
+    const copyGroup = ({ kind, mesh, is_translucent, count }) => ({ kind, mesh, isTranslucent: is_translucent, count });
     const copyMesh = ({ coordinates, indices }) => ({ coordinates, indices });
     return {
         scenery: {
