@@ -6,9 +6,9 @@ import { themeColour } from "./theme.js";
 // Above these numbers of parts, round shapes get fewer triangles.
 const FINE_PARTS = 3000;
 const GROUND_SIZE = 4000;
-// The classes of `Colour` in src/parts.rs, in their order.
-const COLOURS = ["--fixed", "--ball", "--cuboid", "--slab", "--capsule", "--other"];
-const OPACITY = 0.35;
+// The classes of `Colour` in src/parts.rs, in their order. Fixed parts are ground or walls.
+const COLOURS = ["--ground", "--ball", "--cuboid", "--slab", "--capsule", "--other"];
+const OPACITY = 0.4;
 
 const unitGeometries = {
     ball: (fine) => new THREE.SphereGeometry(1, fine ? 20 : 10, fine ? 14 : 7),
@@ -33,6 +33,7 @@ export function createMesh(group, meshes) {
 /** Sets the colour of each instance from its class. */
 export function colourInstances(mesh, classes) {
     const palette = COLOURS.map((name) => new THREE.Color(themeColour(name)));
+    if (mesh.material.transparent) palette[0].set(themeColour("--wall"));
     const shaded = new THREE.Color();
     classes.forEach((number, at) => {
         // Neighbours differ a little in lightness.

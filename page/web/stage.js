@@ -65,7 +65,7 @@ export class Stage {
     lookAt([x, y, z, halfX, halfY, halfZ]) {
         const radius = Math.max(Math.hypot(halfX, halfY, halfZ), 1);
         // Things fall: the ground below is as interesting as the place they start from.
-        const target = new THREE.Vector3(x, y - 0.3 * halfY, z);
+        const target = new THREE.Vector3(x, y - 0.4 * halfY, z);
         const distance = radius / Math.sin(this.#narrowAngle() / 2);
         this.#orbit.target.copy(target);
         this.#camera.position.copy(target).addScaledVector(VIEW_DIRECTION, distance);
