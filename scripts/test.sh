@@ -56,7 +56,7 @@ step_fmt() {
     check scripts/report-test.sh
     check cargo fmt --all --check
     # Workspaces of their own.
-    for other in fuzz wasm; do
+    for other in fuzz wasm page; do
         check cargo fmt --manifest-path "$other/Cargo.toml" --check
         check cargo fetch --locked --manifest-path "$other/Cargo.toml"
     done
