@@ -68,6 +68,9 @@ pub fn alone(case: &str, boxes: usize, pairs: u64, unit: &str, value: Option<f64
     [cells![case, boxes, pairs, unit, value], vec![Value::Null; 6]].concat()
 }
 
+/// Prepares nothing, for [`measured`].
+pub fn unprepared<S>(_: &mut S, _: usize) {}
+
 /// Returns the medians of [`measured`].
 ///
 /// # Errors
@@ -95,7 +98,7 @@ pub fn measured<S>(
     mut prepare: impl FnMut(&mut S, usize),
     mut run: impl FnMut(&mut S, usize) -> Result<f64, Failure>,
 ) -> Result<Vec<Took>, Failure> {
-    // By side, then by place.
+    // By place, then by side.
     let mut times = vec![vec![Vec::new(); sides]; sides];
     let enough = effort.warm_up + 3 * sides.min(2);
     let clock = Instant::now();
@@ -105,23 +108,20 @@ pub fn measured<S>(
             break;
         }
         prepare(state, round);
-        for place in 0..sides {
+        for (place, times) in times.iter_mut().enumerate() {
             let side = (round + place) % sides;
             let time = run(state, side)?;
             if round >= effort.warm_up {
-                times[side][place].push(time);
+                times[side].push(time);
             }
         }
     }
-    let took = |places: Vec<Vec<f64>>| {
-        let (sum, count) =
-            places.iter().flatten().fold((0.0, 0), |(sum, count), time| (sum + time, count + 1));
-        Took {
-            median: mean_of_medians(places.iter().map(Vec::as_slice)),
-            mean: sum / f64::from(count.max(1)),
-        }
+    let took = |side: usize| {
+        let places = || times.iter().map(|times| &times[side][..]);
+        let (sum, count) = places().flatten().fold((0.0, 0), |(sum, count), time| (sum + time, count + 1));
+        Took { median: mean_of_medians(places()), mean: sum / f64::from(count.max(1)) }
     };
-    Ok(times.into_iter().map(took).collect())
+    Ok((0..sides).map(took).collect())
 }
 
 /// Returns the mean of the medians of all places in which there is a time.

@@ -8,7 +8,7 @@ mod avril;
 mod claims;
 mod figures;
 mod model;
-mod printed;
+pub(crate) mod printed;
 mod roots;
 mod sides;
 mod table_iii;

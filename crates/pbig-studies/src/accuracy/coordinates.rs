@@ -53,17 +53,11 @@ fn measure(set: &str, n: usize, quick: bool, table: &mut Table) -> Result<(), Fa
     let (rounds, ms) = if quick { (7, 250) } else { (31, 4000) };
     let effort = Effort { warm_up: 2, rounds, budget: Duration::from_millis(ms) };
     let (mut kept, mut found) = (vec![], [(); KINDS.len()].map(|()| Vec::<Found>::new()));
-    measured(
-        &mut found,
-        KINDS.len(),
-        effort,
-        |_, _| (),
-        |found, side| {
-            let one = (KINDS[side].find)(&candidates, &mut kept);
-            found[side].push(one);
-            Ok(milliseconds(one.test + one.recheck))
-        },
-    )?;
+    measured(&mut found, KINDS.len(), effort, unprepared, |found, side| {
+        let one = (KINDS[side].find)(&candidates, &mut kept);
+        found[side].push(one);
+        Ok(milliseconds(one.test + one.recheck))
+    })?;
     // As pbig counts them, by another search.
     let mut finder = Finder::new(Config { limits: Limits::UNLIMITED, ..Config::DEFAULT });
     let pairs = finder.find(&boxes)?.len() as u64;

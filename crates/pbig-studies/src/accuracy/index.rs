@@ -14,7 +14,7 @@ use rand::{RngExt, SeedableRng};
 use rayon::prelude::*;
 use std::hint::black_box;
 use std::time::Duration;
-use tally::{Block, Tally, WAYS, Way, at, at_ends};
+use tally::{Block, Tally, WAYS, Way, at, at_ends, lazy_pass};
 
 /// The name of the way without a row.
 const LAZY: &str = "lazy way";
@@ -216,33 +216,18 @@ fn blocks(all: i64, times: i64) -> Vec<Block> {
 fn add_times(n: i64, quick: bool, table: &mut Table) -> Result<(), Failure> {
     let (pairs, ids) = (blocks(pairs_of(n), 1), blocks(lazy_ids(n), 2));
     let count: i64 = pairs.iter().map(|block| block.1).sum();
-    let lazy = || {
-        let mut found = 0i64;
-        let sum = tally::sum(&ids, |id| {
-            let pair = lazy_pair(id, n);
-            found += i64::from(pair.is_some());
-            pair.unwrap_or((0, 0))
-        });
-        (found, sum)
-    };
     let sides = 3 * WAYS.len() + 1;
     let rounds = if quick { 15 } else { 2 * sides };
     let effort = Effort { warm_up: 0, rounds, budget: Duration::from_secs(20) };
     let mut times = vec![vec![]; sides];
-    measured(
-        &mut times,
-        sides,
-        effort,
-        |_, _| (),
-        |times, side| {
-            let ((found, _), ms) = match WAYS.get(side / 3) {
-                Some(way) => timed(|| (count, black_box((way.passes[side % 3])(n, &pairs)))),
-                None => timed(|| black_box(lazy())),
-            };
-            times[side].push(ms * 1e6 / found.max(1) as f64);
-            Ok(ms)
-        },
-    )?;
+    measured(&mut times, sides, effort, unprepared, |times, side| {
+        let ((found, _), ms) = match WAYS.get(side / 3) {
+            Some(way) => timed(|| (count, black_box((way.passes[side % 3])(n, &pairs)))),
+            None => timed(|| black_box(lazy_pass(n, &ids))),
+        };
+        times[side].push(ms * 1e6 / found.max(1) as f64);
+        Ok(ms)
+    })?;
     // Medians over all places in a round: there are too many places for a median of each.
     let ns: Vec<f64> = times.into_iter().map(|times| Spread::of(times).median).collect();
     for (way, ns) in WAYS.iter().zip(ns.chunks(3)) {

@@ -107,19 +107,13 @@ fn times(world: &World, quick: bool) -> Result<Table, Failure> {
         let place = Place::new(&world.layout, world.layout.poses([offset; 3]));
         // Finders keep their buffers.
         let mut sides: Vec<_> = WAYS[..TIMED].iter().map(|way| (*way, finder(), vec![])).collect();
-        let both = medians(
-            &mut sides,
-            TIMED,
-            effort,
-            |_, _| (),
-            |sides, side| {
-                let (way, finder, kept) = &mut sides[side];
-                let (boxes, computed) = timed(|| place.boxes(*way));
-                let (found, searched) = timed(|| finder.find(&boxes).map(<[_]>::len));
-                kept.push(computed);
-                Ok(found.map(|_| computed + searched)?)
-            },
-        )?;
+        let both = medians(&mut sides, TIMED, effort, unprepared, |sides, side| {
+            let (way, finder, kept) = &mut sides[side];
+            let (boxes, computed) = timed(|| place.boxes(*way));
+            let (found, searched) = timed(|| finder.find(&boxes).map(<[_]>::len));
+            kept.push(computed);
+            Ok(found.map(|_| computed + searched)?)
+        })?;
         let each = 1e6 / place.len().max(1) as f64;
         for ((way, _, kept), both) in sides.iter().zip(both) {
             table.row(cells![offset, way.0, median(kept) * each, both * each]);

@@ -105,21 +105,21 @@ pub(super) const AVRIL_2: [(u64, f64, f64); 3] =
     [(1000, 0.21, 0.25), (10_000, 2.25, 4.28), (100_000, 29.66, 58.24)];
 
 /// A row of Avril's table 4.
-pub(super) struct Roots {
-    pub(super) roots: u64,
+pub(crate) struct Roots {
+    pub(crate) roots: u64,
     /// Milliseconds by Carmack's or Lomont's approximation, which it has the same for both.
-    pub(super) approximate: f64,
+    pub(crate) approximate: f64,
     /// Milliseconds of CUDA's own.
-    pub(super) cuda: f64,
+    pub(crate) cuda: f64,
     /// The value of the last digit of both.
-    pub(super) digit: f64,
+    pub(crate) digit: f64,
     /// "% of computation time reduction"
-    pub(super) gamma: f64,
+    pub(crate) gamma: f64,
 }
 
 impl Roots {
     /// The reduction in % that the two times give; each `off` half digits from what is printed, in opposite directions.
-    pub(super) fn reduction(&self, off: f64) -> f64 {
+    pub(crate) fn reduction(&self, off: f64) -> f64 {
         let half = 0.5 * off * self.digit;
         100.0 * (1.0 - (self.approximate - half) / (self.cuda + half))
     }
@@ -130,7 +130,7 @@ const fn roots(roots: u64, approximate: f64, cuda: f64, digit: f64, gamma: f64) 
 }
 
 /// Avril, table 4.
-pub(super) const AVRIL_4: [Roots; 4] = [
+pub(crate) const AVRIL_4: [Roots; 4] = [
     roots(1_000_000, 0.042, 0.048, 0.001, 12.6),
     roots(10_000_000, 0.409, 0.478, 0.001, 14.7),
     roots(100_000_000, 4.102, 4.722, 0.001, 13.2),

@@ -102,19 +102,13 @@ pub(super) fn race(
 ) -> Result<Vec<Raced>, Failure> {
     let frames = [moved(&boxes, distance, 2), boxes];
     let mut sides: Vec<(Side, Vec<Call>)> = ways.iter().map(|way| (Side::new(*way, gpu), vec![])).collect();
-    let took = measured(
-        &mut sides,
-        ways.len(),
-        effort,
-        |_, _| (),
-        |sides, side| {
-            let (side, calls) = &mut sides[side];
-            let call = side.call(&frames[calls.len() % 2])?;
-            let ms = call.ms;
-            calls.push(call);
-            Ok(ms)
-        },
-    )?;
+    let took = measured(&mut sides, ways.len(), effort, unprepared, |sides, side| {
+        let (side, calls) = &mut sides[side];
+        let call = side.call(&frames[calls.len() % 2])?;
+        let ms = call.ms;
+        calls.push(call);
+        Ok(ms)
+    })?;
     let counts = |calls: &[Call]| calls.iter().map(|call| call.pairs).collect::<Vec<_>>();
     let other = sides.iter().map(|(_, calls)| counts(calls)).find(|found| *found != counts(&sides[0].1));
     check(other.is_none(), || format!("ways that differ in settings found other pairs: {other:?}"))?;

@@ -1,6 +1,7 @@
 //! Avril's tables 3 and 4 beside ours, and a search for the rounding that gives table 3.
 
 use crate::index::{CARMACK, LOMONT, Newton, Single, SingleRoot};
+use crate::papers::printed::AVRIL_4;
 use pbig_harness::prelude::*;
 use rayon::prelude::*;
 
@@ -12,14 +13,6 @@ const TABLE_3: [(u32, [f64; 4]); 6] = [
     (1_000_000, [0.1800, 0.1803, 0.0110, 0.0111]),
     (10_000_000, [0.3681, 0.3685, 0.0040, 0.0057]),
     (100_000_000, [0.9847, 0.9855, 0.0134, 0.0142]),
-];
-
-/// Table 4: roots, and milliseconds of Carmack's, Lomont's and CUDA's.
-const TABLE_4: [(u32, [f64; 3]); 4] = [
-    (1_000_000, [0.042, 0.042, 0.048]),
-    (10_000_000, [0.409, 0.409, 0.478]),
-    (100_000_000, [4.102, 4.102, 4.722]),
-    (1_000_000_000, [41.01, 41.01, 48.01]),
 ];
 
 /// Counts wrong roots below a number: in f32 and with steps in f64 against the exact root, and the latter against f32's.
@@ -87,10 +80,11 @@ pub(super) fn table_4(quick: bool) -> Table {
         roots_ms::<Single>,
     ];
     let mut table = Table::new("table_4", columns);
-    let most = if quick { 10_000_000 } else { u32::MAX };
-    for (count, paper) in TABLE_4.into_iter().filter(|(count, _)| *count <= most) {
-        let ours = roots.map(|ms| ms(count));
-        table.row(cells![count].into_iter().chain(paper.into_iter().chain(ours).map(Into::into)));
+    let most = if quick { 10_000_000 } else { u64::MAX };
+    for row in AVRIL_4.iter().filter(|row| row.roots <= most) {
+        let paper = [row.approximate, row.approximate, row.cuda];
+        let ours = roots.map(|ms| ms(row.roots as u32));
+        table.row(cells![row.roots].into_iter().chain(paper.into_iter().chain(ours).map(Into::into)));
     }
     table
 }

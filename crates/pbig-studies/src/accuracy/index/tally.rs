@@ -53,8 +53,19 @@ fn pass<R: Root, C: Correction>(n: i64, blocks: &[Block]) -> i64 {
     sum(blocks, |k| C::pair(R::row(2 * n - 1, discriminant(k, n)), k, n))
 }
 
+/// Returns the pairs that identifiers of the lazy way give, and such a sum.
+pub(super) fn lazy_pass(n: i64, blocks: &[Block]) -> (i64, i64) {
+    let mut pairs = 0;
+    let sum = sum(blocks, |id| {
+        let pair = lazy_pair(id, n);
+        pairs += i64::from(pair.is_some());
+        pair.unwrap_or((0, 0))
+    });
+    (pairs, sum)
+}
+
 #[inline(always)]
-pub(super) fn sum(blocks: &[Block], mut pair: impl FnMut(i64) -> Given) -> i64 {
+fn sum(blocks: &[Block], mut pair: impl FnMut(i64) -> Given) -> i64 {
     let all = blocks.iter().flat_map(|&(first, count)| first..first + count);
     all.fold(0, |sum, k| {
         let (a, b) = pair(k);
