@@ -1,15 +1,13 @@
 //! Run time against error: a study for each thing that can be wrong by a little.
 
 mod coordinates;
-mod index;
+pub(crate) mod index;
 mod margin;
 mod simulation;
 mod wide;
 
 use pbig_harness::chart::{Chart, Line, MAX_LINES};
-use pbig_harness::output::Failure;
-use pbig_harness::report::Report;
-use pbig_harness::table::Table;
+use pbig_harness::prelude::*;
 
 /// Makes a study, of small sizes if it is to be quick.
 pub type Run = fn(bool) -> Result<Report, Failure>;
@@ -45,4 +43,13 @@ fn report(
 /// Returns the share of a part, in percent.
 fn percent(part: u64, all: u64) -> f64 {
     part as f64 / all.max(1) as f64 * 100.0
+}
+
+fn mean(values: &[f64]) -> f64 {
+    values.iter().sum::<f64>() / values.len().max(1) as f64
+}
+
+/// Returns the median; 0 of none.
+fn median(values: &[f64]) -> f64 {
+    pbig_harness::runner::Spread::of(values.iter().copied()).median
 }

@@ -1,12 +1,12 @@
 //! Coordinates in fewer bits, for study: what a search's tests could read instead of f32, and the rounding that
-//! keeps them from missing a pair.
+//! keeps them from missing a pair: outward, so that what is stored of a minimum is never above it, and what is stored of a maximum
+//! never below.
 
-mod round;
 mod search;
 
-pub use round::{FARTHEST, Scale, half_down, half_up, half_value};
 pub use search::{Candidates, Found};
 
+use half::f16;
 use pbig_core::Aabb;
 
 /// Boxes as a test reads them.
@@ -128,5 +128,77 @@ impl Coordinates for Code {
         // The ninth bit of each difference `max - min`: set where that is below 0.
         const APART: u64 = 0x1004_0100_1004_0100;
         self.0.rotate_left(32).wrapping_add(other.0) & APART == 0
+    }
+}
+
+/// Coordinates are clamped to this many cells of the origin. Up to here f64 tells the smallest steps apart; beyond, all
+/// coordinates share one place, which costs tests and never a pair. Without it steps would be rounded to multiples of
+/// what fixed point wraps around at.
+pub const FARTHEST: f64 = (1u64 << 32) as f64;
+
+/// An integer for each f16, in their order; -0 just below 0.
+fn ordered(half: f16) -> i16 {
+    let bits = half.to_bits() as i16;
+    bits ^ (((bits >> 15) as u16) >> 1) as i16
+}
+
+/// The value of an integer in the order of f16.
+pub fn half_value(integer: i16) -> f32 {
+    // The order's inverse is itself.
+    f16::from_bits((integer ^ (((integer >> 15) as u16) >> 1) as i16) as u16).to_f32()
+}
+
+/// The largest f16 that is not above `x`, as an integer in the order of f16; `x` is no NaN.
+#[inline]
+pub fn half_down(x: f32) -> i16 {
+    // Zeros are one: a box that ends at -0 touches one that begins at 0.
+    let x = x + 0.0;
+    let nearest = f16::from_f32(x);
+    ordered(nearest) - i16::from(nearest.to_f32() > x)
+}
+
+/// The smallest f16 that is not below `x`, as an integer in the order of f16; `x` is no NaN.
+#[inline]
+pub fn half_up(x: f32) -> i16 {
+    let x = x + 0.0;
+    let nearest = f16::from_f32(x);
+    ordered(nearest) + i16::from(nearest.to_f32() < x)
+}
+
+/// From coordinates to steps of cells.
+#[derive(Clone, Copy, Debug)]
+pub struct Scale {
+    /// The lower corner of cell 0.
+    pub origin: [f32; 3],
+    /// The edge of a cell; above 0.
+    pub cell: f32,
+}
+
+impl Scale {
+    #[inline(always)]
+    fn cells(&self, axis: usize, x: f32) -> f64 {
+        let cells = (f64::from(x) - f64::from(self.origin[axis])) / f64::from(self.cell);
+        cells.clamp(-FARTHEST, FARTHEST)
+    }
+
+    /// The cell that contains a coordinate.
+    pub fn cell(&self, axis: usize, x: f32) -> i64 {
+        self.down(axis, x, 1)
+    }
+
+    /// Whole steps up to a coordinate: monotone, and never above it.
+    #[inline(always)]
+    pub fn down(&self, axis: usize, x: f32, steps: u32) -> i64 {
+        let exact = self.cells(axis, x) * f64::from(steps);
+        let whole = exact as i64;
+        whole - i64::from((whole as f64) > exact)
+    }
+
+    /// Whole steps to the next one at or above a coordinate: monotone, and never below it.
+    #[inline(always)]
+    pub fn up(&self, axis: usize, x: f32, steps: u32) -> i64 {
+        let exact = self.cells(axis, x) * f64::from(steps);
+        let whole = exact as i64;
+        whole + i64::from((whole as f64) < exact)
     }
 }
