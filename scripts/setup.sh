@@ -1,8 +1,8 @@
 #!/usr/bin/env bash
 # Installs what the scripts need, and says what. Where it may not install, it prints the command to run. With CI=true that is a
 # failure.
-#   scripts/setup.sh [PART...]     parts: rust patch vulkan wasm aarch64 spirv deny msrv semver viewer pictures; without one:
-#                                  all but aarch64, viewer and pictures
+#   scripts/setup.sh [PART...]     parts: rust patch vulkan wasm page aarch64 spirv deny msrv semver viewer pictures; without one:
+#                                  all but page, aarch64, viewer and pictures
 # Debian and Ubuntu: packages by apt, as root or by sudo without a password. Elsewhere it only says what is missing.
 set -euo pipefail
 cd "$(dirname "$0")/.."
@@ -74,6 +74,13 @@ setup_wasm() {
         require "a linker for WebAssembly" "lld-$(wasm_linker | sed 's/.*-//')" || true
     fi
     has node || require node nodejs || true
+}
+
+# The web page's tools come from npm. Its test needs a browser and a file server.
+setup_page() {
+    has npm || require npm npm || true
+    has python3 || require python3 python3 || true
+    has chromium || require "the browser Chromium" chromium || true
 }
 
 setup_aarch64() {

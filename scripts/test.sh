@@ -56,7 +56,7 @@ step_fmt() {
     check scripts/report-test.sh
     check cargo fmt --all --check
     # Workspaces of their own.
-    for other in fuzz wasm viewer; do
+    for other in fuzz wasm page viewer; do
         check cargo fmt --manifest-path "$other/Cargo.toml" --check
         check cargo fetch --locked --manifest-path "$other/Cargo.toml"
     done

@@ -11,6 +11,9 @@ pub mod files;
 pub mod layout;
 #[path = "../../crates/pbig-harness/src/pair_index.rs"]
 pub mod pair_index;
+#[allow(dead_code, reason = "the decoder needs a part of it")]
+#[path = "../../crates/pbig-core/src/parallel.rs"]
+mod parallel;
 #[path = "../../crates/pbig-harness/src/pbig_grid.rs"]
 pub mod pbig_grid;
 

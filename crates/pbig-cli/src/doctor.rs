@@ -3,9 +3,8 @@
 use pbig_core::gpu::{GpuError, adapters};
 use pbig_core::layout::Located;
 use pbig_core::{Aabb, Backend, Coding, Config, Finder, GpuFinder, GpuOptions, Limits, Pair, oracle};
-use pbig_harness::boxes::BoxSet;
-use pbig_harness::output::{Failure, print};
 use pbig_harness::pbig_grid::pbig_grid;
+use pbig_harness::prelude::*;
 use pbig_harness::report::simd_found;
 
 pub(crate) fn run() -> Result<(), Failure> {

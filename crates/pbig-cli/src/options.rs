@@ -96,18 +96,4 @@ mod tests {
         assert!(boxes.starts_with("9 boxes are more than 8; for more, use"), "{boxes}");
         assert!([pairs, boxes].iter().all(|text| !text.contains("raise")));
     }
-
-    #[test]
-    fn a_whole_number_lies_between_its_bounds() {
-        assert_eq!((whole("1", 1, 3), whole("3", 1, 3)), (Ok(1), Ok(3)));
-        assert_eq!((whole("0", 0, 0), seed("18446744073709551615")), (Ok(0), Ok(u64::MAX)));
-        let (low, high) = (Err("must be at least 1".into()), Err("must be at most 3".into()));
-        assert_eq!(["0", "-5"].map(|text| whole(text, 1, 3)), [low.clone(), low.clone()]);
-        let long = "9".repeat(50);
-        assert_eq!((whole(&long, 1, 3), whole(&format!("-{long}"), 1, 3)), (high.clone(), low));
-        assert_eq!(whole("4", 1, 3), high);
-        assert!(
-            ["", "1.5", "x"].iter().all(|text| whole(text, 1, 3).is_err_and(|why| why.contains("whole")))
-        );
-    }
 }

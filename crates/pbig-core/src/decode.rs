@@ -4,7 +4,8 @@
 
 use crate::Pair;
 use crate::layout::{BOX_BITS, ENDED, LANES};
-use rayon::prelude::*;
+use crate::parallel::{self, SharedSlice};
+use std::mem::MaybeUninit;
 use std::ops::Range;
 
 /// Words that break the format.
@@ -30,20 +31,30 @@ const PIECE: usize = 1 << 15;
 pub fn plain(words: &[u32], boxes: u32, is_sorted: bool, pairs: &mut Vec<Pair>) -> Result<(), DecodeError> {
     let given = whole_pairs(words)?;
     let start = pairs.len();
-    if given.len() < 2 * PIECE {
-        pairs.extend_from_slice(given);
-    } else {
-        pairs.par_extend(given.par_iter().with_min_len(PIECE).copied());
-    }
-    // The copy is checked: the words may lie in memory of a device, which is slow to read.
-    let copied = &pairs[start..];
-    let pieces = copied.par_chunks(2 * PIECE).enumerate();
-    let faulty = pieces.find_first(|(i, piece)| {
-        let before = if *i == 0 { None } else { Some(copied[2 * PIECE * i - 1]) };
-        !are_pairs(piece, boxes)
-            || is_sorted && !(piece.is_sorted_by(|a, b| a < b) && before < Some(piece[0]))
+    let pieces: Vec<&[Pair]> = given.chunks(2 * PIECE).collect();
+    pairs.reserve(given.len());
+    let places = SharedSlice::new(&mut pairs.spare_capacity_mut()[..given.len()]);
+    let are_good = parallel::map(pieces.len(), |i| {
+        let (at, piece) = (2 * PIECE * i, pieces[i]);
+        // SAFETY: the place is inside the reserved memory, and no other piece has it.
+        let copied = copy_into(unsafe { places.part(at..at + piece.len()) }, piece);
+        let before = i.checked_sub(1).and_then(|i| pieces[i].last());
+        let is_in_order = || copied.is_sorted_by(|a, b| a < b) && before < copied.first();
+        are_pairs(copied, boxes) && (!is_sorted || is_in_order())
     });
-    faulty.map_or(Ok(()), |(i, piece)| Err(fault_of(piece, boxes, 4 * PIECE * i)))
+    // SAFETY: as many pairs were reserved, and written.
+    unsafe { pairs.set_len(start + given.len()) };
+    let faulty = are_good.iter().position(|is_good| !is_good);
+    faulty.map_or(Ok(()), |i| Err(fault_of(pieces[i], boxes, 4 * PIECE * i)))
+}
+
+/// Copies pairs, and returns the copy. This is read from then on: the words may lie in memory of a device, which is slow.
+fn copy_into<'a>(place: &'a mut [MaybeUninit<Pair>], pairs: &[Pair]) -> &'a [Pair] {
+    for (place, pair) in place.iter_mut().zip(pairs) {
+        place.write(*pair);
+    }
+    // SAFETY: a pair was written into each place: both are equally long.
+    unsafe { std::slice::from_raw_parts(place.as_ptr().cast(), place.len()) }
 }
 
 fn are_pairs(piece: &[Pair], boxes: u32) -> bool {
@@ -96,22 +107,24 @@ pub fn events(
 /// If a record is cut off, or names an entry or a box that does not exist. Then nothing useful was appended.
 pub fn records(words: &[u32], entries: &[u32], boxes: u32, pairs: &mut Vec<Pair>) -> Result<(), DecodeError> {
     let pieces = pieces(words)?;
-    let counts: Vec<usize> = pieces.par_iter().map(|piece| count(words, piece)).collect();
-    let start = pairs.len();
-    pairs.resize(start + counts.iter().sum::<usize>(), Pair::default());
-    let (mut places, mut rest) = (Vec::new(), &mut pairs[start..]);
-    for count in counts {
-        let (place, behind) = rest.split_at_mut(count);
-        places.push(place);
-        rest = behind;
-    }
-    pieces.into_par_iter().zip(places).try_for_each(|(range, place)| {
-        let mut reader = Reader { words, entries, boxes, at: range.start, places: place.iter_mut() };
-        while reader.at < range.end {
+    let mut end = pairs.len();
+    let places = parallel::map(pieces.len(), |i| count(words, &pieces[i])).into_iter().map(|count| {
+        end += count;
+        end - count..end
+    });
+    let places: Vec<Range<usize>> = places.collect();
+    pairs.resize(end, Pair::default());
+    let shared = SharedSlice::new(pairs);
+    let decoded = parallel::map(pieces.len(), |i| {
+        // SAFETY: the places are inside the list, and no other piece has these.
+        let places = unsafe { shared.part(places[i].clone()) }.iter_mut();
+        let mut reader = Reader { words, entries, boxes, at: pieces[i].start, places };
+        while reader.at < pieces[i].end {
             reader.record()?;
         }
         Ok(())
-    })
+    });
+    decoded.into_iter().collect()
 }
 
 /// Returns the number of pairs of whole records, if no row is longer than its record.
@@ -263,4 +276,61 @@ pub fn bits(words: &[u32], boxes: u32, pairs: &mut Vec<Pair>) -> Result<(), Deco
         }
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// More pairs than two threads take at a time, in order.
+    fn many() -> Vec<Pair> {
+        (0..5 * PIECE as u32).map(|i| Pair { a: i / 3, b: i / 3 + 1 + i % 3 }).collect()
+    }
+
+    fn words_of(pairs: &[Pair]) -> Vec<u32> {
+        bytemuck::cast_slice(pairs).to_vec()
+    }
+
+    fn decoded(pairs: &[Pair]) -> Result<Vec<Pair>, DecodeError> {
+        let mut all = vec![Pair { a: 7, b: 8 }];
+        plain(&words_of(pairs), u32::MAX, true, &mut all)?;
+        Ok(all.split_off(1))
+    }
+
+    #[test]
+    fn pairs_of_several_pieces_are_appended_in_their_order() {
+        assert_eq!(decoded(&many()), Ok(many()));
+    }
+
+    #[test]
+    fn a_fault_in_any_piece_or_between_two_is_found_and_named() {
+        let piece = 2 * PIECE;
+        for at in [0, 1, piece - 1, piece, 2 * piece, many().len() - 1] {
+            let mut pairs = many();
+            pairs[at].a = pairs[at].b;
+            let wanted = DecodeError { what: "not a < b < boxes", at: 2 * at };
+            assert_eq!(decoded(&pairs), Err(wanted), "at {at}");
+        }
+        for at in [0, piece - 2, piece - 1, piece, 2 * piece - 1] {
+            let mut pairs = many();
+            pairs.swap(at, at + 1);
+            assert_eq!(decoded(&pairs).expect_err("two are swapped").what, "pairs out of order", "at {at}");
+        }
+    }
+
+    /// One record after the other, each a row of three partners.
+    #[test]
+    fn records_of_several_pieces_are_appended_in_their_order() {
+        let entries: Vec<u32> = (0..4).collect();
+        let record = [2, 0, 0, u32::from_le_bytes([0, 2, 1, 2]), u32::from_le_bytes([3, 0, 0, 0])];
+        let repeats = 20_000;
+        let row = [Pair { a: 0, b: 1 }, Pair { a: 0, b: 2 }, Pair { a: 0, b: 3 }];
+        let mut pairs = vec![row[0]];
+        assert_eq!(records(&record.repeat(repeats), &entries, 4, &mut pairs), Ok(()));
+        assert_eq!(pairs, [&row[..1], &row.repeat(repeats)].concat());
+        let mut words = record.repeat(repeats);
+        *words.last_mut().expect("there are words") = 9;
+        let fault = records(&words, &entries, 4, &mut Vec::new()).expect_err("there is no entry 9");
+        assert_eq!((fault.what, fault.at), ("no such entry", words.len()));
+    }
 }

@@ -75,11 +75,16 @@ pub mod layout;
 #[cfg(feature = "unstable-study")]
 pub mod pbig;
 
-#[cfg(all(feature = "gpu", not(feature = "unstable-study")))]
-#[allow(unreachable_pub, reason = "public with `unstable-study`")]
+// Their unit tests need no GPU.
+#[cfg(all(any(feature = "gpu", test), not(all(feature = "gpu", feature = "unstable-study"))))]
+#[allow(dead_code, unreachable_pub, reason = "public with `unstable-study` and `gpu`")]
 mod decode;
-#[cfg(all(feature = "gpu", not(feature = "unstable-study")))]
-#[allow(dead_code, unreachable_pub, reason = "public with `unstable-study`, where tests of kernels use all")]
+#[cfg(all(any(feature = "gpu", test), not(all(feature = "gpu", feature = "unstable-study"))))]
+#[allow(
+    dead_code,
+    unreachable_pub,
+    reason = "public with `unstable-study` and `gpu`, where tests of kernels use all"
+)]
 mod layout;
 #[cfg(all(feature = "gpu", not(feature = "unstable-study")))]
 #[allow(dead_code, unreachable_pub, reason = "public with `unstable-study`, where PBIG's grid uses all")]

@@ -13,6 +13,12 @@ pub(crate) fn available_threads() -> usize {
     1
 }
 
+/// Returns how many threads can work on so many pieces. A single piece does not wake, or make, a pool of threads.
+#[cfg(any(feature = "gpu", test))]
+pub(crate) fn threads_for(pieces: usize) -> usize {
+    if pieces < 2 { 1 } else { available_threads() }
+}
+
 /// Runs `work(worker, piece)` once for each `piece < pieces`, on at most `workers` threads.
 ///
 /// Two calls with the same `worker` never overlap in time. A panic in `work` reaches the caller after the other
@@ -110,6 +116,18 @@ pub(crate) fn run_with<T: Send>(own: &mut [T], pieces: usize, work: impl Fn(&mut
         // SAFETY: a worker has one piece at a time, and there are as many values as workers.
         work(unsafe { &mut shared.part(worker..worker + 1)[0] }, piece);
     });
+}
+
+/// Returns `work(piece)` for each `piece < pieces`, in order.
+#[cfg(any(feature = "gpu", test))]
+pub(crate) fn map<T: Send>(pieces: usize, work: impl Fn(usize) -> T + Sync) -> Vec<T> {
+    let mut results: Vec<Option<T>> = std::iter::repeat_with(|| None).take(pieces).collect();
+    let shared = SharedSlice::new(&mut results);
+    run(threads_for(pieces), pieces, |_, piece| {
+        // SAFETY: `results` outlives the call, and each piece has a place of its own.
+        unsafe { shared.part(piece..piece + 1)[0] = Some(work(piece)) }
+    });
+    results.into_iter().flatten().collect()
 }
 
 /// Makes `buffer` at least `len` elements long without copying what it held: its content is scratch.

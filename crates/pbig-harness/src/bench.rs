@@ -3,23 +3,8 @@
 use crate::cells;
 use crate::output::Failure;
 use crate::runner::{Spread, milliseconds};
-use crate::table::Cell;
+use crate::table::Value;
 use std::time::{Duration, Instant};
-
-/// Sides that do the same work, round by round.
-pub trait Contest {
-    /// Returns the number of sides.
-    fn sides(&self) -> usize;
-
-    /// Prepares a round. This is not measured.
-    fn prepare(&mut self, round: usize);
-
-    /// Does one side's work in this round; returns its milliseconds.
-    ///
-    /// # Errors
-    /// If the work fails.
-    fn run(&mut self, side: usize) -> Result<f64, Failure>;
-}
 
 /// The length of a measurement.
 #[derive(Clone, Copy, Debug)]
@@ -51,19 +36,8 @@ pub struct Took {
 }
 
 /// The columns of a table in which pbig stands beside another side.
-pub const COMPARED: [&str; 11] = [
-    "case",
-    "boxes",
-    "pairs",
-    "unit",
-    "pbig_median",
-    "pbig_mean",
-    "other",
-    "other_median",
-    "other_mean",
-    "other_over_pbig_median",
-    "other_over_pbig_mean",
-];
+pub const COMPARED: &str = "case | boxes | pairs | unit | pbig_median | pbig_mean | other | other_median | other_mean | \
+    other_over_pbig_median | other_over_pbig_mean";
 
 /// A unit, and by what milliseconds are multiplied for it.
 pub type Unit = (&'static str, f64);
@@ -79,41 +53,51 @@ pub fn compared(
     unit: Unit,
     ours: Took,
     other: (&str, Took),
-) -> Vec<Cell> {
+) -> Vec<Value> {
     let (name, theirs) = other;
     let of = |ms: f64| ms * unit.1;
     // A clock can tell 0.
     let times = |ours: f64, theirs: f64| theirs.max(1e-9) / ours.max(1e-9);
-    let means = times(ours.mean, theirs.mean);
-    let ratios = [times(ours.median, theirs.median), means];
-    let (our_times, their_times) = ([of(ours.median), of(ours.mean)], [of(theirs.median), of(theirs.mean)]);
-    let mut row = cells![case, boxes, pairs, unit.0, our_times[0], our_times[1], name];
-    row.extend(their_times.into_iter().chain(ratios).map(Cell::from));
-    row
+    let ratios = cells![times(ours.median, theirs.median), times(ours.mean, theirs.mean)];
+    let ours = cells![case, boxes, pairs, unit.0, of(ours.median), of(ours.mean), name];
+    [ours, cells![of(theirs.median), of(theirs.mean)], ratios].concat()
 }
 
 /// Returns a row of [`COMPARED`] with one value of pbig's alone.
-pub fn alone(case: &str, boxes: usize, pairs: u64, unit: &str, value: Option<f64>) -> Vec<Cell> {
-    let mut row = cells![case, boxes, pairs, unit, value];
-    row.resize(COMPARED.len(), Cell::Nothing);
-    row
+pub fn alone(case: &str, boxes: usize, pairs: u64, unit: &str, value: Option<f64>) -> Vec<Value> {
+    [cells![case, boxes, pairs, unit, value], vec![Value::Null; 6]].concat()
 }
+
+/// Prepares nothing, for [`measured`].
+pub fn unprepared<S>(_: &mut S, _: usize) {}
 
 /// Returns the medians of [`measured`].
 ///
 /// # Errors
 /// If a side's work fails.
-pub fn medians(contest: &mut impl Contest, effort: Effort) -> Result<Vec<f64>, Failure> {
-    Ok(measured(contest, effort)?.iter().map(|took| took.median).collect())
+pub fn medians<S>(
+    state: &mut S,
+    sides: usize,
+    effort: Effort,
+    prepare: impl FnMut(&mut S, usize),
+    run: impl FnMut(&mut S, usize) -> Result<f64, Failure>,
+) -> Result<Vec<f64>, Failure> {
+    Ok(measured(state, sides, effort, prepare, run)?.iter().map(|took| took.median).collect())
 }
 
-/// Measures the sides. They change places from round to round, as the first in a round warms
-/// the caches for the next: a side's median is the mean, over its places, of its median there.
+/// Measures sides that do the same work, round by round. `prepare` gets the round and is not measured; `run` does one side's work
+/// and returns its milliseconds. Sides change places from round to round, as the first in a round warms the caches for the others;
+/// a side's median is the mean of those at each place, however often it was there.
 ///
 /// # Errors
 /// If a side's work fails.
-pub fn measured(contest: &mut impl Contest, effort: Effort) -> Result<Vec<Took>, Failure> {
-    let sides = contest.sides();
+pub fn measured<S>(
+    state: &mut S,
+    sides: usize,
+    effort: Effort,
+    mut prepare: impl FnMut(&mut S, usize),
+    mut run: impl FnMut(&mut S, usize) -> Result<f64, Failure>,
+) -> Result<Vec<Took>, Failure> {
     // By place, then by side.
     let mut times = vec![vec![Vec::new(); sides]; sides];
     let enough = effort.warm_up + 3 * sides.min(2);
@@ -123,10 +107,10 @@ pub fn measured(contest: &mut impl Contest, effort: Effort) -> Result<Vec<Took>,
         if round >= enough && round.is_multiple_of(2) && clock.elapsed() > effort.budget {
             break;
         }
-        contest.prepare(round);
+        prepare(state, round);
         for (place, times) in times.iter_mut().enumerate() {
             let side = (round + place) % sides;
-            let time = contest.run(side)?;
+            let time = run(state, side)?;
             if round >= effort.warm_up {
                 times[side].push(time);
             }
@@ -195,28 +179,16 @@ mod tests {
         assert_eq!(Figures::of(&[5.0]), Figures { first: 5.0, ..Figures::default() });
     }
 
-    /// Side 1 takes twice as long as side 0, and the first of a round 10 more.
-    struct Known(bool);
-
-    impl Contest for Known {
-        fn sides(&self) -> usize {
-            2
-        }
-        fn prepare(&mut self, _: usize) {
-            self.0 = true;
-        }
-        fn run(&mut self, side: usize) -> Result<f64, Failure> {
-            let cold = if std::mem::take(&mut self.0) { 10.0 } else { 0.0 };
-            Ok(cold + [1.0, 2.0][side])
-        }
-    }
-
     #[test]
     fn places_in_a_round_favour_no_side() {
+        // Side 1 takes twice as long as side 0, and the first of a round 10 more.
         let effort = Effort { warm_up: 1, rounds: 7, budget: Duration::MAX };
-        assert_eq!(medians(&mut Known(false), effort).expect("no failure"), [6.0, 7.0]);
+        let run = |is_cold: &mut bool, side: usize| {
+            Ok([1.0, 2.0][side] + if std::mem::take(is_cold) { 10.0 } else { 0.0 })
+        };
+        let took = measured(&mut false, 2, effort, |is_cold, _| *is_cold = true, run).expect("no failure");
+        assert_eq!([took[0].median, took[1].median], [6.0, 7.0]);
         // Side 1 is first in four of seven rounds.
-        let mean = |side: usize| measured(&mut Known(false), effort).expect("no failure")[side].mean;
-        assert_eq!([mean(0), mean(1)], [1.0 + 30.0 / 7.0, 2.0 + 40.0 / 7.0]);
+        assert_eq!([took[0].mean, took[1].mean], [1.0 + 30.0 / 7.0, 2.0 + 40.0 / 7.0]);
     }
 }

@@ -15,6 +15,7 @@ pub mod options;
 pub mod output;
 pub mod pair_index;
 pub mod pbig_grid;
+pub mod prelude;
 pub mod report;
 pub mod runner;
 pub mod shadow;

@@ -76,7 +76,21 @@ pub fn progress(length: usize, what: &'static str) -> indicatif::ProgressBar {
     }
     let style = indicatif::ProgressStyle::with_template("{msg} {wide_bar} {pos}/{len} {eta}");
     let bar = indicatif::ProgressBar::new(length as u64).with_message(what);
-    style.map_or(bar.clone(), |style| bar.with_style(style))
+    style.map_or(bar.clone(), |style| bar.with_style(style)).with_finish(indicatif::ProgressFinish::AndClear)
+}
+
+/// Returns the items one by one, and shows how many are done.
+pub fn tracked<T>(items: impl IntoIterator<Item = T>, what: &'static str) -> impl Iterator<Item = T> {
+    let items: Vec<T> = items.into_iter().collect();
+    progress(items.len(), what).wrap_iter(items.into_iter())
+}
+
+/// Returns a failed check unless something holds.
+///
+/// # Errors
+/// [`Failure::Check`] with the message.
+pub fn check(holds: bool, message: impl FnOnce() -> String) -> Result<(), Failure> {
+    if holds { Ok(()) } else { Err(Failure::Check(message())) }
 }
 
 #[cfg(test)]

@@ -94,27 +94,12 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_examples_of_the_paper() {
-        assert_eq!(pair_of(71_452, 1000), (75 - 1, 303 - 1));
-        assert_eq!(pair_of(46_108, 1000), (48 - 1, 285 - 1));
-        assert_eq!(index_of(75 - 1, 303 - 1, 1000), 71_452);
-    }
-
-    #[test]
     fn every_pair_of_every_small_n_once_in_order() {
         for n in 0..130u64 {
             let wanted: Vec<_> = (0..n).flat_map(|a| (a + 1..n).map(move |b| (a, b))).collect();
             let got: Vec<_> = (0..pair_count(n)).map(|k| pair_of(k, n)).collect();
             assert_eq!(got, wanted, "n = {n}");
             assert!(wanted.iter().enumerate().all(|(k, p)| index_of(p.0, p.1, n) == k as u64));
-        }
-    }
-
-    #[test]
-    fn the_row_is_found_from_any_near_it() {
-        let n = 40;
-        for (k, start) in (0..pair_count(n)).flat_map(|k| (0..n - 1).map(move |start| (k, start))) {
-            assert_eq!(exact_row(start, k, n), pair_of(k, n).0, "from row {start}");
         }
     }
 
@@ -133,14 +118,6 @@ mod tests {
     fn rows_worth_trying(n: u64) -> impl Iterator<Item = u64> {
         let spread = (0..4096).map(move |i| i * (n - 2) / 4095);
         (0..2000).chain(n - 2000..n - 1).chain(spread).filter(move |a| a + 1 < n)
-    }
-
-    #[test]
-    fn counts_at_the_limits_of_integers() {
-        assert_eq!(pair_count(0), 0);
-        assert_eq!(pair_count(1), 0);
-        assert_eq!(pair_count(92_683), 92_683 * 92_682 / 2);
-        assert_eq!(u128::from(pair_count(1 << 32)), (1u128 << 32) * ((1u128 << 32) - 1) / 2);
     }
 
     #[test]

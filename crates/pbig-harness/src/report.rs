@@ -2,7 +2,7 @@
 
 use crate::chart::Chart;
 use crate::output::{Failure, print};
-use crate::table::{LONG, Table};
+use crate::table::{LONG, Table, text};
 use serde_json::{Value, json};
 use std::path::Path;
 
@@ -37,7 +37,7 @@ impl Report {
         match &self.tables[..] {
             [one] => {
                 write(one.columns.clone());
-                one.rows.iter().for_each(|row| write(row.iter().map(|cell| cell.text()).collect()));
+                one.rows.iter().for_each(|row| write(row.iter().map(text).collect()));
             }
             several => {
                 write(LONG.map(str::to_owned).into());
@@ -79,15 +79,6 @@ impl Report {
         let path = folder.join(format!("{}.csv", self.suite));
         let written = std::fs::create_dir_all(folder).and_then(|()| std::fs::write(&path, self.csv()));
         written.map_err(|error| format!("{}: {error}", path.display()))?;
-        self.plot(folder)
-    }
-
-    /// Writes the charts into a folder, which is made if there is none.
-    ///
-    /// # Errors
-    /// If something cannot be written.
-    pub fn plot(&self, folder: &Path) -> Result<(), Failure> {
-        std::fs::create_dir_all(folder).map_err(|error| format!("{}: {error}", folder.display()))?;
         self.charts.iter().try_for_each(|chart| chart.write(&folder.join(format!("{}.svg", chart.name))))?;
         Ok(())
     }
@@ -145,7 +136,7 @@ mod tests {
     use crate::cells;
 
     fn table(name: &str) -> Table {
-        let mut table = Table::new(name, ["case", "ms"]);
+        let mut table = Table::new(name, "case | ms");
         table.row(cells!["a, b", 0.5]);
         table
     }

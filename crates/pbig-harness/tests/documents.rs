@@ -1,8 +1,10 @@
 //! Holds the numbers of the documents against the measured ones: each number between `<!-- from: FILE.csv -->` and
 //! `<!-- end -->` is a value of that file, rounded to the digits shown. Names in backticks and names of rows are left out.
 
+use regex::Regex;
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
+use std::sync::LazyLock;
 
 fn root() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../..")
@@ -53,34 +55,14 @@ struct Token {
     digits: i32,
 }
 
-/// Returns the numbers of a text, without signs. Digits right behind a letter are a name's, as in `f32`.
+/// Returns the numbers of a text, without signs. Digits right behind a letter are a name's, as in `f32`. Points and commas are a
+/// number's own if a digit follows.
 fn tokens(text: &str) -> Vec<Token> {
-    let (mut found, mut rest, mut before) = (vec![], text, ' ');
-    while let Some(first) = rest.chars().next() {
-        let is_number = first.is_ascii_digit() && !before.is_alphanumeric() && before != '_';
-        let length = if first.is_ascii_digit() { length(rest) } else { first.len_utf8() };
-        if is_number {
-            found.push(token(&rest[..length]));
-        }
-        before = rest[..length].chars().last().unwrap_or(' ');
-        rest = &rest[length..];
-    }
-    found
-}
-
-/// The bytes of the number that a text begins with: points and commas are its own if a digit follows.
-fn length(text: &str) -> usize {
-    let bytes = text.as_bytes();
-    let is_digit = |at: usize| bytes.get(at).is_some_and(u8::is_ascii_digit);
-    let is_exponent = |at: usize| {
-        bytes[at] == b'e' && (is_digit(at + 1) || bytes.get(at + 1) == Some(&b'-') && is_digit(at + 2))
-    };
-    let is_inside = |at: &usize| match bytes[*at] {
-        b'.' | b',' => is_digit(at + 1),
-        b'-' => bytes[at - 1] == b'e',
-        _ => is_digit(*at) || is_exponent(*at),
-    };
-    (1..bytes.len()).take_while(is_inside).count() + 1
+    static WORDS: LazyLock<Regex> = LazyLock::new(|| {
+        Regex::new(r"[\p{L}_](?:[\p{L}0-9_]|[.,][0-9])*|([0-9]+(?:[.,][0-9]+|e-?[0-9]+)*)")
+            .expect("a pattern")
+    });
+    WORDS.captures_iter(text).filter_map(|found| found.get(1)).map(|number| token(number.as_str())).collect()
 }
 
 fn token(text: &str) -> Token {

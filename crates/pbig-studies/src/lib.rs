@@ -2,16 +2,13 @@
 //! them is in docs/.
 
 pub mod accuracy;
-pub mod index;
-pub mod mechanics;
-pub mod numbered;
+mod index;
 pub mod papers;
 pub mod peers;
 pub mod precision;
-pub mod reported;
-pub mod sorted;
+mod reordered;
+mod reported;
 pub mod stages;
 pub mod steady;
-pub mod study;
 mod trees;
 pub mod wide;

@@ -1,7 +1,7 @@
 //! The program `pbig-studies`: numbers as tables, one JSON object, or files.
 
 use clap::{Parser, Subcommand};
-use pbig_harness::output::{Failure, finish, print, progress};
+use pbig_harness::output::{Failure, finish, print, tracked};
 use pbig_harness::report::Report;
 use pbig_studies::{accuracy, papers, peers, stages, steady};
 use serde_json::{Map, json};
@@ -36,9 +36,6 @@ enum Command {
     Accuracy {
         #[command(flatten)]
         options: Options,
-        /// Write the charts alone into this folder.
-        #[arg(long, value_name = "DIR")]
-        plot: Option<PathBuf>,
         /// This study alone.
         #[arg(long, value_name = "STUDY", value_parser = accuracy::STUDIES.map(|(name, _)| name))]
         only: Option<String>,
@@ -68,7 +65,7 @@ fn run(command: Command) -> Result<(), Failure> {
         Command::Stages(options) => told(&options, &stages::run(options.quick)?),
         Command::Peers(options) => told(&options, &peers::run(options.quick)?),
         Command::Steady { options, boxes } => told(&options, &steady::run(options.quick, &boxes)?),
-        Command::Accuracy { options, plot, only } => run_accuracy(&options, plot, only),
+        Command::Accuracy { options, only } => run_accuracy(&options, only),
     }
 }
 
@@ -76,23 +73,18 @@ fn told(options: &Options, report: &Report) -> Result<(), Failure> {
     report.finish(options.json, options.write.as_deref())
 }
 
-fn run_accuracy(options: &Options, plot: Option<PathBuf>, only: Option<String>) -> Result<(), Failure> {
+fn run_accuracy(options: &Options, only: Option<String>) -> Result<(), Failure> {
     let wanted = |name: &str| only.as_deref().is_none_or(|only| only == name);
-    let bar = progress(accuracy::STUDIES.len(), "studies");
     let mut objects = Map::new();
-    for (name, study) in accuracy::STUDIES.into_iter().filter(|(name, _)| wanted(name)) {
+    let studies = accuracy::STUDIES.into_iter().filter(|(name, _)| wanted(name));
+    for (name, study) in tracked(studies, "studies") {
         let report: Report = study(options.quick)?;
-        if let Some(folder) = &plot {
-            report.plot(folder)?;
-        }
         if options.json {
             objects.insert(name.into(), report.object());
             options.write.as_ref().map_or(Ok(()), |folder| report.write(folder))?;
         } else {
             report.finish(false, options.write.as_deref())?;
         }
-        bar.inc(1);
     }
-    bar.finish_and_clear();
     if options.json { print(&json!({ "suite": "accuracy", "studies": objects }).to_string()) } else { Ok(()) }
 }

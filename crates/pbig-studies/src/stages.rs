@@ -1,17 +1,9 @@
 //! Pbig alone, stage by stage, against what a scene can be: cubes with edges around 1 and about one pair a box that all move by up
 //! to 0.1, unless that is varied.
 
-use crate::study::algorithm;
-use pbig_core::{
-    Aabb, BroadPhase, Config, Error, Finder, Limits, Order, ProxyFilter, Report as Told, StageTimes,
-};
-use pbig_harness::bench::{Contest, Effort, medians, timed};
-use pbig_harness::boxes::{Wander, cubes};
-use pbig_harness::cells;
-use pbig_harness::output::{Failure, progress};
-use pbig_harness::report::Report;
-use pbig_harness::runner::{Spread, milliseconds};
-use pbig_harness::table::Table;
+use pbig_core::{Aabb, BroadPhase, Config, Finder, Limits, Order, ProxyFilter};
+use pbig_harness::prelude::*;
+use std::collections::BTreeMap;
 
 /// Distance of a move along each axis at most.
 const DISTANCE: f32 = 0.1;
@@ -21,7 +13,7 @@ const CONFIG: Config = Config { limits: Limits::UNLIMITED, order: Order::Unspeci
 /// The whole call, `set_many` (incremental only), and the stages of the report.
 pub(crate) const NAMES: [&str; 7] = ["whole", "set", "plan", "map", "check", "emit", "diff"];
 
-pub(crate) type Times = [f64; NAMES.len()];
+type Times = [f64; NAMES.len()];
 
 /// From nothing in each round, or events for what has moved.
 enum Way {
@@ -34,9 +26,8 @@ pub(crate) struct Alone {
     way: Way,
     wander: Wander,
     moved: Vec<u32>,
-    times: Vec<Times>,
-    /// The algorithm of each round.
-    chosen: Vec<&'static str>,
+    /// Times and algorithm of each round.
+    rounds: Vec<(Times, &'static str)>,
 }
 
 /// The times of the rounds, and their algorithms.
@@ -46,19 +37,6 @@ pub(crate) struct Measured {
     pub(crate) pairs: u64,
     /// The algorithms, and the number of rounds of each.
     pub(crate) chosen: String,
-}
-
-/// Counts each name, and lists the most frequent first.
-fn counted(names: &[&'static str]) -> String {
-    let mut counts: Vec<(&str, usize)> = vec![];
-    for name in names {
-        match counts.iter_mut().find(|(known, _)| known == name) {
-            Some((_, count)) => *count += 1,
-            None => counts.push((name, 1)),
-        }
-    }
-    counts.sort_by_key(|(_, count)| std::cmp::Reverse(*count));
-    counts.iter().map(|(name, count)| format!("{name} {count}")).collect::<Vec<_>>().join(", ")
 }
 
 impl Alone {
@@ -74,54 +52,23 @@ impl Alone {
 
     fn new(way: Way, boxes: Vec<Aabb>, share: f64, distance: f32) -> Self {
         let moved = (0..boxes.len() as u32).collect();
-        Self { way, wander: Wander::new(boxes, share, distance), moved, times: vec![], chosen: vec![] }
+        Self { way, wander: Wander::new(boxes, share, distance), moved, rounds: vec![] }
     }
 
     pub(crate) fn measure(mut self, effort: Effort) -> Result<Measured, Failure> {
-        medians(&mut self, effort)?;
-        let times = &self.times[effort.warm_up..];
-        let of = |k: usize| times.iter().map(move |times| times[k]);
+        measured(&mut self, 1, effort, Self::prepare, |alone, _| alone.find())?;
+        let rounds = &self.rounds[effort.warm_up..];
+        let of = |k: usize| rounds.iter().map(move |(times, _)| times[k]);
         let median = std::array::from_fn(|k| Spread::of(of(k)).median);
-        let mean = std::array::from_fn(|k| of(k).sum::<f64>() / times.len().max(1) as f64);
-        let (pairs, chosen) = (self.told().pairs, counted(&self.chosen[effort.warm_up..]));
-        Ok(Measured { median, mean, pairs, chosen })
-    }
-
-    fn told(&self) -> &Told {
-        match &self.way {
-            Way::Scratch(finder) => finder.report(),
-            Way::Events(broad_phase) => broad_phase.report(),
-        }
-    }
-
-    fn find(&mut self) -> Result<Times, Error> {
-        let Self { way, wander, moved, .. } = self;
-        let boxes = &wander.boxes;
-        match way {
-            Way::Scratch(finder) => {
-                let (done, whole) = timed(|| finder.find(boxes).map(|_| ()));
-                done.map(|()| in_order(whole, 0.0, &finder.report().stages))
-            }
-            Way::Events(broad_phase) => {
-                let set = || broad_phase.set_many(moved, |id| Some((boxes[id as usize], ProxyFilter::ALL)));
-                let (done, set) = timed(set);
-                done?;
-                let (done, update) = timed(|| broad_phase.update().map(|_| ()));
-                done.map(|()| in_order(set + update, set, &broad_phase.report().stages))
-            }
-        }
-    }
-}
-
-fn in_order(whole: f64, set: f64, stages: &StageTimes) -> Times {
-    let StageTimes { plan, map, check, emit, diff, .. } = *stages;
-    let [plan, map, check, emit, diff] = [plan, map, check, emit, diff].map(milliseconds);
-    [whole, set, plan, map, check, emit, diff]
-}
-
-impl Contest for Alone {
-    fn sides(&self) -> usize {
-        1
+        let mean = std::array::from_fn(|k| of(k).sum::<f64>() / rounds.len().max(1) as f64);
+        let pairs = match &self.way {
+            Way::Scratch(finder) => finder.report().pairs,
+            Way::Events(broad_phase) => broad_phase.report().pairs,
+        };
+        let mut counts = BTreeMap::<_, usize>::new();
+        rounds.iter().for_each(|(_, name)| *counts.entry(*name).or_default() += 1);
+        let chosen: Vec<String> = counts.iter().map(|(name, count)| format!("{name} {count}")).collect();
+        Ok(Measured { median, mean, pairs, chosen: chosen.join(", ") })
     }
 
     fn prepare(&mut self, round: usize) {
@@ -132,11 +79,27 @@ impl Contest for Alone {
         }
     }
 
-    fn run(&mut self, _: usize) -> Result<f64, Failure> {
-        let times = self.find()?;
-        self.times.push(times);
-        self.chosen.push(algorithm(&self.told().plan));
-        Ok(times[0])
+    fn find(&mut self) -> Result<f64, Failure> {
+        let Self { way, wander, moved, rounds } = self;
+        let boxes = &wander.boxes;
+        let (whole, set, report) = match way {
+            Way::Scratch(finder) => {
+                let (done, whole) = timed(|| finder.find(boxes).map(|_| ()));
+                done?;
+                (whole, 0.0, finder.report())
+            }
+            Way::Events(broad_phase) => {
+                let set = || broad_phase.set_many(moved, |id| Some((boxes[id as usize], ProxyFilter::ALL)));
+                let (done, set) = timed(set);
+                done?;
+                let (done, update) = timed(|| broad_phase.update().map(|_| ()));
+                done?;
+                (set + update, set, broad_phase.report())
+            }
+        };
+        let [plan, map, check, emit, diff] = report.stages.named().map(|(_, time)| milliseconds(time));
+        rounds.push(([whole, set, plan, map, check, emit, diff], report.plan.algorithm.name()));
+        Ok(whole)
     }
 }
 
@@ -170,16 +133,13 @@ fn sweeps(scratch: bool, quick: bool) -> Vec<(&'static str, Vec<Point>)> {
 /// If a search fails.
 pub fn run(quick: bool) -> Result<Report, Failure> {
     let effort = Effort::new(quick);
-    let stages = NAMES[1..].iter().map(|name| format!("{name}_ms"));
-    let columns = ["case", "boxes", "pairs", "median_ms", "mean_ms"].map(str::to_owned);
-    let columns: Vec<String> = columns.into_iter().chain(stages).chain(["algorithms".into()]).collect();
+    let columns = "case | boxes | pairs | median_ms | mean_ms | set_ms | plan_ms | map_ms | check_ms | emit_ms | diff_ms | \
+        algorithms";
     let mut tables = vec![];
     for (name, scratch) in [("from scratch", true), ("events", false)] {
-        let (sweeps, mut table) = (sweeps(scratch, quick), Table::new(name, &columns));
-        let bar = progress(sweeps.iter().map(|(_, points)| points.len()).sum(), "scenes");
-        for (what, point) in
-            sweeps.iter().flat_map(|(what, points)| points.iter().map(move |point| (what, point)))
-        {
+        let (sweeps, mut table) = (sweeps(scratch, quick), Table::new(name, columns));
+        let points = sweeps.iter().flat_map(|(what, points)| points.iter().map(move |point| (what, point)));
+        for (what, point) in tracked(points, "scenes") {
             let boxes = cubes(point.boxes, point.spread as f32, point.pairs as f32, 1);
             let alone = match scratch {
                 true => Alone::scratch(boxes, point.share, DISTANCE),
@@ -187,24 +147,11 @@ pub fn run(quick: bool) -> Result<Report, Failure> {
             };
             let Measured { median, mean, pairs, chosen } = alone.measure(effort)?;
             let stages = if scratch { &median } else { &mean }[1..].iter();
-            let stages = stages.map(|&ms| (ms > 0.0).then_some(ms).into());
+            let stages = stages.map(|&ms| Value::from((ms > 0.0).then_some(ms)));
             let head = cells![format!("{what} {}", point.x), point.boxes, pairs, median[0], mean[0]];
             table.row(head.into_iter().chain(stages).chain(cells![chosen]));
-            bar.inc(1);
         }
-        bar.finish_and_clear();
         tables.push(table);
     }
     Ok(Report::new("stages", tables))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn names_are_counted() {
-        assert_eq!(counted(&["grid", "edit", "edit"]), "edit 2, grid 1");
-        assert_eq!(counted(&[]), "");
-    }
 }

@@ -1,4 +1,4 @@
-//! The other side: parry's tree kept or rebuilt, and obvhs.
+//! The sides of a race: pbig kept on all threads and on one, parry's tree kept or rebuilt, and obvhs.
 
 use glam::Vec3A;
 use obvhs::bvh2::Bvh2;
@@ -6,7 +6,64 @@ use obvhs::ploc::{PlocBuilder, PlocSearchDistance, SortPrecision};
 use parry_peer::bounding_volume::Aabb as ParryAabb;
 use parry_peer::math::Vector;
 use parry_peer::partitioning::{Bvh, BvhBuildStrategy, BvhLeafUpdateStatus, BvhWorkspace};
-use pbig_core::Aabb;
+use pbig_core::{Aabb, BroadPhase, Config, ProxyFilter};
+use pbig_harness::bench::timed;
+use pbig_harness::output::Failure;
+use rayon::{ThreadPool, ThreadPoolBuilder};
+
+/// Pbig, kept from frame to frame on all threads and again on one.
+pub(crate) struct Kept {
+    all: BroadPhase,
+    lone: BroadPhase,
+    pool: ThreadPool,
+}
+
+impl Kept {
+    pub(crate) fn new(config: Config) -> Result<Self, Failure> {
+        let pool = ThreadPoolBuilder::new().num_threads(1).build();
+        let pool = pool.map_err(|error| Failure::Input(error.to_string()))?;
+        Ok(Self { all: BroadPhase::new(config)?, lone: BroadPhase::new(config)?, pool })
+    }
+
+    /// Updates one of both with changed boxes, of which invalid ones are removed; returns the milliseconds. The clock runs inside
+    /// the pool, as waking its thread takes longer than a small update.
+    pub(crate) fn update(
+        &mut self,
+        is_lone: bool,
+        boxes: &[Aabb],
+        changed: &Changed,
+    ) -> Result<f64, Failure> {
+        let Self { all, lone, pool } = self;
+        let work = |broad_phase: &mut BroadPhase| {
+            for &id in &changed.absent {
+                broad_phase.remove(id);
+            }
+            broad_phase.set_many(&changed.present, |id| Some((boxes[id as usize], ProxyFilter::ALL)))?;
+            broad_phase.update().map(|_| ())
+        };
+        let (done, ms) = if is_lone { pool.install(|| timed(|| work(lone))) } else { timed(|| work(all)) };
+        Ok(done.map(|()| ms)?)
+    }
+
+    /// Returns the number of pairs of each.
+    pub(crate) fn pairs(&self) -> [usize; 2] {
+        [self.all.pair_count(), self.lone.pair_count()]
+    }
+}
+
+/// The ids of changed boxes that are valid, and of those that are not.
+#[derive(Default)]
+pub(crate) struct Changed {
+    present: Vec<u32>,
+    absent: Vec<u32>,
+}
+
+impl Changed {
+    pub(crate) fn new(changed: &[u32], boxes: &[Aabb]) -> Self {
+        let (present, absent) = changed.iter().partition(|id| boxes[**id as usize].is_valid());
+        Self { present, absent }
+    }
+}
 
 pub(crate) fn for_parry(boxes: &[Aabb]) -> Vec<ParryAabb> {
     let vector = |v: [f32; 3]| Vector::new(v[0], v[1], v[2]);

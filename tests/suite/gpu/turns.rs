@@ -1,6 +1,8 @@
 //! Contract: updates on a device and on the CPU may take turns, and fail in between, and no event is lost.
 
-use pbig_core::{Aabb, Backend, BroadPhase, Config, Error, GpuFinder, Limits, Pair, ProxyFilter, oracle};
+use pbig_core::{
+    Aabb, Backend, BroadPhase, Config, Error, GpuFinder, GpuOptions, Limits, Pair, ProxyFilter, oracle,
+};
 use pbig_tests::needs_gpu;
 use rand::rngs::StdRng;
 use rand::{RngExt, SeedableRng};
@@ -53,8 +55,16 @@ fn brute_force(broad_phase: &BroadPhase) -> Vec<Pair> {
 #[test]
 fn devices_and_the_cpu_take_turns_and_updates_fail_in_between() {
     needs_gpu!();
+    // With and without a grid: a plan outlives updates that fail.
+    for all_pairs_up_to in [0, 1000] {
+        take_turns(GpuOptions { all_pairs_up_to, ..GpuOptions::DEFAULT });
+    }
+}
+
+fn take_turns(options: GpuOptions) {
     let gpu = GpuFinder::new().expect("an adapter");
-    let mut broad_phase = BroadPhase::with_gpu(Config::DEFAULT, gpu).expect("a margin that is one");
+    let config = Config { gpu: options, ..Config::DEFAULT };
+    let mut broad_phase = BroadPhase::with_gpu(config, gpu).expect("a margin that is one");
     let (mut random, mut pairs) = (StdRng::seed_from_u64(17), BTreeSet::new());
     let home = |id: u32| [id % 8, id / 8 % 8, id / 64].map(|i| i as f32);
     // Updates on the device and on the CPU; those that succeeded and those that failed.

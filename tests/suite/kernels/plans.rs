@@ -80,3 +80,16 @@ fn extreme_sets_have_a_plan() {
     let flat: Vec<_> = (0..900).map(|i| Aabb::from_center([(i % 30) as f32, 0.0, 0.0], [0.5; 3])).collect();
     plan(&flat);
 }
+
+/// The model of `docs/GPU.md` predicts times from bytes, and bytes from the entries and tests of a box.
+#[test]
+fn the_model_of_the_documents_has_the_entries_and_tests_that_the_kernels_make() {
+    let boxes = set("unit", 30_000);
+    let case = Case { name: "unit", boxes, before: Vec::new(), small_cell: 32, columns: 8 };
+    let counters = State::before("check_small", &case).counters;
+    let a_box = |count: u32| f64::from(count) / case.boxes.len() as f64;
+    let (entries, tests) = (a_box(counters.entries), a_box(LANES * counters.tests));
+    let model = format!("{entries:.1} entries and {tests:.0} tests a box");
+    let text = include_str!("../../../docs/GPU.md").split_whitespace().collect::<Vec<_>>().join(" ");
+    assert!(text.contains(&model), "docs/GPU.md does not say: {model}");
+}

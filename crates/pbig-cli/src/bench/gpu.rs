@@ -1,121 +1,88 @@
-//! `pbig bench gpu`: the GPU beside the CPU, kernel by kernel, and the floor below both.
+//! `pbig bench gpu`: the GPU beside the CPU, kernel by kernel, the floor below both, and the host's part of a call.
 
-mod events;
-mod host;
-
-use pbig_core::{Aabb, Backend, Config, Finder, GpuFinder, GpuOptions, GpuReport, Limits};
-use pbig_harness::bench::timed;
-use pbig_harness::boxes::{BoxSet, moved};
-use pbig_harness::cells;
+use pbig_core::{Aabb, Backend, BroadPhase, Config, Finder, GpuFinder, GpuOptions, Limits, Order};
+use pbig_core::{GpuReport, ProxyFilter, Report as Told};
+use pbig_harness::gpu_race::race;
 use pbig_harness::kernels::Bench;
-use pbig_harness::output::{Failure, progress};
-use pbig_harness::report::Report;
-use pbig_harness::runner::{Spread, milliseconds};
-use pbig_harness::table::Table;
+use pbig_harness::prelude::*;
 
-/// Medians in ms, of calls between which all boxes move. The floor is the time to read all boxes and to write all pairs at the
-/// device's copy rate. All after `floor` is of the last call.
-const COLUMNS: [&str; 12] = [
-    "set",
-    "boxes",
-    "pairs",
-    "cpu_ms",
-    "gpu_ms",
-    "cpu_over_gpu",
-    "floor_ms",
-    "wait_ms",
-    "uploaded_bytes",
-    "downloaded_bytes",
-    "device_bytes",
-    "compression",
-];
+const CONFIG: Config = Config { limits: Limits::UNLIMITED, ..Config::DEFAULT };
+const ON_GPU: Config = Config { backend: Backend::Gpu, ..CONFIG };
 
 pub(super) fn run(quick: bool) -> Result<Report, Failure> {
     let gpu = GpuFinder::new().map_err(|error| Failure::Input(error.to_string()))?;
     let rate = Bench::new().and_then(|bench| bench.copy_rate(256 << 20));
     let rate = rate.map_err(|error| Failure::Input(error.to_string()))?;
-    let [searches, kernels] = searches(&gpu, rate, quick)?;
-    let tables = vec![searches, kernels, host::table(&gpu, quick)?, events::table(&gpu, quick)?];
     let head = vec![
         ("adapter", gpu.adapter().to_owned()),
         ("software", gpu.is_software().to_string()),
         ("copy_bytes_per_s", format!("{rate:.0}")),
     ];
+    let [searches, kernels] = searches(&gpu, rate, quick)?;
+    let tables = vec![searches, kernels, host(&gpu, quick)?, events(&gpu, quick)?];
     Ok(Report { head, ..Report::new("gpu", tables) })
 }
 
 /// Returns the numbers of boxes: ten million take minutes on a program that plays a GPU, and tell nothing.
-fn sizes<'a>(gpu: &GpuFinder, all: &'a [usize]) -> impl Iterator<Item = usize> + use<'a> {
-    let most = if gpu.is_software() { 1_000_000 } else { usize::MAX };
-    all.iter().copied().filter(move |&boxes| boxes <= most)
+fn sizes(gpu: &GpuFinder, quick: bool) -> Vec<usize> {
+    let most = match (quick, gpu.is_software()) {
+        (true, _) => 10_000,
+        (false, true) => 1_000_000,
+        (false, false) => 10_000_000,
+    };
+    (3..=7).map(|power| 10usize.pow(power)).filter(|boxes| *boxes <= most).collect()
 }
 
-/// Returns the table of searches, and that of their kernels.
+fn boxes(set: &str, n: usize) -> Vec<Aabb> {
+    BoxSet::named(set).expect("a set of the harness").boxes(n, 1)
+}
+
+/// Returns the table of searches, and that of their kernels. Medians in ms, of calls between which all boxes move. The floor is the
+/// time to read all boxes and to write all pairs at the device's copy rate. All after `floor` is of the last call.
 fn searches(gpu: &GpuFinder, rate: f64, quick: bool) -> Result<[Table; 2], Failure> {
-    let all: &[usize] = if quick { &[1000, 10_000] } else { &[1000, 10_000, 100_000, 1_000_000, 10_000_000] };
-    let cases: Vec<_> =
-        sizes(gpu, all).flat_map(|boxes| ["uniform", "gaussian", "mixed"].map(|set| (set, boxes))).collect();
-    let (mut table, mut kernels) =
-        (Table::new("searches", COLUMNS), Table::new("kernels", ["set", "boxes", "kernel", "kernel_ms"]));
-    let bar = progress(cases.len(), "sets");
-    for (set, n) in cases {
-        let ([cpu, on_gpu], pairs, report) = measure(gpu, set, n)?;
+    let columns = "set | boxes | pairs | cpu_ms | gpu_ms | cpu_over_gpu | floor_ms | wait_ms | uploaded_bytes | \
+        downloaded_bytes | device_bytes | compression";
+    let mut table = Table::new("searches", columns);
+    let mut kernels = Table::new("kernels", "set | boxes | kernel | kernel_ms");
+    let sets = ["uniform", "gaussian", "mixed"];
+    let cases = sizes(gpu, quick).into_iter().flat_map(|n| sets.map(|set| (n, set)));
+    for (n, set) in tracked(cases, "sets") {
+        let ([cpu, on_gpu], pairs, report) = search(gpu, set, n)?;
         // Bytes that must move on the device whatever the algorithm.
         let floor = (24 * n as u64 + 8 * pairs) as f64 / rate * 1e3;
-        let mut row = cells![set, n, pairs, cpu, on_gpu, cpu / on_gpu, floor, milliseconds(report.wait)];
-        row.extend(cells![report.uploaded, report.downloaded, report.device_bytes, report.compression]);
-        table.row(row);
-        report
-            .kernels
-            .iter()
-            .for_each(|(name, time)| kernels.row(cells![set, n, *name, milliseconds(*time)]));
-        bar.inc(1);
+        let times = cells![set, n, pairs, cpu, on_gpu, cpu / on_gpu, floor, milliseconds(report.wait)];
+        let bytes = cells![report.uploaded, report.downloaded, report.device_bytes, report.compression];
+        table.row([times, bytes].concat());
+        for (name, time) in &report.kernels {
+            kernels.row(cells![set, n, *name, milliseconds(*time)]);
+        }
     }
-    bar.finish_and_clear();
     Ok([table, kernels])
 }
 
-/// Medians on the CPU and on the GPU, the pairs, and a report with the times of the kernels.
-type Measured = ([f64; 2], u64, GpuReport);
-
-/// Returns the boxes of a set, and the same after all have moved.
-fn frames(name: &str, n: usize) -> [Vec<Aabb>; 2] {
-    let start = BoxSet::named(name).expect("a set of the harness").boxes(n, 1);
-    [moved(&start, 1.0, 2), start]
-}
-
-/// Measures both backends on the same boxes, in turn.
-fn measure(gpu: &GpuFinder, name: &str, n: usize) -> Result<Measured, Failure> {
-    let frames = frames(name, n);
-    let config = |backend| Config { backend, limits: Limits::UNLIMITED, ..Config::DEFAULT };
-    let mut on_cpu = Finder::new(config(Backend::Cpu));
-    let mut on_gpu = Finder::with_gpu(config(Backend::Gpu), gpu.clone());
+/// Measures both backends on the same boxes, in turn: returns both medians, the pairs, and a report with the times of the kernels.
+fn search(gpu: &GpuFinder, set: &str, n: usize) -> Result<([f64; 2], u64, GpuReport), Failure> {
+    let start = boxes(set, n);
+    let frames = [moved(&start, 1.0, 2), start];
+    let mut on_cpu = Finder::new(Config { backend: Backend::Cpu, ..CONFIG });
+    let mut on_gpu = Finder::with_gpu(ON_GPU, gpu.clone());
     let mut times = [vec![], vec![]];
     for round in 0..if n > 100_000 { 4 } else { 7 } {
         let boxes = &frames[round % 2];
         let round_times = [time(&mut on_cpu, boxes)?, time(&mut on_gpu, boxes)?];
-        on_device(&on_gpu)?;
-        if on_cpu.pairs() != on_gpu.pairs() {
-            return Err(Failure::Check(format!("{name} {n}: CPU and GPU differ")));
-        }
+        on_device(on_gpu.report())?;
+        check(on_cpu.pairs() == on_gpu.pairs(), || format!("{set} {n}: CPU and GPU differ"))?;
         // The first round compiles, allocates and learns.
         if round > 0 {
             times.iter_mut().zip(round_times).for_each(|(times, ms)| times.push(ms));
         }
     }
-    let report = with_kernels(gpu, &frames)?;
-    Ok((times.map(|times| Spread::of(times).median), on_cpu.pairs().len() as u64, report))
-}
-
-/// Returns the report of a call whose kernels are timed, which takes longer.
-fn with_kernels(gpu: &GpuFinder, frames: &[Vec<Aabb>; 2]) -> Result<GpuReport, Failure> {
+    // Calls whose kernels are timed take longer.
     let options = GpuOptions { time_kernels: true, ..GpuOptions::DEFAULT };
-    let config = Config { backend: Backend::Gpu, limits: Limits::UNLIMITED, gpu: options, ..Config::DEFAULT };
-    let mut finder = Finder::with_gpu(config, gpu.clone());
-    for boxes in frames {
-        time(&mut finder, boxes)?;
-    }
-    on_device(&finder)
+    let mut finder = Finder::with_gpu(Config { gpu: options, ..ON_GPU }, gpu.clone());
+    frames.iter().try_for_each(|boxes| time(&mut finder, boxes).map(|_| ()))?;
+    let report = on_device(finder.report())?.clone();
+    Ok((times.map(|times| Spread::of(times).median), on_cpu.pairs().len() as u64, report))
 }
 
 fn time(finder: &mut Finder, boxes: &[Aabb]) -> Result<f64, Failure> {
@@ -124,8 +91,92 @@ fn time(finder: &mut Finder, boxes: &[Aabb]) -> Result<f64, Failure> {
 }
 
 /// Returns the report of the device. A call that the device left to the CPU is no measurement, but an error.
-fn on_device(finder: &Finder) -> Result<GpuReport, Failure> {
-    let report = finder.report();
+fn on_device(report: &Told) -> Result<&GpuReport, Failure> {
     let why = || Failure::Check(report.fallback.clone().unwrap_or_default());
-    report.gpu.clone().ok_or_else(why)
+    report.gpu.as_ref().ok_or_else(why)
+}
+
+/// Calls whose host's part is measured, and calls before these, which allocate and plan.
+const ROUNDS: usize = 6;
+const WARM_UP: usize = 3;
+
+/// Everything but waiting for the device: medians in ms of searches of moved boxes, unsorted and sorted, and of updates in which
+/// one in a hundred moves. `host` is the call without `wait`, `order` the sort of pairs that the device has left unsorted.
+fn host(gpu: &GpuFinder, quick: bool) -> Result<Table, Failure> {
+    let columns = "call | boxes | pairs | host_ms | upload_ms | plan_ms | record_ms | decode_ms | order_ms";
+    let mut table = Table::new("host", columns);
+    for n in tracked(sizes(gpu, quick).into_iter().filter(|n| *n >= 10_000), "calls") {
+        let start = boxes("unit", n);
+        let frames = [moved(&start, 1.0, 2), start];
+        for (call, order) in [("unsorted", Order::Unspecified), ("sorted", Order::Sorted)] {
+            let (times, pairs) = host_of_searches(gpu, &frames, order)?;
+            table.row([cells![call, n, pairs], medians(&times)].concat());
+        }
+        let (times, pairs) = host_of_updates(gpu, &frames)?;
+        table.row([cells!["update, 1% moved", n, pairs], medians(&times)].concat());
+    }
+    Ok(table)
+}
+
+/// The host's times of a call.
+type Times = [f64; 6];
+
+fn medians(times: &[Times]) -> Vec<Value> {
+    (0..6).map(|k| Spread::of(times[WARM_UP..].iter().map(|times| times[k])).median.into()).collect()
+}
+
+/// Splits the time of a call.
+fn split(ms: f64, report: &Told, emit: f64) -> Result<Times, Failure> {
+    let gpu = on_device(report)?;
+    let [wait, upload, plan, record, decode] =
+        [gpu.wait, gpu.upload, gpu.plan, gpu.record, gpu.decode].map(milliseconds);
+    Ok([ms - wait, upload, plan, record, decode, emit])
+}
+
+fn host_of_searches(
+    gpu: &GpuFinder,
+    frames: &[Vec<Aabb>; 2],
+    order: Order,
+) -> Result<(Vec<Times>, usize), Failure> {
+    let mut finder = Finder::with_gpu(Config { order, ..ON_GPU }, gpu.clone());
+    let mut times = Vec::new();
+    for round in 0..WARM_UP + ROUNDS {
+        let ms = time(&mut finder, &frames[round % 2])?;
+        times.push(split(ms, finder.report(), milliseconds(finder.report().stages.emit))?);
+    }
+    Ok((times, finder.pairs().len()))
+}
+
+/// Measures updates without the calls that set the boxes.
+fn host_of_updates(gpu: &GpuFinder, [moved, start]: &[Vec<Aabb>; 2]) -> Result<(Vec<Times>, usize), Failure> {
+    let mut broad_phase = BroadPhase::with_gpu(ON_GPU, gpu.clone())?;
+    let ids: Vec<u32> = (0..start.len() as u32).collect();
+    broad_phase.set_many(&ids, |id| Some((start[id as usize], ProxyFilter::ALL)))?;
+    broad_phase.update()?;
+    let mut times = Vec::new();
+    for round in 0..WARM_UP + ROUNDS {
+        let movers: Vec<u32> = ids.iter().copied().filter(|id| id % 100 == round as u32).collect();
+        broad_phase.set_many(&movers, |id| Some((moved[id as usize], ProxyFilter::ALL)))?;
+        let (done, ms) = timed(|| broad_phase.update().map(|_| ()));
+        done?;
+        times.push(split(ms, broad_phase.report(), 0.0)?);
+    }
+    Ok((times, broad_phase.pair_count()))
+}
+
+/// Returns the medians of setting the boxes of the set `unit` that have moved by up to a tenth of an edge, and the update. The
+/// bytes that go up and come back should follow the number of changed boxes, not the number of all boxes.
+fn events(gpu: &GpuFinder, quick: bool) -> Result<Table, Failure> {
+    let columns =
+        "boxes | share | pairs | events | cpu_ms | gpu_ms | cpu_over_gpu | uploaded_bytes | downloaded_bytes";
+    let mut table = Table::new("events", columns);
+    let sizes = sizes(gpu, quick).into_iter().filter(|n| *n >= 10_000);
+    let cases = sizes.flat_map(|n| [0.001, 0.01, 0.1, 1.0].map(|share| (n, share)));
+    for (n, share) in tracked(cases, "shares") {
+        let raced = race(gpu, boxes("unit", n), share, 0.1)?;
+        let ([cpu, gpu], report) = (raced.ms, &raced.report);
+        let counts = cells![n, share, raced.pairs, raced.events, cpu, gpu, cpu / gpu];
+        table.row([counts, cells![report.uploaded, report.downloaded]].concat());
+    }
+    Ok(table)
 }

@@ -2,7 +2,6 @@
 
 mod gpu;
 pub(crate) mod memory;
-mod requests;
 mod step;
 mod update;
 

@@ -2,20 +2,13 @@
 //! moved boxes.
 
 use super::update;
-use pbig_harness::bench::Effort;
-use pbig_harness::boxes::BoxSet;
-use pbig_harness::cells;
 use pbig_harness::duel::Duel;
-use pbig_harness::output::{Failure, progress};
-use pbig_harness::report::Report;
+use pbig_harness::prelude::*;
 use pbig_harness::scenes::Scene;
-use pbig_harness::table::Table;
 use std::time::Duration;
 
-const COLUMNS: [&str; 7] = ["case", "boxes", "pairs", "steps", "pbig_ms", "stock_ms", "stock_over_pbig"];
-
 pub(super) fn run(quick: bool) -> Result<Report, Failure> {
-    let mut table = Table::new("step", COLUMNS);
+    let mut table = Table::new("step", "case | boxes | pairs | steps | pbig_ms | stock_ms | stock_over_pbig");
     scenes(quick, &mut table);
     shares(quick, &mut table)?;
     Ok(Report::new("step", vec![table]))
@@ -26,18 +19,14 @@ fn scenes(quick: bool, table: &mut Table) {
     let sizes: &[usize] = if quick { &[1, 10, 100, 1000] } else { &[1, 10, 100, 1000, 10_000, 100_000] };
     let (rounds, budget) = if quick { (40, 50) } else { (1000, 4000) };
     let effort = Effort { warm_up: 2, rounds, budget: Duration::from_millis(budget) };
-    let bar = progress(Scene::ALL.len() * sizes.len(), "scenes");
-    for (scene, &bodies) in
-        Scene::ALL.iter().flat_map(|scene| sizes.iter().map(move |bodies| (scene, bodies)))
-    {
-        let duel = Duel::run(*scene, bodies, effort);
+    let cases = Scene::ALL.into_iter().flat_map(|scene| sizes.iter().map(move |bodies| (scene, *bodies)));
+    for (scene, bodies) in tracked(cases, "scenes") {
+        let duel = Duel::run(scene, bodies, effort);
         let [ours, stock] = duel.medians(effort.warm_up);
         let (case, boxes) = (format!("{}, {bodies} bodies", scene.name), duel.world.colliders.len());
         let steps = duel.times.len() - effort.warm_up;
         table.row(cells![case, boxes, duel.pairs(), steps, ours, stock, stock.max(1e-9) / ours.max(1e-9)]);
-        bar.inc(1);
     }
-    bar.finish_and_clear();
 }
 
 /// Appends the medians of shares of the uniform set that move: the broad phase's call alone.

@@ -1,14 +1,9 @@
 //! `pbig bench update`: a broad phase's call through rapier, ours and stock's in turn on the same world.
 
-use super::{memory, requests};
+use super::memory;
 use pbig_core::Aabb;
-use pbig_harness::bench::{COMPARED, Contest, Effort, MS, Took, compared, measured, medians, timed};
-use pbig_harness::boxes::{BoxSet, Movers};
-use pbig_harness::chart::{Chart, Line};
 use pbig_harness::field::Field;
-use pbig_harness::output::{Failure, progress};
-use pbig_harness::report::Report;
-use pbig_harness::table::Table;
+use pbig_harness::prelude::*;
 use rapier_pbig::PbigBroadPhase;
 use rapier3d::prelude::*;
 use rayon::prelude::*;
@@ -30,7 +25,6 @@ struct Calls {
     stock: DefaultBroadPhase,
     events: Vec<BroadPhasePairEvent>,
     boxes: Vec<rapier3d::parry::bounding_volume::Aabb>,
-    with_floor: bool,
 }
 
 const OURS: usize = 0;
@@ -40,7 +34,7 @@ const FLOOR_PARALLEL: usize = 3;
 
 impl Calls {
     /// A world with two broad phases that know it. Without movers nothing moves.
-    fn new(boxes: &[Aabb], share: Option<f64>, with_floor: bool) -> Self {
+    fn new(boxes: &[Aabb], share: Option<f64>) -> Self {
         let mut calls = Self {
             field: Field::new(boxes),
             movers: share.map(|share| Movers::new(boxes.len(), share)),
@@ -49,7 +43,6 @@ impl Calls {
             stock: DefaultBroadPhase::new(),
             events: vec![],
             boxes: vec![],
-            with_floor,
         };
         calls.modified.clone_from(&calls.field.colliders);
         calls.update(OURS);
@@ -75,12 +68,6 @@ impl Calls {
             self.boxes.extend(self.modified.iter().map(aabb));
         }
         black_box(&mut self.boxes);
-    }
-}
-
-impl Contest for Calls {
-    fn sides(&self) -> usize {
-        if self.with_floor { 4 } else { 2 }
     }
 
     fn prepare(&mut self, round: usize) {
@@ -126,33 +113,21 @@ const OTHERS: [(usize, &str); 3] =
     [(STOCK, "stock"), (FLOOR, "floor, one thread"), (FLOOR_PARALLEL, "floor, all threads")];
 
 pub(super) fn run(quick: bool) -> Result<Report, Failure> {
-    let cases = cases(quick);
-    let bar = progress(cases.len() + 1, "cases");
     let mut table = Table::new("update", COMPARED);
-    let mut lines =
-        ["pbig", "stock", "floor, one thread"].map(|name| Line { name: name.into(), points: vec![] });
-    for &case in &cases {
-        let times = measure(case, Effort::new(quick), &mut table)?;
-        if times.len() > 2 {
-            let place = |took: &Took| (case.1 as f64, took.median);
-            lines.iter_mut().zip(&times).for_each(|(line, took)| line.points.push(place(took)));
-        }
-        bar.inc(1);
+    for case in tracked(cases(quick), "cases") {
+        measure(case, Effort::new(quick), &mut table)?;
     }
-    memory::rows(quick, &mut table)?;
-    requests::rows(quick, &mut table)?;
-    bar.finish_and_clear();
-    let title = "a call through rapier, uniform boxes, all moved";
-    let chart = Chart::log("update-boxes", title, ["boxes", "time, ms"], lines.into());
-    Ok(Report { charts: vec![chart], ..Report::new("update", vec![table]) })
+    memory::peaks(quick, &mut table)?;
+    memory::requests_in_steady_state(quick, &mut table)?;
+    Ok(Report::new("update", vec![table]))
 }
 
-/// Appends the rows of a case; returns the times of all sides.
-fn measure((set, n, share): Case, effort: Effort, table: &mut Table) -> Result<Vec<Took>, Failure> {
+/// Appends the rows of a case.
+fn measure((set, n, share): Case, effort: Effort, table: &mut Table) -> Result<(), Failure> {
     let boxes = BoxSet::named(set).expect("a set of the harness").boxes(n, 1);
-    let with_floor = set == "uniform" && share == Some(1.0);
-    let mut calls = Calls::new(&boxes, share, with_floor);
-    let times = measured(&mut calls, effort)?;
+    let sides = if set == "uniform" && share == Some(1.0) { 4 } else { 2 };
+    let mut calls = Calls::new(&boxes, share);
+    let times = measured(&mut calls, sides, effort, Calls::prepare, Calls::run)?;
     let moved = match share {
         None => "nothing".into(),
         Some(1.0) => "all".into(),
@@ -163,12 +138,12 @@ fn measure((set, n, share): Case, effort: Effort, table: &mut Table) -> Result<V
     for (side, name) in OTHERS.into_iter().take(times.len() - 1) {
         table.row(compared(&case, n, pairs, unit, times[OURS], (name, times[side])));
     }
-    Ok(times)
+    Ok(())
 }
 
 /// Returns ours and stock's milliseconds if a share of some boxes moves, and the pairs.
 pub(super) fn shares(boxes: &[Aabb], share: f64, effort: Effort) -> Result<(f64, f64, u64), Failure> {
-    let mut calls = Calls::new(boxes, Some(share), false);
-    let times = medians(&mut calls, effort)?;
+    let mut calls = Calls::new(boxes, Some(share));
+    let times = medians(&mut calls, 2, effort, Calls::prepare, Calls::run)?;
     Ok((times[OURS], times[STOCK], calls.ours.pair_count() as u64))
 }

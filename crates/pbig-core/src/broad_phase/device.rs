@@ -80,7 +80,7 @@ impl BroadPhase {
         events.clear();
         let existed = |pair: &Pair| !world.was_removed(pair.a) && !world.was_removed(pair.b);
         // A pair that is not kept cannot end: a device that says so is wrong, and does no harm.
-        events.removed.extend(found.ended.iter().filter(|pair| kept.contains(**pair)));
+        events.removed.extend(kept.existing(&found.ended));
         // The device takes pairs of boxes that it treats as new for new ones.
         let restarted = &found.restarted;
         let is_restarted = |id: u32| restarted.binary_search(&id).is_ok();

@@ -7,8 +7,7 @@ use super::search::{SearchRequest, search};
 use super::upload::PIECE;
 use super::{Failure, GpuFinder, GpuFound};
 use crate::layout::{BoxChange, DeviceBox, FilterChange, Motion, WAS_ABSENT};
-use crate::{Aabb, Config, ProxyFilter};
-use rayon::prelude::*;
+use crate::{Aabb, Config, ProxyFilter, parallel};
 use std::ops::Range;
 
 /// A changed box as it was at the last update.
@@ -58,9 +57,12 @@ impl ChangeRequest<'_> {
     }
 
     fn restarted(&self) -> Vec<u32> {
-        let changed = self.changed.par_iter().with_min_len(PIECE);
-        let mut ids: Vec<u32> =
-            changed.filter(|change| self.is_restarted(change)).map(|change| change.id).collect();
+        let pieces: Vec<&[Change]> = self.changed.chunks(PIECE).collect();
+        let ids = parallel::map(pieces.len(), |i| {
+            let restarted = pieces[i].iter().filter(|change| self.is_restarted(change));
+            restarted.map(|change| change.id).collect::<Vec<_>>()
+        });
+        let mut ids = ids.concat();
         ids.sort_unstable();
         ids
     }
@@ -76,12 +78,15 @@ impl ChangeRequest<'_> {
         motions
     }
 
-    /// Returns the changes of the first `known` boxes, for a device that has these boxes at the last update.
-    pub(super) fn lists(&self, known: usize) -> (Vec<BoxChange>, Vec<FilterChange>) {
-        let changed = self.changed.par_iter().with_min_len(PIECE);
-        let changed = changed.filter(|change| (change.id as usize) < known);
-        let boxes = changed.clone().map(|change| self.box_change(change)).collect();
-        (boxes, changed.filter_map(|change| self.filter_change(change)).collect())
+    /// Returns the changes of the first `known` boxes, for a device that has these boxes at the last update. Each list is
+    /// in pieces.
+    pub(super) fn lists(&self, known: usize) -> Vec<(Vec<BoxChange>, Vec<FilterChange>)> {
+        let pieces: Vec<&[Change]> = self.changed.chunks(PIECE).collect();
+        parallel::map(pieces.len(), |i| {
+            let changed = pieces[i].iter().filter(|change| (change.id as usize) < known);
+            let boxes = changed.clone().map(|change| self.box_change(change)).collect();
+            (boxes, changed.filter_map(|change| self.filter_change(change)).collect())
+        })
     }
 
     fn box_change(&self, change: &Change) -> BoxChange {
@@ -118,8 +123,10 @@ impl GpuFinder {
         let &ChangeRequest { filters, config, kept, .. } = request;
         self.run(config, kept, |session| {
             let (boxes, filters, changes) = (request.boxes, Some(filters), Some(request));
+            // First, while the boxes are in the cache.
+            let restarted = request.restarted();
             let found = search(session, &SearchRequest { boxes, filters, changes, config }, Vec::new())?;
-            Ok(GpuFound { restarted: request.restarted(), ..found })
+            Ok(GpuFound { restarted, ..found })
         })
     }
 }

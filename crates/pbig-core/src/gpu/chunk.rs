@@ -4,9 +4,10 @@ use super::GpuError;
 use super::coding::bit_words;
 use super::device::Variant;
 use super::error::Failure;
+use super::items::rest;
 use super::passes::{CLASSES_BYTES, Recording, Step, apply_changes, check, lists_fit, measure, sort};
 use super::readback::{self, HEADER_BYTES, Header};
-use super::session::{Session, rest};
+use super::session::Session;
 use super::sink::Sink;
 use super::storage::{BufferId, Side};
 use crate::decode;
@@ -176,14 +177,13 @@ impl Session {
         params: &Params,
         sink: &mut Sink,
     ) -> Result<ChunkResult, Failure> {
+        let (submission, patience) = (chunk.submission.clone(), self.options.patience);
         let staging = self.storage.get(BufferId::Staging(chunk.side));
         let bytes = HEADER_BYTES + chunk.prefetched;
         let mut clock = Clock::start();
-        let received =
-            readback::read(&self.device, staging, bytes, chunk.submission.clone(), self.options.patience)?;
-        let report = &mut sink.found.report;
-        report.wait += clock.lap();
-        report.downloaded += bytes;
+        let received = readback::read(&self.device, staging, bytes, submission, patience)?;
+        sink.found.report.wait += clock.lap();
+        sink.found.report.downloaded += bytes;
         let (header, prefetched) = received.split_at(HEADER_BYTES as usize);
         let header: Header = bytemuck::pod_read_unaligned(header);
         self.note_times(&chunk, &header, sink);
@@ -199,15 +199,29 @@ impl Session {
             return Ok(ChunkResult::Unsorted);
         }
         let words = self.words(bytemuck::cast_slice(prefetched), out, needed, sink)?;
+        self.fetch_entries(params, needed, sink)?;
         sink.found.report.wait += clock.lap();
+        self.take_output(&words, params, &totals, sink)?;
+        Ok(ChunkResult::Done)
+    }
+
+    /// Decodes the output of a chunk, and notes how much it was.
+    fn take_output(
+        &mut self,
+        words: &[u32],
+        params: &Params,
+        totals: &Totals,
+        sink: &mut Sink,
+    ) -> Result<(), Failure> {
+        let needed = words.len() as u64;
         self.sizes.max_words = self.sizes.max_words.max(needed);
         self.sizes.expected_words = self.sizes.max_words;
-        self.coding.pairs = found_pairs(params, &totals);
-        sink.count(params, &totals, needed);
-        self.decode(&words, params, totals.sorted != 0, sink)?;
-        sink.check(0)?;
+        self.coding.pairs = found_pairs(params, totals);
+        sink.count(params, totals, needed);
+        let mut clock = Clock::start();
+        self.decode(words, params, totals.sorted != 0, sink)?;
         sink.found.report.decode += clock.lap();
-        Ok(ChunkResult::Done)
+        sink.check(0)
     }
 
     /// Returns why the map or the chunk has to be repeated, if it has.
@@ -250,6 +264,15 @@ impl Session {
         Ok(Cow::Owned(words))
     }
 
+    /// Reads the entries, which records name, once a job.
+    fn fetch_entries(&mut self, params: &Params, words: u64, sink: &mut Sink) -> Result<(), GpuError> {
+        if params.flags & PACKED != 0 && self.table.is_none() && words > 0 {
+            let entries = u64::from(self.sizes.lists.entries);
+            self.table = Some(self.fetch(Buffer::Entries.into(), 0, entries, &mut sink.found.report)?);
+        }
+        Ok(())
+    }
+
     fn note_times(&self, chunk: &PendingChunk, header: &Header, sink: &mut Sink) {
         if self.device.has_timestamps && self.options.time_kernels {
             let times = header.times(&chunk.passes, self.device.queue.get_timestamp_period());
@@ -264,10 +287,6 @@ impl Session {
         is_sorted: bool,
         sink: &mut Sink,
     ) -> Result<(), GpuError> {
-        if params.flags & PACKED != 0 && self.table.is_none() && !words.is_empty() {
-            let entries = u64::from(self.sizes.lists.entries);
-            self.table = Some(self.fetch(Buffer::Entries.into(), 0, entries, &mut sink.found.report)?);
-        }
         let (pairs, boxes) = (&mut sink.found.pairs, params.boxes);
         let is_all = pairs.is_empty() && (is_sorted || params.flags & BITS != 0);
         sink.found.is_sorted = is_all;

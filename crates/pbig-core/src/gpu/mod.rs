@@ -22,11 +22,14 @@
 #![cfg_attr(not(feature = "unstable-study"), allow(unreachable_pub, reason = "`study` shows parts of it"))]
 
 mod adapter;
+mod attempts;
 mod changes;
 mod chunk;
 mod coding;
 mod device;
 mod error;
+mod items;
+mod job;
 mod kept_plan;
 mod levels;
 mod passes;

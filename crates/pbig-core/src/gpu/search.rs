@@ -6,15 +6,14 @@
 
 use super::changes::bounds_of;
 use super::error::Failure;
-use super::session::{Input, Job, Session, Sizes};
+use super::job::{Input, Job};
+use super::session::{Session, Sizes};
 use super::sink::{GpuFound, Sink};
-use super::upload::PIECE;
 use super::{ChangeRequest, GpuError};
 use crate::layout::{BOX_BITS, Located, Motion, ordered};
 use crate::pbig::sampled;
 use crate::report::GpuReport;
 use crate::{Aabb, Config, Order, Pair, ProxyFilter};
-use rayon::prelude::*;
 
 /// Most boxes of one cell: their work items, 2^17 rows by 2^17 / 8 groups of 8 columns, fit 32 bits.
 const MAX_BOXES_PER_CELL: u64 = 1 << 25;
@@ -144,8 +143,9 @@ fn of_ids<T: Copy>(all: &[T], ids: &[u32]) -> Vec<T> {
 
 /// Replaces indices into a part by the ids of its boxes.
 fn name_pairs(pairs: &mut [Pair], ids: &[u32]) {
-    let name = |pair: &mut Pair| *pair = Pair::new(ids[pair.a as usize], ids[pair.b as usize]);
-    pairs.par_iter_mut().with_min_len(PIECE).for_each(name);
+    for pair in pairs {
+        *pair = Pair::new(ids[pair.a as usize], ids[pair.b as usize]);
+    }
 }
 
 /// Ids of boxes to search: for all pairs of `first`, or for pairs between `first` and `second`.

@@ -4,9 +4,9 @@
 use super::GpuError;
 use super::device::{GpuDevice, Variant};
 use crate::config::GpuOptions;
+use crate::parallel::{self, threads_for};
 use bytemuck::Pod;
 use pbig_shaders::{Buffer, Kernel};
-use rayon::prelude::*;
 use std::collections::HashMap;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -21,7 +21,7 @@ const MIN_BUFFER_BYTES: u64 = 256;
 const ALWAYS_KEPT_BYTES: u64 = 1 << 16;
 
 /// Bytes that a thread copies at a time.
-const PIECE_BYTES: usize = 1 << 18;
+const PIECE_BYTES: usize = 1 << 19;
 
 /// One of the two sets of buffers for chunks, 0 or 1: two chunks can be in progress (PBIG 5.3).
 pub(super) type Side = usize;
@@ -209,11 +209,17 @@ impl Storage {
         self.map_staging(bytes)?;
         let pieces = self.plan_copies(uploads);
         let staging = self.get(BufferId::UploadStaging);
-        let write = |(from, piece): &(u64, &[u8])| {
-            let view = staging.get_mapped_range_mut(*from..from + piece.len() as u64);
-            view.map(|mut view| view.copy_from_slice(piece)).map_err(|_| self.device.give_up())
-        };
-        pieces.par_iter().try_for_each(write)?;
+        let has_failed = AtomicBool::new(false);
+        parallel::run(threads_for(pieces.len()), pieces.len(), |_, i| {
+            let (from, piece) = pieces[i];
+            match staging.get_mapped_range_mut(from..from + piece.len() as u64) {
+                Ok(mut view) => view.copy_from_slice(piece),
+                Err(_) => has_failed.store(true, Ordering::Relaxed),
+            }
+        });
+        if has_failed.into_inner() {
+            return Err(self.device.give_up());
+        }
         staging.unmap();
         self.is_staging_mapped.store(false, Ordering::Relaxed);
         self.bytes_sent += uploads.iter().map(Upload::len).sum::<u64>();

@@ -8,8 +8,8 @@ use super::ChangeRequest;
 use super::GpuError;
 use super::passes::changed_bytes;
 use super::storage::{Storage, Upload};
-use crate::layout::{DeviceBox, Motion, Params, RAW};
-use crate::{Aabb, ProxyFilter};
+use crate::ProxyFilter;
+use crate::layout::{BoxChange, FilterChange, Motion, Params};
 use bytemuck::Pod;
 use pbig_shaders::Buffer;
 
@@ -35,42 +35,8 @@ impl UploadCache {
         self.motions = None;
     }
 
-    /// Uploads the boxes of a search with a grid.
-    pub(super) fn upload_raw(
-        &mut self,
-        storage: &mut Storage,
-        boxes: &[Aabb],
-        filters: Option<&[ProxyFilter]>,
-        params: &mut Params,
-    ) -> Result<(), GpuError> {
-        params.flags |= RAW;
-        self.upload_all(storage, boxes, filters, params)
-    }
-
-    /// Uploads a few boxes.
-    pub(super) fn upload_few(
-        &mut self,
-        storage: &mut Storage,
-        boxes: &[Aabb],
-        filters: Option<&[ProxyFilter]>,
-        params: &mut Params,
-    ) -> Result<(), GpuError> {
-        let boxes: Vec<DeviceBox> = boxes.iter().map(DeviceBox::new).collect();
-        self.upload_all(storage, &boxes, filters, params)
-    }
-
-    /// Uploads boxes now and before, whatever the device has.
-    pub(super) fn upload_motions(
-        &mut self,
-        storage: &mut Storage,
-        motions: &[Motion],
-        filters: Option<&[ProxyFilter]>,
-        params: &mut Params,
-    ) -> Result<(), GpuError> {
-        self.upload_all(storage, motions, filters, params)
-    }
-
-    fn upload_all<T: Pod>(
+    /// Uploads all boxes, or boxes now and before, whatever the device has.
+    pub(super) fn upload_all<T: Pod>(
         &mut self,
         storage: &mut Storage,
         boxes: &[T],
@@ -98,9 +64,7 @@ impl UploadCache {
         let has_lost_content = make_room(storage, bytes, filter_bytes, params.boxes)?;
         match known.filter(|_| !has_lost_content) {
             Some(known) => send_lists(storage, request, known.boxes.min(boxes), params)?,
-            None => {
-                self.upload_motions(storage, &request.motions(0..boxes), Some(request.filters), params)?;
-            }
+            None => self.upload_all(storage, &request.motions(0..boxes), Some(request.filters), params)?,
         }
         self.motions = Some(KnownMotions { update: request.update, boxes });
         Ok(())
@@ -120,16 +84,22 @@ fn send_lists(
     known: usize,
     params: &mut Params,
 ) -> Result<(), GpuError> {
-    let (boxes, filters) = request.lists(known);
-    storage.ensure(Buffer::BoxChanges, size_of_val(&boxes[..]) as u64)?;
-    storage.ensure(Buffer::FilterChanges, size_of_val(&filters[..]) as u64)?;
-    storage.stage(&[
-        Upload::new(Buffer::BoxChanges, 0, &boxes),
-        Upload::new(Buffer::FilterChanges, 0, &filters),
-        Upload::new(Buffer::Boxes, known, &request.motions(known..request.boxes.len())),
+    let lists = request.lists(known);
+    let new = request.motions(known..request.boxes.len());
+    let mut uploads = vec![
+        Upload::new(Buffer::Boxes, known, &new),
         Upload::new(Buffer::Filters, known, &request.filters[known..]),
-    ])?;
+    ];
+    let (mut box_changes, mut filter_changes) = (0, 0);
+    for (boxes, filters) in &lists {
+        uploads.push(Upload::new(Buffer::BoxChanges, box_changes, boxes));
+        uploads.push(Upload::new(Buffer::FilterChanges, filter_changes, filters));
+        (box_changes, filter_changes) = (box_changes + boxes.len(), filter_changes + filters.len());
+    }
+    storage.ensure(Buffer::BoxChanges, (box_changes * size_of::<BoxChange>()) as u64)?;
+    storage.ensure(Buffer::FilterChanges, (filter_changes * size_of::<FilterChange>()) as u64)?;
+    storage.stage(&uploads)?;
     params.known = known as u32;
-    (params.box_changes, params.filter_changes) = (boxes.len() as u32, filters.len() as u32);
+    (params.box_changes, params.filter_changes) = (box_changes as u32, filter_changes as u32);
     Ok(())
 }

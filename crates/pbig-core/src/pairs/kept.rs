@@ -127,6 +127,26 @@ impl Kept {
         self.forward.row(pair.a).binary_search(&pair.b).is_ok()
     }
 
+    /// Yields those of `pairs` that exist.
+    #[cfg(feature = "gpu")]
+    pub(crate) fn existing(&self, pairs: &[Pair]) -> impl Iterator<Item = Pair> {
+        pairs.iter().enumerate().filter_map(|(i, pair)| {
+            self.prefetch(&pairs[i..]);
+            self.contains(*pair).then_some(*pair)
+        })
+    }
+
+    /// Prefetches the rows of pairs ahead of the first.
+    fn prefetch(&self, pairs: &[Pair]) {
+        let spans = &self.forward.spans;
+        if let Some(pair) = pairs.get(2 * AHEAD) {
+            prefetch(spans.as_ptr().wrapping_add(pair.a as usize));
+        }
+        if let Some(span) = pairs.get(AHEAD).and_then(|pair| spans.get(pair.a as usize)) {
+            prefetch(self.forward.pool.as_ptr().wrapping_add(span.start as usize));
+        }
+    }
+
     fn reversed(&self) -> Rows {
         let mut spans = vec![Span::default(); self.lower.len()];
         let mut next = 0;
@@ -156,10 +176,7 @@ impl Kept {
 
     fn for_each(&mut self, pairs: &[Pair], change: impl Fn(&mut Rows, u32, u32)) {
         for (i, pair) in pairs.iter().enumerate() {
-            if let Some(ahead) = pairs.get(i + AHEAD) {
-                let start = self.forward.spans[ahead.a as usize].start as usize;
-                prefetch(self.forward.pool.as_ptr().wrapping_add(start));
-            }
+            self.prefetch(&pairs[i..]);
             change(&mut self.forward, pair.a, pair.b);
             if let Some(rows) = self.backward.get_mut() {
                 change(rows, pair.b, pair.a);
@@ -234,6 +251,18 @@ mod tests {
             assert_eq!(kept.forward.pool.len(), places);
             kept.apply(&[], &row(longer).collect::<Vec<_>>());
         }
+    }
+
+    #[cfg(feature = "gpu")]
+    #[test]
+    fn pairs_that_no_row_has_do_not_exist() {
+        let mut kept = Kept::default();
+        kept.reserve_ids(100);
+        let pairs: Vec<Pair> = (0..60).map(|i| Pair { a: i, b: 99 }).collect();
+        kept.apply(&pairs, &[]);
+        let unknown = [Pair { a: 1, b: 98 }, Pair { a: 70, b: 99 }, Pair { a: 5000, b: 5001 }];
+        let asked = [&unknown[..], &pairs, &unknown].concat();
+        assert!(kept.existing(&asked).eq(pairs));
     }
 
     #[test]

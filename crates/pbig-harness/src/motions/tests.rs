@@ -90,20 +90,3 @@ fn churn_keeps_a_tenth_absent_and_every_box_has_its_turn() {
     }
     assert!(were_absent.into_iter().all(|was| was));
 }
-
-#[test]
-fn worlds_of_few_boxes_move_too() {
-    for n in 0..4 {
-        for mut scene in scenes(n) {
-            (0..12).for_each(|_| _ = scene.step());
-            assert_eq!(scene.boxes().len(), n);
-        }
-    }
-}
-
-#[test]
-fn names_are_unique() {
-    let mut names = Motion::ALL.map(Motion::name);
-    names.sort_unstable();
-    assert!(names.is_sorted_by(|a, b| a < b));
-}

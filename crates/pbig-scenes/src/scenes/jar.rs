@@ -14,7 +14,7 @@ const PLANKS: usize = 24;
 /// Layers of one size each fall into each other.
 pub(super) fn jar(b: &mut Builder, n: usize) {
     b.ground();
-    // About sixty bodies fit into a jar one metre wide and three high.
+    // The first metre is room for the largest bodies; the rest keeps a large jar about three times as high as its radius.
     let radius = 1.0 + side_of_cube(n) as f32 * 0.25;
     let (mut left, mut height) = (n, 0.1);
     while left > 0 {

@@ -1,15 +1,9 @@
 //! Coordinates in f32, in 16 bits and in codes: what a search's tests take, and what they let through.
 
-use super::report;
+use super::{mean, median, report};
 use crate::precision::{Candidates, Code, Coordinates, Exact, Fixed, Found, Half};
 use pbig_core::{Config, Finder, Limits};
-use pbig_harness::bench::{Contest, Effort, medians};
-use pbig_harness::boxes::BoxSet;
-use pbig_harness::cells;
-use pbig_harness::output::Failure;
-use pbig_harness::report::Report;
-use pbig_harness::runner::{Spread, milliseconds};
-use pbig_harness::table::{Cell, Table};
+use pbig_harness::prelude::*;
 use std::time::Duration;
 
 /// One kind of coordinates.
@@ -28,167 +22,89 @@ const KINDS: [Kind; 5] =
     [kind::<Exact>(), kind::<Fixed<true>>(), kind::<Fixed<false>>(), kind::<Half>(), kind::<Code>()];
 
 const SETS: [&str; 5] = ["uniform", "gaussian", "unit", "mixed", "pile"];
+
 pub(super) fn run(quick: bool) -> Result<Report, Failure> {
     let sizes: &[usize] = if quick { &[3000] } else { &[10_000, 100_000, 1_000_000] };
-    let mut rows = Vec::new();
-    for (boxes, set) in sizes.iter().flat_map(|&boxes| SETS.map(|set| (boxes, set))) {
-        rows.extend(measure(set, boxes, quick)?);
+    let columns = "set | boxes | coordinates | bytes_per_box | tests | pairs | missed | spurious_percent | read_MB | round_ms | \
+        test_ms | exact_test_ms | test_and_exact_test_ms";
+    let mut table = Table::new("tests", columns);
+    for (&boxes, set) in sizes.iter().flat_map(|boxes| SETS.map(|set| (boxes, set))) {
+        measure(set, boxes, quick, &mut table)?;
     }
     let axes = ["time, ns per test with its exact test", "spurious candidates, % of the pairs"];
     // The largest sets alone: a point for each set.
-    let largest = rows.iter().filter(|row| Some(&row.boxes) == sizes.last());
-    let points = largest.map(|row| (row.kind.name.into(), row.ns_per_test(), row.spurious_percent()));
-    let tables = vec![table(&rows), means(&rows)];
+    let largest = &table.rows[table.rows.len() - SETS.len() * KINDS.len()..];
+    let number = |row: &[_], column| table.number(row, column).unwrap_or_default();
+    let points = largest.iter().map(|row| {
+        let ns = number(row, "test_and_exact_test_ms") * 1e6 / number(row, "tests").max(1.0);
+        (row[2].as_str().unwrap_or_default().to_owned(), ns, number(row, "spurious_percent"))
+    });
+    let tables = vec![table.clone(), means(&table)];
     let mut report = report("coordinates", tables, ("Coordinates in fewer bits", axes), points);
     // Sets have no order.
     report.charts[0].plots[0].is_joined = false;
     Ok(report)
 }
 
-/// One kind on one set.
-struct Row {
-    set: &'static str,
-    boxes: usize,
-    kind: &'static Kind,
-    found: Found,
-    /// Pairs that the kind's tests ended; 0, or the run has failed.
-    missed: u64,
-    /// Milliseconds, medians.
-    encode: f64,
-    test: f64,
-    recheck: f64,
-}
-
-impl Row {
-    fn spurious_percent(&self) -> f64 {
-        (self.found.candidates - self.found.pairs) as f64 / self.found.pairs.max(1) as f64 * 100.0
-    }
-
-    /// Read by the tests, and by the exact tests of what they let through.
-    fn bytes(&self) -> u64 {
-        let rechecked = if self.kind.is_exact { 0 } else { self.found.candidates };
-        self.found.tests * self.kind.bytes as u64 + rechecked * 48
-    }
-
-    fn ns_per_test(&self) -> f64 {
-        (self.test + self.recheck) * 1e6 / self.found.tests.max(1) as f64
-    }
-}
-
-/// All kinds on the same candidates, in turn.
-struct Sides {
-    candidates: Candidates,
-    kept: Vec<[u32; 2]>,
-    found: [Vec<Found>; KINDS.len()],
-}
-
-impl Contest for Sides {
-    fn sides(&self) -> usize {
-        KINDS.len()
-    }
-
-    fn prepare(&mut self, _: usize) {}
-
-    fn run(&mut self, side: usize) -> Result<f64, Failure> {
-        let found = (KINDS[side].find)(&self.candidates, &mut self.kept);
-        self.found[side].push(found);
-        Ok(milliseconds(found.test + found.recheck))
-    }
-}
-
-fn measure(set: &'static str, n: usize, quick: bool) -> Result<Vec<Row>, Failure> {
-    let boxes = BoxSet::named(set).map(|set| set.boxes(n, 1)).unwrap_or_default();
-    let candidates = Candidates::new(&boxes);
-    let candidates = candidates.ok_or_else(|| Failure::Input(format!("{set}: a box is not finite")))?;
-    let mut sides = Sides { candidates, kept: vec![], found: Default::default() };
-    let effort = if quick { (7, 250) } else { (31, 4000) };
-    let (rounds, budget) = (effort.0, Duration::from_millis(effort.1));
-    medians(&mut sides, Effort { warm_up: 2, rounds, budget })?;
-    let pairs = pairs(set, &boxes)?;
-    KINDS.iter().zip(&sides.found).map(|(kind, found)| row(set, n, kind, found, pairs)).collect()
-}
-
-/// As pbig counts them, by another search.
-fn pairs(set: &str, boxes: &[pbig_core::Aabb]) -> Result<u64, Failure> {
+/// Appends the rows of all kinds on the same candidates, in turn.
+fn measure(set: &str, n: usize, quick: bool, table: &mut Table) -> Result<(), Failure> {
+    let boxes = BoxSet::named(set).expect("a set of the harness").boxes(n, 1);
+    let candidates = Candidates::new(&boxes).ok_or_else(|| Failure::Input(format!("{set}: not finite")))?;
+    let (rounds, ms) = if quick { (7, 250) } else { (31, 4000) };
+    let effort = Effort { warm_up: 2, rounds, budget: Duration::from_millis(ms) };
+    let (mut kept, mut found) = (vec![], [(); KINDS.len()].map(|()| Vec::<Found>::new()));
+    measured(&mut found, KINDS.len(), effort, unprepared, |found, side| {
+        let one = (KINDS[side].find)(&candidates, &mut kept);
+        found[side].push(one);
+        Ok(milliseconds(one.test + one.recheck))
+    })?;
+    // As pbig counts them, by another search.
     let mut finder = Finder::new(Config { limits: Limits::UNLIMITED, ..Config::DEFAULT });
-    let pairs = finder.find(boxes).map(|pairs| pairs.len() as u64);
-    pairs.map_err(|error| Failure::Input(format!("{set} {}: {error}", boxes.len())))
+    let pairs = finder.find(&boxes)?.len() as u64;
+    for (kind, found) in KINDS.iter().zip(&found) {
+        add(set, n, kind, found, pairs, table)?;
+    }
+    Ok(())
 }
 
-fn row(
-    set: &'static str,
-    boxes: usize,
-    kind: &'static Kind,
+fn add(
+    set: &str,
+    n: usize,
+    kind: &Kind,
     found: &[Found],
     pairs: u64,
-) -> Result<Row, Failure> {
-    let median = |of: fn(&Found) -> Duration| Spread::of(found.iter().map(|f| milliseconds(of(f)))).median;
+    table: &mut Table,
+) -> Result<(), Failure> {
     let last = found.last().copied().unwrap_or_default();
-    if last.pairs != pairs {
-        let what = format!("{set} {boxes}, {}: {} pairs of {pairs}", kind.name, last.pairs);
-        return Err(Failure::Check(what));
-    }
-    let (encode, test, recheck) = (median(|f| f.encode), median(|f| f.test), median(|f| f.recheck));
+    check(last.pairs == pairs, || format!("{set} {n}, {}: {} pairs of {pairs}", kind.name, last.pairs))?;
+    let ms =
+        |of: fn(&Found) -> Duration| median(&found.iter().map(|f| milliseconds(of(f))).collect::<Vec<_>>());
+    let (encode, test, recheck) = (ms(|f| f.encode), ms(|f| f.test), ms(|f| f.recheck));
     let recheck = if kind.is_exact { 0.0 } else { recheck };
-    Ok(Row { set, boxes, kind, found: last, missed: pairs - last.pairs, encode, test, recheck })
-}
-fn table(rows: &[Row]) -> Table {
-    let columns = [
-        "set",
-        "boxes",
-        "coordinates",
-        "bytes_per_box",
-        "tests",
-        "pairs",
-        "missed",
-        "spurious_percent",
-        "read_MB",
-        "round_ms",
-        "test_ms",
-        "exact_test_ms",
-        "test_and_exact_test_ms",
-    ];
-    let mut table = Table::new("tests", columns);
-    for row in rows {
-        let (kind, found) = (row.kind, &row.found);
-        let counts = cells![kind.bytes, found.tests, found.pairs, row.missed, row.spurious_percent()];
-        let (bytes, both) = (row.bytes() as f64 / 1e6, row.test + row.recheck);
-        let times = cells![bytes, row.encode, row.test, row.recheck, both];
-        table.row([cells![row.set, row.boxes, kind.name], counts, times].concat());
-    }
-    table
+    // Read by the tests, and by the exact tests of what they let through.
+    let rechecked = if kind.is_exact { 0 } else { last.candidates };
+    let bytes = last.tests * kind.bytes as u64 + rechecked * 48;
+    let spurious = super::percent(last.candidates - last.pairs, last.pairs);
+    let head = cells![set, n, kind.name, kind.bytes, last.tests, last.pairs, pairs - last.pairs, spurious];
+    table.row([head, cells![bytes as f64 / 1e6, encode, test, recheck, test + recheck]].concat());
+    Ok(())
 }
 
-/// Against f32 on the same boxes: geometric means.
-struct Mean {
-    time: f64,
-    time_with_rounding: f64,
-    bytes: f64,
-    worst_spurious: f64,
-}
-
-fn mean(rows: &[Row], kind: usize) -> Mean {
-    let (sets, count) = (rows.chunks(KINDS.len()), (rows.len() / KINDS.len()).max(1) as f64);
-    let of = |ratio: fn(&Row) -> f64| {
-        let logs = sets.clone().map(|set| (ratio(&set[kind]) / ratio(&set[0])).ln());
-        (logs.sum::<f64>() / count).exp()
-    };
-    Mean {
-        time: of(|row| row.test + row.recheck),
-        time_with_rounding: of(|row| row.encode + row.test + row.recheck),
-        bytes: of(|row| row.bytes() as f64),
-        worst_spurious: sets.map(|set| set[kind].spurious_percent()).fold(0.0, f64::max),
-    }
-}
-
-fn means(rows: &[Row]) -> Table {
-    let columns =
-        ["coordinates", "time_of_tests", "with_the_rounding", "bytes_read", "largest_spurious_percent"];
+/// Returns geometric means over all sets of what a kind takes, relative to f32 on the same boxes.
+fn means(tests: &Table) -> Table {
+    let columns = "coordinates | time_of_tests | with_the_rounding | bytes_read | largest_spurious_percent";
     let mut table = Table::new("means", columns);
+    let [time, rounding, bytes, spurious] =
+        ["test_and_exact_test_ms", "round_ms", "read_MB", "spurious_percent"].map(|name| tests.numbers(name));
+    let with_rounding: Vec<f64> =
+        time.iter().zip(&rounding).map(|(time, rounding)| time + rounding).collect();
     for (k, kind) in KINDS.iter().enumerate() {
-        let mean = mean(rows, k);
-        let values = [mean.time, mean.time_with_rounding, mean.bytes, mean.worst_spurious];
-        table.row([Cell::from(kind.name)].into_iter().chain(values.map(Cell::from)));
+        let of = |values: &[f64]| {
+            let logs = values.chunks(KINDS.len()).map(|set| (set[k] / set[0]).ln());
+            mean(&logs.collect::<Vec<_>>()).exp()
+        };
+        let largest = spurious.chunks(KINDS.len()).map(|set| set[k]).fold(0.0, f64::max);
+        table.row(cells![kind.name, of(&time), of(&with_rounding), of(&bytes), largest]);
     }
     table
 }

@@ -1,173 +1,280 @@
 //! From the index of a pair to the pair (Avril 3.2 and 3.3): every root and every correction.
 
-mod ends;
-mod exact;
-mod kernels;
+pub(crate) mod kernels;
 mod paper;
-mod roundings;
-mod rules;
-mod sizes;
-mod times;
+mod tally;
 
 use super::{percent, report};
-use crate::index::{CORRECTIONS, Tally, WAYS, Way};
-use ends::Shown;
-use exact::Exactly;
-use pbig_harness::cells;
+use crate::index::{AsItIs, row_by_bisection};
+use crate::index::{CORRECTIONS, Correction, Rules, discriminant, ends, lazy_ids, lazy_pair, pairs_of};
 use pbig_harness::kernels::Bench;
-use pbig_harness::output::Failure;
-use pbig_harness::report::Report;
-use pbig_harness::table::{Cell, Table};
+use pbig_harness::prelude::*;
+use rand::rngs::StdRng;
+use rand::{RngExt, SeedableRng};
 use rayon::prelude::*;
-use times::{Times, label};
+use std::hint::black_box;
+use std::time::Duration;
+use tally::{Block, Tally, WAYS, Way, at, at_ends, lazy_pass};
+
+/// The name of the way without a row.
+const LAZY: &str = "lazy way";
 
 pub(super) fn run(quick: bool) -> Result<Report, Failure> {
     let every: Vec<Every> = WAYS.iter().map(|way| Every::of(way, quick)).collect();
-    let (exact, sizes) = (exact::tallied(quick), sizes::looked_at(quick));
-    check(&every, &exact, &sizes)?;
-    let at = if quick { vec![1000, 1 << 20] } else { vec![16, 128, 1000, 5000, 10_000, 100_000, 1 << 20] };
-    let times = at.iter().map(|&n| Times::measure(n, quick)).collect::<Result<Vec<_>, _>>()?;
-    let mut tables = vec![every_table(&every, &exact), sizes::table(&sizes), rules::counterexamples(quick)];
-    tables.extend([times::table(&times), paper::table_3(quick), paper::table_4(quick), roundings::ways()]);
+    check_all(&every)?;
+    let at = if quick { &[1000, 1 << 20][..] } else { &[16, 128, 1000, 5000, 10_000, 100_000, 1 << 20] };
+    let mut times = Table::new("times", TIMES);
+    at.iter().try_for_each(|&n| add_times(n, quick, &mut times))?;
+    let mut tables = vec![every_table(&every, quick)?, sizes(quick)?, counterexamples(quick), times];
+    tables.extend([paper::table_3(quick), paper::table_4(quick), paper::roundings()]);
     let (kernels, adapter) = kernels(quick)?;
     tables.extend(kernels);
     let axes = ["time, ns per pair (one thread, 5,000 boxes)", "wrong pairs, % of all n looked at"];
-    let points = points(&every, &exact, &times);
+    let points = points(&tables[0], &tables[3]);
     let report = report("index", tables, ("From the index of a pair to the pair", axes), points);
     Ok(Report { head: vec![("adapter", adapter)], ..report })
 }
 
 /// The counts of all pairs, for many n.
 struct Every {
-    way: Way,
-    /// Every n, ascending.
+    way: &'static Way,
     boxes: Vec<i64>,
-    /// As it is, by the rules, by integers.
     tallies: [Tally; 3],
     /// The smallest n with a wrong pair.
     first: [Option<i64>; 3],
-    /// The counts of the ends of rows alone.
-    at_ends: [Shown; 3],
+    /// Values of n with a wrong pair; those of them whose ends of rows are right; by how many rows the worst end is off.
+    ends: [[u64; 3]; 3],
 }
 
-fn boxes(quick: bool) -> Vec<i64> {
-    if quick { (2..=250).chain([1000]).collect() } else { (2..=5000).collect() }
+fn boxes(way: &Way, quick: bool) -> Vec<i64> {
+    match (quick, way.is_exact) {
+        (true, false) => (2..=250).chain([1000]).collect(),
+        (true, true) => (2..=100).chain([1000]).collect(),
+        (false, false) => (2..=5000).collect(),
+        (false, true) => (2..=500).chain((1000..=5000).step_by(1000)).collect(),
+    }
 }
 
 impl Every {
-    fn of(way: &Way, quick: bool) -> Self {
-        let boxes = boxes(quick);
-        let all = boxes.par_iter().map(|&n| Self::of_one(way, n)).reduce(|| Self::of_none(way), Self::and);
-        Self { boxes, ..all }
+    fn of(way: &'static Way, quick: bool) -> Self {
+        let boxes = boxes(way, quick);
+        let (tallies, first, ends) = Default::default();
+        let mut every = Self { way, boxes, tallies, first, ends };
+        let all: Vec<_> = every.boxes.par_iter().map(|&n| (n, (way.all)(n), at_ends(way, n))).collect();
+        all.into_iter().for_each(|(n, tallies, ends)| every.add(n, tallies, ends));
+        every
     }
 
-    fn of_none(way: &Way) -> Self {
-        Self {
-            way: *way,
-            boxes: vec![],
-            tallies: Default::default(),
-            first: [None; 3],
-            at_ends: Default::default(),
+    fn add(&mut self, n: i64, tallies: [Tally; 3], ends: [Tally; 3]) {
+        for c in 0..3 {
+            let is_wrong = tallies[c].wrong > 0;
+            self.tallies[c] += tallies[c];
+            self.first[c] = self.first[c].or(is_wrong.then_some(n));
+            let [values, inside, worst] = &mut self.ends[c];
+            *values += u64::from(is_wrong);
+            *inside += u64::from(is_wrong && ends[c].wrong == 0);
+            *worst = ends[c].worst_row.max(*worst);
         }
-    }
-
-    fn of_one(way: &Way, n: i64) -> Self {
-        let tallies = (way.tally)(n);
-        let first = tallies.map(|tally| (tally.wrong > 0).then_some(n));
-        Self { tallies, first, at_ends: ends::shown(way, n, &tallies), ..Self::of_none(way) }
-    }
-
-    /// With what comes of others.
-    fn and(mut self, other: Self) -> Self {
-        for k in 0..3 {
-            self.tallies[k] += other.tallies[k];
-            self.first[k] = [self.first[k], other.first[k]].into_iter().flatten().min();
-            self.at_ends[k] = self.at_ends[k].and(other.at_ends[k]);
-        }
-        self
     }
 }
 
 /// After the correction by integers nothing may be wrong, nor without an estimate.
-fn check(every: &[Every], exact: &[Exactly], sizes: &[sizes::Size]) -> Result<(), Failure> {
-    let estimated = every.iter().filter_map(|every| Some((label(&every.way), every.first[2]?)));
-    let large = sizes.iter().filter(|size| !size.is_right(2)).map(|size| (label(&WAYS[size.way]), size.n));
-    let exactly = exact.iter().filter_map(|way| Some((way.name.to_owned(), way.first?)));
-    estimated.chain(large).chain(exactly).next().map_or(Ok(()), |(name, n)| {
-        Err(Failure::Check(format!("{name}: a pair of {n} boxes is wrong, by integers")))
+fn check_all(every: &[Every]) -> Result<(), Failure> {
+    let wrong = |every: &Every| every.first[2].or(every.first[0].filter(|_| every.way.is_exact));
+    let found = every.iter().find_map(|every| Some((every.way.name, wrong(every)?)));
+    check(found.is_none(), || format!("a pair is wrong by integers, or without an estimate: {found:?}"))
+}
+
+fn every_table(all: &[Every], quick: bool) -> Result<Table, Failure> {
+    let columns = "root | correction | largest_n | values_of_n | pairs | wrong | wrong_percent | first_wrong_n | worst_row | \
+        missed | doubled | no_pair | values_of_n_with_wrong_pairs | of_these_with_right_ends_of_rows | worst_row_at_ends";
+    let mut table = Table::new("all_pairs", columns);
+    for (every, c) in all.iter().flat_map(|every| (0..CORRECTIONS.len()).map(move |c| (every, c))) {
+        let (tally, [values, inside, worst]) = (every.tallies[c], every.ends[c]);
+        let head = cells![every.way.name, CORRECTIONS[c], every.boxes.last().copied(), every.boxes.len()];
+        let wrong = cells![tally.looked, tally.wrong, percent(tally.wrong, tally.looked), every.first[c]];
+        let rest = cells![tally.worst_row, tally.missed, tally.missed - tally.none, tally.none];
+        table.row([head, wrong, rest, cells![values, inside, worst]].concat());
+    }
+    let boxes = boxes(&WAYS[WAYS.len() - 1], quick);
+    let wrong = boxes.par_iter().find_any(|n| !lazy_way_is_right(**n));
+    check(wrong.is_none(), || format!("{LAZY}: a pair is wrong of so many boxes: {wrong:?}"))?;
+    let pairs: i64 = boxes.iter().map(|n| pairs_of(*n)).sum();
+    let head = cells![LAZY, CORRECTIONS[0], boxes.last().copied(), boxes.len(), pairs, 0, 0.0, None::<u64>];
+    table.row([head, cells![0, 0, 0, 0], vec![Value::Null; 3]].concat());
+    Ok(table)
+}
+
+/// Returns true if the identifiers above the diagonal give every pair once, in order.
+fn lazy_way_is_right(n: i64) -> bool {
+    let all = (0..n).flat_map(|a| (a + 1..n).map(move |b| (a, b)));
+    (0..lazy_ids(n)).filter_map(|id| lazy_pair(id, n)).eq(all)
+}
+
+/// Largest n whose pairs are all looked at: beyond, ends of rows and a sample. `(2n - 1)^2` is below 2^30.
+const MOST_EXHAUSTIVE: i64 = 16_384;
+
+/// From 2 to 2^20 boxes. 46,341 is where 32-bit signed products of n with itself end, 92,683 where unsigned ones of pairs do.
+fn sizes(quick: bool) -> Result<Table, Failure> {
+    let columns = "boxes | root | looked_at | wrong_percent | wrong_ends_of_rows_percent | worst_row | missed | doubled | no_pair | \
+        wrong_by_the_rules_percent | wrong_ends_by_the_rules_percent | worst_row_by_the_rules | missed_by_the_rules";
+    let powers = [1, 4, 7, 10, 12, 13, 14, 15, 16, 17, 18, 19, 20].map(|power| 1i64 << power);
+    let mut sizes: Vec<i64> = powers.into_iter().chain([46_342, 92_683]).collect();
+    sizes.sort_unstable();
+    let sizes = if quick { vec![2, 1000, 1 << 20] } else { sizes };
+    let ways = WAYS.iter().filter(|way| !way.is_exact);
+    let all: Vec<_> = sizes.iter().flat_map(|&n| ways.clone().map(move |way| (n, way))).collect();
+    let mut table = Table::new("sizes", columns);
+    let rows: Vec<_> = all.par_iter().map(|&(n, way)| size(n, way, quick)).collect();
+    rows.into_iter().try_for_each(|row| row.map(|row| table.row(row)))?;
+    Ok(table)
+}
+
+fn size(n: i64, way: &Way, quick: bool) -> Result<Vec<Value>, Failure> {
+    let is_all = n <= MOST_EXHAUSTIVE;
+    let count = if quick { 10_000 } else { 1_000_000 };
+    let tallies = if is_all { (way.all)(n) } else { at(way, n, sample(n, count)) };
+    let at_ends = if is_all { tallies } else { at_ends(way, n) };
+    let is_right = tallies[2].wrong + at_ends[2].wrong == 0;
+    check(is_right, || format!("{}: a pair of {n} boxes is wrong, by integers", way.name))?;
+    let share = |tally: Tally| percent(tally.wrong, tally.looked);
+    let of_all = |count: u64| is_all.then_some(count);
+    let cells = |c: usize| {
+        let (tally, ends) = (tallies[c], at_ends[c]);
+        cells![
+            share(tally),
+            (!is_all).then(|| share(ends)),
+            tally.worst_row.max(ends.worst_row),
+            of_all(tally.missed)
+        ]
+    };
+    let looked = if is_all { "all".to_owned() } else { format!("ends of rows, {count} others") };
+    let Tally { missed, none, .. } = tallies[0];
+    let rest = cells![of_all(missed - none), of_all(none)];
+    Ok([cells![n, way.name, looked], cells(0), rest, cells(1)].concat())
+}
+
+/// Returns indices evenly at random with their rows, the same in every run and for every way.
+fn sample(n: i64, count: usize) -> impl Iterator<Item = (i64, i64)> {
+    let mut rng = StdRng::seed_from_u64(n as u64);
+    (0..count).map(move |_| {
+        let k = rng.random_range(0..pairs_of(n));
+        (k, row_by_bisection(k, n))
     })
 }
 
-/// Each root with each correction over all pairs of every n up to 5,000; ways without an estimate over those of some.
-fn every_table(all: &[Every], exact: &[Exactly]) -> Table {
-    let columns = [
-        "root",
-        "correction",
-        "largest_n",
-        "values_of_n",
-        "pairs",
-        "wrong",
-        "wrong_percent",
-        "first_wrong_n",
-        "worst_row",
-        "missed",
-        "doubled",
-        "no_pair",
-        "values_of_n_with_wrong_pairs",
-        "of_these_with_right_ends_of_rows",
-        "worst_row_at_ends",
-    ];
-    let mut table = Table::new("all_pairs", columns);
-    for (every, k) in all.iter().flat_map(|every| (0..CORRECTIONS.len()).map(move |k| (every, k))) {
-        let most = every.boxes.last().copied().unwrap_or(0);
-        let head = cells![label(&every.way), CORRECTIONS[k], most as u64, every.boxes.len()];
-        table
-            .row([head, counts(&every.tallies[k], every.first[k]), every.at_ends[k].cells().into()].concat());
-    }
-    for one in exact {
-        let head = cells![one.name, CORRECTIONS[0], one.most as u64, one.values];
-        table.row([head, counts(&one.tally, one.first), vec![Cell::Nothing; 3]].concat());
+/// The smallest n for which the rules give a wrong pair at an end of a row.
+fn counterexamples(quick: bool) -> Table {
+    let mut table = Table::new("counterexamples", "root | searched_up_to | boxes | index | given | right");
+    let most = if quick { 1 << 16 } else { 1 << 20 };
+    let ways: Vec<&Way> = WAYS.iter().filter(|way| !way.is_exact).collect();
+    let found: Vec<_> = ways.par_iter().map(|way| counterexample(way, most)).collect();
+    for (way, found) in ways.into_iter().zip(found) {
+        let Some((n, row, k)) = found else {
+            table.row(cells![way.name, most, None::<i64>, None::<i64>, "none", None::<i64>]);
+            continue;
+        };
+        let (given, right) = (by_rules(way, n, k), AsItIs::pair(row, k, n));
+        table.row(cells![way.name, most, n, k, format!("{given:?}"), format!("{right:?}")]);
     }
     table
 }
 
-fn counts(tally: &Tally, first: Option<i64>) -> Vec<Cell> {
-    let (share, first) = (percent(tally.wrong, tally.pairs), first.map(|n| n as u64));
-    let wrong = cells![tally.pairs, tally.wrong, share, first, tally.worst_row];
-    [wrong, cells![tally.missed, tally.doubled, tally.none]].concat()
+fn by_rules(way: &Way, n: i64, k: i64) -> (i64, i64) {
+    Rules::pair((way.row)(2 * n - 1, discriminant(k, n)), k, n)
 }
 
-/// Returns the tables of kernels, where there is an adapter; and its name, or why there is none.
-fn kernels(quick: bool) -> Result<(Vec<Table>, String), Failure> {
+/// Returns the smallest `n <= most <= 2^20` with its row and index. A root is wrong by more than one row only if it can be off by
+/// more than 2; rounding to f32 adds an eighth at most. An index within a row could be wrong at an n a little smaller.
+fn counterexample(way: &Way, most: i64) -> Option<(i64, i64, i64)> {
+    let least = 1.875 / (way.worst_relative)();
+    (((least / 2.0) as i64).max(2)..=most).find_map(|n| {
+        // The root at the start of row `a` is `2n - 1 - 2a`.
+        let rows = ((((2 * n - 1) as f64 - least) / 2.0).ceil() as i64 + 1).clamp(0, n - 1);
+        let mut places = (0..rows).flat_map(|row| ends(row, n).map(|k| (n, row, k)));
+        places.find(|&(n, row, k)| by_rules(way, n, k) != AsItIs::pair(row, k, n))
+    })
+}
+
+/// Blocks of indices that are timed, evenly spread, and the length of each.
+const BLOCKS: i64 = 16;
+const BLOCK: i64 = 2048;
+
+const TIMES: &str =
+    "boxes | root | as_it_is_ns_per_pair | by_the_rules_ns_per_pair | by_integers_ns_per_pair";
+
+/// Returns blocks spread over what there is; all of it, as often as makes as many indices, if there are fewer.
+fn blocks(all: i64, times: i64) -> Vec<Block> {
+    let count = BLOCK * times;
+    if all < BLOCKS * count {
+        return vec![(0, all); ((BLOCKS * count + all - 1) / all) as usize];
+    }
+    (0..BLOCKS).map(|k| ((all - count) * k / (BLOCKS - 1), count)).collect()
+}
+
+/// Appends nanoseconds for a pair on one thread, by every way and correction in turn.
+fn add_times(n: i64, quick: bool, table: &mut Table) -> Result<(), Failure> {
+    let (pairs, ids) = (blocks(pairs_of(n), 1), blocks(lazy_ids(n), 2));
+    let count: i64 = pairs.iter().map(|block| block.1).sum();
+    let sides = 3 * WAYS.len() + 1;
+    let rounds = if quick { 15 } else { 2 * sides };
+    let effort = Effort { warm_up: 0, rounds, budget: Duration::from_secs(20) };
+    let mut times = vec![vec![]; sides];
+    measured(&mut times, sides, effort, unprepared, |times, side| {
+        let ((found, _), ms) = match WAYS.get(side / 3) {
+            Some(way) => timed(|| (count, black_box((way.passes[side % 3])(n, &pairs)))),
+            None => timed(|| black_box(lazy_pass(n, &ids))),
+        };
+        times[side].push(ms * 1e6 / found.max(1) as f64);
+        Ok(ms)
+    })?;
+    // Medians over all places in a round: there are too many places for a median of each.
+    let ns: Vec<f64> = times.into_iter().map(|times| Spread::of(times).median).collect();
+    for (way, ns) in WAYS.iter().zip(ns.chunks(3)) {
+        table.row(cells![n, way.name, ns[0], ns[1], ns[2]]);
+    }
+    table.row(cells![n, LAZY, ns[sides - 1], None::<f64>, None::<f64>]);
+    Ok(())
+}
+
+/// Returns the table of kernels, if there is an adapter; and its name, or why there is none.
+fn kernels(quick: bool) -> Result<(Option<Table>, String), Failure> {
     let adapter = pbig_core::GpuFinder::new().map(|gpu| (gpu.adapter().to_owned(), gpu.is_software()));
     match (Bench::new(), adapter) {
-        (Ok(bench), Ok((name, software))) => Ok((vec![kernels::table(&bench, software, quick)?], name)),
-        (Err(why), _) | (_, Err(why)) => Ok((vec![], format!("none: {why}"))),
+        (Ok(bench), Ok((name, software))) => Ok((Some(kernels::table(&bench, software, quick)?), name)),
+        (Err(why), _) | (_, Err(why)) => Ok((None, format!("none: {why}"))),
     }
 }
 
-/// Time and error of roots as they are (of Newton's with one to four steps) and corrected, and of ways without an estimate.
-fn points(every: &[Every], exact: &[Exactly], times: &[Times]) -> Vec<(String, f64, f64)> {
-    let Some(at) = times.iter().find(|times| times.n == 5000).or(times.first()) else { return vec![] };
-    let point = |name: String, way: usize, fix: usize| {
-        let tally = &every[way].tallies[fix];
-        (name, at.ways[way][fix], percent(tally.wrong, tally.pairs))
+/// Lines of the chart: the name, the ways that it joins, and the corrections.
+const LINES: [(&str, &str, &[usize]); 8] = [
+    ("f32 sqrt, each correction", "f32 sqrt", &[0, 1, 2]),
+    ("f64 sqrt, each correction", "f64 sqrt", &[0, 1, 2]),
+    ("Carmack, as it is", "Carmack", &[0]),
+    ("Carmack, the paper's rules", "Carmack", &[1]),
+    ("Lomont, as it is", "Lomont", &[0]),
+    ("without an estimate", "bisection", &[0]),
+    ("without an estimate", "integer root", &[0]),
+    ("without an estimate", LAZY, &[0]),
+];
+
+/// Returns time and error of roots as they are (of Newton's with one to four steps) and corrected.
+fn points(errors: &Table, times: &Table) -> Vec<(String, f64, f64)> {
+    let at = if times.rows.iter().any(|row| row[0] == 5000) { 5000 } else { 1000 };
+    let of = |(name, way, corrections): (&str, &'static str, &'static [usize])| {
+        let name = name.to_owned();
+        let rows = times
+            .rows
+            .iter()
+            .filter(move |row| row[0] == at && row[1].as_str().is_some_and(|it| it.starts_with(way)));
+        let all = rows.flat_map(|row| corrections.iter().map(move |c| (row, *c)));
+        let point = move |(row, c): (&Vec<Value>, usize)| {
+            let error = errors.rows.iter().find(|error| error[0] == row[1] && error[1] == CORRECTIONS[c])?;
+            Some((name.clone(), row[2 + c].as_f64()?, error[6].as_f64()?))
+        };
+        all.filter_map(point).collect::<Vec<_>>()
     };
-    let of = |name: &'static str, fixes: &'static [usize]| {
-        let ways = every.iter().enumerate().filter(move |(_, every)| every.way.name == name);
-        let all = ways.flat_map(move |(way, _)| fixes.iter().map(move |&fix| (way, fix)));
-        all.map(move |(way, fix)| {
-            let is_newton = every[way].way.steps.is_some();
-            let fix_name = if is_newton { CORRECTIONS[fix] } else { "each correction" };
-            point(format!("{name}, {fix_name}"), way, fix)
-        })
-    };
-    let roots = of("f32 sqrt", &[0, 1, 2]).chain(of("f64 sqrt", &[0, 1, 2])).chain(of("Carmack", &[0]));
-    let roots = roots.chain(of("Carmack", &[1])).chain(of("Lomont", &[0]));
-    let without = exact.iter().zip(at.exact).map(|(one, time)| {
-        ("without an estimate".to_owned(), time, percent(one.tally.wrong, one.tally.pairs))
-    });
-    roots.chain(without).collect()
+    LINES.into_iter().flat_map(of).collect()
 }
 
 #[cfg(test)]
@@ -175,17 +282,20 @@ mod tests {
     use super::*;
 
     #[test]
-    fn sums_over_n_do_not_depend_on_how_they_are_split_and_a_wrong_pair_is_a_failed_check() {
-        let way = WAYS.iter().find(|way| label(way) == "Carmack 1").expect("a way");
-        let mut every = Every::of(way, true);
-        let mut slow = [Tally::default(); 3];
-        for n in boxes(true) {
-            slow.iter_mut().zip((way.tally)(n)).for_each(|(sum, tally)| *sum += tally);
-        }
-        assert_eq!(every.tallies, slow);
-        assert_eq!(every.first[0], (2..).find(|&n| (way.tally)(n)[0].wrong > 0));
+    fn a_wrong_pair_by_integers_is_a_failed_check() {
+        let mut every = Every::of(&WAYS[2], true);
+        assert_eq!(every.first[0], (2..).find(|&n| (WAYS[2].all)(n)[0].wrong > 0));
+        assert!(check_all(&[Every::of(&WAYS[2], true)]).is_ok() && every.ends[0][0] > 0);
         every.first[2] = Some(7);
-        let failed = check(&[every], &[], &[]);
-        assert!(failed.is_err_and(|failure| failure.to_string().contains("7 boxes")));
+        assert!(check_all(&[every]).is_err_and(|failure| failure.to_string().contains("Carmack 1\", 7")));
+    }
+
+    #[test]
+    fn before_a_counterexample_the_rules_mend_everything() {
+        for way in WAYS[2..4].iter().chain(&WAYS[6..8]) {
+            let (n, row, k) = counterexample(way, 1 << 18).expect("a counterexample");
+            assert_ne!(by_rules(way, n, k), AsItIs::pair(row, k, n));
+            assert!(n > 5000 || (2..n).step_by(31).all(|n| (way.all)(n)[1].wrong == 0), "{}", way.name);
+        }
     }
 }

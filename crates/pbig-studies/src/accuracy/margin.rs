@@ -1,35 +1,79 @@
 //! The margin of stored boxes: with a wider one fewer boxes change, and more pairs are extra. From one state of a scene a world
 //! with each margin goes on, all in turn step by step, and all of it twice: of each step the shorter time counts.
 
-mod boxes;
-mod tally;
-mod worlds;
+mod cases;
 
-use super::{percent, report};
+use super::{mean, percent, report};
 use crate::reported::Reported;
-use pbig_harness::cells;
-use pbig_harness::output::Failure;
-use pbig_harness::report::Report;
+use pbig_harness::prelude::*;
 use pbig_harness::runner::StepTime;
-use pbig_harness::table::{Cell, Table};
 use rapier_pbig::PbigConfig;
-use tally::{MARGINS, Passes};
+
+/// In units of rapier's length unit, as `Config::margin`.
+const MARGINS: [f64; 8] = [0.0, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5];
+
+/// Rounds that do not count: boxes are new in the first, and later ones learn how they move.
+const WARM_UP: usize = 8;
+
+/// Pairs are compared with brute force in one of so many rounds.
+const COMPARED: usize = 10;
+
+/// All is done so often. The work is the same each time, so the shortest time of each round is the one least disturbed.
+/// (A median over rounds would hide what a margin does: boxes of one speed leave their fat boxes in the same round.)
+const PASSES: usize = 2;
 
 pub(super) fn run(quick: bool) -> Result<Report, Failure> {
-    let mut rows = worlds::measured(quick)?;
-    rows.extend(boxes::measured(quick)?);
+    let mut rows = cases::worlds(quick)?;
+    rows.extend(cases::boxes(quick)?);
     let tables = vec![table(&rows), means(&rows)];
     let axes = ["broad phase, ms a step", "extra pairs, % of those that overlap"];
-    // The first case of each scene.
+    let scene = |row: &Row| row.case.split(' ').next().unwrap_or_default().to_owned();
     let mut firsts: Vec<&[Row]> = rows.chunks(MARGINS.len()).collect();
-    let of = |case: &[Row]| scene(&case[0]).to_owned();
-    firsts.sort_by_key(|case| of(case));
-    firsts.dedup_by_key(|case| of(case));
-    let point = |row: &Row| (row.case.clone(), row.broad_phase, row.reported.extra_percent());
+    firsts.sort_by_key(|case| scene(&case[0]));
+    firsts.dedup_by_key(|case| scene(&case[0]));
+    let point = |row: &Row| (row.case.clone(), row.broad_phase(), row.work.reported.extra_percent());
     Ok(report("margin", tables, ("Margin of stored boxes", axes), firsts.into_iter().flatten().map(point)))
 }
 
-/// One margin in one case: [`MARGINS`] in their order make a case.
+/// The steps of one margin in one pass.
+#[derive(Clone, Default)]
+struct Work {
+    times: Vec<StepTime>,
+    /// Boxes that the broad phase was told of, and those of them that had left their fat box.
+    listed: u64,
+    changed: u64,
+    /// Sums over the compared steps, and their number.
+    reported: Reported,
+    compared: u64,
+}
+
+/// One round of one margin: its time, listed and changed boxes, and the comparison in rounds that have one.
+type Round = (StepTime, [u64; 2], Option<Reported>);
+
+impl Work {
+    fn add(&mut self, (time, [listed, changed], reported): Round) {
+        self.times.push(time);
+        self.listed += listed;
+        self.changed += changed;
+        self.compared += u64::from(reported.is_some());
+        self.reported += reported.unwrap_or_default();
+    }
+
+    fn mean(&self, of: Time) -> f64 {
+        mean(&self.times.iter().map(of).collect::<Vec<_>>())
+    }
+}
+
+/// A world for each margin.
+trait Case {
+    /// Prepares a round.
+    fn prepare(&mut self, round: usize, is_compared: bool) -> Result<(), Failure>;
+
+    /// Makes one margin's step.
+    fn step(&mut self, margin: usize, is_compared: bool) -> Result<Round, Failure>;
+}
+
+/// One margin in one case; [`MARGINS`] in their order make a case.
 #[derive(Clone)]
 struct Row {
     case: String,
@@ -37,78 +81,82 @@ struct Row {
     margin: f64,
     /// The median edge of a box.
     edge: f64,
-    /// Share of the boxes that the broad phase was told of in a step, in percent.
-    moved: f64,
-    /// Share of these that had left their fat box, in percent.
-    changed: f64,
-    /// Milliseconds a step.
-    broad_phase: f64,
-    /// Milliseconds of the whole step, where there is one.
-    step: Option<f64>,
-    /// All compared steps together.
-    reported: Reported,
-    compared: u64,
-    /// The mean step of each pass.
-    passes: Vec<StepTime>,
+    has_step: bool,
+    /// The shorter time of each step.
+    work: Work,
+    /// Mean milliseconds of each pass: the broad phase, and the whole step.
+    passes: [[f64; PASSES]; 2],
 }
 
-/// Returns the rows of a case; a missed pair is a failed check.
-fn rows(case: &str, boxes: usize, edge: f32, has_step: bool, passes: &Passes) -> Result<Vec<Row>, Failure> {
-    let row = |((&margin, tally), means): ((&f64, &tally::Tally), &Vec<StepTime>)| {
-        let Reported { missed, needed, .. } = tally.reported;
-        if missed > 0 {
-            let what =
-                format!("{case}, margin {margin}: {missed} of {needed} pairs that overlap are missing");
-            return Err(Failure::Check(what));
+/// A time of a step.
+type Time = fn(&StepTime) -> f64;
+
+const TIMES: [Time; 2] = [|time| time.broad_phase, |time| time.step];
+
+impl Row {
+    fn broad_phase(&self) -> f64 {
+        self.work.mean(TIMES[0])
+    }
+
+    /// Fails if a pair is missing.
+    fn new(case: &str, margin: usize, all: [&Work; PASSES], has_step: bool) -> Result<Self, Failure> {
+        let Reported { missed, needed, .. } = all[0].reported;
+        let (margin, mut work) = (MARGINS[margin], all[0].clone());
+        let what = || format!("{case}, margin {margin}: {missed} of {needed} pairs that overlap are missing");
+        check(missed == 0, what)?;
+        for (time, again) in work.times.iter_mut().zip(&all[1].times) {
+            time.broad_phase = time.broad_phase.min(again.broad_phase);
+            time.step = time.step.min(again.step);
         }
-        Ok(Row {
-            case: case.to_owned(),
-            boxes,
-            margin,
-            edge: edge.into(),
-            moved: percent(tally.listed, (boxes * tally.counted()) as u64),
-            changed: percent(tally.changed, tally.listed),
-            broad_phase: tally.mean(|time| time.broad_phase),
-            step: has_step.then(|| tally.mean(|time| time.step)),
-            reported: tally.reported,
-            compared: tally.compared,
-            passes: means.clone(),
-        })
+        let passes = TIMES.map(|of| all.map(|work| work.mean(of)));
+        Ok(Self { case: case.to_owned(), boxes: 0, margin, edge: 1.0, has_step, work, passes })
+    }
+}
+
+/// Makes the case anew for each pass, and runs all margins in turn.
+fn rows<C: Case>(
+    case: &str,
+    steps: usize,
+    (boxes, edge, has_step): (usize, f32, bool),
+    make: impl Fn() -> Result<C, Failure>,
+) -> Result<Vec<Row>, Failure> {
+    let mut all: [Vec<Work>; PASSES] = std::array::from_fn(|_| vec![Work::default(); MARGINS.len()]);
+    for pass in &mut all {
+        let mut case = make()?;
+        for round in 0..WARM_UP + steps {
+            let is_compared = round >= WARM_UP && (round + 1).is_multiple_of(COMPARED);
+            case.prepare(round, is_compared)?;
+            for margin in (0..MARGINS.len()).map(|place| (round + place) % MARGINS.len()) {
+                let done = case.step(margin, is_compared)?;
+                if round >= WARM_UP {
+                    pass[margin].add(done);
+                }
+            }
+        }
+    }
+    let row = |k: usize| {
+        let row = Row::new(case, k, [&all[0][k], &all[1][k]], has_step)?;
+        Ok(Row { boxes, edge: edge.into(), ..row })
     };
-    MARGINS.iter().zip(&passes.tallies).zip(&passes.means).map(row).collect()
+    (0..MARGINS.len()).map(row).collect()
 }
 
 fn table(rows: &[Row]) -> Table {
-    let columns = [
-        "case",
-        "boxes",
-        "margin",
-        "percent_of_the_edge",
-        "moved_percent",
-        "changed_percent",
-        "broad_phase_ms",
-        "step_ms",
-        "pairs",
-        "extra_percent",
-        "missed",
-        "compared_steps",
-    ];
+    let columns = "case | boxes | margin | percent_of_the_edge | moved_percent | changed_percent | broad_phase_ms | step_ms | \
+        pairs | extra_percent | missed | compared_steps";
     let mut table = Table::new("margins", columns);
     for row in rows {
-        let case = cells![&row.case, row.boxes, row.margin, row.margin / row.edge * 100.0];
-        let times = cells![row.moved, row.changed, row.broad_phase, row.step];
-        let Reported { needed, missed, .. } = row.reported;
-        let pairs = cells![needed / row.compared.max(1), row.reported.extra_percent(), missed, row.compared];
+        let Work { times, listed, changed, reported, compared } = &row.work;
+        let moved = percent(*listed, (row.boxes * times.len()) as u64);
+        let case = cells![row.case.as_str(), row.boxes, row.margin, row.margin / row.edge * 100.0, moved];
+        let step = row.has_step.then(|| row.work.mean(TIMES[1]));
+        let times = cells![percent(*changed, *listed), row.broad_phase(), step];
+        let Reported { needed, missed, .. } = *reported;
+        let pairs = cells![needed / (*compared).max(1), reported.extra_percent(), missed, *compared];
         table.row([case, times, pairs].concat());
     }
     table
 }
-
-/// A time that is compared: of the shorter time of each step, and of one pass.
-type Time = (fn(&Row) -> Option<f64>, fn(&StepTime) -> f64);
-
-const BROAD_PHASE: Time = (|row| Some(row.broad_phase), |time| time.broad_phase);
-const STEP: Time = (|row| row.step, |time| time.step);
 
 /// Returns the place of rapier-pbig's default in [`MARGINS`].
 fn default_margin() -> usize {
@@ -116,29 +164,20 @@ fn default_margin() -> usize {
 }
 
 /// Returns a margin's time over the default's: the geometric mean over cases and passes, and two standard errors of it in
-/// percent.
-fn against_default<'a>(
-    cases: impl Iterator<Item = &'a [Row]>,
-    margin: usize,
-    (of, in_pass): Time,
-) -> [f64; 2] {
-    // Within one pass both margins met the same disturbances.
-    let logs = |case: &[Row]| -> Option<Vec<f64>> {
-        let (one, default) = (&case[margin], &case[default_margin()]);
-        of(one)?;
-        Some(one.passes.iter().zip(&default.passes).map(|(a, b)| (in_pass(a) / in_pass(b)).ln()).collect())
-    };
-    let cases: Vec<Vec<f64>> = cases.filter_map(logs).collect();
-    let count = cases.len().max(1) as f64;
+/// percent. Within one pass both margins met the same disturbances.
+fn against_default(rows: &[Row], margin: usize, time: usize) -> [f64; 2] {
+    let cases = rows.chunks(MARGINS.len()).filter(|case| time == 0 || case[0].has_step);
+    let cases: Vec<[f64; PASSES]> = cases
+        .map(|case| {
+            let [one, default] = [margin, default_margin()].map(|k| case[k].passes[time]);
+            std::array::from_fn(|pass| (one[pass] / default[pass]).ln())
+        })
+        .collect();
     let means: Vec<f64> = cases.iter().map(|passes| mean(passes)).collect();
     // Variances of independent cases add up; or cases differ by more than passes do.
-    let of_passes = cases.iter().map(|passes| variance_of_mean(passes)).sum::<f64>() / (count * count);
-    let variance = of_passes.max(variance_of_mean(&means));
+    let of_passes: Vec<f64> = cases.iter().map(|passes| variance_of_mean(passes)).collect();
+    let variance = (mean(&of_passes) / cases.len().max(1) as f64).max(variance_of_mean(&means));
     [mean(&means).exp(), ((2.0 * variance.sqrt()).exp() - 1.0) * 100.0]
-}
-
-fn mean(values: &[f64]) -> f64 {
-    values.iter().sum::<f64>() / values.len().max(1) as f64
 }
 
 fn variance_of_mean(values: &[f64]) -> f64 {
@@ -148,65 +187,50 @@ fn variance_of_mean(values: &[f64]) -> f64 {
 }
 
 fn means(rows: &[Row]) -> Table {
-    let columns = [
-        "margin",
-        "broad_phase",
-        "broad_phase_noise_percent",
-        "whole_step",
-        "whole_step_noise_percent",
-        "largest_extra_percent",
-    ];
+    let columns = "margin | broad_phase | broad_phase_noise_percent | whole_step | whole_step_noise_percent | \
+        largest_extra_percent";
     let mut table = Table::new("means", columns);
-    let cases = || rows.chunks_exact(MARGINS.len());
     for (k, margin) in MARGINS.into_iter().enumerate() {
-        let times = [BROAD_PHASE, STEP].map(|time| against_default(cases(), k, time));
-        let extra = cases().map(|case| case[k].reported.extra_percent()).fold(0.0, f64::max);
-        table.row([margin].into_iter().chain(times.concat()).chain([extra]).map(Cell::from));
+        let [[broad_phase, noise], [step, step_noise]] = [0, 1].map(|time| against_default(rows, k, time));
+        let extra = rows.chunks(MARGINS.len()).map(|case| case[k].work.reported.extra_percent());
+        table.row(cells![margin, broad_phase, noise, step, step_noise, extra.fold(0.0, f64::max)]);
     }
     table
-}
-
-fn scene(row: &Row) -> &str {
-    row.case.split(' ').next().unwrap_or_default()
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    /// Cases in which a margin takes so long; between two passes all but the default differ by 2%.
-    fn made(cases: &[[f64; MARGINS.len()]]) -> Vec<Row> {
-        let passes = |off: f64, ms: f64| {
-            let time = |off: f64| StepTime { broad_phase: ms * off.exp(), step: 10.0 * ms * off.exp() };
-            [-off, off].map(time).to_vec()
+    /// Returns a row whose margin takes so long; between its two passes all but the default differ by 2%.
+    fn row(margin: usize, ms: f64) -> Row {
+        let off = if margin == default_margin() { 0.0 } else { 0.01f64 };
+        let work = |off: f64| {
+            let time = StepTime { broad_phase: ms * off.exp(), step: 0.0 };
+            Work { times: vec![time], ..Work::default() }
         };
-        let row = |k: usize, ms: f64| Row {
-            case: "a case".into(),
-            boxes: 10,
-            margin: MARGINS[k],
-            edge: 2.0,
-            moved: 100.0,
-            changed: 50.0,
-            broad_phase: ms,
-            step: None,
-            reported: Reported { needed: 100, extra: k as u64, missed: 0 },
-            compared: 1,
-            passes: passes(if k == default_margin() { 0.0 } else { 0.01 }, ms),
-        };
-        cases.iter().flat_map(|case| case.iter().enumerate().map(move |(k, ms)| row(k, *ms))).collect()
+        Row::new("a case", margin, [&work(-off), &work(off)], false).expect("no pair is missing")
     }
 
     #[test]
     fn cases_count_alike_and_the_noise_of_a_mean_is_less_than_that_of_a_case() {
         assert_eq!(MARGINS[default_margin()] as f32, PbigConfig::DEFAULT.margin);
-        let against = |rows: &[Row]| against_default(rows.chunks(MARGINS.len()), 4, BROAD_PHASE);
-        let mut cases = [[1.0; MARGINS.len()], [100.0; MARGINS.len()]];
-        (cases[0][4], cases[1][4]) = (0.4, 100.0 / 6.4);
-        assert!((against(&made(&cases))[0] - 0.25).abs() < 1e-12);
+        let case =
+            |ms: f64, fifth: f64| (0..MARGINS.len()).map(move |k| row(k, if k == 4 { fifth } else { ms }));
+        let rows: Vec<Row> = case(1.0, 0.4).chain(case(100.0, 100.0 / 6.4)).collect();
+        assert!((against_default(&rows, 4, 0)[0] - 0.25).abs() < 1e-12);
         // Two passes 2% apart: an error of 1% for their mean, of a quarter of that for the mean of 16 cases.
         for (cases, noise) in [(1, 2.02), (16, 0.501)] {
-            let found = against(&made(&vec![[1.0; MARGINS.len()]; cases]))[1];
+            let rows: Vec<Row> = (0..cases).flat_map(|_| case(1.0, 1.0)).collect();
+            let found = against_default(&rows, 4, 0)[1];
             assert!((found - noise).abs() < 5e-3, "{cases} cases: {found}");
         }
+    }
+
+    #[test]
+    fn a_missing_pair_is_a_failed_check() {
+        let missing = Work { reported: Reported { missed: 3, needed: 9, extra: 0 }, ..Work::default() };
+        let failed = Row::new("a case", 0, [&missing; PASSES], false).map(|_| ());
+        assert!(failed.is_err_and(|failure| failure.to_string().contains("3 of 9 pairs")));
     }
 }

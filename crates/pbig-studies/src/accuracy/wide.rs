@@ -7,169 +7,131 @@
 
 mod place;
 mod simulated;
-mod times;
 
-use super::{percent, report};
+use super::{median, percent, report};
 use crate::wide::Differences;
-use pbig_harness::cells;
-use pbig_harness::output::Failure;
-use pbig_harness::report::Report;
-use pbig_harness::table::Table;
-use place::{AT_POSES, Along, IN_WORLD, Place, Row, WAYS, Way, World, ulp, worlds};
+use pbig_harness::prelude::*;
+use place::{AT_POSES, IN_WORLD, MARGIN, OUTWARD, Place, RAPIERS, Row, WAYS, World, finder, worlds};
 use rapier_pbig::PbigConfig;
-use times::{Time, times, ways};
+use std::time::Duration;
 
 const OFFSETS: [f64; 7] = [0.0, 1e2, 1e3, 1e4, 1e5, 1e6, 1e7];
 
+/// The ways that are timed.
+const TIMED: usize = 6;
+
 pub(super) fn run(quick: bool) -> Result<Report, Failure> {
     let worlds = worlds(if quick { 500 } else { 12_000 })?;
-    let (rows, simulated) = (rows(&worlds)?, simulated::simulated(&OFFSETS, quick)?);
-    rows.iter().chain(simulated.iter().map(|one| &one.row)).try_for_each(check)?;
-    let timed = all_times(&worlds[0], quick)?;
-    let [in_f64, in_f32] = simulated::tables(&simulated);
-    let others = [ways_table(&rows), times_table(&timed)];
-    let tables = [pairs_table(&rows), in_f64, in_f32].into_iter().chain(others).collect();
+    let (rows, (simulated, [in_f64, in_f32])) = (rows(&worlds)?, simulated::simulated(&OFFSETS, quick)?);
+    rows.iter().chain(&simulated).try_for_each(check)?;
+    let times = times(&worlds[0], quick)?;
     let axes = ["time, ns per box, computed and searched for", "pairs missed and added, % of those in f64"];
-    Ok(report(
-        "wide",
-        tables,
-        ("f32 far from the origin: a crowd along the diagonal", axes),
-        points(&rows, &timed),
-    ))
+    let points = points(&rows, &times);
+    let tables = vec![pairs_table(&rows), in_f64, in_f32, ways_table(&rows), times];
+    Ok(report("wide", tables, ("f32 far from the origin: a crowd along the diagonal", axes), points))
 }
 
-/// Returns true for the first crowd, of any size, along the diagonal.
-fn is_crowd(row: &Row) -> bool {
-    row.world.starts_with("crowd") && row.along == Along::Diagonal
-}
-
-/// Returns the distance from the origin up to which the margin covers the loss by rounding, its own included: 2 ulps, which
-/// are 2^-22 of the distance at most.
-fn covered() -> f64 {
-    f64::from(PbigConfig::DEFAULT.margin) * 2f64.powi(22)
-}
+/// Puts every world everywhere; worlds of size 1 also along one axis. At the origin all directions are the same.
 fn rows(worlds: &[World]) -> Result<Vec<Row>, Failure> {
-    let all = |world: &'_ World| {
-        let x = world.along_x.then_some(Along::X);
-        let everywhere = [Some(Along::Diagonal), x].into_iter().flatten();
-        everywhere.flat_map(|along| OFFSETS.map(|offset| (offset, along))).collect::<Vec<_>>()
-    };
-    let places = worlds.iter().flat_map(|world| all(world).into_iter().map(move |place| (world, place)));
-    // At the origin all directions are the same.
-    let places = places.filter(|(_, (offset, along))| *offset > 0.0 || *along == Along::Diagonal);
-    places.map(|(world, (offset, along))| Row::new(world, offset, along)).collect()
+    let mut rows = vec![];
+    for world in worlds {
+        for (along, axes) in [("diagonal", [1.0; 3]), ("x", [1.0, 0.0, 0.0])] {
+            let is_wanted = |offset: &f64| along == "diagonal" || (world.size == 1.0 && *offset > 0.0);
+            for offset in OFFSETS.into_iter().filter(is_wanted) {
+                let place = Place::new(&world.layout, world.layout.poses(axes.map(|axis| axis * offset)));
+                rows.push(Row::new((world.name, world.size), (offset, along), &place)?);
+            }
+        }
+    }
+    Ok(rows)
 }
 
 /// Checks the proved statements: no pair is missed by boxes that are widened by 2 ulps, at the poses that rapier
 /// holds; by 3, in the world; by boxes in f64 that are rounded outward; nor, at the poses, as far out as the margin
-/// does.
+/// does: it covers the loss by rounding, its own included, while 2 ulps, 2^-22 of the distance at most, are less.
 fn check(row: &Row) -> Result<(), Failure> {
-    let near = row.offset < covered();
-    let promised = [
-        (true, AT_POSES, row.by_boxes(AT_POSES).missed),
-        (true, IN_WORLD, row.in_all(IN_WORLD).missed),
-        (true, Way::Outward, row.in_all(Way::Outward).missed),
-        (near, Way::Margin(0), row.by_boxes(Way::Margin(0)).missed),
-    ];
-    if let Some((_, way, missed)) = promised.into_iter().find(|&(holds, _, missed)| holds && missed > 0) {
-        let Row { world, offset, .. } = row;
-        let way = way.name();
-        return Err(Failure::Check(format!("{world}, {offset} away, {way}: {missed} pairs missed")));
+    let is_near = row.offset < f64::from(PbigConfig::DEFAULT.margin) * 2f64.powi(22);
+    let promised = [(true, AT_POSES, 0), (true, IN_WORLD, 1), (true, OUTWARD, 1), (is_near, MARGIN, 0)];
+    match promised.into_iter().find(|&(holds, way, truth)| holds && row.ways[way][truth].missed > 0) {
+        Some((_, way, truth)) => {
+            let Row { world, offset, .. } = row;
+            let (name, missed) = (WAYS[way].0, row.ways[way][truth].missed);
+            Err(Failure::Check(format!("{world}, {offset} away, {name}: {missed} pairs missed")))
+        }
+        None => Ok(()),
     }
-    Ok(())
-}
-
-/// The times of a world at each offset.
-fn all_times(world: &World, quick: bool) -> Result<Vec<(f64, Vec<Time>)>, Failure> {
-    let one = |offset| Ok((offset, times(&Place::new(&world.layout, offset, Along::Diagonal), quick)?));
-    OFFSETS.into_iter().map(one).collect()
 }
 
 fn pairs_table(rows: &[Row]) -> Table {
-    let columns = [
-        "world",
-        "along",
-        "offset",
-        "ulp",
-        "pairs",
-        "missed_by_poses",
-        "added_by_poses",
-        "missed_by_boxes",
-        "of_touching_shapes",
-        "added_by_boxes",
-        "missed",
-        "added",
-        "largest_shortfall_in_ulps_of_widening",
-    ];
+    let columns = "world | along | offset | ulp | pairs | missed_by_poses | added_by_poses | missed_by_boxes | \
+        of_touching_shapes | added_by_boxes | missed | added | largest_shortfall_in_ulps_of_widening";
     let mut table = Table::new("pairs", columns);
     for row in rows {
-        let (boxes, all) = (row.by_boxes(Way::Ulps(0)), row.in_all(Way::Ulps(0)));
-        let head = cells![row.world, along(row.along), row.offset, coarseness(row), row.pairs];
+        let [boxes, all] = row.ways[RAPIERS];
+        // From one f32 to the next: of a position there; near the origin of a shape's size.
+        let ulp = f64::from(f32::EPSILON) * row.offset.max(row.size).log2().floor().exp2();
+        let head = cells![row.world, row.along, row.offset, ulp, row.pairs];
         let counts = cells![row.poses.missed, row.poses.added, boxes.missed, boxes.missed_deep, boxes.added];
         table.row([head, counts, cells![all.missed, all.added, row.shortfall]].concat());
     }
     table
 }
 
-fn along(along: Along) -> &'static str {
-    match along {
-        Along::Diagonal => "diagonal",
-        Along::X => "x",
-    }
-}
-
-/// Of a position there; near the origin of a shape's size.
-fn coarseness(row: &Row) -> f64 {
-    ulp(row.offset.max(row.size))
-}
-
-/// All worlds and directions together.
+/// Sums over all worlds and directions.
 fn ways_table(rows: &[Row]) -> Table {
-    let columns = [
-        "offset",
-        "boxes",
-        "pairs_at_the_poses",
-        "missed_at_the_poses",
-        "of_touching_shapes",
-        "pairs",
-        "missed",
-        "added",
-        "added_percent",
-    ];
+    let columns = "offset | boxes | pairs_at_the_poses | missed_at_the_poses | of_touching_shapes | pairs | missed | added | \
+        added_percent";
     let mut table = Table::new("ways", columns);
-    for (offset, way) in OFFSETS.into_iter().flat_map(|offset| WAYS.map(|way| (offset, way))) {
-        let sum =
-            |of: &dyn Fn(&Row) -> u64| rows.iter().filter(|row| row.offset == offset).map(of).sum::<u64>();
-        let (pairs, added) = (sum(&|row| row.pairs), sum(&|row| row.in_all(way).added));
-        let boxes = |of: fn(&Differences) -> u64| sum(&|row| of(&row.by_boxes(way)));
-        let at_poses = cells![sum(&|row| row.held_pairs), boxes(|d| d.missed), boxes(|d| d.missed_deep)];
-        let missed = sum(&|row| row.in_all(way).missed);
-        let in_all = cells![pairs, missed, added, percent(added, pairs)];
-        table.row([cells![offset, way.name()], at_poses, in_all].concat());
-    }
-    table
-}
-
-fn times_table(timed: &[(f64, Vec<Time>)]) -> Table {
-    let columns = ["offset", "boxes", "to_compute_ns", "to_compute_and_search_for_ns"];
-    let mut table = Table::new("times", columns);
-    for (offset, times) in timed {
-        for (way, time) in ways().zip(times) {
-            table.row(cells![*offset, way.name(), time.boxes, time.both]);
+    for offset in OFFSETS {
+        let there: Vec<&Row> = rows.iter().filter(|row| row.offset == offset).collect();
+        let (pairs, held) = there.iter().fold((0, 0), |sum, row| (sum.0 + row.pairs, sum.1 + row.held_pairs));
+        for (k, way) in WAYS.iter().enumerate() {
+            let mut sums = [Differences::default(); 2];
+            let all = there.iter().flat_map(|row| row.ways[k].into_iter().enumerate());
+            all.for_each(|(truth, one)| sums[truth] += one);
+            let [boxes, world] = sums;
+            let at_poses = cells![offset, way.0, held, boxes.missed, boxes.missed_deep];
+            let added = percent(world.added, pairs);
+            table.row([at_poses, cells![pairs, world.missed, world.added, added]].concat());
         }
     }
     table
 }
 
-/// Time and error of each way at each offset.
-fn points(rows: &[Row], timed: &[(f64, Vec<Time>)]) -> Vec<(String, f64, f64)> {
-    let crowd =
-        |offset: f64| rows.iter().find(|row| is_crowd(row) && row.size == 1.0 && row.offset == offset);
-    let at = |(k, way): (usize, Way)| {
-        let rows = timed.iter().filter_map(move |(offset, times)| Some((crowd(*offset)?, times[k].both)));
-        rows.map(move |(row, time)| (way.name(), time, row.wrong_percent(way))).collect::<Vec<_>>()
+/// Measures nanoseconds a box of a world at each offset: to compute it, and also to find its pairs.
+fn times(world: &World, quick: bool) -> Result<Table, Failure> {
+    let mut table = Table::new("times", "offset | boxes | to_compute_ns | to_compute_and_search_for_ns");
+    let (rounds, ms) = if quick { (6, 60) } else { (60, 2000) };
+    let effort = Effort { warm_up: 2, rounds, budget: Duration::from_millis(ms) };
+    for offset in OFFSETS {
+        let place = Place::new(&world.layout, world.layout.poses([offset; 3]));
+        // Finders keep their buffers.
+        let mut sides: Vec<_> = WAYS[..TIMED].iter().map(|way| (*way, finder(), vec![])).collect();
+        let both = medians(&mut sides, TIMED, effort, unprepared, |sides, side| {
+            let (way, finder, kept) = &mut sides[side];
+            let (boxes, computed) = timed(|| place.boxes(*way));
+            let (found, searched) = timed(|| finder.find(&boxes).map(<[_]>::len));
+            kept.push(computed);
+            Ok(found.map(|_| computed + searched)?)
+        })?;
+        let each = 1e6 / place.len().max(1) as f64;
+        for ((way, _, kept), both) in sides.iter().zip(both) {
+            table.row(cells![offset, way.0, median(kept) * each, both * each]);
+        }
+    }
+    Ok(table)
+}
+
+/// Returns time and error of each way at each offset, of the first crowd along the diagonal.
+fn points(rows: &[Row], times: &Table) -> Vec<(String, f64, f64)> {
+    let point = |k: usize| {
+        let row = &rows[k / TIMED];
+        let [_, Differences { missed, added, .. }] = row.ways[k % TIMED];
+        let time = times.rows[k][3].as_f64().unwrap_or_default();
+        (WAYS[k % TIMED].0.to_owned(), time, percent(missed + added, row.pairs))
     };
-    ways().enumerate().flat_map(at).collect()
+    let by_way = (0..TIMED).flat_map(|way| (0..OFFSETS.len()).map(move |offset| offset * TIMED + way));
+    by_way.map(point).collect()
 }
 
 #[cfg(test)]
@@ -178,15 +140,16 @@ mod tests {
 
     #[test]
     fn a_missed_pair_that_was_promised_is_a_failed_check() {
-        let worlds = worlds(50).expect("worlds");
-        let mut row = Row::new(&worlds[0], 1e3, Along::X).expect("a row");
-        row.ways[Way::Ulps(1).index()][0].missed = 5;
+        let layout = &worlds(50).expect("worlds")[0].layout;
+        let place = Place::new(layout, layout.poses([1e3; 3]));
+        let mut row = Row::new(("crowd", 1.0), (1e3, "diagonal"), &place).expect("a row");
+        row.ways[1][0].missed = 5;
         assert!(check(&row).is_ok(), "nobody promises that of one");
-        row.ways[Way::Margin(0).index()][0].missed = 5;
+        row.ways[MARGIN][0].missed = 5;
         assert!(check(&row).is_err_and(|failure| failure.to_string().contains("5 pairs missed")));
         row.offset = 1e6;
         assert!(check(&row).is_ok(), "as far away the margin is lost");
-        row.ways[IN_WORLD.index()][1].missed = 7;
+        row.ways[IN_WORLD][1].missed = 7;
         assert!(check(&row).is_err_and(|failure| failure.to_string().contains("by 3 ulps: 7 pairs")));
     }
 }

@@ -1,27 +1,28 @@
-//! Avril's tables 1, 5 and 7 and figures 3 and 4: the matrix of pairs, forms of output, brute force, and a grid.
+//! Avril's tables 1, 5, 6 and 7 and figures 3 to 6: the matrix of pairs, forms of output, brute force, a grid, and steps.
 
-use super::device::{Device, kernels, on_gpu, same_pairs, written};
-use super::finders::{Finders, Way};
-use super::printed::{AVRIL_1, AVRIL_5, AVRIL_7, AVRIL_EXAMPLES};
-use super::steps::DISTANCE;
-use super::{Scale, UNSORTED, effort, once};
-use crate::study::{
-    ALL_PAIRS_UP_TO, CellRule, INDEX_PAIRS, PbigSettings, SETTINGS, with_gpu_grid, with_our_grid,
-};
-use pbig_core::layout::{LANES, Params};
-use pbig_core::{Aabb, Backend, Coding, Config, GpuOptions, Pair};
-use pbig_harness::bench::{Effort, timed};
-use pbig_harness::boxes::{cubes, moved};
-use pbig_harness::cells;
+use super::printed::*;
+use super::sides::{Device, Way, effort, on_gpu, race};
+use super::{OUR_GRID, Scale, UNSORTED};
+use crate::accuracy::index::kernels::run as run_kernel;
+use crate::stages::{Alone, NAMES};
+use pbig_core::layout::Params;
+use pbig_core::{Aabb, Backend, CellRule, Coding, Config, GpuOptions, Pair};
+use pbig_harness::gpu_race;
 use pbig_harness::kernels::Bench;
-use pbig_harness::output::Failure;
 use pbig_harness::pair_index::{index_of, pair_count, pair_of};
-use pbig_harness::runner::{Spread, milliseconds};
-use pbig_harness::table::Table;
+use pbig_harness::prelude::*;
+use pbig_shaders::study::INDEX_PAIRS;
+
+/// The distance that cubes with edges of 1 move in a step, along each axis.
+const DISTANCE: f32 = 0.1;
+
+/// Boxes up to which a device tests every pair by default.
+const ALL_PAIRS: usize = GpuOptions::DEFAULT.all_pairs_up_to as usize;
 
 pub(super) fn tables(scale: &Scale, device: &Device) -> Result<Vec<Table>, Failure> {
     let output = [bytes(), forms_on_cpu()?, forms_on_device(device)?];
-    let whole = [brute_force(device)?, with_grid(scale, device)?];
+    let whole =
+        [brute_force(device)?, with_grid(scale, device)?, steps(scale, device)?, movers(scale, device)?];
     Ok([matrix(device)?].into_iter().chain(output).chain(whole).collect())
 }
 
@@ -31,11 +32,9 @@ const OBJECTS: u64 = AVRIL_EXAMPLES[0].0;
 /// Table 1: rows and columns counted from 1, indices from 0, as in the paper. The mapping of all pairs is checked on the CPU, to
 /// and fro, and on a device.
 fn matrix(device: &Device) -> Result<Table, Failure> {
-    let columns =
-        ["row", "column", "printed", "that number", "index, ours", "pair of the printed index, ours"];
+    let columns = "row | column | printed | that number | index, ours | pair of the printed index, ours";
     let mut table = Table::new("Avril table 1: the matrix of pairs", columns);
-    let of_table =
-        AVRIL_1.iter().map(|(pair, text, printed)| (pair(OBJECTS), (*text).to_owned(), printed(OBJECTS)));
+    let of_table = AVRIL_1.iter().map(|(pair, text, of)| (pair(OBJECTS), (*text).to_owned(), of(OBJECTS)));
     let of_examples = AVRIL_EXAMPLES.iter().map(|&(_, k, pair)| (pair, format!("{k} (section 3.1)"), k));
     for ((a, b), text, printed) in of_table.chain(of_examples) {
         let pair = (printed < pair_count(OBJECTS)).then(|| pair_of(printed, OBJECTS));
@@ -44,43 +43,30 @@ fn matrix(device: &Device) -> Result<Table, Failure> {
     }
     let there = |k: u64| index_of(pair_of(k, OBJECTS).0, pair_of(k, OBJECTS).1, OBJECTS) == k;
     let wrong = (0..pair_count(OBJECTS)).find(|&k| !there(k));
-    let on_device = if device.has_adapter() { all_on_device()? } else { vec![] };
+    let on_device = if device.for_boxes(0).is_some() { all_on_device()? } else { vec![] };
     let wrong = wrong.or((0..).zip(on_device).find(|&(k, pair)| pair != pair_of(k, OBJECTS)).map(|(k, _)| k));
-    wrong.map_or(Ok(table), |k| Err(Failure::Check(format!("index {k} of {OBJECTS} boxes is wrong"))))
+    check(wrong.is_none(), || format!("{OBJECTS} boxes: an index is wrong: {wrong:?}")).map(|()| table)
 }
 
 /// Returns the pair of every index, by the mapping of the check kernels.
 fn all_on_device() -> Result<Vec<(u64, u64)>, Failure> {
+    let bench = Bench::new().map_err(|error| Failure::Input(error.to_string()))?;
     let count = pair_count(OBJECTS) as u32;
     let params = Params { boxes: OBJECTS as u32, cells: count, ..Params::default() };
-    let bindings = [bytemuck::bytes_of(&params).to_vec(), vec![0; 12 * count as usize]];
-    let options = GpuOptions::DEFAULT;
-    let run = |bench: Bench| bench.run(&INDEX_PAIRS, &options, false, &bindings, count.div_ceil(LANES));
-    let found = Bench::new().and_then(run).map_err(|error| Failure::Input(error.to_string()))?;
-    let words: Vec<u32> = bytemuck::pod_collect_to_vec(&found[1]);
+    let words = run_kernel(&bench, &INDEX_PAIRS, GpuOptions::DEFAULT.root, params, count)?;
     Ok(words.chunks_exact(3).map(|words| (words[1].into(), words[2].into())).collect())
 }
 
-/// Bytes that come back with a byte a pair, and with a bit (3.4).
+/// Returns the bytes that come back with a byte a pair, and with a bit (3.4).
 fn output_bytes(n: u64) -> [u64; 2] {
     [pair_count(n), pair_count(n).div_ceil(8)]
 }
 
 /// Table 5 and figure 3: bytes by calculation, and rates over the printed output time.
 fn bytes() -> Table {
-    let columns = [
-        "objects",
-        "pairs tested",
-        "bytes, a byte a pair",
-        "bytes, a bit a pair",
-        "kernel printed, ms: byte",
-        "kernel printed, ms: bit",
-        "output printed, us: byte",
-        "output printed, us: bit",
-        "GB/s printed: byte",
-        "GB/s printed: bit",
-        "tests/s printed",
-    ];
+    let columns = "objects | pairs tested | bytes, a byte a pair | bytes, a bit a pair | kernel printed, ms: byte | \
+        kernel printed, ms: bit | output printed, us: byte | output printed, us: bit | GB/s printed: byte | \
+        GB/s printed: bit | tests/s printed";
     let mut table = Table::new("Avril table 5 and figure 3: a byte or a bit a pair", columns);
     for (n, byte, bit) in AVRIL_5 {
         let [bytes, bits] = output_bytes(n);
@@ -101,7 +87,7 @@ const FORMS: [Form; 3] = [
     ("a list of pairs", write_list, read_list),
 ];
 
-/// Every pair in the order of its index, and whether it overlaps.
+/// Returns every pair in the order of its index, and true if it overlaps.
 fn tests(boxes: &[Aabb]) -> impl Iterator<Item = (Pair, bool)> {
     let pairs = (0..boxes.len()).flat_map(|a| (a + 1..boxes.len()).map(move |b| (a, b)));
     pairs.map(|(a, b)| (Pair::new(a as u32, b as u32), boxes[a].overlaps(&boxes[b])))
@@ -147,26 +133,23 @@ fn read_list(out: &[u8], _: u64) -> Vec<Pair> {
 
 /// Table 5 on one thread: every pair is tested and written in memory, whence the pairs are read again; medians of 3 calls.
 fn forms_on_cpu() -> Result<Table, Failure> {
-    let columns =
-        ["objects", "pairs", "form", "bytes written", "ms, tests and output", "ms, pairs read from it"];
+    let columns = "objects | pairs | form | bytes written | ms, tests and output | ms, pairs read from it";
     let mut table = Table::new("Avril table 5: forms of output, CPU", columns);
     for (n, ..) in AVRIL_5 {
         let boxes = cubes(n as usize, 1.0, 1.0, 1);
         let mut known: Option<Vec<Pair>> = None;
         for (name, write, read) in FORMS {
-            let (mut times, mut found) = ([vec![], vec![]], (vec![], vec![]));
-            for _ in 0..3 {
-                let (written, ms) = timed(|| write(&boxes));
-                let (pairs, read_ms) = timed(|| read(&written, n));
-                times.iter_mut().zip([ms, read_ms]).for_each(|(times, ms)| times.push(ms));
-                found = (written, pairs);
-            }
-            let [write_ms, read_ms] = times.map(|times| Spread::of(times).median);
-            let (out, pairs) = found;
-            if known.as_ref().is_some_and(|known| *known != pairs) {
-                return Err(Failure::Check(format!("{n} objects: other pairs from {name}")));
-            }
-            table.row(cells![n, pairs.len(), name, out.len(), write_ms, read_ms]);
+            let calls = [(); 3].map(|()| {
+                let (out, written) = timed(|| write(&boxes));
+                let (pairs, read) = timed(|| read(&out, n));
+                (out.len(), pairs, written, read)
+            });
+            let [written, read] = [calls.each_ref().map(|call| call.2), calls.each_ref().map(|call| call.3)]
+                .map(|ms| Spread::of(ms).median);
+            let [.., (bytes, pairs, ..)] = calls;
+            let is_known = known.as_ref().is_none_or(|known| *known == pairs);
+            check(is_known, || format!("{n} objects: other pairs from {name}"))?;
+            table.row(cells![n, pairs.len(), name, bytes, written, read]);
             known = Some(pairs);
         }
     }
@@ -175,86 +158,106 @@ fn forms_on_cpu() -> Result<Table, Failure> {
 
 /// The same on a device, without a grid: bits (`Coding::Packed`) against a list of pairs (`Plain`).
 fn forms_on_device(device: &Device) -> Result<Table, Failure> {
-    let columns = [
-        "objects",
-        "pairs",
-        "form",
-        "bytes written",
-        "bytes fetched",
-        "ms of the kernel `check_all`",
-        "ms, host waits",
-        "ms, host decodes",
-    ];
+    let columns = "objects | pairs | form | bytes written | bytes fetched | ms of the kernel `check_all` | \
+        ms, host waits | ms, host decodes";
     let mut table = Table::new("Avril table 5: forms of output, GPU", columns);
     for n in [100, 1000] {
-        let forms = [("a bit a pair of boxes", Coding::Packed), ("a list of pairs", Coding::Plain)];
-        let configs = forms.map(|(_, coding)| on_gpu(GpuOptions { coding, ..GpuOptions::DEFAULT }));
-        for ((form, _), (_, report)) in forms.iter().zip(device.run(&configs, &cubes(n, 1.0, 1.0, 1), 0.1)?) {
-            let kernel = kernels(&report, |name| name == "check_all");
-            let gpu = report.gpu.clone().unwrap_or_default();
+        let ways = [Coding::Packed, Coding::Plain]
+            .map(|coding| on_gpu(GpuOptions { coding, ..GpuOptions::DEFAULT }));
+        let calls = device.run(&ways, &cubes(n, 1.0, 1.0, 1), DISTANCE)?;
+        for ((form, ..), call) in FORMS[1..].iter().zip(calls) {
+            let kernel = call.kernels(|name| name == "check_all");
+            let gpu = call.report.as_ref().and_then(|report| report.gpu.clone()).unwrap_or_default();
             let [wait, decode] = [gpu.wait, gpu.decode].map(milliseconds);
-            table.row(cells![n, report.pairs, *form, written(&report), gpu.downloaded, kernel, wait, decode]);
+            table.row(cells![n, call.pairs, *form, call.written(), gpu.downloaded, kernel, wait, decode]);
         }
     }
     Ok(table)
 }
 
+const BRUTE: Way = Way::Finder(Config { backend: Backend::Brute, ..UNSORTED });
+
 /// Figure 4: brute force by number of objects, on one thread, and on a device up to 1024 boxes.
 fn brute_force(device: &Device) -> Result<Table, Failure> {
-    let columns = [
-        "objects",
-        "tests",
-        "bytes up",
-        "bytes back, a bit a pair",
-        "ms, brute force, CPU",
-        "tests/s, CPU",
-        "ms, GPU",
-    ];
+    let columns = "objects | tests | bytes up | bytes back, a bit a pair | ms, brute force, CPU | tests/s, CPU | ms, GPU";
     let mut table = Table::new("Avril figure 4: brute force", columns);
     for n in [100usize, 500, 1000, 2500, 5000] {
         let boxes = cubes(n, 1.0, 1.0, 1);
-        let gpu = if n <= 1024 { device.run(&[on_gpu(GpuOptions::DEFAULT)], &boxes, 0.1)? } else { vec![] };
-        let config = Config { backend: Backend::Brute, ..UNSORTED };
-        same_pairs(&gpu, once(config, &boxes)?.pairs)?;
-        let ms = Finders::new([config], None, [moved(&boxes, 0.1, 2), boxes]).times(effort(n))?[0];
+        let ways = [on_gpu(GpuOptions::DEFAULT)];
+        let gpu = device.run(&ways[..usize::from(n <= ALL_PAIRS)], &boxes, DISTANCE)?;
+        let ms = race(&[BRUTE], None, boxes, DISTANCE, effort(n))?[0].ms;
         let tests = pair_count(n as u64);
         let sizes = cells![n, tests, 24 * n, output_bytes(n as u64)[1]];
-        table.row([sizes, cells![ms, tests as f64 / ms * 1e3, gpu.first().map(|(ms, _)| *ms)]].concat());
+        table.row([sizes, cells![ms, tests as f64 / ms * 1e3, gpu.first().map(|call| call.ms)]].concat());
     }
     Ok(table)
 }
 
 /// Table 7: with and without a grid, whole calls from nothing, all moved.
 fn with_grid(scale: &Scale, device: &Device) -> Result<Table, Failure> {
-    let columns = [
-        "objects",
-        "pairs",
-        "ms printed: without grid",
-        "ms printed: with grid",
-        "ms, CPU: brute force",
-        "ms, CPU: our grid",
-        "ms, CPU: Avril's cells, one thread",
-        "ms, GPU: without grid",
-        "ms, GPU: with grid",
-    ];
+    let columns = "objects | pairs | ms printed: without grid | ms printed: with grid | ms, CPU: brute force | \
+        ms, CPU: our grid | ms, CPU: Avril's cells, one thread | ms, GPU: without grid | ms, GPU: with grid";
     let mut table = Table::new("Avril table 7: with and without a grid", columns);
-    let sides: [Way; 3] = [
-        Config { backend: Backend::Brute, ..UNSORTED }.into(),
-        with_our_grid(UNSORTED).into(),
-        PbigSettings { cell_rule: CellRule::Density, ..SETTINGS }.into(),
-    ];
+    let density = Way::Pbig(GpuOptions { cell_rule: CellRule::Density, ..GpuOptions::DEFAULT });
+    let on_device = [0, ALL_PAIRS as u32]
+        .map(|all_pairs_up_to| on_gpu(GpuOptions { all_pairs_up_to, ..GpuOptions::DEFAULT }));
     for (n, without, with) in AVRIL_7 {
         let boxes = cubes(n, 1.0, 1.0, 1);
-        let on = |all_pairs_up_to| with_gpu_grid(on_gpu(GpuOptions::DEFAULT), &SETTINGS, all_pairs_up_to);
-        let wanted = [on(0), on(ALL_PAIRS_UP_TO)];
-        let gpu = device.run(&wanted[..if n <= 1024 { 2 } else { 1 }], &boxes, DISTANCE)?;
-        let pairs = once(UNSORTED, &boxes)?.pairs;
-        same_pairs(&gpu, pairs)?;
-        let mut finders = Finders::new(sides, None, [moved(&boxes, DISTANCE, 2), boxes]);
-        let cpu = finders.times(Effort::new(scale.quick))?;
-        finders.pairs()?;
-        let gpu_ms = |i: usize| gpu.get(i).map(|(ms, _)| *ms);
-        table.row(cells![n, pairs, without, with, cpu[0], cpu[1], cpu[2], gpu_ms(1), gpu_ms(0)]);
+        let gpu = device.run(&on_device[..1 + usize::from(n <= ALL_PAIRS)], &boxes, DISTANCE)?;
+        let ways = [BRUTE, Way::Finder(OUR_GRID), density];
+        let cpu = race(&ways, None, boxes, DISTANCE, Effort::new(scale.quick))?;
+        let gpu_ms = |i: usize| gpu.get(i).map(|call| call.ms);
+        let printed = cells![n, cpu[0].call.pairs, without, with];
+        table.row([printed, cells![cpu[0].ms, cpu[1].ms, cpu[2].ms, gpu_ms(1), gpu_ms(0)]].concat());
+    }
+    Ok(table)
+}
+
+/// Table 6 and figure 5: a step in which all move. Ours: cubes with a pair each that move by up to a tenth of their edge:
+/// `BroadPhase::set_many`, then `update`, events included; on the CPU means, on a device medians of a few updates.
+fn steps(scale: &Scale, device: &Device) -> Result<Table, Failure> {
+    let columns = "objects | side | pairs | boxes up to date, ms | grid (ours: plan and map), ms | \
+        search (ours: check, emit, diff), ms | whole, ms | updates";
+    let mut table = Table::new("Avril table 6 and figure 5: a step, all moving", columns);
+    for (n, printed) in AVRIL_6.into_iter().filter(|(n, _)| !scale.quick || *n <= 100_000) {
+        let printed = printed.map(Value::from).into();
+        table.row([cells![n, "printed", None::<u64>], printed, cells![None::<u64>]].concat());
+        let boxes = || cubes(n, 1.0, 1.0, 1);
+        let ours = Alone::events(boxes(), 1.0, DISTANCE)?.measure(Effort::new(scale.quick))?;
+        let of = |wanted: &[&str]| -> f64 {
+            NAMES.iter().zip(ours.mean).filter(|(name, _)| wanted.contains(name)).map(|(_, ms)| ms).sum()
+        };
+        let (set, grid, search) = (of(&["set"]), of(&["plan", "map"]), of(&["check", "emit", "diff"]));
+        table.row(cells![n, "ours, CPU", ours.pairs, set, grid, search, ours.mean[0], ours.chosen]);
+        if let Some(gpu) = device.for_boxes(n) {
+            let raced = gpu_race::race(gpu, boxes(), 1.0, DISTANCE)?;
+            let times = [vec![Value::Null; 3], cells![raced.ms[1], None::<u64>]].concat();
+            table.row([cells![n, "ours, GPU", raced.pairs], times].concat());
+        }
+    }
+    Ok(table)
+}
+
+/// Figure 6: a step in which a share moves. A program that plays a device has fewer boxes.
+fn movers(scale: &Scale, device: &Device) -> Result<Table, Failure> {
+    let n = if scale.quick { 10_000 } else { 100_000 };
+    let columns = "share moved | boxes | pairs | ms, events | ms, from nothing | updates | boxes, GPU | \
+        ms, events, GPU | ms, events, CPU with as many";
+    let mut table = Table::new("Avril figure 6: share of moving objects", columns);
+    let fewer = if device.for_boxes(n).is_some() { n } else { n.min(10_000) };
+    for share in [0.01, 0.1, 0.25, 0.5, 0.75, 1.0] {
+        let (boxes, effort) = (|n| cubes(n, 1.0, 1.0, 1), Effort::new(scale.quick));
+        let events = Alone::events(boxes(n), share, DISTANCE)?.measure(effort)?;
+        let scratch = Alone::scratch(boxes(n), share, DISTANCE).measure(effort)?;
+        let ours = cells![share, n, events.pairs, events.mean[0], scratch.mean[0], events.chosen];
+        let beside = match device.for_boxes(fewer) {
+            Some(gpu) => {
+                let [cpu, gpu] = gpu_race::race(gpu, boxes(fewer), share, DISTANCE)?.ms;
+                cells![fewer, gpu, cpu]
+            }
+            None => vec![Value::Null; 3],
+        };
+        table.row([ours, beside].concat());
     }
     Ok(table)
 }
@@ -268,8 +271,7 @@ mod tests {
     fn every_form_has_the_pairs_of_brute_force_and_the_bytes_of_the_calculation() {
         assert_eq!((output_bytes(1000), output_bytes(7)), ([499_500, 62_438], [21, 3]));
         let boxes = cubes(90, 1.0, 3.0, 1);
-        let mut pairs = oracle::pairs(&boxes);
-        pairs.sort_unstable();
+        let pairs = oracle::pairs(&boxes);
         let [bytes, bits] = output_bytes(90);
         for ((name, write, read), size) in FORMS.iter().zip([bytes, bits, 8 * pairs.len() as u64]) {
             let out = write(&boxes);

@@ -1,18 +1,13 @@
 //! PBIG's figures 8, 9 and 11: number of boxes, size of cells, distribution. They have no printed numbers but what the text says.
+//! And tables IV, V and VI: each optimisation on and off, and the time of each task.
 
-use super::density::{expected_checks, settings_for};
-use super::device::{Device, on_gpu};
-use super::finders::{Finders, Way};
 use super::model::{Edges, Model, Place, Space};
-use super::printed::{CELLS, LENGTHS, MOST_BOXES, NORMAL, SPACE, TABLE_VI, WARP};
-use super::{Scale, UNSORTED, effort, once};
-use crate::study::{PbigSettings, SETTINGS, with_gpu_grid};
-use pbig_core::{Aabb, Finder, GpuOptions};
-use pbig_harness::bench::timed;
-use pbig_harness::boxes::moved;
-use pbig_harness::cells;
-use pbig_harness::output::Failure;
-use pbig_harness::table::{Cell, Table};
+use super::printed::*;
+use super::sides::{Call, Device, Way, effort, on_gpu, once, race};
+use super::table_iii::{expected_checks, options_for};
+use super::{OUR_GRID, Scale, UNSORTED};
+use pbig_core::{Aabb, CellRule, Coding, Config, Finder, GpuOptions, Order};
+use pbig_harness::prelude::*;
 
 /// Section 6.1 as it is printed.
 const UNIFORM: Model =
@@ -32,37 +27,34 @@ const MOST_PLAIN: usize = 1_000_000;
 
 pub(super) fn tables(scale: &Scale, device: &Device) -> Result<Vec<Table>, Failure> {
     let gaussian_ms = TABLE_VI[7].total as f64 / 1e3;
+    let n = scale.on_device(device);
+    let runs = device.run(&TABLE_VI.map(|row| optimised(&row)), &crowded(n).boxes(n, 1), 1.0)?;
     Ok(vec![
         by_number("PBIG figure 8: number of boxes", &UNIFORM, "< 1000".into(), scale, device)?,
         by_length(scale, device)?,
         by_number("PBIG figure 11: distribution of boxes", &GAUSSIAN, gaussian_ms.into(), scale, device)?,
+        optimisations(&runs),
+        tasks(&runs),
+        on_cpu(scale)?,
     ])
 }
 
-/// Whole calls from nothing, all boxes moved since the call before. `printed`: what the paper has for most boxes.
+/// Measures whole calls from nothing, all boxes moved since the call before. `printed`: what the paper has for most boxes.
 fn by_number(
     name: &str,
     model: &Model,
-    printed: Cell,
+    printed: Value,
     scale: &Scale,
     device: &Device,
 ) -> Result<Table, Failure> {
-    let columns = [
-        "boxes",
-        "pairs expected",
-        "pairs",
-        "off, standard deviations",
-        "ms printed",
-        "ms, our grid, CPU",
-        "ms, PBIG's grid, CPU, one thread",
-        "ms, GPU",
-    ];
+    let columns = "boxes | pairs expected | pairs | off, standard deviations | ms printed | ms, our grid, CPU | \
+        ms, PBIG's grid, CPU, one thread | ms, GPU";
     let mut table = Table::new(name, columns);
     for &n in scale.numbers {
         let (times, pairs) = sides(model, n, device)?;
         let counts = cells![n, model.pairs(n).round() as u64, pairs, model.off(n, pairs)];
-        let printed = if n == MOST_BOXES { printed.clone() } else { Cell::Nothing };
-        table.row([counts, vec![printed], times.map(Cell::from).into()].concat());
+        let printed = if n == MOST_BOXES { printed.clone() } else { Value::Null };
+        table.row([counts, vec![printed], times.map(Value::from).into()].concat());
     }
     Ok(table)
 }
@@ -75,20 +67,18 @@ fn sides(model: &Model, n: usize, device: &Device) -> Result<([Option<f64>; 3], 
         return Ok(([Some(ms), None, None], pairs));
     }
     let gpu = device.for_boxes(n);
-    let mut takes_part: Vec<(usize, Way)> = vec![(0, UNSORTED.into())];
-    takes_part.extend((n <= MOST_PLAIN).then_some((1, SETTINGS.into())));
-    takes_part.extend(gpu.map(|_| (2, on_gpu(GpuOptions::DEFAULT).into())));
-    let ways = takes_part.iter().map(|(_, way)| *way);
-    let mut finders = Finders::new(ways, gpu, [moved(&boxes, 1.0, 2), boxes]);
+    let mut takes_part = vec![(0, Way::Finder(UNSORTED))];
+    takes_part.extend((n <= MOST_PLAIN).then_some((1, Way::Pbig(GpuOptions::DEFAULT))));
+    takes_part.extend(gpu.map(|_| (2, on_gpu(GpuOptions::DEFAULT))));
+    let ways: Vec<Way> = takes_part.iter().map(|(_, way)| *way).collect();
+    let raced = race(&ways, gpu, boxes, 1.0, effort(n))?;
     let mut times = [None; 3];
-    for ((side, _), ms) in takes_part.iter().zip(finders.times(effort(n))?) {
-        times[*side] = Some(ms);
-    }
-    Ok((times, finders.pairs()?))
+    takes_part.iter().zip(&raced).for_each(|((side, _), raced)| times[*side] = Some(raced.ms));
+    Ok((times, raced[0].call.pairs))
 }
 
-/// Pairs that are too many for one list, counted slab by slab: each slab searches the boxes that reach into
-/// it and counts pairs whose higher lower corner is its own. And the milliseconds of the searches.
+/// Counts pairs that are too many for one list, slab by slab: each slab searches the boxes that reach into
+/// it and counts pairs whose higher lower corner is its own. Also returns the milliseconds of the searches.
 fn in_slabs(boxes: &[Aabb], slabs: usize) -> Result<(u64, f64), Failure> {
     let mut corners: Vec<f32> = boxes.iter().map(|b| b.min[0]).collect();
     corners.sort_unstable_by(f32::total_cmp);
@@ -112,32 +102,18 @@ const MOST_CHECKS: f64 = 2e10;
 
 /// Returns the number of calls if the first took so long: one for the longest, which would make the run too long.
 fn calls(first_ms: f64) -> usize {
-    if first_ms < 2000.0 {
-        3
-    } else if first_ms < 40_000.0 {
-        2
-    } else {
-        1
+    match first_ms {
+        0.0..2000.0 => 3,
+        2000.0..40_000.0 => 2,
+        _ => 1,
     }
 }
 
 /// Figure 9: the lengths of the figure, and equation 6 as we use it and as the paper does. Cells that would hold less than a
 /// box, which the rule does not give, or take too long, have only their expected checks.
 fn by_length(scale: &Scale, device: &Device) -> Result<Table, Failure> {
-    let columns = [
-        "boxes",
-        "cell wanted",
-        "cell",
-        "checks",
-        "unnecessary",
-        "redundant",
-        "ms, PBIG's grid, CPU, one thread",
-        "calls",
-        "longest call / shortest",
-        "cell, GPU",
-        "checks, GPU",
-        "ms, GPU",
-    ];
+    let columns = "boxes | cell wanted | cell | checks | unnecessary | redundant | ms, PBIG's grid, CPU, one thread | calls | \
+        longest call / shortest | cell, GPU | checks, GPU | ms, GPU";
     let mut table = Table::new("PBIG figure 9: size of cells", columns);
     for &n in scale.numbers.iter().filter(|n| **n >= 10_000) {
         let (boxes, mut known) = (UNIFORM.boxes(n, 1), None);
@@ -145,21 +121,16 @@ fn by_length(scale: &Scale, device: &Device) -> Result<Table, Failure> {
             let checks = expected_checks(&UNIFORM, n, cell);
             if n as f64 * (cell / SPACE).powi(3) < 0.3 || checks > MOST_CHECKS {
                 let expected = cells![n, cell.to_string(), None::<f64>, checks.round() as u64];
-                table.row([expected, vec![Cell::Nothing; 8]].concat());
+                table.row([expected, vec![Value::Null; 8]].concat());
             } else {
-                let settings = settings_for(&boxes, cell);
-                table.row(cells_of(&boxes, cell.to_string(), settings, &mut known, device)?);
+                let options = options_for(&boxes, cell);
+                table.row(cells_of(&boxes, cell.to_string(), options, &mut known, device)?);
             }
         }
-        for boxes_per_cell in [SETTINGS.boxes_per_cell, WARP as f32] {
-            let settings = PbigSettings { boxes_per_cell, ..SETTINGS };
-            table.row(cells_of(
-                &boxes,
-                format!("equation 6, W = {boxes_per_cell}"),
-                settings,
-                &mut known,
-                device,
-            )?);
+        for boxes_per_cell in [GpuOptions::DEFAULT.boxes_per_cell, WARP as f32] {
+            let options = GpuOptions { boxes_per_cell, ..GpuOptions::DEFAULT };
+            let wanted = format!("equation 6, W = {boxes_per_cell}");
+            table.row(cells_of(&boxes, wanted, options, &mut known, device)?);
         }
     }
     Ok(table)
@@ -169,28 +140,134 @@ fn by_length(scale: &Scale, device: &Device) -> Result<Table, Failure> {
 fn cells_of(
     boxes: &[Aabb],
     wanted: String,
-    settings: PbigSettings,
+    options: GpuOptions,
     known: &mut Option<u64>,
     device: &Device,
-) -> Result<Vec<Cell>, Failure> {
-    let first = once(settings, boxes)?;
-    if *known.get_or_insert(first.pairs) != first.pairs {
-        return Err(Failure::Check(format!("cells {wanted}: {} pairs, not {known:?}", first.pairs)));
-    }
+) -> Result<Vec<Value>, Failure> {
+    let first = once(Way::Pbig(options), boxes)?;
+    let pairs = *known.get_or_insert(first.pairs);
+    check(pairs == first.pairs, || format!("cells {wanted}: {} pairs, not {pairs}", first.pairs))?;
     let mut times = vec![first.ms];
     while times.len() < calls(first.ms) {
-        times.push(once(settings, boxes)?.ms);
+        times.push(once(Way::Pbig(options), boxes)?.ms);
     }
     times.sort_by(f64::total_cmp);
     let spread = (times.len() > 1).then(|| times[times.len() - 1] / times[0]);
     let ours = cells![boxes.len(), wanted, first.cell, first.checks.made, first.checks.unnecessary];
     let times = cells![first.checks.redundant, times[(times.len() - 1) / 2], times.len(), spread];
-    let config = with_gpu_grid(on_gpu(GpuOptions::DEFAULT), &settings, 0);
-    let on_device = match device.run_for(config, boxes, 1.0, first.pairs)? {
-        Some((ms, report)) => cells![report.plan.gpu.as_ref().map(|plan| plan.cell), report.checks.made, ms],
-        None => vec![Cell::Nothing; 3],
+    let runs = device.run(&[on_gpu(GpuOptions { all_pairs_up_to: 0, ..options })], boxes, 1.0)?;
+    let on_device = runs.first().map(|call| cells![call.cell, call.checks.made, call.ms]);
+    Ok([ours, times, on_device.unwrap_or_else(|| vec![Value::Null; 3])].concat())
+}
+
+/// Returns boxes of section 6.3 that pair as often as 10^7 do in its space: pairs a box follow `N e^3`.
+fn crowded(n: usize) -> Model {
+    let larger = (MOST_BOXES as f64 / n as f64).cbrt();
+    Model { edges: Edges::boxes(LENGTHS[0] * larger, LENGTHS[1] * larger), ..GAUSSIAN }
+}
+
+/// Returns the way of a setting. Chunks are as small as gives several at this size: one alone leaves nothing to overlap.
+fn optimised(row: &Breakdown) -> Way {
+    let has = |letter: char| row.setting.contains(letter);
+    let coding = if has('C') { Coding::Packed } else { Coding::Plain };
+    let (pipelining, load_balancing, chunk) = (has('P'), has('B'), [1 << 13, 1 << 7]);
+    on_gpu(GpuOptions { coding, pipelining, load_balancing, chunk, ..GpuOptions::DEFAULT })
+}
+
+/// Table IV, and what each setting sends. Ours: section 6.3 with fewer boxes, as crowded.
+fn optimisations(runs: &[Call]) -> Table {
+    let columns = "setting | speed-up printed | speed-up by table VI | ms, GPU | speed-up | pairs | checks | bytes written | \
+        bytes written a pair | bytes fetched | bytes fetched a pair | chunks";
+    let mut table = Table::new("PBIG table IV: optimisations on and off, GPU", columns);
+    for (i, row) in TABLE_VI.iter().enumerate() {
+        let printed = cells![row.setting, row.speed_up, TABLE_VI[0].total as f64 / row.total as f64];
+        let ours = runs.get(i).map_or(vec![Value::Null; 9], |call| {
+            let a_pair = |bytes: Option<u64>| bytes.map(|bytes| bytes as f64 / call.pairs.max(1) as f64);
+            let chunks = call.report.as_ref().and_then(|report| Some(report.gpu.as_ref()?.chunks));
+            let (written, fetched) = (call.written(), call.fetched());
+            let counts = cells![call.ms, runs[0].ms / call.ms, call.pairs, call.checks.made];
+            [counts, cells![written, a_pair(written), fetched, a_pair(fetched), chunks]].concat()
+        });
+        table.row([printed, ours].concat());
+    }
+    table
+}
+
+/// Tables V and VI: the time of each task. Printed: with P, CHECK has the time of CHECK, `DataOut` and REPORT together. Ours: of
+/// the call in table IV; `DataOut` is the time that the host waits beyond the kernels. In none: total less the tasks; with P
+/// tasks overlap, and what is at the same time counts twice.
+fn tasks(runs: &[Call]) -> Table {
+    let columns = format!("setting | side | total | {} | in none", TASKS.join(" | "));
+    let mut table = Table::new("PBIG tables V and VI: time per task, ms", &columns);
+    let mut row = |setting: &str, side: &str, total: f64, tasks: [Option<f64>; TASKS.len()]| {
+        let rest = total - tasks.iter().flatten().sum::<f64>();
+        table.row([cells![setting, side, total], tasks.map(Value::from).into(), cells![rest]].concat());
     };
-    Ok([ours, times, on_device].concat())
+    for (i, printed) in TABLE_VI.iter().enumerate() {
+        let tasks = std::array::from_fn(|k| printed.tasks.get(k).map(|us| *us as f64 / 1e3));
+        row(printed.setting, "printed", printed.total as f64 / 1e3, tasks);
+        if let Some(call) = runs.get(i) {
+            row(printed.setting, "ours", call.ms, of_tasks(call));
+        }
+    }
+    table
+}
+
+/// Returns the times of a call on a device by the paper's tasks; of the host's tasks none without a report of the device.
+fn of_tasks(call: &Call) -> [Option<f64>; 7] {
+    let is_check = |name: &str| name.starts_with("check");
+    let is_schedule = |name: &str| matches!(name, "schedule" | "arrange");
+    let map = call.kernels(|name| !is_check(name) && !is_schedule(name));
+    let (schedule, check, all) = (call.kernels(is_schedule), call.kernels(is_check), call.kernels(|_| true));
+    let report = call.report.as_ref();
+    let gpu = report.and_then(|report| report.gpu.as_ref());
+    let out = gpu.zip(all).map(|(gpu, all)| (milliseconds(gpu.wait) - all).max(0.0));
+    let decode = gpu.zip(report).map(|(gpu, report)| milliseconds(gpu.decode + report.stages.emit));
+    let upload = gpu.map(|gpu| milliseconds(gpu.upload));
+    let plan = report.map(|report| milliseconds(report.stages.plan));
+    [upload, plan, map, schedule, check, out, decode]
+}
+
+/// Returns the settings that can be switched on the CPU.
+fn settings() -> [(String, Way); 7] {
+    let default = GpuOptions::DEFAULT;
+    let wanted = |boxes_per_cell: f32| {
+        let name = format!("PBIG's grid, equation 6, W = {boxes_per_cell}");
+        (name, Way::Pbig(GpuOptions { boxes_per_cell, ..default }))
+    };
+    let small_cell = |small_cell: u32| Way::Pbig(GpuOptions { small_cell, ..default });
+    let density = Way::Pbig(GpuOptions { cell_rule: CellRule::Density, ..default });
+    let sorted = Way::Finder(Config { order: Order::Sorted, ..OUR_GRID });
+    [
+        wanted(WARP as f32),
+        wanted(default.boxes_per_cell),
+        ("PBIG's grid, Avril's cells of that many objects".into(), density),
+        ("the same as the second, every cell by balanced rows".into(), small_cell(0)),
+        ("the same, every cell by Avril's mapping".into(), small_cell(u32::MAX)),
+        ("our grid, one entry a box".into(), Way::Finder(OUR_GRID)),
+        ("our grid, list sorted".into(), sorted),
+    ]
+}
+
+/// The counterpart on the CPU: which cells, which mapping, which entries. Section 6.3 as printed; PBIG's grid on one thread,
+/// ours on all.
+fn on_cpu(scale: &Scale) -> Result<Table, Failure> {
+    let n = if scale.quick { 20_000 } else { 300_000 };
+    let columns = "setting | ms | times as fast as the first | pairs | checks | unnecessary | redundant | plan ms | map ms | \
+        check ms | emit ms";
+    let mut table = Table::new("PBIG table IV's counterpart on the CPU", columns);
+    let settings = settings();
+    let ways: Vec<Way> = settings.iter().map(|(_, way)| *way).collect();
+    let raced = race(&ways, None, GAUSSIAN.boxes(n, 1), 1.0, effort(n))?;
+    for ((name, _), one) in settings.iter().zip(&raced) {
+        let Call { pairs, checks, report, .. } = &one.call;
+        let head = cells![name.as_str(), one.ms, raced[0].ms / one.ms, *pairs];
+        let counts = cells![checks.made, checks.unnecessary, checks.redundant];
+        let stages = report.as_ref().map(|report| report.stages.named().map(|(_, time)| milliseconds(time)));
+        let stages = (0..4).map(|k| stages.map(|stages| stages[k]).into()).collect();
+        table.row([head, counts, stages].concat());
+    }
+    Ok(table)
 }
 
 #[cfg(test)]
@@ -210,9 +287,15 @@ mod tests {
     }
 
     #[test]
-    fn at_most_boxes_only_the_longest_cells_are_not_run_and_short_calls_are_repeated() {
-        let is_run = |cell: &f64| expected_checks(&UNIFORM, MOST_BOXES, *cell) <= MOST_CHECKS;
-        assert_eq!(CELLS.map(|cell| is_run(&cell)), [true, true, true, true, false]);
-        assert_eq!([1.0, 3e3, 5e4].map(calls), [3, 2, 1]);
+    fn every_setting_finds_the_pairs_of_brute_force() {
+        let boxes = crowded(1500).boxes(1500, 1);
+        let pairs = oracle::pairs(&boxes).len() as u64;
+        for (name, way) in settings() {
+            assert_eq!(once(way, &boxes).expect("found").pairs, pairs, "{name}");
+        }
+        let runs = Device::best(true).run(&TABLE_VI.map(|row| optimised(&row)), &boxes, 1.0);
+        for call in runs.expect("a device that works") {
+            assert!(call.pairs == pairs && call.written() <= Some(12 * pairs));
+        }
     }
 }

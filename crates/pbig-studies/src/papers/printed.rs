@@ -48,34 +48,35 @@ pub(super) const TABLE_III: [Coverage; 5] = [
 /// PBIG, table III: the size of the input, "MB".
 pub(super) const INPUT_MB: f64 = 280.0;
 
-/// A row of PBIG's table VI, in microseconds (section 6.4 calls 1,941,184 of them 1.941 seconds).
+/// A row of PBIG's tables IV and VI, in microseconds (section 6.4 calls 1,941,184 of them 1.941 seconds).
 pub(super) struct Breakdown {
-    /// Data compression.
-    pub(super) c: bool,
-    /// Pipelined execution.
-    pub(super) p: bool,
-    /// Load balancing.
-    pub(super) b: bool,
-    pub(super) total: u64,
-    /// `DataIn`, PLAN, MAP, SCHED.
-    pub(super) before: [u64; 4],
-    /// CHECK, `DataOut`, REPORT; with pipelining one number for the three.
-    pub(super) after: &'static [u64],
-    /// PBIG, table IV.
+    /// C: data compression, P: pipelined execution, B: load balancing.
+    pub(super) setting: &'static str,
     pub(super) speed_up: Option<f64>,
+    pub(super) total: u64,
+    /// `DataIn`, PLAN, MAP, SCHED, CHECK, `DataOut`, REPORT; with pipelining one number for the last three.
+    pub(super) tasks: &'static [u64],
+}
+
+const fn breakdown(
+    setting: &'static str,
+    speed_up: Option<f64>,
+    total: u64,
+    tasks: &'static [u64],
+) -> Breakdown {
+    Breakdown { setting, speed_up, total, tasks }
 }
 
 /// PBIG, tables IV and VI.
-#[rustfmt::skip]
 pub(super) const TABLE_VI: [Breakdown; 8] = [
-    Breakdown { c: false, p: false, b: false, total: 10_264_940, before: [50_423, 30, 137_909, 2_644], after: &[4_970_496, 1_740_208, 3_312_812], speed_up: None },
-    Breakdown { c: true, p: false, b: false, total: 5_512_054, before: [52_686, 35, 137_713, 2_709], after: &[3_806_897, 473_857, 995_124], speed_up: Some(1.86) },
-    Breakdown { c: false, p: true, b: false, total: 5_181_014, before: [48_470, 28, 137_649, 2_753], after: &[4_983_314], speed_up: Some(1.98) },
-    Breakdown { c: true, p: true, b: false, total: 3_891_116, before: [49_243, 30, 137_845, 2_684], after: &[3_697_194], speed_up: Some(2.63) },
-    Breakdown { c: false, p: false, b: true, total: 10_167_360, before: [49_926, 31, 137_854, 2_701], after: &[5_039_146, 1_696_377, 3_191_348], speed_up: Some(1.01) },
-    Breakdown { c: true, p: false, b: true, total: 3_562_590, before: [54_857, 39, 137_996, 3_193], after: &[2_097_496, 483_593, 740_671], speed_up: Some(2.88) },
-    Breakdown { c: false, p: true, b: true, total: 5_337_236, before: [48_115, 41, 137_856, 2_837], after: &[5_139_588], speed_up: Some(1.92) },
-    Breakdown { c: true, p: true, b: true, total: 2_132_998, before: [47_760, 35, 137_840, 2_537], after: &[1_941_184], speed_up: Some(4.81) },
+    breakdown("baseline", None, 10_264_940, &[50_423, 30, 137_909, 2_644, 4_970_496, 1_740_208, 3_312_812]),
+    breakdown("+C", Some(1.86), 5_512_054, &[52_686, 35, 137_713, 2_709, 3_806_897, 473_857, 995_124]),
+    breakdown("+P", Some(1.98), 5_181_014, &[48_470, 28, 137_649, 2_753, 4_983_314]),
+    breakdown("+C+P", Some(2.63), 3_891_116, &[49_243, 30, 137_845, 2_684, 3_697_194]),
+    breakdown("+B", Some(1.01), 10_167_360, &[49_926, 31, 137_854, 2_701, 5_039_146, 1_696_377, 3_191_348]),
+    breakdown("+C+B", Some(2.88), 3_562_590, &[54_857, 39, 137_996, 3_193, 2_097_496, 483_593, 740_671]),
+    breakdown("+P+B", Some(1.92), 5_337_236, &[48_115, 41, 137_856, 2_837, 5_139_588]),
+    breakdown("+C+P+B", Some(4.81), 2_132_998, &[47_760, 35, 137_840, 2_537, 1_941_184]),
 ];
 
 /// PBIG, table V: the tasks. Ours: `GpuReport::upload`; `StageTimes::plan` on the host; the kernels `locate` to `scan_add` and
@@ -104,21 +105,21 @@ pub(super) const AVRIL_2: [(u64, f64, f64); 3] =
     [(1000, 0.21, 0.25), (10_000, 2.25, 4.28), (100_000, 29.66, 58.24)];
 
 /// A row of Avril's table 4.
-pub(super) struct Roots {
-    pub(super) roots: u64,
+pub(crate) struct Roots {
+    pub(crate) roots: u64,
     /// Milliseconds by Carmack's or Lomont's approximation, which it has the same for both.
-    pub(super) approximate: f64,
+    pub(crate) approximate: f64,
     /// Milliseconds of CUDA's own.
-    pub(super) cuda: f64,
+    pub(crate) cuda: f64,
     /// The value of the last digit of both.
-    pub(super) digit: f64,
+    pub(crate) digit: f64,
     /// "% of computation time reduction"
-    pub(super) gamma: f64,
+    pub(crate) gamma: f64,
 }
 
 impl Roots {
     /// The reduction in % that the two times give; each `off` half digits from what is printed, in opposite directions.
-    pub(super) fn reduction(&self, off: f64) -> f64 {
+    pub(crate) fn reduction(&self, off: f64) -> f64 {
         let half = 0.5 * off * self.digit;
         100.0 * (1.0 - (self.approximate - half) / (self.cuda + half))
     }
@@ -129,7 +130,7 @@ const fn roots(roots: u64, approximate: f64, cuda: f64, digit: f64, gamma: f64) 
 }
 
 /// Avril, table 4.
-pub(super) const AVRIL_4: [Roots; 4] = [
+pub(crate) const AVRIL_4: [Roots; 4] = [
     roots(1_000_000, 0.042, 0.048, 0.001, 12.6),
     roots(10_000_000, 0.409, 0.478, 0.001, 14.7),
     roots(100_000_000, 4.102, 4.722, 0.001, 13.2),

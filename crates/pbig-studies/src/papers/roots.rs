@@ -1,27 +1,22 @@
 //! Avril's table 2 and the times of table 4: from the index of a pair to the pair, with a root and by the lazy way (3.2.2).
 
-use super::device::{Device, kernels, on_gpu, same_pairs};
+use super::Scale;
 use super::printed::AVRIL_2;
-use super::{Scale, UNSORTED, once};
-use crate::index::{AsItIs, Correction, Double, Root, Rules, Single, lazy_ids, lazy_pair};
-use crate::study::{PbigSettings, SETTINGS, with_gpu_grid};
+use super::sides::{Call, Device, on_gpu};
+use crate::index::{AsItIs, Correction, Double, Root, Rules, Single, discriminant, lazy_ids, lazy_pair};
 use pbig_core::{Aabb, GpuOptions};
-use pbig_harness::bench::timed;
-use pbig_harness::boxes::cubes;
-use pbig_harness::cells;
-use pbig_harness::output::Failure;
 use pbig_harness::pair_index::{pair_count, pair_of};
-use pbig_harness::table::Table;
+use pbig_harness::prelude::*;
 use std::ops::Range;
 
 pub(super) fn tables(scale: &Scale, device: &Device) -> Result<Vec<Table>, Failure> {
-    Ok(vec![on_cpu(scale)?, on_device(device)?, in_cells(device)?])
+    Ok([vec![on_cpu(scale)?], on_device(device)?].concat())
 }
 
 /// Ids looked at in one measurement; where there are more, stretches of them, spread evenly.
 const MOST_IDS: u64 = 100_000_000;
 
-/// Returns stretches of `0..ids` of at most `most` in all, and how many times as many there are.
+/// Returns stretches of `0..ids` of at most `most` in all, and how many times as many ids there are.
 fn stretches(ids: u64, most: u64) -> (Vec<Range<u64>>, f64) {
     const STRETCHES: u64 = 1000;
     if ids <= most {
@@ -58,14 +53,13 @@ fn hits(boxes: &[Aabb], pairs: &[(i64, i64)]) -> u64 {
     pairs.iter().filter(hit).count() as u64
 }
 
-/// A root as in the study of accuracy, where all are held against each other.
+/// Makes a pair by a root, as the study of accuracy does.
 #[inline(always)]
 fn by_root<R: Root, C: Correction>(k: i64, n: i64) -> Option<(i64, i64)> {
-    let m = 2 * n - 1;
-    Some(C::pair(R::row(m, m * m - 8 * k), k, n))
+    Some(C::pair(R::row(2 * n - 1, discriminant(k, n)), k, n))
 }
 
-/// Pbig's own, for up to 2^32 boxes: it multiplies in 128 bits.
+/// Makes a pair by pbig's own function, for up to 2^32 boxes: it multiplies in 128 bits.
 #[inline(always)]
 fn by_pair_of(k: i64, n: i64) -> Option<(i64, i64)> {
     let (a, b) = pair_of(k as u64, n as u64);
@@ -85,49 +79,55 @@ const WAYS: [(&str, Search); 4] = [
 /// Calls of each way, in turn. Two ways that take as long have all calls of one before all of the other in 3% of cases.
 const CALLS: usize = 4;
 
-/// Pairs that a way found, the shortest and the longest of its calls for all ids, and all ids over those looked at.
-type Took = (u64, [f64; 2], f64);
+/// The measurement of a way.
+#[derive(Clone, Copy)]
+struct Took {
+    pairs: u64,
+    /// Milliseconds for all ids of the shortest and of the longest call.
+    ms: [f64; 2],
+    /// All ids over those looked at.
+    times: f64,
+}
 
 /// Measures all ways. A failed check, if ways that looked at the same pairs have not found the same.
 fn all_ways(n: u64, most: u64) -> Result<[Took; 4], Failure> {
     let boxes = cubes(n as usize, 1.0, 1.0, 1);
-    let mut all = [(0, [f64::MAX, 0.0], 1.0); 4];
-    for (way, _) in (0..CALLS * WAYS.len()).map(|i| (i % WAYS.len(), i)) {
+    let mut all = [Took { pairs: 0, ms: [f64::MAX, 0.0], times: 1.0 }; 4];
+    for way in (0..CALLS * WAYS.len()).map(|i| i % WAYS.len()) {
         let ids = if way == 3 { lazy_ids(n as i64) as u64 } else { pair_count(n) };
         let (ids, times) = stretches(ids, most);
-        let (found, ms) = timed(|| WAYS[way].1(&boxes, &ids));
-        let [least, longest] = all[way].1;
-        all[way] = (found, [least.min(ms * times), longest.max(ms * times)], times);
+        let (pairs, ms) = timed(|| WAYS[way].1(&boxes, &ids));
+        let [least, longest] = all[way].ms;
+        all[way] = Took { pairs, ms: [least.min(ms * times), longest.max(ms * times)], times };
     }
     // The lazy way has ids of its own, so it can be held against roots only where it looks at all.
-    let is_other = |(way, took): (usize, &Took)| took.0 != all[0].0 && (way < 3 || took.2 == 1.0);
-    match all.iter().enumerate().find(|&one| is_other(one)) {
-        Some((way, took)) => {
-            let what = format!("{n} objects: {} pairs with {}, not {}", took.0, WAYS[way].0, all[0].0);
-            Err(Failure::Check(what))
-        }
-        None => Ok(all),
-    }
+    let is_other = |way: &usize| all[*way].pairs != all[0].pairs && (*way < 3 || all[3].times == 1.0);
+    let other = (1..4).find(is_other).map(|way| (WAYS[way].0, all[way].pairs));
+    check(other.is_none(), || format!("{n} objects, not {} pairs: {other:?}", all[0].pairs)).map(|()| all)
 }
 
 /// Table 2 on one thread: cubes with a pair each. Times are those of the shortest call.
 fn on_cpu(scale: &Scale) -> Result<Table, Failure> {
-    let head = ["objects", "ms printed, root", "ms printed, lazy", "lazy / root printed"].map(str::to_owned);
-    let times = WAYS.iter().map(|(name, _)| format!("ms, {name}"));
-    let longest = WAYS.iter().map(|(name, _)| format!("longest call, ms, {name}"));
-    let ratios = WAYS[..3].iter().map(|(name, _)| format!("lazy / {name}"));
-    let looked_at = ["pairs", "ids looked at, roots, %", "ids looked at, lazy, %"].map(str::to_owned);
-    let columns = head.into_iter().chain(times).chain(longest).chain(ratios).chain(looked_at);
-    let mut table = Table::new("Avril table 2: the lazy way, CPU", columns);
+    let names = |before: &str, ways: &[(&str, Search)]| -> String {
+        ways.iter().map(|(name, _)| format!("{before}{name} | ")).collect()
+    };
+    let columns = format!(
+        "objects | ms printed, root | ms printed, lazy | lazy / root printed | {}{}{}\
+         pairs | ids looked at, roots, % | ids looked at, lazy, %",
+        names("ms, ", &WAYS),
+        names("longest call, ms, ", &WAYS),
+        names("lazy / ", &WAYS[..3])
+    );
+    let mut table = Table::new("Avril table 2: the lazy way, CPU", &columns);
     let most = if scale.quick { MOST_IDS / 10 } else { MOST_IDS };
     for (n, root, lazy) in AVRIL_2 {
         let all = all_ways(n, most)?;
-        let mut row = cells![n, root, lazy, lazy / root];
-        row.extend(all.iter().map(|took| took.1[0].into()));
-        row.extend(all.iter().map(|took| took.1[1].into()));
-        row.extend(all[..3].iter().map(|took| (all[3].1[0] / took.1[0]).into()));
-        let pairs = (all[3].2 == 1.0).then_some(all[3].0);
-        table.row([row, cells![pairs, 100.0 / all[0].2, 100.0 / all[3].2]].concat());
+        let times = |k: usize| all.iter().map(move |took| took.ms[k]);
+        let ratios = all[..3].iter().map(|took| all[3].ms[0] / took.ms[0]);
+        let measured = times(0).chain(times(1)).chain(ratios).map(Value::from).collect();
+        let pairs = (all[3].times == 1.0).then_some(all[3].pairs);
+        let looked_at = cells![pairs, 100.0 / all[0].times, 100.0 / all[3].times];
+        table.row([cells![n, root, lazy, lazy / root], measured, looked_at].concat());
     }
     Ok(table)
 }
@@ -144,39 +144,31 @@ const ROOTS: [(u32, &str); 8] = [
     (9, "no root: bisection"),
 ];
 
-/// Every pair of 1000 objects tested by `check_all`; integers correct each root, so all are exact.
-fn on_device(device: &Device) -> Result<Table, Failure> {
-    let columns = ["root", "ms of the kernel `check_all`", "times as long as the first", "pairs"];
-    let mut table = Table::new("Avril tables 2 and 4: roots, GPU", columns);
-    let configs = ROOTS.map(|(root, _)| on_gpu(GpuOptions { root, ..GpuOptions::DEFAULT }));
-    let boxes = cubes(1000, 1.0, 1.0, 1);
-    let runs = device.run(&configs, &boxes, 0.1)?;
-    same_pairs(&runs, once(UNSORTED, &boxes)?.pairs)?;
-    let ms = |i: usize| kernels(&runs[i].1, |name| name == "check_all");
-    for (i, (_, report)) in runs.iter().enumerate() {
+/// Every root on a device; integers correct each, so all are exact. First every pair of 1000 objects is tested; then, as table 2's
+/// times seem to be, the pairs in the cells of a grid.
+fn on_device(device: &Device) -> Result<Vec<Table>, Failure> {
+    let columns = "root | ms of the kernel `check_all` | times as long as the first | pairs";
+    let mut roots = Table::new("Avril tables 2 and 4: roots, GPU", columns);
+    let calls = by_roots(device, 1000, GpuOptions::DEFAULT)?;
+    let ms = |i: usize| calls[i].kernels(|name| name == "check_all");
+    for (i, call) in calls.iter().enumerate() {
         let ratio = ms(0).zip(ms(i)).map(|(first, ms)| ms / first);
-        table.row(cells![ROOTS[i].1, ms(i), ratio, report.pairs]);
+        roots.row(cells![ROOTS[i].1, ms(i), ratio, call.pairs]);
     }
-    Ok(table)
-}
-
-/// Table 2 beyond brute force: in the cells of a grid, as table 2's times seem to be.
-fn in_cells(device: &Device) -> Result<Table, Failure> {
-    let columns = ["objects", "root", "ms of the kernel `check_small`", "checks", "pairs"];
-    let mut table = Table::new("Avril table 2: roots in the cells of a grid, GPU", columns);
-    for n in [10_000, 100_000].into_iter().filter(|&n| device.for_boxes(n).is_some()) {
-        let boxes = cubes(n, 1.0, 1.0, 1);
-        let pairs = once(UNSORTED, &boxes)?.pairs;
-        for (root, name) in ROOTS {
-            let gpu = on_gpu(GpuOptions { root, ..GpuOptions::DEFAULT });
-            let config = with_gpu_grid(gpu, &PbigSettings { small_cell: 256, ..SETTINGS }, 0);
-            if let Some((_, report)) = device.run_for(config, &boxes, 0.1, pairs)? {
-                let kernel = kernels(&report, |name| name == "check_small");
-                table.row(cells![n, name, kernel, report.checks.made, report.pairs]);
-            }
+    let columns = "objects | root | ms of the kernel `check_small` | checks | pairs";
+    let mut in_cells = Table::new("Avril table 2: roots in the cells of a grid, GPU", columns);
+    let options = GpuOptions { all_pairs_up_to: 0, small_cell: 256, ..GpuOptions::DEFAULT };
+    for n in [10_000, 100_000] {
+        for ((_, name), call) in ROOTS.iter().zip(by_roots(device, n, options)?) {
+            let ms = call.kernels(|name| name == "check_small");
+            in_cells.row(cells![n, *name, ms, call.checks.made, call.pairs]);
         }
     }
-    Ok(table)
+    Ok(vec![roots, in_cells])
+}
+
+fn by_roots(device: &Device, n: usize, options: GpuOptions) -> Result<Vec<Call>, Failure> {
+    device.run(&ROOTS.map(|(root, _)| on_gpu(GpuOptions { root, ..options })), &cubes(n, 1.0, 1.0, 1), 0.1)
 }
 
 #[cfg(test)]
@@ -188,9 +180,9 @@ mod tests {
     fn all_ways_find_the_pairs_of_brute_force() {
         let pairs = oracle::pairs(&cubes(300, 1.0, 1.0, 1)).len() as u64;
         let all = all_ways(300, MOST_IDS).expect("all agree");
-        assert!(all.iter().all(|took| took.0 == pairs && took.2 == 1.0 && took.1[0] <= took.1[1]));
+        assert!(all.iter().all(|took| took.pairs == pairs && took.times == 1.0 && took.ms[0] <= took.ms[1]));
         // In stretches, which end within a block.
-        assert!(all_ways(300, 30_000).is_ok_and(|all| all[0].0 > 0 && all[0].2 > 1.0));
+        assert!(all_ways(300, 30_000).is_ok_and(|all| all[0].pairs > 0 && all[0].times > 1.0));
         let (some, times) = stretches(1_000_000, 10_000);
         assert_eq!((some[0].clone(), some[999].clone(), times), (0..10, 999_990..1_000_000, 100.0));
     }

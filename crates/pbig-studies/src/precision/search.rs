@@ -45,11 +45,6 @@ impl Candidates {
         Some(sorted(boxes, scale, dims))
     }
 
-    /// Boxes in the order of their cells.
-    pub fn boxes(&self) -> &[Aabb] {
-        &self.boxes
-    }
-
     /// Tests all that lie near each other; `kept` is room that is used again.
     pub fn find<C: Coordinates>(&self, kept: &mut Vec<[u32; 2]>) -> Found {
         let clock = Instant::now();
@@ -95,27 +90,23 @@ fn scale(boxes: &[Aabb], all: &Aabb) -> Scale {
     Scale { origin: all.min, cell: largest.max((volume / MOST_CELLS).cbrt() as f32) }
 }
 
-/// Counted, then put in order.
+/// Sorts boxes by cell, and lists for each the others in its own and in half of the neighbouring cells.
 fn sorted(boxes: &[Aabb], scale: Scale, dims: [usize; 3]) -> Candidates {
     let place = |b: &Aabb| -> [usize; 3] { std::array::from_fn(|k| scale.cell(k, b.min[k]) as usize) };
     let key = |[x, y, z]: [usize; 3]| (z * dims[1] + y) * dims[0] + x;
     let mut order: Vec<(usize, Aabb)> = boxes.iter().map(|b| (key(place(b)), *b)).collect();
     order.sort_by_key(|(key, _)| *key);
-    let mut starts = vec![0u32; dims[0] * dims[1] * dims[2] + 1];
-    order.iter().for_each(|(key, _)| starts[key + 1] += 1);
-    for key in 1..starts.len() {
-        starts[key] += starts[key - 1];
-    }
+    let start = |key: usize| order.partition_point(|(other, _)| *other < key) as u32;
     let mut runs = Vec::new();
     for (i, (key_of, b)) in (0u32..).zip(&order) {
         let [x, y, z] = place(b);
         // The rest of its own row, to the next cell; then four rows, from the cell before to the next.
         let last = (x + 1).min(dims[0] - 1);
-        runs.push([i, i + 1, starts[key_of - x + last + 1]]);
+        runs.push([i, i + 1, start(key_of - x + last + 1)]);
         for (y, z) in [(Some(y + 1), z), (y.checked_sub(1), z + 1), (Some(y), z + 1), (Some(y + 1), z + 1)] {
             let Some(y) = y.filter(|y| *y < dims[1] && z < dims[2]) else { continue };
             let row = key([0, y, z]);
-            runs.push([i, starts[row + x.saturating_sub(1)], starts[row + last + 1]]);
+            runs.push([i, start(row + x.saturating_sub(1)), start(row + last + 1)]);
         }
     }
     runs.retain(|[_, from, to]| from < to);

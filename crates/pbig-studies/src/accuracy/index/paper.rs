@@ -1,13 +1,12 @@
-//! Figures of Avril et al. 2012, and ours beside them.
+//! Avril's tables 3 and 4 beside ours, and a search for the rounding that gives table 3.
 
-use crate::index::{CARMACK, LOMONT, Newton, Single, SingleRoot, WideNewton};
-use crate::index::{root_differences, root_errors};
-use pbig_harness::bench::timed;
-use pbig_harness::cells;
-use pbig_harness::table::{Cell, Table};
+use crate::index::{CARMACK, LOMONT, Newton, Single, SingleRoot};
+use crate::papers::printed::AVRIL_4;
+use pbig_harness::prelude::*;
+use rayon::prelude::*;
 
-/// Table 3: tests, % of errors with two steps (Carmack, Lomont) and with three; four are said to be as three.
-pub(super) const TABLE_3: [(u32, [f64; 4]); 6] = [
+/// Table 3: tests; errors in percent with two steps (Carmack, Lomont) and with three. The paper says that four are as three.
+const TABLE_3: [(u32, [f64; 4]); 6] = [
     (1000, [2.9, 2.9, 0.7, 0.7]),
     (10_000, [0.89, 0.89, 0.12, 0.12]),
     (100_000, [0.27, 0.27, 0.035, 0.035]),
@@ -16,98 +15,229 @@ pub(super) const TABLE_3: [(u32, [f64; 4]); 6] = [
     (100_000_000, [0.9847, 0.9855, 0.0134, 0.0142]),
 ];
 
-/// Table 4: roots, ms of Carmack's, Lomont's and CUDA's.
-const TABLE_4: [(u32, [f64; 3]); 4] = [
-    (1_000_000, [0.042, 0.042, 0.048]),
-    (10_000_000, [0.409, 0.409, 0.478]),
-    (100_000_000, [4.102, 4.102, 4.722]),
-    (1_000_000_000, [41.01, 41.01, 48.01]),
+/// Counts wrong roots below a number: in f32 and with steps in f64 against the exact root, and the latter against f32's.
+type Errors = [fn(u32) -> u64; 3];
+
+const fn errors<const MAGIC: u32, const STEPS: u32>() -> Errors {
+    [
+        wrong_roots::<Newton<MAGIC, STEPS>, false>,
+        wrong_roots::<Newton<MAGIC, STEPS, true>, false>,
+        wrong_roots::<Newton<MAGIC, STEPS, true>, true>,
+    ]
+}
+
+/// The columns of table 3, and those of four steps.
+const ERRORS: [(&str, u32, Errors); 6] = [
+    ("Carmack", 2, errors::<CARMACK, 2>()),
+    ("Lomont", 2, errors::<LOMONT, 2>()),
+    ("Carmack", 3, errors::<CARMACK, 3>()),
+    ("Lomont", 3, errors::<LOMONT, 3>()),
+    ("Carmack", 4, errors::<CARMACK, 4>()),
+    ("Lomont", 4, errors::<LOMONT, 4>()),
 ];
 
-/// Table 3: how many of the whole numbers below N have another root, without fractions. The root that ours are held against
-/// is exact, but for the last column.
+/// Counts whole numbers `1 <= x < below` whose root without its fraction is wrong: is not that of `x`, or `BY_F32` not that of the
+/// processor's f32 root. From 2^24 on, `x` is not always an f32, and these two differ.
+fn wrong_roots<R: SingleRoot, const BY_F32: bool>(below: u32) -> u64 {
+    let (mut wrong, mut exact) = (0, 1);
+    for x in 1..below {
+        exact += i32::from((exact + 1) * (exact + 1) <= x as i32);
+        let single = x as i32 as f32;
+        let right = if BY_F32 { Single::root(single) as i32 } else { exact };
+        wrong += u64::from(R::root(single) as i32 != right);
+    }
+    wrong
+}
+
 pub(super) fn table_3(quick: bool) -> Table {
-    let columns = [
-        "tests",
-        "constant",
-        "steps",
-        "paper_percent",
-        "ours_all_in_f32_percent",
-        "ours_steps_in_f64_percent",
-        "ours_steps_in_f64_against_f32_sqrt_percent",
-    ];
+    let columns = "tests | constant | steps | paper_percent | ours_all_in_f32_percent | \
+        ours_steps_in_f64_percent | ours_steps_in_f64_against_f32_sqrt_percent";
     let mut table = Table::new("table_3", columns);
     let most = if quick { 1_000_000 } else { u32::MAX };
     for (tests, paper) in TABLE_3.into_iter().filter(|(tests, _)| *tests <= most) {
-        let percent = |errors: fn(u32) -> u64| errors(tests) as f64 / f64::from(tests) * 100.0;
         for (k, (name, steps, errors)) in ERRORS.into_iter().enumerate() {
-            let paper = paper[k.min(2 + k % 2)];
-            let head = cells![tests, name, steps, paper];
-            table.row(head.into_iter().chain(errors.map(percent).map(Cell::from)));
+            let [all, wide, by_f32] = errors.map(|count| count(tests) as f64 / f64::from(tests) * 100.0);
+            table.row(cells![tests, name, steps, paper[k.min(2 + k % 2)], all, wide, by_f32]);
         }
     }
     table
 }
 
-/// Counts wrong roots below a number: all in f32 and each step in f64, against the exact root; and the latter against f32's.
-type Errors = [fn(u32) -> u64; 3];
-
-const fn errors<R: SingleRoot, Wide: SingleRoot>() -> Errors {
-    [root_errors::<R>, root_errors::<Wide>, root_differences::<Wide>]
-}
-
-const fn carmack<const STEPS: u32>() -> (&'static str, u32, Errors) {
-    ("Carmack", STEPS, errors::<Newton<CARMACK, STEPS>, WideNewton<CARMACK, STEPS>>())
-}
-
-const fn lomont<const STEPS: u32>() -> (&'static str, u32, Errors) {
-    ("Lomont", STEPS, errors::<Newton<LOMONT, STEPS>, WideNewton<LOMONT, STEPS>>())
-}
-
-/// In the order of table 3, and those of four steps.
-const ERRORS: [(&str, u32, Errors); 6] =
-    [carmack::<2>(), lomont::<2>(), carmack::<3>(), lomont::<3>(), carmack::<4>(), lomont::<4>()];
-
-/// Table 4: roots of the first N whole numbers, on one thread here.
+/// Measures roots of the first whole numbers on one thread.
 pub(super) fn table_4(quick: bool) -> Table {
-    let columns = [
-        "roots",
-        "paper_carmack_ms",
-        "paper_lomont_ms",
-        "paper_cuda_ms",
-        "ours_carmack_1_step_ms",
-        "ours_carmack_2_steps_ms",
-        "ours_carmack_3_steps_ms",
-        "ours_carmack_4_steps_ms",
-        "ours_lomont_1_step_ms",
-        "ours_lomont_2_steps_ms",
-        "ours_lomont_3_steps_ms",
-        "ours_lomont_4_steps_ms",
-        "ours_f32_sqrt_ms",
+    let columns = "roots | paper_carmack_ms | paper_lomont_ms | paper_cuda_ms | ours_carmack_1_step_ms | \
+        ours_carmack_2_steps_ms | ours_carmack_3_steps_ms | ours_carmack_4_steps_ms | ours_lomont_1_step_ms | \
+        ours_lomont_2_steps_ms | ours_lomont_3_steps_ms | ours_lomont_4_steps_ms | ours_f32_sqrt_ms";
+    let roots: [fn(u32) -> f64; 9] = [
+        roots_ms::<Newton<CARMACK, 1>>,
+        roots_ms::<Newton<CARMACK, 2>>,
+        roots_ms::<Newton<CARMACK, 3>>,
+        roots_ms::<Newton<CARMACK, 4>>,
+        roots_ms::<Newton<LOMONT, 1>>,
+        roots_ms::<Newton<LOMONT, 2>>,
+        roots_ms::<Newton<LOMONT, 3>>,
+        roots_ms::<Newton<LOMONT, 4>>,
+        roots_ms::<Single>,
     ];
     let mut table = Table::new("table_4", columns);
-    let most = if quick { 10_000_000 } else { u32::MAX };
-    for (roots, paper) in TABLE_4.into_iter().filter(|(roots, _)| *roots <= most) {
-        let ours = [
-            roots_ms::<Newton<CARMACK, 1>>(roots),
-            roots_ms::<Newton<CARMACK, 2>>(roots),
-            roots_ms::<Newton<CARMACK, 3>>(roots),
-            roots_ms::<Newton<CARMACK, 4>>(roots),
-            roots_ms::<Newton<LOMONT, 1>>(roots),
-            roots_ms::<Newton<LOMONT, 2>>(roots),
-            roots_ms::<Newton<LOMONT, 3>>(roots),
-            roots_ms::<Newton<LOMONT, 4>>(roots),
-            roots_ms::<Single>(roots),
-        ];
-        let all = paper.into_iter().chain(ours).map(Cell::from);
-        table.row(cells![roots].into_iter().chain(all));
+    let most = if quick { 10_000_000 } else { u64::MAX };
+    for row in AVRIL_4.iter().filter(|row| row.roots <= most) {
+        let paper = [row.approximate, row.approximate, row.cuda];
+        let ours = roots.map(|ms| ms(row.roots as u32));
+        table.row(cells![row.roots].into_iter().chain(paper.into_iter().chain(ours).map(Into::into)));
     }
     table
 }
 
-/// The best of three.
+/// Returns the milliseconds of the best of three.
 fn roots_ms<R: SingleRoot>(count: u32) -> f64 {
-    let bits = |x: u32| R::root(x as i32 as f32).to_bits();
-    let sum = || (1..=count).fold(0u32, |sum, x| sum ^ bits(x));
+    let sum = || (1..=count).fold(0u32, |sum, x| sum ^ R::root(x as i32 as f32).to_bits());
     (0..3).map(|_| timed(|| std::hint::black_box(sum())).1).fold(f64::MAX, f64::min)
+}
+
+/// Returns the result of one operation: the nearest f32, the next f32 towards zero (as devices of 2008 cut the product of a
+/// multiply-add), or a number that stays in a wider register.
+type Rounding = fn(f64) -> f64;
+
+const ROUNDINGS: [Rounding; 3] = [
+    |x| (x as f32).into(),
+    |x| {
+        let nearest = x as f32;
+        let is_above = f64::from(nearest).abs() > x.abs();
+        if is_above { f32::from_bits(nearest.to_bits() - 1).into() } else { nearest.into() }
+    },
+    |x| x,
+];
+
+/// One step `y (1.5 - h y y)`: true if y is squared first; the roundings of both products, the difference and the new `y`.
+type Step = (bool, [Rounding; 4]);
+
+fn steps() -> Vec<Step> {
+    let rounding = |code: usize, place: u32| ROUNDINGS[code / 3usize.pow(place) % 3];
+    let one = |code: usize| (code.is_multiple_of(2), std::array::from_fn(|k| rounding(code / 2, k as u32)));
+    (0..2 * 81).map(one).collect()
+}
+
+fn next((square_first, [first, second, difference, product]): Step, half: f64, y: f64) -> f64 {
+    let scaled = if square_first { half * first(y * y) } else { first(half * y) * y };
+    product(y * difference(1.5 - second(scaled)))
+}
+
+/// The names of what is made of the last `y`: the whole number below `x y`, the one above, or the one below `1 / y`.
+const FORMS: [&str; 3] = ["x y cut", "x y rounded up", "1 / y cut"];
+
+/// A way to round: the first two steps alike, later steps alike, the form, and the last operation.
+type RoundedRoot = ([Step; 2], usize, Rounding);
+
+/// Returns the root as a whole number.
+fn rounded((steps, form, last): RoundedRoot, magic: u32, count: usize, x: u32) -> u32 {
+    let half = f64::from(x as f32 * 0.5);
+    let mut y = f64::from(f32::from_bits(magic - ((x as f32).to_bits() >> 1)));
+    for step in 0..count {
+        y = next(steps[step / 2], half, y);
+    }
+    match form {
+        0 => last(f64::from(x) * y) as u32,
+        1 => last(f64::from(x) * y).ceil() as u32,
+        _ => last(1.0 / y) as u32,
+    }
+}
+
+/// Counts wrong roots of `1 <= x < below <= 2^24` after two steps or more. These are off by less than one in 200,000, so only
+/// numbers near a square can be wrong.
+fn errors_of(way: RoundedRoot, magic: u32, steps: usize, below: u32) -> u64 {
+    let near = |root: u32| {
+        let (square, reach) = (root * root, 2 + root * root / 100_000);
+        square - reach.min(root - 1)..=square + reach.min(root)
+    };
+    let exact = |x: u32| x.isqrt() + u32::from(way.1 == 1 && x.isqrt().pow(2) < x);
+    let all = (1..=below.isqrt() + 1).flat_map(near).filter(|x| (1..below).contains(x));
+    all.filter(|x| rounded(way, magic, steps, *x) != exact(*x)).count() as u64
+}
+
+/// Half of what the last digit counts in the first four rows of table 3: with two steps, with three.
+const HALF_DIGITS: [[f64; 2]; 4] = [[0.05, 0.05], [0.005, 0.005], [0.005, 5e-4], [5e-5, 5e-5]];
+
+/// Numbers of ways: all, those that give both constants' figures up to 100,000 tests, up to 1,000,000, and Carmack's up to there.
+type Counts = [usize; 4];
+
+/// Counts of ways with two steps, with three, with four, and with each of these at once.
+type Found = [Counts; 4];
+
+fn both<const N: usize, T: Copy>(a: [T; N], b: [T; N], of: impl Fn(T, T) -> T) -> [T; N] {
+    std::array::from_fn(|k| of(a[k], b[k]))
+}
+
+fn judged(way: RoundedRoot, steps: usize) -> Counts {
+    let late = usize::from(steps > 2);
+    let rows = |magic: u32, column: usize, most: usize| {
+        let is_printed = |row: &usize| {
+            let (tests, paper) = TABLE_3[*row];
+            let percent = errors_of(way, magic, steps, tests) as f64 / f64::from(tests) * 100.0;
+            (percent - paper[2 * late + column]).abs() <= HALF_DIGITS[*row][late]
+        };
+        (0..most).take_while(is_printed).count()
+    };
+    let carmack = rows(CARMACK, 0, HALF_DIGITS.len());
+    let both = rows(LOMONT, 1, carmack);
+    [1, usize::from(both >= 3), usize::from(both >= 4), usize::from(carmack >= 4)]
+}
+
+/// Judges ways with more than two steps. Two steps are looked at only if three give the table's figures: few do.
+fn beyond_two(way: RoundedRoot) -> Found {
+    let [three, four] = [3, 4].map(|steps| judged(way, steps));
+    let two = if three[1] + three[3] > 0 { judged(way, 2) } else { [1, 0, 0, 0] };
+    [[0; 4], three, four, both(two, both(three, four, usize::min), usize::min)]
+}
+
+fn found(form: usize) -> Found {
+    let all = steps();
+    let add = |a: Found, b: Found| both(a, b, |a, b| both(a, b, |a, b| a + b));
+    let of_early = |&early: &Step| {
+        let two = ROUNDINGS.map(|last| [judged(([early; 2], form, last), 2), [0; 4], [0; 4], [0; 4]]);
+        let late = all.iter().flat_map(|late| ROUNDINGS.map(|last| beyond_two(([early, *late], form, last))));
+        two.into_iter().chain(late).fold(Found::default(), add)
+    };
+    all.par_iter().map(of_early).reduce(Found::default, add)
+}
+
+/// Counts the roundings that give the figures of table 3 in its rows up to 1,000,000 tests.
+pub(super) fn roundings() -> Table {
+    let columns = "result | steps | ways | both_constants_up_to_100000_tests | \
+        both_constants_up_to_1000000_tests | carmack_up_to_1000000_tests";
+    let mut table = Table::new("roundings_of_table_3", columns);
+    for (form, name) in FORMS.into_iter().enumerate() {
+        for (steps, [ways, few, all, carmack]) in
+            ["2", "3", "4", "each of these"].into_iter().zip(found(form))
+        {
+            table.row(cells![name, steps, ways, few, all, carmack]);
+        }
+    }
+    table
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn roots_are_wrong_as_often_near_squares_as_among_all_and_f32_is_exact_up_to_2_to_the_24th() {
+        let [nearest, _, wide] = ROUNDINGS;
+        let with = |roundings| ([(false, roundings); 2], 0, nearest);
+        for below in [4, 1000, 99_856, 1_000_000] {
+            let [narrow, of_wide, by_f32] = errors::<LOMONT, 2>().map(|count| count(below));
+            assert_eq!(errors_of(with([nearest; 4]), LOMONT, 2, below), narrow);
+            assert_eq!(errors_of(with([wide, wide, wide, nearest]), LOMONT, 2, below), of_wide);
+            assert_eq!((of_wide, wrong_roots::<Single, false>(below)), (by_f32, 0));
+        }
+        assert_eq!(wrong_roots::<Single, true>(30_000_000), 0);
+        assert!(wrong_roots::<Single, false>(30_000_000) > 0);
+    }
+
+    #[test]
+    fn a_cut_product_gives_the_figures_of_two_steps() {
+        let cut = found(0);
+        assert_eq!((cut[0][0], cut[1][0], cut[3][0]), (3 * 162, 3 * 162 * 162, 3 * 162 * 162));
+        assert!(cut[0][2] > 0 && cut[0][2] < cut[0][0] / 10 && cut[1][2] == 0, "{cut:?}");
+    }
 }

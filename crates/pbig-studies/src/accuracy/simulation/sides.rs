@@ -1,10 +1,10 @@
 //! Worlds of one scene, side by side: with rapier's own broad phase, with pbig's, and with bodies or events in another
 //! order.
 
-use crate::mechanics::Mechanics;
-use crate::numbered::{Apart, Numbered};
+use super::mechanics::Mechanics;
+use super::numbered::Numbered;
+use crate::reordered::{Reordered, lower_first, sorted};
 use crate::reported::Reported;
-use crate::sorted::{LowerFirst, Sorted};
 use glam::Vec3;
 use pbig_harness::bench::timed;
 use pbig_harness::output::Failure;
@@ -19,7 +19,7 @@ use std::hash::{DefaultHasher, Hash, Hasher};
 enum Order {
     /// Bodies, as they are inserted; of a seed.
     Permuted(u64),
-    /// Events, as rapier is told of them: as ours has them.
+    /// Events, sorted as pbig sorts them: shows which part of a difference is due to the order of events.
     Sorted,
     /// The two colliders of each of our pairs: as rapier's own broad phase has them.
     LowerFirst,
@@ -29,50 +29,30 @@ enum Order {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Way {
     pub(super) name: &'static str,
-    /// Of pbig's broad phase; none: rapier's own.
+    /// The margin of pbig's broad phase; none: rapier's own.
     margin: Option<f32>,
     order: Option<Order>,
-    /// The way before it once more.
-    is_again: bool,
+    /// True for the way before it once more.
+    pub(super) is_again: bool,
 }
-
-const fn stock(name: &'static str, order: Option<Order>) -> Way {
-    Way { name, margin: None, order, is_again: false }
-}
-
-const fn pbig(name: &'static str, margin: f32) -> Way {
-    Way { name, margin: Some(margin), order: None, is_again: false }
-}
-
-const fn again(name: &'static str, way: Way) -> Way {
-    Way { name, is_again: true, ..way }
-}
-
-const STOCK: Way = stock("stock", None);
-/// The control that shows which part of a difference is due to the order of events.
-const SORTED: Way = stock("stock sorted", Some(Order::Sorted));
-const PBIG: Way = pbig("pbig", PbigConfig::DEFAULT.margin);
 
 /// So many orders of insertion beside the scene's: a run that is one more of them is farther than all these once in 20 times.
 pub(super) const PERMUTED: usize = 19;
 
-/// All ways, what the others are held against first.
-pub(super) static WAYS: [Way; PERMUTED + 8] = ways();
+const STOCK: Way = Way { name: "stock", margin: None, order: None, is_again: false };
+const PBIG: Way = Way { name: "pbig", margin: Some(PbigConfig::DEFAULT.margin), ..STOCK };
 
-const fn ways() -> [Way; PERMUTED + 8] {
-    let mut ways = [STOCK; PERMUTED + 8];
-    ways[1] = again("stock again", STOCK);
-    let mut order = 1;
-    while order <= PERMUTED {
-        ways[1 + order] = stock("stock permuted", Some(Order::Permuted(order as u64)));
-        order += 1;
-    }
-    ways[PERMUTED + 2] = SORTED;
-    ways[PERMUTED + 3] = again("stock sorted again", SORTED);
-    ways[PERMUTED + 4] = Way { name: "pbig lower first", order: Some(Order::LowerFirst), ..PBIG };
-    ways[PERMUTED + 5] = PBIG;
-    ways[PERMUTED + 6] = again("pbig again", PBIG);
-    ways[PERMUTED + 7] = pbig("pbig without margin", 0.0);
+/// Returns all ways, the one that the others are held against first.
+fn ways() -> Vec<Way> {
+    let again = |name, way| Way { name, is_again: true, ..way };
+    let permuted = |seed| Way { name: "stock permuted", order: Some(Order::Permuted(seed)), ..STOCK };
+    let sorted = Way { name: "stock sorted", order: Some(Order::Sorted), ..STOCK };
+    let mut ways = vec![STOCK, again("stock again", STOCK)];
+    ways.extend((1..=PERMUTED as u64).map(permuted));
+    ways.extend([sorted, again("stock sorted again", sorted)]);
+    ways.extend([Way { name: "pbig lower first", order: Some(Order::LowerFirst), ..PBIG }, PBIG]);
+    let without = Way { name: "pbig without margin", margin: Some(0.0), ..PBIG };
+    ways.extend([again("pbig again", PBIG), without]);
     ways
 }
 
@@ -81,14 +61,17 @@ impl Way {
         self.margin.is_some()
     }
 
-    /// Pbig's, or stock in our order of events; for the first time.
+    /// Returns true for pbig's ways and stock in our order of events, for the first time.
     pub(super) fn is_held_against_stock(&self) -> bool {
         (self.is_pbig() || self.order == Some(Order::Sorted)) && !self.is_again
     }
 
-    /// Rapier's own broad phase, and another order of bodies.
     pub(super) fn is_permuted(&self) -> bool {
-        matches!(self.order, Some(Order::Permuted(_)))
+        self.seed().is_some()
+    }
+
+    fn seed(&self) -> Option<u64> {
+        if let Some(Order::Permuted(seed)) = self.order { Some(seed) } else { None }
     }
 
     fn broad_phase(&self) -> Box<dyn BroadPhase> {
@@ -96,43 +79,25 @@ impl Way {
         let config = |margin| PbigConfig { margin, ..PbigConfig::DEFAULT };
         let ours = |margin| PbigBroadPhase::with_config(config(margin)).expect("a length");
         match (self.margin, self.order) {
-            (Some(margin), Some(Order::LowerFirst)) => Box::new(LowerFirst(ours(margin))),
+            (Some(margin), Some(Order::LowerFirst)) => Box::new(Reordered(ours(margin), lower_first)),
             (Some(margin), _) => Box::new(ours(margin)),
-            (None, Some(Order::Sorted)) => Box::new(Sorted(stock)),
+            (None, Some(Order::Sorted)) => Box::new(Reordered(stock, sorted)),
             (None, _) => Box::new(stock),
         }
     }
-
-    fn inserted(&self, scene: &Numbered) -> Numbered {
-        match self.order {
-            Some(Order::Permuted(seed)) => scene.permuted(seed),
-            _ => scene.inserted(&(0..scene.bodies.len()).collect::<Vec<_>>()),
-        }
-    }
 }
 
-/// A scene, how large, and for how long.
-#[derive(Clone, Copy)]
-pub(super) struct Case {
-    pub(super) scene: &'static str,
-    bodies: usize,
-    pub(super) steps: usize,
-}
-
-pub(super) const fn case(scene: &'static str, bodies: usize, steps: usize) -> Case {
-    Case { scene, bodies, steps }
-}
+/// A scene, its bodies, and its steps.
+pub(super) type Case = (&'static str, usize, usize);
 
 /// The one scene that the harness does not have: see [`cloud`].
 pub(super) const CLOUD: &str = "cloud";
 
-impl Case {
-    fn world(&self) -> Result<World, Failure> {
-        if self.scene == CLOUD {
-            return Ok(cloud(self.bodies));
-        }
-        Ok(Scene::named(self.scene)?.build(self.bodies, 1))
+fn world((scene, bodies, _): Case) -> Result<World, Failure> {
+    if scene == CLOUD {
+        return Ok(cloud(bodies));
     }
+    Ok(Scene::named(scene)?.build(bodies, 1))
 }
 
 /// Balls and cubes that fly at a common centre and through each other's ways, without gravity, ground or sleep: what
@@ -153,14 +118,13 @@ fn cloud(bodies: usize) -> World {
 }
 
 /// The state of one way after a step.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Sample {
     pub(super) mechanics: Mechanics,
-    /// From the first way's bodies.
-    pub(super) apart: Apart,
-    /// Of every number of every pose: the same exactly where two worlds with one order of bodies are.
+    /// Mean and largest distance from the first way's bodies.
+    pub(super) apart: [f64; 2],
+    /// A hash of every number of every pose: the same exactly where two worlds with one order of bodies are.
     pub(super) poses: u64,
-    /// Dynamic bodies that do not sleep, %.
+    /// Dynamic bodies that do not sleep, in percent.
     pub(super) awake: f64,
 }
 
@@ -171,11 +135,10 @@ pub(super) struct Side {
     broad_phase: Box<dyn BroadPhase>,
     /// After each step.
     pub(super) samples: Vec<Sample>,
-    /// Of each step.
+    /// Milliseconds of each step.
     pub(super) ms: Vec<f64>,
-    /// Of the steps in which pairs were compared with brute force.
+    /// Sums over the steps in which pairs were compared with brute force, and the number of these.
     pub(super) reported: Reported,
-    /// Those steps.
     pub(super) compared: u64,
     /// Pairs that ended while their colliders touched.
     pub(super) parted: u64,
@@ -183,7 +146,7 @@ pub(super) struct Side {
 
 impl Side {
     fn new(way: Way, scene: &Numbered) -> Self {
-        let (numbered, broad_phase) = (way.inserted(scene), way.broad_phase());
+        let (numbered, broad_phase) = (scene.inserted(way.seed()), way.broad_phase());
         let (reported, compared, parted) = (Reported::default(), 0, 0);
         Self { way, numbered, broad_phase, samples: vec![], ms: vec![], reported, compared, parted }
     }
@@ -193,12 +156,12 @@ impl Side {
         let touching = touching(world);
         let ((), ms) = timed(|| world.step(&mut *self.broad_phase));
         self.ms.push(ms);
-        let is_there =
-            |pair: &&[ColliderHandle; 2]| world.narrow_phase.contact_pair(pair[0], pair[1]).is_some();
-        self.parted += (touching.len() - touching.iter().filter(is_there).count()) as u64;
+        let has_ended =
+            |pair: &&[ColliderHandle; 2]| world.narrow_phase.contact_pair(pair[0], pair[1]).is_none();
+        self.parted += touching.iter().filter(has_ended).count() as u64;
     }
 
-    fn look(&mut self, apart: Apart) {
+    fn look(&mut self, apart: [f64; 2]) {
         let world = &self.numbered.world;
         let mut poses = DefaultHasher::new();
         world.pose_bits().hash(&mut poses);
@@ -211,75 +174,32 @@ impl Side {
     }
 }
 
-/// Pairs of colliders that rapier holds to be in contact.
+fn dynamic(world: &World) -> impl Iterator<Item = &RigidBody> {
+    world.bodies.iter().map(|(_, body)| body).filter(|body| body.is_dynamic())
+}
+
+/// Returns the pairs of colliders that rapier holds to be in contact.
 fn touching(world: &World) -> Vec<[ColliderHandle; 2]> {
     let pairs = world.narrow_phase.contact_pairs().filter(|pair| pair.has_any_active_contact);
     pairs.map(|pair| [pair.collider1, pair.collider2]).collect()
 }
 
-/// Of the dynamic bodies, in percent.
 fn awake(world: &World) -> f64 {
-    let bodies = || world.bodies.iter().filter(|(_, body)| body.is_dynamic());
-    let awake = bodies().filter(|(_, body)| !body.is_sleeping()).count();
-    awake as f64 / bodies().count().max(1) as f64 * 100.0
-}
-
-/// Bodies that keep a world from coming to rest.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(super) struct Moving {
-    /// Those with more than a kinetic energy for each kilogram.
-    pub(super) moving: usize,
-    /// Of these, those with a shape that rolls.
-    pub(super) round: usize,
-}
-
-impl Side {
-    /// At the end, by the limit for a world at rest.
-    pub(super) fn moving(&self, rest: f64) -> Moving {
-        let world = &self.numbered.world;
-        let mut found = Moving::default();
-        for (_, body) in world.bodies.iter().filter(|(_, body)| body.is_dynamic()) {
-            let is_moving = f64::from(body.kinetic_energy()) > rest * f64::from(body.mass());
-            let is_round = body.colliders().iter().any(|&one| rolls(world.colliders[one].shape()));
-            found.moving += usize::from(is_moving);
-            found.round += usize::from(is_moving && is_round);
-        }
-        found
-    }
-}
-
-/// Rapier has no rolling friction.
-fn rolls(shape: &dyn Shape) -> bool {
-    use ShapeType::{Ball, Capsule, Cone, Cylinder};
-    let is_round = |shape: &dyn Shape| matches!(shape.shape_type(), Ball | Capsule | Cone | Cylinder);
-    match shape.as_compound() {
-        Some(compound) => compound.shapes().iter().any(|(_, part)| is_round(&**part)),
-        None => is_round(shape),
-    }
-}
-
-/// Each way that was run twice: its name, and the first step after which the two differ.
-pub(super) fn repeats(sides: &[Side]) -> Vec<(&'static str, Option<usize>)> {
-    let repeat = |two: &[Side]| {
-        let poses = |side: &Side| side.samples.iter().map(|sample| sample.poses).collect::<Vec<_>>();
-        let same = poses(&two[0]).iter().zip(&poses(&two[1])).position(|(one, again)| one != again);
-        (two[0].way.name, same.map(|step| step + 1))
-    };
-    sides.windows(2).filter(|two| two[1].way.is_again).map(repeat).collect()
+    let awake = dynamic(world).filter(|body| !body.is_sleeping()).count();
+    awake as f64 / dynamic(world).count().max(1) as f64 * 100.0
 }
 
 /// Pairs are compared with brute force in one of so many steps.
 const COMPARED: usize = 20;
 
-/// All ways through a scene, in turn step by step.
+/// Runs all ways through a scene, in turn step by step.
 pub(super) fn simulated(case: Case) -> Result<Vec<Side>, Failure> {
-    let scene = Numbered::new(case.world()?);
-    let mut sides: Vec<Side> = WAYS.iter().map(|way| Side::new(*way, &scene)).collect();
-    for step in 0..case.steps {
-        for place in 0..sides.len() {
-            sides[(step + place) % WAYS.len()].step();
-        }
-        let apart: Vec<Apart> = sides.iter().map(|side| sides[0].numbered.apart(&side.numbered)).collect();
+    let scene = Numbered::new(world(case)?);
+    let mut sides: Vec<Side> = ways().into_iter().map(|way| Side::new(way, &scene)).collect();
+    for step in 0..case.2 {
+        let count = sides.len();
+        (0..count).for_each(|place| sides[(step + place) % count].step());
+        let apart: Vec<_> = sides.iter().map(|side| sides[0].numbered.apart(&side.numbered)).collect();
         sides.iter_mut().zip(apart).for_each(|(side, apart)| side.look(apart));
     }
     Ok(sides)
@@ -291,19 +211,17 @@ mod tests {
 
     #[test]
     fn bodies_that_sleep_are_counted_and_pairs_that_end_while_they_touch() {
-        let scene = Numbered::new(case("pile", 8, 0).world().expect("a scene"));
-        let mut side = Side::new(PBIG, &scene);
+        let mut side = Side::new(PBIG, &Numbered::new(world(("pile", 8, 0)).expect("a scene")));
         for _ in 0..200 {
             side.step();
-            side.look(Apart::default());
+            side.look([0.0; 2]);
         }
-        let awake: Vec<f64> = side.samples.iter().map(|sample| sample.awake).collect();
-        assert_eq!((awake[0], awake[199], side.parted), (100.0, 0.0, 0), "{awake:?}");
+        assert_eq!((side.samples[0].awake, side.samples[199].awake, side.parted), (100.0, 0.0, 0));
         let touched = touching(&side.numbered.world).len();
         let top = &mut side.numbered.world.bodies[side.numbered.bodies[7]];
         top.set_translation(vector![0.0, 90.0, 0.0], true);
         side.step();
-        side.look(Apart::default());
+        side.look([0.0; 2]);
         let parted = touched - touching(&side.numbered.world).len();
         assert_eq!((side.parted, parted > 0), (parted as u64, true), "{touched} touched");
         assert!(side.samples[200].awake > 0.0);

@@ -1,4 +1,4 @@
-//! A world at a place: in f64, as rapier holds it, and its boxes in f32 by every way there is to them.
+//! A world at a place: in f64, as rapier holds it, and its boxes in f32 by every way.
 
 use crate::wide::{Differences, Layout, Pose, Truth, Wide, doubt, to_f32, to_f64, widened_by_ulps};
 use pbig_core::{Aabb, Config, Finder, Limits, Pair};
@@ -7,52 +7,30 @@ use pbig_harness::scenes::Scene;
 use rapier_pbig::{PbigConfig, collision_aabb};
 use rapier3d::prelude::{Collider, IntegrationParameters, RigidBodySet};
 
-/// The way to make boxes in f32.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) enum Way {
-    /// Rapier's, widened by so many ulps.
-    Ulps(u32),
-    /// The same, and the margin that the drop-in stores them with.
-    Margin(u32),
-    /// In f64 at poses in f64, rounded outward: what f32 cannot do without.
-    Outward,
-}
+/// A way to make boxes in f32: its name, the ulps by which rapier's boxes are widened, and true with the drop-in's margin.
+/// Without ulps: boxes in f64 at poses in f64, rounded outward.
+pub(super) type Way = (&'static str, Option<u32>, bool);
 
-/// Every way, in the order of tables; what takes time comes first.
+/// The ways in the order of tables. The first six are timed: a margin on top of a way takes no time.
 pub(super) const WAYS: [Way; 8] = [
-    Way::Ulps(0),
-    Way::Ulps(1),
-    Way::Ulps(2),
-    Way::Ulps(3),
-    Way::Ulps(4),
-    Way::Outward,
-    Way::Margin(0),
-    Way::Margin(2),
+    ("rapier's boxes", Some(0), false),
+    ("widened by 1 ulp", Some(1), false),
+    ("widened by 2 ulps", Some(2), false),
+    ("widened by 3 ulps", Some(3), false),
+    ("widened by 4 ulps", Some(4), false),
+    ("f64, rounded outward", None, false),
+    ("rapier's boxes, with the margin", Some(0), true),
+    ("widened by 2 ulps, with the margin", Some(2), true),
 ];
 
-/// The way that misses nothing at the poses that rapier holds.
-pub(super) const AT_POSES: Way = Way::Ulps(2);
-
-/// The way that misses nothing of the world, whose poses are in f64.
-pub(super) const IN_WORLD: Way = Way::Ulps(3);
-
-impl Way {
-    pub(super) fn name(self) -> String {
-        match self {
-            Self::Ulps(0) => "rapier's boxes".into(),
-            Self::Ulps(1) => "widened by 1 ulp".into(),
-            Self::Ulps(ulps) => format!("widened by {ulps} ulps"),
-            Self::Margin(0) => "rapier's boxes, with the margin".into(),
-            Self::Margin(ulps) => format!("widened by {ulps} ulps, with the margin"),
-            Self::Outward => "f64, rounded outward".into(),
-        }
-    }
-
-    /// Its place in [`WAYS`].
-    pub(super) fn index(self) -> usize {
-        WAYS.iter().position(|&way| way == self).unwrap_or(0)
-    }
-}
+/// Places in [`WAYS`].
+pub(super) const RAPIERS: usize = 0;
+/// Misses nothing at the poses that rapier holds.
+pub(super) const AT_POSES: usize = 2;
+/// Misses nothing of the world, whose poses are in f64.
+pub(super) const IN_WORLD: usize = 3;
+pub(super) const OUTWARD: usize = 5;
+pub(super) const MARGIN: usize = 6;
 
 /// A world near the origin.
 pub(super) struct World {
@@ -60,37 +38,22 @@ pub(super) struct World {
     /// About how large its shapes are.
     pub(super) size: f64,
     pub(super) layout: Layout,
-    /// True if it is moved along one axis, too.
-    pub(super) along_x: bool,
 }
 
-/// The worlds; `count` shapes in each, or a fifth where at last all lie in one place.
+/// Returns the worlds; `count` shapes in each, or a fifth if all lie in one place far away.
 pub(super) fn worlds(count: usize) -> Result<Vec<World>, Failure> {
-    let crowd = |name, size: f64, count| World {
-        name,
-        size,
-        layout: Layout::crowd(count, size, 1),
-        along_x: size == 1.0,
-    };
+    let crowd = |name, size: f64, count| World { name, size, layout: Layout::crowd(count, size, 1) };
     let scene = |name| -> Result<World, Failure> {
-        let built = Scene::named(name).map_err(Failure::Input)?.build(count, 1);
-        Ok(World { name, size: 1.0, layout: Layout::of_world(&built), along_x: true })
+        let built = Scene::named(name)?.build(count, 1);
+        Ok(World { name, size: 1.0, layout: Layout::of_world(&built) })
     };
-    Ok(vec![
+    let crowds = [
         crowd("crowd", 1.0, count),
         crowd("crowd, a tenth as large", 0.1, count / 5),
         crowd("crowd, ten times as large", 10.0, count / 5),
-        scene("column")?,
-        scene("ragdolls")?,
-        scene("pile")?,
-    ])
-}
-
-/// Which way a world is moved.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) enum Along {
-    Diagonal,
-    X,
+    ];
+    let scenes = [scene("column")?, scene("ragdolls")?, scene("pile")?];
+    Ok(crowds.into_iter().chain(scenes).collect())
 }
 
 /// A world that has been moved.
@@ -102,32 +65,25 @@ pub(super) struct Place<'a> {
     /// Boxes in f64 at poses in f64.
     pub(super) world: Truth,
     /// Boxes in f64 at the poses that rapier holds in f32.
-    pub(super) held: Truth,
+    held: Truth,
 }
 
 impl<'a> Place<'a> {
-    pub(super) fn new(layout: &'a Layout, offset: f64, along: Along) -> Self {
-        let poses = match along {
-            Along::Diagonal => layout.poses([offset; 3]),
-            Along::X => layout.poses([offset, 0.0, 0.0]),
-        };
-        Self::at(layout, poses)
-    }
-
-    /// Shapes at poses of their own.
-    pub(super) fn at(layout: &'a Layout, poses: Vec<Pose>) -> Self {
+    /// Places shapes at poses.
+    pub(super) fn new(layout: &'a Layout, poses: Vec<Pose>) -> Self {
         let params = IntegrationParameters::default();
         let narrow: Vec<_> = poses.iter().map(to_f32).collect();
         let held: Vec<_> = narrow.iter().map(to_f64).collect();
         let truth = |poses: &[Pose]| {
+            let farthest = poses.iter().map(|pose| pose.translation.vector.amax()).fold(0.0, f64::max);
             let boxes = layout.boxes(poses, f64::from(params.prediction_distance() / 2.0));
-            Truth::of(boxes, doubt(farthest(poses)))
+            Truth::of(boxes, doubt(farthest))
         };
         let (world, held) = (truth(&poses), truth(&held));
         Self { layout, colliders: layout.colliders(&narrow), poses, params, world, held }
     }
 
-    /// Twice what boxes reach beyond shapes: boxes that overlap by more are of shapes whose own do.
+    /// Returns twice what boxes reach beyond shapes: boxes that overlap by more are of shapes whose own do.
     pub(super) fn reach(&self) -> f64 {
         f64::from(self.params.prediction_distance())
     }
@@ -136,29 +92,20 @@ impl<'a> Place<'a> {
         self.colliders.len()
     }
 
-    pub(super) fn boxes(&self, way: Way) -> Vec<Aabb> {
-        match way {
-            Way::Ulps(ulps) => self.rapiers(ulps),
-            Way::Margin(ulps) => {
-                let margin = PbigConfig::DEFAULT.margin;
-                self.rapiers(ulps).iter().map(|aabb| aabb.inflated(margin)).collect()
-            }
-            Way::Outward => {
-                let boxes = self.layout.boxes(&self.poses, self.reach() / 2.0);
-                boxes.iter().map(Wide::outward).collect()
-            }
-        }
-    }
-
-    fn rapiers(&self, ulps: u32) -> Vec<Aabb> {
-        rapiers(&self.params, self.colliders.iter(), ulps)
+    pub(super) fn boxes(&self, (_, ulps, has_margin): Way) -> Vec<Aabb> {
+        let Some(ulps) = ulps else {
+            let boxes = self.layout.boxes(&self.poses, self.reach() / 2.0);
+            return boxes.iter().map(|wide| Aabb::from_f64(wide.min, wide.max)).collect();
+        };
+        let boxes = rapiers(&self.params, self.colliders.iter(), ulps);
+        let margin = if has_margin { PbigConfig::DEFAULT.margin } else { 0.0 };
+        if has_margin { boxes.iter().map(|aabb| aabb.inflated(margin)).collect() } else { boxes }
     }
 
     /// Compares the pairs of boxes in f32 with those in f64: at the poses that rapier holds, and in the world.
     fn differences(&self, way: Way) -> Result<[Differences; 2], Failure> {
         let mut finder = finder();
-        let found = finder.find(&self.boxes(way));
-        let found = found.map_err(|error| Failure::Input(format!("{}: {error}", way.name())))?;
+        let found = finder.find(&self.boxes(way))?;
         Ok([&self.held, &self.world].map(|truth| truth.differences(found, self.reach())))
     }
 
@@ -168,13 +115,13 @@ impl<'a> Place<'a> {
             let units = units(aabb, collider);
             wide.shortfall(aabb).into_iter().zip(units).map(|(short, unit)| short / unit).fold(0.0, f64::max)
         };
-        let rapiers = self.rapiers(0);
+        let rapiers = self.boxes(WAYS[RAPIERS]);
         let boxes = self.held.boxes.iter().zip(&rapiers).zip(&self.colliders);
         boxes.map(short).fold(0.0, f64::max)
     }
 }
 
-/// Boxes of colliders without bodies, or of bodies without soft CCD, widened by so many ulps.
+/// Returns the boxes of colliders without bodies, or of bodies without soft CCD, widened by so many ulps.
 pub(super) fn rapiers<'c>(
     params: &IntegrationParameters,
     colliders: impl Iterator<Item = &'c Collider>,
@@ -188,7 +135,7 @@ pub(super) fn rapiers<'c>(
     colliders.map(|one| widened_by_ulps(&stock(one), one.position(), ulps)).collect()
 }
 
-/// By how much one ulp of [`widened_by_ulps`] widens a box on each axis.
+/// Returns by how much one ulp of [`widened_by_ulps`] widens a box on each axis.
 fn units(aabb: &Aabb, collider: &Collider) -> [f64; 3] {
     // So many that rounding of the widened bound is nothing beside them; a power of two, which rounds nothing itself.
     const MANY: u32 = 1024;
@@ -200,25 +147,16 @@ pub(super) fn finder() -> Finder {
     Finder::new(Config { limits: Limits::UNLIMITED, ..Config::DEFAULT })
 }
 
-fn farthest(poses: &[Pose]) -> f64 {
-    poses.iter().map(|pose| pose.translation.vector.amax()).fold(0.0, f64::max)
-}
-
-/// From one f32 to the next.
-pub(super) fn ulp(x: f64) -> f64 {
-    f64::from(f32::EPSILON) * x.abs().log2().floor().exp2()
-}
-
 /// The results of a world at a place.
 #[derive(Clone)]
 pub(super) struct Row {
     pub(super) world: &'static str,
     pub(super) size: f64,
     pub(super) offset: f64,
-    pub(super) along: Along,
-    /// In f64.
+    /// The direction in which the world is moved.
+    pub(super) along: &'static str,
+    /// Pairs in f64, and at the poses in f32.
     pub(super) pairs: u64,
-    /// In f64 at the poses in f32.
     pub(super) held_pairs: u64,
     /// Boxes in f64 at the poses in f32, against the world.
     pub(super) poses: Differences,
@@ -229,57 +167,28 @@ pub(super) struct Row {
 }
 
 impl Row {
-    pub(super) fn new(world: &World, offset: f64, along: Along) -> Result<Self, Failure> {
-        Self::of(world.name, world.size, (offset, along), &Place::new(&world.layout, offset, along))
-    }
-
-    pub(super) fn of(
-        world: &'static str,
-        size: f64,
-        (offset, along): (f64, Along),
+    pub(super) fn new(
+        (world, size): (&'static str, f64),
+        (offset, along): (f64, &'static str),
         place: &Place<'_>,
     ) -> Result<Self, Failure> {
         let held: Vec<Pair> = place.held.pairs.iter().map(|(pair, _)| *pair).collect();
         let ways: Result<_, Failure> = WAYS.iter().map(|&way| place.differences(way)).collect();
-        Ok(Self {
-            world,
-            size,
-            offset,
-            along,
-            pairs: place.world.pairs.len() as u64,
-            held_pairs: held.len() as u64,
-            poses: place.world.differences(&held, place.reach()),
-            ways: ways?,
-            shortfall: place.shortfall(),
-        })
+        let (pairs, held_pairs) = (place.world.pairs.len() as u64, held.len() as u64);
+        let (poses, shortfall) = (place.world.differences(&held, place.reach()), place.shortfall());
+        Ok(Self { world, size, offset, along, pairs, held_pairs, poses, ways: ways?, shortfall })
     }
 
-    /// With what became of the same world later.
+    /// Adds the same world at another time.
     pub(super) fn and(mut self, later: &Self) -> Self {
         self.pairs += later.pairs;
         self.held_pairs += later.held_pairs;
         self.poses += later.poses;
-        for (sums, more) in self.ways.iter_mut().zip(&later.ways) {
-            sums.iter_mut().zip(more).for_each(|(sum, &one)| *sum += one);
+        for (sum, one) in self.ways.iter_mut().flatten().zip(later.ways.iter().flatten()) {
+            *sum += *one;
         }
         self.shortfall = self.shortfall.max(later.shortfall);
         self
-    }
-
-    /// Against boxes in f64 at the same poses.
-    pub(super) fn by_boxes(&self, way: Way) -> Differences {
-        self.ways[way.index()][0]
-    }
-
-    /// Against the world.
-    pub(super) fn in_all(&self, way: Way) -> Differences {
-        self.ways[way.index()][1]
-    }
-
-    /// Missed and added, against the world, in percent of its pairs.
-    pub(super) fn wrong_percent(&self, way: Way) -> f64 {
-        let Differences { missed, added, .. } = self.in_all(way);
-        (missed + added) as f64 / self.pairs.max(1) as f64 * 100.0
     }
 }
 
@@ -289,17 +198,15 @@ mod tests {
 
     #[test]
     fn a_shortfall_is_counted_in_what_a_box_is_widened_by() {
-        let ball = |at: f32| {
-            rapier3d::prelude::ColliderBuilder::ball(0.5).translation([at, 0.0, 0.0].into()).build()
-        };
-        let of = |at: f32| units(&Aabb::from_center([at, 0.0, 0.0], [0.5; 3]), &ball(at));
+        let ball = rapier3d::prelude::ColliderBuilder::ball(0.5).translation([1e7, 0.0, 0.0].into()).build();
         // On x an ulp of 10^7 + 1, on the others one of 1; and 2^-17 of what the box reaches: 0.5.
         let near = 2f64.powi(-23) + 2f64.powi(-18);
-        for (found, right) in of(1e7).into_iter().zip([1.0 + 2f64.powi(-18), near, near]) {
+        let found = units(&Aabb::from_center([1e7, 0.0, 0.0], [0.5; 3]), &ball);
+        for (found, right) in found.into_iter().zip([1.0 + 2f64.powi(-18), near, near]) {
             assert!((found / right - 1.0).abs() < 1e-2, "{found}, not {right}");
         }
-        let worlds = worlds(100).expect("worlds");
-        let far = Row::new(&worlds[0], 1e5, Along::Diagonal).expect("a row");
-        assert!(far.shortfall > 0.0 && far.shortfall < 2.0, "{}: no more than is proved", far.shortfall);
+        let layout = Layout::crowd(100, 1.0, 1);
+        let shortfall = Place::new(&layout, layout.poses([1e5; 3])).shortfall();
+        assert!(shortfall > 0.0 && shortfall < 2.0, "{shortfall}: no more than is proved");
     }
 }

@@ -1,0 +1,40 @@
+//! A job: the boxes of one search on a device.
+
+use super::{Change, ChangeRequest};
+use crate::layout::Motion;
+use crate::{Aabb, ProxyFilter};
+
+/// What goes up to the device.
+#[derive(Clone, Copy)]
+pub(super) enum Input<'a> {
+    /// The boxes of the job.
+    Boxes,
+    /// Boxes now and at the last update.
+    Motions(&'a [Motion]),
+    /// Changes, for a device that has the boxes of the last update.
+    Changes(&'a ChangeRequest<'a>),
+}
+
+/// A search of boxes that fit the device at once.
+pub(super) struct Job<'a> {
+    /// The boxes now.
+    pub(super) boxes: &'a [Aabb],
+    pub(super) input: Input<'a>,
+    pub(super) filters: Option<&'a [ProxyFilter]>,
+    /// If not 0: only pairs of a box below this index and a box from it on are wanted.
+    pub(super) split: u32,
+    /// Without a grid every pair is tested.
+    pub(super) needs_grid: bool,
+    /// The caller wants the pairs in order.
+    pub(super) is_sorted: bool,
+}
+
+impl Job<'_> {
+    /// Returns the number of boxes that are valid now or were at the last update.
+    pub(super) fn valid(&self) -> u32 {
+        let now = self.boxes.iter().filter(|one| one.is_valid()).count();
+        let Input::Changes(request) = self.input else { return now as u32 };
+        let ended = |change: &&Change| change.aabb.is_valid() && !self.boxes[change.id as usize].is_valid();
+        (now + request.changed.iter().filter(ended).count()) as u32
+    }
+}

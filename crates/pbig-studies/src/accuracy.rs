@@ -1,0 +1,55 @@
+//! Run time against error: a study for each thing that can be wrong by a little.
+
+mod coordinates;
+pub(crate) mod index;
+mod margin;
+mod simulation;
+mod wide;
+
+use pbig_harness::chart::{Chart, Line, MAX_LINES};
+use pbig_harness::prelude::*;
+
+/// Makes a study, of small sizes if it is to be quick.
+pub type Run = fn(bool) -> Result<Report, Failure>;
+
+/// Every study with its name.
+pub const STUDIES: [(&str, Run); 5] = [
+    ("index", index::run),
+    ("coordinates", coordinates::run),
+    ("margin", margin::run),
+    ("wide", wide::run),
+    ("simulation", simulation::run),
+];
+
+/// Returns a study with its chart: names of lines, each with a time and an error.
+fn report(
+    name: &str,
+    tables: Vec<Table>,
+    (title, axes): (&str, [&str; 2]),
+    points: impl IntoIterator<Item = (String, f64, f64)>,
+) -> Report {
+    let name = format!("accuracy-{name}");
+    let mut lines: Vec<Line> = vec![];
+    for (name, time, error) in points {
+        match lines.iter().position(|line| line.name == name) {
+            Some(place) => lines[place].points.push((time, error)),
+            None if lines.len() < MAX_LINES => lines.push(Line { name, points: vec![(time, error)] }),
+            None => {}
+        }
+    }
+    Report { charts: vec![Chart::log(&name, title, axes, lines)], ..Report::new(&name, tables) }
+}
+
+/// Returns the share of a part, in percent.
+fn percent(part: u64, all: u64) -> f64 {
+    part as f64 / all.max(1) as f64 * 100.0
+}
+
+fn mean(values: &[f64]) -> f64 {
+    values.iter().sum::<f64>() / values.len().max(1) as f64
+}
+
+/// Returns the median; 0 of none.
+fn median(values: &[f64]) -> f64 {
+    pbig_harness::runner::Spread::of(values.iter().copied()).median
+}

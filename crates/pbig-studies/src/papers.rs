@@ -1,0 +1,136 @@
+//! The experiments of PBIG's and Avril's papers, the printed numbers beside ours.
+//!
+//! *PBIG*: Lo, Lee, Chung, Chung, "Optimizing Pairwise Box Intersection Checking on GPUs for Large-Scale Simulations", ACM TOMACS
+//! 23(3), 2013; times on a Tesla C2070. *Avril*: Avril, Gouranton, Arnaldi, "Fast Collision Culling in Large-Scale Environments
+//! Using GPU Mapping Function", EGPGV 2012; times on a Quadro FX 3600M. The printed numbers are in `printed`, each with its place.
+
+mod avril;
+mod claims;
+mod figures;
+mod model;
+pub(crate) mod printed;
+mod roots;
+mod sides;
+mod table_iii;
+
+use pbig_core::{Config, Engine, Limits, Order};
+use pbig_harness::chart::Chart;
+use pbig_harness::prelude::*;
+use pbig_harness::table::text;
+use sides::Device;
+
+/// Unlimited and in no order, as the papers' programs.
+const UNSORTED: Config = Config { limits: Limits::UNLIMITED, order: Order::Unspecified, ..Config::DEFAULT };
+
+/// Our grid on the CPU, however few the boxes.
+const OUR_GRID: Config = Config { engine: Some(Engine::Rebuild), ..UNSORTED };
+
+/// The size of the experiments.
+struct Scale {
+    quick: bool,
+    /// Boxes of the experiment on readings of DoC.
+    experiment: &'static [usize],
+    /// Boxes where the papers have most.
+    most_boxes: usize,
+    /// Boxes of figures 8, 9 and 11 of PBIG.
+    numbers: &'static [usize],
+}
+
+impl Scale {
+    fn new(quick: bool) -> Self {
+        if quick {
+            Self { quick, experiment: &[10_000], most_boxes: 100_000, numbers: &[1000, 10_000, 100_000] }
+        } else {
+            let numbers = &[1000, 10_000, 100_000, 1_000_000, printed::MOST_BOXES];
+            Self { quick, experiment: &[100_000, 1_000_000], most_boxes: printed::MOST_BOXES, numbers }
+        }
+    }
+
+    /// Returns the boxes for a device: as many as a program that plays one searches in seconds.
+    fn on_device(&self, device: &Device) -> usize {
+        match (device.is_software(), self.quick) {
+            (_, true) => 2000,
+            (true, false) => 50_000,
+            (false, false) => 1_000_000,
+        }
+    }
+}
+
+type Part = fn(&Scale, &Device) -> Result<Vec<Table>, Failure>;
+
+const PARTS: [Part; 4] = [table_iii::tables, figures::tables, roots::tables, avril::tables];
+
+/// Makes all tables.
+///
+/// # Errors
+/// A failed check, if two ways to search find different pairs.
+pub fn run(quick: bool) -> Result<Report, Failure> {
+    let (scale, device) = (Scale::new(quick), Device::best(quick));
+    let mut tables = vec![];
+    for part in tracked(PARTS, "parts") {
+        tables.extend(part(&scale, &device)?);
+    }
+    tables.push(claims::table());
+    let head = vec![("adapter", device.name.clone()), ("software", device.is_software().to_string())];
+    Ok(Report { head, charts: charts(&tables), ..Report::new("papers", tables) })
+}
+
+/// Draws PBIG's figures 8 and 9 and Avril's figure 5.
+fn charts(tables: &[Table]) -> Vec<Chart> {
+    let table = |start: &str| tables.iter().find(|table| table.name.starts_with(start)).expect("made before");
+    let (uniform, cells, steps) = (table("PBIG figure 8"), table("PBIG figure 9"), table("Avril table 6"));
+    let of_uniform = [
+        ("pbig's grid, CPU", "ms, our grid, CPU"),
+        ("PBIG's grid, CPU, one thread", "ms, PBIG's grid, CPU, one thread"),
+        ("pbig, GPU", "ms, GPU"),
+    ];
+    let of_uniform = of_uniform.map(|(name, y)| uniform.line(name, ["boxes", y], |_| true)).into();
+    let mut sizes: Vec<String> = cells.column("boxes").map(text).collect();
+    sizes.dedup();
+    let of_size = |size: String| {
+        let columns = ["cell", "ms, PBIG's grid, CPU, one thread"];
+        let mut line = cells.line(&format!("{size} boxes"), columns, |row| text(&row[0]) == size);
+        line.points.sort_by(|a, b| a.0.total_cmp(&b.0));
+        line
+    };
+    let of_cells = sizes.into_iter().map(of_size).collect();
+    let of_steps = [("printed", "printed"), ("pbig, CPU", "ours, CPU"), ("pbig, GPU", "ours, GPU")];
+    let of_steps =
+        of_steps.map(|(name, side)| steps.line(name, ["objects", "whole, ms"], |row| row[1] == side));
+    let (titles, time) = (["PBIG figure 8: uniform boxes", "PBIG figure 9: size of cells"], "time, ms");
+    vec![
+        Chart::log("papers-uniform", titles[0], ["boxes", time], of_uniform),
+        Chart::log("papers-cells", titles[1], ["length of a cell", time], of_cells),
+        Chart::log("papers-steps", "Avril figure 5: a step, all moving", ["objects", time], of_steps.into()),
+    ]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The one run of all experiments in tests, at small sizes.
+    #[test]
+    fn every_table_is_there_and_counts_fit_what_is_expected() {
+        let report = run(true).expect("all ways agree");
+        let table = |name: &str| {
+            let found = report.tables.iter().find(|table| table.name.contains(name));
+            found.unwrap_or_else(|| panic!("no table {name}"))
+        };
+        assert_eq!(report.tables.len(), 24);
+        // A device's tables are empty without one.
+        assert!(report.tables.iter().all(|table| !table.rows.is_empty() || table.name.contains("GPU")));
+        for name in ["PBIG figure 8", "PBIG figure 11"] {
+            let off = table(name).numbers("off, standard deviations");
+            assert!(off.into_iter().map(f64::abs).fold(0.0, f64::max) < 5.0, "{name}");
+        }
+        // Plain pairs are eight bytes each, as written; and never less are fetched.
+        let switches = table("PBIG table IV: optimisations");
+        for row in &switches.rows {
+            let of = |column: &str| switches.number(row, column);
+            assert!(of("bytes fetched") >= of("bytes written"), "{row:?}");
+            let is_plain = of("bytes written") == of("pairs").map(|pairs| 8.0 * pairs);
+            assert!(text(&row[0]).contains('C') || is_plain, "{row:?}");
+        }
+    }
+}

@@ -1,0 +1,320 @@
+//! PBIG's table III and figure 10: what DoC, "degree of coverage", can mean; the cells of the paper's rule; and what was counted.
+//!
+//! Equation 11 is the sum of the volumes of all boxes over that of the space. By it `n` equal cubes, and boxes whose lengths are
+//! independent on each axis, have `4 n DoC` pairs: `n^2 / 2` times the chance `(2 e / L)^3`. The table has an eighth of that.
+
+use super::model::{Edges, Model, Place, Space};
+use super::printed::{Coverage, LENGTHS, MOST_BOXES, SPACE, TABLE_III, WARP};
+use super::sides::{Call, Device, Way, effort, on_gpu, once, race};
+use super::{Scale, UNSORTED};
+use pbig_core::pbig::Summary;
+use pbig_core::{Aabb, Coding, GpuOptions};
+use pbig_harness::pbig_grid::PbigPlan;
+use pbig_harness::prelude::*;
+
+pub(super) fn tables(scale: &Scale, device: &Device) -> Result<Vec<Table>, Failure> {
+    let calculated = [readings(), readings_counted(scale)?, rule()];
+    let counted = [counted(scale)?, on_device(scale, device)?, bytes(scale, device)?];
+    Ok(calculated.into_iter().chain(counted).collect())
+}
+
+/// One way to understand what the experiment draws: the law for `n` boxes at a DoC.
+type Reading = (&'static str, fn(usize, f64) -> Model);
+
+/// Returns the edge of `n` equal cubes in the paper's space that have this DoC by equation 11.
+fn edge(n: usize, doc: f64) -> f64 {
+    SPACE * (doc / n as f64).cbrt()
+}
+
+const fn centred(edges: Edges) -> Model {
+    Model { space: Space::Even(SPACE), place: Place::Centre, edges }
+}
+
+/// Returns the reading that fits: lower corners uniform in the space, lengths uniform from 0 to the edge by equation 11 rounded
+/// up to a whole number. So DoC counts each box as if it were as large as it may be.
+fn fitting(n: usize, doc: f64) -> Model {
+    Model { place: Place::LowerCorner, ..centred(Edges::boxes(0.0, edge(n, doc).ceil())) }
+}
+
+const READINGS: [Reading; 14] = [
+    ("equal cubes by equation 11", |n, doc| centred(Edges::equal(edge(n, doc)))),
+    ("lengths uniform from 0, mean by equation 11", |n, doc| centred(Edges::boxes(0.0, 2.0 * edge(n, doc)))),
+    ("lengths uniform from 1 (section 6.1), mean by equation 11", |n, doc| {
+        centred(Edges::boxes(1.0, 2.0 * edge(n, doc) - 1.0))
+    }),
+    // The mean of e^3 is a quarter of the largest.
+    ("cubes of random size from 0, volumes by equation 11", |n, doc| {
+        centred(Edges::cubes(0.0, 4f64.cbrt() * edge(n, doc)))
+    }),
+    ("lengths 1 to 100 (section 6.1), the space by equation 11", |n, doc| {
+        let mean = 0.5 * (LENGTHS[0] + LENGTHS[1]);
+        let space = Space::Even(mean * (n as f64 / doc).cbrt());
+        Model { space, ..centred(Edges::boxes(LENGTHS[0], LENGTHS[1])) }
+    }),
+    ("the edge by equation 11 is a half extent", |n, doc| centred(Edges::equal(2.0 * edge(n, doc)))),
+    ("equation 11 with half extents for lengths", |n, doc| centred(Edges::equal(0.5 * edge(n, doc)))),
+    ("equation 11 with half extents for lengths, rounded up", |n, doc| {
+        centred(Edges::equal(0.5 * edge(n, doc).ceil()))
+    }),
+    ("coordinates to both sides of 0: eight times the space", |n, doc| Model {
+        space: Space::Even(2.0 * SPACE),
+        ..centred(Edges::boxes(0.0, 2.0 * edge(n, doc)))
+    }),
+    ("lengths uniform from 1, the largest by equation 11", |n, doc| centred(Edges::boxes(1.0, edge(n, doc)))),
+    ("lengths uniform from 1, the largest by equation 11 rounded up", |n, doc| {
+        centred(Edges::boxes(1.0, edge(n, doc).ceil()))
+    }),
+    ("lengths uniform from 0, the largest by equation 11", |n, doc| centred(Edges::boxes(0.0, edge(n, doc)))),
+    ("lengths uniform from 0, the largest by equation 11 rounded up", |n, doc| {
+        centred(Edges::boxes(0.0, edge(n, doc).ceil()))
+    }),
+    (
+        "lower corners uniform instead of centres, lengths uniform from 0, the largest by equation 11 rounded up",
+        fitting,
+    ),
+];
+
+/// Returns by how many standard deviations the worst of the printed counts is off what a reading expects.
+fn furthest_off(model: fn(usize, f64) -> Model) -> f64 {
+    let off = TABLE_III.iter().map(|row| model(MOST_BOXES, row.doc).off(MOST_BOXES, row.pairs));
+    off.max_by(|a, b| a.abs().total_cmp(&b.abs())).unwrap_or(0.0)
+}
+
+/// Returns the expected pairs of every reading by calculation, the border of the space included.
+fn readings() -> Table {
+    let columns = "reading | pairs / (N DoC) at DoC 1 | DoC 0.001 | DoC 0.01 | DoC 0.1 | DoC 1 | DoC 10 | \
+        furthest off, standard deviations";
+    let mut table = Table::new("PBIG table III: what DoC can mean", columns);
+    let mut row = |name: &str, pairs: [f64; 5], off: Option<f64>| {
+        let counts = pairs.map(|pairs| Value::from(pairs.round() as u64));
+        table.row([cells![name, pairs[3] / MOST_BOXES as f64], counts.into(), cells![off]].concat());
+    };
+    row("printed", TABLE_III.each_ref().map(|row| row.pairs as f64), None);
+    for (name, model) in READINGS {
+        let pairs = TABLE_III.each_ref().map(|row| model(MOST_BOXES, row.doc).pairs(MOST_BOXES));
+        row(name, pairs, Some(furthest_off(model)));
+    }
+    table
+}
+
+/// Holds the calculation against counts: every reading at DoC 1 in the paper's space.
+fn readings_counted(scale: &Scale) -> Result<Table, Failure> {
+    let columns = "reading | boxes | expected pairs | counted pairs | off, standard deviations";
+    let mut table = Table::new("PBIG table III: the readings, counted", columns);
+    for (name, reading) in READINGS {
+        for &n in scale.experiment {
+            let model = reading(n, 1.0);
+            let count = once(Way::Finder(UNSORTED), &model.boxes(n, 1))?.pairs;
+            table.row(cells![name, n, model.pairs(n).round() as u64, count, model.off(n, count)]);
+        }
+    }
+    Ok(table)
+}
+
+/// Returns the number of cells along an axis of even boxes, of which the last may be cut off.
+fn along(length: f64, cell: f64) -> f64 {
+    (length / cell).ceil().max(1.0)
+}
+
+/// Returns the length of the space of a law whose boxes lie evenly; of another the width of four deviations.
+fn length(model: &Model) -> f64 {
+    match model.space {
+        Space::Even(length) => length,
+        Space::Normal([_, deviation]) => 4.0 * deviation,
+    }
+}
+
+/// Returns the expected checks of `n` even boxes placed by their lower corners: two boxes are tested in each cell that
+/// both touch. Axes are independent, so it is half of `n^2` times the third power of a sum over the cells of
+/// one axis: a box touches the first if its corner lies there, the others also if it reaches there from
+/// below, and what lies beyond the space counts as the last.
+pub(super) fn expected_checks(model: &Model, n: usize, cell: f64) -> f64 {
+    let (length, mean) = (length(model), model.edges.mean());
+    let touched = |i: f64| {
+        let own = (length - i * cell).min(cell);
+        let reach = if i > 0.0 { mean } else { 0.0 };
+        ((own + reach) / length).min(1.0)
+    };
+    let both: f64 = (0..along(length, cell) as u64).map(|i| touched(i as f64).powi(2)).sum();
+    let n = n as f64;
+    0.5 * n * (n - 1.0) * both.powi(3)
+}
+
+/// `alpha`: the cells that a box touches along an axis on average; and the number of cells along the space.
+type Alpha = (fn(&Edges, f64) -> f64, fn(f64, f64) -> f64);
+
+/// The cells that a box does touch, wherever it lies: one more than it has cell lengths.
+const TOUCHED: Alpha = (|edges, cell| 1.0 + edges.mean() / cell, |length, cell| length / cell);
+
+/// By equation 5: a box's length in cells, rounded up.
+const EQUATION_5: Alpha = (mean_of_ceilings, along);
+
+/// Returns the mean of `ceil(e / cell)` for lengths uniform between two.
+fn mean_of_ceilings(edges: &Edges, cell: f64) -> f64 {
+    let whole = |e: f64| {
+        let full = (e / cell).floor();
+        // The integral of the ceiling from 0 to e.
+        cell * full * (full + 1.0) / 2.0 + (e - full * cell) * (full + 1.0)
+    };
+    match edges.high - edges.low {
+        0.0 => (edges.low / cell).ceil(),
+        width => (whole(edges.high) - whole(edges.low)) / width,
+    }
+}
+
+/// Returns `f` of equation 2.
+fn objective((alpha, cells): Alpha, model: &Model, n: usize, cell: f64) -> f64 {
+    n as f64 * (alpha(&model.edges, cell) / cells(length(model), cell)).powi(3)
+}
+
+/// Returns equation 6 among the powers of two: the shortest cell with at least a warp of boxes.
+fn equation_6(alpha: Alpha, model: &Model, n: usize) -> Option<f64> {
+    (0..14).map(|k| f64::from(1 << k)).find(|&cell| objective(alpha, model, n, cell) >= WARP)
+}
+
+/// Returns options with which PBIG's grid has cells as close to `cell` as its rule can be made to give.
+pub(super) fn options_for(boxes: &[Aabb], cell: f64) -> GpuOptions {
+    let summary = Summary::of(boxes);
+    let with = |wanted: f64| GpuOptions { boxes_per_cell: wanted as f32, ..GpuOptions::DEFAULT };
+    let (mut low, mut high) = (1.0, boxes.len().max(2) as f64);
+    for _ in 0..40 {
+        let middle: f64 = (low * high).sqrt();
+        let given = f64::from(PbigPlan::new(&summary, &with(middle)).cell);
+        if given < cell { low = middle } else { high = middle }
+    }
+    with(high)
+}
+
+/// Returns the cell length of a row: as printed, or by the paper's rule where it is not.
+fn cell(row: &Coverage) -> f64 {
+    let by_rule = || equation_6(TOUCHED, &fitting(MOST_BOXES, row.doc), MOST_BOXES);
+    row.cell.or_else(by_rule).unwrap_or(1.0)
+}
+
+/// Returns cells of equation 6 among the powers of two, and their checks, n (n - 1) / 2 in each; also if the printed numbers
+/// were numbers of cells along an axis, not lengths.
+fn rule() -> Table {
+    let columns = "DoC | cell printed | cell by equation 6, cells touched | f | cell by equation 6, equation 5 | \
+        checks printed | checks expected | off, % | off if they are numbers of cells, %";
+    let mut table = Table::new("PBIG table III: cells and checks by calculation", columns);
+    for row in &TABLE_III {
+        let (model, cell) = (fitting(MOST_BOXES, row.doc), cell(row));
+        let expected = |cell: f64| expected_checks(&model, MOST_BOXES, cell);
+        let off = |cell: f64| 100.0 * (expected(cell) / row.checks as f64 - 1.0);
+        let by = |alpha| equation_6(alpha, &model, MOST_BOXES);
+        let rule = cells![by(TOUCHED), objective(TOUCHED, &model, MOST_BOXES, cell), by(EQUATION_5)];
+        let numbers = row.cell.map(|n| off(SPACE / n));
+        let checks = cells![row.checks, expected(cell).round() as u64, off(cell), numbers];
+        table.row([cells![row.doc, row.cell], rule, checks].concat());
+    }
+    table
+}
+
+/// The table itself, counted. Our grid makes none of the checks; PBIG's time is of one call that also allocates.
+fn counted(scale: &Scale) -> Result<Table, Failure> {
+    let columns = "DoC | pairs printed (N = 10^7) | pairs | off what is expected, standard deviations | \
+        checks printed (N = 10^7) | checks in such cells | of them unnecessary | of them redundant | ms printed | \
+        ms, our grid, CPU | ms, PBIG's grid, CPU, one thread";
+    let (n, mut table) = (scale.most_boxes, Table::new("PBIG table III and figure 10: density", columns));
+    let scale = (MOST_BOXES as f64 / n as f64).cbrt();
+    for row in &TABLE_III {
+        let model = fitting(n, row.doc);
+        let boxes = model.boxes(n, 1);
+        let pbig = once(Way::Pbig(options_for(&boxes, scale * cell(row))), &boxes)?;
+        let ours = &race(&[Way::Finder(UNSORTED)], None, boxes, 1.0, effort(n))?[0];
+        let pairs = ours.call.pairs;
+        let what = || format!("DoC {}: {pairs} pairs, by PBIG's grid {}", row.doc, pbig.pairs);
+        check(pairs == pbig.pairs, what)?;
+        let counts = cells![row.doc, row.pairs, pairs, model.off(n, pairs), row.checks, pbig.checks.made];
+        let rest = cells![pbig.checks.unnecessary, pbig.checks.redundant, "< 1000", ours.ms, pbig.ms];
+        table.row([counts, rest].concat());
+    }
+    Ok(table)
+}
+
+/// The same on a device, with cells as our plan has them and as the paper's `W` gives them.
+fn on_device(scale: &Scale, device: &Device) -> Result<Table, Failure> {
+    let n = if device.is_software() { scale.on_device(device) } else { scale.most_boxes };
+    let columns = "DoC | boxes | pairs | checks, our W | ms, our W | checks, the paper's W | ms, the paper's W | ms printed";
+    let mut table = Table::new("PBIG table III and figure 10: density, GPU", columns);
+    let at = |boxes_per_cell: f32| on_gpu(GpuOptions { boxes_per_cell, ..GpuOptions::DEFAULT });
+    let ways = [at(GpuOptions::DEFAULT.boxes_per_cell), at(WARP as f32)];
+    for row in &TABLE_III {
+        if let [ours, paper] = &device.run(&ways, &fitting(n, row.doc).boxes(n, 1), 1.0)?[..] {
+            let times = cells![ours.checks.made, ours.ms, paper.checks.made, paper.ms, "< 1000"];
+            table.row([cells![row.doc, n, ours.pairs], times].concat());
+        }
+    }
+    Ok(table)
+}
+
+/// Returns the bytes of the output, printed and ours: as a list, as records, and as records in the paper's cells by rows of
+/// segments.
+fn bytes(scale: &Scale, device: &Device) -> Result<Table, Failure> {
+    let columns = "DoC | pairs printed | output printed, MB | bytes a pair, MB = 2^20 | bytes a pair, MB = 10^6 | \
+        pairs, ours | bytes written a pair, ours: list | records | records, the paper's W, rows of segments | \
+        bytes fetched a pair, ours: records";
+    let (n, mut table) = (scale.on_device(device), Table::new("PBIG table III: bytes of output", columns));
+    let with = |coding| GpuOptions { coding, ..GpuOptions::DEFAULT };
+    let rows = GpuOptions { boxes_per_cell: WARP as f32, small_cell: 1, ..with(Coding::Packed) };
+    let ways = [with(Coding::Plain), with(Coding::Packed), rows].map(on_gpu);
+    for row in &TABLE_III {
+        let printed = |unit: f64| row.output * unit / row.pairs as f64;
+        let printed = cells![row.doc, row.pairs, row.output, printed(f64::from(1 << 20)), printed(1e6)];
+        let ours = match &device.run(&ways, &fitting(n, row.doc).boxes(n, 1), 1.0)?[..] {
+            [plain, packed, rows] => {
+                let a_pair = |bytes: Option<u64>| bytes.map(|bytes| bytes as f64 / plain.pairs as f64);
+                let [list, records, segments] =
+                    [plain, packed, rows].map(|call: &Call| a_pair(call.written()));
+                let fetched = a_pair(packed.fetched()).filter(|_| packed.pairs > 0);
+                cells![plain.pairs, list, records, segments, fetched]
+            }
+            _ => vec![Value::Null; 5],
+        };
+        table.row([printed, ours].concat());
+    }
+    Ok(table)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use pbig_core::oracle;
+
+    #[test]
+    fn readings_count_what_they_expect_and_the_printed_counts_fit_lower_corners_alone() {
+        for (name, reading) in &READINGS {
+            let model = reading(2000, 1.0);
+            let count = oracle::pairs(&model.boxes(2000, 3)).len() as u64;
+            assert!(model.off(2000, count).abs() < 5.0, "{name}: {count}, {}", model.pairs(2000));
+        }
+        let (others, fits) = READINGS.split_at(READINGS.len() - 2);
+        assert!(others.iter().all(|(_, reading)| furthest_off(*reading).abs() > 10.0));
+        assert!(furthest_off(fits[1].1).abs() < 1.0 && (1.0..3.0).contains(&furthest_off(fits[0].1).abs()));
+    }
+
+    #[test]
+    fn the_rule_gives_the_printed_cells_and_the_printed_checks() {
+        for row in &TABLE_III {
+            let by_rule = equation_6(TOUCHED, &fitting(MOST_BOXES, row.doc), MOST_BOXES);
+            assert!(row.cell.is_none() || by_rule == row.cell, "DoC {}: {by_rule:?}", row.doc);
+            let expected = expected_checks(&fitting(MOST_BOXES, row.doc), MOST_BOXES, cell(row));
+            assert!((expected / row.checks as f64 - 1.0).abs() < 0.01, "DoC {}: {expected}", row.doc);
+        }
+        // Lengths 0 to 10 in cells of 4: 1, 2 and 3 cells for 4, 4 and 2 of 10.
+        assert!((mean_of_ceilings(&Edges::boxes(0.0, 10.0), 4.0) - 1.8).abs() < 1e-12);
+    }
+
+    #[test]
+    fn the_expected_checks_are_those_of_the_grid_in_cells_of_the_wanted_length() {
+        let model = Model { space: Space::Even(100.0), ..fitting(1000, 1.0) };
+        let model = Model { edges: Edges::boxes(0.0, 10.0), ..model };
+        let boxes = model.boxes(20_000, 1);
+        let call = once(Way::Pbig(options_for(&boxes, 10.0)), &boxes).expect("found");
+        let given = f64::from(call.cell.expect("a cell"));
+        assert!((given / 10.0 - 1.0).abs() < 0.06, "{given}");
+        // The grid's border lies where the boxes end, not where the space does.
+        let expected = expected_checks(&model, 20_000, given);
+        assert!((call.checks.made as f64 / expected - 1.0).abs() < 0.1, "{} of {expected}", call.checks.made);
+    }
+}

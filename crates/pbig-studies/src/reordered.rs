@@ -1,0 +1,98 @@
+//! Broad phases that report what another one finds, with its events in another order. Rapier solves contacts in an order that
+//! comes from the order of events, so a run with such a broad phase differs from one with the broad phase inside by order alone.
+
+use rapier3d::prelude::*;
+
+/// A broad phase, and what is done to the events of each update.
+pub(crate) struct Reordered<B>(pub(crate) B, pub(crate) fn(&mut [BroadPhasePairEvent]));
+
+impl<B: BroadPhase> BroadPhase for Reordered<B> {
+    fn update(
+        &mut self,
+        params: &IntegrationParameters,
+        colliders: &ColliderSet,
+        bodies: &RigidBodySet,
+        modified: &[ColliderHandle],
+        removed: &[ColliderHandle],
+        events: &mut Vec<BroadPhasePairEvent>,
+    ) {
+        let before = events.len();
+        self.0.update(params, colliders, bodies, modified, removed, events);
+        self.1(&mut events[before..]);
+    }
+}
+
+/// Sorts events as pbig does: ends before additions, each by the lower and then the higher index of its colliders.
+pub(crate) fn sorted(events: &mut [BroadPhasePairEvent]) {
+    events.sort_by_key(|event| {
+        let (is_added, [a, b]) = plain(event);
+        (is_added, a.min(b), a.max(b))
+    });
+}
+
+/// Names the collider with the lower index first in each pair, as rapier's own broad phase does.
+pub(crate) fn lower_first(events: &mut [BroadPhasePairEvent]) {
+    for event in events {
+        let (BroadPhasePairEvent::AddPair(pair) | BroadPhasePairEvent::DeletePair(pair)) = event;
+        if pair.collider2.into_raw_parts() < pair.collider1.into_raw_parts() {
+            *pair = pair.swap();
+        }
+    }
+}
+
+/// Returns true for an addition, and the indices of the colliders.
+fn plain(event: &BroadPhasePairEvent) -> (bool, [u32; 2]) {
+    let (BroadPhasePairEvent::AddPair(pair) | BroadPhasePairEvent::DeletePair(pair)) = event;
+    let indices = [pair.collider1, pair.collider2].map(|handle| handle.into_raw_parts().0);
+    (matches!(event, BroadPhasePairEvent::AddPair(_)), indices)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use pbig_harness::boxes::{BoxSet, Movers};
+    use pbig_harness::field::Field;
+    use rapier_pbig::PbigBroadPhase;
+
+    /// Returns the events of some updates.
+    fn told(mut broad_phase: impl BroadPhase) -> Vec<Vec<BroadPhasePairEvent>> {
+        let mut field = Field::new(&BoxSet::named("unit").expect("a set").boxes(200, 1));
+        let movers = Movers::new(200, 0.3);
+        let mut modified = field.colliders.clone();
+        let mut update = |round: usize| {
+            let mut events = vec![];
+            field.call(&mut broad_phase, &modified, &mut events);
+            modified = field.shift(&movers.of(round), 0.7);
+            events
+        };
+        (0..9).map(&mut update).collect()
+    }
+
+    #[test]
+    fn stock_sorted_tells_what_stock_tells_in_the_order_of_pbig() {
+        let key = |event: &BroadPhasePairEvent| {
+            let (is_added, [a, b]) = plain(event);
+            (is_added, a.min(b), a.max(b))
+        };
+        let stock = told(DefaultBroadPhase::new());
+        let sorted = told(Reordered(DefaultBroadPhase::new(), sorted));
+        let is_sorted =
+            |all: &[Vec<BroadPhasePairEvent>]| all.iter().all(|events| events.is_sorted_by_key(key));
+        assert!(!is_sorted(&stock) && is_sorted(&sorted) && is_sorted(&told(PbigBroadPhase::new())));
+        for (stock, sorted) in stock.iter().zip(&sorted) {
+            let plain = |events: &[BroadPhasePairEvent]| {
+                let mut all: Vec<_> = events.iter().map(plain).collect();
+                all.sort_unstable();
+                all
+            };
+            assert_eq!(plain(stock), plain(sorted), "no event is lost or turned");
+        }
+    }
+
+    #[test]
+    fn the_lower_collider_comes_first() {
+        let mut all = told(Reordered(PbigBroadPhase::new(), lower_first)).into_iter().flatten();
+        assert!(all.all(|event| plain(&event).1.is_sorted()));
+        assert!(told(PbigBroadPhase::new()).iter().flatten().any(|event| !plain(event).1.is_sorted()));
+    }
+}

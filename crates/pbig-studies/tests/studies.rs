@@ -1,0 +1,110 @@
+//! Each study once, at small sizes: what must be right is, whatever the times.
+
+use pbig_harness::motions::Motion;
+use pbig_harness::prelude::*;
+use pbig_harness::scenes::Scene;
+use pbig_studies::accuracy::STUDIES;
+use pbig_studies::{peers, stages, steady};
+
+fn made(name: &str) -> Report {
+    let (_, study) = STUDIES.into_iter().find(|(study, _)| *study == name).expect("a study");
+    let report = study(true).expect("no failure");
+    assert_eq!((report.suite.as_str(), report.charts.len()), (format!("accuracy-{name}").as_str(), 1));
+    let lines = report.charts[0].plots.iter().flat_map(|plot| &plot.lines);
+    let points: Vec<_> = lines.flat_map(|line| &line.points).collect();
+    let are_drawn = points.iter().all(|(time, error)| *time > 0.0 && *error >= 0.0);
+    assert!(!points.is_empty() && are_drawn, "{points:?}");
+    assert!(report.tables.iter().all(|table| !table.rows.is_empty()));
+    report
+}
+
+fn table<'a>(report: &'a Report, name: &str) -> &'a Table {
+    report.tables.iter().find(|table| table.name == name).unwrap_or_else(|| panic!("no table {name}"))
+}
+
+/// Returns a number of each row that has a label.
+fn numbers(table: &Table, label: &str, column: &str) -> Vec<f64> {
+    let rows = table.rows.iter().filter(|row| row.contains(&label.into()));
+    rows.filter_map(|row| table.number(row, column)).collect()
+}
+
+fn all_zero(numbers: &[f64]) -> bool {
+    !numbers.is_empty() && numbers.iter().all(|number| *number == 0.0)
+}
+
+#[test]
+fn index_integers_are_right_and_every_error_is_counted() {
+    let report = made("index");
+    let all = table(&report, "all_pairs");
+    assert!(all_zero(&numbers(all, "integers", "wrong")) && all_zero(&numbers(all, "lazy way", "wrong")));
+    assert!(numbers(all, "Carmack 1", "wrong")[1] > 0.0, "one step is more than the rules mend");
+    for constant in ["Carmack", "Lomont"] {
+        let table = table(&report, "table_3");
+        let [paper, ours] =
+            ["paper_percent", "ours_steps_in_f64_percent"].map(|c| numbers(table, constant, c));
+        assert!((paper[0] - ours[0]).abs() < 1e-4, "two steps in f64 give the paper's figures");
+    }
+}
+
+#[test]
+fn coordinates_margin_and_simulation_miss_nothing() {
+    let coordinates = made("coordinates");
+    let tests = table(&coordinates, "tests");
+    assert!(all_zero(&tests.numbers("missed")) && all_zero(&numbers(tests, "f32", "spurious_percent")));
+    let margin = made("margin");
+    let margins = table(&margin, "margins");
+    assert!(all_zero(&margins.numbers("missed")));
+    let (extra, changed) = (margins.numbers("extra_percent"), margins.numbers("changed_percent"));
+    for (extra, changed) in extra.chunks(8).zip(changed.chunks(8)) {
+        assert!(extra[0] == 0.0 && extra[7] > 0.0 && changed[7] < changed[0], "{extra:?} {changed:?}");
+    }
+    let simulation = made("simulation");
+    let runs = table(&simulation, "runs");
+    assert!(all_zero(&numbers(runs, "pbig", "missed")) && all_zero(&numbers(runs, "stock", "mean_distance")));
+    assert!(runs.numbers("energy_at_the_end_percent").iter().all(|percent| *percent < 101.0));
+    assert!(runs.numbers("momentum_drift_percent").iter().all(|drift| *drift < 1e-2));
+}
+
+#[test]
+fn wide_boxes_miss_pairs_without_ulps_and_none_with_two() {
+    let report = made("wide");
+    let missed = |boxes| numbers(table(&report, "ways"), boxes, "missed_at_the_poses");
+    assert!(!all_zero(&missed("rapier's boxes")) && all_zero(&missed("widened by 2 ulps")));
+}
+
+#[test]
+fn peers_agree_on_the_pairs() {
+    let report = peers::run(true).expect("all agree");
+    let has = |column: &str, word: &str| {
+        report.tables[0].column(column).any(|name| name.as_str().is_some_and(|name| name.contains(word)))
+    };
+    for word in ["one thread", "all threads", "changed pairs", "refit_partial", "rebuilt", "obvhs"] {
+        assert!(has("other", word), "{word}");
+    }
+    assert!(has("case", "per box and pair"));
+    assert!(report.tables[0].numbers("pairs").iter().all(|pairs| *pairs > 0.0));
+}
+
+#[test]
+fn steady_has_every_motion_and_every_scene() {
+    let report = steady::run(true, &[60]).expect("all agree");
+    let table = &report.tables[0];
+    // Ours on all threads and on one, the finder and parry; ours and stock.
+    assert_eq!(table.rows.len(), 4 * (2 * Motion::ALL.len() + 2) + 2 * Scene::ALL.len());
+    let [median, p99, worst] = ["median_ms", "p99_ms", "worst_ms"].map(|column| table.numbers(column));
+    assert!((0..median.len()).all(|k| median[k] <= p99[k] && p99[k] <= worst[k]));
+}
+
+#[test]
+fn stages_add_up_to_at_most_the_whole() {
+    let report = stages::run(true).expect("no failure");
+    for table in &report.tables {
+        assert!(table.rows.len() > 10, "{}", table.name);
+        for row in &table.rows {
+            let number = |k: usize| row[k].as_f64().unwrap_or(0.0);
+            // Of events all are means; medians of parts need not add up to the median of the whole.
+            let parts: f64 = (5..11).map(number).sum();
+            assert!(parts > 0.0 && (table.name != "events" || parts <= number(4) * 1.001), "{row:?}");
+        }
+    }
+}

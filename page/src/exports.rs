@@ -1,0 +1,194 @@
+//! The functions that JavaScript calls.
+
+use crate::broad_phase::Choice;
+use crate::groups::Groups;
+use crate::parts::Kind;
+use crate::run::{Run, StepTime};
+use pbig_scenes::scenes::Scene;
+use std::sync::{Mutex, PoisonError};
+use wasm_bindgen::prelude::*;
+
+static PANIC: Mutex<String> = Mutex::new(String::new());
+
+/// Keeps the message of a panic for [`panic_message`]: a panic ends the module in a trap without words.
+#[wasm_bindgen(start)]
+pub fn keep_panics() {
+    std::panic::set_hook(Box::new(|panic| {
+        *PANIC.lock().unwrap_or_else(PoisonError::into_inner) = panic.to_string();
+    }));
+}
+
+/// Returns the message of the panic that ended the module; empty without one.
+#[wasm_bindgen]
+pub fn panic_message() -> String {
+    PANIC.lock().unwrap_or_else(PoisonError::into_inner).clone()
+}
+
+/// A scene that can be chosen.
+#[wasm_bindgen(getter_with_clone)]
+pub struct SceneInfo {
+    /// Name in [`Simulation::new`].
+    pub name: String,
+    /// Description in a few words.
+    pub about: String,
+    /// Property that makes it hard for a broad phase.
+    pub hard: String,
+}
+
+/// Returns every scene.
+#[wasm_bindgen]
+pub fn scenes() -> Vec<SceneInfo> {
+    let info = |scene: &Scene| SceneInfo {
+        name: scene.name.into(),
+        about: scene.about.into(),
+        hard: scene.hard.into(),
+    };
+    Scene::ALL.iter().map(info).collect()
+}
+
+/// Triangles of a shape that is drawn as a mesh.
+#[wasm_bindgen(getter_with_clone)]
+pub struct MeshData {
+    /// Three coordinates of each vertex.
+    pub coordinates: Vec<f32>,
+    /// Three vertices of each triangle.
+    pub indices: Vec<u32>,
+}
+
+/// Parts that one instanced call draws.
+#[wasm_bindgen(getter_with_clone)]
+pub struct GroupData {
+    /// `ball`, `cuboid`, `cylinder`, `cone`, `half-space` or `mesh`.
+    pub kind: String,
+    /// Number of the mesh, if the kind is `mesh`.
+    pub mesh: Option<u32>,
+    /// True for parts that are drawn translucent.
+    pub is_translucent: bool,
+    /// Number of parts.
+    pub count: u32,
+}
+
+/// A running scene.
+#[wasm_bindgen]
+pub struct Simulation {
+    run: Run,
+    groups: Groups,
+    time: StepTime,
+}
+
+#[wasm_bindgen]
+impl Simulation {
+    /// Builds a scene with about this many bodies. The broad phase is `stock` or `pbig`.
+    ///
+    /// # Errors
+    /// A text that lists the right names if one is wrong.
+    #[wasm_bindgen(constructor)]
+    pub fn new(scene: &str, bodies: u32, seed: u32, broad_phase: &str) -> Result<Self, JsError> {
+        let choice: Choice = broad_phase.parse().map_err(to_js)?;
+        let run = Run::new(scene, bodies as usize, seed.into(), choice).map_err(to_js)?;
+        let groups = Groups::new(&run.world.bodies, &run.world.colliders);
+        Ok(Self { run, groups, time: StepTime::default() })
+    }
+
+    /// Advances the world by 1/60 s. Returns true if colliders were added or removed, so that the groups are new.
+    ///
+    /// # Errors
+    /// The text of pbig's error.
+    pub fn step(&mut self) -> Result<bool, JsError> {
+        self.time = self.run.step().map_err(to_js)?;
+        let is_outdated = self.groups.is_outdated(&self.run.world.colliders);
+        if is_outdated {
+            self.groups = Groups::new(&self.run.world.bodies, &self.run.world.colliders);
+        }
+        Ok(is_outdated)
+    }
+
+    /// Changes the broad phase to `stock` or `pbig` while the world runs.
+    ///
+    /// # Errors
+    /// A text that lists the right names.
+    pub fn change_broad_phase(&mut self, broad_phase: &str) -> Result<(), JsError> {
+        self.run.change_broad_phase(broad_phase.parse().map_err(to_js)?);
+        Ok(())
+    }
+
+    /// Returns the milliseconds of the broad phase in the last step.
+    pub fn broad_phase_ms(&self) -> f64 {
+        self.time.broad_phase_ms
+    }
+
+    /// Returns the milliseconds of the last step, the broad phase included.
+    pub fn step_ms(&self) -> f64 {
+        self.time.step_ms
+    }
+
+    /// Returns the number of steps so far.
+    pub fn steps(&self) -> u32 {
+        self.run.steps()
+    }
+
+    /// Returns the number of pairs that the broad phase reported.
+    pub fn pair_count(&self) -> u32 {
+        self.run.pair_count() as u32
+    }
+
+    /// Returns the number of rigid bodies.
+    pub fn body_count(&self) -> u32 {
+        self.run.world.bodies.len() as u32
+    }
+
+    /// Returns pbig's algorithm and the reason for it; empty with rapier's own broad phase.
+    pub fn plan(&self) -> String {
+        self.run.plan()
+    }
+
+    /// Returns the indices of the colliders of each pair, one pair after another, sorted.
+    pub fn pairs(&self) -> Vec<u32> {
+        self.run.pairs().into_flattened()
+    }
+
+    /// Returns the centre and the half extents of a box around the bodies that can move: six coordinates.
+    pub fn moving_box(&self) -> Vec<f32> {
+        self.run.moving_box().to_vec()
+    }
+
+    /// Returns the groups of parts.
+    pub fn groups(&self) -> Vec<GroupData> {
+        self.groups.groups.iter().map(group_data).collect()
+    }
+
+    /// Returns the meshes that groups name by number.
+    pub fn meshes(&self) -> Vec<MeshData> {
+        let copied = |mesh: &crate::mesh::Mesh| MeshData {
+            coordinates: mesh.coordinates.clone(),
+            indices: mesh.indices.clone(),
+        };
+        self.groups.meshes.iter().map(copied).collect()
+    }
+
+    /// Returns the colour class of each part, group by group.
+    pub fn colours(&self) -> Vec<u8> {
+        self.groups.colours()
+    }
+
+    /// Returns a matrix of 16 floats for each part, group by group, column by column.
+    pub fn matrices(&self) -> Vec<f32> {
+        self.groups.matrices(&self.run.world.colliders)
+    }
+}
+
+fn group_data(group: &crate::Group) -> GroupData {
+    let (kind, mesh) = match group.kind {
+        Kind::Ball => ("ball", None),
+        Kind::Cuboid => ("cuboid", None),
+        Kind::Cylinder => ("cylinder", None),
+        Kind::Cone => ("cone", None),
+        Kind::HalfSpace => ("half-space", None),
+        Kind::Mesh(number) => ("mesh", Some(number)),
+    };
+    GroupData { kind: kind.into(), mesh, is_translucent: group.is_translucent, count: group.count }
+}
+
+fn to_js(message: String) -> JsError {
+    JsError::new(&message)
+}

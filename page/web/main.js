@@ -1,0 +1,180 @@
+// Connects panel, simulation and stage.
+
+import { hideMessage, showMessage } from "./message.js";
+import { Pace, STEP_MS } from "./pace.js";
+import { Panel } from "./panel.js";
+import { findMissing } from "./requirements.js";
+import { formatSettings, parseSettings } from "./settings.js";
+import { Simulation } from "./simulation.js";
+import { Stage } from "./stage.js";
+import { Times } from "./times.js";
+
+const NARROW_SCREEN = "(max-width: 760px)";
+// Where drawing is slow, steps go on between the frames.
+const SLOW_FRAME_MS = 2 * STEP_MS;
+const TIMER_MS = STEP_MS / 2;
+const CONTEXT_LOST = new Error("The browser took the graphics context away. Reload the page.");
+
+class Page {
+    #settings;
+    #simulation;
+    #stage;
+    #panel;
+    #times = new Times();
+    #pace = new Pace();
+    #isPaused = false;
+    // True between a failure and the next reset.
+    #hasFailed = false;
+    // Each task waits for the one before it.
+    #tasks = Promise.resolve();
+    #isStepping = false;
+    #lastFrame = 0;
+
+    async start() {
+        const missing = await findMissing();
+        if (missing) return showMessage(`This browser has no ${missing.name}`, `The page needs it. ${missing.advice}`);
+        try {
+            this.#settings = parseSettings(location.search, matchMedia(NARROW_SCREEN).matches);
+            this.#stage = new Stage(document.getElementById("canvas"), () => this.#fail(CONTEXT_LOST));
+        } catch (error) {
+            return showMessage("The page could not start", error.message);
+        }
+        this.#panel = new Panel(this.#actions());
+        this.#panel.showClock(clockResolution());
+        this.#build();
+        requestAnimationFrame((now) => this.#frame(now));
+        setInterval(() => this.#stepBetweenFrames(performance.now()), TIMER_MS);
+    }
+
+    /** Returns the pairs of a scene after each step, from a worker of its own. */
+    async pairs(settings, steps) {
+        const simulation = new Simulation();
+        await simulation.load();
+        const pairs = await simulation.pairs(settings, steps);
+        simulation.end();
+        return pairs.map((step) => Array.from(step));
+    }
+
+    #actions() {
+        return {
+            change: (changed) => this.#change(changed),
+            changeBroadPhase: (name) => this.#changeBroadPhase(name),
+            pause: () => this.#pause(!this.#isPaused),
+            step: () => this.#stepOnce(),
+            reset: () => this.#build(),
+        };
+    }
+
+    #change(changed) {
+        this.#settings = { ...this.#settings, ...changed };
+        this.#build();
+    }
+
+    #changeBroadPhase(broadPhase) {
+        this.#settings = { ...this.#settings, broadPhase };
+        this.#showSettings();
+        this.#do(() => this.#simulation.changeBroadPhase(broadPhase));
+    }
+
+    #pause(isPaused) {
+        this.#isPaused = isPaused;
+        this.#panel.showPaused(isPaused);
+        this.#panel.showTimes(this.#times);
+    }
+
+    #stepOnce() {
+        this.#pause(true);
+        this.#do(() => this.#step());
+    }
+
+    #showSettings() {
+        this.#panel.showSettings(this.#settings);
+        history.replaceState(null, "", formatSettings(this.#settings));
+    }
+
+    #build() {
+        if (this.#hasFailed) this.#dropSimulation();
+        showMessage("Loading…");
+        this.#do(async () => {
+            this.#simulation ??= await this.#load();
+            this.#times = new Times();
+            const frame = await this.#simulation.build(this.#settings);
+            this.#showSettings();
+            this.#show(frame);
+            this.#stage.lookAt(frame.scenery.movingBox);
+            hideMessage();
+        });
+    }
+
+    // A module that trapped cannot be used again.
+    #dropSimulation() {
+        this.#simulation?.end();
+        this.#simulation = undefined;
+        this.#hasFailed = false;
+    }
+
+    async #load() {
+        const simulation = new Simulation();
+        try {
+            this.#panel.fill(await simulation.load(), this.#settings);
+        } catch (error) {
+            simulation.end();
+            throw error;
+        }
+        return simulation;
+    }
+
+    async #step() {
+        const frame = await this.#simulation.step();
+        this.#times.add(frame);
+        this.#show(frame);
+    }
+
+    #show(frame) {
+        if (frame.scenery) this.#stage.setScenery(frame.scenery);
+        this.#stage.setMatrices(frame.matrices);
+        this.#panel.showFrame(frame, this.#times, this.#isPaused);
+    }
+
+    // Runs a task after those before it. None runs after a failure.
+    #do(task) {
+        this.#tasks = this.#tasks.then(() => this.#hasFailed || task()).catch((error) => this.#fail(error));
+        return this.#tasks;
+    }
+
+    #frame(now) {
+        this.#lastFrame = now;
+        this.#stepIfDue(now);
+        this.#stage.draw(now);
+        requestAnimationFrame((next) => this.#frame(next));
+    }
+
+    #stepBetweenFrames(now) {
+        const isSlow = now - this.#lastFrame > SLOW_FRAME_MS;
+        if (isSlow && !document.hidden) this.#stepIfDue(now);
+    }
+
+    #stepIfDue(now) {
+        if (this.#isPaused || this.#isStepping || this.#hasFailed || !this.#pace.takeStep(now)) return;
+        this.#isStepping = true;
+        this.#do(() => this.#step()).then(() => (this.#isStepping = false));
+    }
+
+    #fail(error) {
+        this.#hasFailed = true;
+        showMessage("The simulation stopped", error.message);
+    }
+}
+
+/** Returns the smallest difference of two times of the clock, in milliseconds. */
+function clockResolution() {
+    const start = performance.now();
+    let now = start;
+    while (now === start) now = performance.now();
+    return now - start;
+}
+
+const page = new Page();
+// For tests: the pairs of any scene, step by step.
+window.pbigPage = { pairs: (settings, steps) => page.pairs(settings, steps) };
+page.start();

@@ -1,0 +1,91 @@
+#!/usr/bin/env bash
+# Builds the web page of falling objects into a folder of static files, which any file server serves:
+#   scripts/page.sh [--no-setup] [--test] [FOLDER]     FOLDER: out/page
+#   python3 -m http.server -d out/page
+# It calls setup.sh first, unless told not to. --test also runs the tests of the page, those in headless Chromium included;
+# their screenshots go to out/page-shots. From clean it takes some minutes, most of them for Rust.
+set -euo pipefail
+cd "$(dirname "$0")/.."
+setup=true test=false out=out/page
+for argument in "$@"; do
+    case $argument in
+    --no-setup) setup=false ;;
+    --test) test=true ;;
+    -*) echo "there is no option '$argument'; the options: --no-setup --test" >&2 && exit 2 ;;
+    *) out=$argument ;;
+    esac
+done
+! $setup || scripts/setup.sh rust wasm page || true
+. scripts/common.sh
+target=wasm32-unknown-unknown
+manifest=page/Cargo.toml
+tools=page/node_modules/.bin
+# The workspace's own folder for what it builds, as an absolute path.
+built=$(cargo metadata --no-deps --format-version 1 --manifest-path "$manifest" | sed 's/.*"target_directory":"\([^"]*\)".*/\1/')
+
+# build_module FOLDER [OPTION...]: rapier and pbig as a WebAssembly module, and the JavaScript beside it. The module has SIMD,
+# and no unwinding. The program that writes the JavaScript is small: optimizing it would take longer than it runs.
+build_module() {
+    local folder=$1
+    shift
+    RUSTFLAGS="-C target-feature=+simd128" CARGO_PROFILE_RELEASE_PANIC=abort step "${cargo[@]}" build --locked --release \
+        --lib --manifest-path "$manifest" --target "$target" --target-dir "$built/wasm" "$@"
+    step cargo run --quiet --locked --manifest-path "$manifest" --package pbig-page-bindgen -- \
+        "$built/wasm/$target/release/pbig_page.wasm" "$folder"
+}
+
+# build_native [OPTION...]: the native program whose pairs are compared with the module's.
+build_native() {
+    step cargo build --quiet --locked --release --manifest-path "$manifest" --package pbig-page --bin native_pairs "$@"
+}
+
+install_tools() {
+    [ page/node_modules/.package-lock.json -nt page/package-lock.json ] ||
+        (cd page && step npm ci --no-audit --no-fund --ignore-scripts)
+}
+
+# bundle: everything that a browser loads, and the licences of what it contains.
+bundle() {
+    rm -rf "$out"
+    mkdir -p "$out/licences"
+    step "$tools/esbuild" page/web/main.js page/web/worker.js page/web/style.css --bundle --minify --format=esm \
+        --target=es2022 --log-level=warning --alias:pbig-page-module="$built/bindings/pbig_page.js" --outdir="$out"
+    cp page/web/index.html page/web/start.js "$built/bindings/pbig_page_bg.wasm" "$out"
+    cp LICENSE-MIT LICENSE-APACHE "$out/licences"
+    for package in three uplot wasm-feature-detect; do
+        cp "page/node_modules/$package/LICENSE" "$out/licences/$package.txt"
+    done
+}
+
+# build_deterministic: module and native program with mathematics that are the same on both sides.
+build_deterministic() {
+    local options="--no-default-features --features deterministic" folder=$built/deterministic
+    build_module "$folder" $options
+    build_native $options
+    cp "$built/release/native_pairs" "$folder"
+    mv "$folder/pbig_page.js" "$folder/pbig_page.mjs"
+}
+
+# test_page: the logic natively and in node, then the page in a browser, one test file after another.
+test_page() {
+    step cargo test --quiet --locked --release --manifest-path "$manifest" --package pbig-page
+    build_deterministic
+    build_native
+    PAGE_FOLDER=$(cd "$out" && pwd) NATIVE_PAIRS=$built/release/native_pairs DETERMINISTIC=$built/deterministic \
+        SHOTS=$PWD/out/page-shots step node --test --test-reporter=spec --test-concurrency=1 page/tests/*.test.mjs
+}
+
+choose_cargo "$target" && has npm || { left_out "$target or npm" && exit 0; }
+if $builds_std; then
+    export CARGO_TARGET_WASM32_UNKNOWN_UNKNOWN_LINKER
+    CARGO_TARGET_WASM32_UNKNOWN_UNKNOWN_LINKER=$(wasm_linker)
+fi
+build_module "$built/bindings"
+install_tools
+bundle
+echo "== the page is in $out; serve it with: python3 -m http.server -d $out"
+if $test; then
+    has chromium || { left_out "the page's tests: there is no Chromium" && exit 0; }
+    test_page
+    echo "== page: all passed"
+fi
