@@ -170,6 +170,11 @@ pub fn pose(at: Vec3) -> Isometry<Real> {
     Isometry::translation(at.x, at.y, at.z)
 }
 
+/// Returns the body at a place and with a rotation.
+pub fn turned_body(body: RigidBodyBuilder, at: Vec3, turn: Quat) -> RigidBodyBuilder {
+    body.position(turned(at, turn))
+}
+
 /// Returns a pose with a rotation, bit by bit. The builders' own `rotation` takes an angle, of which rapier computes the
 /// sine and the cosine as the platform does.
 pub fn turned(at: Vec3, turn: Quat) -> Isometry<Real> {

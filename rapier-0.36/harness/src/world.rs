@@ -181,6 +181,11 @@ pub fn pose(at: Vec3) -> Pose {
     Pose::from_translation(to_vector(at))
 }
 
+/// Returns the body at a place and with a rotation.
+pub fn turned_body(body: RigidBodyBuilder, at: Vec3, turn: Quat) -> RigidBodyBuilder {
+    body.pose(turned(at, turn))
+}
+
 /// Returns a pose with a rotation, bit by bit. The builders' own `rotation` takes an angle, of which rapier computes the
 /// sine and the cosine as the platform does.
 pub fn turned(at: Vec3, turn: Quat) -> Pose {

@@ -3,7 +3,7 @@
 //! Each run is named by its seed. `PBIG_RUNS=20000` plays more runs (about 10^6 operations).
 
 use glam::Vec3;
-use pbig_harness_036::world::{World, groups_that_meet, to_vector, turned};
+use pbig_harness_036::world::{World, groups_that_meet, to_vector, turned_body};
 use rand::rngs::StdRng;
 use rand::{RngExt, SeedableRng};
 use rapier_pbig::shadow::{Shadow, Shadowed};
@@ -184,7 +184,7 @@ impl Player {
         let speed = if self.rng.random_range(0..4) == 0 { fast } else { Vec3::ZERO };
         let soft_ccd = if self.rng.random_range(0..6) == 0 { 0.5 } else { 0.0 };
         let turn = glam::Quat::from_rotation_z(self.rng.random_range(-3.0..3.0));
-        let body = body.position(turned(at, turn)).linvel(to_vector(speed));
+        let body = turned_body(body, at, turn).linvel(to_vector(speed));
         body.soft_ccd_prediction(soft_ccd).ccd_enabled(self.rng.random_range(0..3) == 0)
     }
 

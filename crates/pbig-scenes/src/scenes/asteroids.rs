@@ -1,7 +1,7 @@
 //! An asteroid field: no gravity, bodies of very different sizes, all in motion.
 
 use super::builder::{Builder, side_of_square};
-use crate::world::{to_vector, turned};
+use crate::world::{to_vector, turned_body};
 use glam::Vec3;
 use rapier3d::prelude::*;
 
@@ -82,6 +82,6 @@ fn asteroid(b: &mut Builder, cube: Vec3, half: f32) -> RigidBodyHandle {
     let around = Vec3::Y.cross(cube) * CIRCLING;
     let velocity = around + b.random_vec(Vec3::splat(2.0));
     let (turn, spin) = (b.random_turn(), b.random_vec(Vec3::splat(0.7)));
-    let body = RigidBodyBuilder::dynamic().position(turned(cube, turn)).linvel(to_vector(velocity));
+    let body = turned_body(RigidBodyBuilder::dynamic(), cube, turn).linvel(to_vector(velocity));
     b.world.add(body.angvel(to_vector(spin)), shape.restitution(0.6))
 }

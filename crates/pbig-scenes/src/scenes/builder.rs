@@ -1,6 +1,6 @@
 //! A world under construction.
 
-use crate::world::{World, to_vector, turned};
+use crate::world::{World, to_vector, turned, turned_body};
 use glam::{EulerRot, Quat, Vec2, Vec3};
 use rand::RngExt;
 use rand::rngs::StdRng;
@@ -42,8 +42,8 @@ impl Builder {
 
     /// Adds a dynamic body with a random rotation.
     pub(super) fn falling(&mut self, at: Vec3, collider: ColliderBuilder) -> RigidBodyHandle {
-        let pose = turned(at, self.random_turn());
-        self.world.add(RigidBodyBuilder::dynamic().position(pose), collider)
+        let body = turned_body(RigidBodyBuilder::dynamic(), at, self.random_turn());
+        self.world.add(body, collider)
     }
 
     /// Adds a collider without a body.

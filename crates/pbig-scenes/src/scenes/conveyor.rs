@@ -1,7 +1,7 @@
 //! Ring conveyors: rollers carry crates around, through gates, which are sensors.
 
 use super::builder::{Builder, direction, side_of_square};
-use crate::world::{to_vector, turned};
+use crate::world::{to_vector, turned_body};
 use glam::{Quat, Vec3};
 use rapier3d::prelude::*;
 use std::f32::consts::TAU;
@@ -45,10 +45,9 @@ fn add_rollers(b: &mut Builder, at: Vec3, n: usize) {
     for i in 0..n {
         let angle = TAU * (i as f32 + 0.5) / ROLLERS as f32;
         let outward = direction(angle);
-        let pose = turned(at + outward * RING_RADIUS, Quat::from_rotation_y(-angle));
-        let roller = RigidBodyBuilder::kinematic_velocity_based()
-            .position(pose)
-            .angvel(to_vector(outward * (SPEED / ROLLER_RADIUS)));
+        let roller =
+            RigidBodyBuilder::kinematic_velocity_based().angvel(to_vector(outward * (SPEED / ROLLER_RADIUS)));
+        let roller = turned_body(roller, at + outward * RING_RADIUS, Quat::from_rotation_y(-angle));
         b.world.add(roller, ColliderBuilder::capsule_x(0.7, ROLLER_RADIUS).friction(1.0));
     }
 }
@@ -60,9 +59,10 @@ fn add_crates(b: &mut Builder, at: Vec3, n: usize) {
         let angle = TAU * ((i / 2) as f32 + 0.5) / (CRATES / 2) as f32;
         let up = ROLLER_RADIUS + 0.02 + half.y + (i % 2) as f32 * 0.62;
         let outward = direction(angle) * (RING_RADIUS + b.random(-0.1, 0.1));
-        let pose = turned(at + outward + Vec3::Y * up, Quat::from_rotation_y(-angle));
+        let body = RigidBodyBuilder::dynamic().can_sleep(false);
+        let body = turned_body(body, at + outward + Vec3::Y * up, Quat::from_rotation_y(-angle));
         let shape = ColliderBuilder::cuboid(half.x, half.y, half.z).friction(0.8);
-        b.world.add(RigidBodyBuilder::dynamic().position(pose).can_sleep(false), shape);
+        b.world.add(body, shape);
     }
 }
 

@@ -1,7 +1,7 @@
 //! Bodies of joined limbs.
 
 use super::builder::{Builder, lattice, side_of_square};
-use crate::world::{hinge, to_point, to_vector, turned};
+use crate::world::{hinge, to_point, to_vector, turned_body};
 use glam::{Quat, Vec3};
 use rapier3d::prelude::*;
 
@@ -68,9 +68,8 @@ impl Figure<'_> {
 
     /// Adds a body.
     fn part(&mut self, at: Vec3, shape: ColliderBuilder) -> Part {
-        let body = RigidBodyBuilder::dynamic()
-            .position(turned(self.at + self.turn * at, self.turn))
-            .linvel(to_vector(self.velocity));
+        let body = RigidBodyBuilder::dynamic().linvel(to_vector(self.velocity));
+        let body = turned_body(body, self.at + self.turn * at, self.turn);
         Part { body: self.b.world.add(body, shape), at }
     }
 

@@ -1,7 +1,7 @@
 //! A town of rings: houses, cars that drive around for ever, and barrels in their way.
 
 use super::builder::{Builder, direction};
-use crate::world::{World, to_point, to_vector, turned};
+use crate::world::{World, to_point, to_vector, turned_body};
 use glam::{Quat, Vec3};
 use rapier3d::prelude::*;
 use std::f32::consts::TAU;
@@ -73,11 +73,11 @@ fn car(b: &mut Builder, radius: f32, angle: f32, way: f32) {
     let speed = 8.0 + 4.0 * way;
     let place = Vec3::new(lane, half.y + 0.05, 0.0);
     let body = RigidBodyBuilder::kinematic_velocity_based()
-        .position(turned(Vec3::ZERO, Quat::from_rotation_y(-angle)))
         .angvel(to_vector(Vec3::Y * -way * speed / lane))
         .additional_mass_properties(mass_at_origin())
         // A slow turn counts as rest, however long the way.
         .can_sleep(false);
+    let body = turned_body(body, Vec3::ZERO, Quat::from_rotation_y(-angle));
     let shape = ColliderBuilder::cuboid(half.x, half.y, half.z).density(0.0);
     b.world.add(body, shape.translation(to_vector(place)));
 }
