@@ -19,7 +19,7 @@ name = "fingerprint"
 version = "0.0.0"
 edition = "2024"
 [dependencies]
-glam = "0.34"
+glam = { version = "0.34", features = ["libm"] }
 postcard = { version = "1.1", default-features = false, features = ["use-std"] }
 rand = "0.10"
 rapier3d = { version = "=0.36.1", features = ["serde-serialize"] }

@@ -1,6 +1,7 @@
 //! A headless rapier world, and the conversion from glam, in which scenes are built.
 
 use glam::{Quat, Vec3};
+use rapier3d::na::{Quaternion, UnitQuaternion};
 use rapier3d::prelude::*;
 
 /// Everything that rapier keeps apart, together; the broad phase is lent to each step.
@@ -42,12 +43,12 @@ impl Default for World {
 }
 
 impl World {
-    /// An empty world with the given acceleration, m/s^2.
+    /// Returns an empty world with this acceleration, m/s^2.
     pub fn with_gravity(gravity: Vec3) -> Self {
         Self { gravity, ..Self::default() }
     }
 
-    /// One step of rapier's physics pipeline.
+    /// Runs one step of rapier's physics pipeline.
     pub fn step(&mut self, broad_phase: &mut dyn BroadPhase) {
         self.pipeline.step(
             &to_vector(self.gravity),
@@ -72,12 +73,12 @@ impl World {
         handle
     }
 
-    /// A dynamic body at a place.
+    /// Returns a dynamic body without rotation at a place.
     pub fn dynamic(at: Vec3) -> RigidBodyBuilder {
         RigidBodyBuilder::dynamic().translation(to_vector(at))
     }
 
-    /// A half-space, whose surface is at height 0.
+    /// Returns a half-space, whose surface is at height 0.
     pub fn ground() -> ColliderBuilder {
         ColliderBuilder::halfspace(Vector::y_axis())
     }
@@ -99,15 +100,14 @@ impl World {
         self.add(ball, ColliderBuilder::ball(0.5).density(10.0))
     }
 
-    /// The pairs that the narrow phase has: of contacts, and with sensors.
+    /// Returns the pairs of the narrow phase: of contacts, and with sensors.
     pub fn pairs(&self) -> impl Iterator<Item = ColliderPair> {
         let contacts = self.narrow_phase.contact_pairs().map(|pair| (pair.collider1, pair.collider2));
         let intersections = self.narrow_phase.intersection_pairs().map(|(one, other, _)| (one, other));
         contacts.chain(intersections).map(|(one, other)| ColliderPair::new(one, other))
     }
 
-    /// Every number that makes up the poses of all bodies, bit by bit, in order: equal exactly when
-    /// two worlds are.
+    /// Returns the bits of all numbers in the poses of all bodies, in order. They are equal exactly when all poses are.
     pub fn pose_bits(&self) -> Vec<u32> {
         let bits = |(_, body): (RigidBodyHandle, &RigidBody)| {
             let pose = body.position();
@@ -120,7 +120,7 @@ impl World {
 
 #[cfg(feature = "snapshot")]
 impl World {
-    /// Everything, bit by bit.
+    /// Returns everything as bytes, bit by bit.
     ///
     /// # Panics
     /// If a part cannot be saved, which none of rapier's refuses.
@@ -130,7 +130,7 @@ impl World {
         postcard::to_stdvec(&(sets, rest, self.gravity.to_array())).expect("rapier's sets can be saved")
     }
 
-    /// The world that was saved.
+    /// Returns the world that was saved.
     ///
     /// # Errors
     /// If these are not the bytes of a world.
@@ -155,37 +155,44 @@ impl World {
     }
 }
 
-/// glam's vector as rapier's.
+/// Returns a glam vector as rapier's.
 pub fn to_vector(v: Vec3) -> Vector<Real> {
     vector![v.x, v.y, v.z]
 }
 
-/// A glam rotation as the scaled axis that rapier's builders take.
-pub fn to_rotation(q: Quat) -> Vector<Real> {
-    to_vector(q.to_scaled_axis())
-}
-
-/// A glam vector as a point of rapier's.
+/// Returns a glam vector as a point of rapier's.
 pub fn to_point(v: Vec3) -> Point<Real> {
     to_vector(v).into()
 }
 
-/// A pose without rotation.
+/// Returns a pose without rotation.
 pub fn pose(at: Vec3) -> Isometry<Real> {
     Isometry::translation(at.x, at.y, at.z)
 }
 
-/// A joint that turns around one axis, a unit vector.
+/// Returns the body at a place and with a rotation.
+pub fn turned_body(body: RigidBodyBuilder, at: Vec3, turn: Quat) -> RigidBodyBuilder {
+    body.position(turned(at, turn))
+}
+
+/// Returns a pose with a rotation, bit by bit. The builders' own `rotation` takes an angle, of which rapier computes the
+/// sine and the cosine as the platform does.
+pub fn turned(at: Vec3, turn: Quat) -> Isometry<Real> {
+    let turn = UnitQuaternion::new_unchecked(Quaternion::new(turn.w, turn.x, turn.y, turn.z));
+    Isometry::from_parts(to_vector(at).into(), turn)
+}
+
+/// Returns a joint that turns around one axis, a unit vector.
 pub fn hinge(axis: Vec3) -> RevoluteJointBuilder {
     RevoluteJointBuilder::new(UnitVector::new_unchecked(to_vector(axis)))
 }
 
-/// A square grid of heights.
+/// Returns a square grid of heights.
 pub fn heights(side: usize, height: impl Fn(usize, usize) -> f32) -> DMatrix<Real> {
     DMatrix::from_fn(side, side, height)
 }
 
-/// Groups that meet if each has a group of the other's filter.
+/// Returns groups that meet if each has a group of the other's filter.
 pub fn groups_that_meet(memberships: Group, filter: Group) -> InteractionGroups {
     InteractionGroups::new(memberships, filter)
 }

@@ -1,13 +1,17 @@
-//! Scenes in motion: nothing explodes, and each scene does what its name says.
+//! Scenes in motion: nothing explodes or falls through the ground, and each scene does what its name says.
 
 use glam::Vec3;
 use pbig_scenes::scenes::Scene;
 use pbig_scenes::world::{World, to_vector};
 use rapier3d::prelude::*;
+use std::collections::HashSet;
 
 const STEPS: usize = 300;
 /// Metres a second. Drops of rain begin with up to 40, and gravity adds 49 in 300 steps.
 const MOST_SPEED: f32 = 100.0;
+/// Metres that a body's centre may be below the ground: more than it sinks in for a moment, and less than it falls in
+/// the first second without ground.
+const MOST_DEPTH: f32 = 1.0;
 
 /// A scene under way.
 struct Run {
@@ -15,13 +19,14 @@ struct Run {
     broad_phase: DefaultBroadPhase,
     /// Where the bodies began.
     start: Vec<Vec3>,
+    has_ground: bool,
 }
 
 impl Run {
     fn new(name: &str, bodies: usize) -> Self {
         let world = Scene::named(name).expect("the scene exists").build(bodies, 1);
-        let start = places(&world);
-        Self { world, broad_phase: DefaultBroadPhase::new(), start }
+        let (start, has_ground) = (places(&world), has_ground(&world));
+        Self { world, broad_phase: DefaultBroadPhase::new(), start, has_ground }
     }
 
     fn steps(mut self, steps: usize) -> Self {
@@ -47,25 +52,33 @@ fn places(world: &World) -> Vec<Vec3> {
     world.bodies.iter().map(|(_, body)| place(body)).collect()
 }
 
-/// Returns the first body that is out of range, or too fast, or nowhere.
+/// Returns true if the scene has a half-space, whose surface is at height 0.
+fn has_ground(world: &World) -> bool {
+    world.colliders.iter().any(|(_, collider)| collider.shape().as_halfspace().is_some())
+}
+
+/// Returns the first body that is out of range, or too fast, or nowhere, or below the ground.
 fn fault(run: &Run) -> Option<String> {
     let start = run.start.iter().fold(0.0, |most: f32, at| most.max(at.length()));
     // Nothing gets farther than it goes at the highest speed in all the steps.
     let range = start + MOST_SPEED * STEPS as f32 / 60.0;
     let is_wrong = |body: &RigidBody| {
         let (at, speed) = (place(body), body.linvel().norm());
+        let is_buried = run.has_ground && body.is_dynamic() && at.y < -MOST_DEPTH;
         // A comparison with a NaN is false.
-        !(at.length() < range && speed < MOST_SPEED)
+        is_buried || !(at.length() < range && speed < MOST_SPEED)
     };
     let (_, body) = run.world.bodies.iter().find(|(_, body)| is_wrong(body))?;
     Some(format!("{} with {} m/s", place(body), body.linvel().norm()))
 }
 
 #[test]
-fn nothing_explodes_in_300_steps() {
+fn nothing_explodes_or_falls_through_the_ground_in_300_steps() {
     for scene in Scene::ALL {
         for bodies in [10, 300] {
-            let run = Run::new(scene.name, bodies).steps(STEPS);
+            let run = Run::new(scene.name, bodies);
+            assert_eq!(run.has_ground, scene.name != "asteroids", "{}", scene.name);
+            let run = run.steps(STEPS);
             assert_eq!(fault(&run), None, "{}, {bodies} bodies", scene.name);
         }
     }
@@ -87,6 +100,19 @@ fn a_body_that_explodes_or_is_nowhere_is_a_fault() {
 }
 
 #[test]
+fn bodies_that_fall_through_the_ground_are_a_fault() {
+    for name in ["column", "pyramid"] {
+        let mut run = Run::new(name, 100);
+        let ground =
+            run.world.colliders.iter().find(|(_, collider)| collider.shape().as_halfspace().is_some());
+        let ground = ground.expect("there is ground").0;
+        run.world.remove_collider(ground);
+        let run = run.steps(STEPS / 2);
+        assert!(fault(&run).is_some(), "{name}");
+    }
+}
+
+#[test]
 fn a_thrown_ball_knocks_bodies_over() {
     let mut run = Run::new("sleeping", 400);
     let ball = run.world.throw(Vec3::new(-10.0, 1.0, 10.0), Vec3::X * 30.0);
@@ -98,13 +124,15 @@ fn a_thrown_ball_knocks_bodies_over() {
 
 #[test]
 fn the_balls_of_a_galton_board_fall_into_the_middle_bins_more_than_into_the_outer_ones() {
-    let run = Run::new("galton", 50).steps(2 * STEPS);
+    // Eight boards behind each other, because balls fall a little differently each time.
+    let run = Run::new("galton", 400).steps(2 * STEPS);
     let landed: Vec<f32> =
-        run.dynamic().iter().map(|(_, now)| *now).filter(|at| at.y < 3.0).map(|at| at.x).collect();
-    assert!(landed.len() > 40, "{} of 50 balls are in bins", landed.len());
-    let middle = landed.iter().filter(|x| x.abs() < 1.1).count();
-    assert!(middle * 2 > landed.len(), "{middle} of {} balls are in the three middle bins", landed.len());
-    assert!(landed.iter().any(|x| *x < -1.0) && landed.iter().any(|x| *x > 1.0), "{landed:?}");
+        run.dynamic().iter().map(|(_, now)| *now).filter(|at| at.y < 3.0).map(|at| at.x.abs()).collect();
+    assert!(landed.len() > 320, "{} of 400 balls are in bins", landed.len());
+    let middle = landed.iter().filter(|x| **x < 1.1).count();
+    let outer = landed.iter().filter(|x| **x > 1.8).count();
+    // The three middle bins against the six outer ones.
+    assert!(middle > 3 * outer / 2 && outer > 10, "{middle} balls in the middle, {outer} outside");
 }
 
 #[test]
@@ -139,16 +167,17 @@ fn cars_keep_to_their_lane_and_knock_barrels_about() {
 }
 
 #[test]
-fn crates_pass_through_the_gates_of_a_conveyor() {
+fn a_conveyor_never_runs_dry() {
     let mut run = Run::new("conveyor", 140);
-    for _ in 0..10 {
-        run = run.steps(20);
-        let inside =
-            run.world.narrow_phase.intersection_pairs().filter(|(_, _, is_inside)| *is_inside).count();
-        assert!(inside > 5, "{inside} crates in gates");
+    for steps in [60, 140, 200, 500] {
+        run = run.steps(steps);
+        let gates = run.world.narrow_phase.intersection_pairs().filter(|(_, _, is_inside)| *is_inside);
+        let gates = gates.count();
+        assert!(gates > 15, "{gates} crates in gates");
+        let moved =
+            run.dynamic().iter().filter(|(start, now)| now.y > 1.2 && start.distance(*now) > 0.3).count();
+        assert!(moved > 35, "{moved} of 40 crates are carried");
     }
-    let carried = run.dynamic().iter().filter(|(start, now)| now.x > start.x + 1.0).count();
-    assert!(carried > 30, "{carried} of 40 crates were carried");
 }
 
 #[test]
@@ -157,6 +186,17 @@ fn boulders_roll_down_the_valley() {
     let down =
         run.dynamic().iter().filter(|(start, now)| now.z > start.z + 5.0 && now.y < start.y - 5.0).count();
     assert!(down > 200, "{down} of 300");
+}
+
+#[test]
+fn most_drops_of_rain_land_on_the_hills() {
+    let run = Run::new("rain", 1000).steps(STEPS);
+    let is_on_hills = |at: &Vec3| at.x.abs().max(at.z.abs()) < 1000_f32.sqrt() * 1.5;
+    let landed: Vec<f32> =
+        run.dynamic().iter().map(|(_, now)| *now).filter(is_on_hills).map(|at| at.y).collect();
+    let through = landed.iter().filter(|height| **height < 0.2).count();
+    assert!(landed.len() > 700, "{} drops are on the hills", landed.len());
+    assert!(through * 50 < landed.len(), "{through} of {} drops fell through the hills", landed.len());
 }
 
 #[test]
@@ -169,15 +209,27 @@ fn a_jar_holds_what_falls_into_it() {
 }
 
 #[test]
-fn asteroids_do_not_fall_and_differ_in_size() {
+fn asteroids_differ_in_size() {
     let run = Run::new("asteroids", 500);
     let sizes = run.world.colliders.iter().map(|(_, collider)| collider.compute_aabb().half_extents().max());
     let (least, most) =
         sizes.fold((f32::MAX, 0.0), |(least, most): (f32, f32), size| (least.min(size), most.max(size)));
     assert!(most > 20.0 * least, "{least} to {most}");
-    let height = |run: &Run| run.dynamic().iter().map(|(_, now)| now.y).sum::<f32>() / 500.0;
-    let before = height(&run);
-    assert!((height(&run.steps(STEPS)) - before).abs() < 5.0);
+}
+
+#[test]
+fn asteroids_collide_and_stay_together() {
+    let spread = |run: &Run| run.dynamic().iter().map(|(_, now)| now.length()).sum::<f32>() / 1500.0;
+    let mut run = Run::new("asteroids", 1500);
+    let before = spread(&run);
+    let mut collided = HashSet::new();
+    for _ in 0..STEPS {
+        run = run.steps(1);
+        let contacts = run.world.narrow_phase.contact_pairs().filter(|pair| pair.has_any_active_contact);
+        collided.extend(contacts.flat_map(|pair| [pair.collider1, pair.collider2]));
+    }
+    assert!(collided.len() > 1000, "{} of 1500 collided", collided.len());
+    assert!(spread(&run) < before, "{} m, {before} m before", spread(&run));
 }
 
 #[test]

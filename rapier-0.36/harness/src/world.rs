@@ -1,7 +1,7 @@
 //! A headless rapier world, and the conversion from glam, in which scenes are built.
 
 use glam::{Quat, Vec3};
-use rapier3d::math::{Pose, Vector};
+use rapier3d::math::{Pose, Rotation, Vector};
 use rapier3d::na::Unit;
 use rapier3d::parry::utils::Array2;
 use rapier3d::prelude::*;
@@ -50,7 +50,7 @@ impl Default for World {
 }
 
 impl World {
-    /// One step of rapier's physics pipeline.
+    /// Runs one step of rapier's physics pipeline.
     pub fn step(&mut self, broad_phase: &mut BroadPhaseBvh) {
         self.pipeline.step(
             to_vector(self.gravity),
@@ -76,12 +76,12 @@ impl World {
         handle
     }
 
-    /// A dynamic body at a place.
+    /// Returns a dynamic body without rotation at a place.
     pub fn dynamic(at: Vec3) -> RigidBodyBuilder {
         RigidBodyBuilder::dynamic().translation(to_vector(at))
     }
 
-    /// A half-space, whose surface is at height 0.
+    /// Returns a half-space, whose surface is at height 0.
     pub fn ground() -> ColliderBuilder {
         ColliderBuilder::halfspace(Unit::new_unchecked(Vector::Y))
     }
@@ -120,7 +120,7 @@ impl World {
         self.add(ball, ColliderBuilder::ball(0.5).density(10.0))
     }
 
-    /// Everything with its broad phase, bit by bit.
+    /// Returns everything with its broad phase as bytes, bit by bit.
     ///
     /// # Panics
     /// If a part cannot be saved, which none of rapier's refuses.
@@ -131,7 +131,7 @@ impl World {
         postcard::to_stdvec(&all).expect("rapier's sets can be saved")
     }
 
-    /// The world and the broad phase that were saved.
+    /// Returns the world and the broad phase that were saved.
     ///
     /// # Errors
     /// If these are not the bytes of a world.
@@ -156,7 +156,7 @@ impl World {
         Ok((world, broad_phase))
     }
 
-    /// Every number that makes up the poses of all bodies, bit by bit, in order: equal exactly when two worlds are.
+    /// Returns the bits of all numbers in the poses of all bodies, in order. They are equal exactly when all poses are.
     pub fn pose_bits(&self) -> Vec<u32> {
         let bits = |(_, body): (RigidBodyHandle, &RigidBody)| {
             let (at, turn) = (body.translation(), body.rotation());
@@ -166,39 +166,45 @@ impl World {
     }
 }
 
-/// glam's vector as rapier's, which is of another version of glam.
+/// Returns a glam vector as rapier's, which is of another version of glam.
 pub fn to_vector(v: Vec3) -> Vector {
     Vector::new(v.x, v.y, v.z)
 }
 
-/// A glam rotation as the scaled axis that rapier's builders take.
-pub fn to_rotation(q: Quat) -> Vector {
-    to_vector(q.to_scaled_axis())
-}
-
-/// A glam vector as a point of rapier's, for which 0.36 has no type.
+/// Returns a glam vector as a point of rapier's, for which 0.36 has no type.
 pub fn to_point(v: Vec3) -> Vector {
     to_vector(v)
 }
 
-/// A pose without rotation.
+/// Returns a pose without rotation.
 pub fn pose(at: Vec3) -> Pose {
     Pose::from_translation(to_vector(at))
 }
 
-/// A joint that turns around one axis, a unit vector.
+/// Returns the body at a place and with a rotation.
+pub fn turned_body(body: RigidBodyBuilder, at: Vec3, turn: Quat) -> RigidBodyBuilder {
+    body.pose(turned(at, turn))
+}
+
+/// Returns a pose with a rotation, bit by bit. The builders' own `rotation` takes an angle, of which rapier computes the
+/// sine and the cosine as the platform does.
+pub fn turned(at: Vec3, turn: Quat) -> Pose {
+    Pose::from_parts(to_vector(at), Rotation::from_xyzw(turn.x, turn.y, turn.z, turn.w))
+}
+
+/// Returns a joint that turns around one axis, a unit vector.
 pub fn hinge(axis: Vec3) -> RevoluteJointBuilder {
     RevoluteJointBuilder::new(to_vector(axis))
 }
 
-/// A square grid of heights.
+/// Returns a square grid of heights.
 pub fn heights(side: usize, height: impl Fn(usize, usize) -> f32) -> Array2<Real> {
     // Column by column.
     let heights = (0..side * side).map(|at| height(at % side, at / side));
     Array2::new(side, side, heights.collect())
 }
 
-/// Groups that meet if each has a group of the other's filter.
+/// Returns groups that meet if each has a group of the other's filter.
 pub fn groups_that_meet(memberships: Group, filter: Group) -> InteractionGroups {
     InteractionGroups::new(memberships, filter, InteractionTestMode::And)
 }

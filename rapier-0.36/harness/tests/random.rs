@@ -3,7 +3,7 @@
 //! Each run is named by its seed. `PBIG_RUNS=20000` plays more runs (about 10^6 operations).
 
 use glam::Vec3;
-use pbig_harness_036::world::{World, groups_that_meet, to_rotation, to_vector};
+use pbig_harness_036::world::{World, groups_that_meet, to_vector, turned_body};
 use rand::rngs::StdRng;
 use rand::{RngExt, SeedableRng};
 use rapier_pbig::shadow::{Shadow, Shadowed};
@@ -174,7 +174,7 @@ impl Player {
     }
 
     fn body(&mut self) -> RigidBodyBuilder {
-        let at = to_vector(self.place());
+        let at = self.place();
         let body = match self.rng.random_range(0..6) {
             0 => RigidBodyBuilder::fixed(),
             1 => RigidBodyBuilder::kinematic_velocity_based().linvel(to_vector(Vec3::X)),
@@ -183,8 +183,8 @@ impl Player {
         let fast = Vec3::new(self.rng.random_range(-30.0..30.0), -20.0, 0.0);
         let speed = if self.rng.random_range(0..4) == 0 { fast } else { Vec3::ZERO };
         let soft_ccd = if self.rng.random_range(0..6) == 0 { 0.5 } else { 0.0 };
-        let turn = to_rotation(glam::Quat::from_rotation_z(self.rng.random_range(-3.0..3.0)));
-        let body = body.translation(at).rotation(turn).linvel(to_vector(speed));
+        let turn = glam::Quat::from_rotation_z(self.rng.random_range(-3.0..3.0));
+        let body = turned_body(body, at, turn).linvel(to_vector(speed));
         body.soft_ccd_prediction(soft_ccd).ccd_enabled(self.rng.random_range(0..3) == 0)
     }
 

@@ -115,7 +115,7 @@ impl Scene {
         },
         Self {
             name: "asteroids",
-            about: "asteroids of many sizes drift without gravity",
+            about: "asteroids of many sizes circle and collide, pulled to the middle",
             hard: "sizes from 0.2 to 15 in all directions, none at rest",
             default_bodies: 1500,
             build: asteroids::asteroids,
@@ -129,7 +129,7 @@ impl Scene {
         },
         Self {
             name: "conveyor",
-            about: "rollers carry crates through gates, which are sensors",
+            about: "rollers carry crates around in rings, through gates, which are sensors",
             hard: "sensors that boxes enter and leave all the time",
             default_bodies: 1400,
             build: conveyor::conveyor,

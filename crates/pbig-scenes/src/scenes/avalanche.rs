@@ -5,20 +5,20 @@ use crate::world::{heights, to_vector};
 use glam::Vec3;
 use rapier3d::prelude::*;
 
-/// Samples of the height field along each axis.
-const SAMPLES: usize = 65;
 /// Height over length of the slope.
 const SLOPE: f32 = 0.7;
 /// Boulders above each other.
 const LAYERS: usize = 3;
 
-/// Boulders lie above the upper part of a valley, which runs out into a plain.
+/// Lays boulders above the upper part of a valley, which runs out into a plain.
 pub(super) fn avalanche(b: &mut Builder, n: usize) {
     b.ground();
     let side = side_of_square(n.div_ceil(LAYERS));
     let length = (side as f32 * 4.0 + 40.0).max(60.0);
-    let field = heights(SAMPLES, |i, j| {
-        let part = |k: usize| k as f32 / (SAMPLES - 1) as f32 - 0.5;
+    // One sample a metre, or the field would cut off the waves, and bury boulders.
+    let samples = length as usize + 1;
+    let field = heights(samples, |i, j| {
+        let part = |k: usize| k as f32 / (samples - 1) as f32 - 0.5;
         surface(part(j) * length, part(i) * length, length)
     });
     let scale = to_vector(Vec3::new(length, 1.0, length));
@@ -39,6 +39,7 @@ fn surface(x: f32, z: f32, length: f32) -> f32 {
     1.0 + slope + sides + 0.4 * (wave(x * 0.35) + direction(z * 0.5).x)
 }
 
+/// Adds a ball, a cuboid or a round cuboid.
 fn boulder(b: &mut Builder, i: usize, at: Vec3) {
     let half = b.random_size(0.15, 0.55);
     let shape = match i % 3 {

@@ -1,6 +1,6 @@
 //! A world under construction.
 
-use crate::world::{World, to_rotation, to_vector};
+use crate::world::{World, to_vector, turned, turned_body};
 use glam::{EulerRot, Quat, Vec2, Vec3};
 use rand::RngExt;
 use rand::rngs::StdRng;
@@ -42,8 +42,8 @@ impl Builder {
 
     /// Adds a dynamic body with a random rotation.
     pub(super) fn falling(&mut self, at: Vec3, collider: ColliderBuilder) -> RigidBodyHandle {
-        let turn = self.random_turn();
-        self.world.add(World::dynamic(at).rotation(to_rotation(turn)), collider)
+        let body = turned_body(RigidBodyBuilder::dynamic(), at, self.random_turn());
+        self.world.add(body, collider)
     }
 
     /// Adds a collider without a body.
@@ -51,10 +51,14 @@ impl Builder {
         self.world.colliders.insert(collider.translation(to_vector(at)));
     }
 
+    /// Adds a collider without a body, turned around the vertical axis by an angle in radians.
+    pub(super) fn fixed_turned(&mut self, at: Vec3, angle: f32, collider: ColliderBuilder) {
+        self.world.colliders.insert(collider.position(turned(at, Quat::from_rotation_y(angle))));
+    }
+
     /// Adds a box without a body, turned around the vertical axis by an angle in radians.
     pub(super) fn fixed_cuboid(&mut self, at: Vec3, half: Vec3, angle: f32) {
-        let cuboid = ColliderBuilder::cuboid(half.x, half.y, half.z);
-        self.fixed(at, cuboid.rotation(to_vector(Vec3::Y * angle)));
+        self.fixed_turned(at, angle, ColliderBuilder::cuboid(half.x, half.y, half.z));
     }
 }
 
@@ -73,8 +77,8 @@ pub(super) fn side_of_square(places: usize) -> usize {
     (1..).find(|side: &usize| side.pow(2) >= places).unwrap_or(1)
 }
 
-// glam computes these, because it does so in the same way on every machine. The standard library asks the platform, and a
-// web page would build other worlds.
+// glam computes these with `libm`, so they have the same bits on every machine. The standard library asks the platform, and
+// a web page would build other worlds. Steps have the same bits only with rapier's `enhanced-determinism`.
 
 /// Returns the cosine and the sine of an angle in radians, as x and z.
 pub(super) fn direction(angle: f32) -> Vec3 {

@@ -19,7 +19,7 @@ pub(super) fn slab(i: usize) -> ColliderBuilder {
     ColliderBuilder::cuboid(half, 0.1, half)
 }
 
-/// A square column, at most 24 wide so that it is tall, above the ground.
+/// Drops a square column, at most 24 wide so that it is tall, above the ground.
 pub(super) fn fall(b: &mut Builder, n: usize, shape: fn(usize) -> ColliderBuilder) {
     b.ground();
     let side = side_of_cube(n.div_ceil(4)).min(24);
@@ -30,7 +30,7 @@ pub(super) fn fall(b: &mut Builder, n: usize, shape: fn(usize) -> ColliderBuilde
     }
 }
 
-/// Columns of one shape each, side by side, as in Avril's figure 1.
+/// Drops columns of one shape each, side by side, as in Avril's figure 1.
 pub(super) fn columns(b: &mut Builder, n: usize) {
     b.ground();
     let columns = (n / 1500).clamp(3, 25);
@@ -50,7 +50,7 @@ pub(super) fn column(b: &mut Builder, n: usize) {
     fall(b, n, |i| [sphere, cube, slab][i % 3](i));
 }
 
-/// Log-uniform sizes; each on its own level above the larger ones, so that nothing starts inside.
+/// Drops bodies of log-uniform sizes. Each is on its own level above the larger ones, so that none begins inside another.
 pub(super) fn mixed(b: &mut Builder, n: usize) {
     b.ground();
     let mut sizes: Vec<f32> = (0..n).map(|_| b.random_size(0.025, 25.0)).collect();
@@ -67,15 +67,19 @@ pub(super) fn mixed(b: &mut Builder, n: usize) {
     }
 }
 
+/// Drops balls on hills in a plain.
 pub(super) fn rain(b: &mut Builder, n: usize) {
-    let wide = (n as f32).sqrt() * 3.0;
-    let hills = heights(24, |i, j| wave(i as f32 * 0.7) + direction(j as f32 * 0.9).x);
+    b.ground();
+    let wide = (n.max(1) as f32).sqrt() * 3.0;
+    let hills = heights(24, |i, j| 2.2 + wave(i as f32 * 0.7) + direction(j as f32 * 0.9).x);
     let scale = to_vector(Vec3::new(wide, 1.0, wide));
     b.world.colliders.insert(ColliderBuilder::heightfield(hills, scale));
     for _ in 0..n {
-        let at = b.random_vec(Vec3::new(wide * 0.49, 0.0, wide * 0.49)) + Vec3::Y * b.random(3.0, 60.0);
+        let at = b.random_vec(Vec3::new(wide * 0.49, 0.0, wide * 0.49)) + Vec3::Y * b.random(5.0, 62.0);
         let down = b.random(-40.0, -10.0);
-        let body = World::dynamic(at).linvel(to_vector(Vec3::Y * down)).ccd_enabled(true);
+        // Rapier's continuous collision detection knows no height fields, so drops look a metre ahead for contacts.
+        let body =
+            World::dynamic(at).linvel(to_vector(Vec3::Y * down)).ccd_enabled(true).soft_ccd_prediction(1.0);
         b.world.add(body, ColliderBuilder::ball(0.08).restitution(0.3));
     }
 }

@@ -25,24 +25,25 @@ const BALL_DISTANCE: f32 = 0.35;
 /// From one board to the board behind it.
 const DEPTH: f32 = 1.2;
 
-/// Boards behind and beside each other. Balls stay in the plane of their board, so a board needs no panes.
+/// Builds boards behind and beside each other. Balls stay in the plane of their board, so a board needs no panes.
 pub(super) fn galton(b: &mut Builder, n: usize) {
     b.ground();
     let boards = n.div_ceil(BALLS);
-    let across = side_of_square(boards.div_ceil(8));
+    let columns = side_of_square(boards.div_ceil(8));
     for board in 0..boards {
-        let column = (board % across) as f32 * (BINS as f32 + 2.0) * PITCH;
-        let at = Vec3::new(column, 0.0, (board / across) as f32 * DEPTH);
+        let column = (board % columns) as f32 * (BINS as f32 + 2.0) * PITCH;
+        let at = Vec3::new(column, 0.0, (board / columns) as f32 * DEPTH);
         fixed_parts(b, at);
         balls(b, at, BALLS.min(n - board * BALLS));
     }
 }
 
-/// Height of the lowest ball.
+/// Returns the height of the lowest ball.
 fn top() -> f32 {
     BIN_HEIGHT + (ROWS as f32 + 2.0) * DROP
 }
 
+/// Adds the pegs, the walls of the bins, and the sides of a board.
 fn fixed_parts(b: &mut Builder, at: Vec3) {
     for row in 0..ROWS {
         let shift = if row % 2 == 0 { 0.0 } else { PITCH / 2.0 };
@@ -73,7 +74,7 @@ fn balls(b: &mut Builder, at: Vec3, n: usize) {
     }
 }
 
-/// Returns where along a board the peg or bin with this number is.
+/// Returns the coordinate along a board of the peg or bin with this number.
 fn across(number: usize) -> f32 {
     (number as f32 - (BINS as f32 - 1.0) / 2.0) * PITCH
 }

@@ -11,7 +11,7 @@ const LARGEST: f32 = 0.6;
 /// Planks of the wall.
 const PLANKS: usize = 24;
 
-/// Layers of one size each fall into each other.
+/// Drops layers of one size each into each other.
 pub(super) fn jar(b: &mut Builder, n: usize) {
     b.ground();
     // The first metre is room for the largest bodies; the rest keeps a large jar about three times as high as its radius.
@@ -35,6 +35,7 @@ fn layer(b: &mut Builder, radius: f32, height: f32, half: f32, most: usize) -> u
     inside.map(|place| content(b, place + Vec3::Y * height, half)).count()
 }
 
+/// Adds a ball or a cube.
 fn content(b: &mut Builder, at: Vec3, half: f32) {
     // A cube that turns freely within the ball of the same size.
     let edge = half * 0.57;
@@ -46,6 +47,7 @@ fn content(b: &mut Builder, at: Vec3, half: f32) {
     b.falling(at, shape);
 }
 
+/// Adds the planks of the jar.
 fn wall(b: &mut Builder, radius: f32, half_height: f32) {
     // Inside, the planks touch a circle of the jar's radius; they overlap at their edges.
     let thick = 0.3;

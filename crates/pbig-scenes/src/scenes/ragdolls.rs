@@ -1,7 +1,7 @@
 //! Bodies of joined limbs.
 
 use super::builder::{Builder, lattice, side_of_square};
-use crate::world::{World, hinge, to_point, to_rotation, to_vector};
+use crate::world::{hinge, to_point, to_vector, turned_body};
 use glam::{Quat, Vec3};
 use rapier3d::prelude::*;
 
@@ -9,14 +9,16 @@ use rapier3d::prelude::*;
 const PARTS: usize = 11;
 /// Figures above each other.
 const LAYERS: usize = 6;
+/// From figure to figure. A foot reaches 1.4 m from the middle of a figure, so none begins inside another.
+const DISTANCE: f32 = 2.9;
 
-/// Figures that fall in a heap, each turned in its own way.
+/// Drops figures in a heap, each turned in its own way.
 pub(super) fn ragdolls(b: &mut Builder, n: usize) {
     b.ground();
     let figures = n.div_ceil(PARTS);
     let side = side_of_square(figures.div_ceil(LAYERS));
     for i in 0..figures {
-        let at = lattice(i, side) * 2.4 + Vec3::Y * 1.5;
+        let at = lattice(i, side) * DISTANCE + Vec3::Y * 1.5;
         let (turn, velocity) = (b.random_turn(), b.random_vec(Vec3::splat(2.0)));
         Figure { b, at, turn, velocity }.build();
     }
@@ -51,6 +53,7 @@ struct Limb {
 }
 
 impl Figure<'_> {
+    /// Adds all parts and joins them.
     fn build(mut self) {
         let trunk = self.part(Vec3::ZERO, ColliderBuilder::capsule_y(0.2, 0.17));
         let head = self.part(Vec3::Y * 0.56, ColliderBuilder::ball(0.16));
@@ -65,9 +68,8 @@ impl Figure<'_> {
 
     /// Adds a body.
     fn part(&mut self, at: Vec3, shape: ColliderBuilder) -> Part {
-        let body = World::dynamic(self.at + self.turn * at)
-            .rotation(to_rotation(self.turn))
-            .linvel(to_vector(self.velocity));
+        let body = RigidBodyBuilder::dynamic().linvel(to_vector(self.velocity));
+        let body = turned_body(body, self.at + self.turn * at, self.turn);
         Part { body: self.b.world.add(body, shape), at }
     }
 

@@ -37,6 +37,9 @@ pub(super) fn sleeping(b: &mut Builder, n: usize) {
         let at = Vec3::new((i % side) as f32 * 1.1, 0.5, (i / side) as f32 * 1.1);
         b.world.add(World::dynamic(at).sleeping(true), ColliderBuilder::cuboid(0.5, 0.5, 0.5));
     }
+    if n == 0 {
+        return;
+    }
     let middle = side as f32 * 0.55;
     let awake = World::dynamic(Vec3::new(middle, 8.0, middle)).linvel(to_vector(Vec3::new(3.0, 0.0, 0.5)));
     b.world.add(awake.can_sleep(false), ColliderBuilder::ball(0.4));

@@ -1,7 +1,7 @@
 //! A town of rings: houses, cars that drive around for ever, and barrels in their way.
 
 use super::builder::{Builder, direction};
-use crate::world::{World, to_point, to_rotation, to_vector};
+use crate::world::{World, to_point, to_vector, turned_body};
 use glam::{Quat, Vec3};
 use rapier3d::prelude::*;
 use std::f32::consts::TAU;
@@ -11,10 +11,9 @@ const FIRST_STREET: f32 = 20.0;
 const STREET_DISTANCE: f32 = 18.0;
 /// From the middle of a street to the middle of a lane.
 const LANE: f32 = 2.2;
-/// Along a street, the space for a house, a car in its lane, and a barrel.
+/// Along a street, the space for a house, and for a car in its lane with the barrels before it.
 const HOUSE_EVERY: f32 = 8.0;
 const CAR_EVERY: f32 = 16.0;
-const BARREL_EVERY: f32 = 11.0;
 
 /// Things that stand or drive along a street.
 #[derive(Clone, Copy)]
@@ -22,7 +21,8 @@ enum Kind {
     House,
     /// A car in a lane; 1 drives counterclockwise, -1 clockwise.
     Car(f32),
-    Barrel,
+    /// A barrel in the outer half of a street (1) or the inner half (-1).
+    Barrel(f32),
 }
 
 /// Builds streets until all bodies are used; a house counts as a body.
@@ -31,23 +31,29 @@ pub(super) fn traffic(b: &mut Builder, n: usize) {
     let mut left = n;
     let mut radius = FIRST_STREET;
     while left > 0 {
-        let kinds = [(Kind::Car(1.0), CAR_EVERY), (Kind::Car(-1.0), CAR_EVERY), (Kind::Barrel, BARREL_EVERY)];
-        for (kind, every) in kinds.into_iter().chain([(Kind::House, HOUSE_EVERY)]) {
-            left -= around(b, radius, kind, every, left);
+        for kind in [Kind::Car(1.0), Kind::Car(-1.0), Kind::Barrel(1.0), Kind::Barrel(-1.0), Kind::House] {
+            left -= around(b, radius, kind, left);
         }
         radius += STREET_DISTANCE;
     }
 }
 
 /// Places things around a street, at most `most` of them, and returns their number.
-fn around(b: &mut Builder, radius: f32, kind: Kind, every: f32, most: usize) -> usize {
+fn around(b: &mut Builder, radius: f32, kind: Kind, most: usize) -> usize {
+    // Of the way from one car to the next. A lorry and its random shift take 0.4 before and behind, so no barrel begins
+    // inside it.
+    let (every, from, to) = match kind {
+        Kind::House => (HOUSE_EVERY, -0.15, 0.15),
+        Kind::Car(_) => (CAR_EVERY, -0.15, 0.15),
+        Kind::Barrel(_) => (CAR_EVERY, 0.44, 0.56),
+    };
     let places = (TAU * radius / every) as usize;
     for i in 0..places.min(most) {
-        let angle = TAU * (i as f32 + b.random(-0.15, 0.15)) / places as f32;
+        let angle = TAU * (i as f32 + b.random(from, to)) / places as f32;
         match kind {
             Kind::House => house(b, radius + STREET_DISTANCE / 2.0, angle),
             Kind::Car(way) => car(b, radius, angle, way),
-            Kind::Barrel => barrel(b, radius, angle),
+            Kind::Barrel(half) => barrel(b, radius, angle, half),
         }
     }
     places.min(most)
@@ -67,11 +73,11 @@ fn car(b: &mut Builder, radius: f32, angle: f32, way: f32) {
     let speed = 8.0 + 4.0 * way;
     let place = Vec3::new(lane, half.y + 0.05, 0.0);
     let body = RigidBodyBuilder::kinematic_velocity_based()
-        .rotation(to_rotation(Quat::from_rotation_y(-angle)))
         .angvel(to_vector(Vec3::Y * -way * speed / lane))
         .additional_mass_properties(mass_at_origin())
         // A slow turn counts as rest, however long the way.
         .can_sleep(false);
+    let body = turned_body(body, Vec3::ZERO, Quat::from_rotation_y(-angle));
     let shape = ColliderBuilder::cuboid(half.x, half.y, half.z).density(0.0);
     b.world.add(body, shape.translation(to_vector(place)));
 }
@@ -81,8 +87,9 @@ fn mass_at_origin() -> MassProperties {
     MassProperties::new(to_point(Vec3::ZERO), 1.0, to_vector(Vec3::ONE))
 }
 
-fn barrel(b: &mut Builder, radius: f32, angle: f32) {
-    let side = b.random(-4.0, 4.0);
+/// Adds a barrel in the way of the cars or beside it.
+fn barrel(b: &mut Builder, radius: f32, angle: f32, half: f32) {
+    let side = half * b.random(0.5, 4.0);
     let at = direction(angle) * (radius + side) + Vec3::Y * 0.5;
     b.world.add(World::dynamic(at), ColliderBuilder::cylinder(0.45, 0.3));
 }

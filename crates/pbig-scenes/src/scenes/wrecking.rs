@@ -1,7 +1,7 @@
 //! Wrecking balls swing into walls of bricks.
 
 use super::builder::{Builder, side_of_square};
-use crate::world::{World, to_point, to_rotation, to_vector};
+use crate::world::{World, to_point, to_vector, turned_body};
 use glam::{Quat, Vec3};
 use rapier3d::prelude::*;
 
@@ -12,10 +12,10 @@ const BRICK: Vec3 = Vec3::new(0.5, 0.25, 0.3);
 const BALL_RADIUS: f32 = 2.0;
 /// From the pivot to the ball's centre.
 const ROD: f32 = 10.0;
-/// How far the ball is pulled back, in radians.
+/// Angle by which the ball is pulled back, in radians.
 const SWING: f32 = 1.2;
 
-/// Walls behind and beside each other, each with its own ball.
+/// Builds walls behind and beside each other, each with its own ball.
 pub(super) fn wrecking(b: &mut Builder, n: usize) {
     b.ground();
     let walls = n.div_ceil(BODIES);
@@ -48,7 +48,7 @@ fn ball(b: &mut Builder, at: Vec3, height: f32) {
     let hook = b.world.bodies.insert(RigidBodyBuilder::fixed().translation(to_vector(pivot)));
     let turn = Quat::from_rotation_x(SWING + b.random(-0.05, 0.05));
     let place = pivot + turn * (Vec3::NEG_Y * ROD);
-    let body = World::dynamic(place).rotation(to_rotation(turn)).can_sleep(false);
+    let body = turned_body(RigidBodyBuilder::dynamic(), place, turn).can_sleep(false);
     let ball = b.world.add(body, ColliderBuilder::ball(BALL_RADIUS).density(20.0));
     let rod = ColliderBuilder::capsule_y(ROD / 2.0, 0.05).translation(to_vector(Vec3::Y * ROD / 2.0));
     b.world.colliders.insert_with_parent(rod.density(0.0), ball, &mut b.world.bodies);
