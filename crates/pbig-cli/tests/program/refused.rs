@@ -51,8 +51,8 @@ fn header(kind: &str, shape: &str) -> Vec<u8> {
     header_of(&format!("{{'descr': {kind}, 'fortran_order': False, 'shape': ({shape}), }}"))
 }
 
-/// What parses headers understands more than numpy writes: what is checked must be what it understands. A header that promises more
-/// than the file holds is refused before anything is allocated, and values that are no floats are named as numpy names them.
+/// The parser of headers understands more than numpy writes, and checks all that it understands. A header that promises more than
+/// the file holds is refused before anything is allocated, and values that are no floats are named as numpy names them.
 #[test]
 fn a_header_cannot_lie_and_says_what_the_values_are() {
     let folder = tempfile::tempdir().expect("a folder");

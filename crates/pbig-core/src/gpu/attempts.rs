@@ -64,7 +64,7 @@ impl Session {
     fn note_output(&mut self, words: u64, params: &Params) -> Result<Option<Chunk>, Failure> {
         self.sizes.word_capacity = words;
         let fits = words <= self.storage.max_buffer_bytes / 4;
-        // What does not fit comes as bits the next time. They have no mark that tells ended pairs from new ones. Fewer boxes at
+        // Output that does not fit comes as bits the next time. They have no mark that tells ended pairs from new ones. Fewer boxes at
         // a time have fewer of both.
         if params.levels == 0 && !fits && (self.finds_changes || params.flags & BITS != 0) {
             return Err(self.too_large().into());

@@ -4,7 +4,7 @@ use super::{Change, ChangeRequest};
 use crate::layout::Motion;
 use crate::{Aabb, ProxyFilter};
 
-/// What goes up to the device.
+/// The data that goes up to the device.
 #[derive(Clone, Copy)]
 pub(super) enum Input<'a> {
     /// The boxes of the job.

@@ -8,7 +8,7 @@ use rapier3d::prelude::*;
 /// Half the edge of the cubes that the field is divided into, and of their smallest parts.
 const LARGEST: f32 = 8.0;
 const SMALLEST: f32 = 0.25;
-/// Of 1: cubes with one asteroid, and cubes that are divided into eight. The others are empty.
+/// Shares of cubes with one asteroid, and of cubes that are divided into eight. The others are empty.
 const FILLED: f32 = 0.45;
 const DIVIDED: f32 = 0.35;
 /// Mean number of asteroids in one of the largest cubes, about.

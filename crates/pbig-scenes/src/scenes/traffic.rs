@@ -40,8 +40,8 @@ pub(super) fn traffic(b: &mut Builder, n: usize) {
 
 /// Places things around a street, at most `most` of them, and returns their number.
 fn around(b: &mut Builder, radius: f32, kind: Kind, most: usize) -> usize {
-    // Of the way from one car to the next. A lorry and its random shift take 0.4 before and behind, so no barrel begins
-    // inside it.
+    // Shares of the way from one car to the next. A lorry and its random shift take 0.4 before and behind, so no barrel
+    // begins inside it.
     let (every, from, to) = match kind {
         Kind::House => (HOUSE_EVERY, -0.15, 0.15),
         Kind::Car(_) => (CAR_EVERY, -0.15, 0.15),

@@ -130,7 +130,7 @@ fn judged(way: &Way, n: i64, words: &[u32]) -> Result<([Tally; 2], u64), Failure
 mod tests {
     use super::*;
 
-    /// Of 4 boxes, by a root that estimates row 1 everywhere on the CPU.
+    /// Four boxes, with a root that estimates row 1 everywhere on the CPU.
     #[test]
     fn wrong_estimates_are_counted_and_a_wrong_pair_is_a_failure() {
         let mut words = [[1, 0, 1], [0, 0, 3], [1, 1, 2], [1, 1, 3], [0, 2, 3], [2, 2, 3]].concat();
