@@ -25,7 +25,7 @@ pub fn viewer(figures: &Figures, history: &History, controls: &Controls, size: [
     let choice = history.last().map(|step| step.choice);
     add_figures(&mut sheet, figures, choice, text);
     add_graph(&mut sheet, history, size, text);
-    if controls.has_help {
+    if controls.is_help_shown {
         add_keys(&mut sheet, size, text);
     }
     sheet
@@ -140,8 +140,10 @@ mod tests {
     fn every_key_is_on_the_screen_unless_hidden() {
         let is_listed = |sheet: &Sheet, text: &str| sheet.texts.iter().any(|found| found.text == text);
         let shown = sheet(&Controls::new(Colouring::Shape, false), [1280.0, 800.0]);
-        let hidden =
-            sheet(&Controls { has_help: false, ..Controls::new(Colouring::Shape, false) }, [1280.0, 800.0]);
+        let hidden = sheet(
+            &Controls { is_help_shown: false, ..Controls::new(Colouring::Shape, false) },
+            [1280.0, 800.0],
+        );
         for binding in &BINDINGS {
             assert!(is_listed(&shown, binding.help) && !is_listed(&hidden, binding.help), "{}", binding.name);
         }
@@ -162,7 +164,7 @@ mod tests {
     fn a_comparison_shows_the_median_of_its_side() {
         let mut history = History::default();
         for broad_phase_ms in [1.0, 1.5, 9.0] {
-            history.push(StepTime { choice: Choice::Stock, broad_phase_ms, step_ms: 9.0 });
+            history.push(StepTime { choice: Choice::Stock, swaps: 0, broad_phase_ms, step_ms: 9.0 });
         }
         let side = Side { choice: Choice::Stock, history: &history, end_ms: 10.0, title: "step 2".into() };
         let sheet = comparison(&side, [640.0, 640.0]);

@@ -17,12 +17,12 @@ use std::path::Path;
 /// Writes a picture of every n-th step into a folder, as `00000.png` and so on by the number of steps.
 ///
 /// # Errors
-/// If a picture cannot be written.
+/// If a picture cannot be written, or the broad phase fails in a step.
 pub async fn run(options: &Options, folder: &Path) -> Result<(), Error> {
     let mut studio = Studio::new(options).await;
     for step in 0..=options.steps {
         if step > 0 {
-            studio.step();
+            studio.step()?;
         }
         if step % options.every == 0 {
             save(&studio.picture().await, &folder.join(format!("{step:05}.png")))?;
@@ -67,13 +67,16 @@ impl Studio {
             (simulation, view)
         };
         let sides = choices.into_iter().map(&mut side).collect();
-        let controls = Controls { has_help: false, ..Controls::new(options.colour, options.cells) };
+        let controls = Controls { is_help_shown: false, ..Controls::new(options.colour, options.cells) };
         Self { window, sides, controls, has_comparison: options.compare }
     }
 
     /// Makes one step on each side in turn, so that both see the same noise of the machine.
-    fn step(&mut self) {
-        self.sides.iter_mut().for_each(|(simulation, _)| simulation.step());
+    fn step(&mut self) -> Result<(), Error> {
+        self.sides.iter_mut().try_for_each(|(simulation, _)| {
+            simulation.step();
+            simulation.check()
+        })
     }
 
     /// Draws all sides, left to right.
