@@ -60,13 +60,13 @@ const STEPS_OF_CELL: f64 = 64.0;
 /// Returns the cell of a lower corner, or `None` if the last update used no grid. Boxes beyond the grid lie in its outermost
 /// cells, around which a ring stays empty.
 fn cell_at(corner: [f32; 3], plan: &Plan) -> Option<[i64; 3]> {
-    let is_grid_shown = plan.cell.iter().all(|&edge| edge > 0.0);
+    let has_cells = plan.cell.iter().all(|&edge| edge > 0.0);
     let along = |i: usize| {
         let cells = (f64::from(corner[i]) - plan.origin[i]) / f64::from(plan.cell[i]);
         let index = ((cells * STEPS_OF_CELL).round() / STEPS_OF_CELL).floor() as i64;
         index.clamp(1, (i64::from(plan.dims[i]) - 2).max(1))
     };
-    is_grid_shown.then(|| std::array::from_fn(along))
+    has_cells.then(|| std::array::from_fn(along))
 }
 
 /// Collects the boxes that pbig draws: its cells, or the stored boxes of colliders.
