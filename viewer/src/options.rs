@@ -57,7 +57,7 @@ impl Options {
 }
 
 /// Smallest width and height, in pixels: figures, graph and keys lie beside each other without overlap.
-pub const MIN_SIZE: [u32; 2] = [720, 480];
+pub const MIN_SIZE: [u32; 2] = [720, 500];
 /// Largest width and height, in pixels: the smallest limit that graphics adapters have.
 const MAX_SIZE: u32 = 8192;
 
@@ -76,8 +76,8 @@ mod tests {
 
     #[test]
     fn sizes_are_read_and_bad_ones_are_errors() {
-        assert_eq!(parse_size("720x480"), Ok(MIN_SIZE));
-        for bad in ["800", "800x", "x600", "800x600x2", "-800x600", "0x0", "99999x600", "719x480", "720x479"]
+        assert_eq!(parse_size("720x500"), Ok(MIN_SIZE));
+        for bad in ["800", "800x", "x600", "800x600x2", "-800x600", "0x0", "99999x600", "719x500", "720x499"]
         {
             assert!(parse_size(bad).is_err(), "{bad}");
         }

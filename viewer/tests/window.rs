@@ -256,13 +256,13 @@ fn pictures_need_no_display() {
     let folder = out("frames");
     let path = folder.to_str().unwrap();
     let options =
-        ["--frames", path, "--steps", "20", "--every", "10", "--bodies", "300", "--size", "720x480"];
+        ["--frames", path, "--steps", "20", "--every", "10", "--bodies", "300", "--size", "720x500"];
     let output = without_display(&options);
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     let pictures = ["00000.png", "00010.png", "00020.png"].map(|name| open(&folder.join(name)));
     assert_eq!(std::fs::read_dir(&folder).unwrap().count(), pictures.len());
     for two in pictures.windows(2) {
-        assert!(two[0].dimensions() == (720, 480) && colours(&two[0]) > 100);
+        assert!(two[0].dimensions() == (720, 500) && colours(&two[0]) > 100);
         assert!(difference(&two[0], &two[1]) > 0.005, "objects fall");
     }
 }
