@@ -12,7 +12,7 @@ images=docs/images
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
 cargo build --locked --release --manifest-path viewer/Cargo.toml
-viewer=$(cd viewer && target_folder)/release/viewer
+viewer=$(target_folder --manifest-path viewer/Cargo.toml)/release/viewer
 
 # at_most BYTES FILE: fails if the file is larger.
 at_most() {

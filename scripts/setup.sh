@@ -89,10 +89,26 @@ setup_aarch64() {
         require "a linker and an emulator for aarch64" gcc-aarch64-linux-gnu libc6-dev-arm64-cross qemu-user-static || true
 }
 
+# has_libraries FILE...: the dynamic linker knows each library.
+has_libraries() {
+    local known file
+    known=$(ldconfig -p 2>/dev/null)
+    for file in "$@"; do
+        case $known in *"$file "*) ;; *) return 1 ;; esac
+    done
+}
+
+# On Linux a window loads X libraries at run time; other systems bring theirs.
+has_x_libraries() {
+    [ "$(uname)" = Linux ] || return 0
+    has_libraries libX11.so.6 libX11-xcb.so.1 libXcursor.so.1 libXi.so.6 libxkbcommon-x11.so.0
+}
+
 # What a window needs at run time, and what tests it without a monitor.
 setup_viewer() {
-    { has Xvfb && has xdotool; } ||
-        require "a screen without a monitor" xvfb xdotool libx11-6 libxcursor1 libxi6 libxkbcommon-x11-0 || true
+    has_x_libraries ||
+        require "what opens a window" libx11-6 libx11-xcb1 libxcursor1 libxi6 libxkbcommon-x11-0 || true
+    { has Xvfb && has xdotool; } || require "a screen without a monitor" xvfb xdotool || true
 }
 
 setup_pictures() {

@@ -81,9 +81,9 @@ pub struct Controls {
     /// How objects are coloured.
     pub colouring: Colouring,
     /// True if the cells of the grid are shown.
-    pub has_cells: bool,
+    pub is_grid_shown: bool,
     /// True if the keys are listed.
-    pub has_help: bool,
+    pub is_help_shown: bool,
     /// True once the program is to end.
     pub is_ending: bool,
     /// True if the next frame is to be saved.
@@ -92,9 +92,9 @@ pub struct Controls {
 
 impl Controls {
     /// Returns the controls of a scene that runs, with its keys listed.
-    pub fn new(colouring: Colouring, has_cells: bool) -> Self {
+    pub fn new(colouring: Colouring, is_grid_shown: bool) -> Self {
         let (is_paused, is_ending, is_saving) = (false, false, false);
-        Self { is_paused, colouring, has_cells, has_help: true, is_ending, is_saving }
+        Self { is_paused, colouring, is_grid_shown, is_help_shown: true, is_ending, is_saving }
     }
 
     /// Does what a key asks for. `ball` is thrown if the key asks for one.
@@ -111,8 +111,8 @@ impl Controls {
             Action::Use(choice) => simulation.swap(choice),
             Action::ThrowBall => simulation.throw(ball),
             Action::NextColouring => self.colouring = self.colouring.next(),
-            Action::ToggleCells => self.has_cells = !self.has_cells,
-            Action::ToggleHelp => self.has_help = !self.has_help,
+            Action::ToggleCells => self.is_grid_shown = !self.is_grid_shown,
+            Action::ToggleHelp => self.is_help_shown = !self.is_help_shown,
             Action::SavePicture => self.is_saving = true,
             Action::Quit => self.is_ending = true,
         }
@@ -120,13 +120,13 @@ impl Controls {
 
     /// Describes the state in one line, which the program prints after each key.
     pub fn describe(&self, simulation: &Simulation) -> String {
-        let Self { is_paused, colouring, has_cells, has_help, .. } = self;
+        let Self { is_paused, colouring, is_grid_shown, is_help_shown, .. } = self;
         let scene = simulation.setting.scene.name;
         let (backend, steps) = (simulation.engine.choice(), simulation.steps);
         let (bodies, pairs) = (simulation.world.bodies.len(), simulation.pairs());
         format!(
             "scene={scene} bodies={bodies} step={steps} paused={is_paused} backend={backend:?} pairs={pairs} \
-             colouring={colouring:?} cells={has_cells} help={has_help}"
+             colouring={colouring:?} cells={is_grid_shown} help={is_help_shown}"
         )
     }
 }

@@ -2,7 +2,7 @@
 
 use crate::choice::Choice;
 use pbig_scenes::world::World;
-use rapier_pbig::{PbigBroadPhase, PbigConfig};
+use rapier_pbig::{Error, PbigBroadPhase, PbigConfig};
 use rapier3d::prelude::*;
 use std::collections::HashSet;
 use std::time::{Duration, Instant};
@@ -26,17 +26,18 @@ enum Kind {
     Pbig(Box<PbigBroadPhase>),
 }
 
+impl Kind {
+    fn pbig(config: PbigConfig) -> Self {
+        Self::Pbig(Box::new(PbigBroadPhase::with_config(config).expect("the default margin is a length")))
+    }
+}
+
 impl Engine {
     /// Creates a broad phase for a world that has not been stepped.
     pub fn new(choice: Choice) -> Self {
         let kind = match choice.backend() {
             None => Kind::Stock(Box::default()),
-            Some(backend) => {
-                let config = PbigConfig { backend, ..PbigConfig::DEFAULT };
-                let broad_phase =
-                    PbigBroadPhase::with_config(config).expect("the default margin is a length");
-                Kind::Pbig(Box::new(broad_phase))
-            }
+            Some(backend) => Kind::pbig(PbigConfig { backend, ..PbigConfig::DEFAULT }),
         };
         Self { choice, kind, pending: Vec::new(), time: Duration::ZERO, added: 0, deleted: 0 }
     }
@@ -63,6 +64,11 @@ impl Engine {
             Kind::Stock(_) => None,
             Kind::Pbig(pbig) => Some(pbig),
         }
+    }
+
+    /// Returns the error of the last update. Stock has none.
+    pub fn last_error(&self) -> Option<&Error> {
+        self.pbig().and_then(PbigBroadPhase::last_error)
     }
 
     /// Returns the time inside the broad phase since the last call.
@@ -109,20 +115,40 @@ fn show_world(stock: &mut DefaultBroadPhase, world: &World) -> Vec<BroadPhasePai
     }
     let mut events = Vec::new();
     stock.update(&world.params, &colliders, &world.bodies, &all, &[], &mut events);
-    let ended = ended_pairs(world, &events);
-    events.extend(ended.into_iter().map(BroadPhasePairEvent::DeletePair));
-    events
+    differences(world, &events)
 }
 
-/// Returns the pairs of the narrow phase that are not among the added ones.
-fn ended_pairs(world: &World, added: &[BroadPhasePairEvent]) -> Vec<ColliderPair> {
+/// Returns the events that turn the narrow phase's pairs into the added ones. The narrow phase would skip a pair that it already
+/// has, but the count of events would not.
+fn differences(world: &World, added: &[BroadPhasePairEvent]) -> Vec<BroadPhasePairEvent> {
+    let wanted: Vec<ColliderPair> = added.iter().map(event_pair).collect();
+    let found: Vec<ColliderPair> = world.pairs().collect();
+    let begun = missing_from(&found, &wanted).into_iter().map(BroadPhasePairEvent::AddPair);
+    let ended = missing_from(&wanted, &found).into_iter().map(BroadPhasePairEvent::DeletePair);
+    begun.chain(ended).collect()
+}
+
+/// Returns those of `pairs` that are not among `known`, whichever collider comes first.
+fn missing_from(known: &[ColliderPair], pairs: &[ColliderPair]) -> Vec<ColliderPair> {
     let sorted = |pair: &ColliderPair| {
         let (a, b) = (pair.collider1, pair.collider2);
         if a.into_raw_parts() < b.into_raw_parts() { (a, b) } else { (b, a) }
     };
-    let pair_of = |event: &BroadPhasePairEvent| match event {
-        BroadPhasePairEvent::AddPair(pair) | BroadPhasePairEvent::DeletePair(pair) => sorted(pair),
-    };
-    let added: HashSet<_> = added.iter().map(pair_of).collect();
-    world.pairs().filter(|pair| !added.contains(&sorted(pair))).collect()
+    let known: HashSet<_> = known.iter().map(sorted).collect();
+    pairs.iter().filter(|pair| !known.contains(&sorted(pair))).copied().collect()
+}
+
+fn event_pair(event: &BroadPhasePairEvent) -> ColliderPair {
+    match event {
+        BroadPhasePairEvent::AddPair(pair) | BroadPhasePairEvent::DeletePair(pair) => *pair,
+    }
+}
+
+#[cfg(test)]
+impl Engine {
+    /// Creates pbig with a limit on the number of pairs, above which updates fail.
+    pub(crate) fn with_max_pairs(max_pairs: u64) -> Self {
+        let kind = Kind::pbig(PbigConfig { max_pairs, ..PbigConfig::DEFAULT });
+        Self { kind, ..Self::new(Choice::Auto) }
+    }
 }

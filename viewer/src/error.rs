@@ -8,8 +8,10 @@ use std::path::PathBuf;
 pub enum Error {
     /// There is no graphics adapter, not even a software one.
     NoAdapter(String),
-    /// There is no display for a window.
-    NoDisplay,
+    /// There is no display for a window: the reason.
+    NoDisplay(String),
+    /// An update of the broad phase failed: the number of the step, and the reason.
+    Step(u64, String),
     /// A file or folder cannot be written: its path, and the reason.
     File(PathBuf, String),
 }
@@ -22,9 +24,10 @@ impl fmt::Display for Error {
                 "there is no graphics adapter: {why}\na software one will do; on Debian and Ubuntu: \
                  apt install mesa-vulkan-drivers libvulkan1"
             ),
-            Self::NoDisplay => f.write_str(
-                "there is no display: neither DISPLAY nor WAYLAND_DISPLAY is set; --frames DIR writes pictures without one",
-            ),
+            Self::NoDisplay(why) => {
+                write!(f, "there is no display: {why}\n--frames DIR writes pictures without one")
+            }
+            Self::Step(step, why) => write!(f, "step {step}: {why}"),
             Self::File(path, why) => write!(f, "{}: {why}", path.display()),
         }
     }

@@ -4,7 +4,7 @@ use crate::choice::Choice;
 use crate::controls::Controls;
 use crate::history::Summary;
 use crate::simulation::Simulation;
-use rapier_pbig::PbigBroadPhase;
+use rapier_pbig::{Error, PbigBroadPhase};
 
 /// The number of characters after which the plan's text is broken.
 const LINE_CHARS: usize = 52;
@@ -20,6 +20,8 @@ pub struct Figures {
     pub times: Vec<String>,
     /// Pairs and events.
     pub counts: String,
+    /// The error of the last update, broken into lines.
+    pub error: Vec<String>,
     /// The algorithm and the reasons, broken into lines.
     pub plan: Vec<String>,
     /// The legend of the colours, and what the cells show.
@@ -46,6 +48,7 @@ impl Figures {
                 engine.added,
                 engine.deleted
             ),
+            error: wrap(&error_text(engine.last_error()), LINE_CHARS),
             plan: wrap(&plan_text(engine.pbig()), LINE_CHARS),
             legend: legend_line(simulation, controls),
         }
@@ -54,7 +57,8 @@ impl Figures {
     /// Returns all lines, top to bottom.
     pub fn lines(&self) -> Vec<&str> {
         let head = [&self.scene, &self.broad_phase];
-        let rest = self.times.iter().chain([&self.counts]).chain(&self.plan).chain([&self.legend]);
+        let rest = self.times.iter().chain([&self.counts]).chain(&self.error);
+        let rest = rest.chain(&self.plan).chain([&self.legend]);
         head.into_iter().chain(rest).map(String::as_str).collect()
     }
 }
@@ -74,6 +78,10 @@ fn time_line(name: &str, last: f64, Summary { mean, p99, .. }: Summary) -> Strin
     format!("{name} {last:.2} ms  (mean {mean:.2}, p99 {p99:.2})")
 }
 
+fn error_text(error: Option<&Error>) -> String {
+    error.map(|error| format!("error: {error}")).unwrap_or_default()
+}
+
 /// Returns the algorithm and the reasons: the plan of the last update, and why a GPU was not used.
 fn plan_text(pbig: Option<&PbigBroadPhase>) -> String {
     let Some(pbig) = pbig else { return "a tree of boxes, updated and searched in each step".to_owned() };
@@ -86,7 +94,7 @@ fn plan_text(pbig: Option<&PbigBroadPhase>) -> String {
 
 fn legend_line(simulation: &Simulation, controls: &Controls) -> String {
     let legend = controls.colouring.legend();
-    match (controls.has_cells, simulation.engine.pbig()) {
+    match (controls.is_grid_shown, simulation.engine.pbig()) {
         (false, _) => legend.to_owned(),
         (true, None) => format!("{legend}; stock has no cells"),
         (true, Some(_)) => format!("{legend}; cells shown"),
@@ -111,6 +119,7 @@ fn wrap(text: &str, chars: usize) -> Vec<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::engine::Engine;
     use crate::palette::Colouring;
     use crate::simulation::Setting;
     use pbig_scenes::scenes::Scene;
@@ -131,6 +140,18 @@ mod tests {
         let stock = figures(Choice::Stock, 3);
         assert!(stock.broad_phase.starts_with("stock") && stock.plan[0].starts_with("a tree"));
         assert!(stock.lines().len() == stock.plan.len() + 6);
+    }
+
+    #[test]
+    fn an_error_of_the_broad_phase_is_shown() {
+        assert!(figures(Choice::Cpu, 1).error.is_empty() && figures(Choice::Stock, 1).error.is_empty());
+        let setting = Setting { scene: Scene::named("column").unwrap(), bodies: 200, seed: 1 };
+        let mut simulation = Simulation::new(setting, Choice::Auto);
+        simulation.engine = Engine::with_max_pairs(10);
+        simulation.step();
+        let figures = Figures::of(&simulation, &Controls::new(Colouring::Shape, false));
+        let shown = figures.lines().join(" ");
+        assert!(shown.contains("error: ") && shown.contains("10"), "{shown}");
     }
 
     #[test]

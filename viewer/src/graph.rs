@@ -31,7 +31,7 @@ pub fn draw(sheet: &mut Sheet, area: Area, history: &History, end_ms: f64, size:
     let points: Vec<[f32; 2]> = places(history, area, end_ms);
     let steps: Vec<&StepTime> = history.steps().collect();
     let mut start = 0;
-    for run in steps.chunk_by(|a, b| a.choice == b.choice) {
+    for run in steps.chunk_by(|a, b| a.swaps == b.swaps) {
         // A run begins where the one before it ends, so that the graph has no gap.
         let from = start.max(1) - 1;
         sheet.path(&points[from..start + run.len()], 0.1 * size, colour_of(run[0].choice));
@@ -76,7 +76,11 @@ mod tests {
     fn history(times: &[(Choice, f64)]) -> History {
         let mut history = History::default();
         for &(choice, broad_phase_ms) in times {
-            history.push(StepTime { choice, broad_phase_ms, step_ms: 1.0 });
+            if history.last().is_some_and(|last| last.choice != choice) {
+                history.count_swap();
+            }
+            let swaps = history.swaps();
+            history.push(StepTime { choice, swaps, broad_phase_ms, step_ms: 1.0 });
         }
         history
     }

@@ -11,6 +11,8 @@ pub const HISTORY_STEPS: usize = 300;
 pub struct StepTime {
     /// The broad phase that was measured.
     pub choice: Choice,
+    /// Swaps of the broad phase before the step.
+    pub swaps: u32,
     /// Time inside the broad phase, all its calls, in ms.
     pub broad_phase_ms: f64,
     /// Time of the whole step, the broad phase included, in ms.
@@ -21,6 +23,7 @@ pub struct StepTime {
 #[derive(Clone, Debug, Default)]
 pub struct History {
     steps: VecDeque<StepTime>,
+    swaps: u32,
 }
 
 /// Figures of some times, in ms. All zero without times.
@@ -59,9 +62,14 @@ impl History {
         self.steps.push_back(step);
     }
 
-    /// Forgets all steps.
-    pub fn clear(&mut self) {
-        self.steps.clear();
+    /// Counts a swap of the broad phase. Summaries start anew.
+    pub fn count_swap(&mut self) {
+        self.swaps += 1;
+    }
+
+    /// Returns the number of swaps so far.
+    pub fn swaps(&self) -> u32 {
+        self.swaps
     }
 
     /// Returns the steps, oldest first.
@@ -69,15 +77,19 @@ impl History {
         self.steps.iter()
     }
 
-    /// Returns the newest step.
+    /// Returns the newest step since the last swap.
     pub fn last(&self) -> Option<&StepTime> {
-        self.steps.back()
+        self.since_swap().next()
+    }
+
+    /// Returns the steps since the last swap, newest first.
+    fn since_swap(&self) -> impl Iterator<Item = &StepTime> {
+        self.steps.iter().rev().take_while(|step| step.swaps == self.swaps)
     }
 
     /// Summarizes one time of the shown steps since the last swap.
     pub fn summary(&self, time: impl Fn(&StepTime) -> f64) -> Summary {
-        let Some(last) = self.last() else { return Summary::default() };
-        Summary::of(self.steps.iter().rev().take_while(|step| step.choice == last.choice).map(time))
+        Summary::of(self.since_swap().map(time))
     }
 
     /// Returns the longest time inside the broad phase, in ms; 0 without steps.
@@ -90,8 +102,9 @@ impl History {
 mod tests {
     use super::*;
 
-    fn step(choice: Choice, broad_phase_ms: f64) -> StepTime {
-        StepTime { choice, broad_phase_ms, step_ms: 10.0 * broad_phase_ms }
+    fn push(history: &mut History, choice: Choice, broad_phase_ms: f64) {
+        let swaps = history.swaps();
+        history.push(StepTime { choice, swaps, broad_phase_ms, step_ms: 10.0 * broad_phase_ms });
     }
 
     #[test]
@@ -108,17 +121,28 @@ mod tests {
     #[test]
     fn old_steps_leave_and_a_swap_starts_a_new_summary() {
         let mut history = History::default();
-        (0..HISTORY_STEPS + 5).for_each(|i| history.push(step(Choice::Stock, i as f64)));
+        (0..HISTORY_STEPS + 5).for_each(|i| push(&mut history, Choice::Stock, i as f64));
         assert_eq!(
             (history.steps().len(), history.steps().next().unwrap().broad_phase_ms),
             (HISTORY_STEPS, 5.0)
         );
         assert_eq!(history.longest_broad_phase_ms(), (HISTORY_STEPS + 4) as f64);
-        history.push(step(Choice::Cpu, 1.0));
-        history.push(step(Choice::Cpu, 2.0));
+        history.count_swap();
+        assert_eq!((history.last(), history.summary(|step| step.step_ms)), (None, Summary::default()));
+        push(&mut history, Choice::Cpu, 1.0);
+        push(&mut history, Choice::Cpu, 2.0);
         assert_eq!(history.summary(|step| step.broad_phase_ms), Summary { mean: 1.5, median: 2.0, p99: 2.0 });
         assert_eq!(history.summary(|step| step.step_ms).mean, 15.0);
-        history.clear();
-        assert_eq!((history.last(), history.longest_broad_phase_ms()), (None, 0.0));
+    }
+
+    #[test]
+    fn a_broad_phase_that_comes_back_starts_a_new_summary() {
+        let mut history = History::default();
+        push(&mut history, Choice::Stock, 9.0);
+        history.count_swap();
+        history.count_swap();
+        push(&mut history, Choice::Stock, 1.0);
+        assert_eq!(history.summary(|step| step.broad_phase_ms).mean, 1.0);
+        assert_eq!(history.longest_broad_phase_ms(), 9.0, "the graph shows all");
     }
 }

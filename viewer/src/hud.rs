@@ -15,17 +15,19 @@ const PAPER: Rgba = [1.0, 1.0, 1.0, 0.82];
 const TEXT_SHARE: f32 = 0.026;
 /// The smallest readable height of a text line, in pixels.
 const MIN_TEXT_PIXELS: f32 = 15.0;
+/// The width that the graph and the keys need beside each other, in text lines.
+const WIDTH_IN_LINES: f32 = 48.0;
 /// The mean width of a character, as a share of its line's height.
 const CHAR_WIDTH: f32 = 0.44;
 
 /// Lays out the viewer's figures at the left, the keys at the right and the graph below. `size` is the picture's, in pixels.
 pub fn viewer(figures: &Figures, history: &History, controls: &Controls, size: [f32; 2]) -> Sheet {
     let mut sheet = Sheet::default();
-    let text = (TEXT_SHARE * size[1]).max(MIN_TEXT_PIXELS);
+    let text = (TEXT_SHARE * size[1]).min(size[0] / WIDTH_IN_LINES).max(MIN_TEXT_PIXELS);
     let choice = history.last().map(|step| step.choice);
     add_figures(&mut sheet, figures, choice, text);
     add_graph(&mut sheet, history, size, text);
-    if controls.has_help {
+    if controls.is_help_shown {
         add_keys(&mut sheet, size, text);
     }
     sheet
@@ -114,9 +116,19 @@ fn add_times(sheet: &mut Sheet, side: &Side<'_>, width: f32, text: f32) {
 mod tests {
     use super::*;
     use crate::history::StepTime;
+    use crate::options::MIN_SIZE;
     use crate::palette::Colouring;
     use crate::simulation::{Setting, Simulation};
     use pbig_scenes::scenes::Scene;
+
+    fn overlaps(a: Area, b: Area) -> bool {
+        a.x < b.x + b.width && b.x < a.x + a.width && a.y < b.y + b.height && b.y < a.y + a.height
+    }
+
+    fn has_overlap(sheet: &Sheet) -> bool {
+        let areas: Vec<Area> = sheet.panels.iter().map(|panel| panel.area).collect();
+        (1..areas.len()).any(|i| areas[..i].iter().any(|&area| overlaps(area, areas[i])))
+    }
 
     fn is_inside(sheet: &Sheet, size: [f32; 2]) -> bool {
         let is_area_inside = |area: &Area| {
@@ -140,8 +152,10 @@ mod tests {
     fn every_key_is_on_the_screen_unless_hidden() {
         let is_listed = |sheet: &Sheet, text: &str| sheet.texts.iter().any(|found| found.text == text);
         let shown = sheet(&Controls::new(Colouring::Shape, false), [1280.0, 800.0]);
-        let hidden =
-            sheet(&Controls { has_help: false, ..Controls::new(Colouring::Shape, false) }, [1280.0, 800.0]);
+        let hidden = sheet(
+            &Controls { is_help_shown: false, ..Controls::new(Colouring::Shape, false) },
+            [1280.0, 800.0],
+        );
         for binding in &BINDINGS {
             assert!(is_listed(&shown, binding.help) && !is_listed(&hidden, binding.help), "{}", binding.name);
         }
@@ -149,20 +163,22 @@ mod tests {
 
     #[test]
     fn nothing_leaves_the_screen() {
-        for size in [[1280.0, 800.0], [800.0, 600.0], [3840.0, 2160.0]] {
-            assert!(is_inside(&sheet(&Controls::new(Colouring::Shape, false), size), size), "{size:?}");
+        let controls = Controls::new(Colouring::Contacts, true);
+        let min = MIN_SIZE.map(|pixels| pixels as f32);
+        for size in [[1280.0, 800.0], [800.0, 600.0], [3840.0, 2160.0], [min[0], 2160.0], min] {
+            let sheet = sheet(&controls, size);
+            assert!(sheet.panels.len() == 3 && is_inside(&sheet, size), "{size:?}");
+            assert!(!has_overlap(&sheet), "{size:?}");
         }
-        assert!(
-            !is_inside(&sheet(&Controls::new(Colouring::Shape, false), [300.0, 200.0]), [300.0, 200.0]),
-            "too small for it"
-        );
+        assert!(!is_inside(&sheet(&controls, [300.0, 200.0]), [300.0, 200.0]), "too small for it");
+        assert!(has_overlap(&sheet(&controls, [min[0] - 40.0, min[1]])), "graph and keys meet");
     }
 
     #[test]
     fn a_comparison_shows_the_median_of_its_side() {
         let mut history = History::default();
         for broad_phase_ms in [1.0, 1.5, 9.0] {
-            history.push(StepTime { choice: Choice::Stock, broad_phase_ms, step_ms: 9.0 });
+            history.push(StepTime { choice: Choice::Stock, swaps: 0, broad_phase_ms, step_ms: 9.0 });
         }
         let side = Side { choice: Choice::Stock, history: &history, end_ms: 10.0, title: "step 2".into() };
         let sheet = comparison(&side, [640.0, 640.0]);

@@ -56,8 +56,8 @@ impl Options {
     }
 }
 
-/// Smallest width and height, in pixels: figures and keys need the room.
-const MIN_SIZE: [u32; 2] = [320, 240];
+/// Smallest width and height, in pixels: figures, graph and keys lie beside each other without overlap.
+pub const MIN_SIZE: [u32; 2] = [720, 500];
 /// Largest width and height, in pixels: the smallest limit that graphics adapters have.
 const MAX_SIZE: u32 = 8192;
 
@@ -76,8 +76,9 @@ mod tests {
 
     #[test]
     fn sizes_are_read_and_bad_ones_are_errors() {
-        assert_eq!(parse_size("640x480"), Ok([640, 480]));
-        for bad in ["640", "640x", "x480", "640x480x2", "-640x480", "0x0", "99999x480"] {
+        assert_eq!(parse_size("720x500"), Ok(MIN_SIZE));
+        for bad in ["800", "800x", "x600", "800x600x2", "-800x600", "0x0", "99999x600", "719x500", "720x499"]
+        {
             assert!(parse_size(bad).is_err(), "{bad}");
         }
     }

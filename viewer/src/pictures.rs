@@ -17,12 +17,12 @@ use std::path::Path;
 /// Writes a picture of every n-th step into a folder, as `00000.png` and so on by the number of steps.
 ///
 /// # Errors
-/// If a picture cannot be written.
+/// If a picture cannot be written, or the broad phase fails in a step.
 pub async fn run(options: &Options, folder: &Path) -> Result<(), Error> {
     let mut studio = Studio::new(options).await;
     for step in 0..=options.steps {
         if step > 0 {
-            studio.step();
+            studio.step()?;
         }
         if step % options.every == 0 {
             save(&studio.picture().await, &folder.join(format!("{step:05}.png")))?;
@@ -67,13 +67,13 @@ impl Studio {
             (simulation, view)
         };
         let sides = choices.into_iter().map(&mut side).collect();
-        let controls = Controls { has_help: false, ..Controls::new(options.colour, options.cells) };
+        let controls = Controls { is_help_shown: false, ..Controls::new(options.colour, options.cells) };
         Self { window, sides, controls, has_comparison: options.compare }
     }
 
     /// Makes one step on each side in turn, so that both see the same noise of the machine.
-    fn step(&mut self) {
-        self.sides.iter_mut().for_each(|(simulation, _)| simulation.step());
+    fn step(&mut self) -> Result<(), Error> {
+        step_all(self.sides.iter_mut().map(|(simulation, _)| simulation))
     }
 
     /// Draws all sides, left to right.
@@ -104,6 +104,14 @@ impl Studio {
     }
 }
 
+/// Makes one step of each simulation, and ends with the first that fails.
+fn step_all<'a>(mut simulations: impl Iterator<Item = &'a mut Simulation>) -> Result<(), Error> {
+    simulations.try_for_each(|simulation| {
+        simulation.step();
+        simulation.check()
+    })
+}
+
 /// Returns a number with a comma before each three digits.
 fn thousands(number: usize) -> String {
     let digits = number.to_string();
@@ -131,11 +139,23 @@ fn beside(pictures: &[RgbImage]) -> RgbImage {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::engine::Engine;
+    use crate::simulation::Setting;
     use image::Rgb;
+    use pbig_scenes::scenes::Scene;
 
     #[test]
     fn numbers_have_a_comma_before_each_three_digits() {
         assert_eq!([0, 999, 1000, 1234567].map(thousands), ["0", "999", "1,000", "1,234,567"]);
+    }
+
+    #[test]
+    fn a_step_fails_with_the_broad_phase_of_either_side() {
+        let setting = Setting { scene: Scene::named("column").unwrap(), bodies: 200, seed: 1 };
+        let mut sides = [Choice::Stock, Choice::Auto].map(|choice| Simulation::new(setting, choice));
+        assert_eq!(step_all(sides.iter_mut()), Ok(()));
+        sides[1].engine = Engine::with_max_pairs(10);
+        assert!(matches!(step_all(sides.iter_mut()), Err(Error::Step(2, _))));
     }
 
     #[test]

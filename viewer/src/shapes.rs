@@ -163,7 +163,7 @@ pub fn surfaces(world: &World) -> Vec<Surface> {
     world.colliders.iter_enabled().filter_map(|(_, collider)| surface(collider)).collect()
 }
 
-/// Returns true if a half-space with an upward normal through the origin is among the colliders: the scenes' ground.
+/// Returns true if a half-space is among the colliders. It is drawn as ground at height 0, where all scenes have theirs.
 pub fn has_ground(world: &World) -> bool {
     world.colliders.iter().any(|(_, collider)| collider.shape().as_halfspace().is_some())
 }

@@ -10,22 +10,22 @@ use crate::pictures::save;
 use crate::simulation::Simulation;
 use kiss3d::event::{Action as KeyAction, WindowEvent};
 use kiss3d::window::Window;
+use std::any::Any;
+use std::panic::{self, AssertUnwindSafe};
 
 /// Opens a window and runs the scene in it until the window is closed. Prints the state after each key.
 ///
 /// # Errors
-/// If there is no display, or a picture cannot be written.
+/// If there is no display, or a window cannot be opened on it.
 pub async fn run(options: &Options, quality: Quality) -> Result<(), Error> {
-    check_display()?;
-    let [width, height] = options.size;
-    let mut window = Window::new_with_setup("pbig", width, height, quality.canvas_setup()).await;
+    let mut window = open(options.size, quality)?;
     let mut simulation = Simulation::new(options.setting(), options.backend);
     let mut controls = Controls::new(options.colour, options.cells);
     let mut view = View::new(&mut window, &simulation, quality);
     println!("ready {}", controls.describe(&simulation));
     while !controls.is_ending && draw(&mut window, &mut view, &simulation, &controls).await {
         if std::mem::take(&mut controls.is_saving) {
-            save_picture(options, &window)?;
+            save_picture(options, &window);
         }
         if !controls.is_paused {
             simulation.step();
@@ -56,18 +56,61 @@ fn actions(window: &Window) -> Vec<Action> {
     pressed.collect()
 }
 
-/// Saves the last frame under the first free number.
-fn save_picture(options: &Options, window: &Window) -> Result<(), Error> {
+/// Saves the last frame under the first free number. An error is printed, because the scene can go on without the picture.
+fn save_picture(options: &Options, window: &Window) {
     let paths = (1..).map(|number: u32| options.pictures.join(format!("viewer-{number:03}.png")));
     let path = paths.into_iter().find(|path| !path.exists()).unwrap_or_default();
-    save(&window.snap_image(), &path)?;
-    println!("saved {}", path.display());
-    Ok(())
+    match save(&window.snap_image(), &path) {
+        Ok(()) => println!("saved {}", path.display()),
+        Err(error) => eprintln!("the picture was not saved: {error}"),
+    }
 }
 
-/// The window library panics without a display, so this says first what is missing.
+/// Opens the window. The window library panics if it reaches no display or lacks a library of the display, so the panic becomes
+/// an error here.
+fn open([width, height]: [u32; 2], quality: Quality) -> Result<Window, Error> {
+    check_display()?;
+    let opening = || Window::new_with_setup("pbig", width, height, quality.canvas_setup());
+    let window = without_panic_message(|| kiss3d::pollster::block_on(opening()));
+    window.map_err(|panic| Error::NoDisplay(text_of(&*panic)))
+}
+
+/// Calls a function, and returns its panic instead of printing it.
+fn without_panic_message<T>(call: impl FnOnce() -> T) -> Result<T, Box<dyn Any + Send>> {
+    let hook = panic::take_hook();
+    panic::set_hook(Box::new(|_| {}));
+    let result = panic::catch_unwind(AssertUnwindSafe(call));
+    panic::set_hook(hook);
+    result
+}
+
+/// Returns the text of a panic.
+fn text_of(panic: &(dyn Any + Send)) -> String {
+    let text = panic.downcast_ref::<String>().map(String::as_str);
+    let text = text.or_else(|| panic.downcast_ref::<&str>().copied());
+    text.unwrap_or("the window library gave no reason").to_owned()
+}
+
+/// Says what is missing, in clearer words than the window library's.
 fn check_display() -> Result<(), Error> {
     let is_set = |name: &str| std::env::var_os(name).is_some_and(|value| !value.is_empty());
     let needs_one = cfg!(all(unix, not(target_os = "macos")));
-    if needs_one && !is_set("DISPLAY") && !is_set("WAYLAND_DISPLAY") { Err(Error::NoDisplay) } else { Ok(()) }
+    if needs_one && !is_set("DISPLAY") && !is_set("WAYLAND_DISPLAY") {
+        return Err(Error::NoDisplay("neither DISPLAY nor WAYLAND_DISPLAY is set".into()));
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_panic_is_returned_with_its_text() {
+        assert_eq!(without_panic_message(|| 7).ok(), Some(7));
+        let text = |call: fn()| without_panic_message(call).map_err(|panic| text_of(&*panic));
+        assert_eq!(text(|| panic!("plain")), Err("plain".into()));
+        assert_eq!(text(|| panic!("number {}", std::hint::black_box(3))), Err("number 3".into()));
+        assert!(text(|| panic::panic_any(3)).unwrap_err().contains("no reason"));
+    }
 }

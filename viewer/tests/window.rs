@@ -256,13 +256,13 @@ fn pictures_need_no_display() {
     let folder = out("frames");
     let path = folder.to_str().unwrap();
     let options =
-        ["--frames", path, "--steps", "20", "--every", "10", "--bodies", "300", "--size", "640x480"];
+        ["--frames", path, "--steps", "20", "--every", "10", "--bodies", "300", "--size", "720x500"];
     let output = without_display(&options);
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     let pictures = ["00000.png", "00010.png", "00020.png"].map(|name| open(&folder.join(name)));
     assert_eq!(std::fs::read_dir(&folder).unwrap().count(), pictures.len());
     for two in pictures.windows(2) {
-        assert!(two[0].dimensions() == (640, 480) && colours(&two[0]) > 100);
+        assert!(two[0].dimensions() == (720, 500) && colours(&two[0]) > 100);
         assert!(difference(&two[0], &two[1]) > 0.005, "objects fall");
     }
 }
@@ -290,6 +290,35 @@ fn without_a_display_the_window_says_what_is_missing() {
         !output.status.success() && text.contains("there is no display") && !text.contains("panicked"),
         "{text}"
     );
+}
+
+#[test]
+#[cfg(target_os = "linux")]
+#[ignore = "needs a graphics adapter: scripts/viewer.sh"]
+fn a_display_that_nobody_serves_is_an_error_with_its_reason() {
+    for (name, value) in [("DISPLAY", ":9999"), ("WAYLAND_DISPLAY", "nothing")] {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_viewer"));
+        command.args(["--bodies", "10"]).env_remove("DISPLAY").env_remove("WAYLAND_DISPLAY").env(name, value);
+        let output = command.output().unwrap();
+        let text = String::from_utf8(output.stderr).unwrap();
+        assert_eq!(output.status.code(), Some(1), "{text}");
+        assert!(text.contains("there is no display") && text.contains("event loop"), "{text}");
+        assert!(!text.contains("panicked"), "{text}");
+    }
+}
+
+#[test]
+#[ignore = "needs Xvfb, xdotool and a graphics adapter: scripts/viewer.sh"]
+fn a_picture_that_cannot_be_written_does_not_end_the_window() {
+    let folder = out("unwritable");
+    std::fs::create_dir_all(&folder).unwrap();
+    let file = folder.join("file");
+    std::fs::write(&file, "").unwrap();
+    let mut viewer = Viewer::start(&["--bodies", "50", "--pictures", file.to_str().unwrap()]);
+    viewer.press("p", "SavePicture");
+    // The frame of the next key comes after the picture, and that of the one after it shows that the window goes on.
+    (0..2).for_each(|_| viewer.press("s", "Step"));
+    assert!(!file.is_dir() && viewer.process.0.try_wait().unwrap().is_none());
 }
 
 #[test]

@@ -46,7 +46,7 @@ pub struct View {
     flat_camera: FixedView2d,
     radius: f32,
     quality: Quality,
-    /// The world for which the stage was built: its scene, and its number of resets.
+    /// The name of the scene for which the stage was built. A reset builds the same scene, and needs no new stage.
     scene: &'static str,
 }
 
@@ -95,12 +95,12 @@ impl View {
     }
 
     fn show(&mut self, simulation: &Simulation, controls: &Controls) {
-        let is_needed = controls.has_cells || controls.colouring == Colouring::Cell;
+        let is_needed = controls.is_grid_shown || controls.colouring == Colouring::Cell;
         let cells = if is_needed { Cells::of(simulation) } else { Cells::default() };
         let palette = Palette::new(controls.colouring, &simulation.world, &cells);
         let mut instances = Vec::new();
         shapes::instances(&simulation.world, &palette, &mut instances);
-        self.stage.show(&instances, if controls.has_cells { &cells.occupied } else { &[] });
+        self.stage.show(&instances, if controls.is_grid_shown { &cells.occupied } else { &[] });
     }
 }
 

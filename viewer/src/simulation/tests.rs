@@ -1,0 +1,205 @@
+//! Tests of steps, swaps and errors.
+
+use super::*;
+
+fn column(choice: Choice) -> Simulation {
+    let scene = Scene::named("column").unwrap();
+    Simulation::new(Setting { scene, bodies: 300, seed: 1 }, choice)
+}
+
+fn sleeping(simulation: &Simulation) -> usize {
+    simulation.world.bodies.iter().filter(|(_, body)| body.is_sleeping()).count()
+}
+
+/// The pairs whose boxes overlap without a margin, by brute force. Every broad phase must report each of them.
+fn touching(world: &World) -> Vec<(ColliderHandle, ColliderHandle)> {
+    let dynamic = |collider: &Collider| collider.parent().is_some_and(|body| world.bodies[body].is_dynamic());
+    let boxes: Vec<_> =
+        world.colliders.iter().map(|(handle, c)| (handle, c.compute_aabb(), dynamic(c))).collect();
+    let mut pairs = Vec::new();
+    for (i, (a, box_a, dynamic_a)) in boxes.iter().enumerate() {
+        for (b, box_b, dynamic_b) in &boxes[i + 1..] {
+            if (*dynamic_a || *dynamic_b) && box_a.intersects(box_b) {
+                pairs.push((*a, *b));
+            }
+        }
+    }
+    pairs
+}
+
+fn missing(simulation: &Simulation) -> usize {
+    let world = &simulation.world;
+    let is_known = |&(a, b): &(_, _)| world.narrow_phase.contact_pair(a, b).is_some();
+    touching(world).iter().filter(|pair| !is_known(pair)).count()
+}
+
+#[test]
+fn the_world_goes_on_through_every_swap_and_no_pair_is_lost() {
+    let mut simulation = column(Choice::Stock);
+    let (mut choice, mut steps) = (Choice::Stock, 0);
+    for _ in 0..7 {
+        (0..15).for_each(|_| simulation.step());
+        steps += 15;
+        assert_eq!((simulation.steps, missing(&simulation)), (steps, 0), "with {choice:?}");
+        assert!(!touching(&simulation.world).is_empty());
+        choice = choice.next();
+        simulation.swap(choice);
+        assert_eq!(simulation.engine.choice(), choice);
+        simulation.step();
+        steps += 1;
+        assert_eq!(missing(&simulation), 0, "in the step after the swap to {choice:?}");
+    }
+}
+
+/// A new broad phase that nobody shows the world misses sleeping colliders: so the check above can fail.
+#[test]
+fn without_showing_the_world_pairs_are_lost() {
+    let mut simulation = column(Choice::Cpu);
+    (0..60).for_each(|_| simulation.step());
+    simulation.world.narrow_phase = NarrowPhase::new();
+    simulation.engine = Engine::new(Choice::Stock);
+    simulation.step();
+    assert!(missing(&simulation) > 0);
+}
+
+#[test]
+fn a_swap_wakes_nobody() {
+    let scene = Scene::named("pile").unwrap();
+    let mut simulation = Simulation::new(Setting { scene, bodies: 64, seed: 1 }, Choice::Cpu);
+    (0..400).for_each(|_| simulation.step());
+    let before = sleeping(&simulation);
+    assert!(before > 0, "the pile is asleep");
+    for choice in [Choice::Stock, Choice::Cpu, Choice::Stock] {
+        simulation.swap(choice);
+        simulation.step();
+        assert_eq!(sleeping(&simulation), before, "after the swap to {choice:?}");
+    }
+}
+
+/// A broad phase that reports nothing.
+struct Blind;
+
+impl BroadPhase for Blind {
+    fn update(
+        &mut self,
+        _: &IntegrationParameters,
+        _: &ColliderSet,
+        _: &RigidBodySet,
+        _: &[ColliderHandle],
+        _: &[ColliderHandle],
+        _: &mut Vec<BroadPhasePairEvent>,
+    ) {
+    }
+}
+
+#[test]
+fn a_swap_ends_pairs_that_ended_before() {
+    for choice in [Choice::Stock, Choice::Cpu] {
+        let mut simulation = column(Choice::Cpu);
+        simulation.step();
+        let (pairs, bodies) = (simulation.pairs(), simulation.world.bodies.len());
+        for (i, (_, body)) in simulation.world.bodies.iter_mut().enumerate() {
+            body.set_translation(vector![10.0 * i as f32, 1000.0, 0.0], true);
+        }
+        simulation.world.step(&mut Blind);
+        assert!(simulation.pairs() == pairs && pairs > bodies);
+        simulation.swap(choice);
+        simulation.step();
+        // The ground is endless, and pairs with each body.
+        assert_eq!(simulation.pairs(), bodies, "{choice:?}");
+    }
+}
+
+#[test]
+fn the_same_setting_gives_the_same_world_after_a_reset() {
+    let mut simulation = column(Choice::Cpu);
+    let start = simulation.world.pose_bits();
+    simulation.step();
+    let one_step = simulation.world.pose_bits();
+    assert_ne!(start, one_step);
+    simulation.reset();
+    assert_eq!((simulation.steps, simulation.world.pose_bits()), (0, start));
+    simulation.step();
+    assert_eq!(simulation.world.pose_bits(), one_step);
+}
+
+#[test]
+fn every_scene_comes_in_turn() {
+    let mut simulation = column(Choice::Cpu);
+    let first = simulation.setting.scene.name;
+    for _ in Scene::ALL {
+        simulation.setting = simulation.setting.next_scene();
+    }
+    assert_eq!(simulation.setting.scene.name, first);
+    simulation.next_scene();
+    assert!(simulation.setting.scene.name != first && simulation.steps == 0);
+}
+
+#[test]
+fn a_thrown_ball_flies() {
+    let mut simulation = column(Choice::Cpu);
+    let before = simulation.world.bodies.len();
+    simulation.throw(Ball { from: [-50.0, 3.0, 0.0], velocity: [60.0, 0.0, 0.0], radius: 1.0 });
+    assert_eq!(simulation.world.bodies.len(), before + 1);
+    simulation.step();
+    let farthest =
+        simulation.world.bodies.iter().map(|(_, body)| body.translation().x).fold(f32::MAX, f32::min);
+    assert!((farthest + 49.0).abs() < 0.01, "{farthest}");
+}
+
+#[test]
+fn each_swap_sends_only_the_pairs_that_differ() {
+    let mut simulation = column(Choice::Cpu);
+    let known = |it: &Simulation| it.engine.added - it.engine.deleted;
+    for choice in [Choice::Stock, Choice::Cpu, Choice::Stock, Choice::Brute, Choice::Cpu] {
+        (0..15).for_each(|_| simulation.step());
+        let added = simulation.engine.added;
+        simulation.swap(choice);
+        simulation.step();
+        let pairs = simulation.pairs() as u64;
+        assert_eq!(known(&simulation), pairs, "after the swap to {choice:?}");
+        assert!(simulation.engine.added - added < pairs, "{pairs} pairs are not announced again");
+        assert_eq!(simulation.world.pairs().count() as u64, pairs);
+    }
+}
+
+#[test]
+fn figures_after_a_swap_are_of_the_new_broad_phase_alone() {
+    let mut simulation = column(Choice::Stock);
+    for (i, choice) in [Choice::Cpu, Choice::Stock, Choice::Cpu].into_iter().enumerate() {
+        (0..3).for_each(|_| simulation.step());
+        simulation.swap(choice);
+        assert_eq!(simulation.history.last(), None);
+        simulation.step();
+        assert_eq!(simulation.history.last(), None, "the first step sets up");
+        simulation.step();
+        let last = simulation.history.last().unwrap();
+        assert_eq!((last.choice, last.swaps as usize), (choice, i + 1));
+        assert_eq!(simulation.history.summary(|step| step.step_ms).p99, last.step_ms, "of one step");
+    }
+}
+
+#[test]
+fn a_swap_to_the_broad_phase_in_use_changes_nothing() {
+    for choice in [Choice::Stock, Choice::Cpu] {
+        let mut simulation = column(choice);
+        simulation.step();
+        let before = (simulation.engine.added, simulation.history.last().copied());
+        assert!(before.1.is_some());
+        simulation.swap(choice);
+        assert_eq!((simulation.engine.added, simulation.history.last().copied()), before, "{choice:?}");
+        simulation.step();
+        assert_eq!((simulation.history.steps().len(), simulation.history.swaps()), (2, 0));
+    }
+}
+
+#[test]
+fn an_error_of_the_broad_phase_is_that_of_the_step() {
+    let mut simulation = column(Choice::Auto);
+    simulation.step();
+    assert_eq!(simulation.check(), Ok(()));
+    simulation.engine = Engine::with_max_pairs(10);
+    simulation.step();
+    let error = simulation.check().unwrap_err().to_string();
+    assert!(error.starts_with("step 2: ") && error.contains("10"), "{error}");
+}
