@@ -47,9 +47,10 @@ wasm_linker() {
     echo "/usr/bin/wasm-ld-$(/usr/bin/rustc -vV | sed -n 's/^LLVM version: \([0-9]*\).*/\1/p')"
 }
 
-# target_folder: cargo's folder for what it builds.
+# target_folder [OPTION...]: cargo's folder for what it builds, as an absolute path. Call it where cargo is called: a relative
+# CARGO_TARGET_DIR starts there.
 target_folder() {
-    cargo metadata --no-deps --format-version 1 | sed 's/.*"target_directory":"\([^"]*\)".*/\1/'
+    cargo metadata --no-deps --format-version 1 "$@" | sed 's/.*"target_directory":"\([^"]*\)".*/\1/'
 }
 
 # left_out WHAT: says that something cannot run here. With CI=true it ends the script as a failure.
