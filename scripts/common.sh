@@ -47,7 +47,8 @@ wasm_linker() {
     echo "/usr/bin/wasm-ld-$(/usr/bin/rustc -vV | sed -n 's/^LLVM version: \([0-9]*\).*/\1/p')"
 }
 
-# target_folder [--manifest-path FILE]: cargo's folder for what it builds.
+# target_folder [OPTION...]: cargo's folder for what it builds, as an absolute path. Call it where cargo is called: a relative
+# CARGO_TARGET_DIR starts there.
 target_folder() {
     cargo metadata --no-deps --format-version 1 "$@" | sed 's/.*"target_directory":"\([^"]*\)".*/\1/'
 }

@@ -1,10 +1,11 @@
 #!/usr/bin/env bash
 # Builds the web page of falling objects into a folder of static files, which any file server serves:
-#   scripts/page.sh [--no-setup] [--test] [FOLDER]     FOLDER: out/page
+#   scripts/page.sh [--no-setup] [--test] [FOLDER]     FOLDER: out/page here; an earlier page there is replaced
 #   python3 -m http.server -d out/page
 # It calls setup.sh first, unless told not to. --test also runs the tests of the page, those in headless Chromium included;
 # their screenshots go to out/page-shots. From clean it takes some minutes, most of them for Rust.
 set -euo pipefail
+caller=$PWD
 cd "$(dirname "$0")/.."
 setup=true test=false out=out/page
 for argument in "$@"; do
@@ -12,16 +13,22 @@ for argument in "$@"; do
     --no-setup) setup=false ;;
     --test) test=true ;;
     -*) echo "there is no option '$argument'; the options: --no-setup --test" >&2 && exit 2 ;;
-    *) out=$argument ;;
+    /*) out=$argument ;;
+    *) out=$caller/$argument ;;
     esac
 done
-! $setup || scripts/setup.sh rust wasm page || true
-. scripts/common.sh
 target=wasm32-unknown-unknown
 manifest=page/Cargo.toml
 tools=page/node_modules/.bin
-# The workspace's own folder for what it builds, as an absolute path.
-built=$(cargo metadata --no-deps --format-version 1 --manifest-path "$manifest" | sed 's/.*"target_directory":"\([^"]*\)".*/\1/')
+
+# check_folder: refuses a folder of other files than an earlier page's, because `bundle` deletes what is there.
+check_folder() {
+    if [ ! -e "$out" ] || [ -f "$out/pbig_page_bg.wasm" ]; then return; fi
+    if [ ! -d "$out" ] || [ -n "$(ls -A "$out")" ]; then
+        echo "'$out' is not a page that this script built; choose a folder that is empty or not there" >&2
+        exit 2
+    fi
+}
 
 # build_module FOLDER [OPTION...]: rapier and pbig as a WebAssembly module, and the JavaScript beside it. The module has SIMD,
 # and no unwinding. The program that writes the JavaScript is small: optimizing it would take longer than it runs.
@@ -48,9 +55,11 @@ install_tools() {
 bundle() {
     rm -rf "$out"
     mkdir -p "$out/licences"
+    # First, because `check_folder` looks for it, also after a bundle that failed.
+    cp "$built/bindings/pbig_page_bg.wasm" "$out"
     step "$tools/esbuild" page/web/main.js page/web/worker.js page/web/style.css --bundle --minify --format=esm \
         --target=es2022 --log-level=warning --alias:pbig-page-module="$built/bindings/pbig_page.js" --outdir="$out"
-    cp page/web/index.html page/web/start.js "$built/bindings/pbig_page_bg.wasm" "$out"
+    cp page/web/index.html page/web/start.js "$out"
     cp LICENSE-MIT LICENSE-APACHE "$out/licences"
     for package in three uplot wasm-feature-detect; do
         cp "page/node_modules/$package/LICENSE" "$out/licences/$package.txt"
@@ -72,20 +81,32 @@ test_page() {
     build_deterministic
     build_native
     PAGE_FOLDER=$(cd "$out" && pwd) NATIVE_PAIRS=$built/release/native_pairs DETERMINISTIC=$built/deterministic \
-        SHOTS=$PWD/out/page-shots step node --test --test-reporter=spec --test-concurrency=1 page/tests/*.test.mjs
+        CHROMIUM=$(command -v chromium) SHOTS=$PWD/out/page-shots \
+        step node --test --test-reporter=spec --test-concurrency=1 page/tests/*.test.mjs
 }
 
+# has_new_node: puppeteer-core, which drives the browser, needs Node 22.
+has_new_node() {
+    [ "$(node -p 'process.versions.node.split(".")[0]')" -ge 22 ]
+}
+
+check_folder
+! $setup || scripts/setup.sh rust wasm page || true
+. scripts/common.sh
 choose_cargo "$target" && has npm || { left_out "$target or npm" && exit 0; }
 if $builds_std; then
     export CARGO_TARGET_WASM32_UNKNOWN_UNKNOWN_LINKER
     CARGO_TARGET_WASM32_UNKNOWN_UNKNOWN_LINKER=$(wasm_linker)
 fi
+# The workspace's own folder for what it builds.
+built=$(target_folder --manifest-path "$manifest")
 build_module "$built/bindings"
 install_tools
 bundle
 echo "== the page is in $out; serve it with: python3 -m http.server -d $out"
 if $test; then
     has chromium || { left_out "the page's tests: there is no Chromium" && exit 0; }
+    has_new_node || { left_out "the page's tests, which need Node 22: this is $(node --version)" && exit 0; }
     test_page
     echo "== page: all passed"
 fi

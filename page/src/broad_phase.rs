@@ -33,11 +33,11 @@ enum Inner {
     Pbig(Box<PbigBroadPhase>),
 }
 
-/// The broad phase in use, the time spent in it, and what a change left behind.
+/// The broad phase in use, the time spent in it, and the events of a change.
 pub struct ExchangeableBroadPhase {
     inner: Inner,
-    /// Pairs of the narrow phase from before a change to stock. The next update ends those that stock does not add.
-    inherited: Vec<ColliderPair>,
+    /// Events of a change to stock, which the next update sends.
+    pending: Vec<BroadPhasePairEvent>,
     spent_ms: f64,
 }
 
@@ -48,7 +48,7 @@ impl ExchangeableBroadPhase {
             Choice::Stock => Inner::Stock(Box::default()),
             Choice::Pbig => Inner::Pbig(Box::default()),
         };
-        Self { inner, inherited: Vec::new(), spent_ms: 0.0 }
+        Self { inner, pending: Vec::new(), spent_ms: 0.0 }
     }
 
     /// Returns the broad phase in use.
@@ -59,18 +59,15 @@ impl ExchangeableBroadPhase {
         }
     }
 
-    /// Changes the broad phase of a running world.
-    pub fn change(&mut self, choice: Choice, world: &mut World) {
+    /// Changes the broad phase of a running world. The narrow phase keeps its pairs, and sleeping bodies stay asleep.
+    pub fn change(&mut self, choice: Choice, world: &World) {
         if choice == self.choice() {
             return;
         }
         *self = Self::new(choice);
         match &mut self.inner {
             Inner::Pbig(pbig) => pbig.adopt(&world.narrow_phase),
-            Inner::Stock(_) => {
-                self.inherited = world.pairs().collect();
-                list_all_colliders(&mut world.colliders);
-            }
+            Inner::Stock(stock) => self.pending = show_world(stock, world),
         }
     }
 
@@ -88,19 +85,34 @@ impl ExchangeableBroadPhase {
     }
 }
 
-/// Makes rapier list every collider in the next step, as moved. Its own broad phase learns of a collider in no other way, and
-/// sleeping or fixed ones are not listed by themselves.
-fn list_all_colliders(colliders: &mut ColliderSet) {
+/// Shows all colliders of a world to a new stock broad phase, and returns the events that bring the narrow phase up to date.
+/// Stock skips colliders that are not marked as changed, so this marks a copy of them: rapier wakes the bodies of colliders that
+/// are marked in the world itself.
+fn show_world(stock: &mut DefaultBroadPhase, world: &World) -> Vec<BroadPhasePairEvent> {
+    let colliders = marked_colliders(world);
+    let all: Vec<_> = colliders.iter_enabled().map(|(handle, _)| handle).collect();
+    let mut events = Vec::new();
+    stock.update(&world.params, &colliders, &world.bodies, &all, &[], &mut events);
+    differences(world, &events)
+}
+
+/// Returns a copy of a world's colliders, all marked as moved.
+fn marked_colliders(world: &World) -> ColliderSet {
+    let mut colliders = world.colliders.clone();
     for (_, collider) in colliders.iter_mut() {
         collider.set_position(*collider.position());
     }
+    colliders
 }
 
-/// Appends the end of each inherited pair that is not among the new ones.
-fn end_pairs(inherited: Vec<ColliderPair>, events: &mut Vec<BroadPhasePairEvent>) {
-    let added: HashSet<_> = events.iter().filter_map(added_pair).map(sorted).collect();
-    let ended = inherited.into_iter().filter(|pair| !added.contains(&sorted(*pair)));
-    events.extend(ended.map(BroadPhasePairEvent::DeletePair));
+/// Returns the additions that the narrow phase lacks, and the ends of its pairs that are not among the additions.
+fn differences(world: &World, additions: &[BroadPhasePairEvent]) -> Vec<BroadPhasePairEvent> {
+    let held: HashSet<_> = world.pairs().map(sorted).collect();
+    let added: HashSet<_> = additions.iter().filter_map(added_pair).map(sorted).collect();
+    let is_new = |pair: &ColliderPair| !held.contains(&sorted(*pair));
+    let new = additions.iter().filter_map(added_pair).filter(is_new);
+    let ended = world.pairs().filter(|pair| !added.contains(&sorted(*pair)));
+    new.map(BroadPhasePairEvent::AddPair).chain(ended.map(BroadPhasePairEvent::DeletePair)).collect()
 }
 
 fn added_pair(event: &BroadPhasePairEvent) -> Option<ColliderPair> {
@@ -126,6 +138,7 @@ impl BroadPhase for ExchangeableBroadPhase {
         removed: &[ColliderHandle],
         events: &mut Vec<BroadPhasePairEvent>,
     ) {
+        events.append(&mut self.pending);
         let start_ms = now_ms();
         let inner: &mut dyn BroadPhase = match &mut self.inner {
             Inner::Stock(stock) => &mut **stock,
@@ -133,9 +146,6 @@ impl BroadPhase for ExchangeableBroadPhase {
         };
         inner.update(params, colliders, bodies, modified, removed, events);
         self.spent_ms += now_ms() - start_ms;
-        if !self.inherited.is_empty() {
-            end_pairs(std::mem::take(&mut self.inherited), events);
-        }
     }
 }
 

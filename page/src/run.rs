@@ -50,7 +50,7 @@ impl Run {
 
     /// Changes the broad phase; the world goes on.
     pub fn change_broad_phase(&mut self, choice: Choice) {
-        self.broad_phase.change(choice, &mut self.world);
+        self.broad_phase.change(choice, &self.world);
     }
 
     #[cfg(test)]

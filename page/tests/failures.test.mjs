@@ -64,6 +64,17 @@ test("a worker that is not there", async () => {
     assert.match(await waitForMessage(page, "The simulation stopped"), /worker\.js/);
 });
 
+test("without module workers", async () => {
+    const page = await open(browser, server.address, (page) =>
+        page.evaluateOnNewDocument(() => {
+            globalThis.Worker = class {
+                terminate() {}
+            };
+        }),
+    );
+    await waitForMessage(page, "no module workers");
+});
+
 test("opened as a file", async () => {
     const page = await open(browser, `${pathToFileURL(resolve(folder))}/index.html`);
     await waitForMessage(page, "needs a file server");
@@ -92,4 +103,21 @@ test("a lost graphics context", async () => {
     };
     await page.evaluate(lose);
     assert.match(await waitForMessage(page, "The simulation stopped"), /Reload the page/);
+});
+
+test("a simulation that is dropped in the middle of a call does not stop the next one", async () => {
+    const page = await open(browser, `${server.address}?bodies=5000`);
+    await waitForSteps(page, 1);
+    await page.evaluate(() => {
+        const [canvas, reset] = ["canvas", "reset"].map((id) => document.getElementById(id));
+        // The page's own listener is called before this one: the simulation has failed, and still builds.
+        canvas.addEventListener("webglcontextlost", () => reset.click());
+        reset.click();
+        canvas.getContext("webgl2").getExtension("WEBGL_lose_context").loseContext();
+    });
+    await page.waitForFunction(() => {
+        const [message, title] = ["message", "message-title"].map((id) => document.getElementById(id));
+        return message.hidden || !title.textContent.startsWith("Loading");
+    });
+    await waitForSteps(page, 1);
 });

@@ -4,8 +4,9 @@ import assert from "node:assert/strict";
 import { test } from "node:test";
 import { Pace, STEP_MS } from "../web/pace.js";
 import { LEVELS, Quality } from "../web/quality.js";
-import { findMissing } from "../web/requirements.js";
+import { findMissing, hasModuleWorkers } from "../web/requirements.js";
 import { bodyChoices, formatSettings, parseSettings } from "../web/settings.js";
+import { Simulation, SimulationEnded } from "../web/simulation.js";
 import { formatMs, mean, p99, Times, WINDOW_STEPS } from "../web/times.js";
 
 test("mean and p99 by hand", () => {
@@ -82,4 +83,34 @@ test("the first missing requirement is named; a check that throws counts as miss
     assert.equal(await findMissing([there]), undefined);
     assert.equal((await findMissing([there, absent, broken])).name, "absent");
     assert.equal((await findMissing([there, broken])).name, "broken");
+});
+
+test("a worker that does not read its type cannot be a module", () => {
+    class Classic {
+        terminate() {}
+    }
+    class Modern extends Classic {
+        constructor(url, { type }) {
+            super();
+            this.type = type;
+        }
+    }
+    assert.deepEqual([Modern, Classic].map(hasModuleWorkers), [true, false]);
+});
+
+test("the end of a simulation is not a failure of its calls", async () => {
+    let worker;
+    globalThis.Worker = class {
+        constructor() {
+            worker = this;
+        }
+        postMessage() {}
+        terminate() {}
+    };
+    const simulation = new Simulation();
+    const [broken, ended] = [simulation.step(), simulation.build({})];
+    worker.onmessage({ data: { id: 1, error: "no such scene" } });
+    simulation.end();
+    await assert.rejects(broken, (error) => !(error instanceof SimulationEnded) && error.message === "no such scene");
+    await assert.rejects(ended, SimulationEnded);
 });

@@ -115,7 +115,7 @@ test("every scene builds and draws", async () => {
     const page = await openScene("?bodies=100", DESKTOP, "dark");
     await waitForSteps(page, 1);
     const scenes = await page.$$eval("#scene option", (options) => options.map((option) => option.value));
-    assert.ok(scenes.length >= 14, `${scenes}`);
+    assert.ok(scenes.length >= 22, `${scenes}`);
     for (const scene of scenes) {
         await page.select("#scene", scene);
         await page.waitForFunction((name) => location.search.includes(`scene=${name}`), {}, scene);

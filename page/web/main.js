@@ -5,7 +5,7 @@ import { Pace, STEP_MS } from "./pace.js";
 import { Panel } from "./panel.js";
 import { findMissing } from "./requirements.js";
 import { formatSettings, parseSettings } from "./settings.js";
-import { Simulation } from "./simulation.js";
+import { Simulation, SimulationEnded } from "./simulation.js";
 import { Stage } from "./stage.js";
 import { Times } from "./times.js";
 
@@ -138,7 +138,7 @@ class Page {
 
     // Runs a task after those before it. None runs after a failure.
     #do(task) {
-        this.#tasks = this.#tasks.then(() => this.#hasFailed || task()).catch((error) => this.#fail(error));
+        this.#tasks = this.#tasks.then(() => this.#hasFailed || task()).catch((error) => this.#failUnlessEnded(error));
         return this.#tasks;
     }
 
@@ -158,6 +158,11 @@ class Page {
         if (this.#isPaused || this.#isStepping || this.#hasFailed || !this.#pace.takeStep(now)) return;
         this.#isStepping = true;
         this.#do(() => this.#step()).then(() => (this.#isStepping = false));
+    }
+
+    // What a dropped simulation still had to do is of no concern to the next one.
+    #failUnlessEnded(error) {
+        if (!(error instanceof SimulationEnded)) this.#fail(error);
     }
 
     #fail(error) {

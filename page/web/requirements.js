@@ -20,7 +20,27 @@ const REQUIREMENTS = [
         advice: "It may be switched off with the browser's graphics acceleration.",
     },
     { name: "Web Workers", isThere: async () => typeof Worker === "function", advice: "" },
+    {
+        name: "module workers",
+        isThere: async () => hasModuleWorkers(Worker),
+        advice: "Browsers have them since Chrome 80, Firefox 114 and Safari 15.",
+    },
 ];
+
+/** Returns true if workers can be modules. A browser without such workers does not read the option that asks for one. */
+export function hasModuleWorkers(WorkerClass) {
+    let isRead = false;
+    const options = {
+        get type() {
+            isRead = true;
+            return "module";
+        },
+    };
+    const empty = URL.createObjectURL(new Blob([], { type: "text/javascript" }));
+    new WorkerClass(empty, options).terminate();
+    URL.revokeObjectURL(empty);
+    return isRead;
+}
 
 /** Returns the first requirement that the browser lacks, or undefined. */
 export async function findMissing(requirements = REQUIREMENTS) {

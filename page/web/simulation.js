@@ -1,5 +1,8 @@
 // The worker that steps the world, as an object with asynchronous methods.
 
+/** The rejection of the calls that were under way when their simulation was ended. */
+export class SimulationEnded extends Error {}
+
 /** A worker whose answers are promises. Once one is rejected by a trap or by the worker itself, make a new one. */
 export class Simulation {
     #worker;
@@ -9,7 +12,7 @@ export class Simulation {
     constructor(url = "worker.js") {
         this.#worker = new Worker(url, { type: "module" });
         this.#worker.onmessage = ({ data }) => this.#settle(data);
-        this.#worker.onerror = (event) => this.#failAll(event.message || `${url} could not be loaded`);
+        this.#worker.onerror = (event) => this.#failAll(new Error(event.message || `${url} could not be loaded`));
     }
 
     /** Loads the module, and returns the scenes: `{ name, about, hard }`. */
@@ -40,7 +43,7 @@ export class Simulation {
     /** Ends the worker. */
     end() {
         this.#worker.terminate();
-        this.#failAll("the simulation was ended");
+        this.#failAll(new SimulationEnded("the simulation was ended"));
     }
 
     #call(method, ...parameters) {
@@ -56,8 +59,8 @@ export class Simulation {
         else reject(new Error(error));
     }
 
-    #failAll(message) {
-        for (const { reject } of this.#waiting.values()) reject(new Error(message));
+    #failAll(error) {
+        for (const { reject } of this.#waiting.values()) reject(error);
         this.#waiting.clear();
     }
 }

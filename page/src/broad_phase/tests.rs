@@ -69,7 +69,75 @@ fn a_change_loses_no_pair_and_leaves_none_behind() {
     }
 }
 
-/// Sleeping and fixed colliders are lost if rapier does not list them again.
+/// Returns two runs of the same world after ten steps.
+fn twins(choice: Choice) -> [Run; 2] {
+    [(); 2].map(|()| {
+        let mut run = Run::new("sleeping", 150, 1, choice).unwrap();
+        for _ in 0..10 {
+            run.step().unwrap();
+        }
+        run
+    })
+}
+
+fn sleepers(world: &World) -> HashSet<RigidBodyHandle> {
+    world.bodies.iter().filter(|(_, body)| body.is_sleeping()).map(|(handle, _)| handle).collect()
+}
+
+/// Compares the sleeping bodies of two runs in ten further steps; the first run has been changed.
+fn check_sleepers([mut changed, mut other]: [Run; 2]) -> Result<(), String> {
+    for step in 1..=10 {
+        changed.step()?;
+        other.step()?;
+        let [left, expected] = [&changed, &other].map(|run| sleepers(&run.world));
+        assert!(expected.len() > 100, "too few sleep: {}", expected.len());
+        let woken: Vec<_> = expected.difference(&left).collect();
+        if left != expected {
+            return Err(format!("step {step}: woken: {woken:?}"));
+        }
+    }
+    Ok(())
+}
+
+#[test]
+fn a_change_wakes_no_body() {
+    for [before, after] in [[Choice::Stock, Choice::Pbig], [Choice::Pbig, Choice::Stock]] {
+        let mut runs = twins(before);
+        runs[0].change_broad_phase(after);
+        check_sleepers(runs).unwrap();
+    }
+}
+
+/// Rapier wakes the bodies of colliders that are marked as moved in the world itself.
+#[test]
+fn the_check_notices_bodies_that_a_change_wakes() {
+    let mut runs = twins(Choice::Pbig);
+    runs[0].change_broad_phase(Choice::Stock);
+    runs[0].world.colliders = marked_colliders(&runs[0].world);
+    assert!(check_sleepers(runs).is_err());
+}
+
+/// Returns the pairs without those of two fixed colliders.
+fn movable_pairs(world: &World) -> Pairs {
+    world.pairs().map(sorted).filter(|pair| !has_fixed(world, pair)).collect()
+}
+
+/// Stock has the pairs that it would have had from the start.
+#[test]
+fn a_change_leaves_the_pairs_of_resting_bodies_equal() {
+    let [mut changed, _] = twins(Choice::Pbig);
+    let [mut other, _] = twins(Choice::Stock);
+    for choice in [Choice::Stock, Choice::Pbig, Choice::Stock] {
+        changed.change_broad_phase(choice);
+        for step in 1..=5 {
+            changed.step().unwrap();
+            other.step().unwrap();
+            assert_eq!(movable_pairs(&changed.world), movable_pairs(&other.world), "{choice:?}, step {step}");
+        }
+    }
+}
+
+/// Sleeping and fixed colliders are lost to a stock broad phase to which nobody shows them.
 #[test]
 fn the_check_notices_a_broad_phase_that_starts_empty() {
     let lost = run("sleeping", 7, |run, choice| run.replace_broad_phase(ExchangeableBroadPhase::new(choice)));
