@@ -1,11 +1,11 @@
-//! What each key does.
+//! Keys and their actions.
 
 use crate::choice::Choice;
 use crate::palette::Colouring;
 use crate::simulation::{Ball, Simulation};
 use kiss3d::event::Key;
 
-/// What a key asks for.
+/// The action of a key.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Action {
     /// Stop, or go on.
