@@ -42,7 +42,7 @@ pub struct Binding {
     pub name: &'static str,
     /// The action.
     pub action: Action,
-    /// What the action does, in a few words.
+    /// The action in a few words.
     pub help: &'static str,
 }
 
@@ -73,7 +73,7 @@ pub fn action_of(key: Key) -> Option<Action> {
     BINDINGS.iter().find(|binding| binding.key == key).map(|binding| binding.action)
 }
 
-/// What is shown, and whether the scene runs.
+/// Switches: parts of the picture, and whether the scene runs.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Controls {
     /// True while the scene stands still.

@@ -102,7 +102,7 @@ fn stages_add_up_to_at_most_the_whole() {
         assert!(table.rows.len() > 10, "{}", table.name);
         for row in &table.rows {
             let number = |k: usize| row[k].as_f64().unwrap_or(0.0);
-            // Of events all are means; medians of parts need not add up to the median of the whole.
+            // Events have means only: medians of parts need not add up to the median of the whole.
             let parts: f64 = (5..11).map(number).sum();
             assert!(parts > 0.0 && (table.name != "events" || parts <= number(4) * 1.001), "{row:?}");
         }

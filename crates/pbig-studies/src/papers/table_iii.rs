@@ -232,7 +232,7 @@ fn counted(scale: &Scale) -> Result<Table, Failure> {
     Ok(table)
 }
 
-/// The same on a device, with cells as our plan has them and as the paper's `W` gives them.
+/// Counts on a device, with cells as our plan has them and as the paper's `W` gives them.
 fn on_device(scale: &Scale, device: &Device) -> Result<Table, Failure> {
     let n = if device.is_software() { scale.on_device(device) } else { scale.most_boxes };
     let columns = "DoC | boxes | pairs | checks, our W | ms, our W | checks, the paper's W | ms, the paper's W | ms printed";

@@ -52,7 +52,7 @@ fn median_edge(world: &World) -> f32 {
     edges.get(edges.len() / 2).copied().unwrap_or_default()
 }
 
-/// The same world for each margin.
+/// A world, run once with each margin.
 struct Worlds(Vec<Run<PbigBroadPhase>>);
 
 impl Worlds {
@@ -110,7 +110,7 @@ pub(super) fn boxes(quick: bool) -> Result<Vec<Row>, Failure> {
 
 const CONFIG: Config = Config { limits: Limits::UNLIMITED, ..Config::DEFAULT };
 
-/// The same boxes for each margin.
+/// Boxes, with a broad phase for each margin.
 struct Boxes {
     wander: Wander,
     finders: Vec<BroadPhase>,
