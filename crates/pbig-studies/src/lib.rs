@@ -11,4 +11,5 @@ mod reported;
 pub mod stages;
 pub mod steady;
 mod trees;
+pub mod whole_steps;
 pub mod wide;

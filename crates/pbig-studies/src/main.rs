@@ -3,7 +3,7 @@
 use clap::{Parser, Subcommand};
 use pbig_harness::output::{Failure, finish, print, tracked};
 use pbig_harness::report::Report;
-use pbig_studies::{accuracy, papers, peers, stages, steady};
+use pbig_studies::{accuracy, papers, peers, stages, steady, whole_steps};
 use serde_json::{Map, json};
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -32,6 +32,8 @@ enum Command {
         #[arg(long, value_name = "N,N", value_delimiter = ',')]
         boxes: Vec<usize>,
     },
+    /// Whole steps of rapier with its own broad phase and with pbig's, of every scene.
+    WholeSteps(Options),
     /// Run time against error.
     Accuracy {
         #[command(flatten)]
@@ -65,6 +67,7 @@ fn run(command: Command) -> Result<(), Failure> {
         Command::Stages(options) => told(&options, &stages::run(options.quick)?),
         Command::Peers(options) => told(&options, &peers::run(options.quick)?),
         Command::Steady { options, boxes } => told(&options, &steady::run(options.quick, &boxes)?),
+        Command::WholeSteps(options) => told(&options, &whole_steps::run(options.quick)),
         Command::Accuracy { options, only } => run_accuracy(&options, only),
     }
 }
