@@ -1,5 +1,4 @@
 # Functions that the other scripts share; they source this file from the repository's root.
-# PBIG_SETUP=no: nothing is installed.
 PATH=$PATH:/usr/sbin:/sbin
 if [ -f "${HOME:-}/.cargo/env" ]; then . "$HOME/.cargo/env"; fi
 
@@ -51,6 +50,18 @@ wasm_linker() {
 # CARGO_TARGET_DIR starts there.
 target_folder() {
     cargo metadata --no-deps --format-version 1 "$@" | sed 's/.*"target_directory":"\([^"]*\)".*/\1/'
+}
+
+# Where setup.sh installs a Node for the page's tests, if the system's is too old.
+node_folder=out/node
+
+# new_node: prints a Node of version 22 or newer, which the page's tests need.
+new_node() {
+    local node
+    for node in node "$PWD/$node_folder/node_modules/node/bin/node"; do
+        if has "$node" && [ "$("$node" -p 'process.versions.node.split(".")[0]')" -ge 22 ]; then echo "$node" && return; fi
+    done
+    return 1
 }
 
 # left_out WHAT: says that something cannot run here. With CI=true it ends the script as a failure.

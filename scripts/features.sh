@@ -48,7 +48,7 @@ for kind in "$@"; do
         lint rapier-pbig "" parallel gpu serde debug-render shadow
         lint pbig-core "" gpu unstable-study
         ;;
-    powerset-0.36) lint rapier-pbig "--manifest-path rapier-0.36/Cargo.toml" parallel gpu shadow ;;
+    powerset-0.36) lint rapier-pbig "--manifest-path rapier-0.36/Cargo.toml" parallel gpu debug-render shadow ;;
     *) test_with "$kind" ;;
     esac
 done

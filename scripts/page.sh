@@ -82,16 +82,13 @@ test_page() {
     build_native
     PAGE_FOLDER=$(cd "$out" && pwd) NATIVE_PAIRS=$built/release/native_pairs DETERMINISTIC=$built/deterministic \
         CHROMIUM=$(command -v chromium) SHOTS=$PWD/out/page-shots \
-        step node --test --test-reporter=spec --test-concurrency=1 page/tests/*.test.mjs
-}
-
-# has_new_node: puppeteer-core, which drives the browser, needs Node 22.
-has_new_node() {
-    [ "$(node -p 'process.versions.node.split(".")[0]')" -ge 22 ]
+        step "$node" --test --test-reporter=spec --test-concurrency=1 page/tests/*.test.mjs
 }
 
 check_folder
-! $setup || scripts/setup.sh rust wasm page || true
+parts="rust wasm page"
+! $test || parts="$parts browser"
+! $setup || scripts/setup.sh $parts || true
 . scripts/common.sh
 choose_cargo "$target" && has npm || { left_out "$target or npm" && exit 0; }
 if $builds_std; then
@@ -106,7 +103,7 @@ bundle
 echo "== the page is in $out; serve it with: python3 -m http.server -d $out"
 if $test; then
     has chromium || { left_out "the page's tests: there is no Chromium" && exit 0; }
-    has_new_node || { left_out "the page's tests, which need Node 22: this is $(node --version)" && exit 0; }
+    node=$(new_node) || { left_out "the page's tests, which need Node 22: this is $(node --version)" && exit 0; }
     test_page
     echo "== page: all passed"
 fi

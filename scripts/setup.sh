@@ -1,8 +1,8 @@
 #!/usr/bin/env bash
 # Installs what the scripts need, and says what. Where it may not install, it prints the command to run. With CI=true that is a
 # failure.
-#   scripts/setup.sh [PART...]     parts: rust patch vulkan wasm page aarch64 spirv deny msrv semver viewer pictures; without one:
-#                                  all but page, aarch64, viewer and pictures
+#   scripts/setup.sh [PART...]     parts: rust patch vulkan wasm page browser aarch64 spirv deny msrv semver viewer pictures;
+#                                  without one: all but page, browser, aarch64, viewer and pictures
 # Debian and Ubuntu: packages by apt, as root or by sudo without a password. Elsewhere it only says what is missing.
 set -euo pipefail
 cd "$(dirname "$0")/.."
@@ -76,11 +76,18 @@ setup_wasm() {
     has node || require node nodejs || true
 }
 
-# The web page's tools come from npm. Its test needs a browser and a file server.
+# The web page's tools come from npm; python3 serves the page.
 setup_page() {
     has npm || require npm npm || true
     has python3 || require python3 python3 || true
+}
+
+# The page's tests need a browser, and a newer Node than Debian has. npm has its binaries.
+setup_browser() {
     has chromium || require "the browser Chromium" chromium || true
+    ! new_node >/dev/null || return 0
+    step npm install --silent --no-audit --no-fund --prefix "$node_folder" node@22 || true
+    new_node >/dev/null || missing "Node 22" "npm install --prefix $node_folder node@22"
 }
 
 setup_aarch64() {

@@ -136,6 +136,9 @@ step_rapier_0_36() {
     check cargo fetch --locked $in_036
     check cargo fmt $in_036 $members_036 --check
     check cargo clippy --release $in_036 $members_036 --all-targets -- -D warnings
+    # The viewer is tested by scripts/viewer.sh.
+    check cargo fmt --manifest-path rapier-0.36/viewer/Cargo.toml --check
+    check cargo fetch --locked --manifest-path rapier-0.36/viewer/Cargo.toml
     check scripts/features.sh powerset-0.36
     check cargo test --release $in_036 $members_036 --no-fail-fast
     check cargo test --release $in_036 -p pbig-harness-036 --no-default-features --features enhanced-determinism

@@ -1,10 +1,10 @@
 //! A broad phase that changes between rapier's own and pbig's while a world runs, with a clock around it.
 
 use crate::clock::now_ms;
+use pbig_scenes::stock::StockBroadPhase;
 use pbig_scenes::world::World;
 use rapier_pbig::PbigBroadPhase;
 use rapier3d::prelude::*;
-use std::collections::HashSet;
 use std::str::FromStr;
 
 /// The broad phase in use.
@@ -29,15 +29,13 @@ impl FromStr for Choice {
 }
 
 enum Inner {
-    Stock(Box<DefaultBroadPhase>),
+    Stock(Box<StockBroadPhase>),
     Pbig(Box<PbigBroadPhase>),
 }
 
-/// The broad phase in use, the time spent in it, and the events of a change.
+/// The broad phase in use, and the time spent in it.
 pub struct ExchangeableBroadPhase {
     inner: Inner,
-    /// Events of a change to stock, which the next update sends.
-    pending: Vec<BroadPhasePairEvent>,
     spent_ms: f64,
 }
 
@@ -48,7 +46,7 @@ impl ExchangeableBroadPhase {
             Choice::Stock => Inner::Stock(Box::default()),
             Choice::Pbig => Inner::Pbig(Box::default()),
         };
-        Self { inner, pending: Vec::new(), spent_ms: 0.0 }
+        Self { inner, spent_ms: 0.0 }
     }
 
     /// Returns the broad phase in use.
@@ -67,7 +65,7 @@ impl ExchangeableBroadPhase {
         *self = Self::new(choice);
         match &mut self.inner {
             Inner::Pbig(pbig) => pbig.adopt(&world.narrow_phase),
-            Inner::Stock(stock) => self.pending = show_world(stock, world),
+            Inner::Stock(stock) => **stock = StockBroadPhase::adopt(world),
         }
     }
 
@@ -85,49 +83,6 @@ impl ExchangeableBroadPhase {
     }
 }
 
-/// Shows all colliders of a world to a new stock broad phase, and returns the events that bring the narrow phase up to date.
-/// Stock skips colliders that are not marked as changed, so this marks a copy of them: rapier wakes the bodies of colliders that
-/// are marked in the world itself.
-fn show_world(stock: &mut DefaultBroadPhase, world: &World) -> Vec<BroadPhasePairEvent> {
-    let colliders = marked_colliders(world);
-    let all: Vec<_> = colliders.iter_enabled().map(|(handle, _)| handle).collect();
-    let mut events = Vec::new();
-    stock.update(&world.params, &colliders, &world.bodies, &all, &[], &mut events);
-    differences(world, &events)
-}
-
-/// Returns a copy of a world's colliders, all marked as moved.
-fn marked_colliders(world: &World) -> ColliderSet {
-    let mut colliders = world.colliders.clone();
-    for (_, collider) in colliders.iter_mut() {
-        collider.set_position(*collider.position());
-    }
-    colliders
-}
-
-/// Returns the additions that the narrow phase lacks, and the ends of its pairs that are not among the additions.
-fn differences(world: &World, additions: &[BroadPhasePairEvent]) -> Vec<BroadPhasePairEvent> {
-    let held: HashSet<_> = world.pairs().map(sorted).collect();
-    let added: HashSet<_> = additions.iter().filter_map(added_pair).map(sorted).collect();
-    let is_new = |pair: &ColliderPair| !held.contains(&sorted(*pair));
-    let new = additions.iter().filter_map(added_pair).filter(is_new);
-    let ended = world.pairs().filter(|pair| !added.contains(&sorted(*pair)));
-    new.map(BroadPhasePairEvent::AddPair).chain(ended.map(BroadPhasePairEvent::DeletePair)).collect()
-}
-
-fn added_pair(event: &BroadPhasePairEvent) -> Option<ColliderPair> {
-    match event {
-        BroadPhasePairEvent::AddPair(pair) => Some(*pair),
-        BroadPhasePairEvent::DeletePair(_) => None,
-    }
-}
-
-fn sorted(pair: ColliderPair) -> [(u32, u32); 2] {
-    let mut handles = [pair.collider1, pair.collider2].map(ColliderHandle::into_raw_parts);
-    handles.sort_unstable();
-    handles
-}
-
 impl BroadPhase for ExchangeableBroadPhase {
     fn update(
         &mut self,
@@ -138,7 +93,6 @@ impl BroadPhase for ExchangeableBroadPhase {
         removed: &[ColliderHandle],
         events: &mut Vec<BroadPhasePairEvent>,
     ) {
-        events.append(&mut self.pending);
         let start_ms = now_ms();
         let inner: &mut dyn BroadPhase = match &mut self.inner {
             Inner::Stock(stock) => &mut **stock,
@@ -150,4 +104,48 @@ impl BroadPhase for ExchangeableBroadPhase {
 }
 
 #[cfg(test)]
-mod tests;
+mod tests {
+    use super::*;
+    use crate::Run;
+    use std::collections::BTreeSet;
+
+    /// Returns the sleeping bodies, and the pairs without those of two fixed colliders, which stock reports, too.
+    fn state(run: &Run) -> (Vec<RigidBodyHandle>, BTreeSet<[(u32, u32); 2]>) {
+        let World { bodies, colliders, .. } = &run.world;
+        let asleep = bodies.iter().filter(|(_, body)| body.is_sleeping()).map(|(handle, _)| handle);
+        let both = |pair: ColliderPair| [pair.collider1, pair.collider2];
+        let can_move = |pair: &[ColliderHandle; 2]| pair.iter().any(|&it| colliders[it].parent().is_some());
+        let raw = |pair: [ColliderHandle; 2]| {
+            let mut raw = pair.map(ColliderHandle::into_raw_parts);
+            raw.sort_unstable();
+            raw
+        };
+        (asleep.collect(), run.world.pairs().map(both).filter(can_move).map(raw).collect())
+    }
+
+    /// After each change a world has the pairs that it would have had with stock from the start, and sleeps on.
+    #[test]
+    fn a_change_leaves_resting_bodies_alone() {
+        let [mut changed, mut other] = [Choice::Pbig, Choice::Stock].map(|choice| {
+            let mut run = Run::new("sleeping", 150, 1, choice).unwrap();
+            (0..10).try_for_each(|_| run.step().map(drop)).unwrap();
+            run
+        });
+        for choice in [Choice::Stock, Choice::Pbig, Choice::Stock] {
+            changed.change_broad_phase(choice);
+            for step in 1..=5 {
+                (changed.step().unwrap(), other.step().unwrap());
+                let (found, expected) = (state(&changed), state(&other));
+                assert!(expected.0.len() > 100, "too few sleep: {}", expected.0.len());
+                assert_eq!(found, expected, "{choice:?}, step {step}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_wrong_name_is_answered_with_the_right_ones() {
+        assert_eq!("pbig".parse(), Ok(Choice::Pbig));
+        let error = "grid".parse::<Choice>().unwrap_err();
+        assert!(error.contains("'grid'") && error.contains("stock, pbig"), "{error}");
+    }
+}

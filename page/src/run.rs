@@ -53,11 +53,6 @@ impl Run {
         self.broad_phase.change(choice, &self.world);
     }
 
-    #[cfg(test)]
-    pub(crate) fn replace_broad_phase(&mut self, broad_phase: ExchangeableBroadPhase) {
-        self.broad_phase = broad_phase;
-    }
-
     /// Returns the number of steps so far.
     pub fn steps(&self) -> u32 {
         self.steps

@@ -1,9 +1,10 @@
 //! The cells of pbig's grid, and the cell of each collider.
 
+use crate::engine::Pbig;
+use crate::rapier::boxes;
 use crate::simulation::Simulation;
 use pbig_core::Plan;
-use rapier_pbig::{DebugRenderParts, PbigBroadPhase};
-use rapier3d::pipeline::{DebugColor, DebugRenderBackend, DebugRenderObject};
+use rapier_pbig::DebugRenderParts;
 use rapier3d::prelude::*;
 use std::collections::HashMap;
 
@@ -41,15 +42,14 @@ impl Cells {
         self.of_collider.get(&collider).copied()
     }
 
-    fn read(pbig: &PbigBroadPhase, colliders: &ColliderSet) -> Self {
-        let (mut cells, mut boxes) = (Boxes::default(), Boxes::default());
-        pbig.debug_render(colliders, DebugRenderParts { cells: true, fat_boxes: false }, &mut cells);
-        pbig.debug_render(colliders, DebugRenderParts { cells: false, fat_boxes: true }, &mut boxes);
-        let occupied = cells.boxes.iter().map(|(_, cell, _)| *cell).collect();
+    fn read(pbig: &Pbig, colliders: &ColliderSet) -> Self {
+        let cells = boxes(pbig, colliders, DebugRenderParts { cells: true, fat_boxes: false });
+        let fat_boxes = boxes(pbig, colliders, DebugRenderParts { cells: false, fat_boxes: true });
+        let occupied = cells.into_iter().map(|(_, cell, _)| cell).collect();
         let plan = &pbig.stats().report.plan;
-        let in_grid = boxes.boxes.iter().filter(|(.., is_in_grid)| *is_in_grid);
+        let in_grid = fat_boxes.into_iter().filter(|(.., is_in_grid)| *is_in_grid);
         let of_collider =
-            in_grid.filter_map(|(handle, fat, _)| Some((*handle, cell_at(fat.min, plan)?))).collect();
+            in_grid.filter_map(|(handle, fat, _)| Some((handle, cell_at(fat.min, plan)?))).collect();
         Self { occupied, of_collider }
     }
 }
@@ -67,33 +67,6 @@ fn cell_at(corner: [f32; 3], plan: &Plan) -> Option<[i64; 3]> {
         index.clamp(1, (i64::from(plan.dims[i]) - 2).max(1))
     };
     has_cells.then(|| std::array::from_fn(along))
-}
-
-/// Collects the boxes that pbig draws: its cells, or the stored boxes of colliders.
-#[derive(Default)]
-struct Boxes {
-    /// The collider, the box, and whether it lies in a cell.
-    boxes: Vec<(ColliderHandle, Cell, bool)>,
-}
-
-impl DebugRenderBackend for Boxes {
-    fn draw_line(&mut self, _: DebugRenderObject, _: Point<Real>, _: Point<Real>, _: DebugColor) {}
-
-    fn draw_polyline(
-        &mut self,
-        object: DebugRenderObject,
-        _: &[Point<Real>],
-        _: &[[u32; 2]],
-        _: &Isometry<Real>,
-        _: &Vector<Real>,
-        [_, saturation, lightness, _]: DebugColor,
-    ) {
-        if let DebugRenderObject::ColliderAabb(handle, _, aabb) = object {
-            let cell = Cell { min: aabb.mins.into(), max: aabb.maxs.into(), lightness };
-            // Pbig draws boxes outside the grid in grey.
-            self.boxes.push((handle, cell, saturation > 0.0));
-        }
-    }
 }
 
 #[cfg(test)]

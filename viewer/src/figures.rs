@@ -2,9 +2,10 @@
 
 use crate::choice::Choice;
 use crate::controls::Controls;
+use crate::engine::Pbig;
 use crate::history::Summary;
 use crate::simulation::Simulation;
-use rapier_pbig::{Error, PbigBroadPhase};
+use rapier_pbig::Error;
 
 /// The number of characters after which the plan's text is broken.
 const LINE_CHARS: usize = 52;
@@ -42,12 +43,7 @@ impl Figures {
                 time_line("broad phase", last[0], broad_phase),
                 time_line("whole step", last[1], step),
             ],
-            counts: format!(
-                "{} pairs, events: {} added, {} removed",
-                simulation.pairs(),
-                engine.added,
-                engine.deleted
-            ),
+            counts: counts_line(simulation.pairs(), engine.events()),
             error: wrap(&error_text(engine.last_error()), LINE_CHARS),
             plan: wrap(&plan_text(engine.pbig()), LINE_CHARS),
             legend: legend_line(simulation, controls),
@@ -69,8 +65,8 @@ fn scene_line(simulation: &Simulation, controls: &Controls) -> String {
     format!("{name}: {bodies} bodies, step {}{paused}", simulation.steps)
 }
 
-fn broad_phase_line(choice: Choice, pbig: Option<&PbigBroadPhase>) -> String {
-    let adapter = pbig.and_then(PbigBroadPhase::adapter).filter(|_| choice == Choice::Gpu);
+fn broad_phase_line(choice: Choice, pbig: Option<&Pbig>) -> String {
+    let adapter = pbig.and_then(Pbig::adapter).filter(|_| choice == Choice::Gpu);
     adapter.map_or_else(|| choice.name().to_owned(), |adapter| format!("{}: {adapter}", choice.name()))
 }
 
@@ -78,12 +74,19 @@ fn time_line(name: &str, last: f64, Summary { mean, p99, .. }: Summary) -> Strin
     format!("{name} {last:.2} ms  (mean {mean:.2}, p99 {p99:.2})")
 }
 
+fn counts_line(pairs: usize, events: Option<[u64; 2]>) -> String {
+    match events {
+        Some([added, deleted]) => format!("{pairs} pairs, events: {added} added, {deleted} removed"),
+        None => format!("{pairs} pairs"),
+    }
+}
+
 fn error_text(error: Option<&Error>) -> String {
     error.map(|error| format!("error: {error}")).unwrap_or_default()
 }
 
 /// Returns the algorithm and the reasons: the plan of the last update, and why a GPU was not used.
-fn plan_text(pbig: Option<&PbigBroadPhase>) -> String {
+fn plan_text(pbig: Option<&Pbig>) -> String {
     let Some(pbig) = pbig else { return "a tree of boxes, updated and searched in each step".to_owned() };
     let report = pbig.stats().report;
     match &report.fallback {

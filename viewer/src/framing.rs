@@ -1,6 +1,8 @@
 //! Where the camera stands.
 
+use crate::shapes::to_vec3;
 use crate::simulation::Ball;
+use kiss3d::prelude::Vec3;
 use pbig_scenes::world::World;
 use rapier3d::prelude::*;
 
@@ -28,18 +30,20 @@ impl Framing {
     /// Returns a place from which the moving objects of a world can be seen. Without one it looks at all objects.
     pub fn of(world: &World) -> Self {
         let around = bounds(world, true).or_else(|| bounds(world, false));
-        let around = around.unwrap_or_else(|| Aabb::from_half_extents(Point::origin(), Vector::repeat(5.0)));
-        let radius = around.half_extents().norm().max(2.0);
+        let (centre, half) = around.map_or((Vec3::ZERO, Vec3::splat(5.0)), |around| {
+            (to_vec3(around.center()), to_vec3(around.half_extents()))
+        });
+        let radius = half.length().max(2.0);
         // Objects fall, and lie low for most of the time.
-        let at = around.center() - vector![0.0, 0.5 * around.half_extents().y, 0.0];
+        let at = centre - 0.5 * half * Vec3::Y;
         let distance = 1.1 * radius / (0.5 * FIELD_OF_VIEW).sin();
-        let eye = at + Vector::from(TOWARDS_CAMERA).normalize() * distance;
+        let eye = at + Vec3::from_array(TOWARDS_CAMERA).normalize() * distance;
         Self { eye: eye.into(), at: at.into(), radius }
     }
 
     /// Returns a ball that flies from the camera to the middle of the picture.
     pub fn ball(&self) -> Ball {
-        let (eye, at) = (Vector::from(self.eye), Vector::from(self.at));
+        let [eye, at] = [self.eye, self.at].map(Vec3::from_array);
         let start = eye + (at - eye) * 0.25;
         let velocity = (at - start) / BALL_SECONDS;
         Ball { from: start.into(), velocity: velocity.into(), radius: BALL_SHARE * self.radius }
@@ -52,7 +56,7 @@ fn bounds(world: &World, dynamic_only: bool) -> Option<Aabb> {
         |collider: &Collider| collider.parent().is_some_and(|body| world.bodies[body].is_dynamic());
     let wanted = world.colliders.iter().filter(|(_, collider)| !dynamic_only || is_dynamic(collider));
     let boxes = wanted.map(|(_, collider)| collider.compute_aabb());
-    boxes.filter(|aabb| aabb.extents().amax() < 1e5).reduce(|a, b| a.merged(&b))
+    boxes.filter(|aabb| to_vec3(aabb.extents()).max_element() < 1e5).reduce(|a, b| a.merged(&b))
 }
 
 #[cfg(test)]
@@ -65,7 +69,7 @@ mod tests {
         for scene in Scene::ALL {
             let world = scene.build(200, 1);
             let Framing { eye, at, radius } = Framing::of(&world);
-            let distance = (Point::from(eye) - Point::from(at)).norm();
+            let distance = to_vec3(eye).distance(to_vec3(at));
             assert!(eye.iter().chain(&at).all(|x| x.is_finite()), "{}", scene.name);
             assert!(distance * (0.5 * FIELD_OF_VIEW).sin() > 0.9 * radius, "{}", scene.name);
             assert!(eye[1] > at[1], "{}", scene.name);

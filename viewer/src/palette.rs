@@ -1,6 +1,7 @@
 //! The colour of each object.
 
 use crate::cells::Cells;
+use crate::rapier::is_touching;
 use crate::shapes::Primitive;
 use clap::ValueEnum;
 use pbig_scenes::world::World;
@@ -100,7 +101,7 @@ impl<'a> Palette<'a> {
 /// Counts the objects that each collider touches, by its index.
 fn count_contacts(world: &World) -> Vec<u32> {
     let mut counts = Vec::new();
-    for pair in world.narrow_phase.contact_pairs().filter(|pair| pair.has_any_active_contact) {
+    for pair in world.narrow_phase.contact_pairs().filter(|pair| is_touching(pair)) {
         for handle in [pair.collider1, pair.collider2] {
             let index = handle.into_raw_parts().0 as usize;
             if counts.len() <= index {

@@ -1,6 +1,8 @@
 //! Colliders as instances of a few meshes.
 
 use crate::palette::{Palette, Rgb};
+use crate::rapier::pose;
+use kiss3d::prelude::{Mat3, Pose3, Quat, Vec3};
 use pbig_scenes::world::World;
 use rapier3d::parry::shape::{Shape, TypedShape};
 use rapier3d::prelude::*;
@@ -67,12 +69,17 @@ pub struct Surface {
 /// A slab's smallest edge is at most this share of its largest.
 const SLAB_FLATNESS: f32 = 0.6;
 
+/// Returns a vector of rapier's, or a point, as one that can be drawn.
+pub fn to_vec3(vector: impl Into<[f32; 3]>) -> Vec3 {
+    Vec3::from_array(vector.into())
+}
+
 /// Returns the kind of a shape.
 pub fn primitive_of(shape: &dyn Shape) -> Primitive {
     match shape.as_typed_shape() {
         TypedShape::Ball(_) => Primitive::Ball,
-        TypedShape::Cuboid(cuboid) => primitive_of_box(cuboid.half_extents),
-        TypedShape::RoundCuboid(round) => primitive_of_box(round.inner_shape.half_extents),
+        TypedShape::Cuboid(cuboid) => primitive_of_box(to_vec3(cuboid.half_extents)),
+        TypedShape::RoundCuboid(round) => primitive_of_box(to_vec3(round.inner_shape.half_extents)),
         TypedShape::Capsule(_) => Primitive::Capsule,
         TypedShape::Cylinder(_) => Primitive::Cylinder,
         TypedShape::Cone(_) => Primitive::Cone,
@@ -80,24 +87,25 @@ pub fn primitive_of(shape: &dyn Shape) -> Primitive {
     }
 }
 
-fn primitive_of_box(half: Vector<Real>) -> Primitive {
-    if half.min() <= SLAB_FLATNESS * half.max() { Primitive::Slab } else { Primitive::Cube }
+fn primitive_of_box(half: Vec3) -> Primitive {
+    if half.min_element() <= SLAB_FLATNESS * half.max_element() { Primitive::Slab } else { Primitive::Cube }
 }
 
 /// Appends what is to be drawn of all colliders, but for surfaces and half-spaces.
 pub fn instances(world: &World, palette: &Palette<'_>, out: &mut Vec<Instance>) {
     for (handle, collider) in world.colliders.iter_enabled() {
-        let mut push = |shape: &dyn Shape, pose: &Isometry<Real>| {
+        let mut push = |shape: &dyn Shape, pose: Pose3| {
             let colour = palette.colour(handle, collider, primitive_of(shape));
             append(shape, pose, |mesh, pose, size| {
-                out.push(place(mesh, &pose, size, colour, collider.is_sensor()));
+                out.push(place(mesh, pose, size, colour, collider.is_sensor()));
             });
         };
+        let at = pose(collider.position());
         match collider.shape().as_compound() {
-            None => push(collider.shape(), collider.position()),
+            None => push(collider.shape(), at),
             Some(compound) => {
                 for (local, shape) in compound.shapes() {
-                    push(&**shape, &(collider.position() * local));
+                    push(&**shape, at * pose(local));
                 }
             }
         }
@@ -105,48 +113,38 @@ pub fn instances(world: &World, palette: &Palette<'_>, out: &mut Vec<Instance>) 
 }
 
 /// Calls `draw` with each mesh of a shape, its pose and its size. A shape without a mesh is drawn as the box around it.
-fn append(
-    shape: &dyn Shape,
-    pose: &Isometry<Real>,
-    mut draw: impl FnMut(Mesh, Isometry<Real>, Vector<Real>),
-) {
+fn append(shape: &dyn Shape, pose: Pose3, mut draw: impl FnMut(Mesh, Pose3, Vec3)) {
+    let round = |radius: f32, half_height: f32| 2.0 * Vec3::new(radius, half_height, radius);
     match shape.as_typed_shape() {
-        TypedShape::Ball(ball) => draw(Mesh::Ball, *pose, Vector::repeat(2.0 * ball.radius)),
-        TypedShape::Cuboid(cuboid) => draw(Mesh::Cube, *pose, 2.0 * cuboid.half_extents),
-        TypedShape::Cylinder(c) => {
-            draw(Mesh::Cylinder, *pose, vector![2.0 * c.radius, 2.0 * c.half_height, 2.0 * c.radius]);
-        }
-        TypedShape::Cone(c) => {
-            draw(Mesh::Cone, *pose, vector![2.0 * c.radius, 2.0 * c.half_height, 2.0 * c.radius])
-        }
+        TypedShape::Ball(ball) => draw(Mesh::Ball, pose, Vec3::splat(2.0 * ball.radius)),
+        TypedShape::Cuboid(cuboid) => draw(Mesh::Cube, pose, 2.0 * to_vec3(cuboid.half_extents)),
+        TypedShape::Cylinder(c) => draw(Mesh::Cylinder, pose, round(c.radius, c.half_height)),
+        TypedShape::Cone(c) => draw(Mesh::Cone, pose, round(c.radius, c.half_height)),
         TypedShape::Capsule(capsule) => append_capsule(capsule, pose, draw),
         TypedShape::HalfSpace(_) | TypedShape::HeightField(_) | TypedShape::TriMesh(_) => {}
         _ => {
             let around = shape.compute_local_aabb();
-            draw(Mesh::Cube, pose * Translation::from(around.center().coords), around.extents());
+            let middle = Pose3::from_translation(to_vec3(around.center()));
+            draw(Mesh::Cube, pose * middle, to_vec3(around.extents()));
         }
     }
 }
 
-fn append_capsule(
-    capsule: &Capsule,
-    pose: &Isometry<Real>,
-    mut draw: impl FnMut(Mesh, Isometry<Real>, Vector<Real>),
-) {
+fn append_capsule(capsule: &Capsule, pose: Pose3, mut draw: impl FnMut(Mesh, Pose3, Vec3)) {
     let wide = 2.0 * capsule.radius;
-    for end in [capsule.segment.a, capsule.segment.b] {
-        draw(Mesh::Ball, pose * Translation::from(end.coords), Vector::repeat(wide));
+    let ends = [capsule.segment.a, capsule.segment.b].map(to_vec3);
+    for end in ends {
+        draw(Mesh::Ball, pose * Pose3::from_translation(end), Vec3::splat(wide));
     }
-    let along = capsule.segment.b - capsule.segment.a;
-    let turn = Rotation::rotation_between(&Vector::y(), &along).unwrap_or_default();
-    let middle = Translation::from(capsule.segment.a.coords + 0.5 * along);
-    draw(Mesh::Cylinder, pose * Isometry::from_parts(middle, turn), vector![wide, along.norm(), wide]);
+    let along = ends[1] - ends[0];
+    let turn = Quat::from_rotation_arc(Vec3::Y, along.normalize_or(Vec3::Y));
+    let middle = Pose3::from_parts(ends[0] + 0.5 * along, turn);
+    draw(Mesh::Cylinder, pose * middle, Vec3::new(wide, along.length(), wide));
 }
 
-fn place(mesh: Mesh, pose: &Isometry<Real>, size: Vector<Real>, colour: Rgb, is_sensor: bool) -> Instance {
-    let turn = pose.rotation.to_rotation_matrix();
-    let columns = std::array::from_fn(|i| (turn.matrix().column(i) * size[i]).into());
-    Instance { mesh, position: pose.translation.vector.into(), columns, colour, is_sensor }
+fn place(mesh: Mesh, pose: Pose3, size: Vec3, colour: Rgb, is_sensor: bool) -> Instance {
+    let columns = (Mat3::from_quat(pose.rotation) * Mat3::from_diagonal(size)).to_cols_array_2d();
+    Instance { mesh, position: pose.translation.into(), columns, colour, is_sensor }
 }
 
 /// Returns the surfaces of fixed colliders, in world coordinates. They are read once, because they do not move.
@@ -157,7 +155,8 @@ pub fn surfaces(world: &World) -> Vec<Surface> {
             TypedShape::TriMesh(mesh) => (mesh.vertices().to_vec(), mesh.indices().to_vec()),
             _ => return None,
         };
-        let vertices = points.iter().map(|point| (collider.position() * point).into()).collect();
+        let at = pose(collider.position());
+        let vertices = points.iter().map(|&point| (at * to_vec3(point)).into()).collect();
         Some(Surface { vertices, triangles })
     };
     world.colliders.iter_enabled().filter_map(|(_, collider)| surface(collider)).collect()
@@ -171,30 +170,31 @@ pub fn has_ground(world: &World) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use pbig_scenes::world::heights;
 
-    fn drawn(shape: &SharedShape, pose: Isometry<Real>) -> Vec<Instance> {
+    fn drawn(collider: &Collider) -> Vec<Instance> {
         let mut drawn = Vec::new();
-        append(&**shape, &pose, |mesh, pose, size| drawn.push(place(mesh, &pose, size, [1.0; 3], false)));
+        append(collider.shape(), pose(collider.position()), |mesh, pose, size| {
+            drawn.push(place(mesh, pose, size, [1.0; 3], false));
+        });
         drawn
     }
 
-    /// The box around an instance of a mesh that fills its cube.
-    fn around(instances: &[Instance]) -> Aabb {
+    /// The lower and the upper corner of the box around instances of meshes that fill their cubes.
+    fn around(instances: &[Instance]) -> [Vec3; 2] {
         let mut points = Vec::new();
         for Instance { position, columns, .. } in instances {
             for corner in 0..8 {
                 let at = |i: usize| if corner >> i & 1 == 0 { -0.5 } else { 0.5 };
-                points.push(Point::from(std::array::from_fn(|axis| {
-                    position[axis] + (0..3).map(|i| at(i) * columns[i][axis]).sum::<f32>()
-                })));
+                let local = Vec3::new(at(0), at(1), at(2));
+                points.push(to_vec3(*position) + Mat3::from_cols_array_2d(columns) * local);
             }
         }
-        Aabb::from_points(points)
+        [Vec3::min, Vec3::max].map(|choose| points.iter().copied().reduce(choose).unwrap())
     }
 
     #[test]
     fn shapes_are_drawn_where_rapier_has_them() {
-        let pose = Isometry::new(vector![1.0, 2.0, 3.0], Vector::x() * std::f32::consts::FRAC_PI_2);
         let shapes = [
             SharedShape::ball(0.5),
             SharedShape::cuboid(0.1, 0.2, 0.3),
@@ -206,9 +206,14 @@ mod tests {
             SharedShape::round_cuboid(0.3, 0.2, 0.1, 0.05),
         ];
         for shape in shapes {
-            let (found, wanted) = (around(&drawn(&shape, pose)), shape.compute_aabb(&pose));
-            let apart = (found.mins - wanted.mins).amax().max((found.maxs - wanted.maxs).amax());
-            assert!(apart < 1e-4, "{:?}: {found:?}, not {wanted:?}", shape.shape_type());
+            let turn = [std::f32::consts::FRAC_PI_2, 0.0, 0.0];
+            let placed =
+                ColliderBuilder::new(shape).translation([1.0, 2.0, 3.0].into()).rotation(turn.into());
+            let collider = placed.build();
+            let (found, wanted) = (around(&drawn(&collider)), collider.compute_aabb());
+            let is_near = |a: Vec3, b: Vec3| (a - b).abs().max_element() < 1e-4;
+            let is_right = is_near(found[0], to_vec3(wanted.mins)) && is_near(found[1], to_vec3(wanted.maxs));
+            assert!(is_right, "{:?}: {found:?}, not {wanted:?}", collider.shape().shape_type());
         }
     }
 
@@ -223,10 +228,8 @@ mod tests {
         let mut world = World::default();
         assert!(!has_ground(&world));
         world.colliders.insert(World::ground());
-        let heights = DMatrix::from_element(3, 3, 0.5);
-        let field =
-            ColliderBuilder::heightfield(heights, vector![4.0, 2.0, 4.0]).translation(vector![0.0, 1.0, 0.0]);
-        world.colliders.insert(field);
+        let field = ColliderBuilder::heightfield(heights(3, |_, _| 0.5), [4.0, 2.0, 4.0].into());
+        world.colliders.insert(field.translation([0.0, 1.0, 0.0].into()));
         let surfaces = surfaces(&world);
         assert!(has_ground(&world) && surfaces.len() == 1 && surfaces[0].triangles.len() == 8);
         assert!(surfaces[0].vertices.iter().all(|vertex| vertex[1] == 2.0));

@@ -74,7 +74,7 @@ impl Simulation {
     /// up its tree, grid or device there.
     pub fn step(&mut self) {
         let clock = Instant::now();
-        self.world.step(&mut self.engine);
+        self.engine.step(&mut self.world);
         let step_ms = milliseconds(clock.elapsed());
         let broad_phase_ms = milliseconds(self.engine.take_time());
         self.steps += 1;
@@ -135,5 +135,10 @@ fn milliseconds(time: Duration) -> f64 {
     time.as_secs_f64() * 1e3
 }
 
+// The paths are for `rapier-0.36/viewer`, whose compiler would look for these files beside this one.
 #[cfg(test)]
+#[path = "simulation/events.rs"]
+mod events;
+#[cfg(test)]
+#[path = "simulation/tests.rs"]
 mod tests;

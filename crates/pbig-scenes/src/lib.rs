@@ -2,4 +2,5 @@
 //! a thread or reads a clock, so all of it builds for wasm32-unknown-unknown.
 
 pub mod scenes;
+pub mod stock;
 pub mod world;

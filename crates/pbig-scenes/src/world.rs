@@ -3,6 +3,7 @@
 use glam::{Quat, Vec3};
 use rapier3d::na::{Quaternion, UnitQuaternion};
 use rapier3d::prelude::*;
+use std::sync::mpsc::channel;
 
 /// Everything that rapier keeps apart, together; the broad phase is lent to each step.
 pub struct World {
@@ -50,6 +51,17 @@ impl World {
 
     /// Runs one step of rapier's physics pipeline.
     pub fn step(&mut self, broad_phase: &mut dyn BroadPhase) {
+        self.step_for(broad_phase, &());
+    }
+
+    /// Runs one step, and returns its collision events.
+    pub fn step_with_events(&mut self, broad_phase: &mut dyn BroadPhase) -> Vec<CollisionEvent> {
+        let (send, received) = channel();
+        self.step_for(broad_phase, &ChannelEventCollector::new(send, channel().0));
+        received.try_iter().collect()
+    }
+
+    fn step_for(&mut self, broad_phase: &mut dyn BroadPhase, listener: &dyn EventHandler) {
         self.pipeline.step(
             &to_vector(self.gravity),
             &self.params,
@@ -62,7 +74,7 @@ impl World {
             &mut self.multibody_joints,
             &mut self.ccd_solver,
             &(),
-            &(),
+            listener,
         );
     }
 

@@ -5,6 +5,7 @@ use rapier3d::math::{Pose, Rotation, Vector};
 use rapier3d::na::Unit;
 use rapier3d::parry::utils::Array2;
 use rapier3d::prelude::*;
+use std::sync::mpsc::channel;
 
 /// Everything that rapier keeps apart, together; the broad phase is lent to each step.
 pub struct World {
@@ -52,6 +53,17 @@ impl Default for World {
 impl World {
     /// Runs one step of rapier's physics pipeline.
     pub fn step(&mut self, broad_phase: &mut BroadPhaseBvh) {
+        self.step_for(broad_phase, &());
+    }
+
+    /// Runs one step, and returns its collision events.
+    pub fn step_with_events(&mut self, broad_phase: &mut BroadPhaseBvh) -> Vec<CollisionEvent> {
+        let (send, received) = channel();
+        self.step_for(broad_phase, &ChannelEventCollector::new(send, channel().0, channel().0));
+        received.try_iter().collect()
+    }
+
+    fn step_for(&mut self, broad_phase: &mut BroadPhaseBvh, listener: &dyn EventHandler) {
         self.pipeline.step(
             to_vector(self.gravity),
             &self.params,
@@ -65,7 +77,7 @@ impl World {
             &mut self.soft_bodies,
             &mut self.ccd_solver,
             &(),
-            &(),
+            listener,
         );
     }
 

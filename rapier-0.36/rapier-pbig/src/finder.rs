@@ -45,6 +45,12 @@ impl PbigFinder {
         pbig_core::BroadPhase::with_gpu(config.into(), gpu).map(Self::around)
     }
 
+    /// Returns the name, kind and API of the device in use.
+    #[cfg(feature = "gpu")]
+    pub fn adapter(&self) -> Option<&str> {
+        self.colliders.core().adapter()
+    }
+
     fn around(core: pbig_core::BroadPhase) -> Self {
         Self { relative_margin: core.config().margin, colliders: Colliders::new(core) }
     }
@@ -76,7 +82,7 @@ impl PbigFinder {
     }
 }
 
-fn to_handle(handle: pbig_adapter::Handle) -> ColliderHandle {
+pub(crate) fn to_handle(handle: pbig_adapter::Handle) -> ColliderHandle {
     ColliderHandle::from_raw_parts(handle.index, handle.generation)
 }
 

@@ -36,9 +36,12 @@
 //! | --- | --- |
 //! | `parallel` (default) | several threads search |
 //! | `gpu` | the GPU backend |
+//! | `debug-render` | [`PbigFinder::debug_render`], as rapier's |
 //! | `shadow` | [`PbigFinder::with_shadow`]: rapier's own broad phase and brute force run beside it |
 
 mod config;
+#[cfg(feature = "debug-render")]
+mod debug_render;
 mod finder;
 mod scene;
 #[cfg(feature = "shadow")]
@@ -46,6 +49,8 @@ pub mod shadow;
 mod tree;
 
 pub use config::PbigConfig;
+#[cfg(feature = "debug-render")]
+pub use debug_render::DebugRenderParts;
 pub use finder::PbigFinder;
 pub use pbig_adapter::{Backend, Error, Handle, Report, Stats, Totals, Why};
 #[cfg(feature = "gpu")]

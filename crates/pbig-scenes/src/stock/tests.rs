@@ -1,0 +1,141 @@
+//! A world that changes its broad phase keeps every pair, has no other, and sleeps on.
+
+use super::*;
+use crate::scenes::Scene;
+use std::collections::BTreeSet;
+
+/// Largest distance, in metres, of two AABBs whose fat AABBs overlap: a margin of 1 cm for each, and what a collider moves
+/// before its fat AABB is stored again.
+const FAR: f32 = 0.1;
+
+type Pairs = BTreeSet<[(u32, u32); 2]>;
+
+/// Returns the pairs of colliders, one of them movable, whose AABBs overlap after they grow by `loosened` on each side.
+fn overlapping(world: &World, loosened: f32) -> Pairs {
+    let is_dynamic = |it: &Collider| it.parent().is_some_and(|body| world.bodies[body].is_dynamic());
+    let aabb = |it: &Collider| it.compute_aabb().loosened(loosened);
+    let all: Vec<_> = world.colliders.iter().map(|(at, it)| (at, it, is_dynamic(it), aabb(it))).collect();
+    let mut pairs = Pairs::new();
+    for (at, (one, a, a_moves, a_box)) in all.iter().enumerate() {
+        for (other, b, b_moves, b_box) in &all[at + 1..] {
+            if (*a_moves || *b_moves) && a.parent() != b.parent() && a_box.intersects(b_box) {
+                pairs.insert(sorted(ColliderPair::new(*one, *other)));
+            }
+        }
+    }
+    pairs
+}
+
+/// Compares the narrow phase's pairs with brute force.
+fn check(world: &World) -> Result<(), String> {
+    let pairs: Pairs = world.pairs().map(sorted).collect();
+    let missing: Vec<_> = overlapping(world, 0.0).difference(&pairs).copied().collect();
+    let near = overlapping(world, FAR);
+    let is_far = |pair: &&[(u32, u32); 2]| !near.contains(*pair) && !is_fixed(world, pair);
+    let stale: Vec<_> = pairs.iter().filter(is_far).collect();
+    if missing.is_empty() && stale.is_empty() { Ok(()) } else { Err(format!("{missing:?} {stale:?}")) }
+}
+
+/// Returns true for a pair of fixed colliders, which stock reports, too.
+fn is_fixed(world: &World, pair: &[(u32, u32); 2]) -> bool {
+    let handle = |(index, generation)| ColliderHandle::from_raw_parts(index, generation);
+    pair.iter().all(|raw| world.colliders[handle(*raw)].parent().is_none())
+}
+
+/// Runs a scene whose broad phase is replaced every `period` steps, and checks each step.
+fn run(scene: &str, period: u32, replace: fn(&World) -> StockBroadPhase) -> Result<(), String> {
+    let mut world = Scene::named(scene)?.build(150, 1);
+    let mut broad_phase = StockBroadPhase::default();
+    for step in 1..=120 {
+        world.step(&mut broad_phase);
+        check(&world).map_err(|why| format!("{scene}, step {step}: {why}"))?;
+        if step % period == 0 {
+            broad_phase = replace(&world);
+        }
+    }
+    Ok(())
+}
+
+#[test]
+fn a_takeover_loses_no_pair_and_leaves_none_behind() {
+    for scene in ["column", "pyramid", "sleeping", "ragdolls", "sensors"] {
+        for period in [1, 7, 30] {
+            run(scene, period, StockBroadPhase::adopt).unwrap();
+        }
+    }
+}
+
+/// Sleeping and fixed colliders are lost to a broad phase to which nobody shows them.
+#[test]
+fn the_check_notices_a_broad_phase_that_starts_empty() {
+    assert!(run("sleeping", 7, |_| StockBroadPhase::default()).is_err());
+}
+
+/// Pairs that the broad phase before had and this one does not stay in the narrow phase if nobody ends them.
+#[test]
+fn the_check_notices_pairs_that_are_left_behind() {
+    let without_events =
+        |world: &World| StockBroadPhase { pending: Vec::new(), ..StockBroadPhase::adopt(world) };
+    assert!(run("column", 7, without_events).is_err());
+}
+
+/// A takeover sends neither pairs that the narrow phase has nor a second end.
+#[test]
+fn a_takeover_sends_only_the_pairs_that_differ() {
+    let mut world = Scene::named("column").unwrap().build(150, 1);
+    let mut broad_phase = StockBroadPhase::default();
+    for _ in 0..60 {
+        world.step(&mut broad_phase);
+    }
+    let (held, adopted) = (world.pairs().count(), StockBroadPhase::adopt(&world));
+    assert!(held > 150 && adopted.pending.len() < held / 4, "{held} pairs, {}", adopted.pending.len());
+    world.narrow_phase = NarrowPhase::new();
+    let all = StockBroadPhase::adopt(&world).pending;
+    assert!(all.len() > 150 && all.iter().all(|event| added_pair(event).is_some()), "{}", all.len());
+}
+
+/// Returns two worlds after ten steps, with a broad phase for each.
+fn twins() -> [(World, StockBroadPhase); 2] {
+    [(); 2].map(|()| {
+        let (mut world, mut broad_phase) =
+            (Scene::named("sleeping").unwrap().build(150, 1), StockBroadPhase::default());
+        (0..10).for_each(|_| world.step(&mut broad_phase));
+        (world, broad_phase)
+    })
+}
+
+fn sleepers(world: &World) -> BTreeSet<(u32, u32)> {
+    let asleep = world.bodies.iter().filter(|(_, body)| body.is_sleeping());
+    asleep.map(|(handle, _)| handle.into_raw_parts()).collect()
+}
+
+/// Compares the sleeping bodies of two worlds in ten further steps.
+fn check_sleepers([mut changed, mut other]: [(World, StockBroadPhase); 2]) -> Result<(), String> {
+    for step in 1..=10 {
+        for (world, broad_phase) in [&mut changed, &mut other] {
+            world.step(broad_phase);
+        }
+        let [left, expected] = [&changed.0, &other.0].map(sleepers);
+        assert!(expected.len() > 100, "too few sleep: {}", expected.len());
+        if left != expected {
+            return Err(format!("step {step}: woken: {:?}", expected.difference(&left)));
+        }
+    }
+    Ok(())
+}
+
+#[test]
+fn a_takeover_wakes_no_body() {
+    let mut both = twins();
+    both[0].1 = StockBroadPhase::adopt(&both[0].0);
+    check_sleepers(both).unwrap();
+}
+
+/// Rapier wakes the bodies of colliders that are marked as moved in the world itself.
+#[test]
+fn the_check_notices_bodies_that_a_takeover_wakes() {
+    let mut both = twins();
+    both[0].1 = StockBroadPhase::adopt(&both[0].0);
+    both[0].0.colliders = marked_colliders(&both[0].0);
+    assert!(check_sleepers(both).is_err());
+}

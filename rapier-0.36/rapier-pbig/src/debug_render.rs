@@ -1,0 +1,121 @@
+//! Draws the broad phase through rapier's debug renderer.
+
+use crate::PbigFinder;
+use crate::finder::to_handle;
+use crate::tree::to_tree;
+use pbig_core::Aabb;
+use rapier3d::math::{Pose, Vector};
+use rapier3d::parry::bounding_volume::Aabb as DrawnAabb;
+use rapier3d::pipeline::{DebugColor, DebugRenderBackend, DebugRenderObject};
+use rapier3d::prelude::{Collider, ColliderHandle, ColliderSet};
+
+/// The parts that [`PbigFinder::debug_render`] draws.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct DebugRenderParts {
+    /// The stored AABBs, with their margins. Boxes in a cell are green, others grey.
+    pub fat_boxes: bool,
+    /// The occupied cells of the grid. The lightness tells how many boxes lie in one: white for eight or more.
+    pub cells: bool,
+}
+
+impl DebugRenderParts {
+    /// Everything.
+    pub const ALL: Self = Self { fat_boxes: true, cells: true };
+}
+
+/// The alpha of boxes and of cells, which are more numerous.
+const ALPHA: [f32; 2] = [1.0, 0.5];
+
+impl PbigFinder {
+    /// Draws the stored boxes and cells as lines, through the renderer that also draws rapier's own pictures. Each is passed as
+    /// a [`DebugRenderObject::ColliderAabb`], a cell with the first collider in it. There are no cells for few boxes, which
+    /// need no grid, and on a GPU.
+    pub fn debug_render(
+        &self,
+        colliders: &ColliderSet,
+        parts: DebugRenderParts,
+        backend: &mut dyn DebugRenderBackend,
+    ) {
+        let cells = self.colliders.core().cells();
+        let mut in_grid = vec![false; self.colliders.core().id_count() as usize];
+        for cell in &cells {
+            cell.ids.iter().for_each(|&id| in_grid[id as usize] = true);
+            let first = cell.ids.iter().find_map(|&id| self.collider(colliders, id));
+            if let (true, Some((handle, collider))) = (parts.cells, first) {
+                let lightness = 0.2 + 0.1 * (cell.ids.len().min(8) as f32);
+                draw(backend, (handle, collider), &cell.aabb, hsla(true, lightness, ALPHA[1]));
+            }
+        }
+        for (id, in_grid) in in_grid.into_iter().enumerate().filter(|_| parts.fat_boxes) {
+            let aabb = self.colliders.core().fat_aabb(id as u32);
+            if let (Some(aabb), Some(drawn)) = (aabb, self.collider(colliders, id as u32)) {
+                draw(backend, drawn, &aabb, hsla(in_grid, 0.5, ALPHA[0]));
+            }
+        }
+    }
+
+    fn collider<'a>(&self, colliders: &'a ColliderSet, id: u32) -> Option<(ColliderHandle, &'a Collider)> {
+        let handle = to_handle(self.colliders.handle(id)?);
+        Some((handle, colliders.get(handle)?))
+    }
+}
+
+/// Green for cells and the boxes in them, grey for boxes in no cell.
+fn hsla(in_grid: bool, lightness: f32, alpha: f32) -> DebugColor {
+    if in_grid { [120.0, 1.0, lightness, alpha] } else { [0.0, 0.0, lightness, alpha] }
+}
+
+fn draw(
+    backend: &mut dyn DebugRenderBackend,
+    (handle, collider): (ColliderHandle, &Collider),
+    aabb: &Aabb,
+    color: DebugColor,
+) {
+    let aabb = to_tree(aabb);
+    let object = DebugRenderObject::ColliderAabb(handle, collider, &aabb);
+    if backend.filter_object(object) {
+        let edges = DrawnAabb::EDGES_VERTEX_IDS.map(|(a, b)| [a as u32, b as u32]);
+        backend.draw_polyline(object, &aabb.vertices(), &edges, &Pose::IDENTITY, Vector::ONE, color);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rapier3d::prelude::*;
+
+    #[derive(Default)]
+    struct Canvas {
+        lines: usize,
+        longest: f32,
+    }
+
+    impl DebugRenderBackend for Canvas {
+        fn draw_line(&mut self, _: DebugRenderObject, a: Vector, b: Vector, _: DebugColor) {
+            self.lines += 1;
+            self.longest = self.longest.max(a.distance(b));
+        }
+    }
+
+    #[test]
+    fn boxes_and_cells_are_drawn_with_twelve_lines_each() {
+        let (mut colliders, bodies) = (ColliderSet::new(), RigidBodySet::new());
+        let at = |i: u32| Vector::new((i % 8) as f32, (i / 8 % 8) as f32, (i / 64) as f32) * 5.0;
+        let cube = |i| ColliderBuilder::cuboid(0.5, 0.5, 0.5).translation(at(i));
+        let all: Vec<_> = (0..512).map(|i| colliders.insert(cube(i))).collect();
+        let mut broad_phase = crate::broad_phase();
+        let params = IntegrationParameters::default();
+        broad_phase.update(&params, &colliders, &bodies, &all, &[], &mut Vec::new());
+        let finder = crate::finder(&broad_phase).unwrap();
+        let [boxes, cells] = [true, false].map(|fat_boxes| {
+            let mut canvas = Canvas::default();
+            let parts = DebugRenderParts { fat_boxes, cells: !fat_boxes };
+            finder.debug_render(&colliders, parts, &mut canvas);
+            canvas
+        });
+        assert_eq!(boxes.lines, 512 * 12);
+        assert!(boxes.longest > 1.05 && boxes.longest < 1.1, "a cube with its margins: {}", boxes.longest);
+        assert!(cells.lines % 12 == 0 && cells.lines > 12 && cells.lines <= 512 * 12, "{}", cells.lines);
+        assert!(cells.longest > boxes.longest, "a box fits into a cell");
+    }
+}

@@ -1,0 +1,42 @@
+//! The viewer on rapier 0.36.1: the files of `viewer/src`, but for `engine` and `rapier`, the two that know rapier's version.
+
+#[path = "../../../viewer/src/cells.rs"]
+pub mod cells;
+#[path = "../../../viewer/src/choice.rs"]
+pub mod choice;
+#[path = "../../../viewer/src/controls.rs"]
+pub mod controls;
+#[path = "../../../viewer/src/draw/mod.rs"]
+pub mod draw;
+pub mod engine;
+#[path = "../../../viewer/src/error.rs"]
+pub mod error;
+#[path = "../../../viewer/src/figures.rs"]
+pub mod figures;
+#[path = "../../../viewer/src/framing.rs"]
+pub mod framing;
+#[path = "../../../viewer/src/graph.rs"]
+pub mod graph;
+#[path = "../../../viewer/src/history.rs"]
+pub mod history;
+#[path = "../../../viewer/src/hud.rs"]
+pub mod hud;
+#[path = "../../../viewer/src/options.rs"]
+pub mod options;
+#[path = "../../../viewer/src/palette.rs"]
+pub mod palette;
+#[path = "../../../viewer/src/pictures.rs"]
+pub mod pictures;
+#[path = "../../../viewer/src/program.rs"]
+pub mod program;
+pub mod rapier;
+#[path = "../../../viewer/src/shapes.rs"]
+pub mod shapes;
+#[path = "../../../viewer/src/sheet.rs"]
+pub mod sheet;
+#[path = "../../../viewer/src/simulation.rs"]
+pub mod simulation;
+#[path = "../../../viewer/src/window.rs"]
+pub mod window;
+
+pub use program::main;
