@@ -40,6 +40,14 @@ pub struct Line {
     pub points: Vec<(f64, f64)>,
 }
 
+impl Line {
+    /// Returns a line of a value for each step.
+    pub fn steps(name: &str, values: impl IntoIterator<Item = f64>) -> Self {
+        let points = values.into_iter().enumerate().map(|(step, value)| (step as f64, value));
+        Self { name: name.into(), points: points.collect() }
+    }
+}
+
 /// One plot.
 #[derive(Clone, Debug)]
 pub struct Plot {
@@ -49,18 +57,16 @@ pub struct Plot {
     pub x: String,
     /// Label of the y axis, with its unit.
     pub y: String,
-    /// True if both axes are logarithmic.
+    /// True if both axes are logarithmic; then points have marks.
     pub is_log: bool,
     /// True if the points of a line are joined.
     pub is_joined: bool,
-    /// True if the points have marks.
-    pub has_marks: bool,
     /// The lines, at most [`MAX_LINES`].
     pub lines: Vec<Line>,
 }
 
 /// A chart for a file.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct Chart {
     /// The file's name without its extension.
     pub name: String,
@@ -73,10 +79,7 @@ impl Chart {
     pub fn log(name: &str, title: &str, [x, y]: [&str; 2], mut lines: Vec<Line>) -> Self {
         lines.retain(|line| !line.points.is_empty());
         let (title, x, y) = (title.into(), x.into(), y.into());
-        Self {
-            name: name.into(),
-            plots: vec![Plot { title, x, y, is_log: true, is_joined: true, has_marks: true, lines }],
-        }
+        Self { name: name.into(), plots: vec![Plot { title, x, y, is_log: true, is_joined: true, lines }] }
     }
 
     /// Writes the chart.
@@ -96,18 +99,21 @@ impl Chart {
             plot.draw(&area)?;
             plot.draw_legend(&legend)?;
         }
-        root.present().map_err(owned)
+        root.present()?;
+        Ok(())
     }
 }
 
 type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
 type Done = Result<(), Box<dyn std::error::Error>>;
 
-fn owned(error: impl std::error::Error) -> Box<dyn std::error::Error> {
-    error.to_string().into()
-}
-
 impl Plot {
+    /// Returns milliseconds against steps.
+    pub fn steps(title: &str, lines: Vec<Line>) -> Self {
+        let (x, y) = ("step".into(), "time, ms".into());
+        Self { title: title.into(), x, y, is_log: false, is_joined: true, lines }
+    }
+
     fn lines(&self) -> impl Iterator<Item = (&Line, RGBColor)> {
         self.lines.iter().zip(COLOURS)
     }
@@ -132,21 +138,20 @@ impl Plot {
             .margin(12)
             .x_label_area_size(48)
             .y_label_area_size(84)
-            .build_cartesian_2d(x.clone(), y.clone())
-            .map_err(owned)?;
+            .build_cartesian_2d(x.clone(), y.clone())?;
         let mut mesh = chart.configure_mesh();
         mesh.x_desc(&self.x).y_desc(&self.y).light_line_style(WHITE);
-        mesh.axis_desc_style(("sans-serif", TEXT)).label_style(("sans-serif", TEXT)).draw().map_err(owned)?;
+        mesh.axis_desc_style(("sans-serif", TEXT)).label_style(("sans-serif", TEXT)).draw()?;
         for (line, colour) in self.lines() {
             let place = |&(x, v): &(f64, f64)| (x, v.max(y.zero.unwrap_or(f64::MIN)));
             let points: Vec<_> =
                 line.points.iter().filter(|point| self.has_place(point)).map(place).collect();
             if self.is_joined {
-                chart.draw_series(LineSeries::new(points.clone(), colour.stroke_width(2))).map_err(owned)?;
+                chart.draw_series(LineSeries::new(points.clone(), colour.stroke_width(2)))?;
             }
-            if self.has_marks {
+            if self.is_log {
                 let mark = |at| Circle::new(at, 4, colour.filled());
-                chart.draw_series(points.into_iter().map(mark)).map_err(owned)?;
+                chart.draw_series(points.into_iter().map(mark))?;
             }
         }
         Ok(())
@@ -155,10 +160,10 @@ impl Plot {
     fn draw_legend(&self, area: &Area<'_>) -> Done {
         let mut y = 48;
         for (line, colour) in self.lines() {
-            area.draw(&Rectangle::new([(4, y - 4), (20, y + 4)], colour.filled())).map_err(owned)?;
+            area.draw(&Rectangle::new([(4, y - 4), (20, y + 4)], colour.filled()))?;
             for text in wrapped(&line.name) {
                 let style = ("sans-serif", TEXT).into_font();
-                area.draw(&Text::new(text, (26, y - 7), style)).map_err(owned)?;
+                area.draw(&Text::new(text, (26, y - 7), style))?;
                 y += 18;
             }
             y += 6;
@@ -259,43 +264,6 @@ impl ValueFormatter<f64> for Axis {
     }
 }
 
-/// Milliseconds step by step, for [`write()`].
-pub struct Series<'a> {
-    /// The name in the legend.
-    pub name: &'a str,
-    /// One value for each step.
-    pub values: Vec<f64>,
-}
-
-/// A panel of such series.
-pub struct Panel<'a> {
-    /// The title above the panel.
-    pub title: &'a str,
-    /// Its lines.
-    pub series: Vec<Series<'a>>,
-}
-
-/// Writes panels one below the other, milliseconds against steps.
-///
-/// # Errors
-/// Returns a message that names the file, if it cannot be written.
-pub fn write(path: &Path, panels: &[Panel<'_>]) -> Result<(), String> {
-    Chart { name: String::new(), plots: panels.iter().map(Plot::of).collect() }.write(path)
-}
-
-impl Plot {
-    /// Returns milliseconds against steps.
-    pub fn of(panel: &Panel<'_>) -> Self {
-        let line = |series: &Series<'_>| {
-            let points = series.values.iter().enumerate().map(|(step, &ms)| (step as f64, ms));
-            Line { name: series.name.to_owned(), points: points.collect() }
-        };
-        let lines = panel.series.iter().map(line).collect();
-        let (x, y) = ("step".into(), "time, ms".into());
-        Self { title: panel.title.to_owned(), x, y, is_log: false, is_joined: true, has_marks: false, lines }
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -336,7 +304,7 @@ mod tests {
 
     #[test]
     fn a_chart_that_cannot_be_written_names_its_file() {
-        let nowhere = write(Path::new("no/such/folder.svg"), &[]);
+        let nowhere = Chart::default().write(Path::new("no/such/folder.svg"));
         assert!(nowhere.is_err_and(|error| error.contains("folder.svg")));
     }
 }

@@ -3,7 +3,7 @@
 //! Events: `set_many` of the boxes that moved and `update`; parry keeps its tree and gives all pairs (1% moved: those with a moved
 //! box), no events. Not counted for the others: turning boxes into theirs, and the list of updates for parry's parallel frame.
 
-use crate::trees::{Changed, Kept, Obvhs, Parry, Refit, for_parry, parry_rebuilt};
+use crate::trees::{Kept, Obvhs, Parry, Refit, for_parry, parry_rebuilt};
 use pbig_core::{Aabb, Config, Finder, Limits, Order};
 use pbig_harness::prelude::*;
 
@@ -58,21 +58,20 @@ fn agree(name: &str, ours: usize, others: &[usize]) -> Result<u64, Failure> {
 /// Pbig and parry's trees through the same frames.
 struct Frames {
     wander: Wander,
-    changed: Changed,
+    changed: Vec<u32>,
     ours: Kept,
     trees: [Parry; 2],
 }
 
 impl Frames {
     fn prepare(&mut self, round: usize) {
-        let moved = self.wander.step(round);
-        self.trees.iter_mut().for_each(|tree| tree.prepare(&self.wander.boxes, &moved));
-        self.changed = Changed::new(&moved, &self.wander.boxes);
+        self.changed = self.wander.step(round);
+        self.trees.iter_mut().for_each(|tree| tree.prepare(&self.wander.boxes, &self.changed));
     }
 
     fn run(&mut self, side: usize) -> Result<f64, Failure> {
         match side {
-            0 | 1 => self.ours.update(side == 1, &self.wander.boxes, &self.changed),
+            0 | 1 => self.ours.update(side, &self.wander.boxes, &self.changed),
             _ => Ok(timed(|| self.trees[side - 2].frame()).1),
         }
     }
@@ -80,20 +79,19 @@ impl Frames {
 
 /// Measures a case frame by frame.
 fn frames(what: &str, case: Case, motion: Motion, effort: Effort, table: &mut Table) -> Result<(), Failure> {
-    let (name, boxes, is_partial) =
-        (format!("{what}, {}", case.0), named(case), motion < Some(1.0) && motion.is_some());
-    let refits = if is_partial { [Refit::Whole, Refit::Part] } else { [Refit::Whole, Refit::Parallel] };
-    let trees = refits.map(|refit| Parry::new(&boxes, refit, is_partial));
+    let (name, boxes) = (format!("{what}, {}", case.0), named(case));
+    let is_partial = motion.is_some_and(|share| share < 1.0);
+    let refits = if is_partial { [Refit::Changed, Refit::Part] } else { [Refit::Whole, Refit::Parallel] };
+    let trees = refits.map(|refit| Parry::new(&boxes, refit));
     let wander = match motion {
         Some(share) => Wander::new(boxes, share, distance(case.0)),
         None => Wander::drifting(boxes, distance(case.0)),
     };
-    let all: Vec<u32> = (0..case.1 as u32).collect();
-    let changed = Changed::new(&all, &wander.boxes);
-    let mut ours = Kept::new(CONFIG)?;
-    ours.update(false, &wander.boxes, &changed)?;
-    ours.update(true, &wander.boxes, &changed)?;
-    let mut state = Frames { wander, changed, ours, trees };
+    let changed = (0..case.1 as u32).collect();
+    let mut state = Frames { wander, changed, ours: Kept::new(CONFIG)?, trees };
+    for side in [0, 1] {
+        state.run(side)?;
+    }
     let times = measured(&mut state, 4, effort, Frames::prepare, Frames::run)?;
     let Frames { ours, mut trees, .. } = state;
     let [all, lone] = ours.pairs();
@@ -112,9 +110,9 @@ fn from_scratch(case: Case, effort: Effort, table: &mut Table) -> Result<(), Fai
     let (mut ours, mut found, mut pairs) = (Finder::new(CONFIG), vec![], [0; 3]);
     let wander = Wander::new(named(case), 1.0, distance(case.0));
     let mut state = (wander, vec![], Obvhs::default());
-    let prepare = |(wander, parry, obvhs): &mut (Wander, _, Obvhs), round| {
+    let prepare = |(wander, parry, obvhs): &mut (Wander, Vec<_>, Obvhs), round| {
         wander.step(round);
-        *parry = for_parry(&wander.boxes);
+        *parry = wander.boxes.iter().map(for_parry).collect();
         obvhs.prepare(&wander.boxes);
     };
     let times = measured(&mut state, 3, effort, prepare, |(wander, parry, obvhs), side| {

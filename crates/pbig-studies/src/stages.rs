@@ -15,15 +15,11 @@ pub(crate) const NAMES: [&str; 7] = ["whole", "set", "plan", "map", "check", "em
 
 type Times = [f64; NAMES.len()];
 
-/// From nothing in each round, or events for what has moved.
-enum Way {
-    Scratch(Box<Finder>),
-    Events(Box<BroadPhase>),
-}
-
 /// Pbig with nothing beside it.
-pub(crate) struct Alone {
-    way: Way,
+struct Alone {
+    finder: Finder,
+    /// Makes events for what has moved; without it each round is a search from nothing.
+    broad_phase: Option<BroadPhase>,
     wander: Wander,
     moved: Vec<u32>,
     /// Times and algorithm of each round.
@@ -39,38 +35,29 @@ pub(crate) struct Measured {
     pub(crate) chosen: String,
 }
 
+/// Measures searches from nothing, or with `events` the events, if a share moves by up to `distance`.
+pub(crate) fn alone(
+    events: bool,
+    boxes: Vec<Aabb>,
+    (share, distance): (f64, f32),
+    effort: Effort,
+) -> Result<Measured, Failure> {
+    let (finder, moved) = (Finder::new(CONFIG), (0..boxes.len() as u32).collect());
+    let broad_phase = events.then(|| BroadPhase::new(CONFIG)).transpose()?;
+    let wander = Wander::new(boxes, share, distance);
+    let mut alone = Alone { finder, broad_phase, wander, moved, rounds: vec![] };
+    measured(&mut alone, 1, effort, Alone::prepare, |alone, _| alone.find())?;
+    let rounds = &alone.rounds[effort.warm_up..];
+    let of = |k: usize| rounds.iter().map(move |(times, _)| times[k]);
+    let median = std::array::from_fn(|k| Spread::of(of(k)).median);
+    let mean = std::array::from_fn(|k| of(k).sum::<f64>() / rounds.len().max(1) as f64);
+    let mut counts = BTreeMap::<_, usize>::new();
+    rounds.iter().for_each(|(_, name)| *counts.entry(*name).or_default() += 1);
+    let chosen: Vec<String> = counts.iter().map(|(name, count)| format!("{name} {count}")).collect();
+    Ok(Measured { median, mean, pairs: alone.report().pairs, chosen: chosen.join(", ") })
+}
+
 impl Alone {
-    /// Searches from nothing in each round; a share has moved by up to `distance`.
-    pub(crate) fn scratch(boxes: Vec<Aabb>, share: f64, distance: f32) -> Self {
-        Self::new(Way::Scratch(Box::new(Finder::new(CONFIG))), boxes, share, distance)
-    }
-
-    /// Makes the events of such moves.
-    pub(crate) fn events(boxes: Vec<Aabb>, share: f64, distance: f32) -> Result<Self, Failure> {
-        Ok(Self::new(Way::Events(Box::new(BroadPhase::new(CONFIG)?)), boxes, share, distance))
-    }
-
-    fn new(way: Way, boxes: Vec<Aabb>, share: f64, distance: f32) -> Self {
-        let moved = (0..boxes.len() as u32).collect();
-        Self { way, wander: Wander::new(boxes, share, distance), moved, rounds: vec![] }
-    }
-
-    pub(crate) fn measure(mut self, effort: Effort) -> Result<Measured, Failure> {
-        measured(&mut self, 1, effort, Self::prepare, |alone, _| alone.find())?;
-        let rounds = &self.rounds[effort.warm_up..];
-        let of = |k: usize| rounds.iter().map(move |(times, _)| times[k]);
-        let median = std::array::from_fn(|k| Spread::of(of(k)).median);
-        let mean = std::array::from_fn(|k| of(k).sum::<f64>() / rounds.len().max(1) as f64);
-        let pairs = match &self.way {
-            Way::Scratch(finder) => finder.report().pairs,
-            Way::Events(broad_phase) => broad_phase.report().pairs,
-        };
-        let mut counts = BTreeMap::<_, usize>::new();
-        rounds.iter().for_each(|(_, name)| *counts.entry(*name).or_default() += 1);
-        let chosen: Vec<String> = counts.iter().map(|(name, count)| format!("{name} {count}")).collect();
-        Ok(Measured { median, mean, pairs, chosen: chosen.join(", ") })
-    }
-
     fn prepare(&mut self, round: usize) {
         let moved = self.wander.step(round);
         // In the first round all are new.
@@ -79,26 +66,28 @@ impl Alone {
         }
     }
 
+    fn report(&self) -> &pbig_core::Report {
+        self.broad_phase.as_ref().map_or_else(|| self.finder.report(), BroadPhase::report)
+    }
+
     fn find(&mut self) -> Result<f64, Failure> {
-        let Self { way, wander, moved, rounds } = self;
-        let boxes = &wander.boxes;
-        let (whole, set, report) = match way {
-            Way::Scratch(finder) => {
-                let (done, whole) = timed(|| finder.find(boxes).map(|_| ()));
+        let boxes = &self.wander.boxes;
+        let mut set = 0.0;
+        let (done, ms) = match &mut self.broad_phase {
+            None => timed(|| self.finder.find(boxes).map(|_| ())),
+            Some(broad_phase) => {
+                let of = |id: u32| Some((boxes[id as usize], ProxyFilter::ALL));
+                let (done, ms) = timed(|| broad_phase.set_many(&self.moved, of));
                 done?;
-                (whole, 0.0, finder.report())
-            }
-            Way::Events(broad_phase) => {
-                let set = || broad_phase.set_many(moved, |id| Some((boxes[id as usize], ProxyFilter::ALL)));
-                let (done, set) = timed(set);
-                done?;
-                let (done, update) = timed(|| broad_phase.update().map(|_| ()));
-                done?;
-                (set + update, set, broad_phase.report())
+                set = ms;
+                timed(|| broad_phase.update().map(|_| ()))
             }
         };
+        done?;
+        let (whole, report) = (set + ms, self.report());
         let [plan, map, check, emit, diff] = report.stages.named().map(|(_, time)| milliseconds(time));
-        rounds.push(([whole, set, plan, map, check, emit, diff], report.plan.algorithm.name()));
+        let algorithm = report.plan.algorithm.name();
+        self.rounds.push(([whole, set, plan, map, check, emit, diff], algorithm));
         Ok(whole)
     }
 }
@@ -141,11 +130,8 @@ pub fn run(quick: bool) -> Result<Report, Failure> {
         let points = sweeps.iter().flat_map(|(what, points)| points.iter().map(move |point| (what, point)));
         for (what, point) in tracked(points, "scenes") {
             let boxes = cubes(point.boxes, point.spread as f32, point.pairs as f32, 1);
-            let alone = match scratch {
-                true => Alone::scratch(boxes, point.share, DISTANCE),
-                false => Alone::events(boxes, point.share, DISTANCE)?,
-            };
-            let Measured { median, mean, pairs, chosen } = alone.measure(effort)?;
+            let Measured { median, mean, pairs, chosen } =
+                alone(!scratch, boxes, (point.share, DISTANCE), effort)?;
             let stages = if scratch { &median } else { &mean }[1..].iter();
             let stages = stages.map(|&ms| Value::from((ms > 0.0).then_some(ms)));
             let head = cells![format!("{what} {}", point.x), point.boxes, pairs, median[0], mean[0]];

@@ -4,7 +4,7 @@ use super::printed::*;
 use super::sides::{Device, Way, effort, on_gpu, race};
 use super::{OUR_GRID, Scale, UNSORTED};
 use crate::accuracy::index::kernels::run as run_kernel;
-use crate::stages::{Alone, NAMES};
+use crate::stages::{NAMES, alone};
 use pbig_core::layout::Params;
 use pbig_core::{Aabb, Backend, CellRule, Coding, Config, GpuOptions, Pair};
 use pbig_harness::gpu_race;
@@ -42,15 +42,15 @@ fn matrix(device: &Device) -> Result<Table, Failure> {
         table.row(cells![a, b, text, printed, index_of(a - 1, b - 1, OBJECTS), pair]);
     }
     let there = |k: u64| index_of(pair_of(k, OBJECTS).0, pair_of(k, OBJECTS).1, OBJECTS) == k;
-    let wrong = (0..pair_count(OBJECTS)).find(|&k| !there(k));
     let on_device = if device.for_boxes(0).is_some() { all_on_device()? } else { vec![] };
-    let wrong = wrong.or((0..).zip(on_device).find(|&(k, pair)| pair != pair_of(k, OBJECTS)).map(|(k, _)| k));
-    check(wrong.is_none(), || format!("{OBJECTS} boxes: an index is wrong: {wrong:?}")).map(|()| table)
+    let is_right = (0..).zip(on_device).all(|(k, pair)| pair == pair_of(k, OBJECTS));
+    let is_right = is_right && (0..pair_count(OBJECTS)).all(there);
+    check(is_right, || format!("{OBJECTS} boxes: an index is wrong")).map(|()| table)
 }
 
 /// Returns the pair of every index, by the mapping of the check kernels.
 fn all_on_device() -> Result<Vec<(u64, u64)>, Failure> {
-    let bench = Bench::new().map_err(|error| Failure::Input(error.to_string()))?;
+    let bench = Bench::new().map_err(|error| error.to_string())?;
     let count = pair_count(OBJECTS) as u32;
     let params = Params { boxes: OBJECTS as u32, cells: count, ..Params::default() };
     let words = run_kernel(&bench, &INDEX_PAIRS, GpuOptions::DEFAULT.root, params, count)?;
@@ -107,8 +107,8 @@ fn write_bits(boxes: &[Aabb]) -> Vec<u8> {
 }
 
 fn write_list(boxes: &[Aabb]) -> Vec<u8> {
-    let ids = |pair: Pair| [pair.a.to_le_bytes(), pair.b.to_le_bytes()];
-    tests(boxes).filter(|(_, hit)| *hit).flat_map(|(pair, _)| ids(pair)).flatten().collect()
+    let pairs: Vec<Pair> = tests(boxes).filter(|(_, hit)| *hit).map(|(pair, _)| pair).collect();
+    bytemuck::cast_slice(&pairs).to_vec()
 }
 
 fn pair_at(k: u64, n: u64) -> Pair {
@@ -127,30 +127,25 @@ fn read_bits(out: &[u8], n: u64) -> Vec<Pair> {
 }
 
 fn read_list(out: &[u8], _: u64) -> Vec<Pair> {
-    let id = |bytes: &[u8]| bytes.iter().rev().fold(0, |id, byte| id << 8 | u32::from(*byte));
-    out.chunks_exact(8).map(|pair| Pair::new(id(&pair[..4]), id(&pair[4..]))).collect()
+    bytemuck::pod_collect_to_vec(out)
 }
 
-/// Table 5 on one thread: every pair is tested and written in memory, whence the pairs are read again; medians of 3 calls.
+/// Table 5 on one thread: every pair is tested and written in memory, whence the pairs are read again.
 fn forms_on_cpu() -> Result<Table, Failure> {
     let columns = "objects | pairs | form | bytes written | ms, tests and output | ms, pairs read from it";
     let mut table = Table::new("Avril table 5: forms of output, CPU", columns);
     for (n, ..) in AVRIL_5 {
         let boxes = cubes(n as usize, 1.0, 1.0, 1);
-        let mut known: Option<Vec<Pair>> = None;
+        let known = read_list(&write_list(&boxes), n);
         for (name, write, read) in FORMS {
-            let calls = [(); 3].map(|()| {
-                let (out, written) = timed(|| write(&boxes));
-                let (pairs, read) = timed(|| read(&out, n));
-                (out.len(), pairs, written, read)
-            });
-            let [written, read] = [calls.each_ref().map(|call| call.2), calls.each_ref().map(|call| call.3)]
-                .map(|ms| Spread::of(ms).median);
-            let [.., (bytes, pairs, ..)] = calls;
-            let is_known = known.as_ref().is_none_or(|known| *known == pairs);
-            check(is_known, || format!("{n} objects: other pairs from {name}"))?;
-            table.row(cells![n, pairs.len(), name, bytes, written, read]);
-            known = Some(pairs);
+            let mut found = (write(&boxes), vec![]);
+            let ms = medians(&mut found, 2, effort(boxes.len()), unprepared, |(out, pairs), side| {
+                let write = || *out = write(&boxes);
+                Ok(if side == 0 { timed(write).1 } else { timed(|| *pairs = read(out, n)).1 })
+            })?;
+            let (out, pairs) = found;
+            check(pairs == known, || format!("{n} objects: other pairs from {name}"))?;
+            table.row(cells![n, pairs.len(), name, out.len(), ms[0], ms[1]]);
         }
     }
     Ok(table)
@@ -167,9 +162,10 @@ fn forms_on_device(device: &Device) -> Result<Table, Failure> {
         let calls = device.run(&ways, &cubes(n, 1.0, 1.0, 1), DISTANCE)?;
         for ((form, ..), call) in FORMS[1..].iter().zip(calls) {
             let kernel = call.kernels(|name| name == "check_all");
-            let gpu = call.report.as_ref().and_then(|report| report.gpu.clone()).unwrap_or_default();
+            let gpu = call.report.gpu.clone().unwrap_or_default();
             let [wait, decode] = [gpu.wait, gpu.decode].map(milliseconds);
-            table.row(cells![n, call.pairs, *form, call.written(), gpu.downloaded, kernel, wait, decode]);
+            let output = cells![*form, call.written(), gpu.downloaded, kernel, wait, decode];
+            table.row([cells![n, call.report.pairs], output].concat());
         }
     }
     Ok(table)
@@ -185,7 +181,7 @@ fn brute_force(device: &Device) -> Result<Table, Failure> {
         let boxes = cubes(n, 1.0, 1.0, 1);
         let ways = [on_gpu(GpuOptions::DEFAULT)];
         let gpu = device.run(&ways[..usize::from(n <= ALL_PAIRS)], &boxes, DISTANCE)?;
-        let ms = race(&[BRUTE], None, boxes, DISTANCE, effort(n))?[0].ms;
+        let ms = race(&[BRUTE], None, boxes, DISTANCE, effort(n))?[0].median;
         let tests = pair_count(n as u64);
         let sizes = cells![n, tests, 24 * n, output_bytes(n as u64)[1]];
         table.row([sizes, cells![ms, tests as f64 / ms * 1e3, gpu.first().map(|call| call.ms)]].concat());
@@ -206,9 +202,10 @@ fn with_grid(scale: &Scale, device: &Device) -> Result<Table, Failure> {
         let gpu = device.run(&on_device[..1 + usize::from(n <= ALL_PAIRS)], &boxes, DISTANCE)?;
         let ways = [BRUTE, Way::Finder(OUR_GRID), density];
         let cpu = race(&ways, None, boxes, DISTANCE, Effort::new(scale.quick))?;
-        let gpu_ms = |i: usize| gpu.get(i).map(|call| call.ms);
-        let printed = cells![n, cpu[0].call.pairs, without, with];
-        table.row([printed, cells![cpu[0].ms, cpu[1].ms, cpu[2].ms, gpu_ms(1), gpu_ms(0)]].concat());
+        let ours = [0, 1, 2].map(|i| cpu[i].median.into());
+        let on_device = [1, 0].map(|i: usize| gpu.get(i).map(|call| call.ms).into());
+        let printed = cells![n, cpu[0].report.pairs, without, with];
+        table.row([printed, ours.into(), on_device.into()].concat());
     }
     Ok(table)
 }
@@ -223,7 +220,7 @@ fn steps(scale: &Scale, device: &Device) -> Result<Table, Failure> {
         let printed = printed.map(Value::from).into();
         table.row([cells![n, "printed", None::<u64>], printed, cells![None::<u64>]].concat());
         let boxes = || cubes(n, 1.0, 1.0, 1);
-        let ours = Alone::events(boxes(), 1.0, DISTANCE)?.measure(Effort::new(scale.quick))?;
+        let ours = alone(true, boxes(), (1.0, DISTANCE), Effort::new(scale.quick))?;
         let of = |wanted: &[&str]| -> f64 {
             NAMES.iter().zip(ours.mean).filter(|(name, _)| wanted.contains(name)).map(|(_, ms)| ms).sum()
         };
@@ -247,16 +244,12 @@ fn movers(scale: &Scale, device: &Device) -> Result<Table, Failure> {
     let fewer = if device.for_boxes(n).is_some() { n } else { n.min(10_000) };
     for share in [0.01, 0.1, 0.25, 0.5, 0.75, 1.0] {
         let (boxes, effort) = (|n| cubes(n, 1.0, 1.0, 1), Effort::new(scale.quick));
-        let events = Alone::events(boxes(n), share, DISTANCE)?.measure(effort)?;
-        let scratch = Alone::scratch(boxes(n), share, DISTANCE).measure(effort)?;
+        let events = alone(true, boxes(n), (share, DISTANCE), effort)?;
+        let scratch = alone(false, boxes(n), (share, DISTANCE), effort)?;
         let ours = cells![share, n, events.pairs, events.mean[0], scratch.mean[0], events.chosen];
-        let beside = match device.for_boxes(fewer) {
-            Some(gpu) => {
-                let [cpu, gpu] = gpu_race::race(gpu, boxes(fewer), share, DISTANCE)?.ms;
-                cells![fewer, gpu, cpu]
-            }
-            None => vec![Value::Null; 3],
-        };
+        let raced = device.for_boxes(fewer).map(|gpu| gpu_race::race(gpu, boxes(fewer), share, DISTANCE));
+        let ms = raced.transpose()?.map(|raced| raced.ms);
+        let beside = cells![ms.map(|_| fewer), ms.map(|[_, gpu]| gpu), ms.map(|[cpu, _]| cpu)];
         table.row([ours, beside].concat());
     }
     Ok(table)
