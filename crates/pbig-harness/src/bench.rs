@@ -58,14 +58,14 @@ pub fn compared(
     let of = |ms: f64| ms * unit.1;
     // A clock can tell 0.
     let times = |ours: f64, theirs: f64| theirs.max(1e-9) / ours.max(1e-9);
-    let ratios = cells![times(ours.median, theirs.median), times(ours.mean, theirs.mean)];
-    let ours = cells![case, boxes, pairs, unit.0, of(ours.median), of(ours.mean), name];
-    [ours, cells![of(theirs.median), of(theirs.mean)], ratios].concat()
+    let ratios = [times(ours.median, theirs.median), times(ours.mean, theirs.mean)];
+    let [ours, theirs] = [ours, theirs].map(|took| [of(took.median), of(took.mean)]);
+    cells![case, boxes, pairs, unit.0, ..ours, name, ..theirs, ..ratios]
 }
 
 /// Returns a row of [`COMPARED`] with one value of pbig's alone.
 pub fn alone(case: &str, boxes: usize, pairs: u64, unit: &str, value: Option<f64>) -> Vec<Value> {
-    [cells![case, boxes, pairs, unit, value], vec![Value::Null; 6]].concat()
+    cells![case, boxes, pairs, unit, value]
 }
 
 /// Prepares nothing, for [`measured`].

@@ -2,6 +2,7 @@
 
 use plotters::coord::Shift;
 use plotters::coord::ranged1d::{KeyPointHint, NoDefaultFormatting, Ranged, ValueFormatter};
+use plotters::coord::types::RangedCoordf64;
 use plotters::prelude::*;
 use std::path::Path;
 
@@ -218,34 +219,20 @@ impl Axis {
         let all = all.flat_map(|power| factors.iter().map(move |factor| factor * 10f64.powi(power)));
         self.zero.into_iter().chain(all.filter(|v| (first..=self.high).contains(v))).collect()
     }
-
-    fn steps(&self, most: usize) -> Vec<f64> {
-        let wide = (self.high - self.low) / most.max(2) as f64;
-        let power = 10f64.powf(wide.log10().floor());
-        let step = [1.0, 2.0, 5.0, 10.0].map(|k| k * power).into_iter().find(|step| *step >= wide);
-        let step = step.unwrap_or(wide);
-        (0..)
-            .map(|k| k as f64 * step + (self.low / step).ceil() * step)
-            .take_while(|v| *v <= self.high)
-            .collect()
-    }
 }
 
 impl Ranged for Axis {
     type FormatOption = NoDefaultFormatting;
     type ValueType = f64;
 
-    fn map(&self, value: &f64, (from, to): (i32, i32)) -> i32 {
-        let share = match self.is_log {
-            true => (value / self.low).ln() / (self.high / self.low).ln(),
-            false => (value - self.low) / (self.high - self.low),
-        };
-        from + (f64::from(to - from) * share).round() as i32
+    fn map(&self, value: &f64, limits: (i32, i32)) -> i32 {
+        let scaled = |value: f64| if self.is_log { value.ln() } else { value };
+        RangedCoordf64::from(scaled(self.low)..scaled(self.high)).map(&scaled(*value), limits)
     }
 
     fn key_points<Hint: KeyPointHint>(&self, hint: Hint) -> Vec<f64> {
         let most = hint.max_num_points().min(12);
-        if self.is_log { self.powers(most) } else { self.steps(most) }
+        if self.is_log { self.powers(most) } else { RangedCoordf64::from(self.range()).key_points(most) }
     }
 
     fn range(&self) -> std::ops::Range<f64> {
@@ -297,7 +284,7 @@ mod tests {
 
     #[test]
     fn axes_have_round_labels() {
-        assert_eq!(Axis::new(vec![0.0, 9.0], false).steps(5), [0.0, 2.0, 4.0, 6.0, 8.0]);
+        assert_eq!(Axis::new(vec![0.0, 9.0], false).key_points(5), [0.0, 2.0, 4.0, 6.0, 8.0]);
         assert_eq!(Axis::new(vec![1.0, 9.0], true).powers(12), [1.0, 2.0, 5.0, 10.0]);
         assert_eq!(Axis::new(vec![1e-3, 1e3], true).powers(12).len(), 7);
     }

@@ -6,10 +6,16 @@ use serde_json::Map;
 /// A label, a number, or nothing where nothing was measured.
 pub use serde_json::Value;
 
-/// Makes a row from values of different types.
+/// Makes a row from values of different types; `..values` appends each of several, and `()` nothing measured.
 #[macro_export]
 macro_rules! cells {
-    ($($value:expr),* $(,)?) => { vec![$($crate::table::Value::from($value)),*] };
+    (@ $row:ident) => {};
+    (@ $row:ident ..$values:expr $(, $($rest:tt)*)?) => {
+        $row.extend($values.into_iter().map($crate::table::Value::from));
+        $($crate::cells!(@ $row $($rest)*);)?
+    };
+    (@ $row:ident $value:expr $(, $($rest:tt)*)?) => { $crate::cells!(@ $row ..[$value] $(, $($rest)*)?) };
+    ($($values:tt)*) => {{ let mut row = vec![]; $crate::cells!(@ row $($values)*); row }};
 }
 
 /// Returns a value as files have it: a number with up to nine digits.
@@ -54,13 +60,14 @@ impl Table {
         Self { name: name.into(), columns, rows: vec![] }
     }
 
-    /// Appends a row.
+    /// Appends a row. Values that are missing at its end were not measured.
     ///
     /// # Panics
-    /// If the row has not one value for each column.
+    /// If the row has more values than the table has columns.
     pub fn row(&mut self, values: impl IntoIterator<Item = Value>) {
-        let values: Vec<Value> = values.into_iter().collect();
-        assert_eq!(values.len(), self.columns.len(), "values of a row of {}", self.name);
+        let mut values: Vec<Value> = values.into_iter().collect();
+        assert!(values.len() <= self.columns.len(), "{}: too many values: {values:?}", self.name);
+        values.resize(self.columns.len(), Value::Null);
         self.rows.push(values);
     }
 

@@ -16,7 +16,7 @@ mod table_iii;
 use pbig_core::{Config, Engine, Limits, Order};
 use pbig_harness::chart::Chart;
 use pbig_harness::prelude::*;
-use sides::Device;
+use sides::Setup;
 
 /// Unlimited and in no order, as the papers' programs.
 const UNSORTED: Config = Config { limits: Limits::UNLIMITED, order: Order::Unspecified, ..Config::DEFAULT };
@@ -24,35 +24,7 @@ const UNSORTED: Config = Config { limits: Limits::UNLIMITED, order: Order::Unspe
 /// Our grid on the CPU, however few the boxes.
 const OUR_GRID: Config = Config { engine: Some(Engine::Rebuild), ..UNSORTED };
 
-/// The size of the experiments.
-struct Scale {
-    quick: bool,
-    /// Boxes where the papers have most.
-    most_boxes: usize,
-    /// Boxes of figures 8, 9 and 11 of PBIG.
-    numbers: &'static [usize],
-}
-
-impl Scale {
-    fn new(quick: bool) -> Self {
-        let numbers: &[usize] = match quick {
-            true => &[1000, 10_000, 100_000],
-            false => &[1000, 10_000, 100_000, 1_000_000, printed::MOST_BOXES],
-        };
-        Self { quick, most_boxes: numbers[numbers.len() - 1], numbers }
-    }
-
-    /// Returns the boxes for a device: as many as a program that plays one searches in seconds.
-    fn on_device(&self, device: &Device) -> usize {
-        match (device.is_software(), self.quick) {
-            (_, true) => 2000,
-            (true, false) => 50_000,
-            (false, false) => 1_000_000,
-        }
-    }
-}
-
-type Part = fn(&Scale, &Device) -> Result<Vec<Table>, Failure>;
+type Part = fn(&Setup) -> Result<Vec<Table>, Failure>;
 
 const PARTS: [Part; 4] = [table_iii::tables, figures::tables, roots::tables, avril::tables];
 
@@ -61,13 +33,13 @@ const PARTS: [Part; 4] = [table_iii::tables, figures::tables, roots::tables, avr
 /// # Errors
 /// A failed check, if two ways to search find different pairs.
 pub fn run(quick: bool) -> Result<Report, Failure> {
-    let (scale, device) = (Scale::new(quick), Device::best(quick));
+    let setup = Setup::new(quick);
     let mut tables = vec![];
     for part in tracked(PARTS, "parts") {
-        tables.extend(part(&scale, &device)?);
+        tables.extend(part(&setup)?);
     }
     tables.push(claims::table());
-    let head = vec![("adapter", device.name.clone()), ("software", device.is_software().to_string())];
+    let head = vec![("software", setup.is_software().to_string()), ("adapter", setup.adapter)];
     Ok(Report { head, charts: charts(&tables), ..Report::new("papers", tables) })
 }
 

@@ -3,7 +3,7 @@
 //! Events: `set_many` of the boxes that moved and `update`; parry keeps its tree and gives all pairs (1% moved: those with a moved
 //! box), no events. Not counted for the others: turning boxes into theirs, and the list of updates for parry's parallel frame.
 
-use crate::trees::{Kept, Obvhs, Parry, Refit, for_parry, parry_rebuilt};
+use crate::trees::{Changed, Kept, Obvhs, Parry, Refit, for_parry, parry_rebuilt, partition};
 use pbig_core::{Aabb, Config, Finder, Limits, Order};
 use pbig_harness::prelude::*;
 
@@ -41,8 +41,6 @@ pub fn run(quick: bool) -> Result<Report, Failure> {
         tracked(cases, what).try_for_each(|case| frames(what, *case, motion, effort, &mut table))?;
     }
     tracked(cases, "from scratch").try_for_each(|case| from_scratch(*case, effort, &mut table))?;
-    mixed_beside_unit("events, all moved", &mut table);
-    mixed_beside_unit("from scratch", &mut table);
     Ok(Report::new("peers", vec![table]))
 }
 
@@ -58,15 +56,16 @@ fn agree(name: &str, ours: usize, others: &[usize]) -> Result<u64, Failure> {
 /// Pbig and parry's trees through the same frames.
 struct Frames {
     wander: Wander,
-    changed: Vec<u32>,
+    changed: Changed,
     ours: Kept,
     trees: [Parry; 2],
 }
 
 impl Frames {
     fn prepare(&mut self, round: usize) {
-        self.changed = self.wander.step(round);
-        self.trees.iter_mut().for_each(|tree| tree.prepare(&self.wander.boxes, &self.changed));
+        let moved = self.wander.step(round);
+        self.trees.iter_mut().for_each(|tree| tree.prepare(&self.wander.boxes, &moved));
+        self.changed = partition(&self.wander.boxes, &moved);
     }
 
     fn run(&mut self, side: usize) -> Result<f64, Failure> {
@@ -87,7 +86,7 @@ fn frames(what: &str, case: Case, motion: Motion, effort: Effort, table: &mut Ta
         Some(share) => Wander::new(boxes, share, distance(case.0)),
         None => Wander::drifting(boxes, distance(case.0)),
     };
-    let changed = (0..case.1 as u32).collect();
+    let changed = ((0..case.1 as u32).collect(), vec![]);
     let mut state = Frames { wander, changed, ours: Kept::new(CONFIG)?, trees };
     for side in [0, 1] {
         state.run(side)?;
@@ -129,19 +128,4 @@ fn from_scratch(case: Case, effort: Effort, table: &mut Table) -> Result<(), Fai
         table.row(compared(&name, case.1, pairs, MS, times[0], (other, theirs)));
     }
     Ok(())
-}
-
-/// Appends pbig's cost of a box or pair of the set of many sizes, beside that of the set of one.
-fn mixed_beside_unit(what: &str, table: &mut Table) {
-    let of = |set: &str| {
-        let row = table.rows.iter().find(|row| row[0] == format!("{what}, {set}"))?;
-        let number = |k: usize| row[k].as_f64();
-        let count = number(1)? + number(2)?;
-        Some((count, number(2)? as u64, Took { median: number(4)? / count, mean: number(5)? / count }))
-    };
-    if let Some((mixed, unit)) = of("mixed").zip(of("unit")) {
-        let boxes = (mixed.0 - mixed.1 as f64) as usize;
-        let case = format!("{what}, mixed, per box and pair");
-        table.row(compared(&case, boxes, mixed.1, ("ns", 1e6), mixed.2, ("unit", unit.2)));
-    }
 }

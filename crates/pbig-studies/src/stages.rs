@@ -133,9 +133,9 @@ pub fn run(quick: bool) -> Result<Report, Failure> {
             let Measured { median, mean, pairs, chosen } =
                 alone(!scratch, boxes, (point.share, DISTANCE), effort)?;
             let stages = if scratch { &median } else { &mean }[1..].iter();
-            let stages = stages.map(|&ms| Value::from((ms > 0.0).then_some(ms)));
-            let head = cells![format!("{what} {}", point.x), point.boxes, pairs, median[0], mean[0]];
-            table.row(head.into_iter().chain(stages).chain(cells![chosen]));
+            let stages = stages.map(|&ms| (ms > 0.0).then_some(ms));
+            let case = format!("{what} {}", point.x);
+            table.row(cells![case, point.boxes, pairs, median[0], mean[0], ..stages, chosen]);
         }
         tables.push(table);
     }

@@ -1,7 +1,7 @@
 //! How long updates take, and how evenly. Boxes in motion: our updates beside a search from nothing and parry's tree, in turn in
 //! every frame; pairs agree in number in every frame. Scenes through rapier: ours beside stock in the same world.
 
-use crate::trees::{Kept, Parry, Refit};
+use crate::trees::{Kept, Parry, Refit, partition};
 use pbig_core::{Config, Finder, Limits, Order};
 use pbig_harness::bench::figures;
 use pbig_harness::chart::{Chart, Line, Plot};
@@ -91,12 +91,12 @@ fn race(mut scene: Scene, frames: usize, name: &str) -> Result<[Vec<f64>; NAMES.
             changed = scene.step().to_vec();
             parry.iter_mut().for_each(|parry: &mut Parry| parry.prepare(scene.boxes(), &changed));
         }
-        let boxes = scene.boxes();
+        let (boxes, of_ours) = (scene.boxes(), partition(scene.boxes(), &changed));
         for place in 0..NAMES.len() {
             let place = if frame.is_multiple_of(2) { place } else { NAMES.len() - 1 - place };
             let side = (frame / 2 + place) % NAMES.len();
             times[side].push(match side {
-                0 | 1 => ours.update(side, boxes, &changed)?,
+                0 | 1 => ours.update(side, boxes, &of_ours)?,
                 2 => {
                     let (done, ms) = timed(|| finder.find(boxes).map(|_| ()));
                     done.map(|()| ms)?
@@ -120,9 +120,8 @@ fn plot(title: &str, times: &[Vec<f64>]) -> Plot {
     Plot::steps(title, names.into_iter().zip(times).map(line).collect())
 }
 
-fn row(labels: [&str; 3], [boxes, threads]: [usize; 2], ms: &[f64], table: &mut Table) {
-    let [motion, density, side] = labels;
-    table.row([cells![motion, density, boxes, threads, side], figures(ms).map(Value::from).into()].concat());
+fn row([motion, density, side]: [&str; 3], [boxes, threads]: [usize; 2], ms: &[f64], table: &mut Table) {
+    table.row(cells![motion, density, boxes, threads, side, ..figures(ms)]);
 }
 
 fn through_rapier(sizes: &[usize], quick: bool, table: &mut Table) {

@@ -23,14 +23,14 @@ impl Kept {
 
     /// Updates side 0, on all threads, or 1, on one, with changed boxes, of which invalid ones are removed; returns the
     /// milliseconds. The clock runs inside the pool, as waking its thread takes longer than a small update.
-    pub(crate) fn update(&mut self, side: usize, boxes: &[Aabb], changed: &[u32]) -> Result<f64, Failure> {
-        let (present, absent) = partition(boxes, changed);
+    pub(crate) fn update(&mut self, side: usize, boxes: &[Aabb], changed: &Changed) -> Result<f64, Failure> {
+        let (present, absent) = changed;
         let broad_phase = &mut self.sides[side];
         let work = || {
-            for &id in &absent {
+            for &id in absent {
                 broad_phase.remove(id);
             }
-            broad_phase.set_many(&present, |id| Some((boxes[id as usize], ProxyFilter::ALL)))?;
+            broad_phase.set_many(present, |id| Some((boxes[id as usize], ProxyFilter::ALL)))?;
             broad_phase.update().map(|_| ())
         };
         let (done, ms) = if side == 1 { self.pool.install(|| timed(work)) } else { timed(work) };
@@ -43,8 +43,10 @@ impl Kept {
     }
 }
 
-/// Returns the ids of valid boxes, and of the others.
-fn partition(boxes: &[Aabb], ids: &[u32]) -> (Vec<u32>, Vec<u32>) {
+/// The ids of changed boxes that are valid, and of the others.
+pub(crate) type Changed = (Vec<u32>, Vec<u32>);
+
+pub(crate) fn partition(boxes: &[Aabb], ids: &[u32]) -> Changed {
     ids.iter().partition(|id| boxes[**id as usize].is_valid())
 }
 

@@ -1,17 +1,13 @@
 //! Avril's tables 1, 5, 6 and 7 and figures 3 to 6: the matrix of pairs, forms of output, brute force, a grid, and steps.
 
 use super::printed::*;
-use super::sides::{Device, Way, effort, on_gpu, race};
-use super::{OUR_GRID, Scale, UNSORTED};
-use crate::accuracy::index::kernels::run as run_kernel;
+use super::sides::{Setup, Way, effort, on_gpu, race};
+use super::{OUR_GRID, UNSORTED};
 use crate::stages::{NAMES, alone};
-use pbig_core::layout::Params;
 use pbig_core::{Aabb, Backend, CellRule, Coding, Config, GpuOptions, Pair};
 use pbig_harness::gpu_race;
-use pbig_harness::kernels::Bench;
 use pbig_harness::pair_index::{index_of, pair_count, pair_of};
 use pbig_harness::prelude::*;
-use pbig_shaders::study::INDEX_PAIRS;
 
 /// The distance that cubes with edges of 1 move in a step, along each axis.
 const DISTANCE: f32 = 0.1;
@@ -19,19 +15,18 @@ const DISTANCE: f32 = 0.1;
 /// Boxes up to which a device tests every pair by default.
 const ALL_PAIRS: usize = GpuOptions::DEFAULT.all_pairs_up_to as usize;
 
-pub(super) fn tables(scale: &Scale, device: &Device) -> Result<Vec<Table>, Failure> {
-    let output = [bytes(), forms_on_cpu()?, forms_on_device(device)?];
-    let whole =
-        [brute_force(device)?, with_grid(scale, device)?, steps(scale, device)?, movers(scale, device)?];
-    Ok([matrix(device)?].into_iter().chain(output).chain(whole).collect())
+pub(super) fn tables(setup: &Setup) -> Result<Vec<Table>, Failure> {
+    let output = [matrix()?, bytes(), forms_on_cpu()?, forms_on_device(setup)?];
+    let whole = [brute_force(setup)?, with_grid(setup)?, steps(setup)?, movers(setup)?];
+    Ok([output, whole].concat())
 }
 
 /// Objects with which table 1's elements are numbers; those of the paper's examples.
 const OBJECTS: u64 = AVRIL_EXAMPLES[0].0;
 
-/// Table 1: rows and columns counted from 1, indices from 0, as in the paper. The mapping of all pairs is checked on the CPU, to
-/// and fro, and on a device.
-fn matrix(device: &Device) -> Result<Table, Failure> {
+/// Table 1: rows and columns counted from 1, indices from 0, as in the paper. The mapping of all pairs is checked to and
+/// fro.
+fn matrix() -> Result<Table, Failure> {
     let columns = "row | column | printed | that number | index, ours | pair of the printed index, ours";
     let mut table = Table::new("Avril table 1: the matrix of pairs", columns);
     let of_table = AVRIL_1.iter().map(|(pair, text, of)| (pair(OBJECTS), (*text).to_owned(), of(OBJECTS)));
@@ -42,19 +37,8 @@ fn matrix(device: &Device) -> Result<Table, Failure> {
         table.row(cells![a, b, text, printed, index_of(a - 1, b - 1, OBJECTS), pair]);
     }
     let there = |k: u64| index_of(pair_of(k, OBJECTS).0, pair_of(k, OBJECTS).1, OBJECTS) == k;
-    let on_device = if device.for_boxes(0).is_some() { all_on_device()? } else { vec![] };
-    let is_right = (0..).zip(on_device).all(|(k, pair)| pair == pair_of(k, OBJECTS));
-    let is_right = is_right && (0..pair_count(OBJECTS)).all(there);
-    check(is_right, || format!("{OBJECTS} boxes: an index is wrong")).map(|()| table)
-}
-
-/// Returns the pair of every index, by the mapping of the check kernels.
-fn all_on_device() -> Result<Vec<(u64, u64)>, Failure> {
-    let bench = Bench::new().map_err(|error| error.to_string())?;
-    let count = pair_count(OBJECTS) as u32;
-    let params = Params { boxes: OBJECTS as u32, cells: count, ..Params::default() };
-    let words = run_kernel(&bench, &INDEX_PAIRS, GpuOptions::DEFAULT.root, params, count)?;
-    Ok(words.chunks_exact(3).map(|words| (words[1].into(), words[2].into())).collect())
+    let wrong = (0..pair_count(OBJECTS)).find(|&k| !there(k));
+    check(wrong.is_none(), || format!("{OBJECTS} boxes: index {wrong:?} is wrong")).map(|()| table)
 }
 
 /// Returns the bytes that come back with a byte a pair, and with a bit (3.4).
@@ -73,7 +57,7 @@ fn bytes() -> Table {
         let rate = |bytes: u64, us: f64| bytes as f64 / us / 1e3;
         let sizes = cells![n, pair_count(n), bytes, bits, byte[0], bit[0], byte[1], bit[1]];
         let tests = pair_count(n) as f64 / (bit[0] / 1e3);
-        table.row([sizes, cells![rate(bytes, byte[1]), rate(bits, bit[1]), tests]].concat());
+        table.row(cells![..sizes, rate(bytes, byte[1]), rate(bits, bit[1]), tests]);
     }
     table
 }
@@ -152,20 +136,20 @@ fn forms_on_cpu() -> Result<Table, Failure> {
 }
 
 /// The same on a device, without a grid: bits (`Coding::Packed`) against a list of pairs (`Plain`).
-fn forms_on_device(device: &Device) -> Result<Table, Failure> {
+fn forms_on_device(setup: &Setup) -> Result<Table, Failure> {
     let columns = "objects | pairs | form | bytes written | bytes fetched | ms of the kernel `check_all` | \
         ms, host waits | ms, host decodes";
     let mut table = Table::new("Avril table 5: forms of output, GPU", columns);
     for n in [100, 1000] {
         let ways = [Coding::Packed, Coding::Plain]
             .map(|coding| on_gpu(GpuOptions { coding, ..GpuOptions::DEFAULT }));
-        let calls = device.run(&ways, &cubes(n, 1.0, 1.0, 1), DISTANCE)?;
+        let calls = setup.run(&ways, &cubes(n, 1.0, 1.0, 1), DISTANCE)?;
         for ((form, ..), call) in FORMS[1..].iter().zip(calls) {
             let kernel = call.kernels(|name| name == "check_all");
             let gpu = call.report.gpu.clone().unwrap_or_default();
             let [wait, decode] = [gpu.wait, gpu.decode].map(milliseconds);
-            let output = cells![*form, call.written(), gpu.downloaded, kernel, wait, decode];
-            table.row([cells![n, call.report.pairs], output].concat());
+            let bytes = [call.written(), Some(gpu.downloaded)];
+            table.row(cells![n, call.report.pairs, *form, ..bytes, kernel, wait, decode]);
         }
     }
     Ok(table)
@@ -174,23 +158,23 @@ fn forms_on_device(device: &Device) -> Result<Table, Failure> {
 const BRUTE: Way = Way::Finder(Config { backend: Backend::Brute, ..UNSORTED });
 
 /// Figure 4: brute force by number of objects, on one thread, and on a device up to 1024 boxes.
-fn brute_force(device: &Device) -> Result<Table, Failure> {
+fn brute_force(setup: &Setup) -> Result<Table, Failure> {
     let columns = "objects | tests | bytes up | bytes back, a bit a pair | ms, brute force, CPU | tests/s, CPU | ms, GPU";
     let mut table = Table::new("Avril figure 4: brute force", columns);
     for n in [100usize, 500, 1000, 2500, 5000] {
         let boxes = cubes(n, 1.0, 1.0, 1);
         let ways = [on_gpu(GpuOptions::DEFAULT)];
-        let gpu = device.run(&ways[..usize::from(n <= ALL_PAIRS)], &boxes, DISTANCE)?;
+        let gpu = setup.run(&ways[..usize::from(n <= ALL_PAIRS)], &boxes, DISTANCE)?;
         let ms = race(&[BRUTE], None, boxes, DISTANCE, effort(n))?[0].median;
         let tests = pair_count(n as u64);
-        let sizes = cells![n, tests, 24 * n, output_bytes(n as u64)[1]];
-        table.row([sizes, cells![ms, tests as f64 / ms * 1e3, gpu.first().map(|call| call.ms)]].concat());
+        let times = cells![ms, tests as f64 / ms * 1e3, gpu.first().map(|call| call.ms)];
+        table.row(cells![n, tests, 24 * n, output_bytes(n as u64)[1], ..times]);
     }
     Ok(table)
 }
 
 /// Table 7: with and without a grid, whole calls from nothing, all moved.
-fn with_grid(scale: &Scale, device: &Device) -> Result<Table, Failure> {
+fn with_grid(setup: &Setup) -> Result<Table, Failure> {
     let columns = "objects | pairs | ms printed: without grid | ms printed: with grid | ms, CPU: brute force | \
         ms, CPU: our grid | ms, CPU: Avril's cells, one thread | ms, GPU: without grid | ms, GPU: with grid";
     let mut table = Table::new("Avril table 7: with and without a grid", columns);
@@ -199,58 +183,55 @@ fn with_grid(scale: &Scale, device: &Device) -> Result<Table, Failure> {
         .map(|all_pairs_up_to| on_gpu(GpuOptions { all_pairs_up_to, ..GpuOptions::DEFAULT }));
     for (n, without, with) in AVRIL_7 {
         let boxes = cubes(n, 1.0, 1.0, 1);
-        let gpu = device.run(&on_device[..1 + usize::from(n <= ALL_PAIRS)], &boxes, DISTANCE)?;
+        let gpu = setup.run(&on_device[..1 + usize::from(n <= ALL_PAIRS)], &boxes, DISTANCE)?;
         let ways = [BRUTE, Way::Finder(OUR_GRID), density];
-        let cpu = race(&ways, None, boxes, DISTANCE, Effort::new(scale.quick))?;
-        let ours = [0, 1, 2].map(|i| cpu[i].median.into());
-        let on_device = [1, 0].map(|i: usize| gpu.get(i).map(|call| call.ms).into());
-        let printed = cells![n, cpu[0].report.pairs, without, with];
-        table.row([printed, ours.into(), on_device.into()].concat());
+        let cpu = race(&ways, None, boxes, DISTANCE, Effort::new(setup.quick))?;
+        let ours = cpu.iter().map(|call| call.median);
+        let on_device = [1, 0].map(|i: usize| gpu.get(i).map(|call| call.ms));
+        table.row(cells![n, cpu[0].report.pairs, without, with, ..ours, ..on_device]);
     }
     Ok(table)
 }
 
 /// Table 6 and figure 5: a step in which all move. Ours: cubes with a pair each that move by up to a tenth of their edge:
 /// `BroadPhase::set_many`, then `update`, events included; on the CPU means, on a device medians of a few updates.
-fn steps(scale: &Scale, device: &Device) -> Result<Table, Failure> {
+fn steps(setup: &Setup) -> Result<Table, Failure> {
     let columns = "objects | side | pairs | boxes up to date, ms | grid (ours: plan and map), ms | \
         search (ours: check, emit, diff), ms | whole, ms | updates";
     let mut table = Table::new("Avril table 6 and figure 5: a step, all moving", columns);
-    for (n, printed) in AVRIL_6.into_iter().filter(|(n, _)| !scale.quick || *n <= 100_000) {
-        let printed = printed.map(Value::from).into();
-        table.row([cells![n, "printed", None::<u64>], printed, cells![None::<u64>]].concat());
+    for (n, printed) in AVRIL_6.into_iter().filter(|(n, _)| !setup.quick || *n <= 100_000) {
+        table.row(cells![n, "printed", (), ..printed]);
         let boxes = || cubes(n, 1.0, 1.0, 1);
-        let ours = alone(true, boxes(), (1.0, DISTANCE), Effort::new(scale.quick))?;
+        let ours = alone(true, boxes(), (1.0, DISTANCE), Effort::new(setup.quick))?;
         let of = |wanted: &[&str]| -> f64 {
             NAMES.iter().zip(ours.mean).filter(|(name, _)| wanted.contains(name)).map(|(_, ms)| ms).sum()
         };
         let (set, grid, search) = (of(&["set"]), of(&["plan", "map"]), of(&["check", "emit", "diff"]));
         table.row(cells![n, "ours, CPU", ours.pairs, set, grid, search, ours.mean[0], ours.chosen]);
-        if let Some(gpu) = device.for_boxes(n) {
+        if let Some(gpu) = setup.for_boxes(n) {
             let raced = gpu_race::race(gpu, boxes(), 1.0, DISTANCE)?;
-            let times = [vec![Value::Null; 3], cells![raced.ms[1], None::<u64>]].concat();
-            table.row([cells![n, "ours, GPU", raced.pairs], times].concat());
+            table.row(cells![n, "ours, GPU", raced.pairs, ..[(); 3], raced.ms[1]]);
         }
     }
     Ok(table)
 }
 
 /// Figure 6: a step in which a share moves. A program that plays a device has fewer boxes.
-fn movers(scale: &Scale, device: &Device) -> Result<Table, Failure> {
-    let n = if scale.quick { 10_000 } else { 100_000 };
+fn movers(setup: &Setup) -> Result<Table, Failure> {
+    let n = if setup.quick { 10_000 } else { 100_000 };
     let columns = "share moved | boxes | pairs | ms, events | ms, from nothing | updates | boxes, GPU | \
         ms, events, GPU | ms, events, CPU with as many";
     let mut table = Table::new("Avril figure 6: share of moving objects", columns);
-    let fewer = if device.for_boxes(n).is_some() { n } else { n.min(10_000) };
+    let fewer = if setup.for_boxes(n).is_some() { n } else { n.min(10_000) };
     for share in [0.01, 0.1, 0.25, 0.5, 0.75, 1.0] {
-        let (boxes, effort) = (|n| cubes(n, 1.0, 1.0, 1), Effort::new(scale.quick));
+        let (boxes, effort) = (|n| cubes(n, 1.0, 1.0, 1), Effort::new(setup.quick));
         let events = alone(true, boxes(n), (share, DISTANCE), effort)?;
         let scratch = alone(false, boxes(n), (share, DISTANCE), effort)?;
         let ours = cells![share, n, events.pairs, events.mean[0], scratch.mean[0], events.chosen];
-        let raced = device.for_boxes(fewer).map(|gpu| gpu_race::race(gpu, boxes(fewer), share, DISTANCE));
+        let raced = setup.for_boxes(fewer).map(|gpu| gpu_race::race(gpu, boxes(fewer), share, DISTANCE));
         let ms = raced.transpose()?.map(|raced| raced.ms);
-        let beside = cells![ms.map(|_| fewer), ms.map(|[_, gpu]| gpu), ms.map(|[cpu, _]| cpu)];
-        table.row([ours, beside].concat());
+        let beside = ms.map_or(vec![], |[cpu, gpu]| cells![fewer, gpu, cpu]);
+        table.row(cells![..ours, ..beside]);
     }
     Ok(table)
 }

@@ -19,7 +19,10 @@ impl Facts {
     }
 }
 
-const PLACES: [([&str; 2], fn(&mut Facts)); 11] = [
+/// A paper and a place in it, and the facts there.
+type Place = ([&'static str; 2], fn(&mut Facts));
+
+const PLACES: [Place; 11] = [
     (["PBIG", "equation 7, figure 3"], rows_of_figure_3),
     (["PBIG", "algorithms 1 and 2"], segments),
     (["PBIG", "tables IV and VI"], totals),
@@ -102,12 +105,12 @@ fn segments(facts: &mut Facts) {
 }
 
 fn totals(facts: &mut Facts) {
-    let gap = |row: &Breakdown| row.total as f64 - row.tasks.iter().sum::<u64>() as f64;
+    let gap = |row: &Timing| row.total as f64 - row.tasks.iter().sum::<u64>() as f64;
     for (i, row) in TABLE_VI.iter().enumerate() {
         facts.add(format!("row {i}: total less the tasks, us"), gap(row));
     }
     facts.add("baseline in no task, %", 100.0 * gap(&TABLE_VI[0]) / TABLE_VI[0].total as f64);
-    let off = |row: &Breakdown| Some((row.speed_up? - TABLE_VI[0].total as f64 / row.total as f64).abs());
+    let off = |row: &Timing| Some((row.speed_up? - TABLE_VI[0].total as f64 / row.total as f64).abs());
     let off = TABLE_VI.iter().filter_map(off).fold(0.0, f64::max);
     facts.add("largest difference of speed-ups of tables IV and VI", off);
 }

@@ -3,9 +3,9 @@
 
 use super::model::{GAUSSIAN, Model, UNIFORM};
 use super::printed::*;
-use super::sides::{Call, Device, Way, effort, on_gpu, once, race};
+use super::sides::{Call, Setup, Way, effort, on_gpu, once, race};
 use super::table_iii::{expected_checks, options_for};
-use super::{OUR_GRID, Scale, UNSORTED};
+use super::{OUR_GRID, UNSORTED};
 use pbig_core::{Aabb, CellRule, Coding, Config, Finder, GpuOptions, GpuReport, Order, Report};
 use pbig_harness::prelude::*;
 use std::time::Duration;
@@ -15,48 +15,41 @@ const MOST_PAIRS: f64 = 2e8;
 /// Most boxes for PBIG's grid on one thread.
 const MOST_PLAIN: usize = 1_000_000;
 
-pub(super) fn tables(scale: &Scale, device: &Device) -> Result<Vec<Table>, Failure> {
+pub(super) fn tables(setup: &Setup) -> Result<Vec<Table>, Failure> {
     let gaussian_ms = TABLE_VI[7].total as f64 / 1e3;
-    let n = scale.on_device(device);
-    let runs = device.run(&TABLE_VI.map(|row| optimised(&row)), &crowded(n).draw(n, 1), 1.0)?;
+    let n = setup.on_device();
+    let runs = setup.run(&TABLE_VI.map(|row| optimised(&row)), &crowded(n).draw(n, 1), 1.0)?;
     Ok(vec![
-        by_number("PBIG figure 8: number of boxes", &UNIFORM, "< 1000".into(), scale, device)?,
-        by_length(scale, device)?,
-        by_number("PBIG figure 11: distribution of boxes", &GAUSSIAN, gaussian_ms.into(), scale, device)?,
+        by_number("PBIG figure 8: number of boxes", &UNIFORM, "< 1000".into(), setup)?,
+        by_length(setup)?,
+        by_number("PBIG figure 11: distribution of boxes", &GAUSSIAN, gaussian_ms.into(), setup)?,
         optimisations(&runs),
         tasks(&runs),
-        on_cpu(scale)?,
+        on_cpu(setup)?,
     ])
 }
 
 /// Measures whole calls from nothing, all boxes moved since the call before. `printed`: what the paper has for most boxes.
-fn by_number(
-    name: &str,
-    model: &Model,
-    printed: Value,
-    scale: &Scale,
-    device: &Device,
-) -> Result<Table, Failure> {
+fn by_number(name: &str, model: &Model, printed: Value, setup: &Setup) -> Result<Table, Failure> {
     let columns = "boxes | pairs expected | pairs | off, standard deviations | ms printed | ms, our grid, CPU | \
         ms, PBIG's grid, CPU, one thread | ms, GPU";
     let mut table = Table::new(name, columns);
-    for &n in scale.numbers {
-        let (times, pairs) = sides(model, n, device)?;
-        let counts = cells![n, model.pairs(n).round() as u64, pairs, model.off(n, pairs)];
+    for &n in setup.numbers {
+        let (times, pairs) = sides(model, n, setup)?;
         let printed = if n == MOST_BOXES { printed.clone() } else { Value::Null };
-        table.row([counts, vec![printed], times.map(Value::from).into()].concat());
+        table.row(cells![n, model.pairs(n).round() as u64, pairs, model.off(n, pairs), printed, ..times]);
     }
     Ok(table)
 }
 
 /// Returns the milliseconds of each side that takes part, and the pairs.
-fn sides(model: &Model, n: usize, device: &Device) -> Result<([Option<f64>; 3], u64), Failure> {
+fn sides(model: &Model, n: usize, setup: &Setup) -> Result<([Option<f64>; 3], u64), Failure> {
     let boxes = model.draw(n, 1);
     if model.pairs(n) > MOST_PAIRS {
         let (pairs, ms) = in_slabs(&boxes, (model.pairs(n) / 2e7).ceil() as usize)?;
         return Ok(([Some(ms), None, None], pairs));
     }
-    let gpu = device.for_boxes(n);
+    let gpu = setup.for_boxes(n);
     let pbig = (n <= MOST_PLAIN).then_some(Way::Pbig(GpuOptions::DEFAULT));
     let sides = [Some(Way::Finder(UNSORTED)), pbig, gpu.map(|_| on_gpu(GpuOptions::DEFAULT))];
     let ways: Vec<Way> = sides.into_iter().flatten().collect();
@@ -90,51 +83,42 @@ const MOST_CHECKS: f64 = 2e10;
 
 /// Figure 9: the lengths of the figure, and equation 6 as we use it and as the paper does. Cells that would hold less than a
 /// box, which the rule does not give, or take too long, have only their expected checks.
-fn by_length(scale: &Scale, device: &Device) -> Result<Table, Failure> {
+fn by_length(setup: &Setup) -> Result<Table, Failure> {
     let columns = "boxes | cell wanted | cell | checks | unnecessary | redundant | ms, PBIG's grid, CPU, one thread | \
         cell, GPU | checks, GPU | ms, GPU";
     let mut table = Table::new("PBIG figure 9: size of cells", columns);
-    for &n in scale.numbers.iter().filter(|n| **n >= 10_000) {
-        let (boxes, mut known) = (UNIFORM.draw(n, 1), None);
-        let mut row = |wanted, options| cells_of(&boxes, wanted, options, &mut known, device);
+    for &n in setup.numbers.iter().filter(|n| **n >= 10_000) {
+        let boxes = UNIFORM.draw(n, 1);
+        let pairs = once(Way::Finder(UNSORTED), &boxes)?.report.pairs;
         for cell in CELLS {
-            let (wanted, checks) = (cell.to_string(), expected_checks(&UNIFORM, n, cell));
-            let is_expected_only = n as f64 * (cell / SPACE).powi(3) < 0.3 || checks > MOST_CHECKS;
-            table.row(match is_expected_only {
-                true => {
-                    [cells![n, wanted, None::<f64>, checks.round() as u64], vec![Value::Null; 6]].concat()
-                }
-                false => row(wanted, options_for(&boxes, cell))?,
-            });
+            let expected = expected_checks(&UNIFORM, n, cell);
+            let is_tried = n as f64 * (cell / SPACE).powi(3) >= 0.3 && expected <= MOST_CHECKS;
+            let options = is_tried.then(|| options_for(&boxes, cell));
+            let of_cells = options.map(|options| cells_of(&boxes, pairs, options, setup)).transpose()?;
+            let of_cells = of_cells.unwrap_or_else(|| cells![(), expected.round() as u64]);
+            table.row(cells![n, cell.to_string(), ..of_cells]);
         }
         for boxes_per_cell in [GpuOptions::DEFAULT.boxes_per_cell, WARP as f32] {
             let options = GpuOptions { boxes_per_cell, ..GpuOptions::DEFAULT };
-            table.row(row(format!("equation 6, W = {boxes_per_cell}"), options)?);
+            let of_cells = cells_of(&boxes, pairs, options, setup)?;
+            table.row(cells![n, format!("equation 6, W = {boxes_per_cell}"), ..of_cells]);
         }
     }
     Ok(table)
 }
 
-/// Returns the row of some cells, in which `known` pairs must be found. The time is the shortest of three; of one if that
-/// makes the run too long.
-fn cells_of(
-    boxes: &[Aabb],
-    wanted: String,
-    options: GpuOptions,
-    known: &mut Option<u64>,
-    device: &Device,
-) -> Result<Vec<Value>, Failure> {
-    let Call { mut ms, cell, report, .. } = once(Way::Pbig(options), boxes)?;
-    let pairs = *known.get_or_insert(report.pairs);
-    check(pairs == report.pairs, || format!("cells {wanted}: {} pairs, not {pairs}", report.pairs))?;
-    for _ in 0..if ms < 10_000.0 { 2 } else { 0 } {
-        ms = ms.min(once(Way::Pbig(options), boxes)?.ms);
+/// Returns the row of some cells, in which so many pairs must be found. The time is the shortest of three; of one if that makes
+/// the run too long.
+fn cells_of(boxes: &[Aabb], pairs: u64, options: GpuOptions, setup: &Setup) -> Result<Vec<Value>, Failure> {
+    let mut call = once(Way::Pbig(options), boxes)?;
+    let found = call.report.pairs;
+    check(found == pairs, || format!("cells of {:?}: {found} pairs, not {pairs}", call.cell))?;
+    for _ in 0..if call.ms < 10_000.0 { 2 } else { 0 } {
+        call.ms = call.ms.min(once(Way::Pbig(options), boxes)?.ms);
     }
-    let checks = report.checks;
-    let ours = cells![boxes.len(), wanted, cell, checks.made, checks.unnecessary, checks.redundant, ms];
-    let runs = device.run(&[on_gpu(GpuOptions { all_pairs_up_to: 0, ..options })], boxes, 1.0)?;
-    let on_device = runs.first().map(|call| cells![call.cell, call.report.checks.made, call.ms]);
-    Ok([ours, on_device.unwrap_or_else(|| vec![Value::Null; 3])].concat())
+    let runs = setup.run(&[on_gpu(GpuOptions { all_pairs_up_to: 0, ..options })], boxes, 1.0)?;
+    let on_device = runs.iter().flat_map(|call| cells![call.cell, call.checks()[0], call.ms]);
+    Ok(cells![call.cell, ..call.checks(), call.ms, ..on_device])
 }
 
 /// Returns boxes of section 6.3 that pair as often as 10^7 do in its space: pairs a box follow `N e^3`.
@@ -144,7 +128,7 @@ fn crowded(n: usize) -> Model {
 }
 
 /// Returns the way of a setting. Chunks are as small as gives several at this size: one alone leaves nothing to overlap.
-fn optimised(row: &Breakdown) -> Way {
+fn optimised(row: &Timing) -> Way {
     let has = |letter: char| row.setting.contains(letter);
     let coding = if has('C') { Coding::Packed } else { Coding::Plain };
     let (pipelining, load_balancing, chunk) = (has('P'), has('B'), [1 << 13, 1 << 7]);
@@ -157,15 +141,14 @@ fn optimisations(runs: &[Call]) -> Table {
         bytes written a pair | bytes fetched | bytes fetched a pair | chunks";
     let mut table = Table::new("PBIG table IV: optimisations on and off, GPU", columns);
     for (i, row) in TABLE_VI.iter().enumerate() {
-        let printed = cells![row.setting, row.speed_up, TABLE_VI[0].total as f64 / row.total as f64];
-        let ours = runs.get(i).map_or(vec![Value::Null; 9], |call| {
+        let ours = runs.get(i).map_or(vec![], |call| {
             let Report { pairs, checks, gpu, .. } = &call.report;
-            let counts = cells![call.ms, runs[0].ms / call.ms, *pairs, checks.made];
             let of = |bytes: Option<u64>| cells![bytes, bytes.map(|bytes| bytes as f64 / *pairs as f64)];
-            let chunks = cells![gpu.as_ref().map(|gpu| gpu.chunks)];
-            [counts, of(call.written()), of(call.fetched()), chunks].concat()
+            let bytes = [of(call.written()), of(call.fetched())].concat();
+            let chunks = gpu.as_ref().map(|gpu| gpu.chunks);
+            cells![call.ms, runs[0].ms / call.ms, *pairs, checks.made, ..bytes, chunks]
         });
-        table.row([printed, ours].concat());
+        table.row(cells![row.setting, row.speed_up, TABLE_VI[0].total as f64 / row.total as f64, ..ours]);
     }
     table
 }
@@ -178,7 +161,7 @@ fn tasks(runs: &[Call]) -> Table {
     let mut table = Table::new("PBIG tables V and VI: time per task, ms", &columns);
     let mut row = |setting: &str, side: &str, total: f64, tasks: [Option<f64>; TASKS.len()]| {
         let rest = total - tasks.iter().flatten().sum::<f64>();
-        table.row([cells![setting, side, total], tasks.map(Value::from).into(), cells![rest]].concat());
+        table.row(cells![setting, side, total, ..tasks, rest]);
     };
     for (i, printed) in TABLE_VI.iter().enumerate() {
         let tasks = std::array::from_fn(|k| printed.tasks.get(k).map(|us| *us as f64 / 1e3));
@@ -204,39 +187,35 @@ fn of_tasks(call: &Call) -> [Option<f64>; 7] {
 }
 
 /// Returns the settings that can be switched on the CPU.
-fn settings() -> [(String, Way); 7] {
+fn settings() -> [(&'static str, Way); 7] {
     let default = GpuOptions::DEFAULT;
-    let wanted = |boxes_per_cell: f32| {
-        let name = format!("PBIG's grid, equation 6, W = {boxes_per_cell}");
-        (name, Way::Pbig(GpuOptions { boxes_per_cell, ..default }))
-    };
+    let wanted = |boxes_per_cell: f32| Way::Pbig(GpuOptions { boxes_per_cell, ..default });
     let small_cell = |small_cell: u32| Way::Pbig(GpuOptions { small_cell, ..default });
     let density = Way::Pbig(GpuOptions { cell_rule: CellRule::Density, ..default });
     let sorted = Way::Finder(Config { order: Order::Sorted, ..OUR_GRID });
     [
-        wanted(WARP as f32),
-        wanted(default.boxes_per_cell),
-        ("PBIG's grid, Avril's cells of that many objects".into(), density),
-        ("the same as the second, every cell by balanced rows".into(), small_cell(0)),
-        ("the same, every cell by Avril's mapping".into(), small_cell(u32::MAX)),
-        ("our grid, one entry a box".into(), Way::Finder(OUR_GRID)),
-        ("our grid, list sorted".into(), sorted),
+        ("PBIG's grid, equation 6, W = 32", wanted(32.0)),
+        ("PBIG's grid, equation 6, W = 4", wanted(4.0)),
+        ("PBIG's grid, Avril's cells of that many objects", density),
+        ("the same as the second, every cell by balanced rows", small_cell(0)),
+        ("the same, every cell by Avril's mapping", small_cell(u32::MAX)),
+        ("our grid, one entry a box", Way::Finder(OUR_GRID)),
+        ("our grid, list sorted", sorted),
     ]
 }
 
 /// The counterpart on the CPU: which cells, which mapping, which entries. Section 6.3 as printed; PBIG's grid on one thread,
 /// ours on all.
-fn on_cpu(scale: &Scale) -> Result<Table, Failure> {
-    let n = if scale.quick { 20_000 } else { 300_000 };
+fn on_cpu(setup: &Setup) -> Result<Table, Failure> {
+    let n = if setup.quick { 20_000 } else { 300_000 };
     let columns = "setting | ms | times as fast as the first | pairs | checks | unnecessary | redundant";
     let mut table = Table::new("PBIG table IV's counterpart on the CPU", columns);
     let settings = settings();
     let ways: Vec<Way> = settings.iter().map(|(_, way)| *way).collect();
     let raced = race(&ways, None, GAUSSIAN.draw(n, 1), 1.0, effort(n))?;
-    for ((name, _), one) in settings.iter().zip(&raced) {
-        let Report { pairs, checks, .. } = &one.report;
-        let head = cells![name.as_str(), one.median, raced[0].median / one.median, *pairs];
-        table.row([head, cells![checks.made, checks.unnecessary, checks.redundant]].concat());
+    for ((name, _), one) in settings.into_iter().zip(&raced) {
+        let (ratio, pairs) = (raced[0].median / one.median, one.report.pairs);
+        table.row(cells![name, one.median, ratio, pairs, ..one.checks()]);
     }
     Ok(table)
 }
@@ -264,7 +243,7 @@ mod tests {
         for (name, way) in settings() {
             assert_eq!(once(way, &boxes).expect("found").report.pairs, pairs, "{name}");
         }
-        let runs = Device::best(true).run(&TABLE_VI.map(|row| optimised(&row)), &boxes, 1.0);
+        let runs = Setup::new(true).run(&TABLE_VI.map(|row| optimised(&row)), &boxes, 1.0);
         for call in runs.expect("a device that works") {
             assert!(call.report.pairs == pairs && call.written() <= Some(12 * pairs));
         }

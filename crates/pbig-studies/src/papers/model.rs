@@ -5,7 +5,7 @@ use super::printed::{LENGTHS, NORMAL, SPACE};
 use pbig_core::Aabb;
 use rand::rngs::StdRng;
 use rand::{RngExt, SeedableRng};
-use rand_distr::{Distribution, Normal};
+use rand_distr::StandardNormal;
 
 /// Section 6.1 as it is printed.
 pub(super) const UNIFORM: Model = Model::boxes(LENGTHS[0], LENGTHS[1]);
@@ -147,9 +147,7 @@ impl Model {
     fn point(&self, rng: &mut StdRng) -> f64 {
         match self.space {
             Space::Even(length) => rng.random_range(0.0..length),
-            Space::Normal([mean, deviation]) => {
-                Normal::new(mean, deviation).map_or(mean, |normal| normal.sample(rng))
-            }
+            Space::Normal([mean, deviation]) => mean + deviation * rng.sample::<f64, _>(StandardNormal),
         }
     }
 }

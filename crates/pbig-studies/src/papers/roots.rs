@@ -1,8 +1,7 @@
 //! Avril's table 2 and the times of table 4: from the index of a pair to the pair, with a root and by the lazy way (3.2.2).
 
-use super::Scale;
 use super::printed::AVRIL_2;
-use super::sides::{Device, on_gpu};
+use super::sides::{Setup, on_gpu};
 use crate::index::{AsItIs, Correction, Double, Root, Rules, Single, discriminant, lazy_ids, lazy_pair};
 use pbig_core::{Aabb, GpuOptions, Report};
 use pbig_harness::pair_index::{pair_count, pair_of};
@@ -10,8 +9,8 @@ use pbig_harness::prelude::*;
 use std::ops::Range;
 use std::time::Duration;
 
-pub(super) fn tables(scale: &Scale, device: &Device) -> Result<Vec<Table>, Failure> {
-    Ok(vec![on_cpu(scale)?, on_device(device)?])
+pub(super) fn tables(setup: &Setup) -> Result<Vec<Table>, Failure> {
+    Ok(vec![on_cpu(setup)?, on_device(setup)?])
 }
 
 /// Ids looked at in one measurement; where there are more, stretches of them, spread evenly.
@@ -105,7 +104,7 @@ fn all_ways(n: u64, most: u64) -> Result<Found, Failure> {
 }
 
 /// Table 2 on one thread: cubes with a pair each.
-fn on_cpu(scale: &Scale) -> Result<Table, Failure> {
+fn on_cpu(setup: &Setup) -> Result<Table, Failure> {
     let names = |before: &str, ways: &[(&str, Search)]| -> String {
         ways.iter().map(|(name, _)| format!("{before}{name} | ")).collect()
     };
@@ -116,14 +115,13 @@ fn on_cpu(scale: &Scale) -> Result<Table, Failure> {
         names("lazy / ", &WAYS[..LAZY])
     );
     let mut table = Table::new("Avril table 2: the lazy way, CPU", &columns);
-    let most = if scale.quick { MOST_IDS / 10 } else { MOST_IDS };
+    let most = if setup.quick { MOST_IDS / 10 } else { MOST_IDS };
     for (n, root, lazy) in AVRIL_2 {
         let (pairs, ms, times) = all_ways(n, most)?;
         let ratios = ms[..LAZY].iter().map(|root| ms[LAZY] / root);
-        let measured = ms.iter().copied().chain(ratios).map(Value::from).collect();
         let pairs = (times[1] == 1.0).then_some(pairs[LAZY]);
-        let looked_at = cells![pairs, 100.0 / times[0], 100.0 / times[1]];
-        table.row([cells![n, root, lazy, lazy / root], measured, looked_at].concat());
+        let looked_at = times.map(|times| 100.0 / times);
+        table.row(cells![n, root, lazy, lazy / root, ..ms.clone(), ..ratios, pairs, ..looked_at]);
     }
     Ok(table)
 }
@@ -142,7 +140,7 @@ const ROOTS: [(u32, &str); 8] = [
 
 /// Every root on a device; integers correct each, so all are exact. Every pair of 1000 objects is tested; of more, as table 2's
 /// times seem to be, the pairs in the cells of a grid.
-fn on_device(device: &Device) -> Result<Table, Failure> {
+fn on_device(setup: &Setup) -> Result<Table, Failure> {
     let columns = "objects | root | kernel | ms of the kernel | times as long as the first | checks | pairs";
     let mut table = Table::new("Avril tables 2 and 4: roots, GPU", columns);
     let in_cells = GpuOptions { all_pairs_up_to: 0, small_cell: 256, ..GpuOptions::DEFAULT };
@@ -152,7 +150,7 @@ fn on_device(device: &Device) -> Result<Table, Failure> {
         (100_000, "check_small", in_cells),
     ] {
         let ways = ROOTS.map(|(root, _)| on_gpu(GpuOptions { root, ..options }));
-        let calls = device.run(&ways, &cubes(n, 1.0, 1.0, 1), 0.1)?;
+        let calls = setup.run(&ways, &cubes(n, 1.0, 1.0, 1), 0.1)?;
         let ms: Vec<_> = calls.iter().map(|call| call.kernels(|name| name == kernel)).collect();
         for (((_, root), call), &own) in ROOTS.iter().zip(&calls).zip(&ms) {
             let ratio = ms[0].zip(own).map(|(first, own)| own / first);

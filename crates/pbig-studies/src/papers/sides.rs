@@ -1,6 +1,7 @@
 //! Ways to search the same boxes from nothing, in turn, on the CPU and on a device.
 
 use super::UNSORTED;
+use super::printed::MOST_BOXES;
 use pbig_core::{Aabb, Backend, Config, Finder, GpuFinder, GpuOptions, Report};
 use pbig_harness::pbig_grid::pbig_grid;
 use pbig_harness::prelude::*;
@@ -108,24 +109,40 @@ pub(super) fn race(
     Ok(sides.into_iter().zip(took).map(middle).collect())
 }
 
-/// The adapter on which the papers' GPU experiments are repeated, if there is one.
-pub(super) struct Device {
+/// The size of the experiments, and the adapter on which those on a GPU are repeated, if there is one.
+pub(super) struct Setup {
+    pub(super) quick: bool,
+    /// Boxes of figures 8, 9 and 11 of PBIG; the last is as many as the papers have at most.
+    pub(super) numbers: &'static [usize],
     gpu: Option<GpuFinder>,
-    /// Its name, or why there is none.
-    pub(super) name: String,
-    quick: bool,
+    /// The adapter's name, or why there is none.
+    pub(super) adapter: String,
 }
 
-impl Device {
+impl Setup {
     /// Opens the best adapter, or that of `WGPU_ADAPTER_NAME`.
-    pub(super) fn best(quick: bool) -> Self {
+    pub(super) fn new(quick: bool) -> Self {
+        const NUMBERS: [usize; 5] = [1000, 10_000, 100_000, 1_000_000, MOST_BOXES];
         let gpu = GpuFinder::new();
-        let name = gpu.as_ref().map_or_else(|error| format!("none: {error}"), |gpu| gpu.adapter().to_owned());
-        Self { gpu: gpu.ok(), name, quick }
+        let adapter = gpu.as_ref().map_or_else(|error| format!("none: {error}"), |gpu| gpu.adapter().into());
+        Self { quick, numbers: if quick { &NUMBERS[..3] } else { &NUMBERS }, gpu: gpu.ok(), adapter }
+    }
+
+    pub(super) fn most_boxes(&self) -> usize {
+        self.numbers[self.numbers.len() - 1]
     }
 
     pub(super) fn is_software(&self) -> bool {
         self.gpu.as_ref().is_some_and(GpuFinder::is_software)
+    }
+
+    /// Returns the boxes for a device: as many as a program that plays one searches in seconds.
+    pub(super) fn on_device(&self) -> usize {
+        match (self.is_software(), self.quick) {
+            (_, true) => 2000,
+            (true, false) => 50_000,
+            (false, false) => 1_000_000,
+        }
     }
 
     /// Returns the device for a set of so many boxes: a program that plays one takes minutes for millions.
@@ -150,6 +167,12 @@ impl Device {
 }
 
 impl Call {
+    /// Returns the checks made, and of them the unnecessary and the redundant ones.
+    pub(super) fn checks(&self) -> [u64; 3] {
+        let checks = &self.report.checks;
+        [checks.made, checks.unnecessary, checks.redundant]
+    }
+
     /// Returns the bytes that the kernels have written of output, for the host to decode; none where nothing was found. Those
     /// that come back are more: with each chunk of work its counters and times, and words that are fetched before it is known how
     /// many there are; with records also the table for decoding.
@@ -167,7 +190,7 @@ impl Call {
     /// Returns the milliseconds of the kernels whose name a rule takes.
     pub(super) fn kernels(&self, takes: impl Fn(&str) -> bool) -> Option<f64> {
         let kernels = &self.report.gpu.as_ref()?.kernels;
-        let wanted = kernels.iter().filter(|(name, _)| takes(name)).map(|(_, of)| of.as_secs_f64() * 1e3);
+        let wanted = kernels.iter().filter(|(name, _)| takes(name)).map(|(_, time)| milliseconds(*time));
         (!kernels.is_empty()).then(|| wanted.sum())
     }
 }

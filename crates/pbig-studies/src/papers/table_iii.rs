@@ -3,17 +3,17 @@
 //! Equation 11 is the sum of the volumes of all boxes over that of the space. By it `n` equal cubes, and boxes whose lengths are
 //! independent on each axis, have `4 n DoC` pairs: `n^2 / 2` times the chance `(2 e / L)^3`. The table has an eighth of that.
 
+use super::UNSORTED;
 use super::model::{Model, Place, Space, UNIFORM};
 use super::printed::{Coverage, MOST_BOXES, SPACE, TABLE_III, WARP};
-use super::sides::{Call, Device, Way, effort, on_gpu, once, race};
-use super::{Scale, UNSORTED};
+use super::sides::{Call, Setup, Way, effort, on_gpu, once, race};
 use pbig_core::pbig::Summary;
 use pbig_core::{Aabb, Coding, GpuOptions};
 use pbig_harness::pbig_grid::PbigPlan;
 use pbig_harness::prelude::*;
 
-pub(super) fn tables(scale: &Scale, device: &Device) -> Result<Vec<Table>, Failure> {
-    Ok(vec![readings(), rule(), counted(scale)?, on_device(scale, device)?])
+pub(super) fn tables(setup: &Setup) -> Result<Vec<Table>, Failure> {
+    Ok(vec![readings(), rule(), counted(setup)?, on_device(setup)?])
 }
 
 /// Returns the edge of `n` equal cubes in the paper's space that have this DoC by equation 11.
@@ -75,8 +75,8 @@ fn readings() -> Table {
         furthest off, standard deviations";
     let mut table = Table::new("PBIG table III: what DoC can mean", columns);
     let mut row = |name: &str, pairs: [f64; 5], off: Option<f64>| {
-        let counts = pairs.map(|pairs| Value::from(pairs.round() as u64));
-        table.row([cells![name, pairs[3] / MOST_BOXES as f64], counts.into(), cells![off]].concat());
+        let counts = pairs.map(|pairs| pairs.round() as u64);
+        table.row(cells![name, pairs[3] / MOST_BOXES as f64, ..counts, off]);
     };
     row("printed", TABLE_III.each_ref().map(|row| row.pairs as f64), None);
     for (name, law) in READINGS {
@@ -176,61 +176,61 @@ fn rule() -> Table {
         let off = |cell: f64| 100.0 * (expected(cell) / row.checks as f64 - 1.0);
         let by = |alpha| equation_6(alpha, &model, MOST_BOXES);
         let rule = cells![by(TOUCHED), objective(TOUCHED, &model, MOST_BOXES, cell), by(EQUATION_5)];
+        let checks = [row.checks, expected(cell).round() as u64];
         let numbers = row.cell.map(|n| off(SPACE / n));
-        let checks = cells![row.checks, expected(cell).round() as u64, off(cell), numbers];
-        table.row([cells![row.doc, row.cell], rule, checks].concat());
+        table.row(cells![row.doc, row.cell, ..rule, ..checks, off(cell), numbers]);
     }
     table
 }
 
 /// The table itself, counted. Our grid makes none of the checks; PBIG's time is of one call that also allocates.
-fn counted(scale: &Scale) -> Result<Table, Failure> {
+fn counted(setup: &Setup) -> Result<Table, Failure> {
     let columns = "DoC | pairs printed (N = 10^7) | pairs | off what is expected, standard deviations | \
         checks printed (N = 10^7) | checks in such cells | of them unnecessary | of them redundant | ms printed | \
         ms, our grid, CPU | ms, PBIG's grid, CPU, one thread";
-    let (n, mut table) = (scale.most_boxes, Table::new("PBIG table III and figure 10: density", columns));
+    let (n, mut table) = (setup.most_boxes(), Table::new("PBIG table III and figure 10: density", columns));
     let scale = (MOST_BOXES as f64 / n as f64).cbrt();
     for row in &TABLE_III {
         let model = fitting(n, row.doc);
         let boxes = model.draw(n, 1);
         let pbig = once(Way::Pbig(options_for(&boxes, scale * cell(row))), &boxes)?;
         let ours = &race(&[Way::Finder(UNSORTED)], None, boxes, 1.0, effort(n))?[0];
-        let (pairs, theirs, checks) = (ours.report.pairs, pbig.report.pairs, pbig.report.checks);
+        let (pairs, theirs) = (ours.report.pairs, pbig.report.pairs);
         check(pairs == theirs, || format!("DoC {}: {pairs} pairs, by PBIG's grid {theirs}", row.doc))?;
-        let counts = cells![row.doc, row.pairs, pairs, model.off(n, pairs), row.checks, checks.made];
-        let rest = cells![checks.unnecessary, checks.redundant, "< 1000", ours.median, pbig.ms];
-        table.row([counts, rest].concat());
+        let times = cells!["< 1000", ours.median, pbig.ms];
+        let counts = cells![row.doc, row.pairs, pairs, model.off(n, pairs), row.checks];
+        table.row(cells![..counts, ..pbig.checks(), ..times]);
     }
     Ok(table)
 }
 
 /// Counts, times and bytes of the output on a device: as a list and as records in cells as our plan has them, and as records in
 /// cells as the paper's `W` gives them, by rows of segments.
-fn on_device(scale: &Scale, device: &Device) -> Result<Table, Failure> {
+fn on_device(setup: &Setup) -> Result<Table, Failure> {
     let columns = "DoC | output printed, MB | bytes a pair, MB = 2^20 | bytes a pair, MB = 10^6 | boxes | pairs, ours | \
         checks, our W | ms, our W | checks, the paper's W | ms, the paper's W | bytes written a pair, ours: list | \
         records | records, the paper's W, rows of segments | bytes fetched a pair, ours: records";
     let mut table = Table::new("PBIG table III and figure 10: density and bytes of output, GPU", columns);
-    let n = scale.on_device(device);
+    let n = setup.on_device();
     let with = |coding| GpuOptions { coding, ..GpuOptions::DEFAULT };
     let rows = GpuOptions { boxes_per_cell: WARP as f32, small_cell: 1, ..with(Coding::Packed) };
     let ways = [with(Coding::Plain), with(Coding::Packed), rows].map(on_gpu);
     for row in &TABLE_III {
         let printed = |unit: f64| row.output * unit / row.pairs as f64;
-        let printed = cells![row.doc, row.output, printed(f64::from(1 << 20)), printed(1e6), n];
-        let calls = device.run(&ways, &fitting(n, row.doc).draw(n, 1), 1.0)?;
-        table.row([printed, of_output(&calls)].concat());
+        let printed = [row.output, printed(f64::from(1 << 20)), printed(1e6)];
+        let calls = setup.run(&ways, &fitting(n, row.doc).draw(n, 1), 1.0)?;
+        table.row(cells![row.doc, ..printed, n, ..of_output(&calls)]);
     }
     Ok(table)
 }
 
 fn of_output(calls: &[Call]) -> Vec<Value> {
-    let [list, packed, rows] = calls else { return vec![Value::Null; 9] };
+    let [list, packed, rows] = calls else { return vec![] };
     let pairs = list.report.pairs;
     let a_pair = |bytes: Option<u64>| bytes.filter(|_| pairs > 0).map(|bytes| bytes as f64 / pairs as f64);
-    let [ours, papers] = [packed, rows].map(|call| cells![call.report.checks.made, call.ms]);
-    let written = [list, packed, rows].map(|call| a_pair(call.written()).into());
-    [cells![pairs], ours, papers, written.into(), cells![a_pair(packed.fetched())]].concat()
+    let [ours, papers] = [packed, rows].map(|call| cells![call.checks()[0], call.ms]);
+    let written = [list, packed, rows].map(|call| a_pair(call.written()));
+    cells![pairs, ..ours, ..papers, ..written, a_pair(packed.fetched())]
 }
 
 #[cfg(test)]
