@@ -72,9 +72,6 @@ pub fn alone(case: &str, boxes: usize, pairs: u64, unit: &str, value: Option<f64
 pub fn unprepared<S>(_: &mut S, _: usize) {}
 
 /// Returns the medians of [`measured`].
-///
-/// # Errors
-/// If a side's work fails.
 pub fn medians<S>(
     state: &mut S,
     sides: usize,
@@ -88,9 +85,6 @@ pub fn medians<S>(
 /// Measures sides that do the same work, round by round. `prepare` gets the round and is not measured; `run` does one side's work
 /// and returns its milliseconds. Sides change places from round to round, as the first in a round warms the caches for the others;
 /// a side's median is the mean of those at each place, however often it was there.
-///
-/// # Errors
-/// If a side's work fails.
 pub fn measured<S>(
     state: &mut S,
     sides: usize,

@@ -83,10 +83,7 @@ impl Chart {
         Self { name: name.into(), plots: vec![Plot { title, x, y, is_log: true, is_joined: true, lines }] }
     }
 
-    /// Writes the chart.
-    ///
-    /// # Errors
-    /// Returns a message that names the file, if it cannot be written.
+    /// Writes the chart. An error names the file.
     pub fn write(&self, path: &Path) -> Result<(), String> {
         self.draw(path).map_err(|error| format!("{}: cannot write the chart: {error}", path.display()))
     }

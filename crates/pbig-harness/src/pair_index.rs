@@ -22,9 +22,6 @@ pub const fn pair_count(n: u64) -> u64 {
 }
 
 /// Returns the index of the first pair of row `a < n <= 2^32` (the paper's S_a): `a (2n - a - 1) / 2`.
-///
-/// # Panics
-/// If `a` is not below `n`.
 #[inline]
 pub fn row_start(a: u64, n: u64) -> u64 {
     assert!(a < n, "row {a} of {n} boxes");
@@ -33,9 +30,6 @@ pub fn row_start(a: u64, n: u64) -> u64 {
 }
 
 /// Returns the index of the pair `(a, b)`, `a < b < n <= 2^32` (equation 2, solved for k).
-///
-/// # Panics
-/// If not `a < b < n`.
 #[inline]
 pub fn index_of(a: u64, b: u64, n: u64) -> u64 {
     assert!(a < b && b < n, "pair ({a}, {b}) of {n} boxes");

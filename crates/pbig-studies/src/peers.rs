@@ -3,17 +3,15 @@
 //! Events: `set_many` of the boxes that moved and `update`; parry keeps its tree and gives all pairs (1% moved: those with a moved
 //! box), no events. Not counted for the others: turning boxes into theirs, and the list of updates for parry's parallel frame.
 
+use crate::UNSORTED;
 use crate::trees::{Changed, Kept, Obvhs, Parry, Refit, for_parry, parry_rebuilt, partition};
-use pbig_core::{Aabb, Config, Finder, Limits, Order};
+use pbig_core::{Aabb, Finder};
 use pbig_harness::prelude::*;
 
 /// Returns the distance that a box of a set moves between two frames, along each axis. Settled boxes hardly move.
 fn distance(set: &str) -> f32 {
     if set == "pile" { 0.02 } else { 0.1 }
 }
-
-/// Unlimited, as the others know no limits.
-const CONFIG: Config = Config { limits: Limits::UNLIMITED, order: Order::Unspecified, ..Config::DEFAULT };
 
 /// A set of boxes, and how many.
 type Case = (&'static str, usize);
@@ -24,10 +22,7 @@ const SMALL: [Case; 3] = [("unit", 10_000), ("mixed", 10_000), ("pile", 10_000)]
 /// The share of boxes that swing to and fro; none: all drift, on and on.
 type Motion = Option<f64>;
 
-/// Measures all cases.
-///
-/// # Errors
-/// A failed check, if the sides have different numbers of pairs.
+/// Measures all cases. A failed check, if the sides have different numbers of pairs.
 pub fn run(quick: bool) -> Result<Report, Failure> {
     let (effort, mut table) = (Effort::new(quick), Table::new("peers", COMPARED));
     let cases: &[Case] = if quick { &SMALL } else { &LARGE };
@@ -58,7 +53,7 @@ struct Frames {
     wander: Wander,
     changed: Changed,
     ours: Kept,
-    trees: [Parry; 2],
+    trees: Vec<Parry>,
 }
 
 impl Frames {
@@ -80,21 +75,23 @@ impl Frames {
 fn frames(what: &str, case: Case, motion: Motion, effort: Effort, table: &mut Table) -> Result<(), Failure> {
     let (name, boxes) = (format!("{what}, {}", case.0), named(case));
     let is_partial = motion.is_some_and(|share| share < 1.0);
-    let refits = if is_partial { [Refit::Changed, Refit::Part] } else { [Refit::Whole, Refit::Parallel] };
-    let trees = refits.map(|refit| Parry::new(&boxes, refit));
+    let refits = if is_partial { &[Refit::Changed][..] } else { &[Refit::Whole, Refit::Parallel] };
+    let trees: Vec<Parry> = refits.iter().map(|refit| Parry::new(&boxes, *refit)).collect();
+    let sides = 2 + trees.len();
     let wander = match motion {
         Some(share) => Wander::new(boxes, share, distance(case.0)),
         None => Wander::drifting(boxes, distance(case.0)),
     };
     let changed = ((0..case.1 as u32).collect(), vec![]);
-    let mut state = Frames { wander, changed, ours: Kept::new(CONFIG)?, trees };
+    let mut state = Frames { wander, changed, ours: Kept::new(UNSORTED)?, trees };
     for side in [0, 1] {
         state.run(side)?;
     }
-    let times = measured(&mut state, 4, effort, Frames::prepare, Frames::run)?;
+    let times = measured(&mut state, sides, effort, Frames::prepare, Frames::run)?;
     let Frames { ours, mut trees, .. } = state;
     let [all, lone] = ours.pairs();
-    let pairs = agree(&name, all, &[lone, trees[0].all_pairs(), trees[1].all_pairs()])?;
+    let theirs: Vec<usize> = trees.iter_mut().map(Parry::all_pairs).collect();
+    let pairs = agree(&name, all, &[vec![lone], theirs].concat())?;
     for (tree, &theirs) in trees.iter().zip(&times[2..]) {
         table.row(compared(&name, case.1, pairs, MS, times[0], (tree.name(), theirs)));
     }
@@ -106,7 +103,7 @@ fn frames(what: &str, case: Case, motion: Motion, effort: Effort, table: &mut Ta
 /// Measures all pairs from nothing, of boxes that are elsewhere in each round.
 fn from_scratch(case: Case, effort: Effort, table: &mut Table) -> Result<(), Failure> {
     let name = format!("from scratch, {}", case.0);
-    let (mut ours, mut found, mut pairs) = (Finder::new(CONFIG), vec![], [0; 3]);
+    let (mut ours, mut found, mut pairs) = (Finder::new(UNSORTED), vec![], [0; 3]);
     let wander = Wander::new(named(case), 1.0, distance(case.0));
     let mut state = (wander, vec![], Obvhs::default());
     let prepare = |(wander, parry, obvhs): &mut (Wander, Vec<_>, Obvhs), round| {

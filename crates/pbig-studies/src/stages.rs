@@ -1,14 +1,13 @@
 //! Pbig alone, stage by stage, against what a scene can be: cubes with edges around 1 and about one pair a box that all move by up
 //! to 0.1, unless that is varied.
 
-use pbig_core::{Aabb, BroadPhase, Config, Finder, Limits, Order, ProxyFilter};
+use crate::UNSORTED;
+use pbig_core::{Aabb, BroadPhase, Finder, ProxyFilter};
 use pbig_harness::prelude::*;
 use std::collections::BTreeMap;
 
 /// Distance of a move along each axis at most.
 const DISTANCE: f32 = 0.1;
-
-const CONFIG: Config = Config { limits: Limits::UNLIMITED, order: Order::Unspecified, ..Config::DEFAULT };
 
 /// The whole call, `set_many` (incremental only), and the stages of the report.
 pub(crate) const NAMES: [&str; 7] = ["whole", "set", "plan", "map", "check", "emit", "diff"];
@@ -42,8 +41,8 @@ pub(crate) fn alone(
     (share, distance): (f64, f32),
     effort: Effort,
 ) -> Result<Measured, Failure> {
-    let (finder, moved) = (Finder::new(CONFIG), (0..boxes.len() as u32).collect());
-    let broad_phase = events.then(|| BroadPhase::new(CONFIG)).transpose()?;
+    let (finder, moved) = (Finder::new(UNSORTED), (0..boxes.len() as u32).collect());
+    let broad_phase = events.then(|| BroadPhase::new(UNSORTED)).transpose()?;
     let wander = Wander::new(boxes, share, distance);
     let mut alone = Alone { finder, broad_phase, wander, moved, rounds: vec![] };
     measured(&mut alone, 1, effort, Alone::prepare, |alone, _| alone.find())?;
@@ -92,50 +91,38 @@ impl Alone {
     }
 }
 
-/// A value of what is varied, and the boxes there.
-struct Point {
-    x: f64,
-    boxes: usize,
-    share: f64,
-    spread: f64,
-    pairs: f64,
+/// What is varied, its value, the number of boxes, and their share that moves, spread of sizes and pairs a box.
+type Point = (&'static str, f64, usize, [f64; 3]);
+
+/// Returns the points of each varied quantity; `scratch`: of searches from nothing.
+fn points(scratch: bool, quick: bool) -> impl Iterator<Item = Point> {
+    let (n, most) = if quick { (10_000, if scratch { 5 } else { 4 }) } else { (100_000, 7) };
+    let sizes = (2..=most).map(|k| ("boxes", 10f64.powi(k), 10usize.pow(k as u32), [1.0; 3]));
+    let vary = move |what: &'static str, place: usize, values: [f64; 7]| {
+        values.map(|x| (what, x, n, std::array::from_fn(|k| if k == place { x } else { 1.0 })))
+    };
+    let shares = vary("share moved", 0, [0.001, 0.003, 0.01, 0.03, 0.1, 0.3, 1.0]);
+    let densities = vary("pairs a box", 2, [0.01, 0.1, 0.3, 1.0, 3.0, 10.0, 30.0]);
+    let spreads = vary("largest edge / smallest", 1, [1.0, 3.0, 10.0, 30.0, 100.0, 300.0, 1000.0]);
+    let shares = shares.into_iter().filter(move |_| !scratch);
+    sizes.chain(shares).chain(densities).chain(spreads)
 }
 
-/// Returns each varied quantity with its points; `scratch`: of searches from nothing.
-fn sweeps(scratch: bool, quick: bool) -> Vec<(&'static str, Vec<Point>)> {
-    let point = |x, boxes| Point { x, boxes, share: 1.0, spread: 1.0, pairs: 1.0 };
-    let n = if quick { 10_000 } else { 100_000 };
-    let most = if quick { if scratch { 5 } else { 4 } } else { 7 };
-    let sizes = (2..=most).map(|k| point(10f64.powi(k), 10usize.pow(k as u32))).collect();
-    let shares = [0.001, 0.003, 0.01, 0.03, 0.1, 0.3, 1.0].map(|x| Point { share: x, ..point(x, n) });
-    let densities = [0.01, 0.1, 0.3, 1.0, 3.0, 10.0, 30.0].map(|x| Point { pairs: x, ..point(x, n) });
-    let spreads = [1.0, 3.0, 10.0, 30.0, 100.0, 300.0, 1000.0].map(|x| Point { spread: x, ..point(x, n) });
-    let all = [("boxes", sizes), ("share moved", shares.into()), ("pairs a box", densities.into())];
-    let all = all.into_iter().chain([("largest edge / smallest", spreads.into())]);
-    all.filter(|(name, _)| !scratch || *name != "share moved").collect()
-}
-
-/// Measures all sweeps. Stages are medians from nothing and means of events: updates differ, and a median shows only one kind
+/// Measures all points. Stages are medians from nothing and means of events: updates differ, and a median shows only one kind
 /// of them.
-///
-/// # Errors
-/// If a search fails.
 pub fn run(quick: bool) -> Result<Report, Failure> {
     let effort = Effort::new(quick);
     let columns = "case | boxes | pairs | median_ms | mean_ms | set_ms | plan_ms | map_ms | check_ms | emit_ms | diff_ms | \
         algorithms";
     let mut tables = vec![];
     for (name, scratch) in [("from scratch", true), ("events", false)] {
-        let (sweeps, mut table) = (sweeps(scratch, quick), Table::new(name, columns));
-        let points = sweeps.iter().flat_map(|(what, points)| points.iter().map(move |point| (what, point)));
-        for (what, point) in tracked(points, "scenes") {
-            let boxes = cubes(point.boxes, point.spread as f32, point.pairs as f32, 1);
-            let Measured { median, mean, pairs, chosen } =
-                alone(!scratch, boxes, (point.share, DISTANCE), effort)?;
+        let mut table = Table::new(name, columns);
+        for (what, x, n, [share, spread, pairs]) in tracked(points(scratch, quick), "scenes") {
+            let boxes = cubes(n, spread as f32, pairs as f32, 1);
+            let Measured { median, mean, pairs, chosen } = alone(!scratch, boxes, (share, DISTANCE), effort)?;
             let stages = if scratch { &median } else { &mean }[1..].iter();
             let stages = stages.map(|&ms| (ms > 0.0).then_some(ms));
-            let case = format!("{what} {}", point.x);
-            table.row(cells![case, point.boxes, pairs, median[0], mean[0], ..stages, chosen]);
+            table.row(cells![format!("{what} {x}"), n, pairs, median[0], mean[0], ..stages, chosen]);
         }
         tables.push(table);
     }

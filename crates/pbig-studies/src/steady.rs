@@ -1,8 +1,9 @@
 //! How long updates take, and how evenly. Boxes in motion: our updates beside a search from nothing and parry's tree, in turn in
 //! every frame; pairs agree in number in every frame. Scenes through rapier: ours beside stock in the same world.
 
+use crate::UNSORTED;
 use crate::trees::{Kept, Parry, Refit, partition};
-use pbig_core::{Config, Finder, Limits, Order};
+use pbig_core::{Config, Finder, Limits};
 use pbig_harness::bench::figures;
 use pbig_harness::chart::{Chart, Line, Plot};
 use pbig_harness::duel::Duel;
@@ -20,10 +21,8 @@ const NAMES: [&str; 4] = ["ours", "ours", "search from nothing", "parry 0.31"];
 const COLUMNS: &str =
     "motion | density | boxes | threads | side | mean_ms | median_ms | p99_ms | worst_ms | first_ms";
 
-/// Measures every motion and every scene; `given`: numbers of boxes, and of bodies, instead of its own.
-///
-/// # Errors
-/// A failed check, if the sides have different numbers of pairs.
+/// Measures every motion and every scene; `given`: numbers of boxes, and of bodies, instead of its own. A failed check, if the
+/// sides have different numbers of pairs.
 pub fn run(quick: bool, given: &[usize]) -> Result<Report, Failure> {
     let sizes = |full: &[usize], few: &[usize]| match given {
         [] => if quick { few } else { full }.to_vec(),
@@ -83,7 +82,7 @@ fn frames(n: usize, quick: bool) -> usize {
 /// so the first one changes from frame to frame, and every second frame runs the other way round.
 fn race(mut scene: Scene, frames: usize, name: &str) -> Result<[Vec<f64>; NAMES.len()], Failure> {
     let (mut ours, mut parry) = (Kept::new(CONFIG)?, None);
-    let mut finder = Finder::new(Config { order: Order::Unspecified, ..CONFIG });
+    let mut finder = Finder::new(UNSORTED);
     let mut times = [(); NAMES.len()].map(|()| vec![]);
     let mut changed: Vec<u32> = (0..scene.boxes().len() as u32).collect();
     for frame in 0..=frames {

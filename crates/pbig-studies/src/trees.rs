@@ -64,8 +64,6 @@ pub(crate) enum Refit {
     Changed,
     /// As the first, on all threads.
     Parallel,
-    /// Only what is above the changed leaves, for the pairs with a moved box alone; improves nothing.
-    Part,
 }
 
 /// Parry 0.31's tree, kept from frame to frame as rapier keeps it.
@@ -77,7 +75,6 @@ pub(crate) struct Parry {
     updates: Vec<(ParryAabb, u32, f32)>,
     removed: Vec<u32>,
     changed: Vec<u32>,
-    changed_before: Vec<u32>,
     statuses: Vec<BvhLeafUpdateStatus>,
     found: Vec<(u32, u32)>,
 }
@@ -98,28 +95,21 @@ impl Parry {
             Refit::Whole => "parry 0.31, one thread",
             Refit::Changed => "parry 0.31, changed pairs",
             Refit::Parallel => "parry 0.31, all threads",
-            Refit::Part => "parry 0.31, refit_partial",
         }
-    }
-
-    /// True if a frame gives the pairs with a moved box alone.
-    fn is_partial(&self) -> bool {
-        matches!(self.refit, Refit::Changed | Refit::Part)
     }
 
     /// Takes in the changed boxes, of which invalid ones are removed; not measured.
     pub(crate) fn prepare(&mut self, boxes: &[Aabb], moved: &[u32]) {
         let (present, removed) = partition(boxes, moved);
         // 0 leaves no leaf marked as changed; the smallest number marks them and makes no box larger.
-        let margin = if self.is_partial() { f32::MIN_POSITIVE } else { 0.0 };
+        let margin = if self.refit == Refit::Changed { f32::MIN_POSITIVE } else { 0.0 };
         self.updates = present.iter().map(|&id| (for_parry(&boxes[id as usize]), id, margin)).collect();
         self.removed = removed;
-        self.changed_before = std::mem::replace(&mut self.changed, moved.to_vec());
+        self.changed = moved.to_vec();
     }
 
     /// One frame: boxes in, pairs out.
     pub(crate) fn frame(&mut self) {
-        let is_partial = self.is_partial();
         let Self { refit, tree, workspace, updates, removed, statuses, found, .. } = self;
         found.clear();
         removed.iter().for_each(|&id| tree.remove(id));
@@ -133,16 +123,12 @@ impl Parry {
         for &(aabb, id, margin) in updates.iter() {
             tree.insert_or_update_partially(aabb, id, margin);
         }
-        if *refit == Refit::Part {
-            tree.refit_partial(&self.changed_before, &self.changed);
-        } else {
-            tree.optimize_incremental(workspace);
-            tree.refit(workspace);
-        }
+        tree.optimize_incremental(workspace);
+        tree.refit(workspace);
         let mut push = |a, b| found.push((a, b));
-        match is_partial {
-            true => tree.traverse_bvtt_single_tree::<true>(workspace, &mut push),
-            false => tree.traverse_bvtt_single_tree::<false>(workspace, &mut push),
+        match refit {
+            Refit::Changed => tree.traverse_bvtt_single_tree::<true>(workspace, &mut push),
+            _ => tree.traverse_bvtt_single_tree::<false>(workspace, &mut push),
         }
     }
 

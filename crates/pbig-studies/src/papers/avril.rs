@@ -1,8 +1,9 @@
 //! Avril's tables 1, 5, 6 and 7 and figures 3 to 6: the matrix of pairs, forms of output, brute force, a grid, and steps.
 
+use super::OUR_GRID;
 use super::printed::*;
 use super::sides::{Setup, Way, effort, on_gpu, race};
-use super::{OUR_GRID, UNSORTED};
+use crate::UNSORTED;
 use crate::stages::{NAMES, alone};
 use pbig_core::{Aabb, Backend, CellRule, Coding, Config, GpuOptions, Pair};
 use pbig_harness::gpu_race;
@@ -16,8 +17,8 @@ const DISTANCE: f32 = 0.1;
 const ALL_PAIRS: usize = GpuOptions::DEFAULT.all_pairs_up_to as usize;
 
 pub(super) fn tables(setup: &Setup) -> Result<Vec<Table>, Failure> {
-    let output = [matrix()?, bytes(), forms_on_cpu()?, forms_on_device(setup)?];
-    let whole = [brute_force(setup)?, with_grid(setup)?, steps(setup)?, movers(setup)?];
+    let output = [matrix()?, forms_on_cpu()?, forms_on_device(setup)?];
+    let whole = [brute_force_and_grid(setup)?, steps(setup)?, movers(setup)?];
     Ok([output, whole].concat())
 }
 
@@ -44,22 +45,6 @@ fn matrix() -> Result<Table, Failure> {
 /// Returns the bytes that come back with a byte a pair, and with a bit (3.4).
 fn output_bytes(n: u64) -> [u64; 2] {
     [pair_count(n), pair_count(n).div_ceil(8)]
-}
-
-/// Table 5 and figure 3: bytes by calculation, and rates over the printed output time.
-fn bytes() -> Table {
-    let columns = "objects | pairs tested | bytes, a byte a pair | bytes, a bit a pair | kernel printed, ms: byte | \
-        kernel printed, ms: bit | output printed, us: byte | output printed, us: bit | GB/s printed: byte | \
-        GB/s printed: bit | tests/s printed";
-    let mut table = Table::new("Avril table 5 and figure 3: a byte or a bit a pair", columns);
-    for (n, byte, bit) in AVRIL_5 {
-        let [bytes, bits] = output_bytes(n);
-        let rate = |bytes: u64, us: f64| bytes as f64 / us / 1e3;
-        let sizes = cells![n, pair_count(n), bytes, bits, byte[0], bit[0], byte[1], bit[1]];
-        let tests = pair_count(n) as f64 / (bit[0] / 1e3);
-        table.row(cells![..sizes, rate(bytes, byte[1]), rate(bits, bit[1]), tests]);
-    }
-    table
 }
 
 /// A way to write down which pairs overlap, and to read it.
@@ -114,22 +99,27 @@ fn read_list(out: &[u8], _: u64) -> Vec<Pair> {
     bytemuck::pod_collect_to_vec(out)
 }
 
-/// Table 5 on one thread: every pair is tested and written in memory, whence the pairs are read again.
+/// Table 5 and figure 3 on one thread: every pair is tested and written in memory, whence the pairs are read again. Printed rates
+/// are bytes over the output's time, and tests over the kernel's.
 fn forms_on_cpu() -> Result<Table, Failure> {
-    let columns = "objects | pairs | form | bytes written | ms, tests and output | ms, pairs read from it";
-    let mut table = Table::new("Avril table 5: forms of output, CPU", columns);
-    for (n, ..) in AVRIL_5 {
+    let columns = "objects | pairs | form | bytes written | ms, tests and output | ms, pairs read from it | \
+        kernel printed, ms | output printed, us | GB/s printed | tests/s printed";
+    let mut table = Table::new("Avril table 5 and figure 3: forms of output, CPU", columns);
+    for (n, byte, bit) in AVRIL_5 {
         let boxes = cubes(n as usize, 1.0, 1.0, 1);
         let known = read_list(&write_list(&boxes), n);
-        for (name, write, read) in FORMS {
+        for ((name, write, read), printed) in FORMS.into_iter().zip([Some(byte), Some(bit), None]) {
             let mut found = (write(&boxes), vec![]);
             let ms = medians(&mut found, 2, effort(boxes.len()), unprepared, |(out, pairs), side| {
                 let write = || *out = write(&boxes);
                 Ok(if side == 0 { timed(write).1 } else { timed(|| *pairs = read(out, n)).1 })
             })?;
-            let (out, pairs) = found;
+            let (bytes, pairs) = (found.0.len(), found.1);
             check(pairs == known, || format!("{n} objects: other pairs from {name}"))?;
-            table.row(cells![n, pairs.len(), name, out.len(), ms[0], ms[1]]);
+            let tests = pair_count(n) as f64;
+            let rates = |[kernel, us]: [f64; 2]| [kernel, us, bytes as f64 / us / 1e3, tests / kernel * 1e3];
+            let printed = printed.into_iter().flat_map(rates);
+            table.row(cells![n, pairs.len(), name, bytes, ..ms, ..printed]);
         }
     }
     Ok(table)
@@ -157,38 +147,28 @@ fn forms_on_device(setup: &Setup) -> Result<Table, Failure> {
 
 const BRUTE: Way = Way::Finder(Config { backend: Backend::Brute, ..UNSORTED });
 
-/// Figure 4: brute force by number of objects, on one thread, and on a device up to 1024 boxes.
-fn brute_force(setup: &Setup) -> Result<Table, Failure> {
-    let columns = "objects | tests | bytes up | bytes back, a bit a pair | ms, brute force, CPU | tests/s, CPU | ms, GPU";
-    let mut table = Table::new("Avril figure 4: brute force", columns);
-    for n in [100usize, 500, 1000, 2500, 5000] {
-        let boxes = cubes(n, 1.0, 1.0, 1);
-        let ways = [on_gpu(GpuOptions::DEFAULT)];
-        let gpu = setup.run(&ways[..usize::from(n <= ALL_PAIRS)], &boxes, DISTANCE)?;
-        let ms = race(&[BRUTE], None, boxes, DISTANCE, effort(n))?[0].median;
-        let tests = pair_count(n as u64);
-        let times = cells![ms, tests as f64 / ms * 1e3, gpu.first().map(|call| call.ms)];
-        table.row(cells![n, tests, 24 * n, output_bytes(n as u64)[1], ..times]);
-    }
-    Ok(table)
-}
-
-/// Table 7: with and without a grid, whole calls from nothing, all moved.
-fn with_grid(setup: &Setup) -> Result<Table, Failure> {
-    let columns = "objects | pairs | ms printed: without grid | ms printed: with grid | ms, CPU: brute force | \
-        ms, CPU: our grid | ms, CPU: Avril's cells, one thread | ms, GPU: without grid | ms, GPU: with grid";
-    let mut table = Table::new("Avril table 7: with and without a grid", columns);
+/// Figure 4, brute force by number of objects, and table 7, with and without a grid: whole calls from nothing, all moved. On a
+/// device brute force takes up to 1024 boxes.
+fn brute_force_and_grid(setup: &Setup) -> Result<Table, Failure> {
+    let columns = "objects | tests | bytes up | bytes back, a bit a pair | pairs | ms, CPU: brute force | ms, CPU: our grid | \
+        ms, CPU: Avril's cells, one thread | tests/s, CPU: brute force | ms printed: without grid | \
+        ms printed: with grid | ms, GPU: with grid | ms, GPU: without grid";
+    let mut table = Table::new("Avril figure 4 and table 7: brute force, with and without a grid", columns);
     let density = Way::Pbig(GpuOptions { cell_rule: CellRule::Density, ..GpuOptions::DEFAULT });
     let on_device = [0, ALL_PAIRS as u32]
         .map(|all_pairs_up_to| on_gpu(GpuOptions { all_pairs_up_to, ..GpuOptions::DEFAULT }));
-    for (n, without, with) in AVRIL_7 {
-        let boxes = cubes(n, 1.0, 1.0, 1);
+    for n in [100usize, 500, 1000, 2500, 5000, 10_000] {
+        let (boxes, tests) = (cubes(n, 1.0, 1.0, 1), pair_count(n as u64));
         let gpu = setup.run(&on_device[..1 + usize::from(n <= ALL_PAIRS)], &boxes, DISTANCE)?;
-        let ways = [BRUTE, Way::Finder(OUR_GRID), density];
-        let cpu = race(&ways, None, boxes, DISTANCE, Effort::new(setup.quick))?;
-        let ours = cpu.iter().map(|call| call.median);
-        let on_device = [1, 0].map(|i: usize| gpu.get(i).map(|call| call.ms));
-        table.row(cells![n, cpu[0].report.pairs, without, with, ..ours, ..on_device]);
+        let cpu = race(&[BRUTE, Way::Finder(OUR_GRID), density], None, boxes, DISTANCE, effort(n))?;
+        let bytes = [24 * n, output_bytes(n as u64)[1] as usize];
+        let ms = cpu.iter().map(|call| call.median);
+        let tests_a_second = tests as f64 / cpu[0].median * 1e3;
+        let printed = AVRIL_7.iter().find(|row| row.0 == n);
+        let printed = [printed.map(|row| row.1), printed.map(|row| row.2)];
+        let on_device = gpu.iter().map(|call| call.ms);
+        let counts = cells![n, tests, ..bytes, cpu[0].report.pairs];
+        table.row(cells![..counts, ..ms, tests_a_second, ..printed, ..on_device]);
     }
     Ok(table)
 }

@@ -1,11 +1,12 @@
 //! PBIG's figures 8, 9 and 11: number of boxes, size of cells, distribution. They have no printed numbers but what the text says.
 //! And tables IV, V and VI: each optimisation on and off, and the time of each task.
 
+use super::OUR_GRID;
 use super::model::{GAUSSIAN, Model, UNIFORM};
 use super::printed::*;
 use super::sides::{Call, Setup, Way, effort, on_gpu, once, race};
 use super::table_iii::{expected_checks, options_for};
-use super::{OUR_GRID, UNSORTED};
+use crate::UNSORTED;
 use pbig_core::{Aabb, CellRule, Coding, Config, Finder, GpuOptions, GpuReport, Order, Report};
 use pbig_harness::prelude::*;
 use std::time::Duration;

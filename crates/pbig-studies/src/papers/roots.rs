@@ -53,28 +53,27 @@ fn hits(boxes: &[Aabb], pairs: &[(i64, i64)]) -> u64 {
     pairs.iter().filter(hit).count() as u64
 }
 
+type Search = fn(&[Aabb], &[Range<u64>]) -> u64;
+
+/// Ways with a root that give every pair of table 2's objects, and the lazy way, which looks at all of n^2 - n identifiers.
+/// `pair_of` is pbig's own function, for up to 2^32 boxes: it multiplies in 128 bits.
+const WAYS: [(&str, Search); 4] = [
+    ("f32 root, the paper's rules", |boxes, ids| overlaps(boxes, ids, by_root::<Single, Rules>)),
+    ("f64 root, as it is", |boxes, ids| overlaps(boxes, ids, by_root::<Double, AsItIs>)),
+    ("`pair_of`", |boxes, ids| {
+        overlaps(boxes, ids, |k, n| {
+            let (a, b) = pair_of(k as u64, n as u64);
+            Some((a as i64, b as i64))
+        })
+    }),
+    ("lazy", |boxes, ids| overlaps(boxes, ids, lazy_pair)),
+];
+
 /// Makes a pair by a root, as the study of accuracy does.
 #[inline(always)]
 fn by_root<R: Root, C: Correction>(k: i64, n: i64) -> Option<(i64, i64)> {
     Some(C::pair(R::row(2 * n - 1, discriminant(k, n)), k, n))
 }
-
-/// Makes a pair by pbig's own function, for up to 2^32 boxes: it multiplies in 128 bits.
-#[inline(always)]
-fn by_pair_of(k: i64, n: i64) -> Option<(i64, i64)> {
-    let (a, b) = pair_of(k as u64, n as u64);
-    Some((a as i64, b as i64))
-}
-
-type Search = fn(&[Aabb], &[Range<u64>]) -> u64;
-
-/// Ways with a root that give every pair of table 2's objects, and the lazy way, which looks at all of n^2 - n identifiers.
-const WAYS: [(&str, Search); 4] = [
-    ("f32 root, the paper's rules", |boxes, ids| overlaps(boxes, ids, by_root::<Single, Rules>)),
-    ("f64 root, as it is", |boxes, ids| overlaps(boxes, ids, by_root::<Double, AsItIs>)),
-    ("`pair_of`", |boxes, ids| overlaps(boxes, ids, by_pair_of)),
-    ("lazy", |boxes, ids| overlaps(boxes, ids, lazy_pair)),
-];
 
 /// The place of the lazy way.
 const LAZY: usize = 3;

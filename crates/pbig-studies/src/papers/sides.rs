@@ -1,7 +1,7 @@
 //! Ways to search the same boxes from nothing, in turn, on the CPU and on a device.
 
-use super::UNSORTED;
 use super::printed::MOST_BOXES;
+use crate::UNSORTED;
 use pbig_core::{Aabb, Backend, Config, Finder, GpuFinder, GpuOptions, Report};
 use pbig_harness::pbig_grid::pbig_grid;
 use pbig_harness::prelude::*;

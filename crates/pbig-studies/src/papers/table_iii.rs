@@ -3,10 +3,10 @@
 //! Equation 11 is the sum of the volumes of all boxes over that of the space. By it `n` equal cubes, and boxes whose lengths are
 //! independent on each axis, have `4 n DoC` pairs: `n^2 / 2` times the chance `(2 e / L)^3`. The table has an eighth of that.
 
-use super::UNSORTED;
 use super::model::{Model, Place, Space, UNIFORM};
 use super::printed::{Coverage, MOST_BOXES, SPACE, TABLE_III, WARP};
 use super::sides::{Call, Setup, Way, effort, on_gpu, once, race};
+use crate::UNSORTED;
 use pbig_core::pbig::Summary;
 use pbig_core::{Aabb, Coding, GpuOptions};
 use pbig_harness::pbig_grid::PbigPlan;
