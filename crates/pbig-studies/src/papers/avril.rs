@@ -17,9 +17,8 @@ const DISTANCE: f32 = 0.1;
 const ALL_PAIRS: usize = GpuOptions::DEFAULT.all_pairs_up_to as usize;
 
 pub(super) fn tables(setup: &Setup) -> Result<Vec<Table>, Failure> {
-    let output = [matrix()?, forms_on_cpu()?, forms_on_device(setup)?];
-    let whole = [brute_force_and_grid(setup)?, steps(setup)?, movers(setup)?];
-    Ok([output, whole].concat())
+    let forms = [matrix()?, forms_on_cpu()?, forms_on_device(setup)?];
+    Ok([&forms[..], &[brute_force_and_grid(setup)?, steps(setup)?]].concat())
 }
 
 /// Objects with which table 1's elements are numbers; those of the paper's examples.
@@ -173,45 +172,33 @@ fn brute_force_and_grid(setup: &Setup) -> Result<Table, Failure> {
     Ok(table)
 }
 
-/// Table 6 and figure 5: a step in which all move. Ours: cubes with a pair each that move by up to a tenth of their edge:
-/// `BroadPhase::set_many`, then `update`, events included; on the CPU means, on a device medians of a few updates.
+/// Table 6 and figures 5 and 6: a step in which all or a share move. Ours: cubes with a pair each that move by up to a tenth of
+/// their edge: `BroadPhase::set_many`, then `update`, events included, beside a search from nothing; on the CPU means, on a
+/// device medians of a few updates.
 fn steps(setup: &Setup) -> Result<Table, Failure> {
-    let columns = "objects | side | pairs | boxes up to date, ms | grid (ours: plan and map), ms | \
+    let columns = "objects | share moved | side | pairs | boxes up to date, ms | grid (ours: plan and map), ms | \
         search (ours: check, emit, diff), ms | whole, ms | updates";
-    let mut table = Table::new("Avril table 6 and figure 5: a step, all moving", columns);
-    for (n, printed) in AVRIL_6.into_iter().filter(|(n, _)| !setup.quick || *n <= 100_000) {
-        table.row(cells![n, "printed", (), ..printed]);
-        let boxes = || cubes(n, 1.0, 1.0, 1);
-        let ours = alone(true, boxes(), (1.0, DISTANCE), Effort::new(setup.quick))?;
-        let of = |wanted: &[&str]| -> f64 {
-            NAMES.iter().zip(ours.mean).filter(|(name, _)| wanted.contains(name)).map(|(_, ms)| ms).sum()
-        };
-        let (set, grid, search) = (of(&["set"]), of(&["plan", "map"]), of(&["check", "emit", "diff"]));
-        table.row(cells![n, "ours, CPU", ours.pairs, set, grid, search, ours.mean[0], ours.chosen]);
-        if let Some(gpu) = setup.for_boxes(n) {
-            let raced = gpu_race::race(gpu, boxes(), 1.0, DISTANCE)?;
-            table.row(cells![n, "ours, GPU", raced.pairs, ..[(); 3], raced.ms[1]]);
+    let mut table = Table::new("Avril table 6, figures 5 and 6: a step", columns);
+    let (n, most) = if setup.quick { (10_000, 100_000) } else { (100_000, usize::MAX) };
+    let sizes = AVRIL_6.into_iter().filter(|(n, _)| *n <= most).map(|(n, printed)| (n, 1.0, Some(printed)));
+    for (n, share, printed) in sizes.chain([0.75, 0.5, 0.25, 0.1, 0.01].map(|share| (n, share, None))) {
+        if let Some(printed) = printed {
+            table.row(cells![n, share, "printed", (), ..printed]);
         }
-    }
-    Ok(table)
-}
-
-/// Figure 6: a step in which a share moves. A program that plays a device has fewer boxes.
-fn movers(setup: &Setup) -> Result<Table, Failure> {
-    let n = if setup.quick { 10_000 } else { 100_000 };
-    let columns = "share moved | boxes | pairs | ms, events | ms, from nothing | updates | boxes, GPU | \
-        ms, events, GPU | ms, events, CPU with as many";
-    let mut table = Table::new("Avril figure 6: share of moving objects", columns);
-    let fewer = if setup.for_boxes(n).is_some() { n } else { n.min(10_000) };
-    for share in [0.01, 0.1, 0.25, 0.5, 0.75, 1.0] {
-        let (boxes, effort) = (|n| cubes(n, 1.0, 1.0, 1), Effort::new(setup.quick));
-        let events = alone(true, boxes(n), (share, DISTANCE), effort)?;
-        let scratch = alone(false, boxes(n), (share, DISTANCE), effort)?;
-        let ours = cells![share, n, events.pairs, events.mean[0], scratch.mean[0], events.chosen];
-        let raced = setup.for_boxes(fewer).map(|gpu| gpu_race::race(gpu, boxes(fewer), share, DISTANCE));
-        let ms = raced.transpose()?.map(|raced| raced.ms);
-        let beside = ms.map_or(vec![], |[cpu, gpu]| cells![fewer, gpu, cpu]);
-        table.row(cells![..ours, ..beside]);
+        let boxes = || cubes(n, 1.0, 1.0, 1);
+        for (side, events) in [("ours, CPU", true), ("ours, CPU, from nothing", false)] {
+            let ours = alone(events, boxes(), (share, DISTANCE), Effort::new(setup.quick))?;
+            let of = |wanted: &[&str]| -> f64 {
+                let times = NAMES.iter().zip(ours.mean);
+                times.filter(|(name, _)| wanted.contains(name)).map(|(_, ms)| ms).sum()
+            };
+            let parts = [of(&["set"]), of(&["plan", "map"]), of(&["check", "emit", "diff"])];
+            table.row(cells![n, share, side, ours.pairs, ..parts, ours.mean[0], ours.chosen]);
+        }
+        if let Some(gpu) = setup.for_boxes(n) {
+            let raced = gpu_race::race(gpu, boxes(), share, DISTANCE)?;
+            table.row(cells![n, share, "ours, GPU", raced.pairs, ..[(); 3], raced.ms[1]]);
+        }
     }
     Ok(table)
 }

@@ -25,7 +25,6 @@ pub(super) fn tables(setup: &Setup) -> Result<Vec<Table>, Failure> {
         by_length(setup)?,
         by_number("PBIG figure 11: distribution of boxes", &GAUSSIAN, gaussian_ms.into(), setup)?,
         optimisations(&runs),
-        tasks(&runs),
         on_cpu(setup)?,
     ])
 }
@@ -136,46 +135,43 @@ fn optimised(row: &Timing) -> Way {
     on_gpu(GpuOptions { coding, pipelining, load_balancing, chunk, ..GpuOptions::DEFAULT })
 }
 
-/// Table IV, and what each setting sends. Ours: section 6.3 with fewer boxes, as crowded.
+/// Tables IV, V and VI: each setting's total, the time of each task, and what it sends. Printed: with P, CHECK has the time of
+/// CHECK, `DataOut` and REPORT together. Ours: section 6.3 with fewer boxes, as crowded; `DataOut` is the time that the host waits
+/// beyond the kernels. In none: total less the tasks; with P tasks overlap, and what is at the same time counts twice.
 fn optimisations(runs: &[Call]) -> Table {
-    let columns = "setting | speed-up printed | speed-up by table VI | ms, GPU | speed-up | pairs | checks | bytes written | \
-        bytes written a pair | bytes fetched | bytes fetched a pair | chunks";
-    let mut table = Table::new("PBIG table IV: optimisations on and off, GPU", columns);
-    for (i, row) in TABLE_VI.iter().enumerate() {
-        let ours = runs.get(i).map_or(vec![], |call| {
-            let Report { pairs, checks, gpu, .. } = &call.report;
-            let of = |bytes: Option<u64>| cells![bytes, bytes.map(|bytes| bytes as f64 / *pairs as f64)];
-            let bytes = [of(call.written()), of(call.fetched())].concat();
-            let chunks = gpu.as_ref().map(|gpu| gpu.chunks);
-            cells![call.ms, runs[0].ms / call.ms, *pairs, checks.made, ..bytes, chunks]
-        });
-        table.row(cells![row.setting, row.speed_up, TABLE_VI[0].total as f64 / row.total as f64, ..ours]);
-    }
-    table
-}
-
-/// Tables V and VI: the time of each task. Printed: with P, CHECK has the time of CHECK, `DataOut` and REPORT together. Ours: of
-/// the call in table IV; `DataOut` is the time that the host waits beyond the kernels. In none: total less the tasks; with P
-/// tasks overlap, and what is at the same time counts twice.
-fn tasks(runs: &[Call]) -> Table {
-    let columns = format!("setting | side | total | {} | in none", TASKS.join(" | "));
-    let mut table = Table::new("PBIG tables V and VI: time per task, ms", &columns);
-    let mut row = |setting: &str, side: &str, total: f64, tasks: [Option<f64>; TASKS.len()]| {
-        let rest = total - tasks.iter().flatten().sum::<f64>();
-        table.row(cells![setting, side, total, ..tasks, rest]);
-    };
+    let columns = format!(
+        "setting | side | speed-up printed | total, ms | speed-up by the totals | {} | in none | pairs | checks | \
+         bytes written | bytes written a pair | bytes fetched | bytes fetched a pair | chunks",
+        TASKS.join(" | ")
+    );
+    let mut table =
+        Table::new("PBIG tables IV, V and VI: optimisations on and off, and tasks, ms, GPU", &columns);
+    let mut row =
+        |labels: Vec<Value>, [first, total]: [f64; 2], tasks: [Option<f64>; 7], sent: Vec<Value>| {
+            let rest = total - tasks.iter().flatten().sum::<f64>();
+            table.row(cells![..labels, total, first / total, ..tasks, rest, ..sent]);
+        };
     for (i, printed) in TABLE_VI.iter().enumerate() {
         let tasks = std::array::from_fn(|k| printed.tasks.get(k).map(|us| *us as f64 / 1e3));
-        row(printed.setting, "printed", printed.total as f64 / 1e3, tasks);
+        let totals = [TABLE_VI[0].total, printed.total].map(|us| us as f64 / 1e3);
+        row(cells![printed.setting, "printed", printed.speed_up], totals, tasks, vec![]);
         if let Some(call) = runs.get(i) {
-            row(printed.setting, "ours", call.ms, of_tasks(call));
+            let labels = cells![printed.setting, "ours", ()];
+            row(labels, [runs[0].ms, call.ms], of_tasks(call), sent(call));
         }
     }
     table
 }
 
+fn sent(call: &Call) -> Vec<Value> {
+    let Report { pairs, checks, gpu, .. } = &call.report;
+    let of = |bytes: Option<u64>| cells![bytes, bytes.map(|bytes| bytes as f64 / *pairs as f64)];
+    let bytes = [of(call.written()), of(call.fetched())].concat();
+    cells![*pairs, checks.made, ..bytes, gpu.as_ref().map(|gpu| gpu.chunks)]
+}
+
 /// Returns the times of a call on a device by the paper's tasks.
-fn of_tasks(call: &Call) -> [Option<f64>; 7] {
+fn of_tasks(call: &Call) -> [Option<f64>; TASKS.len()] {
     let is_check = |name: &str| name.starts_with("check");
     let is_schedule = |name: &str| matches!(name, "schedule" | "arrange");
     let map = call.kernels(|name| !is_check(name) && !is_schedule(name));

@@ -14,8 +14,7 @@ pub(super) const UNIFORM: Model = Model::boxes(LENGTHS[0], LENGTHS[1]);
 pub(super) const GAUSSIAN: Model = Model { space: Space::Normal(NORMAL), ..UNIFORM };
 
 /// Section 6.3 by the reading that gives table III: lower corners, lengths from 0.
-pub(super) const GAUSSIAN_READ: Model =
-    Model { place: Place::LowerCorner, lengths: [0.0, LENGTHS[1]], ..GAUSSIAN };
+pub(super) const GAUSSIAN_READ: Model = Model { has_corners: true, lengths: [0.0, LENGTHS[1]], ..GAUSSIAN };
 
 /// The distribution of points along each axis.
 #[derive(Clone, Copy, Debug)]
@@ -26,18 +25,12 @@ pub(super) enum Space {
     Normal([f64; 2]),
 }
 
-/// Which point of a box is drawn from the space.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) enum Place {
-    Centre,
-    LowerCorner,
-}
-
 /// A law by which boxes are drawn.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Model {
     pub(super) space: Space,
-    pub(super) place: Place,
+    /// True if lower corners are drawn from the space, false if centres are.
+    pub(super) has_corners: bool,
     /// Lengths are uniform between two.
     pub(super) lengths: [f64; 2],
     /// One length for all axes of a box, or one for each.
@@ -47,7 +40,7 @@ pub(super) struct Model {
 impl Model {
     /// Boxes whose centres are uniform in the paper's space.
     pub(super) const fn boxes(low: f64, high: f64) -> Self {
-        Self { space: Space::Even(SPACE), place: Place::Centre, lengths: [low, high], cubes: false }
+        Self { space: Space::Even(SPACE), has_corners: false, lengths: [low, high], cubes: false }
     }
 
     /// As above, with one length for all axes of a box.
@@ -111,9 +104,9 @@ impl Model {
 
     /// The chance that two boxes of given lengths overlap along an axis.
     fn on_axis(&self, e: f64, f: f64) -> f64 {
-        match self.place {
-            Place::Centre => 2.0 * self.within(0.5 * (e + f)),
-            Place::LowerCorner => self.within(e) + self.within(f),
+        match self.has_corners {
+            false => 2.0 * self.within(0.5 * (e + f)),
+            true => self.within(e) + self.within(f),
         }
     }
 
@@ -139,7 +132,7 @@ impl Model {
         let mut edge = || low + (high - low) * rng.random_range(0.0..1.0);
         let first = edge();
         let edges = if self.cubes { [first; 3] } else { [first, edge(), edge()] };
-        let shift = if self.place == Place::Centre { 0.5 } else { 0.0 };
+        let shift = if self.has_corners { 0.0 } else { 0.5 };
         let min = edges.map(|edge| self.point(rng) - shift * edge);
         Aabb::new(min.map(|x| x as f32), std::array::from_fn(|k| (min[k] + edges[k]) as f32))
     }
@@ -164,8 +157,7 @@ mod tests {
         let laws = [Model::cubes(900.0, 900.0), Model::boxes(0.0, 1500.0), Model::cubes(100.0, 1500.0)];
         let spaces = [Space::Even(1e4), Space::Normal([5000.0, 2000.0])];
         let laws = laws.into_iter().flat_map(|law| spaces.map(|space| Model { space, ..law }));
-        let places = [Place::Centre, Place::LowerCorner];
-        for law in laws.flat_map(|law| places.map(|place| Model { place, ..law })) {
+        for law in laws.flat_map(|law| [false, true].map(|has_corners| Model { has_corners, ..law })) {
             let count: usize = (0..seeds).map(|seed| oracle::pairs(&law.draw(n, seed)).len()).sum();
             let mean = count as f64 / seeds as f64;
             let off = (mean - law.pairs(n)) / (law.deviation(n) / (seeds as f64).sqrt());

@@ -3,7 +3,7 @@
 //! Equation 11 is the sum of the volumes of all boxes over that of the space. By it `n` equal cubes, and boxes whose lengths are
 //! independent on each axis, have `4 n DoC` pairs: `n^2 / 2` times the chance `(2 e / L)^3`. The table has an eighth of that.
 
-use super::model::{Model, Place, Space, UNIFORM};
+use super::model::{Model, Space, UNIFORM};
 use super::printed::{Coverage, MOST_BOXES, SPACE, TABLE_III, WARP};
 use super::sides::{Call, Setup, Way, effort, on_gpu, once, race};
 use crate::UNSORTED;
@@ -28,7 +28,7 @@ fn fitting(n: usize, doc: f64) -> Model {
 }
 
 fn by_lower_corner(edge: f64) -> Model {
-    Model { place: Place::LowerCorner, ..Model::boxes(0.0, edge.ceil()) }
+    Model { has_corners: true, ..Model::boxes(0.0, edge.ceil()) }
 }
 
 /// One way to understand what the experiment draws: the law for an edge by equation 11.
