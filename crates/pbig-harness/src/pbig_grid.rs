@@ -112,9 +112,9 @@ impl GridMember {
 
     /// Returns the keys of the cells, row by row.
     fn keys(self, plan: &PbigPlan) -> impl Iterator<Item = usize> {
-        let [x, y, z] = std::array::from_fn(|k| self.low[k]..=self.high[k]);
-        let rows = z.flat_map(move |z| y.clone().map(move |y| (y, z)));
-        rows.flat_map(move |(y, z)| x.clone().map(move |x| plan.key([x, y, z])))
+        let [[x, y, z], [to_x, to_y, to_z]] = [self.low, self.high];
+        (z..=to_z)
+            .flat_map(move |z| (y..=to_y).flat_map(move |y| (x..=to_x).map(move |x| plan.key([x, y, z]))))
     }
 }
 
@@ -171,21 +171,21 @@ impl PbigFound {
         let range = grid.offsets[key] as usize..grid.offsets[key + 1] as usize;
         let entries = &grid.entries[range];
         let n = entries.len() as u32;
-        let mut check = |i: usize, j: usize| {
-            let [a, b] = [entries[i], entries[j]].map(|entry| &grid.members[entry as usize]);
-            self.check_in_cell(key, a, b);
-        };
         if n <= small_cell {
-            let pairs = (0..pair_count(n.into())).map(|k| pair_of(k, n.into()));
-            pairs.for_each(|(i, j)| check(i as usize, j as usize));
+            for k in 0..pair_count(n.into()) {
+                let (i, j) = pair_of(k, n.into());
+                self.check_in_cell(grid, key, entries[i as usize], entries[j as usize]);
+            }
             return;
         }
-        let pairs = (0..n).flat_map(|row| (0..row_len(row, n)).map(move |k| row_pair(row, k, n)));
-        pairs.for_each(|(i, j)| check(i as usize, j as usize));
+        for (i, j) in (0..n).flat_map(|row| (0..row_len(row, n)).map(move |k| row_pair(row, k, n))) {
+            self.check_in_cell(grid, key, entries[i as usize], entries[j as usize]);
+        }
     }
 
-    /// Tests two boxes in a cell that both touch, if it is the owner of their pair.
-    fn check_in_cell(&mut self, key: usize, a: &GridMember, b: &GridMember) {
+    /// Tests two members in a cell that both touch, if it is the owner of their pair.
+    fn check_in_cell(&mut self, grid: &PbigGrid, key: usize, i: u32, j: u32) {
+        let (a, b) = (&grid.members[i as usize], &grid.members[j as usize]);
         if self.plan.key(std::array::from_fn(|k| a.low[k].max(b.low[k]))) == key {
             self.test(a, b);
         } else {
