@@ -39,17 +39,11 @@ fn brief(text: &str) -> String {
 
 /// A list of boxes: `.npy` (N,6) float32 or float64 (rounded outward), or `.csv` with the columns
 /// min_x,min_y,min_z,max_x,max_y,max_z (rounded to nearest, which never parts two boxes that touch).
-///
-/// # Errors
-/// A message that names the file, what is wrong and where.
 pub fn read_boxes(path: &Path) -> Result<Vec<Aabb>, FileError> {
     read(path, if ending(path, &["npy", "csv"])? == "npy" { npy_boxes } else { csv_boxes })
 }
 
 /// Frames of boxes: `.npy` (F,N,6) float32 or float64 (rounded outward).
-///
-/// # Errors
-/// A message that names the file and what is wrong.
 pub fn read_frames(path: &Path) -> Result<Frames, FileError> {
     ending(path, &["npy"])?;
     read(path, npy_frames)
@@ -96,9 +90,6 @@ fn ending<'a>(path: &Path, known: &[&'a str]) -> Result<&'a str, FileError> {
 }
 
 /// The content of a `.csv` file of boxes, see [`read_boxes`].
-///
-/// # Errors
-/// Returns a message in one line that names the line of the file.
 pub fn csv_boxes(bytes: &[u8]) -> Result<Vec<Aabb>, ContentError> {
     let text = text(bytes)?;
     let mut reader =
@@ -168,17 +159,11 @@ fn csv_box(record: &csv::StringRecord) -> Result<Aabb, String> {
 }
 
 /// Checks that [`write_pairs`] knows the extension. Call it before the work, not after.
-///
-/// # Errors
-/// A message that names the file.
 pub fn check_pairs_path(path: &Path) -> Result<(), FileError> {
     ending(path, &["npy", "csv"]).map(|_| ())
 }
 
 /// Pairs as `.npy` (K,2) uint32 or `.csv`.
-///
-/// # Errors
-/// A message that names the file, when it cannot be written or has another extension.
 pub fn write_pairs(path: &Path, pairs: &[Pair]) -> Result<(), FileError> {
     if ending(path, &["npy", "csv"])? == "csv" {
         return write_csv(path, "a,b", pairs.iter().map(|p| format!("{},{}", p.a, p.b)));
@@ -191,17 +176,11 @@ pub fn write_pairs(path: &Path, pairs: &[Pair]) -> Result<(), FileError> {
 }
 
 /// Checks that [`write_csv`] accepts the extension. Call it before the work, not after.
-///
-/// # Errors
-/// A message that names the file.
 pub fn check_csv_path(path: &Path) -> Result<(), FileError> {
     ending(path, &["csv"]).map(|_| ())
 }
 
 /// A text file of a header and lines.
-///
-/// # Errors
-/// A message that names the file, when it cannot be written.
 pub fn write_csv(
     path: &Path,
     header: &str,

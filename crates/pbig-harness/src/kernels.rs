@@ -3,11 +3,7 @@
 use pbig_core::gpu::GpuError;
 use pbig_core::{GpuFinder, GpuOptions};
 use pbig_shaders::Kernel;
-use std::time::Instant;
 use wgpu::BufferUsages as Usage;
-
-/// Copies in a timed submission: so many that the submission itself counts for little.
-const COPIES: u64 = 16;
 
 /// Workgroups in a row of a dispatch.
 const GROUPS_PER_ROW: u32 = 32_768;
@@ -25,33 +21,6 @@ impl Bench {
     /// If there is no adapter, or it gives no device that the kernels can run on.
     pub fn new() -> Result<Self, GpuError> {
         Ok(Self { gpu: GpuFinder::new()? })
-    }
-
-    /// Returns the bytes per second that the device reads and writes while it copies; a copied byte counts twice.
-    ///
-    /// This is the best of five submissions of sixteen copies of `bytes` bytes, or of a buffer's limit.
-    ///
-    /// # Errors
-    /// If the device refuses, is lost or does not answer in time.
-    pub fn copy_rate(&self, bytes: u64) -> Result<f64, GpuError> {
-        self.gpu.on_device(|device, queue| {
-            let limits = device.limits();
-            let bytes = bytes.min(limits.max_buffer_size).min(limits.max_storage_buffer_binding_size);
-            let bytes = bytes / 256 * 256;
-            let [from, to] =
-                ["from", "to"].map(|name| buffer(device, name, bytes, Usage::COPY_SRC | Usage::COPY_DST));
-            let copy = || {
-                let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
-                (0..COPIES).for_each(|_| encoder.copy_buffer_to_buffer(&from, 0, &to, 0, bytes));
-                let clock = Instant::now();
-                wait(device, queue.submit([encoder.finish()]))?;
-                Ok::<_, GpuError>(clock.elapsed().as_secs_f64())
-            };
-            // The first copy also clears the buffers.
-            let times = (0..6).map(|_| copy()).collect::<Result<Vec<_>, _>>()?;
-            let best = times[1..].iter().copied().fold(f64::MAX, f64::min);
-            Ok((2 * COPIES * bytes) as f64 / best)
-        })
     }
 
     /// Runs a kernel on the bytes of its bindings, in their order, and returns the bytes afterwards.

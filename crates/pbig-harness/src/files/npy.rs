@@ -10,9 +10,6 @@ use pbig_core::Aabb;
 const MAGIC: &[u8] = b"\x93NUMPY";
 
 /// The content of an `.npy` file of boxes, see [`super::read_boxes`].
-///
-/// # Errors
-/// A message in one line.
 pub fn npy_boxes(bytes: &[u8]) -> Result<Vec<Aabb>, ContentError> {
     let wrong = |shape: &[usize]| match (shape, shape_text(shape)) {
         ([_, _, 6], found) => {
@@ -24,9 +21,6 @@ pub fn npy_boxes(bytes: &[u8]) -> Result<Vec<Aabb>, ContentError> {
 }
 
 /// The content of an `.npy` file of frames, see [`super::read_frames`].
-///
-/// # Errors
-/// A message in one line.
 pub fn npy_frames(bytes: &[u8]) -> Result<Frames, ContentError> {
     let wrong = |shape: &[usize]| match (shape, shape_text(shape)) {
         ([_, 6], found) => {
