@@ -78,12 +78,6 @@ fn report(args: &Args, finder: &Finder, ms: Spread) -> Result<(), Failure> {
         });
         return print(&object.to_string());
     }
-    print(&format!(
-        "{boxes} boxes ({invalid} invalid), {pairs} overlapping pairs\n{:.3} ms (median of {}; {:.3} to {:.3})\n{}",
-        ms.median,
-        args.repeat,
-        ms.min,
-        ms.max,
-        plan_text(report)
-    ))
+    let plan = plan_text(report);
+    print(&format!("{boxes} boxes ({invalid} invalid), {pairs} overlapping pairs\n{ms}\n{plan}"))
 }

@@ -121,12 +121,9 @@ fn report(args: &Args, frames: &Frames, replay: &Replay, broad_phase: &BroadPhas
         return print(&object.to_string());
     }
     print(&format!(
-        "{} frames of {boxes} boxes: {added} pairs added, {removed} removed, {} at the end\n{:.3} ms a frame (median; {:.3} to {:.3})\nlast frame: {}",
-        count,
+        "{count} frames of {boxes} boxes: {added} pairs added, {removed} removed, {} at the end\n\
+         a frame: {ms}\nlast frame: {}",
         broad_phase.pair_count(),
-        ms.median,
-        ms.min,
-        ms.max,
         plan_text(report)
     ))
 }

@@ -115,25 +115,14 @@ fn report(
         return print(&object.to_string());
     }
     let note = fallback.map_or(String::new(), |why| format!("\nnote: {why}"));
-    let (broad_phase, step) = (outcome.broad_phase, outcome.step);
+    let Outcome { colliders, steps, broad_phase, step, pairs, added, removed, check } = outcome;
     print(&format!(
-        "{}: {bodies} bodies, {} colliders, {} steps with the {} broad phase\n\
-         broad phase {:.3} ms a step (median; {:.3} to {:.3}), whole step {:.3} ms ({:.3} to {:.3})\n\
-         {} pairs at the end; {} added, {} removed\n{}",
+        "{}: {bodies} bodies, {colliders} colliders, {steps} steps with the {} broad phase\n\
+         a step: broad phase {broad_phase}, all {step}\n\
+         {pairs} pairs at the end; {added} added, {removed} removed\n{}{note}",
         args.scene,
-        outcome.colliders,
-        outcome.steps,
         args.broad_phase,
-        broad_phase.median,
-        broad_phase.min,
-        broad_phase.max,
-        step.median,
-        step.min,
-        step.max,
-        outcome.pairs,
-        outcome.added,
-        outcome.removed,
-        outcome.check.as_ref().map_or(String::new(), check_line) + &note,
+        check.as_ref().map_or(String::new(), check_line),
     ))
 }
 

@@ -231,6 +231,6 @@ mod tests {
         let [as_it_is, rules, _] = count(4098);
         assert!(as_it_is.wrong > 0 && as_it_is.worst_row == 1 && rules.wrong == 0, "{as_it_is:?}");
         assert_eq!(count(4097)[0].wrong, 0);
-        assert_eq!([as_it_is, rules], [0, 1].map(|c| slowly(&WAYS[0], c, 4098)));
+        assert_eq!((WAYS[0].all)(4098, f64::INFINITY), count(4098), "none is wrong that is not near an end");
     }
 }
