@@ -11,6 +11,7 @@ mod reported;
 pub mod stages;
 pub mod steady;
 mod trees;
+pub mod whole_steps;
 pub mod wide;
 
 use pbig_core::{Config, Limits, Order};

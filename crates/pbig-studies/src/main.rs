@@ -3,7 +3,7 @@
 use clap::{Parser, Subcommand};
 use pbig_harness::output::{Failure, finish, print, tracked};
 use pbig_harness::report::Report;
-use pbig_studies::{accuracy, papers, peers, stages, steady};
+use pbig_studies::{accuracy, papers, peers, stages, steady, whole_steps};
 use serde_json::{Map, json};
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -39,6 +39,8 @@ enum Command {
         #[arg(long, value_name = "N,N", value_delimiter = ',')]
         boxes: Vec<usize>,
     },
+    /// Whole steps of rapier with its own broad phase and with pbig's, of every scene.
+    WholeSteps,
     /// Run time against error.
     Accuracy {
         /// This study alone.
@@ -57,6 +59,7 @@ fn run(cli: &Cli) -> Result<(), Failure> {
         Command::Stages => stages::run(cli.quick)?,
         Command::Peers => peers::run(cli.quick)?,
         Command::Steady { boxes } => steady::run(cli.quick, boxes)?,
+        Command::WholeSteps => whole_steps::run(cli.quick),
         Command::Accuracy { only } => return run_accuracy(cli, only.as_deref()),
     };
     report.finish(cli.json, cli.write.as_deref())

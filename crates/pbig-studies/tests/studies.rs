@@ -4,7 +4,7 @@ use pbig_harness::motions::Motion;
 use pbig_harness::prelude::*;
 use pbig_harness::scenes::Scene;
 use pbig_studies::accuracy::STUDIES;
-use pbig_studies::{peers, stages, steady};
+use pbig_studies::{peers, stages, steady, whole_steps};
 
 fn made(name: &str) -> Report {
     let (_, study) = STUDIES.into_iter().find(|(study, _)| *study == name).expect("a study");
@@ -92,6 +92,20 @@ fn steady_has_every_motion_and_every_scene() {
     assert_eq!(table.rows.len(), 4 * (2 * Motion::ALL.len() + 2) + 2 * Scene::ALL.len());
     let [median, p99, worst] = ["median_ms", "p99_ms", "worst_ms"].map(|column| table.numbers(column));
     assert!((0..median.len()).all(|k| median[k] <= p99[k] && p99[k] <= worst[k]));
+}
+
+#[test]
+fn whole_steps_have_every_scene_and_the_broad_phase_is_a_part() {
+    let report = whole_steps::run(true);
+    let table = &report.tables[0];
+    assert_eq!(table.rows.len(), Scene::ALL.len());
+    for side in ["stock", "pbig"] {
+        let [broad, whole] = ["broad", "step"].map(|part| table.numbers(&format!("{side}_{part}_mean_ms")));
+        assert!(
+            broad.iter().zip(&whole).all(|(broad, whole)| 0.0 < *broad && broad < whole),
+            "{broad:?} {whole:?}"
+        );
+    }
 }
 
 #[test]

@@ -3,6 +3,7 @@
 
 use super::GpuError;
 use super::chunk::{ChunkResult, PendingChunk};
+use super::coding::Counted;
 use super::error::Failure;
 use super::items::{cut, rest};
 use super::job::Job;
@@ -10,7 +11,7 @@ use super::passes::{self, CLEAR_TOTALS, Groups, Step};
 use super::session::Session;
 use super::sink::Sink;
 use crate::decode::pair_count;
-use crate::layout::{BITS, Chunk, LANES, PACKED, Params, SORTED};
+use crate::layout::{BITS, Chunk, LANES, Params, SORTED};
 use pbig_shaders::CHECK_ALL;
 use std::collections::VecDeque;
 
@@ -20,7 +21,7 @@ const MAX_REPEATS: u32 = 8;
 impl Session {
     /// Searches with a grid, or tests every pair (Avril 3.2).
     pub(super) fn search(&mut self, job: &Job<'_>, uploaded: Params, sink: &mut Sink) -> Result<(), Failure> {
-        let before = (sink.pairs(), sink.words);
+        let before = sink.pairs();
         for _ in 0..MAX_REPEATS {
             let mut params = self.with_plan(job, uploaded, &mut sink.found.report)?;
             let Some(done) = self.try_to_search(&mut params, sink)? else { continue };
@@ -28,8 +29,11 @@ impl Session {
                 // The host sorts the chunks that are left.
                 params.flags &= !SORTED;
                 self.search_rest(&params, rest(&self.sizes.lists, &done), sink)?;
-                self.learn(&params, before, sink);
+                sink.found.plan = self.plan.as_ref().map(|kept| kept.plan.clone());
+                self.plan.take_if(|kept| kept.is_outgrown_after(&self.sizes.lists));
             }
+            let entries = u64::from(self.sizes.lists.entries);
+            self.counted = Counted { pairs: sink.pairs() - before, entries };
             return Ok(());
         }
         Err(self.too_large().into())
@@ -72,15 +76,6 @@ impl Session {
         // The map is there, so only the checks are repeated, unless the pairs can be sorted with it.
         let is_repeated = params.levels == 0 || params.flags & SORTED != 0 && fits;
         Ok((!is_repeated).then(Chunk::default))
-    }
-
-    /// Notes what a search with a grid tells about the next one.
-    fn learn(&mut self, params: &Params, before: (u64, u64), sink: &mut Sink) {
-        let lists = self.sizes.lists;
-        let (pairs, words) = (sink.pairs() - before.0, sink.words - before.1);
-        self.coding.learn(params.flags & PACKED != 0, pairs, words, lists.entries);
-        sink.found.plan = self.plan.as_ref().map(|kept| kept.plan.clone());
-        self.plan.take_if(|kept| kept.is_outgrown_after(&lists));
     }
 
     /// Submits the first chunk: with a grid also map and schedule, without one all pairs.

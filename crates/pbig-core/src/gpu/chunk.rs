@@ -216,7 +216,6 @@ impl Session {
         let needed = words.len() as u64;
         self.sizes.max_words = self.sizes.max_words.max(needed);
         self.sizes.expected_words = self.sizes.max_words;
-        self.coding.pairs = found_pairs(params, totals);
         sink.count(params, totals, needed);
         let mut clock = Clock::start();
         self.decode(words, params, totals.sorted != 0, sink)?;

@@ -7,41 +7,27 @@ use crate::layout::{BITS, PACKED, Params};
 /// Most boxes of one cell that records can name: 2^16 segments.
 const MAX_PACKED_BOXES: u32 = 1 << 24;
 
-/// Chooses the smaller coding of the output by the sizes in earlier calls.
+/// The counts of an earlier call, by which the smaller coding is chosen.
 #[derive(Debug, Default)]
-pub(super) struct CodingChoice {
-    /// Number of pairs of the last chunk.
+pub(super) struct Counted {
+    /// Number of pairs.
     pub(super) pairs: u64,
-    is_packed: bool,
-    /// Number of calls until records are tried again, after they were larger.
-    wait: u32,
+    /// Number of entries in cells.
+    pub(super) entries: u64,
 }
 
-impl CodingChoice {
-    /// Returns the flag of the coding that is wanted, or that is expected to be the smallest.
+impl Counted {
+    /// Returns the flag of the coding that is wanted, or of the smaller one.
     pub(super) fn flag(&self, wanted: Coding, params: &Params) -> u32 {
         let has_grid = params.levels > 0;
-        let is_smaller = if has_grid { self.is_packed } else { bit_words(params) <= 2 * self.pairs };
+        // Plain pairs take 8 bytes. Records took 4 to 7 a pair in the sets of `BoxSet`, and 4 an entry, which the host reads.
+        let is_smaller =
+            if has_grid { 2 * self.entries < self.pairs } else { bit_words(params) <= 2 * self.pairs };
         let is_packed = if wanted == Coding::Auto { is_smaller } else { wanted == Coding::Packed };
         match (is_packed, has_grid) {
             (true, false) => BITS,
             (true, true) if params.boxes < MAX_PACKED_BOXES => PACKED,
             _ => 0,
-        }
-    }
-
-    /// Notes the sizes of a call with a grid.
-    ///
-    /// Decoding records needs the entries, 4 bytes each. Records take 2 bytes a pair if pairs share rows, and up to 4
-    /// if they do not; plain pairs take 8.
-    pub(super) fn learn(&mut self, was_packed: bool, pairs: u64, words: u64, entries: u32) {
-        let (plain, table) = (8 * pairs, 4 * u64::from(entries));
-        self.wait = self.wait.saturating_sub(1);
-        if was_packed {
-            self.is_packed = 4 * words + table < plain;
-            self.wait = if self.is_packed { 0 } else { 64 };
-        } else {
-            self.is_packed = self.wait == 0 && plain / 2 + table < plain;
         }
     }
 }

@@ -1,6 +1,6 @@
 //! The state of a finder on a device, and what happens before a search: upload, plan, choice of the coding.
 
-use super::coding::{CodingChoice, bits_that_fit};
+use super::coding::{Counted, bits_that_fit};
 use super::device::GpuDevice;
 use super::error::Failure;
 use super::job::{Input, Job};
@@ -46,7 +46,8 @@ pub(super) struct Session {
     pub(super) uploaded: UploadCache,
     pub(super) timestamps: [Option<Timestamps>; 2],
     pub(super) sizes: Sizes,
-    pub(super) coding: CodingChoice,
+    /// Counts of the last search.
+    pub(super) counted: Counted,
     pub(super) plan: Option<KeptPlan>,
     /// Factor on the cell size: smaller while cells hold too many boxes.
     pub(super) cell_factor: f32,
@@ -72,7 +73,7 @@ impl Session {
             uploaded: UploadCache::default(),
             timestamps: [Timestamps::new(&device)?, Timestamps::new(&device)?],
             sizes: Sizes::default(),
-            coding: CodingChoice::default(),
+            counted: Counted::default(),
             plan: None,
             cell_factor: 1.0,
             split: None,
@@ -225,7 +226,7 @@ impl Session {
             _ if !has_grid && self.sizes.word_capacity > most / 4 => BITS,
             Coding::Auto if job.is_sorted && has_grid => 0,
             Coding::Auto if job.is_sorted => bits_that_fit(params, most),
-            wanted => self.coding.flag(wanted, params),
+            wanted => self.counted.flag(wanted, params),
         };
         if flags == 0 && has_grid && job.is_sorted { SORTED } else { flags }
     }

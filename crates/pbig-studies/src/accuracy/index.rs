@@ -1,6 +1,5 @@
 //! From the index of a pair to the pair (Avril 3.2 and 3.3): every root and every correction.
 
-pub(crate) mod kernels;
 mod paper;
 mod tally;
 
