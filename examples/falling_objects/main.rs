@@ -4,7 +4,7 @@
 //! `cargo run --release --example falling_objects -- --help`
 
 use clap::Parser;
-use pbig_harness::chart::{self, Panel, Series};
+use pbig_harness::chart::{Chart, Line, Plot};
 use pbig_harness::options::BackendOption;
 use pbig_harness::runner::{Run, Spread, StepTime};
 use pbig_harness::scenes::Scene;
@@ -143,10 +143,10 @@ fn write_chart(args: &Args, stock: &[StepTime], ours: &[StepTime]) -> Result<(),
     if let Some(folder) = folder {
         std::fs::create_dir_all(folder).map_err(|error| format!("{}: {error}", folder.display()))?;
     }
-    let panel = |title, of: fn(&StepTime) -> f64| {
-        let series = |name, times: &[StepTime]| Series { name, values: times.iter().map(of).collect() };
-        Panel { title, series: vec![series("stock", stock), series("pbig", ours)] }
+    let plot = |title, of: fn(&StepTime) -> f64| {
+        let line = |name, times: &[StepTime]| Line::steps(name, times.iter().map(of));
+        Plot::steps(title, vec![line("stock", stock), line("pbig", ours)])
     };
-    let panels = [panel("broad phase", |t| t.broad_phase), panel("whole step", |t| t.step)];
-    chart::write(&args.chart, &panels)
+    let plots = vec![plot("broad phase", |t| t.broad_phase), plot("whole step", |t| t.step)];
+    Chart { plots, ..Chart::default() }.write(&args.chart)
 }

@@ -1,8 +1,9 @@
 //! Options that several commands share.
 
+use clap::builder::RangedI64ValueParser;
 use pbig_core::{Error, Report};
 use pbig_harness::output::Failure;
-use std::num::IntErrorKind;
+use pbig_harness::runner::milliseconds;
 
 /// Runs `work` on `threads` threads, or on all.
 pub(crate) fn with_threads<T: Send>(
@@ -14,41 +15,15 @@ pub(crate) fn with_threads<T: Send>(
     pool.map_err(|error| Failure::Input(format!("--threads {threads}: {error}")))?.install(work)
 }
 
-/// A whole number within bounds; which one is broken is told of a number of any length.
-fn whole(text: &str, least: u64, most: u64) -> Result<u64, String> {
-    let number = text.parse::<i128>().or_else(|error| match error.kind() {
-        IntErrorKind::PosOverflow => Ok(i128::MAX),
-        IntErrorKind::NegOverflow => Ok(i128::MIN),
-        _ => Err("must be a whole number"),
-    })?;
-    if number < i128::from(least) {
-        return Err(format!("must be at least {least}"));
-    }
-    u64::try_from(number).ok().filter(|&fits| fits <= most).ok_or_else(|| format!("must be at most {most}"))
-}
+/// Beyond this number starting threads takes longer than any work.
+pub(crate) const MOST_THREADS: i64 = 1024;
 
-fn count_up_to(text: &str, most: usize) -> Result<usize, String> {
-    whole(text, 1, most as u64).map(|count| count as usize)
-}
+/// Beyond this number no machine has the memory for a world of bodies.
+pub(crate) const MOST_BODIES: i64 = 10_000_000;
 
-/// A count of at least one.
-pub(crate) fn positive(text: &str) -> Result<usize, String> {
-    count_up_to(text, usize::MAX)
-}
-
-/// A number of threads: beyond the most, starting them takes longer than any work.
-pub(crate) fn threads(text: &str) -> Result<usize, String> {
-    count_up_to(text, 1024)
-}
-
-/// A number of bodies: beyond the most, no machine has the memory for a world of them.
-pub(crate) fn bodies(text: &str) -> Result<usize, String> {
-    count_up_to(text, 10_000_000)
-}
-
-/// Parses the seed of random numbers.
-pub(crate) fn seed(text: &str) -> Result<u64, String> {
-    whole(text, 0, u64::MAX)
+/// Parses a count of at least one.
+pub(crate) fn up_to(most: i64) -> RangedI64ValueParser<usize> {
+    RangedI64ValueParser::new().range(1..=most)
 }
 
 /// A length for `Config::margin`.
@@ -79,9 +54,7 @@ pub(crate) fn plan_text(report: &Report) -> String {
 
 /// Stage times in milliseconds, by name.
 pub(crate) fn stages(report: &Report) -> serde_json::Value {
-    let ms = |time: std::time::Duration| serde_json::Value::from(time.as_secs_f64() * 1e3);
-    let named = report.stages.named().map(|(name, time)| (name.to_string(), ms(time)));
-    named.into_iter().collect::<serde_json::Map<_, _>>().into()
+    report.stages.named().into_iter().map(|(name, time)| (name, milliseconds(time))).collect()
 }
 
 #[cfg(test)]

@@ -1,13 +1,11 @@
 //! `pbig pairs`: all overlapping pairs of the boxes in a file.
 
-use crate::options::{plan_text, positive, search_text, stages, threads, with_threads};
+use crate::options::{MOST_THREADS, plan_text, search_text, stages, up_to, with_threads};
 use pbig_core::{Aabb, Config, Finder};
 use pbig_harness::files::{check_pairs_path, read_boxes, write_pairs};
 use pbig_harness::options::BackendOption;
-use pbig_harness::output::{Failure, print, progress};
-use pbig_harness::runner::{Spread, milliseconds};
+use pbig_harness::prelude::*;
 use std::path::{Path, PathBuf};
-use std::time::Instant;
 
 #[derive(clap::Args)]
 pub(crate) struct Args {
@@ -20,10 +18,10 @@ pub(crate) struct Args {
     #[arg(long, value_enum, default_value_t)]
     backend: BackendOption,
     /// Threads; all by default.
-    #[arg(long, value_name = "N", value_parser = threads, allow_negative_numbers = true)]
+    #[arg(long, value_name = "N", value_parser = up_to(MOST_THREADS), allow_negative_numbers = true)]
     threads: Option<usize>,
     /// How often to find the pairs, for the times.
-    #[arg(long, value_name = "K", default_value = "1", value_parser = positive, allow_negative_numbers = true)]
+    #[arg(long, value_name = "K", default_value = "1", value_parser = up_to(i64::MAX), allow_negative_numbers = true)]
     repeat: usize,
     /// An invalid box (NaN, or min > max) is an error.
     #[arg(long)]
@@ -50,26 +48,18 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
 }
 
 fn refuse_invalid(path: &Path, boxes: &[Aabb]) -> Result<(), Failure> {
-    match boxes.iter().position(|b| !b.is_valid()) {
-        Some(row) => {
-            let what = "has a NaN or a minimum above its maximum; mend it, or leave out --strict";
-            Err(Failure::Input(format!("{}: box {row} (counted from 0) {what}", path.display())))
-        }
-        None => Ok(()),
-    }
+    let Some(row) = boxes.iter().position(|b| !b.is_valid()) else { return Ok(()) };
+    let what = "has a NaN or a minimum above its maximum; mend it, or leave out --strict";
+    Err(Failure::Input(format!("{}: box {row} (counted from 0) {what}", path.display())))
 }
 
 fn find(finder: &mut Finder, boxes: &[Aabb], args: &Args) -> Result<Vec<f64>, Failure> {
-    let bar = progress(args.repeat, "finding pairs");
+    let about = |error| format!("{}: {}", args.input.display(), search_text(&error));
     let once = |_| {
-        let clock = Instant::now();
-        let found = finder.find(boxes).map(|_| milliseconds(clock.elapsed()));
-        bar.inc(1);
-        found.map_err(|error| Failure::Input(format!("{}: {}", args.input.display(), search_text(&error))))
+        let (found, ms) = timed(|| finder.find(boxes).map(|_| ()));
+        Ok(found.map(|()| ms).map_err(about)?)
     };
-    let times = (0..args.repeat).map(once).collect();
-    bar.finish_and_clear();
-    times
+    progress(args.repeat, "finding pairs").wrap_iter(0..args.repeat).map(once).collect()
 }
 
 fn report(args: &Args, finder: &Finder, ms: Spread) -> Result<(), Failure> {
@@ -88,12 +78,6 @@ fn report(args: &Args, finder: &Finder, ms: Spread) -> Result<(), Failure> {
         });
         return print(&object.to_string());
     }
-    print(&format!(
-        "{boxes} boxes ({invalid} invalid), {pairs} overlapping pairs\n{:.3} ms (median of {}; {:.3} to {:.3})\n{}",
-        ms.median,
-        args.repeat,
-        ms.min,
-        ms.max,
-        plan_text(report)
-    ))
+    let plan = plan_text(report);
+    print(&format!("{boxes} boxes ({invalid} invalid), {pairs} overlapping pairs\n{ms}\n{plan}"))
 }

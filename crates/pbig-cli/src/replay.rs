@@ -4,8 +4,7 @@ use crate::options::{margin, plan_text, search_text, stages};
 use pbig_core::{BroadPhase, Config, Pair, ProxyFilter};
 use pbig_harness::files::{FrameBox, Frames, check_csv_path, read_frames, write_csv};
 use pbig_harness::options::BackendOption;
-use pbig_harness::output::{Failure, print, progress};
-use pbig_harness::runner::{Spread, milliseconds};
+use pbig_harness::prelude::*;
 use std::path::PathBuf;
 use std::time::Instant;
 
@@ -47,12 +46,9 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
     let mut broad_phase =
         BroadPhase::new(config).map_err(|error| Failure::Input(format!("--margin: {error}")))?;
     let mut replay = Replay::default();
-    let bar = progress(frames.frames.len(), "frames");
-    for (number, frame) in frames.frames.iter().enumerate() {
+    for (number, frame) in tracked(frames.frames.iter().enumerate(), "frames") {
         replay.step(&mut broad_phase, number, frame, args.output.is_some()).map_err(about)?;
-        bar.inc(1);
     }
-    bar.finish_and_clear();
     if let Some(output) = &args.output {
         write_csv(output, "frame,event,a,b", std::mem::take(&mut replay.lines))?;
     }
@@ -125,12 +121,9 @@ fn report(args: &Args, frames: &Frames, replay: &Replay, broad_phase: &BroadPhas
         return print(&object.to_string());
     }
     print(&format!(
-        "{} frames of {boxes} boxes: {added} pairs added, {removed} removed, {} at the end\n{:.3} ms a frame (median; {:.3} to {:.3})\nlast frame: {}",
-        count,
+        "{count} frames of {boxes} boxes: {added} pairs added, {removed} removed, {} at the end\n\
+         a frame: {ms}\nlast frame: {}",
         broad_phase.pair_count(),
-        ms.median,
-        ms.min,
-        ms.max,
         plan_text(report)
     ))
 }

@@ -1,7 +1,6 @@
 //! `pbig simulate` and `pbig scenes`: headless rapier worlds.
 
-use crate::options::{bodies, positive, seed};
-use clap::ValueEnum;
+use crate::options::{MOST_BODIES, up_to};
 use pbig_harness::options::BackendOption;
 use pbig_harness::output::{Failure, print, progress};
 use pbig_harness::scenes::Scene;
@@ -16,19 +15,19 @@ pub(crate) struct Args {
     #[arg(long, value_name = "NAME")]
     scene: String,
     /// Bodies; each scene has its own default.
-    #[arg(long, value_name = "N", value_parser = bodies, allow_negative_numbers = true)]
+    #[arg(long, value_name = "N", value_parser = up_to(MOST_BODIES), allow_negative_numbers = true)]
     bodies: Option<usize>,
     /// Steps of 1/60 s.
-    #[arg(long, value_name = "K", default_value = "300", value_parser = positive, allow_negative_numbers = true)]
+    #[arg(long, value_name = "K", default_value = "300", value_parser = up_to(i64::MAX), allow_negative_numbers = true)]
     steps: usize,
     /// Which broad phase drives the world.
-    #[arg(long, value_enum, default_value_t)]
-    broad_phase: BroadPhaseOption,
+    #[arg(long, default_value = "pbig", value_parser = ["pbig", "stock"])]
+    broad_phase: String,
     /// Where pbig works.
     #[arg(long, value_enum, default_value_t)]
     backend: BackendOption,
     /// For the random numbers of the scene.
-    #[arg(long, default_value = "1", value_parser = seed, allow_negative_numbers = true)]
+    #[arg(long, default_value = "1", allow_negative_numbers = true)]
     seed: u64,
     /// Run rapier's broad phase and the oracle beside pbig and compare after every call.
     #[arg(long)]
@@ -36,22 +35,6 @@ pub(crate) struct Args {
     /// Print one JSON object.
     #[arg(long)]
     json: bool,
-}
-
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
-enum BroadPhaseOption {
-    #[default]
-    Pbig,
-    Stock,
-}
-
-impl BroadPhaseOption {
-    fn name(self) -> &'static str {
-        match self {
-            Self::Pbig => "pbig",
-            Self::Stock => "stock",
-        }
-    }
 }
 
 pub(crate) fn list() -> Result<(), Failure> {
@@ -71,30 +54,25 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
     let config = PbigConfig { backend: args.backend.backend(), ..PbigConfig::DEFAULT };
     let ours = PbigBroadPhase::with_config(config).expect("the default margin is a length");
     let step = |_| bar.inc(1);
-    let (outcome, did) = match args.broad_phase {
-        BroadPhaseOption::Stock => (run_scene(task, DefaultBroadPhase::new(), step).0, Did::default()),
-        BroadPhaseOption::Pbig => {
-            let (outcome, ours) = if args.check {
-                run_checked(task, ours, config.margin, Path::new("."), step)
-            } else {
-                run_scene(task, ours, step)
-            };
-            (outcome, Did::of(&ours))
-        }
+    let (outcome, ours) = if args.broad_phase == "stock" {
+        (run_scene(task, DefaultBroadPhase::new(), step).0, None)
+    } else {
+        let run = if args.check {
+            run_checked(task, ours, config.margin, Path::new("."), step)
+        } else {
+            run_scene(task, ours, step)
+        };
+        (run.0, Some(run.1))
     };
     bar.finish_and_clear();
-    report(args, bodies, &outcome, &did)?;
+    report(args, bodies, &outcome, ours.as_ref())?;
     if outcome.failed() { Err(Failure::Check(failure_line(&outcome))) } else { Ok(()) }
 }
 
 fn refuse_what_stock_ignores(args: &Args) -> Result<(), Failure> {
-    if args.check && args.broad_phase == BroadPhaseOption::Stock {
-        return Err(Failure::Input(
-            "--check is for pbig, not for rapier's own broad phase: leave out --check or --broad-phase stock"
-                .into(),
-        ));
-    }
-    Ok(())
+    let what =
+        "--check is for pbig, not for rapier's own broad phase: leave out --check or --broad-phase stock";
+    if args.check && args.broad_phase == "stock" { Err(Failure::Input(what.into())) } else { Ok(()) }
 }
 
 /// The first difference and where the frames are.
@@ -108,70 +86,43 @@ fn failure_line(outcome: &Outcome) -> String {
     }
 }
 
-/// The backend that did the work.
-#[derive(Default)]
-struct Did {
-    /// The reason why it was not the wanted backend.
-    fallback: Option<String>,
-    adapter: Option<String>,
-    /// Number of updates.
-    updates: u64,
-}
-
-impl Did {
-    fn of(broad_phase: &PbigBroadPhase) -> Self {
-        let stats = broad_phase.stats();
-        Self {
-            fallback: stats.report.fallback.clone(),
-            adapter: broad_phase.adapter().map(str::to_owned),
-            updates: stats.totals.updates,
-        }
-    }
-}
-
-fn report(args: &Args, bodies: usize, outcome: &Outcome, did: &Did) -> Result<(), Failure> {
-    let fallback = did.fallback.as_deref();
-    let stock = args.broad_phase == BroadPhaseOption::Stock;
-    let backend = if stock { "cpu" } else { args.backend.in_use(fallback) };
+/// Prints the outcome; `ours` is the broad phase, if it is pbig's.
+fn report(
+    args: &Args,
+    bodies: usize,
+    outcome: &Outcome,
+    ours: Option<&PbigBroadPhase>,
+) -> Result<(), Failure> {
+    let fallback = ours.and_then(|ours| ours.stats().report.fallback.as_deref());
+    let backend = if ours.is_some() { args.backend.in_use(fallback) } else { "cpu" };
     if args.json {
         let object = serde_json::json!({
             "scene": args.scene,
             "bodies": bodies,
             "colliders": outcome.colliders,
             "steps": outcome.steps,
-            "broad_phase": args.broad_phase.name(),
+            "broad_phase": args.broad_phase,
             "backend": backend,
-            "adapter": did.adapter,
+            "adapter": ours.and_then(PbigBroadPhase::adapter),
             "ms": { "broad_phase": outcome.broad_phase, "step": outcome.step },
             "pairs": outcome.pairs,
             "added": outcome.added,
             "removed": outcome.removed,
-            "updates": did.updates,
+            "updates": ours.map_or(0, |ours| ours.stats().totals.updates),
             "fallback": fallback,
             "check": outcome.check.as_ref().map(check_object),
         });
         return print(&object.to_string());
     }
     let note = fallback.map_or(String::new(), |why| format!("\nnote: {why}"));
-    let (broad_phase, step) = (outcome.broad_phase, outcome.step);
+    let Outcome { colliders, steps, broad_phase, step, pairs, added, removed, check } = outcome;
     print(&format!(
-        "{}: {bodies} bodies, {} colliders, {} steps with the {} broad phase\n\
-         broad phase {:.3} ms a step (median; {:.3} to {:.3}), whole step {:.3} ms ({:.3} to {:.3})\n\
-         {} pairs at the end; {} added, {} removed\n{}",
+        "{}: {bodies} bodies, {colliders} colliders, {steps} steps with the {} broad phase\n\
+         a step: broad phase {broad_phase}, all {step}\n\
+         {pairs} pairs at the end; {added} added, {removed} removed\n{}{note}",
         args.scene,
-        outcome.colliders,
-        outcome.steps,
-        args.broad_phase.name(),
-        broad_phase.median,
-        broad_phase.min,
-        broad_phase.max,
-        step.median,
-        step.min,
-        step.max,
-        outcome.pairs,
-        outcome.added,
-        outcome.removed,
-        outcome.check.as_ref().map_or(String::new(), check_line) + &note,
+        args.broad_phase,
+        check.as_ref().map_or(String::new(), check_line),
     ))
 }
 

@@ -58,23 +58,20 @@ pub fn compared(
     let of = |ms: f64| ms * unit.1;
     // A clock can tell 0.
     let times = |ours: f64, theirs: f64| theirs.max(1e-9) / ours.max(1e-9);
-    let ratios = cells![times(ours.median, theirs.median), times(ours.mean, theirs.mean)];
-    let ours = cells![case, boxes, pairs, unit.0, of(ours.median), of(ours.mean), name];
-    [ours, cells![of(theirs.median), of(theirs.mean)], ratios].concat()
+    let ratios = [times(ours.median, theirs.median), times(ours.mean, theirs.mean)];
+    let [ours, theirs] = [ours, theirs].map(|took| [of(took.median), of(took.mean)]);
+    cells![case, boxes, pairs, unit.0, ..ours, name, ..theirs, ..ratios]
 }
 
 /// Returns a row of [`COMPARED`] with one value of pbig's alone.
 pub fn alone(case: &str, boxes: usize, pairs: u64, unit: &str, value: Option<f64>) -> Vec<Value> {
-    [cells![case, boxes, pairs, unit, value], vec![Value::Null; 6]].concat()
+    cells![case, boxes, pairs, unit, value]
 }
 
 /// Prepares nothing, for [`measured`].
 pub fn unprepared<S>(_: &mut S, _: usize) {}
 
 /// Returns the medians of [`measured`].
-///
-/// # Errors
-/// If a side's work fails.
 pub fn medians<S>(
     state: &mut S,
     sides: usize,
@@ -88,9 +85,6 @@ pub fn medians<S>(
 /// Measures sides that do the same work, round by round. `prepare` gets the round and is not measured; `run` does one side's work
 /// and returns its milliseconds. Sides change places from round to round, as the first in a round warms the caches for the others;
 /// a side's median is the mean of those at each place, however often it was there.
-///
-/// # Errors
-/// If a side's work fails.
 pub fn measured<S>(
     state: &mut S,
     sides: usize,
@@ -138,32 +132,21 @@ pub fn timed<T>(call: impl FnOnce() -> T) -> (T, f64) {
     (result, milliseconds(clock.elapsed()))
 }
 
-/// Milliseconds of some frames; all but `first` leave out the first frame.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Figures {
-    /// The mean.
-    pub mean: f64,
-    /// The median.
-    pub median: f64,
-    /// The 99th percentile, by nearest rank.
-    pub p99: f64,
-    /// The longest.
-    pub worst: f64,
-    /// The first frame.
-    pub first: f64,
-}
-
-impl Figures {
-    /// Summarizes frames; zeros for none.
-    pub fn of(ms: &[f64]) -> Self {
-        let Some((&first, rest)) = ms.split_first() else { return Self::default() };
-        let mut sorted = rest.to_vec();
-        sorted.sort_unstable_by(f64::total_cmp);
-        let Some(&worst) = sorted.last() else { return Self { first, ..Self::default() } };
-        let count = sorted.len();
-        let (median, p99) = (sorted[count / 2], sorted[(99 * count).div_ceil(100) - 1]);
-        Self { mean: sorted.iter().sum::<f64>() / count as f64, median, p99, worst, first }
-    }
+/// Returns mean, median, 99th percentile by nearest rank and maximum of all frames but the first, and the first; zeros for none.
+pub fn figures(ms: &[f64]) -> [f64; 5] {
+    let Some((&first, rest)) = ms.split_first() else { return [0.0; 5] };
+    let mut sorted = rest.to_vec();
+    sorted.sort_unstable_by(f64::total_cmp);
+    let count = sorted.len();
+    let at = |place: usize| sorted.get(place).copied().unwrap_or(0.0);
+    let mean = sorted.iter().sum::<f64>() / count.max(1) as f64;
+    [
+        mean,
+        at(count / 2),
+        at((99 * count).div_ceil(100).saturating_sub(1)),
+        at(count.saturating_sub(1)),
+        first,
+    ]
 }
 
 #[cfg(test)]
@@ -172,11 +155,10 @@ mod tests {
 
     #[test]
     fn figures_by_hand() {
-        let figures = Figures { mean: 3.0, median: 2.0, p99: 6.0, worst: 6.0, first: 9.0 };
-        assert_eq!(Figures::of(&[9.0, 1.0, 2.0, 6.0]), figures);
+        assert_eq!(figures(&[9.0, 1.0, 2.0, 6.0]), [3.0, 2.0, 6.0, 6.0, 9.0]);
         let many: Vec<f64> = std::iter::once(0.0).chain((1..=200).map(f64::from)).collect();
-        assert_eq!((Figures::of(&many).p99, Figures::of(&many).worst), (198.0, 200.0));
-        assert_eq!(Figures::of(&[5.0]), Figures { first: 5.0, ..Figures::default() });
+        assert_eq!(figures(&many)[2..4], [198.0, 200.0]);
+        assert_eq!(figures(&[5.0]), [0.0, 0.0, 0.0, 0.0, 5.0]);
     }
 
     #[test]

@@ -45,14 +45,11 @@ impl BoxSet {
 /// The boxes moved by up to `distance` along each axis, sizes kept.
 pub fn moved(boxes: &[Aabb], distance: f32, seed: u64) -> Vec<Aabb> {
     let mut rng = StdRng::seed_from_u64(seed);
-    let mut step = || rng.random_range(-distance..=distance);
-    boxes
-        .iter()
-        .map(|b| {
-            let by = [step(), step(), step()];
-            Aabb::new(std::array::from_fn(|k| b.min[k] + by[k]), std::array::from_fn(|k| b.max[k] + by[k]))
-        })
-        .collect()
+    let mut shift = |b: &Aabb| {
+        let by = [0; 3].map(|_| rng.random_range(-distance..=distance));
+        Aabb::new(std::array::from_fn(|k| b.min[k] + by[k]), std::array::from_fn(|k| b.max[k] + by[k]))
+    };
+    boxes.iter().map(&mut shift).collect()
 }
 
 /// Cubes whose edges differ by up to `spread` times (log-uniform around 1), about `pairs` pairs a box:
@@ -160,13 +157,8 @@ impl Wander {
     }
 }
 
-fn with(n: usize, mut make: impl FnMut() -> ([f32; 3], [f32; 3])) -> Vec<Aabb> {
-    (0..n)
-        .map(|_| {
-            let (center, half) = make();
-            Aabb::from_center(center, half)
-        })
-        .collect()
+fn with(n: usize, make: impl FnMut() -> ([f32; 3], [f32; 3])) -> Vec<Aabb> {
+    std::iter::repeat_with(make).take(n).map(|(center, half)| Aabb::from_center(center, half)).collect()
 }
 
 fn uniform(n: usize, rng: &mut StdRng) -> Vec<Aabb> {

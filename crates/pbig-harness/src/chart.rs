@@ -2,6 +2,7 @@
 
 use plotters::coord::Shift;
 use plotters::coord::ranged1d::{KeyPointHint, NoDefaultFormatting, Ranged, ValueFormatter};
+use plotters::coord::types::RangedCoordf64;
 use plotters::prelude::*;
 use std::path::Path;
 
@@ -40,6 +41,14 @@ pub struct Line {
     pub points: Vec<(f64, f64)>,
 }
 
+impl Line {
+    /// Returns a line of a value for each step.
+    pub fn steps(name: &str, values: impl IntoIterator<Item = f64>) -> Self {
+        let points = values.into_iter().enumerate().map(|(step, value)| (step as f64, value));
+        Self { name: name.into(), points: points.collect() }
+    }
+}
+
 /// One plot.
 #[derive(Clone, Debug)]
 pub struct Plot {
@@ -49,18 +58,16 @@ pub struct Plot {
     pub x: String,
     /// Label of the y axis, with its unit.
     pub y: String,
-    /// True if both axes are logarithmic.
+    /// True if both axes are logarithmic; then points have marks.
     pub is_log: bool,
     /// True if the points of a line are joined.
     pub is_joined: bool,
-    /// True if the points have marks.
-    pub has_marks: bool,
     /// The lines, at most [`MAX_LINES`].
     pub lines: Vec<Line>,
 }
 
 /// A chart for a file.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct Chart {
     /// The file's name without its extension.
     pub name: String,
@@ -73,16 +80,10 @@ impl Chart {
     pub fn log(name: &str, title: &str, [x, y]: [&str; 2], mut lines: Vec<Line>) -> Self {
         lines.retain(|line| !line.points.is_empty());
         let (title, x, y) = (title.into(), x.into(), y.into());
-        Self {
-            name: name.into(),
-            plots: vec![Plot { title, x, y, is_log: true, is_joined: true, has_marks: true, lines }],
-        }
+        Self { name: name.into(), plots: vec![Plot { title, x, y, is_log: true, is_joined: true, lines }] }
     }
 
-    /// Writes the chart.
-    ///
-    /// # Errors
-    /// Returns a message that names the file, if it cannot be written.
+    /// Writes the chart. An error names the file.
     pub fn write(&self, path: &Path) -> Result<(), String> {
         self.draw(path).map_err(|error| format!("{}: cannot write the chart: {error}", path.display()))
     }
@@ -96,18 +97,21 @@ impl Chart {
             plot.draw(&area)?;
             plot.draw_legend(&legend)?;
         }
-        root.present().map_err(owned)
+        root.present()?;
+        Ok(())
     }
 }
 
 type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
 type Done = Result<(), Box<dyn std::error::Error>>;
 
-fn owned(error: impl std::error::Error) -> Box<dyn std::error::Error> {
-    error.to_string().into()
-}
-
 impl Plot {
+    /// Returns milliseconds against steps.
+    pub fn steps(title: &str, lines: Vec<Line>) -> Self {
+        let (x, y) = ("step".into(), "time, ms".into());
+        Self { title: title.into(), x, y, is_log: false, is_joined: true, lines }
+    }
+
     fn lines(&self) -> impl Iterator<Item = (&Line, RGBColor)> {
         self.lines.iter().zip(COLOURS)
     }
@@ -132,21 +136,20 @@ impl Plot {
             .margin(12)
             .x_label_area_size(48)
             .y_label_area_size(84)
-            .build_cartesian_2d(x.clone(), y.clone())
-            .map_err(owned)?;
+            .build_cartesian_2d(x.clone(), y.clone())?;
         let mut mesh = chart.configure_mesh();
         mesh.x_desc(&self.x).y_desc(&self.y).light_line_style(WHITE);
-        mesh.axis_desc_style(("sans-serif", TEXT)).label_style(("sans-serif", TEXT)).draw().map_err(owned)?;
+        mesh.axis_desc_style(("sans-serif", TEXT)).label_style(("sans-serif", TEXT)).draw()?;
         for (line, colour) in self.lines() {
             let place = |&(x, v): &(f64, f64)| (x, v.max(y.zero.unwrap_or(f64::MIN)));
             let points: Vec<_> =
                 line.points.iter().filter(|point| self.has_place(point)).map(place).collect();
             if self.is_joined {
-                chart.draw_series(LineSeries::new(points.clone(), colour.stroke_width(2))).map_err(owned)?;
+                chart.draw_series(LineSeries::new(points.clone(), colour.stroke_width(2)))?;
             }
-            if self.has_marks {
+            if self.is_log {
                 let mark = |at| Circle::new(at, 4, colour.filled());
-                chart.draw_series(points.into_iter().map(mark)).map_err(owned)?;
+                chart.draw_series(points.into_iter().map(mark))?;
             }
         }
         Ok(())
@@ -155,10 +158,10 @@ impl Plot {
     fn draw_legend(&self, area: &Area<'_>) -> Done {
         let mut y = 48;
         for (line, colour) in self.lines() {
-            area.draw(&Rectangle::new([(4, y - 4), (20, y + 4)], colour.filled())).map_err(owned)?;
+            area.draw(&Rectangle::new([(4, y - 4), (20, y + 4)], colour.filled()))?;
             for text in wrapped(&line.name) {
                 let style = ("sans-serif", TEXT).into_font();
-                area.draw(&Text::new(text, (26, y - 7), style)).map_err(owned)?;
+                area.draw(&Text::new(text, (26, y - 7), style))?;
                 y += 18;
             }
             y += 6;
@@ -213,34 +216,20 @@ impl Axis {
         let all = all.flat_map(|power| factors.iter().map(move |factor| factor * 10f64.powi(power)));
         self.zero.into_iter().chain(all.filter(|v| (first..=self.high).contains(v))).collect()
     }
-
-    fn steps(&self, most: usize) -> Vec<f64> {
-        let wide = (self.high - self.low) / most.max(2) as f64;
-        let power = 10f64.powf(wide.log10().floor());
-        let step = [1.0, 2.0, 5.0, 10.0].map(|k| k * power).into_iter().find(|step| *step >= wide);
-        let step = step.unwrap_or(wide);
-        (0..)
-            .map(|k| k as f64 * step + (self.low / step).ceil() * step)
-            .take_while(|v| *v <= self.high)
-            .collect()
-    }
 }
 
 impl Ranged for Axis {
     type FormatOption = NoDefaultFormatting;
     type ValueType = f64;
 
-    fn map(&self, value: &f64, (from, to): (i32, i32)) -> i32 {
-        let share = match self.is_log {
-            true => (value / self.low).ln() / (self.high / self.low).ln(),
-            false => (value - self.low) / (self.high - self.low),
-        };
-        from + (f64::from(to - from) * share).round() as i32
+    fn map(&self, value: &f64, limits: (i32, i32)) -> i32 {
+        let scaled = |value: f64| if self.is_log { value.ln() } else { value };
+        RangedCoordf64::from(scaled(self.low)..scaled(self.high)).map(&scaled(*value), limits)
     }
 
     fn key_points<Hint: KeyPointHint>(&self, hint: Hint) -> Vec<f64> {
         let most = hint.max_num_points().min(12);
-        if self.is_log { self.powers(most) } else { self.steps(most) }
+        if self.is_log { self.powers(most) } else { RangedCoordf64::from(self.range()).key_points(most) }
     }
 
     fn range(&self) -> std::ops::Range<f64> {
@@ -256,43 +245,6 @@ impl ValueFormatter<f64> for Axis {
             small if self.is_log && !(1e-3..1e6).contains(&small) => format!("{value:e}"),
             _ => format!("{rounded}"),
         }
-    }
-}
-
-/// Milliseconds step by step, for [`write()`].
-pub struct Series<'a> {
-    /// The name in the legend.
-    pub name: &'a str,
-    /// One value for each step.
-    pub values: Vec<f64>,
-}
-
-/// A panel of such series.
-pub struct Panel<'a> {
-    /// The title above the panel.
-    pub title: &'a str,
-    /// Its lines.
-    pub series: Vec<Series<'a>>,
-}
-
-/// Writes panels one below the other, milliseconds against steps.
-///
-/// # Errors
-/// Returns a message that names the file, if it cannot be written.
-pub fn write(path: &Path, panels: &[Panel<'_>]) -> Result<(), String> {
-    Chart { name: String::new(), plots: panels.iter().map(Plot::of).collect() }.write(path)
-}
-
-impl Plot {
-    /// Returns milliseconds against steps.
-    pub fn of(panel: &Panel<'_>) -> Self {
-        let line = |series: &Series<'_>| {
-            let points = series.values.iter().enumerate().map(|(step, &ms)| (step as f64, ms));
-            Line { name: series.name.to_owned(), points: points.collect() }
-        };
-        let lines = panel.series.iter().map(line).collect();
-        let (x, y) = ("step".into(), "time, ms".into());
-        Self { title: panel.title.to_owned(), x, y, is_log: false, is_joined: true, has_marks: false, lines }
     }
 }
 
@@ -329,14 +281,14 @@ mod tests {
 
     #[test]
     fn axes_have_round_labels() {
-        assert_eq!(Axis::new(vec![0.0, 9.0], false).steps(5), [0.0, 2.0, 4.0, 6.0, 8.0]);
+        assert_eq!(Axis::new(vec![0.0, 9.0], false).key_points(5), [0.0, 2.0, 4.0, 6.0, 8.0]);
         assert_eq!(Axis::new(vec![1.0, 9.0], true).powers(12), [1.0, 2.0, 5.0, 10.0]);
         assert_eq!(Axis::new(vec![1e-3, 1e3], true).powers(12).len(), 7);
     }
 
     #[test]
     fn a_chart_that_cannot_be_written_names_its_file() {
-        let nowhere = write(Path::new("no/such/folder.svg"), &[]);
+        let nowhere = Chart::default().write(Path::new("no/such/folder.svg"));
         assert!(nowhere.is_err_and(|error| error.contains("folder.svg")));
     }
 }

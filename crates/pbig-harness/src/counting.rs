@@ -22,46 +22,39 @@ thread_local! {
     static REQUESTS: Cell<u64> = const { Cell::new(0) };
 }
 
-fn count<const ALWAYS: bool>(bytes: i64) {
+/// Counts bytes that are asked for and bytes that are given back.
+fn count<const ALWAYS: bool>(asked: usize, returned: usize) {
     if !ALWAYS && !IS_ON.load(Relaxed) {
         return;
     }
-    // Where a thread ends its sum may be gone before the last block is.
-    _ = HELD.try_with(|held| held.set(held.get() + bytes));
-}
-
-fn count_new<const ALWAYS: bool>(size: usize) {
-    if !ALWAYS && !IS_ON.load(Relaxed) {
-        return;
-    }
-    count::<ALWAYS>(size as i64);
-    _ = LARGEST.try_with(|largest| largest.set(largest.get().max(size)));
-    _ = REQUESTS.try_with(|requests| requests.set(requests.get() + 1));
+    // Where a thread ends its sums may be gone before the last block is.
+    _ = HELD.try_with(|held| held.set(held.get() + asked as i64 - returned as i64));
+    _ = LARGEST.try_with(|largest| largest.set(largest.get().max(asked)));
+    _ = REQUESTS.try_with(|requests| requests.set(requests.get() + u64::from(asked > 0)));
 }
 
 // SAFETY: all is left to the system's allocator.
 unsafe impl<const ALWAYS: bool> GlobalAlloc for Counting<ALWAYS> {
     unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
-        count_new::<ALWAYS>(layout.size());
+        count::<ALWAYS>(layout.size(), 0);
         // SAFETY: the caller's promise.
         unsafe { System.alloc(layout) }
     }
 
     unsafe fn alloc_zeroed(&self, layout: Layout) -> *mut u8 {
-        count_new::<ALWAYS>(layout.size());
+        count::<ALWAYS>(layout.size(), 0);
         // SAFETY: the caller's promise.
         unsafe { System.alloc_zeroed(layout) }
     }
 
     unsafe fn realloc(&self, old: *mut u8, layout: Layout, size: usize) -> *mut u8 {
-        count::<ALWAYS>(-(layout.size() as i64));
-        count_new::<ALWAYS>(size);
+        count::<ALWAYS>(size, layout.size());
         // SAFETY: the caller's promise.
         unsafe { System.realloc(old, layout, size) }
     }
 
     unsafe fn dealloc(&self, old: *mut u8, layout: Layout) {
-        count::<ALWAYS>(-(layout.size() as i64));
+        count::<ALWAYS>(0, layout.size());
         // SAFETY: the caller's promise.
         unsafe { System.dealloc(old, layout) }
     }

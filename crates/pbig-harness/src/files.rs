@@ -7,7 +7,7 @@ mod npy;
 pub use npy::{npy_boxes, npy_frames};
 
 use ndarray::Array2;
-use ndarray_npy::{WriteNpyError, WriteNpyExt};
+use ndarray_npy::WriteNpyExt;
 use pbig_core::{Aabb, Pair};
 use std::fs::File;
 use std::io::{BufWriter, Write};
@@ -39,26 +39,14 @@ fn brief(text: &str) -> String {
 
 /// A list of boxes: `.npy` (N,6) float32 or float64 (rounded outward), or `.csv` with the columns
 /// min_x,min_y,min_z,max_x,max_y,max_z (rounded to nearest, which never parts two boxes that touch).
-///
-/// # Errors
-/// A message that names the file, what is wrong and where.
 pub fn read_boxes(path: &Path) -> Result<Vec<Aabb>, FileError> {
-    match extension(path).as_str() {
-        "npy" => read(path, npy_boxes),
-        "csv" => read(path, csv_boxes),
-        _ => Err(at(path, "expected a file that ends in .npy or .csv")),
-    }
+    read(path, if ending(path, &["npy", "csv"])? == "npy" { npy_boxes } else { csv_boxes })
 }
 
 /// Frames of boxes: `.npy` (F,N,6) float32 or float64 (rounded outward).
-///
-/// # Errors
-/// A message that names the file and what is wrong.
 pub fn read_frames(path: &Path) -> Result<Frames, FileError> {
-    match extension(path).as_str() {
-        "npy" => read(path, npy_frames),
-        _ => Err(at(path, "expected a file that ends in .npy")),
-    }
+    ending(path, &["npy"])?;
+    read(path, npy_frames)
 }
 
 fn read<T>(path: &Path, content: fn(&[u8]) -> Result<T, ContentError>) -> Result<T, FileError> {
@@ -85,36 +73,23 @@ pub enum FrameBox {
 }
 
 impl FrameBox {
-    fn from_f32(v: [f32; 6]) -> Self {
-        Self::new(v.iter().all(|x| x.is_nan()), f32_box(v))
+    fn of(v: [f64; 6]) -> Self {
+        if v.iter().all(|x| x.is_nan()) { Self::Absent } else { Self::Present(f64_box(v)) }
     }
-
-    fn from_f64(v: [f64; 6]) -> Self {
-        Self::new(v.iter().all(|x| x.is_nan()), f64_box(v))
-    }
-
-    fn new(absent: bool, aabb: Aabb) -> Self {
-        if absent { Self::Absent } else { Self::Present(aabb) }
-    }
-}
-
-fn f32_box(v: [f32; 6]) -> Aabb {
-    Aabb::new([v[0], v[1], v[2]], [v[3], v[4], v[5]])
 }
 
 fn f64_box(v: [f64; 6]) -> Aabb {
     Aabb::from_f64([v[0], v[1], v[2]], [v[3], v[4], v[5]])
 }
 
-/// In small letters.
-fn extension(path: &Path) -> String {
-    path.extension().and_then(|e| e.to_str()).unwrap_or("").to_ascii_lowercase()
+/// Returns which of these endings a file has, in small letters.
+fn ending<'a>(path: &Path, known: &[&'a str]) -> Result<&'a str, FileError> {
+    let has = path.extension().and_then(|ending| ending.to_str()).unwrap_or_default();
+    let found = known.iter().find(|known| known.eq_ignore_ascii_case(has)).copied();
+    found.ok_or_else(|| at(path, format!("expected a file that ends in .{}", known.join(" or ."))))
 }
 
 /// The content of a `.csv` file of boxes, see [`read_boxes`].
-///
-/// # Errors
-/// Returns a message in one line that names the line of the file.
 pub fn csv_boxes(bytes: &[u8]) -> Result<Vec<Aabb>, ContentError> {
     let text = text(bytes)?;
     let mut reader =
@@ -179,46 +154,33 @@ fn csv_box(record: &csv::StringRecord) -> Result<Aabb, String> {
             .parse()
             .map_err(|_| format!("column {}: '{}' is not a number", column + 1, brief(field)))?;
     }
-    Ok(f32_box(values))
+    let [a, b, c, d, e, f] = values;
+    Ok(Aabb::new([a, b, c], [d, e, f]))
 }
 
 /// Checks that [`write_pairs`] knows the extension. Call it before the work, not after.
-///
-/// # Errors
-/// A message that names the file.
 pub fn check_pairs_path(path: &Path) -> Result<(), FileError> {
-    let known = ["npy", "csv"].contains(&extension(path).as_str());
-    if known { Ok(()) } else { Err(at(path, "expected a file that ends in .npy or .csv")) }
+    ending(path, &["npy", "csv"]).map(|_| ())
 }
 
 /// Pairs as `.npy` (K,2) uint32 or `.csv`.
-///
-/// # Errors
-/// A message that names the file, when it cannot be written or has another extension.
 pub fn write_pairs(path: &Path, pairs: &[Pair]) -> Result<(), FileError> {
-    check_pairs_path(path)?;
-    match extension(path).as_str() {
-        "npy" => {
-            let flat = pairs.iter().flat_map(|p| [p.a, p.b]).collect();
-            let array = Array2::from_shape_vec((pairs.len(), 2), flat).map_err(|error| at(path, error))?;
-            write_npy(path, |file| array.write_npy(file))
-        }
-        _ => write_csv(path, "a,b", pairs.iter().map(|p| format!("{},{}", p.a, p.b))),
+    if ending(path, &["npy", "csv"])? == "csv" {
+        return write_csv(path, "a,b", pairs.iter().map(|p| format!("{},{}", p.a, p.b)));
     }
+    let flat = pairs.iter().flat_map(|p| [p.a, p.b]).collect();
+    let array = Array2::from_shape_vec((pairs.len(), 2), flat).map_err(|error| at(path, error))?;
+    let mut file = BufWriter::new(File::create(path).map_err(|error| at(path, error))?);
+    array.write_npy(&mut file).map_err(|error| at(path, error))?;
+    file.flush().map_err(|error| at(path, error))
 }
 
 /// Checks that [`write_csv`] accepts the extension. Call it before the work, not after.
-///
-/// # Errors
-/// A message that names the file.
 pub fn check_csv_path(path: &Path) -> Result<(), FileError> {
-    if extension(path) == "csv" { Ok(()) } else { Err(at(path, "expected a file that ends in .csv")) }
+    ending(path, &["csv"]).map(|_| ())
 }
 
 /// A text file of a header and lines.
-///
-/// # Errors
-/// A message that names the file, when it cannot be written.
 pub fn write_csv(
     path: &Path,
     header: &str,
@@ -234,13 +196,4 @@ pub fn write_csv(
         file.flush()
     };
     write().map_err(|error| at(path, error))
-}
-
-fn write_npy(
-    path: &Path,
-    write: impl FnOnce(&mut BufWriter<File>) -> Result<(), WriteNpyError>,
-) -> Result<(), FileError> {
-    let mut file = BufWriter::new(File::create(path).map_err(|error| at(path, error))?);
-    write(&mut file).map_err(|error| at(path, error))?;
-    file.flush().map_err(|error| at(path, error))
 }

@@ -3,11 +3,9 @@
 use pbig_core::gpu::GpuError;
 use pbig_core::{GpuFinder, GpuOptions};
 use pbig_shaders::Kernel;
-use std::time::Instant;
+use std::sync::mpsc::channel;
 use wgpu::BufferUsages as Usage;
-
-/// Copies in a timed submission: so many that the submission itself counts for little.
-const COPIES: u64 = 16;
+use wgpu::util::{BufferInitDescriptor, DeviceExt, DownloadBuffer};
 
 /// Workgroups in a row of a dispatch.
 const GROUPS_PER_ROW: u32 = 32_768;
@@ -27,33 +25,6 @@ impl Bench {
         Ok(Self { gpu: GpuFinder::new()? })
     }
 
-    /// Returns the bytes per second that the device reads and writes while it copies; a copied byte counts twice.
-    ///
-    /// This is the best of five submissions of sixteen copies of `bytes` bytes, or of a buffer's limit.
-    ///
-    /// # Errors
-    /// If the device refuses, is lost or does not answer in time.
-    pub fn copy_rate(&self, bytes: u64) -> Result<f64, GpuError> {
-        self.gpu.on_device(|device, queue| {
-            let limits = device.limits();
-            let bytes = bytes.min(limits.max_buffer_size).min(limits.max_storage_buffer_binding_size);
-            let bytes = bytes / 256 * 256;
-            let [from, to] =
-                ["from", "to"].map(|name| buffer(device, name, bytes, Usage::COPY_SRC | Usage::COPY_DST));
-            let copy = || {
-                let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
-                (0..COPIES).for_each(|_| encoder.copy_buffer_to_buffer(&from, 0, &to, 0, bytes));
-                let clock = Instant::now();
-                wait(device, queue.submit([encoder.finish()]))?;
-                Ok::<_, GpuError>(clock.elapsed().as_secs_f64())
-            };
-            // The first copy also clears the buffers.
-            let times = (0..6).map(|_| copy()).collect::<Result<Vec<_>, _>>()?;
-            let best = times[1..].iter().copied().fold(f64::MAX, f64::min);
-            Ok((2 * COPIES * bytes) as f64 / best)
-        })
-    }
-
     /// Runs a kernel on the bytes of its bindings, in their order, and returns the bytes afterwards.
     ///
     /// Uniforms come back unchanged. If a kernel has two texts, `changes` picks the one for a search for changes.
@@ -70,7 +41,7 @@ impl Bench {
     ) -> Result<Vec<Vec<u8>>, GpuError> {
         let pipeline = self.gpu.pipeline(kernel, options, changes)?;
         self.gpu.on_device(|device, queue| {
-            let buffers = upload(device, queue, kernel, bindings);
+            let buffers = upload(device, kernel, bindings);
             let group = bind(device, &pipeline, &buffers);
             let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
             let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor::default());
@@ -78,35 +49,26 @@ impl Bench {
             pass.set_bind_group(0, &group, &[]);
             pass.dispatch_workgroups(workgroups.min(GROUPS_PER_ROW), workgroups.div_ceil(GROUPS_PER_ROW), 1);
             drop(pass);
-            let found = download(device, queue, encoder, &buffers)?;
+            queue.submit([encoder.finish()]);
+            let found = download(device, queue, &buffers)?;
             Ok(found.iter().zip(bindings).map(|(found, given)| found[..given.len()].to_vec()).collect())
         })
     }
 }
 
-fn buffer(device: &wgpu::Device, name: &str, size: u64, usage: Usage) -> wgpu::Buffer {
-    device.create_buffer(&wgpu::BufferDescriptor {
-        label: Some(name),
-        size,
-        usage,
-        mapped_at_creation: false,
-    })
-}
-
 /// Makes a kernel's buffers with this content.
-fn upload(
-    device: &wgpu::Device,
-    queue: &wgpu::Queue,
-    kernel: &Kernel,
-    bindings: &[Vec<u8>],
-) -> Vec<wgpu::Buffer> {
+fn upload(device: &wgpu::Device, kernel: &Kernel, bindings: &[Vec<u8>]) -> Vec<wgpu::Buffer> {
     assert_eq!(kernel.bindings.len(), bindings.len(), "{}: a buffer for each binding", kernel.name);
     let make = |(binding, bytes): (&pbig_shaders::Buffer, &Vec<u8>)| {
         let usage = if binding.is_uniform() { Usage::UNIFORM } else { Usage::STORAGE };
-        let size = bytes.len().max(16) as u64;
-        let made = buffer(device, binding.name(), size, usage | Usage::COPY_DST | Usage::COPY_SRC);
-        queue.write_buffer(&made, 0, bytes);
-        made
+        let mut contents = bytes.clone();
+        contents.resize(bytes.len().max(16), 0);
+        let usage = usage | Usage::COPY_SRC;
+        device.create_buffer_init(&BufferInitDescriptor {
+            label: Some(binding.name()),
+            contents: &contents,
+            usage,
+        })
     };
     kernel.bindings.iter().zip(bindings).map(make).collect()
 }
@@ -124,35 +86,24 @@ fn bind(
     device.create_bind_group(&wgpu::BindGroupDescriptor { label: None, layout, entries: &entries })
 }
 
-/// Submits commands, and returns the content of buffers after them.
+/// Returns the content of buffers.
 fn download(
     device: &wgpu::Device,
     queue: &wgpu::Queue,
-    mut encoder: wgpu::CommandEncoder,
     buffers: &[wgpu::Buffer],
 ) -> Result<Vec<Vec<u8>>, GpuError> {
-    let all: u64 = buffers.iter().map(wgpu::Buffer::size).sum();
-    let staging = buffer(device, "staging", all, Usage::MAP_READ | Usage::COPY_DST);
-    let mut at = 0;
-    for buffer in buffers {
-        encoder.copy_buffer_to_buffer(buffer, 0, &staging, at, buffer.size());
-        at += buffer.size();
+    let (sender, receiver) = channel();
+    for (place, buffer) in buffers.iter().enumerate() {
+        let sender = sender.clone();
+        DownloadBuffer::read_buffer(device, queue, &buffer.slice(..), move |read| {
+            _ = sender.send((place, read.map(|bytes| bytes.to_vec())));
+        });
     }
-    let submission = queue.submit([encoder.finish()]);
-    staging.map_async(wgpu::MapMode::Read, .., |_| ());
-    wait(device, submission)?;
-    let view = staging.get_mapped_range(..).map_err(|error| GpuError::Refused(error.to_string()))?;
-    let mut rest = &view[..];
-    let take = |buffer: &wgpu::Buffer| {
-        let (own, more) = rest.split_at(buffer.size() as usize);
-        rest = more;
-        own.to_vec()
-    };
-    Ok(buffers.iter().map(take).collect())
-}
-
-fn wait(device: &wgpu::Device, submission: wgpu::SubmissionIndex) -> Result<(), GpuError> {
     let patience = GpuOptions::DEFAULT.patience;
-    let poll = wgpu::PollType::Wait { submission_index: Some(submission), timeout: Some(patience) };
-    device.poll(poll).map(|_| ()).map_err(|_| GpuError::Timeout(patience))
+    let poll = wgpu::PollType::Wait { submission_index: None, timeout: Some(patience) };
+    device.poll(poll).map_err(|_| GpuError::Timeout(patience))?;
+    let mut found: Vec<_> = receiver.try_iter().collect();
+    found.sort_by_key(|(place, _)| *place);
+    let refused = |error: wgpu::BufferAsyncError| GpuError::Refused(error.to_string());
+    found.into_iter().map(|(_, read)| read.map_err(refused)).collect()
 }

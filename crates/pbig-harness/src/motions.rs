@@ -10,7 +10,7 @@ use pbig_core::Aabb;
 use rand::rngs::StdRng;
 use rand::seq::SliceRandom;
 use rand::{RngExt, SeedableRng};
-use space::{Space, mixed_edge};
+use space::side;
 
 /// Largest distance that a box drifts or jitters in a frame along each axis; unit cubes have edge 1.
 const STEP: f32 = 0.1;
@@ -49,31 +49,16 @@ pub enum Motion {
 
 impl Motion {
     /// Every kind.
-    pub const ALL: [Self; 9] = [
-        Self::Drift,
-        Self::Jitter,
-        Self::Swing,
-        Self::Fall,
-        Self::Jump,
-        Self::Burst,
-        Self::Shares,
-        Self::Few,
-        Self::Churn,
-    ];
+    pub const ALL: [Self; 9] = {
+        use Motion::*;
+        [Drift, Jitter, Swing, Fall, Jump, Burst, Shares, Few, Churn]
+    };
 
     /// Returns the name in tables and files.
     pub fn name(self) -> &'static str {
-        match self {
-            Self::Drift => "drift",
-            Self::Jitter => "jitter",
-            Self::Swing => "swing",
-            Self::Fall => "fall",
-            Self::Jump => "jump",
-            Self::Burst => "rest and burst",
-            Self::Shares => "changing shares",
-            Self::Few => "few",
-            Self::Churn => "churn",
-        }
+        const NAMES: [&str; 9] =
+            ["drift", "jitter", "swing", "fall", "jump", "rest and burst", "changing shares", "few", "churn"];
+        NAMES[self as usize]
     }
 
     /// Returns the share of boxes that move, or are removed, in a frame. Frames count from 1.
@@ -110,24 +95,17 @@ impl Density {
 
     /// Returns the name in tables and files.
     pub fn name(self) -> &'static str {
-        match self {
-            Self::Dense => "dense",
-            Self::Sparse => "sparse",
-            Self::Mixed => "mixed",
-        }
+        ["dense", "sparse", "mixed"][self as usize]
     }
 
     /// Returns the expected number of pairs, divided by the number of boxes.
     pub fn pairs_per_box(self) -> f64 {
-        match self {
-            Self::Dense => 3.7,
-            Self::Sparse => 1.0,
-            Self::Mixed => 11.0,
-        }
+        [3.7, 1.0, 11.0][self as usize]
     }
 
-    fn edge(self, rng: &mut StdRng) -> f32 {
-        if self == Self::Mixed { mixed_edge(rng.random_range(0.0..1.0)) as f32 } else { 1.0 }
+    /// Returns the edge of a box at a place from 0 to 1 among the sizes.
+    fn edge(self, place: f64) -> f64 {
+        if self == Self::Mixed { 0.1 * 100f64.powf(place) } else { 1.0 }
     }
 }
 
@@ -146,35 +124,32 @@ pub struct Scene {
     next: usize,
     centers: Vec<[f32; 3]>,
     edges: Vec<f32>,
-    paths: Paths,
+    /// The state, besides its center, on which the next center of a box depends: its velocity, its home, or the elapsed part of
+    /// its fall, from 0 to 1.
+    states: Vec<[f32; 3]>,
     boxes: Vec<Aabb>,
     changed: Vec<u32>,
-}
-
-/// The state, besides its center, on which the next center of a box depends.
-#[derive(Debug)]
-enum Paths {
-    Free,
-    Velocities(Vec<[f32; 3]>),
-    Homes(Vec<[f32; 3]>),
-    /// Elapsed part of each box's fall, from 0 to 1.
-    Falls(Vec<f32>),
 }
 
 impl Scene {
     /// Makes `n` boxes. With [`Motion::Churn`] a tenth of them is absent.
     pub fn new(motion: Motion, density: Density, n: usize, seed: u64) -> Self {
         let mut rng = StdRng::seed_from_u64(seed);
-        let space = Space { mixed: density == Density::Mixed, falls: motion == Motion::Fall };
-        let side = space.side(n - motion.absent(n), density.pairs_per_box()) as f32;
+        let present = n - motion.absent(n);
+        let side = side(density, motion == Motion::Fall, present) as f32;
         let centers: Vec<[f32; 3]> = (0..n).map(|_| anywhere(&mut rng, side)).collect();
-        let edges: Vec<f32> = (0..n).map(|_| density.edge(&mut rng)).collect();
+        let edges = (0..n).map(|_| density.edge(rng.random_range(0.0..1.0)) as f32).collect();
         let mut order: Vec<u32> = (0..n as u32).collect();
         order.shuffle(&mut rng);
-        let paths = Paths::new(motion, &centers, &mut rng);
+        let mut state = |home: &[f32; 3]| match motion {
+            Motion::Drift | Motion::Burst => [0; 3].map(|_| rng.random_range(-STEP..=STEP)),
+            Motion::Fall => [rng.random_range(0.0..1.0), 0.0, 0.0],
+            _ => *home,
+        };
+        let states = centers.iter().map(&mut state).collect();
         let (boxes, changed) = (vec![Aabb::NOWHERE; n], Vec::with_capacity(n));
         let mut scene =
-            Self { motion, side, frame: 0, rng, order, next: 0, centers, edges, paths, boxes, changed };
+            Self { motion, side, frame: 0, rng, order, next: 0, centers, edges, states, boxes, changed };
         scene.place_all();
         scene
     }
@@ -206,8 +181,8 @@ impl Scene {
     }
 
     fn place_all(&mut self) {
-        if let Paths::Falls(elapsed) = &self.paths {
-            let heights = elapsed.iter().map(|&elapsed| height(elapsed, self.side));
+        if self.motion == Motion::Fall {
+            let heights = self.states.iter().map(|state| height(state[0], self.side));
             self.centers.iter_mut().zip(heights).for_each(|(center, y)| center[1] = y);
         }
         (0..self.boxes.len()).for_each(|i| self.place(i));
@@ -222,23 +197,20 @@ impl Scene {
 
     fn move_one(&mut self, i: usize) {
         let (rng, side, center) = (&mut self.rng, self.side, &mut self.centers[i]);
-        match (&mut self.paths, self.motion) {
-            (Paths::Velocities(velocities), _) => {
-                for (x, v) in center.iter_mut().zip(&mut velocities[i]) {
-                    advance(x, v, side);
-                }
+        let state = &mut self.states[i];
+        match self.motion {
+            Motion::Drift | Motion::Burst => {
+                center.iter_mut().zip(state).for_each(|(x, v)| advance(x, v, side));
             }
-            (Paths::Homes(homes), _) => {
+            Motion::Jitter | Motion::Shares | Motion::Few => {
+                center.iter_mut().for_each(|x| advance(x, &mut rng.random_range(-STEP..=STEP), side));
+            }
+            Motion::Swing => {
                 let far = if self.frame.is_multiple_of(2) { 0.0 } else { SWING * self.edges[i] };
-                *center = homes[i].map(|x| x + rng.random_range(-far..=far));
+                *center = state.map(|x| x + rng.random_range(-far..=far));
             }
-            (Paths::Falls(elapsed), _) => fall(center, &mut elapsed[i], side, rng),
-            (Paths::Free, Motion::Jump | Motion::Churn) => *center = anywhere(rng, side),
-            (Paths::Free, _) => {
-                for x in center {
-                    advance(x, &mut rng.random_range(-STEP..=STEP), side);
-                }
-            }
+            Motion::Fall => fall(center, &mut state[0], side, rng),
+            Motion::Jump | Motion::Churn => *center = anywhere(rng, side),
         }
         self.place(i);
     }
@@ -253,20 +225,6 @@ impl Scene {
             self.changed.push(id);
         }
         self.changed.sort_unstable();
-    }
-}
-
-impl Paths {
-    fn new(motion: Motion, centers: &[[f32; 3]], rng: &mut StdRng) -> Self {
-        match motion {
-            Motion::Drift | Motion::Burst => {
-                let velocity = |_: &[f32; 3]| [0; 3].map(|_| rng.random_range(-STEP..=STEP));
-                Self::Velocities(centers.iter().map(velocity).collect())
-            }
-            Motion::Swing => Self::Homes(centers.to_vec()),
-            Motion::Fall => Self::Falls(centers.iter().map(|_| rng.random_range(0.0..1.0)).collect()),
-            _ => Self::Free,
-        }
     }
 }
 

@@ -47,9 +47,6 @@ impl From<String> for Failure {
 }
 
 /// Prints to stdout. A reader that has gone away (`pbig scenes | head -1`) is no failure.
-///
-/// # Errors
-/// If stdout takes no more.
 pub fn print(text: &str) -> Result<(), Failure> {
     let mut stdout = std::io::stdout().lock();
     let newline = if text.ends_with('\n') { "" } else { "\n" };
@@ -86,9 +83,6 @@ pub fn tracked<T>(items: impl IntoIterator<Item = T>, what: &'static str) -> imp
 }
 
 /// Returns a failed check unless something holds.
-///
-/// # Errors
-/// [`Failure::Check`] with the message.
 pub fn check(holds: bool, message: impl FnOnce() -> String) -> Result<(), Failure> {
     if holds { Ok(()) } else { Err(Failure::Check(message())) }
 }

@@ -22,9 +22,6 @@ pub const fn pair_count(n: u64) -> u64 {
 }
 
 /// Returns the index of the first pair of row `a < n <= 2^32` (the paper's S_a): `a (2n - a - 1) / 2`.
-///
-/// # Panics
-/// If `a` is not below `n`.
 #[inline]
 pub fn row_start(a: u64, n: u64) -> u64 {
     assert!(a < n, "row {a} of {n} boxes");
@@ -33,9 +30,6 @@ pub fn row_start(a: u64, n: u64) -> u64 {
 }
 
 /// Returns the index of the pair `(a, b)`, `a < b < n <= 2^32` (equation 2, solved for k).
-///
-/// # Panics
-/// If not `a < b < n`.
 #[inline]
 pub fn index_of(a: u64, b: u64, n: u64) -> u64 {
     assert!(a < b && b < n, "pair ({a}, {b}) of {n} boxes");
@@ -49,27 +43,16 @@ pub fn index_of(a: u64, b: u64, n: u64) -> u64 {
 /// and has its sign of `8k` wrong in the text (section 3.3), right in equation 1.
 #[inline]
 pub fn pair_of(k: u64, n: u64) -> (u64, u64) {
-    let a = exact_row(estimated_row(k, n), k, n);
-    (a, a + 1 + (k - row_start(a, n)))
-}
-
-/// Estimates the row by equation 1 in f64, 0-based: `(2n - 1 - sqrt((2n - 1)^2 - 8k)) / 2`.
-fn estimated_row(k: u64, n: u64) -> u64 {
     let m = u128::from(2 * n - 1);
-    let discriminant = m * m - 8 * u128::from(k);
-    let row = (m as f64 - (discriminant as f64).sqrt()) / 2.0;
-    (row as u64).min(n - 2)
-}
-
-/// Returns the row that contains `k`, found from a nearby row by integers alone.
-fn exact_row(mut a: u64, k: u64, n: u64) -> u64 {
+    let root = ((m * m - 8 * u128::from(k)) as f64).sqrt();
+    let mut a = (((m as f64 - root) / 2.0) as u64).min(n - 2);
     while row_start(a, n) > k {
         a -= 1;
     }
     while a + 2 < n && row_start(a + 1, n) <= k {
         a += 1;
     }
-    a
+    (a, a + 1 + (k - row_start(a, n)))
 }
 
 /// Returns the number of partners in balanced row `i` of `n` boxes: PBIG's equation 7 with `m = n`, less the diagonal, where a
@@ -84,8 +67,7 @@ pub fn row_len(i: u32, n: u32) -> u32 {
 /// elements of PBIG's figure 3).
 #[inline]
 pub fn row_pair(i: u32, k: u32, n: u32) -> (u32, u32) {
-    let j = u64::from(i) + 1 + u64::from(k);
-    let n = u64::from(n);
+    let (j, n) = (u64::from(i) + 1 + u64::from(k), u64::from(n));
     (i, (if j >= n { j - n } else { j }) as u32)
 }
 

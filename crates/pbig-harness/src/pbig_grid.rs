@@ -7,15 +7,14 @@
 //! exact (contract 3).
 
 use crate::pair_index::{pair_count, pair_of, row_len, row_pair};
-use pbig_core::pbig::{Summary, cell_size, cells_along, cells_in, ordinary, pbig_objective, space_of};
+use pbig_core::pbig::{Summary, cell_size, cells_along, cells_in, ordinary, space_of};
 use pbig_core::{Aabb, Checks, Error, GpuOptions, Limits, Pair};
-use std::fmt;
 
 /// Most cells per box. With more cells, empty cells cost more than full ones.
 const MAX_CELLS_PER_BOX: f64 = 4.0;
 
 /// Most cells that a box touches before it is tested against all others instead.
-const MAX_TOUCHED_CELLS: u32 = 512;
+const MAX_TOUCHED_CELLS: u64 = 512;
 
 /// The grid of [`pbig_grid`]: one entry for each cell that a box touches.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -26,18 +25,6 @@ pub struct PbigPlan {
     pub origin: [f32; 3],
     /// Number of cells on each axis. Boxes beyond are clamped into the border cells.
     pub dims: [u32; 3],
-    /// Most cells that a box touches before it is tested against all others instead.
-    pub max_cells_per_box: u32,
-    /// `f` of equation 2 at this cell size: average entries per cell.
-    pub objective: f32,
-}
-
-/// `16 x 16 x 16 cells of 1.5, f = 4 entries a cell`.
-impl fmt::Display for PbigPlan {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let [x, y, z] = self.dims;
-        write!(f, "{x} x {y} x {z} cells of {}, f = {} entries a cell", self.cell, self.objective)
-    }
 }
 
 impl PbigPlan {
@@ -53,9 +40,12 @@ impl PbigPlan {
         while cells_in(space, cell) > f64::from(n.max(64)) * MAX_CELLS_PER_BOX {
             cell *= 1.25;
         }
-        let dims = space.map(|length| cells_along(length, cell) as u32);
-        let objective = pbig_objective(&sample, n, space, cell);
-        Self { cell, origin, dims, max_cells_per_box: MAX_TOUCHED_CELLS, objective }
+        Self { cell, origin, dims: space.map(|length| cells_along(length, cell) as u32) }
+    }
+
+    /// Returns the key of a cell.
+    fn key(&self, [x, y, z]: [u32; 3]) -> usize {
+        ((z * self.dims[1] + y) * self.dims[0] + x) as usize
     }
 }
 
@@ -83,79 +73,67 @@ pub fn pbig_grid(boxes: &[Aabb], options: &GpuOptions) -> Result<PbigFound, Erro
     }
     let plan = PbigPlan::new(&Summary::of(boxes), options);
     let grid = PbigGrid::new(&plan, boxes);
-    let mut search = PbigSearch { grid: &grid, pairs: Vec::new(), checks: Checks::default() };
+    let mut found = PbigFound { pairs: Vec::new(), checks: Checks::default(), plan };
     for key in 0..grid.offsets.len() - 1 {
-        search.check_cell(key, options.small_cell);
-        search.check_limit()?;
+        found.check_cell(&grid, key, options.small_cell);
+        found.check_limit()?;
     }
-    search.check_oversize()?;
-    let PbigSearch { mut pairs, checks, .. } = search;
-    pairs.sort_unstable();
-    Ok(PbigFound { pairs, checks, plan })
+    for (i, one) in grid.oversize.iter().enumerate() {
+        grid.oversize[i + 1..].iter().chain(&grid.members).for_each(|other| found.test(one, other));
+        found.check_limit()?;
+    }
+    found.pairs.sort_unstable();
+    Ok(found)
 }
 
-/// The cells that a box touches, both ends included.
+/// A box with the cells that it touches, both ends included.
 #[derive(Clone, Copy, Debug)]
-struct TouchedCells {
+struct GridMember {
+    aabb: Aabb,
+    id: u32,
     low: [u32; 3],
     high: [u32; 3],
 }
 
-impl TouchedCells {
-    fn new(plan: &PbigPlan, one: &Aabb) -> Self {
+impl GridMember {
+    fn new(plan: &PbigPlan, id: u32, aabb: Aabb) -> Self {
         let cell = |k: usize, x: f32| {
             let scaled = (x - plan.origin[k]) * (1.0 / plan.cell);
             scaled.clamp(0.0, (plan.dims[k] - 1) as f32) as u32
         };
-        Self {
-            low: std::array::from_fn(|k| cell(k, one.min[k])),
-            high: std::array::from_fn(|k| cell(k, one.max[k])),
-        }
+        let [low, high] = [aabb.min, aabb.max].map(|corner| std::array::from_fn(|k| cell(k, corner[k])));
+        Self { aabb, id, low, high }
     }
 
+    /// Returns the number of cells.
     fn count(&self) -> u64 {
         (0..3).map(|k| u64::from(self.high[k] - self.low[k] + 1)).product()
     }
 
     /// Returns the keys of the cells, row by row.
-    fn keys(self, dims: [u32; 3]) -> impl Iterator<Item = usize> {
-        (self.low[2]..=self.high[2]).flat_map(move |z| {
-            (self.low[1]..=self.high[1])
-                .flat_map(move |y| (self.low[0]..=self.high[0]).map(move |x| key_of([x, y, z], dims)))
-        })
+    fn keys(self, plan: &PbigPlan) -> impl Iterator<Item = usize> {
+        let [[x, y, z], [to_x, to_y, to_z]] = [self.low, self.high];
+        (z..=to_z)
+            .flat_map(move |z| (y..=to_y).flat_map(move |y| (x..=to_x).map(move |x| plan.key([x, y, z]))))
     }
-}
-
-fn key_of(cell: [u32; 3], dims: [u32; 3]) -> usize {
-    ((cell[2] * dims[1] + cell[1]) * dims[0] + cell[0]) as usize
-}
-
-/// A box in the grid.
-#[derive(Clone, Copy, Debug)]
-struct GridMember {
-    aabb: Aabb,
-    id: u32,
-    touched: TouchedCells,
 }
 
 /// The grid: for each cell a range of `entries`, each an index into `members`.
 #[derive(Debug)]
 struct PbigGrid {
-    dims: [u32; 3],
     offsets: Vec<u32>,
     entries: Vec<u32>,
     members: Vec<GridMember>,
     /// Boxes that touch too many cells, which are tested against all others.
-    oversize: Vec<(u32, Aabb)>,
+    oversize: Vec<GridMember>,
 }
 
 impl PbigGrid {
     /// Builds the grid by count, scan and scatter: the three kernels of PBIG 4.2.
     fn new(plan: &PbigPlan, boxes: &[Aabb]) -> Self {
         let (members, oversize) = select(plan, boxes);
-        let dims = plan.dims;
-        let mut offsets = vec![0; dims.iter().product::<u32>() as usize + 1];
-        for key in members.iter().flat_map(|member| member.touched.keys(dims)) {
+        let mut offsets = vec![0; plan.dims.iter().product::<u32>() as usize + 1];
+        for key in members.iter().flat_map(|member| member.keys(plan)) {
             offsets[key] += 1;
         }
         let mut sum = 0;
@@ -165,95 +143,64 @@ impl PbigGrid {
         }
         let mut entries = vec![0; sum as usize];
         for (i, member) in members.iter().enumerate().rev() {
-            for key in member.touched.keys(dims) {
+            for key in member.keys(plan) {
                 offsets[key] -= 1;
                 entries[offsets[key] as usize] = i as u32;
             }
         }
-        Self { dims, offsets, entries, members, oversize }
-    }
-
-    /// Returns the key of the cell that reports a pair.
-    fn owner(&self, a: &GridMember, b: &GridMember) -> usize {
-        key_of(std::array::from_fn(|k| a.touched.low[k].max(b.touched.low[k])), self.dims)
+        Self { offsets, entries, members, oversize }
     }
 }
 
 /// Returns the valid boxes with their cells, and the oversize boxes.
-fn select(plan: &PbigPlan, boxes: &[Aabb]) -> (Vec<GridMember>, Vec<(u32, Aabb)>) {
-    let (mut members, mut oversize, mut entries) = (Vec::new(), Vec::new(), 0);
-    for (id, aabb) in (0u32..).zip(boxes).filter(|(_, aabb)| aabb.is_valid()) {
-        let touched = TouchedCells::new(plan, aabb);
-        let count = touched.count();
+fn select(plan: &PbigPlan, boxes: &[Aabb]) -> (Vec<GridMember>, Vec<GridMember>) {
+    let valid = (0..).zip(boxes).filter(|(_, aabb)| aabb.is_valid());
+    let mut entries = 0;
+    valid.map(|(id, aabb)| GridMember::new(plan, id, *aabb)).partition(|member| {
+        let count = member.count();
         // Entries are counted in 32 bits.
-        if count > u64::from(plan.max_cells_per_box) || entries + count > u64::from(u32::MAX) {
-            oversize.push((id, *aabb));
-        } else {
-            entries += count;
-            members.push(GridMember { aabb: *aabb, id, touched });
-        }
-    }
-    (members, oversize)
+        let fits = count <= MAX_TOUCHED_CELLS && entries + count <= u64::from(u32::MAX);
+        entries += if fits { count } else { 0 };
+        fits
+    })
 }
 
-/// A search of the grid, with its result so far.
-struct PbigSearch<'a> {
-    grid: &'a PbigGrid,
-    pairs: Vec<Pair>,
-    checks: Checks,
-}
-
-impl PbigSearch<'_> {
+impl PbigFound {
     /// Tests the pairs of a cell.
-    fn check_cell(&mut self, key: usize, small_cell: u32) {
-        let range = self.grid.offsets[key] as usize..self.grid.offsets[key + 1] as usize;
-        let entries = &self.grid.entries[range];
+    fn check_cell(&mut self, grid: &PbigGrid, key: usize, small_cell: u32) {
+        let range = grid.offsets[key] as usize..grid.offsets[key + 1] as usize;
+        let entries = &grid.entries[range];
         let n = entries.len() as u32;
         if n <= small_cell {
-            for k in 0..pair_count(u64::from(n)) {
-                let (i, j) = pair_of(k, u64::from(n));
-                self.test_members(key, entries[i as usize], entries[j as usize]);
+            for k in 0..pair_count(n.into()) {
+                let (i, j) = pair_of(k, n.into());
+                self.check_in_cell(grid, key, entries[i as usize], entries[j as usize]);
             }
             return;
         }
         for (i, j) in (0..n).flat_map(|row| (0..row_len(row, n)).map(move |k| row_pair(row, k, n))) {
-            self.test_members(key, entries[i as usize], entries[j as usize]);
+            self.check_in_cell(grid, key, entries[i as usize], entries[j as usize]);
         }
     }
 
-    fn test_members(&mut self, key: usize, i: u32, j: u32) {
-        let (a, b) = (&self.grid.members[i as usize], &self.grid.members[j as usize]);
-        if self.grid.owner(a, b) == key {
-            self.test((a.id, &a.aabb), (b.id, &b.aabb));
+    /// Tests two members in a cell that both touch, if it is the owner of their pair.
+    fn check_in_cell(&mut self, grid: &PbigGrid, key: usize, i: u32, j: u32) {
+        let (a, b) = (&grid.members[i as usize], &grid.members[j as usize]);
+        if self.plan.key(std::array::from_fn(|k| a.low[k].max(b.low[k]))) == key {
+            self.test(a, b);
         } else {
             self.checks.made += 1;
             self.checks.redundant += 1;
         }
     }
 
-    /// Tests two boxes.
-    fn test(&mut self, a: (u32, &Aabb), b: (u32, &Aabb)) {
+    fn test(&mut self, a: &GridMember, b: &GridMember) {
         self.checks.made += 1;
-        if a.1.overlaps(b.1) {
-            self.pairs.push(Pair::new(a.0, b.0));
+        if a.aabb.overlaps(&b.aabb) {
+            self.pairs.push(Pair::new(a.id, b.id));
         } else {
             self.checks.unnecessary += 1;
         }
-    }
-
-    /// Tests oversize boxes against each other and against all others.
-    fn check_oversize(&mut self) -> Result<(), Error> {
-        let grid = self.grid;
-        for (i, (id, aabb)) in grid.oversize.iter().enumerate() {
-            for (other, other_aabb) in &grid.oversize[i + 1..] {
-                self.test((*id, aabb), (*other, other_aabb));
-            }
-            for member in &grid.members {
-                self.test((*id, aabb), (member.id, &member.aabb));
-            }
-            self.check_limit()?;
-        }
-        Ok(())
     }
 
     fn check_limit(&self) -> Result<(), Error> {
@@ -265,7 +212,7 @@ impl PbigSearch<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use pbig_core::pbig::{density_cell, pbig_cell};
+    use pbig_core::pbig::{density_cell, pbig_cell, pbig_objective};
     use pbig_core::{CellRule, oracle};
 
     fn boxes() -> Vec<Aabb> {
@@ -288,7 +235,7 @@ mod tests {
                 let found = pbig_grid(&boxes, &options).expect("few boxes");
                 assert_eq!(found.pairs, wanted, "{cell_rule:?}, {boxes_per_cell}, {small_cell}");
                 let Checks { made, unnecessary, redundant, .. } = found.checks;
-                assert_eq!(made, unnecessary + redundant + wanted.len() as u64, "{}", found.plan);
+                assert_eq!(made, unnecessary + redundant + wanted.len() as u64, "{:?}", found.plan);
             }
         }
     }
@@ -300,7 +247,7 @@ mod tests {
         for half in [1e3, 1e6, 0.5 * f32::MAX] {
             boxes.push(Aabb::from_center([0.0; 3], [half; 3]));
             let plan = PbigPlan::new(&Summary::of(&boxes), &GpuOptions::DEFAULT);
-            assert!(plan.cell < 10.0, "ground of {half}: {plan}");
+            assert!(plan.cell < 10.0, "ground of {half}: {plan:?}");
         }
     }
 

@@ -58,9 +58,6 @@ impl Report {
     }
 
     /// Prints the tables, or one JSON object; writes the file and the charts if there is a folder for them.
-    ///
-    /// # Errors
-    /// If something cannot be written.
     pub fn finish(&self, as_json: bool, folder: Option<&Path>) -> Result<(), Failure> {
         if as_json {
             print(&self.object().to_string())?;
@@ -72,9 +69,6 @@ impl Report {
     }
 
     /// Writes the file and the charts into a folder, which is made if there is none.
-    ///
-    /// # Errors
-    /// If something cannot be written.
     pub fn write(&self, folder: &Path) -> Result<(), Failure> {
         let path = folder.join(format!("{}.csv", self.suite));
         let written = std::fs::create_dir_all(folder).and_then(|()| std::fs::write(&path, self.csv()));
@@ -112,22 +106,18 @@ fn commit() -> Option<String> {
     (output.status.success() && !name.is_empty()).then_some(name)
 }
 
-/// Returns the SIMD extensions of this processor.
-#[cfg(target_arch = "x86_64")]
+/// Returns the SIMD extensions of this processor; of others than x86-64 the architecture, which implies its extensions.
 pub fn simd_found() -> Vec<&'static str> {
+    #[cfg(target_arch = "x86_64")]
     let found = [
         ("sse4.2", is_x86_feature_detected!("sse4.2")),
         ("avx2", is_x86_feature_detected!("avx2")),
         ("fma", is_x86_feature_detected!("fma")),
         ("avx512f", is_x86_feature_detected!("avx512f")),
     ];
+    #[cfg(not(target_arch = "x86_64"))]
+    let found = [(std::env::consts::ARCH, true)];
     found.into_iter().filter(|(_, has)| *has).map(|(name, _)| name).collect()
-}
-
-/// Returns the architecture, which implies its extensions.
-#[cfg(not(target_arch = "x86_64"))]
-pub fn simd_found() -> Vec<&'static str> {
-    vec![std::env::consts::ARCH]
 }
 
 #[cfg(test)]

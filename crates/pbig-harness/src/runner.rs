@@ -3,6 +3,7 @@
 use crate::scenes::Scene;
 use crate::world::World;
 use rapier3d::prelude::*;
+use std::fmt;
 use std::time::{Duration, Instant};
 
 /// A broad phase with a clock around it.
@@ -115,6 +116,12 @@ impl Spread {
             [] => Self::default(),
             [min, ..] => Self { min, median: times[times.len() / 2], max: times[times.len() - 1] },
         }
+    }
+}
+
+impl fmt::Display for Spread {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{:.3} ms (median; {:.3} to {:.3})", self.median, self.min, self.max)
     }
 }
 

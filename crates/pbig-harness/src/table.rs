@@ -6,10 +6,16 @@ use serde_json::Map;
 /// A label, a number, or nothing where nothing was measured.
 pub use serde_json::Value;
 
-/// Makes a row from values of different types.
+/// Makes a row from values of different types; `..values` appends each of several, and `()` nothing measured.
 #[macro_export]
 macro_rules! cells {
-    ($($value:expr),* $(,)?) => { vec![$($crate::table::Value::from($value)),*] };
+    (@ $row:ident) => {};
+    (@ $row:ident ..$values:expr $(, $($rest:tt)*)?) => {
+        $row.extend($values.into_iter().map($crate::table::Value::from));
+        $($crate::cells!(@ $row $($rest)*);)?
+    };
+    (@ $row:ident $value:expr $(, $($rest:tt)*)?) => { $crate::cells!(@ $row ..[$value] $(, $($rest)*)?) };
+    ($($values:tt)*) => {{ let mut row = vec![]; $crate::cells!(@ row $($values)*); row }};
 }
 
 /// Returns a value as files have it: a number with up to nine digits.
@@ -36,7 +42,8 @@ fn short(value: &Value) -> String {
     }
 }
 
-/// Rows under named columns. The first columns name the row; units are in the columns' names.
+/// Rows under named columns. The first columns name the row; units are in the columns' names. To ask for a column that does not
+/// exist is a panic, and so is a row with too many values.
 #[derive(Clone, Debug)]
 pub struct Table {
     /// The name in files and JSON.
@@ -54,13 +61,11 @@ impl Table {
         Self { name: name.into(), columns, rows: vec![] }
     }
 
-    /// Appends a row.
-    ///
-    /// # Panics
-    /// If the row has not one value for each column.
+    /// Appends a row. Values that are missing at its end were not measured.
     pub fn row(&mut self, values: impl IntoIterator<Item = Value>) {
-        let values: Vec<Value> = values.into_iter().collect();
-        assert_eq!(values.len(), self.columns.len(), "values of a row of {}", self.name);
+        let mut values: Vec<Value> = values.into_iter().collect();
+        assert!(values.len() <= self.columns.len(), "{}: too many values: {values:?}", self.name);
+        values.resize(self.columns.len(), Value::Null);
         self.rows.push(values);
     }
 
@@ -70,34 +75,22 @@ impl Table {
     }
 
     /// Returns the values of a column.
-    ///
-    /// # Panics
-    /// If there is no such column.
     pub fn column(&self, name: &str) -> impl Iterator<Item = &Value> {
         let place = self.place(name);
         self.rows.iter().map(move |row| &row[place])
     }
 
     /// Returns the numbers of a column.
-    ///
-    /// # Panics
-    /// If there is no such column.
     pub fn numbers(&self, name: &str) -> Vec<f64> {
         self.column(name).filter_map(Value::as_f64).collect()
     }
 
     /// Returns the number in a column of a row of this table.
-    ///
-    /// # Panics
-    /// If there is no such column.
     pub fn number(&self, row: &[Value], column: &str) -> Option<f64> {
         row[self.place(column)].as_f64()
     }
 
     /// Returns a line of a chart: a column against another one, in the rows that are wanted and have numbers in both.
-    ///
-    /// # Panics
-    /// If there is no such column.
     pub fn line(&self, name: &str, [x, y]: [&str; 2], is_wanted: impl Fn(&[Value]) -> bool) -> Line {
         let wanted = self.rows.iter().filter(|row| is_wanted(row));
         let points = wanted.filter_map(|row| Some((self.number(row, x)?, self.number(row, y)?))).collect();

@@ -1,7 +1,7 @@
 //! Run time against error: a study for each thing that can be wrong by a little.
 
 mod coordinates;
-pub(crate) mod index;
+mod index;
 mod margin;
 mod simulation;
 mod wide;

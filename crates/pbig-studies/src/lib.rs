@@ -13,3 +13,8 @@ pub mod steady;
 mod trees;
 pub mod whole_steps;
 pub mod wide;
+
+use pbig_core::{Config, Limits, Order};
+
+/// Unlimited and in no order, as the papers' programs and the other trees.
+const UNSORTED: Config = Config { limits: Limits::UNLIMITED, order: Order::Unspecified, ..Config::DEFAULT };

@@ -14,80 +14,68 @@ use std::process::ExitCode;
 struct Cli {
     #[command(subcommand)]
     command: Command,
+    /// Print one JSON object.
+    #[arg(long, global = true)]
+    json: bool,
+    /// Small sizes only, in less than a minute.
+    #[arg(long, global = true)]
+    quick: bool,
+    /// Write the numbers as CSV, and the charts, into this folder.
+    #[arg(long, global = true, value_name = "DIR")]
+    write: Option<PathBuf>,
 }
 
 #[derive(Subcommand)]
 enum Command {
     /// The experiments of PBIG's and Avril's papers, the printed numbers beside ours.
-    Papers(Options),
+    Papers,
     /// Pbig alone, stage by stage: against boxes, movers, density and the spread of sizes.
-    Stages(Options),
+    Stages,
     /// Pbig alone beside parry's tree and obvhs.
-    Peers(Options),
+    Peers,
     /// How long updates take, and how evenly, by motion and of every scene.
     Steady {
-        #[command(flatten)]
-        options: Options,
         /// Numbers of boxes, and of bodies, instead of its own.
         #[arg(long, value_name = "N,N", value_delimiter = ',')]
         boxes: Vec<usize>,
     },
     /// Whole steps of rapier with its own broad phase and with pbig's, of every scene.
-    WholeSteps(Options),
+    WholeSteps,
     /// Run time against error.
     Accuracy {
-        #[command(flatten)]
-        options: Options,
         /// This study alone.
         #[arg(long, value_name = "STUDY", value_parser = accuracy::STUDIES.map(|(name, _)| name))]
         only: Option<String>,
     },
 }
 
-#[derive(clap::Args)]
-struct Options {
-    /// Print one JSON object.
-    #[arg(long)]
-    json: bool,
-    /// Small sizes only, in less than a minute.
-    #[arg(long)]
-    quick: bool,
-    /// Write the numbers as CSV, and the charts, into this folder.
-    #[arg(long, value_name = "DIR")]
-    write: Option<PathBuf>,
-}
-
 fn main() -> ExitCode {
-    finish("pbig-studies", run(Cli::parse().command))
+    finish("pbig-studies", run(&Cli::parse()))
 }
 
-fn run(command: Command) -> Result<(), Failure> {
-    match command {
-        Command::Papers(options) => told(&options, &papers::run(options.quick)?),
-        Command::Stages(options) => told(&options, &stages::run(options.quick)?),
-        Command::Peers(options) => told(&options, &peers::run(options.quick)?),
-        Command::Steady { options, boxes } => told(&options, &steady::run(options.quick, &boxes)?),
-        Command::WholeSteps(options) => told(&options, &whole_steps::run(options.quick)),
-        Command::Accuracy { options, only } => run_accuracy(&options, only),
-    }
+fn run(cli: &Cli) -> Result<(), Failure> {
+    let report = match &cli.command {
+        Command::Papers => papers::run(cli.quick)?,
+        Command::Stages => stages::run(cli.quick)?,
+        Command::Peers => peers::run(cli.quick)?,
+        Command::Steady { boxes } => steady::run(cli.quick, boxes)?,
+        Command::WholeSteps => whole_steps::run(cli.quick),
+        Command::Accuracy { only } => return run_accuracy(cli, only.as_deref()),
+    };
+    report.finish(cli.json, cli.write.as_deref())
 }
 
-fn told(options: &Options, report: &Report) -> Result<(), Failure> {
-    report.finish(options.json, options.write.as_deref())
-}
-
-fn run_accuracy(options: &Options, only: Option<String>) -> Result<(), Failure> {
-    let wanted = |name: &str| only.as_deref().is_none_or(|only| only == name);
+fn run_accuracy(cli: &Cli, only: Option<&str>) -> Result<(), Failure> {
     let mut objects = Map::new();
-    let studies = accuracy::STUDIES.into_iter().filter(|(name, _)| wanted(name));
+    let studies = accuracy::STUDIES.into_iter().filter(|(name, _)| only.is_none_or(|only| only == *name));
     for (name, study) in tracked(studies, "studies") {
-        let report: Report = study(options.quick)?;
-        if options.json {
+        let report: Report = study(cli.quick)?;
+        if cli.json {
             objects.insert(name.into(), report.object());
-            options.write.as_ref().map_or(Ok(()), |folder| report.write(folder))?;
+            cli.write.as_ref().map_or(Ok(()), |folder| report.write(folder))?;
         } else {
-            report.finish(false, options.write.as_deref())?;
+            report.finish(false, cli.write.as_deref())?;
         }
     }
-    if options.json { print(&json!({ "suite": "accuracy", "studies": objects }).to_string()) } else { Ok(()) }
+    if cli.json { print(&json!({ "suite": "accuracy", "studies": objects }).to_string()) } else { Ok(()) }
 }

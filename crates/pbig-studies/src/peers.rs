@@ -3,17 +3,15 @@
 //! Events: `set_many` of the boxes that moved and `update`; parry keeps its tree and gives all pairs (1% moved: those with a moved
 //! box), no events. Not counted for the others: turning boxes into theirs, and the list of updates for parry's parallel frame.
 
-use crate::trees::{Changed, Kept, Obvhs, Parry, Refit, for_parry, parry_rebuilt};
-use pbig_core::{Aabb, Config, Finder, Limits, Order};
+use crate::UNSORTED;
+use crate::trees::{Changed, Kept, Obvhs, Parry, Refit, for_parry, parry_rebuilt, partition};
+use pbig_core::{Aabb, Finder};
 use pbig_harness::prelude::*;
 
 /// Returns the distance that a box of a set moves between two frames, along each axis. Settled boxes hardly move.
 fn distance(set: &str) -> f32 {
     if set == "pile" { 0.02 } else { 0.1 }
 }
-
-/// Unlimited, as the others know no limits.
-const CONFIG: Config = Config { limits: Limits::UNLIMITED, order: Order::Unspecified, ..Config::DEFAULT };
 
 /// A set of boxes, and how many.
 type Case = (&'static str, usize);
@@ -24,10 +22,7 @@ const SMALL: [Case; 3] = [("unit", 10_000), ("mixed", 10_000), ("pile", 10_000)]
 /// The share of boxes that swing to and fro; none: all drift, on and on.
 type Motion = Option<f64>;
 
-/// Measures all cases.
-///
-/// # Errors
-/// A failed check, if the sides have different numbers of pairs.
+/// Measures all cases. A failed check, if the sides have different numbers of pairs.
 pub fn run(quick: bool) -> Result<Report, Failure> {
     let (effort, mut table) = (Effort::new(quick), Table::new("peers", COMPARED));
     let cases: &[Case] = if quick { &SMALL } else { &LARGE };
@@ -41,8 +36,6 @@ pub fn run(quick: bool) -> Result<Report, Failure> {
         tracked(cases, what).try_for_each(|case| frames(what, *case, motion, effort, &mut table))?;
     }
     tracked(cases, "from scratch").try_for_each(|case| from_scratch(*case, effort, &mut table))?;
-    mixed_beside_unit("events, all moved", &mut table);
-    mixed_beside_unit("from scratch", &mut table);
     Ok(Report::new("peers", vec![table]))
 }
 
@@ -60,19 +53,19 @@ struct Frames {
     wander: Wander,
     changed: Changed,
     ours: Kept,
-    trees: [Parry; 2],
+    trees: Vec<Parry>,
 }
 
 impl Frames {
     fn prepare(&mut self, round: usize) {
         let moved = self.wander.step(round);
         self.trees.iter_mut().for_each(|tree| tree.prepare(&self.wander.boxes, &moved));
-        self.changed = Changed::new(&moved, &self.wander.boxes);
+        self.changed = partition(&self.wander.boxes, &moved);
     }
 
     fn run(&mut self, side: usize) -> Result<f64, Failure> {
         match side {
-            0 | 1 => self.ours.update(side == 1, &self.wander.boxes, &self.changed),
+            0 | 1 => self.ours.update(side, &self.wander.boxes, &self.changed),
             _ => Ok(timed(|| self.trees[side - 2].frame()).1),
         }
     }
@@ -80,24 +73,25 @@ impl Frames {
 
 /// Measures a case frame by frame.
 fn frames(what: &str, case: Case, motion: Motion, effort: Effort, table: &mut Table) -> Result<(), Failure> {
-    let (name, boxes, is_partial) =
-        (format!("{what}, {}", case.0), named(case), motion < Some(1.0) && motion.is_some());
-    let refits = if is_partial { [Refit::Whole, Refit::Part] } else { [Refit::Whole, Refit::Parallel] };
-    let trees = refits.map(|refit| Parry::new(&boxes, refit, is_partial));
+    let (name, boxes) = (format!("{what}, {}", case.0), named(case));
+    let is_partial = motion.is_some_and(|share| share < 1.0);
+    let refits = if is_partial { &[Refit::Changed][..] } else { &[Refit::Whole, Refit::Parallel] };
+    let trees: Vec<Parry> = refits.iter().map(|refit| Parry::new(&boxes, *refit)).collect();
+    let sides = 2 + trees.len();
     let wander = match motion {
         Some(share) => Wander::new(boxes, share, distance(case.0)),
         None => Wander::drifting(boxes, distance(case.0)),
     };
-    let all: Vec<u32> = (0..case.1 as u32).collect();
-    let changed = Changed::new(&all, &wander.boxes);
-    let mut ours = Kept::new(CONFIG)?;
-    ours.update(false, &wander.boxes, &changed)?;
-    ours.update(true, &wander.boxes, &changed)?;
-    let mut state = Frames { wander, changed, ours, trees };
-    let times = measured(&mut state, 4, effort, Frames::prepare, Frames::run)?;
+    let changed = ((0..case.1 as u32).collect(), vec![]);
+    let mut state = Frames { wander, changed, ours: Kept::new(UNSORTED)?, trees };
+    for side in [0, 1] {
+        state.run(side)?;
+    }
+    let times = measured(&mut state, sides, effort, Frames::prepare, Frames::run)?;
     let Frames { ours, mut trees, .. } = state;
     let [all, lone] = ours.pairs();
-    let pairs = agree(&name, all, &[lone, trees[0].all_pairs(), trees[1].all_pairs()])?;
+    let theirs: Vec<usize> = trees.iter_mut().map(Parry::all_pairs).collect();
+    let pairs = agree(&name, all, &[vec![lone], theirs].concat())?;
     for (tree, &theirs) in trees.iter().zip(&times[2..]) {
         table.row(compared(&name, case.1, pairs, MS, times[0], (tree.name(), theirs)));
     }
@@ -109,12 +103,12 @@ fn frames(what: &str, case: Case, motion: Motion, effort: Effort, table: &mut Ta
 /// Measures all pairs from nothing, of boxes that are elsewhere in each round.
 fn from_scratch(case: Case, effort: Effort, table: &mut Table) -> Result<(), Failure> {
     let name = format!("from scratch, {}", case.0);
-    let (mut ours, mut found, mut pairs) = (Finder::new(CONFIG), vec![], [0; 3]);
+    let (mut ours, mut found, mut pairs) = (Finder::new(UNSORTED), vec![], [0; 3]);
     let wander = Wander::new(named(case), 1.0, distance(case.0));
     let mut state = (wander, vec![], Obvhs::default());
-    let prepare = |(wander, parry, obvhs): &mut (Wander, _, Obvhs), round| {
+    let prepare = |(wander, parry, obvhs): &mut (Wander, Vec<_>, Obvhs), round| {
         wander.step(round);
-        *parry = for_parry(&wander.boxes);
+        *parry = wander.boxes.iter().map(for_parry).collect();
         obvhs.prepare(&wander.boxes);
     };
     let times = measured(&mut state, 3, effort, prepare, |(wander, parry, obvhs), side| {
@@ -131,19 +125,4 @@ fn from_scratch(case: Case, effort: Effort, table: &mut Table) -> Result<(), Fai
         table.row(compared(&name, case.1, pairs, MS, times[0], (other, theirs)));
     }
     Ok(())
-}
-
-/// Appends pbig's cost of a box or pair of the set of many sizes, beside that of the set of one.
-fn mixed_beside_unit(what: &str, table: &mut Table) {
-    let of = |set: &str| {
-        let row = table.rows.iter().find(|row| row[0] == format!("{what}, {set}"))?;
-        let number = |k: usize| row[k].as_f64();
-        let count = number(1)? + number(2)?;
-        Some((count, number(2)? as u64, Took { median: number(4)? / count, mean: number(5)? / count }))
-    };
-    if let Some((mixed, unit)) = of("mixed").zip(of("unit")) {
-        let boxes = (mixed.0 - mixed.1 as f64) as usize;
-        let case = format!("{what}, mixed, per box and pair");
-        table.row(compared(&case, boxes, mixed.1, ("ns", 1e6), mixed.2, ("unit", unit.2)));
-    }
 }

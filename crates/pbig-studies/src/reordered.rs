@@ -1,7 +1,20 @@
 //! Broad phases that report what another one finds, with its events in another order. Rapier solves contacts in an order that
 //! comes from the order of events, so a run with such a broad phase differs from one with the broad phase inside by order alone.
 
+use rapier_pbig::PbigBroadPhase;
 use rapier3d::prelude::*;
+
+/// Names a broad phase, and makes it.
+pub(crate) type Kind = (&'static str, fn() -> Box<dyn BroadPhase>);
+
+/// The second of each two differs from the first in order alone: which collider of a pair is the first is as stock has it; and
+/// events are sorted as ours are.
+pub(crate) const KINDS: [Kind; 4] = [
+    ("pbig", || Box::new(PbigBroadPhase::new())),
+    ("pbig lower first", || Box::new(Reordered(PbigBroadPhase::new(), lower_first))),
+    ("stock", || Box::new(DefaultBroadPhase::new())),
+    ("stock sorted", || Box::new(Reordered(DefaultBroadPhase::new(), sorted))),
+];
 
 /// A broad phase, and what is done to the events of each update.
 pub(crate) struct Reordered<B>(pub(crate) B, pub(crate) fn(&mut [BroadPhasePairEvent]));
@@ -23,21 +36,23 @@ impl<B: BroadPhase> BroadPhase for Reordered<B> {
 }
 
 /// Sorts events as pbig does: ends before additions, each by the lower and then the higher index of its colliders.
-pub(crate) fn sorted(events: &mut [BroadPhasePairEvent]) {
-    events.sort_by_key(|event| {
-        let (is_added, [a, b]) = plain(event);
-        (is_added, a.min(b), a.max(b))
-    });
+fn sorted(events: &mut [BroadPhasePairEvent]) {
+    events.sort_by_key(key);
 }
 
 /// Names the collider with the lower index first in each pair, as rapier's own broad phase does.
-pub(crate) fn lower_first(events: &mut [BroadPhasePairEvent]) {
+fn lower_first(events: &mut [BroadPhasePairEvent]) {
     for event in events {
         let (BroadPhasePairEvent::AddPair(pair) | BroadPhasePairEvent::DeletePair(pair)) = event;
         if pair.collider2.into_raw_parts() < pair.collider1.into_raw_parts() {
             *pair = pair.swap();
         }
     }
+}
+
+fn key(event: &BroadPhasePairEvent) -> (bool, u32, u32) {
+    let (is_added, [a, b]) = plain(event);
+    (is_added, a.min(b), a.max(b))
 }
 
 /// Returns true for an addition, and the indices of the colliders.
@@ -52,7 +67,6 @@ mod tests {
     use super::*;
     use pbig_harness::boxes::{BoxSet, Movers};
     use pbig_harness::field::Field;
-    use rapier_pbig::PbigBroadPhase;
 
     /// Returns the events of some updates.
     fn told(mut broad_phase: impl BroadPhase) -> Vec<Vec<BroadPhasePairEvent>> {
@@ -70,10 +84,6 @@ mod tests {
 
     #[test]
     fn stock_sorted_tells_what_stock_tells_in_the_order_of_pbig() {
-        let key = |event: &BroadPhasePairEvent| {
-            let (is_added, [a, b]) = plain(event);
-            (is_added, a.min(b), a.max(b))
-        };
         let stock = told(DefaultBroadPhase::new());
         let sorted = told(Reordered(DefaultBroadPhase::new(), sorted));
         let is_sorted =

@@ -1,10 +1,11 @@
 //! How long updates take, and how evenly. Boxes in motion: our updates beside a search from nothing and parry's tree, in turn in
 //! every frame; pairs agree in number in every frame. Scenes through rapier: ours beside stock in the same world.
 
-use crate::trees::{Changed, Kept, Parry, Refit};
-use pbig_core::{Config, Finder, Limits, Order};
-use pbig_harness::bench::Figures;
-use pbig_harness::chart::{Chart, Panel, Plot, Series};
+use crate::UNSORTED;
+use crate::trees::{Kept, Parry, Refit, partition};
+use pbig_core::{Config, Finder, Limits};
+use pbig_harness::bench::figures;
+use pbig_harness::chart::{Chart, Line, Plot};
 use pbig_harness::duel::Duel;
 use pbig_harness::motions::{Density, Motion, Scene};
 use pbig_harness::prelude::*;
@@ -20,10 +21,8 @@ const NAMES: [&str; 4] = ["ours", "ours", "search from nothing", "parry 0.31"];
 const COLUMNS: &str =
     "motion | density | boxes | threads | side | mean_ms | median_ms | p99_ms | worst_ms | first_ms";
 
-/// Measures every motion and every scene; `given`: numbers of boxes, and of bodies, instead of its own.
-///
-/// # Errors
-/// A failed check, if the sides have different numbers of pairs.
+/// Measures every motion and every scene; `given`: numbers of boxes, and of bodies, instead of its own. A failed check, if the
+/// sides have different numbers of pairs.
 pub fn run(quick: bool, given: &[usize]) -> Result<Report, Failure> {
     let sizes = |full: &[usize], few: &[usize]| match given {
         [] => if quick { few } else { full }.to_vec(),
@@ -83,7 +82,7 @@ fn frames(n: usize, quick: bool) -> usize {
 /// so the first one changes from frame to frame, and every second frame runs the other way round.
 fn race(mut scene: Scene, frames: usize, name: &str) -> Result<[Vec<f64>; NAMES.len()], Failure> {
     let (mut ours, mut parry) = (Kept::new(CONFIG)?, None);
-    let mut finder = Finder::new(Config { order: Order::Unspecified, ..CONFIG });
+    let mut finder = Finder::new(UNSORTED);
     let mut times = [(); NAMES.len()].map(|()| vec![]);
     let mut changed: Vec<u32> = (0..scene.boxes().len() as u32).collect();
     for frame in 0..=frames {
@@ -91,19 +90,17 @@ fn race(mut scene: Scene, frames: usize, name: &str) -> Result<[Vec<f64>; NAMES.
             changed = scene.step().to_vec();
             parry.iter_mut().for_each(|parry: &mut Parry| parry.prepare(scene.boxes(), &changed));
         }
-        let (boxes, of_ours) = (scene.boxes(), Changed::new(&changed, scene.boxes()));
+        let (boxes, of_ours) = (scene.boxes(), partition(scene.boxes(), &changed));
         for place in 0..NAMES.len() {
             let place = if frame.is_multiple_of(2) { place } else { NAMES.len() - 1 - place };
             let side = (frame / 2 + place) % NAMES.len();
             times[side].push(match side {
-                0 | 1 => ours.update(side == 1, boxes, &of_ours)?,
+                0 | 1 => ours.update(side, boxes, &of_ours)?,
                 2 => {
                     let (done, ms) = timed(|| finder.find(boxes).map(|_| ()));
                     done.map(|()| ms)?
                 }
-                _ => {
-                    timed(|| parry.get_or_insert_with(|| Parry::new(boxes, Refit::Parallel, false)).frame()).1
-                }
+                _ => timed(|| parry.get_or_insert_with(|| Parry::new(boxes, Refit::Parallel)).frame()).1,
             });
         }
         let pairs = finder.pairs().len();
@@ -118,13 +115,12 @@ fn race(mut scene: Scene, frames: usize, name: &str) -> Result<[Vec<f64>; NAMES.
 /// Draws all frames but the first, which is longer than all others and would flatten their lines.
 fn plot(title: &str, times: &[Vec<f64>]) -> Plot {
     let names = ["pbig", "pbig, one thread", NAMES[2], NAMES[3]];
-    let series = names.into_iter().zip(times).map(|(name, ms)| Series { name, values: ms[1..].to_vec() });
-    Plot::of(&Panel { title, series: series.collect() })
+    let line = |(name, ms): (&str, &Vec<f64>)| Line::steps(name, ms[1..].iter().copied());
+    Plot::steps(title, names.into_iter().zip(times).map(line).collect())
 }
 
 fn row([motion, density, side]: [&str; 3], [boxes, threads]: [usize; 2], ms: &[f64], table: &mut Table) {
-    let Figures { mean, median, p99, worst, first } = Figures::of(ms);
-    table.row(cells![motion, density, boxes, threads, side, mean, median, p99, worst, first]);
+    table.row(cells![motion, density, boxes, threads, side, ..figures(ms)]);
 }
 
 fn through_rapier(sizes: &[usize], quick: bool, table: &mut Table) {
@@ -132,10 +128,10 @@ fn through_rapier(sizes: &[usize], quick: bool, table: &mut Table) {
     let effort = Effort { warm_up: 0, rounds, budget: Duration::from_millis(ms) };
     let cases = sizes.iter().flat_map(|bodies| scenes::Scene::ALL.map(|scene| (*bodies, scene)));
     for (bodies, scene) in tracked(cases, "scenes") {
-        let duel = Duel::run(scene, bodies, effort);
+        let (duel, threads) = (Duel::run(scene, bodies, effort), rayon::current_num_threads());
         for (k, side) in ["ours", "stock"].into_iter().enumerate() {
             let ms: Vec<f64> = duel.times.iter().map(|ms| ms[k]).collect();
-            row([scene.name, "scene", side], [bodies, rayon::current_num_threads()], &ms, table);
+            row([scene.name, "scene", side], [bodies, threads], &ms, table);
         }
     }
 }

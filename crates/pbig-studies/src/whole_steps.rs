@@ -1,6 +1,6 @@
 //! Whole steps of rapier: each scene in two worlds, one with rapier's own broad phase and one with pbig's, step by step in turn.
 
-use pbig_harness::bench::Figures;
+use pbig_harness::bench::figures;
 use pbig_harness::prelude::*;
 use pbig_harness::runner::{Run, StepTime};
 use pbig_harness::scenes::Scene;
@@ -23,12 +23,10 @@ pub fn run(quick: bool) -> Report {
         let mut ours = Run::new(scene, bodies, 1, PbigBroadPhase::new());
         race(&mut stock, &mut ours, steps, Duration::from_secs(budget));
         let (name, threads, steps) = (scene.name, rayon::current_num_threads(), ours.times.len());
-        let pairs = cells![stock.pairs(), ours.pairs()];
-        let times = [
-            times(&stock.times, &ours.times, |time| time.broad_phase),
-            times(&stock.times, &ours.times, |time| time.step),
-        ];
-        table.row([cells![name, bodies, threads, steps], times.concat(), pairs].concat());
+        let broad = times(&stock.times, &ours.times, |time| time.broad_phase);
+        let whole = times(&stock.times, &ours.times, |time| time.step);
+        let pairs = [stock.pairs(), ours.pairs()];
+        table.row(cells![name, bodies, threads, steps, ..broad, ..whole, ..pairs]);
     }
     Report::new("whole-steps", vec![table])
 }
@@ -48,7 +46,8 @@ fn race<A: BroadPhase, B: BroadPhase>(one: &mut Run<A>, other: &mut Run<B>, step
 }
 
 /// Returns means and 99th percentiles.
-fn times(stock: &[StepTime], ours: &[StepTime], of: impl Fn(&StepTime) -> f64) -> Vec<Value> {
-    let [stock, ours] = [stock, ours].map(|times| Figures::of(&times.iter().map(&of).collect::<Vec<_>>()));
-    cells![stock.mean, ours.mean, stock.p99, ours.p99]
+fn times(stock: &[StepTime], ours: &[StepTime], of: impl Fn(&StepTime) -> f64) -> [f64; 4] {
+    let [stock, ours] = [stock, ours].map(|times| figures(&times.iter().map(&of).collect::<Vec<_>>()));
+    let ([stock_mean, _, stock_p99, ..], [mean, _, p99, ..]) = (stock, ours);
+    [stock_mean, mean, stock_p99, p99]
 }

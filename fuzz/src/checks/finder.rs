@@ -69,7 +69,7 @@ fn pbig_options(settings: u8) -> GpuOptions {
 fn check_pbig(boxes: &[Aabb], options: &GpuOptions) {
     let found = pbig_grid(boxes, options).expect("few boxes");
     let wanted = oracle::pairs(boxes);
-    assert_eq!(found.pairs, wanted, "{}", found.plan);
+    assert_eq!(found.pairs, wanted, "{:?}", found.plan);
     let counted = found.checks.unnecessary + found.checks.redundant + wanted.len() as u64;
-    assert_eq!(found.checks.made, counted, "{}", found.plan);
+    assert_eq!(found.checks.made, counted, "{:?}", found.plan);
 }

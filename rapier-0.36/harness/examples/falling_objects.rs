@@ -5,7 +5,7 @@
 
 use clap::Parser;
 use indicatif::ProgressBar;
-use pbig_harness_036::chart::{self, Panel, Series};
+use pbig_harness_036::chart::{Chart, Line, Plot};
 use pbig_harness_036::run::{Run, StepTime, Summary};
 use pbig_harness_036::scenes::Scene;
 use rapier_pbig::PbigFinder;
@@ -113,10 +113,10 @@ fn write_chart(args: &Args, stock: &[StepTime], ours: &[StepTime]) -> Result<(),
     if let Some(folder) = folder {
         std::fs::create_dir_all(folder).map_err(|error| format!("{}: {error}", folder.display()))?;
     }
-    let panel = |title, of: fn(&StepTime) -> f64| {
-        let series = |name, times: &[StepTime]| Series { name, values: times.iter().map(of).collect() };
-        Panel { title, series: vec![series("stock", stock), series("pbig", ours)] }
+    let plot = |title, of: fn(&StepTime) -> f64| {
+        let line = |name, times: &[StepTime]| Line::steps(name, times.iter().map(of));
+        Plot::steps(title, vec![line("stock", stock), line("pbig", ours)])
     };
-    let panels = [panel("broad phase", |time| time.broad_phase), panel("whole step", |time| time.step)];
-    chart::write(&args.chart, &panels)
+    let plots = vec![plot("broad phase", |time| time.broad_phase), plot("whole step", |time| time.step)];
+    Chart { plots, ..Chart::default() }.write(&args.chart)
 }

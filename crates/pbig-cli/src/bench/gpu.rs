@@ -1,9 +1,8 @@
-//! `pbig bench gpu`: the GPU beside the CPU, kernel by kernel, the floor below both, and the host's part of a call.
+//! `pbig bench gpu`: the GPU beside the CPU, kernel by kernel, and the host's part of a call.
 
 use pbig_core::{Aabb, Backend, BroadPhase, Config, Finder, GpuFinder, GpuOptions, Limits, Order};
 use pbig_core::{GpuReport, ProxyFilter, Report as Told};
 use pbig_harness::gpu_race::race;
-use pbig_harness::kernels::Bench;
 use pbig_harness::prelude::*;
 
 const CONFIG: Config = Config { limits: Limits::UNLIMITED, ..Config::DEFAULT };
@@ -11,14 +10,8 @@ const ON_GPU: Config = Config { backend: Backend::Gpu, ..CONFIG };
 
 pub(super) fn run(quick: bool) -> Result<Report, Failure> {
     let gpu = GpuFinder::new().map_err(|error| Failure::Input(error.to_string()))?;
-    let rate = Bench::new().and_then(|bench| bench.copy_rate(256 << 20));
-    let rate = rate.map_err(|error| Failure::Input(error.to_string()))?;
-    let head = vec![
-        ("adapter", gpu.adapter().to_owned()),
-        ("software", gpu.is_software().to_string()),
-        ("copy_bytes_per_s", format!("{rate:.0}")),
-    ];
-    let [searches, kernels] = searches(&gpu, rate, quick)?;
+    let head = vec![("adapter", gpu.adapter().to_owned()), ("software", gpu.is_software().to_string())];
+    let [searches, kernels] = searches(&gpu, quick)?;
     let tables = vec![searches, kernels, host(&gpu, quick)?, events(&gpu, quick)?];
     Ok(Report { head, ..Report::new("gpu", tables) })
 }
@@ -37,20 +30,17 @@ fn boxes(set: &str, n: usize) -> Vec<Aabb> {
     BoxSet::named(set).expect("a set of the harness").boxes(n, 1)
 }
 
-/// Returns the table of searches, and that of their kernels. Medians in ms, of calls between which all boxes move. The floor is the
-/// time to read all boxes and to write all pairs at the device's copy rate. All after `floor` is of the last call.
-fn searches(gpu: &GpuFinder, rate: f64, quick: bool) -> Result<[Table; 2], Failure> {
-    let columns = "set | boxes | pairs | cpu_ms | gpu_ms | cpu_over_gpu | floor_ms | wait_ms | uploaded_bytes | \
-        downloaded_bytes | device_bytes | compression";
+/// Returns the table of searches, and that of their kernels. Medians in ms, of calls between which all boxes move. `wait_ms`
+/// and all after it are of the last call.
+fn searches(gpu: &GpuFinder, quick: bool) -> Result<[Table; 2], Failure> {
+    let columns = "set | boxes | pairs | cpu_ms | gpu_ms | cpu_over_gpu | wait_ms | uploaded_bytes | downloaded_bytes | device_bytes | compression";
     let mut table = Table::new("searches", columns);
     let mut kernels = Table::new("kernels", "set | boxes | kernel | kernel_ms");
     let sets = ["uniform", "gaussian", "mixed"];
     let cases = sizes(gpu, quick).into_iter().flat_map(|n| sets.map(|set| (n, set)));
     for (n, set) in tracked(cases, "sets") {
         let ([cpu, on_gpu], pairs, report) = search(gpu, set, n)?;
-        // Bytes that must move on the device whatever the algorithm.
-        let floor = (24 * n as u64 + 8 * pairs) as f64 / rate * 1e3;
-        let times = cells![set, n, pairs, cpu, on_gpu, cpu / on_gpu, floor, milliseconds(report.wait)];
+        let times = cells![set, n, pairs, cpu, on_gpu, cpu / on_gpu, milliseconds(report.wait)];
         let bytes = cells![report.uploaded, report.downloaded, report.device_bytes, report.compression];
         table.row([times, bytes].concat());
         for (name, time) in &report.kernels {

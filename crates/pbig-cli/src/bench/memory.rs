@@ -12,12 +12,12 @@ const STEP: f32 = 0.1;
 /// The motion of boxes: each so many-th, by so much, by its id and the update.
 type Motion = (usize, fn(usize, usize) -> [f32; 3]);
 
-/// The probes: the argument, the case in the table, and the motion; none: a search from nothing.
-const PROBES: [(&str, &str, Option<Motion>); 4] = [
-    ("incremental", "memory, incremental, all moved", Some((1, to_and_fro))),
-    ("drift", "memory, incremental, all drift", Some((1, drift))),
-    ("few-drift", "memory, incremental, 10% drift", Some((10, drift))),
-    ("scratch", "memory, from scratch", None),
+/// The probes: the case in the table, and the motion; none: a search from nothing.
+const PROBES: [(&str, Option<Motion>); 4] = [
+    ("memory, incremental, all moved", Some((1, to_and_fro))),
+    ("memory, incremental, all drift", Some((1, drift))),
+    ("memory, incremental, 10% drift", Some((10, drift))),
+    ("memory, from scratch", None),
 ];
 
 /// Motions of boxes that stay about where they are, for ever: a world that drifts apart needs another plan now and then.
@@ -43,9 +43,9 @@ fn drift(id: usize, update: usize) -> [f32; 3] {
 
 #[derive(clap::Args)]
 pub(crate) struct Args {
-    /// Which way in.
-    #[arg(value_parser = PROBES.map(|(name, ..)| name))]
-    way: String,
+    /// The probe.
+    #[arg(value_parser = PROBES.map(|(case, _)| case))]
+    case: String,
     /// Number of boxes, of the set `unit`.
     boxes: usize,
 }
@@ -57,9 +57,9 @@ fn unit(n: usize) -> Vec<Aabb> {
 /// Appends the peaks beyond the boxes given; they are empty where the system does not tell them.
 pub(super) fn peaks(quick: bool, table: &mut Table) -> Result<(), Failure> {
     let [few, many] = if quick { [10_000, 100_000] } else { [1_000_000, 10_000_000] };
-    for (way, case, motion) in PROBES {
+    for (case, motion) in PROBES {
         let boxes = if motion.is_some() { few } else { many };
-        let object = in_child(way, boxes)?;
+        let object = in_child(case, boxes)?;
         let (pairs, bytes) = (object["pairs"].as_u64().unwrap_or(0), object["bytes"].as_f64());
         table.row(alone(case, boxes, pairs, "MB", bytes.map(|bytes| bytes / 1e6)));
     }
@@ -67,10 +67,10 @@ pub(super) fn peaks(quick: bool, table: &mut Table) -> Result<(), Failure> {
 }
 
 /// Runs a probe in a fresh process: in one that has measured other things, freed memory would hide what is used.
-fn in_child(way: &str, boxes: usize) -> Result<Value, Failure> {
+fn in_child(case: &str, boxes: usize) -> Result<Value, Failure> {
     let about = |error: &dyn std::fmt::Display| Failure::Input(format!("memory probe: {error}"));
     let program = std::env::current_exe().map_err(|error| about(&error))?;
-    let output = Command::new(program).args(["memory-probe", way, &boxes.to_string()]).output();
+    let output = Command::new(program).args(["memory-probe", case, &boxes.to_string()]).output();
     let output = output.map_err(|error| about(&error))?;
     if !output.status.success() {
         return Err(about(&String::from_utf8_lossy(&output.stderr)));
@@ -84,8 +84,8 @@ pub(crate) fn probe(args: &Args) -> Result<(), Failure> {
     let before = resident("VmRSS:");
     // Linux then counts the peak from now on; where it may not, making the boxes had no higher one.
     let _ = std::fs::write("/proc/self/clear_refs", "5");
-    let pairs = match PROBES.into_iter().find(|(name, ..)| *name == args.way) {
-        Some((.., Some(motion))) => {
+    let pairs = match PROBES.into_iter().find(|(case, _)| *case == args.case) {
+        Some((_, Some(motion))) => {
             let mut moving = Moving::new(&boxes, motion)?;
             // Enough for every buffer to reach its size.
             (1..30).try_for_each(|_| moving.update())?;
@@ -149,9 +149,8 @@ pub(super) fn requests_in_steady_state(quick: bool, table: &mut Table) -> Result
     counting::switch_on();
     let (boxes, all) = (if quick { 5000 } else { 100_000 }, rayon::current_num_threads());
     let threads: &[usize] = if all > 1 { &[1, all] } else { &[1] };
-    for (&threads, (name, motion)) in
-        threads.iter().flat_map(|threads| STEADY.map(|motion| (threads, motion)))
-    {
+    let cases = threads.iter().flat_map(|threads| STEADY.map(|motion| (*threads, motion)));
+    for (threads, (name, motion)) in cases {
         let (count, pairs) = crate::options::with_threads(Some(threads), || Ok(counted(motion, boxes)?))?;
         let case = format!("requests for memory, {name}, {threads} threads, in {COUNTED} updates");
         table.row(alone(&case, boxes, pairs, "requests", Some(count as f64)));

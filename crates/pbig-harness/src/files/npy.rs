@@ -1,6 +1,6 @@
 //! The content of `.npy` files.
 
-use super::{ContentError, FrameBox, Frames, brief, f32_box, f64_box, one_line};
+use super::{ContentError, FrameBox, Frames, brief, f64_box, one_line};
 use ndarray::{Array, ArrayD, ArrayView2, Dimension, Ix2, Ix3};
 use ndarray_npy::npy::header::Header;
 use ndarray_npy::{ReadNpyError, ReadNpyExt};
@@ -10,9 +10,6 @@ use pbig_core::Aabb;
 const MAGIC: &[u8] = b"\x93NUMPY";
 
 /// The content of an `.npy` file of boxes, see [`super::read_boxes`].
-///
-/// # Errors
-/// A message in one line.
 pub fn npy_boxes(bytes: &[u8]) -> Result<Vec<Aabb>, ContentError> {
     let wrong = |shape: &[usize]| match (shape, shape_text(shape)) {
         ([_, _, 6], found) => {
@@ -20,16 +17,10 @@ pub fn npy_boxes(bytes: &[u8]) -> Result<Vec<Aabb>, ContentError> {
         }
         (_, found) => format!("expected an array of shape (N, 6), found {found}"),
     };
-    Ok(match array::<Ix2>(bytes, wrong)? {
-        Floats::F32(array) => rows(&array.view()).map(f32_box).collect(),
-        Floats::F64(array) => rows(&array.view()).map(f64_box).collect(),
-    })
+    Ok(rows(&array::<Ix2>(bytes, wrong)?.view()).map(f64_box).collect())
 }
 
 /// The content of an `.npy` file of frames, see [`super::read_frames`].
-///
-/// # Errors
-/// A message in one line.
 pub fn npy_frames(bytes: &[u8]) -> Result<Frames, ContentError> {
     let wrong = |shape: &[usize]| match (shape, shape_text(shape)) {
         ([_, 6], found) => {
@@ -37,20 +28,13 @@ pub fn npy_frames(bytes: &[u8]) -> Result<Frames, ContentError> {
         }
         (_, found) => format!("expected an array of shape (F, N, 6), found {found}"),
     };
-    Ok(match array::<Ix3>(bytes, wrong)? {
-        Floats::F32(array) => Frames {
-            boxes: array.dim().1,
-            frames: array.outer_iter().map(|frame| rows(&frame).map(FrameBox::from_f32).collect()).collect(),
-        },
-        Floats::F64(array) => Frames {
-            boxes: array.dim().1,
-            frames: array.outer_iter().map(|frame| rows(&frame).map(FrameBox::from_f64).collect()).collect(),
-        },
-    })
+    let array = array::<Ix3>(bytes, wrong)?;
+    let frames = array.outer_iter().map(|frame| rows(&frame).map(FrameBox::of).collect());
+    Ok(Frames { boxes: array.dim().1, frames: frames.collect() })
 }
 
 /// The rows of an (N,6) array, whatever its memory order.
-fn rows<'a, T: Copy>(array: &'a ArrayView2<'_, T>) -> impl Iterator<Item = [T; 6]> + 'a {
+fn rows<'a>(array: &'a ArrayView2<'_, f64>) -> impl Iterator<Item = [f64; 6]> + 'a {
     array.outer_iter().map(|row| std::array::from_fn(|k| row[k]))
 }
 
@@ -59,32 +43,18 @@ fn shape_text(shape: &[usize]) -> String {
     brief(&format!("({})", lengths.join(", ")))
 }
 
-/// An array of either float type.
-enum Floats<D> {
-    F32(Array<f32, D>),
-    F64(Array<f64, D>),
-}
-
-/// The array of six columns, or what is `wrong` with its shape.
+/// Returns the array of six columns, or what is `wrong` with its shape. An f32 is the same number in f64.
 fn array<D: Dimension>(
     bytes: &[u8],
     wrong: impl Fn(&[usize]) -> ContentError,
-) -> Result<Floats<D>, ContentError> {
+) -> Result<Array<f64, D>, ContentError> {
     check_start(bytes)?;
     check_size(bytes).map_err(one_line)?;
-    match ArrayD::<f32>::read_npy(bytes) {
-        Err(ReadNpyError::WrongDescriptor(_)) => {
-            let array = ArrayD::<f64>::read_npy(bytes).map_err(|error| npy_text(&error))?;
-            six_columns(array, wrong).map(Floats::F64)
-        }
-        read => six_columns(read.map_err(|error| npy_text(&error))?, wrong).map(Floats::F32),
-    }
-}
-
-fn six_columns<T, D: Dimension>(
-    array: ArrayD<T>,
-    wrong: impl Fn(&[usize]) -> ContentError,
-) -> Result<Array<T, D>, ContentError> {
+    let read = match ArrayD::<f32>::read_npy(bytes) {
+        Err(ReadNpyError::WrongDescriptor(_)) => ArrayD::<f64>::read_npy(bytes),
+        read => read.map(|array| array.mapv(f64::from)),
+    };
+    let array = read.map_err(|error| npy_text(&error))?;
     let shape = array.shape().to_vec();
     let fits = D::NDIM == Some(shape.len()) && shape.last() == Some(&6);
     array.into_dimensionality().ok().filter(|_| fits).ok_or_else(|| wrong(&shape))

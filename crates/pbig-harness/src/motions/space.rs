@@ -1,54 +1,26 @@
 //! The size of the space in which boxes have a wanted number of pairs.
 
+use super::Density;
+
 /// Random edges are replaced by so many typical ones.
 const SAMPLES: usize = 32;
 
-/// Edges of boxes of mixed sizes.
-const MIXED: [f64; 2] = [0.1, 10.0];
-
-/// Returns the edge at a place from 0 to 1 among the mixed sizes, log-uniform.
-pub(super) fn mixed_edge(place: f64) -> f64 {
-    MIXED[0] * (MIXED[1] / MIXED[0]).powf(place)
-}
-
-/// The law of the boxes: centers uniform in a cube, but for heights of boxes that fall.
-pub(super) struct Space {
-    /// Edges are mixed; otherwise they are 1.
-    pub(super) mixed: bool,
-    /// Heights are those of boxes on their way from the top to the bottom, starts uniform in time.
-    pub(super) falls: bool,
-}
-
-impl Space {
-    /// Returns the edge of the cube in which `n` boxes have `pairs` pairs a box.
-    pub(super) fn side(&self, n: usize, pairs: f64) -> f64 {
-        let (mut low, mut high): (f64, f64) = (0.1, 1e6);
-        for _ in 0..60 {
-            let middle = (low * high).sqrt();
-            if self.pairs(n, middle) > pairs { low = middle } else { high = middle }
-        }
-        high
+/// Returns the edge of the cube in which the centers of `n` boxes are uniform, but for heights of boxes that fall: these are on
+/// their way from the top to the bottom, with starts uniform in time.
+pub(super) fn side(density: Density, falls: bool, n: usize) -> f64 {
+    let edges: Vec<f64> = (0..SAMPLES).map(|i| density.edge((i as f64 + 0.5) / SAMPLES as f64)).collect();
+    let reaches = || edges.iter().flat_map(|a| edges.iter().map(move |b| 0.5 * (a + b)));
+    let chance = |part: f64| near(part).powi(2) * if falls { near_in_a_fall(part) } else { near(part) };
+    let pairs_per_box = |side: f64| {
+        let sum: f64 = reaches().map(|reach| chance((reach / side).min(1.0))).sum();
+        0.5 * n.saturating_sub(1) as f64 * sum / (SAMPLES * SAMPLES) as f64
+    };
+    let (mut low, mut high): (f64, f64) = (0.1, 1e6);
+    for _ in 0..60 {
+        let middle = (low * high).sqrt();
+        if pairs_per_box(middle) > density.pairs_per_box() { low = middle } else { high = middle }
     }
-
-    /// Returns the expected pairs a box.
-    fn pairs(&self, n: usize, side: f64) -> f64 {
-        let edges = self.edges();
-        let all = edges.iter().flat_map(|a| edges.iter().map(move |b| 0.5 * (a + b)));
-        let chance = |reach: f64| {
-            let part = (reach / side).min(1.0);
-            let vertical = if self.falls { near_in_a_fall(part) } else { near(part) };
-            near(part).powi(2) * vertical
-        };
-        let mean = all.map(chance).sum::<f64>() / (edges.len() * edges.len()) as f64;
-        0.5 * n.saturating_sub(1) as f64 * mean
-    }
-
-    fn edges(&self) -> Vec<f64> {
-        if !self.mixed {
-            return vec![1.0];
-        }
-        (0..SAMPLES).map(|i| mixed_edge((i as f64 + 0.5) / SAMPLES as f64)).collect()
-    }
+    high
 }
 
 /// Returns the chance that two numbers, uniform from 0 to 1, differ by at most `part`.

@@ -1,20 +1,16 @@
 //! From the index of a pair to the pair (Avril 3.2 and 3.3): every root and every correction.
 
-pub(crate) mod kernels;
 mod paper;
 mod tally;
 
 use super::{percent, report};
-use crate::index::{AsItIs, row_by_bisection};
+use crate::index::AsItIs;
 use crate::index::{CORRECTIONS, Correction, Rules, discriminant, ends, lazy_ids, lazy_pair, pairs_of};
-use pbig_harness::kernels::Bench;
 use pbig_harness::prelude::*;
-use rand::rngs::StdRng;
-use rand::{RngExt, SeedableRng};
 use rayon::prelude::*;
 use std::hint::black_box;
 use std::time::Duration;
-use tally::{Block, Tally, WAYS, Way, at, at_ends, lazy_pass};
+use tally::{Block, Tally, WAYS, Way, lazy_pass};
 
 /// The name of the way without a row.
 const LAZY: &str = "lazy way";
@@ -22,17 +18,15 @@ const LAZY: &str = "lazy way";
 pub(super) fn run(quick: bool) -> Result<Report, Failure> {
     let every: Vec<Every> = WAYS.iter().map(|way| Every::of(way, quick)).collect();
     check_all(&every)?;
-    let at = if quick { &[1000, 1 << 20][..] } else { &[16, 128, 1000, 5000, 10_000, 100_000, 1 << 20] };
+    let at = if quick { &[1000, 1 << 20][..] } else { &[1000, 5000, 10_000, 100_000, 1 << 20] };
     let mut times = Table::new("times", TIMES);
     at.iter().try_for_each(|&n| add_times(n, quick, &mut times))?;
-    let mut tables = vec![every_table(&every, quick)?, sizes(quick)?, counterexamples(quick), times];
-    tables.extend([paper::table_3(quick), paper::table_4(quick), paper::roundings()]);
-    let (kernels, adapter) = kernels(quick)?;
-    tables.extend(kernels);
+    let every = every_table(&every, quick)?;
     let axes = ["time, ns per pair (one thread, 5,000 boxes)", "wrong pairs, % of all n looked at"];
-    let points = points(&tables[0], &tables[3]);
-    let report = report("index", tables, ("From the index of a pair to the pair", axes), points);
-    Ok(Report { head: vec![("adapter", adapter)], ..report })
+    let points = points(&every, &times);
+    let paper = [paper::table_3(quick), paper::table_4(quick), paper::roundings()];
+    let tables = [every, counterexamples(quick), times].into_iter().chain(paper).collect();
+    Ok(report("index", tables, ("From the index of a pair to the pair", axes), points))
 }
 
 /// The counts of all pairs, for many n.
@@ -42,12 +36,10 @@ struct Every {
     tallies: [Tally; 3],
     /// The smallest n with a wrong pair.
     first: [Option<i64>; 3],
-    /// Values of n with a wrong pair; those of them whose ends of rows are right; by how many rows the worst end is off.
-    ends: [[u64; 3]; 3],
 }
 
-fn boxes(way: &Way, quick: bool) -> Vec<i64> {
-    match (quick, way.is_exact) {
+fn boxes(is_exact: bool, quick: bool) -> Vec<i64> {
+    match (quick, is_exact) {
         (true, false) => (2..=250).chain([1000]).collect(),
         (true, true) => (2..=100).chain([1000]).collect(),
         (false, false) => (2..=5000).collect(),
@@ -57,24 +49,16 @@ fn boxes(way: &Way, quick: bool) -> Vec<i64> {
 
 impl Every {
     fn of(way: &'static Way, quick: bool) -> Self {
-        let boxes = boxes(way, quick);
-        let (tallies, first, ends) = Default::default();
-        let mut every = Self { way, boxes, tallies, first, ends };
-        let all: Vec<_> = every.boxes.par_iter().map(|&n| (n, (way.all)(n), at_ends(way, n))).collect();
-        all.into_iter().for_each(|(n, tallies, ends)| every.add(n, tallies, ends));
-        every
-    }
-
-    fn add(&mut self, n: i64, tallies: [Tally; 3], ends: [Tally; 3]) {
-        for c in 0..3 {
-            let is_wrong = tallies[c].wrong > 0;
-            self.tallies[c] += tallies[c];
-            self.first[c] = self.first[c].or(is_wrong.then_some(n));
-            let [values, inside, worst] = &mut self.ends[c];
-            *values += u64::from(is_wrong);
-            *inside += u64::from(is_wrong && ends[c].wrong == 0);
-            *worst = ends[c].worst_row.max(*worst);
+        let (boxes, error) = (boxes(way.is_exact, quick), (way.worst_relative)());
+        let all: Vec<_> = boxes.par_iter().map(|&n| (n, (way.all)(n, error))).collect();
+        let mut every = Self { way, boxes, tallies: Default::default(), first: [None; 3] };
+        for (n, tallies) in all {
+            for (c, tally) in tallies.into_iter().enumerate() {
+                every.tallies[c] += tally;
+                every.first[c] = every.first[c].or((tally.wrong > 0).then_some(n));
+            }
         }
+        every
     }
 }
 
@@ -87,21 +71,20 @@ fn check_all(every: &[Every]) -> Result<(), Failure> {
 
 fn every_table(all: &[Every], quick: bool) -> Result<Table, Failure> {
     let columns = "root | correction | largest_n | values_of_n | pairs | wrong | wrong_percent | first_wrong_n | worst_row | \
-        missed | doubled | no_pair | values_of_n_with_wrong_pairs | of_these_with_right_ends_of_rows | worst_row_at_ends";
+        missed | doubled | no_pair";
     let mut table = Table::new("all_pairs", columns);
     for (every, c) in all.iter().flat_map(|every| (0..CORRECTIONS.len()).map(move |c| (every, c))) {
-        let (tally, [values, inside, worst]) = (every.tallies[c], every.ends[c]);
+        let Tally { looked, wrong, worst_row, none, missed } = every.tallies[c];
         let head = cells![every.way.name, CORRECTIONS[c], every.boxes.last().copied(), every.boxes.len()];
-        let wrong = cells![tally.looked, tally.wrong, percent(tally.wrong, tally.looked), every.first[c]];
-        let rest = cells![tally.worst_row, tally.missed, tally.missed - tally.none, tally.none];
-        table.row([head, wrong, rest, cells![values, inside, worst]].concat());
+        let counts = cells![looked, wrong, percent(wrong, looked), every.first[c], worst_row];
+        table.row([head, counts, cells![missed, missed - none, none]].concat());
     }
-    let boxes = boxes(&WAYS[WAYS.len() - 1], quick);
+    let boxes = boxes(true, quick);
     let wrong = boxes.par_iter().find_any(|n| !lazy_way_is_right(**n));
     check(wrong.is_none(), || format!("{LAZY}: a pair is wrong of so many boxes: {wrong:?}"))?;
     let pairs: i64 = boxes.iter().map(|n| pairs_of(*n)).sum();
-    let head = cells![LAZY, CORRECTIONS[0], boxes.last().copied(), boxes.len(), pairs, 0, 0.0, None::<u64>];
-    table.row([head, cells![0, 0, 0, 0], vec![Value::Null; 3]].concat());
+    let head = cells![LAZY, CORRECTIONS[0], boxes.last().copied(), boxes.len(), pairs];
+    table.row([head, cells![0, 0.0, None::<u64>, 0, 0, 0, 0]].concat());
     Ok(table)
 }
 
@@ -109,58 +92,6 @@ fn every_table(all: &[Every], quick: bool) -> Result<Table, Failure> {
 fn lazy_way_is_right(n: i64) -> bool {
     let all = (0..n).flat_map(|a| (a + 1..n).map(move |b| (a, b)));
     (0..lazy_ids(n)).filter_map(|id| lazy_pair(id, n)).eq(all)
-}
-
-/// Largest n whose pairs are all looked at: beyond, ends of rows and a sample. `(2n - 1)^2` is below 2^30.
-const MOST_EXHAUSTIVE: i64 = 16_384;
-
-/// From 2 to 2^20 boxes. 46,341 is where 32-bit signed products of n with itself end, 92,683 where unsigned ones of pairs do.
-fn sizes(quick: bool) -> Result<Table, Failure> {
-    let columns = "boxes | root | looked_at | wrong_percent | wrong_ends_of_rows_percent | worst_row | missed | doubled | no_pair | \
-        wrong_by_the_rules_percent | wrong_ends_by_the_rules_percent | worst_row_by_the_rules | missed_by_the_rules";
-    let powers = [1, 4, 7, 10, 12, 13, 14, 15, 16, 17, 18, 19, 20].map(|power| 1i64 << power);
-    let mut sizes: Vec<i64> = powers.into_iter().chain([46_342, 92_683]).collect();
-    sizes.sort_unstable();
-    let sizes = if quick { vec![2, 1000, 1 << 20] } else { sizes };
-    let ways = WAYS.iter().filter(|way| !way.is_exact);
-    let all: Vec<_> = sizes.iter().flat_map(|&n| ways.clone().map(move |way| (n, way))).collect();
-    let mut table = Table::new("sizes", columns);
-    let rows: Vec<_> = all.par_iter().map(|&(n, way)| size(n, way, quick)).collect();
-    rows.into_iter().try_for_each(|row| row.map(|row| table.row(row)))?;
-    Ok(table)
-}
-
-fn size(n: i64, way: &Way, quick: bool) -> Result<Vec<Value>, Failure> {
-    let is_all = n <= MOST_EXHAUSTIVE;
-    let count = if quick { 10_000 } else { 1_000_000 };
-    let tallies = if is_all { (way.all)(n) } else { at(way, n, sample(n, count)) };
-    let at_ends = if is_all { tallies } else { at_ends(way, n) };
-    let is_right = tallies[2].wrong + at_ends[2].wrong == 0;
-    check(is_right, || format!("{}: a pair of {n} boxes is wrong, by integers", way.name))?;
-    let share = |tally: Tally| percent(tally.wrong, tally.looked);
-    let of_all = |count: u64| is_all.then_some(count);
-    let cells = |c: usize| {
-        let (tally, ends) = (tallies[c], at_ends[c]);
-        cells![
-            share(tally),
-            (!is_all).then(|| share(ends)),
-            tally.worst_row.max(ends.worst_row),
-            of_all(tally.missed)
-        ]
-    };
-    let looked = if is_all { "all".to_owned() } else { format!("ends of rows, {count} others") };
-    let Tally { missed, none, .. } = tallies[0];
-    let rest = cells![of_all(missed - none), of_all(none)];
-    Ok([cells![n, way.name, looked], cells(0), rest, cells(1)].concat())
-}
-
-/// Returns indices evenly at random with their rows, the same in every run and for every way.
-fn sample(n: i64, count: usize) -> impl Iterator<Item = (i64, i64)> {
-    let mut rng = StdRng::seed_from_u64(n as u64);
-    (0..count).map(move |_| {
-        let k = rng.random_range(0..pairs_of(n));
-        (k, row_by_bisection(k, n))
-    })
 }
 
 /// The smallest n for which the rules give a wrong pair at an end of a row.
@@ -203,18 +134,13 @@ const BLOCK: i64 = 2048;
 const TIMES: &str =
     "boxes | root | as_it_is_ns_per_pair | by_the_rules_ns_per_pair | by_integers_ns_per_pair";
 
-/// Returns blocks spread over what there is; all of it, as often as makes as many indices, if there are fewer.
-fn blocks(all: i64, times: i64) -> Vec<Block> {
-    let count = BLOCK * times;
-    if all < BLOCKS * count {
-        return vec![(0, all); ((BLOCKS * count + all - 1) / all) as usize];
-    }
+fn blocks(all: i64, count: i64) -> Vec<Block> {
     (0..BLOCKS).map(|k| ((all - count) * k / (BLOCKS - 1), count)).collect()
 }
 
 /// Appends nanoseconds for a pair on one thread, by every way and correction in turn.
 fn add_times(n: i64, quick: bool, table: &mut Table) -> Result<(), Failure> {
-    let (pairs, ids) = (blocks(pairs_of(n), 1), blocks(lazy_ids(n), 2));
+    let (pairs, ids) = (blocks(pairs_of(n), BLOCK), blocks(lazy_ids(n), 2 * BLOCK));
     let count: i64 = pairs.iter().map(|block| block.1).sum();
     let sides = 3 * WAYS.len() + 1;
     let rounds = if quick { 15 } else { 2 * sides };
@@ -235,15 +161,6 @@ fn add_times(n: i64, quick: bool, table: &mut Table) -> Result<(), Failure> {
     }
     table.row(cells![n, LAZY, ns[sides - 1], None::<f64>, None::<f64>]);
     Ok(())
-}
-
-/// Returns the table of kernels, if there is an adapter; and its name, or why there is none.
-fn kernels(quick: bool) -> Result<(Option<Table>, String), Failure> {
-    let adapter = pbig_core::GpuFinder::new().map(|gpu| (gpu.adapter().to_owned(), gpu.is_software()));
-    match (Bench::new(), adapter) {
-        (Ok(bench), Ok((name, software))) => Ok((Some(kernels::table(&bench, software, quick)?), name)),
-        (Err(why), _) | (_, Err(why)) => Ok((None, format!("none: {why}"))),
-    }
 }
 
 /// Lines of the chart: the name, the ways that it joins, and the corrections.
@@ -284,8 +201,9 @@ mod tests {
     #[test]
     fn a_wrong_pair_by_integers_is_a_failed_check() {
         let mut every = Every::of(&WAYS[2], true);
-        assert_eq!(every.first[0], (2..).find(|&n| (WAYS[2].all)(n)[0].wrong > 0));
-        assert!(check_all(&[Every::of(&WAYS[2], true)]).is_ok() && every.ends[0][0] > 0);
+        let is_wrong = |n: &i64| (WAYS[2].all)(*n, f64::INFINITY)[0].wrong > 0;
+        assert_eq!(every.first[0], (2..100).find(is_wrong));
+        assert!(check_all(&[Every::of(&WAYS[2], true)]).is_ok());
         every.first[2] = Some(7);
         assert!(check_all(&[every]).is_err_and(|failure| failure.to_string().contains("Carmack 1\", 7")));
     }
@@ -295,7 +213,8 @@ mod tests {
         for way in WAYS[2..4].iter().chain(&WAYS[6..8]) {
             let (n, row, k) = counterexample(way, 1 << 18).expect("a counterexample");
             assert_ne!(by_rules(way, n, k), AsItIs::pair(row, k, n));
-            assert!(n > 5000 || (2..n).step_by(31).all(|n| (way.all)(n)[1].wrong == 0), "{}", way.name);
+            let (sizes, error) = ((2..n).step_by(31), (way.worst_relative)());
+            assert!(n > 5000 || sizes.map(|n| (way.all)(n, error)).all(|tallies| tallies[1].wrong == 0));
         }
     }
 }

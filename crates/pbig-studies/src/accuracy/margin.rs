@@ -6,7 +6,6 @@ mod cases;
 use super::{mean, percent, report};
 use crate::reported::Reported;
 use pbig_harness::prelude::*;
-use pbig_harness::runner::StepTime;
 use rapier_pbig::PbigConfig;
 
 /// In units of rapier's length unit, as `Config::margin`.
@@ -31,43 +30,44 @@ pub(super) fn run(quick: bool) -> Result<Report, Failure> {
     let mut firsts: Vec<&[Row]> = rows.chunks(MARGINS.len()).collect();
     firsts.sort_by_key(|case| scene(&case[0]));
     firsts.dedup_by_key(|case| scene(&case[0]));
-    let point = |row: &Row| (row.case.clone(), row.broad_phase(), row.work.reported.extra_percent());
+    let point = |row: &Row| (row.case.clone(), row.work.means()[0], row.work.reported.extra_percent());
     Ok(report("margin", tables, ("Margin of stored boxes", axes), firsts.into_iter().flatten().map(point)))
 }
 
 /// The steps of one margin in one pass.
 #[derive(Clone, Default)]
 struct Work {
-    times: Vec<StepTime>,
+    /// Milliseconds of each step: the broad phase, and the whole step.
+    times: Vec<[f64; 2]>,
     /// Boxes that the broad phase was told of, and those of them that had left their fat box.
-    listed: u64,
-    changed: u64,
+    counts: [u64; 2],
     /// Sums over the compared steps, and their number.
     reported: Reported,
     compared: u64,
 }
 
-/// One round of one margin: its time, listed and changed boxes, and the comparison in rounds that have one.
-type Round = (StepTime, [u64; 2], Option<Reported>);
+/// One round of one margin: its times, listed and changed boxes, and the comparison in rounds that have one.
+type Round = ([f64; 2], [u64; 2], Option<Reported>);
 
 impl Work {
-    fn add(&mut self, (time, [listed, changed], reported): Round) {
-        self.times.push(time);
-        self.listed += listed;
-        self.changed += changed;
+    fn add(&mut self, (times, counts, reported): Round) {
+        self.times.push(times);
+        self.counts = [0, 1].map(|k| self.counts[k] + counts[k]);
         self.compared += u64::from(reported.is_some());
         self.reported += reported.unwrap_or_default();
     }
 
-    fn mean(&self, of: Time) -> f64 {
-        mean(&self.times.iter().map(of).collect::<Vec<_>>())
+    fn means(&self) -> [f64; 2] {
+        [0, 1].map(|time| mean(&self.times.iter().map(|times| times[time]).collect::<Vec<_>>()))
     }
 }
 
 /// A world for each margin.
 trait Case {
     /// Prepares a round.
-    fn prepare(&mut self, round: usize, is_compared: bool) -> Result<(), Failure>;
+    fn prepare(&mut self, _round: usize, _is_compared: bool) -> Result<(), Failure> {
+        Ok(())
+    }
 
     /// Makes one margin's step.
     fn step(&mut self, margin: usize, is_compared: bool) -> Result<Round, Failure>;
@@ -79,37 +79,24 @@ struct Row {
     case: String,
     boxes: usize,
     margin: f64,
-    /// The median edge of a box.
-    edge: f64,
     has_step: bool,
-    /// The shorter time of each step.
+    /// The shorter times of each step.
     work: Work,
-    /// Mean milliseconds of each pass: the broad phase, and the whole step.
-    passes: [[f64; PASSES]; 2],
+    /// Mean milliseconds of each pass.
+    passes: [[f64; 2]; PASSES],
 }
 
-/// A time of a step.
-type Time = fn(&StepTime) -> f64;
-
-const TIMES: [Time; 2] = [|time| time.broad_phase, |time| time.step];
-
 impl Row {
-    fn broad_phase(&self) -> f64 {
-        self.work.mean(TIMES[0])
-    }
-
     /// Fails if a pair is missing.
     fn new(case: &str, margin: usize, all: [&Work; PASSES], has_step: bool) -> Result<Self, Failure> {
         let Reported { missed, needed, .. } = all[0].reported;
         let (margin, mut work) = (MARGINS[margin], all[0].clone());
         let what = || format!("{case}, margin {margin}: {missed} of {needed} pairs that overlap are missing");
         check(missed == 0, what)?;
-        for (time, again) in work.times.iter_mut().zip(&all[1].times) {
-            time.broad_phase = time.broad_phase.min(again.broad_phase);
-            time.step = time.step.min(again.step);
+        for (times, again) in work.times.iter_mut().zip(&all[1].times) {
+            *times = [0, 1].map(|k| times[k].min(again[k]));
         }
-        let passes = TIMES.map(|of| all.map(|work| work.mean(of)));
-        Ok(Self { case: case.to_owned(), boxes: 0, margin, edge: 1.0, has_step, work, passes })
+        Ok(Self { case: case.to_owned(), boxes: 0, margin, has_step, work, passes: all.map(Work::means) })
     }
 }
 
@@ -117,7 +104,7 @@ impl Row {
 fn rows<C: Case>(
     case: &str,
     steps: usize,
-    (boxes, edge, has_step): (usize, f32, bool),
+    (boxes, has_step): (usize, bool),
     make: impl Fn() -> Result<C, Failure>,
 ) -> Result<Vec<Row>, Failure> {
     let mut all: [Vec<Work>; PASSES] = std::array::from_fn(|_| vec![Work::default(); MARGINS.len()]);
@@ -134,26 +121,21 @@ fn rows<C: Case>(
             }
         }
     }
-    let row = |k: usize| {
-        let row = Row::new(case, k, [&all[0][k], &all[1][k]], has_step)?;
-        Ok(Row { boxes, edge: edge.into(), ..row })
-    };
+    let row = |k: usize| Ok(Row { boxes, ..Row::new(case, k, [&all[0][k], &all[1][k]], has_step)? });
     (0..MARGINS.len()).map(row).collect()
 }
 
 fn table(rows: &[Row]) -> Table {
-    let columns = "case | boxes | margin | percent_of_the_edge | moved_percent | changed_percent | broad_phase_ms | step_ms | \
-        pairs | extra_percent | missed | compared_steps";
+    let columns = "case | boxes | margin | changed_percent | broad_phase_ms | step_ms | pairs | extra_percent | missed | \
+        compared_steps";
     let mut table = Table::new("margins", columns);
-    for row in rows {
-        let Work { times, listed, changed, reported, compared } = &row.work;
-        let moved = percent(*listed, (row.boxes * times.len()) as u64);
-        let case = cells![row.case.as_str(), row.boxes, row.margin, row.margin / row.edge * 100.0, moved];
-        let step = row.has_step.then(|| row.work.mean(TIMES[1]));
-        let times = cells![percent(*changed, *listed), row.broad_phase(), step];
-        let Reported { needed, missed, .. } = *reported;
-        let pairs = cells![needed / (*compared).max(1), reported.extra_percent(), missed, *compared];
-        table.row([case, times, pairs].concat());
+    for Row { case, boxes, margin, has_step, work, .. } in rows {
+        let ([broad_phase, step], [listed, changed]) = (work.means(), work.counts);
+        let head = cells![case.as_str(), *boxes, *margin, percent(changed, listed), broad_phase];
+        let Reported { needed, missed, .. } = work.reported;
+        let pairs =
+            cells![needed / work.compared.max(1), work.reported.extra_percent(), missed, work.compared];
+        table.row([head, cells![has_step.then_some(step)], pairs].concat());
     }
     table
 }
@@ -169,8 +151,8 @@ fn against_default(rows: &[Row], margin: usize, time: usize) -> [f64; 2] {
     let cases = rows.chunks(MARGINS.len()).filter(|case| time == 0 || case[0].has_step);
     let cases: Vec<[f64; PASSES]> = cases
         .map(|case| {
-            let [one, default] = [margin, default_margin()].map(|k| case[k].passes[time]);
-            std::array::from_fn(|pass| (one[pass] / default[pass]).ln())
+            let [one, default] = [margin, default_margin()].map(|k| case[k].passes);
+            std::array::from_fn(|pass| (one[pass][time] / default[pass][time]).ln())
         })
         .collect();
     let means: Vec<f64> = cases.iter().map(|passes| mean(passes)).collect();
@@ -205,10 +187,7 @@ mod tests {
     /// Returns a row whose margin takes so long; between its two passes all but the default differ by 2%.
     fn row(margin: usize, ms: f64) -> Row {
         let off = if margin == default_margin() { 0.0 } else { 0.01f64 };
-        let work = |off: f64| {
-            let time = StepTime { broad_phase: ms * off.exp(), step: 0.0 };
-            Work { times: vec![time], ..Work::default() }
-        };
+        let work = |off: f64| Work { times: vec![[ms * off.exp(), 0.0]], ..Work::default() };
         Row::new("a case", margin, [&work(-off), &work(off)], false).expect("no pair is missing")
     }
 

@@ -1,17 +1,14 @@
 //! Avril's tables 1, 5, 6 and 7 and figures 3 to 6: the matrix of pairs, forms of output, brute force, a grid, and steps.
 
+use super::OUR_GRID;
 use super::printed::*;
-use super::sides::{Device, Way, effort, on_gpu, race};
-use super::{OUR_GRID, Scale, UNSORTED};
-use crate::accuracy::index::kernels::run as run_kernel;
-use crate::stages::{Alone, NAMES};
-use pbig_core::layout::Params;
+use super::sides::{Setup, Way, effort, on_gpu, race};
+use crate::UNSORTED;
+use crate::stages::{NAMES, alone};
 use pbig_core::{Aabb, Backend, CellRule, Coding, Config, GpuOptions, Pair};
 use pbig_harness::gpu_race;
-use pbig_harness::kernels::Bench;
 use pbig_harness::pair_index::{index_of, pair_count, pair_of};
 use pbig_harness::prelude::*;
-use pbig_shaders::study::INDEX_PAIRS;
 
 /// The distance that cubes with edges of 1 move in a step, along each axis.
 const DISTANCE: f32 = 0.1;
@@ -19,19 +16,17 @@ const DISTANCE: f32 = 0.1;
 /// Boxes up to which a device tests every pair by default.
 const ALL_PAIRS: usize = GpuOptions::DEFAULT.all_pairs_up_to as usize;
 
-pub(super) fn tables(scale: &Scale, device: &Device) -> Result<Vec<Table>, Failure> {
-    let output = [bytes(), forms_on_cpu()?, forms_on_device(device)?];
-    let whole =
-        [brute_force(device)?, with_grid(scale, device)?, steps(scale, device)?, movers(scale, device)?];
-    Ok([matrix(device)?].into_iter().chain(output).chain(whole).collect())
+pub(super) fn tables(setup: &Setup) -> Result<Vec<Table>, Failure> {
+    let forms = [matrix()?, forms_on_cpu()?, forms_on_device(setup)?];
+    Ok([&forms[..], &[brute_force_and_grid(setup)?, steps(setup)?]].concat())
 }
 
 /// Objects with which table 1's elements are numbers; those of the paper's examples.
 const OBJECTS: u64 = AVRIL_EXAMPLES[0].0;
 
-/// Table 1: rows and columns counted from 1, indices from 0, as in the paper. The mapping of all pairs is checked on the CPU, to
-/// and fro, and on a device.
-fn matrix(device: &Device) -> Result<Table, Failure> {
+/// Table 1: rows and columns counted from 1, indices from 0, as in the paper. The mapping of all pairs is checked to and
+/// fro.
+fn matrix() -> Result<Table, Failure> {
     let columns = "row | column | printed | that number | index, ours | pair of the printed index, ours";
     let mut table = Table::new("Avril table 1: the matrix of pairs", columns);
     let of_table = AVRIL_1.iter().map(|(pair, text, of)| (pair(OBJECTS), (*text).to_owned(), of(OBJECTS)));
@@ -43,39 +38,12 @@ fn matrix(device: &Device) -> Result<Table, Failure> {
     }
     let there = |k: u64| index_of(pair_of(k, OBJECTS).0, pair_of(k, OBJECTS).1, OBJECTS) == k;
     let wrong = (0..pair_count(OBJECTS)).find(|&k| !there(k));
-    let on_device = if device.for_boxes(0).is_some() { all_on_device()? } else { vec![] };
-    let wrong = wrong.or((0..).zip(on_device).find(|&(k, pair)| pair != pair_of(k, OBJECTS)).map(|(k, _)| k));
-    check(wrong.is_none(), || format!("{OBJECTS} boxes: an index is wrong: {wrong:?}")).map(|()| table)
-}
-
-/// Returns the pair of every index, by the mapping of the check kernels.
-fn all_on_device() -> Result<Vec<(u64, u64)>, Failure> {
-    let bench = Bench::new().map_err(|error| Failure::Input(error.to_string()))?;
-    let count = pair_count(OBJECTS) as u32;
-    let params = Params { boxes: OBJECTS as u32, cells: count, ..Params::default() };
-    let words = run_kernel(&bench, &INDEX_PAIRS, GpuOptions::DEFAULT.root, params, count)?;
-    Ok(words.chunks_exact(3).map(|words| (words[1].into(), words[2].into())).collect())
+    check(wrong.is_none(), || format!("{OBJECTS} boxes: index {wrong:?} is wrong")).map(|()| table)
 }
 
 /// Returns the bytes that come back with a byte a pair, and with a bit (3.4).
 fn output_bytes(n: u64) -> [u64; 2] {
     [pair_count(n), pair_count(n).div_ceil(8)]
-}
-
-/// Table 5 and figure 3: bytes by calculation, and rates over the printed output time.
-fn bytes() -> Table {
-    let columns = "objects | pairs tested | bytes, a byte a pair | bytes, a bit a pair | kernel printed, ms: byte | \
-        kernel printed, ms: bit | output printed, us: byte | output printed, us: bit | GB/s printed: byte | \
-        GB/s printed: bit | tests/s printed";
-    let mut table = Table::new("Avril table 5 and figure 3: a byte or a bit a pair", columns);
-    for (n, byte, bit) in AVRIL_5 {
-        let [bytes, bits] = output_bytes(n);
-        let rate = |bytes: u64, us: f64| bytes as f64 / us / 1e3;
-        let sizes = cells![n, pair_count(n), bytes, bits, byte[0], bit[0], byte[1], bit[1]];
-        let tests = pair_count(n) as f64 / (bit[0] / 1e3);
-        table.row([sizes, cells![rate(bytes, byte[1]), rate(bits, bit[1]), tests]].concat());
-    }
-    table
 }
 
 /// A way to write down which pairs overlap, and to read it.
@@ -107,8 +75,8 @@ fn write_bits(boxes: &[Aabb]) -> Vec<u8> {
 }
 
 fn write_list(boxes: &[Aabb]) -> Vec<u8> {
-    let ids = |pair: Pair| [pair.a.to_le_bytes(), pair.b.to_le_bytes()];
-    tests(boxes).filter(|(_, hit)| *hit).flat_map(|(pair, _)| ids(pair)).flatten().collect()
+    let pairs: Vec<Pair> = tests(boxes).filter(|(_, hit)| *hit).map(|(pair, _)| pair).collect();
+    bytemuck::cast_slice(&pairs).to_vec()
 }
 
 fn pair_at(k: u64, n: u64) -> Pair {
@@ -127,49 +95,50 @@ fn read_bits(out: &[u8], n: u64) -> Vec<Pair> {
 }
 
 fn read_list(out: &[u8], _: u64) -> Vec<Pair> {
-    let id = |bytes: &[u8]| bytes.iter().rev().fold(0, |id, byte| id << 8 | u32::from(*byte));
-    out.chunks_exact(8).map(|pair| Pair::new(id(&pair[..4]), id(&pair[4..]))).collect()
+    bytemuck::pod_collect_to_vec(out)
 }
 
-/// Table 5 on one thread: every pair is tested and written in memory, whence the pairs are read again; medians of 3 calls.
+/// Table 5 and figure 3 on one thread: every pair is tested and written in memory, whence the pairs are read again. Printed rates
+/// are bytes over the output's time, and tests over the kernel's.
 fn forms_on_cpu() -> Result<Table, Failure> {
-    let columns = "objects | pairs | form | bytes written | ms, tests and output | ms, pairs read from it";
-    let mut table = Table::new("Avril table 5: forms of output, CPU", columns);
-    for (n, ..) in AVRIL_5 {
+    let columns = "objects | pairs | form | bytes written | ms, tests and output | ms, pairs read from it | \
+        kernel printed, ms | output printed, us | GB/s printed | tests/s printed";
+    let mut table = Table::new("Avril table 5 and figure 3: forms of output, CPU", columns);
+    for (n, byte, bit) in AVRIL_5 {
         let boxes = cubes(n as usize, 1.0, 1.0, 1);
-        let mut known: Option<Vec<Pair>> = None;
-        for (name, write, read) in FORMS {
-            let calls = [(); 3].map(|()| {
-                let (out, written) = timed(|| write(&boxes));
-                let (pairs, read) = timed(|| read(&out, n));
-                (out.len(), pairs, written, read)
-            });
-            let [written, read] = [calls.each_ref().map(|call| call.2), calls.each_ref().map(|call| call.3)]
-                .map(|ms| Spread::of(ms).median);
-            let [.., (bytes, pairs, ..)] = calls;
-            let is_known = known.as_ref().is_none_or(|known| *known == pairs);
-            check(is_known, || format!("{n} objects: other pairs from {name}"))?;
-            table.row(cells![n, pairs.len(), name, bytes, written, read]);
-            known = Some(pairs);
+        let known = read_list(&write_list(&boxes), n);
+        for ((name, write, read), printed) in FORMS.into_iter().zip([Some(byte), Some(bit), None]) {
+            let mut found = (write(&boxes), vec![]);
+            let ms = medians(&mut found, 2, effort(boxes.len()), unprepared, |(out, pairs), side| {
+                let write = || *out = write(&boxes);
+                Ok(if side == 0 { timed(write).1 } else { timed(|| *pairs = read(out, n)).1 })
+            })?;
+            let (bytes, pairs) = (found.0.len(), found.1);
+            check(pairs == known, || format!("{n} objects: other pairs from {name}"))?;
+            let tests = pair_count(n) as f64;
+            let rates = |[kernel, us]: [f64; 2]| [kernel, us, bytes as f64 / us / 1e3, tests / kernel * 1e3];
+            let printed = printed.into_iter().flat_map(rates);
+            table.row(cells![n, pairs.len(), name, bytes, ..ms, ..printed]);
         }
     }
     Ok(table)
 }
 
 /// The same on a device, without a grid: bits (`Coding::Packed`) against a list of pairs (`Plain`).
-fn forms_on_device(device: &Device) -> Result<Table, Failure> {
+fn forms_on_device(setup: &Setup) -> Result<Table, Failure> {
     let columns = "objects | pairs | form | bytes written | bytes fetched | ms of the kernel `check_all` | \
         ms, host waits | ms, host decodes";
     let mut table = Table::new("Avril table 5: forms of output, GPU", columns);
     for n in [100, 1000] {
         let ways = [Coding::Packed, Coding::Plain]
             .map(|coding| on_gpu(GpuOptions { coding, ..GpuOptions::DEFAULT }));
-        let calls = device.run(&ways, &cubes(n, 1.0, 1.0, 1), DISTANCE)?;
+        let calls = setup.run(&ways, &cubes(n, 1.0, 1.0, 1), DISTANCE)?;
         for ((form, ..), call) in FORMS[1..].iter().zip(calls) {
             let kernel = call.kernels(|name| name == "check_all");
-            let gpu = call.report.as_ref().and_then(|report| report.gpu.clone()).unwrap_or_default();
+            let gpu = call.report.gpu.clone().unwrap_or_default();
             let [wait, decode] = [gpu.wait, gpu.decode].map(milliseconds);
-            table.row(cells![n, call.pairs, *form, call.written(), gpu.downloaded, kernel, wait, decode]);
+            let bytes = [call.written(), Some(gpu.downloaded)];
+            table.row(cells![n, call.report.pairs, *form, ..bytes, kernel, wait, decode]);
         }
     }
     Ok(table)
@@ -177,87 +146,59 @@ fn forms_on_device(device: &Device) -> Result<Table, Failure> {
 
 const BRUTE: Way = Way::Finder(Config { backend: Backend::Brute, ..UNSORTED });
 
-/// Figure 4: brute force by number of objects, on one thread, and on a device up to 1024 boxes.
-fn brute_force(device: &Device) -> Result<Table, Failure> {
-    let columns = "objects | tests | bytes up | bytes back, a bit a pair | ms, brute force, CPU | tests/s, CPU | ms, GPU";
-    let mut table = Table::new("Avril figure 4: brute force", columns);
-    for n in [100usize, 500, 1000, 2500, 5000] {
-        let boxes = cubes(n, 1.0, 1.0, 1);
-        let ways = [on_gpu(GpuOptions::DEFAULT)];
-        let gpu = device.run(&ways[..usize::from(n <= ALL_PAIRS)], &boxes, DISTANCE)?;
-        let ms = race(&[BRUTE], None, boxes, DISTANCE, effort(n))?[0].ms;
-        let tests = pair_count(n as u64);
-        let sizes = cells![n, tests, 24 * n, output_bytes(n as u64)[1]];
-        table.row([sizes, cells![ms, tests as f64 / ms * 1e3, gpu.first().map(|call| call.ms)]].concat());
-    }
-    Ok(table)
-}
-
-/// Table 7: with and without a grid, whole calls from nothing, all moved.
-fn with_grid(scale: &Scale, device: &Device) -> Result<Table, Failure> {
-    let columns = "objects | pairs | ms printed: without grid | ms printed: with grid | ms, CPU: brute force | \
-        ms, CPU: our grid | ms, CPU: Avril's cells, one thread | ms, GPU: without grid | ms, GPU: with grid";
-    let mut table = Table::new("Avril table 7: with and without a grid", columns);
+/// Figure 4, brute force by number of objects, and table 7, with and without a grid: whole calls from nothing, all moved. On a
+/// device brute force takes up to 1024 boxes.
+fn brute_force_and_grid(setup: &Setup) -> Result<Table, Failure> {
+    let columns = "objects | tests | bytes up | bytes back, a bit a pair | pairs | ms, CPU: brute force | ms, CPU: our grid | \
+        ms, CPU: Avril's cells, one thread | tests/s, CPU: brute force | ms printed: without grid | \
+        ms printed: with grid | ms, GPU: with grid | ms, GPU: without grid";
+    let mut table = Table::new("Avril figure 4 and table 7: brute force, with and without a grid", columns);
     let density = Way::Pbig(GpuOptions { cell_rule: CellRule::Density, ..GpuOptions::DEFAULT });
     let on_device = [0, ALL_PAIRS as u32]
         .map(|all_pairs_up_to| on_gpu(GpuOptions { all_pairs_up_to, ..GpuOptions::DEFAULT }));
-    for (n, without, with) in AVRIL_7 {
-        let boxes = cubes(n, 1.0, 1.0, 1);
-        let gpu = device.run(&on_device[..1 + usize::from(n <= ALL_PAIRS)], &boxes, DISTANCE)?;
-        let ways = [BRUTE, Way::Finder(OUR_GRID), density];
-        let cpu = race(&ways, None, boxes, DISTANCE, Effort::new(scale.quick))?;
-        let gpu_ms = |i: usize| gpu.get(i).map(|call| call.ms);
-        let printed = cells![n, cpu[0].call.pairs, without, with];
-        table.row([printed, cells![cpu[0].ms, cpu[1].ms, cpu[2].ms, gpu_ms(1), gpu_ms(0)]].concat());
+    for n in [100usize, 500, 1000, 2500, 5000, 10_000] {
+        let (boxes, tests) = (cubes(n, 1.0, 1.0, 1), pair_count(n as u64));
+        let gpu = setup.run(&on_device[..1 + usize::from(n <= ALL_PAIRS)], &boxes, DISTANCE)?;
+        let cpu = race(&[BRUTE, Way::Finder(OUR_GRID), density], None, boxes, DISTANCE, effort(n))?;
+        let bytes = [24 * n, output_bytes(n as u64)[1] as usize];
+        let ms = cpu.iter().map(|call| call.median);
+        let tests_a_second = tests as f64 / cpu[0].median * 1e3;
+        let printed = AVRIL_7.iter().find(|row| row.0 == n);
+        let printed = [printed.map(|row| row.1), printed.map(|row| row.2)];
+        let on_device = gpu.iter().map(|call| call.ms);
+        let counts = cells![n, tests, ..bytes, cpu[0].report.pairs];
+        table.row(cells![..counts, ..ms, tests_a_second, ..printed, ..on_device]);
     }
     Ok(table)
 }
 
-/// Table 6 and figure 5: a step in which all move. Ours: cubes with a pair each that move by up to a tenth of their edge:
-/// `BroadPhase::set_many`, then `update`, events included; on the CPU means, on a device medians of a few updates.
-fn steps(scale: &Scale, device: &Device) -> Result<Table, Failure> {
-    let columns = "objects | side | pairs | boxes up to date, ms | grid (ours: plan and map), ms | \
+/// Table 6 and figures 5 and 6: a step in which all or a share move. Ours: cubes with a pair each that move by up to a tenth of
+/// their edge: `BroadPhase::set_many`, then `update`, events included, beside a search from nothing; on the CPU means, on a
+/// device medians of a few updates.
+fn steps(setup: &Setup) -> Result<Table, Failure> {
+    let columns = "objects | share moved | side | pairs | boxes up to date, ms | grid (ours: plan and map), ms | \
         search (ours: check, emit, diff), ms | whole, ms | updates";
-    let mut table = Table::new("Avril table 6 and figure 5: a step, all moving", columns);
-    for (n, printed) in AVRIL_6.into_iter().filter(|(n, _)| !scale.quick || *n <= 100_000) {
-        let printed = printed.map(Value::from).into();
-        table.row([cells![n, "printed", None::<u64>], printed, cells![None::<u64>]].concat());
-        let boxes = || cubes(n, 1.0, 1.0, 1);
-        let ours = Alone::events(boxes(), 1.0, DISTANCE)?.measure(Effort::new(scale.quick))?;
-        let of = |wanted: &[&str]| -> f64 {
-            NAMES.iter().zip(ours.mean).filter(|(name, _)| wanted.contains(name)).map(|(_, ms)| ms).sum()
-        };
-        let (set, grid, search) = (of(&["set"]), of(&["plan", "map"]), of(&["check", "emit", "diff"]));
-        table.row(cells![n, "ours, CPU", ours.pairs, set, grid, search, ours.mean[0], ours.chosen]);
-        if let Some(gpu) = device.for_boxes(n) {
-            let raced = gpu_race::race(gpu, boxes(), 1.0, DISTANCE)?;
-            let times = [vec![Value::Null; 3], cells![raced.ms[1], None::<u64>]].concat();
-            table.row([cells![n, "ours, GPU", raced.pairs], times].concat());
+    let mut table = Table::new("Avril table 6, figures 5 and 6: a step", columns);
+    let (n, most) = if setup.quick { (10_000, 100_000) } else { (100_000, usize::MAX) };
+    let sizes = AVRIL_6.into_iter().filter(|(n, _)| *n <= most).map(|(n, printed)| (n, 1.0, Some(printed)));
+    for (n, share, printed) in sizes.chain([0.75, 0.5, 0.25, 0.1, 0.01].map(|share| (n, share, None))) {
+        if let Some(printed) = printed {
+            table.row(cells![n, share, "printed", (), ..printed]);
         }
-    }
-    Ok(table)
-}
-
-/// Figure 6: a step in which a share moves. A program that plays a device has fewer boxes.
-fn movers(scale: &Scale, device: &Device) -> Result<Table, Failure> {
-    let n = if scale.quick { 10_000 } else { 100_000 };
-    let columns = "share moved | boxes | pairs | ms, events | ms, from nothing | updates | boxes, GPU | \
-        ms, events, GPU | ms, events, CPU with as many";
-    let mut table = Table::new("Avril figure 6: share of moving objects", columns);
-    let fewer = if device.for_boxes(n).is_some() { n } else { n.min(10_000) };
-    for share in [0.01, 0.1, 0.25, 0.5, 0.75, 1.0] {
-        let (boxes, effort) = (|n| cubes(n, 1.0, 1.0, 1), Effort::new(scale.quick));
-        let events = Alone::events(boxes(n), share, DISTANCE)?.measure(effort)?;
-        let scratch = Alone::scratch(boxes(n), share, DISTANCE).measure(effort)?;
-        let ours = cells![share, n, events.pairs, events.mean[0], scratch.mean[0], events.chosen];
-        let beside = match device.for_boxes(fewer) {
-            Some(gpu) => {
-                let [cpu, gpu] = gpu_race::race(gpu, boxes(fewer), share, DISTANCE)?.ms;
-                cells![fewer, gpu, cpu]
-            }
-            None => vec![Value::Null; 3],
-        };
-        table.row([ours, beside].concat());
+        let boxes = || cubes(n, 1.0, 1.0, 1);
+        for (side, events) in [("ours, CPU", true), ("ours, CPU, from nothing", false)] {
+            let ours = alone(events, boxes(), (share, DISTANCE), Effort::new(setup.quick))?;
+            let of = |wanted: &[&str]| -> f64 {
+                let times = NAMES.iter().zip(ours.mean);
+                times.filter(|(name, _)| wanted.contains(name)).map(|(_, ms)| ms).sum()
+            };
+            let parts = [of(&["set"]), of(&["plan", "map"]), of(&["check", "emit", "diff"])];
+            table.row(cells![n, share, side, ours.pairs, ..parts, ours.mean[0], ours.chosen]);
+        }
+        if let Some(gpu) = setup.for_boxes(n) {
+            let raced = gpu_race::race(gpu, boxes(), share, DISTANCE)?;
+            table.row(cells![n, share, "ours, GPU", raced.pairs, ..[(); 3], raced.ms[1]]);
+        }
     }
     Ok(table)
 }

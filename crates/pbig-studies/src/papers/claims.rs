@@ -1,43 +1,49 @@
 //! Places where a paper contradicts itself, is wrong or is silent, as numbers that are computed here; docs/PAPERS.md says what
 //! follows from them.
 
-use super::figures::{GAUSSIAN, GAUSSIAN_READ};
+use super::model::{GAUSSIAN, GAUSSIAN_READ};
 use super::printed::*;
 use pbig_core::pbig::density_cell;
 use pbig_core::{Aabb, Pair, oracle};
 use pbig_harness::pair_index::{index_of, pair_count, pair_of, row_start};
 use pbig_harness::prelude::*;
 
-/// A quantity with its value.
-type Fact = (String, Value);
+/// The table, with the place in a paper to which facts are appended.
+struct Facts(Table, [&'static str; 2]);
 
-fn fact(name: impl Into<String>, value: impl Into<Value>) -> Fact {
-    (name.into(), value.into())
+impl Facts {
+    /// Appends a quantity with its value.
+    fn add(&mut self, quantity: impl Into<Value>, value: impl Into<Value>) {
+        let [paper, place] = self.1;
+        self.0.row([paper.into(), place.into(), quantity.into(), value.into()]);
+    }
 }
 
-/// Returns the facts of a place in a paper.
-type Facts = fn() -> Vec<Fact>;
+/// A paper and a place in it, and the facts there.
+type Place = ([&'static str; 2], fn(&mut Facts));
 
-const PLACES: [(&str, &str, Facts); 11] = [
-    ("PBIG", "equation 7, figure 3", rows_of_figure_3),
-    ("PBIG", "algorithms 1 and 2", segments),
-    ("PBIG", "tables IV and VI", totals),
-    ("PBIG", "sections 6.2 to 6.4, equation 9", sizes),
-    ("Avril", "section 3.3", signs),
-    ("Avril", "section 3.2", indices),
-    ("Avril", "tables 2 and 4", rates),
-    ("Avril", "table 4", reductions),
-    ("Avril", "tables 6 and 7", grids),
-    ("Avril", "section 3.4", lost_bits),
-    ("Avril", "sections 4.1 and 4.2", meetings_of_pairs),
+const PLACES: [Place; 11] = [
+    (["PBIG", "equation 7, figure 3"], rows_of_figure_3),
+    (["PBIG", "algorithms 1 and 2"], segments),
+    (["PBIG", "tables IV and VI"], totals),
+    (["PBIG", "sections 6.2 to 6.4, equation 9"], sizes),
+    (["Avril", "section 3.3"], signs),
+    (["Avril", "section 3.2"], indices),
+    (["Avril", "tables 2 and 4"], rates),
+    (["Avril", "table 4"], reductions),
+    (["Avril", "tables 6 and 7"], grids),
+    (["Avril", "section 3.4"], lost_bits),
+    (["Avril", "sections 4.1 and 4.2"], meetings_of_pairs),
 ];
 
 pub(super) fn table() -> Table {
-    let mut table = Table::new("what the papers print", "paper | place | quantity | value");
-    for (paper, place, facts) in PLACES {
-        facts().into_iter().for_each(|(name, value)| table.row(cells![paper, place, name, value]));
+    let table = Table::new("what the papers print", "paper | place | quantity | value");
+    let mut facts = Facts(table, ["", ""]);
+    for (place, of_place) in PLACES {
+        facts.1 = place;
+        of_place(&mut facts);
     }
-    table
+    facts.0
 }
 
 /// Equation 7: matrix elements of row `i` of `m x n`, `i` counted from 0 by the caller, and by the equation from `first`.
@@ -47,13 +53,11 @@ fn equation_7(i: u64, m: u64, n: u64, first: u64) -> u64 {
     n - m + half
 }
 
-fn rows_of_figure_3() -> Vec<Fact> {
+fn rows_of_figure_3(facts: &mut Facts) {
     let sum = |first| (0..8).map(|i| equation_7(i, 8, 8, first)).sum::<u64>();
-    vec![
-        fact("elements of 8 x 8 on and above the diagonal", 36u64),
-        fact("elements, rows counted from 1", sum(1)),
-        fact("elements, rows counted from 0", sum(0)),
-    ]
+    facts.add("elements of 8 x 8 on and above the diagonal", 36);
+    facts.add("elements, rows counted from 1", sum(1));
+    facts.add("elements, rows counted from 0", sum(0));
 }
 
 /// Returns how many pairs of a cell PBIG's line 3, each segment against each, never compares, and how many comparisons are
@@ -87,33 +91,28 @@ fn algorithm_2(boxes: u64, length: u64) -> [u64; 2] {
     })
 }
 
-fn segments() -> Vec<Fact> {
+fn segments(facts: &mut Facts) {
     let [two, unequal] = [2 * SEGMENT, SEGMENT + 44];
-    let of = |name: &str, boxes: u64, [missed, repeated]: [u64; 2]| {
-        [("missed", missed), ("repeated", repeated)]
-            .map(|(what, count)| fact(format!("{name}, {boxes} boxes: pairs {what}"), count))
-    };
-    let first = of("algorithm 1", two, algorithm_1(two, SEGMENT));
-    let second = of("algorithm 2", two, algorithm_2(two, SEGMENT));
-    let third = of("algorithm 2", unequal, algorithm_2(unequal, SEGMENT));
-    let all = fact(format!("pairs of {unequal} boxes"), pair_count(unequal));
-    first.into_iter().chain(second).chain(third).chain([all]).collect()
+    for (name, boxes, [missed, repeated]) in [
+        ("algorithm 1", two, algorithm_1(two, SEGMENT)),
+        ("algorithm 2", two, algorithm_2(two, SEGMENT)),
+        ("algorithm 2", unequal, algorithm_2(unequal, SEGMENT)),
+    ] {
+        facts.add(format!("{name}, {boxes} boxes: pairs missed"), missed);
+        facts.add(format!("{name}, {boxes} boxes: pairs repeated"), repeated);
+    }
+    facts.add(format!("pairs of {unequal} boxes"), pair_count(unequal));
 }
 
-fn totals() -> Vec<Fact> {
-    let gap = |row: &Breakdown| row.total as f64 - row.tasks.iter().sum::<u64>() as f64;
-    let gaps = TABLE_VI
-        .iter()
-        .enumerate()
-        .map(|(i, row)| fact(format!("row {i}: total less the tasks, us"), gap(row)));
-    let share = 100.0 * gap(&TABLE_VI[0]) / TABLE_VI[0].total as f64;
-    let off = |row: &Breakdown| Some((row.speed_up? - TABLE_VI[0].total as f64 / row.total as f64).abs());
+fn totals(facts: &mut Facts) {
+    let gap = |row: &Timing| row.total as f64 - row.tasks.iter().sum::<u64>() as f64;
+    for (i, row) in TABLE_VI.iter().enumerate() {
+        facts.add(format!("row {i}: total less the tasks, us"), gap(row));
+    }
+    facts.add("baseline in no task, %", 100.0 * gap(&TABLE_VI[0]) / TABLE_VI[0].total as f64);
+    let off = |row: &Timing| Some((row.speed_up? - TABLE_VI[0].total as f64 / row.total as f64).abs());
     let off = TABLE_VI.iter().filter_map(off).fold(0.0, f64::max);
-    let rest = [
-        fact("baseline in no task, %", share),
-        fact("largest difference of speed-ups of tables IV and VI", off),
-    ];
-    gaps.chain(rest).collect()
+    facts.add("largest difference of speed-ups of tables IV and VI", off);
 }
 
 /// Returns the bytes a pair of PBIG's equation 9, `k` pairs of a box with a segment.
@@ -122,30 +121,28 @@ fn equation_9(k: f64) -> f64 {
     (32.0 + 2.0 * 16.0 + 2.0 * local + k * local) / (8.0 * k)
 }
 
-fn sizes() -> Vec<Fact> {
+fn sizes(facts: &mut Facts) {
     let (mebi, gibi) = (1_048_576.0, 1_073_741_824.0);
     let bytes = GAUSSIAN_GB[0] * 1e9;
     let off = |pairs: f64| 100.0 * (8.0 * pairs / bytes - 1.0);
     let densest = |unit: f64| DENSEST_PLAIN_MB * unit / TABLE_III[4].pairs as f64;
     let a_pair = |row: &Coverage| row.output * mebi / row.pairs as f64;
-    vec![
-        fact("pairs of the printed bytes if GB is 10^9", bytes / 8.0),
-        fact("pairs of the printed bytes if GB is 2^30", GAUSSIAN_GB[0] * gibi / 8.0),
-        fact("pairs expected, section 6.3 as printed", GAUSSIAN.pairs(MOST_BOXES).round()),
-        fact("these off the bytes, %", off(GAUSSIAN.pairs(MOST_BOXES))),
-        fact("pairs expected, by the reading of table III", GAUSSIAN_READ.pairs(MOST_BOXES).round()),
-        fact("the pairs of that reading off the bytes, %", off(GAUSSIAN_READ.pairs(MOST_BOXES))),
-        fact("bytes a pair without compression", bytes / GAUSSIAN_PAIRS as f64),
-        fact("bytes a pair with compression", GAUSSIAN_GB[1] * 1e9 / GAUSSIAN_PAIRS as f64),
-        fact("input, bytes a box if MB is 10^6", INPUT_MB * 1e6 / MOST_BOXES as f64),
-        fact("uncompressed at DoC 10, bytes a pair if MB is 2^20", densest(mebi)),
-        fact("uncompressed at DoC 10, bytes a pair if MB is 10^6", densest(1e6)),
-        fact("bytes of a pair alone by equation 9", equation_9(1.0)),
-        fact("bytes a pair of very many by equation 10", equation_9(1e12)),
-        fact("bytes a pair printed at DoC 0.001", a_pair(&TABLE_III[0])),
-        fact("bytes a pair printed at DoC 10", a_pair(&TABLE_III[4])),
-        fact("bits for the number of partners", SEGMENT.ilog2()),
-    ]
+    facts.add("pairs of the printed bytes if GB is 10^9", bytes / 8.0);
+    facts.add("pairs of the printed bytes if GB is 2^30", GAUSSIAN_GB[0] * gibi / 8.0);
+    facts.add("pairs expected, section 6.3 as printed", GAUSSIAN.pairs(MOST_BOXES).round());
+    facts.add("these off the bytes, %", off(GAUSSIAN.pairs(MOST_BOXES)));
+    facts.add("pairs expected, by the reading of table III", GAUSSIAN_READ.pairs(MOST_BOXES).round());
+    facts.add("the pairs of that reading off the bytes, %", off(GAUSSIAN_READ.pairs(MOST_BOXES)));
+    facts.add("bytes a pair without compression", bytes / GAUSSIAN_PAIRS as f64);
+    facts.add("bytes a pair with compression", GAUSSIAN_GB[1] * 1e9 / GAUSSIAN_PAIRS as f64);
+    facts.add("input, bytes a box if MB is 10^6", INPUT_MB * 1e6 / MOST_BOXES as f64);
+    facts.add("uncompressed at DoC 10, bytes a pair if MB is 2^20", densest(mebi));
+    facts.add("uncompressed at DoC 10, bytes a pair if MB is 10^6", densest(1e6));
+    facts.add("bytes of a pair alone by equation 9", equation_9(1.0));
+    facts.add("bytes a pair of very many by equation 10", equation_9(1e12));
+    facts.add("bytes a pair printed at DoC 0.001", a_pair(&TABLE_III[0]));
+    facts.add("bytes a pair printed at DoC 10", a_pair(&TABLE_III[4]));
+    facts.add("bits for the number of partners", SEGMENT.ilog2());
 }
 
 /// Avril's equation 1, row counted from 1, with one of the two signs of `8k`.
@@ -154,70 +151,58 @@ fn equation_1(k: u64, n: u64, sign: f64) -> f64 {
     ((2.0 * n + 1.0 - (4.0 * n * n - 4.0 * n + sign * 8.0 * k + 1.0).sqrt()) / 2.0).floor()
 }
 
-fn signs() -> Vec<Fact> {
+fn signs(facts: &mut Facts) {
     let (n, k, (row, _)) = AVRIL_EXAMPLES[0];
     let right = |sign: f64| {
         (0..pair_count(n)).filter(|&k| equation_1(k, n, sign) == (pair_of(k, n).0 + 1) as f64).count()
     };
-    vec![
-        fact("indices of 1000 objects", pair_count(n)),
-        fact("indices with the right row, + 8k", right(1.0)),
-        fact("indices with the right row, - 8k", right(-1.0)),
-        fact("row of k = 71452 in the paper's example", row),
-        fact("row of k = 71452, + 8k", equation_1(k, n, 1.0)),
-        fact("row of k = 71452, - 8k", equation_1(k, n, -1.0)),
-    ]
+    facts.add("indices of 1000 objects", pair_count(n));
+    facts.add("indices with the right row, + 8k", right(1.0));
+    facts.add("indices with the right row, - 8k", right(-1.0));
+    facts.add("row of k = 71452 in the paper's example", row);
+    facts.add("row of k = 71452, + 8k", equation_1(k, n, 1.0));
+    facts.add("row of k = 71452, - 8k", equation_1(k, n, -1.0));
 }
 
-fn indices() -> Vec<Fact> {
+fn indices(facts: &mut Facts) {
     let n = 1000;
     let fits = |k: u64, a: u64| row_start(a, n) <= k && (a + 1 == n || k <= row_start(a + 1, n));
     // A row and the next both take the first index of the next.
     let twice = (1..n - 1).filter(|&a| fits(row_start(a, n), a) && fits(row_start(a, n), a - 1)).count();
-    vec![
-        fact("indices of 1000 objects with two rows by S_a <= k <= S_a+1", twice),
-        fact("index of the last pair of 1000 objects", index_of(n - 2, n - 1, n)),
-        fact("(n^2 - n) / 2", pair_count(n)),
-    ]
+    facts.add("indices of 1000 objects with two rows by S_a <= k <= S_a+1", twice);
+    facts.add("index of the last pair of 1000 objects", index_of(n - 2, n - 1, n));
+    facts.add("(n^2 - n) / 2", pair_count(n));
 }
 
-fn rates() -> Vec<Fact> {
+fn rates(facts: &mut Facts) {
+    for (n, ms, _) in AVRIL_2 {
+        facts.add(format!("table 2, {n} objects: pairs a second"), pair_count(n) as f64 / ms * 1e3);
+    }
     let roots = AVRIL_4[3].roots as f64 / AVRIL_4[3].cuda * 1e3;
-    let of_2 = |&(n, ms, _): &(u64, f64, f64)| {
-        fact(format!("table 2, {n} objects: pairs a second"), pair_count(n) as f64 / ms * 1e3)
-    };
+    facts.add("table 4: roots a second", roots);
     let alone = pair_count(AVRIL_2[2].0) as f64 / roots * 1e3;
-    let rest = [
-        fact("table 4: roots a second", roots),
-        fact("ms of the roots alone for the pairs of 100,000 objects", alone),
-    ];
-    AVRIL_2.iter().map(of_2).chain(rest).collect()
+    facts.add("ms of the roots alone for the pairs of 100,000 objects", alone);
 }
 
-fn reductions() -> Vec<Fact> {
-    let mean = |of: &dyn Fn(&Roots) -> f64| AVRIL_4.iter().map(of).sum::<f64>() / AVRIL_4.len() as f64;
-    let of = |row: &Roots| {
+fn reductions(facts: &mut Facts) {
+    for row in &AVRIL_4 {
         let name = |what: &str| format!("{} roots: {what}", row.roots);
-        [
-            fact(name("gamma printed, %"), row.gamma),
-            fact(name("gamma by the times, %"), row.reduction(0.0)),
-            fact(name("gamma by the times rounded most favourably, %"), row.reduction(1.0)),
-        ]
-    };
-    let means = [
-        fact("mean printed, %", AVRIL_4_MEAN),
-        fact("mean of the printed gammas, %", mean(&|row| row.gamma)),
-        fact("mean by the times, %", mean(&|row| row.reduction(0.0))),
-    ];
-    AVRIL_4.iter().flat_map(of).chain(means).collect()
+        facts.add(name("gamma printed, %"), row.gamma);
+        facts.add(name("gamma by the times, %"), row.reduction(0.0));
+        facts.add(name("gamma by the times rounded most favourably, %"), row.reduction(1.0));
+    }
+    let mean = |of: fn(&Roots) -> f64| AVRIL_4.iter().map(of).sum::<f64>() / AVRIL_4.len() as f64;
+    facts.add("mean printed, %", AVRIL_4_MEAN);
+    facts.add("mean of the printed gammas, %", mean(|row| row.gamma));
+    facts.add("mean by the times, %", mean(|row| row.reduction(0.0)));
 }
 
-fn grids() -> Vec<Fact> {
-    let both =
-        AVRIL_6.iter().filter_map(|(n, ms)| Some((*n, ms[3], AVRIL_7.iter().find(|row| row.0 == *n)?.2)));
-    let apart = both
-        .map(|(n, six, seven)| fact(format!("{n} objects: table 7 over the total of table 6"), seven / six));
-    apart.collect()
+fn grids(facts: &mut Facts) {
+    for (n, _, seven) in AVRIL_7 {
+        for (_, ms) in AVRIL_6.iter().filter(|six| six.0 == n) {
+            facts.add(format!("{n} objects: table 7 over the total of table 6"), seven / ms[3]);
+        }
+    }
 }
 
 /// Returns the hits that are lost when the eight threads of a byte read it before any of them writes: all but one of each byte.
@@ -229,16 +214,13 @@ fn lost(pairs: &[Pair], n: u64) -> usize {
     pairs.len() - bytes.len()
 }
 
-fn lost_bits() -> Vec<Fact> {
-    let of = |a_box: f32| {
+fn lost_bits(facts: &mut Facts) {
+    for a_box in [1.0f32, 10.0] {
         let pairs = oracle::pairs(&cubes(1000, 1.0, a_box, 1));
         let name = |what: &str| format!("1000 cubes, {a_box} pairs a box: {what}");
-        [
-            fact(name("pairs"), pairs.len()),
-            fact(name("lost if all eight threads of a byte read first"), lost(&pairs, 1000)),
-        ]
-    };
-    [1.0, 10.0].into_iter().flat_map(of).collect()
+        facts.add(name("pairs"), pairs.len());
+        facts.add(name("lost if all eight threads of a byte read first"), lost(&pairs, 1000));
+    }
 }
 
 /// Returns the number of cells in which pairs of boxes meet, in all.
@@ -251,18 +233,15 @@ fn meetings(boxes: &[Aabb], pairs: &[Pair], cell: f32) -> u64 {
     pairs.iter().map(|pair| cells(pair) as u64).sum()
 }
 
-fn meetings_of_pairs() -> Vec<Fact> {
+fn meetings_of_pairs(facts: &mut Facts) {
     let boxes = cubes(5000, 1.0, 1.0, 1);
     let side = boxes.iter().flat_map(|b| b.max).fold(0.0, f32::max);
     let pairs = oracle::pairs(&boxes);
-    let times = |wanted: f32| {
+    for wanted in [8.0f32, 64.0] {
         let met = meetings(&boxes, &pairs, density_cell(5000, [side; 3], wanted));
-        fact(
-            format!("times that a pair is found with {wanted} objects a cell"),
-            met as f64 / pairs.len() as f64,
-        )
-    };
-    vec![times(8.0), times(64.0)]
+        let name = format!("times that a pair is found with {wanted} objects a cell");
+        facts.add(name, met as f64 / pairs.len() as f64);
+    }
 }
 
 #[cfg(test)]

@@ -1,10 +1,20 @@
 //! Random boxes as PBIG's section 6 makes them: how many pairs they have by calculation, and the boxes
 //! themselves.
 
+use super::printed::{LENGTHS, NORMAL, SPACE};
 use pbig_core::Aabb;
 use rand::rngs::StdRng;
 use rand::{RngExt, SeedableRng};
-use rand_distr::{Distribution, Normal};
+use rand_distr::StandardNormal;
+
+/// Section 6.1 as it is printed.
+pub(super) const UNIFORM: Model = Model::boxes(LENGTHS[0], LENGTHS[1]);
+
+/// Section 6.3 as it is printed.
+pub(super) const GAUSSIAN: Model = Model { space: Space::Normal(NORMAL), ..UNIFORM };
+
+/// Section 6.3 by the reading that gives table III: lower corners, lengths from 0.
+pub(super) const GAUSSIAN_READ: Model = Model { has_corners: true, lengths: [0.0, LENGTHS[1]], ..GAUSSIAN };
 
 /// The distribution of points along each axis.
 #[derive(Clone, Copy, Debug)]
@@ -15,56 +25,41 @@ pub(super) enum Space {
     Normal([f64; 2]),
 }
 
-/// Which point of a box is drawn from the space.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) enum Place {
-    Centre,
-    LowerCorner,
-}
-
-/// Lengths of boxes: uniform between two.
+/// A law by which boxes are drawn.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Edges {
-    pub(super) low: f64,
-    pub(super) high: f64,
+pub(super) struct Model {
+    pub(super) space: Space,
+    /// True if lower corners are drawn from the space, false if centres are.
+    pub(super) has_corners: bool,
+    /// Lengths are uniform between two.
+    pub(super) lengths: [f64; 2],
     /// One length for all axes of a box, or one for each.
     pub(super) cubes: bool,
 }
 
-impl Edges {
-    pub(super) const fn equal(edge: f64) -> Self {
-        Self { low: edge, high: edge, cubes: true }
-    }
-
+impl Model {
+    /// Boxes whose centres are uniform in the paper's space.
     pub(super) const fn boxes(low: f64, high: f64) -> Self {
-        Self { low, high, cubes: false }
+        Self { space: Space::Even(SPACE), has_corners: false, lengths: [low, high], cubes: false }
     }
 
+    /// As above, with one length for all axes of a box.
     pub(super) const fn cubes(low: f64, high: f64) -> Self {
-        Self { low, high, cubes: true }
+        Self { cubes: true, ..Self::boxes(low, high) }
     }
 
-    pub(super) fn mean(&self) -> f64 {
-        0.5 * (self.low + self.high)
+    pub(super) fn mean_length(&self) -> f64 {
+        0.5 * (self.lengths[0] + self.lengths[1])
     }
 
     /// The mean of a function of the length: the midpoint rule, exact to 10^-5 for the cubics here.
     fn average(&self, of: impl Fn(f64) -> f64) -> f64 {
         const STEPS: usize = 128;
-        let step = (self.high - self.low) / STEPS as f64;
-        (0..STEPS).map(|i| of(self.low + step * (i as f64 + 0.5))).sum::<f64>() / STEPS as f64
+        let [low, high] = self.lengths;
+        let step = (high - low) / STEPS as f64;
+        (0..STEPS).map(|i| of(low + step * (i as f64 + 0.5))).sum::<f64>() / STEPS as f64
     }
-}
 
-/// A law by which boxes are drawn.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Model {
-    pub(super) space: Space,
-    pub(super) place: Place,
-    pub(super) edges: Edges,
-}
-
-impl Model {
     /// Expected pairs of `n` boxes.
     pub(super) fn pairs(&self, n: usize) -> f64 {
         let n = n as f64;
@@ -87,9 +82,9 @@ impl Model {
     /// The chance that two boxes overlap, and the relative variance over one box's sizes and places of its
     /// chance to overlap another.
     fn chance(&self) -> (f64, f64) {
-        let alike = if self.edges.cubes { 3 } else { 1 };
-        let of_one = |e: f64| self.edges.average(|f| self.on_axis(e, f).powi(alike));
-        let (first, second) = (self.edges.average(of_one), self.edges.average(|e| of_one(e).powi(2)));
+        let alike = if self.cubes { 3 } else { 1 };
+        let of_one = |e: f64| self.average(|f| self.on_axis(e, f).powi(alike));
+        let (first, second) = (self.average(of_one), self.average(|e| of_one(e).powi(2)));
         let axes = 3 / alike;
         (first.powi(axes), (second / first.powi(2)).powi(axes) * self.crowding().powi(3) - 1.0)
     }
@@ -100,7 +95,7 @@ impl Model {
     fn crowding(&self) -> f64 {
         match self.space {
             Space::Even(length) => {
-                let t = (self.edges.mean() / length).min(0.5);
+                let t = (self.mean_length() / length).min(0.5);
                 (1.0 - 5.0 * t / 6.0) / (1.0 - 0.5 * t).powi(2)
             }
             Space::Normal(_) => 2.0 / 3f64.sqrt(),
@@ -109,9 +104,9 @@ impl Model {
 
     /// The chance that two boxes of given lengths overlap along an axis.
     fn on_axis(&self, e: f64, f: f64) -> f64 {
-        match self.place {
-            Place::Centre => 2.0 * self.within(0.5 * (e + f)),
-            Place::LowerCorner => self.within(e) + self.within(f),
+        match self.has_corners {
+            false => 2.0 * self.within(0.5 * (e + f)),
+            true => self.within(e) + self.within(f),
         }
     }
 
@@ -122,46 +117,32 @@ impl Model {
                 let share = (distance / length).min(1.0);
                 share - 0.5 * share * share
             }
-            Space::Normal([_, deviation]) => 0.5 * erf(distance / (2.0 * deviation)),
+            Space::Normal([_, deviation]) => 0.5 * libm::erf(distance / (2.0 * deviation)),
         }
     }
 
-    /// `n` boxes, the same ones for the same seed.
-    pub(super) fn boxes(&self, n: usize, seed: u64) -> Vec<Aabb> {
+    /// Draws `n` boxes, the same ones for the same seed.
+    pub(super) fn draw(&self, n: usize, seed: u64) -> Vec<Aabb> {
         let mut rng = StdRng::seed_from_u64(seed);
         (0..n).map(|_| self.one(&mut rng)).collect()
     }
 
     fn one(&self, rng: &mut StdRng) -> Aabb {
-        let Edges { low, high, cubes } = self.edges;
+        let [low, high] = self.lengths;
         let mut edge = || low + (high - low) * rng.random_range(0.0..1.0);
         let first = edge();
-        let edges = if cubes { [first; 3] } else { [first, edge(), edge()] };
-        let min = edges.map(|edge| {
-            let point = self.point(rng);
-            if self.place == Place::Centre { point - 0.5 * edge } else { point }
-        });
+        let edges = if self.cubes { [first; 3] } else { [first, edge(), edge()] };
+        let shift = if self.has_corners { 0.0 } else { 0.5 };
+        let min = edges.map(|edge| self.point(rng) - shift * edge);
         Aabb::new(min.map(|x| x as f32), std::array::from_fn(|k| (min[k] + edges[k]) as f32))
     }
 
     fn point(&self, rng: &mut StdRng) -> f64 {
         match self.space {
             Space::Even(length) => rng.random_range(0.0..length),
-            Space::Normal([mean, deviation]) => {
-                Normal::new(mean, deviation).map_or(mean, |normal| normal.sample(rng))
-            }
+            Space::Normal([mean, deviation]) => mean + deviation * rng.sample::<f64, _>(StandardNormal),
         }
     }
-}
-
-/// The error function by its Maclaurin series, for arguments up to 1.
-fn erf(x: f64) -> f64 {
-    let (mut term, mut sum) = (x, x);
-    for k in 1..20 {
-        term *= -x * x / f64::from(k);
-        sum += term / f64::from(2 * k + 1);
-    }
-    sum * std::f64::consts::FRAC_2_SQRT_PI
 }
 
 #[cfg(test)]
@@ -169,25 +150,18 @@ mod tests {
     use super::*;
     use pbig_core::oracle;
 
-    const N: usize = 2000;
-
-    /// The calculation against brute force, over several seeds: within 4 standard deviations of the mean.
-    fn agrees(model: &Model) {
-        let seeds = 6;
-        let mean = (0..seeds).map(|seed| oracle::pairs(&model.boxes(N, seed)).len() as f64).sum::<f64>()
-            / seeds as f64;
-        let off = (mean - model.pairs(N)) / (model.deviation(N) / (seeds as f64).sqrt());
-        assert!(off.abs() < 4.0, "{model:?}: {mean} pairs, {} expected, {off} off", model.pairs(N));
-    }
-
+    /// Over several seeds the counts are within 4 standard deviations of the mean.
     #[test]
     fn the_expected_pairs_are_those_of_brute_force() {
-        for place in [Place::Centre, Place::LowerCorner] {
-            for edges in [Edges::equal(900.0), Edges::boxes(0.0, 1500.0), Edges::cubes(100.0, 1500.0)] {
-                for space in [Space::Even(1e4), Space::Normal([5000.0, 2000.0])] {
-                    agrees(&Model { space, place, edges });
-                }
-            }
+        let (n, seeds) = (2000, 6);
+        let laws = [Model::cubes(900.0, 900.0), Model::boxes(0.0, 1500.0), Model::cubes(100.0, 1500.0)];
+        let spaces = [Space::Even(1e4), Space::Normal([5000.0, 2000.0])];
+        let laws = laws.into_iter().flat_map(|law| spaces.map(|space| Model { space, ..law }));
+        for law in laws.flat_map(|law| [false, true].map(|has_corners| Model { has_corners, ..law })) {
+            let count: usize = (0..seeds).map(|seed| oracle::pairs(&law.draw(n, seed)).len()).sum();
+            let mean = count as f64 / seeds as f64;
+            let off = (mean - law.pairs(n)) / (law.deviation(n) / (seeds as f64).sqrt());
+            assert!(off.abs() < 4.0, "{law:?}: {mean} pairs, {} expected, {off} off", law.pairs(n));
         }
     }
 }

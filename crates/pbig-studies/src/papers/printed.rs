@@ -49,7 +49,7 @@ pub(super) const TABLE_III: [Coverage; 5] = [
 pub(super) const INPUT_MB: f64 = 280.0;
 
 /// A row of PBIG's tables IV and VI, in microseconds (section 6.4 calls 1,941,184 of them 1.941 seconds).
-pub(super) struct Breakdown {
+pub(super) struct Timing {
     /// C: data compression, P: pipelined execution, B: load balancing.
     pub(super) setting: &'static str,
     pub(super) speed_up: Option<f64>,
@@ -58,25 +58,20 @@ pub(super) struct Breakdown {
     pub(super) tasks: &'static [u64],
 }
 
-const fn breakdown(
-    setting: &'static str,
-    speed_up: Option<f64>,
-    total: u64,
-    tasks: &'static [u64],
-) -> Breakdown {
-    Breakdown { setting, speed_up, total, tasks }
+const fn timing(setting: &'static str, speed_up: Option<f64>, total: u64, tasks: &'static [u64]) -> Timing {
+    Timing { setting, speed_up, total, tasks }
 }
 
 /// PBIG, tables IV and VI.
-pub(super) const TABLE_VI: [Breakdown; 8] = [
-    breakdown("baseline", None, 10_264_940, &[50_423, 30, 137_909, 2_644, 4_970_496, 1_740_208, 3_312_812]),
-    breakdown("+C", Some(1.86), 5_512_054, &[52_686, 35, 137_713, 2_709, 3_806_897, 473_857, 995_124]),
-    breakdown("+P", Some(1.98), 5_181_014, &[48_470, 28, 137_649, 2_753, 4_983_314]),
-    breakdown("+C+P", Some(2.63), 3_891_116, &[49_243, 30, 137_845, 2_684, 3_697_194]),
-    breakdown("+B", Some(1.01), 10_167_360, &[49_926, 31, 137_854, 2_701, 5_039_146, 1_696_377, 3_191_348]),
-    breakdown("+C+B", Some(2.88), 3_562_590, &[54_857, 39, 137_996, 3_193, 2_097_496, 483_593, 740_671]),
-    breakdown("+P+B", Some(1.92), 5_337_236, &[48_115, 41, 137_856, 2_837, 5_139_588]),
-    breakdown("+C+P+B", Some(4.81), 2_132_998, &[47_760, 35, 137_840, 2_537, 1_941_184]),
+pub(super) const TABLE_VI: [Timing; 8] = [
+    timing("baseline", None, 10_264_940, &[50_423, 30, 137_909, 2_644, 4_970_496, 1_740_208, 3_312_812]),
+    timing("+C", Some(1.86), 5_512_054, &[52_686, 35, 137_713, 2_709, 3_806_897, 473_857, 995_124]),
+    timing("+P", Some(1.98), 5_181_014, &[48_470, 28, 137_649, 2_753, 4_983_314]),
+    timing("+C+P", Some(2.63), 3_891_116, &[49_243, 30, 137_845, 2_684, 3_697_194]),
+    timing("+B", Some(1.01), 10_167_360, &[49_926, 31, 137_854, 2_701, 5_039_146, 1_696_377, 3_191_348]),
+    timing("+C+B", Some(2.88), 3_562_590, &[54_857, 39, 137_996, 3_193, 2_097_496, 483_593, 740_671]),
+    timing("+P+B", Some(1.92), 5_337_236, &[48_115, 41, 137_856, 2_837, 5_139_588]),
+    timing("+C+P+B", Some(4.81), 2_132_998, &[47_760, 35, 137_840, 2_537, 1_941_184]),
 ];
 
 /// PBIG, table V: the tasks. Ours: `GpuReport::upload`; `StageTimes::plan` on the host; the kernels `locate` to `scan_add` and

@@ -1,16 +1,16 @@
 //! Avril's table 2 and the times of table 4: from the index of a pair to the pair, with a root and by the lazy way (3.2.2).
 
-use super::Scale;
 use super::printed::AVRIL_2;
-use super::sides::{Call, Device, on_gpu};
+use super::sides::{Setup, on_gpu};
 use crate::index::{AsItIs, Correction, Double, Root, Rules, Single, discriminant, lazy_ids, lazy_pair};
-use pbig_core::{Aabb, GpuOptions};
+use pbig_core::{Aabb, GpuOptions, Report};
 use pbig_harness::pair_index::{pair_count, pair_of};
 use pbig_harness::prelude::*;
 use std::ops::Range;
+use std::time::Duration;
 
-pub(super) fn tables(scale: &Scale, device: &Device) -> Result<Vec<Table>, Failure> {
-    Ok([vec![on_cpu(scale)?], on_device(device)?].concat())
+pub(super) fn tables(setup: &Setup) -> Result<Vec<Table>, Failure> {
+    Ok(vec![on_cpu(setup)?, on_device(setup)?])
 }
 
 /// Ids looked at in one measurement; where there are more, stretches of them, spread evenly.
@@ -53,81 +53,74 @@ fn hits(boxes: &[Aabb], pairs: &[(i64, i64)]) -> u64 {
     pairs.iter().filter(hit).count() as u64
 }
 
+type Search = fn(&[Aabb], &[Range<u64>]) -> u64;
+
+/// Ways with a root that give every pair of table 2's objects, and the lazy way, which looks at all of n^2 - n identifiers.
+/// `pair_of` is pbig's own function, for up to 2^32 boxes: it multiplies in 128 bits.
+const WAYS: [(&str, Search); 4] = [
+    ("f32 root, the paper's rules", |boxes, ids| overlaps(boxes, ids, by_root::<Single, Rules>)),
+    ("f64 root, as it is", |boxes, ids| overlaps(boxes, ids, by_root::<Double, AsItIs>)),
+    ("`pair_of`", |boxes, ids| {
+        overlaps(boxes, ids, |k, n| {
+            let (a, b) = pair_of(k as u64, n as u64);
+            Some((a as i64, b as i64))
+        })
+    }),
+    ("lazy", |boxes, ids| overlaps(boxes, ids, lazy_pair)),
+];
+
 /// Makes a pair by a root, as the study of accuracy does.
 #[inline(always)]
 fn by_root<R: Root, C: Correction>(k: i64, n: i64) -> Option<(i64, i64)> {
     Some(C::pair(R::row(2 * n - 1, discriminant(k, n)), k, n))
 }
 
-/// Makes a pair by pbig's own function, for up to 2^32 boxes: it multiplies in 128 bits.
-#[inline(always)]
-fn by_pair_of(k: i64, n: i64) -> Option<(i64, i64)> {
-    let (a, b) = pair_of(k as u64, n as u64);
-    Some((a as i64, b as i64))
-}
+/// The place of the lazy way.
+const LAZY: usize = 3;
 
-type Search = fn(&[Aabb], &[Range<u64>]) -> u64;
+/// Calls of each way. Two ways that take as long have all calls of one before all of the other in 3% of cases.
+const EFFORT: Effort = Effort { warm_up: 0, rounds: 4, budget: Duration::MAX };
 
-/// Ways with a root that give every pair of table 2's objects, and the lazy way, which looks at all of n^2 - n identifiers.
-const WAYS: [(&str, Search); 4] = [
-    ("f32 root, the paper's rules", |boxes, ids| overlaps(boxes, ids, by_root::<Single, Rules>)),
-    ("f64 root, as it is", |boxes, ids| overlaps(boxes, ids, by_root::<Double, AsItIs>)),
-    ("`pair_of`", |boxes, ids| overlaps(boxes, ids, by_pair_of)),
-    ("lazy", |boxes, ids| overlaps(boxes, ids, lazy_pair)),
-];
-
-/// Calls of each way, in turn. Two ways that take as long have all calls of one before all of the other in 3% of cases.
-const CALLS: usize = 4;
-
-/// The measurement of a way.
-#[derive(Clone, Copy)]
-struct Took {
-    pairs: u64,
-    /// Milliseconds for all ids of the shortest and of the longest call.
-    ms: [f64; 2],
-    /// All ids over those looked at.
-    times: f64,
-}
+/// The pairs of each way, its milliseconds for all ids, and for roots and for the lazy way all ids over those looked at.
+type Found = ([u64; WAYS.len()], Vec<f64>, [f64; 2]);
 
 /// Measures all ways. A failed check, if ways that looked at the same pairs have not found the same.
-fn all_ways(n: u64, most: u64) -> Result<[Took; 4], Failure> {
+fn all_ways(n: u64, most: u64) -> Result<Found, Failure> {
     let boxes = cubes(n as usize, 1.0, 1.0, 1);
-    let mut all = [Took { pairs: 0, ms: [f64::MAX, 0.0], times: 1.0 }; 4];
-    for way in (0..CALLS * WAYS.len()).map(|i| i % WAYS.len()) {
-        let ids = if way == 3 { lazy_ids(n as i64) as u64 } else { pair_count(n) };
-        let (ids, times) = stretches(ids, most);
-        let (pairs, ms) = timed(|| WAYS[way].1(&boxes, &ids));
-        let [least, longest] = all[way].ms;
-        all[way] = Took { pairs, ms: [least.min(ms * times), longest.max(ms * times)], times };
-    }
+    let ids = [pair_count(n), lazy_ids(n as i64) as u64].map(|ids| stretches(ids, most));
+    let mut pairs = [0; WAYS.len()];
+    let ms = medians(&mut pairs, WAYS.len(), EFFORT, unprepared, |pairs, way| {
+        let (ids, times) = &ids[usize::from(way == LAZY)];
+        let (found, ms) = timed(|| WAYS[way].1(&boxes, ids));
+        pairs[way] = found;
+        Ok(ms * times)
+    })?;
+    let times = ids.map(|(_, times)| times);
     // The lazy way has ids of its own, so it can be held against roots only where it looks at all.
-    let is_other = |way: &usize| all[*way].pairs != all[0].pairs && (*way < 3 || all[3].times == 1.0);
-    let other = (1..4).find(is_other).map(|way| (WAYS[way].0, all[way].pairs));
-    check(other.is_none(), || format!("{n} objects, not {} pairs: {other:?}", all[0].pairs)).map(|()| all)
+    let comparable = if times[1] == 1.0 { &pairs[..] } else { &pairs[..LAZY] };
+    let is_equal = comparable.iter().all(|found| *found == pairs[0]);
+    check(is_equal, || format!("{n} objects: ways found {pairs:?} pairs")).map(|()| (pairs, ms, times))
 }
 
-/// Table 2 on one thread: cubes with a pair each. Times are those of the shortest call.
-fn on_cpu(scale: &Scale) -> Result<Table, Failure> {
+/// Table 2 on one thread: cubes with a pair each.
+fn on_cpu(setup: &Setup) -> Result<Table, Failure> {
     let names = |before: &str, ways: &[(&str, Search)]| -> String {
         ways.iter().map(|(name, _)| format!("{before}{name} | ")).collect()
     };
     let columns = format!(
-        "objects | ms printed, root | ms printed, lazy | lazy / root printed | {}{}{}\
+        "objects | ms printed, root | ms printed, lazy | lazy / root printed | {}{}\
          pairs | ids looked at, roots, % | ids looked at, lazy, %",
         names("ms, ", &WAYS),
-        names("longest call, ms, ", &WAYS),
-        names("lazy / ", &WAYS[..3])
+        names("lazy / ", &WAYS[..LAZY])
     );
     let mut table = Table::new("Avril table 2: the lazy way, CPU", &columns);
-    let most = if scale.quick { MOST_IDS / 10 } else { MOST_IDS };
+    let most = if setup.quick { MOST_IDS / 10 } else { MOST_IDS };
     for (n, root, lazy) in AVRIL_2 {
-        let all = all_ways(n, most)?;
-        let times = |k: usize| all.iter().map(move |took| took.ms[k]);
-        let ratios = all[..3].iter().map(|took| all[3].ms[0] / took.ms[0]);
-        let measured = times(0).chain(times(1)).chain(ratios).map(Value::from).collect();
-        let pairs = (all[3].times == 1.0).then_some(all[3].pairs);
-        let looked_at = cells![pairs, 100.0 / all[0].times, 100.0 / all[3].times];
-        table.row([cells![n, root, lazy, lazy / root], measured, looked_at].concat());
+        let (pairs, ms, times) = all_ways(n, most)?;
+        let ratios = ms[..LAZY].iter().map(|root| ms[LAZY] / root);
+        let pairs = (times[1] == 1.0).then_some(pairs[LAZY]);
+        let looked_at = times.map(|times| 100.0 / times);
+        table.row(cells![n, root, lazy, lazy / root, ..ms.clone(), ..ratios, pairs, ..looked_at]);
     }
     Ok(table)
 }
@@ -144,31 +137,27 @@ const ROOTS: [(u32, &str); 8] = [
     (9, "no root: bisection"),
 ];
 
-/// Every root on a device; integers correct each, so all are exact. First every pair of 1000 objects is tested; then, as table 2's
+/// Every root on a device; integers correct each, so all are exact. Every pair of 1000 objects is tested; of more, as table 2's
 /// times seem to be, the pairs in the cells of a grid.
-fn on_device(device: &Device) -> Result<Vec<Table>, Failure> {
-    let columns = "root | ms of the kernel `check_all` | times as long as the first | pairs";
-    let mut roots = Table::new("Avril tables 2 and 4: roots, GPU", columns);
-    let calls = by_roots(device, 1000, GpuOptions::DEFAULT)?;
-    let ms = |i: usize| calls[i].kernels(|name| name == "check_all");
-    for (i, call) in calls.iter().enumerate() {
-        let ratio = ms(0).zip(ms(i)).map(|(first, ms)| ms / first);
-        roots.row(cells![ROOTS[i].1, ms(i), ratio, call.pairs]);
-    }
-    let columns = "objects | root | ms of the kernel `check_small` | checks | pairs";
-    let mut in_cells = Table::new("Avril table 2: roots in the cells of a grid, GPU", columns);
-    let options = GpuOptions { all_pairs_up_to: 0, small_cell: 256, ..GpuOptions::DEFAULT };
-    for n in [10_000, 100_000] {
-        for ((_, name), call) in ROOTS.iter().zip(by_roots(device, n, options)?) {
-            let ms = call.kernels(|name| name == "check_small");
-            in_cells.row(cells![n, *name, ms, call.checks.made, call.pairs]);
+fn on_device(setup: &Setup) -> Result<Table, Failure> {
+    let columns = "objects | root | kernel | ms of the kernel | times as long as the first | checks | pairs";
+    let mut table = Table::new("Avril tables 2 and 4: roots, GPU", columns);
+    let in_cells = GpuOptions { all_pairs_up_to: 0, small_cell: 256, ..GpuOptions::DEFAULT };
+    for (n, kernel, options) in [
+        (1000, "check_all", GpuOptions::DEFAULT),
+        (10_000, "check_small", in_cells),
+        (100_000, "check_small", in_cells),
+    ] {
+        let ways = ROOTS.map(|(root, _)| on_gpu(GpuOptions { root, ..options }));
+        let calls = setup.run(&ways, &cubes(n, 1.0, 1.0, 1), 0.1)?;
+        let ms: Vec<_> = calls.iter().map(|call| call.kernels(|name| name == kernel)).collect();
+        for (((_, root), call), &own) in ROOTS.iter().zip(&calls).zip(&ms) {
+            let ratio = ms[0].zip(own).map(|(first, own)| own / first);
+            let Report { checks, pairs, .. } = &call.report;
+            table.row(cells![n, *root, kernel, own, ratio, checks.made, *pairs]);
         }
     }
-    Ok(vec![roots, in_cells])
-}
-
-fn by_roots(device: &Device, n: usize, options: GpuOptions) -> Result<Vec<Call>, Failure> {
-    device.run(&ROOTS.map(|(root, _)| on_gpu(GpuOptions { root, ..options })), &cubes(n, 1.0, 1.0, 1), 0.1)
+    Ok(table)
 }
 
 #[cfg(test)]
@@ -179,10 +168,10 @@ mod tests {
     #[test]
     fn all_ways_find_the_pairs_of_brute_force() {
         let pairs = oracle::pairs(&cubes(300, 1.0, 1.0, 1)).len() as u64;
-        let all = all_ways(300, MOST_IDS).expect("all agree");
-        assert!(all.iter().all(|took| took.pairs == pairs && took.times == 1.0 && took.ms[0] <= took.ms[1]));
+        let (found, _, times) = all_ways(300, MOST_IDS).expect("all agree");
+        assert_eq!((found, times), ([pairs; 4], [1.0; 2]));
         // In stretches, which end within a block.
-        assert!(all_ways(300, 30_000).is_ok_and(|all| all[0].pairs > 0 && all[0].times > 1.0));
+        assert!(all_ways(300, 30_000).is_ok_and(|(pairs, _, times)| pairs[0] > 0 && times[0] > 1.0));
         let (some, times) = stretches(1_000_000, 10_000);
         assert_eq!((some[0].clone(), some[999].clone(), times), (0..10, 999_990..1_000_000, 100.0));
     }

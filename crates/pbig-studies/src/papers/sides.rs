@@ -1,7 +1,8 @@
 //! Ways to search the same boxes from nothing, in turn, on the CPU and on a device.
 
-use super::UNSORTED;
-use pbig_core::{Aabb, Backend, Checks, Config, Finder, GpuFinder, GpuOptions, Report};
+use super::printed::MOST_BOXES;
+use crate::UNSORTED;
+use pbig_core::{Aabb, Backend, Config, Finder, GpuFinder, GpuOptions, Report};
 use pbig_harness::pbig_grid::pbig_grid;
 use pbig_harness::prelude::*;
 use std::time::Duration;
@@ -21,54 +22,50 @@ pub(super) fn on_gpu(gpu: GpuOptions) -> Way {
 }
 
 /// One call and its results.
-#[derive(Clone)]
+#[derive(Clone, Default)]
 pub(super) struct Call {
     pub(super) ms: f64,
-    pub(super) pairs: u64,
-    pub(super) checks: Checks,
+    /// The median of a race, whatever the place in a round.
+    pub(super) median: f64,
     /// The length of PBIG's cells, where it has them.
     pub(super) cell: Option<f32>,
-    /// Pbig's report; PBIG's grid on the CPU has none.
-    pub(super) report: Option<Report>,
+    /// Pbig's report; of PBIG's grid on the CPU, pairs and checks alone.
+    pub(super) report: Report,
 }
 
-/// A way with the buffers that it keeps.
-enum Side {
-    Finder(Box<Finder>),
-    Pbig(GpuOptions),
+/// A way with the buffers that it keeps, and its calls.
+struct Side {
+    way: Way,
+    finder: Finder,
+    calls: Vec<Call>,
 }
 
 impl Side {
     fn new(way: Way, gpu: Option<&GpuFinder>) -> Self {
-        match (way, gpu) {
-            (Way::Pbig(options), _) => Self::Pbig(options),
+        let finder = match (way, gpu) {
             (Way::Finder(config), Some(gpu)) if config.backend == Backend::Gpu => {
-                Self::Finder(Box::new(Finder::with_gpu(config, gpu.clone())))
+                Finder::with_gpu(config, gpu.clone())
             }
-            (Way::Finder(config), _) => Self::Finder(Box::new(Finder::new(config))),
-        }
+            (Way::Finder(config), _) => Finder::new(config),
+            (Way::Pbig(_), _) => Finder::default(),
+        };
+        Self { way, finder, calls: vec![] }
     }
 
     /// Makes a call. One that a device left to the CPU is no measurement of the device, and fails.
     fn call(&mut self, boxes: &[Aabb]) -> Result<Call, Failure> {
-        match self {
-            Self::Finder(finder) => {
-                let (found, ms) = timed(|| finder.find(boxes).map(|_| ()));
-                found?;
-                let report = finder.report().clone();
-                if let Some(why) = report.fallback {
-                    return Err(Failure::Check(why));
-                }
-                let cell = report.plan.gpu.as_ref().map(|plan| plan.cell);
-                Ok(Call { ms, pairs: report.pairs, checks: report.checks, cell, report: Some(report) })
-            }
-            Self::Pbig(options) => {
-                let (found, ms) = timed(|| pbig_grid(boxes, options));
-                let found = found?;
-                let (pairs, cell) = (found.pairs.len() as u64, Some(found.plan.cell));
-                Ok(Call { ms, pairs, checks: found.checks, cell, report: None })
-            }
+        if let Way::Pbig(options) = self.way {
+            let (found, ms) = timed(|| pbig_grid(boxes, &options));
+            let (found, mut report) = (found?, Report::default());
+            (report.pairs, report.checks) = (found.pairs.len() as u64, found.checks);
+            return Ok(Call { ms, cell: Some(found.plan.cell), report, ..Call::default() });
         }
+        let (found, ms) = timed(|| self.finder.find(boxes).map(|_| ()));
+        found?;
+        let report = self.finder.report().clone();
+        check(report.fallback.is_none(), || report.fallback.clone().unwrap_or_default())?;
+        let cell = report.plan.gpu.as_ref().map(|plan| plan.cell);
+        Ok(Call { ms, cell, report, ..Call::default() })
     }
 }
 
@@ -77,73 +74,75 @@ pub(super) fn once(way: Way, boxes: &[Aabb]) -> Result<Call, Failure> {
     Side::new(way, None).call(boxes)
 }
 
-/// Times of a way.
-pub(super) struct Raced {
-    /// The median, whatever the place in a round.
-    pub(super) ms: f64,
-    /// The call on the boxes of the set whose time is the median: its time and its report are of the same call.
-    pub(super) call: Call,
-}
-
 /// Rounds for so many boxes: enough for a median where a call is short, few where it takes seconds.
 pub(super) fn effort(boxes: usize) -> Effort {
     let (warm_up, rounds) = if boxes > 200_000 { (1, 3) } else { (3, 15) };
     Effort { warm_up, rounds, budget: Duration::from_secs(5) }
 }
 
-/// Measures ways in turn. In every second round boxes are elsewhere, as those of a world are: a device must get them anew. A
-/// failed check, if ways find different numbers of pairs.
+/// Measures ways in turn; returns of each the call on the boxes of the set whose time is the median, so that its time and its
+/// report are of the same call. In every second round boxes are elsewhere, as those of a world are: a device must get them anew.
+/// A failed check, if ways find different numbers of pairs.
 pub(super) fn race(
     ways: &[Way],
     gpu: Option<&GpuFinder>,
     boxes: Vec<Aabb>,
     distance: f32,
     effort: Effort,
-) -> Result<Vec<Raced>, Failure> {
+) -> Result<Vec<Call>, Failure> {
     let frames = [moved(&boxes, distance, 2), boxes];
-    let mut sides: Vec<(Side, Vec<Call>)> = ways.iter().map(|way| (Side::new(*way, gpu), vec![])).collect();
+    let mut sides: Vec<Side> = ways.iter().map(|way| Side::new(*way, gpu)).collect();
     let took = measured(&mut sides, ways.len(), effort, unprepared, |sides, side| {
-        let (side, calls) = &mut sides[side];
-        let call = side.call(&frames[calls.len() % 2])?;
-        let ms = call.ms;
-        calls.push(call);
-        Ok(ms)
+        let side = &mut sides[side];
+        let call = side.call(&frames[side.calls.len() % 2])?;
+        side.calls.push(call.clone());
+        Ok(call.ms)
     })?;
-    let counts = |calls: &[Call]| calls.iter().map(|call| call.pairs).collect::<Vec<_>>();
-    let other = sides.iter().map(|(_, calls)| counts(calls)).find(|found| *found != counts(&sides[0].1));
+    let counts = |side: &Side| side.calls.iter().map(|call| call.report.pairs).collect::<Vec<_>>();
+    let other = sides.iter().map(counts).find(|found| *found != counts(&sides[0]));
     check(other.is_none(), || format!("ways that differ in settings found other pairs: {other:?}"))?;
-    let raced = |((_, calls), ms): ((Side, Vec<Call>), f64)| {
-        let at_home =
-            calls.into_iter().enumerate().filter(|(round, _)| *round >= effort.warm_up && round % 2 == 1);
-        Raced { ms, call: middle(at_home.map(|(_, call)| call).collect()) }
+    let middle = |(side, took): (Side, Took)| {
+        let mut calls: Vec<Call> = side.calls.into_iter().skip(effort.warm_up | 1).step_by(2).collect();
+        calls.sort_by(|a, b| a.ms.total_cmp(&b.ms));
+        Call { median: took.median, ..calls.swap_remove((calls.len() - 1) / 2) }
     };
-    Ok(sides.into_iter().zip(took.into_iter().map(|took| took.median)).map(raced).collect())
+    Ok(sides.into_iter().zip(took).map(middle).collect())
 }
 
-/// Returns the call whose time is the median; of an even number of calls the shorter of the two in the middle.
-fn middle(mut calls: Vec<Call>) -> Call {
-    calls.sort_by(|a, b| a.ms.total_cmp(&b.ms));
-    calls.swap_remove((calls.len() - 1) / 2)
-}
-
-/// The adapter on which the papers' GPU experiments are repeated, if there is one.
-pub(super) struct Device {
+/// The size of the experiments, and the adapter on which those on a GPU are repeated, if there is one.
+pub(super) struct Setup {
+    pub(super) quick: bool,
+    /// Boxes of figures 8, 9 and 11 of PBIG; the last is as many as the papers have at most.
+    pub(super) numbers: &'static [usize],
     gpu: Option<GpuFinder>,
-    /// Its name, or why there is none.
-    pub(super) name: String,
-    quick: bool,
+    /// The adapter's name, or why there is none.
+    pub(super) adapter: String,
 }
 
-impl Device {
+impl Setup {
     /// Opens the best adapter, or that of `WGPU_ADAPTER_NAME`.
-    pub(super) fn best(quick: bool) -> Self {
+    pub(super) fn new(quick: bool) -> Self {
+        const NUMBERS: [usize; 5] = [1000, 10_000, 100_000, 1_000_000, MOST_BOXES];
         let gpu = GpuFinder::new();
-        let name = gpu.as_ref().map_or_else(|error| format!("none: {error}"), |gpu| gpu.adapter().to_owned());
-        Self { gpu: gpu.ok(), name, quick }
+        let adapter = gpu.as_ref().map_or_else(|error| format!("none: {error}"), |gpu| gpu.adapter().into());
+        Self { quick, numbers: if quick { &NUMBERS[..3] } else { &NUMBERS }, gpu: gpu.ok(), adapter }
+    }
+
+    pub(super) fn most_boxes(&self) -> usize {
+        self.numbers[self.numbers.len() - 1]
     }
 
     pub(super) fn is_software(&self) -> bool {
         self.gpu.as_ref().is_some_and(GpuFinder::is_software)
+    }
+
+    /// Returns the boxes for a device: as many as a program that plays one searches in seconds.
+    pub(super) fn on_device(&self) -> usize {
+        match (self.is_software(), self.quick) {
+            (_, true) => 2000,
+            (true, false) => 50_000,
+            (false, false) => 1_000_000,
+        }
     }
 
     /// Returns the device for a set of so many boxes: a program that plays one takes minutes for millions.
@@ -159,34 +158,39 @@ impl Device {
         // The first calls compile, allocate and learn. Times in software mean nothing, so few will do.
         let (warm_up, rounds) = if self.is_software() { (1, 5) } else { (3, 13) };
         let effort = Effort { warm_up, rounds, budget: Duration::from_secs(10) };
-        let raced = race(ways, Some(gpu), boxes.to_vec(), distance, effort)?;
-        let on_cpu = once(Way::Finder(UNSORTED), boxes)?.pairs;
-        let calls: Vec<Call> = raced.into_iter().map(|raced| raced.call).collect();
-        let what = || format!("{on_cpu} pairs on the CPU, others on the device: {}", calls[0].pairs);
-        check(calls.iter().all(|call| call.pairs == on_cpu), what)?;
+        let calls = race(ways, Some(gpu), boxes.to_vec(), distance, effort)?;
+        let on_cpu = once(Way::Finder(UNSORTED), boxes)?.report.pairs;
+        let what = || format!("{on_cpu} pairs on the CPU, others on the device: {}", calls[0].report.pairs);
+        check(calls.iter().all(|call| call.report.pairs == on_cpu), what)?;
         Ok(calls)
     }
 }
 
 impl Call {
+    /// Returns the checks made, and of them the unnecessary and the redundant ones.
+    pub(super) fn checks(&self) -> [u64; 3] {
+        let checks = &self.report.checks;
+        [checks.made, checks.unnecessary, checks.redundant]
+    }
+
     /// Returns the bytes that the kernels have written of output, for the host to decode; none where nothing was found. Those
     /// that come back are more: with each chunk of work its counters and times, and words that are fetched before it is known how
     /// many there are; with records also the table for decoding.
     pub(super) fn written(&self) -> Option<u64> {
-        let gpu = self.report.as_ref()?.gpu.as_ref()?;
+        let gpu = self.report.gpu.as_ref()?;
         // The ratio to two ids a pair, of all that the kernels wrote.
-        (self.pairs > 0).then(|| (gpu.compression * 8.0 * self.pairs as f64).round() as u64)
+        (self.report.pairs > 0).then(|| (gpu.compression * 8.0 * self.report.pairs as f64).round() as u64)
     }
 
     /// Returns the bytes that came back.
     pub(super) fn fetched(&self) -> Option<u64> {
-        Some(self.report.as_ref()?.gpu.as_ref()?.downloaded)
+        Some(self.report.gpu.as_ref()?.downloaded)
     }
 
     /// Returns the milliseconds of the kernels whose name a rule takes.
     pub(super) fn kernels(&self, takes: impl Fn(&str) -> bool) -> Option<f64> {
-        let kernels = &self.report.as_ref()?.gpu.as_ref()?.kernels;
-        let wanted = kernels.iter().filter(|(name, _)| takes(name)).map(|(_, of)| of.as_secs_f64() * 1e3);
+        let kernels = &self.report.gpu.as_ref()?.kernels;
+        let wanted = kernels.iter().filter(|(name, _)| takes(name)).map(|(_, time)| milliseconds(*time));
         (!kernels.is_empty()).then(|| wanted.sum())
     }
 }

@@ -3,80 +3,69 @@
 //! Equation 11 is the sum of the volumes of all boxes over that of the space. By it `n` equal cubes, and boxes whose lengths are
 //! independent on each axis, have `4 n DoC` pairs: `n^2 / 2` times the chance `(2 e / L)^3`. The table has an eighth of that.
 
-use super::model::{Edges, Model, Place, Space};
-use super::printed::{Coverage, LENGTHS, MOST_BOXES, SPACE, TABLE_III, WARP};
-use super::sides::{Call, Device, Way, effort, on_gpu, once, race};
-use super::{Scale, UNSORTED};
+use super::model::{Model, Space, UNIFORM};
+use super::printed::{Coverage, MOST_BOXES, SPACE, TABLE_III, WARP};
+use super::sides::{Call, Setup, Way, effort, on_gpu, once, race};
+use crate::UNSORTED;
 use pbig_core::pbig::Summary;
 use pbig_core::{Aabb, Coding, GpuOptions};
 use pbig_harness::pbig_grid::PbigPlan;
 use pbig_harness::prelude::*;
 
-pub(super) fn tables(scale: &Scale, device: &Device) -> Result<Vec<Table>, Failure> {
-    let calculated = [readings(), readings_counted(scale)?, rule()];
-    let counted = [counted(scale)?, on_device(scale, device)?, bytes(scale, device)?];
-    Ok(calculated.into_iter().chain(counted).collect())
+pub(super) fn tables(setup: &Setup) -> Result<Vec<Table>, Failure> {
+    Ok(vec![readings(), rule(), counted(setup)?, on_device(setup)?])
 }
-
-/// One way to understand what the experiment draws: the law for `n` boxes at a DoC.
-type Reading = (&'static str, fn(usize, f64) -> Model);
 
 /// Returns the edge of `n` equal cubes in the paper's space that have this DoC by equation 11.
 fn edge(n: usize, doc: f64) -> f64 {
     SPACE * (doc / n as f64).cbrt()
 }
 
-const fn centred(edges: Edges) -> Model {
-    Model { space: Space::Even(SPACE), place: Place::Centre, edges }
-}
-
 /// Returns the reading that fits: lower corners uniform in the space, lengths uniform from 0 to the edge by equation 11 rounded
 /// up to a whole number. So DoC counts each box as if it were as large as it may be.
 fn fitting(n: usize, doc: f64) -> Model {
-    Model { place: Place::LowerCorner, ..centred(Edges::boxes(0.0, edge(n, doc).ceil())) }
+    by_lower_corner(edge(n, doc))
 }
 
+fn by_lower_corner(edge: f64) -> Model {
+    Model { has_corners: true, ..Model::boxes(0.0, edge.ceil()) }
+}
+
+/// One way to understand what the experiment draws: the law for an edge by equation 11.
+type Reading = (&'static str, fn(f64) -> Model);
+
 const READINGS: [Reading; 14] = [
-    ("equal cubes by equation 11", |n, doc| centred(Edges::equal(edge(n, doc)))),
-    ("lengths uniform from 0, mean by equation 11", |n, doc| centred(Edges::boxes(0.0, 2.0 * edge(n, doc)))),
-    ("lengths uniform from 1 (section 6.1), mean by equation 11", |n, doc| {
-        centred(Edges::boxes(1.0, 2.0 * edge(n, doc) - 1.0))
-    }),
+    ("equal cubes by equation 11", |e| Model::cubes(e, e)),
+    ("lengths uniform from 0, mean by equation 11", |e| Model::boxes(0.0, 2.0 * e)),
+    ("lengths uniform from 1 (section 6.1), mean by equation 11", |e| Model::boxes(1.0, 2.0 * e - 1.0)),
     // The mean of e^3 is a quarter of the largest.
-    ("cubes of random size from 0, volumes by equation 11", |n, doc| {
-        centred(Edges::cubes(0.0, 4f64.cbrt() * edge(n, doc)))
+    ("cubes of random size from 0, volumes by equation 11", |e| Model::cubes(0.0, 4f64.cbrt() * e)),
+    ("lengths 1 to 100 (section 6.1), the space by equation 11", |e| Model {
+        space: Space::Even(SPACE * UNIFORM.mean_length() / e),
+        ..UNIFORM
     }),
-    ("lengths 1 to 100 (section 6.1), the space by equation 11", |n, doc| {
-        let mean = 0.5 * (LENGTHS[0] + LENGTHS[1]);
-        let space = Space::Even(mean * (n as f64 / doc).cbrt());
-        Model { space, ..centred(Edges::boxes(LENGTHS[0], LENGTHS[1])) }
+    ("the edge by equation 11 is a half extent", |e| Model::cubes(2.0 * e, 2.0 * e)),
+    ("equation 11 with half extents for lengths", |e| Model::cubes(0.5 * e, 0.5 * e)),
+    ("equation 11 with half extents for lengths, rounded up", |e| {
+        Model::cubes(0.5 * e.ceil(), 0.5 * e.ceil())
     }),
-    ("the edge by equation 11 is a half extent", |n, doc| centred(Edges::equal(2.0 * edge(n, doc)))),
-    ("equation 11 with half extents for lengths", |n, doc| centred(Edges::equal(0.5 * edge(n, doc)))),
-    ("equation 11 with half extents for lengths, rounded up", |n, doc| {
-        centred(Edges::equal(0.5 * edge(n, doc).ceil()))
-    }),
-    ("coordinates to both sides of 0: eight times the space", |n, doc| Model {
+    ("coordinates to both sides of 0: eight times the space", |e| Model {
         space: Space::Even(2.0 * SPACE),
-        ..centred(Edges::boxes(0.0, 2.0 * edge(n, doc)))
+        ..Model::boxes(0.0, 2.0 * e)
     }),
-    ("lengths uniform from 1, the largest by equation 11", |n, doc| centred(Edges::boxes(1.0, edge(n, doc)))),
-    ("lengths uniform from 1, the largest by equation 11 rounded up", |n, doc| {
-        centred(Edges::boxes(1.0, edge(n, doc).ceil()))
-    }),
-    ("lengths uniform from 0, the largest by equation 11", |n, doc| centred(Edges::boxes(0.0, edge(n, doc)))),
-    ("lengths uniform from 0, the largest by equation 11 rounded up", |n, doc| {
-        centred(Edges::boxes(0.0, edge(n, doc).ceil()))
-    }),
+    ("lengths uniform from 1, the largest by equation 11", |e| Model::boxes(1.0, e)),
+    ("lengths uniform from 1, the largest by equation 11 rounded up", |e| Model::boxes(1.0, e.ceil())),
+    ("lengths uniform from 0, the largest by equation 11", |e| Model::boxes(0.0, e)),
+    ("lengths uniform from 0, the largest by equation 11 rounded up", |e| Model::boxes(0.0, e.ceil())),
     (
         "lower corners uniform instead of centres, lengths uniform from 0, the largest by equation 11 rounded up",
-        fitting,
+        by_lower_corner,
     ),
 ];
 
 /// Returns by how many standard deviations the worst of the printed counts is off what a reading expects.
-fn furthest_off(model: fn(usize, f64) -> Model) -> f64 {
-    let off = TABLE_III.iter().map(|row| model(MOST_BOXES, row.doc).off(MOST_BOXES, row.pairs));
+fn furthest_off(law: fn(f64) -> Model) -> f64 {
+    let off = TABLE_III.iter().map(|row| law(edge(MOST_BOXES, row.doc)).off(MOST_BOXES, row.pairs));
     off.max_by(|a, b| a.abs().total_cmp(&b.abs())).unwrap_or(0.0)
 }
 
@@ -86,29 +75,15 @@ fn readings() -> Table {
         furthest off, standard deviations";
     let mut table = Table::new("PBIG table III: what DoC can mean", columns);
     let mut row = |name: &str, pairs: [f64; 5], off: Option<f64>| {
-        let counts = pairs.map(|pairs| Value::from(pairs.round() as u64));
-        table.row([cells![name, pairs[3] / MOST_BOXES as f64], counts.into(), cells![off]].concat());
+        let counts = pairs.map(|pairs| pairs.round() as u64);
+        table.row(cells![name, pairs[3] / MOST_BOXES as f64, ..counts, off]);
     };
     row("printed", TABLE_III.each_ref().map(|row| row.pairs as f64), None);
-    for (name, model) in READINGS {
-        let pairs = TABLE_III.each_ref().map(|row| model(MOST_BOXES, row.doc).pairs(MOST_BOXES));
-        row(name, pairs, Some(furthest_off(model)));
+    for (name, law) in READINGS {
+        let pairs = TABLE_III.each_ref().map(|row| law(edge(MOST_BOXES, row.doc)).pairs(MOST_BOXES));
+        row(name, pairs, Some(furthest_off(law)));
     }
     table
-}
-
-/// Holds the calculation against counts: every reading at DoC 1 in the paper's space.
-fn readings_counted(scale: &Scale) -> Result<Table, Failure> {
-    let columns = "reading | boxes | expected pairs | counted pairs | off, standard deviations";
-    let mut table = Table::new("PBIG table III: the readings, counted", columns);
-    for (name, reading) in READINGS {
-        for &n in scale.experiment {
-            let model = reading(n, 1.0);
-            let count = once(Way::Finder(UNSORTED), &model.boxes(n, 1))?.pairs;
-            table.row(cells![name, n, model.pairs(n).round() as u64, count, model.off(n, count)]);
-        }
-    }
-    Ok(table)
 }
 
 /// Returns the number of cells along an axis of even boxes, of which the last may be cut off.
@@ -129,7 +104,7 @@ fn length(model: &Model) -> f64 {
 /// one axis: a box touches the first if its corner lies there, the others also if it reaches there from
 /// below, and what lies beyond the space counts as the last.
 pub(super) fn expected_checks(model: &Model, n: usize, cell: f64) -> f64 {
-    let (length, mean) = (length(model), model.edges.mean());
+    let (length, mean) = (length(model), model.mean_length());
     let touched = |i: f64| {
         let own = (length - i * cell).min(cell);
         let reach = if i > 0.0 { mean } else { 0.0 };
@@ -141,30 +116,28 @@ pub(super) fn expected_checks(model: &Model, n: usize, cell: f64) -> f64 {
 }
 
 /// `alpha`: the cells that a box touches along an axis on average; and the number of cells along the space.
-type Alpha = (fn(&Edges, f64) -> f64, fn(f64, f64) -> f64);
+type Alpha = (fn(&Model, f64) -> f64, fn(f64, f64) -> f64);
 
 /// The cells that a box does touch, wherever it lies: one more than it has cell lengths.
-const TOUCHED: Alpha = (|edges, cell| 1.0 + edges.mean() / cell, |length, cell| length / cell);
+const TOUCHED: Alpha = (|model, cell| 1.0 + model.mean_length() / cell, |length, cell| length / cell);
 
 /// By equation 5: a box's length in cells, rounded up.
 const EQUATION_5: Alpha = (mean_of_ceilings, along);
 
 /// Returns the mean of `ceil(e / cell)` for lengths uniform between two.
-fn mean_of_ceilings(edges: &Edges, cell: f64) -> f64 {
+fn mean_of_ceilings(model: &Model, cell: f64) -> f64 {
+    // The integral of the ceiling from 0 to e.
     let whole = |e: f64| {
         let full = (e / cell).floor();
-        // The integral of the ceiling from 0 to e.
         cell * full * (full + 1.0) / 2.0 + (e - full * cell) * (full + 1.0)
     };
-    match edges.high - edges.low {
-        0.0 => (edges.low / cell).ceil(),
-        width => (whole(edges.high) - whole(edges.low)) / width,
-    }
+    let [low, high] = model.lengths;
+    (whole(high) - whole(low)) / (high - low)
 }
 
 /// Returns `f` of equation 2.
 fn objective((alpha, cells): Alpha, model: &Model, n: usize, cell: f64) -> f64 {
-    n as f64 * (alpha(&model.edges, cell) / cells(length(model), cell)).powi(3)
+    n as f64 * (alpha(model, cell) / cells(length(model), cell)).powi(3)
 }
 
 /// Returns equation 6 among the powers of two: the shortest cell with at least a warp of boxes.
@@ -203,77 +176,61 @@ fn rule() -> Table {
         let off = |cell: f64| 100.0 * (expected(cell) / row.checks as f64 - 1.0);
         let by = |alpha| equation_6(alpha, &model, MOST_BOXES);
         let rule = cells![by(TOUCHED), objective(TOUCHED, &model, MOST_BOXES, cell), by(EQUATION_5)];
+        let checks = [row.checks, expected(cell).round() as u64];
         let numbers = row.cell.map(|n| off(SPACE / n));
-        let checks = cells![row.checks, expected(cell).round() as u64, off(cell), numbers];
-        table.row([cells![row.doc, row.cell], rule, checks].concat());
+        table.row(cells![row.doc, row.cell, ..rule, ..checks, off(cell), numbers]);
     }
     table
 }
 
 /// The table itself, counted. Our grid makes none of the checks; PBIG's time is of one call that also allocates.
-fn counted(scale: &Scale) -> Result<Table, Failure> {
+fn counted(setup: &Setup) -> Result<Table, Failure> {
     let columns = "DoC | pairs printed (N = 10^7) | pairs | off what is expected, standard deviations | \
         checks printed (N = 10^7) | checks in such cells | of them unnecessary | of them redundant | ms printed | \
         ms, our grid, CPU | ms, PBIG's grid, CPU, one thread";
-    let (n, mut table) = (scale.most_boxes, Table::new("PBIG table III and figure 10: density", columns));
+    let (n, mut table) = (setup.most_boxes(), Table::new("PBIG table III and figure 10: density", columns));
     let scale = (MOST_BOXES as f64 / n as f64).cbrt();
     for row in &TABLE_III {
         let model = fitting(n, row.doc);
-        let boxes = model.boxes(n, 1);
+        let boxes = model.draw(n, 1);
         let pbig = once(Way::Pbig(options_for(&boxes, scale * cell(row))), &boxes)?;
         let ours = &race(&[Way::Finder(UNSORTED)], None, boxes, 1.0, effort(n))?[0];
-        let pairs = ours.call.pairs;
-        let what = || format!("DoC {}: {pairs} pairs, by PBIG's grid {}", row.doc, pbig.pairs);
-        check(pairs == pbig.pairs, what)?;
-        let counts = cells![row.doc, row.pairs, pairs, model.off(n, pairs), row.checks, pbig.checks.made];
-        let rest = cells![pbig.checks.unnecessary, pbig.checks.redundant, "< 1000", ours.ms, pbig.ms];
-        table.row([counts, rest].concat());
+        let (pairs, theirs) = (ours.report.pairs, pbig.report.pairs);
+        check(pairs == theirs, || format!("DoC {}: {pairs} pairs, by PBIG's grid {theirs}", row.doc))?;
+        let times = cells!["< 1000", ours.median, pbig.ms];
+        let counts = cells![row.doc, row.pairs, pairs, model.off(n, pairs), row.checks];
+        table.row(cells![..counts, ..pbig.checks(), ..times]);
     }
     Ok(table)
 }
 
-/// Counts on a device, with cells as our plan has them and as the paper's `W` gives them.
-fn on_device(scale: &Scale, device: &Device) -> Result<Table, Failure> {
-    let n = if device.is_software() { scale.on_device(device) } else { scale.most_boxes };
-    let columns = "DoC | boxes | pairs | checks, our W | ms, our W | checks, the paper's W | ms, the paper's W | ms printed";
-    let mut table = Table::new("PBIG table III and figure 10: density, GPU", columns);
-    let at = |boxes_per_cell: f32| on_gpu(GpuOptions { boxes_per_cell, ..GpuOptions::DEFAULT });
-    let ways = [at(GpuOptions::DEFAULT.boxes_per_cell), at(WARP as f32)];
-    for row in &TABLE_III {
-        if let [ours, paper] = &device.run(&ways, &fitting(n, row.doc).boxes(n, 1), 1.0)?[..] {
-            let times = cells![ours.checks.made, ours.ms, paper.checks.made, paper.ms, "< 1000"];
-            table.row([cells![row.doc, n, ours.pairs], times].concat());
-        }
-    }
-    Ok(table)
-}
-
-/// Returns the bytes of the output, printed and ours: as a list, as records, and as records in the paper's cells by rows of
-/// segments.
-fn bytes(scale: &Scale, device: &Device) -> Result<Table, Failure> {
-    let columns = "DoC | pairs printed | output printed, MB | bytes a pair, MB = 2^20 | bytes a pair, MB = 10^6 | \
-        pairs, ours | bytes written a pair, ours: list | records | records, the paper's W, rows of segments | \
-        bytes fetched a pair, ours: records";
-    let (n, mut table) = (scale.on_device(device), Table::new("PBIG table III: bytes of output", columns));
+/// Counts, times and bytes of the output on a device: as a list and as records in cells as our plan has them, and as records in
+/// cells as the paper's `W` gives them, by rows of segments.
+fn on_device(setup: &Setup) -> Result<Table, Failure> {
+    let columns = "DoC | output printed, MB | bytes a pair, MB = 2^20 | bytes a pair, MB = 10^6 | boxes | pairs, ours | \
+        checks, our W | ms, our W | checks, the paper's W | ms, the paper's W | bytes written a pair, ours: list | \
+        records | records, the paper's W, rows of segments | bytes fetched a pair, ours: records";
+    let mut table = Table::new("PBIG table III and figure 10: density and bytes of output, GPU", columns);
+    let n = setup.on_device();
     let with = |coding| GpuOptions { coding, ..GpuOptions::DEFAULT };
     let rows = GpuOptions { boxes_per_cell: WARP as f32, small_cell: 1, ..with(Coding::Packed) };
     let ways = [with(Coding::Plain), with(Coding::Packed), rows].map(on_gpu);
     for row in &TABLE_III {
         let printed = |unit: f64| row.output * unit / row.pairs as f64;
-        let printed = cells![row.doc, row.pairs, row.output, printed(f64::from(1 << 20)), printed(1e6)];
-        let ours = match &device.run(&ways, &fitting(n, row.doc).boxes(n, 1), 1.0)?[..] {
-            [plain, packed, rows] => {
-                let a_pair = |bytes: Option<u64>| bytes.map(|bytes| bytes as f64 / plain.pairs as f64);
-                let [list, records, segments] =
-                    [plain, packed, rows].map(|call: &Call| a_pair(call.written()));
-                let fetched = a_pair(packed.fetched()).filter(|_| packed.pairs > 0);
-                cells![plain.pairs, list, records, segments, fetched]
-            }
-            _ => vec![Value::Null; 5],
-        };
-        table.row([printed, ours].concat());
+        let printed = [row.output, printed(f64::from(1 << 20)), printed(1e6)];
+        let calls = setup.run(&ways, &fitting(n, row.doc).draw(n, 1), 1.0)?;
+        table.row(cells![row.doc, ..printed, n, ..of_output(&calls)]);
     }
     Ok(table)
+}
+
+fn of_output(calls: &[Call]) -> Vec<Value> {
+    let [list, packed, rows] = calls else { return vec![] };
+    let pairs = list.report.pairs;
+    let a_pair = |bytes: Option<u64>| bytes.filter(|_| pairs > 0).map(|bytes| bytes as f64 / pairs as f64);
+    let [ours, papers] = [packed, rows].map(|call| cells![call.checks()[0], call.ms]);
+    let written = [list, packed, rows].map(|call| a_pair(call.written()));
+    cells![pairs, ..ours, ..papers, ..written, a_pair(packed.fetched())]
 }
 
 #[cfg(test)]
@@ -283,13 +240,13 @@ mod tests {
 
     #[test]
     fn readings_count_what_they_expect_and_the_printed_counts_fit_lower_corners_alone() {
-        for (name, reading) in &READINGS {
-            let model = reading(2000, 1.0);
-            let count = oracle::pairs(&model.boxes(2000, 3)).len() as u64;
+        for (name, law) in &READINGS {
+            let model = law(edge(2000, 1.0));
+            let count = oracle::pairs(&model.draw(2000, 3)).len() as u64;
             assert!(model.off(2000, count).abs() < 5.0, "{name}: {count}, {}", model.pairs(2000));
         }
         let (others, fits) = READINGS.split_at(READINGS.len() - 2);
-        assert!(others.iter().all(|(_, reading)| furthest_off(*reading).abs() > 10.0));
+        assert!(others.iter().all(|(_, law)| furthest_off(*law).abs() > 10.0));
         assert!(furthest_off(fits[1].1).abs() < 1.0 && (1.0..3.0).contains(&furthest_off(fits[0].1).abs()));
     }
 
@@ -302,19 +259,19 @@ mod tests {
             assert!((expected / row.checks as f64 - 1.0).abs() < 0.01, "DoC {}: {expected}", row.doc);
         }
         // Lengths 0 to 10 in cells of 4: 1, 2 and 3 cells for 4, 4 and 2 of 10.
-        assert!((mean_of_ceilings(&Edges::boxes(0.0, 10.0), 4.0) - 1.8).abs() < 1e-12);
+        assert!((mean_of_ceilings(&Model::boxes(0.0, 10.0), 4.0) - 1.8).abs() < 1e-12);
     }
 
     #[test]
     fn the_expected_checks_are_those_of_the_grid_in_cells_of_the_wanted_length() {
-        let model = Model { space: Space::Even(100.0), ..fitting(1000, 1.0) };
-        let model = Model { edges: Edges::boxes(0.0, 10.0), ..model };
-        let boxes = model.boxes(20_000, 1);
+        let model = Model { space: Space::Even(100.0), lengths: [0.0, 10.0], ..fitting(1000, 1.0) };
+        let boxes = model.draw(20_000, 1);
         let call = once(Way::Pbig(options_for(&boxes, 10.0)), &boxes).expect("found");
         let given = f64::from(call.cell.expect("a cell"));
         assert!((given / 10.0 - 1.0).abs() < 0.06, "{given}");
         // The grid's border lies where the boxes end, not where the space does.
         let expected = expected_checks(&model, 20_000, given);
-        assert!((call.checks.made as f64 / expected - 1.0).abs() < 0.1, "{} of {expected}", call.checks.made);
+        let made = call.report.checks.made;
+        assert!((made as f64 / expected - 1.0).abs() < 0.1, "{made} of {expected}");
     }
 }

@@ -112,37 +112,3 @@ fn sorted(boxes: &[Aabb], scale: Scale, dims: [usize; 3]) -> Candidates {
     runs.retain(|[_, from, to]| from < to);
     Candidates { scale, boxes: order.into_iter().map(|(_, b)| b).collect(), runs }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::super::{Code, Exact, Fixed, Half};
-    use super::*;
-    use pbig_core::oracle;
-    use pbig_harness::boxes::BoxSet;
-
-    fn agrees<C: Coordinates>(candidates: &Candidates, pairs: u64, name: &str) {
-        let found = candidates.find::<C>(&mut vec![]);
-        assert_eq!(found.pairs, pairs, "{name}, {}", C::NAME);
-        assert!(found.candidates >= pairs && found.tests >= found.candidates);
-    }
-
-    #[test]
-    fn every_pair_of_the_oracle_is_found_in_all_coordinates() {
-        for name in ["uniform", "gaussian", "unit", "mixed", "pile"] {
-            let boxes = BoxSet::named(name).expect("a set").boxes(1500, 3);
-            let candidates = Candidates::new(&boxes).expect("finite boxes");
-            let pairs = oracle::pairs(&boxes).len() as u64;
-            agrees::<Exact>(&candidates, pairs, name);
-            agrees::<Fixed<true>>(&candidates, pairs, name);
-            agrees::<Fixed<false>>(&candidates, pairs, name);
-            agrees::<Half>(&candidates, pairs, name);
-            agrees::<Code>(&candidates, pairs, name);
-        }
-    }
-
-    #[test]
-    fn boxes_that_are_not_finite_are_for_another_search() {
-        assert!(Candidates::new(&[]).is_none());
-        assert!(Candidates::new(&[Aabb::new([0.0; 3], [f32::INFINITY; 3])]).is_none());
-    }
-}

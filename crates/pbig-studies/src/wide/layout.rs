@@ -1,12 +1,12 @@
 //! Shapes and where they are, near the origin; and the same elsewhere, in f64 and as f32 has it.
 
 use super::{Pose, Wide};
-use parry3d_f64::bounding_volume::{Aabb, BoundingVolume, details::point_cloud_aabb};
-use parry3d_f64::shape::{Ball, Capsule, Cone, Cuboid, Cylinder};
+use parry3d_f64::bounding_volume::BoundingVolume;
+use parry3d_f64::shape::SharedShape as WideShape;
 use pbig_harness::world::World;
 use rand::rngs::StdRng;
 use rand::{RngExt, SeedableRng};
-use rapier3d::na::{Point3, Translation3, UnitQuaternion, Vector3};
+use rapier3d::na::{Point3, Translation3, Unit, UnitQuaternion, Vector3};
 use rapier3d::prelude::{Collider, ColliderBuilder, Isometry, Real, Shape, SharedShape, TypedShape};
 
 /// A pose as f64 has it: the same position, and a rotation whose norm is 1 in f64 too.
@@ -24,15 +24,17 @@ pub fn to_f32(pose: &Pose) -> Isometry<Real> {
 /// Shapes with their poses near the origin.
 #[derive(Clone)]
 pub struct Layout {
-    placed: Vec<(SharedShape, Pose)>,
+    placed: Vec<(SharedShape, WideShape, Pose)>,
 }
 
 impl Layout {
     /// The colliders of a world, less those whose box f64 does not have: half-spaces.
     pub fn of_world(world: &World) -> Self {
-        let placed =
-            world.colliders.iter().map(|(_, one)| (one.shared_shape().clone(), to_f64(one.position())));
-        Self { placed: placed.filter(|(shape, pose)| parry_aabb(&**shape, pose).is_some()).collect() }
+        let bounded = world.colliders.iter().filter(|(_, one)| one.shape().as_halfspace().is_none());
+        let placed = |one: &Collider| {
+            Some((one.shared_shape().clone(), shape_in_f64(one.shape())?, to_f64(one.position())))
+        };
+        Self { placed: bounded.filter_map(|(_, one)| placed(one)).collect() }
     }
 
     /// Shapes of every kind about as large as `size`, turned and placed at random, about two pairs of boxes each.
@@ -43,7 +45,8 @@ impl Layout {
             let shape = shape(i, size as f32, &mut rng);
             let at = Vector3::from_fn(|_, _| rng.random_range(-0.5 * side..=0.5 * side));
             let turn = Vector3::from_fn(|_, _| rng.random_range(-2.0..2.0));
-            (shape, Pose::new(at, turn))
+            let wide = shape_in_f64(&*shape).expect("a shape that f64 has");
+            (shape, wide, Pose::new(at, turn))
         };
         Self { placed: (0..count).map(&mut place).collect() }
     }
@@ -51,19 +54,21 @@ impl Layout {
     /// The poses of all shapes when the world lies elsewhere.
     pub fn poses(&self, offset: [f64; 3]) -> Vec<Pose> {
         let by = Translation3::from(Vector3::from(offset));
-        self.placed.iter().map(|(_, pose)| by * pose).collect()
+        self.placed.iter().map(|(.., pose)| by * pose).collect()
     }
 
     /// The boxes of all shapes at these poses, grown by `reach`.
     pub fn boxes(&self, poses: &[Pose], reach: f64) -> Vec<Wide> {
-        let boxes = self.placed.iter().zip(poses).filter_map(|((shape, _), pose)| parry_aabb(&**shape, pose));
-        let wide = |Aabb { mins, maxs }: Aabb| Wide { min: mins.coords.into(), max: maxs.coords.into() };
-        boxes.map(|one| wide(one.loosened(reach))).collect()
+        let wide = |((_, shape, _), pose): (&(_, WideShape, _), &Pose)| {
+            let aabb = shape.compute_aabb(pose).loosened(reach);
+            Wide { min: aabb.mins.coords.into(), max: aabb.maxs.coords.into() }
+        };
+        self.placed.iter().zip(poses).map(wide).collect()
     }
 
     /// All shapes as rapier's colliders.
     pub fn colliders(&self, poses: &[Isometry<Real>]) -> Vec<Collider> {
-        let shapes = self.placed.iter().map(|(shape, _)| shape.clone());
+        let shapes = self.placed.iter().map(|(shape, ..)| shape.clone());
         shapes.zip(poses).map(|(shape, &pose)| ColliderBuilder::new(shape).position(pose).build()).collect()
     }
 }
@@ -93,47 +98,52 @@ fn shape(i: usize, size: f32, rng: &mut StdRng) -> SharedShape {
     }
 }
 
-/// Returns the box of a shape that rapier has in f32, its sizes taken as they are, at a pose in f64. None for kinds of shapes
-/// that no scene has, and for half-spaces, whose boxes are no smaller than the world.
-fn parry_aabb(shape: &dyn Shape, pose: &Pose) -> Option<Aabb> {
+/// Returns a shape that rapier has in f32, its sizes taken as they are. None for kinds of shapes that no scene has.
+pub(super) fn shape_in_f64(shape: &dyn Shape) -> Option<WideShape> {
     Some(match shape.as_typed_shape() {
-        TypedShape::Ball(ball) => Ball::new(ball.radius.into()).aabb(pose),
-        TypedShape::Cuboid(cuboid) => Cuboid::new(cuboid.half_extents.cast()).aabb(pose),
+        TypedShape::Ball(ball) => WideShape::ball(ball.radius.into()),
+        TypedShape::Cuboid(cuboid) => {
+            let half = cuboid.half_extents.cast::<f64>();
+            WideShape::cuboid(half.x, half.y, half.z)
+        }
         TypedShape::Capsule(capsule) => {
             let [a, b] = [capsule.segment.a, capsule.segment.b].map(|end| end.cast());
-            Capsule::new(a, b, capsule.radius.into()).aabb(pose)
+            WideShape::capsule(a, b, capsule.radius.into())
         }
-        TypedShape::Cylinder(it) => Cylinder::new(it.half_height.into(), it.radius.into()).aabb(pose),
-        TypedShape::Cone(it) => Cone::new(it.half_height.into(), it.radius.into()).aabb(pose),
+        TypedShape::Cylinder(it) => WideShape::cylinder(it.half_height.into(), it.radius.into()),
+        TypedShape::Cone(it) => WideShape::cone(it.half_height.into(), it.radius.into()),
+        TypedShape::HalfSpace(it) => WideShape::halfspace(Unit::new_normalize(it.normal.into_inner().cast())),
         TypedShape::ConvexPolyhedron(hull) => {
-            point_cloud_aabb(pose, hull.points().iter().map(|corner| corner.cast()))
+            let corners: Vec<_> = hull.points().iter().map(|corner| corner.cast()).collect();
+            WideShape::convex_hull(&corners)?
         }
-        TypedShape::Compound(compound) => compound_aabb(compound.shapes())?.transform_by(pose),
+        TypedShape::Compound(compound) => {
+            let part =
+                |(pose, part): &(Isometry<Real>, SharedShape)| Some((to_f64(pose), shape_in_f64(&**part)?));
+            WideShape::compound(compound.shapes().iter().map(part).collect::<Option<_>>()?)
+        }
         TypedShape::HeightField(_) | TypedShape::TriMesh(_) => {
-            let local = shape.compute_local_aabb();
-            Aabb::new(local.mins.cast(), local.maxs.cast()).transform_by(pose)
+            // The box around it.
+            let (local, half) =
+                (shape.compute_local_aabb(), shape.compute_local_aabb().half_extents().cast());
+            let middle = Pose::from_parts(local.center().coords.cast::<f64>().into(), Default::default());
+            WideShape::compound(vec![(middle, WideShape::cuboid(half.x, half.y, half.z))])
         }
         _ => return None,
     })
 }
 
-/// Around its parts, in its own coordinates.
-fn compound_aabb<S: std::ops::Deref<Target = dyn Shape>>(parts: &[(Isometry<Real>, S)]) -> Option<Aabb> {
-    let parts = parts.iter().map(|(pose, part)| parry_aabb(&**part, &to_f64(pose)));
-    parts.reduce(|sum, part| Some(sum?.merged(&part?))).flatten()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use rapier3d::prelude::Vector;
 
     /// Near the origin f32 and f64 differ by some 2^-24: another formula, or another size, would by far more.
     #[test]
     fn near_the_origin_boxes_are_what_parry_computes_in_f32() {
         let crowd = Layout::crowd(70, 1.0, 3);
         let poses = crowd.poses([0.3, -0.6, 0.2]);
-        for ((shape, _), (wide, pose)) in crowd.placed.iter().zip(crowd.boxes(&poses, 0.0).iter().zip(&poses))
+        for ((shape, ..), (wide, pose)) in
+            crowd.placed.iter().zip(crowd.boxes(&poses, 0.0).iter().zip(&poses))
         {
             let narrow = shape.compute_aabb(&to_f32(pose));
             for k in 0..3 {
@@ -143,7 +153,6 @@ mod tests {
                 assert!(wide.max[k] - wide.min[k] > 0.1, "{:?}: {wide:?}", shape.shape_type());
             }
         }
-        assert_eq!(parry_aabb(&*SharedShape::halfspace(Vector::y_axis()), &Pose::identity()), None);
     }
 
     #[test]

@@ -1,5 +1,6 @@
 //! A world of rapier3d-f64: what a simulation is held against that runs in f32.
 
+use super::layout::shape_in_f64;
 use super::{Pose, to_f32, to_f64};
 use pbig_harness::world::World;
 use rapier3d::na::{Translation3, Vector3};
@@ -29,7 +30,7 @@ impl WideWorld {
     /// without joints, with rapier's settings but for density, friction and restitution.
     ///
     /// # Errors
-    /// If it has other shapes than balls, cuboids and half-spaces.
+    /// If it has shapes that no scene has.
     pub fn of(world: &World, offset: [f64; 3]) -> Result<Self, String> {
         let gravity = world.gravity.to_array().map(f64::from).into();
         let mut wide = Self { gravity, ..Self::default() };
@@ -48,7 +49,9 @@ impl WideWorld {
         collider: &narrow::Collider,
         by: &Translation3<f64>,
     ) -> Result<(), String> {
-        let shape = shape(collider.shape())?;
+        let kind = collider.shape().shape_type();
+        let shape =
+            shape_in_f64(collider.shape()).ok_or_else(|| format!("a world in f64 has no {kind:?}"))?;
         let is_bounded = shape.as_halfspace().is_none();
         let builder = ColliderBuilder::new(shape)
             .density(collider.density().into())
@@ -89,20 +92,6 @@ impl WideWorld {
     pub fn poses(&self) -> Vec<Pose> {
         self.bounded.iter().map(|&handle| *self.colliders[handle].position()).collect()
     }
-}
-
-fn shape(shape: &dyn narrow::Shape) -> Result<SharedShape, String> {
-    Ok(match shape.as_typed_shape() {
-        narrow::TypedShape::Ball(ball) => SharedShape::ball(ball.radius.into()),
-        narrow::TypedShape::Cuboid(cuboid) => {
-            let half = cuboid.half_extents.cast::<f64>();
-            SharedShape::cuboid(half.x, half.y, half.z)
-        }
-        narrow::TypedShape::HalfSpace(plane) => {
-            SharedShape::halfspace(UnitVector::new_normalize(plane.normal.into_inner().cast()))
-        }
-        _ => return Err(format!("a world in f64 has no {:?}", shape.shape_type())),
-    })
 }
 
 /// The world at a distance from where it is, rounded as f32 has it.

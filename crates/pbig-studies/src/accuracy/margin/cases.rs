@@ -4,10 +4,10 @@ use super::{Case, MARGINS, Round, Row, rows};
 use crate::reported::Reported;
 use pbig_core::{Aabb, BroadPhase, Config, Error, Finder, Limits, Pair, ProxyFilter};
 use pbig_harness::prelude::*;
-use pbig_harness::runner::{Run, StepTime, Timed};
+use pbig_harness::runner::{Run, Timed};
 use pbig_harness::scenes::Scene;
 use pbig_harness::world::World;
-use rapier_pbig::{PbigBroadPhase, PbigConfig, collision_aabb};
+use rapier_pbig::{PbigBroadPhase, PbigConfig};
 
 /// A scene, its bodies, the steps after which margins are compared, and the steps that count.
 type Windows = (&'static str, usize, &'static [usize], usize);
@@ -37,19 +37,11 @@ pub(super) fn worlds(quick: bool) -> Result<Vec<Row>, Failure> {
             }
             let case = format!("{scene} {bodies}, from step {start}");
             let saved = run.world.to_bytes();
-            let about = (run.world.colliders.len(), median_edge(&run.world), true);
+            let about = (run.world.colliders.len(), true);
             all.extend(rows(&case, steps, about, || Worlds::restored(&case, &saved))?);
         }
     }
     Ok(all)
-}
-
-/// Returns the edge of a collider's box, over all colliders and axes: half are longer.
-fn median_edge(world: &World) -> f32 {
-    let aabb = |collider| collision_aabb(&world.params, &world.bodies, collider);
-    let mut edges: Vec<f32> = world.colliders.iter().flat_map(|(_, one)| aabb(one).extents()).collect();
-    edges.sort_unstable_by(f32::total_cmp);
-    edges.get(edges.len() / 2).copied().unwrap_or_default()
 }
 
 /// A world, run once with each margin.
@@ -70,16 +62,12 @@ impl Worlds {
 }
 
 impl Case for Worlds {
-    fn prepare(&mut self, _: usize, _: bool) -> Result<(), Failure> {
-        Ok(())
-    }
-
     fn step(&mut self, margin: usize, is_compared: bool) -> Result<Round, Failure> {
         let run = &mut self.0[margin];
         run.step();
-        let (time, stats) = (run.times.last().copied(), run.broad_phase.inner.stats());
+        let (time, stats) = (run.times.last().copied().unwrap_or_default(), run.broad_phase.inner.stats());
         let counts = [stats.modified as u64, stats.report.changed];
-        Ok((time.unwrap_or_default(), counts, is_compared.then(|| Reported::of(&run.world))))
+        Ok(([time.broad_phase, time.step], counts, is_compared.then(|| Reported::of(&run.world))))
     }
 }
 
@@ -100,9 +88,8 @@ pub(super) fn boxes(quick: bool) -> Result<Vec<Row>, Failure> {
     for (motion, start) in MOTIONS {
         for &(n, rounds) in sizes {
             let set = BoxSet::named("unit").expect("a set of the harness").boxes(n, 1);
-            let about = (n, set[0].extents()[0], false);
             let make = || Boxes::new(start(set.clone()));
-            all.extend(rows(&format!("{motion} {n}"), rounds, about, make)?);
+            all.extend(rows(&format!("{motion} {n}"), rounds, (n, false), make)?);
         }
     }
     Ok(all)
@@ -150,7 +137,7 @@ impl Case for Boxes {
         done?;
         let reported = is_compared.then(|| Reported::compare(finder.pairs().collect(), &self.needed));
         let counts = [self.wander.boxes.len() as u64, finder.report().changed];
-        Ok((StepTime { broad_phase: ms, step: ms }, counts, reported))
+        Ok(([ms, ms], counts, reported))
     }
 }
 

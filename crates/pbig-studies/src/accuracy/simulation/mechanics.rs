@@ -24,8 +24,6 @@ pub(super) struct Mechanics {
     pub(super) momentum: DVec3,
     /// The sum of the lengths of the bodies' momenta.
     pub(super) speed: f64,
-    /// Kilograms.
-    pub(super) mass: f64,
 }
 
 impl Mechanics {
@@ -55,7 +53,6 @@ impl Mechanics {
     fn add(&mut self, world: &World, body: &RigidBody) {
         let mass = f64::from(body.mass());
         let momentum = DVec3::from_array(body.linvel().map(|v| f64::from(v) * mass).into());
-        self.mass += mass;
         self.kinetic += f64::from(body.kinetic_energy());
         // Rapier's solver makes so many small steps of each.
         let dt = world.params.dt / world.params.num_solver_iterations.get() as Real;
@@ -108,7 +105,6 @@ mod tests {
         // Half of m v^2 twice, and of I w^2 with I = 2/5 m r^2; then m g h.
         near(found.kinetic, 4.0 + 2.5 + 0.5 * (0.4 * 5.0 * 0.25) * 16.0);
         near(found.energy(), found.kinetic + 10.0 * (2.0 * 3.0 + 5.0 * 1.0));
-        near(found.mass, 7.0);
         near(found.momentum.x, -1.0);
         near(found.speed, 9.0);
     }

@@ -3,7 +3,7 @@
 
 use super::mechanics::Mechanics;
 use super::numbered::Numbered;
-use crate::reordered::{Reordered, lower_first, sorted};
+use crate::reordered::KINDS;
 use crate::reported::Reported;
 use glam::Vec3;
 use pbig_harness::bench::timed;
@@ -14,76 +14,41 @@ use rapier_pbig::{PbigBroadPhase, PbigConfig};
 use rapier3d::prelude::*;
 use std::hash::{DefaultHasher, Hash, Hasher};
 
-/// The things whose order differs from rapier's own broad phase in the scene.
-#[derive(Clone, Copy, Debug, PartialEq)]
-enum Order {
-    /// Bodies, as they are inserted; of a seed.
-    Permuted(u64),
-    /// Events, sorted as pbig sorts them: shows which part of a difference is due to the order of events.
-    Sorted,
-    /// The two colliders of each of our pairs: as rapier's own broad phase has them.
-    LowerFirst,
-}
-
 /// One way to run a scene.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy)]
 pub(super) struct Way {
     pub(super) name: &'static str,
-    /// The margin of pbig's broad phase; none: rapier's own.
-    margin: Option<f32>,
-    order: Option<Order>,
+    /// The seed of the order in which bodies are inserted; none: as the scene has them.
+    pub(super) seed: Option<u64>,
     /// True for the way before it once more.
     pub(super) is_again: bool,
+    broad_phase: fn() -> Box<dyn BroadPhase>,
 }
 
 /// So many orders of insertion beside the scene's: a run that is one more of them is farther than all these once in 20 times.
 pub(super) const PERMUTED: usize = 19;
 
-const STOCK: Way = Way { name: "stock", margin: None, order: None, is_again: false };
-const PBIG: Way = Way { name: "pbig", margin: Some(PbigConfig::DEFAULT.margin), ..STOCK };
-
 /// Returns all ways, the one that the others are held against first.
 fn ways() -> Vec<Way> {
+    let way = |(name, broad_phase)| Way { name, seed: None, is_again: false, broad_phase };
     let again = |name, way| Way { name, is_again: true, ..way };
-    let permuted = |seed| Way { name: "stock permuted", order: Some(Order::Permuted(seed)), ..STOCK };
-    let sorted = Way { name: "stock sorted", order: Some(Order::Sorted), ..STOCK };
-    let mut ways = vec![STOCK, again("stock again", STOCK)];
+    let [pbig, lower_first, stock, sorted] = KINDS.map(way);
+    let permuted = |seed| Way { name: "stock permuted", seed: Some(seed), ..stock };
+    let mut ways = vec![stock, again("stock again", stock)];
     ways.extend((1..=PERMUTED as u64).map(permuted));
-    ways.extend([sorted, again("stock sorted again", sorted)]);
-    ways.extend([Way { name: "pbig lower first", order: Some(Order::LowerFirst), ..PBIG }, PBIG]);
-    let without = Way { name: "pbig without margin", margin: Some(0.0), ..PBIG };
-    ways.extend([again("pbig again", PBIG), without]);
+    ways.extend([sorted, again("stock sorted again", sorted), lower_first, pbig, again("pbig again", pbig)]);
+    ways.push(way(("pbig without margin", without_margin)));
     ways
+}
+
+fn without_margin() -> Box<dyn BroadPhase> {
+    let config = PbigConfig { margin: 0.0, ..PbigConfig::DEFAULT };
+    Box::new(PbigBroadPhase::with_config(config).expect("a length"))
 }
 
 impl Way {
     pub(super) fn is_pbig(&self) -> bool {
-        self.margin.is_some()
-    }
-
-    /// Returns true for pbig's ways and stock in our order of events, for the first time.
-    pub(super) fn is_held_against_stock(&self) -> bool {
-        (self.is_pbig() || self.order == Some(Order::Sorted)) && !self.is_again
-    }
-
-    pub(super) fn is_permuted(&self) -> bool {
-        self.seed().is_some()
-    }
-
-    fn seed(&self) -> Option<u64> {
-        if let Some(Order::Permuted(seed)) = self.order { Some(seed) } else { None }
-    }
-
-    fn broad_phase(&self) -> Box<dyn BroadPhase> {
-        let stock = DefaultBroadPhase::new();
-        let config = |margin| PbigConfig { margin, ..PbigConfig::DEFAULT };
-        let ours = |margin| PbigBroadPhase::with_config(config(margin)).expect("a length");
-        match (self.margin, self.order) {
-            (Some(margin), Some(Order::LowerFirst)) => Box::new(Reordered(ours(margin), lower_first)),
-            (Some(margin), _) => Box::new(ours(margin)),
-            (None, Some(Order::Sorted)) => Box::new(Reordered(stock, sorted)),
-            (None, _) => Box::new(stock),
-        }
+        self.name.starts_with("pbig")
     }
 }
 
@@ -137,18 +102,17 @@ pub(super) struct Side {
     pub(super) samples: Vec<Sample>,
     /// Milliseconds of each step.
     pub(super) ms: Vec<f64>,
-    /// Sums over the steps in which pairs were compared with brute force, and the number of these.
+    /// Sums over the steps in which pairs were compared with brute force.
     pub(super) reported: Reported,
-    pub(super) compared: u64,
     /// Pairs that ended while their colliders touched.
     pub(super) parted: u64,
 }
 
 impl Side {
     fn new(way: Way, scene: &Numbered) -> Self {
-        let (numbered, broad_phase) = (scene.inserted(way.seed()), way.broad_phase());
-        let (reported, compared, parted) = (Reported::default(), 0, 0);
-        Self { way, numbered, broad_phase, samples: vec![], ms: vec![], reported, compared, parted }
+        let (numbered, broad_phase) = (scene.inserted(way.seed), (way.broad_phase)());
+        let (reported, parted) = (Reported::default(), 0);
+        Self { way, numbered, broad_phase, samples: vec![], ms: vec![], reported, parted }
     }
 
     fn step(&mut self) {
@@ -169,7 +133,6 @@ impl Side {
         self.samples.push(Sample { mechanics, apart, poses, awake });
         if self.samples.len().is_multiple_of(COMPARED) {
             self.reported += Reported::of(world);
-            self.compared += 1;
         }
     }
 }
@@ -211,7 +174,8 @@ mod tests {
 
     #[test]
     fn bodies_that_sleep_are_counted_and_pairs_that_end_while_they_touch() {
-        let mut side = Side::new(PBIG, &Numbered::new(world(("pile", 8, 0)).expect("a scene")));
+        let pbig = ways().into_iter().find(Way::is_pbig).expect("a way");
+        let mut side = Side::new(pbig, &Numbered::new(world(("pile", 8, 0)).expect("a scene")));
         for _ in 0..200 {
             side.step();
             side.look([0.0; 2]);

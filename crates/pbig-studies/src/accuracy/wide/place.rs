@@ -1,6 +1,6 @@
 //! A world at a place: in f64, as rapier holds it, and its boxes in f32 by every way.
 
-use crate::wide::{Differences, Layout, Pose, Truth, Wide, doubt, to_f32, to_f64, widened_by_ulps};
+use crate::wide::{Differences, Layout, Pose, Truth, doubt, to_f32, to_f64, widened_by_ulps};
 use pbig_core::{Aabb, Config, Finder, Limits, Pair};
 use pbig_harness::output::Failure;
 use pbig_harness::scenes::Scene;
@@ -98,8 +98,10 @@ impl<'a> Place<'a> {
             return boxes.iter().map(|wide| Aabb::from_f64(wide.min, wide.max)).collect();
         };
         let boxes = rapiers(&self.params, self.colliders.iter(), ulps);
-        let margin = if has_margin { PbigConfig::DEFAULT.margin } else { 0.0 };
-        if has_margin { boxes.iter().map(|aabb| aabb.inflated(margin)).collect() } else { boxes }
+        if !has_margin {
+            return boxes;
+        }
+        boxes.iter().map(|aabb| aabb.inflated(PbigConfig::DEFAULT.margin)).collect()
     }
 
     /// Compares the pairs of boxes in f32 with those in f64: at the poses that rapier holds, and in the world.
@@ -107,17 +109,6 @@ impl<'a> Place<'a> {
         let mut finder = finder();
         let found = finder.find(&self.boxes(way))?;
         Ok([&self.held, &self.world].map(|truth| truth.differences(found, self.reach())))
-    }
-
-    /// Returns the largest distance by which a bound of rapier's boxes ends inside the one in f64, in ulps of [`widened_by_ulps`].
-    fn shortfall(&self) -> f64 {
-        let short = |((wide, aabb), collider): ((&Wide, &Aabb), &Collider)| {
-            let units = units(aabb, collider);
-            wide.shortfall(aabb).into_iter().zip(units).map(|(short, unit)| short / unit).fold(0.0, f64::max)
-        };
-        let rapiers = self.boxes(WAYS[RAPIERS]);
-        let boxes = self.held.boxes.iter().zip(&rapiers).zip(&self.colliders);
-        boxes.map(short).fold(0.0, f64::max)
     }
 }
 
@@ -133,14 +124,6 @@ pub(super) fn rapiers<'c>(
         return colliders.map(stock).collect();
     }
     colliders.map(|one| widened_by_ulps(&stock(one), one.position(), ulps)).collect()
-}
-
-/// Returns by how much one ulp of [`widened_by_ulps`] widens a box on each axis.
-fn units(aabb: &Aabb, collider: &Collider) -> [f64; 3] {
-    // So many that rounding of the widened bound is nothing beside them; a power of two, which rounds nothing itself.
-    const MANY: u32 = 1024;
-    let wide = widened_by_ulps(aabb, collider.position(), MANY);
-    std::array::from_fn(|k| (f64::from(wide.max[k]) - f64::from(aabb.max[k])) / f64::from(MANY))
 }
 
 pub(super) fn finder() -> Finder {
@@ -162,8 +145,6 @@ pub(super) struct Row {
     pub(super) poses: Differences,
     /// By way: against boxes in f64 at the same poses, and against the world.
     pub(super) ways: Vec<[Differences; 2]>,
-    /// Of rapier's boxes at the poses that it holds, in ulps as [`widened_by_ulps`] has them.
-    pub(super) shortfall: f64,
 }
 
 impl Row {
@@ -175,8 +156,8 @@ impl Row {
         let held: Vec<Pair> = place.held.pairs.iter().map(|(pair, _)| *pair).collect();
         let ways: Result<_, Failure> = WAYS.iter().map(|&way| place.differences(way)).collect();
         let (pairs, held_pairs) = (place.world.pairs.len() as u64, held.len() as u64);
-        let (poses, shortfall) = (place.world.differences(&held, place.reach()), place.shortfall());
-        Ok(Self { world, size, offset, along, pairs, held_pairs, poses, ways: ways?, shortfall })
+        let poses = place.world.differences(&held, place.reach());
+        Ok(Self { world, size, offset, along, pairs, held_pairs, poses, ways: ways? })
     }
 
     /// Adds the same world at another time.
@@ -187,26 +168,6 @@ impl Row {
         for (sum, one) in self.ways.iter_mut().flatten().zip(later.ways.iter().flatten()) {
             *sum += *one;
         }
-        self.shortfall = self.shortfall.max(later.shortfall);
         self
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_shortfall_is_counted_in_what_a_box_is_widened_by() {
-        let ball = rapier3d::prelude::ColliderBuilder::ball(0.5).translation([1e7, 0.0, 0.0].into()).build();
-        // On x an ulp of 10^7 + 1, on the others one of 1; and 2^-17 of what the box reaches: 0.5.
-        let near = 2f64.powi(-23) + 2f64.powi(-18);
-        let found = units(&Aabb::from_center([1e7, 0.0, 0.0], [0.5; 3]), &ball);
-        for (found, right) in found.into_iter().zip([1.0 + 2f64.powi(-18), near, near]) {
-            assert!((found / right - 1.0).abs() < 1e-2, "{found}, not {right}");
-        }
-        let layout = Layout::crowd(100, 1.0, 1);
-        let shortfall = Place::new(&layout, layout.poses([1e5; 3])).shortfall();
-        assert!(shortfall > 0.0 && shortfall < 2.0, "{shortfall}: no more than is proved");
     }
 }

@@ -4,31 +4,18 @@
 
 use super::super::percent;
 use super::place::{IN_WORLD, Place, RAPIERS, Row, finder, rapiers};
-use crate::reordered::{Reordered, lower_first, sorted};
+use crate::reordered::KINDS;
 use crate::wide::{Differences, Layout, Pose, WideWorld, moved, to_f64};
 use pbig_harness::prelude::*;
 use pbig_harness::scenes::Scene;
 use pbig_harness::world::World;
-use rapier_pbig::PbigBroadPhase;
-use rapier3d::prelude::{BroadPhase, Collider, DefaultBroadPhase};
+use rapier3d::prelude::{BroadPhase, Collider};
 
 /// A scene, its name in tables, its bodies, and steps: bodies fall and come to lie; and lie from the first.
 type Scenery = (&'static str, &'static str, usize, usize);
 
 const SCENES: [Scenery; 2] =
     [("column", "column, simulated in f64", 1000, 180), ("pile", "pile, simulated in f64", 1000, 120)];
-
-/// Names a broad phase, and makes it.
-type Kind = (&'static str, fn() -> Box<dyn BroadPhase>);
-
-/// With which rapier simulates in f32. The second of each two differs from the first in order alone: which collider of a
-/// pair is the first is as stock has it; and events are sorted as ours are.
-const KINDS: [Kind; 4] = [
-    ("pbig", || Box::new(PbigBroadPhase::new())),
-    ("pbig lower first", || Box::new(Reordered(PbigBroadPhase::new(), lower_first))),
-    ("stock", || Box::new(DefaultBroadPhase::new())),
-    ("stock sorted", || Box::new(Reordered(DefaultBroadPhase::new(), sorted))),
-];
 
 /// Returns what boxes in f32 make of the worlds in f64, summed over all steps; and both tables.
 pub(super) fn simulated(offsets: &[f64], quick: bool) -> Result<(Vec<Row>, [Table; 2]), Failure> {
