@@ -21,15 +21,12 @@ pub(crate) fn run() -> Result<(), Failure> {
     ))?;
     let gpus = describe_adapters()?;
     print("self-test, 2000 boxes of each set against brute force:")?;
-    let mut wrong = test_cpu()?;
-    for (name, gpu) in gpus {
-        wrong.extend(test_gpu(&name, &gpu)?);
+    let searches = cpu_searches().into_iter().chain(gpus.iter().flat_map(gpu_searches));
+    let mut wrong = Vec::new();
+    for (name, find) in searches {
+        wrong.extend(test(&name, find)?);
     }
-    if wrong.is_empty() {
-        Ok(())
-    } else {
-        Err(Failure::Check(format!("self-test failed: {}", wrong.join(", "))))
-    }
+    check(wrong.is_empty(), || format!("self-test failed: {}", wrong.join(", ")))
 }
 
 /// Prints every adapter, and returns those on which the kernels can run.
@@ -91,38 +88,39 @@ fn describe(i: usize, adapter: &wgpu::Adapter, opened: &Result<GpuFinder, GpuErr
     )
 }
 
-/// Tests every search on the CPU; returns what was wrong.
-fn test_cpu() -> Result<Vec<String>, Failure> {
-    let mut wrong = Vec::new();
-    for (name, backend) in [("cpu", Backend::Cpu), ("brute", Backend::Brute)] {
-        let mut finder = Finder::new(Config { backend, ..Config::DEFAULT });
-        wrong.extend(test(name, |boxes| find(&mut finder, boxes))?);
-    }
+/// A search with its name.
+type Search = (String, Box<dyn FnMut(&[Aabb]) -> Result<Vec<Pair>, String>>);
+
+fn cpu_searches() -> Vec<Search> {
     let by_pbigs_grid = |boxes: &[Aabb]| {
         let mut pairs = pbig_grid(boxes, &GpuOptions::DEFAULT).map_err(|error| error.to_string())?.pairs;
         pairs.sort_unstable();
         Ok(pairs)
     };
-    wrong.extend(test("pbig grid", by_pbigs_grid)?);
-    Ok(wrong)
+    let with = |backend| Finder::new(Config { backend, ..Config::DEFAULT });
+    vec![
+        by("cpu", with(Backend::Cpu)),
+        by("brute", with(Backend::Brute)),
+        ("pbig grid".into(), Box::new(by_pbigs_grid)),
+    ]
 }
 
-/// Tests both codings on a device, always with the grid; returns what was wrong.
-fn test_gpu(name: &str, gpu: &GpuFinder) -> Result<Vec<String>, Failure> {
-    let mut wrong = Vec::new();
-    for (coding, words) in [(Coding::Plain, "plain"), (Coding::Packed, "packed")] {
+/// Returns a device's searches in both codings, always with the grid.
+fn gpu_searches((name, gpu): &(String, GpuFinder)) -> [Search; 2] {
+    [(Coding::Plain, "plain"), (Coding::Packed, "packed")].map(|(coding, words)| {
         let options = GpuOptions { coding, all_pairs_up_to: 0, ..GpuOptions::DEFAULT };
         let config = Config { backend: Backend::Gpu, gpu: options, ..Config::DEFAULT };
-        let mut finder = Finder::with_gpu(config, gpu.clone());
-        wrong.extend(test(&format!("{name} {words}"), |boxes| find(&mut finder, boxes))?);
-    }
-    Ok(wrong)
+        by(&format!("{name} {words}"), Finder::with_gpu(config, gpu.clone()))
+    })
 }
 
-/// Returns the pairs. A device that leaves the work to the CPU is an error.
-fn find(finder: &mut Finder, boxes: &[Aabb]) -> Result<Vec<Pair>, String> {
-    let pairs = finder.find(boxes).map_err(|error| error.to_string())?.to_vec();
-    finder.report().fallback.clone().map_or(Ok(pairs), Err)
+/// Returns a finder's search. A device that leaves the work to the CPU is an error.
+fn by(name: &str, mut finder: Finder) -> Search {
+    let find = move |boxes: &[Aabb]| {
+        let pairs = finder.find(boxes).map_err(|error| error.to_string())?.to_vec();
+        finder.report().fallback.clone().map_or(Ok(pairs), Err)
+    };
+    (name.into(), Box::new(find))
 }
 
 /// Tests a search on every set; returns what was wrong.

@@ -4,7 +4,7 @@
 
 mod search;
 
-pub use search::{Candidates, Found};
+pub(crate) use search::{Candidates, Found};
 
 use half::f16;
 use pbig_core::Aabb;

@@ -99,59 +99,54 @@ fn host(gpu: &GpuFinder, quick: bool) -> Result<Table, Failure> {
         let start = boxes("unit", n);
         let frames = [moved(&start, 1.0, 2), start];
         for (call, order) in [("unsorted", Order::Unspecified), ("sorted", Order::Sorted)] {
-            let (times, pairs) = host_of_searches(gpu, &frames, order)?;
-            table.row([cells![call, n, pairs], medians(&times)].concat());
+            table.row([cells![call, n], host_of_searches(gpu, &frames, order)?].concat());
         }
-        let (times, pairs) = host_of_updates(gpu, &frames)?;
-        table.row([cells!["update, 1% moved", n, pairs], medians(&times)].concat());
+        table.row([cells!["update, 1% moved", n], host_of_updates(gpu, &frames)?].concat());
     }
     Ok(table)
 }
 
-/// The host's times of a call.
-type Times = [f64; 6];
-
-fn medians(times: &[Times]) -> Vec<Value> {
-    (0..6).map(|k| Spread::of(times[WARM_UP..].iter().map(|times| times[k])).median.into()).collect()
-}
-
-/// Splits the time of a call.
-fn split(ms: f64, report: &Told, emit: f64) -> Result<Times, Failure> {
-    let gpu = on_device(report)?;
-    let [wait, upload, plan, record, decode] =
-        [gpu.wait, gpu.upload, gpu.plan, gpu.record, gpu.decode].map(milliseconds);
-    Ok([ms - wait, upload, plan, record, decode, emit])
-}
-
-fn host_of_searches(
-    gpu: &GpuFinder,
-    frames: &[Vec<Aabb>; 2],
-    order: Order,
-) -> Result<(Vec<Times>, usize), Failure> {
-    let mut finder = Finder::with_gpu(Config { order, ..ON_GPU }, gpu.clone());
+/// Returns the median of each of the host's times, by a call that gets the round and returns its milliseconds, the device's report,
+/// and the milliseconds of the sort.
+fn host_medians(
+    mut call: impl FnMut(usize) -> Result<(f64, GpuReport, f64), Failure>,
+) -> Result<Vec<Value>, Failure> {
     let mut times = Vec::new();
     for round in 0..WARM_UP + ROUNDS {
-        let ms = time(&mut finder, &frames[round % 2])?;
-        times.push(split(ms, finder.report(), milliseconds(finder.report().stages.emit))?);
+        let (ms, gpu, order) = call(round)?;
+        let [wait, upload, plan, record, decode] =
+            [gpu.wait, gpu.upload, gpu.plan, gpu.record, gpu.decode].map(milliseconds);
+        times.push([ms - wait, upload, plan, record, decode, order]);
     }
-    Ok((times, finder.pairs().len()))
+    let median = |k: usize| Spread::of(times[WARM_UP..].iter().map(|times| times[k])).median;
+    Ok((0..6).map(|k| median(k).into()).collect())
 }
 
-/// Measures updates without the calls that set the boxes.
-fn host_of_updates(gpu: &GpuFinder, [moved, start]: &[Vec<Aabb>; 2]) -> Result<(Vec<Times>, usize), Failure> {
+/// Returns the pairs, then the host's times.
+fn host_of_searches(gpu: &GpuFinder, frames: &[Vec<Aabb>; 2], order: Order) -> Result<Vec<Value>, Failure> {
+    let mut finder = Finder::with_gpu(Config { order, ..ON_GPU }, gpu.clone());
+    let times = host_medians(|round| {
+        let ms = time(&mut finder, &frames[round % 2])?;
+        let report = finder.report();
+        Ok((ms, on_device(report)?.clone(), milliseconds(report.stages.emit)))
+    })?;
+    Ok([cells![finder.pairs().len()], times].concat())
+}
+
+/// As [`host_of_searches`], of updates without the calls that set the boxes.
+fn host_of_updates(gpu: &GpuFinder, [moved, start]: &[Vec<Aabb>; 2]) -> Result<Vec<Value>, Failure> {
     let mut broad_phase = BroadPhase::with_gpu(ON_GPU, gpu.clone())?;
     let ids: Vec<u32> = (0..start.len() as u32).collect();
     broad_phase.set_many(&ids, |id| Some((start[id as usize], ProxyFilter::ALL)))?;
     broad_phase.update()?;
-    let mut times = Vec::new();
-    for round in 0..WARM_UP + ROUNDS {
+    let times = host_medians(|round| {
         let movers: Vec<u32> = ids.iter().copied().filter(|id| id % 100 == round as u32).collect();
         broad_phase.set_many(&movers, |id| Some((moved[id as usize], ProxyFilter::ALL)))?;
         let (done, ms) = timed(|| broad_phase.update().map(|_| ()));
         done?;
-        times.push(split(ms, broad_phase.report(), 0.0)?);
-    }
-    Ok((times, broad_phase.pair_count()))
+        Ok((ms, on_device(broad_phase.report())?.clone(), 0.0))
+    })?;
+    Ok([cells![broad_phase.pair_count()], times].concat())
 }
 
 /// Returns the medians of setting the boxes of the set `unit` that have moved by up to a tenth of an edge, and the update. The

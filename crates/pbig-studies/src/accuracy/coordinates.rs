@@ -49,7 +49,7 @@ pub(super) fn run(quick: bool) -> Result<Report, Failure> {
 /// Appends the rows of all kinds on the same candidates, in turn.
 fn measure(set: &str, n: usize, quick: bool, table: &mut Table) -> Result<(), Failure> {
     let boxes = BoxSet::named(set).expect("a set of the harness").boxes(n, 1);
-    let candidates = Candidates::new(&boxes).ok_or_else(|| Failure::Input(format!("{set}: not finite")))?;
+    let candidates = Candidates::new(&boxes);
     let (rounds, ms) = if quick { (7, 250) } else { (31, 4000) };
     let effort = Effort { warm_up: 2, rounds, budget: Duration::from_millis(ms) };
     let (mut kept, mut found) = (vec![], [(); KINDS.len()].map(|()| Vec::<Found>::new()));

@@ -39,7 +39,9 @@ fn rows(worlds: &[World]) -> Result<Vec<Row>, Failure> {
             let is_wanted = |offset: &f64| along == "diagonal" || (world.size == 1.0 && *offset > 0.0);
             for offset in OFFSETS.into_iter().filter(is_wanted) {
                 let place = Place::new(&world.layout, world.layout.poses(axes.map(|axis| axis * offset)));
-                rows.push(Row::new((world.name, world.size), (offset, along), &place)?);
+                let mut row = Row::new((world.name, world.size), (offset, along));
+                row.add(&place)?;
+                rows.push(row);
             }
         }
     }
@@ -141,8 +143,8 @@ mod tests {
     #[test]
     fn a_missed_pair_that_was_promised_is_a_failed_check() {
         let layout = &worlds(50).expect("worlds")[0].layout;
-        let place = Place::new(layout, layout.poses([1e3; 3]));
-        let mut row = Row::new(("crowd", 1.0), (1e3, "diagonal"), &place).expect("a row");
+        let mut row = Row::new(("crowd", 1.0), (1e3, "diagonal"));
+        row.add(&Place::new(layout, layout.poses([1e3; 3]))).expect("found");
         row.ways[1][0].missed = 5;
         assert!(check(&row).is_ok(), "nobody promises that of one");
         row.ways[MARGIN][0].missed = 5;

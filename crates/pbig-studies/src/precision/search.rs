@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 const MOST_CELLS: f64 = (1u64 << 23) as f64;
 
 /// Boxes in the order of their cells, and which of them are tested against which.
-pub struct Candidates {
+pub(crate) struct Candidates {
     scale: Scale,
     boxes: Vec<Aabb>,
     /// A box, and others in consecutive places.
@@ -16,37 +16,29 @@ pub struct Candidates {
 }
 
 /// The findings of tests in some kind of coordinates.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct Found {
-    /// Tests.
-    pub tests: u64,
-    /// Pairs that may overlap.
-    pub candidates: u64,
-    /// Number of these candidates that overlap.
-    pub pairs: u64,
-    /// Rounding the boxes.
-    pub encode: Duration,
-    /// Testing them.
-    pub test: Duration,
-    /// Testing in f32 what may overlap, where that is not exact.
-    pub recheck: Duration,
+#[derive(Clone, Copy, Default)]
+pub(crate) struct Found {
+    pub(crate) tests: u64,
+    /// Pairs that may overlap, and those of them that do.
+    pub(crate) candidates: u64,
+    pub(crate) pairs: u64,
+    /// Rounding the boxes, testing them, and testing in f32 what may overlap, where that is not exact.
+    pub(crate) encode: Duration,
+    pub(crate) test: Duration,
+    pub(crate) recheck: Duration,
 }
 
 impl Candidates {
-    /// Sorts boxes by cell. Returns none if there is no box, or if one is invalid or infinite.
-    pub fn new(boxes: &[Aabb]) -> Option<Self> {
-        let is_finite = |b: &Aabb| b.is_valid() && b.min.iter().chain(&b.max).all(|x| x.is_finite());
-        if boxes.is_empty() || !boxes.iter().all(is_finite) {
-            return None;
-        }
+    /// Sorts boxes by cell: valid and finite ones, at least one.
+    pub(crate) fn new(boxes: &[Aabb]) -> Self {
         let all = boxes.iter().fold(boxes[0], |all, b| all.union(b));
         let scale = scale(boxes, &all);
         let dims = std::array::from_fn(|k| scale.cell(k, all.max[k]) as usize + 1);
-        Some(sorted(boxes, scale, dims))
+        sorted(boxes, scale, dims)
     }
 
     /// Tests all that lie near each other; `kept` is room that is used again.
-    pub fn find<C: Coordinates>(&self, kept: &mut Vec<[u32; 2]>) -> Found {
+    pub(crate) fn find<C: Coordinates>(&self, kept: &mut Vec<[u32; 2]>) -> Found {
         let clock = Instant::now();
         let codes: Vec<C> = self.boxes.iter().map(|b| C::of(b, &self.scale)).collect();
         let encode = clock.elapsed();

@@ -130,8 +130,7 @@ pub(super) fn finder() -> Finder {
     Finder::new(Config { limits: Limits::UNLIMITED, ..Config::DEFAULT })
 }
 
-/// The results of a world at a place.
-#[derive(Clone)]
+/// The results of a world at a distance.
 pub(super) struct Row {
     pub(super) world: &'static str,
     pub(super) size: f64,
@@ -144,30 +143,24 @@ pub(super) struct Row {
     /// Boxes in f64 at the poses in f32, against the world.
     pub(super) poses: Differences,
     /// By way: against boxes in f64 at the same poses, and against the world.
-    pub(super) ways: Vec<[Differences; 2]>,
+    pub(super) ways: [[Differences; 2]; WAYS.len()],
 }
 
 impl Row {
-    pub(super) fn new(
-        (world, size): (&'static str, f64),
-        (offset, along): (f64, &'static str),
-        place: &Place<'_>,
-    ) -> Result<Self, Failure> {
-        let held: Vec<Pair> = place.held.pairs.iter().map(|(pair, _)| *pair).collect();
-        let ways: Result<_, Failure> = WAYS.iter().map(|&way| place.differences(way)).collect();
-        let (pairs, held_pairs) = (place.world.pairs.len() as u64, held.len() as u64);
-        let poses = place.world.differences(&held, place.reach());
-        Ok(Self { world, size, offset, along, pairs, held_pairs, poses, ways: ways? })
+    pub(super) fn new((world, size): (&'static str, f64), (offset, along): (f64, &'static str)) -> Self {
+        let (poses, ways) = Default::default();
+        Self { world, size, offset, along, pairs: 0, held_pairs: 0, poses, ways }
     }
 
-    /// Adds the same world at another time.
-    pub(super) fn and(mut self, later: &Self) -> Self {
-        self.pairs += later.pairs;
-        self.held_pairs += later.held_pairs;
-        self.poses += later.poses;
-        for (sum, one) in self.ways.iter_mut().flatten().zip(later.ways.iter().flatten()) {
-            *sum += *one;
+    /// Adds the world as it is at a time.
+    pub(super) fn add(&mut self, place: &Place<'_>) -> Result<(), Failure> {
+        let held: Vec<Pair> = place.held.pairs.iter().map(|(pair, _)| *pair).collect();
+        self.pairs += place.world.pairs.len() as u64;
+        self.held_pairs += held.len() as u64;
+        self.poses += place.world.differences(&held, place.reach());
+        for (sums, way) in self.ways.iter_mut().zip(WAYS) {
+            sums.iter_mut().zip(place.differences(way)?).for_each(|(sum, one)| *sum += one);
         }
-        self
+        Ok(())
     }
 }

@@ -42,15 +42,13 @@ fn run((scene, name, bodies, steps): Scenery, offset: f64, tables: &mut [Table; 
     let narrow =
         KINDS.map(|(_, make)| Ok(Narrow::new(Scene::named(scene)?.build(bodies, 1), offset, make())));
     let mut narrow = narrow.into_iter().collect::<Result<Vec<_>, Failure>>()?;
-    let mut sum: Option<Row> = None;
+    let mut row = Row::new((name, 1.0), (offset, "diagonal"));
     for _ in 0..steps {
         wide.step();
         let place = Place::new(&layout, wide.poses());
-        let now = Row::new((name, 1.0), (offset, "diagonal"), &place)?;
+        row.add(&place)?;
         narrow.iter_mut().try_for_each(|one| one.step(&place))?;
-        sum = Some(sum.map_or_else(|| now.clone(), |sum| sum.and(&now)));
     }
-    let row = sum.ok_or_else(|| Failure::Input("no steps".into()))?;
     let ends = wide.poses();
     let is_there = ends.iter().all(|pose| pose.translation.vector.norm().is_finite());
     check(is_there, || format!("{name}, {offset} away: a body is nowhere in f64"))?;
