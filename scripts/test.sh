@@ -144,7 +144,7 @@ step_rapier_0_36() {
     check cargo test --release $in_036 -p pbig-harness-036 --no-default-features --features enhanced-determinism
     check cargo run --release $in_036 --example falling_objects -- --bodies 500 --steps 60
     check env RUSTDOCFLAGS="-D warnings" \
-        cargo doc --release $in_036 -p rapier-pbig --features shadow --no-deps
+        cargo doc --release $in_036 -p rapier-pbig --features shadow,debug-render --no-deps
 }
 
 all="setup fmt clippy unit suite-cpu suite-gpu doc features packages wasm examples docs rapier-0.36"

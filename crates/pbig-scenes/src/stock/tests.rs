@@ -4,9 +4,9 @@ use super::*;
 use crate::scenes::Scene;
 use std::collections::BTreeSet;
 
-/// Largest distance, in metres, of two AABBs whose fat AABBs overlap: a margin of 1 cm for each, and what a collider moves
-/// before its fat AABB is stored again.
-const FAR: f32 = 0.1;
+/// By how much each AABB of a reported pair may have to grow until the two meet, in metres: a margin of 1 cm, what a collider
+/// moves before its fat AABB is stored again, and what it moves in the step after the broad phase, at up to 20 m/s.
+const FAR: f32 = 0.5;
 
 type Pairs = BTreeSet<[(u32, u32); 2]>;
 
