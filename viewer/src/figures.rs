@@ -136,8 +136,9 @@ mod tests {
 
     #[test]
     fn figures_name_scene_broad_phase_and_algorithm() {
-        let pbig = figures(Choice::Cpu, 3);
-        assert_eq!(pbig.scene, "column: 200 bodies, step 3");
+        // In the first step every box is new.
+        let pbig = figures(Choice::Cpu, 1);
+        assert_eq!(pbig.scene, "column: 200 bodies, step 1");
         assert_eq!(pbig.broad_phase, "pbig on the CPU");
         assert!(pbig.plan.join(" ").contains("tested against all 201"), "{:?}", pbig.plan);
         let stock = figures(Choice::Stock, 3);

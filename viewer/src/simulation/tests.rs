@@ -27,27 +27,30 @@ fn touching(world: &World) -> Vec<(ColliderHandle, ColliderHandle)> {
     pairs
 }
 
-fn missing(simulation: &Simulation) -> usize {
-    let world = &simulation.world;
-    let is_known = |&(a, b): &(_, _)| world.narrow_phase.contact_pair(a, b).is_some();
-    touching(world).iter().filter(|pair| !is_known(pair)).count()
+/// Makes a step, and returns how many pairs that touched at its start and touch at its end are unknown. Rapier 0.36 looks for
+/// pairs at the start of a step, rapier 0.27 at its end as well.
+fn missed_in_a_step(simulation: &mut Simulation) -> usize {
+    let before = touching(&simulation.world);
+    simulation.step();
+    let (after, narrow_phase) = (touching(&simulation.world), &simulation.world.narrow_phase);
+    let is_missed =
+        |pair: &&(_, _)| after.contains(pair) && narrow_phase.contact_pair(pair.0, pair.1).is_none();
+    before.iter().filter(is_missed).count()
 }
 
 #[test]
 fn the_world_goes_on_through_every_swap_and_no_pair_is_lost() {
     let mut simulation = column(Choice::Stock);
-    let (mut choice, mut steps) = (Choice::Stock, 0);
-    for _ in 0..7 {
-        (0..15).for_each(|_| simulation.step());
-        steps += 15;
-        assert_eq!((simulation.steps, missing(&simulation)), (steps, 0), "with {choice:?}");
+    let mut choice = Choice::Stock;
+    for swaps in 0..7 {
+        for step in 0..16 {
+            let missed = missed_in_a_step(&mut simulation);
+            assert_eq!((simulation.steps, missed), (16 * swaps + step + 1, 0), "with {choice:?}");
+        }
         assert!(!touching(&simulation.world).is_empty());
         choice = choice.next();
         simulation.swap(choice);
         assert_eq!(simulation.engine.choice(), choice);
-        simulation.step();
-        steps += 1;
-        assert_eq!(missing(&simulation), 0, "in the step after the swap to {choice:?}");
     }
 }
 
@@ -58,8 +61,7 @@ fn without_showing_the_world_pairs_are_lost() {
     (0..60).for_each(|_| simulation.step());
     simulation.world.narrow_phase = NarrowPhase::new();
     simulation.engine = Engine::new(Choice::Stock);
-    simulation.step();
-    assert!(missing(&simulation) > 0);
+    assert!(missed_in_a_step(&mut simulation) > 0);
 }
 
 #[test]
