@@ -1,4 +1,4 @@
-//! What differs between versions of rapier, apart from the broad phase: vectors, contacts and pbig's debug renderer.
+//! The differences between versions of rapier, apart from the broad phase: vectors, contacts and pbig's debug renderer.
 //! `rapier-0.36/viewer` has its own file of this name.
 
 use crate::cells::Cell;

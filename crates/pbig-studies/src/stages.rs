@@ -91,7 +91,7 @@ impl Alone {
     }
 }
 
-/// What is varied, its value, the number of boxes, and their share that moves, spread of sizes and pairs a box.
+/// The quantity that is varied, its value, the number of boxes, and their share that moves, spread of sizes and pairs a box.
 type Point = (&'static str, f64, usize, [f64; 3]);
 
 /// Returns the points of each varied quantity; `scratch`: of searches from nothing.

@@ -1,4 +1,4 @@
-//! What differs between versions of rapier, apart from the broad phase: vectors, contacts and pbig's debug renderer.
+//! The differences between versions of rapier, apart from the broad phase: vectors, contacts and pbig's debug renderer.
 
 use crate::cells::Cell;
 use crate::engine::Pbig;

@@ -109,7 +109,7 @@ fn the_comparison_notices_a_broad_phase_that_starts_empty() {
     assert!(compare(Choice::Stock, |it, choice| it.engine = Engine::new(choice)).is_err());
 }
 
-/// What falls and is pushed takes another way with another order of pairs. Still, no event comes twice, and none is lost.
+/// Bodies that fall and are pushed take another way with another order of pairs. Still, no event comes twice, and none is lost.
 #[test]
 fn no_pair_of_a_scene_starts_twice_or_stops_without_a_start() {
     for scene in ["column", "sensors", "conveyor"] {
