@@ -102,8 +102,12 @@ fn download(
     let patience = GpuOptions::DEFAULT.patience;
     let poll = wgpu::PollType::Wait { submission_index: None, timeout: Some(patience) };
     device.poll(poll).map_err(|_| GpuError::Timeout(patience))?;
-    let mut found: Vec<_> = receiver.try_iter().collect();
-    found.sort_by_key(|(place, _)| *place);
-    let refused = |error: wgpu::BufferAsyncError| GpuError::Refused(error.to_string());
-    found.into_iter().map(|(_, read)| read.map_err(refused)).collect()
+    let mut found = vec![Vec::new(); buffers.len()];
+    for _ in buffers {
+        // If another thread polls the device, that thread calls back, perhaps a moment later.
+        let received = receiver.recv_timeout(patience).map_err(|_| GpuError::Timeout(patience))?;
+        let (place, read): (usize, Result<_, wgpu::BufferAsyncError>) = received;
+        found[place] = read.map_err(|error| GpuError::Refused(error.to_string()))?;
+    }
+    Ok(found)
 }
