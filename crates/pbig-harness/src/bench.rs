@@ -135,18 +135,19 @@ pub fn timed<T>(call: impl FnOnce() -> T) -> (T, f64) {
 /// Returns mean, median, 99th percentile by nearest rank and maximum of all frames but the first, and the first; zeros for none.
 pub fn figures(ms: &[f64]) -> [f64; 5] {
     let Some((&first, rest)) = ms.split_first() else { return [0.0; 5] };
-    let mut sorted = rest.to_vec();
+    let [mean, median, p99, max] = summary(rest);
+    [mean, median, p99, max, first]
+}
+
+/// Returns mean, median, 99th percentile by nearest rank and maximum of some times; zeros for none.
+pub fn summary(ms: &[f64]) -> [f64; 4] {
+    let mut sorted = ms.to_vec();
     sorted.sort_unstable_by(f64::total_cmp);
     let count = sorted.len();
     let at = |place: usize| sorted.get(place).copied().unwrap_or(0.0);
     let mean = sorted.iter().sum::<f64>() / count.max(1) as f64;
-    [
-        mean,
-        at(count / 2),
-        at((99 * count).div_ceil(100).saturating_sub(1)),
-        at(count.saturating_sub(1)),
-        first,
-    ]
+    let p99 = (99 * count).div_ceil(100).saturating_sub(1);
+    [mean, at(count / 2), at(p99), at(count.saturating_sub(1))]
 }
 
 #[cfg(test)]
