@@ -1,11 +1,11 @@
-//! Kernels that only tests and studies run: Avril's mapping from indices to pairs, and the lazy way beside it.
+//! Kernels that only tests run: Avril's mapping from indices to pairs, and the lazy way beside it.
 
 use crate::{PAIR_INDEX, kernels};
 
 const LAZY: &str = include_str!("study/shared/lazy.wgsl");
 
 kernels! {
-    /// Every kernel of the studies.
+    /// Every kernel that only tests run.
     in "study/";
     /// Computes the pairs of given indices.
     INDEX_PAIRS "index_pairs" [PAIR_INDEX] (Params, Out);

@@ -9,7 +9,6 @@ pub mod duel;
 pub mod field;
 pub mod files;
 pub mod gpu_race;
-pub mod kernels;
 pub mod motions;
 pub mod options;
 pub mod output;

@@ -12,7 +12,7 @@ const GROUPS_PER_ROW: u32 = 32_768;
 
 /// A device to run single kernels on.
 #[derive(Debug)]
-pub struct Bench {
+pub(super) struct Bench {
     gpu: GpuFinder,
 }
 
@@ -21,7 +21,7 @@ impl Bench {
     ///
     /// # Errors
     /// If there is no adapter, or it gives no device that the kernels can run on.
-    pub fn new() -> Result<Self, GpuError> {
+    pub(super) fn new() -> Result<Self, GpuError> {
         Ok(Self { gpu: GpuFinder::new()? })
     }
 
@@ -31,7 +31,7 @@ impl Bench {
     ///
     /// # Errors
     /// If the device refuses the kernel or the buffers, is lost or does not answer in time.
-    pub fn run(
+    pub(super) fn run(
         &self,
         kernel: &'static Kernel,
         options: &GpuOptions,
