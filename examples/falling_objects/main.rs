@@ -8,7 +8,7 @@ use pbig_harness::chart::{Chart, Line, Plot};
 use pbig_harness::options::BackendOption;
 use pbig_harness::runner::{Run, Spread, StepTime};
 use pbig_harness::scenes::Scene;
-use pbig_harness::shadow::{Difference, Shadowed};
+use rapier_pbig::shadow::Difference;
 use rapier_pbig::{PbigBroadPhase, PbigConfig};
 use rapier3d::prelude::{BroadPhase, DefaultBroadPhase};
 use std::io::IsTerminal;
@@ -89,21 +89,17 @@ struct Checked {
 }
 
 fn check(args: &Args, broad_phase: PbigBroadPhase) -> Checked {
-    let shadow = Shadowed::new(broad_phase, PbigConfig::DEFAULT.margin).every(CHECK_EVERY);
-    let mut run = Run::new(args.scene, args.bodies as usize, args.seed, shadow);
+    let run = Run::new(args.scene, args.bodies as usize, args.seed, broad_phase);
+    let mut run = run.checked(PbigConfig::DEFAULT.margin, CHECK_EVERY);
     let bar = progress(args.steps.into());
     for _ in 0..args.steps {
         run.step();
         bar.inc(1);
     }
     bar.finish_and_clear();
-    let shadow = run.broad_phase.inner;
-    let missing = shadow.checker().differences.iter().filter(|d| d.fault.is_missing()).count();
-    Checked {
-        comparisons: shadow.checker().compared,
-        missing,
-        differences: shadow.checker().differences.clone(),
-    }
+    let checker = run.broad_phase.checker().expect("it is checked");
+    let missing = checker.differences.iter().filter(|d| d.fault.is_missing()).count();
+    Checked { comparisons: checker.compared, missing, differences: checker.differences.clone() }
 }
 
 fn print_table(stock: &Run<DefaultBroadPhase>, ours: &Run<PbigBroadPhase>, checked: &Checked) {

@@ -1,7 +1,7 @@
 //! A world whose every call of the broad phase is checked beside stock and the oracle.
 
 use pbig_core::{Backend, Coding, Config, Engine};
-use pbig_harness::shadow::Shadowed;
+use pbig_harness::runner::Timed;
 use pbig_harness::world::World;
 use rapier_pbig::{PbigBroadPhase, PbigConfig};
 use rapier3d::prelude::*;
@@ -9,7 +9,7 @@ use rapier3d::prelude::*;
 /// The world, and the broad phase with its checker around it.
 pub(crate) struct Checked {
     pub(crate) world: World,
-    pub(crate) broad_phase: Shadowed<PbigBroadPhase>,
+    pub(crate) broad_phase: Timed<PbigBroadPhase>,
     pub(crate) config: Config,
 }
 
@@ -49,8 +49,8 @@ impl Checked {
     /// Things stay where they are put: no gravity, and [`Checked::ball`]s that contacts cannot push.
     pub(crate) fn new(config: Config) -> Self {
         let world = World::with_gravity(glam::Vec3::ZERO);
-        let shadow = Shadowed::new(pbig(config), config.margin);
-        Self { world, broad_phase: shadow, config }
+        let broad_phase = Timed::new(pbig(config)).checked(config.margin, 1);
+        Self { world, broad_phase, config }
     }
 
     /// A ball of radius 0.5 on a body of its own that never sleeps.

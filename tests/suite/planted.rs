@@ -2,10 +2,10 @@
 
 use pbig_core::{Aabb, Pair, oracle};
 use pbig_harness::boxes::BoxSet;
+use pbig_harness::runner::{Run, Timed};
 use pbig_harness::scenes::Scene;
-use pbig_harness::shadow::Fault;
-use pbig_harness::simulate::{Task, run_checked};
 use pbig_tests::difference;
+use rapier_pbig::shadow::Fault;
 use rapier_pbig::{PbigBroadPhase, PbigConfig};
 use rapier3d::prelude::*;
 
@@ -114,26 +114,24 @@ fn the_shadow_checker_notices_each_fault_and_writes_the_frames() {
         (Plant::AddFar, &[Fault::Spurious]),
     ] {
         let scene = Scene::named("column").expect("the scene exists");
-        let task = Task { scene, bodies: 300, steps: 300, seed: 1 };
         let faulty = Faulty { inner: PbigBroadPhase::new(), plant, seen: 0 };
-        let margin = PbigConfig::DEFAULT.margin;
-        let (outcome, _) = run_checked(task, faulty, margin, folder.path(), |_| ());
-        let check = outcome.check.as_ref().expect("a check was asked for");
-        let first = check.differences.first().unwrap_or_else(|| panic!("{plant:?} was not noticed"));
+        let mut run = Run::new(scene, 300, 1, faulty).checked(PbigConfig::DEFAULT.margin, 1);
+        run.steps(300, || ());
+        let first = run.broad_phase.first_difference();
+        let first = first.unwrap_or_else(|| panic!("{plant:?} was not noticed"));
         assert!(faults.contains(&first.fault), "{plant:?}: {first}");
-        let file = check.frames_file.as_ref().expect("it failed").as_ref().expect("a writable folder");
-        let frames = pbig_harness::files::read_frames(file).expect("a replayable file");
+        let file = run.write_failure("column", folder.path()).expect("it failed").expect("a writable folder");
+        let frames = pbig_harness::files::read_frames(&file).expect("a replayable file");
         assert_eq!(frames.boxes, 301, "one box for each collider");
     }
 }
 
 #[test]
 fn the_shadow_checker_notices_a_collider_paired_with_itself() {
-    use pbig_harness::shadow::Shadowed;
     let world = Scene::named("column").expect("the scene exists").build(300, 1);
     let handles: Vec<ColliderHandle> = world.colliders.iter().map(|(handle, _)| handle).collect();
     let faulty = Faulty { inner: PbigBroadPhase::new(), plant: Plant::WithItself, seen: 99 };
-    let mut shadow = Shadowed::new(faulty, PbigConfig::DEFAULT.margin);
+    let mut shadow = Timed::new(faulty).checked(PbigConfig::DEFAULT.margin, 1);
     // Without a narrow phase, which would panic. Large boxes, so that there are pairs at once.
     let params = IntegrationParameters { normalized_prediction_distance: 1.0, ..world.params };
     shadow.update(&params, &world.colliders, &world.bodies, &handles, &[], &mut Vec::new());

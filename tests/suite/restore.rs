@@ -4,7 +4,6 @@ use crate::checked::{backends, everywhere, pbig};
 use pbig_core::{Backend, Config, GpuFinder};
 use pbig_harness::runner::Timed;
 use pbig_harness::scenes::Scene;
-use pbig_harness::shadow::Shadowed;
 use pbig_harness::world::World;
 use pbig_tests::needs_gpu;
 use rapier_pbig::shadow::Shadow;
@@ -91,7 +90,7 @@ fn a_fresh_broad_phase_beside_a_restored_world_finds_what_sleeps_and_what_is_fix
     for (name, config) in backends() {
         let (mut world, ours) = sleeping_pile(config);
         let before = edges(&world);
-        let mut fresh = Shadowed::new(pbig(config), config.margin);
+        let mut fresh = Timed::new(pbig(config)).checked(config.margin, 1);
         world = copy(&world);
         world
             .add(RigidBodyBuilder::dynamic().translation(vector![0.0, 8.0, 0.0]), ColliderBuilder::ball(0.4));
@@ -173,9 +172,8 @@ fn a_running_world_goes_over_from_rapiers_broad_phase_to_ours() {
     world.step(&mut ours);
     let known: BTreeSet<_> = ours.pairs().map(unordered).collect();
     assert_eq!(known, edges(&world), "both know the same pairs");
-    let mut shadow = Shadowed::new(ours, PbigConfig::DEFAULT.margin);
-    let pairs: Vec<ColliderPair> = shadow.inner.pairs().collect();
-    shadow.start_over(pairs);
+    let mut shadow = Timed::new(ours).checked(PbigConfig::DEFAULT.margin, 1);
+    shadow.watcher.as_mut().expect("it is checked").start_over_with(shadow.inner.pairs());
     steps(&mut world, &mut shadow, 60);
     assert!(shadow.first_difference().is_none(), "{}", shadow.first_difference().expect("one"));
 }

@@ -4,7 +4,6 @@
 
 use crate::checked::{Checked, everywhere};
 use crate::upstream::{add, held, sensed, touching};
-use pbig_harness::runner::Timed;
 use pbig_harness::world::World;
 use rapier3d::prelude::*;
 
@@ -350,15 +349,14 @@ fn pairs_of_a_stack_at_rest_are_never_deleted() {
             let body = RigidBodyBuilder::dynamic().translation(vector![0.0, 0.5 + k as f32, 0.0]);
             add(&mut scene, body.can_sleep(false), ColliderBuilder::cuboid(0.5, 0.5, 0.5));
         }
-        let Checked { mut world, broad_phase, .. } = scene;
-        let mut counted = Timed::new(broad_phase);
+        let Checked { mut world, broad_phase: mut counted, .. } = scene;
         for step in 0..100 {
             world.step(&mut counted);
             let touching =
                 world.narrow_phase.contact_pairs().filter(|pair| pair.has_any_active_contact).count();
             assert_eq!((counted.added, counted.removed, touching), (4, 0, 4), "step {step}");
         }
-        if let Some(first) = counted.inner.first_difference() {
+        if let Some(first) = counted.first_difference() {
             panic!("{first}");
         }
     });

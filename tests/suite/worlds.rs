@@ -2,10 +2,8 @@
 
 use crate::checked::pbig;
 use pbig_core::{Backend, Config, Engine};
-use pbig_harness::runner::Run;
+use pbig_harness::runner::{Run, Timed};
 use pbig_harness::scenes::Scene;
-use pbig_harness::shadow::Shadowed;
-use pbig_harness::simulate::{Task, run_checked};
 use pbig_harness::world::World;
 use rapier_pbig::{PbigBroadPhase, PbigConfig};
 use rapier3d::prelude::*;
@@ -15,19 +13,15 @@ const MOST_BODIES: usize = 1000;
 
 fn check(scene: Scene, config: Config, steps: usize) {
     let bodies = scene.default_bodies.min(MOST_BODIES);
-    let task = Task { scene, bodies, steps, seed: 11 };
-    let folder = std::env::temp_dir();
-    let ours = pbig(config);
-    let (outcome, ours) = run_checked(task, ours, config.margin, &folder, |_| ());
-    let check = outcome.check.as_ref().expect("a check was asked for");
-    assert!(!outcome.failed(), "{}: {}", scene.name, check.differences[0]);
-    assert_eq!(
-        ours.stats().report.fallback,
-        None,
-        "{}: a GPU's work must not be done by the CPU",
-        scene.name
-    );
-    assert!(check.calls > 0 && check.oracle_pairs > 0, "{}: nothing was compared", scene.name);
+    let mut run = Run::new(scene, bodies, 11, pbig(config)).checked(config.margin, 1);
+    run.steps(steps, || ());
+    if let Some(first) = run.broad_phase.first_difference() {
+        panic!("{}: {first}; {:?}", scene.name, run.write_failure(scene.name, &std::env::temp_dir()));
+    }
+    let fallback = &run.broad_phase.inner.stats().report.fallback;
+    assert_eq!(*fallback, None, "{}: a GPU's work must not be done by the CPU", scene.name);
+    let checker = run.broad_phase.checker().expect("it is checked");
+    assert!(checker.compared > 0 && checker.oracle_pairs > 0, "{}: nothing was compared", scene.name);
 }
 
 #[test]
@@ -132,7 +126,7 @@ fn upstream_14_objects_that_fall_for_ever_are_still_found_at_the_same_cost() {
             let at = glam::vec3((i % 10) as f32 * 0.9, 0.0, (i / 10) as f32 * 0.9);
             world.add(World::dynamic(at).linear_damping(0.0), ColliderBuilder::ball(0.5));
         }
-        let mut broad_phase = Shadowed::new(pbig(config), config.margin).every(50);
+        let mut broad_phase = Timed::new(pbig(config)).checked(config.margin, 50);
         let mut most_bytes = 0;
         for _ in 0..if name == "cpu" { 2000 } else { 700 } {
             world.step(&mut broad_phase);

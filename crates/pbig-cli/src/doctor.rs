@@ -23,8 +23,8 @@ pub(crate) fn run() -> Result<(), Failure> {
     print("self-test, 2000 boxes of each set against brute force:")?;
     let searches = cpu_searches().into_iter().chain(gpus.iter().flat_map(gpu_searches));
     let mut wrong = Vec::new();
-    for (name, find) in searches {
-        wrong.extend(test(&name, find)?);
+    for search in searches {
+        wrong.extend(test(search)?);
     }
     check(wrong.is_empty(), || format!("self-test failed: {}", wrong.join(", ")))
 }
@@ -92,11 +92,8 @@ fn describe(i: usize, adapter: &wgpu::Adapter, opened: &Result<GpuFinder, GpuErr
 type Search = (String, Box<dyn FnMut(&[Aabb]) -> Result<Vec<Pair>, String>>);
 
 fn cpu_searches() -> Vec<Search> {
-    let by_pbigs_grid = |boxes: &[Aabb]| {
-        let mut pairs = pbig_grid(boxes, &GpuOptions::DEFAULT).map_err(|error| error.to_string())?.pairs;
-        pairs.sort_unstable();
-        Ok(pairs)
-    };
+    let by_pbigs_grid =
+        |boxes: &[Aabb]| Ok(pbig_grid(boxes, &GpuOptions::DEFAULT).map_err(|error| error.to_string())?.pairs);
     let with = |backend| Finder::new(Config { backend, ..Config::DEFAULT });
     vec![
         by("cpu", with(Backend::Cpu)),
@@ -124,10 +121,7 @@ fn by(name: &str, mut finder: Finder) -> Search {
 }
 
 /// Tests a search on every set; returns what was wrong.
-fn test(
-    name: &str,
-    mut find: impl FnMut(&[Aabb]) -> Result<Vec<Pair>, String>,
-) -> Result<Vec<String>, Failure> {
+fn test((name, mut find): Search) -> Result<Vec<String>, Failure> {
     let mut wrong = Vec::new();
     for set in BoxSet::ALL {
         let boxes = set.boxes(2000, 1);

@@ -2,7 +2,7 @@
 
 use crate::options::{MOST_THREADS, plan_text, search_text, stages, up_to, with_threads};
 use pbig_core::{Aabb, Config, Finder};
-use pbig_harness::files::{check_pairs_path, read_boxes, write_pairs};
+use pbig_harness::files::{BOXES_OR_PAIRS, ending, read_boxes, write_pairs};
 use pbig_harness::options::BackendOption;
 use pbig_harness::prelude::*;
 use std::path::{Path, PathBuf};
@@ -33,7 +33,7 @@ pub(crate) struct Args {
 
 pub(crate) fn run(args: &Args) -> Result<(), Failure> {
     if let Some(output) = &args.output {
-        check_pairs_path(output)?;
+        ending(output, &BOXES_OR_PAIRS)?;
     }
     let boxes = read_boxes(&args.input)?;
     if args.strict {

@@ -1,8 +1,8 @@
 //! `pbig replay`: the incremental path over frames of boxes.
 
 use crate::options::{margin, plan_text, search_text, stages};
-use pbig_core::{BroadPhase, Config, Pair, ProxyFilter};
-use pbig_harness::files::{FrameBox, Frames, check_csv_path, read_frames, write_csv};
+use pbig_core::{Aabb, BroadPhase, Config, Error, Pair, ProxyFilter};
+use pbig_harness::files::{Frames, ending, read_frames, write_csv};
 use pbig_harness::options::BackendOption;
 use pbig_harness::prelude::*;
 use std::path::PathBuf;
@@ -34,20 +34,21 @@ struct Replay {
     added: u64,
     removed: u64,
     invalid: u64,
+    keep_lines: bool,
 }
 
 pub(crate) fn run(args: &Args) -> Result<(), Failure> {
     if let Some(output) = &args.output {
-        check_csv_path(output)?;
+        ending(output, &["csv"])?;
     }
     let frames = read_frames(&args.frames)?;
     let config = Config { margin: args.margin, backend: args.backend.backend(), ..Config::DEFAULT };
     let about = |error| Failure::Input(format!("{}: {}", args.frames.display(), search_text(&error)));
     let mut broad_phase =
         BroadPhase::new(config).map_err(|error| Failure::Input(format!("--margin: {error}")))?;
-    let mut replay = Replay::default();
-    for (number, frame) in tracked(frames.frames.iter().enumerate(), "frames") {
-        replay.step(&mut broad_phase, number, frame, args.output.is_some()).map_err(about)?;
+    let mut replay = Replay { keep_lines: args.output.is_some(), ..Replay::default() };
+    for frame in tracked(&frames.frames, "frames") {
+        replay.step(&mut broad_phase, frame).map_err(about)?;
     }
     if let Some(output) = &args.output {
         write_csv(output, "frame,event,a,b", std::mem::take(&mut replay.lines))?;
@@ -56,20 +57,14 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
 }
 
 impl Replay {
-    fn step(
-        &mut self,
-        broad_phase: &mut BroadPhase,
-        number: usize,
-        frame: &[FrameBox],
-        keep_lines: bool,
-    ) -> Result<(), pbig_core::Error> {
+    fn step(&mut self, broad_phase: &mut BroadPhase, frame: &[Option<Aabb>]) -> Result<(), Error> {
         // Pairs of a box that leaves end here: the broad phase ends them without an event.
         let mut left: Vec<Pair> = Vec::new();
         let clock = Instant::now();
         for (id, now) in frame.iter().enumerate() {
             match now {
-                FrameBox::Present(aabb) => broad_phase.set(id as u32, *aabb, ProxyFilter::ALL)?,
-                FrameBox::Absent => {
+                Some(aabb) => broad_phase.set(id as u32, *aabb, ProxyFilter::ALL)?,
+                None => {
                     left.extend(broad_phase.pairs_of(id as u32));
                     broad_phase.remove(id as u32);
                 }
@@ -78,18 +73,18 @@ impl Replay {
         broad_phase.update()?;
         self.times.push(milliseconds(clock.elapsed()));
         self.invalid += broad_phase.report().invalid;
-        self.count(broad_phase, number, left, keep_lines);
+        self.count(broad_phase, left);
         Ok(())
     }
 
-    fn count(&mut self, broad_phase: &BroadPhase, number: usize, left: Vec<Pair>, keep_lines: bool) {
+    fn count(&mut self, broad_phase: &BroadPhase, mut removed: Vec<Pair>) {
         let events = broad_phase.events();
-        let mut removed = left;
         removed.extend_from_slice(&events.removed);
         removed.sort_unstable();
         self.added += events.added.len() as u64;
         self.removed += removed.len() as u64;
-        if keep_lines {
+        if self.keep_lines {
+            let number = self.times.len() - 1;
             let line = |sign: char| move |pair: &Pair| format!("{number},{sign},{},{}", pair.a, pair.b);
             self.lines.extend(removed.iter().map(line('-')));
             self.lines.extend(events.added.iter().map(line('+')));

@@ -2,12 +2,13 @@
 
 use crate::options::{MOST_BODIES, up_to};
 use pbig_harness::options::BackendOption;
-use pbig_harness::output::{Failure, print, progress};
+use pbig_harness::prelude::*;
+use pbig_harness::runner::{Run, StepTime};
 use pbig_harness::scenes::Scene;
-use pbig_harness::simulate::{Check, Outcome, Task, run as run_scene, run_checked};
+use rapier_pbig::shadow::Checker;
 use rapier_pbig::{PbigBroadPhase, PbigConfig};
-use rapier3d::prelude::DefaultBroadPhase;
-use std::path::Path;
+use rapier3d::prelude::{BroadPhase, DefaultBroadPhase};
+use std::path::{Path, PathBuf};
 
 #[derive(clap::Args)]
 pub(crate) struct Args {
@@ -48,25 +49,14 @@ pub(crate) fn list() -> Result<(), Failure> {
 pub(crate) fn run(args: &Args) -> Result<(), Failure> {
     let scene = Scene::named(&args.scene)?;
     let bodies = args.bodies.unwrap_or(scene.default_bodies);
-    let task = Task { scene, bodies, steps: args.steps, seed: args.seed };
     refuse_what_stock_ignores(args)?;
-    let bar = progress(args.steps, "steps");
+    if args.broad_phase == "stock" {
+        return finish(args, bodies, Run::new(scene, bodies, args.seed, DefaultBroadPhase::new()), |_| None);
+    }
     let config = PbigConfig { backend: args.backend.backend(), ..PbigConfig::DEFAULT };
     let ours = PbigBroadPhase::with_config(config).expect("the default margin is a length");
-    let step = |_| bar.inc(1);
-    let (outcome, ours) = if args.broad_phase == "stock" {
-        (run_scene(task, DefaultBroadPhase::new(), step).0, None)
-    } else {
-        let run = if args.check {
-            run_checked(task, ours, config.margin, Path::new("."), step)
-        } else {
-            run_scene(task, ours, step)
-        };
-        (run.0, Some(run.1))
-    };
-    bar.finish_and_clear();
-    report(args, bodies, &outcome, ours.as_ref())?;
-    if outcome.failed() { Err(Failure::Check(failure_line(&outcome))) } else { Ok(()) }
+    let run = Run::new(scene, bodies, args.seed, ours);
+    finish(args, bodies, if args.check { run.checked(config.margin, 1) } else { run }, |ours| Some(ours))
 }
 
 fn refuse_what_stock_ignores(args: &Args) -> Result<(), Failure> {
@@ -75,74 +65,88 @@ fn refuse_what_stock_ignores(args: &Args) -> Result<(), Failure> {
     if args.check && args.broad_phase == "stock" { Err(Failure::Input(what.into())) } else { Ok(()) }
 }
 
-/// The first difference and where the frames are.
-fn failure_line(outcome: &Outcome) -> String {
-    let check = outcome.check.as_ref();
-    let first = check.and_then(|c| c.differences.first()).map_or(String::new(), ToString::to_string);
-    match check.and_then(|c| c.frames_file.as_ref()) {
-        Some(Ok(file)) => format!("{first}; the frames up to there are in {}", file.display()),
-        Some(Err(why)) => format!("{first}; the frames could not be written: {why}"),
-        None => first,
-    }
-}
-
-/// Prints the outcome; `ours` is the broad phase, if it is pbig's.
-fn report(
+/// Runs the scene and prints what came of it. `ours` returns the broad phase, if it is pbig's.
+fn finish<B: BroadPhase>(
     args: &Args,
     bodies: usize,
-    outcome: &Outcome,
+    mut run: Run<B>,
+    ours: fn(&B) -> Option<&PbigBroadPhase>,
+) -> Result<(), Failure> {
+    let bar = progress(args.steps, "steps");
+    run.steps(args.steps, || bar.inc(1));
+    bar.finish_and_clear();
+    let frames = run.write_failure(&args.scene, Path::new("."));
+    let file = frames.as_ref().and_then(|frames| frames.as_ref().ok());
+    report(args, bodies, &run, ours(&run.broad_phase.inner), file)?;
+    let (Some(first), Some(frames)) = (run.broad_phase.first_difference(), frames) else { return Ok(()) };
+    Err(Failure::Check(match frames {
+        Ok(file) => format!("{first}; the frames up to there are in {}", file.display()),
+        Err(why) => format!("{first}; the frames could not be written: {why}"),
+    }))
+}
+
+fn report<B: BroadPhase>(
+    args: &Args,
+    bodies: usize,
+    run: &Run<B>,
     ours: Option<&PbigBroadPhase>,
+    file: Option<&PathBuf>,
 ) -> Result<(), Failure> {
     let fallback = ours.and_then(|ours| ours.stats().report.fallback.as_deref());
     let backend = if ours.is_some() { args.backend.in_use(fallback) } else { "cpu" };
+    let spread = |of: fn(&StepTime) -> f64| Spread::of(run.times.iter().map(of));
+    let (broad_phase, step) = (spread(|time| time.broad_phase), spread(|time| time.step));
+    let (colliders, steps, pairs) = (run.world.colliders.len(), run.times.len(), run.pairs());
+    let (added, removed) = (run.broad_phase.added, run.broad_phase.removed);
+    let checker = run.broad_phase.checker();
     if args.json {
         let object = serde_json::json!({
             "scene": args.scene,
             "bodies": bodies,
-            "colliders": outcome.colliders,
-            "steps": outcome.steps,
+            "colliders": colliders,
+            "steps": steps,
             "broad_phase": args.broad_phase,
             "backend": backend,
             "adapter": ours.and_then(PbigBroadPhase::adapter),
-            "ms": { "broad_phase": outcome.broad_phase, "step": outcome.step },
-            "pairs": outcome.pairs,
-            "added": outcome.added,
-            "removed": outcome.removed,
+            "ms": { "broad_phase": broad_phase, "step": step },
+            "pairs": pairs,
+            "added": added,
+            "removed": removed,
             "updates": ours.map_or(0, |ours| ours.stats().totals.updates),
             "fallback": fallback,
-            "check": outcome.check.as_ref().map(check_object),
+            "check": checker.map(|checker| check_object(checker, file)),
         });
         return print(&object.to_string());
     }
     let note = fallback.map_or(String::new(), |why| format!("\nnote: {why}"));
-    let Outcome { colliders, steps, broad_phase, step, pairs, added, removed, check } = outcome;
     print(&format!(
         "{}: {bodies} bodies, {colliders} colliders, {steps} steps with the {} broad phase\n\
          a step: broad phase {broad_phase}, all {step}\n\
          {pairs} pairs at the end; {added} added, {removed} removed\n{}{note}",
         args.scene,
         args.broad_phase,
-        check.as_ref().map_or(String::new(), check_line),
+        checker.map_or(String::new(), check_line),
     ))
 }
 
-fn check_object(check: &Check) -> serde_json::Value {
+fn missing(checker: &Checker) -> usize {
+    checker.differences.iter().filter(|difference| difference.fault.is_missing()).count()
+}
+
+/// Returns the checker's results; `file` has the frames of a failure.
+fn check_object(checker: &Checker, file: Option<&PathBuf>) -> serde_json::Value {
     serde_json::json!({
-        "calls": check.calls,
-        "oracle_pairs": check.oracle_pairs,
-        "stock_only": check.stock_only,
-        "missing": check.missing(),
-        "differences": check.differences.iter().map(ToString::to_string).collect::<Vec<_>>(),
-        "frames_file": check.frames_file.as_ref().and_then(|file| file.as_ref().ok()),
+        "calls": checker.compared,
+        "oracle_pairs": checker.oracle_pairs,
+        "stock_only": checker.stock_only,
+        "missing": missing(checker),
+        "differences": checker.differences.iter().map(ToString::to_string).collect::<Vec<_>>(),
+        "frames_file": file,
     })
 }
 
-fn check_line(check: &Check) -> String {
-    format!(
-        "checked {} calls: {} missing pairs of {} that the oracle found; {} pairs that only stock reports",
-        check.calls,
-        check.missing(),
-        check.oracle_pairs,
-        check.stock_only
-    )
+fn check_line(checker: &Checker) -> String {
+    let Checker { compared, oracle_pairs, stock_only, .. } = checker;
+    let of_the_oracle = format!("{} missing pairs of {oracle_pairs} that the oracle found", missing(checker));
+    format!("checked {compared} calls: {of_the_oracle}; {stock_only} pairs that only stock reports")
 }

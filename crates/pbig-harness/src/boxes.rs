@@ -11,25 +11,19 @@ use rand_distr::{Distribution, Normal};
 pub struct BoxSet {
     /// The name on the command line.
     pub name: &'static str,
-    /// A description in a few words.
-    pub about: &'static str,
     make: fn(usize, &mut StdRng) -> Vec<Aabb>,
 }
 
 impl BoxSet {
     /// Every set.
     pub const ALL: [Self; 6] = [
-        Self::new("uniform", "PBIG 6.1: centres uniform in 10^4 cubed, edges 1 to 100", uniform),
-        Self::new("gaussian", "PBIG 6.3: centres normal, deviation 1000", gaussian),
-        Self::new("unit", "unit cubes, density 1/4, about one pair a box", unit),
-        Self::new("mixed", "edges log-uniform from 0.1 to 10, about one pair a box", mixed),
-        Self::new("pile", "a settled lattice, 10 to 12 neighbours a box", pile),
-        Self::new("degenerate", "every kind of bad, flat, far, huge and identical box", degenerate),
+        Self { name: "uniform", make: uniform }, // PBIG 6.1: centres uniform in 10^4 cubed, edges 1 to 100
+        Self { name: "gaussian", make: gaussian }, // PBIG 6.3: centres normal, deviation 1000
+        Self { name: "unit", make: unit },       // unit cubes, density 1/4, about one pair a box
+        Self { name: "mixed", make: mixed },     // edges log-uniform from 0.1 to 10, about one pair a box
+        Self { name: "pile", make: pile },       // a settled lattice, 10 to 12 neighbours a box
+        Self { name: "degenerate", make: degenerate }, // every kind of bad, flat, far, huge and identical box
     ];
-
-    const fn new(name: &'static str, about: &'static str, make: fn(usize, &mut StdRng) -> Vec<Aabb>) -> Self {
-        Self { name, about, make }
-    }
 
     /// The set with this name.
     pub fn named(name: &str) -> Option<Self> {

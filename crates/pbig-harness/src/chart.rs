@@ -159,7 +159,7 @@ impl Plot {
         let mut y = 48;
         for (line, colour) in self.lines() {
             area.draw(&Rectangle::new([(4, y - 4), (20, y + 4)], colour.filled()))?;
-            for text in wrapped(&line.name) {
+            for text in textwrap::wrap(&line.name, LEGEND_LETTERS) {
                 let style = ("sans-serif", TEXT).into_font();
                 area.draw(&Text::new(text, (26, y - 7), style))?;
                 y += 18;
@@ -168,20 +168,6 @@ impl Plot {
         }
         Ok(())
     }
-}
-
-/// Splits a name between words into lines of the legend.
-fn wrapped(name: &str) -> Vec<String> {
-    let mut lines = vec![String::new()];
-    for word in name.split(' ') {
-        let last = lines.last_mut().expect("one line at least");
-        match last.is_empty() {
-            true => last.push_str(word),
-            false if last.len() + word.len() < LEGEND_LETTERS => last.extend([" ", word]),
-            false => lines.push(word.to_owned()),
-        }
-    }
-    lines
 }
 
 /// One axis.

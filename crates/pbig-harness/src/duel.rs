@@ -32,12 +32,10 @@ impl BroadPhase for Both {
     ) {
         let Self { ours, stock, ours_first, discarded } = self;
         discarded.clear();
-        if *ours_first {
-            ours.update(params, colliders, bodies, modified, removed, events);
-        }
-        stock.update(params, colliders, bodies, modified, removed, discarded);
-        if !*ours_first {
-            ours.update(params, colliders, bodies, modified, removed, events);
+        let mut turns: [(&mut dyn BroadPhase, _); 2] = [(ours, events), (stock, discarded)];
+        turns.rotate_left(usize::from(!*ours_first));
+        for (side, events) in turns {
+            side.update(params, colliders, bodies, modified, removed, events);
         }
     }
 }

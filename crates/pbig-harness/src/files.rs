@@ -7,22 +7,19 @@ mod npy;
 pub use npy::{npy_boxes, npy_frames};
 
 use ndarray::Array2;
-use ndarray_npy::WriteNpyExt;
 use pbig_core::{Aabb, Pair};
 use std::fs::File;
 use std::io::{BufWriter, Write};
 use std::path::Path;
 
+/// The endings of a file of boxes, and of one of pairs.
+pub const BOXES_OR_PAIRS: [&str; 2] = ["npy", "csv"];
+
 /// The columns of a `.csv` file.
 const COLUMNS: [&str; 6] = ["min_x", "min_y", "min_z", "max_x", "max_y", "max_z"];
 
-/// A message about a file, in one line that names it.
-pub type FileError = String;
-
-/// A message about the content of a file whose name is not known yet.
-type ContentError = String;
-
-fn at(path: &Path, what: impl std::fmt::Display) -> FileError {
+/// Returns a message about a file, in one line that names it. Messages about the content alone do not know the name.
+fn at(path: &Path, what: impl std::fmt::Display) -> String {
     format!("{}: {}", path.display(), one_line(what))
 }
 
@@ -39,17 +36,17 @@ fn brief(text: &str) -> String {
 
 /// A list of boxes: `.npy` (N,6) float32 or float64 (rounded outward), or `.csv` with the columns
 /// min_x,min_y,min_z,max_x,max_y,max_z (rounded to nearest, which never parts two boxes that touch).
-pub fn read_boxes(path: &Path) -> Result<Vec<Aabb>, FileError> {
-    read(path, if ending(path, &["npy", "csv"])? == "npy" { npy_boxes } else { csv_boxes })
+pub fn read_boxes(path: &Path) -> Result<Vec<Aabb>, String> {
+    read(path, if ending(path, &BOXES_OR_PAIRS)? == "npy" { npy_boxes } else { csv_boxes })
 }
 
 /// Frames of boxes: `.npy` (F,N,6) float32 or float64 (rounded outward).
-pub fn read_frames(path: &Path) -> Result<Frames, FileError> {
+pub fn read_frames(path: &Path) -> Result<Frames, String> {
     ending(path, &["npy"])?;
     read(path, npy_frames)
 }
 
-fn read<T>(path: &Path, content: fn(&[u8]) -> Result<T, ContentError>) -> Result<T, FileError> {
+fn read<T>(path: &Path, content: fn(&[u8]) -> Result<T, String>) -> Result<T, String> {
     let bytes = std::fs::read(path).map_err(|error| at(path, error))?;
     content(&bytes).map_err(|what| at(path, what))
 }
@@ -59,38 +56,23 @@ fn read<T>(path: &Path, content: fn(&[u8]) -> Result<T, ContentError>) -> Result
 pub struct Frames {
     /// Boxes in each frame.
     pub boxes: usize,
-    /// The frames.
-    pub frames: Vec<Vec<FrameBox>>,
-}
-
-/// A box of a frame.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum FrameBox {
-    /// All six values are NaN: the box is not there.
-    Absent,
-    /// A box, perhaps an invalid one.
-    Present(Aabb),
-}
-
-impl FrameBox {
-    fn of(v: [f64; 6]) -> Self {
-        if v.iter().all(|x| x.is_nan()) { Self::Absent } else { Self::Present(f64_box(v)) }
-    }
+    /// The frames, each with its boxes, perhaps invalid ones. None: all six values are NaN, the box is not there.
+    pub frames: Vec<Vec<Option<Aabb>>>,
 }
 
 fn f64_box(v: [f64; 6]) -> Aabb {
     Aabb::from_f64([v[0], v[1], v[2]], [v[3], v[4], v[5]])
 }
 
-/// Returns which of these endings a file has, in small letters.
-fn ending<'a>(path: &Path, known: &[&'a str]) -> Result<&'a str, FileError> {
+/// Returns which of these endings a file has, in small letters. For a file to write, call it before the work, not after.
+pub fn ending<'a>(path: &Path, known: &[&'a str]) -> Result<&'a str, String> {
     let has = path.extension().and_then(|ending| ending.to_str()).unwrap_or_default();
     let found = known.iter().find(|known| known.eq_ignore_ascii_case(has)).copied();
     found.ok_or_else(|| at(path, format!("expected a file that ends in .{}", known.join(" or ."))))
 }
 
 /// The content of a `.csv` file of boxes, see [`read_boxes`].
-pub fn csv_boxes(bytes: &[u8]) -> Result<Vec<Aabb>, ContentError> {
+pub fn csv_boxes(bytes: &[u8]) -> Result<Vec<Aabb>, String> {
     let text = text(bytes)?;
     let mut reader =
         csv::ReaderBuilder::new().has_headers(false).flexible(true).trim(csv::Trim::All).from_reader(bytes);
@@ -106,7 +88,7 @@ pub fn csv_boxes(bytes: &[u8]) -> Result<Vec<Aabb>, ContentError> {
     Ok(boxes)
 }
 
-fn text(bytes: &[u8]) -> Result<&str, ContentError> {
+fn text(bytes: &[u8]) -> Result<&str, String> {
     std::str::from_utf8(bytes).map_err(|error| {
         let before = &bytes[..error.valid_up_to()];
         let line = 1 + before.iter().filter(|&&byte| byte == b'\n').count();
@@ -126,7 +108,7 @@ fn plain(field: &str) -> &str {
 }
 
 /// Returns a message about the whole file rather than a value.
-fn wrong_throughout(record: &csv::StringRecord, number: usize) -> Option<ContentError> {
+fn wrong_throughout(record: &csv::StringRecord, number: usize) -> Option<String> {
     for (separator, name) in [(';', "semicolons"), ('\t', "tabs")] {
         if record.iter().any(|field| field.contains(separator)) {
             return Some(format!("values are separated by {name}; expected commas"));
@@ -158,35 +140,19 @@ fn csv_box(record: &csv::StringRecord) -> Result<Aabb, String> {
     Ok(Aabb::new([a, b, c], [d, e, f]))
 }
 
-/// Checks that [`write_pairs`] knows the extension. Call it before the work, not after.
-pub fn check_pairs_path(path: &Path) -> Result<(), FileError> {
-    ending(path, &["npy", "csv"]).map(|_| ())
-}
-
 /// Pairs as `.npy` (K,2) uint32 or `.csv`.
-pub fn write_pairs(path: &Path, pairs: &[Pair]) -> Result<(), FileError> {
-    if ending(path, &["npy", "csv"])? == "csv" {
+pub fn write_pairs(path: &Path, pairs: &[Pair]) -> Result<(), String> {
+    if ending(path, &BOXES_OR_PAIRS)? == "csv" {
         return write_csv(path, "a,b", pairs.iter().map(|p| format!("{},{}", p.a, p.b)));
     }
     let flat = pairs.iter().flat_map(|p| [p.a, p.b]).collect();
     let array = Array2::from_shape_vec((pairs.len(), 2), flat).map_err(|error| at(path, error))?;
-    let mut file = BufWriter::new(File::create(path).map_err(|error| at(path, error))?);
-    array.write_npy(&mut file).map_err(|error| at(path, error))?;
-    file.flush().map_err(|error| at(path, error))
-}
-
-/// Checks that [`write_csv`] accepts the extension. Call it before the work, not after.
-pub fn check_csv_path(path: &Path) -> Result<(), FileError> {
-    ending(path, &["csv"]).map(|_| ())
+    ndarray_npy::write_npy(path, &array).map_err(|error| at(path, error))
 }
 
 /// A text file of a header and lines.
-pub fn write_csv(
-    path: &Path,
-    header: &str,
-    lines: impl IntoIterator<Item = String>,
-) -> Result<(), FileError> {
-    check_csv_path(path)?;
+pub fn write_csv(path: &Path, header: &str, lines: impl IntoIterator<Item = String>) -> Result<(), String> {
+    ending(path, &["csv"])?;
     let write = || -> std::io::Result<()> {
         let mut file = BufWriter::new(File::create(path)?);
         writeln!(file, "{header}")?;

@@ -17,8 +17,6 @@ pub mod pbig_grid;
 pub mod prelude;
 pub mod report;
 pub mod runner;
-pub mod shadow;
-pub mod simulate;
 pub mod table;
 
 pub use pbig_scenes::{scenes, world};

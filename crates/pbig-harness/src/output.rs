@@ -1,7 +1,8 @@
 //! The output of a program, and its exit status.
 
+use indicatif::{ProgressBar, ProgressFinish, ProgressStyle};
 use std::fmt;
-use std::io::{ErrorKind, IsTerminal, Write};
+use std::io::{ErrorKind, Write};
 use std::process::ExitCode;
 
 /// The reason why the program ends with a status other than 0.
@@ -67,13 +68,10 @@ pub fn finish(program: &str, result: Result<(), Failure>) -> ExitCode {
 }
 
 /// A progress bar on stderr, when that is a terminal.
-pub fn progress(length: usize, what: &'static str) -> indicatif::ProgressBar {
-    if !std::io::stderr().is_terminal() {
-        return indicatif::ProgressBar::hidden();
-    }
-    let style = indicatif::ProgressStyle::with_template("{msg} {wide_bar} {pos}/{len} {eta}");
-    let bar = indicatif::ProgressBar::new(length as u64).with_message(what);
-    style.map_or(bar.clone(), |style| bar.with_style(style)).with_finish(indicatif::ProgressFinish::AndClear)
+pub fn progress(length: usize, what: &'static str) -> ProgressBar {
+    let style = ProgressStyle::with_template("{msg} {wide_bar} {pos}/{len} {eta}").expect("a template");
+    let bar = ProgressBar::new(length as u64).with_message(what).with_style(style);
+    bar.with_finish(ProgressFinish::AndClear)
 }
 
 /// Returns the items one by one, and shows how many are done.

@@ -171,15 +171,13 @@ impl PbigFound {
         let range = grid.offsets[key] as usize..grid.offsets[key + 1] as usize;
         let entries = &grid.entries[range];
         let n = entries.len() as u32;
+        let mut check = |i, j| self.check_in_cell(grid, key, entries[i as usize], entries[j as usize]);
         if n <= small_cell {
-            for k in 0..pair_count(n.into()) {
-                let (i, j) = pair_of(k, n.into());
-                self.check_in_cell(grid, key, entries[i as usize], entries[j as usize]);
-            }
-            return;
-        }
-        for (i, j) in (0..n).flat_map(|row| (0..row_len(row, n)).map(move |k| row_pair(row, k, n))) {
-            self.check_in_cell(grid, key, entries[i as usize], entries[j as usize]);
+            let pairs = (0..pair_count(n.into())).map(|k| pair_of(k, n.into()));
+            pairs.for_each(|(i, j)| check(i as u32, j as u32));
+        } else {
+            let pairs = (0..n).flat_map(|row| (0..row_len(row, n)).map(move |k| row_pair(row, k, n)));
+            pairs.for_each(|(i, j)| check(i, j));
         }
     }
 

@@ -1,27 +1,50 @@
-//! Runs a scene step by step and measures the broad phase and the whole step.
+//! Runs a scene step by step, measures the broad phase and the whole step, and checks the pairs where that is wanted.
 
 use crate::scenes::Scene;
 use crate::world::World;
+use rapier_pbig::shadow::{Call, Checker, Difference, ReplayError, Shadow, Watcher, write_frames};
 use rapier3d::prelude::*;
 use std::fmt;
+use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
-/// A broad phase with a clock around it.
+/// Any broad phase with a clock around it, and a checker beside it where that is wanted.
 pub struct Timed<B> {
     /// The broad phase.
     pub inner: B,
     /// Time inside since the last [`Timed::take`].
     time: Duration,
+    /// Time that the checker has taken in the present step.
+    checking: Duration,
     /// `AddPair` events so far.
     pub added: u64,
     /// `DeletePair` events so far.
     pub removed: u64,
+    /// The checker, beside stock and the oracle.
+    pub watcher: Option<Watcher>,
 }
 
 impl<B> Timed<B> {
-    /// Starts at zero.
+    /// Starts at zero, without a checker.
     pub fn new(inner: B) -> Self {
-        Self { inner, time: Duration::ZERO, added: 0, removed: 0 }
+        let (time, checking) = Default::default();
+        Self { inner, time, checking, added: 0, removed: 0, watcher: None }
+    }
+
+    /// Adds a checker, which compares in one of `every` calls that modify something. `relative_margin` as in [`Watcher::new`].
+    pub fn checked(self, relative_margin: f32, every: usize) -> Self {
+        let watcher = Watcher::new(relative_margin).with(Shadow::Stock).with(Shadow::Oracle);
+        Self { watcher: Some(watcher.every(every)), ..self }
+    }
+
+    /// Returns the checker's counts and differences.
+    pub fn checker(&self) -> Option<&Checker> {
+        self.watcher.as_ref().map(|watcher| &watcher.checker)
+    }
+
+    /// Returns the first thing that was wrong.
+    pub fn first_difference(&self) -> Option<&Difference> {
+        self.checker()?.differences.first()
     }
 
     /// The time since the last call.
@@ -48,10 +71,15 @@ impl<B: BroadPhase> BroadPhase for Timed<B> {
         let added = events[before..].iter().filter(is_added).count();
         self.added += added as u64;
         self.removed += (events.len() - before - added) as u64;
+        if let Some(watcher) = &mut self.watcher {
+            let clock = Instant::now();
+            watcher.watch(&Call { params, colliders, bodies, modified, removed }, &events[before..]);
+            self.checking += clock.elapsed();
+        }
     }
 }
 
-/// Milliseconds of one step.
+/// Milliseconds of one step, without its checks.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct StepTime {
     /// Inside the broad phase, all its calls.
@@ -76,11 +104,27 @@ impl<B: BroadPhase> Run<B> {
         Self { world: scene.build(bodies, seed), broad_phase: Timed::new(broad_phase), times: Vec::new() }
     }
 
+    /// Adds a checker, see [`Timed::checked`].
+    pub fn checked(self, relative_margin: f32, every: usize) -> Self {
+        Self { broad_phase: self.broad_phase.checked(relative_margin, every), ..self }
+    }
+
+    /// Makes so many steps, or those up to the first difference. `progress` is called after each.
+    pub fn steps(&mut self, steps: usize, mut progress: impl FnMut()) {
+        for _ in 0..steps {
+            self.step();
+            progress();
+            if self.broad_phase.first_difference().is_some() {
+                break;
+            }
+        }
+    }
+
     /// One step, measured.
     pub fn step(&mut self) {
         let clock = Instant::now();
         self.world.step(&mut self.broad_phase);
-        let step = milliseconds(clock.elapsed());
+        let step = milliseconds(clock.elapsed() - std::mem::take(&mut self.broad_phase.checking));
         let broad_phase = milliseconds(self.broad_phase.take());
         self.times.push(StepTime { broad_phase, step });
     }
@@ -88,6 +132,14 @@ impl<B: BroadPhase> Run<B> {
     /// Pairs that the narrow phase knows: edges of contacts and of intersections.
     pub fn pairs(&self) -> usize {
         self.world.pairs().count()
+    }
+
+    /// Writes the boxes of the calls up to the first difference into a folder, for `pbig replay`. Returns the file, or why it
+    /// cannot be written; none without a difference.
+    pub fn write_failure(&self, scene: &str, folder: &Path) -> Option<Result<PathBuf, ReplayError>> {
+        self.broad_phase.first_difference()?;
+        let file = folder.join(format!("pbig-{scene}-{}-failed.npy", self.times.len()));
+        Some(write_frames(&file, &self.broad_phase.checker()?.frames).map(|()| file))
     }
 }
 

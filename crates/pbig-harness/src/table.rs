@@ -2,6 +2,7 @@
 
 use crate::chart::Line;
 use serde_json::Map;
+use std::collections::HashSet;
 
 /// A label, a number, or nothing where nothing was measured.
 pub use serde_json::Value;
@@ -100,9 +101,8 @@ impl Table {
     /// Returns how many of the first columns it takes to tell all rows apart.
     fn labels(&self) -> usize {
         let is_enough = |count: &usize| {
-            let mut labels: Vec<String> = self.rows.iter().map(|row| label(&row[..*count])).collect();
-            labels.sort_unstable();
-            labels.windows(2).all(|two| two[0] != two[1])
+            let labels: HashSet<String> = self.rows.iter().map(|row| label(&row[..*count])).collect();
+            labels.len() == self.rows.len()
         };
         (1..self.columns.len()).find(is_enough).unwrap_or(1)
     }

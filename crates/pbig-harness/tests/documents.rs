@@ -106,25 +106,15 @@ fn faults(document: &str, results: impl Fn(&str) -> Known) -> (Vec<String>, usiz
     (faults, blocks)
 }
 
-fn documents(folder: &Path, found: &mut Vec<PathBuf>) {
-    for entry in std::fs::read_dir(folder).expect("a folder").flatten() {
-        let path = entry.path();
-        if path.is_dir() {
-            documents(&path, found);
-        } else if path.extension().is_some_and(|ending| ending == "md") {
-            found.push(path);
-        }
-    }
-}
-
 #[test]
 fn numbers_in_documents_are_measured_ones() {
-    let mut paths = vec![root().join("README.md")];
-    documents(&root().join("docs"), &mut paths);
+    let files = walkdir::WalkDir::new(root().join("docs"));
+    let files = files.into_iter().map(|entry| entry.expect("a readable folder").into_path());
+    let documents = files.filter(|path| path.extension().is_some_and(|ending| ending == "md"));
     let read = |path: &Path| {
         std::fs::read_to_string(path).unwrap_or_else(|error| panic!("{}: {error}", path.display()))
     };
-    for path in paths {
+    for path in documents.chain([root().join("README.md")]) {
         let (faults, _) = faults(&read(&path), |file| Known::of(&read(&root().join(file))));
         assert!(faults.is_empty(), "{}: {faults:#?}", path.display());
     }

@@ -262,7 +262,7 @@ fn an_entry_that_lost_its_mark_costs_pairs() {
     let wanted = after_twin(twin("check_small"), &before);
     before.entries.iter_mut().for_each(|entry| *entry &= !MOVED);
     let before = with_capacity_for(&before, &wanted);
-    let found = on_device(bench(), twin("check_small"), &GpuOptions::DEFAULT, &before);
+    let found = on_device(gpu(), twin("check_small"), &GpuOptions::DEFAULT, &before);
     let fault = compare_checks(&before, &found, &wanted).expect("pairs are missing");
     assert!(fault.starts_with("missing"), "{fault}");
 }

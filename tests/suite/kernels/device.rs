@@ -3,25 +3,25 @@
 use super::*;
 
 /// Returns the device that all tests share.
-pub(super) fn bench() -> &'static Bench {
-    static BENCH: OnceLock<Bench> = OnceLock::new();
-    BENCH.get_or_init(|| Bench::new().expect("a device, be it a software one"))
+pub(super) fn gpu() -> &'static GpuFinder {
+    static GPU: OnceLock<GpuFinder> = OnceLock::new();
+    GPU.get_or_init(|| GpuFinder::new().expect("a device, be it a software one"))
 }
 
 /// Returns the device, or none if `PBIG_GPU=none`.
-pub(super) fn benches() -> Option<&'static Bench> {
-    (!without_gpu()).then(bench)
+pub(super) fn gpus() -> Option<&'static GpuFinder> {
+    (!without_gpu()).then(gpu)
 }
 
 /// Runs a kernel on a state, and returns the state afterwards.
-pub(super) fn on_device(bench: &Bench, twin: &Twin, options: &GpuOptions, before: &State) -> State {
+pub(super) fn on_device(gpu: &GpuFinder, twin: &Twin, options: &GpuOptions, before: &State) -> State {
     let mut after = before.clone();
     let bindings = twin.kernel.bindings;
     let buffers: Vec<_> = bindings.iter().map(|&buffer| padded(after.bytes(buffer))).collect();
     let groups = (twin.groups)(before);
     let changes = before.finds_changes();
-    let left =
-        bench.run(twin.kernel, options, changes, &buffers, groups).expect("the device runs the kernel");
+    let left = single::run(gpu, twin.kernel, options, changes, &buffers, groups)
+        .expect("the device runs the kernel");
     for (&buffer, left) in bindings.iter().zip(&left) {
         let own = after.bytes(buffer);
         let len = own.len();
@@ -59,7 +59,7 @@ pub(super) fn after_twin(twin: &Twin, before: &State) -> State {
 pub(super) fn fault(twin: &Twin, options: &GpuOptions, before: &State) -> Option<String> {
     let wanted = after_twin(twin, before);
     let before = with_capacity_for(before, &wanted);
-    let found = on_device(benches()?, twin, options, &before);
+    let found = on_device(gpus()?, twin, options, &before);
     let fault = (twin.compare)(&before, &found, &wanted)?;
     Some(format!("{}: {fault}", twin.kernel.name))
 }

@@ -99,7 +99,7 @@ fn index_fault(root: u32, before: &State) -> Option<String> {
     let options = GpuOptions { root, ..GpuOptions::DEFAULT };
     let kernel = twin("index_pairs");
     let wanted = after_twin(kernel, before);
-    let found = on_device(bench(), kernel, &options, &with_capacity_for(before, &wanted));
+    let found = on_device(gpu(), kernel, &options, &with_capacity_for(before, &wanted));
     let far = if matches!(root, 1 | 5) { 2 + before.params.boxes / 500 } else { 2 };
     let rows = found.out.iter().zip(&wanted.out).step_by(3);
     let worst = rows.max_by_key(|(estimate, row)| estimate.abs_diff(**row))?;

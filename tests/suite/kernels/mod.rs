@@ -28,12 +28,11 @@ use pbig_core::layout::{
     Motion, NO_LEVEL, PACKED, Params, RAW, SHORT_ROW, Slot, SmallItem, Totals, WAS_ABSENT, WINDOW, halves,
     wide,
 };
-use pbig_core::{Aabb, GpuOptions, Pair, ProxyFilter, oracle};
+use pbig_core::{Aabb, GpuFinder, GpuOptions, Pair, ProxyFilter, oracle};
 use pbig_harness::boxes::BoxSet;
 use pbig_harness::pair_index::{index_of, pair_count, pair_of};
 use pbig_shaders::{self as shaders, Buffer, KERNELS, Kernel};
 use pbig_tests::{corpus, difference, needs_gpu, without_gpu};
-use single::Bench;
 use sort::*;
 use state::*;
 use std::fmt::Debug;
@@ -297,8 +296,8 @@ fn nothing_is_checked_once_there_are_too_many_pairs() {
         before.out = vec![0; 1 << 16];
         before.chunk.word_capacity = 1 << 16;
         before.chunk.pairs_left = halves(wide(NEARLY) - 1);
-        if let Some(bench) = benches() {
-            let found = on_device(bench, twin(kernel), &GpuOptions::DEFAULT, &before);
+        if let Some(gpu) = gpus() {
+            let found = on_device(gpu, twin(kernel), &GpuOptions::DEFAULT, &before);
             assert_eq!((found.totals, &found.out), (before.totals, &before.out), "{kernel}");
         }
     }
@@ -313,7 +312,7 @@ fn the_checks_count_output_that_does_not_fit_and_write_nothing_there() {
             let wanted = after_twin(twin(kernel), &before);
             let mut before = with_capacity_for(&before, &wanted);
             before.chunk.word_capacity = hits(&wanted) as u32 / 2;
-            let found = on_device(bench(), twin(kernel), &GpuOptions::DEFAULT, &before);
+            let found = on_device(gpu(), twin(kernel), &GpuOptions::DEFAULT, &before);
             assert_eq!(same("counts", &counts(&found), &counts(&wanted)), None, "{kernel}, flags {flags}");
             assert_eq!(words_fault(&found, &wanted), None, "{kernel}, flags {flags}");
             let beyond = &found.out[before.chunk.word_capacity as usize..];
@@ -332,8 +331,8 @@ fn schedule_counts_items_that_do_not_fit_and_writes_nothing_there() {
     let Counters { entries, slots, small_items, large_items, .. } = wanted.counters;
     let [slots, small, large] = [slots, small_items, large_items].map(|n| n / 2);
     set_capacities(&mut before.params, &[entries, slots, small, large]);
-    if let Some(bench) = benches() {
-        let found = on_device(bench, twin("schedule"), &GpuOptions::DEFAULT, &before);
+    if let Some(gpu) = gpus() {
+        let found = on_device(gpu, twin("schedule"), &GpuOptions::DEFAULT, &before);
         assert_eq!(found.counters, wanted.counters);
         assert_eq!(capacity_fault(&found.slots, slots, &wanted.slots), None);
         assert_eq!(capacity_fault(&found.large_items, large, &wanted.large_items), None);
@@ -365,7 +364,7 @@ fn scatter_writes_nothing_without_capacity_for_all() {
     needs_gpu!();
     let mut before = State::before("scatter", &pile());
     before.params.entry_capacity -= 1;
-    let found = on_device(bench(), twin("scatter"), &GpuOptions::DEFAULT, &before);
+    let found = on_device(gpu(), twin("scatter"), &GpuOptions::DEFAULT, &before);
     assert_eq!(same("entries", &found.entries, &before.entries), None);
     assert_eq!(same("cells", &found.cells, &before.cells), None);
 }
@@ -435,7 +434,7 @@ fn an_entry_that_lost_a_bit_costs_pairs() {
         *entry = if *entry & lost == lost { *entry & !(1 << AXIS_BITS) } else { *entry };
     }
     let before = with_capacity_for(&before, &wanted);
-    let found = on_device(bench(), twin("check_small"), &GpuOptions::DEFAULT, &before);
+    let found = on_device(gpu(), twin("check_small"), &GpuOptions::DEFAULT, &before);
     let fault = compare_checks(&before, &found, &wanted).expect("pairs are missing");
     assert!(fault.starts_with("missing"), "{fault}");
 }

@@ -9,13 +9,14 @@ mod ops;
 use crate::checked::{on_cpu, on_gpu, pbig};
 use ops::{Op, any_op, apply};
 use pbig_core::Config;
-use pbig_harness::shadow::Shadowed;
+use pbig_harness::runner::Timed;
 use pbig_harness::world::World;
 use pbig_tests::{engines, needs_gpu};
 use proptest::collection::vec;
 use proptest::prelude::ProptestConfig;
 use proptest::test_runner::{RngAlgorithm, TestCaseError, TestError, TestRng, TestRunner};
 use rapier_pbig::PbigBroadPhase;
+use rapier_pbig::shadow::Watcher;
 use rapier3d::prelude::*;
 use std::cell::Cell;
 use std::collections::HashMap;
@@ -113,7 +114,7 @@ struct Tally {
     runs: u64,
     ops: u64,
     steps: u64,
-    /// Steps after which rapier's broad phase was still compared with: see `Shadowed::has_stock`.
+    /// Steps after which rapier's broad phase was still compared with: see `Watcher::has_stock`.
     beside_stock: u64,
     oracle_pairs: u64,
     contacts: u64,
@@ -176,7 +177,7 @@ impl Outcome {
 /// The world, and the broad phase with its checker around it.
 struct Scene {
     world: World,
-    broad_phase: Shadowed<Subject>,
+    broad_phase: Timed<Subject>,
     config: Config,
     tally: Tally,
 }
@@ -186,7 +187,7 @@ impl Scene {
         let mut world = World::with_gravity(glam::Vec3::ZERO);
         // With CCD, calls between the two of a step, for a part of it.
         world.params.max_ccd_substeps = 3;
-        let broad_phase = Shadowed::new(Subject::new(config, plant), config.margin);
+        let broad_phase = Timed::new(Subject::new(config, plant)).checked(config.margin, 1);
         Self { world, broad_phase, config, tally: Tally { runs: 1, ..Tally::default() } }
     }
 
@@ -206,7 +207,7 @@ impl Scene {
                 }
                 // Else it adds all pairs again, which does rapier no harm.
                 let known = if adopts { self.world.pairs().collect() } else { vec![] };
-                self.broad_phase.start_over(known);
+                self.watcher().start_over_with(known);
                 self.broad_phase.inner.pbig = fresh;
             }
             op => apply(&mut self.world, op),
@@ -240,8 +241,12 @@ impl Scene {
         let touching = self.world.narrow_phase.contact_pairs().filter(|pair| pair.has_any_active_contact);
         self.tally.contacts += touching.count() as u64;
         self.tally.steps += 1;
-        self.tally.beside_stock += u64::from(self.broad_phase.has_stock());
-        self.tally.oracle_pairs = self.broad_phase.checker().oracle_pairs;
+        self.tally.beside_stock += u64::from(self.watcher().has_stock());
+        self.tally.oracle_pairs = self.watcher().checker.oracle_pairs;
+    }
+
+    fn watcher(&mut self) -> &mut Watcher {
+        self.broad_phase.watcher.as_mut().expect("it is checked")
     }
 
     fn outcome(&self) -> Outcome {

@@ -3,7 +3,7 @@
 
 use super::memory;
 use glam::Vec3;
-use pbig_harness::shadow::Shadowed;
+use pbig_harness::runner::Timed;
 use pbig_harness::world::World;
 use rand::rngs::StdRng;
 use rand::{RngExt, SeedableRng};
@@ -113,7 +113,7 @@ fn soak_of_a_rapier_world_that_comes_and_goes() {
         let steps = steps();
         let mut tray = Tray::new();
         let weighed = Weighed { inner: PbigBroadPhase::new(), bytes: 0 };
-        let mut broad_phase = Shadowed::new(weighed, PbigConfig::DEFAULT.margin).every((steps / 5000).max(1));
+        let mut broad_phase = Timed::new(weighed).checked(PbigConfig::DEFAULT.margin, (steps / 5000).max(1));
         let mut early = 0;
         for step in 0..steps {
             tray.churn(step);
@@ -121,13 +121,10 @@ fn soak_of_a_rapier_world_that_comes_and_goes() {
             let bytes = broad_phase.inner.bytes;
             early = if step < steps / 5 { bytes.max(early) } else { early };
             assert!(bytes <= early * 5 / 4 + 8000, "step {step}: {bytes} bytes are held, at first {early}");
-            assert!(
-                broad_phase.first_difference().is_none(),
-                "step {step}: {:?}",
-                broad_phase.checker().differences
-            );
+            let differences = &broad_phase.checker().expect("it is checked").differences;
+            assert!(differences.is_empty(), "step {step}: {differences:?}");
         }
-        let checker = broad_phase.checker();
+        let checker = broad_phase.checker().expect("it is checked");
         assert!(checker.compared > 0 && checker.oracle_pairs as usize > 10 * checker.compared, "few pairs");
         println!(
             "{steps} steps, {} compared, {} bytes held, at first {early}",

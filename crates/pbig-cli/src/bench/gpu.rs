@@ -1,8 +1,9 @@
 //! `pbig bench gpu`: the GPU beside the CPU, kernel by kernel, and the host's part of a call.
 
-use pbig_core::{Aabb, Backend, BroadPhase, Config, Finder, GpuFinder, GpuOptions, Limits, Order};
-use pbig_core::{GpuReport, ProxyFilter, Report as Told};
-use pbig_harness::gpu_race::race;
+use pbig_core::{
+    Aabb, Backend, BroadPhase, Config, Finder, GpuFinder, GpuOptions, GpuReport, Limits, Order, ProxyFilter,
+};
+use pbig_harness::gpu_race::{on_device, race};
 use pbig_harness::prelude::*;
 
 const CONFIG: Config = Config { limits: Limits::UNLIMITED, ..Config::DEFAULT };
@@ -78,12 +79,6 @@ fn search(gpu: &GpuFinder, set: &str, n: usize) -> Result<([f64; 2], u64, GpuRep
 fn time(finder: &mut Finder, boxes: &[Aabb]) -> Result<f64, Failure> {
     let (found, ms) = timed(|| finder.find(boxes).map(|_| ()));
     Ok(found.map(|()| ms)?)
-}
-
-/// Returns the report of the device. A call that the device left to the CPU is no measurement, but an error.
-fn on_device(report: &Told) -> Result<&GpuReport, Failure> {
-    let why = || Failure::Check(report.fallback.clone().unwrap_or_default());
-    report.gpu.as_ref().ok_or_else(why)
 }
 
 /// Calls whose host's part is measured, and calls before these, which allocate and plan.

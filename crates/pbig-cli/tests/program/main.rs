@@ -5,24 +5,18 @@ mod refused;
 mod replay;
 mod usage;
 
-use ndarray::{Array2, Array3, ShapeBuilder};
-use ndarray_npy::{ReadNpyExt, WriteNpyExt};
+use ndarray::{Array, Array2, Array3, Dimension, ShapeBuilder};
+use ndarray_npy::{WritableElement, read_npy, write_npy};
 use pbig_core::{Aabb, Pair, oracle};
 use pbig_harness::boxes::BoxSet;
 use pbig_harness::scenes::Scene;
 use serde_json::Value;
-use std::fs::File;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::{Command, Output};
 
 fn pbig(folder: &Path, args: &[&str]) -> Output {
     let mut command = Command::new(env!("CARGO_BIN_EXE_pbig"));
     command.current_dir(folder).args(args).output().expect("the program starts")
-}
-
-/// As `pbig`, where there is no GPU.
-fn pbig_without_gpu(folder: &Path, args: &[&str]) -> Output {
-    pbig_where(folder, "WGPU_ADAPTER_NAME", "no such adapter", args)
 }
 
 /// As `pbig`, where a variable has a value.
@@ -39,8 +33,8 @@ fn json(output: &Output) -> Value {
     serde_json::from_str(&text).unwrap_or_else(|error| panic!("not one JSON object: {error}: {text}"))
 }
 
-/// Exit status 2 and one line on stderr that contains all the words.
-fn refused(output: &Output, words: &[&str]) {
+/// Checks that the exit status is 2 and that the one line on stderr contains all the words; returns the line.
+fn refused(output: &Output, words: &[&str]) -> String {
     let line = String::from_utf8_lossy(&output.stderr);
     assert_eq!(output.status.code(), Some(2), "{line}");
     assert_eq!(line.lines().count(), 1, "{line}");
@@ -48,6 +42,7 @@ fn refused(output: &Output, words: &[&str]) {
     for word in words {
         assert!(line.contains(word), "'{word}' is not in: {line}");
     }
+    line.trim_end().into()
 }
 
 fn six(b: &Aabb) -> [f32; 6] {
@@ -58,18 +53,12 @@ fn array(boxes: &[Aabb]) -> Array2<f32> {
     Array2::from_shape_fn((boxes.len(), 6), |(i, k)| six(&boxes[i])[k])
 }
 
-fn save<T: ndarray_npy::WritableElement, D: ndarray::Dimension>(
-    folder: &Path,
-    name: &str,
-    array: &ndarray::Array<T, D>,
-) -> PathBuf {
-    let path = folder.join(name);
-    array.write_npy(File::create(&path).expect("a new file")).expect("written");
-    path
+fn save<T: WritableElement, D: Dimension>(folder: &Path, name: &str, array: &Array<T, D>) {
+    write_npy(folder.join(name), array).expect("written");
 }
 
 fn read_pairs(path: &Path) -> Vec<Pair> {
-    let array = Array2::<u32>::read_npy(File::open(path).expect("the output")).expect("(K,2) uint32");
+    let array: Array2<u32> = read_npy(path).expect("(K,2) uint32");
     assert_eq!(array.ncols(), 2);
     array.outer_iter().map(|row| Pair { a: row[0], b: row[1] }).collect()
 }
@@ -179,21 +168,22 @@ fn a_backend_that_is_not_there_is_replaced_and_the_output_says_so() {
     let folder = tempfile::tempdir().expect("a folder");
     save(folder.path(), "boxes.npy", &Array2::<f32>::zeros((3, 6)));
     save(folder.path(), "frames.npy", &Array3::<f32>::zeros((3, 3, 6)));
+    let without_gpu = |args: &[&str]| pbig_where(folder.path(), "WGPU_ADAPTER_NAME", "no such adapter", args);
     // More than 1024 bodies: fewer need no grid.
     let scene = ["simulate", "--scene", "pile", "--bodies", "1100", "--steps", "5"];
     for args in [&["pairs", "boxes.npy"][..], &["replay", "frames.npy"], &scene] {
         let gpu = [args, &["--backend", "gpu"]].concat();
-        let text = String::from_utf8_lossy(&pbig_without_gpu(folder.path(), &gpu).stdout).into_owned();
+        let text = String::from_utf8_lossy(&without_gpu(&gpu).stdout).into_owned();
         assert!(text.contains("no GPU adapter named"), "{args:?}: {text}");
         let gpu = [&gpu[..], &["--json"]].concat();
-        let object = json(&pbig_without_gpu(folder.path(), &gpu));
+        let object = json(&without_gpu(&gpu));
         assert_eq!((&object["backend"], &object["adapter"]), (&Value::from("cpu"), &Value::Null), "{args:?}");
         assert!(object.to_string().contains("no GPU adapter named"), "{args:?}: {object}");
         let object = json(&pbig(folder.path(), &gpu));
         assert_eq!(object["backend"], "gpu", "{args:?}: {object}");
         assert!(object["adapter"].as_str().is_some_and(|name| !name.is_empty()), "{args:?}: {object}");
     }
-    refused(&pbig_without_gpu(folder.path(), &["bench", "gpu", "--quick"]), &["no such adapter"]);
+    refused(&without_gpu(&["bench", "gpu", "--quick"]), &["no such adapter"]);
 }
 
 #[test]

@@ -5,9 +5,7 @@ use super::{pbig, refused};
 /// The one line on stderr, without the program's name.
 fn line(args: &[&str]) -> String {
     let folder = tempfile::tempdir().expect("a folder");
-    let output = pbig(folder.path(), args);
-    refused(&output, &["pbig: "]);
-    String::from_utf8_lossy(&output.stderr).trim_end().replacen("pbig: ", "", 1)
+    refused(&pbig(folder.path(), args), &["pbig: "]).replacen("pbig: ", "", 1)
 }
 
 #[test]

@@ -1,6 +1,6 @@
 //! The content of `.npy` files.
 
-use super::{ContentError, FrameBox, Frames, brief, f64_box, one_line};
+use super::{Frames, brief, f64_box, one_line};
 use ndarray::{Array, ArrayD, ArrayView2, Dimension, Ix2, Ix3};
 use ndarray_npy::npy::header::Header;
 use ndarray_npy::{ReadNpyError, ReadNpyExt};
@@ -10,26 +10,15 @@ use pbig_core::Aabb;
 const MAGIC: &[u8] = b"\x93NUMPY";
 
 /// The content of an `.npy` file of boxes, see [`super::read_boxes`].
-pub fn npy_boxes(bytes: &[u8]) -> Result<Vec<Aabb>, ContentError> {
-    let wrong = |shape: &[usize]| match (shape, shape_text(shape)) {
-        ([_, _, 6], found) => {
-            format!("shape {found} is a list of frames: use `pbig replay`; `pbig pairs` expects (N, 6)")
-        }
-        (_, found) => format!("expected an array of shape (N, 6), found {found}"),
-    };
-    Ok(rows(&array::<Ix2>(bytes, wrong)?.view()).map(f64_box).collect())
+pub fn npy_boxes(bytes: &[u8]) -> Result<Vec<Aabb>, String> {
+    Ok(rows(&array::<Ix2>(bytes)?.view()).map(f64_box).collect())
 }
 
 /// The content of an `.npy` file of frames, see [`super::read_frames`].
-pub fn npy_frames(bytes: &[u8]) -> Result<Frames, ContentError> {
-    let wrong = |shape: &[usize]| match (shape, shape_text(shape)) {
-        ([_, 6], found) => {
-            format!("shape {found} is one list of boxes: use `pbig pairs`; `pbig replay` expects (F, N, 6)")
-        }
-        (_, found) => format!("expected an array of shape (F, N, 6), found {found}"),
-    };
-    let array = array::<Ix3>(bytes, wrong)?;
-    let frames = array.outer_iter().map(|frame| rows(&frame).map(FrameBox::of).collect());
+pub fn npy_frames(bytes: &[u8]) -> Result<Frames, String> {
+    let array = array::<Ix3>(bytes)?;
+    let present = |v: [f64; 6]| (!v.iter().all(|x| x.is_nan())).then(|| f64_box(v));
+    let frames = array.outer_iter().map(|frame| rows(&frame).map(present).collect());
     Ok(Frames { boxes: array.dim().1, frames: frames.collect() })
 }
 
@@ -43,11 +32,8 @@ fn shape_text(shape: &[usize]) -> String {
     brief(&format!("({})", lengths.join(", ")))
 }
 
-/// Returns the array of six columns, or what is `wrong` with its shape. An f32 is the same number in f64.
-fn array<D: Dimension>(
-    bytes: &[u8],
-    wrong: impl Fn(&[usize]) -> ContentError,
-) -> Result<Array<f64, D>, ContentError> {
+/// Returns the array of six columns. An f32 is the same number in f64.
+fn array<D: Dimension>(bytes: &[u8]) -> Result<Array<f64, D>, String> {
     check_start(bytes)?;
     check_size(bytes).map_err(one_line)?;
     let read = match ArrayD::<f32>::read_npy(bytes) {
@@ -57,7 +43,21 @@ fn array<D: Dimension>(
     let array = read.map_err(|error| npy_text(&error))?;
     let shape = array.shape().to_vec();
     let fits = D::NDIM == Some(shape.len()) && shape.last() == Some(&6);
-    array.into_dimensionality().ok().filter(|_| fits).ok_or_else(|| wrong(&shape))
+    array.into_dimensionality().ok().filter(|_| fits).ok_or_else(|| wrong_shape(D::NDIM, &shape))
+}
+
+fn wrong_shape(wanted: Option<usize>, shape: &[usize]) -> String {
+    let (found, of_frames, of_boxes) = (shape_text(shape), "(F, N, 6)", "(N, 6)");
+    match (wanted, shape) {
+        (Some(2), [_, _, 6]) => {
+            format!("shape {found} is a list of frames: use `pbig replay`; `pbig pairs` expects {of_boxes}")
+        }
+        (Some(3), [_, 6]) => {
+            format!("shape {found} is one list of boxes: use `pbig pairs`; `pbig replay` expects {of_frames}")
+        }
+        (Some(2), _) => format!("expected an array of shape {of_boxes}, found {found}"),
+        _ => format!("expected an array of shape {of_frames}, found {found}"),
+    }
 }
 
 fn npy_text(error: &ReadNpyError) -> String {
@@ -70,7 +70,7 @@ fn npy_text(error: &ReadNpyError) -> String {
 /// Marks of the order of bytes.
 const ORDERS: [char; 4] = ['<', '>', '=', '|'];
 
-fn values_text(kind: Option<&String>) -> ContentError {
+fn values_text(kind: Option<&String>) -> String {
     let found = kind.map_or("records".into(), |kind| value_name(kind));
     one_line(format!("values are {found}; expected float32 or float64 (numpy: `.astype('float32')`)"))
 }
@@ -92,7 +92,7 @@ fn value_name(kind: &str) -> String {
 }
 
 /// Checks that this is a `.npy` file.
-fn check_start(bytes: &[u8]) -> Result<(), ContentError> {
+fn check_start(bytes: &[u8]) -> Result<(), String> {
     match bytes {
         [] => Err("the file is empty".into()),
         _ if bytes.starts_with(MAGIC) => Ok(()),
@@ -103,7 +103,7 @@ fn check_start(bytes: &[u8]) -> Result<(), ContentError> {
 /// Checks that the file holds as many bytes as its header promises. The reader allocates what the header says, so a header
 /// that lies must be noticed before: by the reader's own parser, or the two would understand different things. What that
 /// cannot understand it will not read either.
-fn check_size(bytes: &[u8]) -> Result<(), ContentError> {
+fn check_size(bytes: &[u8]) -> Result<(), String> {
     check_header(bytes)?;
     let mut rest = bytes;
     let Ok(header) = Header::from_reader(&mut rest) else { return Ok(()) };
@@ -134,7 +134,7 @@ fn check_size(bytes: &[u8]) -> Result<(), ContentError> {
 
 /// Checks that the header is complete and that its parser will not take for ever. That allocates what the header's length says, up
 /// to 4 GiB, and takes twice as long for each bracket within another.
-fn check_header(bytes: &[u8]) -> Result<(), ContentError> {
+fn check_header(bytes: &[u8]) -> Result<(), String> {
     const LONGEST: u32 = 1 << 16;
     const DEEPEST: i32 = 6;
     let Some((after, length)) = header_length(bytes) else { return Ok(()) };
