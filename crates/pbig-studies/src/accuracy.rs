@@ -48,8 +48,3 @@ fn percent(part: u64, all: u64) -> f64 {
 fn mean(values: &[f64]) -> f64 {
     values.iter().sum::<f64>() / values.len().max(1) as f64
 }
-
-/// Returns the median; 0 of none.
-fn median(values: &[f64]) -> f64 {
-    pbig_harness::runner::Spread::of(values.iter().copied()).median
-}

@@ -17,4 +17,7 @@ pub mod wide;
 use pbig_core::{Config, Limits, Order};
 
 /// Unlimited and in no order, as the papers' programs and the other trees.
-const UNSORTED: Config = Config { limits: Limits::UNLIMITED, order: Order::Unspecified, ..Config::DEFAULT };
+const UNSORTED: Config = Config { order: Order::Unspecified, ..UNLIMITED };
+
+/// The default without limits.
+const UNLIMITED: Config = Config { limits: Limits::UNLIMITED, ..Config::DEFAULT };

@@ -68,33 +68,3 @@ fn charts(tables: &[Table]) -> Vec<Chart> {
         chart("papers-steps", "Avril figure 5: a step, all moving", "objects", of_steps.into()),
     ]
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// The one run of all experiments in tests, at small sizes.
-    #[test]
-    fn every_table_is_there_and_counts_fit_what_is_expected() {
-        let report = run(true).expect("all ways agree");
-        let table = |name: &str| {
-            let found = report.tables.iter().find(|table| table.name.contains(name));
-            found.unwrap_or_else(|| panic!("no table {name}"))
-        };
-        assert_eq!(report.tables.len(), 17);
-        // A device's tables are empty without one.
-        assert!(report.tables.iter().all(|table| !table.rows.is_empty() || table.name.contains("GPU")));
-        for name in ["PBIG figure 8", "PBIG figure 11"] {
-            let off = table(name).numbers("off, standard deviations");
-            assert!(off.into_iter().map(f64::abs).fold(0.0, f64::max) < 5.0, "{name}");
-        }
-        // Plain pairs are eight bytes each, as written; and never less are fetched.
-        let switches = table("optimisations on and off");
-        for row in &switches.rows {
-            let of = |column: &str| switches.number(row, column);
-            assert!(of("bytes fetched") >= of("bytes written"), "{row:?}");
-            let is_plain = of("bytes written") == of("pairs").map(|pairs| 8.0 * pairs);
-            assert!(row[0].as_str().is_some_and(|name| name.contains('C')) || is_plain, "{row:?}");
-        }
-    }
-}

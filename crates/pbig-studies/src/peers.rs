@@ -71,12 +71,19 @@ impl Frames {
     }
 }
 
+/// Parry's trees: of frames in which few move, and of others.
+const REFITS: [(&str, Refit); 3] = [
+    ("parry 0.31, changed pairs", Refit::Changed),
+    ("parry 0.31, one thread", Refit::Whole),
+    ("parry 0.31, all threads", Refit::Parallel),
+];
+
 /// Measures a case frame by frame.
 fn frames(what: &str, case: Case, motion: Motion, effort: Effort, table: &mut Table) -> Result<(), Failure> {
     let (name, boxes) = (format!("{what}, {}", case.0), named(case));
     let is_partial = motion.is_some_and(|share| share < 1.0);
-    let refits = if is_partial { &[Refit::Changed][..] } else { &[Refit::Whole, Refit::Parallel] };
-    let trees: Vec<Parry> = refits.iter().map(|refit| Parry::new(&boxes, *refit)).collect();
+    let refits = if is_partial { &REFITS[..1] } else { &REFITS[1..] };
+    let trees: Vec<Parry> = refits.iter().map(|(_, refit)| Parry::new(&boxes, *refit)).collect();
     let sides = 2 + trees.len();
     let wander = match motion {
         Some(share) => Wander::new(boxes, share, distance(case.0)),
@@ -92,11 +99,11 @@ fn frames(what: &str, case: Case, motion: Motion, effort: Effort, table: &mut Ta
     let [all, lone] = ours.pairs();
     let theirs: Vec<usize> = trees.iter_mut().map(Parry::all_pairs).collect();
     let pairs = agree(&name, all, &[vec![lone], theirs].concat())?;
-    for (tree, &theirs) in trees.iter().zip(&times[2..]) {
-        table.row(compared(&name, case.1, pairs, MS, times[0], (tree.name(), theirs)));
+    for ((tree, _), &theirs) in refits.iter().zip(&times[2..]) {
+        table.row(compared(&name, case.1, pairs, MS, times[0], (tree, theirs)));
     }
     let alone = format!("{name}, ours on one thread");
-    table.row(compared(&alone, case.1, pairs, MS, times[1], (trees[0].name(), times[2])));
+    table.row(compared(&alone, case.1, pairs, MS, times[1], (refits[0].0, times[2])));
     Ok(())
 }
 

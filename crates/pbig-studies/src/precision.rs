@@ -2,12 +2,9 @@
 //! keeps them from missing a pair: outward, so that what is stored of a minimum is never above it, and what is stored of a maximum
 //! never below.
 
-mod search;
-
-pub(crate) use search::{Candidates, Found};
-
 use half::f16;
 use pbig_core::Aabb;
+use pbig_harness::bench::timed;
 
 /// Boxes as a test reads them.
 pub trait Coordinates: Copy {
@@ -26,7 +23,7 @@ pub trait Coordinates: Copy {
 /// Minima, then maxima. All six comparisons, as the outcome of each is a coin toss.
 #[inline(always)]
 fn overlap<T: PartialOrd>(a: [T; 6], b: [T; 6]) -> bool {
-    (a[0] <= b[3]) & (a[1] <= b[4]) & (a[2] <= b[5]) & (b[0] <= a[3]) & (b[1] <= a[4]) & (b[2] <= a[5])
+    (0..3).fold(true, |all, k| all & (a[k] <= b[k + 3]) & (b[k] <= a[k + 3]))
 }
 
 /// As they are.
@@ -39,8 +36,7 @@ impl Coordinates for Exact {
 
     #[inline(always)]
     fn of(aabb: &Aabb, _: &Scale) -> Self {
-        let ([a, b, c], [d, e, f]) = (aabb.min, aabb.max);
-        Self([a, b, c, d, e, f])
+        Self(bytemuck::cast([aabb.min, aabb.max]))
     }
 
     #[inline(always)]
@@ -68,19 +64,14 @@ impl<const OUTWARD: bool> Coordinates for Fixed<OUTWARD> {
             let x = aabb.max[k];
             (if OUTWARD { scale.up(k, x, FIXED_STEPS) } else { scale.down(k, x, FIXED_STEPS) }) as u16
         };
-        Self([low(0), low(1), low(2), high(0), high(1), high(2)])
+        Self(bytemuck::cast([[0, 1, 2].map(low), [0, 1, 2].map(high)]))
     }
 
     #[inline(always)]
     fn may_overlap(self, other: Self) -> bool {
         let (a, b) = (self.0, other.0);
         let reaches = |high: u16, low: u16| high.wrapping_sub(low) as i16 >= 0;
-        reaches(b[3], a[0])
-            & reaches(b[4], a[1])
-            & reaches(b[5], a[2])
-            & reaches(a[3], b[0])
-            & reaches(a[4], b[1])
-            & reaches(a[5], b[2])
+        (0..3).fold(true, |all, k| all & reaches(b[k + 3], a[k]) & reaches(a[k + 3], b[k]))
     }
 }
 
@@ -93,8 +84,7 @@ impl Coordinates for Half {
 
     #[inline(always)]
     fn of(aabb: &Aabb, _: &Scale) -> Self {
-        let ([a, b, c], [d, e, f]) = (aabb.min.map(half_down), aabb.max.map(half_up));
-        Self([a, b, c, d, e, f])
+        Self(bytemuck::cast([aabb.min.map(half_down), aabb.max.map(half_up)]))
     }
 
     #[inline(always)]
@@ -201,4 +191,95 @@ impl Scale {
         let whole = exact as i64;
         whole + i64::from((whole as f64) < exact)
     }
+}
+
+/// The most cells; more make cells larger.
+const MOST_CELLS: f64 = (1u64 << 23) as f64;
+
+/// Boxes in the order of their cells, and which of them are tested against which.
+pub(crate) struct Candidates {
+    scale: Scale,
+    boxes: Vec<Aabb>,
+    /// A box, and others in consecutive places.
+    runs: Vec<[u32; 3]>,
+}
+
+/// The findings of tests in some kind of coordinates.
+#[derive(Clone, Copy, Default)]
+pub(crate) struct Found {
+    pub(crate) tests: u64,
+    /// Pairs that may overlap, and those of them that do.
+    pub(crate) candidates: u64,
+    pub(crate) pairs: u64,
+    /// Milliseconds of rounding the boxes, testing them, and testing in f32 what may overlap, where that is not exact.
+    pub(crate) encode: f64,
+    pub(crate) test: f64,
+    pub(crate) recheck: f64,
+}
+
+impl Candidates {
+    /// Sorts boxes into a grid by lower corners, cells as large as the largest extent: valid and finite ones, at least one.
+    pub(crate) fn new(boxes: &[Aabb]) -> Self {
+        let all = boxes.iter().fold(boxes[0], |all, b| all.union(b));
+        let extents = |b: &Aabb| (0..3).map(|k| b.max[k] - b.min[k]).fold(0.0, f32::max);
+        // Up once: the difference may have been rounded down.
+        let largest = boxes.iter().map(extents).fold(f32::MIN_POSITIVE, f32::max).next_up();
+        let side = |k: usize| f64::from(all.max[k]) - f64::from(all.min[k]) + f64::from(largest);
+        let cell = ((0..3).map(side).product::<f64>() / MOST_CELLS).cbrt() as f32;
+        let scale = Scale { origin: all.min, cell: largest.max(cell) };
+        let dims = std::array::from_fn(|k| scale.cell(k, all.max[k]) as usize + 1);
+        sorted(boxes, scale, dims)
+    }
+
+    /// Tests all that lie near each other; `kept` is room that is used again.
+    pub(crate) fn find<C: Coordinates>(&self, kept: &mut Vec<[u32; 2]>) -> Found {
+        let (codes, encode) = timed(|| self.boxes.iter().map(|b| C::of(b, &self.scale)).collect::<Vec<_>>());
+        let (tests, test) = timed(|| self.test(&codes, kept));
+        let candidates = kept.len() as u64;
+        let overlap = |[i, j]: &[u32; 2]| self.boxes[*i as usize].overlaps(&self.boxes[*j as usize]);
+        let recheck = || kept.iter().map(|pair| u64::from(overlap(pair))).sum();
+        let (pairs, recheck) = if C::EXACT { (candidates, 0.0) } else { timed(recheck) };
+        Found { tests, candidates, pairs, encode, test, recheck }
+    }
+
+    /// Without a branch on the result, which no processor could foresee.
+    fn test<C: Coordinates>(&self, codes: &[C], kept: &mut Vec<[u32; 2]>) -> u64 {
+        let (mut tests, mut count) = (0, 0);
+        for &[i, from, to] in &self.runs {
+            tests += u64::from(to - from);
+            if kept.len() < count + (to - from) as usize {
+                kept.resize(2 * kept.len() + (to - from) as usize, [0; 2]);
+            }
+            let code = codes[i as usize];
+            for (j, &other) in (from..to).zip(&codes[from as usize..to as usize]) {
+                kept[count] = [i, j];
+                count += usize::from(code.may_overlap(other));
+            }
+        }
+        kept.truncate(count);
+        tests
+    }
+}
+
+/// Sorts boxes by cell, and lists for each the others in its own and in half of the neighbouring cells.
+fn sorted(boxes: &[Aabb], scale: Scale, dims: [usize; 3]) -> Candidates {
+    let place = |b: &Aabb| -> [usize; 3] { std::array::from_fn(|k| scale.cell(k, b.min[k]) as usize) };
+    let key = |[x, y, z]: [usize; 3]| (z * dims[1] + y) * dims[0] + x;
+    let mut order: Vec<(usize, Aabb)> = boxes.iter().map(|b| (key(place(b)), *b)).collect();
+    order.sort_by_key(|(key, _)| *key);
+    let start = |key: usize| order.partition_point(|(other, _)| *other < key) as u32;
+    let mut runs = Vec::new();
+    for (i, (key_of, b)) in (0u32..).zip(&order) {
+        let [x, y, z] = place(b);
+        // The rest of its own row, to the next cell; then four rows, from the cell before to the next.
+        let last = (x + 1).min(dims[0] - 1);
+        runs.push([i, i + 1, start(key_of - x + last + 1)]);
+        for (y, z) in [(Some(y + 1), z), (y.checked_sub(1), z + 1), (Some(y), z + 1), (Some(y + 1), z + 1)] {
+            let Some(y) = y.filter(|y| *y < dims[1] && z < dims[2]) else { continue };
+            let row = key([0, y, z]);
+            runs.push([i, start(row + x.saturating_sub(1)), start(row + last + 1)]);
+        }
+    }
+    runs.retain(|[_, from, to]| from < to);
+    Candidates { scale, boxes: order.into_iter().map(|(_, b)| b).collect(), runs }
 }

@@ -41,11 +41,6 @@ impl Reported {
         let reported = world.pairs().map(|pair| Pair::new(index(pair.collider1), index(pair.collider2)));
         Self::compare(reported.collect(), &oracle::pairs_filtered(&boxes, &filters))
     }
-
-    /// Returns the extra pairs for a hundred needed ones.
-    pub(crate) fn extra_percent(&self) -> f64 {
-        self.extra as f64 / self.needed.max(1) as f64 * 100.0
-    }
 }
 
 impl AddAssign for Reported {

@@ -1,9 +1,9 @@
 //! How long updates take, and how evenly. Boxes in motion: our updates beside a search from nothing and parry's tree, in turn in
 //! every frame; pairs agree in number in every frame. Scenes through rapier: ours beside stock in the same world.
 
-use crate::UNSORTED;
 use crate::trees::{Kept, Parry, Refit, partition};
-use pbig_core::{Config, Finder, Limits};
+use crate::{UNLIMITED, UNSORTED};
+use pbig_core::Finder;
 use pbig_harness::bench::figures;
 use pbig_harness::chart::{Chart, Line, Plot};
 use pbig_harness::duel::Duel;
@@ -11,8 +11,6 @@ use pbig_harness::motions::{Density, Motion, Scene};
 use pbig_harness::prelude::*;
 use pbig_harness::scenes;
 use std::time::Duration;
-
-const CONFIG: Config = Config { limits: Limits::UNLIMITED, ..Config::DEFAULT };
 
 /// All sides; the second is ours on one thread.
 const NAMES: [&str; 4] = ["ours", "ours", "search from nothing", "parry 0.31"];
@@ -81,7 +79,7 @@ fn frames(n: usize, quick: bool) -> usize {
 /// Returns the milliseconds of all sides on the same boxes, by side, then by frame. Each side warms the caches for the next one,
 /// so the first one changes from frame to frame, and every second frame runs the other way round.
 fn race(mut scene: Scene, frames: usize, name: &str) -> Result<[Vec<f64>; NAMES.len()], Failure> {
-    let (mut ours, mut parry) = (Kept::new(CONFIG)?, None);
+    let (mut ours, mut parry) = (Kept::new(UNLIMITED)?, None);
     let mut finder = Finder::new(UNSORTED);
     let mut times = [(); NAMES.len()].map(|()| vec![]);
     let mut changed: Vec<u32> = (0..scene.boxes().len() as u32).collect();

@@ -90,14 +90,6 @@ impl Parry {
         Self { refit, tree, workspace, ..Self::default() }
     }
 
-    pub(crate) fn name(&self) -> &'static str {
-        match self.refit {
-            Refit::Whole => "parry 0.31, one thread",
-            Refit::Changed => "parry 0.31, changed pairs",
-            Refit::Parallel => "parry 0.31, all threads",
-        }
-    }
-
     /// Takes in the changed boxes, of which invalid ones are removed; not measured.
     pub(crate) fn prepare(&mut self, boxes: &[Aabb], moved: &[u32]) {
         let (present, removed) = partition(boxes, moved);

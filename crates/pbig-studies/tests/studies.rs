@@ -4,7 +4,7 @@ use pbig_harness::motions::Motion;
 use pbig_harness::prelude::*;
 use pbig_harness::scenes::Scene;
 use pbig_studies::accuracy::STUDIES;
-use pbig_studies::{peers, stages, steady, whole_steps};
+use pbig_studies::{papers, peers, stages, steady, whole_steps};
 
 fn made(name: &str) -> Report {
     let (_, study) = STUDIES.into_iter().find(|(study, _)| *study == name).expect("a study");
@@ -19,7 +19,11 @@ fn made(name: &str) -> Report {
 }
 
 fn table<'a>(report: &'a Report, name: &str) -> &'a Table {
-    report.tables.iter().find(|table| table.name == name).unwrap_or_else(|| panic!("no table {name}"))
+    report
+        .tables
+        .iter()
+        .find(|table| table.name.starts_with(name))
+        .unwrap_or_else(|| panic!("no table {name}"))
 }
 
 /// Returns a number of each row that has a label.
@@ -119,5 +123,25 @@ fn stages_add_up_to_at_most_the_whole() {
             let parts: f64 = (5..11).map(number).sum();
             assert!(parts > 0.0 && (table.name != "events" || parts <= number(4) * 1.001), "{row:?}");
         }
+    }
+}
+
+#[test]
+fn papers_have_every_table_and_counts_fit_what_is_expected() {
+    let report = papers::run(true).expect("all ways agree");
+    assert_eq!(report.tables.len(), 17);
+    // A device's tables are empty without one.
+    assert!(report.tables.iter().all(|table| !table.rows.is_empty() || table.name.contains("GPU")));
+    for name in ["PBIG figure 8", "PBIG figure 11"] {
+        let off = table(&report, name).numbers("off, standard deviations");
+        assert!(off.into_iter().map(f64::abs).fold(0.0, f64::max) < 5.0, "{name}");
+    }
+    // Plain pairs are eight bytes each, as written; and never less are fetched.
+    let switches = table(&report, "PBIG tables IV, V and VI");
+    for row in &switches.rows {
+        let of = |column: &str| switches.number(row, column);
+        assert!(of("bytes fetched") >= of("bytes written"), "{row:?}");
+        let is_plain = of("bytes written") == of("pairs").map(|pairs| 8.0 * pairs);
+        assert!(row[0].as_str().is_some_and(|name| name.contains('C')) || is_plain, "{row:?}");
     }
 }

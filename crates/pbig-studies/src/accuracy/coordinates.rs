@@ -1,8 +1,9 @@
 //! Coordinates in f32, in 16 bits and in codes: what a search's tests take, and what they let through.
 
-use super::{mean, median, report};
+use super::{mean, report};
+use crate::UNLIMITED;
 use crate::precision::{Candidates, Code, Coordinates, Exact, Fixed, Found, Half};
-use pbig_core::{Config, Finder, Limits};
+use pbig_core::Finder;
 use pbig_harness::prelude::*;
 use std::time::Duration;
 
@@ -56,38 +57,29 @@ fn measure(set: &str, n: usize, quick: bool, table: &mut Table) -> Result<(), Fa
     measured(&mut found, KINDS.len(), effort, unprepared, |found, side| {
         let one = (KINDS[side].find)(&candidates, &mut kept);
         found[side].push(one);
-        Ok(milliseconds(one.test + one.recheck))
+        Ok(one.test + one.recheck)
     })?;
     // As pbig counts them, by another search.
-    let mut finder = Finder::new(Config { limits: Limits::UNLIMITED, ..Config::DEFAULT });
+    let mut finder = Finder::new(UNLIMITED);
     let pairs = finder.find(&boxes)?.len() as u64;
     for (kind, found) in KINDS.iter().zip(&found) {
-        add(set, n, kind, found, pairs, table)?;
+        table.row(row(set, n, kind, found, pairs)?);
     }
     Ok(())
 }
 
-fn add(
-    set: &str,
-    n: usize,
-    kind: &Kind,
-    found: &[Found],
-    pairs: u64,
-    table: &mut Table,
-) -> Result<(), Failure> {
+fn row(set: &str, n: usize, kind: &Kind, found: &[Found], pairs: u64) -> Result<Vec<Value>, Failure> {
     let last = found.last().copied().unwrap_or_default();
     check(last.pairs == pairs, || format!("{set} {n}, {}: {} pairs of {pairs}", kind.name, last.pairs))?;
-    let ms =
-        |of: fn(&Found) -> Duration| median(&found.iter().map(|f| milliseconds(of(f))).collect::<Vec<_>>());
+    let ms = |of: fn(&Found) -> f64| Spread::of(found.iter().map(of)).median;
     let (encode, test, recheck) = (ms(|f| f.encode), ms(|f| f.test), ms(|f| f.recheck));
-    let recheck = if kind.is_exact { 0.0 } else { recheck };
     // Read by the tests, and by the exact tests of what they let through.
     let rechecked = if kind.is_exact { 0 } else { last.candidates };
     let bytes = last.tests * kind.bytes as u64 + rechecked * 48;
     let spurious = super::percent(last.candidates - last.pairs, last.pairs);
-    let head = cells![set, n, kind.name, kind.bytes, last.tests, last.pairs, pairs - last.pairs, spurious];
-    table.row([head, cells![bytes as f64 / 1e6, encode, test, recheck, test + recheck]].concat());
-    Ok(())
+    let counts = [last.tests, last.pairs, pairs - last.pairs];
+    let times = [encode, test, recheck, test + recheck];
+    Ok(cells![set, n, kind.name, kind.bytes, ..counts, spurious, bytes as f64 / 1e6, ..times])
 }
 
 /// Returns geometric means over all sets of what a kind takes, relative to f32 on the same boxes.

@@ -4,8 +4,7 @@ mod paper;
 mod tally;
 
 use super::{percent, report};
-use crate::index::AsItIs;
-use crate::index::{CORRECTIONS, Correction, Rules, discriminant, ends, lazy_ids, lazy_pair, pairs_of};
+use crate::index::{CORRECTIONS, as_it_is, ends, lazy_ids, lazy_pair, pairs_of, rules};
 use pbig_harness::prelude::*;
 use rayon::prelude::*;
 use std::hint::black_box;
@@ -19,7 +18,8 @@ pub(super) fn run(quick: bool) -> Result<Report, Failure> {
     let every: Vec<Every> = WAYS.iter().map(|way| Every::of(way, quick)).collect();
     check_all(&every)?;
     let at = if quick { &[1000, 1 << 20][..] } else { &[1000, 5000, 10_000, 100_000, 1 << 20] };
-    let mut times = Table::new("times", TIMES);
+    let columns = "boxes | root | as_it_is_ns_per_pair | by_the_rules_ns_per_pair | by_integers_ns_per_pair";
+    let mut times = Table::new("times", columns);
     at.iter().try_for_each(|&n| add_times(n, quick, &mut times))?;
     let every = every_table(&every, quick)?;
     let axes = ["time, ns per pair (one thread, 5,000 boxes)", "wrong pairs, % of all n looked at"];
@@ -49,8 +49,8 @@ fn boxes(is_exact: bool, quick: bool) -> Vec<i64> {
 
 impl Every {
     fn of(way: &'static Way, quick: bool) -> Self {
-        let (boxes, error) = (boxes(way.is_exact, quick), (way.worst_relative)());
-        let all: Vec<_> = boxes.par_iter().map(|&n| (n, (way.all)(n, error))).collect();
+        let boxes = boxes(way.is_exact, quick);
+        let all: Vec<_> = boxes.par_iter().map(|&n| (n, (way.all)(n))).collect();
         let mut every = Self { way, boxes, tallies: Default::default(), first: [None; 3] };
         for (n, tallies) in all {
             for (c, tally) in tallies.into_iter().enumerate() {
@@ -75,16 +75,16 @@ fn every_table(all: &[Every], quick: bool) -> Result<Table, Failure> {
     let mut table = Table::new("all_pairs", columns);
     for (every, c) in all.iter().flat_map(|every| (0..CORRECTIONS.len()).map(move |c| (every, c))) {
         let Tally { looked, wrong, worst_row, none, missed } = every.tallies[c];
+        let counts = cells![looked, wrong, percent(wrong, looked), every.first[c], worst_row, missed];
         let head = cells![every.way.name, CORRECTIONS[c], every.boxes.last().copied(), every.boxes.len()];
-        let counts = cells![looked, wrong, percent(wrong, looked), every.first[c], worst_row];
-        table.row([head, counts, cells![missed, missed - none, none]].concat());
+        table.row(cells![..head, ..counts, missed - none, none]);
     }
     let boxes = boxes(true, quick);
     let wrong = boxes.par_iter().find_any(|n| !lazy_way_is_right(**n));
     check(wrong.is_none(), || format!("{LAZY}: a pair is wrong of so many boxes: {wrong:?}"))?;
     let pairs: i64 = boxes.iter().map(|n| pairs_of(*n)).sum();
     let head = cells![LAZY, CORRECTIONS[0], boxes.last().copied(), boxes.len(), pairs];
-    table.row([head, cells![0, 0.0, None::<u64>, 0, 0, 0, 0]].concat());
+    table.row(cells![..head, 0, 0.0, (), 0, 0, 0, 0]);
     Ok(table)
 }
 
@@ -101,38 +101,33 @@ fn counterexamples(quick: bool) -> Table {
     let ways: Vec<&Way> = WAYS.iter().filter(|way| !way.is_exact).collect();
     let found: Vec<_> = ways.par_iter().map(|way| counterexample(way, most)).collect();
     for (way, found) in ways.into_iter().zip(found) {
-        let Some((n, row, k)) = found else {
-            table.row(cells![way.name, most, None::<i64>, None::<i64>, "none", None::<i64>]);
-            continue;
-        };
-        let (given, right) = (by_rules(way, n, k), AsItIs::pair(row, k, n));
-        table.row(cells![way.name, most, n, k, format!("{given:?}"), format!("{right:?}")]);
+        let at = found.map(|(n, row, k)| {
+            cells![n, k, format!("{:?}", by_rules(way, n, k)), format!("{:?}", as_it_is(row, k, n))]
+        });
+        table.row(cells![way.name, most, ..at.unwrap_or_else(|| cells![(), (), "none"])]);
     }
     table
 }
 
 fn by_rules(way: &Way, n: i64, k: i64) -> (i64, i64) {
-    Rules::pair((way.row)(2 * n - 1, discriminant(k, n)), k, n)
+    rules((way.row)(k, n), k, n)
 }
 
 /// Returns the smallest `n <= most <= 2^20` with its row and index. A root is wrong by more than one row only if it can be off by
 /// more than 2; rounding to f32 adds an eighth at most. An index within a row could be wrong at an n a little smaller.
 fn counterexample(way: &Way, most: i64) -> Option<(i64, i64, i64)> {
-    let least = 1.875 / (way.worst_relative)();
+    let least = 1.875 / way.error;
     (((least / 2.0) as i64).max(2)..=most).find_map(|n| {
         // The root at the start of row `a` is `2n - 1 - 2a`.
         let rows = ((((2 * n - 1) as f64 - least) / 2.0).ceil() as i64 + 1).clamp(0, n - 1);
         let mut places = (0..rows).flat_map(|row| ends(row, n).map(|k| (n, row, k)));
-        places.find(|&(n, row, k)| by_rules(way, n, k) != AsItIs::pair(row, k, n))
+        places.find(|&(n, row, k)| by_rules(way, n, k) != as_it_is(row, k, n))
     })
 }
 
 /// Blocks of indices that are timed, evenly spread, and the length of each.
 const BLOCKS: i64 = 16;
 const BLOCK: i64 = 2048;
-
-const TIMES: &str =
-    "boxes | root | as_it_is_ns_per_pair | by_the_rules_ns_per_pair | by_integers_ns_per_pair";
 
 fn blocks(all: i64, count: i64) -> Vec<Block> {
     (0..BLOCKS).map(|k| ((all - count) * k / (BLOCKS - 1), count)).collect()
@@ -178,20 +173,17 @@ const LINES: [(&str, &str, &[usize]); 8] = [
 /// Returns time and error of roots as they are (of Newton's with one to four steps) and corrected.
 fn points(errors: &Table, times: &Table) -> Vec<(String, f64, f64)> {
     let at = if times.rows.iter().any(|row| row[0] == 5000) { 5000 } else { 1000 };
-    let of = |(name, way, corrections): (&str, &'static str, &'static [usize])| {
-        let name = name.to_owned();
-        let rows = times
-            .rows
-            .iter()
-            .filter(move |row| row[0] == at && row[1].as_str().is_some_and(|it| it.starts_with(way)));
-        let all = rows.flat_map(|row| corrections.iter().map(move |c| (row, *c)));
-        let point = move |(row, c): (&Vec<Value>, usize)| {
-            let error = errors.rows.iter().find(|error| error[0] == row[1] && error[1] == CORRECTIONS[c])?;
-            Some((name.clone(), row[2 + c].as_f64()?, error[6].as_f64()?))
-        };
-        all.filter_map(point).collect::<Vec<_>>()
-    };
-    LINES.into_iter().flat_map(of).collect()
+    let mut points = vec![];
+    for (name, way, corrections) in LINES {
+        let is_of = |row: &&Vec<Value>| row[0] == at && row[1].as_str().is_some_and(|it| it.starts_with(way));
+        let rows = times.rows.iter().filter(is_of);
+        for (row, &c) in rows.flat_map(|row| corrections.iter().map(move |c| (row, c))) {
+            let error = errors.rows.iter().find(|error| error[0] == row[1] && error[1] == CORRECTIONS[c]);
+            let both = error.and_then(|error| row[2 + c].as_f64().zip(error[6].as_f64()));
+            points.extend(both.map(|(time, error)| (name.to_owned(), time, error)));
+        }
+    }
+    points
 }
 
 #[cfg(test)]
@@ -201,7 +193,7 @@ mod tests {
     #[test]
     fn a_wrong_pair_by_integers_is_a_failed_check() {
         let mut every = Every::of(&WAYS[2], true);
-        let is_wrong = |n: &i64| (WAYS[2].all)(*n, f64::INFINITY)[0].wrong > 0;
+        let is_wrong = |n: &i64| (WAYS[2].all)(*n)[0].wrong > 0;
         assert_eq!(every.first[0], (2..100).find(is_wrong));
         assert!(check_all(&[Every::of(&WAYS[2], true)]).is_ok());
         every.first[2] = Some(7);
@@ -212,9 +204,9 @@ mod tests {
     fn before_a_counterexample_the_rules_mend_everything() {
         for way in WAYS[2..4].iter().chain(&WAYS[6..8]) {
             let (n, row, k) = counterexample(way, 1 << 18).expect("a counterexample");
-            assert_ne!(by_rules(way, n, k), AsItIs::pair(row, k, n));
-            let (sizes, error) = ((2..n).step_by(31), (way.worst_relative)());
-            assert!(n > 5000 || sizes.map(|n| (way.all)(n, error)).all(|tallies| tallies[1].wrong == 0));
+            assert_ne!(by_rules(way, n, k), as_it_is(row, k, n));
+            let mut tallies = (2..n).step_by(31).map(|n| (way.all)(n));
+            assert!(n > 5000 || tallies.all(|tallies| tallies[1].wrong == 0));
         }
     }
 }

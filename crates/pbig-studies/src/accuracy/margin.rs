@@ -1,15 +1,20 @@
 //! The margin of stored boxes: with a wider one fewer boxes change, and more pairs are extra. From one state of a scene a world
 //! with each margin goes on, all in turn step by step, and all of it twice: of each step the shorter time counts.
 
-mod cases;
-
 use super::{mean, percent, report};
+use crate::UNLIMITED;
 use crate::reported::Reported;
+use pbig_core::{Aabb, BroadPhase, Error, Finder, Pair, ProxyFilter};
 use pbig_harness::prelude::*;
-use rapier_pbig::PbigConfig;
+use pbig_harness::runner::{Run, Timed};
+use pbig_harness::scenes::Scene;
+use pbig_harness::world::World;
+use rapier_pbig::{PbigBroadPhase, PbigConfig};
 
 /// In units of rapier's length unit, as `Config::margin`.
 const MARGINS: [f64; 8] = [0.0, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5];
+/// The place of rapier-pbig's default.
+const DEFAULT: usize = 2;
 
 /// Rounds that do not count: boxes are new in the first, and later ones learn how they move.
 const WARM_UP: usize = 8;
@@ -22,15 +27,15 @@ const COMPARED: usize = 10;
 const PASSES: usize = 2;
 
 pub(super) fn run(quick: bool) -> Result<Report, Failure> {
-    let mut rows = cases::worlds(quick)?;
-    rows.extend(cases::boxes(quick)?);
+    let mut rows = worlds(quick)?;
+    rows.extend(boxes(quick)?);
     let tables = vec![table(&rows), means(&rows)];
     let axes = ["broad phase, ms a step", "extra pairs, % of those that overlap"];
     let scene = |row: &Row| row.case.split(' ').next().unwrap_or_default().to_owned();
     let mut firsts: Vec<&[Row]> = rows.chunks(MARGINS.len()).collect();
     firsts.sort_by_key(|case| scene(&case[0]));
     firsts.dedup_by_key(|case| scene(&case[0]));
-    let point = |row: &Row| (row.case.clone(), row.work.means()[0], row.work.reported.extra_percent());
+    let point = |row: &Row| (row.case.clone(), row.work.means()[0], row.work.extra_percent());
     Ok(report("margin", tables, ("Margin of stored boxes", axes), firsts.into_iter().flatten().map(point)))
 }
 
@@ -55,6 +60,10 @@ impl Work {
         self.counts = [0, 1].map(|k| self.counts[k] + counts[k]);
         self.compared += u64::from(reported.is_some());
         self.reported += reported.unwrap_or_default();
+    }
+
+    fn extra_percent(&self) -> f64 {
+        percent(self.reported.extra, self.reported.needed)
     }
 
     fn means(&self) -> [f64; 2] {
@@ -133,16 +142,11 @@ fn table(rows: &[Row]) -> Table {
         let ([broad_phase, step], [listed, changed]) = (work.means(), work.counts);
         let head = cells![case.as_str(), *boxes, *margin, percent(changed, listed), broad_phase];
         let Reported { needed, missed, .. } = work.reported;
-        let pairs =
-            cells![needed / work.compared.max(1), work.reported.extra_percent(), missed, work.compared];
-        table.row([head, cells![has_step.then_some(step)], pairs].concat());
+        let (step, pairs, extra) =
+            (has_step.then_some(step), needed / work.compared.max(1), work.extra_percent());
+        table.row(cells![..head, step, pairs, extra, missed, work.compared]);
     }
     table
-}
-
-/// Returns the place of rapier-pbig's default in [`MARGINS`].
-fn default_margin() -> usize {
-    MARGINS.iter().position(|margin| *margin as f32 == PbigConfig::DEFAULT.margin).unwrap_or_default()
 }
 
 /// Returns a margin's time over the default's: the geometric mean over cases and passes, and two standard errors of it in
@@ -151,7 +155,7 @@ fn against_default(rows: &[Row], margin: usize, time: usize) -> [f64; 2] {
     let cases = rows.chunks(MARGINS.len()).filter(|case| time == 0 || case[0].has_step);
     let cases: Vec<[f64; PASSES]> = cases
         .map(|case| {
-            let [one, default] = [margin, default_margin()].map(|k| case[k].passes);
+            let [one, default] = [margin, DEFAULT].map(|k| case[k].passes);
             std::array::from_fn(|pass| (one[pass][time] / default[pass][time]).ln())
         })
         .collect();
@@ -174,10 +178,141 @@ fn means(rows: &[Row]) -> Table {
     let mut table = Table::new("means", columns);
     for (k, margin) in MARGINS.into_iter().enumerate() {
         let [[broad_phase, noise], [step, step_noise]] = [0, 1].map(|time| against_default(rows, k, time));
-        let extra = rows.chunks(MARGINS.len()).map(|case| case[k].work.reported.extra_percent());
+        let extra = rows.chunks(MARGINS.len()).map(|case| case[k].work.extra_percent());
         table.row(cells![margin, broad_phase, noise, step, step_noise, extra.fold(0.0, f64::max)]);
     }
     table
+}
+
+/// A scene, its bodies, the steps after which margins are compared, and the steps that count.
+type Windows = (&'static str, usize, &'static [usize], usize);
+
+/// In free fall the lowest bodies of a column reach the ground after about 30 steps, the highest after 145 (1000
+/// bodies) or 220 (10,000). So each scene is looked at in motion, and most once more while it comes to rest.
+const FULL: [Windows; 7] = [
+    ("column", 1000, &[40, 320], 42),
+    ("pile", 1000, &[10, 90], 42),
+    ("ragdolls", 1000, &[40, 240], 42),
+    ("mixed", 1000, &[60], 42),
+    ("rain", 10_000, &[60], 12),
+    ("column", 10_000, &[60, 240], 6),
+    ("pile", 10_000, &[20], 6),
+];
+
+const QUICK: [Windows; 2] = [("column", 100, &[40], 12), ("pile", 100, &[10], 12)];
+
+/// Runs scenes with the default margin from window to window, and compares margins there.
+fn worlds(quick: bool) -> Result<Vec<Row>, Failure> {
+    let mut all = Vec::new();
+    for &(scene, bodies, starts, steps) in if quick { &QUICK[..] } else { &FULL } {
+        let mut run = Run::new(Scene::named(scene)?, bodies, 1, PbigBroadPhase::new());
+        for &start in starts {
+            while run.times.len() < start {
+                run.step();
+            }
+            let case = format!("{scene} {bodies}, from step {start}");
+            let saved = run.world.to_bytes();
+            let about = (run.world.colliders.len(), true);
+            all.extend(rows(&case, steps, about, || Worlds::restored(&case, &saved))?);
+        }
+    }
+    Ok(all)
+}
+
+/// A world, run once with each margin.
+struct Worlds(Vec<Run<PbigBroadPhase>>);
+
+impl Worlds {
+    fn restored(case: &str, saved: &[u8]) -> Result<Self, Failure> {
+        let run = |&margin: &f64| {
+            let world = World::from_bytes(saved);
+            let world = world.map_err(|error| Failure::Input(format!("{case}: its snapshot: {error}")))?;
+            let config = PbigConfig { margin: margin as f32, ..PbigConfig::DEFAULT };
+            let mut broad_phase = PbigBroadPhase::with_config(config).expect("a length");
+            broad_phase.adopt(&world.narrow_phase);
+            Ok(Run { world, broad_phase: Timed::new(broad_phase), times: vec![] })
+        };
+        MARGINS.iter().map(run).collect::<Result<_, _>>().map(Self)
+    }
+}
+
+impl Case for Worlds {
+    fn step(&mut self, margin: usize, is_compared: bool) -> Result<Round, Failure> {
+        let run = &mut self.0[margin];
+        run.step();
+        let (time, stats) = (run.times.last().copied().unwrap_or_default(), run.broad_phase.inner.stats());
+        let counts = [stats.modified as u64, stats.report.changed];
+        Ok(([time.broad_phase, time.step], counts, is_compared.then(|| Reported::of(&run.world))))
+    }
+}
+
+/// Makes boxes move.
+type Start = fn(Vec<Aabb>) -> Wander;
+
+/// The motions: the largest distance along each axis, in edges. As fast as things that fall, or as little as a thing that
+/// leans on something.
+const MOTIONS: [(&str, Start); 2] = [
+    ("drifting", |boxes| Wander::drifting(boxes, 0.02)),
+    ("trembling", |boxes| Wander::new(boxes, 1.0, 0.004)),
+];
+
+/// Compares margins of boxes in motion.
+fn boxes(quick: bool) -> Result<Vec<Row>, Failure> {
+    let sizes: &[(usize, usize)] = if quick { &[(1000, 22)] } else { &[(10_000, 62), (100_000, 32)] };
+    let mut all = Vec::new();
+    for (motion, start) in MOTIONS {
+        for &(n, rounds) in sizes {
+            let set = BoxSet::named("unit").expect("a set of the harness").boxes(n, 1);
+            let make = || Boxes::new(start(set.clone()));
+            all.extend(rows(&format!("{motion} {n}"), rounds, (n, false), make)?);
+        }
+    }
+    Ok(all)
+}
+
+/// Boxes, with a broad phase for each margin.
+struct Boxes {
+    wander: Wander,
+    finders: Vec<BroadPhase>,
+    /// The pairs of the last compared round.
+    needed: Vec<Pair>,
+}
+
+impl Boxes {
+    fn new(wander: Wander) -> Result<Self, Failure> {
+        let finder =
+            |&margin: &f64| BroadPhase::new(pbig_core::Config { margin: margin as f32, ..UNLIMITED });
+        let finders = MARGINS.iter().map(finder).collect::<Result<_, _>>()?;
+        Ok(Self { wander, finders, needed: vec![] })
+    }
+}
+
+/// Sets all boxes, as an app does that does not know which have moved far.
+fn update(finder: &mut BroadPhase, boxes: &[Aabb]) -> Result<(), Error> {
+    for (id, aabb) in boxes.iter().enumerate() {
+        finder.set(id as u32, *aabb, ProxyFilter::ALL)?;
+    }
+    finder.update().map(|_| ())
+}
+
+impl Case for Boxes {
+    fn prepare(&mut self, round: usize, is_compared: bool) -> Result<(), Failure> {
+        self.wander.step(round);
+        if is_compared {
+            // From nothing, by another search: brute force takes two seconds for 100,000 boxes.
+            self.needed = Finder::new(UNLIMITED).find(&self.wander.boxes)?.to_vec();
+        }
+        Ok(())
+    }
+
+    fn step(&mut self, margin: usize, is_compared: bool) -> Result<Round, Failure> {
+        let finder = &mut self.finders[margin];
+        let (done, ms) = timed(|| update(finder, &self.wander.boxes));
+        done?;
+        let reported = is_compared.then(|| Reported::compare(finder.pairs().collect(), &self.needed));
+        let counts = [self.wander.boxes.len() as u64, finder.report().changed];
+        Ok(([ms, ms], counts, reported))
+    }
 }
 
 #[cfg(test)]
@@ -186,14 +321,14 @@ mod tests {
 
     /// Returns a row whose margin takes so long; between its two passes all but the default differ by 2%.
     fn row(margin: usize, ms: f64) -> Row {
-        let off = if margin == default_margin() { 0.0 } else { 0.01f64 };
+        let off = if margin == DEFAULT { 0.0 } else { 0.01f64 };
         let work = |off: f64| Work { times: vec![[ms * off.exp(), 0.0]], ..Work::default() };
         Row::new("a case", margin, [&work(-off), &work(off)], false).expect("no pair is missing")
     }
 
     #[test]
     fn cases_count_alike_and_the_noise_of_a_mean_is_less_than_that_of_a_case() {
-        assert_eq!(MARGINS[default_margin()] as f32, PbigConfig::DEFAULT.margin);
+        assert_eq!(MARGINS[DEFAULT] as f32, PbigConfig::DEFAULT.margin);
         let case =
             |ms: f64, fifth: f64| (0..MARGINS.len()).map(move |k| row(k, if k == 4 { fifth } else { ms }));
         let rows: Vec<Row> = case(1.0, 0.4).chain(case(100.0, 100.0 / 6.4)).collect();
@@ -211,5 +346,16 @@ mod tests {
         let missing = Work { reported: Reported { missed: 3, needed: 9, extra: 0 }, ..Work::default() };
         let failed = Row::new("a case", 0, [&missing; PASSES], false).map(|_| ());
         assert!(failed.is_err_and(|failure| failure.to_string().contains("3 of 9 pairs")));
+    }
+
+    #[test]
+    fn worlds_go_on_from_where_the_scene_was() {
+        let mut run = Run::new(Scene::named("column").expect("a scene"), 30, 1, PbigBroadPhase::new());
+        (0..20).for_each(|_| run.step());
+        let Worlds(runs) = Worlds::restored("some", &run.world.to_bytes()).expect("a snapshot");
+        assert_eq!(runs.len(), MARGINS.len());
+        assert!(runs.iter().all(|side| side.world.pose_bits() == run.world.pose_bits()));
+        let wrong = Worlds::restored("some", b"no world").map(|_| ());
+        assert!(wrong.is_err_and(|failure| failure.to_string().contains("some: its snapshot")));
     }
 }

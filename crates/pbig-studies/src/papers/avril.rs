@@ -17,16 +17,15 @@ const DISTANCE: f32 = 0.1;
 const ALL_PAIRS: usize = GpuOptions::DEFAULT.all_pairs_up_to as usize;
 
 pub(super) fn tables(setup: &Setup) -> Result<Vec<Table>, Failure> {
-    let forms = [matrix()?, forms_on_cpu()?, forms_on_device(setup)?];
+    let forms = [matrix(), forms_on_cpu()?, forms_on_device(setup)?];
     Ok([&forms[..], &[brute_force_and_grid(setup)?, steps(setup)?]].concat())
 }
 
 /// Objects with which table 1's elements are numbers; those of the paper's examples.
 const OBJECTS: u64 = AVRIL_EXAMPLES[0].0;
 
-/// Table 1: rows and columns counted from 1, indices from 0, as in the paper. The mapping of all pairs is checked to and
-/// fro.
-fn matrix() -> Result<Table, Failure> {
+/// Table 1: rows and columns counted from 1, indices from 0, as in the paper.
+fn matrix() -> Table {
     let columns = "row | column | printed | that number | index, ours | pair of the printed index, ours";
     let mut table = Table::new("Avril table 1: the matrix of pairs", columns);
     let of_table = AVRIL_1.iter().map(|(pair, text, of)| (pair(OBJECTS), (*text).to_owned(), of(OBJECTS)));
@@ -36,9 +35,7 @@ fn matrix() -> Result<Table, Failure> {
         let pair = pair.map_or("none".to_owned(), |(a, b)| format!("({}, {})", a + 1, b + 1));
         table.row(cells![a, b, text, printed, index_of(a - 1, b - 1, OBJECTS), pair]);
     }
-    let there = |k: u64| index_of(pair_of(k, OBJECTS).0, pair_of(k, OBJECTS).1, OBJECTS) == k;
-    let wrong = (0..pair_count(OBJECTS)).find(|&k| !there(k));
-    check(wrong.is_none(), || format!("{OBJECTS} boxes: index {wrong:?} is wrong")).map(|()| table)
+    table
 }
 
 /// Returns the bytes that come back with a byte a pair, and with a bit (3.4).

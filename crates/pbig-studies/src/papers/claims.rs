@@ -79,11 +79,7 @@ fn by_segments(boxes: u64, length: u64, columns: impl Fn(u64, u64, u64) -> Vec<u
     [missed, seen.iter().map(|times| times.saturating_sub(1)).sum()]
 }
 
-fn algorithm_1(boxes: u64, length: u64) -> [u64; 2] {
-    by_segments(boxes, length, |i, _, n| (i..n).collect())
-}
-
-/// Line 11; line 5 takes the smaller of both segments for m. Rows count from 1.
+/// Algorithm 2, line 11; line 5 takes the smaller of both segments for m. Rows count from 1.
 fn algorithm_2(boxes: u64, length: u64) -> [u64; 2] {
     by_segments(boxes, length, |i, m, n| {
         let x = if i < n { equation_7(i, m.min(n), n, 1) } else { 0 };
@@ -94,7 +90,7 @@ fn algorithm_2(boxes: u64, length: u64) -> [u64; 2] {
 fn segments(facts: &mut Facts) {
     let [two, unequal] = [2 * SEGMENT, SEGMENT + 44];
     for (name, boxes, [missed, repeated]) in [
-        ("algorithm 1", two, algorithm_1(two, SEGMENT)),
+        ("algorithm 1", two, by_segments(two, SEGMENT, |i, _, n| (i..n).collect())),
         ("algorithm 2", two, algorithm_2(two, SEGMENT)),
         ("algorithm 2", unequal, algorithm_2(unequal, SEGMENT)),
     ] {

@@ -104,10 +104,7 @@ impl Model {
 
     /// The chance that two boxes of given lengths overlap along an axis.
     fn on_axis(&self, e: f64, f: f64) -> f64 {
-        match self.has_corners {
-            false => 2.0 * self.within(0.5 * (e + f)),
-            true => self.within(e) + self.within(f),
-        }
+        if self.has_corners { self.within(e) + self.within(f) } else { 2.0 * self.within(0.5 * (e + f)) }
     }
 
     /// The chance that one point lies above another by at most `distance`.

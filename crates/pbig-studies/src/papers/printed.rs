@@ -32,17 +32,13 @@ pub(super) struct Coverage {
     pub(super) cell: Option<f64>,
 }
 
-const fn coverage(doc: f64, pairs: u64, checks: u64, output: f64, cell: Option<f64>) -> Coverage {
-    Coverage { doc, pairs, checks: checks * 1_000_000, output, cell }
-}
-
 /// PBIG, table III.
 pub(super) const TABLE_III: [Coverage; 5] = [
-    coverage(0.001, 6_234, 879, 0.024, None),
-    coverage(0.01, 50_064, 930, 0.183, None),
-    coverage(0.1, 530_689, 1062, 1.334, Some(256.0)),
-    coverage(1.0, 5_165_837, 286, 9.369, Some(128.0)),
-    coverage(10.0, 49_514_252, 744, 44.734, Some(128.0)),
+    Coverage { doc: 0.001, pairs: 6_234, checks: 879_000_000, output: 0.024, cell: None },
+    Coverage { doc: 0.01, pairs: 50_064, checks: 930_000_000, output: 0.183, cell: None },
+    Coverage { doc: 0.1, pairs: 530_689, checks: 1_062_000_000, output: 1.334, cell: Some(256.0) },
+    Coverage { doc: 1.0, pairs: 5_165_837, checks: 286_000_000, output: 9.369, cell: Some(128.0) },
+    Coverage { doc: 10.0, pairs: 49_514_252, checks: 744_000_000, output: 44.734, cell: Some(128.0) },
 ];
 
 /// PBIG, table III: the size of the input, "MB".
@@ -120,16 +116,12 @@ impl Roots {
     }
 }
 
-const fn roots(roots: u64, approximate: f64, cuda: f64, digit: f64, gamma: f64) -> Roots {
-    Roots { roots, approximate, cuda, digit, gamma }
-}
-
 /// Avril, table 4.
 pub(crate) const AVRIL_4: [Roots; 4] = [
-    roots(1_000_000, 0.042, 0.048, 0.001, 12.6),
-    roots(10_000_000, 0.409, 0.478, 0.001, 14.7),
-    roots(100_000_000, 4.102, 4.722, 0.001, 13.2),
-    roots(1_000_000_000, 41.01, 48.01, 0.01, 14.6),
+    Roots { roots: 1_000_000, approximate: 0.042, cuda: 0.048, digit: 0.001, gamma: 12.6 },
+    Roots { roots: 10_000_000, approximate: 0.409, cuda: 0.478, digit: 0.001, gamma: 14.7 },
+    Roots { roots: 100_000_000, approximate: 4.102, cuda: 4.722, digit: 0.001, gamma: 13.2 },
+    Roots { roots: 1_000_000_000, approximate: 41.01, cuda: 48.01, digit: 0.01, gamma: 14.6 },
 ];
 
 /// Avril 3.3: the mean of that reduction, in %.

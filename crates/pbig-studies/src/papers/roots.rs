@@ -2,7 +2,7 @@
 
 use super::printed::AVRIL_2;
 use super::sides::{Setup, on_gpu};
-use crate::index::{AsItIs, Correction, Double, Root, Rules, Single, discriminant, lazy_ids, lazy_pair};
+use crate::index::{as_it_is, lazy_ids, lazy_pair, row_by, row_in_f64, rules};
 use pbig_core::{Aabb, GpuOptions, Report};
 use pbig_harness::pair_index::{pair_count, pair_of};
 use pbig_harness::prelude::*;
@@ -58,8 +58,10 @@ type Search = fn(&[Aabb], &[Range<u64>]) -> u64;
 /// Ways with a root that give every pair of table 2's objects, and the lazy way, which looks at all of n^2 - n identifiers.
 /// `pair_of` is pbig's own function, for up to 2^32 boxes: it multiplies in 128 bits.
 const WAYS: [(&str, Search); 4] = [
-    ("f32 root, the paper's rules", |boxes, ids| overlaps(boxes, ids, by_root::<Single, Rules>)),
-    ("f64 root, as it is", |boxes, ids| overlaps(boxes, ids, by_root::<Double, AsItIs>)),
+    ("f32 root, the paper's rules", |boxes, ids| {
+        overlaps(boxes, ids, |k, n| Some(rules(row_by(f32::sqrt)(k, n), k, n)))
+    }),
+    ("f64 root, as it is", |boxes, ids| overlaps(boxes, ids, |k, n| Some(as_it_is(row_in_f64(k, n), k, n)))),
     ("`pair_of`", |boxes, ids| {
         overlaps(boxes, ids, |k, n| {
             let (a, b) = pair_of(k as u64, n as u64);
@@ -68,12 +70,6 @@ const WAYS: [(&str, Search); 4] = [
     }),
     ("lazy", |boxes, ids| overlaps(boxes, ids, lazy_pair)),
 ];
-
-/// Makes a pair by a root, as the study of accuracy does.
-#[inline(always)]
-fn by_root<R: Root, C: Correction>(k: i64, n: i64) -> Option<(i64, i64)> {
-    Some(C::pair(R::row(2 * n - 1, discriminant(k, n)), k, n))
-}
 
 /// The place of the lazy way.
 const LAZY: usize = 3;

@@ -128,10 +128,6 @@ impl Setup {
         Self { quick, numbers: if quick { &NUMBERS[..3] } else { &NUMBERS }, gpu: gpu.ok(), adapter }
     }
 
-    pub(super) fn most_boxes(&self) -> usize {
-        self.numbers[self.numbers.len() - 1]
-    }
-
     pub(super) fn is_software(&self) -> bool {
         self.gpu.as_ref().is_some_and(GpuFinder::is_software)
     }
@@ -180,11 +176,6 @@ impl Call {
         let gpu = self.report.gpu.as_ref()?;
         // The ratio to two ids a pair, of all that the kernels wrote.
         (self.report.pairs > 0).then(|| (gpu.compression * 8.0 * self.report.pairs as f64).round() as u64)
-    }
-
-    /// Returns the bytes that came back.
-    pub(super) fn fetched(&self) -> Option<u64> {
-        Some(self.report.gpu.as_ref()?.downloaded)
     }
 
     /// Returns the milliseconds of the kernels whose name a rule takes.

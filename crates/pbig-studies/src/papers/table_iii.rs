@@ -188,7 +188,8 @@ fn counted(setup: &Setup) -> Result<Table, Failure> {
     let columns = "DoC | pairs printed (N = 10^7) | pairs | off what is expected, standard deviations | \
         checks printed (N = 10^7) | checks in such cells | of them unnecessary | of them redundant | ms printed | \
         ms, our grid, CPU | ms, PBIG's grid, CPU, one thread";
-    let (n, mut table) = (setup.most_boxes(), Table::new("PBIG table III and figure 10: density", columns));
+    let mut table = Table::new("PBIG table III and figure 10: density", columns);
+    let n = setup.numbers.iter().copied().max().unwrap_or_default();
     let scale = (MOST_BOXES as f64 / n as f64).cbrt();
     for row in &TABLE_III {
         let model = fitting(n, row.doc);
@@ -230,21 +231,15 @@ fn of_output(calls: &[Call]) -> Vec<Value> {
     let a_pair = |bytes: Option<u64>| bytes.filter(|_| pairs > 0).map(|bytes| bytes as f64 / pairs as f64);
     let [ours, papers] = [packed, rows].map(|call| cells![call.checks()[0], call.ms]);
     let written = [list, packed, rows].map(|call| a_pair(call.written()));
-    cells![pairs, ..ours, ..papers, ..written, a_pair(packed.fetched())]
+    cells![pairs, ..ours, ..papers, ..written, a_pair(packed.report.gpu.as_ref().map(|gpu| gpu.downloaded))]
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use pbig_core::oracle;
 
     #[test]
-    fn readings_count_what_they_expect_and_the_printed_counts_fit_lower_corners_alone() {
-        for (name, law) in &READINGS {
-            let model = law(edge(2000, 1.0));
-            let count = oracle::pairs(&model.draw(2000, 3)).len() as u64;
-            assert!(model.off(2000, count).abs() < 5.0, "{name}: {count}, {}", model.pairs(2000));
-        }
+    fn the_printed_counts_fit_lower_corners_alone() {
         let (others, fits) = READINGS.split_at(READINGS.len() - 2);
         assert!(others.iter().all(|(_, law)| furthest_off(*law).abs() > 10.0));
         assert!(furthest_off(fits[1].1).abs() < 1.0 && (1.0..3.0).contains(&furthest_off(fits[0].1).abs()));

@@ -33,18 +33,6 @@ const ROTATION: f32 = 128.0 / (1 << 24) as f32;
 /// With 2, boxes that parry has computed in f32 for two shapes overlap if the exact boxes of these shapes do at the same
 /// poses; with 3 also if they do at poses in f64 of which these are the rounded ones. Near the origin that is about a
 /// hundred-thousandth of the size. An invalid box stays as it is, and so do bounds that are infinite.
-///
-/// ```
-/// use pbig_core::Aabb;
-/// use pbig_studies::wide::widened_by_ulps;
-/// use rapier3d::prelude::*;
-/// // Floats are 1 apart there, and the ball lies in no box of corners half a unit from its centre.
-/// let (ball, pose) = (Ball::new(0.5), Isometry::translation(1e7, 0.0, 0.0));
-/// let stock = ball.aabb(&pose);
-/// assert_eq!(stock.mins.x, stock.maxs.x);
-/// let aabb = Aabb::new(stock.mins.coords.into(), stock.maxs.coords.into());
-/// assert_eq!(widened_by_ulps(&aabb, &pose, 2).max[0], 1e7 + 2.0);
-/// ```
 #[inline]
 pub fn widened_by_ulps(aabb: &Aabb, pose: &Isometry<Real>, ulps: u32) -> Aabb {
     let at: [f32; 3] = pose.translation.vector.into();

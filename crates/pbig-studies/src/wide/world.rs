@@ -1,7 +1,6 @@
 //! A world of rapier3d-f64: what a simulation is held against that runs in f32.
 
-use super::layout::shape_in_f64;
-use super::{Pose, to_f32, to_f64};
+use super::{Pose, shape_in_f64, to_f32, to_f64};
 use pbig_harness::world::World;
 use rapier3d::na::{Translation3, Vector3};
 use rapier3d::prelude as narrow;
@@ -36,35 +35,27 @@ impl WideWorld {
         let mut wide = Self { gravity, ..Self::default() };
         let by = Translation3::from(Vector3::from(offset));
         for (_, collider) in world.colliders.iter() {
-            let body = collider.parent().and_then(|handle| world.bodies.get(handle));
-            wide.add(body, collider, &by)?;
+            wide.add(world, collider, by)?;
         }
         Ok(wide)
     }
 
     /// A collider, with a body of its own where it has one.
-    fn add(
-        &mut self,
-        body: Option<&narrow::RigidBody>,
-        collider: &narrow::Collider,
-        by: &Translation3<f64>,
-    ) -> Result<(), String> {
-        let kind = collider.shape().shape_type();
-        let shape =
-            shape_in_f64(collider.shape()).ok_or_else(|| format!("a world in f64 has no {kind:?}"))?;
+    fn add(&mut self, world: &World, one: &narrow::Collider, by: Translation3<f64>) -> Result<(), String> {
+        let shape = shape_in_f64(one.shape()).ok_or("a shape that no scene has")?;
         let is_bounded = shape.as_halfspace().is_none();
         let builder = ColliderBuilder::new(shape)
-            .density(collider.density().into())
-            .friction(collider.friction().into())
-            .restitution(collider.restitution().into());
-        let handle = match body {
-            Some(one) => {
-                let [linear, angular] = [one.linvel(), one.angvel()].map(|velocity| velocity.cast());
+            .density(one.density().into())
+            .friction(one.friction().into())
+            .restitution(one.restitution().into());
+        let handle = match one.parent().and_then(|handle| world.bodies.get(handle)) {
+            Some(body) => {
+                let [linear, angular] = [body.linvel(), body.angvel()].map(|velocity| velocity.cast());
                 let moving = RigidBodyBuilder::dynamic().linvel(linear).angvel(angular);
-                let body = self.bodies.insert(moving.position(by * to_f64(one.position())));
+                let body = self.bodies.insert(moving.position(by * to_f64(body.position())));
                 self.colliders.insert_with_parent(builder, body, &mut self.bodies)
             }
-            None => self.colliders.insert(builder.position(by * to_f64(collider.position()))),
+            None => self.colliders.insert(builder.position(by * to_f64(one.position()))),
         };
         self.bounded.extend(is_bounded.then_some(handle));
         Ok(())
@@ -130,14 +121,11 @@ mod tests {
         let held = narrow.colliders.iter().filter(|(_, one)| one.parent().is_some());
         let held: Vec<_> = held.map(|(_, one)| to_f64(one.position()).translation.vector).collect();
         assert_eq!([start.len(), held.len()], [27; 2]);
-        let apart = wide
-            .poses()
-            .iter()
-            .zip(&held)
-            .map(|(pose, at)| (pose.translation.vector - at).norm())
-            .fold(0.0, f64::max);
+        let ends = wide.poses();
+        let apart = ends.iter().zip(&held).map(|(pose, at)| (pose.translation.vector - at).norm());
+        let apart = apart.fold(0.0, f64::max);
         assert!(apart < 1e-4, "{apart}");
-        let fallen = start[26].translation.y - wide.poses()[26].translation.y;
+        let fallen = start[26].translation.y - ends[26].translation.y;
         assert!((0.1..0.2).contains(&fallen), "{fallen}: g t^2 / 2 is 0.136");
     }
 }

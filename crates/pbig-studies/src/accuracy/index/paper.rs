@@ -1,50 +1,49 @@
 //! Avril's tables 3 and 4 beside ours, and a search for the rounding that gives table 3.
 
-use crate::index::{CARMACK, LOMONT, Newton, Single, SingleRoot};
+use crate::index::{CARMACK, LOMONT, newton};
 use crate::papers::printed::AVRIL_4;
 use pbig_harness::prelude::*;
 use rayon::prelude::*;
 
-/// Table 3: tests; errors in percent with two steps (Carmack, Lomont) and with three. The paper says that four are as three.
-const TABLE_3: [(u32, [f64; 4]); 6] = [
-    (1000, [2.9, 2.9, 0.7, 0.7]),
-    (10_000, [0.89, 0.89, 0.12, 0.12]),
-    (100_000, [0.27, 0.27, 0.035, 0.035]),
-    (1_000_000, [0.1800, 0.1803, 0.0110, 0.0111]),
-    (10_000_000, [0.3681, 0.3685, 0.0040, 0.0057]),
-    (100_000_000, [0.9847, 0.9855, 0.0134, 0.0142]),
+/// Table 3: tests; errors in percent with two steps (Carmack, Lomont) and with three; and half of what the last digit counts, with
+/// two and with three. The paper says that four are as three.
+const TABLE_3: [(u32, [f64; 4], [f64; 2]); 6] = [
+    (1000, [2.9, 2.9, 0.7, 0.7], [0.05, 0.05]),
+    (10_000, [0.89, 0.89, 0.12, 0.12], [0.005, 0.005]),
+    (100_000, [0.27, 0.27, 0.035, 0.035], [0.005, 5e-4]),
+    (1_000_000, [0.1800, 0.1803, 0.0110, 0.0111], [5e-5, 5e-5]),
+    (10_000_000, [0.3681, 0.3685, 0.0040, 0.0057], [5e-5, 5e-5]),
+    (100_000_000, [0.9847, 0.9855, 0.0134, 0.0142], [5e-5, 5e-5]),
 ];
 
-/// Counts wrong roots below a number: in f32 and with steps in f64 against the exact root, and the latter against f32's.
-type Errors = [fn(u32) -> u64; 3];
+/// Counts of wrong roots below a number.
+type Errors = fn(u32) -> [u64; 3];
 
-const fn errors<const MAGIC: u32, const STEPS: u32>() -> Errors {
-    [
-        wrong_roots::<Newton<MAGIC, STEPS>, false>,
-        wrong_roots::<Newton<MAGIC, STEPS, true>, false>,
-        wrong_roots::<Newton<MAGIC, STEPS, true>, true>,
-    ]
+/// Counts wrong roots below a number: in f32 and with steps in f64 against the exact root, and the latter against f32's.
+fn errors<const MAGIC: u32, const STEPS: u32>(below: u32) -> [u64; 3] {
+    let (narrow, wide) = (newton::<MAGIC, STEPS, false>, newton::<MAGIC, STEPS, true>);
+    [wrong_roots(narrow, false, below), wrong_roots(wide, false, below), wrong_roots(wide, true, below)]
 }
 
 /// The columns of table 3, and those of four steps.
 const ERRORS: [(&str, u32, Errors); 6] = [
-    ("Carmack", 2, errors::<CARMACK, 2>()),
-    ("Lomont", 2, errors::<LOMONT, 2>()),
-    ("Carmack", 3, errors::<CARMACK, 3>()),
-    ("Lomont", 3, errors::<LOMONT, 3>()),
-    ("Carmack", 4, errors::<CARMACK, 4>()),
-    ("Lomont", 4, errors::<LOMONT, 4>()),
+    ("Carmack", 2, errors::<CARMACK, 2>),
+    ("Lomont", 2, errors::<LOMONT, 2>),
+    ("Carmack", 3, errors::<CARMACK, 3>),
+    ("Lomont", 3, errors::<LOMONT, 3>),
+    ("Carmack", 4, errors::<CARMACK, 4>),
+    ("Lomont", 4, errors::<LOMONT, 4>),
 ];
 
-/// Counts whole numbers `1 <= x < below` whose root without its fraction is wrong: is not that of `x`, or `BY_F32` not that of the
+/// Counts whole numbers `1 <= x < below` whose root without its fraction is wrong: is not that of `x`, or `by_f32` not that of the
 /// processor's f32 root. From 2^24 on, `x` is not always an f32, and these two differ.
-fn wrong_roots<R: SingleRoot, const BY_F32: bool>(below: u32) -> u64 {
+fn wrong_roots(root: impl Fn(f32) -> f32, by_f32: bool, below: u32) -> u64 {
     let (mut wrong, mut exact) = (0, 1);
     for x in 1..below {
         exact += i32::from((exact + 1) * (exact + 1) <= x as i32);
         let single = x as i32 as f32;
-        let right = if BY_F32 { Single::root(single) as i32 } else { exact };
-        wrong += u64::from(R::root(single) as i32 != right);
+        let right = if by_f32 { single.sqrt() as i32 } else { exact };
+        wrong += u64::from(root(single) as i32 != right);
     }
     wrong
 }
@@ -54,9 +53,9 @@ pub(super) fn table_3(quick: bool) -> Table {
         ours_steps_in_f64_percent | ours_steps_in_f64_against_f32_sqrt_percent";
     let mut table = Table::new("table_3", columns);
     let most = if quick { 1_000_000 } else { u32::MAX };
-    for (tests, paper) in TABLE_3.into_iter().filter(|(tests, _)| *tests <= most) {
+    for (tests, paper, _) in TABLE_3.into_iter().filter(|(tests, ..)| *tests <= most) {
         for (k, (name, steps, errors)) in ERRORS.into_iter().enumerate() {
-            let [all, wide, by_f32] = errors.map(|count| count(tests) as f64 / f64::from(tests) * 100.0);
+            let [all, wide, by_f32] = errors(tests).map(|count| count as f64 / f64::from(tests) * 100.0);
             table.row(cells![tests, name, steps, paper[k.min(2 + k % 2)], all, wide, by_f32]);
         }
     }
@@ -69,15 +68,15 @@ pub(super) fn table_4(quick: bool) -> Table {
         ours_carmack_2_steps_ms | ours_carmack_3_steps_ms | ours_carmack_4_steps_ms | ours_lomont_1_step_ms | \
         ours_lomont_2_steps_ms | ours_lomont_3_steps_ms | ours_lomont_4_steps_ms | ours_f32_sqrt_ms";
     let roots: [fn(u32) -> f64; 9] = [
-        roots_ms::<Newton<CARMACK, 1>>,
-        roots_ms::<Newton<CARMACK, 2>>,
-        roots_ms::<Newton<CARMACK, 3>>,
-        roots_ms::<Newton<CARMACK, 4>>,
-        roots_ms::<Newton<LOMONT, 1>>,
-        roots_ms::<Newton<LOMONT, 2>>,
-        roots_ms::<Newton<LOMONT, 3>>,
-        roots_ms::<Newton<LOMONT, 4>>,
-        roots_ms::<Single>,
+        |count| roots_ms(newton::<CARMACK, 1, false>, count),
+        |count| roots_ms(newton::<CARMACK, 2, false>, count),
+        |count| roots_ms(newton::<CARMACK, 3, false>, count),
+        |count| roots_ms(newton::<CARMACK, 4, false>, count),
+        |count| roots_ms(newton::<LOMONT, 1, false>, count),
+        |count| roots_ms(newton::<LOMONT, 2, false>, count),
+        |count| roots_ms(newton::<LOMONT, 3, false>, count),
+        |count| roots_ms(newton::<LOMONT, 4, false>, count),
+        |count| roots_ms(f32::sqrt, count),
     ];
     let mut table = Table::new("table_4", columns);
     let most = if quick { 10_000_000 } else { u64::MAX };
@@ -90,8 +89,8 @@ pub(super) fn table_4(quick: bool) -> Table {
 }
 
 /// Returns the milliseconds of the best of three.
-fn roots_ms<R: SingleRoot>(count: u32) -> f64 {
-    let sum = || (1..=count).fold(0u32, |sum, x| sum ^ R::root(x as i32 as f32).to_bits());
+fn roots_ms(root: impl Fn(f32) -> f32, count: u32) -> f64 {
+    let sum = || (1..=count).fold(0u32, |sum, x| sum ^ root(x as i32 as f32).to_bits());
     (0..3).map(|_| timed(|| std::hint::black_box(sum())).1).fold(f64::MAX, f64::min)
 }
 
@@ -155,18 +154,17 @@ fn errors_of(way: RoundedRoot, magic: u32, steps: usize, below: u32) -> u64 {
     all.filter(|x| rounded(way, magic, steps, *x) != exact(*x)).count() as u64
 }
 
-/// Half of what the last digit counts in the first four rows of table 3: with two steps, with three.
-const HALF_DIGITS: [[f64; 2]; 4] = [[0.05, 0.05], [0.005, 0.005], [0.005, 5e-4], [5e-5, 5e-5]];
-
 /// Returns true if a way gives both constants' figures in the rows of table 3 up to 1,000,000 tests.
 fn gives_the_figures(way: RoundedRoot, steps: usize) -> bool {
     let late = usize::from(steps > 2);
-    let is_printed = |((tests, paper), half): ((u32, [f64; 4]), [f64; 2]), magic, column: usize| {
+    let is_printed = |tests: u32, printed: f64, half: f64, magic| {
         let percent = errors_of(way, magic, steps, tests) as f64 / f64::from(tests) * 100.0;
-        (percent - paper[2 * late + column]).abs() <= half[late]
+        (percent - printed).abs() <= half
     };
-    let mut rows = TABLE_3.into_iter().zip(HALF_DIGITS);
-    rows.all(|row| is_printed(row, CARMACK, 0) && is_printed(row, LOMONT, 1))
+    TABLE_3[..4].iter().all(|&(tests, paper, half)| {
+        let [carmack, lomont] = [paper[2 * late], paper[2 * late + 1]];
+        is_printed(tests, carmack, half[late], CARMACK) && is_printed(tests, lomont, half[late], LOMONT)
+    })
 }
 
 /// Returns the number of ways to round, and of those that give the figures.
@@ -199,13 +197,13 @@ mod tests {
         let [nearest, _, wide] = ROUNDINGS;
         let with = |roundings| ([(false, roundings); 2], 0, nearest);
         for below in [4, 1000, 99_856, 1_000_000] {
-            let [narrow, of_wide, by_f32] = errors::<LOMONT, 2>().map(|count| count(below));
+            let [narrow, of_wide, by_f32] = errors::<LOMONT, 2>(below);
             assert_eq!(errors_of(with([nearest; 4]), LOMONT, 2, below), narrow);
             assert_eq!(errors_of(with([wide, wide, wide, nearest]), LOMONT, 2, below), of_wide);
-            assert_eq!((of_wide, wrong_roots::<Single, false>(below)), (by_f32, 0));
+            assert_eq!((of_wide, wrong_roots(f32::sqrt, false, below)), (by_f32, 0));
         }
-        assert_eq!(wrong_roots::<Single, true>(30_000_000), 0);
-        assert!(wrong_roots::<Single, false>(30_000_000) > 0);
+        assert_eq!(wrong_roots(f32::sqrt, true, 30_000_000), 0);
+        assert!(wrong_roots(f32::sqrt, false, 30_000_000) > 0);
     }
 
     #[test]

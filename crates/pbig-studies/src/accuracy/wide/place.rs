@@ -1,11 +1,20 @@
-//! A world at a place: in f64, as rapier holds it, and its boxes in f32 by every way.
+//! A world at a place: in f64, as rapier holds it, and its boxes in f32 by every way. And worlds that move: simulated by
+//! rapier3d-f64, whose poses are the truth in each step, and by rapier in f32 beside it, with our broad phase and, as controls, with
+//! rapier's and with the orders of either in the other. What is promised of boxes must hold there, too; sums over worlds are without
+//! these, which are hundreds of frames of one.
 
-use crate::wide::{Differences, Layout, Pose, Truth, doubt, to_f32, to_f64, widened_by_ulps};
-use pbig_core::{Aabb, Config, Finder, Limits, Pair};
-use pbig_harness::output::Failure;
+use super::super::{mean, percent};
+use crate::UNLIMITED;
+use crate::reordered::KINDS;
+use crate::wide::{
+    Differences, Layout, Pose, Truth, WideWorld, doubt, moved, to_f32, to_f64, widened_by_ulps,
+};
+use pbig_core::{Aabb, Finder, Pair};
+use pbig_harness::prelude::*;
 use pbig_harness::scenes::Scene;
+use pbig_harness::world::World;
 use rapier_pbig::{PbigConfig, collision_aabb};
-use rapier3d::prelude::{Collider, IntegrationParameters, RigidBodySet};
+use rapier3d::prelude::{BroadPhase, Collider, IntegrationParameters, RigidBodySet};
 
 /// A way to make boxes in f32: its name, the ulps by which rapier's boxes are widened, and true with the drop-in's margin.
 /// Without ulps: boxes in f64 at poses in f64, rounded outward.
@@ -33,7 +42,7 @@ pub(super) const OUTWARD: usize = 5;
 pub(super) const MARGIN: usize = 6;
 
 /// A world near the origin.
-pub(super) struct World {
+pub(super) struct NamedLayout {
     pub(super) name: &'static str,
     /// About how large its shapes are.
     pub(super) size: f64,
@@ -41,11 +50,11 @@ pub(super) struct World {
 }
 
 /// Returns the worlds; `count` shapes in each, or a fifth if all lie in one place far away.
-pub(super) fn worlds(count: usize) -> Result<Vec<World>, Failure> {
-    let crowd = |name, size: f64, count| World { name, size, layout: Layout::crowd(count, size, 1) };
-    let scene = |name| -> Result<World, Failure> {
+pub(super) fn worlds(count: usize) -> Result<Vec<NamedLayout>, Failure> {
+    let crowd = |name, size: f64, count| NamedLayout { name, size, layout: Layout::crowd(count, size, 1) };
+    let scene = |name| -> Result<NamedLayout, Failure> {
         let built = Scene::named(name)?.build(count, 1);
-        Ok(World { name, size: 1.0, layout: Layout::of_world(&built) })
+        Ok(NamedLayout { name, size: 1.0, layout: Layout::of_world(&built) })
     };
     let crowds = [
         crowd("crowd", 1.0, count),
@@ -98,10 +107,8 @@ impl<'a> Place<'a> {
             return boxes.iter().map(|wide| Aabb::from_f64(wide.min, wide.max)).collect();
         };
         let boxes = rapiers(&self.params, self.colliders.iter(), ulps);
-        if !has_margin {
-            return boxes;
-        }
-        boxes.iter().map(|aabb| aabb.inflated(PbigConfig::DEFAULT.margin)).collect()
+        let widened = |aabb: &Aabb| aabb.inflated(PbigConfig::DEFAULT.margin);
+        if has_margin { boxes.iter().map(widened).collect() } else { boxes }
     }
 
     /// Compares the pairs of boxes in f32 with those in f64: at the poses that rapier holds, and in the world.
@@ -127,7 +134,7 @@ pub(super) fn rapiers<'c>(
 }
 
 pub(super) fn finder() -> Finder {
-    Finder::new(Config { limits: Limits::UNLIMITED, ..Config::DEFAULT })
+    Finder::new(UNLIMITED)
 }
 
 /// The results of a world at a distance.
@@ -162,5 +169,95 @@ impl Row {
             sums.iter_mut().zip(place.differences(way)?).for_each(|(sum, one)| *sum += one);
         }
         Ok(())
+    }
+}
+
+/// A scene, its name in tables, its bodies, and steps: bodies fall and come to lie; and lie from the first.
+type Scenery = (&'static str, &'static str, usize, usize);
+
+const SCENES: [Scenery; 2] =
+    [("column", "column, simulated in f64", 1000, 180), ("pile", "pile, simulated in f64", 1000, 120)];
+
+/// Returns what boxes in f32 make of the worlds in f64, summed over all steps; and both tables.
+pub(super) fn simulated(offsets: &[f64], quick: bool) -> Result<(Vec<Row>, [Table; 2]), Failure> {
+    let in_f64 = "world | offset | steps | pairs | missed_by_boxes_in_f32 | of_touching_shapes | missed | added | \
+        missed_with_3_ulps";
+    let in_f32 =
+        "world | offset | broad_phase | missed_percent | added_percent | apart_at_the_end | lost_bodies";
+    let mut tables = [Table::new("simulated", in_f64), Table::new("simulated_in_f32", in_f32)];
+    let mut rows = vec![];
+    for scene in if quick { &SCENES[..1] } else { &SCENES } {
+        let (scene, name, bodies, steps) = if quick { (scene.0, scene.1, 100, 50) } else { *scene };
+        for &offset in offsets {
+            rows.push(run((scene, name, bodies, steps), offset, &mut tables)?);
+        }
+    }
+    Ok((rows, tables))
+}
+
+/// Runs a scene along the diagonal, and appends its rows.
+fn run((scene, name, bodies, steps): Scenery, offset: f64, tables: &mut [Table; 2]) -> Result<Row, Failure> {
+    let world = Scene::named(scene)?.build(bodies, 1);
+    let layout = Layout::of_world(&world);
+    let mut wide = WideWorld::of(&world, [offset; 3])?;
+    let narrow =
+        KINDS.map(|(_, make)| Ok(Narrow::new(Scene::named(scene)?.build(bodies, 1), offset, make())));
+    let mut narrow = narrow.into_iter().collect::<Result<Vec<_>, Failure>>()?;
+    let mut row = Row::new((name, 1.0), (offset, "diagonal"));
+    for _ in 0..steps {
+        wide.step();
+        let place = Place::new(&layout, wide.poses());
+        row.add(&place)?;
+        narrow.iter_mut().try_for_each(|one| one.step(&place))?;
+    }
+    let ends = wide.poses();
+    let is_there = ends.iter().all(|pose| pose.translation.vector.norm().is_finite());
+    check(is_there, || format!("{name}, {offset} away: a body is nowhere in f64"))?;
+    let [boxes, whole] = row.ways[RAPIERS];
+    let head = cells![name, offset, steps, row.pairs, boxes.missed, boxes.missed_deep];
+    tables[0].row(cells![..head, whole.missed, whole.added, row.ways[IN_WORLD][1].missed]);
+    for ((kind, _), narrow) in KINDS.iter().zip(narrow) {
+        let [missed, added] = [narrow.sum.missed, narrow.sum.added].map(|count| percent(count, row.pairs));
+        let (apart, lost) = narrow.apart(&ends);
+        tables[1].row(cells![name, offset, *kind, missed, added, apart, lost]);
+    }
+    Ok(row)
+}
+
+/// The world as rapier simulates it in f32.
+struct Narrow {
+    world: World,
+    broad_phase: Box<dyn BroadPhase>,
+    /// Its pairs against those of the one in f64, summed over all steps.
+    sum: Differences,
+}
+
+impl Narrow {
+    fn new(world: World, offset: f64, broad_phase: Box<dyn BroadPhase>) -> Self {
+        Self { world: moved(world, [offset; 3]), broad_phase, sum: Differences::default() }
+    }
+
+    /// Makes a step, and compares the pairs of rapier's boxes with the world in f64 after the same step.
+    fn step(&mut self, truth: &Place) -> Result<(), Failure> {
+        self.world.step(&mut *self.broad_phase);
+        let boxes = rapiers(&self.world.params, self.colliders(), 0);
+        self.sum += truth.world.differences(finder().find(&boxes)?, truth.reach());
+        Ok(())
+    }
+
+    /// Returns all colliders but the ground.
+    fn colliders(&self) -> impl Iterator<Item = &Collider> {
+        let all = self.world.colliders.iter().map(|(_, one)| one);
+        all.filter(|one| one.shape().as_halfspace().is_none())
+    }
+
+    /// Returns the mean distance between the places of a body in the two worlds, and the number of bodies that are nowhere.
+    fn apart(&self, poses: &[Pose]) -> (f64, usize) {
+        let apart = |(one, pose): (&Collider, &Pose)| {
+            (to_f64(one.position()).translation.vector - pose.translation.vector).norm()
+        };
+        let all: Vec<f64> = self.colliders().zip(poses).map(apart).collect();
+        let there: Vec<f64> = all.iter().copied().filter(|distance| distance.is_finite()).collect();
+        (mean(&there), all.len() - there.len())
     }
 }
