@@ -1,9 +1,9 @@
 //! Options that several commands share.
 
-use clap::builder::RangedI64ValueParser;
 use pbig_core::{Error, Report};
 use pbig_harness::output::Failure;
 use pbig_harness::runner::milliseconds;
+use std::ops::RangeInclusive;
 
 /// Runs `work` on `threads` threads, or on all.
 pub(crate) fn with_threads<T: Send>(
@@ -15,15 +15,22 @@ pub(crate) fn with_threads<T: Send>(
     pool.map_err(|error| Failure::Input(format!("--threads {threads}: {error}")))?.install(work)
 }
 
-/// Beyond this number starting threads takes longer than any work.
-pub(crate) const MOST_THREADS: i64 = 1024;
+/// Numbers of threads: beyond the largest, starting them takes longer than any work.
+pub(crate) const THREADS: RangeInclusive<u64> = 1..=1024;
 
-/// Beyond this number no machine has the memory for a world of bodies.
-pub(crate) const MOST_BODIES: i64 = 10_000_000;
+/// Numbers of bodies: beyond the largest, no machine has the memory for their world.
+pub(crate) const BODIES: RangeInclusive<u64> = 1..=10_000_000;
 
-/// Parses a count of at least one.
-pub(crate) fn up_to(most: i64) -> RangedI64ValueParser<usize> {
-    RangedI64ValueParser::new().range(1..=most)
+/// Returns a parser of whole numbers within bounds.
+pub(crate) fn whole<T: TryFrom<u64>>(
+    bounds: RangeInclusive<u64>,
+) -> impl Fn(&str) -> Result<T, String> + Clone {
+    move |text| {
+        let number = text.parse().ok().filter(|number| bounds.contains(number));
+        let (least, most) = (bounds.start(), bounds.end());
+        let number = number.and_then(|number| number.try_into().ok());
+        number.ok_or_else(|| format!("must be a whole number from {least} to {most}"))
+    }
 }
 
 /// A length for `Config::margin`.

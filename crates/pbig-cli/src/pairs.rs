@@ -1,6 +1,6 @@
 //! `pbig pairs`: all overlapping pairs of the boxes in a file.
 
-use crate::options::{MOST_THREADS, plan_text, search_text, stages, up_to, with_threads};
+use crate::options::{THREADS, plan_text, search_text, stages, whole, with_threads};
 use pbig_core::{Aabb, Config, Finder};
 use pbig_harness::files::{BOXES_OR_PAIRS, ending, read_boxes, write_pairs};
 use pbig_harness::options::BackendOption;
@@ -18,10 +18,10 @@ pub(crate) struct Args {
     #[arg(long, value_enum, default_value_t)]
     backend: BackendOption,
     /// Threads; all by default.
-    #[arg(long, value_name = "N", value_parser = up_to(MOST_THREADS), allow_negative_numbers = true)]
+    #[arg(long, value_name = "N", value_parser = whole::<usize>(THREADS), allow_negative_numbers = true)]
     threads: Option<usize>,
     /// How often to find the pairs, for the times.
-    #[arg(long, value_name = "K", default_value = "1", value_parser = up_to(i64::MAX), allow_negative_numbers = true)]
+    #[arg(long, value_name = "K", default_value = "1", value_parser = whole::<usize>(1..=u64::MAX), allow_negative_numbers = true)]
     repeat: usize,
     /// An invalid box (NaN, or min > max) is an error.
     #[arg(long)]

@@ -1,6 +1,6 @@
 //! `pbig simulate` and `pbig scenes`: headless rapier worlds.
 
-use crate::options::{MOST_BODIES, up_to};
+use crate::options::{BODIES, whole};
 use pbig_harness::options::BackendOption;
 use pbig_harness::prelude::*;
 use pbig_harness::runner::{Run, StepTime};
@@ -16,10 +16,10 @@ pub(crate) struct Args {
     #[arg(long, value_name = "NAME")]
     scene: String,
     /// Bodies; each scene has its own default.
-    #[arg(long, value_name = "N", value_parser = up_to(MOST_BODIES), allow_negative_numbers = true)]
+    #[arg(long, value_name = "N", value_parser = whole::<usize>(BODIES), allow_negative_numbers = true)]
     bodies: Option<usize>,
     /// Steps of 1/60 s.
-    #[arg(long, value_name = "K", default_value = "300", value_parser = up_to(i64::MAX), allow_negative_numbers = true)]
+    #[arg(long, value_name = "K", default_value = "300", value_parser = whole::<usize>(1..=u64::MAX), allow_negative_numbers = true)]
     steps: usize,
     /// Which broad phase drives the world.
     #[arg(long, default_value = "pbig", value_parser = ["pbig", "stock"])]
@@ -28,7 +28,7 @@ pub(crate) struct Args {
     #[arg(long, value_enum, default_value_t)]
     backend: BackendOption,
     /// For the random numbers of the scene.
-    #[arg(long, default_value = "1", allow_negative_numbers = true)]
+    #[arg(long, default_value = "1", value_parser = whole::<u64>(0..=u64::MAX), allow_negative_numbers = true)]
     seed: u64,
     /// Run rapier's broad phase and the oracle beside pbig and compare after every call.
     #[arg(long)]

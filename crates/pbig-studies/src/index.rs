@@ -180,6 +180,16 @@ mod tests {
     }
 
     #[test]
+    fn integers_are_right_at_both_ends_of_every_row_of_a_million_boxes() {
+        let n = 1 << 20;
+        for row in 0..n - 1 {
+            let [first, last] = ends(row, n);
+            let wanted = [(row, row + 1), (row, n - 1)];
+            assert_eq!([first, last].map(|k| integers(row_by(f32::sqrt)(k, n), k, n)), wanted);
+        }
+    }
+
+    #[test]
     fn relative_errors_are_those_of_the_literature() {
         // Lomont: 0.00175233 for Carmack's constant after one step, a little less for his own.
         let carmack = worst_relative(newton::<CARMACK, 1, false>);

@@ -26,7 +26,7 @@ type Part = fn(&Setup) -> Result<Vec<Table>, Failure>;
 
 const PARTS: [Part; 4] = [table_iii::tables, figures::tables, roots::tables, avril::tables];
 
-/// Makes all tables. A failed check, if two ways to search find different pairs.
+/// Makes all tables. Fails if two ways to search find different pairs.
 pub fn run(quick: bool) -> Result<Report, Failure> {
     let setup = Setup::new(quick);
     let mut tables = vec![];

@@ -22,7 +22,7 @@ const SMALL: [Case; 3] = [("unit", 10_000), ("mixed", 10_000), ("pile", 10_000)]
 /// The share of boxes that swing to and fro; none: all drift, on and on.
 type Motion = Option<f64>;
 
-/// Measures all cases. A failed check, if the sides have different numbers of pairs.
+/// Measures all cases. Fails if the sides have different numbers of pairs.
 pub fn run(quick: bool) -> Result<Report, Failure> {
     let (effort, mut table) = (Effort::new(quick), Table::new("peers", COMPARED));
     let cases: &[Case] = if quick { &SMALL } else { &LARGE };

@@ -19,7 +19,7 @@ const NAMES: [&str; 4] = ["ours", "ours", "search from nothing", "parry 0.31"];
 const COLUMNS: &str =
     "motion | density | boxes | threads | side | mean_ms | median_ms | p99_ms | worst_ms | first_ms";
 
-/// Measures every motion and every scene; `given`: numbers of boxes, and of bodies, instead of its own. A failed check, if the
+/// Measures every motion and every scene; `given`: numbers of boxes, and of bodies, instead of its own. Fails if the
 /// sides have different numbers of pairs.
 pub fn run(quick: bool, given: &[usize]) -> Result<Report, Failure> {
     let sizes = |full: &[usize], few: &[usize]| match given {

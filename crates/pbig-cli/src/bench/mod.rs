@@ -5,7 +5,7 @@ pub(crate) mod memory;
 mod step;
 mod update;
 
-use crate::options::{MOST_BODIES, up_to};
+use crate::options::{BODIES, whole};
 use crate::studies;
 use clap::ValueEnum;
 use pbig_harness::output::Failure;
@@ -27,7 +27,7 @@ pub(crate) struct Args {
     #[arg(long, value_name = "DIR")]
     write: Option<PathBuf>,
     /// Numbers of boxes and of bodies for `steady`, instead of its own.
-    #[arg(long, value_name = "N,N", value_parser = up_to(MOST_BODIES), value_delimiter = ',', allow_negative_numbers = true)]
+    #[arg(long, value_name = "N,N", value_parser = whole::<usize>(BODIES), value_delimiter = ',', allow_negative_numbers = true)]
     boxes: Vec<usize>,
 }
 

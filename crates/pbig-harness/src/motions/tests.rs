@@ -65,6 +65,20 @@ fn exactly_the_named_boxes_change_and_all_stay_in_the_space() {
 }
 
 #[test]
+fn every_box_leaves_and_comes_in_churn() {
+    let mut scene = Scene::new(Motion::Churn, Density::Sparse, 300, 1);
+    let mut frames_present = vec![0; 300];
+    for _ in 0..200 {
+        scene.step();
+        frames_present
+            .iter_mut()
+            .zip(scene.boxes())
+            .for_each(|(frames, b)| *frames += i32::from(b.is_valid()));
+    }
+    assert!(frames_present.iter().all(|frames| (1..200).contains(frames)), "{frames_present:?}");
+}
+
+#[test]
 fn the_same_seed_gives_the_same_boxes_and_another_gives_others() {
     for motion in Motion::ALL {
         for density in Density::ALL {

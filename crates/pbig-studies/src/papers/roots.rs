@@ -74,13 +74,13 @@ const WAYS: [(&str, Search); 4] = [
 /// The place of the lazy way.
 const LAZY: usize = 3;
 
-/// Calls of each way. Two ways that take as long have all calls of one before all of the other in 3% of cases.
+/// Calls of each way. Each way runs once at each place of a round.
 const EFFORT: Effort = Effort { warm_up: 0, rounds: 4, budget: Duration::MAX };
 
 /// The pairs of each way, its milliseconds for all ids, and for roots and for the lazy way all ids over those looked at.
 type Found = ([u64; WAYS.len()], Vec<f64>, [f64; 2]);
 
-/// Measures all ways. A failed check, if ways that looked at the same pairs have not found the same.
+/// Measures all ways. Fails if ways that looked at the same pairs have not found the same.
 fn all_ways(n: u64, most: u64) -> Result<Found, Failure> {
     let boxes = cubes(n as usize, 1.0, 1.0, 1);
     let ids = [pair_count(n), lazy_ids(n as i64) as u64].map(|ids| stretches(ids, most));

@@ -147,8 +147,8 @@ impl Setup {
         self.gpu.as_ref().filter(|gpu| !gpu.is_software() || boxes <= most_in_software)
     }
 
-    /// Returns a call of each setting on moving boxes; none without a device for so many. A failed check, if they find other
-    /// pairs than the CPU.
+    /// Returns a call of each setting on moving boxes; none without a device for so many. Fails if they find other pairs than the
+    /// CPU.
     pub(super) fn run(&self, ways: &[Way], boxes: &[Aabb], distance: f32) -> Result<Vec<Call>, Failure> {
         let Some(gpu) = self.for_boxes(boxes.len()) else { return Ok(vec![]) };
         // The first calls compile, allocate and learn. Times in software mean nothing, so few will do.
