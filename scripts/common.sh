@@ -55,18 +55,19 @@ target_folder() {
 # Where setup.sh installs a Node for the page's tests, if the system's is too old.
 node_folder=out/node
 
-# new_node: prints a Node of version 22 or newer, which the page's tests need.
+# new_node: prints a Node of version 22.12 or newer, which the page's tests need.
 new_node() {
-    local node
+    local node is_new='const [major, minor] = process.versions.node.split(".").map(Number)
+        process.exit(major > 22 || (major === 22 && minor >= 12) ? 0 : 1)'
     for node in node "$PWD/$node_folder/node_modules/node/bin/node"; do
-        if has "$node" && [ "$("$node" -p 'process.versions.node.split(".")[0]')" -ge 22 ]; then echo "$node" && return; fi
+        if has "$node" && "$node" -e "$is_new"; then echo "$node" && return; fi
     done
     return 1
 }
 
-# left_out WHAT: says that something cannot run here. With CI=true it ends the script as a failure.
+# left_out WHAT [REMEDY]: says that something cannot run here, and what to do. With CI=true it ends the script as a failure.
 left_out() {
-    echo "== left out: $1; scripts/setup.sh installs what is missing"
+    echo "== left out: $1; ${2:-scripts/setup.sh installs what is missing}"
     [ "${CI:-}" != true ] || exit 1
 }
 

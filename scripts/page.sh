@@ -103,7 +103,7 @@ bundle
 echo "== the page is in $out; serve it with: python3 -m http.server -d $out"
 if $test; then
     has chromium || { left_out "the page's tests: there is no Chromium" && exit 0; }
-    node=$(new_node) || { left_out "the page's tests, which need Node 22: this is $(node --version)" && exit 0; }
+    node=$(new_node) || { left_out "the page's tests, which need Node 22.12 or newer: this is $(node --version)" && exit 0; }
     test_page
     echo "== page: all passed"
 fi

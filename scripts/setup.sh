@@ -87,7 +87,7 @@ setup_browser() {
     has chromium || require "the browser Chromium" chromium || true
     ! new_node >/dev/null || return 0
     step npm install --silent --no-audit --no-fund --prefix "$node_folder" node@22 || true
-    new_node >/dev/null || missing "Node 22" "npm install --prefix $node_folder node@22"
+    new_node >/dev/null || missing "Node 22.12" "npm install --prefix $node_folder node@22"
 }
 
 setup_aarch64() {

@@ -1,10 +1,10 @@
 //! The cells of pbig's grid, and the cell of each collider.
 
 use crate::engine::Pbig;
-use crate::rapier::boxes;
 use crate::simulation::Simulation;
 use pbig_core::Plan;
 use rapier_pbig::DebugRenderParts;
+use rapier3d::pipeline::{DebugColor, DebugRenderObject};
 use rapier3d::prelude::*;
 use std::collections::HashMap;
 
@@ -43,8 +43,8 @@ impl Cells {
     }
 
     fn read(pbig: &Pbig, colliders: &ColliderSet) -> Self {
-        let cells = boxes(pbig, colliders, DebugRenderParts { cells: true, fat_boxes: false });
-        let fat_boxes = boxes(pbig, colliders, DebugRenderParts { cells: false, fat_boxes: true });
+        let cells = boxes_of(pbig, colliders, DebugRenderParts { cells: true, fat_boxes: false });
+        let fat_boxes = boxes_of(pbig, colliders, DebugRenderParts { cells: false, fat_boxes: true });
         let occupied = cells.into_iter().map(|(_, cell, _)| cell).collect();
         let plan = &pbig.stats().report.plan;
         let in_grid = fat_boxes.into_iter().filter(|(.., is_in_grid)| *is_in_grid);
@@ -52,6 +52,30 @@ impl Cells {
             in_grid.filter_map(|(handle, fat, _)| Some((handle, cell_at(fat.min, plan)?))).collect();
         Self { occupied, of_collider }
     }
+}
+
+/// The boxes that pbig draws, each with its collider and whether it lies in a cell. `rapier` has the trait that calls it.
+pub(crate) struct Boxes(Vec<(ColliderHandle, Cell, bool)>);
+
+impl Boxes {
+    /// Appends an AABB; other objects are left out.
+    pub(crate) fn push(&mut self, object: DebugRenderObject, [_, saturation, lightness, _]: DebugColor) {
+        if let DebugRenderObject::ColliderAabb(handle, _, aabb) = object {
+            let cell = Cell { min: aabb.mins.into(), max: aabb.maxs.into(), lightness };
+            // Pbig draws boxes outside the grid in grey.
+            self.0.push((handle, cell, saturation > 0.0));
+        }
+    }
+}
+
+fn boxes_of(
+    pbig: &Pbig,
+    colliders: &ColliderSet,
+    parts: DebugRenderParts,
+) -> Vec<(ColliderHandle, Cell, bool)> {
+    let mut boxes = Boxes(Vec::new());
+    pbig.debug_render(colliders, parts, &mut boxes);
+    boxes.0
 }
 
 /// Steps of a cell, to which pbig rounds a coordinate (docs/ARCHITECTURE.md, Build).

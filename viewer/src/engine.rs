@@ -76,7 +76,8 @@ impl Engine {
         self.pbig().and_then(Pbig::last_error)
     }
 
-    /// Returns the numbers of `AddPair` and `DeletePair` events so far, those of swaps included. Rapier 0.36 does not tell them.
+    /// Returns the numbers of `AddPair` and `DeletePair` events since the engine was created, across all swaps. The viewer on
+    /// rapier 0.36 returns `None` for stock, whose events rapier keeps private there.
     pub fn events(&self) -> Option<[u64; 2]> {
         Some([self.added, self.deleted])
     }

@@ -147,6 +147,12 @@ mod tests {
     }
 
     #[test]
+    fn events_are_shown_where_they_are_known() {
+        assert_eq!(counts_line(3, Some([5, 2])), "3 pairs, events: 5 added, 2 removed");
+        assert_eq!(counts_line(3, None), "3 pairs");
+    }
+
+    #[test]
     fn an_error_of_the_broad_phase_is_shown() {
         assert!(figures(Choice::Cpu, 1).error.is_empty() && figures(Choice::Stock, 1).error.is_empty());
         let setting = Setting { scene: Scene::named("column").unwrap(), bodies: 200, seed: 1 };

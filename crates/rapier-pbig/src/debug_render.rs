@@ -1,12 +1,14 @@
-//! Draws the broad phase through rapier's debug renderer.
+//! Draws the broad phase through rapier's debug renderer. `rapier-0.36/rapier-pbig` has this file, too; `draw` is each crate's
+//! own, for its version of rapier.
 
-use crate::PbigBroadPhase;
+use crate::draw::{Drawn, draw_edges, to_handle};
+use crate::tree::to_tree;
 use pbig_core::Aabb;
 use rapier3d::parry::bounding_volume::Aabb as DrawnAabb;
 use rapier3d::pipeline::{DebugColor, DebugRenderBackend, DebugRenderObject};
-use rapier3d::prelude::{Collider, ColliderHandle, ColliderSet, Isometry, Point, Vector};
+use rapier3d::prelude::{Collider, ColliderHandle, ColliderSet};
 
-/// The parts that [`PbigBroadPhase::debug_render`] draws.
+/// The parts that `debug_render` draws.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct DebugRenderParts {
     /// The stored AABBs, with their margins. Boxes in a cell are green, others grey.
@@ -23,7 +25,7 @@ impl DebugRenderParts {
 /// The alpha of boxes and of cells, which are more numerous.
 const ALPHA: [f32; 2] = [1.0, 0.5];
 
-impl PbigBroadPhase {
+impl Drawn {
     /// Draws the stored boxes and cells as lines, through the renderer that also draws rapier's own pictures. Each is passed as
     /// a [`DebugRenderObject::ColliderAabb`], a cell with the first collider in it. There are no cells for few boxes, which
     /// need no grid, and on a GPU.
@@ -52,7 +54,7 @@ impl PbigBroadPhase {
     }
 
     fn collider<'a>(&self, colliders: &'a ColliderSet, id: u32) -> Option<(ColliderHandle, &'a Collider)> {
-        let handle = crate::scene::to_collider(self.colliders.handle(id)?);
+        let handle = to_handle(self.colliders.handle(id)?);
         Some((handle, colliders.get(handle)?))
     }
 }
@@ -68,11 +70,10 @@ fn draw(
     aabb: &Aabb,
     color: DebugColor,
 ) {
-    let aabb = DrawnAabb::new(Point::from(aabb.min), Point::from(aabb.max));
+    let aabb = to_tree(aabb);
     let object = DebugRenderObject::ColliderAabb(handle, collider, &aabb);
     if backend.filter_object(object) {
         let edges = DrawnAabb::EDGES_VERTEX_IDS.map(|(a, b)| [a as u32, b as u32]);
-        let (pose, scale) = (Isometry::identity(), Vector::repeat(1.0));
-        backend.draw_polyline(object, &aabb.vertices(), &edges, &pose, &scale, color);
+        draw_edges(backend, object, &aabb.vertices(), &edges, color);
     }
 }

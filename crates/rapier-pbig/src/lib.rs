@@ -51,6 +51,8 @@ mod call;
 mod config;
 #[cfg(feature = "debug-render")]
 mod debug_render;
+#[cfg(feature = "debug-render")]
+mod draw;
 mod queries;
 mod scene;
 #[cfg(feature = "shadow")]

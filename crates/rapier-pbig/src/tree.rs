@@ -25,7 +25,7 @@ impl Tree for ParryTree {
             tree.update(leaves);
             return tree;
         }
-        let leaves = leaves.map(|(id, aabb)| (id as usize, tree_aabb(&aabb)));
+        let leaves = leaves.map(|(id, aabb)| (id as usize, to_tree(&aabb)));
         Self { bvh: Bvh::from_iter(BvhBuildStrategy::Binned, leaves), workspace: BvhWorkspace::default() }
     }
 
@@ -37,7 +37,7 @@ impl Tree for ParryTree {
 
     fn update(&mut self, leaves: impl Iterator<Item = (u32, Aabb)>) {
         for (id, aabb) in leaves {
-            self.bvh.insert_or_update_partially(tree_aabb(&aabb), id, 0.0);
+            self.bvh.insert_or_update_partially(to_tree(&aabb), id, 0.0);
         }
         self.bvh.optimize_incremental(&mut self.workspace);
         self.bvh.refit(&mut self.workspace);
@@ -45,7 +45,7 @@ impl Tree for ParryTree {
 }
 
 /// Clamps infinite boxes to the size of rapier's half-spaces, because the tree computes centres.
-fn tree_aabb(aabb: &Aabb) -> TreeAabb {
+pub(crate) fn to_tree(aabb: &Aabb) -> TreeAabb {
     let corner = |corner: [f32; 3]| Point::from(corner.map(|x| x.clamp(Real::MIN / 2.0, Real::MAX / 2.0)));
     TreeAabb::new(corner(aabb.min), corner(aabb.max))
 }

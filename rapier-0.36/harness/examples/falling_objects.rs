@@ -49,6 +49,7 @@ fn main() -> ExitCode {
         Ok(()) => println!("chart: {}", args.chart.display()),
         Err(error) => eprintln!("{error}"),
     }
+    print_where_to_watch(&args);
     for difference in checker.differences.iter().take(3) {
         eprintln!("{difference}");
     }
@@ -106,6 +107,14 @@ fn print_table(stock: &Run, ours: &Run, checker: &Checker) {
     let against = format!("(against the oracle, {} comparisons)", checker.compared);
     println!("{:<26} {:>11} {missing:>11}   {against}", "missing pairs", "");
     println!("\nTimes are medians over the steps. The two worlds drift apart, so pairs differ in number.");
+}
+
+/// Names the programs that show the same objects as they fall.
+fn print_where_to_watch(args: &Args) {
+    let Args { scene, bodies, seed, .. } = args;
+    println!("\nWatch it: cargo run --release --manifest-path rapier-0.36/viewer/Cargo.toml -- \\");
+    println!("              --scene {} --bodies {bodies} --seed {seed}", scene.name);
+    println!("In a browser, on rapier 0.27: scripts/page.sh");
 }
 
 fn write_chart(args: &Args, stock: &[StepTime], ours: &[StepTime]) -> Result<(), String> {

@@ -41,7 +41,10 @@
 
 mod config;
 #[cfg(feature = "debug-render")]
+#[path = "../../../crates/rapier-pbig/src/debug_render.rs"]
 mod debug_render;
+#[cfg(feature = "debug-render")]
+mod draw;
 mod finder;
 mod scene;
 #[cfg(feature = "shadow")]

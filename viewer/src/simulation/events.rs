@@ -6,8 +6,8 @@ use std::collections::BTreeSet;
 
 type Pair = [(u32, u32); 2];
 
-/// The broad phases to swap to, in turn.
-const SWAPS: [Choice; 4] = [Choice::Stock, Choice::Cpu, Choice::Stock, Choice::Brute];
+/// The broad phases to swap to, in turn: from stock to pbig, from pbig to pbig, and from pbig to stock.
+const SWAPS: [Choice; 4] = [Choice::Stock, Choice::Cpu, Choice::Brute, Choice::Cpu];
 
 fn sorted(a: ColliderHandle, b: ColliderHandle) -> Pair {
     let mut pair = [a, b].map(ColliderHandle::into_raw_parts);

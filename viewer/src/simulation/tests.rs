@@ -11,11 +11,14 @@ fn sleeping(simulation: &Simulation) -> usize {
     simulation.world.bodies.iter().filter(|(_, body)| body.is_sleeping()).count()
 }
 
-/// The pairs whose boxes overlap without a margin, by brute force. Every broad phase must report each of them.
-fn touching(world: &World) -> Vec<(ColliderHandle, ColliderHandle)> {
+/// The largest distance by which a stored AABB at first exceeds its shape's on each side, of both versions of rapier: on 0.36
+/// a margin of 4 cm, and half the prediction distance of 2 cm.
+const MARGIN_METRES: f32 = 0.05;
+
+/// Returns the pairs whose AABBs overlap, by brute force. Every broad phase must report each pair that overlaps without margins.
+fn overlapping(world: &World, aabb: fn(&Collider) -> Aabb) -> Vec<(ColliderHandle, ColliderHandle)> {
     let dynamic = |collider: &Collider| collider.parent().is_some_and(|body| world.bodies[body].is_dynamic());
-    let boxes: Vec<_> =
-        world.colliders.iter().map(|(handle, c)| (handle, c.compute_aabb(), dynamic(c))).collect();
+    let boxes: Vec<_> = world.colliders.iter().map(|(handle, c)| (handle, aabb(c), dynamic(c))).collect();
     let mut pairs = Vec::new();
     for (i, (a, box_a, dynamic_a)) in boxes.iter().enumerate() {
         for (b, box_b, dynamic_b) in &boxes[i + 1..] {
@@ -27,25 +30,59 @@ fn touching(world: &World) -> Vec<(ColliderHandle, ColliderHandle)> {
     pairs
 }
 
-/// Makes a step, and returns how many pairs that touched at its start and touch at its end are unknown. Rapier 0.36 looks for
-/// pairs at the start of a step, rapier 0.27 at its end as well.
-fn missed_in_a_step(simulation: &mut Simulation) -> usize {
-    let before = touching(&simulation.world);
+fn touching(world: &World) -> Vec<(ColliderHandle, ColliderHandle)> {
+    overlapping(world, Collider::compute_aabb)
+}
+
+/// Returns the pairs whose stored AABBs may overlap. A broad phase keeps a stored AABB as long as it contains the collider's.
+/// The AABB of a body that turns may shrink; the larger one stays. No edge of a stored AABB is longer than the bounding
+/// sphere's diameter and two margins, so the stored AABB exceeds the present one by at most that difference.
+fn near(world: &World) -> Vec<(ColliderHandle, ColliderHandle)> {
+    overlapping(world, |collider| {
+        let radius = collider.shape().compute_local_bounding_sphere().radius;
+        let now = collider.compute_aabb();
+        let excess = now.extents().map(|edge| 2.0 * (radius + MARGIN_METRES) - edge);
+        Aabb::new(now.mins - excess, now.maxs + excess)
+    })
+}
+
+/// Pairs that are wrong after a step.
+#[derive(Debug, Default, PartialEq)]
+struct Faults {
+    /// Pairs that touched at the step's start and touch at its end, and that the narrow phase does not have. Rapier 0.36 looks
+    /// for pairs at the start of a step, rapier 0.27 at its end as well.
+    missed: usize,
+    /// Pairs that the narrow phase has and whose stored AABBs overlap neither at the start nor at the end.
+    stale: usize,
+}
+
+/// Makes a step, and compares the narrow phase's pairs with brute force.
+fn faults_in_a_step(simulation: &mut Simulation) -> Faults {
+    let (before, mut known) = (touching(&simulation.world), near(&simulation.world));
     simulation.step();
     let (after, narrow_phase) = (touching(&simulation.world), &simulation.world.narrow_phase);
+    known.extend(near(&simulation.world));
     let is_missed =
         |pair: &&(_, _)| after.contains(pair) && narrow_phase.contact_pair(pair.0, pair.1).is_none();
-    before.iter().filter(is_missed).count()
+    let is_stale = |pair: &&ContactPair| {
+        let (a, b) = (pair.collider1, pair.collider2);
+        !known.contains(&(a, b)) && !known.contains(&(b, a))
+    };
+    Faults {
+        missed: before.iter().filter(is_missed).count(),
+        stale: narrow_phase.contact_pairs().filter(is_stale).count(),
+    }
 }
 
 #[test]
-fn the_world_goes_on_through_every_swap_and_no_pair_is_lost() {
+fn through_every_swap_no_pair_is_lost_and_none_is_left_behind() {
     let mut simulation = column(Choice::Stock);
     let mut choice = Choice::Stock;
     for swaps in 0..7 {
         for step in 0..16 {
-            let missed = missed_in_a_step(&mut simulation);
-            assert_eq!((simulation.steps, missed), (16 * swaps + step + 1, 0), "with {choice:?}");
+            let faults = faults_in_a_step(&mut simulation);
+            let expected = (16 * swaps + step + 1, Faults::default());
+            assert_eq!((simulation.steps, faults), expected, "with {choice:?}");
         }
         assert!(!touching(&simulation.world).is_empty());
         choice = choice.next();
@@ -61,7 +98,27 @@ fn without_showing_the_world_pairs_are_lost() {
     (0..60).for_each(|_| simulation.step());
     simulation.world.narrow_phase = NarrowPhase::new();
     simulation.engine = Engine::new(Choice::Stock);
-    assert!(missed_in_a_step(&mut simulation) > 0);
+    assert!(faults_in_a_step(&mut simulation).missed > 0);
+}
+
+/// Changes the broad phase, moves all bodies apart, and returns how often a pair is stale in three steps.
+fn stale_after_scattering(change: fn(&mut Simulation)) -> usize {
+    let mut simulation = column(Choice::Cpu);
+    (0..60).for_each(|_| simulation.step());
+    change(&mut simulation);
+    for (_, body) in simulation.world.bodies.iter_mut() {
+        let apart = body.translation() * 4.0;
+        body.set_translation(apart, true);
+    }
+    (0..3).map(|_| faults_in_a_step(&mut simulation).stale).sum()
+}
+
+/// A new broad phase does not end pairs that it has never seen: so the check above can fail.
+#[test]
+fn without_a_takeover_pairs_are_left_behind() {
+    assert_eq!(stale_after_scattering(|it| it.swap(Choice::Stock)), 0);
+    assert_eq!(stale_after_scattering(|it| it.swap(Choice::Brute)), 0);
+    assert!(stale_after_scattering(|it| it.engine = Engine::new(Choice::Cpu)) > 0);
 }
 
 #[test]

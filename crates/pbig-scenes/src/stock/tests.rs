@@ -4,16 +4,15 @@ use super::*;
 use crate::scenes::Scene;
 use std::collections::BTreeSet;
 
-/// By how much each AABB of a reported pair may have to grow until the two meet, in metres: a margin of 1 cm, what a collider
-/// moves before its fat AABB is stored again, and what it moves in the step after the broad phase, at up to 20 m/s.
-const FAR: f32 = 0.5;
+/// The distance by which stock's stored AABB at first exceeds its shape's on each side: 1 cm, and half the prediction
+/// distance of 2 mm.
+const MARGIN_METRES: f32 = 0.011;
 
 type Pairs = BTreeSet<[(u32, u32); 2]>;
 
-/// Returns the pairs of colliders, one of them movable, whose AABBs overlap after they grow by `loosened` on each side.
-fn overlapping(world: &World, loosened: f32) -> Pairs {
+/// Returns the pairs of colliders, one of them movable, whose AABBs overlap.
+fn overlapping(world: &World, aabb: fn(&Collider) -> Aabb) -> Pairs {
     let is_dynamic = |it: &Collider| it.parent().is_some_and(|body| world.bodies[body].is_dynamic());
-    let aabb = |it: &Collider| it.compute_aabb().loosened(loosened);
     let all: Vec<_> = world.colliders.iter().map(|(at, it)| (at, it, is_dynamic(it), aabb(it))).collect();
     let mut pairs = Pairs::new();
     for (at, (one, a, a_moves, a_box)) in all.iter().enumerate() {
@@ -26,11 +25,20 @@ fn overlapping(world: &World, loosened: f32) -> Pairs {
     pairs
 }
 
+/// Returns an AABB around every one that stock may have stored for a collider. Stock keeps a stored AABB as long as it contains
+/// the collider's. The AABB of a body that turns may shrink; the larger one stays. No edge of a stored AABB is longer than the
+/// bounding sphere's diameter and two margins, so the stored AABB exceeds the present one by at most that difference.
+fn largest_stored(collider: &Collider) -> Aabb {
+    let (now, radius) = (collider.compute_aabb(), collider.shape().compute_local_bounding_sphere().radius);
+    let excess = now.extents().map(|edge| 2.0 * (radius + MARGIN_METRES) - edge);
+    Aabb::new(now.mins - excess, now.maxs + excess)
+}
+
 /// Compares the narrow phase's pairs with brute force.
 fn check(world: &World) -> Result<(), String> {
     let pairs: Pairs = world.pairs().map(sorted).collect();
-    let missing: Vec<_> = overlapping(world, 0.0).difference(&pairs).copied().collect();
-    let near = overlapping(world, FAR);
+    let missing: Vec<_> = overlapping(world, Collider::compute_aabb).difference(&pairs).copied().collect();
+    let near = overlapping(world, largest_stored);
     let is_far = |pair: &&[(u32, u32); 2]| !near.contains(*pair) && !is_fixed(world, pair);
     let stale: Vec<_> = pairs.iter().filter(is_far).collect();
     if missing.is_empty() && stale.is_empty() { Ok(()) } else { Err(format!("{missing:?} {stale:?}")) }
