@@ -7,7 +7,7 @@ use std::collections::HashSet;
 /// A label, a number, or nothing where nothing was measured.
 pub use serde_json::Value;
 
-/// Makes a row from values of different types; `..values` appends each of several, and `()` nothing measured.
+/// Makes a row from values of different types; `..values` appends several, and `()` an empty cell.
 #[macro_export]
 macro_rules! cells {
     (@ $row:ident) => {};
@@ -43,8 +43,8 @@ fn short(value: &Value) -> String {
     }
 }
 
-/// Rows under named columns. The first columns name the row; units are in the columns' names. To ask for a column that does not
-/// exist is a panic, and so is a row with too many values.
+/// Rows under named columns. The first columns name the row; units are in the columns' names. A column that does not exist is a
+/// panic, and so is a row with too many values.
 #[derive(Clone, Debug)]
 pub struct Table {
     /// The name in files and JSON.

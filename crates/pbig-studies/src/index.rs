@@ -33,14 +33,14 @@ pub(crate) const fn discriminant(k: i64, n: i64) -> i64 {
 }
 
 /// An estimate of the row: from an index and the number of boxes.
-pub(crate) trait Row: Fn(i64, i64) -> i64 + Copy + Send + Sync + 'static {}
+pub(crate) trait RowEstimate: Fn(i64, i64) -> i64 + Copy + Send + Sync + 'static {}
 
-impl<R: Fn(i64, i64) -> i64 + Copy + Send + Sync + 'static> Row for R {}
+impl<R: Fn(i64, i64) -> i64 + Copy + Send + Sync + 'static> RowEstimate for R {}
 
 /// Returns the row by equation 1, `(2n - 1 - sqrt((2n - 1)^2 - 8k)) / 2` without its fraction, with a root in f32. The number under
 /// the root is an exact integer.
 #[inline(always)]
-pub(crate) fn row_by(root: impl Fn(f32) -> f32 + Copy + Send + Sync + 'static) -> impl Row {
+pub(crate) fn row_by(root: impl Fn(f32) -> f32 + Copy + Send + Sync + 'static) -> impl RowEstimate {
     move |k, n| (((2 * n - 1) as f32 - root(discriminant(k, n) as f32)) * 0.5) as i64
 }
 

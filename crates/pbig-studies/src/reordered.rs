@@ -4,12 +4,12 @@
 use rapier_pbig::PbigBroadPhase;
 use rapier3d::prelude::*;
 
-/// Names a broad phase, and makes it.
-pub(crate) type Kind = (&'static str, fn() -> Box<dyn BroadPhase>);
+/// A broad phase's name and constructor.
+pub(crate) type NamedBroadPhase = (&'static str, fn() -> Box<dyn BroadPhase>);
 
-/// The second of each two differs from the first in order alone: which collider of a pair is the first is as stock has it; and
-/// events are sorted as ours are.
-pub(crate) const KINDS: [Kind; 4] = [
+/// Broad phases, each before one that differs from it in the order of its events alone: `lower first` puts the lower handle of a
+/// pair first, as stock does; `sorted` sorts events, as pbig does.
+pub(crate) const KINDS: [NamedBroadPhase; 4] = [
     ("pbig", || Box::new(PbigBroadPhase::new())),
     ("pbig lower first", || Box::new(Reordered(PbigBroadPhase::new(), lower_first))),
     ("stock", || Box::new(DefaultBroadPhase::new())),

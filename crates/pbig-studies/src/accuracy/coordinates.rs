@@ -8,18 +8,18 @@ use pbig_harness::prelude::*;
 use std::time::Duration;
 
 /// One kind of coordinates.
-struct Kind {
+struct Format {
     name: &'static str,
     bytes: usize,
     is_exact: bool,
     find: fn(&Candidates, &mut Vec<[u32; 2]>) -> Found,
 }
 
-const fn kind<C: Coordinates>() -> Kind {
-    Kind { name: C::NAME, bytes: size_of::<C>(), is_exact: C::EXACT, find: Candidates::find::<C> }
+const fn kind<C: Coordinates>() -> Format {
+    Format { name: C::NAME, bytes: size_of::<C>(), is_exact: C::EXACT, find: Candidates::find::<C> }
 }
 
-const KINDS: [Kind; 5] =
+const KINDS: [Format; 5] =
     [kind::<Exact>(), kind::<Fixed<true>>(), kind::<Fixed<false>>(), kind::<Half>(), kind::<Code>()];
 
 const SETS: [&str; 5] = ["uniform", "gaussian", "unit", "mixed", "pile"];
@@ -68,7 +68,7 @@ fn measure(set: &str, n: usize, quick: bool, table: &mut Table) -> Result<(), Fa
     Ok(())
 }
 
-fn row(set: &str, n: usize, kind: &Kind, found: &[Found], pairs: u64) -> Result<Vec<Value>, Failure> {
+fn row(set: &str, n: usize, kind: &Format, found: &[Found], pairs: u64) -> Result<Vec<Value>, Failure> {
     let last = found.last().copied().unwrap_or_default();
     check(last.pairs == pairs, || format!("{set} {n}, {}: {} pairs of {pairs}", kind.name, last.pairs))?;
     let ms = |of: fn(&Found) -> f64| Spread::of(found.iter().map(of)).median;

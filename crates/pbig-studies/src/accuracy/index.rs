@@ -9,7 +9,7 @@ use pbig_harness::prelude::*;
 use rayon::prelude::*;
 use std::hint::black_box;
 use std::time::Duration;
-use tally::{Block, Tally, WAYS, Way, lazy_pass};
+use tally::{Block, RootWay, Tally, WAYS, lazy_pass};
 
 /// The name of the way without a row.
 const LAZY: &str = "lazy way";
@@ -31,7 +31,7 @@ pub(super) fn run(quick: bool) -> Result<Report, Failure> {
 
 /// The counts of all pairs, for many n.
 struct Every {
-    way: &'static Way,
+    way: &'static RootWay,
     boxes: Vec<i64>,
     tallies: [Tally; 3],
     /// The smallest n with a wrong pair.
@@ -48,7 +48,7 @@ fn boxes(is_exact: bool, quick: bool) -> Vec<i64> {
 }
 
 impl Every {
-    fn of(way: &'static Way, quick: bool) -> Self {
+    fn of(way: &'static RootWay, quick: bool) -> Self {
         let boxes = boxes(way.is_exact, quick);
         let all: Vec<_> = boxes.par_iter().map(|&n| (n, (way.all)(n))).collect();
         let mut every = Self { way, boxes, tallies: Default::default(), first: [None; 3] };
@@ -98,7 +98,7 @@ fn lazy_way_is_right(n: i64) -> bool {
 fn counterexamples(quick: bool) -> Table {
     let mut table = Table::new("counterexamples", "root | searched_up_to | boxes | index | given | right");
     let most = if quick { 1 << 16 } else { 1 << 20 };
-    let ways: Vec<&Way> = WAYS.iter().filter(|way| !way.is_exact).collect();
+    let ways: Vec<&RootWay> = WAYS.iter().filter(|way| !way.is_exact).collect();
     let found: Vec<_> = ways.par_iter().map(|way| counterexample(way, most)).collect();
     for (way, found) in ways.into_iter().zip(found) {
         let at = found.map(|(n, row, k)| {
@@ -109,13 +109,13 @@ fn counterexamples(quick: bool) -> Table {
     table
 }
 
-fn by_rules(way: &Way, n: i64, k: i64) -> (i64, i64) {
+fn by_rules(way: &RootWay, n: i64, k: i64) -> (i64, i64) {
     rules((way.row)(k, n), k, n)
 }
 
 /// Returns the smallest `n <= most <= 2^20` with its row and index. A root is wrong by more than one row only if it can be off by
 /// more than 2; rounding to f32 adds an eighth at most. An index within a row could be wrong at an n a little smaller.
-fn counterexample(way: &Way, most: i64) -> Option<(i64, i64, i64)> {
+fn counterexample(way: &RootWay, most: i64) -> Option<(i64, i64, i64)> {
     let least = 1.875 / way.error;
     (((least / 2.0) as i64).max(2)..=most).find_map(|n| {
         // The root at the start of row `a` is `2n - 1 - 2a`.

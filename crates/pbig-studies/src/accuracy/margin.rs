@@ -31,11 +31,11 @@ pub(super) fn run(quick: bool) -> Result<Report, Failure> {
     rows.extend(boxes(quick)?);
     let tables = vec![table(&rows), means(&rows)];
     let axes = ["broad phase, ms a step", "extra pairs, % of those that overlap"];
-    let scene = |row: &Row| row.case.split(' ').next().unwrap_or_default().to_owned();
-    let mut firsts: Vec<&[Row]> = rows.chunks(MARGINS.len()).collect();
+    let scene = |row: &MarginRow| row.case.split(' ').next().unwrap_or_default().to_owned();
+    let mut firsts: Vec<&[MarginRow]> = rows.chunks(MARGINS.len()).collect();
     firsts.sort_by_key(|case| scene(&case[0]));
     firsts.dedup_by_key(|case| scene(&case[0]));
-    let point = |row: &Row| (row.case.clone(), row.work.means()[0], row.work.extra_percent());
+    let point = |row: &MarginRow| (row.case.clone(), row.work.means()[0], row.work.extra_percent());
     Ok(report("margin", tables, ("Margin of stored boxes", axes), firsts.into_iter().flatten().map(point)))
 }
 
@@ -72,7 +72,7 @@ impl Work {
 }
 
 /// A world for each margin.
-trait Case {
+trait MarginCase {
     /// Prepares a round.
     fn prepare(&mut self, _round: usize, _is_compared: bool) -> Result<(), Failure> {
         Ok(())
@@ -84,7 +84,7 @@ trait Case {
 
 /// One margin in one case; [`MARGINS`] in their order make a case.
 #[derive(Clone)]
-struct Row {
+struct MarginRow {
     case: String,
     boxes: usize,
     margin: f64,
@@ -95,7 +95,7 @@ struct Row {
     passes: [[f64; 2]; PASSES],
 }
 
-impl Row {
+impl MarginRow {
     /// Fails if a pair is missing.
     fn new(case: &str, margin: usize, all: [&Work; PASSES], has_step: bool) -> Result<Self, Failure> {
         let Reported { missed, needed, .. } = all[0].reported;
@@ -110,12 +110,12 @@ impl Row {
 }
 
 /// Makes the case anew for each pass, and runs all margins in turn.
-fn rows<C: Case>(
+fn rows<C: MarginCase>(
     case: &str,
     steps: usize,
     (boxes, has_step): (usize, bool),
     make: impl Fn() -> Result<C, Failure>,
-) -> Result<Vec<Row>, Failure> {
+) -> Result<Vec<MarginRow>, Failure> {
     let mut all: [Vec<Work>; PASSES] = std::array::from_fn(|_| vec![Work::default(); MARGINS.len()]);
     for pass in &mut all {
         let mut case = make()?;
@@ -130,15 +130,16 @@ fn rows<C: Case>(
             }
         }
     }
-    let row = |k: usize| Ok(Row { boxes, ..Row::new(case, k, [&all[0][k], &all[1][k]], has_step)? });
+    let row =
+        |k: usize| Ok(MarginRow { boxes, ..MarginRow::new(case, k, [&all[0][k], &all[1][k]], has_step)? });
     (0..MARGINS.len()).map(row).collect()
 }
 
-fn table(rows: &[Row]) -> Table {
+fn table(rows: &[MarginRow]) -> Table {
     let columns = "case | boxes | margin | changed_percent | broad_phase_ms | step_ms | pairs | extra_percent | missed | \
         compared_steps";
     let mut table = Table::new("margins", columns);
-    for Row { case, boxes, margin, has_step, work, .. } in rows {
+    for MarginRow { case, boxes, margin, has_step, work, .. } in rows {
         let ([broad_phase, step], [listed, changed]) = (work.means(), work.counts);
         let head = cells![case.as_str(), *boxes, *margin, percent(changed, listed), broad_phase];
         let Reported { needed, missed, .. } = work.reported;
@@ -151,7 +152,7 @@ fn table(rows: &[Row]) -> Table {
 
 /// Returns a margin's time over the default's: the geometric mean over cases and passes, and two standard errors of it in
 /// percent. Within one pass both margins met the same disturbances.
-fn against_default(rows: &[Row], margin: usize, time: usize) -> [f64; 2] {
+fn against_default(rows: &[MarginRow], margin: usize, time: usize) -> [f64; 2] {
     let cases = rows.chunks(MARGINS.len()).filter(|case| time == 0 || case[0].has_step);
     let cases: Vec<[f64; PASSES]> = cases
         .map(|case| {
@@ -172,7 +173,7 @@ fn variance_of_mean(values: &[f64]) -> f64 {
     squares / (count - 1.0).max(1.0) / count.max(1.0)
 }
 
-fn means(rows: &[Row]) -> Table {
+fn means(rows: &[MarginRow]) -> Table {
     let columns = "margin | broad_phase | broad_phase_noise_percent | whole_step | whole_step_noise_percent | \
         largest_extra_percent";
     let mut table = Table::new("means", columns);
@@ -202,7 +203,7 @@ const FULL: [Windows; 7] = [
 const QUICK: [Windows; 2] = [("column", 100, &[40], 12), ("pile", 100, &[10], 12)];
 
 /// Runs scenes with the default margin from window to window, and compares margins there.
-fn worlds(quick: bool) -> Result<Vec<Row>, Failure> {
+fn worlds(quick: bool) -> Result<Vec<MarginRow>, Failure> {
     let mut all = Vec::new();
     for &(scene, bodies, starts, steps) in if quick { &QUICK[..] } else { &FULL } {
         let mut run = Run::new(Scene::named(scene)?, bodies, 1, PbigBroadPhase::new());
@@ -236,7 +237,7 @@ impl Worlds {
     }
 }
 
-impl Case for Worlds {
+impl MarginCase for Worlds {
     fn step(&mut self, margin: usize, is_compared: bool) -> Result<Round, Failure> {
         let run = &mut self.0[margin];
         run.step();
@@ -257,7 +258,7 @@ const MOTIONS: [(&str, Start); 2] = [
 ];
 
 /// Compares margins of boxes in motion.
-fn boxes(quick: bool) -> Result<Vec<Row>, Failure> {
+fn boxes(quick: bool) -> Result<Vec<MarginRow>, Failure> {
     let sizes: &[(usize, usize)] = if quick { &[(1000, 22)] } else { &[(10_000, 62), (100_000, 32)] };
     let mut all = Vec::new();
     for (motion, start) in MOTIONS {
@@ -295,7 +296,7 @@ fn update(finder: &mut BroadPhase, boxes: &[Aabb]) -> Result<(), Error> {
     finder.update().map(|_| ())
 }
 
-impl Case for Boxes {
+impl MarginCase for Boxes {
     fn prepare(&mut self, round: usize, is_compared: bool) -> Result<(), Failure> {
         self.wander.step(round);
         if is_compared {
@@ -320,10 +321,10 @@ mod tests {
     use super::*;
 
     /// Returns a row whose margin takes so long; between its two passes all but the default differ by 2%.
-    fn row(margin: usize, ms: f64) -> Row {
+    fn row(margin: usize, ms: f64) -> MarginRow {
         let off = if margin == DEFAULT { 0.0 } else { 0.01f64 };
         let work = |off: f64| Work { times: vec![[ms * off.exp(), 0.0]], ..Work::default() };
-        Row::new("a case", margin, [&work(-off), &work(off)], false).expect("no pair is missing")
+        MarginRow::new("a case", margin, [&work(-off), &work(off)], false).expect("no pair is missing")
     }
 
     #[test]
@@ -331,11 +332,11 @@ mod tests {
         assert_eq!(MARGINS[DEFAULT] as f32, PbigConfig::DEFAULT.margin);
         let case =
             |ms: f64, fifth: f64| (0..MARGINS.len()).map(move |k| row(k, if k == 4 { fifth } else { ms }));
-        let rows: Vec<Row> = case(1.0, 0.4).chain(case(100.0, 100.0 / 6.4)).collect();
+        let rows: Vec<MarginRow> = case(1.0, 0.4).chain(case(100.0, 100.0 / 6.4)).collect();
         assert!((against_default(&rows, 4, 0)[0] - 0.25).abs() < 1e-12);
         // Two passes 2% apart: an error of 1% for their mean, of a quarter of that for the mean of 16 cases.
         for (cases, noise) in [(1, 2.02), (16, 0.501)] {
-            let rows: Vec<Row> = (0..cases).flat_map(|_| case(1.0, 1.0)).collect();
+            let rows: Vec<MarginRow> = (0..cases).flat_map(|_| case(1.0, 1.0)).collect();
             let found = against_default(&rows, 4, 0)[1];
             assert!((found - noise).abs() < 5e-3, "{cases} cases: {found}");
         }
@@ -344,7 +345,7 @@ mod tests {
     #[test]
     fn a_missing_pair_is_a_failed_check() {
         let missing = Work { reported: Reported { missed: 3, needed: 9, extra: 0 }, ..Work::default() };
-        let failed = Row::new("a case", 0, [&missing; PASSES], false).map(|_| ());
+        let failed = MarginRow::new("a case", 0, [&missing; PASSES], false).map(|_| ());
         assert!(failed.is_err_and(|failure| failure.to_string().contains("3 of 9 pairs")));
     }
 

@@ -10,10 +10,10 @@ use glam::DVec3;
 use pbig_harness::prelude::*;
 use pbig_harness::world::{World, to_vector};
 use rapier3d::prelude::{Real, RigidBody};
-use sides::{CLOUD, Case, PERMUTED, Side, simulated};
+use sides::{CLOUD, PERMUTED, SceneCase, VariantRun, simulated};
 
 /// Scenes, bodies and steps.
-const FULL: [Case; 6] = [
+const FULL: [SceneCase; 6] = [
     ("column", 1000, 500),
     ("pile", 500, 300),
     ("pyramid", 506, 300),
@@ -22,7 +22,7 @@ const FULL: [Case; 6] = [
     (CLOUD, 500, 400),
 ];
 
-const QUICK: [Case; 3] = [("column", 60, 120), ("ragdolls", 22, 60), (CLOUD, 60, 60)];
+const QUICK: [SceneCase; 3] = [("column", 60, 120), ("ragdolls", 22, 60), (CLOUD, 60, 60)];
 
 /// The columns of the table of runs.
 const RUNS: &str = "scene | broad_phase | contacts | points | deepest_mm | mean_penetration_mm | \
@@ -48,7 +48,7 @@ pub(super) fn run(quick: bool) -> Result<Report, Failure> {
 }
 
 /// Returns the first step after which the poses of two runs differ.
-fn first_difference(two: &[Side]) -> Option<usize> {
+fn first_difference(two: &[VariantRun]) -> Option<usize> {
     let mut both = two[0].samples.iter().zip(&two[1].samples);
     both.position(|(one, again)| one.poses != again.poses).map(|step| step + 1)
 }
@@ -67,7 +67,7 @@ fn points(runs: &Table) -> Vec<(String, f64, f64)> {
 }
 
 /// Returns a row for each way; of the permuted ones the first, the middle and the last value of each column.
-fn rows(scene: &str, sides: &[Side]) -> Result<Vec<Vec<Value>>, Failure> {
+fn rows(scene: &str, sides: &[VariantRun]) -> Result<Vec<Vec<Value>>, Failure> {
     let rows: Result<Vec<_>, Failure> = sides.iter().map(|side| figures(scene, side)).collect();
     // The permuted ones come after stock, and stock again.
     let (mut rows, places) = (rows?, 2..2 + PERMUTED);
@@ -91,7 +91,7 @@ fn ranked(permuted: &[Vec<Value>], name: &str, rank: usize) -> Vec<Value> {
 }
 
 /// Returns one run in figures. A pair that pbig should have reported and did not is a failed check.
-fn figures(scene: &str, side: &Side) -> Result<Vec<Value>, Failure> {
+fn figures(scene: &str, side: &VariantRun) -> Result<Vec<Value>, Failure> {
     let (name, Reported { missed, needed, .. }) = (side.way.name, side.reported);
     let what = || format!("{scene}, {name}: {missed} of {needed} pairs that overlap are missing");
     check(missed == 0 || !side.way.is_pbig(), what)?;
@@ -164,7 +164,7 @@ impl Mechanics {
 }
 
 /// Returns contacts of the second half of a run; penetration, energy and momentum of all of it.
-fn mechanics(scene: &str, side: &Side) -> Vec<Value> {
+fn mechanics(scene: &str, side: &VariantRun) -> Vec<Value> {
     let all: Vec<Mechanics> = side.samples.iter().map(|sample| sample.mechanics).collect();
     let late = |of: fn(&Mechanics) -> u64| {
         mean(&all[all.len() / 2..].iter().map(|m| of(m) as f64).collect::<Vec<_>>())

@@ -31,14 +31,14 @@ pub(super) fn run(quick: bool) -> Result<Report, Failure> {
 }
 
 /// Puts every world everywhere; worlds of size 1 also along one axis. At the origin all directions are the same.
-fn rows(worlds: &[NamedLayout]) -> Result<Vec<Row>, Failure> {
+fn rows(worlds: &[NamedLayout]) -> Result<Vec<PlaceRow>, Failure> {
     let mut rows = vec![];
     for world in worlds {
         for (along, axes) in [("diagonal", [1.0; 3]), ("x", [1.0, 0.0, 0.0])] {
             let is_wanted = |offset: &f64| along == "diagonal" || (world.size == 1.0 && *offset > 0.0);
             for offset in OFFSETS.into_iter().filter(is_wanted) {
                 let place = Place::new(&world.layout, world.layout.poses(axes.map(|axis| axis * offset)));
-                let mut row = Row::new((world.name, world.size), (offset, along));
+                let mut row = PlaceRow::new((world.name, world.size), (offset, along));
                 row.add(&place)?;
                 rows.push(row);
             }
@@ -50,17 +50,17 @@ fn rows(worlds: &[NamedLayout]) -> Result<Vec<Row>, Failure> {
 /// Checks the proved statements: no pair is missed by boxes that are widened by 2 ulps, at the poses that rapier
 /// holds; by 3, in the world; by boxes in f64 that are rounded outward; nor, at the poses, as far out as the margin
 /// does: it covers the loss by rounding, its own included, while 2 ulps, 2^-22 of the distance at most, are less.
-fn promised(row: &Row) -> Result<(), Failure> {
+fn promised(row: &PlaceRow) -> Result<(), Failure> {
     let is_near = row.offset < f64::from(PbigConfig::DEFAULT.margin) * 2f64.powi(22);
     let promised = [(true, AT_POSES, 0), (true, IN_WORLD, 1), (true, OUTWARD, 1), (is_near, MARGIN, 0)];
     promised.into_iter().try_for_each(|(holds, way, truth)| {
-        let (Row { world, offset, ways, .. }, name) = (row, WAYS[way].0);
+        let (PlaceRow { world, offset, ways, .. }, name) = (row, WAYS[way].0);
         let missed = ways[way][truth].missed;
         check(!holds || missed == 0, || format!("{world}, {offset} away, {name}: {missed} pairs missed"))
     })
 }
 
-fn pairs_table(rows: &[Row]) -> Table {
+fn pairs_table(rows: &[PlaceRow]) -> Table {
     let columns = "world | along | offset | ulp | pairs | missed_by_poses | added_by_poses | missed_by_boxes | \
         of_touching_shapes | added_by_boxes | missed | added";
     let mut table = Table::new("pairs", columns);
@@ -76,12 +76,12 @@ fn pairs_table(rows: &[Row]) -> Table {
 }
 
 /// Sums over all worlds and directions.
-fn ways_table(rows: &[Row]) -> Table {
+fn ways_table(rows: &[PlaceRow]) -> Table {
     let columns = "offset | boxes | pairs_at_the_poses | missed_at_the_poses | of_touching_shapes | pairs | missed | added | \
         added_percent";
     let mut table = Table::new("ways", columns);
     for offset in OFFSETS {
-        let there: Vec<&Row> = rows.iter().filter(|row| row.offset == offset).collect();
+        let there: Vec<&PlaceRow> = rows.iter().filter(|row| row.offset == offset).collect();
         let (pairs, held) = there.iter().fold((0, 0), |sum, row| (sum.0 + row.pairs, sum.1 + row.held_pairs));
         for (k, way) in WAYS.iter().enumerate() {
             let mut sums = [Differences::default(); 2];
@@ -120,7 +120,7 @@ fn times(world: &NamedLayout, quick: bool) -> Result<Table, Failure> {
 }
 
 /// Returns time and error of each way at each offset, of the first crowd along the diagonal.
-fn points(rows: &[Row], times: &Table) -> Vec<(String, f64, f64)> {
+fn points(rows: &[PlaceRow], times: &Table) -> Vec<(String, f64, f64)> {
     let point = |k: usize| {
         let row = &rows[k / TIMED];
         let [_, Differences { missed, added, .. }] = row.ways[k % TIMED];
@@ -138,7 +138,7 @@ mod tests {
     #[test]
     fn a_missed_pair_that_was_promised_is_a_failed_check() {
         let layout = &worlds(50).expect("worlds")[0].layout;
-        let mut row = Row::new(("crowd", 1.0), (1e3, "diagonal"));
+        let mut row = PlaceRow::new(("crowd", 1.0), (1e3, "diagonal"));
         row.add(&Place::new(layout, layout.poses([1e3; 3]))).expect("found");
         row.ways[1][0].missed = 5;
         assert!(promised(&row).is_ok(), "nobody promises that of one");

@@ -20,9 +20,9 @@ impl Facts {
 }
 
 /// A paper and a place in it, and the facts there.
-type Place = ([&'static str; 2], fn(&mut Facts));
+type Passage = ([&'static str; 2], fn(&mut Facts));
 
-const PLACES: [Place; 11] = [
+const PASSAGES: [Passage; 11] = [
     (["PBIG", "equation 7, figure 3"], rows_of_figure_3),
     (["PBIG", "algorithms 1 and 2"], segments),
     (["PBIG", "tables IV and VI"], totals),
@@ -39,7 +39,7 @@ const PLACES: [Place; 11] = [
 pub(super) fn table() -> Table {
     let table = Table::new("what the papers print", "paper | place | quantity | value");
     let mut facts = Facts(table, ["", ""]);
-    for (place, of_place) in PLACES {
+    for (place, of_place) in PASSAGES {
         facts.1 = place;
         of_place(&mut facts);
     }

@@ -78,10 +78,10 @@ const LAZY: usize = 3;
 const EFFORT: Effort = Effort { warm_up: 0, rounds: 4, budget: Duration::MAX };
 
 /// The pairs of each way, its milliseconds for all ids, and for roots and for the lazy way all ids over those looked at.
-type Found = ([u64; WAYS.len()], Vec<f64>, [f64; 2]);
+type WaysFound = ([u64; WAYS.len()], Vec<f64>, [f64; 2]);
 
 /// Measures all ways. Fails if ways that looked at the same pairs have not found the same.
-fn all_ways(n: u64, most: u64) -> Result<Found, Failure> {
+fn all_ways(n: u64, most: u64) -> Result<WaysFound, Failure> {
     let boxes = cubes(n as usize, 1.0, 1.0, 1);
     let ids = [pair_count(n), lazy_ids(n as i64) as u64].map(|ids| stretches(ids, most));
     let mut pairs = [0; WAYS.len()];

@@ -5,7 +5,7 @@ use std::ops::AddAssign;
 use std::sync::LazyLock;
 
 /// A way to estimate the row.
-pub(super) struct Way {
+pub(super) struct RootWay {
     pub(super) name: &'static str,
     /// True for ways that must be right by themselves. They are slower, so fewer pairs are looked at.
     pub(super) is_exact: bool,
@@ -30,25 +30,25 @@ pub(super) const CORRECT: [Correct; 3] = [as_it_is, rules, integers];
 /// Consecutive indices: the first, and their number.
 pub(super) type Block = (i64, i64);
 
-fn way(name: &'static str, error: f64, row: impl Row) -> Way {
+fn way(name: &'static str, error: f64, row: impl RowEstimate) -> RootWay {
     let passes = [pass(row, as_it_is), pass(row, rules), pass(row, integers)];
     let all = Box::new(move |n| all_pairs(row, n, error));
-    Way { name, is_exact: false, error, row: Box::new(row), all, passes }
+    RootWay { name, is_exact: false, error, row: Box::new(row), all, passes }
 }
 
-fn pass(row: impl Row, correct: impl Fn(i64, i64, i64) -> Given + Send + Sync + 'static) -> Pass {
+fn pass(row: impl RowEstimate, correct: impl Fn(i64, i64, i64) -> Given + Send + Sync + 'static) -> Pass {
     Box::new(move |n, blocks| sum(blocks, |k| correct(row(k, n), k, n)))
 }
 
-fn by_root(name: &'static str, root: impl Fn(f32) -> f32 + Copy + Send + Sync + 'static) -> Way {
+fn by_root(name: &'static str, root: impl Fn(f32) -> f32 + Copy + Send + Sync + 'static) -> RootWay {
     way(name, worst_relative(root), row_by(root))
 }
 
-fn exact(name: &'static str, row: impl Row) -> Way {
-    Way { is_exact: true, ..way(name, f64::INFINITY, row) }
+fn exact(name: &'static str, row: impl RowEstimate) -> RootWay {
+    RootWay { is_exact: true, ..way(name, f64::INFINITY, row) }
 }
 
-pub(super) static WAYS: LazyLock<[Way; 14]> = LazyLock::new(|| {
+pub(super) static WAYS: LazyLock<[RootWay; 14]> = LazyLock::new(|| {
     [
         by_root("f32 sqrt", f32::sqrt),
         way("f64 sqrt", f64::EPSILON, row_in_f64),
@@ -131,7 +131,7 @@ impl Tally {
 ///
 /// A right estimate is right by every correction, and its index marks its own pair. So only wrong ones mark pairs: bit `c` of a mark
 /// says that the index is wrong by correction `c`, bit `4 + c` that a wrong index gives its pair.
-fn all_pairs(estimate: impl Row, n: i64, error: f64) -> [Tally; 3] {
+fn all_pairs(estimate: impl RowEstimate, n: i64, error: f64) -> [Tally; 3] {
     let mut tallies = [Tally { looked: pairs_of(n) as u64, ..Tally::default() }; 3];
     let mut marks = vec![0u8; pairs_of(n) as usize];
     for row in 0..n - 1 {

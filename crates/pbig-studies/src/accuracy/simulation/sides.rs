@@ -71,7 +71,7 @@ impl Numbered {
 
 /// One way to run a scene.
 #[derive(Clone, Copy)]
-pub(super) struct Way {
+pub(super) struct Variant {
     pub(super) name: &'static str,
     /// The seed of the order in which bodies are inserted; none: as the scene has them.
     seed: Option<u64>,
@@ -84,11 +84,11 @@ pub(super) struct Way {
 pub(super) const PERMUTED: usize = 19;
 
 /// Returns all ways, the one that the others are held against first.
-fn ways() -> Vec<Way> {
-    let way = |(name, broad_phase)| Way { name, seed: None, is_again: false, broad_phase };
-    let again = |name, way| Way { name, is_again: true, ..way };
+fn ways() -> Vec<Variant> {
+    let way = |(name, broad_phase)| Variant { name, seed: None, is_again: false, broad_phase };
+    let again = |name, way| Variant { name, is_again: true, ..way };
     let [pbig, lower_first, stock, sorted] = KINDS.map(way);
-    let permuted = |seed| Way { name: "stock permuted", seed: Some(seed), ..stock };
+    let permuted = |seed| Variant { name: "stock permuted", seed: Some(seed), ..stock };
     let mut ways = vec![stock, again("stock again", stock)];
     ways.extend((1..=PERMUTED as u64).map(permuted));
     ways.extend([sorted, again("stock sorted again", sorted), lower_first, pbig, again("pbig again", pbig)]);
@@ -99,19 +99,19 @@ fn ways() -> Vec<Way> {
     ways
 }
 
-impl Way {
+impl Variant {
     pub(super) fn is_pbig(&self) -> bool {
         self.name.starts_with("pbig")
     }
 }
 
 /// A scene, its bodies, and its steps.
-pub(super) type Case = (&'static str, usize, usize);
+pub(super) type SceneCase = (&'static str, usize, usize);
 
 /// The one scene that the harness does not have: see [`cloud`].
 pub(super) const CLOUD: &str = "cloud";
 
-fn world((scene, bodies, _): Case) -> Result<World, Failure> {
+fn world((scene, bodies, _): SceneCase) -> Result<World, Failure> {
     Ok(if scene == CLOUD { cloud(bodies) } else { Scene::named(scene)?.build(bodies, 1) })
 }
 
@@ -144,8 +144,8 @@ pub(super) struct Sample {
 }
 
 /// One way under way.
-pub(super) struct Side {
-    pub(super) way: Way,
+pub(super) struct VariantRun {
+    pub(super) way: Variant,
     numbered: Numbered,
     broad_phase: Box<dyn BroadPhase>,
     /// After each step.
@@ -158,8 +158,8 @@ pub(super) struct Side {
     pub(super) parted: u64,
 }
 
-impl Side {
-    fn new(way: Way, scene: &Numbered) -> Self {
+impl VariantRun {
+    fn new(way: Variant, scene: &Numbered) -> Self {
         let (numbered, broad_phase) = (scene.inserted(way.seed), (way.broad_phase)());
         let (reported, parted) = (Reported::default(), 0);
         Self { way, numbered, broad_phase, samples: vec![], ms: vec![], reported, parted }
@@ -203,9 +203,9 @@ fn awake(world: &World) -> f64 {
 const COMPARED: usize = 20;
 
 /// Runs all ways through a scene, in turn step by step.
-pub(super) fn simulated(case: Case) -> Result<Vec<Side>, Failure> {
+pub(super) fn simulated(case: SceneCase) -> Result<Vec<VariantRun>, Failure> {
     let scene = Numbered::new(world(case)?);
-    let mut sides: Vec<Side> = ways().into_iter().map(|way| Side::new(way, &scene)).collect();
+    let mut sides: Vec<VariantRun> = ways().into_iter().map(|way| VariantRun::new(way, &scene)).collect();
     for step in 0..case.2 {
         let count = sides.len();
         (0..count).for_each(|place| sides[(step + place) % count].step());
@@ -221,8 +221,8 @@ mod tests {
 
     #[test]
     fn bodies_that_sleep_are_counted_and_pairs_that_end_while_they_touch() {
-        let pbig = ways().into_iter().find(Way::is_pbig).expect("a way");
-        let mut side = Side::new(pbig, &Numbered::new(world(("pile", 8, 0)).expect("a scene")));
+        let pbig = ways().into_iter().find(Variant::is_pbig).expect("a way");
+        let mut side = VariantRun::new(pbig, &Numbered::new(world(("pile", 8, 0)).expect("a scene")));
         for _ in 0..200 {
             side.step();
             side.look([0.0; 2]);

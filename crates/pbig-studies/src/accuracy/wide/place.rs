@@ -18,10 +18,10 @@ use rapier3d::prelude::{BroadPhase, Collider, IntegrationParameters, RigidBodySe
 
 /// A way to make boxes in f32: its name, the ulps by which rapier's boxes are widened, and true with the drop-in's margin.
 /// Without ulps: boxes in f64 at poses in f64, rounded outward.
-pub(super) type Way = (&'static str, Option<u32>, bool);
+pub(super) type Widening = (&'static str, Option<u32>, bool);
 
 /// The ways in the order of tables. The first six are timed: a margin on top of a way takes no time.
-pub(super) const WAYS: [Way; 8] = [
+pub(super) const WAYS: [Widening; 8] = [
     ("rapier's boxes", Some(0), false),
     ("widened by 1 ulp", Some(1), false),
     ("widened by 2 ulps", Some(2), false),
@@ -101,7 +101,7 @@ impl<'a> Place<'a> {
         self.colliders.len()
     }
 
-    pub(super) fn boxes(&self, (_, ulps, has_margin): Way) -> Vec<Aabb> {
+    pub(super) fn boxes(&self, (_, ulps, has_margin): Widening) -> Vec<Aabb> {
         let Some(ulps) = ulps else {
             let boxes = self.layout.boxes(&self.poses, self.reach() / 2.0);
             return boxes.iter().map(|wide| Aabb::from_f64(wide.min, wide.max)).collect();
@@ -112,7 +112,7 @@ impl<'a> Place<'a> {
     }
 
     /// Compares the pairs of boxes in f32 with those in f64: at the poses that rapier holds, and in the world.
-    fn differences(&self, way: Way) -> Result<[Differences; 2], Failure> {
+    fn differences(&self, way: Widening) -> Result<[Differences; 2], Failure> {
         let mut finder = finder();
         let found = finder.find(&self.boxes(way))?;
         Ok([&self.held, &self.world].map(|truth| truth.differences(found, self.reach())))
@@ -138,7 +138,7 @@ pub(super) fn finder() -> Finder {
 }
 
 /// The results of a world at a distance.
-pub(super) struct Row {
+pub(super) struct PlaceRow {
     pub(super) world: &'static str,
     pub(super) size: f64,
     pub(super) offset: f64,
@@ -153,7 +153,7 @@ pub(super) struct Row {
     pub(super) ways: [[Differences; 2]; WAYS.len()],
 }
 
-impl Row {
+impl PlaceRow {
     pub(super) fn new((world, size): (&'static str, f64), (offset, along): (f64, &'static str)) -> Self {
         let (poses, ways) = Default::default();
         Self { world, size, offset, along, pairs: 0, held_pairs: 0, poses, ways }
@@ -179,7 +179,7 @@ const SCENES: [Scenery; 2] =
     [("column", "column, simulated in f64", 1000, 180), ("pile", "pile, simulated in f64", 1000, 120)];
 
 /// Returns what boxes in f32 make of the worlds in f64, summed over all steps; and both tables.
-pub(super) fn simulated(offsets: &[f64], quick: bool) -> Result<(Vec<Row>, [Table; 2]), Failure> {
+pub(super) fn simulated(offsets: &[f64], quick: bool) -> Result<(Vec<PlaceRow>, [Table; 2]), Failure> {
     let in_f64 = "world | offset | steps | pairs | missed_by_boxes_in_f32 | of_touching_shapes | missed | added | \
         missed_with_3_ulps";
     let in_f32 =
@@ -196,14 +196,18 @@ pub(super) fn simulated(offsets: &[f64], quick: bool) -> Result<(Vec<Row>, [Tabl
 }
 
 /// Runs a scene along the diagonal, and appends its rows.
-fn run((scene, name, bodies, steps): Scenery, offset: f64, tables: &mut [Table; 2]) -> Result<Row, Failure> {
+fn run(
+    (scene, name, bodies, steps): Scenery,
+    offset: f64,
+    tables: &mut [Table; 2],
+) -> Result<PlaceRow, Failure> {
     let world = Scene::named(scene)?.build(bodies, 1);
     let layout = Layout::of_world(&world);
     let mut wide = WideWorld::of(&world, [offset; 3])?;
     let narrow =
         KINDS.map(|(_, make)| Ok(Narrow::new(Scene::named(scene)?.build(bodies, 1), offset, make())));
     let mut narrow = narrow.into_iter().collect::<Result<Vec<_>, Failure>>()?;
-    let mut row = Row::new((name, 1.0), (offset, "diagonal"));
+    let mut row = PlaceRow::new((name, 1.0), (offset, "diagonal"));
     for _ in 0..steps {
         wide.step();
         let place = Place::new(&layout, wide.poses());
