@@ -18,6 +18,13 @@ pub(super) struct RootWay {
     pub(super) passes: [Pass; 3],
 }
 
+impl RootWay {
+    /// Returns true for a root with one Newton step, which is wrong for most pairs of thousands of boxes.
+    pub(super) fn is_coarse(&self) -> bool {
+        (1e-3..1.0).contains(&self.error)
+    }
+}
+
 /// Computes a sum that depends on every pair, so that none is optimised away.
 type Pass = Box<dyn Fn(i64, &[Block]) -> i64 + Send + Sync>;
 
