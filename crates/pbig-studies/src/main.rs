@@ -33,9 +33,9 @@ enum Command {
     Stages,
     /// Pbig alone beside parry's tree and obvhs.
     Peers,
-    /// How long updates take, and how evenly, by motion and of every scene.
+    /// How long updates take, and how evenly, by motion.
     Steady {
-        /// Numbers of boxes, and of bodies, instead of its own.
+        /// Numbers of boxes instead of its own.
         #[arg(long, value_name = "N,N", value_delimiter = ',')]
         boxes: Vec<usize>,
     },

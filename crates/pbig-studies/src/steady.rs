@@ -1,16 +1,13 @@
 //! How long updates take, and how evenly. Boxes in motion: our updates beside a search from nothing and parry's tree, in turn in
-//! every frame; pairs agree in number in every frame. Scenes through rapier: ours beside stock in the same world.
+//! every frame; pairs agree in number in every frame. Scenes of rapier are in `whole_steps`.
 
 use crate::trees::{Kept, Parry, Refit, partition};
 use crate::{UNLIMITED, UNSORTED};
 use pbig_core::Finder;
 use pbig_harness::bench::figures;
 use pbig_harness::chart::{Chart, Line, Plot};
-use pbig_harness::duel::Duel;
 use pbig_harness::motions::{Density, Motion, Scene};
 use pbig_harness::prelude::*;
-use pbig_harness::scenes;
-use std::time::Duration;
 
 /// All sides; the second is ours on one thread.
 const NAMES: [&str; 4] = ["ours", "ours", "search from nothing", "parry 0.31"];
@@ -19,18 +16,12 @@ const NAMES: [&str; 4] = ["ours", "ours", "search from nothing", "parry 0.31"];
 const COLUMNS: &str =
     "motion | density | boxes | threads | side | mean_ms | median_ms | p99_ms | worst_ms | first_ms";
 
-/// Measures every motion and every scene; `given`: numbers of boxes, and of bodies, instead of its own. Fails if the
-/// sides have different numbers of pairs.
+/// Measures every motion; `given`: numbers of boxes instead of its own. Fails if the sides have different numbers of pairs.
 pub fn run(quick: bool, given: &[usize]) -> Result<Report, Failure> {
-    let sizes = |full: &[usize], few: &[usize]| match given {
-        [] => if quick { few } else { full }.to_vec(),
-        given => given.to_vec(),
-    };
-    let boxes = sizes(&[1000, 10_000, 100_000, 1_000_000], &[1000, 10_000]);
-    let bodies = sizes(&[10, 100, 1000, 10_000, 100_000], &[10, 100]);
+    let own: &[usize] = if quick { &[1000, 10_000] } else { &[1000, 10_000, 100_000, 1_000_000] };
+    let boxes = if given.is_empty() { own } else { given };
     let mut table = Table::new("steady", COLUMNS);
-    let plots = motions(&boxes, quick, &mut table)?;
-    through_rapier(&bodies, quick, &mut table);
+    let plots = motions(boxes, quick, &mut table)?;
     let charts = vec![Chart { name: "steady-frames".into(), plots }];
     Ok(Report { charts, ..Report::new("steady", vec![table]) })
 }
@@ -119,17 +110,4 @@ fn plot(title: &str, times: &[Vec<f64>]) -> Plot {
 
 fn row([motion, density, side]: [&str; 3], [boxes, threads]: [usize; 2], ms: &[f64], table: &mut Table) {
     table.row(cells![motion, density, boxes, threads, side, ..figures(ms)]);
-}
-
-fn through_rapier(sizes: &[usize], quick: bool, table: &mut Table) {
-    let (rounds, ms) = if quick { (40, 50) } else { (300, 10_000) };
-    let effort = Effort { warm_up: 0, rounds, budget: Duration::from_millis(ms) };
-    let cases = sizes.iter().flat_map(|bodies| scenes::Scene::ALL.map(|scene| (*bodies, scene)));
-    for (bodies, scene) in tracked(cases, "scenes") {
-        let (duel, threads) = (Duel::run(scene, bodies, effort), rayon::current_num_threads());
-        for (k, side) in ["ours", "stock"].into_iter().enumerate() {
-            let ms: Vec<f64> = duel.times.iter().map(|ms| ms[k]).collect();
-            row([scene.name, "scene", side], [bodies, threads], &ms, table);
-        }
-    }
 }

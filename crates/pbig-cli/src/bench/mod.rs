@@ -26,7 +26,7 @@ pub(crate) struct Args {
     /// Write the numbers as CSV, and the charts, into this folder.
     #[arg(long, value_name = "DIR")]
     write: Option<PathBuf>,
-    /// Numbers of boxes and of bodies for `steady`, instead of its own.
+    /// Numbers of boxes for `steady`, instead of its own.
     #[arg(long, value_name = "N,N", value_parser = whole::<usize>(BODIES), value_delimiter = ',', allow_negative_numbers = true)]
     boxes: Vec<usize>,
 }
@@ -41,7 +41,7 @@ enum Suite {
     Peers,
     /// Every scene at every size, stock beside ours in each step.
     Step,
-    /// How long updates take, and how evenly, by motion and of every scene (of `pbig-studies`).
+    /// How long updates take, and how evenly, by motion (of `pbig-studies`).
     Steady,
     /// The experiments of PBIG's and Avril's papers, the printed figures beside ours (of `pbig-studies`).
     Papers,

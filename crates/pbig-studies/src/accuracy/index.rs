@@ -44,7 +44,7 @@ fn boxes(has_few: bool, quick: bool) -> Vec<i64> {
         (true, false) => (2..=250).chain([1000]).collect(),
         (true, true) => (2..=100).chain([1000]).collect(),
         (false, false) => (2..=5000).collect(),
-        (false, true) => (2..=1000).chain((1100..=5000).step_by(100)).collect(),
+        (false, true) => (2..=700).chain((725..=5000).step_by(25)).collect(),
     }
 }
 

@@ -2,103 +2,23 @@
 //!
 //! Each run is named by its seed. `PBIG_RUNS=20000` plays more runs (about 10^6 operations).
 
+mod planted;
+
 use glam::Vec3;
 use pbig_harness_036::world::{World, groups_that_meet, to_vector, turned_body};
+use planted::{BUSY, Plant, Planted};
 use rand::rngs::StdRng;
 use rand::{RngExt, SeedableRng};
 use rapier_pbig::shadow::{Shadow, Shadowed};
 use rapier_pbig::{PbigConfig, PbigFinder};
 use rapier3d::geometry::PairFinder;
-use rapier3d::parry::bounding_volume::Aabb;
-use rapier3d::parry::partitioning::Bvh;
 use rapier3d::prelude::*;
 use std::any::Any;
-use std::cell::Cell;
 use std::collections::HashSet;
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 
 /// Operations in a run.
 const OPS: usize = 60;
-
-thread_local! {
-    /// In the middle of a call of the finder, where a panic is ours and not rapier's.
-    static BUSY: Cell<bool> = const { Cell::new(false) };
-}
-
-/// What the finder under test does wrong.
-#[derive(Clone, Copy, Debug, PartialEq)]
-enum Plant {
-    Nothing,
-    /// The AABBs that a step has moved do not arrive.
-    Unmoved,
-    /// The third event of a call and those after it are lost.
-    RoomForTwo,
-    /// Nothing is listed as modified but what is new.
-    OnlyNew,
-}
-
-/// A finder with a fault planted in front of it or behind.
-#[derive(Clone)]
-struct Planted {
-    finder: PbigFinder,
-    plant: Plant,
-    known: HashSet<ColliderHandle>,
-}
-
-impl PairFinder for Planted {
-    fn update(
-        &mut self,
-        params: &IntegrationParameters,
-        adaptive_margin: bool,
-        colliders: &ColliderSet,
-        bodies: &RigidBodySet,
-        modified: &[ColliderHandle],
-        removed: &[ColliderHandle],
-        events: &mut Vec<BroadPhasePairEvent>,
-    ) {
-        let is_new = |handle: &&ColliderHandle| self.plant != Plant::OnlyNew || self.known.insert(**handle);
-        let shown: Vec<_> = modified.iter().filter(is_new).copied().collect();
-        BUSY.set(true);
-        self.finder.update(params, adaptive_margin, colliders, bodies, &shown, removed, events);
-        BUSY.set(false);
-        if self.plant == Plant::RoomForTwo {
-            events.truncate(2);
-        }
-    }
-
-    fn set_aabbs(
-        &mut self,
-        params: &IntegrationParameters,
-        adaptive: bool,
-        aabbs: &[(ColliderHandle, Aabb)],
-    ) {
-        if self.plant != Plant::Unmoved {
-            BUSY.set(true);
-            self.finder.set_aabbs(params, adaptive, aabbs);
-            BUSY.set(false);
-        }
-    }
-
-    fn tree(&self) -> &Bvh {
-        self.finder.tree()
-    }
-
-    fn intersect_aabb(&self, aabb: &Aabb, found: &mut dyn FnMut(u32)) {
-        self.finder.intersect_aabb(aabb, found);
-    }
-
-    fn state(&self) -> (Vec<(ColliderHandle, Aabb)>, Vec<(ColliderHandle, ColliderHandle)>) {
-        self.finder.state()
-    }
-
-    fn start_from(&mut self, aabbs: Vec<(u32, Aabb)>, pairs: Vec<(ColliderHandle, ColliderHandle)>) {
-        self.finder.start_from(aabbs, pairs);
-    }
-
-    fn clone_box(&self) -> Box<dyn PairFinder> {
-        Box::new(self.clone())
-    }
-}
 
 /// A world under random operations.
 struct Player {
