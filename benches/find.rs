@@ -17,7 +17,7 @@ const CONFIG: Config = Config { order: Order::Unspecified, ..Config::DEFAULT };
 /// Searches after which one is like those before.
 const WARM_UP: usize = 4;
 
-/// Of nothing criterion can make nothing.
+/// Criterion cannot show a time of zero.
 const LEAST: Duration = Duration::from_nanos(1);
 
 fn find(c: &mut Criterion) {

@@ -25,9 +25,6 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         println!("note: {why}");
     }
     let gpu = report.gpu.as_ref().ok_or("the CPU did the work")?;
-    for (kernel, time) in &gpu.kernels {
-        println!("  {kernel:<12} {time:?}");
-    }
     println!("  {} bytes up, {} down, {} held on the device", gpu.uploaded, gpu.downloaded, gpu.device_bytes);
     Ok(())
 }

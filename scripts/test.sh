@@ -83,7 +83,6 @@ step_suite_cpu() {
 step_suite_gpu() {
     has_gpu || { leave_out "there is no GPU adapter" && return; }
     check cargo test --release -p pbig-tests --no-fail-fast
-    check cargo run --release --bin pbig -- bench gpu --quick
 }
 
 # On docs.rs a nightly Rust labels each item with its feature. A wrapper lets this release do that, too.

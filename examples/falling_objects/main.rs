@@ -81,7 +81,7 @@ fn progress(steps: u64) -> indicatif::ProgressBar {
     }
 }
 
-/// What the oracle says about a third run, apart from the measured ones because it is slow.
+/// Compares a third run with the oracle: it is slow, so it is apart from the measured ones.
 struct Checked {
     comparisons: usize,
     missing: usize,

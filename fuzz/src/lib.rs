@@ -1,4 +1,4 @@
-//! What is fuzzed. The files in `checks` are compiled twice, here with instruments, and in the test suite, where
+//! The checks that are fuzzed. The files in `checks` are compiled twice, here with instruments, and in the test suite, where
 //! seeds and every input that once failed are run again without any.
 
 // The decoder's and the readers' own files rather than their crates: these would bring wgpu and rapier.

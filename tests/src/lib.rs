@@ -10,8 +10,8 @@ use pbig_harness::boxes;
 use std::io::Write;
 use std::sync::LazyLock;
 
-/// Whether `PBIG_GPU=none` leaves devices out: where a driver must not run, as beside a sanitizer that cannot look into
-/// it. Said once, and by each test that asks.
+/// Returns true if `PBIG_GPU=none` leaves devices out: where a driver must not run, as beside a sanitizer that cannot look into
+/// it. The first call prints this; each test that asks does so, too.
 ///
 /// # Panics
 /// With `CI=true`, and with another value.
@@ -44,7 +44,7 @@ fn leaves_out(gpu: Option<&str>, ci: Option<&str>) -> Result<bool, String> {
     }
 }
 
-/// Whether a test may find pairs so.
+/// Returns true if a test may find pairs with this configuration.
 pub fn may_run(config: &Config) -> bool {
     config.backend != Backend::Gpu || !without_gpu()
 }

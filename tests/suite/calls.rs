@@ -12,7 +12,7 @@ struct Recorder<B> {
     inner: B,
     /// Modified and removed colliders, and `dt`, of each call.
     calls: Vec<(usize, usize, f32)>,
-    /// Whether a pair was added, and its indices, of each event.
+    /// Each event: true if a pair was added, and its indices.
     events: Vec<Vec<(bool, [u32; 2])>>,
 }
 

@@ -65,7 +65,8 @@ impl World {
         let now = self.finder.find_filtered(&self.boxes, &self.filters).expect("few pairs").to_vec();
         let is_there = |pair: &Pair| !self.gone.contains(&pair.a) && !self.gone.contains(&pair.b);
         let old: Vec<Pair> = self.pairs.iter().copied().filter(is_there).collect();
-        let wanted = Events { added: without(&now, &old), removed: without(&old, &now) };
+        let mut wanted = Events::default();
+        (wanted.added, wanted.removed) = (without(&now, &old), without(&old, &now));
         let overlap = |pair: &&Pair| self.boxes[pair.a as usize].overlaps(&self.boxes[pair.b as usize]);
         self.parted += wanted.removed.iter().filter(overlap).count();
         let events = self.tested.update().expect("few pairs");

@@ -110,10 +110,10 @@ mod tests {
                     if id == 0 { ground as u32 } else { u32::from(ground > 0) }
                 }
             };
-            let (mut events, added) = (Vec::new(), Events { added: pairs.clone(), removed: vec![] });
+            let (mut events, mut added, mut removed) = (Vec::new(), Events::default(), Events::default());
+            (added.added, removed.removed) = (pairs.clone(), pairs);
             let written = writer.write(&added, &registry, degree(balls), |event| events.push(event));
             assert_eq!(written, (balls, 0));
-            let removed = Events { added: vec![], removed: pairs };
             let written = writer.write(&removed, &registry, degree(0), |event| events.push(event));
             assert_eq!(written, (0, balls));
             assert!(lookups.get() <= 4 * events.len(), "{} lookups", lookups.get());

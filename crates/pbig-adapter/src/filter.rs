@@ -53,7 +53,7 @@ pub struct Groups {
     pub memberships: u32,
     /// The groups that it meets.
     pub mask: u32,
-    /// Whether both colliders must accept each other, or one is enough.
+    /// Says if both colliders must accept each other, or if one is enough.
     pub mode: TestMode,
 }
 

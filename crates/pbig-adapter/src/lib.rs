@@ -1,5 +1,5 @@
-//! What pbig's broad phases for different versions of rapier share. It knows none of rapier's types, which differ from version
-//! to version.
+//! The part that pbig's broad phases for different versions of rapier share. It knows none of rapier's types, which differ from
+//! version to version.
 //!
 //! An adapter implements [`Scene`] for the arguments of rapier's call, and passes them to [`Colliders`], which keeps the
 //! colliders' boxes in `pbig-core` and writes events. Apps use `rapier-pbig`; this crate has no stable interface.

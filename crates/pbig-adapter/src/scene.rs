@@ -17,7 +17,7 @@ pub enum Proxy {
     Enabled(Aabb, ProxyFilter),
 }
 
-/// What rapier passes to an update.
+/// The arguments of an update.
 pub trait Scene: Sync {
     /// Returns the number of colliders in rapier's set.
     fn collider_count(&self) -> usize;

@@ -5,6 +5,7 @@ use std::time::Duration;
 /// The processor that does the work.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[non_exhaustive]
 pub enum Backend {
     /// The CPU. A GPU that was given, if it is hardware and the boxes are many.
     #[default]
@@ -83,7 +84,8 @@ pub enum Coding {
     Packed,
 }
 
-/// The settings of the GPU backend. The defaults suit most programs.
+/// The settings of the GPU backend. The defaults suit most programs. There may be more settings in a later version: begin
+/// with `..GpuOptions::DEFAULT`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct GpuOptions {
@@ -154,7 +156,8 @@ impl Default for GpuOptions {
     }
 }
 
-/// The settings of a [`crate::Finder`] or [`crate::BroadPhase`]. The defaults suit most programs.
+/// The settings of a [`crate::Finder`] or [`crate::BroadPhase`]. The defaults suit most programs. There may be more settings in
+/// a later version: begin with `..Config::DEFAULT`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Config {
     /// The processor that does the work.

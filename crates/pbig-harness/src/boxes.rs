@@ -79,7 +79,7 @@ impl Movers {
         Self { order, count: ((n as f64 * share).round() as usize).clamp(n.min(1), n) }
     }
 
-    /// Those of one frame, in ascending order.
+    /// Returns the boxes that move in a frame, in ascending order.
     pub fn of(&self, frame: usize) -> Vec<u32> {
         let n = self.order.len();
         let mut movers: Vec<u32> =

@@ -1,5 +1,5 @@
-//! Holds the numbers of the documents against the measured ones: each number between `<!-- from: FILE.csv -->` and
-//! `<!-- end -->` is a value of that file, rounded to the digits shown. Names in backticks and names of rows are left out.
+//! Holds the numbers of the documents against the measured ones: each number between `<!-- from: FILE.csv, FILE.csv -->` and
+//! `<!-- end -->` is a value of one of these files, rounded to the digits shown. Names in backticks and names of rows are left out.
 
 use regex::Regex;
 use std::collections::BTreeSet;
@@ -10,7 +10,7 @@ fn root() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../..")
 }
 
-/// What a file of results has: its numbers, without their signs, and its texts.
+/// The content of a file of results: its numbers, without their signs, and its texts.
 #[derive(Default)]
 struct Known {
     numbers: Vec<f64>,
@@ -18,16 +18,20 @@ struct Known {
 }
 
 impl Known {
-    fn of(csv: &str) -> Self {
+    fn of(files: &[String]) -> Self {
         let mut known = Self::default();
+        files.iter().for_each(|csv| known.add_file(csv));
+        known
+    }
+
+    fn add_file(&mut self, csv: &str) {
         let head = csv.lines().filter(|line| line.starts_with('#'));
-        head.for_each(|line| known.numbers.extend(tokens(line).into_iter().map(|token| token.value)));
+        head.for_each(|line| self.numbers.extend(tokens(line).into_iter().map(|token| token.value)));
         let mut reader =
             csv::ReaderBuilder::new().comment(Some(b'#')).has_headers(false).from_reader(csv.as_bytes());
         for record in reader.records() {
-            record.expect("a row").iter().for_each(|cell| known.add(cell));
+            record.expect("a row").iter().for_each(|cell| self.add(cell));
         }
-        known
     }
 
     /// The name of a row counts as a whole, and so does each number in it.
@@ -90,12 +94,12 @@ fn wrong(line: &str, known: &Known) -> Vec<String> {
 }
 
 /// Returns each wrong number of a document with its line, and blocks that do not end; and how many blocks there are.
-fn faults(document: &str, results: impl Fn(&str) -> Known) -> (Vec<String>, usize) {
+fn faults(document: &str, read: impl Fn(&str) -> String) -> (Vec<String>, usize) {
     let (mut faults, mut blocks, mut known) = (vec![], 0, None);
     for (i, line) in document.lines().enumerate() {
-        if let Some(file) = line.trim().strip_prefix("<!-- from: ") {
-            let file = file.trim_end_matches("-->").trim();
-            (known, blocks) = (Some(results(file)), blocks + 1);
+        if let Some(files) = line.trim().strip_prefix("<!-- from: ") {
+            let files = files.trim_end_matches("-->").split(',').map(|file| read(file.trim()));
+            (known, blocks) = (Some(Known::of(&files.collect::<Vec<_>>())), blocks + 1);
         } else if line.trim() == "<!-- end -->" {
             known = None;
         } else if let Some(known) = &known {
@@ -115,7 +119,7 @@ fn numbers_in_documents_are_measured_ones() {
         std::fs::read_to_string(path).unwrap_or_else(|error| panic!("{}: {error}", path.display()))
     };
     for path in documents.chain([root().join("README.md")]) {
-        let (faults, _) = faults(&read(&path), |file| Known::of(&read(&root().join(file))));
+        let (faults, _) = faults(&read(&path), |file| read(&root().join(file)));
         assert!(faults.is_empty(), "{}: {faults:#?}", path.display());
     }
 }
@@ -126,10 +130,12 @@ const RESULTS: &str =
 #[test]
 fn a_wrong_number_is_noticed() {
     let document = "9\n<!-- from: some.csv -->\n| 2 steps | `7` | 500 | 1,234.57 | 1235 | f32 | -0.35 |\nOn 2 threads 1234.58.\n<!-- end -->\n8";
-    let (found, blocks) = faults(document, |_| Known::of(RESULTS));
+    let (found, blocks) = faults(document, |_| RESULTS.to_owned());
     assert_eq!((found, blocks), (vec!["line 4: 1234.58".to_owned()], 1));
-    let (found, _) = faults("<!-- from: some.csv -->\n[3](4)", |_| Known::of(RESULTS));
+    let (found, _) = faults("<!-- from: some.csv -->\n[3](4)", |_| RESULTS.to_owned());
     assert_eq!(found, ["line 2: 3", "a block without an end"]);
+    let two = |file: &str| if file == "a.csv" { "x\n3".to_owned() } else { "x\n4".to_owned() };
+    assert_eq!(faults("<!-- from: a.csv, b.csv -->\n3, 4 and 5\n<!-- end -->", two).0, ["line 2: 5"]);
 }
 
 #[test]

@@ -66,7 +66,12 @@ fn charts(tables: &[Table], gpu: &str) -> Vec<Chart> {
     let chart = |name, title, x, lines| Chart::log(name, title, [x, "time, ms"], lines);
     vec![
         chart("papers-uniform", "PBIG figure 8: uniform boxes", "boxes", of_uniform.into()),
-        chart("papers-cells", "PBIG figure 9: size of cells", "length of a cell", of_cells),
+        chart(
+            "papers-cells",
+            "PBIG figure 9: size of cells",
+            "length of a cell, in units of the boxes",
+            of_cells,
+        ),
         chart("papers-steps", "Avril figure 5: a step, all moving", "objects", of_steps.into()),
     ]
 }

@@ -26,7 +26,7 @@ pub fn decode_words(data: &[u8]) {
     assert!(pairs.len() <= 32 * output.len(), "{} pairs of {} words", pairs.len(), output.len());
 }
 
-/// What a snapshot restores goes on without a panic.
+/// A restored broad phase goes on without a panic.
 fn snapshot(bytes: &[u8]) {
     let Ok(mut restored) = postcard::from_bytes::<BroadPhase>(bytes) else { return };
     for id in 0..restored.id_count().min(40) {

@@ -1,4 +1,4 @@
-//! What must not change a single bit: the number of threads, a second run, saving and restoring.
+//! The number of threads, a second run, saving and restoring must not change a single bit.
 
 use pbig_harness_036::scenes::Scene;
 use pbig_harness_036::world::{World, to_vector};
@@ -42,7 +42,7 @@ fn state(broad_phase: &BroadPhaseBvh) -> impl PartialEq {
     pbig_in(broad_phase).state()
 }
 
-/// What rapier does with them depends on the order, and neither grid nor tree has one that depends on the world alone.
+/// The result of CCD depends on the order of colliders, and neither grid nor tree has one that depends on the world alone.
 #[test]
 fn what_a_box_intersects_is_sorted() {
     for bodies in [200, 3000] {

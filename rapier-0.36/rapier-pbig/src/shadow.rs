@@ -52,7 +52,7 @@ pub fn checker(broad_phase: &BroadPhaseBvh) -> Option<&Checker> {
 pub struct Shadowed<F> {
     /// The finder.
     pub inner: F,
-    /// What was found so far.
+    /// The comparisons and their result so far.
     pub checker: Checker,
     relative_margin: f32,
     /// None after it has panicked.

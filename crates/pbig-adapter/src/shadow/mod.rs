@@ -58,9 +58,9 @@ pub struct Watched<'a, V> {
     pub removed: &'a [Handle],
     /// True if something was modified or moved.
     pub is_modified: bool,
-    /// What the broad phase has answered.
+    /// The events of the broad phase.
     pub events: &'a [PairEvent],
-    /// What rapier's own broad phase has answered, if it is a reference; none once it has panicked.
+    /// The events of rapier's own broad phase, if it is a reference; none once it has panicked.
     pub stock: Option<&'a [PairEvent]>,
 }
 

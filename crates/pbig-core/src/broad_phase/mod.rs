@@ -34,6 +34,7 @@ use world::World;
 /// No pair of a removed box is in `removed` (see [`BroadPhase::remove`]). If the box was set again, a pair can be in `added`
 /// that existed before.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct Events {
     /// Pairs whose fat boxes overlap now and did not after the previous update.
     pub added: Vec<Pair>,

@@ -121,7 +121,7 @@ fn forms_on_cpu() -> Result<Table, Failure> {
     Ok(table)
 }
 
-/// The same on a device, without a grid: bits (`Coding::Packed`) against a list of pairs (`Plain`).
+/// Forms of output on a device, without a grid: bits (`Coding::Packed`) against a list of pairs (`Plain`).
 fn forms_on_device(setup: &Setup) -> Result<Table, Failure> {
     let columns = "objects | pairs | form | bytes written | bytes fetched | ms of the kernel `check_all` | \
         ms, host waits | ms, host decodes";

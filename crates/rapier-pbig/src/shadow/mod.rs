@@ -62,7 +62,7 @@ impl PbigBroadPhase {
 /// A checker, and stock beside it.
 #[derive(Clone)]
 pub struct Watcher {
-    /// What was found so far.
+    /// The comparisons and their result so far.
     pub checker: Checker,
     relative_margin: f32,
     stock: Stock,

@@ -29,7 +29,7 @@ struct Player {
     plant: Plant,
 }
 
-/// What happened, summed up.
+/// Counts of what happened.
 #[derive(Default)]
 struct Tally {
     steps: u64,

@@ -13,7 +13,7 @@ thread_local! {
     pub static BUSY: Cell<bool> = const { Cell::new(false) };
 }
 
-/// What the finder under test does wrong.
+/// The fault of the finder under test.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Plant {
     Nothing,

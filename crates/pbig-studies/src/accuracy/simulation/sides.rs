@@ -80,7 +80,7 @@ pub(super) struct Variant {
     broad_phase: fn() -> Box<dyn BroadPhase>,
 }
 
-/// So many orders of insertion beside the scene's: a run that is one more of them is farther than all these once in 20 times.
+/// The number of orders of insertion beside the scene's: a run that is one more of them is farther than all these once in 20 times.
 pub(super) const PERMUTED: usize = 19;
 
 /// Returns all ways, the one that the others are held against first.
