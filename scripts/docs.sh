@@ -81,7 +81,7 @@ check_marks() {
             /^<!-- end -->/ { if (!open) print file ":" NR ": an end without a mark"; open = 0 }
             END { if (open) print file ":" open ": a mark without an end" }' "$file" >"$work/marks"
         while IFS= read -r name; do fault "$name"; done <"$work/marks"
-        sed -n 's/^<!-- from: \(.*\) -->$/\1/p' "$file" | sort -u >"$work/names"
+        sed -n 's|^<!-- from: \(.*\) -->$|\1|p' "$file" | tr ',' '\n' | sed 's/^ *//' | sort -u >"$work/names"
         while IFS= read -r name; do
             [ -f "$name" ] || fault "$file: there is no '$name'"
         done <"$work/names"
