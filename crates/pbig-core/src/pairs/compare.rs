@@ -165,7 +165,7 @@ impl Part {
     fn compare_stripped(&mut self, old: &Rows, new: &NewRows<'_>, is_removed: &(dyn Fn(u32) -> bool + Sync)) {
         for (a, is) in new.rows() {
             self.strip(a, old.row(a), is_removed);
-            if self.stripped != is {
+            if !row::equal(&self.stripped, is) {
                 row::differences(a, &self.stripped, is, &mut self.added, &mut self.removed);
             }
         }
