@@ -77,7 +77,8 @@ impl Follower {
         match self.broad_phase.config().backend {
             Backend::Gpu => assert!(on_gpu || !searched, "{what}: no GPU; {}", report.plan),
             Backend::Cpu | Backend::Brute => assert!(!on_gpu, "{what}: a GPU; {}", report.plan),
-            _ => {}
+            Backend::Auto => {}
+            other => panic!("{what}: what is done by {other:?}?"),
         }
     }
 

@@ -84,7 +84,7 @@ pub enum Coding {
     Packed,
 }
 
-/// The settings of the GPU backend. The defaults suit most programs. There may be more settings in a later version: begin
+/// The settings of the GPU backend. The defaults suit most programs. A later version may have more settings: end
 /// with `..GpuOptions::DEFAULT`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -156,8 +156,8 @@ impl Default for GpuOptions {
     }
 }
 
-/// The settings of a [`crate::Finder`] or [`crate::BroadPhase`]. The defaults suit most programs. There may be more settings in
-/// a later version: begin with `..Config::DEFAULT`.
+/// The settings of a [`crate::Finder`] or [`crate::BroadPhase`]. The defaults suit most programs. A later version may have
+/// more settings: end with `..Config::DEFAULT`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Config {
     /// The processor that does the work.

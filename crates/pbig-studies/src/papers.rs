@@ -69,7 +69,7 @@ fn charts(tables: &[Table], gpu: &str) -> Vec<Chart> {
         chart(
             "papers-cells",
             "PBIG figure 9: size of cells",
-            "length of a cell, in units of the boxes",
+            "length of a cell, in the paper's unit",
             of_cells,
         ),
         chart("papers-steps", "Avril figure 5: a step, all moving", "objects", of_steps.into()),

@@ -2,7 +2,7 @@
 
 use pbig_core::{Backend, Limits};
 
-/// The settings of a [`crate::PbigBroadPhase`]. There may be more in a later version: begin with `..PbigConfig::DEFAULT`.
+/// The settings of a [`crate::PbigBroadPhase`]. A later version may have more: end with `..PbigConfig::DEFAULT`.
 ///
 /// ```
 /// use rapier_pbig::{PbigBroadPhase, PbigConfig};

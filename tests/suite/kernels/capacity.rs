@@ -4,15 +4,14 @@ use super::*;
 
 #[test]
 fn nothing_is_checked_once_there_are_too_many_pairs() {
+    needs_gpu!();
     for kernel in ["check_small", "check_large", "check_all"] {
         let mut before = State::before(kernel, &pile()).with(PACKED, 0);
         before.out = vec![0; 1 << 16];
         before.chunk.word_capacity = 1 << 16;
         before.chunk.pairs_left = halves(wide(NEARLY) - 1);
-        if let Some(gpu) = gpus() {
-            let found = on_device(gpu, twin(kernel), &GpuOptions::DEFAULT, &before);
-            assert_eq!((found.totals, &found.out), (before.totals, &before.out), "{kernel}");
-        }
+        let found = on_device(gpu(), twin(kernel), &GpuOptions::DEFAULT, &before);
+        assert_eq!((found.totals, &found.out), (before.totals, &before.out), "{kernel}");
     }
 }
 
@@ -39,21 +38,20 @@ fn the_checks_count_output_that_does_not_fit_and_write_nothing_there() {
 
 #[test]
 fn schedule_counts_items_that_do_not_fit_and_writes_nothing_there() {
+    needs_gpu!();
     let mut before = State::before("schedule", &pile());
     let wanted = after_twin(twin("schedule"), &before);
     let Counters { entries, slots, small_items, large_items, .. } = wanted.counters;
     let [slots, small, large] = [slots, small_items, large_items].map(|n| n / 2);
     set_capacities(&mut before.params, &[entries, slots, small, large]);
-    if let Some(gpu) = gpus() {
-        let found = on_device(gpu, twin("schedule"), &GpuOptions::DEFAULT, &before);
-        assert_eq!(found.counters, wanted.counters);
-        assert_eq!(capacity_fault(&found.slots, slots, &wanted.slots), None);
-        assert_eq!(capacity_fault(&found.large_items, large, &wanted.large_items), None);
-        // The content of a small item depends on the order of the slots.
-        let (within, beyond) = found.small_items.split_at(small as usize);
-        assert!(within.iter().all(|item| item.pairs > 0), "a gap in the small items");
-        assert!(beyond.iter().all(|item| *item == SmallItem::default()), "a small item beyond the capacity");
-    }
+    let found = on_device(gpu(), twin("schedule"), &GpuOptions::DEFAULT, &before);
+    assert_eq!(found.counters, wanted.counters);
+    assert_eq!(capacity_fault(&found.slots, slots, &wanted.slots), None);
+    assert_eq!(capacity_fault(&found.large_items, large, &wanted.large_items), None);
+    // The content of a small item depends on the order of the slots.
+    let (within, beyond) = found.small_items.split_at(small as usize);
+    assert!(within.iter().all(|item| item.pairs > 0), "a gap in the small items");
+    assert!(beyond.iter().all(|item| *item == SmallItem::default()), "a small item beyond the capacity");
 }
 
 /// Returns an error unless the first `capacity` places of a list hold different wanted elements, and no other is used.

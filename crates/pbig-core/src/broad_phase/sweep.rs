@@ -6,7 +6,7 @@
 
 use super::world::World;
 use crate::grid::{BLOCK, EightBoxes, Kernel, Simd, dispatch};
-use crate::pairs::{Comparison, Kept, differences};
+use crate::pairs::{Comparison, Kept, differences, equal};
 use crate::{Aabb, Checks, Pair};
 
 /// The boxes of a small world axis by axis, eight to a block, padded with boxes that overlap nothing; and buffers.
@@ -65,7 +65,7 @@ impl Sweep {
     fn compare_later(&mut self, world: &World, kept: &Kept, id: u32, events: &mut Comparison) {
         let Self { now, was, .. } = self;
         let partners = kept.later_partners(id);
-        if partners != &now[..] || world.is_filtered || world.has_removed() {
+        if !equal(partners, now) || world.is_filtered || world.has_removed() {
             was.clear();
             was.extend_from_slice(partners);
             compare(world, id, was, now, events);

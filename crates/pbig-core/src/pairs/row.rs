@@ -79,10 +79,10 @@ unsafe fn push(a: u32, row: *const u32, mut mask: u32, pairs: &mut Vec<Pair>) {
     }
 }
 
-/// Returns true if two rows are equal. Empty ones are not handed to `memcmp`, which takes 60 ns for nothing at an address that
-/// cannot be read, such as that of a vector without memory.
+/// Returns true if two rows are equal. Empty ones are not handed to `memcmp`: it took 60 ns (glibc 2.36, AVX-512) where the address
+/// cannot be read, as in a vector without memory.
 #[inline(always)]
-pub(super) fn equal(old: &[u32], new: &[u32]) -> bool {
+pub(crate) fn equal(old: &[u32], new: &[u32]) -> bool {
     old.len() == new.len() && (old.is_empty() || old == new)
 }
 
@@ -117,6 +117,14 @@ mod tests {
         differences(5, &[], &[7], &mut added, &mut removed);
         differences(6, &[8], &[], &mut added, &mut removed);
         assert_eq!((added[2], removed[2]), (Pair { a: 5, b: 7 }, Pair { a: 6, b: 8 }));
+    }
+
+    #[test]
+    fn equal_rows_may_be_empty() {
+        assert!(equal(&[], &[]) && equal(&[3, 5], &[3, 5]));
+        for (old, new) in [(&[][..], &[3][..]), (&[3], &[]), (&[3, 5], &[3, 6]), (&[3], &[3, 5])] {
+            assert!(!equal(old, new));
+        }
     }
 
     struct Compared<'a>(&'a [u32], &'a [u32]);

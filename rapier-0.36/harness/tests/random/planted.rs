@@ -10,12 +10,12 @@ use std::collections::HashSet;
 
 thread_local! {
     /// In the middle of a call of the finder, where a panic is ours and not rapier's.
-    pub static BUSY: Cell<bool> = const { Cell::new(false) };
+    pub(crate) static BUSY: Cell<bool> = const { Cell::new(false) };
 }
 
 /// The fault of the finder under test.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Plant {
+pub(crate) enum Plant {
     Nothing,
     /// The AABBs that a step has moved do not arrive.
     Unmoved,
@@ -27,10 +27,10 @@ pub enum Plant {
 
 /// A finder with a fault planted in front of it or behind.
 #[derive(Clone)]
-pub struct Planted {
-    pub finder: PbigFinder,
-    pub plant: Plant,
-    pub known: HashSet<ColliderHandle>,
+pub(crate) struct Planted {
+    pub(crate) finder: PbigFinder,
+    pub(crate) plant: Plant,
+    pub(crate) known: HashSet<ColliderHandle>,
 }
 
 impl PairFinder for Planted {

@@ -19,7 +19,7 @@ pub(super) struct RootWay {
 }
 
 impl RootWay {
-    /// Returns true for a root with one Newton step, which is wrong for most pairs of thousands of boxes.
+    /// Returns true for a root with one Newton step: its error of 0.0018 makes most pairs of thousands of boxes wrong.
     pub(super) fn is_coarse(&self) -> bool {
         (1e-3..1.0).contains(&self.error)
     }
