@@ -66,6 +66,7 @@ step_fmt() {
 
 step_clippy() {
     check cargo clippy --release --workspace --all-targets -- -D warnings
+    check cargo check --release --locked --manifest-path fuzz/Cargo.toml --target-dir "${CARGO_TARGET_DIR:-target}"
 }
 
 # All but the suite. One profile and one set of features: every crate is built once.
@@ -142,7 +143,7 @@ step_rapier_0_36() {
     check scripts/features.sh powerset-0.36
     check cargo test --release $in_036 $members_036 $features_036 --no-fail-fast
     check cargo test --release $in_036 -p pbig-harness-036 --no-default-features --features enhanced-determinism
-    check cargo run --release $in_036 --example falling_objects -- --bodies 500 --steps 60
+    check cargo run --release $in_036 -p pbig-harness-036 $features_036 --example falling_objects -- --bodies 500 --steps 60
     check env RUSTDOCFLAGS="-D warnings" \
         cargo doc --release $in_036 -p rapier-pbig --features shadow,debug-render --no-deps
 }
