@@ -4,6 +4,7 @@ mod calls;
 mod changes;
 mod checked;
 mod crowds;
+mod documents;
 mod drop_in;
 mod edits;
 mod explain;
