@@ -83,7 +83,7 @@ fn race(
     frames_of_parry: usize,
     name: &str,
 ) -> Result<[Vec<f64>; NAMES.len()], Failure> {
-    let (mut ours, mut parry) = (Kept::new(UNLIMITED)?, None);
+    let (mut ours, mut parry) = (Kept::new(UNLIMITED)?, None::<Parry>);
     let mut finder = Finder::new(UNSORTED);
     let mut times = [(); NAMES.len()].map(|()| vec![]);
     let mut changed: Vec<u32> = (0..scene.boxes().len() as u32).collect();
@@ -91,10 +91,9 @@ fn race(
         let has_parry = frame <= frames_of_parry;
         if frame > 0 {
             changed = scene.step().to_vec();
-            parry
-                .iter_mut()
-                .filter(|_| has_parry)
-                .for_each(|parry: &mut Parry| parry.prepare(scene.boxes(), &changed));
+            if let Some(parry) = parry.as_mut().filter(|_| has_parry) {
+                parry.prepare(scene.boxes(), &changed);
+            }
         }
         let (boxes, of_ours) = (scene.boxes(), partition(scene.boxes(), &changed));
         for place in 0..NAMES.len() {
