@@ -33,10 +33,11 @@ mod scene;
 mod tree;
 pub(crate) use config::PbigConfig;
 pub(crate) use finder::PbigFinder;
+use crate::geometry::PairFinder;
 const MARGIN: f32 = 0.04;
 const MAX_ADAPTIVE_MARGIN: f32 = 0.25;
 
-pub(crate) fn wanted() -> Option<std::boxed::Box<dyn crate::geometry::PairFinder>> {
+pub(crate) fn wanted() -> Option<std::boxed::Box<dyn PairFinder>> {
     std::env::var_os("RAPIER_PBIG").map(|_| std::boxed::Box::<PbigFinder>::default() as _)
 }
 RUST

@@ -1,10 +1,9 @@
 //! `PbigFinder`: translates rapier's calls into calls of the core.
 
-use crate::PbigConfig;
 use crate::scene::{Call, handle, own_margin};
 use crate::tree::{ParryTree, from_tree, to_tree};
+use crate::{PairFinder, PbigConfig};
 use pbig_adapter::{Colliders, Error, HandlePair, PairEvent, Stats, Why};
-use rapier3d::geometry::PairFinder;
 use rapier3d::parry::bounding_volume::{Aabb as TreeAabb, BoundingVolume};
 use rapier3d::parry::partitioning::Bvh;
 use rapier3d::prelude::{

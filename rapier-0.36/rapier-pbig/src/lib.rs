@@ -59,7 +59,7 @@ pub use pbig_adapter::{Backend, Error, Handle, Report, Stats, Totals, Why};
 #[cfg(feature = "gpu")]
 pub use pbig_core::GpuFinder;
 
-use rapier3d::geometry::PairFinder;
+use rapier3d::geometry::PairFinder; // "no `PairFinder`"? rapier3d is not the patched copy: see [patch.crates-io] in pbig/docs/RAPIER_VERSIONS.md
 use rapier3d::prelude::BroadPhaseBvh;
 use std::any::Any;
 
