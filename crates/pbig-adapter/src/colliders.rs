@@ -1,6 +1,7 @@
 //! The colliders of a world by handle, their boxes in the core, and the events for the narrow phase.
 
-use crate::events::{EventWriter, PairEvent, ordered};
+use crate::events::{EventWriter, PairEvent, handles};
+use crate::index::{SceneIndex, SceneQuery};
 use crate::registry::ColliderRegistry;
 use crate::stats::{Counts, Totals};
 use crate::tree::SceneTree;
@@ -22,6 +23,7 @@ pub struct Colliders<T> {
     /// Proxies that several threads compute. Kept for its memory.
     #[cfg(feature = "parallel")]
     pub(crate) proxies: Vec<(Handle, crate::Proxy)>,
+    index: SceneIndex,
     tree: SceneTree<T>,
     pub(crate) counts: Counts,
     last_error: Option<Error>,
@@ -29,7 +31,7 @@ pub struct Colliders<T> {
     is_idle: bool,
     /// The last call stored only some of the listed colliders: a shape panicked, or the core refused a box. The next call
     /// reads all colliders, because rapier lists a change only once.
-    is_incomplete: bool,
+    pub(crate) is_incomplete: bool,
     /// Boxes of a broad phase that stopped: the next call starts from these.
     inherited: Vec<(u32, Aabb)>,
 }
@@ -43,6 +45,7 @@ impl<T: Tree> Colliders<T> {
             writer: EventWriter::default(),
             #[cfg(feature = "parallel")]
             proxies: Vec::new(),
+            index: SceneIndex::default(),
             tree: SceneTree::default(),
             counts: Counts::default(),
             last_error: None,
@@ -77,7 +80,8 @@ impl<T: Tree> Colliders<T> {
     pub fn adopt(&mut self, pairs: Vec<HandlePair>, boxes: Vec<(u32, Aabb)>) {
         self.forget_all();
         (self.is_idle, self.is_incomplete) = (false, !pairs.is_empty() || !boxes.is_empty());
-        (self.writer.adopted, self.inherited) = (pairs, boxes);
+        self.writer.adopt(pairs);
+        self.inherited = boxes;
     }
 
     /// Sets the AABBs of colliders, with this margin or one of their own, and keeps their filters. A collider without a box gets a filter
@@ -94,14 +98,21 @@ impl<T: Tree> Colliders<T> {
                 self.enable(handle, aabb, ProxyFilter::ALL);
             }
         }
-        if self.core.changes().next().is_some() {
+        if !self.core.changes().is_empty() {
+            self.index.expire();
             self.tree.expire();
         }
     }
 
-    /// Returns the tree of the boxes with their margins, for queries.
+    /// Visits the indices of colliders whose boxes, margins included, a query meets; some that it barely misses may be among
+    /// them. `visit` returns the time or distance up to which more are wanted.
+    pub fn visit(&self, query: &SceneQuery, visit: &mut dyn FnMut(u32) -> f32) {
+        self.index.visit(&self.core, query, visit);
+    }
+
+    /// Returns a tree of the same boxes, for queries that need one.
     pub fn tree(&self) -> &T {
-        self.tree.get(self.core.id_count(), self.core.changes(), |id| self.core.fat_aabb(id))
+        self.tree.get(self.core.id_count(), self.core.changes().iter().copied(), |id| self.core.fat_aabb(id))
     }
 
     /// Updates the boxes that rapier lists, and sends the events.
@@ -114,8 +125,9 @@ impl<T: Tree> Colliders<T> {
         self.counts = Counts { modified, removed, totals, ..Counts::default() };
         (self.last_error, self.is_idle) = (None, false);
         self.read(scene, margin);
-        self.tree.note(self.core.changes(), self.registry.len());
-        self.find_and_send(send);
+        self.index.note(self.core.changes(), self.core.id_count());
+        self.tree.note(self.core.changes().iter().copied(), self.registry.len());
+        self.find_and_send(|handle| scene.size(handle), send);
         self.counts.totals.failures += u64::from(self.last_error.is_some());
         self.is_idle = !has_changes && self.has_nothing_left();
     }
@@ -126,7 +138,7 @@ impl<T: Tree> Colliders<T> {
         let skips = self.is_idle
             && scene.listed_count() == 0
             && scene.removed().next().is_none()
-            && self.core.changes().next().is_none()
+            && self.core.changes().is_empty()
             && !self.differs_from(scene);
         self.counts.totals.updates += u64::from(skips);
         skips
@@ -138,7 +150,7 @@ impl<T: Tree> Colliders<T> {
 
     /// Returns true if nothing is left to do: no change or error of a failed update, and no adopted pair.
     fn has_nothing_left(&self) -> bool {
-        let is_done = self.last_error.is_none() && self.core.changes().next().is_none();
+        let is_done = self.last_error.is_none() && self.core.changes().is_empty();
         is_done && self.writer.adopted.is_empty()
     }
 
@@ -200,10 +212,10 @@ impl<T: Tree> Colliders<T> {
     fn forget_all(&mut self) {
         self.registry.clear();
         self.core.clear();
-        self.tree = SceneTree::default();
+        (self.index, self.tree) = (SceneIndex::default(), SceneTree::default());
     }
 
-    fn find_and_send(&mut self, send: impl FnMut(PairEvent)) {
+    fn find_and_send(&mut self, size: impl Fn(Handle) -> u8, send: impl FnMut(PairEvent)) {
         if let Err(error) = self.core.update() {
             return self.note_error(error);
         }
@@ -212,8 +224,7 @@ impl<T: Tree> Colliders<T> {
             return;
         }
         let _span = tracing::debug_span!(target: "pbig", "events").entered();
-        let degree = |id| self.core.degree(id);
-        let (added, deleted) = self.writer.write(found, &self.registry, degree, send);
+        let (added, deleted) = self.writer.write(found, &self.registry, size, send);
         self.counts.note_events(added, deleted);
     }
 
@@ -238,16 +249,13 @@ impl<T: Tree> Colliders<T> {
         self.core.pair_count()
     }
 
-    /// Returns the pairs that rapier knows of, in no particular order; the collider with fewer pairs comes first in each.
+    /// Returns the pairs that rapier knows of, sorted by the two indices; in each, the colliders are in the order of its events.
     /// Adopted pairs are among them from the next update on.
     pub fn pairs(&self) -> impl Iterator<Item = HandlePair> {
-        // Counted here: after a failed update the core would look at all pairs of a collider for each of its pairs.
-        let mut degrees = vec![0; self.core.id_count() as usize];
-        for pair in self.core.pairs() {
-            degrees[pair.a as usize] += 1;
-            degrees[pair.b as usize] += 1;
-        }
-        self.core.pairs().map(move |pair| ordered(pair, &self.registry, |id| degrees[id as usize]))
+        self.core.pairs().map(|pair| {
+            let [a, b] = handles(pair, &self.registry);
+            self.writer.order.of(a, b)
+        })
     }
 
     /// Returns the pairs that [`Colliders::adopt`] was given and no update has looked at since.

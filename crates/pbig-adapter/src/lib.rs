@@ -15,7 +15,9 @@ mod colliders;
 mod events;
 mod filter;
 mod handle;
+mod index;
 mod listed;
+mod order;
 pub mod policy;
 mod registry;
 mod scene;
@@ -31,6 +33,8 @@ pub use colliders::Colliders;
 pub use events::PairEvent;
 pub use filter::{BodyKind, Groups, accepted_kinds, filter_of};
 pub use handle::{Handle, HandlePair};
+pub use index::SceneQuery;
+pub use order::size_class;
 pub use pbig_core::{Aabb, Backend, Error, ProxyFilter, Report};
 pub use scene::{Proxy, Scene};
 #[cfg(feature = "serde")]

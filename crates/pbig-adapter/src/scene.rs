@@ -34,6 +34,9 @@ pub trait Scene: Sync {
     /// Returns the colliders that rapier lists as removed or disabled, and whether rapier's set still has them.
     fn removed(&self) -> impl Iterator<Item = (Handle, bool)>;
 
+    /// Returns the size class of a collider's shape, see [`crate::size_class`]. It decides which collider comes first in a pair.
+    fn size(&self, handle: Handle) -> u8;
+
     /// Returns the margin of a box, if it is not the same for all.
     #[inline(always)]
     fn margin(&self, _aabb: &Aabb) -> Option<f32> {

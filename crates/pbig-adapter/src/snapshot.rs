@@ -1,5 +1,6 @@
 //! Saves and restores a broad phase, next to rapier's own sets.
 
+use crate::order::{PairOrder, Size};
 use crate::registry::ColliderRegistry;
 use crate::{Colliders, HandlePair, Tree};
 use serde::de::Error as _;
@@ -7,7 +8,7 @@ use serde::{Deserialize, Deserializer, Serialize};
 use std::borrow::Cow;
 
 /// The version of [`Snapshot`]'s layout. Increased whenever the layout changes.
-const VERSION: u32 = 1;
+const VERSION: u32 = 2;
 
 type RawHandle = (u32, u32);
 
@@ -21,6 +22,11 @@ pub struct Snapshot<'a> {
     generations: Cow<'a, [u32]>,
     relative_margin: f32,
     adopted: Vec<[RawHandle; 2]>,
+    /// What the order in pairs depends on.
+    sizes: Vec<Size>,
+    reversed: Vec<[RawHandle; 2]>,
+    /// The next update reads all colliders.
+    is_incomplete: bool,
 }
 
 /// Reads the version, and fails if it is another one.
@@ -37,12 +43,17 @@ fn this_version<'de, D: Deserializer<'de>>(deserializer: D) -> Result<u32, D::Er
 impl<T: Tree> Colliders<T> {
     /// Returns what to save. `relative_margin` is the adapter's.
     pub fn snapshot(&self, relative_margin: f32) -> Snapshot<'_> {
+        let raw = |pair: &HandlePair| [pair.0.into(), pair.1.into()];
+        let (sizes, reversed) = self.writer.order.to_saved();
         Snapshot {
             version: VERSION,
             core: Cow::Borrowed(&self.core),
             generations: Cow::Borrowed(self.registry.generations()),
             relative_margin,
-            adopted: self.writer.adopted.iter().map(|pair| [pair.0.into(), pair.1.into()]).collect(),
+            adopted: self.writer.adopted.iter().map(raw).collect(),
+            sizes,
+            reversed: reversed.iter().map(raw).collect(),
+            is_incomplete: self.is_incomplete,
         }
     }
 }
@@ -67,6 +78,8 @@ impl Snapshot<'_> {
         restored.registry = registry;
         let pair = |[a, b]: [RawHandle; 2]| HandlePair(a.into(), b.into());
         restored.writer.adopted = self.adopted.into_iter().map(pair).collect();
+        restored.writer.order = PairOrder::from_saved(self.sizes, self.reversed.into_iter().map(pair));
+        restored.is_incomplete = self.is_incomplete;
         Ok((restored, margin))
     }
 }

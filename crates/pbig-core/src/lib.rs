@@ -60,6 +60,7 @@ mod finder;
 pub mod gpu;
 mod gpu_slot;
 mod grid;
+mod index;
 pub mod oracle;
 mod pair;
 mod pairs;
@@ -103,6 +104,7 @@ pub use finder::{Finder, find_pairs};
 #[cfg(feature = "gpu")]
 pub use gpu::GpuFinder;
 pub use grid::{NeighbourScan, OccupiedCell, simd};
+pub use index::{BoxIndex, Visited};
 pub use pair::Pair;
 pub use plan::{Algorithm, Plan};
 pub use policy::NoGpu;

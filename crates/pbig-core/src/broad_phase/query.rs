@@ -55,10 +55,15 @@ impl BroadPhase {
         self.world.boxes.get(id as usize).copied().filter(Aabb::is_valid)
     }
 
-    /// Yields the ids of changed boxes: set outside their fat box, given another filter, inserted or removed since the last
-    /// update.
-    pub fn changes(&self) -> impl Iterator<Item = u32> {
-        self.world.changed.iter().copied()
+    /// Returns all stored (fat) boxes by id; [`Aabb::NOWHERE`] where there is none or an invalid one.
+    pub fn fat_aabbs(&self) -> &[Aabb] {
+        &self.world.boxes
+    }
+
+    /// Returns the ids of changed boxes: set outside their fat box, given another filter, inserted or removed since the last
+    /// update. In the order of their first change.
+    pub fn changes(&self) -> &[u32] {
+        &self.world.changed
     }
 
     /// Returns the number of pairs: those of the last update, less those of boxes removed since. After a removal, and until

@@ -5,6 +5,7 @@
 
 mod backend;
 mod engine;
+pub(crate) mod index;
 
 pub use backend::NoGpu;
 pub(crate) use backend::{AvailableDevice, Choice, choose_backend};

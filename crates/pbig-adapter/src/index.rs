@@ -1,0 +1,97 @@
+//! Scene queries. They search an index of boxes, which the first of them builds; it is brought up to date by the first query
+//! after a change, and costs next to nothing while nobody asks.
+
+use pbig_core::{Aabb, BoxIndex, BroadPhase};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Mutex, PoisonError, RwLock};
+
+/// The boxes that a scene query looks for.
+#[derive(Clone, Copy, Debug)]
+pub enum SceneQuery {
+    /// Those that a box (a point, for a ray) with a velocity meets until a time.
+    Sweep(Aabb, [f32; 3], f32),
+    /// Those within a distance of a point.
+    Near([f32; 3], f32),
+}
+
+/// The index, and the changes that it does not know.
+#[derive(Debug, Default)]
+pub(crate) struct SceneIndex {
+    state: RwLock<State>,
+    is_fresh: AtomicBool,
+    /// Held while the index is brought up to date. Nobody waits for `state` to write, so that a query within a query, on the
+    /// thread that reads it already, does not wait for a writer that waits for that thread.
+    refreshing: Mutex<()>,
+}
+
+#[derive(Debug, Default)]
+struct State {
+    index: BoxIndex,
+    /// Ids whose boxes have changed since the index was fresh, repeated or not.
+    changed: Vec<u32>,
+    /// False if `changed` was given up because it grew too long.
+    knows_changes: bool,
+}
+
+impl Clone for SceneIndex {
+    /// Returns an empty index: the clone builds its own for its first query.
+    fn clone(&self) -> Self {
+        Self::default()
+    }
+}
+
+impl SceneIndex {
+    /// Says that boxes have changed; which ones, [`SceneIndex::note`] or the core's pending changes tell.
+    pub(crate) fn expire(&mut self) {
+        *self.is_fresh.get_mut() = false;
+    }
+
+    /// Notes changed boxes before an update forgets them.
+    pub(crate) fn note(&mut self, changed: &[u32], ids: u32) {
+        if changed.is_empty() {
+            return;
+        }
+        self.expire();
+        let state = self.state.get_mut().unwrap_or_else(PoisonError::into_inner);
+        // A longer list saves nothing: all boxes are read then.
+        state.knows_changes &= state.changed.len() + changed.len() <= ids as usize / 8;
+        if state.knows_changes {
+            state.changed.extend_from_slice(changed);
+        } else {
+            state.changed.clear();
+        }
+    }
+
+    /// Visits the ids of the boxes that a query meets. `visit` returns the bound up to which more are wanted.
+    pub(crate) fn visit(&self, core: &BroadPhase, query: &SceneQuery, visit: &mut dyn FnMut(u32) -> f32) {
+        if !self.is_fresh.load(Ordering::Acquire) {
+            self.refresh(core);
+        }
+        let wants_sort = {
+            let index = &self.state.read().unwrap_or_else(PoisonError::into_inner).index;
+            match *query {
+                SceneQuery::Sweep(start, velocity, time) => index.sweep(&start, velocity, time, visit),
+                SceneQuery::Near(point, distance) => index.near(point, distance, visit),
+            };
+            index.wants_sort()
+        };
+        if wants_sort && let Ok(mut state) = self.state.try_write() {
+            state.index.sort(core.fat_aabbs());
+        }
+    }
+
+    fn refresh(&self, core: &BroadPhase) {
+        let _guard = self.refreshing.lock().unwrap_or_else(PoisonError::into_inner);
+        if self.is_fresh.load(Ordering::Acquire) {
+            return;
+        }
+        // Readers have seen a fresh index, so there are none.
+        let mut state = self.state.write().unwrap_or_else(PoisonError::into_inner);
+        let State { index, changed, knows_changes } = &mut *state;
+        changed.extend_from_slice(core.changes());
+        index.refresh(core.fat_aabbs(), knows_changes.then_some(&changed[..]));
+        changed.clear();
+        *knows_changes = true;
+        self.is_fresh.store(true, Ordering::Release);
+    }
+}

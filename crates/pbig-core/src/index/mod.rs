@@ -1,0 +1,137 @@
+//! An index of boxes for questions: rays, moving boxes, boxes, points.
+//!
+//! ```text
+//! boxes by id ─► sort (rarely) ─► nodes of eight boxes, eight nodes, ... ◄─ refit (before a question, if boxes moved)
+//! ```
+//!
+//! A tree of nodes with eight children each. It is refitted in one pass over its nodes, children first. Sorting is left until
+//! questions have looked at so many nodes that a sort would have paid.
+
+mod node;
+mod question;
+mod refit;
+mod sort;
+#[cfg(test)]
+mod tests;
+mod walk;
+
+use crate::Aabb;
+use crate::grid::dispatch;
+use node::Node;
+use question::{Near, Question, Sweep};
+use std::sync::atomic::{AtomicU64, Ordering};
+use walk::Walk;
+
+/// The work of a question.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Visited {
+    /// Nodes, of eight boxes each, that were tested.
+    pub nodes: u64,
+    /// Boxes that were handed to the caller.
+    pub boxes: u64,
+}
+
+/// Boxes by id, for questions about places: which boxes does a ray, a moving box, a box or a point meet?
+///
+/// The index holds copies of boxes. [`BoxIndex::refresh`] brings it up to date; questions see the boxes as of then.
+///
+/// ```
+/// use pbig_core::{Aabb, BoxIndex};
+/// let boxes = [0.0, 5.0, 9.0].map(|x| Aabb::from_center([x, 0.0, 0.0], [0.5; 3]));
+/// let mut index = BoxIndex::default();
+/// index.refresh(&boxes, None);
+/// // The first box on a ray: each visit shortens the ray.
+/// let (point, along) = (Aabb::new([2.0, 0.0, 0.0], [2.0, 0.0, 0.0]), [1.0, 0.0, 0.0]);
+/// let mut first = (f32::INFINITY, None);
+/// index.sweep(&point, along, 100.0, &mut |id| {
+///     let distance = boxes[id as usize].min[0] - 2.0;
+///     if distance < first.0 {
+///         first = (distance, Some(id));
+///     }
+///     first.0
+/// });
+/// assert_eq!(first, (2.5, Some(1)));
+/// ```
+#[derive(Debug, Default)]
+pub struct BoxIndex {
+    /// Leaves first, then their parents, and so on up to the root; then loose leaves, which hold boxes that came since the sort.
+    nodes: Vec<Node>,
+    leaves: u32,
+    /// One more than the root's number; 0 if there is none.
+    end: u32,
+    /// By node: the lane in which its parent has it (node times eight plus lane), or `NONE`.
+    parents: Vec<u32>,
+    /// By node: the sum of its extents at the last sort; infinite once it has grown past twice that.
+    extents: Vec<f32>,
+    grown: usize,
+    /// By id: the lane of its box, or `NONE`.
+    places: Vec<u32>,
+    is_sorted: bool,
+    /// Nodes that questions have looked at since the last sort.
+    looked_at: AtomicU64,
+}
+
+impl Clone for BoxIndex {
+    /// Returns an empty index, which its first [`BoxIndex::refresh`] fills.
+    fn clone(&self) -> Self {
+        Self::default()
+    }
+}
+
+impl BoxIndex {
+    /// Visits the ids of boxes that a moving box meets between time 0 and `max_time`, about the earliest first. `start` is the
+    /// moving box at time 0 (a point for a ray), `velocity` its motion in a unit of time.
+    ///
+    /// `visit` returns the time until which further boxes are wanted; boxes that are met just after it may be visited as well.
+    /// No box is visited twice. A NaN in the question means that no box is visited.
+    pub fn sweep(
+        &self,
+        start: &Aabb,
+        velocity: [f32; 3],
+        max_time: f32,
+        visit: &mut dyn FnMut(u32) -> f32,
+    ) -> Visited {
+        match Sweep::new(start, velocity, max_time) {
+            Some(question) => self.ask(question, max_time, visit),
+            None => Visited::default(),
+        }
+    }
+
+    /// Visits the ids of boxes within a distance of a point, about the nearest first. `visit` returns the distance up to which
+    /// further boxes are wanted; boxes just beyond may be visited as well.
+    pub fn near(&self, point: [f32; 3], max_distance: f32, visit: &mut dyn FnMut(u32) -> f32) -> Visited {
+        if point.iter().any(|x| x.is_nan()) {
+            return Visited::default();
+        }
+        self.ask(Near { point }, max_distance, visit)
+    }
+
+    /// Visits the ids of boxes that overlap a box, in no particular order.
+    pub fn overlapping(&self, aabb: &Aabb, visit: &mut dyn FnMut(u32)) -> Visited {
+        self.sweep(aabb, [0.0; 3], 0.0, &mut |id| {
+            visit(id);
+            0.0
+        })
+    }
+
+    fn ask<Q: Question>(&self, question: Q, bound: f32, visit: &mut dyn FnMut(u32) -> f32) -> Visited {
+        // An empty lane is met at infinity.
+        let visited = dispatch(Walk { index: self, question, bound: bound.min(f32::MAX), visit });
+        self.looked_at.fetch_add(visited.nodes, Ordering::Relaxed);
+        visited
+    }
+
+    fn root(&self) -> Option<u32> {
+        self.end.checked_sub(1)
+    }
+
+    #[inline(always)]
+    fn is_leaf(&self, node: u32) -> bool {
+        node < self.leaves
+    }
+
+    /// Returns the leaves that no other node holds.
+    fn loose(&self) -> std::ops::Range<u32> {
+        self.end..self.nodes.len() as u32
+    }
+}

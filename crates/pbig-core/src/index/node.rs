@@ -1,0 +1,101 @@
+//! A node: eight boxes, axis by axis, and what each stands for.
+
+use crate::Aabb;
+
+/// Boxes in a node.
+pub(super) const LANES: usize = 8;
+
+/// Value of a lane of each box, or one for each axis.
+pub(super) type Lanes = [f32; LANES];
+
+/// The child of an empty lane.
+pub(super) const NONE: u32 = u32::MAX;
+
+/// Eight boxes: of stored boxes (a leaf), or of nodes.
+#[repr(C, align(32))]
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Node {
+    /// Lower corners by axis; infinite in an empty lane, which no question meets.
+    pub(super) low: [Lanes; 3],
+    /// Upper corners by axis; minus infinity in an empty lane.
+    pub(super) high: [Lanes; 3],
+    /// Ids of boxes in a leaf, else numbers of nodes.
+    pub(super) children: [u32; LANES],
+}
+
+impl Node {
+    pub(super) const EMPTY: Self = Self {
+        low: [[f32::INFINITY; LANES]; 3],
+        high: [[f32::NEG_INFINITY; LANES]; 3],
+        children: [NONE; LANES],
+    };
+
+    /// Stores a box. An invalid one becomes an empty box, which meets nothing.
+    #[inline(always)]
+    pub(super) fn set(&mut self, lane: usize, aabb: &Aabb) {
+        let is_valid = aabb.is_valid();
+        for k in 0..3 {
+            self.low[k][lane] = if is_valid { aabb.min[k] } else { f32::INFINITY };
+            self.high[k][lane] = if is_valid { aabb.max[k] } else { f32::NEG_INFINITY };
+        }
+    }
+
+    /// Returns the box around all lanes; an invalid one if all are empty.
+    #[inline(always)]
+    pub(super) fn bounds(&self) -> Aabb {
+        // Loops: `map` on arrays is not inlined into a kernel.
+        let mut bounds = Aabb::NOWHERE;
+        for k in 0..3 {
+            bounds.min[k] = fold(&self.low[k], |a, b| if a < b { a } else { b });
+            bounds.max[k] = fold(&self.high[k], |a, b| if a > b { a } else { b });
+        }
+        bounds
+    }
+
+    /// Reads the boxes that a leaf stands for.
+    #[inline(always)]
+    pub(super) fn read(&mut self, boxes: &[Aabb]) {
+        for lane in 0..LANES {
+            let aabb = boxes.get(self.children[lane] as usize).unwrap_or(&Aabb::NOWHERE);
+            for k in 0..3 {
+                (self.low[k][lane], self.high[k][lane]) = (aabb.min[k], aabb.max[k]);
+            }
+        }
+        let mut is_invalid = [0; LANES];
+        for k in 0..3 {
+            for lane in 0..LANES {
+                is_invalid[lane] |= u32::from(!(self.low[k][lane] <= self.high[k][lane]));
+            }
+        }
+        if is_invalid.iter().fold(0, |any, one| any | one) != 0 {
+            self.empty_invalid(&is_invalid);
+        }
+    }
+
+    #[cold]
+    fn empty_invalid(&mut self, is_invalid: &[u32; LANES]) {
+        (0..LANES).filter(|lane| is_invalid[*lane] != 0).for_each(|lane| self.set(lane, &Aabb::NOWHERE));
+    }
+
+    /// Returns true if a lane has this box.
+    #[inline(always)]
+    pub(super) fn holds(&self, lane: usize, aabb: &Aabb) -> bool {
+        (0..3).all(|k| (self.low[k][lane] == aabb.min[k]) & (self.high[k][lane] == aabb.max[k]))
+    }
+}
+
+/// Returns the sum of a box's extents; zero for an invalid one.
+pub(super) fn extent_sum(aabb: &Aabb) -> f32 {
+    if !aabb.is_valid() {
+        return 0.0;
+    }
+    (0..3).map(|k| aabb.max[k] - aabb.min[k]).sum()
+}
+
+/// Folds eight numbers in halves: one after the other takes twice as long.
+#[inline(always)]
+fn fold(lanes: &Lanes, of: impl Fn(f32, f32) -> f32) -> f32 {
+    let mut four = [0.0; 4];
+    (0..4).for_each(|i| four[i] = of(lanes[i], lanes[i + 4]));
+    of(of(four[0], four[2]), of(four[1], four[3]))
+}

@@ -1,0 +1,129 @@
+//! Questions: which of a node's eight boxes they meet, and from which bound on.
+
+use super::node::{LANES, Lanes, Node};
+use crate::Aabb;
+
+/// Share of a value by which it may be wrong: a few roundings. Bounds give way by as much, so that rounding costs a visit, never
+/// a box.
+const SLACK: f32 = 4.0 * f32::EPSILON;
+
+/// A question to a box: from which bound on does it belong to the answer?
+pub(super) trait Question {
+    /// Returns the least bound of each lane that the question meets; infinity for the others.
+    fn least(&self, node: &Node) -> Lanes;
+}
+
+/// Meets boxes that a moving box meets, at a time from 0 on.
+pub(super) struct Sweep {
+    axes: [Axis; 3],
+}
+
+/// The motion of the moving box along an axis.
+#[derive(Clone, Copy)]
+enum Axis {
+    /// It stays where it is, from the first to the second coordinate.
+    Still(f32, f32),
+    /// Its upper and lower end, and the time that it takes for a length unit.
+    Up(f32, f32, f32),
+    /// As `Up`, with a negative time.
+    Down(f32, f32, f32),
+}
+
+impl Axis {
+    /// A velocity that is too small to divide by moves the box by less than it is widened here.
+    fn new(low: f32, high: f32, velocity: f32, max_time: f32) -> Self {
+        let [low, high] = [low, high].map(finite);
+        let pace = 1.0 / velocity;
+        if velocity == 0.0 || !pace.is_finite() {
+            let reach = velocity * max_time;
+            return Self::Still(low + reach.min(0.0), high + reach.max(0.0));
+        }
+        if pace > 0.0 { Self::Up(high, low, pace) } else { Self::Down(high, low, pace) }
+    }
+
+    /// Narrows the times at which the boxes of a node are met.
+    #[inline(always)]
+    fn narrow(&self, low: &Lanes, high: &Lanes, enter: &mut Lanes, leave: &mut Lanes) {
+        match *self {
+            Self::Still(least, most) => {
+                for i in 0..LANES {
+                    let meets = (low[i] <= most) & (least <= high[i]);
+                    leave[i] = if meets { leave[i] } else { f32::NEG_INFINITY };
+                }
+            }
+            Self::Up(top, bottom, pace) => narrow(low, top, high, bottom, pace, enter, leave),
+            Self::Down(top, bottom, pace) => narrow(high, bottom, low, top, pace, enter, leave),
+        }
+    }
+}
+
+#[inline(always)]
+fn narrow(
+    first: &Lanes,
+    first_end: f32,
+    last: &Lanes,
+    last_end: f32,
+    pace: f32,
+    enter: &mut Lanes,
+    leave: &mut Lanes,
+) {
+    for i in 0..LANES {
+        let (begins, ends) = ((first[i] - first_end) * pace, (last[i] - last_end) * pace);
+        enter[i] = if begins > enter[i] { begins } else { enter[i] };
+        leave[i] = if ends < leave[i] { ends } else { leave[i] };
+    }
+}
+
+/// Clamps a coordinate, so that no difference of two is NaN.
+fn finite(x: f32) -> f32 {
+    x.clamp(f32::MIN, f32::MAX)
+}
+
+impl Sweep {
+    /// Returns none if a number is NaN.
+    pub(super) fn new(start: &Aabb, velocity: [f32; 3], max_time: f32) -> Option<Self> {
+        let is_number = start.is_valid() && !max_time.is_nan() && velocity.iter().all(|v| !v.is_nan());
+        let axis = |k: usize| Axis::new(start.min[k], start.max[k], finite(velocity[k]), max_time.min(f32::MAX));
+        is_number.then(|| Self { axes: std::array::from_fn(axis) })
+    }
+}
+
+impl Question for Sweep {
+    #[inline(always)]
+    fn least(&self, node: &Node) -> Lanes {
+        let (mut enter, mut leave) = ([0.0; LANES], [f32::INFINITY; LANES]);
+        for (k, axis) in self.axes.iter().enumerate() {
+            axis.narrow(&node.low[k], &node.high[k], &mut enter, &mut leave);
+        }
+        for i in 0..LANES {
+            let earliest = enter[i] - enter[i] * SLACK;
+            let meets = (leave[i] >= 0.0) & (earliest <= leave[i] + leave[i] * SLACK);
+            enter[i] = if meets { earliest } else { f32::INFINITY };
+        }
+        enter
+    }
+}
+
+/// Meets boxes within a distance of a point.
+pub(super) struct Near {
+    pub(super) point: [f32; 3],
+}
+
+impl Question for Near {
+    #[inline(always)]
+    fn least(&self, node: &Node) -> Lanes {
+        let mut squares = [0.0f32; LANES];
+        for k in 0..3 {
+            for i in 0..LANES {
+                let (below, above) = (node.low[k][i] - self.point[k], self.point[k] - node.high[k][i]);
+                let gap = if below > above { below } else { above };
+                let gap = if gap > 0.0 { gap } else { 0.0 };
+                squares[i] += gap * gap;
+            }
+        }
+        for square in &mut squares {
+            *square = square.sqrt() * (1.0 - SLACK);
+        }
+        squares
+    }
+}

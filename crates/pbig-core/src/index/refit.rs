@@ -1,0 +1,204 @@
+//! Bringing an index up to date: boxes that moved, came or went, and now and then a new layout.
+
+use super::BoxIndex;
+use super::node::{LANES, NONE, Node, extent_sum};
+use super::sort::{Entry, sort};
+use crate::Aabb;
+use crate::grid::{Kernel, Simd, dispatch, prefetch};
+use crate::policy::index as policy;
+use std::sync::atomic::Ordering;
+
+/// Leaves between the one that is read and the one whose boxes are asked for.
+const READ_AHEAD: usize = 3;
+
+impl BoxIndex {
+    /// Takes the boxes as they are now: `boxes` by id, [`Aabb::NOWHERE`] for an absent one. `changed` are the ids whose boxes
+    /// may differ from those at the last call, in any order, repeated or not; without it any box may differ.
+    pub fn refresh(&mut self, boxes: &[Aabb], changed: Option<&[u32]>) {
+        let is_few = |changed: &&[u32]| changed.len() * policy::REFIT_SHARE < self.places.len();
+        match changed.filter(is_few) {
+            Some(changed) => changed.iter().for_each(|&id| self.take(id, boxes)),
+            None => self.refit(boxes),
+        }
+        if self.wants_sort() || self.nodes.len() - self.end as usize > policy::loose_leaves(self.leaves) {
+            self.lay_out(boxes, self.has_earned_sort());
+        }
+    }
+
+    /// Returns true if sorting the boxes anew would pay: questions have looked at as many nodes as a sort costs, and the order
+    /// is bad. [`BoxIndex::refresh`] sorts then, too.
+    pub fn wants_sort(&self) -> bool {
+        let is_bad = !self.is_sorted || self.grown * policy::GROWN_SHARE > self.end as usize;
+        is_bad && self.has_earned_sort()
+    }
+
+    fn has_earned_sort(&self) -> bool {
+        self.looked_at.load(Ordering::Relaxed) >= policy::nodes_for_sort(self.leaves)
+    }
+
+    /// Sorts the boxes as they are now.
+    pub fn sort(&mut self, boxes: &[Aabb]) {
+        self.lay_out(boxes, true);
+    }
+
+    /// Reads all boxes.
+    fn refit(&mut self, boxes: &[Aabb]) {
+        if self.end == 0 {
+            return self.lay_out(boxes, false);
+        }
+        dispatch(ReadLeaves { index: self, boxes });
+        self.places.resize(boxes.len().max(self.places.len()), NONE);
+        for (id, aabb) in boxes.iter().enumerate() {
+            if self.places[id] == NONE && aabb.is_valid() {
+                self.add(id as u32, boxes);
+            }
+        }
+    }
+
+    /// Reads the boxes of all leaves, and passes their bounds on, children first.
+    #[inline(always)]
+    fn read_leaves(&mut self, boxes: &[Aabb]) {
+        for leaf in (0..self.leaves).chain(self.loose()) {
+            if let Some(next) = self.nodes.get(leaf as usize + READ_AHEAD) {
+                next.children.iter().for_each(|id| prefetch(boxes.as_ptr().wrapping_add(*id as usize)));
+            }
+            self.nodes[leaf as usize].read(boxes);
+            let bounds = self.nodes[leaf as usize].bounds();
+            self.tell_parent(leaf, &bounds);
+        }
+        for node in self.leaves..self.end {
+            let bounds = self.nodes[node as usize].bounds();
+            self.tell_parent(node, &bounds);
+        }
+    }
+
+    /// Reads one box.
+    fn take(&mut self, id: u32, boxes: &[Aabb]) {
+        let place = self.places.get(id as usize).copied().unwrap_or(NONE);
+        let aabb = boxes.get(id as usize).copied().unwrap_or(Aabb::NOWHERE);
+        if place != NONE {
+            self.nodes[place as usize / LANES].set(place as usize % LANES, &aabb);
+            self.tell_ancestors(place / LANES as u32);
+        } else if aabb.is_valid() {
+            self.add(id, boxes);
+        }
+    }
+
+    /// Appends a box that has no place to the loose leaves.
+    fn add(&mut self, id: u32, boxes: &[Aabb]) {
+        if self.places.len() <= id as usize {
+            self.places.resize(id as usize + 1, NONE);
+        }
+        let last = self.nodes.len().checked_sub(1).filter(|last| *last >= self.end as usize);
+        let open = last.filter(|last| self.nodes[*last].children[LANES - 1] == NONE);
+        let at = open.unwrap_or_else(|| {
+            self.push(Node::EMPTY);
+            self.nodes.len() - 1
+        });
+        let node = &mut self.nodes[at];
+        let lane = node.children.iter().position(|child| *child == NONE).unwrap_or(LANES - 1);
+        node.children[lane] = id;
+        node.set(lane, &boxes[id as usize]);
+        self.places[id as usize] = (at * LANES + lane) as u32;
+    }
+
+    fn push(&mut self, node: Node) {
+        self.nodes.push(node);
+        self.parents.push(NONE);
+        self.extents.push(f32::INFINITY);
+    }
+
+    /// Copies the bounds of a node into its parent.
+    #[inline(always)]
+    fn tell_parent(&mut self, node: u32, bounds: &Aabb) {
+        let (place, extent) = (self.parents[node as usize], &mut self.extents[node as usize]);
+        if extent_sum(bounds) > policy::GROWN_TO * *extent {
+            (*extent, self.grown) = (f32::INFINITY, self.grown + 1);
+        }
+        if place != NONE {
+            self.nodes[place as usize / LANES].set(place as usize % LANES, bounds);
+        }
+    }
+
+    /// Tells a node's ancestors its bounds, up to the first one that they do not change.
+    fn tell_ancestors(&mut self, mut node: u32) {
+        loop {
+            let (bounds, place) = (self.nodes[node as usize].bounds(), self.parents[node as usize]);
+            let is_known = place == NONE || self.nodes[place as usize / LANES].holds(place as usize % LANES, &bounds);
+            self.tell_parent(node, &bounds);
+            if is_known {
+                return;
+            }
+            node = place / LANES as u32;
+        }
+    }
+
+    /// Makes all nodes anew, in order of ids or sorted.
+    fn lay_out(&mut self, boxes: &[Aabb], sorted: bool) {
+        let ids = (0u32..).zip(boxes).filter(|(_, aabb)| aabb.is_valid());
+        let mut entries: Vec<Entry> = ids.map(|(id, aabb)| Entry::new(id, aabb)).collect();
+        self.nodes.clear();
+        self.parents.clear();
+        self.extents.clear();
+        self.places.clear();
+        self.places.resize(boxes.len(), NONE);
+        let classes = if sorted { sort(&mut entries) } else { vec![0..entries.len()] };
+        let classes: Vec<_> = classes.into_iter().map(|class| self.push_leaves(&entries[class])).collect();
+        self.leaves = self.nodes.len() as u32;
+        let mut roots: Vec<u32> = classes.into_iter().flat_map(|class| self.push_parents(class.collect())).collect();
+        roots = self.push_parents(roots);
+        debug_assert!(roots.len() < 2);
+        self.end = self.nodes.len() as u32;
+        dispatch(ReadLeaves { index: self, boxes });
+        self.extents = self.nodes.iter().map(|node| extent_sum(&node.bounds())).collect();
+        (self.grown, self.is_sorted) = (0, sorted);
+        if sorted {
+            *self.looked_at.get_mut() = 0;
+        }
+    }
+
+    /// Makes the leaves of a class; returns their numbers.
+    fn push_leaves(&mut self, class: &[Entry]) -> std::ops::Range<u32> {
+        let first = self.nodes.len() as u32;
+        for eight in class.chunks(LANES) {
+            let mut node = Node::EMPTY;
+            for (lane, entry) in eight.iter().enumerate() {
+                node.children[lane] = entry.id;
+                self.places[entry.id as usize] = (self.nodes.len() * LANES + lane) as u32;
+            }
+            self.push(node);
+        }
+        first..self.nodes.len() as u32
+    }
+
+    /// Makes the parents of some nodes, and theirs, up to one; returns it.
+    fn push_parents(&mut self, mut level: Vec<u32>) -> Vec<u32> {
+        while level.len() > 1 {
+            let first = self.nodes.len() as u32;
+            for eight in level.chunks(LANES) {
+                let mut node = Node::EMPTY;
+                node.children[..eight.len()].copy_from_slice(eight);
+                for (lane, child) in eight.iter().enumerate() {
+                    self.parents[*child as usize] = (self.nodes.len() * LANES + lane) as u32;
+                }
+                self.push(node);
+            }
+            level = (first..self.nodes.len() as u32).collect();
+        }
+        level
+    }
+}
+
+struct ReadLeaves<'a> {
+    index: &'a mut BoxIndex,
+    boxes: &'a [Aabb],
+}
+
+impl Kernel for ReadLeaves<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    unsafe fn run<S: Simd>(self) {
+        self.index.read_leaves(self.boxes);
+    }
+}

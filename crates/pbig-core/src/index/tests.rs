@@ -1,0 +1,197 @@
+//! The index gives what a scan of all boxes gives, whatever happened to the boxes, and looks at few of them.
+
+use super::{BoxIndex, Visited};
+use crate::Aabb;
+use rand::rngs::StdRng;
+use rand::{RngExt, SeedableRng};
+
+fn random_box(rng: &mut StdRng, reach: f32) -> Aabb {
+    let half = match rng.random_range(0..20) {
+        0 => return Aabb::NOWHERE,
+        1 => [reach, 0.1, reach],
+        2 => [f32::INFINITY, 0.1, f32::INFINITY],
+        _ => [0.0; 3].map(|_: f32| rng.random_range(0.0..0.6)),
+    };
+    Aabb::from_center([0.0; 3].map(|_: f32| rng.random_range(-reach..reach)), half)
+}
+
+/// Returns the times at which a box meets another one that stays, in f64; none if it never does before `max_time`.
+fn meets(start: &Aabb, velocity: [f32; 3], max_time: f32, other: &Aabb) -> Option<f64> {
+    let (mut enter, mut leave) = (0.0f64, f64::from(max_time));
+    for k in 0..3 {
+        let [low, high, min, max] =
+            [start.min[k], start.max[k], other.min[k], other.max[k]].map(f64::from);
+        let v = f64::from(velocity[k]);
+        if v == 0.0 {
+            if !(low <= max && min <= high) {
+                return None;
+            }
+            continue;
+        }
+        let (a, b) = ((min - high) / v, (max - low) / v);
+        enter = enter.max(a.min(b));
+        leave = leave.min(a.max(b));
+    }
+    (other.is_valid() && enter <= leave).then_some(enter)
+}
+
+fn distance(point: [f32; 3], other: &Aabb) -> f64 {
+    let gap = |k: usize| f64::from(other.min[k] - point[k]).max(f64::from(point[k] - other.max[k])).max(0.0);
+    if other.is_valid() { (0..3).map(|k| gap(k).powi(2)).sum::<f64>().sqrt() } else { f64::INFINITY }
+}
+
+/// Asks one question of each kind, and compares with a scan.
+fn check(index: &BoxIndex, boxes: &[Aabb], rng: &mut StdRng, reach: f32) {
+    let start = Aabb::from_center(
+        [0.0; 3].map(|_: f32| rng.random_range(-reach..reach)),
+        [0.0; 3].map(|_: f32| if rng.random_range(0..2) == 0 { 0.0 } else { 0.3 }),
+    );
+    let velocity = [0.0; 3].map(|_: f32| if rng.random_range(0..3) == 0 { 0.0 } else { rng.random_range(-1.0..1.0) });
+    let max_time = [0.0, 5.0, f32::MAX, f32::INFINITY][rng.random_range(0..4)];
+    let mut found = Vec::new();
+    index.sweep(&start, velocity, max_time, &mut |id| {
+        found.push(id);
+        max_time
+    });
+    let all = |i: usize| meets(&start, velocity, max_time, &boxes[i]).is_some();
+    compare(found, (0..boxes.len()).filter(|&i| all(i)), |i| {
+        meets(&start.inflated(1e-3), velocity, max_time * 1.001, &boxes[i]).is_some()
+    });
+
+    let mut first = f64::INFINITY;
+    index.sweep(&start, velocity, max_time, &mut |id| {
+        first = meets(&start, velocity, max_time, &boxes[id as usize]).map_or(first, |t| t.min(first));
+        max_time.min(first as f32)
+    });
+    let wanted = boxes.iter().filter_map(|other| meets(&start, velocity, max_time, other)).fold(f64::INFINITY, f64::min);
+    assert_eq!(first, wanted, "the first box met");
+
+    let (point, within) = (start.min, rng.random_range(0.0..4.0f32));
+    let mut found = Vec::new();
+    index.near(point, within, &mut |id| {
+        found.push(id);
+        within
+    });
+    let is_near = |i: usize, factor: f64| distance(point, &boxes[i]) <= f64::from(within) * factor;
+    compare(found, (0..boxes.len()).filter(|&i| is_near(i, 1.0)), |i| is_near(i, 1.001));
+}
+
+/// All wanted boxes were found, each once, and besides only such as `may_be`.
+fn compare(mut found: Vec<u32>, wanted: impl Iterator<Item = usize>, may_be: impl Fn(usize) -> bool) {
+    found.sort_unstable();
+    assert!(found.windows(2).all(|two| two[0] < two[1]), "a box was visited twice");
+    for id in wanted {
+        assert!(found.binary_search(&(id as u32)).is_ok(), "box {id} was missed");
+    }
+    assert!(found.iter().all(|&id| may_be(id as usize)), "a box far away was visited");
+}
+
+#[test]
+fn answers_equal_a_scan_through_any_history() {
+    for (seed, n) in [(1, 1), (2, 7), (3, 9), (4, 70), (5, 600), (6, 3000)] {
+        let (mut rng, mut index) = (StdRng::seed_from_u64(seed), BoxIndex::default());
+        let mut boxes: Vec<Aabb> = (0..n).map(|_| random_box(&mut rng, 10.0)).collect();
+        index.refresh(&boxes, None);
+        let (mut sorts, mut loose) = (0, 0);
+        for round in 0..60 {
+            let count = [1, 1 + n / 40, n][round % 3];
+            let mut changed: Vec<u32> = (0..count).map(|_| rng.random_range(0..boxes.len() as u32)).collect();
+            changed.iter().for_each(|&id| boxes[id as usize] = random_box(&mut rng, 10.0));
+            for _ in 0..rng.random_range(0..1 + n / 20) {
+                changed.push(boxes.len() as u32);
+                boxes.push(random_box(&mut rng, 10.0));
+            }
+            index.refresh(&boxes, (round % 2 == 0).then_some(&changed[..]));
+            loose += index.loose().len();
+            (0..20).for_each(|_| check(&index, &boxes, &mut rng, 12.0));
+            if round % 7 == 0 {
+                index.sort(&boxes);
+                sorts += 1;
+            }
+        }
+        assert!(sorts > 5 && (loose > 0 || n < 20), "{n} boxes: {sorts} sorts, {loose} loose leaves");
+    }
+}
+
+#[test]
+fn a_missed_box_is_noticed() {
+    let mut rng = StdRng::seed_from_u64(7);
+    let boxes: Vec<Aabb> = (0..50).map(|_| random_box(&mut rng, 3.0)).collect();
+    let (mut index, mut stale) = (BoxIndex::default(), boxes.clone());
+    let valid = stale.iter().position(Aabb::is_valid).expect("one of 50");
+    stale[valid] = Aabb::NOWHERE;
+    index.refresh(&stale, None);
+    let mut ask = || (0..500).for_each(|_| check(&index, &boxes, &mut rng, 3.0));
+    assert!(std::panic::catch_unwind(std::panic::AssertUnwindSafe(&mut ask)).is_err());
+}
+
+fn scattered(n: usize) -> Vec<Aabb> {
+    let (mut rng, side) = (StdRng::seed_from_u64(9), (n as f32 * 4.0).cbrt());
+    (0..n).map(|_| Aabb::from_center([0.0; 3].map(|_: f32| rng.random_range(0.0..side)), [0.4; 3])).collect()
+}
+
+/// Casts rays to the first box, and returns the work of the last one hundred.
+fn cast(index: &mut BoxIndex, boxes: &[Aabb], rays: usize) -> Visited {
+    let (mut rng, mut sum) = (StdRng::seed_from_u64(3), Visited::default());
+    let side = (boxes.len() as f32 * 4.0).cbrt();
+    for ray in 0..rays {
+        let from = [0.0; 3].map(|_: f32| rng.random_range(0.0..side));
+        let along = [0.0; 3].map(|_: f32| rng.random_range(-1.0..1.0));
+        let (start, mut first) = (Aabb::new(from, from), f32::MAX);
+        let visited = index.sweep(&start, along, f32::MAX, &mut |id| {
+            first = meets(&start, along, f32::MAX, &boxes[id as usize]).map_or(first, |t| first.min(t as f32));
+            first
+        });
+        if ray + 100 >= rays {
+            sum = Visited { nodes: sum.nodes + visited.nodes, boxes: sum.boxes + visited.boxes };
+        }
+        if index.wants_sort() {
+            index.sort(boxes);
+        }
+    }
+    sum
+}
+
+#[test]
+fn a_crowd_of_questions_pays_for_a_sort_and_single_ones_do_not() {
+    for n in [1000, 10_000, 100_000] {
+        let (boxes, mut index) = (scattered(n), BoxIndex::default());
+        index.refresh(&boxes, None);
+        let many = (n / 40) as u64;
+        let one = cast(&mut index, &boxes, 1);
+        assert!(one.nodes >= many, "{n} boxes: {one:?}: not sorted for one ray");
+        let few = cast(&mut index, &boxes, 200);
+        assert!(few.nodes < 100 * 80, "{n} boxes: {few:?} for 100 rays");
+        // A box at the end of the world, huge ones and flat ones cost the others nothing.
+        let mut odd = boxes.clone();
+        odd[0] = Aabb::new([1e9; 3], [1e10; 3]);
+        odd[1] = Aabb::new([f32::NEG_INFINITY, -1.0, f32::NEG_INFINITY], [f32::INFINITY, 0.0, f32::INFINITY]);
+        odd.iter_mut().skip(2).step_by(50).for_each(|one| *one = one.inflated(n as f32));
+        let mut index = BoxIndex::default();
+        index.refresh(&odd, None);
+        index.sort(&odd);
+        let with_odd = cast(&mut index, &odd, 100);
+        assert!(with_odd.boxes < 100 * (n as u64 / 50 + 40), "{n} boxes: {with_odd:?}");
+        assert!(with_odd.nodes < 100 * (n as u64 / 300 + 200), "{n} boxes: {with_odd:?}");
+    }
+}
+
+#[test]
+fn questions_with_nans_visit_nothing() {
+    let mut index = BoxIndex::default();
+    let unit = Aabb::new([0.0; 3], [1.0; 3]);
+    index.refresh(&[unit], None);
+    let count = |ask: &dyn Fn(&mut dyn FnMut(u32) -> f32)| {
+        let mut visits = 0;
+        ask(&mut |_| {
+            visits += 1;
+            1.0
+        });
+        visits
+    };
+    assert_eq!(count(&|visit| _ = index.sweep(&unit, [f32::NAN, 0.0, 0.0], 1.0, visit)), 0);
+    assert_eq!(count(&|visit| _ = index.sweep(&unit, [1.0; 3], f32::NAN, visit)), 0);
+    assert_eq!(count(&|visit| _ = index.sweep(&Aabb::NOWHERE, [1.0; 3], 1.0, visit)), 0);
+    assert_eq!(count(&|visit| _ = index.near([f32::NAN; 3], 1.0, visit)), 0);
+    assert_eq!(count(&|visit| _ = index.sweep(&unit, [f32::INFINITY, 0.0, 0.0], 1.0, visit)), 1);
+}
