@@ -1,9 +1,11 @@
 //! Options that several commands share.
 
 use pbig_core::{Error, Report};
-use pbig_harness::output::Failure;
+use pbig_harness::files;
+use pbig_harness::output::{Failure, print, print_aside};
 use pbig_harness::runner::milliseconds;
 use std::ops::RangeInclusive;
+use std::path::Path;
 
 /// Runs `work` on `threads` threads, or on all.
 pub(crate) fn with_threads<T: Send>(
@@ -13,6 +15,32 @@ pub(crate) fn with_threads<T: Send>(
     let Some(threads) = threads else { return work() };
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
     pool.map_err(|error| Failure::Input(format!("--threads {threads}: {error}")))?.install(work)
+}
+
+/// Checks the option `-o` before the work.
+pub(crate) fn check_output(
+    output: Option<&Path>,
+    known: &[&str],
+    input: &Path,
+    as_json: bool,
+) -> Result<(), Failure> {
+    let Some(output) = output else { return Ok(()) };
+    if files::is_stdout(output) && as_json {
+        return Err(Failure::Input("-o - and --json both write to stdout: leave out one".into()));
+    }
+    Ok(files::check_output(output, known, input)?)
+}
+
+/// Prints a summary where it does not mix with the output, or with a hint how to get an output of `what`.
+pub(crate) fn print_summary(output: Option<&Path>, what: &str, summary: &str) -> Result<(), Failure> {
+    match output {
+        None => print(&format!("{summary}\nhint: -o FILE writes the {what} to a file, -o - to stdout")),
+        Some(output) if files::is_stdout(output) => {
+            print_aside(summary);
+            Ok(())
+        }
+        Some(_) => print(summary),
+    }
 }
 
 /// Numbers of threads: beyond the largest, starting them takes longer than any work.

@@ -1,8 +1,10 @@
 //! `pbig pairs`: all overlapping pairs of the boxes in a file.
 
-use crate::options::{THREADS, plan_text, search_text, stages, whole, with_threads};
+use crate::options::{
+    THREADS, check_output, plan_text, print_summary, search_text, stages, whole, with_threads,
+};
 use pbig_core::{Aabb, Config, Finder};
-use pbig_harness::files::{BOXES_OR_PAIRS, ending, read_boxes, write_pairs};
+use pbig_harness::files::{BOXES_OR_PAIRS, BoxList, Place, read_boxes, write_pairs};
 use pbig_harness::options::BackendOption;
 use pbig_harness::prelude::*;
 use std::path::{Path, PathBuf};
@@ -11,7 +13,7 @@ use std::path::{Path, PathBuf};
 pub(crate) struct Args {
     /// Boxes: .npy (N,6) float32 or float64, or .csv, columns min_x,min_y,min_z,max_x,max_y,max_z.
     input: PathBuf,
-    /// Where to write the pairs: .npy (K,2) uint32 or .csv.
+    /// Where to write the pairs: .npy (K,2) uint32 or .csv; `-` is stdout, as .csv.
     #[arg(short, value_name = "OUT")]
     output: Option<PathBuf>,
     /// Where the work runs.
@@ -32,25 +34,24 @@ pub(crate) struct Args {
 }
 
 pub(crate) fn run(args: &Args) -> Result<(), Failure> {
-    if let Some(output) = &args.output {
-        ending(output, &BOXES_OR_PAIRS)?;
-    }
-    let boxes = read_boxes(&args.input)?;
+    check_output(args.output.as_deref(), &BOXES_OR_PAIRS, &args.input, args.json)?;
+    let list = read_boxes(&args.input)?;
     if args.strict {
-        refuse_invalid(&args.input, &boxes)?;
+        refuse_invalid(&args.input, &list)?;
     }
     let mut finder = Finder::new(Config { backend: args.backend.backend(), ..Config::DEFAULT });
-    let times = with_threads(args.threads, || find(&mut finder, &boxes, args))?;
+    let times = with_threads(args.threads, || find(&mut finder, &list.boxes, args))?;
     if let Some(output) = &args.output {
         write_pairs(output, finder.pairs())?;
     }
-    report(args, &finder, Spread::of(times))
+    report(args, &finder, &list, Spread::of(times))
 }
 
-fn refuse_invalid(path: &Path, boxes: &[Aabb]) -> Result<(), Failure> {
-    let Some(row) = boxes.iter().position(|b| !b.is_valid()) else { return Ok(()) };
+fn refuse_invalid(path: &Path, list: &BoxList) -> Result<(), Failure> {
+    let Some((index, place)) = list.first_invalid else { return Ok(()) };
+    let line = if let Place::Line(_) = place { format!("{place}: ") } else { String::new() };
     let what = "has a NaN or a minimum above its maximum; mend it, or leave out --strict";
-    Err(Failure::Input(format!("{}: box {row} (counted from 0) {what}", path.display())))
+    Err(Failure::Input(format!("{}: {line}box {index} (counted from 0) {what}", path.display())))
 }
 
 fn find(finder: &mut Finder, boxes: &[Aabb], args: &Args) -> Result<Vec<f64>, Failure> {
@@ -62,7 +63,7 @@ fn find(finder: &mut Finder, boxes: &[Aabb], args: &Args) -> Result<Vec<f64>, Fa
     progress(args.repeat, "finding pairs").wrap_iter(0..args.repeat).map(once).collect()
 }
 
-fn report(args: &Args, finder: &Finder, ms: Spread) -> Result<(), Failure> {
+fn report(args: &Args, finder: &Finder, list: &BoxList, ms: Spread) -> Result<(), Failure> {
     let report = finder.report();
     let (boxes, pairs, invalid) = (report.boxes, report.pairs, report.invalid);
     if args.json {
@@ -79,5 +80,8 @@ fn report(args: &Args, finder: &Finder, ms: Spread) -> Result<(), Failure> {
         return print(&object.to_string());
     }
     let plan = plan_text(report);
-    print(&format!("{boxes} boxes ({invalid} invalid), {pairs} overlapping pairs\n{ms}\n{plan}"))
+    let first = list.first_invalid.map_or(String::new(), |(_, place)| format!(", the first in {place}"));
+    let summary =
+        format!("{boxes} boxes ({invalid} invalid{first}), {pairs} overlapping pairs\n{ms}\n{plan}");
+    print_summary(args.output.as_deref(), "pairs", &summary)
 }

@@ -1,8 +1,8 @@
 //! `pbig replay`: the incremental path over frames of boxes.
 
-use crate::options::{margin, plan_text, search_text, stages};
+use crate::options::{check_output, margin, plan_text, print_summary, search_text, stages};
 use pbig_core::{Aabb, BroadPhase, Config, Error, Pair, ProxyFilter};
-use pbig_harness::files::{Frames, ending, read_frames, write_csv};
+use pbig_harness::files::{Frames, read_frames, write_csv};
 use pbig_harness::options::BackendOption;
 use pbig_harness::prelude::*;
 use std::path::PathBuf;
@@ -12,7 +12,7 @@ use std::time::Instant;
 pub(crate) struct Args {
     /// Frames: .npy (F,N,6) float32 or float64; a box of six NaN is absent in that frame.
     frames: PathBuf,
-    /// Where to write the events: .csv with frame,event,a,b.
+    /// Where to write the events: .csv with frame,event,a,b; `-` is stdout.
     #[arg(short, value_name = "EVENTS.csv")]
     output: Option<PathBuf>,
     /// Where the work runs.
@@ -34,13 +34,13 @@ struct Replay {
     added: u64,
     removed: u64,
     invalid: u64,
+    /// Frame and index of the first invalid box.
+    first_invalid: Option<(usize, usize)>,
     keep_lines: bool,
 }
 
 pub(crate) fn run(args: &Args) -> Result<(), Failure> {
-    if let Some(output) = &args.output {
-        ending(output, &["csv"])?;
-    }
+    check_output(args.output.as_deref(), &["csv"], &args.frames, args.json)?;
     let frames = read_frames(&args.frames)?;
     let config = Config { margin: args.margin, backend: args.backend.backend(), ..Config::DEFAULT };
     let about = |error| Failure::Input(format!("{}: {}", args.frames.display(), search_text(&error)));
@@ -72,9 +72,24 @@ impl Replay {
         }
         broad_phase.update()?;
         self.times.push(milliseconds(clock.elapsed()));
+        self.note_invalid(frame);
         self.invalid += broad_phase.report().invalid;
         self.count(broad_phase, left);
         Ok(())
+    }
+
+    fn note_invalid(&mut self, frame: &[Option<Aabb>]) {
+        if self.first_invalid.is_none() {
+            let index = frame.iter().position(|now| now.is_some_and(|aabb| !aabb.is_valid()));
+            self.first_invalid = index.map(|index| (self.times.len() - 1, index));
+        }
+    }
+
+    /// Returns a line about the invalid boxes, or nothing if there are none.
+    fn invalid_line(&self) -> String {
+        let Some((frame, index)) = self.first_invalid else { return String::new() };
+        let first = format!("the first in frame {frame}, row {index}, counted from 0");
+        format!("invalid boxes, over all frames: {}, {first}\n", self.invalid)
     }
 
     fn count(&mut self, broad_phase: &BroadPhase, mut removed: Vec<Pair>) {
@@ -115,10 +130,12 @@ fn report(args: &Args, frames: &Frames, replay: &Replay, broad_phase: &BroadPhas
         });
         return print(&object.to_string());
     }
-    print(&format!(
+    let summary = format!(
         "{count} frames of {boxes} boxes: {added} pairs added, {removed} removed, {} at the end\n\
-         a frame: {ms}\nlast frame: {}",
+         {}a frame: {ms}\nlast frame: {}",
         broad_phase.pair_count(),
+        replay.invalid_line(),
         plan_text(report)
-    ))
+    );
+    print_summary(args.output.as_deref(), "events", &summary)
 }

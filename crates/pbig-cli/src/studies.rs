@@ -14,7 +14,11 @@ pub(crate) fn run(command: &str, options: Vec<OsString>) -> Result<(), Failure> 
         std::process::exit(status.code().unwrap_or(1));
     }
     let options: Vec<_> = options.iter().map(|option| option.to_string_lossy().into_owned()).collect();
-    let line =
+    let run =
         [&["cargo run --release -p pbig-studies --", command].map(str::to_owned)[..], &options].concat();
-    Err(Failure::Input(format!("{command} is a study; run it with: {}", line.join(" "))))
+    let build = "cargo build --release -p pbig-studies";
+    Err(Failure::Input(format!(
+        "{command} belongs to the program pbig-studies, which is not beside this one: build it with `{build}`, or run: {}",
+        run.join(" ")
+    )))
 }

@@ -148,6 +148,8 @@ mod tests {
         for algorithm in [Nothing, Brute, Sweep, Grid, Edit] {
             let shown = |no_gpu| Plan { algorithm, boxes: 9, no_gpu, ..Plan::default() }.to_string();
             assert!(shown(Some(NoGpu::Software)).ends_with("; no GPU: the given device is software"));
+            // Nothing has failed where nobody asked.
+            assert!(shown(Some(NoGpu::NotGiven)).ends_with("; no GPU: none was asked for"));
             assert!(!shown(Some(NoGpu::NotBuilt)).contains("GPU") && !shown(None).contains("GPU"));
         }
     }

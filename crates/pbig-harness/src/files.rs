@@ -1,30 +1,36 @@
 //! Boxes in files, as the program `pbig` reads and writes them.
 
-// The fuzz targets compile this file at another place: with a path it finds its part there too.
+// The fuzz targets compile this file at another place: with a path it finds its parts there too.
 #[path = "files/npy.rs"]
 mod npy;
+#[path = "files/text.rs"]
+mod text;
+#[path = "files/write.rs"]
+mod write;
 
 pub use npy::{npy_boxes, npy_frames};
+pub use text::csv_boxes;
+pub use write::{check_output, is_stdout, write_csv, write_pairs};
 
-use ndarray::Array2;
-use pbig_core::{Aabb, Pair};
+use pbig_core::{Aabb, Limits};
+use std::fmt;
 use std::fs::File;
-use std::io::{BufWriter, Write};
+use std::io::BufReader;
 use std::path::Path;
 
 /// The endings of a file of boxes, and of one of pairs.
 pub const BOXES_OR_PAIRS: [&str; 2] = ["npy", "csv"];
 
-/// The columns of a `.csv` file.
-const COLUMNS: [&str; 6] = ["min_x", "min_y", "min_z", "max_x", "max_y", "max_z"];
+/// The largest number of boxes that is read: no search of the program `pbig` takes more.
+const MAX_BOXES: u64 = Limits::DEFAULT.max_boxes;
 
 /// Returns a message about a file, in one line that names it. Messages about the content alone do not know the name.
-fn at(path: &Path, what: impl std::fmt::Display) -> String {
+fn at(path: &Path, what: impl fmt::Display) -> String {
     format!("{}: {}", path.display(), one_line(what))
 }
 
 /// Whatever a library put into its message.
-fn one_line(what: impl std::fmt::Display) -> String {
+fn one_line(what: impl fmt::Display) -> String {
     what.to_string().replace(['\n', '\r'], " ")
 }
 
@@ -34,21 +40,79 @@ fn brief(text: &str) -> String {
     text.char_indices().nth(LONGEST).map_or(text.to_owned(), |(end, _)| format!("{}...", &text[..end]))
 }
 
+/// Boxes of a file, and the place of the first invalid one.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct BoxList {
+    /// The boxes, perhaps invalid ones.
+    pub boxes: Vec<Aabb>,
+    /// The first box that is invalid: its index and its place in the file.
+    pub first_invalid: Option<(usize, Place)>,
+}
+
+/// The place of a box in a file.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Place {
+    /// Line of a text, counted from 1.
+    Line(usize),
+    /// Row of an array, counted from 0.
+    Row(usize),
+}
+
+impl fmt::Display for Place {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Line(line) => write!(f, "line {line}"),
+            Self::Row(row) => write!(f, "row {row}, counted from 0"),
+        }
+    }
+}
+
+impl BoxList {
+    fn push(&mut self, aabb: Aabb, place: Place) {
+        if self.first_invalid.is_none() && !aabb.is_valid() {
+            self.first_invalid = Some((self.boxes.len(), place));
+        }
+        self.boxes.push(aabb);
+    }
+}
+
+/// Bytes to read, and their number if it is known: of a pipe it is not.
+struct Source<R> {
+    reader: R,
+    length: Option<u64>,
+}
+
+impl Source<BufReader<File>> {
+    fn open(path: &Path) -> Result<Self, String> {
+        let open = || {
+            let file = File::open(path)?;
+            let about = file.metadata()?;
+            Ok((file, about.is_file().then_some(about.len())))
+        };
+        let (file, length) = open().map_err(|error: std::io::Error| at(path, error))?;
+        Ok(Self { reader: BufReader::with_capacity(64 << 10, file), length })
+    }
+}
+
+impl<'a> Source<&'a [u8]> {
+    fn of(bytes: &'a [u8]) -> Self {
+        Self { reader: bytes, length: Some(bytes.len() as u64) }
+    }
+}
+
 /// A list of boxes: `.npy` (N,6) float32 or float64 (rounded outward), or `.csv` with the columns
 /// min_x,min_y,min_z,max_x,max_y,max_z (rounded to nearest, which never parts two boxes that touch).
-pub fn read_boxes(path: &Path) -> Result<Vec<Aabb>, String> {
-    read(path, if ending(path, &BOXES_OR_PAIRS)? == "npy" { npy_boxes } else { csv_boxes })
+pub fn read_boxes(path: &Path) -> Result<BoxList, String> {
+    let is_npy = ending(path, &BOXES_OR_PAIRS)? == "npy";
+    let source = Source::open(path)?;
+    let read = if is_npy { npy::boxes(source) } else { text::boxes(source.reader, MAX_BOXES) };
+    read.map_err(|what| at(path, what))
 }
 
 /// Frames of boxes: `.npy` (F,N,6) float32 or float64 (rounded outward).
 pub fn read_frames(path: &Path) -> Result<Frames, String> {
     ending(path, &["npy"])?;
-    read(path, npy_frames)
-}
-
-fn read<T>(path: &Path, content: fn(&[u8]) -> Result<T, String>) -> Result<T, String> {
-    let bytes = std::fs::read(path).map_err(|error| at(path, error))?;
-    content(&bytes).map_err(|what| at(path, what))
+    npy::frames(Source::open(path)?).map_err(|what| at(path, what))
 }
 
 /// The content of a file of frames.
@@ -71,95 +135,7 @@ pub fn ending<'a>(path: &Path, known: &[&'a str]) -> Result<&'a str, String> {
     found.ok_or_else(|| at(path, format!("expected a file that ends in .{}", known.join(" or ."))))
 }
 
-/// The content of a `.csv` file of boxes, see [`read_boxes`].
-pub fn csv_boxes(bytes: &[u8]) -> Result<Vec<Aabb>, String> {
-    let text = text(bytes)?;
-    let mut reader =
-        csv::ReaderBuilder::new().has_headers(false).flexible(true).trim(csv::Trim::All).from_reader(bytes);
-    let mut boxes = Vec::new();
-    for (i, record) in reader.records().enumerate() {
-        let record = record.map_err(one_line)?;
-        if i > 0 || !is_header(&record) {
-            let better = |what| wrong_throughout(&record, i).unwrap_or(what);
-            let about = |what| one_line(format!("line {}: {}", line_of(text, &record), better(what)));
-            boxes.push(csv_box(&record).map_err(about)?);
-        }
-    }
-    Ok(boxes)
-}
-
-fn text(bytes: &[u8]) -> Result<&str, String> {
-    std::str::from_utf8(bytes).map_err(|error| {
-        let before = &bytes[..error.valid_up_to()];
-        let line = 1 + before.iter().filter(|&&byte| byte == b'\n').count();
-        format!("line {line}: this is not UTF-8; save the file as UTF-8 text")
-    })
-}
-
-/// The column names, and nothing else: a file that begins with other words is not taken for empty.
-fn is_header(record: &csv::StringRecord) -> bool {
-    record.len() == 6
-        && record.iter().zip(COLUMNS).all(|(field, name)| plain(field).eq_ignore_ascii_case(name))
-}
-
-/// Without the mark that some programs put before the text.
-fn plain(field: &str) -> &str {
-    field.trim_start_matches('\u{feff}')
-}
-
-/// Returns a message about the whole file rather than a value.
-fn wrong_throughout(record: &csv::StringRecord, number: usize) -> Option<String> {
-    for (separator, name) in [(';', "semicolons"), ('\t', "tabs")] {
-        if record.iter().any(|field| field.contains(separator)) {
-            return Some(format!("values are separated by {name}; expected commas"));
-        }
-    }
-    let is_name = |field: &str| plain(field).starts_with(|c: char| c.is_alphabetic() || c == '#');
-    let header = number == 0 && record.iter().all(is_name);
-    header.then(|| format!("the header must be {}, or be left out", COLUMNS.join(",")))
-}
-
-/// The line of a record, counted from 1. The reader's own count is off after blank lines.
-fn line_of(text: &str, record: &csv::StringRecord) -> usize {
-    let start = record.position().map_or(0, |position| position.byte() as usize);
-    let blank = text[start..].len() - text[start..].trim_start_matches(['\r', '\n']).len();
-    1 + text[..start + blank].matches('\n').count()
-}
-
-fn csv_box(record: &csv::StringRecord) -> Result<Aabb, String> {
-    if record.len() != 6 {
-        return Err(format!("expected 6 columns, separated by commas, found {}", record.len()));
-    }
-    let mut values = [0.0f32; 6];
-    for (column, (value, field)) in values.iter_mut().zip(record).enumerate() {
-        *value = field
-            .parse()
-            .map_err(|_| format!("column {}: '{}' is not a number", column + 1, brief(field)))?;
-    }
-    let [a, b, c, d, e, f] = values;
-    Ok(Aabb::new([a, b, c], [d, e, f]))
-}
-
-/// Pairs as `.npy` (K,2) uint32 or `.csv`.
-pub fn write_pairs(path: &Path, pairs: &[Pair]) -> Result<(), String> {
-    if ending(path, &BOXES_OR_PAIRS)? == "csv" {
-        return write_csv(path, "a,b", pairs.iter().map(|p| format!("{},{}", p.a, p.b)));
-    }
-    let flat = pairs.iter().flat_map(|p| [p.a, p.b]).collect();
-    let array = Array2::from_shape_vec((pairs.len(), 2), flat).map_err(|error| at(path, error))?;
-    ndarray_npy::write_npy(path, &array).map_err(|error| at(path, error))
-}
-
-/// A text file of a header and lines.
-pub fn write_csv(path: &Path, header: &str, lines: impl IntoIterator<Item = String>) -> Result<(), String> {
-    ending(path, &["csv"])?;
-    let write = || -> std::io::Result<()> {
-        let mut file = BufWriter::new(File::create(path)?);
-        writeln!(file, "{header}")?;
-        for line in lines {
-            writeln!(file, "{line}")?;
-        }
-        file.flush()
-    };
-    write().map_err(|error| at(path, error))
+/// Returns the message about more boxes than [`MAX_BOXES`].
+fn too_many(boxes: impl fmt::Display, limit: u64) -> String {
+    format!("{boxes} boxes are more than {limit}; for more, use the crate pbig-core with larger `Limits`")
 }

@@ -59,11 +59,16 @@ pub fn print(text: &str) -> Result<(), Failure> {
     }
 }
 
+/// Prints to stderr, for what stdout must not hold.
+pub fn print_aside(text: &str) {
+    // Nothing is left to do if stderr is closed.
+    _ = std::io::stderr().write_all(format!("{text}\n").as_bytes());
+}
+
 /// Ends a program: an error is one line on stderr.
 pub fn finish(program: &str, result: Result<(), Failure>) -> ExitCode {
     let Err(failure) = result else { return ExitCode::SUCCESS };
-    // Nothing is left to do if stderr is closed too.
-    _ = std::io::stderr().write_all(format!("{program}: {failure}\n").as_bytes());
+    print_aside(&format!("{program}: {failure}"));
     failure.code()
 }
 

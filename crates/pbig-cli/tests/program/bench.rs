@@ -85,7 +85,8 @@ fn studies_are_named_where_their_program_is_not_beside_this_one() {
     std::fs::copy(env!("CARGO_BIN_EXE_pbig"), &alone).expect("a copy");
     let run = |args: &[&str]| std::process::Command::new(&alone).args(args).output().expect("it starts");
     let studies = "cargo run --release -p pbig-studies --";
-    refused(&run(&["bench", "papers", "--quick"]), &[&format!("{studies} papers --quick")]);
+    let build = "build it with `cargo build --release -p pbig-studies`";
+    refused(&run(&["bench", "papers", "--quick"]), &[build, &format!("{studies} papers --quick")]);
     let steady = run(&["bench", "steady", "--boxes", "10,20", "--write", "out"]);
     refused(&steady, &[&format!("{studies} steady --write out --boxes 10,20")]);
     refused(&run(&["accuracy", "--only", "index"]), &[&format!("{studies} accuracy --only index")]);

@@ -1,6 +1,7 @@
 //! The program `pbig` as other programs see it: files, JSON, exit status, one line on stderr.
 
 mod bench;
+mod files;
 mod refused;
 mod replay;
 mod usage;
@@ -132,7 +133,7 @@ fn f64_boxes_are_rounded_outward() {
 fn no_boxes_at_all() {
     let folder = tempfile::tempdir().expect("a folder");
     save(folder.path(), "none.npy", &Array2::<f32>::zeros((0, 6)));
-    std::fs::write(folder.path().join("none.csv"), "").expect("written");
+    std::fs::write(folder.path().join("none.csv"), "\n").expect("written");
     for input in ["none.npy", "none.csv"] {
         let object = json(&pbig(folder.path(), &["pairs", input, "-o", "out.npy", "--json"]));
         assert_eq!(object["pairs"], 0);

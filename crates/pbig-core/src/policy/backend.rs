@@ -54,7 +54,7 @@ impl fmt::Display for NoGpu {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
             Self::NotBuilt => "this build has no GPU backend",
-            Self::NotGiven => "no device was given",
+            Self::NotGiven => "none was asked for",
             Self::Software => "the given device is software",
             Self::FewChanged => "too few boxes have changed",
             Self::OldBoxesUnknown => "the boxes of the last update are not known",

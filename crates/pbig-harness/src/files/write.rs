@@ -1,0 +1,74 @@
+//! Files that the program `pbig` writes.
+
+use super::{BOXES_OR_PAIRS, at, ending};
+use ndarray::Array2;
+use pbig_core::Pair;
+use std::fs::File;
+use std::io::{self, BufWriter, ErrorKind, Write};
+use std::path::Path;
+
+/// Returns true for `-`, the name of stdout.
+pub fn is_stdout(path: &Path) -> bool {
+    path == "-"
+}
+
+/// Checks, before the work, that an output has a known ending and is not the input.
+pub fn check_output(output: &Path, known: &[&str], input: &Path) -> Result<(), String> {
+    if is_stdout(output) {
+        return Ok(());
+    }
+    ending(output, known)?;
+    match is_same_file(output, input) {
+        true => Err(at(output, format!("-o names the input, {}; name another file", input.display()))),
+        false => Ok(()),
+    }
+}
+
+/// Returns true if two paths lead to one file, also through links.
+fn is_same_file(a: &Path, b: &Path) -> bool {
+    matches!((identity(a), identity(b)), (Ok(a), Ok(b)) if a == b)
+}
+
+#[cfg(unix)]
+fn identity(path: &Path) -> io::Result<(u64, u64)> {
+    use std::os::unix::fs::MetadataExt;
+    std::fs::metadata(path).map(|about| (about.dev(), about.ino()))
+}
+
+#[cfg(not(unix))]
+fn identity(path: &Path) -> io::Result<std::path::PathBuf> {
+    path.canonicalize()
+}
+
+/// Pairs as `.npy` (K,2) uint32 or `.csv`.
+pub fn write_pairs(path: &Path, pairs: &[Pair]) -> Result<(), String> {
+    if is_stdout(path) || ending(path, &BOXES_OR_PAIRS)? == "csv" {
+        return write_csv(path, "a,b", pairs.iter().map(|p| format!("{},{}", p.a, p.b)));
+    }
+    let flat = pairs.iter().flat_map(|p| [p.a, p.b]).collect();
+    let array = Array2::from_shape_vec((pairs.len(), 2), flat).map_err(|error| at(path, error))?;
+    ndarray_npy::write_npy(path, &array).map_err(|error| at(path, error))
+}
+
+/// A text file of a header and lines, or these on stdout.
+pub fn write_csv(path: &Path, header: &str, lines: impl IntoIterator<Item = String>) -> Result<(), String> {
+    if is_stdout(path) {
+        return match write_lines(io::stdout().lock(), header, lines) {
+            // A reader that has gone away (`| head`) is no failure.
+            Err(error) if error.kind() != ErrorKind::BrokenPipe => Err(at(Path::new("stdout"), error)),
+            _ => Ok(()),
+        };
+    }
+    ending(path, &["csv"])?;
+    let written = File::create(path).and_then(|file| write_lines(file, header, lines));
+    written.map_err(|error| at(path, error))
+}
+
+fn write_lines(to: impl Write, header: &str, lines: impl IntoIterator<Item = String>) -> io::Result<()> {
+    let mut to = BufWriter::new(to);
+    writeln!(to, "{header}")?;
+    for line in lines {
+        writeln!(to, "{line}")?;
+    }
+    to.flush()
+}
