@@ -12,6 +12,8 @@ pub enum SceneQuery {
     Sweep(Aabb, [f32; 3], f32),
     /// Those within a distance of a point.
     Near([f32; 3], f32),
+    /// Those that overlap a box.
+    Overlap(Aabb),
 }
 
 /// The index, and the changes that it does not know.
@@ -72,6 +74,7 @@ impl SceneIndex {
             match *query {
                 SceneQuery::Sweep(start, velocity, time) => index.sweep(&start, velocity, time, visit),
                 SceneQuery::Near(point, distance) => index.near(point, distance, visit),
+                SceneQuery::Overlap(aabb) => index.sweep(&aabb, [0.0; 3], 0.0, visit),
             };
             index.wants_sort()
         };

@@ -15,8 +15,9 @@ pub mod output;
 pub mod pair_index;
 pub mod pbig_grid;
 pub mod prelude;
+pub mod queries;
 pub mod report;
 pub mod runner;
 pub mod table;
 
-pub use pbig_scenes::{scenes, world};
+pub use pbig_scenes::{frames, scenes, world};

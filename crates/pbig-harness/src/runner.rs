@@ -1,5 +1,8 @@
-//! Runs a scene step by step, measures the broad phase and the whole step, and checks the pairs where that is wanted.
+//! Runs a scene step by step, measures the broad phase, the whole step and the scene queries after it, and checks the pairs where
+//! that is wanted.
 
+use crate::frames::FrameKind;
+use crate::queries::{Answer, FrameQueries};
 use crate::scenes::Scene;
 use crate::world::World;
 use rapier_pbig::shadow::{Call, Checker, Difference, ReplayError, Shadow, Watcher, write_frames};
@@ -79,13 +82,17 @@ impl<B: BroadPhase> BroadPhase for Timed<B> {
     }
 }
 
-/// Milliseconds of one step, without its checks.
+/// Milliseconds of one frame, without its checks.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct StepTime {
     /// Inside the broad phase, all its calls.
     pub broad_phase: f64,
     /// Time of the whole step, the broad phase included.
     pub step: f64,
+    /// Scene queries after the step, with the upkeep of an index that the first of them causes.
+    pub queries: f64,
+    /// The step and the queries.
+    pub frame: f64,
 }
 
 /// A scene being run with one broad phase.
@@ -96,12 +103,25 @@ pub struct Run<B> {
     pub broad_phase: Timed<B>,
     /// One for each step so far.
     pub times: Vec<StepTime>,
+    /// Hits of all queries so far.
+    pub hits: u64,
+    queries: Option<FrameQueries>,
 }
 
 impl<B: BroadPhase> Run<B> {
     /// Builds the scene.
     pub fn new(scene: Scene, bodies: usize, seed: u64, broad_phase: B) -> Self {
-        Self { world: scene.build(bodies, seed), broad_phase: Timed::new(broad_phase), times: Vec::new() }
+        Self::in_world(scene.build(bodies, seed), broad_phase)
+    }
+
+    /// Takes a world that has been built.
+    pub fn in_world(world: World, broad_phase: B) -> Self {
+        Self { world, broad_phase: Timed::new(broad_phase), times: Vec::new(), hits: 0, queries: None }
+    }
+
+    /// Adds scene queries to each [`Run::frame`].
+    pub fn with_queries(self, kind: FrameKind) -> Self {
+        Self { queries: FrameQueries::new(kind, &self.world), ..self }
     }
 
     /// Adds a checker, see [`Timed::checked`].
@@ -126,7 +146,7 @@ impl<B: BroadPhase> Run<B> {
         self.world.step(&mut self.broad_phase);
         let step = milliseconds(clock.elapsed() - std::mem::take(&mut self.broad_phase.checking));
         let broad_phase = milliseconds(self.broad_phase.take());
-        self.times.push(StepTime { broad_phase, step });
+        self.times.push(StepTime { broad_phase, step, queries: 0.0, frame: step });
     }
 
     /// Pairs that the narrow phase knows: edges of contacts and of intersections.
@@ -140,6 +160,18 @@ impl<B: BroadPhase> Run<B> {
         self.broad_phase.first_difference()?;
         let file = folder.join(format!("pbig-{scene}-{}-failed.npy", self.times.len()));
         Some(write_frames(&file, &self.broad_phase.checker()?.frames).map(|()| file))
+    }
+}
+
+impl<B: BroadPhase + Answer> Run<B> {
+    /// One step and its scene queries, measured.
+    pub fn frame(&mut self) {
+        self.step();
+        let (Some(queries), Some(time)) = (&mut self.queries, self.times.last_mut()) else { return };
+        let clock = Instant::now();
+        self.hits += queries.ask(&self.world, &self.broad_phase.inner);
+        time.queries = milliseconds(clock.elapsed());
+        time.frame += time.queries;
     }
 }
 
@@ -180,6 +212,19 @@ impl fmt::Display for Spread {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_frame_is_a_step_and_its_queries() {
+        for (kind, has_queries) in [(FrameKind::None, false), (FrameKind::Rays100, true)] {
+            let scene = Scene::named("column").expect("the scene exists");
+            let mut run = Run::new(scene, 50, 1, DefaultBroadPhase::new()).with_queries(kind);
+            (0..5).for_each(|_| run.frame());
+            assert_eq!((run.times.len(), run.hits > 0), (5, has_queries));
+            for time in &run.times {
+                assert_eq!((time.frame, time.queries > 0.0), (time.step + time.queries, has_queries));
+            }
+        }
+    }
 
     #[test]
     fn spread_by_hand() {

@@ -1,6 +1,10 @@
-//! Scenes of rapier by name, number of bodies and seed, for the harness, a viewer and a web page. Nothing here draws, starts
-//! a thread or reads a clock, so all of it builds for wasm32-unknown-unknown.
+//! Scenes of rapier by name, number of bodies and seed, and the scene queries of a frame, for the harness, a viewer and a web page.
+//! Nothing here draws, starts a thread or reads a clock, so all of it builds for wasm32-unknown-unknown.
 
+pub mod frames;
+#[cfg(feature = "rapier")]
 pub mod scenes;
+#[cfg(feature = "rapier")]
 pub mod stock;
+#[cfg(feature = "rapier")]
 pub mod world;

@@ -1,6 +1,7 @@
 //! The program `pbig-studies`: numbers as tables, one JSON object, or files.
 
 use clap::{Parser, Subcommand};
+use pbig_harness::frames::FrameKind;
 use pbig_harness::output::{Failure, finish, print, tracked};
 use pbig_harness::report::Report;
 use pbig_studies::{accuracy, papers, peers, stages, steady, whole_steps};
@@ -40,7 +41,12 @@ enum Command {
         boxes: Vec<usize>,
     },
     /// Whole steps of rapier with its own broad phase and with pbig's, of every scene.
-    WholeSteps,
+    WholeSteps {
+        /// Scene queries after each step, several kinds separated by commas: none, ray, rays-100, rays-10000, cast, character,
+        /// boxes or point.
+        #[arg(long, value_name = "KIND", value_delimiter = ',', default_value = "none", value_parser = FrameKind::named)]
+        queries: Vec<FrameKind>,
+    },
     /// Run time against error.
     Accuracy {
         /// This study alone.
@@ -59,7 +65,7 @@ fn run(cli: &Cli) -> Result<(), Failure> {
         Command::Stages => stages::run(cli.quick)?,
         Command::Peers => peers::run(cli.quick)?,
         Command::Steady { boxes } => steady::run(cli.quick, boxes)?,
-        Command::WholeSteps => whole_steps::run(cli.quick),
+        Command::WholeSteps { queries } => whole_steps::run(cli.quick, queries),
         Command::Accuracy { only } => return run_accuracy(cli, only.as_deref()),
     };
     report.finish(cli.json, cli.write.as_deref())

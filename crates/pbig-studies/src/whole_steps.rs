@@ -1,7 +1,10 @@
-//! Whole steps of rapier: each scene in two worlds, one with rapier's own broad phase and one with pbig's, step by step in turn.
+//! Whole steps of rapier, with scene queries where they are wanted: each scene in two worlds, one with rapier's own broad phase and
+//! one with pbig's, frame by frame in turn.
 
 use pbig_harness::bench::summary;
+use pbig_harness::frames::FrameKind;
 use pbig_harness::prelude::*;
+use pbig_harness::queries::Answer;
 use pbig_harness::runner::{Run, StepTime};
 use pbig_harness::scenes::Scene;
 use rapier_pbig::PbigBroadPhase;
@@ -13,47 +16,54 @@ const SIZES: [(usize, u64); 3] = [(1000, 4), (10_000, 1), (100_000, 1)];
 
 /// The columns have the names of those for rapier 0.36.1. Each world's first step is left out: in it everything is new.
 const COLUMNS: &str = "scene | bodies | threads | steps | stock_broad_mean_ms | pbig_broad_mean_ms | stock_broad_p99_ms | \
-    pbig_broad_p99_ms | stock_step_mean_ms | pbig_step_mean_ms | stock_step_p99_ms | pbig_step_p99_ms | stock_pairs | pbig_pairs";
+    pbig_broad_p99_ms | stock_step_mean_ms | pbig_step_mean_ms | stock_step_p99_ms | pbig_step_p99_ms | stock_pairs | \
+    pbig_pairs | queries | stock_frame_mean_ms | pbig_frame_mean_ms | stock_frame_median_ms | pbig_frame_median_ms | \
+    stock_frame_p99_ms | pbig_frame_p99_ms | stock_queries_mean_ms | pbig_queries_mean_ms | stock_over_pbig_frame_mean | \
+    stock_hits | pbig_hits";
 
-/// Times and pairs at the end, of all worlds together: with rapier's own broad phase, and with pbig's.
+/// Times, pairs at the end and hits, of all worlds together: with rapier's own broad phase, and with pbig's.
 #[derive(Default)]
 struct Both {
     times: [Vec<StepTime>; 2],
     pairs: [usize; 2],
+    hits: [u64; 2],
 }
 
-/// Measures every scene.
-pub fn run(quick: bool) -> Report {
+/// Measures every scene with each kind of scene queries.
+pub fn run(quick: bool, kinds: &[FrameKind]) -> Report {
     let (sizes, steps, limit) = if quick { (&[(20, 1)][..], 20, 1) } else { (&SIZES[..], 300, 15) };
     let mut table = Table::new("whole-steps", COLUMNS);
     let cases = sizes.iter().flat_map(|size| Scene::ALL.map(|scene| (scene, *size)));
-    for (scene, (bodies, seeds)) in tracked(cases, "scenes") {
+    let cases = cases.flat_map(|(scene, size)| kinds.iter().map(move |kind| (scene, size, *kind)));
+    for (scene, (bodies, seeds), kind) in tracked(cases, "scenes") {
         let mut both = Both::default();
         for seed in 1..=seeds {
-            let mut stock = Run::new(scene, bodies, seed, DefaultBroadPhase::new());
-            let mut ours = Run::new(scene, bodies, seed, PbigBroadPhase::new());
+            let mut stock = Run::new(scene, bodies, seed, DefaultBroadPhase::new()).with_queries(kind);
+            let mut ours = Run::new(scene, bodies, seed, PbigBroadPhase::new()).with_queries(kind);
             race(&mut stock, &mut ours, steps, Duration::from_secs(limit));
             both.add(0, &stock);
             both.add(1, &ours);
         }
-        let (threads, steps) = (rayon::current_num_threads(), both.times[0].len());
-        let [broad, whole] = [both.figures(|time| time.broad_phase), both.figures(|time| time.step)];
-        table.row(cells![scene.name, bodies, threads, steps, ..broad, ..whole, ..both.pairs]);
+        table.row(both.row(scene, bodies, kind));
     }
     Report::new("whole-steps", vec![table])
 }
 
-/// Steps both worlds, until the time after the first step is over. Each goes first in every other step, as the first one warms
-/// the caches.
-fn race<A: BroadPhase, B: BroadPhase>(one: &mut Run<A>, other: &mut Run<B>, steps: usize, limit: Duration) {
-    one.step();
-    other.step();
+/// Runs frames of both worlds, until the time after the first frame is over. Each goes first in every other frame, as the first one
+/// warms the caches.
+fn race<A, B>(one: &mut Run<A>, other: &mut Run<B>, steps: usize, limit: Duration)
+where
+    A: BroadPhase + Answer,
+    B: BroadPhase + Answer,
+{
+    one.frame();
+    other.frame();
     let clock = Instant::now();
     for _ in 0..steps.div_ceil(2) {
-        other.step();
-        one.step();
-        one.step();
-        other.step();
+        other.frame();
+        one.frame();
+        one.frame();
+        other.frame();
         if clock.elapsed() > limit {
             break;
         }
@@ -64,12 +74,25 @@ impl Both {
     fn add<B: BroadPhase>(&mut self, side: usize, run: &Run<B>) {
         self.times[side].extend(&run.times[1..]);
         self.pairs[side] += run.pairs();
+        self.hits[side] += run.hits;
     }
 
-    /// Returns means and 99th percentiles.
-    fn figures(&self, of: impl Fn(&StepTime) -> f64) -> [f64; 4] {
+    /// Returns a row of [`COLUMNS`].
+    fn row(&self, scene: Scene, bodies: usize, kind: FrameKind) -> Vec<Value> {
+        let (threads, steps) = (rayon::current_num_threads(), self.times[0].len());
+        let [means, medians, p99] = self.figures(|time| time.frame);
+        let [queries, ..] = self.figures(|time| time.queries);
+        let mean_and_p99 = |[mean, _, p99]: [[f64; 2]; 3]| [mean, p99].concat();
+        let broad = mean_and_p99(self.figures(|time| time.broad_phase));
+        let whole = mean_and_p99(self.figures(|time| time.step));
+        let mut row = cells![scene.name, bodies, threads, steps, ..broad, ..whole, ..self.pairs, kind.name()];
+        row.extend(cells![..means, ..medians, ..p99, ..queries, means[0] / means[1], ..self.hits]);
+        row
+    }
+
+    /// Returns means, medians and 99th percentiles, each of both sides.
+    fn figures(&self, of: impl Fn(&StepTime) -> f64) -> [[f64; 2]; 3] {
         let sides = self.times.each_ref().map(|times| summary(&times.iter().map(&of).collect::<Vec<_>>()));
-        let [[stock_mean, _, stock_p99, _], [mean, _, p99, _]] = sides;
-        [stock_mean, mean, stock_p99, p99]
+        [0, 1, 2].map(|figure| sides.map(|side| side[figure]))
     }
 }

@@ -1,5 +1,6 @@
 //! Each study once, at small sizes: what must be right is, whatever the times.
 
+use pbig_harness::frames::FrameKind;
 use pbig_harness::motions::Motion;
 use pbig_harness::prelude::*;
 use pbig_harness::scenes::Scene;
@@ -100,15 +101,18 @@ fn steady_has_every_motion() {
 
 #[test]
 fn whole_steps_have_every_scene_and_the_broad_phase_is_a_part() {
-    let report = whole_steps::run(true);
+    let report = whole_steps::run(true, &[FrameKind::None, FrameKind::Rays100]);
     let table = &report.tables[0];
-    assert_eq!(table.rows.len(), Scene::ALL.len());
+    assert_eq!(table.rows.len(), 2 * Scene::ALL.len());
     for side in ["stock", "pbig"] {
         let [broad, whole] = ["broad", "step"].map(|part| table.numbers(&format!("{side}_{part}_mean_ms")));
         assert!(
             broad.iter().zip(&whole).all(|(broad, whole)| 0.0 < *broad && broad < whole),
             "{broad:?} {whole:?}"
         );
+        let of = |kind: &str, column: &str| numbers(table, kind, &format!("{side}_{column}"));
+        assert_eq!(of("none", "frame_mean_ms"), of("none", "step_mean_ms"));
+        assert!(all_zero(&of("none", "hits")) && of("rays-100", "hits").iter().all(|hits| *hits > 0.0));
     }
 }
 

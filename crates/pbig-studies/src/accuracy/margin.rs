@@ -6,7 +6,7 @@ use crate::UNLIMITED;
 use crate::reported::Reported;
 use pbig_core::{Aabb, BroadPhase, Error, Finder, Pair, ProxyFilter};
 use pbig_harness::prelude::*;
-use pbig_harness::runner::{Run, Timed};
+use pbig_harness::runner::Run;
 use pbig_harness::scenes::Scene;
 use pbig_harness::world::World;
 use rapier_pbig::{PbigBroadPhase, PbigConfig};
@@ -231,7 +231,7 @@ impl Worlds {
             let config = PbigConfig { margin: margin as f32, ..PbigConfig::DEFAULT };
             let mut broad_phase = PbigBroadPhase::with_config(config).expect("a length");
             broad_phase.adopt(&world.narrow_phase);
-            Ok(Run { world, broad_phase: Timed::new(broad_phase), times: vec![] })
+            Ok(Run::in_world(world, broad_phase))
         };
         MARGINS.iter().map(run).collect::<Result<_, _>>().map(Self)
     }

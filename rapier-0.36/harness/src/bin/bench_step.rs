@@ -1,6 +1,7 @@
-//! Whole steps of rapier 0.36.1 with its own broad phase and with pbig, in turn: `cargo run --release --bin bench_step -- --help`.
+//! Frames of rapier 0.36.1 with its own broad phase and with pbig, in turn: `cargo run --release --bin bench_step -- --help`.
 
 use clap::Parser;
+use pbig_harness_036::frames::FrameKind;
 use pbig_harness_036::run::{Run, StepTime, Summary};
 use pbig_harness_036::scenes::Scene;
 use rapier3d::prelude::BroadPhaseBvh;
@@ -10,7 +11,7 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 use std::time::{Duration, Instant};
 
-/// Whole steps of rapier 0.36.1, with its own broad phase ("stock") and with pbig, step by step in turn.
+/// Frames of rapier 0.36.1, with its own broad phase ("stock") and with pbig, in turn: a whole step, and scene queries.
 #[derive(Parser)]
 struct Args {
     /// Bodies, several separated by commas.
@@ -19,10 +20,14 @@ struct Args {
     /// Scenes, several separated by commas; all by default.
     #[arg(long, value_delimiter = ',', value_parser = Scene::named)]
     scenes: Vec<Scene>,
+    /// Scene queries after each step, several kinds separated by commas: none, ray, rays-100, rays-10000, cast, character,
+    /// boxes or point.
+    #[arg(long, value_name = "KIND", value_delimiter = ',', default_value = "none", value_parser = FrameKind::named)]
+    queries: Vec<FrameKind>,
     /// Steps of 1/60 s.
     #[arg(long, default_value_t = 300)]
     steps: usize,
-    /// Seconds for each scene after its first step, which is not counted.
+    /// Seconds for each row after the first step, which is not counted.
     #[arg(long, default_value_t = 60)]
     seconds: u64,
     /// Where to write all rows (CSV).
@@ -33,7 +38,13 @@ struct Args {
 /// The heading of the CSV file. With fewer than 100 steps p99 is the worst step.
 const HEADING: &str = "scene,bodies,threads,steps,stock_broad_mean_ms,pbig_broad_mean_ms,stock_broad_median_ms,\
 pbig_broad_median_ms,stock_broad_p99_ms,pbig_broad_p99_ms,stock_step_mean_ms,pbig_step_mean_ms,stock_step_median_ms,\
-pbig_step_median_ms,stock_step_p99_ms,pbig_step_p99_ms,stock_pairs,pbig_pairs";
+pbig_step_median_ms,stock_step_p99_ms,pbig_step_p99_ms,stock_pairs,pbig_pairs,queries,stock_frame_mean_ms,\
+pbig_frame_mean_ms,stock_frame_median_ms,pbig_frame_median_ms,stock_frame_p99_ms,pbig_frame_p99_ms,\
+stock_queries_mean_ms,pbig_queries_mean_ms,stock_over_pbig_frame_mean,stock_hits,pbig_hits";
+
+/// The heading on the terminal: means, and ratios of stock to pbig.
+const SHOWN: &str = "scene        bodies queries     steps   broad phase, ms: stock   pbig      x   p99 x   step, ms: stock   \
+pbig      x median x   queries, ms: stock   pbig   frame, ms: stock   pbig      x median x   p99 x";
 
 /// The threads that rapier uses.
 const THREADS: &str = if cfg!(feature = "parallel") { "2" } else { "1" };
@@ -43,14 +54,12 @@ fn main() -> ExitCode {
     if args.scenes.is_empty() {
         args.scenes = Scene::ALL.to_vec();
     }
-    println!(
-        "scene        bodies  steps   broad phase, ms: stock   pbig      x   p99 x   step, ms: stock   pbig      x median x"
-    );
+    println!("{SHOWN}");
     let mut rows = vec![HEADING.to_string()];
-    for &bodies in &args.bodies {
-        for &scene in &args.scenes {
-            rows.push(measure(scene, bodies, &args));
-        }
+    for case in cases(&args) {
+        let sides = case.measure(&args);
+        case.show(&sides);
+        rows.push(case.row(&sides));
     }
     match args.write.map(|file| File::create(&file).and_then(|mut out| writeln!(out, "{}", rows.join("\n"))))
     {
@@ -62,42 +71,106 @@ fn main() -> ExitCode {
     }
 }
 
-fn measure(scene: Scene, bodies: usize, args: &Args) -> String {
-    let mut stock = Run::new(scene, bodies, 1, BroadPhaseBvh::new());
-    let mut ours = Run::new(scene, bodies, 1, rapier_pbig::broad_phase());
-    // In the first step everything is new. It is not counted.
-    stock.step();
-    ours.step();
-    let (clock, limit) = (Instant::now(), Duration::from_secs(args.seconds));
-    for step in 0..args.steps {
-        // Each goes first in every other step.
-        let [first, second] = if step % 2 == 0 { [&mut stock, &mut ours] } else { [&mut ours, &mut stock] };
-        first.step();
-        second.step();
-        if clock.elapsed() > limit {
-            break;
+fn cases(args: &Args) -> impl Iterator<Item = Case> {
+    args.bodies.iter().flat_map(move |&bodies| {
+        let of = move |scene| args.queries.iter().map(move |&queries| Case { scene, bodies, queries });
+        args.scenes.iter().copied().flat_map(of)
+    })
+}
+
+/// The subject of a row.
+struct Case {
+    scene: Scene,
+    bodies: usize,
+    queries: FrameKind,
+}
+
+/// The measured values of one broad phase.
+struct Side {
+    broad: Summary,
+    step: Summary,
+    queries: Summary,
+    frame: Summary,
+    steps: usize,
+    pairs: usize,
+    hits: u64,
+}
+
+impl Side {
+    /// Summarizes all frames but the first, in which everything is new.
+    fn of(run: &Run) -> Self {
+        let of = |time: fn(&StepTime) -> f64| Summary::of(run.times[1..].iter().map(time));
+        Self {
+            broad: of(|time| time.broad_phase),
+            step: of(|time| time.step),
+            queries: of(|time| time.queries),
+            frame: of(|time| time.frame),
+            steps: run.times.len() - 1,
+            pairs: run.pairs(),
+            hits: run.hits,
         }
     }
-    let of = |run: &Run, time: fn(&StepTime) -> f64| Summary::of(run.times[1..].iter().map(time));
-    let [stock_broad, ours_broad] = [&stock, &ours].map(|run| of(run, |time| time.broad_phase));
-    let [stock_step, ours_step] = [&stock, &ours].map(|run| of(run, |time| time.step));
-    println!(
-        "{:<12} {bodies:>6} {:>6} {:>24.3} {:>6.3} {:>5.2}x {:>6.2}x {:>17.3} {:>6.3} {:>5.2}x {:>7.2}x",
-        scene.name,
-        ours.times.len() - 1,
-        stock_broad.mean,
-        ours_broad.mean,
-        stock_broad.mean / ours_broad.mean,
-        stock_broad.p99 / ours_broad.p99,
-        stock_step.mean,
-        ours_step.mean,
-        stock_step.mean / ours_step.mean,
-        stock_step.median / ours_step.median,
-    );
-    let sides = |[a, b]: [Summary; 2]| {
-        [a.mean, b.mean, a.median, b.median, a.p99, b.p99].map(|ms| format!("{ms:.4}")).join(",")
-    };
-    let (broad, step) = (sides([stock_broad, ours_broad]), sides([stock_step, ours_step]));
-    let (steps, pairs) = (ours.times.len() - 1, format!("{},{}", stock.pairs(), ours.pairs()));
-    format!("{},{bodies},{THREADS},{steps},{broad},{step},{pairs}", scene.name)
+}
+
+impl Case {
+    /// Returns stock and pbig.
+    fn measure(&self, args: &Args) -> [Side; 2] {
+        let [mut stock, mut ours] = [BroadPhaseBvh::new(), rapier_pbig::broad_phase()]
+            .map(|one| Run::new(self.scene, self.bodies, 1, one).with_queries(self.queries));
+        stock.step();
+        ours.step();
+        let (clock, limit) = (Instant::now(), Duration::from_secs(args.seconds));
+        for step in 0..args.steps {
+            // Each goes first in every other step.
+            let [first, second] =
+                if step % 2 == 0 { [&mut stock, &mut ours] } else { [&mut ours, &mut stock] };
+            first.step();
+            second.step();
+            if clock.elapsed() > limit {
+                break;
+            }
+        }
+        [&stock, &ours].map(Side::of)
+    }
+
+    fn show(&self, [stock, ours]: &[Side; 2]) {
+        let times = |of: fn(&Side) -> f64| of(stock) / of(ours);
+        print!("{:<12} {:>6} {:<10} {:>6} ", self.scene.name, self.bodies, self.queries.name(), ours.steps);
+        print!("{:>24.3} {:>6.3} ", stock.broad.mean, ours.broad.mean);
+        print!("{:>5.2}x {:>6.2}x ", times(|side| side.broad.mean), times(|side| side.broad.p99));
+        print!("{:>17.3} {:>6.3} ", stock.step.mean, ours.step.mean);
+        print!("{:>5.2}x {:>7.2}x ", times(|side| side.step.mean), times(|side| side.step.median));
+        print!("{:>20.3} {:>6.3} ", stock.queries.mean, ours.queries.mean);
+        print!("{:>18.3} {:>6.3} ", stock.frame.mean, ours.frame.mean);
+        print!("{:>5.2}x {:>7.2}x ", times(|side| side.frame.mean), times(|side| side.frame.median));
+        println!("{:>6.2}x", times(|side| side.frame.p99));
+    }
+
+    /// Returns a line of the CSV file, see [`HEADING`].
+    fn row(&self, sides: &[Side; 2]) -> String {
+        let [stock, ours] = sides;
+        let [broad, step, frame] = [
+            columns(sides, |side| three(side.broad)),
+            columns(sides, |side| three(side.step)),
+            columns(sides, |side| three(side.frame)),
+        ];
+        let queries = columns(sides, |side| [side.queries.mean]);
+        let ratio = stock.frame.mean / ours.frame.mean;
+        let (scene, bodies, kind) = (self.scene.name, self.bodies, self.queries.name());
+        let (pairs, hits) = ([stock.pairs, ours.pairs], [stock.hits, ours.hits]);
+        let start = format!("{scene},{bodies},{THREADS},{},{broad},{step}", ours.steps);
+        let end = format!("{frame},{queries},{ratio:.4},{},{}", hits[0], hits[1]);
+        format!("{start},{},{},{kind},{end}", pairs[0], pairs[1])
+    }
+}
+
+fn three(summary: Summary) -> [f64; 3] {
+    [summary.mean, summary.median, summary.p99]
+}
+
+/// Returns values of stock and pbig side by side.
+fn columns<const N: usize>(sides: &[Side; 2], of: fn(&Side) -> [f64; N]) -> String {
+    let [stock, ours] = sides.each_ref().map(of);
+    let pairs = stock.iter().zip(ours).map(|(stock, ours)| format!("{stock:.4},{ours:.4}"));
+    pairs.collect::<Vec<_>>().join(",")
 }

@@ -71,8 +71,8 @@ impl PairFinder for Planted {
         self.finder.tree()
     }
 
-    fn intersect_aabb(&self, aabb: &Aabb, found: &mut dyn FnMut(u32)) {
-        self.finder.intersect_aabb(aabb, found);
+    fn visit(&self, query: &SceneQuery, visit: &mut dyn FnMut(u32) -> Real) {
+        self.finder.visit(query, visit);
     }
 
     fn state(&self) -> (Vec<(ColliderHandle, Aabb)>, Vec<(ColliderHandle, ColliderHandle)>) {

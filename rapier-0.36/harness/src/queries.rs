@@ -1,0 +1,93 @@
+//! The scene queries of each frame, put to rapier.
+
+use crate::frames::{
+    AREA_RADIUS_METRES, CAPSULE_HALF_HEIGHT_METRES, CAPSULE_RADIUS_METRES, CAST_RADIUS_METRES, Extent,
+    FRAME_SECONDS, FrameKind, MAX_DISTANCE_METRES, MAX_PROJECTION_METRES, Query,
+};
+use crate::world::{World, pose, to_point, to_vector};
+use glam::Vec3;
+use rapier3d::control::KinematicCharacterController;
+use rapier3d::parry::query::ShapeCastOptions;
+use rapier3d::prelude::*;
+
+/// The queries of one frame after the other.
+pub struct FrameQueries {
+    kind: FrameKind,
+    extent: Extent,
+    frame: u64,
+    character: Vec3,
+}
+
+impl FrameQueries {
+    /// Begins at the first frame, in a world that has not made a step. Returns nothing for a kind without queries: a frame
+    /// must not touch the broad phase then, because its index may wait for a first query.
+    pub fn new(kind: FrameKind, world: &World) -> Option<Self> {
+        let extent = extent(world);
+        let queries = Self { kind, extent, frame: 0, character: extent.character_start() };
+        (kind != FrameKind::None).then_some(queries)
+    }
+
+    /// Asks the queries of the next frame, and returns the number of hits.
+    pub fn ask(&mut self, world: &World, broad_phase: &BroadPhaseBvh) -> u64 {
+        let World { bodies, colliders, narrow_phase, .. } = world;
+        let filter = QueryFilter::default();
+        let queries =
+            broad_phase.as_query_pipeline(narrow_phase.query_dispatcher(), bodies, colliders, filter);
+        let hits = self.hits(&queries);
+        self.frame += 1;
+        hits
+    }
+
+    fn hits(&mut self, queries: &QueryPipeline<'_>) -> u64 {
+        let hits_of: fn(&QueryPipeline<'_>, Query) -> usize = match self.kind {
+            FrameKind::None => return 0,
+            FrameKind::Character => return self.walk(queries),
+            FrameKind::Ray | FrameKind::Rays100 | FrameKind::Rays10000 => ray,
+            FrameKind::Cast => cast,
+            FrameKind::Boxes => area,
+            FrameKind::Point => point,
+        };
+        self.extent.queries(self.kind, self.frame).map(|query| hits_of(queries, query) as u64).sum()
+    }
+
+    /// Moves the character, and returns its collisions.
+    fn walk(&mut self, queries: &QueryPipeline<'_>) -> u64 {
+        let capsule = Capsule::new_y(CAPSULE_HALF_HEIGHT_METRES, CAPSULE_RADIUS_METRES);
+        let (at, wanted) = (pose(self.character), to_vector(self.extent.character_motion(self.frame)));
+        let (controller, mut collisions) = (KinematicCharacterController::default(), 0);
+        let count = |_| collisions += 1;
+        let moved = controller.move_shape(FRAME_SECONDS, queries, &capsule, &at, wanted, count);
+        let way = moved.translation;
+        self.character += Vec3::new(way.x, way.y, way.z);
+        collisions
+    }
+}
+
+/// Returns the AABB around the colliders of all bodies that can move.
+fn extent(world: &World) -> Extent {
+    let can_move = |collider: &Collider| collider.parent().is_some_and(|body| !world.bodies[body].is_fixed());
+    let moving = world.colliders.iter().filter(|(_, collider)| can_move(collider));
+    Extent::around(moving.map(|(_, collider)| {
+        let aabb = collider.compute_aabb();
+        [aabb.mins, aabb.maxs].map(|corner| Vec3::new(corner.x, corner.y, corner.z))
+    }))
+}
+
+fn ray(queries: &QueryPipeline<'_>, query: Query) -> usize {
+    let ray = Ray::new(to_point(query.origin), to_vector(query.direction));
+    queries.cast_ray(&ray, MAX_DISTANCE_METRES, true).iter().count()
+}
+
+fn cast(queries: &QueryPipeline<'_>, query: Query) -> usize {
+    let (at, along) = (pose(query.origin), to_vector(query.direction));
+    let options = ShapeCastOptions::with_max_time_of_impact(MAX_DISTANCE_METRES);
+    queries.cast_shape(&at, along, &Ball::new(CAST_RADIUS_METRES), options).iter().count()
+}
+
+fn area(queries: &QueryPipeline<'_>, query: Query) -> usize {
+    queries.intersect_shape(pose(query.origin), &Ball::new(AREA_RADIUS_METRES)).count()
+}
+
+fn point(queries: &QueryPipeline<'_>, query: Query) -> usize {
+    queries.project_point(to_point(query.origin), MAX_PROJECTION_METRES, true).iter().count()
+}
