@@ -48,7 +48,8 @@ impl EventWriter {
         mut send: impl FnMut(PairEvent),
     ) -> (usize, usize) {
         let adopted = std::mem::take(&mut self.adopted);
-        let (known, ended): (Vec<_>, Vec<_>) = adopted.into_iter().partition(|pair| overlaps(pair, found, registry));
+        let (known, ended): (Vec<_>, Vec<_>) =
+            adopted.into_iter().partition(|pair| overlaps(pair, found, registry));
         let deleted = found.removed.len() + ended.len();
         for &pair in &found.removed {
             let [a, b] = handles(pair, registry);

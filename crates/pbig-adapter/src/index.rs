@@ -1,6 +1,7 @@
 //! Scene queries. They search an index of boxes, which the first of them builds; it is brought up to date by the first query
 //! after a change, and costs next to nothing while nobody asks.
 
+use crate::{Colliders, Tree};
 use pbig_core::{Aabb, BoxIndex, BroadPhase};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, PoisonError, RwLock};
@@ -14,6 +15,51 @@ pub enum SceneQuery {
     Near([f32; 3], f32),
     /// Those that overlap a box.
     Overlap(Aabb),
+}
+
+impl SceneQuery {
+    /// Returns the largest time or distance.
+    fn bound(&self) -> f32 {
+        match *self {
+            Self::Sweep(.., bound) | Self::Near(_, bound) => bound,
+            Self::Overlap(_) => 0.0,
+        }
+    }
+}
+
+impl<T: Tree> Colliders<T> {
+    /// Returns the indices of colliders whose boxes a query meets, sorted; some that it barely misses may be among them.
+    pub fn met(&self, query: &SceneQuery) -> Vec<u32> {
+        let mut met = Vec::new();
+        self.visit(query, &mut |index| {
+            met.push(index);
+            query.bound()
+        });
+        met.sort_unstable();
+        met
+    }
+
+    /// Returns the collider with the least cost below the query's bound, the one with the lowest index of several. `cost` also
+    /// gets the cost up to which it matters.
+    pub fn best<R>(
+        &self,
+        query: &SceneQuery,
+        cost: impl Fn(u32, f32) -> Option<(f32, R)>,
+    ) -> Option<(u32, R)> {
+        let (mut bound, mut best) = (query.bound(), None::<(u32, R)>);
+        self.visit(query, &mut |index| {
+            // A little more than the best so far, so that the order of visits decides no ties.
+            let reach = (bound * (1.0 + f32::EPSILON)).min(query.bound());
+            if let Some((found, result)) = cost(index, reach) {
+                let first = best.as_ref().map_or(0, |best| best.0);
+                if found < bound || found == bound && index < first {
+                    (bound, best) = (found, Some((index, result)));
+                }
+            }
+            bound
+        });
+        best
+    }
 }
 
 /// The index, and the changes that it does not know.
@@ -64,7 +110,8 @@ impl SceneIndex {
         }
     }
 
-    /// Visits the ids of the boxes that a query meets. `visit` returns the bound up to which more are wanted.
+    /// Visits the ids of the boxes that a query meets: first those at the start of the motion or around the point, sorted.
+    /// `visit` returns the bound up to which more are wanted.
     pub(crate) fn visit(&self, core: &BroadPhase, query: &SceneQuery, visit: &mut dyn FnMut(u32) -> f32) {
         if !self.is_fresh.load(Ordering::Acquire) {
             self.refresh(core);

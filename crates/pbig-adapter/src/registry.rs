@@ -70,11 +70,6 @@ impl ColliderRegistry {
     pub(crate) fn len(&self) -> usize {
         self.count
     }
-
-    /// Returns one more than the largest known index.
-    pub(crate) fn index_count(&self) -> usize {
-        self.generations.len()
-    }
 }
 
 #[cfg(test)]

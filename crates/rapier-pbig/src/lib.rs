@@ -65,10 +65,11 @@ pub use broad_phase::PbigBroadPhase;
 pub use config::PbigConfig;
 #[cfg(feature = "debug-render")]
 pub use debug_render::DebugRenderParts;
-#[cfg(feature = "shadow")]
-pub use shadow::Shadow;
 pub use pbig_adapter::{Backend, Error, Handle, Report, Stats, Totals, Why};
 #[cfg(feature = "gpu")]
 pub use pbig_core::GpuFinder;
+pub use queries::Queries;
 #[cfg(feature = "unstable-study")]
 pub use scene::{collision_aabb, filter_of};
+#[cfg(feature = "shadow")]
+pub use shadow::Shadow;

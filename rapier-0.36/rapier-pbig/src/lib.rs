@@ -56,11 +56,11 @@ pub use config::PbigConfig;
 #[cfg(feature = "debug-render")]
 pub use debug_render::DebugRenderParts;
 pub use finder::PbigFinder;
-#[cfg(feature = "shadow")]
-pub use shadow::{Shadow, differences};
 pub use pbig_adapter::{Backend, Error, Handle, Report, Stats, Totals, Why};
 #[cfg(feature = "gpu")]
 pub use pbig_core::GpuFinder;
+#[cfg(feature = "shadow")]
+pub use shadow::{Shadow, differences};
 
 use rapier3d::geometry::PairFinder; // "no `PairFinder`"? rapier3d is not the patched copy: see [patch.crates-io] in pbig/docs/RAPIER_VERSIONS.md
 use rapier3d::prelude::BroadPhaseBvh;

@@ -67,6 +67,8 @@ pub struct BoxIndex {
     /// By id: the lane of its box, or `NONE`.
     places: Vec<u32>,
     is_sorted: bool,
+    /// Boxes may have moved since the last sort.
+    has_moved: bool,
     /// Nodes that questions have looked at since the last sort.
     looked_at: AtomicU64,
 }
@@ -79,11 +81,12 @@ impl Clone for BoxIndex {
 }
 
 impl BoxIndex {
-    /// Visits the ids of boxes that a moving box meets between time 0 and `max_time`, about the earliest first. `start` is the
-    /// moving box at time 0 (a point for a ray), `velocity` its motion in a unit of time.
+    /// Visits the ids of boxes that a moving box meets between time 0 and `max_time`: those at time 0 first, by id, then the
+    /// others, about the earliest first. `start` is the moving box at time 0 (a point for a ray), `velocity` its motion in a
+    /// unit of time.
     ///
     /// `visit` returns the time until which further boxes are wanted; boxes that are met just after it may be visited as well.
-    /// No box is visited twice. A NaN in the question means that no box is visited.
+    /// After a time of 0 no box is wanted. No box is visited twice. A NaN in the question means that no box is visited.
     pub fn sweep(
         &self,
         start: &Aabb,
@@ -97,7 +100,8 @@ impl BoxIndex {
         }
     }
 
-    /// Visits the ids of boxes within a distance of a point, about the nearest first. `visit` returns the distance up to which
+    /// Visits the ids of boxes within a distance of a point: those around it first, by id, then the others, about the nearest
+    /// first. `visit` returns the distance up to which
     /// further boxes are wanted; boxes just beyond may be visited as well.
     pub fn near(&self, point: [f32; 3], max_distance: f32, visit: &mut dyn FnMut(u32) -> f32) -> Visited {
         if point.iter().any(|x| x.is_nan()) {
@@ -106,7 +110,7 @@ impl BoxIndex {
         self.ask(Near { point }, max_distance, visit)
     }
 
-    /// Visits the ids of boxes that overlap a box, in no particular order.
+    /// Visits the ids of boxes that overlap a box, in ascending order.
     pub fn overlapping(&self, aabb: &Aabb, visit: &mut dyn FnMut(u32)) -> Visited {
         self.sweep(aabb, [0.0; 3], 0.0, &mut |id| {
             visit(id);
@@ -116,7 +120,7 @@ impl BoxIndex {
 
     fn ask<Q: Question>(&self, question: Q, bound: f32, visit: &mut dyn FnMut(u32) -> f32) -> Visited {
         // An empty lane is met at infinity.
-        let visited = dispatch(Walk { index: self, question, bound: bound.min(f32::MAX), visit });
+        let visited = dispatch(Walk::new(self, question, bound.min(f32::MAX), visit));
         self.looked_at.fetch_add(visited.nodes, Ordering::Relaxed);
         visited
     }

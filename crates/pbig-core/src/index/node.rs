@@ -55,12 +55,13 @@ impl Node {
     /// Reads the boxes that a leaf stands for.
     #[inline(always)]
     pub(super) fn read(&mut self, boxes: &[Aabb]) {
+        let mut eight = [&Aabb::NOWHERE; LANES];
         for lane in 0..LANES {
-            let aabb = boxes.get(self.children[lane] as usize).unwrap_or(&Aabb::NOWHERE);
-            for k in 0..3 {
-                (self.low[k][lane], self.high[k][lane]) = (aabb.min[k], aabb.max[k]);
+            if let Some(aabb) = boxes.get(self.children[lane] as usize) {
+                eight[lane] = aabb;
             }
         }
+        self.transpose(eight);
         let mut is_invalid = [0; LANES];
         for k in 0..3 {
             for lane in 0..LANES {
@@ -69,6 +70,37 @@ impl Node {
         }
         if is_invalid.iter().fold(0, |any, one| any | one) != 0 {
             self.empty_invalid(&is_invalid);
+        }
+    }
+
+    /// Stores eight boxes axis by axis: four at a time, which takes half as long as number by number.
+    #[cfg(target_arch = "x86_64")]
+    #[inline(always)]
+    fn transpose(&mut self, eight: [&Aabb; LANES]) {
+        use std::arch::x86_64::{_MM_TRANSPOSE4_PS, _mm_storeu_ps};
+        let [x, y, z] = &mut self.low;
+        let [x2, y2, z2] = &mut self.high;
+        for first in [0, 4] {
+            let [mut a, mut b, mut c, mut d] = [0, 1, 2, 3].map(|i| eight[first + i].corners());
+            // SAFETY: SSE is part of the architecture; each store is of four lanes from `first` on, of eight.
+            unsafe {
+                _MM_TRANSPOSE4_PS(&mut a.0, &mut b.0, &mut c.0, &mut d.0);
+                _MM_TRANSPOSE4_PS(&mut a.1, &mut b.1, &mut c.1, &mut d.1);
+                let lanes = [(x.as_mut_ptr(), a.0), (y.as_mut_ptr(), b.0), (z.as_mut_ptr(), c.0)];
+                lanes.into_iter().for_each(|(axis, four)| _mm_storeu_ps(axis.add(first), four));
+                let lanes = [(x2.as_mut_ptr(), a.1), (y2.as_mut_ptr(), b.1), (z2.as_mut_ptr(), c.1)];
+                lanes.into_iter().for_each(|(axis, four)| _mm_storeu_ps(axis.add(first), four));
+            }
+        }
+    }
+
+    #[cfg(not(target_arch = "x86_64"))]
+    #[inline(always)]
+    fn transpose(&mut self, eight: [&Aabb; LANES]) {
+        for lane in 0..LANES {
+            for k in 0..3 {
+                (self.low[k][lane], self.high[k][lane]) = (eight[lane].min[k], eight[lane].max[k]);
+            }
         }
     }
 

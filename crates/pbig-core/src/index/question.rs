@@ -83,7 +83,8 @@ impl Sweep {
     /// Returns none if a number is NaN.
     pub(super) fn new(start: &Aabb, velocity: [f32; 3], max_time: f32) -> Option<Self> {
         let is_number = start.is_valid() && !max_time.is_nan() && velocity.iter().all(|v| !v.is_nan());
-        let axis = |k: usize| Axis::new(start.min[k], start.max[k], finite(velocity[k]), max_time.min(f32::MAX));
+        let axis =
+            |k: usize| Axis::new(start.min[k], start.max[k], finite(velocity[k]), max_time.min(f32::MAX));
         is_number.then(|| Self { axes: std::array::from_fn(axis) })
     }
 }

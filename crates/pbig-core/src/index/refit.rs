@@ -15,13 +15,14 @@ impl BoxIndex {
     /// Takes the boxes as they are now: `boxes` by id, [`Aabb::NOWHERE`] for an absent one. `changed` are the ids whose boxes
     /// may differ from those at the last call, in any order, repeated or not; without it any box may differ.
     pub fn refresh(&mut self, boxes: &[Aabb], changed: Option<&[u32]>) {
+        self.has_moved |= changed.is_none_or(|changed| !changed.is_empty());
         let is_few = |changed: &&[u32]| changed.len() * policy::REFIT_SHARE < self.places.len();
         match changed.filter(is_few) {
             Some(changed) => changed.iter().for_each(|&id| self.take(id, boxes)),
             None => self.refit(boxes),
         }
         if self.wants_sort() || self.nodes.len() - self.end as usize > policy::loose_leaves(self.leaves) {
-            self.lay_out(boxes, self.has_earned_sort());
+            self.lay_out(boxes, self.has_earned_sort(1));
         }
     }
 
@@ -29,11 +30,12 @@ impl BoxIndex {
     /// is bad. [`BoxIndex::refresh`] sorts then, too.
     pub fn wants_sort(&self) -> bool {
         let is_bad = !self.is_sorted || self.grown * policy::GROWN_SHARE > self.end as usize;
-        is_bad && self.has_earned_sort()
+        is_bad && self.has_earned_sort(1) || self.has_moved && self.has_earned_sort(policy::SORTS_FOR_ORDER)
     }
 
-    fn has_earned_sort(&self) -> bool {
-        self.looked_at.load(Ordering::Relaxed) >= policy::nodes_for_sort(self.leaves)
+    /// Returns true if questions have looked at as many nodes as so many sorts cost.
+    fn has_earned_sort(&self, sorts: u64) -> bool {
+        self.looked_at.load(Ordering::Relaxed) >= sorts * policy::nodes_for_sort(self.leaves)
     }
 
     /// Sorts the boxes as they are now.
@@ -124,7 +126,8 @@ impl BoxIndex {
     fn tell_ancestors(&mut self, mut node: u32) {
         loop {
             let (bounds, place) = (self.nodes[node as usize].bounds(), self.parents[node as usize]);
-            let is_known = place == NONE || self.nodes[place as usize / LANES].holds(place as usize % LANES, &bounds);
+            let is_known =
+                place == NONE || self.nodes[place as usize / LANES].holds(place as usize % LANES, &bounds);
             self.tell_parent(node, &bounds);
             if is_known {
                 return;
@@ -145,7 +148,8 @@ impl BoxIndex {
         let classes = if sorted { sort(&mut entries) } else { vec![0..entries.len()] };
         let classes: Vec<_> = classes.into_iter().map(|class| self.push_leaves(&entries[class])).collect();
         self.leaves = self.nodes.len() as u32;
-        let mut roots: Vec<u32> = classes.into_iter().flat_map(|class| self.push_parents(class.collect())).collect();
+        let mut roots: Vec<u32> =
+            classes.into_iter().flat_map(|class| self.push_parents(class.collect())).collect();
         roots = self.push_parents(roots);
         debug_assert!(roots.len() < 2);
         self.end = self.nodes.len() as u32;
@@ -154,6 +158,7 @@ impl BoxIndex {
         (self.grown, self.is_sorted) = (0, sorted);
         if sorted {
             *self.looked_at.get_mut() = 0;
+            self.has_moved = false;
         }
     }
 

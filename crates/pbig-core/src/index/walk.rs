@@ -13,55 +13,94 @@ const STACK: usize = 128;
 type Waiting = (f32, u32);
 
 pub(super) struct Walk<'a, Q> {
-    pub(super) index: &'a BoxIndex,
-    pub(super) question: Q,
-    pub(super) bound: f32,
+    index: &'a BoxIndex,
+    question: Q,
+    bound: f32,
     /// Called with the id of a box; returns the new bound.
-    pub(super) visit: &'a mut dyn FnMut(u32) -> f32,
+    visit: &'a mut dyn FnMut(u32) -> f32,
+    /// Boxes at bound 0, of which crowds have many.
+    at_start: Vec<u32>,
+    visited: Visited,
+}
+
+impl<'a, Q: Question> Walk<'a, Q> {
+    pub(super) fn new(
+        index: &'a BoxIndex,
+        question: Q,
+        bound: f32,
+        visit: &'a mut dyn FnMut(u32) -> f32,
+    ) -> Self {
+        Self { index, question, bound, visit, at_start: Vec::new(), visited: Visited::default() }
+    }
 }
 
 impl<Q: Question> Kernel for Walk<'_, Q> {
     type Output = Visited;
 
+    /// Boxes at bound 0 are visited first, by id, so that the lowest id wins among them without a look at the others.
     #[inline(always)]
     unsafe fn run<S: Simd>(mut self) -> Visited {
-        let mut visited = Visited::default();
-        let mut waiting: ArrayVec<Waiting, STACK> = ArrayVec::new();
-        for loose in self.index.loose() {
-            self.look_at(loose, true, &mut waiting, &mut visited);
-        }
-        waiting.extend(self.index.root().map(|root| (0.0, root)));
-        while let Some((least, node)) = waiting.pop() {
-            if least <= self.bound {
-                self.look_at(node, self.index.is_leaf(node), &mut waiting, &mut visited);
+        let is_still = self.bound <= 0.0;
+        let bound = std::mem::replace(&mut self.bound, 0.0);
+        self.walk::<true>();
+        self.bound = bound;
+        self.at_start.sort_unstable();
+        for id in std::mem::take(&mut self.at_start) {
+            self.take(id);
+            if self.bound <= 0.0 && !is_still {
+                return self.visited;
             }
         }
-        visited
+        if !is_still {
+            self.walk::<false>();
+        }
+        self.visited
     }
 }
 
 impl<Q: Question> Walk<'_, Q> {
-    /// Visits the boxes of a leaf, or lets the children of a node wait, the nearest on top.
+    /// Collects the boxes at bound 0, or visits the others.
     #[inline(always)]
-    fn look_at(
+    fn walk<const AT_START: bool>(&mut self) {
+        let mut nodes: ArrayVec<Waiting, STACK> = ArrayVec::new();
+        for loose in self.index.loose() {
+            self.look_at::<AT_START>(loose, true, &mut nodes);
+        }
+        nodes.extend(self.index.root().map(|root| (0.0, root)));
+        while let Some((least, node)) = nodes.pop() {
+            if least <= self.bound {
+                self.look_at::<AT_START>(node, self.index.is_leaf(node), &mut nodes);
+            }
+        }
+    }
+
+    /// Takes the boxes of a leaf, or lets the children of a node wait, the nearest on top.
+    #[inline(always)]
+    fn look_at<const AT_START: bool>(
         &mut self,
         number: u32,
         is_leaf: bool,
-        waiting: &mut ArrayVec<Waiting, STACK>,
-        visited: &mut Visited,
+        nodes: &mut ArrayVec<Waiting, STACK>,
     ) {
         let node = &self.index.nodes[number as usize];
-        visited.nodes += 1;
+        self.visited.nodes += 1;
         let met = self.met(node, &self.question.least(node));
         if !is_leaf {
-            return waiting.extend(met);
+            return nodes.extend(met);
         }
         for (least, id) in met.into_iter().rev() {
-            if least <= self.bound {
-                visited.boxes += 1;
-                self.bound = (self.visit)(id).min(f32::MAX);
+            if AT_START {
+                self.at_start.push(id);
+            } else if least > 0.0 && least <= self.bound {
+                self.take(id);
             }
         }
+    }
+
+    #[inline(always)]
+    fn take(&mut self, id: u32) {
+        self.visited.boxes += 1;
+        self.bound = (self.visit)(id).min(f32::MAX);
     }
 
     /// Returns the lanes within the bound, the farthest first.

@@ -1,7 +1,7 @@
 //! A finder with a fault planted in it.
 
 use rapier_pbig::PbigFinder;
-use rapier3d::geometry::PairFinder;
+use rapier3d::geometry::{PairFinder, SceneQuery};
 use rapier3d::parry::bounding_volume::Aabb;
 use rapier3d::parry::partitioning::Bvh;
 use rapier3d::prelude::*;
