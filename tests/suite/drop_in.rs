@@ -286,7 +286,7 @@ fn a_nan_position_is_contained_and_the_others_go_on() {
 }
 
 #[test]
-fn the_collider_with_fewer_pairs_comes_first() {
+fn the_smaller_collider_comes_first() {
     let mut world = World::default();
     let ground = world.colliders.insert(ColliderBuilder::halfspace(Vector::y_axis()));
     for i in 0..20 {

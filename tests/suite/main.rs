@@ -14,6 +14,7 @@ mod gpu;
 mod incremental;
 mod kernels;
 mod motions;
+mod order;
 mod planted;
 mod precision;
 mod queries;

@@ -43,21 +43,27 @@ struct Answers {
     cast: Option<f32>,
 }
 
-fn ask(queries: &QueryPipeline<'_>, at: [f32; 3], along: [f32; 3]) -> Answers {
-    let (point, direction) = (Point::from(at), Vector::from(along));
-    let (ray, ball) = (Ray::new(point, direction), Ball::new(0.7));
-    let pose = Isometry::translation(at[0], at[1], at[2]);
-    let index = |handle: ColliderHandle| handle.into_raw_parts().0;
-    Answers {
-        ray: queries.cast_ray(&ray, 30.0, true).map(|hit| hit.1),
-        all_on_ray: queries.intersect_ray(ray, 30.0, true).map(|hit| index(hit.0)).collect(),
-        projection: queries.project_point(&point, 5.0, true).map(|(_, found)| (found.point - point).norm()),
-        within: queries.intersect_point(point).map(|(handle, _)| index(handle)).collect(),
-        shapes: queries.intersect_shape(pose, &ball).map(|(handle, _)| index(handle)).collect(),
-        cast: queries
-            .cast_shape(&pose, &direction, &ball, ShapeCastOptions::with_max_time_of_impact(20.0))
-            .map(|(_, hit)| hit.time_of_impact),
-    }
+/// Asks all kinds of queries. A macro, because pbig's own type and rapier's have the methods without a trait.
+macro_rules! ask {
+    ($queries:expr, $at:expr, $along:expr) => {{
+        let (queries, at, along) = ($queries, $at, $along);
+        let (point, direction) = (Point::from(at), Vector::from(along));
+        let (ray, ball) = (Ray::new(point, direction), Ball::new(0.7));
+        let pose = Isometry::translation(at[0], at[1], at[2]);
+        let index = |handle: ColliderHandle| handle.into_raw_parts().0;
+        Answers {
+            ray: queries.cast_ray(&ray, 30.0, true).map(|hit| hit.1),
+            all_on_ray: queries.intersect_ray(ray, 30.0, true).map(|hit| index(hit.0)).collect(),
+            projection: queries
+                .project_point(&point, 5.0, true)
+                .map(|(_, found)| (found.point - point).norm()),
+            within: queries.intersect_point(point).map(|(handle, _)| index(handle)).collect(),
+            shapes: queries.intersect_shape(pose, &ball).map(|(handle, _)| index(handle)).collect(),
+            cast: queries
+                .cast_shape(&pose, &direction, &ball, ShapeCastOptions::with_max_time_of_impact(20.0))
+                .map(|(_, hit)| hit.time_of_impact),
+        }
+    }};
 }
 
 fn random3(random: &mut SmallRng, reach: f32) -> [f32; 3] {
@@ -75,8 +81,9 @@ fn compare(world: &World, both: &Both, random: &mut SmallRng, questions: usize) 
         let ours = both.ours.as_query_pipeline(&DefaultQueryDispatcher, bodies, colliders, filter);
         let stock = both.stock.as_query_pipeline(&DefaultQueryDispatcher, bodies, colliders, filter);
         let (at, along) = (random3(random, 8.0), random3(random, 1.0));
-        let wanted = ask(&stock, at, along);
-        assert_eq!(ask(&ours, at, along), wanted, "at {at:?} along {along:?}");
+        let wanted = ask!(&stock, at, along);
+        assert_eq!(ask!(&ours, at, along), wanted, "at {at:?} along {along:?}");
+        assert_eq!(ask!(&*ours, at, along), wanted, "rapier's own queries, at {at:?} along {along:?}");
         hits += usize::from(wanted.ray.is_some());
     }
     hits

@@ -126,7 +126,7 @@ impl PbigBroadPhase {
         self.colliders.pair_count()
     }
 
-    /// Returns the pairs that rapier knows of, in no particular order; the collider with fewer pairs comes first in each.
+    /// Returns the pairs that rapier knows of, sorted by the two indices; the collider with the smaller shape comes first in each, then the lower index.
     /// Adopted pairs are among them from the next update on.
     pub fn pairs(&self) -> impl Iterator<Item = ColliderPair> {
         self.colliders.pairs().map(to_pair)

@@ -120,11 +120,11 @@ impl<'a> Queries<'a> {
 
     /// As [`QueryPipeline::intersect_ray`].
     pub fn intersect_ray(
-        &'a self,
+        &self,
         ray: Ray,
         max_toi: Real,
         solid: bool,
-    ) -> impl Iterator<Item = (ColliderHandle, &'a Collider, RayIntersection)> + 'a {
+    ) -> impl Iterator<Item = (ColliderHandle, &'a Collider, RayIntersection)> {
         self.met(on_ray(&ray, max_toi)).filter_map(move |(handle, collider)| {
             let hit = collider.shape().cast_ray_and_get_normal(collider.position(), &ray, max_toi, solid)?;
             Some((handle, collider, hit))
@@ -159,9 +159,9 @@ impl<'a> Queries<'a> {
 
     /// As [`QueryPipeline::intersect_point`].
     pub fn intersect_point(
-        &'a self,
+        &self,
         point: Point<Real>,
-    ) -> impl Iterator<Item = (ColliderHandle, &'a Collider)> + 'a {
+    ) -> impl Iterator<Item = (ColliderHandle, &'a Collider)> {
         let at = point.coords.into();
         let contains =
             move |collider: &Collider| collider.shape().contains_point(collider.position(), &point);
@@ -170,9 +170,9 @@ impl<'a> Queries<'a> {
 
     /// As [`QueryPipeline::intersect_aabb_conservative`], with this broad phase's boxes.
     pub fn intersect_aabb_conservative(
-        &'a self,
+        &self,
         aabb: TreeAabb,
-    ) -> impl Iterator<Item = (ColliderHandle, &'a Collider)> + 'a {
+    ) -> impl Iterator<Item = (ColliderHandle, &'a Collider)> {
         self.met(SceneQuery::Overlap(to_box(&aabb)))
     }
 
@@ -196,10 +196,10 @@ impl<'a> Queries<'a> {
 
     /// As [`QueryPipeline::intersect_shape`].
     pub fn intersect_shape(
-        &'a self,
+        &self,
         shape_pos: Isometry<Real>,
-        shape: &'a dyn Shape,
-    ) -> impl Iterator<Item = (ColliderHandle, &'a Collider)> + 'a {
+        shape: &dyn Shape,
+    ) -> impl Iterator<Item = (ColliderHandle, &'a Collider)> {
         let query = SceneQuery::Overlap(to_box(&shape.compute_aabb(&shape_pos)));
         self.met(query).filter(move |(_, collider)| {
             let pos12 = shape_pos.inv_mul(collider.position());
@@ -222,7 +222,7 @@ impl<'a> Queries<'a> {
     }
 
     /// Returns the colliders whose boxes a query meets, by index.
-    fn met(&'a self, query: SceneQuery) -> impl Iterator<Item = (ColliderHandle, &'a Collider)> + 'a {
+    fn met(&self, query: SceneQuery) -> impl Iterator<Item = (ColliderHandle, &'a Collider)> {
         self.index.met(&query).into_iter().filter_map(|index| self.collider(index))
     }
 

@@ -2,9 +2,11 @@
 //!
 //! Each run is named by its seed. `PBIG_RUNS=20000` plays more runs (about 10^6 operations).
 
+mod ask;
 mod planted;
 
 use glam::Vec3;
+use pbig_harness_036::scenes::Scene;
 use pbig_harness_036::world::{World, groups_that_meet, to_vector, turned_body};
 use planted::{BUSY, Plant, Planted};
 use rand::rngs::StdRng;
@@ -37,6 +39,8 @@ struct Tally {
     oracle_pairs: u64,
     contacts: u64,
     queries: u64,
+    /// Rays that hit, of those that were compared.
+    hits: u64,
     restores: u64,
     soft: u64,
     /// Runs that a panic of rapier's has cut short: it panics at a joint between bodies of which none is dynamic any more.
@@ -215,6 +219,15 @@ impl Player {
         }
     }
 
+    /// Right after a step all boxes hold their colliders; else, or with a planted fault, answers depend on the order of visits.
+    fn ask(&mut self, tally: &mut Tally) {
+        if self.plant == Plant::Nothing {
+            BUSY.set(true);
+            tally.hits += ask::compare(&self.world, &self.broad_phase, &mut self.rng);
+            BUSY.set(false);
+        }
+    }
+
     /// Saves and restores the world. Half the time its tree goes on for a step before pbig takes over again.
     fn restore(&mut self, tally: &mut Tally) {
         let bytes = self.world.to_bytes(&self.broad_phase);
@@ -294,6 +307,7 @@ fn run(seed: u64, plant: Plant, tally: &mut Tally) -> Result<(), String> {
             if player.rng.random_range(0..2) == 0 {
                 player.world.step(&mut player.broad_phase);
                 tally.steps += 1;
+                player.ask(tally);
             }
         };
         if let Err(panic) = catch_unwind(AssertUnwindSafe(&mut play)) {
@@ -319,12 +333,14 @@ fn random_worlds_have_the_pairs_of_the_oracle_and_miss_no_contact_of_stock() {
     for seed in 0..runs {
         run(seed, Plant::Nothing, &mut tally).unwrap_or_else(|difference| panic!("{difference}"));
     }
-    let Tally { steps, compared, oracle_pairs, contacts, queries, restores, soft, cut_short } = tally;
+    let Tally { steps, compared, oracle_pairs, contacts, queries, hits, restores, soft, cut_short } = tally;
     println!(
-        "{steps} steps, {compared} compared, {oracle_pairs} pairs, {contacts} contacts, {queries} queries, {restores} restores, {soft} soft, {cut_short} cut short"
+        "{steps} steps, {compared} compared, {oracle_pairs} pairs, {contacts} contacts, {queries} queries, {hits} hits, {restores} restores, {soft} soft, {cut_short} cut short"
     );
     assert!(compared > 5 * runs && oracle_pairs > 10 * runs && contacts > runs);
-    assert!(queries > runs && restores > runs && soft > runs / 20 && cut_short < runs / 5);
+    assert!(
+        queries > runs && hits > 10 * runs && restores > runs && soft > runs / 20 && cut_short < runs / 5
+    );
 }
 
 #[test]
@@ -332,5 +348,18 @@ fn planted_faults_are_noticed() {
     for plant in [Plant::Unmoved, Plant::RoomForTwo, Plant::OnlyNew] {
         let noticed = (0..40).filter(|&seed| run(seed, plant, &mut Tally::default()).is_err()).count();
         assert!(noticed >= 10, "{plant:?}: {noticed} of 40");
+    }
+}
+
+#[test]
+fn every_scene_answers_in_each_frame_as_rapiers_tree_does() {
+    for scene in Scene::ALL {
+        let (mut world, mut broad_phase) = (scene.build(250, 1), rapier_pbig::broad_phase());
+        let (mut rng, mut hits) = (StdRng::seed_from_u64(1), 0);
+        for _ in 0..60 {
+            world.step(&mut broad_phase);
+            hits += ask::compare(&world, &broad_phase, &mut rng);
+        }
+        assert!(hits > 0, "{}", scene.name);
     }
 }
