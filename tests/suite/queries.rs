@@ -203,3 +203,50 @@ fn queries_work_on_a_restored_and_on_a_cloned_broad_phase() {
     world.step(&mut both);
     compare(&world, &both, &mut random, 20);
 }
+
+/// A collider that uses the index of one removed since the last step is named by its own handle, as by stock.
+#[test]
+fn a_collider_that_reuses_an_index_is_named_by_its_own_handle() {
+    let mut world = World::default();
+    let ball = || ColliderBuilder::ball(0.5).translation(vector![3.0, 0.0, 0.0]);
+    let first = world.colliders.insert(ball());
+    let mut both = Both { ours: PbigBroadPhase::new(), stock: DefaultBroadPhase::new() };
+    world.step(&mut both);
+    let World { colliders, islands, bodies, .. } = &mut world;
+    colliders.remove(first, islands, bodies, true);
+    let second = colliders.insert(ball());
+    assert_eq!(first.into_raw_parts().0, second.into_raw_parts().0);
+    let filter = QueryFilter::default();
+    let ours = both.ours.as_query_pipeline(&DefaultQueryDispatcher, &world.bodies, &world.colliders, filter);
+    let stock =
+        both.stock.as_query_pipeline(&DefaultQueryDispatcher, &world.bodies, &world.colliders, filter);
+    let ray = Ray::new(Point::origin(), Vector::x());
+    assert_eq!(ours.cast_ray(&ray, 9.0, true), stock.cast_ray(&ray, 9.0, true));
+    assert_eq!(ours.cast_ray(&ray, 9.0, true), Some((second, 2.5)));
+}
+
+/// A filter may ask in turn, while other threads ask, too, and the index is sorted now and then.
+#[test]
+fn a_filter_may_ask_while_others_ask() {
+    let mut world = Scene::named("column").expect("the scene exists").build(400, 2);
+    let mut ours = PbigBroadPhase::new();
+    (0..30).for_each(|_| world.step(&mut ours));
+    let ask = |filter: QueryFilter<'_>| {
+        let queries =
+            ours.as_query_pipeline(&DefaultQueryDispatcher, &world.bodies, &world.colliders, filter);
+        let down = |i: u32| Ray::new(point![0.01 * (i % 100) as f32, 50.0, 0.0], -Vector::y());
+        (0..600).filter(|&i| queries.cast_ray(&down(i), 100.0, true).is_some()).count()
+    };
+    let counts: Vec<usize> = std::thread::scope(|scope| {
+        let ask_again = |_: ColliderHandle, _: &Collider| {
+            let (bodies, colliders) = (&world.bodies, &world.colliders);
+            let queries =
+                ours.as_query_pipeline(&DefaultQueryDispatcher, bodies, colliders, QueryFilter::default());
+            queries.intersect_point(Point::origin()).count() < usize::MAX
+        };
+        let threads: Vec<_> =
+            (0..4).map(|_| scope.spawn(|| ask(QueryFilter::new().predicate(&ask_again)))).collect();
+        threads.into_iter().map(|thread| thread.join().expect("no panic")).collect()
+    });
+    assert!(counts[0] > 0 && counts.iter().all(|count| *count == ask(QueryFilter::default())), "{counts:?}");
+}

@@ -2,6 +2,7 @@
 
 use crate::events::{EventWriter, PairEvent, handles};
 use crate::index::{SceneIndex, SceneQuery};
+use crate::order::PairOrder;
 use crate::registry::ColliderRegistry;
 use crate::stats::{Counts, Totals};
 use crate::tree::SceneTree;
@@ -77,10 +78,11 @@ impl<T: Tree> Colliders<T> {
 
     /// Takes over a world whose narrow phase has these pairs. The next update finds no collider known, so it reads all, and ends
     /// pairs that do not overlap. `boxes` are those of the broad phase before, by collider index: one that holds its collider is kept.
-    pub fn adopt(&mut self, pairs: Vec<HandlePair>, boxes: Vec<(u32, Aabb)>) {
+    /// With `keeps_order` the colliders of each pair are in the order of its event, and its end will have that order.
+    pub fn adopt(&mut self, pairs: Vec<HandlePair>, boxes: Vec<(u32, Aabb)>, keeps_order: bool) {
         self.forget_all();
         (self.is_idle, self.is_incomplete) = (false, !pairs.is_empty() || !boxes.is_empty());
-        self.writer.adopt(pairs);
+        self.writer.adopt(pairs, keeps_order);
         self.inherited = boxes;
     }
 
@@ -108,10 +110,13 @@ impl<T: Tree> Colliders<T> {
     /// them. `visit` returns the time or distance up to which more are wanted.
     pub fn visit(&self, query: &SceneQuery, visit: &mut dyn FnMut(u32) -> f32) {
         // Continuous collision detection asks in the middle of a step, when there is a grid of just these boxes.
+        let mut of_grid = Vec::new();
         if let SceneQuery::Overlap(aabb) = query
-            && self.core.overlapping_in_grid(aabb, &mut |id| _ = visit(id))
+            && self.index.prefers_grid()
+            && self.core.overlapping_in_grid(aabb, &mut |id| of_grid.push(id))
         {
-            return;
+            of_grid.sort_unstable();
+            return of_grid.into_iter().for_each(|id| _ = visit(id));
         }
         self.index.visit(&self.core, query, visit);
     }
@@ -130,6 +135,9 @@ impl<T: Tree> Colliders<T> {
         let totals = Totals { updates: self.counts.totals.updates + 1, ..self.counts.totals };
         self.counts = Counts { modified, removed, totals, ..Counts::default() };
         (self.last_error, self.is_idle) = (None, false);
+        // A shape may panic in the middle.
+        self.index.expire();
+        self.tree.expire();
         self.read(scene, margin);
         self.index.note(self.core.changes(), self.core.id_count());
         self.tree.note(self.core.changes().iter().copied(), self.registry.len());
@@ -219,6 +227,7 @@ impl<T: Tree> Colliders<T> {
         self.registry.clear();
         self.core.clear();
         (self.index, self.tree) = (SceneIndex::default(), SceneTree::default());
+        self.writer.order = PairOrder::default();
     }
 
     fn find_and_send(&mut self, size: impl Fn(Handle) -> u8, send: impl FnMut(PairEvent)) {

@@ -20,19 +20,23 @@ pub enum PairEvent {
 pub(crate) struct EventWriter {
     pub(crate) adopted: Vec<HandlePair>,
     pub(crate) order: PairOrder,
+    /// Adopted pairs end in the order in which they were handed over, not in that of [`PairOrder`].
+    pub(crate) keeps_order: bool,
 }
 
 impl EventWriter {
-    /// Starts with the pairs that another broad phase has reported.
-    pub(crate) fn adopt(&mut self, pairs: Vec<HandlePair>) {
-        self.adopted = pairs;
-        self.order.forget_adopted();
+    /// Starts with the pairs that another broad phase has reported, perhaps in the order of its events.
+    pub(crate) fn adopt(&mut self, pairs: Vec<HandlePair>, keeps_order: bool) {
+        *self = Self { adopted: pairs, keeps_order, order: PairOrder::default() };
     }
 
     /// Forgets adopted pairs of removed and disabled colliders, which the narrow phase drops itself.
     pub(crate) fn forget_adopted(&mut self, removed: impl Iterator<Item = Handle>) {
         if !self.adopted.is_empty() || self.order.has_adopted() {
             let removed: HashSet<_> = removed.collect();
+            if removed.is_empty() {
+                return;
+            }
             self.adopted.retain(|pair| !removed.contains(&pair.0) && !removed.contains(&pair.1));
             self.order.forget(&removed);
         }
@@ -57,8 +61,13 @@ impl EventWriter {
             self.order.end(pair);
             send(PairEvent::Delete(pair));
         }
-        ended.into_iter().for_each(|pair| send(PairEvent::Delete(pair)));
-        known.iter().for_each(|&pair| self.order.adopt(pair, &size));
+        for pair in ended {
+            let by_size = || self.order.of(pair.0, pair.1);
+            send(PairEvent::Delete(if self.keeps_order { pair } else { by_size() }));
+        }
+        if self.keeps_order {
+            known.iter().for_each(|&pair| self.order.adopt(pair, &size));
+        }
         let known: HashSet<Pair> = known.iter().map(ids).collect();
         let new = found.added.iter().filter(|pair| !known.contains(pair));
         let added = new.map(|&pair| {
@@ -119,7 +128,7 @@ mod tests {
         let [a, b] = handles(Pair::new(0, 1), &registry);
         let (mut events, mut added, mut removed) = (Vec::new(), Events::default(), Events::default());
         (added.added, removed.removed) = (vec![Pair::new(0, 1)], vec![Pair::new(0, 1)]);
-        writer.adopt(vec![HandlePair(b, a)]);
+        writer.adopt(vec![HandlePair(b, a)], true);
         writer.write(&added, &registry, |_| 1, |event| events.push(event));
         assert_eq!(events, [], "it is known");
         writer.write(&removed, &registry, |_| 1, |event| events.push(event));

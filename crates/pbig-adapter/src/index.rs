@@ -1,19 +1,20 @@
 //! Scene queries. They search an index of boxes, which the first of them builds; it is brought up to date by the first query
 //! after a change, and costs next to nothing while nobody asks.
 
+use crate::policy;
 use crate::{Colliders, Tree};
 use pbig_core::{Aabb, BoxIndex, BroadPhase};
-use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Mutex, PoisonError, RwLock};
+use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
+use std::sync::{Mutex, PoisonError, RwLock, TryLockError};
 
-/// The boxes that a scene query looks for.
+/// A scene query, by the boxes that it looks for.
 #[derive(Clone, Copy, Debug)]
 pub enum SceneQuery {
-    /// Those that a box (a point, for a ray) with a velocity meets until a time.
+    /// Boxes that a moving box (a point, for a ray) meets: its start, its velocity, and the last time.
     Sweep(Aabb, [f32; 3], f32),
-    /// Those within a distance of a point.
+    /// Boxes within a distance of a point.
     Near([f32; 3], f32),
-    /// Those that overlap a box.
+    /// Boxes that overlap a box.
     Overlap(Aabb),
 }
 
@@ -67,6 +68,8 @@ impl<T: Tree> Colliders<T> {
 pub(crate) struct SceneIndex {
     state: RwLock<State>,
     is_fresh: AtomicBool,
+    /// Questions that a grid has answered since the index was fresh.
+    asked_of_grid: AtomicU32,
     /// Held while the index is brought up to date. Nobody waits for `state` to write, so that a query within a query, on the
     /// thread that reads it already, does not wait for a writer that waits for that thread.
     refreshing: Mutex<()>,
@@ -89,9 +92,16 @@ impl Clone for SceneIndex {
 }
 
 impl SceneIndex {
-    /// Says that boxes have changed; which ones, [`SceneIndex::note`] or the core's pending changes tell.
+    /// Marks the index as stale. The changed boxes are those noted, and the core's pending changes.
     pub(crate) fn expire(&mut self) {
         *self.is_fresh.get_mut() = false;
+        *self.asked_of_grid.get_mut() = 0;
+    }
+
+    /// Returns true if a grid should answer a question about a box: the index is stale, and few have asked since.
+    pub(crate) fn prefers_grid(&self) -> bool {
+        let is_fresh = self.is_fresh.load(Ordering::Acquire);
+        !is_fresh && self.asked_of_grid.fetch_add(1, Ordering::Relaxed) < policy::QUESTIONS_TO_GRID
     }
 
     /// Notes changed boxes before an update forgets them.
@@ -125,7 +135,20 @@ impl SceneIndex {
             };
             index.wants_sort()
         };
-        if wants_sort && let Ok(mut state) = self.state.try_write() {
+        if wants_sort {
+            self.sort(core);
+        }
+    }
+
+    /// Sorts the index, unless another thread reads it; a later query tries again.
+    fn sort(&self, core: &BroadPhase) {
+        let mut state = match self.state.try_write() {
+            Ok(state) => state,
+            Err(TryLockError::Poisoned(state)) => state.into_inner(),
+            Err(TryLockError::WouldBlock) => return,
+        };
+        // Another thread may have sorted it meanwhile.
+        if state.index.wants_sort() {
             state.index.sort(core.fat_aabbs());
         }
     }

@@ -80,11 +80,6 @@ impl PairOrder {
         self.reversed.retain(|pair| !colliders.contains(&pair.0) && !colliders.contains(&pair.1));
     }
 
-    /// Forgets all pairs that another broad phase has reported.
-    pub(crate) fn forget_adopted(&mut self) {
-        self.reversed.clear();
-    }
-
     pub(crate) fn has_adopted(&self) -> bool {
         !self.reversed.is_empty()
     }

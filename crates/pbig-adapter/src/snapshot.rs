@@ -78,6 +78,7 @@ impl Snapshot<'_> {
         restored.registry = registry;
         let pair = |[a, b]: [RawHandle; 2]| HandlePair(a.into(), b.into());
         restored.writer.adopted = self.adopted.into_iter().map(pair).collect();
+        restored.writer.keeps_order = true;
         restored.writer.order = PairOrder::from_saved(self.sizes, self.reversed.into_iter().map(pair));
         restored.is_incomplete = self.is_incomplete;
         Ok((restored, margin))

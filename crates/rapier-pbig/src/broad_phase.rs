@@ -106,7 +106,7 @@ impl PbigBroadPhase {
         let contacts = narrow_phase.contact_pairs().map(|pair| (pair.collider1, pair.collider2));
         let intersections = narrow_phase.intersection_pairs().map(|(one, other, _)| (one, other));
         let pairs = contacts.chain(intersections).map(|(a, b)| HandlePair(handle(a), handle(b)));
-        self.colliders.adopt(pairs.collect(), Vec::new());
+        self.colliders.adopt(pairs.collect(), Vec::new(), true);
         self.restart_shadow();
     }
 

@@ -1,7 +1,6 @@
 //! Offers scene queries, as rapier's own broad phase does.
 
 use crate::PbigBroadPhase;
-use crate::scene::to_collider;
 use crate::tree::ParryTree;
 use pbig_adapter::{Aabb, Colliders, SceneQuery};
 use rapier3d::parry::bounding_volume::{Aabb as TreeAabb, BoundingVolume};
@@ -61,18 +60,15 @@ impl PbigBroadPhase {
 
 /// Scene queries with the names, arguments and results of rapier's [`QueryPipeline`], which they dereference to.
 ///
-/// Of several colliders at exactly the same distance, the one with the lowest index is returned. Lists are sorted by index.
+/// Of several colliders at exactly the same distance, the one with the lowest index is returned. Lists are sorted by index, and
+/// complete before the first element is read. Another filter is set by [`Queries::with_filter`].
 #[derive(Clone)]
 pub struct Queries<'a> {
     index: &'a Colliders<ParryTree>,
-    /// The queries on shapes.
-    pub dispatcher: &'a dyn QueryDispatcher,
-    /// The bodies, for filters.
-    pub bodies: &'a RigidBodySet,
-    /// The colliders.
-    pub colliders: &'a ColliderSet,
-    /// Which colliders count.
-    pub filter: QueryFilter<'a>,
+    dispatcher: &'a dyn QueryDispatcher,
+    bodies: &'a RigidBodySet,
+    colliders: &'a ColliderSet,
+    filter: QueryFilter<'a>,
     /// Rapier's own, once something asks for it.
     pipeline: OnceCell<QueryPipeline<'a>>,
 }
@@ -214,11 +210,12 @@ impl<'a> Queries<'a> {
         cost: impl Fn(&Collider, Real) -> Option<T>,
     ) -> Option<(ColliderHandle, T)> {
         let of = |index: u32, reach: Real| {
-            let found = cost(self.collider(index)?.1, reach)?;
-            Some((found.cost(), found))
+            // The handle of now: the index may have another collider since the last update.
+            let (handle, collider) = self.collider(index)?;
+            let found = cost(collider, reach)?;
+            Some((found.cost(), (handle, found)))
         };
-        let (index, found) = self.index.best(&query, of)?;
-        Some((to_collider(self.index.handle(index)?), found))
+        Some(self.index.best(&query, of)?.1)
     }
 
     /// Returns the colliders whose boxes a query meets, by index.

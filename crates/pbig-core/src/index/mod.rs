@@ -86,7 +86,8 @@ impl BoxIndex {
     /// unit of time.
     ///
     /// `visit` returns the time until which further boxes are wanted; boxes that are met just after it may be visited as well.
-    /// After a time of 0 no box is wanted. No box is visited twice. A NaN in the question means that no box is visited.
+    /// After a time of 0 no box is wanted. No box is visited twice. With a NaN in the question, or a
+    /// negative time, no box is visited.
     pub fn sweep(
         &self,
         start: &Aabb,
@@ -104,10 +105,8 @@ impl BoxIndex {
     /// first. `visit` returns the distance up to which
     /// further boxes are wanted; boxes just beyond may be visited as well.
     pub fn near(&self, point: [f32; 3], max_distance: f32, visit: &mut dyn FnMut(u32) -> f32) -> Visited {
-        if point.iter().any(|x| x.is_nan()) {
-            return Visited::default();
-        }
-        self.ask(Near { point }, max_distance, visit)
+        let is_place = point.iter().all(|x| x.is_finite());
+        if is_place { self.ask(Near { point }, max_distance, visit) } else { Visited::default() }
     }
 
     /// Visits the ids of boxes that overlap a box, in ascending order.
@@ -119,6 +118,10 @@ impl BoxIndex {
     }
 
     fn ask<Q: Question>(&self, question: Q, bound: f32, visit: &mut dyn FnMut(u32) -> f32) -> Visited {
+        // None for a NaN.
+        if !(bound >= 0.0) {
+            return Visited::default();
+        }
         // An empty lane is met at infinity.
         let visited = dispatch(Walk::new(self, question, bound.min(f32::MAX), visit));
         self.looked_at.fetch_add(visited.nodes, Ordering::Relaxed);

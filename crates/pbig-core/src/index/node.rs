@@ -5,7 +5,7 @@ use crate::Aabb;
 /// Boxes in a node.
 pub(super) const LANES: usize = 8;
 
-/// Value of a lane of each box, or one for each axis.
+/// A number for each box of a node.
 pub(super) type Lanes = [f32; LANES];
 
 /// The child of an empty lane.

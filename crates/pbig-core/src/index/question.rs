@@ -1,15 +1,15 @@
-//! Questions: which of a node's eight boxes they meet, and from which bound on.
+//! Questions about places. Each is put to the eight boxes of a node at a time.
 
 use super::node::{LANES, Lanes, Node};
 use crate::Aabb;
 
-/// Share of a value by which it may be wrong: a few roundings. Bounds give way by as much, so that rounding costs a visit, never
-/// a box.
+/// Relative error of a time or distance, for a few roundings. Bounds are widened by it, so that rounding costs a visit and never
+/// a box (unless a product is denormal, or a square overflows: gaps below 1e-22 or above 1e19).
 const SLACK: f32 = 4.0 * f32::EPSILON;
 
-/// A question to a box: from which bound on does it belong to the answer?
+/// A question: a sweep meets a box at a time, a search around a point at a distance.
 pub(super) trait Question {
-    /// Returns the least bound of each lane that the question meets; infinity for the others.
+    /// Returns the smallest time or distance at which each box is met; infinity for boxes that are not.
     fn least(&self, node: &Node) -> Lanes;
 }
 
@@ -32,12 +32,15 @@ enum Axis {
 impl Axis {
     /// A velocity that is too small to divide by moves the box by less than it is widened here.
     fn new(low: f32, high: f32, velocity: f32, max_time: f32) -> Self {
-        let [low, high] = [low, high].map(finite);
         let pace = 1.0 / velocity;
-        if velocity == 0.0 || !pace.is_finite() {
+        if velocity == 0.0 {
+            return Self::Still(low, high);
+        }
+        if !pace.is_finite() {
             let reach = velocity * max_time;
             return Self::Still(low + reach.min(0.0), high + reach.max(0.0));
         }
+        let [low, high] = [low, high].map(finite);
         if pace > 0.0 { Self::Up(high, low, pace) } else { Self::Down(high, low, pace) }
     }
 

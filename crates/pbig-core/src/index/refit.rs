@@ -21,7 +21,7 @@ impl BoxIndex {
             Some(changed) => changed.iter().for_each(|&id| self.take(id, boxes)),
             None => self.refit(boxes),
         }
-        if self.wants_sort() || self.nodes.len() - self.end as usize > policy::loose_leaves(self.leaves) {
+        if self.wants_sort() || self.loose().len() > policy::loose_leaves(self.leaves) {
             self.lay_out(boxes, self.has_earned_sort(1));
         }
     }
@@ -29,7 +29,9 @@ impl BoxIndex {
     /// Returns true if sorting the boxes anew would pay: questions have looked at as many nodes as a sort costs, and the order
     /// is bad. [`BoxIndex::refresh`] sorts then, too.
     pub fn wants_sort(&self) -> bool {
-        let is_bad = !self.is_sorted || self.grown * policy::GROWN_SHARE > self.end as usize;
+        let has_many_loose = policy::FEW_LOOSE_SHARE * self.loose().len() > policy::loose_leaves(self.leaves);
+        let has_grown = self.grown * policy::GROWN_SHARE > self.end as usize;
+        let is_bad = !self.is_sorted || has_many_loose || has_grown;
         is_bad && self.has_earned_sort(1) || self.has_moved && self.has_earned_sort(policy::SORTS_FOR_ORDER)
     }
 

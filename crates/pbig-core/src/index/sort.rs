@@ -4,8 +4,9 @@ use super::node::LANES;
 use crate::Aabb;
 use std::ops::Range;
 
-/// Boxes of one class differ in size by less than two to this power: a large box among small ones would make their node large.
-const CLASS_BITS: u32 = 3;
+/// Bits of a size's exponent within a class: boxes of one class differ in size by less than 16 times. A large box among small
+/// ones would make their node large.
+const CLASS_BITS: u32 = 2;
 
 /// A box as the sort reads it.
 #[derive(Clone, Copy, Debug)]

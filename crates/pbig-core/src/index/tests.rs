@@ -191,7 +191,7 @@ fn a_crowd_of_questions_pays_for_a_sort_and_single_ones_do_not() {
         let many = (n / 40) as u64;
         let one = cast(&mut index, &boxes, 1);
         assert!(one.nodes >= many, "{n} boxes: {one:?}: not sorted for one ray");
-        let few = cast(&mut index, &boxes, 200);
+        let few = cast(&mut index, &boxes, 500);
         assert!(few.nodes < 100 * 160, "{n} boxes: {few:?} for 100 rays");
         // A box at the end of the world, huge ones and flat ones cost the others nothing.
         let mut odd = boxes.clone();
@@ -204,6 +204,25 @@ fn a_crowd_of_questions_pays_for_a_sort_and_single_ones_do_not() {
         let with_odd = cast(&mut index, &odd, 100);
         assert!(with_odd.boxes < 100 * (n as u64 / 50 + 40), "{n} boxes: {with_odd:?}");
         assert!(with_odd.nodes < 100 * (n as u64 / 300 + 200), "{n} boxes: {with_odd:?}");
+    }
+}
+
+/// Boxes that come after a sort make questions slow only until these have paid for the next one.
+#[test]
+fn boxes_that_come_later_are_sorted_in_once_questions_have_paid() {
+    for n in [2000, 20_000] {
+        let (mut boxes, mut index) = (scattered(n), BoxIndex::default());
+        index.refresh(&boxes, None);
+        index.sort(&boxes);
+        let before = cast(&mut index, &boxes, 100).nodes;
+        let new: Vec<Aabb> = boxes.iter().step_by(40).map(|one| one.inflated(-0.1)).collect();
+        let ids: Vec<u32> = (0..new.len()).map(|i| (n + i) as u32).collect();
+        boxes.extend(new);
+        index.refresh(&boxes, Some(&ids));
+        assert!(index.loose().len() > n / 400);
+        let with_loose = cast(&mut index, &boxes, 100).nodes;
+        let after = cast(&mut index, &boxes, 8 * n).nodes;
+        assert!(with_loose > 2 * before && after < 2 * before, "{n}: {before}, {with_loose}, {after}");
     }
 }
 

@@ -1,4 +1,4 @@
-//! Upkeep of the index for questions. A node is eight boxes; looking at one takes about 5 ns, sorting a box about 60.
+//! Upkeep of the index for questions. A node is eight boxes; looking at one takes about 5 ns, sorting a box about 150.
 
 /// Minimum share of changed boxes, one in so many, from which all boxes are read in order: that takes about 3 ns a box, while
 /// a box alone takes 50, for it tells its ancestors.
@@ -15,8 +15,11 @@ pub(crate) const SORTS_FOR_ORDER: u64 = 32;
 
 /// Returns the number of nodes that questions look at before a sort: it then takes about as long as they did.
 pub(crate) fn nodes_for_sort(leaves: u32) -> u64 {
-    64 + 64 * u64::from(leaves)
+    64 + 256 * u64::from(leaves)
 }
+
+/// Minimum share of the maximum number of leaves outside the tree, one in so many, from which the order is bad.
+pub(crate) const FEW_LOOSE_SHARE: usize = 8;
 
 /// Returns the maximum number of leaves outside the tree, which every question looks at.
 pub(crate) fn loose_leaves(leaves: u32) -> usize {

@@ -353,13 +353,14 @@ fn planted_faults_are_noticed() {
 
 #[test]
 fn every_scene_answers_in_each_frame_as_rapiers_tree_does() {
+    let mut hits = 0;
     for scene in Scene::ALL {
         let (mut world, mut broad_phase) = (scene.build(250, 1), rapier_pbig::broad_phase());
-        let (mut rng, mut hits) = (StdRng::seed_from_u64(1), 0);
+        let mut rng = StdRng::seed_from_u64(1);
         for _ in 0..60 {
             world.step(&mut broad_phase);
             hits += ask::compare(&world, &broad_phase, &mut rng);
         }
-        assert!(hits > 0, "{}", scene.name);
     }
+    assert!(hits > 100, "{hits}");
 }
