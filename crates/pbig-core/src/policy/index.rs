@@ -10,8 +10,8 @@ pub(crate) const GROWN_TO: f32 = 2.0;
 /// Minimum share of grown nodes, one in so many, from which the order is bad.
 pub(crate) const GROWN_SHARE: usize = 8;
 
-/// Sorts whose cost questions pay before the boxes are sorted although the order is not bad yet: a sort then adds 3%.
-pub(crate) const SORTS_FOR_ORDER: u64 = 32;
+/// Sorts whose cost questions pay before the boxes are sorted although the order is not bad yet: a sort then adds an eighth at most.
+pub(crate) const SORTS_FOR_ORDER: u64 = 8;
 
 /// Returns the number of nodes that questions look at before a sort: it then takes about as long as they did.
 pub(crate) fn nodes_for_sort(leaves: u32) -> u64 {
