@@ -212,9 +212,8 @@ fn a_collider_that_reuses_an_index_is_named_by_its_own_handle() {
     let first = world.colliders.insert(ball());
     let mut both = Both { ours: PbigBroadPhase::new(), stock: DefaultBroadPhase::new() };
     world.step(&mut both);
-    let World { colliders, islands, bodies, .. } = &mut world;
-    colliders.remove(first, islands, bodies, true);
-    let second = colliders.insert(ball());
+    world.remove_collider(first);
+    let second = world.colliders.insert(ball());
     assert_eq!(first.into_raw_parts().0, second.into_raw_parts().0);
     let filter = QueryFilter::default();
     let ours = both.ours.as_query_pipeline(&DefaultQueryDispatcher, &world.bodies, &world.colliders, filter);
@@ -237,13 +236,13 @@ fn a_filter_may_ask_while_others_ask() {
         let down = |i: u32| Ray::new(point![0.01 * (i % 100) as f32, 50.0, 0.0], -Vector::y());
         (0..600).filter(|&i| queries.cast_ray(&down(i), 100.0, true).is_some()).count()
     };
+    let ask_again = |_: ColliderHandle, _: &Collider| {
+        let (bodies, colliders) = (&world.bodies, &world.colliders);
+        let queries =
+            ours.as_query_pipeline(&DefaultQueryDispatcher, bodies, colliders, QueryFilter::default());
+        queries.intersect_point(Point::origin()).count() < usize::MAX
+    };
     let counts: Vec<usize> = std::thread::scope(|scope| {
-        let ask_again = |_: ColliderHandle, _: &Collider| {
-            let (bodies, colliders) = (&world.bodies, &world.colliders);
-            let queries =
-                ours.as_query_pipeline(&DefaultQueryDispatcher, bodies, colliders, QueryFilter::default());
-            queries.intersect_point(Point::origin()).count() < usize::MAX
-        };
         let threads: Vec<_> =
             (0..4).map(|_| scope.spawn(|| ask(QueryFilter::new().predicate(&ask_again)))).collect();
         threads.into_iter().map(|thread| thread.join().expect("no panic")).collect()

@@ -7,6 +7,8 @@
 //! A tree of nodes with eight children each. It is refitted in one pass over its nodes, children first. Sorting is left until
 //! questions have looked at so many nodes that a sort would have paid.
 
+#![allow(clippy::needless_range_loop, reason = "a lane of several arrays")]
+
 mod node;
 mod question;
 mod refit;
@@ -118,8 +120,7 @@ impl BoxIndex {
     }
 
     fn ask<Q: Question>(&self, question: Q, bound: f32, visit: &mut dyn FnMut(u32) -> f32) -> Visited {
-        // None for a NaN.
-        if !(bound >= 0.0) {
+        if bound.is_nan() || bound < 0.0 {
             return Visited::default();
         }
         // An empty lane is met at infinity.

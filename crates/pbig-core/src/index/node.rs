@@ -62,14 +62,14 @@ impl Node {
             }
         }
         self.transpose(eight);
-        let mut is_invalid = [0; LANES];
+        let mut is_valid = [1; LANES];
         for k in 0..3 {
             for lane in 0..LANES {
-                is_invalid[lane] |= u32::from(!(self.low[k][lane] <= self.high[k][lane]));
+                is_valid[lane] &= u32::from(self.low[k][lane] <= self.high[k][lane]);
             }
         }
-        if is_invalid.iter().fold(0, |any, one| any | one) != 0 {
-            self.empty_invalid(&is_invalid);
+        if is_valid.iter().fold(1, |all, one| all & one) == 0 {
+            self.empty_invalid(&is_valid);
         }
     }
 
@@ -105,8 +105,8 @@ impl Node {
     }
 
     #[cold]
-    fn empty_invalid(&mut self, is_invalid: &[u32; LANES]) {
-        (0..LANES).filter(|lane| is_invalid[*lane] != 0).for_each(|lane| self.set(lane, &Aabb::NOWHERE));
+    fn empty_invalid(&mut self, is_valid: &[u32; LANES]) {
+        (0..LANES).filter(|lane| is_valid[*lane] == 0).for_each(|lane| self.set(lane, &Aabb::NOWHERE));
     }
 
     /// Returns true if a lane has this box.

@@ -147,7 +147,8 @@ impl BoxIndex {
         self.extents.clear();
         self.places.clear();
         self.places.resize(boxes.len(), NONE);
-        let classes = if sorted { sort(&mut entries) } else { vec![0..entries.len()] };
+        let all = 0..entries.len();
+        let classes = if sorted { sort(&mut entries) } else { Vec::from([all]) };
         let classes: Vec<_> = classes.into_iter().map(|class| self.push_leaves(&entries[class])).collect();
         self.leaves = self.nodes.len() as u32;
         let mut roots: Vec<u32> =

@@ -231,17 +231,20 @@ fn questions_with_nans_visit_nothing() {
     let mut index = BoxIndex::default();
     let unit = Aabb::new([0.0; 3], [1.0; 3]);
     index.refresh(&[unit], None);
-    let count = |ask: &dyn Fn(&mut dyn FnMut(u32) -> f32)| {
+    let sweep = |start: &Aabb, velocity, time| {
         let mut visits = 0;
-        ask(&mut |_| {
+        index.sweep(start, velocity, time, &mut |_| {
             visits += 1;
             1.0
         });
         visits
     };
-    assert_eq!(count(&|visit| _ = index.sweep(&unit, [f32::NAN, 0.0, 0.0], 1.0, visit)), 0);
-    assert_eq!(count(&|visit| _ = index.sweep(&unit, [1.0; 3], f32::NAN, visit)), 0);
-    assert_eq!(count(&|visit| _ = index.sweep(&Aabb::NOWHERE, [1.0; 3], 1.0, visit)), 0);
-    assert_eq!(count(&|visit| _ = index.near([f32::NAN; 3], 1.0, visit)), 0);
-    assert_eq!(count(&|visit| _ = index.sweep(&unit, [f32::INFINITY, 0.0, 0.0], 1.0, visit)), 1);
+    assert_eq!(sweep(&unit, [f32::NAN, 0.0, 0.0], 1.0), 0);
+    assert_eq!(sweep(&unit, [1.0; 3], f32::NAN), 0);
+    assert_eq!(sweep(&unit, [1.0; 3], -1.0), 0);
+    assert_eq!(sweep(&Aabb::NOWHERE, [1.0; 3], 1.0), 0);
+    assert_eq!(sweep(&unit, [f32::INFINITY, 0.0, 0.0], 1.0), 1);
+    for (point, distance) in [([f32::NAN; 3], 1.0), ([f32::NEG_INFINITY; 3], 1.0), ([0.5; 3], f32::NAN)] {
+        assert_eq!(index.near(point, distance, &mut |_| 1.0), Visited::default());
+    }
 }
