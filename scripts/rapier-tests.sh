@@ -33,7 +33,7 @@ mod scene;
 mod tree;
 pub(crate) use config::PbigConfig;
 pub(crate) use finder::PbigFinder;
-use crate::geometry::PairFinder;
+use crate::geometry::{PairFinder, SceneQuery};
 const MARGIN: f32 = 0.04;
 const MAX_ADAPTIVE_MARGIN: f32 = 0.25;
 

@@ -2,9 +2,8 @@
 
 use crate::scene::{Call, handle, own_margin};
 use crate::tree::{ParryTree, from_tree, to_tree};
-use crate::{PairFinder, PbigConfig};
+use crate::{PairFinder, PbigConfig, SceneQuery};
 use pbig_adapter::{Colliders, Error, HandlePair, PairEvent, Stats, Why};
-use rapier3d::geometry::SceneQuery;
 use rapier3d::math::Real;
 use rapier3d::parry::bounding_volume::Aabb as TreeAabb;
 use rapier3d::parry::partitioning::Bvh;

@@ -62,7 +62,7 @@ pub use pbig_core::GpuFinder;
 #[cfg(feature = "shadow")]
 pub use shadow::{Shadow, differences};
 
-use rapier3d::geometry::PairFinder; // "no `PairFinder`"? rapier3d is not the patched copy: see [patch.crates-io] in pbig/docs/RAPIER_VERSIONS.md
+use rapier3d::geometry::{PairFinder, SceneQuery}; // missing? rapier3d is unpatched: pbig/docs/RAPIER_VERSIONS.md#errors
 use rapier3d::prelude::BroadPhaseBvh;
 use std::any::Any;
 

@@ -6,10 +6,9 @@ pub use pbig_adapter::shadow::{Checker, Difference, Fault, ReplayError, Shadow, 
 
 use crate::scene::{Call, groups_of, handle};
 use crate::tree::from_tree;
-use crate::{PairFinder, PbigFinder};
+use crate::{PairFinder, PbigFinder, SceneQuery};
 use pbig_adapter::shadow::Watched;
 use pbig_adapter::{Aabb, Handle, HandlePair, PairEvent};
-use rapier3d::geometry::SceneQuery;
 use rapier3d::parry::bounding_volume::Aabb as TreeAabb;
 use rapier3d::parry::partitioning::Bvh;
 use rapier3d::parry::query::{contact, distance};
