@@ -89,19 +89,6 @@ fn compare(world: &World, both: &Both, random: &mut SmallRng, questions: usize) 
     hits
 }
 
-/// Compares the answers of the index with those of rapier's own queries on a tree of the same boxes.
-pub(crate) fn compare_with_tree(world: &World, ours: &PbigBroadPhase, seed: u64) -> Result<(), String> {
-    let mut random = SmallRng::seed_from_u64(seed);
-    let (bodies, colliders) = (&world.bodies, &world.colliders);
-    let queries = ours.as_query_pipeline(&DefaultQueryDispatcher, bodies, colliders, QueryFilter::default());
-    let (at, along) = (random3(&mut random, 4.0), random3(&mut random, 1.0));
-    let (of_index, of_tree) = (ask!(&queries, at, along), ask!(&*queries, at, along));
-    if of_index == of_tree {
-        return Ok(());
-    }
-    Err(format!("at {at:?} along {along:?}: {of_index:?}, rapier's own queries: {of_tree:?}"))
-}
-
 #[test]
 fn queries_agree_with_stock_in_each_frame_of_each_scene() {
     let mut hits = 0;
