@@ -8,7 +8,7 @@ use rapier_pbig::PbigBroadPhase;
 use rapier3d::prelude::*;
 use std::collections::HashSet;
 
-/// What an app keeps.
+/// An app that keeps the ordered pairs it was told of.
 #[derive(Default)]
 struct App {
     told: HashSet<(ColliderHandle, ColliderHandle)>,

@@ -22,7 +22,7 @@ pub struct Snapshot<'a> {
     generations: Cow<'a, [u32]>,
     relative_margin: f32,
     adopted: Vec<[RawHandle; 2]>,
-    /// What the order in pairs depends on.
+    /// Sizes of colliders, which decide the order in pairs.
     sizes: Vec<Size>,
     reversed: Vec<[RawHandle; 2]>,
     /// The next update reads all colliders.

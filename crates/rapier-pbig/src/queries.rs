@@ -60,7 +60,7 @@ impl PbigBroadPhase {
 
 /// Scene queries with the names, arguments and results of rapier's [`QueryPipeline`], which they dereference to.
 ///
-/// Of several colliders at exactly the same distance, the one with the lowest index is returned. Lists are sorted by index, and
+/// A query returns the lowest index of several colliders at exactly the same distance. Lists are sorted by index, and
 /// complete before the first element is read. Another filter is set by [`Queries::with_filter`].
 #[derive(Clone)]
 pub struct Queries<'a> {

@@ -10,7 +10,7 @@ use std::collections::HashSet;
 
 type Told = HashSet<(ColliderHandle, ColliderHandle)>;
 
-/// What an app keeps.
+/// An app that keeps the ordered pairs it was told of.
 #[derive(Default)]
 struct App {
     told: Told,
