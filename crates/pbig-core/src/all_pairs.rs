@@ -1,11 +1,12 @@
-//! All pairs of a list of boxes: by a grid, or by testing every pair where the boxes are few.
+//! All pairs of a list of boxes: by a grid, by a tree where a grid would test too many, or by testing every pair of a few.
 
-use crate::grid::{EditedGrid, GridPlan, Hits, Rule, brute_force};
+use crate::grid::{EditedGrid, GridPlan, Hits, Rule, Sorted, brute_force};
+use crate::index::BoxIndex;
 use crate::pairs::{Grouping, Groups};
 use crate::parallel::available_threads;
-use crate::policy::{self, PARALLEL_FROM_BOXES};
+use crate::policy::{self, PARALLEL_FROM_BOXES, search};
 use crate::report::{Checks, Clock, Report, stage};
-use crate::{Aabb, Algorithm, Backend, Config, Error, Pair, Plan, ProxyFilter};
+use crate::{Aabb, Algorithm, Backend, Config, Engine, Error, Pair, Plan, ProxyFilter};
 use std::sync::atomic::AtomicU64;
 
 /// A search: boxes, filters and settings.
@@ -17,6 +18,23 @@ pub(crate) struct Request<'a> {
     pub(crate) config: &'a Config,
     /// How found pairs are counted, for [`Groups::gather`]; not at all if none is given.
     pub(crate) grouping: Option<Grouping>,
+}
+
+/// The structure that holds all boxes as they are.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) enum Held {
+    #[default]
+    Nowhere,
+    InGrid,
+    InTree,
+}
+
+/// The structures that can hold boxes.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Store {
+    pub(crate) grid: EditedGrid,
+    pub(crate) tree: BoxIndex,
+    pub(crate) held: Held,
 }
 
 /// The buffers of a search: what each thread has found.
@@ -31,14 +49,14 @@ impl AllPairs {
         if boxes < PARALLEL_FROM_BOXES { 1 } else { available_threads() }
     }
 
-    /// Leaves all pairs in `hits`, the boxes in `grid` unless they were too few, and what was done in `report`. Returns
-    /// true if the grid has the boxes.
+    /// Leaves all pairs in `hits`, the boxes in `store` unless they were too few, and what was done in `report`.
     pub(crate) fn find(
         &mut self,
         request: &Request<'_>,
-        grid: &mut EditedGrid,
+        store: &mut Store,
         report: &mut Report,
-    ) -> Result<bool, Error> {
+    ) -> Result<(), Error> {
+        store.held = Held::Nowhere;
         self.begin(request);
         let found = AtomicU64::new(0);
         let max_pairs = request.config.limits.pairs();
@@ -49,14 +67,15 @@ impl AllPairs {
         if brute {
             self.test_all(request, &rule, report)
         } else {
-            self.search(request, grid, &rule, report)
+            self.search(request, store, &rule, report)
         }
         let sum = |of: fn(&Hits) -> u64| self.hits.iter().map(of).sum::<u64>();
         let (made, overlaps) = (sum(|hits| hits.tests), sum(|hits| hits.overlaps));
         report.checks = Checks { made, unnecessary: made - overlaps, redundant: 0 };
+        report.work += made + sum(|hits| hits.runs);
         let is_too_many =
             self.hits.iter().any(Hits::is_full) || sum(|hits| hits.pairs.len() as u64) > max_pairs;
-        if is_too_many { Err(Error::TooManyPairs { limit: max_pairs }) } else { Ok(!brute) }
+        if is_too_many { Err(Error::TooManyPairs { limit: max_pairs }) } else { Ok(()) }
     }
 
     fn begin(&mut self, request: &Request<'_>) {
@@ -76,7 +95,7 @@ impl AllPairs {
         report.stages.check += clock.lap();
     }
 
-    fn search(&mut self, request: &Request<'_>, grid: &mut EditedGrid, rule: &Rule<'_>, report: &mut Report) {
+    fn search(&mut self, request: &Request<'_>, store: &mut Store, rule: &Rule<'_>, report: &mut Report) {
         let workers = self.hits.len();
         let mut clock = Clock::start();
         let plan = {
@@ -86,16 +105,53 @@ impl AllPairs {
         report.stages.plan += clock.lap();
         let sorted = {
             stage!("map");
-            grid.build(plan, request.boxes, workers)
+            store.grid.build(plan, request.boxes, workers)
         };
+        report.stages.map += clock.lap();
+        let is_grid = self.is_for_grid(request, &sorted, rule);
+        if is_grid {
+            stage!("check");
+            sorted.search(rule, &mut self.hits);
+            store.held = Held::InGrid;
+        }
+        report.stages.check += clock.lap();
+        report.invalid = u64::from(store.grid.grid().invalid);
+        report.plan = Plan::of_grid(Algorithm::Grid, &store.grid);
+        if !is_grid {
+            self.join(request, store, rule, report);
+        }
+    }
+
+    /// Returns true if a grid finds the pairs with less work than a tree.
+    fn is_for_grid(&mut self, request: &Request<'_>, sorted: &Sorted<'_>, rule: &Rule<'_>) -> bool {
+        if let Some(engine) = request.config.forced_engine() {
+            return engine != Engine::Tree;
+        }
+        let (boxes, work) = (request.boxes.len(), sorted.work());
+        if search::is_light(boxes, work) {
+            return true;
+        }
+        let hits = &mut self.hits[0];
+        let overlaps = sorted.overlaps_in_sample(search::sample_one_in(boxes, work), rule, hits);
+        let Grouping { count, shift, .. } = request.grouping.unwrap_or_default();
+        hits.begin(count, shift);
+        search::is_fruitful(boxes, work, overlaps)
+    }
+
+    fn join(&mut self, request: &Request<'_>, store: &mut Store, rule: &Rule<'_>, report: &mut Report) {
+        let mut clock = Clock::start();
+        {
+            stage!("map");
+            store.tree.sort(request.boxes);
+        }
         report.stages.map += clock.lap();
         {
             stage!("check");
-            sorted.search(rule, &mut self.hits);
+            store.tree.join(rule, &mut self.hits);
         }
         report.stages.check += clock.lap();
-        report.invalid = u64::from(grid.grid().invalid);
-        report.plan = Plan::of_grid(Algorithm::Grid, grid);
+        store.held = Held::InTree;
+        report.plan = Plan { algorithm: Algorithm::Tree, boxes: report.plan.boxes, ..Plan::default() };
     }
 
     /// Gathers what was found, for sorting.
@@ -138,7 +194,7 @@ mod tests {
         let boxes = vec![Aabb::new([0.0; 3], [1.0; 3]); 20_000];
         let request = Request { boxes: &boxes, filters: None, config: &config, grouping: None };
         let mut all = AllPairs::default();
-        let found = all.find(&request, &mut EditedGrid::default(), &mut Report::default());
+        let found = all.find(&request, &mut Store::default(), &mut Report::default());
         assert_eq!(found, Err(Error::TooManyPairs { limit: 1000 }));
         let kept: usize = all.hits.iter().map(|hits| hits.pairs.capacity()).sum();
         assert!(kept < 1_000_000, "room for {kept} pairs");

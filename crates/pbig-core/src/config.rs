@@ -211,6 +211,8 @@ pub enum Engine {
     Sweep,
     /// Changed boxes are moved in the grid and searched for. All are sorted anew where there is no grid yet.
     Edit,
+    /// Changed boxes are looked up in a tree, all if there is none yet or they are many.
+    Tree,
     /// All boxes are sorted into a grid, searched and compared.
     Rebuild,
 }

@@ -1,10 +1,9 @@
 //! `Finder`: all pairs of a list of boxes, with nothing kept between calls but memory.
 
-use crate::all_pairs::{AllPairs, Request};
+use crate::all_pairs::{AllPairs, Request, Store};
 #[cfg(feature = "gpu")]
 use crate::gpu::{GpuFinder, SearchRequest};
 use crate::gpu_slot::GpuSlot;
-use crate::grid::EditedGrid;
 use crate::pairs::{Grouping, Groups};
 use crate::report::{Clock, Report, stage};
 use crate::{Aabb, Config, Error, Limits, Order, Pair, ProxyFilter};
@@ -44,7 +43,7 @@ pub fn find_pairs(boxes: &[Aabb]) -> Result<Vec<Pair>, Error> {
 pub struct Finder {
     config: Config,
     gpu: GpuSlot,
-    grid: EditedGrid,
+    store: Store,
     all_pairs: AllPairs,
     groups: Groups,
     pairs: Vec<Pair>,
@@ -104,7 +103,7 @@ impl Finder {
         #[cfg(feature = "gpu")]
         let is_found = is_found && self.find_on_gpu(&request)?;
         if !is_found {
-            self.all_pairs.find(&request, &mut self.grid, &mut self.report)?;
+            self.all_pairs.find(&request, &mut self.store, &mut self.report)?;
             self.report.plan.no_gpu = no_gpu;
             self.emit(grouping);
         }

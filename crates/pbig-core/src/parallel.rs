@@ -55,6 +55,21 @@ fn run_workers(_: usize, take_pieces: impl Fn(usize) + Sync) {
     take_pieces(0);
 }
 
+/// Does two works at once, if a thread is free for the first.
+#[cfg(feature = "parallel")]
+pub(crate) fn join(first: impl FnOnce() + Send, second: impl FnOnce()) {
+    rayon::in_place_scope(|scope| {
+        scope.spawn(|_| first());
+        second();
+    });
+}
+
+#[cfg(not(feature = "parallel"))]
+pub(crate) fn join(first: impl FnOnce(), second: impl FnOnce()) {
+    first();
+    second();
+}
+
 /// Returns the part of `0..len` that belongs to `piece` of `pieces` equal ones.
 pub(crate) fn piece_range(len: usize, piece: usize, pieces: usize) -> std::ops::Range<usize> {
     len * piece / pieces..len * (piece + 1) / pieces

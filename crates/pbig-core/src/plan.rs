@@ -19,6 +19,8 @@ pub enum Algorithm {
     Grid,
     /// Changed boxes were moved in the grid of an earlier update, and only they were searched for.
     Edit,
+    /// All boxes were sorted into a tree, as cells would hold too many, or changed boxes were searched for in one.
+    Tree,
     /// A GPU did the work.
     Gpu,
 }
@@ -32,6 +34,7 @@ impl Algorithm {
             Self::Sweep => "sweep",
             Self::Grid => "grid",
             Self::Edit => "edit",
+            Self::Tree => "tree",
             Self::Gpu => "gpu",
         }
     }
@@ -121,6 +124,7 @@ impl fmt::Display for Plan {
             Algorithm::Nothing => write!(f, "nothing to do: no box has changed")?,
             Algorithm::Brute => write!(f, "brute force: every pair of {boxes} boxes is tested")?,
             Algorithm::Sweep => write!(f, "sweep: changed boxes are tested against all {boxes}")?,
+            Algorithm::Tree => write!(f, "tree: cells would hold too many of {boxes} boxes, or few have changed")?,
             Algorithm::Gpu => self.write_gpu(f)?,
             Algorithm::Grid => write!(f, "grid: {boxes} boxes are sorted and searched")?,
             Algorithm::Edit => {
@@ -144,8 +148,8 @@ mod tests {
 
     #[test]
     fn every_algorithm_says_why_no_gpu_was_used() {
-        use Algorithm::{Brute, Edit, Grid, Nothing, Sweep};
-        for algorithm in [Nothing, Brute, Sweep, Grid, Edit] {
+        use Algorithm::{Brute, Edit, Grid, Nothing, Sweep, Tree};
+        for algorithm in [Nothing, Brute, Sweep, Grid, Edit, Tree] {
             let shown = |no_gpu| Plan { algorithm, boxes: 9, no_gpu, ..Plan::default() }.to_string();
             assert!(shown(Some(NoGpu::Software)).ends_with("; no GPU: the given device is software"));
             // Nothing has failed where nobody asked.

@@ -103,6 +103,9 @@ pub struct Report {
     /// Tests made. On a GPU the map's estimate, without unnecessary and redundant ones, unless
     /// [`crate::GpuOptions::count_tests`] is set.
     pub checks: Checks,
+    /// The work in counts: tests made, runs of cells, nodes of a tree and entries of lists that were looked at. At most
+    /// [`crate::WORK_LIMIT`] for each box or changed box and each pair, times the binary logarithm of the number of boxes. 0 on a GPU.
+    pub work: u64,
     /// Pairs reported ([`crate::BroadPhase`]: pairs that exist now).
     pub pairs: u64,
     /// The plan: the algorithm, the grid and the reasons.

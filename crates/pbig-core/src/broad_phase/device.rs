@@ -1,5 +1,6 @@
 //! An update on a GPU: only what has changed goes there, only pairs that were added or removed come back.
 
+use crate::all_pairs::Held;
 use super::BroadPhase;
 #[cfg(feature = "unstable-study")]
 use crate::Limits;
@@ -68,7 +69,7 @@ impl BroadPhase {
         let found = self.gpu.call(&mut self.report, |gpu| gpu.changes(&request))?;
         self.report.invalid = invalid;
         let Some(found) = found else { return Ok(false) };
-        self.has_grid = false;
+        self.store.held = Held::Nowhere;
         self.sweep.expire();
         self.sort_out(&found);
         Ok(true)

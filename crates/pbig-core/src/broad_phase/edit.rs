@@ -4,7 +4,7 @@
 //! update takes time in proportion to what changed.
 
 use super::world::{Old, World};
-use crate::grid::{Candidates, EditedGrid, Meet, Place, Record};
+use crate::grid::{Budget, Candidates, EditedGrid, Meet, Place, Record};
 use crate::pairs::Comparison;
 use crate::parallel::{SharedSlice, available_threads, piece_range, run_with};
 use crate::policy;
@@ -25,6 +25,15 @@ pub(super) struct Edit {
     listed: Vec<Record>,
     /// Key and place in that list.
     order: Vec<u64>,
+    /// Work of the last run.
+    work: u64,
+}
+
+/// Limits of a run: pairs to be listed, and work to be done.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct EditLimits {
+    pub(super) pairs: u64,
+    pub(super) work: u64,
 }
 
 /// The findings and buffers of one thread.
@@ -38,22 +47,40 @@ struct Thread {
 
 impl Edit {
     /// Brings `grid` up to date with the changes of the world, and leaves the events in `events`, sorted: all, or more new
-    /// pairs than `max_pairs`. Returns the tests made.
+    /// pairs than the limit. Returns false if the work is beyond its limit; the grid and the events are good for nothing then.
     pub(super) fn run(
         &mut self,
         world: &World,
         grid: &mut EditedGrid,
         events: &mut Comparison,
-        max_pairs: u64,
-    ) -> Checks {
+        limits: EditLimits,
+    ) -> bool {
+        let budget = Budget::new(limits.work);
+        self.work = 0;
+        if grid.work_with_oversize(world.changed.len()) > limits.work {
+            return false;
+        }
         self.list(world, grid);
         let threads = if self.before.len() < policy::PARALLEL_FROM_EDITS { 1 } else { available_threads() };
         self.threads.resize_with(threads.max(self.threads.len()), Thread::default);
         self.threads.iter_mut().for_each(Thread::clear);
-        self.find_ended(world, grid, threads);
-        grid.move_all(&self.after, &self.places);
-        self.find_new(world, grid, threads, max_pairs);
-        self.gather(events, world.ids());
+        self.find_ended(world, grid, &budget, threads);
+        if !budget.is_over() {
+            grid.move_all(&self.after, &self.places);
+            self.find_new(world, grid, &budget, (threads, limits.pairs));
+            self.gather(events, world.ids());
+        }
+        self.work = budget.spent();
+        !budget.is_over()
+    }
+
+    /// Returns the work of the last run.
+    pub(super) fn work(&self) -> u64 {
+        self.work
+    }
+
+    /// Returns the tests of the last run.
+    pub(super) fn checks(&self) -> Checks {
         let sum = |of: fn(&Candidates) -> u64| {
             self.threads.iter().map(|thread| of(&thread.candidates)).sum::<u64>()
         };
@@ -78,7 +105,7 @@ impl Edit {
         grid.keys(after);
     }
 
-    fn find_ended(&mut self, world: &World, grid: &EditedGrid, threads: usize) {
+    fn find_ended(&mut self, world: &World, grid: &EditedGrid, budget: &Budget, threads: usize) {
         let Self { before, after, places, threads: all, .. } = self;
         places.clear();
         places.resize(before.len(), Place::Nowhere);
@@ -90,18 +117,25 @@ impl Edit {
             // SAFETY: each piece has its own range.
             let places = unsafe { places.part(range.clone()) };
             let (before, after) = (&before[range.clone()], &after[range]);
-            grid.look_up(before, candidates, &mut Ended { world, before, after, places, removed, dropped });
+            let mut ended = Ended { world, before, after, places, removed, dropped };
+            grid.look_up(before, candidates, budget, &mut ended);
         });
     }
 
-    fn find_new(&mut self, world: &World, grid: &EditedGrid, threads: usize, max_pairs: u64) {
+    fn find_new(
+        &mut self,
+        world: &World,
+        grid: &EditedGrid,
+        budget: &Budget,
+        (threads, max_pairs): (usize, u64),
+    ) {
         let Self { before, after, threads: all, .. } = self;
         let (before, after) = (&*before, &*after);
         run_with(&mut all[..threads], threads, |thread, piece| {
             let range = piece_range(after.len(), piece, threads);
             let Thread { candidates, added, .. } = thread;
             let (before, after) = (&before[range.clone()], &after[range]);
-            grid.look_up(after, candidates, &mut New { world, before, after, added, max_pairs });
+            grid.look_up(after, candidates, budget, &mut New { world, before, after, added, max_pairs });
         });
     }
 
@@ -121,7 +155,7 @@ impl Thread {
         self.added.clear();
         self.removed.clear();
         self.dropped.clear();
-        (self.candidates.tests, self.candidates.met) = (0, 0);
+        self.candidates.clear_counts();
     }
 }
 

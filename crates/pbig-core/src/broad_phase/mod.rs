@@ -1,7 +1,7 @@
 //! The incremental form: boxes are set and removed by id, an update tells which pairs were added and removed.
 //!
 //! ```text
-//! set, remove ─► world ─► policy ─► sweep, edit, or rebuild and compare ─► kept pairs ─► events
+//! set, remove ─► world ─► policy ─► sweep, edit, look up in a tree, or rebuild and compare ─► kept pairs ─► events
 //! ```
 
 #[cfg(feature = "gpu")]
@@ -17,10 +17,9 @@ mod tests;
 mod update;
 mod world;
 
-use crate::all_pairs::AllPairs;
+use crate::all_pairs::{AllPairs, Store};
 use crate::finder::check_count;
 use crate::gpu_slot::GpuSlot;
-use crate::grid::EditedGrid;
 use crate::pairs::{Comparison, Groups, Kept};
 use crate::policy;
 use crate::report::Report;
@@ -49,7 +48,7 @@ pub struct Events {
 /// top.
 ///
 /// An update in which few boxes have changed tests only these. An update in which many have changed sorts all boxes into a
-/// grid, searches it, and compares the pairs with those of the last update.
+/// grid (or a tree, where a cell would hold too many), searches it, and compares the pairs with those of the last update.
 ///
 /// ```
 /// use pbig_core::{Aabb, BroadPhase, Config, Pair, ProxyFilter};
@@ -69,9 +68,10 @@ pub struct BroadPhase {
     /// Updates that have changed something.
     updates: u64,
     world: World,
-    grid: EditedGrid,
-    /// True if the grid holds the boxes of the last update.
-    has_grid: bool,
+    /// The boxes of the last update.
+    store: Store,
+    /// Work of the last search of all boxes.
+    rebuild_work: u64,
     sweep: Sweep,
     edit: Edit,
     all_pairs: AllPairs,
@@ -172,7 +172,7 @@ impl BroadPhase {
     pub fn shrink_to_fit(&mut self) {
         self.world.shrink();
         self.kept.shrink();
-        (self.grid, self.has_grid) = (EditedGrid::default(), false);
+        self.store = Store::default();
         (self.sweep, self.edit) = (Sweep::default(), Edit::default());
         (self.all_pairs, self.groups) = (AllPairs::default(), Groups::default());
         self.comparison.shrink();

@@ -1,6 +1,7 @@
 //! Questions to a broad phase: its boxes, its pairs, and the report of the last update.
 
 use super::{BroadPhase, Events};
+use crate::all_pairs::Held;
 use crate::report::Report;
 use crate::{Aabb, Config, OccupiedCell, Pair, ProxyFilter};
 
@@ -101,7 +102,7 @@ impl BroadPhase {
     /// Returns the occupied cells of the grid, for pictures. There are none if the last update needed no grid or ran on a GPU.
     /// Takes time and memory in proportion to the cells.
     pub fn cells(&self) -> Vec<OccupiedCell> {
-        if self.has_grid { self.grid.occupied_cells() } else { Vec::new() }
+        if self.store.held == Held::InGrid { self.store.grid.occupied_cells() } else { Vec::new() }
     }
 
     /// Returns the ids of all stored (fat) boxes that overlap a box, in no particular order. Filters are ignored.
@@ -130,9 +131,9 @@ impl BroadPhase {
     /// As [`BroadPhase::overlapping`], if there is a grid of all boxes. Returns false, and finds nothing, if there is none:
     /// the last update used none, or boxes have changed since.
     pub fn overlapping_in_grid(&self, aabb: &Aabb, found: &mut dyn FnMut(u32)) -> bool {
-        let has_grid = self.has_grid && self.world.changed.is_empty();
+        let has_grid = self.store.held == Held::InGrid && self.world.changed.is_empty();
         if has_grid && aabb.is_valid() {
-            self.grid.overlapping(aabb, found);
+            self.store.grid.overlapping(aabb, found);
         }
         has_grid
     }

@@ -5,7 +5,8 @@ use rand::rngs::StdRng;
 use rand::{RngExt, SeedableRng};
 use std::collections::BTreeSet;
 
-const ENGINES: [Option<Engine>; 4] = [None, Some(Engine::Sweep), Some(Engine::Edit), Some(Engine::Rebuild)];
+const ENGINES: [Option<Engine>; 5] =
+    [None, Some(Engine::Sweep), Some(Engine::Edit), Some(Engine::Tree), Some(Engine::Rebuild)];
 
 /// A broad phase, and what it must know.
 struct Checked {

@@ -1,7 +1,8 @@
 //! An update: choose an engine, run it, keep the pairs, report.
 
+use super::edit::EditLimits;
 use super::{BroadPhase, Events};
-use crate::all_pairs::{AllPairs, Request};
+use crate::all_pairs::{AllPairs, Held, Request};
 use crate::pairs::Grouping;
 use crate::policy::{self, Counts};
 use crate::report::{Clock, stage};
@@ -45,8 +46,9 @@ impl BroadPhase {
     fn find_on_cpu(&mut self) -> Result<(), Error> {
         match self.engine() {
             Engine::Sweep => self.run_sweep(),
-            Engine::Edit => self.run_edit(),
-            Engine::Rebuild => self.rebuild(),
+            Engine::Edit if self.run_edit() => self.apply_events(),
+            Engine::Tree if self.run_in_tree() => self.apply_events(),
+            Engine::Edit | Engine::Tree | Engine::Rebuild => self.rebuild(),
         }
     }
 
@@ -59,8 +61,8 @@ impl BroadPhase {
             ids: self.world.ids(),
             changed: self.world.changed.len(),
             knows_old: self.world.knows_old(),
-            has_grid: self.has_grid,
-            spilled: self.grid.spilled(),
+            held: self.store.held,
+            spilled: self.store.grid.spilled(),
         };
         policy::choose_engine(&counts, self.config.forced_engine())
     }
@@ -70,29 +72,53 @@ impl BroadPhase {
         let mut clock = Clock::start();
         self.report.checks = self.sweep.run(&self.world, &self.kept, &mut self.comparison);
         self.report.stages.check = clock.lap();
+        self.report.work = self.report.checks.made;
         self.report.plan.algorithm = Algorithm::Sweep;
-        self.has_grid = false;
-        self.apply_events()?;
-        self.report.stages.diff = clock.lap();
-        Ok(())
+        self.store.held = Held::Nowhere;
+        self.apply_events()
     }
 
-    fn run_edit(&mut self) -> Result<(), Error> {
+    /// Returns false if it would take too much work: the grid is to be built anew.
+    fn run_edit(&mut self) -> bool {
         stage!("edit");
         let mut clock = Clock::start();
-        let limit = self.config.limits.pairs();
-        self.report.checks = self.edit.run(&self.world, &mut self.grid, &mut self.comparison, limit);
+        let limits = EditLimits {
+            pairs: self.config.limits.pairs(),
+            work: policy::edit_up_to_work(self.world.present() as usize, self.rebuild_work),
+        };
+        let done = self.edit.run(&self.world, &mut self.store.grid, &mut self.comparison, limits);
         self.report.stages.check = clock.lap();
-        self.report.plan = Plan::of_grid(Algorithm::Edit, &self.grid);
+        self.report.work += self.edit.work().min(limits.work);
+        self.report.checks = self.edit.checks();
+        self.report.plan = Plan::of_grid(Algorithm::Edit, &self.store.grid);
         self.report.plan.boxes = self.world.valid();
         self.sweep.expire();
-        self.apply_events()?;
-        self.report.stages.diff = clock.lap();
-        Ok(())
+        done
+    }
+
+    /// Looks up changed boxes in a tree, which is brought up to date first. Returns false if that would take too much work.
+    fn run_in_tree(&mut self) -> bool {
+        stage!("tree");
+        let mut clock = Clock::start();
+        let Self { world, store, .. } = self;
+        let changed = (store.held == Held::InTree).then_some(&world.changed[..]);
+        self.report.work = store.tree.keep_sorted(&world.boxes, changed);
+        store.held = Held::InTree;
+        self.report.stages.map = clock.lap();
+        let max_nodes = self.config.forced_engine().map_or(policy::look_up_to_nodes(world.ids()), |_| u64::MAX);
+        let tree = (&store.tree, max_nodes);
+        let (checks, nodes) = self.sweep.run_in_tree(world, &self.kept, tree, &mut self.comparison);
+        self.report.checks = checks;
+        self.report.work += checks.made + nodes;
+        self.report.stages.check = clock.lap();
+        self.report.plan.algorithm = Algorithm::Tree;
+        self.sweep.expire();
+        nodes <= max_nodes
     }
 
     /// Keeps the pairs that an engine has found to be new, and forgets those that have ended.
     fn apply_events(&mut self) -> Result<(), Error> {
+        let mut clock = Clock::start();
         let events = &self.comparison;
         let gone = events.removed.len() + events.dropped.len();
         let limit = self.config.limits.pairs();
@@ -101,6 +127,7 @@ impl BroadPhase {
         }
         self.kept.drop_pairs(&events.dropped);
         self.kept.apply(&events.added, &events.removed);
+        self.report.stages.diff = clock.lap();
         Ok(())
     }
 
@@ -113,7 +140,8 @@ impl BroadPhase {
             Request { boxes: &world.boxes, filters, config: &self.config, grouping: Some(grouping) };
         let invalid = self.report.invalid;
         self.sweep.expire();
-        self.has_grid = self.all_pairs.find(&request, &mut self.grid, &mut self.report)?;
+        self.all_pairs.find(&request, &mut self.store, &mut self.report)?;
+        self.rebuild_work = self.report.checks.made;
         self.report.invalid = invalid;
         stage!("diff");
         let mut clock = Clock::start();
@@ -129,7 +157,7 @@ impl BroadPhase {
 
     /// Makes the next update begin with nothing but the boxes and the kept pairs.
     fn fail(&mut self) {
-        self.has_grid = false;
+        self.store.held = Held::Nowhere;
         self.sweep.expire();
         self.report.pairs = self.kept.len() as u64;
         #[cfg(feature = "gpu")]
@@ -160,7 +188,7 @@ impl BroadPhase {
     fn begin_report(&mut self) {
         let present = u64::from(self.world.present());
         let report = &mut self.report;
-        (report.stages, report.checks) = Default::default();
+        (report.stages, report.checks, report.work) = Default::default();
         report.boxes = present;
         report.invalid = present - u64::from(self.world.valid());
         report.changed = self.world.changed.len() as u64;

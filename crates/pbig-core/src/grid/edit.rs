@@ -11,6 +11,7 @@ use super::search::KeyRun;
 use super::simd::{Kernel, Simd, dispatch, prefetch};
 use super::{Grid, Sorted};
 use crate::Aabb;
+use crate::policy::search::WORK_OF_EXACT_TEST;
 
 /// Boxes between a prefetch and the move.
 const AHEAD: usize = 12;
@@ -29,7 +30,9 @@ pub(crate) struct EditedGrid {
 #[derive(Clone, Debug, Default)]
 pub(super) struct Spill {
     records: Vec<Record>,
+    /// By entry: the one behind it and the one before it in its list.
     next: Vec<u32>,
+    before: Vec<u32>,
     free: Vec<u32>,
     /// By cell: the first entry. Empty until the first box moves.
     heads: Vec<u32>,
@@ -102,6 +105,7 @@ impl Spill {
         }
         self.records.clear();
         self.next.clear();
+        self.before.clear();
         self.free.clear();
     }
 
@@ -115,23 +119,26 @@ impl Spill {
         if entry as usize == self.records.len() {
             self.records.push(record);
             self.next.push(NONE);
+            self.before.push(NONE);
         }
+        let second = std::mem::replace(&mut self.heads[key], entry);
         self.records[entry as usize] = record;
-        self.next[entry as usize] = std::mem::replace(&mut self.heads[key], entry);
+        (self.next[entry as usize], self.before[entry as usize]) = (second, NONE);
+        if second != NONE {
+            self.before[second as usize] = entry;
+        }
         self.occupied[key / 64] |= 1 << (key % 64);
     }
 
     fn remove(&mut self, entry: u32) {
         let key = self.records[entry as usize].key as usize;
-        let next = self.next[entry as usize];
-        if self.heads[key] == entry {
-            self.heads[key] = next;
-        } else {
-            let mut before = self.heads[key];
-            while self.next[before as usize] != entry {
-                before = self.next[before as usize];
-            }
-            self.next[before as usize] = next;
+        let (next, before) = (self.next[entry as usize], self.before[entry as usize]);
+        match before {
+            NONE => self.heads[key] = next,
+            before => self.next[before as usize] = next,
+        }
+        if next != NONE {
+            self.before[next as usize] = before;
         }
         if self.heads[key] == NONE {
             self.occupied[key / 64] &= !(1 << (key % 64));
@@ -150,6 +157,11 @@ impl EditedGrid {
     /// Returns the grid without the spilled boxes, for reports.
     pub(crate) fn grid(&self) -> &Grid {
         &self.grid
+    }
+
+    /// Returns the work of looking up so many boxes among the oversize ones, before and after they move.
+    pub(crate) fn work_with_oversize(&self, boxes: usize) -> u64 {
+        2 * (boxes * self.grid.oversize.len()) as u64 * WORK_OF_EXACT_TEST
     }
 
     /// Returns how many boxes are out of the grid's order.

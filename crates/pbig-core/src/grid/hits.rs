@@ -46,6 +46,8 @@ pub(crate) struct Hits {
     pub(crate) group_shift: u32,
     /// Candidates tested.
     pub(crate) tests: u64,
+    /// Runs of cells, or nodes of a tree, looked at.
+    pub(crate) runs: u64,
     /// Overlapping boxes met, filtered ones included.
     pub(crate) overlaps: u64,
     /// Pairs that other threads know of.
@@ -94,7 +96,7 @@ impl Hits {
         self.groups.clear();
         self.groups.resize(groups, 0);
         self.group_shift = shift;
-        (self.tests, self.overlaps, self.accounted, self.is_full) = (0, 0, 0, false);
+        (self.tests, self.runs, self.overlaps, self.accounted, self.is_full) = (0, 0, 0, 0, false);
     }
 
     /// Returns true if more pairs were found than may be.
@@ -163,7 +165,7 @@ impl Hits {
 
     /// Filters, counts and accounts for the pairs from `from` on.
     #[inline(always)]
-    pub(super) fn keep(&mut self, from: usize, rule: &Rule<'_>) {
+    pub(crate) fn keep(&mut self, from: usize, rule: &Rule<'_>) {
         self.overlaps += (self.pairs.len() - from) as u64;
         if let Some(filters) = rule.filters {
             self.filter(from, filters);

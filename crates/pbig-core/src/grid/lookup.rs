@@ -6,6 +6,8 @@ use super::record::Record;
 use super::search::KeyRun;
 use super::simd::{BLOCK, Kernel, Simd, dispatch, prefetch};
 use crate::Aabb;
+use crate::policy::search::{WORK_OF_ENTRY, WORK_OF_EXACT_TEST};
+use std::sync::atomic::{AtomicU64, Ordering};
 
 /// Candidates that are tested together, at most.
 const ROOM: usize = 4096;
@@ -51,6 +53,32 @@ impl Row {
     }
 }
 
+/// The work that look-ups may take, and what all threads have taken. Beyond the limit they end early.
+#[derive(Debug)]
+pub(crate) struct Budget {
+    limit: u64,
+    spent: AtomicU64,
+}
+
+impl Budget {
+    pub(crate) fn new(limit: u64) -> Self {
+        Self { limit, spent: AtomicU64::new(0) }
+    }
+
+    /// Returns the work done so far.
+    pub(crate) fn spent(&self) -> u64 {
+        self.spent.load(Ordering::Relaxed)
+    }
+
+    /// Returns true if more than the limit was spent. Whether it will be depends on the work alone, not on the threads.
+    pub(crate) fn is_over(&self) -> bool {
+        self.spent() > self.limit
+    }
+}
+
+/// Work of a thread before it tells the others.
+const CHARGED_TOGETHER: u64 = 4096;
+
 /// Buffers of a look-up: candidates as the number of the box and a slot, or an entry of the spill list.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Candidates {
@@ -61,6 +89,10 @@ pub(crate) struct Candidates {
     room: usize,
     /// Stored boxes tested.
     pub(crate) tests: u64,
+    /// The work: tests of codes, rows, and exact tests of what lies out of order.
+    work: u64,
+    /// The part of the work that other threads know of.
+    charged: u64,
     /// Stored boxes that overlapped, each box itself included.
     pub(crate) met: u64,
 }
@@ -73,24 +105,64 @@ impl Candidates {
         self.places.resize(self.room + 2 * BLOCK, 0);
         self.len = 0;
     }
+
+    /// Forgets what was counted.
+    pub(crate) fn clear_counts(&mut self) {
+        (self.tests, self.met, self.work, self.charged) = (0, 0, 0, 0);
+    }
+
+    /// Counts the candidates from `from` on, which are entries of lists.
+    #[inline(always)]
+    fn count_entries(&mut self, from: usize) {
+        let entries = (self.len - from) as u64;
+        self.tests += entries;
+        self.work += entries * WORK_OF_ENTRY;
+    }
+
+    /// Returns true if the budget allows to go on.
+    #[inline(always)]
+    fn may_go_on(&mut self, budget: &Budget) -> bool {
+        if self.work - self.charged < CHARGED_TOGETHER {
+            return true;
+        }
+        self.charge(budget);
+        !budget.is_over()
+    }
+
+    fn charge(&mut self, budget: &Budget) {
+        budget.spent.fetch_add(self.work - self.charged, Ordering::Relaxed);
+        self.charged = self.work;
+    }
 }
 
 /// Marks an entry of the spill list. Slots are below 2^28.
 const SPILL: u32 = 1 << 31;
 
 impl EditedGrid {
-    /// Hands every stored box that overlaps one of `boxes` to `meet`. Invalid boxes meet nothing.
-    pub(crate) fn look_up<M: Meet>(&self, boxes: &[Record], candidates: &mut Candidates, meet: &mut M) {
+    /// Hands every stored box that overlaps one of `boxes` to `meet`; some only, if the budget does not suffice. Invalid boxes
+    /// meet nothing.
+    pub(crate) fn look_up<M: Meet>(
+        &self,
+        boxes: &[Record],
+        candidates: &mut Candidates,
+        budget: &Budget,
+        meet: &mut M,
+    ) {
         candidates.begin(boxes.len());
-        dispatch(LookUp { grid: self, boxes, candidates, meet });
+        dispatch(LookUp { grid: self, boxes, candidates, budget, meet });
         for (i, one) in boxes.iter().enumerate().filter(|(_, one)| one.aabb.is_valid()) {
+            if !candidates.may_go_on(budget) {
+                break;
+            }
             self.meet_oversize(i, one, candidates, meet);
         }
+        candidates.charge(budget);
     }
 
     fn meet_oversize<M: Meet>(&self, i: usize, one: &Record, counts: &mut Candidates, meet: &mut M) {
         let mut counted = |stored: &Record, place: Place| {
             counts.tests += 1;
+            counts.work += WORK_OF_EXACT_TEST;
             if one.overlaps(stored) {
                 counts.met += 1;
                 meet.meet(i, stored, place);
@@ -124,7 +196,7 @@ impl EditedGrid {
             }
         }
         let one = [Record::new(*aabb, u32::MAX, 0)];
-        self.look_up(&one, &mut Candidates::default(), &mut Visit(visit));
+        self.look_up(&one, &mut Candidates::default(), &Budget::new(u64::MAX), &mut Visit(visit));
     }
 }
 
@@ -132,6 +204,7 @@ struct LookUp<'a, M> {
     grid: &'a EditedGrid,
     boxes: &'a [Record],
     candidates: &'a mut Candidates,
+    budget: &'a Budget,
     meet: &'a mut M,
 }
 
@@ -165,6 +238,9 @@ impl<M: Meet> LookUp<'_, M> {
             if self.candidates.rows.len() >= ROWS {
                 // SAFETY: as above.
                 unsafe { self.look_through::<S>() };
+                if self.budget.is_over() {
+                    break;
+                }
             }
         }
         // SAFETY: as above.
@@ -205,17 +281,24 @@ impl<M: Meet> LookUp<'_, M> {
     unsafe fn look_through<S: Simd>(&mut self) {
         let mut rows = std::mem::take(&mut self.candidates.rows);
         let grid = &self.grid.grid;
+        self.candidates.work += rows.len() as u64;
         if !self.grid.spill.is_empty() {
             rows.iter().for_each(|row| self.grid.spill.prefetch_heads(row.cells()));
-            rows.iter().for_each(|row| self.spilled(row));
+            self.spilled(&rows);
         }
+        let mut slots = 0;
         for row in &mut rows {
             (row.first, row.end) = (grid.starts[row.first as usize], grid.starts[row.end as usize]);
+            slots += u64::from(row.end - row.first);
             prefetch(grid.codes.as_ptr().wrapping_add(row.first as usize));
         }
-        for row in &rows {
-            // SAFETY: the caller has the instructions.
-            unsafe { self.slots::<S>(row) };
+        self.candidates.tests += slots;
+        self.candidates.work += slots;
+        if self.candidates.may_go_on(self.budget) {
+            for row in &rows {
+                // SAFETY: the caller has the instructions.
+                unsafe { self.slots::<S>(row) };
+            }
         }
         rows.clear();
         self.candidates.rows = rows;
@@ -225,7 +308,6 @@ impl<M: Meet> LookUp<'_, M> {
     #[inline(always)]
     unsafe fn slots<S: Simd>(&mut self, row: &Row) {
         let grid = &self.grid.grid;
-        self.candidates.tests += u64::from(row.end - row.first);
         for first in (row.first..row.end).step_by(BLOCK) {
             let beyond = (row.end - first).min(BLOCK as u32);
             let Candidates { boxes, places, len, .. } = &mut *self.candidates;
@@ -244,20 +326,30 @@ impl<M: Meet> LookUp<'_, M> {
         }
     }
 
-    /// Gathers the spilled boxes of a run of cells.
+    /// Gathers the spilled boxes in rows of cells; not all if there are more than the budget allows.
     #[inline(always)]
-    fn spilled(&mut self, row: &Row) {
+    fn spilled(&mut self, rows: &[Row]) {
         let grid = self.grid;
-        grid.spill.visit(row.cells(), |entry| {
-            prefetch(grid.spill.record(entry));
-            let at = self.candidates.len;
-            (self.candidates.boxes[at], self.candidates.places[at]) = (row.i, entry | SPILL);
-            self.candidates.len += 1;
-            self.candidates.tests += 1;
-            if self.candidates.len > self.candidates.room {
-                self.test();
+        // Candidates from here on are not counted yet.
+        let (mut uncounted, mut may_go_on) = (self.candidates.len, true);
+        for row in rows {
+            grid.spill.visit(row.cells(), |entry| {
+                prefetch(grid.spill.record(entry));
+                let at = self.candidates.len;
+                (self.candidates.boxes[at], self.candidates.places[at]) = (row.i, entry | SPILL);
+                self.candidates.len += 1;
+                if self.candidates.len > self.candidates.room {
+                    self.candidates.count_entries(uncounted);
+                    uncounted = 0;
+                    self.test();
+                    may_go_on = self.candidates.may_go_on(self.budget);
+                }
+            });
+            if !may_go_on {
+                break;
             }
-        });
+        }
+        self.candidates.count_entries(uncounted);
     }
 
     /// Tests the candidates so far exactly.

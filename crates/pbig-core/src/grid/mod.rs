@@ -13,6 +13,7 @@ mod avx2;
 mod bounds;
 mod build;
 mod cells;
+mod count;
 mod edit;
 mod hits;
 mod lookup;
@@ -27,7 +28,7 @@ mod tests;
 
 pub(crate) use edit::EditedGrid;
 pub(crate) use hits::{Hits, Rule};
-pub(crate) use lookup::{Candidates, Meet, Place};
+pub(crate) use lookup::{Budget, Candidates, Meet, Place};
 pub use occupied::OccupiedCell;
 pub(crate) use oversize::brute_force;
 pub(crate) use plan::GridPlan;

@@ -15,7 +15,7 @@ impl Grid {
         let from = hits.pairs.len();
         self.reached_by(&one.aabb, |run| {
             let (first, end) = self.slots(run);
-            hits.tests += (end - first) as u64;
+            (hits.tests, hits.runs) = (hits.tests + (end - first) as u64, hits.runs + 1);
             test_run(one, &self.records[first..end], &mut hits.pairs);
         });
         hits.tests += (self.oversize.len() - i - 1) as u64;

@@ -106,6 +106,13 @@ impl Spacing {
         (f64::from(self.extent[k]) / (MAX_STEPS_PER_BOX - 1.0)).max(self.edge / 64.0).max(1e-36)
     }
 
+    /// Returns the extent of the largest box that the grid takes on an axis: larger than any now, so that a box that turns or
+    /// is rounded elsewhere is not oversize at once. A larger one makes windows larger.
+    fn extent_with_slack(&self, k: usize) -> f32 {
+        let most = ((MAX_STEPS_PER_BOX - 0.5) * self.step(k)) as f32;
+        self.extent[k].max(most.min(policy::MAX_SLACK * self.extent[k]))
+    }
+
     /// Returns true if the edge decides about the step on an axis; otherwise the largest box does.
     fn decides(&self) -> bool {
         (0..3).any(|k| self.edge / 64.0 > f64::from(self.extent[k]) / (MAX_STEPS_PER_BOX - 1.0))
@@ -163,8 +170,8 @@ impl Spacing {
             let step = self.step(k);
             cells.origin[k] = self.origin[k] - 64.0 * step;
             cells.scale[k] = 1.0 / step;
-            cells.max_extent[k] = self.extent[k];
-            cells.reach[k] = (f64::from(self.extent[k]) / step).ceil() as i32 + 2;
+            cells.max_extent[k] = self.extent_with_slack(k);
+            cells.reach[k] = (f64::from(cells.max_extent[k]) / step).ceil() as i32 + 2;
             let needed = (self.space.width(k) / step + 128.0) / f64::from(1u32 << shift);
             cells.dims[k] = needed.min(f64::from(1 << 24)) as i32 + 3;
         }

@@ -30,14 +30,20 @@ impl Sorted<'_> {
                 return;
             }
             if i < in_grid {
-                let slots = i * piece..grid.len.min((i + 1) * piece);
-                dispatch(SearchPiece { grid, slots, rule, hits });
+                grid.search_slots(i * piece..grid.len.min((i + 1) * piece), rule, hits);
             } else {
                 let first = (i - in_grid) * OVERSIZE_PIECE;
                 let last = grid.oversize.len().min(first + OVERSIZE_PIECE);
                 (first..last).for_each(|i| grid.find_oversize_pairs(i, rule, hits));
             }
         });
+    }
+}
+
+impl Grid {
+    /// Finds the pairs of the boxes in some slots with those behind them.
+    pub(super) fn search_slots(&self, slots: Range<usize>, rule: &Rule<'_>, hits: &mut Hits) {
+        dispatch(SearchPiece { grid: self, slots, rule, hits });
     }
 }
 
@@ -81,6 +87,7 @@ impl Scan<'_, '_> {
         let (starts, records) = (self.grid.starts.as_ptr(), self.grid.records.as_ptr());
         let codes = self.grid.codes.as_ptr();
         let mut writer = hits.writer();
+        hits.runs += 5 * slots.len() as u64;
         for slot in slots {
             // SAFETY: the ring of border cells is never a box's own: all keys below are inside `starts`, all slots
             // inside `codes`, which has two blocks more.
@@ -218,6 +225,7 @@ impl Scan<'_, '_> {
         hits: &mut Hits,
     ) {
         for run in row {
+            hits.runs += 1;
             // SAFETY: as the caller says.
             unsafe { self.slots::<S>(query, slot, self.grid.slots(run), writer, hits) };
         }

@@ -9,6 +9,7 @@
 
 #![allow(clippy::needless_range_loop, reason = "a lane of several arrays")]
 
+mod join;
 mod node;
 mod question;
 mod refit;

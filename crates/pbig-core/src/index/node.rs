@@ -1,9 +1,10 @@
 //! A node: eight boxes, axis by axis, and what each stands for.
 
 use crate::Aabb;
+use crate::grid::{BLOCK, EightBoxes};
 
 /// Boxes in a node.
-pub(super) const LANES: usize = 8;
+pub(super) const LANES: usize = BLOCK;
 
 /// A number for each box of a node.
 pub(super) type Lanes = [f32; LANES];
@@ -15,18 +16,22 @@ pub(super) const NONE: u32 = u32::MAX;
 #[repr(C, align(32))]
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Node {
-    /// Lower corners by axis; infinite in an empty lane, which no question meets.
-    pub(super) low: [Lanes; 3],
-    /// Upper corners by axis; minus infinity in an empty lane.
-    pub(super) high: [Lanes; 3],
+    /// In an empty lane, corners are at plus and minus infinity, which only an infinite box meets.
+    pub(super) boxes: EightBoxes,
     /// Ids of boxes in a leaf, else numbers of nodes.
     pub(super) children: [u32; LANES],
 }
 
 impl Node {
     pub(super) const EMPTY: Self = Self {
-        low: [[f32::INFINITY; LANES]; 3],
-        high: [[f32::NEG_INFINITY; LANES]; 3],
+        boxes: [
+            [f32::INFINITY; LANES],
+            [f32::INFINITY; LANES],
+            [f32::INFINITY; LANES],
+            [f32::NEG_INFINITY; LANES],
+            [f32::NEG_INFINITY; LANES],
+            [f32::NEG_INFINITY; LANES],
+        ],
         children: [NONE; LANES],
     };
 
@@ -35,9 +40,25 @@ impl Node {
     pub(super) fn set(&mut self, lane: usize, aabb: &Aabb) {
         let is_valid = aabb.is_valid();
         for k in 0..3 {
-            self.low[k][lane] = if is_valid { aabb.min[k] } else { f32::INFINITY };
-            self.high[k][lane] = if is_valid { aabb.max[k] } else { f32::NEG_INFINITY };
+            self.boxes[k][lane] = if is_valid { aabb.min[k] } else { f32::INFINITY };
+            self.boxes[k + 3][lane] = if is_valid { aabb.max[k] } else { f32::NEG_INFINITY };
         }
+    }
+
+    /// Returns the box in a lane; an empty one, which overlaps nothing, where there is none.
+    #[inline(always)]
+    pub(super) fn get(&self, lane: usize) -> Aabb {
+        let mut aabb = Aabb::NOWHERE;
+        for k in 0..3 {
+            (aabb.min[k], aabb.max[k]) = (self.boxes[k][lane], self.boxes[k + 3][lane]);
+        }
+        aabb
+    }
+
+    /// Returns true if a lane has a box.
+    #[inline(always)]
+    pub(super) fn has(&self, lane: usize) -> bool {
+        self.boxes[0][lane] <= self.boxes[3][lane]
     }
 
     /// Returns the box around all lanes; an invalid one if all are empty.
@@ -46,8 +67,8 @@ impl Node {
         // Loops: `map` on arrays is not inlined into a kernel.
         let mut bounds = Aabb::NOWHERE;
         for k in 0..3 {
-            bounds.min[k] = fold(&self.low[k], |a, b| if a < b { a } else { b });
-            bounds.max[k] = fold(&self.high[k], |a, b| if a > b { a } else { b });
+            bounds.min[k] = fold(&self.boxes[k], |a, b| if a < b { a } else { b });
+            bounds.max[k] = fold(&self.boxes[k + 3], |a, b| if a > b { a } else { b });
         }
         bounds
     }
@@ -65,7 +86,7 @@ impl Node {
         let mut is_valid = [1; LANES];
         for k in 0..3 {
             for lane in 0..LANES {
-                is_valid[lane] &= u32::from(self.low[k][lane] <= self.high[k][lane]);
+                is_valid[lane] &= u32::from(self.boxes[k][lane] <= self.boxes[k + 3][lane]);
             }
         }
         if is_valid.iter().fold(1, |all, one| all & one) == 0 {
@@ -78,8 +99,7 @@ impl Node {
     #[inline(always)]
     fn transpose(&mut self, eight: [&Aabb; LANES]) {
         use std::arch::x86_64::{_MM_TRANSPOSE4_PS, _mm_storeu_ps};
-        let [x, y, z] = &mut self.low;
-        let [x2, y2, z2] = &mut self.high;
+        let [x, y, z, x2, y2, z2] = &mut self.boxes;
         for first in [0, 4] {
             let [mut a, mut b, mut c, mut d] = [0, 1, 2, 3].map(|i| eight[first + i].corners());
             // SAFETY: SSE is part of the architecture; each store is of four lanes from `first` on, of eight.
@@ -99,7 +119,7 @@ impl Node {
     fn transpose(&mut self, eight: [&Aabb; LANES]) {
         for lane in 0..LANES {
             for k in 0..3 {
-                (self.low[k][lane], self.high[k][lane]) = (eight[lane].min[k], eight[lane].max[k]);
+                (self.boxes[k][lane], self.boxes[k + 3][lane]) = (eight[lane].min[k], eight[lane].max[k]);
             }
         }
     }
@@ -112,7 +132,7 @@ impl Node {
     /// Returns true if a lane has this box.
     #[inline(always)]
     pub(super) fn holds(&self, lane: usize, aabb: &Aabb) -> bool {
-        (0..3).all(|k| (self.low[k][lane] == aabb.min[k]) & (self.high[k][lane] == aabb.max[k]))
+        (0..3).all(|k| (self.boxes[k][lane] == aabb.min[k]) & (self.boxes[k + 3][lane] == aabb.max[k]))
     }
 }
 

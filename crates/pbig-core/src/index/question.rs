@@ -97,7 +97,7 @@ impl Question for Sweep {
     fn least(&self, node: &Node) -> Lanes {
         let (mut enter, mut leave) = ([0.0; LANES], [f32::INFINITY; LANES]);
         for (k, axis) in self.axes.iter().enumerate() {
-            axis.narrow(&node.low[k], &node.high[k], &mut enter, &mut leave);
+            axis.narrow(&node.boxes[k], &node.boxes[k + 3], &mut enter, &mut leave);
         }
         for i in 0..LANES {
             let earliest = enter[i] - enter[i] * SLACK;
@@ -119,7 +119,7 @@ impl Question for Near {
         let mut squares = [0.0f32; LANES];
         for k in 0..3 {
             for i in 0..LANES {
-                let (below, above) = (node.low[k][i] - self.point[k], self.point[k] - node.high[k][i]);
+                let (below, above) = (node.boxes[k][i] - self.point[k], self.point[k] - node.boxes[k + 3][i]);
                 let gap = if below > above { below } else { above };
                 let gap = if gap > 0.0 { gap } else { 0.0 };
                 squares[i] += gap * gap;

@@ -26,6 +26,22 @@ impl BoxIndex {
         }
     }
 
+    /// As [`BoxIndex::refresh`], for an owner that looks up every box that changes: the boxes are sorted from the first call on.
+    /// Returns the work, in nodes and boxes.
+    pub(crate) fn keep_sorted(&mut self, boxes: &[Aabb], changed: Option<&[u32]>) -> u64 {
+        let Some(changed) = changed else {
+            self.sort(boxes);
+            return boxes.len() as u64;
+        };
+        self.has_moved = true;
+        changed.iter().for_each(|&id| self.take(id, boxes));
+        let is_loose = self.loose().len() > policy::loose_leaves(self.leaves);
+        if is_loose || self.wants_sort() {
+            self.sort(boxes);
+        }
+        changed.len() as u64
+    }
+
     /// Returns true if sorting the boxes anew would pay: questions have looked at as many nodes as a sort costs, and the order
     /// is bad. [`BoxIndex::refresh`] sorts then, too.
     pub fn wants_sort(&self) -> bool {
@@ -37,7 +53,7 @@ impl BoxIndex {
 
     /// Returns true if questions have looked at as many nodes as so many sorts cost.
     fn has_earned_sort(&self, sorts: u64) -> bool {
-        self.looked_at.load(Ordering::Relaxed) >= sorts * policy::nodes_for_sort(self.leaves)
+        self.looked_at.load(Ordering::Relaxed) >= sorts * policy::nodes_for_sort(self.leaves, self.places.len())
     }
 
     /// Sorts the boxes as they are now.

@@ -2,36 +2,55 @@
 
 use super::node::LANES;
 use crate::Aabb;
+use crate::parallel::join;
+use crate::policy::PARALLEL_FROM_BOXES;
 use std::ops::Range;
 
 /// Bits of a size's exponent within a class: boxes of one class differ in size by less than 16 times. A large box among small
 /// ones would make their node large.
 const CLASS_BITS: u32 = 2;
 
-/// A box as the sort reads it.
+/// A box as the sort reads it: 20 bytes, as it is moved once for each level of the tree.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Entry {
     center: [f32; 3],
-    class: u32,
+    /// The exponents of its extents, and of the largest one (the highest byte).
+    exponents: [u8; 4],
     pub(super) id: u32,
 }
 
 impl Entry {
     pub(super) fn new(id: u32, aabb: &Aabb) -> Self {
         let end = |x: f32| x.clamp(f32::MIN / 4.0, f32::MAX / 4.0);
-        let extent = (0..3).map(|k| aabb.max[k] - aabb.min[k]).fold(0.0, f32::max);
+        let [x, y, z] = std::array::from_fn(|k| exponent(aabb.max[k] - aabb.min[k]));
         let center = std::array::from_fn(|k| end(aabb.min[k]) + end(aabb.max[k]));
-        Self { center, class: extent.to_bits() >> (23 + CLASS_BITS), id }
+        Self { center, exponents: [x, y, z, x.max(y).max(z)], id }
     }
+
+    fn class(&self) -> u32 {
+        let [x, y, z, largest] = self.exponents;
+        let is_long = |exponent: u8| u32::from(largest - exponent < 1 << CLASS_BITS);
+        u32::from(largest >> CLASS_BITS) << 3 | is_long(x) << 2 | is_long(y) << 1 | is_long(z)
+    }
+}
+
+/// Returns the exponent's bits of a number that is not negative; those of infinity for a NaN.
+fn exponent(x: f32) -> u8 {
+    (x.to_bits() >> 23) as u8
+}
+
+/// Returns a number with such an exponent.
+fn with_exponent(exponent: u8) -> f64 {
+    f64::from(f32::from_bits(u32::from(exponent.min(254)) << 23))
 }
 
 /// Sorts boxes by class, and within a class by place. Returns the classes.
 pub(super) fn sort(entries: &mut [Entry]) -> Vec<Range<usize>> {
-    if entries.windows(2).any(|two| two[0].class != two[1].class) {
-        entries.sort_unstable_by_key(|entry| entry.class);
+    if entries.windows(2).any(|two| two[0].class() != two[1].class()) {
+        entries.sort_unstable_by_key(|entry| entry.class());
     }
     let (mut classes, mut first) = (Vec::new(), 0);
-    for class in entries.chunk_by_mut(|a, b| a.class == b.class) {
+    for class in entries.chunk_by_mut(|a, b| a.class() == b.class()) {
         sort_by_place(class);
         classes.push(first..first + class.len());
         first += class.len();
@@ -43,12 +62,16 @@ pub(super) fn sort(entries: &mut [Entry]) -> Vec<Range<usize>> {
 /// nothing. The cuts lie between whole nodes of the level in question.
 fn sort_by_place(mut entries: &mut [Entry]) {
     while entries.len() > LANES {
-        let axis = longest_axis(entries);
+        let axis = best_axis(entries);
         let middle = cut(entries.len());
         entries.select_nth_unstable_by(middle, |a, b| a.center[axis].total_cmp(&b.center[axis]));
         let (first, rest) = entries.split_at_mut(middle);
-        sort_by_place(first);
-        entries = rest;
+        if middle < PARALLEL_FROM_BOXES {
+            sort_by_place(first);
+            entries = rest;
+        } else {
+            return join(|| sort_by_place(first), || sort_by_place(rest));
+        }
     }
 }
 
@@ -61,14 +84,19 @@ fn cut(len: usize) -> usize {
     child * (len.div_ceil(child) / 2).max(1)
 }
 
-fn longest_axis(entries: &[Entry]) -> usize {
-    let (mut low, mut high) = ([f32::INFINITY; 3], [f32::NEG_INFINITY; 3]);
+/// Returns the axis along which the boxes lie apart most: the spread of their centers is longest, compared with their extents.
+fn best_axis(entries: &[Entry]) -> usize {
+    let (mut low, mut high, mut extents) = ([f32::INFINITY; 3], [f32::NEG_INFINITY; 3], [0.0; 3]);
     for entry in entries {
         for k in 0..3 {
             low[k] = low[k].min(entry.center[k]);
             high[k] = high[k].max(entry.center[k]);
+            extents[k] += with_exponent(entry.exponents[k]);
         }
     }
-    let spread = |k: &usize| high[*k] - low[*k];
-    (0..3).max_by(|a, b| spread(a).total_cmp(&spread(b))).unwrap_or(0)
+    let spread: [f64; 3] = std::array::from_fn(|k| f64::from(high[k]) - f64::from(low[k]));
+    let compare = |a: usize, b: usize| {
+        (spread[a] * extents[b]).total_cmp(&(spread[b] * extents[a])).then(spread[a].total_cmp(&spread[b]))
+    };
+    (0..3).max_by(|a, b| compare(*a, *b)).unwrap_or(0)
 }

@@ -1,6 +1,7 @@
 //! The choice of an engine for an update.
 
 use crate::Engine;
+use crate::all_pairs::Held;
 
 /// Boxes of a world in which changed boxes are tested against all, at most.
 pub(crate) const SWEEP_UP_TO_BOXES: usize = 1024;
@@ -11,6 +12,15 @@ pub(crate) const SWEEP_UP_TO_TESTS: usize = 1 << 16;
 /// Share of the boxes, one in so many, up to which changed boxes are edited: measured, editing takes as long as a rebuild
 /// at 7 to 10% of 100,000 boxes, at 4 to 5% of a million.
 pub(crate) const EDIT_UP_TO_ONE_IN: usize = 20;
+
+/// Share of the ids, one in so many, up to which boxes are sorted into a tree although there is none: a rebuild looks at all ids.
+const SPARSE_FROM_ONE_IN: usize = 8;
+
+/// Work of an edit for each box of the world, in tests of codes of 0.35 ns; a rebuild sorts a box in about 40 ns.
+const EDIT_UP_TO_WORK_PER_BOX: u64 = 60;
+
+/// Nodes of a tree that are looked at in an update, at most, for each id.
+const LOOK_UP_TO_NODES_PER_ID: u64 = 2;
 
 /// Share of the boxes, one in so many, that may be out of the grid's order: lists of them are slower than slots.
 pub(crate) const SPILL_UP_TO_ONE_IN: usize = 2;
@@ -29,10 +39,21 @@ pub(crate) struct Counts {
     pub(crate) changed: usize,
     /// True if the old state of all changed boxes is known.
     pub(crate) knows_old: bool,
-    /// True if the grid holds the boxes of the last update.
-    pub(crate) has_grid: bool,
+    /// Where the boxes of the last update are.
+    pub(crate) held: Held,
     /// Boxes out of the grid's order.
     pub(crate) spilled: usize,
+}
+
+impl Counts {
+    fn may_edit(&self) -> bool {
+        self.knows_old && self.held == Held::InGrid
+    }
+
+    /// Returns true if so few of some boxes or ids have changed that it pays to look at these alone.
+    fn are_few_of(&self, all: usize) -> bool {
+        self.changed * EDIT_UP_TO_ONE_IN <= all
+    }
 }
 
 /// Chooses the engine of an update in which some boxes have changed.
@@ -41,25 +62,40 @@ pub(crate) struct Counts {
 /// | --- | --- |
 /// | ids at most [`SWEEP_UP_TO_BOXES`], changed x ids at most [`SWEEP_UP_TO_TESTS`] | sweep |
 /// | a grid of the last update, changed at most 1 in [`EDIT_UP_TO_ONE_IN`], spilled at most 1 in [`SPILL_UP_TO_ONE_IN`] | edit |
+/// | a tree of the last update, or at most 1 in [`SPARSE_FROM_ONE_IN`] ids in use; changed at most 1 in [`EDIT_UP_TO_ONE_IN`] ids | tree |
 /// | else | rebuild |
+///
+/// A rebuild looks at all ids, so after a peak, when few boxes are left, few changes are not worth one.
 pub(crate) fn choose_engine(counts: &Counts, forced: Option<Engine>) -> Engine {
-    let may_edit = counts.knows_old && counts.has_grid;
     match forced {
-        Some(Engine::Sweep) => return Engine::Sweep,
-        Some(Engine::Edit) if may_edit => return Engine::Edit,
-        Some(_) => return Engine::Rebuild,
+        Some(Engine::Edit) if !counts.may_edit() => return Engine::Rebuild,
+        Some(engine) => return engine,
         None => {}
     }
-    let is_small = counts.ids <= SWEEP_UP_TO_BOXES && counts.changed * counts.ids <= SWEEP_UP_TO_TESTS;
-    let is_few = counts.changed * EDIT_UP_TO_ONE_IN <= counts.boxes;
+    let is_small =
+        counts.ids <= SWEEP_UP_TO_BOXES && counts.changed * counts.ids <= SWEEP_UP_TO_TESTS;
     let is_tidy = counts.spilled * SPILL_UP_TO_ONE_IN <= counts.boxes;
+    let has_tree = counts.held == Held::InTree || counts.boxes * SPARSE_FROM_ONE_IN <= counts.ids;
     if is_small {
         Engine::Sweep
-    } else if is_few && is_tidy && may_edit {
+    } else if counts.may_edit() && is_tidy && counts.are_few_of(counts.boxes) {
         Engine::Edit
+    } else if has_tree && counts.are_few_of(counts.ids) {
+        Engine::Tree
     } else {
         Engine::Rebuild
     }
+}
+
+/// Returns the work of an edit, in tests of codes, from which on a rebuild takes less than twice as long as the edit so far:
+/// a rebuild sorts the boxes and does the work of the last one.
+pub(crate) fn edit_up_to_work(boxes: usize, rebuild_work: u64) -> u64 {
+    EDIT_UP_TO_WORK_PER_BOX * boxes as u64 + rebuild_work / 2
+}
+
+/// Returns the nodes of a tree that look-ups may take: 5 ns each, while a search sorts and joins a box in about 150 ns.
+pub(crate) fn look_up_to_nodes(ids: usize) -> u64 {
+    LOOK_UP_TO_NODES_PER_ID * ids as u64
 }
 
 /// Returns the number of old states that are worth keeping until the next update.
@@ -75,21 +111,39 @@ pub(crate) fn old_states_to_keep(boxes: usize, forced: Option<Engine>) -> usize 
 mod tests {
     use super::*;
 
-    const WORLD: Counts =
-        Counts { boxes: 10_000, ids: 10_000, changed: 100, knows_old: true, has_grid: true, spilled: 0 };
+    const WORLD: Counts = Counts {
+        boxes: 10_000,
+        ids: 10_000,
+        changed: 100,
+        knows_old: true,
+        held: Held::InGrid,
+        spilled: 0,
+    };
 
     #[test]
     fn few_changes_are_edited_and_many_rebuild_the_grid() {
         assert_eq!(choose_engine(&WORLD, None), Engine::Edit);
         assert_eq!(choose_engine(&Counts { changed: 501, ..WORLD }, None), Engine::Rebuild);
         assert_eq!(choose_engine(&Counts { spilled: 5001, ..WORLD }, None), Engine::Rebuild);
-        assert_eq!(choose_engine(&Counts { has_grid: false, ..WORLD }, None), Engine::Rebuild);
+        assert_eq!(choose_engine(&Counts { held: Held::Nowhere, ..WORLD }, None), Engine::Rebuild);
         assert_eq!(choose_engine(&Counts { knows_old: false, ..WORLD }, None), Engine::Rebuild);
+        assert_eq!(edit_up_to_work(1000, 6000), 63_000);
+    }
+
+    #[test]
+    fn few_changes_are_looked_up_in_a_tree_where_there_is_one_or_most_ids_are_unused() {
+        let tree = Counts { held: Held::InTree, knows_old: false, ..WORLD };
+        assert_eq!(choose_engine(&tree, None), Engine::Tree);
+        assert_eq!(choose_engine(&Counts { changed: 501, ..tree }, None), Engine::Rebuild);
+        let left = Counts { boxes: 100, ..WORLD };
+        assert_eq!(choose_engine(&left, None), Engine::Tree);
+        assert_eq!(choose_engine(&Counts { held: Held::Nowhere, ..left }, None), Engine::Tree);
+        assert_eq!(choose_engine(&Counts { changed: 5, ..left }, None), Engine::Edit);
     }
 
     #[test]
     fn small_worlds_are_swept_while_few_boxes_change() {
-        let small = Counts { boxes: 1000, ids: 1000, changed: 65, has_grid: false, ..WORLD };
+        let small = Counts { boxes: 1000, ids: 1000, changed: 65, held: Held::Nowhere, ..WORLD };
         assert_eq!(choose_engine(&small, None), Engine::Sweep);
         assert_eq!(choose_engine(&Counts { changed: 66, ..small }, None), Engine::Rebuild);
         assert_eq!(choose_engine(&Counts { ids: 1025, ..small }, None), Engine::Rebuild);
@@ -98,9 +152,9 @@ mod tests {
 
     #[test]
     fn an_engine_that_is_asked_for_is_used_where_it_can() {
-        for engine in [Engine::Sweep, Engine::Edit, Engine::Rebuild] {
+        for engine in [Engine::Sweep, Engine::Edit, Engine::Tree, Engine::Rebuild] {
             assert_eq!(choose_engine(&WORLD, Some(engine)), engine);
-            let lost = Counts { has_grid: false, knows_old: false, ..WORLD };
+            let lost = Counts { held: Held::Nowhere, knows_old: false, ..WORLD };
             let instead = if engine == Engine::Edit { Engine::Rebuild } else { engine };
             assert_eq!(choose_engine(&lost, Some(engine)), instead);
         }

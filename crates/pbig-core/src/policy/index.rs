@@ -14,8 +14,8 @@ pub(crate) const GROWN_SHARE: usize = 8;
 pub(crate) const SORTS_FOR_ORDER: u64 = 8;
 
 /// Returns the number of nodes that questions look at before a sort: it then takes about as long as they did.
-pub(crate) fn nodes_for_sort(leaves: u32) -> u64 {
-    64 + 256 * u64::from(leaves)
+pub(crate) fn nodes_for_sort(leaves: u32, ids: usize) -> u64 {
+    64 + 256 * u64::from(leaves) + ids as u64 / 4
 }
 
 /// Minimum share of the maximum number of leaves outside the tree, one in so many, from which the order is bad.

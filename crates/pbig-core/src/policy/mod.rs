@@ -6,10 +6,11 @@
 mod backend;
 mod engine;
 pub(crate) mod index;
+pub(crate) mod search;
 
 pub use backend::NoGpu;
 pub(crate) use backend::{AvailableDevice, Choice, choose_backend};
-pub(crate) use engine::{Counts, PARALLEL_FROM_EDITS, choose_engine, old_states_to_keep};
+pub(crate) use engine::{Counts, PARALLEL_FROM_EDITS, choose_engine, edit_up_to_work, look_up_to_nodes, old_states_to_keep};
 
 /// Boxes from which several threads share a search: waking one costs about as much as 16,384 boxes take alone.
 pub(crate) const PARALLEL_FROM_BOXES: usize = 16_384;
@@ -28,6 +29,9 @@ pub(crate) const MIN_CELLS: f64 = 4096.0;
 
 /// Boxes in a cell up to which the five runs of the half neighbourhood are visited unseen.
 pub(crate) const RUNS_UP_TO_PER_CELL: f64 = 3.0;
+
+/// Largest extent that a grid takes, in extents of its largest box, at most: a cube that turns by 14 degrees grows so much.
+pub(crate) const MAX_SLACK: f32 = 1.25;
 
 /// Others in a box's cell, by the sample, from which cells are made smaller: boxes lie in clusters far apart.
 pub(crate) const MAX_CROWD: f64 = 32.0;

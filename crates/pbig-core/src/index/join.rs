@@ -1,0 +1,120 @@
+//! Every pair of overlapping boxes: each leaf meets itself and the leaves behind it.
+//!
+//! Whatever the shape of the boxes, a leaf's eight lie near each other and are of one size and shape: the tree is cut at medians,
+//! along the axis on which boxes lie apart most, and has a part for each class. So a leaf looks at few nodes.
+
+use super::BoxIndex;
+use super::node::{LANES, NONE};
+use crate::grid::{Hits, Kernel, Rule, Simd, dispatch};
+use crate::parallel::run_with;
+use crate::policy::PARALLEL_FROM_BOXES;
+use crate::{Aabb, Pair};
+use std::ops::Range;
+
+/// Leaves in a piece of work.
+const PIECE: usize = 64;
+
+impl BoxIndex {
+    /// Finds all pairs of the boxes as of the last sort, into the lists of as many threads as there are `hits`.
+    pub(crate) fn join(&self, rule: &Rule<'_>, hits: &mut [Hits]) {
+        debug_assert!(self.loose().is_empty());
+        let (last_leaves, leaves) = (self.last_leaves(), self.leaves as usize);
+        let workers = if leaves * LANES < PARALLEL_FROM_BOXES { 1 } else { hits.len() };
+        run_with(&mut hits[..workers], leaves.div_ceil(PIECE), |hits, piece| {
+            let leaves = piece * PIECE..leaves.min((piece + 1) * PIECE);
+            dispatch(Join { index: self, last_leaves: &last_leaves, leaves, rule, hits });
+        });
+    }
+
+    /// Returns the last leaf below each node.
+    fn last_leaves(&self) -> Vec<u32> {
+        let mut last: Vec<u32> = (0..self.end).collect();
+        for node in self.leaves..self.end {
+            let children = self.nodes[node as usize].children.iter().filter(|child| **child != NONE);
+            last[node as usize] = children.map(|child| last[*child as usize]).max().unwrap_or(0);
+        }
+        last
+    }
+}
+
+struct Join<'a, 'b> {
+    index: &'a BoxIndex,
+    last_leaves: &'a [u32],
+    leaves: Range<usize>,
+    rule: &'a Rule<'b>,
+    hits: &'a mut Hits,
+}
+
+impl Kernel for Join<'_, '_> {
+    type Output = ();
+
+    #[inline(always)]
+    unsafe fn run<S: Simd>(mut self) {
+        let mut waiting = Vec::new();
+        for leaf in self.leaves.clone() {
+            if self.hits.is_full() {
+                return;
+            }
+            // SAFETY: the caller has the instructions.
+            unsafe { self.meet::<S>(leaf as u32, &mut waiting) };
+        }
+    }
+}
+
+impl Join<'_, '_> {
+    /// Finds the pairs of a leaf's boxes with each other, and with those of later leaves.
+    #[inline(always)]
+    unsafe fn meet<S: Simd>(&mut self, leaf: u32, waiting: &mut Vec<u32>) {
+        let index = self.index;
+        let bounds = index.nodes[leaf as usize].bounds();
+        let from = self.hits.pairs.len();
+        waiting.extend(index.root());
+        while let Some(at) = waiting.pop() {
+            self.hits.runs += 1;
+            if index.is_leaf(at) {
+                // SAFETY: the caller has the instructions.
+                unsafe { self.test::<S>(leaf, at) };
+                continue;
+            }
+            let node = &index.nodes[at as usize];
+            // SAFETY: as above.
+            let mut lanes = unsafe { S::overlaps_eight(&node.boxes, &bounds) };
+            while let Some(lane) = next(&mut lanes) {
+                let child = node.children[lane];
+                if child != NONE && self.last_leaves[child as usize] >= leaf {
+                    waiting.push(child);
+                }
+            }
+        }
+        self.hits.keep(from, self.rule);
+    }
+
+    /// Tests the boxes of a leaf against those of another one, or of its own.
+    #[inline(always)]
+    unsafe fn test<S: Simd>(&mut self, leaf: u32, at: u32) {
+        let (one, other) = (&self.index.nodes[leaf as usize], &self.index.nodes[at as usize]);
+        // SAFETY: the caller has the instructions.
+        let mut lanes = unsafe { S::overlaps_eight(&one.boxes, &other.bounds()) };
+        while let Some(lane) = next(&mut lanes) {
+            let aabb: Aabb = one.get(lane);
+            let wanted = if leaf == at { 255 & !((2u32 << lane) - 1) } else { 255 };
+            self.hits.tests += u64::from(wanted.count_ones());
+            // SAFETY: as above.
+            let mut met = unsafe { S::overlaps_eight(&other.boxes, &aabb) } & wanted;
+            while let Some(hit) = next(&mut met) {
+                if one.has(lane) && other.has(hit) {
+                    self.hits.pairs.push(Pair::new(one.children[lane], other.children[hit]));
+                }
+            }
+        }
+    }
+}
+
+/// Takes the lowest bit out of a mask, and returns its number.
+#[inline(always)]
+fn next(mask: &mut u32) -> Option<usize> {
+    let lane = mask.trailing_zeros() as usize;
+    let is_any = *mask != 0;
+    *mask &= mask.wrapping_sub(1);
+    is_any.then_some(lane)
+}

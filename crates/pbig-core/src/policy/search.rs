@@ -1,0 +1,54 @@
+//! The choice between a grid and a tree for a search of all boxes, made when the boxes lie in the grid's cells.
+//!
+//! Work is counted in tests of codes, eight to an instruction: about 0.35 ns each.
+
+/// Boxes, one in so many, whose candidates are counted.
+pub(crate) const COUNT_ONE_IN: usize = 16;
+
+/// Oversize boxes whose candidates are counted, at most.
+pub(crate) const COUNTED_OVERSIZE: usize = 128;
+
+/// Tests of codes that take as long as an exact test of two boxes in memory.
+pub(crate) const WORK_OF_EXACT_TEST: u64 = 4;
+
+/// Tests of codes that take as long as looking at an entry of a list, which can lie anywhere in memory.
+pub(crate) const WORK_OF_ENTRY: u64 = 16;
+
+/// Tests for each box up to which a grid is searched: a tree is sorted and joined in about the same time.
+const GRID_UP_TO_PER_BOX: u64 = 400;
+
+/// Tests for each pair up to which a grid is searched: in a crowd each box meets many, and a tree is no faster.
+const GRID_UP_TO_PER_PAIR: u64 = 32;
+
+/// Work of a sample, for each box.
+const SAMPLE_WORK_PER_BOX: u64 = 16;
+
+/// Returns true if a grid is searched, whatever it would find.
+pub(crate) fn is_light(boxes: usize, work: u64) -> bool {
+    work <= GRID_UP_TO_PER_BOX * boxes as u64
+}
+
+/// Returns true if a grid finds so many pairs that its work is worth while.
+pub(crate) fn is_fruitful(boxes: usize, work: u64, overlaps: u64) -> bool {
+    work <= GRID_UP_TO_PER_BOX * boxes as u64 + GRID_UP_TO_PER_PAIR * overlaps
+}
+
+/// Returns of how many boxes one is searched to see what a search would find.
+pub(crate) fn sample_one_in(boxes: usize, work: u64) -> usize {
+    (work / (SAMPLE_WORK_PER_BOX * boxes.max(1) as u64)) as usize + 1
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_grid_is_searched_where_its_cells_hold_few_or_many_of_them_pair() {
+        assert!(is_light(1000, 400_000));
+        assert!(!is_light(1000, 400_001));
+        assert!(is_fruitful(1000, 432_000, 1000));
+        assert!(!is_fruitful(1000, 432_001, 1000));
+        assert_eq!(sample_one_in(1000, 1_600_000), 101);
+        assert_eq!(sample_one_in(0, 0), 1);
+    }
+}
