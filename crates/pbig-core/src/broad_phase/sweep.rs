@@ -10,10 +10,20 @@ use crate::index::BoxIndex;
 use crate::pairs::{Comparison, Kept, differences, equal};
 use crate::{Aabb, Checks, Pair};
 
+/// No lane, of a box that is absent or invalid; or no box, of a free lane.
+const NONE: u32 = u32::MAX;
+
 /// The boxes of a small world axis by axis, eight to a block, padded with boxes that overlap nothing; and buffers.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Sweep {
     blocks: Vec<EightBoxes>,
+    /// By lane of all blocks: the id of its box, or `NONE`.
+    ids: Vec<u32>,
+    /// By id: the lane. Ids that are not in use take none, so that a few boxes left of many are as fast as a few.
+    lanes: Vec<u32>,
+    free: Vec<u32>,
+    /// True if lanes are in the order of ids.
+    is_in_order: bool,
     /// True if the blocks hold the boxes of the last update.
     is_current: bool,
     /// Ids that the box at hand overlaps, sorted.
@@ -31,16 +41,59 @@ impl Sweep {
     /// Leaves the events of an update in `events`, sorted. Returns the tests made.
     pub(super) fn run(&mut self, world: &World, kept: &Kept, events: &mut Comparison) -> Checks {
         events.clear();
-        self.blocks.resize(world.ids().div_ceil(BLOCK), [[f32::NAN; BLOCK]; 6]);
-        if self.is_current {
-            world.changed.iter().for_each(|&id| self.put(id as usize, &world.boxes[id as usize]));
+        let are_many = 2 * world.changed.len() > world.valid() as usize;
+        if self.is_current && (self.is_in_order || !are_many) {
+            self.lanes.resize(world.ids(), NONE);
+            world.changed.iter().for_each(|&id| self.put(id, &world.boxes[id as usize]));
         } else {
-            world.boxes.iter().enumerate().for_each(|(id, aabb)| self.put(id, aabb));
+            self.lay_out(&world.boxes);
         }
-        self.is_current = true;
-        let (made, met) = dispatch(SweepAll { sweep: self, world, kept, events });
+        let are_many = are_many && self.is_in_order;
+        let (made, met) = dispatch(SweepAll { sweep: self, world, kept, events, are_many });
         events.sort(world.ids());
         Checks { made, unnecessary: made - met, redundant: 0 }
+    }
+
+    /// Gives every valid box a lane.
+    fn lay_out(&mut self, boxes: &[Aabb]) {
+        self.blocks.clear();
+        self.ids.clear();
+        self.free.clear();
+        self.lanes.clear();
+        self.lanes.resize(boxes.len(), NONE);
+        (self.is_in_order, self.is_current) = (true, true);
+        (0..).zip(boxes).for_each(|(id, aabb)| self.put(id, aabb));
+    }
+
+    /// Stores a box in its lane, in a new one, or in none if it is invalid.
+    fn put(&mut self, id: u32, aabb: &Aabb) {
+        let lane = match (self.lanes[id as usize], aabb.is_valid()) {
+            (NONE, false) => return,
+            (NONE, true) => self.take_lane(id),
+            (lane, true) => lane,
+            (lane, false) => {
+                (self.lanes[id as usize], self.ids[lane as usize]) = (NONE, NONE);
+                self.free.push(lane);
+                lane
+            }
+        };
+        let values = aabb.min.into_iter().chain(aabb.max);
+        for (row, value) in self.blocks[lane as usize / BLOCK].iter_mut().zip(values) {
+            row[lane as usize % BLOCK] = value;
+        }
+    }
+
+    fn take_lane(&mut self, id: u32) -> u32 {
+        let is_last = self.free.is_empty() && self.ids.last().is_none_or(|last| *last < id);
+        self.is_in_order &= is_last;
+        let lane = self.free.pop().unwrap_or(self.ids.len() as u32);
+        if lane as usize == self.ids.len() {
+            self.ids.push(id);
+            self.blocks.resize(self.ids.len().div_ceil(BLOCK), [[f32::NAN; BLOCK]; 6]);
+        }
+        self.ids[lane as usize] = id;
+        self.lanes[id as usize] = lane;
+        lane
     }
 
     /// As [`Sweep::run`], with the boxes in a tree. Returns the nodes looked at as well; if they are more than `max_nodes`, the
@@ -71,13 +124,6 @@ impl Sweep {
         (Checks { made, unnecessary: made - met, redundant: 0 }, nodes)
     }
 
-    fn put(&mut self, id: usize, aabb: &Aabb) {
-        let values = aabb.min.into_iter().chain(aabb.max);
-        for (row, value) in self.blocks[id / BLOCK].iter_mut().zip(values) {
-            row[id % BLOCK] = value;
-        }
-    }
-
     /// Compares what a changed box overlaps with its kept pairs. The changed box with the lower id reports a pair
     /// of two changed boxes.
     fn compare_all(&mut self, world: &World, kept: &Kept, id: u32, events: &mut Comparison) {
@@ -87,6 +133,16 @@ impl Sweep {
         was.clear();
         was.extend(kept.partners(id).filter(|&other| is_own(other)));
         compare(world, id, was, now, events);
+    }
+
+    /// Ends the pairs of changed boxes that overlap nothing, as they have no lane.
+    fn end_all(&mut self, world: &World, kept: &Kept, events: &mut Comparison) {
+        self.now.clear();
+        for &id in &world.changed {
+            if self.lanes[id as usize] == NONE {
+                self.compare_later(world, kept, id, events);
+            }
+        }
     }
 
     /// Compares the later boxes that a box overlaps with its kept pairs.
@@ -122,6 +178,8 @@ struct SweepAll<'a> {
     world: &'a World,
     kept: &'a Kept,
     events: &'a mut Comparison,
+    /// Test each box against those with higher ids; otherwise each changed one against all.
+    are_many: bool,
 }
 
 impl Kernel for SweepAll<'_> {
@@ -130,33 +188,50 @@ impl Kernel for SweepAll<'_> {
 
     #[inline(always)]
     unsafe fn run<S: Simd>(self) -> (u64, u64) {
-        let Self { sweep, world, kept, events } = self;
+        let Self { sweep, world, kept, events, are_many } = self;
         let (mut made, mut met) = (0, 0);
-        let are_many = 2 * world.changed.len() > world.ids();
-        let count = if are_many { world.ids() } else { world.changed.len() };
+        let lanes = sweep.ids.len();
+        let count = if are_many { lanes } else { world.changed.len() };
         for i in 0..count {
-            let id = if are_many { i } else { world.changed[i] as usize };
-            // The first block also has the box itself and lower ids: their lanes are masked out.
-            let (first, mut wanted) =
-                if are_many { (id / BLOCK, 255 & !((2 << (id % BLOCK)) - 1)) } else { (0, 255) };
-            made += (world.ids() - first * BLOCK) as u64;
-            sweep.now.clear();
-            for (block, boxes) in sweep.blocks.iter().enumerate().skip(first) {
-                // SAFETY: the caller has the instructions.
-                let mut mask = unsafe { S::overlaps_eight(boxes, &world.boxes[id]) } & wanted;
-                wanted = 255;
-                met += u64::from(mask.count_ones());
-                while mask != 0 {
-                    sweep.now.push((block * BLOCK) as u32 + mask.trailing_zeros());
-                    mask &= mask - 1;
-                }
+            let id = if are_many { sweep.ids[i] } else { world.changed[i] };
+            if id == NONE {
+                continue;
             }
+            // The first block also has the box itself and lower ids: their lanes are masked out.
+            let (first, wanted) = if are_many { (i / BLOCK, 255 & !((2 << (i % BLOCK)) - 1)) } else { (0, 255) };
+            made += (lanes - first * BLOCK) as u64;
+            sweep.now.clear();
+            // SAFETY: the caller has the instructions.
+            met += unsafe { sweep.meet::<S>(&world.boxes[id as usize], first, wanted) };
             if are_many {
-                sweep.compare_later(world, kept, id as u32, events);
+                sweep.compare_later(world, kept, id, events);
             } else {
-                sweep.compare_all(world, kept, id as u32, events);
+                sweep.compare_all(world, kept, id, events);
             }
         }
+        if are_many {
+            sweep.end_all(world, kept, events);
+        }
         (made, met)
+    }
+}
+
+impl Sweep {
+    /// Lists the ids of boxes that overlap one, from a block on; in the first block only the `wanted` lanes. Returns how many.
+    #[inline(always)]
+    unsafe fn meet<S: Simd>(&mut self, aabb: &Aabb, first: usize, mut wanted: u32) -> u64 {
+        for (block, boxes) in self.blocks.iter().enumerate().skip(first) {
+            // SAFETY: the caller has the instructions.
+            let mut mask = unsafe { S::overlaps_eight(boxes, aabb) } & wanted;
+            wanted = 255;
+            while mask != 0 {
+                self.now.push(self.ids[block * BLOCK + mask.trailing_zeros() as usize]);
+                mask &= mask - 1;
+            }
+        }
+        if !self.is_in_order {
+            self.now.sort_unstable();
+        }
+        self.now.len() as u64
     }
 }

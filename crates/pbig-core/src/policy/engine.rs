@@ -50,6 +50,11 @@ impl Counts {
         self.knows_old && self.held == Held::InGrid
     }
 
+    /// Returns true if most ids are not in use.
+    fn is_sparse(&self) -> bool {
+        self.boxes * SPARSE_FROM_ONE_IN <= self.ids
+    }
+
     /// Returns true if so few of some boxes or ids have changed that it pays to look at these alone.
     fn are_few_of(&self, all: usize) -> bool {
         self.changed * EDIT_UP_TO_ONE_IN <= all
@@ -60,7 +65,7 @@ impl Counts {
 ///
 /// | rule, the first that applies | engine |
 /// | --- | --- |
-/// | ids at most [`SWEEP_UP_TO_BOXES`], changed x ids at most [`SWEEP_UP_TO_TESTS`] | sweep |
+/// | boxes at most [`SWEEP_UP_TO_BOXES`], changed x boxes at most [`SWEEP_UP_TO_TESTS`] | sweep |
 /// | a grid of the last update, changed at most 1 in [`EDIT_UP_TO_ONE_IN`], spilled at most 1 in [`SPILL_UP_TO_ONE_IN`] | edit |
 /// | a tree of the last update, or at most 1 in [`SPARSE_FROM_ONE_IN`] ids in use; changed at most 1 in [`EDIT_UP_TO_ONE_IN`] ids | tree |
 /// | else | rebuild |
@@ -72,10 +77,12 @@ pub(crate) fn choose_engine(counts: &Counts, forced: Option<Engine>) -> Engine {
         Some(engine) => return engine,
         None => {}
     }
-    let is_small =
-        counts.ids <= SWEEP_UP_TO_BOXES && counts.changed * counts.ids <= SWEEP_UP_TO_TESTS;
+    // Few boxes left of many are swept, too, where a grid would look at all ids.
+    let is_small = counts.boxes <= SWEEP_UP_TO_BOXES
+        && counts.changed * counts.boxes <= SWEEP_UP_TO_TESTS
+        && (counts.ids <= SWEEP_UP_TO_BOXES || counts.is_sparse());
     let is_tidy = counts.spilled * SPILL_UP_TO_ONE_IN <= counts.boxes;
-    let has_tree = counts.held == Held::InTree || counts.boxes * SPARSE_FROM_ONE_IN <= counts.ids;
+    let has_tree = counts.held == Held::InTree || counts.is_sparse();
     if is_small {
         Engine::Sweep
     } else if counts.may_edit() && is_tidy && counts.are_few_of(counts.boxes) {
@@ -135,10 +142,11 @@ mod tests {
         let tree = Counts { held: Held::InTree, knows_old: false, ..WORLD };
         assert_eq!(choose_engine(&tree, None), Engine::Tree);
         assert_eq!(choose_engine(&Counts { changed: 501, ..tree }, None), Engine::Rebuild);
-        let left = Counts { boxes: 100, ..WORLD };
+        let left = Counts { boxes: 1100, ..WORLD };
         assert_eq!(choose_engine(&left, None), Engine::Tree);
         assert_eq!(choose_engine(&Counts { held: Held::Nowhere, ..left }, None), Engine::Tree);
-        assert_eq!(choose_engine(&Counts { changed: 5, ..left }, None), Engine::Edit);
+        assert_eq!(choose_engine(&Counts { changed: 55, ..left }, None), Engine::Edit);
+        assert_eq!(choose_engine(&Counts { boxes: 100, ..WORLD }, None), Engine::Sweep);
     }
 
     #[test]
