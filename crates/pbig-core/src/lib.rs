@@ -108,4 +108,4 @@ pub use index::{BoxIndex, Visited};
 pub use pair::Pair;
 pub use plan::{Algorithm, Plan};
 pub use policy::NoGpu;
-pub use report::{Checks, GpuReport, Report, StageTimes};
+pub use report::{Checks, GpuReport, Report, StageTimes, WORK_LIMIT};

@@ -124,7 +124,9 @@ impl fmt::Display for Plan {
             Algorithm::Nothing => write!(f, "nothing to do: no box has changed")?,
             Algorithm::Brute => write!(f, "brute force: every pair of {boxes} boxes is tested")?,
             Algorithm::Sweep => write!(f, "sweep: changed boxes are tested against all {boxes}")?,
-            Algorithm::Tree => write!(f, "tree: cells would hold too many of {boxes} boxes, or few have changed")?,
+            Algorithm::Tree => {
+                write!(f, "tree: cells would hold too many of {boxes} boxes, or few have changed")?
+            }
             Algorithm::Gpu => self.write_gpu(f)?,
             Algorithm::Grid => write!(f, "grid: {boxes} boxes are sorted and searched")?,
             Algorithm::Edit => {

@@ -88,6 +88,10 @@ pub struct Checks {
     pub redundant: u64,
 }
 
+/// Bound of [`Report::work`] for each box and pair, in binary logarithms of the number of boxes: whatever the shape of the boxes,
+/// their motion and their history. Measured, not proven: docs/STRESS.md tells the worst that was found.
+pub const WORK_LIMIT: u64 = 64;
+
 /// The report on the last call of a [`crate::Finder`] or [`crate::BroadPhase`].
 #[derive(Clone, Debug, Default, PartialEq)]
 #[non_exhaustive]
@@ -103,8 +107,9 @@ pub struct Report {
     /// Tests made. On a GPU the map's estimate, without unnecessary and redundant ones, unless
     /// [`crate::GpuOptions::count_tests`] is set.
     pub checks: Checks,
-    /// The work in counts: tests made, runs of cells, nodes of a tree and entries of lists that were looked at. At most
-    /// [`crate::WORK_LIMIT`] for each box or changed box and each pair, times the binary logarithm of the number of boxes. 0 on a GPU.
+    /// The work on the CPU in counts: tests made, runs of cells and nodes of a tree looked at. An entry of a list counts as 16, a
+    /// test against an oversize box in an edit as 4, as they take so much longer. At most
+    /// [`crate::WORK_LIMIT`] for each box and each pair, times the binary logarithm of the number of boxes.
     pub work: u64,
     /// Pairs reported ([`crate::BroadPhase`]: pairs that exist now).
     pub pairs: u64,

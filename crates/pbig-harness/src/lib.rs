@@ -9,6 +9,7 @@ pub mod duel;
 pub mod field;
 pub mod files;
 pub mod gpu_race;
+pub mod hard;
 pub mod motions;
 pub mod options;
 pub mod output;

@@ -13,6 +13,7 @@ pub mod steady;
 mod trees;
 pub mod whole_steps;
 pub mod wide;
+pub mod worst;
 
 use pbig_core::{Config, Limits, Order};
 

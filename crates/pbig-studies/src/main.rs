@@ -4,7 +4,7 @@ use clap::{Parser, Subcommand};
 use pbig_harness::frames::FrameKind;
 use pbig_harness::output::{Failure, finish, print, tracked};
 use pbig_harness::report::Report;
-use pbig_studies::{accuracy, papers, peers, stages, steady, whole_steps};
+use pbig_studies::{accuracy, papers, peers, stages, steady, whole_steps, worst};
 use serde_json::{Map, json};
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -47,6 +47,18 @@ enum Command {
         #[arg(long, value_name = "KIND", value_delimiter = ',', default_value = "none", value_parser = FrameKind::named)]
         queries: Vec<FrameKind>,
     },
+    /// Searches for the world or history that takes most work for each box and pair.
+    Worst {
+        /// How long to search.
+        #[arg(long, default_value_t = 60)]
+        seconds: u64,
+        /// For the random numbers of the search.
+        #[arg(long, default_value_t = 1)]
+        seed: u64,
+        /// Boxes in a world.
+        #[arg(long, default_value_t = 10_000)]
+        boxes: usize,
+    },
     /// Run time against error.
     Accuracy {
         /// This study alone.
@@ -66,6 +78,9 @@ fn run(cli: &Cli) -> Result<(), Failure> {
         Command::Peers => peers::run(cli.quick)?,
         Command::Steady { boxes } => steady::run(cli.quick, boxes)?,
         Command::WholeSteps { queries } => whole_steps::run(cli.quick, queries),
+        Command::Worst { seconds, seed, boxes } => {
+            worst::run(worst::Search { seconds: *seconds, seed: *seed, boxes: *boxes })?
+        }
         Command::Accuracy { only } => return run_accuracy(cli, only.as_deref()),
     };
     report.finish(cli.json, cli.write.as_deref())

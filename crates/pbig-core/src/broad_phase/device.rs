@@ -1,9 +1,9 @@
 //! An update on a GPU: only what has changed goes there, only pairs that were added or removed come back.
 
-use crate::all_pairs::Held;
 use super::BroadPhase;
 #[cfg(feature = "unstable-study")]
 use crate::Limits;
+use crate::all_pairs::Held;
 use crate::gpu::{Change, ChangeRequest, GpuFinder, GpuFound};
 use crate::{Aabb, Backend, Config, Error, NoGpu, Pair};
 

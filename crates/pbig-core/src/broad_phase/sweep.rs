@@ -111,7 +111,8 @@ impl Sweep {
             let (aabb, now) = (&world.boxes[id as usize], &mut self.now);
             now.clear();
             // Tested again, as an infinite box meets the empty places of a tree.
-            let mut take = |other: u32| now.extend(aabb.overlaps(&world.boxes[other as usize]).then_some(other));
+            let mut take =
+                |other: u32| now.extend(aabb.overlaps(&world.boxes[other as usize]).then_some(other));
             nodes += tree.overlapping(aabb, &mut take).nodes;
             met += now.len() as u64;
             if nodes > max_nodes {
@@ -198,7 +199,8 @@ impl Kernel for SweepAll<'_> {
                 continue;
             }
             // The first block also has the box itself and lower ids: their lanes are masked out.
-            let (first, wanted) = if are_many { (i / BLOCK, 255 & !((2 << (i % BLOCK)) - 1)) } else { (0, 255) };
+            let (first, wanted) =
+                if are_many { (i / BLOCK, 255 & !((2 << (i % BLOCK)) - 1)) } else { (0, 255) };
             made += (lanes - first * BLOCK) as u64;
             sweep.now.clear();
             // SAFETY: the caller has the instructions.

@@ -105,7 +105,8 @@ impl BroadPhase {
         self.report.work = store.tree.keep_sorted(&world.boxes, changed);
         store.held = Held::InTree;
         self.report.stages.map = clock.lap();
-        let max_nodes = self.config.forced_engine().map_or(policy::look_up_to_nodes(world.ids()), |_| u64::MAX);
+        let max_nodes =
+            self.config.forced_engine().map_or(policy::look_up_to_nodes(world.ids()), |_| u64::MAX);
         let tree = (&store.tree, max_nodes);
         let (checks, nodes) = self.sweep.run_in_tree(world, &self.kept, tree, &mut self.comparison);
         self.report.checks = checks;

@@ -17,9 +17,7 @@ impl Sorted<'_> {
         let step = oversize.div_ceil(policy::COUNTED_OVERSIZE).max(1);
         let counted = grid.oversize.iter().step_by(step).map(|one| grid.work_of_oversize(one)).sum::<u64>();
         let between = (oversize * oversize / 2) as u64;
-        in_grid * policy::COUNT_ONE_IN as u64
-            + counted * step as u64
-            + between * policy::WORK_OF_EXACT_TEST
+        in_grid * policy::COUNT_ONE_IN as u64 + counted * step as u64 + between * policy::WORK_OF_EXACT_TEST
     }
 
     /// Returns the number of overlaps that a search of one box in `step` finds, in proportion. Leaves `hits` as they come.
@@ -79,7 +77,8 @@ impl Kernel for CountSlots<'_> {
 /// Returns the slots behind a box in its own row of cells, and in four rows more.
 #[inline(always)]
 fn in_runs(grid: &Grid, slot: usize) -> u64 {
-    let (dx, layer) = (grid.plan.cells.dims[0] as usize, (grid.plan.cells.dims[0] * grid.plan.cells.dims[1]) as usize);
+    let (dx, layer) =
+        (grid.plan.cells.dims[0] as usize, (grid.plan.cells.dims[0] * grid.plan.cells.dims[1]) as usize);
     let key = grid.records[slot].key as usize;
     let row = |first: usize| u64::from(grid.starts[first + 3] - grid.starts[first]);
     let own = u64::from(grid.starts[key + 2]) - slot as u64;

@@ -53,7 +53,8 @@ impl BoxIndex {
 
     /// Returns true if questions have looked at as many nodes as so many sorts cost.
     fn has_earned_sort(&self, sorts: u64) -> bool {
-        self.looked_at.load(Ordering::Relaxed) >= sorts * policy::nodes_for_sort(self.leaves, self.places.len())
+        self.looked_at.load(Ordering::Relaxed)
+            >= sorts * policy::nodes_for_sort(self.leaves, self.places.len())
     }
 
     /// Sorts the boxes as they are now.

@@ -118,14 +118,8 @@ pub(crate) fn old_states_to_keep(boxes: usize, forced: Option<Engine>) -> usize 
 mod tests {
     use super::*;
 
-    const WORLD: Counts = Counts {
-        boxes: 10_000,
-        ids: 10_000,
-        changed: 100,
-        knows_old: true,
-        held: Held::InGrid,
-        spilled: 0,
-    };
+    const WORLD: Counts =
+        Counts { boxes: 10_000, ids: 10_000, changed: 100, knows_old: true, held: Held::InGrid, spilled: 0 };
 
     #[test]
     fn few_changes_are_edited_and_many_rebuild_the_grid() {

@@ -1,0 +1,257 @@
+//! Worlds that are hard for a broad phase, as recipes: numbers that a search for the worst world can change.
+
+use pbig_core::Aabb;
+use rand::rngs::StdRng;
+use rand::{RngExt, SeedableRng};
+
+/// Boxes for which the widths of a recipe are meant. More boxes take more room.
+pub const MEANT_FOR: usize = 25_000;
+
+/// How the boxes of a part lie in its region.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Place {
+    /// Anywhere.
+    Anywhere,
+    /// At equal distances along the region's diagonal.
+    Line,
+    /// In cells of a cubic lattice.
+    Lattice,
+    /// At distances from its corner that are log-uniform over ten decades up to its width, sizes in proportion.
+    Around,
+}
+
+/// Boxes of one kind.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Part {
+    /// The share of all boxes, relative to the other parts'.
+    pub weight: u32,
+    /// How they lie.
+    pub place: Place,
+    /// The lower corner of the region.
+    pub corner: [f32; 3],
+    /// The widths of the region.
+    pub width: [f32; 3],
+    /// The power of the number of boxes with which the widths grow: a third keeps the density.
+    pub growth: f32,
+    /// Half extents.
+    pub half: [f32; 3],
+    /// The decades by which sizes differ.
+    pub decades: f32,
+}
+
+impl Part {
+    /// Unit cubes, about one pair for four boxes.
+    pub const CUBES: Self = Self {
+        weight: 1,
+        place: Place::Anywhere,
+        corner: [0.0; 3],
+        width: [74.0; 3],
+        growth: 1.0 / 3.0,
+        half: [0.5; 3],
+        decades: 0.0,
+    };
+
+    fn make(&self, (i, count): (usize, usize), scale: f32, random: &mut StdRng) -> Aabb {
+        let width = self.width.map(|width| width * scale.powf(self.growth));
+        let at = self.at(i, count, random);
+        let size = match self.place {
+            Place::Around => at[0].abs().max(at[1].abs()).max(at[2].abs()),
+            _ => 10f32.powf(-self.decades * random.random_range(0.0..1.0)),
+        };
+        let center = std::array::from_fn(|k| self.corner[k] + at[k] * width[k]);
+        Aabb::from_center(center, self.half.map(|half| half * size))
+    }
+
+    /// Returns where a box lies, in widths.
+    fn at(&self, i: usize, count: usize, random: &mut StdRng) -> [f32; 3] {
+        match self.place {
+            Place::Anywhere => [0; 3].map(|_| random.random_range(0.0..1.0)),
+            Place::Line => [i as f32 / count.max(1) as f32; 3],
+            Place::Lattice => {
+                let side = (count as f64).cbrt().ceil().max(1.0) as usize;
+                [i % side, i / side % side, i / side / side].map(|cell| cell as f32 / side as f32)
+            }
+            Place::Around => {
+                let direction = [0; 3].map(|_| random.random_range(-1.0f32..1.0));
+                let length = direction.iter().fold(1e-3f32, |all, x| all.max(x.abs()));
+                let distance = 10f32.powf(-10.0 * random.random_range(0.0f32..1.0));
+                direction.map(|x| x / length * distance)
+            }
+        }
+    }
+}
+
+/// A world: some parts, whose boxes take turns.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Recipe(pub Vec<Part>);
+
+impl Recipe {
+    /// Makes `n` boxes.
+    pub fn boxes(&self, n: usize, seed: u64) -> Vec<Aabb> {
+        let mut random = StdRng::seed_from_u64(seed);
+        let turns: Vec<usize> =
+            self.0.iter().enumerate().flat_map(|(k, part)| vec![k; part.weight as usize]).collect();
+        let scale = n as f32 / MEANT_FOR as f32;
+        let mut made = vec![0; self.0.len()];
+        let mut next = |i: usize| {
+            let part = turns[i % turns.len()];
+            made[part] += 1;
+            let count = n * self.0[part].weight as usize / turns.len();
+            self.0[part].make((made[part] - 1, count), scale, &mut random)
+        };
+        if turns.is_empty() { Vec::new() } else { (0..n).map(&mut next).collect() }
+    }
+}
+
+/// What becomes of a box in a history.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Change {
+    /// It goes where another world has it, with its size.
+    To(Recipe),
+    /// Its extents grow by a factor.
+    Grow(f32),
+    /// It moves.
+    Shift([f32; 3]),
+    /// It is removed.
+    Remove,
+}
+
+/// A world and its history: in each update the next boxes change, each once.
+#[derive(Clone, Debug, PartialEq)]
+pub struct History {
+    /// The world at first.
+    pub start: Recipe,
+    /// What becomes of the boxes.
+    pub change: Change,
+    /// In how many updates all boxes have changed.
+    pub updates: usize,
+}
+
+impl History {
+    /// Returns the boxes as they become, by id; none for those that are removed.
+    pub fn after(&self, boxes: &[Aabb], seed: u64) -> Vec<Option<Aabb>> {
+        let to = match &self.change {
+            Change::To(recipe) => recipe.boxes(boxes.len(), seed + 1),
+            _ => Vec::new(),
+        };
+        let changed = |(i, aabb): (usize, &Aabb)| match &self.change {
+            Change::To(_) => Some(to[i]),
+            Change::Grow(factor) => {
+                let half: [f32; 3] = std::array::from_fn(|k| (aabb.max[k] - aabb.min[k]) * 0.5);
+                Some(Aabb::from_center(
+                    std::array::from_fn(|k| aabb.min[k] + half[k]),
+                    half.map(|half| half * factor),
+                ))
+            }
+            Change::Shift(by) => Some(Aabb::new(
+                std::array::from_fn(|k| aabb.min[k] + by[k]),
+                std::array::from_fn(|k| aabb.max[k] + by[k]),
+            )),
+            Change::Remove => None,
+        };
+        boxes.iter().enumerate().map(changed).collect()
+    }
+}
+
+/// Shapes for which a grid of one cell size takes quadratic time, and their neighbours.
+pub fn shapes() -> Vec<(&'static str, Recipe)> {
+    const CUBES: Part = Part::CUBES;
+    const SMALL: Part = Part { growth: 0.0, ..CUBES };
+    let needles = |axis: usize, corner: [f32; 3], thick: f32| {
+        let mut part = Part { corner, half: [thick; 3], ..CUBES };
+        (part.half[axis], part.width[axis]) = (1000.0, 0.0);
+        part
+    };
+    let slab = |z: f32| Part { corner: [0.0, 0.0, z], width: [100.0, 100.0, 3.0], half: [0.3; 3], ..CUBES };
+    let [x, y, z] = [0, 1, 2].map(|axis| needles(axis, [0.0; 3], 0.01));
+    let worlds: [(&str, &[Part]); 18] = [
+        ("uniform", &[CUBES]),
+        (
+            "two scales",
+            &[Part { width: [1000.0; 3], ..CUBES }, Part { width: [0.01; 3], half: [5e-6; 3], ..SMALL }],
+        ),
+        ("size by distance", &[Part { place: Place::Around, width: [1e5; 3], half: [2e3; 3], ..SMALL }]),
+        ("tiny ones in the volume of one", &[CUBES, Part { width: [0.9; 3], half: [5e-4; 3], ..SMALL }]),
+        (
+            "infinite needles far away",
+            &[CUBES, Part { corner: [0.0, 1e4, 0.0], half: [f32::INFINITY, 0.1, 0.1], ..CUBES }],
+        ),
+        ("mixed sizes above 2^100", &[Part { width: [3e34; 3], half: [1e33; 3], decades: 3.0, ..CUBES }]),
+        (
+            "a slab with sheets in its gap",
+            &[
+                Part { weight: 5, ..slab(0.0) },
+                Part { weight: 4, ..slab(100.0) },
+                Part {
+                    corner: [0.0, 0.0, 20.0],
+                    width: [0.0, 0.0, 60.0],
+                    half: [100.0, 100.0, 1e-5],
+                    ..CUBES
+                },
+            ],
+        ),
+        (
+            "a diagonal line",
+            &[Part {
+                place: Place::Line,
+                width: [MEANT_FOR as f32; 3],
+                half: [0.4; 3],
+                growth: 1.0,
+                ..CUBES
+            }],
+        ),
+        ("needles that do not cross", &[x, Part { corner: [0.0, 0.0, 1e4], ..y }]),
+        ("needles between needles", &[needles(0, [0.0; 3], 1e-4), needles(1, [0.0; 3], 1e-4)]),
+        ("needles in three directions", &[x, y, z]),
+        (
+            "gravel and crates",
+            &[
+                Part { width: [3.0; 3], half: [0.05; 3], ..CUBES },
+                Part { width: [600.0; 3], half: [1.0; 3], ..CUBES },
+            ],
+        ),
+        ("denormal numbers", &[Part { width: [3e-39; 3], half: [3e-41; 3], ..CUBES }]),
+        ("some far away", &[Part { weight: 30, ..CUBES }, Part { width: [1e9; 3], ..SMALL }]),
+        ("sizes over two decades", &[Part { width: [150.0; 3], half: [1.0; 3], decades: 2.0, ..CUBES }]),
+        (
+            "sheets in three directions",
+            &[
+                Part { half: [60.0, 60.0, 1e-4], width: [600.0; 3], ..CUBES },
+                Part { half: [60.0, 1e-4, 60.0], width: [600.0; 3], ..CUBES },
+                Part { half: [1e-4, 60.0, 60.0], width: [600.0; 3], ..CUBES },
+            ],
+        ),
+        ("a lattice that touches", &[Part { place: Place::Lattice, width: [29.0; 3], ..CUBES }]),
+        (
+            "all on one plane of a huge floor",
+            &[
+                Part { weight: 50, width: [300.0, 300.0, 0.0], ..CUBES },
+                Part { half: [1e6, 1e6, 1.0], ..CUBES },
+            ],
+        ),
+    ];
+    worlds.map(|(name, parts)| (name, Recipe(parts.to_vec()))).into()
+}
+
+/// Histories after which a grid that is edited again and again takes quadratic time.
+pub fn histories() -> Vec<(&'static str, History)> {
+    let start =
+        || Recipe(vec![Part { place: Place::Lattice, width: [45.0; 3], half: [0.3; 3], ..Part::CUBES }]);
+    let history = |change: Change| History { start: start(), change, updates: 25 };
+    let part = |part: Part| Change::To(Recipe(vec![part]));
+    let tiny = Part { corner: [20.0; 3], width: [0.9; 3], growth: 0.0, half: [1e-3; 3], ..Part::CUBES };
+    let line =
+        Part { place: Place::Line, width: [MEANT_FOR as f32; 3], growth: 1.0, half: [0.3; 3], ..Part::CUBES };
+    [
+        ("cubes that turn", Change::Grow(1.2)),
+        ("cubes that double", Change::Grow(2.0)),
+        ("4 km along one axis", Change::Shift([4000.37, 0.0, 0.0])),
+        ("10 km along all axes", Change::Shift([1e4; 3])),
+        ("tiny ones that gather", part(tiny)),
+        ("out along a line", part(line)),
+        ("mixed up", part(Part { width: [45.0; 3], half: [0.3; 3], ..Part::CUBES })),
+        ("removed", Change::Remove),
+    ]
+    .map(|(name, change)| (name, history(change)))
+    .into()
+}

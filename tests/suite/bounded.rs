@@ -1,0 +1,114 @@
+//! The work of a call is bounded, whatever the boxes' shape, motion and history: counts, never times.
+
+use pbig_core::{BroadPhase, Config, Engine, Finder, ProxyFilter, Report, WORK_LIMIT, oracle};
+use pbig_harness::hard::{History, histories, shapes};
+
+/// Numbers of boxes: a work that is not bounded grows faster than they do.
+const SIZES: [usize; 2] = [4000, 16_000];
+
+/// Growth of the ratio from the first size to the second, at most. Boxes that cross each other in three directions double it.
+const MAX_GROWTH: f64 = 2.0;
+
+/// The ratio up to which a grid is searched: 400 tests for each box of 16,000. Below, it may grow.
+const RATIO_OF_GRIDS: f64 = 30.0;
+
+/// Work of an update, in works of a search of the same boxes, at most: an edit hands over before it takes as long as half of one.
+/// More than one, as an entry of a list counts as 16 tests, and sorting, most of a search of equal boxes, as 8 a box.
+const MAX_SEARCHES: f64 = 6.0;
+
+/// The work for each box and pair, in binary logarithms of the number of boxes.
+fn ratio(report: &Report, boxes: usize) -> f64 {
+    report.work as f64 / ((boxes as f64 + report.pairs as f64) * (boxes as f64).log2())
+}
+
+fn search(boxes: &[pbig_core::Aabb], engine: Option<Engine>) -> f64 {
+    let mut finder = Finder::new(Config { engine, ..Config::DEFAULT });
+    let found = finder.find(boxes).expect("few pairs");
+    if boxes.len() == SIZES[0] {
+        assert!(oracle::pairs(boxes) == found);
+    }
+    ratio(finder.report(), boxes.len())
+}
+
+#[test]
+fn no_shape_takes_work_without_bound() {
+    for (name, recipe) in shapes() {
+        let [small, large] = SIZES.map(|n| search(&recipe.boxes(n, 1), None));
+        println!("{name}: {small:.2}, {large:.2}");
+        assert!(small.max(large) <= WORK_LIMIT as f64, "{name}: {small}, {large}");
+        assert!(large <= (MAX_GROWTH * small).max(RATIO_OF_GRIDS), "{name}: {small}, {large}");
+    }
+}
+
+#[test]
+fn a_grid_alone_breaks_the_bound() {
+    let (_, recipe) = shapes().into_iter().find(|(name, _)| *name == "two scales").expect("a shape");
+    let [small, large] = SIZES.map(|n| search(&recipe.boxes(n, 1), Some(Engine::Rebuild)));
+    assert!(large > MAX_GROWTH * small && large > WORK_LIMIT as f64, "{small}, {large}");
+}
+
+/// Runs a history, and returns the largest work of an update: as a ratio, and in works of a search of the same boxes.
+fn run(history: &History, n: usize) -> [f64; 2] {
+    let boxes = history.start.boxes(n, 1);
+    let after = history.after(&boxes, 1);
+    let mut broad_phase = BroadPhase::default();
+    (0..).zip(&boxes).for_each(|(id, aabb)| broad_phase.set(id, *aabb, ProxyFilter::ALL).expect("an id"));
+    broad_phase.update().expect("few pairs");
+    let (mut finder, mut worst) = (Finder::default(), [0f64; 2]);
+    for changed in (0..n as u32).collect::<Vec<_>>().chunks(n / history.updates) {
+        for &id in changed {
+            match after[id as usize] {
+                Some(aabb) => broad_phase.set(id, aabb, ProxyFilter::ALL).expect("an id"),
+                None => assert!(broad_phase.remove(id)),
+            }
+        }
+        broad_phase.update().expect("few pairs");
+        let found = finder.find(broad_phase.fat_aabbs()).expect("few pairs");
+        assert!(broad_phase.pairs().eq(found.iter().copied()));
+        let work = broad_phase.report().work as f64;
+        // What a search sorts is work, too.
+        let searched = (finder.report().work + 8 * n as u64) as f64;
+        worst = [worst[0].max(ratio(broad_phase.report(), n)), worst[1].max(work / searched)];
+    }
+    worst
+}
+
+#[test]
+fn no_history_takes_work_without_bound() {
+    for (name, history) in histories() {
+        for n in SIZES {
+            let [ratio, searches] = run(&history, n);
+            println!("{name}, {n} boxes: {ratio:.2}, {searches:.2} searches");
+            assert!(ratio <= WORK_LIMIT as f64, "{name}, {n} boxes: {ratio}");
+            assert!(searches <= MAX_SEARCHES, "{name}, {n} boxes: {searches}");
+        }
+    }
+}
+
+#[test]
+fn after_a_peak_work_follows_the_boxes_that_are_left() {
+    for left in [50, 2000] {
+        let works = [20_000, 80_000].map(|peak: u32| {
+            let mut broad_phase = BroadPhase::default();
+            let cube = |i: u32, x: f32| {
+                let at = [i % 40, i / 40 % 40, i / 1600].map(|k| k as f32 * 2.0);
+                pbig_core::Aabb::from_center([at[0] + x, at[1], at[2]], [0.5; 3])
+            };
+            (0..peak).for_each(|i| broad_phase.set(i, cube(i, 0.0), ProxyFilter::ALL).expect("an id"));
+            broad_phase.update().expect("few pairs");
+            (0..peak - left).for_each(|i| assert!(broad_phase.remove(i)));
+            broad_phase.update().expect("few pairs");
+            let mut work = 0;
+            for step in 0..50 {
+                (peak - left..peak)
+                    .step_by(2)
+                    .for_each(|i| assert!(broad_phase.set_aabb(i, cube(i, (step % 3) as f32 * 0.6))));
+                broad_phase.update().expect("few pairs");
+                work += broad_phase.report().work;
+            }
+            work as f64 / f64::from(50 * left)
+        });
+        println!("{left} left of 20,000 and 80,000: {works:?} for each box");
+        assert!(works[1] <= 1.5 * works[0], "{left} left: {works:?}");
+    }
+}
