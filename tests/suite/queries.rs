@@ -51,11 +51,15 @@ macro_rules! ask {
         let (ray, ball) = (Ray::new(point, direction), Ball::new(0.7));
         let pose = Isometry::translation(at[0], at[1], at[2]);
         let index = |handle: ColliderHandle| handle.into_raw_parts().0;
+        // Rapier 0.27's own `project_point` panics if its tree has no collider to project on.
+        let everywhere = Aabb::new(Point::from([f32::MIN; 3]), Point::from([f32::MAX; 3]));
+        let can_project = queries.intersect_aabb_conservative(everywhere).next().is_some();
         Answers {
             ray: queries.cast_ray(&ray, 30.0, true).map(|hit| hit.1),
             all_on_ray: queries.intersect_ray(ray, 30.0, true).map(|hit| index(hit.0)).collect(),
-            projection: queries
-                .project_point(&point, 5.0, true)
+            projection: can_project
+                .then(|| queries.project_point(&point, 5.0, true))
+                .flatten()
                 .map(|(_, found)| (found.point - point).norm()),
             within: queries.intersect_point(point).map(|(handle, _)| index(handle)).collect(),
             shapes: queries.intersect_shape(pose, &ball).map(|(handle, _)| index(handle)).collect(),
@@ -87,6 +91,26 @@ fn compare(world: &World, both: &Both, random: &mut SmallRng, questions: usize) 
         hits += usize::from(wanted.ray.is_some());
     }
     hits
+}
+
+/// Compares the answers of one broad phase's index with those of rapier's own queries on the tree of another, which has the same
+/// boxes. Returns the number of rays that hit.
+pub(crate) fn compare_with_tree(
+    world: &World,
+    of_index: &PbigBroadPhase,
+    of_tree: &PbigBroadPhase,
+    seed: u64,
+) -> Result<u64, String> {
+    let mut random = SmallRng::seed_from_u64(seed);
+    let (at, along) = (random3(&mut random, 4.0), random3(&mut random, 1.0));
+    let filter = QueryFilter::default();
+    let [ours, rapiers] = [of_index, of_tree]
+        .map(|one| one.as_query_pipeline(&DefaultQueryDispatcher, &world.bodies, &world.colliders, filter));
+    let (ours, wanted) = (ask!(&ours, at, along), ask!(&*rapiers, at, along));
+    if ours == wanted {
+        return Ok(u64::from(ours.ray.is_some()));
+    }
+    Err(format!("at {at:?} along {along:?}: {ours:?}, rapier's own queries: {wanted:?}"))
 }
 
 #[test]

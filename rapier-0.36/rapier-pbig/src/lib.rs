@@ -83,7 +83,7 @@ pub fn broad_phase() -> BroadPhaseBvh {
 /// where pbig is installed already.
 ///
 /// A broad phase that was saved and restored has to be given pbig again by this function. Without it, rapier's tree finds the
-/// pairs. To give a running world pbig, call this function; a new broad phase does not know the pairs of the old one.
+/// pairs, and nothing says so: assert [`is_installed`]. To give a running world pbig, call this function; a new broad phase does not know the pairs of the old one.
 pub fn install(broad_phase: &mut BroadPhaseBvh) {
     if finder(broad_phase).is_none() {
         install_finder(broad_phase, PbigFinder::default());

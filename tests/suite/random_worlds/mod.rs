@@ -5,6 +5,7 @@
 //! `PROPTEST_CASES=6400` it plays new ones: about 10^6 on the CPU, and 1.5 x 10^6 on its engines.
 
 mod ops;
+mod subject;
 
 use crate::checked::{on_cpu, on_gpu, pbig};
 use ops::{Op, any_op, apply};
@@ -15,98 +16,14 @@ use pbig_tests::{engines, needs_gpu};
 use proptest::collection::vec;
 use proptest::prelude::ProptestConfig;
 use proptest::test_runner::{RngAlgorithm, TestCaseError, TestError, TestRng, TestRunner};
-use rapier_pbig::PbigBroadPhase;
 use rapier_pbig::shadow::Watcher;
 use rapier3d::prelude::*;
 use std::cell::Cell;
-use std::collections::HashMap;
 use std::panic::{AssertUnwindSafe, catch_unwind};
+use subject::{Plant, Subject};
 
 /// A list has up to so many operations, half as many on average.
 const MOST_OPS: usize = 160;
-
-/// What the broad phase under test does wrong.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Plant {
-    Nothing,
-    /// The third `AddPair` of a call and those after it are lost, as in too small a buffer.
-    RoomForTwo,
-    /// A collider is looked at again only if its box has changed, not its parent, groups or body type.
-    OnlyMoved,
-    /// Nothing is left after a restore.
-    Forgets,
-}
-
-/// Ours, perhaps with a planted fault.
-struct Subject {
-    pbig: PbigBroadPhase,
-    plant: Plant,
-    /// For [`Plant::OnlyMoved`]: each collider's box when it was last listed.
-    boxes: HashMap<ColliderHandle, Option<Aabb>>,
-    /// In the middle of an update, where a panic is ours and not rapier's.
-    busy: bool,
-}
-
-impl Subject {
-    fn new(config: Config, plant: Plant) -> Self {
-        Self { pbig: pbig(config), plant, boxes: HashMap::new(), busy: false }
-    }
-
-    /// Goes on with what was saved.
-    fn restore(&mut self, config: Config) {
-        let bytes = postcard::to_stdvec(&self.pbig).expect("a broad phase can be saved");
-        self.pbig = match self.plant {
-            Plant::Forgets => pbig(config),
-            _ => postcard::from_bytes(&bytes).expect("these are the bytes of a broad phase"),
-        };
-    }
-
-    /// The modified colliders that it is shown.
-    fn shown(
-        &mut self,
-        params: &IntegrationParameters,
-        colliders: &ColliderSet,
-        modified: &[ColliderHandle],
-        removed: &[ColliderHandle],
-    ) -> Vec<ColliderHandle> {
-        if self.plant != Plant::OnlyMoved {
-            return modified.to_vec();
-        }
-        removed.iter().for_each(|handle| _ = self.boxes.remove(handle));
-        let reach = params.prediction_distance() / 2.0;
-        let aabb = |handle| colliders.get(handle).map(|collider| collider.compute_collision_aabb(reach));
-        let has_moved = |&handle: &ColliderHandle| {
-            let now = aabb(handle);
-            self.boxes.insert(handle, now) != Some(now)
-        };
-        modified.iter().copied().filter(has_moved).collect()
-    }
-}
-
-impl BroadPhase for Subject {
-    fn update(
-        &mut self,
-        params: &IntegrationParameters,
-        colliders: &ColliderSet,
-        bodies: &RigidBodySet,
-        modified: &[ColliderHandle],
-        removed: &[ColliderHandle],
-        events: &mut Vec<BroadPhasePairEvent>,
-    ) {
-        self.busy = true;
-        let (shown, mut right) = (self.shown(params, colliders, modified, removed), Vec::new());
-        self.pbig.update(params, colliders, bodies, &shown, removed, &mut right);
-        let mut room = if self.plant == Plant::RoomForTwo { 2 } else { usize::MAX };
-        right.retain(|event| {
-            let added = matches!(event, BroadPhasePairEvent::AddPair(_));
-            let fits = !added || room > 0;
-            room -= usize::from(added && fits);
-            fits
-        });
-        events.append(&mut right);
-        self.busy = false;
-    }
-}
 
 /// What happened, summed up.
 #[derive(Clone, Copy, Debug, Default)]
@@ -118,6 +35,8 @@ struct Tally {
     beside_stock: u64,
     oracle_pairs: u64,
     contacts: u64,
+    /// Rays that hit, of one a step.
+    hits: u64,
     restores: u64,
     /// Runs that a panic of rapier's outside its broad phase has cut short.
     cut_short: u64,
@@ -132,6 +51,7 @@ impl Tally {
             beside_stock: self.beside_stock + other.beside_stock,
             oracle_pairs: self.oracle_pairs + other.oracle_pairs,
             contacts: self.contacts + other.contacts,
+            hits: self.hits + other.hits,
             restores: self.restores + other.restores,
             cut_short: self.cut_short + other.cut_short,
         }
@@ -143,6 +63,7 @@ impl Tally {
         let few = self.runs < 20;
         assert!(few || self.oracle_pairs > self.steps, "hardly any pairs: {self:?}");
         assert!(few || self.contacts > self.steps / 10, "hardly any contacts: {self:?}");
+        assert!(few || self.hits > self.steps / 10, "hardly any rays hit: {self:?}");
         assert!(few || self.beside_stock > self.steps / 2, "hardly compared with stock: {self:?}");
         assert!(few || self.restores > self.runs / 2, "hardly ever restored: {self:?}");
         assert!(few || self.cut_short < self.runs / 20, "rapier panics often: {self:?}");
@@ -227,7 +148,7 @@ impl Scene {
             return Err(End::Wrong(first.to_string()));
         }
         match (whole, self.broad_phase.inner.busy) {
-            (true, _) => self.count_step(),
+            (true, _) => self.count_step()?,
             (false, true) => return Err(End::Wrong("the broad phase has panicked".into())),
             (false, false) => return Err(End::RapierPanicked),
         }
@@ -237,12 +158,15 @@ impl Scene {
         }
     }
 
-    fn count_step(&mut self) {
+    fn count_step(&mut self) -> Result<(), End> {
         let touching = self.world.narrow_phase.contact_pairs().filter(|pair| pair.has_any_active_contact);
         self.tally.contacts += touching.count() as u64;
         self.tally.steps += 1;
         self.tally.beside_stock += u64::from(self.watcher().has_stock());
         self.tally.oracle_pairs = self.watcher().checker.oracle_pairs;
+        let answers = self.broad_phase.inner.ask(&self.world, self.tally.steps);
+        self.tally.hits += answers.map_err(End::Wrong)?;
+        Ok(())
     }
 
     fn watcher(&mut self) -> &mut Watcher {
@@ -372,7 +296,7 @@ fn a_snapshot_anywhere_continues_bit_identically() {
 
 #[test]
 fn planted_faults_are_noticed_and_shrink_to_a_few_operations() {
-    for plant in [Plant::RoomForTwo, Plant::OnlyMoved, Plant::Forgets] {
+    for plant in [Plant::RoomForTwo, Plant::OnlyMoved, Plant::Forgets, Plant::Late] {
         let failing = |ops: &[Op]| run(ops, on_cpu()[0], plant).map(|_| ());
         let (why, ops) = try_random_ops(100, &failing).expect_err("the fault is noticed");
         println!("{plant:?}: {why}\n{}", listed(&ops));

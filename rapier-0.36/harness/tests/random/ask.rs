@@ -4,7 +4,7 @@ use glam::Vec3;
 use pbig_harness_036::world::{World, pose, to_point, to_vector};
 use rand::RngExt;
 use rand::rngs::StdRng;
-use rapier3d::geometry::SceneTree;
+use rapier3d::parry::partitioning::Bvh;
 use rapier3d::parry::query::ShapeCastOptions;
 use rapier3d::pipeline::QueryPipeline;
 use rapier3d::prelude::*;
@@ -76,8 +76,11 @@ pub(crate) fn compare(world: &World, broad_phase: &BroadPhaseBvh, rng: &mut StdR
         let (dispatcher, question) = (world.narrow_phase.query_dispatcher(), Question::new(rng));
         let of_index = broad_phase.as_query_pipeline(dispatcher, &world.bodies, &world.colliders, filter);
         // Before its first update a finder knows nothing, and rapier's own tree answers.
-        let SceneTree::Finder(finder) = of_index.bvh else { return hits };
-        let of_tree = QueryPipeline { bvh: SceneTree::Bvh(finder.tree()), ..of_index };
+        let Some(finder) = of_index.bvh.finder() else { return hits };
+        // As code that was written for the unpatched rapier reads and sets the field.
+        let bvh: &Bvh = of_index.bvh;
+        assert!(std::ptr::eq(bvh, finder.tree()));
+        let of_tree = QueryPipeline { bvh, ..of_index };
         let (ours, wanted) = (question.ask(&of_index), question.ask(&of_tree));
         assert_eq!(ours.0, wanted.0, "at {} along {} within {}", question.at, question.along, question.reach);
         if ours.1 != wanted.1 {
