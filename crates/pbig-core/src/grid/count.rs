@@ -24,13 +24,17 @@ impl Sorted<'_> {
     pub(crate) fn overlaps_in_sample(&self, step: usize, rule: &Rule<'_>, hits: &mut Hits) -> u64 {
         let rule = Rule { max_pairs: u64::MAX, ..*rule };
         hits.begin(0, 0);
-        for slot in (0..self.grid.len).step_by(step) {
+        let (len, oversize) = (self.grid.len, self.grid.oversize.len());
+        for slot in (step / 2..len).step_by(step) {
             self.grid.search_slots(slot..slot + 1, &rule, hits);
         }
-        for i in (0..self.grid.oversize.len()).step_by(step) {
+        let in_grid = hits.overlaps * step as u64;
+        let step = step.min(oversize / policy::SAMPLED_OVERSIZE + 1);
+        hits.begin(0, 0);
+        for i in (step / 2..oversize).step_by(step) {
             self.grid.find_oversize_pairs(i, &rule, hits);
         }
-        hits.overlaps * step as u64
+        in_grid + hits.overlaps * step as u64
     }
 }
 

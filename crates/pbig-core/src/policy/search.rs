@@ -8,6 +8,9 @@ pub(crate) const COUNT_ONE_IN: usize = 16;
 /// Oversize boxes whose candidates are counted, at most.
 pub(crate) const COUNTED_OVERSIZE: usize = 128;
 
+/// Oversize boxes that are searched to see what a search would find, at least: a few of them can meet most boxes.
+pub(crate) const SAMPLED_OVERSIZE: usize = 32;
+
 /// Tests of codes that take as long as an exact test of two boxes in memory.
 pub(crate) const WORK_OF_EXACT_TEST: u64 = 4;
 
