@@ -2,6 +2,7 @@
 //! them is in docs/.
 
 pub mod accuracy;
+pub mod hard;
 mod index;
 pub mod papers;
 pub mod peers;

@@ -4,7 +4,7 @@ use clap::{Parser, Subcommand};
 use pbig_harness::frames::FrameKind;
 use pbig_harness::output::{Failure, finish, print, tracked};
 use pbig_harness::report::Report;
-use pbig_studies::{accuracy, papers, peers, stages, steady, whole_steps, worst};
+use pbig_studies::{accuracy, hard, papers, peers, stages, steady, whole_steps, worst};
 use serde_json::{Map, json};
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -47,6 +47,8 @@ enum Command {
         #[arg(long, value_name = "KIND", value_delimiter = ',', default_value = "none", value_parser = FrameKind::named)]
         queries: Vec<FrameKind>,
     },
+    /// Worlds and histories on which a grid alone takes quadratic time.
+    Hard,
     /// Searches for the world or history that takes most work for each box and pair.
     Worst {
         /// How long to search.
@@ -78,6 +80,7 @@ fn run(cli: &Cli) -> Result<(), Failure> {
         Command::Peers => peers::run(cli.quick)?,
         Command::Steady { boxes } => steady::run(cli.quick, boxes)?,
         Command::WholeSteps { queries } => whole_steps::run(cli.quick, queries),
+        Command::Hard => hard::run(cli.quick)?,
         Command::Worst { seconds, seed, boxes } => {
             worst::run(worst::Search { seconds: *seconds, seed: *seed, boxes: *boxes })?
         }

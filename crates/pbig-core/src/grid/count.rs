@@ -1,6 +1,6 @@
 //! The work of a search, before it is done: once boxes are sorted, the slots that each would visit are known.
 
-use super::cells::Cells;
+use super::cells::{Cells, Steps};
 use super::hits::{Hits, Rule};
 use super::plan::NeighbourScan;
 use super::record::Record;
@@ -66,16 +66,25 @@ impl Kernel for CountSlots<'_> {
         let mut work = 0;
         for slot in (0..grid.len).step_by(step) {
             // SAFETY: the caller has the instructions.
-            work += unsafe {
+            let slots = unsafe {
                 match (grid.plan.scan, cells.wraps) {
                     (NeighbourScan::Runs, _) => in_runs(grid, slot),
                     (NeighbourScan::Windows, false) => in_window::<S, false>(grid, &cells, slot),
                     (NeighbourScan::Windows, true) => in_window::<S, true>(grid, &cells, slot),
                 }
             };
+            // SAFETY: as above.
+            let (low, _) = unsafe { S::steps(&cells, &grid.records[slot].aabb) };
+            work += if is_outside(&cells, low) { slots * policy::WORK_OF_EXACT_TEST } else { slots };
         }
         work
     }
+}
+
+/// Returns true if a box lies beyond the cells, in one at the border: codes of such boxes seldom tell them apart.
+#[inline(always)]
+fn is_outside(cells: &Cells, low: Steps) -> bool {
+    !cells.wraps && (0..3).any(|k| !(1..=cells.dims[k] - 2).contains(&(low[k] >> cells.shift)))
 }
 
 /// Returns the slots behind a box in its own row of cells, and in four rows more.

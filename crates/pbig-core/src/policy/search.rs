@@ -12,7 +12,7 @@ pub(crate) const COUNTED_OVERSIZE: usize = 128;
 pub(crate) const SAMPLED_OVERSIZE: usize = 32;
 
 /// Tests of codes that take as long as an exact test of two boxes in memory.
-pub(crate) const WORK_OF_EXACT_TEST: u64 = 4;
+pub(crate) const WORK_OF_EXACT_TEST: u64 = 6;
 
 /// Tests of codes that take as long as looking at an entry of a list, which can lie anywhere in memory.
 pub(crate) const WORK_OF_ENTRY: u64 = 16;
