@@ -8,13 +8,14 @@ set -euo pipefail
 cd "$(dirname "$0")/.."
 seconds=${1:-600}
 shift || true
-[ $# -gt 0 ] || set -- finder_against_oracle updates_against_scratch decode csv_reader npy_reader
+[ $# -gt 0 ] || set -- finder_against_oracle updates_against_scratch work_is_bounded decode csv_reader npy_reader
 
 # length TARGET: the length in bytes at which an input takes milliseconds, and no allocation that the input does not account for.
 length() {
     case $1 in
     finder_against_oracle) echo 1600 ;;
     updates_against_scratch) echo 800 ;;
+    work_is_bounded) echo 100 ;;
     *) echo 4096 ;;
     esac
 }

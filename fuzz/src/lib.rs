@@ -7,6 +7,8 @@ pub use pbig_core::{Aabb, Pair, ProxyFilter};
 pub mod decode;
 #[path = "../../crates/pbig-harness/src/files.rs"]
 pub mod files;
+#[path = "../../crates/pbig-harness/src/hard.rs"]
+pub mod hard;
 #[path = "../../crates/pbig-core/src/layout.rs"]
 pub mod layout;
 #[path = "../../crates/pbig-harness/src/pair_index.rs"]

@@ -81,7 +81,12 @@ pub fn grid() -> Config {
 /// The CPU's engines for updates where the policy would not choose them, by name.
 pub fn engines() -> Vec<(&'static str, Config)> {
     let by = |engine| Config { engine: Some(engine), ..grid() };
-    vec![("sweep", by(Engine::Sweep)), ("edit", by(Engine::Edit)), ("rebuild", by(Engine::Rebuild))]
+    vec![
+        ("sweep", by(Engine::Sweep)),
+        ("edit", by(Engine::Edit)),
+        ("tree", by(Engine::Tree)),
+        ("rebuild", by(Engine::Rebuild)),
+    ]
 }
 
 /// The settings of PBIG's grid on the CPU, by name.

@@ -1,7 +1,7 @@
 //! The work of a call is bounded, whatever the boxes' shape, motion and history: counts, never times.
 
-use pbig_core::{BroadPhase, Config, Engine, Finder, ProxyFilter, Report, WORK_LIMIT, oracle};
-use pbig_harness::hard::{History, histories, shapes};
+use pbig_core::{BroadPhase, Config, Engine, Finder, ProxyFilter, WORK_LIMIT, oracle};
+use pbig_harness::hard::{History, histories, ratio, shapes};
 
 /// Numbers of boxes: a work that is not bounded grows faster than they do.
 const SIZES: [usize; 2] = [4000, 16_000];
@@ -15,11 +15,6 @@ const RATIO_OF_GRIDS: f64 = 30.0;
 /// Work of an update, in works of a search of the same boxes, at most: an edit hands over before it takes as long as half of one.
 /// More than one, as an entry of a list counts as 16 tests, and sorting, most of a search of equal boxes, as 8 a box.
 const MAX_SEARCHES: f64 = 6.0;
-
-/// The work for each box and pair, in binary logarithms of the number of boxes.
-fn ratio(report: &Report, boxes: usize) -> f64 {
-    report.work as f64 / ((boxes as f64 + report.pairs as f64) * (boxes as f64).log2())
-}
 
 fn search(boxes: &[pbig_core::Aabb], engine: Option<Engine>) -> f64 {
     let mut finder = Finder::new(Config { engine, ..Config::DEFAULT });
@@ -50,14 +45,13 @@ fn a_grid_alone_breaks_the_bound() {
 /// Runs a history, and returns the largest work of an update: as a ratio, and in works of a search of the same boxes.
 fn run(history: &History, n: usize) -> [f64; 2] {
     let boxes = history.start.boxes(n, 1);
-    let after = history.after(&boxes, 1);
     let mut broad_phase = BroadPhase::default();
     (0..).zip(&boxes).for_each(|(id, aabb)| broad_phase.set(id, *aabb, ProxyFilter::ALL).expect("an id"));
     broad_phase.update().expect("few pairs");
     let (mut finder, mut worst) = (Finder::default(), [0f64; 2]);
-    for changed in (0..n as u32).collect::<Vec<_>>().chunks(n / history.updates) {
-        for &id in changed {
-            match after[id as usize] {
+    for changes in history.changes(&boxes, 1) {
+        for (id, aabb) in changes {
+            match aabb {
                 Some(aabb) => broad_phase.set(id, aabb, ProxyFilter::ALL).expect("an id"),
                 None => assert!(broad_phase.remove(id)),
             }

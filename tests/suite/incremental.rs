@@ -59,6 +59,7 @@ fn moving_sets_where_all_or_a_few_boxes_move() {
             all_by(Engine::Edit, Algorithm::Edit);
             all_by(Engine::Rebuild, Algorithm::Grid);
             all_by(Engine::Sweep, Algorithm::Sweep);
+            all_by(Engine::Tree, Algorithm::Tree);
         }
     }
 }
@@ -186,7 +187,7 @@ fn an_update_that_finds_too_many_pairs_can_be_repeated() {
 
 #[test]
 fn an_edit_that_finds_too_many_pairs_can_be_repeated() {
-    [None, Some(Engine::Sweep), Some(Engine::Edit), Some(Engine::Rebuild)]
+    [None, Some(Engine::Sweep), Some(Engine::Edit), Some(Engine::Tree), Some(Engine::Rebuild)]
         .into_iter()
         .for_each(finds_too_many);
 }

@@ -92,6 +92,7 @@ fn every_strategy_gives_the_same_bits() {
     let configs = [
         with(Backend::Cpu, Some(Engine::Rebuild)),
         with(Backend::Cpu, Some(Engine::Edit)),
+        with(Backend::Cpu, Some(Engine::Tree)),
         with(Backend::Brute, None),
         with(Backend::Gpu, None),
     ];

@@ -1,6 +1,6 @@
 //! Worlds that are hard for a broad phase, as recipes: numbers that a search for the worst world can change.
 
-use pbig_core::Aabb;
+use pbig_core::{Aabb, BroadPhase, Config, Finder, Limits, ProxyFilter, Report};
 use rand::rngs::StdRng;
 use rand::{RngExt, SeedableRng};
 
@@ -128,8 +128,14 @@ pub struct History {
 }
 
 impl History {
-    /// Returns the boxes as they become, by id; none for those that are removed.
-    pub fn after(&self, boxes: &[Aabb], seed: u64) -> Vec<Option<Aabb>> {
+    /// Returns the changes of each update: ids, and what becomes of their boxes; none for those that are removed.
+    pub fn changes(&self, boxes: &[Aabb], seed: u64) -> Vec<Vec<(u32, Option<Aabb>)>> {
+        let all: Vec<_> = (0..).zip(self.after(boxes, seed)).collect();
+        all.chunks(boxes.len().div_ceil(self.updates.max(1)).max(1)).map(<[_]>::to_vec).collect()
+    }
+
+    /// Returns the boxes as they become, by id.
+    fn after(&self, boxes: &[Aabb], seed: u64) -> Vec<Option<Aabb>> {
         let to = match &self.change {
             Change::To(recipe) => recipe.boxes(boxes.len(), seed + 1),
             _ => Vec::new(),
@@ -151,6 +157,50 @@ impl History {
         };
         boxes.iter().enumerate().map(changed).collect()
     }
+}
+
+/// Pairs beyond which a world is not looked at: it would be a test of memory.
+const MAX_PAIRS: u64 = 2_000_000;
+
+fn config() -> Config {
+    Config { limits: Limits { max_pairs: MAX_PAIRS, ..Limits::DEFAULT }, ..Config::DEFAULT }
+}
+
+/// Returns the work of a call for each box and pair, in binary logarithms of the number of boxes, which
+/// [`pbig_core::WORK_LIMIT`] bounds.
+pub fn ratio(report: &Report, n: usize) -> f64 {
+    report.work as f64 / ((n as f64 + report.pairs as f64) * (n.max(2) as f64).log2())
+}
+
+/// Returns the ratio of a search from nothing; none where there are too many pairs.
+pub fn ratio_of_search(recipe: &Recipe, n: usize) -> Option<f64> {
+    let mut finder = Finder::new(config());
+    finder.find(&recipe.boxes(n, 1)).ok()?;
+    Some(ratio(finder.report(), n))
+}
+
+/// Returns the largest ratio of all updates of a history; none where there are too many pairs.
+pub fn ratio_of_history(history: &History, n: usize) -> Option<f64> {
+    let boxes = history.start.boxes(n, 1);
+    let mut broad_phase = BroadPhase::new(config()).ok()?;
+    for (id, aabb) in (0..).zip(&boxes) {
+        broad_phase.set(id, *aabb, ProxyFilter::ALL).ok()?;
+    }
+    let mut update = |changes: &[(u32, Option<Aabb>)]| {
+        for (id, aabb) in changes {
+            match aabb {
+                Some(aabb) => broad_phase.set(*id, *aabb, ProxyFilter::ALL).ok()?,
+                None => _ = broad_phase.remove(*id),
+            }
+        }
+        broad_phase.update().ok()?;
+        Some(ratio(broad_phase.report(), n))
+    };
+    let mut worst = update(&[])?;
+    for changes in history.changes(&boxes, 1) {
+        worst = worst.max(update(&changes)?);
+    }
+    Some(worst)
 }
 
 /// Shapes for which a grid of one cell size takes quadratic time, and their neighbours.

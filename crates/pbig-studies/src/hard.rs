@@ -60,16 +60,15 @@ fn search(boxes: &[Aabb], engine: Option<Engine>) -> Result<(Finder, f64), Failu
 /// Returns mean and worst milliseconds of updates, and of searches of the same boxes.
 fn follow(history: &History, n: usize) -> Result<[[f64; 2]; 2], Failure> {
     let boxes = history.start.boxes(n, 1);
-    let after = history.after(&boxes, 1);
     let mut broad_phase = BroadPhase::new(crate::UNLIMITED)?;
     for (id, aabb) in (0..).zip(&boxes) {
         broad_phase.set(id, *aabb, ProxyFilter::ALL)?;
     }
     broad_phase.update()?;
     let (mut finder, mut times) = (Finder::new(crate::UNLIMITED), [vec![], vec![]]);
-    for changed in (0..n as u32).collect::<Vec<_>>().chunks(n / history.updates) {
-        for &id in changed {
-            match after[id as usize] {
+    for changes in history.changes(&boxes, 1) {
+        for (id, aabb) in changes {
+            match aabb {
                 Some(aabb) => broad_phase.set(id, aabb, ProxyFilter::ALL)?,
                 None => _ = broad_phase.remove(id),
             }

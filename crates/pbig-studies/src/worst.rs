@@ -1,15 +1,13 @@
 //! The search for the world that makes pbig work most for what it finds: recipes are changed at random, and changes that raise
 //! the work are kept.
 
-use pbig_core::{BroadPhase, Config, Error, Finder, Limits, ProxyFilter};
-use pbig_harness::hard::{Change, History, Part, Place, Recipe, histories, shapes};
+use pbig_harness::hard::{
+    Change, History, Part, Place, Recipe, histories, ratio_of_history, ratio_of_search, shapes,
+};
 use pbig_harness::prelude::*;
 use rand::rngs::StdRng;
 use rand::{RngExt, SeedableRng};
 use std::time::{Duration, Instant};
-
-/// Pairs beyond which a world is not looked at: it would be a test of memory.
-const MAX_PAIRS: u64 = 2_000_000;
 
 /// Random worlds to start from, besides the known ones, one in so many.
 const FRESH_ONE_IN: u32 = 8;
@@ -23,49 +21,6 @@ pub struct Search {
     pub seed: u64,
     /// Boxes in a world.
     pub boxes: usize,
-}
-
-/// Returns the work of a search from nothing for each box and pair, in binary logarithms of the number of boxes, which
-/// [`pbig_core::WORK_LIMIT`] bounds. None where there are too many pairs.
-pub fn ratio_of_search(recipe: &Recipe, n: usize) -> Option<f64> {
-    let mut finder = Finder::new(config());
-    finder.find(&recipe.boxes(n, 1)).ok()?;
-    Some(ratio(finder.report(), n))
-}
-
-/// Returns the largest such ratio of all updates of a history.
-pub fn ratio_of_history(history: &History, n: usize) -> Option<f64> {
-    let boxes = history.start.boxes(n, 1);
-    let mut broad_phase = BroadPhase::new(config()).ok()?;
-    for (id, aabb) in (0..).zip(&boxes) {
-        broad_phase.set(id, *aabb, ProxyFilter::ALL).ok()?;
-    }
-    let after = history.after(&boxes, 1);
-    let mut worst = update(&mut broad_phase, n)?;
-    for changed in (0u32..n as u32).collect::<Vec<_>>().chunks(n.div_ceil(history.updates.max(1))) {
-        for &id in changed {
-            match after[id as usize] {
-                Some(aabb) => broad_phase.set(id, aabb, ProxyFilter::ALL).ok()?,
-                None => _ = broad_phase.remove(id),
-            }
-        }
-        worst = worst.max(update(&mut broad_phase, n)?);
-    }
-    Some(worst)
-}
-
-fn config() -> Config {
-    Config { limits: Limits { max_pairs: MAX_PAIRS, ..Limits::DEFAULT }, ..Config::DEFAULT }
-}
-
-fn update(broad_phase: &mut BroadPhase, n: usize) -> Option<f64> {
-    let done: Result<_, Error> = broad_phase.update();
-    done.ok()?;
-    Some(ratio(broad_phase.report(), n))
-}
-
-fn ratio(report: &pbig_core::Report, n: usize) -> f64 {
-    report.work as f64 / ((n as f64 + report.pairs as f64) * (n.max(2) as f64).log2())
 }
 
 /// A world or a history, and its ratio.

@@ -4,7 +4,8 @@ use pbig_core::{BroadPhase, Config, Engine};
 use std::fmt::Debug;
 
 /// The first one is left to the policy.
-const ENGINES: [Option<Engine>; 4] = [None, Some(Engine::Sweep), Some(Engine::Edit), Some(Engine::Rebuild)];
+const ENGINES: [Option<Engine>; 5] =
+    [None, Some(Engine::Sweep), Some(Engine::Edit), Some(Engine::Tree), Some(Engine::Rebuild)];
 
 pub(super) struct Engines(Vec<BroadPhase>);
 

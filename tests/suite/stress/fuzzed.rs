@@ -2,7 +2,7 @@
 
 use super::memory;
 use pbig_core::decode;
-use pbig_harness::{files, pbig_grid};
+use pbig_harness::{files, hard, pbig_grid};
 use rand::rngs::StdRng;
 use rand::{RngExt, SeedableRng};
 
@@ -12,9 +12,10 @@ mod checks;
 
 type Check = fn(&[u8]);
 
-const TARGETS: [(&str, Check); 5] = [
+const TARGETS: [(&str, Check); 6] = [
     ("finder_against_oracle", checks::finder_against_oracle),
     ("updates_against_scratch", checks::updates_against_scratch),
+    ("work_is_bounded", checks::work_is_bounded),
     ("decode", checks::decode_words),
     ("npy_reader", checks::npy_reader),
     ("csv_reader", checks::csv_reader),
@@ -56,7 +57,10 @@ fn random_bytes_on_every_target() {
             let bytes: Vec<u8> = (0..length).map(|_| rng.random_range(0..kinds) as u8).collect();
             memory::largest();
             check(&bytes);
-            assert_fits(memory::largest(), &bytes);
+            // A recipe is a world of two thousand boxes, however short.
+            if target != "work_is_bounded" {
+                assert_fits(memory::largest(), &bytes);
+            }
         }
     }
 }
