@@ -2,7 +2,7 @@
 
 use super::{everywhere, shifted};
 use crate::follower::Follower;
-use pbig_core::{Aabb, Algorithm, Config, Finder, Plan, ProxyFilter};
+use pbig_core::{Aabb, Algorithm, Config, Engine, Finder, Plan, ProxyFilter};
 use pbig_harness::boxes::BoxSet;
 use pbig_tests::strategies;
 
@@ -114,7 +114,8 @@ fn boxes_on_the_borders_of_the_cells_that_are_planned_for_them() {
 #[test]
 fn boxes_on_the_borders_of_the_cells_of_an_edited_grid() {
     let start = heaps();
-    let mut world = Follower::new(Config::DEFAULT, start.len());
+    let config = Config { engine: Some(Engine::Edit), ..Config::DEFAULT };
+    let mut world = Follower::new(config, start.len());
     super::step(&mut world, &[], &start);
     world.update("the heaps");
     let (mut edits, mut on) = (0, 0);

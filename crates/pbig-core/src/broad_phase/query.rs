@@ -99,10 +99,14 @@ impl BroadPhase {
         !self.world.was_removed(pair.a) && !self.world.was_removed(pair.b)
     }
 
-    /// Returns the occupied cells of the grid, for pictures. There are none if the last update needed no grid or ran on a GPU.
-    /// Takes time and memory in proportion to the cells.
+    /// Returns the occupied cells of the grid, or the leaves of the tree, for pictures. There are none if the last update needed
+    /// neither or ran on a GPU. Takes time and memory in proportion to the cells.
     pub fn cells(&self) -> Vec<OccupiedCell> {
-        if self.store.held == Held::InGrid { self.store.grid.occupied_cells() } else { Vec::new() }
+        match self.store.held {
+            Held::InGrid => self.store.grid.occupied_cells(),
+            Held::InTree => self.store.tree.occupied_leaves(),
+            Held::Nowhere => Vec::new(),
+        }
     }
 
     /// Returns the ids of all stored (fat) boxes that overlap a box, in no particular order. Filters are ignored.

@@ -84,7 +84,7 @@ impl BroadPhase {
         let mut clock = Clock::start();
         let limits = EditLimits {
             pairs: self.config.limits.pairs(),
-            work: policy::edit_up_to_work(self.world.present() as usize, self.rebuild_work),
+            work: self.unless_forced(policy::edit_up_to_work(self.len(), self.rebuild_work)),
         };
         let done = self.edit.run(&self.world, &mut self.store.grid, &mut self.comparison, limits);
         self.report.stages.check = clock.lap();
@@ -96,17 +96,21 @@ impl BroadPhase {
         done
     }
 
+    /// Returns the limit of an engine's work; none for an engine that was asked for.
+    fn unless_forced(&self, limit: u64) -> u64 {
+        self.config.forced_engine().map_or(limit, |_| u64::MAX)
+    }
+
     /// Looks up changed boxes in a tree, which is brought up to date first. Returns false if that would take too much work.
     fn run_in_tree(&mut self) -> bool {
         stage!("tree");
         let mut clock = Clock::start();
+        let max_nodes = self.unless_forced(policy::look_up_to_nodes(self.world.ids()));
         let Self { world, store, .. } = self;
         let changed = (store.held == Held::InTree).then_some(&world.changed[..]);
         self.report.work = store.tree.keep_sorted(&world.boxes, changed);
         store.held = Held::InTree;
         self.report.stages.map = clock.lap();
-        let max_nodes =
-            self.config.forced_engine().map_or(policy::look_up_to_nodes(world.ids()), |_| u64::MAX);
         let tree = (&store.tree, max_nodes);
         let (checks, nodes) = self.sweep.run_in_tree(world, &self.kept, tree, &mut self.comparison);
         self.report.checks = checks;

@@ -110,7 +110,8 @@ impl Spacing {
     /// is rounded elsewhere is not oversize at once. A larger one makes windows larger.
     fn extent_with_slack(&self, k: usize) -> f32 {
         let most = ((MAX_STEPS_PER_BOX - 0.5) * self.step(k)) as f32;
-        self.extent[k].max(most.min(policy::MAX_SLACK * self.extent[k]))
+        // Finite, so that no infinite box is taken where the largest is huge.
+        self.extent[k].max(most.min(policy::MAX_SLACK * self.extent[k]).min(f32::MAX))
     }
 
     /// Returns true if the edge decides about the step on an axis; otherwise the largest box does.

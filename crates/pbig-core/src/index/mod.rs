@@ -18,9 +18,9 @@ mod sort;
 mod tests;
 mod walk;
 
-use crate::Aabb;
 use crate::grid::dispatch;
-use node::Node;
+use crate::{Aabb, OccupiedCell};
+use node::{LANES, Node};
 use question::{Near, Question, Sweep};
 use std::sync::atomic::{AtomicU64, Ordering};
 use walk::Walk;
@@ -128,6 +128,16 @@ impl BoxIndex {
         let visited = dispatch(Walk::new(self, question, bound.min(f32::MAX), visit));
         self.looked_at.fetch_add(visited.nodes, Ordering::Relaxed);
         visited
+    }
+
+    /// Returns the leaves and the ids of their boxes, for pictures.
+    pub(crate) fn occupied_leaves(&self) -> Vec<OccupiedCell> {
+        let leaves = (0..self.leaves).chain(self.loose()).map(|leaf| &self.nodes[leaf as usize]);
+        let cells = leaves.map(|node| OccupiedCell {
+            aabb: node.bounds(),
+            ids: (0..LANES).filter(|lane| node.has(*lane)).map(|lane| node.children[lane]).collect(),
+        });
+        cells.filter(|cell| !cell.ids.is_empty()).collect()
     }
 
     fn root(&self) -> Option<u32> {
