@@ -65,6 +65,7 @@ pub fn strategies() -> Vec<(&'static str, Config)> {
     let all = vec![
         ("auto", Config::DEFAULT),
         ("grid", grid()),
+        ("tree", Config { engine: Some(Engine::Tree), ..grid() }),
         ("brute", on(Backend::Brute)),
         ("gpu", on(Backend::Gpu)),
         ("gpu grid", gpu(Coding::Plain)),

@@ -22,7 +22,7 @@ fn search(boxes: &[pbig_core::Aabb], engine: Option<Engine>) -> f64 {
     if boxes.len() == SIZES[0] {
         assert!(oracle::pairs(boxes) == found);
     }
-    ratio(finder.report(), boxes.len())
+    ratio(finder.report())
 }
 
 #[test]
@@ -63,7 +63,7 @@ fn run(history: &History, n: usize) -> (f64, u64) {
         // The last rebuild may have been of another world.
         searched = finder.report().work.max(searched);
         let more = broad_phase.report().work.saturating_sub(searched * 3 / 2);
-        worst = (worst.0.max(ratio(broad_phase.report(), n)), worst.1.max(more));
+        worst = (worst.0.max(ratio(broad_phase.report())), worst.1.max(more));
     }
     worst
 }

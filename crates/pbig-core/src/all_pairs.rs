@@ -108,7 +108,7 @@ impl AllPairs {
             store.grid.build(plan, request.boxes, workers)
         };
         report.stages.map += clock.lap();
-        let is_grid = self.is_for_grid(request, &sorted, rule);
+        let is_grid = self.is_for_grid(request, &sorted);
         if is_grid {
             stage!("check");
             sorted.search(rule, &mut self.hits);
@@ -118,27 +118,35 @@ impl AllPairs {
         report.invalid = u64::from(store.grid.grid().invalid);
         report.plan = Plan::of_grid(Algorithm::Grid, &store.grid);
         if !is_grid {
-            self.join(request, store, rule, report);
+            self.search_tree(request, store, rule, report);
         }
     }
 
     /// Returns true if a grid finds the pairs with less work than a tree.
-    fn is_for_grid(&mut self, request: &Request<'_>, sorted: &Sorted<'_>, rule: &Rule<'_>) -> bool {
+    fn is_for_grid(&mut self, request: &Request<'_>, sorted: &Sorted<'_>) -> bool {
         if let Some(engine) = request.config.forced_engine() {
             return engine != Engine::Tree;
         }
-        let (boxes, work) = (request.boxes.len(), sorted.work());
+        let (boxes, work) = (request.boxes.len(), sorted.work(self.hits.len()));
         if search::is_light(boxes, work) {
             return true;
         }
         let hits = &mut self.hits[0];
-        let overlaps = sorted.overlaps_in_sample(search::sample_one_in(boxes, work), rule, hits);
+        let step = search::sample_one_in(boxes, work);
+        let overlaps = sorted.overlaps_in_sample(step, request.filters, hits);
         let Grouping { count, shift, .. } = request.grouping.unwrap_or_default();
         hits.begin(count, shift);
         search::is_fruitful(boxes, work, overlaps)
     }
 
-    fn join(&mut self, request: &Request<'_>, store: &mut Store, rule: &Rule<'_>, report: &mut Report) {
+    /// Sorts all boxes into a tree, and finds the pairs there.
+    fn search_tree(
+        &mut self,
+        request: &Request<'_>,
+        store: &mut Store,
+        rule: &Rule<'_>,
+        report: &mut Report,
+    ) {
         let mut clock = Clock::start();
         {
             stage!("map");
@@ -147,7 +155,7 @@ impl AllPairs {
         report.stages.map += clock.lap();
         {
             stage!("check");
-            store.tree.join(rule, &mut self.hits);
+            store.tree.find_pairs(rule, &mut self.hits);
         }
         report.stages.check += clock.lap();
         store.held = Held::InTree;

@@ -209,10 +209,10 @@ impl Default for Config {
 pub enum Engine {
     /// Changed boxes are tested against all.
     Sweep,
-    /// Changed boxes are moved in the grid and searched for. All are sorted anew where there is no grid yet.
+    /// Changed boxes are moved in the grid and searched for. Without a grid, or where that takes too much work, it is a rebuild.
     Edit,
-    /// Changed boxes are looked up in a tree, all if there is none yet or they are many.
+    /// Changed boxes are looked up in a tree, into which all are sorted at first. A search joins the tree with itself.
     Tree,
-    /// All boxes are sorted into a grid, searched and compared.
+    /// All boxes are sorted into a grid, or a tree where cells would hold too many, searched and compared.
     Rebuild,
 }

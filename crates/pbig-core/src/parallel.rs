@@ -57,7 +57,7 @@ fn run_workers(_: usize, take_pieces: impl Fn(usize) + Sync) {
 
 /// Does two works at once, if a thread is free for the first.
 #[cfg(feature = "parallel")]
-pub(crate) fn join(first: impl FnOnce() + Send, second: impl FnOnce()) {
+pub(crate) fn both(first: impl FnOnce() + Send, second: impl FnOnce()) {
     rayon::in_place_scope(|scope| {
         scope.spawn(|_| first());
         second();
@@ -65,7 +65,7 @@ pub(crate) fn join(first: impl FnOnce() + Send, second: impl FnOnce()) {
 }
 
 #[cfg(not(feature = "parallel"))]
-pub(crate) fn join(first: impl FnOnce(), second: impl FnOnce()) {
+pub(crate) fn both(first: impl FnOnce(), second: impl FnOnce()) {
     first();
     second();
 }

@@ -107,9 +107,10 @@ pub struct Report {
     /// Tests made. On a GPU the map's estimate, without unnecessary and redundant ones, unless
     /// [`crate::GpuOptions::count_tests`] is set.
     pub checks: Checks,
-    /// The work on the CPU in counts: tests made, runs of cells and nodes of a tree looked at. An entry of a list counts as 16, a
-    /// test against an oversize box in an edit as 4, as they take so much longer. At most
-    /// [`crate::WORK_LIMIT`] for each box and each pair, times the binary logarithm of the number of boxes.
+    /// The work on the CPU in counts: tests made, runs of cells and nodes of a tree looked at. In an edit an entry of a list
+    /// counts as 16 and a test against an oversize box as 6, as they take so much longer; an edit that was given up counts as the
+    /// work that it was allowed. At most [`crate::WORK_LIMIT`] for each box, change and pair, times the binary logarithm of the
+    /// number of boxes, unless [`crate::Backend::Brute`] was asked for.
     pub work: u64,
     /// Pairs reported ([`crate::BroadPhase`]: pairs that exist now).
     pub pairs: u64,

@@ -166,17 +166,18 @@ fn config() -> Config {
     Config { limits: Limits { max_pairs: MAX_PAIRS, ..Limits::DEFAULT }, ..Config::DEFAULT }
 }
 
-/// Returns the work of a call for each box and pair, in binary logarithms of the number of boxes, which
+/// Returns the work of a call for each box, change and pair, in binary logarithms of the number of boxes, which
 /// [`pbig_core::WORK_LIMIT`] bounds.
-pub fn ratio(report: &Report, n: usize) -> f64 {
-    report.work as f64 / ((n as f64 + report.pairs as f64) * (n.max(2) as f64).log2())
+pub fn ratio(report: &Report) -> f64 {
+    let boxes = report.boxes + report.changed;
+    report.work as f64 / ((boxes + report.pairs).max(1) as f64 * (boxes.max(2) as f64).log2())
 }
 
 /// Returns the ratio of a search from nothing; none where there are too many pairs.
 pub fn ratio_of_search(recipe: &Recipe, n: usize) -> Option<f64> {
     let mut finder = Finder::new(config());
     finder.find(&recipe.boxes(n, 1)).ok()?;
-    Some(ratio(finder.report(), n))
+    Some(ratio(finder.report()))
 }
 
 /// Returns the largest ratio of all updates of a history; none where there are too many pairs.
@@ -194,7 +195,7 @@ pub fn ratio_of_history(history: &History, n: usize) -> Option<f64> {
             }
         }
         broad_phase.update().ok()?;
-        Some(ratio(broad_phase.report(), n))
+        Some(ratio(broad_phase.report()))
     };
     let mut worst = update(&[])?;
     for changes in history.changes(&boxes, 1) {

@@ -37,7 +37,7 @@ fn config(settings: u8) -> Config {
     match settings & 3 {
         0 => base,
         1 => grid,
-        2 => Config { order: Order::Unspecified, ..grid },
+        2 => Config { order: Order::Unspecified, engine: Some(Engine::Tree), ..base },
         _ => Config { backend: Backend::Brute, ..base },
     }
 }

@@ -13,6 +13,9 @@ use crate::{Aabb, Checks, Pair};
 /// No lane, of a box that is absent or invalid; or no box, of a free lane.
 const NONE: u32 = u32::MAX;
 
+/// Free lanes besides as many as boxes, at most: all are tested.
+const MAX_HOLES: usize = 64;
+
 /// The boxes of a small world axis by axis, eight to a block, padded with boxes that overlap nothing; and buffers.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Sweep {
@@ -42,7 +45,8 @@ impl Sweep {
     pub(super) fn run(&mut self, world: &World, kept: &Kept, events: &mut Comparison) -> Checks {
         events.clear();
         let are_many = 2 * world.changed.len() > world.valid() as usize;
-        if self.is_current && (self.is_in_order || !are_many) {
+        let has_holes = self.free.len() > world.valid() as usize + MAX_HOLES;
+        if self.is_current && !has_holes && (self.is_in_order || !are_many) {
             self.lanes.resize(world.ids(), NONE);
             world.changed.iter().for_each(|&id| self.put(id, &world.boxes[id as usize]));
         } else {

@@ -1,6 +1,8 @@
 //! Random worlds against the oracle, update by update: every engine gives the events that lead from one set to the next.
 
-use crate::{Aabb, BroadPhase, Config, Engine, Error, Limits, Pair, ProxyFilter, oracle};
+use super::edit::EditLimits;
+use crate::pairs::Comparison;
+use crate::{Aabb, Algorithm, BroadPhase, Config, Engine, Error, Limits, Pair, ProxyFilter, oracle};
 use rand::rngs::StdRng;
 use rand::{RngExt, SeedableRng};
 use std::collections::BTreeSet;
@@ -102,7 +104,7 @@ fn every_engine_follows_random_worlds() {
         let ids = [5, 40, 200, 400, 1100][seed as usize % 5];
         let (kind, is_filtered) = (seed as u32 % 6, seed % 3 == 0);
         let width = (ids as f32 * [1.0, 6.0][seed as usize % 2]).cbrt();
-        let mut world = Checked::new(ENGINES[seed as usize % 4], ids);
+        let mut world = Checked::new(ENGINES[seed as usize % ENGINES.len()], ids);
         for frame in 0..10 {
             if frame == 0 {
                 for id in 0..ids as u32 {
@@ -207,6 +209,58 @@ fn boxes_are_counted_and_given_back() {
     assert_eq!((broad_phase.id_count(), broad_phase.pair_count()), (6, 1));
     broad_phase.clear();
     assert!(broad_phase.is_empty() && broad_phase.pair_count() == 0);
+}
+
+/// Small boxes by the thousand within one large box's volume.
+fn crowded(broad_phase: &mut BroadPhase, ids: std::ops::Range<u32>, shift: f32) {
+    for id in ids {
+        let at = [id % 20, id / 20 % 20, id / 400].map(|i| i as f32 * 0.05 + shift);
+        let half = if id % 10 == 0 { [0.5; 3] } else { [0.02; 3] };
+        let at = if id % 10 == 0 { at.map(|x| x * 100.0) } else { at };
+        broad_phase.set(id, Aabb::from_center(at, half), ProxyFilter::ALL).expect("few boxes");
+    }
+}
+
+#[test]
+fn a_clone_goes_on_as_the_original() {
+    let mut broad_phase = BroadPhase::default();
+    crowded(&mut broad_phase, 0..8000, 0.0);
+    broad_phase.update().expect("few pairs");
+    assert_eq!(broad_phase.report().plan.algorithm, Algorithm::Tree);
+    let mut clone = broad_phase.clone();
+    for one in [&mut broad_phase, &mut clone] {
+        crowded(one, 100..200, 0.01);
+        one.update().expect("few pairs");
+        assert_eq!(one.report().plan.algorithm, Algorithm::Tree);
+        assert!(one.pairs().eq(oracle::pairs(one.fat_aabbs())));
+    }
+    assert_eq!(broad_phase.events(), clone.events());
+}
+
+#[test]
+fn an_edit_stops_soon_after_its_work_is_beyond_the_limit() {
+    let mut broad_phase = BroadPhase::default();
+    let cube = |id: u32, far: f32| {
+        let at = [id % 30, id / 30 % 30, id / 900].map(|i| i as f32 * 2.0 + far);
+        Aabb::from_center(at, [0.5; 3])
+    };
+    (0..20_000).for_each(|id| broad_phase.set(id, cube(id, 0.0), ProxyFilter::ALL).expect("few boxes"));
+    broad_phase.update().expect("few pairs");
+    // All into one border cell: a list of a thousand boxes, looked through a thousand times.
+    (0..1000).for_each(|id| assert!(broad_phase.set_aabb(id, cube(id, 1e6))));
+    let world = &broad_phase.world;
+    let mut run = |work: u64| {
+        let limits = EditLimits { pairs: u64::MAX, work };
+        let (mut grid, mut events) = (broad_phase.store.grid.clone(), Comparison::default());
+        let is_done = broad_phase.edit.run(world, &mut grid, &mut events, limits);
+        (is_done, broad_phase.edit.work())
+    };
+    let (is_done, all) = run(u64::MAX);
+    assert!(is_done && all > 1_000_000, "{all}");
+    assert_eq!(run(all), (true, all));
+    let (is_done, part) = run(all / 10);
+    // Beyond by what each thread does between two looks at the budget.
+    assert!(!is_done && part < all / 2, "{part} of {all}");
 }
 
 #[test]

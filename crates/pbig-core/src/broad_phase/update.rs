@@ -44,12 +44,13 @@ impl BroadPhase {
     }
 
     fn find_on_cpu(&mut self) -> Result<(), Error> {
-        match self.engine() {
+        let is_done = match self.engine() {
             Engine::Sweep => self.run_sweep(),
-            Engine::Edit if self.run_edit() => self.apply_events(),
-            Engine::Tree if self.run_in_tree() => self.apply_events(),
-            Engine::Edit | Engine::Tree | Engine::Rebuild => self.rebuild(),
-        }
+            Engine::Edit => self.run_edit(),
+            Engine::Tree => self.run_in_tree(),
+            Engine::Rebuild => false,
+        };
+        if is_done { self.apply_events() } else { self.rebuild() }
     }
 
     fn engine(&self) -> Engine {
@@ -67,7 +68,8 @@ impl BroadPhase {
         policy::choose_engine(&counts, self.config.forced_engine())
     }
 
-    fn run_sweep(&mut self) -> Result<(), Error> {
+    /// Always done.
+    fn run_sweep(&mut self) -> bool {
         stage!("check");
         let mut clock = Clock::start();
         self.report.checks = self.sweep.run(&self.world, &self.kept, &mut self.comparison);
@@ -75,10 +77,10 @@ impl BroadPhase {
         self.report.work = self.report.checks.made;
         self.report.plan.algorithm = Algorithm::Sweep;
         self.store.held = Held::Nowhere;
-        self.apply_events()
+        true
     }
 
-    /// Returns false if it would take too much work: the grid is to be built anew.
+    /// Returns false if it took too much work, and was given up.
     fn run_edit(&mut self) -> bool {
         stage!("edit");
         let mut clock = Clock::start();
@@ -101,7 +103,7 @@ impl BroadPhase {
         self.config.forced_engine().map_or(limit, |_| u64::MAX)
     }
 
-    /// Looks up changed boxes in a tree, which is brought up to date first. Returns false if that would take too much work.
+    /// Looks up changed boxes in a tree, which is brought up to date first. Returns false if it took too much work, and was given up.
     fn run_in_tree(&mut self) -> bool {
         stage!("tree");
         let mut clock = Clock::start();

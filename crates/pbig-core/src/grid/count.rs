@@ -6,36 +6,67 @@ use super::plan::NeighbourScan;
 use super::record::Record;
 use super::simd::{Kernel, Simd, dispatch};
 use super::{Grid, Sorted};
-use crate::policy::search as policy;
+use crate::ProxyFilter;
+use crate::parallel::{piece_range, run};
+use crate::policy::{PARALLEL_FROM_BOXES, search};
+use std::ops::Range;
+use std::sync::atomic::{AtomicU64, Ordering};
 
 impl Sorted<'_> {
-    /// Returns the work of a search: one box in [`policy::COUNT_ONE_IN`] is counted, without a test.
-    pub(crate) fn work(&self) -> u64 {
-        let grid = self.grid;
-        let in_grid = dispatch(CountSlots { grid, step: policy::COUNT_ONE_IN });
+    /// Returns the work of a search: of the boxes in cells one in [`search::COUNT_ONE_IN`] is counted, without a test.
+    pub(crate) fn work(&self, workers: usize) -> u64 {
+        let (grid, total) = (self.grid, AtomicU64::new(0));
+        let workers = if grid.len < PARALLEL_FROM_BOXES { 1 } else { workers };
+        run(workers, workers, |_, piece| {
+            let slots = piece_range(grid.len, piece, workers);
+            total.fetch_add(dispatch(CountSlots { grid, slots }), Ordering::Relaxed);
+        });
         let oversize = grid.oversize.len();
-        let step = oversize.div_ceil(policy::COUNTED_OVERSIZE).max(1);
-        let counted = grid.oversize.iter().step_by(step).map(|one| grid.work_of_oversize(one)).sum::<u64>();
+        let step = oversize.div_ceil(search::COUNTED_OVERSIZE).max(1);
+        let counted =
+            scattered(0..oversize, step).map(|i| grid.work_of_oversize(&grid.oversize[i])).sum::<u64>();
         let between = (oversize * oversize / 2) as u64;
-        in_grid * policy::COUNT_ONE_IN as u64 + counted * step as u64 + between * policy::WORK_OF_EXACT_TEST
+        total.into_inner() * search::COUNT_ONE_IN as u64
+            + counted * step as u64
+            + between * search::WORK_OF_EXACT_TEST
     }
 
     /// Returns the number of overlaps that a search of one box in `step` finds, in proportion. Leaves `hits` as they come.
-    pub(crate) fn overlaps_in_sample(&self, step: usize, rule: &Rule<'_>, hits: &mut Hits) -> u64 {
-        let rule = Rule { max_pairs: u64::MAX, ..*rule };
-        hits.begin(0, 0);
+    pub(crate) fn overlaps_in_sample(
+        &self,
+        step: usize,
+        filters: Option<&[ProxyFilter]>,
+        hits: &mut Hits,
+    ) -> u64 {
+        let rule = Rule { filters, max_pairs: u64::MAX, found: &AtomicU64::new(0) };
         let (len, oversize) = (self.grid.len, self.grid.oversize.len());
-        for slot in (step / 2..len).step_by(step) {
+        hits.begin(0, 0);
+        for slot in scattered(0..len, step) {
             self.grid.search_slots(slot..slot + 1, &rule, hits);
+            hits.forget_pairs();
         }
         let in_grid = hits.overlaps * step as u64;
-        let step = step.min(oversize / policy::SAMPLED_OVERSIZE + 1);
+        let step = step.min(oversize / search::SAMPLED_OVERSIZE + 1);
         hits.begin(0, 0);
-        for i in (step / 2..oversize).step_by(step) {
+        for i in scattered(0..oversize, step) {
             self.grid.find_oversize_pairs(i, &rule, hits);
+            hits.forget_pairs();
         }
         in_grid + hits.overlaps * step as u64
     }
+}
+
+/// Yields a number of every `step` in a range, each somewhere else in its part: a pattern in the order of the boxes cannot
+/// bias a sample.
+#[inline(always)]
+fn scattered(range: Range<usize>, step: usize) -> impl Iterator<Item = usize> {
+    const GOLDEN: u64 = 0x9E37_79B9_7F4A_7C15;
+    let at = move |first: usize| {
+        let hash = (first as u64).wrapping_mul(GOLDEN) >> 32;
+        first + ((hash * step as u64) >> 32) as usize
+    };
+    let end = range.end;
+    range.step_by(step).map(at).filter(move |at| *at < end)
 }
 
 impl Grid {
@@ -44,16 +75,16 @@ impl Grid {
         let mut work = 0;
         self.reached_by(&one.aabb, |run| {
             let (first, end) = self.slots(run);
-            work += 1 + (end - first) as u64 * policy::WORK_OF_EXACT_TEST;
+            work += 1 + (end - first) as u64 * search::WORK_OF_EXACT_TEST;
         });
         work
     }
 }
 
-/// Counts the slots that one box in `step` visits.
+/// Counts the slots that one box in [`search::COUNT_ONE_IN`] visits.
 struct CountSlots<'a> {
     grid: &'a Grid,
-    step: usize,
+    slots: Range<usize>,
 }
 
 impl Kernel for CountSlots<'_> {
@@ -61,10 +92,10 @@ impl Kernel for CountSlots<'_> {
 
     #[inline(always)]
     unsafe fn run<S: Simd>(self) -> u64 {
-        let Self { grid, step } = self;
+        let Self { grid, slots } = self;
         let cells = grid.plan.cells;
         let mut work = 0;
-        for slot in (0..grid.len).step_by(step) {
+        for slot in scattered(slots, search::COUNT_ONE_IN) {
             // SAFETY: the caller has the instructions.
             let slots = unsafe {
                 match (grid.plan.scan, cells.wraps) {
@@ -75,7 +106,7 @@ impl Kernel for CountSlots<'_> {
             };
             // SAFETY: as above.
             let (low, _) = unsafe { S::steps(&cells, &grid.records[slot].aabb) };
-            work += if is_outside(&cells, low) { slots * policy::WORK_OF_EXACT_TEST } else { slots };
+            work += if is_outside(&cells, low) { slots * search::WORK_OF_EXACT_TEST } else { slots };
         }
         work
     }

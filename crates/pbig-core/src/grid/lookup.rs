@@ -172,19 +172,23 @@ impl EditedGrid {
             counted(stored, Place::Oversize(place as u32));
         }
         if !self.grid.plan.cells.takes(&one.aabb) {
-            self.visit_reached(&one.aabb, counted);
+            let runs = self.visit_reached(&one.aabb, counted);
+            counts.work += runs;
         }
     }
 
-    /// Visits all boxes in the cells that an oversize box reaches.
-    fn visit_reached(&self, aabb: &Aabb, mut visit: impl FnMut(&Record, Place)) {
+    /// Visits all boxes in the cells that an oversize box reaches. Returns the number of runs of cells.
+    fn visit_reached(&self, aabb: &Aabb, mut visit: impl FnMut(&Record, Place)) -> u64 {
+        let mut runs = 0;
         self.grid.reached_by(aabb, |run| {
+            runs += 1;
             let (first, end) = self.grid.slots(run);
             for (slot, stored) in (first..end).zip(&self.grid.records[first..end]) {
                 visit(stored, Place::Slot(slot as u32));
             }
             self.spill.visit(run, |entry| visit(self.spill.record(entry), Place::Spill(entry)));
         });
+        runs
     }
 
     /// Hands stored boxes that overlap `aabb` to `visit`.

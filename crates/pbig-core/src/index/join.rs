@@ -16,7 +16,7 @@ const PIECE: usize = 64;
 
 impl BoxIndex {
     /// Finds all pairs of the boxes as of the last sort, into the lists of as many threads as there are `hits`.
-    pub(crate) fn join(&self, rule: &Rule<'_>, hits: &mut [Hits]) {
+    pub(crate) fn find_pairs(&self, rule: &Rule<'_>, hits: &mut [Hits]) {
         debug_assert!(self.loose().is_empty());
         let (last_leaves, leaves) = (self.last_leaves(), self.leaves as usize);
         let workers = if leaves * LANES < PARALLEL_FROM_BOXES { 1 } else { hits.len() };

@@ -45,7 +45,7 @@ impl Node {
         }
     }
 
-    /// Returns the box in a lane; an empty one, which overlaps nothing, where there is none.
+    /// Returns the box in a lane; where there is none, an empty one, which only an infinite box overlaps.
     #[inline(always)]
     pub(super) fn get(&self, lane: usize) -> Aabb {
         let mut aabb = Aabb::NOWHERE;

@@ -29,17 +29,19 @@ impl BoxIndex {
     /// As [`BoxIndex::refresh`], for an owner that looks up every box that changes: the boxes are sorted from the first call on.
     /// Returns the work, in nodes and boxes.
     pub(crate) fn keep_sorted(&mut self, boxes: &[Aabb], changed: Option<&[u32]>) -> u64 {
-        let Some(changed) = changed else {
+        // A clone is empty.
+        let Some(changed) = changed.filter(|_| self.is_sorted) else {
             self.sort(boxes);
             return boxes.len() as u64;
         };
         self.has_moved = true;
         changed.iter().for_each(|&id| self.take(id, boxes));
         let is_loose = self.loose().len() > policy::loose_leaves(self.leaves);
-        if is_loose || self.wants_sort() {
-            self.sort(boxes);
+        if !is_loose && !self.wants_sort() {
+            return changed.len() as u64;
         }
-        changed.len() as u64
+        self.sort(boxes);
+        (changed.len() + boxes.len()) as u64
     }
 
     /// Returns true if sorting the boxes anew would pay: questions have looked at as many nodes as a sort costs, and the order

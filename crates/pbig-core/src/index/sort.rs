@@ -2,12 +2,12 @@
 
 use super::node::LANES;
 use crate::Aabb;
-use crate::parallel::join;
+use crate::parallel::both;
 use crate::policy::PARALLEL_FROM_BOXES;
 use std::ops::Range;
 
-/// Bits of a size's exponent within a class: boxes of one class differ in size by less than 16 times. A large box among small
-/// ones would make their node large.
+/// Bits of an exponent within a class. Boxes of one class differ in size by less than 16 times, and the same axes are long,
+/// within 16 times of the longest: a large or long box among others would make their node large.
 const CLASS_BITS: u32 = 2;
 
 /// A box as the sort reads it: 20 bytes, as it is moved once for each level of the tree.
@@ -70,7 +70,7 @@ fn sort_by_place(mut entries: &mut [Entry]) {
             sort_by_place(first);
             entries = rest;
         } else {
-            return join(|| sort_by_place(first), || sort_by_place(rest));
+            return both(|| sort_by_place(first), || sort_by_place(rest));
         }
     }
 }

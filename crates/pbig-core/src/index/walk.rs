@@ -6,7 +6,7 @@ use super::{BoxIndex, Visited};
 use crate::grid::{Kernel, Simd};
 use arrayvec::ArrayVec;
 
-/// Maximum number of nodes that wait: seven for each level, and 2^32 boxes of 64 size classes make 13 levels.
+/// Maximum number of nodes that wait: seven for each level, and 2^32 boxes of 448 classes make 14 levels.
 const STACK: usize = 128;
 
 /// A node that waits, and the bound from which on it belongs to the answer.

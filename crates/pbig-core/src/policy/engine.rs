@@ -70,17 +70,18 @@ impl Counts {
 /// | a tree of the last update, or at most 1 in [`SPARSE_FROM_ONE_IN`] ids in use; changed at most 1 in [`EDIT_UP_TO_ONE_IN`] ids | tree |
 /// | else | rebuild |
 ///
-/// A rebuild looks at all ids, so after a peak, when few boxes are left, few changes are not worth one.
+/// A rebuild looks at all ids. So after a peak, when few boxes are left, they are swept or lie in a tree.
 pub(crate) fn choose_engine(counts: &Counts, forced: Option<Engine>) -> Engine {
     match forced {
         Some(Engine::Edit) if !counts.may_edit() => return Engine::Rebuild,
         Some(engine) => return engine,
         None => {}
     }
-    // Few boxes left of many are swept, too, where a grid would look at all ids.
+    // Few boxes left of many are swept, too, where a grid would look at all ids; but not in turn with a tree, since each
+    // looks at all ids at first.
     let is_small = counts.boxes <= SWEEP_UP_TO_BOXES
         && counts.changed * counts.boxes <= SWEEP_UP_TO_TESTS
-        && (counts.ids <= SWEEP_UP_TO_BOXES || counts.is_sparse());
+        && (counts.ids <= SWEEP_UP_TO_BOXES || counts.is_sparse() && counts.held != Held::InTree);
     let is_tidy = counts.spilled * SPILL_UP_TO_ONE_IN <= counts.boxes;
     let has_tree = counts.held == Held::InTree || counts.is_sparse();
     if is_small {

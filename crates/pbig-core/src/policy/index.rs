@@ -13,7 +13,8 @@ pub(crate) const GROWN_SHARE: usize = 8;
 /// Sorts whose cost questions pay before the boxes are sorted although the order is not bad yet: a sort then adds an eighth at most.
 pub(crate) const SORTS_FOR_ORDER: u64 = 8;
 
-/// Returns the number of nodes that questions look at before a sort: it then takes about as long as they did.
+/// Returns the number of nodes that questions look at before a sort: it then takes about as long as they did. A sort looks at
+/// all ids, too.
 pub(crate) fn nodes_for_sort(leaves: u32, ids: usize) -> u64 {
     64 + 256 * u64::from(leaves) + ids as u64 / 4
 }
