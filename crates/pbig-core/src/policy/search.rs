@@ -3,7 +3,7 @@
 //! Work is counted in tests of codes, eight to an instruction: about 0.35 ns each.
 
 /// Boxes, one in so many, whose candidates are counted.
-pub(crate) const COUNT_ONE_IN: usize = 16;
+pub(crate) const COUNT_ONE_IN: usize = 32;
 
 /// Oversize boxes whose candidates are counted, at most.
 pub(crate) const COUNTED_OVERSIZE: usize = 128;
