@@ -127,7 +127,7 @@ impl AllPairs {
         if let Some(engine) = request.config.forced_engine() {
             return engine != Engine::Tree;
         }
-        let (boxes, work) = (request.boxes.len(), sorted.work(self.hits.len()));
+        let (boxes, work) = (sorted.boxes(), sorted.work(self.hits.len()));
         if search::is_light(boxes, work) {
             return true;
         }

@@ -72,6 +72,7 @@ pub struct BroadPhase {
     store: Store,
     /// Work of the last search of all boxes.
     rebuild_work: u64,
+    given_up: policy::GivenUp,
     sweep: Sweep,
     edit: Edit,
     all_pairs: AllPairs,

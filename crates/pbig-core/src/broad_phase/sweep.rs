@@ -100,8 +100,8 @@ impl Sweep {
         lane
     }
 
-    /// As [`Sweep::run`], with the boxes in a tree. Returns the nodes looked at as well; if they are more than `max_nodes`, the
-    /// events are not all.
+    /// As [`Sweep::run`], with the boxes in a tree. Returns the nodes looked at and boxes met as well; if they are more than
+    /// `max_nodes`, the events are not all.
     pub(super) fn run_in_tree(
         &mut self,
         world: &World,
@@ -119,14 +119,14 @@ impl Sweep {
                 |other: u32| now.extend(aabb.overlaps(&world.boxes[other as usize]).then_some(other));
             nodes += tree.overlapping(aabb, &mut take).nodes;
             met += now.len() as u64;
-            if nodes > max_nodes {
+            if nodes + met > max_nodes {
                 break;
             }
             self.compare_all(world, kept, id, events);
         }
         events.sort(world.ids());
         let made = nodes * BLOCK as u64;
-        (Checks { made, unnecessary: made - met, redundant: 0 }, nodes)
+        (Checks { made, unnecessary: made - met, redundant: 0 }, nodes + met)
     }
 
     /// Compares what a changed box overlaps with its kept pairs. The changed box with the lower id reports a pair

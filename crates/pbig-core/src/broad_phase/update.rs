@@ -44,12 +44,18 @@ impl BroadPhase {
     }
 
     fn find_on_cpu(&mut self) -> Result<(), Error> {
-        let is_done = match self.engine() {
+        let changed = self.world.changed.len();
+        let mut engine = self.engine();
+        if self.config.forced_engine().is_none() {
+            engine = self.given_up.instead_of(engine, changed);
+        }
+        let is_done = match engine {
             Engine::Sweep => self.run_sweep(),
             Engine::Edit => self.run_edit(),
             Engine::Tree => self.run_in_tree(),
-            Engine::Rebuild => false,
+            Engine::Rebuild => return self.rebuild(),
         };
+        self.given_up.note(!is_done, changed);
         if is_done { self.apply_events() } else { self.rebuild() }
     }
 

@@ -7,25 +7,33 @@ use super::record::Record;
 use super::simd::{Kernel, Simd, dispatch};
 use super::{Grid, Sorted};
 use crate::ProxyFilter;
-use crate::parallel::{piece_range, run};
+use crate::parallel::run;
 use crate::policy::{PARALLEL_FROM_BOXES, search};
 use std::ops::Range;
 use std::sync::atomic::{AtomicU64, Ordering};
 
+/// Slots that are counted together.
+const PIECE: usize = PARALLEL_FROM_BOXES;
+
 impl Sorted<'_> {
+    /// Returns the number of boxes.
+    pub(crate) fn boxes(&self) -> usize {
+        self.grid.len + self.grid.oversize.len()
+    }
+
     /// Returns the work of a search: of the boxes in cells one in [`search::COUNT_ONE_IN`] is counted, without a test.
     pub(crate) fn work(&self, workers: usize) -> u64 {
         let (grid, total) = (self.grid, AtomicU64::new(0));
-        let workers = if grid.len < PARALLEL_FROM_BOXES { 1 } else { workers };
-        run(workers, workers, |_, piece| {
-            let slots = piece_range(grid.len, piece, workers);
+        // The same pieces for any number of threads, so that the same boxes are counted.
+        run(workers, grid.len.div_ceil(PIECE), |_, piece| {
+            let slots = piece * PIECE..grid.len.min((piece + 1) * PIECE);
             total.fetch_add(dispatch(CountSlots { grid, slots }), Ordering::Relaxed);
         });
         let oversize = grid.oversize.len();
         let step = oversize.div_ceil(search::COUNTED_OVERSIZE).max(1);
         let counted =
             scattered(0..oversize, step).map(|i| grid.work_of_oversize(&grid.oversize[i])).sum::<u64>();
-        let between = (oversize * oversize / 2) as u64;
+        let between = oversize as u64 * oversize as u64 / 2;
         total.into_inner() * search::COUNT_ONE_IN as u64
             + counted * step as u64
             + between * search::WORK_OF_EXACT_TEST
@@ -75,7 +83,7 @@ impl Grid {
         let mut work = 0;
         self.reached_by(&one.aabb, |run| {
             let (first, end) = self.slots(run);
-            work += 1 + (end - first) as u64 * search::WORK_OF_EXACT_TEST;
+            work += search::WORK_OF_ENTRY + (end - first) as u64 * search::WORK_OF_EXACT_TEST;
         });
         work
     }

@@ -161,7 +161,7 @@ impl EditedGrid {
 
     /// Returns the work of looking up so many boxes among the oversize ones, before and after they move.
     pub(crate) fn work_with_oversize(&self, boxes: usize) -> u64 {
-        2 * (boxes * self.grid.oversize.len()) as u64 * WORK_OF_EXACT_TEST
+        2 * boxes as u64 * self.grid.oversize.len() as u64 * WORK_OF_EXACT_TEST
     }
 
     /// Returns how many boxes are out of the grid's order.

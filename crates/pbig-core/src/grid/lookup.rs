@@ -165,6 +165,7 @@ impl EditedGrid {
             counts.work += WORK_OF_EXACT_TEST;
             if one.overlaps(stored) {
                 counts.met += 1;
+                counts.work += WORK_OF_ENTRY;
                 meet.meet(i, stored, place);
             }
         };
@@ -172,23 +173,23 @@ impl EditedGrid {
             counted(stored, Place::Oversize(place as u32));
         }
         if !self.grid.plan.cells.takes(&one.aabb) {
-            let runs = self.visit_reached(&one.aabb, counted);
-            counts.work += runs;
+            let work = self.visit_reached(&one.aabb, counted);
+            counts.work += work;
         }
     }
 
-    /// Visits all boxes in the cells that an oversize box reaches. Returns the number of runs of cells.
+    /// Visits all boxes in the cells that an oversize box reaches. Returns the work of finding them.
     fn visit_reached(&self, aabb: &Aabb, mut visit: impl FnMut(&Record, Place)) -> u64 {
-        let mut runs = 0;
+        let mut work = 0;
         self.grid.reached_by(aabb, |run| {
-            runs += 1;
+            work += WORK_OF_ENTRY;
             let (first, end) = self.grid.slots(run);
             for (slot, stored) in (first..end).zip(&self.grid.records[first..end]) {
                 visit(stored, Place::Slot(slot as u32));
             }
             self.spill.visit(run, |entry| visit(self.spill.record(entry), Place::Spill(entry)));
         });
-        runs
+        work
     }
 
     /// Hands stored boxes that overlap `aabb` to `visit`.
@@ -369,6 +370,7 @@ impl<M: Meet> LookUp<'_, M> {
             };
             if self.boxes[i].overlaps(stored) {
                 self.candidates.met += 1;
+                self.candidates.work += WORK_OF_ENTRY;
                 self.meet.meet(i, stored, place);
             }
         }

@@ -84,7 +84,9 @@ fn cut(len: usize) -> usize {
     child * (len.div_ceil(child) / 2).max(1)
 }
 
-/// Returns the axis along which the boxes lie apart most: the spread of their centers is longest, compared with their extents.
+/// Returns the axis along which the boxes lie apart most: the spread of their centers is longest, compared with their extents
+/// and the distance between neighbours. (Compared with extents alone, thin tiles would be cut on one axis only, into slabs as
+/// wide as the world.)
 fn best_axis(entries: &[Entry]) -> usize {
     let (mut low, mut high, mut extents) = ([f32::INFINITY; 3], [f32::NEG_INFINITY; 3], [0.0; 3]);
     for entry in entries {
@@ -95,6 +97,11 @@ fn best_axis(entries: &[Entry]) -> usize {
         }
     }
     let spread: [f64; 3] = std::array::from_fn(|k| f64::from(high[k]) - f64::from(low[k]));
+    // A distance for each box, as `extents` has an extent for each.
+    let boxes = entries.len() as f64;
+    let edge = |k: usize| (spread[k] + extents[k] / boxes).max(f64::MIN_POSITIVE).cbrt();
+    let distances = edge(0) * edge(1) * edge(2) * boxes.cbrt().powi(2);
+    extents = extents.map(|extent| extent + distances);
     let compare = |a: usize, b: usize| {
         (spread[a] * extents[b]).total_cmp(&(spread[b] * extents[a])).then(spread[a].total_cmp(&spread[b]))
     };

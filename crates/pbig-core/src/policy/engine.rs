@@ -19,8 +19,11 @@ const SPARSE_FROM_ONE_IN: usize = 8;
 /// Work of an edit for each box of the world, in tests of codes of 0.35 ns; a rebuild sorts a box in about 40 ns.
 const EDIT_UP_TO_WORK_PER_BOX: u64 = 60;
 
-/// Nodes of a tree that are looked at in an update, at most, for each id.
-const LOOK_UP_TO_NODES_PER_ID: u64 = 2;
+/// Rebuilds at once after updates that were given up, at most.
+const MAX_REBUILDS: u32 = 64;
+
+/// Nodes of a tree that are looked at, and boxes met, in an update, at most, for each id.
+const LOOK_UP_TO_NODES_PER_ID: u64 = 8;
 
 /// Share of the boxes, one in so many, that may be out of the grid's order: lists of them are slower than slots.
 pub(crate) const SPILL_UP_TO_ONE_IN: usize = 2;
@@ -95,6 +98,40 @@ pub(crate) fn choose_engine(counts: &Counts, forced: Option<Engine>) -> Engine {
     }
 }
 
+/// Updates that were given up because they took too much work. The next ones with as many changes are rebuilds at once: one
+/// after the first, twice as many after each further one, until an update is not given up.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct GivenUp {
+    /// Changed boxes of the last one.
+    changed: usize,
+    /// Rebuilds after it.
+    rebuilds: u32,
+    /// Rebuilds that are still to come.
+    left: u32,
+}
+
+impl GivenUp {
+    /// Returns the engine of an update: a rebuild, where the policy's choice would be given up again.
+    pub(crate) fn instead_of(&mut self, engine: Engine, changed: usize) -> Engine {
+        let is_like_it = self.left > 0 && changed >= self.changed;
+        if !is_like_it || engine == Engine::Sweep {
+            return engine;
+        }
+        self.left -= 1;
+        Engine::Rebuild
+    }
+
+    /// Notes how an edit or a look-up in a tree ended.
+    pub(crate) fn note(&mut self, is_given_up: bool, changed: usize) {
+        if is_given_up {
+            let rebuilds = (2 * self.rebuilds).clamp(1, MAX_REBUILDS);
+            *self = Self { changed, rebuilds, left: rebuilds };
+        } else {
+            *self = Self::default();
+        }
+    }
+}
+
 /// Returns the work of an edit, in tests of codes, from which on a rebuild takes less than twice as long as the edit so far:
 /// a rebuild sorts the boxes and does the work of the last one.
 pub(crate) fn edit_up_to_work(boxes: usize, rebuild_work: u64) -> u64 {
@@ -142,6 +179,20 @@ mod tests {
         assert_eq!(choose_engine(&Counts { held: Held::Nowhere, ..left }, None), Engine::Tree);
         assert_eq!(choose_engine(&Counts { changed: 55, ..left }, None), Engine::Edit);
         assert_eq!(choose_engine(&Counts { boxes: 100, ..WORLD }, None), Engine::Sweep);
+    }
+
+    #[test]
+    fn updates_that_would_be_given_up_are_rebuilds_at_once() {
+        let mut given_up = GivenUp::default();
+        let mut rebuilds = || {
+            given_up.note(true, 100);
+            assert_eq!(given_up.instead_of(Engine::Edit, 99), Engine::Edit);
+            assert_eq!(given_up.instead_of(Engine::Sweep, 100), Engine::Sweep);
+            (0..).find(|_| given_up.instead_of(Engine::Edit, 100) == Engine::Edit)
+        };
+        assert_eq!([(); 8].map(|()| rebuilds()), [1, 2, 4, 8, 16, 32, 64, 64].map(Some));
+        given_up.note(false, 100);
+        assert_eq!(given_up.instead_of(Engine::Tree, 100), Engine::Tree);
     }
 
     #[test]

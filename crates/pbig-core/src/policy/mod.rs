@@ -11,7 +11,8 @@ pub(crate) mod search;
 pub use backend::NoGpu;
 pub(crate) use backend::{AvailableDevice, Choice, choose_backend};
 pub(crate) use engine::{
-    Counts, PARALLEL_FROM_EDITS, choose_engine, edit_up_to_work, look_up_to_nodes, old_states_to_keep,
+    Counts, GivenUp, PARALLEL_FROM_EDITS, choose_engine, edit_up_to_work, look_up_to_nodes,
+    old_states_to_keep,
 };
 
 /// Boxes from which several threads share a search: waking one costs about as much as 16,384 boxes take alone.

@@ -6,7 +6,7 @@
 pub(crate) const COUNT_ONE_IN: usize = 32;
 
 /// Oversize boxes whose candidates are counted, at most.
-pub(crate) const COUNTED_OVERSIZE: usize = 128;
+pub(crate) const COUNTED_OVERSIZE: usize = 16;
 
 /// Oversize boxes that are searched to see what a search would find, at least: a few of them can meet most boxes.
 pub(crate) const SAMPLED_OVERSIZE: usize = 32;
@@ -14,7 +14,8 @@ pub(crate) const SAMPLED_OVERSIZE: usize = 32;
 /// Tests of codes that take as long as an exact test of two boxes in memory.
 pub(crate) const WORK_OF_EXACT_TEST: u64 = 6;
 
-/// Tests of codes that take as long as looking at an entry of a list, which can lie anywhere in memory.
+/// Tests of codes that take as long as what can lie anywhere in memory: an entry of a list, a box that is met, or the ends of a
+/// run of cells.
 pub(crate) const WORK_OF_ENTRY: u64 = 16;
 
 /// Tests for each box up to which a grid is searched: a tree is sorted and joined in about the same time.
