@@ -215,7 +215,14 @@ pub fn shapes() -> Vec<(&'static str, Recipe)> {
     };
     let slab = |z: f32| Part { corner: [0.0, 0.0, z], width: [100.0, 100.0, 3.0], half: [0.3; 3], ..CUBES };
     let [x, y, z] = [0, 1, 2].map(|axis| needles(axis, [0.0; 3], 0.01));
-    let worlds: [(&str, &[Part]); 18] = [
+    let clump = Part { corner: [50.0; 3], width: [0.01; 3], half: [5e-6; 3], growth: 0.0, ..CUBES };
+    let tile = |axis: usize| {
+        let mut part = Part { weight: 5, width: [290.0; 3], ..CUBES };
+        part.half[axis] = 1e-7;
+        part
+    };
+    let lath = |half: [f32; 3]| Part { width: [1000.0; 3], half, decades: 1.0, ..CUBES };
+    let worlds: [(&str, &[Part]); 21] = [
         ("uniform", &[CUBES]),
         (
             "two scales",
@@ -270,6 +277,44 @@ pub fn shapes() -> Vec<(&'static str, Recipe)> {
                 Part { half: [60.0, 60.0, 1e-4], width: [600.0; 3], ..CUBES },
                 Part { half: [60.0, 1e-4, 60.0], width: [600.0; 3], ..CUBES },
                 Part { half: [1e-4, 60.0, 60.0], width: [600.0; 3], ..CUBES },
+            ],
+        ),
+        ("thin tiles and a crowd", &[tile(0), tile(1), tile(2), clump]),
+        (
+            "laths of all shapes and a crowd",
+            &[
+                lath([10.0, 1.0, 0.1]),
+                lath([0.1, 10.0, 1.0]),
+                lath([1.0, 0.01, 10.0]),
+                lath([10.0, 10.0, 0.01]),
+                clump,
+            ],
+        ),
+        (
+            "sheets in the gap of a flat world",
+            &[
+                Part {
+                    weight: 150,
+                    width: [3.0, 130.0, 130.0],
+                    half: [1e-5, 0.4, 0.4],
+                    growth: 0.5,
+                    ..CUBES
+                },
+                Part {
+                    weight: 150,
+                    corner: [7.0, 0.0, 0.0],
+                    width: [3.0, 130.0, 130.0],
+                    half: [1e-5, 0.4, 0.4],
+                    growth: 0.5,
+                    ..CUBES
+                },
+                Part {
+                    corner: [5.0, 65.0, 65.0],
+                    width: [0.2, 0.0, 0.0],
+                    half: [1e-3, 130.0, 130.0],
+                    growth: 0.5,
+                    ..CUBES
+                },
             ],
         ),
         ("a lattice that touches", &[Part { place: Place::Lattice, width: [29.0; 3], ..CUBES }]),
