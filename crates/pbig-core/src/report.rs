@@ -108,7 +108,7 @@ pub struct Report {
     /// [`crate::GpuOptions::count_tests`] is set.
     pub checks: Checks,
     /// The work on the CPU in counts: tests made, runs of cells and nodes of a tree looked at. In an edit an entry of a list
-    /// counts as 16 and a test against an oversize box as 6, as they take so much longer; an edit that was given up counts as the
+    /// counts as 16 and a test against an oversize box as 4, as they take so much longer; an edit that was given up counts as the
     /// work that it was allowed. At most [`crate::WORK_LIMIT`] for each box, change and pair, times the binary logarithm of the
     /// number of boxes, unless [`crate::Backend::Brute`] was asked for.
     pub work: u64,

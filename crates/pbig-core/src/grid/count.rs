@@ -1,10 +1,10 @@
 //! The work of a search, before it is done: once boxes are sorted, the slots that each would visit are known.
 
-use super::cells::{Cells, Steps};
+use super::cells::{Cells, query_of};
 use super::hits::{Hits, Rule};
 use super::plan::NeighbourScan;
 use super::record::Record;
-use super::simd::{Kernel, Simd, dispatch};
+use super::simd::{BLOCK, Kernel, Simd, dispatch};
 use super::{Grid, Sorted};
 use crate::ProxyFilter;
 use crate::parallel::run;
@@ -83,7 +83,7 @@ impl Grid {
         let mut work = 0;
         self.reached_by(&one.aabb, |run| {
             let (first, end) = self.slots(run);
-            work += search::WORK_OF_ENTRY + (end - first) as u64 * search::WORK_OF_EXACT_TEST;
+            work += (1 + end - first) as u64 * search::WORK_OF_EXACT_TEST;
         });
         work
     }
@@ -113,17 +113,20 @@ impl Kernel for CountSlots<'_> {
                 }
             };
             // SAFETY: as above.
-            let (low, _) = unsafe { S::steps(&cells, &grid.records[slot].aabb) };
-            work += if is_outside(&cells, low) { slots * search::WORK_OF_EXACT_TEST } else { slots };
+            let is_vague = unsafe { has_vague_code::<S>(grid, slot) };
+            work += if is_vague { slots * search::WORK_OF_VAGUE_TEST } else { slots };
         }
         work
     }
 }
 
-/// Returns true if a box lies beyond the cells, in one at the border: codes of such boxes seldom tell them apart.
+/// Returns true if the code of a box does not tell it from those behind it, as beyond the cells, or of many tiny ones in one
+/// place: they are tested exactly.
 #[inline(always)]
-fn is_outside(cells: &Cells, low: Steps) -> bool {
-    !cells.wraps && (0..3).any(|k| !(1..=cells.dims[k] - 2).contains(&(low[k] >> cells.shift)))
+unsafe fn has_vague_code<S: Simd>(grid: &Grid, slot: usize) -> bool {
+    // SAFETY: the caller has the instructions; the codes are padded by two blocks.
+    let alike = unsafe { S::test(query_of(grid.codes[slot]), grid.codes.as_ptr().add(slot + 1)) };
+    alike.count_ones() as usize == BLOCK
 }
 
 /// Returns the slots behind a box in its own row of cells, and in four rows more.

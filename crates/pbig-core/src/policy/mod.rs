@@ -33,8 +33,8 @@ pub(crate) const MIN_CELLS: f64 = 4096.0;
 /// Boxes in a cell up to which the five runs of the half neighbourhood are visited unseen.
 pub(crate) const RUNS_UP_TO_PER_CELL: f64 = 3.0;
 
-/// Largest extent that a grid takes, in extents of its largest box, at most: a cube that turns by 14 degrees grows so much.
-pub(crate) const MAX_SLACK: f32 = 1.25;
+/// Largest extent that a grid takes, in extents of its largest box, at most: a cube that turns by 10 degrees grows so much.
+pub(crate) const MAX_SLACK: f32 = 1.16;
 
 /// Others in a box's cell, by the sample, from which cells are made smaller: boxes lie in clusters far apart.
 pub(crate) const MAX_CROWD: f64 = 32.0;

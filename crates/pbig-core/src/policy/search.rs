@@ -11,8 +11,11 @@ pub(crate) const COUNTED_OVERSIZE: usize = 16;
 /// Oversize boxes that are searched to see what a search would find, at least: a few of them can meet most boxes.
 pub(crate) const SAMPLED_OVERSIZE: usize = 32;
 
-/// Tests of codes that take as long as an exact test of two boxes in memory.
-pub(crate) const WORK_OF_EXACT_TEST: u64 = 6;
+/// Tests of codes that take as long as an exact test of two boxes that lie one after the other in memory.
+pub(crate) const WORK_OF_EXACT_TEST: u64 = 4;
+
+/// Tests of codes that take as long as one that does not tell two boxes apart, and the exact test after it.
+pub(crate) const WORK_OF_VAGUE_TEST: u64 = 6;
 
 /// Tests of codes that take as long as what can lie anywhere in memory: an entry of a list, a box that is met, or the ends of a
 /// run of cells.
@@ -23,6 +26,9 @@ const GRID_UP_TO_PER_BOX: u64 = 400;
 
 /// Tests for each pair up to which a grid is searched: in a crowd each box meets many, and a tree is no faster.
 const GRID_UP_TO_PER_PAIR: u64 = 32;
+
+/// Boxes in cells that are searched for it, at most.
+const SAMPLED: usize = 512;
 
 /// Work of a sample, for each box.
 const SAMPLE_WORK_PER_BOX: u64 = 16;
@@ -39,7 +45,8 @@ pub(crate) fn is_fruitful(boxes: usize, work: u64, overlaps: u64) -> bool {
 
 /// Returns of how many boxes one is searched to see what a search would find.
 pub(crate) fn sample_one_in(boxes: usize, work: u64) -> usize {
-    (work / (SAMPLE_WORK_PER_BOX * boxes.max(1) as u64)) as usize + 1
+    let by_work = (work / (SAMPLE_WORK_PER_BOX * boxes.max(1) as u64)) as usize;
+    by_work.max(boxes / SAMPLED) + 1
 }
 
 #[cfg(test)]
@@ -53,6 +60,7 @@ mod tests {
         assert!(is_fruitful(1000, 432_000, 1000));
         assert!(!is_fruitful(1000, 432_001, 1000));
         assert_eq!(sample_one_in(1000, 1_600_000), 101);
+        assert_eq!(sample_one_in(1_000_000, 500_000_000), 1954);
         assert_eq!(sample_one_in(0, 0), 1);
     }
 }
