@@ -133,10 +133,10 @@ impl AllPairs {
         }
         let hits = &mut self.hits[0];
         let step = search::sample_one_in(boxes, work);
-        let overlaps = sorted.overlaps_in_sample(step, request.filters, hits);
+        let vain = sorted.vain_work(step, request.filters, hits);
         let Grouping { count, shift, .. } = request.grouping.unwrap_or_default();
         hits.begin(count, shift);
-        search::is_fruitful(boxes, work, overlaps)
+        search::is_light(boxes, vain)
     }
 
     /// Sorts all boxes into a tree, and finds the pairs there.

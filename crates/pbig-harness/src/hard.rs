@@ -338,7 +338,14 @@ pub fn histories() -> Vec<(&'static str, History)> {
     let tiny = Part { corner: [20.0; 3], width: [0.9; 3], growth: 0.0, half: [1e-3; 3], ..Part::CUBES };
     let line =
         Part { place: Place::Line, width: [MEANT_FOR as f32; 3], growth: 1.0, half: [0.3; 3], ..Part::CUBES };
-    [
+    // Found by search: a cube that meets all tiny ones must not pay for the others that meet none.
+    let lattice = Part { place: Place::Lattice, ..Part::CUBES };
+    let tiny_lattice = Part { weight: 14, width: [0.1, 0.2, 0.2], half: [1.4e-3; 3], ..lattice };
+    let cubes = Part { width: [45.0, 45.0, 330.0], half: [0.3; 3], ..lattice };
+    let crowd = Recipe(vec![cubes, tiny_lattice]);
+    let change = Change::Shift([800.0, 24_000.0, 0.07]);
+    let found = ("a crowd within a cube, moved", History { start: crowd, change, updates: 25 });
+    let changes = [
         ("cubes that turn", Change::Grow(1.2)),
         ("cubes that double", Change::Grow(2.0)),
         ("4 km along one axis", Change::Shift([4000.37, 0.0, 0.0])),
@@ -347,7 +354,6 @@ pub fn histories() -> Vec<(&'static str, History)> {
         ("out along a line", part(line)),
         ("mixed up", part(Part { width: [45.0; 3], half: [0.3; 3], ..Part::CUBES })),
         ("removed", Change::Remove),
-    ]
-    .map(|(name, change)| (name, history(change)))
-    .into()
+    ];
+    changes.map(|(name, change)| (name, history(change))).into_iter().chain([found]).collect()
 }

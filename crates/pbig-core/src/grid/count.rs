@@ -39,28 +39,25 @@ impl Sorted<'_> {
             + between * search::WORK_OF_EXACT_TEST
     }
 
-    /// Returns the number of overlaps that a search of one box in `step` finds, in proportion. Leaves `hits` as they come.
-    pub(crate) fn overlaps_in_sample(
-        &self,
-        step: usize,
-        filters: Option<&[ProxyFilter]>,
-        hits: &mut Hits,
-    ) -> u64 {
+    /// Returns the work in vain of a search, from one box in `step`: what is left after each box's overlaps have paid for it. (So
+    /// a box that meets thousands does not pay for others that meet none.) Leaves `hits` as they come.
+    pub(crate) fn vain_work(&self, step: usize, filters: Option<&[ProxyFilter]>, hits: &mut Hits) -> u64 {
         let rule = Rule { filters, max_pairs: u64::MAX, found: &AtomicU64::new(0) };
         let (len, oversize) = (self.grid.len, self.grid.oversize.len());
-        hits.begin(0, 0);
+        let mut in_grid = 0;
         for slot in scattered(0..len, step) {
+            hits.begin(0, 0);
             self.grid.search_slots(slot..slot + 1, &rule, hits);
-            hits.forget_pairs();
+            in_grid += search::in_vain(hits.tests, hits.overlaps);
         }
-        let in_grid = hits.overlaps * step as u64;
-        let step = step.min(oversize / search::SAMPLED_OVERSIZE + 1);
-        hits.begin(0, 0);
-        for i in scattered(0..oversize, step) {
+        let step_oversize = step.min(oversize / search::SAMPLED_OVERSIZE + 1);
+        let mut among_oversize = 0;
+        for i in scattered(0..oversize, step_oversize) {
+            hits.begin(0, 0);
             self.grid.find_oversize_pairs(i, &rule, hits);
-            hits.forget_pairs();
+            among_oversize += search::in_vain(hits.tests * search::WORK_OF_EXACT_TEST, hits.overlaps);
         }
-        in_grid + hits.overlaps * step as u64
+        in_grid * step as u64 + among_oversize * step_oversize as u64
     }
 }
 

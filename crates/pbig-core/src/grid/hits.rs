@@ -163,12 +163,6 @@ impl Hits {
         self.keep(from, rule);
     }
 
-    /// Forgets the pairs, not what was counted.
-    pub(super) fn forget_pairs(&mut self) {
-        self.pairs.clear();
-        self.accounted = 0;
-    }
-
     /// Filters, counts and accounts for the pairs from `from` on.
     #[inline(always)]
     pub(crate) fn keep(&mut self, from: usize, rule: &Rule<'_>) {

@@ -8,7 +8,7 @@ pub(crate) const COUNT_ONE_IN: usize = 32;
 /// Oversize boxes whose candidates are counted, at most.
 pub(crate) const COUNTED_OVERSIZE: usize = 16;
 
-/// Oversize boxes that are searched to see what a search would find, at least: a few of them can meet most boxes.
+/// Oversize boxes that are searched to see how much would be in vain, at least.
 pub(crate) const SAMPLED_OVERSIZE: usize = 32;
 
 /// Tests of codes that take as long as an exact test of two boxes that lie one after the other in memory.
@@ -27,26 +27,26 @@ const GRID_UP_TO_PER_BOX: u64 = 400;
 /// Tests for each pair up to which a grid is searched: in a crowd each box meets many, and a tree is no faster.
 const GRID_UP_TO_PER_PAIR: u64 = 32;
 
-/// Boxes in cells that are searched for it, at most.
-const SAMPLED: usize = 512;
+/// Boxes in cells that are searched for it, at least and at most.
+const SAMPLED: std::ops::Range<usize> = 64..512;
 
 /// Work of a sample, for each box.
 const SAMPLE_WORK_PER_BOX: u64 = 16;
 
-/// Returns true if a grid is searched, whatever it would find.
+/// Returns true if a grid is searched: its work, or what is in vain of it, is so little.
 pub(crate) fn is_light(boxes: usize, work: u64) -> bool {
     work <= GRID_UP_TO_PER_BOX * boxes as u64
 }
 
-/// Returns true if a grid finds so many pairs that its work is worth while.
-pub(crate) fn is_fruitful(boxes: usize, work: u64, overlaps: u64) -> bool {
-    work <= GRID_UP_TO_PER_BOX * boxes as u64 + GRID_UP_TO_PER_PAIR * overlaps
+/// Returns the part of a box's work that its overlaps do not pay for.
+pub(crate) fn in_vain(work: u64, overlaps: u64) -> u64 {
+    work.saturating_sub(GRID_UP_TO_PER_PAIR * overlaps)
 }
 
-/// Returns of how many boxes one is searched to see what a search would find.
+/// Returns of how many boxes one is searched to see how much would be in vain.
 pub(crate) fn sample_one_in(boxes: usize, work: u64) -> usize {
     let by_work = (work / (SAMPLE_WORK_PER_BOX * boxes.max(1) as u64)) as usize;
-    by_work.max(boxes / SAMPLED) + 1
+    by_work.clamp(boxes / SAMPLED.end, boxes / SAMPLED.start) + 1
 }
 
 #[cfg(test)]
@@ -55,12 +55,11 @@ mod tests {
 
     #[test]
     fn a_grid_is_searched_where_its_cells_hold_few_or_many_of_them_pair() {
-        assert!(is_light(1000, 400_000));
-        assert!(!is_light(1000, 400_001));
-        assert!(is_fruitful(1000, 432_000, 1000));
-        assert!(!is_fruitful(1000, 432_001, 1000));
-        assert_eq!(sample_one_in(1000, 1_600_000), 101);
-        assert_eq!(sample_one_in(1_000_000, 500_000_000), 1954);
+        assert!(is_light(1000, 400_000) && !is_light(1000, 400_001));
+        assert_eq!((in_vain(4000, 100), in_vain(4000, 1000)), (800, 0));
+        assert_eq!(sample_one_in(100_000, 16_000_000), 196);
+        assert_eq!(sample_one_in(100_000, 800_000_000), 501);
+        assert_eq!(sample_one_in(100_000, u64::MAX), 1563);
         assert_eq!(sample_one_in(0, 0), 1);
     }
 }
