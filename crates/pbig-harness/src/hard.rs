@@ -103,7 +103,7 @@ impl Recipe {
     }
 }
 
-/// What becomes of a box in a history.
+/// The change that each box of a history undergoes once.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Change {
     /// It goes where another world has it, with its size.
@@ -121,7 +121,7 @@ pub enum Change {
 pub struct History {
     /// The world at first.
     pub start: Recipe,
-    /// What becomes of the boxes.
+    /// The change of each box.
     pub change: Change,
     /// In how many updates all boxes have changed.
     pub updates: usize,

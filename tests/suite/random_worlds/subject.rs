@@ -8,7 +8,7 @@ use rapier_pbig::PbigBroadPhase;
 use rapier3d::prelude::*;
 use std::collections::HashMap;
 
-/// What the broad phase under test does wrong.
+/// The planted fault of the broad phase under test.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Plant {
     Nothing,

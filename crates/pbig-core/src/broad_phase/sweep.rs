@@ -1,5 +1,6 @@
 //! The engine for small worlds: each changed box is tested against all boxes, and what it overlaps is compared with its kept
-//! pairs. In a large world the boxes are looked up in a tree instead. If more than half of the boxes changed, each box is tested against the boxes with higher ids.
+//! pairs. If more than half of the boxes changed, each box is tested against the boxes with higher ids. In a large world, a tree
+//! tells what a changed box overlaps.
 //!
 //! Boxes lie axis by axis, so that eight are tested at once. There is no index to keep, and no cost but that of
 //! the tests: a quarter of a microsecond for one changed box of a thousand.

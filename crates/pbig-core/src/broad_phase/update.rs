@@ -74,7 +74,7 @@ impl BroadPhase {
         policy::choose_engine(&counts, self.config.forced_engine())
     }
 
-    /// Always done.
+    /// Returns true, as the other engines do if they were not given up.
     fn run_sweep(&mut self) -> bool {
         stage!("check");
         let mut clock = Clock::start();
@@ -109,7 +109,8 @@ impl BroadPhase {
         self.config.forced_engine().map_or(limit, |_| u64::MAX)
     }
 
-    /// Looks up changed boxes in a tree, which is brought up to date first. Returns false if it took too much work, and was given up.
+    /// Looks up changed boxes in a tree, which is brought up to date first. Returns false if it took too much work, and was
+    /// given up.
     fn run_in_tree(&mut self) -> bool {
         stage!("tree");
         let mut clock = Clock::start();

@@ -24,7 +24,7 @@ impl Sorted<'_> {
     /// Returns the work of a search: of the boxes in cells one in [`search::COUNT_ONE_IN`] is counted, without a test.
     pub(crate) fn work(&self, workers: usize) -> u64 {
         let (grid, total) = (self.grid, AtomicU64::new(0));
-        // The same pieces for any number of threads, so that the same boxes are counted.
+        // Pieces do not depend on the number of threads: otherwise other boxes would be counted, and the choice could differ.
         run(workers, grid.len.div_ceil(PIECE), |_, piece| {
             let slots = piece * PIECE..grid.len.min((piece + 1) * PIECE);
             total.fetch_add(dispatch(CountSlots { grid, slots }), Ordering::Relaxed);
@@ -39,8 +39,8 @@ impl Sorted<'_> {
             + between * search::WORK_OF_EXACT_TEST
     }
 
-    /// Returns the work in vain of a search, from one box in `step`: what is left after each box's overlaps have paid for it. (So
-    /// a box that meets thousands does not pay for others that meet none.) Leaves `hits` as they come.
+    /// Returns the work in vain of a search, by a sample of one box in `step`: the tests of each box beyond those that its own
+    /// overlaps pay for. A box that meets thousands does not pay for others that meet none. `hits` are scratch.
     pub(crate) fn vain_work(&self, step: usize, filters: Option<&[ProxyFilter]>, hits: &mut Hits) -> u64 {
         let rule = Rule { filters, max_pairs: u64::MAX, found: &AtomicU64::new(0) };
         let (len, oversize) = (self.grid.len, self.grid.oversize.len());
@@ -117,8 +117,8 @@ impl Kernel for CountSlots<'_> {
     }
 }
 
-/// Returns true if the code of a box does not tell it from those behind it, as beyond the cells, or of many tiny ones in one
-/// place: they are tested exactly.
+/// Returns true if the code of a box is like all eight codes behind it. Boxes beyond the cells, and many tiny ones in one place,
+/// have such codes; their candidates need the exact test.
 #[inline(always)]
 unsafe fn has_vague_code<S: Simd>(grid: &Grid, slot: usize) -> bool {
     // SAFETY: the caller has the instructions; the codes are padded by two blocks.

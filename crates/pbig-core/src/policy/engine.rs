@@ -68,7 +68,7 @@ impl Counts {
 ///
 /// | rule, the first that applies | engine |
 /// | --- | --- |
-/// | boxes at most [`SWEEP_UP_TO_BOXES`], changed x boxes at most [`SWEEP_UP_TO_TESTS`] | sweep |
+/// | boxes at most [`SWEEP_UP_TO_BOXES`], changed x boxes at most [`SWEEP_UP_TO_TESTS`]; ids as few, or most not in use and no tree | sweep |
 /// | a grid of the last update, changed at most 1 in [`EDIT_UP_TO_ONE_IN`], spilled at most 1 in [`SPILL_UP_TO_ONE_IN`] | edit |
 /// | a tree of the last update, or at most 1 in [`SPARSE_FROM_ONE_IN`] ids in use; changed at most 1 in [`EDIT_UP_TO_ONE_IN`] ids | tree |
 /// | else | rebuild |
@@ -132,8 +132,8 @@ impl GivenUp {
     }
 }
 
-/// Returns the work of an edit, in tests of codes, from which on a rebuild takes less than twice as long as the edit so far:
-/// a rebuild sorts the boxes and does the work of the last one.
+/// Returns the most work of an edit, in tests of codes: about half the time of a rebuild, which sorts the boxes and does the work
+/// of the last one.
 pub(crate) fn edit_up_to_work(boxes: usize, rebuild_work: u64) -> u64 {
     EDIT_UP_TO_WORK_PER_BOX * boxes as u64 + rebuild_work / 2
 }

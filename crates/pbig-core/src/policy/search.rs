@@ -8,7 +8,7 @@ pub(crate) const COUNT_ONE_IN: usize = 32;
 /// Oversize boxes whose candidates are counted, at most.
 pub(crate) const COUNTED_OVERSIZE: usize = 16;
 
-/// Oversize boxes that are searched to see how much would be in vain, at least.
+/// Sampled oversize boxes, at least: each can meet most of the others.
 pub(crate) const SAMPLED_OVERSIZE: usize = 32;
 
 /// Tests of codes that take as long as an exact test of two boxes that lie one after the other in memory.
@@ -24,16 +24,16 @@ pub(crate) const WORK_OF_ENTRY: u64 = 16;
 /// Tests for each box up to which a grid is searched: a tree is sorted and joined in about the same time.
 const GRID_UP_TO_PER_BOX: u64 = 400;
 
-/// Tests for each pair up to which a grid is searched: in a crowd each box meets many, and a tree is no faster.
+/// Tests of a box that each of its overlaps pays for: in a crowd each box meets many, and a tree is no faster.
 const GRID_UP_TO_PER_PAIR: u64 = 32;
 
-/// Boxes in cells that are searched for it, at least and at most.
+/// Sampled boxes in cells, at least and at most.
 const SAMPLED: std::ops::Range<usize> = 64..512;
 
-/// Work of a sample, for each box.
+/// Work of the whole sample for each box of the world, about.
 const SAMPLE_WORK_PER_BOX: u64 = 16;
 
-/// Returns true if a grid is searched: its work, or what is in vain of it, is so little.
+/// Returns true if so much work, or work in vain, leaves the grid faster than a tree.
 pub(crate) fn is_light(boxes: usize, work: u64) -> bool {
     work <= GRID_UP_TO_PER_BOX * boxes as u64
 }
@@ -43,7 +43,7 @@ pub(crate) fn in_vain(work: u64, overlaps: u64) -> u64 {
     work.saturating_sub(GRID_UP_TO_PER_PAIR * overlaps)
 }
 
-/// Returns of how many boxes one is searched to see how much would be in vain.
+/// Returns the step of the sample: one box in so many is searched, to estimate the work in vain.
 pub(crate) fn sample_one_in(boxes: usize, work: u64) -> usize {
     let by_work = (work / (SAMPLE_WORK_PER_BOX * boxes.max(1) as u64)) as usize;
     by_work.clamp(boxes / SAMPLED.end, boxes / SAMPLED.start) + 1
