@@ -262,3 +262,28 @@ fn changed_bytes_are_errors_or_a_broad_phase_that_does_not_panic() {
     }
     assert!(errors > 50 && loaded > 50, "{errors} errors, {loaded} loaded");
 }
+
+/// Rapier's own broad phase overflows the stack in this world, which no checker can catch.
+#[test]
+fn a_shadow_survives_removals_that_leave_one_collider() {
+    let mut world = World::default();
+    let mut ours = PbigBroadPhase::new().with_shadow(Shadow::Stock);
+    let ball = |world: &mut World, x: f32| {
+        let body =
+            RigidBodyBuilder::dynamic().translation(vector![x, 10.0, 0.0]).linvel(vector![3.0, 0.0, 0.0]);
+        world.add(body, ColliderBuilder::ball(0.5))
+    };
+    for steps_before in 3..6 {
+        let balls = [10.0, 20.0, 30.0].map(|x| ball(&mut world, x));
+        steps(&mut world, &mut ours, steps_before);
+        balls[..2].iter().for_each(|&gone| world.remove(gone));
+        steps(&mut world, &mut ours, 1);
+        let more = [31.0, 32.0].map(|x| ball(&mut world, x));
+        steps(&mut world, &mut ours, 16);
+        assert!(ours.differences().is_empty(), "{}", ours.differences()[0]);
+        world.remove(balls[2]);
+        more.iter().for_each(|&gone| world.remove(gone));
+        steps(&mut world, &mut ours, 1);
+    }
+    assert_eq!(ours.pair_count(), 0);
+}

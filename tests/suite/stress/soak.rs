@@ -190,7 +190,7 @@ fn soak_of_a_small_world_that_is_swept() {
 
 #[test]
 fn soak_of_a_world_in_the_grid_with_edits() {
-    let churn = || Churn { one_in: 50, ..Churn::new(cpu(None), 3000) };
+    let churn = || Churn { one_in: 50, ..Churn::new(cpu(None), 10_000) };
     soak(churn, updates()).assert_mostly(&["edit"], 95);
 }
 

@@ -170,7 +170,7 @@ fn a_backend_that_is_not_there_is_replaced_and_the_output_says_so() {
     save(folder.path(), "boxes.npy", &Array2::<f32>::zeros((3, 6)));
     save(folder.path(), "frames.npy", &Array3::<f32>::zeros((3, 3, 6)));
     let without_gpu = |args: &[&str]| pbig_where(folder.path(), "WGPU_ADAPTER_NAME", "no such adapter", args);
-    // More than 1024 bodies: fewer need no grid.
+    // More boxes than a device leaves to one kernel that tests all.
     let scene = ["simulate", "--scene", "pile", "--bodies", "1100", "--steps", "5"];
     for args in [&["pairs", "boxes.npy"][..], &["replay", "frames.npy"], &scene] {
         let gpu = [args, &["--backend", "gpu"]].concat();

@@ -17,10 +17,15 @@ const NONE: u32 = u32::MAX;
 /// Free lanes besides as many as boxes, at most: all are tested.
 const MAX_HOLES: usize = 64;
 
+/// Eight lanes. Aligned, as every second load would cross a cache line.
+#[repr(align(32))]
+#[derive(Clone, Copy, Debug)]
+struct Block(EightBoxes);
+
 /// The boxes of a small world axis by axis, eight to a block, padded with boxes that overlap nothing; and buffers.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Sweep {
-    blocks: Vec<EightBoxes>,
+    blocks: Vec<Block>,
     /// By lane of all blocks: the id of its box, or `NONE`.
     ids: Vec<u32>,
     /// By id: the lane. Ids that are not in use take none, so that a few boxes left of many are as fast as a few.
@@ -83,7 +88,7 @@ impl Sweep {
             }
         };
         let values = aabb.min.into_iter().chain(aabb.max);
-        for (row, value) in self.blocks[lane as usize / BLOCK].iter_mut().zip(values) {
+        for (row, value) in self.blocks[lane as usize / BLOCK].0.iter_mut().zip(values) {
             row[lane as usize % BLOCK] = value;
         }
     }
@@ -94,7 +99,7 @@ impl Sweep {
         let lane = self.free.pop().unwrap_or(self.ids.len() as u32);
         if lane as usize == self.ids.len() {
             self.ids.push(id);
-            self.blocks.resize(self.ids.len().div_ceil(BLOCK), [[f32::NAN; BLOCK]; 6]);
+            self.blocks.resize(self.ids.len().div_ceil(BLOCK), Block([[f32::NAN; BLOCK]; 6]));
         }
         self.ids[lane as usize] = id;
         self.lanes[id as usize] = lane;
@@ -227,7 +232,7 @@ impl Sweep {
     /// Lists the ids of boxes that overlap one, from a block on; in the first block only the `wanted` lanes. Returns how many.
     #[inline(always)]
     unsafe fn meet<S: Simd>(&mut self, aabb: &Aabb, first: usize, mut wanted: u32) -> u64 {
-        for (block, boxes) in self.blocks.iter().enumerate().skip(first) {
+        for (block, Block(boxes)) in self.blocks.iter().enumerate().skip(first) {
             // SAFETY: the caller has the instructions.
             let mut mask = unsafe { S::overlaps_eight(boxes, aabb) } & wanted;
             wanted = 255;

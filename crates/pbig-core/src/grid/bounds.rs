@@ -145,11 +145,10 @@ impl Sample {
     /// Draws a sample.
     pub(super) fn of(boxes: &[Aabb]) -> Self {
         let mut sample = Self { boxes: [Aabb::NOWHERE; SAMPLE_SIZE], len: 0 };
-        for i in spread_evenly(boxes.len(), SAMPLE_TRIES) {
-            if sample.len < SAMPLE_SIZE && boxes[i].is_valid() {
-                sample.boxes[sample.len] = boxes[i];
-                sample.len += 1;
-            }
+        let tries = spread_evenly(boxes.len(), SAMPLE_TRIES).map(|i| boxes[i]);
+        for aabb in tries.filter(Aabb::is_valid).take(SAMPLE_SIZE) {
+            sample.boxes[sample.len] = aabb;
+            sample.len += 1;
         }
         sample
     }
@@ -205,14 +204,17 @@ pub(super) struct SizeClass {
 
 /// Counts valid boxes by size class. Counted rather than sampled: a sample misses a thousand large boxes among a million
 /// small ones.
-pub(super) fn size_classes(boxes: &[Aabb], workers: usize) -> [SizeClass; CLASSES] {
-    let pieces = workers.clamp(1, 16);
-    let mut parts = [[SizeClass::default(); CLASSES]; 16];
+pub(super) fn size_classes(boxes: &[Aabb], workers: usize) -> SizeClasses {
+    if workers <= 1 {
+        return classes_of(boxes);
+    }
+    let pieces = workers.min(16);
+    let mut parts = [NO_CLASSES; 16];
     let shared = SharedSlice::new(&mut parts);
     run(workers, pieces, |_, piece| {
-        // SAFETY: each piece has its own part.
-        let part = unsafe { &mut shared.part(piece..piece + 1)[0] };
-        boxes[piece_range(boxes.len(), piece, pieces)].iter().for_each(|aabb| count(part, aabb));
+        let part = classes_of(&boxes[piece_range(boxes.len(), piece, pieces)]);
+        // SAFETY: each piece writes its own part.
+        unsafe { shared.write(piece, part) }
     });
     let mut all = parts[0];
     for part in &parts[1..pieces] {
@@ -220,6 +222,16 @@ pub(super) fn size_classes(boxes: &[Aabb], workers: usize) -> [SizeClass; CLASSE
     }
     all
 }
+
+fn classes_of(boxes: &[Aabb]) -> SizeClasses {
+    let mut classes = NO_CLASSES;
+    boxes.iter().for_each(|aabb| count(&mut classes, aabb));
+    classes
+}
+
+type SizeClasses = [SizeClass; CLASSES];
+
+const NO_CLASSES: SizeClasses = [SizeClass { boxes: 0, extent: [0.0; 3] }; CLASSES];
 
 impl SizeClass {
     #[inline(always)]
@@ -230,7 +242,7 @@ impl SizeClass {
 }
 
 #[inline(always)]
-fn count(classes: &mut [SizeClass; CLASSES], aabb: &Aabb) {
+fn count(classes: &mut SizeClasses, aabb: &Aabb) {
     if aabb.is_valid() {
         let extent = aabb.extents();
         // The exponent; a NaN, of a point at infinity, counts as infinite.

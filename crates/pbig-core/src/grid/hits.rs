@@ -10,7 +10,7 @@ use crate::{Pair, ProxyFilter};
 use std::sync::atomic::{AtomicU64, Ordering};
 
 /// Hits that are tested together.
-const ROOM: usize = 1024;
+const ROOM: usize = 256;
 
 /// Hits that a loop may add between two looks at the room.
 pub(super) const SLACK: usize = 8;

@@ -42,6 +42,7 @@ impl GridPlan {
 /// smaller, the more boxes are oversize. The costs are those of a test, in ns.
 fn cheapest_extent(classes: &[SizeClass], space: &Bounds) -> [f32; 3] {
     const LARGEST_CLASS: usize = 227; // 2^100: the inverse of a cell of that size is still a normal f32
+    let classes = &classes[..classes.iter().rposition(|class| class.boxes > 0).map_or(0, |last| last + 1)];
     let (mut best, mut cheapest) = ([0.0; 3], f64::MAX);
     let (mut taken, mut extent) = (0, [0.0f32; 3]);
     for (i, class) in classes.iter().enumerate().take(LARGEST_CLASS).filter(|(_, class)| class.boxes > 0) {

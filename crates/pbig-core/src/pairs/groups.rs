@@ -67,6 +67,10 @@ impl Groups {
     pub(crate) fn gather(&mut self, grouping: Grouping, hits: &mut [Hits], workers: usize) -> usize {
         self.grouping = grouping;
         let count = self.place(hits);
+        if let ([hits], 1) = (&mut *hits, grouping.count) {
+            std::mem::swap(&mut self.pairs, &mut hits.pairs);
+            return count;
+        }
         ensure_scratch(&mut self.pairs, count, Pair::default());
         let pairs = SharedSlice::new(&mut self.pairs);
         let lists = hits.len();

@@ -3,11 +3,14 @@
 use crate::Engine;
 use crate::all_pairs::Held;
 
-/// Boxes of a world in which changed boxes are tested against all, at most.
-pub(crate) const SWEEP_UP_TO_BOXES: usize = 1024;
+/// Maximum boxes of a world that is swept although a grid is kept: a sweep of one changed box takes no longer than an edit.
+pub(crate) const SWEEP_FIRST_UP_TO_BOXES: usize = 1024;
 
-/// Tests (changed boxes times boxes) up to which a sweep takes less time than a grid.
-pub(crate) const SWEEP_UP_TO_TESTS: usize = 1 << 16;
+/// Maximum boxes of a world that is swept.
+pub(crate) const SWEEP_UP_TO_BOXES: usize = 4096;
+
+/// Maximum tests for each box of the world in a sweep: beyond, a grid finds the pairs sooner.
+pub(crate) const SWEEP_UP_TO_TESTS_PER_BOX: usize = 200;
 
 /// Share of the boxes, one in so many, up to which changed boxes are edited: measured, editing takes as long as a rebuild
 /// at 7 to 10% of 100,000 boxes, at 4 to 5% of a million.
@@ -53,6 +56,15 @@ impl Counts {
         self.knows_old && self.held == Held::InGrid
     }
 
+    /// Returns true if a sweep finds what has changed soonest, in a world of at most `most` boxes. Few boxes left of many are
+    /// swept, too, as a grid would look at all ids; but not in turn with a tree, since each looks at all ids at first.
+    fn may_sweep(&self, most: usize) -> bool {
+        // Each changed box meets all, or each box half of the others.
+        let tests_per_box = self.changed.min(self.boxes / 2);
+        let are_left = self.is_sparse() && self.held != Held::InTree;
+        self.boxes <= most && tests_per_box <= SWEEP_UP_TO_TESTS_PER_BOX && (self.ids <= most || are_left)
+    }
+
     /// Returns true if most ids are not in use.
     fn is_sparse(&self) -> bool {
         self.boxes * SPARSE_FROM_ONE_IN <= self.ids
@@ -68,8 +80,9 @@ impl Counts {
 ///
 /// | rule, the first that applies | engine |
 /// | --- | --- |
-/// | boxes at most [`SWEEP_UP_TO_BOXES`], changed x boxes at most [`SWEEP_UP_TO_TESTS`]; ids as few, or most not in use and no tree | sweep |
+/// | boxes at most [`SWEEP_FIRST_UP_TO_BOXES`], tests for each at most [`SWEEP_UP_TO_TESTS_PER_BOX`]; ids as few, or most not in use and no tree | sweep |
 /// | a grid of the last update, changed at most 1 in [`EDIT_UP_TO_ONE_IN`], spilled at most 1 in [`SPILL_UP_TO_ONE_IN`] | edit |
+/// | as in the first row, boxes at most [`SWEEP_UP_TO_BOXES`] | sweep |
 /// | a tree of the last update, or at most 1 in [`SPARSE_FROM_ONE_IN`] ids in use; changed at most 1 in [`EDIT_UP_TO_ONE_IN`] ids | tree |
 /// | else | rebuild |
 ///
@@ -80,17 +93,14 @@ pub(crate) fn choose_engine(counts: &Counts, forced: Option<Engine>) -> Engine {
         Some(engine) => return engine,
         None => {}
     }
-    // Few boxes left of many are swept, too, where a grid would look at all ids; but not in turn with a tree, since each
-    // looks at all ids at first.
-    let is_small = counts.boxes <= SWEEP_UP_TO_BOXES
-        && counts.changed * counts.boxes <= SWEEP_UP_TO_TESTS
-        && (counts.ids <= SWEEP_UP_TO_BOXES || counts.is_sparse() && counts.held != Held::InTree);
     let is_tidy = counts.spilled * SPILL_UP_TO_ONE_IN <= counts.boxes;
     let has_tree = counts.held == Held::InTree || counts.is_sparse();
-    if is_small {
+    if counts.may_sweep(SWEEP_FIRST_UP_TO_BOXES) {
         Engine::Sweep
     } else if counts.may_edit() && is_tidy && counts.are_few_of(counts.boxes) {
         Engine::Edit
+    } else if counts.may_sweep(SWEEP_UP_TO_BOXES) {
+        Engine::Sweep
     } else if has_tree && counts.are_few_of(counts.ids) {
         Engine::Tree
     } else {
@@ -174,10 +184,11 @@ mod tests {
         let tree = Counts { held: Held::InTree, knows_old: false, ..WORLD };
         assert_eq!(choose_engine(&tree, None), Engine::Tree);
         assert_eq!(choose_engine(&Counts { changed: 501, ..tree }, None), Engine::Rebuild);
-        let left = Counts { boxes: 1100, ..WORLD };
+        let left = Counts { boxes: 1250, changed: 201, ..WORLD };
         assert_eq!(choose_engine(&left, None), Engine::Tree);
         assert_eq!(choose_engine(&Counts { held: Held::Nowhere, ..left }, None), Engine::Tree);
-        assert_eq!(choose_engine(&Counts { changed: 55, ..left }, None), Engine::Edit);
+        assert_eq!(choose_engine(&Counts { changed: 200, ..left }, None), Engine::Sweep);
+        assert_eq!(choose_engine(&Counts { changed: 62, ..left }, None), Engine::Edit);
         assert_eq!(choose_engine(&Counts { boxes: 100, ..WORLD }, None), Engine::Sweep);
     }
 
@@ -197,10 +208,22 @@ mod tests {
 
     #[test]
     fn small_worlds_are_swept_while_few_boxes_change() {
-        let small = Counts { boxes: 1000, ids: 1000, changed: 65, held: Held::Nowhere, ..WORLD };
+        let small = Counts { boxes: 1000, ids: 1000, changed: 200, held: Held::Nowhere, ..WORLD };
         assert_eq!(choose_engine(&small, None), Engine::Sweep);
-        assert_eq!(choose_engine(&Counts { changed: 66, ..small }, None), Engine::Rebuild);
-        assert_eq!(choose_engine(&Counts { ids: 1025, ..small }, None), Engine::Rebuild);
+        assert_eq!(choose_engine(&Counts { changed: 201, ..small }, None), Engine::Rebuild);
+        assert_eq!(
+            choose_engine(&Counts { boxes: 401, ids: 401, changed: 401, ..small }, None),
+            Engine::Sweep
+        );
+        assert_eq!(
+            choose_engine(&Counts { boxes: 402, ids: 402, changed: 402, ..small }, None),
+            Engine::Rebuild
+        );
+        assert_eq!(choose_engine(&Counts { ids: 4096, ..small }, None), Engine::Sweep);
+        assert_eq!(choose_engine(&Counts { ids: 4097, ..small }, None), Engine::Rebuild);
+        let more = Counts { boxes: 1025, ids: 1025, changed: 51, held: Held::InGrid, ..small };
+        assert_eq!(choose_engine(&more, None), Engine::Edit);
+        assert_eq!(choose_engine(&Counts { changed: 52, ..more }, None), Engine::Sweep);
         assert_eq!(choose_engine(&Counts { knows_old: false, ..small }, None), Engine::Sweep);
     }
 

@@ -22,6 +22,10 @@ impl Stock {
         }
         let mut events = Vec::new();
         let Call { params, colliders, bodies, modified, removed } = *call;
+        // Where removals leave one collider, parry's tree keeps nodes that make a later update recurse without end (parry#409).
+        if !removed.is_empty() && colliders.iter_enabled().nth(1).is_none() {
+            *self = Self::default();
+        }
         let broad_phase = &mut self.broad_phase;
         let first = !std::mem::replace(&mut self.started, true);
         let update = || {
