@@ -222,7 +222,7 @@ pub fn shapes() -> Vec<(&'static str, Recipe)> {
         part
     };
     let lath = |half: [f32; 3]| Part { width: [1000.0; 3], half, decades: 1.0, ..CUBES };
-    let worlds: [(&str, &[Part]); 21] = [
+    let worlds: [(&str, &[Part]); 22] = [
         ("uniform", &[CUBES]),
         (
             "two scales",
@@ -325,6 +325,18 @@ pub fn shapes() -> Vec<(&'static str, Recipe)> {
                 Part { half: [1e6, 1e6, 1.0], ..CUBES },
             ],
         ),
+        // Like one found by search: nothing but the thin axis tells them apart.
+        (
+            "needles in a thin world",
+            &[Part {
+                place: Place::Line,
+                corner: [0.47, 1.3, 0.0],
+                width: [0.02, 2200.0, 0.01],
+                half: [8e-7, 3000.0, 55.0],
+                decades: 2.1,
+                ..CUBES
+            }],
+        ),
     ];
     worlds.map(|(name, parts)| (name, Recipe(parts.to_vec()))).into()
 }
@@ -344,7 +356,13 @@ pub fn histories() -> Vec<(&'static str, History)> {
     let cubes = Part { width: [45.0, 45.0, 330.0], half: [0.3; 3], ..lattice };
     let crowd = Recipe(vec![cubes, tiny_lattice]);
     let change = Change::Shift([800.0, 24_000.0, 0.07]);
-    let found = ("a crowd within a cube, moved", History { start: crowd, change, updates: 25 });
+    let moved = ("a crowd within a cube, moved", History { start: crowd, change, updates: 25 });
+    // Found by search: what the last rebuild took says nothing when most of its pairs have ended.
+    let crowd =
+        Recipe(vec![Part { place: Place::Line, width: [1.4, 0.7, 0.5], half: [0.01; 3], ..Part::CUBES }]);
+    let sheets = Part { width: [20.0, 180.0, 690.0], half: [3e3, 5e-5, 2e4], decades: 3.5, ..Part::CUBES };
+    let change = Change::To(Recipe(vec![line, sheets]));
+    let ended = ("a crowd that becomes a line among sheets", History { start: crowd, change, updates: 25 });
     let changes = [
         ("cubes that turn", Change::Grow(1.2)),
         ("cubes that double", Change::Grow(2.0)),
@@ -355,5 +373,5 @@ pub fn histories() -> Vec<(&'static str, History)> {
         ("mixed up", part(Part { width: [45.0; 3], half: [0.3; 3], ..Part::CUBES })),
         ("removed", Change::Remove),
     ];
-    changes.map(|(name, change)| (name, history(change))).into_iter().chain([found]).collect()
+    changes.map(|(name, change)| (name, history(change))).into_iter().chain([moved, ended]).collect()
 }

@@ -92,7 +92,7 @@ impl BroadPhase {
         let mut clock = Clock::start();
         let limits = EditLimits {
             pairs: self.config.limits.pairs(),
-            work: self.unless_forced(policy::edit_up_to_work(self.len(), self.rebuild_work)),
+            work: self.unless_forced(policy::edit_up_to_work(self.len(), self.kept.len(), self.rebuild_work)),
         };
         let done = self.edit.run(&self.world, &mut self.store.grid, &mut self.comparison, limits);
         self.report.stages.check = clock.lap();

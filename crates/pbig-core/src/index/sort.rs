@@ -49,9 +49,10 @@ pub(super) fn sort(entries: &mut [Entry]) -> Vec<Range<usize>> {
     if entries.windows(2).any(|two| two[0].class() != two[1].class()) {
         entries.sort_unstable_by_key(|entry| entry.class());
     }
+    let all = extents_within_spread(entries);
     let (mut classes, mut first) = (Vec::new(), 0);
     for class in entries.chunk_by_mut(|a, b| a.class() == b.class()) {
-        sort_by_place(class);
+        sort_by_place(class, &all);
         classes.push(first..first + class.len());
         first += class.len();
     }
@@ -60,17 +61,17 @@ pub(super) fn sort(entries: &mut [Entry]) -> Vec<Range<usize>> {
 
 /// Halves a list again and again at the median of its longest axis. Medians are ranks, so that a box far away costs the others
 /// nothing. The cuts lie between whole nodes of the level in question.
-fn sort_by_place(mut entries: &mut [Entry]) {
+fn sort_by_place(mut entries: &mut [Entry], all: &[f64; 3]) {
     while entries.len() > LANES {
-        let axis = best_axis(entries);
+        let axis = best_axis(entries, all);
         let middle = cut(entries.len());
         entries.select_nth_unstable_by(middle, |a, b| a.center[axis].total_cmp(&b.center[axis]));
         let (first, rest) = entries.split_at_mut(middle);
         if middle < PARALLEL_FROM_BOXES {
-            sort_by_place(first);
+            sort_by_place(first, all);
             entries = rest;
         } else {
-            return both(|| sort_by_place(first), || sort_by_place(rest));
+            return both(|| sort_by_place(first, all), || sort_by_place(rest, all));
         }
     }
 }
@@ -84,26 +85,43 @@ fn cut(len: usize) -> usize {
     child * (len.div_ceil(child) / 2).max(1)
 }
 
-/// Returns the axis along which the boxes lie apart most: the spread of their centers is longest, compared with their extents
-/// and the distance between neighbours. (Compared with extents alone, thin tiles would be cut on one axis only, into slabs as
-/// wide as the world.)
-fn best_axis(entries: &[Entry]) -> usize {
-    let (mut low, mut high, mut extents) = ([f32::INFINITY; 3], [f32::NEG_INFINITY; 3], [0.0; 3]);
-    for entry in entries {
-        for k in 0..3 {
-            low[k] = low[k].min(entry.center[k]);
-            high[k] = high[k].max(entry.center[k]);
-            extents[k] += with_exponent(entry.exponents[k]);
-        }
-    }
-    let spread: [f64; 3] = std::array::from_fn(|k| f64::from(high[k]) - f64::from(low[k]));
-    // A distance for each box, as `extents` has an extent for each.
-    let boxes = entries.len() as f64;
-    let edge = |k: usize| (spread[k] + extents[k] / boxes).max(f64::MIN_POSITIVE).cbrt();
-    let distances = edge(0) * edge(1) * edge(2) * boxes.cbrt().powi(2);
-    extents = extents.map(|extent| extent + distances);
+/// Returns the axis along which the boxes lie apart most: the spread of their centers is longest, compared with their own
+/// extents and the mean extents of `all` boxes. (Compared with their own alone, thin tiles would be cut into slabs as wide as
+/// the world, and slabs of tiles that stand in two directions all meet.)
+fn best_axis(entries: &[Entry], all: &[f64; 3]) -> usize {
+    let Measure { spread, extents } = Measure::of(entries);
+    let extents: [f64; 3] = std::array::from_fn(|k| extents[k] + all[k]);
     let compare = |a: usize, b: usize| {
         (spread[a] * extents[b]).total_cmp(&(spread[b] * extents[a])).then(spread[a].total_cmp(&spread[b]))
     };
     (0..3).max_by(|a, b| compare(*a, *b)).unwrap_or(0)
+}
+
+/// Returns the mean extents of all boxes; one that is longer than the spread of all meets all, and counts as that long.
+fn extents_within_spread(entries: &[Entry]) -> [f64; 3] {
+    let Measure { spread, .. } = Measure::of(entries);
+    let within =
+        |k: usize| entries.iter().map(|entry| with_exponent(entry.exponents[k]).min(spread[k])).sum::<f64>();
+    std::array::from_fn(|k| within(k) / entries.len().max(1) as f64)
+}
+
+/// The spread of some boxes' centers, and their mean extents, by axis.
+struct Measure {
+    spread: [f64; 3],
+    extents: [f64; 3],
+}
+
+impl Measure {
+    fn of(entries: &[Entry]) -> Self {
+        let (mut low, mut high, mut extents) = ([f32::INFINITY; 3], [f32::NEG_INFINITY; 3], [0.0; 3]);
+        for entry in entries {
+            for k in 0..3 {
+                low[k] = low[k].min(entry.center[k]);
+                high[k] = high[k].max(entry.center[k]);
+                extents[k] += with_exponent(entry.exponents[k]);
+            }
+        }
+        let spread = std::array::from_fn(|k| (f64::from(high[k]) - f64::from(low[k])).max(0.0));
+        Self { spread, extents: extents.map(|sum: f64| sum / entries.len().max(1) as f64) }
+    }
 }

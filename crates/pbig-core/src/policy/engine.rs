@@ -1,5 +1,6 @@
 //! The choice of an engine for an update.
 
+use super::search::work_of_full_grid;
 use crate::Engine;
 use crate::all_pairs::Held;
 
@@ -143,9 +144,9 @@ impl GivenUp {
 }
 
 /// Returns the most work of an edit, in tests of codes: about half the time of a rebuild, which sorts the boxes and does the work
-/// of the last one.
-pub(crate) fn edit_up_to_work(boxes: usize, rebuild_work: u64) -> u64 {
-    EDIT_UP_TO_WORK_PER_BOX * boxes as u64 + rebuild_work / 2
+/// of the last one, unless that world was fuller.
+pub(crate) fn edit_up_to_work(boxes: usize, pairs: usize, rebuild_work: u64) -> u64 {
+    EDIT_UP_TO_WORK_PER_BOX * boxes as u64 + rebuild_work.min(work_of_full_grid(boxes, pairs)) / 2
 }
 
 /// Returns the nodes of a tree that look-ups may take: 5 ns each, while a search sorts and joins a box in about 150 ns.
@@ -176,7 +177,8 @@ mod tests {
         assert_eq!(choose_engine(&Counts { spilled: 5001, ..WORLD }, None), Engine::Rebuild);
         assert_eq!(choose_engine(&Counts { held: Held::Nowhere, ..WORLD }, None), Engine::Rebuild);
         assert_eq!(choose_engine(&Counts { knows_old: false, ..WORLD }, None), Engine::Rebuild);
-        assert_eq!(edit_up_to_work(1000, 6000), 63_000);
+        assert_eq!(edit_up_to_work(1000, 10, 6000), 63_000);
+        assert_eq!(edit_up_to_work(1000, 10, u64::MAX), 60_000 + 200_160);
     }
 
     #[test]

@@ -38,6 +38,11 @@ pub(crate) fn is_light(boxes: usize, work: u64) -> bool {
     work <= GRID_UP_TO_PER_BOX * boxes as u64
 }
 
+/// Returns the work of a grid that is as full as one may be.
+pub(super) fn work_of_full_grid(boxes: usize, pairs: usize) -> u64 {
+    GRID_UP_TO_PER_BOX * boxes as u64 + GRID_UP_TO_PER_PAIR * pairs as u64
+}
+
 /// Returns the part of a box's work that its overlaps do not pay for.
 pub(crate) fn in_vain(work: u64, overlaps: u64) -> u64 {
     work.saturating_sub(GRID_UP_TO_PER_PAIR * overlaps)
