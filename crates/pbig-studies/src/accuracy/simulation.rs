@@ -32,7 +32,8 @@ const RUNS: &str = "scene | broad_phase | contacts | points | deepest_mm | mean_
 pub(super) fn run(quick: bool) -> Result<Report, Failure> {
     let mut runs = Table::new("runs", RUNS);
     let mut repeated = Table::new("repeated", "scene | broad_phase | steps | differ_from_step");
-    for case in if quick { &QUICK[..] } else { &FULL } {
+    let cases = if quick { &QUICK[..] } else { &FULL };
+    for case in cases {
         let sides = simulated(*case)?;
         rows(case.0, &sides)?.into_iter().for_each(|row| runs.row(row));
         for two in sides.windows(2).filter(|two| two[1].way.is_again) {
@@ -41,7 +42,8 @@ pub(super) fn run(quick: bool) -> Result<Report, Failure> {
     }
     let axes = ["whole step, ms", "mean distance from stock's bodies at the end, m"];
     let points = points(&runs);
-    let mut report = report("simulation", vec![runs, repeated], ("Whole simulations", axes), points);
+    let tables = vec![drift(cases, &runs), runs, repeated];
+    let mut report = report("simulation", tables, ("Whole simulations", axes), points);
     // Runs have no order.
     report.charts[0].plots[0].is_joined = false;
     Ok(report)
@@ -51,6 +53,20 @@ pub(super) fn run(quick: bool) -> Result<Report, Failure> {
 fn first_difference(two: &[VariantRun]) -> Option<usize> {
     let mut both = two[0].samples.iter().zip(&two[1].samples);
     both.position(|(one, again)| one.poses != again.poses).map(|step| step + 1)
+}
+
+/// Returns the mean distance from stock's bodies at the end: the farthest permuted run, pbig, and stock with sorted events.
+fn drift(cases: &[SceneCase], runs: &Table) -> Table {
+    let mut table = Table::new("drift", "scene | steps | farthest_permuted | pbig | stock_sorted");
+    for (scene, _, steps) in cases {
+        let distance = |way: &str| {
+            let row = runs.rows.iter().find(|row| row[0] == *scene && row[1] == way);
+            row.and_then(|row| runs.number(row, "mean_distance"))
+        };
+        let ways = ["stock permuted, most", "pbig", "stock sorted"];
+        table.row(cells![*scene, *steps, ..ways.map(distance)]);
+    }
+    table
 }
 
 /// Returns points of three scenes in motion with rapier's own broad phase and with pbig's, whatever the order of bodies and
