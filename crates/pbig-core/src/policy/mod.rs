@@ -1,7 +1,8 @@
-//! Every choice and every constant behind one. A choice is a fixed rule on counts, never on a clock: the same boxes and the
-//! same calls take the same path on every machine.
+//! The choices of engine, backend, cells and threads, and their constants. A choice is a fixed rule on counts, never on a clock:
+//! the same boxes and the same calls take the same path on every machine.
 //!
-//! Constants of plans and threads are here; `engine` chooses how an update is made, `backend` where a call runs.
+//! Constants of plans and threads are here; `engine` chooses how an update is made, `backend` where a call runs. A constant that
+//! one file alone uses stands in that file.
 
 mod backend;
 mod engine;
