@@ -140,7 +140,7 @@ fn rounds() {
 }
 
 #[test]
-fn few_of_many_that_change_make_the_events_of_a_search_of_all_on_any_threads() {
+fn edits_make_the_events_of_a_full_search_on_any_threads() {
     rounds();
     for threads in [1, 2, 3] {
         ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool").install(rounds);

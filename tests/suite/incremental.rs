@@ -114,7 +114,7 @@ fn infinite_boxes_within_their_margin_have_not_changed() {
 }
 
 #[test]
-fn a_few_boxes_that_stay_in_their_cells_leave_them_and_come_back() {
+fn a_few_boxes_stay_in_their_cells_leave_and_come_back() {
     let (mut edits, mut out_of_order, mut in_order) = (0, 0, 0);
     for (name, distance) in [("unit", 0.1), ("unit", 1.5), ("mixed", 0.2), ("gaussian", 0.3), ("pile", 0.05)]
     {

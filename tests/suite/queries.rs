@@ -154,7 +154,7 @@ fn queries_agree_with_stock_while_a_world_moves_and_changes() {
 }
 
 #[test]
-fn queries_work_before_the_first_step_in_small_worlds_and_on_mutable_sets() {
+fn queries_work_before_the_first_step_and_on_mutable_sets() {
     for count in 0..5 {
         let mut world = World::default();
         for i in 0..count {

@@ -241,7 +241,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_invalid_does_not_count_in_a_union_and_is_contained_nowhere() {
+    fn invalid_boxes_add_nothing_to_a_union_and_lie_nowhere() {
         let (cube, all) =
             (Aabb::new([0.0; 3], [1.0; 3]), Aabb::new([f32::NEG_INFINITY; 3], [f32::INFINITY; 3]));
         for invalid in [Aabb::NOWHERE, Aabb::new([0.0, 0.0, 3.0], [9.0, 9.0, 2.0])] {

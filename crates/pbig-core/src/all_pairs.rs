@@ -195,7 +195,7 @@ mod tests {
     use crate::{Limits, Order};
 
     #[test]
-    fn a_search_that_finds_too_many_pairs_ends_long_before_it_has_them_all() {
+    fn a_search_with_too_many_pairs_ends_early() {
         let limits = Limits { max_pairs: 1000, ..Limits::DEFAULT };
         let config = Config { limits, order: Order::Unspecified, ..Config::DEFAULT };
         // 2 * 10^8 pairs, 1.6 GB.

@@ -249,7 +249,7 @@ mod tests {
     }
 
     #[test]
-    fn points_without_a_logarithm_are_left_out_and_zero_has_a_place() {
+    fn negative_points_are_left_out_and_zero_has_a_place() {
         let points =
             [(1.0, 0.0), (2.0, 3e-4), (3.0, 50.0), (0.0, 1.0), (f64::NAN, 1.0), (1.0, f64::INFINITY)];
         let text = drawn(&points);

@@ -103,7 +103,7 @@ mod tests {
     }
 
     #[test]
-    fn balanced_rows_cover_every_pair_once_and_differ_by_one_at_most() {
+    fn balanced_rows_cover_each_pair_once_and_differ_by_one() {
         for n in 0..70u32 {
             let mut seen: Vec<_> = (0..n)
                 .flat_map(|i| (0..row_len(i, n)).map(move |k| row_pair(i, k, n)))

@@ -157,7 +157,7 @@ mod tests {
     }
 
     #[test]
-    fn both_broad_phases_have_the_same_hits_in_a_world_that_stands_still() {
+    fn both_broad_phases_have_the_same_hits_in_a_world_at_rest() {
         for kind in FrameKind::ALL.into_iter().filter(|kind| *kind != FrameKind::None) {
             let [stock, ours] = [hits(kind, DefaultBroadPhase::new()), hits(kind, PbigBroadPhase::new())];
             assert!(stock > 0 && ours > 0, "{}: {stock} and {ours}", kind.name());

@@ -269,7 +269,7 @@ fn random_worlds_agree_with_stock_and_the_oracle() {
 }
 
 #[test]
-fn random_worlds_on_a_gpu_agree_too_and_have_the_bits_of_the_cpu() {
+fn random_worlds_on_a_gpu_have_the_bits_of_the_cpu() {
     needs_gpu!();
     let tally = on_random_ops(20, |ops| {
         let found = run(ops, on_gpu(), Plant::Nothing)?;

@@ -135,7 +135,7 @@ fn the_first_invalid_box_is_named() {
 }
 
 #[test]
-fn no_boxes_are_an_answer_and_no_bytes_are_an_error_in_both_kinds() {
+fn no_boxes_are_an_answer_and_no_bytes_an_error() {
     let folder = tempfile::tempdir().expect("a folder");
     let here = folder.path();
     save(here, "none.npy", &Array2::<f32>::zeros((0, 6)));

@@ -246,7 +246,7 @@ fn a_crowd_of_questions_pays_for_a_sort_and_single_ones_do_not() {
 
 /// Boxes that come after a sort make questions slow only until these have paid for the next one.
 #[test]
-fn boxes_that_come_later_are_sorted_in_once_questions_have_paid() {
+fn later_boxes_are_sorted_in_once_questions_have_paid() {
     for n in [2000, 20_000] {
         let (mut boxes, mut index) = (scattered(n), BoxIndex::default());
         index.refresh(&boxes, None);

@@ -234,7 +234,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_row_that_grows_and_shrinks_again_and_again_keeps_its_place() {
+    fn a_row_that_grows_and_shrinks_keeps_its_place() {
         let mut kept = Kept::default();
         kept.reserve_ids(100);
         let row = |len: u32| (0..len).flat_map(|i| [Pair { a: 3, b: 10 + i }, Pair { a: 4, b: 10 + i }]);

@@ -170,7 +170,7 @@ mod tests {
     }
 
     #[test]
-    fn few_changes_are_looked_up_in_a_tree_where_there_is_one_or_most_ids_are_unused() {
+    fn few_changes_use_a_tree_if_kept_or_if_most_ids_are_unused() {
         let tree = Counts { held: Held::InTree, knows_old: false, ..WORLD };
         assert_eq!(choose_engine(&tree, None), Engine::Tree);
         assert_eq!(choose_engine(&Counts { changed: 501, ..tree }, None), Engine::Rebuild);

@@ -54,7 +54,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_grid_is_searched_where_its_cells_hold_few_or_many_of_them_pair() {
+    fn a_grid_is_searched_if_cells_hold_few_or_many_pair() {
         assert!(is_light(1000, 400_000) && !is_light(1000, 400_001));
         assert_eq!((in_vain(4000, 100), in_vain(4000, 1000)), (800, 0));
         assert_eq!(sample_one_in(100_000, 16_000_000), 196);

@@ -328,7 +328,7 @@ mod tests {
     }
 
     #[test]
-    fn cases_count_alike_and_the_noise_of_a_mean_is_less_than_that_of_a_case() {
+    fn cases_count_alike_and_a_mean_has_less_noise_than_a_case() {
         assert_eq!(MARGINS[DEFAULT] as f32, PbigConfig::DEFAULT.margin);
         let case =
             |ms: f64, fifth: f64| (0..MARGINS.len()).map(move |k| row(k, if k == 4 { fifth } else { ms }));

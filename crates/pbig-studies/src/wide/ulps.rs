@@ -66,7 +66,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_invalid_or_infinite_stays_so_and_widens_nothing_else() {
+    fn invalid_and_infinite_bounds_stay_so_and_widen_no_other() {
         for invalid in [Aabb::new([1e7, 0.0, 0.0], [1e7 - 1.0, 1.0, 1.0]), Aabb::NOWHERE] {
             let wide = widened_by_ulps(&invalid, &pose([1e7, 0.0, 0.0]), u32::MAX);
             assert!(!wide.is_valid(), "{wide:?}");

@@ -327,7 +327,7 @@ fn run(seed: u64, plant: Plant, tally: &mut Tally) -> Result<(), String> {
 }
 
 #[test]
-fn random_worlds_have_the_pairs_of_the_oracle_and_miss_no_contact_of_stock() {
+fn random_worlds_have_the_oracles_pairs_and_stocks_contacts() {
     let runs = std::env::var("PBIG_RUNS").ok().and_then(|runs| runs.parse().ok()).unwrap_or(300);
     let mut tally = Tally::default();
     for seed in 0..runs {
