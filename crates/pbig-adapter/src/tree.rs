@@ -75,7 +75,7 @@ impl<T: Tree> SceneTree<T> {
         }
     }
 
-    /// Returns the tree of the boxes with ids below `ids`. `pending` are those that have changed since the last update.
+    /// Returns the tree of the boxes with ids below `ids`. `pending` are the ids of boxes that changed since the last update.
     pub(crate) fn get(
         &self,
         ids: u32,

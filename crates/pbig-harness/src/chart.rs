@@ -6,7 +6,7 @@ use plotters::coord::types::RangedCoordf64;
 use plotters::prelude::*;
 use std::path::Path;
 
-/// Most lines of a panel; more cannot be told apart.
+/// Maximum number of lines in a panel: more cannot be told apart.
 pub const MAX_LINES: usize = 6;
 
 /// Colours that differ for the colour-blind too (Okabe and Ito).
@@ -28,7 +28,7 @@ const LEGEND: u32 = 230;
 const TEXT: u32 = 18;
 const TITLE: u32 = 23;
 
-/// Most characters of a line of the legend.
+/// Maximum number of characters in a line of the legend.
 const LEGEND_LETTERS: usize = 26;
 
 /// A named line of a panel.

@@ -71,8 +71,8 @@ answer!(DefaultBroadPhase);
 answer!(PbigBroadPhase);
 
 impl FrameQueries {
-    /// Begins at the first frame, in a world that has not made a step. Returns nothing for a kind without queries: a frame
-    /// must not touch the broad phase then, because its index may wait for a first query.
+    /// Begins at the first frame, in a world that has not made a step. Returns nothing for a kind without queries, so that frames
+    /// leave the broad phase alone: its index may wait for a first query.
     pub fn new(kind: FrameKind, world: &World) -> Option<Self> {
         let extent = extent(world);
         let queries = Self { kind, extent, frame: 0, character: extent.character_start() };

@@ -129,7 +129,7 @@ fn what_is_no_npy_file_is_not_read_as_one() {
     for command in ["pairs", "replay"] {
         let about = |content| line_about(folder.path(), command, "x.npy", content);
         assert_eq!(about(b""), "pbig: x.npy: the file is empty");
-        let other = "pbig: x.npy: this is no .npy file, as `numpy.save` writes it";
+        let other = "pbig: x.npy: not a .npy file, as `numpy.save` writes it";
         assert_eq!((about(b"0,0,0,1,1,1\n").as_str(), about(b"\x93NUMP").as_str()), (other, other));
     }
 }

@@ -4,7 +4,7 @@ use super::{BoxList, MAX_BOXES, Place, brief, one_line, too_many};
 use pbig_core::Aabb;
 use std::io::{self, BufRead};
 
-/// The longest line that is read, in bytes. Six numbers need a few hundred.
+/// Maximum length of a line, in bytes. Six numbers need a few hundred.
 const MAX_LINE_BYTES: usize = 64 << 10;
 
 /// The columns of a `.csv` file.
