@@ -73,7 +73,7 @@ check_lengths() {
     at_most 120000 "$(cat docs/benchmarks/results/*.csv | wc -c)" "bytes of measured results"
 }
 
-# within SECONDS COMMAND...: runs a command, and ends it with its children after so many seconds. (macOS has no `timeout`.)
+# within SECONDS COMMAND...: runs a command, and ends it with its children after this time. (macOS has no `timeout`.)
 within() {
     local limit=$1 waited=0 pid
     shift

@@ -77,7 +77,7 @@ fn few_among_many_may_come_go_and_change_in_one_step() {
     multitude(2, 45_000, 5);
 }
 
-/// Balls in a row, on so many threads. Each step one in `every` is moved or stays, as if it had been moved.
+/// Balls in a row, on this number of threads. In each step one in `every` is listed as moved, and moves or stays.
 fn multitude(threads: usize, balls: usize, every: usize) {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool");
     pool.install(|| multitude_of(balls, every));

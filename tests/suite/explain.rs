@@ -98,7 +98,7 @@ fn statistics_count_what_an_update_was_given_and_sent() {
 }
 
 /// Calls that bring no news end at once. They are counted, their statistics are those of a call without news, and
-/// whatever comes next is seen: a change, a collider behind rapier's lists, an adopted world, a failed update.
+/// the next call sees everything: a change, a collider behind rapier's lists, an adopted world, a failed update.
 #[test]
 fn calls_without_changes_are_counted_and_hide_nothing() {
     let mut world = World::default();

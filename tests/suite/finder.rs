@@ -1,4 +1,4 @@
-//! Contract 1: every strategy returns the oracle's pairs, sorted, whatever the boxes and threads.
+//! Contract 1: every strategy returns the oracle's pairs, sorted, for all boxes and thread counts.
 
 use pbig_core::{Aabb, Backend, Coding, Config, Error, Finder, Limits, Order, Pair, ProxyFilter, oracle};
 use pbig_harness::boxes::BoxSet;

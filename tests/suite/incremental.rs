@@ -161,7 +161,7 @@ fn contract_5_no_change_no_work_and_few_changes_little() {
     set_all(&mut broad_phase, 0.04);
     broad_phase.update().expect("within the limits");
     let report = broad_phase.report();
-    assert_eq!((report.changed, report.checks.made), (0, 0), "motion within the margin is no change");
+    assert_eq!((report.changed, report.checks.made), (0, 0), "motion within the margin changes nothing");
     for frame in 1..40 {
         let aabb = Aabb::from_center([frame as f32; 3], [0.5; 3]);
         broad_phase.set(77, aabb, ProxyFilter::ALL).expect("a small id");

@@ -31,7 +31,7 @@ fn steps(world: &mut World, broad_phase: &mut dyn BroadPhase, steps: usize) {
     (0..steps).for_each(|_| world.step(broad_phase));
 }
 
-/// Two colliders, whatever their order.
+/// Two colliders in either order.
 fn unordered(pair: ColliderPair) -> [(u32, u32); 2] {
     let [a, b] = [pair.collider1, pair.collider2].map(|handle| handle.into_raw_parts());
     [a.min(b), a.max(b)]

@@ -233,7 +233,7 @@ mod tests {
             [d.missed, d.missed_deep, d.added]
         };
         assert_eq!(differences(&[pair(0, 1), pair(1, 2)], 0.0), [0, 0, 0]);
-        // The third and fourth touch, as far as f64 tells.
+        // The third and fourth touch, to the precision of f64.
         assert_eq!(differences(&[pair(2, 3)], 0.3), [2, 1, 0]);
         assert_eq!(differences(&[pair(0, 1), pair(0, 2), pair(1, 2)], 0.0), [0, 0, 1]);
     }

@@ -22,7 +22,7 @@ use std::cell::Cell;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use subject::{Plant, Subject};
 
-/// A list has up to so many operations, half as many on average.
+/// Maximum number of operations in a list; half as many on average.
 const MOST_OPS: usize = 160;
 
 /// What happened, summed up.

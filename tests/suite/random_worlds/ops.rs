@@ -14,7 +14,7 @@ const MOST_BODIES: usize = 40;
 /// something in any world, also when those before it are left out.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Op {
-    /// So many steps.
+    /// This number of steps.
     Step(u8),
     /// World and broad phase are saved, and it goes on with what was restored.
     Snapshot,

@@ -128,7 +128,7 @@ impl Tally {
         for (early, bytes) in self.early.iter_mut().zip(self.bytes) {
             *early = if is_early { bytes.max(*early) } else { *early };
             let update = self.updates;
-            // In a short run a list that doubles late is no leak.
+            // In a short run a list may double late without a leak.
             let late = if given().is_none() { 100_000 } else { 0 };
             assert!(
                 bytes <= *early * 5 / 4 + late,

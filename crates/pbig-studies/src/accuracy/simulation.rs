@@ -1,6 +1,6 @@
 //! Scenes with pbig's broad phase instead of rapier's own: contacts, energy, and the paths of bodies.
-//! Events come in another order, so rapier solves contacts in another order; how far that leads is held against what
-//! another order of insertion does, and what our order of events does to rapier's own broad phase.
+//! Events come in another order, so rapier solves contacts in another order. The effect is compared with the effect of another
+//! order of insertion, and with the effect of our order of events on rapier's own broad phase.
 
 mod sides;
 
@@ -69,8 +69,8 @@ fn drift(cases: &[SceneCase], runs: &Table) -> Table {
     table
 }
 
-/// Returns points of three scenes in motion with rapier's own broad phase and with pbig's, whatever the order of bodies and
-/// events. With more scenes no one could tell them apart.
+/// Returns points of three scenes in motion with rapier's own broad phase and with pbig's, in every order of bodies and events.
+/// More scenes could not be told apart.
 fn points(runs: &Table) -> Vec<(String, f64, f64)> {
     let drawn =
         runs.rows.iter().filter(|row| ["column", "ragdolls", CLOUD].iter().any(|scene| row[0] == *scene));
@@ -93,7 +93,7 @@ fn rows(scene: &str, sides: &[VariantRun]) -> Result<Vec<Vec<Value>>, Failure> {
     Ok(rows)
 }
 
-/// Returns the values that have so many smaller ones, column by column. A step that never came is later than all others.
+/// Returns the values of this rank, column by column. A step that never came is later than all others.
 fn ranked(permuted: &[Vec<Value>], name: &str, rank: usize) -> Vec<Value> {
     let column = |k: usize| {
         let mut values: Vec<&Value> = permuted.iter().map(|row| &row[k]).collect();
@@ -171,7 +171,7 @@ impl Mechanics {
         let mass = f64::from(body.mass());
         let momentum = DVec3::from_array(body.linvel().map(|v| f64::from(v) * mass).into());
         self.kinetic += f64::from(body.kinetic_energy());
-        // Rapier's solver makes so many small steps of each.
+        // Rapier's solver divides each step into this number of small ones.
         let dt = world.params.dt / world.params.num_solver_iterations.get() as Real;
         self.potential += f64::from(body.gravitational_potential_energy(dt, to_vector(world.gravity)));
         self.speed += momentum.length();

@@ -167,7 +167,7 @@ fn gives_the_figures(way: RoundedRoot, steps: usize) -> bool {
     })
 }
 
-/// Returns the number of ways to round, and of those that give the figures.
+/// Returns the number of ways to round, and the number of ways that give the figures.
 fn ways(form: usize, count: usize) -> [usize; 2] {
     let all = steps();
     let late = if count > 2 { &all[..] } else { &all[..1] };

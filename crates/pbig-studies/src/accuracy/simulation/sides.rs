@@ -17,7 +17,7 @@ use rapier3d::prelude::*;
 use std::collections::HashMap;
 use std::hash::{DefaultHasher, Hash, Hasher};
 
-/// A world, and the handle of each body by its number, whatever the order in which they are inserted.
+/// A world, and the handle of each body by its number. The number does not depend on the order of insertion.
 struct Numbered {
     world: World,
     bodies: Vec<RigidBodyHandle>,
@@ -199,7 +199,7 @@ fn awake(world: &World) -> f64 {
     percent(awake as u64, dynamic().count() as u64)
 }
 
-/// Pairs are compared with brute force in one of so many steps.
+/// Steps from one comparison with brute force to the next.
 const COMPARED: usize = 20;
 
 /// Runs all ways through a scene, in turn step by step.
