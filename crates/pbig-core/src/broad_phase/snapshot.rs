@@ -109,7 +109,7 @@ impl Snapshot {
         let is_present = |id: u32| self.present.get(id as usize).is_some_and(|present| *present);
         let is_pair = |pair: &Pair| pair.a < pair.b && is_present(pair.a) && is_present(pair.b);
         if let Some(pair) = self.pairs.iter().find(|pair| !is_pair(pair)) {
-            return Err(format!("snapshot: {pair:?} is no pair of boxes"));
+            return Err(format!("snapshot: {pair:?} is not a pair of boxes"));
         }
         if let Some(two) = self.pairs.windows(2).find(|two| two[0] >= two[1]) {
             return Err(format!("snapshot: pairs out of order: {two:?}"));

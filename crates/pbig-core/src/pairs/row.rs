@@ -1,4 +1,4 @@
-//! Sorting short rows of ids, and telling two rows apart.
+//! Sorts short rows of ids, and compares two rows.
 
 use crate::Pair;
 use crate::grid::Simd;

@@ -3,32 +3,32 @@
 use crate::Engine;
 use crate::all_pairs::Held;
 
-/// Boxes of a world in which changed boxes are tested against all, at most.
+/// Maximum number of boxes for a sweep.
 pub(crate) const SWEEP_UP_TO_BOXES: usize = 1024;
 
-/// Tests (changed boxes times boxes) up to which a sweep takes less time than a grid.
+/// Maximum number of tests (changed boxes times boxes) for a sweep: with more, a grid takes less time.
 pub(crate) const SWEEP_UP_TO_TESTS: usize = 1 << 16;
 
-/// Share of the boxes, one in so many, up to which changed boxes are edited: measured, editing takes as long as a rebuild
-/// at 7 to 10% of 100,000 boxes, at 4 to 5% of a million.
+/// Maximum share of changed boxes for an edit, as one in this number. Measured: an edit takes as long as a rebuild at 7 to 10% of
+/// 100,000 boxes, and at 4 to 5% of a million.
 pub(crate) const EDIT_UP_TO_ONE_IN: usize = 20;
 
-/// Share of the ids, one in so many, up to which boxes are sorted into a tree although there is none: a rebuild looks at all ids.
+/// Maximum share of ids in use, as one in this number, for boxes to be sorted into a new tree: a rebuild looks at all ids.
 const SPARSE_FROM_ONE_IN: usize = 8;
 
 /// Work of an edit for each box of the world, in tests of codes of 0.35 ns; a rebuild sorts a box in about 40 ns.
 const EDIT_UP_TO_WORK_PER_BOX: u64 = 60;
 
-/// Rebuilds at once after updates that were given up, at most.
+/// Maximum number of rebuilds in a row after updates that were given up.
 const MAX_REBUILDS: u32 = 64;
 
-/// Nodes of a tree that are looked at, and boxes met, in an update, at most, for each id.
+/// Maximum number of nodes looked at and boxes met in an update in a tree, for each id.
 const LOOK_UP_TO_NODES_PER_ID: u64 = 8;
 
-/// Share of the boxes, one in so many, that may be out of the grid's order: lists of them are slower than slots.
+/// Maximum share of boxes out of the grid's order for an edit, as one in this number: lists are slower than slots.
 pub(crate) const SPILL_UP_TO_ONE_IN: usize = 2;
 
-/// Changed boxes from which several threads look them up.
+/// Minimum number of changed boxes for look-ups on several threads.
 pub(crate) const PARALLEL_FROM_EDITS: usize = 1024;
 
 /// Counts from which an engine is chosen.
@@ -42,7 +42,7 @@ pub(crate) struct Counts {
     pub(crate) changed: usize,
     /// True if the old state of all changed boxes is known.
     pub(crate) knows_old: bool,
-    /// Where the boxes of the last update are.
+    /// The structure that holds the boxes of the last update.
     pub(crate) held: Held,
     /// Boxes out of the grid's order.
     pub(crate) spilled: usize,
@@ -58,7 +58,7 @@ impl Counts {
         self.boxes * SPARSE_FROM_ONE_IN <= self.ids
     }
 
-    /// Returns true if so few of some boxes or ids have changed that it pays to look at these alone.
+    /// Returns true if few enough of some boxes or ids have changed for an engine to look at these alone.
     fn are_few_of(&self, all: usize) -> bool {
         self.changed * EDIT_UP_TO_ONE_IN <= all
     }
@@ -80,8 +80,8 @@ pub(crate) fn choose_engine(counts: &Counts, forced: Option<Engine>) -> Engine {
         Some(engine) => return engine,
         None => {}
     }
-    // Few boxes left of many are swept, too, where a grid would look at all ids; but not in turn with a tree, since each
-    // looks at all ids at first.
+    // A few boxes left of many are also swept, because a grid would look at all ids. Sweep and tree do not take turns, because
+    // each looks at all ids when it begins.
     let is_small = counts.boxes <= SWEEP_UP_TO_BOXES
         && counts.changed * counts.boxes <= SWEEP_UP_TO_TESTS
         && (counts.ids <= SWEEP_UP_TO_BOXES || counts.is_sparse() && counts.held != Held::InTree);
@@ -121,7 +121,7 @@ impl GivenUp {
         Engine::Rebuild
     }
 
-    /// Notes how an edit or a look-up in a tree ended.
+    /// Notes whether an edit or a look-up in a tree was given up.
     pub(crate) fn note(&mut self, is_given_up: bool, changed: usize) {
         if is_given_up {
             let rebuilds = (2 * self.rebuilds).clamp(1, MAX_REBUILDS);
@@ -132,18 +132,18 @@ impl GivenUp {
     }
 }
 
-/// Returns the most work of an edit, in tests of codes: about half the time of a rebuild, which sorts the boxes and does the work
+/// Returns the maximum work of an edit, in tests of codes: about half the time of a rebuild, which sorts the boxes and does the work
 /// of the last one.
 pub(crate) fn edit_up_to_work(boxes: usize, rebuild_work: u64) -> u64 {
     EDIT_UP_TO_WORK_PER_BOX * boxes as u64 + rebuild_work / 2
 }
 
-/// Returns the nodes of a tree that look-ups may take: 5 ns each, while a search sorts and joins a box in about 150 ns.
+/// Returns the maximum number of nodes for look-ups in a tree: 5 ns each, while a search sorts and joins a box in about 150 ns.
 pub(crate) fn look_up_to_nodes(ids: usize) -> u64 {
     LOOK_UP_TO_NODES_PER_ID * ids as u64
 }
 
-/// Returns the number of old states that are worth keeping until the next update.
+/// Returns the number of old states to keep until the next update.
 pub(crate) fn old_states_to_keep(boxes: usize, forced: Option<Engine>) -> usize {
     match forced {
         Some(Engine::Edit) => usize::MAX,
