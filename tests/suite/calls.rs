@@ -1,4 +1,4 @@
-//! How rapier calls a broad phase, and in which order it is answered.
+//! Rapier's calls of a broad phase, and the order of its answers.
 
 use crate::checked::{backends, everywhere, pbig};
 use crate::stress::memory;

@@ -1,4 +1,4 @@
-//! What rapier 0.27 is owed by its broad phase, call by call.
+//! The duties of a broad phase to rapier 0.27, call by call.
 
 use crate::checked::{Checked, backends, everywhere, pbig};
 use pbig_harness::world::World;
@@ -103,7 +103,7 @@ fn multitude_of(count: usize, every: usize) {
         scene.world.colliders[balls[4000 + step].1].set_collision_groups(none);
         scene.move_to(balls[count / 4 * step].0, f32::NAN);
         let pairs = scene.step();
-        // Of a row of neighbours one in 14 is moved away from another, of scattered ones each that has moved.
+        // In a row of neighbours one ball in 14 leaves its neighbour. Scattered balls do whenever they move.
         let apart = if every == 1 { count / 14 } else { count / every / 4 };
         let expected = count - apart - 300..count - apart / 2;
         assert!(expected.contains(&pairs), "{pairs} pairs in step {step}, of {expected:?}");

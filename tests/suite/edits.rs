@@ -17,11 +17,11 @@ const LIMIT: u64 = 300_000;
 /// Pairs with nothing.
 const LONE: ProxyFilter = ProxyFilter { memberships: 0, mask: 0, ..ProxyFilter::ALL };
 
-/// What a broad phase is told, and what it should say.
+/// The boxes given to a broad phase, and the pairs that it should report.
 struct World {
     boxes: Vec<Aabb>,
     filters: Vec<ProxyFilter>,
-    /// The boxes at the last update that succeeded.
+    /// The pairs at the last update that succeeded.
     pairs: Vec<Pair>,
     /// Removed since.
     gone: Vec<u32>,

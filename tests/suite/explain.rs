@@ -1,4 +1,4 @@
-//! What a user sees: reasons, statistics, spans, pictures, and the shadow.
+//! Everything that a user sees: reasons, statistics, spans, pictures, and the shadow.
 
 use crate::checked::{Checked, everywhere, pbig};
 use pbig_core::{Backend, Config, Engine};

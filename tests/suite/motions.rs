@@ -53,7 +53,7 @@ fn a_thousand_sequences_of_every_motion_agree_with_the_oracle() {
     assert!(sequences >= 1000, "{sequences} sequences");
 }
 
-/// Compares the events of enough boxes for several threads.
+/// Returns the events of enough boxes for several threads.
 fn events(motion: Motion, threads: usize) -> Vec<Events> {
     let pool = ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool");
     pool.install(|| {

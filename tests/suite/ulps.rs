@@ -13,7 +13,7 @@ fn reach(params: &IntegrationParameters) -> f64 {
     f64::from(params.prediction_distance() / 2.0)
 }
 
-/// How many of the boxes in f64 at these poses reach beyond widened ones in f32, and the float after.
+/// Returns the number of boxes in f64 at these poses that reach beyond the widened boxes in f32 and the next float.
 fn beyond(layout: &Layout, poses: &[Pose], colliders: &[Collider], ulps: u32) -> usize {
     let (params, none) = (IntegrationParameters::default(), RigidBodySet::new());
     let exact = layout.boxes(poses, reach(&params));

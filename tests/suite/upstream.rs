@@ -96,7 +96,7 @@ fn among_fixed_bodies(config: Config, steps: usize, most_checks: u64) {
     let mut broad_phase = pbig(config);
     world.step(&mut broad_phase);
     for step in 0..steps {
-        // Of the two updates of a step, the first has nothing to do: only rapier moves anything.
+        // The first of the two updates of a step has nothing to do, because only rapier moves bodies.
         world.step(&mut broad_phase);
         let report = broad_phase.stats().report;
         assert_eq!(report.changed, 1, "step {step}");

@@ -50,7 +50,7 @@ enum Command {
     /// Finds pairs and prints the memory that this took: a process of its own for `bench`.
     #[command(hide = true)]
     MemoryProbe(bench::memory::Args),
-    /// What this machine offers, what is chosen and why, and a self-test.
+    /// Prints what this machine offers and what is chosen, with reasons, and runs a self-test.
     Doctor,
 }
 

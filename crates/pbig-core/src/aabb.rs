@@ -68,7 +68,7 @@ impl Aabb {
     /// ```
     #[inline(always)]
     pub fn overlaps(&self, other: &Self) -> bool {
-        // Branches are one at most, on the result: six of them took three times as long.
+        // One branch at most, on the result: six branches took three times as long.
         #[cfg(target_arch = "x86_64")]
         return self.overlaps_by_lanes(other);
         #[cfg(not(target_arch = "x86_64"))]

@@ -96,7 +96,7 @@ pub struct GpuOptions {
     /// If true, the rows of a large cell get equally many pairs (PBIG table IV, "load balancing").
     pub load_balancing: bool,
     /// Estimate of the row in Avril's mapping (Avril 3.3). 0: the device's square root. 1 to 4: Carmack's inverse root with
-    /// so many Newton steps. 5 to 8: Lomont's, with 1 to 4 steps. 9: bisection. All are exact, because integers correct
+    /// this number of Newton steps. 5 to 8: Lomont's, with 1 to 4 steps. 9: bisection. All are exact, because integers correct
     /// the estimate.
     pub root: u32,
     /// Number of small and of large work items of a submission. They have at most 256 and 524,288 tests each. Longer
@@ -115,10 +115,10 @@ pub struct GpuOptions {
     pub boxes_per_cell: f32,
     /// Rule that turns the wanted boxes per cell into a cell size.
     pub cell_rule: CellRule,
-    /// Most boxes of a cell, up to 256, whose pairs are tested through Avril's mapping. Larger cells are tested by PBIG's
+    /// Maximum number of boxes of a cell, up to 256, whose pairs are tested through Avril's mapping. Larger cells are tested by PBIG's
     /// balanced rows.
     pub small_cell: u32,
-    /// Most boxes of a set whose pairs are all tested, without a grid. 0: there is always a grid. Avril's table 7 puts the
+    /// Maximum number of boxes whose pairs are all tested, without a grid. 0: there is always a grid. Avril's table 7 puts the
     /// crossover at 1000.
     pub all_pairs_up_to: u32,
     /// If true, the device counts the tests that it makes, those that repeat another and those of boxes that are apart. It

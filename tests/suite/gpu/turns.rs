@@ -31,7 +31,7 @@ fn a_device_whose_update_was_too_much_does_not_go_on_from_it() {
     put(&mut broad_phase, 0..1000, false);
     put(&mut broad_phase, 0..9, true);
     assert_eq!(broad_phase.update().map(|events| events.added.len()), Ok(9));
-    // The limit of the device, which also counts pairs that may end.
+    // More than the device may find: its limit also counts pairs that may end.
     put(&mut broad_phase, 20..32, true);
     assert_eq!(broad_phase.update(), Err(Error::TooManyPairs { limit: 10 }));
     assert!(broad_phase.report().gpu.is_some(), "the device has found them");

@@ -25,7 +25,7 @@ use subject::{Plant, Subject};
 /// Maximum number of operations in a list; half as many on average.
 const MOST_OPS: usize = 160;
 
-/// What happened, summed up.
+/// Sums over all runs.
 #[derive(Clone, Copy, Debug, Default)]
 struct Tally {
     runs: u64,
@@ -70,7 +70,7 @@ impl Tally {
     }
 }
 
-/// How a run ends before its last operation.
+/// The reason for which a run ends before its last operation.
 enum End {
     Wrong(String),
     /// Rapier's own bugs are not the matter here, but they must be few.
@@ -86,7 +86,7 @@ struct Outcome {
 }
 
 impl Outcome {
-    /// Whether another run ended in the very same state.
+    /// Returns an error if another run ended in another state.
     fn compare(&self, other: &Self) -> Result<(), String> {
         if self.tally.contacts != other.tally.contacts || self.poses != other.poses {
             return Err("the bodies have gone other ways".into());

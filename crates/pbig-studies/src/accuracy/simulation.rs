@@ -248,7 +248,7 @@ mod tests {
         assert!((found - right).abs() <= 1e-5 * right.abs().max(1.0), "{found}, not {right}");
     }
 
-    /// Measures after a step of no length, which only finds masses and contacts.
+    /// Measures after a step of zero length, which only finds masses and contacts.
     fn measured(mut world: World) -> Mechanics {
         world.params.dt = 0.0;
         world.step(&mut DefaultBroadPhase::new());
