@@ -205,3 +205,9 @@ fn text_and_rows_with_sources_of_their_own_are_checked() {
     assert_eq!(found("| _ | |\n| _ | |\n| _ | |", rows).len(), 1, "more sources than rows");
     assert_eq!(found("| 9 |", "<!-- from: b.csv\n| ms |\n-->\n3").len(), 2, "a mark without an end");
 }
+
+#[test]
+fn numbers_are_read_as_they_are_written() {
+    let wanted = [(1.0, 0), (2.71, 2), (3e-7, 7), (10.0, 0), (7.0, 0), (4.0, 0)];
+    assert_eq!(numbers("1→2.71, 3e-7 x86 10^7, 4."), wanted);
+}
