@@ -46,6 +46,14 @@ wasm_linker() {
     echo "/usr/bin/wasm-ld-$(/usr/bin/rustc -vV | sed -n 's/^LLVM version: \([0-9]*\).*/\1/p')"
 }
 
+# use_wasm_linker: names the linker to cargo, where it builds the standard library.
+use_wasm_linker() {
+    if $builds_std; then
+        export CARGO_TARGET_WASM32_UNKNOWN_UNKNOWN_LINKER
+        CARGO_TARGET_WASM32_UNKNOWN_UNKNOWN_LINKER=$(wasm_linker)
+    fi
+}
+
 # target_folder [OPTION...]: cargo's folder for what it builds, as an absolute path. Call it where cargo is called: a relative
 # CARGO_TARGET_DIR starts there.
 target_folder() {
@@ -65,12 +73,22 @@ new_node() {
     return 1
 }
 
+# has_libraries FILE...: the dynamic linker knows each library.
+has_libraries() {
+    local known file
+    known=$(ldconfig -p 2>/dev/null)
+    for file in "$@"; do
+        case $known in *"$file "*) ;; *) return 1 ;; esac
+    done
+}
+
 # left_out WHAT [REMEDY]: says that something cannot run here, and what to do. With CI=true it ends the script as a failure.
 left_out() {
     echo "== left out: $1; ${2:-scripts/setup.sh installs what is missing}"
     [ "${CI:-}" != true ] || exit 1
 }
 
+# step COMMAND...: runs a command below a heading.
 step() {
     echo "== $*"
     "$@"

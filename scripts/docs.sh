@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Checks the documents: links and anchors, lengths, marks of numbers, and the commands that they show.
+# Checks the documents: links and anchors, lengths, and the commands that they show. A test compares their numbers.
 #   scripts/docs.sh [--no-run]     --no-run leaves out the commands
 # Blocks marked `sh` run from the repository's root, each for at most DOCS_SECONDS seconds (300). Other blocks are not run.
 # It needs bash, awk, sed and grep, and for the commands cargo.
@@ -55,9 +55,9 @@ check_links() {
     done
 }
 
-# words FILE...: the words, without the bars of tables.
+# words FILE...: the words, without the bars of tables and without comments, which no reader sees.
 words() {
-    cat "$@" | awk '{ for (i = 1; i <= NF; i++) if ($i ~ /[A-Za-z0-9]/) n++ } END { print n + 0 }'
+    cat "$@" | awk '/^<!--/ { hidden = 1 } hidden { if (/-->$/) hidden = 0; next } { for (i = 1; i <= NF; i++) if ($i ~ /[A-Za-z0-9]/) n++ } END { print n + 0 }'
 }
 
 # at_most LIMIT COUNT WHAT
@@ -69,26 +69,11 @@ check_lengths() {
     at_most 120 "$(awk 'END { print NR }' README.md)" "lines of README.md"
     at_most 1500 "$(words docs/ACCURACY.md)" "words of docs/ACCURACY.md"
     at_most 4000 "$(words docs/ARCHITECTURE.md)" "words of docs/ARCHITECTURE.md"
-    at_most 20000 "$(words $documents)" "words of all documents"
+    at_most 18600 "$(words $documents)" "words of all documents"
+    at_most 120000 "$(cat docs/benchmarks/results/*.csv | wc -c)" "bytes of measured results"
 }
 
-# Numbers that were measured lie between two marks, the first of which names their file. A test compares them.
-check_marks() {
-    local file name
-    for file in $documents; do
-        awk -v file="$file" '
-            /^<!-- from: / { if (open) print file ":" NR ": a mark within another"; open = NR }
-            /^<!-- end -->/ { if (!open) print file ":" NR ": an end without a mark"; open = 0 }
-            END { if (open) print file ":" open ": a mark without an end" }' "$file" >"$work/marks"
-        while IFS= read -r name; do fault "$name"; done <"$work/marks"
-        sed -n 's|^<!-- from: \(.*\) -->$|\1|p' "$file" | tr ',' '\n' | sed 's/^ *//' | sort -u >"$work/names"
-        while IFS= read -r name; do
-            [ -f "$name" ] || fault "$file: there is no '$name'"
-        done <"$work/names"
-    done
-}
-
-# within SECONDS COMMAND...: runs a command, and ends it with its children after so many seconds. (macOS has no `timeout`.)
+# within SECONDS COMMAND...: runs a command, and ends it with its children after this time. (macOS has no `timeout`.)
 within() {
     local limit=$1 waited=0 pid
     shift
@@ -135,7 +120,6 @@ run_blocks() {
 
 check_links
 check_lengths
-check_marks
 if $runs; then
     if cargo build --release --workspace --examples --bins; then run_blocks; else fault "the build failed"; fi
 fi

@@ -91,10 +91,7 @@ parts="rust wasm page"
 ! $setup || scripts/setup.sh $parts || true
 . scripts/common.sh
 choose_cargo "$target" && has npm || { left_out "$target or npm" && exit 0; }
-if $builds_std; then
-    export CARGO_TARGET_WASM32_UNKNOWN_UNKNOWN_LINKER
-    CARGO_TARGET_WASM32_UNKNOWN_UNKNOWN_LINKER=$(wasm_linker)
-fi
+use_wasm_linker
 # The workspace's own folder for what it builds.
 built=$(target_folder --manifest-path "$manifest")
 build_module "$built/bindings"

@@ -52,7 +52,7 @@ setup_patch() {
 # On Linux the adapters are Vulkan's; other systems bring theirs.
 has_vulkan() {
     [ "$(uname)" = Linux ] || return 0
-    case $(ldconfig -p 2>/dev/null) in *libvulkan.so.1*) ;; *) return 1 ;; esac
+    has_libraries libvulkan.so.1 || return 1
     compgen -G '/usr/share/vulkan/icd.d/*.json' >/dev/null || compgen -G '/etc/vulkan/icd.d/*.json' >/dev/null
 }
 
@@ -94,15 +94,6 @@ setup_aarch64() {
     setup_target aarch64-unknown-linux-gnu
     { has aarch64-linux-gnu-gcc && has qemu-aarch64-static; } ||
         require "a linker and an emulator for aarch64" gcc-aarch64-linux-gnu libc6-dev-arm64-cross qemu-user-static || true
-}
-
-# has_libraries FILE...: the dynamic linker knows each library.
-has_libraries() {
-    local known file
-    known=$(ldconfig -p 2>/dev/null)
-    for file in "$@"; do
-        case $known in *"$file "*) ;; *) return 1 ;; esac
-    done
 }
 
 # On Linux a window loads X libraries at run time; other systems bring theirs.

@@ -1,17 +1,17 @@
 #!/usr/bin/env bash
 # The one test command. It sets the machine up, runs named steps, and ends with a table of times and counts.
 #   scripts/test.sh [--no-setup] [STEP...]     without a step: all
-# setup.sh installs what is missing, if it may, and says what; --no-setup leaves it out. Without a GPU adapter (a software one
-# will do) the steps that need one are left out, and the table says so. With CI=true that is a failure.
+# setup.sh installs what is missing, if it may, and says what; --no-setup leaves it out. A step is a function `step_NAME`, with
+# `_` for `-` and `.`. It ends at its first failing command, and the other steps go on. Without a GPU adapter (a software one
+# will do) the parts that need one are left out, and the table says so. With CI=true that is a failure.
 set -uo pipefail
 cd "$(dirname "$0")/.."
 . scripts/common.sh
-. scripts/report.sh
 
 # Planted faults leave files for `pbig replay` in the folder for temporary files.
 TMPDIR=$(mktemp -d)
 export TMPDIR
-trap 'rm -rf "$TMPDIR" "$log"' EXIT
+trap 'rm -rf "$TMPDIR"' EXIT
 
 # Options of several words, which are not quoted where they are used.
 in_036="--manifest-path rapier-0.36/Cargo.toml"
@@ -19,15 +19,10 @@ members_036="-p rapier-pbig -p pbig-harness-036"
 features_036="--features rapier-pbig/debug-render"
 # The suite refuses to leave the GPU out with CI=true.
 without_gpu="env -u CI PBIG_GPU=none"
-gpu=''
 
 # has_gpu: the program finds an adapter.
 has_gpu() {
-    [ -n "$gpu" ] || case $(cargo run --quiet --release --bin pbig -- doctor 2>&1) in
-    *"adapters: none"*) gpu=false ;;
-    *) gpu=true ;;
-    esac
-    $gpu
+    case $(cargo run --quiet --release --bin pbig -- doctor 2>&1) in *"adapters: none"*) return 1 ;; esac
 }
 
 # lacks PACKAGE CRATE [OPTION...]: fails if the package depends on the crate.
@@ -49,103 +44,136 @@ without_harness() {
 }
 
 step_setup() {
-    check scripts/setup.sh
-    . scripts/common.sh
+    step scripts/setup.sh
 }
 
 step_fmt() {
-    check scripts/report-test.sh
-    check cargo fmt --all --check
+    step cargo fmt --all --check
     # Workspaces of their own.
     for other in fuzz wasm page viewer; do
-        check cargo fmt --manifest-path "$other/Cargo.toml" --check
-        check cargo fetch --locked --manifest-path "$other/Cargo.toml"
+        step cargo fmt --manifest-path "$other/Cargo.toml" --check
+        step cargo fetch --locked --manifest-path "$other/Cargo.toml"
     done
-    check cargo fetch --locked
+    step cargo fetch --locked
 }
 
 step_clippy() {
-    check cargo clippy --release --workspace --all-targets -- -D warnings
-    check cargo check --release --locked --manifest-path fuzz/Cargo.toml --target-dir "${CARGO_TARGET_DIR:-target}"
+    step cargo clippy --release --workspace --all-targets -- -D warnings
+    step cargo check --release --locked --manifest-path fuzz/Cargo.toml --target-dir "${CARGO_TARGET_DIR:-target}"
 }
 
 # All but the suite. One profile and one set of features: every crate is built once.
 step_unit() {
-    check cargo build --release --workspace --examples --bins
-    check cargo test --release --workspace --exclude pbig-tests $(without_harness) --no-fail-fast
+    step cargo build --release --workspace --examples --bins
+    step cargo test --release --workspace --exclude pbig-tests $(without_harness) --no-fail-fast
     # Once more with overflow checks and debug assertions, where there is unsafe code and index arithmetic.
-    check cargo test -p pbig-core --features serde,unstable-study --no-fail-fast
+    step cargo test -p pbig-core --features serde,unstable-study --no-fail-fast
 }
 
 step_suite_cpu() {
-    check $without_gpu cargo test --release --workspace --test suite
+    step $without_gpu cargo test --release --workspace --test suite
 }
 
 step_suite_gpu() {
-    has_gpu || { leave_out "there is no GPU adapter" && return; }
-    check cargo test --release -p pbig-tests --no-fail-fast
+    has_gpu || { left_out "there is no GPU adapter" && return; }
+    step cargo test --release -p pbig-tests --no-fail-fast
 }
 
 # On docs.rs a nightly Rust labels each item with its feature. A wrapper lets this release do that, too.
 step_doc() {
     printf '#!/bin/sh\nRUSTC_BOOTSTRAP=1 exec rustdoc "$@"\n' >"$TMPDIR/rustdoc"
     chmod +x "$TMPDIR/rustdoc"
-    check env RUSTDOC="$TMPDIR/rustdoc" RUSTDOCFLAGS="-D warnings --cfg docsrs" \
+    step env RUSTDOC="$TMPDIR/rustdoc" RUSTDOCFLAGS="-D warnings --cfg docsrs" \
         cargo doc --release --workspace --no-deps
 }
 
 step_features() {
-    check scripts/features.sh powerset
+    step scripts/extra.sh --no-setup features powerset
     # Rapier's own features beside those of the suite; one of the other kind for all.
-    if has_gpu; then check scripts/features.sh deterministic; else check $without_gpu scripts/features.sh deterministic; fi
+    local on=''
+    has_gpu || on=$without_gpu
+    step $on scripts/extra.sh --no-setup features deterministic
 }
 
 step_packages() {
     for package in pbig-core rapier-pbig; do
-        check lacks "$package" rayon --no-default-features
-        check lacks "$package" wgpu
+        step lacks "$package" rayon --no-default-features
+        step lacks "$package" wgpu
     done
-    check lacks pbig-wasm rayon --manifest-path wasm/Cargo.toml
-    check scripts/publish.sh
+    step lacks pbig-wasm rayon --manifest-path wasm/Cargo.toml
+    step scripts/extra.sh --no-setup publish
 }
 
 step_wasm() {
-    check scripts/wasm.sh --no-setup
+    step scripts/extra.sh --no-setup wasm
 }
 
 # The commands that the documents show, at a size that takes seconds.
 step_examples() {
-    check cargo run --release --example falling_objects -- --bodies 500 --steps 60
+    step cargo run --release --example falling_objects -- --bodies 500 --steps 60
     for example in drop_in existing_app headless_test debug_render boxes_to_pairs boxes_events; do
-        check cargo run --release --example "$example"
+        step cargo run --release --example "$example"
     done
-    check cargo run --release --bin pbig -- pairs examples/boxes.csv
-    check cargo run --release --bin pbig -- replay examples/frames.npy
-    check cargo run --release --bin pbig -- simulate --scene pile --check --backend gpu --bodies 1500 --steps 20
-    has_gpu || { leave_out "there is no GPU adapter for own_device" && return; }
-    check cargo run --release --example own_device
+    step cargo run --release --bin pbig -- pairs examples/boxes.csv
+    step cargo run --release --bin pbig -- replay examples/frames.npy
+    step cargo run --release --bin pbig -- simulate --scene pile --check --backend gpu --bodies 1500 --steps 20
+    has_gpu || { left_out "there is no GPU adapter for own_device" && return; }
+    step cargo run --release --example own_device
 }
 
 step_docs() {
-    [ ! -f scripts/docs.sh ] || check scripts/docs.sh
+    step scripts/docs.sh
 }
 
 # The adapter for rapier 0.36, in a workspace of its own: cargo replaces rapier there by a patched copy.
 step_rapier_0_36() {
-    check scripts/patch-rapier.sh rapier-0.36
-    check scripts/patch-rapier-test.sh
-    check cargo fetch --locked $in_036
-    check cargo fmt $in_036 $members_036 --check
-    check cargo clippy --release $in_036 $members_036 $features_036 --all-targets -- -D warnings
-    # The viewer is tested by scripts/viewer.sh.
-    check cargo fmt --manifest-path rapier-0.36/viewer/Cargo.toml --check
-    check cargo fetch --locked --manifest-path rapier-0.36/viewer/Cargo.toml
-    check scripts/features.sh powerset-0.36
-    check cargo test --release $in_036 $members_036 $features_036 --no-fail-fast
-    check cargo test --release $in_036 -p pbig-harness-036 --no-default-features --features enhanced-determinism
-    check cargo run --release $in_036 -p pbig-harness-036 $features_036 --example falling_objects -- --bodies 500 --steps 60
-    check env RUSTDOCFLAGS="-D warnings" \
+    step scripts/patch-rapier.sh rapier-0.36
+    step cargo fetch --locked $in_036
+    step cargo fmt $in_036 $members_036 --check
+    step cargo clippy --release $in_036 $members_036 $features_036 --all-targets -- -D warnings
+    # The viewer is tested by scripts/extra.sh viewer.
+    step cargo fmt --manifest-path rapier-0.36/viewer/Cargo.toml --check
+    step cargo fetch --locked --manifest-path rapier-0.36/viewer/Cargo.toml
+    step scripts/extra.sh --no-setup features powerset-0.36
+    step cargo test --release $in_036 $members_036 $features_036 --no-fail-fast
+    step cargo test --release $in_036 -p pbig-harness-036 --no-default-features --features enhanced-determinism
+    step cargo run --release $in_036 -p pbig-harness-036 $features_036 --example falling_objects -- --bodies 500 --steps 60
+    step env RUSTDOCFLAGS="-D warnings" \
         cargo doc --release $in_036 -p rapier-pbig --features shadow,debug-render --no-deps
+}
+
+# count LOG STATUS: prints how many tests passed and failed. A step without tests counts as one.
+count() {
+    awk -v status="$2" '
+        /^test result: / { passed += $4; failed += $6 }
+        /^[0-9]+ cases passed, [0-9]+ failed$/ { passed += $1; failed += $4 }
+        END {
+            if (status != 0 && failed == 0) failed = 1
+            if (passed + failed == 0) passed = 1
+            print passed + 0, failed + 0
+        }' "$1"
+}
+
+# run_step NAME: runs a step, shows its headings, and its output if it fails; adds its row to the table.
+run_step() {
+    local start=$SECONDS log=$TMPDIR/log status passed failed note
+    echo "== $1"
+    # A shell of its own, so that `set -e` ends the step alone. setup.sh may have installed another Rust before.
+    (
+        set -e
+        . scripts/common.sh
+        "step_$(echo "$1" | tr '.-' '__')"
+    ) 2>&1 </dev/null | tee "$log" | grep --line-buffered '^== '
+    status=${PIPESTATUS[0]}
+    read -r passed failed <<<"$(count "$log" "$status")"
+    note=$(sed -n 's/^== left out: /left out: /p' "$log" | head -n 1)
+    if [ "$status" != 0 ]; then
+        echo "-- $1 failed with status $status; the last lines of its output:"
+        tail -n 300 "$log"
+        echo "--"
+    fi
+    rows+=$(printf '%-12s %6s s %8s %8s   %s' "$1" $((SECONDS - start)) "$passed" "$failed" "$note")$'\n'
+    all_passed=$((all_passed + passed)) all_failed=$((all_failed + failed))
 }
 
 all="setup fmt clippy unit suite-cpu suite-gpu doc features packages wasm examples docs rapier-0.36"
@@ -157,7 +185,10 @@ fi
 for name in "$@"; do
     case " $all " in *" $name "*) ;; *) echo "there is no step '$name'; the steps: $all" >&2 && exit 2 ;; esac
 done
+rows='' all_passed=0 all_failed=0
 for name in "$@"; do
     run_step "$name"
 done
-close_report
+printf '\n%-12s %8s %8s %8s\n%s' step time passed failed "$rows"
+printf '%-12s %6s s %8s %8s\n\n%s\n' all "$SECONDS" "$all_passed" "$all_failed" "$all_passed passed, $all_failed failed"
+[ "$all_failed" = 0 ]

@@ -7,7 +7,7 @@ use rapier3d::prelude::*;
 /// Floats of one matrix.
 const MATRIX_FLOATS: usize = 16;
 
-/// Parts of one kind. Those that are drawn translucent are apart.
+/// Parts of one kind. Translucent parts are a group of their own.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Group {
     /// Shape before scaling.

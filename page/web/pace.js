@@ -1,4 +1,4 @@
-// Steps of 1/60 s at the speed of the real time, whatever the screen's refresh rate.
+// Steps of 1/60 s at the speed of the real time, at every refresh rate of the screen.
 
 export const STEP_MS = 1000 / 60;
 // Frames of a screen of 60 Hz come a little early or late.

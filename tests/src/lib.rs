@@ -100,7 +100,7 @@ pub fn pbig_grids() -> Vec<(&'static str, GpuOptions)> {
     ]
 }
 
-/// The grid on the GPU, whatever the size of the set.
+/// The grid on the GPU, for sets of every size.
 pub fn gpu(coding: Coding) -> Config {
     let options = GpuOptions { coding, all_pairs_up_to: 0, count_tests: true, ..GpuOptions::DEFAULT };
     Config { backend: Backend::Gpu, gpu: options, ..Config::DEFAULT }

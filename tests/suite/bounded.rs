@@ -1,4 +1,4 @@
-//! The work of a call is bounded, whatever the boxes' shape, motion and history: counts, never times.
+//! The work of a call is bounded for every shape, motion and history of boxes: counts, never times.
 
 use pbig_core::{BroadPhase, Config, Engine, Finder, ProxyFilter, WORK_LIMIT, oracle};
 use pbig_harness::hard::{History, histories, ratio, shapes};

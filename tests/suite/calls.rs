@@ -1,4 +1,4 @@
-//! How rapier calls a broad phase, and in which order it is answered.
+//! Rapier's calls of a broad phase, and the order of its answers.
 
 use crate::checked::{backends, everywhere, pbig};
 use crate::stress::memory;
@@ -71,7 +71,7 @@ fn a_step_is_two_calls_and_one_more_for_each_further_substep() {
 }
 
 #[test]
-fn deletions_come_before_additions_each_by_index_and_the_same_on_every_backend() {
+fn deletions_come_first_sorted_and_equal_on_every_backend() {
     let stream = |(_, config)| {
         let mut world = Scene::named("column").expect("the scene exists").build(150, 4);
         let mut recorder = Recorder::new(pbig(config));
@@ -162,7 +162,7 @@ impl<B: BroadPhase> BroadPhase for Weigher<B> {
 }
 
 #[test]
-fn calls_like_those_before_ask_for_no_memory_but_for_a_plan_now_and_then() {
+fn repeated_calls_allocate_for_rare_plans_only() {
     let mut world = Scene::named("column").expect("the scene exists").build(3000, 4);
     let mut weigher = Weigher { inner: PbigBroadPhase::new(), largest: vec![] };
     // While the column falls apart the number of pairs doubles, and buffers that hold pairs or candidates grow with it.

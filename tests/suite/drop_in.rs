@@ -1,4 +1,4 @@
-//! What rapier 0.27 is owed by its broad phase, call by call.
+//! The duties of a broad phase to rapier 0.27, call by call.
 
 use crate::checked::{Checked, backends, everywhere, pbig};
 use pbig_harness::world::World;
@@ -37,7 +37,7 @@ fn an_index_is_reused_in_the_step_in_which_it_is_freed() {
 }
 
 #[test]
-fn a_collider_inserted_and_removed_before_the_first_step_is_nothing() {
+fn a_collider_removed_before_the_first_step_leaves_no_trace() {
     everywhere(|mut scene| {
         let (_, gone) = scene.ball(0.0);
         scene.ball(0.9);
@@ -64,20 +64,20 @@ fn many_removed_at_once_and_others_added_in_the_same_step() {
 }
 
 #[test]
-fn a_multitude_that_several_threads_look_at_may_come_go_and_change_in_the_same_step() {
+fn many_that_threads_read_may_come_go_and_change_in_one_step() {
     multitude(2, 18_000, 1);
 }
 
 /// Where few of many have moved, what is kept of each lies far from that of the next one. On one thread; on two; and more
 /// than are looked at one after the other.
 #[test]
-fn scattered_ones_among_a_multitude_may_come_go_and_change_in_the_same_step() {
+fn few_among_many_may_come_go_and_change_in_one_step() {
     multitude(1, 9000, 9);
     multitude(2, 9000, 9);
     multitude(2, 45_000, 5);
 }
 
-/// Balls in a row, on so many threads. Each step one in `every` is moved or stays, as if it had been moved.
+/// Balls in a row, on this number of threads. In each step one in `every` is listed as moved, and moves or stays.
 fn multitude(threads: usize, balls: usize, every: usize) {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool");
     pool.install(|| multitude_of(balls, every));
@@ -103,7 +103,7 @@ fn multitude_of(count: usize, every: usize) {
         scene.world.colliders[balls[4000 + step].1].set_collision_groups(none);
         scene.move_to(balls[count / 4 * step].0, f32::NAN);
         let pairs = scene.step();
-        // Of a row of neighbours one in 14 is moved away from another, of scattered ones each that has moved.
+        // In a row of neighbours one ball in 14 leaves its neighbour. Scattered balls do whenever they move.
         let apart = if every == 1 { count / 14 } else { count / every / 4 };
         let expected = count - apart - 300..count - apart / 2;
         assert!(expected.contains(&pairs), "{pairs} pairs in step {step}, of {expected:?}");
@@ -132,7 +132,7 @@ fn a_multitude_leaves_the_same_behind_on_any_number_of_threads() {
 }
 
 #[test]
-fn a_disabled_collider_has_no_pairs_and_gets_them_back_without_motion() {
+fn a_disabled_collider_has_no_pairs_until_it_is_enabled() {
     everywhere(|mut scene| {
         let (_, a) = scene.ball(0.0);
         scene.ball(0.9);
@@ -167,7 +167,7 @@ fn a_body_is_disabled_while_one_that_it_overlaps_is_removed() {
 }
 
 #[test]
-fn colliders_of_one_body_never_pair_until_one_is_moved_to_another_body() {
+fn colliders_of_one_body_pair_once_one_has_another_body() {
     everywhere(|mut scene| {
         let (a, _) = scene.ball(0.0);
         let second = scene.attach(a);
@@ -240,7 +240,7 @@ fn contact_skin_and_prediction_reach_as_far_as_rapiers() {
 }
 
 #[test]
-fn soft_ccd_boxes_contain_stocks_when_the_motion_is_cut_off_and_spins() {
+fn soft_ccd_boxes_contain_stocks_in_cut_and_spinning_motion() {
     for spin in [0.0, 30.0, 300.0] {
         let mut world = World::with_gravity(glam::Vec3::ZERO);
         let body =
@@ -301,7 +301,7 @@ fn the_smaller_collider_comes_first() {
 }
 
 #[test]
-fn a_ground_that_loses_all_its_pairs_does_not_come_first_either() {
+fn a_ground_without_pairs_does_not_come_first_either() {
     let mut world = World::with_gravity(glam::Vec3::ZERO);
     let ground = world.colliders.insert(ColliderBuilder::cuboid(100.0, 1.0, 100.0));
     let balls: Vec<_> = (0..20)
@@ -357,7 +357,7 @@ fn where_rapiers_own_broad_phase_panics_ours_does_not() {
 }
 
 #[test]
-fn a_collider_that_reuses_an_index_never_listed_as_removed_has_pairs_of_its_own() {
+fn a_collider_that_reuses_an_unlisted_index_has_its_own_pairs() {
     for (_, config) in backends() {
         let (mut scene, mut ours) = (Checked::new(config), pbig(config));
         let (body, old) = scene.ball(0.0);

@@ -11,17 +11,17 @@ const BOXES: usize = 20_000;
 /// Boxes that change in a round: enough for threads to share edits.
 const CHANGED: usize = 1500;
 
-/// Less than the pairs of so many boxes in one place.
+/// A limit below the pairs of all boxes in one place.
 const LIMIT: u64 = 300_000;
 
 /// Pairs with nothing.
 const LONE: ProxyFilter = ProxyFilter { memberships: 0, mask: 0, ..ProxyFilter::ALL };
 
-/// What a broad phase is told, and what it should say.
+/// The boxes given to a broad phase, and the pairs that it should report.
 struct World {
     boxes: Vec<Aabb>,
     filters: Vec<ProxyFilter>,
-    /// Those that are there at the last update that succeeded.
+    /// The pairs at the last update that succeeded.
     pairs: Vec<Pair>,
     /// Removed since.
     gone: Vec<u32>,
@@ -76,7 +76,7 @@ impl World {
         (self.pairs, self.gone) = (now, vec![]);
     }
 
-    /// Those that change in a round go to and fro; some come, go, or get another filter.
+    /// In each round some boxes move to and fro, and some come, go, or get another filter.
     fn change(&mut self, round: usize) {
         let first = round * CHANGED * 3 / 5;
         for k in 0..CHANGED {
@@ -94,7 +94,7 @@ impl World {
         }
     }
 
-    /// So many in one place that it is an error; then elsewhere, some of them gone or with another filter.
+    /// Too many boxes in one place, which is an error; later elsewhere, some of them gone or with another filter.
     fn crowd_and_part(&mut self) {
         let places = self.boxes.clone();
         for id in (0..CHANGED as u32).filter(|&id| places[id as usize].is_valid()) {
@@ -140,7 +140,7 @@ fn rounds() {
 }
 
 #[test]
-fn few_of_many_that_change_make_the_events_of_a_search_of_all_on_any_threads() {
+fn edits_make_the_events_of_a_full_search_on_any_threads() {
     rounds();
     for threads in [1, 2, 3] {
         ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool").install(rounds);

@@ -1,4 +1,4 @@
-//! What a user sees: reasons, statistics, spans, pictures, and the shadow.
+//! Everything that a user sees: reasons, statistics, spans, pictures, and the shadow.
 
 use crate::checked::{Checked, everywhere, pbig};
 use pbig_core::{Backend, Config, Engine};
@@ -98,9 +98,9 @@ fn statistics_count_what_an_update_was_given_and_sent() {
 }
 
 /// Calls that bring no news end at once. They are counted, their statistics are those of a call without news, and
-/// whatever comes next is seen: a change, a collider behind rapier's lists, an adopted world, a failed update.
+/// the next call sees everything: a change, a collider behind rapier's lists, an adopted world, a failed update.
 #[test]
-fn calls_without_news_are_counted_and_hide_nothing_that_follows() {
+fn calls_without_changes_are_counted_and_hide_nothing() {
     let mut world = World::default();
     for i in 0..3 {
         world.add(World::dynamic(glam::vec3(i as f32 * 0.9, 0.0, 0.0)), ColliderBuilder::ball(0.5));
@@ -294,7 +294,7 @@ fn unlisted(shadow: Shadow) -> PbigBroadPhase {
 }
 
 #[test]
-fn a_shadow_reports_the_first_difference_and_writes_a_file_for_a_replay() {
+fn a_shadow_reports_the_first_difference_and_writes_a_replay() {
     let broad_phase = unlisted(Shadow::Oracle);
     let first = broad_phase.differences().first().expect("a difference");
     assert_eq!(first.fault, Fault::Missing);
@@ -311,7 +311,7 @@ fn a_shadow_reports_the_first_difference_and_writes_a_file_for_a_replay() {
 }
 
 #[test]
-fn stock_alone_notices_a_contact_that_is_missing_also_when_it_joins_late() {
+fn stock_alone_notices_a_missing_contact_even_if_it_joins_late() {
     let broad_phase = unlisted(Shadow::Stock);
     let faults: Vec<Fault> = broad_phase.differences().iter().map(|difference| difference.fault).collect();
     assert_eq!(faults, [Fault::MissingContact]);
@@ -320,7 +320,7 @@ fn stock_alone_notices_a_contact_that_is_missing_also_when_it_joins_late() {
 }
 
 #[test]
-fn a_shadow_added_to_a_broad_phase_at_work_finds_nothing_wrong_with_it() {
+fn a_shadow_that_joins_late_finds_no_difference() {
     let mut world = Scene::named("column").expect("the scene exists").build(120, 2);
     let mut broad_phase = PbigBroadPhase::new();
     (0..60).for_each(|_| world.step(&mut broad_phase));

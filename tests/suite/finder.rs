@@ -1,4 +1,4 @@
-//! Contract 1: every strategy returns the oracle's pairs, sorted, whatever the boxes and threads.
+//! Contract 1: every strategy returns the oracle's pairs, sorted, for all boxes and thread counts.
 
 use pbig_core::{Aabb, Backend, Coding, Config, Error, Finder, Limits, Order, Pair, ProxyFilter, oracle};
 use pbig_harness::boxes::BoxSet;
@@ -162,7 +162,7 @@ fn clusters_do_not_cost_more_than_an_even_spread() {
 }
 
 #[test]
-fn boxes_flung_far_away_do_not_cost_the_others_their_resolution() {
+fn boxes_flung_far_away_do_not_coarsen_the_cells_of_others() {
     let mut boxes = BoxSet::named("pile").expect("the set exists").boxes(9000, 1);
     boxes.extend((0..1000).map(|i| {
         let side = |k: u32| if i >> k & 1 == 0 { 1.0 } else { -1.0 };

@@ -75,7 +75,7 @@ fn work_in_many_chunks_is_complete_with_and_without_pipelining() {
 }
 
 #[test]
-fn sets_that_exceed_the_limits_of_a_device_are_split_and_complete() {
+fn sets_beyond_the_limits_of_a_device_are_split_and_complete() {
     needs_gpu!();
     // 1 MiB holds 37,449 boxes, and no more than 131,072 plain pairs.
     let options = GpuOptions { max_bytes: 1 << 20, ..GpuOptions::DEFAULT };
@@ -197,7 +197,7 @@ fn a_small_scene_needs_no_grid_and_may_answer_in_bits() {
 }
 
 #[test]
-fn packed_output_is_an_eighth_of_plain_where_boxes_crowd_and_is_chosen_when_it_pays() {
+fn packed_output_is_an_eighth_in_crowds_and_used_if_it_pays() {
     needs_gpu!();
     let boxes = cubes(1500);
     let mut finder = Finder::new(Config { order: Order::Unspecified, ..with(GpuOptions::DEFAULT) });
@@ -252,7 +252,7 @@ fn more_events_than_a_buffer_holds_are_complete() {
 
 /// A plan that was made for other boxes must not keep the device busy: it is noticed before anything is tested.
 #[test]
-fn boxes_that_jump_into_one_place_or_far_apart_get_another_plan_in_the_same_call() {
+fn boxes_that_jump_together_or_apart_get_another_plan_at_once() {
     needs_gpu!();
     let spread = set("unit", 20_000);
     let factor = |boxes: &[Aabb], by: f32| -> Vec<Aabb> {
@@ -306,7 +306,7 @@ fn nothing_grows_while_boxes_churn() {
 }
 
 #[test]
-fn auto_uses_a_device_where_half_a_million_boxes_change_and_the_cpu_elsewhere() {
+fn auto_uses_a_device_from_half_a_million_changed_boxes_on() {
     needs_gpu!();
     let mut device = GpuFinder::new().expect("an adapter");
     device.pretend_hardware();
@@ -329,7 +329,7 @@ fn auto_uses_a_device_where_half_a_million_boxes_change_and_the_cpu_elsewhere() 
 }
 
 #[test]
-fn an_adapter_that_does_not_exist_is_an_error_that_names_those_that_do() {
+fn an_unknown_adapter_is_an_error_that_lists_the_adapters() {
     needs_gpu!();
     let error = GpuFinder::on_adapter("no such adapter").expect_err("no adapter has this name");
     let real = adapters().into_iter().next().expect("an adapter").get_info().name;

@@ -114,7 +114,7 @@ fn infinite_boxes_within_their_margin_have_not_changed() {
 }
 
 #[test]
-fn a_few_boxes_that_stay_in_their_cells_leave_them_and_come_back() {
+fn a_few_boxes_stay_in_their_cells_leave_and_come_back() {
     let (mut edits, mut out_of_order, mut in_order) = (0, 0, 0);
     for (name, distance) in [("unit", 0.1), ("unit", 1.5), ("mixed", 0.2), ("gaussian", 0.3), ("pile", 0.05)]
     {
@@ -161,7 +161,7 @@ fn contract_5_no_change_no_work_and_few_changes_little() {
     set_all(&mut broad_phase, 0.04);
     broad_phase.update().expect("within the limits");
     let report = broad_phase.report();
-    assert_eq!((report.changed, report.checks.made), (0, 0), "motion within the margin is no change");
+    assert_eq!((report.changed, report.checks.made), (0, 0), "motion within the margin changes nothing");
     for frame in 1..40 {
         let aabb = Aabb::from_center([frame as f32; 3], [0.5; 3]);
         broad_phase.set(77, aabb, ProxyFilter::ALL).expect("a small id");

@@ -9,7 +9,7 @@ use rayon::ThreadPoolBuilder;
 
 const FRAMES: usize = 14;
 
-/// Sets the boxes of a frame that changed, and removes those that are absent.
+/// Sets the boxes that changed in a frame, and removes the absent ones.
 fn tell(world: &mut Follower, scene: &Scene, changed: &[u32]) {
     for &id in changed {
         let aabb = scene.boxes()[id as usize];
@@ -53,7 +53,7 @@ fn a_thousand_sequences_of_every_motion_agree_with_the_oracle() {
     assert!(sequences >= 1000, "{sequences} sequences");
 }
 
-/// The events of so many boxes that threads share the work.
+/// Returns the events of enough boxes for several threads.
 fn events(motion: Motion, threads: usize) -> Vec<Events> {
     let pool = ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool");
     pool.install(|| {

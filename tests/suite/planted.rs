@@ -26,7 +26,7 @@ fn the_comparison_with_the_oracle_notices_each_fault() {
     assert!(noticed(&|pairs| pairs.push(Pair { a: 198, b: 5000 })).starts_with("spurious"));
 }
 
-/// What a faulty broad phase does to one of its events.
+/// The fault of a broad phase in one of its events.
 #[derive(Clone, Copy, Debug)]
 enum Plant {
     DropAdd,

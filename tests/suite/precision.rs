@@ -1,4 +1,4 @@
-//! Coordinates in fewer bits end no pair: whatever the floats, two boxes that overlap may overlap in every kind of
+//! Coordinates in fewer bits end no pair: for all floats, two boxes that overlap may overlap in every kind of
 //! coordinates of the study.
 
 use pbig_core::Aabb;
@@ -161,7 +161,7 @@ fn both_are_right_for(
     for x in places.map(in_order) {
         let [down, up] = both(x);
         assert!(down <= up && up - down <= 1, "{x:e}: from {down} to {up}");
-        // Steps as distances, as far as f64 has them; further away all are one.
+        // Steps as distances, while f64 can tell them apart; further away all are one.
         let at = f64::from(x) - f64::from(scale.origin[0]);
         let nearly = at.abs() * 4.0 * f64::EPSILON;
         let edge = f64::from(scale.cell) / f64::from(steps);

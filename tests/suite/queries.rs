@@ -154,7 +154,7 @@ fn queries_agree_with_stock_while_a_world_moves_and_changes() {
 }
 
 #[test]
-fn queries_work_before_the_first_step_in_small_worlds_and_on_mutable_sets() {
+fn queries_work_before_the_first_step_and_on_mutable_sets() {
     for count in 0..5 {
         let mut world = World::default();
         for i in 0..count {
@@ -263,7 +263,7 @@ fn a_collider_that_reuses_an_index_is_named_by_its_own_handle() {
     assert_eq!(ours.cast_ray(&ray, 9.0, true), Some((second, 2.5)));
 }
 
-/// A filter may ask in turn, while other threads ask, too, and the index is sorted now and then.
+/// A filter may ask queries itself while other threads ask, too, and while the index is sorted.
 #[test]
 fn a_filter_may_ask_while_others_ask() {
     let mut world = Scene::named("column").expect("the scene exists").build(400, 2);

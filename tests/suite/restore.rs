@@ -31,7 +31,7 @@ fn steps(world: &mut World, broad_phase: &mut dyn BroadPhase, steps: usize) {
     (0..steps).for_each(|_| world.step(broad_phase));
 }
 
-/// Two colliders, whatever their order.
+/// Two colliders in either order.
 fn unordered(pair: ColliderPair) -> [(u32, u32); 2] {
     let [a, b] = [pair.collider1, pair.collider2].map(|handle| handle.into_raw_parts());
     [a.min(b), a.max(b)]
@@ -43,7 +43,7 @@ fn edges(world: &World) -> BTreeSet<[(u32, u32); 2]> {
 }
 
 #[test]
-fn upstream_910_966_a_restored_broad_phase_goes_on_bit_by_bit_on_every_backend() {
+fn upstream_910_966_a_restored_broad_phase_resumes_bit_by_bit() {
     for name in ["column", "groups", "compounds", "ragdolls", "sensors"] {
         let mut ends = Vec::new();
         for (backend, config) in backends() {
@@ -62,7 +62,7 @@ fn upstream_910_966_a_restored_broad_phase_goes_on_bit_by_bit_on_every_backend()
 }
 
 #[test]
-fn upstream_675_710_899_options_survive_a_snapshot_also_in_json() {
+fn upstream_675_710_899_options_survive_a_snapshot_and_json() {
     let config = Config { margin: 0.03, ..PbigConfig::DEFAULT.into() };
     let (mut world, mut ours) = (scene("column", 60), pbig(config));
     steps(&mut world, &mut ours, 20);
@@ -86,7 +86,7 @@ fn sleeping_pile(config: Config) -> (World, PbigBroadPhase) {
 }
 
 #[test]
-fn a_fresh_broad_phase_beside_a_restored_world_finds_what_sleeps_and_what_is_fixed() {
+fn a_fresh_broad_phase_finds_sleeping_and_fixed_colliders() {
     for (name, config) in backends() {
         let (mut world, ours) = sleeping_pile(config);
         let before = edges(&world);
@@ -105,7 +105,7 @@ fn a_fresh_broad_phase_beside_a_restored_world_finds_what_sleeps_and_what_is_fix
 }
 
 #[test]
-fn a_device_is_handed_over_at_the_start_or_to_a_restored_broad_phase() {
+fn a_device_is_given_at_the_start_or_after_a_restore() {
     needs_gpu!();
     let config = PbigConfig { backend: Backend::Gpu, ..PbigConfig::DEFAULT };
     let gpu = || GpuFinder::new().expect("an adapter");
@@ -141,7 +141,7 @@ fn a_rescan_happens_once_and_only_where_a_collider_is_unknown() {
 }
 
 #[test]
-fn adopted_pairs_that_have_ended_are_deleted_and_the_others_are_not_added_again() {
+fn adopted_pairs_end_if_apart_and_are_not_added_again() {
     everywhere(|mut scene| {
         let (a, _) = scene.ball(0.0);
         let (b, _) = scene.ball(0.9);
@@ -232,7 +232,7 @@ fn a_world_replaced_by_a_smaller_or_larger_one_is_noticed() {
 }
 
 #[test]
-fn changed_bytes_are_errors_or_a_broad_phase_that_does_not_panic() {
+fn changed_bytes_are_an_error_or_never_panic_later() {
     let (mut world, mut ours) = (scene("column", 12), PbigBroadPhase::new());
     steps(&mut world, &mut ours, 60);
     let bytes = saved(&ours);

@@ -58,7 +58,7 @@ fn things_rest_on_a_half_space() {
 }
 
 #[test]
-fn upstream_236_396_a_half_space_meets_bodies_wherever_they_are() {
+fn upstream_236_396_a_half_space_meets_bodies_everywhere() {
     everywhere(|mut scene| {
         let ground = ColliderBuilder::halfspace(Vector::y_axis()).translation(vector![0.0, -0.4, 0.0]);
         let ground = scene.world.colliders.insert(ground);
@@ -164,7 +164,7 @@ fn a_joint_that_forbids_contacts_keeps_the_pair_for_later() {
 }
 
 #[test]
-fn links_of_a_multibody_are_pairs_whether_they_may_touch_or_not() {
+fn links_of_a_multibody_pair_whether_they_may_touch_or_not() {
     for (contacts, touch) in [(false, 0), (true, 2)] {
         everywhere(|mut scene| {
             // Contacts, but no forces.
@@ -318,7 +318,7 @@ fn a_collider_that_becomes_a_sensor_keeps_its_pair() {
 }
 
 #[test]
-fn prediction_skin_and_length_unit_take_effect_in_the_next_step_and_end_with_it() {
+fn prediction_skin_and_length_unit_act_from_the_next_step_on() {
     everywhere(|mut scene| {
         let [(_, a), ..] = [0.0, 1.3, 50.0].map(|x| scene.ball(x));
         let usual = scene.world.params;

@@ -13,7 +13,7 @@ fn reach(params: &IntegrationParameters) -> f64 {
     f64::from(params.prediction_distance() / 2.0)
 }
 
-/// How many of the boxes in f64 at these poses reach beyond widened ones in f32, and the float after.
+/// Returns the number of boxes in f64 at these poses that reach beyond the widened boxes in f32 and the next float.
 fn beyond(layout: &Layout, poses: &[Pose], colliders: &[Collider], ulps: u32) -> usize {
     let (params, none) = (IntegrationParameters::default(), RigidBodySet::new());
     let exact = layout.boxes(poses, reach(&params));
@@ -36,7 +36,7 @@ fn shrunk(pose: &Pose) -> Isometry<f32> {
 
 /// Shapes of seven kinds, from a thousandth to a thousand in size, anywhere from the origin to 10^8 on each axis.
 #[test]
-fn two_ulps_reach_as_far_as_boxes_at_poses_in_f32_and_three_as_those_at_poses_in_f64() {
+fn two_ulps_cover_poses_in_f32_and_three_those_in_f64() {
     let mut without = 0;
     for (seed, size) in [1e-3, 0.1, 1.0, 30.0, 1e3].into_iter().enumerate() {
         let layout = Layout::crowd(700, size, seed as u64);
@@ -127,7 +127,7 @@ impl Crowd {
 
 /// Floats at a distance `x` are at most `x / 2^23` apart, and two of these distances cover what rounding takes off a box.
 #[test]
-fn far_away_a_margin_of_two_ulps_misses_nothing_and_the_default_misses_something() {
+fn far_away_two_ulps_of_margin_miss_nothing_the_default_does() {
     let (mut without, mut pairs) = (0, 0);
     for offset in [1e5, 1e6, 1e7] {
         let crowd = Crowd::new(offset, 3000);

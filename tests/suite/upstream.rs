@@ -36,7 +36,7 @@ pub(crate) fn sensed(scene: &Checked) -> usize {
 }
 
 #[test]
-fn upstream_288_530_588_a_crowd_in_one_place_that_may_not_collide() {
+fn upstream_288_530_588_a_crowd_that_may_not_collide() {
     everywhere(|mut scene| {
         let crowd = InteractionGroups::new(Group::GROUP_1, Group::GROUP_2);
         for _ in 0..1000 {
@@ -55,7 +55,7 @@ fn upstream_288_530_588_a_crowd_in_one_place_that_may_not_collide() {
 }
 
 #[test]
-fn upstream_730_970_two_thousand_colliders_on_one_body_that_moves() {
+fn upstream_730_970_two_thousand_colliders_on_a_moving_body() {
     everywhere(|mut scene| {
         scene.world.colliders.insert(ColliderBuilder::cuboid(10.2, 1.0, 1.0).sensor(true));
         let body = RigidBodyBuilder::dynamic().linvel(vector![-60.0, 0.0, 0.0]).can_sleep(false);
@@ -76,7 +76,7 @@ fn upstream_730_970_two_thousand_colliders_on_one_body_that_moves() {
 }
 
 #[test]
-fn upstream_558_thousands_of_fixed_bodies_cost_nothing_after_the_first_step() {
+fn upstream_558_fixed_bodies_are_free_after_the_first_step() {
     among_fixed_bodies(on_cpu()[0], 60, 200);
     needs_gpu!();
     // A GPU looks at all again.
@@ -96,7 +96,7 @@ fn among_fixed_bodies(config: Config, steps: usize, most_checks: u64) {
     let mut broad_phase = pbig(config);
     world.step(&mut broad_phase);
     for step in 0..steps {
-        // Of the two updates of a step, the first has nothing to do: only rapier moves anything.
+        // The first of the two updates of a step has nothing to do, because only rapier moves bodies.
         world.step(&mut broad_phase);
         let report = broad_phase.stats().report;
         assert_eq!(report.changed, 1, "step {step}");
@@ -114,7 +114,7 @@ fn among_fixed_bodies(config: Config, steps: usize, most_checks: u64) {
 }
 
 #[test]
-fn upstream_244_a_large_sensor_that_moves_misses_none_of_the_small_ones() {
+fn upstream_244_a_large_moving_sensor_misses_no_small_one() {
     everywhere(|mut scene| {
         for i in 0..400 {
             let at = vector![(i % 20) as f32, 0.0, (i / 20) as f32];
@@ -193,7 +193,7 @@ fn upstream_77_819_far_away_and_back() {
 }
 
 #[test]
-fn upstream_349_small_colliders_that_just_touch_at_the_borders_of_cells() {
+fn upstream_349_small_colliders_touch_at_the_borders_of_cells() {
     everywhere(|mut scene| {
         let row: Vec<_> =
             (0..100).map(|_| add(&mut scene, held([0.0; 3]), ColliderBuilder::ball(0.05)).0).collect();
@@ -208,7 +208,7 @@ fn upstream_349_small_colliders_that_just_touch_at_the_borders_of_cells() {
 }
 
 #[test]
-fn upstream_326_897_groups_that_change_while_rapier_moves_the_bodies() {
+fn upstream_326_897_groups_change_while_bodies_move() {
     everywhere(|mut scene| {
         // Overlapping balls that fly along together: contacts, but no forces.
         let row = [0.0, 0.9, 1.8, 2.7, 3.6, 4.5, 5.4, 6.3, 7.2, 8.1].map(|x| {
@@ -263,7 +263,7 @@ pub(crate) fn collide(scene: &mut Checked) -> Vec<bool> {
 }
 
 #[test]
-fn upstream_268_300_a_change_of_groups_ends_a_contact_with_an_event() {
+fn upstream_268_300_new_groups_end_a_contact_with_an_event() {
     everywhere(|mut scene| {
         let [changing, _, _] = [0.0, 0.9, 50.0].map(|x| scene.world.colliders.insert(loud(x)));
         assert_eq!(collide(&mut scene), [true]);
@@ -278,7 +278,7 @@ fn upstream_268_300_a_change_of_groups_ends_a_contact_with_an_event() {
 }
 
 #[test]
-fn upstream_268_a_body_that_becomes_kinematic_loses_its_contact_with_a_fixed_one() {
+fn upstream_268_a_kinematic_body_leaves_a_fixed_one() {
     everywhere(|mut scene| {
         scene.world.colliders.insert(ColliderBuilder::ball(0.5));
         let (body, _) = scene.ball(0.9);
@@ -293,7 +293,7 @@ fn upstream_268_a_body_that_becomes_kinematic_loses_its_contact_with_a_fixed_one
 }
 
 #[test]
-fn upstream_734_a_collider_that_changes_its_body_has_its_pairs_at_once() {
+fn upstream_734_a_collider_of_another_body_has_pairs_at_once() {
     everywhere(|mut scene| {
         let (a, _) = scene.ball(0.0);
         let wanderer = scene.attach(a);
@@ -313,7 +313,7 @@ fn upstream_734_a_collider_that_changes_its_body_has_its_pairs_at_once() {
 }
 
 #[test]
-fn upstream_344js_900_a_disabled_collider_on_a_moving_body_meets_nothing() {
+fn upstream_344js_900_a_disabled_collider_meets_nothing() {
     everywhere(|mut scene| {
         scene.world.colliders.insert(ColliderBuilder::cuboid(50.0, 1.0, 1.0).sensor(true));
         let body = RigidBodyBuilder::dynamic().linvel(vector![6.0, 0.0, 0.0]).can_sleep(false);
@@ -333,7 +333,7 @@ fn upstream_344js_900_a_disabled_collider_on_a_moving_body_meets_nothing() {
 }
 
 #[test]
-fn upstream_435bevy_538_a_body_enabled_again_has_its_pairs_without_moving() {
+fn upstream_435bevy_538_an_enabled_body_has_its_pairs_at_rest() {
     everywhere(|mut scene| {
         let [_, (body, collider), ..] = [0.0, 0.9, 1.8, 50.0].map(|x| scene.ball(x));
         assert_eq!(scene.step(), 2);

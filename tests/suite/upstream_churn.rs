@@ -5,7 +5,7 @@ use crate::upstream::{collide, loud, touching};
 use rapier3d::prelude::*;
 
 #[test]
-fn upstream_342_343_inserted_and_removed_before_the_collision_pipeline_runs() {
+fn upstream_342_343_removed_before_the_collision_pipeline_runs() {
     everywhere(|mut scene| {
         let gone = scene.world.colliders.insert(loud(0.0));
         for x in [0.9, 50.0, 60.0] {
@@ -36,7 +36,7 @@ fn the_collision_pipeline_sees_motion_between_its_calls() {
 }
 
 #[test]
-fn upstream_281_617_indices_and_pairs_stay_few_while_bodies_come_and_go() {
+fn upstream_281_617_indices_and_pairs_stay_few_under_churn() {
     everywhere(|mut scene| {
         let mut row: Vec<_> = (0..40).map(|i| scene.ball(0.9 * i as f32)).collect();
         assert_eq!(scene.step(), 39);
@@ -82,7 +82,7 @@ fn upstream_865_all_are_removed_and_as_many_added_in_one_step() {
 }
 
 #[test]
-fn upstream_350_a_position_that_is_not_finite_has_no_pairs_until_it_is_mended() {
+fn upstream_350_an_infinite_position_has_no_pairs_until_mended() {
     for (name, config) in backends() {
         let (params, bodies) = (IntegrationParameters::default(), RigidBodySet::new());
         let (mut broad_phase, mut colliders) = (pbig(config), ColliderSet::new());

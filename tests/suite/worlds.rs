@@ -55,7 +55,7 @@ fn bits(scene: Scene, config: Config, threads: usize, steps: usize) -> Vec<u32> 
 }
 
 #[test]
-fn the_same_scene_gives_bit_identical_positions_whatever_the_threads() {
+fn a_scene_gives_the_same_bits_for_any_number_of_threads() {
     for scene in Scene::ALL {
         let wanted = bits(scene, PbigConfig::DEFAULT.into(), 1, 120);
         for threads in [1, 2] {
@@ -71,7 +71,7 @@ fn the_same_scene_gives_bit_identical_positions_whatever_the_threads() {
 }
 
 #[test]
-fn a_world_large_enough_for_threads_gives_the_same_bits_on_one_and_two() {
+fn a_large_world_gives_the_same_bits_on_one_and_two_threads() {
     let scene = Scene::named("column").expect("the scene exists");
     let run = |threads| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool");
@@ -120,7 +120,7 @@ fn a_sleeping_world_costs_no_checks() {
 }
 
 #[test]
-fn upstream_14_objects_that_fall_for_ever_are_still_found_at_the_same_cost() {
+fn upstream_14_endless_falls_are_found_at_the_same_cost() {
     for (name, config) in crate::checked::backends() {
         let mut world = World::with_gravity(glam::Vec3::NEG_Y * 1e4);
         for i in 0..200 {

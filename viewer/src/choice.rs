@@ -57,7 +57,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_key_for_the_next_one_reaches_stock_cpu_and_gpu_from_everywhere() {
+    fn the_next_key_reaches_stock_cpu_and_gpu_from_everywhere() {
         for &start in Choice::value_variants() {
             let mut reached = vec![start.next()];
             reached.push(reached[0].next());

@@ -78,7 +78,7 @@ pub fn action_of(key: Key) -> Option<Action> {
 pub struct Controls {
     /// True while the scene stands still.
     pub is_paused: bool,
-    /// How objects are coloured.
+    /// The property that an object's colour shows.
     pub colouring: Colouring,
     /// True if the cells of the grid are shown.
     pub is_grid_shown: bool,

@@ -1,4 +1,4 @@
-//! What can go wrong, in words that say what to do.
+//! Errors, in words that say what to do.
 
 use std::fmt;
 use std::path::PathBuf;

@@ -65,7 +65,7 @@ mod tests {
     use pbig_scenes::scenes::Scene;
 
     #[test]
-    fn every_scene_is_in_the_picture_and_the_camera_above_the_ground() {
+    fn scenes_are_in_the_picture_and_the_camera_above_ground() {
         for scene in Scene::ALL {
             let world = scene.build(200, 1);
             let Framing { eye, at, radius } = Framing::of(&world);

@@ -9,7 +9,7 @@ use crate::sheet::{Area, Rgba, Sheet};
 
 /// Texts.
 const INK: Rgba = [0.13, 0.16, 0.20, 1.0];
-/// What texts lie on.
+/// The colour behind texts.
 const PAPER: Rgba = [1.0, 1.0, 1.0, 0.82];
 /// The height of a text line, as a share of the picture's height.
 const TEXT_SHARE: f32 = 0.026;
@@ -75,7 +75,7 @@ pub struct Side<'a> {
     pub history: &'a History,
     /// Where the graph's axis ends, in ms: the same on both sides.
     pub end_ms: f64,
-    /// What both sides show, for the upper line.
+    /// The scene that both sides show, for the upper line.
     pub title: String,
 }
 

@@ -14,10 +14,10 @@ pub struct Options {
     /// Which scene; a wrong name lists the right ones.
     #[arg(long, default_value = "column", value_parser = Scene::named)]
     pub scene: Scene,
-    /// How many objects.
+    /// Number of objects.
     #[arg(long, default_value_t = 10_000, value_parser = clap::value_parser!(u32).range(1..))]
     pub bodies: u32,
-    /// For the random numbers of the scene.
+    /// Seed of the scene's random numbers.
     #[arg(long, default_value_t = 1)]
     pub seed: u64,
     /// The broad phase to begin with.

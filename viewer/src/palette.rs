@@ -7,7 +7,7 @@ use clap::ValueEnum;
 use pbig_scenes::world::World;
 use rapier3d::prelude::*;
 
-/// How objects are coloured.
+/// The property that an object's colour shows.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
 pub enum Colouring {
     /// By their shape.
@@ -58,7 +58,7 @@ impl Colouring {
     }
 }
 
-/// What colours depend on, gathered once a frame.
+/// The state on which colours depend, gathered once a frame.
 pub struct Palette<'a> {
     colouring: Colouring,
     world: &'a World,

@@ -7,7 +7,7 @@ use pbig_scenes::world::World;
 use rapier3d::parry::shape::{Shape, TypedShape};
 use rapier3d::prelude::*;
 
-/// What an object looks like. Cubes and slabs share a mesh, and so do the parts of capsules with balls and cylinders.
+/// The mesh of an object. Cubes and slabs share a mesh, and so do the parts of capsules with balls and cylinders.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Primitive {
     /// A ball.

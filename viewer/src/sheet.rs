@@ -1,4 +1,4 @@
-//! What is written over the picture: panels, lines and texts in pixels, from the upper left corner.
+//! The overlay of the picture: panels, lines and texts in pixels, from the upper left corner.
 
 /// A colour with its opacity, each part from 0 to 1.
 pub type Rgba = [f32; 4];

@@ -1,5 +1,5 @@
 //! The window obeys each key and ends cleanly; pictures need no display. These tests need a graphics adapter, a software one
-//! will do, and those of the window also Xvfb and xdotool. `scripts/viewer.sh` installs them and runs the tests.
+//! will do, and those of the window also Xvfb and xdotool. `scripts/extra.sh viewer` installs them and runs the tests.
 //! Screenshots are left in `out/` beside this folder.
 
 #![allow(clippy::unwrap_used, reason = "helpers of tests end them, too")]
@@ -150,7 +150,7 @@ fn pictures_are_compared_by_their_pixels() {
 }
 
 #[test]
-#[ignore = "needs Xvfb, xdotool and a graphics adapter: scripts/viewer.sh"]
+#[ignore = "needs Xvfb, xdotool and a graphics adapter: scripts/extra.sh viewer"]
 fn the_window_obeys_each_key() {
     let folder = out("keys");
     let pictures = folder.to_str().unwrap();
@@ -251,7 +251,7 @@ fn without_display(options: &[&str]) -> std::process::Output {
 }
 
 #[test]
-#[ignore = "needs a graphics adapter: scripts/viewer.sh"]
+#[ignore = "needs a graphics adapter: scripts/extra.sh viewer"]
 fn pictures_need_no_display() {
     let folder = out("frames");
     let path = folder.to_str().unwrap();
@@ -268,7 +268,7 @@ fn pictures_need_no_display() {
 }
 
 #[test]
-#[ignore = "needs a graphics adapter: scripts/viewer.sh"]
+#[ignore = "needs a graphics adapter: scripts/extra.sh viewer"]
 fn a_comparison_shows_the_same_start_on_both_sides() {
     let folder = out("compare");
     let path = folder.to_str().unwrap();
@@ -282,7 +282,7 @@ fn a_comparison_shows_the_same_start_on_both_sides() {
 }
 
 #[test]
-#[ignore = "needs a graphics adapter: scripts/viewer.sh"]
+#[ignore = "needs a graphics adapter: scripts/extra.sh viewer"]
 fn without_a_display_the_window_says_what_is_missing() {
     let output = without_display(&["--bodies", "10"]);
     let text = String::from_utf8(output.stderr).unwrap();
@@ -294,7 +294,7 @@ fn without_a_display_the_window_says_what_is_missing() {
 
 #[test]
 #[cfg(target_os = "linux")]
-#[ignore = "needs a graphics adapter: scripts/viewer.sh"]
+#[ignore = "needs a graphics adapter: scripts/extra.sh viewer"]
 fn a_display_that_nobody_serves_is_an_error_with_its_reason() {
     for (name, value) in [("DISPLAY", ":9999"), ("WAYLAND_DISPLAY", "nothing")] {
         let mut command = Command::new(env!("CARGO_BIN_EXE_viewer"));
@@ -308,7 +308,7 @@ fn a_display_that_nobody_serves_is_an_error_with_its_reason() {
 }
 
 #[test]
-#[ignore = "needs Xvfb, xdotool and a graphics adapter: scripts/viewer.sh"]
+#[ignore = "needs Xvfb, xdotool and a graphics adapter: scripts/extra.sh viewer"]
 fn a_picture_that_cannot_be_written_does_not_end_the_window() {
     let folder = out("unwritable");
     std::fs::create_dir_all(&folder).unwrap();
@@ -323,7 +323,7 @@ fn a_picture_that_cannot_be_written_does_not_end_the_window() {
 
 #[test]
 #[cfg(target_os = "linux")]
-#[ignore = "needs the software adapter's libraries alone: scripts/viewer.sh"]
+#[ignore = "needs the software adapter's libraries alone: scripts/extra.sh viewer"]
 fn without_an_adapter_the_program_says_what_is_missing() {
     let nothing =
         ["VK_DRIVER_FILES", "VK_ICD_FILENAMES", "__EGL_VENDOR_LIBRARY_FILENAMES"].map(|name| (name, "/none"));

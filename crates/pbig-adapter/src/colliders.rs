@@ -61,14 +61,14 @@ impl<T: Tree> Colliders<T> {
         &self.core
     }
 
-    /// Uses this device from the next update on.
+    /// Uses this device in later updates.
     #[cfg(feature = "gpu")]
     pub fn set_gpu(&mut self, gpu: pbig_core::GpuFinder) {
         self.core.set_gpu(gpu);
     }
 
-    /// Changes the margin for boxes that are set from now on, in the world's unit. One that is no length is an error of this
-    /// update.
+    /// Changes the margin of boxes that are set after this call, in the world's unit. A negative, infinite or NaN margin is the
+    /// error of this update.
     #[inline(always)]
     pub fn set_margin(&mut self, margin: f32) {
         if let Err(error) = self.core.set_margin(margin) {
@@ -77,7 +77,7 @@ impl<T: Tree> Colliders<T> {
     }
 
     /// Takes over a world whose narrow phase has these pairs. The next update finds no collider known, so it reads all, and ends
-    /// pairs that do not overlap. `boxes` are those of the broad phase before, by collider index: one that holds its collider is kept.
+    /// pairs that do not overlap. `boxes` are the previous broad phase's, by collider index: a box that holds its collider is kept.
     /// With `keeps_order` the colliders of each pair are in the order of its event, and its end will have that order.
     pub fn adopt(&mut self, pairs: Vec<HandlePair>, boxes: Vec<(u32, Aabb)>, keeps_order: bool) {
         self.forget_all();
@@ -106,8 +106,8 @@ impl<T: Tree> Colliders<T> {
         }
     }
 
-    /// Visits the indices of colliders whose boxes, margins included, a query meets; some that it barely misses may be among
-    /// them. `visit` returns the time or distance up to which more are wanted.
+    /// Visits the indices of colliders whose boxes, margins included, a query meets, and perhaps some that it barely misses.
+    /// `visit` returns the time or distance up to which more are wanted.
     pub fn visit(&self, query: &SceneQuery, visit: &mut dyn FnMut(u32) -> f32) {
         // Continuous collision detection asks in the middle of a step, when there is a grid of just these boxes.
         let mut of_grid = Vec::new();
@@ -184,7 +184,7 @@ impl<T: Tree> Colliders<T> {
         if self.differs_from(scene) {
             self.rescan(scene);
         }
-        // Up to here only a refused box sets an error; the margin's is noted below.
+        // So far only a refused box can have set an error. The margin's error is noted below.
         self.is_incomplete = self.last_error.is_some();
         self.inherited.clear();
         if let Err(error) = margin {
@@ -259,13 +259,13 @@ impl<T: Tree> Colliders<T> {
         self.last_error.as_ref()
     }
 
-    /// Returns the number of pairs that rapier knows of. Adopted pairs count from the next update on.
+    /// Returns the number of pairs that rapier knows of. Adopted pairs count after the next update.
     pub fn pair_count(&self) -> usize {
         self.core.pair_count()
     }
 
     /// Returns the pairs that rapier knows of, sorted by the two indices; in each, the colliders are in the order of its events.
-    /// Adopted pairs are among them from the next update on.
+    /// Adopted pairs are included after the next update.
     pub fn pairs(&self) -> impl Iterator<Item = HandlePair> {
         self.core.pairs().map(|pair| {
             let [a, b] = handles(pair, &self.registry);

@@ -7,7 +7,7 @@ use std::fmt;
 pub struct Handle {
     /// The place in rapier's set.
     pub index: u32,
-    /// How often the place was used before.
+    /// The number of earlier uses of the place.
     pub generation: u32,
 }
 

@@ -1,5 +1,5 @@
-//! Scene queries. They search an index of boxes, which the first of them builds; it is brought up to date by the first query
-//! after a change, and costs next to nothing while nobody asks.
+//! Scene queries. They search an index of boxes. The first query builds the index, and the first query after a change brings it
+//! up to date. Without queries it costs next to nothing.
 
 use crate::policy;
 use crate::{Colliders, Tree};
@@ -29,7 +29,7 @@ impl SceneQuery {
 }
 
 impl<T: Tree> Colliders<T> {
-    /// Returns the indices of colliders whose boxes a query meets, sorted; some that it barely misses may be among them.
+    /// Returns the indices of colliders whose boxes a query meets, sorted, and perhaps some that it barely misses.
     pub fn met(&self, query: &SceneQuery) -> Vec<u32> {
         let mut met = Vec::new();
         self.visit(query, &mut |index| {
@@ -111,7 +111,7 @@ impl SceneIndex {
         }
         self.expire();
         let state = self.state.get_mut().unwrap_or_else(PoisonError::into_inner);
-        // A longer list saves nothing: all boxes are read then.
+        // A longer list saves nothing, because a refresh with many changes reads all boxes.
         state.knows_changes &= state.changed.len() + changed.len() <= ids as usize / 8;
         if state.knows_changes {
             state.changed.extend_from_slice(changed);

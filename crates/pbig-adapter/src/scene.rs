@@ -1,4 +1,4 @@
-//! How an adapter shows rapier's colliders.
+//! The trait by which an adapter shows rapier's colliders.
 
 use crate::Handle;
 use pbig_core::{Aabb, ProxyFilter};
@@ -11,7 +11,7 @@ pub enum Proxy {
     Gone,
     /// It or its body is disabled.
     Disabled,
-    /// Its AABB is not finite: it keeps the box of before, and has this filter.
+    /// Its AABB is not finite: it keeps its last box, and has this filter.
     Unplaced(ProxyFilter),
     /// Its AABB without margin, and its filter.
     Enabled(Aabb, ProxyFilter),

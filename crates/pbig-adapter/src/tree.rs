@@ -75,7 +75,7 @@ impl<T: Tree> SceneTree<T> {
         }
     }
 
-    /// Returns the tree of the boxes with ids below `ids`. `pending` are those that have changed since the last update.
+    /// Returns the tree of the boxes with ids below `ids`. `pending` are the ids of boxes that changed since the last update.
     pub(crate) fn get(
         &self,
         ids: u32,
@@ -174,7 +174,7 @@ mod tests {
     }
 
     #[test]
-    fn a_tree_that_nobody_asks_for_is_not_kept_and_one_without_changes_not_touched() {
+    fn unasked_trees_are_dropped_and_unchanged_ones_not_touched() {
         let (mut tree, asked) = (SceneTree::<List>::default(), Cell::new(0));
         let aabb = |id: u32| {
             asked.set(asked.get() + 1);

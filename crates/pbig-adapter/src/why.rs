@@ -46,7 +46,7 @@ impl<T: Tree> Colliders<T> {
         obstacle.unwrap_or_else(|| self.why_not(one.index, other.index))
     }
 
-    /// Returns the reason why a collider is in no pair at all.
+    /// Returns the reason why a collider has no pairs at all.
     fn obstacle(&self, handle: Handle) -> Option<Why> {
         let id = handle.index;
         if !self.registry.contains(handle) {

@@ -59,7 +59,7 @@ fn describe_adapters() -> Result<Vec<(String, GpuFinder)>, Failure> {
     Ok(usable)
 }
 
-/// Which variant of each stage runs on an adapter, and why.
+/// Returns the variant of each stage that runs on an adapter, and the reason.
 fn variants(adapter: &wgpu::Adapter) -> [String; 3] {
     let (features, limits) = (adapter.features(), adapter.limits());
     let times = match features.contains(wgpu::Features::TIMESTAMP_QUERY) {

@@ -38,7 +38,7 @@ enum Command {
     Simulate(simulate::Args),
     /// The scenes for `simulate`, with a line each.
     Scenes,
-    /// How fast it is here; written into a folder with --write.
+    /// Measures times on this machine; --write writes them into a folder.
     Bench(bench::Args),
     /// Run time against error: `pbig-studies accuracy`.
     #[command(disable_help_flag = true)]
@@ -47,10 +47,10 @@ enum Command {
         #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
         options: Vec<OsString>,
     },
-    /// Finds pairs and says how much memory that took: a process of its own for `bench`.
+    /// Finds pairs and prints the memory that this took: a process of its own for `bench`.
     #[command(hide = true)]
     MemoryProbe(bench::memory::Args),
-    /// What this machine offers, what is chosen and why, and a self-test.
+    /// Prints what this machine offers and what is chosen, with reasons, and runs a self-test.
     Doctor,
 }
 

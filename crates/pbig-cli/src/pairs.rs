@@ -13,16 +13,16 @@ use std::path::{Path, PathBuf};
 pub(crate) struct Args {
     /// Boxes: .npy (N,6) float32 or float64, or .csv, columns min_x,min_y,min_z,max_x,max_y,max_z.
     input: PathBuf,
-    /// Where to write the pairs: .npy (K,2) uint32 or .csv; `-` is stdout, as .csv.
+    /// File for the pairs: .npy (K,2) uint32 or .csv; `-` is stdout, as .csv.
     #[arg(short, value_name = "OUT")]
     output: Option<PathBuf>,
-    /// Where the work runs.
+    /// The backend that searches.
     #[arg(long, value_enum, default_value_t)]
     backend: BackendOption,
     /// Threads; all by default.
     #[arg(long, value_name = "N", value_parser = whole::<usize>(THREADS), allow_negative_numbers = true)]
     threads: Option<usize>,
-    /// How often to find the pairs, for the times.
+    /// Number of searches, for the times.
     #[arg(long, value_name = "K", default_value = "1", value_parser = whole::<usize>(1..=u64::MAX), allow_negative_numbers = true)]
     repeat: usize,
     /// An invalid box (NaN, or min > max) is an error.

@@ -12,13 +12,13 @@ use std::time::Instant;
 pub(crate) struct Args {
     /// Frames: .npy (F,N,6) float32 or float64; a box of six NaN is absent in that frame.
     frames: PathBuf,
-    /// Where to write the events: .csv with frame,event,a,b; `-` is stdout.
+    /// File for the events: .csv with frame,event,a,b; `-` is stdout.
     #[arg(short, value_name = "EVENTS.csv")]
     output: Option<PathBuf>,
-    /// Where the work runs.
+    /// The backend that searches.
     #[arg(long, value_enum, default_value_t)]
     backend: BackendOption,
-    /// How far a stored box reaches beyond the box it was given.
+    /// Distance by which a stored box is larger than the given one.
     #[arg(long, value_name = "M", default_value = "0", value_parser = margin, allow_negative_numbers = true)]
     margin: f32,
     /// Print one JSON object.

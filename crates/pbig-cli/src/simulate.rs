@@ -21,13 +21,13 @@ pub(crate) struct Args {
     /// Steps of 1/60 s.
     #[arg(long, value_name = "K", default_value = "300", value_parser = whole::<usize>(1..=u64::MAX), allow_negative_numbers = true)]
     steps: usize,
-    /// Which broad phase drives the world.
+    /// The broad phase that drives the world.
     #[arg(long, default_value = "pbig", value_parser = ["pbig", "stock"])]
     broad_phase: String,
-    /// Where pbig works.
+    /// The backend of pbig.
     #[arg(long, value_enum, default_value_t)]
     backend: BackendOption,
-    /// For the random numbers of the scene.
+    /// Seed of the scene's random numbers.
     #[arg(long, default_value = "1", value_parser = whole::<u64>(0..=u64::MAX), allow_negative_numbers = true)]
     seed: u64,
     /// Run rapier's broad phase and the oracle beside pbig and compare after every call.
@@ -65,7 +65,7 @@ fn refuse_what_stock_ignores(args: &Args) -> Result<(), Failure> {
     if args.check && args.broad_phase == "stock" { Err(Failure::Input(what.into())) } else { Ok(()) }
 }
 
-/// Runs the scene and prints what came of it. `ours` returns the broad phase, if it is pbig's.
+/// Runs the scene and prints the results. `ours` returns the broad phase, if it is pbig's.
 fn finish<B: BroadPhase>(
     args: &Args,
     bodies: usize,

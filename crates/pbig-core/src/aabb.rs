@@ -68,7 +68,7 @@ impl Aabb {
     /// ```
     #[inline(always)]
     pub fn overlaps(&self, other: &Self) -> bool {
-        // Branches are one at most, on the result: six of them took three times as long.
+        // One branch at most, on the result: six branches took three times as long.
         #[cfg(target_arch = "x86_64")]
         return self.overlaps_by_lanes(other);
         #[cfg(not(target_arch = "x86_64"))]
@@ -241,7 +241,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_invalid_does_not_count_in_a_union_and_is_contained_nowhere() {
+    fn invalid_boxes_add_nothing_to_a_union_and_lie_nowhere() {
         let (cube, all) =
             (Aabb::new([0.0; 3], [1.0; 3]), Aabb::new([f32::NEG_INFINITY; 3], [f32::INFINITY; 3]));
         for invalid in [Aabb::NOWHERE, Aabb::new([0.0, 0.0, 3.0], [9.0, 9.0, 2.0])] {

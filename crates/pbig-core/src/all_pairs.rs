@@ -16,11 +16,11 @@ pub(crate) struct Request<'a> {
     /// By id; none if all may pair.
     pub(crate) filters: Option<&'a [ProxyFilter]>,
     pub(crate) config: &'a Config,
-    /// How found pairs are counted, for [`Groups::gather`]; not at all if none is given.
+    /// The groups by which found pairs are counted, for [`Groups::gather`]. Without one they are not counted.
     pub(crate) grouping: Option<Grouping>,
 }
 
-/// The structure that holds all boxes as they are.
+/// The structure that holds all boxes of the last search.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) enum Held {
     #[default]
@@ -44,7 +44,7 @@ pub(crate) struct AllPairs {
 }
 
 impl AllPairs {
-    /// Returns how many threads share the work on so many boxes.
+    /// Returns the number of threads that share the work on this number of boxes.
     pub(crate) fn workers(boxes: usize) -> usize {
         if boxes < PARALLEL_FROM_BOXES { 1 } else { available_threads() }
     }
@@ -195,7 +195,7 @@ mod tests {
     use crate::{Limits, Order};
 
     #[test]
-    fn a_search_that_finds_too_many_pairs_ends_long_before_it_has_them_all() {
+    fn a_search_with_too_many_pairs_ends_early() {
         let limits = Limits { max_pairs: 1000, ..Limits::DEFAULT };
         let config = Config { limits, order: Order::Unspecified, ..Config::DEFAULT };
         // 2 * 10^8 pairs, 1.6 GB.

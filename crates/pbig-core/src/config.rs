@@ -25,18 +25,18 @@ pub enum Order {
     /// By `(a, b)`: the same bytes on every backend and thread count.
     #[default]
     Sorted,
-    /// As found, which saves the sort. The order depends on threads, and on a GPU on timing.
+    /// The order of discovery, which saves the sort. It depends on threads, and on a GPU on timing.
     Unspecified,
 }
 
-/// Most boxes and pairs that a call accepts. They bound memory; they do not keep it below what the machine has.
+/// Maximum numbers of boxes and pairs for a call. They bound memory, but not to the memory of the machine.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Limits {
-    /// Most boxes, and one more than the largest id of [`crate::BroadPhase`].
+    /// Maximum number of boxes, and of ids of [`crate::BroadPhase`].
     pub max_boxes: u64,
-    /// Most pairs that a [`crate::Finder`] lists, or a [`crate::BroadPhase`] keeps: 8 bytes each, up to 32 while they are
-    /// sorted.
+    /// Maximum number of pairs that a [`crate::Finder`] lists, or a [`crate::BroadPhase`] keeps: 8 bytes each, up to 32 while they
+    /// are sorted.
     pub max_pairs: u64,
 }
 
@@ -46,7 +46,7 @@ impl Limits {
     /// 2^28 boxes and 2^29 pairs: as many as the numbers inside can tell apart.
     pub const UNLIMITED: Self = Self { max_boxes: 1 << 28, max_pairs: 1 << 29 };
 
-    /// Returns the most pairs, at most as many as the numbers inside can tell apart.
+    /// Returns the maximum number of pairs that the numbers inside can also tell apart.
     pub(crate) fn pairs(&self) -> u64 {
         self.max_pairs.min(Self::UNLIMITED.max_pairs)
     }
@@ -96,7 +96,7 @@ pub struct GpuOptions {
     /// If true, the rows of a large cell get equally many pairs (PBIG table IV, "load balancing").
     pub load_balancing: bool,
     /// Estimate of the row in Avril's mapping (Avril 3.3). 0: the device's square root. 1 to 4: Carmack's inverse root with
-    /// so many Newton steps. 5 to 8: Lomont's, with 1 to 4 steps. 9: bisection. All are exact, because integers correct
+    /// this number of Newton steps. 5 to 8: Lomont's, with 1 to 4 steps. 9: bisection. All are exact, because integers correct
     /// the estimate.
     pub root: u32,
     /// Number of small and of large work items of a submission. They have at most 256 and 524,288 tests each. Longer
@@ -115,10 +115,10 @@ pub struct GpuOptions {
     pub boxes_per_cell: f32,
     /// Rule that turns the wanted boxes per cell into a cell size.
     pub cell_rule: CellRule,
-    /// Most boxes of a cell, up to 256, whose pairs are tested through Avril's mapping. Larger cells are tested by PBIG's
+    /// Maximum number of boxes of a cell, up to 256, whose pairs are tested through Avril's mapping. Larger cells are tested by PBIG's
     /// balanced rows.
     pub small_cell: u32,
-    /// Most boxes of a set whose pairs are all tested, without a grid. 0: there is always a grid. Avril's table 7 puts the
+    /// Maximum number of boxes whose pairs are all tested, without a grid. 0: there is always a grid. Avril's table 7 puts the
     /// crossover at 1000.
     pub all_pairs_up_to: u32,
     /// If true, the device counts the tests that it makes, those that repeat another and those of boxes that are apart. It
@@ -171,7 +171,7 @@ pub struct Config {
     pub margin: f32,
     /// Settings of the GPU backend.
     pub gpu: GpuOptions,
-    /// An engine to use whatever the policy says, for tests and measurements.
+    /// An engine that replaces the policy's choice, for tests and measurements.
     #[cfg(feature = "unstable-study")]
     pub engine: Option<Engine>,
 }

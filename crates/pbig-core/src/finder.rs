@@ -56,8 +56,8 @@ impl Finder {
         Self { config, ..Self::default() }
     }
 
-    /// As [`Finder::new`], on a given device: with [`crate::Backend::Gpu`] always, with [`crate::Backend::Auto`] if it is
-    /// no software and the boxes are many.
+    /// Makes a finder with a given device. [`crate::Backend::Gpu`] always uses it, [`crate::Backend::Auto`] if it is hardware and
+    /// the boxes are many.
     #[cfg(feature = "gpu")]
     pub fn with_gpu(config: Config, gpu: GpuFinder) -> Self {
         Self { gpu: GpuSlot::new(gpu), ..Self::new(config) }
@@ -80,7 +80,7 @@ impl Finder {
     /// Returns every pair of overlapping boxes that both filters allow.
     ///
     /// # Errors
-    /// As [`Finder::find`], and [`Error::FilterCount`].
+    /// The errors of [`Finder::find`], and [`Error::FilterCount`].
     pub fn find_filtered(&mut self, boxes: &[Aabb], filters: &[ProxyFilter]) -> Result<&[Pair], Error> {
         if boxes.len() != filters.len() {
             self.forget();
@@ -142,7 +142,7 @@ impl Finder {
         self.report.stages.emit = clock.lap();
     }
 
-    /// Forgets the last call, so that nothing of it outlives the next one, even if that fails.
+    /// Forgets the last call, so that no result of it remains if the next one fails.
     fn forget(&mut self) {
         self.pairs.clear();
         self.report = Report::default();

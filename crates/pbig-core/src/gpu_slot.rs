@@ -1,4 +1,4 @@
-//! The GPU of a finder or a broad phase, if it has one, and what is reported when it cannot do the work.
+//! The GPU of a finder or a broad phase, if it has one, and the report of a GPU that cannot do the work.
 
 use crate::Config;
 use crate::policy::{AvailableDevice, Choice, choose_backend};
@@ -19,8 +19,7 @@ pub(crate) struct GpuSlot {
 }
 
 impl GpuSlot {
-    /// Returns true if a call in which so many boxes have changed should run on the GPU; otherwise says why not in the
-    /// report.
+    /// Returns true if a call with this number of changed boxes should run on the GPU. Otherwise the report gets the reason.
     pub(crate) fn is_wanted(&mut self, config: &Config, changed: usize, report: &mut Report) -> bool {
         let choice = choose_backend(config.backend, self.device(), changed as u64);
         report.plan.no_gpu = choice.no_gpu();

@@ -98,7 +98,7 @@ mod tests {
     }
 
     #[test]
-    fn the_blocked_loop_is_the_definition_at_every_length_around_a_block() {
+    fn the_blocked_loop_is_the_definition_at_every_length() {
         for n in (0..70).chain([95, 96, 97, 200]) {
             let boxes: Vec<_> = (0..n)
                 .map(|i| match i % 7 {

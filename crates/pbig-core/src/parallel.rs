@@ -13,7 +13,7 @@ pub(crate) fn available_threads() -> usize {
     1
 }
 
-/// Returns how many threads can work on so many pieces. A single piece does not wake, or make, a pool of threads.
+/// Returns the number of threads that can work on `pieces` pieces. A single piece does not wake, or make, a pool of threads.
 #[cfg(any(feature = "gpu", test))]
 pub(crate) fn threads_for(pieces: usize) -> usize {
     if pieces < 2 { 1 } else { available_threads() }
@@ -55,7 +55,7 @@ fn run_workers(_: usize, take_pieces: impl Fn(usize) + Sync) {
     take_pieces(0);
 }
 
-/// Does two works at once, if a thread is free for the first.
+/// Runs two closures at once, if a thread is free for the first.
 #[cfg(feature = "parallel")]
 pub(crate) fn both(first: impl FnOnce() + Send, second: impl FnOnce()) {
     rayon::in_place_scope(|scope| {
@@ -145,7 +145,7 @@ pub(crate) fn map<T: Send>(pieces: usize, work: impl Fn(usize) -> T + Sync) -> V
     results.into_iter().flatten().collect()
 }
 
-/// Makes `buffer` at least `len` elements long without copying what it held: its content is scratch.
+/// Makes `buffer` at least `len` elements long. Its old content is scratch and is not copied.
 pub(crate) fn ensure_scratch<T: Copy>(buffer: &mut Vec<T>, len: usize, fill: T) {
     if buffer.capacity() < len {
         buffer.clear();

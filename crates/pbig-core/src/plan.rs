@@ -40,7 +40,7 @@ impl Algorithm {
     }
 }
 
-/// How the work was done. Its `Display` says so in words.
+/// The algorithm of a call and its data. `Display` puts it in words.
 ///
 /// ```
 /// use pbig_core::{Aabb, Finder};
@@ -57,7 +57,7 @@ pub struct Plan {
     pub algorithm: Algorithm,
     /// Valid boxes.
     pub boxes: u32,
-    /// Where the cells begin, in the boxes' length unit.
+    /// Lower corner of the first cell, in the boxes' length unit.
     pub origin: [f64; 3],
     /// Edges of a cell, in the boxes' length unit ([`Algorithm::Grid`] and [`Algorithm::Edit`]).
     pub cell: [f32; 3],

@@ -88,8 +88,8 @@ pub struct Checks {
     pub redundant: u64,
 }
 
-/// Bound of [`Report::work`] for each box and pair, in binary logarithms of the number of boxes: whatever the shape of the boxes,
-/// their motion and their history. Measured, not proven: docs/STRESS.md tells the worst that was found.
+/// Maximum [`Report::work`] for each box and pair, in binary logarithms of the number of boxes, for every shape, motion and history
+/// of the boxes. Measured, not proven: docs/STRESS.md has the worst case that was found.
 pub const WORK_LIMIT: u64 = 64;
 
 /// The report on the last call of a [`crate::Finder`] or [`crate::BroadPhase`].
@@ -108,8 +108,8 @@ pub struct Report {
     /// [`crate::GpuOptions::count_tests`] is set.
     pub checks: Checks,
     /// The work on the CPU in counts: tests made, runs of cells and nodes of a tree looked at. In an edit an entry of a list
-    /// counts as 16 and a test against an oversize box as 4, as they take so much longer; an edit that was given up counts as the
-    /// work that it was allowed. At most [`crate::WORK_LIMIT`] for each box, change and pair, times the binary logarithm of the
+    /// counts as 16 and a test against an oversize box as 4, because they take longer. An edit that was given up counts as the work
+    /// that it was allowed. At most [`crate::WORK_LIMIT`] for each box, change and pair, times the binary logarithm of the
     /// number of boxes, unless [`crate::Backend::Brute`] was asked for.
     pub work: u64,
     /// Pairs reported ([`crate::BroadPhase`]: pairs that exist now).
@@ -152,6 +152,6 @@ pub struct GpuReport {
     pub chunks: u32,
     /// Parts into which the boxes were split because of the device's limits; 1 if they were not.
     pub parts: u32,
-    /// Times that the map or a chunk was repeated for want of room.
+    /// Repetitions of the map or of a chunk that did not fit its buffers.
     pub repeats: u32,
 }

@@ -11,9 +11,9 @@ use std::time::{Duration, Instant};
 pub struct Effort {
     /// Rounds that do not count: they allocate, fill caches, and learn how boxes move.
     pub warm_up: usize,
-    /// Rounds that do, at most.
+    /// Maximum number of rounds that count.
     pub rounds: usize,
-    /// Time after which no further round starts, once there are enough for a median.
+    /// Time after which no further round starts, if there are enough rounds for a median.
     pub budget: Duration,
 }
 
@@ -39,7 +39,7 @@ pub struct Took {
 pub const COMPARED: &str = "case | boxes | pairs | unit | pbig_median | pbig_mean | other | other_median | other_mean | \
     other_over_pbig_median | other_over_pbig_mean";
 
-/// A unit, and by what milliseconds are multiplied for it.
+/// A unit, and the factor from milliseconds to it.
 pub type Unit = (&'static str, f64);
 
 /// Milliseconds.
@@ -83,8 +83,8 @@ pub fn medians<S>(
 }
 
 /// Measures sides that do the same work, round by round. `prepare` gets the round and is not measured; `run` does one side's work
-/// and returns its milliseconds. Sides change places from round to round, as the first in a round warms the caches for the others;
-/// a side's median is the mean of those at each place, however often it was there.
+/// and returns its milliseconds. Sides change places from round to round, because the first in a round warms the caches for the
+/// others. A side's median is the mean of its medians at each place.
 pub fn measured<S>(
     state: &mut S,
     sides: usize,

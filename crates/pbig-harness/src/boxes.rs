@@ -1,4 +1,4 @@
-//! Sets of boxes by name: those of the papers, and those that broke others.
+//! Sets of boxes by name: the papers' sets, and sets that broke other broad phases.
 
 use pbig_core::Aabb;
 use rand::rngs::StdRng;
@@ -63,7 +63,7 @@ pub fn cubes(n: usize, spread: f32, pairs: f32, seed: u64) -> Vec<Aabb> {
     })
 }
 
-/// The boxes that move in each frame: a share of all, others each time.
+/// The boxes that move in each frame: a share of all, each frame a different one.
 #[derive(Clone, Debug)]
 pub struct Movers {
     order: Vec<u32>,

@@ -6,7 +6,7 @@ use plotters::coord::types::RangedCoordf64;
 use plotters::prelude::*;
 use std::path::Path;
 
-/// Most lines of a panel; more cannot be told apart.
+/// Maximum number of lines in a panel: more cannot be told apart.
 pub const MAX_LINES: usize = 6;
 
 /// Colours that differ for the colour-blind too (Okabe and Ito).
@@ -28,7 +28,7 @@ const LEGEND: u32 = 230;
 const TEXT: u32 = 18;
 const TITLE: u32 = 23;
 
-/// Most characters of a line of the legend.
+/// Maximum number of characters in a line of the legend.
 const LEGEND_LETTERS: usize = 26;
 
 /// A named line of a panel.
@@ -249,7 +249,7 @@ mod tests {
     }
 
     #[test]
-    fn points_without_a_logarithm_are_left_out_and_zero_has_a_place() {
+    fn negative_points_are_left_out_and_zero_has_a_place() {
         let points =
             [(1.0, 0.0), (2.0, 3e-4), (3.0, 50.0), (0.0, 1.0), (f64::NAN, 1.0), (1.0, f64::INFINITY)];
         let text = drawn(&points);

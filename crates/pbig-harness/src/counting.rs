@@ -1,12 +1,12 @@
-//! An allocator that counts what each thread asks for and gives back: for tests and benches, which make it theirs with
-//! `#[global_allocator]`. Elsewhere all counts are 0.
+//! An allocator that counts the memory that each thread requests and frees. Tests and benches install it with
+//! `#[global_allocator]`. Without that all counts are 0.
 
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 
-/// The system's allocator, with sums for each thread: other tests run beside, and the resident set is theirs, too. `ALWAYS`, or
-/// from [`switch_on`] on: before, a benchmark's other sides, which ask for more, do not pay for it.
+/// The system's allocator, with sums for each thread, because tests run side by side. It counts from the start if `ALWAYS`, or
+/// after [`switch_on`], so that a benchmark's other sides do not pay for counting.
 pub struct Counting<const ALWAYS: bool>;
 
 static IS_ON: AtomicBool = AtomicBool::new(false);
@@ -60,12 +60,12 @@ unsafe impl<const ALWAYS: bool> GlobalAlloc for Counting<ALWAYS> {
     }
 }
 
-/// Bytes that this thread has asked for and nobody has given back to it.
+/// Returns the bytes that this thread has requested, less those that it has freed.
 pub fn held() -> i64 {
     HELD.get()
 }
 
-/// The largest block that this thread has asked for since it was asked last.
+/// Returns the largest block that this thread has requested since the last call.
 pub fn largest() -> usize {
     LARGEST.replace(0)
 }

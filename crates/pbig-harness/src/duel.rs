@@ -10,11 +10,11 @@ use rapier_pbig::PbigBroadPhase;
 use rapier3d::prelude::*;
 use std::time::{Duration, Instant};
 
-/// A step longer than this ends the measurement of its scene.
+/// Maximum duration of a step: a longer one ends the measurement of its scene.
 const LONGEST: Duration = Duration::from_secs(5);
 
-/// Both broad phases in one world, in turn: they see the same boxes in every step, with caches as cold as the
-/// rest of the step leaves them, or as warm as the other has made them. The world gets our events.
+/// Both broad phases in one world, in turn. They see the same boxes in every step. The first finds the caches as the rest of the
+/// step left them, the second as the first left them. The world gets our events.
 struct Both {
     ours: Timed<PbigBroadPhase>,
     stock: Timed<DefaultBroadPhase>,

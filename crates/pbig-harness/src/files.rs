@@ -21,7 +21,7 @@ use std::path::Path;
 /// The endings of a file of boxes, and of one of pairs.
 pub const BOXES_OR_PAIRS: [&str; 2] = ["npy", "csv"];
 
-/// The largest number of boxes that is read: no search of the program `pbig` takes more.
+/// Maximum number of boxes in a file: no search of the program `pbig` takes more.
 const MAX_BOXES: u64 = Limits::DEFAULT.max_boxes;
 
 /// Returns a message about a file, in one line that names it. Messages about the content alone do not know the name.
@@ -29,12 +29,12 @@ fn at(path: &Path, what: impl fmt::Display) -> String {
     format!("{}: {}", path.display(), one_line(what))
 }
 
-/// Whatever a library put into its message.
+/// Returns a library's message in one line.
 fn one_line(what: impl fmt::Display) -> String {
     what.to_string().replace(['\n', '\r'], " ")
 }
 
-/// As much of what a file says as a message needs, so that what is expected instead is not lost behind it.
+/// Returns the beginning of a value in a file, short enough that a message can also say what was expected.
 fn brief(text: &str) -> String {
     const LONGEST: usize = 120;
     text.char_indices().nth(LONGEST).map_or(text.to_owned(), |(end, _)| format!("{}...", &text[..end]))

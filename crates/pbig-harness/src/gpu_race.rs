@@ -58,7 +58,7 @@ fn update(broad_phase: &mut BroadPhase, moved: &[u32], boxes: &[Aabb]) -> Result
     Ok(done.map(|()| ms)?)
 }
 
-/// Returns the report of the device. A call that the device left to the CPU is no measurement, but an error.
+/// Returns the report of the device. If the device left the call to the CPU, this is an error.
 pub fn on_device(report: &Report) -> Result<&GpuReport, Failure> {
     let why = || Failure::Check(report.fallback.clone().unwrap_or_else(|| "the CPU did the work".into()));
     report.gpu.as_ref().ok_or_else(why)

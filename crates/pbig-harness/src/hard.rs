@@ -4,10 +4,10 @@ use pbig_core::{Aabb, BroadPhase, Config, Finder, Limits, ProxyFilter, Report};
 use rand::rngs::StdRng;
 use rand::{RngExt, SeedableRng};
 
-/// Boxes for which the widths of a recipe are meant. More boxes take more room.
+/// The number of boxes for which a recipe's widths are meant. More boxes take more room.
 pub const MEANT_FOR: usize = 25_000;
 
-/// How the boxes of a part lie in its region.
+/// The arrangement of a part's boxes in its region.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Place {
     /// Anywhere.
@@ -25,7 +25,7 @@ pub enum Place {
 pub struct Part {
     /// The share of all boxes, relative to the other parts'.
     pub weight: u32,
-    /// How they lie.
+    /// The arrangement of the boxes.
     pub place: Place,
     /// The lower corner of the region.
     pub corner: [f32; 3],
@@ -123,12 +123,12 @@ pub struct History {
     pub start: Recipe,
     /// The change of each box.
     pub change: Change,
-    /// In how many updates all boxes have changed.
+    /// The number of updates after which all boxes have changed.
     pub updates: usize,
 }
 
 impl History {
-    /// Returns the changes of each update: ids, and what becomes of their boxes; none for those that are removed.
+    /// Returns the changes of each update: ids with their new boxes, or without one if they are removed.
     pub fn changes(&self, boxes: &[Aabb], seed: u64) -> Vec<Vec<(u32, Option<Aabb>)>> {
         let all: Vec<_> = (0..).zip(self.after(boxes, seed)).collect();
         all.chunks(boxes.len().div_ceil(self.updates.max(1)).max(1)).map(<[_]>::to_vec).collect()
@@ -159,7 +159,7 @@ impl History {
     }
 }
 
-/// Pairs beyond which a world is not looked at: it would be a test of memory.
+/// Maximum number of pairs for a world to be measured: more would be a test of memory.
 const MAX_PAIRS: u64 = 2_000_000;
 
 fn config() -> Config {

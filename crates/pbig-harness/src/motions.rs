@@ -12,10 +12,10 @@ use rand::seq::SliceRandom;
 use rand::{RngExt, SeedableRng};
 use space::side;
 
-/// Largest distance that a box drifts or jitters in a frame along each axis; unit cubes have edge 1.
+/// Maximum distance that a box drifts or jitters in a frame along each axis. Unit cubes have edge 1.
 const STEP: f32 = 0.1;
 
-/// Distance of a swing along each axis at most, in edges of the box.
+/// Maximum distance of a swing along each axis, in edges of the box.
 const SWING: f32 = 0.1;
 
 /// Acceleration of a fall, in lengths per squared frame: 9.81 m/s^2 at 60 frames a second.

@@ -27,7 +27,7 @@ impl Failure {
 impl fmt::Display for Failure {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let (Self::Check(message) | Self::Input(message)) = self;
-        // One line of bearable length, whatever a file or a name contained.
+        // One short line, even if a file or a name contains long or strange text.
         const LONGEST: usize = 600;
         let plain = message.chars().map(|c| if c.is_control() { ' ' } else { c });
         let end = if message.chars().count() > LONGEST { "..." } else { "" };
@@ -47,7 +47,7 @@ impl From<String> for Failure {
     }
 }
 
-/// Prints to stdout. A reader that has gone away (`pbig scenes | head -1`) is no failure.
+/// Prints to stdout. A reader that has gone away (`pbig scenes | head -1`) is not an error.
 pub fn print(text: &str) -> Result<(), Failure> {
     let mut stdout = std::io::stdout().lock();
     let newline = if text.ends_with('\n') { "" } else { "\n" };

@@ -38,8 +38,8 @@ pub fn index_of(a: u64, b: u64, n: u64) -> u64 {
 
 /// Returns the pair with index `k < pair_count(n)`, for every `2 <= n <= 2^32` (equations 1 and 2).
 ///
-/// The square root gives the row to within one or two, whatever its rounding; the integer
-/// correction that follows makes it exact. The paper corrects from the resulting pair instead,
+/// The square root gives the row to within one or two, however it is rounded. The integer
+/// correction makes it exact. The paper corrects from the resulting pair instead,
 /// and has its sign of `8k` wrong in the text (section 3.3), right in equation 1.
 #[inline]
 pub fn pair_of(k: u64, n: u64) -> (u64, u64) {
@@ -103,7 +103,7 @@ mod tests {
     }
 
     #[test]
-    fn balanced_rows_cover_every_pair_once_and_differ_by_one_at_most() {
+    fn balanced_rows_cover_each_pair_once_and_differ_by_one() {
         for n in 0..70u32 {
             let mut seen: Vec<_> = (0..n)
                 .flat_map(|i| (0..row_len(i, n)).map(move |k| row_pair(i, k, n)))

@@ -10,10 +10,10 @@ use crate::pair_index::{pair_count, pair_of, row_len, row_pair};
 use pbig_core::pbig::{Summary, cell_size, cells_along, cells_in, ordinary, space_of};
 use pbig_core::{Aabb, Checks, Error, GpuOptions, Limits, Pair};
 
-/// Most cells per box. With more cells, empty cells cost more than full ones.
+/// Maximum number of cells per box. With more cells, empty cells cost more than full ones.
 const MAX_CELLS_PER_BOX: f64 = 4.0;
 
-/// Most cells that a box touches before it is tested against all others instead.
+/// Maximum number of cells that a box may touch. A box that touches more is tested against all others.
 const MAX_TOUCHED_CELLS: u64 = 512;
 
 /// The grid of [`pbig_grid`]: one entry for each cell that a box touches.

@@ -71,8 +71,8 @@ answer!(DefaultBroadPhase);
 answer!(PbigBroadPhase);
 
 impl FrameQueries {
-    /// Begins at the first frame, in a world that has not made a step. Returns nothing for a kind without queries: a frame
-    /// must not touch the broad phase then, because its index may wait for a first query.
+    /// Begins at the first frame, in a world that has not made a step. Returns nothing for a kind without queries, so that frames
+    /// leave the broad phase alone: its index may wait for a first query.
     pub fn new(kind: FrameKind, world: &World) -> Option<Self> {
         let extent = extent(world);
         let queries = Self { kind, extent, frame: 0, character: extent.character_start() };
@@ -157,7 +157,7 @@ mod tests {
     }
 
     #[test]
-    fn both_broad_phases_have_the_same_hits_in_a_world_that_stands_still() {
+    fn both_broad_phases_have_the_same_hits_in_a_world_at_rest() {
         for kind in FrameKind::ALL.into_iter().filter(|kind| *kind != FrameKind::None) {
             let [stock, ours] = [hits(kind, DefaultBroadPhase::new()), hits(kind, PbigBroadPhase::new())];
             assert!(stock > 0 && ours > 0, "{}: {stock} and {ours}", kind.name());

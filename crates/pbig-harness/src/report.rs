@@ -2,14 +2,14 @@
 
 use crate::chart::Chart;
 use crate::output::{Failure, print};
-use crate::table::{LONG, Table, text};
+use crate::table::Table;
 use serde_json::{Value, json};
 use std::path::Path;
 
 /// The tables and charts of a suite.
 #[derive(Clone, Debug, Default)]
 pub struct Report {
-    /// The name of the suite, and of its file.
+    /// The name of the suite, with which the names of its files begin.
     pub suite: String,
     /// Conditions of the run besides the machine, each with its name.
     pub head: Vec<(&'static str, String)>,
@@ -29,23 +29,14 @@ impl Report {
         machine().into_iter().chain(self.head.clone())
     }
 
-    /// Returns the file: conditions in lines that begin with `#`, then one row a case; of several tables one row a value.
-    pub fn csv(&self) -> String {
+    /// Returns the name and the content of each table's file: conditions in lines that begin with `#`, then one row a case.
+    pub fn files(&self) -> Vec<(String, String)> {
         let head: String = self.heads().map(|(name, value)| format!("# {name}: {value}\n")).collect();
-        let mut writer = csv::Writer::from_writer(vec![]);
-        let mut write = |record: Vec<String>| writer.write_record(record).expect("memory takes it all");
-        match &self.tables[..] {
-            [one] => {
-                write(one.columns.clone());
-                one.rows.iter().for_each(|row| write(row.iter().map(text).collect()));
-            }
-            several => {
-                write(LONG.map(str::to_owned).into());
-                several.iter().flat_map(Table::long).for_each(|value| write(value.into()));
-            }
-        }
-        let rows = writer.into_inner().expect("memory takes it all");
-        head + &String::from_utf8_lossy(&rows)
+        let name = |table: &Table| match self.tables.len() {
+            1 => format!("{}.csv", self.suite),
+            _ => format!("{}-{}.csv", self.suite, table.file_name()),
+        };
+        self.tables.iter().map(|table| (name(table), format!("{head}{}", table.csv()))).collect()
     }
 
     /// Returns one JSON object.
@@ -57,7 +48,7 @@ impl Report {
         json!({ "suite": self.suite, "head": head, "tables": tables })
     }
 
-    /// Prints the tables, or one JSON object; writes the file and the charts if there is a folder for them.
+    /// Prints the tables, or one JSON object; writes the files and the charts if there is a folder for them.
     pub fn finish(&self, as_json: bool, folder: Option<&Path>) -> Result<(), Failure> {
         if as_json {
             print(&self.object().to_string())?;
@@ -68,11 +59,14 @@ impl Report {
         folder.map_or(Ok(()), |folder| self.write(folder))
     }
 
-    /// Writes the file and the charts into a folder, which is made if there is none.
+    /// Writes a file for each table, and the charts, into a folder, which is made if there is none.
     pub fn write(&self, folder: &Path) -> Result<(), Failure> {
-        let path = folder.join(format!("{}.csv", self.suite));
-        let written = std::fs::create_dir_all(folder).and_then(|()| std::fs::write(&path, self.csv()));
-        written.map_err(|error| format!("{}: {error}", path.display()))?;
+        let named = |path: &Path| format!("{}: ", path.display());
+        std::fs::create_dir_all(folder).map_err(|error| named(folder) + &error.to_string())?;
+        for (name, content) in self.files() {
+            let path = folder.join(name);
+            std::fs::write(&path, content).map_err(|error| named(&path) + &error.to_string())?;
+        }
         self.charts.iter().try_for_each(|chart| chart.write(&folder.join(format!("{}.svg", chart.name))))?;
         Ok(())
     }
@@ -132,24 +126,24 @@ mod tests {
     }
 
     #[test]
-    fn a_file_has_the_machine_in_its_head_and_a_row_a_case_or_a_value() {
+    fn a_file_has_the_machine_in_its_head_and_a_row_a_case() {
         let head = vec![("adapter", "some".to_owned())];
         let one = Report { head, ..Report::new("suite", vec![table("one")]) };
-        let text = one.csv();
+        let (name, text) = &one.files()[0];
         assert!(text.starts_with("# machine: ") && text.contains("\n# commit: "), "{text}");
         assert!(text.ends_with("# adapter: some\ncase,ms\n\"a, b\",0.5\n"), "{text}");
-        let two = Report::new("suite", vec![table("one"), table("two")]).csv();
-        assert!(two.ends_with("table,row,column,value\none,\"a, b\",ms,0.5\ntwo,\"a, b\",ms,0.5\n"), "{two}");
+        assert_eq!(name, "suite.csv");
         assert_eq!(one.object()["tables"]["one"][0]["ms"], 0.5);
     }
 
     #[test]
-    fn files_are_written_where_they_are_wanted_and_an_error_names_the_file() {
+    fn each_table_has_a_file_and_an_error_names_it() {
         let folder = tempfile::tempdir().expect("a folder");
         let inner = folder.path().join("inner");
-        Report::new("suite", vec![table("one")]).write(&inner).expect("written");
-        assert!(inner.join("suite.csv").is_file());
-        let error = Report::new("suite", vec![]).write(&inner.join("suite.csv")).expect_err("no folder");
-        assert!(error.to_string().contains("suite.csv"), "{error}");
+        let tables = vec![table("one"), table("Two")];
+        Report::new("suite", tables.clone()).write(&inner).expect("written");
+        assert!(inner.join("suite-one.csv").is_file() && inner.join("suite-two.csv").is_file());
+        let error = Report::new("suite", tables).write(&inner.join("suite-one.csv")).expect_err("no folder");
+        assert!(error.to_string().contains("suite-one.csv"), "{error}");
     }
 }

@@ -1,5 +1,4 @@
-//! Runs a scene step by step, measures the broad phase, the whole step and the scene queries after it, and checks the pairs where
-//! that is wanted.
+//! Runs a scene step by step. Measures the broad phase, the whole step and its scene queries, and checks the pairs if asked to.
 
 use crate::frames::FrameKind;
 use crate::queries::{Answer, FrameQueries};
@@ -11,7 +10,7 @@ use std::fmt;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
-/// Any broad phase with a clock around it, and a checker beside it where that is wanted.
+/// Any broad phase with a clock around it, and perhaps a checker beside it.
 pub struct Timed<B> {
     /// The broad phase.
     pub inner: B,
@@ -45,7 +44,7 @@ impl<B> Timed<B> {
         self.watcher.as_ref().map(|watcher| &watcher.checker)
     }
 
-    /// Returns the first thing that was wrong.
+    /// Returns the first difference.
     pub fn first_difference(&self) -> Option<&Difference> {
         self.checker()?.differences.first()
     }
@@ -129,7 +128,7 @@ impl<B: BroadPhase> Run<B> {
         Self { broad_phase: self.broad_phase.checked(relative_margin, every), ..self }
     }
 
-    /// Makes so many steps, or those up to the first difference. `progress` is called after each.
+    /// Makes this number of steps, or fewer if one has a difference. Calls `progress` after each.
     pub fn steps(&mut self, steps: usize, mut progress: impl FnMut()) {
         for _ in 0..steps {
             self.step();

@@ -2,7 +2,6 @@
 
 use crate::chart::Line;
 use serde_json::Map;
-use std::collections::HashSet;
 
 /// A label, a number, or nothing where nothing was measured.
 pub use serde_json::Value;
@@ -98,24 +97,22 @@ impl Table {
         Line { name: name.into(), points }
     }
 
-    /// Returns how many of the first columns it takes to tell all rows apart.
-    fn labels(&self) -> usize {
-        let is_enough = |count: &usize| {
-            let labels: HashSet<String> = self.rows.iter().map(|row| label(&row[..*count])).collect();
-            labels.len() == self.rows.len()
-        };
-        (1..self.columns.len()).find(is_enough).unwrap_or(1)
+    /// Returns the rows as a CSV file below their heading.
+    pub fn csv(&self) -> String {
+        let mut writer = csv::Writer::from_writer(vec![]);
+        writer.write_record(&self.columns).expect("memory takes it all");
+        for row in &self.rows {
+            writer.write_record(row.iter().map(text)).expect("memory takes it all");
+        }
+        String::from_utf8_lossy(&writer.into_inner().expect("memory takes it all")).into_owned()
     }
 
-    /// Returns each value with its row and column, as [`LONG`] has them. Empty values are left out.
-    pub fn long(&self) -> Vec<[String; 4]> {
-        let labels = self.labels();
-        let values = self.rows.iter().flat_map(|row| (labels..row.len()).map(move |k| (row, k)));
-        let values = values.filter(|(row, k)| !row[*k].is_null());
-        let cell = |(row, k): (&Vec<Value>, usize)| {
-            [self.name.clone(), label(&row[..labels]), self.columns[k].clone(), text(&row[k])]
-        };
-        values.map(cell).collect()
+    /// Returns the table's name in lower case, with `-` for what is neither a letter nor a digit.
+    pub fn file_name(&self) -> String {
+        let plain = self.name.to_lowercase();
+        let words =
+            plain.split(|letter: char| !letter.is_ascii_alphanumeric()).filter(|word| !word.is_empty());
+        words.collect::<Vec<_>>().join("-")
     }
 
     /// Returns the rows as objects.
@@ -142,28 +139,21 @@ impl Table {
     }
 }
 
-/// The columns of a file with several tables.
-pub const LONG: [&str; 4] = ["table", "row", "column", "value"];
-
-fn label(values: &[Value]) -> String {
-    values.iter().map(text).collect::<Vec<_>>().join(", ")
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
 
     #[test]
-    fn rows_are_named_by_as_many_columns_as_it_takes_and_shown_with_four_digits() {
-        let mut table = Table::new("some", "set | boxes | ms");
+    fn values_have_nine_digits_in_a_file_and_four_on_a_terminal() {
+        let mut table = Table::new("Some table: of sets", "set | boxes | ms");
         table.row(cells!["unit", 10usize, 2.0 / 3.0]);
-        table.row(cells!["unit", 100u64, None::<f64>]);
-        assert_eq!(table.long(), [["some", "unit, 10", "ms", "0.666666667"].map(str::to_owned)]);
-        assert!(table.show().contains("| unit |    10 | 0.6667 |"), "{}", table.show());
-        assert_eq!(table.object()[1], serde_json::json!({ "set": "unit", "boxes": 100, "ms": null }));
-        assert_eq!((table.numbers("boxes"), table.numbers("ms").len()), (vec![10.0, 100.0], 1));
-        let mut one = Table::new("one", "set | ms");
-        one.row(cells!["unit", 1e-7f64]);
-        assert_eq!(one.long()[0][1..], ["unit", "ms", "0.0000001"].map(str::to_owned));
+        table.row(cells!["a, b", 100u64, None::<f64>]);
+        table.row(cells!["tiny", 1, 1e-7f64]);
+        let rows = "unit,10,0.666666667\n\"a, b\",100,\ntiny,1,0.0000001\n";
+        assert_eq!(table.csv(), format!("set,boxes,ms\n{rows}"));
+        assert!(table.show().contains("| unit |    10 |      0.6667 |"), "{}", table.show());
+        assert_eq!(table.object()[1], serde_json::json!({ "set": "a, b", "boxes": 100, "ms": null }));
+        assert_eq!((table.numbers("boxes").len(), table.numbers("ms").len()), (3, 2));
+        assert_eq!(table.file_name(), "some-table-of-sets");
     }
 }

@@ -192,7 +192,7 @@ mod tests {
     }
 
     #[test]
-    fn every_kind_is_found_by_its_name_and_a_wrong_name_is_answered_with_the_right_ones() {
+    fn kinds_have_names_and_a_wrong_name_lists_them() {
         for kind in FrameKind::ALL {
             assert_eq!(FrameKind::named(kind.name()), Ok(kind));
             assert_eq!(extent().queries(kind, 3).count() as u64, kind.queries());
@@ -202,7 +202,7 @@ mod tests {
     }
 
     #[test]
-    fn queries_are_inside_and_the_same_each_time_and_half_of_them_point_down() {
+    fn queries_lie_inside_repeat_and_half_of_them_point_down() {
         let (extent, kind) = (extent(), FrameKind::Rays10000);
         let queries: Vec<Query> = extent.queries(kind, 7).collect();
         for query in &queries {

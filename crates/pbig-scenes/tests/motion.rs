@@ -123,7 +123,7 @@ fn a_thrown_ball_knocks_bodies_over() {
 }
 
 #[test]
-fn the_balls_of_a_galton_board_fall_into_the_middle_bins_more_than_into_the_outer_ones() {
+fn balls_of_a_galton_board_prefer_the_middle_bins() {
     // Eight boards behind each other, because balls fall a little differently each time.
     let run = Run::new("galton", 400).steps(2 * STEPS);
     let landed: Vec<f32> =

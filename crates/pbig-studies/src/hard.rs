@@ -1,4 +1,4 @@
-//! How long hard worlds take: those on which a grid of one cell size takes quadratic time, and histories of edits.
+//! Times of hard worlds, on which a grid of one cell size takes quadratic time, and of hard histories of edits.
 
 use pbig_core::{Aabb, BroadPhase, Config, Engine, Finder, ProxyFilter};
 use pbig_harness::hard::{History, histories, shapes};

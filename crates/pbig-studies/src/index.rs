@@ -165,7 +165,7 @@ mod tests {
     use pbig_harness::pair_index::pair_of;
 
     #[test]
-    fn rules_mend_a_row_that_is_off_by_one_and_no_other_and_integers_mend_any() {
+    fn rules_mend_a_row_off_by_one_and_integers_mend_any() {
         for n in 2..50 {
             for k in 0..pairs_of(n) {
                 let (a, b) = pair_of(k as u64, n as u64);
@@ -180,7 +180,7 @@ mod tests {
     }
 
     #[test]
-    fn integers_are_right_at_both_ends_of_every_row_of_a_million_boxes() {
+    fn integers_are_right_at_both_ends_of_a_million_rows() {
         let n = 1 << 20;
         for row in 0..n - 1 {
             let [first, last] = ends(row, n);

@@ -34,7 +34,7 @@ enum Command {
     Stages,
     /// Pbig alone beside parry's tree and obvhs.
     Peers,
-    /// How long updates take, and how evenly, by motion.
+    /// Times of updates by motion: mean, median, p99, worst.
     Steady {
         /// Numbers of boxes instead of its own.
         #[arg(long, value_name = "N,N", value_delimiter = ',')]
@@ -51,10 +51,10 @@ enum Command {
     Hard,
     /// Searches for the world or history that takes most work for each box and pair.
     Worst {
-        /// How long to search.
+        /// Duration of the search.
         #[arg(long, default_value_t = 60)]
         seconds: u64,
-        /// For the random numbers of the search.
+        /// Seed of the search's random numbers.
         #[arg(long, default_value_t = 1)]
         seed: u64,
         /// Boxes in a world.

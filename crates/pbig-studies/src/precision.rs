@@ -93,7 +93,7 @@ impl Coordinates for Half {
     }
 }
 
-/// As pbig's CPU tests them (`pbig-core/src/cpu/cells.rs`): six fields of ten bits, 64 steps to a cell, everything
+/// As pbig's CPU tests them (`pbig-core/src/grid/cells.rs`): six fields of ten bits, 64 steps to a cell, everything
 /// rounded down; one addition and one test for all six comparisons.
 #[derive(Clone, Copy, Debug)]
 pub struct Code(u64);
@@ -138,7 +138,7 @@ pub fn half_value(integer: i16) -> f32 {
     f16::from_bits((integer ^ (((integer >> 15) as u16) >> 1) as i16) as u16).to_f32()
 }
 
-/// The largest f16 that is not above `x`, as an integer in the order of f16; `x` is no NaN.
+/// The largest f16 that is not above `x`, as an integer in the order of f16; `x` is not a NaN.
 #[inline]
 pub fn half_down(x: f32) -> i16 {
     // Zeros are one: a box that ends at -0 touches one that begins at 0.
@@ -147,7 +147,7 @@ pub fn half_down(x: f32) -> i16 {
     ordered(nearest) - i16::from(nearest.to_f32() > x)
 }
 
-/// The smallest f16 that is not below `x`, as an integer in the order of f16; `x` is no NaN.
+/// The smallest f16 that is not below `x`, as an integer in the order of f16; `x` is not a NaN.
 #[inline]
 pub fn half_up(x: f32) -> i16 {
     let x = x + 0.0;

@@ -27,7 +27,7 @@ impl Reported {
         Self { needed, extra, missed: needed - known as u64 }
     }
 
-    /// Compares the narrow phase's pairs after a step, which are those that its broad phase has reported, with brute force over
+    /// Compares the narrow phase's pairs after a step, which its broad phase has reported, with brute force over
     /// the boxes of enabled colliders that rapier's early filters allow.
     pub(crate) fn of(world: &World) -> Self {
         let index = |collider: ColliderHandle| collider.into_raw_parts().0;

@@ -1,4 +1,4 @@
-//! How long updates take, and how evenly. Boxes in motion: our updates beside a search from nothing and parry's tree, in turn in
+//! Times of updates: mean, median, p99, worst. Boxes in motion: our updates beside a search from nothing and parry's tree, in turn in
 //! every frame; pairs agree in number wherever a side takes part. Scenes of rapier are in `whole_steps`.
 
 use crate::trees::{Kept, Parry, Refit, partition};

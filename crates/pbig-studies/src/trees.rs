@@ -57,12 +57,12 @@ pub(crate) fn for_parry(aabb: &Aabb) -> ParryAabb {
 /// The way to bring a kept tree up to date.
 #[derive(Clone, Copy, Default, PartialEq, Eq)]
 pub(crate) enum Refit {
-    /// All of it, on one thread, after improving a part.
+    /// The whole tree, on one thread, after improving a part.
     #[default]
     Whole,
-    /// As above, for the pairs with a moved box alone.
+    /// Like `Whole`, for the pairs with a moved box alone.
     Changed,
-    /// As the first, on all threads.
+    /// Like `Whole`, on all threads.
     Parallel,
 }
 

@@ -1,4 +1,4 @@
-//! Whole steps of rapier, with scene queries where they are wanted: each scene in two worlds, one with rapier's own broad phase and
+//! Whole steps of rapier, with scene queries if asked for: each scene in two worlds, one with rapier's own broad phase and
 //! one with pbig's, frame by frame in turn.
 
 use pbig_harness::bench::summary;

@@ -224,7 +224,7 @@ mod tests {
     }
 
     #[test]
-    fn missed_and_added_pairs_are_counted_and_those_in_doubt_are_not() {
+    fn missed_and_added_pairs_count_and_doubtful_ones_do_not() {
         let truth = Truth::of([0.0, 0.5, 1.25, 2.25 + 1e-12].map(cube).to_vec(), 1e-9);
         let pair = Pair::new;
         assert_eq!(truth.pairs, [(pair(0, 1), -0.5), (pair(1, 2), -0.25)]);
@@ -233,7 +233,7 @@ mod tests {
             [d.missed, d.missed_deep, d.added]
         };
         assert_eq!(differences(&[pair(0, 1), pair(1, 2)], 0.0), [0, 0, 0]);
-        // The third and fourth touch, as far as f64 tells.
+        // The third and fourth touch, to the precision of f64.
         assert_eq!(differences(&[pair(2, 3)], 0.3), [2, 1, 0]);
         assert_eq!(differences(&[pair(0, 1), pair(0, 2), pair(1, 2)], 0.0), [0, 0, 1]);
     }

@@ -9,7 +9,7 @@ use rand::rngs::StdRng;
 use rand::{RngExt, SeedableRng};
 use std::time::{Duration, Instant};
 
-/// Finds that start from a known world again, one in so many.
+/// A step of the search starts again from a known world with a chance of one in this number.
 const AFRESH_ONE_IN: u32 = 8;
 
 /// Settings of a search.
@@ -147,7 +147,7 @@ fn mutated_part(mut part: Part, random: &mut StdRng) -> Part {
     part
 }
 
-/// Returns a factor of up to so many decades up or down.
+/// Returns a random factor within this number of decades up or down.
 fn factor(random: &mut StdRng, decades: f32) -> f32 {
     10f32.powf(random.random_range(-decades..decades))
 }

@@ -65,6 +65,8 @@ fn coordinates_margin_and_simulation_miss_nothing() {
     }
     let simulation = made("simulation");
     let runs = table(&simulation, "runs");
+    let drift = table(&simulation, "drift");
+    assert_eq!(drift.numbers("pbig"), numbers(runs, "pbig", "mean_distance"));
     assert!(all_zero(&numbers(runs, "pbig", "missed")) && all_zero(&numbers(runs, "stock", "mean_distance")));
     assert!(runs.numbers("energy_at_the_end_percent").iter().all(|percent| *percent < 101.0));
     assert!(runs.numbers("momentum_drift_percent").iter().all(|drift| *drift < 1e-2));

@@ -64,7 +64,7 @@ impl PbigBroadPhase {
         pbig_core::BroadPhase::with_gpu(config.into(), gpu).map(Self::around)
     }
 
-    /// Uses this device from the next update on. A broad phase restored from a snapshot has none.
+    /// Uses this device in later updates. A broad phase restored from a snapshot has none.
     #[cfg(feature = "gpu")]
     pub fn set_gpu(&mut self, gpu: pbig_core::GpuFinder) {
         self.colliders.set_gpu(gpu);
@@ -121,13 +121,13 @@ impl PbigBroadPhase {
         self.colliders.stats()
     }
 
-    /// Returns the number of pairs that rapier knows of. Adopted pairs count from the next update on.
+    /// Returns the number of pairs that rapier knows of. Adopted pairs count after the next update.
     pub fn pair_count(&self) -> usize {
         self.colliders.pair_count()
     }
 
     /// Returns the pairs that rapier knows of, sorted by the two indices; the collider with the smaller shape comes first in each, then the lower index.
-    /// Adopted pairs are among them from the next update on.
+    /// Adopted pairs are included after the next update.
     pub fn pairs(&self) -> impl Iterator<Item = ColliderPair> {
         self.colliders.pairs().map(to_pair)
     }

@@ -27,8 +27,8 @@ const ALPHA: [f32; 2] = [1.0, 0.5];
 
 impl Drawn {
     /// Draws the stored boxes and cells as lines, through the renderer that also draws rapier's own pictures. Each is passed as
-    /// a [`DebugRenderObject::ColliderAabb`], a cell with the first collider in it. There are no cells for few boxes, which
-    /// need no grid, and on a GPU.
+    /// a [`DebugRenderObject::ColliderAabb`], a cell with the first collider in it. Few boxes have no cells, because
+    /// they need no grid. A GPU shows no cells.
     pub fn debug_render(
         &self,
         colliders: &ColliderSet,

@@ -36,7 +36,7 @@
 //! | `serde` | `Serialize` and `Deserialize`, as rapier's `serde-serialize` |
 //! | `debug-render` | [`PbigBroadPhase::debug_render`], as rapier's |
 //! | `shadow` | [`PbigBroadPhase::with_shadow`]: rapier's own broad phase and brute force run beside it |
-//! | `unstable-study` | what studies and tests need; may change in any release |
+//! | `unstable-study` | parts for studies and tests, which may change in any release |
 
 // Labels each item in the documentation with the feature that it needs; on docs.rs only, as it takes nightly Rust.
 #![cfg_attr(docsrs, feature(doc_cfg))]

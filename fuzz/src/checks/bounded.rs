@@ -1,4 +1,4 @@
-//! The work of searches and updates is bounded, whatever the recipe of a world.
+//! The work of searches and updates is bounded for every recipe of a world.
 
 use super::super::hard::{Change, History, Part, Place, Recipe, ratio_of_history, ratio_of_search};
 use super::input::Input;

@@ -205,7 +205,7 @@ impl Player {
         Some(())
     }
 
-    /// Compares the pairs that exist with those that the events have led to.
+    /// Compares the existing pairs with the pairs that the events add up to.
     fn check_pairs(&self) {
         let pairs: Vec<Pair> = self.engines.ask(|one| one.pairs().collect());
         assert!(pairs.iter().eq(&self.pairs), "{pairs:?}, but events led to {:?}", self.pairs);
@@ -213,7 +213,7 @@ impl Player {
         assert_eq!(self.engines.ask(|one| one.len()), self.proxies.len());
     }
 
-    /// Compares the pairs of one box with those that the events have led to.
+    /// Compares the pairs of one box with the pairs that the events add up to.
     fn check_pairs_of(&self, input: &mut Input) -> Option<()> {
         let id = self.id(input)?;
         // Pairs sorted by (a, b) of one box are sorted by the other box.

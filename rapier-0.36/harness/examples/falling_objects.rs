@@ -18,7 +18,7 @@ use std::process::ExitCode;
 /// Objects fall in rapier 0.36.1, with its own broad phase and with pbig's.
 #[derive(Parser)]
 struct Args {
-    /// How many objects.
+    /// Number of objects.
     #[arg(long, default_value_t = 10_000, value_parser = clap::value_parser!(u32).range(1..))]
     bodies: u32,
     /// Steps of 1/60 s.
@@ -27,10 +27,10 @@ struct Args {
     /// Which scene; a wrong name lists the right ones.
     #[arg(long, default_value = "column", value_parser = Scene::named)]
     scene: Scene,
-    /// For the random numbers of the scene.
+    /// Seed of the scene's random numbers.
     #[arg(long, default_value_t = 1)]
     seed: u64,
-    /// Where to write the chart (SVG).
+    /// File for the chart (SVG).
     #[arg(long, default_value = "out/falling_objects_036.svg")]
     chart: PathBuf,
 }

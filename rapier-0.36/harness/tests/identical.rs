@@ -233,7 +233,7 @@ fn a_collider_whose_box_is_set_before_the_first_step_is_found() {
 }
 
 #[test]
-fn a_step_of_no_length_changes_nothing_about_who_finds_the_pairs() {
+fn a_step_of_zero_length_keeps_the_finder() {
     let (mut world, mut broad_phase) = (scene("column").build(60, 1), BroadPhaseBvh::new());
     for round in 0..6 {
         if round % 2 == 0 {

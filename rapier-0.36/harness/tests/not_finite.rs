@@ -1,4 +1,4 @@
-//! Colliders whose AABB is not finite: rapier keeps the box of before, and so does pbig.
+//! Colliders whose AABB is not finite: rapier keeps its last box, and so does pbig.
 
 use rapier_pbig::finder;
 use rapier3d::prelude::*;
@@ -44,7 +44,7 @@ fn a_collider_that_keeps_its_box_gets_its_new_filter() {
     assert!(matches!(two.update()[..], [BroadPhasePairEvent::AddPair(_)]));
     let ([_, lost], [to, _]) = (two.boxes, two.of_body);
     two.colliders[lost].set_translation(Vector::splat(f32::NAN));
-    assert!(two.update().is_empty(), "it keeps the box of before");
+    assert!(two.update().is_empty(), "it keeps its last box");
     two.colliders.set_parent(lost, Some(to), &mut two.bodies);
     two.colliders[lost].set_translation(Vector::splat(f32::NAN));
     assert!(matches!(two.update()[..], [BroadPhasePairEvent::DeletePair(_)]));

@@ -1,4 +1,4 @@
-//! A pair ends in the order in which it began, whatever becomes of its colliders in between: an app that keeps ordered pairs of
+//! A pair ends in the order in which it began, even if its colliders change in between: an app that keeps ordered pairs of
 //! handles must not keep one for ever.
 
 #[path = "../../../tests/suite/order/pairs.rs"]

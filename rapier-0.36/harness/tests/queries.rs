@@ -32,7 +32,7 @@ fn hits(kind: FrameKind, mut broad_phase: BroadPhaseBvh) -> u64 {
 }
 
 #[test]
-fn both_broad_phases_have_the_same_hits_in_a_world_that_stands_still() {
+fn both_broad_phases_have_the_same_hits_in_a_world_at_rest() {
     for kind in FrameKind::ALL.into_iter().filter(|kind| *kind != FrameKind::None) {
         let [stock, ours] = [BroadPhaseBvh::new(), rapier_pbig::broad_phase()].map(|one| hits(kind, one));
         assert!(stock > 0 && ours > 0, "{}: {stock} and {ours}", kind.name());

@@ -6,7 +6,7 @@ use rapier_pbig::shadow::{Shadow, checker};
 use rapier3d::prelude::BroadPhaseBvh;
 
 #[test]
-fn every_scene_has_the_pairs_of_the_oracle_and_misses_no_contact_of_stock() {
+fn every_scene_has_the_oracles_pairs_and_stocks_contacts() {
     for scene in Scene::ALL {
         let mut broad_phase = BroadPhaseBvh::new();
         let finder = PbigFinder::default().with_shadow(Shadow::Stock).with_shadow(Shadow::Oracle);

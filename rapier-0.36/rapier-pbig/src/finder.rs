@@ -163,7 +163,7 @@ impl PairFinder for PbigFinder {
     fn start_from(&mut self, aabbs: Vec<(u32, TreeAabb)>, pairs: Vec<(ColliderHandle, ColliderHandle)>) {
         let pairs: Vec<_> = pairs.into_iter().map(|(a, b)| HandlePair(handle(a), handle(b))).collect();
         let boxes = aabbs.iter().map(|(id, aabb)| (*id, from_tree(aabb))).collect();
-        // Sorted by index. Rapier's narrow phase reports ends in the order of the beginnings, whatever the order here.
+        // Sorted by index. Rapier's narrow phase reports ends in the order of the beginnings, so this order does not matter.
         self.colliders.adopt(pairs, boxes, false);
     }
 

@@ -28,7 +28,7 @@ impl Call<'_> {
         let filter = self.filter(collider);
         match self.aabb_of(collider) {
             Some(aabb) => Proxy::Enabled(from_tree(&aabb), filter),
-            // Rapier's own broad phase keeps the box of before, too. Rapier disables such a collider at the end of the step.
+            // Rapier's own broad phase also keeps the last box. Rapier disables such a collider at the end of the step.
             None => Proxy::Unplaced(filter),
         }
     }

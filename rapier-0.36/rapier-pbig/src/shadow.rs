@@ -112,7 +112,7 @@ impl<F> Shadowed<F> {
         Some(pair_events(&events))
     }
 
-    /// Does something with stock. If it panics, there is no stock any more.
+    /// Calls a function of stock. After a panic stock is dropped.
     fn guard(&mut self, work: impl FnOnce(&mut BroadPhaseBvh)) -> Option<()> {
         let stock = self.stock.as_mut()?;
         if catch_unwind(AssertUnwindSafe(|| work(stock))).is_err() {

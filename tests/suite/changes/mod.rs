@@ -71,7 +71,7 @@ fn follow_at_random(seed: u64, boxes: usize, updates: usize, config: &Config) {
 }
 
 #[test]
-fn random_updates_give_what_brute_force_gives_with_and_without_a_grid() {
+fn random_updates_equal_brute_force_with_and_without_a_grid() {
     needs_gpu!();
     for seed in 0..6 {
         for coding in [Coding::Auto, Coding::Plain, Coding::Packed] {
@@ -85,7 +85,7 @@ fn random_updates_give_what_brute_force_gives_with_and_without_a_grid() {
 }
 
 #[test]
-fn random_updates_lose_nothing_where_room_is_scarce_and_work_comes_in_chunks() {
+fn random_updates_lose_nothing_in_small_chunks_and_buffers() {
     needs_gpu!();
     for (seed, coding) in [(1, Coding::Plain), (2, Coding::Packed)] {
         for pipelining in [true, false] {
@@ -122,7 +122,7 @@ fn a_world_of_many_chunks_and_repeats_is_complete() {
 }
 
 #[test]
-fn a_world_that_exceeds_the_limits_of_a_device_is_followed_in_parts() {
+fn a_world_beyond_the_limits_of_a_device_is_split() {
     needs_gpu!();
     // 1 MiB holds 21,845 boxes now and before.
     let options = GpuOptions { max_bytes: 1 << 20, ..GpuOptions::DEFAULT };
@@ -191,7 +191,7 @@ fn transfers_follow_what_has_changed() {
 }
 
 #[test]
-fn boxes_that_leave_their_place_or_change_their_filter_begin_anew_and_no_others() {
+fn only_boxes_that_jump_or_change_their_filter_restart() {
     needs_gpu!();
     let (mut world, mut gpu) = (World::new(&set("unit", 2000)), device());
     let config = with(GpuOptions::DEFAULT);
@@ -262,7 +262,7 @@ fn searches_for_all_pairs_in_between_do_no_harm() {
 }
 
 #[test]
-fn memory_follows_what_is_needed_down_and_nothing_is_forgotten_with_it() {
+fn memory_shrinks_with_the_need_and_no_state_is_lost() {
     needs_gpu!();
     let (mut world, mut gpu) = (World::new(&set("pile", 20_000)), device());
     let config = with(GpuOptions::DEFAULT);

@@ -31,7 +31,7 @@ fn a_device_whose_update_was_too_much_does_not_go_on_from_it() {
     put(&mut broad_phase, 0..1000, false);
     put(&mut broad_phase, 0..9, true);
     assert_eq!(broad_phase.update().map(|events| events.added.len()), Ok(9));
-    // As many as the device may find, which counts those that may end, too.
+    // More than the device may find: its limit also counts pairs that may end.
     put(&mut broad_phase, 20..32, true);
     assert_eq!(broad_phase.update(), Err(Error::TooManyPairs { limit: 10 }));
     assert!(broad_phase.report().gpu.is_some(), "the device has found them");
@@ -51,7 +51,7 @@ fn brute_force(broad_phase: &BroadPhase) -> Vec<Pair> {
     oracle::pairs_filtered(&boxes, &filters)
 }
 
-/// Events lead from the pairs of the last update that did not fail to those that there are, whichever backend finds them.
+/// Events lead from the pairs of the last successful update to the present pairs, on every backend.
 #[test]
 fn devices_and_the_cpu_take_turns_and_updates_fail_in_between() {
     needs_gpu!();
@@ -67,7 +67,7 @@ fn take_turns(options: GpuOptions) {
     let mut broad_phase = BroadPhase::with_gpu(config, gpu).expect("a margin that is one");
     let (mut random, mut pairs) = (StdRng::seed_from_u64(17), BTreeSet::new());
     let home = |id: u32| [id % 8, id / 8 % 8, id / 64].map(|i| i as f32);
-    // Updates on the device and on the CPU; those that succeeded and those that failed.
+    // Updates on the device and on the CPU, successful and failed ones.
     let mut seen = [[0; 2]; 2];
     for round in 0..300 {
         let way = random.random_range(0..2);

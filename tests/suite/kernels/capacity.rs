@@ -16,7 +16,7 @@ fn nothing_is_checked_once_there_are_too_many_pairs() {
 }
 
 #[test]
-fn the_checks_count_output_that_does_not_fit_and_write_nothing_there() {
+fn checks_count_output_beyond_capacity_and_write_none_there() {
     needs_gpu!();
     for (kernel, case) in [("check_small", pile()), ("check_large", crowd()), ("check_all", pile())] {
         for flags in [0, PACKED] {
@@ -37,7 +37,7 @@ fn the_checks_count_output_that_does_not_fit_and_write_nothing_there() {
 }
 
 #[test]
-fn schedule_counts_items_that_do_not_fit_and_writes_nothing_there() {
+fn schedule_counts_items_beyond_capacity_and_writes_none_there() {
     needs_gpu!();
     let mut before = State::before("schedule", &pile());
     let wanted = after_twin(twin("schedule"), &before);

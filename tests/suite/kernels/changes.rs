@@ -206,7 +206,7 @@ fn locate_and_check_all_take_new_boxes_as_they_are() {
 }
 
 #[test]
-fn the_twins_together_find_what_the_oracle_has_in_one_of_two_states() {
+fn the_twins_together_find_what_one_of_two_states_has() {
     for case in moving_cases() {
         let state = State::before("check_small", &case);
         let (now, before) = (oracle::pairs(&case.boxes), oracle::pairs(&case.before));

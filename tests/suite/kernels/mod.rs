@@ -74,7 +74,7 @@ fn the_twins_together_find_the_pairs_of_the_oracle() {
 
 /// The tests below would mean little if the sets did not reach every kind of cell and item.
 #[test]
-fn the_sets_have_small_and_large_cells_several_levels_and_visitors() {
+fn the_sets_have_all_kinds_of_cells_levels_and_visitors() {
     let states: Vec<_> = cases().iter().map(|case| State::before("scatter", case)).collect();
     some(&states, "block after the first", |s| s.sums.len() > 1);
     some(&states, "visitors", |s| (0..s.cells.len()).any(|cell| s.counts_of(cell).visitors > 0));
@@ -188,7 +188,7 @@ fn arrange_agrees_with_its_twin() {
 }
 
 #[test]
-fn arrange_dispatches_nothing_without_capacity_and_rows_of_many() {
+fn arrange_dispatches_nothing_without_capacity() {
     let found = Counters {
         entries: 10,
         slots: 20,

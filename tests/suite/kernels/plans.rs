@@ -83,7 +83,7 @@ fn extreme_sets_have_a_plan() {
 
 /// The model of `docs/GPU.md` predicts times from bytes, and bytes from what the kernels do for a box.
 #[test]
-fn the_model_of_the_documents_has_the_entries_tests_and_atomics_that_the_kernels_make() {
+fn the_documents_model_has_the_counts_of_the_kernels() {
     let boxes = set("unit", 30_000);
     let case = Case { name: "unit", boxes, before: Vec::new(), small_cell: 32, columns: 8 };
     let a_box = |count: u64| count as f64 / case.boxes.len() as f64;

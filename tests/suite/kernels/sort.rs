@@ -188,7 +188,7 @@ fn the_sort_agrees_with_its_twins_on_long_rows() {
 }
 
 #[test]
-fn arrange_rows_leaves_the_sort_to_the_host_without_all_pairs_or_room() {
+fn arrange_rows_leaves_the_sort_to_the_host_without_room() {
     let pairs: Vec<_> = (1..900).map(|b| Pair::new(0, b)).collect();
     let lacks: [fn(&mut State); 4] = [
         |s| s.chunk.word_capacity -= 1,

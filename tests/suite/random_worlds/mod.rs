@@ -22,10 +22,10 @@ use std::cell::Cell;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use subject::{Plant, Subject};
 
-/// A list has up to so many operations, half as many on average.
+/// Maximum number of operations in a list; half as many on average.
 const MOST_OPS: usize = 160;
 
-/// What happened, summed up.
+/// Sums over all runs.
 #[derive(Clone, Copy, Debug, Default)]
 struct Tally {
     runs: u64,
@@ -70,7 +70,7 @@ impl Tally {
     }
 }
 
-/// How a run ends before its last operation.
+/// The reason for which a run ends before its last operation.
 enum End {
     Wrong(String),
     /// Rapier's own bugs are not the matter here, but they must be few.
@@ -86,7 +86,7 @@ struct Outcome {
 }
 
 impl Outcome {
-    /// Whether another run ended in the very same state.
+    /// Returns an error if another run ended in another state.
     fn compare(&self, other: &Self) -> Result<(), String> {
         if self.tally.contacts != other.tally.contacts || self.poses != other.poses {
             return Err("the bodies have gone other ways".into());
@@ -269,7 +269,7 @@ fn random_worlds_agree_with_stock_and_the_oracle() {
 }
 
 #[test]
-fn random_worlds_on_a_gpu_agree_too_and_have_the_bits_of_the_cpu() {
+fn random_worlds_on_a_gpu_have_the_bits_of_the_cpu() {
     needs_gpu!();
     let tally = on_random_ops(20, |ops| {
         let found = run(ops, on_gpu(), Plant::Nothing)?;

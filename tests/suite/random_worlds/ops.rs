@@ -14,7 +14,7 @@ const MOST_BODIES: usize = 40;
 /// something in any world, also when those before it are left out.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Op {
-    /// So many steps.
+    /// This number of steps.
     Step(u8),
     /// World and broad phase are saved, and it goes on with what was restored.
     Snapshot,
@@ -39,7 +39,7 @@ pub(super) enum Op {
 }
 
 impl Op {
-    /// The same about each of the first few bodies and colliders.
+    /// Returns this operation on each of the first few bodies and colliders.
     pub(super) fn renumbered(self) -> Vec<Self> {
         let few = || 0..6u8;
         match self {
@@ -357,7 +357,7 @@ fn shape((form, size): What) -> SharedShape {
     }
 }
 
-/// Of a tetrahedron, counter-clockwise from outside.
+/// Faces of a tetrahedron, counter-clockwise from outside.
 const FACES: [[u32; 3]; 4] = [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]];
 
 fn corners(r: f32) -> Vec<Point<Real>> {

@@ -113,7 +113,7 @@ fn spoiled(aabb: &Aabb, which: usize, with: impl Fn(f32) -> f32) -> Aabb {
 }
 
 #[test]
-fn no_number_in_any_field_of_the_first_a_middle_and_the_last_box() {
+fn nan_in_any_field_of_the_first_a_middle_and_the_last_box() {
     let boxes = pile(120);
     for which in 1..64 {
         let mut bad = boxes.clone();

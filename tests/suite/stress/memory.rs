@@ -1,4 +1,4 @@
-//! How much memory a thread holds, by counting what it asks for and gives back.
+//! The memory that a thread holds: requested less freed bytes.
 
 use pbig_harness::counting::Counting;
 pub(crate) use pbig_harness::counting::{held, largest};

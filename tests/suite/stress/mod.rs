@@ -67,7 +67,7 @@ fn step(world: &mut Follower, before: &[Aabb], frame: &[Aabb]) {
     (frame.len()..before.len()).for_each(|id| world.remove(id as u32));
 }
 
-/// The same boxes in other places: a few moved, all moved, a third gone, a few nowhere, all back.
+/// Returns the boxes in other places: a few moved, all moved, a third gone, a few nowhere, all back.
 fn shuffled(boxes: &[Aabb]) -> Vec<Vec<Aabb>> {
     let n = boxes.len();
     let of = |id: usize| boxes[id % n.max(1)];

@@ -31,7 +31,7 @@ fn small_and_grid() -> [Config; 2] {
 #[test]
 fn free_fall_for_a_million_steps_at_the_same_cost_and_memory() {
     let steps = if at_length() { 1_000_000 } else { 6000 };
-    // The same depth in fewer steps.
+    // This depth in fewer steps.
     let acceleration = 9.81 * (1e6 / steps as f32).powi(2);
     for config in small_and_grid() {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("a pool");
@@ -66,7 +66,7 @@ impl Cost {
     }
 }
 
-/// What it costs, and how deep the boxes fell. A sample of the updates is compared with the oracle.
+/// Returns the cost of a fall, and its depth. A sample of the updates is compared with the oracle.
 fn fall(config: Config, steps: usize, acceleration: f32) -> (Cost, f32) {
     let (mut falling, mut world) = (Falling::new(200), Follower::new(config, 200));
     let (mut cost, mut early) = (Cost::default(), 0);

@@ -50,7 +50,7 @@ fn identical_boxes_by_the_thousand_that_come_and_go() {
 }
 
 #[test]
-fn everything_overlapping_everything_is_complete_or_an_error_that_names_the_limit() {
+fn all_overlapping_all_is_complete_or_an_error_with_the_limit() {
     let (many, few) = (nested(20_000), nested(1200));
     for (strategy, config) in strategies() {
         let limited = Config { limits: Limits { max_pairs: 1_000_000, ..Limits::DEFAULT }, ..config };

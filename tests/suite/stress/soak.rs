@@ -26,9 +26,9 @@ struct Churn {
     rng: StdRng,
     home: Vec<Aabb>,
     odd: Vec<Aabb>,
-    /// Whether all boxes move smoothly around their homes, so that near pairs are kept.
+    /// True if all boxes move smoothly around their homes, so that near pairs are kept.
     swings: bool,
-    /// Otherwise one in so many changes in an update.
+    /// The number of boxes from one changed box to the next, if they do not swing.
     one_in: usize,
     tally: Tally,
 }
@@ -107,11 +107,11 @@ impl Churn {
     }
 }
 
-/// What has been counted so far.
+/// Counts so far.
 #[derive(Default)]
 struct Tally {
     updates: usize,
-    /// Of them those that were compared with the oracle, and equal.
+    /// Updates that were compared with the oracle, and equal.
     equal: usize,
     /// By who found the pairs: a device, or else what the plan names.
     ways: BTreeMap<&'static str, usize>,
@@ -128,7 +128,7 @@ impl Tally {
         for (early, bytes) in self.early.iter_mut().zip(self.bytes) {
             *early = if is_early { bytes.max(*early) } else { *early };
             let update = self.updates;
-            // In a short run a list that doubles late is no leak.
+            // In a short run a list may double late without a leak.
             let late = if given().is_none() { 100_000 } else { 0 };
             assert!(
                 bytes <= *early * 5 / 4 + late,
@@ -156,7 +156,7 @@ impl Tally {
     }
 }
 
-/// What one thread has asked for another may give back: only the sum says something.
+/// Returns the bytes that all threads hold. One thread may free memory of another, so only the sum counts.
 fn held_by_all() -> i64 {
     if rayon::current_num_threads() == 1 {
         return memory::held();

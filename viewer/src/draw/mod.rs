@@ -16,7 +16,7 @@ use kiss3d::prelude::{
 use overlay::Overlay;
 use stage::Stage;
 
-/// How finely pictures are drawn.
+/// The resolution of pictures.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Quality {
     /// Smooth edges and sharp shadows.

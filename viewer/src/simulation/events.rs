@@ -96,7 +96,7 @@ fn compare(kept: Choice, swap: impl Fn(&mut Followed, Choice)) -> Result<usize, 
 }
 
 #[test]
-fn events_of_contacts_and_sensors_are_those_of_a_world_that_is_never_swapped() {
+fn contacts_and_sensors_have_the_events_of_an_unswapped_world() {
     for kept in [Choice::Stock, Choice::Cpu] {
         let count = compare(kept, |it, choice| it.engine.swap(choice, &it.world)).unwrap();
         assert!(count > 200, "{count} events with {kept:?}");

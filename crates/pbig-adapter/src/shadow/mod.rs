@@ -102,7 +102,7 @@ impl Checker {
         self
     }
 
-    /// As [`Checker::with`].
+    /// Like [`Checker::with`], in place.
     pub fn add(&mut self, shadow: Shadow) {
         match shadow {
             Shadow::Oracle => self.oracle = true,
@@ -128,8 +128,8 @@ impl Checker {
         self.with_replays_in(std::env::temp_dir())
     }
 
-    /// Prepares for another world, or one that is not new. `pairs` are those that the narrow phase has. Stock must see all
-    /// colliders in the next call.
+    /// Prepares for another world, or for one that already has pairs. `pairs` are the narrow phase's. Stock must see all colliders
+    /// in the next call.
     pub fn start_over(&mut self, pairs: impl IntoIterator<Item = HandlePair>) {
         self.known = Followed::of(pairs);
         self.fresh = true;

@@ -17,7 +17,7 @@ pub(super) fn run(quick: bool) -> Result<Report, Failure> {
     Ok(Report { head, ..Report::new("gpu", tables) })
 }
 
-/// Returns the numbers of boxes: ten million take minutes on a program that plays a GPU, and tell nothing.
+/// Returns the numbers of boxes. A software adapter gets fewer: ten million take minutes there, and the times say nothing.
 fn sizes(gpu: &GpuFinder, quick: bool) -> Vec<usize> {
     let most = match (quick, gpu.is_software()) {
         (true, _) => 10_000,
@@ -31,8 +31,8 @@ fn boxes(set: &str, n: usize) -> Vec<Aabb> {
     BoxSet::named(set).expect("a set of the harness").boxes(n, 1)
 }
 
-/// Returns the table of searches, and that of their kernels. Medians in ms, of calls between which all boxes move. `wait_ms`
-/// and all after it are of the last call.
+/// Returns the table of searches, and the table of their kernels: medians in ms of calls between which all boxes move. `wait_ms`
+/// and the columns after it are of the last call.
 fn searches(gpu: &GpuFinder, quick: bool) -> Result<[Table; 2], Failure> {
     let columns = "set | boxes | pairs | cpu_ms | gpu_ms | cpu_over_gpu | wait_ms | uploaded_bytes | downloaded_bytes | device_bytes | compression";
     let mut table = Table::new("searches", columns);
@@ -81,12 +81,12 @@ fn time(finder: &mut Finder, boxes: &[Aabb]) -> Result<f64, Failure> {
     Ok(found.map(|()| ms)?)
 }
 
-/// Calls whose host's part is measured, and calls before these, which allocate and plan.
+/// Numbers of calls whose host's part is measured, and of calls before, which allocate and plan.
 const ROUNDS: usize = 6;
 const WARM_UP: usize = 3;
 
-/// Everything but waiting for the device: medians in ms of searches of moved boxes, unsorted and sorted, and of updates in which
-/// one in a hundred moves. `host` is the call without `wait`, `order` the sort of pairs that the device has left unsorted.
+/// Measures all but waiting for the device: medians in ms of searches of moved boxes, unsorted and sorted, and of updates in
+/// which one box in a hundred moves. `host` is the call without `wait`, `order` the sort of pairs that the device left unsorted.
 fn host(gpu: &GpuFinder, quick: bool) -> Result<Table, Failure> {
     let columns = "call | boxes | pairs | host_ms | upload_ms | plan_ms | record_ms | decode_ms | order_ms";
     let mut table = Table::new("host", columns);
@@ -128,7 +128,7 @@ fn host_of_searches(gpu: &GpuFinder, frames: &[Vec<Aabb>; 2], order: Order) -> R
     Ok([cells![finder.pairs().len()], times].concat())
 }
 
-/// As [`host_of_searches`], of updates without the calls that set the boxes.
+/// Measures updates like [`host_of_searches`], without the calls that set the boxes.
 fn host_of_updates(gpu: &GpuFinder, [moved, start]: &[Vec<Aabb>; 2]) -> Result<Vec<Value>, Failure> {
     let mut broad_phase = BroadPhase::with_gpu(ON_GPU, gpu.clone())?;
     let ids: Vec<u32> = (0..start.len() as u32).collect();

@@ -9,10 +9,10 @@ use std::process::Command;
 /// The distance that a box moves in one update.
 const STEP: f32 = 0.1;
 
-/// The motion of boxes: each so many-th, by so much, by its id and the update.
+/// The step from one moving id to the next, and the displacement of a box by its id and the update.
 type Motion = (usize, fn(usize, usize) -> [f32; 3]);
 
-/// The probes: the case in the table, and the motion; none: a search from nothing.
+/// The probes: the case in the table, and the motion. A probe without a motion is a search from nothing.
 const PROBES: [(&str, Option<Motion>); 4] = [
     ("memory, incremental, all moved", Some((1, to_and_fro))),
     ("memory, incremental, all drift", Some((1, drift))),
@@ -20,7 +20,7 @@ const PROBES: [(&str, Option<Motion>); 4] = [
     ("memory, from scratch", None),
 ];
 
-/// Motions of boxes that stay about where they are, for ever: a world that drifts apart needs another plan now and then.
+/// Motions of boxes that stay near their places, because a world that drifts apart sometimes needs another plan.
 const STEADY: [(&str, Motion); 3] =
     [("all moved", (1, to_and_fro)), ("all circle", (1, circle)), ("10% circle", (10, circle))];
 

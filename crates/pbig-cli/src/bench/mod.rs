@@ -41,7 +41,7 @@ enum Suite {
     Peers,
     /// Every scene at every size, stock beside ours in each step.
     Step,
-    /// How long updates take, and how evenly, by motion (of `pbig-studies`).
+    /// Times of updates by motion: mean, median, p99, worst (of `pbig-studies`).
     Steady,
     /// The experiments of PBIG's and Avril's papers, the printed figures beside ours (of `pbig-studies`).
     Papers,

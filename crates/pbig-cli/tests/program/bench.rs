@@ -30,7 +30,7 @@ fn about(rows: &[Value], word: &str) -> usize {
 }
 
 #[test]
-fn bench_update_compares_with_stock_and_the_floor_and_measures_memory() {
+fn bench_update_has_stock_the_floor_and_memory() {
     let tables = tables("update");
     let rows = rows(&tables, "update");
     for word in ["stock", "floor, one thread", "floor, all threads", "nothing moved", "1% moved"] {
@@ -47,7 +47,7 @@ fn bench_update_compares_with_stock_and_the_floor_and_measures_memory() {
 }
 
 #[test]
-fn bench_step_has_every_scene_and_writes_into_a_folder_that_is_named() {
+fn bench_step_has_every_scene_and_writes_a_file() {
     let folder = tempfile::tempdir().expect("a folder");
     let object = json(&pbig(folder.path(), &["bench", "step", "--quick", "--json", "--write", "out"]));
     let rows = rows(&object["tables"], "step");
@@ -64,7 +64,7 @@ fn bench_step_has_every_scene_and_writes_into_a_folder_that_is_named() {
 
 /// On whatever adapter there is: what goes up and comes back is a matter of counts.
 #[test]
-fn bench_gpu_has_both_backends_and_moves_no_more_bytes_than_have_changed() {
+fn bench_gpu_has_both_backends_and_moves_changed_bytes_only() {
     let tables = tables("gpu");
     let searches = rows(&tables, "searches");
     assert!(searches.len() == 6 && searches.iter().all(|row| number(row, "cpu_over_gpu") > 0.0));
@@ -80,7 +80,7 @@ fn bench_gpu_has_both_backends_and_moves_no_more_bytes_than_have_changed() {
 }
 
 #[test]
-fn studies_are_named_where_their_program_is_not_beside_this_one() {
+fn a_missing_program_of_studies_is_named() {
     let folder = tempfile::tempdir().expect("a folder");
     let alone = folder.path().join("pbig");
     std::fs::copy(env!("CARGO_BIN_EXE_pbig"), &alone).expect("a copy");

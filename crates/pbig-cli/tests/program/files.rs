@@ -38,8 +38,8 @@ fn a_large_wrong_file_is_refused_with_little_memory() {
         ("pairs", "x.csv", vec![], "line 1: longer than 65536 bytes"),
         ("pairs", "x.csv", b"0,0,zero,1,1,1\n".to_vec(), "line 1: column 3"),
         ("pairs", "x.csv", b"0,0,0,1,1,1\n".to_vec(), "line 2: longer than 65536 bytes"),
-        ("pairs", "x.npy", vec![], "this is no .npy file"),
-        ("replay", "x.npy", vec![], "this is no .npy file"),
+        ("pairs", "x.npy", vec![], "not a .npy file"),
+        ("replay", "x.npy", vec![], "not a .npy file"),
         ("pairs", "x.npy", head("<i4", "44739242, 6"), "values are int32"),
         ("pairs", "x.npy", head("<f4", "44739242, 6"), "the file has 10737"),
         ("replay", "x.npy", head("<f4", "9, 44739242, 6"), "the file has 10737"),
@@ -135,7 +135,7 @@ fn the_first_invalid_box_is_named() {
 }
 
 #[test]
-fn no_boxes_are_an_answer_and_no_bytes_are_an_error_in_both_kinds() {
+fn no_boxes_are_an_answer_and_no_bytes_an_error() {
     let folder = tempfile::tempdir().expect("a folder");
     let here = folder.path();
     save(here, "none.npy", &Array2::<f32>::zeros((0, 6)));

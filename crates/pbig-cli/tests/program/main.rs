@@ -165,7 +165,7 @@ fn absent_boxes_are_not_invalid_ones() {
 }
 
 #[test]
-fn a_backend_that_is_not_there_is_replaced_and_the_output_says_so() {
+fn a_missing_backend_is_replaced_and_the_output_says_so() {
     let folder = tempfile::tempdir().expect("a folder");
     save(folder.path(), "boxes.npy", &Array2::<f32>::zeros((3, 6)));
     save(folder.path(), "frames.npy", &Array3::<f32>::zeros((3, 3, 6)));

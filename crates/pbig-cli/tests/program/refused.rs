@@ -89,7 +89,7 @@ fn a_header_cannot_lie_and_says_what_the_values_are() {
 }
 
 #[test]
-fn what_a_file_says_at_length_is_told_in_brief_and_what_is_expected_all_the_same() {
+fn long_values_are_cut_in_errors_and_the_expected_form_stays() {
     let folder = tempfile::tempdir().expect("a folder");
     let long = "é".repeat(20_000);
     let version_3 = |text: String| {
@@ -129,13 +129,13 @@ fn what_is_no_npy_file_is_not_read_as_one() {
     for command in ["pairs", "replay"] {
         let about = |content| line_about(folder.path(), command, "x.npy", content);
         assert_eq!(about(b""), "pbig: x.npy: the file is empty");
-        let other = "pbig: x.npy: this is no .npy file, as `numpy.save` writes it";
+        let other = "pbig: x.npy: not a .npy file, as `numpy.save` writes it";
         assert_eq!((about(b"0,0,0,1,1,1\n").as_str(), about(b"\x93NUMP").as_str()), (other, other));
     }
 }
 
 #[test]
-fn a_text_with_other_separators_or_another_header_is_told_what_is_expected() {
+fn other_separators_or_headers_are_told_what_is_expected() {
     let folder = tempfile::tempdir().expect("a folder");
     let header = "the header must be min_x,min_y,min_z,max_x,max_y,max_z, or be left out";
     for (text, wanted) in [

@@ -75,7 +75,7 @@ fn replayed_events_add_up_to_the_pairs_of_every_frame() {
 }
 
 #[test]
-fn with_a_margin_the_pairs_lie_between_the_boxes_and_those_grown_by_two_margins() {
+fn with_a_margin_pairs_are_at_most_those_of_two_margins() {
     let folder = tempfile::tempdir().expect("a folder");
     let frames = frames(300, 15, 4);
     save_frames(folder.path(), &frames);

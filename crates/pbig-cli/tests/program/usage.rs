@@ -39,7 +39,7 @@ fn numbers_out_of_bounds_are_told_the_bound() {
 }
 
 #[test]
-fn every_error_names_the_help_that_lists_the_options_and_guesses_nothing() {
+fn every_error_names_the_help_and_guesses_nothing() {
     for (args, wanted) in [
         (
             &["pairs", "x.npy", "--output", "y"][..],

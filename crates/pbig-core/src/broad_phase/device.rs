@@ -8,8 +8,8 @@ use crate::gpu::{Change, ChangeRequest, GpuFinder, GpuFound};
 use crate::{Aabb, Backend, Config, Error, NoGpu, Pair};
 
 impl BroadPhase {
-    /// As [`BroadPhase::new`], on a given device: with [`Backend::Gpu`] always, with [`Backend::Auto`] if it is no
-    /// software and many boxes change.
+    /// Makes a broad phase with a given device. [`Backend::Gpu`] always uses it, [`Backend::Auto`] if it is hardware and many boxes
+    /// change.
     ///
     /// # Errors
     /// [`Error::Margin`].
@@ -19,7 +19,7 @@ impl BroadPhase {
         Ok(broad_phase)
     }
 
-    /// Uses this device from the next update on whose changes are all set after this call; until then the CPU.
+    /// Uses this device, beginning with the first update whose changes are all set after this call. Earlier updates use the CPU.
     pub fn set_gpu(&mut self, gpu: GpuFinder) {
         self.gpu.gpu = Some(gpu);
         self.world.keep_old = usize::MAX;
@@ -80,9 +80,9 @@ impl BroadPhase {
         let (world, kept, events) = (&self.world, &self.kept, &mut self.comparison);
         events.clear();
         let existed = |pair: &Pair| !world.was_removed(pair.a) && !world.was_removed(pair.b);
-        // A pair that is not kept cannot end: a device that says so is wrong, and does no harm.
+        // A pair that is not kept cannot end. A device that reports its end is wrong, and does no harm.
         events.removed.extend(kept.existing(&found.ended));
-        // The device takes pairs of boxes that it treats as new for new ones.
+        // The device reports pairs of boxes that it treats as new, even if they are kept.
         let restarted = &found.restarted;
         let is_restarted = |id: u32| restarted.binary_search(&id).is_ok();
         let may_be_kept = |pair: &Pair| is_restarted(pair.a) || is_restarted(pair.b);

@@ -1,7 +1,7 @@
 //! The engine for few changed boxes: they are looked up where they were and where they are, in a grid that is edited.
 //!
-//! A pair has ended if it overlapped before and does not now; it is new the other way round. Nothing else is looked at: an
-//! update takes time in proportion to what changed.
+//! A pair has ended if it overlapped before and does not now, and is new if it did not overlap before and does now. Nothing else is
+//! looked at, so an update takes time in proportion to the changed boxes.
 
 use super::world::{Old, World};
 use crate::grid::{Budget, Candidates, EditedGrid, Meet, Place, Record};
@@ -18,7 +18,7 @@ pub(super) struct Edit {
     before: Vec<Record>,
     /// Changed boxes as they are, in the same order.
     after: Vec<Record>,
-    /// Where each one was found.
+    /// The place of each changed box.
     places: Vec<Place>,
     threads: Vec<Thread>,
     /// Changed boxes as they were, in the order of their changes.
@@ -47,7 +47,7 @@ struct Thread {
 
 impl Edit {
     /// Brings `grid` up to date with the changes of the world, and leaves the events in `events`, sorted: all, or more new
-    /// pairs than the limit. Returns false if the work is beyond its limit; the grid and the events are good for nothing then.
+    /// pairs than the limit. Returns false if the work is beyond its limit, and leaves grid and events unusable.
     pub(super) fn run(
         &mut self,
         world: &World,
@@ -159,7 +159,7 @@ impl Thread {
     }
 }
 
-/// A box at one time: what decides about a pair.
+/// A box at one time, with all that decides about its pairs.
 #[derive(Clone, Copy)]
 struct State<'a> {
     aabb: &'a Aabb,
@@ -188,7 +188,7 @@ impl World {
         State { aabb: &self.boxes[id as usize], filter: &self.filters[id as usize] }
     }
 
-    /// Returns true if the pair of a changed box with another one is the other one's business: both have changed.
+    /// Returns true if this box does not report the pair: the other box is itself, or has changed and has the lower id.
     fn is_met_twice(&self, id: u32, other: u32) -> bool {
         other < id && self.change_of(other).is_some() || other == id
     }

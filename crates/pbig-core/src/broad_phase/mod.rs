@@ -163,7 +163,7 @@ impl BroadPhase {
 
     /// Removes all boxes; their pairs end without an event.
     pub fn clear(&mut self) {
-        // Two numbers on, so that a device does not go on from an update of before.
+        // Skips a number, so that a device does not continue from an earlier update.
         let (gpu, updates) = (std::mem::take(&mut self.gpu), self.updates + 2);
         *self = Self { config: self.config, gpu, updates, ..Self::default() };
         self.world.keep_old = self.old_to_keep();

@@ -132,8 +132,8 @@ impl BroadPhase {
         ids
     }
 
-    /// As [`BroadPhase::overlapping`], if there is a grid of all boxes. Returns false, and finds nothing, if there is none:
-    /// the last update used none, or boxes have changed since.
+    /// Answers [`BroadPhase::overlapping`] from the grid. Returns false, and finds nothing, if there is no grid of all boxes: the
+    /// last update used none, or boxes have changed since.
     pub fn overlapping_in_grid(&self, aabb: &Aabb, found: &mut dyn FnMut(u32)) -> bool {
         let has_grid = self.store.held == Held::InGrid && self.world.changed.is_empty();
         if has_grid && aabb.is_valid() {

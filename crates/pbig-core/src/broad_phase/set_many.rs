@@ -4,15 +4,15 @@ use super::BroadPhase;
 use crate::grid::prefetch;
 use crate::{Aabb, Error, ProxyFilter};
 
-/// Boxes between a prefetch and the box's turn.
+/// Number of boxes between a prefetch and the use of its box.
 const AHEAD: usize = 16;
 
 impl BroadPhase {
     /// Sets many boxes, as [`BroadPhase::set`] does one, in the order of `ids`.
     ///
-    /// `of` returns box and filter of an id, or none for a box that is to be left as it is. A panic in it goes on to the
-    /// caller; then some boxes are set. Where boxes take long to compute, compute them on several threads first: to set
-    /// one takes about 5 ns, less than to hand it to another thread.
+    /// `of` returns box and filter of an id, or none to leave its box alone. A panic in `of` reaches the caller after some boxes are
+    /// set. If boxes take long to compute, compute them on several threads first: setting one takes about 5 ns, less than handing
+    /// it to another thread.
     ///
     /// ```
     /// use pbig_core::{Aabb, BroadPhase, ProxyFilter};
@@ -25,7 +25,7 @@ impl BroadPhase {
     /// ```
     ///
     /// # Errors
-    /// As [`BroadPhase::set`]: the first error; the other boxes are set.
+    /// The first error of [`BroadPhase::set`]. The other boxes are set.
     pub fn set_many(
         &mut self,
         ids: &[u32],
@@ -45,7 +45,7 @@ impl BroadPhase {
         result
     }
 
-    /// Prefetches what [`BroadPhase::set`] reads of an id: worth it for ids that lie apart, a dozen ahead of their turn.
+    /// Prefetches the memory of an id that [`BroadPhase::set`] reads. It pays for ids far apart, a dozen ahead of their use.
     #[inline(always)]
     pub fn prefetch(&self, id: u32) {
         prefetch(self.world.boxes.as_ptr().wrapping_add(id as usize));

@@ -109,7 +109,7 @@ impl Snapshot {
         let is_present = |id: u32| self.present.get(id as usize).is_some_and(|present| *present);
         let is_pair = |pair: &Pair| pair.a < pair.b && is_present(pair.a) && is_present(pair.b);
         if let Some(pair) = self.pairs.iter().find(|pair| !is_pair(pair)) {
-            return Err(format!("snapshot: {pair:?} is no pair of boxes"));
+            return Err(format!("snapshot: {pair:?} is not a pair of boxes"));
         }
         if let Some(two) = self.pairs.windows(2).find(|two| two[0] >= two[1]) {
             return Err(format!("snapshot: pairs out of order: {two:?}"));
@@ -179,13 +179,13 @@ mod tests {
         };
         assert!(broken(&|v| v["version"] = 7.into()).contains("format 7"));
         assert!(broken(&|v| v["margin"] = (-1.0).into()).contains("margin"));
-        assert!(broken(&|v| v["pairs"][0]["a"] = v["pairs"][0]["b"].clone()).contains("no pair"));
-        assert!(broken(&|v| v["pairs"][1]["b"] = 4000.into()).contains("no pair"));
+        assert!(broken(&|v| v["pairs"][0]["a"] = v["pairs"][0]["b"].clone()).contains("not a pair"));
+        assert!(broken(&|v| v["pairs"][1]["b"] = 4000.into()).contains("not a pair"));
         let absent = |v: &mut serde_json::Value| {
             let id = v["pairs"][0]["b"].as_u64().expect("an id");
             v["present"][id as usize] = false.into();
         };
-        assert!(broken(&absent).contains("no pair"));
+        assert!(broken(&absent).contains("not a pair"));
         assert!(broken(&|v| v["pairs"][1] = v["pairs"][0].clone()).contains("out of order"));
         assert!(broken(&|v| v["changed"][0] = 92.into()).contains("has changed"));
         assert!(broken(&|v| _ = v["present"].as_array_mut().expect("a list").pop()).contains("flags"));

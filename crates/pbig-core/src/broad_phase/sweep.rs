@@ -1,9 +1,9 @@
-//! The engine for small worlds: each changed box is tested against all boxes, and what it overlaps is compared with its kept
+//! The engine for small worlds: each changed box is tested against all boxes, and the overlapping ones are compared with its kept
 //! pairs. If more than half of the boxes changed, each box is tested against the boxes with higher ids. In a large world, a tree
 //! tells what a changed box overlaps.
 //!
-//! Boxes lie axis by axis, so that eight are tested at once. There is no index to keep, and no cost but that of
-//! the tests: a quarter of a microsecond for one changed box of a thousand.
+//! Boxes lie axis by axis, so that eight are tested at once. There is no index to keep. The tests are the whole
+//! cost: a quarter of a microsecond for one changed box of a thousand.
 
 use super::world::World;
 use crate::grid::{BLOCK, EightBoxes, Kernel, Simd, dispatch};
@@ -11,10 +11,10 @@ use crate::index::BoxIndex;
 use crate::pairs::{Comparison, Kept, differences, equal};
 use crate::{Aabb, Checks, Pair};
 
-/// No lane, of a box that is absent or invalid; or no box, of a free lane.
+/// The lane of a box that is absent or invalid, and the box of a free lane.
 const NONE: u32 = u32::MAX;
 
-/// Free lanes besides as many as boxes, at most: all are tested.
+/// Maximum number of free lanes beyond the number of boxes. Free lanes are tested, too.
 const MAX_HOLES: usize = 64;
 
 /// Eight lanes. Aligned, as every second load would cross a cache line.
@@ -106,8 +106,8 @@ impl Sweep {
         lane
     }
 
-    /// As [`Sweep::run`], with the boxes in a tree. Returns the nodes looked at and boxes met as well; if they are more than
-    /// `max_nodes`, the events are not all.
+    /// Does the work of [`Sweep::run`] with the boxes in a tree. Also returns the nodes looked at and boxes met. If these are more
+    /// than `max_nodes`, events are missing.
     pub(super) fn run_in_tree(
         &mut self,
         world: &World,
@@ -120,7 +120,7 @@ impl Sweep {
         for &id in &world.changed {
             let (aabb, now) = (&world.boxes[id as usize], &mut self.now);
             now.clear();
-            // Tested again, as an infinite box meets the empty places of a tree.
+            // Tested again, because an infinite box meets the empty places of a tree.
             let mut take =
                 |other: u32| now.extend(aabb.overlaps(&world.boxes[other as usize]).then_some(other));
             nodes += tree.overlapping(aabb, &mut take).nodes;
@@ -146,7 +146,7 @@ impl Sweep {
         compare(world, id, was, now, events);
     }
 
-    /// Ends the pairs of changed boxes that overlap nothing, as they have no lane.
+    /// Ends the pairs of changed boxes without a lane, which overlap nothing.
     fn end_all(&mut self, world: &World, kept: &Kept, events: &mut Comparison) {
         self.now.clear();
         for &id in &world.changed {
@@ -194,7 +194,7 @@ struct SweepAll<'a> {
 }
 
 impl Kernel for SweepAll<'_> {
-    /// Boxes tested, and those that overlap.
+    /// Numbers of tested and of overlapping boxes.
     type Output = (u64, u64);
 
     #[inline(always)]

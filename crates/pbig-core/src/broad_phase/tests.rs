@@ -163,7 +163,7 @@ fn an_edit_that_finds_too_many_pairs_does_not_list_them_all() {
 }
 
 #[test]
-fn pairs_of_a_box_and_boxes_in_a_box_are_those_of_the_last_update() {
+fn questions_are_answered_as_of_the_last_update() {
     let mut random = StdRng::seed_from_u64(3);
     let mut world = Checked::new(None, 1100);
     for frame in 0..5 {

@@ -74,7 +74,7 @@ impl BroadPhase {
         policy::choose_engine(&counts, self.config.forced_engine())
     }
 
-    /// Returns true, as the other engines do if they were not given up.
+    /// Returns true: unlike other engines, a sweep is never given up.
     fn run_sweep(&mut self) -> bool {
         stage!("check");
         let mut clock = Clock::start();
@@ -104,7 +104,7 @@ impl BroadPhase {
         done
     }
 
-    /// Returns the limit of an engine's work; none for an engine that was asked for.
+    /// Returns the maximum work of an engine. An engine that the caller chose has no limit.
     fn unless_forced(&self, limit: u64) -> u64 {
         self.config.forced_engine().map_or(limit, |_| u64::MAX)
     }
@@ -130,7 +130,7 @@ impl BroadPhase {
         nodes <= max_nodes
     }
 
-    /// Keeps the pairs that an engine has found to be new, and forgets those that have ended.
+    /// Keeps the added pairs of an engine, and forgets the ended ones.
     fn apply_events(&mut self) -> Result<(), Error> {
         let mut clock = Clock::start();
         let events = &self.comparison;
@@ -169,7 +169,7 @@ impl BroadPhase {
         Ok(())
     }
 
-    /// Makes the next update begin with nothing but the boxes and the kept pairs.
+    /// Makes the next update begin from the boxes and the kept pairs alone.
     fn fail(&mut self) {
         self.store.held = Held::Nowhere;
         self.sweep.expire();
@@ -189,7 +189,7 @@ impl BroadPhase {
         self.updates += 1;
     }
 
-    /// Returns the number of old states that are worth keeping until the next update.
+    /// Returns the number of old states to keep until the next update.
     pub(super) fn old_to_keep(&self) -> usize {
         #[cfg(feature = "gpu")]
         if self.may_use_gpu() {
@@ -198,7 +198,7 @@ impl BroadPhase {
         policy::old_states_to_keep(self.len(), self.config.forced_engine())
     }
 
-    /// Begins a report of nothing done yet.
+    /// Begins an empty report.
     fn begin_report(&mut self) {
         let present = u64::from(self.world.present());
         let report = &mut self.report;

@@ -31,7 +31,7 @@ pub(crate) struct World {
     pub(super) changed: Vec<u32>,
     /// Old states of the first ids in `changed`. Shorter than `changed` if too many have changed for an edit.
     pub(super) old: Vec<Old>,
-    /// Changed boxes of which the old state is kept, at most.
+    /// Maximum number of old states.
     pub(super) keep_old: usize,
     /// Ids whose box of the last update was removed.
     removed: Vec<u32>,
@@ -168,7 +168,7 @@ impl World {
         self.present -= 1;
     }
 
-    /// Notes the first change of a box since the last update, and what it was.
+    /// Notes the first change of a box since the last update, and its old state.
     #[inline(always)]
     pub(super) fn note_change(&mut self, id: u32) {
         let i = id as usize;
@@ -181,7 +181,7 @@ impl World {
         }
     }
 
-    /// Says that all changes were taken in by an update.
+    /// Forgets all changes, after an update.
     pub(super) fn forget_changes(&mut self) {
         for &id in &self.changed {
             self.states[id as usize] &= state::PRESENT;
@@ -206,8 +206,8 @@ impl World {
     }
 }
 
-/// Returns the widest gap between a stored box and one that it still holds: twice the margin, as a box that has shrunk is
-/// stored anew, so that only boxes near each other pair. A little less, because gaps are rounded.
+/// Returns the maximum gap between a stored box and a box that it still holds: twice the margin. A box that shrinks more is stored
+/// anew, so that only boxes near each other pair. The gap is a little less, because gaps are rounded.
 #[inline(always)]
 fn slack(margin: f32) -> f32 {
     2.0 * margin * (1.0 - 2.0 * f32::EPSILON)

@@ -1,15 +1,15 @@
-//! Bounds and sizes of a set of boxes: what the plan of a grid looks at.
+//! Bounds and sizes of a set of boxes, from which the plan of a grid follows.
 
 use crate::Aabb;
 use crate::parallel::{SharedSlice, piece_range, run};
 
-/// Coordinates beyond this one count as this one, so that a width never overflows.
+/// Maximum coordinate. Larger ones count as this one, so that a width never overflows.
 const FARTHEST: f32 = 1e37;
 
-/// Boxes of a sample.
+/// Number of boxes in a sample.
 pub(super) const SAMPLE_SIZE: usize = 128;
 
-/// Boxes looked at for a sample: some may be invalid.
+/// Maximum number of boxes looked at for a sample: some may be invalid.
 const SAMPLE_TRIES: usize = 1024;
 
 /// Size classes: one for each power of two of the largest extent.

@@ -11,10 +11,10 @@ use super::{Grid, Sorted};
 use crate::Aabb;
 use crate::parallel::{SharedSlice, ensure_scratch, piece_range, run};
 
-/// Buckets of the first sort, at most: their write positions stay in the nearest cache.
+/// Maximum number of buckets of the first sort: their write positions stay in the nearest cache.
 const MAX_BUCKETS: usize = 2047;
 
-/// Boxes in a bucket, about: they are sorted within the second cache.
+/// Approximate number of boxes in a bucket: they are sorted within the second cache.
 const BOXES_PER_BUCKET: usize = 2048;
 
 /// Keys of boxes that are in no cell.
@@ -87,7 +87,7 @@ impl Grid {
         });
     }
 
-    /// Turns counts into places, and returns where each bucket begins and the last one ends.
+    /// Turns counts into places, and returns the beginning of each bucket and the end of the last one.
     fn place(&mut self, split: Split) -> Vec<u32> {
         let mut starts = std::mem::take(&mut self.bucket_starts);
         starts.clear();

@@ -1,4 +1,4 @@
-//! Cells, steps and codes: where a box lies, in integers.
+//! Cells, steps and codes: the place of a box in integers.
 //!
 //! An axis is divided into *steps*, a few dozen to a cell. Every coordinate is rounded to a step once, in f64; cells and
 //! codes come from that integer alone (contract 3). Rounding is monotone, so boxes that overlap also overlap in steps.
@@ -8,12 +8,12 @@ use crate::Aabb;
 /// Coordinates in steps, an axis a lane; the fourth lane is unused.
 pub(crate) type Steps = [i32; 4];
 
-/// Steps of the largest ordinary box, at most. With one step of rounding at each end two such boxes
+/// Maximum extent in steps of a box in the grid. With one step of rounding at each end two such boxes
 /// that overlap differ by at most 2 * (62 + 2) < 256 steps, which the nine bits of a code can tell from "apart".
 pub(crate) const MAX_STEPS_PER_BOX: f64 = 62.0;
 
 /// Coordinates beyond these steps are clamped: steps must fit an `i32` with room for a window. Both ends lie in different
-/// cells of a grid that wraps, so that what is far away on different sides does not meet there.
+/// cells of a grid that wraps, so that boxes far away on different sides do not meet there.
 pub(super) const MIN_STEP: f64 = -((1u32 << 29) as f64);
 pub(super) const MAX_STEP: f64 = ((1u32 << 29) + 21 * 64) as f64;
 
@@ -26,7 +26,7 @@ pub(super) const TOMBSTONE: u64 = 1 << 30 | 1 << 62;
 /// The cells of a uniform grid.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Cells {
-    /// Where step 0 begins.
+    /// The coordinates of step 0.
     pub(super) origin: [f64; 4],
     /// Steps in a length unit.
     pub(super) scale: [f64; 4],
@@ -53,7 +53,7 @@ impl Cells {
         self.dims.map(|dim| dim as u32)
     }
 
-    /// Returns where the cells begin.
+    /// Returns the lower corner of the first cell.
     pub(crate) fn origin(&self) -> [f64; 3] {
         [self.origin[0], self.origin[1], self.origin[2]]
     }

@@ -1,4 +1,4 @@
-//! The work of a search, before it is done: once boxes are sorted, the slots that each would visit are known.
+//! Counts the work of a search before the search: once boxes are sorted, the slots that each would visit are known.
 
 use super::cells::{Cells, query_of};
 use super::hits::{Hits, Rule};
@@ -39,8 +39,8 @@ impl Sorted<'_> {
             + between * search::WORK_OF_EXACT_TEST
     }
 
-    /// Returns the work in vain of a search, by a sample of one box in `step`: the tests of each box beyond those that its own
-    /// overlaps pay for. A box that meets thousands does not pay for others that meet none. `hits` are scratch.
+    /// Estimates the work in vain of a search, by a sample of one box in `step`: the tests of each box that its own overlaps do not
+    /// pay for. A box that meets thousands does not pay for others that meet none. `hits` are scratch.
     pub(crate) fn vain_work(&self, step: usize, filters: Option<&[ProxyFilter]>, hits: &mut Hits) -> u64 {
         let rule = Rule { filters, max_pairs: u64::MAX, found: &AtomicU64::new(0) };
         let (len, oversize) = (self.grid.len, self.grid.oversize.len());

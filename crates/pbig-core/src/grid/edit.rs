@@ -13,7 +13,7 @@ use super::{Grid, Sorted};
 use crate::Aabb;
 use crate::policy::search::WORK_OF_EXACT_TEST;
 
-/// Boxes between a prefetch and the move.
+/// Number of boxes between a prefetch and the move.
 const AHEAD: usize = 12;
 
 /// No entry: the end of a list.
@@ -77,11 +77,11 @@ impl Spill {
     #[inline(always)]
     fn occupied_from(&self, key: usize) -> u64 {
         let (word, bit) = (key / 64, key % 64);
-        // In two steps, as a shift by 64 is none.
+        // In two steps, because a shift by 64 does nothing.
         self.occupied[word] >> bit | self.occupied[word + 1] << 1 << (63 - bit)
     }
 
-    /// Prefetches what a visit reads next.
+    /// Prefetches the memory that a visit reads next.
     #[inline(always)]
     pub(super) fn prefetch_heads(&self, (key, count): KeyRun) {
         if key + count <= self.heads.len() && self.occupied_from(key) << (64 - count.clamp(1, 64)) != 0 {
@@ -89,7 +89,7 @@ impl Spill {
         }
     }
 
-    /// Prefetches what a visit reads first.
+    /// Prefetches the memory that a visit reads first.
     #[inline(always)]
     pub(super) fn prefetch(&self, key: usize) {
         prefetch(self.occupied.as_ptr().wrapping_add(key / 64));
@@ -159,12 +159,12 @@ impl EditedGrid {
         &self.grid
     }
 
-    /// Returns the work of looking up so many boxes among the oversize ones, before and after they move.
+    /// Returns the work of looking up `boxes` boxes among the oversize ones, before and after they move.
     pub(crate) fn work_with_oversize(&self, boxes: usize) -> u64 {
         2 * boxes as u64 * self.grid.oversize.len() as u64 * WORK_OF_EXACT_TEST
     }
 
-    /// Returns how many boxes are out of the grid's order.
+    /// Returns the number of boxes that are out of the grid's order.
     pub(crate) fn spilled(&self) -> usize {
         self.spill.len()
     }
@@ -179,7 +179,7 @@ impl EditedGrid {
         dispatch(Keys { grid: self, boxes });
     }
 
-    /// Prefetches what the move of a box reads and writes, where it is and where it goes.
+    /// Prefetches the memory that the move of a box reads and writes, at its old and its new place.
     #[inline(always)]
     fn prefetch(&self, moved: &[Record], places: &[Place], i: usize) {
         let Some(Place::Slot(slot)) = places.get(i) else { return };
@@ -200,7 +200,7 @@ impl EditedGrid {
         }
     }
 
-    /// Returns true if the box stays in its slot or spill list, where it is overwritten then.
+    /// Overwrites a box that stays in its slot or spill list. Returns false if it leaves.
     fn overwrite(&mut self, record: Record, code: u64, place: Place) -> bool {
         match place {
             Place::Slot(slot) if self.grid.records[slot as usize].key == record.key => {

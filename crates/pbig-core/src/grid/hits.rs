@@ -1,4 +1,4 @@
-//! Hits: what the test of codes leaves over, tested exactly many at a time.
+//! Hits: candidates that the test of codes leaves, tested exactly many at a time.
 //!
 //! A hit is a block of slots with a bit for each candidate. Hits are gathered first; then all are expanded, and then all
 //! tested, while the records further ahead are on their way. (Tested at once, each would wait for its record.) The test
@@ -9,13 +9,13 @@ use super::simd::{BLOCK, Simd, prefetch};
 use crate::{Pair, ProxyFilter};
 use std::sync::atomic::{AtomicU64, Ordering};
 
-/// Hits that are tested together.
+/// Number of hits that are tested together.
 const ROOM: usize = 256;
 
-/// Hits that a loop may add between two looks at the room.
+/// Maximum number of hits that a loop adds between two checks of the room.
 pub(super) const SLACK: usize = 8;
 
-/// Candidates between a prefetch and the test: a record from memory takes about as long.
+/// Number of candidates between a prefetch and the test: a record from memory takes about as long.
 const AHEAD: usize = 24;
 
 /// Pairs that a thread gathers before it accounts for them.
@@ -24,7 +24,7 @@ const BATCH: usize = 4096;
 /// Conditions for a found pair, besides that its boxes overlap.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Rule<'a> {
-    /// By id; none if all may pair.
+    /// Filters by id; none if all may pair.
     pub(crate) filters: Option<&'a [ProxyFilter]>,
     /// Pairs that may be found.
     pub(crate) max_pairs: u64,
@@ -69,7 +69,7 @@ impl HitWriter {
     /// Adds a hit unless its mask is empty.
     ///
     /// # Safety
-    /// The hits that the writer is of still live. At most [`SLACK`] hits are added between two calls of
+    /// The [`Hits`] that made the writer still live. At most [`SLACK`] hits are added between two calls of
     /// [`HitWriter::has_room`] that return true, or a flush.
     #[inline(always)]
     pub(super) unsafe fn push(&mut self, query: usize, first: usize, mask: u32) {

@@ -9,13 +9,13 @@ use crate::Aabb;
 use crate::policy::search::{WORK_OF_ENTRY, WORK_OF_EXACT_TEST};
 use std::sync::atomic::{AtomicU64, Ordering};
 
-/// Candidates that are tested together, at most.
+/// Maximum number of candidates that are tested together.
 const ROOM: usize = 4096;
 
 /// Candidates that are tested together for each box of a short list.
 const ROOM_PER_BOX: usize = 32;
 
-/// Rows of cells that are looked through together: enough that the first one's codes are there when the last is asked for.
+/// Number of rows of cells in a round: enough for the first row's codes to arrive before the last row is prefetched.
 const ROWS: usize = 256;
 
 /// Place of a stored box.
@@ -70,13 +70,13 @@ impl Budget {
         self.spent.load(Ordering::Relaxed)
     }
 
-    /// Returns true if more than the limit was spent. Whether it will be depends on the work alone, not on the threads.
+    /// Returns true if more than the limit was spent. The final answer depends on the work alone, not on the threads.
     pub(crate) fn is_over(&self) -> bool {
         self.spent() > self.limit
     }
 }
 
-/// Work of a thread before it tells the others.
+/// Work that a thread does before it adds it to the total.
 const CHARGED_TOGETHER: u64 = 4096;
 
 /// Buffers of a look-up: candidates as the number of the box and a slot, or an entry of the spill list.
@@ -119,7 +119,7 @@ impl Candidates {
         self.work += entries * WORK_OF_ENTRY;
     }
 
-    /// Returns true if the budget allows to go on.
+    /// Returns true while the budget lasts.
     #[inline(always)]
     fn may_go_on(&mut self, budget: &Budget) -> bool {
         if self.work - self.charged < CHARGED_TOGETHER {
@@ -230,7 +230,7 @@ impl<M: Meet> Kernel for LookUp<'_, M> {
 }
 
 /// In three rounds over many rows, so that memory is asked for long before it is read: where the cells begin, then the codes
-/// in them, then the records of those that match.
+/// in them, then the records of matching codes.
 impl<M: Meet> LookUp<'_, M> {
     #[inline(always)]
     unsafe fn all<S: Simd, const WRAPS: bool>(&mut self) {

@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! bounds ─► plan ─► build (keys, two counting sorts, codes) ─► search ─► hits (exact test) ─► pairs
-//!                     └─► edit: boxes that moved since, in place ─► query
+//!                     └─► edit: boxes that moved since, in place ─► lookup
 //! ```
 //!
 //! A search visits half of each box's neighbouring cells as contiguous runs of slots, tests 64-bit codes (`cells`), and

@@ -1,4 +1,4 @@
-//! The plan: how large the cells of a grid are, which boxes it takes, and how a search looks at neighbouring cells.
+//! The plan: the size of a grid's cells, the boxes that it takes, and the neighbouring cells that a search visits.
 
 use super::bounds::{Bounds, SAMPLE_SIZE, Sample, SizeClass, size_classes};
 use super::cells::{Cells, MAX_STEPS_PER_BOX};
@@ -8,7 +8,7 @@ use crate::policy;
 /// The cells that a search visits for each box.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum NeighbourScan {
-    /// Half of the 27 neighbouring cells, as five runs of sorted boxes, whatever they hold: fastest where cells hold few.
+    /// Half of the 27 neighbouring cells, as five runs of sorted boxes, even if empty: fastest where cells hold few boxes.
     #[default]
     Runs,
     /// The cells in which an overlapping box can lie: fastest where cells hold many.
@@ -74,14 +74,14 @@ fn share(space: &Bounds, extent: [f32; 3]) -> f64 {
     (0..3).map(|k| (f64::from(extent[k]) / space.width(k)).min(1.0)).product()
 }
 
-/// Step lengths, and what they follow from.
+/// Step lengths, and the quantities that they follow from.
 struct Spacing {
     boxes: usize,
     space: Bounds,
     extent: [f32; 3],
     /// The edge of a cell that holds the wanted number of boxes.
     edge: f64,
-    /// Where the cells begin, by axis.
+    /// Lower corner of the cells, by axis.
     origin: [f64; 3],
     wraps: bool,
 }
@@ -129,8 +129,8 @@ impl Spacing {
         (0..3).map(|k| (self.cells_along(k) + 4.0).floor()).product()
     }
 
-    /// Makes cells smaller where the sample says that boxes lie in a few clusters far apart: then the cells wrap around, as
-    /// a grid of the whole space would have too many.
+    /// Makes cells smaller if the sample says that boxes lie in a few clusters far apart. The cells wrap around if a grid of the
+    /// whole space would have too many.
     fn uncrowded(mut self, sample: &Sample) -> Self {
         if self.crowd(sample) <= policy::MAX_CROWD {
             return self;
@@ -165,7 +165,7 @@ impl Spacing {
     fn plan(&self) -> GridPlan {
         let per_cell = self.boxes as f64 / (0..3).map(|k| self.cells_along(k)).product::<f64>();
         let is_crowded = self.wraps || per_cell > policy::RUNS_UP_TO_PER_CELL;
-        // Half cells where the grid wraps: those that fold onto one place hold fewer boxes then.
+        // Half cells where the grid wraps, so that cells that fold onto one place hold fewer boxes.
         let shift = if self.wraps { 5 } else { 6 };
         let mut cells = Cells { shift, wraps: self.wraps, ..Cells::default() };
         for k in 0..3 {

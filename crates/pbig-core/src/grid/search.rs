@@ -11,10 +11,10 @@ use crate::parallel::run_with;
 use crate::policy::PARALLEL_FROM_BOXES;
 use std::ops::Range;
 
-/// Boxes in a piece of work: enough to hide the cost of handing it out, few enough to balance.
+/// Number of boxes in a piece of work: enough to hide the cost of handing it out, few enough to balance.
 const PIECE: Range<usize> = 512..16_384;
 
-/// Oversize boxes in a piece of work.
+/// Number of oversize boxes in a piece of work.
 const OVERSIZE_PIECE: usize = 4;
 
 impl Sorted<'_> {
@@ -247,7 +247,7 @@ impl Scan<'_, '_> {
     }
 }
 
-/// Cells whose keys follow each other: the first key, and how many.
+/// Cells whose keys follow each other: the first key, and their number.
 pub(super) type KeyRun = (usize, usize);
 
 impl Grid {

@@ -1,7 +1,7 @@
 //! Every pair of overlapping boxes: each leaf meets itself and the leaves behind it.
 //!
-//! Whatever the shape of the boxes, a leaf's eight lie near each other and are of one size and shape: the tree is cut at medians,
-//! along the axis on which boxes lie apart most, and has a part for each class. So a leaf looks at few nodes.
+//! The eight boxes of a leaf lie near each other and have one size and shape, because the tree is cut at medians, along the axis on
+//! which boxes lie apart most, and has a part for each class. So a leaf looks at few nodes.
 
 use super::BoxIndex;
 use super::node::{LANES, NONE};
@@ -11,7 +11,7 @@ use crate::policy::PARALLEL_FROM_BOXES;
 use crate::{Aabb, Pair};
 use std::ops::Range;
 
-/// Leaves in a piece of work.
+/// Number of leaves in a piece of work.
 const PIECE: usize = 64;
 
 impl BoxIndex {

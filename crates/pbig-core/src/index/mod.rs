@@ -5,7 +5,7 @@
 //! ```
 //!
 //! A tree of nodes with eight children each. It is refitted in one pass over its nodes, children first. Sorting is left until
-//! questions have looked at so many nodes that a sort would have paid.
+//! questions have looked at enough nodes for a sort to pay.
 
 #![allow(clippy::needless_range_loop, reason = "a lane of several arrays")]
 
@@ -36,7 +36,7 @@ pub struct Visited {
 
 /// Boxes by id, for questions about places: which boxes does a ray, a moving box, a box or a point meet?
 ///
-/// The index holds copies of boxes. [`BoxIndex::refresh`] brings it up to date; questions see the boxes as of then.
+/// The index holds copies of boxes. [`BoxIndex::refresh`] brings it up to date; questions see the boxes of the last refresh.
 ///
 /// ```
 /// use pbig_core::{Aabb, BoxIndex};

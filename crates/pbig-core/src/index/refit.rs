@@ -26,7 +26,7 @@ impl BoxIndex {
         }
     }
 
-    /// As [`BoxIndex::refresh`], for an owner that looks up every box that changes: the boxes are sorted from the first call on.
+    /// Does the work of [`BoxIndex::refresh`] for an owner that looks up every changed box: the first call already sorts.
     /// Returns the work, in nodes and boxes.
     pub(crate) fn keep_sorted(&mut self, boxes: &[Aabb], changed: Option<&[u32]>) -> u64 {
         // A clone is empty.
@@ -53,7 +53,7 @@ impl BoxIndex {
         is_bad && self.has_earned_sort(1) || self.has_moved && self.has_earned_sort(policy::SORTS_FOR_ORDER)
     }
 
-    /// Returns true if questions have looked at as many nodes as so many sorts cost.
+    /// Returns true if questions have looked at as many nodes as this number of sorts costs.
     fn has_earned_sort(&self, sorts: u64) -> bool {
         self.looked_at.load(Ordering::Relaxed)
             >= sorts * policy::nodes_for_sort(self.leaves, self.places.len())

@@ -1,4 +1,4 @@
-//! The index gives what a scan of all boxes gives, whatever happened to the boxes, and looks at few of them.
+//! The index gives the answers of a scan of all boxes, after all kinds of changes, and looks at few boxes.
 
 use super::{BoxIndex, Visited};
 use crate::grid::{Hits, Rule};
@@ -91,7 +91,7 @@ fn compare(mut found: Vec<u32>, wanted: impl Iterator<Item = usize>, may_be: imp
     assert!(found.iter().all(|&id| may_be(id as usize)), "a box far away was visited");
 }
 
-/// Returns all pairs that a sorted index finds, by so many threads.
+/// Returns all pairs that a sorted index finds on this number of threads.
 fn joined(boxes: &[Aabb], threads: usize) -> Vec<Pair> {
     let mut index = BoxIndex::default();
     index.sort(boxes);
@@ -246,7 +246,7 @@ fn a_crowd_of_questions_pays_for_a_sort_and_single_ones_do_not() {
 
 /// Boxes that come after a sort make questions slow only until these have paid for the next one.
 #[test]
-fn boxes_that_come_later_are_sorted_in_once_questions_have_paid() {
+fn later_boxes_are_sorted_in_once_questions_have_paid() {
     for n in [2000, 20_000] {
         let (mut boxes, mut index) = (scattered(n), BoxIndex::default());
         index.refresh(&boxes, None);

@@ -33,8 +33,8 @@ struct Part {
 }
 
 impl Comparison {
-    /// Compares all found pairs with the kept ones; the found ones are kept from now on. `is_removed` tells of a box that
-    /// its kept pairs have ended already; none has if it is not given.
+    /// Compares all found pairs with the kept pairs, and keeps the found ones. `is_removed` returns true for a box whose kept
+    /// pairs have already ended. Without it there is no such box.
     pub(crate) fn run(
         &mut self,
         found: &mut Groups,
@@ -100,7 +100,7 @@ impl Comparison {
 }
 
 impl Rows {
-    /// Makes room for `pairs` pairs of `ids` ids, whatever was there.
+    /// Makes room for `pairs` pairs of `ids` ids. The old content is lost.
     fn prepare(&mut self, ids: usize, pairs: usize) {
         self.spans.resize(ids, Span::default());
         self.pool.resize(pairs, 0);
@@ -110,7 +110,7 @@ impl Rows {
 /// The sorted rows of a group.
 struct NewRows<'a> {
     first_id: u32,
-    /// Where the group's rows begin in the pool of all.
+    /// The place of the group's first row in the pool of all rows.
     first_place: u32,
     spans: &'a [Span],
     pool: &'a [u32],
@@ -123,7 +123,7 @@ impl NewRows<'_> {
         (self.first_id..).zip(self.spans).map(|(a, span)| (a, &self.pool[self.range(*span)]))
     }
 
-    /// Returns where a row lies in the pool of the group.
+    /// Returns the place of a row in the pool of the group.
     #[inline(always)]
     fn range(&self, span: Span) -> Range<usize> {
         let start = (span.start - self.first_place) as usize;
@@ -161,7 +161,7 @@ impl Part {
         self.dropped.clear();
     }
 
-    /// Compares as if the kept pairs of removed boxes had never been.
+    /// Compares rows without the kept pairs of removed boxes.
     fn compare_stripped(&mut self, old: &Rows, new: &NewRows<'_>, is_removed: &(dyn Fn(u32) -> bool + Sync)) {
         for (a, is) in new.rows() {
             self.strip(a, old.row(a), is_removed);

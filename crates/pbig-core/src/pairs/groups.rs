@@ -9,7 +9,7 @@ use std::ops::{Range, RangeInclusive};
 /// log2 of the ids in a group: in larger groups the rows do not fit the cache.
 const SHIFTS: RangeInclusive<u32> = 10..=14;
 
-/// Groups, about, up to 650,000 ids: their write positions fit the TLB.
+/// Approximate number of groups, up to 650,000 ids: their write positions fit the TLB.
 const MAX_GROUPS: usize = 40;
 
 /// Bits of `a` by which many events are sorted roughly before each part is sorted.
@@ -24,7 +24,7 @@ pub(crate) struct Grouping {
 }
 
 impl Grouping {
-    /// Groups for so many ids.
+    /// Returns the groups of `ids` ids.
     pub(crate) fn new(ids: usize) -> Self {
         let mut shifts = SHIFTS;
         let shift = shifts.find(|shift| ids >> shift <= MAX_GROUPS).unwrap_or(*SHIFTS.end());
@@ -63,7 +63,7 @@ pub(crate) struct Groups {
 }
 
 impl Groups {
-    /// Gathers the pairs that threads have found and counted by this grouping; returns how many there are.
+    /// Gathers the pairs that threads have found and counted by this grouping, and returns their number.
     pub(crate) fn gather(&mut self, grouping: Grouping, hits: &mut [Hits], workers: usize) -> usize {
         self.grouping = grouping;
         let count = self.place(hits);

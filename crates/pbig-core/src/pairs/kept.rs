@@ -5,13 +5,13 @@ use crate::Pair;
 use crate::grid::prefetch;
 use std::sync::OnceLock;
 
-/// Room of a row that has outgrown its place, at least.
+/// Minimum room of a row that has outgrown its place.
 const MIN_ROOM: u32 = 4;
 
 /// Marks a spare place of a row; the other bits are the row's id. Ids are below 2^28.
 const SPARE: u32 = 1 << 31;
 
-/// Pairs ahead of the one at hand whose rows are prefetched.
+/// Number of pairs between a prefetch of rows and their use.
 const AHEAD: usize = 8;
 
 /// Sorted rows of ids, by id. Spare places behind a row are marked as its own.
@@ -163,7 +163,7 @@ impl Kept {
         Rows { spans, pool }
     }
 
-    /// Brings the rows up to date with pairs that exist now, and with those that no longer do.
+    /// Inserts added pairs into the rows, and takes removed pairs out.
     pub(crate) fn apply(&mut self, added: &[Pair], removed: &[Pair]) {
         self.for_each(removed, |rows, id, other| rows.remove(id, other));
         self.for_each(added, |rows, id, other| rows.insert(id, other));
@@ -234,7 +234,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_row_that_grows_and_shrinks_again_and_again_keeps_its_place() {
+    fn a_row_that_grows_and_shrinks_keeps_its_place() {
         let mut kept = Kept::default();
         kept.reserve_ids(100);
         let row = |len: u32| (0..len).flat_map(|i| [Pair { a: 3, b: 10 + i }, Pair { a: 4, b: 10 + i }]);

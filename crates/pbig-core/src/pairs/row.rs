@@ -1,4 +1,4 @@
-//! Sorting short rows of ids, and telling two rows apart.
+//! Sorts short rows of ids, and compares two rows.
 
 use crate::Pair;
 use crate::grid::Simd;
@@ -143,7 +143,7 @@ mod tests {
     }
 
     #[test]
-    fn rows_are_compared_alike_in_the_middle_of_a_pool_and_at_its_end() {
+    fn rows_compare_alike_within_a_pool_and_at_its_end() {
         // Behind the rows, numbers of the other one.
         let old = [2, 4, 6, 5, 7, 5, 7, 5, 7];
         let new = [4, 5, 6, 7, 2, 2, 2, 2, 2];

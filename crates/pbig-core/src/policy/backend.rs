@@ -3,7 +3,7 @@
 use crate::Backend;
 use std::fmt;
 
-/// Changed boxes from which [`Backend::Auto`] uses a hardware GPU. A search of all boxes counts each as changed.
+/// Minimum number of changed boxes for [`Backend::Auto`] to use a hardware GPU. A search of all boxes counts each as changed.
 pub(crate) const AUTO_GPU_FROM_CHANGED_BOXES: u64 = 500_000;
 
 /// The device that a call may use.

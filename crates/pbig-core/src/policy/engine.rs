@@ -4,35 +4,35 @@ use super::search::work_of_full_grid;
 use crate::Engine;
 use crate::all_pairs::Held;
 
-/// Maximum boxes of a world that is swept although a grid is kept: a sweep of one changed box takes no longer than an edit.
+/// Maximum number of boxes of a world that is swept although a grid is kept: a sweep of one changed box takes no longer than an edit.
 pub(crate) const SWEEP_FIRST_UP_TO_BOXES: usize = 1024;
 
-/// Maximum boxes of a world that is swept.
+/// Maximum number of boxes of a world that is swept.
 pub(crate) const SWEEP_UP_TO_BOXES: usize = 4096;
 
-/// Maximum tests for each box of the world in a sweep: beyond, a grid finds the pairs sooner.
+/// Maximum number of tests for each box of the world in a sweep: beyond, a grid finds the pairs sooner.
 pub(crate) const SWEEP_UP_TO_TESTS_PER_BOX: usize = 200;
 
-/// Share of the boxes, one in so many, up to which changed boxes are edited: measured, editing takes as long as a rebuild
-/// at 7 to 10% of 100,000 boxes, at 4 to 5% of a million.
+/// Maximum share of changed boxes for an edit, as one in this number. Measured: an edit takes as long as a rebuild at 7 to 10% of
+/// 100,000 boxes, and at 4 to 5% of a million.
 pub(crate) const EDIT_UP_TO_ONE_IN: usize = 20;
 
-/// Share of the ids, one in so many, up to which boxes are sorted into a tree although there is none: a rebuild looks at all ids.
+/// Maximum share of ids in use, as one in this number, for boxes to be sorted into a new tree: a rebuild looks at all ids.
 const SPARSE_FROM_ONE_IN: usize = 8;
 
 /// Work of an edit for each box of the world, in tests of codes of 0.35 ns; a rebuild sorts a box in about 40 ns.
 const EDIT_UP_TO_WORK_PER_BOX: u64 = 60;
 
-/// Rebuilds at once after updates that were given up, at most.
+/// Maximum number of rebuilds in a row after updates that were given up.
 const MAX_REBUILDS: u32 = 64;
 
-/// Nodes of a tree that are looked at, and boxes met, in an update, at most, for each id.
+/// Maximum number of nodes looked at and boxes met in an update in a tree, for each id.
 const LOOK_UP_TO_NODES_PER_ID: u64 = 8;
 
-/// Share of the boxes, one in so many, that may be out of the grid's order: lists of them are slower than slots.
+/// Maximum share of boxes out of the grid's order for an edit, as one in this number: lists are slower than slots.
 pub(crate) const SPILL_UP_TO_ONE_IN: usize = 2;
 
-/// Changed boxes from which several threads look them up.
+/// Minimum number of changed boxes for look-ups on several threads.
 pub(crate) const PARALLEL_FROM_EDITS: usize = 1024;
 
 /// Counts from which an engine is chosen.
@@ -46,7 +46,7 @@ pub(crate) struct Counts {
     pub(crate) changed: usize,
     /// True if the old state of all changed boxes is known.
     pub(crate) knows_old: bool,
-    /// Where the boxes of the last update are.
+    /// The structure that holds the boxes of the last update.
     pub(crate) held: Held,
     /// Boxes out of the grid's order.
     pub(crate) spilled: usize,
@@ -57,8 +57,8 @@ impl Counts {
         self.knows_old && self.held == Held::InGrid
     }
 
-    /// Returns true if a sweep finds what has changed soonest, in a world of at most `most` boxes. Few boxes left of many are
-    /// swept, too, as a grid would look at all ids; but not in turn with a tree, since each looks at all ids at first.
+    /// Returns true if a sweep finds what has changed soonest, in a world of at most `most` boxes. A few boxes left of many are also
+    /// swept, because a grid would look at all ids. Sweep and tree do not take turns, because each looks at all ids when it begins.
     fn may_sweep(&self, most: usize) -> bool {
         // Each changed box meets all, or each box half of the others.
         let tests_per_box = self.changed.min(self.boxes / 2);
@@ -71,7 +71,7 @@ impl Counts {
         self.boxes * SPARSE_FROM_ONE_IN <= self.ids
     }
 
-    /// Returns true if so few of some boxes or ids have changed that it pays to look at these alone.
+    /// Returns true if few enough of some boxes or ids have changed for an engine to look at these alone.
     fn are_few_of(&self, all: usize) -> bool {
         self.changed * EDIT_UP_TO_ONE_IN <= all
     }
@@ -132,7 +132,7 @@ impl GivenUp {
         Engine::Rebuild
     }
 
-    /// Notes how an edit or a look-up in a tree ended.
+    /// Notes whether an edit or a look-up in a tree was given up.
     pub(crate) fn note(&mut self, is_given_up: bool, changed: usize) {
         if is_given_up {
             let rebuilds = (2 * self.rebuilds).clamp(1, MAX_REBUILDS);
@@ -143,18 +143,18 @@ impl GivenUp {
     }
 }
 
-/// Returns the most work of an edit, in tests of codes: about half the time of a rebuild, which sorts the boxes and does the work
+/// Returns the maximum work of an edit, in tests of codes: about half the time of a rebuild, which sorts the boxes and does the work
 /// of the last one, unless that world was fuller.
 pub(crate) fn edit_up_to_work(boxes: usize, pairs: usize, rebuild_work: u64) -> u64 {
     EDIT_UP_TO_WORK_PER_BOX * boxes as u64 + rebuild_work.min(work_of_full_grid(boxes, pairs)) / 2
 }
 
-/// Returns the nodes of a tree that look-ups may take: 5 ns each, while a search sorts and joins a box in about 150 ns.
+/// Returns the maximum number of nodes for look-ups in a tree: 5 ns each, while a search sorts and joins a box in about 150 ns.
 pub(crate) fn look_up_to_nodes(ids: usize) -> u64 {
     LOOK_UP_TO_NODES_PER_ID * ids as u64
 }
 
-/// Returns the number of old states that are worth keeping until the next update.
+/// Returns the number of old states to keep until the next update.
 pub(crate) fn old_states_to_keep(boxes: usize, forced: Option<Engine>) -> usize {
     match forced {
         Some(Engine::Edit) => usize::MAX,
@@ -182,7 +182,7 @@ mod tests {
     }
 
     #[test]
-    fn few_changes_are_looked_up_in_a_tree_where_there_is_one_or_most_ids_are_unused() {
+    fn few_changes_use_a_tree_if_kept_or_if_most_ids_are_unused() {
         let tree = Counts { held: Held::InTree, knows_old: false, ..WORLD };
         assert_eq!(choose_engine(&tree, None), Engine::Tree);
         assert_eq!(choose_engine(&Counts { changed: 501, ..tree }, None), Engine::Rebuild);

@@ -1,16 +1,16 @@
 //! Upkeep of the index for questions. A node is eight boxes; looking at one takes about 5 ns, sorting a box about 150.
 
-/// Minimum share of changed boxes, one in so many, from which all boxes are read in order: that takes about 3 ns a box, while
-/// a box alone takes 50, for it tells its ancestors.
+/// Minimum share of changed boxes, as one in this number, for all boxes to be read in order. That takes about 3 ns a box; a box
+/// alone takes 50, because it updates its ancestors.
 pub(crate) const REFIT_SHARE: usize = 16;
 
-/// Growth of a node's extents since the last sort beyond which it counts as grown.
+/// Maximum growth of a node's extents since the last sort. A node that grew more counts as grown.
 pub(crate) const GROWN_TO: f32 = 2.0;
 
-/// Minimum share of grown nodes, one in so many, from which the order is bad.
+/// Minimum share of grown nodes, as one in this number, for the order to be bad.
 pub(crate) const GROWN_SHARE: usize = 8;
 
-/// Sorts whose cost questions pay before the boxes are sorted although the order is not bad yet: a sort then adds an eighth at most.
+/// Number of sorts that questions pay for before the boxes are sorted although the order is not bad: a sort adds at most an eighth.
 pub(crate) const SORTS_FOR_ORDER: u64 = 8;
 
 /// Returns the number of nodes that questions look at before a sort: it then takes about as long as they did. A sort looks at
@@ -19,7 +19,7 @@ pub(crate) fn nodes_for_sort(leaves: u32, ids: usize) -> u64 {
     64 + 256 * u64::from(leaves) + ids as u64 / 4
 }
 
-/// Minimum share of the maximum number of leaves outside the tree, one in so many, from which the order is bad.
+/// Minimum share of the maximum number of leaves outside the tree, as one in this number, for the order to be bad.
 pub(crate) const FEW_LOOSE_SHARE: usize = 8;
 
 /// Returns the maximum number of leaves outside the tree, which every question looks at.

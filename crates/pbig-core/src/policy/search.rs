@@ -2,13 +2,13 @@
 //!
 //! Work is counted in tests of codes, eight to an instruction: about 0.35 ns each.
 
-/// Boxes, one in so many, whose candidates are counted.
+/// Step from one box whose candidates are counted to the next.
 pub(crate) const COUNT_ONE_IN: usize = 32;
 
-/// Oversize boxes whose candidates are counted, at most.
+/// Maximum number of oversize boxes whose candidates are counted.
 pub(crate) const COUNTED_OVERSIZE: usize = 16;
 
-/// Sampled oversize boxes, at least: each can meet most of the others.
+/// Minimum number of sampled oversize boxes: each can meet most of the others.
 pub(crate) const SAMPLED_OVERSIZE: usize = 32;
 
 /// Tests of codes that take as long as an exact test of two boxes that lie one after the other in memory.
@@ -17,23 +17,23 @@ pub(crate) const WORK_OF_EXACT_TEST: u64 = 4;
 /// Tests of codes that take as long as one that does not tell two boxes apart, and the exact test after it.
 pub(crate) const WORK_OF_VAGUE_TEST: u64 = 6;
 
-/// Tests of codes that take as long as what can lie anywhere in memory: an entry of a list, a box that is met, or the ends of a
+/// Tests of codes that take as long as a read from anywhere in memory: of an entry of a list, a box that is met, or the ends of a
 /// run of cells.
 pub(crate) const WORK_OF_ENTRY: u64 = 16;
 
-/// Tests for each box up to which a grid is searched: a tree is sorted and joined in about the same time.
+/// Maximum number of tests for each box for a search of the grid: a tree is sorted and joined in about the same time.
 const GRID_UP_TO_PER_BOX: u64 = 400;
 
-/// Tests of a box that each of its overlaps pays for: in a crowd each box meets many, and a tree is no faster.
+/// Tests of a box that each of its overlaps pays for: in a crowd each box meets many, and a tree is not faster.
 const GRID_UP_TO_PER_PAIR: u64 = 32;
 
-/// Sampled boxes in cells, at least and at most.
+/// Minimum and maximum number of sampled boxes in cells.
 const SAMPLED: std::ops::Range<usize> = 64..512;
 
-/// Work of the whole sample for each box of the world, about.
+/// Approximate work of the whole sample for each box of the world.
 const SAMPLE_WORK_PER_BOX: u64 = 16;
 
-/// Returns true if so much work, or work in vain, leaves the grid faster than a tree.
+/// Returns true if the grid is faster than a tree, with this work and this work in vain.
 pub(crate) fn is_light(boxes: usize, work: u64) -> bool {
     work <= GRID_UP_TO_PER_BOX * boxes as u64
 }
@@ -48,7 +48,7 @@ pub(crate) fn in_vain(work: u64, overlaps: u64) -> u64 {
     work.saturating_sub(GRID_UP_TO_PER_PAIR * overlaps)
 }
 
-/// Returns the step of the sample: one box in so many is searched, to estimate the work in vain.
+/// Returns the step from one sampled box to the next. Sampled boxes are searched, to estimate the work in vain.
 pub(crate) fn sample_one_in(boxes: usize, work: u64) -> usize {
     let by_work = (work / (SAMPLE_WORK_PER_BOX * boxes.max(1) as u64)) as usize;
     by_work.clamp(boxes / SAMPLED.end, boxes / SAMPLED.start) + 1
@@ -59,7 +59,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_grid_is_searched_where_its_cells_hold_few_or_many_of_them_pair() {
+    fn a_grid_is_searched_if_cells_hold_few_or_many_pair() {
         assert!(is_light(1000, 400_000) && !is_light(1000, 400_001));
         assert_eq!((in_vain(4000, 100), in_vain(4000, 1000)), (800, 0));
         assert_eq!(sample_one_in(100_000, 16_000_000), 196);

@@ -86,7 +86,7 @@ impl Number {
 }
 
 impl<R: Read> Array<R> {
-    /// Reads the head of an array of so many dimensions.
+    /// Reads the head of an array with this number of dimensions.
     fn open(mut source: Source<R>, dimensions: usize) -> Result<Self, String> {
         let head = read_head(&mut source.reader)?;
         source.length = source.length.map(|length| length.saturating_sub(head.len() as u64));
@@ -98,7 +98,7 @@ impl<R: Read> Array<R> {
         Ok(Self { source, frames, boxes, number, is_fortran: header.layout.is_fortran() })
     }
 
-    /// Number of boxes to ask memory for: none before they come where the length of the file is not known.
+    /// Returns the number of boxes to reserve memory for: none if the length of the file is not known.
     fn room(&self) -> usize {
         self.source.length.map_or(0, |_| self.boxes)
     }
@@ -229,7 +229,7 @@ fn check_start(bytes: &[u8]) -> Result<(), String> {
     match bytes {
         [] => Err("the file is empty".into()),
         _ if bytes.starts_with(MAGIC) => Ok(()),
-        _ => Err("this is no .npy file, as `numpy.save` writes it".into()),
+        _ => Err("not a .npy file, as `numpy.save` writes it".into()),
     }
 }
 
@@ -242,7 +242,7 @@ fn header_length(start: &[u8]) -> Option<u64> {
     }
 }
 
-/// The longest header that is read, in bytes. Its length in the file may say up to 4 GiB.
+/// Maximum length of a header, in bytes. A file may claim up to 4 GiB.
 const MAX_HEADER_BYTES: u64 = 1 << 16;
 
 const NOT_NUMPYS: &str = "the header is none that numpy writes for an array of floats";
@@ -259,7 +259,7 @@ fn check_depth(header: &[u8]) -> Result<(), String> {
     if deepest > DEEPEST { Err(NOT_NUMPYS.into()) } else { Ok(()) }
 }
 
-/// Checks that a file with so many bytes after its head holds exactly the values that its shape promises.
+/// Checks that a file with these bytes after its head holds exactly the values that its shape promises.
 fn check_size(lengths: &[usize], size: u64, found: Option<u64>) -> Result<(), String> {
     let shape = shape_text(lengths);
     let bytes_of =
@@ -296,7 +296,7 @@ mod tests {
 
     #[test]
     fn a_wrong_head_is_refused_before_the_values_are_read() {
-        let no_npy = "this is no .npy file, as `numpy.save` writes it";
+        let no_npy = "not a .npy file, as `numpy.save` writes it";
         assert_eq!((endless(b"", None).as_str(), endless(b"\x93NUMPX", None).as_str()), (no_npy, no_npy));
         assert_eq!(endless(b"\x93NUMPY\x03\x00\xff\xff\xff\xff", None), NOT_NUMPYS);
         for (start, words) in [

@@ -4,7 +4,7 @@ use super::{BoxList, MAX_BOXES, Place, brief, one_line, too_many};
 use pbig_core::Aabb;
 use std::io::{self, BufRead};
 
-/// The longest line that is read, in bytes. Six numbers need a few hundred.
+/// Maximum length of a line, in bytes. Six numbers need a few hundred.
 const MAX_LINE_BYTES: usize = 64 << 10;
 
 /// The columns of a `.csv` file.
@@ -184,7 +184,7 @@ mod tests {
     }
 
     #[test]
-    fn more_boxes_than_a_search_takes_are_refused_while_they_are_read() {
+    fn too_many_boxes_are_refused_while_they_are_read() {
         let line = b"0,0,0,1,1,1\n";
         let three = [&line[..]; 3].concat();
         assert_eq!(boxes(&three[..], 3).expect("as many as may be").boxes.len(), 3);
@@ -202,7 +202,7 @@ mod tests {
     }
 
     #[test]
-    fn the_header_of_savetxt_and_a_mark_before_the_text_are_understood() {
+    fn the_header_of_savetxt_and_a_byte_order_mark_are_read() {
         let one = csv_boxes(b"0,0,0,1,1,1\n");
         for head in
             ["# min_x,min_y,min_z,max_x,max_y,max_z\n", "#MIN_X, min_y,min_z,max_x,max_y,max_z\n", "\u{feff}"]

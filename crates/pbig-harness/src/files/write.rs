@@ -54,7 +54,7 @@ pub fn write_pairs(path: &Path, pairs: &[Pair]) -> Result<(), String> {
 pub fn write_csv(path: &Path, header: &str, lines: impl IntoIterator<Item = String>) -> Result<(), String> {
     if is_stdout(path) {
         return match write_lines(io::stdout().lock(), header, lines) {
-            // A reader that has gone away (`| head`) is no failure.
+            // A reader that has gone away (`| head`) is not an error.
             Err(error) if error.kind() != ErrorKind::BrokenPipe => Err(at(Path::new("stdout"), error)),
             _ => Ok(()),
         };

@@ -2,7 +2,7 @@
 
 use super::Density;
 
-/// Random edges are replaced by so many typical ones.
+/// The number of typical edges that stand for random ones.
 const SAMPLES: usize = 32;
 
 /// Returns the edge of the cube in which the centers of `n` boxes are uniform, but for heights of boxes that fall: these are on

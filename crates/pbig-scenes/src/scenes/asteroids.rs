@@ -63,7 +63,7 @@ fn fill(b: &mut Builder, middle: RigidBodyHandle, cube: Vec3, half: f32, left: u
     }
 }
 
-/// Returns a pull toward the middle, whatever the mass. Without it the first collisions would scatter the field for good.
+/// Returns a pull toward the middle that does not depend on the mass. Without it the first collisions would scatter the field for good.
 fn pull() -> GenericJointBuilder {
     let free = GenericJointBuilder::new(JointAxesMask::empty());
     [JointAxis::LinX, JointAxis::LinY, JointAxis::LinZ].into_iter().fold(free, |joint, axis| {

@@ -38,7 +38,7 @@ struct Every {
     first: [Option<i64>; 3],
 }
 
-/// The numbers of boxes all of whose pairs are looked at: fewer for ways that are slow, or wrong for most pairs, which costs time.
+/// Returns the numbers of boxes all of whose pairs are looked at: fewer for ways that are slow or mostly wrong.
 fn boxes(has_few: bool, quick: bool) -> Vec<i64> {
     match (quick, has_few) {
         (true, false) => (2..=250).chain([1000]).collect(),
@@ -82,7 +82,7 @@ fn every_table(all: &[Every], quick: bool) -> Result<Table, Failure> {
     }
     let boxes = boxes(true, quick);
     let wrong = boxes.par_iter().find_any(|n| !lazy_way_is_right(**n));
-    check(wrong.is_none(), || format!("{LAZY}: a pair is wrong of so many boxes: {wrong:?}"))?;
+    check(wrong.is_none(), || format!("{LAZY}: a pair is wrong with this number of boxes: {wrong:?}"))?;
     let pairs: i64 = boxes.iter().map(|n| pairs_of(*n)).sum();
     let head = cells![LAZY, CORRECTIONS[0], boxes.last().copied(), boxes.len(), pairs];
     table.row(cells![..head, 0, 0.0, (), 0, 0, 0, 0]);

@@ -19,7 +19,7 @@ const DEFAULT: usize = 2;
 /// Rounds that do not count: boxes are new in the first, and later ones learn how they move.
 const WARM_UP: usize = 8;
 
-/// Pairs are compared with brute force in one of so many rounds.
+/// Rounds from one comparison with brute force to the next.
 const COMPARED: usize = 10;
 
 /// All is done so often. The work is the same each time, so the shortest time of each round is the one least disturbed.
@@ -30,7 +30,7 @@ pub(super) fn run(quick: bool) -> Result<Report, Failure> {
     let mut rows = worlds(quick)?;
     rows.extend(boxes(quick)?);
     let tables = vec![table(&rows), means(&rows)];
-    let axes = ["broad phase, ms a step", "extra pairs, % of those that overlap"];
+    let axes = ["broad phase, ms a step", "extra pairs, % of overlapping pairs"];
     let scene = |row: &MarginRow| row.case.split(' ').next().unwrap_or_default().to_owned();
     let mut firsts: Vec<&[MarginRow]> = rows.chunks(MARGINS.len()).collect();
     firsts.sort_by_key(|case| scene(&case[0]));
@@ -328,7 +328,7 @@ mod tests {
     }
 
     #[test]
-    fn cases_count_alike_and_the_noise_of_a_mean_is_less_than_that_of_a_case() {
+    fn cases_count_alike_and_a_mean_has_less_noise_than_a_case() {
         assert_eq!(MARGINS[DEFAULT] as f32, PbigConfig::DEFAULT.margin);
         let case =
             |ms: f64, fifth: f64| (0..MARGINS.len()).map(move |k| row(k, if k == 4 { fifth } else { ms }));

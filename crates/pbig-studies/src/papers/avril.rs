@@ -206,7 +206,7 @@ mod tests {
     use pbig_core::oracle;
 
     #[test]
-    fn every_form_has_the_pairs_of_brute_force_and_the_bytes_of_the_calculation() {
+    fn every_form_has_the_oracles_pairs_and_the_calculated_bytes() {
         assert_eq!((output_bytes(1000), output_bytes(7)), ([499_500, 62_438], [21, 3]));
         let boxes = cubes(90, 1.0, 3.0, 1);
         let pairs = oracle::pairs(&boxes);

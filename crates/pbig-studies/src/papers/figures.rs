@@ -11,9 +11,9 @@ use pbig_core::{Aabb, CellRule, Coding, Config, Finder, GpuOptions, GpuReport, O
 use pbig_harness::prelude::*;
 use std::time::Duration;
 
-/// Most pairs of a call here: their list and its copy stay below 4 GB.
+/// Maximum number of pairs of a call here: their list and its copy stay below 4 GB.
 const MOST_PAIRS: f64 = 2e8;
-/// Most boxes for PBIG's grid on one thread.
+/// Maximum number of boxes for PBIG's grid on one thread.
 const MOST_PLAIN: usize = 1_000_000;
 
 pub(super) fn tables(setup: &Setup) -> Result<Vec<Table>, Failure> {
@@ -78,7 +78,7 @@ fn in_slabs(boxes: &[Aabb], slabs: usize) -> Result<(u64, f64), Failure> {
     Ok((pairs, ms))
 }
 
-/// Most checks of cells that are tried: about three minutes on one thread, at 9 ns each.
+/// Maximum number of checks for a size of cells to be tried: about three minutes on one thread, at 9 ns each.
 const MOST_CHECKS: f64 = 2e10;
 
 /// Figure 9: the lengths of the figure, and equation 6 as we use it and as the paper does. Cells that would hold less than a
@@ -107,7 +107,7 @@ fn by_length(setup: &Setup) -> Result<Table, Failure> {
     Ok(table)
 }
 
-/// Returns the row of some cells, in which so many pairs must be found. The time is the shortest of three; of one if that makes
+/// Returns the row of some cells, in which this number of pairs must be found. The time is the shortest of three; of one if that makes
 /// the run too long.
 fn cells_of(boxes: &[Aabb], pairs: u64, options: GpuOptions, setup: &Setup) -> Result<Vec<Value>, Failure> {
     let mut call = once(Way::Pbig(options), boxes)?;

@@ -43,7 +43,7 @@ impl Model {
         Self { space: Space::Even(SPACE), has_corners: false, lengths: [low, high], cubes: false }
     }
 
-    /// As above, with one length for all axes of a box.
+    /// Boxes like [`Model::boxes`], with one length for all axes.
     pub(super) const fn cubes(low: f64, high: f64) -> Self {
         Self { cubes: true, ..Self::boxes(low, high) }
     }
@@ -74,7 +74,7 @@ impl Model {
         (pairs + 4.0 * pairs * pairs / n as f64 * relative).sqrt()
     }
 
-    /// By how many standard deviations a count is off; positive when there are more.
+    /// Returns the deviation of a count in standard deviations, positive if it is larger than expected.
     pub(super) fn off(&self, n: usize, count: u64) -> f64 {
         (count as f64 - self.pairs(n)) / self.deviation(n)
     }
@@ -90,7 +90,7 @@ impl Model {
     }
 
     /// Along an axis the mean square of a box's chance to meet another, by where it lies, over the square of
-    /// its mean. Normal: `2 / sqrt(3)` whatever the deviation. Even, with mean length `t` of the space: 1 but for
+    /// its mean. Normal: `2 / sqrt(3)` for every deviation. Even, with mean length `t` of the space: 1 but for
     /// boxes near the border, which have fewer around them; `4 t^2 (1 - 5 t / 6)` over `4 t^2 (1 - t / 2)^2`.
     fn crowding(&self) -> f64 {
         match self.space {

@@ -74,7 +74,7 @@ pub(super) const TABLE_VI: [Timing; 8] = [
 /// `scatter`; `schedule` and `arrange`; `check_*`; `GpuReport::wait` less the kernels; `GpuReport::decode` and emit.
 pub(super) const TASKS: [&str; 7] = ["DataIn", "PLAN", "MAP", "SCHED", "CHECK", "DataOut", "REPORT"];
 
-/// An element of Avril's table 1: row and column from 1 on with so many objects, what is printed there, and its value.
+/// An element of Avril's table 1 for a number of objects: row and column, counted from 1, the printed text, and its value.
 pub(super) type Element = (fn(u64) -> (u64, u64), &'static str, fn(u64) -> u64);
 
 /// Avril, table 1.

@@ -31,7 +31,7 @@ fn stretches(ids: u64, most: u64) -> (Vec<Range<u64>>, f64) {
 /// Ids whose pairs are made before they are tested.
 const BLOCK: u64 = 1024;
 
-/// Counts overlapping pairs among the ids. In the caller, so that the way to a pair is no call.
+/// Counts overlapping pairs among the ids. Inlined, so that `pair` is not a function call.
 #[inline(always)]
 fn overlaps(boxes: &[Aabb], ids: &[Range<u64>], pair: impl Fn(i64, i64) -> Option<(i64, i64)>) -> u64 {
     let (n, mut block, mut found) = (boxes.len() as i64, Vec::new(), 0);

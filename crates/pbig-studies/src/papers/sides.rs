@@ -25,7 +25,7 @@ pub(super) fn on_gpu(gpu: GpuOptions) -> Way {
 #[derive(Clone, Default)]
 pub(super) struct Call {
     pub(super) ms: f64,
-    /// The median of a race, whatever the place in a round.
+    /// The median of a race, over all places in a round.
     pub(super) median: f64,
     /// The length of PBIG's cells, where it has them.
     pub(super) cell: Option<f32>,
@@ -52,7 +52,7 @@ impl Side {
         Self { way, finder, calls: vec![] }
     }
 
-    /// Makes a call. One that a device left to the CPU is no measurement of the device, and fails.
+    /// Makes a call. Fails if a device left it to the CPU.
     fn call(&mut self, boxes: &[Aabb]) -> Result<Call, Failure> {
         if let Way::Pbig(options) = self.way {
             let (found, ms) = timed(|| pbig_grid(boxes, &options));
@@ -74,7 +74,7 @@ pub(super) fn once(way: Way, boxes: &[Aabb]) -> Result<Call, Failure> {
     Side::new(way, None).call(boxes)
 }
 
-/// Rounds for so many boxes: enough for a median where a call is short, few where it takes seconds.
+/// Returns the rounds for `n` boxes: enough for a median if a call is short, few if it takes seconds.
 pub(super) fn effort(boxes: usize) -> Effort {
     let (warm_up, rounds) = if boxes > 200_000 { (1, 3) } else { (3, 15) };
     Effort { warm_up, rounds, budget: Duration::from_secs(5) }
@@ -141,13 +141,13 @@ impl Setup {
         }
     }
 
-    /// Returns the device for a set of so many boxes: a program that plays one takes minutes for millions.
+    /// Returns the device for a set of `n` boxes. A software adapter takes minutes for millions, so it gets small sets only.
     pub(super) fn for_boxes(&self, boxes: usize) -> Option<&GpuFinder> {
         let most_in_software = if self.quick { 10_000 } else { 50_000 };
         self.gpu.as_ref().filter(|gpu| !gpu.is_software() || boxes <= most_in_software)
     }
 
-    /// Returns a call of each setting on moving boxes; none without a device for so many. Fails if they find other pairs than the
+    /// Returns a call of each setting on moving boxes; none without a device for this number. Fails if they find other pairs than the
     /// CPU.
     pub(super) fn run(&self, ways: &[Way], boxes: &[Aabb], distance: f32) -> Result<Vec<Call>, Failure> {
         let Some(gpu) = self.for_boxes(boxes.len()) else { return Ok(vec![]) };

@@ -258,7 +258,7 @@ mod tests {
     }
 
     #[test]
-    fn the_expected_checks_are_those_of_the_grid_in_cells_of_the_wanted_length() {
+    fn the_expected_checks_are_those_of_the_grid() {
         let model = Model { space: Space::Even(100.0), lengths: [0.0, 10.0], ..fitting(1000, 1.0) };
         let boxes = model.draw(20_000, 1);
         let call = once(Way::Pbig(options_for(&boxes, 10.0)), &boxes).expect("found");

@@ -3,7 +3,7 @@
 //! An *ulp*, a unit in the last place, is the distance from a float to the next. Far from the origin it is large: 1/128
 //! of a length unit at 10^5, 1 at 10^7. Let `u` be 2^-24, so that an operation rounds by at most `u` times its result and by
 //! half an ulp of it; `t` the coordinate of the pose on an axis; `E` the farthest that the box reaches from the pose's
-//! position on any axis. How much too far inside may a bound be that parry 0.22 computes?
+//! position on any axis. The question is by how much a bound that parry 0.22 computes can lie too far inside.
 //!
 //! - **Sums with `t`** are rounded up to three times: where a shape's corner or centre is, what it reaches from there
 //!   (a radius, half extents, a border), and contact skin with prediction. A ball, a cuboid and a hull have two of these.
@@ -18,7 +18,7 @@
 //!
 //! So a bound is too far inside by at most 1.5 ulps of `|t| + 2 E` and 171 `u E`. Two of `ulp(|t| + 2 E) + 128 u E` are more:
 //! before it is rounded, the widened bound is not inside the exact one. Rounding is monotone, so what it parts was
-//! apart: **with 2, whatever overlaps exactly still does**. A position that was rounded from f64 is off by half an ulp
+//! apart: **with 2, all boxes that overlap exactly still do**. A position that was rounded from f64 is off by half an ulp
 //! more, its rotation by 8 `u E`: with 3, also what overlaps there. (Above 10^-30 in size, where products do not underflow.)
 
 use pbig_core::Aabb;
@@ -27,7 +27,7 @@ use rapier3d::prelude::{Isometry, Real};
 /// The loss by rotations, as a part of the size: half of it for each of two ulps.
 const ROTATION: f32 = 128.0 / (1 << 24) as f32;
 
-/// The box with every bound moved outward by so many units in the last place (ulps) of the numbers that it was computed
+/// The box with every bound moved outward by `ulps` units in the last place (ulps) of the numbers that it was computed
 /// from: the position of the shape on that axis and the box's reach, with 2^-17 of that for rotations.
 ///
 /// With 2, boxes that parry has computed in f32 for two shapes overlap if the exact boxes of these shapes do at the same
@@ -66,7 +66,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_invalid_or_infinite_stays_so_and_widens_nothing_else() {
+    fn invalid_and_infinite_bounds_stay_so_and_widen_no_other() {
         for invalid in [Aabb::new([1e7, 0.0, 0.0], [1e7 - 1.0, 1.0, 1.0]), Aabb::NOWHERE] {
             let wide = widened_by_ulps(&invalid, &pose([1e7, 0.0, 0.0]), u32::MAX);
             assert!(!wide.is_valid(), "{wide:?}");

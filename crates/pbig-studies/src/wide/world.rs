@@ -108,7 +108,7 @@ mod tests {
 
     /// Both fall by Newton's law until the lowest touch the ground, so much alike that only rounding is between them.
     #[test]
-    fn in_f64_the_world_goes_where_it_goes_in_f32_while_nothing_touches() {
+    fn worlds_in_f64_and_f32_agree_while_nothing_touches() {
         let offset = [5.0; 3];
         let world = Scene::named("column").expect("a scene").build(27, 1);
         let mut wide = WideWorld::of(&world, offset).expect("balls and cuboids");

@@ -51,7 +51,7 @@ fn a_bad_margin_is_an_error_and_no_other_margin_is_taken() {
 }
 
 #[test]
-fn an_update_that_fails_sends_nothing_tells_why_and_the_next_one_sees_its_changes() {
+fn a_failed_update_says_why_and_the_next_sees_its_changes() {
     let (colliders, handles) = row(12);
     let config = PbigConfig { max_pairs: 3, ..PbigConfig::DEFAULT };
     let mut broad_phase = PbigBroadPhase::with_config(config).expect("a length");
@@ -70,7 +70,7 @@ fn an_update_that_fails_sends_nothing_tells_why_and_the_next_one_sees_its_change
 
 /// A ground and balls on it, in an update that has too many pairs after some balls were removed.
 #[test]
-fn after_a_failed_update_the_pairs_are_those_of_colliders_that_are_there() {
+fn after_a_failed_update_pairs_have_existing_colliders() {
     let mut colliders = ColliderSet::new();
     let ground = colliders.insert(ColliderBuilder::cuboid(100.0, 1.0, 1.0));
     let mut ball = |i: usize| {
@@ -101,7 +101,7 @@ fn after_a_failed_update_the_pairs_are_those_of_colliders_that_are_there() {
 }
 
 #[test]
-fn a_box_that_the_core_refuses_is_an_error_in_each_update_until_there_is_room() {
+fn a_refused_box_is_an_error_until_there_is_room() {
     let (mut colliders, handles) = row(5);
     let limits = pbig_core::Limits { max_boxes: 4, ..pbig_core::Limits::DEFAULT };
     let config = pbig_core::Config { limits, ..PbigConfig::DEFAULT.into() };
@@ -121,7 +121,7 @@ fn a_box_that_the_core_refuses_is_an_error_in_each_update_until_there_is_room() 
 }
 
 #[test]
-fn a_length_unit_that_is_no_length_is_an_error_until_it_is_mended() {
+fn a_bad_length_unit_is_an_error_until_it_is_mended() {
     let (colliders, handles) = row(3);
     let (mut broad_phase, bodies) = (PbigBroadPhase::new(), RigidBodySet::new());
     for (length_unit, is_good) in [(1.0, true), (-1.0, false), (1.0, true)] {
@@ -132,7 +132,7 @@ fn a_length_unit_that_is_no_length_is_an_error_until_it_is_mended() {
 }
 
 #[test]
-fn adopting_a_world_leaves_no_collider_and_nothing_to_draw_or_ask_about() {
+fn adopting_a_world_forgets_the_old_colliders() {
     let (colliders, handles) = row(100);
     let mut broad_phase = PbigBroadPhase::new();
     update(&mut broad_phase, &colliders, &handles, &[]);
@@ -203,7 +203,7 @@ impl PointQuery for Trap {
 
 /// The call in which a shape panics changes nothing half: the next call reads all colliders, although rapier lists them once.
 #[test]
-fn after_a_shape_has_panicked_the_next_call_sees_all_that_the_other_one_missed() {
+fn after_a_shape_panicked_the_next_call_misses_nothing() {
     // On one thread, and on several.
     for count in [40, 9000] {
         let ((mut colliders, mut handles), is_armed) = (row(count), Arc::new(AtomicBool::new(false)));

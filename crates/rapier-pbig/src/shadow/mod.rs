@@ -86,14 +86,14 @@ impl Watcher {
         Self { checker: self.checker.every(every), ..self }
     }
 
-    /// Prepares for another world, or one that is not new. `pairs` are those that the narrow phase has. Stock sees all colliders
-    /// in the next call.
+    /// Prepares for another world, or for one that already has pairs. `pairs` are the narrow phase's. Stock sees all colliders in
+    /// the next call.
     pub fn start_over(&mut self, pairs: impl IntoIterator<Item = HandlePair>) {
         self.checker.start_over(pairs);
         self.stock = Stock::default();
     }
 
-    /// As [`Watcher::start_over`], with rapier's pairs.
+    /// Calls [`Watcher::start_over`] with the pairs of rapier's narrow phase.
     pub fn start_over_with(&mut self, pairs: impl IntoIterator<Item = ColliderPair>) {
         self.start_over(pairs.into_iter().map(|pair| of_pair(&pair)));
     }
@@ -155,9 +155,9 @@ mod tests {
         assert_eq!((checker.compared, checker.oracle_pairs, checker.stock_only), (1, 1, 1));
     }
 
-    /// Contract 7: numbers that no length is, for which rapier's own functions panic, end the pairs and not the program.
+    /// Contract 7: rapier's own functions panic on negative and NaN distances. Here such a distance ends pairs, not the program.
     #[test]
-    fn contact_skins_and_predictions_that_are_no_lengths_are_checked_like_any_other() {
+    fn bad_contact_skins_and_predictions_are_checked_too() {
         for bad in [-3.0, f32::NAN, f32::NEG_INFINITY] {
             for is_skin in [true, false] {
                 let (mut colliders, pair) = scene::tests::balls(0.9);
@@ -176,7 +176,7 @@ mod tests {
     }
 
     #[test]
-    fn without_the_oracle_stocks_pairs_are_demanded_where_there_is_a_contact() {
+    fn without_the_oracle_stocks_contacts_are_demanded() {
         // Along an axis the balls touch; along the diagonal of a face only their boxes do.
         for (y, faults) in [(0.0, &[Fault::MissingContact][..]), (0.9, &[])] {
             let (mut colliders, pair) = scene::tests::balls(0.9);

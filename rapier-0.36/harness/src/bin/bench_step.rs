@@ -30,7 +30,7 @@ struct Args {
     /// Seconds for each row after the first step, which is not counted.
     #[arg(long, default_value_t = 60)]
     seconds: u64,
-    /// Where to write all rows (CSV).
+    /// File for all rows (CSV).
     #[arg(long)]
     write: Option<PathBuf>,
 }

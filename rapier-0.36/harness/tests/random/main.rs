@@ -265,7 +265,7 @@ impl Player {
         self.broad_phase = self.broad_phase.clone();
     }
 
-    /// Changes what the margin depends on. Only larger ones: boxes of before would have pairs that the new margin has not.
+    /// Changes what the margin depends on. Margins only grow: with a smaller one, older boxes would have pairs that it excludes.
     fn change_margin(&mut self) {
         if self.rng.random_range(0..2) == 0 {
             self.is_adaptive = true;
@@ -282,7 +282,7 @@ impl Player {
         rapier_pbig::install_finder(&mut self.broad_phase, subject(self.plant));
     }
 
-    /// A body whose velocity is no number is put out of action by rapier.
+    /// Gives a body a velocity of NaN. Rapier disables such a body.
     fn quarantine_test(&mut self, body: RigidBodyHandle) {
         if self.rng.random_range(0..10) == 0 {
             self.world.bodies[body].set_linvel(to_vector(Vec3::new(f32::NAN, 0.0, 0.0)), true);
@@ -327,7 +327,7 @@ fn run(seed: u64, plant: Plant, tally: &mut Tally) -> Result<(), String> {
 }
 
 #[test]
-fn random_worlds_have_the_pairs_of_the_oracle_and_miss_no_contact_of_stock() {
+fn random_worlds_have_the_oracles_pairs_and_stocks_contacts() {
     let runs = std::env::var("PBIG_RUNS").ok().and_then(|runs| runs.parse().ok()).unwrap_or(300);
     let mut tally = Tally::default();
     for seed in 0..runs {

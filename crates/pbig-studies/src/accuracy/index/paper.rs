@@ -167,7 +167,7 @@ fn gives_the_figures(way: RoundedRoot, steps: usize) -> bool {
     })
 }
 
-/// Returns the number of ways to round, and of those that give the figures.
+/// Returns the number of ways to round, and the number of ways that give the figures.
 fn ways(form: usize, count: usize) -> [usize; 2] {
     let all = steps();
     let late = if count > 2 { &all[..] } else { &all[..1] };
@@ -193,7 +193,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn roots_are_wrong_as_often_near_squares_as_among_all_and_f32_is_exact_up_to_2_to_the_24th() {
+    fn wrong_roots_lie_near_squares_up_to_2_to_the_24th() {
         let [nearest, _, wide] = ROUNDINGS;
         let with = |roundings| ([(false, roundings); 2], 0, nearest);
         for below in [4, 1000, 99_856, 1_000_000] {

@@ -12,7 +12,7 @@ pub(super) struct RootWay {
     /// The largest relative error of the root.
     pub(super) error: f64,
     pub(super) row: Box<dyn Fn(i64, i64) -> i64 + Send + Sync>,
-    /// Counts all pairs of so many boxes.
+    /// Counts all pairs of `n` boxes.
     pub(super) all: Box<dyn Fn(i64) -> [Tally; 3] + Send + Sync>,
     /// Compute the pairs of ranges of indices, for the time of each correction.
     pub(super) passes: [Pass; 3],

@@ -17,7 +17,7 @@ use rapier3d::prelude::*;
 use std::collections::HashMap;
 use std::hash::{DefaultHasher, Hash, Hasher};
 
-/// A world, and the handle of each body by its number, whatever the order in which they are inserted.
+/// A world, and the handle of each body by its number. The number does not depend on the order of insertion.
 struct Numbered {
     world: World,
     bodies: Vec<RigidBodyHandle>,
@@ -199,7 +199,7 @@ fn awake(world: &World) -> f64 {
     percent(awake as u64, dynamic().count() as u64)
 }
 
-/// Pairs are compared with brute force in one of so many steps.
+/// Steps from one comparison with brute force to the next.
 const COMPARED: usize = 20;
 
 /// Runs all ways through a scene, in turn step by step.
@@ -220,7 +220,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn bodies_that_sleep_are_counted_and_pairs_that_end_while_they_touch() {
+    fn sleeping_bodies_and_touching_pairs_that_end_are_counted() {
         let pbig = ways().into_iter().find(Variant::is_pbig).expect("a way");
         let mut side = VariantRun::new(pbig, &Numbered::new(world(("pile", 8, 0)).expect("a scene")));
         for _ in 0..200 {
@@ -246,7 +246,7 @@ mod tests {
     }
 
     #[test]
-    fn in_the_old_order_it_is_the_same_world_and_in_another_it_ends_elsewhere() {
+    fn the_old_order_gives_the_same_world_and_another_does_not() {
         for name in ["column", "ragdolls", "compounds"] {
             let scene = || Numbered::new(Scene::named(name).expect("a scene").build(40, 1));
             let (original, other) = (scene(), scene().inserted(Some(1)));

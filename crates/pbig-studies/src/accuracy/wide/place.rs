@@ -119,7 +119,7 @@ impl<'a> Place<'a> {
     }
 }
 
-/// Returns the boxes of colliders without bodies, or of bodies without soft CCD, widened by so many ulps.
+/// Returns the boxes of colliders without bodies, or of bodies without soft CCD, widened by some ulps.
 pub(super) fn rapiers<'c>(
     params: &IntegrationParameters,
     colliders: impl Iterator<Item = &'c Collider>,

@@ -1,0 +1,167 @@
+//! scripts/patch-rapier.sh in a project of its own: what it makes, what it removes, what it prints, and its errors.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+fn root() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../..").canonicalize().expect("the repository")
+}
+
+/// A user's project, with the script that patches it; removed in the end.
+struct Project {
+    work: PathBuf,
+    script: PathBuf,
+}
+
+impl Project {
+    fn new(name: &str) -> Self {
+        let work = std::env::temp_dir().join(format!("pbig-patch-{name}-{}", std::process::id()));
+        fs::create_dir_all(work.join("a project")).expect("a folder");
+        let work = work.canonicalize().expect("a folder");
+        Self { work, script: root().join("scripts/patch-rapier.sh") }
+    }
+
+    fn folder(&self) -> PathBuf {
+        self.work.join("a project")
+    }
+
+    fn copy(&self) -> PathBuf {
+        self.folder().join("patched/rapier3d-0.36.1")
+    }
+
+    fn write(&self, file: &str, text: &str) {
+        let path = self.folder().join(file);
+        fs::create_dir_all(path.parent().expect("a folder")).expect("a folder");
+        fs::write(path, text).expect("written");
+    }
+
+    /// Copies script and patches into a folder, and uses that copy from now on.
+    fn clone_into(&mut self, folder: &Path) {
+        for part in ["scripts", "patches"] {
+            fs::create_dir_all(folder.join(part)).expect("a folder");
+        }
+        fs::copy(root().join("scripts/patch-rapier.sh"), folder.join("scripts/patch-rapier.sh"))
+            .expect("copied");
+        for file in fs::read_dir(root().join("patches")).expect("patches") {
+            let path = file.expect("a file").path();
+            fs::copy(&path, folder.join("patches").join(path.file_name().expect("a name"))).expect("copied");
+        }
+        self.script = folder.join("scripts/patch-rapier.sh");
+    }
+
+    /// Runs the script in the project, and returns what it prints, or its errors.
+    fn run(&self, arguments: &[&str]) -> Result<String, String> {
+        let mut command = Command::new("bash");
+        let run =
+            command.arg(&self.script).args(arguments).current_dir(self.folder()).output().expect("bash");
+        let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
+        if run.status.success() { Ok(text(&run.stdout)) } else { Err(text(&run.stderr)) }
+    }
+
+    #[track_caller]
+    fn fails_with(&self, text: &str, arguments: &[&str]) {
+        let error = self.run(arguments).expect_err("an error");
+        assert!(error.contains(text), "{error}");
+        assert!(!self.copy().exists() && !self.folder().join("patched/rapier3d-0.36.1.new").exists());
+    }
+
+    #[track_caller]
+    fn prints(&self, text: &str, arguments: &[&str]) {
+        let printed = self.run(arguments).expect("success");
+        let text = text.replace("PROJECT", &self.folder().display().to_string());
+        assert!(printed.contains(&text), "{printed}\nnot: {text}");
+    }
+}
+
+impl Drop for Project {
+    fn drop(&mut self) {
+        let _ = fs::remove_dir_all(&self.work);
+    }
+}
+
+fn package(name: &str) -> String {
+    format!("[package]\nname = \"{name}\"\nversion = \"0.0.0\"\n")
+}
+
+fn locked(version: &str) -> String {
+    format!("[[package]]\nname = \"rapier3d\"\nversion = \"{version}\"\n")
+}
+
+#[test]
+fn an_error_says_what_is_wrong_and_leaves_no_copy() {
+    let mut project = Project::new("errors");
+    project.fails_with("no Cargo.toml in '.'", &[]);
+    project.write("Cargo.toml", "");
+    project.fails_with("unknown option '--fast'", &["--fast", "."]);
+    project.write("Cargo.lock", &locked("0.30.0"));
+    project.fails_with("Cargo.lock has rapier3d 0.30.0; the patch is for 0.36.1", &[]);
+    fs::remove_file(project.folder().join("Cargo.lock")).expect("removed");
+    project.clone_into(&project.work.join("old"));
+    let patch = project.work.join("old/patches/rapier3d+0.36.1.patch");
+    let text = fs::read_to_string(&patch).expect("the patch");
+    let other: Vec<&str> =
+        text.lines().map(|line| if line.starts_with(' ') { " none" } else { line }).collect();
+    fs::write(&patch, other.join("\n")).expect("written");
+    project.fails_with("the patch rapier3d+0.36.1.patch does not apply", &[]);
+    fs::remove_file(&patch).expect("removed");
+    project.fails_with("run the script from a copy of pbig's repository", &[]);
+}
+
+#[test]
+fn the_copy_is_made_anew_and_removed_alone() {
+    let project = Project::new("copies");
+    project.write("Cargo.toml", &package("plain"));
+    project.write("src/lib.rs", "");
+    // The version for 0.27 may stand beside it.
+    project.write("Cargo.lock", &(locked("0.27.0") + &locked("0.36.1")));
+    let has = |file: &str, word: &str| {
+        fs::read_to_string(project.copy().join(file)).expect("a file").contains(word)
+    };
+    project.run(&["--edge-lookup"]).expect("success");
+    assert!(has("src/data/graph.rs", "find_edge_visiting"));
+    project.write("patched/rapier3d-0.36.1/left", "");
+    project.run(&[]).expect("success");
+    assert!(has("src/geometry/broad_phase_bvh/pair_finder.rs", "PairFinder"));
+    assert!(!has("src/data/graph.rs", "find_edge_visiting") && !project.copy().join("left").exists());
+    project.write("patched/mine", "");
+    project.run(&["--undo"]).expect("success");
+    assert!(!project.copy().exists() && project.folder().join("patched/mine").exists());
+}
+
+const IN_A_WORKSPACE: &str = "Add to PROJECT/Cargo.toml, the root of the workspace, unless it has them:
+
+    [workspace]
+    exclude = [\"third party/pbig\", \"patched\"]
+
+    [patch.crates-io]
+    rapier3d = { path = \"patched/rapier3d-0.36.1\" }
+
+Add to PROJECT/crates/app/Cargo.toml:
+
+    [dependencies]
+    rapier-pbig = { path = \"../../third party/pbig/rapier-0.36/rapier-pbig\" }
+";
+
+#[test]
+fn it_prints_the_lines_for_each_manifest() {
+    let mut project = Project::new("lines");
+    project.write("Cargo.toml", &package("plain"));
+    project.write("src/lib.rs", "");
+    project.prints(&format!("path = \"{}/rapier-0.36/rapier-pbig\"", root().display()), &[]);
+    project.clone_into(&project.folder().join("third party/pbig"));
+    project.prints("rapier-pbig = { path = \"third party/pbig/rapier-0.36/rapier-pbig\" }", &[]);
+    // A virtual workspace, named by its member and by its root.
+    fs::remove_dir_all(project.folder().join("src")).expect("removed");
+    project.write("Cargo.toml", "[workspace]\nmembers = [\"crates/app\"]\n");
+    project.write("crates/app/Cargo.toml", &(package("app") + "[dependencies]\nrapier3d = \"0.36\"\n"));
+    project.write("crates/app/src/lib.rs", "");
+    project.prints(IN_A_WORKSPACE, &["crates/app"]);
+    assert!(project.copy().exists() && !project.folder().join("crates/app/patched").exists());
+    project.prints(IN_A_WORKSPACE, &[]);
+    project.write("crates/app/Cargo.toml", &package("app"));
+    project.prints("Add to the Cargo.toml of the member that uses rapier:", &[]);
+    // A root that is a package as well.
+    project.write("Cargo.toml", &(package("top") + "[lib]\npath = \"crates/app/src/lib.rs\"\n[workspace]\n"));
+    project.prints("Add to PROJECT/Cargo.toml:\n\n    [dependencies]\n", &[]);
+}

@@ -1,0 +1,245 @@
+#!/usr/bin/env bash
+# Checks beside scripts/test.sh, each with a name:
+#   scripts/extra.sh [--no-setup] NAME [ARGUMENT...]     it calls setup.sh first, unless told not to
+#   features [KIND...]     rapier's own features, and sets of pbig's: see `test_features`
+#   publish                what would be published; publishes nothing
+#   wasm                   the corpus and a rapier world under node, without and with SIMD; from clean two minutes
+#   aarch64                pbig-core's unit tests, the corpus and a rapier world under qemu; ten minutes
+#   viewer                 builds, lints and tests the viewer, on rapier 0.36.1 too if its patched copy is there
+#   pictures               makes docs/images again from a fixed seed, with the times of this machine
+#   sanitize KIND          pbig-core's unit tests with a sanitizer, `address` or `thread`
+#   fuzz [SECONDS] [TARGET...]     each target for 600 seconds; needs nightly Rust and cargo-fuzz
+set -euo pipefail
+cd "$(dirname "$0")/.."
+. scripts/common.sh
+
+# sets FEATURE...: prints every set of the features, one a line, separated by commas.
+sets() {
+    [ $# -gt 0 ] || { echo && return; }
+    local first=$1 set
+    shift
+    sets "$@" | while read -r set; do
+        echo "$set"
+        echo "$first${set:+,$set}"
+    done
+}
+
+# lint PACKAGE OPTIONS FEATURE...: lints a package, and its dependencies of the workspace, with every set of the features.
+lint() {
+    local package=$1 options=$2 set
+    shift 2
+    sets "$@" | while read -r set; do
+        echo "== $package with '$set'"
+        # Not quoted: several words, or none.
+        cargo clippy --quiet --locked --release $options -p "$package" --no-default-features --features "$set" -- -D warnings \
+            </dev/null
+    done
+}
+
+# test_features KIND: none, parallel, simd and deterministic test all that depends on rapier, with this feature of rapier alone
+# (`parallel`, `simd-stable`, `enhanced-determinism`). powerset and powerset-0.36 lint pbig with every set of its features.
+test_features() {
+    local kind=$1
+    case $kind in
+    powerset)
+        lint rapier-pbig "" parallel gpu serde debug-render shadow
+        lint pbig-core "" gpu unstable-study
+        ;;
+    powerset-0.36) lint rapier-pbig "--manifest-path rapier-0.36/Cargo.toml" parallel gpu debug-render shadow ;;
+    *)
+        step cargo test --locked --release -p pbig-tests --no-default-features --features "${kind#none}" --test suite -- \
+            calls drop_in upstream shapes restore queries explain random_worlds worlds::a_scene_gives
+        ;;
+    esac
+}
+
+run_features() {
+    [ $# -gt 0 ] || set -- none parallel simd deterministic
+    for kind in "$@"; do test_features "$kind"; done
+}
+
+# check_contents PACKAGE FOLDER: the package has a README and the licences. They are copies, because links break on Windows.
+check_contents() {
+    local files file
+    files=$(cargo package --locked --list --allow-dirty -p "$1")
+    for file in README.md LICENSE-MIT LICENSE-APACHE; do
+        case $'\n'$files$'\n' in *$'\n'"$file"$'\n'*) ;; *) echo "$1 has no $file" && exit 1 ;; esac
+    done
+    cmp LICENSE-MIT "$2/LICENSE-MIT"
+    cmp LICENSE-APACHE "$2/LICENSE-APACHE"
+}
+
+# check_dependencies: licences, sources and known vulnerabilities; the list of these comes from outside.
+check_dependencies() {
+    has cargo-deny || { left_out "cargo-deny" && return; }
+    step cargo deny --locked check licenses bans sources
+    if cargo deny --locked fetch db 2>/dev/null; then
+        step cargo deny --locked check advisories
+    else
+        echo "== left out: advisories; their list cannot be fetched"
+    fi
+}
+
+# check_interface OPTION...: compares the interface with the last release's, once there is one.
+check_interface() {
+    local tag
+    tag=$(git describe --tags --abbrev=0 --match 'v*' 2>/dev/null) || return 0
+    has cargo-semver-checks || { left_out "a comparison with $tag, which needs cargo-semver-checks" && return; }
+    step cargo semver-checks --baseline-rev "$tag" "$@"
+}
+
+# check_oldest OPTION...: builds with the oldest Rust that is supported.
+check_oldest() {
+    local version
+    version=$(sed -n 's/^rust-version = "\(.*\)"/\1/p' Cargo.toml)
+    has rustup && rustup run "$version" rustc --version >/dev/null 2>&1 || { left_out "a build with Rust $version" && return; }
+    step env RUSTUP_TOOLCHAIN="$version" cargo check --locked --all-features "$@" --target-dir "$(target_folder)/msrv"
+}
+
+run_publish() {
+    local options="-p pbig-shaders -p pbig-core -p pbig-adapter -p rapier-pbig" folder
+    for folder in shaders crates/pbig-core crates/pbig-adapter crates/rapier-pbig; do
+        check_contents "$(sed -n 's/^name = "\(.*\)"/\1/p' "$folder/Cargo.toml" | head -n 1)" "$folder"
+    done
+    # Each is built from its package, against the others' packages.
+    step cargo publish --dry-run --locked --allow-dirty $options
+    check_dependencies
+    check_interface $options
+    check_oldest $options
+}
+
+# run_module NAME FLAGS: builds the module with these flags of rustc, and runs it.
+run_module() {
+    echo "== WebAssembly $1"
+    RUSTFLAGS=$2 step "${cargo[@]}" build --locked --quiet --release --lib --manifest-path wasm/Cargo.toml \
+        --target "$target" --target-dir "$folder"
+    step node wasm/run.mjs "$folder/$target/release/pbig_wasm.wasm"
+}
+
+run_wasm() {
+    local target=wasm32-unknown-unknown folder
+    choose_cargo "$target" && has node || { left_out "$target" && return; }
+    use_wasm_linker
+    folder="$(target_folder)/wasm"
+    run_module "without SIMD" ""
+    run_module "with SIMD" "-C target-feature=+simd128"
+    step "${cargo[@]}" check --locked --quiet --release --package pbig-scenes --target "$target" --target-dir "$folder"
+}
+
+run_aarch64() {
+    local target=aarch64-unknown-linux-gnu folder
+    choose_cargo "$target" && has aarch64-linux-gnu-gcc && has qemu-aarch64-static || { left_out "$target" && return; }
+    export CARGO_TARGET_AARCH64_UNKNOWN_LINUX_GNU_LINKER=aarch64-linux-gnu-gcc
+    export CARGO_TARGET_AARCH64_UNKNOWN_LINUX_GNU_RUNNER="qemu-aarch64-static -L /usr/aarch64-linux-gnu"
+    folder="$(target_folder)/aarch64"
+    step "${cargo[@]}" test --locked --release -p pbig-core --features serde,unstable-study --lib --target "$target" \
+        --target-dir "$folder"
+    step "${cargo[@]}" run --locked --release --manifest-path wasm/Cargo.toml --target "$target" --target-dir "$folder"
+}
+
+# test_viewer FOLDER
+test_viewer() {
+    local workspace="--manifest-path $1/Cargo.toml"
+    step cargo fmt $workspace --check
+    step cargo build --locked --release $workspace --bins --examples
+    step cargo test --locked --release $workspace -- --include-ignored
+    step cargo clippy --locked --release $workspace --all-targets -- -D warnings
+}
+
+# The tests open a window under Xvfb, press each key, and leave screenshots in viewer/out. A software adapter will do.
+run_viewer() {
+    { has Xvfb && has xdotool && has_libraries libvulkan.so.1; } || { left_out "the viewer" && return; }
+    test_viewer viewer
+    [ -d rapier-0.36/patched/rapier3d-0.36.1 ] ||
+        { left_out "the viewer on rapier 0.36.1" "scripts/patch-rapier.sh rapier-0.36 makes the copy that it needs" && return; }
+    test_viewer rapier-0.36/viewer
+}
+
+# pack PICTURE FROM: writes a PNG file of 256 colours, and fails if it is large.
+pack() {
+    pngquant --force --speed 1 --output "$1" 256 "$2"
+    at_most 400000 "$1"
+}
+
+# at_most BYTES FILE: fails if the file is larger.
+at_most() {
+    local bytes
+    bytes=$(wc -c <"$2")
+    echo "$2: $bytes bytes of at most $1"
+    [ "$bytes" -le "$1" ]
+}
+
+run_pictures() {
+    { has img2webp && has pngquant; } || { left_out "the pictures" && return; }
+    local images=docs/images work viewer
+    work=$(mktemp -d)
+    trap "rm -rf '$work'" EXIT
+    step cargo build --locked --release --manifest-path viewer/Cargo.toml
+    viewer=$(target_folder --manifest-path viewer/Cargo.toml)/release/viewer
+    # One run makes both: pictures of every 8th step, of which one is the README's.
+    step "$viewer" --scene column --bodies 10000 --seed 1 --compare --size 1440x720 --steps 240 --every 8 --frames "$work/falling"
+    pack "$images/falling.png" "$work/falling/00168.png"
+    # Each for the time of its 8 steps, in ms.
+    img2webp -loop 0 -lossy -q 45 -m 4 -d 133 "$work"/falling/*.png -o "$images/falling.webp"
+    at_most 3000000 "$images/falling.webp"
+    step "$viewer" --scene column --bodies 10000 --seed 1 --backend cpu --colour contacts --size 1280x800 \
+        --steps 200 --every 200 --frames "$work/viewer"
+    pack "$images/viewer.png" "$work/viewer/00200.png"
+}
+
+# Optimized a little, with overflow checks and debug assertions. The thread sanitizer has to instrument the standard library:
+# otherwise it does not see locks, and reports each exchange between rayon's threads as a race.
+run_sanitize() {
+    local sanitizer=$1 host std=''
+    host=$(rustc -vV | sed -n 's/^host: //p')
+    if [ "$sanitizer" = thread ]; then
+        [ -d "$(rustc --print sysroot)/lib/rustlib/src" ] ||
+            { left_out "the thread sanitizer" "rustup component add rust-src installs what it needs" && return; }
+        std=-Zbuild-std
+    fi
+    export CARGO_PROFILE_DEV_OPT_LEVEL=1 CARGO_PROFILE_DEV_DEBUG=line-tables-only
+    step env RUSTC_BOOTSTRAP=1 RUSTFLAGS="-Zsanitizer=$sanitizer" cargo test $std --target "$host" \
+        --target-dir "$(target_folder)/sanitize-$sanitizer" -p pbig-core --features serde,unstable-study --lib
+}
+
+# longest TARGET: the length in bytes at which an input takes milliseconds, and no allocation that the input does not account for.
+longest() {
+    case $1 in
+    finder_against_oracle) echo 1600 ;;
+    updates_against_scratch) echo 800 ;;
+    work_is_bounded) echo 100 ;;
+    *) echo 4096 ;;
+    esac
+}
+
+# Seeds are made from the box sets and scenes; the corpus stays in fuzz/corpus. What fails lies in fuzz/artifacts: move it to
+# fuzz/failed/TARGET, where the test suite runs it from then on.
+run_fuzz() {
+    local seconds=${1:-600} target words
+    shift || true
+    [ $# -gt 0 ] || set -- finder_against_oracle updates_against_scratch work_is_bounded decode csv_reader npy_reader
+    step cargo run --release -p pbig-tests --example fuzz_seeds
+    for target in "$@"; do
+        words=''
+        [ ! -f "fuzz/$target.dict" ] || words="-dict=fuzz/$target.dict"
+        # Inputs of every length from the beginning: by itself libFuzzer stays below 30 bytes for minutes.
+        step cargo +nightly fuzz run "$target" -- -len_control=0 -max_total_time="$seconds" -max_len="$(longest "$target")" \
+            -malloc_limit_mb=64 -timeout=60 -print_final_stats=1 $words
+    done
+}
+
+setup=true
+if [ "${1:-}" = --no-setup ]; then setup=false && shift; fi
+name=${1:-}
+case $name in
+wasm | aarch64) parts="rust $name" ;;
+viewer | pictures) parts="rust vulkan $name" ;;
+publish) parts="rust deny msrv semver" ;;
+features | sanitize | fuzz) parts=rust ;;
+*) sed -n '2,/^set/s/^# \{0,1\}//p' "$0" >&2 && exit 2 ;;
+esac
+shift
+if $setup; then scripts/setup.sh $parts || true; fi
+. scripts/common.sh
+"run_$name" "$@"
+echo "== $name: done"
