@@ -12,7 +12,7 @@ choose_cargo "$target" && has aarch64-linux-gnu-gcc && has qemu-aarch64-static |
 export CARGO_TARGET_AARCH64_UNKNOWN_LINUX_GNU_LINKER=aarch64-linux-gnu-gcc
 export CARGO_TARGET_AARCH64_UNKNOWN_LINUX_GNU_RUNNER="qemu-aarch64-static -L /usr/aarch64-linux-gnu"
 folder="$(target_folder)/aarch64"
-step "${cargo[@]}" test --locked --release -p pbig-core --features serde,unstable-study --lib --target "$target" \
+step "${cargo[@]}" test --locked --release -p pbig-core --features serde --lib --target "$target" \
     --target-dir "$folder"
 step "${cargo[@]}" run --locked --release --manifest-path wasm/Cargo.toml --target "$target" --target-dir "$folder"
 echo "== aarch64: all passed"

@@ -46,7 +46,7 @@ for kind in "$@"; do
     case $kind in
     powerset)
         lint rapier-pbig "" parallel gpu serde debug-render shadow
-        lint pbig-core "" gpu unstable-study
+        lint pbig-gpu "" wgpu
         ;;
     powerset-0.36) lint rapier-pbig "--manifest-path rapier-0.36/Cargo.toml" parallel gpu debug-render shadow ;;
     *) test_with "$kind" ;;

@@ -4,7 +4,7 @@
 set -euo pipefail
 cd "$(dirname "$0")/.."
 . scripts/common.sh
-packages="pbig-shaders pbig-core pbig-adapter rapier-pbig"
+packages="pbig-shaders pbig-core pbig-gpu pbig-adapter rapier-pbig"
 options=''
 for package in $packages; do
     options="$options -p $package"
@@ -14,7 +14,7 @@ for package in $packages; do
     done
 done
 # Copies, because links break on Windows.
-for folder in shaders crates/pbig-core crates/pbig-adapter crates/rapier-pbig; do
+for folder in shaders crates/pbig-core crates/pbig-gpu crates/pbig-adapter crates/rapier-pbig; do
     cmp LICENSE-MIT "$folder/LICENSE-MIT"
     cmp LICENSE-APACHE "$folder/LICENSE-APACHE"
 done

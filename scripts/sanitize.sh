@@ -24,7 +24,7 @@ fi
 host=$("${rustc[@]}" -vV | sed -n 's/^host: //p')
 std=()
 if [ -f "$("${rustc[@]}" --print sysroot)/lib/rustlib/src/rust/library/Cargo.lock" ]; then std=(-Zbuild-std); fi
-what=(-p pbig-core --features serde,unstable-study --lib)
+what=(-p pbig-core --features serde --lib)
 # Optimized a little, with overflow checks and debug assertions; a folder for each sanitizer.
 export CARGO_PROFILE_DEV_OPT_LEVEL=1 CARGO_PROFILE_DEV_DEBUG=line-tables-only
 if [ -n "${PBIG_SUITE:-}" ]; then
