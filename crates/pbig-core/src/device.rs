@@ -3,7 +3,7 @@
 use crate::{Aabb, Checks, DeviceReport, Pair, ProxyFilter};
 use std::fmt;
 
-/// A processor that finds pairs, such as a GPU. `pbig-gpu` has one; `examples/other_device.rs` has one in 30 lines.
+/// A processor that finds pairs, such as a GPU. `pbig-gpu` has one, and `examples/other_device.rs` a small one.
 ///
 /// # What a device promises
 ///

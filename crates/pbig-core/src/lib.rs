@@ -26,6 +26,8 @@
 //! for boxes of your own: from ten to a hundred million, of any mix of sizes, anywhere in f32. It
 //! knows boxes only: no rays, no shapes.
 //!
+//! Another processor, such as the GPU of the crate `pbig-gpu`, finds pairs behind the trait [`PairDevice`].
+//!
 //! # What is guaranteed
 //!
 //! * Two valid boxes pair when `a.min <= b.max && b.min <= a.max` on all three axes, in f32, exactly, as

@@ -18,6 +18,11 @@
 // Labels each item in the documentation with the feature that it needs; on docs.rs only, as it takes nightly Rust.
 #![cfg_attr(docsrs, feature(doc_cfg))]
 
+/// Runs the programs in the README as tests.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;
+
 // Hidden modules are for tests and studies, and may change in any release.
 #[doc(hidden)]
 pub mod decode;
