@@ -2,7 +2,8 @@
 //!
 //! `cargo run --release --example own_device`
 
-use pbig_core::{Aabb, Backend, Config, Finder, GpuFinder};
+use pbig_core::{Aabb, Backend, Config, Finder};
+use pbig_gpu::GpuFinder;
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     // An app has these already.
@@ -12,7 +13,8 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
 
     let gpu = GpuFinder::from_device(device, queue)?;
     println!("on {}", gpu.adapter());
-    let mut finder = Finder::with_gpu(Config { backend: Backend::Gpu, ..Config::DEFAULT }, gpu);
+    let config = Config { backend: Backend::Device, ..Config::DEFAULT };
+    let mut finder = Finder::with_device(config, Box::new(gpu));
 
     // A hardware GPU takes a million as well. A software adapter takes a moment for this many.
     let boxes: Vec<Aabb> = (0..20_000u32)
@@ -24,7 +26,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     if let Some(why) = &report.fallback {
         println!("note: {why}");
     }
-    let gpu = report.gpu.as_ref().ok_or("the CPU did the work")?;
+    let gpu = report.device.as_ref().ok_or("the CPU did the work")?;
     println!("  {} bytes up, {} down, {} held on the device", gpu.uploaded, gpu.downloaded, gpu.device_bytes);
     Ok(())
 }

@@ -43,7 +43,7 @@ test_features() {
     case $kind in
     powerset)
         lint rapier-pbig "" parallel gpu serde debug-render shadow
-        lint pbig-core "" gpu unstable-study
+        lint pbig-gpu "" wgpu
         ;;
     powerset-0.36) lint rapier-pbig "--manifest-path rapier-0.36/Cargo.toml" parallel gpu debug-render shadow ;;
     *)
@@ -97,8 +97,8 @@ check_oldest() {
 }
 
 run_publish() {
-    local options="-p pbig-shaders -p pbig-core -p pbig-adapter -p rapier-pbig" folder
-    for folder in shaders crates/pbig-core crates/pbig-adapter crates/rapier-pbig; do
+    local options="-p pbig-shaders -p pbig-core -p pbig-gpu -p pbig-adapter -p rapier-pbig" folder
+    for folder in shaders crates/pbig-core crates/pbig-gpu crates/pbig-adapter crates/rapier-pbig; do
         check_contents "$(sed -n 's/^name = "\(.*\)"/\1/p' "$folder/Cargo.toml" | head -n 1)" "$folder"
     done
     # Each is built from its package, against the others' packages.
@@ -132,7 +132,7 @@ run_aarch64() {
     export CARGO_TARGET_AARCH64_UNKNOWN_LINUX_GNU_LINKER=aarch64-linux-gnu-gcc
     export CARGO_TARGET_AARCH64_UNKNOWN_LINUX_GNU_RUNNER="qemu-aarch64-static -L /usr/aarch64-linux-gnu"
     folder="$(target_folder)/aarch64"
-    step "${cargo[@]}" test --locked --release -p pbig-core --features serde,unstable-study --lib --target "$target" \
+    step "${cargo[@]}" test --locked --release -p pbig-core --features serde --lib --target "$target" \
         --target-dir "$folder"
     step "${cargo[@]}" run --locked --release --manifest-path wasm/Cargo.toml --target "$target" --target-dir "$folder"
 }
@@ -199,7 +199,7 @@ run_sanitize() {
     fi
     export CARGO_PROFILE_DEV_OPT_LEVEL=1 CARGO_PROFILE_DEV_DEBUG=line-tables-only
     step env RUSTC_BOOTSTRAP=1 RUSTFLAGS="-Zsanitizer=$sanitizer" cargo test $std --target "$host" \
-        --target-dir "$(target_folder)/sanitize-$sanitizer" -p pbig-core --features serde,unstable-study --lib
+        --target-dir "$(target_folder)/sanitize-$sanitizer" -p pbig-core --features serde --lib
 }
 
 # longest TARGET: the length in bytes at which an input takes milliseconds, and no allocation that the input does not account for.

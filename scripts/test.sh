@@ -38,7 +38,7 @@ lacks() {
 without_harness() {
     local manifest
     ! has_gpu || return 0
-    for manifest in $(grep -l '^publish' crates/*/Cargo.toml | grep -v '^crates/pbig-scenes/'); do
+    for manifest in $(grep -l '^publish' crates/*/Cargo.toml lab/Cargo.toml | grep -v '^crates/pbig-scenes/'); do
         echo "--exclude $(sed -n 's/^name = "\(pbig.*\)"/\1/p' "$manifest" | head -n 1)"
     done
 }
@@ -67,7 +67,7 @@ step_unit() {
     step cargo build --release --workspace --examples --bins
     step cargo test --release --workspace --exclude pbig-tests $(without_harness) --no-fail-fast
     # Once more with overflow checks and debug assertions, where there is unsafe code and index arithmetic.
-    step cargo test -p pbig-core --features serde,unstable-study --no-fail-fast
+    step cargo test -p pbig-core --features serde --no-fail-fast
 }
 
 step_suite_cpu() {
@@ -111,7 +111,7 @@ step_wasm() {
 # The commands that the documents show, at a size that takes seconds.
 step_examples() {
     step cargo run --release --example falling_objects -- --bodies 500 --steps 60
-    for example in drop_in existing_app headless_test debug_render boxes_to_pairs boxes_events; do
+    for example in drop_in existing_app headless_test debug_render boxes_to_pairs boxes_events other_device; do
         step cargo run --release --example "$example"
     done
     step cargo run --release --bin pbig -- pairs examples/boxes.csv

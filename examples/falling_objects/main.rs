@@ -43,10 +43,8 @@ const CHECK_EVERY: usize = 20;
 
 fn main() -> ExitCode {
     let args = Args::parse();
-    let config = PbigConfig { backend: args.backend.backend(), ..PbigConfig::DEFAULT };
-    let new = || PbigBroadPhase::with_config(config).expect("the default margin is a length");
     let mut stock = Run::new(args.scene, args.bodies as usize, args.seed, DefaultBroadPhase::new());
-    let mut ours = Run::new(args.scene, args.bodies as usize, args.seed, new());
+    let mut ours = Run::new(args.scene, args.bodies as usize, args.seed, args.backend.for_rapier());
     let bar = progress(args.steps.into());
     for _ in 0..args.steps {
         stock.step();
@@ -54,7 +52,7 @@ fn main() -> ExitCode {
         bar.inc(1);
     }
     bar.finish_and_clear();
-    let checked = check(&args, new());
+    let checked = check(&args, args.backend.for_rapier());
     println!("{} with {} bodies, {} steps\n", args.scene.name, args.bodies, args.steps);
     print_table(&stock, &ours, &checked);
     println!("\n{}", ours.broad_phase.inner.stats().report.plan);

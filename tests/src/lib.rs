@@ -4,11 +4,63 @@ mod corpus;
 
 pub use corpus::{Case, corpus, difference};
 
-use pbig_core::{Backend, CellRule, Coding, Config, Engine, GpuOptions};
+use pbig_core::{Backend, BroadPhase, Config, Engine, Finder, PairDevice};
+use pbig_gpu::{CellRule, Coding, GpuOptions};
 // `corpus.rs` finds the generator as `crate::boxes`, because the crate in `wasm/` includes both files.
 use pbig_harness::boxes;
+use pbig_harness::options;
 use std::io::Write;
+use std::ops::Deref;
 use std::sync::LazyLock;
+
+/// A way to find pairs: settings, and those of the GPU if they ask for a device.
+#[derive(Clone, Copy, Debug)]
+pub struct Way {
+    /// The settings of the core.
+    pub config: Config,
+    /// The settings of the GPU.
+    pub gpu: GpuOptions,
+}
+
+impl From<Config> for Way {
+    fn from(config: Config) -> Self {
+        Self { config, gpu: GpuOptions::DEFAULT }
+    }
+}
+
+impl Deref for Way {
+    type Target = Config;
+
+    fn deref(&self) -> &Config {
+        &self.config
+    }
+}
+
+impl Way {
+    /// Returns the way with other settings of the core.
+    pub fn with(mut self, change: impl FnOnce(&mut Config)) -> Self {
+        change(&mut self.config);
+        self
+    }
+
+    /// Returns a finder.
+    pub fn finder(&self) -> Finder {
+        options::finder(self.config, self.gpu)
+    }
+
+    /// Returns a broad phase.
+    ///
+    /// # Panics
+    /// If the margin is no length.
+    pub fn broad_phase(&self) -> BroadPhase {
+        options::broad_phase(self.config, self.gpu).expect("a good margin")
+    }
+
+    /// Returns the GPU, if the settings ask for a device.
+    pub fn device(&self) -> Option<Box<dyn PairDevice>> {
+        options::shared_gpu(self.config.backend, self.gpu)
+    }
+}
 
 /// Returns true if `PBIG_GPU=none` leaves devices out: where a driver must not run, as beside a sanitizer that cannot look into
 /// it. The first call prints this; each test that asks does so, too.
@@ -46,7 +98,7 @@ fn leaves_out(gpu: Option<&str>, ci: Option<&str>) -> Result<bool, String> {
 
 /// Returns true if a test may find pairs with this configuration.
 pub fn may_run(config: &Config) -> bool {
-    config.backend != Backend::Gpu || !without_gpu()
+    config.backend != Backend::Device || !without_gpu()
 }
 
 /// Ends a test, or what is left of it, where devices are left out: the one way for all that need one.
@@ -60,18 +112,18 @@ macro_rules! needs_gpu {
 }
 
 /// Every backend that finds pairs, by name.
-pub fn strategies() -> Vec<(&'static str, Config)> {
-    let on = |backend| Config { backend, ..Config::DEFAULT };
+pub fn strategies() -> Vec<(&'static str, Way)> {
+    let on = |backend| Way::from(Config { backend, ..Config::DEFAULT });
     let all = vec![
-        ("auto", Config::DEFAULT),
-        ("grid", grid()),
-        ("tree", Config { engine: Some(Engine::Tree), ..grid() }),
+        ("auto", Config::DEFAULT.into()),
+        ("grid", grid().into()),
+        ("tree", Config { engine: Some(Engine::Tree), ..grid() }.into()),
         ("brute", on(Backend::Brute)),
-        ("gpu", on(Backend::Gpu)),
+        ("gpu", on(Backend::Device)),
         ("gpu grid", gpu(Coding::Plain)),
         ("gpu grid packed", gpu(Coding::Packed)),
     ];
-    all.into_iter().filter(|(_, config)| may_run(config)).collect()
+    all.into_iter().filter(|(_, way)| may_run(way)).collect()
 }
 
 /// The CPU's grid, however few the boxes.
@@ -80,8 +132,8 @@ pub fn grid() -> Config {
 }
 
 /// The CPU's engines for updates where the policy would not choose them, by name.
-pub fn engines() -> Vec<(&'static str, Config)> {
-    let by = |engine| Config { engine: Some(engine), ..grid() };
+pub fn engines() -> Vec<(&'static str, Way)> {
+    let by = |engine| Way::from(Config { engine: Some(engine), ..grid() });
     vec![
         ("sweep", by(Engine::Sweep)),
         ("edit", by(Engine::Edit)),
@@ -101,9 +153,9 @@ pub fn pbig_grids() -> Vec<(&'static str, GpuOptions)> {
 }
 
 /// The grid on the GPU, for sets of every size.
-pub fn gpu(coding: Coding) -> Config {
-    let options = GpuOptions { coding, all_pairs_up_to: 0, count_tests: true, ..GpuOptions::DEFAULT };
-    Config { backend: Backend::Gpu, gpu: options, ..Config::DEFAULT }
+pub fn gpu(coding: Coding) -> Way {
+    let gpu = GpuOptions { coding, all_pairs_up_to: 0, count_tests: true, ..GpuOptions::DEFAULT };
+    Way { config: Config { backend: Backend::Device, ..Config::DEFAULT }, gpu }
 }
 
 #[cfg(test)]

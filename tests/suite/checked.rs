@@ -1,8 +1,10 @@
 //! A world whose every call of the broad phase is checked beside stock and the oracle.
 
-use pbig_core::{Backend, Coding, Config, Engine};
+use pbig_core::{Backend, Config, Engine};
+use pbig_gpu::Coding;
 use pbig_harness::runner::Timed;
 use pbig_harness::world::World;
+use pbig_tests::Way;
 use rapier_pbig::{PbigBroadPhase, PbigConfig};
 use rapier3d::prelude::*;
 
@@ -10,20 +12,29 @@ use rapier3d::prelude::*;
 pub(crate) struct Checked {
     pub(crate) world: World,
     pub(crate) broad_phase: Timed<PbigBroadPhase>,
-    pub(crate) config: Config,
+    pub(crate) way: Way,
 }
 
 /// The backends on which rapier's semantics are tested: the CPU as it comes, which sweeps a small world,
 /// the CPU with its grid and a GPU with its grid, however small the world.
-pub(crate) fn backends() -> Vec<(&'static str, Config)> {
-    let [cpu, grid] = on_cpu();
+pub(crate) fn backends() -> Vec<(&'static str, Way)> {
+    let [cpu, grid] = on_cpu().map(Way::from);
     let all = [("cpu", cpu), ("cpu grid", grid), ("gpu", on_gpu())];
-    all.into_iter().filter(|(_, config)| pbig_tests::may_run(config)).collect()
+    all.into_iter().filter(|(_, way)| pbig_tests::may_run(way)).collect()
 }
 
 /// Ours, with any settings of the core.
-pub(crate) fn pbig(config: Config) -> PbigBroadPhase {
-    PbigBroadPhase::with_core_config(config).expect("a length")
+pub(crate) fn pbig(way: impl Into<Way>) -> PbigBroadPhase {
+    let way = way.into();
+    on_its_device(way, PbigBroadPhase::with_core_config(way.config).expect("a length"))
+}
+
+/// Gives a broad phase its device, if it needs one. A restored one has none.
+pub(crate) fn on_its_device(way: Way, mut pbig: PbigBroadPhase) -> PbigBroadPhase {
+    if let Some(device) = way.device() {
+        pbig.set_device(device);
+    }
+    pbig
 }
 
 /// As it comes, and with its grid.
@@ -33,24 +44,25 @@ pub(crate) fn on_cpu() -> [Config; 2] {
 }
 
 /// With its grid.
-pub(crate) fn on_gpu() -> Config {
-    Config { margin: PbigConfig::DEFAULT.margin, ..pbig_tests::gpu(Coding::Plain) }
+pub(crate) fn on_gpu() -> Way {
+    pbig_tests::gpu(Coding::Plain).with(|it| it.margin = PbigConfig::DEFAULT.margin)
 }
 
 /// Runs a test on every backend, each time with a new world.
 pub(crate) fn everywhere(test: impl Fn(Checked)) {
-    for (name, config) in backends() {
+    for (name, way) in backends() {
         println!("on {name}");
-        test(Checked::new(config));
+        test(Checked::new(way));
     }
 }
 
 impl Checked {
     /// Things stay where they are put: no gravity, and [`Checked::ball`]s that contacts cannot push.
-    pub(crate) fn new(config: Config) -> Self {
+    pub(crate) fn new(way: impl Into<Way>) -> Self {
+        let way = way.into();
         let world = World::with_gravity(glam::Vec3::ZERO);
-        let broad_phase = Timed::new(pbig(config)).checked(config.margin, 1);
-        Self { world, broad_phase, config }
+        let broad_phase = Timed::new(pbig(way)).checked(way.margin, 1);
+        Self { world, broad_phase, way }
     }
 
     /// A ball of radius 0.5 on a body of its own that never sleeps.
@@ -91,7 +103,7 @@ impl Checked {
     }
 
     pub(crate) fn on_gpu(&self) -> bool {
-        self.config.backend == Backend::Gpu
+        self.way.backend == Backend::Device
     }
 
     /// Pairs that the narrow phase has, apart from those with sensors.
@@ -106,6 +118,6 @@ impl Checked {
         let report = self.broad_phase.inner.stats().report;
         assert_eq!(report.fallback, None, "a GPU's work is not done by the CPU");
         let searched = report.changed > 0 && report.boxes - report.invalid > 1;
-        assert_eq!(report.gpu.is_some(), searched && self.on_gpu(), "{}", report.plan);
+        assert_eq!(report.device.is_some(), searched && self.on_gpu(), "{}", report.plan);
     }
 }

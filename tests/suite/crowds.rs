@@ -1,7 +1,7 @@
 //! Crowds of boxes that may not pair with each other, and clusters far apart: no pair is missed.
 
 use crate::follower::Follower;
-use pbig_core::{Aabb, Config, Finder, ProxyFilter, oracle};
+use pbig_core::{Aabb, Finder, ProxyFilter, oracle};
 use pbig_tests::strategies;
 use rand::rngs::StdRng;
 use rand::{RngExt, SeedableRng};
@@ -30,10 +30,10 @@ fn filter(random: &mut StdRng, share: u32) -> ProxyFilter {
 
 #[test]
 fn crowds_that_change_sides_agree_on_every_strategy() {
-    for (strategy, config) in strategies() {
+    for (strategy, way) in strategies() {
         for seed in 0..8 {
             let (mut random, ids) = (StdRng::seed_from_u64(seed), [150, 400][seed as usize % 2]);
-            let mut world = Follower::new(Config { margin: 0.01, ..config }, ids);
+            let mut world = Follower::new(way.with(|it| it.margin = 0.01), ids);
             for round in 0..12u32 {
                 let changes = if round % 4 == 0 { ids } else { ids / 12 };
                 // First most are debris, then few, then most again.

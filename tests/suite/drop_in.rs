@@ -1,6 +1,7 @@
 //! The duties of a broad phase to rapier 0.27, call by call.
 
 use crate::checked::{Checked, backends, everywhere, pbig};
+use pbig_core::Config;
 use pbig_harness::world::World;
 use rapier_pbig::{PbigBroadPhase, PbigConfig, Why};
 use rapier3d::prelude::*;
@@ -84,7 +85,7 @@ fn multitude(threads: usize, balls: usize, every: usize) {
 }
 
 fn multitude_of(count: usize, every: usize) {
-    let mut scene = Checked::new(PbigConfig::DEFAULT.into());
+    let mut scene = Checked::new(Config::from(PbigConfig::DEFAULT));
     let mut balls: Vec<_> = (0..count).map(|i| scene.ball(i as f32 * 0.9)).collect();
     assert_eq!(scene.step(), count - 1, "all are new");
     for step in 1..4 {
@@ -150,7 +151,7 @@ fn a_disabled_collider_has_no_pairs_until_it_is_enabled() {
 #[test]
 fn a_body_is_disabled_while_one_that_it_overlaps_is_removed() {
     // Not beside stock: this panics in rapier 0.27's own broad phase (a pair of equal indices).
-    let mut scene = Checked::new(PbigConfig::DEFAULT.into());
+    let mut scene = Checked::new(Config::from(PbigConfig::DEFAULT));
     let [a, b, _] = [0.0, 0.5, 0.9].map(|x| scene.ball(x).0);
     let mut world = scene.world;
     let mut broad_phase = PbigBroadPhase::new();
@@ -336,7 +337,7 @@ fn where_rapiers_own_broad_phase_panics_ours_does_not() {
     // One of three is disabled and one removed in the same step. If stock survives that in another release, its row in
     // docs/DROP_IN.md goes.
     let step = |broad_phase: &mut dyn BroadPhase, x: f32| {
-        let mut scene = Checked::new(PbigConfig::DEFAULT.into());
+        let mut scene = Checked::new(Config::from(PbigConfig::DEFAULT));
         let [a, b, _] = [0.0, x, 0.9].map(|x| scene.ball(x).0);
         scene.world.step(broad_phase);
         scene.world.bodies[a].set_enabled(false);
@@ -350,16 +351,16 @@ fn where_rapiers_own_broad_phase_panics_ours_does_not() {
     };
     for x in [0.5, 7.0] {
         assert!(panics(Box::new(DefaultBroadPhase::new()), x));
-        for (_, config) in backends() {
-            assert!(!panics(Box::new(pbig(config)), x));
+        for (_, way) in backends() {
+            assert!(!panics(Box::new(pbig(way)), x));
         }
     }
 }
 
 #[test]
 fn a_collider_that_reuses_an_unlisted_index_has_its_own_pairs() {
-    for (_, config) in backends() {
-        let (mut scene, mut ours) = (Checked::new(config), pbig(config));
+    for (_, way) in backends() {
+        let (mut scene, mut ours) = (Checked::new(way), pbig(way));
         let (body, old) = scene.ball(0.0);
         let (_, other) = scene.ball(0.9);
         let update = |scene: &Checked, ours: &mut PbigBroadPhase, listed: &[ColliderHandle]| {

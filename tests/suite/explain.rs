@@ -5,7 +5,7 @@ use pbig_core::{Backend, Config, Engine};
 use pbig_harness::files::read_frames;
 use pbig_harness::scenes::Scene;
 use pbig_harness::world::World;
-use pbig_tests::needs_gpu;
+use pbig_tests::{Way, needs_gpu};
 use rapier_pbig::shadow::{Fault, Shadow};
 use rapier_pbig::{DebugRenderParts, PbigBroadPhase, PbigConfig, Why};
 use rapier3d::pipeline::{DebugColor, DebugRenderBackend, DebugRenderObject};
@@ -175,10 +175,10 @@ impl tracing::Subscriber for Names {
     fn exit(&self, _: &tracing::span::Id) {}
 }
 
-fn spans(config: Config) -> BTreeSet<&'static str> {
+fn spans(way: impl Into<Way>) -> BTreeSet<&'static str> {
     SPANS.take();
     let mut world = Scene::named("column").expect("the scene exists").build(200, 1);
-    let mut broad_phase = pbig(config);
+    let mut broad_phase = pbig(way);
     (0..3).for_each(|_| world.step(&mut broad_phase));
     SPANS.take()
 }
@@ -192,8 +192,8 @@ fn each_stage_is_a_span() {
     let by_grid = spans(Config { engine: Some(Engine::Rebuild), ..on_cpu });
     assert_eq!(by_grid, ["update", "proxies", "plan", "map", "check", "diff", "events"].into());
     needs_gpu!();
-    let of_gpu = spans(Config { backend: Backend::Gpu, ..PbigConfig::DEFAULT.into() });
-    assert!(of_gpu.is_superset(&["update", "proxies", "gpu", "events"].into()), "{of_gpu:?}");
+    let of_gpu = spans(Config { backend: Backend::Device, ..PbigConfig::DEFAULT.into() });
+    assert!(of_gpu.is_superset(&["update", "proxies", "device", "events"].into()), "{of_gpu:?}");
 }
 
 /// Boxes drawn by kind of colour, from their lines.

@@ -1,27 +1,28 @@
 //! Contract 1: every strategy returns the oracle's pairs, sorted, for all boxes and thread counts.
 
-use pbig_core::{Aabb, Backend, Coding, Config, Error, Finder, Limits, Order, Pair, ProxyFilter, oracle};
+use pbig_core::{Aabb, Backend, Config, Error, Finder, Limits, Order, Pair, ProxyFilter, oracle};
+use pbig_gpu::Coding;
 use pbig_harness::boxes::BoxSet;
 use pbig_harness::pbig_grid::pbig_grid;
-use pbig_tests::{corpus, difference, gpu, may_run, pbig_grids, strategies};
+use pbig_tests::{Way, corpus, difference, gpu, may_run, pbig_grids, strategies};
 use proptest::prelude::*;
 
 pub(crate) fn check(name: &str, boxes: &[Aabb]) {
     check_on(strategies(), name, boxes);
 }
 
-pub(crate) fn check_on(strategies: Vec<(&str, Config)>, name: &str, boxes: &[Aabb]) {
+pub(crate) fn check_on(strategies: Vec<(&str, Way)>, name: &str, boxes: &[Aabb]) {
     let wanted = oracle::pairs(boxes);
     let invalid = boxes.iter().filter(|b| !b.is_valid()).count() as u64;
-    for (strategy, config) in strategies {
-        let mut finder = Finder::new(config);
+    for (strategy, way) in strategies {
+        let mut finder = way.finder();
         let found = finder.find(boxes).expect("within the limits");
         assert_eq!(difference(found, &wanted), None, "{name}, {strategy}");
         let report = finder.report();
         assert_eq!(report.fallback, None, "{name}, {strategy}: a GPU's work must not be done by the CPU");
         assert_eq!((report.boxes, report.invalid), (boxes.len() as u64, invalid), "{name}, {strategy}");
         assert_eq!(report.pairs, wanted.len() as u64);
-        if config.backend != Backend::Gpu || config.gpu.count_tests {
+        if way.backend != Backend::Device || way.gpu.count_tests {
             let useful = report.checks.made - report.checks.unnecessary - report.checks.redundant;
             assert_eq!(useful, wanted.len() as u64, "{name}, {strategy}: each pair has one useful check");
         }
@@ -68,8 +69,8 @@ fn the_sets_of_the_paper_at_100_000() {
     for name in ["uniform", "gaussian"] {
         let boxes = BoxSet::named(name).expect("the set exists").boxes(100_000, 7);
         let wanted = oracle::pairs(&boxes);
-        for (strategy, config) in strategies().into_iter().filter(|(s, _)| *s != "brute") {
-            let mut finder = Finder::new(config);
+        for (strategy, way) in strategies().into_iter().filter(|(s, _)| *s != "brute") {
+            let mut finder = way.finder();
             let found = finder.find(&boxes).expect("within the limits");
             assert_eq!(difference(found, &wanted), None, "{name}, {strategy}");
         }
@@ -99,8 +100,8 @@ fn the_same_bytes_for_any_number_of_threads() {
 
 #[test]
 fn a_finder_that_is_used_again_forgets_the_boxes_before() {
-    for (strategy, config) in strategies() {
-        let mut finder = Finder::new(config);
+    for (strategy, way) in strategies() {
+        let mut finder = way.finder();
         for case in corpus() {
             let wanted = oracle::pairs(&case.boxes);
             let found = finder.find(&case.boxes).expect("within the limits");
@@ -122,8 +123,8 @@ fn filters_are_applied_while_searching() {
         .collect();
     let wanted = oracle::pairs_filtered(&boxes, &filters);
     assert!(!wanted.is_empty() && wanted.len() < oracle::pairs(&boxes).len());
-    for (strategy, config) in strategies() {
-        let mut finder = Finder::new(config);
+    for (strategy, way) in strategies() {
+        let mut finder = way.finder();
         assert_eq!(finder.find_filtered(&boxes, &filters).expect("one each"), wanted, "{strategy}");
     }
 }
@@ -131,18 +132,18 @@ fn filters_are_applied_while_searching() {
 #[test]
 fn limits_end_in_errors_that_name_them() {
     let boxes = vec![Aabb::new([0.0; 3], [1.0; 3]); 300];
-    for (strategy, config) in strategies() {
-        let with = |max_boxes, max_pairs| Config { limits: Limits { max_boxes, max_pairs }, ..config };
+    for (strategy, way) in strategies() {
+        let with = |max_boxes, max_pairs| way.with(|it| it.limits = Limits { max_boxes, max_pairs });
         let pairs = 300 * 299 / 2;
         assert_eq!(
-            Finder::new(with(300, pairs)).find(&boxes).map(<[Pair]>::len),
+            with(300, pairs).finder().find(&boxes).map(<[Pair]>::len),
             Ok(pairs as usize),
             "{strategy}"
         );
-        let error = Finder::new(with(300, pairs - 1)).find(&boxes).unwrap_err();
+        let error = with(300, pairs - 1).finder().find(&boxes).unwrap_err();
         assert_eq!(error, Error::TooManyPairs { limit: pairs - 1 }, "{strategy}");
         assert!(error.to_string().contains("Limits::max_pairs"));
-        let error = Finder::new(with(299, pairs)).find(&boxes).unwrap_err();
+        let error = with(299, pairs).finder().find(&boxes).unwrap_err();
         assert_eq!(error, Error::TooManyBoxes { boxes: 300, limit: 299 }, "{strategy}");
     }
     let error = Finder::default().find_filtered(&boxes, &[]).unwrap_err();
@@ -186,9 +187,9 @@ fn points_among_identical_ones_cost_no_more_than_those() {
 /// In each of three calls of one finder, which has learned from the calls before.
 fn checks_at_most(most: u64, boxes: &[Aabb]) {
     // On a GPU a box has an entry in each of about eight cells.
-    let all = [(Config::DEFAULT, most), (gpu(Coding::Auto), 8 * most)];
-    for (config, most) in all.into_iter().filter(|(config, _)| may_run(config)) {
-        let mut finder = Finder::new(config);
+    let all = [(Config::DEFAULT.into(), most), (gpu(Coding::Auto), 8 * most)];
+    for (way, most) in all.into_iter().filter(|(way, _): &(Way, _)| may_run(way)) {
+        let mut finder = way.finder();
         for call in 0..3 {
             finder.find(boxes).expect("within the limits");
             let made = finder.report().checks.made;
@@ -201,9 +202,9 @@ fn checks_at_most(most: u64, boxes: &[Aabb]) {
 fn a_limit_is_noticed_before_memory_runs_out() {
     // 5 * 10^9 pairs, 40 GB, if anything went on past the limit.
     let boxes = vec![Aabb::new([0.0; 3], [1.0; 3]); 100_000];
-    for (strategy, config) in strategies() {
+    for (strategy, way) in strategies() {
         let limits = Limits { max_pairs: 1000, ..Limits::DEFAULT };
-        let error = Finder::new(Config { limits, ..config }).find(&boxes).unwrap_err();
+        let error = way.with(|it| it.limits = limits).finder().find(&boxes).unwrap_err();
         assert_eq!(error, Error::TooManyPairs { limit: 1000 }, "{strategy}");
     }
 }

@@ -1,6 +1,7 @@
 //! A broad phase whose events are followed, and whose pairs are compared with the oracle's.
 
-use pbig_core::{Aabb, Backend, BroadPhase, Config, Pair, ProxyFilter, oracle};
+use pbig_core::{Aabb, Backend, BroadPhase, Pair, ProxyFilter, oracle};
+use pbig_tests::Way;
 use std::collections::{BTreeSet, HashSet};
 
 /// A broad phase with the state of its caller: the boxes that were set, and the pairs by the events.
@@ -13,8 +14,8 @@ pub(crate) struct Follower {
 }
 
 impl Follower {
-    pub(crate) fn new(config: Config, ids: usize) -> Self {
-        let broad_phase = BroadPhase::new(config).expect("a good margin");
+    pub(crate) fn new(way: impl Into<Way>, ids: usize) -> Self {
+        let broad_phase = way.into().broad_phase();
         Self { broad_phase, boxes: vec![None; ids], pairs: BTreeSet::new(), gone: HashSet::new() }
     }
 
@@ -73,9 +74,9 @@ impl Follower {
         assert_eq!(report.fallback, None, "{what}");
         // With fewer boxes a device may still be asked for ended pairs.
         let searched = report.changed > 0 && report.boxes - report.invalid > 1;
-        let on_gpu = report.gpu.is_some();
+        let on_gpu = report.device.is_some();
         match self.broad_phase.config().backend {
-            Backend::Gpu => assert!(on_gpu || !searched, "{what}: no GPU; {}", report.plan),
+            Backend::Device => assert!(on_gpu || !searched, "{what}: no GPU; {}", report.plan),
             Backend::Cpu | Backend::Brute => assert!(!on_gpu, "{what}: a GPU; {}", report.plan),
             Backend::Auto => {}
             other => panic!("{what}: what is done by {other:?}?"),

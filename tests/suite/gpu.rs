@@ -4,32 +4,35 @@
 mod failures;
 mod turns;
 
-use pbig_core::gpu::adapters;
 use pbig_core::{
-    Aabb, Backend, BroadPhase, Coding, Config, Finder, GpuFinder, GpuOptions, GpuReport, NoGpu, Order, Pair,
-    ProxyFilter,
+    Aabb, Backend, BroadPhase, Config, DeviceReport, Finder, NoDevice, Order, Pair, ProxyFilter,
 };
+use pbig_gpu::{Coding, GpuFinder, GpuOptions, adapters};
 use pbig_harness::boxes::BoxSet;
-use pbig_tests::{difference, gpu, needs_gpu};
+use pbig_tests::{Way, difference, gpu, needs_gpu};
 
 fn set(name: &str, n: usize) -> Vec<Aabb> {
     BoxSet::named(name).expect("the set exists").boxes(n, 5)
 }
 
 /// Returns settings for a device that always makes a grid.
-fn with(options: GpuOptions) -> Config {
-    Config {
-        gpu: GpuOptions { all_pairs_up_to: 0, count_tests: true, time_kernels: true, ..options },
-        ..gpu(options.coding)
-    }
+fn with(options: GpuOptions) -> Way {
+    let gpu = GpuOptions { all_pairs_up_to: 0, count_tests: true, time_kernels: true, ..options };
+    Way { gpu, ..pbig_tests::gpu(options.coding) }
+}
+
+/// As [`with`], on a given device.
+fn with_device(options: GpuOptions, device: GpuFinder) -> Finder {
+    let Way { config, gpu } = with(options);
+    Finder::with_device(config, Box::new(device.with_options(gpu)))
 }
 
 /// Returns the pairs, which a device must have found, and its report.
-fn find(finder: &mut Finder, boxes: &[Aabb]) -> (Vec<Pair>, GpuReport) {
+fn find(finder: &mut Finder, boxes: &[Aabb]) -> (Vec<Pair>, DeviceReport) {
     let pairs = finder.find(boxes).expect("within the limits").to_vec();
     let report = finder.report();
     assert_eq!(report.fallback, None);
-    (pairs, report.gpu.clone().expect("a device did the work"))
+    (pairs, report.device.clone().expect("a device did the work"))
 }
 
 fn on_cpu(boxes: &[Aabb]) -> Vec<Pair> {
@@ -50,7 +53,7 @@ fn lists_that_begin_far_too_small_lose_nothing() {
         let wanted = on_cpu(&boxes);
         for coding in [Coding::Plain, Coding::Packed] {
             let tiny = GpuOptions { first_bytes: 0, coding, ..GpuOptions::DEFAULT };
-            let mut finder = Finder::new(with(tiny));
+            let mut finder = with(tiny).finder();
             let (pairs, report) = find(&mut finder, &boxes);
             assert_eq!(difference(&pairs, &wanted), None, "{name}, {coding:?}");
             assert!(report.repeats > 0, "{name}: nothing was too small");
@@ -67,7 +70,7 @@ fn work_in_many_chunks_is_complete_with_and_without_pipelining() {
         let wanted = on_cpu(&boxes);
         for pipelining in [true, false] {
             let options = GpuOptions { chunk: [3, 2], pipelining, first_bytes: 0, ..GpuOptions::DEFAULT };
-            let (pairs, report) = find(&mut Finder::new(with(options)), &boxes);
+            let (pairs, report) = find(&mut with(options).finder(), &boxes);
             assert_eq!(difference(&pairs, &wanted), None, "{name}, pipelining {pipelining}");
             assert!(report.chunks > 4, "{name}: {} chunks", report.chunks);
         }
@@ -89,7 +92,7 @@ fn sets_beyond_the_limits_of_a_device_are_split_and_complete() {
     ] {
         let wanted = on_cpu(&boxes);
         for coding in [Coding::Plain, Coding::Packed] {
-            let (pairs, report) = find(&mut Finder::new(with(GpuOptions { coding, ..options })), &boxes);
+            let (pairs, report) = find(&mut with(GpuOptions { coding, ..options }).finder(), &boxes);
             assert_eq!(difference(&pairs, &wanted), None, "{name}, {coding:?}");
             assert!(report.parts >= parts, "{name}: {} parts", report.parts);
         }
@@ -102,7 +105,7 @@ fn lists_that_exceed_a_buffer_split_the_set_and_are_remembered() {
     // The boxes fit, but their entries, some twenty each, do not.
     let boxes = set("pile", 30_000);
     let options = GpuOptions { max_bytes: 1 << 20, boxes_per_cell: 1.0, ..GpuOptions::DEFAULT };
-    let mut finder = Finder::new(with(options));
+    let mut finder = with(options).finder();
     let wanted = on_cpu(&boxes);
     for call in 0..2 {
         let (pairs, report) = find(&mut finder, &boxes);
@@ -128,7 +131,7 @@ fn a_device_that_really_allows_little_is_enough() {
     let device = pollster::block_on(adapter.request_device(&descriptor));
     let (device, queue) = device.expect("a device with small limits");
     let device = GpuFinder::from_device(device, queue).expect("small limits are enough");
-    let mut finder = Finder::with_gpu(with(GpuOptions::DEFAULT), device);
+    let mut finder = with_device(GpuOptions::DEFAULT, device);
     for boxes in [set("gaussian", 60_000), cubes(1500)] {
         for call in 0..2 {
             let (pairs, report) = find(&mut finder, &boxes);
@@ -146,11 +149,11 @@ fn filters_hold_in_every_part() {
         (0..45_000).map(|i| ProxyFilter { body: i / 3, mask: 1 << (i % 5), ..ProxyFilter::ALL }).collect();
     let options = GpuOptions { max_bytes: 1 << 20, ..GpuOptions::DEFAULT };
     let mut cpu = Finder::new(Config { backend: Backend::Cpu, ..Config::DEFAULT });
-    let mut finder = Finder::new(with(options));
+    let mut finder = with(options).finder();
     let wanted = cpu.find_filtered(&boxes, &filters).expect("within the limits");
     assert!(!wanted.is_empty());
     assert_eq!(difference(finder.find_filtered(&boxes, &filters).expect("within the limits"), wanted), None);
-    assert!(finder.report().gpu.as_ref().is_some_and(|gpu| gpu.parts > 1));
+    assert!(finder.report().device.as_ref().is_some_and(|gpu| gpu.parts > 1));
 }
 
 #[test]
@@ -167,8 +170,8 @@ fn every_switch_gives_the_same_bytes() {
         );
         for options in all {
             for small_cell in [1, 32, 256] {
-                let config = with(GpuOptions { small_cell, ..options });
-                let (pairs, _) = find(&mut Finder::new(config), &boxes);
+                let mut finder = with(GpuOptions { small_cell, ..options }).finder();
+                let (pairs, _) = find(&mut finder, &boxes);
                 assert_eq!(difference(&pairs, &wanted), None, "{name}, {small_cell}, {options:?}");
             }
         }
@@ -182,8 +185,7 @@ fn a_small_scene_needs_no_grid_and_may_answer_in_bits() {
     let wanted = on_cpu(&boxes);
     for (coding, downloaded) in [(Coding::Packed, 300 * 299 / 2 / 8), (Coding::Plain, wanted.len() * 8)] {
         let options = GpuOptions { coding, ..GpuOptions::DEFAULT };
-        let config = Config { gpu: options, ..gpu(coding) };
-        let mut finder = Finder::new(config);
+        let mut finder = Way { gpu: options, ..gpu(coding) }.finder();
         let (pairs, _) = find(&mut finder, &boxes);
         assert_eq!(difference(&pairs, &wanted), None, "{coding:?}");
         let (_, report) = find(&mut finder, &boxes);
@@ -200,7 +202,7 @@ fn a_small_scene_needs_no_grid_and_may_answer_in_bits() {
 fn packed_output_is_an_eighth_in_crowds_and_used_if_it_pays() {
     needs_gpu!();
     let boxes = cubes(1500);
-    let mut finder = Finder::new(Config { order: Order::Unspecified, ..with(GpuOptions::DEFAULT) });
+    let mut finder = with(GpuOptions::DEFAULT).with(|it| it.order = Order::Unspecified).finder();
     assert_eq!(find(&mut finder, &boxes).1.compression, 1.0, "nothing is known in the first call");
     let (_, report) = find(&mut finder, &boxes);
     assert!(report.compression < 0.14, "{}", report.compression);
@@ -213,7 +215,7 @@ fn packed_output_is_an_eighth_in_crowds_and_used_if_it_pays() {
 fn a_call_sends_each_box_once_and_gets_each_pair_once_in_order() {
     needs_gpu!();
     let mut boxes = set("unit", 20_000);
-    let mut finder = Finder::new(with(GpuOptions::DEFAULT));
+    let mut finder = with(GpuOptions::DEFAULT).finder();
     let all = size_of_val(boxes.as_slice()) as u64;
     for _ in 0..3 {
         let (pairs, report) = find(&mut finder, &boxes);
@@ -234,8 +236,8 @@ fn more_events_than_a_buffer_holds_are_complete() {
     let boxes = cubes(1500);
     let options = GpuOptions { max_bytes: 1 << 20, ..GpuOptions::DEFAULT };
     for all_pairs_up_to in [0, 2000] {
-        let config = Config { gpu: GpuOptions { all_pairs_up_to, ..options }, ..with(options) };
-        let mut broad_phase = BroadPhase::new(config).expect("a margin");
+        let gpu = GpuOptions { all_pairs_up_to, ..options };
+        let mut broad_phase = Way { gpu, ..with(options) }.broad_phase();
         let ids: Vec<u32> = (0..boxes.len() as u32).collect();
         broad_phase.set_many(&ids, |id| Some((boxes[id as usize], ProxyFilter::ALL))).expect("ids");
         let added = broad_phase.update().expect("within the limits").added.clone();
@@ -258,7 +260,7 @@ fn boxes_that_jump_together_or_apart_get_another_plan_at_once() {
     let factor = |boxes: &[Aabb], by: f32| -> Vec<Aabb> {
         boxes.iter().map(|b| Aabb::from_center(b.min.map(|x| x * by), [0.001; 3])).collect()
     };
-    let mut finder = Finder::new(Config { order: Order::Unspecified, ..with(GpuOptions::DEFAULT) });
+    let mut finder = with(GpuOptions::DEFAULT).with(|it| it.order = Order::Unspecified).finder();
     let mut plans = Vec::new();
     for boxes in [&spread, &factor(&spread, 1e-3), &factor(&spread, 1e4), &spread, &spread] {
         let (mut pairs, _) = find(&mut finder, boxes);
@@ -276,7 +278,7 @@ fn boxes_that_jump_together_or_apart_get_another_plan_at_once() {
 #[test]
 fn memory_follows_what_is_needed_down_as_well_as_up() {
     needs_gpu!();
-    let mut finder = Finder::new(with(GpuOptions::DEFAULT));
+    let mut finder = with(GpuOptions::DEFAULT).finder();
     let (many, few) = (set("pile", 60_000), set("pile", 500));
     let burst = find(&mut finder, &many).1.device_bytes;
     for _ in 0..130 {
@@ -290,7 +292,7 @@ fn memory_follows_what_is_needed_down_as_well_as_up() {
 #[test]
 fn nothing_grows_while_boxes_churn() {
     needs_gpu!();
-    let mut finder = Finder::new(with(GpuOptions::DEFAULT));
+    let mut finder = with(GpuOptions::DEFAULT).finder();
     let bytes = |seed| {
         let boxes = BoxSet::named("pile").expect("the set exists").boxes(400 + (seed % 100) as usize, seed);
         (boxes, seed)
@@ -310,7 +312,7 @@ fn auto_uses_a_device_from_half_a_million_changed_boxes_on() {
     needs_gpu!();
     let mut device = GpuFinder::new().expect("an adapter");
     device.pretend_hardware();
-    let mut ours = BroadPhase::with_gpu(Config::DEFAULT, device).expect("a margin");
+    let mut ours = BroadPhase::with_device(Config::DEFAULT, Box::new(device)).expect("a margin");
     let mut cpu = BroadPhase::new(Config { backend: Backend::Cpu, ..Config::DEFAULT }).expect("a margin");
     let start = set("unit", 500_000);
     for (frame, step) in [(0, 1), (1, 100), (2, 1), (3, 2)] {
@@ -322,9 +324,9 @@ fn auto_uses_a_device_from_half_a_million_changed_boxes_on() {
         }
         assert!(ours.update() == cpu.update(), "frame {frame}: events differ");
         let report = ours.report();
-        let wanted = if step == 1 { None } else { Some(NoGpu::FewChanged) };
-        assert_eq!(report.plan.no_gpu, wanted, "frame {frame}, {} changed", report.changed);
-        assert_eq!((report.gpu.is_some(), &report.fallback), (step == 1, &None), "frame {frame}");
+        let wanted = if step == 1 { None } else { Some(NoDevice::FewChanged) };
+        assert_eq!(report.plan.no_device, wanted, "frame {frame}, {} changed", report.changed);
+        assert_eq!((report.device.is_some(), &report.fallback), (step == 1, &None), "frame {frame}");
     }
 }
 
@@ -342,11 +344,11 @@ fn auto_leaves_a_software_adapter_alone() {
     needs_gpu!();
     let device = GpuFinder::new().expect("an adapter");
     let (software, boxes) = (device.is_software(), set("unit", 20_000));
-    let mut finder = Finder::with_gpu(Config::DEFAULT, device);
+    let mut finder = Finder::with_device(Config::DEFAULT, Box::new(device));
     for _ in 0..6 {
         finder.find(&boxes).expect("within the limits");
         let report = finder.report();
-        assert!((report.gpu.is_none() && report.plan.no_gpu == Some(NoGpu::Software)) || !software);
+        assert!((report.device.is_none() && report.plan.no_device == Some(NoDevice::Software)) || !software);
     }
 }
 
@@ -358,7 +360,7 @@ fn finders_in_several_threads_share_a_device() {
     std::thread::scope(|scope| {
         for _ in 0..4 {
             scope.spawn(|| {
-                let mut finder = Finder::new(with(GpuOptions::DEFAULT));
+                let mut finder = with(GpuOptions::DEFAULT).finder();
                 (0..10).for_each(|_| assert_eq!(difference(&find(&mut finder, &boxes).0, &wanted), None));
             });
         }

@@ -12,12 +12,12 @@ use std::collections::BTreeSet;
 #[test]
 fn random_worlds_with_churn_on_every_strategy() {
     let degenerate = BoxSet::named("degenerate").expect("the set exists");
-    for (strategy, config) in strategies().into_iter().chain(engines()) {
+    for (strategy, way) in strategies().into_iter().chain(engines()) {
         for seed in 0..60 {
             let mut rng = StdRng::seed_from_u64(seed);
             let margin = [0.0, 0.01, 0.3][seed as usize % 3];
             let ids = [20, 90, 300][seed as usize % 3];
-            let mut world = Follower::new(Config { margin, ..config }, ids);
+            let mut world = Follower::new(way.with(|it| it.margin = margin), ids);
             for round in 0..25 {
                 // From a handful of changes to a change of everything.
                 let changes = if round % 7 == 0 { ids } else { rng.random_range(0..1 + ids / 10) };

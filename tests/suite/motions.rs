@@ -43,7 +43,7 @@ fn a_thousand_sequences_of_every_motion_agree_with_the_oracle() {
                 let n = [60, 150, 400, 1100][seed as usize % 4];
                 let engines = engines();
                 let (_, asked) = engines[seed as usize / 4 % engines.len()];
-                let config = if seed % 2 == 0 { Config::DEFAULT } else { asked };
+                let config = if seed % 2 == 0 { Config::DEFAULT } else { asked.config };
                 let margin = [0.0, 0.02][seed as usize / 8 % 2];
                 play(Config { margin, ..config }, motion, density, n, seed);
                 sequences += 1;

@@ -1,11 +1,12 @@
 //! Snapshots: our state restored goes on bit by bit; a fresh broad phase beside a restored world misses nothing.
 
-use crate::checked::{backends, everywhere, pbig};
-use pbig_core::{Backend, Config, GpuFinder};
+use crate::checked::{backends, everywhere, on_its_device, pbig};
+use pbig_core::{Backend, Config};
+use pbig_gpu::GpuFinder;
 use pbig_harness::runner::Timed;
 use pbig_harness::scenes::Scene;
 use pbig_harness::world::World;
-use pbig_tests::needs_gpu;
+use pbig_tests::{Way, needs_gpu};
 use rapier_pbig::shadow::Shadow;
 use rapier_pbig::{PbigBroadPhase, PbigConfig};
 use rapier3d::prelude::*;
@@ -46,10 +47,10 @@ fn edges(world: &World) -> BTreeSet<[(u32, u32); 2]> {
 fn upstream_910_966_a_restored_broad_phase_resumes_bit_by_bit() {
     for name in ["column", "groups", "compounds", "ragdolls", "sensors"] {
         let mut ends = Vec::new();
-        for (backend, config) in backends() {
-            let (mut world, mut ours) = (scene(name, 300), pbig(config));
+        for (backend, way) in backends() {
+            let (mut world, mut ours) = (scene(name, 300), pbig(way));
             steps(&mut world, &mut ours, 40);
-            let (mut other, mut again) = (copy(&world), restored(&saved(&ours)));
+            let (mut other, mut again) = (copy(&world), on_its_device(way, restored(&saved(&ours))));
             steps(&mut world, &mut ours, 30);
             steps(&mut other, &mut again, 30);
             assert!(world.pose_bits() == other.pose_bits(), "{name} on {backend}: restored and not");
@@ -73,8 +74,8 @@ fn upstream_675_710_899_options_survive_a_snapshot_and_json() {
 }
 
 /// A pile that sleeps on a fixed ground, and its broad phase.
-fn sleeping_pile(config: Config) -> (World, PbigBroadPhase) {
-    let (mut world, mut ours) = (World::default(), pbig(config));
+fn sleeping_pile(way: impl Into<Way>) -> (World, PbigBroadPhase) {
+    let (mut world, mut ours) = (World::default(), pbig(way));
     world.colliders.insert(ColliderBuilder::cuboid(20.0, 0.5, 20.0));
     for i in 0..30 {
         let at = vector![(i % 5) as f32 * 1.02, 1.0 + (i / 5) as f32 * 1.01, 0.0];
@@ -87,10 +88,10 @@ fn sleeping_pile(config: Config) -> (World, PbigBroadPhase) {
 
 #[test]
 fn a_fresh_broad_phase_finds_sleeping_and_fixed_colliders() {
-    for (name, config) in backends() {
-        let (mut world, ours) = sleeping_pile(config);
+    for (name, way) in backends() {
+        let (mut world, ours) = sleeping_pile(way);
         let before = edges(&world);
-        let mut fresh = Timed::new(pbig(config)).checked(config.margin, 1);
+        let mut fresh = Timed::new(pbig(way)).checked(way.margin, 1);
         world = copy(&world);
         world
             .add(RigidBodyBuilder::dynamic().translation(vector![0.0, 8.0, 0.0]), ColliderBuilder::ball(0.4));
@@ -107,25 +108,25 @@ fn a_fresh_broad_phase_finds_sleeping_and_fixed_colliders() {
 #[test]
 fn a_device_is_given_at_the_start_or_after_a_restore() {
     needs_gpu!();
-    let config = PbigConfig { backend: Backend::Gpu, ..PbigConfig::DEFAULT };
+    let config = PbigConfig { backend: Backend::Device, ..PbigConfig::DEFAULT };
     let gpu = || GpuFinder::new().expect("an adapter");
     let (mut world, mut ours) =
         (scene("column", 100), PbigBroadPhase::with_gpu(config, gpu()).expect("a length"));
     steps(&mut world, &mut ours, 20);
     let (mut other, mut again) = (copy(&world), restored(&saved(&ours)));
-    assert!(again.adapter().is_none(), "a snapshot holds no device");
-    again.set_gpu(gpu());
+    assert!(again.device_name().is_none(), "a snapshot holds no device");
+    again.set_device(Box::new(gpu()));
     steps(&mut world, &mut ours, 20);
     steps(&mut other, &mut again, 20);
     for broad_phase in [&ours, &again] {
-        assert!(broad_phase.adapter().is_some() && broad_phase.stats().report.gpu.is_some());
+        assert!(broad_phase.device_name().is_some() && broad_phase.stats().report.device.is_some());
     }
     assert!(world.pose_bits() == other.pose_bits());
 }
 
 #[test]
 fn a_rescan_happens_once_and_only_where_a_collider_is_unknown() {
-    let (world, _) = sleeping_pile(PbigConfig::DEFAULT.into());
+    let (world, _) = sleeping_pile(Config::from(PbigConfig::DEFAULT));
     let mut world = copy(&world);
     let mut fresh = PbigBroadPhase::new();
     let mut rescans = Vec::new();
@@ -149,7 +150,7 @@ fn adopted_pairs_end_if_apart_and_are_not_added_again() {
         assert_eq!((scene.step(), scene.contacts()), (2, 2));
         scene.world = copy(&scene.world);
         scene.move_to(a, 50.0);
-        let mut fresh = pbig(scene.config);
+        let mut fresh = pbig(scene.way);
         fresh.adopt(&scene.world.narrow_phase);
         // Not the fresh one's own: it follows what the narrow phase was told, by whomever.
         let mut counted = Timed::new(fresh);

@@ -2,7 +2,7 @@
 //! those at poses before they were rounded to f32. The margin of a broad phase covers 2 ulps up to `margin x 2^22` away.
 
 use crate::checked::{backends, pbig};
-use pbig_core::{Aabb, Config, Pair};
+use pbig_core::{Aabb, Pair};
 use pbig_studies::wide::{Layout, Pose, Truth, Wide, doubt, to_f32, to_f64, widened_by_ulps};
 use proptest::prelude::*;
 use rapier_pbig::{PbigBroadPhase, collision_aabb};
@@ -133,9 +133,9 @@ fn far_away_two_ulps_of_margin_miss_nothing_the_default_does() {
         let crowd = Crowd::new(offset, 3000);
         pairs += crowd.truth.pairs.len();
         without += crowd.missed(&mut PbigBroadPhase::new());
-        for (name, config) in backends() {
+        for (name, way) in backends() {
             let margin = 1.01 * offset as f32 / (1 << 22) as f32;
-            let mut ours = pbig(Config { margin, ..config });
+            let mut ours = pbig(way.with(|it| it.margin = margin));
             assert_eq!(crowd.missed(&mut ours), 0, "{name}, {offset} away");
         }
     }

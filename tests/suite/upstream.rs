@@ -3,9 +3,8 @@
 //! `bevy` and `js` mark those of its bindings.
 
 use crate::checked::{Checked, everywhere, on_cpu, on_gpu, pbig};
-use pbig_core::Config;
 use pbig_harness::world::World;
-use pbig_tests::needs_gpu;
+use pbig_tests::{Way, needs_gpu};
 use rapier3d::prelude::*;
 use std::sync::mpsc::channel;
 
@@ -84,7 +83,7 @@ fn upstream_558_fixed_bodies_are_free_after_the_first_step() {
 }
 
 /// One body moves among fixed ones, at a metre in two steps. Not beside the oracle, which would test 127 million pairs.
-fn among_fixed_bodies(config: Config, steps: usize, most_checks: u64) {
+fn among_fixed_bodies(way: impl Into<Way>, steps: usize, most_checks: u64) {
     let mut world = World::with_gravity(glam::Vec3::ZERO);
     for i in 0..15_941 {
         let at = vector![(i % 127) as f32, 0.0, (i / 127) as f32];
@@ -93,7 +92,7 @@ fn among_fixed_bodies(config: Config, steps: usize, most_checks: u64) {
     let mover =
         RigidBodyBuilder::dynamic().translation(vector![5.0, 0.0, 60.0]).linvel(vector![30.0, 0.0, 0.0]);
     let mover = world.add(mover.can_sleep(false), ColliderBuilder::ball(0.4).sensor(true));
-    let mut broad_phase = pbig(config);
+    let mut broad_phase = pbig(way);
     world.step(&mut broad_phase);
     for step in 0..steps {
         // The first of the two updates of a step has nothing to do, because only rapier moves bodies.

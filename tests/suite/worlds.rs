@@ -5,15 +5,17 @@ use pbig_core::{Backend, Config, Engine};
 use pbig_harness::runner::{Run, Timed};
 use pbig_harness::scenes::Scene;
 use pbig_harness::world::World;
+use pbig_tests::Way;
 use rapier_pbig::{PbigBroadPhase, PbigConfig};
 use rapier3d::prelude::*;
 
 /// Bodies in a test; `pbig simulate --check` runs the scenes at their full size.
 const MOST_BODIES: usize = 1000;
 
-fn check(scene: Scene, config: Config, steps: usize) {
+fn check(scene: Scene, way: impl Into<Way>, steps: usize) {
+    let way = way.into();
     let bodies = scene.default_bodies.min(MOST_BODIES);
-    let mut run = Run::new(scene, bodies, 11, pbig(config)).checked(config.margin, 1);
+    let mut run = Run::new(scene, bodies, 11, pbig(way)).checked(way.margin, 1);
     run.steps(steps, || ());
     if let Some(first) = run.broad_phase.first_difference() {
         panic!("{}: {first}; {:?}", scene.name, run.write_failure(scene.name, &std::env::temp_dir()));
@@ -27,19 +29,19 @@ fn check(scene: Scene, config: Config, steps: usize) {
 #[test]
 fn every_scene_for_300_steps_beside_stock_and_the_oracle() {
     for scene in Scene::ALL {
-        check(scene, PbigConfig::DEFAULT.into(), 300);
+        check(scene, Config::from(PbigConfig::DEFAULT), 300);
     }
 }
 
 #[test]
 fn every_scene_on_every_strategy() {
     for strategy in pbig_tests::strategies() {
-        let (name, config) = strategy;
+        let (name, way) = strategy;
         println!("{name}");
         // A software adapter takes its time.
         let steps = if name.starts_with("gpu") { 20 } else { 40 };
         for scene in Scene::ALL {
-            check(scene, Config { margin: PbigConfig::DEFAULT.margin, ..config }, steps);
+            check(scene, way.with(|it| it.margin = PbigConfig::DEFAULT.margin), steps);
         }
     }
 }
@@ -94,7 +96,7 @@ fn every_strategy_gives_the_same_bits() {
         with(Backend::Cpu, Some(Engine::Edit)),
         with(Backend::Cpu, Some(Engine::Tree)),
         with(Backend::Brute, None),
-        with(Backend::Gpu, None),
+        with(Backend::Device, None),
     ];
     for config in configs.into_iter().filter(pbig_tests::may_run) {
         assert!(bits(scene, config, 2, 120) == wanted, "{config:?}");
@@ -121,13 +123,13 @@ fn a_sleeping_world_costs_no_checks() {
 
 #[test]
 fn upstream_14_endless_falls_are_found_at_the_same_cost() {
-    for (name, config) in crate::checked::backends() {
+    for (name, way) in crate::checked::backends() {
         let mut world = World::with_gravity(glam::Vec3::NEG_Y * 1e4);
         for i in 0..200 {
             let at = glam::vec3((i % 10) as f32 * 0.9, 0.0, (i / 10) as f32 * 0.9);
             world.add(World::dynamic(at).linear_damping(0.0), ColliderBuilder::ball(0.5));
         }
-        let mut broad_phase = Timed::new(pbig(config)).checked(config.margin, 50);
+        let mut broad_phase = Timed::new(pbig(way)).checked(way.margin, 50);
         let mut most_bytes = 0;
         for _ in 0..if name == "cpu" { 2000 } else { 700 } {
             world.step(&mut broad_phase);

@@ -46,7 +46,7 @@ impl Choice {
             Self::Stock => None,
             Self::Auto => Some(Backend::Auto),
             Self::Cpu => Some(Backend::Cpu),
-            Self::Gpu => Some(Backend::Gpu),
+            Self::Gpu => Some(Backend::Device),
             Self::Brute => Some(Backend::Brute),
         }
     }

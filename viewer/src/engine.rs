@@ -4,7 +4,7 @@
 use crate::choice::Choice;
 use pbig_scenes::stock::StockBroadPhase;
 use pbig_scenes::world::World;
-use rapier_pbig::{Error, PbigBroadPhase, PbigConfig};
+use rapier_pbig::{Backend, Error, GpuFinder, PbigBroadPhase, PbigConfig};
 use rapier3d::prelude::*;
 use std::time::{Duration, Instant};
 
@@ -28,7 +28,11 @@ enum Kind {
 
 impl Kind {
     fn pbig(config: PbigConfig) -> Self {
-        Self::Pbig(Box::new(Pbig::with_config(config).expect("the default margin is a length")))
+        let mut pbig = Pbig::with_config(config).expect("the default margin is a length");
+        if config.backend == Backend::Device {
+            pbig.set_device(Box::new(GpuFinder::shared()));
+        }
+        Self::Pbig(Box::new(pbig))
     }
 }
 

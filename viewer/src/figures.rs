@@ -66,7 +66,7 @@ fn scene_line(simulation: &Simulation, controls: &Controls) -> String {
 }
 
 fn broad_phase_line(choice: Choice, pbig: Option<&Pbig>) -> String {
-    let adapter = pbig.and_then(Pbig::adapter).filter(|_| choice == Choice::Gpu);
+    let adapter = pbig.and_then(Pbig::device_name).filter(|_| choice == Choice::Gpu);
     adapter.map_or_else(|| choice.name().to_owned(), |adapter| format!("{}: {adapter}", choice.name()))
 }
 

@@ -7,7 +7,7 @@ use crate::registry::ColliderRegistry;
 use crate::stats::{Counts, Totals};
 use crate::tree::SceneTree;
 use crate::{Handle, HandlePair, Scene, Tree};
-use pbig_core::{Aabb, BroadPhase, Error, ProxyFilter};
+use pbig_core::{Aabb, BroadPhase, Error, PairDevice, ProxyFilter};
 use std::collections::HashSet;
 
 /// The part of a broad phase that does not depend on rapier's version.
@@ -62,9 +62,8 @@ impl<T: Tree> Colliders<T> {
     }
 
     /// Uses this device in later updates.
-    #[cfg(feature = "gpu")]
-    pub fn set_gpu(&mut self, gpu: pbig_core::GpuFinder) {
-        self.core.set_gpu(gpu);
+    pub fn set_device(&mut self, device: Box<dyn PairDevice>) {
+        self.core.set_device(device);
     }
 
     /// Changes the margin of boxes that are set after this call, in the world's unit. A negative, infinite or NaN margin is the

@@ -35,7 +35,7 @@ pub use filter::{BodyKind, Groups, accepted_kinds, filter_of};
 pub use handle::{Handle, HandlePair};
 pub use index::SceneQuery;
 pub use order::size_class;
-pub use pbig_core::{Aabb, Backend, Error, ProxyFilter, Report};
+pub use pbig_core::{Aabb, Backend, Error, PairDevice, ProxyFilter, Report};
 pub use scene::{Proxy, Scene};
 #[cfg(feature = "serde")]
 pub use snapshot::Snapshot;

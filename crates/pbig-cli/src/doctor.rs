@@ -1,8 +1,8 @@
 //! `pbig doctor`: what this machine offers, what is chosen and why, and a self-test.
 
-use pbig_core::gpu::{GpuError, adapters};
-use pbig_core::layout::Located;
-use pbig_core::{Aabb, Backend, Coding, Config, Finder, GpuFinder, GpuOptions, Limits, Pair, oracle};
+use pbig_core::{Aabb, Backend, Config, Finder, Limits, Pair, oracle};
+use pbig_gpu::layout::Located;
+use pbig_gpu::{Coding, GpuError, GpuFinder, GpuOptions, adapters};
 use pbig_harness::pbig_grid::pbig_grid;
 use pbig_harness::prelude::*;
 use pbig_harness::report::simd_found;
@@ -87,7 +87,7 @@ fn describe(i: usize, adapter: &wgpu::Adapter, opened: &Result<GpuFinder, GpuErr
     format!(
         "adapter gpu {i}: {}, driver {} {}{chosen}\n    \
          limits: buffers {} MiB, bindings {} MiB, {} storage buffers, {} invocations, {} KiB workgroup memory\n    {}",
-        pbig_core::gpu::describe(&info),
+        pbig_gpu::describe(&info),
         info.driver,
         info.driver_info,
         mib(limits.max_buffer_size),
@@ -117,8 +117,9 @@ fn cpu_searches() -> Vec<Search> {
 fn gpu_searches((name, gpu): &(String, GpuFinder)) -> [Search; 2] {
     [(Coding::Plain, "plain"), (Coding::Packed, "packed")].map(|(coding, words)| {
         let options = GpuOptions { coding, all_pairs_up_to: 0, ..GpuOptions::DEFAULT };
-        let config = Config { backend: Backend::Gpu, gpu: options, ..Config::DEFAULT };
-        by(&format!("{name} {words}"), Finder::with_gpu(config, gpu.clone()))
+        let config = Config { backend: Backend::Device, ..Config::DEFAULT };
+        let gpu = gpu.clone().with_options(options);
+        by(&format!("{name} {words}"), Finder::with_device(config, Box::new(gpu)))
     })
 }
 

@@ -3,7 +3,7 @@
 use crate::options::{
     THREADS, check_output, plan_text, print_summary, search_text, stages, whole, with_threads,
 };
-use pbig_core::{Aabb, Config, Finder};
+use pbig_core::{Aabb, Finder};
 use pbig_harness::files::{BOXES_OR_PAIRS, BoxList, Place, read_boxes, write_pairs};
 use pbig_harness::options::BackendOption;
 use pbig_harness::prelude::*;
@@ -39,7 +39,7 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
     if args.strict {
         refuse_invalid(&args.input, &list)?;
     }
-    let mut finder = Finder::new(Config { backend: args.backend.backend(), ..Config::DEFAULT });
+    let mut finder = args.backend.finder();
     let times = with_threads(args.threads, || find(&mut finder, &list.boxes, args))?;
     if let Some(output) = &args.output {
         write_pairs(output, finder.pairs())?;
@@ -72,7 +72,7 @@ fn report(args: &Args, finder: &Finder, list: &BoxList, ms: Spread) -> Result<()
             "pairs": pairs,
             "invalid": invalid,
             "backend": args.backend.in_use(report.fallback.as_deref()),
-            "adapter": report.gpu.as_ref().map(|gpu| &gpu.adapter),
+            "adapter": report.device.as_ref().map(|device| &device.name),
             "plan": plan_text(report),
             "ms": ms,
             "stages": stages(report),

@@ -1,7 +1,7 @@
 //! `pbig replay`: the incremental path over frames of boxes.
 
 use crate::options::{check_output, margin, plan_text, print_summary, search_text, stages};
-use pbig_core::{Aabb, BroadPhase, Config, Error, Pair, ProxyFilter};
+use pbig_core::{Aabb, BroadPhase, Error, Pair, ProxyFilter};
 use pbig_harness::files::{Frames, read_frames, write_csv};
 use pbig_harness::options::BackendOption;
 use pbig_harness::prelude::*;
@@ -42,10 +42,11 @@ struct Replay {
 pub(crate) fn run(args: &Args) -> Result<(), Failure> {
     check_output(args.output.as_deref(), &["csv"], &args.frames, args.json)?;
     let frames = read_frames(&args.frames)?;
-    let config = Config { margin: args.margin, backend: args.backend.backend(), ..Config::DEFAULT };
     let about = |error| Failure::Input(format!("{}: {}", args.frames.display(), search_text(&error)));
-    let mut broad_phase =
-        BroadPhase::new(config).map_err(|error| Failure::Input(format!("--margin: {error}")))?;
+    let mut broad_phase = args
+        .backend
+        .broad_phase(args.margin)
+        .map_err(|error| Failure::Input(format!("--margin: {error}")))?;
     let mut replay = Replay { keep_lines: args.output.is_some(), ..Replay::default() };
     for frame in tracked(&frames.frames, "frames") {
         replay.step(&mut broad_phase, frame).map_err(about)?;
@@ -123,7 +124,7 @@ fn report(args: &Args, frames: &Frames, replay: &Replay, broad_phase: &BroadPhas
             "pairs": broad_phase.pair_count(),
             "margin": args.margin.abs(),
             "backend": args.backend.in_use(report.fallback.as_deref()),
-            "adapter": broad_phase.adapter(),
+            "adapter": broad_phase.device_name(),
             "plan": plan_text(report),
             "stages": stages(report),
             "fallback": report.fallback,

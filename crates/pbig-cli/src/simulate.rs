@@ -53,10 +53,9 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
     if args.broad_phase == "stock" {
         return finish(args, bodies, Run::new(scene, bodies, args.seed, DefaultBroadPhase::new()), |_| None);
     }
-    let config = PbigConfig { backend: args.backend.backend(), ..PbigConfig::DEFAULT };
-    let ours = PbigBroadPhase::with_config(config).expect("the default margin is a length");
-    let run = Run::new(scene, bodies, args.seed, ours);
-    finish(args, bodies, if args.check { run.checked(config.margin, 1) } else { run }, |ours| Some(ours))
+    let run = Run::new(scene, bodies, args.seed, args.backend.for_rapier());
+    let run = if args.check { run.checked(PbigConfig::DEFAULT.margin, 1) } else { run };
+    finish(args, bodies, run, |ours| Some(ours))
 }
 
 fn refuse_what_stock_ignores(args: &Args) -> Result<(), Failure> {
@@ -107,7 +106,7 @@ fn report<B: BroadPhase>(
             "steps": steps,
             "broad_phase": args.broad_phase,
             "backend": backend,
-            "adapter": ours.and_then(PbigBroadPhase::adapter),
+            "adapter": ours.and_then(PbigBroadPhase::device_name),
             "ms": { "broad_phase": broad_phase, "step": step },
             "pairs": pairs,
             "added": added,

@@ -61,7 +61,7 @@ impl AllPairs {
         let found = AtomicU64::new(0);
         let max_pairs = request.config.limits.pairs();
         let rule = Rule { filters: request.filters, max_pairs, found: &found };
-        let may_be_brute = request.config.forced_engine().is_none();
+        let may_be_brute = request.config.engine.is_none();
         let is_few = may_be_brute && request.boxes.len() <= policy::BRUTE_FORCE_UP_TO_BOXES;
         let brute = request.config.backend == Backend::Brute || is_few;
         if brute {
@@ -124,7 +124,7 @@ impl AllPairs {
 
     /// Returns true if a grid finds the pairs with less work than a tree.
     fn is_for_grid(&mut self, request: &Request<'_>, sorted: &Sorted<'_>) -> bool {
-        if let Some(engine) = request.config.forced_engine() {
+        if let Some(engine) = request.config.engine {
             return engine != Engine::Tree;
         }
         let (boxes, work) = (sorted.boxes(), sorted.work(self.hits.len()));
@@ -170,8 +170,7 @@ impl AllPairs {
 }
 
 impl AllPairs {
-    /// Takes pairs that another backend has found, a list for each thread.
-    #[cfg(feature = "gpu")]
+    /// Takes pairs that a device has found, a list for each thread.
     pub(crate) fn take(&mut self, lists: Vec<Vec<Pair>>, grouping: Option<Grouping>) {
         let Grouping { count, shift, .. } = grouping.unwrap_or_default();
         self.hits.resize_with(lists.len().max(1), Hits::default);

@@ -1,19 +1,19 @@
 //! The settings. Every field says its unit, why one would change it, and what follows.
 
-use std::time::Duration;
-
 /// The processor that does the work.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub enum Backend {
-    /// The CPU. A GPU that was given, if it is hardware and the boxes are many.
+    /// The CPU. A device that was given, if it is hardware and the boxes are many.
     #[default]
     Auto,
     /// The CPU, with rayon's threads if there are enough boxes.
     Cpu,
-    /// A GPU. Without one the call finishes on the CPU and [`crate::Report::fallback`] says so.
-    Gpu,
+    /// The device that was given. Without one the call finishes on the CPU and [`crate::Report::fallback`] says so.
+    // Snapshots have the name that it had at first.
+    #[cfg_attr(feature = "serde", serde(rename = "Gpu"))]
+    Device,
     /// Every pair is tested, on the CPU: the definition of right, quadratic time.
     Brute,
 }
@@ -25,7 +25,7 @@ pub enum Order {
     /// By `(a, b)`: the same bytes on every backend and thread count.
     #[default]
     Sorted,
-    /// The order of discovery, which saves the sort. It depends on threads, and on a GPU on timing.
+    /// The order of discovery, which saves the sort. It depends on threads, and on a device on timing.
     Unspecified,
 }
 
@@ -58,104 +58,6 @@ impl Default for Limits {
     }
 }
 
-/// The rule by which the GPU turns [`GpuOptions::boxes_per_cell`] into a cell size.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub enum CellRule {
-    /// PBIG's equation 6: the smallest cell with that many entries on average. A box has an entry in every cell that it
-    /// touches.
-    #[default]
-    Objective,
-    /// Avril's section 4.1: the cell that holds that many boxes at the density of the space, whatever their sizes.
-    Density,
-}
-
-/// The coding of the GPU's output (docs/PAIR_FORMAT.md).
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub enum Coding {
-    /// The coding that would have been smaller in the last call, with the tables for decoding.
-    #[default]
-    Auto,
-    /// Two ids a pair.
-    Plain,
-    /// PBIG's three levels of cell, segment and place in the segment (PBIG 5.2). Without a grid: one bit for each pair of
-    /// boxes (Avril 3.4).
-    Packed,
-}
-
-/// The settings of the GPU backend. The defaults suit most programs. A later version may have more settings: end
-/// with `..GpuOptions::DEFAULT`.
-#[derive(Clone, Copy, Debug, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub struct GpuOptions {
-    /// Coding of the output (PBIG table IV, "data compression").
-    pub coding: Coding,
-    /// If true, check, transfer and decoding of several chunks of work overlap (PBIG table IV, "pipelining").
-    pub pipelining: bool,
-    /// If true, the rows of a large cell get equally many pairs (PBIG table IV, "load balancing").
-    pub load_balancing: bool,
-    /// Estimate of the row in Avril's mapping (Avril 3.3). 0: the device's square root. 1 to 4: Carmack's inverse root with
-    /// this number of Newton steps. 5 to 8: Lomont's, with 1 to 4 steps. 9: bisection. All are exact, because integers correct
-    /// the estimate.
-    pub root: u32,
-    /// Number of small and of large work items of a submission. They have at most 256 and 524,288 tests each. Longer
-    /// submissions may exceed the time limit of some systems.
-    pub chunk: [u32; 2],
-    /// Largest buffer and binding in bytes, at least 2^20. The device may allow less.
-    pub max_bytes: u64,
-    /// Size in bytes, in the first call, of buffers whose needed size is unknown.
-    pub first_bytes: u64,
-    /// Longest time that a call waits for the device before it finishes on the CPU.
-    pub patience: Duration,
-    /// Time for which calls stay on the CPU after the device failed.
-    pub pause: Duration,
-    /// Wanted boxes per cell: PBIG's `W` in the constraint `f >= W` of equation 6. More boxes make larger cells. The paper
-    /// takes a warp, 32.
-    pub boxes_per_cell: f32,
-    /// Rule that turns the wanted boxes per cell into a cell size.
-    pub cell_rule: CellRule,
-    /// Maximum number of boxes of a cell, up to 256, whose pairs are tested through Avril's mapping. Larger cells are tested by PBIG's
-    /// balanced rows.
-    pub small_cell: u32,
-    /// Maximum number of boxes whose pairs are all tested, without a grid. 0: there is always a grid. Avril's table 7 puts the
-    /// crossover at 1000.
-    pub all_pairs_up_to: u32,
-    /// If true, the device counts the tests that it makes, those that repeat another and those of boxes that are apart. It
-    /// costs four more atomic operations for each workgroup.
-    pub count_tests: bool,
-    /// If true, the device measures the time of each kernel, where it can. It then finishes one before the next begins, and
-    /// recording takes the host twice as long.
-    pub time_kernels: bool,
-}
-
-impl GpuOptions {
-    /// The defaults.
-    pub const DEFAULT: Self = Self {
-        coding: Coding::Auto,
-        pipelining: true,
-        load_balancing: true,
-        root: 0,
-        chunk: [1 << 18, 1 << 12],
-        max_bytes: u64::MAX,
-        first_bytes: 1 << 16,
-        patience: Duration::from_secs(30),
-        pause: Duration::from_secs(5),
-        boxes_per_cell: 4.0,
-        cell_rule: CellRule::Objective,
-        small_cell: 32,
-        all_pairs_up_to: 1024,
-        count_tests: false,
-        time_kernels: false,
-    };
-}
-
-impl Default for GpuOptions {
-    fn default() -> Self {
-        Self::DEFAULT
-    }
-}
-
 /// The settings of a [`crate::Finder`] or [`crate::BroadPhase`]. The defaults suit most programs. A later version may have
 /// more settings: end with `..Config::DEFAULT`.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -169,10 +71,8 @@ pub struct Config {
     /// The distance by which a stored box is larger than the given one on every side, in the caller's length unit
     /// ([`crate::BroadPhase`] only). A larger margin means fewer changed boxes, and more reported pairs that do not touch yet.
     pub margin: f32,
-    /// Settings of the GPU backend.
-    pub gpu: GpuOptions,
     /// An engine that replaces the policy's choice, for tests and measurements.
-    #[cfg(feature = "unstable-study")]
+    #[doc(hidden)]
     pub engine: Option<Engine>,
 }
 
@@ -183,18 +83,8 @@ impl Config {
         order: Order::Sorted,
         limits: Limits::DEFAULT,
         margin: 0.0,
-        gpu: GpuOptions::DEFAULT,
-        #[cfg(feature = "unstable-study")]
         engine: None,
     };
-
-    /// Returns the engine that was asked for.
-    pub(crate) fn forced_engine(&self) -> Option<Engine> {
-        #[cfg(feature = "unstable-study")]
-        return self.engine;
-        #[cfg(not(feature = "unstable-study"))]
-        None
-    }
 }
 
 impl Default for Config {
@@ -205,7 +95,7 @@ impl Default for Config {
 
 /// The ways in which the CPU makes an update of [`crate::BroadPhase`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[cfg_attr(not(feature = "unstable-study"), allow(unreachable_pub, reason = "public with `unstable-study`"))]
+#[doc(hidden)]
 pub enum Engine {
     /// Changed boxes are tested against all.
     Sweep,

@@ -1,9 +1,8 @@
 //! `Finder`: all pairs of a list of boxes, with nothing kept between calls but memory.
 
 use crate::all_pairs::{AllPairs, Request, Store};
-#[cfg(feature = "gpu")]
-use crate::gpu::{GpuFinder, SearchRequest};
-use crate::gpu_slot::GpuSlot;
+use crate::device::{PairDevice, SearchRequest};
+use crate::device_slot::DeviceSlot;
 use crate::pairs::{Grouping, Groups};
 use crate::report::{Clock, Report, stage};
 use crate::{Aabb, Config, Error, Limits, Order, Pair, ProxyFilter};
@@ -42,7 +41,7 @@ pub fn find_pairs(boxes: &[Aabb]) -> Result<Vec<Pair>, Error> {
 #[derive(Clone, Debug, Default)]
 pub struct Finder {
     config: Config,
-    gpu: GpuSlot,
+    device: DeviceSlot,
     store: Store,
     all_pairs: AllPairs,
     groups: Groups,
@@ -56,17 +55,20 @@ impl Finder {
         Self { config, ..Self::default() }
     }
 
-    /// Makes a finder with a given device. [`crate::Backend::Gpu`] always uses it, [`crate::Backend::Auto`] if it is hardware and
+    /// Makes a finder with a given device. [`crate::Backend::Device`] always uses it, [`crate::Backend::Auto`] if it is hardware and
     /// the boxes are many.
-    #[cfg(feature = "gpu")]
-    pub fn with_gpu(config: Config, gpu: GpuFinder) -> Self {
-        Self { gpu: GpuSlot::new(gpu), ..Self::new(config) }
+    pub fn with_device(config: Config, device: Box<dyn PairDevice>) -> Self {
+        Self { device: DeviceSlot::new(device), ..Self::new(config) }
     }
 
-    /// Returns the adapter of the device in use: name, kind and API. None while there is no device or it has failed.
-    #[cfg(feature = "gpu")]
-    pub fn adapter(&self) -> Option<&str> {
-        self.gpu.adapter()
+    /// Uses this device from the next call on.
+    pub fn set_device(&mut self, device: Box<dyn PairDevice>) {
+        self.device = DeviceSlot::new(device);
+    }
+
+    /// Returns the name of the device in use. None while there is no device or it has failed.
+    pub fn device_name(&self) -> Option<&str> {
+        self.device.name()
     }
 
     /// Returns every pair of overlapping boxes; `boxes[i]` has the id `i`.
@@ -98,13 +100,12 @@ impl Finder {
         // A copy, so that the finder is free for its backends.
         let config = self.config;
         let request = Request { boxes, filters, config: &config, grouping };
-        let is_found = self.gpu.is_wanted(&self.config, boxes.len(), &mut self.report);
-        let no_gpu = self.report.plan.no_gpu;
-        #[cfg(feature = "gpu")]
-        let is_found = is_found && self.find_on_gpu(&request)?;
+        let is_wanted = self.device.is_wanted(&self.config, boxes.len(), &mut self.report);
+        let no_device = self.report.plan.no_device;
+        let is_found = is_wanted && self.find_on_device(&request)?;
         if !is_found {
             self.all_pairs.find(&request, &mut self.store, &mut self.report)?;
-            self.report.plan.no_gpu = no_gpu;
+            self.report.plan.no_device = no_device;
             self.emit(grouping);
         }
         self.report.pairs = self.pairs.len() as u64;
@@ -112,15 +113,16 @@ impl Finder {
     }
 
     /// Returns true if a device has found the pairs.
-    #[cfg(feature = "gpu")]
-    fn find_on_gpu(&mut self, request: &Request<'_>) -> Result<bool, Error> {
+    fn find_on_device(&mut self, request: &Request<'_>) -> Result<bool, Error> {
         let Request { boxes, filters, config, grouping } = *request;
-        let request = SearchRequest { boxes, filters, changes: None, config };
-        let pairs = std::mem::take(&mut self.pairs);
-        let found = self.gpu.call(&mut self.report, |gpu| gpu.find(&request, pairs))?;
+        let (is_sorted, max_pairs) = (grouping.is_some(), config.limits.pairs());
+        let request = SearchRequest { boxes, filters, is_sorted, max_pairs };
+        let (pairs, report) = (std::mem::take(&mut self.pairs), &mut self.report);
+        let call = |device: &mut dyn PairDevice, found: &mut _| device.find_all(&request, found);
+        let found = self.device.call(boxes.len(), pairs, config, report, call)?;
         let Some(found) = found else { return Ok(false) };
         self.report.invalid = boxes.len() as u64 - u64::from(found.valid);
-        if found.is_sorted || grouping.is_none() {
+        if grouping.is_none() || found.pairs.is_sorted_by(|one, next| one < next) {
             self.pairs = found.pairs;
         } else {
             self.all_pairs.take(vec![found.pairs], grouping);

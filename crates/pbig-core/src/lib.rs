@@ -26,6 +26,8 @@
 //! for boxes of your own: from ten to a hundred million, of any mix of sizes, anywhere in f32. It
 //! knows boxes only: no rays, no shapes.
 //!
+//! Another processor, such as the GPU of the crate `pbig-gpu`, finds pairs behind the trait [`PairDevice`].
+//!
 //! # What is guaranteed
 //!
 //! * Two valid boxes pair when `a.min <= b.max && b.min <= a.max` on all three axes, in f32, exactly, as
@@ -53,12 +55,11 @@ mod aabb;
 mod all_pairs;
 mod broad_phase;
 mod config;
+mod device;
+mod device_slot;
 mod error;
 mod filter;
 mod finder;
-#[cfg(feature = "gpu")]
-pub mod gpu;
-mod gpu_slot;
 mod grid;
 mod index;
 pub mod oracle;
@@ -69,43 +70,23 @@ mod plan;
 mod policy;
 mod report;
 
-#[cfg(all(feature = "gpu", feature = "unstable-study"))]
-pub mod decode;
-#[cfg(all(feature = "gpu", feature = "unstable-study"))]
-pub mod layout;
-#[cfg(feature = "unstable-study")]
-pub mod pbig;
-
-// Their unit tests need no GPU.
-#[cfg(all(any(feature = "gpu", test), not(all(feature = "gpu", feature = "unstable-study"))))]
-#[allow(dead_code, unreachable_pub, reason = "public with `unstable-study` and `gpu`")]
-mod decode;
-#[cfg(all(any(feature = "gpu", test), not(all(feature = "gpu", feature = "unstable-study"))))]
-#[allow(
-    dead_code,
-    unreachable_pub,
-    reason = "public with `unstable-study` and `gpu`, where tests of kernels use all"
-)]
-mod layout;
-#[cfg(all(feature = "gpu", not(feature = "unstable-study")))]
-#[allow(dead_code, unreachable_pub, reason = "public with `unstable-study`, where PBIG's grid uses all")]
-mod pbig;
-
 pub use aabb::Aabb;
 pub use broad_phase::{BroadPhase, Events};
-#[cfg(feature = "unstable-study")]
-pub use config::Engine;
-#[cfg(not(feature = "unstable-study"))]
-use config::Engine;
-pub use config::{Backend, CellRule, Coding, Config, GpuOptions, Limits, Order};
+pub use config::{Backend, Config, Engine, Limits, Order};
+pub use device::{ChangeRequest, ChangedBox, DeviceFailure, DeviceFound, PairDevice, SearchRequest};
 pub use error::Error;
 pub use filter::{ProxyFilter, TestMode};
 pub use finder::{Finder, find_pairs};
-#[cfg(feature = "gpu")]
-pub use gpu::GpuFinder;
 pub use grid::{NeighbourScan, OccupiedCell, simd};
 pub use index::{BoxIndex, Visited};
 pub use pair::Pair;
 pub use plan::{Algorithm, Plan};
-pub use policy::NoGpu;
-pub use report::{Checks, GpuReport, Report, StageTimes, WORK_LIMIT};
+pub use policy::NoDevice;
+pub use report::{Checks, DeviceReport, Report, StageTimes, WORK_LIMIT};
+
+/// What the other crates of pbig use of this one. It may change in any release.
+#[doc(hidden)]
+pub mod internal {
+    pub use crate::parallel::{SharedSlice, map, run, threads_for};
+    pub use crate::report::Clock;
+}

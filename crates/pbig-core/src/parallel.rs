@@ -5,17 +5,53 @@
 
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-/// Returns how many threads can work on one call, the caller included.
-pub(crate) fn available_threads() -> usize {
-    #[cfg(feature = "parallel")]
-    return rayon::current_num_threads();
-    #[cfg(not(feature = "parallel"))]
-    1
+use threads::run_workers;
+pub(crate) use threads::{available_threads, both};
+
+#[cfg(feature = "parallel")]
+mod threads {
+    /// Returns how many threads can work on one call, the caller included.
+    pub(crate) fn available_threads() -> usize {
+        rayon::current_num_threads()
+    }
+
+    /// Runs `take_pieces(worker)` on so many threads.
+    pub(super) fn run_workers(workers: usize, take_pieces: impl Fn(usize) + Sync) {
+        rayon::in_place_scope(|scope| {
+            let take_pieces = &take_pieces;
+            (1..workers).for_each(|worker| scope.spawn(move |_| take_pieces(worker)));
+            take_pieces(0);
+        });
+    }
+
+    /// Does two works at once, if a thread is free for the first.
+    pub(crate) fn both(first: impl FnOnce() + Send, second: impl FnOnce()) {
+        rayon::in_place_scope(|scope| {
+            scope.spawn(|_| first());
+            second();
+        });
+    }
+}
+
+/// The caller alone.
+#[cfg(not(feature = "parallel"))]
+mod threads {
+    pub(crate) fn available_threads() -> usize {
+        1
+    }
+
+    pub(super) fn run_workers(_: usize, take_pieces: impl Fn(usize) + Sync) {
+        take_pieces(0);
+    }
+
+    pub(crate) fn both(first: impl FnOnce(), second: impl FnOnce()) {
+        first();
+        second();
+    }
 }
 
 /// Returns the number of threads that can work on `pieces` pieces. A single piece does not wake, or make, a pool of threads.
-#[cfg(any(feature = "gpu", test))]
-pub(crate) fn threads_for(pieces: usize) -> usize {
+pub fn threads_for(pieces: usize) -> usize {
     if pieces < 2 { 1 } else { available_threads() }
 }
 
@@ -23,7 +59,7 @@ pub(crate) fn threads_for(pieces: usize) -> usize {
 ///
 /// Two calls with the same `worker` never overlap in time. A panic in `work` reaches the caller after the other
 /// threads have ended.
-pub(crate) fn run(workers: usize, pieces: usize, work: impl Fn(usize, usize) + Sync) {
+pub fn run(workers: usize, pieces: usize, work: impl Fn(usize, usize) + Sync) {
     let workers = workers.min(pieces);
     if workers <= 1 {
         return (0..pieces).for_each(|piece| work(0, piece));
@@ -41,42 +77,13 @@ pub(crate) fn run(workers: usize, pieces: usize, work: impl Fn(usize, usize) + S
     run_workers(workers, take_pieces);
 }
 
-#[cfg(feature = "parallel")]
-fn run_workers(workers: usize, take_pieces: impl Fn(usize) + Sync) {
-    rayon::in_place_scope(|scope| {
-        let take_pieces = &take_pieces;
-        (1..workers).for_each(|worker| scope.spawn(move |_| take_pieces(worker)));
-        take_pieces(0);
-    });
-}
-
-#[cfg(not(feature = "parallel"))]
-fn run_workers(_: usize, take_pieces: impl Fn(usize) + Sync) {
-    take_pieces(0);
-}
-
-/// Runs two closures at once, if a thread is free for the first.
-#[cfg(feature = "parallel")]
-pub(crate) fn both(first: impl FnOnce() + Send, second: impl FnOnce()) {
-    rayon::in_place_scope(|scope| {
-        scope.spawn(|_| first());
-        second();
-    });
-}
-
-#[cfg(not(feature = "parallel"))]
-pub(crate) fn both(first: impl FnOnce(), second: impl FnOnce()) {
-    first();
-    second();
-}
-
 /// Returns the part of `0..len` that belongs to `piece` of `pieces` equal ones.
 pub(crate) fn piece_range(len: usize, piece: usize, pieces: usize) -> std::ops::Range<usize> {
     len * piece / pieces..len * (piece + 1) / pieces
 }
 
 /// A slice whose elements several threads write, each element one thread only.
-pub(crate) struct SharedSlice<T> {
+pub struct SharedSlice<T> {
     start: *mut T,
     len: usize,
 }
@@ -96,7 +103,7 @@ unsafe impl<T: Send> Sync for SharedSlice<T> {}
 
 impl<T> SharedSlice<T> {
     /// Borrows `slice`; the caller keeps the borrow alive while threads write.
-    pub(crate) fn new(slice: &mut [T]) -> Self {
+    pub fn new(slice: &mut [T]) -> Self {
         Self { start: slice.as_mut_ptr(), len: slice.len() }
     }
 
@@ -105,7 +112,7 @@ impl<T> SharedSlice<T> {
     /// # Safety
     /// `i` is inside the slice, which is still borrowed, and no other thread uses element `i`.
     #[inline(always)]
-    pub(crate) unsafe fn write(self, i: usize, value: T) {
+    pub unsafe fn write(self, i: usize, value: T) {
         debug_assert!(i < self.len);
         // SAFETY: the caller's promise.
         unsafe { self.start.add(i).write(value) }
@@ -116,7 +123,7 @@ impl<T> SharedSlice<T> {
     /// # Safety
     /// `range` is inside the slice, which is still borrowed, and no other thread uses these elements while the part lives.
     #[inline(always)]
-    pub(crate) unsafe fn part<'a>(self, range: std::ops::Range<usize>) -> &'a mut [T] {
+    pub unsafe fn part<'a>(self, range: std::ops::Range<usize>) -> &'a mut [T] {
         debug_assert!(range.start <= range.end && range.end <= self.len);
         // SAFETY: the caller's promise.
         unsafe { std::slice::from_raw_parts_mut(self.start.add(range.start), range.end - range.start) }
@@ -134,8 +141,7 @@ pub(crate) fn run_with<T: Send>(own: &mut [T], pieces: usize, work: impl Fn(&mut
 }
 
 /// Returns `work(piece)` for each `piece < pieces`, in order.
-#[cfg(any(feature = "gpu", test))]
-pub(crate) fn map<T: Send>(pieces: usize, work: impl Fn(usize) -> T + Sync) -> Vec<T> {
+pub fn map<T: Send>(pieces: usize, work: impl Fn(usize) -> T + Sync) -> Vec<T> {
     let mut results: Vec<Option<T>> = std::iter::repeat_with(|| None).take(pieces).collect();
     let shared = SharedSlice::new(&mut results);
     run(threads_for(pieces), pieces, |_, piece| {

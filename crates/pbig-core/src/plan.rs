@@ -1,7 +1,7 @@
 //! The plan in a report: what was done, and why, in words.
 
 use crate::grid::{EditedGrid, NeighbourScan};
-use crate::policy::NoGpu;
+use crate::policy::NoDevice;
 use std::fmt;
 
 /// The algorithm that did the work.
@@ -21,8 +21,8 @@ pub enum Algorithm {
     Edit,
     /// All boxes were sorted into a tree, as cells would hold too many, or changed boxes were searched for in one.
     Tree,
-    /// A GPU did the work.
-    Gpu,
+    /// A device did the work, see [`crate::PairDevice`].
+    Device,
 }
 
 impl Algorithm {
@@ -35,7 +35,7 @@ impl Algorithm {
             Self::Grid => "grid",
             Self::Edit => "edit",
             Self::Tree => "tree",
-            Self::Gpu => "gpu",
+            Self::Device => "device",
         }
     }
 }
@@ -69,11 +69,10 @@ pub struct Plan {
     pub oversize: u32,
     /// Boxes that are not in the grid's order, because they moved since it was built ([`Algorithm::Edit`]).
     pub spilled: u32,
-    /// The grid on the GPU ([`Algorithm::Gpu`]); none where every pair was tested.
-    #[cfg(feature = "gpu")]
-    pub gpu: Option<crate::gpu::GpuPlan>,
-    /// The reason that kept a call from a GPU.
-    pub no_gpu: Option<NoGpu>,
+    /// The device's plan in words ([`Algorithm::Device`]); none where every pair was tested.
+    pub device: Option<String>,
+    /// The reason that kept a call from a device.
+    pub no_device: Option<NoDevice>,
 }
 
 impl Plan {
@@ -93,14 +92,12 @@ impl Plan {
         }
     }
 
-    fn write_gpu(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "GPU: {} boxes", self.boxes)?;
-        #[cfg(feature = "gpu")]
-        match &self.gpu {
-            Some(grid) => write!(f, "; {grid}")?,
-            None => write!(f, ", every pair is tested")?,
+    fn write_device(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "device: {} boxes", self.boxes)?;
+        match &self.device {
+            Some(plan) => write!(f, "; {plan}"),
+            None => write!(f, ", every pair is tested"),
         }
-        Ok(())
     }
 
     fn write_cells(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -127,7 +124,7 @@ impl fmt::Display for Plan {
             Algorithm::Tree => {
                 write!(f, "tree: cells would hold too many of {boxes} boxes, or few have changed")?
             }
-            Algorithm::Gpu => self.write_gpu(f)?,
+            Algorithm::Device => self.write_device(f)?,
             Algorithm::Grid => write!(f, "grid: {boxes} boxes are sorted and searched")?,
             Algorithm::Edit => {
                 write!(f, "edit: {} of {boxes} boxes are out of the grid's order", self.spilled)?
@@ -136,9 +133,9 @@ impl fmt::Display for Plan {
         if matches!(self.algorithm, Algorithm::Grid | Algorithm::Edit) {
             self.write_cells(f)?;
         }
-        // Without a GPU backend nobody expects one.
-        match self.no_gpu {
-            Some(why) if why != NoGpu::NotBuilt => write!(f, "; no GPU: {why}"),
+        // Where no device was given nobody expects one.
+        match self.no_device {
+            Some(why) if why != NoDevice::NotGiven => write!(f, "; no device: {why}"),
             _ => Ok(()),
         }
     }
@@ -149,14 +146,12 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_algorithm_says_why_no_gpu_was_used() {
+    fn every_algorithm_says_why_no_device_was_used() {
         use Algorithm::{Brute, Edit, Grid, Nothing, Sweep, Tree};
         for algorithm in [Nothing, Brute, Sweep, Grid, Edit, Tree] {
-            let shown = |no_gpu| Plan { algorithm, boxes: 9, no_gpu, ..Plan::default() }.to_string();
-            assert!(shown(Some(NoGpu::Software)).ends_with("; no GPU: the given device is software"));
-            // Nothing has failed where nobody asked.
-            assert!(shown(Some(NoGpu::NotGiven)).ends_with("; no GPU: none was asked for"));
-            assert!(!shown(Some(NoGpu::NotBuilt)).contains("GPU") && !shown(None).contains("GPU"));
+            let shown = |no_device| Plan { algorithm, boxes: 9, no_device, ..Plan::default() }.to_string();
+            assert!(shown(Some(NoDevice::Software)).ends_with("; no device: the given one is software"));
+            assert_eq!(shown(Some(NoDevice::NotGiven)), shown(None));
         }
     }
 }

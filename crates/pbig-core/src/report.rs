@@ -47,14 +47,14 @@ macro_rules! stage {
 pub(crate) use stage;
 
 /// A stopwatch for reports. It decides nothing, and stands still where there is no clock (wasm32-unknown-unknown).
-pub(crate) struct Clock {
+pub struct Clock {
     #[cfg(not(all(target_family = "wasm", target_os = "unknown")))]
     last: std::time::Instant,
 }
 
 impl Clock {
     /// Starts a stopwatch.
-    pub(crate) fn start() -> Self {
+    pub fn start() -> Self {
         Self {
             #[cfg(not(all(target_family = "wasm", target_os = "unknown")))]
             last: std::time::Instant::now(),
@@ -63,14 +63,14 @@ impl Clock {
 
     /// Returns the time since the last lap, or the start.
     #[cfg(not(all(target_family = "wasm", target_os = "unknown")))]
-    pub(crate) fn lap(&mut self) -> Duration {
+    pub fn lap(&mut self) -> Duration {
         let now = std::time::Instant::now();
         now.duration_since(std::mem::replace(&mut self.last, now))
     }
 
     /// Returns no time.
     #[cfg(all(target_family = "wasm", target_os = "unknown"))]
-    pub(crate) fn lap(&mut self) -> Duration {
+    pub fn lap(&mut self) -> Duration {
         Duration::ZERO
     }
 }
@@ -104,8 +104,8 @@ pub struct Report {
     pub invalid: u64,
     /// Boxes that had changed ([`crate::BroadPhase`]: beyond their margin, or filter).
     pub changed: u64,
-    /// Tests made. On a GPU the map's estimate, without unnecessary and redundant ones, unless
-    /// [`crate::GpuOptions::count_tests`] is set.
+    /// Tests made. A device may report an estimate, without unnecessary and redundant
+    /// ones.
     pub checks: Checks,
     /// The work on the CPU in counts: tests made, runs of cells and nodes of a tree looked at. In an edit an entry of a list
     /// counts as 16 and a test against an oversize box as 4, because they take longer. An edit that was given up counts as the work
@@ -116,18 +116,18 @@ pub struct Report {
     pub pairs: u64,
     /// The plan: the algorithm, the grid and the reasons.
     pub plan: Plan,
-    /// The reason why the CPU did the work of a wanted GPU, if it did.
+    /// The reason why the CPU did the work of a wanted device, if it did.
     pub fallback: Option<String>,
-    /// The report on the GPU, if it did the work.
-    pub gpu: Option<GpuReport>,
+    /// The report on the device, if it did the work.
+    pub device: Option<DeviceReport>,
 }
 
-/// The report on a call that ran on a GPU.
+/// The report on a call that ran on a device: zero where a device measures or does nothing of the kind.
 #[derive(Clone, Debug, Default, PartialEq)]
 #[non_exhaustive]
-pub struct GpuReport {
-    /// The adapter's name, kind and API.
-    pub adapter: String,
+pub struct DeviceReport {
+    /// The name of the device.
+    pub name: String,
     /// Time of the host: copying boxes or changes into the device's staging memory.
     pub upload: Duration,
     /// Time of the host: choosing cells. Zero where the plan of an earlier call is kept.
@@ -138,8 +138,10 @@ pub struct GpuReport {
     pub wait: Duration,
     /// Time of the host: decoding.
     pub decode: Duration,
-    /// Time on the device by kernel, where the adapter measures it, if [`crate::GpuOptions::time_kernels`] is set.
+    /// Time on the device by kernel.
     pub kernels: Vec<(&'static str, Duration)>,
+    /// Edge of the smallest cells, in the boxes' length unit; 0 where every pair was tested.
+    pub cell: f32,
     /// Bytes sent to the device.
     pub uploaded: u64,
     /// Bytes read back.

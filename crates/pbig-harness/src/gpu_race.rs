@@ -4,7 +4,8 @@ use crate::bench::timed;
 use crate::boxes::Wander;
 use crate::output::{Failure, check};
 use crate::runner::Spread;
-use pbig_core::{Aabb, Backend, BroadPhase, Config, GpuFinder, GpuReport, Limits, ProxyFilter, Report};
+use pbig_core::{Aabb, Backend, BroadPhase, Config, DeviceReport, Limits, ProxyFilter, Report};
+use pbig_gpu::GpuFinder;
 
 /// The result of a race.
 #[derive(Debug)]
@@ -16,7 +17,7 @@ pub struct Raced {
     /// Pairs that were added or removed in the last round.
     pub events: usize,
     /// The device's report on the last round.
-    pub report: GpuReport,
+    pub report: DeviceReport,
 }
 
 /// Lets a share of these boxes move by up to a distance, for some rounds.
@@ -25,7 +26,7 @@ pub struct Raced {
 /// A failed check, if CPU and device have different events or if the device leaves an update to the CPU.
 pub fn race(gpu: &GpuFinder, start: Vec<Aabb>, share: f64, distance: f32) -> Result<Raced, Failure> {
     let config = |backend| Config { backend, limits: Limits::UNLIMITED, ..Config::DEFAULT };
-    let on_gpu = BroadPhase::with_gpu(config(Backend::Gpu), gpu.clone())?;
+    let on_gpu = BroadPhase::with_device(config(Backend::Device), Box::new(gpu.clone()))?;
     let mut sides = [BroadPhase::new(config(Backend::Cpu))?, on_gpu];
     let all: Vec<u32> = (0..start.len() as u32).collect();
     let mut wander = Wander::new(start, share, distance);
@@ -59,7 +60,7 @@ fn update(broad_phase: &mut BroadPhase, moved: &[u32], boxes: &[Aabb]) -> Result
 }
 
 /// Returns the report of the device. If the device left the call to the CPU, this is an error.
-pub fn on_device(report: &Report) -> Result<&GpuReport, Failure> {
+pub fn on_device(report: &Report) -> Result<&DeviceReport, Failure> {
     let why = || Failure::Check(report.fallback.clone().unwrap_or_else(|| "the CPU did the work".into()));
-    report.gpu.as_ref().ok_or_else(why)
+    report.device.as_ref().ok_or_else(why)
 }

@@ -1,7 +1,9 @@
-//! Command-line options that the program and the examples share.
+//! Command-line options that the program and the examples share, and what they choose.
 
 use clap::ValueEnum;
-use pbig_core::Backend;
+use pbig_core::{Backend, BroadPhase, Config, Error, Finder, PairDevice};
+use pbig_gpu::{GpuFinder, GpuOptions};
+use rapier_pbig::{PbigBroadPhase, PbigConfig};
 
 /// `--backend`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
@@ -18,12 +20,34 @@ pub enum BackendOption {
 }
 
 impl BackendOption {
-    /// The setting that this asks for.
-    pub fn backend(self) -> Backend {
+    /// Returns a finder.
+    pub fn finder(self) -> Finder {
+        finder(Config { backend: self.backend(), ..Config::DEFAULT }, GpuOptions::DEFAULT)
+    }
+
+    /// Returns a broad phase.
+    ///
+    /// # Errors
+    /// [`Error::Margin`].
+    pub fn broad_phase(self, margin: f32) -> Result<BroadPhase, Error> {
+        broad_phase(Config { margin, backend: self.backend(), ..Config::DEFAULT }, GpuOptions::DEFAULT)
+    }
+
+    /// Returns a broad phase for rapier.
+    pub fn for_rapier(self) -> PbigBroadPhase {
+        let config = PbigConfig { backend: self.backend(), ..PbigConfig::DEFAULT };
+        let mut broad_phase = PbigBroadPhase::with_config(config).expect("the default margin is a length");
+        if let Some(gpu) = shared_gpu(config.backend, GpuOptions::DEFAULT) {
+            broad_phase.set_device(gpu);
+        }
+        broad_phase
+    }
+
+    fn backend(self) -> Backend {
         match self {
             Self::Auto => Backend::Auto,
             Self::Cpu => Backend::Cpu,
-            Self::Gpu => Backend::Gpu,
+            Self::Gpu => Backend::Device,
             Self::Brute => Backend::Brute,
         }
     }
@@ -35,5 +59,30 @@ impl BackendOption {
             Self::Gpu if fallback.is_none() => "gpu",
             _ => "cpu",
         }
+    }
+}
+
+/// Returns the GPU that the process shares, if this backend asks for a device.
+pub fn shared_gpu(backend: Backend, options: GpuOptions) -> Option<Box<dyn PairDevice>> {
+    let gpu = || Box::new(GpuFinder::shared().with_options(options)) as Box<dyn PairDevice>;
+    (backend == Backend::Device).then(gpu)
+}
+
+/// Returns a finder, on the shared GPU if the settings ask for a device.
+pub fn finder(config: Config, options: GpuOptions) -> Finder {
+    match shared_gpu(config.backend, options) {
+        Some(gpu) => Finder::with_device(config, gpu),
+        None => Finder::new(config),
+    }
+}
+
+/// As [`finder`], a broad phase.
+///
+/// # Errors
+/// [`Error::Margin`].
+pub fn broad_phase(config: Config, options: GpuOptions) -> Result<BroadPhase, Error> {
+    match shared_gpu(config.backend, options) {
+        Some(gpu) => BroadPhase::with_device(config, gpu),
+        None => BroadPhase::new(config),
     }
 }

@@ -7,8 +7,9 @@
 //! exact (contract 3).
 
 use crate::pair_index::{pair_count, pair_of, row_len, row_pair};
-use pbig_core::pbig::{Summary, cell_size, cells_along, cells_in, ordinary, space_of};
-use pbig_core::{Aabb, Checks, Error, GpuOptions, Limits, Pair};
+use pbig_core::{Aabb, Checks, Error, Limits, Pair};
+use pbig_gpu::GpuOptions;
+use pbig_gpu::pbig::{Summary, cell_size, cells_along, cells_in, ordinary, space_of};
 
 /// Maximum number of cells per box. With more cells, empty cells cost more than full ones.
 const MAX_CELLS_PER_BOX: f64 = 4.0;
@@ -210,8 +211,9 @@ impl PbigFound {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use pbig_core::pbig::{density_cell, pbig_cell, pbig_objective};
-    use pbig_core::{CellRule, oracle};
+    use pbig_core::oracle;
+    use pbig_gpu::CellRule;
+    use pbig_gpu::pbig::{density_cell, pbig_cell, pbig_objective};
 
     fn boxes() -> Vec<Aabb> {
         let at = |i: u32| [i * 37 % 101, i * 53 % 29, i * 17 % 7].map(|x| x as f32 * 0.7);

@@ -4,7 +4,7 @@ use crate::PbigConfig;
 use crate::call::Call;
 use crate::scene::{handle, to_collider};
 use crate::tree::ParryTree;
-use pbig_adapter::{Colliders, Error, HandlePair, PairEvent, Stats, Why};
+use pbig_adapter::{Colliders, Error, HandlePair, PairDevice, PairEvent, Stats, Why};
 use rapier3d::prelude::{
     BroadPhase, BroadPhasePairEvent, ColliderHandle, ColliderPair, ColliderSet, IntegrationParameters,
     NarrowPhase, RigidBodySet,
@@ -54,34 +54,40 @@ impl PbigBroadPhase {
         pbig_core::BroadPhase::new(config.into()).map(Self::around)
     }
 
-    /// As [`PbigBroadPhase::with_config`], on a given device. [`pbig_core::Backend::Gpu`] always uses it.
-    /// [`pbig_core::Backend::Auto`] uses it for large changes, unless it is a software adapter.
+    /// As [`PbigBroadPhase::with_config`], on a given device. [`pbig_core::Backend::Device`] always uses it.
+    /// [`pbig_core::Backend::Auto`] uses it for large changes, unless it is software.
+    ///
+    /// # Errors
+    /// [`Error::Margin`].
+    pub fn with_device(config: PbigConfig, device: Box<dyn PairDevice>) -> Result<Self, Error> {
+        pbig_core::BroadPhase::with_device(config.into(), device).map(Self::around)
+    }
+
+    /// As [`PbigBroadPhase::with_device`], on a GPU.
     ///
     /// # Errors
     /// [`Error::Margin`].
     #[cfg(feature = "gpu")]
-    pub fn with_gpu(config: PbigConfig, gpu: pbig_core::GpuFinder) -> Result<Self, Error> {
-        pbig_core::BroadPhase::with_gpu(config.into(), gpu).map(Self::around)
+    pub fn with_gpu(config: PbigConfig, gpu: pbig_gpu::GpuFinder) -> Result<Self, Error> {
+        Self::with_device(config, Box::new(gpu))
     }
 
     /// Uses this device in later updates. A broad phase restored from a snapshot has none.
-    #[cfg(feature = "gpu")]
-    pub fn set_gpu(&mut self, gpu: pbig_core::GpuFinder) {
-        self.colliders.set_gpu(gpu);
+    pub fn set_device(&mut self, device: Box<dyn PairDevice>) {
+        self.colliders.set_device(device);
     }
 
-    /// Returns the name, kind and API of the device in use.
-    #[cfg(feature = "gpu")]
-    pub fn adapter(&self) -> Option<&str> {
-        self.colliders.core().adapter()
+    /// Returns the name of the device in use.
+    pub fn device_name(&self) -> Option<&str> {
+        self.colliders.core().device_name()
     }
 
     /// As [`PbigBroadPhase::with_config`], with any settings of the core; its margin is in units of rapier's `length_unit`.
-    /// For studies and tests (feature `unstable-study`).
+    /// For studies and tests.
     ///
     /// # Errors
     /// [`Error::Margin`].
-    #[cfg(feature = "unstable-study")]
+    #[doc(hidden)]
     pub fn with_core_config(config: pbig_core::Config) -> Result<Self, Error> {
         pbig_core::BroadPhase::new(config).map(Self::around)
     }

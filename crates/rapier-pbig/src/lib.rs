@@ -32,11 +32,10 @@
 //! | feature | adds |
 //! | --- | --- |
 //! | `parallel` (default) | several threads read the modified colliders, and search |
-//! | `gpu` | the GPU backend |
+//! | `gpu` | the GPU of `pbig-gpu` |
 //! | `serde` | `Serialize` and `Deserialize`, as rapier's `serde-serialize` |
 //! | `debug-render` | [`PbigBroadPhase::debug_render`], as rapier's |
 //! | `shadow` | [`PbigBroadPhase::with_shadow`]: rapier's own broad phase and brute force run beside it |
-//! | `unstable-study` | parts for studies and tests, which may change in any release |
 
 // Labels each item in the documentation with the feature that it needs; on docs.rs only, as it takes nightly Rust.
 #![cfg_attr(docsrs, feature(doc_cfg))]
@@ -65,11 +64,11 @@ pub use broad_phase::PbigBroadPhase;
 pub use config::PbigConfig;
 #[cfg(feature = "debug-render")]
 pub use debug_render::DebugRenderParts;
-pub use pbig_adapter::{Backend, Error, Handle, Report, Stats, Totals, Why};
+pub use pbig_adapter::{Backend, Error, Handle, PairDevice, Report, Stats, Totals, Why};
 #[cfg(feature = "gpu")]
-pub use pbig_core::GpuFinder;
+pub use pbig_gpu::GpuFinder;
 pub use queries::Queries;
-#[cfg(feature = "unstable-study")]
+#[doc(hidden)]
 pub use scene::{collision_aabb, filter_of};
 #[cfg(feature = "shadow")]
 pub use shadow::Shadow;

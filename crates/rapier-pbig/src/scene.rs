@@ -37,7 +37,6 @@ impl<'a> Call<'a> {
 /// its contact skin; with soft CCD, also the AABB at the predicted pose.
 ///
 /// The margin is not included. A pose with a NaN gives an invalid AABB, which pairs with nothing.
-#[cfg(feature = "unstable-study")]
 pub fn collision_aabb(params: &IntegrationParameters, bodies: &RigidBodySet, collider: &Collider) -> Aabb {
     aabb_of(params, parent_of(bodies, collider), collider)
 }
@@ -100,7 +99,6 @@ fn union(a: &Aabb, b: &Aabb) -> Aabb {
 
 /// Returns the filters that rapier's narrow phase applies before it computes contacts: parent body, body type against active
 /// collision types, collision groups.
-#[cfg(feature = "unstable-study")]
 pub fn filter_of(bodies: &RigidBodySet, collider: &Collider) -> ProxyFilter {
     filter_with(parent_of(bodies, collider), collider)
 }

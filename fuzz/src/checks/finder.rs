@@ -2,7 +2,8 @@
 
 use super::super::pbig_grid::pbig_grid;
 use super::input::Input;
-use pbig_core::{Aabb, Backend, CellRule, Config, Engine, Finder, GpuOptions, Order, ProxyFilter, oracle};
+use pbig_core::{Aabb, Backend, Config, Engine, Finder, Order, ProxyFilter, oracle};
+use pbig_gpu::{CellRule, GpuOptions};
 
 /// One byte of settings, then boxes, each with a filter if the settings ask for filters.
 pub fn finder_against_oracle(data: &[u8]) {

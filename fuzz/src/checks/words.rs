@@ -1,7 +1,7 @@
 //! Words of a device, and saved bytes, that may be anything: an error, or pairs as they may be; never a panic.
 
-use super::super::decode;
 use pbig_core::{Aabb, BroadPhase, Pair, ProxyFilter};
+use pbig_gpu::decode;
 
 /// A byte for the format, one for the number of boxes, one for that of entries; then words, entries first.
 pub fn decode_words(data: &[u8]) {

@@ -3,7 +3,7 @@
 use crate::scene::{Call, handle, own_margin};
 use crate::tree::{ParryTree, from_tree, to_tree};
 use crate::{PairFinder, PbigConfig, SceneQuery};
-use pbig_adapter::{Colliders, Error, HandlePair, PairEvent, Stats, Why};
+use pbig_adapter::{Colliders, Error, HandlePair, PairDevice, PairEvent, Stats, Why};
 use rapier3d::math::Real;
 use rapier3d::parry::bounding_volume::Aabb as TreeAabb;
 use rapier3d::parry::partitioning::Bvh;
@@ -35,20 +35,27 @@ impl PbigFinder {
         pbig_core::BroadPhase::new(config.into()).map(Self::around)
     }
 
-    /// As [`PbigFinder::with_config`], on a given device. [`pbig_core::Backend::Gpu`] always uses it.
-    /// [`pbig_core::Backend::Auto`] uses it for large changes, unless it is a software adapter.
+    /// As [`PbigFinder::with_config`], on a given device. [`pbig_core::Backend::Device`] always uses it.
+    /// [`pbig_core::Backend::Auto`] uses it for large changes, unless it is software.
+    ///
+    /// # Errors
+    /// [`Error::Margin`].
+    pub fn with_device(config: PbigConfig, device: Box<dyn PairDevice>) -> Result<Self, Error> {
+        pbig_core::BroadPhase::with_device(config.into(), device).map(Self::around)
+    }
+
+    /// As [`PbigFinder::with_device`], on a GPU.
     ///
     /// # Errors
     /// [`Error::Margin`].
     #[cfg(feature = "gpu")]
-    pub fn with_gpu(config: PbigConfig, gpu: pbig_core::GpuFinder) -> Result<Self, Error> {
-        pbig_core::BroadPhase::with_gpu(config.into(), gpu).map(Self::around)
+    pub fn with_gpu(config: PbigConfig, gpu: pbig_gpu::GpuFinder) -> Result<Self, Error> {
+        Self::with_device(config, Box::new(gpu))
     }
 
-    /// Returns the name, kind and API of the device in use.
-    #[cfg(feature = "gpu")]
-    pub fn adapter(&self) -> Option<&str> {
-        self.colliders.core().adapter()
+    /// Returns the name of the device in use.
+    pub fn device_name(&self) -> Option<&str> {
+        self.colliders.core().device_name()
     }
 
     fn around(core: pbig_core::BroadPhase) -> Self {

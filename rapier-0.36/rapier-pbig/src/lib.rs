@@ -35,7 +35,7 @@
 //! | feature | adds |
 //! | --- | --- |
 //! | `parallel` (default) | several threads search |
-//! | `gpu` | the GPU backend |
+//! | `gpu` | the GPU of `pbig-gpu` |
 //! | `debug-render` | [`PbigFinder::debug_render`], as rapier's |
 //! | `serde` | rapier's `serde-serialize`: worlds can be saved |
 //! | `shadow` | [`PbigFinder::with_shadow`]: rapier's own broad phase and brute force run beside it |
@@ -56,9 +56,9 @@ pub use config::PbigConfig;
 #[cfg(feature = "debug-render")]
 pub use debug_render::DebugRenderParts;
 pub use finder::PbigFinder;
-pub use pbig_adapter::{Backend, Error, Handle, Report, Stats, Totals, Why};
+pub use pbig_adapter::{Backend, Error, Handle, PairDevice, Report, Stats, Totals, Why};
 #[cfg(feature = "gpu")]
-pub use pbig_core::GpuFinder;
+pub use pbig_gpu::GpuFinder;
 #[cfg(feature = "shadow")]
 pub use shadow::{Shadow, differences};
 

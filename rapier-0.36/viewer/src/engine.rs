@@ -2,7 +2,7 @@
 
 use crate::choice::Choice;
 use pbig_scenes::world::World;
-use rapier_pbig::{Error, PbigConfig, PbigFinder};
+use rapier_pbig::{Backend, Error, GpuFinder, PbigConfig, PbigFinder};
 use rapier3d::prelude::BroadPhaseBvh;
 use std::time::Duration;
 
@@ -40,7 +40,12 @@ impl Engine {
     }
 
     fn install_pbig(&mut self, config: PbigConfig) {
-        rapier_pbig::install_with(&mut self.broad_phase, config).expect("the default margin is a length");
+        let pbig = match config.backend {
+            Backend::Device => PbigFinder::with_gpu(config, GpuFinder::shared()),
+            _ => PbigFinder::with_config(config),
+        };
+        let pbig = pbig.expect("the default margin is a length");
+        rapier_pbig::install_finder(&mut self.broad_phase, pbig);
     }
 
     /// Makes one step of the world. The time inside the broad phase is rapier's own count.

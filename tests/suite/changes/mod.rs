@@ -3,10 +3,13 @@
 
 mod world;
 
-use pbig_core::gpu::study::{Fault, GpuFound};
-use pbig_core::{Aabb, Coding, Config, GpuFinder, GpuOptions, GpuReport, Limits, ProxyFilter, oracle};
+use pbig_core::{
+    Aabb, DeviceFailure, DeviceFound, DeviceReport, Limits, PairDevice, ProxyFilter, SearchRequest, oracle,
+};
+use pbig_gpu::study::Fault;
+use pbig_gpu::{Coding, GpuFinder, GpuOptions};
 use pbig_harness::boxes::BoxSet;
-use pbig_tests::{gpu, needs_gpu};
+use pbig_tests::needs_gpu;
 use rand::rngs::StdRng;
 use rand::{RngExt, SeedableRng};
 use std::time::Duration;
@@ -16,16 +19,16 @@ fn set(name: &str, n: usize) -> Vec<Aabb> {
     BoxSet::named(name).expect("the set exists").boxes(n, 5)
 }
 
-fn device() -> GpuFinder {
-    GpuFinder::new().expect("an adapter")
+fn device(options: GpuOptions) -> GpuFinder {
+    GpuFinder::new().expect("an adapter").with_options(options)
 }
 
-/// Returns settings for a device that always makes a grid.
-fn with(options: GpuOptions) -> Config {
-    Config { gpu: GpuOptions { all_pairs_up_to: 0, count_tests: true, ..options }, ..gpu(options.coding) }
+/// Returns a device that always makes a grid.
+fn with(options: GpuOptions) -> GpuFinder {
+    device(GpuOptions { all_pairs_up_to: 0, count_tests: true, ..options })
 }
 
-fn transferred(tracked: &GpuFound) -> GpuReport {
+fn transferred(tracked: &DeviceFound) -> DeviceReport {
     tracked.report.clone()
 }
 
@@ -52,19 +55,19 @@ fn disturb(world: &mut World, rng: &mut StdRng) {
 }
 
 /// Runs random updates on one device. Now and then another backend does one.
-fn follow_at_random(seed: u64, boxes: usize, updates: usize, config: &Config) {
+fn follow_at_random(seed: u64, boxes: usize, updates: usize, mut gpu: GpuFinder) {
     let rng = &mut StdRng::seed_from_u64(seed);
     let start = |_| Aabb::from_center(std::array::from_fn(|_| rng.random_range(0.0..11.0)), [0.7; 3]);
     let mut world = World::new(&(0..boxes).map(start).collect::<Vec<_>>());
-    let mut gpu = device();
     for update in 0..updates {
-        let tracked = world.follow(&mut gpu, config).expect("no device fails here");
+        let tracked = world.follow(&mut gpu).expect("no device fails here");
         assert_eq!(transferred(&tracked).uploaded > 0, world.len() > 0, "update {update}");
         for _ in 0..rng.random_range(0..2 * boxes / 3) {
             disturb(&mut world, rng);
         }
         if rng.random_range(0..8) == 0 {
             world.advance();
+            gpu.forget();
         }
         world.put(0, Aabb::from_center([update as f32; 3], [0.5; 3]));
     }
@@ -77,8 +80,7 @@ fn random_updates_equal_brute_force_with_and_without_a_grid() {
         for coding in [Coding::Auto, Coding::Plain, Coding::Packed] {
             for all_pairs_up_to in [0, 1024] {
                 let options = GpuOptions { coding, all_pairs_up_to, ..GpuOptions::DEFAULT };
-                let config = Config { gpu: options, ..gpu(coding) };
-                follow_at_random(seed, 90, 14, &config);
+                follow_at_random(seed, 90, 14, device(options));
             }
         }
     }
@@ -92,7 +94,7 @@ fn random_updates_lose_nothing_in_small_chunks_and_buffers() {
             let tiny =
                 GpuOptions { coding, chunk: [2, 1], first_bytes: 0, pipelining, ..GpuOptions::DEFAULT };
             for small_cell in [1, 32] {
-                follow_at_random(seed, 700, 7, &with(GpuOptions { small_cell, ..tiny }));
+                follow_at_random(seed, 700, 7, with(GpuOptions { small_cell, ..tiny }));
             }
         }
     }
@@ -110,11 +112,11 @@ fn jostle(world: &mut World, every: usize, by: f32) {
 fn a_world_of_many_chunks_and_repeats_is_complete() {
     needs_gpu!();
     let tiny = GpuOptions { chunk: [3, 2], first_bytes: 0, ..GpuOptions::DEFAULT };
-    let (mut world, mut gpu) = (World::new(&set("pile", 3000)), device());
+    let (mut world, mut gpu) = (World::new(&set("pile", 3000)), with(tiny));
     let (mut chunks, mut repeats) = (0, 0);
     for (every, by) in [(1, 0.0), (2, 0.2), (1, 0.3), (3, -0.4), (1000, 0.1)] {
         jostle(&mut world, every, by);
-        let report = transferred(&world.follow(&mut gpu, &with(tiny)).expect("a device"));
+        let report = transferred(&world.follow(&mut gpu).expect("a device"));
         chunks += report.chunks;
         repeats += report.repeats;
     }
@@ -128,10 +130,10 @@ fn a_world_beyond_the_limits_of_a_device_is_split() {
     let options = GpuOptions { max_bytes: 1 << 20, ..GpuOptions::DEFAULT };
     let mut boxes = set("pile", 24_000);
     boxes.push(Aabb::new([f32::NEG_INFINITY; 3], [f32::INFINITY, 0.0, f32::INFINITY]));
-    let (mut world, mut gpu) = (World::new(&boxes), device());
+    let (mut world, mut gpu) = (World::new(&boxes), with(options));
     for (every, by) in [(1, 0.0), (5, 0.3), (9000, 0.2)] {
         jostle(&mut world, every, by);
-        let tracked = world.follow(&mut gpu, &with(options)).expect("a device");
+        let tracked = world.follow(&mut gpu).expect("a device");
         assert!(transferred(&tracked).parts > 1, "{} parts", transferred(&tracked).parts);
     }
     // Fewer boxes fit at once, and the device gets all of them again.
@@ -141,7 +143,7 @@ fn a_world_beyond_the_limits_of_a_device_is_split() {
     world.changed.retain(|&id, _| id < 3000);
     for every in [1, 100] {
         jostle(&mut world, every, 0.1);
-        let report = transferred(&world.follow(&mut gpu, &with(options)).expect("a device"));
+        let report = transferred(&world.follow(&mut gpu).expect("a device"));
         assert_eq!((report.parts, report.uploaded > 3000 * 48), (1, every == 1));
     }
 }
@@ -155,12 +157,11 @@ const FILTER_CHANGE: u64 = 20;
 fn transfers_follow_what_has_changed() {
     needs_gpu!();
     let boxes = set("pile", 20_000);
-    let (mut world, mut gpu) = (World::new(&boxes), device());
-    let config = with(GpuOptions::DEFAULT);
+    let (mut world, mut gpu) = (World::new(&boxes), with(GpuOptions::DEFAULT));
     let mut update = |world: &mut World| {
         let kept = world.kept.len();
-        let tracked = world.follow(&mut gpu, &config).expect("a device");
-        let GpuReport { uploaded, downloaded, .. } = transferred(&tracked);
+        let tracked = world.follow(&mut gpu).expect("a device");
+        let DeviceReport { uploaded, downloaded, .. } = transferred(&tracked);
         let events = (tracked.pairs.len() + tracked.ended.len()) as u64;
         // There are 464 bytes of counts and times, and 64 prefetched words.
         assert!(downloaded >= 464 + 8 * events, "{downloaded} bytes for {events} events");
@@ -193,22 +194,21 @@ fn transfers_follow_what_has_changed() {
 #[test]
 fn only_boxes_that_jump_or_change_their_filter_restart() {
     needs_gpu!();
-    let (mut world, mut gpu) = (World::new(&set("unit", 2000)), device());
-    let config = with(GpuOptions::DEFAULT);
-    world.follow(&mut gpu, &config).expect("a device");
+    let (mut world, mut gpu) = (World::new(&set("unit", 2000)), with(GpuOptions::DEFAULT));
+    world.follow(&mut gpu).expect("a device");
     world.shift(5, [0.3; 3]);
     world.shift(6, [50.0, 0.0, 0.0]);
     world.set(7, world.boxes[7], ProxyFilter { mask: 2, ..ProxyFilter::ALL });
     world.put(8, Aabb::NOWHERE);
     world.remove(9);
     world.set(2000, world.boxes[3], ProxyFilter::ALL);
-    let tracked = world.follow(&mut gpu, &config).expect("a device");
+    let tracked = world.follow(&mut gpu).expect("a device");
     assert_eq!(tracked.restarted, [6, 7]);
     // A ground that moves far still overlaps its old place, so it is not new.
     world.put(10, Aabb::new([f32::MIN; 3], [f32::MAX, -50.0, f32::MAX]));
-    world.follow(&mut gpu, &config).expect("a device");
+    world.follow(&mut gpu).expect("a device");
     world.put(10, Aabb::new([f32::MIN; 3], [f32::MAX, 7.0, f32::MAX]));
-    let tracked = world.follow(&mut gpu, &config).expect("a device");
+    let tracked = world.follow(&mut gpu).expect("a device");
     assert_eq!((tracked.restarted.len(), tracked.pairs.is_empty()), (0, false));
 }
 
@@ -216,28 +216,27 @@ fn only_boxes_that_jump_or_change_their_filter_restart() {
 #[test]
 fn boxes_at_rest_are_not_tested() {
     needs_gpu!();
-    let (mut world, mut gpu) = (World::new(&set("pile", 6000)), device());
-    let config = with(GpuOptions::DEFAULT);
-    let tested = |tracked: &GpuFound| tracked.checks.made - tracked.checks.redundant;
-    let all = tested(&world.follow(&mut gpu, &config).expect("a device"));
+    let (mut world, mut gpu) = (World::new(&set("pile", 6000)), with(GpuOptions::DEFAULT));
+    let tested = |tracked: &DeviceFound| tracked.checks.made - tracked.checks.redundant;
+    let all = tested(&world.follow(&mut gpu).expect("a device"));
     jostle(&mut world, 600, 0.01);
-    let few = tested(&world.follow(&mut gpu, &config).expect("a device"));
+    let few = tested(&world.follow(&mut gpu).expect("a device"));
     assert!(few > 0 && few * 100 < all, "{few} tests for 10 boxes, {all} for 6000");
 }
 
 #[test]
 fn a_device_that_has_not_seen_an_update_is_told_everything() {
     needs_gpu!();
-    let (mut world, mut gpu) = (World::new(&set("unit", 1500)), device());
-    let config = with(GpuOptions::DEFAULT);
+    let (mut world, mut gpu) = (World::new(&set("unit", 1500)), with(GpuOptions::DEFAULT));
     for missed in [false, false, true, false, true, true] {
         if missed {
             jostle(&mut world, 2, 0.3);
             world.advance();
+            gpu.forget();
         }
         jostle(&mut world, 3, 0.4);
         let all = world.update == 0 || missed;
-        let report = transferred(&world.follow(&mut gpu, &config).expect("a device"));
+        let report = transferred(&world.follow(&mut gpu).expect("a device"));
         assert_eq!(report.uploaded, if all { 1500 * WHOLE } else { 500 * BOX_CHANGE });
     }
 }
@@ -245,18 +244,20 @@ fn a_device_that_has_not_seen_an_update_is_told_everything() {
 #[test]
 fn searches_for_all_pairs_in_between_do_no_harm() {
     needs_gpu!();
-    let (mut world, mut gpu) = (World::new(&set("pile", 2000)), device());
-    let config = with(GpuOptions::DEFAULT);
+    let (mut world, mut gpu) = (World::new(&set("pile", 2000)), with(GpuOptions::DEFAULT));
     for find_all in [false, true, true, false, true] {
         if find_all {
             let few = &world.boxes[..1500];
-            let mut pairs = gpu.search_all(few, &config).expect("a device").pairs;
-            pairs.sort_unstable();
-            assert_eq!(pbig_tests::difference(&pairs, &oracle::pairs(few)), None);
+            let max_pairs = Limits::DEFAULT.max_pairs;
+            let request = SearchRequest { boxes: few, filters: None, is_sorted: false, max_pairs };
+            let mut found = DeviceFound::default();
+            gpu.find_all(&request, &mut found).expect("a device");
+            found.pairs.sort_unstable();
+            assert_eq!(pbig_tests::difference(&found.pairs, &oracle::pairs(few)), None);
         }
         for every in [2, 40] {
             jostle(&mut world, every, 0.3);
-            world.follow(&mut gpu, &config).expect("a device");
+            world.follow(&mut gpu).expect("a device");
         }
     }
 }
@@ -264,9 +265,8 @@ fn searches_for_all_pairs_in_between_do_no_harm() {
 #[test]
 fn memory_shrinks_with_the_need_and_no_state_is_lost() {
     needs_gpu!();
-    let (mut world, mut gpu) = (World::new(&set("pile", 20_000)), device());
-    let config = with(GpuOptions::DEFAULT);
-    let burst = transferred(&world.follow(&mut gpu, &config).expect("a device")).device_bytes;
+    let (mut world, mut gpu) = (World::new(&set("pile", 20_000)), with(GpuOptions::DEFAULT));
+    let burst = transferred(&world.follow(&mut gpu).expect("a device")).device_bytes;
     (300..20_000).for_each(|id| world.remove(id));
     world.boxes.truncate(300);
     world.filters.truncate(300);
@@ -274,7 +274,7 @@ fn memory_shrinks_with_the_need_and_no_state_is_lost() {
     let mut held = 0;
     for _ in 0..140 {
         jostle(&mut world, 5, 0.05);
-        held = transferred(&world.follow(&mut gpu, &config).expect("a device")).device_bytes;
+        held = transferred(&world.follow(&mut gpu).expect("a device")).device_bytes;
     }
     assert!(held * 4 < burst, "{held} of {burst} bytes are still held");
 }
@@ -287,20 +287,21 @@ fn after_a_failure_at_any_moment_the_next_update_is_right() {
     for (fault, after) in
         (0..8).map(|i| (Fault::LoseDevice, i)).chain([(Fault::Timeout, 2), (Fault::Panic, 3)])
     {
-        let (mut world, mut gpu) = (World::new(&set("pile", 1500)), device());
-        world.follow(&mut gpu, &with(options)).expect("a device");
+        let (mut world, mut gpu) = (World::new(&set("pile", 1500)), with(options));
+        world.follow(&mut gpu).expect("a device");
         gpu.inject(fault, after);
         for frame in 0..4 {
             jostle(&mut world, 1 + frame, 0.3);
-            if world.follow(&mut gpu, &with(options)).is_err() {
+            if world.follow(&mut gpu).is_err() {
                 failures += 1;
                 // Either the CPU does this update, or it is tried again.
                 if after.is_multiple_of(2) {
                     world.advance();
+                    gpu.forget();
                 }
             }
         }
-        assert!(world.follow(&mut gpu, &with(options)).is_ok(), "{fault:?} after {after}");
+        assert!(world.follow(&mut gpu).is_ok(), "{fault:?} after {after}");
     }
     assert!(failures >= 8, "{failures} failures only");
 }
@@ -309,16 +310,13 @@ fn after_a_failure_at_any_moment_the_next_update_is_right() {
 fn too_many_pairs_are_an_error_and_the_update_can_be_repeated() {
     needs_gpu!();
     let cubes = vec![Aabb::new([0.0; 3], [1.0; 3]); 1200];
-    let (mut world, mut gpu) = (World::new(&cubes), device());
-    let limits = Limits { max_pairs: 600_000, ..Limits::DEFAULT };
-    let limited = Config { limits, ..with(GpuOptions::DEFAULT) };
-    let error = world.follow(&mut gpu, &limited).expect_err("719,400 pairs");
-    assert!(error.contains("600000"), "{error}");
-    let config = with(GpuOptions::DEFAULT);
-    world.follow(&mut gpu, &config).expect("the device works");
+    let (mut world, mut gpu) = (World::new(&cubes), with(GpuOptions::DEFAULT));
+    let error = world.follow_within(&mut gpu, 600_000).expect_err("719,400 pairs");
+    assert_eq!(error, DeviceFailure::TooManyPairs);
+    world.follow(&mut gpu).expect("the device works");
     // As many pairs end, which does not count against the limit.
     (0..1200).for_each(|id| world.put(id, Aabb::from_center([id as f32 * 9.0, 0.0, 0.0], [0.5; 3])));
     world.put(0, Aabb::NOWHERE);
-    let tracked = world.follow(&mut gpu, &limited).expect("few pairs are new");
+    let tracked = world.follow_within(&mut gpu, 600_000).expect("few pairs are new");
     assert!(world.kept.is_empty() && !tracked.restarted.is_empty());
 }

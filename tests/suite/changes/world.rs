@@ -1,14 +1,17 @@
 //! A world of boxes with its pairs by brute force, and its updates on a device.
 
-use pbig_core::gpu::study::{Change, ChangeRequest, GpuFound};
-use pbig_core::{Aabb, Config, GpuFinder, Pair, ProxyFilter, oracle};
+use pbig_core::{
+    Aabb, ChangeRequest, ChangedBox, DeviceFailure, DeviceFound, Limits, Pair, PairDevice, ProxyFilter,
+    oracle,
+};
+use pbig_gpu::GpuFinder;
 use std::collections::{BTreeMap, BTreeSet};
 
 /// The state of a broad phase, in the plainest form.
 pub(super) struct World {
     pub(super) boxes: Vec<Aabb>,
     pub(super) filters: Vec<ProxyFilter>,
-    pub(super) changed: BTreeMap<u32, Change>,
+    pub(super) changed: BTreeMap<u32, ChangedBox>,
     pub(super) kept: BTreeSet<Pair>,
     pub(super) update: u64,
 }
@@ -36,7 +39,7 @@ impl World {
             self.boxes.resize(i + 1, Aabb::NOWHERE);
             self.filters.resize(i + 1, ProxyFilter::ALL);
         }
-        let was = Change { id, aabb: self.boxes[i], filter: self.filters[i] };
+        let was = ChangedBox { id, aabb: self.boxes[i], filter: self.filters[i] };
         self.changed.entry(id).or_insert(was);
     }
 
@@ -65,17 +68,26 @@ impl World {
     }
 
     /// Runs an update on a device and compares it with brute force.
-    pub(super) fn follow(&mut self, gpu: &mut GpuFinder, config: &Config) -> Result<GpuFound, String> {
+    pub(super) fn follow(&mut self, gpu: &mut GpuFinder) -> Result<DeviceFound, DeviceFailure> {
+        self.follow_within(gpu, Limits::DEFAULT.max_pairs)
+    }
+
+    /// As [`World::follow`], with a limit of pairs.
+    pub(super) fn follow_within(
+        &mut self,
+        gpu: &mut GpuFinder,
+        max_pairs: u64,
+    ) -> Result<DeviceFound, DeviceFailure> {
         let changed: Vec<_> = self.changed.values().copied().collect();
         let request = ChangeRequest {
             boxes: &self.boxes,
             filters: &self.filters,
             changed: &changed,
-            update: self.update,
             kept: self.kept.len() as u64,
-            config,
+            max_pairs,
         };
-        let found = gpu.search_changes(&request)?;
+        let mut found = DeviceFound::default();
+        gpu.find_changed(&request, &mut found)?;
         assert_eq!(self.fault(&found), None, "update {}", self.update);
         let pairs = self.completed(&found);
         self.advance();
@@ -91,7 +103,7 @@ impl World {
     }
 
     /// Returns the first difference between the found pairs and those that are in one of the two states only.
-    fn fault(&self, found: &GpuFound) -> Option<String> {
+    fn fault(&self, found: &DeviceFound) -> Option<String> {
         let mut before = self.boxes.clone();
         for change in self.changed.values() {
             let restarted = found.restarted.contains(&change.id);
@@ -111,7 +123,7 @@ impl World {
     }
 
     /// Returns the pairs after the update, completed as the rules of a search for changes say.
-    fn completed(&self, found: &GpuFound) -> BTreeSet<Pair> {
+    fn completed(&self, found: &DeviceFound) -> BTreeSet<Pair> {
         let again = |pair: &Pair| [pair.a, pair.b].iter().any(|id| found.restarted.contains(id));
         let overlaps = |pair: &Pair| self.boxes[pair.a as usize].overlaps(&self.boxes[pair.b as usize]);
         let allowed = |pair: &Pair| self.filters[pair.a as usize].allows(&self.filters[pair.b as usize]);

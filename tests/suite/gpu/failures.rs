@@ -1,12 +1,10 @@
 //! Contract: a device that fails or is lost at any moment costs no pair and no event.
 
-use super::{find, on_cpu, set, with};
-use pbig_core::gpu::adapters;
-use pbig_core::gpu::study::Fault;
-use pbig_core::{
-    Aabb, Backend, BroadPhase, Coding, Config, Events, Finder, GpuFinder, GpuOptions, ProxyFilter, oracle,
-};
-use pbig_tests::{corpus, difference, gpu, needs_gpu};
+use super::{find, on_cpu, set, with_device};
+use pbig_core::{Aabb, Backend, BroadPhase, Config, Events, ProxyFilter, oracle};
+use pbig_gpu::study::Fault;
+use pbig_gpu::{Coding, GpuFinder, GpuOptions, adapters};
+use pbig_tests::{corpus, difference, needs_gpu};
 use std::time::Duration;
 
 /// Runs frames in which boxes move, appear and disappear. They are the same for any backend.
@@ -36,7 +34,7 @@ fn events(frames: &[(Events, Option<String>)]) -> Vec<&Events> {
 #[test]
 fn a_device_that_fails_in_the_middle_of_a_run_loses_no_event() {
     needs_gpu!();
-    let base = Config { margin: 0.05, ..gpu(Coding::Auto) };
+    let base = Config { margin: 0.05, backend: Backend::Device, ..Config::DEFAULT };
     let cpu =
         frames(&mut BroadPhase::new(Config { backend: Backend::Cpu, ..base }).expect("a margin"), |_| ());
     for (fault, words) in [
@@ -52,7 +50,8 @@ fn a_device_that_fails_in_the_middle_of_a_run_loses_no_event() {
             // Shaders are compiled and buffers are made in the first call only; each call submits.
             let at = if matches!(fault, Fault::LoseDevice | Fault::Timeout | Fault::Panic) { 5 } else { 0 };
             device.inject(fault, at);
-            let mut ours = BroadPhase::with_gpu(Config { gpu: options, ..base }, device).expect("a margin");
+            let device = Box::new(device.with_options(options));
+            let mut ours = BroadPhase::with_device(base, device).expect("a margin");
             let got = frames(&mut ours, |_| ());
             assert_eq!(events(&got), events(&cpu), "{fault:?}");
             let failed = got.iter().position(|(_, why)| why.as_ref().is_some_and(|why| why.contains(words)));
@@ -76,7 +75,7 @@ fn a_device_that_is_lost_at_any_moment_of_a_call_loses_no_pair() {
         for after in 0..10 {
             let device = GpuFinder::new().expect("an adapter");
             device.inject(Fault::LoseDevice, after);
-            let mut finder = Finder::with_gpu(with(options), device);
+            let mut finder = with_device(options, device);
             let found = finder.find(&boxes).expect("within the limits");
             assert_eq!(difference(found, &wanted), None, "lost after {after} submissions");
             lost += u32::from(finder.report().fallback.is_some());
@@ -94,7 +93,7 @@ fn an_app_shares_its_device_and_a_lost_one_is_not_replaced() {
     let finder = GpuFinder::from_device(device.clone(), queue).expect("default limits are enough");
     assert!(finder.adapter().contains(&adapter.get_info().name), "{}", finder.adapter());
     let options = GpuOptions { pause: Duration::ZERO, ..GpuOptions::DEFAULT };
-    let mut finder = Finder::with_gpu(with(options), finder);
+    let mut finder = with_device(options, finder);
     for case in corpus() {
         let (pairs, _) = find(&mut finder, &case.boxes);
         assert_eq!(difference(&pairs, &oracle::pairs(&case.boxes)), None, "{}", case.name);

@@ -1,8 +1,7 @@
 //! Contract: updates on a device and on the CPU may take turns, and fail in between, and no event is lost.
 
-use pbig_core::{
-    Aabb, Backend, BroadPhase, Config, Error, GpuFinder, GpuOptions, Limits, Pair, ProxyFilter, oracle,
-};
+use pbig_core::{Aabb, Backend, BroadPhase, Config, Error, Limits, Pair, ProxyFilter, oracle};
+use pbig_gpu::{GpuFinder, GpuOptions};
 use pbig_tests::needs_gpu;
 use rand::rngs::StdRng;
 use rand::{RngExt, SeedableRng};
@@ -25,23 +24,23 @@ fn put(broad_phase: &mut BroadPhase, couples: Range<u32>, close: bool) {
 fn a_device_whose_update_was_too_much_does_not_go_on_from_it() {
     needs_gpu!();
     let limits = Limits { max_pairs: 10, ..Limits::UNLIMITED };
-    let config = Config { backend: Backend::Gpu, limits, ..Config::DEFAULT };
+    let config = Config { backend: Backend::Device, limits, ..Config::DEFAULT };
     let gpu = GpuFinder::new().expect("an adapter");
-    let mut broad_phase = BroadPhase::with_gpu(config, gpu).expect("a margin that is one");
+    let mut broad_phase = BroadPhase::with_device(config, Box::new(gpu)).expect("a margin that is one");
     put(&mut broad_phase, 0..1000, false);
     put(&mut broad_phase, 0..9, true);
     assert_eq!(broad_phase.update().map(|events| events.added.len()), Ok(9));
     // More than the device may find: its limit also counts pairs that may end.
     put(&mut broad_phase, 20..32, true);
     assert_eq!(broad_phase.update(), Err(Error::TooManyPairs { limit: 10 }));
-    assert!(broad_phase.report().gpu.is_some(), "the device has found them");
+    assert!(broad_phase.report().device.is_some(), "the device has found them");
     put(&mut broad_phase, 20..32, false);
     broad_phase.set_backend(Backend::Cpu, limits);
     assert_eq!(broad_phase.update().map(|events| events.added.len()), Ok(0));
-    broad_phase.set_backend(Backend::Gpu, limits);
+    broad_phase.set_backend(Backend::Device, limits);
     put(&mut broad_phase, 20..21, true);
     assert_eq!(broad_phase.update().map(|events| events.added.clone()), Ok(vec![Pair::new(40, 41)]));
-    assert!(broad_phase.report().gpu.is_some());
+    assert!(broad_phase.report().device.is_some());
 }
 
 fn brute_force(broad_phase: &BroadPhase) -> Vec<Pair> {
@@ -62,9 +61,9 @@ fn devices_and_the_cpu_take_turns_and_updates_fail_in_between() {
 }
 
 fn take_turns(options: GpuOptions) {
-    let gpu = GpuFinder::new().expect("an adapter");
-    let config = Config { gpu: options, ..Config::DEFAULT };
-    let mut broad_phase = BroadPhase::with_gpu(config, gpu).expect("a margin that is one");
+    let gpu = GpuFinder::new().expect("an adapter").with_options(options);
+    let mut broad_phase =
+        BroadPhase::with_device(Config::DEFAULT, Box::new(gpu)).expect("a margin that is one");
     let (mut random, mut pairs) = (StdRng::seed_from_u64(17), BTreeSet::new());
     let home = |id: u32| [id % 8, id / 8 % 8, id / 64].map(|i| i as f32);
     // Updates on the device and on the CPU, successful and failed ones.
@@ -72,7 +71,8 @@ fn take_turns(options: GpuOptions) {
     for round in 0..300 {
         let way = random.random_range(0..2);
         let max_pairs = if random.random_ratio(1, 6) { 40 } else { u64::MAX };
-        broad_phase.set_backend([Backend::Gpu, Backend::Cpu][way], Limits { max_pairs, ..Limits::DEFAULT });
+        broad_phase
+            .set_backend([Backend::Device, Backend::Cpu][way], Limits { max_pairs, ..Limits::DEFAULT });
         for id in 0..400 {
             let to = if random.random_ratio(1, 400) { random.random_range(0..400) } else { id };
             let center = home(to).map(|x| x + random.random_range(-0.02..0.02));
@@ -87,7 +87,7 @@ fn take_turns(options: GpuOptions) {
             }
         }
         let result = broad_phase.update().cloned();
-        let is_on_gpu = broad_phase.report().gpu.is_some();
+        let is_on_gpu = broad_phase.report().device.is_some();
         assert!(result.is_err() || is_on_gpu == (way == 0), "round {round}: the device works");
         seen[way][usize::from(result.is_err())] += 1;
         if let Ok(events) = result {

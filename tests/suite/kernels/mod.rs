@@ -23,15 +23,16 @@ use checks::*;
 use compare::*;
 use device::*;
 use indices::*;
-use pbig_core::decode::{self, PLAIN};
-use pbig_core::gpu::study::plan_params;
-use pbig_core::layout::{
+use pbig_core::{Aabb, Pair, ProxyFilter, oracle};
+use pbig_gpu::decode::{self, PLAIN};
+use pbig_gpu::layout::{
     self, AXIS_BITS, BITS, BOX_BITS, BoxChange, CELLS_PER_BLOCK, COUNTED, COUNTS_PER_BLOCK, Cell, Chunk,
     Counters, DeviceBox, ENDED, FILTERED, FilterChange, LANES, LargeItem, Level, Located, MAX_SPAN, MOVED,
     Motion, NO_LEVEL, PACKED, Params, RAW, SHORT_ROW, Slot, SmallItem, Totals, WAS_ABSENT, WINDOW, halves,
     wide,
 };
-use pbig_core::{Aabb, GpuFinder, GpuOptions, Pair, ProxyFilter, oracle};
+use pbig_gpu::study::plan_params;
+use pbig_gpu::{GpuFinder, GpuOptions};
 use pbig_harness::boxes::BoxSet;
 use pbig_harness::pair_index::{index_of, pair_count, pair_of};
 use pbig_shaders::{self as shaders, Buffer, KERNELS, Kernel};

@@ -1,7 +1,6 @@
 //! Single kernels on given buffers, with the pipelines of a finder's device.
 
-use pbig_core::gpu::GpuError;
-use pbig_core::{GpuFinder, GpuOptions};
+use pbig_gpu::{GpuError, GpuFinder, GpuOptions};
 use pbig_shaders::Kernel;
 use std::sync::mpsc::channel;
 use wgpu::BufferUsages as Usage;

@@ -2,8 +2,8 @@
 
 use super::AXIS_BITS;
 use pbig_core::Pair;
-use pbig_core::decode::{self, DecodeError, PLAIN};
-use pbig_core::layout::ENDED;
+use pbig_gpu::decode::{self, DecodeError, PLAIN};
+use pbig_gpu::layout::ENDED;
 
 fn plain(words: &[u32], boxes: u32, is_sorted: bool) -> Result<Vec<Pair>, DecodeError> {
     let mut pairs = vec![pair(0, 1)];

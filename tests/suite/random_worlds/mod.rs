@@ -9,10 +9,9 @@ mod subject;
 
 use crate::checked::{on_cpu, on_gpu, pbig};
 use ops::{Op, any_op, apply};
-use pbig_core::Config;
 use pbig_harness::runner::Timed;
 use pbig_harness::world::World;
-use pbig_tests::{engines, needs_gpu};
+use pbig_tests::{Way, engines, needs_gpu};
 use proptest::collection::vec;
 use proptest::prelude::ProptestConfig;
 use proptest::test_runner::{RngAlgorithm, TestCaseError, TestError, TestRng, TestRunner};
@@ -99,17 +98,17 @@ impl Outcome {
 struct Scene {
     world: World,
     broad_phase: Timed<Subject>,
-    config: Config,
+    way: Way,
     tally: Tally,
 }
 
 impl Scene {
-    fn new(config: Config, plant: Plant) -> Self {
+    fn new(way: Way, plant: Plant) -> Self {
         let mut world = World::with_gravity(glam::Vec3::ZERO);
         // With CCD, calls between the two of a step, for a part of it.
         world.params.max_ccd_substeps = 3;
-        let broad_phase = Timed::new(Subject::new(config, plant)).checked(config.margin, 1);
-        Self { world, broad_phase, config, tally: Tally { runs: 1, ..Tally::default() } }
+        let broad_phase = Timed::new(Subject::new(way, plant)).checked(way.margin, 1);
+        Self { world, broad_phase, way, tally: Tally { runs: 1, ..Tally::default() } }
     }
 
     fn play(&mut self, op: Op) -> Result<(), End> {
@@ -118,11 +117,11 @@ impl Scene {
             Op::Step(steps) => return (0..steps).try_for_each(|_| self.step()),
             Op::Snapshot => {
                 self.restore_world();
-                self.broad_phase.inner.restore(self.config);
+                self.broad_phase.inner.restore(self.way);
             }
             Op::Fresh(adopts) => {
                 self.restore_world();
-                let mut fresh = pbig(self.config);
+                let mut fresh = pbig(self.way);
                 if adopts {
                     fresh.adopt(&self.world.narrow_phase);
                 }
@@ -182,8 +181,8 @@ impl Scene {
 }
 
 /// Plays the operations and another step, so that the last one is seen too; or says what was wrong.
-fn run(ops: &[Op], config: Config, plant: Plant) -> Result<Outcome, String> {
-    let mut scene = Scene::new(config, plant);
+fn run(ops: &[Op], way: impl Into<Way>, plant: Plant) -> Result<Outcome, String> {
+    let mut scene = Scene::new(way.into(), plant);
     match ops.iter().copied().chain([Op::Step(1)]).try_for_each(|op| scene.play(op)) {
         Ok(()) => Ok(scene.outcome()),
         Err(End::Wrong(what)) => Err(what),
@@ -262,9 +261,9 @@ fn random_worlds_agree_with_stock_and_the_oracle() {
     let tally = on_cpu.plus(on_grid);
     tally.assert_that_much_happened();
     assert!(tally.ops >= 100_000 || std::env::var_os("PROPTEST_CASES").is_some(), "{tally:?}");
-    for (_, config) in engines() {
-        let config = Config { margin: cpu.margin, ..config };
-        on_random_ops(100, |ops| run(ops, config, Plant::Nothing)).assert_that_much_happened();
+    for (_, way) in engines() {
+        let way = way.with(|it| it.margin = cpu.margin);
+        on_random_ops(100, |ops| run(ops, way, Plant::Nothing)).assert_that_much_happened();
     }
 }
 

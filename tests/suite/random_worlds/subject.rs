@@ -1,9 +1,9 @@
 //! The broad phase under test, perhaps with a planted fault.
 
-use crate::checked::pbig;
+use crate::checked::{on_its_device, pbig};
 use crate::queries::compare_with_tree;
-use pbig_core::Config;
 use pbig_harness::world::World;
+use pbig_tests::Way;
 use rapier_pbig::PbigBroadPhase;
 use rapier3d::prelude::*;
 use std::collections::HashMap;
@@ -35,8 +35,8 @@ pub(super) struct Subject {
 }
 
 impl Subject {
-    pub(super) fn new(config: Config, plant: Plant) -> Self {
-        Self { pbig: pbig(config), plant, boxes: HashMap::new(), before: pbig(config), busy: false }
+    pub(super) fn new(way: Way, plant: Plant) -> Self {
+        Self { pbig: pbig(way), plant, boxes: HashMap::new(), before: pbig(way), busy: false }
     }
 
     /// Asks a few scene queries right after a step, when each box holds its collider. Returns the number of rays that hit.
@@ -53,11 +53,14 @@ impl Subject {
     }
 
     /// Goes on with what was saved.
-    pub(super) fn restore(&mut self, config: Config) {
+    pub(super) fn restore(&mut self, way: Way) {
         let bytes = postcard::to_stdvec(&self.pbig).expect("a broad phase can be saved");
         self.pbig = match self.plant {
-            Plant::Forgets => pbig(config),
-            _ => postcard::from_bytes(&bytes).expect("these are the bytes of a broad phase"),
+            Plant::Forgets => pbig(way),
+            _ => on_its_device(
+                way,
+                postcard::from_bytes(&bytes).expect("these are the bytes of a broad phase"),
+            ),
         };
     }
 

@@ -2,7 +2,7 @@
 
 use super::{everywhere, intervals, product, shifted, through_updates};
 use crate::follower::Follower;
-use pbig_core::{Aabb, Config, ProxyFilter};
+use pbig_core::{Aabb, ProxyFilter};
 use pbig_harness::boxes::BoxSet;
 use pbig_tests::strategies;
 use rand::rngs::StdRng;
@@ -128,10 +128,10 @@ fn nan_in_any_field_of_the_first_a_middle_and_the_last_box() {
 /// and between the two halves of an update.
 #[test]
 fn no_number_in_any_field_at_any_time() {
-    for (strategy, config) in strategies() {
+    for (strategy, way) in strategies() {
         // Each field, each axis, and all.
         for which in [1, 2, 4, 8, 16, 32, 9, 18, 36, 63] {
-            let world = Follower::new(Config { margin: 0.01, ..config }, 60);
+            let world = Follower::new(way.with(|it| it.margin = 0.01), 60);
             spoil_at_all_times(world, which, &format!("{strategy}, NaN in {which:06b}"));
         }
     }

@@ -1,7 +1,6 @@
 //! The checks of the fuzz targets, without instruments: on every input that once failed, and on random bytes.
 
 use super::memory;
-use pbig_core::decode;
 use pbig_harness::{files, hard, pbig_grid};
 use rand::rngs::StdRng;
 use rand::{RngExt, SeedableRng};

@@ -13,8 +13,9 @@ mod soak_worlds;
 
 use crate::finder::check;
 use crate::follower::Follower;
-use pbig_core::{Aabb, Backend, Coding, Config, ProxyFilter};
-use pbig_tests::{engines, gpu, may_run};
+use pbig_core::{Aabb, Backend, Config, ProxyFilter};
+use pbig_gpu::Coding;
+use pbig_tests::{Way, engines, gpu, may_run};
 
 /// Returns true if sizes that take minutes or gigabytes are tested, too: `PBIG_STRESS=1`.
 fn at_length() -> bool {
@@ -28,20 +29,20 @@ fn everywhere(name: &str, boxes: &[Aabb]) {
 }
 
 /// Returns the ways to update: as the policy chooses, with each engine of the CPU, and with the grid of a GPU.
-fn ways_to_update() -> Vec<(&'static str, Config)> {
-    let mut ways = vec![("auto", Config::DEFAULT)];
+fn ways_to_update() -> Vec<(&'static str, Way)> {
+    let mut ways = vec![("auto", Way::from(Config::DEFAULT))];
     ways.extend(engines());
     ways.push(("gpu grid", gpu(Coding::Plain)));
-    ways.into_iter().filter(|(_, config)| may_run(config)).collect()
+    ways.into_iter().filter(|(_, way)| may_run(way)).collect()
 }
 
 /// Plays the frames of a world one after the other. On the CPU also with a margin; on a GPU that would take too long.
 fn through_updates(name: &str, frames: &[Vec<Aabb>]) {
-    for (strategy, config) in ways_to_update() {
-        let margins: &[f32] = if config.backend == Backend::Gpu { &[0.0] } else { &[0.0, 0.01] };
+    for (strategy, way) in ways_to_update() {
+        let margins: &[f32] = if way.backend == Backend::Device { &[0.0] } else { &[0.0, 0.01] };
         for &margin in margins {
             let ids = frames.iter().map(Vec::len).max().unwrap_or(0);
-            let mut world = Follower::new(Config { margin, ..config }, ids);
+            let mut world = Follower::new(way.with(|it| it.margin = margin), ids);
             play(&mut world, frames, &format!("{name}, {strategy}, margin {margin}"));
         }
     }

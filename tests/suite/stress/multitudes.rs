@@ -3,8 +3,8 @@
 use super::ways_to_update;
 use crate::finder::check_on;
 use crate::follower::Follower;
-use pbig_core::{Aabb, Backend, BroadPhase, Config, Error, Finder, Limits, Pair, ProxyFilter};
-use pbig_tests::strategies;
+use pbig_core::{Aabb, Backend, BroadPhase, Config, Error, Limits, Pair, ProxyFilter};
+use pbig_tests::{Way, strategies};
 
 fn all_pairs(n: u32) -> impl Iterator<Item = Pair> {
     (0..n).flat_map(move |a| (a + 1..n).map(move |b| Pair { a, b }))
@@ -33,8 +33,8 @@ fn identical_boxes_by_the_thousand_that_come_and_go() {
         ProxyFilter { memberships: 1, mask: 2, ..ProxyFilter::ALL },
         ProxyFilter { memberships: 2, mask: 3, ..ProxyFilter::ALL },
     );
-    for (strategy, config) in ways_to_update() {
-        let mut world = Follower::new(config, 2400);
+    for (strategy, way) in ways_to_update() {
+        let mut world = Follower::new(way, 2400);
         let filter = |id: u32| if id.is_multiple_of(480) { guest } else { crowd };
         (0..2400).for_each(|id| world.set(id, cube, filter(id)));
         world.update(&format!("{strategy}, all come"));
@@ -52,15 +52,15 @@ fn identical_boxes_by_the_thousand_that_come_and_go() {
 #[test]
 fn all_overlapping_all_is_complete_or_an_error_with_the_limit() {
     let (many, few) = (nested(20_000), nested(1200));
-    for (strategy, config) in strategies() {
-        let limited = Config { limits: Limits { max_pairs: 1_000_000, ..Limits::DEFAULT }, ..config };
-        let error = Finder::new(limited).find(&many).expect_err("2 * 10^8 pairs");
+    for (strategy, way) in strategies() {
+        let limits = Limits { max_pairs: 1_000_000, ..Limits::DEFAULT };
+        let error = way.with(|it| it.limits = limits).finder().find(&many).expect_err("2 * 10^8 pairs");
         assert_eq!(error, Error::TooManyPairs { limit: 1_000_000 }, "{strategy}");
         assert!(
             error.to_string().contains("Limits::max_pairs = 1000000")
                 && error.to_string().contains("raise it")
         );
-        let mut finder = Finder::new(config);
+        let mut finder = way.finder();
         assert!(finder.find(&few).expect("10^6 pairs").iter().copied().eq(all_pairs(1200)), "{strategy}");
     }
 }
@@ -69,15 +69,15 @@ fn all_overlapping_all_is_complete_or_an_error_with_the_limit() {
 fn everything_overlapping_everything_in_updates() {
     ways_to_update()
         .into_iter()
-        .for_each(|(strategy, config)| complete_in_updates(config, strategy, &nested(1200)));
+        .for_each(|(strategy, way)| complete_in_updates(way, strategy, &nested(1200)));
 }
 
 /// All come at once, one goes and comes back; before, the same with too low a limit, which changes nothing.
-fn complete_in_updates(config: Config, strategy: &str, boxes: &[Aabb]) {
+fn complete_in_updates(way: Way, strategy: &str, boxes: &[Aabb]) {
     let n = boxes.len() as u32;
     let limits = Limits { max_pairs: 1000, ..Limits::DEFAULT };
-    for (config, complete) in [(Config { limits, ..config }, false), (config, true)] {
-        let mut broad_phase = BroadPhase::new(config).expect("a good margin");
+    for (way, complete) in [(way.with(|it| it.limits = limits), false), (way, true)] {
+        let mut broad_phase = way.broad_phase();
         for (id, aabb) in boxes.iter().enumerate() {
             broad_phase.set(id as u32, *aabb, ProxyFilter::ALL).expect("a small id");
         }
@@ -103,9 +103,9 @@ fn complete_in_updates(config: Config, strategy: &str, boxes: &[Aabb]) {
 #[ignore = "2 * 10^8 pairs, 1.6 GB of them alone: cargo test --release -p pbig-tests -- --ignored twenty_thousand"]
 fn twenty_thousand_boxes_that_all_overlap() {
     let boxes = nested(20_000);
-    for (strategy, config) in strategies().into_iter().filter(|(_, config)| config.backend != Backend::Gpu) {
+    for (strategy, way) in strategies().into_iter().filter(|(_, way)| way.backend != Backend::Device) {
         let clock = std::time::Instant::now();
-        let mut finder = Finder::new(config);
+        let mut finder = way.finder();
         let found = finder.find(&boxes).expect("the default limit is 2^28");
         println!("{strategy}: {} pairs in {:?}", found.len(), clock.elapsed());
         assert!(found.iter().copied().eq(all_pairs(20_000)), "{strategy}");

@@ -4,7 +4,7 @@ use super::{everywhere, shifted};
 use crate::follower::Follower;
 use pbig_core::{Aabb, Algorithm, Config, Engine, Finder, Plan, ProxyFilter};
 use pbig_harness::boxes::BoxSet;
-use pbig_tests::strategies;
+use pbig_tests::{Way, strategies};
 
 #[test]
 fn flat_worlds_of_any_thickness_on_every_axis() {
@@ -104,8 +104,8 @@ fn boxes_on_the_borders_of_the_cells_that_are_planned_for_them() {
         let (boxes, on) = on_borders(&start);
         println!("{name}: {on} boxes on borders");
         assert!(on > 100, "{name}: only {on} of {} boxes are on borders", boxes.len());
-        for (strategy, config) in strategies().into_iter().filter(|(name, _)| !name.starts_with("gpu")) {
-            everywhere_on(config, strategy, &boxes);
+        for (strategy, way) in strategies().into_iter().filter(|(name, _)| !name.starts_with("gpu")) {
+            everywhere_on(way, strategy, &boxes);
         }
     }
 }
@@ -133,8 +133,8 @@ fn boxes_on_the_borders_of_the_cells_of_an_edited_grid() {
 }
 
 /// What lies on the borders of one strategy's cells is of no special place to another.
-fn everywhere_on(config: Config, strategy: &str, boxes: &[Aabb]) {
-    crate::finder::check_on(vec![(strategy, config)], "on borders", boxes);
-    let mut world = Follower::new(config, boxes.len());
+fn everywhere_on(way: Way, strategy: &str, boxes: &[Aabb]) {
+    crate::finder::check_on(vec![(strategy, way)], "on borders", boxes);
+    let mut world = Follower::new(way, boxes.len());
     super::play(&mut world, &super::shuffled(boxes), &format!("on borders, {strategy}"));
 }

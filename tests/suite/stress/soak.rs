@@ -3,9 +3,10 @@
 
 use super::memory;
 use crate::follower::Follower;
-use pbig_core::{Aabb, Backend, Coding, Config, Engine, ProxyFilter, Report};
+use pbig_core::{Aabb, Backend, Config, Engine, ProxyFilter, Report};
+use pbig_gpu::Coding;
 use pbig_harness::boxes::BoxSet;
-use pbig_tests::{gpu, needs_gpu};
+use pbig_tests::{Way, gpu, needs_gpu};
 use rand::rngs::StdRng;
 use rand::{RngExt, SeedableRng};
 use std::collections::BTreeMap;
@@ -34,9 +35,9 @@ struct Churn {
 }
 
 impl Churn {
-    fn new(config: Config, ids: usize) -> Self {
+    fn new(way: impl Into<Way>, ids: usize) -> Self {
         let set = |name: &str, n| BoxSet::named(name).expect("the set exists").boxes(n, 4);
-        let world = Follower::new(config, ids);
+        let world = Follower::new(way, ids);
         let rng = StdRng::seed_from_u64(6);
         let (home, odd) = (set("unit", ids), set("degenerate", 100));
         Self { world, rng, home, odd, swings: false, one_in: 30, tally: Tally::default() }
@@ -124,7 +125,7 @@ impl Tally {
     fn count(&mut self, report: &Report, is_early: bool) {
         let way = report.plan.algorithm.name();
         *self.ways.entry(way).or_default() += 1;
-        self.bytes = [held_by_all(), report.gpu.as_ref().map_or(0, |gpu| gpu.device_bytes as i64)];
+        self.bytes = [held_by_all(), report.device.as_ref().map_or(0, |device| device.device_bytes as i64)];
         for (early, bytes) in self.early.iter_mut().zip(self.bytes) {
             *early = if is_early { bytes.max(*early) } else { *early };
             let update = self.updates;
@@ -220,8 +221,8 @@ fn soak_on_threads() {
 #[test]
 fn soak_on_a_gpu() {
     needs_gpu!();
-    let config = Config { margin: 0.05, ..gpu(Coding::Auto) };
-    let tally = soak(|| Churn::new(config, 400), (updates() / 100).max(200));
-    tally.assert_mostly(&["gpu"], 99);
+    let way = gpu(Coding::Auto).with(|it| it.margin = 0.05);
+    let tally = soak(|| Churn::new(way, 400), (updates() / 100).max(200));
+    tally.assert_mostly(&["device"], 99);
     assert!(tally.bytes[1] > 0, "nothing is held on the device");
 }

@@ -1,13 +1,12 @@
 //! `pbig bench gpu`: the GPU beside the CPU, kernel by kernel, and the host's part of a call.
 
-use pbig_core::{
-    Aabb, Backend, BroadPhase, Config, Finder, GpuFinder, GpuOptions, GpuReport, Limits, Order, ProxyFilter,
-};
+use pbig_core::{Aabb, Backend, BroadPhase, Config, DeviceReport, Finder, Limits, Order, ProxyFilter};
+use pbig_gpu::{GpuFinder, GpuOptions};
 use pbig_harness::gpu_race::{on_device, race};
 use pbig_harness::prelude::*;
 
 const CONFIG: Config = Config { limits: Limits::UNLIMITED, ..Config::DEFAULT };
-const ON_GPU: Config = Config { backend: Backend::Gpu, ..CONFIG };
+const ON_GPU: Config = Config { backend: Backend::Device, ..CONFIG };
 
 pub(super) fn run(quick: bool) -> Result<Report, Failure> {
     let gpu = GpuFinder::new().map_err(|error| Failure::Input(error.to_string()))?;
@@ -52,11 +51,11 @@ fn searches(gpu: &GpuFinder, quick: bool) -> Result<[Table; 2], Failure> {
 }
 
 /// Measures both backends on the same boxes, in turn: returns both medians, the pairs, and a report with the times of the kernels.
-fn search(gpu: &GpuFinder, set: &str, n: usize) -> Result<([f64; 2], u64, GpuReport), Failure> {
+fn search(gpu: &GpuFinder, set: &str, n: usize) -> Result<([f64; 2], u64, DeviceReport), Failure> {
     let start = boxes(set, n);
     let frames = [moved(&start, 1.0, 2), start];
     let mut on_cpu = Finder::new(Config { backend: Backend::Cpu, ..CONFIG });
-    let mut on_gpu = Finder::with_gpu(ON_GPU, gpu.clone());
+    let mut on_gpu = Finder::with_device(ON_GPU, Box::new(gpu.clone()));
     let mut times = [vec![], vec![]];
     for round in 0..if n > 100_000 { 4 } else { 7 } {
         let boxes = &frames[round % 2];
@@ -70,7 +69,7 @@ fn search(gpu: &GpuFinder, set: &str, n: usize) -> Result<([f64; 2], u64, GpuRep
     }
     // Calls whose kernels are timed take longer.
     let options = GpuOptions { time_kernels: true, ..GpuOptions::DEFAULT };
-    let mut finder = Finder::with_gpu(Config { gpu: options, ..ON_GPU }, gpu.clone());
+    let mut finder = Finder::with_device(ON_GPU, Box::new(gpu.clone().with_options(options)));
     frames.iter().try_for_each(|boxes| time(&mut finder, boxes).map(|_| ()))?;
     let report = on_device(finder.report())?.clone();
     Ok((times.map(|times| Spread::of(times).median), on_cpu.pairs().len() as u64, report))
@@ -104,7 +103,7 @@ fn host(gpu: &GpuFinder, quick: bool) -> Result<Table, Failure> {
 /// Returns the median of each of the host's times, by a call that gets the round and returns its milliseconds, the device's report,
 /// and the milliseconds of the sort.
 fn host_medians(
-    mut call: impl FnMut(usize) -> Result<(f64, GpuReport, f64), Failure>,
+    mut call: impl FnMut(usize) -> Result<(f64, DeviceReport, f64), Failure>,
 ) -> Result<Vec<Value>, Failure> {
     let mut times = Vec::new();
     for round in 0..WARM_UP + ROUNDS {
@@ -119,7 +118,7 @@ fn host_medians(
 
 /// Returns the pairs, then the host's times.
 fn host_of_searches(gpu: &GpuFinder, frames: &[Vec<Aabb>; 2], order: Order) -> Result<Vec<Value>, Failure> {
-    let mut finder = Finder::with_gpu(Config { order, ..ON_GPU }, gpu.clone());
+    let mut finder = Finder::with_device(Config { order, ..ON_GPU }, Box::new(gpu.clone()));
     let times = host_medians(|round| {
         let ms = time(&mut finder, &frames[round % 2])?;
         let report = finder.report();
@@ -130,7 +129,7 @@ fn host_of_searches(gpu: &GpuFinder, frames: &[Vec<Aabb>; 2], order: Order) -> R
 
 /// Measures updates like [`host_of_searches`], without the calls that set the boxes.
 fn host_of_updates(gpu: &GpuFinder, [moved, start]: &[Vec<Aabb>; 2]) -> Result<Vec<Value>, Failure> {
-    let mut broad_phase = BroadPhase::with_gpu(ON_GPU, gpu.clone())?;
+    let mut broad_phase = BroadPhase::with_device(ON_GPU, Box::new(gpu.clone()))?;
     let ids: Vec<u32> = (0..start.len() as u32).collect();
     broad_phase.set_many(&ids, |id| Some((start[id as usize], ProxyFilter::ALL)))?;
     broad_phase.update()?;

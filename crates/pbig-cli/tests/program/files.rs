@@ -165,7 +165,7 @@ fn what_is_no_failure_does_not_read_like_one() {
     let folder = tempfile::tempdir().expect("a folder");
     write(folder.path(), "boxes.csv", THREE);
     let text = stdout(&pbig(folder.path(), &["pairs", "boxes.csv"]));
-    assert!(text.contains("; no GPU: none was asked for\n"), "{text}");
+    assert!(!text.contains("no device"), "{text}");
     let mut doctor = std::process::Command::new(env!("CARGO_BIN_EXE_pbig"));
     let text = stdout(&doctor.arg("doctor").env_remove("XDG_RUNTIME_DIR").output().expect("it starts"));
     let note = "note: XDG_RUNTIME_DIR is not set. A graphics driver may complain about that on stderr";

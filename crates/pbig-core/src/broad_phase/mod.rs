@@ -4,7 +4,6 @@
 //! set, remove ─► world ─► policy ─► sweep, edit, look up in a tree, or rebuild and compare ─► kept pairs ─► events
 //! ```
 
-#[cfg(feature = "gpu")]
 mod device;
 mod edit;
 mod query;
@@ -12,14 +11,14 @@ mod set_many;
 #[cfg(feature = "serde")]
 mod snapshot;
 mod sweep;
-#[cfg(all(test, feature = "unstable-study"))]
+#[cfg(test)]
 mod tests;
 mod update;
 mod world;
 
 use crate::all_pairs::{AllPairs, Store};
+use crate::device_slot::DeviceSlot;
 use crate::finder::check_count;
-use crate::gpu_slot::GpuSlot;
 use crate::pairs::{Comparison, Groups, Kept};
 use crate::policy;
 use crate::report::Report;
@@ -64,9 +63,7 @@ pub struct Events {
 #[derive(Clone, Debug, Default)]
 pub struct BroadPhase {
     config: Config,
-    gpu: GpuSlot,
-    /// Updates that have changed something.
-    updates: u64,
+    device: DeviceSlot,
     world: World,
     /// The boxes of the last update.
     store: Store,
@@ -163,9 +160,9 @@ impl BroadPhase {
 
     /// Removes all boxes; their pairs end without an event.
     pub fn clear(&mut self) {
-        // Skips a number, so that a device does not continue from an earlier update.
-        let (gpu, updates) = (std::mem::take(&mut self.gpu), self.updates + 2);
-        *self = Self { config: self.config, gpu, updates, ..Self::default() };
+        self.device.forget();
+        let device = std::mem::take(&mut self.device);
+        *self = Self { config: self.config, device, ..Self::default() };
         self.world.keep_old = self.old_to_keep();
     }
 

@@ -31,22 +31,20 @@ impl BroadPhase {
     }
 
     fn find_events(&mut self) -> Result<(), Error> {
-        #[cfg(feature = "gpu")]
-        if self.find_on_gpu()? {
+        if self.find_on_device()? {
             return self.apply_events();
         }
-        #[cfg(not(feature = "gpu"))]
-        self.gpu.is_wanted(&self.config, self.world.changed.len(), &mut self.report);
-        let no_gpu = self.report.plan.no_gpu;
+        self.device.forget();
+        let no_device = self.report.plan.no_device;
         let found = self.find_on_cpu();
-        self.report.plan.no_gpu = no_gpu;
+        self.report.plan.no_device = no_device;
         found
     }
 
     fn find_on_cpu(&mut self) -> Result<(), Error> {
         let changed = self.world.changed.len();
         let mut engine = self.engine();
-        if self.config.forced_engine().is_none() {
+        if self.config.engine.is_none() {
             engine = self.given_up.instead_of(engine, changed);
         }
         let is_done = match engine {
@@ -71,7 +69,7 @@ impl BroadPhase {
             held: self.store.held,
             spilled: self.store.grid.spilled(),
         };
-        policy::choose_engine(&counts, self.config.forced_engine())
+        policy::choose_engine(&counts, self.config.engine)
     }
 
     /// Returns true: unlike other engines, a sweep is never given up.
@@ -106,7 +104,7 @@ impl BroadPhase {
 
     /// Returns the maximum work of an engine. An engine that the caller chose has no limit.
     fn unless_forced(&self, limit: u64) -> u64 {
-        self.config.forced_engine().map_or(limit, |_| u64::MAX)
+        self.config.engine.map_or(limit, |_| u64::MAX)
     }
 
     /// Looks up changed boxes in a tree, which is brought up to date first. Returns false if it took too much work, and was
@@ -174,10 +172,7 @@ impl BroadPhase {
         self.store.held = Held::Nowhere;
         self.sweep.expire();
         self.report.pairs = self.kept.len() as u64;
-        #[cfg(feature = "gpu")]
-        if let Some(gpu) = &mut self.gpu.gpu {
-            gpu.forget_changes();
-        }
+        self.device.forget();
     }
 
     /// Hands the events over, and forgets the changes.
@@ -186,16 +181,14 @@ impl BroadPhase {
         std::mem::swap(&mut self.events.removed, &mut self.comparison.removed);
         self.world.forget_changes();
         self.world.keep_old = self.old_to_keep();
-        self.updates += 1;
     }
 
     /// Returns the number of old states to keep until the next update.
     pub(super) fn old_to_keep(&self) -> usize {
-        #[cfg(feature = "gpu")]
-        if self.may_use_gpu() {
+        if self.device.has_device() {
             return usize::MAX;
         }
-        policy::old_states_to_keep(self.len(), self.config.forced_engine())
+        policy::old_states_to_keep(self.len(), self.config.engine)
     }
 
     /// Begins an empty report.
@@ -207,9 +200,9 @@ impl BroadPhase {
         report.invalid = present - u64::from(self.world.valid());
         report.changed = self.world.changed.len() as u64;
         report.plan = Plan { boxes: self.world.valid(), ..Plan::default() };
-        report.gpu = None;
+        report.device = None;
         // A backend that was asked for stays unavailable until a call on it succeeds.
-        if self.config.backend != Backend::Gpu {
+        if self.config.backend != Backend::Device {
             report.fallback = None;
         }
     }

@@ -68,7 +68,6 @@ impl World {
     }
 
     /// Returns the ids whose box of the last update was removed since.
-    #[cfg(feature = "gpu")]
     pub(super) fn removed(&self) -> &[u32] {
         &self.removed
     }

@@ -190,7 +190,6 @@ impl Hits {
     }
 
     /// Takes pairs that were found elsewhere.
-    #[cfg(feature = "gpu")]
     pub(crate) fn take(&mut self, pairs: Vec<Pair>) {
         self.pairs = pairs;
         self.count_groups(0);

@@ -83,6 +83,18 @@ impl Comparison {
         }
     }
 
+    /// Puts events in order that may be in order already. Those that were found twice are left once.
+    pub(crate) fn put_in_order(&mut self, ids: usize) {
+        let is_sorted = |events: &[Pair]| events.is_sorted_by(|one, next| one < next);
+        if !is_sorted(&self.added) || !is_sorted(&self.removed) {
+            self.sort(ids);
+            self.added.dedup();
+            self.removed.dedup();
+        }
+        self.dropped.sort_unstable();
+        self.dropped.dedup();
+    }
+
     fn gather(&mut self) {
         self.clear();
         let Self { added, removed, dropped, parts, .. } = self;

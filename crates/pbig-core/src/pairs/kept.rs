@@ -127,12 +127,11 @@ impl Kept {
         self.forward.row(pair.a).binary_search(&pair.b).is_ok()
     }
 
-    /// Yields those of `pairs` that exist.
-    #[cfg(feature = "gpu")]
-    pub(crate) fn existing(&self, pairs: &[Pair]) -> impl Iterator<Item = Pair> {
-        pairs.iter().enumerate().filter_map(|(i, pair)| {
+    /// Yields `pairs`, each with whether it exists.
+    pub(crate) fn look_up(&self, pairs: &[Pair]) -> impl Iterator<Item = (Pair, bool)> {
+        pairs.iter().enumerate().map(|(i, pair)| {
             self.prefetch(&pairs[i..]);
-            self.contains(*pair).then_some(*pair)
+            (*pair, self.contains(*pair))
         })
     }
 
@@ -253,7 +252,6 @@ mod tests {
         }
     }
 
-    #[cfg(feature = "gpu")]
     #[test]
     fn pairs_that_no_row_has_do_not_exist() {
         let mut kept = Kept::default();
@@ -262,7 +260,8 @@ mod tests {
         kept.apply(&pairs, &[]);
         let unknown = [Pair { a: 1, b: 98 }, Pair { a: 70, b: 99 }, Pair { a: 5000, b: 5001 }];
         let asked = [&unknown[..], &pairs, &unknown].concat();
-        assert!(kept.existing(&asked).eq(pairs));
+        let existing = kept.look_up(&asked).filter_map(|(pair, exists)| exists.then_some(pair));
+        assert!(existing.eq(pairs));
     }
 
     #[test]

@@ -1,0 +1,199 @@
+//! The contract of `PairDevice`: whatever a device does, a call is complete, and nothing panics.
+
+mod double;
+
+use double::{Double, Fault};
+use pbig_core::{
+    Aabb, Backend, BroadPhase, Config, Error, Finder, Limits, NoDevice, Order, Pair, ProxyFilter, oracle,
+};
+use rand::rngs::StdRng;
+use rand::{RngExt, SeedableRng};
+
+const IDS: u32 = 120;
+
+const ON_DEVICE: Config = Config { backend: Backend::Device, margin: 0.1, ..Config::DEFAULT };
+
+/// Faults that the core notices, or that are none.
+const HARMLESS: [Fault; 13] = [
+    Fault::Nothing,
+    Fault::Fails,
+    Fault::IsSlow,
+    Fault::IsLost,
+    Fault::Restarts,
+    Fault::Disorder,
+    Fault::Twice,
+    Fault::OldNews,
+    Fault::EndsOthers,
+    Fault::BeyondTheLast,
+    Fault::Inverted,
+    Fault::RestartsOthers,
+    Fault::MoreThanAll,
+];
+
+fn on_device(fault: Fault) -> BroadPhase {
+    BroadPhase::with_device(ON_DEVICE, Double::new(fault)).expect("a margin")
+}
+
+fn on_cpu() -> BroadPhase {
+    BroadPhase::new(Config { backend: Backend::Cpu, ..ON_DEVICE }).expect("a margin")
+}
+
+fn random_box(rng: &mut StdRng) -> Aabb {
+    let center = std::array::from_fn(|_| rng.random_range(0.0..5.0));
+    if rng.random_ratio(1, 40) { Aabb::NOWHERE } else { Aabb::from_center(center, [0.5; 3]) }
+}
+
+fn random_boxes(seed: u64) -> Vec<Aabb> {
+    let mut rng = StdRng::seed_from_u64(seed);
+    (0..IDS).map(|_| random_box(&mut rng)).collect()
+}
+
+/// Changes some boxes, the same ones in every world.
+fn disturb(worlds: &mut [&mut BroadPhase], rng: &mut StdRng) {
+    for _ in 0..rng.random_range(0..IDS / 2) {
+        let (id, aabb, kind) = (rng.random_range(0..IDS), random_box(rng), rng.random_range(0..10));
+        let filter = ProxyFilter { body: rng.random_range(0..40), ..ProxyFilter::ALL };
+        for world in &mut *worlds {
+            match kind {
+                0 => _ = world.remove(id),
+                1 => _ = world.set_filter(id, filter),
+                _ => world.set(id, aabb, filter).expect("a small id"),
+            }
+        }
+    }
+}
+
+#[test]
+fn updates_equal_those_of_the_cpu_whatever_fails() {
+    for fault in HARMLESS {
+        let (mut ours, mut cpu, mut rng) = (on_device(fault), on_cpu(), StdRng::seed_from_u64(1));
+        let mut done_by_device = 0;
+        for update in 0..40 {
+            disturb(&mut [&mut ours, &mut cpu], &mut rng);
+            assert_eq!(ours.update(), cpu.update(), "{fault:?}, update {update}");
+            assert!(ours.pairs().eq(cpu.pairs()), "{fault:?}, update {update}");
+            assert_eq!(ours.report().invalid, cpu.report().invalid, "{fault:?}, update {update}");
+            done_by_device += usize::from(ours.report().device.is_some());
+        }
+        let wanted = match fault {
+            Fault::Fails => 15..=25,
+            Fault::IsLost => 2..=2,
+            Fault::BeyondTheLast | Fault::Inverted | Fault::RestartsOthers | Fault::MoreThanAll => 0..=0,
+            _ => 35..=40,
+        };
+        assert!(wanted.contains(&done_by_device), "{fault:?}: {done_by_device} updates");
+    }
+}
+
+#[test]
+fn searches_equal_those_of_the_cpu_whatever_fails() {
+    for fault in HARMLESS.into_iter().filter(|fault| *fault != Fault::Twice) {
+        for order in [Order::Sorted, Order::Unspecified] {
+            let mut finder = Finder::with_device(Config { order, ..ON_DEVICE }, Double::new(fault));
+            for seed in 0..5 {
+                let boxes = random_boxes(seed);
+                let mut found = finder.find(&boxes).expect("few pairs").to_vec();
+                if order == Order::Unspecified {
+                    found.sort_unstable();
+                }
+                assert_eq!(found, oracle::pairs(&boxes), "{fault:?}");
+                let report = finder.report();
+                assert_ne!(report.device.is_some(), report.fallback.is_some(), "{fault:?}");
+            }
+        }
+    }
+}
+
+#[test]
+fn lies_about_pairs_do_not_panic_and_end_with_a_new_start() {
+    for fault in [Fault::TooFew, Fault::TooMany, Fault::Twice] {
+        let (mut ours, mut rng) = (on_device(fault), StdRng::seed_from_u64(2));
+        for update in 0..60 {
+            // The CPU's engines go on from what the device has said.
+            let backend = if update % 3 == 2 { Backend::Cpu } else { Backend::Device };
+            ours.set_backend(backend, Limits::DEFAULT);
+            disturb(&mut [&mut ours], &mut rng);
+            ours.update().expect("few pairs");
+        }
+        ours.clear();
+        ours.set_device(Double::new(Fault::Nothing));
+        ours.set_backend(Backend::Device, Limits::DEFAULT);
+        let mut cpu = on_cpu();
+        disturb(&mut [&mut ours, &mut cpu], &mut rng);
+        assert_eq!(ours.update(), cpu.update(), "{fault:?}");
+        let mut finder = Finder::with_device(ON_DEVICE, Double::new(fault));
+        (0..5).for_each(|seed| _ = finder.find(&random_boxes(seed)).expect("few pairs"));
+    }
+}
+
+#[test]
+fn a_failure_is_reported_and_the_device_is_asked_again() {
+    let mut finder = Finder::with_device(ON_DEVICE, Double::new(Fault::Fails));
+    let boxes = random_boxes(1);
+    let mut why = |_| {
+        finder.find(&boxes).expect("few pairs");
+        finder.report().fallback.clone()
+    };
+    let failed = Some("no luck: the CPU does the work".to_owned());
+    assert_eq!([0, 1, 2, 3].map(&mut why), [None, failed.clone(), None, failed]);
+}
+
+#[test]
+fn a_device_that_is_lost_has_no_name() {
+    let mut finder = Finder::with_device(ON_DEVICE, Double::new(Fault::IsLost));
+    assert_eq!(finder.device_name(), Some("a double"));
+    (0..3).for_each(|seed| _ = finder.find(&random_boxes(seed)).expect("few pairs"));
+    assert_eq!(finder.device_name(), None);
+}
+
+#[test]
+fn without_a_device_the_cpu_does_the_work_and_says_so() {
+    let mut finder = Finder::new(ON_DEVICE);
+    let boxes = random_boxes(3);
+    assert_eq!(finder.find(&boxes).expect("few pairs"), oracle::pairs(&boxes));
+    assert_eq!(finder.report().fallback.as_deref(), Some("no device was given: the CPU does the work"));
+}
+
+#[test]
+fn auto_uses_a_device_for_many_boxes_unless_it_is_software() {
+    let mut software = Double::new(Fault::Nothing);
+    software.is_software = true;
+    let few = random_boxes(4);
+    for (device, wanted) in
+        [(Double::new(Fault::Nothing), NoDevice::FewChanged), (software, NoDevice::Software)]
+    {
+        let mut finder = Finder::with_device(Config::DEFAULT, device);
+        finder.find(&few).expect("few pairs");
+        assert_eq!((finder.report().plan.no_device, &finder.report().fallback), (Some(wanted), &None));
+    }
+}
+
+#[test]
+fn too_many_pairs_are_an_error_and_the_update_can_be_repeated() {
+    let (mut ours, mut cpu, mut rng) = (on_device(Fault::Nothing), on_cpu(), StdRng::seed_from_u64(5));
+    (0..9).for_each(|_| disturb(&mut [&mut ours, &mut cpu], &mut rng));
+    let limits = Limits { max_pairs: 1, ..Limits::DEFAULT };
+    ours.set_backend(Backend::Device, limits);
+    assert_eq!(ours.update(), Err(Error::TooManyPairs { limit: 1 }));
+    ours.set_backend(Backend::Device, Limits::DEFAULT);
+    assert_eq!(ours.update(), cpu.update());
+    let mut finder = Finder::with_device(Config { limits, ..ON_DEVICE }, Double::new(Fault::Nothing));
+    let identical = [Aabb::new([0.0; 3], [1.0; 3]); 3];
+    assert_eq!(finder.find(&identical), Err(Error::TooManyPairs { limit: 1 }));
+    assert_eq!(finder.pairs(), &[] as &[Pair]);
+}
+
+#[test]
+fn a_clone_goes_on_as_the_original_with_a_device_of_its_own() {
+    let (mut ours, mut rng) = (on_device(Fault::Nothing), StdRng::seed_from_u64(6));
+    for _ in 0..5 {
+        disturb(&mut [&mut ours], &mut rng);
+        ours.update().expect("few pairs");
+    }
+    let mut copy = ours.clone();
+    for _ in 0..5 {
+        disturb(&mut [&mut ours, &mut copy], &mut rng);
+        assert_eq!(ours.update(), copy.update());
+        assert!(copy.report().device.is_some());
+    }
+}

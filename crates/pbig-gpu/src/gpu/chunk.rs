@@ -1,0 +1,334 @@
+//! A chunk of work items: submitted to the device, awaited, and decoded.
+
+use super::GpuError;
+use super::coding::bit_words;
+use super::device::Variant;
+use super::error::Failure;
+use super::items::rest;
+use super::passes::{CLASSES_BYTES, Recording, Step, apply_changes, check, lists_fit, measure, sort};
+use super::readback::{self, HEADER_BYTES, Header};
+use super::session::Session;
+use super::sink::Sink;
+use super::storage::{BufferId, Side};
+use crate::decode;
+use crate::layout::{BITS, Chunk, Counters, PACKED, Params, RAW, SORTED, Totals, halves, wide};
+use crate::pbig::{CLASSES, SizeClass};
+use pbig_core::{DeviceReport, internal::Clock};
+use pbig_shaders::Buffer;
+use std::borrow::Cow;
+
+/// A chunk that the device is working on.
+#[derive(Debug)]
+pub(super) struct PendingChunk {
+    pub(super) items: Chunk,
+    side: Side,
+    submission: wgpu::SubmissionIndex,
+    /// Bytes of output that come with the header.
+    prefetched: u64,
+    passes: Vec<&'static str>,
+}
+
+pub(super) enum ChunkResult {
+    /// All of its pairs are found.
+    Done,
+    /// A list of the map did not fit, so nothing was checked.
+    MapTooLarge,
+    /// The plan was made for other boxes, so nothing was checked.
+    TooManyTests,
+    /// The output needs this many words.
+    OutputTooLarge(u64),
+    /// The pairs are on the device, to be sorted when the other chunks are done.
+    Unsorted,
+}
+
+impl Session {
+    /// Submits a chunk: uploads and changes that wait, and `steps`. The device stops counting beyond `left` pairs.
+    pub(super) fn submit(
+        &mut self,
+        params: &Params,
+        items: Chunk,
+        side: Side,
+        steps: &[Step],
+        left: u64,
+    ) -> Result<PendingChunk, GpuError> {
+        let mut clock = Clock::start();
+        let prefetched = self.make_room(params, side)?;
+        self.write_chunk(items, side, left)?;
+        let (submission, passes) = self.record(params, side, steps, Some(prefetched))?;
+        // A map has turned the boxes into ordered integers.
+        self.has_raw_boxes &= params.flags & RAW == 0;
+        self.recording += clock.lap();
+        Ok(PendingChunk { items, side, submission, prefetched, passes })
+    }
+
+    /// Checks the other chunks of sorted pairs, which add their output to that of the first, and sorts all.
+    pub(super) fn submit_rest_and_sort(
+        &mut self,
+        params: &Params,
+        rest: &[Chunk],
+        sink: &mut Sink,
+    ) -> Result<PendingChunk, GpuError> {
+        let left = sink.left();
+        for items in rest {
+            let mut clock = Clock::start();
+            self.write_chunk(*items, 0, left)?;
+            let steps = check(items.small_items, items.large_items);
+            let (submission, _) = self.record(params, 0, &steps, None)?;
+            self.recording += clock.lap();
+            // One at a time: the next one waits for this one anyway.
+            self.device.wait(submission, self.options.patience)?;
+            sink.found.report.wait += clock.lap();
+            sink.found.report.chunks += 1;
+        }
+        let all = Chunk { small_items: u32::MAX, large_items: u32::MAX, ..Chunk::default() };
+        self.submit(params, all, 0, &sort(params), left)
+    }
+
+    /// Tells the kernels which work items to check, and how much output there may be.
+    fn write_chunk(&mut self, items: Chunk, side: Side, left: u64) -> Result<(), GpuError> {
+        let capacity = self.storage.size(BufferId::of(Buffer::Out, side)) / 4;
+        let word_capacity = capacity.min(u64::from(u32::MAX) - 1) as u32;
+        let items = Chunk { word_capacity, pairs_left: halves(left), ..items };
+        self.storage.write(BufferId::of(Buffer::Chunk, side), &[items])
+    }
+
+    /// Records and submits uploads and changes that wait, `steps`, and a readback of some bytes of output, if they are told.
+    /// Returns the names of the kernels.
+    fn record(
+        &mut self,
+        params: &Params,
+        side: Side,
+        steps: &[Step],
+        prefetched: Option<u64>,
+    ) -> Result<(wgpu::SubmissionIndex, Vec<&'static str>), GpuError> {
+        self.storage.write(Buffer::Params, &[*params])?;
+        let is_timed = prefetched.is_some() && self.options.time_kernels;
+        let timestamps = self.timestamps[side].as_ref().filter(|_| is_timed);
+        let descriptor = wgpu::CommandEncoderDescriptor { label: Some("pbig") };
+        let mut encoder = self.device.handle.create_command_encoder(&descriptor);
+        let has_copies = self.storage.record_copies(&mut encoder);
+        let mut recording = Recording {
+            encoder,
+            storage: &mut self.storage,
+            side,
+            variant: Variant::new(&self.options, self.finds_changes),
+            queries: timestamps.map(|timestamps| &timestamps.queries),
+            passes: Vec::new(),
+        };
+        // Applied once, however often a map or a chunk is repeated.
+        let has_changes = std::mem::take(&mut self.has_pending_changes);
+        let changes = has_changes.then(|| apply_changes(params));
+        let steps: Vec<Step> = changes.into_iter().flatten().chain(steps.iter().copied()).collect();
+        recording.record(&steps)?;
+        if let Some(prefetched) = prefetched {
+            readback::record(&mut recording, timestamps, prefetched);
+        }
+        let Recording { encoder, passes, .. } = recording;
+        let submission = self.device.submit(encoder);
+        if has_copies {
+            self.storage.take_staging_back();
+        }
+        Ok((submission, passes))
+    }
+
+    /// Counts the boxes on the device by size.
+    pub(super) fn measure(
+        &mut self,
+        params: &Params,
+        report: &mut DeviceReport,
+    ) -> Result<Box<[SizeClass; CLASSES]>, GpuError> {
+        self.storage.ensure(Buffer::Classes, CLASSES_BYTES)?;
+        let mut clock = Clock::start();
+        self.record(params, 0, &measure(params), None)?;
+        self.recording += clock.lap();
+        let words = self.fetch(Buffer::Classes.into(), 0, CLASSES_BYTES / 4, report)?;
+        report.wait += clock.lap();
+        let mut classes = Box::new([SizeClass::default(); CLASSES]);
+        for (class, four) in classes.iter_mut().zip(words.as_chunks::<4>().0) {
+            let [boxes, x, y, z] = *four;
+            *class = SizeClass { boxes, max_extent: [x, y, z].map(f32::from_bits) };
+        }
+        Ok(classes)
+    }
+
+    /// Makes the buffers for the output of a chunk. Returns the bytes to prefetch.
+    fn make_room(&mut self, params: &Params, side: Side) -> Result<u64, GpuError> {
+        let (storage, sizes) = (&mut self.storage, &self.sizes);
+        let (out, most) = (BufferId::of(Buffer::Out, side), storage.max_buffer_bytes);
+        let (words, prefetched) = if params.flags & BITS == 0 {
+            (sizes.word_capacity, sizes.expected_words + sizes.expected_words / 4 + 64)
+        } else {
+            // The last workgroup writes all of its eight words.
+            let words = bit_words(params).next_multiple_of(8);
+            (words, words)
+        };
+        storage.ensure(out, (4 * words).clamp(self.options.first_bytes.min(most), most))?;
+        storage.ensure(BufferId::of(Buffer::Totals, side), size_of::<Totals>() as u64)?;
+        storage.ensure(Buffer::Counters, size_of::<Counters>() as u64)?;
+        let prefetched = (4 * prefetched).min(storage.size(out)).min(most - HEADER_BYTES);
+        storage.ensure(BufferId::Staging(side), HEADER_BYTES + prefetched)?;
+        Ok(prefetched)
+    }
+
+    /// Waits for a chunk and decodes its output where it lies, if everything fitted.
+    pub(super) fn finish(
+        &mut self,
+        chunk: PendingChunk,
+        params: &Params,
+        sink: &mut Sink,
+    ) -> Result<ChunkResult, Failure> {
+        let (submission, patience) = (chunk.submission.clone(), self.options.patience);
+        let staging = self.storage.get(BufferId::Staging(chunk.side));
+        let bytes = HEADER_BYTES + chunk.prefetched;
+        let mut clock = Clock::start();
+        let received = readback::read(&self.device, staging, bytes, submission, patience)?;
+        sink.found.report.wait += clock.lap();
+        sink.found.report.downloaded += bytes;
+        let (header, prefetched) = received.split_at(HEADER_BYTES as usize);
+        let header: Header = bytemuck::pod_read_unaligned(header);
+        self.note_times(&chunk, &header, sink);
+        let Header { totals, counters, .. } = header;
+        sink.check(found_pairs(params, &totals))?;
+        let (out, needed) = (BufferId::of(Buffer::Out, chunk.side), output_words(params, &totals));
+        if let Some(repeat) = self.repeat(params, &counters, needed, out) {
+            sink.found.report.repeats += 1;
+            return Ok(repeat);
+        }
+        sink.found.report.chunks += 1;
+        if params.flags & SORTED != 0 && totals.sorted == 0 && !rest(&counters, &chunk.items).is_empty() {
+            return Ok(ChunkResult::Unsorted);
+        }
+        let words = self.words(bytemuck::cast_slice(prefetched), out, needed, sink)?;
+        self.fetch_entries(params, needed, sink)?;
+        sink.found.report.wait += clock.lap();
+        self.take_output(&words, params, &totals, sink)?;
+        Ok(ChunkResult::Done)
+    }
+
+    /// Decodes the output of a chunk, and notes how much it was.
+    fn take_output(
+        &mut self,
+        words: &[u32],
+        params: &Params,
+        totals: &Totals,
+        sink: &mut Sink,
+    ) -> Result<(), Failure> {
+        let needed = words.len() as u64;
+        self.sizes.max_words = self.sizes.max_words.max(needed);
+        self.sizes.expected_words = self.sizes.max_words;
+        sink.count(params, totals, needed);
+        let mut clock = Clock::start();
+        self.decode(words, params, totals.sorted != 0, sink)?;
+        sink.found.report.decode += clock.lap();
+        sink.check(0)
+    }
+
+    /// Returns why the map or the chunk has to be repeated, if it has.
+    fn repeat(
+        &mut self,
+        params: &Params,
+        counters: &Counters,
+        needed: u64,
+        out: BufferId,
+    ) -> Option<ChunkResult> {
+        if params.levels > 0 {
+            self.sizes.lists = *counters;
+            // First: lists that a plan for other boxes makes are not worth their memory.
+            let is_any_number_allowed = params.most_tests == u32::MAX;
+            if !is_any_number_allowed && (counters.tests > params.most_tests || counters.too_many_tests != 0)
+            {
+                return Some(ChunkResult::TooManyTests);
+            }
+            if !lists_fit(params, counters) {
+                return Some(ChunkResult::MapTooLarge);
+            }
+        }
+        (needed > self.storage.size(out) / 4).then_some(ChunkResult::OutputTooLarge(needed))
+    }
+
+    /// Returns the words of output: those that came with the header, and the rest if there are more.
+    fn words<'a>(
+        &mut self,
+        prefetched: &'a [u32],
+        out: BufferId,
+        needed: u64,
+        sink: &mut Sink,
+    ) -> Result<Cow<'a, [u32]>, GpuError> {
+        let have = prefetched.len() as u64;
+        if needed <= have {
+            return Ok(Cow::Borrowed(&prefetched[..needed as usize]));
+        }
+        let mut words = prefetched.to_vec();
+        words.extend(self.fetch(out, have, needed, &mut sink.found.report)?);
+        Ok(Cow::Owned(words))
+    }
+
+    /// Reads the entries, which records name, once a job.
+    fn fetch_entries(&mut self, params: &Params, words: u64, sink: &mut Sink) -> Result<(), GpuError> {
+        if params.flags & PACKED != 0 && self.table.is_none() && words > 0 {
+            let entries = u64::from(self.sizes.lists.entries);
+            self.table = Some(self.fetch(Buffer::Entries.into(), 0, entries, &mut sink.found.report)?);
+        }
+        Ok(())
+    }
+
+    fn note_times(&self, chunk: &PendingChunk, header: &Header, sink: &mut Sink) {
+        if self.device.has_timestamps && self.options.time_kernels {
+            let times = header.times(&chunk.passes, self.device.queue.get_timestamp_period());
+            times.for_each(|(name, time)| sink.add_time(name, time));
+        }
+    }
+
+    fn decode(
+        &mut self,
+        words: &[u32],
+        params: &Params,
+        is_sorted: bool,
+        sink: &mut Sink,
+    ) -> Result<(), GpuError> {
+        let (pairs, boxes) = (&mut sink.found.pairs, params.boxes);
+        if params.flags & BITS != 0 {
+            decode::bits(words, boxes, pairs)?;
+        } else if params.flags & PACKED != 0 {
+            decode::records(words, self.table.as_deref().unwrap_or(&[]), boxes, pairs)?;
+        } else if self.finds_changes {
+            decode::events(words, boxes, is_sorted, pairs, &mut sink.found.ended)?;
+        } else {
+            decode::plain(words, boxes, is_sorted, pairs)?;
+        }
+        Ok(())
+    }
+
+    /// Reads the words `from..to` of a buffer, in a submission of its own.
+    fn fetch(
+        &mut self,
+        source: BufferId,
+        from: u64,
+        to: u64,
+        report: &mut DeviceReport,
+    ) -> Result<Vec<u32>, GpuError> {
+        if from >= to {
+            return Ok(Vec::new());
+        }
+        let bytes = 4 * (to - from);
+        self.storage.ensure(BufferId::FetchStaging, bytes)?;
+        report.downloaded += bytes;
+        let staging = self.storage.get(BufferId::FetchStaging);
+        let descriptor = wgpu::CommandEncoderDescriptor { label: Some("pbig fetch") };
+        let mut encoder = self.device.handle.create_command_encoder(&descriptor);
+        encoder.copy_buffer_to_buffer(self.storage.get(source), 4 * from, staging, 0, bytes);
+        let submission = self.device.submit(encoder);
+        let read = readback::read(&self.device, staging, bytes, submission, self.options.patience)?;
+        Ok(bytemuck::pod_collect_to_vec(&read))
+    }
+}
+
+/// Returns the number of words of output. The device does not count bits.
+fn output_words(params: &Params, totals: &Totals) -> u64 {
+    if params.flags & BITS == 0 { wide(totals.words) } else { bit_words(params) }
+}
+
+/// Returns the number of pairs. The device does not count plain ones.
+fn found_pairs(params: &Params, totals: &Totals) -> u64 {
+    if params.flags & (PACKED | BITS) == 0 { wide(totals.words) / 2 } else { wide(totals.pairs) }
+}

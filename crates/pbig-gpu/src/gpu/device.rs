@@ -1,0 +1,307 @@
+//! The device: pipelines, buffers, submissions. Only this file and `readback` talk to a queue.
+
+use super::{GpuError, adapter};
+use crate::GpuOptions;
+use pbig_shaders::{Buffer, Kernel};
+use std::collections::HashMap;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
+use std::time::Duration;
+
+/// A fault that a test injects at a later submission.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Fault {
+    /// The device is destroyed before the submission.
+    LoseDevice,
+    /// The device has no memory for the next buffer.
+    OutOfMemory,
+    /// The kernels do not compile.
+    RefuseShader,
+    /// The device does not answer in time.
+    Timeout,
+    /// wgpu panics, as it does when a device is lost during a wait.
+    Panic,
+}
+
+/// The choices that are fixed when a pipeline is made.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub(super) struct Variant {
+    root: u32,
+    is_balanced: bool,
+    /// The search is for changes instead of all pairs.
+    changes: bool,
+    /// The scan is of rows of pairs instead of cells.
+    rows: bool,
+}
+
+impl Variant {
+    pub(super) fn new(options: &GpuOptions, changes: bool) -> Self {
+        Self { root: options.root.min(9), is_balanced: options.load_balancing, changes, rows: false }
+    }
+
+    pub(super) fn of_rows(self) -> Self {
+        Self { rows: true, ..self }
+    }
+
+    /// Returns the buffer for a binding.
+    pub(super) fn bound(self, binding: Buffer) -> Buffer {
+        if self.rows && binding == Buffer::Cells { Buffer::Rows } else { binding }
+    }
+
+    /// Returns the values of the overrides that the source declares.
+    fn constants(self, source: &str) -> Vec<(&'static str, f64)> {
+        let flag = |is_set: bool| f64::from(u8::from(is_set));
+        let all =
+            [("ROOT", f64::from(self.root)), ("BALANCED", flag(self.is_balanced)), ("ROWS", flag(self.rows))];
+        all.into_iter().filter(|(name, _)| source.contains(&format!("override {name}"))).collect()
+    }
+}
+
+/// A device with its pipelines, shared by finders.
+#[derive(Debug)]
+pub(super) struct GpuDevice {
+    pub(super) handle: wgpu::Device,
+    pub(super) queue: wgpu::Queue,
+    pub(super) name: String,
+    pub(super) is_software: bool,
+    pub(super) has_timestamps: bool,
+    pipelines: Mutex<HashMap<(&'static str, Variant), wgpu::ComputePipeline>>,
+    is_lost: AtomicBool,
+    /// An injected fault, and the number of submissions until it happens.
+    fault: Mutex<Option<(Fault, u32)>>,
+}
+
+impl GpuDevice {
+    pub(super) fn new(device: wgpu::Device, queue: wgpu::Queue) -> Result<Self, GpuError> {
+        check_limits(&device.limits())?;
+        let (features, info) = (device.features(), device.adapter_info());
+        Ok(Self {
+            name: adapter::describe(&info),
+            is_software: info.device_type == wgpu::DeviceType::Cpu,
+            has_timestamps: features.contains(wgpu::Features::TIMESTAMP_QUERY),
+            handle: device,
+            queue,
+            pipelines: Mutex::default(),
+            is_lost: AtomicBool::new(false),
+            fault: Mutex::default(),
+        })
+    }
+
+    /// Opens a device on an adapter, with its limits and the features that pbig uses.
+    pub(super) fn on(adapter: &wgpu::Adapter) -> Result<Self, GpuError> {
+        let descriptor = wgpu::DeviceDescriptor {
+            label: Some("pbig"),
+            required_features: adapter.features() & wgpu::Features::TIMESTAMP_QUERY,
+            required_limits: adapter.limits(),
+            memory_hints: wgpu::MemoryHints::MemoryUsage,
+            ..Default::default()
+        };
+        let name = || adapter.get_info().name;
+        let opened = pollster::block_on(adapter.request_device(&descriptor));
+        let (device, queue) =
+            opened.map_err(|why| GpuError::NoDevice { adapter: name(), why: why.to_string() })?;
+        Self::new(device, queue)
+    }
+
+    /// Returns the process's device, which finders without a device of their own share. Opening a device takes tenths
+    /// of a second. A lost device is replaced.
+    pub(super) fn shared() -> Result<Arc<Self>, GpuError> {
+        static SHARED: OnceLock<Mutex<Option<Arc<GpuDevice>>>> = OnceLock::new();
+        let mut shared = lock(SHARED.get_or_init(Mutex::default));
+        match &*shared {
+            Some(device) if !device.is_lost() => Ok(device.clone()),
+            _ => {
+                let device = Arc::new(Self::on(&adapter::choose(None)?)?);
+                *shared = Some(device.clone());
+                Ok(device)
+            }
+        }
+    }
+
+    pub(super) fn is_lost(&self) -> bool {
+        self.is_lost.load(Ordering::Relaxed)
+    }
+
+    pub(super) fn inject(&self, fault: Fault, submissions: u32) {
+        *lock(&self.fault) = Some((fault, submissions));
+    }
+
+    /// Returns true, once, if the given fault is due.
+    fn is_due(&self, fault: Fault) -> bool {
+        lock(&self.fault).take_if(|armed| *armed == (fault, 0)).is_some()
+    }
+
+    pub(super) fn max_buffer_bytes(&self, options: &GpuOptions) -> u64 {
+        let limits = self.handle.limits();
+        let most = limits.max_buffer_size.min(limits.max_storage_buffer_binding_size);
+        most.min(options.max_bytes.max(1 << 20)) / 256 * 256
+    }
+
+    /// Runs `work`, and returns errors that wgpu reports meanwhile.
+    pub(super) fn watch<T, F: From<GpuError>>(&self, work: impl FnOnce() -> Result<T, F>) -> Result<T, F> {
+        use wgpu::ErrorFilter::{Internal, OutOfMemory, Validation};
+        let scopes = [Validation, OutOfMemory, Internal].map(|filter| self.handle.push_error_scope(filter));
+        let result = work();
+        // Innermost first.
+        let errors = scopes.into_iter().rev().map(|scope| pollster::block_on(scope.pop()));
+        let error = errors.fold(None, |first: Option<wgpu::Error>, error| first.or(error));
+        match error {
+            None => result,
+            Some(wgpu::Error::OutOfMemory { .. }) => Err(GpuError::OutOfMemory.into()),
+            // A lost device refuses everything, and its messages do not name the loss.
+            Some(_) if !self.is_alive() => Err(self.give_up().into()),
+            Some(other) => Err(GpuError::Refused(first_lines(&other.to_string())).into()),
+        }
+    }
+
+    fn is_alive(&self) -> bool {
+        self.is_idle_within(Duration::from_secs(1))
+    }
+
+    /// Returns true if the device finishes all its work, and an empty submission, in time.
+    pub(super) fn is_idle_within(&self, limit: Duration) -> bool {
+        let scope = self.handle.push_error_scope(wgpu::ErrorFilter::Validation);
+        let encoder = self.handle.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+        let submission = self.queue.submit([encoder.finish()]);
+        let finished = self.poll(submission, limit).is_ok();
+        let refused = pollster::block_on(scope.pop()).is_some();
+        finished && !refused
+    }
+
+    /// Returns the pipeline of a kernel, which is compiled at first use.
+    pub(super) fn pipeline(
+        &self,
+        kernel: &'static Kernel,
+        variant: Variant,
+    ) -> Result<wgpu::ComputePipeline, GpuError> {
+        // Most kernels do not depend on what is searched for.
+        let variant = Variant { changes: variant.changes && kernel.depends_on_search(), ..variant };
+        let mut pipelines = lock(&self.pipelines);
+        if let Some(pipeline) = pipelines.get(&(kernel.name, variant)) {
+            return Ok(pipeline.clone());
+        }
+        let mut source = kernel.source(variant.changes);
+        if self.is_due(Fault::RefuseShader) {
+            source.push_str("this is no WGSL");
+        }
+        let pipeline = self.watch(|| Ok::<_, GpuError>(self.compile(kernel, &source, variant)))?;
+        pipelines.insert((kernel.name, variant), pipeline.clone());
+        Ok(pipeline)
+    }
+
+    fn compile(&self, kernel: &Kernel, source: &str, variant: Variant) -> wgpu::ComputePipeline {
+        let module = self.handle.create_shader_module(wgpu::ShaderModuleDescriptor {
+            label: Some(kernel.name),
+            source: wgpu::ShaderSource::Wgsl(source.into()),
+        });
+        self.handle.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
+            label: Some(kernel.name),
+            layout: None,
+            module: &module,
+            entry_point: Some(kernel.name),
+            compilation_options: wgpu::PipelineCompilationOptions {
+                constants: &variant.constants(source),
+                ..Default::default()
+            },
+            cache: None,
+        })
+    }
+
+    pub(super) fn buffer(
+        &self,
+        label: &str,
+        size: u64,
+        usage: wgpu::BufferUsages,
+        mapped_at_creation: bool,
+    ) -> Result<wgpu::Buffer, GpuError> {
+        if self.is_due(Fault::OutOfMemory) {
+            return Err(GpuError::OutOfMemory);
+        }
+        let descriptor = wgpu::BufferDescriptor { label: Some(label), size, usage, mapped_at_creation };
+        Ok(self.handle.create_buffer(&descriptor))
+    }
+
+    pub(super) fn submit(&self, encoder: wgpu::CommandEncoder) -> wgpu::SubmissionIndex {
+        if self.is_due(Fault::LoseDevice) {
+            self.handle.destroy();
+        }
+        if let Some((_, left)) = &mut *lock(&self.fault) {
+            *left = left.saturating_sub(1);
+        }
+        self.queue.submit([encoder.finish()])
+    }
+
+    /// Waits for a submission, at most for `patience`.
+    pub(super) fn wait(&self, submission: wgpu::SubmissionIndex, patience: Duration) -> Result<(), GpuError> {
+        if self.is_due(Fault::Timeout) {
+            self.give_up();
+            return Err(GpuError::Timeout(patience));
+        }
+        match self.poll(submission, patience) {
+            Ok(()) => Ok(()),
+            Err(Some(wgpu::PollError::Timeout)) => {
+                self.give_up();
+                // Dropping the last handle of a queue waits for it without a limit, so a handle is leaked.
+                std::mem::forget((self.handle.clone(), self.queue.clone()));
+                Err(GpuError::Timeout(patience))
+            }
+            // wgpu did not accept the submission. The error scopes know why.
+            Err(Some(_)) if self.is_alive() => Err(GpuError::Refused("the submission".into())),
+            Err(_) => Err(self.give_up()),
+        }
+    }
+
+    /// Waits. Returns `Err(None)` if wgpu panicked, as it does when the driver reports a lost device.
+    fn poll(
+        &self,
+        submission: wgpu::SubmissionIndex,
+        patience: Duration,
+    ) -> Result<(), Option<wgpu::PollError>> {
+        let wait = wgpu::PollType::Wait { submission_index: Some(submission), timeout: Some(patience) };
+        let poll = || {
+            assert!(!self.is_due(Fault::Panic), "an injected fault");
+            self.handle.poll(wait)
+        };
+        match catch_unwind(AssertUnwindSafe(poll)) {
+            Ok(polled) => polled.map(|_| ()).map_err(Some),
+            Err(_) => Err(None),
+        }
+    }
+
+    pub(super) fn take_back(&self) {
+        self.is_lost.store(false, Ordering::Relaxed);
+    }
+
+    /// Marks the device as lost, because its state is unknown.
+    pub(super) fn give_up(&self) -> GpuError {
+        self.is_lost.store(true, Ordering::Relaxed);
+        GpuError::Lost
+    }
+}
+
+/// Locks a mutex even if another thread panicked while it held the lock: these mutexes guard caches only.
+pub(super) fn lock<T>(mutex: &Mutex<T>) -> std::sync::MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+fn first_lines(text: &str) -> String {
+    text.lines().map(str::trim).filter(|line| !line.is_empty()).take(3).collect::<Vec<_>>().join(": ")
+}
+
+/// Returns an error if the device lacks what every WebGPU device has.
+fn check_limits(limits: &wgpu::Limits) -> Result<(), GpuError> {
+    let needs = [
+        ("storage buffers a stage", limits.max_storage_buffers_per_shader_stage.into(), 8),
+        ("invocations a workgroup", limits.max_compute_invocations_per_workgroup.into(), 256),
+        ("bytes of workgroup memory", limits.max_compute_workgroup_storage_size.into(), 16_384),
+        ("workgroups in a dimension", limits.max_compute_workgroups_per_dimension.into(), 65_535),
+        ("invocations along x", limits.max_compute_workgroup_size_x.into(), 256),
+        ("bytes a storage binding", limits.max_storage_buffer_binding_size, 1 << 20),
+        ("bytes a buffer", limits.max_buffer_size, 1 << 20),
+    ];
+    match needs.into_iter().find(|&(_, found, needed)| found < needed) {
+        Some((what, found, needed)) => Err(GpuError::TooLimited { what, found, needed }),
+        None => Ok(()),
+    }
+}

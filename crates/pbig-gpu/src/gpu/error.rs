@@ -1,0 +1,100 @@
+//! Errors of a device. None of them reaches a caller of [`pbig_core::Finder`]: the call finishes on the CPU, and the report
+//! says why.
+
+use crate::decode::DecodeError;
+use pbig_core::DeviceFailure;
+
+/// Reason why a device could not do the work.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum GpuError {
+    /// There is no adapter, or none of the wanted name.
+    #[error("no GPU adapter{wanted}; found: {found}")]
+    NoAdapter {
+        /// The wanted name, in words.
+        wanted: String,
+        /// The adapters that exist.
+        found: String,
+    },
+    /// `WGPU_BACKEND` has this value, which names no API that wgpu knows, so no adapter is looked for.
+    #[error("no GPU adapter: WGPU_BACKEND={0:?} names no API (known: vulkan, metal, dx12, gl)")]
+    UnknownApi(String),
+    /// The adapter refused to open a device.
+    #[error("the adapter {adapter} opened no device: {why}")]
+    NoDevice {
+        /// The adapter.
+        adapter: String,
+        /// The adapter's message.
+        why: String,
+    },
+    /// A limit of the device is below that of every WebGPU device.
+    #[error("the device allows {found} {what}, but {needed} are needed")]
+    TooLimited {
+        /// The limit's name.
+        what: &'static str,
+        /// The device's value.
+        found: u64,
+        /// The value that pbig needs.
+        needed: u64,
+    },
+    /// The device was lost, before or during the call.
+    #[error("the device was lost")]
+    Lost,
+    /// The device did not answer in time.
+    #[error("the device did not answer within {0:?}")]
+    Timeout(std::time::Duration),
+    /// The device has no memory left.
+    #[error("out of device memory")]
+    OutOfMemory,
+    /// wgpu refused a shader or a command.
+    #[error("refused by wgpu: {0}")]
+    Refused(String),
+    /// A buffer would be larger than a limit allows, and the work cannot be split further.
+    #[error("{what}: {bytes} bytes are needed, but the device or GpuOptions::max_bytes allows {limit}")]
+    TooLarge {
+        /// The buffer's name.
+        what: &'static str,
+        /// The needed size, in bytes.
+        bytes: u64,
+        /// The limit, in bytes.
+        limit: u64,
+    },
+    /// The device returned words that break the pair format.
+    #[error(transparent)]
+    Decode(#[from] DecodeError),
+    /// The device failed a short while ago, and calls wait before they try it again.
+    #[error("the device failed {ago:?} ago ({why}); it is tried again after {pause:?}")]
+    Paused {
+        /// Time since the failure.
+        ago: std::time::Duration,
+        /// The failure.
+        why: String,
+        /// See [`crate::GpuOptions::pause`].
+        pause: std::time::Duration,
+    },
+}
+
+/// Reason why a search on a device ended early.
+#[derive(Debug, PartialEq)]
+pub(super) enum Failure {
+    /// There are more pairs than the caller allows.
+    TooManyPairs,
+    /// The device failed, and the CPU can do the work.
+    Device(GpuError),
+}
+
+impl<E: Into<GpuError>> From<E> for Failure {
+    fn from(error: E) -> Self {
+        Self::Device(error.into())
+    }
+}
+
+impl Failure {
+    /// Returns the failure as the core knows it.
+    pub(super) fn for_core(self) -> DeviceFailure {
+        match self {
+            Self::TooManyPairs => DeviceFailure::TooManyPairs,
+            Self::Device(error) => DeviceFailure::Failed(error.to_string()),
+        }
+    }
+}

@@ -1,0 +1,114 @@
+//! The plan of earlier calls. A plan decides only the time of a search, so it is kept until the boxes have outgrown it: then the
+//! device measures the boxes once more. In between, a call costs the host nothing for planning.
+
+use super::GpuPlan;
+use crate::layout::{Counters, LANES};
+
+/// Factor by which the number of boxes, or the work for a box, may change until a plan is outgrown.
+const OUTGROWN: u64 = 2;
+
+/// Tests that a kept plan may need, as a multiple of those in its first call. With more, nothing is tested: boxes that have
+/// jumped into one cell would keep the device busy for seconds.
+const MAX_TESTS_FACTOR: u64 = 4;
+
+/// Tests that every plan may need, in units of [`LANES`].
+const ALWAYS_ALLOWED_TESTS: u64 = 1024;
+
+/// A plan, and how it did.
+#[derive(Debug)]
+pub(super) struct KeptPlan {
+    pub(super) plan: GpuPlan,
+    boxes: u64,
+    first: Option<Work>,
+}
+
+/// The work of a call.
+#[derive(Clone, Copy, Debug)]
+struct Work {
+    boxes: u64,
+    /// In units of [`LANES`].
+    tests: u64,
+    /// Entries of cells, and tests.
+    all: u64,
+}
+
+impl Work {
+    fn of(counters: &Counters) -> Self {
+        let tests = u64::from(counters.tests);
+        let all = u64::from(counters.entries) + u64::from(LANES) * tests;
+        Self { boxes: u64::from(counters.valid).max(1), tests, all: all.max(1) }
+    }
+}
+
+impl KeptPlan {
+    /// Keeps a plan that was made for so many boxes.
+    pub(super) fn new(plan: GpuPlan, boxes: u32) -> Self {
+        Self { plan, boxes: u64::from(boxes), first: None }
+    }
+
+    /// Returns true if the plan was made for about as many boxes.
+    pub(super) fn suits(&self, boxes: usize) -> bool {
+        let boxes = boxes as u64;
+        boxes <= OUTGROWN * self.boxes && self.boxes <= OUTGROWN * boxes
+    }
+
+    /// Returns the tests that a call may need, in units of [`LANES`]: any number in the first call.
+    pub(super) fn most_tests(&self, boxes: u32) -> u32 {
+        let Some(first) = self.first else { return u32::MAX };
+        let usual = first.tests.max(1) * u64::from(boxes) / first.boxes;
+        u32::try_from(MAX_TESTS_FACTOR * usual + ALWAYS_ALLOWED_TESTS).unwrap_or(u32::MAX)
+    }
+
+    /// Notes a call. Returns true if the work for a box has doubled or halved since the first one.
+    pub(super) fn is_outgrown_after(&mut self, counters: &Counters) -> bool {
+        let now = Work::of(counters);
+        let first = *self.first.get_or_insert(now);
+        let product = |all: u64, boxes: u64| u128::from(all) * u128::from(boxes);
+        let (before, now) = (product(first.all, now.boxes), product(now.all, first.boxes));
+        let outgrown = u128::from(OUTGROWN);
+        now > outgrown * before || before > outgrown * now
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::GpuOptions;
+    use crate::pbig::Summary;
+    use pbig_core::Aabb;
+
+    fn kept(boxes: u32) -> KeptPlan {
+        let cubes: Vec<_> = (0..boxes).map(|i| Aabb::from_center([i as f32, 0.0, 0.0], [0.5; 3])).collect();
+        KeptPlan::new(GpuPlan::new(&Summary::of(&cubes), &GpuOptions::DEFAULT, 1.0, 1 << 20), boxes)
+    }
+
+    fn counted(valid: u32, entries: u32, tests: u32) -> Counters {
+        Counters { valid, entries, tests, ..Counters::default() }
+    }
+
+    #[test]
+    fn a_plan_suits_up_to_twice_as_many_boxes_and_half_as_many() {
+        let plan = kept(1000);
+        assert!(plan.suits(1000) && plan.suits(2000) && plan.suits(500));
+        assert!(!plan.suits(2001) && !plan.suits(499));
+    }
+
+    #[test]
+    fn a_plan_is_outgrown_when_the_work_for_a_box_has_doubled_or_halved() {
+        let mut plan = kept(1000);
+        assert!(!plan.is_outgrown_after(&counted(1000, 8000, 40)));
+        assert!(!plan.is_outgrown_after(&counted(2000, 16_000, 80)), "twice the boxes");
+        assert!(!plan.is_outgrown_after(&counted(1000, 8000, 70)));
+        assert!(plan.is_outgrown_after(&counted(1000, 8000, 120)));
+        assert!(plan.is_outgrown_after(&counted(1000, 4000, 15)));
+    }
+
+    #[test]
+    fn the_first_call_may_need_any_number_of_tests_and_later_ones_four_times_as_many_a_box() {
+        let mut plan = kept(100_000);
+        assert_eq!(plan.most_tests(100_000), u32::MAX);
+        plan.is_outgrown_after(&counted(100_000, 0, 5000));
+        assert_eq!(plan.most_tests(100_000), 4 * 5000 + 1024);
+        assert_eq!(plan.most_tests(50_000), 4 * 2500 + 1024);
+    }
+}

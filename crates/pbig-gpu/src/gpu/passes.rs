@@ -1,0 +1,248 @@
+//! The kernels and buffers of a submission, as tables.
+
+use super::GpuError;
+use super::device::Variant;
+use super::storage::{BufferId, Side, Storage};
+use crate::layout::{
+    CELLS_PER_BLOCK, COUNTS_PER_BLOCK, Cell, Counters, LANES, LargeItem, Located, Params, SHORT_ROW, SORTED,
+    Slot, SmallItem, Totals,
+};
+use pbig_core::Pair;
+use pbig_shaders::{self as shaders, Buffer, Kernel};
+
+/// Workgroups in a row of a dispatch. The portable limit is 65,535.
+const GROUPS_PER_ROW: u32 = 32_768;
+
+/// Most kernels in one submission. Each takes two timestamps.
+pub(super) const MAX_PASSES: u32 = 24;
+
+/// Most workgroups that measure the boxes. Each adds its counts to those of all.
+const MEASURE_GROUPS: u32 = 64;
+
+/// Bytes of the counts of size classes.
+pub(super) const CLASSES_BYTES: u64 = 256 * 16;
+
+/// The number of workgroups of a kernel.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Groups {
+    /// A number that the host knows. 0 leaves the kernel out.
+    Direct(u32),
+    /// A number that the device has written into a buffer, at this byte.
+    Indirect(Buffer, u64),
+}
+
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Step {
+    /// Sets the first bytes of a buffer to 0.
+    Clear(Buffer, u64),
+    Run(&'static Kernel, Groups),
+    /// Runs a kernel of the scan on the rows of pairs instead of the cells.
+    RunOnRows(&'static Kernel, Groups),
+}
+
+/// The step that begins the counts of a check anew.
+pub(super) const CLEAR_TOTALS: Step = Clear(Buffer::Totals, size_of::<Totals>() as u64);
+
+use Buffer::{Dispatches, LongDispatch};
+use Groups::{Direct, Indirect};
+use Step::{Clear, Run, RunOnRows};
+
+/// Returns the steps that apply uploaded changes.
+pub(super) fn apply_changes(params: &Params) -> [Step; 2] {
+    let longest = params.box_changes.max(params.filter_changes);
+    [
+        Clear(Buffer::Changed, changed_bytes(params.known)),
+        Run(&shaders::APPLY_CHANGES, Direct(longest.div_ceil(LANES))),
+    ]
+}
+
+/// Returns the bytes of a bit for each box.
+pub(super) fn changed_bytes(boxes: u32) -> u64 {
+    4 * u64::from(boxes.div_ceil(32))
+}
+
+/// Returns the steps that count the boxes of each size.
+pub(super) fn measure(params: &Params) -> [Step; 2] {
+    let groups = params.boxes.div_ceil(LANES).min(MEASURE_GROUPS);
+    [Clear(Buffer::Classes, CLASSES_BYTES), Run(&shaders::MEASURE, Direct(groups))]
+}
+
+/// Returns the steps that turn boxes into work items, without a round trip to the host, check the first of these, and sort
+/// the pairs if the flags say so and these items are expected to be all.
+pub(super) fn map_and_check(params: &Params, is_all: bool) -> Vec<Step> {
+    let by_box = Direct(params.boxes.div_ceil(LANES));
+    let mut steps = vec![
+        CLEAR_TOTALS,
+        Clear(Buffer::Cells, bytes_of::<Cell>(params.cells)),
+        Clear(Buffer::Counters, bytes_of::<Counters>(1)),
+        Run(&shaders::LOCATE, by_box),
+        Run(&shaders::VISIT, if params.levels > 1 { by_box } else { Direct(0) }),
+        Run(&shaders::SCAN_BLOCKS, Direct((2 * params.cells).div_ceil(COUNTS_PER_BLOCK))),
+        Run(&shaders::SCAN_SUMS, Direct(1)),
+        Run(&shaders::SCHEDULE, Direct(params.cells.div_ceil(CELLS_PER_BLOCK))),
+        Run(&shaders::SCATTER, by_box),
+        Run(&shaders::ARRANGE, Direct(1)),
+        Run(&shaders::CHECK_SMALL, Indirect(Dispatches, 0)),
+        Run(&shaders::CHECK_LARGE, Indirect(Dispatches, 12)),
+    ];
+    if is_all && params.flags & SORTED != 0 {
+        steps.extend(sort(params));
+    }
+    steps
+}
+
+/// Returns the steps that sort the pairs, where the chunk has all and they fit.
+pub(super) fn sort(params: &Params) -> [Step; 8] {
+    [
+        Run(&shaders::ARRANGE_ROWS, Direct(1)),
+        Clear(Buffer::Rows, bytes_of::<u32>(params.boxes)),
+        Run(&shaders::COUNT_PAIRS, Indirect(Dispatches, 24)),
+        RunOnRows(&shaders::SCAN_BLOCKS, Direct(params.boxes.div_ceil(COUNTS_PER_BLOCK))),
+        RunOnRows(&shaders::SCAN_SUMS, Direct(1)),
+        Run(&shaders::PLACE_PAIRS, Indirect(Dispatches, 24)),
+        Run(&shaders::RANK_PAIRS, Indirect(Dispatches, 24)),
+        Run(&shaders::RANK_LONG_ROWS, Indirect(LongDispatch, 0)),
+    ]
+}
+
+pub(super) fn check(small_items: u32, large_items: u32) -> [Step; 2] {
+    [Run(&shaders::CHECK_SMALL, Direct(small_items)), Run(&shaders::CHECK_LARGE, Direct(large_items))]
+}
+
+fn bytes_of<T>(elements: u32) -> u64 {
+    u64::from(elements) * size_of::<T>() as u64
+}
+
+/// Makes the buffers of the map. The device finds out the lengths of the lists: `needed` has those of the last call, and
+/// `params` gets the capacities.
+pub(super) fn make_buffers(
+    storage: &mut Storage,
+    params: &mut Params,
+    needed: &Counters,
+    first_bytes: u64,
+) -> Result<(), GpuError> {
+    let lists = (2 * params.cells).max(params.boxes);
+    let buffers = [
+        (Buffer::Located, bytes_of::<Located>(params.boxes)),
+        (Buffer::Cells, bytes_of::<Cell>(params.cells)),
+        (Buffer::Sums, bytes_of::<u32>(lists.div_ceil(COUNTS_PER_BLOCK))),
+        (Buffer::Dispatches, bytes_of::<[u32; 3]>(3)),
+    ];
+    for (buffer, bytes) in buffers {
+        storage.ensure(buffer, bytes)?;
+    }
+    let lists = [
+        (Buffer::Entries, needed.entries, size_of::<u32>(), &mut params.entry_capacity),
+        (Buffer::Slots, needed.slots, size_of::<Slot>(), &mut params.slot_capacity),
+        (Buffer::SmallItems, needed.small_items, size_of::<SmallItem>(), &mut params.small_capacity),
+        (Buffer::LargeItems, needed.large_items, size_of::<LargeItem>(), &mut params.large_capacity),
+    ];
+    for (buffer, len, size, capacity) in lists {
+        let bytes = u64::from(len) * size as u64;
+        storage.ensure(buffer, bytes.max(first_bytes.min(storage.max_buffer_bytes)))?;
+        *capacity = u32::try_from(storage.size(buffer) / size as u64).unwrap_or(u32::MAX);
+    }
+    Ok(())
+}
+
+/// Makes the buffers of the sort, for the pairs of so many words. `params` gets the capacity.
+pub(super) fn make_sort_buffers(
+    storage: &mut Storage,
+    params: &mut Params,
+    words: u64,
+) -> Result<(), GpuError> {
+    storage.ensure(Buffer::Rows, bytes_of::<u32>(params.boxes))?;
+    storage.ensure(Buffer::LongDispatch, bytes_of::<[u32; 3]>(1))?;
+    storage.ensure(Buffer::Grouped, 4 * words)?;
+    let pairs = storage.size(Buffer::Grouped) / size_of::<Pair>() as u64;
+    storage.ensure(Buffer::LongRows, 8 * (pairs / u64::from(SHORT_ROW) + 1))?;
+    params.pair_capacity = u32::try_from(pairs).unwrap_or(u32::MAX);
+    Ok(())
+}
+
+/// Returns true if all lists of the map fitted into their buffers.
+pub(super) fn lists_fit(params: &Params, found: &Counters) -> bool {
+    found.entries <= params.entry_capacity
+        && found.slots <= params.slot_capacity
+        && found.small_items <= params.small_capacity
+        && found.large_items <= params.large_capacity
+}
+
+/// A submission that is being recorded.
+pub(super) struct Recording<'a> {
+    pub(super) storage: &'a mut Storage,
+    pub(super) encoder: wgpu::CommandEncoder,
+    pub(super) side: Side,
+    pub(super) variant: Variant,
+    pub(super) queries: Option<&'a wgpu::QuerySet>,
+    pub(super) passes: Vec<&'static str>,
+}
+
+/// A kernel that is ready to run.
+struct Ready {
+    name: &'static str,
+    pipeline: wgpu::ComputePipeline,
+    bind_group: wgpu::BindGroup,
+    groups: Groups,
+}
+
+impl Recording<'_> {
+    /// Records steps: first everything that is cleared, then the kernels. They share a pass, unless each is timed.
+    pub(super) fn record(&mut self, steps: &[Step]) -> Result<(), GpuError> {
+        let mut kernels = Vec::with_capacity(steps.len());
+        for &step in steps {
+            match step {
+                Clear(buffer, bytes) => {
+                    let buffer = self.storage.get(BufferId::of(buffer, self.side));
+                    self.encoder.clear_buffer(buffer, 0, Some(bytes));
+                }
+                Run(_, Direct(0)) => {}
+                Run(kernel, groups) => kernels.push(self.ready(kernel, groups, self.variant)?),
+                RunOnRows(kernel, groups) => {
+                    kernels.push(self.ready(kernel, groups, self.variant.of_rows())?);
+                }
+            }
+        }
+        self.passes.extend(kernels.iter().map(|kernel| kernel.name));
+        let Some(query_set) = self.queries else {
+            self.run(&kernels, None);
+            return Ok(());
+        };
+        for (i, kernel) in (0u32..).zip(&kernels) {
+            let (beginning, end) = (Some(2 * i), Some(2 * i + 1));
+            let writes = wgpu::ComputePassTimestampWrites {
+                query_set,
+                beginning_of_pass_write_index: beginning,
+                end_of_pass_write_index: end,
+            };
+            self.run(std::slice::from_ref(kernel), Some(writes));
+        }
+        Ok(())
+    }
+
+    fn ready(
+        &mut self,
+        kernel: &'static Kernel,
+        groups: Groups,
+        variant: Variant,
+    ) -> Result<Ready, GpuError> {
+        let pipeline = self.storage.device.pipeline(kernel, variant)?;
+        let bind_group = self.storage.bind_group(kernel, variant, self.side, &pipeline);
+        Ok(Ready { name: kernel.name, pipeline, bind_group, groups })
+    }
+
+    /// Records a pass.
+    fn run(&mut self, kernels: &[Ready], timestamp_writes: Option<wgpu::ComputePassTimestampWrites<'_>>) {
+        let descriptor = wgpu::ComputePassDescriptor { label: Some("pbig"), timestamp_writes };
+        let mut pass = self.encoder.begin_compute_pass(&descriptor);
+        for Ready { name, pipeline, bind_group, groups } in kernels {
+            pass.insert_debug_marker(name);
+            pass.set_pipeline(pipeline);
+            pass.set_bind_group(0, bind_group, &[]);
+            match *groups {
+                Direct(n) => pass.dispatch_workgroups(n.min(GROUPS_PER_ROW), n.div_ceil(GROUPS_PER_ROW), 1),
+                Indirect(buffer, at) => pass.dispatch_workgroups_indirect(self.storage.get(buffer), at),
+            }
+        }
+    }
+}

@@ -1,0 +1,200 @@
+//! The GPU's grid: PBIG's cells (section 4.1), one size for each level of boxes.
+//!
+//! A level's cells are a power of two times those of the finest level. So a device computes the cells of a box once and
+//! shifts integers to get those of every level (contract 3). The last level has a single cell: there the boxes without
+//! a level of their own are tested against all others, once (contract 4).
+
+use super::levels::{SizeRange, levels};
+use crate::layout::{FEWEST_CELLS, Level, MAX_LEVELS, MAX_SPAN, Params, ordered};
+use crate::pbig::{Summary, cell_size, ordinary, size_class_of, space_of};
+use crate::{CellRule, GpuOptions};
+use pbig_core::Aabb;
+use std::fmt;
+
+/// Most cells of a level per box. With more cells, the scan costs more than full cells do.
+const CELLS_PER_BOX: f64 = 4.0;
+/// Number of cells that every level may have, however few its boxes.
+const MIN_CELLS_PER_LEVEL: f64 = 4096.0;
+/// Largest mean number of other boxes in a box's cell, as a multiple of the wanted boxes per cell. Above it the cell is
+/// halved.
+const OCCUPANCY_LIMIT: f64 = 4.0;
+/// Fewest pairs of sampled boxes in one cell that count: a single coincidence would stand for many boxes.
+const FEWEST_SAMPLED_PAIRS: usize = 16;
+/// Most cells of the finest level from the middle of the world to its end. They must fit an `i32` with room to spare.
+const MAX_CELL: f64 = 1073741824.0;
+
+/// The levels and cells of a search on a GPU.
+#[derive(Clone, Debug, PartialEq)]
+pub struct GpuPlan {
+    /// Edge of the cells of the finest level, in the boxes' length unit.
+    pub cell: f32,
+    /// Lower corner of cell 0, in the boxes' length unit: the middle of most boxes.
+    pub origin: [f32; 3],
+    /// Number of cells of all levels.
+    pub cells: u32,
+    /// Levels, finest first. The last has one cell.
+    pub(crate) levels: Vec<Level>,
+}
+
+/// `4097 cells, 16 x 16 x 16 of 1.5`.
+impl fmt::Display for GpuPlan {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{} cells", self.cells)?;
+        for level in &self.levels[..self.levels.len() - 1] {
+            let [x, y, z] = level.dims;
+            write!(f, ", {x} x {y} x {z} of {}", f64::from(self.cell) * f64::from(level.shift).exp2())?;
+        }
+        Ok(())
+    }
+}
+
+impl GpuPlan {
+    /// Plans the grid for the boxes behind `summary`, with at most `max_cells` cells.
+    ///
+    /// `cell_factor` scales the cells: 1, or less where earlier cells held too many boxes.
+    pub(crate) fn new(summary: &Summary, options: &GpuOptions, cell_factor: f32, max_cells: u32) -> Self {
+        let split = levels(summary);
+        // The coarsest levels are kept if there are too many: finer boxes then share the first of these.
+        let split = &split[split.len().saturating_sub(MAX_LEVELS - 1)..];
+        let (space, low) = space_of(summary, &ordinary(summary));
+        let edges = split.iter().map(|level| edge(level, summary, space, options, cell_factor));
+        let (cell, shifts) = powers_of_two(&edges.collect::<Vec<_>>(), split, space);
+        let mut plan = Self {
+            cell: cell as f32,
+            origin: std::array::from_fn(|k| low[k] + 0.5 * space[k]),
+            levels: Vec::new(),
+            cells: 0,
+        };
+        for (shift, level) in shifts {
+            let share = max_cells.saturating_sub(1) / split.len().max(1) as u32;
+            let most =
+                (f64::from(level.boxes) * CELLS_PER_BOX).max(MIN_CELLS_PER_LEVEL).min(f64::from(share));
+            plan.push(dims(space, cell * f64::from(shift).exp2(), most), shift);
+        }
+        plan.push([1; 3], 0);
+        plan
+    }
+
+    fn push(&mut self, dims: [u32; 3], shift: u32) {
+        self.levels.push(Level { dims, shift, first_cell: self.cells, unused: [0; 3] });
+        self.cells += dims.iter().product::<u32>();
+    }
+
+    /// Returns the kernels' parameters with those that the plan sets.
+    pub(crate) fn add_to(&self, params: Params) -> Params {
+        let scale = (1.0 / f64::from(self.cell)) as f32;
+        let reach = 0.99 * MAX_CELL / f64::from(scale);
+        let bound = |k: usize, sign: f64| {
+            let x =
+                (f64::from(self.origin[k]) + sign * reach).clamp(-f64::from(f32::MAX), f64::from(f32::MAX));
+            ordered(x as f32)
+        };
+        let mut params = Params {
+            origin: self.origin,
+            scale,
+            clamp_low: std::array::from_fn(|k| bound(k, -1.0)),
+            clamp_high: std::array::from_fn(|k| bound(k, 1.0)),
+            levels: self.levels.len() as u32,
+            cells: self.cells,
+            ..params
+        };
+        params.level[..self.levels.len()].copy_from_slice(&self.levels);
+        params
+    }
+}
+
+/// Returns the cell size of a level: by the cell rule on its boxes alone, but such that its largest box touches few
+/// cells on each axis.
+fn edge(
+    level: &SizeRange,
+    summary: &Summary,
+    space: [f32; 3],
+    options: &GpuOptions,
+    cell_factor: f32,
+) -> f64 {
+    let of_level = |b: &&Aabb| (level.classes.0..=level.classes.1).contains(&size_class_of(b.extents()));
+    let sample: Vec<Aabb> = summary.sample.iter().filter(of_level).copied().collect();
+    let wanted = options.boxes_per_cell.max(1.0);
+    let cell = if sample.is_empty() {
+        cell_size(CellRule::Density, &sample, level.boxes, space, wanted)
+    } else {
+        // A quarter of the sample is enough: equation 6 is evaluated on it 24 times.
+        let quarter: Vec<Aabb> = sample.iter().step_by(4).copied().collect();
+        cell_size(options.cell_rule, &quarter, level.boxes, space, wanted)
+    };
+    let largest = level.max_extent.into_iter().fold(0.0, f32::max);
+    // A box crosses at most one border more than it has cell lengths, and one more by rounding.
+    let smallest = f64::from(largest) * 1.001 / f64::from(MAX_SPAN - 2);
+    let even = f64::from(cell) * f64::from(cell_factor);
+    with_limited_occupancy(&sample, level.boxes, even, smallest, OCCUPANCY_LIMIT * f64::from(wanted))
+        .max(smallest)
+}
+
+/// Returns a cell size at which a box has at most `most` other boxes in its cell, as the sample tells.
+///
+/// Equation 6 knows the average cell only. If boxes lie in clusters far apart, most cells are empty and the others hold
+/// a cluster each; so the cell is halved. It stops where the smallest cell would hold hardly fewer boxes: no cell
+/// separates identical boxes.
+fn with_limited_occupancy(sample: &[Aabb], boxes: u32, even: f64, smallest: f64, most: f64) -> f64 {
+    let mut cell = even;
+    let (now, sampled_pairs) = occupancy(sample, boxes, cell);
+    if now <= most || sampled_pairs < FEWEST_SAMPLED_PAIRS {
+        return cell;
+    }
+    let smallest = smallest.max(even * 2f64.powi(-30));
+    let goal = most.max(1.25 * occupancy(sample, boxes, smallest).0);
+    while cell > smallest && occupancy(sample, boxes, cell).0 > goal {
+        cell /= 2.0;
+    }
+    cell
+}
+
+/// Returns an estimate of the mean number of other boxes in the cell of a box's lower corner, and the number of pairs
+/// of sampled boxes that share a cell.
+fn occupancy(sample: &[Aabb], boxes: u32, cell: f64) -> (f64, usize) {
+    let of = |b: &Aabb| b.min.map(|x| (f64::from(x) / cell).floor() as i64);
+    let mut cells: Vec<[i64; 3]> = sample.iter().map(of).collect();
+    cells.sort_unstable();
+    let others = cells.chunk_by(|a, b| a == b).map(|same| same.len() * (same.len() - 1)).sum::<usize>();
+    let n = sample.len().max(1) as f64;
+    (others as f64 / n * (f64::from(boxes) / n), others)
+}
+
+/// Returns the finest cell, and for each level the number of doublings to its cells. Levels of equal cells are joined.
+/// Levels so coarse that the finest cells would not span the space are left out.
+fn powers_of_two<'a>(
+    edges: &[f64],
+    levels: &'a [SizeRange],
+    space: [f32; 3],
+) -> (f64, Vec<(u32, &'a SizeRange)>) {
+    let widest = f64::from(space.into_iter().fold(0.0, f32::max));
+    let finest = edges.first().copied().unwrap_or(1.0).max(4.0 * widest / MAX_CELL).clamp(1e-30, 1e30);
+    let mut shifts: Vec<(u32, &SizeRange)> = Vec::new();
+    for (edge, level) in edges.iter().zip(levels) {
+        let shift = (edge / finest).log2().ceil().max(0.0) as u32;
+        match shifts.last() {
+            _ if shift > 28 => break,
+            Some((last, _)) if shift <= *last => {}
+            _ => shifts.push((shift, level)),
+        }
+    }
+    (finest, shifts)
+}
+
+/// Returns the number of cells on each axis: enough for the space, but at most `most` in all. Boxes beyond wrap around.
+/// An axis shorter than a cell is not divided.
+fn dims(space: [f32; 3], cell: f64, most: f64) -> [u32; 3] {
+    let along = |length: f32| match f64::from(length) / cell {
+        cells if cells < 1.0 => 1,
+        cells => (cells.min(1e6).ceil() as u32 + 1).max(FEWEST_CELLS),
+    };
+    let mut dims = space.map(along);
+    while dims.iter().map(|&d| f64::from(d)).product::<f64>() > most {
+        let longest = dims.iter_mut().max().expect("three axes");
+        if *longest <= FEWEST_CELLS {
+            break;
+        }
+        *longest = (*longest * 3 / 4).max(FEWEST_CELLS);
+    }
+    dims
+}

@@ -1,0 +1,74 @@
+//! The pairs of a search on a device: those read back so far, and all of them in the end.
+
+use super::{Failure, GpuPlan};
+use crate::layout::{COUNTED, Params, Totals, wide};
+use pbig_core::{DeviceFound, Pair};
+use std::time::Duration;
+
+/// The pairs and counts of a search so far.
+pub(super) struct Sink {
+    pub(super) found: DeviceFound,
+    /// Words of output so far.
+    pub(super) words: u64,
+    /// The caller's limit of pairs.
+    pub(super) limit: u64,
+    /// Number of kept pairs in a search for changes. As many may be removed without counting against the limit.
+    pub(super) kept: u64,
+}
+
+impl Sink {
+    /// Returns an empty result with the memory of `pairs`.
+    pub(super) fn new(mut pairs: Vec<Pair>, limit: u64, kept: u64) -> Self {
+        pairs.clear();
+        let mut found = DeviceFound::default();
+        (found.pairs, found.report.parts) = (pairs, 1);
+        Self { found, words: 0, limit, kept }
+    }
+
+    /// Notes the grid. Of several parts the last one's is reported.
+    pub(super) fn note_plan(&mut self, plan: Option<&GpuPlan>) {
+        self.found.plan = plan.map(GpuPlan::to_string);
+        self.found.report.cell = plan.map_or(0.0, |plan| plan.cell);
+    }
+
+    /// Returns the number of pairs so far.
+    pub(super) fn pairs(&self) -> u64 {
+        (self.found.pairs.len() + self.found.ended.len()) as u64
+    }
+
+    pub(super) fn left(&self) -> u64 {
+        self.limit.saturating_add(self.kept).saturating_sub(self.pairs())
+    }
+
+    /// Returns an error if `more` pairs are too many, or those so far.
+    pub(super) fn check(&self, more: u64) -> Result<(), Failure> {
+        let limit = self.limit.saturating_add(self.kept);
+        if self.pairs().saturating_add(more) > limit { Err(Failure::TooManyPairs) } else { Ok(()) }
+    }
+
+    /// Adds the counts of a chunk with so many words of output. Only a device that was told to counts tests.
+    pub(super) fn count(&mut self, params: &Params, totals: &Totals, words: u64) {
+        self.words += words;
+        let checks = &mut self.found.checks;
+        if params.flags & COUNTED != 0 {
+            let (made, redundant) = (wide(totals.made), wide(totals.redundant));
+            checks.made += made;
+            checks.redundant += redundant;
+            checks.unnecessary += made.saturating_sub(redundant + wide(totals.overlaps));
+        }
+    }
+
+    pub(super) fn add_time(&mut self, name: &'static str, time: Duration) {
+        let kernels = &mut self.found.report.kernels;
+        match kernels.iter_mut().find(|(known, _)| *known == name) {
+            Some((_, sum)) => *sum += time,
+            None => kernels.push((name, time)),
+        }
+    }
+
+    pub(super) fn end(mut self) -> DeviceFound {
+        let ratio = self.words as f64 / (2 * self.pairs()) as f64;
+        self.found.report.compression = if self.pairs() > 0 { ratio } else { 0.0 };
+        self.found
+    }
+}

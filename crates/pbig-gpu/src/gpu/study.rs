@@ -1,0 +1,49 @@
+//! For tests and studies: faults, single pipelines, plans.
+
+pub use super::device::Fault;
+use super::device::Variant;
+use super::{GpuError, GpuFinder, GpuPlan};
+use crate::GpuOptions;
+use crate::layout::Params;
+use crate::pbig::Summary;
+use pbig_core::Aabb;
+use pbig_shaders::Kernel;
+
+/// Returns the kernels' parameters for a grid of the boxes with at most `max_cells` cells, as far as the plan sets them.
+pub fn plan_params(boxes: &[Aabb], options: &GpuOptions, max_cells: u32) -> Params {
+    GpuPlan::new(&Summary::of(boxes), options, 1.0, max_cells).add_to(Params::default())
+}
+
+impl GpuFinder {
+    /// Makes [`pbig_core::Backend::Auto`] take a software adapter for hardware.
+    pub fn pretend_hardware(&mut self) {
+        self.pretends_hardware = true;
+    }
+
+    /// Makes the device fail after so many more submissions.
+    pub fn inject(&self, fault: Fault, submissions: u32) {
+        if let Some(device) = &self.device {
+            device.inject(fault, submissions);
+        }
+    }
+
+    /// Returns a kernel's pipeline. If the kernel has two texts, `changes` picks the one for a search for changes.
+    pub fn pipeline(
+        &self,
+        kernel: &'static Kernel,
+        options: &GpuOptions,
+        changes: bool,
+    ) -> Result<wgpu::ComputePipeline, GpuError> {
+        let device = self.device.as_ref().ok_or(GpuError::Lost)?;
+        device.pipeline(kernel, Variant::new(options, changes))
+    }
+
+    /// Runs `work` on the device, and returns errors that wgpu reports meanwhile.
+    pub fn on_device<T>(
+        &self,
+        work: impl FnOnce(&wgpu::Device, &wgpu::Queue) -> Result<T, GpuError>,
+    ) -> Result<T, GpuError> {
+        let device = self.device.as_ref().ok_or(GpuError::Lost)?;
+        device.watch(|| work(&device.handle, &device.queue))
+    }
+}

@@ -1,0 +1,99 @@
+//! Upload: each list is copied once into staging memory. Boxes go up as they are, and a kernel turns them into ordered
+//! integers. Updates send only the changes that the caller lists.
+//!
+//! A finder sends all boxes in each call: to find those that have changed, the host would have to read them and a copy of the
+//! last call's, which takes longer than sending them.
+
+use super::GpuError;
+use super::changes::Changes;
+use super::passes::changed_bytes;
+use super::storage::{Storage, Upload};
+use crate::layout::{BoxChange, FilterChange, Motion, Params};
+use bytemuck::Pod;
+use pbig_core::ProxyFilter;
+use pbig_shaders::Buffer;
+
+/// Fewest elements for a thread: 10 us of work.
+pub(super) const PIECE: usize = 1 << 14;
+
+/// The boxes, now and before, that the device has.
+#[derive(Debug, Default)]
+pub(super) struct UploadCache {
+    /// Number of boxes of the last update; none if the device has not seen it.
+    motions: Option<usize>,
+}
+
+/// Each upload sets the lengths of the lists in `params`.
+impl UploadCache {
+    /// Forgets which motions the device has: the next search for changes uploads all boxes.
+    pub(super) fn forget_motions(&mut self) {
+        self.motions = None;
+    }
+
+    /// Uploads all boxes, or boxes now and before, whatever the device has.
+    pub(super) fn upload_all<T: Pod>(
+        &mut self,
+        storage: &mut Storage,
+        boxes: &[T],
+        filters: Option<&[ProxyFilter]>,
+        params: &mut Params,
+    ) -> Result<(), GpuError> {
+        self.motions = None;
+        params.boxes = boxes.len() as u32;
+        make_room(storage, size_of_val(boxes), filters.map_or(0, size_of_val), params.boxes)?;
+        let filters = filters.unwrap_or(&[]);
+        storage.stage(&[Upload::new(Buffer::Boxes, 0, boxes), Upload::new(Buffer::Filters, 0, filters)])
+    }
+
+    /// Uploads the changes, or all boxes to a device that does not have those of the last update.
+    pub(super) fn upload_changes(
+        &mut self,
+        storage: &mut Storage,
+        changes: Changes<'_>,
+        params: &mut Params,
+    ) -> Result<(), GpuError> {
+        let (boxes, filters) = (changes.boxes.len(), changes.filters);
+        params.boxes = boxes as u32;
+        let (bytes, filter_bytes) = (boxes * size_of::<Motion>(), size_of_val(filters));
+        let has_lost_content = make_room(storage, bytes, filter_bytes, params.boxes)?;
+        match self.motions.filter(|_| !has_lost_content) {
+            Some(known) => send_lists(storage, changes, known.min(boxes), params)?,
+            None => self.upload_all(storage, &changes.motions(0..boxes), Some(filters), params)?,
+        }
+        self.motions = Some(boxes);
+        Ok(())
+    }
+}
+
+/// Makes the buffers of boxes. Returns true if one of them has lost its content.
+fn make_room(storage: &mut Storage, boxes: usize, filters: usize, count: u32) -> Result<bool, GpuError> {
+    storage.ensure(Buffer::Changed, changed_bytes(count))?;
+    Ok(storage.ensure(Buffer::Boxes, boxes as u64)? | storage.ensure(Buffer::Filters, filters as u64)?)
+}
+
+/// Sends the lists of changes of the first `known` boxes, and the boxes after these.
+fn send_lists(
+    storage: &mut Storage,
+    changes: Changes<'_>,
+    known: usize,
+    params: &mut Params,
+) -> Result<(), GpuError> {
+    let lists = changes.lists(known);
+    let new = changes.motions(known..changes.boxes.len());
+    let mut uploads = vec![
+        Upload::new(Buffer::Boxes, known, &new),
+        Upload::new(Buffer::Filters, known, &changes.filters[known..]),
+    ];
+    let (mut box_changes, mut filter_changes) = (0, 0);
+    for (boxes, filters) in &lists {
+        uploads.push(Upload::new(Buffer::BoxChanges, box_changes, boxes));
+        uploads.push(Upload::new(Buffer::FilterChanges, filter_changes, filters));
+        (box_changes, filter_changes) = (box_changes + boxes.len(), filter_changes + filters.len());
+    }
+    storage.ensure(Buffer::BoxChanges, (box_changes * size_of::<BoxChange>()) as u64)?;
+    storage.ensure(Buffer::FilterChanges, (filter_changes * size_of::<FilterChange>()) as u64)?;
+    storage.stage(&uploads)?;
+    params.known = known as u32;
+    (params.box_changes, params.filter_changes) = (box_changes as u32, filter_changes as u32);
+    Ok(())
+}

@@ -1,0 +1,149 @@
+//! The structs that Rust and WGSL share. `shaders/shared/types.wgsl` has the same fields, and says what they hold; a test
+//! compares names, offsets and constants.
+
+use bytemuck::{Pod, Zeroable};
+use pbig_core::{Aabb, ProxyFilter};
+
+/// Number of lanes of a workgroup, and of boxes of a segment (PBIG 5.2).
+pub const LANES: u32 = 256;
+/// Most levels of cells. The last level has one cell for everything.
+pub const MAX_LEVELS: usize = 8;
+/// Most cells that a box touches along one axis of its level.
+pub const MAX_SPAN: u32 = 4;
+/// Fewest cells along an axis that is divided. Two overlapping boxes must not meet a second time by wrapping around, so the
+/// `2 * MAX_SPAN - 1` cells that they touch together must be distinct.
+pub const FEWEST_CELLS: u32 = 2 * MAX_SPAN;
+/// Level of an invalid box.
+pub const NO_LEVEL: u32 = u32::MAX;
+/// Number of cells of a workgroup of the schedule.
+pub const CELLS_PER_BLOCK: u32 = 4 * LANES;
+/// Number of lists of a workgroup of the scan.
+pub const COUNTS_PER_BLOCK: u32 = 4 * LANES;
+/// Most pairs of a row that is ordered by counting.
+pub const SHORT_ROW: u32 = 512;
+/// Second boxes of a long row that a workgroup orders.
+pub const WINDOW: u32 = 32_768;
+/// Number of bits of an entry for the box. Above them are [`MOVED`] and the axes.
+pub const BOX_BITS: u32 = 28;
+/// The first of three bits of an entry, one for each axis. A bit is set if this is the box's lowest cell on the axis.
+pub const AXIS_BITS: u32 = 29;
+/// Bit of an entry and of [`Located::level`] in a search for changes: the box has changed.
+pub const MOVED: u32 = 1 << BOX_BITS;
+/// Bit of the second id of a pair of output: the boxes overlapped at the last update, and no longer do.
+pub const ENDED: u32 = 1 << 31;
+/// Bit of [`BoxChange::marked_id`]: at the last update the box overlapped nothing.
+pub const WAS_ABSENT: u32 = 1 << 31;
+/// Bit of [`Params::flags`]: filters are tested.
+pub const FILTERED: u32 = 1;
+/// Bit of [`Params::flags`]: the output is records (docs/PAIR_FORMAT.md), not plain pairs.
+pub const PACKED: u32 = 2;
+/// Bit of [`Params::flags`]: the output of `check_all` is one bit a pair.
+pub const BITS: u32 = 4;
+/// Bit of [`Params::flags`]: the boxes are floats.
+pub const RAW: u32 = 8;
+/// Bit of [`Params::flags`]: plain pairs are sorted, if they fit one buffer.
+pub const SORTED: u32 = 16;
+/// Bit of [`Params::flags`]: redundant tests and overlaps are counted.
+pub const COUNTED: u32 = 32;
+
+/// Declares structs of plain 32-bit numbers.
+macro_rules! shared_structs {
+    ($($(#[$about:meta])* $name:ident { $($field:ident: $type:ty),* })*) => {$(
+        $(#[$about])*
+        #[repr(C)]
+        #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+        #[allow(missing_docs, reason = "types.wgsl describes the fields")]
+        pub struct $name { $(pub $field: $type),* }
+    )*};
+}
+
+shared_structs! {
+    /// An [`Aabb`] in ordered integers, see [`ordered`].
+    DeviceBox { low: [i32; 3], high: [i32; 3] }
+    /// A box now and at the last update.
+    Motion { now: DeviceBox, before: DeviceBox }
+    /// A changed box. Its id has the bit [`WAS_ABSENT`].
+    BoxChange { marked_id: u32, now: DeviceBox }
+    /// A changed filter.
+    FilterChange { id: u32, filter: ProxyFilter }
+    /// Cells that a box touches at the finest resolution, and its level, with [`MOVED`], or [`NO_LEVEL`].
+    Located { low: [i32; 3], high: [i32; 3], level: u32 }
+    /// Cells of one size.
+    Level { dims: [u32; 3], shift: u32, first_cell: u32, unused: [u32; 3] }
+    /// Parameters of all kernels of a call.
+    Params {
+        origin: [f32; 3], scale: f32, clamp_low: [i32; 3], boxes: u32, clamp_high: [i32; 3], levels: u32,
+        cells: u32, small_cell: u32, columns: u32, flags: u32, split: u32,
+        entry_capacity: u32, slot_capacity: u32, small_capacity: u32, large_capacity: u32,
+        known: u32, box_changes: u32, filter_changes: u32, pair_capacity: u32,
+        most_tests: u32, unused: [u32; 2], level: [Level; MAX_LEVELS]
+    }
+    /// Range of the work items of one dispatch of the check kernels.
+    Chunk {
+        first_small: u32, small_items: u32, first_large: u32, large_items: u32,
+        word_capacity: u32, unused: u32, pairs_left: [u32; 2]
+    }
+    /// Entries of a cell by kind: until the scan counts, then the ends of both lists, then their starts.
+    Cell { residents: u32, visitors: u32 }
+    /// A small cell in the schedule.
+    #[derive(Eq, PartialOrd, Ord)]
+    Slot { start: u32, shape: u32, first_pair: u32 }
+    /// A work item: [`LANES`] consecutive pairs of the small cells of a block, or the rest.
+    #[derive(Eq, PartialOrd, Ord)]
+    SmallItem { slot: u32, slots: u32, first_pair: u32, pairs: u32 }
+    /// A work item: a segment of rows of a large cell against some segments of columns.
+    #[derive(Eq, PartialOrd, Ord)]
+    LargeItem { start: u32, boxes: u32, residents: u32, row: u32, column: u32, end_column: u32 }
+    /// Lengths of the lists that the map makes, even if they do not fit; valid boxes; tests in units of [`LANES`], and 1 if
+    /// their number exceeds 32 bits.
+    Counters {
+        entries: u32, slots: u32, small_items: u32, large_items: u32,
+        valid: u32, tests: u32, long_rows: u32, too_many_tests: u32
+    }
+    /// Counts of a check, even if its output does not fit. Each has a low and a high half. A test is redundant if the
+    /// entries alone decide it: another cell owns the pair, or, in a search for changes, neither box has changed. Overlaps
+    /// include pairs that filters forbid. Without [`COUNTED`] there are only the words, and without [`PACKED`] no pairs.
+    /// `sorted` is 1 if plain pairs are in order.
+    Totals { words: [u32; 2], pairs: [u32; 2], made: [u32; 2], redundant: [u32; 2], overlaps: [u32; 2],
+        sorted: u32, unused: u32 }
+}
+
+impl Chunk {
+    /// Returns true if there are no work items.
+    pub fn is_empty(&self) -> bool {
+        self.small_items == 0 && self.large_items == 0
+    }
+}
+
+impl DeviceBox {
+    /// A box that overlaps nothing: all of `low` lies above all of `high`, beyond the infinities.
+    pub const INVALID: Self = Self { low: [i32::MAX; 3], high: [i32::MIN; 3] };
+
+    /// Returns the box in ordered integers.
+    #[inline]
+    pub fn new(aabb: &Aabb) -> Self {
+        let valid = Self { low: aabb.min.map(ordered), high: aabb.max.map(ordered) };
+        if aabb.is_valid() { valid } else { Self::INVALID }
+    }
+}
+
+/// Returns an integer for a float, in the same order; both zeros become one. Devices may flush denormals and may assume
+/// that there are no infinities, but they compare integers exactly.
+#[inline]
+pub fn ordered(x: f32) -> i32 {
+    let bits = (x + 0.0).to_bits() as i32;
+    bits ^ (((bits >> 31) as u32) >> 1) as i32
+}
+
+/// Returns the number of two halves.
+pub fn wide([low, high]: [u32; 2]) -> u64 {
+    u64::from(high) << 32 | u64::from(low)
+}
+
+/// Returns the two halves of a number.
+pub fn halves(x: u64) -> [u32; 2] {
+    [x as u32, (x >> 32) as u32]
+}
+
+/// A filter is one `vec4<u32>` on the device.
+const _: () = assert!(size_of::<ProxyFilter>() == 16);

@@ -1,0 +1,42 @@
+//! A GPU for pbig: a [`GpuFinder`] is a [`pbig_core::PairDevice`] that finds pairs by PBIG's pipeline in WGSL, on any device
+//! that wgpu supports.
+//!
+//! ```no_run
+//! use pbig_core::{Aabb, Backend, Config, Finder};
+//! use pbig_gpu::GpuFinder;
+//!
+//! let config = Config { backend: Backend::Device, ..Config::DEFAULT };
+//! let mut finder = Finder::with_device(config, Box::new(GpuFinder::shared()));
+//! finder.find(&[Aabb::new([0.0; 3], [1.0; 3]); 2000])?;
+//! println!("{}", finder.report().plan);
+//! # Ok::<(), pbig_core::Error>(())
+//! ```
+//!
+//! Without an adapter, or if it fails, the CPU finishes the call, and [`pbig_core::Report::fallback`] says why. An app that has
+//! a wgpu device passes it on by [`GpuFinder::from_device`].
+
+// Labels each item in the documentation with the feature that it needs; on docs.rs only, as it takes nightly Rust.
+#![cfg_attr(docsrs, feature(doc_cfg))]
+
+/// Runs the programs in the README as tests.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;
+
+// Hidden modules are for tests and studies, and may change in any release.
+#[doc(hidden)]
+pub mod decode;
+#[cfg(feature = "wgpu")]
+mod gpu;
+#[doc(hidden)]
+pub mod layout;
+mod options;
+#[doc(hidden)]
+pub mod pbig;
+
+#[doc(hidden)]
+#[cfg(feature = "wgpu")]
+pub use gpu::study;
+#[cfg(feature = "wgpu")]
+pub use gpu::{GpuError, GpuFinder, GpuPlan, adapters, describe};
+pub use options::{CellRule, Coding, GpuOptions};
