@@ -17,7 +17,7 @@ fn pairs(boxes: &[Aabb], filters: &[ProxyFilter]) -> Result<Vec<Pair>, DeviceFai
 impl PairDevice for Thread {
     fn find_all(&mut self, all: &SearchRequest<'_>, found: &mut DeviceFound) -> Result<(), DeviceFailure> {
         let any = vec![ProxyFilter::ALL; all.boxes.len()];
-        found.valid = all.boxes.len() as u32;
+        found.valid = all.boxes.iter().filter(|one| one.is_valid()).count() as u32;
         found.pairs = pairs(all.boxes, all.filters.unwrap_or(&any))?;
         Ok(())
     }
@@ -32,7 +32,7 @@ impl PairDevice for Thread {
             (boxes[was.id as usize], filters[was.id as usize]) = (was.aabb, was.filter);
         }
         let (before, after) = (pairs(&boxes, &filters)?, pairs(now.boxes, now.filters)?);
-        found.valid = now.boxes.len() as u32;
+        found.valid = now.boxes.iter().filter(|one| one.is_valid()).count() as u32;
         found.pairs = after.iter().filter(|pair| !before.contains(pair)).copied().collect();
         found.ended = before.iter().filter(|pair| !after.contains(pair)).copied().collect();
         Ok(())

@@ -190,7 +190,7 @@ run_pictures() {
 # Optimized a little, with overflow checks and debug assertions. The thread sanitizer has to instrument the standard library:
 # otherwise it does not see locks, and reports each exchange between rayon's threads as a race.
 run_sanitize() {
-    local sanitizer=$1 host std=''
+    local sanitizer=${1:-address} host std=''
     host=$(rustc -vV | sed -n 's/^host: //p')
     if [ "$sanitizer" = thread ]; then
         [ -d "$(rustc --print sysroot)/lib/rustlib/src" ] ||

@@ -68,6 +68,7 @@ step_unit() {
     step cargo test --release --workspace --exclude pbig-tests $(without_harness) --no-fail-fast
     # Once more with overflow checks and debug assertions, where there is unsafe code and index arithmetic.
     step cargo test -p pbig-core --features serde --no-fail-fast
+    step cargo test -p pbig-gpu --no-default-features --lib --no-fail-fast
 }
 
 step_suite_cpu() {

@@ -19,6 +19,9 @@ const RATIO_OF_GRIDS: f64 = 30.0;
 /// long as sorting half of the boxes.
 const MORE_PER_BOX: u64 = 64;
 
+/// The same in a world that may be swept, of this number of boxes: up to 200 tests a box, which lie in order.
+const SWEPT: (usize, u64) = (4000, 200);
+
 fn search(boxes: &[pbig_core::Aabb], engine: Option<Engine>) -> f64 {
     let mut finder = Finder::new(Config { engine, ..Config::DEFAULT });
     let found = finder.find(boxes).expect("few pairs");
@@ -85,12 +88,12 @@ fn run(history: &History, n: usize) -> (f64, u64) {
 #[test]
 fn no_history_takes_work_without_bound() {
     for (name, history) in histories() {
-        for n in SIZES {
+        for (n, most) in [SWEPT, (SIZES[0], MORE_PER_BOX), (SIZES[1], MORE_PER_BOX)] {
             let (ratio, more) = run(&history, n);
             let more = more / n as u64;
             println!("{name}, {n} boxes: {ratio:.2}, {more} more a box");
             assert!(ratio <= WORK_LIMIT as f64, "{name}, {n} boxes: {ratio}");
-            assert!(more <= MORE_PER_BOX, "{name}, {n} boxes: {more} a box");
+            assert!(more <= most, "{name}, {n} boxes: {more} a box");
         }
     }
 }

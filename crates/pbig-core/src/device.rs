@@ -47,7 +47,7 @@ pub trait PairDevice: fmt::Debug + Send + Sync {
     /// Returns a name for reports. None while the device is not open or does not work.
     fn name(&self) -> Option<&str>;
 
-    /// Returns true if the device is a program on the CPU. [`crate::Backend::Auto`] does not use it.
+    /// Returns true if the device is known to be a program on the CPU. [`crate::Backend::Auto`] does not use it then.
     fn is_software(&self) -> bool;
 
     /// Returns a device for a clone of its owner. It may share the processor, but not the boxes of the last update.
@@ -116,14 +116,15 @@ pub struct DeviceFound {
     pub plan: Option<String>,
     /// Tests made, as far as the device counts them.
     pub checks: Checks,
-    /// Times and counts of the device. The core fills in the name.
+    /// Times and counts of the device. The core fills in the name. Kernels whose names begin with `check` count as the stage
+    /// `check`, the others as `map`.
     pub report: DeviceReport,
 }
 
 /// Reason why a device has no answer.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum DeviceFailure {
-    /// There are more pairs than [`SearchRequest::max_pairs`]. The call ends in [`crate::Error::TooManyPairs`].
+    /// There are more pairs than [`SearchRequest::max_pairs`], or more changes than [`ChangeRequest::max_pairs`] allows. The call ends in [`crate::Error::TooManyPairs`].
     TooManyPairs,
     /// The device could not do the work, for this reason. The CPU does it.
     Failed(String),

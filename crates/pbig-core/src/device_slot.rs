@@ -12,14 +12,15 @@ const PIECE: usize = 1 << 16;
 #[derive(Clone, Debug, Default)]
 pub(crate) struct DeviceSlot {
     device: Option<Box<dyn PairDevice>>,
+    /// True if the device has done the last update to its end. It knows the boxes then.
+    is_current: bool,
     has_warned: bool,
 }
 
 impl DeviceSlot {
     /// Makes a slot with a device.
-    pub(crate) fn new(mut device: Box<dyn PairDevice>) -> Self {
-        device.forget();
-        Self { device: Some(device), has_warned: false }
+    pub(crate) fn new(device: Box<dyn PairDevice>) -> Self {
+        Self { device: Some(device), is_current: false, has_warned: false }
     }
 
     /// Returns true if there is a device.
@@ -32,11 +33,17 @@ impl DeviceSlot {
         self.device.as_ref()?.name()
     }
 
-    /// Tells the device that it does not know the boxes of the next call's last update.
-    pub(crate) fn forget(&mut self) {
-        if let Some(device) = &mut self.device {
+    /// Begins an update on the device. It forgets what it knows, unless it has done the last update to its end.
+    pub(crate) fn begin_update(&mut self) {
+        let is_current = std::mem::take(&mut self.is_current);
+        if let Some(device) = self.device.as_mut().filter(|_| !is_current) {
             device.forget();
         }
+    }
+
+    /// Ends an update, which the device has done or the CPU.
+    pub(crate) fn end_update(&mut self, is_by_device: bool) {
+        self.is_current = is_by_device;
     }
 
     /// Returns true if a call with this number of changed boxes should run on the device. Otherwise the report gets the reason.
@@ -68,8 +75,8 @@ impl DeviceSlot {
         report.fallback = Some(why);
     }
 
-    /// Runs a call of so many boxes on the device, with the memory of `pairs`. Returns none if the device could not do it; the
-    /// report says why.
+    /// Runs a call about this number of boxes on the device, with the memory of `pairs`. Returns none if the device could not do
+    /// it; the report says why.
     pub(crate) fn call(
         &mut self,
         boxes: usize,
@@ -111,14 +118,17 @@ fn note_success(found: &DeviceFound, clock: &mut Clock, report: &mut Report) {
     (report.checks, report.device, report.fallback) = (found.checks, Some(found.report.clone()), None);
 }
 
-/// Returns an error if an answer about so many boxes names others.
+/// Returns an error if an answer about this number of boxes has not the form that a device promises.
 fn check(found: &DeviceFound, boxes: usize) -> Result<(), DeviceFailure> {
     let are_pairs = are_pairs(&found.pairs, boxes) && are_pairs(&found.ended, boxes);
-    let are_ids = found.restarted.is_sorted() && found.restarted.iter().all(|id| (*id as usize) < boxes);
+    let are_ids = found.restarted.is_sorted_by(|one, next| one < next)
+        && found.restarted.iter().all(|id| (*id as usize) < boxes);
     if are_pairs && are_ids && found.valid as usize <= boxes {
         return Ok(());
     }
-    Err(DeviceFailure::Failed(format!("the device's answer names boxes beyond the {boxes} that there are")))
+    let form =
+        format!("pairs a < b < {boxes}, ascending ids of restarted boxes, and at most {boxes} valid boxes");
+    Err(DeviceFailure::Failed(format!("the device's answer is malformed: {form} were expected")))
 }
 
 /// Returns true if every pair is `a < b < boxes`.

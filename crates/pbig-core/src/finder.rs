@@ -121,6 +121,9 @@ impl Finder {
         let call = |device: &mut dyn PairDevice, found: &mut _| device.find_all(&request, found);
         let found = self.device.call(boxes.len(), pairs, config, report, call)?;
         let Some(found) = found else { return Ok(false) };
+        if found.pairs.len() as u64 > max_pairs {
+            return Err(Error::TooManyPairs { limit: max_pairs });
+        }
         self.report.invalid = boxes.len() as u64 - u64::from(found.valid);
         if grouping.is_none() || found.pairs.is_sorted_by(|one, next| one < next) {
             self.pairs = found.pairs;

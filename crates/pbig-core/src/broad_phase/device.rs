@@ -55,6 +55,7 @@ impl BroadPhase {
 
     /// Returns the answer of the device; none if it could not do the work.
     fn ask_device(&mut self) -> Result<Option<DeviceFound>, Error> {
+        self.device.begin_update();
         let changed = self.changed_boxes();
         let (World { boxes, filters, .. }, config) = (&self.world, &self.config);
         let (kept, max_pairs) = (self.kept.len() as u64, config.limits.pairs());

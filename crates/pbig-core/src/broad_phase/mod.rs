@@ -160,7 +160,7 @@ impl BroadPhase {
 
     /// Removes all boxes; their pairs end without an event.
     pub fn clear(&mut self) {
-        self.device.forget();
+        self.device.end_update(false);
         let device = std::mem::take(&mut self.device);
         *self = Self { config: self.config, device, ..Self::default() };
         self.world.keep_old = self.old_to_keep();

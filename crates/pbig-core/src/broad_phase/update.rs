@@ -34,7 +34,6 @@ impl BroadPhase {
         if self.find_on_device()? {
             return self.apply_events();
         }
-        self.device.forget();
         let no_device = self.report.plan.no_device;
         let found = self.find_on_cpu();
         self.report.plan.no_device = no_device;
@@ -172,7 +171,6 @@ impl BroadPhase {
         self.store.held = Held::Nowhere;
         self.sweep.expire();
         self.report.pairs = self.kept.len() as u64;
-        self.device.forget();
     }
 
     /// Hands the events over, and forgets the changes.
@@ -180,6 +178,7 @@ impl BroadPhase {
         std::mem::swap(&mut self.events.added, &mut self.comparison.added);
         std::mem::swap(&mut self.events.removed, &mut self.comparison.removed);
         self.world.forget_changes();
+        self.device.end_update(self.report.device.is_some());
         self.world.keep_old = self.old_to_keep();
     }
 

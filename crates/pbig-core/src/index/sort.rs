@@ -59,7 +59,7 @@ pub(super) fn sort(entries: &mut [Entry]) -> Vec<Range<usize>> {
     classes
 }
 
-/// Halves a list again and again at the median of its longest axis. Medians are ranks, so that a box far away costs the others
+/// Halves a list again and again at the median of its best axis. Medians are ranks, so that a box far away costs the others
 /// nothing. The cuts lie between whole nodes of the level in question.
 fn sort_by_place(mut entries: &mut [Entry], all: &[f64; 3]) {
     while entries.len() > LANES {

@@ -4,7 +4,8 @@ mod double;
 
 use double::{Double, Fault};
 use pbig_core::{
-    Aabb, Backend, BroadPhase, Config, Error, Finder, Limits, NoDevice, Order, Pair, ProxyFilter, oracle,
+    Aabb, Backend, BroadPhase, Config, Engine, Error, Finder, Limits, NoDevice, Order, Pair, ProxyFilter,
+    oracle,
 };
 use rand::rngs::StdRng;
 use rand::{RngExt, SeedableRng};
@@ -82,6 +83,23 @@ fn updates_equal_those_of_the_cpu_whatever_fails() {
             _ => 35..=40,
         };
         assert!(wanted.contains(&done_by_device), "{fault:?}: {done_by_device} updates");
+    }
+}
+
+/// A structure that is not brought up to date by a device's update would lose pairs in the next one on the CPU.
+#[test]
+fn device_and_cpu_take_turns_with_each_engine() {
+    for engine in [Engine::Sweep, Engine::Edit, Engine::Tree, Engine::Rebuild] {
+        let config = Config { engine: Some(engine), ..ON_DEVICE };
+        let mut ours = BroadPhase::with_device(config, Double::new(Fault::Nothing)).expect("a margin");
+        let (mut cpu, mut rng) = (on_cpu(), StdRng::seed_from_u64(3));
+        for update in 0..60 {
+            let backend = if update % 5 < 2 { Backend::Device } else { Backend::Cpu };
+            ours.set_backend(backend, Limits::DEFAULT);
+            disturb(&mut [&mut ours, &mut cpu], &mut rng);
+            assert_eq!(ours.update(), cpu.update(), "{engine:?}, update {update}");
+            assert_eq!(ours.report().device.is_some(), backend == Backend::Device);
+        }
     }
 }
 
@@ -177,10 +195,12 @@ fn too_many_pairs_are_an_error_and_the_update_can_be_repeated() {
     assert_eq!(ours.update(), Err(Error::TooManyPairs { limit: 1 }));
     ours.set_backend(Backend::Device, Limits::DEFAULT);
     assert_eq!(ours.update(), cpu.update());
-    let mut finder = Finder::with_device(Config { limits, ..ON_DEVICE }, Double::new(Fault::Nothing));
-    let identical = [Aabb::new([0.0; 3], [1.0; 3]); 3];
-    assert_eq!(finder.find(&identical), Err(Error::TooManyPairs { limit: 1 }));
-    assert_eq!(finder.pairs(), &[] as &[Pair]);
+    for fault in [Fault::Nothing, Fault::IgnoresLimits] {
+        let mut finder = Finder::with_device(Config { limits, ..ON_DEVICE }, Double::new(fault));
+        let identical = [Aabb::new([0.0; 3], [1.0; 3]); 3];
+        assert_eq!(finder.find(&identical), Err(Error::TooManyPairs { limit: 1 }));
+        assert_eq!(finder.pairs(), &[] as &[Pair]);
+    }
 }
 
 #[test]

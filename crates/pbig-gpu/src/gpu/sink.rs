@@ -46,7 +46,7 @@ impl Sink {
         if self.pairs().saturating_add(more) > limit { Err(Failure::TooManyPairs) } else { Ok(()) }
     }
 
-    /// Adds the counts of a chunk with so many words of output. Only a device that was told to counts tests.
+    /// Adds the counts of a chunk with this number of words of output. A device counts tests only if it was told to.
     pub(super) fn count(&mut self, params: &Params, totals: &Totals, words: u64) {
         self.words += words;
         let checks = &mut self.found.checks;
