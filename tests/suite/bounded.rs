@@ -1,7 +1,7 @@
 //! The work of a call is bounded for every shape, motion and history of boxes: counts, never times.
 
 use pbig_core::{BroadPhase, Config, Engine, Finder, ProxyFilter, WORK_LIMIT, oracle};
-use pbig_harness::hard::{History, histories, ratio, shapes};
+use pbig_harness::hard::{History, Part, Recipe, histories, ratio, shapes};
 
 /// Numbers of boxes, too many for a sweep: a work that is not bounded grows faster than they do.
 const SIZES: [usize; 2] = [5000, 20_000];
@@ -49,6 +49,21 @@ fn a_tree_alone_takes_no_work_without_bound() {
         assert!(small.max(large) <= WORK_LIMIT as f64, "{name}: {small}, {large}");
         assert!(large <= MAX_GROWTH_OF_TREES * small, "{name}: {small}, {large}");
     }
+}
+
+/// They are in a class of their own, and as long as the world on one axis.
+#[test]
+fn two_half_infinite_boxes_leave_a_tree_as_it_is() {
+    let flat = Part { width: [1000.0, 1000.0, 1.0], growth: 0.5, ..Part::CUBES };
+    let mut boxes = Recipe(vec![flat]).boxes(SIZES[1], 1);
+    let without = search(&boxes, Some(Engine::Tree));
+    for axis in 0..2 {
+        let mut aabb = pbig_core::Aabb::from_center([-50.0; 3], [0.5; 3]);
+        (aabb.min[axis], aabb.max[axis]) = (0.0, f32::INFINITY);
+        boxes.push(aabb);
+    }
+    let with = search(&boxes, Some(Engine::Tree));
+    assert!(with <= 1.1 * without, "{without}, {with}");
 }
 
 #[test]

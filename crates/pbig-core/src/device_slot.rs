@@ -4,6 +4,7 @@ use crate::device::{DeviceFailure, DeviceFound, PairDevice};
 use crate::policy::{AvailableDevice, Choice, choose_backend};
 use crate::report::{Clock, Report, stage};
 use crate::{Algorithm, Config, Error, Pair, Plan, parallel};
+use std::time::Duration;
 
 /// Pairs of an answer that a thread checks at a time.
 const PIECE: usize = 1 << 16;
@@ -110,7 +111,8 @@ fn note_success(found: &DeviceFound, clock: &mut Clock, report: &mut Report) {
     // The device's own times for its map; the rest of the call is check, transfer and decoding.
     let kernels = found.report.kernels.iter().filter(|(name, _)| !name.starts_with("check"));
     let time = clock.lap();
-    let map = kernels.map(|(_, time)| *time).sum::<std::time::Duration>().min(time);
+    let add = |sum: Duration, (_, more): &(_, Duration)| sum.saturating_add(*more);
+    let map = kernels.fold(Duration::ZERO, add).min(time);
     report.stages.map += map;
     report.stages.check += time - map;
     let algorithm = if found.valid < 2 { Algorithm::Nothing } else { Algorithm::Device };

@@ -69,6 +69,8 @@ pub struct BroadPhase {
     store: Store,
     /// Work of the last search of all boxes.
     rebuild_work: u64,
+    /// Pairs that began or ended in the last update.
+    last_events: usize,
     given_up: policy::GivenUp,
     sweep: Sweep,
     edit: Edit,

@@ -67,6 +67,7 @@ impl BroadPhase {
             knows_old: self.world.knows_old(),
             held: self.store.held,
             spilled: self.store.grid.spilled(),
+            events: self.last_events,
         };
         policy::choose_engine(&counts, self.config.engine)
     }
@@ -177,6 +178,7 @@ impl BroadPhase {
     fn finish(&mut self) {
         std::mem::swap(&mut self.events.added, &mut self.comparison.added);
         std::mem::swap(&mut self.events.removed, &mut self.comparison.removed);
+        self.last_events = self.events.added.len() + self.events.removed.len();
         self.world.forget_changes();
         self.device.end_update(self.report.device.is_some());
         self.world.keep_old = self.old_to_keep();

@@ -49,7 +49,7 @@ pub(super) fn sort(entries: &mut [Entry]) -> Vec<Range<usize>> {
     if entries.windows(2).any(|two| two[0].class() != two[1].class()) {
         entries.sort_unstable_by_key(|entry| entry.class());
     }
-    let all = extents_within_spread(entries);
+    let all: Vec<Measure> = entries.chunk_by(|a, b| a.class() == b.class()).map(Measure::of).collect();
     let (mut classes, mut first) = (Vec::new(), 0);
     for class in entries.chunk_by_mut(|a, b| a.class() == b.class()) {
         sort_by_place(class, &all);
@@ -61,7 +61,7 @@ pub(super) fn sort(entries: &mut [Entry]) -> Vec<Range<usize>> {
 
 /// Halves a list again and again at the median of its best axis. Medians are ranks, so that a box far away costs the others
 /// nothing. The cuts lie between whole nodes of the level in question.
-fn sort_by_place(mut entries: &mut [Entry], all: &[f64; 3]) {
+fn sort_by_place(mut entries: &mut [Entry], all: &[Measure]) {
     while entries.len() > LANES {
         let axis = best_axis(entries, all);
         let middle = cut(entries.len());
@@ -86,27 +86,32 @@ fn cut(len: usize) -> usize {
 }
 
 /// Returns the axis along which the boxes lie apart most: the spread of their centers is longest, compared with their own
-/// extents and the mean extents of `all` boxes. (Compared with their own alone, thin tiles would be cut into slabs as wide as
-/// the world, and slabs of tiles that stand in two directions all meet.)
-fn best_axis(entries: &[Entry], all: &[f64; 3]) -> usize {
-    let Measure { spread, extents } = Measure::of(entries);
-    let extents: [f64; 3] = std::array::from_fn(|k| extents[k] + all[k]);
+/// extents and the mean extents of the boxes of `all` classes. (Compared with their own alone, thin tiles would be cut into slabs
+/// as wide as the world, and slabs of tiles that stand in two directions all meet.)
+fn best_axis(entries: &[Entry], all: &[Measure]) -> usize {
+    let Measure { spread, extents, .. } = Measure::of(entries);
+    let extents: [f64; 3] = std::array::from_fn(|k| extents[k] + mean_within(all, k, spread[k]));
     let compare = |a: usize, b: usize| {
         (spread[a] * extents[b]).total_cmp(&(spread[b] * extents[a])).then(spread[a].total_cmp(&spread[b]))
     };
     (0..3).max_by(|a, b| compare(*a, *b)).unwrap_or(0)
 }
 
-/// Returns the mean extents of all boxes; one that is longer than the spread of all meets all, and counts as that long.
-fn extents_within_spread(entries: &[Entry]) -> [f64; 3] {
-    let Measure { spread, .. } = Measure::of(entries);
-    let within =
-        |k: usize| entries.iter().map(|entry| with_exponent(entry.exponents[k]).min(spread[k])).sum::<f64>();
-    std::array::from_fn(|k| within(k) / entries.len().max(1) as f64)
+/// Returns the mean extent of all boxes on an axis. A box that is longer than `spread` meets both halves of a cut, and counts as
+/// that long: so a few infinite boxes do not keep others from being cut.
+fn mean_within(all: &[Measure], axis: usize, spread: f64) -> f64 {
+    let (mut sum, mut boxes) = (0.0, 0.0);
+    for class in all {
+        sum += class.boxes * class.extents[axis].min(spread);
+        boxes += class.boxes;
+    }
+    sum / boxes
 }
 
-/// The spread of some boxes' centers, and their mean extents, by axis.
+/// Some boxes: their number, the spread of their centers and their mean extents, by axis.
+#[derive(Clone, Copy, Debug)]
 struct Measure {
+    boxes: f64,
     spread: [f64; 3],
     extents: [f64; 3],
 }
@@ -121,7 +126,8 @@ impl Measure {
                 extents[k] += with_exponent(entry.exponents[k]);
             }
         }
+        let boxes = entries.len().max(1) as f64;
         let spread = std::array::from_fn(|k| (f64::from(high[k]) - f64::from(low[k])).max(0.0));
-        Self { spread, extents: extents.map(|sum: f64| sum / entries.len().max(1) as f64) }
+        Self { boxes, spread, extents: extents.map(|sum: f64| sum / boxes) }
     }
 }

@@ -13,6 +13,9 @@ pub(crate) const SWEEP_UP_TO_BOXES: usize = 4096;
 /// Maximum number of tests for each box of the world in a sweep: beyond, a grid finds the pairs sooner.
 pub(crate) const SWEEP_UP_TO_TESTS_PER_BOX: usize = 200;
 
+/// Tests that take as long as one pair that begins or ends: a sweep keeps each on its own, a rebuild whole rows.
+const TESTS_OF_EVENT: usize = 256;
+
 /// Maximum share of changed boxes for an edit, as one in this number. Measured: an edit takes as long as a rebuild at 7 to 10% of
 /// 100,000 boxes, and at 4 to 5% of a million.
 pub(crate) const EDIT_UP_TO_ONE_IN: usize = 20;
@@ -50,6 +53,8 @@ pub(crate) struct Counts {
     pub(crate) held: Held,
     /// Boxes out of the grid's order.
     pub(crate) spilled: usize,
+    /// Pairs that began or ended in the last update.
+    pub(crate) events: usize,
 }
 
 impl Counts {
@@ -61,7 +66,8 @@ impl Counts {
     /// swept, because a grid would look at all ids. Sweep and tree do not take turns, because each looks at all ids when it begins.
     fn may_sweep(&self, most: usize) -> bool {
         // Each changed box meets all, or each box half of the others.
-        let tests_per_box = self.changed.min(self.boxes / 2);
+        let tests = self.changed.min(self.boxes / 2) * self.boxes + TESTS_OF_EVENT * self.events;
+        let tests_per_box = tests / self.boxes.max(1);
         let are_left = self.is_sparse() && self.held != Held::InTree;
         self.boxes <= most && tests_per_box <= SWEEP_UP_TO_TESTS_PER_BOX && (self.ids <= most || are_left)
     }
@@ -167,8 +173,15 @@ pub(crate) fn old_states_to_keep(boxes: usize, forced: Option<Engine>) -> usize 
 mod tests {
     use super::*;
 
-    const WORLD: Counts =
-        Counts { boxes: 10_000, ids: 10_000, changed: 100, knows_old: true, held: Held::InGrid, spilled: 0 };
+    const WORLD: Counts = Counts {
+        boxes: 10_000,
+        ids: 10_000,
+        changed: 100,
+        knows_old: true,
+        held: Held::InGrid,
+        spilled: 0,
+        events: 0,
+    };
 
     #[test]
     fn few_changes_are_edited_and_many_rebuild_the_grid() {
@@ -213,6 +226,8 @@ mod tests {
         let small = Counts { boxes: 1000, ids: 1000, changed: 200, held: Held::Nowhere, ..WORLD };
         assert_eq!(choose_engine(&small, None), Engine::Sweep);
         assert_eq!(choose_engine(&Counts { changed: 201, ..small }, None), Engine::Rebuild);
+        assert_eq!(choose_engine(&Counts { changed: 100, events: 392, ..small }, None), Engine::Sweep);
+        assert_eq!(choose_engine(&Counts { changed: 100, events: 400, ..small }, None), Engine::Rebuild);
         assert_eq!(
             choose_engine(&Counts { boxes: 401, ids: 401, changed: 401, ..small }, None),
             Engine::Sweep
