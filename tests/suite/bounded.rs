@@ -9,7 +9,7 @@ const SIZES: [usize; 2] = [5000, 20_000];
 /// Growth of the ratio from the first size to the second, at most. Boxes that cross each other in three directions double it.
 const MAX_GROWTH: f64 = 2.0;
 
-/// The same for trees. Needles between needles exceed it if their part is cut by their own extents alone.
+/// Maximum growth of the ratio in a tree. Needles between needles exceed it if their part is cut by their own extents alone.
 const MAX_GROWTH_OF_TREES: f64 = 1.25;
 
 /// The ratio up to which a grid is searched: 400 tests for each box of 20,000. Below, it may grow.
@@ -19,7 +19,7 @@ const RATIO_OF_GRIDS: f64 = 30.0;
 /// long as sorting half of the boxes.
 const MORE_PER_BOX: u64 = 64;
 
-/// The same in a world that may be swept, of this number of boxes: up to 200 tests a box, which lie in order.
+/// Number of boxes in a world that may be swept, and its work besides: up to 200 tests a box, which lie in order.
 const SWEPT: (usize, u64) = (4000, 200);
 
 fn search(boxes: &[pbig_core::Aabb], engine: Option<Engine>) -> f64 {

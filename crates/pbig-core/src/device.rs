@@ -105,9 +105,9 @@ pub struct ChangedBox {
 pub struct DeviceFound {
     /// The pairs; of an update, the added ones.
     pub pairs: Vec<Pair>,
-    /// Of an update: the pairs that have ended.
+    /// Pairs that an update has ended.
     pub ended: Vec<Pair>,
-    /// Of an update: ids of changed boxes that the device treats as absent at the last update, ascending. All their pairs
+    /// Ids of changed boxes that the device treats as absent at the last update, ascending. All their pairs
     /// are in `pairs`, and none is in `ended`: the core finds those that have ended.
     pub restarted: Vec<u32>,
     /// Number of valid boxes; of an update, of boxes that are valid now or were at the last update.
@@ -124,7 +124,8 @@ pub struct DeviceFound {
 /// Reason why a device has no answer.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum DeviceFailure {
-    /// There are more pairs than [`SearchRequest::max_pairs`], or more changes than [`ChangeRequest::max_pairs`] allows. The call ends in [`crate::Error::TooManyPairs`].
+    /// There are more pairs than [`SearchRequest::max_pairs`], or more changes than [`ChangeRequest::max_pairs`] allows. The call
+    /// ends in [`crate::Error::TooManyPairs`].
     TooManyPairs,
     /// The device could not do the work, for this reason. The CPU does it.
     Failed(String),

@@ -84,7 +84,7 @@ pub use plan::{Algorithm, Plan};
 pub use policy::NoDevice;
 pub use report::{Checks, DeviceReport, Report, StageTimes, WORK_LIMIT};
 
-/// What the other crates of pbig use of this one. It may change in any release.
+/// Items for the other crates of pbig. They may change in any release.
 #[doc(hidden)]
 pub mod internal {
     pub use crate::parallel::{SharedSlice, map, run, threads_for};

@@ -5,7 +5,7 @@ use pbig_core::{
 };
 use std::time::Duration;
 
-/// What a device does wrong.
+/// A fault of a device.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Fault {
     Nothing,
