@@ -14,6 +14,12 @@ const SPARE: u32 = 1 << 31;
 /// Number of pairs between a prefetch of rows and their use.
 const AHEAD: usize = 8;
 
+/// Minimum number of changes of one row that are merged into it: each alone moves what lies behind it.
+const MERGE_FROM: usize = 8;
+
+/// Minimum number of pairs that are sorted by `b` for the rows of `b`.
+const TURN_FROM: usize = 64;
+
 /// Sorted rows of ids, by id. Spare places behind a row are marked as its own.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Rows {
@@ -29,7 +35,7 @@ impl Rows {
     fn insert(&mut self, id: u32, other: u32) {
         let span = self.spans[id as usize];
         let has_room = self.pool.get(span.range().end) == Some(&(SPARE | id));
-        let span = if has_room { span } else { self.move_to_end(id, span) };
+        let span = if has_room { span } else { self.move_to_end(id, span, 1) };
         let row = &mut self.pool[span.start as usize..][..span.len as usize + 1];
         let place = row[..span.len as usize].partition_point(|&before| before < other);
         row.copy_within(place..span.len as usize, place + 1);
@@ -37,9 +43,9 @@ impl Rows {
         self.spans[id as usize] = Span { len: span.len + 1, ..span };
     }
 
-    fn move_to_end(&mut self, id: u32, span: Span) -> Span {
+    fn move_to_end(&mut self, id: u32, span: Span, more: u32) -> Span {
         let start = self.pool.len() as u32;
-        let room = (span.len + 1).next_power_of_two().max(MIN_ROOM);
+        let room = (span.len + more).next_power_of_two().max(MIN_ROOM);
         self.pool.extend_from_within(span.range());
         self.pool.resize((start + room) as usize, SPARE | id);
         Span { start, len: span.len }
@@ -52,6 +58,83 @@ impl Rows {
             row.copy_within(place + 1.., place);
             row[row.len() - 1] = SPARE | id;
             self.spans[id as usize] = Span { len: span.len - 1, ..span };
+        }
+    }
+
+    /// Adds pairs, sorted, to the rows of their `a`.
+    fn insert_all(&mut self, pairs: &[Pair]) {
+        self.for_each_run(pairs, Self::insert, Self::insert_run);
+    }
+
+    /// Removes pairs, sorted, from the rows of their `a`.
+    fn remove_all(&mut self, pairs: &[Pair]) {
+        self.for_each_run(pairs, Self::remove, Self::remove_run);
+    }
+
+    fn for_each_run(
+        &mut self,
+        pairs: &[Pair],
+        change: impl Fn(&mut Self, u32, u32),
+        merge: impl Fn(&mut Self, &[Pair]),
+    ) {
+        let mut rest = pairs;
+        for run in pairs.chunk_by(|one, next| one.a == next.a) {
+            if run.len() >= MERGE_FROM {
+                merge(self, run);
+            } else {
+                for (i, pair) in run.iter().enumerate() {
+                    self.prefetch(&rest[i..]);
+                    change(self, pair.a, pair.b);
+                }
+            }
+            rest = &rest[run.len()..];
+        }
+    }
+
+    /// Merges new pairs of one row into it, from its end.
+    fn insert_run(&mut self, run: &[Pair]) {
+        let (id, more) = (run[0].a, run.len());
+        let span = self.spans[id as usize];
+        let behind = self.pool.get(span.range().end..span.range().end + more);
+        let has_room = behind.is_some_and(|room| room.iter().all(|place| *place == SPARE | id));
+        let span = if has_room { span } else { self.move_to_end(id, span, more as u32) };
+        let (mut old, mut new) = (span.len as usize, more);
+        let row = &mut self.pool[span.start as usize..][..old + more];
+        for to in (0..row.len()).rev() {
+            if new > 0 && (old == 0 || row[old - 1] < run[new - 1].b) {
+                new -= 1;
+                row[to] = run[new].b;
+            } else {
+                old -= 1;
+                row[to] = row[old];
+            }
+        }
+        self.spans[id as usize] = Span { len: row.len() as u32, ..span };
+    }
+
+    /// Takes pairs out of one row.
+    fn remove_run(&mut self, run: &[Pair]) {
+        let (id, mut gone) = (run[0].a, run.iter().map(|pair| pair.b).peekable());
+        let span = self.spans[id as usize];
+        let row = &mut self.pool[span.range()];
+        let mut len = 0;
+        for i in 0..row.len() {
+            let other = row[i];
+            while gone.next_if(|gone| *gone < other).is_some() {}
+            row[len] = other;
+            len += usize::from(gone.next_if_eq(&other).is_none());
+        }
+        row[len..].fill(SPARE | id);
+        self.spans[id as usize] = Span { len: len as u32, ..span };
+    }
+
+    /// Prefetches the rows of pairs ahead of the first.
+    fn prefetch(&self, pairs: &[Pair]) {
+        if let Some(pair) = pairs.get(2 * AHEAD) {
+            prefetch(self.spans.as_ptr().wrapping_add(pair.a as usize));
+        }
+        if let Some(span) = pairs.get(AHEAD).and_then(|pair| self.spans.get(pair.a as usize)) {
+            prefetch(self.pool.as_ptr().wrapping_add(span.start as usize));
         }
     }
 
@@ -82,6 +165,8 @@ pub(crate) struct Kept {
     len: usize,
     /// Buffers of the next comparison.
     pub(super) next: Rows,
+    /// Changed pairs, `b` first.
+    turned: Vec<Pair>,
 }
 
 impl Kept {
@@ -130,20 +215,9 @@ impl Kept {
     /// Yields `pairs`, each with whether it exists.
     pub(crate) fn look_up(&self, pairs: &[Pair]) -> impl Iterator<Item = (Pair, bool)> {
         pairs.iter().enumerate().map(|(i, pair)| {
-            self.prefetch(&pairs[i..]);
+            self.forward.prefetch(&pairs[i..]);
             (*pair, self.contains(*pair))
         })
-    }
-
-    /// Prefetches the rows of pairs ahead of the first.
-    fn prefetch(&self, pairs: &[Pair]) {
-        let spans = &self.forward.spans;
-        if let Some(pair) = pairs.get(2 * AHEAD) {
-            prefetch(spans.as_ptr().wrapping_add(pair.a as usize));
-        }
-        if let Some(span) = pairs.get(AHEAD).and_then(|pair| spans.get(pair.a as usize)) {
-            prefetch(self.forward.pool.as_ptr().wrapping_add(span.start as usize));
-        }
     }
 
     fn reversed(&self) -> Rows {
@@ -164,8 +238,8 @@ impl Kept {
 
     /// Inserts added pairs into the rows, and takes removed pairs out.
     pub(crate) fn apply(&mut self, added: &[Pair], removed: &[Pair]) {
-        self.for_each(removed, |rows, id, other| rows.remove(id, other));
-        self.for_each(added, |rows, id, other| rows.insert(id, other));
+        self.change(removed, Rows::remove_all);
+        self.change(added, Rows::insert_all);
         self.count(added, removed);
         self.forward.compact(self.len);
         if let Some(rows) = self.backward.get_mut() {
@@ -173,13 +247,21 @@ impl Kept {
         }
     }
 
-    fn for_each(&mut self, pairs: &[Pair], change: impl Fn(&mut Rows, u32, u32)) {
-        for (i, pair) in pairs.iter().enumerate() {
-            self.prefetch(&pairs[i..]);
-            change(&mut self.forward, pair.a, pair.b);
-            if let Some(rows) = self.backward.get_mut() {
-                change(rows, pair.b, pair.a);
+    /// Changes the rows of `a`, and of `b` if there are any.
+    fn change(&mut self, pairs: &[Pair], change: fn(&mut Rows, &[Pair])) {
+        if !pairs.is_sorted() {
+            let mut sorted = pairs.to_vec();
+            sorted.sort_unstable();
+            return self.change(&sorted, change);
+        }
+        change(&mut self.forward, pairs);
+        if let Some(rows) = self.backward.get_mut() {
+            self.turned.clear();
+            self.turned.extend(pairs.iter().map(|pair| Pair { a: pair.b, b: pair.a }));
+            if pairs.len() >= TURN_FROM {
+                self.turned.sort_unstable();
             }
+            change(rows, &self.turned);
         }
     }
 
@@ -221,6 +303,7 @@ impl Kept {
     /// Gives back memory that the kept pairs do not need.
     pub(crate) fn shrink(&mut self) {
         self.next = Rows::default();
+        self.turned = Vec::new();
         self.backward.take();
         self.forward.pool.shrink_to_fit();
         self.forward.spans.shrink_to_fit();
@@ -262,6 +345,31 @@ mod tests {
         let asked = [&unknown[..], &pairs, &unknown].concat();
         let existing = kept.look_up(&asked).filter_map(|(pair, exists)| exists.then_some(pair));
         assert!(existing.eq(pairs));
+    }
+
+    /// Batches of every size, whose pairs share `a`, share `b` or neither, beside a set of pairs.
+    #[test]
+    fn rows_equal_a_set_after_changes_of_many_pairs_at_once() {
+        for (columns, step) in [(1, 1), (200, 1), (7, 3), (40, 17)] {
+            let (mut kept, mut wanted) = (Kept::default(), std::collections::BTreeSet::new());
+            kept.reserve_ids(700);
+            kept.partners(0).for_each(drop);
+            let pair = |i: u32| Pair { a: i * step % columns, b: 200 + i * step / columns % 500 };
+            for round in 0..60u32 {
+                let (first, len) = (round * 37 % 300, round * round % 230);
+                let batch: std::collections::BTreeSet<Pair> = (first..first + len).map(pair).collect();
+                let added: Vec<Pair> = batch.difference(&wanted).copied().collect();
+                let removed: Vec<Pair> = batch.intersection(&wanted).copied().collect();
+                kept.apply(&added, &removed);
+                wanted = wanted.symmetric_difference(&batch).copied().collect();
+                assert!(kept.iter().eq(wanted.iter().copied()), "{columns}, round {round}");
+                for id in 0..700 {
+                    let of_id = wanted.iter().filter(|pair| pair.b == id).map(|pair| pair.a);
+                    let later = wanted.iter().filter(|pair| pair.a == id).map(|pair| pair.b);
+                    assert!(kept.partners(id).eq(of_id.chain(later)), "{columns}, round {round}, {id}");
+                }
+            }
+        }
     }
 
     #[test]
