@@ -102,6 +102,8 @@ run_publish() {
         check_contents "$(sed -n 's/^name = "\(.*\)"/\1/p' "$folder/Cargo.toml" | head -n 1)" "$folder"
     done
     # Each is built from its package, against the others' packages.
+    # Cargo keeps what it has unpacked in an earlier dry run from the same folder, and would build against that.
+    rm -rf "${CARGO_HOME:-$HOME/.cargo}"/registry/{src,cache}/-*/{pbig,rapier-pbig}-* 2>/dev/null || true
     step cargo publish --dry-run --locked --allow-dirty $options
     check_dependencies
     check_interface $options
