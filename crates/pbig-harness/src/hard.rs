@@ -334,6 +334,7 @@ pub fn shapes() -> Vec<(&'static str, Recipe)> {
                 width: [0.02, 2200.0, 0.01],
                 half: [8e-7, 3000.0, 55.0],
                 decades: 2.1,
+                growth: 1.0,
                 ..CUBES
             }],
         ),
@@ -358,8 +359,13 @@ pub fn histories() -> Vec<(&'static str, History)> {
     let change = Change::Shift([800.0, 24_000.0, 0.07]);
     let moved = ("a crowd within a cube, moved", History { start: crowd, change, updates: 25 });
     // Found by search: what the last rebuild took says nothing when most of its pairs have ended.
-    let crowd =
-        Recipe(vec![Part { place: Place::Line, width: [1.4, 0.7, 0.5], half: [0.01; 3], ..Part::CUBES }]);
+    let crowd = Recipe(vec![Part {
+        place: Place::Line,
+        width: [1.4, 0.7, 0.5],
+        growth: 1.0,
+        half: [0.01; 3],
+        ..Part::CUBES
+    }]);
     let sheets = Part { width: [20.0, 180.0, 690.0], half: [3e3, 5e-5, 2e4], decades: 3.5, ..Part::CUBES };
     let change = Change::To(Recipe(vec![line, sheets]));
     let ended = ("a crowd that becomes a line among sheets", History { start: crowd, change, updates: 25 });
