@@ -20,7 +20,7 @@ const RATIO_OF_GRIDS: f64 = 30.0;
 const MORE_PER_BOX: u64 = 64;
 
 /// Number of boxes in a world that may be swept, and its work besides: up to 200 tests a box, which lie in order.
-const SWEPT: (usize, u64) = (4000, 200);
+const SWEPT: (usize, u64) = (2000, 200);
 
 fn search(boxes: &[pbig_core::Aabb], engine: Option<Engine>) -> f64 {
     let mut finder = Finder::new(Config { engine, ..Config::DEFAULT });

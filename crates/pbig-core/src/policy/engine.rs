@@ -7,8 +7,8 @@ use crate::all_pairs::Held;
 /// Maximum number of boxes of a world that is swept although a grid is kept: a sweep of one changed box takes no longer than an edit.
 pub(crate) const SWEEP_FIRST_UP_TO_BOXES: usize = 1024;
 
-/// Maximum number of boxes of a world that is swept.
-pub(crate) const SWEEP_UP_TO_BOXES: usize = 4096;
+/// Maximum number of boxes of a world that is swept. Each sweep after a rebuild allocates the rows of `b`.
+pub(crate) const SWEEP_UP_TO_BOXES: usize = 2048;
 
 /// Maximum number of tests for each box of the world in a sweep: beyond, a grid finds the pairs sooner.
 pub(crate) const SWEEP_UP_TO_TESTS_PER_BOX: usize = 200;
@@ -240,8 +240,8 @@ mod tests {
             choose_engine(&Counts { boxes: 402, ids: 402, changed: 402, ..small }, None),
             Engine::Rebuild
         );
-        assert_eq!(choose_engine(&Counts { ids: 4096, ..small }, None), Engine::Sweep);
-        assert_eq!(choose_engine(&Counts { ids: 4097, ..small }, None), Engine::Rebuild);
+        assert_eq!(choose_engine(&Counts { ids: 2048, ..small }, None), Engine::Sweep);
+        assert_eq!(choose_engine(&Counts { ids: 2049, ..small }, None), Engine::Rebuild);
         let more = Counts { boxes: 1025, ids: 1025, changed: 51, held: Held::InGrid, ..small };
         assert_eq!(choose_engine(&more, None), Engine::Edit);
         assert_eq!(choose_engine(&Counts { changed: 52, ..more }, None), Engine::Sweep);
