@@ -183,7 +183,7 @@ impl<T: Tree> Colliders<T> {
         if self.differs_from(scene) {
             self.rescan(scene);
         }
-        // So far only a refused box can have set an error. The margin's error is noted below.
+        // Only a refused box can have set an error before this line. The margin's error is noted below.
         self.is_incomplete = self.last_error.is_some();
         self.inherited.clear();
         if let Err(error) = margin {
