@@ -54,10 +54,10 @@ use_wasm_linker() {
     fi
 }
 
-# target_folder [OPTION...]: cargo's folder for what it builds, as an absolute path. Call it where cargo is called: a relative
+# target_folder: cargo's folder for what it builds, as an absolute path. Call it where cargo is called: a relative
 # CARGO_TARGET_DIR starts there.
 target_folder() {
-    cargo metadata --no-deps --format-version 1 "$@" | sed 's/.*"target_directory":"\([^"]*\)".*/\1/'
+    cargo metadata --no-deps --format-version 1 | sed 's/.*"target_directory":"\([^"]*\)".*/\1/'
 }
 
 # Where setup.sh installs a Node for the page's tests, if the system's is too old.

@@ -121,7 +121,7 @@ run_blocks() {
 check_links
 check_lengths
 if $runs; then
-    if cargo build --release --workspace --examples --bins; then run_blocks; else fault "the build failed"; fi
+    if cargo build --release --examples --bins; then run_blocks; else fault "the build failed"; fi
 fi
 [ "$faults" = 0 ] || { echo "docs: $faults faults" >&2 && exit 1; }
 echo "docs: no faults"

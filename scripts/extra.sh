@@ -113,9 +113,9 @@ run_publish() {
 # run_module NAME FLAGS: builds the module with these flags of rustc, and runs it.
 run_module() {
     echo "== WebAssembly $1"
-    RUSTFLAGS=$2 step "${cargo[@]}" build --locked --quiet --release --lib --manifest-path wasm/Cargo.toml \
+    RUSTFLAGS=$2 step "${cargo[@]}" build --locked --quiet --profile wasm --lib --package pbig-wasm \
         --target "$target" --target-dir "$folder"
-    step node wasm/run.mjs "$folder/$target/release/pbig_wasm.wasm"
+    step node wasm/run.mjs "$folder/$target/wasm/pbig_wasm.wasm"
 }
 
 run_wasm() {
@@ -125,7 +125,7 @@ run_wasm() {
     folder="$(target_folder)/wasm"
     run_module "without SIMD" ""
     run_module "with SIMD" "-C target-feature=+simd128"
-    step "${cargo[@]}" check --locked --quiet --release --package pbig-scenes --target "$target" --target-dir "$folder"
+    step "${cargo[@]}" check --locked --quiet --profile wasm --package pbig-scenes --target "$target" --target-dir "$folder"
 }
 
 run_aarch64() {
@@ -136,25 +136,23 @@ run_aarch64() {
     folder="$(target_folder)/aarch64"
     step "${cargo[@]}" test --locked --release -p pbig-core --features serde --lib --target "$target" \
         --target-dir "$folder"
-    step "${cargo[@]}" run --locked --release --manifest-path wasm/Cargo.toml --target "$target" --target-dir "$folder"
+    step "${cargo[@]}" run --locked --release --package pbig-wasm --target "$target" --target-dir "$folder"
 }
 
-# test_viewer FOLDER
+# test_viewer PACKAGE [OPTION...]
 test_viewer() {
-    local workspace="--manifest-path $1/Cargo.toml"
-    step cargo fmt $workspace --check
-    step cargo build --locked --release $workspace --bins --examples
-    step cargo test --locked --release $workspace -- --include-ignored
-    step cargo clippy --locked --release $workspace --all-targets -- -D warnings
+    step cargo build --locked --release --package "$@" --bins --examples
+    step cargo test --locked --release --package "$@" -- --include-ignored
+    step cargo clippy --locked --release --package "$@" --all-targets -- -D warnings
 }
 
 # The tests open a window under Xvfb, press each key, and leave screenshots in viewer/out. A software adapter will do.
 run_viewer() {
     { has Xvfb && has xdotool && has_libraries libvulkan.so.1; } || { left_out "the viewer" && return; }
-    test_viewer viewer
+    test_viewer pbig-viewer
     [ -d rapier-0.36/patched/rapier3d-0.36.1 ] ||
         { left_out "the viewer on rapier 0.36.1" "scripts/patch-rapier.sh rapier-0.36 makes the copy that it needs" && return; }
-    test_viewer rapier-0.36/viewer
+    test_viewer pbig-viewer-036 --manifest-path rapier-0.36/viewer/Cargo.toml
 }
 
 # pack PICTURE FROM: writes a PNG file of 256 colours, and fails if it is large.
@@ -176,8 +174,8 @@ run_pictures() {
     local images=docs/images work viewer
     work=$(mktemp -d)
     trap "rm -rf '$work'" EXIT
-    step cargo build --locked --release --manifest-path viewer/Cargo.toml
-    viewer=$(target_folder --manifest-path viewer/Cargo.toml)/release/viewer
+    step cargo build --locked --release --package pbig-viewer
+    viewer=$(target_folder)/release/viewer
     # One run makes both: pictures of every 8th step, of which one is the README's.
     step "$viewer" --scene column --bodies 10000 --seed 1 --compare --size 1440x720 --steps 240 --every 8 --frames "$work/falling"
     pack "$images/falling.png" "$work/falling/00168.png"

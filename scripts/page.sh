@@ -18,7 +18,6 @@ for argument in "$@"; do
     esac
 done
 target=wasm32-unknown-unknown
-manifest=page/Cargo.toml
 tools=page/node_modules/.bin
 
 # check_folder: refuses a folder of other files than an earlier page's, because `bundle` deletes what is there.
@@ -35,15 +34,14 @@ check_folder() {
 build_module() {
     local folder=$1
     shift
-    RUSTFLAGS="-C target-feature=+simd128" CARGO_PROFILE_RELEASE_PANIC=abort step "${cargo[@]}" build --locked --release \
-        --lib --manifest-path "$manifest" --target "$target" --target-dir "$built/wasm" "$@"
-    step cargo run --quiet --locked --manifest-path "$manifest" --package pbig-page-bindgen -- \
-        "$built/wasm/$target/release/pbig_page.wasm" "$folder"
+    RUSTFLAGS="-C target-feature=+simd128" step "${cargo[@]}" build --locked --profile wasm --lib --package pbig-page \
+        --target "$target" --target-dir "$built/wasm" "$@"
+    step cargo run --quiet --locked --package pbig-page-bindgen -- "$built/wasm/$target/wasm/pbig_page.wasm" "$folder"
 }
 
 # build_native [OPTION...]: the native program whose pairs are compared with the module's.
 build_native() {
-    step cargo build --quiet --locked --release --manifest-path "$manifest" --package pbig-page --bin native_pairs "$@"
+    step cargo build --quiet --locked --release --package pbig-page --bin native_pairs "$@"
 }
 
 install_tools() {
@@ -77,7 +75,7 @@ build_deterministic() {
 
 # test_page: the logic natively and in node, then the page in a browser, one test file after another.
 test_page() {
-    step cargo test --quiet --locked --release --manifest-path "$manifest" --package pbig-page
+    step cargo test --quiet --locked --release --package pbig-page
     build_deterministic
     build_native
     PAGE_FOLDER=$(cd "$out" && pwd) NATIVE_PAIRS=$built/release/native_pairs DETERMINISTIC=$built/deterministic \
@@ -92,8 +90,7 @@ parts="rust wasm page"
 . scripts/common.sh
 choose_cargo "$target" && has npm || { left_out "$target or npm" && exit 0; }
 use_wasm_linker
-# The workspace's own folder for what it builds.
-built=$(target_folder --manifest-path "$manifest")
+built=$(target_folder)
 build_module "$built/bindings"
 install_tools
 bundle

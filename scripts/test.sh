@@ -14,6 +14,8 @@ export TMPDIR
 trap 'rm -rf "$TMPDIR"' EXIT
 
 # Options of several words, which are not quoted where they are used.
+# The default members, for commands that leave one out: cargo takes `--exclude` only beside `--workspace`.
+members="--workspace --exclude pbig-page --exclude pbig-page-bindgen --exclude pbig-viewer --exclude pbig-wasm"
 in_036="--manifest-path rapier-0.36/Cargo.toml"
 members_036="-p rapier-pbig -p pbig-harness-036"
 features_036="--features rapier-pbig/debug-render"
@@ -49,30 +51,27 @@ step_setup() {
 
 step_fmt() {
     step cargo fmt --all --check
-    # Workspaces of their own.
-    for other in fuzz wasm page viewer; do
-        step cargo fmt --manifest-path "$other/Cargo.toml" --check
-        step cargo fetch --locked --manifest-path "$other/Cargo.toml"
-    done
     step cargo fetch --locked
+    step cargo fmt --manifest-path fuzz/Cargo.toml --check
+    step cargo fetch --locked --manifest-path fuzz/Cargo.toml
 }
 
 step_clippy() {
-    step cargo clippy --release --workspace --all-targets -- -D warnings
+    step cargo clippy --release --all-targets -- -D warnings
     step cargo check --release --locked --manifest-path fuzz/Cargo.toml --target-dir "${CARGO_TARGET_DIR:-target}"
 }
 
 # All but the suite. One profile and one set of features: every crate is built once.
 step_unit() {
-    step cargo build --release --workspace --examples --bins
-    step cargo test --release --workspace --exclude pbig-tests $(without_harness) --no-fail-fast
+    step cargo build --release --examples --bins
+    step cargo test --release $members --exclude pbig-tests $(without_harness) --no-fail-fast
     # Once more with overflow checks and debug assertions, where there is unsafe code and index arithmetic.
     step cargo test -p pbig-core --features serde --no-fail-fast
     step cargo test -p pbig-gpu --no-default-features --lib --no-fail-fast
 }
 
 step_suite_cpu() {
-    step $without_gpu cargo test --release --workspace --test suite
+    step $without_gpu cargo test --release --test suite
 }
 
 step_suite_gpu() {
@@ -85,7 +84,7 @@ step_doc() {
     printf '#!/bin/sh\nRUSTC_BOOTSTRAP=1 exec rustdoc "$@"\n' >"$TMPDIR/rustdoc"
     chmod +x "$TMPDIR/rustdoc"
     step env RUSTDOC="$TMPDIR/rustdoc" RUSTDOCFLAGS="-D warnings --cfg docsrs" \
-        cargo doc --release --workspace --no-deps
+        cargo doc --release --no-deps
 }
 
 step_features() {
@@ -101,7 +100,7 @@ step_packages() {
         step lacks "$package" rayon --no-default-features
         step lacks "$package" wgpu
     done
-    step lacks pbig-wasm rayon --manifest-path wasm/Cargo.toml
+    step lacks pbig-wasm rayon
     step scripts/extra.sh --no-setup publish
 }
 

@@ -122,7 +122,7 @@ fn print_table(stock: &Run<DefaultBroadPhase>, ours: &Run<PbigBroadPhase>, check
 fn print_where_to_watch(args: &Args) {
     let Args { scene, bodies, seed, .. } = args;
     println!(
-        "\nWatch it: cd viewer && cargo run --release -- --scene {} --bodies {bodies} --seed {seed}",
+        "\nWatch it: cargo run --release -p pbig-viewer -- --scene {} --bodies {bodies} --seed {seed}",
         scene.name
     );
     println!("In a browser: scripts/page.sh");

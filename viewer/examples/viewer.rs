@@ -1,4 +1,4 @@
-//! The viewer as an example: `cargo run --release --example viewer`
+//! The viewer as an example: `cargo run --release -p pbig-viewer --example viewer`
 
 use std::process::ExitCode;
 

@@ -1,4 +1,4 @@
-//! The viewer. `cargo run --release -- --help`
+//! The viewer. `cargo run --release -p pbig-viewer -- --help`
 
 use std::process::ExitCode;
 

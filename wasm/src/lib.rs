@@ -6,7 +6,7 @@
 pub mod boxes;
 #[path = "../../tests/src/corpus.rs"]
 pub mod corpus;
-mod exports;
+pub mod exports;
 mod fault;
 mod finder;
 mod follower;
