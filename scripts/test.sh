@@ -76,7 +76,7 @@ step_suite_cpu() {
 
 step_suite_gpu() {
     has_gpu || { left_out "there is no GPU adapter" && return; }
-    step cargo test --release -p pbig-tests --no-fail-fast
+    step cargo test --release --test suite --no-fail-fast
 }
 
 # On docs.rs a nightly Rust labels each item with its feature. A wrapper lets this release do that, too.
@@ -142,21 +142,22 @@ step_rapier_0_36() {
         cargo doc --release $in_036 -p rapier-pbig --features shadow,debug-render --no-deps
 }
 
-# count LOG STATUS: prints how many tests passed and failed. A step without tests counts as one.
+# count LOG STATUS: prints how many tests passed, failed and were left out. A step without tests counts as one.
 count() {
     awk -v status="$2" '
+        /^== left out: / { skipped++ }
         /^test result: / { passed += $4; failed += $6 }
         /^[0-9]+ cases passed, [0-9]+ failed$/ { passed += $1; failed += $4 }
         END {
             if (status != 0 && failed == 0) failed = 1
-            if (passed + failed == 0) passed = 1
-            print passed + 0, failed + 0
+            if (passed + failed + skipped == 0) passed = 1
+            print passed + 0, failed + 0, skipped + 0
         }' "$1"
 }
 
 # run_step NAME: runs a step, shows its headings, and its output if it fails; adds its row to the table.
 run_step() {
-    local start=$SECONDS log=$TMPDIR/log status passed failed note
+    local start=$SECONDS log=$TMPDIR/log status passed failed skipped note
     echo "== $1"
     # A shell of its own, so that `set -e` ends the step alone. setup.sh may have installed another Rust before.
     (
@@ -165,15 +166,15 @@ run_step() {
         "step_$(echo "$1" | tr '.-' '__')"
     ) 2>&1 </dev/null | tee "$log" | grep --line-buffered '^== '
     status=${PIPESTATUS[0]}
-    read -r passed failed <<<"$(count "$log" "$status")"
+    read -r passed failed skipped <<<"$(count "$log" "$status")"
     note=$(sed -n 's/^== left out: /left out: /p' "$log" | head -n 1)
     if [ "$status" != 0 ]; then
         echo "-- $1 failed with status $status; the last lines of its output:"
         tail -n 300 "$log"
         echo "--"
     fi
-    rows+=$(printf '%-12s %6s s %8s %8s   %s' "$1" $((SECONDS - start)) "$passed" "$failed" "$note")$'\n'
-    all_passed=$((all_passed + passed)) all_failed=$((all_failed + failed))
+    rows+=$(printf "$columns   %s" "$1" "$((SECONDS - start)) s" "$passed" "$failed" "$skipped" "$note")$'\n'
+    all_passed=$((all_passed + passed)) all_failed=$((all_failed + failed)) all_skipped=$((all_skipped + skipped))
 }
 
 all="setup fmt clippy unit suite-cpu suite-gpu doc features packages wasm examples docs rapier-0.36"
@@ -185,10 +186,12 @@ fi
 for name in "$@"; do
     case " $all " in *" $name "*) ;; *) echo "there is no step '$name'; the steps: $all" >&2 && exit 2 ;; esac
 done
-rows='' all_passed=0 all_failed=0
+columns='%-12s %8s %8s %8s %8s'
+rows='' all_passed=0 all_failed=0 all_skipped=0
 for name in "$@"; do
     run_step "$name"
 done
-printf '\n%-12s %8s %8s %8s\n%s' step time passed failed "$rows"
-printf '%-12s %6s s %8s %8s\n\n%s\n' all "$SECONDS" "$all_passed" "$all_failed" "$all_passed passed, $all_failed failed"
+printf "\n$columns\n%s" step time passed failed skipped "$rows"
+printf "$columns\n\n%s\n" all "$SECONDS s" "$all_passed" "$all_failed" "$all_skipped" \
+    "$all_passed passed, $all_failed failed, $all_skipped skipped"
 [ "$all_failed" = 0 ]
