@@ -1,4 +1,4 @@
-//! The GPU kernels of pbig: one WGSL file each. File, entry point, stage in reports and label in a GPU debugger have the
+//! The GPU kernels of pbig: one WGSL file each. File, entry point, time in reports and label in a GPU debugger have the
 //! same name.
 //!
 //! A kernel's file declares its bindings, in the order of [`Kernel::bindings`]. Code that kernels share is in `shared/`
@@ -14,8 +14,6 @@
 #[cfg(doctest)]
 #[doc = include_str!("README.md")]
 struct Readme;
-
-pub mod study;
 
 /// A buffer that kernels bind.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -105,11 +103,24 @@ impl Buffer {
     }
 }
 
-/// A kernel: its name, the buffers that it binds, and its text.
+/// The part of a search to which a kernel's time belongs.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Stage {
+    /// Sorting boxes into cells, and cells into work items.
+    Map,
+    /// Testing pairs.
+    Check,
+    /// Sorting the pairs that were found.
+    Sort,
+}
+
+/// A kernel: its name, its stage, the buffers that it binds, and its text.
 #[derive(Debug, PartialEq, Eq, Hash)]
 pub struct Kernel {
-    /// Name of the file, entry point, stage and label.
+    /// Name of the file, entry point and label.
     pub name: &'static str,
+    /// The stage.
+    pub stage: Stage,
     /// Buffers of group 0, by binding number.
     pub bindings: &'static [Buffer],
     parts: &'static [&'static str],
@@ -147,63 +158,71 @@ const SEARCH_OVERLAPS: &str = include_str!("shared/search_overlaps.wgsl");
 const SEARCH_CHANGES: &str = include_str!("shared/search_changes.wgsl");
 const EMIT: &str = include_str!("shared/emit.wgsl");
 
-/// Declares kernels, each once, with the list of all.
+/// Declares kernels, each once, and [`KERNELS`].
 macro_rules! kernels {
-    ($(#[$all:meta])* in $folder:literal; $($(#[$doc:meta])* $constant:ident $name:literal [$($part:ident),*]
+    ($($(#[$doc:meta])* $constant:ident $stage:ident $name:literal [$($part:ident),*]
         ($($binding:ident),*);)*) => {
-        $($(#[$doc])* pub const $constant: $crate::Kernel = $crate::Kernel {
+        $($(#[$doc])* pub const $constant: Kernel = Kernel {
             name: $name,
-            bindings: &[$($crate::Buffer::$binding),*],
+            stage: Stage::$stage,
+            bindings: &[$(Buffer::$binding),*],
             parts: &[$($part),*],
-            body: include_str!(concat!($folder, $name, ".wgsl")),
+            body: include_str!(concat!($name, ".wgsl")),
         };)*
 
-        $(#[$all])*
-        pub const KERNELS: &[&$crate::Kernel] = &[$(&$constant),*];
+        /// Every kernel of a search, in the order in which they run.
+        pub const KERNELS: &[&Kernel] = &[$(&$constant),*];
     };
 }
-pub(crate) use kernels;
 
 kernels! {
-    /// Every kernel of a search, in the order in which they run.
-    in "";
     /// Changes: applies the changes of boxes and filters.
-    APPLY_CHANGES "apply_changes" [] (Params, BoxChanges, FilterChanges, Boxes, Filters, Changed);
+    APPLY_CHANGES Map "apply_changes" [] (Params, BoxChanges, FilterChanges, Boxes, Filters, Changed);
     /// Plan: counts the boxes of each size.
-    MEASURE "measure" [FLOATS, SEARCH_OVERLAPS, KNOWN_BOX] (Params, Boxes, Changed, Classes);
+    MEASURE Map "measure" [FLOATS, SEARCH_OVERLAPS, KNOWN_BOX] (Params, Boxes, Changed, Classes);
     /// Map: computes the cells and the level of each box, and counts the residents of each cell.
-    LOCATE "locate" [FLOATS, SEARCH_OVERLAPS, KNOWN_BOX, CELLS]
+    LOCATE Map "locate" [FLOATS, SEARCH_OVERLAPS, KNOWN_BOX, CELLS]
         (Params, Boxes, Changed, Located, Cells, Counters);
     /// Map: counts the visitors of each cell.
-    VISIT "visit" [CELLS] (Params, Located, Cells);
+    VISIT Map "visit" [CELLS] (Params, Located, Cells);
     /// Scan: computes prefix sums within blocks of lists.
-    SCAN_BLOCKS "scan_blocks" [SCANNED, BLOCK_SCAN] (Params, Cells, Sums);
+    SCAN_BLOCKS Map "scan_blocks" [SCANNED, BLOCK_SCAN] (Params, Cells, Sums);
     /// Scan: computes prefix sums over the blocks.
-    SCAN_SUMS "scan_sums" [SCANNED, BLOCK_SCAN] (Params, Sums, Counters);
+    SCAN_SUMS Map "scan_sums" [SCANNED, BLOCK_SCAN] (Params, Sums, Counters);
     /// Schedule: turns cells into work items.
-    SCHEDULE "schedule" [ENDS, BLOCK_SCAN] (Params, Cells, Sums, Slots, SmallItems, LargeItems, Counters);
+    SCHEDULE Map "schedule" [ENDS, BLOCK_SCAN] (Params, Cells, Sums, Slots, SmallItems, LargeItems, Counters);
     /// Map: scatters boxes into cells.
-    SCATTER "scatter" [ENDS, CELLS] (Params, Located, Sums, Counters, Cells, Entries);
+    SCATTER Map "scatter" [ENDS, CELLS] (Params, Located, Sums, Counters, Cells, Entries);
     /// Schedule: computes the sizes of the dispatches that follow.
-    ARRANGE "arrange" [DISPATCH] (Params, Chunk, Counters, Dispatches);
+    ARRANGE Map "arrange" [DISPATCH] (Params, Chunk, Counters, Dispatches);
     /// Check: tests the pairs of small cells.
-    CHECK_SMALL "check_small" [FLOATS, SEARCH_OVERLAPS, BLOCK_SCAN, PAIR_INDEX, EMIT]
+    CHECK_SMALL Check "check_small" [FLOATS, SEARCH_OVERLAPS, BLOCK_SCAN, PAIR_INDEX, EMIT]
         (Params, Chunk, Boxes, Filters, Entries, Counters, Slots, SmallItems, Totals, Out);
     /// Check: tests the pairs of large cells.
-    CHECK_LARGE "check_large" [FLOATS, SEARCH_OVERLAPS, EMIT]
+    CHECK_LARGE Check "check_large" [FLOATS, SEARCH_OVERLAPS, EMIT]
         (Params, Chunk, Boxes, Filters, Entries, Counters, LargeItems, Totals, Out);
     /// Check: tests all pairs, without a grid.
-    CHECK_ALL "check_all" [FLOATS, SEARCH_OVERLAPS, KNOWN_BOX, PAIR_INDEX, EMIT]
+    CHECK_ALL Check "check_all" [FLOATS, SEARCH_OVERLAPS, KNOWN_BOX, PAIR_INDEX, EMIT]
         (Params, Chunk, Boxes, Changed, Filters, Totals, Out);
     /// Sort: computes the sizes of the dispatches that follow.
-    ARRANGE_ROWS "arrange_rows" [ROWS, DISPATCH] (Params, Chunk, Counters, Totals, Dispatches, LongDispatch);
+    ARRANGE_ROWS Sort "arrange_rows" [ROWS, DISPATCH] (Params, Chunk, Counters, Totals, Dispatches, LongDispatch);
     /// Sort: counts the pairs of each first box.
-    COUNT_PAIRS "count_pairs" [] (Totals, Out, Rows);
+    COUNT_PAIRS Sort "count_pairs" [] (Totals, Out, Rows);
     /// Sort: groups the pairs by first box.
-    PLACE_PAIRS "place_pairs" [ENDS] (Totals, Out, Sums, Rows, Grouped);
+    PLACE_PAIRS Sort "place_pairs" [ENDS] (Totals, Out, Sums, Rows, Grouped);
     /// Sort: orders short rows.
-    RANK_PAIRS "rank_pairs" [ENDS, ROWS]
+    RANK_PAIRS Sort "rank_pairs" [ENDS, ROWS]
         (Params, Totals, Sums, Rows, Grouped, Counters, LongDispatch, LongRows, Out);
     /// Sort: orders long rows.
-    RANK_LONG_ROWS "rank_long_rows" [ROWS, BLOCK_SCAN] (Counters, Grouped, LongRows, Out);
+    RANK_LONG_ROWS Sort "rank_long_rows" [ROWS, BLOCK_SCAN] (Counters, Grouped, LongRows, Out);
 }
+
+/// For tests: computes the pairs of given indices.
+#[doc(hidden)]
+pub const INDEX_PAIRS: Kernel = Kernel {
+    name: "index_pairs",
+    stage: Stage::Map,
+    bindings: &[Buffer::Params, Buffer::Out],
+    parts: &[PAIR_INDEX],
+    body: include_str!("tests/index_pairs.wgsl"),
+};

@@ -1,3 +1,3 @@
 #![no_main]
 
-libfuzzer_sys::fuzz_target!(|data: &[u8]| pbig_fuzz::finder_against_oracle(data));
+libfuzzer_sys::fuzz_target!(|data: &[u8]| pbig_harness::checks::finder_against_oracle(data));

@@ -1,3 +1,3 @@
 #![no_main]
 
-libfuzzer_sys::fuzz_target!(|data: &[u8]| pbig_fuzz::npy_reader(data));
+libfuzzer_sys::fuzz_target!(|data: &[u8]| pbig_harness::checks::npy_reader(data));

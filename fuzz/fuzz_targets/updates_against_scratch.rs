@@ -1,3 +1,3 @@
 #![no_main]
 
-libfuzzer_sys::fuzz_target!(|data: &[u8]| pbig_fuzz::updates_against_scratch(data));
+libfuzzer_sys::fuzz_target!(|data: &[u8]| pbig_harness::checks::updates_against_scratch(data));

@@ -1,3 +1,3 @@
 #![no_main]
 
-libfuzzer_sys::fuzz_target!(|data: &[u8]| pbig_fuzz::work_is_bounded(data));
+libfuzzer_sys::fuzz_target!(|data: &[u8]| pbig_harness::checks::work_is_bounded(data));

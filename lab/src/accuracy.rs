@@ -1,4 +1,4 @@
-//! Run time against error: a study for each thing that can be wrong by a little.
+//! StudyRun time against error: a study for each thing that can be wrong by a little.
 
 mod coordinates;
 mod index;
@@ -10,10 +10,10 @@ use pbig_harness::chart::{Chart, Line, MAX_LINES};
 use pbig_harness::prelude::*;
 
 /// Makes a study, of small sizes if it is to be quick.
-pub type Run = fn(bool) -> Result<Report, Failure>;
+pub type StudyRun = fn(bool) -> Result<BenchReport, Failure>;
 
 /// Every study with its name.
-pub const STUDIES: [(&str, Run); 5] = [
+pub const STUDIES: [(&str, StudyRun); 5] = [
     ("index", index::run),
     ("coordinates", coordinates::run),
     ("margin", margin::run),
@@ -27,7 +27,7 @@ fn report(
     tables: Vec<Table>,
     (title, axes): (&str, [&str; 2]),
     points: impl IntoIterator<Item = (String, f64, f64)>,
-) -> Report {
+) -> BenchReport {
     let name = format!("accuracy-{name}");
     let mut lines: Vec<Line> = vec![];
     for (name, time, error) in points {
@@ -37,7 +37,7 @@ fn report(
             None => {}
         }
     }
-    Report { charts: vec![Chart::log(&name, title, axes, lines)], ..Report::new(&name, tables) }
+    BenchReport { charts: vec![Chart::log(&name, title, axes, lines)], ..BenchReport::new(&name, tables) }
 }
 
 /// Returns the share of a part, in percent.

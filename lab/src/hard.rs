@@ -11,7 +11,7 @@ const SIZES: [usize; 3] = [25_000, 100_000, 400_000];
 const SEARCHES: usize = 3;
 
 /// Measures searches of all shapes, and updates of all histories. `quick`: the smallest size only.
-pub fn run(quick: bool) -> Result<Report, Failure> {
+pub fn run(quick: bool) -> Result<BenchReport, Failure> {
     let sizes = if quick { &SIZES[..1] } else { &SIZES };
     let columns = "world | boxes | pairs | algorithm | ms | ms_of_a_grid_alone | work_for_each_box_and_pair";
     let mut searches = Table::new("searches", columns);
@@ -42,7 +42,7 @@ pub fn run(quick: bool) -> Result<Report, Failure> {
             updates.row(cells![name, n, history.updates, ..update, ..search]);
         }
     }
-    Ok(Report::new("hard", vec![searches, updates]))
+    Ok(BenchReport::new("hard", vec![searches, updates]))
 }
 
 fn search(boxes: &[Aabb], engine: Option<Engine>) -> Result<(Finder, f64), Failure> {

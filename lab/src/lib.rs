@@ -2,17 +2,17 @@
 //! them is in docs/.
 
 pub mod accuracy;
+mod alone;
 pub mod hard;
 mod index;
 pub mod papers;
+pub mod pbig_grid;
 pub mod peers;
 pub mod precision;
 mod reordered;
 mod reported;
-pub mod stages;
 pub mod steady;
 mod trees;
-pub mod whole_steps;
 pub mod wide;
 pub mod worst;
 

@@ -1,10 +1,9 @@
 //! The program `pbig-studies`: numbers as tables, one JSON object, or files.
 
 use clap::{Parser, Subcommand};
-use pbig_harness::frames::FrameKind;
 use pbig_harness::output::{Failure, finish, print, tracked};
-use pbig_harness::report::Report;
-use pbig_studies::{accuracy, hard, papers, peers, stages, steady, whole_steps, worst};
+use pbig_harness::report::BenchReport;
+use pbig_studies::{accuracy, hard, papers, peers, steady, worst};
 use serde_json::{Map, json};
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -30,8 +29,6 @@ struct Cli {
 enum Command {
     /// The experiments of PBIG's and Avril's papers, the printed numbers beside ours.
     Papers,
-    /// Pbig alone, stage by stage: against boxes, movers, density and the spread of sizes.
-    Stages,
     /// Pbig alone beside parry's tree and obvhs.
     Peers,
     /// Times of updates by motion: mean, median, p99, worst.
@@ -39,13 +36,6 @@ enum Command {
         /// Numbers of boxes instead of its own.
         #[arg(long, value_name = "N,N", value_delimiter = ',')]
         boxes: Vec<usize>,
-    },
-    /// Whole steps of rapier with its own broad phase and with pbig's, of every scene.
-    WholeSteps {
-        /// Scene queries after each step, several kinds separated by commas: none, ray, rays-100, rays-10000, cast, character,
-        /// boxes or point.
-        #[arg(long, value_name = "KIND", value_delimiter = ',', default_value = "none", value_parser = FrameKind::named)]
-        queries: Vec<FrameKind>,
     },
     /// Worlds and histories on which a grid alone takes quadratic time.
     Hard,
@@ -76,10 +66,8 @@ fn main() -> ExitCode {
 fn run(cli: &Cli) -> Result<(), Failure> {
     let report = match &cli.command {
         Command::Papers => papers::run(cli.quick)?,
-        Command::Stages => stages::run(cli.quick)?,
         Command::Peers => peers::run(cli.quick)?,
         Command::Steady { boxes } => steady::run(cli.quick, boxes)?,
-        Command::WholeSteps { queries } => whole_steps::run(cli.quick, queries),
         Command::Hard => hard::run(cli.quick)?,
         Command::Worst { seconds, seed, boxes } => {
             worst::run(worst::Search { seconds: *seconds, seed: *seed, boxes: *boxes })?
@@ -93,7 +81,7 @@ fn run_accuracy(cli: &Cli, only: Option<&str>) -> Result<(), Failure> {
     let mut objects = Map::new();
     let studies = accuracy::STUDIES.into_iter().filter(|(name, _)| only.is_none_or(|only| only == *name));
     for (name, study) in tracked(studies, "studies") {
-        let report: Report = study(cli.quick)?;
+        let report: BenchReport = study(cli.quick)?;
         if cli.json {
             objects.insert(name.into(), report.object());
             cli.write.as_ref().map_or(Ok(()), |folder| report.write(folder))?;

@@ -22,12 +22,12 @@ use sides::Setup;
 /// Our grid on the CPU, however few the boxes.
 const OUR_GRID: Config = Config { engine: Some(Engine::Rebuild), ..UNSORTED };
 
-type Part = fn(&Setup) -> Result<Vec<Table>, Failure>;
+type Section = fn(&Setup) -> Result<Vec<Table>, Failure>;
 
-const PARTS: [Part; 4] = [table_iii::tables, figures::tables, roots::tables, avril::tables];
+const PARTS: [Section; 4] = [table_iii::tables, figures::tables, roots::tables, avril::tables];
 
 /// Makes all tables. Fails if two ways to search find different pairs.
-pub fn run(quick: bool) -> Result<Report, Failure> {
+pub fn run(quick: bool) -> Result<BenchReport, Failure> {
     let setup = Setup::new(quick);
     let mut tables = vec![];
     for part in tracked(PARTS, "parts") {
@@ -37,7 +37,7 @@ pub fn run(quick: bool) -> Result<Report, Failure> {
     let gpu = if setup.is_software() { "pbig, software adapter" } else { "pbig, GPU" };
     let charts = charts(&tables, gpu);
     let head = vec![("software", setup.is_software().to_string()), ("adapter", setup.adapter)];
-    Ok(Report { head, charts, ..Report::new("papers", tables) })
+    Ok(BenchReport { head, charts, ..BenchReport::new("papers", tables) })
 }
 
 /// Draws PBIG's figures 8 and 9 and Avril's figure 5, with the line of a device under the given name.

@@ -14,19 +14,19 @@ fn distance(set: &str) -> f32 {
 }
 
 /// A set of boxes, and how many.
-type Case = (&'static str, usize);
+type PeerCase = (&'static str, usize);
 
-const LARGE: [Case; 4] = [("unit", 100_000), ("unit", 1_000_000), ("mixed", 100_000), ("pile", 100_000)];
-const SMALL: [Case; 3] = [("unit", 10_000), ("mixed", 10_000), ("pile", 10_000)];
+const LARGE: [PeerCase; 4] = [("unit", 100_000), ("unit", 1_000_000), ("mixed", 100_000), ("pile", 100_000)];
+const SMALL: [PeerCase; 3] = [("unit", 10_000), ("mixed", 10_000), ("pile", 10_000)];
 
 /// The share of boxes that swing to and fro; none: all drift, on and on.
-type Motion = Option<f64>;
+type MovedShare = Option<f64>;
 
 /// Measures all cases. Fails if the sides have different numbers of pairs.
-pub fn run(quick: bool) -> Result<Report, Failure> {
+pub fn run(quick: bool) -> Result<BenchReport, Failure> {
     let (effort, mut table) = (Effort::new(quick), Table::new("peers", COMPARED));
-    let cases: &[Case] = if quick { &SMALL } else { &LARGE };
-    let drift: &[Case] = if quick { &[] } else { &[LARGE[0], LARGE[3]] };
+    let cases: &[PeerCase] = if quick { &SMALL } else { &LARGE };
+    let drift: &[PeerCase] = if quick { &[] } else { &[LARGE[0], LARGE[3]] };
     let parts = if quick { &SMALL[..1] } else { &LARGE[..2] };
     for (what, motion, cases) in [
         ("events, all moved", Some(1.0), cases),
@@ -36,10 +36,10 @@ pub fn run(quick: bool) -> Result<Report, Failure> {
         tracked(cases, what).try_for_each(|case| frames(what, *case, motion, effort, &mut table))?;
     }
     tracked(cases, "from scratch").try_for_each(|case| from_scratch(*case, effort, &mut table))?;
-    Ok(Report::new("peers", vec![table]))
+    Ok(BenchReport::new("peers", vec![table]))
 }
 
-fn named((set, boxes): Case) -> Vec<Aabb> {
+fn named((set, boxes): PeerCase) -> Vec<Aabb> {
     BoxSet::named(set).expect("a set of the harness").boxes(boxes, 1)
 }
 
@@ -49,14 +49,14 @@ fn agree(name: &str, ours: usize, others: &[usize]) -> Result<u64, Failure> {
 }
 
 /// Pbig and parry's trees through the same frames.
-struct Frames {
+struct PeerFrames {
     wander: Wander,
     changed: Changed,
     ours: Kept,
     trees: Vec<Parry>,
 }
 
-impl Frames {
+impl PeerFrames {
     fn prepare(&mut self, round: usize) {
         let moved = self.wander.step(round);
         self.trees.iter_mut().for_each(|tree| tree.prepare(&self.wander.boxes, &moved));
@@ -79,7 +79,13 @@ const REFITS: [(&str, Refit); 3] = [
 ];
 
 /// Measures a case frame by frame.
-fn frames(what: &str, case: Case, motion: Motion, effort: Effort, table: &mut Table) -> Result<(), Failure> {
+fn frames(
+    what: &str,
+    case: PeerCase,
+    motion: MovedShare,
+    effort: Effort,
+    table: &mut Table,
+) -> Result<(), Failure> {
     let (name, boxes) = (format!("{what}, {}", case.0), named(case));
     let is_partial = motion.is_some_and(|share| share < 1.0);
     let refits = if is_partial { &REFITS[..1] } else { &REFITS[1..] };
@@ -90,12 +96,12 @@ fn frames(what: &str, case: Case, motion: Motion, effort: Effort, table: &mut Ta
         None => Wander::drifting(boxes, distance(case.0)),
     };
     let changed = ((0..case.1 as u32).collect(), vec![]);
-    let mut state = Frames { wander, changed, ours: Kept::new(UNSORTED)?, trees };
+    let mut state = PeerFrames { wander, changed, ours: Kept::new(UNSORTED)?, trees };
     for side in [0, 1] {
         state.run(side)?;
     }
-    let times = measured(&mut state, sides, effort, Frames::prepare, Frames::run)?;
-    let Frames { ours, mut trees, .. } = state;
+    let times = measured(&mut state, sides, effort, PeerFrames::prepare, PeerFrames::run)?;
+    let PeerFrames { ours, mut trees, .. } = state;
     let [all, lone] = ours.pairs();
     let theirs: Vec<usize> = trees.iter_mut().map(Parry::all_pairs).collect();
     let pairs = agree(&name, all, &[vec![lone], theirs].concat())?;
@@ -108,7 +114,7 @@ fn frames(what: &str, case: Case, motion: Motion, effort: Effort, table: &mut Ta
 }
 
 /// Measures all pairs from nothing, of boxes that are elsewhere in each round.
-fn from_scratch(case: Case, effort: Effort, table: &mut Table) -> Result<(), Failure> {
+fn from_scratch(case: PeerCase, effort: Effort, table: &mut Table) -> Result<(), Failure> {
     let name = format!("from scratch, {}", case.0);
     let (mut ours, mut found, mut pairs) = (Finder::new(UNSORTED), vec![], [0; 3]);
     let wander = Wander::new(named(case), 1.0, distance(case.0));

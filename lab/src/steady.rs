@@ -1,12 +1,12 @@
 //! Times of updates: mean, median, p99, worst. Boxes in motion: our updates beside a search from nothing and parry's tree, in turn in
-//! every frame; pairs agree in number wherever a side takes part. Scenes of rapier are in `whole_steps`.
+//! every frame; pairs agree in number wherever a side takes part.
 
 use crate::trees::{Kept, Parry, Refit, partition};
 use crate::{UNLIMITED, UNSORTED};
 use pbig_core::Finder;
 use pbig_harness::bench::figures;
 use pbig_harness::chart::{Chart, Line, Plot};
-use pbig_harness::motions::{Density, Motion, Scene};
+use pbig_harness::motions::{Density, Motion, MovingBoxes};
 use pbig_harness::prelude::*;
 
 /// All sides; the second is ours on one thread.
@@ -18,13 +18,13 @@ const COLUMNS: &str =
     "motion | density | boxes | threads | side | frames | mean_ms | median_ms | p99_ms | worst_ms | first_ms";
 
 /// Measures every motion; `given`: numbers of boxes instead of its own. Fails if the sides have different numbers of pairs.
-pub fn run(quick: bool, given: &[usize]) -> Result<Report, Failure> {
+pub fn run(quick: bool, given: &[usize]) -> Result<BenchReport, Failure> {
     let own: &[usize] = if quick { &[1000, 10_000] } else { &[1000, 10_000, 100_000, 1_000_000] };
     let boxes = if given.is_empty() { own } else { given };
     let mut table = Table::new("steady", COLUMNS);
     let plots = motions(boxes, quick, &mut table)?;
     let charts = vec![Chart { name: "steady-frames".into(), plots }];
-    Ok(Report { charts, ..Report::new("steady", vec![table]) })
+    Ok(BenchReport { charts, ..BenchReport::new("steady", vec![table]) })
 }
 
 /// The motions whose frames are drawn, of the largest of the sizes up to [`MOST_DRAWN`].
@@ -48,7 +48,7 @@ fn motions(sizes: &[usize], quick: bool, table: &mut Table) -> Result<Vec<Plot>,
         let name = format!("{}, {}, {n} boxes", motion.name(), density.name());
         let frames = frames(n, quick);
         let times =
-            race(Scene::new(motion, density, n, 1), frames, frames_of_parry(motion, n, frames), &name)?;
+            race(MovingBoxes::new(motion, density, n, 1), frames, frames_of_parry(motion, n, frames), &name)?;
         for (k, ms) in times.iter().enumerate() {
             let threads = if k == 1 { 1 } else { rayon::current_num_threads() };
             row([motion.name(), density.name(), NAMES[k]], [n, threads], ms, table);
@@ -78,7 +78,7 @@ fn frames_of_parry(motion: Motion, n: usize, frames: usize) -> usize {
 /// Returns the milliseconds of all sides on the same boxes, by side, then by frame. Each side warms the caches for the next one,
 /// so the first one changes from frame to frame, and every second frame runs the other way round.
 fn race(
-    mut scene: Scene,
+    mut scene: MovingBoxes,
     frames: usize,
     frames_of_parry: usize,
     name: &str,
@@ -137,7 +137,7 @@ mod tests {
 
     #[test]
     fn parry_takes_part_in_the_first_frames_only() {
-        let scene = Scene::new(Motion::Jump, Density::Dense, 200, 1);
+        let scene = MovingBoxes::new(Motion::Jump, Density::Dense, 200, 1);
         let times = race(scene, 6, 3, "jump").expect("all agree");
         assert_eq!(times.map(|ms| ms.len()), [7, 7, 7, 4]);
         assert_eq!(

@@ -2,7 +2,7 @@
 //! the work are kept.
 
 use pbig_harness::hard::{
-    Change, History, Part, Place, Recipe, histories, ratio_of_history, ratio_of_search, shapes,
+    Change, History, Part, Placement, Recipe, histories, ratio_of_history, ratio_of_search, shapes,
 };
 use pbig_harness::prelude::*;
 use rand::rngs::StdRng;
@@ -47,7 +47,7 @@ impl Find {
 }
 
 /// Runs a search, and tells the worst finds.
-pub fn run(search: Search) -> Result<Report, Failure> {
+pub fn run(search: Search) -> Result<BenchReport, Failure> {
     let mut random = StdRng::seed_from_u64(search.seed);
     let worlds = shapes().into_iter().map(|(_, recipe)| Find::World(recipe));
     let known: Vec<Find> =
@@ -78,7 +78,7 @@ pub fn run(search: Search) -> Result<Report, Failure> {
     for (ratio, find) in best.into_iter().take(10) {
         table.row(cells![ratio, search.boxes, tried, format!("{find:?}")]);
     }
-    Ok(Report::new("worst", vec![table]))
+    Ok(BenchReport::new("worst", vec![table]))
 }
 
 fn mutated(recipe: &Recipe, random: &mut StdRng) -> Recipe {
@@ -135,8 +135,8 @@ fn mutated_part(mut part: Part, random: &mut StdRng) -> Part {
         5 => part.corner[k] += part.width[k] * factor(random, 1.0),
         6 => part.decades = random.random_range(0.0..4.0),
         7 => {
-            part.place =
-                [Place::Anywhere, Place::Line, Place::Lattice, Place::Around][random.random_range(0..4)];
+            part.place = [Placement::Anywhere, Placement::Line, Placement::Lattice, Placement::Around]
+                [random.random_range(0..4)];
         }
         _ => {
             let scale = factor(random, 3.0);

@@ -1,6 +1,6 @@
 // Rows: the pairs of each first box, one row after the other.
 
-// Most pairs of a row whose places are found by counting; longer rows are sorted through a bitmap.
+// Maximum number of pairs of a row whose places are found by counting; longer rows are sorted through a bitmap.
 const SHORT_ROW = 512u;
 // Second boxes of a long row that a workgroup sorts.
 const WINDOW = 32768u;

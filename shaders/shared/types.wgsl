@@ -2,9 +2,9 @@
 
 // Lanes of a workgroup, and boxes of a segment (PBIG 5.2).
 const LANES = 256u;
-// Most levels of cells. The last level has one cell for everything.
+// Maximum number of levels of cells. The last level has one cell for everything.
 const MAX_LEVELS = 8u;
-// Most cells that a box touches along one axis of its level.
+// Maximum number of cells that a box touches along one axis of its level.
 const MAX_SPAN = 4;
 // Level of an invalid box.
 const NO_LEVEL = 0xffffffffu;

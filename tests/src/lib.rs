@@ -1,13 +1,9 @@
 //! The corpus, with the backends and engines to try on it.
 
-mod corpus;
-
-pub use corpus::{Case, corpus, difference};
+pub use pbig_harness::corpus::{Case, corpus, difference};
 
 use pbig_core::{Backend, BroadPhase, Config, Engine, Finder, PairDevice};
-use pbig_gpu::{CellRule, Coding, GpuOptions};
-// `corpus.rs` finds the generator as `crate::boxes`, because the crate in `wasm/` includes both files.
-use pbig_harness::boxes;
+use pbig_gpu::{Coding, GpuOptions};
 use pbig_harness::options;
 use std::io::Write;
 use std::ops::Deref;
@@ -86,8 +82,11 @@ pub fn without_gpu() -> bool {
     *IS_LEFT_OUT
 }
 
-/// By the values of `PBIG_GPU` and `CI`.
-fn leaves_out(gpu: Option<&str>, ci: Option<&str>) -> Result<bool, String> {
+/// Returns true if devices are left out, by the values of `PBIG_GPU` and `CI`.
+///
+/// # Errors
+/// With `CI=true`, and with another value of `PBIG_GPU`.
+pub fn leaves_out(gpu: Option<&str>, ci: Option<&str>) -> Result<bool, String> {
     match (gpu, ci) {
         (None, _) => Ok(false),
         (Some("none"), Some("true")) => Err("CI=true tests the GPU, too: not with PBIG_GPU=none".to_owned()),
@@ -142,31 +141,8 @@ pub fn engines() -> Vec<(&'static str, Way)> {
     ]
 }
 
-/// The settings of PBIG's grid on the CPU, by name.
-pub fn pbig_grids() -> Vec<(&'static str, GpuOptions)> {
-    let options = GpuOptions::DEFAULT;
-    vec![
-        ("pbig", options),
-        ("pbig by density", GpuOptions { cell_rule: CellRule::Density, ..options }),
-        ("pbig rows", GpuOptions { small_cell: 1, ..options }),
-    ]
-}
-
 /// The grid on the GPU, for sets of every size.
 pub fn gpu(coding: Coding) -> Way {
     let gpu = GpuOptions { coding, all_pairs_up_to: 0, count_tests: true, ..GpuOptions::DEFAULT };
     Way { config: Config { backend: Backend::Device, ..Config::DEFAULT }, gpu }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn ci_is_never_without_a_gpu() {
-        assert_eq!(leaves_out(None, Some("true")), Ok(false));
-        assert_eq!([None, Some("")].map(|ci| leaves_out(Some("none"), ci)), [Ok(true), Ok(true)]);
-        assert!(leaves_out(Some("none"), Some("true")).is_err_and(|why| why.contains("CI=true")));
-        assert!(leaves_out(Some("some"), None).is_err_and(|why| why.contains("PBIG_GPU=some")));
-    }
 }

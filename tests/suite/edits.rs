@@ -18,7 +18,7 @@ const LIMIT: u64 = 300_000;
 const LONE: ProxyFilter = ProxyFilter { memberships: 0, mask: 0, ..ProxyFilter::ALL };
 
 /// The boxes given to a broad phase, and the pairs that it should report.
-struct World {
+struct EditedWorld {
     boxes: Vec<Aabb>,
     filters: Vec<ProxyFilter>,
     /// The pairs at the last update that succeeded.
@@ -32,7 +32,7 @@ struct World {
     parted: usize,
 }
 
-impl World {
+impl EditedWorld {
     fn new() -> Self {
         let boxes = BoxSet::named("pile").expect("the set exists").boxes(BOXES, 3);
         let limits = Limits { max_pairs: LIMIT, ..Limits::DEFAULT };
@@ -120,7 +120,7 @@ fn without(pairs: &[Pair], others: &[Pair]) -> Vec<Pair> {
 }
 
 fn rounds() {
-    let mut world = World::new();
+    let mut world = EditedWorld::new();
     for (id, aabb) in (0..).zip(world.boxes.clone()) {
         world.set(id, aabb, ProxyFilter::ALL);
     }

@@ -3,14 +3,14 @@
 
 use crate::follower::Follower;
 use pbig_core::{BroadPhase, Config, Events, ProxyFilter};
-use pbig_harness::motions::{Density, Motion, Scene};
+use pbig_harness::motions::{Density, Motion, MovingBoxes};
 use pbig_tests::engines;
 use rayon::ThreadPoolBuilder;
 
 const FRAMES: usize = 14;
 
 /// Sets the boxes that changed in a frame, and removes the absent ones.
-fn tell(world: &mut Follower, scene: &Scene, changed: &[u32]) {
+fn tell(world: &mut Follower, scene: &MovingBoxes, changed: &[u32]) {
     for &id in changed {
         let aabb = scene.boxes()[id as usize];
         if aabb.is_valid() {
@@ -23,7 +23,7 @@ fn tell(world: &mut Follower, scene: &Scene, changed: &[u32]) {
 
 /// Plays a sequence, compared with the oracle in every frame.
 fn play(config: Config, motion: Motion, density: Density, n: usize, seed: u64) {
-    let mut scene = Scene::new(motion, density, n, seed);
+    let mut scene = MovingBoxes::new(motion, density, n, seed);
     let mut world = Follower::new(config, n);
     let all: Vec<u32> = (0..n as u32).collect();
     tell(&mut world, &scene, &all);
@@ -57,7 +57,7 @@ fn a_thousand_sequences_of_every_motion_agree_with_the_oracle() {
 fn events(motion: Motion, threads: usize) -> Vec<Events> {
     let pool = ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool");
     pool.install(|| {
-        let mut scene = Scene::new(motion, Density::Dense, 20_000, 7);
+        let mut scene = MovingBoxes::new(motion, Density::Dense, 20_000, 7);
         let ids: Vec<u32> = (0..20_000).collect();
         let mut broad_phase = BroadPhase::default();
         let mut all = Vec::new();

@@ -124,11 +124,6 @@ impl Engine {
         let kind = Kind::pbig(PbigConfig { max_pairs, ..PbigConfig::DEFAULT });
         Self { kind, ..Self::new(Choice::Auto) }
     }
-
-    /// Makes one step of the world, and returns its collision events.
-    pub(crate) fn step_with_events(&mut self, world: &mut World) -> Vec<CollisionEvent> {
-        world.step_with_events(self)
-    }
 }
 
 #[cfg(test)]

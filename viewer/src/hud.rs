@@ -68,7 +68,7 @@ fn add_keys(sheet: &mut Sheet, size: [f32; 2], text: f32) {
 }
 
 /// One side of a comparison.
-pub struct Side<'a> {
+pub struct HudSide<'a> {
     /// The broad phase.
     pub choice: Choice,
     /// Its times.
@@ -84,7 +84,7 @@ const COMPARISON_TEXT_SHARE: f32 = 0.038;
 
 /// Lays out one half of a comparison: the broad phase's name, its times, the median one in large letters, and the graph.
 /// `size` is the half's, in pixels.
-pub fn comparison(side: &Side<'_>, size: [f32; 2]) -> Sheet {
+pub fn comparison(side: &HudSide<'_>, size: [f32; 2]) -> Sheet {
     let mut sheet = Sheet::default();
     let text = COMPARISON_TEXT_SHARE * size[1];
     add_times(&mut sheet, side, size[0], text);
@@ -96,7 +96,7 @@ pub fn comparison(side: &Side<'_>, size: [f32; 2]) -> Sheet {
     sheet
 }
 
-fn add_times(sheet: &mut Sheet, side: &Side<'_>, width: f32, text: f32) {
+fn add_times(sheet: &mut Sheet, side: &HudSide<'_>, width: f32, text: f32) {
     let colour = colour_of(side.choice);
     let name = if side.choice == Choice::Stock { "rapier's own broad phase" } else { "pbig" };
     let broad_phase = side.history.summary(|step| step.broad_phase_ms);
@@ -180,7 +180,7 @@ mod tests {
         for broad_phase_ms in [1.0, 1.5, 9.0] {
             history.push(StepTime { choice: Choice::Stock, swaps: 0, broad_phase_ms, step_ms: 9.0 });
         }
-        let side = Side { choice: Choice::Stock, history: &history, end_ms: 10.0, title: "step 2".into() };
+        let side = HudSide { choice: Choice::Stock, history: &history, end_ms: 10.0, title: "step 2".into() };
         let sheet = comparison(&side, [640.0, 640.0]);
         let has = |text: &str| sheet.texts.iter().any(|found| found.text == text);
         assert!(has("1.50 ms") && has("rapier's own broad phase") && has("step 2"));

@@ -6,7 +6,7 @@ use crate::draw::{Quality, View};
 use crate::error::Error;
 use crate::figures::Figures;
 use crate::graph::scale_end_ms;
-use crate::hud::{self, Side};
+use crate::hud::{self, HudSide};
 use crate::options::Options;
 use crate::sheet::Sheet;
 use crate::simulation::Simulation;
@@ -100,7 +100,7 @@ impl Studio {
         let (bodies, steps) = (simulation.world.bodies.len(), simulation.steps);
         let title = format!("{} objects, step {steps}: broad phase, ms a step", thousands(bodies));
         let (choice, history) = (simulation.engine.choice(), &simulation.history);
-        hud::comparison(&Side { choice, history, end_ms: scale_end_ms(longest), title }, size)
+        hud::comparison(&HudSide { choice, history, end_ms: scale_end_ms(longest), title }, size)
     }
 }
 

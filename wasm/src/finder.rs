@@ -1,9 +1,9 @@
 //! `Finder` against the oracle.
 
 use crate::Fault;
-use crate::boxes::moved;
-use crate::corpus::difference;
 use pbig_core::{Aabb, Backend, Config, Error, Finder, Pair, ProxyFilter, oracle};
+use pbig_harness::boxes::moved;
+use pbig_harness::corpus::difference;
 
 /// Compares the pairs of a set of boxes with the oracle's: as they are, moved, and with filters.
 pub(crate) fn check(boxes: &[Aabb], backend: Backend, fault: Fault) -> Result<(), String> {

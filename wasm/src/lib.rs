@@ -2,20 +2,15 @@
 //!
 //! `run.mjs` calls the exported functions in node; `main.rs` calls the same checks in a native program.
 
-#[path = "../../crates/pbig-harness/src/boxes.rs"]
-pub mod boxes;
-#[path = "../../tests/src/corpus.rs"]
-pub mod corpus;
 pub mod exports;
 mod fault;
 mod finder;
-mod follower;
 mod motion;
 mod world;
 
-use corpus::{Case, corpus};
 pub use fault::Fault;
 use pbig_core::Backend;
+use pbig_harness::corpus::{Case, corpus};
 
 /// The backends that need no device.
 const BACKENDS: [Backend; 3] = [Backend::Auto, Backend::Cpu, Backend::Brute];

@@ -1,9 +1,9 @@
 //! `BroadPhase` over frames in which boxes move, leave, return and change their filters.
 
 use crate::Fault;
-use crate::boxes::moved;
-use crate::follower::Follower;
-use pbig_core::{Aabb, Backend, Config, ProxyFilter};
+use pbig_core::{Aabb, Backend, BroadPhase, Config, ProxyFilter};
+use pbig_harness::boxes::moved;
+use pbig_harness::follower::Follower;
 
 /// Margins in the unit of the boxes: none, and one that most small motions stay within.
 const MARGINS: [f32; 2] = [0.0, 0.05];
@@ -12,7 +12,12 @@ const MARGINS: [f32; 2] = [0.0, 0.05];
 pub(crate) fn check(boxes: &[Aabb], backend: Backend, fault: Fault) -> Result<(), String> {
     for margin in MARGINS {
         let config = Config { backend, margin, ..Config::DEFAULT };
-        let mut world = Follower::new(config, boxes.len(), fault)?;
+        let broad_phase = BroadPhase::new(config).map_err(|error| error.to_string())?;
+        let mut world = Follower::new(broad_phase, boxes.len());
+        world.spoil = Box::new(move |events| {
+            fault.lose(Fault::AddedLost, &mut events.added);
+            fault.lose(Fault::RemovedLost, &mut events.removed);
+        });
         for (frame, play) in FRAMES.iter().enumerate() {
             play(&mut world, boxes)
                 .and_then(|()| world.update())

@@ -3,7 +3,6 @@
 use pbig_core::{Aabb, Backend, Config, Finder, Limits, Pair, oracle};
 use pbig_gpu::layout::Located;
 use pbig_gpu::{Coding, GpuError, GpuFinder, GpuOptions, adapters};
-use pbig_harness::pbig_grid::pbig_grid;
 use pbig_harness::prelude::*;
 use pbig_harness::report::simd_found;
 
@@ -100,21 +99,15 @@ fn describe(i: usize, adapter: &wgpu::Adapter, opened: &Result<GpuFinder, GpuErr
 }
 
 /// A search with its name.
-type Search = (String, Box<dyn FnMut(&[Aabb]) -> Result<Vec<Pair>, String>>);
+type NamedSearch = (String, Box<dyn FnMut(&[Aabb]) -> Result<Vec<Pair>, String>>);
 
-fn cpu_searches() -> Vec<Search> {
-    let by_pbigs_grid =
-        |boxes: &[Aabb]| Ok(pbig_grid(boxes, &GpuOptions::DEFAULT).map_err(|error| error.to_string())?.pairs);
+fn cpu_searches() -> Vec<NamedSearch> {
     let with = |backend| Finder::new(Config { backend, ..Config::DEFAULT });
-    vec![
-        by("cpu", with(Backend::Cpu)),
-        by("brute", with(Backend::Brute)),
-        ("pbig grid".into(), Box::new(by_pbigs_grid)),
-    ]
+    vec![by("cpu", with(Backend::Cpu)), by("brute", with(Backend::Brute))]
 }
 
 /// Returns a device's searches in both codings, always with the grid.
-fn gpu_searches((name, gpu): &(String, GpuFinder)) -> [Search; 2] {
+fn gpu_searches((name, gpu): &(String, GpuFinder)) -> [NamedSearch; 2] {
     [(Coding::Plain, "plain"), (Coding::Packed, "packed")].map(|(coding, words)| {
         let options = GpuOptions { coding, all_pairs_up_to: 0, ..GpuOptions::DEFAULT };
         let config = Config { backend: Backend::Device, ..Config::DEFAULT };
@@ -124,7 +117,7 @@ fn gpu_searches((name, gpu): &(String, GpuFinder)) -> [Search; 2] {
 }
 
 /// Returns a finder's search. A device that leaves the work to the CPU is an error.
-fn by(name: &str, mut finder: Finder) -> Search {
+fn by(name: &str, mut finder: Finder) -> NamedSearch {
     let find = move |boxes: &[Aabb]| {
         let pairs = finder.find(boxes).map_err(|error| error.to_string())?.to_vec();
         finder.report().fallback.clone().map_or(Ok(pairs), Err)
@@ -133,7 +126,7 @@ fn by(name: &str, mut finder: Finder) -> Search {
 }
 
 /// Tests a search on every set; returns what was wrong.
-fn test((name, mut find): Search) -> Result<Vec<String>, Failure> {
+fn test((name, mut find): NamedSearch) -> Result<Vec<String>, Failure> {
     let mut wrong = Vec::new();
     for set in BoxSet::ALL {
         let boxes = set.boxes(2000, 1);

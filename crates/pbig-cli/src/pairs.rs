@@ -4,7 +4,7 @@ use crate::options::{
     THREADS, check_output, plan_text, print_summary, search_text, stages, whole, with_threads,
 };
 use pbig_core::{Aabb, Finder};
-use pbig_harness::files::{BOXES_OR_PAIRS, BoxList, Place, read_boxes, write_pairs};
+use pbig_harness::files::{BOXES_OR_PAIRS, BoxList, Location, read_boxes, write_pairs};
 use pbig_harness::options::BackendOption;
 use pbig_harness::prelude::*;
 use std::path::{Path, PathBuf};
@@ -49,7 +49,7 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
 
 fn refuse_invalid(path: &Path, list: &BoxList) -> Result<(), Failure> {
     let Some((index, place)) = list.first_invalid else { return Ok(()) };
-    let line = if let Place::Line(_) = place { format!("{place}: ") } else { String::new() };
+    let line = if let Location::Line(_) = place { format!("{place}: ") } else { String::new() };
     let what = "has a NaN or a minimum above its maximum; mend it, or leave out --strict";
     Err(Failure::Input(format!("{}: {line}box {index} (counted from 0) {what}", path.display())))
 }

@@ -4,7 +4,6 @@ use crate::device::{DeviceFailure, DeviceFound, PairDevice};
 use crate::policy::{AvailableDevice, Choice, choose_backend};
 use crate::report::{Clock, Report, stage};
 use crate::{Algorithm, Config, Error, Pair, Plan, parallel};
-use std::time::Duration;
 
 /// Pairs of an answer that a thread checks at a time.
 const PIECE: usize = 1 << 16;
@@ -108,11 +107,9 @@ impl DeviceSlot {
 
 /// Says in the report what the device did.
 fn note_success(found: &DeviceFound, clock: &mut Clock, report: &mut Report) {
-    // The device's own times for its map; the rest of the call is check, transfer and decoding.
-    let kernels = found.report.kernels.iter().filter(|(name, _)| !name.starts_with("check"));
+    // The rest of the call is check, sort, transfer and decoding.
     let time = clock.lap();
-    let add = |sum: Duration, (_, more): &(_, Duration)| sum.saturating_add(*more);
-    let map = kernels.fold(Duration::ZERO, add).min(time);
+    let map = found.report.map.min(time);
     report.stages.map += map;
     report.stages.check += time - map;
     let algorithm = if found.valid < 2 { Algorithm::Nothing } else { Algorithm::Device };

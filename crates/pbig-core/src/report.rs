@@ -138,6 +138,8 @@ pub struct DeviceReport {
     pub wait: Duration,
     /// Time of the host: decoding.
     pub decode: Duration,
+    /// Time on the device: what comes before the tests.
+    pub map: Duration,
     /// Time on the device by kernel.
     pub kernels: Vec<(&'static str, Duration)>,
     /// Edge of the smallest cells, in the boxes' length unit; 0 where every pair was tested.

@@ -75,7 +75,7 @@ fn whole_pairs(words: &[u32]) -> Result<&[Pair], DecodeError> {
     bytemuck::try_cast_slice(words).map_err(|_| half)
 }
 
-/// Appends the pairs of an update to those that were added or to those that ended, by their marks ([`ENDED`]).
+/// Appends the pairs of an update to the added or the ended pairs, by their marks ([`ENDED`]).
 ///
 /// # Errors
 /// As [`plain`].
@@ -148,7 +148,7 @@ fn count(words: &[u32], range: &Range<usize>) -> usize {
     pairs
 }
 
-/// Returns the number of words of a row with so many partners.
+/// Returns the number of words of a row with this number of partners.
 fn row_len(partners: usize) -> usize {
     (partners + 2).div_ceil(4)
 }
@@ -244,7 +244,7 @@ impl Reader<'_> {
     }
 }
 
-/// Returns the number of pairs of so many boxes.
+/// Returns the number of pairs of this number of boxes.
 pub fn pair_count(boxes: u32) -> u64 {
     u64::from(boxes) * u64::from(boxes.saturating_sub(1)) / 2
 }

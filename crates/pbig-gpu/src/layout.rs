@@ -6,9 +6,9 @@ use pbig_core::{Aabb, ProxyFilter};
 
 /// Number of lanes of a workgroup, and of boxes of a segment (PBIG 5.2).
 pub const LANES: u32 = 256;
-/// Most levels of cells. The last level has one cell for everything.
+/// Maximum number of levels of cells. The last level has one cell for everything.
 pub const MAX_LEVELS: usize = 8;
-/// Most cells that a box touches along one axis of its level.
+/// Maximum number of cells that a box touches along one axis of its level.
 pub const MAX_SPAN: u32 = 4;
 /// Fewest cells along an axis that is divided. Two overlapping boxes must not meet a second time by wrapping around, so the
 /// `2 * MAX_SPAN - 1` cells that they touch together must be distinct.
@@ -19,7 +19,7 @@ pub const NO_LEVEL: u32 = u32::MAX;
 pub const CELLS_PER_BLOCK: u32 = 4 * LANES;
 /// Number of lists of a workgroup of the scan.
 pub const COUNTS_PER_BLOCK: u32 = 4 * LANES;
-/// Most pairs of a row that is ordered by counting.
+/// Maximum number of pairs of a row that is ordered by counting.
 pub const SHORT_ROW: u32 = 512;
 /// Second boxes of a long row that a workgroup orders.
 pub const WINDOW: u32 = 32_768;

@@ -36,7 +36,7 @@ pub mod pbig;
 
 #[doc(hidden)]
 #[cfg(feature = "wgpu")]
-pub use gpu::study;
+pub use gpu::testing;
 #[cfg(feature = "wgpu")]
 pub use gpu::{GpuError, GpuFinder, GpuPlan, adapters, describe};
 pub use options::{CellRule, Coding, GpuOptions};

@@ -9,7 +9,7 @@ pub enum CellRule {
     /// touches.
     #[default]
     Objective,
-    /// Avril's section 4.1: the cell that holds that many boxes at the density of the space, whatever their sizes.
+    /// Avril's section 4.1: the cell that holds this number of boxes at the density of the space. Sizes do not matter.
     Density,
 }
 
@@ -36,10 +36,6 @@ pub struct GpuOptions {
     pub pipelining: bool,
     /// If true, the rows of a large cell get equally many pairs (PBIG table IV, "load balancing").
     pub load_balancing: bool,
-    /// Estimate of the row in Avril's mapping (Avril 3.3). 0: the device's square root. 1 to 4: Carmack's inverse root with
-    /// so many Newton steps. 5 to 8: Lomont's, with 1 to 4 steps. 9: bisection. All are exact, because integers correct
-    /// the estimate.
-    pub root: u32,
     /// Number of small and of large work items of a submission. They have at most 256 and 524,288 tests each. Longer
     /// submissions may exceed the time limit of some systems.
     pub chunk: [u32; 2],
@@ -56,11 +52,11 @@ pub struct GpuOptions {
     pub boxes_per_cell: f32,
     /// Rule that turns the wanted boxes per cell into a cell size.
     pub cell_rule: CellRule,
-    /// Most boxes of a cell, up to 256, whose pairs are tested through Avril's mapping. Larger cells are tested by PBIG's
-    /// balanced rows.
+    /// Maximum number of boxes of a cell, up to 256, whose pairs are tested through Avril's mapping. Larger cells are
+    /// tested by PBIG's balanced rows.
     pub small_cell: u32,
-    /// Most boxes of a set whose pairs are all tested, without a grid. 0: there is always a grid. Avril's table 7 puts the
-    /// crossover at 1000.
+    /// Maximum number of boxes of a set whose pairs are all tested, without a grid. 0: there is always a grid. Avril's
+    /// table 7 puts the crossover at 1000.
     pub all_pairs_up_to: u32,
     /// If true, the device counts the tests that it makes, those that repeat another and those of boxes that are apart. It
     /// costs four more atomic operations for each workgroup.
@@ -76,7 +72,6 @@ impl GpuOptions {
         coding: Coding::Auto,
         pipelining: true,
         load_balancing: true,
-        root: 0,
         chunk: [1 << 18, 1 << 12],
         max_bytes: u64::MAX,
         first_bytes: 1 << 16,

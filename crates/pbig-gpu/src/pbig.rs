@@ -124,7 +124,7 @@ pub fn cells_in(lengths: [f32; 3], cell: f32) -> f64 {
 
 /// Returns the sample without boxes as wide as the range of all boxes, such as a ground or a half-space.
 ///
-/// These boxes touch so many cells that they are tested against all others instead. They would also stretch the space.
+/// Such a box touches too many cells, so it is tested against all others instead. It would also stretch the space.
 pub fn ordinary(summary: &Summary) -> Vec<Aabb> {
     let widths: [f32; 3] = std::array::from_fn(|k| summary.range(k).1 - summary.range(k).0);
     let largest = widths.into_iter().fold(0.0, f32::max);
@@ -178,7 +178,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn invalid_boxes_are_not_counted_and_infinite_ones_are_a_class_of_their_own() {
+    fn invalid_boxes_are_not_counted_and_infinite_ones_have_a_class() {
         let boxes = [
             Aabb::NOWHERE,
             Aabb::new([1.0; 3], [0.0; 3]),

@@ -119,7 +119,7 @@ pub fn measured<S>(
 }
 
 /// Returns the mean of the medians of all places in which there is a time.
-pub fn mean_of_medians<'a>(places: impl IntoIterator<Item = &'a [f64]>) -> f64 {
+fn mean_of_medians<'a>(places: impl IntoIterator<Item = &'a [f64]>) -> f64 {
     let median = |times: &[f64]| Spread::of(times.iter().copied()).median;
     let seen: Vec<f64> = places.into_iter().filter(|times| !times.is_empty()).map(median).collect();
     seen.iter().sum::<f64>() / seen.len().max(1) as f64

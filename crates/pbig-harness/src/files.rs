@@ -1,11 +1,7 @@
 //! Boxes in files, as the program `pbig` reads and writes them.
 
-// The fuzz targets compile this file at another place: with a path it finds its parts there too.
-#[path = "files/npy.rs"]
 mod npy;
-#[path = "files/text.rs"]
 mod text;
-#[path = "files/write.rs"]
 mod write;
 
 pub use npy::{npy_boxes, npy_frames};
@@ -46,19 +42,19 @@ pub struct BoxList {
     /// The boxes, perhaps invalid ones.
     pub boxes: Vec<Aabb>,
     /// The first box that is invalid: its index and its place in the file.
-    pub first_invalid: Option<(usize, Place)>,
+    pub first_invalid: Option<(usize, Location)>,
 }
 
 /// The place of a box in a file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Place {
+pub enum Location {
     /// Line of a text, counted from 1.
     Line(usize),
     /// Row of an array, counted from 0.
     Row(usize),
 }
 
-impl fmt::Display for Place {
+impl fmt::Display for Location {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Line(line) => write!(f, "line {line}"),
@@ -68,7 +64,7 @@ impl fmt::Display for Place {
 }
 
 impl BoxList {
-    fn push(&mut self, aabb: Aabb, place: Place) {
+    fn push(&mut self, aabb: Aabb, place: Location) {
         if self.first_invalid.is_none() && !aabb.is_valid() {
             self.first_invalid = Some((self.boxes.len(), place));
         }

@@ -9,7 +9,7 @@ pub const MEANT_FOR: usize = 25_000;
 
 /// The arrangement of a part's boxes in its region.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Place {
+pub enum Placement {
     /// Anywhere.
     Anywhere,
     /// At equal distances along the region's diagonal.
@@ -26,7 +26,7 @@ pub struct Part {
     /// The share of all boxes, relative to the other parts'.
     pub weight: u32,
     /// The arrangement of the boxes.
-    pub place: Place,
+    pub place: Placement,
     /// The lower corner of the region.
     pub corner: [f32; 3],
     /// The widths of the region.
@@ -43,7 +43,7 @@ impl Part {
     /// Unit cubes, about one pair for four boxes.
     pub const CUBES: Self = Self {
         weight: 1,
-        place: Place::Anywhere,
+        place: Placement::Anywhere,
         corner: [0.0; 3],
         width: [74.0; 3],
         growth: 1.0 / 3.0,
@@ -55,7 +55,7 @@ impl Part {
         let width = self.width.map(|width| width * scale.powf(self.growth));
         let at = self.at(i, count, random);
         let size = match self.place {
-            Place::Around => at[0].abs().max(at[1].abs()).max(at[2].abs()),
+            Placement::Around => at[0].abs().max(at[1].abs()).max(at[2].abs()),
             _ => 10f32.powf(-self.decades * random.random_range(0.0..1.0)),
         };
         let center = std::array::from_fn(|k| self.corner[k] + at[k] * width[k]);
@@ -65,13 +65,13 @@ impl Part {
     /// Returns where a box lies, in widths.
     fn at(&self, i: usize, count: usize, random: &mut StdRng) -> [f32; 3] {
         match self.place {
-            Place::Anywhere => [0; 3].map(|_| random.random_range(0.0..1.0)),
-            Place::Line => [i as f32 / count.max(1) as f32; 3],
-            Place::Lattice => {
+            Placement::Anywhere => [0; 3].map(|_| random.random_range(0.0..1.0)),
+            Placement::Line => [i as f32 / count.max(1) as f32; 3],
+            Placement::Lattice => {
                 let side = (count as f64).cbrt().ceil().max(1.0) as usize;
                 [i % side, i / side % side, i / side / side].map(|cell| cell as f32 / side as f32)
             }
-            Place::Around => {
+            Placement::Around => {
                 let direction = [0; 3].map(|_| random.random_range(-1.0f32..1.0));
                 let length = direction.iter().fold(1e-3f32, |all, x| all.max(x.abs()));
                 let distance = 10f32.powf(-10.0 * random.random_range(0.0f32..1.0));
@@ -228,7 +228,7 @@ pub fn shapes() -> Vec<(&'static str, Recipe)> {
             "two scales",
             &[Part { width: [1000.0; 3], ..CUBES }, Part { width: [0.01; 3], half: [5e-6; 3], ..SMALL }],
         ),
-        ("size by distance", &[Part { place: Place::Around, width: [1e5; 3], half: [2e3; 3], ..SMALL }]),
+        ("size by distance", &[Part { place: Placement::Around, width: [1e5; 3], half: [2e3; 3], ..SMALL }]),
         ("tiny ones in the volume of one", &[CUBES, Part { width: [0.9; 3], half: [5e-4; 3], ..SMALL }]),
         (
             "infinite needles far away",
@@ -251,7 +251,7 @@ pub fn shapes() -> Vec<(&'static str, Recipe)> {
         (
             "a diagonal line",
             &[Part {
-                place: Place::Line,
+                place: Placement::Line,
                 width: [MEANT_FOR as f32; 3],
                 half: [0.4; 3],
                 growth: 1.0,
@@ -317,7 +317,7 @@ pub fn shapes() -> Vec<(&'static str, Recipe)> {
                 },
             ],
         ),
-        ("a lattice that touches", &[Part { place: Place::Lattice, width: [29.0; 3], ..CUBES }]),
+        ("a lattice that touches", &[Part { place: Placement::Lattice, width: [29.0; 3], ..CUBES }]),
         (
             "all on one plane of a huge floor",
             &[
@@ -329,7 +329,7 @@ pub fn shapes() -> Vec<(&'static str, Recipe)> {
         (
             "needles in a thin world",
             &[Part {
-                place: Place::Line,
+                place: Placement::Line,
                 corner: [0.47, 1.3, 0.0],
                 width: [0.02, 2200.0, 0.01],
                 half: [8e-7, 3000.0, 55.0],
@@ -345,14 +345,19 @@ pub fn shapes() -> Vec<(&'static str, Recipe)> {
 /// Histories after which a grid that is edited again and again takes quadratic time.
 pub fn histories() -> Vec<(&'static str, History)> {
     let start =
-        || Recipe(vec![Part { place: Place::Lattice, width: [45.0; 3], half: [0.3; 3], ..Part::CUBES }]);
+        || Recipe(vec![Part { place: Placement::Lattice, width: [45.0; 3], half: [0.3; 3], ..Part::CUBES }]);
     let history = |change: Change| History { start: start(), change, updates: 25 };
     let part = |part: Part| Change::To(Recipe(vec![part]));
     let tiny = Part { corner: [20.0; 3], width: [0.9; 3], growth: 0.0, half: [1e-3; 3], ..Part::CUBES };
-    let line =
-        Part { place: Place::Line, width: [MEANT_FOR as f32; 3], growth: 1.0, half: [0.3; 3], ..Part::CUBES };
+    let line = Part {
+        place: Placement::Line,
+        width: [MEANT_FOR as f32; 3],
+        growth: 1.0,
+        half: [0.3; 3],
+        ..Part::CUBES
+    };
     // Found by search: a cube that meets all tiny ones must not pay for the others that meet none.
-    let lattice = Part { place: Place::Lattice, ..Part::CUBES };
+    let lattice = Part { place: Placement::Lattice, ..Part::CUBES };
     let tiny_lattice = Part { weight: 14, width: [0.1, 0.2, 0.2], half: [1.4e-3; 3], ..lattice };
     let cubes = Part { width: [45.0, 45.0, 330.0], half: [0.3; 3], ..lattice };
     let crowd = Recipe(vec![cubes, tiny_lattice]);
@@ -360,7 +365,7 @@ pub fn histories() -> Vec<(&'static str, History)> {
     let moved = ("a crowd within a cube, moved", History { start: crowd, change, updates: 25 });
     // Found by search: what the last rebuild took says nothing when most of its pairs have ended.
     let crowd = Recipe(vec![Part {
-        place: Place::Line,
+        place: Placement::Line,
         width: [1.4, 0.7, 0.5],
         growth: 1.0,
         half: [0.01; 3],

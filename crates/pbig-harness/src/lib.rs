@@ -1,24 +1,40 @@
 //! Box sets, motions, files, the headless runner and the frame of measurements behind the program `pbig`, the
 //! studies, the tests and the examples.
 
+#[cfg(feature = "run")]
 pub mod bench;
 pub mod boxes;
+#[cfg(feature = "run")]
 pub mod chart;
+#[cfg(feature = "checks")]
+pub mod checks;
+pub mod corpus;
+#[cfg(feature = "run")]
 pub mod counting;
-pub mod duel;
+#[cfg(feature = "run")]
 pub mod field;
+#[cfg(feature = "files")]
 pub mod files;
+pub mod follower;
+#[cfg(feature = "run")]
 pub mod gpu_race;
 pub mod hard;
 pub mod motions;
+#[cfg(feature = "run")]
 pub mod options;
+#[cfg(feature = "run")]
 pub mod output;
 pub mod pair_index;
-pub mod pbig_grid;
+#[cfg(feature = "run")]
 pub mod prelude;
+#[cfg(feature = "run")]
 pub mod queries;
+#[cfg(feature = "run")]
 pub mod report;
+#[cfg(feature = "run")]
 pub mod runner;
+#[cfg(feature = "run")]
 pub mod table;
 
+#[cfg(feature = "run")]
 pub use pbig_scenes::{frames, scenes, world};

@@ -111,7 +111,7 @@ impl Density {
 
 /// Boxes that move.
 #[derive(Debug)]
-pub struct Scene {
+pub struct MovingBoxes {
     motion: Motion,
     /// Edge of the cube that holds the centers, in the boxes' length unit.
     side: f32,
@@ -131,7 +131,7 @@ pub struct Scene {
     changed: Vec<u32>,
 }
 
-impl Scene {
+impl MovingBoxes {
     /// Makes `n` boxes. With [`Motion::Churn`] a tenth of them is absent.
     pub fn new(motion: Motion, density: Density, n: usize, seed: u64) -> Self {
         let mut rng = StdRng::seed_from_u64(seed);

@@ -4,6 +4,6 @@ pub use crate::bench::{COMPARED, Effort, MS, Took, alone, compared, measured, me
 pub use crate::boxes::{BoxSet, Movers, Wander, cubes, moved};
 pub use crate::cells;
 pub use crate::output::{Failure, check, print, progress, tracked};
-pub use crate::report::Report;
+pub use crate::report::BenchReport;
 pub use crate::runner::{Spread, milliseconds};
 pub use crate::table::{Table, Value};

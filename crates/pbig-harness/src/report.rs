@@ -8,7 +8,7 @@ use std::path::Path;
 
 /// The tables and charts of a suite.
 #[derive(Clone, Debug, Default)]
-pub struct Report {
+pub struct BenchReport {
     /// The name of the suite, with which the names of its files begin.
     pub suite: String,
     /// Conditions of the run besides the machine, each with its name.
@@ -19,7 +19,7 @@ pub struct Report {
     pub charts: Vec<Chart>,
 }
 
-impl Report {
+impl BenchReport {
     /// Returns a report without conditions and charts.
     pub fn new(suite: &str, tables: Vec<Table>) -> Self {
         Self { suite: suite.into(), tables, ..Self::default() }
@@ -128,7 +128,7 @@ mod tests {
     #[test]
     fn a_file_has_the_machine_in_its_head_and_a_row_a_case() {
         let head = vec![("adapter", "some".to_owned())];
-        let one = Report { head, ..Report::new("suite", vec![table("one")]) };
+        let one = BenchReport { head, ..BenchReport::new("suite", vec![table("one")]) };
         let (name, text) = &one.files()[0];
         assert!(text.starts_with("# machine: ") && text.contains("\n# commit: "), "{text}");
         assert!(text.ends_with("# adapter: some\ncase,ms\n\"a, b\",0.5\n"), "{text}");
@@ -141,9 +141,10 @@ mod tests {
         let folder = tempfile::tempdir().expect("a folder");
         let inner = folder.path().join("inner");
         let tables = vec![table("one"), table("Two")];
-        Report::new("suite", tables.clone()).write(&inner).expect("written");
+        BenchReport::new("suite", tables.clone()).write(&inner).expect("written");
         assert!(inner.join("suite-one.csv").is_file() && inner.join("suite-two.csv").is_file());
-        let error = Report::new("suite", tables).write(&inner.join("suite-one.csv")).expect_err("no folder");
+        let error =
+            BenchReport::new("suite", tables).write(&inner.join("suite-one.csv")).expect_err("no folder");
         assert!(error.to_string().contains("suite-one.csv"), "{error}");
     }
 }

@@ -24,7 +24,7 @@ const KINDS: [Format; 5] =
 
 const SETS: [&str; 5] = ["uniform", "gaussian", "unit", "mixed", "pile"];
 
-pub(super) fn run(quick: bool) -> Result<Report, Failure> {
+pub(super) fn run(quick: bool) -> Result<BenchReport, Failure> {
     let sizes: &[usize] = if quick { &[3000] } else { &[10_000, 100_000, 1_000_000] };
     let columns = "set | boxes | coordinates | bytes_per_box | tests | pairs | missed | spurious_percent | read_MB | round_ms | \
         test_ms | exact_test_ms | test_and_exact_test_ms";

@@ -14,7 +14,7 @@ use tally::{Block, RootWay, Tally, WAYS, lazy_pass};
 /// The name of the way without a row.
 const LAZY: &str = "lazy way";
 
-pub(super) fn run(quick: bool) -> Result<Report, Failure> {
+pub(super) fn run(quick: bool) -> Result<BenchReport, Failure> {
     let every: Vec<Every> = WAYS.iter().map(|way| Every::of(way, quick)).collect();
     check_all(&every)?;
     let at = if quick { &[1000, 1 << 20][..] } else { &[1000, 5000, 10_000, 100_000, 1 << 20] };
@@ -24,7 +24,7 @@ pub(super) fn run(quick: bool) -> Result<Report, Failure> {
     let every = every_table(&every, quick)?;
     let axes = ["time, ns per pair (one thread, 5,000 boxes)", "wrong pairs, % of all n looked at"];
     let points = points(&every, &times);
-    let paper = [paper::table_3(quick), paper::table_4(quick), paper::roundings()];
+    let paper = [paper::table_3(quick), paper::table_4(quick)];
     let tables = [every, counterexamples(quick), times].into_iter().chain(paper).collect();
     Ok(report("index", tables, ("From the index of a pair to the pair", axes), points))
 }

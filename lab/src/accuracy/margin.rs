@@ -26,7 +26,7 @@ const COMPARED: usize = 10;
 /// (A median over rounds would hide what a margin does: boxes of one speed leave their fat boxes in the same round.)
 const PASSES: usize = 2;
 
-pub(super) fn run(quick: bool) -> Result<Report, Failure> {
+pub(super) fn run(quick: bool) -> Result<BenchReport, Failure> {
     let mut rows = worlds(quick)?;
     rows.extend(boxes(quick)?);
     let tables = vec![table(&rows), means(&rows)];
@@ -41,7 +41,7 @@ pub(super) fn run(quick: bool) -> Result<Report, Failure> {
 
 /// The steps of one margin in one pass.
 #[derive(Clone, Default)]
-struct Work {
+struct MarginWork {
     /// Milliseconds of each step: the broad phase, and the whole step.
     times: Vec<[f64; 2]>,
     /// Boxes that the broad phase was told of, and those of them that had left their fat box.
@@ -54,7 +54,7 @@ struct Work {
 /// One round of one margin: its times, listed and changed boxes, and the comparison in rounds that have one.
 type Round = ([f64; 2], [u64; 2], Option<Reported>);
 
-impl Work {
+impl MarginWork {
     fn add(&mut self, (times, counts, reported): Round) {
         self.times.push(times);
         self.counts = [0, 1].map(|k| self.counts[k] + counts[k]);
@@ -90,14 +90,14 @@ struct MarginRow {
     margin: f64,
     has_step: bool,
     /// The shorter times of each step.
-    work: Work,
+    work: MarginWork,
     /// Mean milliseconds of each pass.
     passes: [[f64; 2]; PASSES],
 }
 
 impl MarginRow {
     /// Fails if a pair is missing.
-    fn new(case: &str, margin: usize, all: [&Work; PASSES], has_step: bool) -> Result<Self, Failure> {
+    fn new(case: &str, margin: usize, all: [&MarginWork; PASSES], has_step: bool) -> Result<Self, Failure> {
         let Reported { missed, needed, .. } = all[0].reported;
         let (margin, mut work) = (MARGINS[margin], all[0].clone());
         let what = || format!("{case}, margin {margin}: {missed} of {needed} pairs that overlap are missing");
@@ -105,7 +105,14 @@ impl MarginRow {
         for (times, again) in work.times.iter_mut().zip(&all[1].times) {
             *times = [0, 1].map(|k| times[k].min(again[k]));
         }
-        Ok(Self { case: case.to_owned(), boxes: 0, margin, has_step, work, passes: all.map(Work::means) })
+        Ok(Self {
+            case: case.to_owned(),
+            boxes: 0,
+            margin,
+            has_step,
+            work,
+            passes: all.map(MarginWork::means),
+        })
     }
 }
 
@@ -116,7 +123,8 @@ fn rows<C: MarginCase>(
     (boxes, has_step): (usize, bool),
     make: impl Fn() -> Result<C, Failure>,
 ) -> Result<Vec<MarginRow>, Failure> {
-    let mut all: [Vec<Work>; PASSES] = std::array::from_fn(|_| vec![Work::default(); MARGINS.len()]);
+    let mut all: [Vec<MarginWork>; PASSES] =
+        std::array::from_fn(|_| vec![MarginWork::default(); MARGINS.len()]);
     for pass in &mut all {
         let mut case = make()?;
         for round in 0..WARM_UP + steps {
@@ -323,7 +331,7 @@ mod tests {
     /// Returns a row whose margin takes so long; between its two passes all but the default differ by 2%.
     fn row(margin: usize, ms: f64) -> MarginRow {
         let off = if margin == DEFAULT { 0.0 } else { 0.01f64 };
-        let work = |off: f64| Work { times: vec![[ms * off.exp(), 0.0]], ..Work::default() };
+        let work = |off: f64| MarginWork { times: vec![[ms * off.exp(), 0.0]], ..MarginWork::default() };
         MarginRow::new("a case", margin, [&work(-off), &work(off)], false).expect("no pair is missing")
     }
 
@@ -344,7 +352,8 @@ mod tests {
 
     #[test]
     fn a_missing_pair_is_a_failed_check() {
-        let missing = Work { reported: Reported { missed: 3, needed: 9, extra: 0 }, ..Work::default() };
+        let missing =
+            MarginWork { reported: Reported { missed: 3, needed: 9, extra: 0 }, ..MarginWork::default() };
         let failed = MarginRow::new("a case", 0, [&missing; PASSES], false).map(|_| ());
         assert!(failed.is_err_and(|failure| failure.to_string().contains("3 of 9 pairs")));
     }

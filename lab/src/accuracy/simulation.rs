@@ -29,7 +29,7 @@ const RUNS: &str = "scene | broad_phase | contacts | points | deepest_mm | mean_
     energy_at_the_end_percent | energy_rise_percent | momentum_drift_percent | asleep_from_step | awake_percent | \
     parted_in_contact | differs_from_step | mean_distance | largest_distance | missed | step_ms | needed_pairs";
 
-pub(super) fn run(quick: bool) -> Result<Report, Failure> {
+pub(super) fn run(quick: bool) -> Result<BenchReport, Failure> {
     let mut runs = Table::new("runs", RUNS);
     let mut repeated = Table::new("repeated", "scene | broad_phase | steps | differ_from_step");
     let cases = if quick { &QUICK[..] } else { &FULL };

@@ -19,7 +19,7 @@ const OFFSETS: [f64; 7] = [0.0, 1e2, 1e3, 1e4, 1e5, 1e6, 1e7];
 /// The ways that are timed.
 const TIMED: usize = 6;
 
-pub(super) fn run(quick: bool) -> Result<Report, Failure> {
+pub(super) fn run(quick: bool) -> Result<BenchReport, Failure> {
     let worlds = worlds(if quick { 500 } else { 12_000 })?;
     let (rows, (simulated, [in_f64, in_f32])) = (rows(&worlds)?, simulated(&OFFSETS, quick)?);
     rows.iter().chain(&simulated).try_for_each(promised)?;
@@ -37,7 +37,8 @@ fn rows(worlds: &[NamedLayout]) -> Result<Vec<PlaceRow>, Failure> {
         for (along, axes) in [("diagonal", [1.0; 3]), ("x", [1.0, 0.0, 0.0])] {
             let is_wanted = |offset: &f64| along == "diagonal" || (world.size == 1.0 && *offset > 0.0);
             for offset in OFFSETS.into_iter().filter(is_wanted) {
-                let place = Place::new(&world.layout, world.layout.poses(axes.map(|axis| axis * offset)));
+                let place =
+                    PlacedWorld::new(&world.layout, world.layout.poses(axes.map(|axis| axis * offset)));
                 let mut row = PlaceRow::new((world.name, world.size), (offset, along));
                 row.add(&place)?;
                 rows.push(row);
@@ -101,7 +102,7 @@ fn times(world: &NamedLayout, quick: bool) -> Result<Table, Failure> {
     let (rounds, ms) = if quick { (6, 60) } else { (60, 2000) };
     let effort = Effort { warm_up: 2, rounds, budget: Duration::from_millis(ms) };
     for offset in OFFSETS {
-        let place = Place::new(&world.layout, world.layout.poses([offset; 3]));
+        let place = PlacedWorld::new(&world.layout, world.layout.poses([offset; 3]));
         // Finders keep their buffers.
         let mut sides: Vec<_> = WAYS[..TIMED].iter().map(|way| (*way, finder(), vec![])).collect();
         let both = medians(&mut sides, TIMED, effort, unprepared, |sides, side| {
@@ -139,7 +140,7 @@ mod tests {
     fn a_missed_pair_that_was_promised_is_a_failed_check() {
         let layout = &worlds(50).expect("worlds")[0].layout;
         let mut row = PlaceRow::new(("crowd", 1.0), (1e3, "diagonal"));
-        row.add(&Place::new(layout, layout.poses([1e3; 3]))).expect("found");
+        row.add(&PlacedWorld::new(layout, layout.poses([1e3; 3]))).expect("found");
         row.ways[1][0].missed = 5;
         assert!(promised(&row).is_ok(), "nobody promises that of one");
         row.ways[MARGIN][0].missed = 5;

@@ -1,14 +1,14 @@
-//! Avril's tables 1, 5, 6 and 7 and figures 3 to 6: the matrix of pairs, forms of output, brute force, a grid, and steps.
+//! Avril's tables 5, 6 and 7 and figures 3 to 6: forms of output, brute force, a grid, and steps.
 
 use super::OUR_GRID;
 use super::printed::*;
 use super::sides::{Setup, Way, effort, race};
 use crate::UNSORTED;
-use crate::stages::{NAMES, alone};
+use crate::alone::{NAMES, alone};
 use pbig_core::{Aabb, Backend, Config, Pair};
-use pbig_gpu::{CellRule, Coding, GpuOptions};
+use pbig_gpu::{CellRule, GpuOptions};
 use pbig_harness::gpu_race;
-use pbig_harness::pair_index::{index_of, pair_count, pair_of};
+use pbig_harness::pair_index::{pair_count, pair_of};
 use pbig_harness::prelude::*;
 
 /// The distance that cubes with edges of 1 move in a step, along each axis.
@@ -18,25 +18,7 @@ const DISTANCE: f32 = 0.1;
 const ALL_PAIRS: usize = GpuOptions::DEFAULT.all_pairs_up_to as usize;
 
 pub(super) fn tables(setup: &Setup) -> Result<Vec<Table>, Failure> {
-    let forms = [matrix(), forms_on_cpu()?, forms_on_device(setup)?];
-    Ok([&forms[..], &[brute_force_and_grid(setup)?, steps(setup)?]].concat())
-}
-
-/// Objects with which table 1's elements are numbers; those of the paper's examples.
-const OBJECTS: u64 = AVRIL_EXAMPLES[0].0;
-
-/// Table 1: rows and columns counted from 1, indices from 0, as in the paper.
-fn matrix() -> Table {
-    let columns = "row | column | printed | that number | index, ours | pair of the printed index, ours";
-    let mut table = Table::new("Avril table 1: the matrix of pairs", columns);
-    let of_table = AVRIL_1.iter().map(|(pair, text, of)| (pair(OBJECTS), (*text).to_owned(), of(OBJECTS)));
-    let of_examples = AVRIL_EXAMPLES.iter().map(|&(_, k, pair)| (pair, format!("{k} (section 3.1)"), k));
-    for ((a, b), text, printed) in of_table.chain(of_examples) {
-        let pair = (printed < pair_count(OBJECTS)).then(|| pair_of(printed, OBJECTS));
-        let pair = pair.map_or("none".to_owned(), |(a, b)| format!("({}, {})", a + 1, b + 1));
-        table.row(cells![a, b, text, printed, index_of(a - 1, b - 1, OBJECTS), pair]);
-    }
-    table
+    Ok(vec![forms_on_cpu()?, brute_force_and_grid(setup)?, steps(setup)?])
 }
 
 /// Returns the bytes that come back with a byte a pair, and with a bit (3.4).
@@ -117,26 +99,6 @@ fn forms_on_cpu() -> Result<Table, Failure> {
             let rates = |[kernel, us]: [f64; 2]| [kernel, us, bytes as f64 / us / 1e3, tests / kernel * 1e3];
             let printed = printed.into_iter().flat_map(rates);
             table.row(cells![n, pairs.len(), name, bytes, ..ms, ..printed]);
-        }
-    }
-    Ok(table)
-}
-
-/// Forms of output on a device, without a grid: bits (`Coding::Packed`) against a list of pairs (`Plain`).
-fn forms_on_device(setup: &Setup) -> Result<Table, Failure> {
-    let columns = "objects | pairs | form | bytes written | bytes fetched | ms of the kernel `check_all` | \
-        ms, host waits | ms, host decodes";
-    let mut table = Table::new("Avril table 5: forms of output, GPU", columns);
-    for n in [100, 1000] {
-        let ways = [Coding::Packed, Coding::Plain]
-            .map(|coding| Way::Gpu(GpuOptions { coding, ..GpuOptions::DEFAULT }));
-        let calls = setup.run(&ways, &cubes(n, 1.0, 1.0, 1), DISTANCE)?;
-        for ((form, ..), call) in FORMS[1..].iter().zip(calls) {
-            let kernel = call.kernels(|name| name == "check_all");
-            let gpu = call.report.device.clone().unwrap_or_default();
-            let [wait, decode] = [gpu.wait, gpu.decode].map(milliseconds);
-            let bytes = [call.written(), Some(gpu.downloaded)];
-            table.row(cells![n, call.report.pairs, *form, ..bytes, kernel, wait, decode]);
         }
     }
     Ok(table)

@@ -4,7 +4,7 @@
 use super::OUR_GRID;
 use super::model::{GAUSSIAN, Model, UNIFORM};
 use super::printed::*;
-use super::sides::{Call, Setup, Way, effort, once, race};
+use super::sides::{SearchCall, Setup, Way, effort, once, race};
 use super::table_iii::{expected_checks, options_for};
 use crate::UNSORTED;
 use pbig_core::{Aabb, Config, DeviceReport, Finder, Order, Report};
@@ -139,7 +139,7 @@ fn optimised(row: &Timing) -> Way {
 /// Tables IV, V and VI: each setting's total, the time of each task, and what it sends. Printed: with P, CHECK has the time of
 /// CHECK, `DataOut` and REPORT together. Ours: section 6.3 with fewer boxes, as crowded; `DataOut` is the time that the host waits
 /// beyond the kernels. In none: total less the tasks; with P tasks overlap, and what is at the same time counts twice.
-fn optimisations(runs: &[Call]) -> Table {
+fn optimisations(runs: &[SearchCall]) -> Table {
     let columns = format!(
         "setting | side | speed-up printed | total, ms | speed-up by the totals | {} | in none | pairs | checks | \
          bytes written | bytes written a pair | bytes fetched | bytes fetched a pair | chunks",
@@ -164,7 +164,7 @@ fn optimisations(runs: &[Call]) -> Table {
     table
 }
 
-fn sent(call: &Call) -> Vec<Value> {
+fn sent(call: &SearchCall) -> Vec<Value> {
     let Report { pairs, checks, device: gpu, .. } = &call.report;
     let of = |bytes: Option<u64>| cells![bytes, bytes.map(|bytes| bytes as f64 / *pairs as f64)];
     let bytes = [of(call.written()), of(gpu.as_ref().map(|gpu| gpu.downloaded))].concat();
@@ -172,8 +172,8 @@ fn sent(call: &Call) -> Vec<Value> {
 }
 
 /// Returns the times of a call on a device by the paper's tasks.
-fn of_tasks(call: &Call) -> [Option<f64>; TASKS.len()] {
-    let is_check = |name: &str| name.starts_with("check");
+fn of_tasks(call: &SearchCall) -> [Option<f64>; TASKS.len()] {
+    let is_check = |name: &str| matches!(name, "check_all" | "check_small" | "check_large");
     let is_schedule = |name: &str| matches!(name, "schedule" | "arrange");
     let map = call.kernels(|name| !is_check(name) && !is_schedule(name));
     let (schedule, check, all) = (call.kernels(is_schedule), call.kernels(is_check), call.kernels(|_| true));

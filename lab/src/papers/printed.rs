@@ -9,12 +9,8 @@ pub(super) const LENGTHS: [f64; 2] = [1.0, 100.0];
 pub(super) const NORMAL: [f64; 2] = [5000.0, 1000.0];
 /// PBIG 6.1, 6.2, 6.4: most boxes.
 pub(super) const MOST_BOXES: usize = 10_000_000;
-/// PBIG 6.3: intersecting pairs of 10^7 boxes with normal centres, "approximately".
-pub(super) const GAUSSIAN_PAIRS: u64 = 1_120_000_000;
-/// PBIG 6.4: bytes of those pairs without compression and with, "GB".
-pub(super) const GAUSSIAN_GB: [f64; 2] = [8.968, 1.824];
-/// PBIG 6.2: uncompressed size at DoC = 10, "MB".
-pub(super) const DENSEST_PLAIN_MB: f64 = 377.76;
+/// PBIG 6.4: bytes of the pairs of 10^7 boxes with normal centres, "GB".
+pub(super) const GAUSSIAN_GB: f64 = 8.968;
 /// PBIG 4.1 and 6: threads of a warp, `W` of equation 6.
 pub(super) const WARP: f64 = 32.0;
 /// PBIG 5.2 and 6: boxes of a segment and threads of a block.
@@ -40,9 +36,6 @@ pub(super) const TABLE_III: [Coverage; 5] = [
     Coverage { doc: 1.0, pairs: 5_165_837, checks: 286_000_000, output: 9.369, cell: Some(128.0) },
     Coverage { doc: 10.0, pairs: 49_514_252, checks: 744_000_000, output: 44.734, cell: Some(128.0) },
 ];
-
-/// PBIG, table III: the size of the input, "MB".
-pub(super) const INPUT_MB: f64 = 280.0;
 
 /// A row of PBIG's tables IV and VI, in microseconds (section 6.4 calls 1,941,184 of them 1.941 seconds).
 pub(super) struct Timing {
@@ -74,23 +67,6 @@ pub(super) const TABLE_VI: [Timing; 8] = [
 /// `scatter`; `schedule` and `arrange`; `check_*`; `DeviceReport::wait` less the kernels; `DeviceReport::decode` and emit.
 pub(super) const TASKS: [&str; 7] = ["DataIn", "PLAN", "MAP", "SCHED", "CHECK", "DataOut", "REPORT"];
 
-/// An element of Avril's table 1 for a number of objects: row and column, counted from 1, the printed text, and its value.
-pub(super) type Element = (fn(u64) -> (u64, u64), &'static str, fn(u64) -> u64);
-
-/// Avril, table 1.
-pub(super) const AVRIL_1: [Element; 10] = [
-    (|_| (1, 2), "0", |_| 0),
-    (|_| (1, 3), "1", |_| 1),
-    (|n| (1, n - 1), "n-3", |n| n - 3),
-    (|n| (1, n), "n-2", |n| n - 2),
-    (|_| (2, 3), "n-1", |n| n - 1),
-    (|n| (2, n - 1), "2n - 5", |n| 2 * n - 5),
-    (|n| (2, n), "2n - 4", |n| 2 * n - 4),
-    (|n| (3, n - 1), "3n - 8", |n| 3 * n - 8),
-    (|n| (3, n), "3n - 7", |n| 3 * n - 7),
-    (|n| (n - 1, n), "(n^2 - n) / 2", |n| (n * n - n) / 2),
-];
-
 /// Avril, table 2: objects, milliseconds with the square root and the "lazy way" without.
 pub(super) const AVRIL_2: [(u64, f64, f64); 3] =
     [(1000, 0.21, 0.25), (10_000, 2.25, 4.28), (100_000, 29.66, 58.24)];
@@ -102,30 +78,15 @@ pub(crate) struct Roots {
     pub(crate) approximate: f64,
     /// Milliseconds of CUDA's own.
     pub(crate) cuda: f64,
-    /// The value of the last digit of both.
-    pub(crate) digit: f64,
-    /// "% of computation time reduction"
-    pub(crate) gamma: f64,
-}
-
-impl Roots {
-    /// The reduction in % that the two times give; each `off` half digits from what is printed, in opposite directions.
-    pub(crate) fn reduction(&self, off: f64) -> f64 {
-        let half = 0.5 * off * self.digit;
-        100.0 * (1.0 - (self.approximate - half) / (self.cuda + half))
-    }
 }
 
 /// Avril, table 4.
 pub(crate) const AVRIL_4: [Roots; 4] = [
-    Roots { roots: 1_000_000, approximate: 0.042, cuda: 0.048, digit: 0.001, gamma: 12.6 },
-    Roots { roots: 10_000_000, approximate: 0.409, cuda: 0.478, digit: 0.001, gamma: 14.7 },
-    Roots { roots: 100_000_000, approximate: 4.102, cuda: 4.722, digit: 0.001, gamma: 13.2 },
-    Roots { roots: 1_000_000_000, approximate: 41.01, cuda: 48.01, digit: 0.01, gamma: 14.6 },
+    Roots { roots: 1_000_000, approximate: 0.042, cuda: 0.048 },
+    Roots { roots: 10_000_000, approximate: 0.409, cuda: 0.478 },
+    Roots { roots: 100_000_000, approximate: 4.102, cuda: 4.722 },
+    Roots { roots: 1_000_000_000, approximate: 41.01, cuda: 48.01 },
 ];
-
-/// Avril 3.3: the mean of that reduction, in %.
-pub(super) const AVRIL_4_MEAN: f64 = 13.7;
 
 /// Avril, table 5: objects; kernel (ms) and output (microseconds) with a byte a pair, and with a bit.
 pub(super) const AVRIL_5: [(u64, [f64; 2], [f64; 2]); 4] = [

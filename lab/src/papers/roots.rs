@@ -1,17 +1,16 @@
-//! Avril's table 2 and the times of table 4: from the index of a pair to the pair, with a root and by the lazy way (3.2.2).
+//! Avril's table 2: from the index of a pair to the pair, with a root and by the lazy way (3.2.2).
 
 use super::printed::AVRIL_2;
-use super::sides::{Setup, Way};
+use super::sides::Setup;
 use crate::index::{as_it_is, lazy_ids, lazy_pair, row_by, row_in_f64, rules};
-use pbig_core::{Aabb, Report};
-use pbig_gpu::GpuOptions;
+use pbig_core::Aabb;
 use pbig_harness::pair_index::{pair_count, pair_of};
 use pbig_harness::prelude::*;
 use std::ops::Range;
 use std::time::Duration;
 
 pub(super) fn tables(setup: &Setup) -> Result<Vec<Table>, Failure> {
-    Ok(vec![on_cpu(setup)?, on_device(setup)?])
+    Ok(vec![on_cpu(setup)?])
 }
 
 /// Ids looked at in one measurement; where there are more, stretches of them, spread evenly.
@@ -54,11 +53,11 @@ fn hits(boxes: &[Aabb], pairs: &[(i64, i64)]) -> u64 {
     pairs.iter().filter(hit).count() as u64
 }
 
-type Search = fn(&[Aabb], &[Range<u64>]) -> u64;
+type CountOverlaps = fn(&[Aabb], &[Range<u64>]) -> u64;
 
 /// Ways with a root that give every pair of table 2's objects, and the lazy way, which looks at all of n^2 - n identifiers.
 /// `pair_of` is pbig's own function, for up to 2^32 boxes: it multiplies in 128 bits.
-const WAYS: [(&str, Search); 4] = [
+const WAYS: [(&str, CountOverlaps); 4] = [
     ("f32 root, the paper's rules", |boxes, ids| {
         overlaps(boxes, ids, |k, n| Some(rules(row_by(f32::sqrt)(k, n), k, n)))
     }),
@@ -101,7 +100,7 @@ fn all_ways(n: u64, most: u64) -> Result<WaysFound, Failure> {
 
 /// Table 2 on one thread: cubes with a pair each.
 fn on_cpu(setup: &Setup) -> Result<Table, Failure> {
-    let names = |before: &str, ways: &[(&str, Search)]| -> String {
+    let names = |before: &str, ways: &[(&str, CountOverlaps)]| -> String {
         ways.iter().map(|(name, _)| format!("{before}{name} | ")).collect()
     };
     let columns = format!(
@@ -118,41 +117,6 @@ fn on_cpu(setup: &Setup) -> Result<Table, Failure> {
         let pairs = (times[1] == 1.0).then_some(pairs[LAZY]);
         let looked_at = times.map(|times| 100.0 / times);
         table.row(cells![n, root, lazy, lazy / root, ..ms.clone(), ..ratios, pairs, ..looked_at]);
-    }
-    Ok(table)
-}
-
-/// The values of `GpuOptions::root`, in words.
-const ROOTS: [(u32, &str); 8] = [
-    (0, "the device's square root"),
-    (2, "Carmack, 2 steps"),
-    (3, "Carmack, 3 steps"),
-    (4, "Carmack, 4 steps"),
-    (6, "Lomont, 2 steps"),
-    (7, "Lomont, 3 steps"),
-    (8, "Lomont, 4 steps"),
-    (9, "no root: bisection"),
-];
-
-/// Every root on a device; integers correct each, so all are exact. Every pair of 1000 objects is tested; of more, as table 2's
-/// times seem to be, the pairs in the cells of a grid.
-fn on_device(setup: &Setup) -> Result<Table, Failure> {
-    let columns = "objects | root | kernel | ms of the kernel | times as long as the first | checks | pairs";
-    let mut table = Table::new("Avril tables 2 and 4: roots, GPU", columns);
-    let in_cells = GpuOptions { all_pairs_up_to: 0, small_cell: 256, ..GpuOptions::DEFAULT };
-    for (n, kernel, options) in [
-        (1000, "check_all", GpuOptions::DEFAULT),
-        (10_000, "check_small", in_cells),
-        (100_000, "check_small", in_cells),
-    ] {
-        let ways = ROOTS.map(|(root, _)| Way::Gpu(GpuOptions { root, ..options }));
-        let calls = setup.run(&ways, &cubes(n, 1.0, 1.0, 1), 0.1)?;
-        let ms: Vec<_> = calls.iter().map(|call| call.kernels(|name| name == kernel)).collect();
-        for (((_, root), call), &own) in ROOTS.iter().zip(&calls).zip(&ms) {
-            let ratio = ms[0].zip(own).map(|(first, own)| own / first);
-            let Report { checks, pairs, .. } = &call.report;
-            table.row(cells![n, *root, kernel, own, ratio, checks.made, *pairs]);
-        }
     }
     Ok(table)
 }

@@ -2,9 +2,9 @@
 
 use super::printed::MOST_BOXES;
 use crate::UNSORTED;
+use crate::pbig_grid::pbig_grid;
 use pbig_core::{Aabb, Backend, Config, Finder, Report};
 use pbig_gpu::{GpuFinder, GpuOptions};
-use pbig_harness::pbig_grid::pbig_grid;
 use pbig_harness::prelude::*;
 use std::time::Duration;
 
@@ -24,7 +24,7 @@ const ON_GPU: Config = Config { backend: Backend::Device, ..UNSORTED };
 
 /// One call and its results.
 #[derive(Clone, Default)]
-pub(super) struct Call {
+pub(super) struct SearchCall {
     pub(super) ms: f64,
     /// The median of a race, over all places in a round.
     pub(super) median: f64,
@@ -35,13 +35,13 @@ pub(super) struct Call {
 }
 
 /// A way with the buffers that it keeps, and its calls.
-struct Side {
+struct Racer {
     way: Way,
     finder: Finder,
-    calls: Vec<Call>,
+    calls: Vec<SearchCall>,
 }
 
-impl Side {
+impl Racer {
     fn new(way: Way, gpu: Option<&GpuFinder>) -> Self {
         let finder = match (way, gpu) {
             (Way::Gpu(options), Some(gpu)) => {
@@ -55,25 +55,25 @@ impl Side {
     }
 
     /// Makes a call. Fails if a device left it to the CPU.
-    fn call(&mut self, boxes: &[Aabb]) -> Result<Call, Failure> {
+    fn call(&mut self, boxes: &[Aabb]) -> Result<SearchCall, Failure> {
         if let Way::Pbig(options) = self.way {
             let (found, ms) = timed(|| pbig_grid(boxes, &options));
             let (found, mut report) = (found?, Report::default());
             (report.pairs, report.checks) = (found.pairs.len() as u64, found.checks);
-            return Ok(Call { ms, cell: Some(found.plan.cell), report, ..Call::default() });
+            return Ok(SearchCall { ms, cell: Some(found.plan.cell), report, ..SearchCall::default() });
         }
         let (found, ms) = timed(|| self.finder.find(boxes).map(|_| ()));
         found?;
         let report = self.finder.report().clone();
         check(report.fallback.is_none(), || report.fallback.clone().unwrap_or_default())?;
         let cell = report.device.as_ref().map(|device| device.cell).filter(|cell| *cell > 0.0);
-        Ok(Call { ms, cell, report, ..Call::default() })
+        Ok(SearchCall { ms, cell, report, ..SearchCall::default() })
     }
 }
 
 /// Makes one call, which also allocates.
-pub(super) fn once(way: Way, boxes: &[Aabb]) -> Result<Call, Failure> {
-    Side::new(way, None).call(boxes)
+pub(super) fn once(way: Way, boxes: &[Aabb]) -> Result<SearchCall, Failure> {
+    Racer::new(way, None).call(boxes)
 }
 
 /// Returns the rounds for `n` boxes: enough for a median if a call is short, few if it takes seconds.
@@ -91,22 +91,22 @@ pub(super) fn race(
     boxes: Vec<Aabb>,
     distance: f32,
     effort: Effort,
-) -> Result<Vec<Call>, Failure> {
+) -> Result<Vec<SearchCall>, Failure> {
     let frames = [moved(&boxes, distance, 2), boxes];
-    let mut sides: Vec<Side> = ways.iter().map(|way| Side::new(*way, gpu)).collect();
+    let mut sides: Vec<Racer> = ways.iter().map(|way| Racer::new(*way, gpu)).collect();
     let took = measured(&mut sides, ways.len(), effort, unprepared, |sides, side| {
         let side = &mut sides[side];
         let call = side.call(&frames[side.calls.len() % 2])?;
         side.calls.push(call.clone());
         Ok(call.ms)
     })?;
-    let counts = |side: &Side| side.calls.iter().map(|call| call.report.pairs).collect::<Vec<_>>();
+    let counts = |side: &Racer| side.calls.iter().map(|call| call.report.pairs).collect::<Vec<_>>();
     let other = sides.iter().map(counts).find(|found| *found != counts(&sides[0]));
     check(other.is_none(), || format!("ways that differ in settings found other pairs: {other:?}"))?;
-    let middle = |(side, took): (Side, Took)| {
-        let mut calls: Vec<Call> = side.calls.into_iter().skip(effort.warm_up | 1).step_by(2).collect();
+    let middle = |(side, took): (Racer, Took)| {
+        let mut calls: Vec<SearchCall> = side.calls.into_iter().skip(effort.warm_up | 1).step_by(2).collect();
         calls.sort_by(|a, b| a.ms.total_cmp(&b.ms));
-        Call { median: took.median, ..calls.swap_remove((calls.len() - 1) / 2) }
+        SearchCall { median: took.median, ..calls.swap_remove((calls.len() - 1) / 2) }
     };
     Ok(sides.into_iter().zip(took).map(middle).collect())
 }
@@ -151,7 +151,12 @@ impl Setup {
 
     /// Returns a call of each setting on moving boxes; none without a device for this number. Fails if they find other pairs than the
     /// CPU.
-    pub(super) fn run(&self, ways: &[Way], boxes: &[Aabb], distance: f32) -> Result<Vec<Call>, Failure> {
+    pub(super) fn run(
+        &self,
+        ways: &[Way],
+        boxes: &[Aabb],
+        distance: f32,
+    ) -> Result<Vec<SearchCall>, Failure> {
         let Some(gpu) = self.for_boxes(boxes.len()) else { return Ok(vec![]) };
         // The first calls compile, allocate and learn. Times in software mean nothing, so few will do.
         let (warm_up, rounds) = if self.is_software() { (1, 5) } else { (3, 13) };
@@ -164,7 +169,7 @@ impl Setup {
     }
 }
 
-impl Call {
+impl SearchCall {
     /// Returns the checks made, and of them the unnecessary and the redundant ones.
     pub(super) fn checks(&self) -> [u64; 3] {
         let checks = &self.report.checks;

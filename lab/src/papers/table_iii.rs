@@ -5,12 +5,12 @@
 
 use super::model::{Model, Space, UNIFORM};
 use super::printed::{Coverage, MOST_BOXES, SPACE, TABLE_III, WARP};
-use super::sides::{Call, Setup, Way, effort, once, race};
+use super::sides::{SearchCall, Setup, Way, effort, once, race};
 use crate::UNSORTED;
+use crate::pbig_grid::PbigPlan;
 use pbig_core::Aabb;
 use pbig_gpu::pbig::Summary;
 use pbig_gpu::{Coding, GpuOptions};
-use pbig_harness::pbig_grid::PbigPlan;
 use pbig_harness::prelude::*;
 
 pub(super) fn tables(setup: &Setup) -> Result<Vec<Table>, Failure> {
@@ -226,7 +226,7 @@ fn on_device(setup: &Setup) -> Result<Table, Failure> {
     Ok(table)
 }
 
-fn of_output(calls: &[Call]) -> Vec<Value> {
+fn of_output(calls: &[SearchCall]) -> Vec<Value> {
     let [list, packed, rows] = calls else { return vec![] };
     let pairs = list.report.pairs;
     let a_pair = |bytes: Option<u64>| bytes.filter(|_| pairs > 0).map(|bytes| bytes as f64 / pairs as f64);

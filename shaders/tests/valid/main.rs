@@ -4,7 +4,7 @@
 mod translate;
 
 use naga::valid::{Capabilities, ModuleInfo, ValidationFlags, Validator};
-use pbig_shaders::{Buffer, KERNELS, Kernel, study};
+use pbig_shaders::{Buffer, INDEX_PAIRS, KERNELS, Kernel};
 
 fn parse(kernel: &Kernel, changes: bool) -> naga::Module {
     let source = kernel.source(changes);
@@ -20,9 +20,9 @@ fn validate(kernel: &Kernel, changes: bool) -> (naga::Module, ModuleInfo) {
     (module, info)
 }
 
-/// Returns every kernel, those of the studies too, for a search for overlaps and for one for changes.
+/// Returns every kernel, that of tests too, for a search for overlaps and for one for changes.
 fn texts() -> impl Iterator<Item = (&'static &'static Kernel, bool)> {
-    KERNELS.iter().chain(study::KERNELS).flat_map(|kernel| [(kernel, false), (kernel, true)])
+    KERNELS.iter().chain([&&INDEX_PAIRS]).flat_map(|kernel| [(kernel, false), (kernel, true)])
 }
 
 #[test]
@@ -51,11 +51,10 @@ fn bindings_are_numbered_as_listed_and_there_are_no_others() {
     }
 }
 
-/// Returns the names of the kernels' files in a folder of the crate, sorted.
-fn files(folder: &str) -> Vec<String> {
-    let folder = format!("{}/{folder}", env!("CARGO_MANIFEST_DIR"));
-    let mut files: Vec<String> = std::fs::read_dir(folder)
-        .expect("a folder of the crate")
+/// Returns the names of the kernels' files, sorted.
+fn files() -> Vec<String> {
+    let mut files: Vec<String> = std::fs::read_dir(env!("CARGO_MANIFEST_DIR"))
+        .expect("the crate's folder")
         .filter_map(|entry| entry.expect("an entry").file_name().into_string().ok())
         .filter_map(|name| name.strip_suffix(".wgsl").map(str::to_owned))
         .collect();
@@ -64,12 +63,10 @@ fn files(folder: &str) -> Vec<String> {
 }
 
 #[test]
-fn the_lists_of_kernels_are_the_lists_of_files() {
-    for (folder, kernels) in [("", KERNELS), ("study", study::KERNELS)] {
-        let mut listed: Vec<String> = kernels.iter().map(|kernel| kernel.name.to_owned()).collect();
-        listed.sort();
-        assert_eq!(listed, files(folder), "{folder}");
-    }
+fn the_list_of_kernels_is_the_list_of_files() {
+    let mut listed: Vec<String> = KERNELS.iter().map(|kernel| kernel.name.to_owned()).collect();
+    listed.sort();
+    assert_eq!(listed, files());
 }
 
 #[test]

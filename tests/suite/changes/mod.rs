@@ -6,14 +6,14 @@ mod world;
 use pbig_core::{
     Aabb, DeviceFailure, DeviceFound, DeviceReport, Limits, PairDevice, ProxyFilter, SearchRequest, oracle,
 };
-use pbig_gpu::study::Fault;
+use pbig_gpu::testing::Fault;
 use pbig_gpu::{Coding, GpuFinder, GpuOptions};
 use pbig_harness::boxes::BoxSet;
 use pbig_tests::needs_gpu;
 use rand::rngs::StdRng;
 use rand::{RngExt, SeedableRng};
 use std::time::Duration;
-use world::World;
+use world::DeviceWorld;
 
 fn set(name: &str, n: usize) -> Vec<Aabb> {
     BoxSet::named(name).expect("the set exists").boxes(n, 5)
@@ -33,7 +33,7 @@ fn transferred(tracked: &DeviceFound) -> DeviceReport {
 }
 
 /// Changes a box in one of many ways.
-fn disturb(world: &mut World, rng: &mut StdRng) {
+fn disturb(world: &mut DeviceWorld, rng: &mut StdRng) {
     let id = rng.random_range(0..world.len() + 2);
     let at: [f32; 3] = std::array::from_fn(|_| rng.random_range(-1.0..12.0));
     let half = [rng.random_range(0.1..1.5), rng.random_range(0.1f32..1.5), 0.5];
@@ -58,7 +58,7 @@ fn disturb(world: &mut World, rng: &mut StdRng) {
 fn follow_at_random(seed: u64, boxes: usize, updates: usize, mut gpu: GpuFinder) {
     let rng = &mut StdRng::seed_from_u64(seed);
     let start = |_| Aabb::from_center(std::array::from_fn(|_| rng.random_range(0.0..11.0)), [0.7; 3]);
-    let mut world = World::new(&(0..boxes).map(start).collect::<Vec<_>>());
+    let mut world = DeviceWorld::new(&(0..boxes).map(start).collect::<Vec<_>>());
     for update in 0..updates {
         let tracked = world.follow(&mut gpu).expect("no device fails here");
         assert_eq!(transferred(&tracked).uploaded > 0, world.len() > 0, "update {update}");
@@ -101,7 +101,7 @@ fn random_updates_lose_nothing_in_small_chunks_and_buffers() {
 }
 
 /// Moves a share of the boxes a little, in different directions.
-fn jostle(world: &mut World, every: usize, by: f32) {
+fn jostle(world: &mut DeviceWorld, every: usize, by: f32) {
     for (i, id) in (0..world.len()).step_by(every).enumerate() {
         let by = by * [1.0, -0.5, 2.0][i % 3];
         world.shift(id, [by, 0.5 * by, -by]);
@@ -112,7 +112,7 @@ fn jostle(world: &mut World, every: usize, by: f32) {
 fn a_world_of_many_chunks_and_repeats_is_complete() {
     needs_gpu!();
     let tiny = GpuOptions { chunk: [3, 2], first_bytes: 0, ..GpuOptions::DEFAULT };
-    let (mut world, mut gpu) = (World::new(&set("pile", 3000)), with(tiny));
+    let (mut world, mut gpu) = (DeviceWorld::new(&set("pile", 3000)), with(tiny));
     let (mut chunks, mut repeats) = (0, 0);
     for (every, by) in [(1, 0.0), (2, 0.2), (1, 0.3), (3, -0.4), (1000, 0.1)] {
         jostle(&mut world, every, by);
@@ -130,7 +130,7 @@ fn a_world_beyond_the_limits_of_a_device_is_split() {
     let options = GpuOptions { max_bytes: 1 << 20, ..GpuOptions::DEFAULT };
     let mut boxes = set("pile", 24_000);
     boxes.push(Aabb::new([f32::NEG_INFINITY; 3], [f32::INFINITY, 0.0, f32::INFINITY]));
-    let (mut world, mut gpu) = (World::new(&boxes), with(options));
+    let (mut world, mut gpu) = (DeviceWorld::new(&boxes), with(options));
     for (every, by) in [(1, 0.0), (5, 0.3), (9000, 0.2)] {
         jostle(&mut world, every, by);
         let tracked = world.follow(&mut gpu).expect("a device");
@@ -157,8 +157,8 @@ const FILTER_CHANGE: u64 = 20;
 fn transfers_follow_what_has_changed() {
     needs_gpu!();
     let boxes = set("pile", 20_000);
-    let (mut world, mut gpu) = (World::new(&boxes), with(GpuOptions::DEFAULT));
-    let mut update = |world: &mut World| {
+    let (mut world, mut gpu) = (DeviceWorld::new(&boxes), with(GpuOptions::DEFAULT));
+    let mut update = |world: &mut DeviceWorld| {
         let kept = world.kept.len();
         let tracked = world.follow(&mut gpu).expect("a device");
         let DeviceReport { uploaded, downloaded, .. } = transferred(&tracked);
@@ -194,7 +194,7 @@ fn transfers_follow_what_has_changed() {
 #[test]
 fn only_boxes_that_jump_or_change_their_filter_restart() {
     needs_gpu!();
-    let (mut world, mut gpu) = (World::new(&set("unit", 2000)), with(GpuOptions::DEFAULT));
+    let (mut world, mut gpu) = (DeviceWorld::new(&set("unit", 2000)), with(GpuOptions::DEFAULT));
     world.follow(&mut gpu).expect("a device");
     world.shift(5, [0.3; 3]);
     world.shift(6, [50.0, 0.0, 0.0]);
@@ -216,7 +216,7 @@ fn only_boxes_that_jump_or_change_their_filter_restart() {
 #[test]
 fn boxes_at_rest_are_not_tested() {
     needs_gpu!();
-    let (mut world, mut gpu) = (World::new(&set("pile", 6000)), with(GpuOptions::DEFAULT));
+    let (mut world, mut gpu) = (DeviceWorld::new(&set("pile", 6000)), with(GpuOptions::DEFAULT));
     let tested = |tracked: &DeviceFound| tracked.checks.made - tracked.checks.redundant;
     let all = tested(&world.follow(&mut gpu).expect("a device"));
     jostle(&mut world, 600, 0.01);
@@ -227,7 +227,7 @@ fn boxes_at_rest_are_not_tested() {
 #[test]
 fn a_device_that_has_not_seen_an_update_is_told_everything() {
     needs_gpu!();
-    let (mut world, mut gpu) = (World::new(&set("unit", 1500)), with(GpuOptions::DEFAULT));
+    let (mut world, mut gpu) = (DeviceWorld::new(&set("unit", 1500)), with(GpuOptions::DEFAULT));
     for missed in [false, false, true, false, true, true] {
         if missed {
             jostle(&mut world, 2, 0.3);
@@ -244,7 +244,7 @@ fn a_device_that_has_not_seen_an_update_is_told_everything() {
 #[test]
 fn searches_for_all_pairs_in_between_do_no_harm() {
     needs_gpu!();
-    let (mut world, mut gpu) = (World::new(&set("pile", 2000)), with(GpuOptions::DEFAULT));
+    let (mut world, mut gpu) = (DeviceWorld::new(&set("pile", 2000)), with(GpuOptions::DEFAULT));
     for find_all in [false, true, true, false, true] {
         if find_all {
             let few = &world.boxes[..1500];
@@ -265,7 +265,7 @@ fn searches_for_all_pairs_in_between_do_no_harm() {
 #[test]
 fn memory_shrinks_with_the_need_and_no_state_is_lost() {
     needs_gpu!();
-    let (mut world, mut gpu) = (World::new(&set("pile", 20_000)), with(GpuOptions::DEFAULT));
+    let (mut world, mut gpu) = (DeviceWorld::new(&set("pile", 20_000)), with(GpuOptions::DEFAULT));
     let burst = transferred(&world.follow(&mut gpu).expect("a device")).device_bytes;
     (300..20_000).for_each(|id| world.remove(id));
     world.boxes.truncate(300);
@@ -287,7 +287,7 @@ fn after_a_failure_at_any_moment_the_next_update_is_right() {
     for (fault, after) in
         (0..8).map(|i| (Fault::LoseDevice, i)).chain([(Fault::Timeout, 2), (Fault::Panic, 3)])
     {
-        let (mut world, mut gpu) = (World::new(&set("pile", 1500)), with(options));
+        let (mut world, mut gpu) = (DeviceWorld::new(&set("pile", 1500)), with(options));
         world.follow(&mut gpu).expect("a device");
         gpu.inject(fault, after);
         for frame in 0..4 {
@@ -310,7 +310,7 @@ fn after_a_failure_at_any_moment_the_next_update_is_right() {
 fn too_many_pairs_are_an_error_and_the_update_can_be_repeated() {
     needs_gpu!();
     let cubes = vec![Aabb::new([0.0; 3], [1.0; 3]); 1200];
-    let (mut world, mut gpu) = (World::new(&cubes), with(GpuOptions::DEFAULT));
+    let (mut world, mut gpu) = (DeviceWorld::new(&cubes), with(GpuOptions::DEFAULT));
     let error = world.follow_within(&mut gpu, 600_000).expect_err("719,400 pairs");
     assert_eq!(error, DeviceFailure::TooManyPairs);
     world.follow(&mut gpu).expect("the device works");

@@ -8,7 +8,7 @@ use pbig_gpu::GpuFinder;
 use std::collections::{BTreeMap, BTreeSet};
 
 /// The state of a broad phase, in the plainest form.
-pub(super) struct World {
+pub(super) struct DeviceWorld {
     pub(super) boxes: Vec<Aabb>,
     pub(super) filters: Vec<ProxyFilter>,
     pub(super) changed: BTreeMap<u32, ChangedBox>,
@@ -16,7 +16,7 @@ pub(super) struct World {
     pub(super) update: u64,
 }
 
-impl World {
+impl DeviceWorld {
     pub(super) fn new(boxes: &[Aabb]) -> Self {
         let mut world = Self {
             boxes: Vec::new(),
@@ -72,7 +72,7 @@ impl World {
         self.follow_within(gpu, Limits::DEFAULT.max_pairs)
     }
 
-    /// As [`World::follow`], with a limit of pairs.
+    /// As [`DeviceWorld::follow`], with a limit of pairs.
     pub(super) fn follow_within(
         &mut self,
         gpu: &mut GpuFinder,

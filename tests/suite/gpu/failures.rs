@@ -2,7 +2,7 @@
 
 use super::{find, on_cpu, set, with_device};
 use pbig_core::{Aabb, Backend, BroadPhase, Config, Events, ProxyFilter, oracle};
-use pbig_gpu::study::Fault;
+use pbig_gpu::testing::Fault;
 use pbig_gpu::{Coding, GpuFinder, GpuOptions, adapters};
 use pbig_tests::{corpus, difference, needs_gpu};
 use std::time::Duration;

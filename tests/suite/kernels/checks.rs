@@ -4,14 +4,14 @@ use super::*;
 
 /// The result of a check.
 #[derive(Default)]
-pub(super) struct Checked {
+pub(super) struct TestedPairs {
     pub(super) made: u64,
     pub(super) redundant: u64,
     pub(super) overlaps: u64,
     pub(super) pairs: Vec<Pair>,
 }
 
-impl Checked {
+impl TestedPairs {
     /// Tests two entries of a cell.
     pub(super) fn test_entries(&mut self, s: &State, a: u32, b: u32) {
         let (i, j) = (box_of(a), box_of(b));
@@ -67,7 +67,7 @@ pub(super) fn taken<T>(items: &[T], first: u32, count: u32) -> &[T] {
 }
 
 pub(super) fn check_small(s: &mut State) {
-    let mut checked = Checked::default();
+    let mut checked = TestedPairs::default();
     for item in taken(&s.small_items, s.chunk.first_small, s.chunk.small_items) {
         let slots = taken(&s.slots, item.slot, item.slots);
         for pair in item.first_pair..item.first_pair + item.pairs {
@@ -81,14 +81,14 @@ pub(super) fn check_small(s: &mut State) {
 }
 
 pub(super) fn check_large(s: &mut State) {
-    let mut checked = Checked::default();
+    let mut checked = TestedPairs::default();
     for item in taken(&s.large_items, s.chunk.first_large, s.chunk.large_items) {
         check_large_item(s, item, &mut checked);
     }
     checked.leave(s);
 }
 
-pub(super) fn check_large_item(s: &State, item: &LargeItem, checked: &mut Checked) {
+pub(super) fn check_large_item(s: &State, item: &LargeItem, checked: &mut TestedPairs) {
     let entry = |place: u32| s.entries[(item.start + place) as usize];
     let segments = |from: u32, to: u32| from * LANES..(to * LANES).min(item.boxes);
     let (rows, columns) = (segments(item.row, item.row + 1), segments(item.column, item.end_column));
@@ -106,7 +106,7 @@ pub(super) fn check_large_item(s: &State, item: &LargeItem, checked: &mut Checke
 }
 
 pub(super) fn check_all(s: &mut State) {
-    let (mut checked, mut fresh) = (Checked::default(), s.clone());
+    let (mut checked, mut fresh) = (TestedPairs::default(), s.clone());
     fresh.renew();
     for a in 0..s.params.boxes {
         for b in a + 1..s.params.boxes {

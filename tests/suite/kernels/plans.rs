@@ -80,21 +80,3 @@ fn extreme_sets_have_a_plan() {
     let flat: Vec<_> = (0..900).map(|i| Aabb::from_center([(i % 30) as f32, 0.0, 0.0], [0.5; 3])).collect();
     plan(&flat);
 }
-
-/// The model of `docs/GPU.md` predicts times from bytes, and bytes from what the kernels do for a box.
-#[test]
-fn the_documents_model_has_the_counts_of_the_kernels() {
-    let boxes = set("unit", 30_000);
-    let case = Case { name: "unit", boxes, before: Vec::new(), small_cell: 32, columns: 8 };
-    let a_box = |count: u64| count as f64 / case.boxes.len() as f64;
-    let state = State::before("check_small", &case);
-    let (entries, tests) = (u64::from(state.counters.entries), u64::from(LANES * state.counters.tests));
-    // `locate` has counted a box in each of its cells, and `scatter` has placed it there.
-    let counted: u64 = State::before("visit", &case).cells.iter().map(|cell| u64::from(cell.residents)).sum();
-    // `count_pairs` and `place_pairs` have one for each pair.
-    let atomics = counted + entries + 2 * oracle::pairs(&case.boxes).len() as u64;
-    let (entries, tests, atomics) = (a_box(entries), a_box(tests), a_box(atomics));
-    let model = format!("{entries:.1} entries, {tests:.0} tests and {atomics:.1} atomic operations a box");
-    let text = include_str!("../../../docs/GPU.md").split_whitespace().collect::<Vec<_>>().join(" ");
-    assert!(text.contains(&model), "docs/GPU.md does not say: {model}");
-}

@@ -139,24 +139,20 @@ impl State {
 
     /// Returns the state before a kernel, made by the twins of the kernels before it.
     pub(super) fn before(kernel: &str, case: &Case) -> Self {
-        if matches!(kernel, "index_pairs" | "lazy_pairs") {
+        if kernel == "index_pairs" {
             return indices(1000, 77, 4000);
-        }
-        if let "row_ends" | "lazy_ends" = kernel {
-            return ends(300, 350, if kernel == "row_ends" { 2 } else { 5 });
         }
         if let "arrange_rows" | "count_pairs" | "place_pairs" | "rank_pairs" | "rank_long_rows" = kernel {
             return pairs_to_sort(kernel, case);
         }
         let mut state = Self::new(case);
         // Without a grid no box is located.
-        let skipped = if kernel == "check_all" { "locate" } else { "check" };
         for twin in TWINS.iter().take_while(|twin| twin.kernel.name != kernel) {
-            if kernel == "check_all" && twin.kernel.name == skipped {
+            if kernel == "check_all" && twin.kernel.name == "locate" {
                 break;
             }
             // The checks do not depend on each other.
-            if !twin.kernel.name.starts_with("check") {
+            if twin.kernel.stage != Stage::Check {
                 (twin.run)(&mut state);
             }
         }

@@ -12,7 +12,7 @@ pub(super) struct Twin {
 }
 
 /// The twins, in the order in which the kernels run.
-pub(super) static TWINS: [Twin; 21] = [
+pub(super) static TWINS: [Twin; 18] = [
     Twin { kernel: &shaders::APPLY_CHANGES, run: apply_changes, groups: by_change, compare: compare_motions },
     Twin { kernel: &shaders::MEASURE, run: measure, groups: few, compare: compare_classes },
     Twin { kernel: &shaders::LOCATE, run: locate, groups: by_box, compare: compare_located },
@@ -30,15 +30,7 @@ pub(super) static TWINS: [Twin; 21] = [
     Twin { kernel: &shaders::PLACE_PAIRS, run: place_pairs, groups: by_found_pair, compare: compare_grouped },
     Twin { kernel: &shaders::RANK_PAIRS, run: rank_pairs, groups: by_found_pair, compare: compare_ranked },
     Twin { kernel: &shaders::RANK_LONG_ROWS, run: rank_long_rows, groups: by_window, compare: compare_out },
-    Twin {
-        kernel: &shaders::study::INDEX_PAIRS,
-        run: index_pairs,
-        groups: by_cell,
-        compare: compare_indices,
-    },
-    Twin { kernel: &shaders::study::LAZY_PAIRS, run: lazy_pairs, groups: by_cell, compare: compare_out },
-    Twin { kernel: &shaders::study::ROW_ENDS, run: row_ends, groups: by_cell, compare: compare_indices },
-    Twin { kernel: &shaders::study::LAZY_ENDS, run: lazy_ends, groups: by_cell, compare: compare_out },
+    Twin { kernel: &shaders::INDEX_PAIRS, run: index_pairs, groups: by_cell, compare: compare_indices },
 ];
 
 pub(super) fn twin(kernel: &str) -> &'static Twin {

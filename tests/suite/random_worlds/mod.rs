@@ -26,7 +26,7 @@ const MOST_OPS: usize = 160;
 
 /// Sums over all runs.
 #[derive(Clone, Copy, Debug, Default)]
-struct Tally {
+struct OperationCounts {
     runs: u64,
     ops: u64,
     steps: u64,
@@ -41,7 +41,7 @@ struct Tally {
     cut_short: u64,
 }
 
-impl Tally {
+impl OperationCounts {
     fn plus(self, other: Self) -> Self {
         Self {
             runs: self.runs + other.runs,
@@ -79,7 +79,7 @@ enum End {
 /// The state in which a run ended; no poses and no pairs when it was cut short.
 #[derive(Default)]
 struct Outcome {
-    tally: Tally,
+    tally: OperationCounts,
     poses: Vec<u32>,
     pairs: Vec<[(u32, u32); 2]>,
 }
@@ -95,20 +95,20 @@ impl Outcome {
 }
 
 /// The world, and the broad phase with its checker around it.
-struct Scene {
+struct RandomScene {
     world: World,
     broad_phase: Timed<Subject>,
     way: Way,
-    tally: Tally,
+    tally: OperationCounts,
 }
 
-impl Scene {
+impl RandomScene {
     fn new(way: Way, plant: Plant) -> Self {
         let mut world = World::with_gravity(glam::Vec3::ZERO);
         // With CCD, calls between the two of a step, for a part of it.
         world.params.max_ccd_substeps = 3;
         let broad_phase = Timed::new(Subject::new(way, plant)).checked(way.margin, 1);
-        Self { world, broad_phase, way, tally: Tally { runs: 1, ..Tally::default() } }
+        Self { world, broad_phase, way, tally: OperationCounts { runs: 1, ..OperationCounts::default() } }
     }
 
     fn play(&mut self, op: Op) -> Result<(), End> {
@@ -182,12 +182,12 @@ impl Scene {
 
 /// Plays the operations and another step, so that the last one is seen too; or says what was wrong.
 fn run(ops: &[Op], way: impl Into<Way>, plant: Plant) -> Result<Outcome, String> {
-    let mut scene = Scene::new(way.into(), plant);
+    let mut scene = RandomScene::new(way.into(), plant);
     match ops.iter().copied().chain([Op::Step(1)]).try_for_each(|op| scene.play(op)) {
         Ok(()) => Ok(scene.outcome()),
         Err(End::Wrong(what)) => Err(what),
         Err(End::RapierPanicked) => {
-            Ok(Outcome { tally: Tally { cut_short: 1, ..scene.tally }, ..Outcome::default() })
+            Ok(Outcome { tally: OperationCounts { cut_short: 1, ..scene.tally }, ..Outcome::default() })
         }
     }
 }
@@ -241,8 +241,8 @@ fn listed(ops: &[Op]) -> String {
 }
 
 /// Runs a test on random lists of operations and sums up what happened in the runs that it returns.
-fn on_random_ops(cases: u32, test: impl Fn(&[Op]) -> Result<Outcome, String>) -> Tally {
-    let sum = Cell::new(Tally::default());
+fn on_random_ops(cases: u32, test: impl Fn(&[Op]) -> Result<Outcome, String>) -> OperationCounts {
+    let sum = Cell::new(OperationCounts::default());
     let counted = |ops: &[Op]| -> Result<(), String> {
         sum.set(sum.get().plus(test(ops)?.tally));
         Ok(())

@@ -1,13 +1,9 @@
 //! The checks of the fuzz targets, without instruments: on every input that once failed, and on random bytes.
 
 use super::memory;
-use pbig_harness::{files, hard, pbig_grid};
+use pbig_harness::checks;
 use rand::rngs::StdRng;
 use rand::{RngExt, SeedableRng};
-
-#[path = "../../../fuzz/src/checks/mod.rs"]
-#[allow(unreachable_pub, reason = "the fuzz targets are other crates")]
-mod checks;
 
 type Check = fn(&[u8]);
 

@@ -3,7 +3,7 @@
 use super::ways_to_update;
 use crate::finder::check_on;
 use crate::follower::Follower;
-use pbig_core::{Aabb, Backend, BroadPhase, Config, Error, Limits, Pair, ProxyFilter};
+use pbig_core::{Aabb, Error, Limits, Pair, ProxyFilter};
 use pbig_tests::{Way, strategies};
 
 fn all_pairs(n: u32) -> impl Iterator<Item = Pair> {
@@ -96,26 +96,4 @@ fn complete_in_updates(way: Way, strategy: &str, boxes: &[Aabb]) {
         broad_phase.set(n / 2, boxes[0], ProxyFilter::ALL).expect("a small id");
         assert_eq!(broad_phase.update().expect("the default limit").added.len() as u32, n - 1, "{strategy}");
     }
-}
-
-/// Not on software adapters, where it would take minutes.
-#[test]
-#[ignore = "2 * 10^8 pairs, 1.6 GB of them alone: cargo test --release -p pbig-tests -- --ignored twenty_thousand"]
-fn twenty_thousand_boxes_that_all_overlap() {
-    let boxes = nested(20_000);
-    for (strategy, way) in strategies().into_iter().filter(|(_, way)| way.backend != Backend::Device) {
-        let clock = std::time::Instant::now();
-        let mut finder = way.finder();
-        let found = finder.find(&boxes).expect("the default limit is 2^28");
-        println!("{strategy}: {} pairs in {:?}", found.len(), clock.elapsed());
-        assert!(found.iter().copied().eq(all_pairs(20_000)), "{strategy}");
-    }
-    let mut broad_phase = BroadPhase::new(Config::DEFAULT).expect("a good margin");
-    for (id, aabb) in boxes.iter().enumerate() {
-        broad_phase.set(id as u32, *aabb, ProxyFilter::ALL).expect("a small id");
-    }
-    let clock = std::time::Instant::now();
-    let added = &broad_phase.update().expect("the default limit is 2^28").added;
-    println!("in an update: {} pairs in {:?}", added.len(), clock.elapsed());
-    assert!(added.iter().copied().eq(all_pairs(20_000)));
 }

@@ -31,7 +31,7 @@ struct Churn {
     swings: bool,
     /// The number of boxes from one changed box to the next, if they do not swing.
     one_in: usize,
-    tally: Tally,
+    tally: SoakCounts,
 }
 
 impl Churn {
@@ -40,7 +40,7 @@ impl Churn {
         let world = Follower::new(way, ids);
         let rng = StdRng::seed_from_u64(6);
         let (home, odd) = (set("unit", ids), set("degenerate", 100));
-        Self { world, rng, home, odd, swings: false, one_in: 30, tally: Tally::default() }
+        Self { world, rng, home, odd, swings: false, one_in: 30, tally: SoakCounts::default() }
     }
 
     fn aabb(&mut self, id: u32) -> Aabb {
@@ -110,7 +110,7 @@ impl Churn {
 
 /// Counts so far.
 #[derive(Default)]
-struct Tally {
+struct SoakCounts {
     updates: usize,
     /// Updates that were compared with the oracle, and equal.
     equal: usize,
@@ -121,7 +121,7 @@ struct Tally {
     early: [i64; 2],
 }
 
-impl Tally {
+impl SoakCounts {
     fn count(&mut self, report: &Report, is_early: bool) {
         let way = report.plan.algorithm.name();
         *self.ways.entry(way).or_default() += 1;
@@ -166,11 +166,16 @@ fn held_by_all() -> i64 {
 }
 
 /// On one thread.
-fn soak(churn: impl FnOnce() -> Churn + Send, updates: usize) -> Tally {
+fn soak(churn: impl FnOnce() -> Churn + Send, updates: usize) -> SoakCounts {
     soak_on(1, churn, updates, (updates / 20).min(5000))
 }
 
-fn soak_on(threads: usize, churn: impl FnOnce() -> Churn + Send, updates: usize, sampled: usize) -> Tally {
+fn soak_on(
+    threads: usize,
+    churn: impl FnOnce() -> Churn + Send,
+    updates: usize,
+    sampled: usize,
+) -> SoakCounts {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool");
     pool.install(|| {
         let mut churn = churn();

@@ -8,12 +8,12 @@ use pbig_harness::prelude::*;
 const CONFIG: Config = Config { limits: Limits::UNLIMITED, ..Config::DEFAULT };
 const ON_GPU: Config = Config { backend: Backend::Device, ..CONFIG };
 
-pub(super) fn run(quick: bool) -> Result<Report, Failure> {
+pub(super) fn run(quick: bool) -> Result<BenchReport, Failure> {
     let gpu = GpuFinder::new().map_err(|error| Failure::Input(error.to_string()))?;
     let head = vec![("adapter", gpu.adapter().to_owned()), ("software", gpu.is_software().to_string())];
     let [searches, kernels] = searches(&gpu, quick)?;
     let tables = vec![searches, kernels, host(&gpu, quick)?, events(&gpu, quick)?];
-    Ok(Report { head, ..Report::new("gpu", tables) })
+    Ok(BenchReport { head, ..BenchReport::new("gpu", tables) })
 }
 
 /// Returns the numbers of boxes. A software adapter gets fewer: ten million take minutes there, and the times say nothing.

@@ -10,10 +10,10 @@ use std::process::Command;
 const STEP: f32 = 0.1;
 
 /// The step from one moving id to the next, and the displacement of a box by its id and the update.
-type Motion = (usize, fn(usize, usize) -> [f32; 3]);
+type Movement = (usize, fn(usize, usize) -> [f32; 3]);
 
 /// The probes: the case in the table, and the motion. A probe without a motion is a search from nothing.
-const PROBES: [(&str, Option<Motion>); 4] = [
+const PROBES: [(&str, Option<Movement>); 4] = [
     ("memory, incremental, all moved", Some((1, to_and_fro))),
     ("memory, incremental, all drift", Some((1, drift))),
     ("memory, incremental, 10% drift", Some((10, drift))),
@@ -21,7 +21,7 @@ const PROBES: [(&str, Option<Motion>); 4] = [
 ];
 
 /// Motions of boxes that stay near their places, because a world that drifts apart sometimes needs another plan.
-const STEADY: [(&str, Motion); 3] =
+const STEADY: [(&str, Movement); 3] =
     [("all moved", (1, to_and_fro)), ("all circle", (1, circle)), ("10% circle", (10, circle))];
 
 /// Moves neighbours apart from each other.
@@ -111,14 +111,14 @@ fn resident(key: &str) -> Option<u64> {
 /// A broad phase of boxes that move.
 struct Moving<'a> {
     boxes: &'a [Aabb],
-    motion: Motion,
+    motion: Movement,
     broad_phase: BroadPhase,
     updates: usize,
 }
 
 impl<'a> Moving<'a> {
     /// Sets all boxes where they begin.
-    fn new(boxes: &'a [Aabb], motion: Motion) -> Result<Self, Error> {
+    fn new(boxes: &'a [Aabb], motion: Movement) -> Result<Self, Error> {
         let broad_phase = BroadPhase::new(Config { limits: Limits::UNLIMITED, ..Config::DEFAULT })?;
         let mut moving = Self { boxes, motion: (1, motion.1), broad_phase, updates: 0 };
         moving.update()?;
@@ -159,7 +159,7 @@ pub(super) fn requests_in_steady_state(quick: bool, table: &mut Table) -> Result
 }
 
 /// Returns the requests of all threads of the pool in some updates, and the pairs afterwards.
-fn counted(motion: Motion, boxes: usize) -> Result<(u64, u64), Error> {
+fn counted(motion: Movement, boxes: usize) -> Result<(u64, u64), Error> {
     let boxes = unit(boxes);
     let mut moving = Moving::new(&boxes, motion)?;
     (0..WARM_UP).try_for_each(|_| moving.update())?;

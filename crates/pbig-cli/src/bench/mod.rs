@@ -8,6 +8,7 @@ mod update;
 use crate::options::{BODIES, whole};
 use crate::studies;
 use clap::ValueEnum;
+use pbig_harness::frames::FrameKind;
 use pbig_harness::output::Failure;
 use std::ffi::OsString;
 use std::path::PathBuf;
@@ -29,17 +30,19 @@ pub(crate) struct Args {
     /// Numbers of boxes for `steady`, instead of its own.
     #[arg(long, value_name = "N,N", value_parser = whole::<usize>(BODIES), value_delimiter = ',', allow_negative_numbers = true)]
     boxes: Vec<usize>,
+    /// Scene queries after each step of `step`, several kinds separated by commas: none, ray, rays-100, rays-10000, cast,
+    /// character, boxes or point.
+    #[arg(long, value_name = "KIND", value_delimiter = ',', value_parser = FrameKind::named)]
+    queries: Vec<FrameKind>,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 enum Suite {
-    /// Ours alone, stage by stage: against boxes, movers, density and the spread of sizes (of `pbig-studies`).
-    Stages,
     /// A broad phase's call through rapier, beside stock's on the same world; and memory.
     Update,
     /// The finder alone, beside parry's tree and obvhs (of `pbig-studies`).
     Peers,
-    /// Every scene at every size, stock beside ours in each step.
+    /// Whole steps of every scene, with stock and with ours in turn.
     Step,
     /// Times of updates by motion: mean, median, p99, worst (of `pbig-studies`).
     Steady,
@@ -53,11 +56,14 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
     if !args.boxes.is_empty() && args.suite != Suite::Steady {
         return Err(Failure::Input("--boxes is for `pbig bench steady`, not for other suites".into()));
     }
+    if !args.queries.is_empty() && args.suite != Suite::Step {
+        return Err(Failure::Input("--queries is for `pbig bench step`, not for other suites".into()));
+    }
     let report = match args.suite {
         Suite::Update => update::run(args.quick)?,
-        Suite::Step => step::run(args.quick)?,
+        Suite::Step => step::run(args.quick, &args.queries),
         Suite::Gpu => gpu::run(args.quick)?,
-        Suite::Stages | Suite::Peers | Suite::Steady | Suite::Papers => return forward(args),
+        Suite::Peers | Suite::Steady | Suite::Papers => return forward(args),
     };
     report.finish(args.json, args.write.as_deref())
 }

@@ -91,9 +91,9 @@ impl Calls {
 }
 
 /// A set of boxes, and the share that moves; none: nothing moves.
-type Case = (&'static str, usize, Option<f64>);
+type UpdateCase = (&'static str, usize, Option<f64>);
 
-fn cases(quick: bool) -> impl Iterator<Item = Case> {
+fn cases(quick: bool) -> impl Iterator<Item = UpdateCase> {
     let of = |share| [1000, 10_000, 100_000, 1_000_000].map(|boxes| ("uniform", boxes, share));
     let others = [("gaussian", 10_000, Some(1.0)), ("gaussian", 100_000, Some(1.0))];
     let all = of(Some(1.0)).into_iter().chain(others).chain(of(Some(0.01))).chain(of(None));
@@ -104,18 +104,18 @@ fn cases(quick: bool) -> impl Iterator<Item = Case> {
 const OTHERS: [(usize, &str); 3] =
     [(STOCK, "stock"), (FLOOR, "floor, one thread"), (FLOOR_PARALLEL, "floor, all threads")];
 
-pub(super) fn run(quick: bool) -> Result<Report, Failure> {
+pub(super) fn run(quick: bool) -> Result<BenchReport, Failure> {
     let mut table = Table::new("update", COMPARED);
     for case in tracked(cases(quick), "cases") {
         measure(case, Effort::new(quick), &mut table)?;
     }
     memory::peaks(quick, &mut table)?;
     memory::requests_in_steady_state(quick, &mut table)?;
-    Ok(Report::new("update", vec![table]))
+    Ok(BenchReport::new("update", vec![table]))
 }
 
 /// Appends the rows of a case.
-fn measure((set, n, share): Case, effort: Effort, table: &mut Table) -> Result<(), Failure> {
+fn measure((set, n, share): UpdateCase, effort: Effort, table: &mut Table) -> Result<(), Failure> {
     let boxes = BoxSet::named(set).expect("a set of the harness").boxes(n, 1);
     let sides = if set == "uniform" && share == Some(1.0) { 4 } else { 2 };
     let mut calls = Calls::new(&boxes, share);
@@ -131,11 +131,4 @@ fn measure((set, n, share): Case, effort: Effort, table: &mut Table) -> Result<(
         table.row(compared(&case, n, pairs, unit, times[OURS], (name, times[side])));
     }
     Ok(())
-}
-
-/// Returns ours and stock's milliseconds if a share of some boxes moves, and the pairs.
-pub(super) fn shares(boxes: &[Aabb], share: f64, effort: Effort) -> Result<(f64, f64, u64), Failure> {
-    let mut calls = Calls::new(boxes, Some(share));
-    let times = medians(&mut calls, 2, effort, Calls::prepare, Calls::run)?;
-    Ok((times[OURS], times[STOCK], calls.ours.pair_count() as u64))
 }

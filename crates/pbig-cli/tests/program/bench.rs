@@ -49,16 +49,23 @@ fn bench_update_has_stock_the_floor_and_memory() {
 #[test]
 fn bench_step_has_every_scene_and_writes_a_file() {
     let folder = tempfile::tempdir().expect("a folder");
-    let object = json(&pbig(folder.path(), &["bench", "step", "--quick", "--json", "--write", "out"]));
+    let kinds = ["--queries", "none,rays-100"];
+    let object = json(&pbig(
+        folder.path(),
+        &[&["bench", "step", "--quick", "--json", "--write", "out"], &kinds[..]].concat(),
+    ));
     let rows = rows(&object["tables"], "step");
-    for scene in pbig_harness::scenes::Scene::ALL {
-        assert!(about(rows, scene.name) > 0, "{}", scene.name);
+    assert_eq!(rows.len(), 2 * pbig_harness::scenes::Scene::ALL.len());
+    for row in rows {
+        let asks = row["queries"] == "rays-100";
+        for side in ["stock", "pbig"] {
+            let of = |what: &str| number(row, &format!("{side}_{what}"));
+            assert!(0.0 < of("broad_mean_ms") && of("broad_mean_ms") < of("step_mean_ms"), "{row}");
+            assert_eq!((of("hits") > 0.0, of("frame_mean_ms") > of("step_mean_ms")), (asks, asks), "{row}");
+        }
     }
-    assert!(about(rows, "uniform, 100% moved") > 0);
-    assert_eq!(about(rows, ", one ray a frame"), pbig_harness::scenes::Scene::ALL.len());
-    assert!(rows.iter().all(|row| number(row, "stock_over_pbig") > 0.0 && row["boxes"].is_u64()));
     let text = std::fs::read_to_string(folder.path().join("out/step.csv")).expect("the file");
-    assert!(text.starts_with("# machine: ") && text.contains("\ncase,boxes,pairs,steps,"), "{text}");
+    assert!(text.starts_with("# machine: ") && text.contains("\nscene,bodies,threads,steps,"), "{text}");
     assert_eq!(text.lines().filter(|line| !line.starts_with('#')).count(), 1 + rows.len());
 }
 
@@ -92,4 +99,5 @@ fn a_missing_program_of_studies_is_named() {
     refused(&steady, &[&format!("{studies} steady --write out --boxes 10,20")]);
     refused(&run(&["accuracy", "--only", "index"]), &[&format!("{studies} accuracy --only index")]);
     refused(&pbig(Path::new("."), &["bench", "step", "--boxes", "60"]), &["--boxes", "steady"]);
+    refused(&pbig(Path::new("."), &["bench", "gpu", "--queries", "ray"]), &["--queries", "step"]);
 }

@@ -68,7 +68,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn software_comes_last_and_low_power_prefers_the_integrated_one() {
+    fn software_comes_last_and_low_power_prefers_integrated() {
         use wgpu::DeviceType::{Cpu, DiscreteGpu, IntegratedGpu, Other, VirtualGpu};
         let best_first = |low| {
             let mut kinds = [Cpu, Other, VirtualGpu, IntegratedGpu, DiscreteGpu];

@@ -15,7 +15,7 @@ use crate::layout::{BITS, Chunk, LANES, Params, SORTED};
 use pbig_shaders::CHECK_ALL;
 use std::collections::VecDeque;
 
-/// Most repetitions of a map before the set is split. Each one has the capacities that the last one asked for.
+/// Maximum number of repetitions of a map before the set is split. Each one has the capacities that the last one asked for.
 const MAX_REPEATS: u32 = 8;
 
 impl Session {
@@ -64,7 +64,7 @@ impl Session {
         }
     }
 
-    /// Notes how much output there is. Returns the items that are done: none of them if the map is still of use.
+    /// Notes how much output there is. Returns the items that are done: none if the map can be used again.
     fn note_output(&mut self, words: u64, params: &Params) -> Result<Option<Chunk>, Failure> {
         self.sizes.word_capacity = words;
         let fits = words <= self.storage.max_buffer_bytes / 4;

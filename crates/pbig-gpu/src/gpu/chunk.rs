@@ -14,7 +14,7 @@ use crate::decode;
 use crate::layout::{BITS, Chunk, Counters, PACKED, Params, RAW, SORTED, Totals, halves, wide};
 use crate::pbig::{CLASSES, SizeClass};
 use pbig_core::{DeviceReport, internal::Clock};
-use pbig_shaders::Buffer;
+use pbig_shaders::{Buffer, Kernel};
 use std::borrow::Cow;
 
 /// A chunk that the device is working on.
@@ -25,7 +25,7 @@ pub(super) struct PendingChunk {
     submission: wgpu::SubmissionIndex,
     /// Bytes of output that come with the header.
     prefetched: u64,
-    passes: Vec<&'static str>,
+    passes: Vec<&'static Kernel>,
 }
 
 pub(super) enum ChunkResult {
@@ -93,14 +93,14 @@ impl Session {
     }
 
     /// Records and submits uploads and changes that wait, `steps`, and a readback of some bytes of output, if they are told.
-    /// Returns the names of the kernels.
+    /// Returns the kernels.
     fn record(
         &mut self,
         params: &Params,
         side: Side,
         steps: &[Step],
         prefetched: Option<u64>,
-    ) -> Result<(wgpu::SubmissionIndex, Vec<&'static str>), GpuError> {
+    ) -> Result<(wgpu::SubmissionIndex, Vec<&'static Kernel>), GpuError> {
         self.storage.write(Buffer::Params, &[*params])?;
         let is_timed = prefetched.is_some() && self.options.time_kernels;
         let timestamps = self.timestamps[side].as_ref().filter(|_| is_timed);
@@ -275,7 +275,7 @@ impl Session {
     fn note_times(&self, chunk: &PendingChunk, header: &Header, sink: &mut Sink) {
         if self.device.has_timestamps && self.options.time_kernels {
             let times = header.times(&chunk.passes, self.device.queue.get_timestamp_period());
-            times.for_each(|(name, time)| sink.add_time(name, time));
+            times.for_each(|(kernel, time)| sink.add_time(kernel, time));
         }
     }
 

@@ -4,7 +4,7 @@ use crate::Coding;
 use crate::decode::pair_count;
 use crate::layout::{BITS, PACKED, Params};
 
-/// Most boxes of one cell that records can name: 2^16 segments.
+/// Maximum number of boxes of one cell that records can name: 2^16 segments.
 const MAX_PACKED_BOXES: u32 = 1 << 24;
 
 /// The counts of an earlier call, by which the smaller coding is chosen.
@@ -32,7 +32,7 @@ impl Counted {
     }
 }
 
-/// Returns the flag of one bit a pair if all fit a buffer of so many bytes. The order of bits is that of the pairs.
+/// Returns the flag of one bit a pair if all fit a buffer of this size in bytes. The order of bits is that of the pairs.
 pub(super) fn bits_that_fit(params: &Params, max_bytes: u64) -> u32 {
     if 4 * bit_words(params) <= max_bytes { BITS } else { 0 }
 }

@@ -27,7 +27,6 @@ pub enum Fault {
 /// The choices that are fixed when a pipeline is made.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub(super) struct Variant {
-    root: u32,
     is_balanced: bool,
     /// The search is for changes instead of all pairs.
     changes: bool,
@@ -37,7 +36,7 @@ pub(super) struct Variant {
 
 impl Variant {
     pub(super) fn new(options: &GpuOptions, changes: bool) -> Self {
-        Self { root: options.root.min(9), is_balanced: options.load_balancing, changes, rows: false }
+        Self { is_balanced: options.load_balancing, changes, rows: false }
     }
 
     pub(super) fn of_rows(self) -> Self {
@@ -52,8 +51,7 @@ impl Variant {
     /// Returns the values of the overrides that the source declares.
     fn constants(self, source: &str) -> Vec<(&'static str, f64)> {
         let flag = |is_set: bool| f64::from(u8::from(is_set));
-        let all =
-            [("ROOT", f64::from(self.root)), ("BALANCED", flag(self.is_balanced)), ("ROWS", flag(self.rows))];
+        let all = [("BALANCED", flag(self.is_balanced)), ("ROWS", flag(self.rows))];
         all.into_iter().filter(|(name, _)| source.contains(&format!("override {name}"))).collect()
     }
 }

@@ -41,7 +41,7 @@ impl Work {
 }
 
 impl KeptPlan {
-    /// Keeps a plan that was made for so many boxes.
+    /// Keeps a plan that was made for this number of boxes.
     pub(super) fn new(plan: GpuPlan, boxes: u32) -> Self {
         Self { plan, boxes: u64::from(boxes), first: None }
     }
@@ -94,7 +94,7 @@ mod tests {
     }
 
     #[test]
-    fn a_plan_is_outgrown_when_the_work_for_a_box_has_doubled_or_halved() {
+    fn a_plan_is_outgrown_when_work_for_a_box_doubles_or_halves() {
         let mut plan = kept(1000);
         assert!(!plan.is_outgrown_after(&counted(1000, 8000, 40)));
         assert!(!plan.is_outgrown_after(&counted(2000, 16_000, 80)), "twice the boxes");
@@ -104,7 +104,7 @@ mod tests {
     }
 
     #[test]
-    fn the_first_call_may_need_any_number_of_tests_and_later_ones_four_times_as_many_a_box() {
+    fn later_calls_may_need_four_times_the_tests_of_the_first() {
         let mut plan = kept(100_000);
         assert_eq!(plan.most_tests(100_000), u32::MAX);
         plan.is_outgrown_after(&counted(100_000, 0, 5000));

@@ -5,11 +5,11 @@
 
 use crate::pbig::{OVERSIZE_CLASS, Summary};
 
-/// Most boxes of a level, spread evenly, that may lie in the space of a box. Of 4, 8, 16, 32 and 64, this one led to the fewest
-/// entries and tests on twelve sets of mixed sizes.
+/// Maximum number of boxes of a level, spread evenly, that may lie in the space of a box. Of 4, 8, 16, 32 and 64, this
+/// one led to the fewest entries and tests on twelve sets of mixed sizes.
 const MOST_UNDER_A_BOX: f64 = 16.0;
 
-/// Most boxes that are tested against all others, instead of having cells of their own.
+/// Maximum number of boxes that are tested against all others, instead of having cells of their own.
 const MOST_WITHOUT_LEVEL: u32 = 32;
 
 /// Allowance for boxes that turn, or that are rounded differently elsewhere.

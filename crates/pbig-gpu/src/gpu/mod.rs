@@ -27,7 +27,7 @@ mod search;
 mod session;
 mod sink;
 mod storage;
-pub mod study;
+pub mod testing;
 mod upload;
 
 pub use adapter::{adapters, describe};

@@ -13,10 +13,10 @@ use pbig_shaders::{self as shaders, Buffer, Kernel};
 /// Workgroups in a row of a dispatch. The portable limit is 65,535.
 const GROUPS_PER_ROW: u32 = 32_768;
 
-/// Most kernels in one submission. Each takes two timestamps.
+/// Maximum number of kernels in one submission. Each takes two timestamps.
 pub(super) const MAX_PASSES: u32 = 24;
 
-/// Most workgroups that measure the boxes. Each adds its counts to those of all.
+/// Maximum number of workgroups that measure the boxes. Each adds its counts to those of all.
 const MEASURE_GROUPS: u32 = 64;
 
 /// Bytes of the counts of size classes.
@@ -145,7 +145,7 @@ pub(super) fn make_buffers(
     Ok(())
 }
 
-/// Makes the buffers of the sort, for the pairs of so many words. `params` gets the capacity.
+/// Makes the buffers of the sort, for the pairs of this number of words. `params` gets the capacity.
 pub(super) fn make_sort_buffers(
     storage: &mut Storage,
     params: &mut Params,
@@ -175,12 +175,12 @@ pub(super) struct Recording<'a> {
     pub(super) side: Side,
     pub(super) variant: Variant,
     pub(super) queries: Option<&'a wgpu::QuerySet>,
-    pub(super) passes: Vec<&'static str>,
+    pub(super) passes: Vec<&'static Kernel>,
 }
 
 /// A kernel that is ready to run.
 struct Ready {
-    name: &'static str,
+    kernel: &'static Kernel,
     pipeline: wgpu::ComputePipeline,
     bind_group: wgpu::BindGroup,
     groups: Groups,
@@ -203,7 +203,7 @@ impl Recording<'_> {
                 }
             }
         }
-        self.passes.extend(kernels.iter().map(|kernel| kernel.name));
+        self.passes.extend(kernels.iter().map(|ready| ready.kernel));
         let Some(query_set) = self.queries else {
             self.run(&kernels, None);
             return Ok(());
@@ -228,15 +228,15 @@ impl Recording<'_> {
     ) -> Result<Ready, GpuError> {
         let pipeline = self.storage.device.pipeline(kernel, variant)?;
         let bind_group = self.storage.bind_group(kernel, variant, self.side, &pipeline);
-        Ok(Ready { name: kernel.name, pipeline, bind_group, groups })
+        Ok(Ready { kernel, pipeline, bind_group, groups })
     }
 
     /// Records a pass.
     fn run(&mut self, kernels: &[Ready], timestamp_writes: Option<wgpu::ComputePassTimestampWrites<'_>>) {
         let descriptor = wgpu::ComputePassDescriptor { label: Some("pbig"), timestamp_writes };
         let mut pass = self.encoder.begin_compute_pass(&descriptor);
-        for Ready { name, pipeline, bind_group, groups } in kernels {
-            pass.insert_debug_marker(name);
+        for Ready { kernel, pipeline, bind_group, groups } in kernels {
+            pass.insert_debug_marker(kernel.name);
             pass.set_pipeline(pipeline);
             pass.set_bind_group(0, bind_group, &[]);
             match *groups {

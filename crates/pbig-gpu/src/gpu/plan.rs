@@ -11,7 +11,7 @@ use crate::{CellRule, GpuOptions};
 use pbig_core::Aabb;
 use std::fmt;
 
-/// Most cells of a level per box. With more cells, the scan costs more than full cells do.
+/// Maximum number of cells of a level per box. With more cells, the scan costs more than full cells do.
 const CELLS_PER_BOX: f64 = 4.0;
 /// Number of cells that every level may have, however few its boxes.
 const MIN_CELLS_PER_LEVEL: f64 = 4096.0;
@@ -20,7 +20,7 @@ const MIN_CELLS_PER_LEVEL: f64 = 4096.0;
 const OCCUPANCY_LIMIT: f64 = 4.0;
 /// Fewest pairs of sampled boxes in one cell that count: a single coincidence would stand for many boxes.
 const FEWEST_SAMPLED_PAIRS: usize = 16;
-/// Most cells of the finest level from the middle of the world to its end. They must fit an `i32` with room to spare.
+/// Maximum number of cells of the finest level from the middle of the world to its end. They must fit an `i32` with room to spare.
 const MAX_CELL: f64 = 1073741824.0;
 
 /// The levels and cells of a search on a GPU.

@@ -6,7 +6,7 @@ use super::passes::{MAX_PASSES, Recording};
 use super::storage::BufferId;
 use crate::layout::{Counters, Totals};
 use bytemuck::{Pod, Zeroable};
-use pbig_shaders::Buffer;
+use pbig_shaders::{Buffer, Kernel};
 use std::sync::mpsc;
 use std::time::Duration;
 
@@ -28,11 +28,11 @@ impl Header {
     /// Returns the device time of each pass. Some drivers' ticks run backwards across a reset: then it is 0.
     pub(super) fn times(
         &self,
-        passes: &[&'static str],
+        passes: &[&'static Kernel],
         period: f32,
-    ) -> impl Iterator<Item = (&'static str, Duration)> {
-        passes.iter().zip(self.ticks.as_chunks::<2>().0).map(move |(&name, [start, end])| {
-            (name, Duration::from_nanos((end.saturating_sub(*start) as f64 * f64::from(period)) as u64))
+    ) -> impl Iterator<Item = (&'static Kernel, Duration)> {
+        passes.iter().zip(self.ticks.as_chunks::<2>().0).map(move |(&kernel, [start, end])| {
+            (kernel, Duration::from_nanos((end.saturating_sub(*start) as f64 * f64::from(period)) as u64))
         })
     }
 }

@@ -14,7 +14,7 @@ use crate::layout::{BOX_BITS, Located, Motion, ordered};
 use crate::pbig::sampled;
 use pbig_core::{Aabb, ChangeRequest, DeviceFound, Pair, ProxyFilter, SearchRequest};
 
-/// Most boxes of one cell: their work items, 2^17 rows by 2^17 / 8 groups of 8 columns, fit 32 bits.
+/// Maximum number of boxes of one cell: their work items, 2^17 rows by 2^17 / 8 groups of 8 columns, fit 32 bits.
 const MAX_BOXES_PER_CELL: u64 = 1 << 25;
 
 /// Fewest boxes of a part that is split further because a list was too large.

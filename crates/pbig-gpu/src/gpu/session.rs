@@ -18,11 +18,11 @@ use pbig_core::{DeviceFound, DeviceReport, internal::Clock};
 use std::sync::Arc;
 use std::time::Duration;
 
-/// Most words of output per changed box that are prefetched: four pairs. The output of a burst of pairs says nothing about
-/// an update with few changes.
+/// Maximum number of words of output per changed box that are prefetched: four pairs. The output of a burst of pairs
+/// says nothing about an update with few changes.
 const PREFETCHED_WORDS_PER_CHANGE: u64 = 8;
 
-/// Most cells of a plan.
+/// Maximum number of cells of a plan.
 const MAX_CELLS: u64 = 1 << 28;
 
 /// Lengths of lists and output that earlier calls needed.
@@ -32,7 +32,7 @@ pub(super) struct Sizes {
     pub(super) lists: Counters,
     /// Expected words of output of a chunk: these are prefetched.
     pub(super) expected_words: u64,
-    /// Most words of a chunk of this job.
+    /// Maximum number of words of a chunk of this job.
     pub(super) max_words: u64,
     pub(super) word_capacity: u64,
 }
@@ -232,7 +232,7 @@ impl Session {
     }
 }
 
-/// Returns an error if 32 bits might not count the entries of so many boxes: up to 4 x 4 x 4 in each level but the last.
+/// Returns an error if 32 bits might not count the entries of this number of boxes: up to 4 x 4 x 4 in each level but the last.
 fn check_entries(kept: &KeptPlan, boxes: u32) -> Result<(), GpuError> {
     let entries = u64::from(boxes) * (64 * (kept.plan.levels.len() as u64 - 1) + 1);
     let limit = u64::from(u32::MAX);

@@ -3,6 +3,7 @@
 use super::{Failure, GpuPlan};
 use crate::layout::{COUNTED, Params, Totals, wide};
 use pbig_core::{DeviceFound, Pair};
+use pbig_shaders::{Kernel, Stage};
 use std::time::Duration;
 
 /// The pairs and counts of a search so far.
@@ -58,11 +59,14 @@ impl Sink {
         }
     }
 
-    pub(super) fn add_time(&mut self, name: &'static str, time: Duration) {
-        let kernels = &mut self.found.report.kernels;
-        match kernels.iter_mut().find(|(known, _)| *known == name) {
+    pub(super) fn add_time(&mut self, kernel: &Kernel, time: Duration) {
+        let report = &mut self.found.report;
+        match report.kernels.iter_mut().find(|(known, _)| *known == kernel.name) {
             Some((_, sum)) => *sum += time,
-            None => kernels.push((name, time)),
+            None => report.kernels.push((kernel.name, time)),
+        }
+        if kernel.stage == Stage::Map {
+            report.map += time;
         }
     }
 

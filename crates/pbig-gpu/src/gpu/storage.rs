@@ -105,7 +105,7 @@ struct PendingCopy {
 #[derive(Debug)]
 struct KeptBuffer {
     buffer: wgpu::Buffer,
-    /// Most bytes that a call of this window used.
+    /// Maximum number of bytes that a call of this window used.
     used: u64,
 }
 

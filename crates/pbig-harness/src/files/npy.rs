@@ -1,6 +1,6 @@
 //! The content of `.npy` files. The head is read and checked first, then the values, box by box.
 
-use super::{BoxList, Frames, MAX_BOXES, Place, Source, brief, f64_box, one_line, too_many};
+use super::{BoxList, Frames, Location, MAX_BOXES, Source, brief, f64_box, one_line, too_many};
 use ndarray_npy::npy::header::Header;
 use pbig_core::Aabb;
 use std::io::{ErrorKind, Read};
@@ -22,7 +22,7 @@ pub fn npy_frames(bytes: &[u8]) -> Result<Frames, String> {
 pub(super) fn boxes<R: Read>(source: Source<R>) -> Result<BoxList, String> {
     let array = Array::open(source, 2)?;
     let mut list = BoxList { boxes: Vec::with_capacity(array.room()), first_invalid: None };
-    array.each_row(|v| list.push(f64_box(v), Place::Row(list.boxes.len())))?;
+    array.each_row(|v| list.push(f64_box(v), Location::Row(list.boxes.len())))?;
     Ok(list)
 }
 
@@ -354,6 +354,6 @@ mod tests {
     fn the_first_invalid_box_is_known_by_its_row() {
         let bytes = [head("<f4", "False", "3, 6"), vec![0; 24], vec![255; 24], vec![0; 24]].concat();
         let list = boxes(Source::of(&bytes)).expect("boxes");
-        assert_eq!((list.boxes.len(), list.first_invalid), (3, Some((1, Place::Row(1)))));
+        assert_eq!((list.boxes.len(), list.first_invalid), (3, Some((1, Location::Row(1)))));
     }
 }

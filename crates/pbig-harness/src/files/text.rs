@@ -1,6 +1,6 @@
 //! The content of `.csv` files, read line by line.
 
-use super::{BoxList, MAX_BOXES, Place, brief, one_line, too_many};
+use super::{BoxList, Location, MAX_BOXES, brief, one_line, too_many};
 use pbig_core::Aabb;
 use std::io::{self, BufRead};
 
@@ -24,7 +24,7 @@ pub(super) fn boxes(reader: impl BufRead, max_boxes: u64) -> Result<BoxList, Str
         let text = lines.text().map_err(about)?;
         let has_no_box = text.is_empty() || (is_first && is_header(text));
         if !has_no_box {
-            list.push(csv_box(text, is_first).map_err(about)?, Place::Line(lines.number));
+            list.push(csv_box(text, is_first).map_err(about)?, Location::Line(lines.number));
             check_count(list.boxes.len(), max_boxes).map_err(about)?;
         }
         is_first &= text.is_empty();
@@ -221,6 +221,6 @@ mod tests {
     fn the_first_invalid_box_is_known_by_its_line() {
         let text = "min_x,min_y,min_z,max_x,max_y,max_z\n0,0,0,1,1,1\n\n0,0,0,nan,1,1\n1,1,1,0,0,0\n";
         let list = boxes(text.as_bytes(), 9).expect("boxes");
-        assert_eq!((list.boxes.len(), list.first_invalid), (3, Some((1, Place::Line(4)))));
+        assert_eq!((list.boxes.len(), list.first_invalid), (3, Some((1, Location::Line(4)))));
     }
 }

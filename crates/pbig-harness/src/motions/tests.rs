@@ -1,21 +1,21 @@
 use super::*;
 use pbig_core::find_pairs;
 
-fn bits(scene: &Scene) -> Vec<u32> {
+fn bits(scene: &MovingBoxes) -> Vec<u32> {
     scene.boxes().iter().flat_map(|b| [b.min, b.max]).flatten().map(f32::to_bits).collect()
 }
 
-fn scenes(n: usize) -> impl Iterator<Item = Scene> {
+fn scenes(n: usize) -> impl Iterator<Item = MovingBoxes> {
     Motion::ALL
         .into_iter()
-        .flat_map(move |motion| Density::ALL.map(|density| Scene::new(motion, density, n, 1)))
+        .flat_map(move |motion| Density::ALL.map(|density| MovingBoxes::new(motion, density, n, 1)))
 }
 
 #[test]
 fn pairs_a_box_are_as_many_as_the_density_says_in_every_frame() {
     for motion in Motion::ALL {
         for density in Density::ALL {
-            let mut scene = Scene::new(motion, density, 4000, 1);
+            let mut scene = MovingBoxes::new(motion, density, 4000, 1);
             for frame in 0..60 {
                 if frame % 15 == 0 {
                     let present = scene.boxes().iter().filter(|b| b.is_valid()).count() as f64;
@@ -32,7 +32,7 @@ fn pairs_a_box_are_as_many_as_the_density_says_in_every_frame() {
 #[test]
 fn shares_of_changed_boxes_are_as_told() {
     let counts = |motion, frames: usize| -> Vec<usize> {
-        let mut scene = Scene::new(motion, Density::Sparse, 1000, 1);
+        let mut scene = MovingBoxes::new(motion, Density::Sparse, 1000, 1);
         (0..frames).map(|_| scene.step().len()).collect()
     };
     for motion in [Motion::Drift, Motion::Jitter, Motion::Swing, Motion::Fall] {
@@ -66,7 +66,7 @@ fn exactly_the_named_boxes_change_and_all_stay_in_the_space() {
 
 #[test]
 fn every_box_leaves_and_comes_in_churn() {
-    let mut scene = Scene::new(Motion::Churn, Density::Sparse, 300, 1);
+    let mut scene = MovingBoxes::new(Motion::Churn, Density::Sparse, 300, 1);
     let mut frames_present = vec![0; 300];
     for _ in 0..200 {
         scene.step();
@@ -83,7 +83,7 @@ fn the_same_seed_gives_the_same_boxes_and_another_gives_others() {
     for motion in Motion::ALL {
         for density in Density::ALL {
             let after = |seed| {
-                let mut scene = Scene::new(motion, density, 50, seed);
+                let mut scene = MovingBoxes::new(motion, density, 50, seed);
                 (0..25).for_each(|_| _ = scene.step());
                 bits(&scene)
             };

@@ -66,7 +66,7 @@ pub(super) fn worlds(count: usize) -> Result<Vec<NamedLayout>, Failure> {
 }
 
 /// A world that has been moved.
-pub(super) struct Place<'a> {
+pub(super) struct PlacedWorld<'a> {
     layout: &'a Layout,
     poses: Vec<Pose>,
     colliders: Vec<Collider>,
@@ -77,7 +77,7 @@ pub(super) struct Place<'a> {
     held: Truth,
 }
 
-impl<'a> Place<'a> {
+impl<'a> PlacedWorld<'a> {
     /// Places shapes at poses.
     pub(super) fn new(layout: &'a Layout, poses: Vec<Pose>) -> Self {
         let params = IntegrationParameters::default();
@@ -160,7 +160,7 @@ impl PlaceRow {
     }
 
     /// Adds the world as it is at a time.
-    pub(super) fn add(&mut self, place: &Place<'_>) -> Result<(), Failure> {
+    pub(super) fn add(&mut self, place: &PlacedWorld<'_>) -> Result<(), Failure> {
         let held: Vec<Pair> = place.held.pairs.iter().map(|(pair, _)| *pair).collect();
         self.pairs += place.world.pairs.len() as u64;
         self.held_pairs += held.len() as u64;
@@ -210,7 +210,7 @@ fn run(
     let mut row = PlaceRow::new((name, 1.0), (offset, "diagonal"));
     for _ in 0..steps {
         wide.step();
-        let place = Place::new(&layout, wide.poses());
+        let place = PlacedWorld::new(&layout, wide.poses());
         row.add(&place)?;
         narrow.iter_mut().try_for_each(|one| one.step(&place))?;
     }
@@ -242,7 +242,7 @@ impl Narrow {
     }
 
     /// Makes a step, and compares the pairs of rapier's boxes with the world in f64 after the same step.
-    fn step(&mut self, truth: &Place) -> Result<(), Failure> {
+    fn step(&mut self, truth: &PlacedWorld) -> Result<(), Failure> {
         self.world.step(&mut *self.broad_phase);
         let boxes = rapiers(&self.world.params, self.colliders(), 0);
         self.sum += truth.world.differences(finder().find(&boxes)?, truth.reach());

@@ -1,7 +1,4 @@
 //! The corpus: sets of boxes for which every algorithm must find the oracle's pairs.
-//!
-//! This file needs only `pbig_core` and the generator `crate::boxes`, because the crate in `wasm/` includes it
-//! where rapier and wgpu cannot be built.
 
 use crate::boxes::BoxSet;
 use pbig_core::{Aabb, Pair};

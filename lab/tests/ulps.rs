@@ -1,11 +1,10 @@
 //! Far from the origin: boxes widened by 2 ulps reach as far as the exact boxes of the shapes at their poses, by 3 as far as
 //! those at poses before they were rounded to f32. The margin of a broad phase covers 2 ulps up to `margin x 2^22` away.
 
-use crate::checked::{backends, pbig};
-use pbig_core::{Aabb, Pair};
+use pbig_core::{Aabb, Backend, Config, Engine, Pair};
 use pbig_studies::wide::{Layout, Pose, Truth, Wide, doubt, to_f32, to_f64, widened_by_ulps};
 use proptest::prelude::*;
-use rapier_pbig::{PbigBroadPhase, collision_aabb};
+use rapier_pbig::{PbigBroadPhase, PbigConfig, collision_aabb};
 use rapier3d::prelude::*;
 
 /// Half the prediction distance, as f64 has it.
@@ -133,10 +132,11 @@ fn far_away_two_ulps_of_margin_miss_nothing_the_default_does() {
         let crowd = Crowd::new(offset, 3000);
         pairs += crowd.truth.pairs.len();
         without += crowd.missed(&mut PbigBroadPhase::new());
-        for (name, way) in backends() {
+        for engine in [None, Some(Engine::Rebuild)] {
             let margin = 1.01 * offset as f32 / (1 << 22) as f32;
-            let mut ours = pbig(way.with(|it| it.margin = margin));
-            assert_eq!(crowd.missed(&mut ours), 0, "{name}, {offset} away");
+            let config = Config { backend: Backend::Cpu, engine, margin, ..PbigConfig::DEFAULT.into() };
+            let mut ours = PbigBroadPhase::with_core_config(config).expect("a length");
+            assert_eq!(crowd.missed(&mut ours), 0, "{engine:?}, {offset} away");
         }
     }
     assert!(without > 10 && pairs > 10_000, "{without} of {pairs}");

@@ -1,4 +1,4 @@
-// Study of Avril's mapping: computes the estimated row and the exact pair of each index.
+// A test of `pair_at`: computes the estimated row and the exact pair of each index.
 
 @group(0) @binding(0) var<uniform> params: Params;
 @group(0) @binding(1) var<storage, read_write> out: array<u32>;

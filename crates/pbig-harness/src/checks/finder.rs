@@ -1,9 +1,7 @@
 //! The pairs of a finder are the oracle's, bit by bit, also in its second call and with filters.
 
-use super::super::pbig_grid::pbig_grid;
 use super::input::Input;
 use pbig_core::{Aabb, Backend, Config, Engine, Finder, Order, ProxyFilter, oracle};
-use pbig_gpu::{CellRule, GpuOptions};
 
 /// One byte of settings, then boxes, each with a filter if the settings ask for filters.
 pub fn finder_against_oracle(data: &[u8]) {
@@ -16,9 +14,6 @@ pub fn finder_against_oracle(data: &[u8]) {
     // Half of the boxes a second time: nothing of the first call may be left.
     for n in [boxes.len(), boxes.len() / 2] {
         check_finder(&mut finder, config.order, &boxes[..n], filtered.then_some(&filters[..n]));
-    }
-    if !filtered {
-        check_pbig(&boxes, &pbig_options(settings));
     }
 }
 
@@ -55,22 +50,4 @@ fn check_finder(finder: &mut Finder, order: Order, boxes: &[Aabb], filters: Opti
     let wanted =
         filters.map_or_else(|| oracle::pairs(boxes), |filters| oracle::pairs_filtered(boxes, filters));
     assert_eq!(found, wanted, "{}", finder.report().plan);
-}
-
-fn pbig_options(settings: u8) -> GpuOptions {
-    GpuOptions {
-        cell_rule: if settings & 32 == 0 { CellRule::Objective } else { CellRule::Density },
-        small_cell: if settings & 64 == 0 { 32 } else { 1 },
-        boxes_per_cell: if settings & 128 == 0 { 4.0 } else { 1.0 },
-        ..GpuOptions::DEFAULT
-    }
-}
-
-/// Compares PBIG's grid, and its counts of tests, with the oracle.
-fn check_pbig(boxes: &[Aabb], options: &GpuOptions) {
-    let found = pbig_grid(boxes, options).expect("few boxes");
-    let wanted = oracle::pairs(boxes);
-    assert_eq!(found.pairs, wanted, "{:?}", found.plan);
-    let counted = found.checks.unnecessary + found.checks.redundant + wanted.len() as u64;
-    assert_eq!(found.checks.made, counted, "{:?}", found.plan);
 }

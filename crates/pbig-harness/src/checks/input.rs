@@ -91,8 +91,7 @@ fn special(bytes: [u8; 3]) -> Aabb {
     from_floats(std::array::from_fn(number))
 }
 
-/// The bytes of a box that [`Input::aabb`] reads as it is: for seeds.
-#[allow(dead_code, reason = "of the two crates that this is compiled in, one makes seeds")]
-pub(crate) fn raw(aabb: &Aabb) -> Vec<u8> {
+/// Returns the bytes of a box that a check reads as it is: for seeds.
+pub fn raw(aabb: &Aabb) -> Vec<u8> {
     [&[0], bytemuck::bytes_of(aabb)].concat()
 }

@@ -6,10 +6,10 @@
 //! paper calls this cell the "corner of the intersection with the largest coordinates". It is an integer here, so it is
 //! exact (contract 3).
 
-use crate::pair_index::{pair_count, pair_of, row_len, row_pair};
 use pbig_core::{Aabb, Checks, Error, Limits, Pair};
 use pbig_gpu::GpuOptions;
 use pbig_gpu::pbig::{Summary, cell_size, cells_along, cells_in, ordinary, space_of};
+use pbig_harness::pair_index::{pair_count, pair_of, row_len, row_pair};
 
 /// Maximum number of cells per box. With more cells, empty cells cost more than full ones.
 const MAX_CELLS_PER_BOX: f64 = 4.0;
@@ -214,6 +214,7 @@ mod tests {
     use pbig_core::oracle;
     use pbig_gpu::CellRule;
     use pbig_gpu::pbig::{density_cell, pbig_cell, pbig_objective};
+    use pbig_harness::corpus::corpus;
 
     fn boxes() -> Vec<Aabb> {
         let at = |i: u32| [i * 37 % 101, i * 53 % 29, i * 17 % 7].map(|x| x as f32 * 0.7);
@@ -225,19 +226,24 @@ mod tests {
         boxes
     }
 
-    #[test]
-    fn the_pairs_are_those_of_the_oracle_for_all_options() {
-        let boxes = boxes();
-        let wanted = oracle::pairs(&boxes);
+    /// Compares the pairs and the counts of tests with the oracle, for all options.
+    fn check(boxes: &[Aabb], name: &str) {
+        let wanted = oracle::pairs(boxes);
         for cell_rule in [CellRule::Objective, CellRule::Density] {
             for (boxes_per_cell, small_cell) in [(1.0, 32), (4.0, 1), (32.0, 0), (4.0, u32::MAX)] {
                 let options = GpuOptions { cell_rule, boxes_per_cell, small_cell, ..GpuOptions::DEFAULT };
-                let found = pbig_grid(&boxes, &options).expect("few boxes");
-                assert_eq!(found.pairs, wanted, "{cell_rule:?}, {boxes_per_cell}, {small_cell}");
+                let found = pbig_grid(boxes, &options).expect("few boxes");
+                assert_eq!(found.pairs, wanted, "{name}, {cell_rule:?}, {boxes_per_cell}, {small_cell}");
                 let Checks { made, unnecessary, redundant, .. } = found.checks;
-                assert_eq!(made, unnecessary + redundant + wanted.len() as u64, "{:?}", found.plan);
+                assert_eq!(made, unnecessary + redundant + wanted.len() as u64, "{name}, {:?}", found.plan);
             }
         }
+    }
+
+    #[test]
+    fn the_pairs_are_those_of_the_oracle_for_all_options() {
+        check(&boxes(), "a ground under boxes");
+        corpus().iter().for_each(|case| check(&case.boxes, &case.name));
     }
 
     #[test]

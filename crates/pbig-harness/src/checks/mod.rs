@@ -1,9 +1,10 @@
-//! A check for each fuzz target: bytes in, a panic where a contract is broken.
+//! A check for each fuzz target: bytes in, a panic where a contract is broken. The test suite runs the checks too, on every
+//! input that once failed.
 
 mod bounded;
 mod engines;
 mod finder;
-mod input;
+pub mod input;
 mod readers;
 mod updates;
 mod words;

@@ -1,4 +1,4 @@
-//! For tests and studies: faults, single pipelines, plans.
+//! For tests: faults, single pipelines, plans.
 
 pub use super::device::Fault;
 use super::device::Variant;
@@ -9,7 +9,7 @@ use crate::pbig::Summary;
 use pbig_core::Aabb;
 use pbig_shaders::Kernel;
 
-/// Returns the kernels' parameters for a grid of the boxes with at most `max_cells` cells, as far as the plan sets them.
+/// Returns the kernels' parameters for a grid of the boxes with at most `max_cells` cells. Only what the plan sets is filled in.
 pub fn plan_params(boxes: &[Aabb], options: &GpuOptions, max_cells: u32) -> Params {
     GpuPlan::new(&Summary::of(boxes), options, 1.0, max_cells).add_to(Params::default())
 }
@@ -20,7 +20,7 @@ impl GpuFinder {
         self.pretends_hardware = true;
     }
 
-    /// Makes the device fail after so many more submissions.
+    /// Makes the device fail after this number of submissions.
     pub fn inject(&self, fault: Fault, submissions: u32) {
         if let Some(device) = &self.device {
             device.inject(fault, submissions);

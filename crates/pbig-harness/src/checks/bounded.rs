@@ -1,7 +1,7 @@
 //! The work of searches and updates is bounded for every recipe of a world.
 
-use super::super::hard::{Change, History, Part, Place, Recipe, ratio_of_history, ratio_of_search};
 use super::input::Input;
+use crate::hard::{Change, History, Part, Placement, Recipe, ratio_of_history, ratio_of_search};
 use pbig_core::WORK_LIMIT;
 
 /// A byte for the number of boxes, one for the updates, then parts of 12 bytes: one to four of a world, and one to four of
@@ -31,7 +31,8 @@ fn recipe(input: &mut Input) -> Option<Recipe> {
 
 fn part(input: &mut Input) -> Option<Part> {
     let kind = input.byte()?;
-    let place = [Place::Anywhere, Place::Line, Place::Lattice, Place::Around][usize::from(kind & 3)];
+    let place =
+        [Placement::Anywhere, Placement::Line, Placement::Lattice, Placement::Around][usize::from(kind & 3)];
     let mut three = || Some([number(input.byte()?), number(input.byte()?), number(input.byte()?)]);
     let (corner, width, half) = (three()?, three()?, three()?);
     let [weight, decades] = [input.byte()?, input.byte()?];

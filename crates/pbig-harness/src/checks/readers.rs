@@ -1,6 +1,6 @@
 //! Files that may be anything: boxes as many as there are bytes for, or one line of error.
 
-use super::super::files;
+use crate::files;
 
 /// The bytes of an `.npy` file, read as boxes and as frames.
 pub fn npy_reader(data: &[u8]) {
