@@ -64,7 +64,7 @@ fn float() -> impl Strategy<Value = f32> {
 proptest! {
     #![proptest_config(ProptestConfig { cases: 20_000, ..ProptestConfig::default() })]
 
-    /// Outward by so many ulps of the bound at least, and by no more than as many of all that is counted.
+    /// Bounds move outward by at least this number of ulps of the bound, and by at most this number of ulps of all that is counted.
     #[test]
     fn bounds_move_outward_by_ulps(
         at in prop::array::uniform3(float()),

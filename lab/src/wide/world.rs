@@ -106,7 +106,7 @@ mod tests {
     use pbig_harness::scenes::Scene;
     use rapier_pbig::PbigBroadPhase;
 
-    /// Both fall by Newton's law until the lowest touch the ground, so much alike that only rounding is between them.
+    /// Both fall by Newton's law until the lowest touch the ground. Only rounding makes them differ.
     #[test]
     fn worlds_in_f64_and_f32_agree_while_nothing_touches() {
         let offset = [5.0; 3];

@@ -16,7 +16,7 @@ const TARGETS: [(&str, Check); 6] = [
     ("csv_reader", checks::csv_reader),
 ];
 
-/// One allocation: as much as a search needs to begin with, and so much for each byte of the input.
+/// Asserts that one allocation takes at most what a search needs to begin with, and 256 bytes for each byte of the input.
 fn assert_fits(largest: usize, input: &[u8]) {
     let most = (1 << 20) + 256 * input.len();
     assert!(largest <= most, "{largest} bytes at once for an input of {}", input.len());

@@ -5,7 +5,7 @@ use crate::follower::Follower;
 use pbig_core::{Aabb, Algorithm, Backend, BroadPhase, Config, Engine, ProxyFilter};
 use pbig_harness::boxes::BoxSet;
 
-/// A column of cubes after so many steps of 1/60 s under 9.81 m/s^2, computed as it would be: in f32.
+/// A column of cubes after a number of steps of 1/60 s under 9.81 m/s^2, computed as it would be: in f32.
 struct Falling {
     boxes: Vec<Aabb>,
     speed: f32,

@@ -149,7 +149,7 @@ impl SoakCounts {
         writeln!(out, "{done}; {memory}").and_then(|()| out.flush()).expect("standard output is open");
     }
 
-    /// The ways that a soak is named after did so many percent of the updates.
+    /// Asserts that the ways that a soak is named after did this percentage of the updates.
     fn assert_mostly(&self, names: &[&str], percent: usize) {
         let done: usize = names.iter().filter_map(|name| self.ways.get(name)).sum();
         let all = self.updates;

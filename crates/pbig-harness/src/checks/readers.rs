@@ -1,4 +1,4 @@
-//! Files that may be anything: boxes as many as there are bytes for, or one line of error.
+//! Files of any content: no more boxes than the bytes can hold, or one line of error.
 
 use crate::files;
 
