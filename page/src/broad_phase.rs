@@ -134,7 +134,8 @@ mod tests {
         for choice in [Choice::Stock, Choice::Pbig, Choice::Stock] {
             changed.change_broad_phase(choice);
             for step in 1..=5 {
-                (changed.step().unwrap(), other.step().unwrap());
+                changed.step().unwrap();
+                other.step().unwrap();
                 let (found, expected) = (state(&changed), state(&other));
                 assert!(expected.0.len() > 100, "too few sleep: {}", expected.0.len());
                 assert_eq!(found, expected, "{choice:?}, step {step}");
