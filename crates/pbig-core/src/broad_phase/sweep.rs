@@ -198,7 +198,7 @@ impl Kernel for SweepAll<'_> {
     type Output = (u64, u64);
 
     #[inline(always)]
-    unsafe fn run<S: Simd>(self) -> (u64, u64) {
+    fn run<S: Simd>(self, simd: S) -> (u64, u64) {
         let Self { sweep, world, kept, events, are_many } = self;
         let (mut made, mut met) = (0, 0);
         let lanes = sweep.ids.len();
@@ -213,8 +213,7 @@ impl Kernel for SweepAll<'_> {
                 if are_many { (i / BLOCK, 255 & !((2 << (i % BLOCK)) - 1)) } else { (0, 255) };
             made += (lanes - first * BLOCK) as u64;
             sweep.now.clear();
-            // SAFETY: the caller has the instructions.
-            met += unsafe { sweep.meet::<S>(&world.boxes[id as usize], first, wanted) };
+            met += sweep.meet(simd, &world.boxes[id as usize], first, wanted);
             if are_many {
                 sweep.compare_later(world, kept, id, events);
             } else {
@@ -231,10 +230,9 @@ impl Kernel for SweepAll<'_> {
 impl Sweep {
     /// Lists the ids of boxes that overlap one, from a block on; in the first block only the `wanted` lanes. Returns how many.
     #[inline(always)]
-    unsafe fn meet<S: Simd>(&mut self, aabb: &Aabb, first: usize, mut wanted: u32) -> u64 {
+    fn meet(&mut self, simd: impl Simd, aabb: &Aabb, first: usize, mut wanted: u32) -> u64 {
         for (block, Block(boxes)) in self.blocks.iter().enumerate().skip(first) {
-            // SAFETY: the caller has the instructions.
-            let mut mask = unsafe { S::overlaps_eight(boxes, aabb) } & wanted;
+            let mut mask = simd.overlaps_eight(boxes, aabb) & wanted;
             wanted = 255;
             while mask != 0 {
                 self.now.push(self.ids[block * BLOCK + mask.trailing_zeros() as usize]);

@@ -161,13 +161,12 @@ impl Kernel for CountKeys<'_> {
     type Output = ();
 
     #[inline(always)]
-    unsafe fn run<S: Simd>(self) {
+    fn run<S: Simd>(self, simd: S) {
         // Copied, so that the loop keeps them in registers.
         let (cells, shift) = (self.plan.cells, self.shift);
         for (aabb, to) in self.boxes.iter().zip(self.keys) {
-            // SAFETY: the caller has the instructions.
-            let (takes, mut key) =
-                unsafe { (S::takes(&cells, aabb), S::key(&cells, S::steps(&cells, aabb).0)) };
+            let takes = simd.takes(&cells, aabb);
+            let mut key = simd.key(&cells, simd.steps(&cells, aabb).0);
             let mut bucket = 0;
             if takes {
                 bucket += (key >> shift) as usize;
@@ -198,7 +197,7 @@ impl Kernel for ScatterRecords<'_> {
     type Output = ();
 
     #[inline(always)]
-    unsafe fn run<S: Simd>(self) {
+    fn run<S: Simd>(self, _: S) {
         let Self { boxes, keys, first_id, next, coarse, shift } = self;
         for ((aabb, &key), id) in boxes.iter().zip(keys).zip(first_id..) {
             if key < INVALID {
@@ -230,11 +229,13 @@ impl Kernel for SortBucket<'_> {
     type Output = ();
 
     #[inline(always)]
-    unsafe fn run<S: Simd>(self) {
+    fn run<S: Simd>(self, simd: S) {
         let Self { sort, slots, keys } = self;
         let cells = sort.plan.cells;
-        // SAFETY: no other bucket has these cells.
-        let ends = unsafe { sort.ends.part(keys.clone()) };
+        // SAFETY: no other bucket has these cells or slots.
+        let (ends, records, codes) = unsafe {
+            (sort.ends.part(keys.clone()), sort.records.part(slots.clone()), sort.codes.part(slots.clone()))
+        };
         let bucket = &sort.coarse[slots.clone()];
         ends.fill(0);
         for record in bucket {
@@ -246,12 +247,9 @@ impl Kernel for SortBucket<'_> {
         }
         for record in bucket {
             let place = &mut ends[record.key as usize - keys.start];
-            // SAFETY: the caller has the instructions; no other bucket has these slots, and each record its own one.
-            unsafe {
-                let (low, high) = S::steps(&cells, &record.aabb);
-                sort.records.write(*place as usize, *record);
-                sort.codes.write(*place as usize, S::code(low, high));
-            }
+            let (low, high) = simd.steps(&cells, &record.aabb);
+            let (slot, code) = (*place as usize - slots.start, simd.code(low, high));
+            (records[slot], codes[slot]) = (*record, code);
             *place += 1;
         }
     }

@@ -96,21 +96,17 @@ impl Kernel for CountSlots<'_> {
     type Output = u64;
 
     #[inline(always)]
-    unsafe fn run<S: Simd>(self) -> u64 {
+    fn run<S: Simd>(self, simd: S) -> u64 {
         let Self { grid, slots } = self;
         let cells = grid.plan.cells;
         let mut work = 0;
         for slot in scattered(slots, search::COUNT_ONE_IN) {
-            // SAFETY: the caller has the instructions.
-            let slots = unsafe {
-                match (grid.plan.scan, cells.wraps) {
-                    (NeighbourScan::Runs, _) => in_runs(grid, slot),
-                    (NeighbourScan::Windows, false) => in_window::<S, false>(grid, &cells, slot),
-                    (NeighbourScan::Windows, true) => in_window::<S, true>(grid, &cells, slot),
-                }
+            let slots = match (grid.plan.scan, cells.wraps) {
+                (NeighbourScan::Runs, _) => in_runs(grid, slot),
+                (NeighbourScan::Windows, false) => in_window::<false>(simd, grid, &cells, slot),
+                (NeighbourScan::Windows, true) => in_window::<true>(simd, grid, &cells, slot),
             };
-            // SAFETY: as above.
-            let is_vague = unsafe { has_vague_code::<S>(grid, slot) };
+            let is_vague = has_vague_code(simd, grid, slot);
             work += if is_vague { slots * search::WORK_OF_VAGUE_TEST } else { slots };
         }
         work
@@ -120,9 +116,10 @@ impl Kernel for CountSlots<'_> {
 /// Returns true if the code of a box is like all eight codes behind it. Boxes beyond the cells, and many tiny ones in one place,
 /// have such codes; their candidates need the exact test.
 #[inline(always)]
-unsafe fn has_vague_code<S: Simd>(grid: &Grid, slot: usize) -> bool {
-    // SAFETY: the caller has the instructions; the codes are padded by two blocks.
-    let alike = unsafe { S::test(query_of(grid.codes[slot]), grid.codes.as_ptr().add(slot + 1)) };
+fn has_vague_code(simd: impl Simd, grid: &Grid, slot: usize) -> bool {
+    // SAFETY: a slot in use is before it.
+    let codes = unsafe { grid.block(slot + 1) };
+    let alike = simd.test(query_of(grid.codes[slot]), codes);
     alike.count_ones() as usize == BLOCK
 }
 
@@ -139,12 +136,9 @@ fn in_runs(grid: &Grid, slot: usize) -> u64 {
 
 /// Returns half of the slots in a box's window.
 #[inline(always)]
-unsafe fn in_window<S: Simd, const WRAPS: bool>(grid: &Grid, cells: &Cells, slot: usize) -> u64 {
-    // SAFETY: the caller has the instructions.
-    let window = unsafe {
-        let (low, high) = S::steps(cells, &grid.records[slot].aabb);
-        cells.window(low, high)
-    };
+fn in_window<const WRAPS: bool>(simd: impl Simd, grid: &Grid, cells: &Cells, slot: usize) -> u64 {
+    let (low, high) = simd.steps(cells, &grid.records[slot].aabb);
+    let window = cells.window(low, high);
     let (mut rows, mut slots) = (0, 0);
     for z in window.low[2]..=window.high[2] {
         for y in window.low[1]..=window.high[1] {

@@ -232,11 +232,10 @@ impl Kernel for Keys<'_> {
     type Output = ();
 
     #[inline(always)]
-    unsafe fn run<S: Simd>(self) {
+    fn run<S: Simd>(self, simd: S) {
         let cells = self.grid.grid.plan.cells;
         for record in self.boxes {
-            // SAFETY: the caller has the instructions.
-            let (low, _) = unsafe { S::steps(&cells, &record.aabb) };
+            let (low, _) = simd.steps(&cells, &record.aabb);
             record.key = cells.key(cells.cell(low));
         }
     }
@@ -252,7 +251,7 @@ impl Kernel for MoveAll<'_> {
     type Output = ();
 
     #[inline(always)]
-    unsafe fn run<S: Simd>(self) {
+    fn run<S: Simd>(self, simd: S) {
         let Self { grid, moved, places } = self;
         let cells = grid.grid.plan.cells;
         let (mut no_longer_oversize, mut oversize) = (vec![], vec![]);
@@ -263,12 +262,8 @@ impl Kernel for MoveAll<'_> {
                 oversize.extend(record.aabb.is_valid().then_some(*record));
                 continue;
             }
-            // SAFETY: the caller has the instructions.
-            let code = unsafe {
-                let (low, high) = S::steps(&cells, &record.aabb);
-                S::code(low, high)
-            };
-            if !grid.overwrite(*record, code, place) {
+            let (low, high) = simd.steps(&cells, &record.aabb);
+            if !grid.overwrite(*record, simd.code(low, high), place) {
                 grid.take_out(place, &mut no_longer_oversize);
                 grid.spill.insert(*record, cells.count());
             }

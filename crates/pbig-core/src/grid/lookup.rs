@@ -217,14 +217,11 @@ impl<M: Meet> Kernel for LookUp<'_, M> {
     type Output = ();
 
     #[inline(always)]
-    unsafe fn run<S: Simd>(mut self) {
-        // SAFETY: the caller has the instructions.
-        unsafe {
-            if self.grid.grid.plan.cells.wraps {
-                self.all::<S, true>();
-            } else {
-                self.all::<S, false>();
-            }
+    fn run<S: Simd>(mut self, simd: S) {
+        if self.grid.grid.plan.cells.wraps {
+            self.all::<true>(simd);
+        } else {
+            self.all::<false>(simd);
         }
     }
 }
@@ -233,35 +230,29 @@ impl<M: Meet> Kernel for LookUp<'_, M> {
 /// in them, then the records of matching codes.
 impl<M: Meet> LookUp<'_, M> {
     #[inline(always)]
-    unsafe fn all<S: Simd, const WRAPS: bool>(&mut self) {
+    fn all<const WRAPS: bool>(&mut self, simd: impl Simd) {
         self.candidates.rows.clear();
         for i in 0..self.boxes.len() {
             if self.grid.grid.plan.cells.takes(&self.boxes[i].aabb) {
-                // SAFETY: the caller has the instructions.
-                unsafe { self.list::<S, WRAPS>(i) };
+                self.list::<WRAPS>(simd, i);
             }
             if self.candidates.rows.len() >= ROWS {
-                // SAFETY: as above.
-                unsafe { self.look_through::<S>() };
+                self.look_through(simd);
                 if self.budget.is_over() {
                     break;
                 }
             }
         }
-        // SAFETY: as above.
-        unsafe { self.look_through::<S>() };
+        self.look_through(simd);
         self.test();
     }
 
     /// Lists the rows of cells in which the lower corner of an overlapping box can lie.
     #[inline(always)]
-    unsafe fn list<S: Simd, const WRAPS: bool>(&mut self, i: usize) {
+    fn list<const WRAPS: bool>(&mut self, simd: impl Simd, i: usize) {
         let cells = &self.grid.grid.plan.cells;
-        // SAFETY: the caller has the instructions.
-        let (query, window) = unsafe {
-            let (low, high) = S::steps(cells, &self.boxes[i].aabb);
-            (query_of(S::code(low, high)), cells.window(low, high))
-        };
+        let (low, high) = simd.steps(cells, &self.boxes[i].aabb);
+        let (query, window) = (query_of(simd.code(low, high)), cells.window(low, high));
         for z in window.low[2]..=window.high[2] {
             for y in window.low[1]..=window.high[1] {
                 let [run, rest] = cells.row::<WRAPS>([window.low[0], y, z], window.high[0]);
@@ -283,7 +274,7 @@ impl<M: Meet> LookUp<'_, M> {
 
     /// Gathers the candidates of all rows listed.
     #[inline(always)]
-    unsafe fn look_through<S: Simd>(&mut self) {
+    fn look_through(&mut self, simd: impl Simd) {
         let mut rows = std::mem::take(&mut self.candidates.rows);
         let grid = &self.grid.grid;
         self.candidates.work += rows.len() as u64;
@@ -301,8 +292,7 @@ impl<M: Meet> LookUp<'_, M> {
         self.candidates.work += slots;
         if self.candidates.may_go_on(self.budget) {
             for row in &rows {
-                // SAFETY: the caller has the instructions.
-                unsafe { self.slots::<S>(row) };
+                self.slots(simd, row);
             }
         }
         rows.clear();
@@ -311,20 +301,19 @@ impl<M: Meet> LookUp<'_, M> {
 
     /// Gathers the candidates of a run of slots.
     #[inline(always)]
-    unsafe fn slots<S: Simd>(&mut self, row: &Row) {
+    fn slots(&mut self, simd: impl Simd, row: &Row) {
         let grid = &self.grid.grid;
         for first in (row.first..row.end).step_by(BLOCK) {
             let beyond = (row.end - first).min(BLOCK as u32);
             let Candidates { boxes, places, len, .. } = &mut *self.candidates;
-            // SAFETY: codes are padded by two blocks; the lists have room for a block more than `room`.
-            unsafe {
-                let mask =
-                    S::test(row.query, grid.codes.as_ptr().add(first as usize)) & ((1u32 << beyond) - 1);
-                let (boxes, places) = (boxes.as_mut_ptr().add(*len), places.as_mut_ptr().add(*len));
-                let count = S::expand(row.i, first, mask, boxes, places);
-                prefetch(grid.records.as_ptr().wrapping_add(*places as usize & 0xFFF_FFFF));
-                *len += count;
-            }
+            // SAFETY: `first` is below an end that comes from `starts`; `len` is at most `room`, and the lists have two blocks more.
+            let (codes, boxes, places) = unsafe {
+                let [boxes, places] = [boxes, places].map(|list| &mut *list.as_mut_ptr().add(*len).cast());
+                (grid.block(first as usize), boxes, places)
+            };
+            let mask = simd.test(row.query, codes) & ((1u32 << beyond) - 1);
+            *len += simd.expand(row.i, first, mask, boxes, places);
+            prefetch(grid.records.as_ptr().wrapping_add(places[0] as usize & 0xFFF_FFFF));
             if self.candidates.len > self.candidates.room {
                 self.test();
             }

@@ -63,6 +63,19 @@ pub(crate) struct Grid {
     bucket_starts: Vec<u32>,
 }
 
+impl Grid {
+    /// Returns the codes of eight slots.
+    ///
+    /// # Safety
+    /// `first` is at most the number of slots in use: two blocks of tombstones are behind these.
+    #[inline(always)]
+    unsafe fn block(&self, first: usize) -> &[u64; BLOCK] {
+        debug_assert!(first <= self.len);
+        // SAFETY: the caller's promise.
+        unsafe { &*self.codes.as_ptr().add(first).cast() }
+    }
+}
+
 /// A grid as it was built: every box lies in its cell. (A grid that was edited has tombstones, and cannot be searched.)
 pub(crate) struct Sorted<'a> {
     pub(crate) grid: &'a Grid,

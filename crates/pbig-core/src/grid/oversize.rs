@@ -69,9 +69,8 @@ impl Kernel for WindowOf<'_> {
     type Output = Window;
 
     #[inline(always)]
-    unsafe fn run<S: Simd>(self) -> Window {
-        // SAFETY: the caller has the instructions.
-        let (low, high) = unsafe { S::steps(&self.grid.plan.cells, self.aabb) };
+    fn run<S: Simd>(self, simd: S) -> Window {
+        let (low, high) = simd.steps(&self.grid.plan.cells, self.aabb);
         self.grid.plan.cells.window(low, high)
     }
 }

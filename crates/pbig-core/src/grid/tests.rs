@@ -2,7 +2,7 @@
 
 use super::cells::{Cells, query_of};
 use super::plan::GridPlan;
-use super::simd::{BLOCK, EightBoxes, Kernel, Simd, dispatch, run_portable};
+use super::simd::{BLOCK, EightBoxes, Kernel, Portable, Simd, dispatch};
 use crate::Aabb;
 use rand::rngs::StdRng;
 use rand::{RngExt, SeedableRng};
@@ -21,13 +21,10 @@ impl Kernel for ValuesOf<'_> {
     type Output = Values;
 
     #[inline(always)]
-    unsafe fn run<S: Simd>(self) -> Values {
+    fn run<S: Simd>(self, simd: S) -> Values {
         let Self(cells, aabb) = self;
-        // SAFETY: the caller has the instructions.
-        unsafe {
-            let (low, high) = S::steps(cells, aabb);
-            Values { takes: S::takes(cells, aabb), key: S::key(cells, low), code: S::code(low, high) }
-        }
+        let (low, high) = simd.steps(cells, aabb);
+        Values { takes: simd.takes(cells, aabb), key: simd.key(cells, low), code: simd.code(low, high) }
     }
 }
 
@@ -37,9 +34,8 @@ impl Kernel for MayOverlap {
     type Output = u32;
 
     #[inline(always)]
-    unsafe fn run<S: Simd>(self) -> u32 {
-        // SAFETY: a block of codes; the caller has the instructions.
-        unsafe { S::test(query_of(self.0), self.1.as_ptr()) }
+    fn run<S: Simd>(self, simd: S) -> u32 {
+        simd.test(query_of(self.0), &self.1)
     }
 }
 
@@ -85,34 +81,31 @@ fn every_implementation_computes_the_same_values() {
         let cells = GridPlan::new(&boxes, 1).cells;
         boxes.extend([Aabb::NOWHERE, infinite, Aabb::new([f32::MAX; 3], [f32::MIN; 3])]);
         for aabb in &boxes {
-            assert_eq!(dispatch(ValuesOf(&cells, aabb)), run_portable(ValuesOf(&cells, aabb)), "{aabb:?}");
+            assert_eq!(dispatch(ValuesOf(&cells, aabb)), ValuesOf(&cells, aabb).run(Portable), "{aabb:?}");
         }
     }
     for _ in 0..2000 {
         let query = random.random::<u64>() & 0x1FF7_FDFF_1FF7_FDFF;
         let codes: [u64; BLOCK] = std::array::from_fn(|_| random.random::<u64>() & 0x5FF7_FDFF_5FF7_FDFF);
-        assert_eq!(dispatch(MayOverlap(query, codes)), run_portable(MayOverlap(query, codes)));
+        assert_eq!(dispatch(MayOverlap(query, codes)), MayOverlap(query, codes).run(Portable));
     }
 }
 
-struct Rows(Vec<u32>, usize);
+struct Rows([u32; 8], usize);
 
 impl Kernel for Rows {
     type Output = (Vec<u32>, [bool; 2], [u32; 2]);
 
     #[inline(always)]
-    unsafe fn run<S: Simd>(self) -> Self::Output {
+    fn run<S: Simd>(self, simd: S) -> Self::Output {
         let Self(row, len) = self;
-        let mut other = row.clone();
-        // SAFETY: rows of eight numbers; the caller has the instructions.
-        unsafe {
-            let sorted = S::sorted_short(row.as_ptr(), len)[..len].to_vec();
-            let same = S::same_short(row.as_ptr(), other.as_ptr(), len);
-            other[len - 1] += 100;
-            let same = [same, S::same_short(row.as_ptr(), other.as_ptr(), len)];
-            let absent = [&row, &other].map(|numbers| S::absent(numbers.as_ptr(), row.as_ptr(), len));
-            (sorted, same, absent.map(|mask| mask & ((1 << len) - 1)))
-        }
+        let mut other = row;
+        let sorted = simd.sorted_short(&row, len)[..len].to_vec();
+        let same = simd.same_short(&row, &other, len);
+        other[len - 1] += 100;
+        let same = [same, simd.same_short(&row, &other, len)];
+        let absent = [&row, &other].map(|numbers| simd.absent(numbers, &row, len));
+        (sorted, same, absent.map(|mask| mask & ((1 << len) - 1)))
     }
 }
 
@@ -121,14 +114,14 @@ fn short_rows_are_sorted_and_compared() {
     let mut random = StdRng::seed_from_u64(3);
     for _ in 0..3000 {
         let len = random.random_range(1..=8);
-        let mut row: Vec<u32> = (0..8).map(|_| random.random_range(0..20)).collect();
+        let mut row: [u32; 8] = std::array::from_fn(|_| random.random_range(0..20));
         if len < 8 {
             // Behind the row, as other rows are: the number that the other row ends with.
             row[len] = row[len - 1] + 100;
         }
         let mut wanted = row[..len].to_vec();
         wanted.sort_unstable();
-        for found in [dispatch(Rows(row.clone(), len)), run_portable(Rows(row.clone(), len))] {
+        for found in [dispatch(Rows(row, len)), Rows(row, len).run(Portable)] {
             assert_eq!(found, (wanted.clone(), [true, false], [0, 1 << (len - 1)]));
         }
     }
@@ -140,9 +133,8 @@ impl Kernel for Overlaps<'_> {
     type Output = u32;
 
     #[inline(always)]
-    unsafe fn run<S: Simd>(self) -> u32 {
-        // SAFETY: the caller has the instructions.
-        unsafe { S::overlaps_eight(self.0, self.1) }
+    fn run<S: Simd>(self, simd: S) -> u32 {
+        simd.overlaps_eight(self.0, self.1)
     }
 }
 
@@ -156,6 +148,6 @@ fn eight_boxes_at_once_overlap_as_one_by_one() {
             std::array::from_fn(|row| std::array::from_fn(|lane| value(&eight[lane], row)));
         let wanted = (0..BLOCK).fold(0, |mask, lane| mask | u32::from(eight[lane].overlaps(one)) << lane);
         assert_eq!(dispatch(Overlaps(&columns, one)), wanted);
-        assert_eq!(run_portable(Overlaps(&columns, one)), wanted);
+        assert_eq!(Overlaps(&columns, one).run(Portable), wanted);
     }
 }

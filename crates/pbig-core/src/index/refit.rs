@@ -225,7 +225,7 @@ impl Kernel for ReadLeaves<'_> {
     type Output = ();
 
     #[inline(always)]
-    unsafe fn run<S: Simd>(self) {
+    fn run<S: Simd>(self, _: S) {
         self.index.read_leaves(self.boxes);
     }
 }

@@ -39,7 +39,7 @@ impl<Q: Question> Kernel for Walk<'_, Q> {
 
     /// Boxes at bound 0 are visited first, by id, so that the lowest id wins among them without a look at the others.
     #[inline(always)]
-    unsafe fn run<S: Simd>(mut self) -> Visited {
+    fn run<S: Simd>(mut self, _: S) -> Visited {
         let is_still = self.bound <= 0.0;
         let bound = std::mem::replace(&mut self.bound, 0.0);
         self.walk::<true>();

@@ -154,14 +154,11 @@ impl Kernel for CompareRows<'_> {
     type Output = ();
 
     #[inline(always)]
-    unsafe fn run<S: Simd>(self) {
+    fn run<S: Simd>(self, simd: S) {
         let Self { part, old, new } = self;
         for (a, span) in (new.first_id..).zip(new.spans) {
             let (was, is) = (old.spans[a as usize].range(), new.range(*span));
-            // SAFETY: the caller has the instructions.
-            unsafe {
-                row::compare::<S>(a, (&old.pool, was), (new.pool, is), &mut part.added, &mut part.removed);
-            }
+            row::compare(simd, a, (&old.pool, was), (new.pool, is), (&mut part.added, &mut part.removed));
         }
     }
 }

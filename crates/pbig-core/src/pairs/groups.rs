@@ -224,7 +224,7 @@ impl<const LIST: bool> Kernel for SortRows<'_, LIST> {
     type Output = ();
 
     #[inline(always)]
-    unsafe fn run<S: Simd>(self) {
+    fn run<S: Simd>(self, simd: S) {
         let Self { pairs, first_id, base, spans, others, firsts, unsorted } = self;
         spans.fill(Span::default());
         for pair in pairs {
@@ -246,8 +246,7 @@ impl<const LIST: bool> Kernel for SortRows<'_, LIST> {
         }
         for span in spans {
             let range = span.range();
-            // SAFETY: the unsorted list is longer by a register.
-            unsafe { row::sort_into::<S>(unsorted, range, others) };
+            row::sort_into(simd, unsorted, range, others);
             span.start += base;
         }
     }
