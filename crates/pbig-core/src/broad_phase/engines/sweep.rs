@@ -5,11 +5,14 @@
 //! Boxes lie axis by axis, so that eight are tested at once. There is no index to keep. The tests take
 //! a quarter of a microsecond for one changed box of a thousand; each pair that begins or ends takes as long as 256 tests.
 
-use super::world::World;
+use super::partners::Partners;
+use super::task::Task;
+use crate::broad_phase::world::World;
 use crate::grid::{BLOCK, EightBoxes, Kernel, Simd, dispatch};
-use crate::index::BoxIndex;
-use crate::pairs::{Comparison, Kept, differences, equal};
-use crate::{Aabb, Checks, Pair};
+use crate::outcome::{End, Outcome, Valid};
+use crate::pairs::{Comparison, Kept};
+use crate::report::{Clock, StageTimes, stage};
+use crate::{Aabb, Algorithm, Checks, Plan};
 
 /// The lane of a box that is absent or invalid, and the box of a free lane.
 const NONE: u32 = u32::MAX;
@@ -33,35 +36,42 @@ pub(super) struct Sweep {
     free: Vec<u32>,
     /// True if lanes are in the order of ids.
     is_in_order: bool,
-    /// True if the blocks hold the boxes of the last update.
-    is_current: bool,
-    /// Ids that the box at hand overlaps, sorted.
-    now: Vec<u32>,
-    /// Its kept partners, sorted.
-    was: Vec<u32>,
+    partners: Partners,
 }
 
 impl Sweep {
-    /// Says that another engine has made an update.
-    pub(super) fn expire(&mut self) {
-        self.is_current = false;
+    /// Leaves the events of an update in the task.
+    pub(super) fn run(&mut self, task: &mut Task<'_>) -> Outcome {
+        stage!("check");
+        let mut clock = Clock::start();
+        let world = task.world;
+        task.events.clear();
+        let are_many = 2 * world.changed.len() > world.valid() as usize;
+        self.bring_up_to_date(world, task.valid == Valid::Lanes, are_many);
+        let are_many = are_many && self.is_in_order;
+        let (kept, events) = (&*task.kept, &mut *task.events);
+        let (made, met) = dispatch(SweepAll { sweep: self, world, kept, events, are_many });
+        task.events.sort(world.ids());
+        Outcome {
+            end: End::Done,
+            valid: Valid::Lanes,
+            checks: Checks { made, unnecessary: made - met, redundant: 0 },
+            work: made,
+            plan: Plan { algorithm: Algorithm::Sweep, boxes: world.valid(), ..Plan::default() },
+            stages: StageTimes { check: clock.lap(), ..StageTimes::default() },
+            ..Outcome::default()
+        }
     }
 
-    /// Leaves the events of an update in `events`, sorted. Returns the tests made.
-    pub(super) fn run(&mut self, world: &World, kept: &Kept, events: &mut Comparison) -> Checks {
-        events.clear();
-        let are_many = 2 * world.changed.len() > world.valid() as usize;
+    /// Stores all boxes, or the changed ones if the blocks hold the boxes of the last update.
+    fn bring_up_to_date(&mut self, world: &World, is_current: bool, are_many: bool) {
         let has_holes = self.free.len() > world.valid() as usize + MAX_HOLES;
-        if self.is_current && !has_holes && (self.is_in_order || !are_many) {
+        if is_current && !has_holes && (self.is_in_order || !are_many) {
             self.lanes.resize(world.ids(), NONE);
             world.changed.iter().for_each(|&id| self.put(id, &world.boxes[id as usize]));
         } else {
             self.lay_out(&world.boxes);
         }
-        let are_many = are_many && self.is_in_order;
-        let (made, met) = dispatch(SweepAll { sweep: self, world, kept, events, are_many });
-        events.sort(world.ids());
-        Checks { made, unnecessary: made - met, redundant: 0 }
     }
 
     /// Gives every valid box a lane.
@@ -71,7 +81,7 @@ impl Sweep {
         self.free.clear();
         self.lanes.clear();
         self.lanes.resize(boxes.len(), NONE);
-        (self.is_in_order, self.is_current) = (true, true);
+        self.is_in_order = true;
         (0..).zip(boxes).for_each(|(id, aabb)| self.put(id, aabb));
     }
 
@@ -106,82 +116,15 @@ impl Sweep {
         lane
     }
 
-    /// Does the work of [`Sweep::run`] with the boxes in a tree. Also returns the nodes looked at and boxes met. If these are more
-    /// than `max_nodes`, events are missing.
-    pub(super) fn run_in_tree(
-        &mut self,
-        world: &World,
-        kept: &Kept,
-        (tree, max_nodes): (&BoxIndex, u64),
-        events: &mut Comparison,
-    ) -> (Checks, u64) {
-        events.clear();
-        let (mut nodes, mut met) = (0, 0);
-        for &id in &world.changed {
-            let (aabb, now) = (&world.boxes[id as usize], &mut self.now);
-            now.clear();
-            // Tested again, because an infinite box meets the empty places of a tree.
-            let mut take =
-                |other: u32| now.extend(aabb.overlaps(&world.boxes[other as usize]).then_some(other));
-            nodes += tree.overlapping(aabb, &mut take).nodes;
-            met += now.len() as u64;
-            if nodes + met > max_nodes {
-                break;
-            }
-            self.compare_all(world, kept, id, events);
-        }
-        events.sort(world.ids());
-        let made = nodes * BLOCK as u64;
-        (Checks { made, unnecessary: made - met, redundant: 0 }, nodes + met)
-    }
-
-    /// Compares what a changed box overlaps with its kept pairs. The changed box with the lower id reports a pair
-    /// of two changed boxes.
-    fn compare_all(&mut self, world: &World, kept: &Kept, id: u32, events: &mut Comparison) {
-        let Self { now, was, .. } = self;
-        let is_own = |other: u32| other > id || other < id && world.change_of(other).is_none();
-        now.retain(|&other| is_own(other));
-        was.clear();
-        was.extend(kept.partners(id).filter(|&other| is_own(other)));
-        compare(world, id, was, now, events);
-    }
-
     /// Ends the pairs of changed boxes without a lane, which overlap nothing.
     fn end_all(&mut self, world: &World, kept: &Kept, events: &mut Comparison) {
-        self.now.clear();
+        self.partners.now.clear();
         for &id in &world.changed {
             if self.lanes[id as usize] == NONE {
-                self.compare_later(world, kept, id, events);
+                self.partners.compare_later(world, kept, id, events);
             }
         }
     }
-
-    /// Compares the later boxes that a box overlaps with its kept pairs.
-    #[inline(always)]
-    fn compare_later(&mut self, world: &World, kept: &Kept, id: u32, events: &mut Comparison) {
-        let Self { now, was, .. } = self;
-        let partners = kept.later_partners(id);
-        if !equal(partners, now) || world.is_filtered || world.has_removed() {
-            was.clear();
-            was.extend_from_slice(partners);
-            compare(world, id, was, now, events);
-        }
-    }
-}
-
-/// Compares what a box overlaps with its kept partners.
-#[inline(never)]
-fn compare(world: &World, id: u32, was: &mut Vec<u32>, now: &mut Vec<u32>, events: &mut Comparison) {
-    if world.is_filtered {
-        let filter = &world.filters[id as usize];
-        now.retain(|&other| filter.allows(&world.filters[other as usize]));
-    }
-    if world.has_removed() {
-        let ended = |other: u32| world.was_removed(id) || world.was_removed(other);
-        events.dropped.extend(was.iter().filter(|other| ended(**other)).map(|&other| Pair::new(id, other)));
-        was.retain(|&other| !ended(other));
-    }
-    differences(id, was, now, &mut events.added, &mut events.removed);
 }
 
 struct SweepAll<'a> {
@@ -212,12 +155,12 @@ impl Kernel for SweepAll<'_> {
             let (first, wanted) =
                 if are_many { (i / BLOCK, 255 & !((2 << (i % BLOCK)) - 1)) } else { (0, 255) };
             made += (lanes - first * BLOCK) as u64;
-            sweep.now.clear();
+            sweep.partners.now.clear();
             met += sweep.meet(simd, &world.boxes[id as usize], first, wanted);
             if are_many {
-                sweep.compare_later(world, kept, id, events);
+                sweep.partners.compare_later(world, kept, id, events);
             } else {
-                sweep.compare_all(world, kept, id, events);
+                sweep.partners.compare_all(world, kept, id, events);
             }
         }
         if are_many {
@@ -235,13 +178,13 @@ impl Sweep {
             let mut mask = simd.overlaps_eight(boxes, aabb) & wanted;
             wanted = 255;
             while mask != 0 {
-                self.now.push(self.ids[block * BLOCK + mask.trailing_zeros() as usize]);
+                self.partners.now.push(self.ids[block * BLOCK + mask.trailing_zeros() as usize]);
                 mask &= mask - 1;
             }
         }
         if !self.is_in_order {
-            self.now.sort_unstable();
+            self.partners.now.sort_unstable();
         }
-        self.now.len() as u64
+        self.partners.now.len() as u64
     }
 }
