@@ -110,4 +110,14 @@ pub enum Engine {
 impl Engine {
     /// All engines, for tests.
     pub const ALL: [Self; 4] = [Self::Sweep, Self::Edit, Self::Tree, Self::Rebuild];
+
+    /// Returns the name in messages of tests.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Sweep => "sweep",
+            Self::Edit => "edit",
+            Self::Tree => "tree",
+            Self::Rebuild => "rebuild",
+        }
+    }
 }

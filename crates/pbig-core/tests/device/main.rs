@@ -89,7 +89,7 @@ fn updates_equal_those_of_the_cpu_whatever_fails() {
 /// A structure that is not brought up to date by a device's update would lose pairs in the next one on the CPU.
 #[test]
 fn device_and_cpu_take_turns_with_each_engine() {
-    for engine in [Engine::Sweep, Engine::Edit, Engine::Tree, Engine::Rebuild] {
+    for engine in Engine::ALL {
         let config = Config { engine: Some(engine), ..ON_DEVICE };
         let mut ours = BroadPhase::with_device(config, Double::new(Fault::Nothing)).expect("a margin");
         let (mut cpu, mut rng) = (on_cpu(), StdRng::seed_from_u64(3));
