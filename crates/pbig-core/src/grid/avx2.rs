@@ -1,7 +1,7 @@
 //! The inner loops by AVX2, which all x86-64 processors of the last ten years have.
 
 use super::cells::{APART, Cells, MAX_STEP, MIN_STEP, Steps, TOMBSTONE};
-use super::simd::{BLOCK, Eight, EightBoxes, Kernel, Simd};
+use super::simd::{BLOCK, Eight, EightBoxes, Simd};
 use crate::Aabb;
 use std::arch::x86_64::*;
 
@@ -12,7 +12,8 @@ pub(crate) struct Avx2(());
 
 impl Avx2 {
     /// Returns a proof if the processor has all instructions that [`Avx2::run`] enables.
-    pub(super) fn detect() -> Option<Self> {
+    #[inline]
+    pub(crate) fn detect() -> Option<Self> {
         let has_all = is_x86_feature_detected!("avx2")
             && is_x86_feature_detected!("bmi1")
             && is_x86_feature_detected!("bmi2")
@@ -21,14 +22,15 @@ impl Avx2 {
         has_all.then_some(Self(()))
     }
 
-    /// Runs a kernel that is compiled for these instructions.
-    pub(super) fn run<K: Kernel>(self, kernel: K) -> K::Output {
+    /// Calls a function that is inlined here, compiled for these instructions.
+    #[inline]
+    pub(crate) fn run<T>(self, work: impl FnOnce() -> T) -> T {
         #[target_feature(enable = "avx2,bmi1,bmi2,popcnt,lzcnt")]
-        fn compiled<K: Kernel>(proof: Avx2, kernel: K) -> K::Output {
-            kernel.run(proof)
+        fn compiled<T>(work: impl FnOnce() -> T) -> T {
+            work()
         }
         // SAFETY: `self` proves that the processor has these instructions.
-        unsafe { compiled(self, kernel) }
+        unsafe { compiled(work) }
     }
 }
 

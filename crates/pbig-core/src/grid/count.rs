@@ -4,7 +4,7 @@ use super::cells::{Cells, query_of};
 use super::hits::{Hits, Rule};
 use super::plan::NeighbourScan;
 use super::record::Record;
-use super::simd::{BLOCK, Kernel, Simd, dispatch};
+use super::simd::{BLOCK, Simd, dispatch};
 use super::{Grid, Sorted};
 use crate::ProxyFilter;
 use crate::parallel::run;
@@ -27,7 +27,7 @@ impl Sorted<'_> {
         // Pieces do not depend on the number of threads: otherwise other boxes would be counted, and the choice could differ.
         run(workers, grid.len.div_ceil(PIECE), |_, piece| {
             let slots = piece * PIECE..grid.len.min((piece + 1) * PIECE);
-            total.fetch_add(dispatch(CountSlots { grid, slots }), Ordering::Relaxed);
+            total.fetch_add(dispatch!(count_slots, grid, slots.clone()), Ordering::Relaxed);
         });
         let oversize = grid.oversize.len();
         let step = oversize.div_ceil(search::COUNTED_OVERSIZE).max(1);
@@ -87,30 +87,20 @@ impl Grid {
 }
 
 /// Counts the slots that one box in [`search::COUNT_ONE_IN`] visits.
-struct CountSlots<'a> {
-    grid: &'a Grid,
-    slots: Range<usize>,
-}
-
-impl Kernel for CountSlots<'_> {
-    type Output = u64;
-
-    #[inline(always)]
-    fn run<S: Simd>(self, simd: S) -> u64 {
-        let Self { grid, slots } = self;
-        let cells = grid.plan.cells;
-        let mut work = 0;
-        for slot in scattered(slots, search::COUNT_ONE_IN) {
-            let slots = match (grid.plan.scan, cells.wraps) {
-                (NeighbourScan::Runs, _) => in_runs(grid, slot),
-                (NeighbourScan::Windows, false) => in_window::<false>(simd, grid, &cells, slot),
-                (NeighbourScan::Windows, true) => in_window::<true>(simd, grid, &cells, slot),
-            };
-            let is_vague = has_vague_code(simd, grid, slot);
-            work += if is_vague { slots * search::WORK_OF_VAGUE_TEST } else { slots };
-        }
-        work
+#[inline(always)]
+fn count_slots(simd: impl Simd, grid: &Grid, slots: Range<usize>) -> u64 {
+    let cells = grid.plan.cells;
+    let mut work = 0;
+    for slot in scattered(slots, search::COUNT_ONE_IN) {
+        let slots = match (grid.plan.scan, cells.wraps) {
+            (NeighbourScan::Runs, _) => in_runs(grid, slot),
+            (NeighbourScan::Windows, false) => in_window::<false>(simd, grid, &cells, slot),
+            (NeighbourScan::Windows, true) => in_window::<true>(simd, grid, &cells, slot),
+        };
+        let is_vague = has_vague_code(simd, grid, slot);
+        work += if is_vague { slots * search::WORK_OF_VAGUE_TEST } else { slots };
     }
+    work
 }
 
 /// Returns true if the code of a box is like all eight codes behind it. Boxes beyond the cells, and many tiny ones in one place,

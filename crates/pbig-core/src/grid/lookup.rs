@@ -4,7 +4,7 @@ use super::cells::query_of;
 use super::edit::EditedGrid;
 use super::record::Record;
 use super::search::KeyRun;
-use super::simd::{BLOCK, Kernel, Simd, dispatch, prefetch};
+use super::simd::{BLOCK, Simd, dispatch, prefetch};
 use crate::Aabb;
 use crate::policy::search::{WORK_OF_ENTRY, WORK_OF_EXACT_TEST};
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -149,7 +149,12 @@ impl EditedGrid {
         meet: &mut M,
     ) {
         candidates.begin(boxes.len());
-        dispatch(LookUp { grid: self, boxes, candidates, budget, meet });
+        let look_up = &mut LookUp { grid: self, boxes, candidates, budget, meet };
+        if self.grid.plan.cells.wraps {
+            dispatch!(LookUp::in_cells::<true>, look_up);
+        } else {
+            dispatch!(LookUp::in_cells::<false>, look_up);
+        }
         for (i, one) in boxes.iter().enumerate().filter(|(_, one)| one.aabb.is_valid()) {
             if !candidates.may_go_on(budget) {
                 break;
@@ -213,38 +218,25 @@ struct LookUp<'a, M> {
     meet: &'a mut M,
 }
 
-impl<M: Meet> Kernel for LookUp<'_, M> {
-    type Output = ();
-
-    #[inline(always)]
-    fn run<S: Simd>(mut self, simd: S) {
-        if self.grid.grid.plan.cells.wraps {
-            self.all::<true>(simd);
-        } else {
-            self.all::<false>(simd);
-        }
-    }
-}
-
 /// In three rounds over many rows, so that memory is asked for long before it is read: where the cells begin, then the codes
 /// in them, then the records of matching codes.
 impl<M: Meet> LookUp<'_, M> {
     #[inline(always)]
-    fn all<const WRAPS: bool>(&mut self, simd: impl Simd) {
-        self.candidates.rows.clear();
-        for i in 0..self.boxes.len() {
-            if self.grid.grid.plan.cells.takes(&self.boxes[i].aabb) {
-                self.list::<WRAPS>(simd, i);
+    fn in_cells<const WRAPS: bool>(simd: impl Simd, look_up: &mut Self) {
+        look_up.candidates.rows.clear();
+        for i in 0..look_up.boxes.len() {
+            if look_up.grid.grid.plan.cells.takes(&look_up.boxes[i].aabb) {
+                look_up.list::<WRAPS>(simd, i);
             }
-            if self.candidates.rows.len() >= ROWS {
-                self.look_through(simd);
-                if self.budget.is_over() {
+            if look_up.candidates.rows.len() >= ROWS {
+                look_up.look_through(simd);
+                if look_up.budget.is_over() {
                     break;
                 }
             }
         }
-        self.look_through(simd);
-        self.test();
+        look_up.look_through(simd);
+        look_up.test();
     }
 
     /// Lists the rows of cells in which the lower corner of an overlapping box can lie.

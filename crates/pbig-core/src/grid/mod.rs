@@ -26,6 +26,8 @@ mod simd;
 #[cfg(test)]
 mod tests;
 
+#[cfg(target_arch = "x86_64")]
+pub(crate) use avx2::Avx2;
 pub(crate) use edit::EditedGrid;
 pub(crate) use hits::{Hits, Rule};
 pub(crate) use lookup::{Budget, Candidates, Meet, Place};
@@ -35,7 +37,7 @@ pub(crate) use plan::GridPlan;
 pub use plan::NeighbourScan;
 pub(crate) use record::Record;
 pub use simd::simd;
-pub(crate) use simd::{BLOCK, EightBoxes, Kernel, Simd, dispatch, prefetch};
+pub(crate) use simd::{BLOCK, EightBoxes, Portable, Simd, dispatch, prefetch};
 
 use build::BucketCounts;
 

@@ -5,7 +5,7 @@ use super::cells::{Cells, query_of};
 use super::hits::{HIT_ROOM, HitWriter, Hits, Rule};
 use super::plan::NeighbourScan;
 use super::record::Record;
-use super::simd::{BLOCK, Kernel, Simd, dispatch};
+use super::simd::{BLOCK, Simd, dispatch};
 use super::{Grid, Sorted};
 use crate::parallel::run_with;
 use crate::policy::PARALLEL_FROM_BOXES;
@@ -43,33 +43,21 @@ impl Sorted<'_> {
 impl Grid {
     /// Finds the pairs of the boxes in some slots with those behind them.
     pub(super) fn search_slots(&self, slots: Range<usize>, rule: &Rule<'_>, hits: &mut Hits) {
-        dispatch(SearchPiece { grid: self, slots, rule, hits });
+        dispatch!(search_piece, self, slots.clone(), rule, hits);
     }
 }
 
-struct SearchPiece<'a, 'b> {
-    grid: &'a Grid,
-    slots: Range<usize>,
-    rule: &'a Rule<'b>,
-    hits: &'a mut Hits,
-}
-
-impl Kernel for SearchPiece<'_, '_> {
-    type Output = ();
-
-    #[inline(always)]
-    fn run<S: Simd>(self, simd: S) {
-        let Self { grid, slots, rule, hits } = self;
-        let mut blocks = [0; HIT_ROOM];
-        let mut scan =
-            Scan { simd, cells: grid.plan.cells, grid, rule, hits, writer: HitWriter::new(&mut blocks) };
-        match (grid.plan.scan, grid.plan.cells.wraps) {
-            (NeighbourScan::Runs, _) => scan.runs(slots),
-            (NeighbourScan::Windows, false) => scan.windows::<false>(slots),
-            (NeighbourScan::Windows, true) => scan.windows::<true>(slots),
-        }
-        scan.finish();
+#[inline(always)]
+fn search_piece(simd: impl Simd, grid: &Grid, slots: Range<usize>, rule: &Rule<'_>, hits: &mut Hits) {
+    let mut blocks = [0; HIT_ROOM];
+    let writer = HitWriter::new(&mut blocks);
+    let mut scan = Scan { simd, cells: grid.plan.cells, grid, rule, hits, writer };
+    match (grid.plan.scan, grid.plan.cells.wraps) {
+        (NeighbourScan::Runs, _) => scan.runs(slots),
+        (NeighbourScan::Windows, false) => scan.windows::<false>(slots),
+        (NeighbourScan::Windows, true) => scan.windows::<true>(slots),
     }
+    scan.finish();
 }
 
 struct Scan<'a, 'b, S> {

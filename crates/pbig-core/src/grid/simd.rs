@@ -139,25 +139,27 @@ pub fn simd() -> &'static str {
     "portable"
 }
 
-/// Work that is compiled once for each implementation. `run` and all that it calls must be `#[inline(always)]`: a
-/// function that is not inlined is compiled without the instructions (one such helper made the search 6 times slower).
-pub(crate) trait Kernel {
-    /// The result of the work.
-    type Output;
-
-    /// Does the work.
-    fn run<S: Simd>(self, simd: S) -> Self::Output;
+/// Calls a function with a proof of the best instructions that the processor has, and the arguments. The function and all that it calls
+/// must be `#[inline(always)]`, closures in `for_each` included: what is not inlined is compiled without the instructions (one
+/// such helper made the search 6 times slower).
+#[cfg(target_arch = "x86_64")]
+macro_rules! dispatch {
+    ($work:path, $($argument:expr),*) => {
+        match $crate::grid::Avx2::detect() {
+            Some(avx2) => avx2.run(#[inline(always)] || $work(avx2, $($argument),*)),
+            None => $work($crate::grid::Portable, $($argument),*),
+        }
+    };
 }
 
-/// Runs a kernel with the best instructions that the processor has.
-#[inline]
-pub(crate) fn dispatch<K: Kernel>(kernel: K) -> K::Output {
-    #[cfg(target_arch = "x86_64")]
-    if let Some(avx2) = Avx2::detect() {
-        return avx2.run(kernel);
-    }
-    kernel.run(Portable)
+/// Calls a function with a proof of instructions that every processor has, and the arguments.
+#[cfg(not(target_arch = "x86_64"))]
+macro_rules! dispatch {
+    ($work:path, $($argument:expr),*) => {
+        $work($crate::grid::Portable, $($argument),*)
+    };
 }
+pub(crate) use dispatch;
 
 /// Starts to bring the cache line at `address` into the cache; nothing where the processor has no instruction for it.
 #[inline(always)]

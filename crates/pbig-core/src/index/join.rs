@@ -5,7 +5,7 @@
 
 use super::BoxIndex;
 use super::node::{LANES, NONE};
-use crate::grid::{Hits, Kernel, Rule, Simd, dispatch};
+use crate::grid::{Hits, Rule, Simd, dispatch};
 use crate::parallel::run_with;
 use crate::policy::PARALLEL_FROM_BOXES;
 use crate::{Aabb, Pair};
@@ -22,7 +22,8 @@ impl BoxIndex {
         let workers = if leaves * LANES < PARALLEL_FROM_BOXES { 1 } else { hits.len() };
         run_with(&mut hits[..workers], leaves.div_ceil(PIECE), |hits, piece| {
             let leaves = piece * PIECE..leaves.min((piece + 1) * PIECE);
-            dispatch(Join { index: self, last_leaves: &last_leaves, leaves, rule, hits });
+            let join = &mut Join { index: self, last_leaves: &last_leaves, rule, hits };
+            dispatch!(Join::meet_all, join, leaves.clone());
         });
     }
 
@@ -40,27 +41,22 @@ impl BoxIndex {
 struct Join<'a, 'b> {
     index: &'a BoxIndex,
     last_leaves: &'a [u32],
-    leaves: Range<usize>,
     rule: &'a Rule<'b>,
     hits: &'a mut Hits,
 }
 
-impl Kernel for Join<'_, '_> {
-    type Output = ();
-
+impl Join<'_, '_> {
     #[inline(always)]
-    fn run<S: Simd>(mut self, simd: S) {
+    fn meet_all(simd: impl Simd, join: &mut Self, leaves: Range<usize>) {
         let mut waiting = Vec::new();
-        for leaf in self.leaves.clone() {
-            if self.hits.is_full() {
+        for leaf in leaves {
+            if join.hits.is_full() {
                 return;
             }
-            self.meet(simd, leaf as u32, &mut waiting);
+            join.meet(simd, leaf as u32, &mut waiting);
         }
     }
-}
 
-impl Join<'_, '_> {
     /// Finds the pairs of a leaf's boxes with each other, and with those of later leaves.
     #[inline(always)]
     fn meet(&mut self, simd: impl Simd, leaf: u32, waiting: &mut Vec<u32>) {

@@ -112,18 +112,10 @@ mod tests {
         }
     }
 
-    struct Compared<'a>(&'a [u32], &'a [u32]);
-
-    impl crate::grid::Kernel for Compared<'_> {
-        type Output = [Vec<Pair>; 2];
-
-        #[inline(always)]
-        fn run<S: Simd>(self, simd: S) -> Self::Output {
-            let Self(old, new) = self;
-            let [mut added, mut removed] = [vec![], vec![]];
-            compare(simd, 1, (old, 0..3), (new, 0..4), (&mut added, &mut removed));
-            [added, removed]
-        }
+    fn compared(simd: impl Simd, old: &[u32], new: &[u32]) -> [Vec<Pair>; 2] {
+        let [mut added, mut removed] = [vec![], vec![]];
+        compare(simd, 1, (old, 0..3), (new, 0..4), (&mut added, &mut removed));
+        [added, removed]
     }
 
     #[test]
@@ -132,7 +124,7 @@ mod tests {
         let old = [2, 4, 6, 5, 7, 5, 7, 5, 7];
         let new = [4, 5, 6, 7, 2, 2, 2, 2, 2];
         for (old, new) in [(&old[..], &new[..]), (&old[..3], &new[..4]), (&old[..], &new[..4])] {
-            let [added, removed] = crate::grid::dispatch(Compared(old, new));
+            let [added, removed] = crate::grid::dispatch!(compared, old, new);
             assert_eq!(added, [5, 7].map(|b| Pair { a: 1, b }));
             assert_eq!(removed, [Pair { a: 1, b: 2 }]);
         }

@@ -8,7 +8,7 @@
 use super::partners::Partners;
 use super::task::Task;
 use crate::broad_phase::world::World;
-use crate::grid::{BLOCK, EightBoxes, Kernel, Simd, dispatch};
+use crate::grid::{BLOCK, EightBoxes, Simd, dispatch};
 use crate::outcome::{End, Outcome, Valid};
 use crate::pairs::{Comparison, Kept};
 use crate::report::{Clock, StageTimes, stage};
@@ -50,7 +50,7 @@ impl Sweep {
         self.bring_up_to_date(world, task.valid == Valid::Lanes, are_many);
         let are_many = are_many && self.is_in_order;
         let (kept, events) = (&*task.kept, &mut *task.events);
-        let (made, met) = dispatch(SweepAll { sweep: self, world, kept, events, are_many });
+        let (made, met) = dispatch!(Self::sweep, self, world, kept, events, are_many);
         task.events.sort(world.ids());
         Outcome {
             end: End::Done,
@@ -125,24 +125,18 @@ impl Sweep {
             }
         }
     }
-}
 
-struct SweepAll<'a> {
-    sweep: &'a mut Sweep,
-    world: &'a World,
-    kept: &'a Kept,
-    events: &'a mut Comparison,
-    /// Test each box against those with higher ids; otherwise each changed one against all.
-    are_many: bool,
-}
-
-impl Kernel for SweepAll<'_> {
-    /// Numbers of tested and of overlapping boxes.
-    type Output = (u64, u64);
-
+    /// Tests each box against those with higher ids if they `are_many`, otherwise each changed one against all. Returns the numbers
+    /// of tested and of overlapping boxes.
     #[inline(always)]
-    fn run<S: Simd>(self, simd: S) -> (u64, u64) {
-        let Self { sweep, world, kept, events, are_many } = self;
+    fn sweep(
+        simd: impl Simd,
+        sweep: &mut Self,
+        world: &World,
+        kept: &Kept,
+        events: &mut Comparison,
+        are_many: bool,
+    ) -> (u64, u64) {
         let (mut made, mut met) = (0, 0);
         let lanes = sweep.ids.len();
         let count = if are_many { lanes } else { world.changed.len() };
@@ -168,9 +162,7 @@ impl Kernel for SweepAll<'_> {
         }
         (made, met)
     }
-}
 
-impl Sweep {
     /// Lists the ids of boxes that overlap one, from a block on; in the first block only the `wanted` lanes. Returns how many.
     #[inline(always)]
     fn meet(&mut self, simd: impl Simd, aabb: &Aabb, first: usize, mut wanted: u32) -> u64 {
