@@ -132,13 +132,8 @@ pub fn grid() -> Config {
 
 /// The CPU's engines for updates where the policy would not choose them, by name.
 pub fn engines() -> Vec<(&'static str, Way)> {
-    let by = |engine| Way::from(Config { engine: Some(engine), ..grid() });
-    vec![
-        ("sweep", by(Engine::Sweep)),
-        ("edit", by(Engine::Edit)),
-        ("tree", by(Engine::Tree)),
-        ("rebuild", by(Engine::Rebuild)),
-    ]
+    let by = |engine: Engine| (engine.name(), Config { engine: Some(engine), ..grid() }.into());
+    Engine::ALL.map(by).into()
 }
 
 /// The grid on the GPU, for sets of every size.

@@ -187,9 +187,7 @@ fn an_update_that_finds_too_many_pairs_can_be_repeated() {
 
 #[test]
 fn an_edit_that_finds_too_many_pairs_can_be_repeated() {
-    [None, Some(Engine::Sweep), Some(Engine::Edit), Some(Engine::Tree), Some(Engine::Rebuild)]
-        .into_iter()
-        .for_each(finds_too_many);
+    std::iter::once(None).chain(Engine::ALL.map(Some)).for_each(finds_too_many);
 }
 
 fn finds_too_many(engine: Option<Engine>) {

@@ -91,14 +91,9 @@ fn every_strategy_gives_the_same_bits() {
     let scene = Scene::named("column").expect("the scene exists");
     let with = |backend, engine| Config { backend, engine, ..PbigConfig::DEFAULT.into() };
     let wanted = bits(scene, PbigConfig::DEFAULT.into(), 2, 120);
-    let configs = [
-        with(Backend::Cpu, Some(Engine::Rebuild)),
-        with(Backend::Cpu, Some(Engine::Edit)),
-        with(Backend::Cpu, Some(Engine::Tree)),
-        with(Backend::Brute, None),
-        with(Backend::Device, None),
-    ];
-    for config in configs.into_iter().filter(pbig_tests::may_run) {
+    let engines = Engine::ALL.map(|engine| with(Backend::Cpu, Some(engine)));
+    let backends = [Backend::Brute, Backend::Device].map(|backend| with(backend, None));
+    for config in engines.into_iter().chain(backends).filter(pbig_tests::may_run) {
         assert!(bits(scene, config, 2, 120) == wanted, "{config:?}");
     }
 }

@@ -127,22 +127,13 @@ impl Aabb {
     #[cfg(target_arch = "x86_64")]
     #[inline(always)]
     fn overlaps_by_lanes(&self, other: &Self) -> bool {
-        use std::arch::x86_64::{
-            __m128, _mm_and_ps, _mm_cmple_ps, _mm_loadu_ps, _mm_movemask_ps, _mm_shuffle_ps,
+        use std::arch::x86_64::{_mm_and_ps, _mm_cmple_ps, _mm_movemask_ps};
+        let ((min, max), (other_min, other_max)) = (self.corners(), other.corners());
+        // SAFETY: SSE is part of the architecture.
+        let axes = unsafe {
+            _mm_movemask_ps(_mm_and_ps(_mm_cmple_ps(min, other_max), _mm_cmple_ps(other_min, max)))
         };
-        // SAFETY: SSE is part of the architecture. A box is six numbers in a row; the loads are of the first four and
-        // of the last four.
-        unsafe {
-            let lanes = |aabb: &Self| -> (__m128, __m128) {
-                let first = std::ptr::from_ref(aabb).cast::<f32>();
-                let max = _mm_loadu_ps(first.add(2));
-                // The fourth lane holds another number, which is ignored.
-                (_mm_loadu_ps(first), _mm_shuffle_ps::<0b00_11_10_01>(max, max))
-            };
-            let ((a_min, a_max), (b_min, b_max)) = (lanes(self), lanes(other));
-            let both = _mm_and_ps(_mm_cmple_ps(a_min, b_max), _mm_cmple_ps(b_min, a_max));
-            _mm_movemask_ps(both) & 0b111 == 0b111
-        }
+        axes & 7 == 7
     }
 
     #[cfg(any(test, not(target_arch = "x86_64")))]

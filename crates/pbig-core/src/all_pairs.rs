@@ -2,11 +2,12 @@
 
 use crate::grid::{EditedGrid, GridPlan, Hits, Rule, Sorted, brute_force};
 use crate::index::BoxIndex;
+use crate::outcome::{End, Outcome, Valid};
 use crate::pairs::{Grouping, Groups};
 use crate::parallel::available_threads;
 use crate::policy::{self, PARALLEL_FROM_BOXES, search};
-use crate::report::{Checks, Clock, Report, stage};
-use crate::{Aabb, Algorithm, Backend, Config, Engine, Error, Pair, Plan, ProxyFilter};
+use crate::report::{Checks, Clock, stage};
+use crate::{Aabb, Algorithm, Backend, Config, Engine, Pair, Plan, ProxyFilter};
 use std::sync::atomic::AtomicU64;
 
 /// A search: boxes, filters and settings.
@@ -20,21 +21,13 @@ pub(crate) struct Request<'a> {
     pub(crate) grouping: Option<Grouping>,
 }
 
-/// The structure that holds all boxes of the last search.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub(crate) enum Held {
-    #[default]
-    Nowhere,
-    InGrid,
-    InTree,
-}
-
-/// The structures that can hold boxes.
+/// The structures that can hold the boxes of a search.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Store {
     pub(crate) grid: EditedGrid,
     pub(crate) tree: BoxIndex,
-    pub(crate) held: Held,
+    /// Tests of the last search that was done.
+    pub(crate) work: u64,
 }
 
 /// The buffers of a search: what each thread has found.
@@ -49,14 +42,9 @@ impl AllPairs {
         if boxes < PARALLEL_FROM_BOXES { 1 } else { available_threads() }
     }
 
-    /// Leaves all pairs in `hits`, the boxes in `store` unless they were too few, and what was done in `report`.
-    pub(crate) fn find(
-        &mut self,
-        request: &Request<'_>,
-        store: &mut Store,
-        report: &mut Report,
-    ) -> Result<(), Error> {
-        store.held = Held::Nowhere;
+    /// Leaves all pairs in `hits`, and the boxes in `store` unless they were too few.
+    pub(crate) fn find(&mut self, request: &Request<'_>, store: &mut Store) -> Outcome {
+        let mut outcome = Outcome::default();
         self.begin(request);
         let found = AtomicU64::new(0);
         let max_pairs = request.config.limits.pairs();
@@ -65,17 +53,21 @@ impl AllPairs {
         let is_few = may_be_brute && request.boxes.len() <= policy::BRUTE_FORCE_UP_TO_BOXES;
         let brute = request.config.backend == Backend::Brute || is_few;
         if brute {
-            self.test_all(request, &rule, report)
+            self.test_all(request, &rule, &mut outcome);
         } else {
-            self.search(request, store, &rule, report)
+            self.search(request, store, &rule, &mut outcome);
         }
         let sum = |of: fn(&Hits) -> u64| self.hits.iter().map(of).sum::<u64>();
         let (made, overlaps) = (sum(|hits| hits.tests), sum(|hits| hits.overlaps));
-        report.checks = Checks { made, unnecessary: made - overlaps, redundant: 0 };
-        report.work += made + sum(|hits| hits.runs);
+        outcome.checks = Checks { made, unnecessary: made - overlaps, redundant: 0 };
+        outcome.work = made + sum(|hits| hits.runs);
         let is_too_many =
             self.hits.iter().any(Hits::is_full) || sum(|hits| hits.pairs.len() as u64) > max_pairs;
-        if is_too_many { Err(Error::TooManyPairs { limit: max_pairs }) } else { Ok(()) }
+        if is_too_many {
+            return Outcome { end: End::TooManyPairs, valid: Valid::Nothing, ..outcome };
+        }
+        store.work = made;
+        Outcome { end: End::Done, ..outcome }
     }
 
     fn begin(&mut self, request: &Request<'_>) {
@@ -85,40 +77,38 @@ impl AllPairs {
         self.hits.iter_mut().for_each(|hits| hits.begin(count, shift));
     }
 
-    fn test_all(&mut self, request: &Request<'_>, rule: &Rule<'_>, report: &mut Report) {
+    fn test_all(&mut self, request: &Request<'_>, rule: &Rule<'_>, outcome: &mut Outcome) {
         stage!("check");
         let mut clock = Clock::start();
         let valid = brute_force(request.boxes, rule, &mut self.hits[0]);
-        report.invalid = (request.boxes.len() - valid) as u64;
         let algorithm = if valid < 2 { Algorithm::Nothing } else { Algorithm::Brute };
-        report.plan = Plan { algorithm, boxes: valid as u32, ..Plan::default() };
-        report.stages.check += clock.lap();
+        outcome.plan = Plan { algorithm, boxes: valid as u32, ..Plan::default() };
+        outcome.stages.check += clock.lap();
     }
 
-    fn search(&mut self, request: &Request<'_>, store: &mut Store, rule: &Rule<'_>, report: &mut Report) {
+    fn search(&mut self, request: &Request<'_>, store: &mut Store, rule: &Rule<'_>, outcome: &mut Outcome) {
         let workers = self.hits.len();
         let mut clock = Clock::start();
         let plan = {
             stage!("plan");
             GridPlan::new(request.boxes, workers)
         };
-        report.stages.plan += clock.lap();
+        outcome.stages.plan += clock.lap();
         let sorted = {
             stage!("map");
             store.grid.build(plan, request.boxes, workers)
         };
-        report.stages.map += clock.lap();
+        outcome.stages.map += clock.lap();
         let is_grid = self.is_for_grid(request, &sorted);
         if is_grid {
             stage!("check");
             sorted.search(rule, &mut self.hits);
-            store.held = Held::InGrid;
+            outcome.valid = Valid::Grid;
         }
-        report.stages.check += clock.lap();
-        report.invalid = u64::from(store.grid.grid().invalid);
-        report.plan = Plan::of_grid(Algorithm::Grid, &store.grid);
+        outcome.stages.check += clock.lap();
+        outcome.plan = Plan::of_grid(Algorithm::Grid, &store.grid);
         if !is_grid {
-            self.search_tree(request, store, rule, report);
+            self.search_tree(request, store, rule, outcome);
         }
     }
 
@@ -145,21 +135,21 @@ impl AllPairs {
         request: &Request<'_>,
         store: &mut Store,
         rule: &Rule<'_>,
-        report: &mut Report,
+        outcome: &mut Outcome,
     ) {
         let mut clock = Clock::start();
         {
             stage!("map");
             store.tree.sort(request.boxes);
         }
-        report.stages.map += clock.lap();
+        outcome.stages.map += clock.lap();
         {
             stage!("check");
             store.tree.find_pairs(rule, &mut self.hits);
         }
-        report.stages.check += clock.lap();
-        store.held = Held::InTree;
-        report.plan = Plan { algorithm: Algorithm::Tree, boxes: report.plan.boxes, ..Plan::default() };
+        outcome.stages.check += clock.lap();
+        outcome.valid = Valid::Tree;
+        outcome.plan = Plan { algorithm: Algorithm::Tree, boxes: outcome.plan.boxes, ..Plan::default() };
     }
 
     /// Gathers what was found, for sorting.
@@ -201,8 +191,8 @@ mod tests {
         let boxes = vec![Aabb::new([0.0; 3], [1.0; 3]); 20_000];
         let request = Request { boxes: &boxes, filters: None, config: &config, grouping: None };
         let mut all = AllPairs::default();
-        let found = all.find(&request, &mut Store::default(), &mut Report::default());
-        assert_eq!(found, Err(Error::TooManyPairs { limit: 1000 }));
+        let outcome = all.find(&request, &mut Store::default());
+        assert_eq!(outcome.end, End::TooManyPairs);
         let kept: usize = all.hits.iter().map(|hits| hits.pairs.capacity()).sum();
         assert!(kept < 1_000_000, "room for {kept} pairs");
     }

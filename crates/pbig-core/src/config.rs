@@ -106,3 +106,18 @@ pub enum Engine {
     /// All boxes are sorted into a grid, or a tree where cells would hold too many, searched and compared.
     Rebuild,
 }
+
+impl Engine {
+    /// All engines, for tests.
+    pub const ALL: [Self; 4] = [Self::Sweep, Self::Edit, Self::Tree, Self::Rebuild];
+
+    /// Returns the name in messages of tests.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Sweep => "sweep",
+            Self::Edit => "edit",
+            Self::Tree => "tree",
+            Self::Rebuild => "rebuild",
+        }
+    }
+}

@@ -1,9 +1,11 @@
 //! The device of a finder or a broad phase, if it has one, and the report of a device that cannot do the work.
 
 use crate::device::{DeviceFailure, DeviceFound, PairDevice};
+use crate::outcome::{End, Outcome};
 use crate::policy::{AvailableDevice, Choice, choose_backend};
-use crate::report::{Clock, Report, stage};
-use crate::{Algorithm, Config, Error, Pair, Plan, parallel};
+use crate::report::{Clock, Report, StageTimes, stage};
+use crate::{Algorithm, Config, Pair, Plan, parallel};
+use std::time::Duration;
 
 /// Pairs of an answer that a thread checks at a time.
 const PIECE: usize = 1 << 16;
@@ -12,15 +14,13 @@ const PIECE: usize = 1 << 16;
 #[derive(Clone, Debug, Default)]
 pub(crate) struct DeviceSlot {
     device: Option<Box<dyn PairDevice>>,
-    /// True if the device has done the last update to its end. It knows the boxes then.
-    is_current: bool,
     has_warned: bool,
 }
 
 impl DeviceSlot {
     /// Makes a slot with a device.
     pub(crate) fn new(device: Box<dyn PairDevice>) -> Self {
-        Self { device: Some(device), is_current: false, has_warned: false }
+        Self { device: Some(device), has_warned: false }
     }
 
     /// Returns true if there is a device.
@@ -33,17 +33,11 @@ impl DeviceSlot {
         self.device.as_ref()?.name()
     }
 
-    /// Begins an update on the device. It forgets what it knows, unless it has done the last update to its end.
-    pub(crate) fn begin_update(&mut self) {
-        let is_current = std::mem::take(&mut self.is_current);
-        if let Some(device) = self.device.as_mut().filter(|_| !is_current) {
+    /// Lets the device forget the boxes of the last update.
+    pub(crate) fn forget(&mut self) {
+        if let Some(device) = &mut self.device {
             device.forget();
         }
-    }
-
-    /// Ends an update, which the device has done or the CPU.
-    pub(crate) fn end_update(&mut self, is_by_device: bool) {
-        self.is_current = is_by_device;
     }
 
     /// Returns true if a call with this number of changed boxes should run on the device. Otherwise the report gets the reason.
@@ -51,7 +45,7 @@ impl DeviceSlot {
         let choice = choose_backend(config.backend, self.available(), changed as u64);
         report.plan.no_device = choice.no_device();
         if choice == Choice::Device && self.device.is_none() {
-            self.fall_back("no device was given".into(), report);
+            report.fallback = Some(self.fall_back("no device was given"));
             return false;
         }
         choice == Choice::Device
@@ -65,56 +59,54 @@ impl DeviceSlot {
         }
     }
 
-    /// Reports that the wanted backend could not do the work: every time in the report, once as a warning.
-    fn fall_back(&mut self, why: String, report: &mut Report) {
+    /// Returns the report that the wanted backend could not do the work. Logs the first one of a row as a warning.
+    fn fall_back(&mut self, why: &str) -> String {
         let why = format!("{why}: the CPU does the work");
-        if !self.has_warned {
+        if !std::mem::replace(&mut self.has_warned, true) {
             tracing::warn!("pbig: {why}");
-            self.has_warned = true;
         }
-        report.fallback = Some(why);
+        why
     }
 
-    /// Runs a call about this number of boxes on the device, with the memory of `pairs`. Returns none if the device could not do
-    /// it; the report says why.
+    /// Runs a call about this number of boxes on the device, with the memory of `pairs`. Gives up if the device could not do it.
     pub(crate) fn call(
         &mut self,
         boxes: usize,
         pairs: Vec<Pair>,
-        config: &Config,
-        report: &mut Report,
         call: impl FnOnce(&mut dyn PairDevice, &mut DeviceFound) -> Result<(), DeviceFailure>,
-    ) -> Result<Option<DeviceFound>, Error> {
+    ) -> (Outcome, DeviceFound) {
         stage!("device");
-        let Some(device) = &mut self.device else { return Ok(None) };
         let (mut clock, mut found) = (Clock::start(), DeviceFound { pairs, ..DeviceFound::default() });
         found.pairs.clear();
-        match call(&mut **device, &mut found).and_then(|()| check(&found, boxes)) {
+        let Some(device) = &mut self.device else { return (Outcome::default(), found) };
+        let outcome = match call(&mut **device, &mut found).and_then(|()| check(&found, boxes)) {
             Ok(()) => {
                 self.has_warned = false;
                 found.report.name = self.name().unwrap_or_default().to_owned();
-                note_success(&found, &mut clock, report);
-                Ok(Some(found))
+                success(&found, clock.lap())
             }
-            Err(DeviceFailure::TooManyPairs) => Err(Error::TooManyPairs { limit: config.limits.pairs() }),
+            Err(DeviceFailure::TooManyPairs) => Outcome { end: End::TooManyPairs, ..Outcome::default() },
             Err(DeviceFailure::Failed(why)) => {
-                self.fall_back(why, report);
-                Ok(None)
+                Outcome { fallback: Some(self.fall_back(&why)), ..Outcome::default() }
             }
-        }
+        };
+        (outcome, found)
     }
 }
 
-/// Says in the report what the device did.
-fn note_success(found: &DeviceFound, clock: &mut Clock, report: &mut Report) {
+/// Returns what the device did in this time.
+fn success(found: &DeviceFound, time: Duration) -> Outcome {
     // The rest of the call is check, sort, transfer and decoding.
-    let time = clock.lap();
     let map = found.report.map.min(time);
-    report.stages.map += map;
-    report.stages.check += time - map;
     let algorithm = if found.valid < 2 { Algorithm::Nothing } else { Algorithm::Device };
-    report.plan = Plan { algorithm, boxes: found.valid, device: found.plan.clone(), ..Plan::default() };
-    (report.checks, report.device, report.fallback) = (found.checks, Some(found.report.clone()), None);
+    Outcome {
+        end: End::Done,
+        checks: found.checks,
+        plan: Plan { algorithm, boxes: found.valid, device: found.plan.clone(), ..Plan::default() },
+        stages: StageTimes { map, check: time - map, ..StageTimes::default() },
+        device: Some(found.report.clone()),
+        ..Outcome::default()
+    }
 }
 
 /// Returns an error if an answer about this number of boxes has not the form that a device promises.

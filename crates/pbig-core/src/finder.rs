@@ -3,6 +3,7 @@
 use crate::all_pairs::{AllPairs, Request, Store};
 use crate::device::{PairDevice, SearchRequest};
 use crate::device_slot::DeviceSlot;
+use crate::outcome::Outcome;
 use crate::pairs::{Grouping, Groups};
 use crate::report::{Clock, Report, stage};
 use crate::{Aabb, Config, Error, Limits, Order, Pair, ProxyFilter};
@@ -101,11 +102,10 @@ impl Finder {
         let config = self.config;
         let request = Request { boxes, filters, config: &config, grouping };
         let is_wanted = self.device.is_wanted(&self.config, boxes.len(), &mut self.report);
-        let no_device = self.report.plan.no_device;
         let is_found = is_wanted && self.find_on_device(&request)?;
         if !is_found {
-            self.all_pairs.find(&request, &mut self.store, &mut self.report)?;
-            self.report.plan.no_device = no_device;
+            let outcome = self.all_pairs.find(&request, &mut self.store);
+            self.add(outcome, boxes.len())?;
             self.emit(grouping);
         }
         self.report.pairs = self.pairs.len() as u64;
@@ -117,14 +117,15 @@ impl Finder {
         let Request { boxes, filters, config, grouping } = *request;
         let (is_sorted, max_pairs) = (grouping.is_some(), config.limits.pairs());
         let request = SearchRequest { boxes, filters, is_sorted, max_pairs };
-        let (pairs, report) = (std::mem::take(&mut self.pairs), &mut self.report);
+        let pairs = std::mem::take(&mut self.pairs);
         let call = |device: &mut dyn PairDevice, found: &mut _| device.find_all(&request, found);
-        let found = self.device.call(boxes.len(), pairs, config, report, call)?;
-        let Some(found) = found else { return Ok(false) };
+        let (outcome, found) = self.device.call(boxes.len(), pairs, call);
+        if !self.add(outcome, boxes.len())? {
+            return Ok(false);
+        }
         if found.pairs.len() as u64 > max_pairs {
             return Err(Error::TooManyPairs { limit: max_pairs });
         }
-        self.report.invalid = boxes.len() as u64 - u64::from(found.valid);
         if grouping.is_none() || found.pairs.is_sorted_by(|one, next| one < next) {
             self.pairs = found.pairs;
         } else {
@@ -132,6 +133,13 @@ impl Finder {
             self.emit(grouping);
         }
         Ok(true)
+    }
+
+    /// Adds the outcome of a search of this number of boxes to the report. Returns false if it was given up.
+    fn add(&mut self, outcome: Outcome, boxes: usize) -> Result<bool, Error> {
+        let is_done = self.report.add(outcome, &self.config);
+        self.report.invalid = boxes as u64 - u64::from(self.report.plan.boxes);
+        is_done
     }
 
     /// Brings the pairs of all threads into one list, in order if there is a grouping.

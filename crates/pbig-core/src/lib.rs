@@ -63,6 +63,7 @@ mod finder;
 mod grid;
 mod index;
 pub mod oracle;
+mod outcome;
 mod pair;
 mod pairs;
 mod parallel;

@@ -31,6 +31,14 @@ impl StageTimes {
         ]
     }
 
+    pub(crate) fn add(&mut self, other: &Self) {
+        self.plan += other.plan;
+        self.map += other.map;
+        self.check += other.check;
+        self.emit += other.emit;
+        self.diff += other.diff;
+    }
+
     /// Returns the sum of all stages.
     pub fn total(&self) -> Duration {
         self.named().iter().map(|(_, time)| *time).sum()

@@ -5,26 +5,25 @@
 //! ```
 
 mod device;
-mod edit;
+mod engines;
 mod query;
 mod set_many;
 #[cfg(feature = "serde")]
 mod snapshot;
-mod sweep;
 #[cfg(test)]
 mod tests;
 mod update;
 mod world;
 
-use crate::all_pairs::{AllPairs, Store};
+use crate::all_pairs::Store;
 use crate::device_slot::DeviceSlot;
 use crate::finder::check_count;
-use crate::pairs::{Comparison, Groups, Kept};
+use crate::outcome::Valid;
+use crate::pairs::{Comparison, Kept};
 use crate::policy;
 use crate::report::Report;
 use crate::{Aabb, Config, Error, Pair, ProxyFilter};
-use edit::Edit;
-use sweep::Sweep;
+use engines::Engines;
 use world::World;
 
 /// The changes of an update. Both lists are sorted and free of duplicates, and have no pair in common.
@@ -65,17 +64,13 @@ pub struct BroadPhase {
     config: Config,
     device: DeviceSlot,
     world: World,
-    /// The boxes of the last update.
+    /// The structure that holds the boxes of the last update.
+    valid: Valid,
     store: Store,
-    /// Work of the last search of all boxes.
-    rebuild_work: u64,
     /// Pairs that began or ended in the last update.
     last_events: usize,
     given_up: policy::GivenUp,
-    sweep: Sweep,
-    edit: Edit,
-    all_pairs: AllPairs,
-    groups: Groups,
+    engines: Engines,
     comparison: Comparison,
     kept: Kept,
     events: Events,
@@ -162,7 +157,6 @@ impl BroadPhase {
 
     /// Removes all boxes; their pairs end without an event.
     pub fn clear(&mut self) {
-        self.device.end_update(false);
         let device = std::mem::take(&mut self.device);
         *self = Self { config: self.config, device, ..Self::default() };
         self.world.keep_old = self.old_to_keep();
@@ -172,9 +166,10 @@ impl BroadPhase {
     pub fn shrink_to_fit(&mut self) {
         self.world.shrink();
         self.kept.shrink();
-        self.store = Store::default();
-        (self.sweep, self.edit) = (Sweep::default(), Edit::default());
-        (self.all_pairs, self.groups) = (AllPairs::default(), Groups::default());
+        (self.store, self.engines) = (Store::default(), Engines::default());
+        if self.valid != Valid::Device {
+            self.valid = Valid::Nothing;
+        }
         self.comparison.shrink();
         self.events.added.shrink_to_fit();
         self.events.removed.shrink_to_fit();

@@ -1,14 +1,16 @@
 //! Random worlds against the oracle, update by update: every engine gives the events that lead from one set to the next.
 
-use super::edit::EditLimits;
+use super::engines::edit::EditLimits;
 use crate::pairs::Comparison;
 use crate::{Aabb, Algorithm, BroadPhase, Config, Engine, Error, Limits, Pair, ProxyFilter, oracle};
 use rand::rngs::StdRng;
 use rand::{RngExt, SeedableRng};
 use std::collections::BTreeSet;
 
-const ENGINES: [Option<Engine>; 5] =
-    [None, Some(Engine::Sweep), Some(Engine::Edit), Some(Engine::Tree), Some(Engine::Rebuild)];
+/// Returns the policy's choice, and each engine.
+fn engines() -> Vec<Option<Engine>> {
+    std::iter::once(None).chain(Engine::ALL.map(Some)).collect()
+}
 
 /// A broad phase, and what it must know.
 struct Checked {
@@ -98,13 +100,13 @@ fn change(random: &mut StdRng, world: &mut Checked, kind: u32, width: f32, is_fi
 
 #[test]
 fn every_engine_follows_random_worlds() {
-    let mut events = 0;
+    let (engines, mut events) = (engines(), 0);
     for seed in 0..48 {
         let mut random = StdRng::seed_from_u64(seed);
         let ids = [5, 40, 200, 400, 1100][seed as usize % 5];
         let (kind, is_filtered) = (seed as u32 % 6, seed % 3 == 0);
         let width = (ids as f32 * [1.0, 6.0][seed as usize % 2]).cbrt();
-        let mut world = Checked::new(ENGINES[seed as usize % ENGINES.len()], ids);
+        let mut world = Checked::new(engines[seed as usize % engines.len()], ids);
         for frame in 0..10 {
             if frame == 0 {
                 for id in 0..ids as u32 {
@@ -123,7 +125,7 @@ fn every_engine_follows_random_worlds() {
 
 #[test]
 fn an_update_with_too_many_pairs_changes_nothing_but_the_grid() {
-    for engine in ENGINES {
+    for engine in engines() {
         let limits = Limits { max_pairs: 10, ..Limits::DEFAULT };
         let mut broad_phase =
             BroadPhase::new(Config { limits, engine, ..Config::DEFAULT }).expect("a margin");
@@ -252,8 +254,8 @@ fn an_edit_stops_soon_after_its_work_is_beyond_the_limit() {
     let mut run = |work: u64| {
         let limits = EditLimits { pairs: u64::MAX, work };
         let (mut grid, mut events) = (broad_phase.store.grid.clone(), Comparison::default());
-        let is_done = broad_phase.edit.run(world, &mut grid, &mut events, limits);
-        (is_done, broad_phase.edit.work())
+        let is_done = broad_phase.engines.edit.find(world, &mut grid, &mut events, limits);
+        (is_done, broad_phase.engines.edit.work())
     };
     let (is_done, all) = run(u64::MAX);
     assert!(is_done && all > 1_000_000, "{all}");

@@ -1,12 +1,11 @@
 //! An update: choose an engine, run it, keep the pairs, report.
 
-use super::edit::EditLimits;
+use super::engines::{self, Task};
 use super::{BroadPhase, Events};
-use crate::all_pairs::{AllPairs, Held, Request};
-use crate::pairs::Grouping;
+use crate::outcome::{End, Outcome, Valid};
 use crate::policy::{self, Counts};
-use crate::report::{Clock, stage};
-use crate::{Algorithm, Backend, Engine, Error, Plan};
+use crate::report::Clock;
+use crate::{Backend, Engine, Error, Plan};
 
 impl BroadPhase {
     /// Finds what has changed since the last update. Takes next to no time when nothing has.
@@ -31,32 +30,26 @@ impl BroadPhase {
     }
 
     fn find_events(&mut self) -> Result<(), Error> {
-        if self.find_on_device()? {
-            return self.apply_events();
+        if self.is_for_device() {
+            let outcome = self.run_on_device();
+            if self.take(outcome)? {
+                return Ok(());
+            }
         }
-        let no_device = self.report.plan.no_device;
-        let found = self.find_on_cpu();
-        self.report.plan.no_device = no_device;
-        found
-    }
-
-    fn find_on_cpu(&mut self) -> Result<(), Error> {
         let changed = self.world.changed.len();
-        let mut engine = self.engine();
-        if self.config.engine.is_none() {
-            engine = self.given_up.instead_of(engine, changed);
+        let engine = self.choose_engine();
+        let outcome = self.run(engine);
+        if engine != Engine::Rebuild {
+            self.given_up.note(outcome.end == End::GivenUp, changed);
         }
-        let is_done = match engine {
-            Engine::Sweep => self.run_sweep(),
-            Engine::Edit => self.run_edit(),
-            Engine::Tree => self.run_in_tree(),
-            Engine::Rebuild => return self.rebuild(),
-        };
-        self.given_up.note(!is_done, changed);
-        if is_done { self.apply_events() } else { self.rebuild() }
+        if !self.take(outcome)? {
+            let outcome = self.run(Engine::Rebuild);
+            self.take(outcome)?;
+        }
+        Ok(())
     }
 
-    fn engine(&self) -> Engine {
+    fn choose_engine(&mut self) -> Engine {
         if self.config.backend == Backend::Brute {
             return Engine::Rebuild;
         }
@@ -65,67 +58,37 @@ impl BroadPhase {
             ids: self.world.ids(),
             changed: self.world.changed.len(),
             knows_old: self.world.knows_old(),
-            held: self.store.held,
+            valid: self.valid,
             spilled: self.store.grid.spilled(),
             events: self.last_events,
         };
-        policy::choose_engine(&counts, self.config.engine)
+        let engine = policy::choose_engine(&counts, self.config.engine);
+        match self.config.engine {
+            Some(_) => engine,
+            None => self.given_up.instead_of(engine, counts.changed),
+        }
     }
 
-    /// Returns true: unlike other engines, a sweep is never given up.
-    fn run_sweep(&mut self) -> bool {
-        stage!("check");
-        let mut clock = Clock::start();
-        self.report.checks = self.sweep.run(&self.world, &self.kept, &mut self.comparison);
-        self.report.stages.check = clock.lap();
-        self.report.work = self.report.checks.made;
-        self.report.plan.algorithm = Algorithm::Sweep;
-        self.store.held = Held::Nowhere;
-        true
+    fn run(&mut self, engine: Engine) -> Outcome {
+        let Self { world, config, valid, store, kept, comparison: events, .. } = self;
+        self.engines.run(engine, &mut Task { world, config, valid: *valid, store, kept, events })
     }
 
-    /// Returns false if it took too much work, and was given up.
-    fn run_edit(&mut self) -> bool {
-        stage!("edit");
-        let mut clock = Clock::start();
-        let limits = EditLimits {
-            pairs: self.config.limits.pairs(),
-            work: self.unless_forced(policy::edit_up_to_work(self.len(), self.kept.len(), self.rebuild_work)),
-        };
-        let done = self.edit.run(&self.world, &mut self.store.grid, &mut self.comparison, limits);
-        self.report.stages.check = clock.lap();
-        self.report.work += self.edit.work().min(limits.work);
-        self.report.checks = self.edit.checks();
-        self.report.plan = Plan::of_grid(Algorithm::Edit, &self.store.grid);
-        self.report.plan.boxes = self.world.valid();
-        self.sweep.expire();
-        done
+    fn run_on_device(&mut self) -> Outcome {
+        let Self { world, config, valid, store, kept, comparison: events, .. } = self;
+        let mut task = Task { world, config, valid: *valid, store, kept, events };
+        engines::device::run(&mut self.device, &mut task)
     }
 
-    /// Returns the maximum work of an engine. An engine that the caller chose has no limit.
-    fn unless_forced(&self, limit: u64) -> u64 {
-        self.config.engine.map_or(limit, |_| u64::MAX)
-    }
-
-    /// Looks up changed boxes in a tree, which is brought up to date first. Returns false if it took too much work, and was
-    /// given up.
-    fn run_in_tree(&mut self) -> bool {
-        stage!("tree");
-        let mut clock = Clock::start();
-        let max_nodes = self.unless_forced(policy::look_up_to_nodes(self.world.ids()));
-        let Self { world, store, .. } = self;
-        let changed = (store.held == Held::InTree).then_some(&world.changed[..]);
-        self.report.work = store.tree.keep_sorted(&world.boxes, changed);
-        store.held = Held::InTree;
-        self.report.stages.map = clock.lap();
-        let tree = (&store.tree, max_nodes);
-        let (checks, nodes) = self.sweep.run_in_tree(world, &self.kept, tree, &mut self.comparison);
-        self.report.checks = checks;
-        self.report.work += checks.made + nodes;
-        self.report.stages.check = clock.lap();
-        self.report.plan.algorithm = Algorithm::Tree;
-        self.sweep.expire();
-        nodes <= max_nodes
+    /// Adds an outcome to the report, and applies the events to the kept pairs. Returns false if the engine gave up.
+    fn take(&mut self, outcome: Outcome) -> Result<bool, Error> {
+        let has_kept = outcome.has_kept;
+        self.valid = outcome.valid;
+        let is_done = self.report.add(outcome, &self.config)?;
+        if is_done && !has_kept {
+            self.apply_events()?;
+        }
+        Ok(is_done)
     }
 
     /// Keeps the added pairs of an engine, and forgets the ended ones.
@@ -143,34 +106,9 @@ impl BroadPhase {
         Ok(())
     }
 
-    /// Searches all boxes, and compares the pairs with the kept ones.
-    fn rebuild(&mut self) -> Result<(), Error> {
-        let world = &self.world;
-        let grouping = Grouping::new(world.ids());
-        let filters = world.is_filtered.then_some(&world.filters[..]);
-        let request =
-            Request { boxes: &world.boxes, filters, config: &self.config, grouping: Some(grouping) };
-        let invalid = self.report.invalid;
-        self.sweep.expire();
-        self.all_pairs.find(&request, &mut self.store, &mut self.report)?;
-        self.rebuild_work = self.report.checks.made;
-        self.report.invalid = invalid;
-        stage!("diff");
-        let mut clock = Clock::start();
-        self.all_pairs.gather(grouping, &mut self.groups);
-        let was_removed = |id: u32| world.was_removed(id);
-        let is_removed: Option<&(dyn Fn(u32) -> bool + Sync)> =
-            if world.has_removed() { Some(&was_removed) } else { None };
-        let workers = AllPairs::workers(world.ids());
-        self.comparison.run(&mut self.groups, &mut self.kept, is_removed, workers);
-        self.report.stages.diff = clock.lap();
-        Ok(())
-    }
-
     /// Makes the next update begin from the boxes and the kept pairs alone.
     fn fail(&mut self) {
-        self.store.held = Held::Nowhere;
-        self.sweep.expire();
+        self.valid = Valid::Nothing;
         self.report.pairs = self.kept.len() as u64;
     }
 
@@ -180,7 +118,6 @@ impl BroadPhase {
         std::mem::swap(&mut self.events.removed, &mut self.comparison.removed);
         self.last_events = self.events.added.len() + self.events.removed.len();
         self.world.forget_changes();
-        self.device.end_update(self.report.device.is_some());
         self.world.keep_old = self.old_to_keep();
     }
 

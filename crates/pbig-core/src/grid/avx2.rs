@@ -1,13 +1,38 @@
 //! The inner loops by AVX2, which all x86-64 processors of the last ten years have.
 
 use super::cells::{APART, Cells, MAX_STEP, MIN_STEP, Steps, TOMBSTONE};
-use super::simd::{BLOCK, EightBoxes, Simd};
+use super::simd::{BLOCK, Eight, EightBoxes, Simd};
 use crate::Aabb;
 use std::arch::x86_64::*;
 
-/// Four codes to a register of 256 bits. (512 bits were slower on Zen 4: every other load crosses a cache line.)
+/// A proof that the processor has the instructions, because only [`Avx2::detect`] makes one. Four codes lie in a register of 256 bits.
+/// (512 bits were slower on Zen 4: every other load crosses a cache line.)
 #[derive(Clone, Copy)]
-pub(crate) struct Avx2;
+pub(crate) struct Avx2(());
+
+impl Avx2 {
+    /// Returns a proof if the processor has all instructions that [`Avx2::run`] enables.
+    #[inline]
+    pub(crate) fn detect() -> Option<Self> {
+        let has_all = is_x86_feature_detected!("avx2")
+            && is_x86_feature_detected!("bmi1")
+            && is_x86_feature_detected!("bmi2")
+            && is_x86_feature_detected!("popcnt")
+            && is_x86_feature_detected!("lzcnt");
+        has_all.then_some(Self(()))
+    }
+
+    /// Calls a function that is inlined here, compiled for these instructions.
+    #[inline]
+    pub(crate) fn run<T>(self, work: impl FnOnce() -> T) -> T {
+        #[target_feature(enable = "avx2,bmi1,bmi2,popcnt,lzcnt")]
+        fn compiled<T>(work: impl FnOnce() -> T) -> T {
+            work()
+        }
+        // SAFETY: `self` proves that the processor has these instructions.
+        unsafe { compiled(work) }
+    }
+}
 
 /// By mask: the numbers of its set bits, a byte each, lowest first.
 static SET_BITS: [u64; 256] = {
@@ -29,8 +54,8 @@ static SET_BITS: [u64; 256] = {
 
 impl Simd for Avx2 {
     #[inline(always)]
-    unsafe fn steps(cells: &Cells, aabb: &Aabb) -> (Steps, Steps) {
-        // SAFETY: the loads lie inside the box and the cells; the caller has AVX2.
+    fn steps(self, cells: &Cells, aabb: &Aabb) -> (Steps, Steps) {
+        // SAFETY: `self` proves the instructions; each load is of an array of four.
         unsafe {
             let (min, max) = aabb.corners();
             let origin = _mm256_loadu_pd(cells.origin.as_ptr());
@@ -39,18 +64,18 @@ impl Simd for Avx2 {
                 let x = _mm256_mul_pd(_mm256_sub_pd(_mm256_cvtps_pd(corner), origin), scale);
                 // The second operand wins where the first is NaN.
                 let x = _mm256_max_pd(_mm256_min_pd(x, _mm256_set1_pd(MAX_STEP)), _mm256_set1_pd(MIN_STEP));
-                std::mem::transmute::<__m128i, Steps>(_mm256_cvtpd_epi32(x))
+                bytemuck::cast(_mm256_cvtpd_epi32(x))
             };
             (steps(min), steps(max))
         }
     }
 
     #[inline(always)]
-    unsafe fn key(cells: &Cells, point: Steps) -> u32 {
+    fn key(self, cells: &Cells, point: Steps) -> u32 {
         let [x, y, z] = cells.dims;
-        // SAFETY: the caller has AVX2.
+        // SAFETY: `self` proves the instructions.
         unsafe {
-            let point = std::mem::transmute::<Steps, __m128i>(point);
+            let point: __m128i = bytemuck::cast(point);
             let cell = _mm_sra_epi32(point, _mm_cvtsi32_si128(cells.shift as i32));
             let cell = if cells.wraps {
                 _mm_and_si128(cell, _mm_setr_epi32(x - 1, y - 1, z - 1, 0))
@@ -65,9 +90,9 @@ impl Simd for Avx2 {
     }
 
     #[inline(always)]
-    unsafe fn takes(cells: &Cells, aabb: &Aabb) -> bool {
+    fn takes(self, cells: &Cells, aabb: &Aabb) -> bool {
         let [x, y, z] = cells.max_extent;
-        // SAFETY: the caller has AVX2.
+        // SAFETY: `self` proves the instructions.
         unsafe {
             let (min, max) = aabb.corners();
             let extent = _mm_sub_ps(max, min);
@@ -77,10 +102,10 @@ impl Simd for Avx2 {
     }
 
     #[inline(always)]
-    unsafe fn code(low: Steps, high: Steps) -> u64 {
-        // SAFETY: the caller has AVX2.
+    fn code(self, low: Steps, high: Steps) -> u64 {
+        // SAFETY: `self` proves the instructions.
         unsafe {
-            let [low, high] = [low, high].map(|steps| std::mem::transmute::<Steps, __m128i>(steps));
+            let (low, high): (__m128i, __m128i) = (bytemuck::cast(low), bytemuck::cast(high));
             let (mask, shifts) = (_mm_setr_epi32(511, 511, 511, 0), _mm_setr_epi32(0, 10, 20, 0));
             let field = |steps| _mm_sllv_epi32(_mm_and_si128(steps, mask), shifts);
             let (low, high) = (field(_mm_sub_epi32(_mm_setzero_si128(), low)), field(high));
@@ -90,13 +115,13 @@ impl Simd for Avx2 {
     }
 
     #[inline(always)]
-    unsafe fn test(query: u64, codes: *const u64) -> u32 {
-        // SAFETY: the caller has a block of codes there, and AVX2.
+    fn test(self, query: u64, codes: &[u64; BLOCK]) -> u32 {
+        // SAFETY: `self` proves the instructions; each load is of a half of the codes.
         unsafe {
             let query = _mm256_set1_epi64x(query as i64);
             let apart = _mm256_set1_epi64x((APART | TOMBSTONE) as i64);
             let half = |at: usize| {
-                let codes = _mm256_loadu_si256(codes.add(at).cast());
+                let codes = _mm256_loadu_si256(codes[at..].as_ptr().cast());
                 let sum = _mm256_and_si256(_mm256_add_epi64(query, codes), apart);
                 let near = _mm256_cmpeq_epi64(sum, _mm256_setzero_si256());
                 _mm256_movemask_pd(_mm256_castsi256_pd(near)) as u32
@@ -106,31 +131,31 @@ impl Simd for Avx2 {
     }
 
     #[inline(always)]
-    unsafe fn expand(query: u32, first: u32, mask: u32, queries: *mut u32, places: *mut u32) -> usize {
-        // SAFETY: the caller has room for a block, and AVX2; a mask has eight bits.
+    fn expand(self, query: u32, first: u32, mask: u32, queries: &mut Eight, places: &mut Eight) -> usize {
+        // SAFETY: `self` proves the instructions; each store is of eight numbers.
         unsafe {
             let bits = _mm_cvtsi64_si128(SET_BITS[mask as usize & 255] as i64);
             let found = _mm256_add_epi32(_mm256_set1_epi32(first as i32), _mm256_cvtepu8_epi32(bits));
-            _mm256_storeu_si256(queries.cast(), _mm256_set1_epi32(query as i32));
-            _mm256_storeu_si256(places.cast(), found);
+            _mm256_storeu_si256(queries.as_mut_ptr().cast(), _mm256_set1_epi32(query as i32));
+            _mm256_storeu_si256(places.as_mut_ptr().cast(), found);
         }
         mask.count_ones() as usize
     }
 
     /// A sorting network of six steps; numbers behind the row take part as the largest ones.
     #[inline(always)]
-    unsafe fn sorted_short(row: *const u32, len: usize) -> [u32; 8] {
+    fn sorted_short(self, row: &Eight, len: usize) -> Eight {
         macro_rules! step {
             ($row:ident, $swapped:expr, $upper:literal) => {{
                 let swapped = $swapped;
                 _mm256_blend_epi32::<$upper>(_mm256_min_epu32($row, swapped), _mm256_max_epu32($row, swapped))
             }};
         }
-        // SAFETY: the caller has 8 numbers there, and AVX2.
+        // SAFETY: `self` proves the instructions; the load is of eight numbers.
         unsafe {
             let lanes = _mm256_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7);
             let behind = _mm256_cmpgt_epi32(lanes, _mm256_set1_epi32(len as i32 - 1));
-            let v = _mm256_or_si256(_mm256_loadu_si256(row.cast()), behind);
+            let v = _mm256_or_si256(_mm256_loadu_si256(row.as_ptr().cast()), behind);
             let v = step!(v, _mm256_shuffle_epi32::<0b10_11_00_01>(v), 0b1010_1010);
             let v = step!(v, _mm256_shuffle_epi32::<0b00_01_10_11>(v), 0b1100_1100);
             let v = step!(v, _mm256_shuffle_epi32::<0b10_11_00_01>(v), 0b1010_1010);
@@ -139,29 +164,32 @@ impl Simd for Avx2 {
             let v = step!(v, reversed, 0b1111_0000);
             let v = step!(v, _mm256_shuffle_epi32::<0b01_00_11_10>(v), 0b1100_1100);
             let v = step!(v, _mm256_shuffle_epi32::<0b10_11_00_01>(v), 0b1010_1010);
-            std::mem::transmute::<__m256i, [u32; 8]>(v)
+            bytemuck::cast(v)
         }
     }
 
     #[inline(always)]
-    unsafe fn same_short(one: *const u32, other: *const u32, len: usize) -> bool {
-        // SAFETY: the caller has 8 numbers each, and AVX2.
+    fn same_short(self, one: &Eight, other: &Eight, len: usize) -> bool {
+        // SAFETY: `self` proves the instructions; each load is of eight numbers.
         unsafe {
-            let same = _mm256_cmpeq_epi32(_mm256_loadu_si256(one.cast()), _mm256_loadu_si256(other.cast()));
+            let same = _mm256_cmpeq_epi32(
+                _mm256_loadu_si256(one.as_ptr().cast()),
+                _mm256_loadu_si256(other.as_ptr().cast()),
+            );
             let same = _mm256_movemask_ps(_mm256_castsi256_ps(same)) as u32;
             !same & ((1 << len) - 1) == 0
         }
     }
 
     #[inline(always)]
-    unsafe fn absent(numbers: *const u32, others: *const u32, len: usize) -> u32 {
-        // SAFETY: the caller has 8 numbers each, and AVX2.
+    fn absent(self, numbers: &Eight, others: &Eight, len: usize) -> u32 {
+        // SAFETY: `self` proves the instructions; each load is of eight numbers.
         unsafe {
             let lanes = _mm256_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7);
             let behind = _mm256_cmpgt_epi32(lanes, _mm256_set1_epi32(len as i32 - 1));
-            let numbers = _mm256_loadu_si256(numbers.cast());
+            let numbers = _mm256_loadu_si256(numbers.as_ptr().cast());
             // No id is the largest number.
-            let mut others = _mm256_or_si256(_mm256_loadu_si256(others.cast()), behind);
+            let mut others = _mm256_or_si256(_mm256_loadu_si256(others.as_ptr().cast()), behind);
             let next = _mm256_setr_epi32(1, 2, 3, 4, 5, 6, 7, 0);
             let mut found = _mm256_cmpeq_epi32(numbers, others);
             for _ in 1..8 {
@@ -173,8 +201,8 @@ impl Simd for Avx2 {
     }
 
     #[inline(always)]
-    unsafe fn overlaps_eight(boxes: &EightBoxes, aabb: &Aabb) -> u32 {
-        // SAFETY: the caller has AVX2.
+    fn overlaps_eight(self, boxes: &EightBoxes, aabb: &Aabb) -> u32 {
+        // SAFETY: `self` proves the instructions; each load is of eight numbers.
         unsafe {
             let mut overlaps = _mm256_castsi256_ps(_mm256_set1_epi32(-1));
             for k in 0..3 {

@@ -100,23 +100,15 @@ fn largest(extent: &[f32]) -> f32 {
 fn measure(boxes: &[Aabb]) -> Bounds {
     use std::arch::x86_64::*;
     let mut all = Bounds::NONE;
-    // SAFETY: SSE is part of the architecture. A box is six numbers; the loads are of its first and last four.
-    unsafe {
-        let [mut low, mut high, mut extent] =
-            [&all.low, &all.high, &all.extent].map(|lanes| _mm_loadu_ps(lanes.as_ptr()));
-        for aabb in boxes {
-            let first = std::ptr::from_ref(aabb).cast::<f32>();
-            let max = _mm_loadu_ps(first.add(2));
-            let (min, max) = (_mm_loadu_ps(first), _mm_shuffle_ps::<0b11_11_10_01>(max, max));
-            // The second operand wins where the first is NaN.
-            low = _mm_min_ps(min, low);
-            high = _mm_max_ps(max, high);
-            extent = _mm_max_ps(_mm_sub_ps(max, min), extent);
-        }
-        _mm_storeu_ps(all.low.as_mut_ptr(), low);
-        _mm_storeu_ps(all.high.as_mut_ptr(), high);
-        _mm_storeu_ps(all.extent.as_mut_ptr(), extent);
+    let lanes = |of: [f32; 4]| bytemuck::cast::<_, __m128>(of);
+    let (mut low, mut high, mut extent) = (lanes(all.low), lanes(all.high), lanes(all.extent));
+    for (min, max) in boxes.iter().map(Aabb::corners) {
+        // SAFETY: SSE is part of the architecture. The second operand wins where the first is NaN.
+        (low, high, extent) = unsafe {
+            (_mm_min_ps(min, low), _mm_max_ps(max, high), _mm_max_ps(_mm_sub_ps(max, min), extent))
+        };
     }
+    [all.low, all.high, all.extent] = [low, high, extent].map(bytemuck::cast);
     all
 }
 

@@ -3,13 +3,14 @@
 //! The first sort brings records into a few hundred *buckets* of neighbouring cells, the second one sorts each bucket
 //! while it is in the cache, and computes codes. Each pass is shared by threads piece by piece.
 
-use super::cells::TOMBSTONE;
+use super::cells::{Cells, TOMBSTONE};
 use super::plan::GridPlan;
 use super::record::Record;
-use super::simd::{BLOCK, Kernel, Simd, dispatch};
+use super::simd::{BLOCK, Simd, dispatch};
 use super::{Grid, Sorted};
 use crate::Aabb;
 use crate::parallel::{SharedSlice, ensure_scratch, piece_range, run};
+use std::ops::Range;
 
 /// Maximum number of buckets of the first sort: their write positions stay in the nearest cache.
 const MAX_BUCKETS: usize = 2047;
@@ -83,7 +84,7 @@ impl Grid {
             let (keys, counts) = unsafe { (keys.part(range.clone()), &mut counts.part(piece..piece + 1)[0]) };
             counts.0[..=split.buckets].fill(0);
             (counts.0[BucketCounts::OVERSIZE], counts.0[BucketCounts::INVALID]) = (0, 0);
-            dispatch(CountKeys { plan, boxes: &boxes[range], keys, counts, shift: split.shift });
+            dispatch!(count_keys, plan.cells, &boxes[range.clone()], keys, counts, split.shift);
         });
     }
 
@@ -124,7 +125,7 @@ impl Grid {
             let next = unsafe { &mut counts.part(piece..piece + 1)[0].0 };
             let range = piece_range(boxes.len(), piece, split.pieces);
             let (boxes, keys, first_id) = (&boxes[range.clone()], &keys[range.clone()], range.start as u32);
-            dispatch(ScatterRecords { boxes, keys, first_id, next, coarse, shift: split.shift });
+            dispatch!(scatter_records, boxes, keys, first_id, next, coarse, split.shift);
         });
     }
 
@@ -141,7 +142,7 @@ impl Grid {
         run(workers, split.buckets, |_, bucket| {
             let slots = bucket_starts[bucket] as usize..bucket_starts[bucket + 1] as usize;
             let keys = bucket << split.shift..((bucket + 1) << split.shift).min(cells);
-            dispatch(SortBucket { sort: &sort, slots, keys });
+            dispatch!(sort_bucket, &sort, slots.clone(), keys.clone());
         });
         self.starts[0] = 0;
         self.starts[cells + 1..cells + 4].fill(self.len as u32);
@@ -149,64 +150,51 @@ impl Grid {
     }
 }
 
-struct CountKeys<'a> {
-    plan: &'a GridPlan,
-    boxes: &'a [Aabb],
-    keys: &'a mut [u32],
-    counts: &'a mut BucketCounts,
+/// Computes the keys of boxes, and counts the boxes by bucket.
+#[inline(always)]
+fn count_keys(
+    simd: impl Simd,
+    cells: Cells,
+    boxes: &[Aabb],
+    keys: &mut [u32],
+    counts: &mut BucketCounts,
     shift: u32,
-}
-
-impl Kernel for CountKeys<'_> {
-    type Output = ();
-
-    #[inline(always)]
-    unsafe fn run<S: Simd>(self) {
-        // Copied, so that the loop keeps them in registers.
-        let (cells, shift) = (self.plan.cells, self.shift);
-        for (aabb, to) in self.boxes.iter().zip(self.keys) {
-            // SAFETY: the caller has the instructions.
-            let (takes, mut key) =
-                unsafe { (S::takes(&cells, aabb), S::key(&cells, S::steps(&cells, aabb).0)) };
-            let mut bucket = 0;
-            if takes {
-                bucket += (key >> shift) as usize;
+) {
+    for (aabb, to) in boxes.iter().zip(keys) {
+        let takes = simd.takes(&cells, aabb);
+        let mut key = simd.key(&cells, simd.steps(&cells, aabb).0);
+        let mut bucket = 0;
+        if takes {
+            bucket += (key >> shift) as usize;
+        } else {
+            (key, bucket) = if aabb.is_valid() {
+                (OVERSIZE, BucketCounts::OVERSIZE)
             } else {
-                (key, bucket) = if aabb.is_valid() {
-                    (OVERSIZE, BucketCounts::OVERSIZE)
-                } else {
-                    (INVALID, BucketCounts::INVALID)
-                };
-            }
-            *to = key;
-            self.counts.0[bucket] += 1;
+                (INVALID, BucketCounts::INVALID)
+            };
         }
+        *to = key;
+        counts.0[bucket] += 1;
     }
 }
 
-struct ScatterRecords<'a> {
-    boxes: &'a [Aabb],
-    keys: &'a [u32],
+/// Copies boxes to the next places of their buckets.
+#[inline(always)]
+fn scatter_records(
+    _: impl Simd,
+    boxes: &[Aabb],
+    keys: &[u32],
     first_id: u32,
-    /// By bucket: the next place.
-    next: &'a mut [u32],
+    next: &mut [u32],
     coarse: SharedSlice<Record>,
     shift: u32,
-}
-
-impl Kernel for ScatterRecords<'_> {
-    type Output = ();
-
-    #[inline(always)]
-    unsafe fn run<S: Simd>(self) {
-        let Self { boxes, keys, first_id, next, coarse, shift } = self;
-        for ((aabb, &key), id) in boxes.iter().zip(keys).zip(first_id..) {
-            if key < INVALID {
-                let place = &mut next[(key >> shift) as usize];
-                // SAFETY: no two boxes of any pieces have the same place.
-                unsafe { coarse.write(*place as usize, Record::new(*aabb, id, key)) };
-                *place += 1;
-            }
+) {
+    for ((aabb, &key), id) in boxes.iter().zip(keys).zip(first_id..) {
+        if key < INVALID {
+            let place = &mut next[(key >> shift) as usize];
+            // SAFETY: no two boxes of any pieces have the same place.
+            unsafe { coarse.write(*place as usize, Record::new(*aabb, id, key)) };
+            *place += 1;
         }
     }
 }
@@ -220,39 +208,28 @@ struct SortBuckets<'a> {
     ends: SharedSlice<u32>,
 }
 
-struct SortBucket<'a> {
-    sort: &'a SortBuckets<'a>,
-    slots: std::ops::Range<usize>,
-    keys: std::ops::Range<usize>,
-}
-
-impl Kernel for SortBucket<'_> {
-    type Output = ();
-
-    #[inline(always)]
-    unsafe fn run<S: Simd>(self) {
-        let Self { sort, slots, keys } = self;
-        let cells = sort.plan.cells;
-        // SAFETY: no other bucket has these cells.
-        let ends = unsafe { sort.ends.part(keys.clone()) };
-        let bucket = &sort.coarse[slots.clone()];
-        ends.fill(0);
-        for record in bucket {
-            ends[record.key as usize - keys.start] += 1;
-        }
-        let mut next = slots.start as u32;
-        for end in ends.iter_mut() {
-            next += std::mem::replace(end, next);
-        }
-        for record in bucket {
-            let place = &mut ends[record.key as usize - keys.start];
-            // SAFETY: the caller has the instructions; no other bucket has these slots, and each record its own one.
-            unsafe {
-                let (low, high) = S::steps(&cells, &record.aabb);
-                sort.records.write(*place as usize, *record);
-                sort.codes.write(*place as usize, S::code(low, high));
-            }
-            *place += 1;
-        }
+/// Sorts a bucket by cell, and computes its codes.
+#[inline(always)]
+fn sort_bucket(simd: impl Simd, sort: &SortBuckets<'_>, slots: Range<usize>, keys: Range<usize>) {
+    let cells = sort.plan.cells;
+    // SAFETY: no other bucket has these cells or slots.
+    let (ends, records, codes) = unsafe {
+        (sort.ends.part(keys.clone()), sort.records.part(slots.clone()), sort.codes.part(slots.clone()))
+    };
+    let bucket = &sort.coarse[slots.clone()];
+    ends.fill(0);
+    for record in bucket {
+        ends[record.key as usize - keys.start] += 1;
+    }
+    let mut next = slots.start as u32;
+    for end in ends.iter_mut() {
+        next += std::mem::replace(end, next);
+    }
+    for record in bucket {
+        let place = &mut ends[record.key as usize - keys.start];
+        let (low, high) = simd.steps(&cells, &record.aabb);
+        let (slot, code) = (*place as usize - slots.start, simd.code(low, high));
+        (records[slot], codes[slot]) = (*record, code);
+        *place += 1;
     }
 }

@@ -4,7 +4,7 @@ use super::cells::{Cells, query_of};
 use super::hits::{Hits, Rule};
 use super::plan::NeighbourScan;
 use super::record::Record;
-use super::simd::{BLOCK, Kernel, Simd, dispatch};
+use super::simd::{BLOCK, Simd, dispatch};
 use super::{Grid, Sorted};
 use crate::ProxyFilter;
 use crate::parallel::run;
@@ -27,7 +27,7 @@ impl Sorted<'_> {
         // Pieces do not depend on the number of threads: otherwise other boxes would be counted, and the choice could differ.
         run(workers, grid.len.div_ceil(PIECE), |_, piece| {
             let slots = piece * PIECE..grid.len.min((piece + 1) * PIECE);
-            total.fetch_add(dispatch(CountSlots { grid, slots }), Ordering::Relaxed);
+            total.fetch_add(dispatch!(count_slots, grid, slots.clone()), Ordering::Relaxed);
         });
         let oversize = grid.oversize.len();
         let step = oversize.div_ceil(search::COUNTED_OVERSIZE).max(1);
@@ -87,42 +87,29 @@ impl Grid {
 }
 
 /// Counts the slots that one box in [`search::COUNT_ONE_IN`] visits.
-struct CountSlots<'a> {
-    grid: &'a Grid,
-    slots: Range<usize>,
-}
-
-impl Kernel for CountSlots<'_> {
-    type Output = u64;
-
-    #[inline(always)]
-    unsafe fn run<S: Simd>(self) -> u64 {
-        let Self { grid, slots } = self;
-        let cells = grid.plan.cells;
-        let mut work = 0;
-        for slot in scattered(slots, search::COUNT_ONE_IN) {
-            // SAFETY: the caller has the instructions.
-            let slots = unsafe {
-                match (grid.plan.scan, cells.wraps) {
-                    (NeighbourScan::Runs, _) => in_runs(grid, slot),
-                    (NeighbourScan::Windows, false) => in_window::<S, false>(grid, &cells, slot),
-                    (NeighbourScan::Windows, true) => in_window::<S, true>(grid, &cells, slot),
-                }
-            };
-            // SAFETY: as above.
-            let is_vague = unsafe { has_vague_code::<S>(grid, slot) };
-            work += if is_vague { slots * search::WORK_OF_VAGUE_TEST } else { slots };
-        }
-        work
+#[inline(always)]
+fn count_slots(simd: impl Simd, grid: &Grid, slots: Range<usize>) -> u64 {
+    let cells = grid.plan.cells;
+    let mut work = 0;
+    for slot in scattered(slots, search::COUNT_ONE_IN) {
+        let slots = match (grid.plan.scan, cells.wraps) {
+            (NeighbourScan::Runs, _) => in_runs(grid, slot),
+            (NeighbourScan::Windows, false) => in_window::<false>(simd, grid, &cells, slot),
+            (NeighbourScan::Windows, true) => in_window::<true>(simd, grid, &cells, slot),
+        };
+        let is_vague = has_vague_code(simd, grid, slot);
+        work += if is_vague { slots * search::WORK_OF_VAGUE_TEST } else { slots };
     }
+    work
 }
 
 /// Returns true if the code of a box is like all eight codes behind it. Boxes beyond the cells, and many tiny ones in one place,
 /// have such codes; their candidates need the exact test.
 #[inline(always)]
-unsafe fn has_vague_code<S: Simd>(grid: &Grid, slot: usize) -> bool {
-    // SAFETY: the caller has the instructions; the codes are padded by two blocks.
-    let alike = unsafe { S::test(query_of(grid.codes[slot]), grid.codes.as_ptr().add(slot + 1)) };
+fn has_vague_code(simd: impl Simd, grid: &Grid, slot: usize) -> bool {
+    // SAFETY: a slot in use is before it.
+    let codes = unsafe { grid.block(slot + 1) };
+    let alike = simd.test(query_of(grid.codes[slot]), codes);
     alike.count_ones() as usize == BLOCK
 }
 
@@ -139,12 +126,9 @@ fn in_runs(grid: &Grid, slot: usize) -> u64 {
 
 /// Returns half of the slots in a box's window.
 #[inline(always)]
-unsafe fn in_window<S: Simd, const WRAPS: bool>(grid: &Grid, cells: &Cells, slot: usize) -> u64 {
-    // SAFETY: the caller has the instructions.
-    let window = unsafe {
-        let (low, high) = S::steps(cells, &grid.records[slot].aabb);
-        cells.window(low, high)
-    };
+fn in_window<const WRAPS: bool>(simd: impl Simd, grid: &Grid, cells: &Cells, slot: usize) -> u64 {
+    let (low, high) = simd.steps(cells, &grid.records[slot].aabb);
+    let window = cells.window(low, high);
     let (mut rows, mut slots) = (0, 0);
     for z in window.low[2]..=window.high[2] {
         for y in window.low[1]..=window.high[1] {

@@ -3,12 +3,12 @@
 //! A box that stays in its cell is overwritten. One that leaves its cell leaves a tombstone in its slot, and goes to a
 //! *spill* list of its new cell.
 
-use super::cells::TOMBSTONE;
+use super::cells::{Cells, TOMBSTONE};
 use super::lookup::Place;
 use super::plan::GridPlan;
 use super::record::Record;
 use super::search::KeyRun;
-use super::simd::{Kernel, Simd, dispatch, prefetch};
+use super::simd::{Simd, dispatch, prefetch};
 use super::{Grid, Sorted};
 use crate::Aabb;
 use crate::policy::search::WORK_OF_EXACT_TEST;
@@ -171,12 +171,12 @@ impl EditedGrid {
 
     /// Moves boxes from where they are to where they are now; `moved[i]` is at `places[i]`.
     pub(crate) fn move_all(&mut self, moved: &[Record], places: &[Place]) {
-        dispatch(MoveAll { grid: self, moved, places });
+        dispatch!(move_all, self, moved, places);
     }
 
     /// Returns the key of the cell in which a box lies, for sorting: movers are looked up in the order of cells.
     pub(crate) fn keys(&self, boxes: &mut [Record]) {
-        dispatch(Keys { grid: self, boxes });
+        dispatch!(compute_keys, &self.grid.plan.cells, boxes);
     }
 
     /// Prefetches the memory that the move of a box reads and writes, at its old and its new place.
@@ -223,57 +223,31 @@ impl EditedGrid {
     }
 }
 
-struct Keys<'a> {
-    grid: &'a EditedGrid,
-    boxes: &'a mut [Record],
-}
-
-impl Kernel for Keys<'_> {
-    type Output = ();
-
-    #[inline(always)]
-    unsafe fn run<S: Simd>(self) {
-        let cells = self.grid.grid.plan.cells;
-        for record in self.boxes {
-            // SAFETY: the caller has the instructions.
-            let (low, _) = unsafe { S::steps(&cells, &record.aabb) };
-            record.key = cells.key(cells.cell(low));
-        }
+#[inline(always)]
+fn compute_keys(simd: impl Simd, cells: &Cells, boxes: &mut [Record]) {
+    for record in boxes {
+        let (low, _) = simd.steps(cells, &record.aabb);
+        record.key = cells.key(cells.cell(low));
     }
 }
 
-struct MoveAll<'a> {
-    grid: &'a mut EditedGrid,
-    moved: &'a [Record],
-    places: &'a [Place],
-}
-
-impl Kernel for MoveAll<'_> {
-    type Output = ();
-
-    #[inline(always)]
-    unsafe fn run<S: Simd>(self) {
-        let Self { grid, moved, places } = self;
-        let cells = grid.grid.plan.cells;
-        let (mut no_longer_oversize, mut oversize) = (vec![], vec![]);
-        for (i, (record, &place)) in moved.iter().zip(places).enumerate() {
-            grid.prefetch(moved, places, i + AHEAD);
-            if !cells.takes(&record.aabb) {
-                grid.take_out(place, &mut no_longer_oversize);
-                oversize.extend(record.aabb.is_valid().then_some(*record));
-                continue;
-            }
-            // SAFETY: the caller has the instructions.
-            let code = unsafe {
-                let (low, high) = S::steps(&cells, &record.aabb);
-                S::code(low, high)
-            };
-            if !grid.overwrite(*record, code, place) {
-                grid.take_out(place, &mut no_longer_oversize);
-                grid.spill.insert(*record, cells.count());
-            }
+#[inline(always)]
+fn move_all(simd: impl Simd, grid: &mut EditedGrid, moved: &[Record], places: &[Place]) {
+    let cells = grid.grid.plan.cells;
+    let (mut no_longer_oversize, mut oversize) = (vec![], vec![]);
+    for (i, (record, &place)) in moved.iter().zip(places).enumerate() {
+        grid.prefetch(moved, places, i + AHEAD);
+        if !cells.takes(&record.aabb) {
+            grid.take_out(place, &mut no_longer_oversize);
+            oversize.extend(record.aabb.is_valid().then_some(*record));
+            continue;
         }
-        grid.take_out_oversize(no_longer_oversize);
-        grid.grid.oversize.extend(oversize);
+        let (low, high) = simd.steps(&cells, &record.aabb);
+        if !grid.overwrite(*record, simd.code(low, high), place) {
+            grid.take_out(place, &mut no_longer_oversize);
+            grid.spill.insert(*record, cells.count());
+        }
     }
+    grid.take_out_oversize(no_longer_oversize);
+    grid.grid.oversize.extend(oversize);
 }

@@ -5,7 +5,7 @@
 //! has no branch: a pair is written, and kept or overwritten by the next one.
 
 use super::record::Record;
-use super::simd::{BLOCK, Simd, prefetch};
+use super::simd::{BLOCK, Simd, eight_from, prefetch};
 use crate::{Pair, ProxyFilter};
 use std::sync::atomic::{AtomicU64, Ordering};
 
@@ -13,7 +13,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 const ROOM: usize = 256;
 
 /// Maximum number of hits that a loop adds between two checks of the room.
-pub(super) const SLACK: usize = 8;
+const SLACK: usize = 8;
 
 /// Number of candidates between a prefetch and the test: a record from memory takes about as long.
 const AHEAD: usize = 24;
@@ -35,8 +35,6 @@ pub(crate) struct Rule<'a> {
 /// The pairs that one thread finds, and its buffers.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Hits {
-    /// A hit each: slot of the query, first slot of the block, mask (28, 28 and 8 bits).
-    blocks: Vec<u64>,
     queries: Vec<u32>,
     places: Vec<u32>,
     /// The pairs, in no particular order.
@@ -57,25 +55,28 @@ pub(crate) struct Hits {
     pub(super) records: Vec<Record>,
 }
 
-/// Writes hits. A value of its own, so that a loop keeps it in registers.
-pub(super) struct HitWriter {
-    blocks: *mut u64,
+/// Room for the hits of a writer.
+pub(super) const HIT_ROOM: usize = ROOM + SLACK;
+
+/// Writes hits: slot of the query, first slot of the block, mask (28, 28 and 8 bits). A value of its own, so that a loop keeps it in
+/// registers.
+pub(super) struct HitWriter<'a> {
+    blocks: &'a mut [u64; HIT_ROOM],
     len: usize,
     /// Candidates tested.
     pub(super) tests: u64,
 }
 
-impl HitWriter {
-    /// Adds a hit unless its mask is empty.
-    ///
-    /// # Safety
-    /// The [`Hits`] that made the writer still live. At most [`SLACK`] hits are added between two calls of
-    /// [`HitWriter::has_room`] that return true, or a flush.
+impl<'a> HitWriter<'a> {
+    /// Returns a writer without hits.
+    pub(super) fn new(blocks: &'a mut [u64; HIT_ROOM]) -> Self {
+        Self { blocks, len: 0, tests: 0 }
+    }
+
+    /// Adds a hit unless its mask is empty. At most [`SLACK`] hits are added while there is no room.
     #[inline(always)]
-    pub(super) unsafe fn push(&mut self, query: usize, first: usize, mask: u32) {
-        debug_assert!(self.len < ROOM + SLACK);
-        // SAFETY: the caller keeps the room.
-        unsafe { *self.blocks.add(self.len) = (query as u64) << 36 | (first as u64) << 8 | u64::from(mask) };
+    pub(super) fn push(&mut self, query: usize, first: usize, mask: u32) {
+        self.blocks[self.len] = (query as u64) << 36 | (first as u64) << 8 | u64::from(mask);
         self.len += usize::from(mask != 0);
     }
 
@@ -89,9 +90,8 @@ impl HitWriter {
 impl Hits {
     /// Forgets the pairs of an earlier search; counts those of the next one in `groups` groups of `1 << shift` ids.
     pub(crate) fn begin(&mut self, groups: usize, shift: u32) {
-        self.blocks.resize(ROOM + SLACK, 0);
-        self.queries.resize((ROOM + SLACK) * BLOCK + AHEAD, 0);
-        self.places.resize((ROOM + SLACK) * BLOCK + AHEAD, 0);
+        self.queries.resize(HIT_ROOM * BLOCK + AHEAD, 0);
+        self.places.resize(HIT_ROOM * BLOCK + AHEAD, 0);
         self.pairs.clear();
         self.groups.clear();
         self.groups.resize(groups, 0);
@@ -104,57 +104,45 @@ impl Hits {
         self.is_full
     }
 
-    /// Returns a writer of hits, which begins with none.
-    #[inline(always)]
-    pub(super) fn writer(&mut self) -> HitWriter {
-        HitWriter { blocks: self.blocks.as_mut_ptr(), len: 0, tests: 0 }
-    }
-
     /// Tests all hits exactly and keeps the pairs that the rule allows.
-    ///
-    /// # Safety
-    /// The slots of all hits are inside `records`, and the processor has the instructions.
     #[inline(always)]
-    pub(super) unsafe fn flush<S: Simd>(
+    pub(super) fn flush(
         &mut self,
-        writer: &mut HitWriter,
+        simd: impl Simd,
+        writer: &mut HitWriter<'_>,
         records: &[Record],
         rule: &Rule<'_>,
     ) {
-        // SAFETY: the caller's promise; the lists have room for all candidates, and `AHEAD` more are read.
-        unsafe {
-            let candidates = self.expand::<S>(writer.len);
-            self.test(records, candidates, rule);
-        }
+        let candidates = self.expand(simd, &writer.blocks[..writer.len]);
+        self.test(records, candidates, rule);
         writer.len = 0;
     }
 
     #[inline(always)]
-    unsafe fn expand<S: Simd>(&mut self, len: usize) -> usize {
-        let (queries, places) = (self.queries.as_mut_ptr(), self.places.as_mut_ptr());
+    fn expand(&mut self, simd: impl Simd, hits: &[u64]) -> usize {
         let mut count = 0;
-        for hit in &self.blocks[..len] {
+        for hit in hits {
             let (query, first, mask) =
                 ((hit >> 36) as u32, (hit >> 8) as u32 & 0xFFF_FFFF, *hit as u32 & 255);
-            // SAFETY: `ROOM + SLACK` blocks fit.
-            count += unsafe { S::expand(query, first, mask, queries.add(count), places.add(count)) };
+            let (queries, places) =
+                (eight_from(&mut self.queries, count), eight_from(&mut self.places, count));
+            count += simd.expand(query, first, mask, queries, places);
         }
         count
     }
 
     #[inline(always)]
-    unsafe fn test(&mut self, records: &[Record], candidates: usize, rule: &Rule<'_>) {
+    fn test(&mut self, records: &[Record], candidates: usize, rule: &Rule<'_>) {
         let from = self.pairs.len();
         self.pairs.reserve(candidates + 1);
-        let (queries, places, records) = (self.queries.as_ptr(), self.places.as_ptr(), records.as_ptr());
-        // SAFETY: all candidates are inside the lists and the records, and the pairs have room for them.
+        let (queries, places) = (&self.queries[..candidates], &self.places[..candidates + AHEAD]);
+        // SAFETY: the pairs have room for all candidates, and for one more that is overwritten.
         unsafe {
             let start = self.pairs.as_mut_ptr().add(from);
             let mut next = start;
-            for i in 0..candidates {
-                prefetch(records.wrapping_add(*places.add(i + AHEAD) as usize));
-                let one = &*records.add(*queries.add(i) as usize);
-                let other = &*records.add(*places.add(i) as usize);
+            for (i, query) in queries.iter().enumerate() {
+                prefetch(records.as_ptr().wrapping_add(places[i + AHEAD] as usize));
+                let (one, other) = (&records[*query as usize], &records[places[i] as usize]);
                 next.write(Pair::new(one.id, other.id));
                 next = next.add(usize::from(one.overlaps(other)));
             }

@@ -4,7 +4,7 @@ use super::cells::query_of;
 use super::edit::EditedGrid;
 use super::record::Record;
 use super::search::KeyRun;
-use super::simd::{BLOCK, Kernel, Simd, dispatch, prefetch};
+use super::simd::{BLOCK, Simd, dispatch, prefetch};
 use crate::Aabb;
 use crate::policy::search::{WORK_OF_ENTRY, WORK_OF_EXACT_TEST};
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -149,7 +149,12 @@ impl EditedGrid {
         meet: &mut M,
     ) {
         candidates.begin(boxes.len());
-        dispatch(LookUp { grid: self, boxes, candidates, budget, meet });
+        let look_up = &mut LookUp { grid: self, boxes, candidates, budget, meet };
+        if self.grid.plan.cells.wraps {
+            dispatch!(LookUp::in_cells::<true>, look_up);
+        } else {
+            dispatch!(LookUp::in_cells::<false>, look_up);
+        }
         for (i, one) in boxes.iter().enumerate().filter(|(_, one)| one.aabb.is_valid()) {
             if !candidates.may_go_on(budget) {
                 break;
@@ -213,55 +218,33 @@ struct LookUp<'a, M> {
     meet: &'a mut M,
 }
 
-impl<M: Meet> Kernel for LookUp<'_, M> {
-    type Output = ();
-
-    #[inline(always)]
-    unsafe fn run<S: Simd>(mut self) {
-        // SAFETY: the caller has the instructions.
-        unsafe {
-            if self.grid.grid.plan.cells.wraps {
-                self.all::<S, true>();
-            } else {
-                self.all::<S, false>();
-            }
-        }
-    }
-}
-
 /// In three rounds over many rows, so that memory is asked for long before it is read: where the cells begin, then the codes
 /// in them, then the records of matching codes.
 impl<M: Meet> LookUp<'_, M> {
     #[inline(always)]
-    unsafe fn all<S: Simd, const WRAPS: bool>(&mut self) {
-        self.candidates.rows.clear();
-        for i in 0..self.boxes.len() {
-            if self.grid.grid.plan.cells.takes(&self.boxes[i].aabb) {
-                // SAFETY: the caller has the instructions.
-                unsafe { self.list::<S, WRAPS>(i) };
+    fn in_cells<const WRAPS: bool>(simd: impl Simd, look_up: &mut Self) {
+        look_up.candidates.rows.clear();
+        for i in 0..look_up.boxes.len() {
+            if look_up.grid.grid.plan.cells.takes(&look_up.boxes[i].aabb) {
+                look_up.list::<WRAPS>(simd, i);
             }
-            if self.candidates.rows.len() >= ROWS {
-                // SAFETY: as above.
-                unsafe { self.look_through::<S>() };
-                if self.budget.is_over() {
+            if look_up.candidates.rows.len() >= ROWS {
+                look_up.look_through(simd);
+                if look_up.budget.is_over() {
                     break;
                 }
             }
         }
-        // SAFETY: as above.
-        unsafe { self.look_through::<S>() };
-        self.test();
+        look_up.look_through(simd);
+        look_up.test();
     }
 
     /// Lists the rows of cells in which the lower corner of an overlapping box can lie.
     #[inline(always)]
-    unsafe fn list<S: Simd, const WRAPS: bool>(&mut self, i: usize) {
+    fn list<const WRAPS: bool>(&mut self, simd: impl Simd, i: usize) {
         let cells = &self.grid.grid.plan.cells;
-        // SAFETY: the caller has the instructions.
-        let (query, window) = unsafe {
-            let (low, high) = S::steps(cells, &self.boxes[i].aabb);
-            (query_of(S::code(low, high)), cells.window(low, high))
-        };
+        let (low, high) = simd.steps(cells, &self.boxes[i].aabb);
+        let (query, window) = (query_of(simd.code(low, high)), cells.window(low, high));
         for z in window.low[2]..=window.high[2] {
             for y in window.low[1]..=window.high[1] {
                 let [run, rest] = cells.row::<WRAPS>([window.low[0], y, z], window.high[0]);
@@ -283,7 +266,7 @@ impl<M: Meet> LookUp<'_, M> {
 
     /// Gathers the candidates of all rows listed.
     #[inline(always)]
-    unsafe fn look_through<S: Simd>(&mut self) {
+    fn look_through(&mut self, simd: impl Simd) {
         let mut rows = std::mem::take(&mut self.candidates.rows);
         let grid = &self.grid.grid;
         self.candidates.work += rows.len() as u64;
@@ -301,8 +284,7 @@ impl<M: Meet> LookUp<'_, M> {
         self.candidates.work += slots;
         if self.candidates.may_go_on(self.budget) {
             for row in &rows {
-                // SAFETY: the caller has the instructions.
-                unsafe { self.slots::<S>(row) };
+                self.slots(simd, row);
             }
         }
         rows.clear();
@@ -311,20 +293,19 @@ impl<M: Meet> LookUp<'_, M> {
 
     /// Gathers the candidates of a run of slots.
     #[inline(always)]
-    unsafe fn slots<S: Simd>(&mut self, row: &Row) {
+    fn slots(&mut self, simd: impl Simd, row: &Row) {
         let grid = &self.grid.grid;
         for first in (row.first..row.end).step_by(BLOCK) {
             let beyond = (row.end - first).min(BLOCK as u32);
             let Candidates { boxes, places, len, .. } = &mut *self.candidates;
-            // SAFETY: codes are padded by two blocks; the lists have room for a block more than `room`.
-            unsafe {
-                let mask =
-                    S::test(row.query, grid.codes.as_ptr().add(first as usize)) & ((1u32 << beyond) - 1);
-                let (boxes, places) = (boxes.as_mut_ptr().add(*len), places.as_mut_ptr().add(*len));
-                let count = S::expand(row.i, first, mask, boxes, places);
-                prefetch(grid.records.as_ptr().wrapping_add(*places as usize & 0xFFF_FFFF));
-                *len += count;
-            }
+            // SAFETY: `first` is below an end that comes from `starts`; `len` is at most `room`, and the lists have two blocks more.
+            let (codes, boxes, places) = unsafe {
+                let [boxes, places] = [boxes, places].map(|list| &mut *list.as_mut_ptr().add(*len).cast());
+                (grid.block(first as usize), boxes, places)
+            };
+            let mask = simd.test(row.query, codes) & ((1u32 << beyond) - 1);
+            *len += simd.expand(row.i, first, mask, boxes, places);
+            prefetch(grid.records.as_ptr().wrapping_add(places[0] as usize & 0xFFF_FFFF));
             if self.candidates.len > self.candidates.room {
                 self.test();
             }

@@ -26,6 +26,8 @@ mod simd;
 #[cfg(test)]
 mod tests;
 
+#[cfg(target_arch = "x86_64")]
+pub(crate) use avx2::Avx2;
 pub(crate) use edit::EditedGrid;
 pub(crate) use hits::{Hits, Rule};
 pub(crate) use lookup::{Budget, Candidates, Meet, Place};
@@ -35,7 +37,7 @@ pub(crate) use plan::GridPlan;
 pub use plan::NeighbourScan;
 pub(crate) use record::Record;
 pub use simd::simd;
-pub(crate) use simd::{BLOCK, EightBoxes, Kernel, Simd, dispatch, prefetch};
+pub(crate) use simd::{BLOCK, EightBoxes, Portable, Simd, dispatch, prefetch};
 
 use build::BucketCounts;
 
@@ -61,6 +63,19 @@ pub(crate) struct Grid {
     coarse: Vec<Record>,
     counts: Vec<BucketCounts>,
     bucket_starts: Vec<u32>,
+}
+
+impl Grid {
+    /// Returns the codes of eight slots.
+    ///
+    /// # Safety
+    /// `first` is at most the number of slots in use: two blocks of tombstones are behind these.
+    #[inline(always)]
+    unsafe fn block(&self, first: usize) -> &[u64; BLOCK] {
+        debug_assert!(first <= self.len);
+        // SAFETY: the caller's promise.
+        unsafe { &*self.codes.as_ptr().add(first).cast() }
+    }
 }
 
 /// A grid as it was built: every box lies in its cell. (A grid that was edited has tombstones, and cannot be searched.)

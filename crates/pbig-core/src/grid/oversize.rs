@@ -5,7 +5,7 @@ use super::cells::{Cells, Window};
 use super::hits::{Hits, Rule};
 use super::record::Record;
 use super::search::KeyRun;
-use super::simd::{Kernel, Simd, dispatch};
+use super::simd::{Simd, dispatch};
 use crate::{Aabb, Pair};
 
 impl Grid {
@@ -26,7 +26,7 @@ impl Grid {
     /// Visits the cells in which boxes can lie that overlap a box of any size.
     pub(super) fn reached_by(&self, aabb: &Aabb, mut visit: impl FnMut(KeyRun)) {
         let cells = &self.plan.cells;
-        let window = dispatch(WindowOf { grid: self, aabb }).clipped(cells);
+        let window = dispatch!(window_of, cells, aabb).clipped(cells);
         for z in window.low[2]..=window.high[2] {
             if spans_rows(cells, &window) {
                 visit(layer(cells, &window, z));
@@ -60,20 +60,10 @@ fn layer(cells: &Cells, window: &Window, z: i32) -> KeyRun {
     (first, cells.key([cells.dims[0] - 1, window.high[1], z]) as usize + 1 - first)
 }
 
-struct WindowOf<'a> {
-    grid: &'a Grid,
-    aabb: &'a Aabb,
-}
-
-impl Kernel for WindowOf<'_> {
-    type Output = Window;
-
-    #[inline(always)]
-    unsafe fn run<S: Simd>(self) -> Window {
-        // SAFETY: the caller has the instructions.
-        let (low, high) = unsafe { S::steps(&self.grid.plan.cells, self.aabb) };
-        self.grid.plan.cells.window(low, high)
-    }
+#[inline(always)]
+fn window_of(simd: impl Simd, cells: &Cells, aabb: &Aabb) -> Window {
+    let (low, high) = simd.steps(cells, aabb);
+    cells.window(low, high)
 }
 
 /// Appends the pairs of a box with those of a run that overlap it.

@@ -2,10 +2,10 @@
 //! cell is lower.
 
 use super::cells::{Cells, query_of};
-use super::hits::{HitWriter, Hits, Rule};
+use super::hits::{HIT_ROOM, HitWriter, Hits, Rule};
 use super::plan::NeighbourScan;
 use super::record::Record;
-use super::simd::{BLOCK, Kernel, Simd, dispatch};
+use super::simd::{BLOCK, Simd, dispatch};
 use super::{Grid, Sorted};
 use crate::parallel::run_with;
 use crate::policy::PARALLEL_FROM_BOXES;
@@ -43,207 +43,152 @@ impl Sorted<'_> {
 impl Grid {
     /// Finds the pairs of the boxes in some slots with those behind them.
     pub(super) fn search_slots(&self, slots: Range<usize>, rule: &Rule<'_>, hits: &mut Hits) {
-        dispatch(SearchPiece { grid: self, slots, rule, hits });
+        dispatch!(search_piece, self, slots.clone(), rule, hits);
     }
 }
 
-struct SearchPiece<'a, 'b> {
-    grid: &'a Grid,
-    slots: Range<usize>,
-    rule: &'a Rule<'b>,
-    hits: &'a mut Hits,
-}
-
-impl Kernel for SearchPiece<'_, '_> {
-    type Output = ();
-
-    #[inline(always)]
-    unsafe fn run<S: Simd>(self) {
-        let Self { grid, slots, rule, hits } = self;
-        let scan = Scan { cells: grid.plan.cells, grid, rule };
-        // SAFETY: the slots are those of the grid; the caller has the instructions.
-        unsafe {
-            match (grid.plan.scan, grid.plan.cells.wraps) {
-                (NeighbourScan::Runs, _) => scan.runs::<S>(slots, hits),
-                (NeighbourScan::Windows, false) => scan.windows::<S, false>(slots, hits),
-                (NeighbourScan::Windows, true) => scan.windows::<S, true>(slots, hits),
-            }
-        }
+#[inline(always)]
+fn search_piece(simd: impl Simd, grid: &Grid, slots: Range<usize>, rule: &Rule<'_>, hits: &mut Hits) {
+    let mut blocks = [0; HIT_ROOM];
+    let writer = HitWriter::new(&mut blocks);
+    let mut scan = Scan { simd, cells: grid.plan.cells, grid, rule, hits, writer };
+    match (grid.plan.scan, grid.plan.cells.wraps) {
+        (NeighbourScan::Runs, _) => scan.runs(slots),
+        (NeighbourScan::Windows, false) => scan.windows::<false>(slots),
+        (NeighbourScan::Windows, true) => scan.windows::<true>(slots),
     }
+    scan.finish();
 }
 
-struct Scan<'a, 'b> {
+struct Scan<'a, 'b, S> {
+    simd: S,
     cells: Cells,
     grid: &'a Grid,
     rule: &'a Rule<'b>,
+    hits: &'a mut Hits,
+    writer: HitWriter<'a>,
 }
 
-impl Scan<'_, '_> {
+/// A box that is searched for: its slot, and the query that finds its partners.
+#[derive(Clone, Copy)]
+struct Seeker {
+    slot: usize,
+    query: u64,
+}
+
+impl<S: Simd> Scan<'_, '_, S> {
     /// Visits five runs for each box: the rest of its row of three cells, and the four rows of three cells above it and
     /// in the next layer. The first block of a run is tested unseen: most have no second one.
     #[inline(always)]
-    unsafe fn runs<S: Simd>(&self, slots: Range<usize>, hits: &mut Hits) {
+    fn runs(&mut self, slots: Range<usize>) {
         let (dx, layer) = (self.cells.dims[0] as usize, (self.cells.dims[0] * self.cells.dims[1]) as usize);
-        let (starts, records) = (self.grid.starts.as_ptr(), self.grid.records.as_ptr());
-        let codes = self.grid.codes.as_ptr();
-        let mut writer = hits.writer();
-        hits.runs += 5 * slots.len() as u64;
+        let Grid { starts, records, codes, .. } = self.grid;
+        self.hits.runs += 5 * slots.len() as u64;
         for slot in slots {
-            // SAFETY: the ring of border cells is never a box's own: all keys below are inside `starts`, all slots
-            // inside `codes`, which has two blocks more.
-            unsafe {
-                let query = query_of(*codes.add(slot));
-                let cell = starts.add((*records.add(slot)).key as usize);
-                let row = |first: *const u32| (*first as usize, *first.add(3) as usize);
-                let runs = [
-                    (slot + 1, *cell.add(2) as usize),
-                    row(cell.add(dx - 1)),
-                    row(cell.add(layer - dx - 1)),
-                    row(cell.add(layer - 1)),
-                    row(cell.add(layer + dx - 1)),
-                ];
-                let mut longest = 0;
+            let key = records[slot].key as usize;
+            // SAFETY: the ring of border cells is never a box's own, so `starts` has all keys below.
+            let start = |key: usize| unsafe { *starts.get_unchecked(key) as usize };
+            let row = |key: usize| (start(key), start(key + 3));
+            let (above, next) = (key + dx - 1, key + layer - 1);
+            let runs = [(slot + 1, start(key + 2)), row(above), row(next - dx), row(next), row(next + dx)];
+            let (one, mut longest) = (Seeker { slot, query: query_of(codes[slot]) }, 0);
+            for (first, end) in runs {
+                // SAFETY: `first` is a start, or `slot + 1`: at most the number of slots.
+                let block = unsafe { self.grid.block(first) };
+                self.test(one, block, (first, end));
+                self.writer.tests += (end - first) as u64;
+                longest = longest.max(end - first);
+            }
+            if longest > BLOCK {
                 for (first, end) in runs {
-                    self.block::<S>(query, slot, (first, end), &mut writer);
-                    writer.tests += (end - first) as u64;
-                    longest = longest.max(end - first);
-                }
-                if longest > BLOCK {
-                    for (first, end) in runs {
-                        self.rest::<S>(query, slot, (first + BLOCK, end), &mut writer, hits);
-                    }
+                    self.rest(one, (first + BLOCK, end));
                 }
             }
-            self.make_room::<S>(&mut writer, hits);
-            if hits.is_full {
+            self.make_room();
+            if self.hits.is_full {
                 break;
             }
         }
-        self.finish::<S>(writer, hits);
     }
 
-    /// Tests the blocks of a run that are left.
+    /// Tests the slots from `first` up to `end`.
     #[inline(always)]
-    unsafe fn rest<S: Simd>(
-        &self,
-        query: u64,
-        slot: usize,
-        (first, end): (usize, usize),
-        writer: &mut HitWriter,
-        hits: &mut Hits,
-    ) {
-        let mut first = first;
-        while first < end {
-            // SAFETY: as the caller says.
-            unsafe { self.block::<S>(query, slot, (first, end), writer) };
-            self.make_room::<S>(writer, hits);
-            first += BLOCK;
+    fn rest(&mut self, one: Seeker, (first, end): (usize, usize)) {
+        for first in (first..end).step_by(BLOCK) {
+            // SAFETY: `first` is below an end that comes from `starts`.
+            let block = unsafe { self.grid.block(first) };
+            self.test(one, block, (first, end));
+            self.make_room();
         }
     }
 
     /// Tests the block from `first` on, up to `end`.
     #[inline(always)]
-    unsafe fn block<S: Simd>(
-        &self,
-        query: u64,
-        slot: usize,
-        (first, end): (usize, usize),
-        writer: &mut HitWriter,
-    ) {
-        // SAFETY: the codes are padded by two blocks of tombstones; the caller keeps the room.
-        unsafe {
-            let mask = S::test(query, self.grid.codes.as_ptr().add(first));
-            let beyond = (end - first).min(BLOCK) as u32;
-            writer.push(slot, first, mask & ((1u32 << beyond) - 1));
+    fn test(&mut self, one: Seeker, block: &[u64; BLOCK], (first, end): (usize, usize)) {
+        let beyond = (end - first).min(BLOCK) as u32;
+        let mask = self.simd.test(one.query, block) & ((1u32 << beyond) - 1);
+        self.writer.push(one.slot, first, mask);
+    }
+
+    #[inline(always)]
+    fn make_room(&mut self) {
+        if !self.writer.has_room() {
+            self.hits.flush(self.simd, &mut self.writer, &self.grid.records, self.rule);
         }
     }
 
     #[inline(always)]
-    fn make_room<S: Simd>(&self, writer: &mut HitWriter, hits: &mut Hits) {
-        if !writer.has_room() {
-            // SAFETY: hits have slots of this grid; the caller has the instructions.
-            unsafe { hits.flush::<S>(writer, &self.grid.records, self.rule) };
-        }
-    }
-
-    #[inline(always)]
-    fn finish<S: Simd>(&self, mut writer: HitWriter, hits: &mut Hits) {
-        // SAFETY: as above.
-        unsafe { hits.flush::<S>(&mut writer, &self.grid.records, self.rule) };
-        hits.tests += writer.tests;
+    fn finish(mut self) {
+        self.hits.flush(self.simd, &mut self.writer, &self.grid.records, self.rule);
+        self.hits.tests += self.writer.tests;
     }
 
     /// Visits, for each box, the cells after its own in which the lower corner of an overlapping box can lie.
     #[inline(always)]
-    unsafe fn windows<S: Simd, const WRAPS: bool>(&self, slots: Range<usize>, hits: &mut Hits) {
-        let cells = &self.cells;
-        let mut writer = hits.writer();
+    fn windows<const WRAPS: bool>(&mut self, slots: Range<usize>) {
+        let cells = self.cells;
         for slot in slots {
-            if hits.is_full {
+            if self.hits.is_full {
                 break;
             }
             let record: &Record = &self.grid.records[slot];
-            // SAFETY: the caller has the instructions; slots come from `starts`.
-            unsafe {
-                let (low, high) = S::steps(cells, &record.aabb);
-                let (query, window) = (query_of(S::code(low, high)), cells.window(low, high));
-                let own: [i32; 3] = std::array::from_fn(|k| {
-                    let cell = low[k] >> cells.shift;
-                    if WRAPS { cell } else { cell.clamp(1, cells.dims[k] - 2) }
-                });
-                let key = record.key as usize;
-                let own_row = if WRAPS { 0 } else { (window.high[0] - own[0]) as usize };
-                let rest_of_row = (slot + 1, self.grid.starts[key + own_row + 1] as usize);
-                self.slots::<S>(query, slot, rest_of_row, &mut writer, hits);
-                if WRAPS {
-                    let row = cells.row::<WRAPS>([own[0] + 1, own[1], own[2]], window.high[0]);
-                    self.row::<S>(query, slot, row, &mut writer, hits);
-                }
-                for y in own[1] + 1..=window.high[1] {
-                    let row = cells.row::<WRAPS>([window.low[0], y, own[2]], window.high[0]);
-                    self.row::<S>(query, slot, row, &mut writer, hits);
-                }
-                for z in own[2] + 1..=window.high[2] {
-                    for y in window.low[1]..=window.high[1] {
-                        let row = cells.row::<WRAPS>([window.low[0], y, z], window.high[0]);
-                        self.row::<S>(query, slot, row, &mut writer, hits);
-                    }
+            let (low, high) = self.simd.steps(&cells, &record.aabb);
+            let (one, window) =
+                (Seeker { slot, query: query_of(self.simd.code(low, high)) }, cells.window(low, high));
+            let own: [i32; 3] = std::array::from_fn(|k| {
+                let cell = low[k] >> cells.shift;
+                if WRAPS { cell } else { cell.clamp(1, cells.dims[k] - 2) }
+            });
+            let own_row = if WRAPS { 0 } else { (window.high[0] - own[0]) as usize };
+            self.slots(one, (slot + 1, self.grid.starts[record.key as usize + own_row + 1] as usize));
+            if WRAPS {
+                self.row(one, cells.row::<WRAPS>([own[0] + 1, own[1], own[2]], window.high[0]));
+            }
+            for y in own[1] + 1..=window.high[1] {
+                self.row(one, cells.row::<WRAPS>([window.low[0], y, own[2]], window.high[0]));
+            }
+            for z in own[2] + 1..=window.high[2] {
+                for y in window.low[1]..=window.high[1] {
+                    self.row(one, cells.row::<WRAPS>([window.low[0], y, z], window.high[0]));
                 }
             }
         }
-        self.finish::<S>(writer, hits);
     }
 
     /// Tests a row of cells.
     #[inline(always)]
-    unsafe fn row<S: Simd>(
-        &self,
-        query: u64,
-        slot: usize,
-        row: [KeyRun; 2],
-        writer: &mut HitWriter,
-        hits: &mut Hits,
-    ) {
+    fn row(&mut self, one: Seeker, row: [KeyRun; 2]) {
         for run in row {
-            hits.runs += 1;
-            // SAFETY: as the caller says.
-            unsafe { self.slots::<S>(query, slot, self.grid.slots(run), writer, hits) };
+            self.hits.runs += 1;
+            self.slots(one, self.grid.slots(run));
         }
     }
 
     /// Tests a run of slots, and counts the tests.
     #[inline(always)]
-    unsafe fn slots<S: Simd>(
-        &self,
-        query: u64,
-        slot: usize,
-        slots: (usize, usize),
-        writer: &mut HitWriter,
-        hits: &mut Hits,
-    ) {
-        writer.tests += (slots.1 - slots.0) as u64;
-        // SAFETY: as the caller says.
-        unsafe { self.rest::<S>(query, slot, slots, writer, hits) };
+    fn slots(&mut self, one: Seeker, slots: (usize, usize)) {
+        self.writer.tests += (slots.1 - slots.0) as u64;
+        self.rest(one, slots);
     }
 }
 

@@ -2,7 +2,7 @@
 
 use super::cells::{Cells, query_of};
 use super::plan::GridPlan;
-use super::simd::{BLOCK, EightBoxes, Kernel, Simd, dispatch, run_portable};
+use super::simd::{BLOCK, EightBoxes, Portable, Simd, dispatch};
 use crate::Aabb;
 use rand::rngs::StdRng;
 use rand::{RngExt, SeedableRng};
@@ -15,32 +15,13 @@ struct Values {
     code: u64,
 }
 
-struct ValuesOf<'a>(&'a Cells, &'a Aabb);
-
-impl Kernel for ValuesOf<'_> {
-    type Output = Values;
-
-    #[inline(always)]
-    unsafe fn run<S: Simd>(self) -> Values {
-        let Self(cells, aabb) = self;
-        // SAFETY: the caller has the instructions.
-        unsafe {
-            let (low, high) = S::steps(cells, aabb);
-            Values { takes: S::takes(cells, aabb), key: S::key(cells, low), code: S::code(low, high) }
-        }
-    }
+fn values(simd: impl Simd, cells: &Cells, aabb: &Aabb) -> Values {
+    let (low, high) = simd.steps(cells, aabb);
+    Values { takes: simd.takes(cells, aabb), key: simd.key(cells, low), code: simd.code(low, high) }
 }
 
-struct MayOverlap(u64, [u64; BLOCK]);
-
-impl Kernel for MayOverlap {
-    type Output = u32;
-
-    #[inline(always)]
-    unsafe fn run<S: Simd>(self) -> u32 {
-        // SAFETY: a block of codes; the caller has the instructions.
-        unsafe { S::test(query_of(self.0), self.1.as_ptr()) }
-    }
+fn may_overlap(simd: impl Simd, code: u64, codes: &[u64; BLOCK]) -> u32 {
+    simd.test(query_of(code), codes)
 }
 
 /// Boxes of edge 1, some of them flat, touching or far away; in one space or in three far apart.
@@ -63,11 +44,11 @@ fn overlapping_boxes_have_codes_that_may_overlap() {
     for round in 0..12 {
         let boxes = random_boxes(&mut random, [1, 3][round % 2]);
         let cells = GridPlan::new(&boxes, 1).cells;
-        let values: Vec<Values> = boxes.iter().map(|aabb| dispatch(ValuesOf(&cells, aabb))).collect();
+        let values: Vec<Values> = boxes.iter().map(|aabb| dispatch!(values, &cells, aabb)).collect();
         for (i, one) in boxes.iter().enumerate().filter(|(i, _)| values[*i].takes) {
             for (j, other) in boxes.iter().enumerate().filter(|(j, _)| values[*j].takes) {
                 if one.overlaps(other) {
-                    assert_eq!(dispatch(MayOverlap(values[i].code, [values[j].code; BLOCK])), 255);
+                    assert_eq!(dispatch!(may_overlap, values[i].code, &[values[j].code; BLOCK]), 255);
                     met[usize::from(cells.wraps)] += 1;
                 }
             }
@@ -85,35 +66,22 @@ fn every_implementation_computes_the_same_values() {
         let cells = GridPlan::new(&boxes, 1).cells;
         boxes.extend([Aabb::NOWHERE, infinite, Aabb::new([f32::MAX; 3], [f32::MIN; 3])]);
         for aabb in &boxes {
-            assert_eq!(dispatch(ValuesOf(&cells, aabb)), run_portable(ValuesOf(&cells, aabb)), "{aabb:?}");
+            assert_eq!(dispatch!(values, &cells, aabb), values(Portable, &cells, aabb), "{aabb:?}");
         }
     }
     for _ in 0..2000 {
         let query = random.random::<u64>() & 0x1FF7_FDFF_1FF7_FDFF;
         let codes: [u64; BLOCK] = std::array::from_fn(|_| random.random::<u64>() & 0x5FF7_FDFF_5FF7_FDFF);
-        assert_eq!(dispatch(MayOverlap(query, codes)), run_portable(MayOverlap(query, codes)));
+        assert_eq!(dispatch!(may_overlap, query, &codes), may_overlap(Portable, query, &codes));
     }
 }
 
-struct Rows(Vec<u32>, usize);
-
-impl Kernel for Rows {
-    type Output = (Vec<u32>, [bool; 2], [u32; 2]);
-
-    #[inline(always)]
-    unsafe fn run<S: Simd>(self) -> Self::Output {
-        let Self(row, len) = self;
-        let mut other = row.clone();
-        // SAFETY: rows of eight numbers; the caller has the instructions.
-        unsafe {
-            let sorted = S::sorted_short(row.as_ptr(), len)[..len].to_vec();
-            let same = S::same_short(row.as_ptr(), other.as_ptr(), len);
-            other[len - 1] += 100;
-            let same = [same, S::same_short(row.as_ptr(), other.as_ptr(), len)];
-            let absent = [&row, &other].map(|numbers| S::absent(numbers.as_ptr(), row.as_ptr(), len));
-            (sorted, same, absent.map(|mask| mask & ((1 << len) - 1)))
-        }
-    }
+fn rows(simd: impl Simd, row: &[u32; 8], len: usize) -> (Vec<u32>, [bool; 2], [u32; 2]) {
+    let mut other = *row;
+    let same = simd.same_short(row, &other, len);
+    other[len - 1] += 100;
+    let absent = [row, &other].map(|numbers| simd.absent(numbers, row, len) & ((1 << len) - 1));
+    (simd.sorted_short(row, len)[..len].to_vec(), [same, simd.same_short(row, &other, len)], absent)
 }
 
 #[test]
@@ -121,29 +89,21 @@ fn short_rows_are_sorted_and_compared() {
     let mut random = StdRng::seed_from_u64(3);
     for _ in 0..3000 {
         let len = random.random_range(1..=8);
-        let mut row: Vec<u32> = (0..8).map(|_| random.random_range(0..20)).collect();
+        let mut row: [u32; 8] = std::array::from_fn(|_| random.random_range(0..20));
         if len < 8 {
             // Behind the row, as other rows are: the number that the other row ends with.
             row[len] = row[len - 1] + 100;
         }
         let mut wanted = row[..len].to_vec();
         wanted.sort_unstable();
-        for found in [dispatch(Rows(row.clone(), len)), run_portable(Rows(row.clone(), len))] {
+        for found in [dispatch!(rows, &row, len), rows(Portable, &row, len)] {
             assert_eq!(found, (wanted.clone(), [true, false], [0, 1 << (len - 1)]));
         }
     }
 }
 
-struct Overlaps<'a>(&'a EightBoxes, &'a Aabb);
-
-impl Kernel for Overlaps<'_> {
-    type Output = u32;
-
-    #[inline(always)]
-    unsafe fn run<S: Simd>(self) -> u32 {
-        // SAFETY: the caller has the instructions.
-        unsafe { S::overlaps_eight(self.0, self.1) }
-    }
+fn overlaps(simd: impl Simd, boxes: &EightBoxes, aabb: &Aabb) -> u32 {
+    simd.overlaps_eight(boxes, aabb)
 }
 
 #[test]
@@ -155,7 +115,7 @@ fn eight_boxes_at_once_overlap_as_one_by_one() {
         let columns: EightBoxes =
             std::array::from_fn(|row| std::array::from_fn(|lane| value(&eight[lane], row)));
         let wanted = (0..BLOCK).fold(0, |mask, lane| mask | u32::from(eight[lane].overlaps(one)) << lane);
-        assert_eq!(dispatch(Overlaps(&columns, one)), wanted);
-        assert_eq!(run_portable(Overlaps(&columns, one)), wanted);
+        assert_eq!(dispatch!(overlaps, &columns, one), wanted);
+        assert_eq!(overlaps(Portable, &columns, one), wanted);
     }
 }

@@ -5,7 +5,7 @@
 
 use super::BoxIndex;
 use super::node::{LANES, NONE};
-use crate::grid::{Hits, Kernel, Rule, Simd, dispatch};
+use crate::grid::{Hits, Rule, Simd, dispatch};
 use crate::parallel::run_with;
 use crate::policy::PARALLEL_FROM_BOXES;
 use crate::{Aabb, Pair};
@@ -22,7 +22,8 @@ impl BoxIndex {
         let workers = if leaves * LANES < PARALLEL_FROM_BOXES { 1 } else { hits.len() };
         run_with(&mut hits[..workers], leaves.div_ceil(PIECE), |hits, piece| {
             let leaves = piece * PIECE..leaves.min((piece + 1) * PIECE);
-            dispatch(Join { index: self, last_leaves: &last_leaves, leaves, rule, hits });
+            let join = &mut Join { index: self, last_leaves: &last_leaves, rule, hits };
+            dispatch!(Join::meet_all, join, leaves.clone());
         });
     }
 
@@ -40,31 +41,25 @@ impl BoxIndex {
 struct Join<'a, 'b> {
     index: &'a BoxIndex,
     last_leaves: &'a [u32],
-    leaves: Range<usize>,
     rule: &'a Rule<'b>,
     hits: &'a mut Hits,
 }
 
-impl Kernel for Join<'_, '_> {
-    type Output = ();
-
+impl Join<'_, '_> {
     #[inline(always)]
-    unsafe fn run<S: Simd>(mut self) {
+    fn meet_all(simd: impl Simd, join: &mut Self, leaves: Range<usize>) {
         let mut waiting = Vec::new();
-        for leaf in self.leaves.clone() {
-            if self.hits.is_full() {
+        for leaf in leaves {
+            if join.hits.is_full() {
                 return;
             }
-            // SAFETY: the caller has the instructions.
-            unsafe { self.meet::<S>(leaf as u32, &mut waiting) };
+            join.meet(simd, leaf as u32, &mut waiting);
         }
     }
-}
 
-impl Join<'_, '_> {
     /// Finds the pairs of a leaf's boxes with each other, and with those of later leaves.
     #[inline(always)]
-    unsafe fn meet<S: Simd>(&mut self, leaf: u32, waiting: &mut Vec<u32>) {
+    fn meet(&mut self, simd: impl Simd, leaf: u32, waiting: &mut Vec<u32>) {
         let index = self.index;
         let bounds = index.nodes[leaf as usize].bounds();
         let from = self.hits.pairs.len();
@@ -72,13 +67,11 @@ impl Join<'_, '_> {
         while let Some(at) = waiting.pop() {
             self.hits.runs += 1;
             if index.is_leaf(at) {
-                // SAFETY: the caller has the instructions.
-                unsafe { self.test::<S>(leaf, at) };
+                self.test(simd, leaf, at);
                 continue;
             }
             let node = &index.nodes[at as usize];
-            // SAFETY: as above.
-            let mut lanes = unsafe { S::overlaps_eight(&node.boxes, &bounds) };
+            let mut lanes = simd.overlaps_eight(&node.boxes, &bounds);
             while let Some(lane) = next(&mut lanes) {
                 let child = node.children[lane];
                 if child != NONE && self.last_leaves[child as usize] >= leaf {
@@ -91,16 +84,14 @@ impl Join<'_, '_> {
 
     /// Tests the boxes of a leaf against those of another one, or of its own.
     #[inline(always)]
-    unsafe fn test<S: Simd>(&mut self, leaf: u32, at: u32) {
+    fn test(&mut self, simd: impl Simd, leaf: u32, at: u32) {
         let (one, other) = (&self.index.nodes[leaf as usize], &self.index.nodes[at as usize]);
-        // SAFETY: the caller has the instructions.
-        let mut lanes = unsafe { S::overlaps_eight(&one.boxes, &other.bounds()) };
+        let mut lanes = simd.overlaps_eight(&one.boxes, &other.bounds());
         while let Some(lane) = next(&mut lanes) {
             let aabb: Aabb = one.get(lane);
             let wanted = if leaf == at { 255 & !((2u32 << lane) - 1) } else { 255 };
             self.hits.tests += u64::from(wanted.count_ones());
-            // SAFETY: as above.
-            let mut met = unsafe { S::overlaps_eight(&other.boxes, &aabb) } & wanted;
+            let mut met = simd.overlaps_eight(&other.boxes, &aabb) & wanted;
             while let Some(hit) = next(&mut met) {
                 if one.has(lane) && other.has(hit) {
                     self.hits.pairs.push(Pair::new(one.children[lane], other.children[hit]));

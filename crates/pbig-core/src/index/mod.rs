@@ -125,7 +125,7 @@ impl BoxIndex {
             return Visited::default();
         }
         // An empty lane is met at infinity.
-        let visited = dispatch(Walk::new(self, question, bound.min(f32::MAX), visit));
+        let visited = dispatch!(Walk::answer, Walk::new(self, question, bound.min(f32::MAX), visit));
         self.looked_at.fetch_add(visited.nodes, Ordering::Relaxed);
         visited
     }

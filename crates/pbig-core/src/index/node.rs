@@ -98,18 +98,16 @@ impl Node {
     #[cfg(target_arch = "x86_64")]
     #[inline(always)]
     fn transpose(&mut self, eight: [&Aabb; LANES]) {
-        use std::arch::x86_64::{_MM_TRANSPOSE4_PS, _mm_storeu_ps};
-        let [x, y, z, x2, y2, z2] = &mut self.boxes;
-        for first in [0, 4] {
-            let [mut a, mut b, mut c, mut d] = [0, 1, 2, 3].map(|i| eight[first + i].corners());
-            // SAFETY: SSE is part of the architecture; each store is of four lanes from `first` on, of eight.
+        use std::arch::x86_64::_MM_TRANSPOSE4_PS;
+        for half in 0..2 {
+            let [mut a, mut b, mut c, mut d] = [0, 1, 2, 3].map(|i| eight[4 * half + i].corners());
+            // SAFETY: SSE is part of the architecture.
             unsafe {
                 _MM_TRANSPOSE4_PS(&mut a.0, &mut b.0, &mut c.0, &mut d.0);
                 _MM_TRANSPOSE4_PS(&mut a.1, &mut b.1, &mut c.1, &mut d.1);
-                let lanes = [(x.as_mut_ptr(), a.0), (y.as_mut_ptr(), b.0), (z.as_mut_ptr(), c.0)];
-                lanes.into_iter().for_each(|(axis, four)| _mm_storeu_ps(axis.add(first), four));
-                let lanes = [(x2.as_mut_ptr(), a.1), (y2.as_mut_ptr(), b.1), (z2.as_mut_ptr(), c.1)];
-                lanes.into_iter().for_each(|(axis, four)| _mm_storeu_ps(axis.add(first), four));
+            }
+            for (axis, four) in self.boxes.iter_mut().zip([a.0, b.0, c.0, a.1, b.1, c.1]) {
+                bytemuck::cast_mut::<Lanes, [[f32; 4]; 2]>(axis)[half] = bytemuck::cast(four);
             }
         }
     }

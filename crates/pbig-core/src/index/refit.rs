@@ -4,7 +4,7 @@ use super::BoxIndex;
 use super::node::{LANES, NONE, Node, extent_sum};
 use super::sort::{Entry, sort};
 use crate::Aabb;
-use crate::grid::{Kernel, Simd, dispatch, prefetch};
+use crate::grid::{Simd, dispatch, prefetch};
 use crate::policy::index as policy;
 use std::sync::atomic::Ordering;
 
@@ -69,7 +69,7 @@ impl BoxIndex {
         if self.end == 0 {
             return self.lay_out(boxes, false);
         }
-        dispatch(ReadLeaves { index: self, boxes });
+        dispatch!(Self::read_leaves, self, boxes);
         self.places.resize(boxes.len().max(self.places.len()), NONE);
         for (id, aabb) in boxes.iter().enumerate() {
             if self.places[id] == NONE && aabb.is_valid() {
@@ -80,18 +80,18 @@ impl BoxIndex {
 
     /// Reads the boxes of all leaves, and passes their bounds on, children first.
     #[inline(always)]
-    fn read_leaves(&mut self, boxes: &[Aabb]) {
-        for leaf in (0..self.leaves).chain(self.loose()) {
-            if let Some(next) = self.nodes.get(leaf as usize + READ_AHEAD) {
+    fn read_leaves(_: impl Simd, index: &mut Self, boxes: &[Aabb]) {
+        for leaf in (0..index.leaves).chain(index.loose()) {
+            if let Some(next) = index.nodes.get(leaf as usize + READ_AHEAD) {
                 next.children.iter().for_each(|id| prefetch(boxes.as_ptr().wrapping_add(*id as usize)));
             }
-            self.nodes[leaf as usize].read(boxes);
-            let bounds = self.nodes[leaf as usize].bounds();
-            self.tell_parent(leaf, &bounds);
+            index.nodes[leaf as usize].read(boxes);
+            let bounds = index.nodes[leaf as usize].bounds();
+            index.tell_parent(leaf, &bounds);
         }
-        for node in self.leaves..self.end {
-            let bounds = self.nodes[node as usize].bounds();
-            self.tell_parent(node, &bounds);
+        for node in index.leaves..index.end {
+            let bounds = index.nodes[node as usize].bounds();
+            index.tell_parent(node, &bounds);
         }
     }
 
@@ -175,7 +175,7 @@ impl BoxIndex {
         roots = self.push_parents(roots);
         debug_assert!(roots.len() < 2);
         self.end = self.nodes.len() as u32;
-        dispatch(ReadLeaves { index: self, boxes });
+        dispatch!(Self::read_leaves, self, boxes);
         self.extents = self.nodes.iter().map(|node| extent_sum(&node.bounds())).collect();
         (self.grown, self.is_sorted) = (0, sorted);
         if sorted {
@@ -213,19 +213,5 @@ impl BoxIndex {
             level = (first..self.nodes.len() as u32).collect();
         }
         level
-    }
-}
-
-struct ReadLeaves<'a> {
-    index: &'a mut BoxIndex,
-    boxes: &'a [Aabb],
-}
-
-impl Kernel for ReadLeaves<'_> {
-    type Output = ();
-
-    #[inline(always)]
-    unsafe fn run<S: Simd>(self) {
-        self.index.read_leaves(self.boxes);
     }
 }

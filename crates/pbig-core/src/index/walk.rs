@@ -3,7 +3,7 @@
 use super::node::{LANES, Lanes, NONE, Node};
 use super::question::Question;
 use super::{BoxIndex, Visited};
-use crate::grid::{Kernel, Simd};
+use crate::grid::Simd;
 use arrayvec::ArrayVec;
 
 /// Maximum number of nodes that wait: seven for each level, and 2^32 boxes of 448 classes make 14 levels.
@@ -32,33 +32,27 @@ impl<'a, Q: Question> Walk<'a, Q> {
     ) -> Self {
         Self { index, question, bound, visit, at_start: Vec::new(), visited: Visited::default() }
     }
-}
 
-impl<Q: Question> Kernel for Walk<'_, Q> {
-    type Output = Visited;
-
-    /// Boxes at bound 0 are visited first, by id, so that the lowest id wins among them without a look at the others.
+    /// Visits the boxes. Those at bound 0 come first, by id, so that the lowest id wins among them without a look at the others.
     #[inline(always)]
-    unsafe fn run<S: Simd>(mut self) -> Visited {
-        let is_still = self.bound <= 0.0;
-        let bound = std::mem::replace(&mut self.bound, 0.0);
-        self.walk::<true>();
-        self.bound = bound;
-        self.at_start.sort_unstable();
-        for id in std::mem::take(&mut self.at_start) {
-            self.take(id);
-            if self.bound <= 0.0 && !is_still {
-                return self.visited;
+    pub(super) fn answer(_: impl Simd, mut walk: Self) -> Visited {
+        let is_still = walk.bound <= 0.0;
+        let bound = std::mem::replace(&mut walk.bound, 0.0);
+        walk.walk::<true>();
+        walk.bound = bound;
+        walk.at_start.sort_unstable();
+        for id in std::mem::take(&mut walk.at_start) {
+            walk.take(id);
+            if walk.bound <= 0.0 && !is_still {
+                return walk.visited;
             }
         }
         if !is_still {
-            self.walk::<false>();
+            walk.walk::<false>();
         }
-        self.visited
+        walk.visited
     }
-}
 
-impl<Q: Question> Walk<'_, Q> {
     /// Collects the boxes at bound 0, or visits the others.
     #[inline(always)]
     fn walk<const AT_START: bool>(&mut self) {

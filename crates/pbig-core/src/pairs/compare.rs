@@ -4,7 +4,7 @@ use super::groups::{self, Groups, Span};
 use super::kept::{Kept, Rows};
 use super::row;
 use crate::Pair;
-use crate::grid::{Kernel, Simd, dispatch};
+use crate::grid::{Simd, dispatch};
 use crate::parallel::SharedSlice;
 use std::ops::Range;
 
@@ -60,7 +60,7 @@ impl Comparison {
             let new = NewRows { first_id, first_place, spans, pool };
             match is_removed {
                 Some(is_removed) => part.compare_stripped(old, &new, is_removed),
-                None => dispatch(CompareRows { part, old, new: &new }),
+                None => dispatch!(Part::compare, part, old, &new),
             }
         });
         kept.next = next;
@@ -143,29 +143,6 @@ impl NewRows<'_> {
     }
 }
 
-/// Compares rows, most of which are short and have not changed.
-struct CompareRows<'a> {
-    part: &'a mut Part,
-    old: &'a Rows,
-    new: &'a NewRows<'a>,
-}
-
-impl Kernel for CompareRows<'_> {
-    type Output = ();
-
-    #[inline(always)]
-    unsafe fn run<S: Simd>(self) {
-        let Self { part, old, new } = self;
-        for (a, span) in (new.first_id..).zip(new.spans) {
-            let (was, is) = (old.spans[a as usize].range(), new.range(*span));
-            // SAFETY: the caller has the instructions.
-            unsafe {
-                row::compare::<S>(a, (&old.pool, was), (new.pool, is), &mut part.added, &mut part.removed);
-            }
-        }
-    }
-}
-
 impl Part {
     fn clear(&mut self) {
         self.added.clear();
@@ -180,6 +157,15 @@ impl Part {
             if !row::equal(&self.stripped, is) {
                 row::differences(a, &self.stripped, is, &mut self.added, &mut self.removed);
             }
+        }
+    }
+
+    /// Compares rows, most of which are short and have not changed.
+    #[inline(always)]
+    fn compare(simd: impl Simd, part: &mut Self, old: &Rows, new: &NewRows<'_>) {
+        for (a, span) in (new.first_id..).zip(new.spans) {
+            let (was, is) = (old.spans[a as usize].range(), new.range(*span));
+            row::compare(simd, a, (&old.pool, was), (new.pool, is), (&mut part.added, &mut part.removed));
         }
     }
 

@@ -2,7 +2,7 @@
 
 use super::row::{self, SHORT};
 use crate::Pair;
-use crate::grid::{Hits, Kernel, Simd, dispatch};
+use crate::grid::{Hits, Simd, dispatch};
 use crate::parallel::{SharedSlice, ensure_scratch, run, run_with};
 use std::ops::{Range, RangeInclusive};
 
@@ -160,7 +160,7 @@ impl Groups {
             ensure_scratch(firsts, pairs.len(), 0);
         }
         ensure_scratch(unsorted, pairs.len() + SHORT, 0);
-        dispatch(SortRows::<LIST> { pairs, first_id, base, spans, others, firsts, unsorted });
+        dispatch!(sort_rows::<LIST>, pairs, (first_id, base), spans, others, firsts, unsorted);
     }
 }
 
@@ -210,46 +210,38 @@ pub(super) fn sort(pairs: &mut Vec<Pair>, sorted: &mut Vec<Pair>, counts: &mut V
 }
 
 /// Scatters the `b` of pairs into rows, and sorts the rows.
-struct SortRows<'a, const LIST: bool> {
-    pairs: &'a [Pair],
-    first_id: u32,
-    base: u32,
-    spans: &'a mut [Span],
-    others: &'a mut [u32],
-    firsts: &'a mut [u32],
-    unsorted: &'a mut [u32],
-}
-
-impl<const LIST: bool> Kernel for SortRows<'_, LIST> {
-    type Output = ();
-
-    #[inline(always)]
-    unsafe fn run<S: Simd>(self) {
-        let Self { pairs, first_id, base, spans, others, firsts, unsorted } = self;
-        spans.fill(Span::default());
-        for pair in pairs {
-            spans[(pair.a - first_id) as usize].len += 1;
+#[inline(always)]
+fn sort_rows<const LIST: bool>(
+    simd: impl Simd,
+    pairs: &[Pair],
+    (first_id, base): (u32, u32),
+    spans: &mut [Span],
+    others: &mut [u32],
+    firsts: &mut [u32],
+    unsorted: &mut [u32],
+) {
+    spans.fill(Span::default());
+    for pair in pairs {
+        spans[(pair.a - first_id) as usize].len += 1;
+    }
+    let mut next = 0;
+    for span in spans.iter_mut() {
+        span.start = next;
+        next += std::mem::take(&mut span.len);
+    }
+    for pair in pairs {
+        let span = &mut spans[(pair.a - first_id) as usize];
+        let place = (span.start + span.len) as usize;
+        unsorted[place] = pair.b;
+        if LIST {
+            firsts[place] = pair.a;
         }
-        let mut next = 0;
-        for span in spans.iter_mut() {
-            span.start = next;
-            next += std::mem::take(&mut span.len);
-        }
-        for pair in pairs {
-            let span = &mut spans[(pair.a - first_id) as usize];
-            let place = (span.start + span.len) as usize;
-            unsorted[place] = pair.b;
-            if LIST {
-                firsts[place] = pair.a;
-            }
-            span.len += 1;
-        }
-        for span in spans {
-            let range = span.range();
-            // SAFETY: the unsorted list is longer by a register.
-            unsafe { row::sort_into::<S>(unsorted, range, others) };
-            span.start += base;
-        }
+        span.len += 1;
+    }
+    for span in spans {
+        let range = span.range();
+        row::sort_into(simd, unsorted, range, others);
+        span.start += base;
     }
 }
 

@@ -8,26 +8,21 @@ use std::ops::Range;
 pub(super) const SHORT: usize = 8;
 
 /// Copies the row at `range` of `from` to the same range of `to`, sorted; rows are copied in order, as a short one may
-/// overwrite what comes behind it.
-///
-/// # Safety
-/// `from` has [`SHORT`] elements more than the row, and the processor the instructions.
+/// overwrite what comes behind it. A row with a register of elements behind its start is sorted in it.
 #[inline(always)]
-pub(super) unsafe fn sort_into<S: Simd>(from: &[u32], range: Range<usize>, to: &mut [u32]) {
-    let Range { start, end } = range;
-    debug_assert!(end + SHORT <= from.len() && end <= to.len());
-    if end - start > SHORT {
-        let row = &mut to[start..end];
-        row.copy_from_slice(&from[start..end]);
-        return row.sort_unstable();
-    }
-    // SAFETY: the caller's promise; near the end of `to` only the row itself is copied.
-    unsafe {
-        let sorted = S::sorted_short(from.as_ptr().add(start), end - start);
-        if start + SHORT <= to.len() {
-            to.as_mut_ptr().add(start).cast::<[u32; SHORT]>().write_unaligned(sorted);
-        } else {
-            to[start..end].copy_from_slice(&sorted[..end - start]);
+pub(super) fn sort_into(simd: impl Simd, from: &[u32], range: Range<usize>, to: &mut [u32]) {
+    let (len, to) = (range.len(), &mut to[range.start..]);
+    match from[range.start..].first_chunk() {
+        Some(eight) if len <= SHORT => {
+            let sorted = simd.sorted_short(eight, len);
+            match to.first_chunk_mut() {
+                Some(to) => *to = sorted,
+                None => to[..len].copy_from_slice(&sorted[..len]),
+            }
+        }
+        _ => {
+            to[..len].copy_from_slice(&from[range]);
+            to[..len].sort_unstable();
         }
     }
 }
@@ -36,45 +31,35 @@ pub(super) unsafe fn sort_into<S: Simd>(from: &[u32], range: Range<usize>, to: &
 type RowAt<'a> = (&'a [u32], Range<usize>);
 
 /// Appends the pairs of `a` that are in one of two sorted rows only: to `removed` if in the old one.
-///
-/// # Safety
-/// The processor has the instructions.
 #[inline(always)]
-pub(super) unsafe fn compare<S: Simd>(
+pub(super) fn compare(
+    simd: impl Simd,
     a: u32,
     (old, was): RowAt<'_>,
     (new, is): RowAt<'_>,
-    added: &mut Vec<Pair>,
-    removed: &mut Vec<Pair>,
+    (added, removed): (&mut Vec<Pair>, &mut Vec<Pair>),
 ) {
+    let eight =
+        |pool: &[u32], row: &Range<usize>| pool.get(row.start..).and_then(|rest| rest.first_chunk().copied());
     let is_short = was.len().max(is.len()) <= SHORT;
-    let fits = was.start + SHORT <= old.len() && is.start + SHORT <= new.len();
-    if !(is_short && fits) {
+    let (Some(was8), Some(is8), true) = (eight(old, &was), eight(new, &is), is_short) else {
         let (was, is) = (&old[was], &new[is]);
         return if !equal(was, is) {
             differences(a, was, is, added, removed)
         };
+    };
+    if was.len() == is.len() && simd.same_short(&was8, &is8, is.len()) {
+        return;
     }
-    // SAFETY: both pools have that many elements there; the caller has the instructions.
-    unsafe {
-        let (old, new) = (old.as_ptr().add(was.start), new.as_ptr().add(is.start));
-        if was.len() == is.len() && S::same_short(old, new, is.len()) {
-            return;
-        }
-        push(a, old, S::absent(old, new, is.len()) & ((1 << was.len()) - 1), removed);
-        push(a, new, S::absent(new, old, was.len()) & ((1 << is.len()) - 1), added);
-    }
+    push(a, &was8, simd.absent(&was8, &is8, is.len()) & ((1 << was.len()) - 1), removed);
+    push(a, &is8, simd.absent(&is8, &was8, was.len()) & ((1 << is.len()) - 1), added);
 }
 
 /// Appends the pairs of `a` with the elements of a mask.
-///
-/// # Safety
-/// `row` has the elements.
 #[inline(always)]
-unsafe fn push(a: u32, row: *const u32, mut mask: u32, pairs: &mut Vec<Pair>) {
+fn push(a: u32, row: &[u32; SHORT], mut mask: u32, pairs: &mut Vec<Pair>) {
     while mask != 0 {
-        // SAFETY: the caller's promise.
-        pairs.push(Pair { a, b: unsafe { *row.add(mask.trailing_zeros() as usize) } });
+        pairs.push(Pair { a, b: row[mask.trailing_zeros() as usize % SHORT] });
         mask &= mask - 1;
     }
 }
@@ -127,19 +112,10 @@ mod tests {
         }
     }
 
-    struct Compared<'a>(&'a [u32], &'a [u32]);
-
-    impl crate::grid::Kernel for Compared<'_> {
-        type Output = [Vec<Pair>; 2];
-
-        #[inline(always)]
-        unsafe fn run<S: Simd>(self) -> Self::Output {
-            let Self(old, new) = self;
-            let [mut added, mut removed] = [vec![], vec![]];
-            // SAFETY: the caller has the instructions.
-            unsafe { compare::<S>(1, (old, 0..3), (new, 0..4), &mut added, &mut removed) };
-            [added, removed]
-        }
+    fn compared(simd: impl Simd, old: &[u32], new: &[u32]) -> [Vec<Pair>; 2] {
+        let [mut added, mut removed] = [vec![], vec![]];
+        compare(simd, 1, (old, 0..3), (new, 0..4), (&mut added, &mut removed));
+        [added, removed]
     }
 
     #[test]
@@ -148,7 +124,7 @@ mod tests {
         let old = [2, 4, 6, 5, 7, 5, 7, 5, 7];
         let new = [4, 5, 6, 7, 2, 2, 2, 2, 2];
         for (old, new) in [(&old[..], &new[..]), (&old[..3], &new[..4]), (&old[..], &new[..4])] {
-            let [added, removed] = crate::grid::dispatch(Compared(old, new));
+            let [added, removed] = crate::grid::dispatch!(compared, old, new);
             assert_eq!(added, [5, 7].map(|b| Pair { a: 1, b }));
             assert_eq!(removed, [Pair { a: 1, b: 2 }]);
         }

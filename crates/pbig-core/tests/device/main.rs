@@ -89,7 +89,7 @@ fn updates_equal_those_of_the_cpu_whatever_fails() {
 /// A structure that is not brought up to date by a device's update would lose pairs in the next one on the CPU.
 #[test]
 fn device_and_cpu_take_turns_with_each_engine() {
-    for engine in [Engine::Sweep, Engine::Edit, Engine::Tree, Engine::Rebuild] {
+    for engine in Engine::ALL {
         let config = Config { engine: Some(engine), ..ON_DEVICE };
         let mut ours = BroadPhase::with_device(config, Double::new(Fault::Nothing)).expect("a margin");
         let (mut cpu, mut rng) = (on_cpu(), StdRng::seed_from_u64(3));
@@ -183,6 +183,41 @@ fn auto_uses_a_device_for_many_boxes_unless_it_is_software() {
         let mut finder = Finder::with_device(Config::DEFAULT, device);
         finder.find(&few).expect("few pairs");
         assert_eq!((finder.report().plan.no_device, &finder.report().fallback), (Some(wanted), &None));
+    }
+}
+
+#[test]
+fn auto_uses_a_device_from_half_a_million_changed_boxes_on() {
+    let mut boxes = vec![Aabb::NOWHERE; 500_000];
+    boxes[7..9].fill(Aabb::new([0.0; 3], [1.0; 3]));
+    let pair = [Pair::new(7, 8)];
+    let mut finder = Finder::with_device(Config::DEFAULT, Double::new(Fault::Nothing));
+    for (n, is_used) in [(499_999, false), (500_000, true)] {
+        assert_eq!(finder.find(&boxes[..n]).expect("a pair"), pair);
+        assert_eq!(finder.report().device.is_some(), is_used);
+    }
+    let mut world = BroadPhase::with_device(Config::DEFAULT, Double::new(Fault::Nothing)).expect("a margin");
+    (0..).zip(&boxes).for_each(|(id, aabb)| world.set(id, *aabb, ProxyFilter::ALL).expect("a small id"));
+    assert_eq!(world.update().expect("a pair").added, pair);
+    assert!(world.report().device.is_some());
+}
+
+/// A device needs each changed box as it was. Without a device few of them are kept.
+#[test]
+fn a_device_that_comes_amid_changes_begins_with_the_next_update() {
+    let (mut ours, mut cpu) = (BroadPhase::new(ON_DEVICE).expect("a margin"), on_cpu());
+    let mut rng = StdRng::seed_from_u64(8);
+    for update in 0..8 {
+        disturb(&mut [&mut ours, &mut cpu], &mut rng);
+        if update == 4 {
+            assert!(ours.changes().len() > 10);
+            ours.set_device(Double::new(Fault::Nothing));
+        }
+        disturb(&mut [&mut ours, &mut cpu], &mut rng);
+        assert_eq!(ours.update(), cpu.update(), "update {update}");
+        let report = ours.report();
+        let why = (update == 4).then_some(NoDevice::OldBoxesUnknown);
+        assert_eq!((report.device.is_some(), report.plan.no_device), (update > 4, why), "update {update}");
     }
 }
 

@@ -4,15 +4,12 @@ use pbig_core::{BroadPhase, Config, Engine};
 use std::fmt::Debug;
 
 /// The first one is left to the policy.
-const ENGINES: [Option<Engine>; 5] =
-    [None, Some(Engine::Sweep), Some(Engine::Edit), Some(Engine::Tree), Some(Engine::Rebuild)];
-
 pub(super) struct Engines(Vec<BroadPhase>);
 
 impl Engines {
     pub(super) fn new(config: Config) -> Self {
         let with = |engine| BroadPhase::new(Config { engine, ..config }).expect("a good margin");
-        Self(ENGINES.map(with).into())
+        Self(std::iter::once(None).chain(Engine::ALL.map(Some)).map(with).collect())
     }
 
     /// Returns the answer that all broad phases give.

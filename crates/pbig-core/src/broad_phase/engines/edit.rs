@@ -3,17 +3,19 @@
 //! A pair has ended if it overlapped before and does not now, and is new if it did not overlap before and does now. Nothing else is
 //! looked at, so an update takes time in proportion to the changed boxes.
 
-use super::world::{Old, World};
+use super::task::Task;
+use crate::broad_phase::world::{Old, World};
 use crate::grid::{Budget, Candidates, EditedGrid, Meet, Place, Record};
+use crate::outcome::{End, Outcome, Valid};
 use crate::pairs::Comparison;
 use crate::parallel::{SharedSlice, available_threads, piece_range, run_with};
 use crate::policy;
-use crate::report::Checks;
-use crate::{Aabb, Pair, ProxyFilter};
+use crate::report::{Checks, Clock, StageTimes, stage};
+use crate::{Aabb, Algorithm, Pair, Plan, ProxyFilter};
 
 /// The buffers of the engine.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Edit {
+pub(crate) struct Edit {
     /// Changed boxes as they were, in the order of cells.
     before: Vec<Record>,
     /// Changed boxes as they are, in the same order.
@@ -31,9 +33,9 @@ pub(super) struct Edit {
 
 /// Limits of a run: pairs to be listed, and work to be done.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct EditLimits {
-    pub(super) pairs: u64,
-    pub(super) work: u64,
+pub(crate) struct EditLimits {
+    pub(crate) pairs: u64,
+    pub(crate) work: u64,
 }
 
 /// The findings and buffers of one thread.
@@ -46,9 +48,30 @@ struct Thread {
 }
 
 impl Edit {
+    /// Edits the grid, and leaves the events of an update in the task. Gives up if it takes too much work.
+    pub(super) fn run(&mut self, task: &mut Task<'_>) -> Outcome {
+        stage!("edit");
+        let mut clock = Clock::start();
+        let world = task.world;
+        let most = policy::edit_up_to_work(world.present() as usize, task.kept.len(), task.store.work);
+        let limits = EditLimits { pairs: task.config.limits.pairs(), work: task.unless_forced(most) };
+        let is_done = self.find(world, &mut task.store.grid, task.events, limits);
+        let check = clock.lap();
+        let (end, valid) = if is_done { (End::Done, Valid::Grid) } else { (End::GivenUp, Valid::Nothing) };
+        Outcome {
+            end,
+            valid,
+            checks: self.checks(),
+            work: self.work.min(limits.work),
+            plan: Plan { boxes: world.valid(), ..Plan::of_grid(Algorithm::Edit, &task.store.grid) },
+            stages: StageTimes { check, ..StageTimes::default() },
+            ..Outcome::default()
+        }
+    }
+
     /// Brings `grid` up to date with the changes of the world, and leaves the events in `events`, sorted: all, or more new
     /// pairs than the limit. Returns false if the work is beyond its limit, and leaves grid and events unusable.
-    pub(super) fn run(
+    pub(crate) fn find(
         &mut self,
         world: &World,
         grid: &mut EditedGrid,
@@ -75,12 +98,13 @@ impl Edit {
     }
 
     /// Returns the work of the last run.
-    pub(super) fn work(&self) -> u64 {
+    #[cfg(test)]
+    pub(crate) fn work(&self) -> u64 {
         self.work
     }
 
     /// Returns the tests of the last run.
-    pub(super) fn checks(&self) -> Checks {
+    fn checks(&self) -> Checks {
         let sum = |of: fn(&Candidates) -> u64| {
             self.threads.iter().map(|thread| of(&thread.candidates)).sum::<u64>()
         };

@@ -1,0 +1,61 @@
+//! The engine on a device: only what has changed goes there, only pairs that were added or removed come back.
+
+use super::task::Task;
+use crate::broad_phase::world::{Old, World};
+use crate::device::{ChangeRequest, ChangedBox, DeviceFound, PairDevice};
+use crate::device_slot::DeviceSlot;
+use crate::outcome::{End, Outcome, Valid};
+use crate::{Aabb, Pair};
+
+/// Leaves the events of an update in the task. Gives up if the device cannot do the work.
+pub(crate) fn run(slot: &mut DeviceSlot, task: &mut Task<'_>) -> Outcome {
+    if task.valid != Valid::Device {
+        slot.forget();
+    }
+    let changed = changed_boxes(task.world);
+    let World { boxes, filters, .. } = task.world;
+    let (kept, max_pairs) = (task.kept.len() as u64, task.config.limits.pairs());
+    let request = ChangeRequest { boxes, filters, changed: &changed, kept, max_pairs };
+    let call = |device: &mut dyn PairDevice, found: &mut _| device.find_changed(&request, found);
+    let (mut outcome, found) = slot.call(boxes.len(), Vec::new(), call);
+    if outcome.end == End::Done {
+        outcome.valid = Valid::Device;
+        sort_out(&found, task);
+    } else {
+        outcome.plan.boxes = task.world.valid();
+    }
+    outcome
+}
+
+/// Returns the changed boxes as they were at the last update.
+fn changed_boxes(world: &World) -> Vec<ChangedBox> {
+    let was = |(&id, old): (&u32, &Old)| {
+        let aabb = if world.was_removed(id) { Aabb::NOWHERE } else { old.aabb };
+        ChangedBox { id, aabb, filter: old.filter }
+    };
+    world.changed.iter().zip(&world.old).map(was).collect()
+}
+
+/// Sorts what a device has found into added, removed and dropped pairs.
+fn sort_out(found: &DeviceFound, task: &mut Task<'_>) {
+    let Task { world, kept, events, .. } = task;
+    events.clear();
+    let was_removed = |pair: &Pair| world.was_removed(pair.a) || world.was_removed(pair.b);
+    let existed = |pair: &Pair| !(world.has_removed() && was_removed(pair));
+    // A pair that is not kept cannot end, and a kept one cannot begin: a device that says so is wrong, and does no harm. A device
+    // reports all pairs of a box that it treats as new.
+    let ends = |(pair, is_kept): (Pair, bool)| (is_kept && existed(&pair)).then_some(pair);
+    let begins = |(pair, is_kept): (Pair, bool)| (!is_kept || !existed(&pair)).then_some(pair);
+    events.removed.extend(kept.look_up(&found.ended).filter_map(ends));
+    events.added.extend(kept.look_up(&found.pairs).filter_map(begins));
+    for &id in world.removed() {
+        events.dropped.extend(kept.partners(id).map(|other| Pair::new(id, other)));
+    }
+    let overlaps = |pair: &Pair| world.boxes[pair.a as usize].overlaps(&world.boxes[pair.b as usize]);
+    let allows = |pair: &Pair| world.filters[pair.a as usize].allows(&world.filters[pair.b as usize]);
+    for &id in &found.restarted {
+        let pairs = kept.partners(id).map(|other| Pair::new(id, other));
+        events.removed.extend(pairs.filter(|pair| existed(pair) && !(overlaps(pair) && allows(pair))));
+    }
+    events.put_in_order(world.ids());
+}

@@ -1,0 +1,60 @@
+//! The engine for few changed boxes where a tree is kept: each is looked up where it is, and what it overlaps is compared with its
+//! kept pairs.
+
+use super::partners::Partners;
+use super::task::Task;
+use crate::grid::BLOCK;
+use crate::outcome::{End, Outcome, Valid};
+use crate::policy;
+use crate::report::{Clock, stage};
+use crate::{Algorithm, Checks, Plan};
+
+/// The buffers of the engine.
+#[derive(Clone, Debug, Default)]
+pub(super) struct LookUp {
+    partners: Partners,
+}
+
+impl LookUp {
+    /// Brings the tree up to date, and leaves the events of an update in the task. Gives up if it takes too much work.
+    pub(super) fn run(&mut self, task: &mut Task<'_>) -> Outcome {
+        stage!("tree");
+        let mut clock = Clock::start();
+        let world = task.world;
+        let mut outcome = Outcome { valid: Valid::Tree, ..Outcome::default() };
+        let changed = (task.valid == Valid::Tree).then_some(&world.changed[..]);
+        let refit = task.store.tree.keep_sorted(&world.boxes, changed);
+        outcome.stages.map = clock.lap();
+        let max_work = task.unless_forced(policy::look_up_to_nodes(world.ids()));
+        let (nodes, met) = self.look_up(task, max_work);
+        outcome.stages.check = clock.lap();
+        let made = nodes * BLOCK as u64;
+        outcome.checks = Checks { made, unnecessary: made - met, redundant: 0 };
+        outcome.work = refit + made + nodes + met;
+        outcome.plan = Plan { algorithm: Algorithm::Tree, boxes: world.valid(), ..Plan::default() };
+        outcome.end = if nodes + met <= max_work { End::Done } else { End::GivenUp };
+        outcome
+    }
+
+    /// Returns the numbers of nodes looked at and of boxes met. If these are more than `max_work`, events are missing.
+    fn look_up(&mut self, task: &mut Task<'_>, max_work: u64) -> (u64, u64) {
+        let Task { world, kept, store, events, .. } = task;
+        events.clear();
+        let (mut nodes, mut met) = (0, 0);
+        for &id in &world.changed {
+            let (aabb, now) = (&world.boxes[id as usize], &mut self.partners.now);
+            now.clear();
+            // Tested again, because an infinite box meets the empty places of a tree.
+            let mut take =
+                |other: u32| now.extend(aabb.overlaps(&world.boxes[other as usize]).then_some(other));
+            nodes += store.tree.overlapping(aabb, &mut take).nodes;
+            met += now.len() as u64;
+            if nodes + met > max_work {
+                break;
+            }
+            self.partners.compare_all(world, kept, id, events);
+        }
+        events.sort(world.ids());
+        (nodes, met)
+    }
+}
