@@ -1,5 +1,6 @@
 //! One test binary: linking rapier once is what keeps the suite fast to build.
 
+mod between;
 mod bounded;
 mod calls;
 mod changes;

@@ -1,6 +1,6 @@
 //! Counts the work of a search before the search: once boxes are sorted, the slots that each would visit are known.
 
-use super::cells::{Cells, query_of};
+use super::cells::query_of;
 use super::hits::{Hits, Rule};
 use super::plan::NeighbourScan;
 use super::record::Record;
@@ -13,7 +13,7 @@ use std::ops::Range;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 /// Slots that are counted together.
-const PIECE: usize = PARALLEL_FROM_BOXES;
+pub(super) const PIECE: usize = PARALLEL_FROM_BOXES;
 
 impl Sorted<'_> {
     /// Returns the number of boxes.
@@ -42,7 +42,8 @@ impl Sorted<'_> {
     /// Estimates the work in vain of a search, by a sample of one box in `step`: the tests of each box that its own overlaps do not
     /// pay for. A box that meets thousands does not pay for others that meet none. `hits` are scratch.
     pub(crate) fn vain_work(&self, step: usize, filters: Option<&[ProxyFilter]>, hits: &mut Hits) -> u64 {
-        let rule = Rule { filters, max_pairs: u64::MAX, found: &AtomicU64::new(0) };
+        let found = AtomicU64::new(0);
+        let rule = Rule::listing(filters, &found);
         let (len, oversize) = (self.grid.len, self.grid.oversize.len());
         let mut in_grid = 0;
         for slot in scattered(0..len, step) {
@@ -64,7 +65,7 @@ impl Sorted<'_> {
 /// Yields a number of every `step` in a range, each somewhere else in its part: a pattern in the order of the boxes cannot
 /// bias a sample.
 #[inline(always)]
-fn scattered(range: Range<usize>, step: usize) -> impl Iterator<Item = usize> {
+pub(super) fn scattered(range: Range<usize>, step: usize) -> impl Iterator<Item = usize> {
     const GOLDEN: u64 = 0x9E37_79B9_7F4A_7C15;
     let at = move |first: usize| {
         let hash = (first as u64).wrapping_mul(GOLDEN) >> 32;
@@ -76,7 +77,7 @@ fn scattered(range: Range<usize>, step: usize) -> impl Iterator<Item = usize> {
 
 impl Grid {
     /// Returns the work of an oversize box: the rows of cells that it reaches, and the boxes in them.
-    fn work_of_oversize(&self, one: &Record) -> u64 {
+    pub(super) fn work_of_oversize(&self, one: &Record) -> u64 {
         let mut work = 0;
         self.reached_by(&one.aabb, |run| {
             let (first, end) = self.slots(run);
@@ -98,15 +99,16 @@ impl Kernel for CountSlots<'_> {
     #[inline(always)]
     unsafe fn run<S: Simd>(self) -> u64 {
         let Self { grid, slots } = self;
-        let cells = grid.plan.cells;
+        let wraps = grid.plan.cells.wraps;
+        let half = |(rows, slots): (u64, u64)| rows + slots / 2;
         let mut work = 0;
         for slot in scattered(slots, search::COUNT_ONE_IN) {
             // SAFETY: the caller has the instructions.
             let slots = unsafe {
-                match (grid.plan.scan, cells.wraps) {
+                match (grid.plan.scan, wraps) {
                     (NeighbourScan::Runs, _) => in_runs(grid, slot),
-                    (NeighbourScan::Windows, false) => in_window::<S, false>(grid, &cells, slot),
-                    (NeighbourScan::Windows, true) => in_window::<S, true>(grid, &cells, slot),
+                    (NeighbourScan::Windows, false) => half(in_window::<S, false>(grid, grid, slot)),
+                    (NeighbourScan::Windows, true) => half(in_window::<S, true>(grid, grid, slot)),
                 }
             };
             // SAFETY: as above.
@@ -137,12 +139,13 @@ fn in_runs(grid: &Grid, slot: usize) -> u64 {
     own + row(key + dx - 1) + row(key + layer - dx - 1) + row(key + layer - 1) + row(key + layer + dx - 1)
 }
 
-/// Returns half of the slots in a box's window.
+/// Returns the rows and slots of a grid in the window of a box, which lies in a slot of the same grid or of another one.
 #[inline(always)]
-unsafe fn in_window<S: Simd, const WRAPS: bool>(grid: &Grid, cells: &Cells, slot: usize) -> u64 {
+pub(super) unsafe fn in_window<S: Simd, const WRAPS: bool>(own: &Grid, grid: &Grid, slot: usize) -> (u64, u64) {
+    let cells = &grid.plan.cells;
     // SAFETY: the caller has the instructions.
     let window = unsafe {
-        let (low, high) = S::steps(cells, &grid.records[slot].aabb);
+        let (low, high) = S::steps(cells, &own.records[slot].aabb);
         cells.window(low, high)
     };
     let (mut rows, mut slots) = (0, 0);
@@ -154,5 +157,5 @@ unsafe fn in_window<S: Simd, const WRAPS: bool>(grid: &Grid, cells: &Cells, slot
             }
         }
     }
-    rows + slots / 2
+    (rows, slots)
 }

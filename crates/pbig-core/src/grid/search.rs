@@ -12,10 +12,10 @@ use crate::policy::PARALLEL_FROM_BOXES;
 use std::ops::Range;
 
 /// Number of boxes in a piece of work: enough to hide the cost of handing it out, few enough to balance.
-const PIECE: Range<usize> = 512..16_384;
+pub(super) const PIECE: Range<usize> = 512..16_384;
 
 /// Number of oversize boxes in a piece of work.
-const OVERSIZE_PIECE: usize = 4;
+pub(super) const OVERSIZE_PIECE: usize = 4;
 
 impl Sorted<'_> {
     /// Finds all pairs, into the lists of as many threads as there are `hits`.
@@ -60,7 +60,7 @@ impl Kernel for SearchPiece<'_, '_> {
     #[inline(always)]
     unsafe fn run<S: Simd>(self) {
         let Self { grid, slots, rule, hits } = self;
-        let scan = Scan { cells: grid.plan.cells, grid, rule };
+        let scan = Scan { cells: grid.plan.cells, own: grid, grid, rule };
         // SAFETY: the slots are those of the grid; the caller has the instructions.
         unsafe {
             match (grid.plan.scan, grid.plan.cells.wraps) {
@@ -72,10 +72,14 @@ impl Kernel for SearchPiece<'_, '_> {
     }
 }
 
-struct Scan<'a, 'b> {
-    cells: Cells,
-    grid: &'a Grid,
-    rule: &'a Rule<'b>,
+/// A search for the boxes of one grid in another one of the same plan, or in itself.
+pub(super) struct Scan<'a, 'b> {
+    pub(super) cells: Cells,
+    /// The grid with the boxes that are searched for.
+    pub(super) own: &'a Grid,
+    /// The grid that is searched.
+    pub(super) grid: &'a Grid,
+    pub(super) rule: &'a Rule<'b>,
 }
 
 impl Scan<'_, '_> {
@@ -161,15 +165,15 @@ impl Scan<'_, '_> {
     #[inline(always)]
     fn make_room<S: Simd>(&self, writer: &mut HitWriter, hits: &mut Hits) {
         if !writer.has_room() {
-            // SAFETY: hits have slots of this grid; the caller has the instructions.
-            unsafe { hits.flush::<S>(writer, &self.grid.records, self.rule) };
+            // SAFETY: hits have slots of these grids; the caller has the instructions.
+            unsafe { hits.flush::<S>(writer, (&self.own.records, &self.grid.records), self.rule) };
         }
     }
 
     #[inline(always)]
-    fn finish<S: Simd>(&self, mut writer: HitWriter, hits: &mut Hits) {
+    pub(super) fn finish<S: Simd>(&self, mut writer: HitWriter, hits: &mut Hits) {
         // SAFETY: as above.
-        unsafe { hits.flush::<S>(&mut writer, &self.grid.records, self.rule) };
+        unsafe { hits.flush::<S>(&mut writer, (&self.own.records, &self.grid.records), self.rule) };
         hits.tests += writer.tests;
     }
 
@@ -216,7 +220,7 @@ impl Scan<'_, '_> {
 
     /// Tests a row of cells.
     #[inline(always)]
-    unsafe fn row<S: Simd>(
+    pub(super) unsafe fn row<S: Simd>(
         &self,
         query: u64,
         slot: usize,
