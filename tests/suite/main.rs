@@ -12,6 +12,7 @@ mod edits;
 mod explain;
 mod finder;
 mod follower;
+mod for_each;
 mod gpu;
 mod incremental;
 mod kernels;
