@@ -1,5 +1,6 @@
 //! One test binary: linking rapier once is what keeps the suite fast to build.
 
+mod between;
 mod bounded;
 mod calls;
 mod changes;
@@ -11,6 +12,7 @@ mod edits;
 mod explain;
 mod finder;
 mod follower;
+mod for_each;
 mod gpu;
 mod incremental;
 mod kernels;

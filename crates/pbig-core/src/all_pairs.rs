@@ -1,13 +1,13 @@
 //! All pairs of a list of boxes: by a grid, by a tree where a grid would test too many, or by testing every pair of a few.
 
-use crate::grid::{EditedGrid, GridPlan, Hits, Rule, Sorted, brute_force};
+use crate::grid::{EditedGrid, GridPlan, Hits, Receiver, Rule, brute_force};
 use crate::index::BoxIndex;
 use crate::outcome::{End, Outcome, Valid};
 use crate::pairs::{Grouping, Groups};
 use crate::parallel::available_threads;
 use crate::policy::{self, PARALLEL_FROM_BOXES, search};
 use crate::report::{Checks, Clock, stage};
-use crate::{Aabb, Algorithm, Backend, Config, Engine, Pair, Plan, ProxyFilter};
+use crate::{Aabb, Algorithm, Backend, Config, Engine, Keys, Pair, Plan, ProxyFilter};
 use std::sync::atomic::AtomicU64;
 
 /// A search: boxes, filters and settings.
@@ -19,6 +19,24 @@ pub(crate) struct Request<'a> {
     pub(crate) config: &'a Config,
     /// The groups by which found pairs are counted, for [`Groups::gather`]. Without one they are not counted.
     pub(crate) grouping: Option<Grouping>,
+}
+
+/// What a search of a finder can have besides.
+#[derive(Clone, Copy, Default)]
+pub(crate) struct Extras<'a> {
+    /// By id; none if boxes have no keys.
+    pub(crate) keys: Option<&'a [Keys]>,
+    /// None if pairs are listed.
+    pub(crate) receiver: Option<Receiver<'a>>,
+}
+
+impl<'a> Request<'a> {
+    /// Returns the rule for pairs, which `found` counts.
+    pub(crate) fn rule(&self, extras: &Extras<'a>, found: &'a AtomicU64) -> Rule<'a> {
+        let Extras { keys, receiver } = *extras;
+        let max_pairs = if receiver.is_some() { u64::MAX } else { self.config.limits.pairs() };
+        Rule { filters: self.filters, keys, receiver, max_pairs, found }
+    }
 }
 
 /// The structures that can hold the boxes of a search.
@@ -44,11 +62,20 @@ impl AllPairs {
 
     /// Leaves all pairs in `hits`, and the boxes in `store` unless they were too few.
     pub(crate) fn find(&mut self, request: &Request<'_>, store: &mut Store) -> Outcome {
+        self.find_with(request, &Extras::default(), store)
+    }
+
+    /// As [`AllPairs::find`], but for boxes with keys, or without a list.
+    pub(crate) fn find_with(
+        &mut self,
+        request: &Request<'_>,
+        extras: &Extras<'_>,
+        store: &mut Store,
+    ) -> Outcome {
         let mut outcome = Outcome::default();
         self.begin(request);
         let found = AtomicU64::new(0);
-        let max_pairs = request.config.limits.pairs();
-        let rule = Rule { filters: request.filters, max_pairs, found: &found };
+        let rule = request.rule(extras, &found);
         let may_be_brute = request.config.engine.is_none();
         let is_few = may_be_brute && request.boxes.len() <= policy::BRUTE_FORCE_UP_TO_BOXES;
         let brute = request.config.backend == Backend::Brute || is_few;
@@ -57,20 +84,34 @@ impl AllPairs {
         } else {
             self.search(request, store, &rule, &mut outcome);
         }
+        let outcome = self.finish(&rule, outcome);
+        if outcome.end == End::Done {
+            store.work = outcome.checks.made;
+        }
+        outcome
+    }
+
+    /// Hands over what is left, and counts.
+    pub(crate) fn finish(&mut self, rule: &Rule<'_>, mut outcome: Outcome) -> Outcome {
+        if let Some(receiver) = rule.receiver {
+            self.hits.iter_mut().for_each(|hits| hits.hand_over(receiver));
+        }
         let sum = |of: fn(&Hits) -> u64| self.hits.iter().map(of).sum::<u64>();
         let (made, overlaps) = (sum(|hits| hits.tests), sum(|hits| hits.overlaps));
         outcome.checks = Checks { made, unnecessary: made - overlaps, redundant: 0 };
         outcome.work = made + sum(|hits| hits.runs);
-        let is_too_many =
-            self.hits.iter().any(Hits::is_full) || sum(|hits| hits.pairs.len() as u64) > max_pairs;
-        if is_too_many {
+        if self.hits.iter().any(Hits::is_full) || self.count() > rule.max_pairs {
             return Outcome { end: End::TooManyPairs, valid: Valid::Nothing, ..outcome };
         }
-        store.work = made;
         Outcome { end: End::Done, ..outcome }
     }
 
-    fn begin(&mut self, request: &Request<'_>) {
+    /// Returns the number of pairs of the last search.
+    pub(crate) fn count(&self) -> u64 {
+        self.hits.iter().map(Hits::count).sum()
+    }
+
+    pub(crate) fn begin(&mut self, request: &Request<'_>) {
         let workers = Self::workers(request.boxes.len());
         self.hits.resize_with(workers, Hits::default);
         let Grouping { count, shift, .. } = request.grouping.unwrap_or_default();
@@ -99,7 +140,9 @@ impl AllPairs {
             store.grid.build(plan, request.boxes, workers)
         };
         outcome.stages.map += clock.lap();
-        let is_grid = self.is_for_grid(request, &sorted);
+        let (boxes, work) = (sorted.boxes(), sorted.work(workers));
+        let vain = |step: usize, hits: &mut _| sorted.vain_work(step, request.filters, hits);
+        let is_grid = self.is_for_grid(request, (boxes, boxes), work, vain);
         if is_grid {
             stage!("check");
             sorted.search(rule, &mut self.hits);
@@ -112,18 +155,23 @@ impl AllPairs {
         }
     }
 
-    /// Returns true if a grid finds the pairs with less work than a tree.
-    fn is_for_grid(&mut self, request: &Request<'_>, sorted: &Sorted<'_>) -> bool {
+    /// Returns true if a grid finds the pairs of boxes, of which some are searched for, with less work than a tree. `vain_work`
+    /// estimates the work in vain from one box in a number.
+    pub(crate) fn is_for_grid(
+        &mut self,
+        request: &Request<'_>,
+        (boxes, searched): (usize, usize),
+        work: u64,
+        vain_work: impl FnOnce(usize, &mut Hits) -> u64,
+    ) -> bool {
         if let Some(engine) = request.config.engine {
             return engine != Engine::Tree;
         }
-        let (boxes, work) = (sorted.boxes(), sorted.work(self.hits.len()));
         if search::is_light(boxes, work) {
             return true;
         }
         let hits = &mut self.hits[0];
-        let step = search::sample_one_in(boxes, work);
-        let vain = sorted.vain_work(step, request.filters, hits);
+        let vain = vain_work(search::sample_one_in(searched, work), hits);
         let Grouping { count, shift, .. } = request.grouping.unwrap_or_default();
         hits.begin(count, shift);
         search::is_light(boxes, vain)

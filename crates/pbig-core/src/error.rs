@@ -28,13 +28,21 @@ pub enum Error {
         /// The limit in force.
         limit: u64,
     },
-    /// `find_filtered` was given lists of different lengths.
+    /// The lists of boxes and filters have different lengths.
     #[error("{filters} filters for {boxes} boxes: give one filter for each box")]
     FilterCount {
         /// Length of the list of boxes.
         boxes: usize,
         /// Length of the list of filters.
         filters: usize,
+    },
+    /// [`crate::Boxes`] have other numbers of boxes and of keys.
+    #[error("{keys} entries of keys for {boxes} boxes: give one entry for each box")]
+    KeyCount {
+        /// Length of the list of boxes.
+        boxes: usize,
+        /// Length of the list of keys.
+        keys: usize,
     },
     /// A margin that is negative, infinite or NaN.
     #[error("margin {margin} is not a finite length of at least 0")]

@@ -1,12 +1,18 @@
 //! `Finder`: all pairs of a list of boxes, with nothing kept between calls but memory.
 
-use crate::all_pairs::{AllPairs, Request, Store};
+use crate::all_pairs::{AllPairs, Extras, Request, Store};
+use crate::between::{Sets, TwoSets};
 use crate::device::{PairDevice, SearchRequest};
 use crate::device_slot::DeviceSlot;
 use crate::outcome::Outcome;
 use crate::pairs::{Grouping, Groups};
 use crate::report::{Clock, Report, stage};
-use crate::{Aabb, Config, Error, Limits, Order, Pair, ProxyFilter};
+use crate::{Aabb, Backend, Boxes, Config, Error, Keys, Limits, Order, Pair, ProxyFilter, keys};
+
+mod between;
+mod for_each;
+
+pub use between::find_pairs_between;
 
 /// Returns every pair of overlapping boxes, sorted, with default settings.
 ///
@@ -46,7 +52,11 @@ pub struct Finder {
     store: Store,
     all_pairs: AllPairs,
     groups: Groups,
+    sets: Sets,
+    two_sets: TwoSets,
     pairs: Vec<Pair>,
+    /// Pairs of two sets: the ids of a [`crate::CrossPair`].
+    crossing: Vec<Pair>,
     report: Report,
 }
 
@@ -77,7 +87,7 @@ impl Finder {
     /// # Errors
     /// [`Error::TooManyBoxes`] and [`Error::TooManyPairs`], see [`crate::Limits`].
     pub fn find(&mut self, boxes: &[Aabb]) -> Result<&[Pair], Error> {
-        self.find_where(boxes, None)
+        self.list(Boxes::new(boxes))
     }
 
     /// Returns every pair of overlapping boxes that both filters allow.
@@ -85,17 +95,31 @@ impl Finder {
     /// # Errors
     /// The errors of [`Finder::find`], and [`Error::FilterCount`].
     pub fn find_filtered(&mut self, boxes: &[Aabb], filters: &[ProxyFilter]) -> Result<&[Pair], Error> {
-        if boxes.len() != filters.len() {
-            self.forget();
-            return Err(Error::FilterCount { boxes: boxes.len(), filters: filters.len() });
-        }
-        self.find_where(boxes, Some(filters))
+        self.list(Boxes::new(boxes).with_filters(filters))
     }
 
-    fn find_where(&mut self, boxes: &[Aabb], filters: Option<&[ProxyFilter]>) -> Result<&[Pair], Error> {
-        self.forget();
-        check_count(boxes.len() as u64, &self.config.limits)?;
-        self.report.boxes = boxes.len() as u64;
+    /// Returns every pair of overlapping boxes that have no key in common: edges or triangles of a mesh, for example, that do not
+    /// share a vertex. There is one entry of keys for each box.
+    ///
+    /// ```
+    /// use pbig_core::{Aabb, Finder, NO_KEY, Pair};
+    /// let boxes = [Aabb::new([0.0; 3], [1.0; 3]); 3];
+    /// let triangles = [[0, 1, 2], [2, 1, 3], [4, 5, 6]].map(|[u, v, w]| [u, v, w, NO_KEY]);
+    /// let mut finder = Finder::default();
+    /// let pairs = finder.find_without_shared(&boxes, &triangles)?;
+    /// assert_eq!(pairs, [Pair::new(0, 2), Pair::new(1, 2)]);
+    /// # Ok::<(), pbig_core::Error>(())
+    /// ```
+    ///
+    /// # Errors
+    /// The errors of [`Finder::find`], and [`Error::KeyCount`].
+    pub fn find_without_shared(&mut self, boxes: &[Aabb], keys: &[Keys]) -> Result<&[Pair], Error> {
+        self.list(Boxes::new(boxes).with_keys(keys))
+    }
+
+    fn list(&mut self, all: Boxes<'_>) -> Result<&[Pair], Error> {
+        self.begin(&[all])?;
+        let Boxes { boxes, filters, keys } = all;
         let is_sorted = self.config.order == Order::Sorted;
         let grouping = is_sorted.then(|| Grouping::new(boxes.len()));
         // A copy, so that the finder is free for its backends.
@@ -103,13 +127,40 @@ impl Finder {
         let request = Request { boxes, filters, config: &config, grouping };
         let is_wanted = self.device.is_wanted(&self.config, boxes.len(), &mut self.report);
         let is_found = is_wanted && self.find_on_device(&request)?;
-        if !is_found {
-            let outcome = self.all_pairs.find(&request, &mut self.store);
-            self.add(outcome, boxes.len())?;
+        if is_found {
+            self.drop_shared(keys);
+        } else {
+            let extras = Extras { keys, receiver: None };
+            let outcome = self.all_pairs.find_with(&request, &extras, &mut self.store);
+            self.add(outcome)?;
             self.emit(grouping);
         }
         self.report.pairs = self.pairs.len() as u64;
         Ok(&self.pairs)
+    }
+
+    /// Begins a search: forgets the last one, and checks the boxes.
+    fn begin(&mut self, sets: &[Boxes<'_>]) -> Result<(), Error> {
+        self.forget();
+        sets.iter().try_for_each(Boxes::check)?;
+        let boxes = sets.iter().map(|set| set.boxes.len() as u64).sum();
+        check_count(boxes, &self.config.limits)?;
+        self.report.boxes = boxes;
+        Ok(())
+    }
+
+    /// Drops pairs with a key in common: a device does not know keys.
+    fn drop_shared(&mut self, keys: Option<&[Keys]>) {
+        if let Some(keys) = keys {
+            self.pairs.retain(|pair| keys::are_apart(&keys[pair.a as usize], &keys[pair.b as usize]));
+        }
+    }
+
+    /// Says in the report that a device was wanted for what no device does.
+    fn note_no_device(&mut self) {
+        if self.config.backend == Backend::Device {
+            self.report.fallback = Some("a device lists the pairs of one set: the CPU does the work".into());
+        }
     }
 
     /// Returns true if a device has found the pairs.
@@ -120,7 +171,7 @@ impl Finder {
         let pairs = std::mem::take(&mut self.pairs);
         let call = |device: &mut dyn PairDevice, found: &mut _| device.find_all(&request, found);
         let (outcome, found) = self.device.call(boxes.len(), pairs, call);
-        if !self.add(outcome, boxes.len())? {
+        if !self.add(outcome)? {
             return Ok(false);
         }
         if found.pairs.len() as u64 > max_pairs {
@@ -135,10 +186,10 @@ impl Finder {
         Ok(true)
     }
 
-    /// Adds the outcome of a search of this number of boxes to the report. Returns false if it was given up.
-    fn add(&mut self, outcome: Outcome, boxes: usize) -> Result<bool, Error> {
+    /// Adds the outcome of a search to the report. Returns false if it was given up.
+    fn add(&mut self, outcome: Outcome) -> Result<bool, Error> {
         let is_done = self.report.add(outcome, &self.config);
-        self.report.invalid = boxes as u64 - u64::from(self.report.plan.boxes);
+        self.report.invalid = self.report.boxes - u64::from(self.report.plan.boxes);
         is_done
     }
 
@@ -158,10 +209,11 @@ impl Finder {
     /// Forgets the last call, so that no result of it remains if the next one fails.
     fn forget(&mut self) {
         self.pairs.clear();
+        self.crossing.clear();
         self.report = Report::default();
     }
 
-    /// Returns the pairs of the last call; none if it failed.
+    /// Returns the pairs of the last call that lists pairs of one set; none if it failed.
     pub fn pairs(&self) -> &[Pair] {
         &self.pairs
     }

@@ -1,6 +1,6 @@
 //! Brute force: the definition of right. Every backend must return this set.
 
-use crate::{Aabb, Pair, ProxyFilter};
+use crate::{Aabb, CrossPair, Pair, ProxyFilter};
 
 /// Returns every pair of valid boxes that overlap, sorted. Quadratic time.
 ///
@@ -18,6 +18,26 @@ pub fn pairs(boxes: &[Aabb]) -> Vec<Pair> {
 pub fn pairs_filtered(boxes: &[Aabb], filters: &[ProxyFilter]) -> Vec<Pair> {
     let filter = |id: u32| filters.get(id as usize);
     pairs_where(boxes, |a, b| filter(a).zip(filter(b)).is_some_and(|(a, b)| a.allows(b)))
+}
+
+/// Returns every pair of a valid box of `a` and a valid box of `b` that overlap, sorted. Quadratic time.
+///
+/// ```
+/// use pbig_core::{oracle, Aabb, CrossPair};
+/// let unit = Aabb::new([0.0; 3], [1.0; 3]);
+/// assert_eq!(oracle::pairs_between(&[unit], &[Aabb::NOWHERE, unit]), [CrossPair { a: 0, b: 1 }]);
+/// ```
+pub fn pairs_between(a: &[Aabb], b: &[Aabb]) -> Vec<CrossPair> {
+    let columns = Columns::new(b);
+    let mut found = Vec::new();
+    for (a, one) in (0..).zip(a).filter(|(_, one)| one.is_valid()) {
+        for start in (0..b.len()).step_by(BLOCK) {
+            let hits = columns.overlaps(one, start);
+            let hits = hits.iter().zip(start as u32..).filter(|(hit, _)| **hit != 0);
+            found.extend(hits.map(|(_, b)| CrossPair { a, b }));
+        }
+    }
+    found
 }
 
 /// Boxes tested against one box before their results are looked at.
@@ -108,6 +128,19 @@ mod tests {
                 })
                 .collect();
             assert_eq!(pairs(&boxes), nested_loops(&boxes), "n = {n}");
+        }
+    }
+
+    #[test]
+    fn pairs_between_two_sets_are_those_of_one_set_across() {
+        for (n, m) in [(0, 9), (9, 0), (1, 1), (33, 31), (64, 65)] {
+            let cube =
+                |i: usize| Aabb::from_center([(i * i % 31) as f32, 0.0, 0.0], [(i % 5) as f32 - 0.5; 3]);
+            let all: Vec<_> = (0..n + m).map(cube).collect();
+            let across =
+                nested_loops(&all).into_iter().filter(|pair| (pair.a as usize) < n && pair.b as usize >= n);
+            let across: Vec<_> = across.map(|pair| CrossPair { a: pair.a, b: pair.b - n as u32 }).collect();
+            assert_eq!(pairs_between(&all[..n], &all[n..]), across, "{n} and {m}");
         }
     }
 

@@ -1,4 +1,4 @@
-//! A pair of box ids.
+//! Pairs of box ids.
 
 use bytemuck::{Pod, Zeroable};
 
@@ -10,6 +10,18 @@ pub struct Pair {
     /// The smaller id.
     pub a: u32,
     /// The larger id.
+    pub b: u32,
+}
+
+/// A box of a first set and a box of a second one that overlap: two ids of two lists, so either may be the larger. Ordered by
+/// `a`, then `b`.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash, Pod, Zeroable)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct CrossPair {
+    /// The id in the first set.
+    pub a: u32,
+    /// The id in the second set.
     pub b: u32,
 }
 

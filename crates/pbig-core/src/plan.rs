@@ -1,6 +1,6 @@
 //! The plan in a report: what was done, and why, in words.
 
-use crate::grid::{EditedGrid, NeighbourScan};
+use crate::grid::{EditedGrid, GridPlan, NeighbourScan};
 use crate::policy::NoDevice;
 use std::fmt;
 
@@ -78,16 +78,21 @@ pub struct Plan {
 impl Plan {
     /// Describes a grid that was used.
     pub(crate) fn of_grid(algorithm: Algorithm, edited: &EditedGrid) -> Self {
-        let grid = edited.grid();
+        let (grid, spilled) = (edited.grid(), edited.spilled() as u32);
+        let (boxes, oversize) = (grid.len + grid.oversize.len(), grid.oversize.len());
+        Self { spilled, ..Self::of_cells(algorithm, &grid.plan, boxes, oversize) }
+    }
+
+    /// Describes the cells of a grid, or of two.
+    pub(crate) fn of_cells(algorithm: Algorithm, plan: &GridPlan, boxes: usize, oversize: usize) -> Self {
         Self {
             algorithm,
-            boxes: (grid.len + grid.oversize.len()) as u32,
-            origin: grid.plan.cells.origin(),
-            cell: grid.plan.cells.edges(),
-            dims: grid.plan.cells.dims(),
-            scan: grid.plan.scan,
-            oversize: grid.oversize.len() as u32,
-            spilled: edited.spilled() as u32,
+            boxes: boxes as u32,
+            origin: plan.cells.origin(),
+            cell: plan.cells.edges(),
+            dims: plan.cells.dims(),
+            scan: plan.scan,
+            oversize: oversize as u32,
             ..Self::default()
         }
     }

@@ -19,6 +19,8 @@ pub mod follower;
 #[cfg(feature = "run")]
 pub mod gpu_race;
 pub mod hard;
+#[cfg(feature = "files")]
+pub mod mesh;
 pub mod motions;
 #[cfg(feature = "run")]
 pub mod options;

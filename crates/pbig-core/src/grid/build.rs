@@ -53,16 +53,21 @@ impl Split {
 impl Grid {
     /// Sorts the valid boxes, `boxes[id]` with the id `id`, into cells.
     pub(crate) fn build(&mut self, plan: GridPlan, boxes: &[Aabb], workers: usize) -> Sorted<'_> {
+        self.build_from(plan, boxes, 0, workers);
+        Sorted { grid: self }
+    }
+
+    /// Sorts the valid boxes into cells; the first box has this id.
+    pub(super) fn build_from(&mut self, plan: GridPlan, boxes: &[Aabb], first_id: u32, workers: usize) {
         self.plan = plan;
         let split = Split::new(boxes.len(), self.plan.cells.count(), workers);
         self.reserve(boxes.len());
         self.count(boxes, split, workers);
         let in_buckets = self.place(split);
-        self.list_oversize(boxes);
-        self.scatter(boxes, split, workers);
+        self.list_oversize(boxes, first_id);
+        self.scatter((boxes, first_id), split, workers);
         self.sort_buckets(&in_buckets, split, workers);
         self.bucket_starts = in_buckets;
-        Sorted { grid: self }
     }
 
     fn reserve(&mut self, boxes: usize) {
@@ -106,25 +111,26 @@ impl Grid {
         starts
     }
 
-    fn list_oversize(&mut self, boxes: &[Aabb]) {
+    fn list_oversize(&mut self, boxes: &[Aabb], first_id: u32) {
         self.oversize.clear();
         if self.len + self.invalid as usize == boxes.len() {
             return;
         }
-        for (id, aabb) in boxes.iter().enumerate().filter(|(id, _)| self.keys[*id] == OVERSIZE) {
-            self.oversize.push(Record::new(*aabb, id as u32, OVERSIZE));
+        for (i, aabb) in boxes.iter().enumerate().filter(|(i, _)| self.keys[*i] == OVERSIZE) {
+            self.oversize.push(Record::new(*aabb, first_id + i as u32, OVERSIZE));
         }
     }
 
     /// Brings records into their buckets.
-    fn scatter(&mut self, boxes: &[Aabb], split: Split, workers: usize) {
+    fn scatter(&mut self, (boxes, first_id): (&[Aabb], u32), split: Split, workers: usize) {
         let (coarse, counts) = (SharedSlice::new(&mut self.coarse), SharedSlice::new(&mut self.counts));
         let keys = &self.keys;
         run(workers, split.pieces, |_, piece| {
             // SAFETY: each piece has its own counts.
             let next = unsafe { &mut counts.part(piece..piece + 1)[0].0 };
             let range = piece_range(boxes.len(), piece, split.pieces);
-            let (boxes, keys, first_id) = (&boxes[range.clone()], &keys[range.clone()], range.start as u32);
+            let first_id = first_id + range.start as u32;
+            let (boxes, keys) = (&boxes[range.clone()], &keys[range]);
             dispatch!(scatter_records, boxes, keys, first_id, next, coarse, split.shift);
         });
     }

@@ -1,6 +1,6 @@
 //! Counts the work of a search before the search: once boxes are sorted, the slots that each would visit are known.
 
-use super::cells::{Cells, query_of};
+use super::cells::query_of;
 use super::hits::{Hits, Rule};
 use super::plan::NeighbourScan;
 use super::record::Record;
@@ -13,7 +13,7 @@ use std::ops::Range;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 /// Slots that are counted together.
-const PIECE: usize = PARALLEL_FROM_BOXES;
+pub(super) const PIECE: usize = PARALLEL_FROM_BOXES;
 
 impl Sorted<'_> {
     /// Returns the number of boxes.
@@ -42,7 +42,8 @@ impl Sorted<'_> {
     /// Estimates the work in vain of a search, by a sample of one box in `step`: the tests of each box that its own overlaps do not
     /// pay for. A box that meets thousands does not pay for others that meet none. `hits` are scratch.
     pub(crate) fn vain_work(&self, step: usize, filters: Option<&[ProxyFilter]>, hits: &mut Hits) -> u64 {
-        let rule = Rule { filters, max_pairs: u64::MAX, found: &AtomicU64::new(0) };
+        let found = AtomicU64::new(0);
+        let rule = Rule::listing(filters, &found);
         let (len, oversize) = (self.grid.len, self.grid.oversize.len());
         let mut in_grid = 0;
         for slot in scattered(0..len, step) {
@@ -64,7 +65,7 @@ impl Sorted<'_> {
 /// Yields a number of every `step` in a range, each somewhere else in its part: a pattern in the order of the boxes cannot
 /// bias a sample.
 #[inline(always)]
-fn scattered(range: Range<usize>, step: usize) -> impl Iterator<Item = usize> {
+pub(super) fn scattered(range: Range<usize>, step: usize) -> impl Iterator<Item = usize> {
     const GOLDEN: u64 = 0x9E37_79B9_7F4A_7C15;
     let at = move |first: usize| {
         let hash = (first as u64).wrapping_mul(GOLDEN) >> 32;
@@ -76,7 +77,7 @@ fn scattered(range: Range<usize>, step: usize) -> impl Iterator<Item = usize> {
 
 impl Grid {
     /// Returns the work of an oversize box: the rows of cells that it reaches, and the boxes in them.
-    fn work_of_oversize(&self, one: &Record) -> u64 {
+    pub(super) fn work_of_oversize(&self, one: &Record) -> u64 {
         let mut work = 0;
         self.reached_by(&one.aabb, |run| {
             let (first, end) = self.slots(run);
@@ -89,13 +90,13 @@ impl Grid {
 /// Counts the slots that one box in [`search::COUNT_ONE_IN`] visits.
 #[inline(always)]
 fn count_slots(simd: impl Simd, grid: &Grid, slots: Range<usize>) -> u64 {
-    let cells = grid.plan.cells;
+    let half = |(rows, slots): (u64, u64)| rows + slots / 2;
     let mut work = 0;
     for slot in scattered(slots, search::COUNT_ONE_IN) {
-        let slots = match (grid.plan.scan, cells.wraps) {
+        let slots = match (grid.plan.scan, grid.plan.cells.wraps) {
             (NeighbourScan::Runs, _) => in_runs(grid, slot),
-            (NeighbourScan::Windows, false) => in_window::<false>(simd, grid, &cells, slot),
-            (NeighbourScan::Windows, true) => in_window::<true>(simd, grid, &cells, slot),
+            (NeighbourScan::Windows, false) => half(in_window::<false>(simd, grid, grid, slot)),
+            (NeighbourScan::Windows, true) => half(in_window::<true>(simd, grid, grid, slot)),
         };
         let is_vague = has_vague_code(simd, grid, slot);
         work += if is_vague { slots * search::WORK_OF_VAGUE_TEST } else { slots };
@@ -124,10 +125,16 @@ fn in_runs(grid: &Grid, slot: usize) -> u64 {
     own + row(key + dx - 1) + row(key + layer - dx - 1) + row(key + layer - 1) + row(key + layer + dx - 1)
 }
 
-/// Returns half of the slots in a box's window.
+/// Returns the rows and slots of a grid in the window of a box, which lies in a slot of the same grid or of another one.
 #[inline(always)]
-fn in_window<const WRAPS: bool>(simd: impl Simd, grid: &Grid, cells: &Cells, slot: usize) -> u64 {
-    let (low, high) = simd.steps(cells, &grid.records[slot].aabb);
+pub(super) fn in_window<const WRAPS: bool>(
+    simd: impl Simd,
+    own: &Grid,
+    grid: &Grid,
+    slot: usize,
+) -> (u64, u64) {
+    let cells = &grid.plan.cells;
+    let (low, high) = simd.steps(cells, &own.records[slot].aabb);
     let window = cells.window(low, high);
     let (mut rows, mut slots) = (0, 0);
     for z in window.low[2]..=window.high[2] {
@@ -138,5 +145,5 @@ fn in_window<const WRAPS: bool>(simd: impl Simd, grid: &Grid, cells: &Cells, slo
             }
         }
     }
-    rows + slots / 2
+    (rows, slots)
 }

@@ -6,7 +6,7 @@
 
 use super::record::Record;
 use super::simd::{BLOCK, Simd, eight_from, prefetch};
-use crate::{Pair, ProxyFilter};
+use crate::{Keys, Pair, ProxyFilter, keys};
 use std::sync::atomic::{AtomicU64, Ordering};
 
 /// Number of hits that are tested together.
@@ -18,18 +18,32 @@ const SLACK: usize = 8;
 /// Number of candidates between a prefetch and the test: a record from memory takes about as long.
 const AHEAD: usize = 24;
 
-/// Pairs that a thread gathers before it accounts for them.
+/// Pairs that a thread gathers before it accounts for them, or hands them over.
 const BATCH: usize = 4096;
 
-/// Conditions for a found pair, besides that its boxes overlap.
-#[derive(Clone, Copy, Debug)]
+/// Receiver of pairs that are not listed, some at a time. Each thread calls it.
+pub(crate) type Receiver<'a> = &'a (dyn Fn(&[Pair]) + Sync);
+
+/// Conditions for a found pair, besides that its boxes overlap, and where it goes.
+#[derive(Clone, Copy)]
 pub(crate) struct Rule<'a> {
     /// Filters by id; none if all may pair.
     pub(crate) filters: Option<&'a [ProxyFilter]>,
+    /// Keys by id; none if boxes have no keys.
+    pub(crate) keys: Option<&'a [Keys]>,
+    /// None if pairs are listed.
+    pub(crate) receiver: Option<Receiver<'a>>,
     /// Pairs that may be found.
     pub(crate) max_pairs: u64,
     /// Pairs found by all threads.
     pub(crate) found: &'a AtomicU64,
+}
+
+impl<'a> Rule<'a> {
+    /// Makes a rule for a list of pairs, however many.
+    pub(crate) fn listing(filters: Option<&'a [ProxyFilter]>, found: &'a AtomicU64) -> Self {
+        Self { filters, keys: None, receiver: None, max_pairs: u64::MAX, found }
+    }
 }
 
 /// The pairs that one thread finds, and its buffers.
@@ -48,6 +62,8 @@ pub(crate) struct Hits {
     pub(crate) runs: u64,
     /// Overlapping boxes met, filtered ones included.
     pub(crate) overlaps: u64,
+    /// Pairs that a receiver got.
+    handed_over: u64,
     /// Pairs that other threads know of.
     accounted: usize,
     pub(super) is_full: bool,
@@ -96,7 +112,8 @@ impl Hits {
         self.groups.clear();
         self.groups.resize(groups, 0);
         self.group_shift = shift;
-        (self.tests, self.runs, self.overlaps, self.accounted, self.is_full) = (0, 0, 0, 0, false);
+        (self.tests, self.runs, self.overlaps, self.handed_over) = (0, 0, 0, 0);
+        (self.accounted, self.is_full) = (0, false);
     }
 
     /// Returns true if more pairs were found than may be.
@@ -104,17 +121,18 @@ impl Hits {
         self.is_full
     }
 
-    /// Tests all hits exactly and keeps the pairs that the rule allows.
+    /// Tests all hits exactly and keeps the pairs that the rule allows. Queries have slots of the first records, blocks of the
+    /// second ones.
     #[inline(always)]
     pub(super) fn flush(
         &mut self,
         simd: impl Simd,
         writer: &mut HitWriter<'_>,
-        records: &[Record],
+        (own, records): (&[Record], &[Record]),
         rule: &Rule<'_>,
     ) {
         let candidates = self.expand(simd, &writer.blocks[..writer.len]);
-        self.test(records, candidates, rule);
+        self.test(own, records, candidates, rule);
         writer.len = 0;
     }
 
@@ -132,7 +150,7 @@ impl Hits {
     }
 
     #[inline(always)]
-    fn test(&mut self, records: &[Record], candidates: usize, rule: &Rule<'_>) {
+    fn test(&mut self, own: &[Record], records: &[Record], candidates: usize, rule: &Rule<'_>) {
         let from = self.pairs.len();
         self.pairs.reserve(candidates + 1);
         let (queries, places) = (&self.queries[..candidates], &self.places[..candidates + AHEAD]);
@@ -142,7 +160,7 @@ impl Hits {
             let mut next = start;
             for (i, query) in queries.iter().enumerate() {
                 prefetch(records.as_ptr().wrapping_add(places[i + AHEAD] as usize));
-                let (one, other) = (&records[*query as usize], &records[places[i] as usize]);
+                let (one, other) = (&own[*query as usize], &records[places[i] as usize]);
                 next.write(Pair::new(one.id, other.id));
                 next = next.add(usize::from(one.overlaps(other)));
             }
@@ -156,7 +174,16 @@ impl Hits {
     pub(crate) fn keep(&mut self, from: usize, rule: &Rule<'_>) {
         self.overlaps += (self.pairs.len() - from) as u64;
         if let Some(filters) = rule.filters {
-            self.filter(from, filters);
+            self.filter(from, filters, ProxyFilter::allows);
+        }
+        if let Some(keys) = rule.keys {
+            self.filter(from, keys, keys::are_apart);
+        }
+        if let Some(receiver) = rule.receiver {
+            if self.pairs.len() >= BATCH {
+                self.hand_over(receiver);
+            }
+            return;
         }
         self.count_groups(from);
         let new = self.pairs.len() - self.accounted;
@@ -164,6 +191,44 @@ impl Hits {
             self.accounted = self.pairs.len();
             let found = rule.found.fetch_add(new as u64, Ordering::Relaxed) + new as u64;
             self.is_full |= found > rule.max_pairs;
+        }
+    }
+
+    /// Hands over the pairs so far.
+    pub(crate) fn hand_over(&mut self, receiver: Receiver<'_>) {
+        self.handed_over += self.pairs.len() as u64;
+        receiver(&self.pairs);
+        self.pairs.clear();
+    }
+
+    /// Returns the number of pairs found: listed ones, and those that a receiver got.
+    pub(crate) fn count(&self) -> u64 {
+        self.handed_over + self.pairs.len() as u64
+    }
+
+    /// Tests a box exactly against each of a run, some at a time, and keeps the pairs that the rule allows.
+    pub(super) fn test_run(&mut self, one: &Record, run: &[Record], rule: &Rule<'_>) {
+        for run in run.chunks(BATCH) {
+            let from = self.pairs.len();
+            self.tests += run.len() as u64;
+            self.push_overlapping(one, run);
+            self.keep(from, rule);
+        }
+    }
+
+    /// Appends the pairs of a box with those of a run that overlap it.
+    fn push_overlapping(&mut self, one: &Record, run: &[Record]) {
+        let from = self.pairs.len();
+        self.pairs.reserve(run.len() + 1);
+        // SAFETY: there is room for a pair of each, and one more to be overwritten.
+        unsafe {
+            let start = self.pairs.as_mut_ptr().add(from);
+            let mut next = start;
+            for other in run {
+                next.write(Pair::new(one.id, other.id));
+                next = next.add(usize::from(one.overlaps(other)));
+            }
+            self.pairs.set_len(from + next.offset_from(start) as usize);
         }
     }
 
@@ -183,18 +248,18 @@ impl Hits {
         self.count_groups(0);
     }
 
-    /// Drops the pairs from `from` on that filters exclude.
+    /// Drops the pairs from `from` on whose filters, or keys, do not allow them.
     #[inline(always)]
-    fn filter(&mut self, from: usize, filters: &[ProxyFilter]) {
+    fn filter<T>(&mut self, from: usize, by_id: &[T], allow: impl Fn(&T, &T) -> bool) {
         let (mut kept, len) = (from, self.pairs.len());
         for i in from..len {
             if let Some(ahead) = self.pairs.get(i + AHEAD) {
-                prefetch(filters.as_ptr().wrapping_add(ahead.a as usize));
-                prefetch(filters.as_ptr().wrapping_add(ahead.b as usize));
+                prefetch(by_id.as_ptr().wrapping_add(ahead.a as usize));
+                prefetch(by_id.as_ptr().wrapping_add(ahead.b as usize));
             }
             let pair = self.pairs[i];
             self.pairs[kept] = pair;
-            kept += usize::from(filters[pair.a as usize].allows(&filters[pair.b as usize]));
+            kept += usize::from(allow(&by_id[pair.a as usize], &by_id[pair.b as usize]));
         }
         self.pairs.truncate(kept);
     }

@@ -8,6 +8,7 @@
 //! A search visits half of each box's neighbouring cells as contiguous runs of slots, tests 64-bit codes (`cells`), and
 //! tests exactly what these leave over.
 
+mod across;
 #[cfg(target_arch = "x86_64")]
 mod avx2;
 mod bounds;
@@ -26,10 +27,11 @@ mod simd;
 #[cfg(test)]
 mod tests;
 
+pub(crate) use across::{Across, TwoGrids, brute_force_across};
 #[cfg(target_arch = "x86_64")]
 pub(crate) use avx2::Avx2;
 pub(crate) use edit::EditedGrid;
-pub(crate) use hits::{Hits, Rule};
+pub(crate) use hits::{Hits, Receiver, Rule};
 pub(crate) use lookup::{Budget, Candidates, Meet, Place};
 pub use occupied::OccupiedCell;
 pub(crate) use oversize::brute_force;
@@ -57,7 +59,7 @@ pub(crate) struct Grid {
     pub(crate) oversize: Vec<Record>,
     /// Invalid boxes met by the last build.
     pub(crate) invalid: u32,
-    /// By id: the key of the last build.
+    /// By box: the key of the last build.
     keys: Vec<u32>,
     /// The records by bucket, of the last build.
     coarse: Vec<Record>,

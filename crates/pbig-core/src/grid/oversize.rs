@@ -6,21 +6,23 @@ use super::hits::{Hits, Rule};
 use super::record::Record;
 use super::search::KeyRun;
 use super::simd::{Simd, dispatch};
-use crate::{Aabb, Pair};
+use crate::Aabb;
 
 impl Grid {
     /// Finds the pairs of an oversize box with the boxes in the grid, and with the oversize boxes after it.
     pub(super) fn find_oversize_pairs(&self, i: usize, rule: &Rule<'_>, hits: &mut Hits) {
         let one = &self.oversize[i];
-        let from = hits.pairs.len();
+        self.find_reached(one, rule, hits);
+        hits.test_run(one, &self.oversize[i + 1..], rule);
+    }
+
+    /// Finds the pairs of an oversize box, of this grid or another one of the same plan, with the boxes in the grid.
+    pub(super) fn find_reached(&self, one: &Record, rule: &Rule<'_>, hits: &mut Hits) {
         self.reached_by(&one.aabb, |run| {
             let (first, end) = self.slots(run);
-            (hits.tests, hits.runs) = (hits.tests + (end - first) as u64, hits.runs + 1);
-            test_run(one, &self.records[first..end], &mut hits.pairs);
+            hits.runs += 1;
+            hits.test_run(one, &self.records[first..end], rule);
         });
-        hits.tests += (self.oversize.len() - i - 1) as u64;
-        test_run(one, &self.oversize[i + 1..], &mut hits.pairs);
-        hits.keep(from, rule);
     }
 
     /// Visits the cells in which boxes can lie that overlap a box of any size.
@@ -66,22 +68,6 @@ fn window_of(simd: impl Simd, cells: &Cells, aabb: &Aabb) -> Window {
     cells.window(low, high)
 }
 
-/// Appends the pairs of a box with those of a run that overlap it.
-pub(super) fn test_run(one: &Record, run: &[Record], pairs: &mut Vec<Pair>) {
-    let from = pairs.len();
-    pairs.reserve(run.len() + 1);
-    // SAFETY: there is room for a pair of each, and one more to be overwritten.
-    unsafe {
-        let start = pairs.as_mut_ptr().add(from);
-        let mut next = start;
-        for other in run {
-            next.write(Pair::new(one.id, other.id));
-            next = next.add(usize::from(one.overlaps(other)));
-        }
-        pairs.set_len(from + next.offset_from(start) as usize);
-    }
-}
-
 /// Tests every pair of valid boxes; returns how many are valid.
 pub(crate) fn brute_force(boxes: &[Aabb], rule: &Rule<'_>, hits: &mut Hits) -> usize {
     let valid = boxes.iter().enumerate().filter(|(_, aabb)| aabb.is_valid());
@@ -89,10 +75,7 @@ pub(crate) fn brute_force(boxes: &[Aabb], rule: &Rule<'_>, hits: &mut Hits) -> u
     records.clear();
     records.extend(valid.map(|(id, aabb)| Record::new(*aabb, id as u32, 0)));
     for (i, one) in records.iter().enumerate() {
-        let from = hits.pairs.len();
-        hits.tests += (records.len() - i - 1) as u64;
-        test_run(one, &records[i + 1..], &mut hits.pairs);
-        hits.keep(from, rule);
+        hits.test_run(one, &records[i + 1..], rule);
         if hits.is_full {
             break;
         }

@@ -12,10 +12,10 @@ use crate::policy::PARALLEL_FROM_BOXES;
 use std::ops::Range;
 
 /// Number of boxes in a piece of work: enough to hide the cost of handing it out, few enough to balance.
-const PIECE: Range<usize> = 512..16_384;
+pub(super) const PIECE: Range<usize> = 512..16_384;
 
 /// Number of oversize boxes in a piece of work.
-const OVERSIZE_PIECE: usize = 4;
+pub(super) const OVERSIZE_PIECE: usize = 4;
 
 impl Sorted<'_> {
     /// Finds all pairs, into the lists of as many threads as there are `hits`.
@@ -51,7 +51,7 @@ impl Grid {
 fn search_piece(simd: impl Simd, grid: &Grid, slots: Range<usize>, rule: &Rule<'_>, hits: &mut Hits) {
     let mut blocks = [0; HIT_ROOM];
     let writer = HitWriter::new(&mut blocks);
-    let mut scan = Scan { simd, cells: grid.plan.cells, grid, rule, hits, writer };
+    let mut scan = Scan { simd, cells: grid.plan.cells, own: grid, grid, rule, hits, writer };
     match (grid.plan.scan, grid.plan.cells.wraps) {
         (NeighbourScan::Runs, _) => scan.runs(slots),
         (NeighbourScan::Windows, false) => scan.windows::<false>(slots),
@@ -60,20 +60,24 @@ fn search_piece(simd: impl Simd, grid: &Grid, slots: Range<usize>, rule: &Rule<'
     scan.finish();
 }
 
-struct Scan<'a, 'b, S> {
-    simd: S,
-    cells: Cells,
-    grid: &'a Grid,
-    rule: &'a Rule<'b>,
-    hits: &'a mut Hits,
-    writer: HitWriter<'a>,
+/// A search for the boxes of one grid in another one of the same plan, or in itself.
+pub(super) struct Scan<'a, 'b, S> {
+    pub(super) simd: S,
+    pub(super) cells: Cells,
+    /// The grid with the boxes that are searched for.
+    pub(super) own: &'a Grid,
+    /// The grid that is searched.
+    pub(super) grid: &'a Grid,
+    pub(super) rule: &'a Rule<'b>,
+    pub(super) hits: &'a mut Hits,
+    pub(super) writer: HitWriter<'a>,
 }
 
 /// A box that is searched for: its slot, and the query that finds its partners.
 #[derive(Clone, Copy)]
-struct Seeker {
-    slot: usize,
-    query: u64,
+pub(super) struct Seeker {
+    pub(super) slot: usize,
+    pub(super) query: u64,
 }
 
 impl<S: Simd> Scan<'_, '_, S> {
@@ -133,13 +137,15 @@ impl<S: Simd> Scan<'_, '_, S> {
     #[inline(always)]
     fn make_room(&mut self) {
         if !self.writer.has_room() {
-            self.hits.flush(self.simd, &mut self.writer, &self.grid.records, self.rule);
+            let records = (&self.own.records[..], &self.grid.records[..]);
+            self.hits.flush(self.simd, &mut self.writer, records, self.rule);
         }
     }
 
     #[inline(always)]
-    fn finish(mut self) {
-        self.hits.flush(self.simd, &mut self.writer, &self.grid.records, self.rule);
+    pub(super) fn finish(mut self) {
+        let records = (&self.own.records[..], &self.grid.records[..]);
+        self.hits.flush(self.simd, &mut self.writer, records, self.rule);
         self.hits.tests += self.writer.tests;
     }
 
@@ -177,7 +183,7 @@ impl<S: Simd> Scan<'_, '_, S> {
 
     /// Tests a row of cells.
     #[inline(always)]
-    fn row(&mut self, one: Seeker, row: [KeyRun; 2]) {
+    pub(super) fn row(&mut self, one: Seeker, row: [KeyRun; 2]) {
         for run in row {
             self.hits.runs += 1;
             self.slots(one, self.grid.slots(run));

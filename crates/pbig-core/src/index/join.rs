@@ -1,4 +1,4 @@
-//! Every pair of overlapping boxes: each leaf meets itself and the leaves behind it.
+//! Every pair of overlapping boxes: each leaf meets itself and the leaves behind it, or, between two sets, the leaves of the second.
 //!
 //! The eight boxes of a leaf lie near each other and have one size and shape, because the tree is cut at medians, along the axis on
 //! which boxes lie apart most, and has a part for each class. So a leaf looks at few nodes.
@@ -14,15 +14,30 @@ use std::ops::Range;
 /// Number of leaves in a piece of work.
 const PIECE: usize = 64;
 
+/// Pairs of a leaf that are kept together.
+const BATCH: usize = 4096;
+
 impl BoxIndex {
     /// Finds all pairs of the boxes as of the last sort, into the lists of as many threads as there are `hits`.
     pub(crate) fn find_pairs(&self, rule: &Rule<'_>, hits: &mut [Hits]) {
+        self.join(self.leaves, 0, rule, hits);
+    }
+
+    /// Finds all pairs of a box with an id below `split` and another box, as of the last [`BoxIndex::sort_sets`].
+    pub(crate) fn find_pairs_between(&self, split: u32, rule: &Rule<'_>, hits: &mut [Hits]) {
+        let leaves = &self.nodes[..self.leaves as usize];
+        let second_set = leaves.partition_point(|leaf| leaf.children[0] < split) as u32;
+        self.join(second_set, second_set, rule, hits);
+    }
+
+    /// Joins each of the first `leaves` with itself and those behind it, from `earliest` on.
+    fn join(&self, leaves: u32, earliest: u32, rule: &Rule<'_>, hits: &mut [Hits]) {
         debug_assert!(self.loose().is_empty());
-        let (last_leaves, leaves) = (self.last_leaves(), self.leaves as usize);
-        let workers = if leaves * LANES < PARALLEL_FROM_BOXES { 1 } else { hits.len() };
+        let (last_leaves, leaves) = (self.last_leaves(), leaves as usize);
+        let workers = if self.leaves as usize * LANES < PARALLEL_FROM_BOXES { 1 } else { hits.len() };
         run_with(&mut hits[..workers], leaves.div_ceil(PIECE), |hits, piece| {
             let leaves = piece * PIECE..leaves.min((piece + 1) * PIECE);
-            let join = &mut Join { index: self, last_leaves: &last_leaves, rule, hits };
+            let join = &mut Join { index: self, last_leaves: &last_leaves, earliest, rule, hits };
             dispatch!(Join::meet_all, join, leaves.clone());
         });
     }
@@ -41,6 +56,8 @@ impl BoxIndex {
 struct Join<'a, 'b> {
     index: &'a BoxIndex,
     last_leaves: &'a [u32],
+    /// The first leaf that others may meet.
+    earliest: u32,
     rule: &'a Rule<'b>,
     hits: &'a mut Hits,
 }
@@ -57,24 +74,30 @@ impl Join<'_, '_> {
         }
     }
 
-    /// Finds the pairs of a leaf's boxes with each other, and with those of later leaves.
+    /// Finds the pairs of a leaf's boxes with each other, and with those of later leaves, from the earliest on.
     #[inline(always)]
     fn meet(&mut self, simd: impl Simd, leaf: u32, waiting: &mut Vec<u32>) {
         let index = self.index;
         let bounds = index.nodes[leaf as usize].bounds();
-        let from = self.hits.pairs.len();
+        let earliest = leaf.max(self.earliest);
+        let mut from = self.hits.pairs.len();
         waiting.extend(index.root());
         while let Some(at) = waiting.pop() {
             self.hits.runs += 1;
             if index.is_leaf(at) {
                 self.test(simd, leaf, at);
+                // Boxes as large as the world meet all others.
+                if self.hits.pairs.len() >= from + BATCH {
+                    self.hits.keep(from, self.rule);
+                    from = self.hits.pairs.len();
+                }
                 continue;
             }
             let node = &index.nodes[at as usize];
             let mut lanes = simd.overlaps_eight(&node.boxes, &bounds);
             while let Some(lane) = next(&mut lanes) {
                 let child = node.children[lane];
-                if child != NONE && self.last_leaves[child as usize] >= leaf {
+                if child != NONE && self.last_leaves[child as usize] >= earliest {
                     waiting.push(child);
                 }
             }

@@ -22,7 +22,7 @@ impl BoxIndex {
             None => self.refit(boxes),
         }
         if self.wants_sort() || self.loose().len() > policy::loose_leaves(self.leaves) {
-            self.lay_out(boxes, self.has_earned_sort(1));
+            self.lay_out(boxes, self.has_earned_sort(1).then_some(u32::MAX));
         }
     }
 
@@ -61,13 +61,18 @@ impl BoxIndex {
 
     /// Sorts the boxes as they are now.
     pub fn sort(&mut self, boxes: &[Aabb]) {
-        self.lay_out(boxes, true);
+        self.sort_sets(boxes, u32::MAX);
+    }
+
+    /// Sorts the boxes of two sets: ids from `split` on are the second, and no leaf has boxes of both.
+    pub(crate) fn sort_sets(&mut self, boxes: &[Aabb], split: u32) {
+        self.lay_out(boxes, Some(split));
     }
 
     /// Reads all boxes.
     fn refit(&mut self, boxes: &[Aabb]) {
         if self.end == 0 {
-            return self.lay_out(boxes, false);
+            return self.lay_out(boxes, None);
         }
         dispatch!(Self::read_leaves, self, boxes);
         self.places.resize(boxes.len().max(self.places.len()), NONE);
@@ -157,8 +162,8 @@ impl BoxIndex {
         }
     }
 
-    /// Makes all nodes anew, in order of ids or sorted.
-    fn lay_out(&mut self, boxes: &[Aabb], sorted: bool) {
+    /// Makes all nodes anew, in order of ids, or sorted as two sets, the first with the ids below a number.
+    fn lay_out(&mut self, boxes: &[Aabb], split: Option<u32>) {
         let ids = (0u32..).zip(boxes).filter(|(_, aabb)| aabb.is_valid());
         let mut entries: Vec<Entry> = ids.map(|(id, aabb)| Entry::new(id, aabb)).collect();
         self.nodes.clear();
@@ -167,7 +172,7 @@ impl BoxIndex {
         self.places.clear();
         self.places.resize(boxes.len(), NONE);
         let all = 0..entries.len();
-        let classes = if sorted { sort(&mut entries) } else { Vec::from([all]) };
+        let classes = split.map_or_else(|| Vec::from([all]), |split| sort(&mut entries, split));
         let classes: Vec<_> = classes.into_iter().map(|class| self.push_leaves(&entries[class])).collect();
         self.leaves = self.nodes.len() as u32;
         let mut roots: Vec<u32> =
@@ -177,8 +182,8 @@ impl BoxIndex {
         self.end = self.nodes.len() as u32;
         dispatch!(Self::read_leaves, self, boxes);
         self.extents = self.nodes.iter().map(|node| extent_sum(&node.bounds())).collect();
-        (self.grown, self.is_sorted) = (0, sorted);
-        if sorted {
+        (self.grown, self.is_sorted) = (0, split.is_some());
+        if self.is_sorted {
             *self.looked_at.get_mut() = 0;
             self.has_moved = false;
         }

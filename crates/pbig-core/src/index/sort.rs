@@ -27,10 +27,12 @@ impl Entry {
         Self { center, exponents: [x, y, z, x.max(y).max(z)], id }
     }
 
-    fn class(&self) -> u32 {
+    /// Returns the class of the box; boxes with ids from `split` on are in classes of their own, the higher ones.
+    fn class(&self, split: u32) -> u32 {
         let [x, y, z, largest] = self.exponents;
         let is_long = |exponent: u8| u32::from(largest - exponent < 1 << CLASS_BITS);
-        u32::from(largest >> CLASS_BITS) << 3 | is_long(x) << 2 | is_long(y) << 1 | is_long(z)
+        let class = u32::from(largest >> CLASS_BITS) << 3 | is_long(x) << 2 | is_long(y) << 1 | is_long(z);
+        u32::from(self.id >= split) << 31 | class
     }
 }
 
@@ -44,14 +46,16 @@ fn with_exponent(exponent: u8) -> f64 {
     f64::from(f32::from_bits(u32::from(exponent.min(254)) << 23))
 }
 
-/// Sorts boxes by class, and within a class by place. Returns the classes.
-pub(super) fn sort(entries: &mut [Entry]) -> Vec<Range<usize>> {
-    if entries.windows(2).any(|two| two[0].class() != two[1].class()) {
-        entries.sort_unstable_by_key(|entry| entry.class());
+/// Sorts boxes by class, and within a class by place. Returns the classes. Boxes with ids from `split` on are another set: no class
+/// has boxes of both. But both are cut alike, because boxes that are long in one set keep those of the other from being cut across.
+pub(super) fn sort(entries: &mut [Entry], split: u32) -> Vec<Range<usize>> {
+    let are_alike = |a: &Entry, b: &Entry| a.class(split) == b.class(split);
+    if entries.windows(2).any(|two| !are_alike(&two[0], &two[1])) {
+        entries.sort_unstable_by_key(|entry| entry.class(split));
     }
-    let all: Vec<Measure> = entries.chunk_by(|a, b| a.class() == b.class()).map(Measure::of).collect();
+    let all: Vec<Measure> = entries.chunk_by(are_alike).map(Measure::of).collect();
     let (mut classes, mut first) = (Vec::new(), 0);
-    for class in entries.chunk_by_mut(|a, b| a.class() == b.class()) {
+    for class in entries.chunk_by_mut(are_alike) {
         sort_by_place(class, &all);
         classes.push(first..first + class.len());
         first += class.len();

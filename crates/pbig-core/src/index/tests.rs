@@ -95,7 +95,8 @@ fn compare(mut found: Vec<u32>, wanted: impl Iterator<Item = usize>, may_be: imp
 fn joined(boxes: &[Aabb], threads: usize) -> Vec<Pair> {
     let mut index = BoxIndex::default();
     index.sort(boxes);
-    let rule = Rule { filters: None, max_pairs: u64::MAX, found: &AtomicU64::new(0) };
+    let found = AtomicU64::new(0);
+    let rule = Rule::listing(None, &found);
     let mut hits = vec![Hits::default(); threads];
     hits.iter_mut().for_each(|hits| hits.begin(0, 0));
     index.find_pairs(&rule, &mut hits);

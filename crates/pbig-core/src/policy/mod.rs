@@ -60,3 +60,6 @@ pub(crate) const SPARSE_FROM_ID: u32 = 1 << 24;
 
 /// Maximum factor between a new id and the largest earlier one, for ids from [`SPARSE_FROM_ID`] on.
 pub(crate) const MAX_ID_GROWTH: u32 = 64;
+
+/// Maximum number of boxes of the smaller of two sets for a test of every pair: a test takes 1.3 ns, sorting a box about 25.
+pub(crate) const FEW_BOXES: usize = 16;

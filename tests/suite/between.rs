@@ -1,0 +1,238 @@
+//! Pairs between two sets: those of the oracle, in order, at the cost of what is across.
+
+use pbig_core::{
+    Aabb, Algorithm, Backend, Boxes, Config, CrossPair, Engine, Error, Finder, Keys, Limits, NO_KEY, Order,
+    ProxyFilter, WORK_LIMIT, oracle,
+};
+use pbig_harness::boxes::BoxSet;
+use pbig_harness::hard::{Recipe, ratio, shapes};
+use pbig_tests::corpus;
+use rand::rngs::StdRng;
+use rand::{RngExt, SeedableRng};
+
+/// A way to divide a list of boxes into two sets.
+type Division = (&'static str, fn(usize, &Aabb, usize) -> bool);
+
+/// True for a box of the first set, by its index, itself and the number of boxes.
+const DIVISIONS: [Division; 6] = [
+    ("in turns", |i, _, _| i % 2 == 0),
+    ("three kinds in turns", |i, _, _| i % 3 == 0),
+    ("halves of the list", |i, _, n| i < n / 2),
+    ("a few and the others", |i, _, n| i % (n / 40 + 1) == 3),
+    ("by place", |_, aabb, _| aabb.min[0] < 30.0),
+    ("by shape", |_, aabb, _| aabb.max[0] - aabb.min[0] > aabb.max[1] - aabb.min[1]),
+];
+
+fn divide(boxes: &[Aabb], (_, is_first): Division) -> (Vec<Aabb>, Vec<Aabb>) {
+    let all: Vec<_> =
+        boxes.iter().enumerate().map(|(i, aabb)| (is_first(i, aabb, boxes.len()), *aabb)).collect();
+    let part = |wanted: bool| all.iter().filter(|(is, _)| *is == wanted).map(|(_, aabb)| *aabb).collect();
+    (part(true), part(false))
+}
+
+/// Every way in which a finder can search two sets.
+fn ways() -> [(&'static str, Config); 4] {
+    let with = |engine| Config { engine: Some(engine), ..Config::DEFAULT };
+    [
+        ("auto", Config::DEFAULT),
+        ("brute", Config { backend: Backend::Brute, ..Config::DEFAULT }),
+        ("grids", with(Engine::Rebuild)),
+        ("tree", with(Engine::Tree)),
+    ]
+}
+
+/// Returns the first difference of two sorted lists in words.
+fn difference(found: &[CrossPair], wanted: &[CrossPair]) -> Option<String> {
+    if found == wanted {
+        return None;
+    }
+    let differ = found.iter().zip(wanted).find(|(found, wanted)| found != wanted);
+    Some(format!("{} instead of {} pairs, first {differ:?}", found.len(), wanted.len()))
+}
+
+fn check(name: &str, a: &[Aabb], b: &[Aabb]) {
+    let wanted = oracle::pairs_between(a, b);
+    let invalid = a.iter().chain(b).filter(|aabb| !aabb.is_valid()).count() as u64;
+    for (way, config) in ways() {
+        let mut finder = Finder::new(config);
+        let found = finder.find_between(a, b).expect("within the limits");
+        assert_eq!(difference(found, &wanted), None, "{name}, {way}");
+        let report = finder.report();
+        let counts = (report.boxes, report.invalid, report.pairs);
+        assert_eq!(counts, ((a.len() + b.len()) as u64, invalid, wanted.len() as u64), "{name}, {way}");
+        assert_eq!(report.checks.made - report.checks.unnecessary, wanted.len() as u64, "{name}, {way}");
+    }
+}
+
+#[test]
+fn the_corpus_divided_in_every_way() {
+    for case in corpus() {
+        for division in DIVISIONS {
+            let (a, b) = divide(&case.boxes, division);
+            check(&format!("{}, {}", case.name, division.0), &a, &b);
+            check(&format!("{}, {}, the other way", case.name, division.0), &b, &a);
+        }
+    }
+}
+
+#[test]
+fn random_sets_with_every_degenerate_kind() {
+    let set = BoxSet::named("degenerate").expect("the set exists");
+    for seed in 0..2000 {
+        let (a, b) = (set.boxes((seed % 211) as usize, seed), set.boxes((seed % 137) as usize, seed + 7000));
+        check(&format!("degenerate, seed {seed}"), &a, &b);
+    }
+}
+
+#[test]
+fn a_finder_used_for_one_set_and_two_mixes_nothing_up() {
+    let [a, b] = [1, 2].map(|seed| BoxSet::named("unit").expect("the set exists").boxes(3000, seed));
+    let mut finder = Finder::default();
+    for _ in 0..2 {
+        let across = finder.find_between(&a, &b).expect("within the limits").to_vec();
+        assert!(finder.pairs().is_empty() && across == oracle::pairs_between(&a, &b));
+        assert!(finder.find(&a).expect("within the limits") == oracle::pairs(&a));
+        assert!(finder.pairs_between().is_empty());
+    }
+}
+
+#[test]
+fn the_same_bytes_between_sets_for_any_number_of_threads() {
+    for (name, way) in ways().into_iter().filter(|(name, _)| *name != "brute") {
+        let [a, b] = [5, 6].map(|seed| BoxSet::named("mixed").expect("the set exists").boxes(30_000, seed));
+        let with_threads = |threads, order| {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool");
+            pool.install(|| {
+                let mut finder = Finder::new(Config { order, ..way });
+                finder.find_between(&a, &b).expect("within the limits").to_vec()
+            })
+        };
+        let wanted = with_threads(1, Order::Sorted);
+        assert!(wanted.len() > 10_000 && wanted == oracle::pairs_between(&a, &b), "{name}");
+        for threads in [2, 5] {
+            assert!(with_threads(threads, Order::Sorted) == wanted, "{name}, {threads} threads");
+            let mut unsorted = with_threads(threads, Order::Unspecified);
+            unsorted.sort_unstable();
+            assert!(unsorted == wanted, "{name}, {threads} threads, unsorted");
+        }
+    }
+}
+
+#[test]
+fn filters_and_keys_of_two_sets_agree_with_the_oracle() {
+    let mut random = StdRng::seed_from_u64(3);
+    let [a, b] = [1, 2].map(|seed| BoxSet::named("pile").expect("the set exists").boxes(2000, seed));
+    let bodies: Vec<ProxyFilter> = (0..2000)
+        .map(|i| ProxyFilter { body: i % 9, memberships: 1 << (i % 3), mask: 6, ..ProxyFilter::ALL })
+        .collect();
+    let mut keys =
+        || -> Vec<Keys> { (0..2000).map(|_| [0; 4].map(|_| random.random_range(0..20))).collect() };
+    let (of_a, of_b) = (keys(), keys());
+    let share =
+        |pair: &CrossPair| of_a[pair.a as usize].iter().any(|key| of_b[pair.b as usize].contains(key));
+    let allow = |pair: &CrossPair| bodies[pair.a as usize].allows(&ProxyFilter::ALL);
+    let all = oracle::pairs_between(&a, &b);
+    for (way, config) in ways() {
+        let mut finder = Finder::new(config);
+        let filtered = Boxes::new(&a).with_filters(&bodies);
+        let found = finder.find_between(filtered, &b).expect("one each").to_vec();
+        assert!(found.iter().eq(all.iter().filter(|pair| allow(pair))), "{way}, filters");
+        let (one, other) = (filtered.with_keys(&of_a), Boxes::new(&b).with_keys(&of_b));
+        let found = finder.find_between(one, other).expect("one each").to_vec();
+        let wanted: Vec<_> = all.iter().filter(|pair| allow(pair) && !share(pair)).copied().collect();
+        assert!(found == wanted && !wanted.is_empty() && wanted.len() < all.len() / 2, "{way}, keys");
+    }
+}
+
+#[test]
+fn limits_and_lists_of_other_lengths_end_in_errors() {
+    let boxes = vec![Aabb::new([0.0; 3], [1.0; 3]); 300];
+    for (way, config) in ways() {
+        let with =
+            |max_boxes, max_pairs| Finder::new(Config { limits: Limits { max_boxes, max_pairs }, ..config });
+        let found = with(600, 90_000).find_between(&boxes, &boxes).map(<[_]>::len);
+        assert_eq!(found, Ok(90_000), "{way}");
+        let mut finder = with(600, 89_999);
+        let error = finder.find_between(&boxes, &boxes).unwrap_err();
+        assert_eq!(error, Error::TooManyPairs { limit: 89_999 }, "{way}");
+        assert!(finder.pairs_between().is_empty());
+        let error = with(599, 90_000).find_between(&boxes, &boxes).unwrap_err();
+        assert_eq!(error, Error::TooManyBoxes { boxes: 600, limit: 599 }, "{way}");
+    }
+    let short = Boxes::new(&boxes).with_keys(&[[NO_KEY; 4]]);
+    let error = Finder::default().find_between(&boxes, short).unwrap_err();
+    assert_eq!(error, Error::KeyCount { boxes: 300, keys: 1 });
+    let short = Boxes::new(&boxes).with_filters(&[]);
+    let error = Finder::default().find_between(short, &boxes).unwrap_err();
+    assert_eq!(error, Error::FilterCount { boxes: 300, filters: 0 });
+}
+
+fn crowd(n: usize, at: [f32; 3]) -> Vec<Aabb> {
+    vec![Aabb::from_center(at, [0.5; 3]); n]
+}
+
+#[test]
+fn a_crowd_costs_nothing_if_the_other_set_is_elsewhere() {
+    let mut finder = Finder::default();
+    let a = crowd(1_000_000, [0.0; 3]);
+    assert!(finder.find_between(&a, &crowd(1, [9.0; 3])).expect("no pairs").is_empty());
+    assert_eq!((finder.report().work, finder.report().plan.algorithm), (0, Algorithm::Nothing));
+}
+
+#[test]
+fn a_crowd_costs_its_number_if_a_few_boxes_surround_it() {
+    // Bounds do not part these: each set has boxes on all sides of the other's crowd.
+    let corners = |half: f32| {
+        (0..8).map(move |i| {
+            Aabb::from_center([i & 1, i >> 1 & 1, i >> 2].map(|x| x as f32 * 90.0 - 40.0), [half; 3])
+        })
+    };
+    for few in [0, 100] {
+        let mut a = crowd(100_000, [0.0; 3]);
+        let mut b = crowd(100_000, [1.01, 0.0, 0.0]);
+        a.extend(corners(0.1));
+        b.extend(corners(0.2));
+        b.extend(crowd(few, [0.0, 5.0, 0.0]));
+        let mut finder = Finder::default();
+        assert_eq!(finder.find_between(&a, &b).map(<[_]>::len), Ok(8));
+        let (work, plan) = (finder.report().work, &finder.report().plan);
+        assert!(work < 40 * (a.len() + b.len()) as u64, "{work}: {plan}");
+    }
+}
+
+/// Numbers of boxes of both sets: a work that is not bounded grows faster than they do.
+const SIZES: [usize; 2] = [5000, 20_000];
+
+/// Returns the work of a search for each box and pair, in binary logarithms.
+fn ratio_between(recipe: &Recipe, n: usize, division: Division, engine: Option<Engine>) -> f64 {
+    let (a, b) = divide(&recipe.boxes(n, 1), division);
+    let mut finder = Finder::new(Config { engine, ..Config::DEFAULT });
+    let found = finder.find_between(&a, &b).expect("few pairs");
+    if n == SIZES[0] {
+        assert_eq!(difference(found, &oracle::pairs_between(&a, &b)), None);
+    }
+    ratio(finder.report())
+}
+
+#[test]
+fn no_two_sets_take_work_without_bound() {
+    for engine in [None, Some(Engine::Tree)] {
+        for (name, recipe) in shapes() {
+            for division in DIVISIONS {
+                let [small, large] = SIZES.map(|n| ratio_between(&recipe, n, division, engine));
+                let what = format!("{name}, {}, {engine:?}: {small:.2}, {large:.2}", division.0);
+                println!("{what}");
+                assert!(small.max(large) <= WORK_LIMIT as f64, "{what}");
+                // Up to 400 tests for each of 20,000 boxes a grid is searched. Needles in three directions double.
+                assert!(large <= (2.0 * small).max(30.0), "{what}");
+            }
+        }
+    }
+}
+
+#[test]
+fn two_grids_alone_break_the_bound() {
+    let (_, recipe) = shapes().into_iter().find(|(name, _)| *name == "two scales").expect("a shape");
+    let [small, large] = SIZES.map(|n| ratio_between(&recipe, n, DIVISIONS[1], Some(Engine::Rebuild)));
+    assert!(large > (2.0 * small).max(30.0), "{small}, {large}");
+}
