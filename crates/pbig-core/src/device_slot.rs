@@ -2,7 +2,7 @@
 
 use crate::device::{DeviceFailure, DeviceFound, PairDevice};
 use crate::outcome::{End, Outcome};
-use crate::policy::{AvailableDevice, Choice, choose_backend};
+use crate::policy::{Choice, choose_backend};
 use crate::report::{Clock, Report, StageTimes, stage};
 use crate::{Algorithm, Config, Pair, Plan, parallel};
 use std::time::Duration;
@@ -42,21 +42,13 @@ impl DeviceSlot {
 
     /// Returns true if a call with this number of changed boxes should run on the device. Otherwise the report gets the reason.
     pub(crate) fn is_wanted(&mut self, config: &Config, changed: usize, report: &mut Report) -> bool {
-        let choice = choose_backend(config.backend, self.available(), changed as u64);
-        report.plan.no_device = choice.no_device();
-        if choice == Choice::Device && self.device.is_none() {
+        let is_software = self.device.as_ref().map(|device| device.is_software());
+        let choice = choose_backend(config.backend, is_software, changed as u64);
+        report.plan.no_device = if let Choice::Cpu(why) = choice { why } else { None };
+        if choice == Choice::Device && is_software.is_none() {
             report.fallback = Some(self.fall_back("no device was given"));
-            return false;
         }
-        choice == Choice::Device
-    }
-
-    fn available(&self) -> AvailableDevice {
-        match &self.device {
-            None => AvailableDevice::NotGiven,
-            Some(device) if device.is_software() => AvailableDevice::Software,
-            Some(_) => AvailableDevice::Hardware,
-        }
+        choice == Choice::Device && is_software.is_some()
     }
 
     /// Returns the report that the wanted backend could not do the work. Logs the first one of a row as a warning.

@@ -14,9 +14,6 @@ const SPARE: u32 = 1 << 31;
 /// Number of pairs between a prefetch of rows and their use.
 const AHEAD: usize = 8;
 
-/// Minimum number of changes of one row that are merged into it: each alone moves what lies behind it.
-const MERGE_FROM: usize = 8;
-
 /// Minimum number of pairs that are sorted by `b` for the rows of `b`.
 const TURN_FROM: usize = 64;
 
@@ -32,17 +29,6 @@ impl Rows {
         self.spans.get(id as usize).map_or(&[], |span| &self.pool[span.range()])
     }
 
-    fn insert(&mut self, id: u32, other: u32) {
-        let span = self.spans[id as usize];
-        let has_room = self.pool.get(span.range().end) == Some(&(SPARE | id));
-        let span = if has_room { span } else { self.move_to_end(id, span, 1) };
-        let row = &mut self.pool[span.start as usize..][..span.len as usize + 1];
-        let place = row[..span.len as usize].partition_point(|&before| before < other);
-        row.copy_within(place..span.len as usize, place + 1);
-        row[place] = other;
-        self.spans[id as usize] = Span { len: span.len + 1, ..span };
-    }
-
     fn move_to_end(&mut self, id: u32, span: Span, more: u32) -> Span {
         let start = self.pool.len() as u32;
         let room = (span.len + more).next_power_of_two().max(MIN_ROOM);
@@ -51,79 +37,57 @@ impl Rows {
         Span { start, len: span.len }
     }
 
-    fn remove(&mut self, id: u32, other: u32) {
-        let span = self.spans[id as usize];
-        let row = &mut self.pool[span.range()];
-        if let Ok(place) = row.binary_search(&other) {
-            row.copy_within(place + 1.., place);
-            row[row.len() - 1] = SPARE | id;
-            self.spans[id as usize] = Span { len: span.len - 1, ..span };
-        }
-    }
-
     /// Adds pairs, sorted, to the rows of their `a`.
     fn insert_all(&mut self, pairs: &[Pair]) {
-        self.for_each_run(pairs, Self::insert, Self::insert_run);
+        self.for_each_run(pairs, Self::insert);
     }
 
     /// Removes pairs, sorted, from the rows of their `a`.
     fn remove_all(&mut self, pairs: &[Pair]) {
-        self.for_each_run(pairs, Self::remove, Self::remove_run);
+        self.for_each_run(pairs, Self::remove);
     }
 
-    fn for_each_run(
-        &mut self,
-        pairs: &[Pair],
-        change: impl Fn(&mut Self, u32, u32),
-        merge: impl Fn(&mut Self, &[Pair]),
-    ) {
+    fn for_each_run(&mut self, pairs: &[Pair], change: impl Fn(&mut Self, &[Pair])) {
         let mut rest = pairs;
         for run in pairs.chunk_by(|one, next| one.a == next.a) {
-            if run.len() >= MERGE_FROM {
-                merge(self, run);
-            } else {
-                for (i, pair) in run.iter().enumerate() {
-                    self.prefetch(&rest[i..]);
-                    change(self, pair.a, pair.b);
-                }
-            }
+            (0..run.len().min(AHEAD)).for_each(|i| self.prefetch(&rest[i..]));
+            change(self, run);
             rest = &rest[run.len()..];
         }
     }
 
-    /// Merges new pairs of one row into it, from its end.
-    fn insert_run(&mut self, run: &[Pair]) {
-        let (id, more) = (run[0].a, run.len());
+    /// Inserts new pairs of one row. What lies behind the last one moves first.
+    fn insert(&mut self, run: &[Pair]) {
+        let id = run[0].a;
         let span = self.spans[id as usize];
-        let behind = self.pool.get(span.range().end..span.range().end + more);
+        let behind = self.pool.get(span.range().end..span.range().end + run.len());
         let has_room = behind.is_some_and(|room| room.iter().all(|place| *place == SPARE | id));
-        let span = if has_room { span } else { self.move_to_end(id, span, more as u32) };
-        let (mut old, mut new) = (span.len as usize, more);
-        let row = &mut self.pool[span.start as usize..][..old + more];
-        for to in (0..row.len()).rev() {
-            if new > 0 && (old == 0 || row[old - 1] < run[new - 1].b) {
-                new -= 1;
-                row[to] = run[new].b;
-            } else {
-                old -= 1;
-                row[to] = row[old];
-            }
+        let span = if has_room { span } else { self.move_to_end(id, span, run.len() as u32) };
+        let (mut end, len) = (span.len as usize, span.len + run.len() as u32);
+        let row = &mut self.pool[span.start as usize..][..len as usize];
+        for (before, pair) in run.iter().enumerate().rev() {
+            let place = row[..end].partition_point(|&other| other < pair.b);
+            row.copy_within(place..end, place + before + 1);
+            row[place + before] = pair.b;
+            end = place;
         }
-        self.spans[id as usize] = Span { len: row.len() as u32, ..span };
+        self.spans[id as usize] = Span { len, ..span };
     }
 
-    /// Takes pairs out of one row.
-    fn remove_run(&mut self, run: &[Pair]) {
-        let (id, mut gone) = (run[0].a, run.iter().map(|pair| pair.b).peekable());
+    /// Takes pairs out of one row. What lies between two of them moves at once.
+    fn remove(&mut self, run: &[Pair]) {
+        let id = run[0].a;
         let span = self.spans[id as usize];
         let row = &mut self.pool[span.range()];
-        let mut len = 0;
-        for i in 0..row.len() {
-            let other = row[i];
-            while gone.next_if(|gone| *gone < other).is_some() {}
-            row[len] = other;
-            len += usize::from(gone.next_if_eq(&other).is_none());
+        let (mut from, mut len) = (0, 0);
+        for pair in run {
+            if let Ok(place) = row[from..].binary_search(&pair.b) {
+                row.copy_within(from..from + place, len);
+                (from, len) = (from + place + 1, len + place);
+            }
         }
+        row.copy_within(from.., len);
+        len += row.len() - from;
         row[len..].fill(SPARE | id);
         self.spans[id as usize] = Span { len: len as u32, ..span };
     }

@@ -6,30 +6,12 @@ use std::fmt;
 /// Minimum number of changed boxes for [`Backend::Auto`] to use a hardware device. A search of all boxes counts each as changed.
 pub(crate) const AUTO_DEVICE_FROM_CHANGED_BOXES: u64 = 500_000;
 
-/// The device that a call may use.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum AvailableDevice {
-    NotGiven,
-    Software,
-    Hardware,
-}
-
 /// The backend that does the work of a call.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Choice {
     Device,
     /// The CPU; with the reason if [`Backend::Auto`] decided.
     Cpu(Option<NoDevice>),
-}
-
-impl Choice {
-    /// Returns the reason that keeps [`Backend::Auto`] from the device.
-    pub(crate) fn no_device(self) -> Option<NoDevice> {
-        match self {
-            Self::Device => None,
-            Self::Cpu(why) => why,
-        }
-    }
 }
 
 /// Reason that keeps a call from a device.
@@ -57,7 +39,7 @@ impl fmt::Display for NoDevice {
     }
 }
 
-/// Chooses the backend for a call in which `changed` boxes have changed.
+/// Chooses the backend for a call in which `changed` boxes have changed. `is_software` tells about the device, if there is one.
 ///
 /// | backend | device | changed boxes | choice |
 /// | --- | --- | --- | --- |
@@ -65,28 +47,24 @@ impl fmt::Display for NoDevice {
 /// | `Cpu`, `Brute` | any | any | CPU |
 /// | `Auto` | hardware | at least [`AUTO_DEVICE_FROM_CHANGED_BOXES`] | device |
 /// | `Auto` | any | any | CPU |
-pub(crate) fn choose_backend(backend: Backend, device: AvailableDevice, changed: u64) -> Choice {
-    let why = match (backend, device) {
+pub(crate) fn choose_backend(backend: Backend, is_software: Option<bool>, changed: u64) -> Choice {
+    Choice::Cpu(match (backend, is_software) {
         (Backend::Device, _) => return Choice::Device,
-        (Backend::Cpu | Backend::Brute, _) => return Choice::Cpu(None),
-        (Backend::Auto, AvailableDevice::NotGiven) => NoDevice::NotGiven,
-        (Backend::Auto, AvailableDevice::Software) => NoDevice::Software,
-        (Backend::Auto, AvailableDevice::Hardware) if changed < AUTO_DEVICE_FROM_CHANGED_BOXES => {
-            NoDevice::FewChanged
-        }
-        (Backend::Auto, AvailableDevice::Hardware) => return Choice::Device,
-    };
-    Choice::Cpu(Some(why))
+        (Backend::Cpu | Backend::Brute, _) => None,
+        (Backend::Auto, None) => Some(NoDevice::NotGiven),
+        (Backend::Auto, Some(true)) => Some(NoDevice::Software),
+        (Backend::Auto, _) if changed < AUTO_DEVICE_FROM_CHANGED_BOXES => Some(NoDevice::FewChanged),
+        (Backend::Auto, _) => return Choice::Device,
+    })
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use AvailableDevice::{Hardware, NotGiven, Software};
 
     #[test]
     fn a_backend_that_is_asked_for_needs_no_reason() {
-        for device in [NotGiven, Software, Hardware] {
+        for device in [None, Some(true), Some(false)] {
             assert_eq!(choose_backend(Backend::Device, device, 2), Choice::Device);
             assert_eq!(choose_backend(Backend::Cpu, device, u64::MAX), Choice::Cpu(None));
             assert_eq!(choose_backend(Backend::Brute, device, u64::MAX), Choice::Cpu(None));
@@ -96,10 +74,9 @@ mod tests {
     #[test]
     fn auto_uses_hardware_from_half_a_million_changed_boxes_on() {
         let auto = |device, changed| choose_backend(Backend::Auto, device, changed);
-        assert_eq!(auto(NotGiven, u64::MAX).no_device(), Some(NoDevice::NotGiven));
-        assert_eq!(auto(Software, u64::MAX).no_device(), Some(NoDevice::Software));
-        assert_eq!(auto(Hardware, 499_999), Choice::Cpu(Some(NoDevice::FewChanged)));
-        assert_eq!(auto(Hardware, 500_000), Choice::Device);
-        assert_eq!(auto(Hardware, 500_000).no_device(), None);
+        assert_eq!(auto(None, u64::MAX), Choice::Cpu(Some(NoDevice::NotGiven)));
+        assert_eq!(auto(Some(true), u64::MAX), Choice::Cpu(Some(NoDevice::Software)));
+        assert_eq!(auto(Some(false), 499_999), Choice::Cpu(Some(NoDevice::FewChanged)));
+        assert_eq!(auto(Some(false), 500_000), Choice::Device);
     }
 }

@@ -47,7 +47,7 @@ pub(super) struct Double {
     pub(super) is_software: bool,
     calls: u32,
     /// The boxes of the last update, unless they were forgotten.
-    known: Option<Vec<Aabb>>,
+    pub(super) known: Option<Vec<Aabb>>,
 }
 
 impl Double {

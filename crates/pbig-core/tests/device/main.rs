@@ -221,6 +221,19 @@ fn a_device_that_comes_amid_changes_begins_with_the_next_update() {
     }
 }
 
+/// A device may have worked for another world.
+#[test]
+fn another_device_forgets_the_boxes_that_it_knew() {
+    let (mut ours, mut cpu, mut rng) = (on_device(Fault::Nothing), on_cpu(), StdRng::seed_from_u64(9));
+    for seed in 0..3 {
+        disturb(&mut [&mut ours, &mut cpu], &mut rng);
+        assert_eq!(ours.update(), cpu.update());
+        let mut other = Double::new(Fault::Nothing);
+        other.known = Some(random_boxes(seed));
+        ours.set_device(other);
+    }
+}
+
 #[test]
 fn too_many_pairs_are_an_error_and_the_update_can_be_repeated() {
     let (mut ours, mut cpu, mut rng) = (on_device(Fault::Nothing), on_cpu(), StdRng::seed_from_u64(5));
