@@ -66,7 +66,10 @@ impl Sets {
 
     /// Returns the filters and keys by place in the list; none if no box has any.
     fn rules(&self) -> (Option<&[ProxyFilter]>, Option<&[Keys]>) {
-        (Some(&self.filters[..]).filter(|all| !all.is_empty()), Some(&self.keys[..]).filter(|all| !all.is_empty()))
+        (
+            Some(&self.filters[..]).filter(|all| !all.is_empty()),
+            Some(&self.keys[..]).filter(|all| !all.is_empty()),
+        )
     }
 }
 

@@ -134,9 +134,11 @@ mod tests {
     #[test]
     fn pairs_between_two_sets_are_those_of_one_set_across() {
         for (n, m) in [(0, 9), (9, 0), (1, 1), (33, 31), (64, 65)] {
-            let cube = |i: usize| Aabb::from_center([(i * i % 31) as f32, 0.0, 0.0], [(i % 5) as f32 - 0.5; 3]);
+            let cube =
+                |i: usize| Aabb::from_center([(i * i % 31) as f32, 0.0, 0.0], [(i % 5) as f32 - 0.5; 3]);
             let all: Vec<_> = (0..n + m).map(cube).collect();
-            let across = nested_loops(&all).into_iter().filter(|pair| (pair.a as usize) < n && pair.b as usize >= n);
+            let across =
+                nested_loops(&all).into_iter().filter(|pair| (pair.a as usize) < n && pair.b as usize >= n);
             let across: Vec<_> = across.map(|pair| CrossPair { a: pair.a, b: pair.b - n as u32 }).collect();
             assert_eq!(pairs_between(&all[..n], &all[n..]), across, "{n} and {m}");
         }

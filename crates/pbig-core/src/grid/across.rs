@@ -214,8 +214,7 @@ impl Kernel for CountSlots<'_> {
 pub(crate) fn brute_force_across(boxes: &[Aabb], split: usize, rule: &Rule<'_>, hits: &mut [Hits]) {
     let (first, second) = boxes.split_at(split);
     let sides = [(first, 0), (second, split as u32)];
-    let [few, (many, first_id)] =
-        if first.len() <= second.len() { sides } else { [sides[1], sides[0]] };
+    let [few, (many, first_id)] = if first.len() <= second.len() { sides } else { [sides[1], sides[0]] };
     run_with(hits, many.len().div_ceil(BRUTE_PIECE), |hits, piece| {
         let start = piece * BRUTE_PIECE;
         let many = &many[start..many.len().min(start + BRUTE_PIECE)];

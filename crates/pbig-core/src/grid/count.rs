@@ -141,7 +141,11 @@ fn in_runs(grid: &Grid, slot: usize) -> u64 {
 
 /// Returns the rows and slots of a grid in the window of a box, which lies in a slot of the same grid or of another one.
 #[inline(always)]
-pub(super) unsafe fn in_window<S: Simd, const WRAPS: bool>(own: &Grid, grid: &Grid, slot: usize) -> (u64, u64) {
+pub(super) unsafe fn in_window<S: Simd, const WRAPS: bool>(
+    own: &Grid,
+    grid: &Grid,
+    slot: usize,
+) -> (u64, u64) {
     let cells = &grid.plan.cells;
     // SAFETY: the caller has the instructions.
     let window = unsafe {
