@@ -24,7 +24,8 @@ const DIVISIONS: [Division; 6] = [
 ];
 
 fn divide(boxes: &[Aabb], (_, is_first): Division) -> (Vec<Aabb>, Vec<Aabb>) {
-    let all: Vec<_> = boxes.iter().enumerate().map(|(i, aabb)| (is_first(i, aabb, boxes.len()), *aabb)).collect();
+    let all: Vec<_> =
+        boxes.iter().enumerate().map(|(i, aabb)| (is_first(i, aabb, boxes.len()), *aabb)).collect();
     let part = |wanted: bool| all.iter().filter(|(is, _)| *is == wanted).map(|(_, aabb)| *aabb).collect();
     (part(true), part(false))
 }
@@ -121,11 +122,14 @@ fn the_same_bytes_between_sets_for_any_number_of_threads() {
 fn filters_and_keys_of_two_sets_agree_with_the_oracle() {
     let mut random = StdRng::seed_from_u64(3);
     let [a, b] = [1, 2].map(|seed| BoxSet::named("pile").expect("the set exists").boxes(2000, seed));
-    let bodies: Vec<ProxyFilter> =
-        (0..2000).map(|i| ProxyFilter { body: i % 9, memberships: 1 << (i % 3), mask: 6, ..ProxyFilter::ALL }).collect();
-    let mut keys = || -> Vec<Keys> { (0..2000).map(|_| [0; 4].map(|_| random.random_range(0..20))).collect() };
+    let bodies: Vec<ProxyFilter> = (0..2000)
+        .map(|i| ProxyFilter { body: i % 9, memberships: 1 << (i % 3), mask: 6, ..ProxyFilter::ALL })
+        .collect();
+    let mut keys =
+        || -> Vec<Keys> { (0..2000).map(|_| [0; 4].map(|_| random.random_range(0..20))).collect() };
     let (of_a, of_b) = (keys(), keys());
-    let share = |pair: &CrossPair| of_a[pair.a as usize].iter().any(|key| of_b[pair.b as usize].contains(key));
+    let share =
+        |pair: &CrossPair| of_a[pair.a as usize].iter().any(|key| of_b[pair.b as usize].contains(key));
     let allow = |pair: &CrossPair| bodies[pair.a as usize].allows(&ProxyFilter::ALL);
     let all = oracle::pairs_between(&a, &b);
     for (way, config) in ways() {
@@ -144,7 +148,8 @@ fn filters_and_keys_of_two_sets_agree_with_the_oracle() {
 fn limits_and_lists_of_other_lengths_end_in_errors() {
     let boxes = vec![Aabb::new([0.0; 3], [1.0; 3]); 300];
     for (way, config) in ways() {
-        let with = |max_boxes, max_pairs| Finder::new(Config { limits: Limits { max_boxes, max_pairs }, ..config });
+        let with =
+            |max_boxes, max_pairs| Finder::new(Config { limits: Limits { max_boxes, max_pairs }, ..config });
         let found = with(600, 90_000).find_between(&boxes, &boxes).map(<[_]>::len);
         assert_eq!(found, Ok(90_000), "{way}");
         let mut finder = with(600, 89_999);
@@ -177,7 +182,11 @@ fn a_crowd_costs_nothing_if_the_other_set_is_elsewhere() {
 #[test]
 fn a_crowd_costs_its_number_if_a_few_boxes_surround_it() {
     // Bounds do not part these: each set has boxes on all sides of the other's crowd.
-    let corners = |half: f32| (0..8).map(move |i| Aabb::from_center([i & 1, i >> 1 & 1, i >> 2].map(|x| x as f32 * 90.0 - 40.0), [half; 3]));
+    let corners = |half: f32| {
+        (0..8).map(move |i| {
+            Aabb::from_center([i & 1, i >> 1 & 1, i >> 2].map(|x| x as f32 * 90.0 - 40.0), [half; 3])
+        })
+    };
     for few in [0, 100] {
         let mut a = crowd(100_000, [0.0; 3]);
         let mut b = crowd(100_000, [1.01, 0.0, 0.0]);

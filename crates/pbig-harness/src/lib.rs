@@ -10,6 +10,7 @@ pub mod field;
 pub mod files;
 pub mod gpu_race;
 pub mod hard;
+pub mod mesh;
 pub mod motions;
 pub mod options;
 pub mod output;

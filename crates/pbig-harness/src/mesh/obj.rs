@@ -1,0 +1,45 @@
+//! Wavefront's `.obj`: vertices and faces. All else is skipped.
+//!
+//! The crate `tobj` numbers vertices anew for each object, and its errors name no line.
+
+use super::{Mesh, face};
+use std::io::BufRead;
+
+pub(super) fn read(reader: impl BufRead) -> Result<Mesh, String> {
+    let mut mesh = Mesh::default();
+    for (i, line) in reader.lines().enumerate() {
+        let line = line.map_err(|error| format!("line {}: {error}", i + 1))?;
+        take(&line, &mut mesh).map_err(|what| format!("line {}: {what}", i + 1))?;
+    }
+    if mesh.vertices.is_empty() { Err("no vertices (lines that begin with `v`)".into()) } else { Ok(mesh) }
+}
+
+fn take(line: &str, mesh: &mut Mesh) -> Result<(), String> {
+    let mut words = line.split_whitespace();
+    match words.next() {
+        Some("v") => {
+            let numbers: Vec<f64> = words.map(number).collect::<Result<_, _>>()?;
+            let [x, y, z, ..] = numbers[..] else { return Err("a vertex has three coordinates".into()) };
+            mesh.vertices.push([x, y, z]);
+        }
+        Some("f") => {
+            let corners: Vec<u32> =
+                words.map(|word| corner(word, mesh.vertices.len())).collect::<Result<_, _>>()?;
+            mesh.faces.push(face(&corners)?);
+        }
+        _ => {}
+    }
+    Ok(())
+}
+
+fn number(word: &str) -> Result<f64, String> {
+    word.parse().map_err(|_| format!("'{word}' is no number"))
+}
+
+/// Returns the vertex of `vertex/texture/normal`: counted from 1, or backwards from the last one with -1.
+fn corner(word: &str, vertices: usize) -> Result<u32, String> {
+    let number = word.split('/').next().and_then(|vertex| vertex.parse::<i64>().ok());
+    let index = number
+        .and_then(|number| if number < 0 { vertices as i64 + number } else { number - 1 }.try_into().ok());
+    index.ok_or_else(|| format!("'{word}' is no vertex"))
+}
