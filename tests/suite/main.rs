@@ -22,6 +22,7 @@ mod planted;
 mod queries;
 mod random_worlds;
 mod restore;
+mod scalable_ccd;
 mod shapes;
 mod stress;
 mod upstream;

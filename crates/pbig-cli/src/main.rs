@@ -3,6 +3,7 @@
 
 mod bench;
 mod doctor;
+mod mesh;
 mod options;
 mod pairs;
 mod replay;
@@ -30,7 +31,7 @@ struct Cli {
 
 #[derive(Subcommand)]
 enum Command {
-    /// All overlapping pairs of the boxes in a file.
+    /// All overlapping pairs of the boxes in a file, of two files, or of a mesh.
     Pairs(pairs::Args),
     /// Pairs that come and go while boxes move from frame to frame.
     Replay(replay::Args),

@@ -1,10 +1,11 @@
-//! `pbig pairs`: all overlapping pairs of the boxes in a file.
+//! `pbig pairs`: all overlapping pairs of the boxes in a file, or of a box of each of two files.
 
+use crate::mesh::{self, Kinds, kinds};
 use crate::options::{
     THREADS, check_output, plan_text, print_summary, search_text, stages, whole, with_threads,
 };
-use pbig_core::{Aabb, Finder};
-use pbig_harness::files::{BOXES_OR_PAIRS, BoxList, Location, read_boxes, write_pairs};
+use pbig_core::Finder;
+use pbig_harness::files::{BOXES_OR_PAIRS, BoxList, Location, read_boxes, write_id_pairs, write_pairs};
 use pbig_harness::options::BackendOption;
 use pbig_harness::prelude::*;
 use std::path::{Path, PathBuf};
@@ -12,39 +13,77 @@ use std::path::{Path, PathBuf};
 #[derive(clap::Args)]
 pub(crate) struct Args {
     /// Boxes: .npy (N,6) float32 or float64, or .csv, columns min_x,min_y,min_z,max_x,max_y,max_z.
-    input: PathBuf,
+    #[arg(required_unless_present = "mesh")]
+    input: Option<PathBuf>,
+    /// More boxes: only pairs of a box `a` of INPUT with a box `b` of OTHER.
+    #[arg(long, value_name = "OTHER")]
+    with: Option<PathBuf>,
+    /// A mesh in place of boxes, .ply or .obj: pairs of its elements that share no vertex.
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["input", "with", "strict"], requires = "elements")]
+    mesh: Option<PathBuf>,
+    /// The mesh a step later: boxes hold each element on its way there.
+    #[arg(long, value_name = "FRAME", requires = "mesh")]
+    pub(crate) next: Option<PathBuf>,
+    /// Pairs of elements: ee, vf or any two of v (vertex), e (edge) and f (face), with commas.
+    #[arg(long, value_name = "KINDS", value_parser = kinds, value_delimiter = ',', requires = "mesh")]
+    pub(crate) elements: Vec<Kinds>,
     /// File for the pairs: .npy (K,2) uint32 or .csv; `-` is stdout, as .csv.
     #[arg(short, value_name = "OUT")]
-    output: Option<PathBuf>,
+    pub(crate) output: Option<PathBuf>,
     /// The backend that searches.
     #[arg(long, value_enum, default_value_t)]
-    backend: BackendOption,
+    pub(crate) backend: BackendOption,
     /// Threads; all by default.
     #[arg(long, value_name = "N", value_parser = whole::<usize>(THREADS), allow_negative_numbers = true)]
-    threads: Option<usize>,
+    pub(crate) threads: Option<usize>,
     /// Number of searches, for the times.
     #[arg(long, value_name = "K", default_value = "1", value_parser = whole::<usize>(1..=u64::MAX), allow_negative_numbers = true)]
-    repeat: usize,
+    pub(crate) repeat: usize,
     /// An invalid box (NaN, or min > max) is an error.
     #[arg(long)]
     strict: bool,
     /// Print one JSON object.
     #[arg(long)]
-    json: bool,
+    pub(crate) json: bool,
 }
 
+/// Boxes and the file that they come from.
+type Named<'a> = (&'a Path, BoxList);
+
 pub(crate) fn run(args: &Args) -> Result<(), Failure> {
-    check_output(args.output.as_deref(), &BOXES_OR_PAIRS, &args.input, args.json)?;
-    let list = read_boxes(&args.input)?;
-    if args.strict {
-        refuse_invalid(&args.input, &list)?;
+    match (&args.mesh, &args.input) {
+        (Some(mesh), _) => mesh::run(args, mesh),
+        (None, Some(input)) => search(args, input),
+        (None, None) => Err(Failure::Input("INPUT or --mesh is missing".into())),
     }
+}
+
+fn search(args: &Args, input: &Path) -> Result<(), Failure> {
+    let lists = read(args, input)?;
     let mut finder = args.backend.finder();
-    let times = with_threads(args.threads, || find(&mut finder, &list.boxes, args))?;
-    if let Some(output) = &args.output {
-        write_pairs(output, finder.pairs())?;
+    let times = with_threads(args.threads, || find(&mut finder, &lists, args))?;
+    match &args.output {
+        Some(output) if args.with.is_some() => {
+            write_id_pairs(output, bytemuck::cast_slice(finder.pairs_between()))?;
+        }
+        Some(output) => write_pairs(output, finder.pairs())?,
+        None => {}
     }
-    report(args, &finder, &list, Spread::of(times))
+    report(args, &finder, &lists, Spread::of(times))
+}
+
+/// Reads the boxes of one file or two.
+fn read<'a>(args: &'a Args, input: &'a Path) -> Result<Vec<Named<'a>>, Failure> {
+    let paths: Vec<&Path> = [Some(input), args.with.as_deref()].into_iter().flatten().collect();
+    for path in &paths {
+        check_output(args.output.as_deref(), &BOXES_OR_PAIRS, path, args.json)?;
+    }
+    let lists: Vec<Named<'_>> =
+        paths.into_iter().map(|path| Ok((path, read_boxes(path)?))).collect::<Result<_, String>>()?;
+    if args.strict {
+        lists.iter().try_for_each(|(path, list)| refuse_invalid(path, list))?;
+    }
+    Ok(lists)
 }
 
 fn refuse_invalid(path: &Path, list: &BoxList) -> Result<(), Failure> {
@@ -54,16 +93,22 @@ fn refuse_invalid(path: &Path, list: &BoxList) -> Result<(), Failure> {
     Err(Failure::Input(format!("{}: {line}box {index} (counted from 0) {what}", path.display())))
 }
 
-fn find(finder: &mut Finder, boxes: &[Aabb], args: &Args) -> Result<Vec<f64>, Failure> {
-    let about = |error| format!("{}: {}", args.input.display(), search_text(&error));
+fn find(finder: &mut Finder, lists: &[Named<'_>], args: &Args) -> Result<Vec<f64>, Failure> {
+    let names: Vec<String> = lists.iter().map(|(path, _)| path.display().to_string()).collect();
+    let about = |error| format!("{}: {}", names.join(" with "), search_text(&error));
+    let mut search = || match lists {
+        [(_, a), (_, b)] => finder.find_between(&a.boxes, &b.boxes).map(|_| ()),
+        [(_, all), ..] => finder.find(&all.boxes).map(|_| ()),
+        [] => Ok(()),
+    };
     let once = |_| {
-        let (found, ms) = timed(|| finder.find(boxes).map(|_| ()));
+        let (found, ms) = timed(&mut search);
         Ok(found.map(|()| ms).map_err(about)?)
     };
     progress(args.repeat, "finding pairs").wrap_iter(0..args.repeat).map(once).collect()
 }
 
-fn report(args: &Args, finder: &Finder, list: &BoxList, ms: Spread) -> Result<(), Failure> {
+fn report(args: &Args, finder: &Finder, lists: &[Named<'_>], ms: Spread) -> Result<(), Failure> {
     let report = finder.report();
     let (boxes, pairs, invalid) = (report.boxes, report.pairs, report.invalid);
     if args.json {
@@ -80,8 +125,15 @@ fn report(args: &Args, finder: &Finder, list: &BoxList, ms: Spread) -> Result<()
         return print(&object.to_string());
     }
     let plan = plan_text(report);
-    let first = list.first_invalid.map_or(String::new(), |(_, place)| format!(", the first in {place}"));
+    let mut first = lists.iter().filter_map(|(path, list)| Some((path, list.first_invalid?.1)));
+    let first = first.next().map_or(String::new(), |(path, place)| first_text(lists.len(), path, &place));
     let summary =
         format!("{boxes} boxes ({invalid} invalid{first}), {pairs} overlapping pairs\n{ms}\n{plan}");
     print_summary(args.output.as_deref(), "pairs", &summary)
+}
+
+/// Says where the first invalid box is; of two files, in which.
+fn first_text(files: usize, path: &Path, place: &Location) -> String {
+    let file = if files > 1 { format!(" of {}", path.display()) } else { String::new() };
+    format!(", the first in {place}{file}")
 }

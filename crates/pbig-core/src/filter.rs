@@ -15,6 +15,16 @@ use bytemuck::{Pod, Zeroable};
 /// assert!(!wheel.allows(&wheel));
 /// assert!(wheel.allows(&ProxyFilter::ALL));
 /// ```
+///
+/// Groups divide the boxes of a [`crate::BroadPhase`] into two sides, of which only pairs across are events. Pairs within a side are
+/// met and dropped, which costs a test each: a side that is a crowd takes time. [`crate::Finder::find_between`] never meets them.
+///
+/// ```
+/// use pbig_core::ProxyFilter;
+/// let one = ProxyFilter { memberships: 1, mask: 2, ..ProxyFilter::ALL };
+/// let other = ProxyFilter { memberships: 2, mask: 1, ..ProxyFilter::ALL };
+/// assert!(one.allows(&other) && !one.allows(&one) && !other.allows(&other));
+/// ```
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Pod, Zeroable)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]

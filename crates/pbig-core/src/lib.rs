@@ -1,11 +1,14 @@
 //! pbig finds every pair of overlapping axis-aligned boxes, and never misses one.
 //!
-//! Three ways in, from simple to fast:
+//! The ways in, from simple to fast:
 //!
 //! | you have | use |
 //! | --- | --- |
 //! | a list of boxes, once | [`find_pairs`] |
 //! | a new list every time | [`Finder`], which keeps its buffers |
+//! | two sets of boxes, and only pairs across | [`find_pairs_between`], [`Finder::find_between`] |
+//! | a mesh, and no pairs of neighbours | [`Finder::find_without_shared`] |
+//! | more pairs than a list should hold | [`Finder::for_each_pair`] |
 //! | boxes that move a little, come and go | [`BroadPhase`], which tells what changed |
 //!
 //! ```

@@ -6,7 +6,7 @@ mod write;
 
 pub use npy::{npy_boxes, npy_frames};
 pub use text::csv_boxes;
-pub use write::{check_output, is_stdout, write_csv, write_pairs};
+pub use write::{check_output, is_stdout, write_csv, write_id_pairs, write_pairs};
 
 use pbig_core::{Aabb, Limits};
 use std::fmt;

@@ -4,6 +4,7 @@ mod bench;
 mod files;
 mod refused;
 mod replay;
+mod sets;
 mod usage;
 
 use ndarray::{Array, Array2, Array3, Dimension, ShapeBuilder};

@@ -2,7 +2,7 @@
 
 use super::node::LANES;
 use crate::Aabb;
-use crate::parallel::both;
+use crate::parallel::{SharedSlice, available_threads, both, run};
 use crate::policy::PARALLEL_FROM_BOXES;
 use std::ops::Range;
 
@@ -54,12 +54,17 @@ pub(super) fn sort(entries: &mut [Entry], split: u32) -> Vec<Range<usize>> {
         entries.sort_unstable_by_key(|entry| entry.class(split));
     }
     let all: Vec<Measure> = entries.chunk_by(are_alike).map(Measure::of).collect();
-    let (mut classes, mut first) = (Vec::new(), 0);
-    for class in entries.chunk_by_mut(are_alike) {
-        sort_by_place(class, &all);
+    let (mut classes, mut first): (Vec<Range<usize>>, _) = (Vec::new(), 0);
+    for class in entries.chunk_by(are_alike) {
         classes.push(first..first + class.len());
         first += class.len();
     }
+    let workers = if entries.len() < PARALLEL_FROM_BOXES { 1 } else { available_threads() };
+    let shared = SharedSlice::new(entries);
+    run(workers, classes.len(), |_, class| {
+        // SAFETY: classes have different boxes.
+        sort_by_place(unsafe { shared.part(classes[class].clone()) }, &all);
+    });
     classes
 }
 
@@ -67,11 +72,11 @@ pub(super) fn sort(entries: &mut [Entry], split: u32) -> Vec<Range<usize>> {
 /// nothing. The cuts lie between whole nodes of the level in question.
 fn sort_by_place(mut entries: &mut [Entry], all: &[Measure]) {
     while entries.len() > LANES {
-        let axis = best_axis(entries, all);
-        let middle = cut(entries.len());
+        let (axis, middle) = (best_axis(entries, all), cut(entries.len()));
+        let is_few = entries.len() < PARALLEL_FROM_BOXES;
         entries.select_nth_unstable_by(middle, |a, b| a.center[axis].total_cmp(&b.center[axis]));
         let (first, rest) = entries.split_at_mut(middle);
-        if middle < PARALLEL_FROM_BOXES {
+        if is_few {
             sort_by_place(first, all);
             entries = rest;
         } else {

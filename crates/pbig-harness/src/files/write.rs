@@ -42,10 +42,15 @@ fn identity(path: &Path) -> io::Result<std::path::PathBuf> {
 
 /// Pairs as `.npy` (K,2) uint32 or `.csv`.
 pub fn write_pairs(path: &Path, pairs: &[Pair]) -> Result<(), String> {
+    write_id_pairs(path, bytemuck::cast_slice(pairs))
+}
+
+/// Pairs of any two lists, as [`write_pairs`] does.
+pub fn write_id_pairs(path: &Path, pairs: &[[u32; 2]]) -> Result<(), String> {
     if is_stdout(path) || ending(path, &BOXES_OR_PAIRS)? == "csv" {
-        return write_csv(path, "a,b", pairs.iter().map(|p| format!("{},{}", p.a, p.b)));
+        return write_csv(path, "a,b", pairs.iter().map(|[a, b]| format!("{a},{b}")));
     }
-    let flat = pairs.iter().flat_map(|p| [p.a, p.b]).collect();
+    let flat = pairs.iter().flatten().copied().collect();
     let array = Array2::from_shape_vec((pairs.len(), 2), flat).map_err(|error| at(path, error))?;
     ndarray_npy::write_npy(path, &array).map_err(|error| at(path, error))
 }
