@@ -135,10 +135,7 @@ fn milliseconds(time: Duration) -> f64 {
     time.as_secs_f64() * 1e3
 }
 
-// The paths are for `rapier-0.36/viewer`, whose compiler would look for these files beside this one.
 #[cfg(test)]
-#[path = "simulation/events.rs"]
 mod events;
 #[cfg(test)]
-#[path = "simulation/tests.rs"]
 mod tests;
