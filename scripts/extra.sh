@@ -5,7 +5,7 @@
 #   publish                what would be published; publishes nothing
 #   wasm                   the corpus and a rapier world under node, without and with SIMD; from clean two minutes
 #   aarch64                pbig-core's unit tests, the corpus and a rapier world under qemu; ten minutes
-#   viewer                 builds, lints and tests the viewer, on rapier 0.36.1 too if its patched copy is there
+#   viewer                 builds, lints and tests the viewer
 #   pictures               makes docs/images again from a fixed seed, with the times of this machine
 #   sanitize KIND          pbig-core's unit tests with a sanitizer, `address` or `thread`
 #   fuzz [SECONDS] [TARGET...]     each target for 600 seconds; needs nightly Rust and cargo-fuzz
@@ -138,20 +138,12 @@ run_aarch64() {
     step "${cargo[@]}" run --locked --release --package pbig-wasm --target "$target" --target-dir "$folder"
 }
 
-# test_viewer PACKAGE [OPTION...]
-test_viewer() {
-    step cargo build --locked --release --package "$@" --bins --examples
-    step cargo test --locked --release --package "$@" -- --include-ignored
-    step cargo clippy --locked --release --package "$@" --all-targets -- -D warnings
-}
-
 # The tests open a window under Xvfb, press each key, and leave screenshots in viewer/out. A software adapter will do.
 run_viewer() {
     { has Xvfb && has xdotool && has_libraries libvulkan.so.1; } || { left_out "the viewer" && return; }
-    test_viewer pbig-viewer
-    [ -d rapier-0.36/patched/rapier3d-0.36.1 ] ||
-        { left_out "the viewer on rapier 0.36.1" "scripts/patch-rapier.sh rapier-0.36 makes the copy that it needs" && return; }
-    test_viewer pbig-viewer-036 --manifest-path rapier-0.36/viewer/Cargo.toml
+    step cargo build --locked --release --package pbig-viewer --bins --examples
+    step cargo test --locked --release --package pbig-viewer -- --include-ignored
+    step cargo clippy --locked --release --package pbig-viewer --all-targets -- -D warnings
 }
 
 # pack PICTURE FROM: writes a PNG file of 256 colours, and fails if it is large.

@@ -1,5 +1,4 @@
 //! The broad phase in use, with its times and counts. Another one can take its place between two steps.
-//! `rapier-0.36/viewer` has its own file of this name for its version of rapier.
 
 use crate::choice::Choice;
 use pbig_scenes::stock::StockBroadPhase;

@@ -8,7 +8,7 @@
 //! | `figures`, `graph`, `hud`, `sheet` | what is written over the picture, as texts and lines in pixels |
 //! | `shapes`, `palette`, `cells`, `framing` | colliders as instances of meshes, their colours, the grid's cells, the camera |
 //! | `draw`, `window`, `pictures` | drawing with kiss3d |
-//! | `rapier` | with `engine` all that differs between versions of rapier; `rapier-0.36/viewer` has its own two |
+//! | `rapier` | conversions of rapier's types |
 
 pub mod cells;
 pub mod choice;

@@ -1,5 +1,4 @@
-//! The differences between versions of rapier, apart from the broad phase: vectors, contacts and the trait of the debug renderer.
-//! `rapier-0.36/viewer` has its own file of this name.
+//! Conversions of rapier's vectors, its contacts, and its trait of the debug renderer.
 
 use crate::cells::Boxes;
 use kiss3d::prelude::{Pose3, Quat, Vec3};

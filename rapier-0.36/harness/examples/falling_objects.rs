@@ -112,9 +112,9 @@ fn print_table(stock: &Run, ours: &Run, checker: &Checker) {
 /// Names the programs that show the same objects as they fall.
 fn print_where_to_watch(args: &Args) {
     let Args { scene, bodies, seed, .. } = args;
-    println!("\nWatch it: cargo run --release --manifest-path rapier-0.36/viewer/Cargo.toml -- \\");
+    println!("\nWatch it, on rapier 0.27: cargo run --release --manifest-path viewer/Cargo.toml -- \\");
     println!("              --scene {} --bodies {bodies} --seed {seed}", scene.name);
-    println!("In a browser, on rapier 0.27: scripts/page.sh");
+    println!("In a browser: scripts/page.sh");
 }
 
 fn write_chart(args: &Args, stock: &[StepTime], ours: &[StepTime]) -> Result<(), String> {
