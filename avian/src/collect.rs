@@ -1,0 +1,99 @@
+//! The system that adds contacts for the pairs that pbig finds.
+
+use crate::ask::Ask;
+use crate::boxes::{Boxes, Keys};
+use crate::lost::Lost;
+use avian::collider_tree::{ColliderTreeProxy, ColliderTreeProxyFlags, ColliderTrees, MovedProxies};
+use avian::collision::CollisionDiagnostics;
+use avian::collision::contact_types::ContactEdgeFlags;
+use avian::dynamics::joints::joint_graph::JointGraph;
+use avian::prelude::*;
+use bevy::ecs::system::{StaticSystemParam, SystemParam, SystemParamItem};
+use bevy::platform::time::Instant;
+use bevy::prelude::*;
+use pbig_core::{Error, Pair};
+
+/// What a search reads.
+#[derive(SystemParam)]
+pub(crate) struct World<'w, 's> {
+    pub(crate) trees: Res<'w, ColliderTrees>,
+    pub(crate) moved: Res<'w, MovedProxies>,
+    pub(crate) joints: Res<'w, JointGraph>,
+    keys: Keys<'w, 's>,
+    lost: ResMut<'w, Lost>,
+}
+
+impl World<'_, '_> {
+    /// Brings the boxes up to date, and returns the pairs to ask about, in the order of their ids: those that have begun, and those
+    /// without a contact.
+    pub(crate) fn candidates(&mut self, boxes: &mut Boxes) -> Result<Vec<Pair>, Error> {
+        boxes.follow(&self.trees, &self.moved, &mut self.lost, &self.keys)?;
+        let mut pairs = boxes.find()?;
+        if !self.moved.proxies().is_empty() {
+            let has_moved = |pair: &&Pair| boxes.has_moved(pair.a) || boxes.has_moved(pair.b);
+            pairs.extend(boxes.without_contact.iter().filter(has_moved));
+            pairs.sort_unstable();
+        }
+        Ok(pairs)
+    }
+}
+
+pub(crate) fn add_contacts<H: CollisionHooks + 'static>(
+    mut boxes: ResMut<Boxes>,
+    mut world: World,
+    hooks: StaticSystemParam<H>,
+    mut commands: Commands,
+    mut graph: ResMut<ContactGraph>,
+    mut diagnostics: ResMut<CollisionDiagnostics>,
+) where
+    for<'w, 's> SystemParamItem<'w, 's, H>: CollisionHooks,
+{
+    let start = Instant::now();
+    match world.candidates(&mut boxes) {
+        Ok(pairs) => {
+            let ask = Ask { trees: &world.trees, joints: &world.joints, hooks: &hooks.into_inner() };
+            pairs.into_iter().for_each(|pair| add_contact(&ask, &mut boxes, pair, &mut graph, &mut commands));
+        }
+        Err(error) => error!("pbig: {error}; pairs that began in this step have no contact yet"),
+    }
+    diagnostics.broad_phase += start.elapsed();
+}
+
+/// Adds a contact for a pair that is asked for and allowed; otherwise the pair waits until one of its colliders moves.
+fn add_contact<H: CollisionHooks>(
+    ask: &Ask<'_, H>,
+    boxes: &mut Boxes,
+    pair: Pair,
+    graph: &mut ContactGraph,
+    commands: &mut Commands,
+) {
+    let [a, b] = [pair.a, pair.b].map(|id| boxes.slots[id as usize].collider);
+    let has_contact = graph.contains(a, b)
+        || ask.proxies(boxes, pair).is_some_and(|proxies| {
+            let is_allowed = ask.allows(proxies, commands);
+            if is_allowed {
+                add_edge(graph, proxies);
+            }
+            is_allowed
+        });
+    if has_contact {
+        boxes.without_contact.remove(&pair);
+    } else {
+        boxes.without_contact.insert(pair);
+    }
+}
+
+/// Adds a contact with the flags that avian's own broad phase gives it.
+fn add_edge(graph: &mut ContactGraph, [one, other]: [&ColliderTreeProxy; 2]) {
+    let flags = one.flags.union(other.flags);
+    let has = |flag: ColliderTreeProxyFlags| flags.contains(flag);
+    let mut edge = ContactEdge::new(one.collider, other.collider);
+    (edge.body1, edge.body2) = (one.body, other.body);
+    edge.flags.set(ContactEdgeFlags::CONTACT_EVENTS, has(ColliderTreeProxyFlags::CONTACT_EVENTS));
+    let is_solid = !has(ColliderTreeProxyFlags::BODY_DISABLED) && !has(ColliderTreeProxyFlags::SENSOR);
+    graph.add_edge_with(edge, |contact| {
+        (contact.body1, contact.body2) = (one.body, other.body);
+        contact.flags.set(ContactPairFlags::MODIFY_CONTACTS, has(ColliderTreeProxyFlags::MODIFY_CONTACTS));
+        contact.flags.set(ContactPairFlags::GENERATE_CONSTRAINTS, is_solid);
+    });
+}

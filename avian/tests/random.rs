@@ -1,0 +1,111 @@
+//! Random worlds: pbig beside avian's own broad phase, and in its place.
+
+mod support;
+
+use avian::collider_tree::{ColliderTreeProxyKey, ColliderTreeSystems, ColliderTrees, MovedProxies};
+use avian::collision::broad_phase::BroadPhaseSystems;
+use avian::prelude::*;
+use avian_pbig::shadow::{Shadow, ShadowPlugin};
+use avian_pbig::{Boxes, PbigBroadPhasePlugin};
+use bevy::prelude::*;
+use support::{RandomWorld, Veto, app, plugins};
+
+/// Steps a random world, with changes in each step.
+fn run(app: &mut App, seed: u64, bodies: usize, steps: usize) {
+    let mut world = RandomWorld::new(app, seed, bodies);
+    for step in 0..steps {
+        // Quiet steps let bodies come to rest.
+        let changes = if step % 4 == 3 { 0 } else { bodies / 20 + 1 };
+        world.change(app, changes);
+        app.update();
+    }
+}
+
+#[test]
+fn pairs_equal_those_of_avian() {
+    let mut compared = 0;
+    for (seed, bodies) in [(1, 30), (2, 300), (3, 300), (4, 5000)] {
+        let mut app = app(plugins().add(ShadowPlugin::<Veto>::default()));
+        run(&mut app, seed, bodies, 200);
+        let shadow = app.world().resource::<Shadow>();
+        assert_eq!(shadow.missing, [], "seed {seed}");
+        assert_eq!(shadow.spurious, [], "seed {seed}");
+        compared += shadow.compared;
+    }
+    assert!(compared > 1_000_000, "{compared} contacts compared");
+}
+
+/// Pairs that avian's own broad phase would add after pbig.
+#[derive(Resource, Default)]
+struct Missed(Vec<(Entity, Entity)>);
+
+/// Avian's own broad phase runs after pbig, and must find nothing.
+#[test]
+fn avian_finds_nothing_after_pbig() {
+    let own = PbigBroadPhasePlugin::<Veto>::default();
+    let mut app = app(plugins().disable::<BvhBroadPhasePlugin<Veto>>().add(own));
+    app.init_resource::<Missed>();
+    let place =
+        note_missed.after(BroadPhaseSystems::CollectCollisions).before(ColliderTreeSystems::BeginOptimize);
+    app.add_systems(PhysicsSchedule, place.in_set(PhysicsStepSystems::BroadPhase));
+    run(&mut app, 5, 400, 200);
+    assert_eq!(app.world().resource::<Missed>().0, []);
+    assert!(app.world().resource::<Boxes>().len() > 300);
+}
+
+/// Tests each moved proxy against every other, by avian's rules.
+fn note_missed(
+    trees: Res<ColliderTrees>,
+    moved: Res<MovedProxies>,
+    graph: Res<ContactGraph>,
+    joints: Res<avian::dynamics::joints::joint_graph::JointGraph>,
+    keys: Query<&ColliderTreeProxyKey, Without<ColliderDisabled>>,
+    hooks: Veto,
+    mut commands: Commands,
+    mut missed: ResMut<Missed>,
+) {
+    for &key in moved.proxies() {
+        let proxy = trees.get_proxy(key).expect("a moved proxy");
+        let aabb = trees.tree_for_type(key.tree_type()).get_proxy_aabb(key.id()).expect("an AABB");
+        for &other_key in &keys {
+            let Some(other) = trees.get_proxy(other_key) else { continue };
+            let is_looked_at = !key.is_static() || proxy.is_sensor() || !other_key.is_static();
+            let is_apart = {
+                let tree = trees.tree_for_type(other_key.tree_type());
+                let other = tree.get_proxy_aabb(other_key.id()).expect("an AABB");
+                (aabb.min.cmpgt(other.max) | other.min.cmpgt(aabb.max)).any()
+            };
+            let is_joined = proxy.body.zip(other.body).is_some_and(|(one, other)| {
+                joints.joints_between(one, other).any(|joint| joint.collision_disabled)
+            });
+            let asks = (proxy.flags.union(other.flags))
+                .contains(avian::collider_tree::ColliderTreeProxyFlags::CUSTOM_FILTER);
+            let (one, two) = (proxy.collider, other.collider);
+            if one != two
+                && is_looked_at
+                && !is_apart
+                && proxy.body != other.body
+                && proxy.layers.interacts_with(other.layers)
+                && !is_joined
+                && !graph.contains(one, two)
+                && (!asks || hooks.filter_pairs(one, two, &mut commands))
+            {
+                missed.0.push((one, two));
+            }
+        }
+    }
+}
+
+/// The steps of two equal apps have equal contacts, in the same order.
+#[test]
+fn contacts_are_in_the_same_order_each_time() {
+    let contacts = || {
+        let own = PbigBroadPhasePlugin::<Veto>::default();
+        let mut app = app(plugins().disable::<BvhBroadPhasePlugin<Veto>>().add(own));
+        run(&mut app, 6, 300, 60);
+        let graph = app.world().resource::<ContactGraph>();
+        let pairs = graph.active_pairs().iter().chain(graph.sleeping_pairs());
+        pairs.map(|pair| (pair.collider1, pair.collider2)).collect::<Vec<_>>()
+    };
+    assert_eq!(contacts(), contacts());
+}
