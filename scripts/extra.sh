@@ -7,6 +7,7 @@
 #   aarch64                pbig-core's unit tests, the corpus and a rapier world under qemu; ten minutes
 #   viewer                 builds, lints and tests the viewer
 #   pictures               makes docs/images again from a fixed seed, with the times of this machine
+#   avian                  lints and tests the plug-ins for avian; builds bevy, from clean ten minutes
 #   sanitize KIND          pbig-core's unit tests with a sanitizer, `address` or `thread`
 #   fuzz [SECONDS] [TARGET...]     each target for 600 seconds; needs nightly Rust and cargo-fuzz
 set -euo pipefail
@@ -144,6 +145,14 @@ run_viewer() {
     step cargo build --locked --release --package pbig-viewer --bins --examples
     step cargo test --locked --release --package pbig-viewer -- --include-ignored
     step cargo clippy --locked --release --package pbig-viewer --all-targets -- -D warnings
+}
+
+# Bevy asks for a newer compiler than pbig: its own check of versions is left out.
+run_avian() {
+    local avian="--manifest-path avian/Cargo.toml --ignore-rust-version"
+    step cargo fmt --manifest-path avian/Cargo.toml --all --check
+    step cargo test --locked --release $avian
+    step cargo clippy --locked --release $avian --all-targets -- -D warnings
 }
 
 # pack PICTURE FROM: writes a PNG file of 256 colours, and fails if it is large.

@@ -1,10 +1,9 @@
-//! Steps scenes with avian's own broad phase and with pbig, in turn, and prints the times of both.
+//! Steps scenes with avian's own broad phase and with pbig, in turn, and prints the times of both as CSV.
 //!
 //! ```sh
 //! cargo run --release --example step_times -- column 10000 200
 //! ```
 
-use avian::collider_tree::ColliderTreeDiagnostics;
 use avian::collision::CollisionDiagnostics;
 use avian::prelude::*;
 use avian_pbig::PbigBroadPhasePlugin;
@@ -33,34 +32,35 @@ fn main() {
             }
         }
     }
-    println!("{scene} {bodies}, {steps} steps, ms: mean, median, p99");
-    for (name, times) in ["avian", "pbig"].iter().zip(&times) {
-        print_row(name, times);
-    }
+    println!(
+        "scene,bodies,steps,avian_broad_mean_ms,pbig_broad_mean_ms,avian_broad_p99_ms,pbig_broad_p99_ms,\
+        avian_step_mean_ms,pbig_step_mean_ms,avian_step_p99_ms,pbig_step_p99_ms"
+    );
+    let [broad, step] = [1, 0].map(|part| times.each_ref().map(|times| mean_and_p99(times, part)));
+    let columns = [broad, step].map(|[avian, pbig]| [avian[0], pbig[0], avian[1], pbig[1]]);
+    println!(
+        "{scene},{bodies},{steps},{}",
+        columns.as_flattened().iter().map(f64::to_string).collect::<Vec<_>>().join(",")
+    );
 }
 
-/// Whole step, broad phase, update of the trees, optimisation of the trees.
-type Row = [f64; 4];
+/// The times of a step, in ms: the whole of it, and its broad phase.
+type Row = [f64; 2];
 
 fn step_once(app: &mut App) -> Row {
     let start = Instant::now();
     app.update();
     let ms = |time: Duration| time.as_secs_f64() * 1e3;
-    let (collision, trees) =
-        (app.world().resource::<CollisionDiagnostics>(), app.world().resource::<ColliderTreeDiagnostics>());
-    [ms(start.elapsed()), ms(collision.broad_phase), ms(trees.update), ms(trees.optimize)]
+    let step = start.elapsed();
+    [ms(step), ms(app.world().resource::<CollisionDiagnostics>().broad_phase)]
 }
 
-fn print_row(name: &str, times: &[Row]) {
-    print!("{name:6}");
-    for (k, part) in ["step", "broad phase", "trees", "optimise"].iter().enumerate() {
-        let mut column: Vec<f64> = times.iter().map(|row| row[k]).collect();
-        column.sort_by(f64::total_cmp);
-        let mean = column.iter().sum::<f64>() / column.len() as f64;
-        let at = |share: usize| column[(column.len() * share / 100).min(column.len() - 1)];
-        print!("  {part} {mean:.3} {:.3} {:.3}", at(50), at(99));
-    }
-    println!();
+/// Returns the mean and the 99th percentile of a column, to three digits.
+fn mean_and_p99(rows: &[Row], column: usize) -> [f64; 2] {
+    let mut times: Vec<f64> = rows.iter().map(|row| row[column]).collect();
+    times.sort_by(f64::total_cmp);
+    let mean = times.iter().sum::<f64>() / times.len() as f64;
+    [mean, times[(times.len() * 99 / 100).min(times.len() - 1)]].map(|time| (time * 1000.0).round() / 1000.0)
 }
 
 fn app(is_pbig: bool, scene: &str, bodies: usize) -> App {
