@@ -1,11 +1,9 @@
 //! The index gives the answers of a scan of all boxes, after all kinds of changes, and looks at few boxes.
 
 use super::{BoxIndex, Visited};
-use crate::grid::{Hits, Rule};
-use crate::{Aabb, Pair, oracle};
+use crate::Aabb;
 use rand::rngs::StdRng;
 use rand::{RngExt, SeedableRng};
-use std::sync::atomic::AtomicU64;
 
 fn random_box(rng: &mut StdRng, reach: f32) -> Aabb {
     let half = match rng.random_range(0..20) {
@@ -89,41 +87,6 @@ fn compare(mut found: Vec<u32>, wanted: impl Iterator<Item = usize>, may_be: imp
         assert!(found.binary_search(&(id as u32)).is_ok(), "box {id} was missed");
     }
     assert!(found.iter().all(|&id| may_be(id as usize)), "a box far away was visited");
-}
-
-/// Returns all pairs that a sorted index finds on this number of threads.
-fn joined(boxes: &[Aabb], threads: usize) -> Vec<Pair> {
-    let mut index = BoxIndex::default();
-    index.sort(boxes);
-    let rule = Rule { filters: None, max_pairs: u64::MAX, found: &AtomicU64::new(0) };
-    let mut hits = vec![Hits::default(); threads];
-    hits.iter_mut().for_each(|hits| hits.begin(0, 0));
-    index.find_pairs(&rule, &mut hits);
-    let mut pairs: Vec<Pair> = hits.iter().flat_map(|hits| hits.pairs.iter().copied()).collect();
-    pairs.sort_unstable();
-    pairs
-}
-
-#[test]
-fn a_join_finds_the_pairs_of_the_oracle() {
-    let mut random = StdRng::seed_from_u64(5);
-    for n in (0..100).chain([1000, 20_000]) {
-        let width = (n as f32).cbrt() * 1.5;
-        let mut boxes: Vec<Aabb> = (0..n)
-            .map(|i| {
-                let size = 2f32.powi(i % 7 * (i % 3) - 3);
-                let half = [size, 1.0, 0.3].map(|half| half * random.random_range(0.2..0.5));
-                Aabb::from_center([0; 3].map(|_| random.random_range(0.0..=width)), half)
-            })
-            .collect();
-        let odd = [
-            Aabb::NOWHERE,
-            Aabb::new([1.0; 3], [0.0; 3]),
-            Aabb::new([f32::NEG_INFINITY; 3], [f32::INFINITY; 3]),
-        ];
-        boxes.iter_mut().skip(5).step_by(41).zip(odd.iter().cycle()).for_each(|(to, odd)| *to = *odd);
-        assert_eq!(joined(&boxes, 1 + n as usize % 3), oracle::pairs(&boxes), "{n} boxes");
-    }
 }
 
 #[test]
