@@ -225,23 +225,3 @@ impl AllPairs {
         self.hits.iter().for_each(|hits| pairs.extend_from_slice(&hits.pairs));
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::{Limits, Order};
-
-    #[test]
-    fn a_search_with_too_many_pairs_ends_early() {
-        let limits = Limits { max_pairs: 1000, ..Limits::DEFAULT };
-        let config = Config { limits, order: Order::Unspecified, ..Config::DEFAULT };
-        // 2 * 10^8 pairs, 1.6 GB.
-        let boxes = vec![Aabb::new([0.0; 3], [1.0; 3]); 20_000];
-        let request = Request { boxes: &boxes, filters: None, config: &config, grouping: None };
-        let mut all = AllPairs::default();
-        let outcome = all.find(&request, &mut Store::default());
-        assert_eq!(outcome.end, End::TooManyPairs);
-        let kept: usize = all.hits.iter().map(|hits| hits.pairs.capacity()).sum();
-        assert!(kept < 1_000_000, "room for {kept} pairs");
-    }
-}

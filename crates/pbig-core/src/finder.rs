@@ -228,16 +228,3 @@ pub(crate) fn check_count(boxes: u64, limits: &Limits) -> Result<(), Error> {
     let limit = limits.max_boxes.min(Limits::UNLIMITED.max_boxes);
     if boxes > limit { Err(Error::TooManyBoxes { boxes, limit }) } else { Ok(()) }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn filters_part_some_and_leave_the_others() {
-        let boxes = [Aabb::from_center([0.0; 3], [0.5; 3]); 3];
-        let filters = [1, 1, 2].map(|body| ProxyFilter { body, ..ProxyFilter::ALL });
-        let mut finder = Finder::default();
-        assert_eq!(finder.find_filtered(&boxes, &filters), Ok(&[Pair::new(0, 2), Pair::new(1, 2)][..]));
-    }
-}

@@ -143,16 +143,4 @@ mod tests {
             assert_eq!(pairs_between(&all[..n], &all[n..]), across, "{n} and {m}");
         }
     }
-
-    #[test]
-    fn filters_are_asked_about_overlapping_pairs_only() {
-        let boxes = [0.0, 0.5, 9.0].map(|x| Aabb::from_center([x; 3], [1.0; 3]));
-        let mut asked = Vec::new();
-        let none = pairs_where(&boxes, |a, b| {
-            asked.push((a, b));
-            false
-        });
-        assert!(none.is_empty());
-        assert_eq!(asked, [(0, 1)]);
-    }
 }

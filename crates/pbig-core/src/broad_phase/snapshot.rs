@@ -125,53 +125,14 @@ impl Snapshot {
 mod tests {
     use super::*;
 
-    /// Boxes in a row, of which some move each round.
-    fn play(broad_phase: &mut BroadPhase, round: u32) -> crate::Events {
-        for id in 0..90u32 {
-            let x = (id * 7 % 90) as f32 + if id % 3 == round % 3 { round as f32 * 0.4 } else { 0.0 };
-            let aabb = match (id, round) {
-                (5, _) => Aabb::new([f32::NEG_INFINITY; 3], [f32::INFINITY; 3]),
-                (6, 2) => Aabb::NOWHERE,
-                _ => Aabb::from_center([x, 0.0, 0.0], [0.6; 3]),
-            };
-            let filter = ProxyFilter { body: id / 2, ..ProxyFilter::ALL };
-            broad_phase.set(id, aabb, filter).expect("few boxes");
-        }
-        broad_phase.remove(round * 3);
-        let events = broad_phase.update().expect("few pairs").clone();
-        // Changes that the next update will see.
-        broad_phase.remove(round + 20);
-        events
-    }
-
-    fn saved(broad_phase: &BroadPhase) -> String {
-        serde_json::to_string(broad_phase).expect("a snapshot")
-    }
-
-    #[test]
-    fn a_restored_broad_phase_goes_on_with_the_same_events() {
-        let mut kept = BroadPhase::new(Config { margin: 0.05, ..Config::DEFAULT }).expect("a margin");
-        let mut events = 0;
-        for round in 0..12 {
-            let mut restored: BroadPhase = serde_json::from_str(&saved(&kept)).expect("a restored one");
-            assert!(saved(&restored) == saved(&kept));
-            assert_eq!(restored.pair_count(), kept.pair_count());
-            let wanted = play(&mut kept, round);
-            assert_eq!(play(&mut restored, round), wanted);
-            assert_eq!(restored.report().invalid, kept.report().invalid);
-            events += wanted.added.len() + wanted.removed.len();
-            kept = if round % 2 == 0 { restored } else { kept };
-        }
-        assert!(events > 100, "{events} events");
-    }
-
     #[test]
     fn broken_snapshots_are_errors() {
         let mut whole = BroadPhase::new(Config::DEFAULT).expect("a margin");
-        for round in 0..3 {
-            play(&mut whole, round);
-        }
-        let good: serde_json::Value = serde_json::from_str(&saved(&whole)).expect("JSON");
+        let cube = |id: u32| Aabb::from_center([0.9 * id as f32, 0.0, 0.0], [0.5; 3]);
+        (0..90).for_each(|id| whole.set(id, cube(id), ProxyFilter::ALL).expect("a small id"));
+        assert_eq!(whole.update().expect("few pairs").added.len(), 89);
+        whole.remove(20);
+        let good = serde_json::to_value(&whole).expect("a snapshot");
         let broken = |change: &dyn Fn(&mut serde_json::Value)| {
             let mut value = good.clone();
             change(&mut value);

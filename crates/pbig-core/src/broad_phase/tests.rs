@@ -124,31 +124,6 @@ fn every_engine_follows_random_worlds() {
 }
 
 #[test]
-fn an_update_with_too_many_pairs_changes_nothing_but_the_grid() {
-    for engine in engines() {
-        let limits = Limits { max_pairs: 10, ..Limits::DEFAULT };
-        let mut broad_phase =
-            BroadPhase::new(Config { limits, engine, ..Config::DEFAULT }).expect("a margin");
-        let put = |broad_phase: &mut BroadPhase, id: u32, x: f32| {
-            broad_phase.set(id, Aabb::from_center([x, 0.0, 0.0], [0.5; 3]), ProxyFilter::ALL).expect("room");
-        };
-        (0..70).for_each(|id| put(&mut broad_phase, id, 10.0 * id as f32));
-        assert_eq!(broad_phase.update().expect("no pairs").added, []);
-        (1..5).for_each(|id| put(&mut broad_phase, id, 0.0));
-        assert_eq!(broad_phase.update().expect("ten pairs").added.len(), 10);
-        put(&mut broad_phase, 6, 0.0);
-        assert_eq!(broad_phase.update(), Err(Error::TooManyPairs { limit: 10 }));
-        assert_eq!((broad_phase.pair_count(), broad_phase.events().added.len()), (10, 0));
-        put(&mut broad_phase, 0, 205.0);
-        let events = broad_phase.update().expect("ten pairs").clone();
-        let (added, removed): (Vec<_>, Vec<_>) =
-            (1..5).map(|id| (Pair::new(id, 6), Pair::new(0, id))).unzip();
-        assert_eq!((events.added.clone(), events.removed), (added, removed), "{engine:?}");
-        assert!(events.added.iter().all(|pair| broad_phase.has_pair(*pair)));
-    }
-}
-
-#[test]
 fn an_edit_that_finds_too_many_pairs_does_not_list_them_all() {
     let limits = Limits { max_pairs: 1000, ..Limits::DEFAULT };
     let config = Config { limits, engine: Some(Engine::Edit), ..Config::DEFAULT };
@@ -274,14 +249,6 @@ fn an_id_far_above_the_others_is_an_error_and_takes_no_memory() {
     assert_eq!(broad_phase.set(id, cube, ProxyFilter::ALL), Err(Error::SparseId { id, known: 4 }));
     assert_eq!((broad_phase.len(), broad_phase.id_count()), (1, 4));
     broad_phase.set(1 << 20, cube, ProxyFilter::ALL).expect("an id that costs 64 MB");
-}
-
-#[test]
-fn a_margin_that_is_no_length_is_an_error() {
-    for margin in [-1.0, f32::NAN, f32::INFINITY] {
-        assert!(matches!(BroadPhase::new(Config { margin, ..Config::DEFAULT }), Err(Error::Margin { .. })));
-        assert!(BroadPhase::default().set_margin(margin).is_err());
-    }
 }
 
 #[test]

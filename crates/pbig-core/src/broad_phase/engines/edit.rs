@@ -23,9 +23,7 @@ pub(crate) struct Edit {
     /// The place of each changed box.
     places: Vec<Place>,
     threads: Vec<Thread>,
-    /// Changed boxes as they were, in the order of their changes.
-    listed: Vec<Record>,
-    /// Key and place in that list.
+    /// Key and number of each changed box.
     order: Vec<u64>,
     /// Work of the last run.
     work: u64,
@@ -114,18 +112,20 @@ impl Edit {
 
     /// Lists changed boxes in the order of their old cells: neighbours share cache lines.
     fn list(&mut self, world: &World, grid: &EditedGrid) {
-        let Self { before, after, listed, order, .. } = self;
-        listed.clear();
+        let Self { before, after, order, .. } = self;
+        // In the order of their changes at first.
+        after.clear();
         let old = |(&id, old): (&u32, &Old)| Record::new(old.aabb, id, 0);
-        listed.extend(world.changed.iter().zip(&world.old).map(old));
-        grid.keys(listed);
+        after.extend(world.changed.iter().zip(&world.old).map(old));
+        grid.keys(after);
         order.clear();
-        order.extend(listed.iter().enumerate().map(|(i, record)| u64::from(record.key) << 32 | i as u64));
+        order.extend(after.iter().enumerate().map(|(i, record)| u64::from(record.key) << 32 | i as u64));
         order.sort_unstable();
         before.clear();
-        before.extend(order.iter().map(|&word| listed[word as u32 as usize]));
-        after.clear();
-        after.extend(before.iter().map(|record| Record::new(world.boxes[record.id as usize], record.id, 0)));
+        before.extend(order.iter().map(|&word| after[word as u32 as usize]));
+        for (to, record) in after.iter_mut().zip(&*before) {
+            *to = Record::new(world.boxes[record.id as usize], record.id, 0);
+        }
         grid.keys(after);
     }
 
