@@ -109,7 +109,7 @@ fn write(output: &Path, all: &[Found]) -> Result<(), String> {
             .flat_map(|found| found.pairs.iter().map(|[a, b]| format!("{},{a},{b}", found.kinds.0)));
         return write_csv(output, "elements,a,b", lines);
     };
-    write_id_pairs(output, &one.pairs)
+    write_id_pairs(output, one.pairs.iter().copied())
 }
 
 fn report(args: &Args, elements: &MeshElements, all: &[Found]) -> Result<(), Failure> {

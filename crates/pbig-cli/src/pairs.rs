@@ -64,7 +64,7 @@ fn search(args: &Args, input: &Path) -> Result<(), Failure> {
     let times = with_threads(args.threads, || find(&mut finder, &lists, args))?;
     match &args.output {
         Some(output) if args.with.is_some() => {
-            write_id_pairs(output, bytemuck::cast_slice(finder.pairs_between()))?;
+            write_id_pairs(output, finder.pairs_between().iter().map(|pair| [pair.a, pair.b]))?;
         }
         Some(output) => write_pairs(output, finder.pairs())?,
         None => {}

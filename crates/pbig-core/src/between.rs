@@ -23,10 +23,11 @@ pub(crate) struct Sets {
     pub(crate) split: usize,
     /// Valid boxes of both sets, before any was dropped.
     pub(crate) valid: u64,
+    /// Scratch: the ids of the second set.
     second: Vec<u32>,
 }
 
-/// A set overlaps this box if it overlaps any.
+/// A box that all valid boxes overlap.
 const EVERYWHERE: Aabb = Aabb::new([f32::NEG_INFINITY; 3], [f32::INFINITY; 3]);
 
 impl Sets {

@@ -42,16 +42,16 @@ fn identity(path: &Path) -> io::Result<std::path::PathBuf> {
 
 /// Pairs as `.npy` (K,2) uint32 or `.csv`.
 pub fn write_pairs(path: &Path, pairs: &[Pair]) -> Result<(), String> {
-    write_id_pairs(path, bytemuck::cast_slice(pairs))
+    write_id_pairs(path, pairs.iter().map(|pair| [pair.a, pair.b]))
 }
 
 /// Pairs of any two lists, as [`write_pairs`] does.
-pub fn write_id_pairs(path: &Path, pairs: &[[u32; 2]]) -> Result<(), String> {
+pub fn write_id_pairs(path: &Path, pairs: impl Iterator<Item = [u32; 2]>) -> Result<(), String> {
     if is_stdout(path) || ending(path, &BOXES_OR_PAIRS)? == "csv" {
-        return write_csv(path, "a,b", pairs.iter().map(|[a, b]| format!("{a},{b}")));
+        return write_csv(path, "a,b", pairs.map(|[a, b]| format!("{a},{b}")));
     }
-    let flat = pairs.iter().flatten().copied().collect();
-    let array = Array2::from_shape_vec((pairs.len(), 2), flat).map_err(|error| at(path, error))?;
+    let flat: Vec<u32> = pairs.flatten().collect();
+    let array = Array2::from_shape_vec((flat.len() / 2, 2), flat).map_err(|error| at(path, error))?;
     ndarray_npy::write_npy(path, &array).map_err(|error| at(path, error))
 }
 
