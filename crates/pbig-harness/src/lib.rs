@@ -3,7 +3,6 @@
 
 pub mod bench;
 pub mod boxes;
-pub mod chart;
 pub mod counting;
 pub mod duel;
 pub mod field;
@@ -21,4 +20,5 @@ pub mod report;
 pub mod runner;
 pub mod table;
 
-pub use pbig_scenes::{frames, scenes, world};
+pub use pbig_chart as chart;
+pub use pbig_scenes::{frames, pair_order, scenes, world};
