@@ -46,7 +46,7 @@ test_features() {
         lint rapier-pbig "" parallel gpu serde debug-render shadow
         lint pbig-gpu "" wgpu
         ;;
-    powerset-0.36) lint rapier-pbig "--manifest-path rapier-0.36/Cargo.toml" parallel gpu debug-render shadow ;;
+    powerset-0.36) lint rapier3d-pbig "--manifest-path rapier-0.36/Cargo.toml" parallel gpu debug-render shadow ;;
     *)
         step cargo test --locked --release -p pbig-tests --no-default-features --features "${kind#none}" --test suite -- \
             calls drop_in upstream shapes restore queries explain random_worlds worlds::a_scene_gives

@@ -21,25 +21,28 @@ edition = "2024"
 [dependencies]
 glam = { version = "0.34", features = ["libm"] }
 postcard = { version = "1.1", default-features = false, features = ["use-std"] }
-rand = "0.10"
-rapier3d = { version = "=0.36.1", features = ["serde-serialize"] }
+pbig-scenes = { path = "$root/crates/pbig-scenes", default-features = false }
+rapier = { package = "rapier3d", version = "=0.36.1", features = ["serde-serialize"] }
 [workspace]
 $2
 TOML
     cat >"$folder/$1/src/main.rs" <<RUST
 //! Prints a hash of each scene's poses and of its broad phase's bytes.
-#[path = "$root/crates/pbig-scenes/src/scenes/mod.rs"]
-pub mod scenes;
+#![allow(dead_code)]
+#[path = "$root/rapier-0.36/harness/src/build.rs"]
+mod build;
+#[path = "$root/rapier-0.36/harness/src/three.rs"]
+mod dimension;
 #[path = "$root/rapier-0.36/harness/src/world.rs"]
-#[allow(dead_code)]
-pub mod world;
+mod world;
 
-use rapier3d::prelude::BroadPhaseBvh;
+use pbig_scenes::scenes::Scene;
+use rapier::prelude::BroadPhaseBvh;
 use std::hash::{DefaultHasher, Hash, Hasher};
 
 fn main() {
-    for scene in scenes::Scene::ALL {
-        let (mut world, mut broad_phase) = (scene.build($bodies, 1), BroadPhaseBvh::new());
+    for scene in Scene::ALL {
+        let (mut world, mut broad_phase) = (world::World::of(&scene.plan($bodies, 1)), BroadPhaseBvh::new());
         let mut hash = DefaultHasher::new();
         for step in 0..$steps {
             world.step(&mut broad_phase);
@@ -79,7 +82,7 @@ make_copy() {
     cp -r rapier-0.36/patched/rapier3d-0.36.1/. "$copy"
     # Its `crate::` is `crate::pbig::` here.
     for file in config finder scene tree; do
-        { sed 's/crate::/crate::pbig::/g; s/use rapier3d::/use crate::/' "rapier-0.36/rapier-pbig/src/$file.rs"
+        { sed 's/crate::/crate::pbig::/g; s/use rapier::/use crate::/' "rapier-0.36/rapier3d-pbig/src/$file.rs"
           echo '#[allow(unused_imports)] use std::prelude::rust_2024::*;'
         } >"$copy/src/pbig/$file.rs"
     done
@@ -94,6 +97,11 @@ pub(crate) use finder::PbigFinder;
 use crate::geometry::{PairFinder, SceneQuery};
 const MARGIN: f32 = 0.04;
 const MAX_ADAPTIVE_MARGIN: f32 = 0.25;
+type Bounds = <crate::math::Real as pbig_adapter::Scalar>::Aabb;
+
+fn to_f32(x: crate::math::Real) -> f32 {
+    x
+}
 
 pub(crate) fn wanted() -> Option<std::boxed::Box<dyn PairFinder>> {
     std::env::var_os("RAPIER_PBIG").map(|_| std::boxed::Box::<PbigFinder>::default() as _)

@@ -17,8 +17,10 @@ trap 'rm -rf "$TMPDIR"' EXIT
 # The default members, for commands that leave one out: cargo takes `--exclude` only beside `--workspace`.
 members="--workspace --exclude pbig-page --exclude pbig-page-bindgen --exclude pbig-viewer --exclude pbig-wasm"
 in_036="--manifest-path rapier-0.36/Cargo.toml"
-members_036="-p rapier-pbig -p pbig-harness-036"
-features_036="--features rapier-pbig/debug-render"
+members_036="-p rapier3d-pbig -p pbig-harness-036"
+features_036="--features rapier3d-pbig/debug-render"
+# The same source for two dimensions and for f64.
+others_036="-p pbig-harness-2d -p pbig-harness-2d-f64 -p pbig-harness-3d-f64"
 # The suite refuses to leave the GPU out with CI=true.
 without_gpu="env -u CI PBIG_GPU=none"
 
@@ -125,7 +127,7 @@ step_docs() {
     step scripts/docs.sh
 }
 
-# The adapter for rapier 0.36, in a workspace of its own: cargo replaces rapier there by a patched copy.
+# The adapters for rapier 0.36, in a workspace of its own: cargo replaces rapier there by a patched copy.
 step_rapier_0_36() {
     step scripts/patch-rapier.sh rapier-0.36
     step cargo fmt --all $in_036 --check
@@ -133,10 +135,16 @@ step_rapier_0_36() {
     step cargo clippy --locked --release $in_036 $members_036 $features_036 --all-targets -- -D warnings
     step scripts/extra.sh --no-setup features powerset-0.36
     step cargo test --release $in_036 $members_036 $features_036 --no-fail-fast
+    step cargo clippy --locked --release $in_036 $others_036 --all-targets -- -D warnings
+    step env PBIG_RUNS=100 PBIG_BODIES=80 cargo test --release $in_036 $others_036 --no-fail-fast
     step cargo test --release $in_036 -p pbig-harness-036 --no-default-features --features enhanced-determinism
     step cargo run --release $in_036 -p pbig-harness-036 $features_036 --example falling_objects -- --bodies 500 --steps 60
     step env RUSTDOCFLAGS="-D warnings" \
-        cargo doc --release $in_036 -p rapier-pbig --features shadow,debug-render --no-deps
+        cargo doc --release $in_036 -p rapier3d-pbig --features shadow,debug-render --no-deps
+    # The packages have their source, which is a link in three of them.
+    for crate in rapier2d rapier2d-f64 rapier3d rapier3d-f64; do
+        step cargo package --quiet --no-verify --allow-dirty --exclude-lockfile $in_036 -p "$crate-pbig"
+    done
 }
 
 # count LOG STATUS: prints how many tests passed, failed and were left out. A step without tests counts as one.

@@ -1,32 +1,90 @@
-//! A pair ends in the order in which it began, even if its colliders change in between: an app that keeps ordered pairs of
-//! handles must not keep one for ever.
+//! A pair ends in the order in which it began: the checks of `pbig_scenes::pair_order`.
 
-mod pairs;
-
+use glam::Vec3;
+use pbig_harness::pair_order::{self, Change, Told, Zone};
 use pbig_harness::world::{World, to_vector};
 use rand::RngExt;
 use rand::rngs::StdRng;
 use rapier_pbig::PbigBroadPhase;
+use rapier3d::prelude::*;
 
-type Subject = PbigBroadPhase;
-
-fn subject() -> Subject {
-    PbigBroadPhase::new()
+struct InRapier {
+    world: World,
+    broad_phase: PbigBroadPhase,
+    balls: Vec<RigidBodyHandle>,
 }
 
-/// Restores the broad phase, or takes the world over with a new one.
-fn hand_over(world: &mut World, broad_phase: &mut Subject, rng: &mut StdRng) {
-    match rng.random_range(0..4) {
-        0 => {
-            *broad_phase = subject();
-            broad_phase.adopt(&world.narrow_phase);
-        }
-        1 => broad_phase.adopt(&world.narrow_phase),
-        2 => *broad_phase = broad_phase.clone(),
-        _ => {
-            let bytes = postcard::to_stdvec(broad_phase).expect("a snapshot");
-            *broad_phase = postcard::from_bytes(&bytes).expect("what was saved");
-            *world = World::from_bytes(&world.to_bytes()).expect("the bytes of a world");
+fn listening(collider: ColliderBuilder) -> ColliderBuilder {
+    collider.active_events(ActiveEvents::COLLISION_EVENTS).active_collision_types(ActiveCollisionTypes::all())
+}
+
+impl Zone for InRapier {
+    fn new() -> Self {
+        let mut world = World::default();
+        world
+            .colliders
+            .insert(listening(ColliderBuilder::new(SharedShape::cuboid(2.0, 2.0, 2.0))).sensor(true));
+        Self { world, broad_phase: PbigBroadPhase::new(), balls: Vec::new() }
+    }
+
+    fn add_ball(&mut self, at: Vec3, is_sensor: bool) {
+        let body = World::dynamic(at).gravity_scale(0.0);
+        self.balls.push(self.world.add(body, listening(ColliderBuilder::ball(0.4)).sensor(is_sensor)));
+    }
+
+    fn change(&mut self, ball: usize, change: Change) {
+        let World { bodies, colliders, .. } = &mut self.world;
+        let body = &mut bodies[self.balls[ball]];
+        let collider = &mut colliders[body.colliders()[0]];
+        match change {
+            Change::Move(at) => body.set_translation(to_vector(at), true),
+            Change::Throw(velocity) => body.set_linvel(to_vector(velocity), true),
+            Change::Exclude => collider.set_collision_groups(InteractionGroups::none()),
+            Change::Resize(half) => collider.set_shape(SharedShape::cuboid(half, half, half)),
+            Change::MakeKinematic => body.set_body_type(RigidBodyType::KinematicPositionBased, true),
         }
     }
+
+    /// Restores the broad phase, or takes the world over with a new one.
+    fn hand_over(&mut self, rng: &mut StdRng) {
+        let Self { world, broad_phase, .. } = self;
+        match rng.random_range(0..4) {
+            0 => {
+                *broad_phase = PbigBroadPhase::new();
+                broad_phase.adopt(&world.narrow_phase);
+            }
+            1 => broad_phase.adopt(&world.narrow_phase),
+            2 => *broad_phase = broad_phase.clone(),
+            _ => {
+                let bytes = postcard::to_stdvec(broad_phase).expect("a snapshot");
+                *broad_phase = postcard::from_bytes(&bytes).expect("what was saved");
+                *world = World::from_bytes(&world.to_bytes()).expect("the bytes of a world");
+            }
+        }
+    }
+
+    fn step(&mut self) -> Vec<Told> {
+        let parts =
+            |one: ColliderHandle, other: ColliderHandle| [one.into_raw_parts(), other.into_raw_parts()];
+        let told = |event| match event {
+            CollisionEvent::Started(one, other, _) => (true, parts(one, other)),
+            CollisionEvent::Stopped(one, other, _) => (false, parts(one, other)),
+        };
+        self.world.step_with_events(&mut self.broad_phase).into_iter().map(told).collect()
+    }
+}
+
+#[test]
+fn a_ball_that_leaves_a_zone_in_one_step_leaves_as_it_came() {
+    pair_order::a_ball_that_leaves_a_zone_leaves_as_it_came::<InRapier>();
+}
+
+#[test]
+fn pairs_keep_their_order_whoever_finds_them_next() {
+    pair_order::pairs_keep_their_order_whoever_finds_them_next::<InRapier>();
+}
+
+#[test]
+fn an_end_in_the_other_order_is_noticed() {
+    pair_order::an_end_in_the_other_order_is_noticed::<InRapier>();
 }

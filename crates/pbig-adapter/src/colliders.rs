@@ -6,9 +6,14 @@ use crate::order::PairOrder;
 use crate::registry::ColliderRegistry;
 use crate::stats::{Counts, Totals};
 use crate::tree::SceneTree;
-use crate::{Handle, HandlePair, Scene, Tree};
-use pbig_core::{Aabb, BroadPhase, Error, PairDevice, ProxyFilter};
+use crate::{Bounds, Boxes, Handle, HandlePair, Scene, Tree};
+use pbig_core::{BroadPhase, Error, PairDevice, ProxyFilter};
 use std::collections::HashSet;
+
+/// The numbers of a world.
+type RealOf<T> = <<T as Tree>::Aabb as Bounds>::Real;
+/// A scene query of a world.
+type QueryOf<T> = SceneQuery<<T as Tree>::Aabb, RealOf<T>>;
 
 /// The part of a broad phase that does not depend on rapier's version.
 ///
@@ -17,13 +22,14 @@ use std::collections::HashSet;
 ///
 /// A clone sends the same events as the original.
 #[derive(Clone, Debug)]
-pub struct Colliders<T> {
+pub struct Colliders<T: Tree> {
     pub(crate) core: BroadPhase,
+    pub(crate) boxes: <T::Aabb as Bounds>::Boxes,
     pub(crate) registry: ColliderRegistry,
     pub(crate) writer: EventWriter,
     /// Proxies that several threads compute. Kept for its memory.
     #[cfg(feature = "parallel")]
-    pub(crate) proxies: Vec<(Handle, crate::Proxy)>,
+    pub(crate) proxies: Vec<(Handle, crate::Proxy<T::Aabb>)>,
     index: SceneIndex,
     tree: SceneTree<T>,
     pub(crate) counts: Counts,
@@ -34,7 +40,7 @@ pub struct Colliders<T> {
     /// reads all colliders, because rapier lists a change only once.
     pub(crate) is_incomplete: bool,
     /// Boxes of a broad phase that stopped: the next call starts from these.
-    inherited: Vec<(u32, Aabb)>,
+    inherited: Vec<(u32, T::Aabb)>,
 }
 
 impl<T: Tree> Colliders<T> {
@@ -42,6 +48,7 @@ impl<T: Tree> Colliders<T> {
     pub fn new(core: BroadPhase) -> Self {
         Self {
             core,
+            boxes: Default::default(),
             registry: ColliderRegistry::default(),
             writer: EventWriter::default(),
             #[cfg(feature = "parallel")]
@@ -70,7 +77,7 @@ impl<T: Tree> Colliders<T> {
     /// error of this update.
     #[inline(always)]
     pub fn set_margin(&mut self, margin: f32) {
-        if let Err(error) = self.core.set_margin(margin) {
+        if let Err(error) = self.boxes.set_margin(&mut self.core, margin) {
             self.note_error(error);
         }
     }
@@ -78,7 +85,7 @@ impl<T: Tree> Colliders<T> {
     /// Takes over a world whose narrow phase has these pairs. The next update finds no collider known, so it reads all, and ends
     /// pairs that do not overlap. `boxes` are the previous broad phase's, by collider index: a box that holds its collider is kept.
     /// With `keeps_order` the colliders of each pair are in the order of its event, and its end will have that order.
-    pub fn adopt(&mut self, pairs: Vec<HandlePair>, boxes: Vec<(u32, Aabb)>, keeps_order: bool) {
+    pub fn adopt(&mut self, pairs: Vec<HandlePair>, boxes: Vec<(u32, T::Aabb)>, keeps_order: bool) {
         self.forget_all();
         (self.is_idle, self.is_incomplete) = (false, !pairs.is_empty() || !boxes.is_empty());
         self.writer.adopt(pairs, keeps_order);
@@ -88,18 +95,18 @@ impl<T: Tree> Colliders<T> {
     /// Sets the AABBs of colliders, with this margin or one of their own, and keeps their filters. A collider without a box gets a filter
     /// that admits all, until the next update sets its own before it looks for pairs.
     #[inline(always)]
-    pub fn set_aabbs(&mut self, margin: f32, moved: impl Iterator<Item = (Handle, Aabb, Option<f32>)>) {
+    pub fn set_aabbs(&mut self, margin: f32, moved: impl Iterator<Item = (Handle, T::Aabb, Option<f32>)>) {
         self.set_margin(margin);
         for (handle, aabb, own) in moved {
             if let Some(margin) = own {
                 self.set_margin(margin);
             }
             // A collider that was disabled is known but has no box.
-            if !(self.registry.contains(handle) && self.core.set_aabb(handle.index, aabb)) {
+            if !(self.registry.contains(handle) && self.boxes.set_aabb(&mut self.core, handle.index, aabb)) {
                 self.enable(handle, aabb, ProxyFilter::ALL);
             }
         }
-        if !self.core.changes().is_empty() {
+        if !self.boxes.changes(&self.core).is_empty() {
             self.index.expire();
             self.tree.expire();
         }
@@ -107,7 +114,14 @@ impl<T: Tree> Colliders<T> {
 
     /// Visits the indices of colliders whose boxes, margins included, a query meets, and perhaps some that it barely misses.
     /// `visit` returns the time or distance up to which more are wanted.
-    pub fn visit(&self, query: &SceneQuery, visit: &mut dyn FnMut(u32) -> f32) {
+    pub fn visit(&self, query: &QueryOf<T>, visit: &mut dyn FnMut(u32) -> RealOf<T>) {
+        let narrow = self.boxes.narrow(query);
+        self.visit_core(&narrow, &mut |id| {
+            if self.boxes.is_met(query, id) { self.boxes.narrow_bound(visit(id)) } else { f32::INFINITY }
+        });
+    }
+
+    fn visit_core(&self, query: &SceneQuery, visit: &mut dyn FnMut(u32) -> f32) {
         // Continuous collision detection asks in the middle of a step, when there is a grid of just these boxes.
         let mut of_grid = Vec::new();
         if let SceneQuery::Overlap(aabb) = query
@@ -122,11 +136,12 @@ impl<T: Tree> Colliders<T> {
 
     /// Returns a tree of the same boxes, for queries that need one.
     pub fn tree(&self) -> &T {
-        self.tree.get(self.core.id_count(), self.core.changes().iter().copied(), |id| self.core.fat_aabb(id))
+        let changes = self.boxes.changes(&self.core).iter().copied();
+        self.tree.get(self.core.id_count(), changes, |id| self.boxes.fat(&self.core, id))
     }
 
     /// Updates the boxes that rapier lists, and sends the events.
-    pub fn update(&mut self, scene: &impl Scene, margin: f32, send: impl FnMut(PairEvent)) {
+    pub fn update(&mut self, scene: &impl Scene<Aabb = T::Aabb>, margin: f32, send: impl FnMut(PairEvent)) {
         let removed = scene.removed().count();
         let modified = scene.listed_count();
         let has_changes = modified + removed > 0 || self.differs_from(scene);
@@ -139,7 +154,7 @@ impl<T: Tree> Colliders<T> {
         self.tree.expire();
         self.read(scene, margin);
         self.index.note(self.core.changes(), self.core.id_count());
-        self.tree.note(self.core.changes().iter().copied(), self.registry.len());
+        self.tree.note(self.boxes.changes(&self.core).iter().copied(), self.registry.len());
         self.find_and_send(|handle| scene.size(handle), send);
         self.counts.totals.failures += u64::from(self.last_error.is_some());
         self.is_idle = !has_changes && self.has_nothing_left();
@@ -147,34 +162,37 @@ impl<T: Tree> Colliders<T> {
 
     /// Counts an update in which rapier lists nothing, and returns true if there is nothing else to do either.
     #[inline(always)]
-    pub fn skips(&mut self, scene: &impl Scene) -> bool {
+    pub fn skips(&mut self, scene: &impl Scene<Aabb = T::Aabb>) -> bool {
         let skips = self.is_idle
             && scene.listed_count() == 0
             && scene.removed().next().is_none()
-            && self.core.changes().is_empty()
+            && self.has_no_changes()
             && !self.differs_from(scene);
         self.counts.totals.updates += u64::from(skips);
         skips
     }
 
-    fn differs_from(&self, scene: &impl Scene) -> bool {
+    fn differs_from(&self, scene: &impl Scene<Aabb = T::Aabb>) -> bool {
         self.registry.len() != scene.collider_count()
     }
 
     /// Returns true if nothing is left to do: no change or error of a failed update, and no adopted pair.
     fn has_nothing_left(&self) -> bool {
-        let is_done = self.last_error.is_none() && self.core.changes().is_empty();
-        is_done && self.writer.adopted.is_empty()
+        self.last_error.is_none() && self.has_no_changes() && self.writer.adopted.is_empty()
+    }
+
+    fn has_no_changes(&self) -> bool {
+        self.core.changes().is_empty() && self.boxes.changes(&self.core).is_empty()
     }
 
     /// Removes first, because a modified collider may reuse the index of a removed one.
-    fn read(&mut self, scene: &impl Scene, margin: f32) {
+    fn read(&mut self, scene: &impl Scene<Aabb = T::Aabb>, margin: f32) {
         for (handle, exists) in scene.removed() {
             // Rapier lists disabled colliders as removed, too.
             if exists { self.disable(handle) } else { self.forget(handle) }
         }
         self.writer.forget_adopted(scene.removed().map(|(handle, _)| handle));
-        let margin = self.core.set_margin(margin);
+        let margin = self.boxes.set_margin(&mut self.core, margin);
         if std::mem::replace(&mut self.is_incomplete, true) {
             self.read_all(scene);
         } else {
@@ -186,36 +204,37 @@ impl<T: Tree> Colliders<T> {
         // Only a refused box can have set an error before this line. The margin's error is noted below.
         self.is_incomplete = self.last_error.is_some();
         self.inherited.clear();
+        self.boxes.settle(&mut self.core);
         if let Err(error) = margin {
             self.note_error(error);
         }
     }
 
-    fn read_all(&mut self, scene: &impl Scene) {
+    fn read_all(&mut self, scene: &impl Scene<Aabb = T::Aabb>) {
         let mut inherited = std::mem::take(&mut self.inherited);
         if !inherited.is_empty() {
             // Another collider may use the index of a removed one.
             let gone: HashSet<u32> = scene.removed().map(|(handle, _)| handle.index).collect();
             inherited.retain(|(id, _)| !gone.contains(id));
         }
-        let margin = self.core.config().margin;
-        if !inherited.is_empty() && self.core.set_margin(0.0).is_ok() {
+        let margin = self.boxes.margin(&self.core);
+        if !inherited.is_empty() && self.boxes.set_margin(&mut self.core, 0.0).is_ok() {
             for &(id, aabb) in &inherited {
-                _ = self.core.set(id, aabb, Default::default());
+                _ = self.boxes.set(&mut self.core, id, aabb, Default::default());
             }
             self.set_margin(margin);
         }
         scene.for_each_collider(|handle, proxy| self.set_proxy(scene, handle, proxy));
         for (id, _) in inherited {
             if self.registry.handle(id).is_none() {
-                self.core.remove(id);
+                self.boxes.remove(&mut self.core, id);
             }
         }
     }
 
     /// Reads all colliders of a world that is not the one known so far. Rapier lists a collider that neither moves nor changes
     /// only once, and this broad phase missed it. Nothing that is stored can be trusted. (Adding a pair again does no harm.)
-    fn rescan(&mut self, scene: &impl Scene) {
+    fn rescan(&mut self, scene: &impl Scene<Aabb = T::Aabb>) {
         self.forget_all();
         tracing::debug!("pbig: another world, all {} colliders are read", scene.collider_count());
         self.read_all(scene);
@@ -224,16 +243,16 @@ impl<T: Tree> Colliders<T> {
 
     fn forget_all(&mut self) {
         self.registry.clear();
-        self.core.clear();
+        self.boxes.clear(&mut self.core);
         (self.index, self.tree) = (SceneIndex::default(), SceneTree::default());
         self.writer.order = PairOrder::default();
     }
 
     fn find_and_send(&mut self, size: impl Fn(Handle) -> u8, send: impl FnMut(PairEvent)) {
-        if let Err(error) = self.core.update() {
-            return self.note_error(error);
-        }
-        let found = self.core.events();
+        let found = match self.boxes.update(&mut self.core) {
+            Ok(found) => found,
+            Err(error) => return self.note_error(error),
+        };
         if found.added.is_empty() && found.removed.is_empty() && self.writer.adopted.is_empty() {
             return;
         }
@@ -260,13 +279,13 @@ impl<T: Tree> Colliders<T> {
 
     /// Returns the number of pairs that rapier knows of. Adopted pairs count after the next update.
     pub fn pair_count(&self) -> usize {
-        self.core.pair_count()
+        self.boxes.pair_count(&self.core)
     }
 
     /// Returns the pairs that rapier knows of, sorted by the two indices; in each, the colliders are in the order of its events.
     /// Adopted pairs are included after the next update.
     pub fn pairs(&self) -> impl Iterator<Item = HandlePair> {
-        self.core.pairs().map(|pair| {
+        self.core.pairs().filter(|pair| self.boxes.admits(pair)).map(|pair| {
             let [a, b] = handles(pair, &self.registry);
             self.writer.order.of(a, b)
         })
@@ -278,8 +297,8 @@ impl<T: Tree> Colliders<T> {
     }
 
     /// Returns the boxes of all colliders that have one, with their margins, by ascending index.
-    pub fn boxes(&self) -> impl Iterator<Item = (Handle, Aabb)> {
-        let of = |id| Some((self.registry.handle(id)?, self.core.fat_aabb(id)?));
+    pub fn boxes(&self) -> impl Iterator<Item = (Handle, T::Aabb)> {
+        let of = |id| Some((self.registry.handle(id)?, self.boxes.fat(&self.core, id)?));
         (0..self.core.id_count()).filter_map(of)
     }
 

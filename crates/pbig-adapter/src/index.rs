@@ -9,13 +9,13 @@ use std::sync::{Mutex, PoisonError, RwLock, TryLockError};
 
 /// A scene query, by the boxes that it looks for.
 #[derive(Clone, Copy, Debug)]
-pub enum SceneQuery {
+pub enum SceneQuery<A = Aabb, R = f32> {
     /// Boxes that a moving box (a point, for a ray) meets: its start, its velocity, and the last time.
-    Sweep(Aabb, [f32; 3], f32),
+    Sweep(A, [R; 3], R),
     /// Boxes within a distance of a point.
-    Near([f32; 3], f32),
+    Near([R; 3], R),
     /// Boxes that overlap a box.
-    Overlap(Aabb),
+    Overlap(A),
 }
 
 impl SceneQuery {
@@ -28,7 +28,7 @@ impl SceneQuery {
     }
 }
 
-impl<T: Tree> Colliders<T> {
+impl<T: Tree<Aabb = Aabb>> Colliders<T> {
     /// Returns the indices of colliders whose boxes a query meets, sorted, and perhaps some that it barely misses.
     pub fn met(&self, query: &SceneQuery) -> Vec<u32> {
         let mut met = Vec::new();

@@ -11,7 +11,9 @@
 // Labels each item in the documentation with the feature that it needs; on docs.rs only, as it takes nightly Rust.
 #![cfg_attr(docsrs, feature(doc_cfg))]
 
+mod bounds;
 mod colliders;
+mod drawn;
 mod events;
 mod filter;
 mod handle;
@@ -28,8 +30,11 @@ mod snapshot;
 mod stats;
 mod tree;
 mod why;
+mod wide;
 
+pub use bounds::{Bounds, Boxes, CoreBoxes, Scalar};
 pub use colliders::Colliders;
+pub use drawn::{DebugRenderParts, DrawnBox};
 pub use events::PairEvent;
 pub use filter::{BodyKind, Groups, accepted_kinds, filter_of};
 pub use handle::{Handle, HandlePair};
@@ -42,3 +47,4 @@ pub use snapshot::Snapshot;
 pub use stats::{Stats, Totals};
 pub use tree::Tree;
 pub use why::Why;
+pub use wide::{WideAabb, WideBoxes};

@@ -2,8 +2,8 @@
 
 #[cfg(feature = "parallel")]
 use crate::policy;
-use crate::{Colliders, Handle, Proxy, Scene, Tree};
-use pbig_core::{Aabb, ProxyFilter};
+use crate::{Bounds, Boxes, Colliders, Handle, Proxy, Scene, Tree};
+use pbig_core::ProxyFilter;
 #[cfg(feature = "parallel")]
 use rayon::prelude::*;
 #[cfg(feature = "parallel")]
@@ -11,7 +11,7 @@ use std::ops::Range;
 
 impl<T: Tree> Colliders<T> {
     /// Sets or removes the boxes of listed colliders, in the order of the list.
-    pub(crate) fn read_listed(&mut self, scene: &impl Scene) {
+    pub(crate) fn read_listed(&mut self, scene: &impl Scene<Aabb = T::Aabb>) {
         let _span = tracing::debug_span!(target: "pbig", "proxies").entered();
         let listed = scene.listed_count();
         #[cfg(feature = "parallel")]
@@ -25,7 +25,7 @@ impl<T: Tree> Colliders<T> {
 
     /// Computes proxies on several threads, and sets them on this one.
     #[cfg(feature = "parallel")]
-    fn read_batch(&mut self, scene: &impl Scene, batch: Range<usize>) {
+    fn read_batch(&mut self, scene: &impl Scene<Aabb = T::Aabb>, batch: Range<usize>) {
         let mut proxies = std::mem::take(&mut self.proxies);
         proxies.resize(batch.len(), (Handle { index: 0, generation: 0 }, Proxy::Gone));
         let pieces = proxies.par_chunks_mut(policy::PROXIES_PER_PIECE).enumerate();
@@ -46,7 +46,12 @@ impl<T: Tree> Colliders<T> {
     }
 
     #[inline(always)]
-    pub(crate) fn set_proxy(&mut self, scene: &impl Scene, handle: Handle, proxy: Proxy) {
+    pub(crate) fn set_proxy(
+        &mut self,
+        scene: &impl Scene<Aabb = T::Aabb>,
+        handle: Handle,
+        proxy: Proxy<T::Aabb>,
+    ) {
         match proxy {
             Proxy::Enabled(aabb, filter) => {
                 if let Some(margin) = scene.margin(&aabb) {
@@ -61,11 +66,11 @@ impl<T: Tree> Colliders<T> {
     }
 
     #[inline(always)]
-    pub(crate) fn enable(&mut self, handle: Handle, aabb: Aabb, filter: ProxyFilter) {
+    pub(crate) fn enable(&mut self, handle: Handle, aabb: T::Aabb, filter: ProxyFilter) {
         if !self.registry.contains(handle) {
             self.register(handle);
         }
-        if let Err(error) = self.core.set(handle.index, aabb, filter) {
+        if let Err(error) = self.boxes.set(&mut self.core, handle.index, aabb, filter) {
             self.note_error(error);
         }
     }
@@ -74,7 +79,7 @@ impl<T: Tree> Colliders<T> {
     #[cold]
     fn register(&mut self, handle: Handle) {
         if !self.registry.insert(handle) {
-            self.core.remove(handle.index);
+            self.boxes.remove(&mut self.core, handle.index);
         }
     }
 
@@ -84,21 +89,21 @@ impl<T: Tree> Colliders<T> {
             self.register(handle);
         }
         if !self.core.set_filter(handle.index, filter) {
-            self.enable(handle, Aabb::NOWHERE, filter);
+            self.enable(handle, T::Aabb::NOWHERE, filter);
         }
     }
 
     /// Keeps a collider in the registry, without a box.
     pub(crate) fn disable(&mut self, handle: Handle) {
         self.registry.insert(handle);
-        self.core.remove(handle.index);
+        self.boxes.remove(&mut self.core, handle.index);
     }
 
     /// Removes a collider, if this very one is known. Its pairs end without an event: the narrow phase drops the pairs of
     /// removed and disabled colliders itself.
     pub(crate) fn forget(&mut self, handle: Handle) {
         if self.registry.remove(handle) {
-            self.core.remove(handle.index);
+            self.boxes.remove(&mut self.core, handle.index);
         }
     }
 }

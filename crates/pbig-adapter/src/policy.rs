@@ -30,3 +30,12 @@ pub(crate) const REPLAY_FRAMES: usize = 8;
 /// Maximum number of differences that a checker keeps: a broad phase that reports nothing would fill the memory.
 #[cfg(feature = "shadow")]
 pub(crate) const MAX_DIFFERENCES: usize = 1000;
+
+/// Distance from the centre of a world in f64, in margins, beyond which a box is far. There f32 is exact to a 128th of a margin.
+pub(crate) const FAR_MARGINS: f64 = 65_536.0;
+
+/// Number of times that boxes are set, per box of a world in f64, before its centre is considered again: that reads all boxes.
+pub(crate) const CENTRE_SETS_PER_BOX: usize = 4;
+
+/// Ids per changed box of a world in f64, above which the candidates of each changed box are looked up. Else all are read.
+pub(crate) const WIDE_LOOKUPS: usize = 16;

@@ -1,12 +1,12 @@
 //! The trait by which an adapter shows rapier's colliders.
 
-use crate::Handle;
-use pbig_core::{Aabb, ProxyFilter};
+use crate::{Bounds, Handle};
+use pbig_core::ProxyFilter;
 use std::ops::Range;
 
 /// The state of a listed collider.
 #[derive(Clone, Copy, Debug)]
-pub enum Proxy {
+pub enum Proxy<A> {
     /// Not in rapier's set.
     Gone,
     /// It or its body is disabled.
@@ -14,11 +14,14 @@ pub enum Proxy {
     /// Its AABB is not finite: it keeps its last box, and has this filter.
     Unplaced(ProxyFilter),
     /// Its AABB without margin, and its filter.
-    Enabled(Aabb, ProxyFilter),
+    Enabled(A, ProxyFilter),
 }
 
 /// The arguments of an update.
 pub trait Scene: Sync {
+    /// The AABBs of the world.
+    type Aabb: Bounds;
+
     /// Returns the number of colliders in rapier's set.
     fn collider_count(&self) -> usize;
 
@@ -26,10 +29,10 @@ pub trait Scene: Sync {
     fn listed_count(&self) -> usize;
 
     /// Calls `take` with each of these listed colliders and its proxy, in the order of the list.
-    fn for_each_listed(&self, range: Range<usize>, take: impl FnMut(Handle, Proxy));
+    fn for_each_listed(&self, range: Range<usize>, take: impl FnMut(Handle, Proxy<Self::Aabb>));
 
     /// Calls `take` with each collider in rapier's set and its proxy.
-    fn for_each_collider(&self, take: impl FnMut(Handle, Proxy));
+    fn for_each_collider(&self, take: impl FnMut(Handle, Proxy<Self::Aabb>));
 
     /// Returns the colliders that rapier lists as removed or disabled, and whether rapier's set still has them.
     fn removed(&self) -> impl Iterator<Item = (Handle, bool)>;
@@ -39,7 +42,7 @@ pub trait Scene: Sync {
 
     /// Returns the margin of a box, if it is not the same for all.
     #[inline(always)]
-    fn margin(&self, _aabb: &Aabb) -> Option<f32> {
+    fn margin(&self, _aabb: &Self::Aabb) -> Option<f32> {
         None
     }
 }

@@ -3,6 +3,7 @@
 use crate::order::{PairOrder, Size};
 use crate::registry::ColliderRegistry;
 use crate::{Colliders, HandlePair, Tree};
+use pbig_core::Aabb;
 use serde::de::Error as _;
 use serde::{Deserialize, Deserializer, Serialize};
 use std::borrow::Cow;
@@ -40,7 +41,7 @@ fn this_version<'de, D: Deserializer<'de>>(deserializer: D) -> Result<u32, D::Er
     }
 }
 
-impl<T: Tree> Colliders<T> {
+impl<T: Tree<Aabb = Aabb>> Colliders<T> {
     /// Returns what to save. `relative_margin` is the adapter's.
     pub fn snapshot(&self, relative_margin: f32) -> Snapshot<'_> {
         let raw = |pair: &HandlePair| [pair.0.into(), pair.1.into()];
@@ -63,7 +64,7 @@ impl Snapshot<'_> {
     ///
     /// # Errors
     /// In words, if they make no sense.
-    pub fn restore<T: Tree>(self) -> Result<(Colliders<T>, f32), String> {
+    pub fn restore<T: Tree<Aabb = Aabb>>(self) -> Result<(Colliders<T>, f32), String> {
         let registry = ColliderRegistry::from_generations(self.generations.into_owned());
         let mut restored = Colliders::new(self.core.into_owned());
         let core = &restored.core;

@@ -4,20 +4,25 @@
 //! builds the tree for queries. While there is a tree, each change of boxes is noted. The next query updates the tree, or
 //! rebuilds it if too many boxes changed.
 
+use crate::Bounds;
 use crate::policy;
+#[cfg(test)]
 use pbig_core::Aabb;
 use std::sync::{Mutex, OnceLock, PoisonError};
 
 /// Parry's tree, in the version that rapier uses. The AABBs can be infinite.
 pub trait Tree {
+    /// The AABBs of the world.
+    type Aabb: Bounds;
+
     /// Builds the tree of these leaves.
-    fn build(leaves: impl Iterator<Item = (u32, Aabb)> + Clone) -> Self;
+    fn build(leaves: impl Iterator<Item = (u32, Self::Aabb)> + Clone) -> Self;
 
     /// Removes these leaves, and makes the tree ready for further changes.
     fn remove(&mut self, gone: &[u32]);
 
     /// Inserts leaves or moves them. Afterwards the tree is ready for queries.
-    fn update(&mut self, leaves: impl Iterator<Item = (u32, Aabb)>);
+    fn update(&mut self, leaves: impl Iterator<Item = (u32, Self::Aabb)>);
 }
 
 /// A tree for queries, if there are any.
@@ -80,7 +85,7 @@ impl<T: Tree> SceneTree<T> {
         &self,
         ids: u32,
         pending: impl Iterator<Item = u32>,
-        aabb: impl Fn(u32) -> Option<Aabb>,
+        aabb: impl Fn(u32) -> Option<T::Aabb>,
     ) -> &T {
         let make = || match self.stale.lock().unwrap_or_else(PoisonError::into_inner).take() {
             Some(mut stale) => {
@@ -93,14 +98,14 @@ impl<T: Tree> SceneTree<T> {
     }
 }
 
-fn build<T: Tree>(ids: u32, aabb: impl Fn(u32) -> Option<Aabb>) -> T {
+fn build<T: Tree>(ids: u32, aabb: impl Fn(u32) -> Option<T::Aabb>) -> T {
     let aabb = &aabb;
     T::build((0..ids).filter_map(move |id| Some((id, aabb(id)?))))
 }
 
 impl<T: Tree> Stale<T> {
     /// Removes first, because a removal reads the boxes of a leaf's ancestors.
-    fn updated(self, ids: u32, aabb: impl Fn(u32) -> Option<Aabb>) -> T {
+    fn updated(self, ids: u32, aabb: impl Fn(u32) -> Option<T::Aabb>) -> T {
         let Self { mut tree, mut changed } = self;
         changed.sort_unstable();
         changed.dedup();
@@ -130,6 +135,8 @@ mod tests {
     }
 
     impl Tree for List {
+        type Aabb = Aabb;
+
         fn build(leaves: impl Iterator<Item = (u32, Aabb)> + Clone) -> Self {
             Self { leaves: leaves.collect(), updates: 0 }
         }

@@ -1,6 +1,6 @@
 //! Explains why two colliders are a pair or not.
 
-use crate::{BodyKind, Colliders, Groups, Handle, Tree};
+use crate::{BodyKind, Bounds, Boxes, Colliders, Groups, Handle, Tree};
 use pbig_core::Pair;
 use std::fmt;
 
@@ -53,7 +53,7 @@ impl<T: Tree> Colliders<T> {
             Some(Why::Unknown(handle))
         } else if !self.core.contains(id) {
             Some(Why::Disabled(handle))
-        } else if self.core.fat_aabb(id).is_none() {
+        } else if self.boxes.fat(&self.core, id).is_none() {
             Some(Why::InvalidBox(handle))
         } else {
             None
@@ -62,7 +62,8 @@ impl<T: Tree> Colliders<T> {
 
     /// Explains two different colliders that may be in pairs.
     fn why_not(&self, a: u32, b: u32) -> Why {
-        if self.core.has_pair(Pair::new(a, b)) {
+        let pair = Pair::new(a, b);
+        if self.core.has_pair(pair) && self.boxes.admits(&pair) {
             return Why::Reported;
         }
         if let Some((axis, gap)) = self.gap(a, b) {
@@ -78,8 +79,8 @@ impl<T: Tree> Colliders<T> {
 
     /// Returns the axis with the largest gap between two AABBs, and the gap, unless they overlap.
     fn gap(&self, a: u32, b: u32) -> Option<(usize, f32)> {
-        let (a, b) = (self.core.fat_aabb(a)?, self.core.fat_aabb(b)?);
-        let gaps = (0..3).map(|k| (k, (a.min[k] - b.max[k]).max(b.min[k] - a.max[k])));
+        let (a, b) = (self.boxes.fat(&self.core, a)?, self.boxes.fat(&self.core, b)?);
+        let gaps = (0..3).map(|k| (k, a.gap(&b, k)));
         // Between equal infinities a gap is NaN.
         let (axis, gap) = gaps.filter(|(_, gap)| !gap.is_nan()).max_by(|x, y| x.1.total_cmp(&y.1))?;
         (!a.overlaps(&b)).then_some((axis, gap))

@@ -4,8 +4,6 @@
 #[cfg(feature = "run")]
 pub mod bench;
 pub mod boxes;
-#[cfg(feature = "run")]
-pub mod chart;
 #[cfg(feature = "checks")]
 pub mod checks;
 pub mod corpus;
@@ -39,4 +37,6 @@ pub mod runner;
 pub mod table;
 
 #[cfg(feature = "run")]
-pub use pbig_scenes::{frames, scenes, world};
+pub use pbig_chart as chart;
+#[cfg(feature = "run")]
+pub use pbig_scenes::{frames, pair_order, scenes, world};

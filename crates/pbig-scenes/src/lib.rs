@@ -1,8 +1,11 @@
 //! Scenes of rapier by name, number of bodies and seed, and the scene queries of a frame, for the harness, a viewer and a web page.
 //! Nothing here draws, starts a thread or reads a clock, so all of it builds for wasm32-unknown-unknown.
 
-pub mod frames;
 #[cfg(feature = "rapier")]
+mod build;
+pub mod frames;
+pub mod pair_order;
+pub mod plan;
 pub mod scenes;
 #[cfg(feature = "rapier")]
 pub mod stock;

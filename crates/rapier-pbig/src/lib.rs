@@ -50,8 +50,6 @@ mod call;
 mod config;
 #[cfg(feature = "debug-render")]
 mod debug_render;
-#[cfg(feature = "debug-render")]
-mod draw;
 mod queries;
 mod scene;
 #[cfg(feature = "shadow")]
@@ -63,7 +61,7 @@ mod tree;
 pub use broad_phase::PbigBroadPhase;
 pub use config::PbigConfig;
 #[cfg(feature = "debug-render")]
-pub use debug_render::DebugRenderParts;
+pub use pbig_adapter::DebugRenderParts;
 pub use pbig_adapter::{Backend, Error, Handle, PairDevice, Report, Stats, Totals, Why};
 #[cfg(feature = "gpu")]
 pub use pbig_gpu::GpuFinder;

@@ -22,7 +22,7 @@ impl<'a> Call<'a> {
     }
 
     #[inline(always)]
-    pub(crate) fn proxy(&self, (collider, body): Fetched<'_>) -> Proxy {
+    pub(crate) fn proxy(&self, (collider, body): Fetched<'_>) -> Proxy<Aabb> {
         match collider {
             None => Proxy::Gone,
             Some(collider) if !collider.is_enabled() => Proxy::Disabled,
@@ -131,7 +131,7 @@ pub(crate) fn to_collider(handle: Handle) -> ColliderHandle {
 impl Call<'_> {
     /// Calls `take` with each of these colliders and its proxy, in the order of the list.
     #[inline(always)]
-    fn for_each_of(&self, listed: &[ColliderHandle], mut take: impl FnMut(Handle, Proxy)) {
+    fn for_each_of(&self, listed: &[ColliderHandle], mut take: impl FnMut(Handle, Proxy<Aabb>)) {
         for block in listed.chunks(COLLIDERS_PER_BLOCK) {
             let mut fetched = [(None, None); COLLIDERS_PER_BLOCK];
             for (fetched, &handle) in fetched.iter_mut().zip(block) {
@@ -145,6 +145,8 @@ impl Call<'_> {
 }
 
 impl Scene for Call<'_> {
+    type Aabb = Aabb;
+
     fn collider_count(&self) -> usize {
         self.colliders.len()
     }
@@ -153,11 +155,11 @@ impl Scene for Call<'_> {
         self.modified.len()
     }
 
-    fn for_each_listed(&self, range: Range<usize>, take: impl FnMut(Handle, Proxy)) {
+    fn for_each_listed(&self, range: Range<usize>, take: impl FnMut(Handle, Proxy<Aabb>)) {
         self.for_each_of(&self.modified[range], take);
     }
 
-    fn for_each_collider(&self, take: impl FnMut(Handle, Proxy)) {
+    fn for_each_collider(&self, take: impl FnMut(Handle, Proxy<Aabb>)) {
         let all: Vec<ColliderHandle> = self.colliders.iter().map(|(handle, _)| handle).collect();
         self.for_each_of(&all, take);
     }

@@ -18,6 +18,8 @@ impl std::fmt::Debug for ParryTree {
 }
 
 impl Tree for ParryTree {
+    type Aabb = Aabb;
+
     fn build(leaves: impl Iterator<Item = (u32, Aabb)> + Clone) -> Self {
         // Parry 0.22 takes the ids of one or two leaves for 0 and 1.
         if leaves.clone().nth(2).is_none() {

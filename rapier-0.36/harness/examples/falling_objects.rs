@@ -5,12 +5,12 @@
 
 use clap::Parser;
 use indicatif::ProgressBar;
-use pbig_harness_036::chart::{Chart, Line, Plot};
+use pbig_chart::{Chart, Line, Plot};
 use pbig_harness_036::run::{Run, StepTime, Summary};
-use pbig_harness_036::scenes::Scene;
+use pbig_scenes::scenes::Scene;
+use rapier::prelude::BroadPhaseBvh;
 use rapier_pbig::PbigFinder;
 use rapier_pbig::shadow::{self, Checker, Shadow};
-use rapier3d::prelude::BroadPhaseBvh;
 use std::io::IsTerminal;
 use std::path::PathBuf;
 use std::process::ExitCode;

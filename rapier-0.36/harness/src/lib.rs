@@ -1,11 +1,11 @@
-//! Scenes and measurements for rapier3d 0.36.1.
+//! Worlds and measurements for rapier 0.36.1, in two or three dimensions, f32 or f64.
 
-#[path = "../../../crates/pbig-harness/src/chart.rs"]
-pub mod chart;
+mod build;
+#[cfg_attr(feature = "dim2", path = "two.rs")]
+#[cfg_attr(not(feature = "dim2"), path = "three.rs")]
+pub mod dimension;
+#[cfg(not(any(feature = "dim2", feature = "f64")))]
 pub mod queries;
+#[cfg(not(any(feature = "dim2", feature = "f64")))]
 pub mod run;
-#[path = "../../../crates/pbig-scenes/src/scenes/mod.rs"]
-pub mod scenes;
 pub mod world;
-
-pub use pbig_scenes::frames;

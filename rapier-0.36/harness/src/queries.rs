@@ -1,14 +1,14 @@
 //! The scene queries of each frame, put to rapier.
 
-use crate::frames::{
+use crate::world::{World, pose, to_vector};
+use glam::Vec3;
+use pbig_scenes::frames::{
     AREA_RADIUS_METRES, CAPSULE_HALF_HEIGHT_METRES, CAPSULE_RADIUS_METRES, CAST_RADIUS_METRES, Extent,
     FRAME_SECONDS, FrameKind, MAX_DISTANCE_METRES, MAX_PROJECTION_METRES, Query,
 };
-use crate::world::{World, pose, to_point, to_vector};
-use glam::Vec3;
-use rapier3d::control::KinematicCharacterController;
-use rapier3d::parry::query::ShapeCastOptions;
-use rapier3d::prelude::*;
+use rapier::control::KinematicCharacterController;
+use rapier::parry::query::ShapeCastOptions;
+use rapier::prelude::*;
 
 /// The queries of one frame after the other.
 pub struct FrameQueries {
@@ -74,7 +74,7 @@ fn extent(world: &World) -> Extent {
 }
 
 fn ray(queries: &QueryPipeline<'_>, query: Query) -> usize {
-    let ray = Ray::new(to_point(query.origin), to_vector(query.direction));
+    let ray = Ray::new(to_vector(query.origin), to_vector(query.direction));
     queries.cast_ray(&ray, MAX_DISTANCE_METRES, true).iter().count()
 }
 
@@ -89,5 +89,5 @@ fn area(queries: &QueryPipeline<'_>, query: Query) -> usize {
 }
 
 fn point(queries: &QueryPipeline<'_>, query: Query) -> usize {
-    queries.project_point(to_point(query.origin), MAX_PROJECTION_METRES, true).iter().count()
+    queries.project_point(to_vector(query.origin), MAX_PROJECTION_METRES, true).iter().count()
 }

@@ -1,10 +1,10 @@
 //! Runs a scene step by step and measures the broad phase, the whole step, and the scene queries after it.
 
-use crate::frames::FrameKind;
 use crate::queries::FrameQueries;
-use crate::scenes::Scene;
 use crate::world::World;
-use rapier3d::prelude::BroadPhaseBvh;
+use pbig_scenes::frames::FrameKind;
+use pbig_scenes::scenes::Scene;
+use rapier::prelude::BroadPhaseBvh;
 use std::time::Instant;
 
 /// Milliseconds of one frame: of its step by rapier's own counters, and of its queries.
@@ -36,7 +36,7 @@ pub struct Run {
 impl Run {
     /// Builds the scene.
     pub fn new(scene: Scene, bodies: usize, seed: u64, broad_phase: BroadPhaseBvh) -> Self {
-        let (world, times) = (scene.build(bodies, seed), Vec::new());
+        let (world, times) = (World::of(&scene.plan(bodies, seed)), Vec::new());
         Self { world, broad_phase, times, hits: 0, queries: None }
     }
 

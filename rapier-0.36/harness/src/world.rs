@@ -1,10 +1,10 @@
 //! A headless rapier world, and the conversion from glam, in which scenes are built.
 
+use crate::dimension::{parts, rotation, soft_cube};
 use glam::{Quat, Vec3};
-use rapier3d::math::{Pose, Rotation, Vector};
-use rapier3d::na::Unit;
-use rapier3d::parry::utils::Array2;
-use rapier3d::prelude::*;
+use rapier::math::{DIM, Pose, Real, Vector};
+use rapier::na::Unit;
+use rapier::prelude::*;
 use std::sync::mpsc::channel;
 
 /// Everything that rapier keeps apart, together; the broad phase is lent to each step.
@@ -119,9 +119,9 @@ impl World {
         colliders.remove(collider, islands, bodies, soft_bodies, true);
     }
 
-    /// Adds a cube that bends, half an edge long in each direction.
+    /// Adds a cube that bends, a square in two dimensions, half an edge long in each direction.
     pub fn add_soft(&mut self, at: Vec3, half: f32) -> SoftBodyHandle {
-        let cube = SoftBodyBuilder::cuboid(to_vector(at), Vector::splat(half), 3, 3, 3).particle_mass(0.2);
+        let cube = soft_cube(at, half).particle_mass(0.2);
         let Self { soft_bodies, bodies, colliders, .. } = self;
         soft_bodies.insert(cube, bodies, colliders)
     }
@@ -169,23 +169,30 @@ impl World {
     }
 
     /// Returns the bits of all numbers in the poses of all bodies, in order. They are equal exactly when all poses are.
-    pub fn pose_bits(&self) -> Vec<u32> {
+    pub fn pose_bits(&self) -> Vec<u64> {
         let bits = |(_, body): (RigidBodyHandle, &RigidBody)| {
-            let (at, turn) = (body.translation(), body.rotation());
-            [at.x, at.y, at.z, turn.x, turn.y, turn.z, turn.w].map(f32::to_bits)
+            let at: [Real; DIM] = body.translation().into();
+            at.into_iter().chain(parts(body.rotation())).map(bits).collect::<Vec<_>>()
         };
         self.bodies.iter().flat_map(bits).collect()
     }
 }
 
-/// Returns a glam vector as rapier's, which is of another version of glam.
-pub fn to_vector(v: Vec3) -> Vector {
-    Vector::new(v.x, v.y, v.z)
+#[allow(clippy::unnecessary_cast, reason = "rapier's numbers are f32 or f64")]
+fn bits(x: Real) -> u64 {
+    (x as f64).to_bits()
 }
 
-/// Returns a glam vector as a point of rapier's, for which 0.36 has no type.
-pub fn to_point(v: Vec3) -> Vector {
-    to_vector(v)
+/// Returns a number in rapier's precision.
+#[allow(clippy::useless_conversion, reason = "rapier's numbers are f32 or f64")]
+pub fn real(x: f32) -> Real {
+    Real::from(x)
+}
+
+/// Returns a glam vector as rapier's, which is of another version of glam. In two dimensions it loses z.
+pub fn to_vector(v: Vec3) -> Vector {
+    let numbers = v.to_array();
+    Vector::from(std::array::from_fn::<Real, DIM, _>(|k| real(numbers[k])))
 }
 
 /// Returns a pose without rotation.
@@ -193,27 +200,9 @@ pub fn pose(at: Vec3) -> Pose {
     Pose::from_translation(to_vector(at))
 }
 
-/// Returns the body at a place and with a rotation.
-pub fn turned_body(body: RigidBodyBuilder, at: Vec3, turn: Quat) -> RigidBodyBuilder {
-    body.pose(turned(at, turn))
-}
-
-/// Returns a pose with a rotation, bit by bit. The builders' own `rotation` takes an angle, of which rapier computes the
-/// sine and the cosine as the platform does.
+/// Returns a pose with a rotation.
 pub fn turned(at: Vec3, turn: Quat) -> Pose {
-    Pose::from_parts(to_vector(at), Rotation::from_xyzw(turn.x, turn.y, turn.z, turn.w))
-}
-
-/// Returns a joint that turns around one axis, a unit vector.
-pub fn hinge(axis: Vec3) -> RevoluteJointBuilder {
-    RevoluteJointBuilder::new(to_vector(axis))
-}
-
-/// Returns a square grid of heights.
-pub fn heights(side: usize, height: impl Fn(usize, usize) -> f32) -> Array2<Real> {
-    // Column by column.
-    let heights = (0..side * side).map(|at| height(at % side, at / side));
-    Array2::new(side, side, heights.collect())
+    Pose::from_parts(to_vector(at), rotation(turn))
 }
 
 /// Returns groups that meet if each has a group of the other's filter.

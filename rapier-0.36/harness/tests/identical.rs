@@ -1,19 +1,21 @@
 //! The number of threads, a second run, saving and restoring must not change a single bit.
 
-use pbig_harness_036::scenes::Scene;
+use pbig_harness_036::dimension::cuboid;
 use pbig_harness_036::world::{World, to_vector};
+use pbig_scenes::scenes::Scene;
+use rapier::geometry::PairFinder;
+use rapier::math::Real;
+use rapier::parry::bounding_volume::BoundingVolume;
+use rapier::prelude::*;
 use rapier_pbig::{PbigConfig, PbigFinder, Why};
-use rapier3d::geometry::PairFinder;
-use rapier3d::parry::bounding_volume::BoundingVolume;
-use rapier3d::prelude::*;
 
 fn scene(name: &str) -> Scene {
     Scene::named(name).expect("the scene exists")
 }
 
 /// The poses after some steps with pbig.
-fn poses(name: &str, bodies: usize, steps: usize) -> Vec<u32> {
-    let (mut world, mut broad_phase) = (scene(name).build(bodies, 1), rapier_pbig::broad_phase());
+fn poses(name: &str, bodies: usize, steps: usize) -> Vec<u64> {
+    let (mut world, mut broad_phase) = (World::of(&scene(name).plan(bodies, 1)), rapier_pbig::broad_phase());
     for _ in 0..steps {
         world.step(&mut broad_phase);
     }
@@ -46,7 +48,8 @@ fn state(broad_phase: &BroadPhaseBvh) -> impl PartialEq {
 #[test]
 fn what_a_box_meets_is_sorted_and_what_rapiers_tree_meets() {
     for bodies in [200, 3000] {
-        let (mut world, mut broad_phase) = (scene("column").build(bodies, 1), rapier_pbig::broad_phase());
+        let (mut world, mut broad_phase) =
+            (World::of(&scene("column").plan(bodies, 1)), rapier_pbig::broad_phase());
         for step in 0..20 {
             world.step(&mut broad_phase);
             let dispatcher = world.narrow_phase.query_dispatcher();
@@ -57,7 +60,7 @@ fn what_a_box_meets_is_sorted_and_what_rapiers_tree_meets() {
                 QueryFilter::default(),
             );
             for (_, collider) in world.colliders.iter().step_by(97) {
-                let reach = collider.compute_aabb().loosened(0.1 * step as f32);
+                let reach = collider.compute_aabb().loosened(0.1 * step as Real);
                 let index = |(found, _): (ColliderHandle, &Collider)| found.into_raw_parts().0;
                 let of_index: Vec<u32> = queries.intersect_aabb_conservative(reach).map(index).collect();
                 let tree = pbig_in(&broad_phase).tree();
@@ -72,7 +75,7 @@ fn what_a_box_meets_is_sorted_and_what_rapiers_tree_meets() {
 #[test]
 fn a_restored_world_goes_on_as_if_it_had_never_been_saved() {
     for name in ["column", "mixed", "compounds", "ragdolls", "sensors", "pile", "rain"] {
-        let (mut world, mut broad_phase) = (scene(name).build(150, 1), rapier_pbig::broad_phase());
+        let (mut world, mut broad_phase) = (World::of(&scene(name).plan(150, 1)), rapier_pbig::broad_phase());
         for _ in 0..50 {
             world.step(&mut broad_phase);
         }
@@ -95,10 +98,21 @@ fn a_restored_world_goes_on_as_if_it_had_never_been_saved() {
     }
 }
 
-/// The tree takes over when nobody installs pbig again, and pbig from the tree: the pile stays where it is.
+/// Returns a wall of cubes, ten wide, which stands in two dimensions as well.
+fn wall() -> World {
+    let mut world = World::default();
+    world.colliders.insert(World::ground());
+    for i in 0..100 {
+        let at = glam::Vec3::new(1.02 * (i % 10) as f32, 0.5 + (i / 10) as f32, 0.0);
+        world.add(World::dynamic(at), ColliderBuilder::new(cuboid(glam::Vec3::splat(0.5))));
+    }
+    world
+}
+
+/// The tree takes over when nobody installs pbig again, and pbig from the tree: the wall stays where it is.
 #[test]
 fn pbig_and_the_tree_take_over_from_each_other() {
-    let (mut world, mut broad_phase) = (scene("pile").build(100, 1), BroadPhaseBvh::new());
+    let (mut world, mut broad_phase) = (wall(), BroadPhaseBvh::new());
     let pairs = |world: &World| {
         world.narrow_phase.contact_pairs().filter(|pair| pair.has_any_active_contact()).count()
     };
@@ -127,7 +141,7 @@ fn pbig_and_the_tree_take_over_from_each_other() {
 #[test]
 fn a_clone_goes_on_as_the_original() {
     for name in ["cubes", "rain"] {
-        let (mut world, mut broad_phase) = (scene(name).build(100, 1), rapier_pbig::broad_phase());
+        let (mut world, mut broad_phase) = (World::of(&scene(name).plan(100, 1)), rapier_pbig::broad_phase());
         for _ in 0..40 {
             world.step(&mut broad_phase);
         }
@@ -146,7 +160,7 @@ fn a_clone_goes_on_as_the_original() {
 
 #[test]
 fn a_body_whose_pose_is_no_number_disturbs_nobody() {
-    let (mut world, mut broad_phase) = (scene("column").build(60, 1), rapier_pbig::broad_phase());
+    let (mut world, mut broad_phase) = (World::of(&scene("column").plan(60, 1)), rapier_pbig::broad_phase());
     let at = |x: f32| to_vector(glam::Vec3::new(x, 0.0, 0.0));
     let bodies: Vec<_> = world.bodies.iter().map(|(handle, _)| handle).collect();
     for step in 0..120 {
@@ -165,7 +179,7 @@ fn a_body_whose_pose_is_no_number_disturbs_nobody() {
 }
 
 /// Returns the height at which a ray from above hits something.
-fn top(world: &World, broad_phase: &BroadPhaseBvh) -> Option<f32> {
+fn top(world: &World, broad_phase: &BroadPhaseBvh) -> Option<Real> {
     let World { bodies, colliders, narrow_phase, .. } = world;
     let dispatcher = narrow_phase.query_dispatcher();
     let queries = broad_phase.as_query_pipeline(dispatcher, bodies, colliders, QueryFilter::default());
@@ -234,7 +248,7 @@ fn a_collider_whose_box_is_set_before_the_first_step_is_found() {
 
 #[test]
 fn a_step_of_zero_length_keeps_the_finder() {
-    let (mut world, mut broad_phase) = (scene("column").build(60, 1), BroadPhaseBvh::new());
+    let (mut world, mut broad_phase) = (World::of(&scene("column").plan(60, 1)), BroadPhaseBvh::new());
     for round in 0..6 {
         if round % 2 == 0 {
             rapier_pbig::install(&mut broad_phase);

@@ -1,9 +1,10 @@
 //! Colliders whose AABB is not finite: rapier keeps its last box, and so does pbig.
 
+use rapier::math::Real;
+use rapier::prelude::*;
 use rapier_pbig::finder;
-use rapier3d::prelude::*;
 
-/// Two overlapping boxes on bodies of their own.
+/// Two overlapping balls on bodies of their own.
 struct Two {
     bodies: RigidBodySet,
     colliders: ColliderSet,
@@ -16,8 +17,8 @@ impl Two {
     fn new(body: impl Fn() -> RigidBodyBuilder) -> Self {
         let (mut bodies, mut colliders) = (RigidBodySet::new(), ColliderSet::new());
         let of_body = [bodies.insert(body()), bodies.insert(body())];
-        let cuboid = || ColliderBuilder::cuboid(1.0, 1.0, 1.0);
-        let boxes = of_body.map(|body| colliders.insert_with_parent(cuboid(), body, &mut bodies));
+        let ball = || ColliderBuilder::ball(1.0);
+        let boxes = of_body.map(|body| colliders.insert_with_parent(ball(), body, &mut bodies));
         Self { bodies, colliders, broad_phase: rapier_pbig::broad_phase(), of_body, boxes }
     }
 
@@ -31,7 +32,7 @@ impl Two {
 
 #[test]
 fn a_prediction_that_is_no_number_hides_no_pair() {
-    let nan = Vector::splat(f32::NAN);
+    let nan = Vector::splat(Real::NAN);
     let mut two = Two::new(|| RigidBodyBuilder::dynamic().soft_ccd_prediction(0.5).linvel(nan));
     let predicted = two.colliders[two.boxes[0]].compute_broad_phase_aabb(&Default::default(), &two.bodies);
     assert!(!predicted.mins.is_finite(), "{predicted:?}");
@@ -43,10 +44,10 @@ fn a_collider_that_keeps_its_box_gets_its_new_filter() {
     let mut two = Two::new(RigidBodyBuilder::dynamic);
     assert!(matches!(two.update()[..], [BroadPhasePairEvent::AddPair(_)]));
     let ([_, lost], [to, _]) = (two.boxes, two.of_body);
-    two.colliders[lost].set_translation(Vector::splat(f32::NAN));
+    two.colliders[lost].set_translation(Vector::splat(Real::NAN));
     assert!(two.update().is_empty(), "it keeps its last box");
     two.colliders.set_parent(lost, Some(to), &mut two.bodies);
-    two.colliders[lost].set_translation(Vector::splat(f32::NAN));
+    two.colliders[lost].set_translation(Vector::splat(Real::NAN));
     assert!(matches!(two.update()[..], [BroadPhasePairEvent::DeletePair(_)]));
     assert_eq!(finder(&two.broad_phase).map(|finder| finder.pair_count()), Some(0));
 }

@@ -85,7 +85,11 @@ fn package(name: &str) -> String {
 }
 
 fn locked(version: &str) -> String {
-    format!("[[package]]\nname = \"rapier3d\"\nversion = \"{version}\"\n")
+    locked_crate("rapier3d", version)
+}
+
+fn locked_crate(name: &str, version: &str) -> String {
+    format!("[[package]]\nname = \"{name}\"\nversion = \"{version}\"\n")
 }
 
 #[test]
@@ -140,7 +144,7 @@ const IN_A_WORKSPACE: &str = "Add to PROJECT/Cargo.toml, the root of the workspa
 Add to PROJECT/crates/app/Cargo.toml:
 
     [dependencies]
-    rapier-pbig = { path = \"../../third party/pbig/rapier-0.36/rapier-pbig\" }
+    rapier3d-pbig = { path = \"../../third party/pbig/rapier-0.36/rapier3d-pbig\" }
 ";
 
 #[test]
@@ -148,9 +152,9 @@ fn it_prints_the_lines_for_each_manifest() {
     let mut project = Project::new("lines");
     project.write("Cargo.toml", &package("plain"));
     project.write("src/lib.rs", "");
-    project.prints(&format!("path = \"{}/rapier-0.36/rapier-pbig\"", root().display()), &[]);
+    project.prints(&format!("path = \"{}/rapier-0.36/rapier3d-pbig\"", root().display()), &[]);
     project.clone_into(&project.folder().join("third party/pbig"));
-    project.prints("rapier-pbig = { path = \"third party/pbig/rapier-0.36/rapier-pbig\" }", &[]);
+    project.prints("rapier3d-pbig = { path = \"third party/pbig/rapier-0.36/rapier3d-pbig\" }", &[]);
     // A virtual workspace, named by its member and by its root.
     fs::remove_dir_all(project.folder().join("src")).expect("removed");
     project.write("Cargo.toml", "[workspace]\nmembers = [\"crates/app\"]\n");
@@ -164,4 +168,30 @@ fn it_prints_the_lines_for_each_manifest() {
     // A root that is a package as well.
     project.write("Cargo.toml", &(package("top") + "[lib]\npath = \"crates/app/src/lib.rs\"\n[workspace]\n"));
     project.prints("Add to PROJECT/Cargo.toml:\n\n    [dependencies]\n", &[]);
+}
+
+#[test]
+fn it_patches_the_crates_of_rapier_that_the_project_has() {
+    let project = Project::new("crates");
+    project.write("Cargo.toml", &(package("plain") + "[dependencies]\nbevy_rapier2d = \"0.37\"\n"));
+    project.write("src/lib.rs", "");
+    let copies = || {
+        let all = fs::read_dir(project.folder().join("patched")).into_iter().flatten();
+        let mut names: Vec<_> =
+            all.map(|file| file.expect("a file").file_name().into_string().expect("a name")).collect();
+        names.sort_unstable();
+        names
+    };
+    project.prints("/rapier-0.36/rapier2d-pbig\"", &[]);
+    assert_eq!(copies(), ["rapier2d-0.36.1"]);
+    project.fails_with("--crate needs rapier2d,", &["--crate", "rapier4d"]);
+    project.run(&["--undo"]).expect("success");
+    // The lock file counts before the manifest; a crate of another version stays as it is.
+    project.write("Cargo.lock", &(locked("0.27.0") + &locked_crate("rapier3d-f64", "0.36.1")));
+    project.prints("    rapier3d-f64 = { path = \"patched/rapier3d-f64-0.36.1\" }\n", &[]);
+    assert_eq!(copies(), ["rapier3d-f64-0.36.1"]);
+    project.run(&["--crate", "rapier2d-f64"]).expect("success");
+    assert_eq!(copies(), ["rapier2d-f64-0.36.1", "rapier3d-f64-0.36.1"]);
+    project.run(&["--undo"]).expect("success");
+    assert!(copies().is_empty());
 }

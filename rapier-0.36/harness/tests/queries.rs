@@ -1,12 +1,12 @@
 //! Both broad phases answer the queries of frames, and a frame without queries is a step.
 
 use glam::Vec3;
-use pbig_harness_036::frames::FrameKind;
 use pbig_harness_036::queries::FrameQueries;
 use pbig_harness_036::run::Run;
-use pbig_harness_036::scenes::Scene;
 use pbig_harness_036::world::World;
-use rapier3d::prelude::{BroadPhaseBvh, ColliderBuilder};
+use pbig_scenes::frames::FrameKind;
+use pbig_scenes::scenes::Scene;
+use rapier::prelude::{BroadPhaseBvh, ColliderBuilder};
 
 /// Returns balls that hang still above a ground.
 fn still_world() -> World {

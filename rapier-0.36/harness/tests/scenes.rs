@@ -1,17 +1,19 @@
-//! Every scene beside rapier's own broad phase and the oracle.
+//! Every scene beside rapier's own broad phase and the oracle. `PBIG_BODIES=80` makes smaller worlds.
 
-use pbig_harness_036::scenes::Scene;
+use pbig_harness_036::world::World;
+use pbig_scenes::scenes::Scene;
+use rapier::prelude::BroadPhaseBvh;
 use rapier_pbig::PbigFinder;
 use rapier_pbig::shadow::{Shadow, checker};
-use rapier3d::prelude::BroadPhaseBvh;
 
 #[test]
 fn every_scene_has_the_oracles_pairs_and_stocks_contacts() {
+    let bodies = std::env::var("PBIG_BODIES").ok().and_then(|bodies| bodies.parse().ok()).unwrap_or(250);
     for scene in Scene::ALL {
         let mut broad_phase = BroadPhaseBvh::new();
         let finder = PbigFinder::default().with_shadow(Shadow::Stock).with_shadow(Shadow::Oracle);
         rapier_pbig::install_finder(&mut broad_phase, finder.every(3));
-        let mut world = scene.build(250, 1);
+        let mut world = World::of(&scene.plan(bodies, 1));
         for _ in 0..150 {
             world.step(&mut broad_phase);
         }

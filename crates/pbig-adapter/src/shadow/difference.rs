@@ -48,7 +48,7 @@ impl Fault {
 /// A collider of a difference, at the time of the call.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Side {
-    /// Its AABB without margin; `None` if it is disabled.
+    /// Its AABB without margin, in f32; `None` if it is disabled.
     pub aabb: Option<Aabb>,
     /// Its body.
     pub parent: Option<Handle>,

@@ -16,7 +16,7 @@ mod replay;
 pub use difference::{Difference, Fault, Side};
 pub use replay::{ReplayError, write_frames};
 
-use crate::{Handle, HandlePair, PairEvent, policy};
+use crate::{Bounds, Handle, HandlePair, PairEvent, policy};
 use followed::Followed;
 use pbig_core::{Aabb, oracle as brute_force};
 use std::collections::{HashSet, VecDeque};
@@ -34,12 +34,14 @@ pub enum Shadow {
 
 /// A world as a [`Checker`] sees it, through rapier's own functions.
 pub trait View {
+    /// The AABBs of the world.
+    type Aabb: Bounds;
     /// Returns the enabled colliders.
     fn enabled(&self) -> Vec<Handle>;
     /// Returns a collider.
     fn side(&self, handle: Handle) -> Option<Side>;
     /// Returns the AABB of an enabled collider, without margin.
-    fn aabb(&self, handle: Handle) -> Option<Aabb>;
+    fn aabb(&self, handle: Handle) -> Option<Self::Aabb>;
     /// Applies the filters that the narrow phase applies before it computes contacts. False if a collider is not enabled.
     fn allowed(&self, pair: HandlePair) -> bool;
     /// Returns true if parry finds a contact within rapier's prediction distance.
@@ -219,16 +221,19 @@ fn boxes(view: &impl View) -> Vec<Aabb> {
     for handle in view.enabled() {
         let i = handle.index as usize;
         boxes.resize(boxes.len().max(i + 1), Aabb::NOWHERE);
-        boxes[i] = view.aabb(handle).unwrap_or(Aabb::NOWHERE);
+        boxes[i] = view.aabb(handle).map_or(Aabb::NOWHERE, |aabb| aabb.to_f32());
     }
     boxes
 }
 
 fn oracle(view: &impl View) -> HashSet<HandlePair> {
     let handles = view.enabled();
-    let boxes: Vec<Aabb> = handles.iter().map(|&h| view.aabb(h).unwrap_or(Aabb::NOWHERE)).collect();
+    let wide: Vec<_> = handles.iter().map(|&handle| view.aabb(handle)).collect();
+    let boxes: Vec<_> = wide.iter().map(|aabb| aabb.map_or(Aabb::NOWHERE, |aabb| aabb.to_f32())).collect();
+    let meet =
+        |a: u32, b: u32| matches!((wide[a as usize], wide[b as usize]), (Some(a), Some(b)) if a.overlaps(&b));
     let pair = |a: u32, b: u32| HandlePair::sorted(handles[a as usize], handles[b as usize]);
-    let found = brute_force::pairs_where(&boxes, |a, b| view.allowed(pair(a, b)));
+    let found = brute_force::pairs_where(&boxes, |a, b| meet(a, b) && view.allowed(pair(a, b)));
     found.into_iter().map(|p| pair(p.a, p.b)).collect()
 }
 
@@ -238,12 +243,6 @@ fn may_pair(view: &impl View, pair: HandlePair, margin: f32) -> bool {
     let (Some(a), Some(b)) = (view.aabb(pair.0), view.aabb(pair.1)) else { return false };
     // A thousandth more than two margins for the rounding of each inflation.
     let reach = 2.001 * margin;
-    let near = inflated_by_more(&a, reach).overlaps(&inflated_by_more(&b, reach));
+    let near = a.grown(reach).overlaps(&b.grown(reach));
     view.allowed(pair) && (near || view.reaches_further(pair.0) || view.reaches_further(pair.1))
-}
-
-/// Inflates an AABB by at least one unit in the last place.
-fn inflated_by_more(aabb: &Aabb, reach: f32) -> Aabb {
-    let grown = aabb.inflated(reach);
-    Aabb::new(grown.min.map(f32::next_down), grown.max.map(f32::next_up))
 }

@@ -1,9 +1,8 @@
 //! An asteroid field: no gravity, bodies of very different sizes, all in motion.
 
 use super::builder::{Builder, side_of_square};
-use crate::world::{to_vector, turned_body};
+use crate::plan::{Body, Collider, Joint, JointKind};
 use glam::Vec3;
-use rapier3d::prelude::*;
 
 /// Half the edge of the cubes that the field is divided into, and of their smallest parts.
 const LARGEST: f32 = 8.0;
@@ -21,8 +20,8 @@ const CIRCLING: f32 = 0.22;
 
 /// Fills a flat field of cubes. A cube holds one asteroid, or is divided, or is empty, so that none begins inside another.
 pub(super) fn asteroids(b: &mut Builder, n: usize) {
-    b.world.gravity = Vec3::ZERO;
-    let middle = b.world.bodies.insert(RigidBodyBuilder::fixed());
+    b.plan.gravity = Vec3::ZERO;
+    let middle = b.insert_body(Body::fixed(Vec3::ZERO));
     let mut left = n;
     for layer in 0.. {
         for (x, z) in from_the_middle(n) {
@@ -44,14 +43,16 @@ fn from_the_middle(n: usize) -> Vec<(i32, i32)> {
 }
 
 /// Fills a cube with at most `left` asteroids, and returns how many are left.
-fn fill(b: &mut Builder, middle: RigidBodyHandle, cube: Vec3, half: f32, left: usize) -> usize {
+fn fill(b: &mut Builder, middle: usize, cube: Vec3, half: f32, left: usize) -> usize {
     if left == 0 {
         return 0;
     }
     let draw = b.random(0.0, 1.0);
     if draw < FILLED {
         let body = asteroid(b, cube, half);
-        b.world.impulse_joints.insert(middle, body, pull(), true);
+        // It does not depend on the mass. Without it the first collisions would scatter the field for good.
+        let (kind, anchors) = (JointKind::Pull(PULL), [Vec3::ZERO; 2]);
+        b.plan.joints.push(Joint { kind, bodies: [middle, body], anchors, has_contacts: true });
         left - 1
     } else if draw < FILLED + DIVIDED && half > SMALLEST {
         (0..8).fold(left, |left, part| {
@@ -63,25 +64,17 @@ fn fill(b: &mut Builder, middle: RigidBodyHandle, cube: Vec3, half: f32, left: u
     }
 }
 
-/// Returns a pull toward the middle that does not depend on the mass. Without it the first collisions would scatter the field for good.
-fn pull() -> GenericJointBuilder {
-    let free = GenericJointBuilder::new(JointAxesMask::empty());
-    [JointAxis::LinX, JointAxis::LinY, JointAxis::LinZ].into_iter().fold(free, |joint, axis| {
-        joint.motor_model(axis, MotorModel::AccelerationBased).motor_position(axis, 0.0, PULL, 0.0)
-    })
-}
-
 /// Adds an asteroid that fits into a cube however it is turned. It circles the middle.
-fn asteroid(b: &mut Builder, cube: Vec3, half: f32) -> RigidBodyHandle {
+fn asteroid(b: &mut Builder, cube: Vec3, half: f32) -> usize {
     let radius = half * b.random(0.6, 0.95);
     let shape = match b.random(0.0, 3.0) as usize {
-        0 => ColliderBuilder::ball(radius),
-        1 => ColliderBuilder::cuboid(radius * 0.65, radius * 0.5, radius * 0.55),
-        _ => ColliderBuilder::capsule_y(radius * 0.4, radius * 0.6),
+        0 => Collider::ball(radius),
+        1 => Collider::cuboid(radius * 0.65, radius * 0.5, radius * 0.55),
+        _ => Collider::capsule_y(radius * 0.4, radius * 0.6),
     };
     let around = Vec3::Y.cross(cube) * CIRCLING;
     let velocity = around + b.random_vec(Vec3::splat(2.0));
     let (turn, spin) = (b.random_turn(), b.random_vec(Vec3::splat(0.7)));
-    let body = turned_body(RigidBodyBuilder::dynamic(), cube, turn).linvel(to_vector(velocity));
-    b.world.add(body.angvel(to_vector(spin)), shape.restitution(0.6))
+    let body = Body::dynamic(cube).turned(turn).linvel(velocity);
+    b.add(body.angvel(spin), shape.restitution(0.6))
 }

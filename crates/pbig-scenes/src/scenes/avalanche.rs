@@ -1,9 +1,8 @@
 //! An avalanche: boulders roll down a valley.
 
-use super::builder::{Builder, direction, lattice, side_of_square, wave};
-use crate::world::{heights, to_vector};
+use super::builder::{Builder, direction, heights, lattice, side_of_square, wave};
+use crate::plan::{Collider, Shape};
 use glam::Vec3;
-use rapier3d::prelude::*;
 
 /// Height over length of the slope.
 const SLOPE: f32 = 0.7;
@@ -21,8 +20,8 @@ pub(super) fn avalanche(b: &mut Builder, n: usize) {
         let part = |k: usize| k as f32 / (samples - 1) as f32 - 0.5;
         surface(part(j) * length, part(i) * length, length)
     });
-    let scale = to_vector(Vec3::new(length, 1.0, length));
-    b.world.colliders.insert(ColliderBuilder::heightfield(field, scale).friction(0.4));
+    let scale = Vec3::new(length, 1.0, length);
+    b.insert(Collider::new(Shape::Heights(samples, field, scale)).friction(0.4));
     for i in 0..n {
         let place = (lattice(i, side) - Vec3::new(side as f32 / 2.0, 0.0, 0.0)) * 1.6;
         let [x, z] = [place.x, place.z - length * 0.45];
@@ -43,9 +42,9 @@ fn surface(x: f32, z: f32, length: f32) -> f32 {
 fn boulder(b: &mut Builder, i: usize, at: Vec3) {
     let half = b.random_size(0.15, 0.55);
     let shape = match i % 3 {
-        0 => ColliderBuilder::ball(half),
-        1 => ColliderBuilder::cuboid(half, half * 0.8, half * 0.7),
-        _ => ColliderBuilder::round_cuboid(half * 0.6, half * 0.7, half * 0.5, half * 0.3),
+        0 => Collider::ball(half),
+        1 => Collider::cuboid(half, half * 0.8, half * 0.7),
+        _ => Collider::new(Shape::Cuboid(half * Vec3::new(0.6, 0.7, 0.5), Some(half * 0.3))),
     };
     b.falling(at, shape.friction(0.4).restitution(0.2));
 }

@@ -1,14 +1,13 @@
 //! A world under construction.
 
-use crate::world::{World, to_vector, turned, turned_body};
+use crate::plan::{Body, Collider, Plan, Shape};
 use glam::{EulerRot, Quat, Vec2, Vec3};
 use rand::RngExt;
 use rand::rngs::StdRng;
-use rapier3d::prelude::*;
 
 /// A world under construction, with its random numbers.
 pub(super) struct Builder {
-    pub(super) world: World,
+    pub(super) plan: Plan,
     pub(super) rng: StdRng,
 }
 
@@ -35,30 +34,53 @@ impl Builder {
         low * power(high / low, self.random(0.0, 1.0))
     }
 
+    /// Adds a body, and returns its number.
+    pub(super) fn insert_body(&mut self, body: Body) -> usize {
+        self.plan.bodies.push(body);
+        self.plan.bodies.len() - 1
+    }
+
+    /// Adds a collider.
+    pub(super) fn insert(&mut self, collider: Collider) {
+        self.plan.colliders.push(collider);
+    }
+
+    /// Adds a collider to a body.
+    pub(super) fn attach(&mut self, collider: Collider, body: usize) {
+        self.insert(Collider { body: Some(body), ..collider });
+    }
+
+    /// Adds a body with one collider, and returns the body's number.
+    pub(super) fn add(&mut self, body: Body, collider: Collider) -> usize {
+        let body = self.insert_body(body);
+        self.attach(collider, body);
+        body
+    }
+
     /// Adds a half-space below height 0.
     pub(super) fn ground(&mut self) {
-        self.world.colliders.insert(World::ground());
+        self.insert(Collider::new(Shape::HalfSpace));
     }
 
     /// Adds a dynamic body with a random rotation.
-    pub(super) fn falling(&mut self, at: Vec3, collider: ColliderBuilder) -> RigidBodyHandle {
-        let body = turned_body(RigidBodyBuilder::dynamic(), at, self.random_turn());
-        self.world.add(body, collider)
+    pub(super) fn falling(&mut self, at: Vec3, collider: Collider) -> usize {
+        let body = Body::dynamic(at).turned(self.random_turn());
+        self.add(body, collider)
     }
 
     /// Adds a collider without a body.
-    pub(super) fn fixed(&mut self, at: Vec3, collider: ColliderBuilder) {
-        self.world.colliders.insert(collider.translation(to_vector(at)));
+    pub(super) fn fixed(&mut self, at: Vec3, collider: Collider) {
+        self.insert(collider.at(at));
     }
 
     /// Adds a collider without a body, turned around the vertical axis by an angle in radians.
-    pub(super) fn fixed_turned(&mut self, at: Vec3, angle: f32, collider: ColliderBuilder) {
-        self.world.colliders.insert(collider.position(turned(at, Quat::from_rotation_y(angle))));
+    pub(super) fn fixed_turned(&mut self, at: Vec3, angle: f32, collider: Collider) {
+        self.insert(Collider { turn: Quat::from_rotation_y(angle), ..collider.at(at) });
     }
 
     /// Adds a box without a body, turned around the vertical axis by an angle in radians.
     pub(super) fn fixed_cuboid(&mut self, at: Vec3, half: Vec3, angle: f32) {
-        self.fixed_turned(at, angle, ColliderBuilder::cuboid(half.x, half.y, half.z));
+        self.fixed_turned(at, angle, Collider::cuboid(half.x, half.y, half.z));
     }
 }
 
@@ -75,6 +97,11 @@ pub(super) fn side_of_cube(places: usize) -> usize {
 /// Returns the number of places along an edge of the smallest square with `places` places, at least 1.
 pub(super) fn side_of_square(places: usize) -> usize {
     (1..).find(|side: &usize| side.pow(2) >= places).unwrap_or(1)
+}
+
+/// Returns the heights of a square grid, as [`Shape::Heights`] holds them.
+pub(super) fn heights(side: usize, height: impl Fn(usize, usize) -> f32) -> Vec<f32> {
+    (0..side * side).map(|at| height(at % side, at / side)).collect()
 }
 
 // glam computes these with `libm`, so they have the same bits on every machine. The standard library asks the platform, and

@@ -1,9 +1,8 @@
 //! Ring conveyors: rollers carry crates around, through gates, which are sensors.
 
 use super::builder::{Builder, direction, side_of_square};
-use crate::world::{to_vector, turned_body};
+use crate::plan::{Body, Collider};
 use glam::{Quat, Vec3};
-use rapier3d::prelude::*;
 use std::f32::consts::TAU;
 
 /// Bodies of one ring.
@@ -45,10 +44,10 @@ fn add_rollers(b: &mut Builder, at: Vec3, n: usize) {
     for i in 0..n {
         let angle = TAU * (i as f32 + 0.5) / ROLLERS as f32;
         let outward = direction(angle);
-        let roller =
-            RigidBodyBuilder::kinematic_velocity_based().angvel(to_vector(outward * (SPEED / ROLLER_RADIUS)));
-        let roller = turned_body(roller, at + outward * RING_RADIUS, Quat::from_rotation_y(-angle));
-        b.world.add(roller, ColliderBuilder::capsule_x(0.7, ROLLER_RADIUS).friction(1.0));
+        let roller = Body::kinematic(at + outward * RING_RADIUS)
+            .turned(Quat::from_rotation_y(-angle))
+            .angvel(outward * (SPEED / ROLLER_RADIUS));
+        b.add(roller, Collider::capsule_x(0.7, ROLLER_RADIUS).friction(1.0));
     }
 }
 
@@ -59,10 +58,10 @@ fn add_crates(b: &mut Builder, at: Vec3, n: usize) {
         let angle = TAU * ((i / 2) as f32 + 0.5) / (CRATES / 2) as f32;
         let up = ROLLER_RADIUS + 0.02 + half.y + (i % 2) as f32 * 0.62;
         let outward = direction(angle) * (RING_RADIUS + b.random(-0.1, 0.1));
-        let body = RigidBodyBuilder::dynamic().can_sleep(false);
-        let body = turned_body(body, at + outward + Vec3::Y * up, Quat::from_rotation_y(-angle));
-        let shape = ColliderBuilder::cuboid(half.x, half.y, half.z).friction(0.8);
-        b.world.add(body, shape);
+        let body =
+            Body::dynamic(at + outward + Vec3::Y * up).turned(Quat::from_rotation_y(-angle)).sleepless();
+        let shape = Collider::cuboid(half.x, half.y, half.z).friction(0.8);
+        b.add(body, shape);
     }
 }
 
@@ -71,7 +70,7 @@ fn add_gates(b: &mut Builder, at: Vec3, n: usize) {
     for i in 0..n {
         let angle = TAU * i as f32 / GATES as f32;
         let place = direction(angle) * RING_RADIUS + Vec3::Y * 0.8;
-        b.fixed_turned(at + place, -angle, ColliderBuilder::cuboid(0.9, 0.8, 0.05).sensor(true));
+        b.fixed_turned(at + place, -angle, Collider::cuboid(0.9, 0.8, 0.05).sensor());
     }
 }
 
@@ -82,7 +81,7 @@ fn add_rails(b: &mut Builder, at: Vec3) {
         for i in 0..PLANKS {
             let angle = TAU * i as f32 / PLANKS as f32;
             let length = radius * TAU / PLANKS as f32;
-            let plank = ColliderBuilder::cuboid(thick, 0.3, length / 2.0).friction(0.0);
+            let plank = Collider::cuboid(thick, 0.3, length / 2.0).friction(0.0);
             b.fixed_turned(at + direction(angle) * radius + Vec3::Y * 0.45, -angle, plank);
         }
     }

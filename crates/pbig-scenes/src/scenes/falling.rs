@@ -1,26 +1,25 @@
 //! Columns of bodies that fall, and bodies of many sizes.
 
-use super::builder::{Builder, direction, lattice, side_of_cube, side_of_square, wave};
-use crate::world::{World, heights, pose, to_vector};
+use super::builder::{Builder, direction, heights, lattice, side_of_cube, side_of_square, wave};
+use crate::plan::{Body, Collider, Shape};
 use glam::Vec3;
-use rapier3d::prelude::*;
 
-pub(super) fn sphere(i: usize) -> ColliderBuilder {
-    ColliderBuilder::ball(0.3 + 0.05 * (i % 5) as f32)
+pub(super) fn sphere(i: usize) -> Collider {
+    Collider::ball(0.3 + 0.05 * (i % 5) as f32)
 }
 
-pub(super) fn cube(i: usize) -> ColliderBuilder {
+pub(super) fn cube(i: usize) -> Collider {
     let half = 0.3 + 0.04 * (i % 5) as f32;
-    ColliderBuilder::cuboid(half, half, half)
+    Collider::cuboid(half, half, half)
 }
 
-pub(super) fn slab(i: usize) -> ColliderBuilder {
+pub(super) fn slab(i: usize) -> Collider {
     let half = 0.4 + 0.05 * (i % 4) as f32;
-    ColliderBuilder::cuboid(half, 0.1, half)
+    Collider::cuboid(half, 0.1, half)
 }
 
 /// Drops a square column, at most 24 wide so that it is tall, above the ground.
-pub(super) fn fall(b: &mut Builder, n: usize, shape: fn(usize) -> ColliderBuilder) {
+pub(super) fn fall(b: &mut Builder, n: usize, shape: fn(usize) -> Collider) {
     b.ground();
     let side = side_of_cube(n.div_ceil(4)).min(24);
     for i in 0..n {
@@ -61,8 +60,7 @@ pub(super) fn mixed(b: &mut Builder, n: usize) {
         height += 2.0 * half / (width / (2.2 * half)).max(1.0).powi(2) + 1e-3;
         let free = (width - half).max(0.0);
         let at = b.random_vec(Vec3::new(free, 0.0, free)) + Vec3::Y * (height + half);
-        let shape =
-            if i % 2 == 0 { ColliderBuilder::ball(half) } else { ColliderBuilder::cuboid(half, half, half) };
+        let shape = if i % 2 == 0 { Collider::ball(half) } else { Collider::cuboid(half, half, half) };
         b.falling(at, shape);
     }
 }
@@ -72,15 +70,14 @@ pub(super) fn rain(b: &mut Builder, n: usize) {
     b.ground();
     let wide = (n.max(1) as f32).sqrt() * 3.0;
     let hills = heights(24, |i, j| 2.2 + wave(i as f32 * 0.7) + direction(j as f32 * 0.9).x);
-    let scale = to_vector(Vec3::new(wide, 1.0, wide));
-    b.world.colliders.insert(ColliderBuilder::heightfield(hills, scale));
+    let scale = Vec3::new(wide, 1.0, wide);
+    b.insert(Collider::new(Shape::Heights(24, hills, scale)));
     for _ in 0..n {
         let at = b.random_vec(Vec3::new(wide * 0.49, 0.0, wide * 0.49)) + Vec3::Y * b.random(5.0, 62.0);
         let down = b.random(-40.0, -10.0);
         // Rapier's continuous collision detection knows no height fields, so drops look a metre ahead for contacts.
-        let body =
-            World::dynamic(at).linvel(to_vector(Vec3::Y * down)).ccd_enabled(true).soft_ccd_prediction(1.0);
-        b.world.add(body, ColliderBuilder::ball(0.08).restitution(0.3));
+        let body = Body { has_ccd: true, soft_ccd: 1.0, ..Body::dynamic(at).linvel(Vec3::Y * down) };
+        b.add(body, Collider::ball(0.08).restitution(0.3));
     }
 }
 
@@ -91,15 +88,14 @@ pub(super) fn compounds(b: &mut Builder, n: usize) {
         let place = lattice(i, side);
         let at = place * 2.6 + b.random_vec(Vec3::splat(0.1)) + Vec3::Y * 2.0;
         if i % 3 == 0 {
-            let cube = || SharedShape::cuboid(0.3, 0.3, 0.3);
-            let shapes =
-                vec![(pose(Vec3::new(-0.4, 0.0, 0.0)), cube()), (pose(Vec3::new(0.4, 0.2, 0.0)), cube())];
-            b.falling(at, ColliderBuilder::compound(shapes));
+            let cube = || Shape::Cuboid(Vec3::splat(0.3), None);
+            let shapes = vec![(Vec3::new(-0.4, 0.0, 0.0), cube()), (Vec3::new(0.4, 0.2, 0.0), cube())];
+            b.falling(at, Collider::new(Shape::Compound(shapes)));
         } else {
-            let body = b.falling(at, ColliderBuilder::ball(0.35));
+            let body = b.falling(at, Collider::ball(0.35));
             for x in [-0.6, 0.6] {
-                let arm = ColliderBuilder::cuboid(0.4, 0.15, 0.15).translation(to_vector(Vec3::X * x));
-                b.world.colliders.insert_with_parent(arm, body, &mut b.world.bodies);
+                let arm = Collider::cuboid(0.4, 0.15, 0.15).at(Vec3::X * x);
+                b.attach(arm, body);
             }
         }
     }

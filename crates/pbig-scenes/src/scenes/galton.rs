@@ -1,9 +1,8 @@
 //! Galton boards: balls fall through rows of pegs into bins.
 
 use super::builder::{Builder, side_of_square};
-use crate::world::World;
+use crate::plan::{Body, Collider, Shape};
 use glam::Vec3;
-use rapier3d::prelude::*;
 
 /// Balls of a board.
 const BALLS: usize = 50;
@@ -49,16 +48,16 @@ fn fixed_parts(b: &mut Builder, at: Vec3) {
         let shift = if row % 2 == 0 { 0.0 } else { PITCH / 2.0 };
         for peg in 0..BINS {
             let place = Vec3::new(across(peg) + shift, BIN_HEIGHT + (row as f32 + 1.0) * DROP, 0.0);
-            b.fixed(at + place, ColliderBuilder::capsule_z(0.2, PEG_RADIUS));
+            b.fixed(at + place, Collider::new(Shape::Capsule(Vec3::Z * 0.2, PEG_RADIUS)));
         }
     }
     for wall in 0..=BINS {
         let place = Vec3::new(across(wall) - PITCH / 2.0, BIN_HEIGHT / 2.0, 0.0);
-        b.fixed(at + place, ColliderBuilder::cuboid(0.04, BIN_HEIGHT / 2.0, 0.3));
+        b.fixed(at + place, Collider::cuboid(0.04, BIN_HEIGHT / 2.0, 0.3));
     }
     for side in [-1.0, 1.0] {
         let place = Vec3::new(side * (BINS as f32 / 2.0 + 0.1) * PITCH, top() / 2.0, 0.0);
-        b.fixed(at + place, ColliderBuilder::cuboid(0.1, top() / 2.0, 0.3));
+        b.fixed(at + place, Collider::cuboid(0.1, top() / 2.0, 0.3));
     }
 }
 
@@ -66,11 +65,9 @@ fn fixed_parts(b: &mut Builder, at: Vec3) {
 fn balls(b: &mut Builder, at: Vec3, n: usize) {
     for i in 0..n {
         let place = Vec3::new(b.random(-0.1, 0.1), top() + i as f32 * BALL_DISTANCE, 0.0);
-        let ball = World::dynamic(at + place)
-            .enabled_translations(true, true, false)
-            .gravity_scale(GRAVITY_SCALE)
-            .linear_damping(DAMPING);
-        b.world.add(ball, ColliderBuilder::ball(BALL_RADIUS).friction(0.1));
+        let (gravity_scale, damping) = (GRAVITY_SCALE, DAMPING);
+        let ball = Body { keeps_z: true, gravity_scale, damping, ..Body::dynamic(at + place) };
+        b.add(ball, Collider::ball(BALL_RADIUS).friction(0.1));
     }
 }
 

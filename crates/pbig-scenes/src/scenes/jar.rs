@@ -1,8 +1,8 @@
 //! A jar of balls and cubes of mixed sizes.
 
 use super::builder::{Builder, direction, side_of_cube};
+use crate::plan::Collider;
 use glam::Vec3;
-use rapier3d::prelude::*;
 use std::f32::consts::TAU;
 
 /// Radii.
@@ -39,11 +39,8 @@ fn layer(b: &mut Builder, radius: f32, height: f32, half: f32, most: usize) -> u
 fn content(b: &mut Builder, at: Vec3, half: f32) {
     // A cube that turns freely within the ball of the same size.
     let edge = half * 0.57;
-    let shape = if b.random(0.0, 1.0) < 0.6 {
-        ColliderBuilder::ball(half)
-    } else {
-        ColliderBuilder::cuboid(edge, edge, edge)
-    };
+    let shape =
+        if b.random(0.0, 1.0) < 0.6 { Collider::ball(half) } else { Collider::cuboid(edge, edge, edge) };
     b.falling(at, shape);
 }
 

@@ -1,6 +1,6 @@
 //! Scenes by name, count and seed. Built with glam; the same world for the same three, every time.
 //!
-//! The workspace for rapier 0.36 builds the same scenes from this folder: what differs between versions of rapier is in `world`.
+//! A scene is a [`Plan`], plain data, from which each version of rapier builds its world.
 
 mod all;
 mod asteroids;
@@ -16,6 +16,8 @@ mod resting;
 mod traffic;
 mod wrecking;
 
+use crate::plan::Plan;
+#[cfg(feature = "rapier")]
 use crate::world::World;
 use builder::Builder;
 use rand::SeedableRng;
@@ -43,17 +45,23 @@ impl Scene {
         found.ok_or_else(|| format!("no scene is called '{name}'; there are: {}", names()))
     }
 
-    /// Builds the world with `bodies` dynamic and kinematic bodies. Figures of `ragdolls` are whole, so the last may be too
+    /// Returns the world with `bodies` dynamic and kinematic bodies. Figures of `ragdolls` are whole, so the last may be too
     /// many, and `groups` adds two walls. Houses of `city` and `traffic` and sensors of `conveyor` and `sensors` count as
     /// bodies.
-    pub fn build(&self, bodies: usize, seed: u64) -> World {
-        let mut builder = Builder { world: World::default(), rng: StdRng::seed_from_u64(seed) };
+    pub fn plan(&self, bodies: usize, seed: u64) -> Plan {
+        let mut builder = Builder { plan: Plan::default(), rng: StdRng::seed_from_u64(seed) };
         (self.build)(&mut builder, bodies);
-        builder.world
+        builder.plan
+    }
+
+    /// Builds that world on rapier 0.27.
+    #[cfg(feature = "rapier")]
+    pub fn build(&self, bodies: usize, seed: u64) -> World {
+        World::of(&self.plan(bodies, seed))
     }
 }
 
-#[cfg(test)]
+#[cfg(all(test, feature = "rapier"))]
 mod tests {
     use super::*;
     use rapier3d::prelude::*;

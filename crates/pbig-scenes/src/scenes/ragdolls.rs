@@ -1,9 +1,8 @@
 //! Bodies of joined limbs.
 
 use super::builder::{Builder, lattice, side_of_square};
-use crate::world::{hinge, to_point, to_vector, turned_body};
+use crate::plan::{Body, Collider, Joint, JointKind};
 use glam::{Quat, Vec3};
-use rapier3d::prelude::*;
 
 /// Rigid bodies of a figure: trunk, head, hips, and two to each limb.
 const PARTS: usize = 11;
@@ -36,7 +35,7 @@ struct Figure<'a> {
 /// A rigid body of a figure and where its centre is.
 #[derive(Clone, Copy)]
 struct Part {
-    body: RigidBodyHandle,
+    body: usize,
     at: Vec3,
 }
 
@@ -45,7 +44,7 @@ struct Limb {
     start: Vec3,
     /// A unit vector, along the axis of the capsule.
     along: Vec3,
-    capsule: fn(f32, f32) -> ColliderBuilder,
+    capsule: fn(f32, f32) -> Collider,
     half: f32,
     radius: f32,
     /// The axis around which knee or elbow bends.
@@ -55,10 +54,10 @@ struct Limb {
 impl Figure<'_> {
     /// Adds all parts and joins them.
     fn build(mut self) {
-        let trunk = self.part(Vec3::ZERO, ColliderBuilder::capsule_y(0.2, 0.17));
-        let head = self.part(Vec3::Y * 0.56, ColliderBuilder::ball(0.16));
+        let trunk = self.part(Vec3::ZERO, Collider::capsule_y(0.2, 0.17));
+        let head = self.part(Vec3::Y * 0.56, Collider::ball(0.16));
         self.socket(trunk, head, Vec3::Y * 0.39, 0.6);
-        let hips = self.part(Vec3::Y * -0.44, ColliderBuilder::capsule_x(0.08, 0.13));
+        let hips = self.part(Vec3::Y * -0.44, Collider::capsule_x(0.08, 0.13));
         self.socket(trunk, hips, Vec3::Y * -0.34, 0.5);
         for side in [-1.0, 1.0] {
             self.limb(trunk, arm(side));
@@ -67,10 +66,9 @@ impl Figure<'_> {
     }
 
     /// Adds a body.
-    fn part(&mut self, at: Vec3, shape: ColliderBuilder) -> Part {
-        let body = RigidBodyBuilder::dynamic().linvel(to_vector(self.velocity));
-        let body = turned_body(body, self.at + self.turn * at, self.turn);
-        Part { body: self.b.world.add(body, shape), at }
+    fn part(&mut self, at: Vec3, shape: Collider) -> Part {
+        let body = Body::dynamic(self.at + self.turn * at).turned(self.turn).linvel(self.velocity);
+        Part { body: self.b.add(body, shape), at }
     }
 
     /// Adds two bodies that hang on a third.
@@ -81,21 +79,18 @@ impl Figure<'_> {
         });
         self.socket(parent, upper, limb.start, 1.0);
         let middle = limb.start + limb.along * 2.0 * reach;
-        let bend = hinge(limb.axis).limits([0.0, 2.4]).contacts_enabled(false);
-        let bend = bend.local_anchor1(to_point(middle - upper.at)).local_anchor2(to_point(middle - lower.at));
-        self.b.world.impulse_joints.insert(upper.body, lower.body, bend, true);
+        self.join(JointKind::Hinge(limb.axis, [0.0, 2.4]), [upper, lower], middle);
     }
 
     /// Joins two parts at a point. Each turns by at most `most` radians around each axis.
     fn socket(&mut self, parent: Part, child: Part, at: Vec3, most: f32) {
-        let joint = SphericalJointBuilder::new()
-            .local_anchor1(to_point(at - parent.at))
-            .local_anchor2(to_point(at - child.at))
-            .limits(JointAxis::AngX, [-most, most])
-            .limits(JointAxis::AngY, [-most, most])
-            .limits(JointAxis::AngZ, [-most, most])
-            .contacts_enabled(false);
-        self.b.world.impulse_joints.insert(parent.body, child.body, joint, true);
+        self.join(JointKind::Socket(Some(most)), [parent, child], at);
+    }
+
+    /// Joins two parts, which never touch, at a point.
+    fn join(&mut self, kind: JointKind, parts: [Part; 2], at: Vec3) {
+        let (bodies, anchors) = (parts.map(|part| part.body), parts.map(|part| at - part.at));
+        self.b.plan.joints.push(Joint { kind, bodies, anchors, has_contacts: false });
     }
 }
 
@@ -104,7 +99,7 @@ fn arm(side: f32) -> Limb {
     Limb {
         start: Vec3::new(0.19 * side, 0.2, 0.0),
         along: Vec3::X * side,
-        capsule: ColliderBuilder::capsule_x,
+        capsule: Collider::capsule_x,
         half: 0.12,
         radius: 0.065,
         axis: Vec3::Y * -side,
@@ -116,7 +111,7 @@ fn leg(side: f32) -> Limb {
     Limb {
         start: Vec3::new(0.11 * side, -0.5, 0.0),
         along: Vec3::NEG_Y,
-        capsule: ColliderBuilder::capsule_y,
+        capsule: Collider::capsule_y,
         half: 0.14,
         radius: 0.085,
         axis: Vec3::X,

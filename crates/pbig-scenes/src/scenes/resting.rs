@@ -1,9 +1,8 @@
 //! Bodies at rest, or soon at rest.
 
 use super::builder::{Builder, lattice, side_of_cube, side_of_square};
-use crate::world::{World, to_vector};
+use crate::plan::{Body, Collider};
 use glam::Vec3;
-use rapier3d::prelude::*;
 
 pub(super) fn pile(b: &mut Builder, n: usize) {
     b.ground();
@@ -11,7 +10,7 @@ pub(super) fn pile(b: &mut Builder, n: usize) {
     for i in 0..n {
         let place = lattice(i, side);
         let at = place * 1.02 + b.random_vec(Vec3::new(0.01, 0.0, 0.01)) + Vec3::Y * 0.51;
-        b.world.add(World::dynamic(at), ColliderBuilder::cuboid(0.5, 0.5, 0.5));
+        b.add(Body::dynamic(at), Collider::cuboid(0.5, 0.5, 0.5));
     }
 }
 
@@ -24,7 +23,7 @@ pub(super) fn pyramid(b: &mut Builder, n: usize) {
         for i in 0..(side * side).min(left) {
             let corner = Vec3::new(level as f32 * 0.5, level as f32 + 0.5, level as f32 * 0.5);
             let at = corner + Vec3::new((i % side) as f32, 0.0, (i / side) as f32);
-            b.world.add(World::dynamic(at), ColliderBuilder::cuboid(0.495, 0.495, 0.495));
+            b.add(Body::dynamic(at), Collider::cuboid(0.495, 0.495, 0.495));
         }
         left = left.saturating_sub(side * side);
     }
@@ -35,14 +34,14 @@ pub(super) fn sleeping(b: &mut Builder, n: usize) {
     let side = side_of_square(n);
     for i in 0..n.saturating_sub(1) {
         let at = Vec3::new((i % side) as f32 * 1.1, 0.5, (i / side) as f32 * 1.1);
-        b.world.add(World::dynamic(at).sleeping(true), ColliderBuilder::cuboid(0.5, 0.5, 0.5));
+        b.add(Body { is_sleeping: true, ..Body::dynamic(at) }, Collider::cuboid(0.5, 0.5, 0.5));
     }
     if n == 0 {
         return;
     }
     let middle = side as f32 * 0.55;
-    let awake = World::dynamic(Vec3::new(middle, 8.0, middle)).linvel(to_vector(Vec3::new(3.0, 0.0, 0.5)));
-    b.world.add(awake.can_sleep(false), ColliderBuilder::ball(0.4));
+    let awake = Body::dynamic(Vec3::new(middle, 8.0, middle)).linvel(Vec3::new(3.0, 0.0, 0.5));
+    b.add(awake.sleepless(), Collider::ball(0.4));
 }
 
 pub(super) fn city(b: &mut Builder, n: usize) {
@@ -52,12 +51,12 @@ pub(super) fn city(b: &mut Builder, n: usize) {
         let at = Vec3::new((i % side) as f32, 0.0, (i / side) as f32) * 4.0;
         if i % 50 == 0 {
             let up = b.random(10.0, 20.0);
-            let body = World::dynamic(at + Vec3::Y * up + Vec3::X * 2.0)
-                .linvel(to_vector(b.random_vec(Vec3::splat(5.0))));
-            b.world.add(body, ColliderBuilder::ball(0.4));
+            let body =
+                Body::dynamic(at + Vec3::Y * up + Vec3::X * 2.0).linvel(b.random_vec(Vec3::splat(5.0)));
+            b.add(body, Collider::ball(0.4));
         } else {
             let half_height = b.random(0.5, 6.0);
-            b.fixed(at + Vec3::Y * half_height, ColliderBuilder::cuboid(1.5, half_height, 1.5));
+            b.fixed(at + Vec3::Y * half_height, Collider::cuboid(1.5, half_height, 1.5));
         }
     }
 }

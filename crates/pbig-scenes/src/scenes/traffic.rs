@@ -1,9 +1,8 @@
 //! A town of rings: houses, cars that drive around for ever, and barrels in their way.
 
 use super::builder::{Builder, direction};
-use crate::world::{World, to_point, to_vector, turned_body};
+use crate::plan::{Body, Collider, Shape};
 use glam::{Quat, Vec3};
-use rapier3d::prelude::*;
 use std::f32::consts::TAU;
 
 /// The radius of the first street, and the distance from street to street.
@@ -72,24 +71,16 @@ fn car(b: &mut Builder, radius: f32, angle: f32, way: f32) {
     // All cars of a lane are equally fast, so none runs into another. A positive turn around y drives from z to x.
     let speed = 8.0 + 4.0 * way;
     let place = Vec3::new(lane, half.y + 0.05, 0.0);
-    let body = RigidBodyBuilder::kinematic_velocity_based()
-        .angvel(to_vector(Vec3::Y * -way * speed / lane))
-        .additional_mass_properties(mass_at_origin())
-        // A slow turn counts as rest, however long the way.
-        .can_sleep(false);
-    let body = turned_body(body, Vec3::ZERO, Quat::from_rotation_y(-angle));
-    let shape = ColliderBuilder::cuboid(half.x, half.y, half.z).density(0.0);
-    b.world.add(body, shape.translation(to_vector(place)));
-}
-
-/// Returns one kilogramme in the middle of a body.
-fn mass_at_origin() -> MassProperties {
-    MassProperties::new(to_point(Vec3::ZERO), 1.0, to_vector(Vec3::ONE))
+    let spin = Vec3::Y * -way * speed / lane;
+    // A slow turn counts as rest, however long the way.
+    let body = Body::kinematic(Vec3::ZERO).turned(Quat::from_rotation_y(-angle)).angvel(spin).sleepless();
+    let shape = Collider::cuboid(half.x, half.y, half.z).density(0.0);
+    b.add(Body { has_own_mass: true, ..body }, shape.at(place));
 }
 
 /// Adds a barrel in the way of the cars or beside it.
 fn barrel(b: &mut Builder, radius: f32, angle: f32, half: f32) {
     let side = half * b.random(0.5, 4.0);
     let at = direction(angle) * (radius + side) + Vec3::Y * 0.5;
-    b.world.add(World::dynamic(at), ColliderBuilder::cylinder(0.45, 0.3));
+    b.add(Body::dynamic(at), Collider::new(Shape::Cylinder(0.45, 0.3)));
 }

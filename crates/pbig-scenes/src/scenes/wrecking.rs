@@ -1,9 +1,8 @@
 //! Wrecking balls swing into walls of bricks.
 
 use super::builder::{Builder, side_of_square};
-use crate::world::{World, to_point, to_vector, turned_body};
+use crate::plan::{Body, Collider, Joint, JointKind};
 use glam::{Quat, Vec3};
-use rapier3d::prelude::*;
 
 /// Bodies of a wall with its ball.
 const BODIES: usize = 250;
@@ -36,7 +35,7 @@ fn bricks(b: &mut Builder, at: Vec3, n: usize) -> usize {
         let shift = if row % 2 == 0 { 0.0 } else { BRICK.x };
         let x = (column as f32 - row_length as f32 / 2.0) * 2.02 * BRICK.x + shift;
         let place = Vec3::new(x, (row as f32 * 2.0 + 1.0) * BRICK.y, 0.0);
-        b.world.add(World::dynamic(at + place), ColliderBuilder::cuboid(BRICK.x, BRICK.y, BRICK.z));
+        b.add(Body::dynamic(at + place), Collider::cuboid(BRICK.x, BRICK.y, BRICK.z));
     }
     n.div_ceil(row_length)
 }
@@ -45,13 +44,13 @@ fn bricks(b: &mut Builder, at: Vec3, n: usize) -> usize {
 fn ball(b: &mut Builder, at: Vec3, height: f32) {
     let lowest = (height * 0.4).max(BALL_RADIUS + 0.2);
     let pivot = at + Vec3::Y * (lowest + ROD);
-    let hook = b.world.bodies.insert(RigidBodyBuilder::fixed().translation(to_vector(pivot)));
+    let hook = b.insert_body(Body::fixed(pivot));
     let turn = Quat::from_rotation_x(SWING + b.random(-0.05, 0.05));
     let place = pivot + turn * (Vec3::NEG_Y * ROD);
-    let body = turned_body(RigidBodyBuilder::dynamic(), place, turn).can_sleep(false);
-    let ball = b.world.add(body, ColliderBuilder::ball(BALL_RADIUS).density(20.0));
-    let rod = ColliderBuilder::capsule_y(ROD / 2.0, 0.05).translation(to_vector(Vec3::Y * ROD / 2.0));
-    b.world.colliders.insert_with_parent(rod.density(0.0), ball, &mut b.world.bodies);
-    let joint = SphericalJointBuilder::new().local_anchor2(to_point(Vec3::Y * ROD));
-    b.world.impulse_joints.insert(hook, ball, joint, true);
+    let body = Body::dynamic(place).turned(turn).sleepless();
+    let ball = b.add(body, Collider::ball(BALL_RADIUS).density(20.0));
+    let rod = Collider::capsule_y(ROD / 2.0, 0.05).at(Vec3::Y * ROD / 2.0);
+    b.attach(rod.density(0.0), ball);
+    let (kind, anchors) = (JointKind::Socket(None), [Vec3::ZERO, Vec3::Y * ROD]);
+    b.plan.joints.push(Joint { kind, bodies: [hook, ball], anchors, has_contacts: true });
 }

@@ -45,6 +45,8 @@ impl<'a> SceneView<'a> {
 }
 
 impl View for SceneView<'_> {
+    type Aabb = Aabb;
+
     fn enabled(&self) -> Vec<Handle> {
         self.colliders.iter_enabled().map(|(each, _)| handle(each)).collect()
     }

@@ -1,10 +1,10 @@
 //! Frames of rapier 0.36.1 with its own broad phase and with pbig, in turn: `cargo run --release --bin bench_step -- --help`.
 
 use clap::Parser;
-use pbig_harness_036::frames::FrameKind;
 use pbig_harness_036::run::{Run, StepTime, Summary};
-use pbig_harness_036::scenes::Scene;
-use rapier3d::prelude::BroadPhaseBvh;
+use pbig_scenes::frames::FrameKind;
+use pbig_scenes::scenes::Scene;
+use rapier::prelude::BroadPhaseBvh;
 use std::fs::File;
 use std::io::Write;
 use std::path::PathBuf;

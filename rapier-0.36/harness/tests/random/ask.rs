@@ -1,25 +1,26 @@
 //! Asks pbig's index and a tree of the same boxes, searched by rapier's own code, the same questions.
 
 use glam::Vec3;
-use pbig_harness_036::world::{World, pose, to_point, to_vector};
+use pbig_harness_036::world::{World, pose, to_vector};
 use rand::RngExt;
 use rand::rngs::StdRng;
-use rapier3d::parry::partitioning::Bvh;
-use rapier3d::parry::query::ShapeCastOptions;
-use rapier3d::pipeline::QueryPipeline;
-use rapier3d::prelude::*;
+use rapier::math::Real;
+use rapier::parry::partitioning::Bvh;
+use rapier::parry::query::ShapeCastOptions;
+use rapier::pipeline::QueryPipeline;
+use rapier::prelude::*;
 use std::collections::BTreeSet;
 
 /// One answer to each kind of query. Rapier's tree decides which of several equally near colliders it names, so the distance
 /// stands for them.
 #[derive(Debug, PartialEq)]
 struct Answers {
-    ray: Option<f32>,
-    normal: Option<f32>,
+    ray: Option<Real>,
+    normal: Option<Real>,
     on_ray: BTreeSet<(u32, u32)>,
-    nearest: Option<f32>,
+    nearest: Option<Real>,
     around: BTreeSet<(u32, u32)>,
-    cast: Option<f32>,
+    cast: Option<Real>,
     touched: BTreeSet<(u32, u32)>,
     in_box: BTreeSet<(u32, u32)>,
 }
@@ -27,7 +28,7 @@ struct Answers {
 struct Question {
     at: Vec3,
     along: Vec3,
-    reach: f32,
+    reach: Real,
     is_solid: bool,
 }
 
@@ -39,14 +40,14 @@ impl Question {
         Self {
             at,
             along,
-            reach: [3.0, 50.0, f32::MAX][rng.random_range(0..3)],
+            reach: [3.0, 50.0, Real::MAX][rng.random_range(0..3)],
             is_solid: rng.random_range(0..2) == 0,
         }
     }
 
     fn ask(&self, queries: &QueryPipeline<'_>) -> (Answers, Option<(u32, u32)>) {
         let Self { at, along, reach, is_solid } = *self;
-        let (point, along, ball) = (to_point(at), to_vector(along), Ball::new(0.6));
+        let (point, along, ball) = (to_vector(at), to_vector(along), Ball::new(0.6));
         let ray = Ray::new(point, along);
         let hit = queries.cast_ray(&ray, reach, is_solid);
         let area = Aabb::from_half_extents(point, Vector::splat(1.0));

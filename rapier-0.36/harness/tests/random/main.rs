@@ -6,15 +6,17 @@ mod ask;
 mod planted;
 
 use glam::Vec3;
-use pbig_harness_036::scenes::Scene;
-use pbig_harness_036::world::{World, groups_that_meet, to_vector, turned_body};
+use pbig_harness_036::dimension::{cuboid, joint};
+use pbig_harness_036::world::{World, groups_that_meet, real, to_vector, turned};
+use pbig_scenes::plan::JointKind;
+use pbig_scenes::scenes::Scene;
 use planted::{BUSY, Plant, Planted};
 use rand::rngs::StdRng;
 use rand::{RngExt, SeedableRng};
+use rapier::geometry::PairFinder;
+use rapier::prelude::*;
 use rapier_pbig::shadow::{Shadow, Shadowed};
 use rapier_pbig::{PbigConfig, PbigFinder};
-use rapier3d::geometry::PairFinder;
-use rapier3d::prelude::*;
 use std::any::Any;
 use std::collections::HashSet;
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
@@ -79,10 +81,10 @@ impl Player {
     fn collider(&mut self) -> ColliderBuilder {
         let half = self.rng.random_range(0.1..0.9);
         let shape = match self.rng.random_range(0..4) {
-            0 => ColliderBuilder::ball(half),
-            1 => ColliderBuilder::cuboid(half, 0.2, half),
-            2 => ColliderBuilder::capsule_y(half, 0.2),
-            _ => ColliderBuilder::cuboid(half, half, half),
+            0 => ColliderBuilder::ball(real(half)),
+            1 => ColliderBuilder::new(cuboid(Vec3::new(half, 0.2, half))),
+            2 => ColliderBuilder::capsule_y(real(half), 0.2),
+            _ => ColliderBuilder::new(cuboid(Vec3::splat(half))),
         };
         let groups = self.groups();
         let types = [ActiveCollisionTypes::default(), ActiveCollisionTypes::all()];
@@ -108,7 +110,7 @@ impl Player {
         let speed = if self.rng.random_range(0..4) == 0 { fast } else { Vec3::ZERO };
         let soft_ccd = if self.rng.random_range(0..6) == 0 { 0.5 } else { 0.0 };
         let turn = glam::Quat::from_rotation_z(self.rng.random_range(-3.0..3.0));
-        let body = turned_body(body, at, turn).linvel(to_vector(speed));
+        let body = body.pose(turned(at, turn)).linvel(to_vector(speed));
         body.soft_ccd_prediction(soft_ccd).ccd_enabled(self.rng.random_range(0..3) == 0)
     }
 
@@ -187,8 +189,8 @@ impl Player {
     fn reshape(&mut self, collider: ColliderHandle) {
         let (size, skin) = (self.rng.random_range(0.1..1.5), self.rng.random_range(0.0..0.2));
         let collider = &mut self.world.colliders[collider];
-        collider.set_shape(SharedShape::cuboid(size, 0.3, size));
-        collider.set_contact_skin(skin);
+        collider.set_shape(cuboid(Vec3::new(size, 0.3, size)));
+        collider.set_contact_skin(real(skin));
     }
 
     fn add(&mut self) {
@@ -201,7 +203,7 @@ impl Player {
         if let Some(other) =
             other.filter(|&other| [body, other].iter().all(|&one| self.world.bodies[one].is_dynamic()))
         {
-            self.world.impulse_joints.insert(body, other, SphericalJointBuilder::new(), true);
+            self.world.impulse_joints.insert(body, other, joint(JointKind::Socket(None)), true);
         }
     }
 
@@ -355,7 +357,7 @@ fn planted_faults_are_noticed() {
 fn every_scene_answers_in_each_frame_as_rapiers_tree_does() {
     let mut hits = 0;
     for scene in Scene::ALL {
-        let (mut world, mut broad_phase) = (scene.build(250, 1), rapier_pbig::broad_phase());
+        let (mut world, mut broad_phase) = (World::of(&scene.plan(250, 1)), rapier_pbig::broad_phase());
         let mut rng = StdRng::seed_from_u64(1);
         for _ in 0..60 {
             world.step(&mut broad_phase);

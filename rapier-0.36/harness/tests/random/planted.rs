@@ -1,10 +1,10 @@
 //! A finder with a fault planted in it.
 
+use rapier::geometry::{PairFinder, SceneQuery};
+use rapier::parry::bounding_volume::Aabb;
+use rapier::parry::partitioning::Bvh;
+use rapier::prelude::*;
 use rapier_pbig::PbigFinder;
-use rapier3d::geometry::{PairFinder, SceneQuery};
-use rapier3d::parry::bounding_volume::Aabb;
-use rapier3d::parry::partitioning::Bvh;
-use rapier3d::prelude::*;
 use std::cell::Cell;
 use std::collections::HashSet;
 

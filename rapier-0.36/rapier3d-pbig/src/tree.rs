@@ -1,9 +1,10 @@
 //! The tree for scene queries and CCD: parry's, as rapier's own broad phase keeps it.
 
-use pbig_adapter::{Aabb, Tree};
-use rapier3d::math::{Real, Vector};
-use rapier3d::parry::bounding_volume::Aabb as TreeAabb;
-use rapier3d::parry::partitioning::{Bvh, BvhBuildStrategy, BvhWorkspace};
+use crate::Bounds;
+use pbig_adapter::{Bounds as _, Tree};
+use rapier::math::{DIM, Real, Vector};
+use rapier::parry::bounding_volume::Aabb as TreeAabb;
+use rapier::parry::partitioning::{Bvh, BvhBuildStrategy, BvhWorkspace};
 
 /// Leaves that change, in 16ths of all: below, each is inserted anew, which keeps the tree good and reads nothing else. Rapier's
 /// own broad phase has the same rule.
@@ -22,7 +23,9 @@ impl std::fmt::Debug for ParryTree {
 }
 
 impl Tree for ParryTree {
-    fn build(leaves: impl Iterator<Item = (u32, Aabb)> + Clone) -> Self {
+    type Aabb = Bounds;
+
+    fn build(leaves: impl Iterator<Item = (u32, Bounds)> + Clone) -> Self {
         if leaves.clone().nth(2).is_none() {
             let mut tree = Self::default();
             leaves.for_each(|(id, aabb)| tree.bvh.insert(to_tree(&aabb), id));
@@ -37,7 +40,7 @@ impl Tree for ParryTree {
         self.bvh.refit(&mut self.workspace);
     }
 
-    fn update(&mut self, leaves: impl Iterator<Item = (u32, Aabb)>) {
+    fn update(&mut self, leaves: impl Iterator<Item = (u32, Bounds)>) {
         let leaves: Vec<_> = leaves.collect();
         let all = self.bvh.leaf_count() as usize;
         if leaves.len() * 16 < REINSERT_BELOW_SIXTEENTHS * all {
@@ -55,12 +58,23 @@ impl Tree for ParryTree {
 }
 
 /// Clamps infinite boxes to the size of rapier's half-spaces, because the tree computes centres.
-pub(crate) fn to_tree(aabb: &Aabb) -> TreeAabb {
-    let corner = |corner: [f32; 3]| Vector::from(corner.map(|x| x.clamp(Real::MIN / 2.0, Real::MAX / 2.0)));
-    TreeAabb::new(corner(aabb.min), corner(aabb.max))
+pub(crate) fn to_tree(aabb: &Bounds) -> TreeAabb {
+    let corner = |corner: [Real; 3]| {
+        let clamped: [Real; DIM] = std::array::from_fn(|k| corner[k].clamp(Real::MIN / 2.0, Real::MAX / 2.0));
+        Vector::from(clamped)
+    };
+    let [min, max] = aabb.corners();
+    TreeAabb::new(corner(min), corner(max))
 }
 
 #[inline(always)]
-pub(crate) fn from_tree(aabb: &TreeAabb) -> Aabb {
-    Aabb::new(aabb.mins.into(), aabb.maxs.into())
+pub(crate) fn from_tree(aabb: &TreeAabb) -> Bounds {
+    Bounds::from_corners(spatial(aabb.mins), spatial(aabb.maxs))
+}
+
+/// Returns a vector with the z coordinate 0 in two dimensions.
+#[inline(always)]
+pub(crate) fn spatial(vector: Vector) -> [Real; 3] {
+    let known: [Real; DIM] = vector.into();
+    std::array::from_fn(|k| if k < DIM { known[k] } else { 0.0 })
 }

@@ -2,10 +2,12 @@
 
 use crate::finder::to_handle;
 use crate::tree::from_tree;
-use pbig_adapter::{Aabb, BodyKind, Groups, Handle, Proxy, ProxyFilter, Scene, filter_of, size_class};
+use crate::{Bounds, to_f32};
+use pbig_adapter::{BodyKind, Bounds as _, Groups, Handle, Proxy, ProxyFilter, Scene, filter_of, size_class};
 use pbig_core::TestMode;
-use rapier3d::parry::bounding_volume::Aabb as TreeAabb;
-use rapier3d::prelude::*;
+use rapier::math::{DIM, Real};
+use rapier::parry::bounding_volume::Aabb as TreeAabb;
+use rapier::prelude::*;
 use std::ops::Range;
 
 /// The arguments of one update.
@@ -20,7 +22,7 @@ pub(crate) struct Call<'a> {
 }
 
 impl Call<'_> {
-    fn proxy(&self, handle: ColliderHandle) -> Proxy {
+    fn proxy(&self, handle: ColliderHandle) -> Proxy<Bounds> {
         let Some(collider) = self.colliders.get(handle) else { return Proxy::Gone };
         if !collider.is_enabled() {
             return Proxy::Disabled;
@@ -73,12 +75,15 @@ pub(crate) fn handle(handle: ColliderHandle) -> Handle {
 
 /// Returns the margin of rapier's `adaptive_change_detection_margin`: an eighth of the box's smallest extent, within limits.
 #[inline(always)]
-pub(crate) fn own_margin(aabb: &Aabb, length_unit: f32) -> f32 {
-    let extent = (0..3).map(|k| aabb.max[k] - aabb.min[k]).fold(f32::INFINITY, f32::min);
-    (0.125 * extent).max(crate::MARGIN * length_unit).min(crate::MAX_ADAPTIVE_MARGIN * length_unit)
+pub(crate) fn own_margin(aabb: &Bounds, length_unit: f32) -> f32 {
+    let [min, max] = aabb.corners();
+    let extent = (0..DIM).map(|k| max[k] - min[k]).fold(Real::INFINITY, Real::min);
+    (0.125 * to_f32(extent)).max(crate::MARGIN * length_unit).min(crate::MAX_ADAPTIVE_MARGIN * length_unit)
 }
 
 impl Scene for Call<'_> {
+    type Aabb = Bounds;
+
     fn collider_count(&self) -> usize {
         self.colliders.len()
     }
@@ -87,13 +92,13 @@ impl Scene for Call<'_> {
         self.modified.len()
     }
 
-    fn for_each_listed(&self, range: Range<usize>, mut take: impl FnMut(Handle, Proxy)) {
+    fn for_each_listed(&self, range: Range<usize>, mut take: impl FnMut(Handle, Proxy<Bounds>)) {
         for &listed in &self.modified[range] {
             take(handle(listed), self.proxy(listed));
         }
     }
 
-    fn for_each_collider(&self, mut take: impl FnMut(Handle, Proxy)) {
+    fn for_each_collider(&self, mut take: impl FnMut(Handle, Proxy<Bounds>)) {
         for (each, _) in self.colliders.iter() {
             take(handle(each), self.proxy(each));
         }
@@ -105,11 +110,11 @@ impl Scene for Call<'_> {
 
     fn size(&self, handle: Handle) -> u8 {
         let shape = self.colliders.get(to_handle(handle)).map(Collider::shape);
-        shape.map_or(0, |shape| size_class(shape.compute_local_aabb().half_extents().max_element()))
+        shape.map_or(0, |shape| size_class(to_f32(shape.compute_local_aabb().half_extents().max_element())))
     }
 
     #[inline(always)]
-    fn margin(&self, aabb: &Aabb) -> Option<f32> {
-        self.adaptive_margin.then(|| own_margin(aabb, self.params.length_unit))
+    fn margin(&self, aabb: &Bounds) -> Option<f32> {
+        self.adaptive_margin.then(|| own_margin(aabb, to_f32(self.params.length_unit)))
     }
 }

@@ -6,13 +6,14 @@ pub use pbig_adapter::shadow::{Checker, Difference, Fault, ReplayError, Shadow, 
 
 use crate::scene::{Call, groups_of, handle};
 use crate::tree::from_tree;
-use crate::{PairFinder, PbigFinder, SceneQuery};
+use crate::{Bounds, PairFinder, PbigFinder, SceneQuery, to_f32};
 use pbig_adapter::shadow::Watched;
-use pbig_adapter::{Aabb, Handle, HandlePair, PairEvent};
-use rapier3d::parry::bounding_volume::Aabb as TreeAabb;
-use rapier3d::parry::partitioning::Bvh;
-use rapier3d::parry::query::{contact, distance};
-use rapier3d::prelude::*;
+use pbig_adapter::{Bounds as _, Handle, HandlePair, PairEvent};
+use rapier::math::Real;
+use rapier::parry::bounding_volume::Aabb as TreeAabb;
+use rapier::parry::partitioning::Bvh;
+use rapier::parry::query::{contact, distance};
+use rapier::prelude::*;
 use std::any::Any;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
@@ -24,6 +25,7 @@ impl PbigFinder {
     /// For tests, and for an app that seems to miss a pair. See [`Shadow`] for the cost.
     ///
     /// ```
+    /// # use rapier as rapier3d;
     /// use rapier_pbig::{PbigFinder, Shadow, differences};
     /// use rapier3d::prelude::BroadPhaseBvh;
     ///
@@ -90,7 +92,7 @@ impl<F> Shadowed<F> {
         let (events, removed) = (pair_events(events), removed(call));
         let is_modified = std::mem::take(&mut self.has_moved) || !call.modified.is_empty();
         let relative = if call.adaptive_margin { crate::MAX_ADAPTIVE_MARGIN } else { self.relative_margin };
-        let (margin, stock) = (relative * call.params.length_unit, stock.as_deref());
+        let (margin, stock) = (relative * to_f32(call.params.length_unit), stock.as_deref());
         let (removed, events) = (&removed[..], &events[..]);
         self.checker.watch(&Watched { view: call, margin, removed, is_modified, events, stock });
     }
@@ -217,6 +219,8 @@ impl Call<'_> {
 }
 
 impl View for Call<'_> {
+    type Aabb = Bounds;
+
     fn enabled(&self) -> Vec<Handle> {
         self.colliders.iter_enabled().map(|(each, _)| handle(each)).collect()
     }
@@ -224,7 +228,7 @@ impl View for Call<'_> {
     fn side(&self, wanted: Handle) -> Option<Side> {
         let collider = self.find(wanted)?;
         Some(Side {
-            aabb: self.aabb(wanted),
+            aabb: self.aabb(wanted).map(|aabb| aabb.to_f32()),
             parent: collider.parent().map(|body| body.into_raw_parts().into()),
             body_type: self.kind(collider),
             active_collision_types: collider.active_collision_types().bits(),
@@ -232,7 +236,7 @@ impl View for Call<'_> {
         })
     }
 
-    fn aabb(&self, wanted: Handle) -> Option<Aabb> {
+    fn aabb(&self, wanted: Handle) -> Option<Bounds> {
         let collider = self.find_enabled(wanted)?;
         Some(from_tree(&collider.compute_collision_aabb(self.params.prediction_distance() / 2.0)))
     }

@@ -1,9 +1,10 @@
-//! pbig for rapier3d 0.36.1: finds the pairs of colliders in place of rapier's own broad phase.
+//! pbig for rapier 0.36.1: finds the pairs of colliders in place of rapier's own broad phase.
 //!
 //! Rapier 0.36 has no interface for a broad phase of another crate. A small patch adds one; docs/RAPIER_VERSIONS.md of pbig has
 //! the command that applies it. Then one line changes, and the type of the broad phase stays:
 //!
 //! ```
+//! # use rapier as rapier3d;
 //! use rapier3d::prelude::*;
 //!
 //! let mut broad_phase = rapier_pbig::broad_phase(); // was: BroadPhaseBvh::new()
@@ -32,6 +33,9 @@
 //! It reports the pairs of colliders whose AABBs, with rapier's margin, overlap, and that rapier's filters admit. The order of
 //! events depends on the scene alone, not on the number of threads.
 //!
+//! The crates `rapier2d-pbig`, `rapier2d-f64-pbig`, `rapier3d-pbig` and `rapier3d-f64-pbig` are this source for the four crates of
+//! rapier. In f64 the pairs are those of boxes in f64, at any distance from the origin.
+//!
 //! | feature | adds |
 //! | --- | --- |
 //! | `parallel` (default) | several threads search |
@@ -42,10 +46,7 @@
 
 mod config;
 #[cfg(feature = "debug-render")]
-#[path = "../../../crates/rapier-pbig/src/debug_render.rs"]
 mod debug_render;
-#[cfg(feature = "debug-render")]
-mod draw;
 mod finder;
 mod scene;
 #[cfg(feature = "shadow")]
@@ -53,17 +54,17 @@ pub mod shadow;
 mod tree;
 
 pub use config::PbigConfig;
-#[cfg(feature = "debug-render")]
-pub use debug_render::DebugRenderParts;
 pub use finder::PbigFinder;
+#[cfg(feature = "debug-render")]
+pub use pbig_adapter::DebugRenderParts;
 pub use pbig_adapter::{Backend, Error, Handle, PairDevice, Report, Stats, Totals, Why};
 #[cfg(feature = "gpu")]
 pub use pbig_gpu::GpuFinder;
 #[cfg(feature = "shadow")]
 pub use shadow::{Shadow, differences};
 
-use rapier3d::geometry::{PairFinder, SceneQuery}; // missing? rapier3d is unpatched: pbig/docs/RAPIER_VERSIONS.md#errors
-use rapier3d::prelude::BroadPhaseBvh;
+use rapier::geometry::{PairFinder, SceneQuery}; // missing? rapier is unpatched: pbig/docs/RAPIER_VERSIONS.md#errors
+use rapier::prelude::BroadPhaseBvh;
 use std::any::Any;
 
 /// The margin of rapier's own broad phase, in units of `length_unit`.
@@ -71,6 +72,15 @@ const MARGIN: f32 = 0.04;
 
 /// The largest margin with `adaptive_change_detection_margin`, in units of `length_unit`.
 const MAX_ADAPTIVE_MARGIN: f32 = 0.25;
+
+/// An AABB in rapier's numbers.
+type Bounds = <rapier::math::Real as pbig_adapter::Scalar>::Aabb;
+
+#[inline(always)]
+#[allow(clippy::unnecessary_cast, reason = "rapier's numbers are f32 or f64")]
+fn to_f32(x: rapier::math::Real) -> f32 {
+    x as f32
+}
 
 /// Returns an empty broad phase in which pbig finds the pairs, in place of `BroadPhaseBvh::new()`.
 pub fn broad_phase() -> BroadPhaseBvh {
@@ -112,6 +122,7 @@ pub fn uninstall(broad_phase: &mut BroadPhaseBvh) {
 /// Returns true if pbig finds the pairs. A broad phase that was saved and restored has to be given pbig again: see [`install`].
 ///
 /// ```
+/// # use rapier as rapier3d;
 /// let mut broad_phase = rapier3d::prelude::BroadPhaseBvh::new();
 /// assert!(!rapier_pbig::is_installed(&broad_phase));
 /// rapier_pbig::install(&mut broad_phase);

@@ -1,13 +1,13 @@
 //! `PbigFinder`: translates rapier's calls into calls of the core.
 
 use crate::scene::{Call, handle, own_margin};
-use crate::tree::{ParryTree, from_tree, to_tree};
-use crate::{PairFinder, PbigConfig, SceneQuery};
-use pbig_adapter::{Colliders, Error, HandlePair, PairDevice, PairEvent, Stats, Why};
-use rapier3d::math::Real;
-use rapier3d::parry::bounding_volume::Aabb as TreeAabb;
-use rapier3d::parry::partitioning::Bvh;
-use rapier3d::prelude::{
+use crate::tree::{ParryTree, from_tree, spatial, to_tree};
+use crate::{Bounds, PairFinder, PbigConfig, SceneQuery, to_f32};
+use pbig_adapter::{Bounds as _, Colliders, Error, HandlePair, PairDevice, PairEvent, Stats, Why};
+use rapier::math::Real;
+use rapier::parry::bounding_volume::Aabb as TreeAabb;
+use rapier::parry::partitioning::Bvh;
+use rapier::prelude::{
     BroadPhasePairEvent, ColliderHandle, ColliderPair, ColliderSet, IntegrationParameters, RigidBodySet,
 };
 
@@ -53,6 +53,11 @@ impl PbigFinder {
         Self::with_device(config, Box::new(gpu))
     }
 
+    /// Uses this device in later updates, in place of the one in use.
+    pub fn set_device(&mut self, device: Box<dyn PairDevice>) {
+        self.colliders.set_device(device);
+    }
+
     /// Returns the name of the device in use.
     pub fn device_name(&self) -> Option<&str> {
         self.colliders.core().device_name()
@@ -89,15 +94,15 @@ impl PbigFinder {
     }
 }
 
-fn to_query(query: &SceneQuery) -> pbig_adapter::SceneQuery {
+fn to_query(query: &SceneQuery) -> pbig_adapter::SceneQuery<Bounds, Real> {
     use pbig_adapter::SceneQuery as Query;
     match *query {
         SceneQuery::Ray(ray, time) => {
-            let origin = ray.origin.into();
-            Query::Sweep(pbig_adapter::Aabb::new(origin, origin), ray.dir.into(), time)
+            let origin = spatial(ray.origin);
+            Query::Sweep(Bounds::from_corners(origin, origin), spatial(ray.dir), time)
         }
-        SceneQuery::Sweep(aabb, velocity, time) => Query::Sweep(from_tree(&aabb), velocity.into(), time),
-        SceneQuery::Near(point, distance) => Query::Near(point.into(), distance),
+        SceneQuery::Sweep(aabb, velocity, time) => Query::Sweep(from_tree(&aabb), spatial(velocity), time),
+        SceneQuery::Near(point, distance) => Query::Near(spatial(point), distance),
         SceneQuery::Overlap(aabb) => Query::Overlap(from_tree(&aabb)),
     }
 }
@@ -131,7 +136,7 @@ impl PairFinder for PbigFinder {
         let (modified, removed) = (modified_colliders, removed_colliders);
         let call = Call { params, adaptive_margin, colliders, bodies, modified, removed };
         if !self.colliders.skips(&call) {
-            let margin = self.relative_margin * params.length_unit;
+            let margin = self.relative_margin * to_f32(params.length_unit);
             self.colliders.update(&call, margin, |event| events.push(to_event(event)));
         }
     }
@@ -142,7 +147,7 @@ impl PairFinder for PbigFinder {
         adaptive_margin: bool,
         aabbs: &[(ColliderHandle, TreeAabb)],
     ) {
-        let unit = params.length_unit;
+        let unit = to_f32(params.length_unit);
         let moved = aabbs.iter().map(|&(moved, aabb)| {
             let aabb = from_tree(&aabb);
             (handle(moved), aabb, adaptive_margin.then(|| own_margin(&aabb, unit)))

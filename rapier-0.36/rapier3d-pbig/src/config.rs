@@ -5,6 +5,7 @@ use pbig_core::{Backend, Limits};
 /// The settings of a [`crate::PbigFinder`].
 ///
 /// ```
+/// # use rapier as rapier3d;
 /// use rapier_pbig::PbigConfig;
 /// use rapier3d::prelude::BroadPhaseBvh;
 /// let mut broad_phase = BroadPhaseBvh::new();

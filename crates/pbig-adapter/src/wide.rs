@@ -1,0 +1,312 @@
+//! Worlds in f64. The fat AABBs are kept in f64. The core gets them relative to a centre, rounded outward to f32, so it finds
+//! a superset of the pairs. A *candidate* is a pair of the core; it is a pair of the world while its f64 boxes overlap.
+//!
+//! So the pairs are exactly those whose f64 boxes overlap, wherever the centre is. Two boxes can meet without a new event of
+//! the core: the update tests all candidates of changed boxes.
+
+use crate::bounds::{Bounds, Boxes, Scalar};
+use crate::{SceneQuery, policy};
+use pbig_core::{Aabb, BroadPhase, Error, Events, Pair, ProxyFilter};
+use std::collections::HashSet;
+
+/// A closed AABB in f64. It is valid if `min <= max` on all axes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct WideAabb {
+    /// The lower corner.
+    pub min: [f64; 3],
+    /// The upper corner.
+    pub max: [f64; 3],
+}
+
+impl WideAabb {
+    fn is_valid(&self) -> bool {
+        (0..3).all(|k| self.min[k] <= self.max[k])
+    }
+
+    fn inflated(&self, reach: f64) -> Self {
+        Self { min: self.min.map(|x| x - reach), max: self.max.map(|x| x + reach) }
+    }
+
+    /// Returns true if the gaps to a box around it are from 0 to `slack` on all sides. Equal infinities have no gap.
+    fn is_held_by(&self, outer: &Self, slack: f64) -> bool {
+        let is_gap = |low: f64, high: f64| low == high || (0.0..=slack).contains(&(high - low));
+        (0..3).all(|k| is_gap(outer.min[k], self.min[k]) && is_gap(self.max[k], outer.max[k]))
+    }
+}
+
+impl Scalar for f64 {
+    type Aabb = WideAabb;
+}
+
+impl Bounds for WideAabb {
+    type Real = f64;
+    type Boxes = WideBoxes;
+    const NOWHERE: Self = Self { min: [f64::NAN; 3], max: [f64::NAN; 3] };
+
+    fn from_corners(min: [f64; 3], max: [f64; 3]) -> Self {
+        Self { min, max }
+    }
+
+    fn corners(&self) -> [[f64; 3]; 2] {
+        [self.min, self.max]
+    }
+
+    fn overlaps(&self, other: &Self) -> bool {
+        (0..3).all(|k| self.min[k] <= other.max[k] && other.min[k] <= self.max[k])
+    }
+
+    fn gap(&self, other: &Self, axis: usize) -> f32 {
+        (self.min[axis] - other.max[axis]).max(other.min[axis] - self.max[axis]) as f32
+    }
+
+    fn grown(&self, reach: f32) -> Self {
+        let grown = self.inflated(reach.into());
+        Self { min: grown.min.map(f64::next_down), max: grown.max.map(f64::next_up) }
+    }
+
+    fn to_f32(&self) -> Aabb {
+        Aabb::from_f64(self.min, self.max)
+    }
+}
+
+/// The boxes of a world in f64.
+#[derive(Clone, Debug, Default)]
+pub struct WideBoxes {
+    /// Fat AABBs by id.
+    boxes: Vec<WideAabb>,
+    margin: f32,
+    /// The origin of the core's coordinates.
+    centre: [f64; 3],
+    /// Boxes that were set since the centre was last considered, and the number at which it is considered again.
+    set: usize,
+    consider_at: usize,
+    /// Ids of boxes that have changed since the last update, repeated or not.
+    changed: Vec<u32>,
+    has_removed: bool,
+    /// Candidates whose f64 boxes do not overlap.
+    apart: HashSet<Pair>,
+    events: Events,
+}
+
+impl WideBoxes {
+    fn get(&self, id: u32) -> WideAabb {
+        self.boxes.get(id as usize).copied().unwrap_or(WideAabb::NOWHERE)
+    }
+
+    /// Returns the fat AABB of a box: the stored one if it still holds the box.
+    fn fatten(&self, id: u32, aabb: &WideAabb) -> WideAabb {
+        let (fat, margin) = (self.get(id), f64::from(self.margin));
+        if !aabb.is_valid() {
+            WideAabb::NOWHERE
+        } else if aabb.is_held_by(&fat, 2.0 * margin) {
+            fat
+        } else {
+            aabb.inflated(margin)
+        }
+    }
+
+    fn store(&mut self, id: u32, fat: WideAabb) {
+        let i = id as usize;
+        if self.boxes.len() <= i {
+            self.boxes.resize(i + 1, WideAabb::NOWHERE);
+        }
+        if self.boxes[i] != fat && (self.boxes[i].is_valid() || fat.is_valid()) {
+            self.changed.push(id);
+        }
+        self.boxes[i] = fat;
+        self.set += 1;
+    }
+
+    /// Returns the core's box. Subtraction rounds, but monotonically, so boxes that overlap still do. The box reaches one unit in the
+    /// last place further: queries round their directions.
+    fn to_core(&self, aabb: &WideAabb) -> Aabb {
+        let relative = |corner: [f64; 3]| std::array::from_fn(|k| corner[k] - self.centre[k]);
+        let rounded = Aabb::from_f64(relative(aabb.min), relative(aabb.max));
+        Aabb::new(rounded.min.map(f32::next_down), rounded.max.map(f32::next_up))
+    }
+
+    fn limit(&self) -> f64 {
+        f64::from(self.margin) * policy::FAR_MARGINS
+    }
+
+    fn is_far(&self, aabb: &WideAabb, limit: f64) -> bool {
+        (0..3).any(|k| (aabb.min[k] - self.centre[k]).abs() > limit)
+    }
+
+    /// Returns the median of the lower corners, rounded so that a world in motion keeps its centre. Half-spaces do not count.
+    fn median(&self) -> [f64; 3] {
+        let places = self
+            .boxes
+            .iter()
+            .filter(|aabb| aabb.is_valid() && aabb.to_f32().min.iter().all(|x| x.is_finite()));
+        let mut corners: Vec<_> = places.map(|aabb| aabb.min).collect();
+        if corners.is_empty() {
+            return self.centre;
+        }
+        let (middle, grid) = (corners.len() / 2, self.limit());
+        std::array::from_fn(|k| {
+            let median = corners.select_nth_unstable_by(middle, |a, b| a[k].total_cmp(&b[k])).1[k];
+            if grid > 0.0 { (median / grid).round() * grid } else { median }
+        })
+    }
+
+    /// Tests the candidates that are new or have changed.
+    fn test_candidates(&mut self, core: &BroadPhase) {
+        self.changed.sort_unstable();
+        self.changed.dedup();
+        let is_few = self.changed.len() * policy::WIDE_LOOKUPS < core.id_count() as usize;
+        let mut tested: Vec<Pair> = if is_few {
+            self.changed.iter().flat_map(|&id| core.pairs_of(id)).collect()
+        } else {
+            core.pairs().collect()
+        };
+        tested.extend(&core.events().added);
+        tested.into_iter().for_each(|pair| self.test(pair));
+    }
+
+    fn test(&mut self, pair: Pair) {
+        if !self.get(pair.a).overlaps(&self.get(pair.b)) {
+            if self.apart.insert(pair) {
+                self.events.removed.push(pair);
+            }
+        } else if !self.apart.is_empty() && self.apart.remove(&pair) {
+            self.events.added.push(pair);
+        }
+    }
+}
+
+impl Boxes<WideAabb> for WideBoxes {
+    /// The core's margin is 0: the boxes that it gets are fat.
+    fn set_margin(&mut self, core: &mut BroadPhase, margin: f32) -> Result<(), Error> {
+        core.set_margin(margin)?;
+        self.margin = margin;
+        core.set_margin(0.0)
+    }
+
+    fn margin(&self, _: &BroadPhase) -> f32 {
+        self.margin
+    }
+
+    fn set(
+        &mut self,
+        core: &mut BroadPhase,
+        id: u32,
+        aabb: WideAabb,
+        filter: ProxyFilter,
+    ) -> Result<(), Error> {
+        let fat = self.fatten(id, &aabb);
+        core.set(id, self.to_core(&fat), filter)?;
+        self.store(id, fat);
+        Ok(())
+    }
+
+    fn set_aabb(&mut self, core: &mut BroadPhase, id: u32, aabb: WideAabb) -> bool {
+        let fat = self.fatten(id, &aabb);
+        let has_box = core.set_aabb(id, self.to_core(&fat));
+        if has_box {
+            self.store(id, fat);
+        }
+        has_box
+    }
+
+    fn remove(&mut self, core: &mut BroadPhase, id: u32) {
+        if core.remove(id) {
+            self.store(id, WideAabb::NOWHERE);
+            self.has_removed = true;
+        }
+    }
+
+    fn clear(&mut self, core: &mut BroadPhase) {
+        core.clear();
+        *self = Self { margin: self.margin, ..Self::default() };
+    }
+
+    fn fat(&self, _: &BroadPhase, id: u32) -> Option<WideAabb> {
+        Some(self.get(id)).filter(WideAabb::is_valid)
+    }
+
+    fn changes<'a>(&'a self, core: &'a BroadPhase) -> &'a [u32] {
+        if self.changed.is_empty() { core.changes() } else { &self.changed }
+    }
+
+    /// Chooses another centre if more than half of the boxes are far from the present one. The choice reads all boxes, so it waits
+    /// until a few times as many boxes have been set.
+    fn settle(&mut self, core: &mut BroadPhase) {
+        if self.set < self.consider_at {
+            return;
+        }
+        let (limit, count) = (self.limit(), core.len());
+        (self.set, self.consider_at) = (0, count * policy::CENTRE_SETS_PER_BOX);
+        let far = self.boxes.iter().filter(|aabb| aabb.is_valid() && self.is_far(aabb, limit)).count();
+        let centre = if 2 * far > count { self.median() } else { self.centre };
+        if centre != self.centre {
+            self.centre = centre;
+            for id in 0..core.id_count() {
+                core.set_aabb(id, self.to_core(&self.get(id)));
+            }
+        }
+    }
+
+    fn update<'a>(&'a mut self, core: &'a mut BroadPhase) -> Result<&'a Events, Error> {
+        self.events = Events::default();
+        let found = core.update()?;
+        for pair in &found.removed {
+            if !self.apart.remove(pair) {
+                self.events.removed.push(*pair);
+            }
+        }
+        // Apart until they are tested.
+        self.apart.extend(&found.added);
+        self.test_candidates(core);
+        self.changed.clear();
+        if std::mem::take(&mut self.has_removed) {
+            self.apart.retain(|pair| core.has_pair(*pair));
+        }
+        self.events.added.sort_unstable();
+        self.events.removed.sort_unstable();
+        Ok(&self.events)
+    }
+
+    fn admits(&self, pair: &Pair) -> bool {
+        !self.apart.contains(pair)
+    }
+
+    fn pair_count(&self, core: &BroadPhase) -> usize {
+        core.pair_count() - self.apart.iter().filter(|pair| core.has_pair(**pair)).count()
+    }
+
+    fn widen(&self, aabb: Aabb) -> WideAabb {
+        let absolute = |corner: [f32; 3]| std::array::from_fn(|k| f64::from(corner[k]) + self.centre[k]);
+        WideAabb { min: absolute(aabb.min), max: absolute(aabb.max) }
+    }
+
+    /// A direction that f32 cannot hold meets everything.
+    fn narrow(&self, query: &SceneQuery<WideAabb, f64>) -> SceneQuery {
+        match *query {
+            SceneQuery::Sweep(start, velocity, time) => {
+                let velocity = velocity.map(|x| x as f32);
+                if !velocity.iter().all(|x| x.is_finite()) {
+                    return SceneQuery::Overlap(Aabb::new([f32::NEG_INFINITY; 3], [f32::INFINITY; 3]));
+                }
+                SceneQuery::Sweep(self.to_core(&start), velocity, self.narrow_bound(time))
+            }
+            SceneQuery::Near(point, distance) => {
+                let at = std::array::from_fn(|k| (point[k] - self.centre[k]) as f32);
+                SceneQuery::Near(at, self.narrow_bound(distance))
+            }
+            SceneQuery::Overlap(aabb) => SceneQuery::Overlap(self.to_core(&aabb)),
+        }
+    }
+
+    fn is_met(&self, query: &SceneQuery<WideAabb, f64>, id: u32) -> bool {
+        !matches!(query, SceneQuery::Overlap(aabb) if !self.get(id).overlaps(aabb))
+    }
+
+    /// A millionth more than the bound covers the rounding of the query to f32.
+    fn narrow_bound(&self, bound: f64) -> f32 {
+        ((bound * (1.0 + 1e-6)) as f32).next_up()
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,76 @@
+//! The parts of a world that differ between two and three dimensions: three.
+
+use crate::world::{real, to_vector};
+use glam::{Quat, Vec3};
+use pbig_scenes::plan::JointKind;
+use rapier::math::{AngVector, Real, Rotation};
+use rapier::parry::utils::Array2;
+use rapier::prelude::*;
+
+/// Returns a rotation, bit by bit. The builders' own `rotation` takes an angle, of which rapier computes the sine and the cosine
+/// as the platform does.
+pub fn rotation(turn: Quat) -> Rotation {
+    let [x, y, z, w] = turn.to_array().map(real);
+    Rotation::from_xyzw(x, y, z, w)
+}
+
+/// Returns the numbers of a rotation.
+pub fn parts(turn: &Rotation) -> [Real; 4] {
+    [turn.x, turn.y, turn.z, turn.w]
+}
+
+/// Returns an angular velocity.
+pub fn angular(velocity: Vec3) -> AngVector {
+    to_vector(velocity)
+}
+
+/// Returns a cuboid, by half its extents.
+pub fn cuboid(half: Vec3) -> SharedShape {
+    let [x, y, z] = half.to_array().map(real);
+    SharedShape::cuboid(x, y, z)
+}
+
+pub(crate) fn round_cuboid(half: Vec3, radius: f32) -> SharedShape {
+    let [x, y, z] = half.to_array().map(real);
+    SharedShape::round_cuboid(x, y, z, real(radius))
+}
+
+pub(crate) fn cylinder(half: f32, radius: f32) -> SharedShape {
+    SharedShape::cylinder(real(half), real(radius))
+}
+
+pub(crate) fn heightfield(side: usize, heights: &[f32], scale: Vec3) -> SharedShape {
+    let heights = heights.iter().copied().map(real).collect();
+    SharedShape::heightfield(Array2::new(side, side, heights), to_vector(scale))
+}
+
+/// Returns a cube that bends, by half its edge.
+pub(crate) fn soft_cube(at: Vec3, half: f32) -> SoftBodyBuilder {
+    SoftBodyBuilder::cuboid(to_vector(at), Vector::splat(real(half)), 3, 3, 3)
+}
+
+pub(crate) fn kilogramme() -> MassProperties {
+    MassProperties::new(Vector::ZERO, 1.0, Vector::ONE)
+}
+
+pub(crate) fn keeping_z(body: RigidBodyBuilder) -> RigidBodyBuilder {
+    body.enabled_translations(true, true, false)
+}
+
+/// Returns a joint.
+pub fn joint(kind: JointKind) -> GenericJoint {
+    match kind {
+        JointKind::Socket(most) => {
+            let axes = [JointAxis::AngX, JointAxis::AngY, JointAxis::AngZ].into_iter();
+            let axes = axes.filter(|_| most.is_some());
+            let most = real(most.unwrap_or_default());
+            axes.fold(SphericalJointBuilder::new(), |joint, axis| joint.limits(axis, [-most, most])).into()
+        }
+        JointKind::Hinge(axis, limits) => {
+            RevoluteJointBuilder::new(to_vector(axis)).limits(limits.map(real)).into()
+        }
+        JointKind::Pull(pull) => {
+            crate::build::pull(&[JointAxis::LinX, JointAxis::LinY, JointAxis::LinZ], pull)
+        }
+    }
+}

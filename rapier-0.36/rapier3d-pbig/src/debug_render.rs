@@ -1,0 +1,85 @@
+//! Draws the broad phase through rapier's debug renderer.
+
+use crate::PbigFinder;
+use crate::finder::to_handle;
+use crate::tree::to_tree;
+use pbig_adapter::DebugRenderParts;
+use rapier::math::{Pose, Vector};
+use rapier::parry::bounding_volume::Aabb as DrawnAabb;
+use rapier::pipeline::{DebugRenderBackend, DebugRenderObject};
+use rapier::prelude::ColliderSet;
+
+impl PbigFinder {
+    /// Draws the stored boxes and cells as lines, through the renderer that also draws rapier's own pictures. Each is passed as
+    /// a [`DebugRenderObject::ColliderAabb`], a cell with the first collider in it. Few boxes have no cells, because
+    /// they need no grid. A GPU shows no cells.
+    pub fn debug_render(
+        &self,
+        colliders: &ColliderSet,
+        parts: DebugRenderParts,
+        backend: &mut dyn DebugRenderBackend,
+    ) {
+        for drawn in self.colliders.drawn(parts, |handle| colliders.contains(to_handle(handle))) {
+            let (handle, aabb) = (to_handle(drawn.collider), to_tree(&drawn.aabb));
+            let object = DebugRenderObject::ColliderAabb(handle, &colliders[handle], &aabb);
+            if backend.filter_object(object) {
+                let edges = DrawnAabb::EDGES_VERTEX_IDS.map(|(a, b)| [a as u32, b as u32]);
+                let (pose, scale) = (Pose::IDENTITY, Vector::ONE);
+                backend.draw_polyline(object, &aabb.vertices(), &edges, &pose, scale, drawn.color);
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rapier::prelude::*;
+
+    #[derive(Default)]
+    struct Canvas {
+        lines: usize,
+        longest: Real,
+    }
+
+    impl DebugRenderBackend for Canvas {
+        fn draw_line(&mut self, _: DebugRenderObject, a: Vector, b: Vector, _: DebugColor) {
+            self.lines += 1;
+            self.longest = self.longest.max(a.distance(b));
+        }
+    }
+
+    #[test]
+    fn boxes_and_cells_are_drawn_with_all_their_edges() {
+        let (mut colliders, bodies) = (ColliderSet::new(), RigidBodySet::new());
+        let (side, edges) = if DIM == 2 { (32_u32, 4) } else { (8, 12) };
+        let along = |i: u32, k: usize| 5.0 * (i / side.pow(k as u32) % side) as Real;
+        let at = |i: u32| Vector::from(std::array::from_fn::<Real, DIM, _>(|k| along(i, k)));
+        let ball = |i| ColliderBuilder::ball(0.5).translation(at(i));
+        let all: Vec<_> = (0..512).map(|i| colliders.insert(ball(i))).collect();
+        let mut broad_phase = crate::broad_phase();
+        let params = IntegrationParameters::default();
+        broad_phase.update(&params, &colliders, &bodies, &all, &[], &mut Vec::new());
+        let finder = crate::finder(&broad_phase).unwrap();
+        let [boxes, cells] = [true, false].map(|fat_boxes| {
+            let mut canvas = Canvas::default();
+            let parts = DebugRenderParts { fat_boxes, cells: !fat_boxes };
+            finder.debug_render(&colliders, parts, &mut canvas);
+            canvas
+        });
+        assert_eq!(boxes.lines, 512 * edges);
+        // On each side the margin, and half the prediction distance of 2 cm.
+        let edge = 1.0 + 2.0 * (crate::MARGIN + crate::to_f32(params.prediction_distance()) / 2.0);
+        assert!(
+            (crate::to_f32(boxes.longest) - edge).abs() < 1e-4,
+            "a ball with its margins: {}",
+            boxes.longest
+        );
+        assert!(
+            cells.lines % edges == 0 && cells.lines > edges && cells.lines <= 512 * edges,
+            "{}",
+            cells.lines
+        );
+        assert!(cells.longest > boxes.longest, "a box fits into a cell");
+    }
+}
