@@ -1,6 +1,6 @@
 //! The questions that decide about a contact for an overlapping pair: avian's own, in avian's order.
 
-use crate::boxes::{Boxes, Slot};
+use crate::boxes::{ColliderBoxes, Slot};
 use avian::collider_tree::{ColliderTreeProxy, ColliderTreeProxyFlags, ColliderTreeType, ColliderTrees};
 use avian::dynamics::joints::joint_graph::JointGraph;
 use avian::prelude::*;
@@ -16,7 +16,7 @@ pub(crate) struct Ask<'a, H> {
 
 impl<'a, H: CollisionHooks> Ask<'a, H> {
     /// Returns the proxies of a pair, in avian's order, if avian would look at the pair in this update.
-    pub(crate) fn proxies(&self, boxes: &Boxes, pair: Pair) -> Option<[&'a ColliderTreeProxy; 2]> {
+    pub(crate) fn proxies(&self, boxes: &ColliderBoxes, pair: Pair) -> Option<[&'a ColliderTreeProxy; 2]> {
         let [one, other] = [pair.a, pair.b].map(|id| &boxes.slots[id as usize]);
         let proxies = [self.trees.get_proxy(one.key)?, self.trees.get_proxy(other.key)?];
         let looks = [

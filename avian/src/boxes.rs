@@ -13,7 +13,7 @@ const NO_ID: u32 = u32::MAX;
 
 /// The boxes of all colliders, and the pairs between them.
 #[derive(Resource, Default)]
-pub struct Boxes {
+pub struct ColliderBoxes {
     broad_phase: BroadPhase,
     /// By id.
     pub(crate) slots: Vec<Slot>,
@@ -36,11 +36,11 @@ pub(crate) struct Slot {
     begun_in: u32,
 }
 
-/// Answers the key of a collider that takes part in collisions.
-pub(crate) type Keys<'w, 's> =
+/// The query for the proxies of colliders that take part in collisions.
+pub(crate) type ProxyKeys<'w, 's> =
     Query<'w, 's, &'static ColliderTreeProxyKey, Without<avian::prelude::ColliderDisabled>>;
 
-impl Boxes {
+impl ColliderBoxes {
     /// Returns a report of the last update.
     pub fn report(&self) -> &Report {
         self.broad_phase.report()
@@ -69,16 +69,17 @@ impl Boxes {
         trees: &ColliderTrees,
         moved: &MovedProxies,
         lost: &mut Lost,
-        keys: &Keys<'_, '_>,
+        keys: &ProxyKeys<'_, '_>,
     ) -> Result<(), Error> {
         self.update = self.update.wrapping_add(1);
-        self.begin_anew(trees, lost, keys)?;
+        // Avian names each proxy once. So all are set, whatever becomes of one of them.
+        let mut all = self.begin_anew(trees, lost, keys);
         for &key in moved.proxies() {
-            if let Some(id) = self.set(trees, key)? {
-                self.slots[id as usize].moved_in = self.update;
-            }
+            all = all.and(self.set(trees, key).map(|id| {
+                id.into_iter().for_each(|id| self.slots[id as usize].moved_in = self.update);
+            }));
         }
-        Ok(())
+        all
     }
 
     /// Removes the boxes of colliders that have lost their contacts, and sets those that still have a proxy.
@@ -86,23 +87,24 @@ impl Boxes {
         &mut self,
         trees: &ColliderTrees,
         lost: &mut Lost,
-        keys: &Keys<'_, '_>,
+        keys: &ProxyKeys<'_, '_>,
     ) -> Result<(), Error> {
         if lost.0.is_empty() {
             return Ok(());
         }
         let lost = std::mem::take(&mut lost.0);
         lost.iter().for_each(|&collider| self.remove(collider));
+        let mut all = Ok(());
         for collider in lost {
             let Ok(&key) = keys.get(collider) else { continue };
             if trees.get_proxy(key).is_some_and(|proxy| proxy.collider == collider) {
-                self.set(trees, key)?;
+                all = all.and(self.set(trees, key).map(|_| ()));
             }
         }
         let (now, slots) = (self.update, &self.slots);
         let is_old = |id: u32| slots[id as usize].begun_in != now;
         self.without_contact.retain(|pair| is_old(pair.a) && is_old(pair.b));
-        Ok(())
+        all
     }
 
     /// Sets the box of a proxy, and returns its id. Returns none if the key is out of date.
@@ -153,13 +155,12 @@ impl Boxes {
         }
     }
 
-    /// Finds the pairs that have begun since the last update.
-    pub(crate) fn find(&mut self) -> Result<Vec<Pair>, Error> {
+    /// Appends the pairs that have begun since the last update.
+    pub(crate) fn find(&mut self, begun: &mut Vec<Pair>) -> Result<(), Error> {
         let events = self.broad_phase.update()?;
-        events.removed.iter().for_each(|pair| {
-            self.without_contact.remove(pair);
-        });
-        Ok(events.added.clone())
+        events.removed.iter().for_each(|pair| _ = self.without_contact.remove(pair));
+        begun.extend_from_slice(&events.added);
+        Ok(())
     }
 
     /// Returns true if the proxy with this id moved in this update.

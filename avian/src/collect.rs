@@ -1,7 +1,7 @@
 //! The system that adds contacts for the pairs that pbig finds.
 
 use crate::ask::Ask;
-use crate::boxes::{Boxes, Keys};
+use crate::boxes::{ColliderBoxes, ProxyKeys};
 use crate::lost::Lost;
 use avian::collider_tree::{ColliderTreeProxy, ColliderTreeProxyFlags, ColliderTrees, MovedProxies};
 use avian::collision::CollisionDiagnostics;
@@ -13,34 +13,35 @@ use bevy::platform::time::Instant;
 use bevy::prelude::*;
 use pbig_core::{Error, Pair};
 
-/// What a search reads.
+/// The parts of a world that a step of the broad phase reads.
 #[derive(SystemParam)]
-pub(crate) struct World<'w, 's> {
+pub(crate) struct StepInput<'w, 's> {
     pub(crate) trees: Res<'w, ColliderTrees>,
     pub(crate) moved: Res<'w, MovedProxies>,
     pub(crate) joints: Res<'w, JointGraph>,
-    keys: Keys<'w, 's>,
+    keys: ProxyKeys<'w, 's>,
     lost: ResMut<'w, Lost>,
 }
 
-impl World<'_, '_> {
-    /// Brings the boxes up to date, and returns the pairs to ask about, in the order of their ids: those that have begun, and those
+impl StepInput<'_, '_> {
+    /// Brings the boxes up to date, and lists the pairs to ask about, in the order of their ids: those that have begun, and those
     /// without a contact.
-    pub(crate) fn candidates(&mut self, boxes: &mut Boxes) -> Result<Vec<Pair>, Error> {
-        boxes.follow(&self.trees, &self.moved, &mut self.lost, &self.keys)?;
-        let mut pairs = boxes.find()?;
-        if !self.moved.proxies().is_empty() {
+    pub(crate) fn candidates(&mut self, boxes: &mut ColliderBoxes) -> (Vec<Pair>, Result<(), Error>) {
+        let followed = boxes.follow(&self.trees, &self.moved, &mut self.lost, &self.keys);
+        let mut pairs = Vec::new();
+        let found = boxes.find(&mut pairs);
+        if !self.moved.proxies().is_empty() && !boxes.without_contact.is_empty() {
             let has_moved = |pair: &&Pair| boxes.has_moved(pair.a) || boxes.has_moved(pair.b);
             pairs.extend(boxes.without_contact.iter().filter(has_moved));
             pairs.sort_unstable();
         }
-        Ok(pairs)
+        (pairs, followed.and(found))
     }
 }
 
 pub(crate) fn add_contacts<H: CollisionHooks + 'static>(
-    mut boxes: ResMut<Boxes>,
-    mut world: World,
+    mut boxes: ResMut<ColliderBoxes>,
+    mut input: StepInput,
     hooks: StaticSystemParam<H>,
     mut commands: Commands,
     mut graph: ResMut<ContactGraph>,
@@ -49,12 +50,11 @@ pub(crate) fn add_contacts<H: CollisionHooks + 'static>(
     for<'w, 's> SystemParamItem<'w, 's, H>: CollisionHooks,
 {
     let start = Instant::now();
-    match world.candidates(&mut boxes) {
-        Ok(pairs) => {
-            let ask = Ask { trees: &world.trees, joints: &world.joints, hooks: &hooks.into_inner() };
-            pairs.into_iter().for_each(|pair| add_contact(&ask, &mut boxes, pair, &mut graph, &mut commands));
-        }
-        Err(error) => error!("pbig: {error}; pairs that began in this step have no contact yet"),
+    let (pairs, done) = input.candidates(&mut boxes);
+    let ask = Ask { trees: &input.trees, joints: &input.joints, hooks: &hooks.into_inner() };
+    pairs.into_iter().for_each(|pair| add_contact(&ask, &mut boxes, pair, &mut graph, &mut commands));
+    if let Err(error) = done {
+        error!("pbig: {error}; some pairs that began in this step have no contact yet");
     }
     diagnostics.broad_phase += start.elapsed();
 }
@@ -62,7 +62,7 @@ pub(crate) fn add_contacts<H: CollisionHooks + 'static>(
 /// Adds a contact for a pair that is asked for and allowed; otherwise the pair waits until one of its colliders moves.
 fn add_contact<H: CollisionHooks>(
     ask: &Ask<'_, H>,
-    boxes: &mut Boxes,
+    boxes: &mut ColliderBoxes,
     pair: Pair,
     graph: &mut ContactGraph,
     commands: &mut Commands,

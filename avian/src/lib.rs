@@ -34,7 +34,7 @@ mod collect;
 mod lost;
 pub mod shadow;
 
-pub use boxes::Boxes;
+pub use boxes::ColliderBoxes;
 pub use pbig_core::{Error, Report};
 
 use avian::collision::broad_phase::BroadPhaseSystems;
@@ -85,6 +85,6 @@ where
 
 /// Adds the boxes, and the observers that tell which colliders have lost their contacts.
 fn follow_colliders(app: &mut App) {
-    app.init_resource::<Boxes>().init_resource::<lost::Lost>();
+    app.init_resource::<ColliderBoxes>().init_resource::<lost::Lost>();
     lost::add_observers(app);
 }

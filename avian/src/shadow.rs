@@ -1,14 +1,15 @@
 //! pbig beside avian's own broad phase, which stays in charge: each step, the pairs of both are compared.
 
 use crate::ask::Ask;
-use crate::boxes::Boxes;
-use crate::collect::World;
+use crate::boxes::ColliderBoxes;
+use crate::collect::StepInput;
 use avian::collider_tree::{ColliderTreeProxyKey, ColliderTreeSystems};
 use avian::collision::broad_phase::BroadPhaseSystems;
 use avian::prelude::*;
 use bevy::ecs::system::{StaticSystemParam, SystemParamItem};
 use bevy::platform::collections::HashSet;
 use bevy::prelude::*;
+use std::collections::BTreeSet;
 use std::marker::PhantomData;
 
 /// Compares the pairs of pbig with those of avian's own broad phase. Add it beside `BvhBroadPhasePlugin`, with the same hooks, and
@@ -34,9 +35,9 @@ pub struct Shadow {
     /// Contacts compared in all steps.
     pub compared: u64,
     /// Pairs that only avian's own broad phase has.
-    pub missing: Vec<(Entity, Entity)>,
+    pub missing: BTreeSet<(Entity, Entity)>,
     /// Pairs that only pbig has.
-    pub spurious: Vec<(Entity, Entity)>,
+    pub spurious: BTreeSet<(Entity, Entity)>,
 }
 
 impl<H: CollisionHooks + 'static> Plugin for ShadowPlugin<H>
@@ -57,8 +58,8 @@ where
 }
 
 fn compare<H: CollisionHooks + 'static>(
-    mut boxes: ResMut<Boxes>,
-    mut world: World,
+    mut boxes: ResMut<ColliderBoxes>,
+    mut input: StepInput,
     hooks: StaticSystemParam<H>,
     mut commands: Commands,
     graph: Res<ContactGraph>,
@@ -67,17 +68,17 @@ fn compare<H: CollisionHooks + 'static>(
 ) where
     for<'w, 's> SystemParamItem<'w, 's, H>: CollisionHooks,
 {
-    let candidates = match world.candidates(&mut boxes) {
-        Ok(pairs) => pairs,
-        Err(error) => return error!("pbig: {error}"),
-    };
-    let ask = Ask { trees: &world.trees, joints: &world.joints, hooks: &hooks.into_inner() };
+    let (candidates, done) = input.candidates(&mut boxes);
+    if let Err(error) = done {
+        error!("pbig: {error}");
+    }
+    let ask = Ask { trees: &input.trees, joints: &input.joints, hooks: &hooks.into_inner() };
     for pair in candidates {
         let [a, b] = [pair.a, pair.b].map(|id| boxes.slots[id as usize].collider);
         let has_contact = graph.contains(a, b);
         let is_wanted = ask.proxies(&boxes, pair).is_some_and(|proxies| ask.allows(proxies, &mut commands));
         if is_wanted && !has_contact {
-            shadow.spurious.push((a, b));
+            shadow.spurious.insert((a, b));
         }
         if has_contact {
             boxes.without_contact.remove(&pair);
@@ -89,8 +90,8 @@ fn compare<H: CollisionHooks + 'static>(
     for contact in graph.active_pairs().iter().chain(graph.sleeping_pairs()) {
         let (a, b) = ordered(contact.collider1, contact.collider2);
         shadow.compared += 1;
-        if !ours.contains(&(a, b)) && is_found(&world, &keys, a, b) {
-            shadow.missing.push((a, b));
+        if !ours.contains(&(a, b)) && is_found(&input, &keys, a, b) {
+            shadow.missing.insert((a, b));
         }
     }
 }
@@ -101,11 +102,11 @@ fn ordered(a: Entity, b: Entity) -> (Entity, Entity) {
 
 /// Returns true if avian would find the pair now, if both had moved. Contacts live on for a short distance; those of sleeping bodies
 /// also when layers no longer allow them.
-fn is_found(world: &World, keys: &Query<&ColliderTreeProxyKey>, a: Entity, b: Entity) -> bool {
+fn is_found(input: &StepInput, keys: &Query<&ColliderTreeProxyKey>, a: Entity, b: Entity) -> bool {
     let proxy = |collider: Entity| {
         let &key = keys.get(collider).ok()?;
-        let aabb = world.trees.tree_for_type(key.tree_type()).get_proxy_aabb(key.id())?;
-        Some((key, aabb, world.trees.get_proxy(key)?))
+        let aabb = input.trees.tree_for_type(key.tree_type()).get_proxy_aabb(key.id())?;
+        Some((key, aabb, input.trees.get_proxy(key)?))
     };
     let (Some((key, aabb, one)), Some((other_key, other_aabb, other))) = (proxy(a), proxy(b)) else {
         return false;

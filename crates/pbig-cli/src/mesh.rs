@@ -47,12 +47,24 @@ pub(crate) fn run(args: &Args, path: &Path) -> Result<(), Failure> {
     let elements = mesh.elements(next.as_ref().map(|(_, mesh)| mesh));
     let named = next.as_ref().map_or(path, |(path, _)| path);
     let elements = elements.map_err(|what| format!("{}: {what}", named.display()))?;
+    if args.strict {
+        refuse_invalid(path, &elements)?;
+    }
     let find_all = || args.elements.iter().map(|kinds| find(args, path, kinds, &elements)).collect();
     let all: Vec<Found> = with_threads(args.threads, find_all)?;
     if let Some(output) = &args.output {
         write(output, &all)?;
     }
     report(args, &elements, &all)
+}
+
+/// Refuses a vertex that is not finite in a frame.
+fn refuse_invalid(path: &Path, elements: &MeshElements) -> Result<(), Failure> {
+    let Some(vertex) = elements.vertices.boxes.iter().position(|aabb| !aabb.is_valid()) else {
+        return Ok(());
+    };
+    let what = "has a NaN; mend it, or leave out --strict";
+    Err(Failure::Input(format!("{}: vertex {vertex} (counted from 0) {what}", path.display())))
 }
 
 /// Checks the output before the work: `.npy` has no column for kinds.
@@ -133,9 +145,9 @@ fn report(args: &Args, elements: &MeshElements, all: &[Found]) -> Result<(), Fai
         return print(&counts.to_string());
     }
     let line = |found: &Found| {
-        let (kinds, Report { pairs, .. }, ms) = (&found.kinds.0, &found.report, &found.ms);
+        let (kinds, Report { pairs, invalid, .. }, ms) = (&found.kinds.0, &found.report, &found.ms);
         format!(
-            "\n{kinds}: {pairs} candidate pairs without a common vertex\n{ms}\n{}",
+            "\n{kinds}: {pairs} candidate pairs without a common vertex ({invalid} elements invalid)\n{ms}\n{}",
             plan_text(&found.report)
         )
     };

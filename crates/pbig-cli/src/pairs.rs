@@ -19,7 +19,7 @@ pub(crate) struct Args {
     #[arg(long, value_name = "OTHER")]
     with: Option<PathBuf>,
     /// A mesh in place of boxes, .ply or .obj: pairs of its elements that share no vertex.
-    #[arg(long, value_name = "FILE", conflicts_with_all = ["input", "with", "strict"], requires = "elements")]
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["input", "with"], requires = "elements")]
     mesh: Option<PathBuf>,
     /// The mesh a step later: boxes hold each element on its way there.
     #[arg(long, value_name = "FRAME", requires = "mesh")]
@@ -39,9 +39,9 @@ pub(crate) struct Args {
     /// Number of searches, for the times.
     #[arg(long, value_name = "K", default_value = "1", value_parser = whole::<usize>(1..=u64::MAX), allow_negative_numbers = true)]
     pub(crate) repeat: usize,
-    /// An invalid box (NaN, or min > max) is an error.
+    /// An invalid box (NaN, or min > max), or vertex of a mesh (NaN), is an error.
     #[arg(long)]
-    strict: bool,
+    pub(crate) strict: bool,
     /// Print one JSON object.
     #[arg(long)]
     pub(crate) json: bool,

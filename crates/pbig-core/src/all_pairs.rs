@@ -1,8 +1,9 @@
 //! All pairs of a list of boxes: by a grid, by a tree where a grid would test too many, or by testing every pair of a few.
 
 use crate::grid::{EditedGrid, GridPlan, Hits, Receiver, Rule, brute_force};
+use crate::holder::Holder;
 use crate::index::BoxIndex;
-use crate::outcome::{End, Outcome, Valid};
+use crate::outcome::{End, Outcome};
 use crate::pairs::{Grouping, Groups};
 use crate::parallel::available_threads;
 use crate::policy::{self, PARALLEL_FROM_BOXES, search};
@@ -16,26 +17,26 @@ pub(crate) struct Request<'a> {
     pub(crate) boxes: &'a [Aabb],
     /// By id; none if all may pair.
     pub(crate) filters: Option<&'a [ProxyFilter]>,
+    /// By id; none if boxes have no keys.
+    pub(crate) keys: Option<&'a [Keys]>,
+    /// None if pairs are listed.
+    pub(crate) receiver: Option<Receiver<'a>>,
     pub(crate) config: &'a Config,
     /// The groups by which found pairs are counted, for [`Groups::gather`]. Without one they are not counted.
     pub(crate) grouping: Option<Grouping>,
 }
 
-/// What a search of a finder can have besides.
-#[derive(Clone, Copy, Default)]
-pub(crate) struct Extras<'a> {
-    /// By id; none if boxes have no keys.
-    pub(crate) keys: Option<&'a [Keys]>,
-    /// None if pairs are listed.
-    pub(crate) receiver: Option<Receiver<'a>>,
-}
-
 impl<'a> Request<'a> {
+    /// Makes a search for all pairs of boxes, whose groups are not counted.
+    pub(crate) fn new(boxes: &'a [Aabb], config: &'a Config) -> Self {
+        Self { boxes, filters: None, keys: None, receiver: None, config, grouping: None }
+    }
+
     /// Returns the rule for pairs, which `found` counts.
-    pub(crate) fn rule(&self, extras: &Extras<'a>, found: &'a AtomicU64) -> Rule<'a> {
-        let Extras { keys, receiver } = *extras;
+    pub(crate) fn rule(&self, found: &'a AtomicU64) -> Rule<'a> {
+        let Self { filters, keys, receiver, .. } = *self;
         let max_pairs = if receiver.is_some() { u64::MAX } else { self.config.limits.pairs() };
-        Rule { filters: self.filters, keys, receiver, max_pairs, found }
+        Rule { filters, keys, receiver, max_pairs, found }
     }
 }
 
@@ -62,20 +63,10 @@ impl AllPairs {
 
     /// Leaves all pairs in `hits`, and the boxes in `store` unless they were too few.
     pub(crate) fn find(&mut self, request: &Request<'_>, store: &mut Store) -> Outcome {
-        self.find_with(request, &Extras::default(), store)
-    }
-
-    /// As [`AllPairs::find`], but for boxes with keys, or without a list.
-    pub(crate) fn find_with(
-        &mut self,
-        request: &Request<'_>,
-        extras: &Extras<'_>,
-        store: &mut Store,
-    ) -> Outcome {
         let mut outcome = Outcome::default();
         self.begin(request);
         let found = AtomicU64::new(0);
-        let rule = request.rule(extras, &found);
+        let rule = request.rule(&found);
         let may_be_brute = request.config.engine.is_none();
         let is_few = may_be_brute && request.boxes.len() <= policy::BRUTE_FORCE_UP_TO_BOXES;
         let brute = request.config.backend == Backend::Brute || is_few;
@@ -101,7 +92,7 @@ impl AllPairs {
         outcome.checks = Checks { made, unnecessary: made - overlaps, redundant: 0 };
         outcome.work = made + sum(|hits| hits.runs);
         if self.hits.iter().any(Hits::is_full) || self.count() > rule.max_pairs {
-            return Outcome { end: End::TooManyPairs, valid: Valid::Nothing, ..outcome };
+            return Outcome { end: End::TooManyPairs, holder: Holder::Nothing, ..outcome };
         }
         Outcome { end: End::Done, ..outcome }
     }
@@ -146,7 +137,7 @@ impl AllPairs {
         if is_grid {
             stage!("check");
             sorted.search(rule, &mut self.hits);
-            outcome.valid = Valid::Grid;
+            outcome.holder = Holder::Grid;
         }
         outcome.stages.check += clock.lap();
         outcome.plan = Plan::of_grid(Algorithm::Grid, &store.grid);
@@ -196,7 +187,7 @@ impl AllPairs {
             store.tree.find_pairs(rule, &mut self.hits);
         }
         outcome.stages.check += clock.lap();
-        outcome.valid = Valid::Tree;
+        outcome.holder = Holder::Tree;
         outcome.plan = Plan { algorithm: Algorithm::Tree, boxes: outcome.plan.boxes, ..Plan::default() };
     }
 
@@ -205,9 +196,7 @@ impl AllPairs {
         let workers = self.hits.len();
         groups.gather(grouping, &mut self.hits, workers)
     }
-}
 
-impl AllPairs {
     /// Takes pairs that a device has found, a list for each thread.
     pub(crate) fn take(&mut self, lists: Vec<Vec<Pair>>, grouping: Option<Grouping>) {
         let Grouping { count, shift, .. } = grouping.unwrap_or_default();

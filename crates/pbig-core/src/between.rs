@@ -1,7 +1,7 @@
 //! All pairs of a box of one set with a box of another one. Boxes that miss all of the other set are dropped first. The others are
 //! found by two grids, by a tree where a grid would test too many, or by testing every pair where one set is small.
 
-use crate::all_pairs::{AllPairs, Extras, Request};
+use crate::all_pairs::{AllPairs, Request};
 use crate::grid::{Across, GridPlan, Rule, TwoGrids, brute_force_across};
 use crate::index::BoxIndex;
 use crate::outcome::Outcome;
@@ -46,8 +46,8 @@ impl Sets {
         gather(&mut self.keys, keys, [NO_KEY; 4]);
     }
 
-    /// Lists the valid boxes of each set that overlap the bounds of the other, again and again while many are dropped: a set
-    /// that has lost boxes has smaller bounds.
+    /// Lists the valid boxes of each set that overlap the bounds of the other set. Repeats it while a quarter of the boxes is
+    /// dropped, because the bounds of the boxes that are left are smaller.
     fn list_near(&mut self, a: &[Aabb], b: &[Aabb]) {
         let (first, second) = (&mut self.ids, &mut self.second);
         first.clear();
@@ -67,7 +67,7 @@ impl Sets {
     }
 
     /// Returns the filters and keys by place in the list; none if no box has any.
-    fn rules(&self) -> (Option<&[ProxyFilter]>, Option<&[Keys]>) {
+    pub(crate) fn rules(&self) -> (Option<&[ProxyFilter]>, Option<&[Keys]>) {
         (
             Some(&self.filters[..]).filter(|all| !all.is_empty()),
             Some(&self.keys[..]).filter(|all| !all.is_empty()),
@@ -117,15 +117,13 @@ impl AllPairs {
     /// Leaves the pairs of two sets in `hits`, by place in their list, and what was done in the outcome.
     pub(crate) fn find_between(
         &mut self,
-        (request, sets): (&Request<'_>, &Sets),
-        extras: &Extras<'_>,
+        request: &Request<'_>,
+        sets: &Sets,
         store: &mut TwoSets,
     ) -> Outcome {
-        let (filters, keys) = sets.rules();
-        let (request, extras) = (&Request { filters, ..*request }, &Extras { keys, ..*extras });
         self.begin(request);
         let found = AtomicU64::new(0);
-        let rule = request.rule(extras, &found);
+        let rule = request.rule(&found);
         let mut outcome = Outcome::default();
         let few = sets.split.min(sets.boxes.len() - sets.split);
         let is_few = few <= FEW_BOXES || sets.boxes.len() <= BRUTE_FORCE_UP_TO_BOXES;

@@ -1,13 +1,13 @@
 //! `Finder`: all pairs of a list of boxes, with nothing kept between calls but memory.
 
-use crate::all_pairs::{AllPairs, Extras, Request, Store};
+use crate::all_pairs::{AllPairs, Request, Store};
 use crate::between::{Sets, TwoSets};
 use crate::device::{PairDevice, SearchRequest};
 use crate::device_slot::DeviceSlot;
 use crate::outcome::Outcome;
 use crate::pairs::{Grouping, Groups};
 use crate::report::{Clock, Report, stage};
-use crate::{Aabb, Backend, Boxes, Config, Error, Keys, Limits, Order, Pair, ProxyFilter, keys};
+use crate::{Aabb, Backend, Boxes, Config, Error, Keys, Limits, Order, Pair, ProxyFilter};
 
 mod between;
 mod for_each;
@@ -124,14 +124,10 @@ impl Finder {
         let grouping = is_sorted.then(|| Grouping::new(boxes.len()));
         // A copy, so that the finder is free for its backends.
         let config = self.config;
-        let request = Request { boxes, filters, config: &config, grouping };
-        let is_wanted = self.device.is_wanted(&self.config, boxes.len(), &mut self.report);
-        let is_found = is_wanted && self.find_on_device(&request)?;
-        if is_found {
-            self.drop_shared(keys);
-        } else {
-            let extras = Extras { keys, receiver: None };
-            let outcome = self.all_pairs.find_with(&request, &extras, &mut self.store);
+        let request = Request { filters, keys, grouping, ..Request::new(boxes, &config) };
+        let is_found = self.may_use_device(&request) && self.find_on_device(&request)?;
+        if !is_found {
+            let outcome = self.all_pairs.find(&request, &mut self.store);
             self.add(outcome)?;
             self.emit(grouping);
         }
@@ -149,23 +145,26 @@ impl Finder {
         Ok(())
     }
 
-    /// Drops pairs with a key in common: a device does not know keys.
-    fn drop_shared(&mut self, keys: Option<&[Keys]>) {
-        if let Some(keys) = keys {
-            self.pairs.retain(|pair| keys::are_apart(&keys[pair.a as usize], &keys[pair.b as usize]));
+    /// Returns true if a device is wanted for a list of pairs, and knows all that decides about them.
+    fn may_use_device(&mut self, request: &Request<'_>) -> bool {
+        if request.keys.is_some() {
+            self.note_no_device();
+            return false;
         }
+        self.device.is_wanted(&self.config, request.boxes.len(), &mut self.report)
     }
 
     /// Says in the report that a device was wanted for what no device does.
     fn note_no_device(&mut self) {
         if self.config.backend == Backend::Device {
-            self.report.fallback = Some("a device lists the pairs of one set: the CPU does the work".into());
+            self.report.fallback =
+                Some("a device lists the pairs of one set without keys: the CPU does the work".into());
         }
     }
 
     /// Returns true if a device has found the pairs.
     fn find_on_device(&mut self, request: &Request<'_>) -> Result<bool, Error> {
-        let Request { boxes, filters, config, grouping } = *request;
+        let Request { boxes, filters, config, grouping, .. } = *request;
         let (is_sorted, max_pairs) = (grouping.is_some(), config.limits.pairs());
         let request = SearchRequest { boxes, filters, is_sorted, max_pairs };
         let pairs = std::mem::take(&mut self.pairs);

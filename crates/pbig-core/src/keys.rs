@@ -1,4 +1,4 @@
-//! Keys: numbers that two boxes can have in common, such as the vertices of triangles. Boxes that do are no pair.
+//! Keys: numbers of boxes, such as the vertices of triangles. Two boxes with a key in common never pair.
 
 /// Up to four numbers of a box; [`NO_KEY`] where there are fewer.
 ///
@@ -8,9 +8,9 @@ pub type Keys = [u32; 4];
 /// An unused place in [`Keys`], which nothing has in common.
 pub const NO_KEY: u32 = u32::MAX;
 
-/// Returns true if two boxes have no key in common. Without a branch, so that the compiler compares four at once.
+/// Returns true if two boxes share no key. Without a branch, so that the compiler compares four at once.
 #[inline(always)]
-pub(crate) fn are_apart(one: &Keys, other: &Keys) -> bool {
+pub(crate) fn share_none(one: &Keys, other: &Keys) -> bool {
     let mut shared = [0; 4];
     for &key in one {
         for (shared, &other) in shared.iter_mut().zip(other) {
@@ -29,11 +29,11 @@ mod tests {
         for i in 0..4 {
             for j in 0..4 {
                 let (mut one, mut other) = ([NO_KEY; 4], [NO_KEY; 4]);
-                assert!(are_apart(&one, &other));
+                assert!(share_none(&one, &other));
                 (one[i], other[j]) = (7, 7);
-                assert!(!are_apart(&one, &other));
+                assert!(!share_none(&one, &other));
                 other[j] = 8;
-                assert!(are_apart(&one, &other));
+                assert!(share_none(&one, &other));
             }
         }
     }

@@ -66,6 +66,7 @@ mod error;
 mod filter;
 mod finder;
 mod grid;
+mod holder;
 mod index;
 mod keys;
 pub mod oracle;

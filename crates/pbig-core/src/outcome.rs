@@ -1,21 +1,9 @@
 //! The outcome of an engine or a search of all boxes, and how a report takes it.
 
+use crate::holder::Holder;
 use crate::plan::Plan;
 use crate::report::{Checks, DeviceReport, Report, StageTimes};
 use crate::{Config, Error};
-
-/// The structure that holds all boxes as of the last update. All others have expired.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub(crate) enum Valid {
-    #[default]
-    Nothing,
-    /// The lanes of a sweep.
-    Lanes,
-    Grid,
-    Tree,
-    /// The memory of a device.
-    Device,
-}
 
 /// The end of an engine.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -32,13 +20,13 @@ pub(crate) enum End {
 #[derive(Debug, Default)]
 pub(crate) struct Outcome {
     pub(crate) end: End,
-    pub(crate) valid: Valid,
+    pub(crate) holder: Holder,
     pub(crate) checks: Checks,
     pub(crate) work: u64,
     pub(crate) plan: Plan,
     pub(crate) stages: StageTimes,
-    /// The kept pairs are those of the update. Otherwise the events have to be applied to them.
-    pub(crate) has_kept: bool,
+    /// True if the engine has replaced the kept pairs. Otherwise the events have to be applied to them.
+    pub(crate) has_replaced_kept: bool,
     /// The report on the device that did the work.
     pub(crate) device: Option<DeviceReport>,
     /// The reason why a device could not do the work.
@@ -49,6 +37,7 @@ impl Report {
     /// Adds an outcome to those of engines that gave up before it. Returns true if the work is done, and false if it was given up.
     pub(crate) fn add(&mut self, outcome: Outcome, config: &Config) -> Result<bool, Error> {
         self.stages.add(&outcome.stages);
+        // Tests of an engine that gave up found nothing, but they were work.
         self.checks = outcome.checks;
         self.work += outcome.work;
         self.plan = Plan { no_device: self.plan.no_device, ..outcome.plan };

@@ -142,6 +142,7 @@ fn edges_of(face: &Keys) -> impl Iterator<Item = [u32; 2]> {
 /// Returns a face of three or four vertices.
 fn face(corners: &[u32]) -> Result<Keys, String> {
     match *corners {
+        _ if corners.contains(&NO_KEY) => Err(format!("vertex {NO_KEY} is too large a number")),
         [a, b, c] => Ok([a, b, c, NO_KEY]),
         [a, b, c, d] => Ok([a, b, c, d]),
         _ => Err(format!("{} vertices; divide it into triangles or quadrilaterals", corners.len())),
@@ -236,8 +237,8 @@ mod tests {
 
     #[test]
     fn obj_files_are_read_with_every_form_of_face() {
-        let text = "# a\no name\nv 0 0 0\nv 1 0 0\nv 0 1 0 1.0\nvn 0 0 1\nv 1 1 1\nf 1 2 3\nf 2//1 4//1 -2/5/1\nf 1 2 3 4\nusemtl x\n";
-        let mesh = read("a.obj", text.as_bytes()).expect("a mesh");
+        let text = b"# \xe4\no name\nv 0 0 0\nv 1 0 0\nv 0 1 0 1.0\nvn 0 0 1\nv 1 1 1\nf 1 2 3\nf 2//1 4//1 -2/5/1\nf 1 2 \\\n 3 4 # all\nusemtl x\n";
+        let mesh = read("a.obj", text).expect("a mesh");
         assert_eq!(mesh.vertices[3], [1.0; 3]);
         assert_eq!(mesh.faces, [[0, 1, 2, NO_KEY], [1, 3, 2, NO_KEY], [0, 1, 2, 3]]);
     }
@@ -259,12 +260,25 @@ mod tests {
                     .expect_err("no vertices"),
                 "no element `vertex`",
             ),
+            (
+                read(
+                    "a.ply",
+                    HEAD.replace("element face", "element junk 99999999999\nelement face").as_bytes(),
+                )
+                .expect_err("rows without bytes"),
+                "element `junk` has no property",
+            ),
             (obj("v 0 0 0\nv 1 zero 0\n"), "line 2: 'zero' is no number"),
             (obj("v 0 0\n"), "line 1: a vertex has three coordinates"),
             (obj("v 0 0 0\nf 1 1 2\n"), "face 0 (counted from 0): vertex 1 is none of the 1"),
             (obj("v 0 0 0\nf 1 1 0\n"), "line 2: '0' is no vertex"),
             (obj("v 0 0 0\nf 1 1 -2\n"), "line 2: '-2' is no vertex"),
             (obj("v 0 0 0\nf 1 1\n"), "line 2: 2 vertices"),
+            (obj("v 0 0 0\nf 1 1 4294967296\n"), "line 2: vertex 4294967295 is too large"),
+            (
+                read("a.ply", HEAD.replace("float z", "float w").as_bytes()).expect_err("no z"),
+                "no number `z`",
+            ),
             (obj("hello\n"), "no vertices"),
             (read("a.stl", b"").expect_err("another format"), "ends in .ply or .obj"),
         ] {

@@ -3,7 +3,7 @@
 use super::BroadPhase;
 use crate::device::PairDevice;
 use crate::device_slot::DeviceSlot;
-use crate::outcome::Valid;
+use crate::holder::Holder;
 use crate::{Backend, Config, Error, Limits, NoDevice};
 
 impl BroadPhase {
@@ -22,8 +22,8 @@ impl BroadPhase {
     pub fn set_device(&mut self, device: Box<dyn PairDevice>) {
         self.device = DeviceSlot::new(device);
         self.world.keep_old = usize::MAX;
-        if self.valid == Valid::Device {
-            self.valid = Valid::Nothing;
+        if self.holder == Holder::Device {
+            self.holder = Holder::Nothing;
         }
     }
 

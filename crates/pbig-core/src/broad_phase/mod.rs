@@ -18,7 +18,7 @@ mod world;
 use crate::all_pairs::Store;
 use crate::device_slot::DeviceSlot;
 use crate::finder::check_count;
-use crate::outcome::Valid;
+use crate::holder::Holder;
 use crate::pairs::{Comparison, Kept};
 use crate::policy;
 use crate::report::Report;
@@ -65,7 +65,7 @@ pub struct BroadPhase {
     device: DeviceSlot,
     world: World,
     /// The structure that holds the boxes of the last update.
-    valid: Valid,
+    holder: Holder,
     store: Store,
     /// Pairs that began or ended in the last update.
     last_events: usize,
@@ -167,8 +167,8 @@ impl BroadPhase {
         self.world.shrink();
         self.kept.shrink();
         (self.store, self.engines) = (Store::default(), Engines::default());
-        if self.valid != Valid::Device {
-            self.valid = Valid::Nothing;
+        if self.holder != Holder::Device {
+            self.holder = Holder::Nothing;
         }
         self.comparison.shrink();
         self.events.added.shrink_to_fit();

@@ -1,7 +1,7 @@
 //! Questions to a broad phase: its boxes, its pairs, and the report of the last update.
 
 use super::{BroadPhase, Events};
-use crate::outcome::Valid;
+use crate::holder::Holder;
 use crate::report::Report;
 use crate::{Aabb, Config, OccupiedCell, Pair, ProxyFilter};
 
@@ -102,10 +102,10 @@ impl BroadPhase {
     /// Returns the occupied cells of the grid, or the leaves of the tree, for pictures. There are none if the last update needed
     /// neither or ran on a GPU. Takes time and memory in proportion to the cells.
     pub fn cells(&self) -> Vec<OccupiedCell> {
-        match self.valid {
-            Valid::Grid => self.store.grid.occupied_cells(),
-            Valid::Tree => self.store.tree.occupied_leaves(),
-            Valid::Nothing | Valid::Lanes | Valid::Device => Vec::new(),
+        match self.holder {
+            Holder::Grid => self.store.grid.occupied_cells(),
+            Holder::Tree => self.store.tree.occupied_leaves(),
+            Holder::Nothing | Holder::Lanes | Holder::Device => Vec::new(),
         }
     }
 
@@ -135,7 +135,7 @@ impl BroadPhase {
     /// Answers [`BroadPhase::overlapping`] from the grid. Returns false, and finds nothing, if there is no grid of all boxes: the
     /// last update used none, or boxes have changed since.
     pub fn overlapping_in_grid(&self, aabb: &Aabb, found: &mut dyn FnMut(u32)) -> bool {
-        let has_grid = self.valid == Valid::Grid && self.world.changed.is_empty();
+        let has_grid = self.holder == Holder::Grid && self.world.changed.is_empty();
         if has_grid && aabb.is_valid() {
             self.store.grid.overlapping(aabb, found);
         }

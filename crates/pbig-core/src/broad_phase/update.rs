@@ -2,7 +2,8 @@
 
 use super::engines::{self, Task};
 use super::{BroadPhase, Events};
-use crate::outcome::{End, Outcome, Valid};
+use crate::holder::Holder;
+use crate::outcome::{End, Outcome};
 use crate::policy::{self, Counts};
 use crate::report::Clock;
 use crate::{Backend, Engine, Error, Plan};
@@ -44,7 +45,8 @@ impl BroadPhase {
         }
         if !self.take(outcome)? {
             let outcome = self.run(Engine::Rebuild);
-            self.take(outcome)?;
+            let is_done = self.take(outcome)?;
+            debug_assert!(is_done, "a rebuild never gives up");
         }
         Ok(())
     }
@@ -58,7 +60,7 @@ impl BroadPhase {
             ids: self.world.ids(),
             changed: self.world.changed.len(),
             knows_old: self.world.knows_old(),
-            valid: self.valid,
+            holder: self.holder,
             spilled: self.store.grid.spilled(),
             events: self.last_events,
         };
@@ -70,22 +72,22 @@ impl BroadPhase {
     }
 
     fn run(&mut self, engine: Engine) -> Outcome {
-        let Self { world, config, valid, store, kept, comparison: events, .. } = self;
-        self.engines.run(engine, &mut Task { world, config, valid: *valid, store, kept, events })
+        let Self { world, config, holder, store, kept, comparison: events, .. } = self;
+        self.engines.run(engine, &mut Task { world, config, holder: *holder, store, kept, events })
     }
 
     fn run_on_device(&mut self) -> Outcome {
-        let Self { world, config, valid, store, kept, comparison: events, .. } = self;
-        let mut task = Task { world, config, valid: *valid, store, kept, events };
+        let Self { world, config, holder, store, kept, comparison: events, .. } = self;
+        let mut task = Task { world, config, holder: *holder, store, kept, events };
         engines::device::run(&mut self.device, &mut task)
     }
 
     /// Adds an outcome to the report, and applies the events to the kept pairs. Returns false if the engine gave up.
     fn take(&mut self, outcome: Outcome) -> Result<bool, Error> {
-        let has_kept = outcome.has_kept;
-        self.valid = outcome.valid;
+        let has_replaced_kept = outcome.has_replaced_kept;
+        self.holder = outcome.holder;
         let is_done = self.report.add(outcome, &self.config)?;
-        if is_done && !has_kept {
+        if is_done && !has_replaced_kept {
             self.apply_events()?;
         }
         Ok(is_done)
@@ -108,7 +110,7 @@ impl BroadPhase {
 
     /// Makes the next update begin from the boxes and the kept pairs alone.
     fn fail(&mut self) {
-        self.valid = Valid::Nothing;
+        self.holder = Holder::Nothing;
         self.report.pairs = self.kept.len() as u64;
     }
 

@@ -1,7 +1,7 @@
 //! Pairs of a box of one set with a box of another one.
 
 use super::Finder;
-use crate::all_pairs::{Extras, Request};
+use crate::all_pairs::Request;
 use crate::grid::Receiver;
 use crate::pairs::Grouping;
 use crate::parallel::{SharedSlice, piece_range, run, threads_for};
@@ -81,9 +81,10 @@ impl Finder {
         let ids = &self.sets.ids;
         let hand_over = visit.map(|visit| move |pairs: &[Pair]| visit(pairs, ids));
         let receiver = hand_over.as_ref().map(|hand_over| hand_over as Receiver<'_>);
-        let request = Request { boxes: &self.sets.boxes, filters: None, config: &self.config, grouping };
-        let extras = Extras { keys: None, receiver };
-        let outcome = self.all_pairs.find_between((&request, &self.sets), &extras, &mut self.two_sets);
+        let (filters, keys) = self.sets.rules();
+        let all = Request::new(&self.sets.boxes, &self.config);
+        let request = Request { filters, keys, receiver, grouping, ..all };
+        let outcome = self.all_pairs.find_between(&request, &self.sets, &mut self.two_sets);
         let is_done = self.add(outcome);
         self.report.invalid = self.report.boxes - self.sets.valid;
         is_done?;

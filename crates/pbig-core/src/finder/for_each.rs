@@ -1,7 +1,7 @@
 //! Pairs without a list: each is handed to a closure where it is found.
 
 use super::{Finder, between::named};
-use crate::all_pairs::{Extras, Request};
+use crate::all_pairs::Request;
 use crate::{Boxes, CrossPair, Error, Pair};
 
 impl Finder {
@@ -36,9 +36,9 @@ impl Finder {
         self.note_no_device();
         let Boxes { boxes, filters, keys } = all;
         let receiver = |pairs: &[Pair]| pairs.iter().for_each(|pair| visit(*pair));
-        let request = Request { boxes, filters, config: &self.config, grouping: None };
-        let extras = Extras { keys, receiver: Some(&receiver) };
-        let outcome = self.all_pairs.find_with(&request, &extras, &mut self.store);
+        let request =
+            Request { filters, keys, receiver: Some(&receiver), ..Request::new(boxes, &self.config) };
+        let outcome = self.all_pairs.find(&request, &mut self.store);
         self.add(outcome)?;
         self.report.pairs = self.all_pairs.count();
         Ok(self.report.pairs)

@@ -1,7 +1,7 @@
 //! The search between two sets: each has a grid, both grids have one plan, and the boxes of one are searched for in the other. No
 //! two boxes of a set meet.
 
-use super::count::{self, in_window, scattered};
+use super::count::{self, has_vague_code, in_window, scattered};
 use super::hits::{HIT_ROOM, HitWriter, Hits, Rule};
 use super::plan::GridPlan;
 use super::record::Record;
@@ -106,7 +106,8 @@ impl Across<'_> {
 
     /// Finds all pairs of a box of each set, into the lists of as many threads as there are `hits`.
     pub(crate) fn search(&self, rule: &Rule<'_>, hits: &mut [Hits]) {
-        let piece = (self.own.len / (8 * hits.len())).clamp(PIECE.start, PIECE.end);
+        // Each of a few boxes may meet many.
+        let piece = (self.own.len / (8 * hits.len())).clamp(1, PIECE.end);
         let in_grid = self.own.len.div_ceil(piece);
         run_with(hits, in_grid + self.oversize_count().div_ceil(OVERSIZE_PIECE), |hits, i| {
             if hits.is_full {
@@ -178,7 +179,8 @@ fn count_slots(simd: impl Simd, across: &Across<'_>, slots: Range<usize>) -> u64
         } else {
             in_window::<false>(simd, own, grid, slot)
         };
-        work += rows + slots;
+        let is_vague = has_vague_code(simd, own, slot);
+        work += rows + if is_vague { slots * policy::WORK_OF_VAGUE_TEST } else { slots };
     }
     work
 }

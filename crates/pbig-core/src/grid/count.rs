@@ -107,7 +107,7 @@ fn count_slots(simd: impl Simd, grid: &Grid, slots: Range<usize>) -> u64 {
 /// Returns true if the code of a box is like all eight codes behind it. Boxes beyond the cells, and many tiny ones in one place,
 /// have such codes; their candidates need the exact test.
 #[inline(always)]
-fn has_vague_code(simd: impl Simd, grid: &Grid, slot: usize) -> bool {
+pub(super) fn has_vague_code(simd: impl Simd, grid: &Grid, slot: usize) -> bool {
     // SAFETY: a slot in use is before it.
     let codes = unsafe { grid.block(slot + 1) };
     let alike = simd.test(query_of(grid.codes[slot]), codes);

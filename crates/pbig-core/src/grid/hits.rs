@@ -177,7 +177,7 @@ impl Hits {
             self.filter(from, filters, ProxyFilter::allows);
         }
         if let Some(keys) = rule.keys {
-            self.filter(from, keys, keys::are_apart);
+            self.filter(from, keys, keys::share_none);
         }
         if let Some(receiver) = rule.receiver {
             if self.pairs.len() >= BATCH {

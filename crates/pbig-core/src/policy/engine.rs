@@ -2,7 +2,7 @@
 
 use super::search::work_of_full_grid;
 use crate::Engine;
-use crate::outcome::Valid;
+use crate::holder::Holder;
 
 /// Maximum number of boxes of a world that is swept although a grid is kept: a sweep of one changed box takes no longer than an edit.
 pub(crate) const SWEEP_FIRST_UP_TO_BOXES: usize = 1024;
@@ -53,7 +53,7 @@ pub(crate) struct Counts {
     /// True if the old state of all changed boxes is known.
     pub(crate) knows_old: bool,
     /// The structure that holds the boxes of the last update.
-    pub(crate) valid: Valid,
+    pub(crate) holder: Holder,
     /// Boxes out of the grid's order.
     pub(crate) spilled: usize,
     /// Pairs that began or ended in the last update.
@@ -62,7 +62,7 @@ pub(crate) struct Counts {
 
 impl Counts {
     fn may_edit(&self) -> bool {
-        self.knows_old && self.valid == Valid::Grid
+        self.knows_old && self.holder == Holder::Grid
     }
 
     /// Returns true if a sweep finds what has changed soonest, in a world of at most `most` boxes. A few boxes left of many are also
@@ -72,7 +72,7 @@ impl Counts {
         let events = self.events.saturating_sub(FREE_EVENTS);
         let tests = self.changed.min(self.boxes / 2) * self.boxes + TESTS_OF_EVENT * events;
         let tests_per_box = tests / self.boxes.max(1);
-        let are_left = self.is_sparse() && self.valid != Valid::Tree;
+        let are_left = self.is_sparse() && self.holder != Holder::Tree;
         self.boxes <= most && tests_per_box <= SWEEP_UP_TO_TESTS_PER_BOX && (self.ids <= most || are_left)
     }
 
@@ -105,7 +105,7 @@ pub(crate) fn choose_engine(counts: &Counts, forced: Option<Engine>) -> Engine {
         None => {}
     }
     let is_tidy = counts.spilled * SPILL_UP_TO_ONE_IN <= counts.boxes;
-    let has_tree = counts.valid == Valid::Tree || counts.is_sparse();
+    let has_tree = counts.holder == Holder::Tree || counts.is_sparse();
     if counts.may_sweep(SWEEP_FIRST_UP_TO_BOXES) {
         Engine::Sweep
     } else if counts.may_edit() && is_tidy && counts.are_few_of(counts.boxes) {
@@ -182,7 +182,7 @@ mod tests {
         ids: 10_000,
         changed: 100,
         knows_old: true,
-        valid: Valid::Grid,
+        holder: Holder::Grid,
         spilled: 0,
         events: 0,
     };
@@ -192,7 +192,7 @@ mod tests {
         assert_eq!(choose_engine(&WORLD, None), Engine::Edit);
         assert_eq!(choose_engine(&Counts { changed: 501, ..WORLD }, None), Engine::Rebuild);
         assert_eq!(choose_engine(&Counts { spilled: 5001, ..WORLD }, None), Engine::Rebuild);
-        assert_eq!(choose_engine(&Counts { valid: Valid::Nothing, ..WORLD }, None), Engine::Rebuild);
+        assert_eq!(choose_engine(&Counts { holder: Holder::Nothing, ..WORLD }, None), Engine::Rebuild);
         assert_eq!(choose_engine(&Counts { knows_old: false, ..WORLD }, None), Engine::Rebuild);
         assert_eq!(edit_up_to_work(1000, 10, 6000), 63_000);
         assert_eq!(edit_up_to_work(1000, 10, u64::MAX), 60_000 + 200_160);
@@ -200,12 +200,12 @@ mod tests {
 
     #[test]
     fn few_changes_use_a_tree_if_kept_or_if_most_ids_are_unused() {
-        let tree = Counts { valid: Valid::Tree, knows_old: false, ..WORLD };
+        let tree = Counts { holder: Holder::Tree, knows_old: false, ..WORLD };
         assert_eq!(choose_engine(&tree, None), Engine::Tree);
         assert_eq!(choose_engine(&Counts { changed: 501, ..tree }, None), Engine::Rebuild);
         let left = Counts { boxes: 1250, changed: 201, ..WORLD };
         assert_eq!(choose_engine(&left, None), Engine::Tree);
-        assert_eq!(choose_engine(&Counts { valid: Valid::Nothing, ..left }, None), Engine::Tree);
+        assert_eq!(choose_engine(&Counts { holder: Holder::Nothing, ..left }, None), Engine::Tree);
         assert_eq!(choose_engine(&Counts { changed: 200, ..left }, None), Engine::Sweep);
         assert_eq!(choose_engine(&Counts { changed: 62, ..left }, None), Engine::Edit);
         assert_eq!(choose_engine(&Counts { boxes: 100, ..WORLD }, None), Engine::Sweep);
@@ -227,7 +227,7 @@ mod tests {
 
     #[test]
     fn small_worlds_are_swept_while_few_boxes_change() {
-        let small = Counts { boxes: 1000, ids: 1000, changed: 200, valid: Valid::Nothing, ..WORLD };
+        let small = Counts { boxes: 1000, ids: 1000, changed: 200, holder: Holder::Nothing, ..WORLD };
         assert_eq!(choose_engine(&small, None), Engine::Sweep);
         assert_eq!(choose_engine(&Counts { changed: 201, ..small }, None), Engine::Rebuild);
         assert_eq!(choose_engine(&Counts { changed: 100, events: 1416, ..small }, None), Engine::Sweep);
@@ -242,7 +242,7 @@ mod tests {
         );
         assert_eq!(choose_engine(&Counts { ids: 2048, ..small }, None), Engine::Sweep);
         assert_eq!(choose_engine(&Counts { ids: 2049, ..small }, None), Engine::Rebuild);
-        let more = Counts { boxes: 1025, ids: 1025, changed: 51, valid: Valid::Grid, ..small };
+        let more = Counts { boxes: 1025, ids: 1025, changed: 51, holder: Holder::Grid, ..small };
         assert_eq!(choose_engine(&more, None), Engine::Edit);
         assert_eq!(choose_engine(&Counts { changed: 52, ..more }, None), Engine::Sweep);
         assert_eq!(choose_engine(&Counts { knows_old: false, ..small }, None), Engine::Sweep);
@@ -252,7 +252,7 @@ mod tests {
     fn an_engine_that_is_asked_for_is_used_where_it_can() {
         for engine in Engine::ALL {
             assert_eq!(choose_engine(&WORLD, Some(engine)), engine);
-            let lost = Counts { valid: Valid::Nothing, knows_old: false, ..WORLD };
+            let lost = Counts { holder: Holder::Nothing, knows_old: false, ..WORLD };
             let instead = if engine == Engine::Edit { Engine::Rebuild } else { engine };
             assert_eq!(choose_engine(&lost, Some(engine)), instead);
         }

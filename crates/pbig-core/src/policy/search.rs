@@ -33,7 +33,7 @@ const SAMPLED: std::ops::Range<usize> = 64..512;
 /// Approximate work of the whole sample for each box of the world.
 const SAMPLE_WORK_PER_BOX: u64 = 16;
 
-/// Returns true if the grid is faster than a tree, with this work and this work in vain.
+/// Returns true if a grid with this work is faster than a tree.
 pub(crate) fn is_light(boxes: usize, work: u64) -> bool {
     work <= GRID_UP_TO_PER_BOX * boxes as u64
 }

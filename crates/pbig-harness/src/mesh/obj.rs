@@ -7,9 +7,17 @@ use std::io::BufRead;
 
 pub(super) fn read(reader: impl BufRead) -> Result<Mesh, String> {
     let mut mesh = Mesh::default();
-    for (i, line) in reader.lines().enumerate() {
-        let line = line.map_err(|error| format!("line {}: {error}", i + 1))?;
-        take(&line, &mut mesh).map_err(|what| format!("line {}: {what}", i + 1))?;
+    let mut whole = String::new();
+    for (i, line) in reader.split(b'\n').enumerate() {
+        let at = |what: String| format!("line {}: {what}", i + 1);
+        let line = line.map_err(|error| at(error.to_string()))?;
+        // Comments and names may be in any encoding.
+        let line = String::from_utf8_lossy(&line);
+        let line = line.split('#').next().unwrap_or_default().trim_end();
+        match line.strip_suffix('\\') {
+            Some(begun) => whole += begun,
+            None => take(&(std::mem::take(&mut whole) + line), &mut mesh).map_err(at)?,
+        }
     }
     if mesh.vertices.is_empty() { Err("no vertices (lines that begin with `v`)".into()) } else { Ok(mesh) }
 }

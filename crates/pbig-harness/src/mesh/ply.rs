@@ -3,16 +3,24 @@
 use super::{Mesh, face};
 use pbig_core::Keys;
 use ply_rs_bw::parser::{ParseError, Parser, Reader};
-use ply_rs_bw::ply::{ElementDef, Header, Property, PropertyAccess, PropertyAccessResult};
+use ply_rs_bw::ply::{ElementDef, Header, Property, PropertyAccess, PropertyAccessResult, PropertyType};
 use std::io::BufRead;
 
 pub(super) fn read(reader: impl BufRead) -> Result<Mesh, String> {
     let (mut reader, mut mesh) = (Reader::new(reader), Mesh::default());
     let header = Parser::<Skipped>::new().read_header(&mut reader).map_err(text)?;
-    if !header.elements.contains_key("vertex") {
-        return Err("no element `vertex`".into());
+    let vertex = header.elements.get("vertex").ok_or("no element `vertex`")?;
+    for axis in AXES {
+        let data_type = vertex.properties.get(axis).map(|property| &property.data_type);
+        if !matches!(data_type, Some(PropertyType::Scalar(_))) {
+            return Err(format!("element `vertex` has no number `{axis}`"));
+        }
     }
     for (name, element) in &header.elements {
+        // Such rows take no bytes, so a file could have any number of them.
+        if element.properties.is_empty() && element.count > 0 {
+            return Err(format!("element `{name}` has no property"));
+        }
         match name.as_str() {
             "vertex" => {
                 mesh.vertices = rows(&mut reader, element, &header)?.iter().map(|Point(at)| *at).collect()
@@ -55,7 +63,10 @@ impl PropertyAccess for Skipped {
     }
 }
 
-/// The place of a vertex; NaN where the file has no coordinate.
+/// The names of a vertex's coordinates.
+const AXES: [&str; 3] = ["x", "y", "z"];
+
+/// The place of a vertex.
 struct Point([f64; 3]);
 
 impl PropertyAccess for Point {
@@ -64,7 +75,7 @@ impl PropertyAccess for Point {
     }
 
     fn set_property(&mut self, name: &str, property: Property) -> PropertyAccessResult {
-        let axis = ["x", "y", "z"].iter().position(|axis| *axis == name);
+        let axis = AXES.iter().position(|axis| *axis == name);
         let Some((axis, value)) = axis.zip(scalar(&property)) else { return PropertyAccessResult::Ignored };
         self.0[axis] = value;
         PropertyAccessResult::Set

@@ -4,12 +4,13 @@ use super::task::Task;
 use crate::broad_phase::world::{Old, World};
 use crate::device::{ChangeRequest, ChangedBox, DeviceFound, PairDevice};
 use crate::device_slot::DeviceSlot;
-use crate::outcome::{End, Outcome, Valid};
+use crate::holder::Holder;
+use crate::outcome::{End, Outcome};
 use crate::{Aabb, Pair};
 
 /// Leaves the events of an update in the task. Gives up if the device cannot do the work.
 pub(crate) fn run(slot: &mut DeviceSlot, task: &mut Task<'_>) -> Outcome {
-    if task.valid != Valid::Device {
+    if task.holder != Holder::Device {
         slot.forget();
     }
     let changed = changed_boxes(task.world);
@@ -19,7 +20,7 @@ pub(crate) fn run(slot: &mut DeviceSlot, task: &mut Task<'_>) -> Outcome {
     let call = |device: &mut dyn PairDevice, found: &mut _| device.find_changed(&request, found);
     let (mut outcome, found) = slot.call(boxes.len(), Vec::new(), call);
     if outcome.end == End::Done {
-        outcome.valid = Valid::Device;
+        outcome.holder = Holder::Device;
         sort_out(&found, task);
     } else {
         outcome.plan.boxes = task.world.valid();

@@ -6,7 +6,8 @@
 use super::task::Task;
 use crate::broad_phase::world::{Old, World};
 use crate::grid::{Budget, Candidates, EditedGrid, Meet, Place, Record};
-use crate::outcome::{End, Outcome, Valid};
+use crate::holder::Holder;
+use crate::outcome::{End, Outcome};
 use crate::pairs::Comparison;
 use crate::parallel::{SharedSlice, available_threads, piece_range, run_with};
 use crate::policy;
@@ -55,10 +56,10 @@ impl Edit {
         let limits = EditLimits { pairs: task.config.limits.pairs(), work: task.unless_forced(most) };
         let is_done = self.find(world, &mut task.store.grid, task.events, limits);
         let check = clock.lap();
-        let (end, valid) = if is_done { (End::Done, Valid::Grid) } else { (End::GivenUp, Valid::Nothing) };
+        let (end, holder) = if is_done { (End::Done, Holder::Grid) } else { (End::GivenUp, Holder::Nothing) };
         Outcome {
             end,
-            valid,
+            holder,
             checks: self.checks(),
             work: self.work.min(limits.work),
             plan: Plan { boxes: world.valid(), ..Plan::of_grid(Algorithm::Edit, &task.store.grid) },

@@ -18,7 +18,8 @@ impl Rebuild {
     pub(super) fn run(&mut self, task: &mut Task<'_>) -> Outcome {
         let (world, grouping) = (task.world, Grouping::new(task.world.ids()));
         let filters = world.is_filtered.then_some(&world.filters[..]);
-        let request = Request { boxes: &world.boxes, filters, config: task.config, grouping: Some(grouping) };
+        let request =
+            Request { filters, grouping: Some(grouping), ..Request::new(&world.boxes, task.config) };
         let mut outcome = self.all_pairs.find(&request, task.store);
         if outcome.end != End::Done {
             return outcome;
@@ -32,7 +33,7 @@ impl Rebuild {
         let workers = AllPairs::workers(world.ids());
         task.events.run(&mut self.groups, task.kept, is_removed, workers);
         outcome.stages.diff = clock.lap();
-        outcome.has_kept = true;
+        outcome.has_replaced_kept = true;
         outcome
     }
 }

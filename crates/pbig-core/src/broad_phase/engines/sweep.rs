@@ -9,7 +9,8 @@ use super::partners::Partners;
 use super::task::Task;
 use crate::broad_phase::world::World;
 use crate::grid::{BLOCK, EightBoxes, Simd, dispatch};
-use crate::outcome::{End, Outcome, Valid};
+use crate::holder::Holder;
+use crate::outcome::{End, Outcome};
 use crate::pairs::{Comparison, Kept};
 use crate::report::{Clock, StageTimes, stage};
 use crate::{Aabb, Algorithm, Checks, Plan};
@@ -47,14 +48,14 @@ impl Sweep {
         let world = task.world;
         task.events.clear();
         let are_many = 2 * world.changed.len() > world.valid() as usize;
-        self.bring_up_to_date(world, task.valid == Valid::Lanes, are_many);
+        self.bring_up_to_date(world, task.holder == Holder::Lanes, are_many);
         let are_many = are_many && self.is_in_order;
         let (kept, events) = (&*task.kept, &mut *task.events);
         let (made, met) = dispatch!(Self::sweep, self, world, kept, events, are_many);
         task.events.sort(world.ids());
         Outcome {
             end: End::Done,
-            valid: Valid::Lanes,
+            holder: Holder::Lanes,
             checks: Checks { made, unnecessary: made - met, redundant: 0 },
             work: made,
             plan: Plan { algorithm: Algorithm::Sweep, boxes: world.valid(), ..Plan::default() },

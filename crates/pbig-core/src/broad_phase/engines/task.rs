@@ -3,7 +3,7 @@
 use crate::Config;
 use crate::all_pairs::Store;
 use crate::broad_phase::world::World;
-use crate::outcome::Valid;
+use crate::holder::Holder;
 use crate::pairs::{Comparison, Kept};
 
 /// An update: what an engine reads, and where it leaves the events.
@@ -11,7 +11,7 @@ pub(crate) struct Task<'a> {
     pub(crate) world: &'a World,
     pub(crate) config: &'a Config,
     /// The structure that holds the boxes of the last update.
-    pub(crate) valid: Valid,
+    pub(crate) holder: Holder,
     pub(crate) store: &'a mut Store,
     pub(crate) kept: &'a mut Kept,
     /// The events. An engine clears them first, and leaves them sorted.

@@ -4,7 +4,8 @@
 use super::partners::Partners;
 use super::task::Task;
 use crate::grid::BLOCK;
-use crate::outcome::{End, Outcome, Valid};
+use crate::holder::Holder;
+use crate::outcome::{End, Outcome};
 use crate::policy;
 use crate::report::{Clock, stage};
 use crate::{Algorithm, Checks, Plan};
@@ -21,8 +22,8 @@ impl LookUp {
         stage!("tree");
         let mut clock = Clock::start();
         let world = task.world;
-        let mut outcome = Outcome { valid: Valid::Tree, ..Outcome::default() };
-        let changed = (task.valid == Valid::Tree).then_some(&world.changed[..]);
+        let mut outcome = Outcome { holder: Holder::Tree, ..Outcome::default() };
+        let changed = (task.holder == Holder::Tree).then_some(&world.changed[..]);
         let refit = task.store.tree.keep_sorted(&world.boxes, changed);
         outcome.stages.map = clock.lap();
         let max_work = task.unless_forced(policy::look_up_to_nodes(world.ids()));
