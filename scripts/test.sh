@@ -113,7 +113,7 @@ step_wasm() {
 # The commands that the documents show, at a size that takes seconds.
 step_examples() {
     step cargo run --release --example falling_objects -- --bodies 500 --steps 60
-    for example in drop_in existing_app headless_test debug_render boxes_to_pairs boxes_events other_device; do
+    for example in drop_in existing_app headless_test debug_render boxes_to_pairs boxes_events cloth other_device; do
         step cargo run --release --example "$example"
     done
     step cargo run --release --bin pbig -- pairs examples/boxes.csv
