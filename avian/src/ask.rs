@@ -18,7 +18,9 @@ impl<'a, H: CollisionHooks> Ask<'a, H> {
     /// Returns the proxies of a pair, in avian's order, if avian would look at the pair in this update.
     pub(crate) fn proxies(&self, boxes: &ColliderBoxes, pair: Pair) -> Option<[&'a ColliderTreeProxy; 2]> {
         let [one, other] = [pair.a, pair.b].map(|id| &boxes.slots[id as usize]);
-        let proxies = [self.trees.get_proxy(one.key)?, self.trees.get_proxy(other.key)?];
+        let proxy =
+            |slot: &Slot| self.trees.get_proxy(slot.key).filter(|proxy| proxy.collider == slot.collider);
+        let proxies = [proxy(one)?, proxy(other)?];
         let looks = [
             boxes.has_moved(pair.a) && looks_into(one, proxies[0], other),
             boxes.has_moved(pair.b) && looks_into(other, proxies[1], one),

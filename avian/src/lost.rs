@@ -2,7 +2,8 @@
 //!
 //! Avian finds such a pair again when one of its colliders moves. pbig reports a pair once, when it begins. So these colliders
 //! begin anew: their boxes are removed and set again, and pbig reports their pairs again. The observers below match those of
-//! avian's narrow phase, of its joint graph, and of the layers that its narrow phase reads.
+//! avian's narrow phase, of its joint graph, and of the layers that its narrow phase reads. Colliders that are enabled, or given
+//! to another body, are here, too: within a step avian's list of moved proxies is cleared before pbig sees it.
 
 use avian::dynamics::joints::joint_graph::JointGraph;
 use avian::prelude::*;
@@ -17,7 +18,10 @@ pub(crate) struct Lost(pub(crate) BTreeSet<Entity>);
 
 pub(crate) fn add_observers(app: &mut App) {
     app.add_observer(note_collider::<Add<(Disabled, ColliderDisabled)>>)
+        .add_observer(note_collider::<Remove<(Disabled, ColliderDisabled)>>)
         .add_observer(note_collider::<Remove<ColliderMarker>>)
+        .add_observer(note_collider::<Insert<ColliderOf>>)
+        .add_observer(note_collider::<Remove<ColliderOf>>)
         .add_observer(note_collider::<Add<Sensor>>)
         .add_observer(note_collider::<Remove<Sensor>>)
         .add_observer(note_collider::<Insert<CollisionLayers>>)

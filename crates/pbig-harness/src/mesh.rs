@@ -237,7 +237,7 @@ mod tests {
 
     #[test]
     fn obj_files_are_read_with_every_form_of_face() {
-        let text = b"# \xe4\no name\nv 0 0 0\nv 1 0 0\nv 0 1 0 1.0\nvn 0 0 1\nv 1 1 1\nf 1 2 3\nf 2//1 4//1 -2/5/1\nf 1 2 \\\n 3 4 # all\nusemtl x\n";
+        let text = b"\xef\xbb\xbf# \xe4\no name\nv 0 0 0\nv 1 0 0\nv 0 1 0 1.0\nvn 0 0 1\nv 1 1 1\nf 1 2 3\nf 2//1 4//1 -2/5/1\nf 1 2 \\\n 3 4 # all\nusemtl x\n";
         let mesh = read("a.obj", text).expect("a mesh");
         assert_eq!(mesh.vertices[3], [1.0; 3]);
         assert_eq!(mesh.faces, [[0, 1, 2, NO_KEY], [1, 3, 2, NO_KEY], [0, 1, 2, 3]]);

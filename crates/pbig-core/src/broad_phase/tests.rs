@@ -56,6 +56,20 @@ impl Checked {
     }
 }
 
+#[test]
+fn many_gone_and_one_new_take_few_tests() {
+    let at = |x: u32| Aabb::from_center([3.0 * x as f32, 0.0, 0.0], [1.0; 3]);
+    let mut broad_phase =
+        BroadPhase::new(Config { engine: Some(Engine::Sweep), ..Config::DEFAULT }).expect("a margin");
+    (0..2000).for_each(|id| broad_phase.set(id, at(id), ProxyFilter::ALL).expect("few boxes"));
+    broad_phase.update().expect("few pairs");
+    (0..1900).for_each(|id| _ = broad_phase.remove(id));
+    broad_phase.set(2000, at(2000), ProxyFilter::ALL).expect("few boxes");
+    broad_phase.update().expect("few pairs");
+    let work = broad_phase.report().work;
+    assert!(work < 20_000, "{work} tests for 101 boxes");
+}
+
 fn random_box(random: &mut StdRng, kind: u32, width: f32) -> Aabb {
     let mut center: [f32; 3] = std::array::from_fn(|_| random.random_range(0.0..width));
     let mut half = [0.5; 3];

@@ -94,6 +94,10 @@ fn cut(len: usize) -> usize {
     child * (len.div_ceil(child) / 2).max(1)
 }
 
+/// Maximum difference, as a share, at which two axes count as equal. A part that is smaller than the boxes around it has equal
+/// axes, and rounding would choose one of them again and again.
+const TIE: f64 = 0.01;
+
 /// Returns the axis along which the boxes lie apart most: the spread of their centers is longest, compared with their own
 /// extents and the mean extents of the boxes of `all` classes. (Compared with their own alone, thin tiles would be cut into slabs
 /// as wide as the world, and slabs of tiles that stand in two directions all meet.)
@@ -101,7 +105,9 @@ fn best_axis(entries: &[Entry], all: &[Measure]) -> usize {
     let Measure { spread, extents, .. } = Measure::of(entries);
     let extents: [f64; 3] = std::array::from_fn(|k| extents[k] + mean_within(all, k, spread[k]));
     let compare = |a: usize, b: usize| {
-        (spread[a] * extents[b]).total_cmp(&(spread[b] * extents[a])).then(spread[a].total_cmp(&spread[b]))
+        let (one, other) = (spread[a] * extents[b], spread[b] * extents[a]);
+        let is_tie = (one - other).abs() <= TIE * one.max(other);
+        if is_tie { spread[a].total_cmp(&spread[b]) } else { one.total_cmp(&other) }
     };
     (0..3).max_by(|a, b| compare(*a, *b)).unwrap_or(0)
 }

@@ -49,6 +49,21 @@ fn random_boxes(seed: u64) -> Vec<Aabb> {
     (0..IDS).map(|_| random_box(&mut rng)).collect()
 }
 
+/// A device that fails does not cost the CPU the grid that it keeps.
+#[test]
+fn edits_go_on_beside_a_device_that_fails() {
+    let mut world = on_device(Fault::IsLost);
+    let at = |x: u32| Aabb::from_center([2.0 * x as f32, 0.0, 0.0], [0.5; 3]);
+    (0..5000).for_each(|id| world.set(id, at(id), ProxyFilter::ALL).expect("few boxes"));
+    let mut edits = 0;
+    for moved in 0..8 {
+        world.set(moved, at(moved + 9000), ProxyFilter::ALL).expect("few boxes");
+        world.update().expect("few pairs");
+        edits += u32::from(world.report().plan.algorithm == pbig_core::Algorithm::Edit);
+    }
+    assert_eq!(edits, 5, "{}", world.report().plan);
+}
+
 /// Changes some boxes, the same ones in every world.
 fn disturb(worlds: &mut [&mut BroadPhase], rng: &mut StdRng) {
     for _ in 0..rng.random_range(0..IDS / 2) {

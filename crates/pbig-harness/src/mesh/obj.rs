@@ -13,7 +13,7 @@ pub(super) fn read(reader: impl BufRead) -> Result<Mesh, String> {
         let line = line.map_err(|error| at(error.to_string()))?;
         // Comments and names may be in any encoding.
         let line = String::from_utf8_lossy(&line);
-        let line = line.split('#').next().unwrap_or_default().trim_end();
+        let line = line.trim_start_matches('\u{feff}').split('#').next().unwrap_or_default().trim_end();
         match line.strip_suffix('\\') {
             Some(begun) => whole += begun,
             None => take(&(std::mem::take(&mut whole) + line), &mut mesh).map_err(at)?,

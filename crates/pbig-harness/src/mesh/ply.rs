@@ -9,6 +9,11 @@ use std::io::BufRead;
 pub(super) fn read(reader: impl BufRead) -> Result<Mesh, String> {
     let (mut reader, mut mesh) = (Reader::new(reader), Mesh::default());
     let header = Parser::<Skipped>::new().read_header(&mut reader).map_err(text)?;
+    // Rows without properties take no bytes: a short file could have any number of them.
+    let is_empty = |element: &&ElementDef| element.properties.is_empty() && element.count > 0;
+    if let Some(ElementDef { name, .. }) = header.elements.values().find(is_empty) {
+        return Err(format!("element `{name}` has no property"));
+    }
     let vertex = header.elements.get("vertex").ok_or("no element `vertex`")?;
     for axis in AXES {
         let data_type = vertex.properties.get(axis).map(|property| &property.data_type);
@@ -17,10 +22,6 @@ pub(super) fn read(reader: impl BufRead) -> Result<Mesh, String> {
         }
     }
     for (name, element) in &header.elements {
-        // Such rows take no bytes, so a file could have any number of them.
-        if element.properties.is_empty() && element.count > 0 {
-            return Err(format!("element `{name}` has no property"));
-        }
         match name.as_str() {
             "vertex" => {
                 mesh.vertices = rows(&mut reader, element, &header)?.iter().map(|Point(at)| *at).collect()

@@ -24,6 +24,8 @@ pub(crate) fn run(slot: &mut DeviceSlot, task: &mut Task<'_>) -> Outcome {
         sort_out(&found, task);
     } else {
         outcome.plan.boxes = task.world.valid();
+        // What the CPU holds is as it was.
+        outcome.holder = if task.holder == Holder::Device { Holder::Nothing } else { task.holder };
     }
     outcome
 }

@@ -49,7 +49,6 @@ impl Sweep {
         task.events.clear();
         let are_many = 2 * world.changed.len() > world.valid() as usize;
         self.bring_up_to_date(world, task.holder == Holder::Lanes, are_many);
-        let are_many = are_many && self.is_in_order;
         let (kept, events) = (&*task.kept, &mut *task.events);
         let (made, met) = dispatch!(Self::sweep, self, world, kept, events, are_many);
         task.events.sort(world.ids());
@@ -67,10 +66,13 @@ impl Sweep {
     /// Stores all boxes, or the changed ones if the blocks hold the boxes of the last update.
     fn bring_up_to_date(&mut self, world: &World, is_current: bool, are_many: bool) {
         let has_holes = self.free.len() > world.valid() as usize + MAX_HOLES;
-        if is_current && !has_holes && (self.is_in_order || !are_many) {
+        let can_stay = is_current && !has_holes && (self.is_in_order || !are_many);
+        if can_stay {
             self.lanes.resize(world.ids(), NONE);
             world.changed.iter().for_each(|&id| self.put(id, &world.boxes[id as usize]));
-        } else {
+        }
+        // A box in a lane that was free is out of order.
+        if !can_stay || are_many && !self.is_in_order {
             self.lay_out(&world.boxes);
         }
     }
