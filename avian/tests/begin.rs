@@ -111,7 +111,10 @@ fn a_collider_that_is_enabled_within_a_step() {
     };
     let mut two = Two::new();
     two.edit(|e| _ = e.insert(ColliderDisabled));
-    let place = enable.after(PhysicsStepSystems::NarrowPhase).before(PhysicsStepSystems::Finalize);
+    let place = enable
+        .after(PhysicsStepSystems::NarrowPhase)
+        .before(PhysicsStepSystems::Finalize)
+        .ambiguous_with_all();
     two.app.add_systems(PhysicsSchedule, place);
     two.step();
     two.step();
