@@ -11,7 +11,7 @@ const MOST_PAIRS: usize = 1000;
 /// The low one of two limits of pairs, so that updates fail and are repeated.
 const FEW_PAIRS: u64 = 24;
 
-/// Two bytes of settings, then operations: see [`Player::play`].
+/// Two bytes of settings, then operations: see `Player::play`.
 pub fn updates_against_scratch(data: &[u8]) {
     let mut input = Input(data);
     let (Some(settings), Some(spread)) = (input.byte(), input.byte()) else { return };
