@@ -3,7 +3,7 @@
 //! Avian finds such a pair again when one of its colliders moves. pbig reports a pair once, when it begins. So these colliders
 //! begin anew: their boxes are removed and set again, and pbig reports their pairs again. The observers below match those of
 //! avian's narrow phase, of its joint graph, and of the layers that its narrow phase reads. Colliders that are enabled, or given
-//! to another body, are here, too: within a step avian's list of moved proxies is cleared before pbig sees it.
+//! to another body, are here, too: avian clears its list of moved proxies at the end of a step, perhaps before pbig has seen them.
 
 use avian::dynamics::joints::joint_graph::JointGraph;
 use avian::prelude::*;

@@ -103,24 +103,6 @@ fn layers_that_change_for_a_step() {
     );
 }
 
-/// Avian clears its list of moved proxies at the end of a step: pbig must not depend on it.
-#[test]
-fn a_collider_that_is_enabled_within_a_step() {
-    let enable = |disabled: Query<Entity, With<ColliderDisabled>>, mut commands: Commands| {
-        disabled.iter().for_each(|collider| _ = commands.entity(collider).remove::<ColliderDisabled>());
-    };
-    let mut two = Two::new();
-    two.edit(|e| _ = e.insert(ColliderDisabled));
-    let place = enable
-        .after(PhysicsStepSystems::NarrowPhase)
-        .before(PhysicsStepSystems::Finalize)
-        .ambiguous_with_all();
-    two.app.add_systems(PhysicsSchedule, place);
-    two.step();
-    two.step();
-    assert!(two.has_contact());
-}
-
 #[test]
 fn a_veto_that_ends() {
     let mut two = Two::new();
