@@ -1,8 +1,8 @@
 //! Worlds in f64. The fat AABBs are kept in f64. The core gets them relative to a centre, rounded outward to f32, so it finds
 //! a superset of the pairs. A *candidate* is a pair of the core; it is a pair of the world while its f64 boxes overlap.
 //!
-//! So the pairs are exactly those whose f64 boxes overlap, wherever the centre is. Two boxes can meet without a new event of
-//! the core: the update tests all candidates of changed boxes.
+//! Pairs are exactly those whose f64 boxes overlap, wherever the centre is. Two boxes can meet without a new event of the core, so
+//! an update tests all candidates of changed boxes.
 
 use crate::bounds::{Bounds, Boxes, Scalar};
 use crate::{SceneQuery, policy};

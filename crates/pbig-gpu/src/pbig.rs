@@ -124,7 +124,7 @@ pub fn cells_in(lengths: [f32; 3], cell: f32) -> f64 {
 
 /// Returns the sample without boxes as wide as the range of all boxes, such as a ground or a half-space.
 ///
-/// Such a box touches too many cells, so it is tested against all others instead. It would also stretch the space.
+/// A box as wide as the range touches too many cells, so it is tested against all others instead. It would also stretch the space.
 pub fn ordinary(summary: &Summary) -> Vec<Aabb> {
     let widths: [f32; 3] = std::array::from_fn(|k| summary.range(k).1 - summary.range(k).0);
     let largest = widths.into_iter().fold(0.0, f32::max);

@@ -24,7 +24,7 @@ pub(crate) fn run(slot: &mut DeviceSlot, task: &mut Task<'_>) -> Outcome {
         sort_out(&found, task);
     } else {
         outcome.plan.boxes = task.world.valid();
-        // What the CPU holds is as it was.
+        // The structure on the CPU is untouched, so the next update may go on with it.
         outcome.holder = if task.holder == Holder::Device { Holder::Nothing } else { task.holder };
     }
     outcome

@@ -1,4 +1,4 @@
-//! What a box overlaps now, compared with its kept pairs.
+//! The comparison of the boxes that a box overlaps now with its kept pairs.
 
 use crate::Pair;
 use crate::broad_phase::world::World;

@@ -1,4 +1,4 @@
-//! What an engine gets for an update.
+//! The input of an engine, and the place for its events.
 
 use crate::Config;
 use crate::all_pairs::Store;
