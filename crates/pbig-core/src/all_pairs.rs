@@ -49,6 +49,17 @@ pub(crate) struct Store {
     pub(crate) work: u64,
 }
 
+impl Store {
+    /// Renames the boxes that a search has left: `names[id]` is the new id of the box `id`.
+    pub(crate) fn rename(&mut self, holder: Holder, names: &[u32]) {
+        match holder {
+            Holder::Grid => self.grid.rename(names),
+            Holder::Tree => self.tree.rename(names),
+            Holder::Nothing | Holder::Lanes | Holder::Device => {}
+        }
+    }
+}
+
 /// The buffers of a search: what each thread has found.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct AllPairs {

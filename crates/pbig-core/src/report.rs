@@ -116,7 +116,8 @@ pub struct Report {
     /// Tests made. A device may report an estimate, without unnecessary and redundant
     /// ones.
     pub checks: Checks,
-    /// The work on the CPU in counts: tests made, runs of cells and nodes of a tree looked at. In an edit an entry of a list
+    /// The work on the CPU in counts: tests made, runs of cells and nodes of a tree looked at, ids without a box that a
+    /// rebuild reads. In an edit an entry of a list
     /// counts as 16 and a test against an oversize box as 4, because they take longer. An edit that was given up counts as the work
     /// that it was allowed. At most [`crate::WORK_LIMIT`] for each box, change and pair, times the binary logarithm of the
     /// number of boxes, unless [`crate::Backend::Brute`] was asked for.

@@ -222,7 +222,7 @@ pub fn shapes() -> Vec<(&'static str, Recipe)> {
         part
     };
     let lath = |half: [f32; 3]| Part { width: [1000.0; 3], half, decades: 1.0, ..CUBES };
-    let worlds: [(&str, &[Part]); 22] = [
+    let worlds: [(&str, &[Part]); 23] = [
         ("uniform", &[CUBES]),
         (
             "two scales",
@@ -323,6 +323,25 @@ pub fn shapes() -> Vec<(&'static str, Recipe)> {
             &[
                 Part { weight: 50, width: [300.0, 300.0, 0.0], ..CUBES },
                 Part { half: [1e6, 1e6, 1.0], ..CUBES },
+            ],
+        ),
+        // Like one found by search: only cuts across y tell those along x from those along z. Those along y are far away.
+        (
+            "needles in three directions, those along y apart",
+            &[
+                Part { weight: 3, width: [0.0, 85.0, 28.0], half: [1e6, 1e-4, 1e-4], ..CUBES },
+                Part {
+                    corner: [-2000.0, 0.0, 86.0],
+                    width: [1000.0, 0.0, 17.0],
+                    half: [0.01, 100.0, 0.01],
+                    ..CUBES
+                },
+                Part {
+                    corner: [1000.0, 10.0, 0.0],
+                    width: [2000.0, 55.0, 0.0],
+                    half: [1e-4, 1e-4, 4e4],
+                    ..CUBES
+                },
             ],
         ),
         // Like one found by search: nothing but the thin axis tells them apart.

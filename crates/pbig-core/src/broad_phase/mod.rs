@@ -6,6 +6,7 @@
 
 mod device;
 mod engines;
+mod id_set;
 mod query;
 mod set_many;
 #[cfg(feature = "serde")]
@@ -46,7 +47,8 @@ pub struct Events {
 /// top.
 ///
 /// An update in which few boxes have changed tests only these. An update in which many have changed sorts all boxes into a
-/// grid (or a tree, where a cell would hold too many), searches it, and compares the pairs with those of the last update.
+/// grid (or a tree, where a cell would hold too many), searches it, and compares the pairs with those of the last update. After a
+/// peak it takes time for the boxes that are left.
 ///
 /// ```
 /// use pbig_core::{Aabb, BroadPhase, Config, Pair, ProxyFilter};

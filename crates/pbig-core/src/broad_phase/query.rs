@@ -23,7 +23,7 @@ impl BroadPhase {
 
     /// Returns the number of boxes that were set and not removed, invalid ones included.
     pub fn len(&self) -> usize {
-        self.world.present() as usize
+        self.world.present.len()
     }
 
     /// Returns true if there is no box.

@@ -56,8 +56,7 @@ impl BroadPhase {
             return Engine::Rebuild;
         }
         let counts = Counts {
-            boxes: self.world.present() as usize,
-            ids: self.world.ids(),
+            boxes: self.world.present.len(),
             changed: self.world.changed.len(),
             knows_old: self.world.knows_old(),
             holder: self.holder,
@@ -133,7 +132,7 @@ impl BroadPhase {
 
     /// Begins an empty report.
     fn begin_report(&mut self) {
-        let present = u64::from(self.world.present());
+        let present = self.world.present.len() as u64;
         let report = &mut self.report;
         (report.stages, report.checks, report.work) = Default::default();
         report.boxes = present;

@@ -1,5 +1,6 @@
 //! The world: what is kept of each box by id, and which boxes have changed since the last update. It knows no grid.
 
+use super::id_set::IdSet;
 use crate::{Aabb, ProxyFilter};
 
 /// A word for each id: two flags, and 1 + the place in the list of changed ids, or 0.
@@ -35,7 +36,8 @@ pub(crate) struct World {
     pub(super) keep_old: usize,
     /// Ids whose box of the last update was removed.
     removed: Vec<u32>,
-    present: u32,
+    /// Ids whose box was set and not removed, valid or not.
+    pub(super) present: IdSet,
     valid: u32,
     /// Boxes that were ever given a filter other than [`ProxyFilter::ALL`].
     pub(super) is_filtered: bool,
@@ -45,10 +47,6 @@ impl World {
     /// Returns one more than the largest id that was ever set.
     pub(super) fn ids(&self) -> usize {
         self.boxes.len()
-    }
-
-    pub(super) fn present(&self) -> u32 {
-        self.present
     }
 
     pub(super) fn valid(&self) -> u32 {
@@ -93,6 +91,7 @@ impl World {
         self.boxes.resize(ids, Aabb::NOWHERE);
         self.filters.resize(ids, ProxyFilter::ALL);
         self.states.resize(ids, 0);
+        self.present.reserve(ids);
     }
 
     /// Moves a box that is present. Returns false, and does nothing, if it is not.
@@ -141,7 +140,7 @@ impl World {
     pub(super) fn insert(&mut self, id: u32, aabb: Aabb, filter: ProxyFilter, margin: f32) {
         self.note_change(id);
         self.states[id as usize] |= state::PRESENT;
-        self.present += 1;
+        self.present.insert(id);
         self.put(id as usize, aabb, margin);
         self.set_filter(id, filter);
     }
@@ -164,7 +163,7 @@ impl World {
             self.removed.push(id);
         }
         *state = *state & state::CHANGE | state::REMOVED;
-        self.present -= 1;
+        self.present.remove(id);
     }
 
     /// Notes the first change of a box since the last update, and its old state.
@@ -202,6 +201,7 @@ impl World {
         self.changed.shrink_to_fit();
         self.old.shrink_to_fit();
         self.removed.shrink_to_fit();
+        self.present.shrink();
     }
 }
 

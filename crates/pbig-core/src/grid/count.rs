@@ -65,7 +65,7 @@ impl Sorted<'_> {
 /// Yields a number of every `step` in a range, each somewhere else in its part: a pattern in the order of the boxes cannot
 /// bias a sample.
 #[inline(always)]
-pub(super) fn scattered(range: Range<usize>, step: usize) -> impl Iterator<Item = usize> {
+pub(crate) fn scattered(range: Range<usize>, step: usize) -> impl Iterator<Item = usize> {
     const GOLDEN: u64 = 0x9E37_79B9_7F4A_7C15;
     let at = move |first: usize| {
         let hash = (first as u64).wrapping_mul(GOLDEN) >> 32;

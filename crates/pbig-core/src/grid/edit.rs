@@ -154,6 +154,12 @@ impl EditedGrid {
         self.grid.build(plan, boxes, workers)
     }
 
+    /// Renames the boxes of a grid as it was built: `names[id]` is the new id of the box `id`.
+    pub(crate) fn rename(&mut self, names: &[u32]) {
+        let Grid { records, oversize, len, .. } = &mut self.grid;
+        records[..*len].iter_mut().chain(oversize).for_each(|record| record.id = names[record.id as usize]);
+    }
+
     /// Returns the grid without the spilled boxes, for reports.
     pub(crate) fn grid(&self) -> &Grid {
         &self.grid

@@ -30,6 +30,7 @@ mod tests;
 pub(crate) use across::{Across, TwoGrids, brute_force_across};
 #[cfg(target_arch = "x86_64")]
 pub(crate) use avx2::Avx2;
+pub(crate) use count::scattered;
 pub(crate) use edit::EditedGrid;
 pub(crate) use hits::{Hits, Receiver, Rule};
 pub(crate) use lookup::{Budget, Candidates, Meet, Place};

@@ -69,6 +69,8 @@ pub struct BoxIndex {
     grown: usize,
     /// By id: the lane of its box, or `NONE`.
     places: Vec<u32>,
+    /// Length of the list of boxes at the last layout.
+    listed: usize,
     is_sorted: bool,
     /// Boxes may have moved since the last sort.
     has_moved: bool,

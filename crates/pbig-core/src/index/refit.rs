@@ -26,22 +26,38 @@ impl BoxIndex {
         }
     }
 
-    /// Does the work of [`BoxIndex::refresh`] for an owner that looks up every changed box: the first call already sorts.
-    /// Returns the work, in nodes and boxes.
-    pub(crate) fn keep_sorted(&mut self, boxes: &[Aabb], changed: Option<&[u32]>) -> u64 {
+    /// Reads the changed boxes, for an owner that looks up each of them. Returns false if the boxes should be sorted before.
+    pub(crate) fn follow(&mut self, boxes: &[Aabb], changed: &[u32]) -> bool {
         // A clone is empty.
-        let Some(changed) = changed.filter(|_| self.is_sorted) else {
-            self.sort(boxes);
-            return boxes.len() as u64;
-        };
+        if !self.is_sorted {
+            return false;
+        }
         self.has_moved = true;
         changed.iter().for_each(|&id| self.take(id, boxes));
         let is_loose = self.loose().len() > policy::loose_leaves(self.leaves);
-        if !is_loose && !self.wants_sort() {
-            return changed.len() as u64;
+        !is_loose && !self.wants_sort()
+    }
+
+    /// Renames the boxes, as of the last sort: `names[id]` is the new id of the box `id`.
+    pub(crate) fn rename(&mut self, names: &[u32]) {
+        self.forget_places();
+        let ids = names.last().map_or(0, |last| *last as usize + 1);
+        self.places.resize(ids.max(self.places.len()), NONE);
+        for (leaf, node) in self.nodes[..self.leaves as usize].iter_mut().enumerate() {
+            for (lane, id) in node.children.iter_mut().enumerate().filter(|(_, id)| **id != NONE) {
+                *id = names[*id as usize];
+                self.places[*id as usize] = (leaf * LANES + lane) as u32;
+            }
         }
-        self.sort(boxes);
-        (changed.len() + boxes.len()) as u64
+    }
+
+    /// Takes the places from all boxes: without a look at ids that have none.
+    fn forget_places(&mut self) {
+        for leaf in (0..self.leaves).chain(self.loose()) {
+            for id in self.nodes[leaf as usize].children.iter().filter(|id| **id != NONE) {
+                self.places[*id as usize] = NONE;
+            }
+        }
     }
 
     /// Returns true if sorting the boxes anew would pay: questions have looked at as many nodes as a sort costs, and the order
@@ -55,8 +71,7 @@ impl BoxIndex {
 
     /// Returns true if questions have looked at as many nodes as this number of sorts costs.
     fn has_earned_sort(&self, sorts: u64) -> bool {
-        self.looked_at.load(Ordering::Relaxed)
-            >= sorts * policy::nodes_for_sort(self.leaves, self.places.len())
+        self.looked_at.load(Ordering::Relaxed) >= sorts * policy::nodes_for_sort(self.leaves, self.listed)
     }
 
     /// Sorts the boxes as they are now.
@@ -166,11 +181,12 @@ impl BoxIndex {
     fn lay_out(&mut self, boxes: &[Aabb], split: Option<u32>) {
         let ids = (0u32..).zip(boxes).filter(|(_, aabb)| aabb.is_valid());
         let mut entries: Vec<Entry> = ids.map(|(id, aabb)| Entry::new(id, aabb)).collect();
+        self.forget_places();
         self.nodes.clear();
         self.parents.clear();
         self.extents.clear();
-        self.places.clear();
-        self.places.resize(boxes.len(), NONE);
+        self.places.resize(boxes.len().max(self.places.len()), NONE);
+        self.listed = boxes.len();
         let all = 0..entries.len();
         let classes = split.map_or_else(|| Vec::from([all]), |split| sort(&mut entries, split));
         let classes: Vec<_> = classes.into_iter().map(|class| self.push_leaves(&entries[class])).collect();

@@ -2,6 +2,7 @@
 
 use super::node::LANES;
 use crate::Aabb;
+use crate::grid::scattered;
 use crate::parallel::{SharedSlice, available_threads, both, run};
 use crate::policy::PARALLEL_FROM_BOXES;
 use std::ops::Range;
@@ -9,6 +10,12 @@ use std::ops::Range;
 /// Bits of an exponent within a class. Boxes of one class differ in size by less than 16 times, and the same axes are long,
 /// within 16 times of the longest: a large or long box among others would make their node large.
 const CLASS_BITS: u32 = 2;
+
+/// Maximum number of sampled boxes of a class, and of all other classes that a class is sorted beside.
+const MAX_SAMPLED: usize = 64;
+
+/// Minimum number of sampled boxes around a part that tell which are around its halves.
+const MIN_SAMPLED: usize = 16;
 
 /// A box as the sort reads it: 20 bytes, as it is moved once for each level of the tree.
 #[derive(Clone, Copy, Debug)]
@@ -34,6 +41,13 @@ impl Entry {
         let class = u32::from(largest >> CLASS_BITS) << 3 | is_long(x) << 2 | is_long(y) << 1 | is_long(z);
         u32::from(self.id >= split) << 31 | class
     }
+
+    /// Returns true if a join meets boxes of both classes, which are different, of two sets if the ids from `split` on are one.
+    fn may_meet(&self, other: &Self, split: u32) -> bool {
+        let (one, other) = (self.class(split), other.class(split));
+        let has_sets = split != u32::MAX;
+        one != other && (!has_sets || (one ^ other) >> 31 == 1)
+    }
 }
 
 /// Returns the exponent's bits of a number that is not negative; those of infinity for a NaN.
@@ -47,41 +61,48 @@ fn with_exponent(exponent: u8) -> f64 {
 }
 
 /// Sorts boxes by class, and within a class by place. Returns the classes. Boxes with ids from `split` on are another set: no class
-/// has boxes of both. But both are cut alike, because boxes that are long in one set keep those of the other from being cut across.
+/// has boxes of both. But each is cut with a look at the other: long boxes of one set keep those of the other from being cut across.
 pub(super) fn sort(entries: &mut [Entry], split: u32) -> Vec<Range<usize>> {
     let are_alike = |a: &Entry, b: &Entry| a.class(split) == b.class(split);
     if entries.windows(2).any(|two| !are_alike(&two[0], &two[1])) {
         entries.sort_unstable_by_key(|entry| entry.class(split));
     }
-    let all: Vec<Measure> = entries.chunk_by(are_alike).map(Measure::of).collect();
-    let (mut classes, mut first): (Vec<Range<usize>>, _) = (Vec::new(), 0);
+    let (mut classes, mut samples, mut first) = (Vec::new(), Vec::new(), 0);
     for class in entries.chunk_by(are_alike) {
         classes.push(first..first + class.len());
+        samples.extend(Sampled::of(class));
         first += class.len();
     }
     let workers = if entries.len() < PARALLEL_FROM_BOXES { 1 } else { available_threads() };
     let shared = SharedSlice::new(entries);
-    run(workers, classes.len(), |_, class| {
+    run(workers, classes.len(), |_, at| {
         // SAFETY: classes have different boxes.
-        sort_by_place(unsafe { shared.part(classes[class].clone()) }, &all);
+        let class = unsafe { shared.part(classes[at].clone()) };
+        let may_meet = |sample: &Sampled| sample.entry.may_meet(&class[0], split);
+        let samples = samples.iter().copied().filter(may_meet).collect();
+        sort_by_place(class, &Others { samples, is_few: false });
     });
     classes
 }
 
 /// Halves a list again and again at the median of its best axis. Medians are ranks, so that a box far away costs the others
-/// nothing. The cuts lie between whole nodes of the level in question.
-fn sort_by_place(mut entries: &mut [Entry], all: &[Measure]) {
-    while entries.len() > LANES {
-        let (axis, middle) = (best_axis(entries, all), cut(entries.len()));
-        let is_few = entries.len() < PARALLEL_FROM_BOXES;
-        entries.select_nth_unstable_by(middle, |a, b| a.center[axis].total_cmp(&b.center[axis]));
-        let (first, rest) = entries.split_at_mut(middle);
-        if is_few {
-            sort_by_place(first, all);
-            entries = rest;
-        } else {
-            return both(|| sort_by_place(first, all), || sort_by_place(rest, all));
-        }
+/// nothing. The cuts lie between whole nodes of the level in question. `others` stand for boxes of other classes around these.
+fn sort_by_place(entries: &mut [Entry], others: &Others) {
+    if entries.len() <= LANES {
+        return;
+    }
+    let part = Measure::of(entries);
+    let mut near = others.near(&part);
+    let (axis, middle) = (best_axis(&part, &near.samples), cut(entries.len()));
+    near.halve(&part, axis);
+    let is_few = entries.len() < PARALLEL_FROM_BOXES;
+    entries.select_nth_unstable_by(middle, |a, b| a.center[axis].total_cmp(&b.center[axis]));
+    let (first, rest) = entries.split_at_mut(middle);
+    if is_few {
+        sort_by_place(first, &near);
+        sort_by_place(rest, &near);
+    } else {
+        both(|| sort_by_place(first, &near), || sort_by_place(rest, &near));
     }
 }
 
@@ -98,12 +119,12 @@ fn cut(len: usize) -> usize {
 /// axes, and rounding would choose one of them again and again.
 const TIE: f64 = 0.01;
 
-/// Returns the axis along which the boxes lie apart most: the spread of their centers is longest, compared with their own
-/// extents and the mean extents of the boxes of `all` classes. (Compared with their own alone, thin tiles would be cut into slabs
-/// as wide as the world, and slabs of tiles that stand in two directions all meet.)
-fn best_axis(entries: &[Entry], all: &[Measure]) -> usize {
-    let Measure { spread, extents, .. } = Measure::of(entries);
-    let extents: [f64; 3] = std::array::from_fn(|k| extents[k] + mean_within(all, k, spread[k]));
+/// Returns the axis along which the boxes lie apart most: the spread of their centers is longest, compared with their own extents
+/// and the mean extents of all boxes in the same place. (Compared with their own alone, thin tiles would be cut into slabs as wide as
+/// the world, and slabs of tiles that stand in two directions all meet. Boxes elsewhere are not met, whatever the cut.)
+fn best_axis(part: &Measure, others: &[Sampled]) -> usize {
+    let Measure { spread, extents, .. } = part;
+    let extents: [f64; 3] = std::array::from_fn(|k| extents[k] + part.mean_within(others, k));
     let compare = |a: usize, b: usize| {
         let (one, other) = (spread[a] * extents[b], spread[b] * extents[a]);
         let is_tie = (one - other).abs() <= TIE * one.max(other);
@@ -112,37 +133,104 @@ fn best_axis(entries: &[Entry], all: &[Measure]) -> usize {
     (0..3).max_by(|a, b| compare(*a, *b)).unwrap_or(0)
 }
 
-/// Returns the mean extent of all boxes on an axis. A box that is longer than `spread` meets both halves of a cut, and counts as
-/// that long: so a few infinite boxes do not keep others from being cut.
-fn mean_within(all: &[Measure], axis: usize, spread: f64) -> f64 {
-    let (mut sum, mut boxes) = (0.0, 0.0);
-    for class in all {
-        sum += class.boxes * class.extents[axis].min(spread);
-        boxes += class.boxes;
-    }
-    sum / boxes
+/// A box that stands for others of its class.
+#[derive(Clone, Copy, Debug)]
+struct Sampled {
+    entry: Entry,
+    /// The number of boxes.
+    boxes: f64,
 }
 
-/// Some boxes: their number, the spread of their centers and their mean extents, by axis.
+impl Sampled {
+    /// Yields some boxes of a class.
+    fn of(class: &[Entry]) -> impl Iterator<Item = Self> {
+        let step = class.len().div_ceil(MAX_SAMPLED);
+        let boxes = class.len() as f64 / class.len().div_ceil(step) as f64;
+        scattered(0..class.len(), step).map(move |i| Self { entry: class[i], boxes })
+    }
+}
+
+/// Boxes of other classes that may meet those of a part.
+#[derive(Clone, Debug)]
+struct Others {
+    samples: Vec<Sampled>,
+    /// True if the samples are too few to tell which of them are near a part of the part: an expected number stands for those.
+    is_few: bool,
+}
+
+impl Others {
+    /// Returns those that may overlap a part: some for all, where they are many.
+    fn near(&self, part: &Measure) -> Self {
+        if self.is_few {
+            return self.clone();
+        }
+        let near = || self.samples.iter().filter(|sample| part.reaches(sample));
+        let count = near().count();
+        let step = count.div_ceil(MAX_SAMPLED).max(1);
+        let boxes = |sample: &Sampled| sample.boxes * step as f64;
+        let samples = near().step_by(step).map(|sample| Sampled { boxes: boxes(sample), ..*sample });
+        Self { samples: samples.collect(), is_few: count < MIN_SAMPLED }
+    }
+
+    /// Leaves the number of boxes that may overlap one half of a part, if that cannot be told from the samples.
+    fn halve(&mut self, part: &Measure, axis: usize) {
+        if self.is_few {
+            let width = part.spread[axis] + part.extents[axis];
+            for sample in &mut self.samples {
+                let extent = with_exponent(sample.entry.exponents[axis]);
+                sample.boxes *= (0.5 * width + extent) / (width + extent);
+            }
+        }
+    }
+}
+
+/// Some boxes: their number, the range and the spread of their centers, their mean and largest extents, by axis.
 #[derive(Clone, Copy, Debug)]
 struct Measure {
     boxes: f64,
+    low: [f32; 3],
+    high: [f32; 3],
     spread: [f64; 3],
     extents: [f64; 3],
+    largest: [u8; 3],
 }
 
 impl Measure {
     fn of(entries: &[Entry]) -> Self {
-        let (mut low, mut high, mut extents) = ([f32::INFINITY; 3], [f32::NEG_INFINITY; 3], [0.0; 3]);
+        let (mut low, mut high) = ([f32::INFINITY; 3], [f32::NEG_INFINITY; 3]);
+        let (mut extents, mut largest) = ([0.0; 3], [0; 3]);
         for entry in entries {
             for k in 0..3 {
                 low[k] = low[k].min(entry.center[k]);
                 high[k] = high[k].max(entry.center[k]);
                 extents[k] += with_exponent(entry.exponents[k]);
+                largest[k] = entry.exponents[k].max(largest[k]);
             }
         }
         let boxes = entries.len().max(1) as f64;
         let spread = std::array::from_fn(|k| (f64::from(high[k]) - f64::from(low[k])).max(0.0));
-        Self { boxes, spread, extents: extents.map(|sum: f64| sum / boxes) }
+        Self { boxes, low, high, spread, extents: extents.map(|sum: f64| sum / boxes), largest }
+    }
+
+    /// Returns true if a box may overlap the bounds of these boxes. Centers are sums of two corners, so that two whole extents, each
+    /// below two powers of two, keep them apart.
+    fn reaches(&self, other: &Sampled) -> bool {
+        (0..3).all(|k| {
+            let reach = 2.0 * (with_exponent(self.largest[k]) + with_exponent(other.entry.exponents[k]));
+            let center = f64::from(other.entry.center[k]);
+            f64::from(self.low[k]) - reach <= center && center <= f64::from(self.high[k]) + reach
+        })
+    }
+
+    /// Returns the mean extent of these and others on an axis. A box that is longer than the spread meets both halves of a cut, and
+    /// counts as that long: so a few infinite boxes do not keep others from being cut.
+    fn mean_within(&self, others: &[Sampled], axis: usize) -> f64 {
+        let (spread, own) = (self.spread[axis], self.extents[axis]);
+        let (mut sum, mut boxes) = (self.boxes * own.min(spread), self.boxes);
+        for other in others {
+            sum += other.boxes * with_exponent(other.entry.exponents[axis]).min(spread);
+            boxes += other.boxes;
+        }
+        sum / boxes
     }
 }

@@ -34,10 +34,11 @@ struct Part {
 
 impl Comparison {
     /// Compares all found pairs with the kept pairs, and keeps the found ones. `is_removed` returns true for a box whose kept
-    /// pairs have already ended. Without it there is no such box.
+    /// pairs have already ended. Without it there is no such box. With `names`, a search of these ids alone has found the pairs, and
+    /// their `a` are places in this list.
     pub(crate) fn run(
         &mut self,
-        found: &mut Groups,
+        (found, names): (&mut Groups, Option<&[u32]>),
         kept: &mut Kept,
         is_removed: Option<&(dyn Fn(u32) -> bool + Sync)>,
         workers: usize,
@@ -57,7 +58,7 @@ impl Comparison {
                 unsafe { (&mut parts.part(group..group + 1)[0], spans.part(ids), pool.part(places)) };
             part.clear();
             found.sort::<false>(group, sorter, spans, pool, first_place);
-            let new = NewRows { first_id, first_place, spans, pool };
+            let new = NewRows { names, first_id, first_place, spans, pool };
             match is_removed {
                 Some(is_removed) => part.compare_stripped(old, &new, is_removed),
                 None => dispatch!(Part::compare, part, old, &new),
@@ -65,7 +66,7 @@ impl Comparison {
         });
         kept.next = next;
         self.gather();
-        kept.adopt_next(&self.added, &self.removed, &self.dropped);
+        kept.adopt_next(names, &self.added, &self.removed, &self.dropped);
     }
 
     /// Forgets all events.
@@ -121,6 +122,9 @@ impl Rows {
 
 /// The sorted rows of a group.
 struct NewRows<'a> {
+    /// The id of each row by its place; none if that is the id.
+    names: Option<&'a [u32]>,
+    /// The place of the group's first row among all rows.
     first_id: u32,
     /// The place of the group's first row in the pool of all rows.
     first_place: u32,
@@ -129,10 +133,11 @@ struct NewRows<'a> {
 }
 
 impl NewRows<'_> {
-    /// Yields each id with its row.
+    /// Yields each id with the place of its row in the pool of the group.
     #[inline(always)]
-    fn rows(&self) -> impl Iterator<Item = (u32, &[u32])> {
-        (self.first_id..).zip(self.spans).map(|(a, span)| (a, &self.pool[self.range(*span)]))
+    fn rows(&self) -> impl Iterator<Item = (u32, Range<usize>)> {
+        let name = |place: u32| self.names.map_or(place, |names| names[place as usize]);
+        self.spans.iter().zip(self.first_id..).map(move |(span, place)| (name(place), self.range(*span)))
     }
 
     /// Returns the place of a row in the pool of the group.
@@ -152,7 +157,8 @@ impl Part {
 
     /// Compares rows without the kept pairs of removed boxes.
     fn compare_stripped(&mut self, old: &Rows, new: &NewRows<'_>, is_removed: &(dyn Fn(u32) -> bool + Sync)) {
-        for (a, is) in new.rows() {
+        for (a, row) in new.rows() {
+            let is = &new.pool[row];
             self.strip(a, old.row(a), is_removed);
             if !row::equal(&self.stripped, is) {
                 row::differences(a, &self.stripped, is, &mut self.added, &mut self.removed);
@@ -163,8 +169,8 @@ impl Part {
     /// Compares rows, most of which are short and have not changed.
     #[inline(always)]
     fn compare(simd: impl Simd, part: &mut Self, old: &Rows, new: &NewRows<'_>) {
-        for (a, span) in (new.first_id..).zip(new.spans) {
-            let (was, is) = (old.spans[a as usize].range(), new.range(*span));
+        for (a, is) in new.rows() {
+            let was = old.spans[a as usize].range();
             row::compare(simd, a, (&old.pool, was), (new.pool, is), (&mut part.added, &mut part.removed));
         }
     }

@@ -88,6 +88,12 @@ impl Groups {
         count
     }
 
+    /// Renames the `b` of all pairs; their `a`, by which they are grouped, keep the names of the search.
+    pub(crate) fn rename_partners(&mut self, names: &[u32]) {
+        let count = self.len();
+        self.pairs[..count].iter_mut().for_each(|pair| pair.b = names[pair.b as usize]);
+    }
+
     /// Turns the counts of all lists into places.
     fn place(&mut self, hits: &mut [Hits]) -> usize {
         self.starts.clear();

@@ -11,6 +11,10 @@ const MIN_ROOM: u32 = 4;
 /// Marks a spare place of a row; the other bits are the row's id. Ids are below 2^28.
 const SPARE: u32 = 1 << 31;
 
+/// Number of ids that are read in the time in which the rows of `b` take an event: after a rebuild with more events these rows are
+/// made anew, by all ids, when they are wanted.
+const IDS_OF_EVENT: usize = 32;
+
 /// Number of pairs between a prefetch of rows and their use.
 const AHEAD: usize = 8;
 
@@ -26,13 +30,20 @@ pub(super) struct Rows {
 
 impl Rows {
     pub(super) fn row(&self, id: u32) -> &[u32] {
-        self.spans.get(id as usize).map_or(&[], |span| &self.pool[span.range()])
+        self.spans.get(id as usize).map_or(&[], |span| self.at(*span))
+    }
+
+    /// Returns the row of a span. That of an empty row may lie beyond the pool, which others have replaced.
+    fn at(&self, span: Span) -> &[u32] {
+        self.pool.get(span.range()).unwrap_or(&[])
     }
 
     fn move_to_end(&mut self, id: u32, span: Span, more: u32) -> Span {
         let start = self.pool.len() as u32;
         let room = (span.len + more).next_power_of_two().max(MIN_ROOM);
-        self.pool.extend_from_within(span.range());
+        if span.len > 0 {
+            self.pool.extend_from_within(span.range());
+        }
         self.pool.resize((start + room) as usize, SPARE | id);
         Span { start, len: span.len }
     }
@@ -110,7 +121,7 @@ impl Rows {
         let mut pool = Vec::with_capacity(pairs + pairs / 8);
         for span in &mut self.spans {
             let start = pool.len() as u32;
-            pool.extend_from_slice(&self.pool[span.range()]);
+            pool.extend_from_slice(self.pool.get(span.range()).unwrap_or(&[]));
             span.start = start;
         }
         self.pool = pool;
@@ -211,7 +222,7 @@ impl Kept {
         }
     }
 
-    /// Changes the rows of `a`, and of `b` if there are any.
+    /// Changes the rows of `a` and of `b`.
     fn change(&mut self, pairs: &[Pair], change: fn(&mut Rows, &[Pair])) {
         if !pairs.is_sorted() {
             let mut sorted = pairs.to_vec();
@@ -219,6 +230,11 @@ impl Kept {
             return self.change(&sorted, change);
         }
         change(&mut self.forward, pairs);
+        self.change_backward(pairs, change);
+    }
+
+    /// Changes the rows of `b`, if there are any.
+    fn change_backward(&mut self, pairs: &[Pair], change: fn(&mut Rows, &[Pair])) {
         if let Some(rows) = self.backward.get_mut() {
             self.turned.clear();
             self.turned.extend(pairs.iter().map(|pair| Pair { a: pair.b, b: pair.a }));
@@ -235,12 +251,29 @@ impl Kept {
         self.len = self.len + added.len() - removed.len();
     }
 
-    /// Takes the compared rows for the kept ones.
-    pub(super) fn adopt_next(&mut self, added: &[Pair], removed: &[Pair], dropped: &[Pair]) {
+    /// Takes the compared rows for the kept ones: all, or those of the ids in `names`. No other id has a pair.
+    pub(super) fn adopt_next(
+        &mut self,
+        names: Option<&[u32]>,
+        added: &[Pair],
+        removed: &[Pair],
+        dropped: &[Pair],
+    ) {
         std::mem::swap(&mut self.forward, &mut self.next);
+        if let Some(names) = names {
+            std::mem::swap(&mut self.forward.spans, &mut self.next.spans);
+            let rows = names.iter().zip(&self.next.spans);
+            rows.for_each(|(id, span)| self.forward.spans[*id as usize] = *span);
+        }
         self.count(added, removed);
         self.count(&[], dropped);
-        self.backward.take();
+        let events = added.len() + removed.len() + dropped.len();
+        if names.is_none() || events * IDS_OF_EVENT > self.lower.len() {
+            self.backward.take();
+        }
+        self.change_backward(dropped, Rows::remove_all);
+        self.change_backward(removed, Rows::remove_all);
+        self.change_backward(added, Rows::insert_all);
     }
 
     /// Drops pairs that end without an event.

@@ -43,7 +43,8 @@ pub(super) fn compare(
         |pool: &[u32], row: &Range<usize>| pool.get(row.start..).and_then(|rest| rest.first_chunk().copied());
     let is_short = was.len().max(is.len()) <= SHORT;
     let (Some(was8), Some(is8), true) = (eight(old, &was), eight(new, &is), is_short) else {
-        let (was, is) = (&old[was], &new[is]);
+        // An old row that is empty may lie beyond the pool.
+        let (was, is) = (old.get(was).unwrap_or(&[]), &new[is]);
         return if !equal(was, is) {
             differences(a, was, is, added, removed)
         };

@@ -23,8 +23,9 @@ const FREE_EVENTS: usize = 1024;
 /// 100,000 boxes, and at 4 to 5% of a million.
 pub(crate) const EDIT_UP_TO_ONE_IN: usize = 20;
 
-/// Maximum share of ids in use, as one in this number, for boxes to be sorted into a new tree: a rebuild looks at all ids.
-const SPARSE_FROM_ONE_IN: usize = 8;
+/// Maximum share of present boxes among all ids, as one in this number, for a rebuild to list them: copying a box takes about as
+/// long as reading an id without one.
+const LIST_UP_TO_ONE_IN: usize = 2;
 
 /// Work of an edit for each box of the world, in tests of codes of 0.35 ns; a rebuild sorts a box in about 40 ns.
 const EDIT_UP_TO_WORK_PER_BOX: u64 = 60;
@@ -32,8 +33,8 @@ const EDIT_UP_TO_WORK_PER_BOX: u64 = 60;
 /// Maximum number of rebuilds in a row after updates that were given up.
 const MAX_REBUILDS: u32 = 64;
 
-/// Maximum number of nodes looked at and boxes met in an update in a tree, for each id.
-const LOOK_UP_TO_NODES_PER_ID: u64 = 8;
+/// Maximum number of nodes looked at and boxes met in an update in a tree, for each box of the world.
+const LOOK_UP_TO_NODES_PER_BOX: u64 = 8;
 
 /// Maximum share of boxes out of the grid's order for an edit, as one in this number: lists are slower than slots.
 pub(crate) const SPILL_UP_TO_ONE_IN: usize = 2;
@@ -46,8 +47,6 @@ pub(crate) const PARALLEL_FROM_EDITS: usize = 1024;
 pub(crate) struct Counts {
     /// Boxes that are present.
     pub(crate) boxes: usize,
-    /// One more than the largest id.
-    pub(crate) ids: usize,
     /// Boxes changed since the last update.
     pub(crate) changed: usize,
     /// True if the old state of all changed boxes is known.
@@ -65,25 +64,18 @@ impl Counts {
         self.knows_old && self.holder == Holder::Grid
     }
 
-    /// Returns true if a sweep finds what has changed soonest, in a world of at most `most` boxes. A few boxes left of many are also
-    /// swept, because a grid would look at all ids. Sweep and tree do not take turns, because each looks at all ids when it begins.
+    /// Returns true if a sweep finds what has changed soonest, in a world of at most `most` boxes.
     fn may_sweep(&self, most: usize) -> bool {
         // Each changed box meets all, or each box half of the others.
         let events = self.events.saturating_sub(FREE_EVENTS);
         let tests = self.changed.min(self.boxes / 2) * self.boxes + TESTS_OF_EVENT * events;
         let tests_per_box = tests / self.boxes.max(1);
-        let are_left = self.is_sparse() && self.holder != Holder::Tree;
-        self.boxes <= most && tests_per_box <= SWEEP_UP_TO_TESTS_PER_BOX && (self.ids <= most || are_left)
+        self.boxes <= most && tests_per_box <= SWEEP_UP_TO_TESTS_PER_BOX
     }
 
-    /// Returns true if most ids are not in use.
-    fn is_sparse(&self) -> bool {
-        self.boxes * SPARSE_FROM_ONE_IN <= self.ids
-    }
-
-    /// Returns true if few enough of some boxes or ids have changed for an engine to look at these alone.
-    fn are_few_of(&self, all: usize) -> bool {
-        self.changed * EDIT_UP_TO_ONE_IN <= all
+    /// Returns true if few enough boxes have changed for an engine to look at these alone.
+    fn are_few(&self) -> bool {
+        self.changed * EDIT_UP_TO_ONE_IN <= self.boxes
     }
 }
 
@@ -91,13 +83,11 @@ impl Counts {
 ///
 /// | rule, the first that applies | engine |
 /// | --- | --- |
-/// | boxes at most [`SWEEP_FIRST_UP_TO_BOXES`], tests for each at most [`SWEEP_UP_TO_TESTS_PER_BOX`]; ids as few, or most not in use and no tree | sweep |
+/// | boxes at most [`SWEEP_FIRST_UP_TO_BOXES`], tests for each at most [`SWEEP_UP_TO_TESTS_PER_BOX`] | sweep |
 /// | a grid of the last update, changed at most 1 in [`EDIT_UP_TO_ONE_IN`], spilled at most 1 in [`SPILL_UP_TO_ONE_IN`] | edit |
 /// | as in the first row, boxes at most [`SWEEP_UP_TO_BOXES`] | sweep |
-/// | a tree of the last update, or at most 1 in [`SPARSE_FROM_ONE_IN`] ids in use; changed at most 1 in [`EDIT_UP_TO_ONE_IN`] ids | tree |
+/// | a tree of the last update, changed at most 1 in [`EDIT_UP_TO_ONE_IN`] | tree |
 /// | else | rebuild |
-///
-/// A rebuild looks at all ids. So after a peak, when few boxes are left, they are swept or lie in a tree.
 pub(crate) fn choose_engine(counts: &Counts, forced: Option<Engine>) -> Engine {
     match forced {
         Some(Engine::Edit) if !counts.may_edit() => return Engine::Rebuild,
@@ -105,14 +95,13 @@ pub(crate) fn choose_engine(counts: &Counts, forced: Option<Engine>) -> Engine {
         None => {}
     }
     let is_tidy = counts.spilled * SPILL_UP_TO_ONE_IN <= counts.boxes;
-    let has_tree = counts.holder == Holder::Tree || counts.is_sparse();
     if counts.may_sweep(SWEEP_FIRST_UP_TO_BOXES) {
         Engine::Sweep
-    } else if counts.may_edit() && is_tidy && counts.are_few_of(counts.boxes) {
+    } else if counts.may_edit() && is_tidy && counts.are_few() {
         Engine::Edit
     } else if counts.may_sweep(SWEEP_UP_TO_BOXES) {
         Engine::Sweep
-    } else if has_tree && counts.are_few_of(counts.ids) {
+    } else if counts.holder == Holder::Tree && counts.are_few() {
         Engine::Tree
     } else {
         Engine::Rebuild
@@ -160,8 +149,13 @@ pub(crate) fn edit_up_to_work(boxes: usize, pairs: usize, rebuild_work: u64) -> 
 }
 
 /// Returns the maximum number of nodes for look-ups in a tree: 5 ns each, while a search sorts and joins a box in about 150 ns.
-pub(crate) fn look_up_to_nodes(ids: usize) -> u64 {
-    LOOK_UP_TO_NODES_PER_ID * ids as u64
+pub(crate) fn look_up_to_nodes(boxes: usize) -> u64 {
+    LOOK_UP_TO_NODES_PER_BOX * boxes as u64
+}
+
+/// Returns true if a rebuild lists the present boxes first: after a peak it does not look at all ids.
+pub(crate) fn is_listed(boxes: usize, ids: usize) -> bool {
+    boxes * LIST_UP_TO_ONE_IN <= ids
 }
 
 /// Returns the number of old states to keep until the next update.
@@ -177,15 +171,8 @@ pub(crate) fn old_states_to_keep(boxes: usize, forced: Option<Engine>) -> usize 
 mod tests {
     use super::*;
 
-    const WORLD: Counts = Counts {
-        boxes: 10_000,
-        ids: 10_000,
-        changed: 100,
-        knows_old: true,
-        holder: Holder::Grid,
-        spilled: 0,
-        events: 0,
-    };
+    const WORLD: Counts =
+        Counts { boxes: 10_000, changed: 100, knows_old: true, holder: Holder::Grid, spilled: 0, events: 0 };
 
     #[test]
     fn few_changes_are_edited_and_many_rebuild_the_grid() {
@@ -199,16 +186,18 @@ mod tests {
     }
 
     #[test]
-    fn few_changes_use_a_tree_if_kept_or_if_most_ids_are_unused() {
+    fn few_changes_use_a_tree_if_it_is_kept() {
         let tree = Counts { holder: Holder::Tree, knows_old: false, ..WORLD };
-        assert_eq!(choose_engine(&tree, None), Engine::Tree);
+        assert_eq!(choose_engine(&Counts { changed: 500, ..tree }, None), Engine::Tree);
         assert_eq!(choose_engine(&Counts { changed: 501, ..tree }, None), Engine::Rebuild);
-        let left = Counts { boxes: 1250, changed: 201, ..WORLD };
-        assert_eq!(choose_engine(&left, None), Engine::Tree);
-        assert_eq!(choose_engine(&Counts { holder: Holder::Nothing, ..left }, None), Engine::Tree);
-        assert_eq!(choose_engine(&Counts { changed: 200, ..left }, None), Engine::Sweep);
-        assert_eq!(choose_engine(&Counts { changed: 62, ..left }, None), Engine::Edit);
-        assert_eq!(choose_engine(&Counts { boxes: 100, ..WORLD }, None), Engine::Sweep);
+        assert_eq!(choose_engine(&Counts { boxes: 2048, ..tree }, None), Engine::Sweep);
+        assert_eq!(choose_engine(&Counts { boxes: 2049, ..tree }, None), Engine::Tree);
+        assert_eq!(look_up_to_nodes(1000), 8000);
+    }
+
+    #[test]
+    fn boxes_are_listed_if_half_of_the_ids_have_none() {
+        assert!(is_listed(500, 1000) && !is_listed(501, 1000));
     }
 
     #[test]
@@ -227,22 +216,14 @@ mod tests {
 
     #[test]
     fn small_worlds_are_swept_while_few_boxes_change() {
-        let small = Counts { boxes: 1000, ids: 1000, changed: 200, holder: Holder::Nothing, ..WORLD };
+        let small = Counts { boxes: 1000, changed: 200, holder: Holder::Nothing, ..WORLD };
         assert_eq!(choose_engine(&small, None), Engine::Sweep);
         assert_eq!(choose_engine(&Counts { changed: 201, ..small }, None), Engine::Rebuild);
         assert_eq!(choose_engine(&Counts { changed: 100, events: 1416, ..small }, None), Engine::Sweep);
         assert_eq!(choose_engine(&Counts { changed: 100, events: 1424, ..small }, None), Engine::Rebuild);
-        assert_eq!(
-            choose_engine(&Counts { boxes: 401, ids: 401, changed: 401, ..small }, None),
-            Engine::Sweep
-        );
-        assert_eq!(
-            choose_engine(&Counts { boxes: 402, ids: 402, changed: 402, ..small }, None),
-            Engine::Rebuild
-        );
-        assert_eq!(choose_engine(&Counts { ids: 2048, ..small }, None), Engine::Sweep);
-        assert_eq!(choose_engine(&Counts { ids: 2049, ..small }, None), Engine::Rebuild);
-        let more = Counts { boxes: 1025, ids: 1025, changed: 51, holder: Holder::Grid, ..small };
+        assert_eq!(choose_engine(&Counts { boxes: 401, changed: 401, ..small }, None), Engine::Sweep);
+        assert_eq!(choose_engine(&Counts { boxes: 402, changed: 402, ..small }, None), Engine::Rebuild);
+        let more = Counts { boxes: 1025, changed: 51, holder: Holder::Grid, ..small };
         assert_eq!(choose_engine(&more, None), Engine::Edit);
         assert_eq!(choose_engine(&Counts { changed: 52, ..more }, None), Engine::Sweep);
         assert_eq!(choose_engine(&Counts { knows_old: false, ..small }, None), Engine::Sweep);

@@ -52,7 +52,7 @@ impl Edit {
         stage!("edit");
         let mut clock = Clock::start();
         let world = task.world;
-        let most = policy::edit_up_to_work(world.present() as usize, task.kept.len(), task.store.work);
+        let most = policy::edit_up_to_work(world.present.len(), task.kept.len(), task.store.work);
         let limits = EditLimits { pairs: task.config.limits.pairs(), work: task.unless_forced(most) };
         let is_done = self.find(world, &mut task.store.grid, task.events, limits);
         let check = clock.lap();

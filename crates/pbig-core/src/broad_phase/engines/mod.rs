@@ -2,6 +2,7 @@
 
 pub(super) mod device;
 pub(super) mod edit;
+mod listed;
 mod partners;
 mod rebuild;
 mod sweep;

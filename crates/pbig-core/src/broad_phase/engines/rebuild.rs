@@ -1,9 +1,15 @@
-//! The engine for many changed boxes: all boxes are searched, and the pairs are compared with the kept ones.
+//! The engine for many changed boxes: all boxes are searched, and the pairs are compared with the kept ones. Where most ids have
+//! no box, the present boxes are listed first, and the search knows them by their places in the list.
 
+use super::listed::Listed;
 use super::task::Task;
+use crate::Pair;
 use crate::all_pairs::{AllPairs, Request};
+use crate::broad_phase::world::World;
+use crate::holder::Holder;
 use crate::outcome::{End, Outcome};
-use crate::pairs::{Grouping, Groups};
+use crate::pairs::{Grouping, Groups, Kept};
+use crate::policy;
 use crate::report::{Clock, stage};
 
 /// The buffers of the engine.
@@ -11,29 +17,57 @@ use crate::report::{Clock, stage};
 pub(super) struct Rebuild {
     all_pairs: AllPairs,
     groups: Groups,
+    listed: Listed,
 }
 
 impl Rebuild {
     /// Leaves the events of an update in the task, and replaces the kept pairs by the found ones.
     pub(super) fn run(&mut self, task: &mut Task<'_>) -> Outcome {
-        let (world, grouping) = (task.world, Grouping::new(task.world.ids()));
-        let filters = world.is_filtered.then_some(&world.filters[..]);
-        let request =
-            Request { filters, grouping: Some(grouping), ..Request::new(&world.boxes, task.config) };
-        let mut outcome = self.all_pairs.find(&request, task.store);
-        if outcome.end != End::Done {
-            return outcome;
+        let world = task.world;
+        let is_listed = policy::is_listed(world.present.len(), world.ids());
+        let (mut boxes, mut filters) = (&world.boxes, &world.filters);
+        if is_listed {
+            self.listed.take(world);
+            (boxes, filters) = (&self.listed.boxes, &self.listed.filters);
         }
+        let filters = world.is_filtered.then_some(&filters[..]);
+        let grouping = Some(Grouping::new(boxes.len()));
+        let request = Request { filters, grouping, ..Request::new(boxes, task.config) };
+        let mut outcome = self.all_pairs.find(&request, task.store);
+        outcome.work += (boxes.len() - world.present.len()) as u64;
+        if outcome.end == End::Done {
+            let mut clock = Clock::start();
+            self.compare(task, outcome.holder, is_listed);
+            outcome.stages.diff = clock.lap();
+            outcome.has_replaced_kept = true;
+        }
+        outcome
+    }
+
+    /// Compares the found pairs with the kept ones.
+    fn compare(&mut self, task: &mut Task<'_>, holder: Holder, is_listed: bool) {
         stage!("diff");
-        let mut clock = Clock::start();
-        self.all_pairs.gather(grouping, &mut self.groups);
+        let world = task.world;
+        let boxes = if is_listed { self.listed.ids.len() } else { world.ids() };
+        self.all_pairs.gather(Grouping::new(boxes), &mut self.groups);
+        let names = is_listed.then_some(&self.listed.ids[..]);
+        if let Some(names) = names {
+            task.store.rename(holder, names);
+            self.groups.rename_partners(names);
+            drop_rows_of_removed(world, task.kept);
+        }
         let was_removed = |id: u32| world.was_removed(id);
         let is_removed: Option<&(dyn Fn(u32) -> bool + Sync)> =
             if world.has_removed() { Some(&was_removed) } else { None };
-        let workers = AllPairs::workers(world.ids());
-        task.events.run(&mut self.groups, task.kept, is_removed, workers);
-        outcome.stages.diff = clock.lap();
-        outcome.has_replaced_kept = true;
-        outcome
+        let workers = AllPairs::workers(boxes);
+        task.events.run((&mut self.groups, names), task.kept, is_removed, workers);
     }
+}
+
+/// Drops the pairs of removed boxes whose ids are not in a list of the present boxes.
+fn drop_rows_of_removed(world: &World, kept: &mut Kept) {
+    let absent = world.removed().iter().filter(|id| !world.contains(**id));
+    let pairs = |&a: &u32| kept.later_partners(a).iter().map(move |&b| Pair { a, b });
+    let dropped: Vec<Pair> = absent.flat_map(pairs).collect();
+    kept.drop_pairs(&dropped);
 }

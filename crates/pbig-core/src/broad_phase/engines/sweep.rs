@@ -73,19 +73,21 @@ impl Sweep {
         }
         // A box in a lane that was free is out of order.
         if !can_stay || are_many && !self.is_in_order {
-            self.lay_out(&world.boxes);
+            self.lay_out(world);
         }
     }
 
     /// Gives every valid box a lane.
-    fn lay_out(&mut self, boxes: &[Aabb]) {
+    fn lay_out(&mut self, world: &World) {
+        for &id in self.ids.iter().filter(|id| **id != NONE) {
+            self.lanes[id as usize] = NONE;
+        }
+        self.lanes.resize(world.ids(), NONE);
         self.blocks.clear();
         self.ids.clear();
         self.free.clear();
-        self.lanes.clear();
-        self.lanes.resize(boxes.len(), NONE);
         self.is_in_order = true;
-        (0..).zip(boxes).for_each(|(id, aabb)| self.put(id, aabb));
+        world.present.iter().for_each(|id| self.put(id, &world.boxes[id as usize]));
     }
 
     /// Stores a box in its lane, in a new one, or in none if it is invalid.

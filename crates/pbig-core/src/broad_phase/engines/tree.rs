@@ -1,6 +1,7 @@
 //! The engine for few changed boxes where a tree is kept: each is looked up where it is, and what it overlaps is compared with its
 //! kept pairs.
 
+use super::listed::Listed;
 use super::partners::Partners;
 use super::task::Task;
 use crate::grid::BLOCK;
@@ -14,6 +15,7 @@ use crate::{Algorithm, Checks, Plan};
 #[derive(Clone, Debug, Default)]
 pub(super) struct LookUp {
     partners: Partners,
+    listed: Listed,
 }
 
 impl LookUp {
@@ -23,10 +25,9 @@ impl LookUp {
         let mut clock = Clock::start();
         let world = task.world;
         let mut outcome = Outcome { holder: Holder::Tree, ..Outcome::default() };
-        let changed = (task.holder == Holder::Tree).then_some(&world.changed[..]);
-        let refit = task.store.tree.keep_sorted(&world.boxes, changed);
+        let refit = self.bring_up_to_date(task);
         outcome.stages.map = clock.lap();
-        let max_work = task.unless_forced(policy::look_up_to_nodes(world.ids()));
+        let max_work = task.unless_forced(policy::look_up_to_nodes(world.present.len()));
         let (nodes, met) = self.look_up(task, max_work);
         outcome.stages.check = clock.lap();
         let made = nodes * BLOCK as u64;
@@ -35,6 +36,18 @@ impl LookUp {
         outcome.plan = Plan { algorithm: Algorithm::Tree, boxes: world.valid(), ..Plan::default() };
         outcome.end = if nodes + met <= max_work { End::Done } else { End::GivenUp };
         outcome
+    }
+
+    /// Refits the tree along the changed boxes, or sorts it. Returns the work, in boxes.
+    fn bring_up_to_date(&mut self, task: &mut Task<'_>) -> u64 {
+        let (world, tree) = (task.world, &mut task.store.tree);
+        if task.holder == Holder::Tree && tree.follow(&world.boxes, &world.changed) {
+            return world.changed.len() as u64;
+        }
+        self.listed.take(world);
+        tree.sort(&self.listed.boxes);
+        tree.rename(&self.listed.ids);
+        (world.changed.len() + self.listed.ids.len()) as u64
     }
 
     /// Returns the numbers of nodes looked at and of boxes met. If these are more than `max_work`, events are missing.
