@@ -188,7 +188,7 @@ struct Ready {
 
 impl Recording<'_> {
     /// Records steps: first everything that is cleared, then the kernels. They share a pass, unless each is timed.
-    pub(super) fn record(&mut self, steps: &[Step]) -> Result<(), GpuError> {
+    pub(super) fn record(&mut self, steps: &[Step]) {
         let mut kernels = Vec::with_capacity(steps.len());
         for &step in steps {
             match step {
@@ -197,16 +197,15 @@ impl Recording<'_> {
                     self.encoder.clear_buffer(buffer, 0, Some(bytes));
                 }
                 Run(_, Direct(0)) => {}
-                Run(kernel, groups) => kernels.push(self.ready(kernel, groups, self.variant)?),
+                Run(kernel, groups) => kernels.push(self.ready(kernel, groups, self.variant)),
                 RunOnRows(kernel, groups) => {
-                    kernels.push(self.ready(kernel, groups, self.variant.of_rows())?);
+                    kernels.push(self.ready(kernel, groups, self.variant.of_rows()));
                 }
             }
         }
         self.passes.extend(kernels.iter().map(|ready| ready.kernel));
         let Some(query_set) = self.queries else {
-            self.run(&kernels, None);
-            return Ok(());
+            return self.run(&kernels, None);
         };
         for (i, kernel) in (0u32..).zip(&kernels) {
             let (beginning, end) = (Some(2 * i), Some(2 * i + 1));
@@ -217,18 +216,12 @@ impl Recording<'_> {
             };
             self.run(std::slice::from_ref(kernel), Some(writes));
         }
-        Ok(())
     }
 
-    fn ready(
-        &mut self,
-        kernel: &'static Kernel,
-        groups: Groups,
-        variant: Variant,
-    ) -> Result<Ready, GpuError> {
-        let pipeline = self.storage.device.pipeline(kernel, variant)?;
+    fn ready(&mut self, kernel: &'static Kernel, groups: Groups, variant: Variant) -> Ready {
+        let pipeline = self.storage.device.pipeline(kernel, variant);
         let bind_group = self.storage.bind_group(kernel, variant, self.side, &pipeline);
-        Ok(Ready { kernel, pipeline, bind_group, groups })
+        Ready { kernel, pipeline, bind_group, groups }
     }
 
     /// Records a pass.
