@@ -192,6 +192,18 @@ impl GpuFinder {
         self.run(&Search::all(request), found).await.map_err(Failure::for_core)
     }
 
+    /// Finds the pairs that an update has changed, as [`PairDevice::find_changed`], without blocking.
+    ///
+    /// # Errors
+    /// As [`GpuFinder::find_all_async`].
+    pub async fn find_changed_async(
+        &mut self,
+        request: &ChangeRequest<'_>,
+        found: &mut DeviceFound,
+    ) -> Result<(), DeviceFailure> {
+        self.run(&Search::changes(request), found).await.map_err(Failure::for_core)
+    }
+
     /// Runs a search, and notes how it went.
     async fn run(&mut self, request: &Search<'_>, found: &mut DeviceFound) -> Result<(), Failure> {
         self.check_pause()?;
