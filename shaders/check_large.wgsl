@@ -103,11 +103,13 @@ fn place(item: LargeItem, column: u32) -> Placed {
 }
 
 @compute @workgroup_size(LANES)
-fn check_large(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>,
-               @builtin(local_invocation_index) lane: u32) {
-    let index = linear(group, groups);
+fn check_large(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
+    let index = linear(group);
     if index >= chunk.large_items || chunk.first_large + index >= counters.large_items {
         return;
+    }
+    if lane == 0u {
+        atomicStore(&marks, 0u);
     }
     if beyond_limit(lane) {
         return;

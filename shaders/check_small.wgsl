@@ -65,12 +65,12 @@ fn place(words: u32) -> Placed {
 }
 
 @compute @workgroup_size(LANES)
-fn check_small(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>,
-               @builtin(local_invocation_index) lane: u32) {
-    let index = linear(group, groups);
+fn check_small(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
+    let index = linear(group);
     if index >= chunk.small_items || chunk.first_small + index >= counters.small_items {
         return;
     }
+    atomicStore(&slot_hits[lane], 0u);
     if beyond_limit(lane) {
         return;
     }

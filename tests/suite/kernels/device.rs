@@ -15,13 +15,23 @@ pub(super) fn gpus() -> Option<&'static GpuFinder> {
 
 /// Runs a kernel on a state, and returns the state afterwards.
 pub(super) fn on_device(gpu: &GpuFinder, twin: &Twin, options: &GpuOptions, before: &State) -> State {
+    run_text(gpu, twin, &poisoned(twin.kernel, before.finds_changes()), options, before)
+}
+
+/// Runs a kernel with a text that counts: `from` is replaced by `to`.
+pub(super) fn counting(kernel: &str, [from, to]: [&str; 2], before: &State) -> State {
+    let text = poisoned(twin(kernel).kernel, before.finds_changes());
+    assert!(text.contains(from), "{kernel} has no {from}");
+    run_text(gpu(), twin(kernel), &text.replace(from, to), &GpuOptions::DEFAULT, before)
+}
+
+fn run_text(gpu: &GpuFinder, twin: &Twin, text: &str, options: &GpuOptions, before: &State) -> State {
     let mut after = before.clone();
     let bindings = twin.kernel.bindings;
     let buffers: Vec<_> = bindings.iter().map(|&buffer| padded(after.bytes(buffer))).collect();
     let groups = (twin.groups)(before);
-    let changes = before.finds_changes();
-    let left = single::run(gpu, twin.kernel, options, changes, &buffers, groups)
-        .expect("the device runs the kernel");
+    let left =
+        single::run(gpu, twin.kernel, text, options, &buffers, groups).expect("the device runs the kernel");
     for (&buffer, left) in bindings.iter().zip(&left) {
         let own = after.bytes(buffer);
         let len = own.len();
