@@ -18,11 +18,14 @@ pub(super) fn on_device(gpu: &GpuFinder, twin: &Twin, options: &GpuOptions, befo
     run_text(gpu, twin, &poisoned(twin.kernel, before.finds_changes()), options, before)
 }
 
-/// Runs a kernel with a text that counts: `from` is replaced by `to`.
-pub(super) fn counting(kernel: &str, [from, to]: [&str; 2], before: &State) -> State {
-    let text = poisoned(twin(kernel).kernel, before.finds_changes());
-    assert!(text.contains(from), "{kernel} has no {from}");
-    run_text(gpu(), twin(kernel), &text.replace(from, to), &GpuOptions::DEFAULT, before)
+/// Runs a kernel with a text that counts what the kernel does. An edit replaces its first part by its second one.
+pub(super) fn counting(kernel: &str, edits: &[[&str; 2]], before: &State) -> State {
+    let mut text = poisoned(twin(kernel).kernel, before.finds_changes());
+    for [from, to] in edits {
+        assert!(text.contains(from), "{kernel} has no {from}");
+        text = text.replace(from, to);
+    }
+    run_text(gpu(), twin(kernel), &text, &GpuOptions::DEFAULT, before)
 }
 
 fn run_text(gpu: &GpuFinder, twin: &Twin, text: &str, options: &GpuOptions, before: &State) -> State {

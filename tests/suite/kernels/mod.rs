@@ -9,6 +9,7 @@ mod checks;
 mod compare;
 mod device;
 mod indices;
+mod lanes;
 mod layout_of_structs;
 mod plans;
 mod poison;

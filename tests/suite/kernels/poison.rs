@@ -86,7 +86,7 @@ fn all_workgroup_memory_is_poisoned() {
     let text = poisoned(&shaders::CHECK_LARGE, true);
     let filled = |what: &str| assert!(text.contains(what), "{what} in {text}");
     filled("for (var i0 = lane; i0 < 5u; i0 += 256u) { atomicStore(&tally[i0], 0xdeadbeefu);");
-    filled("column_boxes[i0].before.high[i1] = -559038737;");
+    filled("staged_boxes[i0].before.high[i1] = -559038737;");
     filled("placed.packed = 0xdeadbeefu;");
     for kernel in all_kernels().filter(|kernel| kernel.source(false).contains("var<workgroup>")) {
         naga::front::wgsl::parse_str(&poisoned(kernel, false)).expect("a valid text");

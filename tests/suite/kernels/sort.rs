@@ -303,11 +303,14 @@ fn a_ground_costs_its_counter_one_operation_a_workgroup() {
     for count in [1, 3] {
         let before = grounds("count_pairs", 20_000, count, 1);
         let most = count * by_found_pair(&before);
-        let operations = rows(&counting("count_pairs", [amount, "1u"], &before));
+        let operations = rows(&counting("count_pairs", &[[amount, "1u"]], &before));
         assert!(operations > 0 && operations <= most, "count: {operations} of {most}");
+        let alone = ["select(lane, claimed, keys[claimed] == key)", "lane"];
+        let operations = rows(&counting("count_pairs", &[[amount, "1u"], alone], &before));
+        assert_eq!(operations, found_pairs(&before), "without leaders");
         // The rows are in ends within their blocks: only those of the grounds go down.
         let before = grounds("place_pairs", 20_000, count, 1);
-        let operations = rows(&before) - rows(&counting("place_pairs", [amount, "1u"], &before));
+        let operations = rows(&before) - rows(&counting("place_pairs", &[[amount, "1u"]], &before));
         assert!(operations > 0 && operations <= most, "place: {operations} of {most}");
     }
 }
@@ -323,7 +326,7 @@ fn a_pair_of_a_long_row_is_read_a_few_times() {
     ] {
         let mut before = grounds(kernel, 10_000_000, 1, 50);
         before.windows.push(0);
-        let after = counting(kernel, [read, &format!("{note} {read}")], &before);
+        let after = counting(kernel, &[[read, &format!("{note} {read}")]], &before);
         let (reads, pairs) = (after.windows.last().expect("one was pushed"), found_pairs(&before));
         assert!((pairs..=most * pairs).contains(reads), "{kernel}: {reads} reads of {pairs} pairs");
     }
