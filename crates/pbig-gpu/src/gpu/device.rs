@@ -190,7 +190,8 @@ impl GpuDevice {
             entry_point: Some(kernel.name),
             compilation_options: wgpu::PipelineCompilationOptions {
                 constants: &variant.constants(source),
-                ..Default::default()
+                // Lane 0 would zero everything, which is slow. Kernels zero what they read.
+                zero_initialize_workgroup_memory: false,
             },
             cache: None,
         })
