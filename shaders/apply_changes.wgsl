@@ -9,9 +9,8 @@
 @group(0) @binding(5) var<storage, read_write> changed: array<atomic<u32>>;
 
 @compute @workgroup_size(LANES)
-fn apply_changes(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>,
-                 @builtin(local_invocation_index) lane: u32) {
-    let i = linear(group, groups) * LANES + lane;
+fn apply_changes(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
+    let i = linear(group) * LANES + lane;
     if i < params.box_changes {
         let id = box_changes[i].marked_id & ~WAS_ABSENT;
         let was_absent = (box_changes[i].marked_id & WAS_ABSENT) != 0u;

@@ -6,7 +6,7 @@
 @group(0) @binding(2) var<storage, read> counters: Counters;
 @group(0) @binding(3) var<storage, read_write> totals: Totals;
 @group(0) @binding(4) var<storage, read_write> dispatches: array<u32, 9>;
-@group(0) @binding(5) var<storage, read_write> long_dispatch: array<u32, 3>;
+@group(0) @binding(5) var<storage, read_write> long_rows: array<u32>;
 
 @compute @workgroup_size(1)
 fn arrange_rows() {
@@ -16,8 +16,9 @@ fn arrange_rows() {
     let sorted = has_all && fits;
     totals.sorted = u32(sorted);
     write_dispatch(6u, select(0u, (pairs + LANES - 1u) / LANES, sorted));
-    // A workgroup for each window of each long row. rank_pairs counts these rows.
-    long_dispatch[0] = (params.boxes + WINDOW - 1u) / WINDOW;
-    long_dispatch[1] = 0u;
-    long_dispatch[2] = 1u;
+    // rank_pairs lists the pieces of long rows, each of which gets a workgroup.
+    long_rows[0] = 0u;
+    long_rows[1] = 0u;
+    long_rows[2] = 1u;
+    long_rows[PIECES] = 0u;
 }

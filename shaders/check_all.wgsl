@@ -12,11 +12,13 @@
 var<workgroup> bits: array<atomic<u32>, 8>;
 
 @compute @workgroup_size(LANES)
-fn check_all(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>,
-             @builtin(local_invocation_index) lane: u32) {
+fn check_all(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
     let n = params.boxes;
     let all = n * (n - 1u) / 2u;
-    let first = linear(group, groups) * LANES;
+    let first = linear(group) * LANES;
+    if lane < 8u {
+        atomicStore(&bits[lane], 0u);
+    }
     if first >= all || beyond_limit(lane) {
         return;
     }

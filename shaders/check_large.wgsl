@@ -1,5 +1,5 @@
 // Check, large cells (PBIG algorithm 2): tests a segment of rows against segments of columns, which pass through workgroup
-// memory. Within one segment equation 7 distributes the pairs over the rows.
+// memory. Within one segment equation 7 distributes the pairs over the rows. With few residents the two change roles.
 
 @group(0) @binding(0) var<uniform> params: Params;
 @group(0) @binding(1) var<uniform> chunk: Chunk;
@@ -14,9 +14,9 @@
 // If true, the rows of one segment get equally many pairs (PBIG 5.1). If false, a row gets all boxes after it.
 override BALANCED: bool = true;
 
-// The segment of columns.
-var<workgroup> column_boxes: array<KnownBox, LANES>;
-var<workgroup> column_entries: array<u32, LANES>;
+// The staged segment: usually the columns.
+var<workgroup> staged_boxes: array<KnownBox, LANES>;
+var<workgroup> staged_entries: array<u32, LANES>;
 // All marks of the item's entries. If the mark of an axis is missing, the cell owns none of the item's pairs, and the item
 // is skipped. For many boxes across one border of cells this skips 7 of 8 cells. A search for changes also skips items
 // without a moved box.
@@ -40,32 +40,89 @@ fn row_partner(row: u32, k: u32, n: u32) -> u32 {
     return select(partner, partner - n, partner >= n);
 }
 
-// Hits of a lane against one segment of columns: bit k is set if the k-th partner is a hit.
+// Hits of a lane against the staged segment: bit k is set if the k-th partner is a hit.
 var<private> mask: array<u32, 8>;
 
-// Tests a row against the segment's columns; `within` its own segment against the columns that equation 7 assigns.
-// Returns the number of hits.
-fn test_row(lane: u32, row: u32, entry: u32, one: KnownBox, item: LargeItem, n: u32, within: bool) -> u32 {
-    var length = select(select(0u, n, row < item.residents), row_length(lane, n), within);
+// Two segments of a large cell, of which each lane has a box of one, and workgroup memory has the other.
+struct Segments {
+    // Index of the lanes' segment and of the staged one.
+    lanes: u32,
+    staged: u32,
+    // The columns are the lanes' segment, and the residents of the rows are staged.
+    is_swapped: bool,
+    // Both are one segment.
+    within: bool,
+    // Number of boxes of the columns, and of residents of the rows.
+    boxes: u32,
+    residents: u32,
+}
+
+// Returns the segments of an item and a column. A lane of the rows tests all columns, or the half that equation 7 assigns; a
+// lane of the columns tests the residents. The roles with the shorter loop keep more lanes busy: under one ground the lanes
+// are its visitors.
+fn segments(item: LargeItem, column: u32) -> Segments {
+    let within = column == item.row;
+    let boxes = min(LANES, item.boxes - column * LANES);
+    let residents = min(LANES, item.residents - item.row * LANES);
+    if residents < select(boxes, boxes / 2u, within) {
+        return Segments(column, item.row, true, within, boxes, residents);
+    }
+    return Segments(item.row, column, false, within, boxes, residents);
+}
+
+// Returns the number of partners of a lane.
+fn partners(lane: u32, s: Segments) -> u32 {
+    if s.is_swapped {
+        let most = select(s.residents, min(s.residents, lane), s.within);
+        return select(0u, most, lane < s.boxes);
+    }
+    return select(select(0u, s.boxes, lane < s.residents), row_length(lane, s.boxes), s.within);
+}
+
+// Returns the place of a lane's k-th partner in the staged segment.
+fn partner(lane: u32, k: u32, s: Segments) -> u32 {
+    return select(k, row_partner(lane, k, s.boxes), s.within && !s.is_swapped);
+}
+
+// Stages a segment, and returns the entry of the lane's own box.
+fn stage(item: LargeItem, lane: u32, s: Segments) -> u32 {
+    let own = s.lanes * LANES + lane;
+    let other = s.staged * LANES + lane;
+    if lane < select(s.boxes, s.residents, s.is_swapped) {
+        let entry = entries[item.start + other];
+        staged_entries[lane] = entry;
+        staged_boxes[lane] = boxes[box_of(entry)];
+    }
+    var entry = 0u;
+    if own < item.boxes {
+        entry = entries[item.start + own];
+    }
+    workgroupBarrier();
+    return entry;
+}
+
+// Tests a lane's box against its partners. Returns the number of hits.
+fn test_partners(lane: u32, entry: u32, one: KnownBox, s: Segments) -> u32 {
+    let length = partners(lane, s);
     var counts = vec3<u32>(0u);
     var hits = 0u;
     for (var w = 0u; w < 8u; w++) {
         var bits = 0u;
         for (var k = 32u * w; k < min(32u * w + 32u, length); k++) {
-            let j = select(k, row_partner(lane, k, n), within);
+            let j = partner(lane, k, s);
             // Two visitors meet in a cell of their own level.
-            if within && item.row * LANES + min(lane, j) >= item.residents {
+            if s.within && min(lane, j) >= s.residents {
                 continue;
             }
             counts.x += 1u;
             let a = box_of(entry);
-            let b = box_of(column_entries[j]);
-            if !owns(entry, column_entries[j]) || !may_be_wanted(entry | column_entries[j])
+            let b = box_of(staged_entries[j]);
+            if !owns(entry, staged_entries[j]) || !may_be_wanted(entry | staged_entries[j])
                 || (params.split > 0u && (a < params.split) == (b < params.split)) {
                 counts.y += 1u;
                 continue;
             }
-            if !is_wanted(one, column_boxes[j]) {
+            if !is_wanted(one, staged_boxes[j]) {
                 continue;
             }
             counts.z += 1u;
@@ -83,7 +140,7 @@ fn test_row(lane: u32, row: u32, entry: u32, one: KnownBox, item: LargeItem, n: 
 }
 
 // Decides, by one lane, how and where the workgroup's hits are written.
-fn place(item: LargeItem, column: u32) -> Placed {
+fn place(item: LargeItem, s: Segments) -> Placed {
     add_tests();
     let hits = atomicExchange(&tally[HITS], 0u);
     let words = 3u + atomicExchange(&tally[ROW_WORDS], 0u);
@@ -97,30 +154,29 @@ fn place(item: LargeItem, column: u32) -> Placed {
     if at != NO_SPACE {
         out[at] = words - 3u;
         out[at + 1u] = item.start;
-        out[at + 2u] = item.row | (column << 16u);
+        out[at + 2u] = s.lanes | (s.staged << 16u);
     }
     return Placed(select(at + 3u, NO_SPACE, at == NO_SPACE), hits, words, 1u);
 }
 
 @compute @workgroup_size(LANES)
-fn check_large(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>,
-               @builtin(local_invocation_index) lane: u32) {
-    let index = linear(group, groups);
+fn check_large(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
+    let index = linear(group);
     if index >= chunk.large_items || chunk.first_large + index >= counters.large_items {
         return;
+    }
+    if lane == 0u {
+        atomicStore(&marks, 0u);
     }
     if beyond_limit(lane) {
         return;
     }
     let item = large_items[chunk.first_large + index];
     let row = item.row * LANES + lane;
-    var row_entry = 0u;
-    var row_box: KnownBox;
+    var lane_marks = 0u;
     if row < item.boxes {
-        row_entry = entries[item.start + row];
-        row_box = boxes[box_of(row_entry)];
+        lane_marks = entries[item.start + row];
     }
-    var lane_marks = row_entry;
     for (var at = item.column * LANES + lane; at < min(item.end_column * LANES, item.boxes); at += LANES) {
         lane_marks |= entries[item.start + at];
     }
@@ -134,16 +190,11 @@ fn check_large(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups)
         return;
     }
     for (var column = item.column; column < item.end_column; column++) {
-        let n = min(LANES, item.boxes - column * LANES);
         workgroupBarrier();
-        if lane < n {
-            let entry = entries[item.start + column * LANES + lane];
-            column_entries[lane] = entry;
-            column_boxes[lane] = boxes[box_of(entry)];
-        }
-        workgroupBarrier();
-        let within = column == item.row;
-        let hits = test_row(lane, row, row_entry, row_box, item, n, within);
+        let s = segments(item, column);
+        let entry = stage(item, lane, s);
+        let one = boxes[box_of(entry)];
+        let hits = test_partners(lane, entry, one, s);
         // Words of a row: its index, its number of hits less one, and a byte for each hit.
         let words = select(0u, (hits + 5u) / 4u, hits > 0u);
         // Algorithm 2, line 26, takes a prefix sum here. The rows may come in any order, so atomics are enough: 1 barrier
@@ -156,35 +207,35 @@ fn check_large(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups)
         }
         workgroupBarrier();
         if lane == 0u {
-            placed = place(item, column);
+            placed = place(item, s);
         }
         let to = workgroupUniformLoad(&placed);
         let written = hits > 0u && to.at != NO_SPACE;
         if written && to.packed != 0u {
-            write_row(to.at + word_rank, lane, hits, within, n);
+            write_row(to.at + word_rank, lane, hits, s);
         }
         if written && to.packed == 0u {
-            write_pairs(to.at + 2u * rank, lane, row_entry, row_box, within, n);
+            write_pairs(to.at + 2u * rank, lane, entry, one, s);
         }
     }
 }
 
-fn write_pairs(start: u32, lane: u32, entry: u32, one: KnownBox, within: bool, n: u32) {
+fn write_pairs(start: u32, lane: u32, entry: u32, one: KnownBox, s: Segments) {
     var at = start;
     for (var w = 0u; w < 8u; w++) {
         var bits = mask[w];
         while bits != 0u {
             let k = 32u * w + firstTrailingBit(bits);
             bits &= bits - 1u;
-            let j = select(k, row_partner(lane, k, n), within);
-            write_pair(at, box_of(entry), box_of(column_entries[j]), mark_of(one, column_boxes[j]));
+            let j = partner(lane, k, s);
+            write_pair(at, box_of(entry), box_of(staged_entries[j]), mark_of(one, staged_boxes[j]));
             at += 2u;
         }
     }
 }
 
 // Writes a row of a packed record, four bytes to a word.
-fn write_row(start: u32, lane: u32, hits: u32, within: bool, n: u32) {
+fn write_row(start: u32, lane: u32, hits: u32, s: Segments) {
     var at = start;
     var word = lane | ((hits - 1u) << 8u);
     var shift = 16u;
@@ -199,7 +250,7 @@ fn write_row(start: u32, lane: u32, hits: u32, within: bool, n: u32) {
                 word = 0u;
                 shift = 0u;
             }
-            word |= select(k, row_partner(lane, k, n), within) << shift;
+            word |= partner(lane, k, s) << shift;
             shift += 8u;
         }
     }

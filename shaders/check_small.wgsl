@@ -1,5 +1,6 @@
 // Check, small cells (Avril 3.2): one invocation per pair. The workgroup's pairs lie in consecutive small cells of a
-// block. A lane finds its cell by bisection in workgroup memory, and its pair by a square root and an exact correction.
+// block. A lane finds its cell by bisection in workgroup memory, and its pair by a square root and an exact correction. If
+// the boxes of all these cells fit workgroup memory, each is loaded once.
 
 @group(0) @binding(0) var<uniform> params: Params;
 @group(0) @binding(1) var<uniform> chunk: Chunk;
@@ -32,22 +33,61 @@ fn slot_of(pair: u32, count: u32) -> u32 {
     return low;
 }
 
+// The entries and boxes of the item's cells, if they are at most STAGED.
+var<workgroup> staged_entries: array<u32, STAGED>;
+var<workgroup> staged_boxes: array<KnownBox, STAGED>;
+
+// A range of entries, and true if it is staged.
+struct Stage {
+    start: u32,
+    is_used: bool,
+}
+
+// Stages the entries from the item's first cell to the cell of its last pair.
+fn stage(item: SmallItem, lane: u32) -> Stage {
+    let last = slots[item.slot + slot_of(item.first_pair + item.pairs - 1u, item.slots)];
+    let start = slots[item.slot].start;
+    let len = last.start + (last.shape & 0xffffu) - start;
+    if len <= STAGED && lane < len {
+        let entry = entries[start + lane];
+        staged_entries[lane] = entry;
+        staged_boxes[lane] = boxes[box_of(entry)];
+    }
+    return Stage(start, len <= STAGED);
+}
+
+fn entry_at(place: u32, staged: Stage) -> u32 {
+    if staged.is_used {
+        return staged_entries[place - staged.start];
+    }
+    return entries[place];
+}
+
+fn box_at(place: u32, staged: Stage) -> KnownBox {
+    if staged.is_used {
+        return staged_boxes[place - staged.start];
+    }
+    return boxes[box_of(entries[place])];
+}
+
 // The mark of the lane's hit.
 var<private> mark: u32;
 
-// Tests one pair, cheapest test first, and counts for the report.
-fn is_pair(a: u32, b: u32) -> bool {
+// Tests the pair of two entries, cheapest test first, and counts for the report.
+fn is_pair(one: u32, other: u32, staged: Stage) -> bool {
+    let a = entry_at(one, staged);
+    let b = entry_at(other, staged);
     let i = box_of(a);
     let j = box_of(b);
     if !owns(a, b) || !may_be_wanted(a | b) || (params.split > 0u && (i < params.split) == (j < params.split)) {
         note_test(1u, 1u);
         return false;
     }
-    if !is_wanted(boxes[i], boxes[j]) {
+    if !is_wanted(box_at(one, staged), box_at(other, staged)) {
         return false;
     }
     note_test(2u, 1u);
-    mark = mark_of(boxes[i], boxes[j]);
+    mark = mark_of(box_at(one, staged), box_at(other, staged));
     return !has_flag(FILTERED) || filters_allow(filters[i], filters[j]);
 }
 
@@ -65,12 +105,12 @@ fn place(words: u32) -> Placed {
 }
 
 @compute @workgroup_size(LANES)
-fn check_small(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>,
-               @builtin(local_invocation_index) lane: u32) {
-    let index = linear(group, groups);
+fn check_small(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
+    let index = linear(group);
     if index >= chunk.small_items || chunk.first_small + index >= counters.small_items {
         return;
     }
+    atomicStore(&slot_hits[lane], 0u);
     if beyond_limit(lane) {
         return;
     }
@@ -78,6 +118,8 @@ fn check_small(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups)
     if lane < item.slots {
         first_pairs[lane] = slots[item.slot + lane].first_pair;
     }
+    workgroupBarrier();
+    let staged = stage(item, lane);
     workgroupBarrier();
     var hit = false;
     var slot = 0u;
@@ -88,7 +130,7 @@ fn check_small(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups)
         let cell = slots[item.slot + slot];
         start = cell.start;
         pair = pair_at(item.first_pair + lane - cell.first_pair, cell.shape & 0xffffu);
-        hit = is_pair(entries[start + pair.x], entries[start + pair.y]);
+        hit = is_pair(start + pair.x, start + pair.y, staged);
     }
     // The hits may come in any order, so no prefix sum is needed.
     var rank = 0u;
@@ -116,8 +158,9 @@ fn check_small(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups)
         return;
     }
     if to.packed == 0u {
-        write_pair(to.at + 2u * rank, box_of(entries[start + pair.x]), box_of(entries[start + pair.y]),
-            mark);
+        let a = entry_at(start + pair.x, staged);
+        let b = entry_at(start + pair.y, staged);
+        write_pair(to.at + 2u * rank, box_of(a), box_of(b), mark);
         return;
     }
     let record = to.at + slot_at[slot];

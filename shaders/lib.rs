@@ -60,11 +60,11 @@ pub enum Buffer {
     Rows,
     /// Pairs by first box.
     Grouped,
-    /// Start and end of the rows that are sorted through a bitmap.
+    /// Size of the indirect dispatch for the pieces of long rows, and these pieces. The kernel that lists them is dispatched
+    /// indirectly itself, and may not write what it is dispatched from.
     LongRows,
-    /// Size of the indirect dispatch for these rows. The kernel that counts them is dispatched indirectly itself, and may not
-    /// write what it is dispatched from.
-    LongDispatch,
+    /// Number of pairs in each window of the long rows.
+    Windows,
 }
 
 impl Buffer {
@@ -93,7 +93,7 @@ impl Buffer {
             Self::Rows => "rows",
             Self::Grouped => "grouped",
             Self::LongRows => "long_rows",
-            Self::LongDispatch => "long_dispatch",
+            Self::Windows => "windows",
         }
     }
 
@@ -152,6 +152,8 @@ const SCANNED: &str = include_str!("shared/scanned.wgsl");
 const ENDS: &str = include_str!("shared/ends.wgsl");
 const DISPATCH: &str = include_str!("shared/dispatch.wgsl");
 const ROWS: &str = include_str!("shared/rows.wgsl");
+const LEADERS: &str = include_str!("shared/leaders.wgsl");
+const PIECES: &str = include_str!("shared/pieces.wgsl");
 const BLOCK_SCAN: &str = include_str!("shared/block_scan.wgsl");
 const PAIR_INDEX: &str = include_str!("shared/pair_index.wgsl");
 const SEARCH_OVERLAPS: &str = include_str!("shared/search_overlaps.wgsl");
@@ -205,16 +207,17 @@ kernels! {
     CHECK_ALL Check "check_all" [FLOATS, SEARCH_OVERLAPS, KNOWN_BOX, PAIR_INDEX, EMIT]
         (Params, Chunk, Boxes, Changed, Filters, Totals, Out);
     /// Sort: computes the sizes of the dispatches that follow.
-    ARRANGE_ROWS Sort "arrange_rows" [ROWS, DISPATCH] (Params, Chunk, Counters, Totals, Dispatches, LongDispatch);
+    ARRANGE_ROWS Sort "arrange_rows" [ROWS, DISPATCH] (Params, Chunk, Counters, Totals, Dispatches, LongRows);
     /// Sort: counts the pairs of each first box.
-    COUNT_PAIRS Sort "count_pairs" [] (Totals, Out, Rows);
+    COUNT_PAIRS Sort "count_pairs" [LEADERS] (Totals, Out, Rows);
     /// Sort: groups the pairs by first box.
-    PLACE_PAIRS Sort "place_pairs" [ENDS] (Totals, Out, Sums, Rows, Grouped);
-    /// Sort: orders short rows.
-    RANK_PAIRS Sort "rank_pairs" [ENDS, ROWS]
-        (Params, Totals, Sums, Rows, Grouped, Counters, LongDispatch, LongRows, Out);
-    /// Sort: orders long rows.
-    RANK_LONG_ROWS Sort "rank_long_rows" [ROWS, BLOCK_SCAN] (Counters, Grouped, LongRows, Out);
+    PLACE_PAIRS Sort "place_pairs" [ENDS, LEADERS] (Totals, Out, Sums, Rows, Grouped);
+    /// Sort: orders short rows, and cuts long ones into pieces.
+    RANK_PAIRS Sort "rank_pairs" [ENDS, ROWS] (Params, Totals, Sums, Rows, Grouped, LongRows, Windows, Out);
+    /// Sort: groups the pairs of long rows by window.
+    PLACE_WINDOWS Sort "place_windows" [ROWS, PIECES, BLOCK_SCAN] (Params, Grouped, LongRows, Windows, Out);
+    /// Sort: orders the windows of long rows.
+    RANK_WINDOWS Sort "rank_windows" [ROWS, PIECES, BLOCK_SCAN] (Params, Grouped, LongRows, Windows, Out);
 }
 
 /// For tests: computes the pairs of given indices.

@@ -38,9 +38,12 @@ fn level_of(low: vec3<i32>, high: vec3<i32>) -> u32 {
 }
 
 @compute @workgroup_size(LANES)
-fn locate(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>,
-          @builtin(local_invocation_index) lane: u32) {
-    let id = linear(group, groups) * LANES + lane;
+fn locate(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
+    if lane == 0u {
+        atomicStore(&valid, 0u);
+    }
+    workgroupBarrier();
+    let id = linear(group) * LANES + lane;
     if id < params.boxes {
         locate_one(id);
     }

@@ -8,6 +8,8 @@
 @group(0) @binding(3) var<storage, read_write> classes: array<atomic<u32>, 1024>;
 
 const CLASSES = 256u;
+// Maximum number of workgroups. Each adds its counts to those of all.
+const MEASURE_GROUPS = 64u;
 const INFINITE = 0x7f800000u;
 
 var<workgroup> own_classes: array<atomic<u32>, 1024>;
@@ -33,9 +35,12 @@ fn count(one: DeviceBox) {
 }
 
 @compute @workgroup_size(LANES)
-fn measure(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>,
-           @builtin(local_invocation_index) lane: u32) {
-    for (var id = group.x * LANES + lane; id < params.boxes; id += groups.x * LANES) {
+fn measure(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
+    for (var i = lane; i < 4u * CLASSES; i += LANES) {
+        atomicStore(&own_classes[i], 0u);
+    }
+    workgroupBarrier();
+    for (var id = group.x * LANES + lane; id < params.boxes; id += MEASURE_GROUPS * LANES) {
         let one = bounds_of(known_box(id));
         if one.low[0] <= one.high[0] {
             count(one);

@@ -6,13 +6,24 @@
 @group(0) @binding(3) var<storage, read_write> rows: array<atomic<u32>>;
 @group(0) @binding(4) var<storage, read_write> grouped: array<u32>;
 
+// For each leader: the end of the places of its lanes.
+var<workgroup> ends: array<u32, LANES>;
+
 @compute @workgroup_size(LANES)
-fn place_pairs(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>,
-               @builtin(local_invocation_index) lane: u32) {
-    let i = linear(group, groups) * LANES + lane;
-    if 2u * i < totals.words.x {
-        let first = out[2u * i];
-        let at = block_start(first) + atomicSub(&rows[first], 1u) - 1u;
+fn place_pairs(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
+    let i = linear(group) * LANES + lane;
+    let is_pair = 2u * i < totals.words.x;
+    var first = 0u;
+    if is_pair {
+        first = out[2u * i];
+    }
+    let following = follow(first, lane, is_pair);
+    if is_pair && following.leader == lane {
+        ends[lane] = block_start(first) + atomicSub(&rows[first], atomicLoad(&followers[lane]));
+    }
+    workgroupBarrier();
+    if is_pair {
+        let at = ends[following.leader] - 1u - following.rank;
         grouped[2u * at] = first;
         grouped[2u * at + 1u] = out[2u * i + 1u];
     }

@@ -9,9 +9,8 @@
 const COUNTS_PER_LANE = 4u;
 
 @compute @workgroup_size(LANES)
-fn scan_blocks(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>,
-               @builtin(local_invocation_index) lane: u32) {
-    let block = linear(group, groups);
+fn scan_blocks(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
+    let block = linear(group);
     let first = (block * LANES + lane) * COUNTS_PER_LANE;
     let count = scanned();
     var sum = 0u;

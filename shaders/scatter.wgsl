@@ -13,13 +13,16 @@ var<workgroup> last_visitors: atomic<u32>;
 var<workgroup> last_end: u32;
 
 @compute @workgroup_size(LANES)
-fn scatter(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>,
-           @builtin(local_invocation_index) lane: u32) {
+fn scatter(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
     // If the entries do not fit, the host makes larger buffers and maps again.
     if counters.entries > params.entry_capacity {
         return;
     }
-    let id = linear(group, groups) * LANES + lane;
+    if lane == 0u {
+        atomicStore(&last_visitors, 0u);
+    }
+    workgroupBarrier();
+    let id = linear(group) * LANES + lane;
     let last = params.levels - 1u;
     let last_cell = params.level[last].first_cell;
     var visits_last = false;
@@ -35,8 +38,9 @@ fn scatter(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) gro
     workgroupBarrier();
     if lane == 0u {
         let visitors = atomicLoad(&last_visitors);
+        last_end = block_start(2u * last_cell);
         if visitors > 0u {
-            last_end = atomicSub(&cells[2u * last_cell + 1u], visitors) + block_start(2u * last_cell);
+            last_end += atomicSub(&cells[2u * last_cell + 1u], visitors);
         }
     }
     let end = workgroupUniformLoad(&last_end);

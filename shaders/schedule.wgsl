@@ -73,9 +73,12 @@ fn items_before(row: u32, columns: u32) -> u32 {
 }
 
 @compute @workgroup_size(LANES)
-fn schedule(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>,
-            @builtin(local_invocation_index) lane: u32) {
-    let block = linear(group, groups);
+fn schedule(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
+    if lane == 0u {
+        atomicStore(&large_count, 0u);
+    }
+    workgroupBarrier();
+    let block = linear(group);
     let first = (block * LANES + lane) * CELLS_PER_LANE;
     var pairs = 0u;
     var used = 0u;

@@ -11,9 +11,12 @@
 var<workgroup> last_visitors: atomic<u32>;
 
 @compute @workgroup_size(LANES)
-fn visit(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>,
-         @builtin(local_invocation_index) lane: u32) {
-    let id = linear(group, groups) * LANES + lane;
+fn visit(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
+    if lane == 0u {
+        atomicStore(&last_visitors, 0u);
+    }
+    workgroupBarrier();
+    let id = linear(group) * LANES + lane;
     let last = params.levels - 1u;
     let last_cell = params.level[last].first_cell;
     if id < params.boxes && own_level(located[id]) < last {

@@ -1,6 +1,3 @@
-// Workgroups in a row of a dispatch; the portable limit is 65,535.
-const GROUPS_PER_ROW = 32768u;
-
 // Writes the arguments of an indirect dispatch of this number of workgroups.
 fn write_dispatch(at: u32, groups: u32) {
     dispatches[at] = min(groups, GROUPS_PER_ROW);

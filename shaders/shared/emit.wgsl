@@ -50,8 +50,12 @@ fn pairs_so_far() -> vec2<u32> {
 
 var<workgroup> is_over_limit: u32;
 
-// Returns true if the call has passed its limit of pairs, so the rest need not be tested.
+// Zeroes the tally. Returns true if the call has passed its limit of pairs, so the rest need not be tested. The barriers of
+// its load also end what the lanes zeroed before.
 fn beyond_limit(lane: u32) -> bool {
+    if lane < TALLIES {
+        atomicStore(&tally[lane], 0u);
+    }
     if lane == 0u {
         let found = pairs_so_far();
         let left = chunk.pairs_left;
@@ -63,7 +67,8 @@ fn beyond_limit(lane: u32) -> bool {
 // Counts of the workgroup: tests made, redundant tests, overlaps; hits; words of rows.
 const HITS = 3u;
 const ROW_WORDS = 4u;
-var<workgroup> tally: array<atomic<u32>, 5>;
+const TALLIES = 5u;
+var<workgroup> tally: array<atomic<u32>, TALLIES>;
 
 // Counts a test of a lane, if tests are counted.
 fn note_test(index: u32, amount: u32) {

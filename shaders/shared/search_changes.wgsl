@@ -3,6 +3,9 @@
 
 alias KnownBox = Motion;
 
+// Number of boxes of small cells that fit workgroup memory.
+const STAGED = 192u;
+
 // Returns true if a stored box is not yet as the checks need it: an earlier update has changed it, this one has not.
 fn is_stale(one: KnownBox, has_changed: bool) -> bool {
     return !has_changed && has_moved(one);

@@ -2,6 +2,9 @@
 
 alias KnownBox = DeviceBox;
 
+// Number of boxes of small cells that fit workgroup memory.
+const STAGED = 256u;
+
 // Returns true if a stored box is not yet as the checks need it.
 fn is_stale(one: KnownBox, has_changed: bool) -> bool {
     return (params.flags & RAW) != 0u;

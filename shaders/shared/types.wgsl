@@ -164,8 +164,7 @@ struct Counters {
     valid: u32,
     // Tests that the checks may make, in units of LANES.
     tests: u32,
-    // Rows of more than SHORT_ROW pairs.
-    long_rows: u32,
+    unused0: u32,
     // 1 if the tests exceed 32 bits.
     too_many_tests: u32,
 }
@@ -219,7 +218,11 @@ fn filters_allow(a: vec4<u32>, b: vec4<u32>) -> bool {
     return bodies && kinds && ((forth && back) || (either && (forth || back)));
 }
 
-// Returns the index of a workgroup. A dispatch of more than 65,535 workgroups has rows of them.
-fn linear(group: vec3<u32>, groups: vec3<u32>) -> u32 {
-    return group.y * groups.x + group.x;
+// Workgroups in a row of a dispatch; the portable limit is 65,535.
+const GROUPS_PER_ROW = 32768u;
+
+// Returns the index of a workgroup. A dispatch of more than GROUPS_PER_ROW workgroups has rows of them. Kernels do not ask
+// for the number of workgroups: DirectX 12 has none for indirect dispatches.
+fn linear(group: vec3<u32>) -> u32 {
+    return group.y * GROUPS_PER_ROW + group.x;
 }

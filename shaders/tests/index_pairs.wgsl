@@ -5,9 +5,8 @@
 
 // Parameters: `boxes` is n, `split` the first index, `cells` the number of indices.
 @compute @workgroup_size(LANES)
-fn index_pairs(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>,
-               @builtin(local_invocation_index) lane: u32) {
-    let i = linear(group, groups) * LANES + lane;
+fn index_pairs(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
+    let i = linear(group) * LANES + lane;
     if i >= params.cells {
         return;
     }

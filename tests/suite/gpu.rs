@@ -5,12 +5,15 @@ mod failures;
 mod turns;
 
 use pbig_core::{
-    Aabb, Backend, BroadPhase, Config, DeviceReport, Finder, NoDevice, Order, Pair, ProxyFilter,
+    Aabb, Backend, BroadPhase, Config, DeviceFailure, DeviceFound, DeviceReport, Finder, NoDevice, Order,
+    Pair, ProxyFilter, SearchRequest,
 };
 use pbig_gpu::{Coding, GpuFinder, GpuOptions, adapters};
 use pbig_harness::boxes::BoxSet;
 use pbig_shaders::{KERNELS, Stage};
 use pbig_tests::{Way, difference, gpu, needs_gpu};
+use std::pin::pin;
+use std::task::{Context, Poll, Waker};
 use std::time::Duration;
 
 fn set(name: &str, n: usize) -> Vec<Aabb> {
@@ -370,6 +373,35 @@ fn finders_in_several_threads_share_a_device() {
             });
         }
     });
+}
+
+/// Contract: the way of a page is the same call. In a program it never waits for another poll.
+#[test]
+fn a_call_without_blocking_gives_the_same_bytes() {
+    needs_gpu!();
+    let mut finder = ready(GpuFinder::open_async())
+        .expect("an adapter")
+        .with_options(GpuOptions { chunk: [64, 8], ..GpuOptions::DEFAULT });
+    for boxes in [set("pile", 3000), set("unit", 20_000), cubes(900), set("mixed", 5000)] {
+        let request = SearchRequest { boxes: &boxes, filters: None, is_sorted: true, max_pairs: u64::MAX };
+        let mut found = DeviceFound::default();
+        ready(finder.find_all_async(&request, &mut found)).expect("a device that works");
+        found.pairs.sort_unstable();
+        assert_eq!(difference(&found.pairs, &on_cpu(&boxes)), None);
+    }
+    let boxes = cubes(2000);
+    let request = SearchRequest { boxes: &boxes, filters: None, is_sorted: true, max_pairs: 5 };
+    let too_many = ready(finder.find_all_async(&request, &mut DeviceFound::default()));
+    assert_eq!(too_many, Err(DeviceFailure::TooManyPairs));
+}
+
+/// Returns the result of a future that must be ready at the first poll.
+fn ready<T>(future: impl Future<Output = T>) -> T {
+    let mut context = Context::from_waker(Waker::noop());
+    match pin!(future).poll(&mut context) {
+        Poll::Ready(result) => result,
+        Poll::Pending => panic!("the future waits for another poll"),
+    }
 }
 
 #[test]

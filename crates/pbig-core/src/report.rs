@@ -54,7 +54,8 @@ macro_rules! stage {
 }
 pub(crate) use stage;
 
-/// A stopwatch for reports. It decides nothing, and stands still where there is no clock (wasm32-unknown-unknown).
+/// A stopwatch for reports and for the pause of a device. It stands still where there is no clock (wasm32-unknown-unknown).
+#[derive(Debug)]
 pub struct Clock {
     #[cfg(not(all(target_family = "wasm", target_os = "unknown")))]
     last: std::time::Instant,
@@ -80,6 +81,14 @@ impl Clock {
     #[cfg(all(target_family = "wasm", target_os = "unknown"))]
     pub fn lap(&mut self) -> Duration {
         Duration::ZERO
+    }
+
+    /// Returns the time since the last lap, or the start; none where there is no clock.
+    pub fn time(&self) -> Option<Duration> {
+        #[cfg(not(all(target_family = "wasm", target_os = "unknown")))]
+        return Some(self.last.elapsed());
+        #[cfg(all(target_family = "wasm", target_os = "unknown"))]
+        return None;
     }
 }
 

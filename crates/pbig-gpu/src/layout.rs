@@ -6,6 +6,10 @@ use pbig_core::{Aabb, ProxyFilter};
 
 /// Number of lanes of a workgroup, and of boxes of a segment (PBIG 5.2).
 pub const LANES: u32 = 256;
+/// Number of workgroups in a row of a dispatch. The portable limit is 65,535.
+pub const GROUPS_PER_ROW: u32 = 32_768;
+/// Maximum number of workgroups that measure the boxes. Each adds its counts to those of all.
+pub const MEASURE_GROUPS: u32 = 64;
 /// Maximum number of levels of cells. The last level has one cell for everything.
 pub const MAX_LEVELS: usize = 8;
 /// Maximum number of cells that a box touches along one axis of its level.
@@ -21,8 +25,14 @@ pub const CELLS_PER_BLOCK: u32 = 4 * LANES;
 pub const COUNTS_PER_BLOCK: u32 = 4 * LANES;
 /// Maximum number of pairs of a row that is ordered by counting.
 pub const SHORT_ROW: u32 = 512;
-/// Second boxes of a long row that a workgroup orders.
+/// Second boxes of a window of a long row, which a workgroup orders.
 pub const WINDOW: u32 = 32_768;
+/// Number of pairs of a long row that a workgroup moves.
+pub const PIECE: u32 = 4096;
+/// Index of the number of pieces among the words of [`pbig_shaders::Buffer::LongRows`].
+pub const PIECES: u32 = 3;
+/// Index of the first piece there. Each has three words.
+pub const FIRST_PIECE: u32 = 4;
 /// Number of bits of an entry for the box. Above them are [`MOVED`] and the axes.
 pub const BOX_BITS: u32 = 28;
 /// The first of three bits of an entry, one for each axis. A bit is set if this is the box's lowest cell on the axis.
@@ -98,7 +108,7 @@ shared_structs! {
     /// their number exceeds 32 bits.
     Counters {
         entries: u32, slots: u32, small_items: u32, large_items: u32,
-        valid: u32, tests: u32, long_rows: u32, too_many_tests: u32
+        valid: u32, tests: u32, unused: u32, too_many_tests: u32
     }
     /// Counts of a check, even if its output does not fit. Each has a low and a high half. A test is redundant if the
     /// entries alone decide it: another cell owns the pair, or, in a search for changes, neither box has changed. Overlaps

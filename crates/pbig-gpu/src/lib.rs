@@ -14,6 +14,8 @@
 //!
 //! Without an adapter, or if it fails, the CPU finishes the call, and [`pbig_core::Report::fallback`] says why. An app that has
 //! a wgpu device passes it on by [`GpuFinder::from_device`].
+//!
+//! A page, where nothing may block, uses [`GpuFinder::open_async`] and [`GpuFinder::find_all_async`], with the feature `webgpu`.
 
 // Labels each item in the documentation with the feature that it needs; on docs.rs only, as it takes nightly Rust.
 #![cfg_attr(docsrs, feature(doc_cfg))]
@@ -38,5 +40,5 @@ pub mod pbig;
 #[cfg(feature = "wgpu")]
 pub use gpu::testing;
 #[cfg(feature = "wgpu")]
-pub use gpu::{GpuError, GpuFinder, GpuPlan, adapters, describe};
+pub use gpu::{GpuError, GpuFinder, GpuPlan, adapters, adapters_async, describe};
 pub use options::{CellRule, Coding, GpuOptions};

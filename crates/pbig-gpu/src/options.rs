@@ -79,7 +79,7 @@ impl GpuOptions {
         pause: Duration::from_secs(5),
         boxes_per_cell: 4.0,
         cell_rule: CellRule::Objective,
-        small_cell: 32,
+        small_cell: 96,
         all_pairs_up_to: 1024,
         count_tests: false,
         time_kernels: false,

@@ -51,6 +51,14 @@ fn bindings_are_numbered_as_listed_and_there_are_no_others() {
     }
 }
 
+/// Without validation of indirect dispatches the number of workgroups is 0 on DirectX 12.
+#[test]
+fn no_text_asks_for_the_number_of_workgroups() {
+    for (kernel, changes) in texts() {
+        assert!(!kernel.source(changes).contains("num_workgroups"), "{}", kernel.name);
+    }
+}
+
 /// Returns the names of the kernels' files, sorted.
 fn files() -> Vec<String> {
     let mut files: Vec<String> = std::fs::read_dir(env!("CARGO_MANIFEST_DIR"))

@@ -1,11 +1,11 @@
 //! Contract: every text of every kernel translates to SPIR-V, MSL and HLSL. These are the languages of Vulkan, Metal and
-//! DirectX 12. The SPIR-V passes `spirv-val`, if the machine has that program.
+//! DirectX 12. As on a device, kernels clear their workgroup memory themselves. The SPIR-V passes `spirv-val`, if the machine has that program.
 
 use super::{texts, validate};
 use naga::back::pipeline_constants::process_overrides;
 use naga::back::{hlsl, msl, spv};
 use naga::valid::ModuleInfo;
-use pbig_shaders::{KERNELS, Kernel};
+use pbig_shaders::{Buffer, KERNELS, Kernel};
 use std::path::Path;
 use std::process::{Command, Output};
 
@@ -18,20 +18,48 @@ fn with_constants((module, info): &(naga::Module, ModuleInfo)) -> (naga::Module,
 
 /// Returns every kernel with the module of each of its texts.
 fn modules() -> impl Iterator<Item = (&'static Kernel, (naga::Module, ModuleInfo))> {
-    let distinct = texts().filter(|(kernel, changes)| !changes || kernel.depends_on_search());
-    distinct.map(|(kernel, changes)| (*kernel, with_constants(&validate(kernel, changes))))
+    distinct().map(|(kernel, changes)| (kernel, module(kernel, changes)))
+}
+
+/// Returns every kernel, twice if it has two texts.
+fn distinct() -> impl Iterator<Item = (&'static Kernel, bool)> {
+    texts()
+        .filter(|(kernel, changes)| !changes || kernel.depends_on_search())
+        .map(|(kernel, changes)| (*kernel, changes))
+}
+
+fn module(kernel: &Kernel, changes: bool) -> (naga::Module, ModuleInfo) {
+    with_constants(&validate(kernel, changes))
 }
 
 fn spirv(module: &naga::Module, info: &ModuleInfo) -> Vec<u32> {
-    let options = spv::Options { lang_version: (1, 0), ..spv::Options::default() };
+    let options = spv::Options {
+        lang_version: (1, 0),
+        zero_initialize_workgroup_memory: spv::ZeroInitializeWorkgroupMemoryMode::None,
+        ..spv::Options::default()
+    };
     spv::write_vec(module, info, &options, None).expect("SPIR-V")
+}
+
+/// Writes a translation into the folder that `PBIG_TEXTS` names, for `scripts/gpu.sh`. The file is named by the kernel, its
+/// search and its bindings: `u` for a uniform buffer, `s` for a storage buffer.
+fn keep(kernel: &Kernel, changes: bool, ending: &str, text: &[u8]) {
+    let Some(folder) = std::env::var_os("PBIG_TEXTS") else { return };
+    let search = if changes { "changes" } else { "overlaps" };
+    let letter = |buffer: &Buffer| if buffer.is_uniform() { 'u' } else { 's' };
+    let bindings: String = kernel.bindings.iter().map(letter).collect();
+    let name = format!("{}.{search}.{bindings}.{ending}", kernel.name);
+    std::fs::write(Path::new(&folder).join(name), text).expect("the folder exists");
+}
+
+fn bytes(words: &[u32]) -> Vec<u8> {
+    words.iter().flat_map(|word| word.to_le_bytes()).collect()
 }
 
 /// Runs `spirv-val` on words of SPIR-V. Returns none if there is no such program.
 fn judge(folder: &Path, words: &[u32]) -> Option<Output> {
     let file = folder.join("kernel.spv");
-    std::fs::write(&file, words.iter().flat_map(|word| word.to_le_bytes()).collect::<Vec<u8>>())
-        .expect("a file in a new folder");
+    std::fs::write(&file, bytes(words)).expect("a file in a new folder");
     Command::new("spirv-val").args(["--target-env", "vulkan1.1"]).arg(file).output().ok()
 }
 
@@ -53,8 +81,10 @@ fn has_spirv_val() -> bool {
 fn every_text_is_valid_spirv() {
     let folder = tempfile::tempdir().expect("a folder");
     let judged = has_spirv_val();
-    for (kernel, (module, info)) in modules() {
+    for (kernel, changes) in distinct() {
+        let (module, info) = module(kernel, changes);
         let words = spirv(&module, &info);
+        keep(kernel, changes, "spv", &bytes(&words));
         let verdict = judge(folder.path(), &words).filter(|_| judged);
         let is_valid = verdict.as_ref().is_none_or(|output| output.status.success());
         assert!(is_valid, "{}: {verdict:?}", kernel.name);
@@ -85,12 +115,18 @@ fn every_text_translates_to_metal() {
 
 #[test]
 fn every_text_translates_to_directx() {
-    for (kernel, (module, info)) in modules() {
-        let options = hlsl::Options { shader_model: hlsl::ShaderModel::V5_1, ..hlsl::Options::default() };
+    for (kernel, changes) in distinct() {
+        let (module, info) = module(kernel, changes);
+        let options = hlsl::Options {
+            shader_model: hlsl::ShaderModel::V5_1,
+            zero_initialize_workgroup_memory: false,
+            ..hlsl::Options::default()
+        };
         let (mut text, pipeline) = (String::new(), hlsl::PipelineOptions::default());
         let written = hlsl::Writer::new(&mut text, &options, &pipeline).write(&module, &info, None);
         written.unwrap_or_else(|error| panic!("{}: {error}", kernel.name));
         assert!(text.contains(&format!("void {}(", kernel.name)), "{text}");
+        keep(kernel, changes, "hlsl", text.as_bytes());
     }
 }
 

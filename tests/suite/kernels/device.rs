@@ -15,13 +15,26 @@ pub(super) fn gpus() -> Option<&'static GpuFinder> {
 
 /// Runs a kernel on a state, and returns the state afterwards.
 pub(super) fn on_device(gpu: &GpuFinder, twin: &Twin, options: &GpuOptions, before: &State) -> State {
+    run_text(gpu, twin, &poisoned(twin.kernel, before.finds_changes()), options, before)
+}
+
+/// Runs a kernel with a text that counts what the kernel does. An edit replaces its first part by its second one.
+pub(super) fn counting(kernel: &str, edits: &[[&str; 2]], before: &State) -> State {
+    let mut text = poisoned(twin(kernel).kernel, before.finds_changes());
+    for [from, to] in edits {
+        assert!(text.contains(from), "{kernel} has no {from}");
+        text = text.replace(from, to);
+    }
+    run_text(gpu(), twin(kernel), &text, &GpuOptions::DEFAULT, before)
+}
+
+fn run_text(gpu: &GpuFinder, twin: &Twin, text: &str, options: &GpuOptions, before: &State) -> State {
     let mut after = before.clone();
     let bindings = twin.kernel.bindings;
     let buffers: Vec<_> = bindings.iter().map(|&buffer| padded(after.bytes(buffer))).collect();
     let groups = (twin.groups)(before);
-    let changes = before.finds_changes();
-    let left = single::run(gpu, twin.kernel, options, changes, &buffers, groups)
-        .expect("the device runs the kernel");
+    let left =
+        single::run(gpu, twin.kernel, text, options, &buffers, groups).expect("the device runs the kernel");
     for (&buffer, left) in bindings.iter().zip(&left) {
         let own = after.bytes(buffer);
         let len = own.len();

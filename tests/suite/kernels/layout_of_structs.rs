@@ -37,7 +37,7 @@ fn shared_structs() -> Vec<SharedStruct> {
         Slot { start, shape, first_pair }
         SmallItem { slot, slots, first_pair, pairs }
         LargeItem { start, boxes, residents, row, column, end_column }
-        Counters { entries, slots, small_items, large_items, valid, tests, long_rows, too_many_tests }
+        Counters { entries, slots, small_items, large_items, valid, tests, unused, too_many_tests }
         Totals { words, pairs, made, redundant, overlaps, sorted, unused }
     }
 }
@@ -93,6 +93,7 @@ fn constant_of(module: &naga::Module, name: &str) -> Option<u32> {
 fn constants_are_those_of_the_kernels() {
     let everywhere = [
         ("LANES", LANES),
+        ("GROUPS_PER_ROW", GROUPS_PER_ROW),
         ("MAX_LEVELS", layout::MAX_LEVELS as u32),
         ("NO_LEVEL", NO_LEVEL),
         ("BOX_BITS", BOX_BITS),
@@ -113,6 +114,10 @@ fn constants_are_those_of_the_kernels() {
         ("COUNTS_PER_BLOCK", COUNTS_PER_BLOCK),
         ("SHORT_ROW", SHORT_ROW),
         ("WINDOW", WINDOW),
+        ("PIECE", PIECE),
+        ("PIECES", PIECES),
+        ("FIRST_PIECE", FIRST_PIECE),
+        ("MEASURE_GROUPS", MEASURE_GROUPS),
     ];
     let most_span = format!("const MAX_SPAN = {MAX_SPAN};");
     for kernel in all_kernels() {

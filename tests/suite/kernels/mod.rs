@@ -9,8 +9,10 @@ mod checks;
 mod compare;
 mod device;
 mod indices;
+mod lanes;
 mod layout_of_structs;
 mod plans;
+mod poison;
 mod single;
 mod sort;
 mod state;
@@ -27,9 +29,9 @@ use pbig_core::{Aabb, Pair, ProxyFilter, oracle};
 use pbig_gpu::decode::{self, PLAIN};
 use pbig_gpu::layout::{
     self, AXIS_BITS, BITS, BOX_BITS, BoxChange, CELLS_PER_BLOCK, COUNTED, COUNTS_PER_BLOCK, Cell, Chunk,
-    Counters, DeviceBox, ENDED, FILTERED, FilterChange, LANES, LargeItem, Level, Located, MAX_SPAN, MOVED,
-    Motion, NO_LEVEL, PACKED, Params, RAW, SHORT_ROW, Slot, SmallItem, Totals, WAS_ABSENT, WINDOW, halves,
-    wide,
+    Counters, DeviceBox, ENDED, FILTERED, FIRST_PIECE, FilterChange, GROUPS_PER_ROW, LANES, LargeItem, Level,
+    Located, MAX_SPAN, MEASURE_GROUPS, MOVED, Motion, NO_LEVEL, PACKED, PIECE, PIECES, Params, RAW,
+    SHORT_ROW, Slot, SmallItem, Totals, WAS_ABSENT, WINDOW, halves, wide,
 };
 use pbig_gpu::testing::plan_params;
 use pbig_gpu::{GpuFinder, GpuOptions};
@@ -37,6 +39,7 @@ use pbig_harness::boxes::BoxSet;
 use pbig_harness::pair_index::{index_of, pair_count, pair_of};
 use pbig_shaders::{self as shaders, Buffer, KERNELS, Kernel, Stage};
 use pbig_tests::{corpus, difference, needs_gpu, without_gpu};
+use poison::poisoned;
 use sort::*;
 use state::*;
 use std::fmt::Debug;
@@ -104,6 +107,13 @@ fn some(states: &[State], what: &str, has: impl Fn(&State) -> bool) {
 #[test]
 fn measure_agrees_with_its_twin() {
     agrees("measure");
+}
+
+/// With more boxes than the lanes of all workgroups each lane takes several turns.
+#[test]
+fn measure_agrees_with_its_twin_on_many_boxes() {
+    let before = State::before("measure", &Case { boxes: set("mixed", 40_000), ..pile() });
+    assert_eq!(fault(twin("measure"), &GpuOptions::DEFAULT, &before), None);
 }
 
 #[test]

@@ -1,30 +1,29 @@
-//! Single kernels on given buffers, with the pipelines of a finder's device.
+//! Single kernels on given buffers, on a finder's device.
 
+use super::poison::pipeline_of;
+use pbig_gpu::layout::GROUPS_PER_ROW;
 use pbig_gpu::{GpuError, GpuFinder, GpuOptions};
 use pbig_shaders::Kernel;
 use std::sync::mpsc::channel;
 use wgpu::BufferUsages as Usage;
 use wgpu::util::{BufferInitDescriptor, DeviceExt, DownloadBuffer};
 
-/// Workgroups in a row of a dispatch.
-const GROUPS_PER_ROW: u32 = 32_768;
-
 /// Runs a kernel on the bytes of its bindings, in their order, and returns the bytes afterwards.
 ///
-/// Uniforms come back unchanged. If a kernel has two texts, `changes` picks the one for a search for changes.
+/// `text` is the kernel's, perhaps changed. Uniforms come back unchanged.
 ///
 /// # Errors
 /// If the device refuses the kernel or the buffers, is lost or does not answer in time.
 pub(super) fn run(
     gpu: &GpuFinder,
     kernel: &'static Kernel,
+    text: &str,
     options: &GpuOptions,
-    changes: bool,
     bindings: &[Vec<u8>],
     workgroups: u32,
 ) -> Result<Vec<Vec<u8>>, GpuError> {
-    let pipeline = gpu.pipeline(kernel, options, changes)?;
     gpu.on_device(|device, queue| {
+        let pipeline = pipeline_of(device, kernel, text, options);
         let buffers = upload(device, kernel, bindings);
         let group = bind(device, &pipeline, &buffers);
         let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());

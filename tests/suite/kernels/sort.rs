@@ -20,12 +20,13 @@ fn unsorted(kernel: &str, boxes: u32, pairs: &[Pair]) -> State {
         sums: vec![0; boxes.div_ceil(COUNTS_PER_BLOCK) as usize],
         rows: vec![0; boxes as usize],
         grouped: vec![[0; 2]; pairs.len()],
-        long_rows: vec![[0; 2]; pairs.len() / SHORT_ROW as usize + 1],
+        long_rows: vec![0; (FIRST_PIECE + 3 * (count / SHORT_ROW + 1)) as usize],
+        windows: vec![0; ((count / SHORT_ROW + 1) * boxes.div_ceil(WINDOW)) as usize],
         out,
         ..State::default()
     };
     state.totals.words = halves(2 * u64::from(count));
-    for name in ["arrange_rows", "count_pairs", "place_pairs", "rank_pairs"] {
+    for name in SORT {
         if name == kernel {
             return state;
         }
@@ -55,9 +56,8 @@ pub(super) fn by_found_pair(s: &State) -> u32 {
     found_pairs(s).div_ceil(LANES)
 }
 
-/// Returns a workgroup for each window: all of them do the first long row, then the next.
-pub(super) fn by_window(s: &State) -> u32 {
-    s.params.boxes.div_ceil(WINDOW)
+pub(super) fn by_piece(s: &State) -> u32 {
+    s.long_rows[PIECES as usize]
 }
 
 fn found_pairs(s: &State) -> u32 {
@@ -80,7 +80,7 @@ pub(super) fn arrange_rows(s: &mut State) {
     let groups = if has_all && fits { pairs.div_ceil(LANES) } else { 0 };
     s.totals.sorted = u32::from(has_all && fits);
     s.dispatches[6..].copy_from_slice(&[groups.min(32_768), groups.div_ceil(32_768), 1]);
-    s.long_dispatch = [s.params.boxes.div_ceil(WINDOW), 0, 1];
+    s.long_rows[..FIRST_PIECE as usize].copy_from_slice(&[0, 0, 1, 0]);
 }
 
 pub(super) fn count_pairs(s: &mut State) {
@@ -99,15 +99,16 @@ pub(super) fn place_pairs(s: &mut State) {
     }
 }
 
-/// Orders short rows in `out`, and lists the long ones.
+/// Orders short rows in `out`. Counts the pairs of long rows by window, and lists the pieces of these rows.
 pub(super) fn rank_pairs(s: &mut State) {
     let mut start = 0;
     for row in s.grouped.clone().chunk_by(|a, b| a[0] == b[0]) {
         let end = start + row.len();
         if row.len() > SHORT_ROW as usize {
-            s.long_rows[s.counters.long_rows as usize] = [start as u32, end as u32];
-            s.counters.long_rows += 1;
-            s.long_dispatch[1] = s.counters.long_rows;
+            for pair in row {
+                *counter(s, start, second(pair)) += 1;
+            }
+            (0..row.len().div_ceil(PIECE as usize)).for_each(|piece| add_piece(s, [start, end, piece]));
         } else {
             write_row(&mut s.out[2 * start..2 * end], row);
         }
@@ -115,9 +116,50 @@ pub(super) fn rank_pairs(s: &mut State) {
     }
 }
 
-pub(super) fn rank_long_rows(s: &mut State) {
-    for [start, end] in s.long_rows[..s.counters.long_rows as usize].iter().map(|row| row.map(|x| x as usize))
-    {
+fn add_piece(s: &mut State, piece: [usize; 3]) {
+    let index = s.long_rows[PIECES as usize];
+    let at = (FIRST_PIECE + 3 * index) as usize;
+    s.long_rows[at..at + 3].copy_from_slice(&piece.map(|x| x as u32));
+    s.long_rows[..FIRST_PIECE as usize].copy_from_slice(&[
+        (index + 1).min(32_768),
+        index / 32_768 + 1,
+        1,
+        index + 1,
+    ]);
+}
+
+/// Returns the counter of a second box in a long row.
+fn counter(s: &mut State, start: usize, second: u32) -> &mut u32 {
+    let row = start as u32 / SHORT_ROW * s.params.boxes.div_ceil(WINDOW);
+    &mut s.windows[(row + second / WINDOW) as usize]
+}
+
+/// Returns the start and the end of each long row.
+fn long_rows(s: &State) -> Vec<[usize; 2]> {
+    let pieces = pieces(s).into_iter().filter(|piece| piece[2] == 0);
+    pieces.map(|[start, end, _]| [start as usize, end as usize]).collect()
+}
+
+/// Returns the pieces of long rows, sorted: start and end of the row, and index of the piece.
+fn pieces(s: &State) -> Vec<[u32; 3]> {
+    let listed = s.long_rows[FIRST_PIECE as usize..].as_chunks::<3>().0;
+    sorted(&listed[..s.long_rows[PIECES as usize] as usize])
+}
+
+/// Orders long rows by window. Writes only the second boxes.
+pub(super) fn place_windows(s: &mut State) {
+    for [start, end] in long_rows(s) {
+        let mut row = s.grouped[start..end].to_vec();
+        row.sort_by_key(|pair| second(pair) / WINDOW);
+        for (i, pair) in (start..).zip(&row) {
+            s.out[2 * i + 1] = pair[1];
+            *counter(s, start, second(pair)) += 1 << 16;
+        }
+    }
+}
+
+pub(super) fn rank_windows(s: &mut State) {
+    for [start, end] in long_rows(s) {
         write_row(&mut s.out[2 * start..2 * end], &s.grouped[start..end]);
     }
 }
@@ -130,7 +172,7 @@ fn write_row(out: &mut [u32], row: &[[u32; 2]]) {
 
 pub(super) fn compare_row_dispatches(_: &State, found: &State, wanted: &State) -> Option<String> {
     same("dispatches", &found.dispatches[6..], &wanted.dispatches[6..])
-        .or_else(|| same("long dispatch", &found.long_dispatch, &wanted.long_dispatch))
+        .or_else(|| same("long rows", &found.long_rows, &wanted.long_rows))
         .or_else(|| same("totals", &[found.totals], &[wanted.totals]))
 }
 
@@ -150,17 +192,35 @@ pub(super) fn compare_grouped(before: &State, found: &State, wanted: &State) -> 
 }
 
 pub(super) fn compare_ranked(before: &State, found: &State, wanted: &State) -> Option<String> {
-    let long = |s: &State| sorted(&s.long_rows);
+    let head = FIRST_PIECE as usize;
     compare_out(before, found, wanted)
-        .or_else(|| same("long rows", &long(found), &long(wanted)))
-        .or_else(|| same("long dispatch", &found.long_dispatch, &wanted.long_dispatch))
+        .or_else(|| same("dispatch", &found.long_rows[..head], &wanted.long_rows[..head]))
+        .or_else(|| same("pieces", &pieces(found), &pieces(wanted)))
+        .or_else(|| same("windows", &found.windows, &wanted.windows))
 }
 
-const KERNELS: [&str; 5] = ["arrange_rows", "count_pairs", "place_pairs", "rank_pairs", "rank_long_rows"];
+/// Compares the pairs of each window, which may be in any order.
+pub(super) fn compare_windows(_: &State, found: &State, wanted: &State) -> Option<String> {
+    let by_window = |s: &State| {
+        let mut out = s.out.as_chunks::<2>().0.to_vec();
+        for [start, end] in long_rows(s) {
+            let windows = out[start..end].chunk_by_mut(|a, b| second(a) / WINDOW == second(b) / WINDOW);
+            windows.for_each(|window| window.sort_unstable_by_key(|pair| pair[1]));
+        }
+        // The first boxes are not written: sorted by the second ones they lie elsewhere.
+        out.iter().map(|pair| pair[1]).collect::<Vec<_>>()
+    };
+    same("second boxes", &by_window(found), &by_window(wanted))
+        .or_else(|| same("windows", &found.windows, &wanted.windows))
+}
+
+/// The kernels of the sort, in the order in which they run.
+pub(super) const SORT: [&str; 6] =
+    ["arrange_rows", "count_pairs", "place_pairs", "rank_pairs", "place_windows", "rank_windows"];
 
 #[test]
 fn the_sort_agrees_with_its_twins() {
-    for kernel in KERNELS {
+    for kernel in SORT {
         for case in cases() {
             let before = State::before(kernel, &case);
             assert_eq!(fault(twin(kernel), &GpuOptions::DEFAULT, &before), None, "{}", case.name);
@@ -176,13 +236,13 @@ fn the_sort_agrees_with_its_twins_on_long_rows() {
     let second = (70_000..boxes).step_by(3).map(|b| Pair::new(5, b));
     let limit = (0..2).flat_map(|i| (0..SHORT_ROW + i).map(move |k| Pair::new(10 + i, 20 + k)));
     let pairs: Vec<_> = ground.chain(second).chain(limit).chain([Pair::new(boxes - 2, boxes - 1)]).collect();
-    for kernel in KERNELS {
+    for kernel in SORT {
         let before = unsorted(kernel, boxes, &pairs);
         assert_eq!(fault(twin(kernel), &GpuOptions::DEFAULT, &before), None, "{kernel}");
     }
-    let mut after = unsorted("rank_long_rows", boxes, &pairs);
-    assert_eq!(after.counters.long_rows, 3);
-    rank_long_rows(&mut after);
+    let mut after = unsorted("rank_windows", boxes, &pairs);
+    assert_eq!(long_rows(&after).len(), 3);
+    rank_windows(&mut after);
     let sorted_pairs: Vec<_> = after.out.chunks(2).map(|two| Pair::new(two[0], two[1] & !ENDED)).collect();
     assert_eq!(sorted_pairs, sorted(&pairs));
 }
@@ -207,13 +267,16 @@ fn arrange_rows_leaves_the_sort_to_the_host_without_room() {
 
 #[test]
 fn faults_planted_in_the_sort_are_noticed() {
-    let faults: [(&str, Plant); 6] = [
+    let faults: [(&str, Plant); 9] = [
         ("arrange_rows", |s| s.totals.sorted ^= 1),
         ("count_pairs", |s| s.rows[3] += 1),
         ("place_pairs", |s| s.grouped[9][1] ^= ENDED),
         ("rank_pairs", |s| s.out.swap(1, 3)),
-        ("rank_pairs", |s| s.long_rows[0][1] += 1),
-        ("rank_long_rows", |s| s.out[0] ^= 1),
+        ("rank_pairs", |s| s.long_rows[PIECES as usize] += 1),
+        ("rank_pairs", |s| s.windows[0] += 1),
+        ("place_windows", |s| s.windows[0] += 1),
+        ("place_windows", |s| s.out[1] ^= ENDED),
+        ("rank_windows", |s| s.out[0] ^= 1),
     ];
     for (i, (kernel, plant)) in faults.into_iter().enumerate() {
         let before = State::before(kernel, &pile());
@@ -222,5 +285,49 @@ fn faults_planted_in_the_sort_are_noticed() {
         assert_eq!((twin(kernel).compare)(&before, &found, &wanted), None, "{kernel}");
         plant(&mut found);
         assert!((twin(kernel).compare)(&before, &found, &wanted).is_some(), "fault {i}, {kernel}");
+    }
+}
+
+/// Returns the pairs of `grounds` large boxes, which every `step`-th other one touches, before a kernel of the sort.
+fn grounds(kernel: &str, boxes: u32, grounds: u32, step: usize) -> State {
+    let on = |b: u32| (0..grounds).map(move |ground| Pair::new(ground, b));
+    let pairs: Vec<_> = (grounds..boxes).step_by(step).flat_map(on).collect();
+    unsorted(kernel, boxes, &pairs)
+}
+
+/// The texts count operations instead of pairs.
+#[test]
+fn a_ground_costs_its_counter_one_operation_a_workgroup() {
+    needs_gpu!();
+    let (amount, rows) = ("atomicLoad(&followers[lane])", |s: &State| s.rows.iter().sum::<u32>());
+    for count in [1, 3] {
+        let before = grounds("count_pairs", 20_000, count, 1);
+        let most = count * by_found_pair(&before);
+        let operations = rows(&counting("count_pairs", &[[amount, "1u"]], &before));
+        assert!(operations > 0 && operations <= most, "count: {operations} of {most}");
+        let alone = ["select(lane, claimed, keys[claimed] == key)", "lane"];
+        let operations = rows(&counting("count_pairs", &[[amount, "1u"], alone], &before));
+        assert_eq!(operations, found_pairs(&before), "without leaders");
+        // The rows are in ends within their blocks: only those of the grounds go down.
+        let before = grounds("place_pairs", 20_000, count, 1);
+        let operations = rows(&before) - rows(&counting("place_pairs", &[[amount, "1u"]], &before));
+        assert!(operations > 0 && operations <= most, "place: {operations} of {most}");
+    }
+}
+
+/// One ground under ten million boxes has 306 windows.
+#[test]
+fn a_pair_of_a_long_row_is_read_a_few_times() {
+    needs_gpu!();
+    let note = "atomicAdd(&windows[arrayLength(&windows) - 1u], 1u);";
+    for (kernel, read, most) in [
+        ("place_windows", "return grouped[2u * i + 1u];", 4),
+        ("rank_windows", "let word = out[2u * i + 1u];", 1),
+    ] {
+        let mut before = grounds(kernel, 10_000_000, 1, 50);
+        before.windows.push(0);
+        let after = counting(kernel, &[[read, &format!("{note} {read}")]], &before);
+        let (reads, pairs) = (after.windows.last().expect("one was pushed"), found_pairs(&before));
+        assert!((pairs..=most * pairs).contains(reads), "{kernel}: {reads} reads of {pairs} pairs");
     }
 }

@@ -31,8 +31,8 @@ pub(super) struct State {
     pub(super) out: Vec<u32>,
     pub(super) rows: Vec<u32>,
     pub(super) grouped: Vec<[u32; 2]>,
-    pub(super) long_rows: Vec<[u32; 2]>,
-    pub(super) long_dispatch: [u32; 3],
+    pub(super) long_rows: Vec<u32>,
+    pub(super) windows: Vec<u32>,
 }
 
 /// A set of boxes, and the settings of the schedule.
@@ -142,7 +142,7 @@ impl State {
         if kernel == "index_pairs" {
             return indices(1000, 77, 4000);
         }
-        if let "arrange_rows" | "count_pairs" | "place_pairs" | "rank_pairs" | "rank_long_rows" = kernel {
+        if SORT.contains(&kernel) {
             return pairs_to_sort(kernel, case);
         }
         let mut state = Self::new(case);
@@ -213,7 +213,7 @@ impl State {
             Buffer::Rows => cast_slice_mut(&mut self.rows),
             Buffer::Grouped => cast_slice_mut(&mut self.grouped),
             Buffer::LongRows => cast_slice_mut(&mut self.long_rows),
-            Buffer::LongDispatch => bytes_of_mut(&mut self.long_dispatch),
+            Buffer::Windows => cast_slice_mut(&mut self.windows),
         }
     }
 }

@@ -12,9 +12,9 @@ pub(super) struct Twin {
 }
 
 /// The twins, in the order in which the kernels run.
-pub(super) static TWINS: [Twin; 18] = [
+pub(super) static TWINS: [Twin; 19] = [
     Twin { kernel: &shaders::APPLY_CHANGES, run: apply_changes, groups: by_change, compare: compare_motions },
-    Twin { kernel: &shaders::MEASURE, run: measure, groups: few, compare: compare_classes },
+    Twin { kernel: &shaders::MEASURE, run: measure, groups: by_box_at_most_64, compare: compare_classes },
     Twin { kernel: &shaders::LOCATE, run: locate, groups: by_box, compare: compare_located },
     Twin { kernel: &shaders::VISIT, run: visit, groups: by_box, compare: compare_cells },
     Twin { kernel: &shaders::SCAN_BLOCKS, run: scan_blocks, groups: by_block, compare: compare_blocks },
@@ -29,7 +29,8 @@ pub(super) static TWINS: [Twin; 18] = [
     Twin { kernel: &shaders::COUNT_PAIRS, run: count_pairs, groups: by_found_pair, compare: compare_rows },
     Twin { kernel: &shaders::PLACE_PAIRS, run: place_pairs, groups: by_found_pair, compare: compare_grouped },
     Twin { kernel: &shaders::RANK_PAIRS, run: rank_pairs, groups: by_found_pair, compare: compare_ranked },
-    Twin { kernel: &shaders::RANK_LONG_ROWS, run: rank_long_rows, groups: by_window, compare: compare_out },
+    Twin { kernel: &shaders::PLACE_WINDOWS, run: place_windows, groups: by_piece, compare: compare_windows },
+    Twin { kernel: &shaders::RANK_WINDOWS, run: rank_windows, groups: by_piece, compare: compare_out },
     Twin { kernel: &shaders::INDEX_PAIRS, run: index_pairs, groups: by_cell, compare: compare_indices },
 ];
 
@@ -57,9 +58,9 @@ pub(super) fn by_cell_block(s: &State) -> u32 {
     s.params.cells.div_ceil(CELLS_PER_BLOCK)
 }
 
-/// Returns fewer workgroups than there are boxes for.
-pub(super) fn few(_: &State) -> u32 {
-    3
+/// Returns the workgroups that measure the boxes.
+pub(super) fn by_box_at_most_64(s: &State) -> u32 {
+    by_box(s).min(MEASURE_GROUPS)
 }
 
 pub(super) fn by_small_item(s: &State) -> u32 {

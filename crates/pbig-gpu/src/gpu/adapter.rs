@@ -1,14 +1,19 @@
 //! The choice of an adapter.
 
-use super::GpuError;
+use super::{GpuError, wait};
 
 /// Returns all adapters, best first: discrete, integrated, virtual, unknown, software.
 ///
-/// `WGPU_BACKEND` and wgpu's other variables apply. With `WGPU_POWER_PREF=low` integrated adapters come first.
+/// None in a browser, where nothing may block. `WGPU_BACKEND` and wgpu's other variables apply. With `WGPU_POWER_PREF=low` integrated adapters come first.
 pub fn adapters() -> Vec<wgpu::Adapter> {
+    wait::block_on(async { Ok::<_, GpuError>(adapters_async().await) }).unwrap_or_default()
+}
+
+/// Returns all adapters, as [`adapters`]. Of several a browser shows one.
+pub async fn adapters_async() -> Vec<wgpu::Adapter> {
     let instance = wgpu::Instance::new(wgpu::InstanceDescriptor::new_without_display_handle_from_env());
     let backends = wgpu::Backends::from_env().unwrap_or(wgpu::Backends::all());
-    let mut adapters = pollster::block_on(instance.enumerate_adapters(backends));
+    let mut adapters = instance.enumerate_adapters(backends).await;
     let low = wgpu::PowerPreference::from_env() == Some(wgpu::PowerPreference::LowPower);
     adapters.sort_by_key(|adapter| rank(adapter.get_info().device_type, low));
     adapters
@@ -26,12 +31,12 @@ fn rank(kind: wgpu::DeviceType, low_power: bool) -> u32 {
 
 /// Returns the adapter of the given name, or of `WGPU_ADAPTER_NAME`, or the best. A part of the name is enough, in any
 /// case.
-pub(super) fn choose(name: Option<&str>) -> Result<wgpu::Adapter, GpuError> {
+pub(super) async fn choose(name: Option<&str>) -> Result<wgpu::Adapter, GpuError> {
     if let Some(value) = unknown_api() {
         return Err(GpuError::UnknownApi(value));
     }
     let wanted = name.map(str::to_owned).or_else(|| std::env::var("WGPU_ADAPTER_NAME").ok());
-    let all = adapters();
+    let all = adapters_async().await;
     let name_of = |adapter: &wgpu::Adapter| adapter.get_info().name;
     let matches = |adapter: &&wgpu::Adapter| {
         wanted.as_ref().is_none_or(|name| name_of(adapter).to_lowercase().contains(&name.to_lowercase()))

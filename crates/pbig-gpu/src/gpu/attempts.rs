@@ -20,15 +20,20 @@ const MAX_REPEATS: u32 = 8;
 
 impl Session {
     /// Searches with a grid, or tests every pair (Avril 3.2).
-    pub(super) fn search(&mut self, job: &Job<'_>, uploaded: Params, sink: &mut Sink) -> Result<(), Failure> {
+    pub(super) async fn search(
+        &mut self,
+        job: &Job<'_>,
+        uploaded: Params,
+        sink: &mut Sink,
+    ) -> Result<(), Failure> {
         let before = sink.pairs();
         for _ in 0..MAX_REPEATS {
-            let mut params = self.with_plan(job, uploaded, &mut sink.found.report)?;
-            let Some(done) = self.try_to_search(&mut params, sink)? else { continue };
+            let mut params = self.with_plan(job, uploaded, &mut sink.found.report).await?;
+            let Some(done) = self.try_to_search(&mut params, sink).await? else { continue };
             if params.levels > 0 {
                 // The host sorts the chunks that are left.
                 params.flags &= !SORTED;
-                self.search_rest(&params, rest(&self.sizes.lists, &done), sink)?;
+                self.search_rest(&params, rest(&self.sizes.lists, &done), sink).await?;
                 sink.note_plan(self.plan.as_ref().map(|kept| &kept.plan));
                 self.plan.take_if(|kept| kept.is_outgrown_after(&self.sizes.lists));
             }
@@ -41,15 +46,19 @@ impl Session {
 
     /// Submits the first chunk, and the others if their pairs are sorted on the device. Returns the items that are done, or
     /// none if the map has to be repeated.
-    fn try_to_search(&mut self, params: &mut Params, sink: &mut Sink) -> Result<Option<Chunk>, Failure> {
+    async fn try_to_search(
+        &mut self,
+        params: &mut Params,
+        sink: &mut Sink,
+    ) -> Result<Option<Chunk>, Failure> {
         let mut chunk = self.submit_first(params, sink.left())?;
         let mut items = chunk.items;
-        let mut result = self.finish(chunk, params, sink)?;
+        let mut result = self.finish(chunk, params, sink).await?;
         if matches!(result, ChunkResult::Unsorted) {
             let others = cut(rest(&self.sizes.lists, &items), self.chunk_items());
             chunk = self.submit_rest_and_sort(params, &others, sink)?;
             items = chunk.items;
-            result = self.finish(chunk, params, sink)?;
+            result = self.finish(chunk, params, sink).await?;
         }
         match result {
             ChunkResult::Done => Ok(Some(items)),
@@ -105,7 +114,7 @@ impl Session {
     }
 
     /// Searches the other chunks, two at a time: the device checks one while the host decodes the other (PBIG 5.3).
-    fn search_rest(&mut self, params: &Params, left: Chunk, sink: &mut Sink) -> Result<(), Failure> {
+    async fn search_rest(&mut self, params: &Params, left: Chunk, sink: &mut Sink) -> Result<(), Failure> {
         let mut pending: VecDeque<Chunk> = cut(left, self.chunk_items()).into();
         let mut in_progress: VecDeque<PendingChunk> = VecDeque::new();
         let most = if self.options.pipelining { 2 } else { 1 };
@@ -121,7 +130,7 @@ impl Session {
             }
             let Some(chunk) = in_progress.pop_front() else { return Ok(()) };
             let items = chunk.items;
-            match self.finish(chunk, params, sink)? {
+            match self.finish(chunk, params, sink).await? {
                 ChunkResult::Done => {}
                 ChunkResult::OutputTooLarge(words) => {
                     let smaller = self.smaller(items, words)?;

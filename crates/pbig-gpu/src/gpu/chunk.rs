@@ -23,6 +23,8 @@ pub(super) struct PendingChunk {
     pub(super) items: Chunk,
     side: Side,
     submission: wgpu::SubmissionIndex,
+    /// Number of submissions that the wait for it covers.
+    submissions: u32,
     /// Bytes of output that come with the header.
     prefetched: u64,
     passes: Vec<&'static Kernel>,
@@ -58,7 +60,7 @@ impl Session {
         // A map has turned the boxes into ordered integers.
         self.has_raw_boxes &= params.flags & RAW == 0;
         self.recording += clock.lap();
-        Ok(PendingChunk { items, side, submission, prefetched, passes })
+        Ok(PendingChunk { items, side, submission, submissions: 1, prefetched, passes })
     }
 
     /// Checks the other chunks of sorted pairs, which add their output to that of the first, and sorts all.
@@ -73,15 +75,13 @@ impl Session {
             let mut clock = Clock::start();
             self.write_chunk(*items, 0, left)?;
             let steps = check(items.small_items, items.large_items);
-            let (submission, _) = self.record(params, 0, &steps, None)?;
+            self.record(params, 0, &steps, None)?;
             self.recording += clock.lap();
-            // One at a time: the next one waits for this one anyway.
-            self.device.wait(submission, self.options.patience)?;
-            sink.found.report.wait += clock.lap();
             sink.found.report.chunks += 1;
         }
         let all = Chunk { small_items: u32::MAX, large_items: u32::MAX, ..Chunk::default() };
-        self.submit(params, all, 0, &sort(params), left)
+        let last = self.submit(params, all, 0, &sort(params), left)?;
+        Ok(PendingChunk { submissions: rest.len() as u32 + 1, ..last })
     }
 
     /// Tells the kernels which work items to check, and how much output there may be.
@@ -119,7 +119,7 @@ impl Session {
         let has_changes = std::mem::take(&mut self.has_pending_changes);
         let changes = has_changes.then(|| apply_changes(params));
         let steps: Vec<Step> = changes.into_iter().flatten().chain(steps.iter().copied()).collect();
-        recording.record(&steps)?;
+        recording.record(&steps);
         if let Some(prefetched) = prefetched {
             readback::record(&mut recording, timestamps, prefetched);
         }
@@ -132,7 +132,7 @@ impl Session {
     }
 
     /// Counts the boxes on the device by size.
-    pub(super) fn measure(
+    pub(super) async fn measure(
         &mut self,
         params: &Params,
         report: &mut DeviceReport,
@@ -141,7 +141,7 @@ impl Session {
         let mut clock = Clock::start();
         self.record(params, 0, &measure(params), None)?;
         self.recording += clock.lap();
-        let words = self.fetch(Buffer::Classes.into(), 0, CLASSES_BYTES / 4, report)?;
+        let words = self.fetch(Buffer::Classes.into(), 0, CLASSES_BYTES / 4, report).await?;
         report.wait += clock.lap();
         let mut classes = Box::new([SizeClass::default(); CLASSES]);
         for (class, four) in classes.iter_mut().zip(words.as_chunks::<4>().0) {
@@ -171,17 +171,18 @@ impl Session {
     }
 
     /// Waits for a chunk and decodes its output where it lies, if everything fitted.
-    pub(super) fn finish(
+    pub(super) async fn finish(
         &mut self,
         chunk: PendingChunk,
         params: &Params,
         sink: &mut Sink,
     ) -> Result<ChunkResult, Failure> {
-        let (submission, patience) = (chunk.submission.clone(), self.options.patience);
+        let patience = self.options.patience.saturating_mul(chunk.submissions);
+        let submission = chunk.submission.clone();
         let staging = self.storage.get(BufferId::Staging(chunk.side));
         let bytes = HEADER_BYTES + chunk.prefetched;
         let mut clock = Clock::start();
-        let received = readback::read(&self.device, staging, bytes, submission, patience)?;
+        let received = readback::read(&self.device, staging, bytes, submission, patience).await?;
         sink.found.report.wait += clock.lap();
         sink.found.report.downloaded += bytes;
         let (header, prefetched) = received.split_at(HEADER_BYTES as usize);
@@ -198,8 +199,8 @@ impl Session {
         if params.flags & SORTED != 0 && totals.sorted == 0 && !rest(&counters, &chunk.items).is_empty() {
             return Ok(ChunkResult::Unsorted);
         }
-        let words = self.words(bytemuck::cast_slice(prefetched), out, needed, sink)?;
-        self.fetch_entries(params, needed, sink)?;
+        let words = self.words(bytemuck::cast_slice(prefetched), out, needed, sink).await?;
+        self.fetch_entries(params, needed, sink).await?;
         sink.found.report.wait += clock.lap();
         self.take_output(&words, params, &totals, sink)?;
         Ok(ChunkResult::Done)
@@ -247,7 +248,7 @@ impl Session {
     }
 
     /// Returns the words of output: those that came with the header, and the rest if there are more.
-    fn words<'a>(
+    async fn words<'a>(
         &mut self,
         prefetched: &'a [u32],
         out: BufferId,
@@ -259,15 +260,15 @@ impl Session {
             return Ok(Cow::Borrowed(&prefetched[..needed as usize]));
         }
         let mut words = prefetched.to_vec();
-        words.extend(self.fetch(out, have, needed, &mut sink.found.report)?);
+        words.extend(self.fetch(out, have, needed, &mut sink.found.report).await?);
         Ok(Cow::Owned(words))
     }
 
     /// Reads the entries, which records name, once a job.
-    fn fetch_entries(&mut self, params: &Params, words: u64, sink: &mut Sink) -> Result<(), GpuError> {
+    async fn fetch_entries(&mut self, params: &Params, words: u64, sink: &mut Sink) -> Result<(), GpuError> {
         if params.flags & PACKED != 0 && self.table.is_none() && words > 0 {
             let entries = u64::from(self.sizes.lists.entries);
-            self.table = Some(self.fetch(Buffer::Entries.into(), 0, entries, &mut sink.found.report)?);
+            self.table = Some(self.fetch(Buffer::Entries.into(), 0, entries, &mut sink.found.report).await?);
         }
         Ok(())
     }
@@ -300,7 +301,7 @@ impl Session {
     }
 
     /// Reads the words `from..to` of a buffer, in a submission of its own.
-    fn fetch(
+    async fn fetch(
         &mut self,
         source: BufferId,
         from: u64,
@@ -318,7 +319,7 @@ impl Session {
         let mut encoder = self.device.handle.create_command_encoder(&descriptor);
         encoder.copy_buffer_to_buffer(self.storage.get(source), 4 * from, staging, 0, bytes);
         let submission = self.device.submit(encoder);
-        let read = readback::read(&self.device, staging, bytes, submission, self.options.patience)?;
+        let read = readback::read(&self.device, staging, bytes, submission, self.options.patience).await?;
         Ok(bytemuck::pod_collect_to_vec(&read))
     }
 }

@@ -1,13 +1,11 @@
 //! The device: pipelines, buffers, submissions. Only this file and `readback` talk to a queue.
 
-use super::{GpuError, adapter};
+use super::{GpuError, adapter, wait};
 use crate::GpuOptions;
 use pbig_shaders::{Buffer, Kernel};
 use std::collections::HashMap;
-use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, Mutex, OnceLock, PoisonError};
-use std::time::Duration;
+use std::sync::{Arc, Mutex, PoisonError};
 
 /// A fault that a test injects at a later submission.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -66,6 +64,9 @@ pub(super) struct GpuDevice {
     pub(super) has_timestamps: bool,
     pipelines: Mutex<HashMap<(&'static str, Variant), wgpu::ComputePipeline>>,
     is_lost: AtomicBool,
+    /// A call of a page is in progress.
+    #[cfg(target_arch = "wasm32")]
+    pub(super) is_in_call: AtomicBool,
     /// An injected fault, and the number of submissions until it happens.
     fault: Mutex<Option<(Fault, u32)>>,
 }
@@ -82,12 +83,14 @@ impl GpuDevice {
             queue,
             pipelines: Mutex::default(),
             is_lost: AtomicBool::new(false),
+            #[cfg(target_arch = "wasm32")]
+            is_in_call: AtomicBool::new(false),
             fault: Mutex::default(),
         })
     }
 
     /// Opens a device on an adapter, with its limits and the features that pbig uses.
-    pub(super) fn on(adapter: &wgpu::Adapter) -> Result<Self, GpuError> {
+    pub(super) async fn on(adapter: &wgpu::Adapter) -> Result<Self, GpuError> {
         let descriptor = wgpu::DeviceDescriptor {
             label: Some("pbig"),
             required_features: adapter.features() & wgpu::Features::TIMESTAMP_QUERY,
@@ -96,7 +99,7 @@ impl GpuDevice {
             ..Default::default()
         };
         let name = || adapter.get_info().name;
-        let opened = pollster::block_on(adapter.request_device(&descriptor));
+        let opened = adapter.request_device(&descriptor).await;
         let (device, queue) =
             opened.map_err(|why| GpuError::NoDevice { adapter: name(), why: why.to_string() })?;
         Self::new(device, queue)
@@ -104,17 +107,15 @@ impl GpuDevice {
 
     /// Returns the process's device, which finders without a device of their own share. Opening a device takes tenths
     /// of a second. A lost device is replaced.
-    pub(super) fn shared() -> Result<Arc<Self>, GpuError> {
-        static SHARED: OnceLock<Mutex<Option<Arc<GpuDevice>>>> = OnceLock::new();
-        let mut shared = lock(SHARED.get_or_init(Mutex::default));
-        match &*shared {
-            Some(device) if !device.is_lost() => Ok(device.clone()),
-            _ => {
-                let device = Arc::new(Self::on(&adapter::choose(None)?)?);
-                *shared = Some(device.clone());
-                Ok(device)
-            }
+    pub(super) async fn shared() -> Result<Arc<Self>, GpuError> {
+        static SHARED: Mutex<Option<Arc<GpuDevice>>> = Mutex::new(None);
+        let usable = || lock(&SHARED).clone().filter(|device| !device.is_lost());
+        if let Some(device) = usable() {
+            return Ok(device);
         }
+        let opened = Arc::new(Self::on(&adapter::choose(None).await?).await?);
+        // Another finder may have opened one meanwhile.
+        Ok(usable().unwrap_or_else(|| lock(&SHARED).insert(opened).clone()))
     }
 
     pub(super) fn is_lost(&self) -> bool {
@@ -126,7 +127,7 @@ impl GpuDevice {
     }
 
     /// Returns true, once, if the given fault is due.
-    fn is_due(&self, fault: Fault) -> bool {
+    pub(super) fn is_due(&self, fault: Fault) -> bool {
         lock(&self.fault).take_if(|armed| *armed == (fault, 0)).is_some()
     }
 
@@ -137,55 +138,44 @@ impl GpuDevice {
     }
 
     /// Runs `work`, and returns errors that wgpu reports meanwhile.
-    pub(super) fn watch<T, F: From<GpuError>>(&self, work: impl FnOnce() -> Result<T, F>) -> Result<T, F> {
+    pub(super) async fn watch<T, F: From<GpuError>>(
+        &self,
+        work: impl AsyncFnOnce() -> Result<T, F>,
+    ) -> Result<T, F> {
         use wgpu::ErrorFilter::{Internal, OutOfMemory, Validation};
-        let scopes = [Validation, OutOfMemory, Internal].map(|filter| self.handle.push_error_scope(filter));
-        let result = work();
-        // Innermost first.
-        let errors = scopes.into_iter().rev().map(|scope| pollster::block_on(scope.pop()));
-        let error = errors.fold(None, |first: Option<wgpu::Error>, error| first.or(error));
+        let _entered = wait::enter(self)?;
+        // Three variables, because a future that is dropped must end the innermost scope first.
+        let outer = self.handle.push_error_scope(Validation);
+        let middle = self.handle.push_error_scope(OutOfMemory);
+        let inner = self.handle.push_error_scope(Internal);
+        let result = work().await;
+        let errors = [inner.pop().await, middle.pop().await, outer.pop().await];
+        let Some(error) = errors.into_iter().flatten().next() else { return result };
+        // A pipeline may be what was refused.
+        lock(&self.pipelines).clear();
         match error {
-            None => result,
-            Some(wgpu::Error::OutOfMemory { .. }) => Err(GpuError::OutOfMemory.into()),
+            wgpu::Error::OutOfMemory { .. } => Err(GpuError::OutOfMemory.into()),
             // A lost device refuses everything, and its messages do not name the loss.
-            Some(_) if !self.is_alive() => Err(self.give_up().into()),
-            Some(other) => Err(GpuError::Refused(first_lines(&other.to_string())).into()),
+            _ if !self.is_alive() => Err(self.give_up().into()),
+            other => Err(GpuError::Refused(first_lines(&other.to_string())).into()),
         }
     }
 
-    fn is_alive(&self) -> bool {
-        self.is_idle_within(Duration::from_secs(1))
-    }
-
-    /// Returns true if the device finishes all its work, and an empty submission, in time.
-    pub(super) fn is_idle_within(&self, limit: Duration) -> bool {
-        let scope = self.handle.push_error_scope(wgpu::ErrorFilter::Validation);
-        let encoder = self.handle.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
-        let submission = self.queue.submit([encoder.finish()]);
-        let finished = self.poll(submission, limit).is_ok();
-        let refused = pollster::block_on(scope.pop()).is_some();
-        finished && !refused
-    }
-
     /// Returns the pipeline of a kernel, which is compiled at first use.
-    pub(super) fn pipeline(
-        &self,
-        kernel: &'static Kernel,
-        variant: Variant,
-    ) -> Result<wgpu::ComputePipeline, GpuError> {
+    pub(super) fn pipeline(&self, kernel: &'static Kernel, variant: Variant) -> wgpu::ComputePipeline {
         // Most kernels do not depend on what is searched for.
         let variant = Variant { changes: variant.changes && kernel.depends_on_search(), ..variant };
         let mut pipelines = lock(&self.pipelines);
         if let Some(pipeline) = pipelines.get(&(kernel.name, variant)) {
-            return Ok(pipeline.clone());
+            return pipeline.clone();
         }
         let mut source = kernel.source(variant.changes);
         if self.is_due(Fault::RefuseShader) {
             source.push_str("this is no WGSL");
         }
-        let pipeline = self.watch(|| Ok::<_, GpuError>(self.compile(kernel, &source, variant)))?;
+        let pipeline = self.compile(kernel, &source, variant);
         pipelines.insert((kernel.name, variant), pipeline.clone());
-        Ok(pipeline)
+        pipeline
     }
 
     fn compile(&self, kernel: &Kernel, source: &str, variant: Variant) -> wgpu::ComputePipeline {
@@ -200,7 +190,8 @@ impl GpuDevice {
             entry_point: Some(kernel.name),
             compilation_options: wgpu::PipelineCompilationOptions {
                 constants: &variant.constants(source),
-                ..Default::default()
+                // Lane 0 would zero everything, which is slow. Kernels zero what they read.
+                zero_initialize_workgroup_memory: false,
             },
             cache: None,
         })
@@ -228,43 +219,6 @@ impl GpuDevice {
             *left = left.saturating_sub(1);
         }
         self.queue.submit([encoder.finish()])
-    }
-
-    /// Waits for a submission, at most for `patience`.
-    pub(super) fn wait(&self, submission: wgpu::SubmissionIndex, patience: Duration) -> Result<(), GpuError> {
-        if self.is_due(Fault::Timeout) {
-            self.give_up();
-            return Err(GpuError::Timeout(patience));
-        }
-        match self.poll(submission, patience) {
-            Ok(()) => Ok(()),
-            Err(Some(wgpu::PollError::Timeout)) => {
-                self.give_up();
-                // Dropping the last handle of a queue waits for it without a limit, so a handle is leaked.
-                std::mem::forget((self.handle.clone(), self.queue.clone()));
-                Err(GpuError::Timeout(patience))
-            }
-            // wgpu did not accept the submission. The error scopes know why.
-            Err(Some(_)) if self.is_alive() => Err(GpuError::Refused("the submission".into())),
-            Err(_) => Err(self.give_up()),
-        }
-    }
-
-    /// Waits. Returns `Err(None)` if wgpu panicked, as it does when the driver reports a lost device.
-    fn poll(
-        &self,
-        submission: wgpu::SubmissionIndex,
-        patience: Duration,
-    ) -> Result<(), Option<wgpu::PollError>> {
-        let wait = wgpu::PollType::Wait { submission_index: Some(submission), timeout: Some(patience) };
-        let poll = || {
-            assert!(!self.is_due(Fault::Panic), "an injected fault");
-            self.handle.poll(wait)
-        };
-        match catch_unwind(AssertUnwindSafe(poll)) {
-            Ok(polled) => polled.map(|_| ()).map_err(Some),
-            Err(_) => Err(None),
-        }
     }
 
     pub(super) fn take_back(&self) {

@@ -43,6 +43,12 @@ pub enum GpuError {
     /// The device did not answer in time.
     #[error("the device did not answer within {0:?}")]
     Timeout(std::time::Duration),
+    /// A page may not block: it uses the `async` functions of [`crate::GpuFinder`].
+    #[error("a page may not block: use GpuFinder::open_async and find_all_async")]
+    WouldBlock,
+    /// Another call of the page uses the device.
+    #[error("another call of the page uses the device")]
+    Busy,
     /// The device has no memory left.
     #[error("out of device memory")]
     OutOfMemory,

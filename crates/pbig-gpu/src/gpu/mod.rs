@@ -29,19 +29,22 @@ mod sink;
 mod storage;
 pub mod testing;
 mod upload;
+#[cfg_attr(target_arch = "wasm32", path = "wait_web.rs")]
+mod wait;
 
-pub use adapter::{adapters, describe};
+pub use adapter::{adapters, adapters_async, describe};
 use error::Failure;
 pub use error::GpuError;
 pub use plan::GpuPlan;
 
 use crate::GpuOptions;
 use device::GpuDevice;
-use pbig_core::{ChangeRequest, DeviceFailure, DeviceFound, Pair, PairDevice, SearchRequest};
+use pbig_core::internal::Clock;
+use pbig_core::{ChangeRequest, DeviceFailure, DeviceFound, PairDevice, SearchRequest};
 use search::{Search, search};
 use session::Session;
 use std::sync::Arc;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 /// Time that a call waits for a device of the app that was busy for too long.
 const PROBE: Duration = Duration::from_millis(10);
@@ -64,7 +67,7 @@ pub struct GpuFinder {
     options: GpuOptions,
     device: Option<Arc<GpuDevice>>,
     session: Option<Session>,
-    failed: Option<(Instant, String)>,
+    failed: Option<(Clock, String)>,
     /// [`pbig_core::Backend::Auto`] takes a software adapter for hardware, in tests.
     pretends_hardware: bool,
 }
@@ -99,7 +102,23 @@ impl GpuFinder {
     /// # Errors
     /// If the adapter gives no device that the kernels can run on.
     pub fn on(adapter: &wgpu::Adapter) -> Result<Self, GpuError> {
-        Ok(Self::with(Source::Own(Some(adapter.get_info().name)), GpuDevice::on(adapter)?))
+        wait::block_on(Self::on_async(adapter))
+    }
+
+    /// Opens a device on the best adapter, without blocking. In a browser this is the way, with [`GpuFinder::find_all_async`].
+    ///
+    /// # Errors
+    /// As [`GpuFinder::new`].
+    pub async fn open_async() -> Result<Self, GpuError> {
+        Ok(Self::with(Source::Own(None), GpuDevice::on(&adapter::choose(None).await?).await?))
+    }
+
+    /// Opens a device on the given adapter, without blocking.
+    ///
+    /// # Errors
+    /// As [`GpuFinder::on`].
+    pub async fn on_async(adapter: &wgpu::Adapter) -> Result<Self, GpuError> {
+        Ok(Self::with(Source::Own(Some(adapter.get_info().name)), GpuDevice::on(adapter).await?))
     }
 
     /// Uses the app's own device, which is never replaced: after its loss, calls run on the CPU.
@@ -111,8 +130,10 @@ impl GpuFinder {
     }
 
     fn open(name: Option<String>) -> Result<Self, GpuError> {
-        let device = GpuDevice::on(&adapter::choose(name.as_deref())?)?;
-        Ok(Self::with(Source::Own(name), device))
+        wait::block_on(async {
+            let device = GpuDevice::on(&adapter::choose(name.as_deref()).await?).await?;
+            Ok::<_, GpuError>(Self::with(Source::Own(name), device))
+        })
     }
 
     fn with(source: Source, device: GpuDevice) -> Self {
@@ -146,48 +167,93 @@ impl GpuFinder {
         self.device.as_ref().is_some_and(|device| device.is_software)
     }
 
+    /// Finds all pairs without blocking, as [`PairDevice::find_all`]. A program blocks all the same while the device works, and a page
+    /// does not. In a page one call at a time may use a device; a call that is given up, by dropping its future, costs no later
+    /// one its pairs.
+    ///
+    /// ```
+    /// # use pbig_core::{Aabb, DeviceFailure, DeviceFound, SearchRequest};
+    /// # use pbig_gpu::GpuFinder;
+    /// async fn count(boxes: &[Aabb], finder: &mut GpuFinder) -> Result<usize, DeviceFailure> {
+    ///     let request = SearchRequest { boxes, filters: None, is_sorted: true, max_pairs: u64::MAX };
+    ///     let mut found = DeviceFound::default();
+    ///     finder.find_all_async(&request, &mut found).await?;
+    ///     Ok(found.pairs.len())
+    /// }
+    /// ```
+    ///
+    /// # Errors
+    /// See [`DeviceFailure`]. Then `found` may hold anything.
+    pub async fn find_all_async(
+        &mut self,
+        request: &SearchRequest<'_>,
+        found: &mut DeviceFound,
+    ) -> Result<(), DeviceFailure> {
+        self.run(&Search::all(request), found).await.map_err(Failure::for_core)
+    }
+
+    /// Finds the pairs that an update has changed, as [`PairDevice::find_changed`], without blocking.
+    ///
+    /// # Errors
+    /// As [`GpuFinder::find_all_async`].
+    pub async fn find_changed_async(
+        &mut self,
+        request: &ChangeRequest<'_>,
+        found: &mut DeviceFound,
+    ) -> Result<(), DeviceFailure> {
+        self.run(&Search::changes(request), found).await.map_err(Failure::for_core)
+    }
+
     /// Runs a search, and notes how it went.
-    fn run(&mut self, request: &Search<'_>, found: &mut DeviceFound) -> Result<(), DeviceFailure> {
-        let result = self.try_run(request, std::mem::take(&mut found.pairs));
-        if let Err(failure) = &result {
-            self.fail(failure);
-        }
-        *found = result.map_err(Failure::for_core)?;
-        self.failed = None;
-        self.session.iter_mut().for_each(|session| session.end_call(found, request.kept()));
-        Ok(())
-    }
-
-    fn try_run(&mut self, request: &Search<'_>, pairs: Vec<Pair>) -> Result<DeviceFound, Failure> {
+    async fn run(&mut self, request: &Search<'_>, found: &mut DeviceFound) -> Result<(), Failure> {
         self.check_pause()?;
-        let session = self.session()?;
-        session.device.clone().watch(|| search(session, request, pairs))
+        let result = self.try_run(request, found).await;
+        self.failed = match &result {
+            Err(Failure::Device(error)) => Some((Clock::start(), error.to_string())),
+            _ => None,
+        };
+        result
     }
 
-    /// Drops all state that a failed call may have left wrong.
-    fn fail(&mut self, failure: &Failure) {
-        match (failure, &mut self.session) {
-            (Failure::TooManyPairs, _) => self.forget(),
-            (Failure::Device(GpuError::Paused { .. }), _) => {}
-            (Failure::Device(error), session) => {
-                *session = None;
-                self.failed = Some((Instant::now(), error.to_string()));
-            }
+    /// Runs a search in a session that is kept unless the device failed: its state may be wrong then, or if the call was given up.
+    async fn try_run(&mut self, request: &Search<'_>, found: &mut DeviceFound) -> Result<(), Failure> {
+        let mut session = self.take_session().await?;
+        let (device, pairs) = (session.device.clone(), std::mem::take(&mut found.pairs));
+        let result = device.watch(async || search(&mut session, request, pairs).await).await;
+        let result = result.map(|answer| {
+            *found = answer;
+            session.end_call(found, request.kept());
+        });
+        match result {
+            Err(Failure::TooManyPairs) => session.uploaded.forget_motions(),
+            Err(Failure::Device(_)) => return result,
+            Ok(()) => {}
         }
+        self.session = Some(session);
+        result
     }
 
     /// Returns an error while calls stay on the CPU because the device failed a short while ago.
     fn check_pause(&self) -> Result<(), GpuError> {
         let pause = self.options.pause;
-        match &self.failed {
-            Some((when, why)) if when.elapsed() < pause => {
-                Err(GpuError::Paused { ago: when.elapsed(), why: why.clone(), pause })
-            }
+        let Some((clock, why)) = &self.failed else { return Ok(()) };
+        match clock.time() {
+            Some(ago) if ago < pause => Err(GpuError::Paused { ago, why: why.clone(), pause }),
             _ => Ok(()),
         }
     }
 
-    fn session(&mut self) -> Result<&mut Session, GpuError> {
+    /// Returns the session of the last call, or a new one.
+    async fn take_session(&mut self) -> Result<Session, GpuError> {
+        let device = self.open_device().await?;
+        match self.session.take().filter(|session| session.options == self.options) {
+            Some(session) => Ok(session),
+            None => device.watch(async || Session::new(device.clone(), &self.options)).await,
+        }
+    }
+
+    /// Returns the device, or another one if it was lost.
+    async fn open_device(&mut self) -> Result<Arc<GpuDevice>, GpuError> {
         if let Some(device) = self.device.take_if(|device| device.is_lost()) {
             self.session = None;
             // An app's device may only have been busy for too long.
@@ -199,16 +265,13 @@ impl GpuFinder {
         let device = match (&self.device, &self.source) {
             (Some(device), _) if device.is_lost() => return Err(GpuError::Lost),
             (Some(device), _) => device.clone(),
-            (None, Source::Shared) => GpuDevice::shared()?,
-            (None, Source::Own(name)) => Arc::new(GpuDevice::on(&adapter::choose(name.as_deref())?)?),
+            (None, Source::Shared) => GpuDevice::shared().await?,
+            (None, Source::Own(name)) => {
+                Arc::new(GpuDevice::on(&adapter::choose(name.as_deref()).await?).await?)
+            }
             (None, Source::Given) => return Err(GpuError::Lost),
         };
-        self.device = Some(device.clone());
-        let session = match self.session.take().filter(|session| session.options == self.options) {
-            Some(session) => session,
-            None => device.clone().watch(|| Session::new(device, &self.options))?,
-        };
-        Ok(self.session.insert(session))
+        Ok(self.device.insert(device).clone())
     }
 }
 
@@ -218,7 +281,7 @@ impl PairDevice for GpuFinder {
         request: &SearchRequest<'_>,
         found: &mut DeviceFound,
     ) -> Result<(), DeviceFailure> {
-        self.run(&Search::all(request), found)
+        wait::block_on(self.run(&Search::all(request), found)).map_err(Failure::for_core)
     }
 
     /// The device has each box now and at the last update (`shaders/shared/search_changes.wgsl`). So transfers in both
@@ -228,7 +291,7 @@ impl PairDevice for GpuFinder {
         request: &ChangeRequest<'_>,
         found: &mut DeviceFound,
     ) -> Result<(), DeviceFailure> {
-        self.run(&Search::changes(request), found)
+        wait::block_on(self.run(&Search::changes(request), found)).map_err(Failure::for_core)
     }
 
     fn forget(&mut self) {

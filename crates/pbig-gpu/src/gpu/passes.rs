@@ -4,20 +4,14 @@ use super::GpuError;
 use super::device::Variant;
 use super::storage::{BufferId, Side, Storage};
 use crate::layout::{
-    CELLS_PER_BLOCK, COUNTS_PER_BLOCK, Cell, Counters, LANES, LargeItem, Located, Params, SHORT_ROW, SORTED,
-    Slot, SmallItem, Totals,
+    self, CELLS_PER_BLOCK, COUNTS_PER_BLOCK, Cell, Counters, GROUPS_PER_ROW, LANES, LargeItem, Located,
+    MEASURE_GROUPS, Params, SHORT_ROW, SORTED, Slot, SmallItem, Totals, WINDOW,
 };
 use pbig_core::Pair;
 use pbig_shaders::{self as shaders, Buffer, Kernel};
 
-/// Workgroups in a row of a dispatch. The portable limit is 65,535.
-const GROUPS_PER_ROW: u32 = 32_768;
-
 /// Maximum number of kernels in one submission. Each takes two timestamps.
 pub(super) const MAX_PASSES: u32 = 24;
-
-/// Maximum number of workgroups that measure the boxes. Each adds its counts to those of all.
-const MEASURE_GROUPS: u32 = 64;
 
 /// Bytes of the counts of size classes.
 pub(super) const CLASSES_BYTES: u64 = 256 * 16;
@@ -43,7 +37,7 @@ pub(super) enum Step {
 /// The step that begins the counts of a check anew.
 pub(super) const CLEAR_TOTALS: Step = Clear(Buffer::Totals, size_of::<Totals>() as u64);
 
-use Buffer::{Dispatches, LongDispatch};
+use Buffer::{Dispatches, LongRows};
 use Groups::{Direct, Indirect};
 use Step::{Clear, Run, RunOnRows};
 
@@ -92,16 +86,18 @@ pub(super) fn map_and_check(params: &Params, is_all: bool) -> Vec<Step> {
 }
 
 /// Returns the steps that sort the pairs, where the chunk has all and they fit.
-pub(super) fn sort(params: &Params) -> [Step; 8] {
+pub(super) fn sort(params: &Params) -> [Step; 10] {
     [
         Run(&shaders::ARRANGE_ROWS, Direct(1)),
         Clear(Buffer::Rows, bytes_of::<u32>(params.boxes)),
+        Clear(Buffer::Windows, windows_bytes(params)),
         Run(&shaders::COUNT_PAIRS, Indirect(Dispatches, 24)),
         RunOnRows(&shaders::SCAN_BLOCKS, Direct(params.boxes.div_ceil(COUNTS_PER_BLOCK))),
         RunOnRows(&shaders::SCAN_SUMS, Direct(1)),
         Run(&shaders::PLACE_PAIRS, Indirect(Dispatches, 24)),
         Run(&shaders::RANK_PAIRS, Indirect(Dispatches, 24)),
-        Run(&shaders::RANK_LONG_ROWS, Indirect(LongDispatch, 0)),
+        Run(&shaders::PLACE_WINDOWS, Indirect(LongRows, 0)),
+        Run(&shaders::RANK_WINDOWS, Indirect(LongRows, 0)),
     ]
 }
 
@@ -152,12 +148,23 @@ pub(super) fn make_sort_buffers(
     words: u64,
 ) -> Result<(), GpuError> {
     storage.ensure(Buffer::Rows, bytes_of::<u32>(params.boxes))?;
-    storage.ensure(Buffer::LongDispatch, bytes_of::<[u32; 3]>(1))?;
     storage.ensure(Buffer::Grouped, 4 * words)?;
     let pairs = storage.size(Buffer::Grouped) / size_of::<Pair>() as u64;
-    storage.ensure(Buffer::LongRows, 8 * (pairs / u64::from(SHORT_ROW) + 1))?;
     params.pair_capacity = u32::try_from(pairs).unwrap_or(u32::MAX);
+    let pieces = most_long_rows(params.pair_capacity);
+    storage.ensure(LongRows, 4 * (u64::from(layout::FIRST_PIECE) + 3 * pieces))?;
+    storage.ensure(Buffer::Windows, windows_bytes(params))?;
     Ok(())
+}
+
+/// Returns the maximum number of long rows of this number of pairs, which is also that of their pieces.
+fn most_long_rows(pairs: u32) -> u64 {
+    u64::from(pairs / SHORT_ROW) + 1
+}
+
+/// Returns the bytes of the counters of the windows of long rows.
+fn windows_bytes(params: &Params) -> u64 {
+    4 * most_long_rows(params.pair_capacity) * u64::from(params.boxes.div_ceil(WINDOW))
 }
 
 /// Returns true if all lists of the map fitted into their buffers.
@@ -188,7 +195,7 @@ struct Ready {
 
 impl Recording<'_> {
     /// Records steps: first everything that is cleared, then the kernels. They share a pass, unless each is timed.
-    pub(super) fn record(&mut self, steps: &[Step]) -> Result<(), GpuError> {
+    pub(super) fn record(&mut self, steps: &[Step]) {
         let mut kernels = Vec::with_capacity(steps.len());
         for &step in steps {
             match step {
@@ -197,16 +204,15 @@ impl Recording<'_> {
                     self.encoder.clear_buffer(buffer, 0, Some(bytes));
                 }
                 Run(_, Direct(0)) => {}
-                Run(kernel, groups) => kernels.push(self.ready(kernel, groups, self.variant)?),
+                Run(kernel, groups) => kernels.push(self.ready(kernel, groups, self.variant)),
                 RunOnRows(kernel, groups) => {
-                    kernels.push(self.ready(kernel, groups, self.variant.of_rows())?);
+                    kernels.push(self.ready(kernel, groups, self.variant.of_rows()));
                 }
             }
         }
         self.passes.extend(kernels.iter().map(|ready| ready.kernel));
         let Some(query_set) = self.queries else {
-            self.run(&kernels, None);
-            return Ok(());
+            return self.run(&kernels, None);
         };
         for (i, kernel) in (0u32..).zip(&kernels) {
             let (beginning, end) = (Some(2 * i), Some(2 * i + 1));
@@ -217,18 +223,12 @@ impl Recording<'_> {
             };
             self.run(std::slice::from_ref(kernel), Some(writes));
         }
-        Ok(())
     }
 
-    fn ready(
-        &mut self,
-        kernel: &'static Kernel,
-        groups: Groups,
-        variant: Variant,
-    ) -> Result<Ready, GpuError> {
-        let pipeline = self.storage.device.pipeline(kernel, variant)?;
+    fn ready(&mut self, kernel: &'static Kernel, groups: Groups, variant: Variant) -> Ready {
+        let pipeline = self.storage.device.pipeline(kernel, variant);
         let bind_group = self.storage.bind_group(kernel, variant, self.side, &pipeline);
-        Ok(Ready { kernel, pipeline, bind_group, groups })
+        Ready { kernel, pipeline, bind_group, groups }
     }
 
     /// Records a pass.

@@ -1,13 +1,12 @@
 //! Readback: copies the output of a submission to the host.
 
-use super::GpuError;
 use super::device::GpuDevice;
 use super::passes::{MAX_PASSES, Recording};
 use super::storage::BufferId;
+use super::{GpuError, wait};
 use crate::layout::{Counters, Totals};
 use bytemuck::{Pod, Zeroable};
 use pbig_shaders::{Buffer, Kernel};
-use std::sync::mpsc;
 use std::time::Duration;
 
 /// The content of a staging buffer before the words of output.
@@ -98,23 +97,14 @@ impl Drop for Mapped {
 }
 
 /// Waits for a submission. Returns the first `bytes` of the staging buffer that it has filled.
-pub(super) fn read(
+pub(super) async fn read(
     device: &GpuDevice,
     staging: &wgpu::Buffer,
     bytes: u64,
     submission: wgpu::SubmissionIndex,
     patience: Duration,
 ) -> Result<Mapped, GpuError> {
-    let (sender, mapped) = mpsc::channel();
-    staging.map_async(wgpu::MapMode::Read, 0..bytes, move |result| {
-        // The receiver is gone if the wait was given up.
-        let _ = sender.send(result);
-    });
-    device.wait(submission, patience)?;
-    // If another thread polls the device, that thread calls back, perhaps a moment later.
-    if !matches!(mapped.recv_timeout(patience), Ok(Ok(()))) {
-        return Err(device.give_up());
-    }
+    wait::map(device, staging, bytes, submission, patience).await?;
     let view = staging.get_mapped_range(0..bytes).map_err(|_| device.give_up())?;
     Ok(Mapped { view: Some(view), buffer: staging.clone() })
 }

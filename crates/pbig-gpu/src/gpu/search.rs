@@ -70,7 +70,7 @@ impl<'a> Search<'a> {
 }
 
 /// Searches in as few parts as fit. The result uses the memory of `pairs`.
-pub(super) fn search(
+pub(super) async fn search(
     session: &mut Session,
     request: &Search<'_>,
     mut pairs: Vec<Pair>,
@@ -84,9 +84,9 @@ pub(super) fn search(
     loop {
         let mut sink = Sink::new(std::mem::take(&mut pairs), request.max_pairs, request.kept());
         let result = if len <= most {
-            search_whole(session, request, &mut sink)
+            search_whole(session, request, &mut sink).await
         } else {
-            search_parts(session, request, most, &mut sink)
+            search_parts(session, request, most, &mut sink).await
         };
         match result {
             // Only the device knew the length of the list that was too large. Fewer boxes make it shorter.
@@ -107,15 +107,15 @@ pub(super) fn search(
     }
 }
 
-fn search_whole(session: &mut Session, request: &Search<'_>, sink: &mut Sink) -> Result<(), Failure> {
+async fn search_whole(session: &mut Session, request: &Search<'_>, sink: &mut Sink) -> Result<(), Failure> {
     if request.boxes.len() < 2 {
         sink.found.valid = request.boxes.iter().filter(|one| one.is_valid()).count() as u32;
         return Ok(());
     }
-    session.run(&request.whole(session.options.all_pairs_up_to), sink)
+    session.run(&request.whole(session.options.all_pairs_up_to), sink).await
 }
 
-fn search_parts(
+async fn search_parts(
     session: &mut Session,
     request: &Search<'_>,
     most: usize,
@@ -142,7 +142,7 @@ fn search_parts(
         let job = Job { boxes: &boxes, input, filters, split, needs_grid: true, is_sorted: false };
         // Each part lies elsewhere.
         session.plan = None;
-        session.run(&job, sink)?;
+        session.run(&job, sink).await?;
         name_pairs(&mut sink.found.pairs[found..], &ids);
         name_pairs(&mut sink.found.ended[ended..], &ids);
     }

@@ -109,9 +109,9 @@ impl Session {
         }
     }
 
-    pub(super) fn run(&mut self, job: &Job<'_>, sink: &mut Sink) -> Result<(), Failure> {
+    pub(super) async fn run(&mut self, job: &Job<'_>, sink: &mut Sink) -> Result<(), Failure> {
         let params = self.upload(job, &mut sink.found.report)?;
-        let result = self.search(job, params, sink);
+        let result = self.search(job, params, sink).await;
         sink.found.valid = if job.needs_grid { self.sizes.lists.valid } else { job.valid() };
         if !self.options.count_tests {
             sink.found.checks.made += if job.needs_grid {
@@ -172,7 +172,7 @@ impl Session {
     }
 
     /// Adds to the parameters of a job what a plan and the coding of the output set.
-    pub(super) fn with_plan(
+    pub(super) async fn with_plan(
         &mut self,
         job: &Job<'_>,
         mut params: Params,
@@ -182,7 +182,7 @@ impl Session {
             params.flags &= !RAW;
         }
         if job.needs_grid {
-            let kept = self.plan(job, &params, report)?;
+            let kept = self.plan(job, &params, report).await?;
             check_entries(kept, params.boxes)?;
             params = kept.plan.add_to(params);
             params.most_tests = kept.most_tests(params.boxes);
@@ -192,7 +192,7 @@ impl Session {
     }
 
     /// Returns the plan: the kept one, or one for the boxes that the device has now.
-    fn plan(
+    async fn plan(
         &mut self,
         job: &Job<'_>,
         params: &Params,
@@ -201,7 +201,7 @@ impl Session {
         let plan = match self.plan.take_if(|kept| kept.suits(job.boxes.len())) {
             Some(kept) => kept,
             None => {
-                let classes = self.measure(params, report)?;
+                let classes = self.measure(params, report).await?;
                 let mut clock = Clock::start();
                 let plan = self.plan_for(&Summary::of_classes(classes, job.boxes));
                 report.plan += clock.lap();

@@ -68,7 +68,7 @@ impl BufferId {
         match self {
             Self::Staging(_) | Self::FetchStaging => Usage::MAP_READ | Usage::COPY_DST,
             Self::UploadStaging => Usage::MAP_WRITE | Usage::COPY_SRC,
-            Self::Bound(Buffer::Dispatches | Buffer::LongDispatch, _) => Usage::STORAGE | Usage::INDIRECT,
+            Self::Bound(Buffer::Dispatches | Buffer::LongRows, _) => Usage::STORAGE | Usage::INDIRECT,
             Self::Bound(buffer, _) if buffer.is_uniform() => Usage::UNIFORM | Usage::COPY_DST,
             Self::Bound(..) => Usage::STORAGE | Usage::COPY_DST | Usage::COPY_SRC,
         }

@@ -2,7 +2,7 @@
 
 pub use super::device::Fault;
 use super::device::Variant;
-use super::{GpuError, GpuFinder, GpuPlan};
+use super::{GpuError, GpuFinder, GpuPlan, wait};
 use crate::GpuOptions;
 use crate::layout::Params;
 use crate::pbig::Summary;
@@ -35,7 +35,7 @@ impl GpuFinder {
         changes: bool,
     ) -> Result<wgpu::ComputePipeline, GpuError> {
         let device = self.device.as_ref().ok_or(GpuError::Lost)?;
-        device.pipeline(kernel, Variant::new(options, changes))
+        wait::block_on(device.watch(async || Ok(device.pipeline(kernel, Variant::new(options, changes)))))
     }
 
     /// Runs `work` on the device, and returns errors that wgpu reports meanwhile.
@@ -44,6 +44,6 @@ impl GpuFinder {
         work: impl FnOnce(&wgpu::Device, &wgpu::Queue) -> Result<T, GpuError>,
     ) -> Result<T, GpuError> {
         let device = self.device.as_ref().ok_or(GpuError::Lost)?;
-        device.watch(|| work(&device.handle, &device.queue))
+        wait::block_on(device.watch(async || work(&device.handle, &device.queue)))
     }
 }

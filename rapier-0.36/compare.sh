@@ -1,9 +1,11 @@
 #!/usr/bin/env bash
 # Holds the patched rapier 0.36.1 against the unpatched one:
-#   scripts/rapier.sh stock [BODIES] [STEPS]           (400 and 120) without a finder every scene is the same, bit by bit: poses,
-#                                                      and the saved bytes of the broad phase; a few minutes
-#   scripts/rapier.sh tests [ARGUMENTS OF cargo test]  rapier's own tests, without and with pbig in every broad phase; with
-#                                                      arguments PBIG_EXPECTED names the tests that fail with pbig
+#   rapier-0.36/compare.sh stock [BODIES] [STEPS]
+#       (400 and 120) without a finder every scene is the same, bit by bit: poses, and the saved bytes of the broad phase; a few
+#       minutes
+#   rapier-0.36/compare.sh tests [ARGUMENTS OF cargo test]
+#       rapier's own tests, without and with pbig in every broad phase; with arguments PBIG_EXPECTED names the tests that fail
+#       with pbig
 set -euo pipefail
 cd "$(dirname "$0")/.."
 . scripts/common.sh

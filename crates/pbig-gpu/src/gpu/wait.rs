@@ -1,0 +1,94 @@
+//! Waiting for the device in a program: the thread blocks, so futures here are ready at once.
+
+use super::GpuError;
+use super::device::{Fault, GpuDevice};
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::mpsc;
+use std::time::Duration;
+
+/// Blocks until a future is done.
+pub(super) fn block_on<T, E: From<GpuError>>(future: impl Future<Output = Result<T, E>>) -> Result<T, E> {
+    pollster::block_on(future)
+}
+
+/// A call in progress.
+pub(super) struct Entered;
+
+/// Begins a call. Threads may share a device at any time: each has its own error scopes.
+pub(super) fn enter(_: &GpuDevice) -> Result<Entered, GpuError> {
+    Ok(Entered)
+}
+
+/// Waits for a submission, and maps the first `bytes` of the staging buffer that it has filled.
+pub(super) async fn map(
+    device: &GpuDevice,
+    staging: &wgpu::Buffer,
+    bytes: u64,
+    submission: wgpu::SubmissionIndex,
+    patience: Duration,
+) -> Result<(), GpuError> {
+    let (sender, mapped) = mpsc::channel();
+    staging.map_async(wgpu::MapMode::Read, 0..bytes, move |result| {
+        // The receiver is gone if the wait was given up.
+        let _ = sender.send(result);
+    });
+    device.wait(submission, patience)?;
+    // If another thread polls the device, that thread calls back, perhaps a moment later.
+    match mapped.recv_timeout(patience) {
+        Ok(Ok(())) => Ok(()),
+        _ => Err(device.give_up()),
+    }
+}
+
+impl GpuDevice {
+    pub(super) fn is_alive(&self) -> bool {
+        self.is_idle_within(Duration::from_secs(1))
+    }
+
+    /// Returns true if the device finishes all its work, and an empty submission, in time.
+    pub(super) fn is_idle_within(&self, limit: Duration) -> bool {
+        let scope = self.handle.push_error_scope(wgpu::ErrorFilter::Validation);
+        let encoder = self.handle.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+        let submission = self.queue.submit([encoder.finish()]);
+        let finished = self.poll(submission, limit).is_ok();
+        let refused = pollster::block_on(scope.pop()).is_some();
+        finished && !refused
+    }
+
+    /// Waits for a submission, at most for `patience`.
+    fn wait(&self, submission: wgpu::SubmissionIndex, patience: Duration) -> Result<(), GpuError> {
+        if self.is_due(Fault::Timeout) {
+            self.give_up();
+            return Err(GpuError::Timeout(patience));
+        }
+        match self.poll(submission, patience) {
+            Ok(()) => Ok(()),
+            Err(Some(wgpu::PollError::Timeout)) => {
+                self.give_up();
+                // Dropping the last handle of a queue waits for it without a limit, so a handle is leaked.
+                std::mem::forget((self.handle.clone(), self.queue.clone()));
+                Err(GpuError::Timeout(patience))
+            }
+            // wgpu did not accept the submission. The error scopes know why.
+            Err(Some(_)) if self.is_alive() => Err(GpuError::Refused("the submission".into())),
+            Err(_) => Err(self.give_up()),
+        }
+    }
+
+    /// Waits. Returns `Err(None)` if wgpu panicked, as it does when the driver reports a lost device.
+    fn poll(
+        &self,
+        submission: wgpu::SubmissionIndex,
+        patience: Duration,
+    ) -> Result<(), Option<wgpu::PollError>> {
+        let wait = wgpu::PollType::Wait { submission_index: Some(submission), timeout: Some(patience) };
+        let poll = || {
+            assert!(!self.is_due(Fault::Panic), "an injected fault");
+            self.handle.poll(wait)
+        };
+        match catch_unwind(AssertUnwindSafe(poll)) {
+            Ok(polled) => polled.map(|_| ()).map_err(Some),
+            Err(_) => Err(None),
+        }
+    }
+}
