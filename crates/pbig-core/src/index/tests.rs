@@ -99,7 +99,7 @@ fn joined(boxes: &[Aabb], threads: usize) -> Vec<Pair> {
     let rule = Rule::listing(None, &found);
     let mut hits = vec![Hits::default(); threads];
     hits.iter_mut().for_each(|hits| hits.begin(0, 0));
-    index.find_pairs(&rule, &mut hits);
+    index.find_pairs(None, &rule, &mut hits);
     let mut pairs: Vec<Pair> = hits.iter().flat_map(|hits| hits.pairs.iter().copied()).collect();
     pairs.sort_unstable();
     pairs
