@@ -8,6 +8,7 @@ use crate::pairs::{Grouping, Groups};
 use crate::parallel::available_threads;
 use crate::policy::{self, PARALLEL_FROM_BOXES, search};
 use crate::report::{Checks, Clock, stage};
+use crate::streamed;
 use crate::{Aabb, Algorithm, Backend, Config, Engine, Keys, Pair, Plan, ProxyFilter};
 use std::sync::atomic::AtomicU64;
 
@@ -116,8 +117,7 @@ impl AllPairs {
     pub(crate) fn begin(&mut self, request: &Request<'_>) {
         let workers = Self::workers(request.boxes.len());
         self.hits.resize_with(workers, Hits::default);
-        let Grouping { count, shift, .. } = request.grouping.unwrap_or_default();
-        self.hits.iter_mut().for_each(|hits| hits.begin(count, shift));
+        self.hits.iter_mut().for_each(|hits| hits.begin_for(request.grouping));
     }
 
     fn test_all(&mut self, request: &Request<'_>, rule: &Rule<'_>, outcome: &mut Outcome) {
@@ -174,8 +174,7 @@ impl AllPairs {
         }
         let hits = &mut self.hits[0];
         let vain = vain_work(search::sample_one_in(searched, work), hits);
-        let Grouping { count, shift, .. } = request.grouping.unwrap_or_default();
-        hits.begin(count, shift);
+        hits.begin_for(request.grouping);
         search::is_light(boxes, vain)
     }
 
@@ -193,13 +192,31 @@ impl AllPairs {
             store.tree.sort(request.boxes);
         }
         outcome.stages.map += clock.lap();
-        {
-            stage!("check");
-            store.tree.find_pairs(rule, &mut self.hits);
-        }
+        self.join((request, None), &store.tree, rule);
         outcome.stages.check += clock.lap();
         outcome.holder = Holder::Tree;
         outcome.plan = Plan { algorithm: Algorithm::Tree, boxes: outcome.plan.boxes, ..Plan::default() };
+    }
+
+    /// Finds the pairs of the boxes in a tree, or those of two sets, the second with the ids from `split` on: by the tree, unless they
+    /// cross, and it does not cut them apart.
+    pub(crate) fn join(
+        &mut self,
+        (request, split): (&Request<'_>, Option<u32>),
+        tree: &BoxIndex,
+        rule: &Rule<'_>,
+    ) {
+        stage!("check");
+        let (boxes, found) = (request.boxes, AtomicU64::new(0));
+        let (most, listing) = (search::join_up_to_work(boxes.len()), Rule::listing(None, &found));
+        let may_stream = request.config.engine != Some(Engine::Tree);
+        let is_heavy = may_stream && tree.vain_work(split, &listing, most, &mut self.hits[0]) > most;
+        self.hits[0].begin_for(request.grouping);
+        if is_heavy {
+            streamed::find_pairs(boxes, split, rule, &mut self.hits);
+        } else {
+            tree.find_pairs(split, rule, &mut self.hits);
+        }
     }
 
     /// Gathers what was found, for sorting.
@@ -210,9 +227,8 @@ impl AllPairs {
 
     /// Takes pairs that a device has found, a list for each thread.
     pub(crate) fn take(&mut self, lists: Vec<Vec<Pair>>, grouping: Option<Grouping>) {
-        let Grouping { count, shift, .. } = grouping.unwrap_or_default();
         self.hits.resize_with(lists.len().max(1), Hits::default);
-        self.hits.iter_mut().for_each(|hits| hits.begin(count, shift));
+        self.hits.iter_mut().for_each(|hits| hits.begin_for(grouping));
         for (hits, pairs) in self.hits.iter_mut().zip(lists) {
             hits.take(pairs);
         }

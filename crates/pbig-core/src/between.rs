@@ -172,7 +172,7 @@ impl AllPairs {
         outcome.stages.check += clock.lap();
         outcome.plan = Plan::of_cells(Algorithm::Grid, &plan, across.boxes(), across.oversize_count());
         if !is_grid {
-            self.search_trees((request.boxes, split as u32), &mut store.tree, rule, outcome);
+            self.search_trees((request, split as u32), &mut store.tree, rule, outcome);
         }
     }
 
@@ -189,7 +189,7 @@ impl AllPairs {
     /// Sorts the boxes of two sets into a tree, and finds the pairs there.
     fn search_trees(
         &mut self,
-        (boxes, split): (&[Aabb], u32),
+        (request, split): (&Request<'_>, u32),
         tree: &mut BoxIndex,
         rule: &Rule<'_>,
         outcome: &mut Outcome,
@@ -197,14 +197,12 @@ impl AllPairs {
         let mut clock = Clock::start();
         {
             stage!("map");
-            tree.sort_sets(boxes, split);
+            tree.sort_sets(request.boxes, split);
         }
         outcome.stages.map += clock.lap();
-        {
-            stage!("check");
-            tree.find_pairs_between(split, rule, &mut self.hits);
-        }
+        self.join((request, Some(split)), tree, rule);
         outcome.stages.check += clock.lap();
-        outcome.plan = Plan { algorithm: Algorithm::Tree, boxes: boxes.len() as u32, ..Plan::default() };
+        outcome.plan =
+            Plan { algorithm: Algorithm::Tree, boxes: request.boxes.len() as u32, ..Plan::default() };
     }
 }

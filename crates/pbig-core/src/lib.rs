@@ -77,6 +77,7 @@ mod parallel;
 mod plan;
 mod policy;
 mod report;
+mod streamed;
 
 pub use aabb::Aabb;
 pub use boxes::Boxes;

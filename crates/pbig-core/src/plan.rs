@@ -19,7 +19,8 @@ pub enum Algorithm {
     Grid,
     /// Changed boxes were moved in the grid of an earlier update, and only they were searched for.
     Edit,
-    /// All boxes were sorted into a tree, as cells would hold too many, or changed boxes were searched for in one.
+    /// All boxes were sorted into a tree, as cells would hold too many, and paired by it, or by streamed segment trees where they
+    /// cross; or changed boxes were searched for in one.
     Tree,
     /// A device did the work, see [`crate::PairDevice`].
     Device,

@@ -107,7 +107,7 @@ pub struct Checks {
 
 /// Maximum [`Report::work`] for each box and pair, in binary logarithms of the number of boxes, for every shape, motion and history
 /// of the boxes. A pair counts if its boxes overlap, also if filters or keys exclude it. Measured, not proven: docs/STRESS.md has the
-/// worst case that was found, and docs/PERFORMANCE.md the shapes that grow beyond it between two sets.
+/// worst case that was found.
 pub const WORK_LIMIT: u64 = 64;
 
 /// The report on the last call of a [`crate::Finder`] or [`crate::BroadPhase`].

@@ -6,6 +6,7 @@
 
 use super::record::Record;
 use super::simd::{BLOCK, Simd, eight_from, prefetch};
+use crate::pairs::Grouping;
 use crate::{Keys, Pair, ProxyFilter, keys};
 use std::sync::atomic::{AtomicU64, Ordering};
 
@@ -104,6 +105,12 @@ impl<'a> HitWriter<'a> {
 }
 
 impl Hits {
+    /// Forgets the pairs of an earlier search; counts those of the next one by group, if they are wanted so.
+    pub(crate) fn begin_for(&mut self, grouping: Option<Grouping>) {
+        let Grouping { count, shift, .. } = grouping.unwrap_or_default();
+        self.begin(count, shift);
+    }
+
     /// Forgets the pairs of an earlier search; counts those of the next one in `groups` groups of `1 << shift` ids.
     pub(crate) fn begin(&mut self, groups: usize, shift: u32) {
         self.queries.resize(HIT_ROOM * BLOCK + AHEAD, 0);

@@ -5,9 +5,9 @@
 
 use super::BoxIndex;
 use super::node::{LANES, NONE};
-use crate::grid::{Hits, Rule, Simd, dispatch};
+use crate::grid::{Hits, Rule, Simd, dispatch, scattered};
 use crate::parallel::run_with;
-use crate::policy::PARALLEL_FROM_BOXES;
+use crate::policy::{PARALLEL_FROM_BOXES, search};
 use crate::{Aabb, Pair};
 use std::ops::Range;
 
@@ -17,22 +17,41 @@ const PIECE: usize = 64;
 /// Pairs of a leaf that are kept together.
 const BATCH: usize = 4096;
 
+/// Maximum number of boxes of a leaf that meet the bounds of another one for a test at once.
+const FEW_LANES: u32 = 3;
+
 impl BoxIndex {
-    /// Finds all pairs of the boxes as of the last sort, into the lists of as many threads as there are `hits`.
-    pub(crate) fn find_pairs(&self, rule: &Rule<'_>, hits: &mut [Hits]) {
-        self.join(self.leaves, 0, rule, hits);
+    /// Estimates the work of [`BoxIndex::find_pairs`] that overlaps do not pay for, from some leaves. Stops above `most`. `hits` are
+    /// scratch.
+    pub(crate) fn vain_work(&self, split: Option<u32>, rule: &Rule<'_>, most: u64, hits: &mut Hits) -> u64 {
+        let (leaves, earliest) = self.joined(split);
+        let (last_leaves, step) = (self.last_leaves(), search::leaves_per_sampled(leaves));
+        let mut vain = 0;
+        for leaf in scattered(0..leaves as usize, step) {
+            hits.begin(0, 0);
+            let join = &mut Join { index: self, last_leaves: &last_leaves, earliest, rule, hits };
+            dispatch!(Join::meet_all, join, leaf..leaf + 1);
+            vain += search::in_vain(hits.tests + hits.runs, hits.overlaps) * step as u64;
+            if vain > most {
+                break;
+            }
+        }
+        vain
     }
 
-    /// Finds all pairs of a box with an id below `split` and another box, as of the last [`BoxIndex::sort_sets`].
-    pub(crate) fn find_pairs_between(&self, split: u32, rule: &Rule<'_>, hits: &mut [Hits]) {
+    /// Returns the number of leaves that are joined with others, and the first of these.
+    fn joined(&self, split: Option<u32>) -> (u32, u32) {
+        let Some(split) = split else { return (self.leaves, 0) };
         let leaves = &self.nodes[..self.leaves as usize];
         let second_set = leaves.partition_point(|leaf| leaf.children[0] < split) as u32;
-        self.join(second_set, second_set, rule, hits);
+        (second_set, second_set)
     }
 
-    /// Joins each of the first `leaves` with itself and those behind it, from `earliest` on.
-    fn join(&self, leaves: u32, earliest: u32, rule: &Rule<'_>, hits: &mut [Hits]) {
+    /// Finds all pairs of the boxes as of the last sort, into the lists of as many threads as there are `hits`; with a `split`, those
+    /// of a box with an id below it and one with another id, as of the last [`BoxIndex::sort_sets`].
+    pub(crate) fn find_pairs(&self, split: Option<u32>, rule: &Rule<'_>, hits: &mut [Hits]) {
         debug_assert!(self.loose().is_empty());
+        let (leaves, earliest) = self.joined(split);
         let (last_leaves, leaves) = (self.last_leaves(), leaves as usize);
         let workers = if self.leaves as usize * LANES < PARALLEL_FROM_BOXES { 1 } else { hits.len() };
         run_with(&mut hits[..workers], leaves.div_ceil(PIECE), |hits, piece| {
@@ -85,7 +104,7 @@ impl Join<'_, '_> {
         while let Some(at) = waiting.pop() {
             self.hits.runs += 1;
             if index.is_leaf(at) {
-                self.test(simd, leaf, at);
+                self.test(simd, leaf, at, &bounds);
                 // Boxes as large as the world meet all others.
                 if self.hits.pairs.len() >= from + BATCH {
                     self.hits.keep(from, self.rule);
@@ -105,11 +124,18 @@ impl Join<'_, '_> {
         self.hits.keep(from, self.rule);
     }
 
-    /// Tests the boxes of a leaf against those of another one, or of its own.
+    /// Tests the boxes of a leaf, which have these bounds, against those of another one, or of its own.
     #[inline(always)]
-    fn test(&mut self, simd: impl Simd, leaf: u32, at: u32) {
+    fn test(&mut self, simd: impl Simd, leaf: u32, at: u32, bounds: &Aabb) {
         let (one, other) = (&self.index.nodes[leaf as usize], &self.index.nodes[at as usize]);
         let mut lanes = simd.overlaps_eight(&one.boxes, &other.bounds());
+        // Around the edge of a crowd a leaf has bounds that all boxes of another one overlap, and no box that overlaps theirs.
+        if lanes.count_ones() > FEW_LANES && leaf != at {
+            self.hits.tests += LANES as u64;
+            if simd.overlaps_eight(&other.boxes, bounds) == 0 {
+                return;
+            }
+        }
         while let Some(lane) = next(&mut lanes) {
             let aabb: Aabb = one.get(lane);
             let wanted = if leaf == at { 255 & !((2u32 << lane) - 1) } else { 255 };

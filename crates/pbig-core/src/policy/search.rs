@@ -27,6 +27,13 @@ const GRID_UP_TO_PER_BOX: u64 = 400;
 /// Tests of a box that each of its overlaps pays for: in a crowd each box meets many, and a tree is not faster.
 const GRID_UP_TO_PER_PAIR: u64 = 32;
 
+/// Maximum work of a join of a tree for each box, in binary logarithms of their number: within [`crate::WORK_LIMIT`]. Streamed segment
+/// trees take as long as about 1400 for each of 320,000 boxes.
+const JOIN_UP_TO_LOGS_PER_BOX: u64 = 48;
+
+/// Minimum number of leaves of a tree for each sampled one, and about the maximum number of sampled ones.
+const LEAVES_PER_SAMPLED: (u32, u32) = (16, 256);
+
 /// Minimum and maximum number of sampled boxes in cells.
 const SAMPLED: std::ops::Range<usize> = 64..512;
 
@@ -54,6 +61,17 @@ pub(crate) fn sample_one_in(boxes: usize, work: u64) -> usize {
     by_work.clamp(boxes / SAMPLED.end, boxes / SAMPLED.start) + 1
 }
 
+/// Returns the maximum work of a join of a tree that overlaps do not pay for.
+pub(crate) fn join_up_to_work(boxes: usize) -> u64 {
+    JOIN_UP_TO_LOGS_PER_BOX * boxes as u64 * u64::from(boxes.max(1).ilog2())
+}
+
+/// Returns the step from one sampled leaf of a tree to the next.
+pub(crate) fn leaves_per_sampled(leaves: u32) -> usize {
+    let (least, sampled) = LEAVES_PER_SAMPLED;
+    least.max(leaves / sampled) as usize
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -66,5 +84,11 @@ mod tests {
         assert_eq!(sample_one_in(100_000, 800_000_000), 501);
         assert_eq!(sample_one_in(100_000, u64::MAX), 1563);
         assert_eq!(sample_one_in(0, 0), 1);
+    }
+
+    #[test]
+    fn a_tree_is_joined_while_its_work_grows_like_boxes_and_their_logarithm() {
+        assert_eq!([0, 1024, 1 << 20].map(join_up_to_work), [0, 480 << 10, 960 << 20]);
+        assert_eq!([1, 4096, 8192].map(leaves_per_sampled), [16, 16, 32]);
     }
 }
