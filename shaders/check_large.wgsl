@@ -91,7 +91,7 @@ fn stage(item: LargeItem, lane: u32, s: Segments) -> u32 {
     if lane < select(s.boxes, s.residents, s.is_swapped) {
         let entry = entries[item.start + other];
         staged_entries[lane] = entry;
-        staged_boxes[lane] = boxes[box_of(entry)];
+        staged_boxes[lane] = checked_box(boxes[box_of(entry)]);
     }
     var entry = 0u;
     if own < item.boxes {
@@ -193,7 +193,7 @@ fn check_large(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocatio
         workgroupBarrier();
         let s = segments(item, column);
         let entry = stage(item, lane, s);
-        let one = boxes[box_of(entry)];
+        let one = checked_box(boxes[box_of(entry)]);
         let hits = test_partners(lane, entry, one, s);
         // Words of a row: its index, its number of hits less one, and a byte for each hit.
         let words = select(0u, (hits + 5u) / 4u, hits > 0u);

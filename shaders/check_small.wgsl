@@ -51,7 +51,7 @@ fn stage(item: SmallItem, lane: u32) -> Stage {
     if len <= STAGED && lane < len {
         let entry = entries[start + lane];
         staged_entries[lane] = entry;
-        staged_boxes[lane] = boxes[box_of(entry)];
+        staged_boxes[lane] = checked_box(boxes[box_of(entry)]);
     }
     return Stage(start, len <= STAGED);
 }
@@ -67,7 +67,7 @@ fn box_at(place: u32, staged: Stage) -> KnownBox {
     if staged.is_used {
         return staged_boxes[place - staged.start];
     }
-    return boxes[box_of(entries[place])];
+    return checked_box(boxes[box_of(entries[place])]);
 }
 
 // The mark of the lane's hit.

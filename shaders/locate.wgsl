@@ -1,5 +1,5 @@
 // Map, step 1 (PBIG 4.2, count): computes the cells that each box touches and its level. Counts the residents of each
-// cell: boxes of the cell's own level. Brings boxes into the form that the checks need, and counts the valid ones.
+// cell: boxes of the cell's own level. Counts the valid boxes. In a search for changes, renews stale boxes.
 
 @group(0) @binding(0) var<uniform> params: Params;
 @group(0) @binding(1) var<storage, read_write> boxes: array<KnownBox>;
@@ -55,24 +55,26 @@ fn locate(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_ind
 
 fn locate_one(id: u32) {
     let known = known_box(id);
-    if is_stale(boxes[id], has_changed(id)) {
+    if IS_RENEWED_ONCE && is_stale(boxes[id], has_changed(id)) {
         boxes[id] = known;
     }
     let one = bounds_of(known);
     if one.low[0] > one.high[0] {
-        located[id].level = NO_LEVEL;
+        located[id].shape = NO_LEVEL;
         return;
     }
     atomicAdd(&valid, 1u);
-    var at: Located;
+    var low: vec3<i32>;
+    var high: vec3<i32>;
     for (var axis = 0u; axis < 3u; axis++) {
-        at.low[axis] = finest_cell(one.low[axis], axis);
-        at.high[axis] = finest_cell(one.high[axis], axis);
+        low[axis] = finest_cell(one.low[axis], axis);
+        high[axis] = finest_cell(one.high[axis], axis);
     }
-    let level = level_of(low_of(at), high_of(at));
-    at.level = level | select(0u, MOVED, has_moved(known));
+    let level = level_of(low, high);
+    var at = located_at(low, high, level);
+    at.shape |= select(0u, MOVED, has_moved(known));
     located[id] = at;
-    let t = touched(low_of(at), high_of(at), level);
+    let t = touched(at, level);
     for (var k = 0u; k < cell_count(t); k++) {
         atomicAdd(&cells[2u * cell_at(t, k, level).x], 1u);
     }

@@ -26,7 +26,7 @@ fn scatter(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_in
     let last = params.levels - 1u;
     let last_cell = params.level[last].first_cell;
     var visits_last = false;
-    if id < params.boxes && located[id].level != NO_LEVEL {
+    if id < params.boxes && located[id].shape != NO_LEVEL {
         let at = located[id];
         visits_last = own_level(at) < last && takes_visitors(last_cell);
         place_all(id, at, last);
@@ -46,16 +46,16 @@ fn scatter(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_in
     let end = workgroupUniformLoad(&last_end);
     if visits_last {
         // The only cell is the lowest of every box, on all axes.
-        entries[end - 1u - rank] = id | (located[id].level & MOVED) | (7u << AXIS_BITS);
+        entries[end - 1u - rank] = id | (located[id].shape & MOVED) | (7u << AXIS_BITS);
     }
 }
 
 // Writes a box into its own level and into the levels between that and the last.
 fn place_all(id: u32, at: Located, last: u32) {
     let own = own_level(at);
-    let name = id | (at.level & MOVED);
+    let name = id | (at.shape & MOVED);
     for (var level = own; level == own || level < last; level++) {
-        let t = touched(low_of(at), high_of(at), level);
+        let t = touched(at, level);
         for (var k = 0u; k < cell_count(t); k++) {
             let cell = cell_at(t, k, level);
             place(cell.x, name | cell.y, level == own);

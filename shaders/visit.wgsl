@@ -19,8 +19,11 @@ fn visit(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_inde
     let id = linear(group) * LANES + lane;
     let last = params.levels - 1u;
     let last_cell = params.level[last].first_cell;
-    if id < params.boxes && own_level(located[id]) < last {
-        if atomicLoad(&cells[2u * last_cell]) > 0u {
+    let has_last = atomicLoad(&cells[2u * last_cell]) > 0u;
+    // With two levels boxes visit the last one only.
+    let has_visits = has_last || params.levels > 2u;
+    if has_visits && id < params.boxes && own_level(located[id]) < last {
+        if has_last {
             atomicAdd(&last_visitors, 1u);
         }
         count_visits(id, last);
@@ -38,7 +41,7 @@ fn visit(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_inde
 fn count_visits(id: u32, last: u32) {
     let at = located[id];
     for (var level = own_level(at) + 1u; level < last; level++) {
-        let t = touched(low_of(at), high_of(at), level);
+        let t = touched(at, level);
         for (var k = 0u; k < cell_count(t); k++) {
             let cell = cell_at(t, k, level).x;
             // Step 1 has counted all residents, so this value no longer changes.

@@ -6,7 +6,7 @@ const LANES = 256u;
 const MAX_LEVELS = 8u;
 // Maximum number of cells that a box touches along one axis of its level.
 const MAX_SPAN = 4;
-// Level of an invalid box.
+// Located.shape of an invalid box.
 const NO_LEVEL = 0xffffffffu;
 
 // Bits of Params.flags.
@@ -53,12 +53,16 @@ struct FilterChange {
     filter3: u32,
 }
 
-// Cells that a box touches at the finest resolution, both ends included, and its level, with MOVED if the box has changed.
+// Cells that a box touches at its level.
 struct Located {
+    // The lowest on each axis, not wrapped around.
     low: array<i32, 3>,
-    high: array<i32, 3>,
-    level: u32,
+    // The level, from SPAN_BITS on two bits an axis for the number of cells less one, and MOVED if the box has changed.
+    // NO_LEVEL for an invalid box.
+    shape: u32,
 }
+
+const SPAN_BITS = 4u;
 
 struct Level {
     // Number of cells on each axis; boxes beyond wrap around. An axis of one cell is not divided.

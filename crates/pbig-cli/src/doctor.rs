@@ -1,7 +1,7 @@
 //! `pbig doctor`: what this machine offers, what is chosen and why, and a self-test.
 
 use pbig_core::{Aabb, Backend, Config, Finder, Limits, Pair, oracle};
-use pbig_gpu::layout::Located;
+use pbig_gpu::layout::DeviceBox;
 use pbig_gpu::{Coding, GpuError, GpuFinder, GpuOptions, adapters};
 use pbig_harness::prelude::*;
 use pbig_harness::report::simd_found;
@@ -70,7 +70,7 @@ fn variants(adapter: &wgpu::Adapter) -> [String; 3] {
         "check, small cells: the device's square root, corrected by integers; large cells: balanced rows"
             .into(),
         format!("times of kernels: {times}"),
-        format!("sets are searched in parts from {} boxes on", most / size_of::<Located>() as u64),
+        format!("sets are searched in parts from {} boxes on", most / size_of::<DeviceBox>() as u64),
     ]
 }
 

@@ -163,6 +163,10 @@ pub struct DeviceReport {
     pub kernels: Vec<(&'static str, Duration)>,
     /// Edge of the smallest cells, in the boxes' length unit; 0 where every pair was tested.
     pub cell: f32,
+    /// Number of cells of the plan; 0 where every pair was tested.
+    pub cells: u64,
+    /// Number of entries of boxes in cells; 0 where every pair was tested.
+    pub entries: u64,
     /// Bytes sent to the device.
     pub uploaded: u64,
     /// Bytes read back.

@@ -17,7 +17,7 @@ pub const MAX_SPAN: u32 = 4;
 /// Fewest cells along an axis that is divided. Two overlapping boxes must not meet a second time by wrapping around, so the
 /// `2 * MAX_SPAN - 1` cells that they touch together must be distinct.
 pub const FEWEST_CELLS: u32 = 2 * MAX_SPAN;
-/// Level of an invalid box.
+/// [`Located::shape`] of an invalid box.
 pub const NO_LEVEL: u32 = u32::MAX;
 /// Number of cells of a workgroup of the schedule.
 pub const CELLS_PER_BLOCK: u32 = 4 * LANES;
@@ -33,11 +33,13 @@ pub const PIECE: u32 = 4096;
 pub const PIECES: u32 = 3;
 /// Index of the first piece there. Each has three words.
 pub const FIRST_PIECE: u32 = 4;
+/// Bits of [`Located::shape`] for the level. Above them are the numbers of cells less one, two bits an axis.
+pub const SPAN_BITS: u32 = 4;
 /// Number of bits of an entry for the box. Above them are [`MOVED`] and the axes.
 pub const BOX_BITS: u32 = 28;
 /// The first of three bits of an entry, one for each axis. A bit is set if this is the box's lowest cell on the axis.
 pub const AXIS_BITS: u32 = 29;
-/// Bit of an entry and of [`Located::level`] in a search for changes: the box has changed.
+/// Bit of an entry and of [`Located::shape`] in a search for changes: the box has changed.
 pub const MOVED: u32 = 1 << BOX_BITS;
 /// Bit of the second id of a pair of output: the boxes overlapped at the last update, and no longer do.
 pub const ENDED: u32 = 1 << 31;
@@ -76,8 +78,8 @@ shared_structs! {
     BoxChange { marked_id: u32, now: DeviceBox }
     /// A changed filter.
     FilterChange { id: u32, filter: ProxyFilter }
-    /// Cells that a box touches at the finest resolution, and its level, with [`MOVED`], or [`NO_LEVEL`].
-    Located { low: [i32; 3], high: [i32; 3], level: u32 }
+    /// Cells that a box touches at its level: the lowest ones; the level, the numbers of cells and [`MOVED`], or [`NO_LEVEL`].
+    Located { low: [i32; 3], shape: u32 }
     /// Cells of one size.
     Level { dims: [u32; 3], shift: u32, first_cell: u32, unused: [u32; 3] }
     /// Parameters of all kernels of a call.

@@ -32,6 +32,8 @@ pub mod decode;
 mod gpu;
 #[doc(hidden)]
 pub mod layout;
+#[doc(hidden)]
+pub mod model;
 mod options;
 #[doc(hidden)]
 pub mod pbig;

@@ -125,9 +125,9 @@ pub(super) fn moving(mut case: Case) -> Case {
     case
 }
 
-/// Returns the level without the mark. For an invalid box it is larger than all levels.
+/// Returns the level. For an invalid box it is larger than all levels.
 pub(super) fn own_level(at: &Located) -> u32 {
-    at.level & (MOVED - 1)
+    at.shape & ((1 << SPAN_BITS) - 1)
 }
 
 /// Returns true if a cell may own a pair of entries with these marks, and the pair may be wanted.

@@ -25,7 +25,7 @@ fn shared_structs() -> Vec<SharedStruct> {
         Motion { now, before }
         BoxChange { marked_id, now }
         FilterChange { id, filter }
-        Located { low, high, level }
+        Located { low, shape }
         Level { dims, shift, first_cell, unused }
         Params {
             origin, scale, clamp_low, boxes, clamp_high, levels, cells, small_cell, columns, flags, split,
@@ -96,6 +96,7 @@ fn constants_are_those_of_the_kernels() {
         ("GROUPS_PER_ROW", GROUPS_PER_ROW),
         ("MAX_LEVELS", layout::MAX_LEVELS as u32),
         ("NO_LEVEL", NO_LEVEL),
+        ("SPAN_BITS", SPAN_BITS),
         ("BOX_BITS", BOX_BITS),
         ("AXIS_BITS", AXIS_BITS),
         ("WAS_ABSENT", WAS_ABSENT),

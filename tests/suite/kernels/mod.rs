@@ -31,7 +31,7 @@ use pbig_gpu::layout::{
     self, AXIS_BITS, BITS, BOX_BITS, BoxChange, CELLS_PER_BLOCK, COUNTED, COUNTS_PER_BLOCK, Cell, Chunk,
     Counters, DeviceBox, ENDED, FILTERED, FIRST_PIECE, FilterChange, GROUPS_PER_ROW, LANES, LargeItem, Level,
     Located, MAX_SPAN, MEASURE_GROUPS, MOVED, Motion, NO_LEVEL, PACKED, PIECE, PIECES, Params, RAW,
-    SHORT_ROW, Slot, SmallItem, Totals, WAS_ABSENT, WINDOW, halves, wide,
+    SHORT_ROW, SPAN_BITS, Slot, SmallItem, Totals, WAS_ABSENT, WINDOW, halves, wide,
 };
 use pbig_gpu::testing::plan_params;
 use pbig_gpu::{GpuFinder, GpuOptions};
@@ -136,6 +136,20 @@ fn measure_and_locate_turn_floats_into_ordered_integers() {
             }
             assert_eq!(fault(twin(kernel), &GpuOptions::DEFAULT, &before), None, "{kernel}, {}", case.name);
         }
+    }
+}
+
+/// The checks read boxes as they came up.
+#[test]
+fn checks_turn_floats_into_ordered_integers() {
+    for (kernel, case) in [("check_small", pile()), ("check_large", crowd()), ("check_large", pile())] {
+        let mut before = State::before(kernel, &case).with(RAW, 0);
+        let wanted = after_twin(twin(kernel), &before);
+        before = with_capacity_for(&before, &wanted);
+        before.boxes = case.boxes.iter().map(raw).collect();
+        let Some(gpu) = gpus() else { return };
+        let found = on_device(gpu, twin(kernel), &GpuOptions::DEFAULT, &before);
+        assert_eq!(compare_checks(&before, &found, &wanted), None, "{kernel}, {}", case.name);
     }
 }
 
@@ -303,7 +317,7 @@ fn planted_faults_are_noticed() {
     let faults: [(&str, Plant); 22] = [
         ("measure", |s| s.classes[127][0] += 1),
         ("measure", |s| s.classes[127][2] += 1),
-        ("locate", |s| s.located[7].high[1] += 1),
+        ("locate", |s| s.located[7].shape ^= 1 << (SPAN_BITS + 3)),
         ("locate", |s| full(s).residents -= 1),
         ("locate", |s| s.counters.valid -= 1),
         ("visit", |s| full(s).visitors += 1),

@@ -98,23 +98,26 @@ pub(super) fn measure(s: &mut State) {
 }
 
 pub(super) fn locate(s: &mut State) {
-    s.renew();
+    let mut fresh = s.clone();
+    fresh.renew();
     for id in 0..s.boxes.len() {
-        let one = s.bounds(id);
+        let one = fresh.bounds(id);
         if one.low[0] > one.high[0] {
-            s.located[id].level = NO_LEVEL;
+            s.located[id].shape = NO_LEVEL;
             continue;
         }
         s.counters.valid += 1;
         let cells = |corner: [i32; 3]| [0, 1, 2].map(|k| finest_cell(&s.params, corner[k], k));
-        let mut at = Located { low: cells(one.low), high: cells(one.high), level: 0 };
-        let level = level_of(&s.params, &at);
-        at.level = level | if s.has_moved(id) { MOVED } else { 0 };
+        let (low, high) = (cells(one.low), cells(one.high));
+        let level = level_of(&s.params, low, high);
+        let mut at = located_at(&s.params, low, high, level);
+        at.shape |= if fresh.has_moved(id) { MOVED } else { 0 };
         s.located[id] = at;
         for (cell, _) in cells_of(&s.params, &at, level) {
             s.cells[cell].residents += 1;
         }
     }
+    s.motions = fresh.motions;
 }
 
 /// Returns the float of an ordered integer.
@@ -130,17 +133,29 @@ pub(super) fn finest_cell(params: &Params, key: i32, k: usize) -> i32 {
 }
 
 /// Returns the first level at which the box touches few cells on each axis, or the last level.
-pub(super) fn level_of(params: &Params, at: &Located) -> u32 {
-    let steps = |l: &Level, k: usize| (at.high[k] >> l.shift) - (at.low[k] >> l.shift);
+pub(super) fn level_of(params: &Params, low: [i32; 3], high: [i32; 3]) -> u32 {
+    let steps = |l: &Level, k: usize| (high[k] >> l.shift) - (low[k] >> l.shift);
     let fits = |l: &Level| (0..3).all(|k| l.dims[k] == 1 || steps(l, k) < MAX_SPAN as i32);
     let last = params.levels - 1;
     (0..last).find(|&level| fits(&params.level[level as usize])).unwrap_or(last)
 }
 
+/// Returns the cells of a box at its level, from those at the finest resolution.
+fn located_at(params: &Params, low: [i32; 3], high: [i32; 3], level: u32) -> Located {
+    let shift = params.level[level as usize].shift;
+    let first = low.map(|low| low >> shift);
+    let steps = [0, 1, 2].map(|k| ((high[k] >> shift) - first[k]).min(3) as u32);
+    let spans = steps[0] | steps[1] << 2 | steps[2] << 4;
+    Located { low: first, shape: level | spans << SPAN_BITS }
+}
+
 /// Returns the cells that a box touches at a level, each with the axis bits of its entry.
 pub(super) fn cells_of(params: &Params, at: &Located, level: u32) -> Vec<(usize, u32)> {
     let l = params.level[level as usize];
-    let range = |k: usize| if l.dims[k] == 1 { 0..=0 } else { at.low[k] >> l.shift..=at.high[k] >> l.shift };
+    // The last level, which is not divided, has no shift.
+    let shift = l.shift.saturating_sub(params.level[own_level(at) as usize].shift);
+    let high = |k: usize| at.low[k] + (at.shape >> (SPAN_BITS + 2 * k as u32) & 3) as i32;
+    let range = |k: usize| if l.dims[k] == 1 { 0..=0 } else { at.low[k] >> shift..=high(k) >> shift };
     let lowest = [0, 1, 2].map(|k| *range(k).start());
     let mut cells = Vec::new();
     for z in range(2) {
@@ -161,7 +176,7 @@ pub(super) fn cell_at(l: &Level, place: [i32; 3], lowest: [i32; 3]) -> (usize, u
 }
 
 pub(super) fn visit(s: &mut State) {
-    for at in s.located.iter().filter(|at| at.level != NO_LEVEL) {
+    for at in s.located.iter().filter(|at| at.shape != NO_LEVEL) {
         for level in own_level(at) + 1..s.params.levels {
             for (cell, _) in cells_of(&s.params, at, level) {
                 let cell = &mut s.cells[cell];
@@ -276,7 +291,7 @@ pub(super) fn scatter(s: &mut State) {
         let own = own_level(&at);
         for level in own..s.params.levels {
             for (cell, axes) in cells_of(&s.params, &at, level) {
-                place(s, cell, id as u32 | (at.level & MOVED) | axes, level == own);
+                place(s, cell, id as u32 | (at.shape & MOVED) | axes, level == own);
             }
         }
     }

@@ -1,6 +1,7 @@
 //! `pbig bench gpu`: the GPU beside the CPU, kernel by kernel, and the host's part of a call.
 
 use pbig_core::{Aabb, Backend, BroadPhase, Config, DeviceReport, Finder, Limits, Order, ProxyFilter};
+use pbig_gpu::model::{Counts, GPUS, Gpu};
 use pbig_gpu::{GpuFinder, GpuOptions};
 use pbig_harness::gpu_race::{on_device, race};
 use pbig_harness::prelude::*;
@@ -11,8 +12,8 @@ const ON_GPU: Config = Config { backend: Backend::Device, ..CONFIG };
 pub(super) fn run(quick: bool) -> Result<BenchReport, Failure> {
     let gpu = GpuFinder::new().map_err(|error| Failure::Input(error.to_string()))?;
     let head = vec![("adapter", gpu.adapter().to_owned()), ("software", gpu.is_software().to_string())];
-    let [searches, kernels] = searches(&gpu, quick)?;
-    let tables = vec![searches, kernels, host(&gpu, quick)?, events(&gpu, quick)?];
+    let [searches, kernels, model] = searches(&gpu, quick)?;
+    let tables = vec![searches, kernels, model, host(&gpu, quick)?, events(&gpu, quick)?];
     Ok(BenchReport { head, ..BenchReport::new("gpu", tables) })
 }
 
@@ -30,28 +31,56 @@ fn boxes(set: &str, n: usize) -> Vec<Aabb> {
     BoxSet::named(set).expect("a set of the harness").boxes(n, 1)
 }
 
-/// Returns the table of searches, and the table of their kernels: medians in ms of calls between which all boxes move. `wait_ms`
+/// Returns the table of searches, that of their kernels, and that of what the model predicts: medians in ms of calls between which all boxes move. `wait_ms`
 /// and the columns after it are of the last call.
-fn searches(gpu: &GpuFinder, quick: bool) -> Result<[Table; 2], Failure> {
-    let columns = "set | boxes | pairs | cpu_ms | gpu_ms | cpu_over_gpu | wait_ms | uploaded_bytes | downloaded_bytes | device_bytes | compression";
+fn searches(gpu: &GpuFinder, quick: bool) -> Result<[Table; 3], Failure> {
+    let columns = "set | boxes | pairs | cpu_ms | gpu_ms | cpu_over_gpu | predicted_ms | wait_ms | uploaded_bytes | downloaded_bytes | device_bytes | compression";
     let mut table = Table::new("searches", columns);
     let mut kernels = Table::new("kernels", "set | boxes | kernel | kernel_ms");
+    let mut model =
+        Table::new("model", "set | boxes | gpu | bytes_a_box | hottest_address | floor_ms | predicted_ms");
     let sets = ["uniform", "gaussian", "mixed"];
     let cases = sizes(gpu, quick).into_iter().flat_map(|n| sets.map(|set| (n, set)));
     for (n, set) in tracked(cases, "sets") {
-        let ([cpu, on_gpu], pairs, report) = search(gpu, set, n)?;
-        let times = cells![set, n, pairs, cpu, on_gpu, cpu / on_gpu, milliseconds(report.wait)];
+        let ([cpu, on_gpu], counts, report) = search(gpu, set, n)?;
+        let predicted = counts.predicted_ms(like(gpu));
+        let pairs = counts.pairs as u64;
+        let times = cells![set, n, pairs, cpu, on_gpu, cpu / on_gpu, predicted, milliseconds(report.wait)];
         let bytes = cells![report.uploaded, report.downloaded, report.device_bytes, report.compression];
         table.row([times, bytes].concat());
         for (name, time) in &report.kernels {
             kernels.row(cells![set, n, *name, milliseconds(*time)]);
         }
+        for gpu in &GPUS {
+            let (bytes, hottest) = (counts.bytes(gpu) / n as f64, counts.hottest());
+            let [floor, predicted] = [counts.floor_ms(gpu), counts.predicted_ms(gpu)];
+            model.row(cells![set, n, gpu.name, bytes, hottest, floor, predicted]);
+        }
     }
-    Ok([table, kernels])
+    Ok([table, kernels, model])
 }
 
-/// Measures both backends on the same boxes, in turn: returns both medians, the pairs, and a report with the times of the kernels.
-fn search(gpu: &GpuFinder, set: &str, n: usize) -> Result<([f64; 2], u64, DeviceReport), Failure> {
+/// Returns the GPU of the model with the adapter's name, or else the smallest one.
+fn like(gpu: &GpuFinder) -> &'static Gpu {
+    GPUS.iter().find(|known| gpu.adapter().contains(known.name)).unwrap_or(&GPUS[3])
+}
+
+/// Returns what the model asks for. The finder has just searched on the device.
+fn counts(finder: &Finder, report: &DeviceReport) -> Counts {
+    let rows = finder.pairs().chunk_by(|one, other| one.a == other.a);
+    Counts {
+        boxes: finder.report().boxes as f64,
+        cells: report.cells as f64,
+        entries: report.entries as f64,
+        tests: finder.report().checks.made as f64,
+        pairs: finder.pairs().len() as f64,
+        longest_row: rows.map(<[_]>::len).max().unwrap_or(0) as f64,
+        has_visits: finder.report().plan.to_string().matches(" of ").count() > 1,
+    }
+}
+
+/// Measures both backends on the same boxes, in turn: returns both medians, the counts, and a report with the times of the kernels.
+fn search(gpu: &GpuFinder, set: &str, n: usize) -> Result<([f64; 2], Counts, DeviceReport), Failure> {
     let start = boxes(set, n);
     let frames = [moved(&start, 1.0, 2), start];
     let mut on_cpu = Finder::new(Config { backend: Backend::Cpu, ..CONFIG });
@@ -72,7 +101,7 @@ fn search(gpu: &GpuFinder, set: &str, n: usize) -> Result<([f64; 2], u64, Device
     let mut finder = Finder::with_device(ON_GPU, Box::new(gpu.clone().with_options(options)));
     frames.iter().try_for_each(|boxes| time(&mut finder, boxes).map(|_| ()))?;
     let report = on_device(finder.report())?.clone();
-    Ok((times.map(|times| Spread::of(times).median), on_cpu.pairs().len() as u64, report))
+    Ok((times.map(|times| Spread::of(times).median), counts(&finder, &report), report))
 }
 
 fn time(finder: &mut Finder, boxes: &[Aabb]) -> Result<f64, Failure> {

@@ -11,7 +11,7 @@ use super::session::Session;
 use super::sink::Sink;
 use super::storage::{BufferId, Side};
 use crate::decode;
-use crate::layout::{BITS, Chunk, Counters, PACKED, Params, RAW, SORTED, Totals, halves, wide};
+use crate::layout::{BITS, Chunk, Counters, PACKED, Params, SORTED, Totals, halves, wide};
 use crate::pbig::{CLASSES, SizeClass};
 use pbig_core::{DeviceReport, internal::Clock};
 use pbig_shaders::{Buffer, Kernel};
@@ -57,8 +57,6 @@ impl Session {
         let prefetched = self.make_room(params, side)?;
         self.write_chunk(items, side, left)?;
         let (submission, passes) = self.record(params, side, steps, Some(prefetched))?;
-        // A map has turned the boxes into ordered integers.
-        self.has_raw_boxes &= params.flags & RAW == 0;
         self.recording += clock.lap();
         Ok(PendingChunk { items, side, submission, submissions: 1, prefetched, passes })
     }

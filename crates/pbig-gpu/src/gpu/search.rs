@@ -10,7 +10,7 @@ use super::error::Failure;
 use super::job::{Input, Job};
 use super::session::{Session, Sizes};
 use super::sink::Sink;
-use crate::layout::{BOX_BITS, Located, Motion, ordered};
+use crate::layout::{BOX_BITS, DeviceBox, Motion, ordered};
 use crate::pbig::sampled;
 use pbig_core::{Aabb, ChangeRequest, DeviceFound, Pair, ProxyFilter, SearchRequest};
 
@@ -63,7 +63,7 @@ impl<'a> Search<'a> {
 
     /// Returns the most boxes that fit every buffer, and an entry's bits.
     fn max_boxes(&self, session: &Session) -> usize {
-        let largest = if self.changes.is_some() { size_of::<Motion>() } else { size_of::<Located>() };
+        let largest = if self.changes.is_some() { size_of::<Motion>() } else { size_of::<DeviceBox>() };
         let by_bytes = session.storage.max_buffer_bytes / largest as u64;
         by_bytes.min(1 << BOX_BITS).min(MAX_BOXES_PER_CELL) as usize
     }

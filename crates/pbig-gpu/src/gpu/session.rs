@@ -57,8 +57,6 @@ pub(super) struct Session {
     pub(super) finds_changes: bool,
     /// Changes were uploaded that no submission has applied yet.
     pub(super) has_pending_changes: bool,
-    /// The boxes on the device are floats: no map has turned them into ordered integers yet.
-    pub(super) has_raw_boxes: bool,
     /// Entries of this job's map, once fetched.
     pub(super) table: Option<Vec<u32>>,
     /// Time of the host in this job, recording and submitting.
@@ -79,7 +77,6 @@ impl Session {
             split: None,
             finds_changes: false,
             has_pending_changes: false,
-            has_raw_boxes: false,
             table: None,
             recording: Duration::ZERO,
             device,
@@ -121,6 +118,10 @@ impl Session {
             };
         }
         let report = &mut sink.found.report;
+        if job.needs_grid {
+            report.cells += self.plan.as_ref().map_or(0, |kept| u64::from(kept.plan.cells));
+            report.entries += u64::from(self.sizes.lists.entries);
+        }
         report.device_bytes = report.device_bytes.max(self.storage.bytes());
         report.record += std::mem::take(&mut self.recording);
         result
@@ -155,7 +156,6 @@ impl Session {
         report.uploaded += self.storage.bytes_sent;
         report.upload += clock.lap();
         self.has_pending_changes = params.known > 0;
-        self.has_raw_boxes = params.flags & RAW != 0;
         Ok(params)
     }
 
@@ -178,9 +178,6 @@ impl Session {
         mut params: Params,
         report: &mut DeviceReport,
     ) -> Result<Params, GpuError> {
-        if !self.has_raw_boxes {
-            params.flags &= !RAW;
-        }
         if job.needs_grid {
             let kept = self.plan(job, &params, report).await?;
             check_entries(kept, params.boxes)?;
