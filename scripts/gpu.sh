@@ -6,8 +6,9 @@
 #   chromium      the same in headless Chromium
 #   fxc           Microsoft's compiler for DirectX, under wine: at most 5 seconds for each text
 #   amd           AMD's compiler in Mesa: registers, waves and spills of each kernel; nothing may spill
+#   table         the tables of the two compilers as docs/benchmarks/results/gpu-compilers.csv
 #   validation    the suite's GPU part under Khronos' validation layer: no message
-# `fxc` and `amd` leave tables in out/gpu. What lacks a tool is left out by name.
+# What lacks a tool is left out by name.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 . scripts/common.sh
@@ -62,6 +63,33 @@ install_dawn() {
         (cd wasm/gpu && step npm ci --no-audit --no-fund --ignore-scripts)
 }
 
+# build_module: the pipeline as WebAssembly, and the JavaScript beside it.
+build_module() {
+    local target=wasm32-unknown-unknown built
+    choose_cargo "$target" || return 1
+    use_wasm_linker
+    built=$(target_folder)/wasm
+    step "${cargo[@]}" build --locked --profile wasm --lib --package pbig-wasm-gpu --target "$target" --target-dir "$built"
+    step cargo run --quiet --locked --package pbig-page-bindgen -- "$built/$target/wasm/pbig_wasm_gpu.wasm" "$out/module"
+    mv "$out/module/pbig_wasm_gpu.js" "$out/module/pbig_wasm_gpu.mjs"
+}
+
+# Dawn takes SwiftShader: lavapipe of Mesa 22 lacks what it asks for.
+run_dawn() {
+    local file
+    file=$(driver swiftshader)
+    needs Dawn "$file" node npm || return 0
+    install_dawn
+    build_module
+    step env VK_DRIVER_FILES="$file" node wasm/gpu/run.mjs "$out/module"
+}
+
+run_chromium() {
+    needs Chromium chromium node || return 0
+    build_module
+    step node wasm/gpu/run.mjs "$out/module" chromium
+}
+
 # compile TEXT KERNEL: prints the seconds that FXC takes, and fails if they exceed the limit.
 compile() {
     local seconds
@@ -113,6 +141,12 @@ run_amd() {
     awk -F, 'NR > 1 && $5 != 0 { print $1 " spills registers"; faults++ } END { exit faults > 0 }' "$out/amd.csv"
 }
 
+# Both tables have the kernels in one order.
+run_table() {
+    needs "a table" "$out/fxc.csv" "$out/amd.csv" || return 0
+    paste -d , "$out/fxc.csv" <(cut -d , -f 3- "$out/amd.csv") >docs/benchmarks/results/gpu-compilers.csv
+}
+
 # validated CHECKS COMMAND...: runs a command under the validation layer, and fails if the layer has to say something.
 validated() {
     local checks=$1
@@ -140,7 +174,7 @@ run_validation() {
 
 setup=true
 if [ "${1:-}" = --no-setup ]; then setup=false && shift; fi
-[ $# -gt 0 ] || set -- swiftshader dawn chromium fxc amd validation
+[ $# -gt 0 ] || set -- swiftshader dawn chromium fxc amd table validation
 if $setup; then scripts/setup.sh rust vulkan wasm page layers drivers || true; fi
 mkdir -p "$out"
 for name in "$@"; do

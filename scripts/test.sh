@@ -15,7 +15,7 @@ trap 'rm -rf "$TMPDIR"' EXIT
 
 # Options of several words, which are not quoted where they are used.
 # The default members, for commands that leave one out: cargo takes `--exclude` only beside `--workspace`.
-members="--workspace --exclude pbig-page --exclude pbig-page-bindgen --exclude pbig-viewer --exclude pbig-wasm"
+members="--workspace --exclude pbig-page --exclude pbig-page-bindgen --exclude pbig-viewer --exclude pbig-wasm --exclude pbig-wasm-gpu"
 in_036="--manifest-path rapier-0.36/Cargo.toml"
 members_036="-p rapier3d-pbig -p pbig-harness-036"
 features_036="--features rapier3d-pbig/debug-render"
@@ -79,6 +79,12 @@ step_suite_cpu() {
 step_suite_gpu() {
     has_gpu || { left_out "there is no GPU adapter" && return; }
     step cargo test --release --test suite --no-fail-fast
+}
+
+# The parts of gpu.sh that need packages of Debian alone.
+step_gpu() {
+    has_gpu || { left_out "there is no GPU adapter" && return; }
+    step scripts/gpu.sh --no-setup amd validation
 }
 
 # On docs.rs a nightly Rust labels each item with its feature. A wrapper lets this release do that, too.
@@ -182,7 +188,7 @@ run_step() {
     all_passed=$((all_passed + passed)) all_failed=$((all_failed + failed)) all_skipped=$((all_skipped + skipped))
 }
 
-all="setup fmt clippy unit suite-cpu suite-gpu doc features packages wasm examples docs rapier-0.36"
+all="setup fmt clippy unit suite-cpu suite-gpu gpu doc features packages wasm examples docs rapier-0.36"
 if [ "${1:-}" = --no-setup ]; then
     all=${all#setup }
     shift
