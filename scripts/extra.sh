@@ -59,15 +59,15 @@ run_features() {
     for kind in "$@"; do test_features "$kind"; done
 }
 
-# check_contents PACKAGE FOLDER: the package has a README and the licences. They are copies, because links break on Windows.
+# check_contents FOLDER: the package has a README and the licences. These are copies, because links break on Windows.
 check_contents() {
     local files file
-    files=$(cargo package --locked --list --allow-dirty -p "$1")
+    files=$(cargo package --locked --list --allow-dirty --manifest-path "$1/Cargo.toml")
     for file in README.md LICENSE-MIT LICENSE-APACHE; do
         case $'\n'$files$'\n' in *$'\n'"$file"$'\n'*) ;; *) echo "$1 has no $file" && exit 1 ;; esac
     done
-    cmp LICENSE-MIT "$2/LICENSE-MIT"
-    cmp LICENSE-APACHE "$2/LICENSE-APACHE"
+    cmp LICENSE-MIT "$1/LICENSE-MIT"
+    cmp LICENSE-APACHE "$1/LICENSE-APACHE"
 }
 
 # check_dependencies: licences, sources and known vulnerabilities; the list of these comes from outside.
@@ -99,8 +99,8 @@ check_oldest() {
 
 run_publish() {
     local options="-p pbig-shaders -p pbig-core -p pbig-gpu -p pbig-adapter -p rapier-pbig" folder
-    for folder in shaders crates/pbig-core crates/pbig-gpu crates/pbig-adapter crates/rapier-pbig; do
-        check_contents "$(sed -n 's/^name = "\(.*\)"/\1/p' "$folder/Cargo.toml" | head -n 1)" "$folder"
+    for folder in shaders crates/pbig-core crates/pbig-gpu crates/pbig-adapter crates/rapier-pbig avian/avian2d-pbig avian/avian3d-pbig; do
+        check_contents "$folder"
     done
     # Each is built from its package, against the others' packages.
     # Cargo keeps what it has unpacked in an earlier dry run from the same folder, and would build against that.
@@ -235,7 +235,7 @@ case $name in
 wasm | aarch64) parts="rust $name" ;;
 viewer | pictures) parts="rust vulkan $name" ;;
 publish) parts="rust deny msrv semver" ;;
-features | sanitize | fuzz) parts=rust ;;
+features | avian | sanitize | fuzz) parts=rust ;;
 *) sed -n '2,/^set/s/^# \{0,1\}//p' "$0" >&2 && exit 2 ;;
 esac
 shift
