@@ -14,7 +14,7 @@ trap 'rm -rf "$work"' EXIT
 faults=0
 # The documents whose words are counted. READMEs of crates and of the page are short, and checked for links only.
 documents=$(ls README.md CHANGELOG.md CONTRIBUTING.md SECURITY.md && find docs -name '*.md' | sort)
-crates=$(ls shaders/README.md crates/*/README.md page/README.md 2>/dev/null)
+crates=$(ls shaders/README.md crates/*/README.md page/README.md avian/README.md 2>/dev/null)
 
 fault() {
     echo "docs: $*" >&2
