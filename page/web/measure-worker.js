@@ -10,15 +10,19 @@ let done = 0;
 
 onmessage = async ({ data: { sizes } }) => {
     try {
-        await measure(sizes);
+        const adapter = await findAdapter();
+        await measure(adapter, sizes).catch(stop);
         postMessage({ kind: "end" });
-    } catch (error) {
-        postMessage({ kind: "failure", text: describe(error, panic_message) });
+    } catch ({ message }) {
+        postMessage({ kind: "failure", text: message });
     }
 };
 
-async function measure(sizes) {
-    const adapter = await findAdapter();
+function stop(error) {
+    throw new Error(`The measurement stopped: ${describe(error, panic_message)}.`);
+}
+
+async function measure(adapter, sizes) {
     await loadModule(init, MODULE);
     tell(sizes, "Opening the GPU");
     const benchmark = await Benchmark.open();
@@ -69,11 +73,12 @@ async function measureKernels(benchmark, boxes, sizes) {
 }
 
 function conditionsOf(benchmark, adapter) {
-    const { vendor, architecture, device, description } = adapter.info;
-    const name = [description || device, vendor, architecture].filter(Boolean).join(", ");
+    const { vendor, architecture, device, description, isFallbackAdapter } = adapter.info;
+    // A browser may hide each of them.
+    const names = [description || device, vendor, architecture].filter(Boolean);
     return {
-        adapter: name || benchmark.adapter(),
-        software: benchmark.is_software() || adapter.info.isFallbackAdapter === true,
+        adapter: names.join(", ") || "unknown",
+        software: isFallbackAdapter === true,
         browser: navigator.userAgent,
         limits: benchmark.limits(),
         timestamps: benchmark.has_timestamps(),
