@@ -19,6 +19,8 @@ for argument in "$@"; do
 done
 target=wasm32-unknown-unknown
 tools=page/node_modules/.bin
+# The script that the module imports its device from.
+device=--alias:pbig-page-device=./page/web/device.js
 
 # check_folder: refuses a folder of other files than an earlier page's, because `bundle` deletes what is there.
 check_folder() {
@@ -29,14 +31,14 @@ check_folder() {
     fi
 }
 
-# build_module FOLDER [OPTION...]: rapier and pbig as a WebAssembly module, and the JavaScript beside it. The module has SIMD,
-# and no unwinding. The program that writes the JavaScript is small: optimizing it would take longer than it runs.
+# build_module PACKAGE FOLDER [OPTION...]: a WebAssembly module, and the JavaScript beside it: rapier and pbig, or the GPU. The
+# module has SIMD, and no unwinding. The program that writes the JavaScript is small: optimizing it would take longer than it runs.
 build_module() {
-    local folder=$1
-    shift
-    RUSTFLAGS="-C target-feature=+simd128" step "${cargo[@]}" build --locked --profile wasm --lib --package pbig-page \
+    local package=$1 folder=$2
+    shift 2
+    RUSTFLAGS="-C target-feature=+simd128" step "${cargo[@]}" build --locked --profile wasm --lib --package "$package" \
         --target "$target" --target-dir "$built/wasm" "$@"
-    step cargo run --quiet --locked --package pbig-page-bindgen -- "$built/wasm/$target/wasm/pbig_page.wasm" "$folder"
+    step cargo run --quiet --locked --package pbig-page-bindgen -- "$built/wasm/$target/wasm/${package//-/_}.wasm" "$folder"
 }
 
 # build_native [OPTION...]: the native program whose pairs are compared with the module's.
@@ -54,9 +56,11 @@ bundle() {
     rm -rf "$out"
     mkdir -p "$out/licences"
     # First, because `check_folder` looks for it, also after a bundle that failed.
-    cp "$built/bindings/pbig_page_bg.wasm" "$out"
-    step "$tools/esbuild" page/web/main.js page/web/worker.js page/web/style.css --bundle --minify --format=esm \
-        --target=es2022 --log-level=warning --alias:pbig-page-module="$built/bindings/pbig_page.js" --outdir="$out"
+    cp "$built"/bindings/pbig_page{,_gpu}_bg.wasm "$out"
+    # Splitting: what several scripts need, and what is loaded later, becomes files of their own.
+    step "$tools/esbuild" page/web/{main,worker,measure-worker}.js page/web/style.css --bundle --splitting --minify --format=esm \
+        --target=es2022 --log-level=warning --alias:pbig-page-module="$built/bindings/pbig_page.js" \
+        --alias:pbig-page-gpu-module="$built/bindings/pbig_page_gpu.js" "$device" --outdir="$out"
     cp page/web/index.html page/web/start.js "$out"
     cp LICENSE-MIT LICENSE-APACHE "$out/licences"
     for package in three uplot wasm-feature-detect; do
@@ -67,10 +71,11 @@ bundle() {
 # build_deterministic: module and native program with mathematics that are the same on both sides.
 build_deterministic() {
     local options="--no-default-features --features deterministic" folder=$built/deterministic
-    build_module "$folder" $options
+    build_module pbig-page "$folder" $options
     build_native $options
     cp "$built/release/native_pairs" "$folder"
-    mv "$folder/pbig_page.js" "$folder/pbig_page.mjs"
+    step "$tools/esbuild" "$folder/pbig_page.js" --bundle --format=esm --log-level=warning "$device" \
+        --outfile="$folder/pbig_page.mjs"
 }
 
 # test_page: the logic natively and in node, then the page in a browser, one test file after another.
@@ -91,7 +96,8 @@ parts="rust wasm page"
 choose_cargo "$target" && has npm || { left_out "$target or npm" && exit 0; }
 use_wasm_linker
 built=$(target_folder)
-build_module "$built/bindings"
+build_module pbig-page "$built/bindings"
+build_module pbig-page-gpu "$built/bindings"
 install_tools
 bundle
 echo "== the page is in $out; serve it with: python3 -m http.server -d $out"

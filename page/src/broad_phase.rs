@@ -1,9 +1,10 @@
-//! A broad phase that changes between rapier's own and pbig's while a world runs, with a clock around it.
+//! A broad phase that changes between rapier's own and pbig's, on the CPU or on the GPU, while a world runs, with a clock around it.
 
 use crate::clock::now_ms;
+use crate::device::RemoteDevice;
 use pbig_scenes::stock::StockBroadPhase;
 use pbig_scenes::world::World;
-use rapier_pbig::PbigBroadPhase;
+use rapier_pbig::{Backend, PbigBroadPhase, PbigConfig};
 use rapier3d::prelude::*;
 use std::str::FromStr;
 
@@ -12,8 +13,10 @@ use std::str::FromStr;
 pub enum Choice {
     /// Rapier's own.
     Stock,
-    /// pbig's.
+    /// pbig's, on the CPU.
     Pbig,
+    /// pbig's, on the page's GPU.
+    Gpu,
 }
 
 impl FromStr for Choice {
@@ -23,7 +26,8 @@ impl FromStr for Choice {
         match name {
             "stock" => Ok(Self::Stock),
             "pbig" => Ok(Self::Pbig),
-            _ => Err(format!("no broad phase is called '{name}'; there are: stock, pbig")),
+            "gpu" => Ok(Self::Gpu),
+            _ => Err(format!("no broad phase is called '{name}'; there are: stock, pbig, gpu")),
         }
     }
 }
@@ -33,8 +37,25 @@ enum Inner {
     Pbig(Box<PbigBroadPhase>),
 }
 
+impl Inner {
+    fn new(choice: Choice) -> Self {
+        match choice {
+            Choice::Stock => Self::Stock(Box::default()),
+            Choice::Pbig => Self::Pbig(Box::default()),
+            Choice::Gpu => Self::Pbig(Box::new(on_device(RemoteDevice::gpu()))),
+        }
+    }
+}
+
+/// Returns pbig's broad phase on a device that does every call.
+fn on_device(device: RemoteDevice) -> PbigBroadPhase {
+    let config = PbigConfig { backend: Backend::Device, ..PbigConfig::DEFAULT };
+    PbigBroadPhase::with_device(config, Box::new(device)).expect("the default margin is a length")
+}
+
 /// The broad phase in use, and the time spent in it.
 pub struct ExchangeableBroadPhase {
+    choice: Choice,
     inner: Inner,
     spent_ms: f64,
 }
@@ -42,24 +63,12 @@ pub struct ExchangeableBroadPhase {
 impl ExchangeableBroadPhase {
     /// Creates an empty broad phase, for a world that has not stepped yet.
     pub fn new(choice: Choice) -> Self {
-        let inner = match choice {
-            Choice::Stock => Inner::Stock(Box::default()),
-            Choice::Pbig => Inner::Pbig(Box::default()),
-        };
-        Self { inner, spent_ms: 0.0 }
-    }
-
-    /// Returns the broad phase in use.
-    pub fn choice(&self) -> Choice {
-        match self.inner {
-            Inner::Stock(_) => Choice::Stock,
-            Inner::Pbig(_) => Choice::Pbig,
-        }
+        Self { choice, inner: Inner::new(choice), spent_ms: 0.0 }
     }
 
     /// Changes the broad phase of a running world. The narrow phase keeps its pairs, and sleeping bodies stay asleep.
     pub fn change(&mut self, choice: Choice, world: &World) {
-        if choice == self.choice() {
+        if choice == self.choice {
             return;
         }
         *self = Self::new(choice);
@@ -147,6 +156,6 @@ mod tests {
     fn a_wrong_name_is_answered_with_the_right_ones() {
         assert_eq!("pbig".parse(), Ok(Choice::Pbig));
         let error = "grid".parse::<Choice>().unwrap_err();
-        assert!(error.contains("'grid'") && error.contains("stock, pbig"), "{error}");
+        assert!(error.contains("'grid'") && error.contains("stock, pbig, gpu"), "{error}");
     }
 }

@@ -73,12 +73,13 @@ pub struct GroupData {
 pub struct Simulation {
     run: Run,
     groups: Groups,
+    advanced: Result<StepTime, String>,
     time: StepTime,
 }
 
 #[wasm_bindgen]
 impl Simulation {
-    /// Builds a scene with about this many bodies. The broad phase is `stock` or `pbig`.
+    /// Builds a scene with about this many bodies. The broad phase is `stock`, `pbig` or `gpu`.
     ///
     /// # Errors
     /// A text that lists the right names if one is wrong.
@@ -87,15 +88,22 @@ impl Simulation {
         let choice: Choice = broad_phase.parse().map_err(to_js)?;
         let run = Run::new(scene, bodies as usize, seed.into(), choice).map_err(to_js)?;
         let groups = Groups::new(&run.world.bodies, &run.world.colliders);
-        Ok(Self { run, groups, time: StepTime::default() })
+        let time = StepTime::default();
+        Ok(Self { run, groups, advanced: Ok(time), time })
     }
 
-    /// Advances the world by 1/60 s. Returns true if colliders were added or removed, so that the groups are new.
+    /// Advances the world by 1/60 s. With the GPU this must be called so that it can be suspended: by
+    /// `WebAssembly.promising`, which knows numbers alone. So [`Simulation::end_step`] has the result.
+    pub fn advance(&mut self) {
+        self.advanced = self.run.step();
+    }
+
+    /// Ends a step. Returns true if colliders were added or removed, so that the groups are new.
     ///
     /// # Errors
     /// The text of pbig's error.
-    pub fn step(&mut self) -> Result<bool, JsError> {
-        self.time = self.run.step().map_err(to_js)?;
+    pub fn end_step(&mut self) -> Result<bool, JsError> {
+        self.time = self.advanced.clone().map_err(to_js)?;
         let is_outdated = self.groups.is_outdated(&self.run.world.colliders);
         if is_outdated {
             self.groups = Groups::new(&self.run.world.bodies, &self.run.world.colliders);
@@ -103,7 +111,7 @@ impl Simulation {
         Ok(is_outdated)
     }
 
-    /// Changes the broad phase to `stock` or `pbig` while the world runs.
+    /// Changes the broad phase to `stock`, `pbig` or `gpu` while the world runs.
     ///
     /// # Errors
     /// A text that lists the right names.

@@ -5,6 +5,7 @@
 
 mod broad_phase;
 mod clock;
+mod device;
 pub mod exports;
 mod groups;
 mod mesh;

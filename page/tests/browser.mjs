@@ -10,8 +10,13 @@ const folder = process.env.PAGE_FOLDER ?? "../out/page";
 const executablePath = process.env.CHROMIUM ?? "/usr/bin/chromium";
 const WAIT_MS = 120_000;
 
+export const DESKTOP = { width: 1280, height: 800 };
+export const PHONE = { width: 390, height: 844, deviceScaleFactor: 2, isMobile: true, hasTouch: true };
+
 // Graphics in software: the machine may have no GPU.
 const GRAPHICS = ["--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--ignore-gpu-blocklist"];
+/** Arguments for a browser with WebGPU, in software, too. */
+export const WEBGPU = [...GRAPHICS, "--enable-unsafe-webgpu", "--use-webgpu-adapter=swiftshader"];
 /** Arguments for a browser without WebGL. */
 export const NO_GRAPHICS = ["--disable-3d-apis"];
 
@@ -44,6 +49,14 @@ export async function open(browser, address, prepare = async () => {}) {
     await prepare(page);
     await page.goto(address);
     return page;
+}
+
+/** Opens a page on a screen, in a light or a dark scheme. */
+export function openAs(browser, address, viewport, scheme) {
+    return open(browser, address, async (page) => {
+        await page.setViewport(viewport);
+        await page.emulateMediaFeatures([{ name: "prefers-color-scheme", value: scheme }]);
+    });
 }
 
 /** Returns the text of an element. */

@@ -7,6 +7,8 @@ import { LEVELS, Quality } from "../web/quality.js";
 import { findMissing, hasModuleWorkers } from "../web/requirements.js";
 import { bodyChoices, formatSettings, parseSettings } from "../web/settings.js";
 import { Simulation, SimulationEnded } from "../web/simulation.js";
+import { csvOf, DIFFERENT, kernelsMs, median, rowOf, workOf } from "../web/measurement.js";
+import { findAdapter, gpuObstacle } from "../web/webgpu.js";
 import { formatMs, mean, p99, Times, WINDOW_STEPS } from "../web/times.js";
 
 test("mean and p99 by hand", () => {
@@ -25,8 +27,8 @@ test("times keep the last steps of each broad phase", () => {
     for (let step = 2; step <= WINDOW_STEPS + 10; step++) add(step, "pbig", step < 11 ? 100 : 1);
     assert.equal(times.figure("stock", "step", "mean"), 8);
     assert.equal(times.figure("pbig", "broadPhase", "p99"), 1);
-    const [steps, stock, pbig] = times.columns("step");
-    assert.deepEqual([steps.length, steps[0], stock[0], pbig[0]], [WINDOW_STEPS, 11, null, 2]);
+    const [steps, stock, pbig, gpu] = times.columns("step");
+    assert.deepEqual([steps.length, steps[0], stock[0], pbig[0], gpu[0]], [WINDOW_STEPS, 11, null, 2, null]);
     assert.ok(Number.isNaN(new Times().figure("pbig", "step", "mean")));
 });
 
@@ -73,7 +75,7 @@ test("wrong addresses are refused with the right values", () => {
     for (const query of ["?bodies=0", "?bodies=1e9", "?bodies=1.5", "?seed=-1", "?seed=x"]) {
         assert.throws(() => parseSettings(query, false), /must be from/, query);
     }
-    assert.throws(() => parseSettings("?broad-phase=grid", false), /'grid'.*stock or pbig/);
+    assert.throws(() => parseSettings("?broad-phase=grid", false), /'grid'.*stock, pbig, gpu/);
 });
 
 test("the first missing requirement is named; a check that throws counts as missing", async () => {
@@ -113,4 +115,42 @@ test("the end of a simulation is not a failure of its calls", async () => {
     simulation.end();
     await assert.rejects(broken, (error) => !(error instanceof SimulationEnded) && error.message === "no such scene");
     await assert.rejects(ended, SimulationEnded);
+});
+
+/** Returns rounds with these times of the GPU, whose other times are 1 and whose bytes are their number. */
+function rounds(gpu) {
+    const times = { cpu_ms: 6, wait_ms: 1, upload_ms: 1, plan_ms: 0, record_ms: 1, decode_ms: 1 };
+    const bytesOf = (round) => ({ uploaded_bytes: round, downloaded_bytes: 1_234_567, device_bytes: 7, compression: 1 / 3 });
+    return gpu.map((gpu_ms, round) => ({ ...times, gpu_ms, ...bytesOf(round) }));
+}
+
+test("a row has the medians of the rounds and the bytes of the last", () => {
+    assert.deepEqual([median([3, 1, 2]), median([1, 2, 3, 4]), median([])], [2, 2.5, NaN]);
+    const row = rowOf({ boxes: 10, pairs: 5, rounds: rounds([2, 9, 3]), kernels: { scan: 1, check: 2 }, isEqual: true });
+    assert.deepEqual([row.gpu_ms, row.cpu_over_gpu, row.uploaded_bytes, row.pairs_equal], [3, 2, 2, "yes"]);
+    assert.equal(kernelsMs(row), 3);
+    assert.ok(Number.isNaN(kernelsMs({ kernels: {} })));
+    assert.equal(rowOf({ rounds: rounds([1]), kernels: {}, isEqual: false }).pairs_equal, DIFFERENT);
+    assert.equal(workOf([10_000, 1_000_000]), 9 * 10_000 + 6 * 1_000_000);
+});
+
+test("the CSV has conditions, exact counts, and a column for each kernel of any row", () => {
+    const row = (boxes, kernels) => rowOf({ boxes, pairs: 5, rounds: rounds([3.14159265]), kernels, isEqual: true });
+    const csv = csvOf({ adapter: "a GPU", software: false }, [row(10_000, {}), row(1_000_000, { scan: 0.5 })]);
+    const [first, second, columns, ...lines] = csv.trimEnd().split("\n");
+    assert.deepEqual([first, second], ["# adapter: a GPU", "# software: false"]);
+    const searches = "set,boxes,pairs,cpu_ms,gpu_ms,cpu_over_gpu,wait_ms,uploaded_bytes,downloaded_bytes,device_bytes,compression,";
+    assert.ok(columns.startsWith(searches) && columns.endsWith(",pairs_equal,scan_ms"), columns);
+    assert.equal(lines[0], "uniform,10000,5,6,3.1416,1.9099,1,0,1234567,7,0.33333,1,0,1,1,yes,");
+    assert.ok(lines[1].startsWith("uniform,1000000,") && lines[1].endsWith(",yes,0.5"), lines[1]);
+});
+
+test("a browser without WebGPU is told why", async () => {
+    const without = { requestAdapter: async () => null };
+    await assert.rejects(findAdapter(undefined, false), /https, or localhost/);
+    await assert.rejects(findAdapter(undefined, true), /no WebGPU: Chrome/);
+    await assert.rejects(findAdapter(without, true), /no WebGPU: it finds no GPU/);
+    assert.match(await gpuObstacle(undefined, false), /https/);
+    const adapter = {};
+    assert.equal(await findAdapter({ requestAdapter: async () => adapter }, true), adapter);
 });

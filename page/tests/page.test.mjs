@@ -4,7 +4,7 @@
 import assert from "node:assert/strict";
 import { mkdirSync } from "node:fs";
 import { after, before, test } from "node:test";
-import { launch, numberOf, open, serve, textOf, waitForSteps } from "./browser.mjs";
+import { DESKTOP, launch, numberOf, openAs, PHONE, serve, textOf, waitForSteps } from "./browser.mjs";
 import { firstDifference, nativePairs, PAIR_STEPS } from "./pairs.mjs";
 
 const program = process.env.NATIVE_PAIRS;
@@ -12,8 +12,6 @@ const shots = process.env.SHOTS ?? "../out/page-shots";
 const STEPS = 300;
 // Scenes in which rapier's numbers are the same on both sides for so many steps; page/README.md says why others' are not.
 const EQUAL_SCENES = ["column", "galton", "rain", "sensors"];
-const DESKTOP = { width: 1280, height: 800 };
-const PHONE = { width: 390, height: 844, deviceScaleFactor: 2, isMobile: true, hasTouch: true };
 
 let server, browser;
 
@@ -27,11 +25,8 @@ after(async () => {
     server?.end();
 });
 
-async function openScene(query, viewport = DESKTOP, scheme = "light") {
-    return open(browser, server.address + query, async (page) => {
-        await page.setViewport(viewport);
-        await page.emulateMediaFeatures([{ name: "prefers-color-scheme", value: scheme }]);
-    });
+function openScene(query, viewport = DESKTOP, scheme = "light") {
+    return openAs(browser, server.address + query, viewport, scheme);
 }
 
 async function shoot(page, name) {
@@ -105,7 +100,7 @@ test("a phone's screen shows the stage and the controls, without scrolling sidew
     assert.equal(await page.$eval("#bodies", (select) => select.value), "1000");
     await page.tap("#broad-phase .stock");
     await page.waitForFunction(() => location.search.includes("broad-phase=stock"));
-    const heights = await page.$$eval("button, select", (all) => all.map((one) => one.clientHeight));
+    const heights = await page.$$eval("#panel :is(button, select)", (all) => all.map((one) => one.clientHeight));
     assert.ok(Math.min(...heights) >= 38, `too low to touch: ${heights}`);
     assert.deepEqual(page.complaints, []);
     await page.close();

@@ -1,6 +1,7 @@
-// A rolling chart of one time: a line for stock, a line for pbig.
+// A rolling chart of one time: a line for each broad phase.
 
 import uPlot from "uplot";
+import { BROAD_PHASES } from "./settings.js";
 import { onThemeChange, themeColour } from "./theme.js";
 
 const HEIGHT = 110;
@@ -8,7 +9,7 @@ const FONT = "11px system-ui, sans-serif";
 
 /** Creates a chart in an element. Its `setData` takes the columns of `Times`. */
 export function createChart(element) {
-    const chart = new uPlot(options(element.clientWidth), [[], [], []], element);
+    const chart = new uPlot(options(element.clientWidth), [[], ...BROAD_PHASES.map(() => [])], element);
     new ResizeObserver(() => chart.setSize({ width: element.clientWidth, height: HEIGHT })).observe(element);
     onThemeChange(() => chart.redraw());
     return chart;
@@ -23,7 +24,7 @@ function options(width) {
         cursor: { show: false },
         scales: { x: { time: false }, y: { range: (_, __, max) => [0, max > 0 ? max * 1.1 : 1] } },
         axes: [axis({ size: 22 }), axis({ size: 40, splits: fewSplits })],
-        series: [{}, line("--stock"), line("--pbig")],
+        series: [{}, ...BROAD_PHASES.map((name) => line(`--${name}`))],
     };
 }
 

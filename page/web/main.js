@@ -1,5 +1,6 @@
 // Connects panel, simulation and stage.
 
+import { Measure } from "./measure.js";
 import { hideMessage, showMessage } from "./message.js";
 import { Pace, STEP_MS } from "./pace.js";
 import { Panel } from "./panel.js";
@@ -8,6 +9,7 @@ import { formatSettings, parseSettings } from "./settings.js";
 import { Simulation, SimulationEnded } from "./simulation.js";
 import { Stage } from "./stage.js";
 import { Times } from "./times.js";
+import { gpuObstacle } from "./webgpu.js";
 
 const NARROW_SCREEN = "(max-width: 760px)";
 // Where drawing is slow, steps go on between the frames.
@@ -23,6 +25,7 @@ class Page {
     #times = new Times();
     #pace = new Pace();
     #isPaused = false;
+    #isHeld = false;
     // True between a failure and the next reset.
     #hasFailed = false;
     // Each task waits for the one before it.
@@ -44,6 +47,11 @@ class Page {
         this.#build();
         requestAnimationFrame((now) => this.#frame(now));
         setInterval(() => this.#stepBetweenFrames(performance.now()), TIMER_MS);
+    }
+
+    /** Stops world and drawing while the GPU is measured. They go on afterwards, the world unless it is paused. */
+    hold(isHeld) {
+        this.#isHeld = isHeld;
     }
 
     /** Returns the pairs of a scene after each step, from a worker of its own. */
@@ -70,7 +78,10 @@ class Page {
         this.#build();
     }
 
-    #changeBroadPhase(broadPhase) {
+    async #changeBroadPhase(broadPhase) {
+        const obstacle = broadPhase === "gpu" ? await gpuObstacle() : undefined;
+        this.#panel.showObstacle(obstacle);
+        if (obstacle) return this.#showSettings();
         this.#settings = { ...this.#settings, broadPhase };
         this.#showSettings();
         this.#do(() => this.#simulation.changeBroadPhase(broadPhase));
@@ -145,7 +156,7 @@ class Page {
     #frame(now) {
         this.#lastFrame = now;
         this.#stepIfDue(now);
-        this.#stage.draw(now);
+        if (!this.#isHeld || this.#stage.isOutdated) this.#stage.draw(now);
         requestAnimationFrame((next) => this.#frame(next));
     }
 
@@ -155,7 +166,7 @@ class Page {
     }
 
     #stepIfDue(now) {
-        if (this.#isPaused || this.#isStepping || this.#hasFailed || !this.#pace.takeStep(now)) return;
+        if (this.#isPaused || this.#isHeld || this.#isStepping || this.#hasFailed || !this.#pace.takeStep(now)) return;
         this.#isStepping = true;
         this.#do(() => this.#step()).then(() => (this.#isStepping = false));
     }
@@ -180,6 +191,7 @@ function clockResolution() {
 }
 
 const page = new Page();
-// For tests: the pairs of any scene, step by step.
-window.pbigPage = { pairs: (settings, steps) => page.pairs(settings, steps) };
+const measure = new Measure((isPaused) => page.hold(isPaused));
+// For tests: the pairs of any scene, step by step, and the numbers of boxes of a measurement.
+window.pbigPage = { pairs: (settings, steps) => page.pairs(settings, steps), measure };
 page.start();

@@ -37,6 +37,11 @@ export class Panel {
         for (const control of document.querySelectorAll("#controls :disabled")) control.disabled = false;
     }
 
+    /** Shows why the GPU cannot be chosen. */
+    showObstacle(reason = "") {
+        element("obstacle").textContent = reason;
+    }
+
     /** Shows which settings are chosen. */
     showSettings({ scene, bodies, broadPhase }) {
         element("scene").value = scene;

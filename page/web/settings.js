@@ -1,7 +1,7 @@
 // The scene that the page shows. The address has it, so that a link shows the same.
 
 export const BODY_COUNTS = [100, 500, 1000, 2000, 5000, 10000, 20000];
-export const BROAD_PHASES = ["stock", "pbig"];
+export const BROAD_PHASES = ["stock", "pbig", "gpu"];
 const MAX_BODIES = 100_000;
 const MAX_SEED = 0xffffffff;
 
@@ -40,5 +40,5 @@ function parseCount(name, text, min, max) {
 
 function parseBroadPhase(name) {
     if (BROAD_PHASES.includes(name)) return name;
-    throw new Error(`'${name}' in the address is no broad phase: it must be ${BROAD_PHASES.join(" or ")}.`);
+    throw new Error(`'${name}' in the address is no broad phase: it must be one of ${BROAD_PHASES.join(", ")}.`);
 }

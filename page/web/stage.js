@@ -23,6 +23,8 @@ export class Stage {
     #sky = new THREE.HemisphereLight(0xffffff, 0x8088a0, 1.4);
     #shapes = [];
     #quality = new Quality();
+    /** True if the canvas does not show the last scenery, size and scheme. */
+    isOutdated = true;
 
     /** Throws if the canvas has no WebGL. */
     constructor(canvas, onContextLost) {
@@ -80,6 +82,7 @@ export class Stage {
     /** Draws the shapes at their places, at this time in milliseconds. */
     draw(now) {
         if (this.#quality.noteFrame(now)) this.#applyQuality();
+        this.isOutdated = false;
         this.#orbit.update();
         this.#renderer.render(this.#scene, this.#camera);
     }
@@ -102,6 +105,7 @@ export class Stage {
     #fitCanvas() {
         const { clientWidth, clientHeight } = this.#renderer.domElement.parentElement;
         this.#renderer.setSize(clientWidth, clientHeight, false);
+        this.isOutdated = true;
         this.#camera.aspect = clientWidth / Math.max(clientHeight, 1);
         this.#camera.updateProjectionMatrix();
     }
@@ -120,6 +124,7 @@ export class Stage {
         this.#scene.background = sky;
         this.#scene.fog.color.copy(sky);
         this.#shapes.forEach(({ mesh, classes }) => colourInstances(mesh, classes));
+        this.isOutdated = true;
     }
 
     #discard(mesh) {

@@ -1,5 +1,7 @@
 // The times of the last steps, for each broad phase.
 
+import { BROAD_PHASES } from "./settings.js";
+
 /** Steps that means, p99s and charts show. */
 export const WINDOW_STEPS = 300;
 
@@ -19,7 +21,7 @@ const FIGURES = { mean, p99 };
 /** The last steps: `{ steps, broadPhase, times: { broadPhase, step } }`, times in milliseconds. */
 export class Times {
     #all = [];
-    #byBroadPhase = { stock: [], pbig: [] };
+    #byBroadPhase = Object.fromEntries(BROAD_PHASES.map((name) => [name, []]));
 
     /** Adds a step, and drops those that left the window. */
     add(entry) {
@@ -34,11 +36,11 @@ export class Times {
         return FIGURES[figure](this.#byBroadPhase[broadPhase].map(({ times }) => times[time]));
     }
 
-    /** Returns the columns of a chart: numbers of steps, and a time with stock and with pbig, null where another one ran. */
+    /** Returns the columns of a chart: numbers of steps, and a time with each broad phase, null where another one ran. */
     columns(time) {
         const of = (name) =>
             this.#all.map(({ broadPhase, times }) => (broadPhase === name ? times[time] : null));
-        return [this.#all.map(({ steps }) => steps), of("stock"), of("pbig")];
+        return [this.#all.map(({ steps }) => steps), ...BROAD_PHASES.map(of)];
     }
 }
 

@@ -1,45 +1,68 @@
 // Steps the world apart from the page, which stays responsive while a step takes long.
 
+import { connect } from "./device.js";
+import { describe, loadModule } from "./load.js";
 import init, { Simulation, panic_message, scenes } from "pbig-page-module";
 
 const MODULE = "pbig_page_bg.wasm";
 let simulation;
 // The broad phase in use.
 let broadPhase;
+// `Simulation.advance`, which the GPU may suspend.
+let advanceSuspended;
+// Returns a promise of the pairs of boxes.
+let findOnGpu;
 
 const methods = {
     async load() {
-        const response = await fetch(MODULE);
-        if (!response.ok) throw new Error(`${MODULE} could not be loaded: status ${response.status}`);
-        await init({ module_or_path: await response.arrayBuffer() });
+        const { memory, simulation_advance } = await loadModule(init, MODULE);
+        connect(memory, (boxes, filters) => findOnGpu(boxes, filters));
+        advanceSuspended = WebAssembly.promising?.(simulation_advance);
         return scenes().map(({ name, about, hard }) => ({ name, about, hard }));
     },
 
-    build(settings) {
+    async build(settings) {
+        await prepare(settings.broadPhase);
         simulation?.free();
         simulation = create(settings);
         broadPhase = settings.broadPhase;
         return { ...readScenery(), ...readFrame() };
     },
 
-    step() {
-        const isNewScenery = simulation.step();
+    async step() {
+        const isNewScenery = await advance(simulation, broadPhase);
         return { ...(isNewScenery && readScenery()), ...readFrame() };
     },
 
-    changeBroadPhase(name) {
+    async changeBroadPhase(name) {
+        await prepare(name);
         simulation.change_broad_phase(name);
         broadPhase = name;
     },
 
-    pairs(settings, steps) {
-        const apart = create(settings);
-        return Array.from({ length: steps }, () => {
-            apart.step();
-            return apart.pairs();
-        });
+    async pairs(settings, steps) {
+        await prepare(settings.broadPhase);
+        const [apart, pairs] = [create(settings), []];
+        for (let step = 0; step < steps; step++) {
+            await advance(apart, settings.broadPhase);
+            pairs.push(apart.pairs());
+        }
+        return pairs;
     },
 };
+
+/** Opens the GPU where it is needed. Its module is loaded only then. */
+async function prepare(name) {
+    if (name !== "gpu" || findOnGpu) return;
+    const { openGpu } = await import("./gpu.js");
+    findOnGpu = await openGpu();
+}
+
+async function advance(world, name) {
+    if (name === "gpu") await advanceSuspended(world.__wbg_ptr);
+    else world.advance();
+    return world.end_step();
+}
 
 function create(settings) {
     return new Simulation(settings.scene, settings.bodies, settings.seed, settings.broadPhase);
@@ -71,17 +94,11 @@ function readFrame() {
     };
 }
 
-// A trap has no words of its own: the module keeps those of the panic.
-function describe(error) {
-    const isTrap = globalThis.WebAssembly && error instanceof WebAssembly.RuntimeError;
-    return (isTrap && panic_message()) || error.message || String(error);
-}
-
 onmessage = async ({ data: { id, method, parameters } }) => {
     try {
         const result = await methods[method](...parameters);
         postMessage({ id, result }, result?.matrices ? [result.matrices.buffer] : []);
     } catch (error) {
-        postMessage({ id, error: describe(error) });
+        postMessage({ id, error: describe(error, panic_message) });
     }
 };

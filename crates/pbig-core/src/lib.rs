@@ -71,6 +71,8 @@ mod index;
 mod keys;
 pub mod oracle;
 mod outcome;
+#[cfg(all(target_family = "wasm", target_os = "unknown"))]
+mod page_clock;
 mod pair;
 mod pairs;
 mod parallel;
@@ -98,6 +100,8 @@ pub use report::{Checks, DeviceReport, Report, StageTimes, WORK_LIMIT};
 /// Items for the other crates of pbig. They may change in any release.
 #[doc(hidden)]
 pub mod internal {
+    #[cfg(all(target_family = "wasm", target_os = "unknown"))]
+    pub use crate::page_clock::set_clock;
     pub use crate::parallel::{SharedSlice, map, run, threads_for};
     pub use crate::report::Clock;
 }

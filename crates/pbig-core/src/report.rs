@@ -1,9 +1,13 @@
 //! The report of a call: times, counts and the plan.
 
+#[cfg(all(target_family = "wasm", target_os = "unknown"))]
+use crate::page_clock::Instant;
 use crate::plan::Plan;
 use std::time::Duration;
+#[cfg(not(all(target_family = "wasm", target_os = "unknown")))]
+use std::time::Instant;
 
-/// Wall time of each stage of the last call. All zero on wasm32-unknown-unknown, which has no clock.
+/// Wall time of each stage of the last call. All zero on wasm32-unknown-unknown, unless the page gives a clock.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct StageTimes {
@@ -54,41 +58,32 @@ macro_rules! stage {
 }
 pub(crate) use stage;
 
-/// A stopwatch for reports and for the pause of a device. It stands still where there is no clock (wasm32-unknown-unknown).
+/// A stopwatch for reports and for the pause of a device. It stands still where there is no clock: on wasm32-unknown-unknown,
+/// unless the page gives one.
 #[derive(Debug)]
 pub struct Clock {
-    #[cfg(not(all(target_family = "wasm", target_os = "unknown")))]
-    last: std::time::Instant,
+    last: Instant,
 }
 
 impl Clock {
     /// Starts a stopwatch.
     pub fn start() -> Self {
-        Self {
-            #[cfg(not(all(target_family = "wasm", target_os = "unknown")))]
-            last: std::time::Instant::now(),
-        }
+        Self { last: Instant::now() }
     }
 
     /// Returns the time since the last lap, or the start.
-    #[cfg(not(all(target_family = "wasm", target_os = "unknown")))]
     pub fn lap(&mut self) -> Duration {
-        let now = std::time::Instant::now();
+        let now = Instant::now();
         now.duration_since(std::mem::replace(&mut self.last, now))
-    }
-
-    /// Returns no time.
-    #[cfg(all(target_family = "wasm", target_os = "unknown"))]
-    pub fn lap(&mut self) -> Duration {
-        Duration::ZERO
     }
 
     /// Returns the time since the last lap, or the start; none where there is no clock.
     pub fn time(&self) -> Option<Duration> {
-        #[cfg(not(all(target_family = "wasm", target_os = "unknown")))]
-        return Some(self.last.elapsed());
         #[cfg(all(target_family = "wasm", target_os = "unknown"))]
-        return None;
+        if !crate::page_clock::is_set() {
+            return None;
+        }
+        Some(Instant::now().duration_since(self.last))
     }
 }
 

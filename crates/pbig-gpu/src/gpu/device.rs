@@ -149,8 +149,13 @@ impl GpuDevice {
         let middle = self.handle.push_error_scope(OutOfMemory);
         let inner = self.handle.push_error_scope(Internal);
         let result = work().await;
-        let errors = [inner.pop().await, middle.pop().await, outer.pop().await];
-        let Some(error) = errors.into_iter().flatten().next() else { return result };
+        // All at once: in a page each is a message to another process and its answer.
+        let popped = [inner.pop(), middle.pop(), outer.pop()];
+        let mut first = None;
+        for error in popped {
+            first = first.or(error.await);
+        }
+        let Some(error) = first else { return result };
         // A pipeline may be what was refused.
         lock(&self.pipelines).clear();
         match error {

@@ -1,0 +1,37 @@
+//! The GPU as the simulation uses it.
+
+use crate::device::{Device, find};
+use bytemuck::cast_slice;
+use pbig_core::{DeviceFound, SearchRequest};
+use wasm_bindgen::prelude::*;
+
+/// An open GPU.
+#[wasm_bindgen]
+pub struct Gpu {
+    device: Device,
+    found: DeviceFound,
+}
+
+#[wasm_bindgen]
+impl Gpu {
+    /// Opens the GPU.
+    ///
+    /// # Errors
+    /// If there is no adapter, or if it refuses a device.
+    pub async fn open() -> Result<Self, JsError> {
+        Ok(Self { device: Device::open().await?, found: DeviceFound::default() })
+    }
+
+    /// Returns the pairs of boxes that their filters allow, as two ids a pair. A box is six numbers, `min` and `max`. A filter is four
+    /// numbers, the memory of a [`pbig_core::ProxyFilter`]; without filters all boxes may pair.
+    ///
+    /// # Errors
+    /// The reason of the device.
+    pub async fn find(&mut self, boxes: Vec<f32>, filters: Option<Vec<u32>>) -> Result<Vec<u32>, JsError> {
+        let filters = filters.as_deref().map(cast_slice);
+        let request =
+            SearchRequest { boxes: cast_slice(&boxes), filters, is_sorted: true, max_pairs: u64::MAX };
+        find(&mut self.device.finder, &request, &mut self.found).await?;
+        Ok(cast_slice(&self.found.pairs).to_vec())
+    }
+}

@@ -1,0 +1,155 @@
+//! The GPU as the page's broad phase asks it. In a browser the answer comes later, and rapier's step cannot be left and
+//! entered again. So the browser suspends the whole module until then (WebAssembly's JavaScript promise integration).
+
+use pbig_core::{
+    Aabb, ChangeRequest, DeviceFailure, DeviceFound, Pair, PairDevice, ProxyFilter, SearchRequest,
+};
+use std::fmt;
+
+/// Returns all pairs of the boxes that their filters, if any, allow.
+pub(crate) type FindAll = fn(&[Aabb], Option<&[ProxyFilter]>) -> Vec<Pair>;
+
+/// A device that another module is, which finds all pairs in each call.
+#[derive(Clone)]
+pub(crate) struct RemoteDevice {
+    find_all: FindAll,
+}
+
+impl RemoteDevice {
+    /// Returns the GPU of the page.
+    pub(crate) fn gpu() -> Self {
+        Self { find_all: find_on_gpu }
+    }
+}
+
+impl fmt::Debug for RemoteDevice {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("RemoteDevice").finish_non_exhaustive()
+    }
+}
+
+impl RemoteDevice {
+    fn pairs(
+        &self,
+        boxes: &[Aabb],
+        filters: Option<&[ProxyFilter]>,
+        max: u64,
+    ) -> Result<Vec<Pair>, DeviceFailure> {
+        let pairs = (self.find_all)(boxes, filters);
+        if pairs.len() as u64 > max { Err(DeviceFailure::TooManyPairs) } else { Ok(pairs) }
+    }
+}
+
+impl PairDevice for RemoteDevice {
+    fn find_all(&mut self, all: &SearchRequest<'_>, found: &mut DeviceFound) -> Result<(), DeviceFailure> {
+        found.pairs = self.pairs(all.boxes, all.filters, all.max_pairs)?;
+        found.valid = all.boxes.iter().filter(|one| one.is_valid()).count() as u32;
+        Ok(())
+    }
+
+    /// Every changed box starts over: the device gives all its pairs, and the core finds those that have ended.
+    fn find_changed(
+        &mut self,
+        now: &ChangeRequest<'_>,
+        found: &mut DeviceFound,
+    ) -> Result<(), DeviceFailure> {
+        let mut is_changed = vec![false; now.boxes.len()];
+        now.changed.iter().for_each(|was| is_changed[was.id as usize] = true);
+        let max = now.kept.saturating_add(now.max_pairs);
+        found.pairs = self.pairs(now.boxes, Some(now.filters), max)?;
+        found.pairs.retain(|pair| is_changed[pair.a as usize] || is_changed[pair.b as usize]);
+        found.restarted = (0..).zip(&is_changed).filter(|it| *it.1).map(|it| it.0).collect();
+        found.valid = count_valid(now);
+        Ok(())
+    }
+
+    fn forget(&mut self) {}
+
+    fn name(&self) -> Option<&str> {
+        Some("WebGPU")
+    }
+
+    fn is_software(&self) -> bool {
+        false
+    }
+
+    fn clone_box(&self) -> Box<dyn PairDevice> {
+        Box::new(self.clone())
+    }
+}
+
+/// Returns the number of boxes that are valid now or were at the last update.
+fn count_valid(now: &ChangeRequest<'_>) -> u32 {
+    let valid = now.boxes.iter().filter(|one| one.is_valid()).count();
+    let has_ended =
+        now.changed.iter().filter(|was| was.aabb.is_valid() && !now.boxes[was.id as usize].is_valid());
+    (valid + has_ended.count()) as u32
+}
+
+/// Asks the page's GPU, and suspends the module until it answers. A failure ends the step with the GPU's error.
+#[cfg(target_family = "wasm")]
+fn find_on_gpu(boxes: &[Aabb], filters: Option<&[ProxyFilter]>) -> Vec<Pair> {
+    use wasm_bindgen::prelude::wasm_bindgen;
+
+    // Without wasm-bindgen, whose JavaScript around a function cannot be suspended.
+    #[link(wasm_import_module = "pbig-page-device")]
+    unsafe extern "C" {
+        fn find_pairs(boxes: *const Aabb, filters: *const ProxyFilter, count: usize);
+    }
+    #[wasm_bindgen(raw_module = "pbig-page-device")]
+    extern "C" {
+        fn take_pairs() -> Vec<u32>;
+    }
+    let filters = filters.map_or(std::ptr::null(), <[_]>::as_ptr);
+    // SAFETY: `web/device.js` reads `boxes.len()` boxes and, unless the pointer is null, as many filters.
+    unsafe { find_pairs(boxes.as_ptr(), filters, boxes.len()) };
+    take_pairs().as_chunks().0.iter().map(|&[a, b]| Pair { a, b }).collect()
+}
+
+#[cfg(not(target_family = "wasm"))]
+fn find_on_gpu(_: &[Aabb], _: Option<&[ProxyFilter]>) -> Vec<Pair> {
+    panic!("the page's GPU is that of a browser")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use pbig_core::{Backend, BroadPhase, Config, oracle};
+
+    fn brute_force(boxes: &[Aabb], filters: Option<&[ProxyFilter]>) -> Vec<Pair> {
+        oracle::pairs_filtered(boxes, filters.unwrap_or(&vec![ProxyFilter::ALL; boxes.len()]))
+    }
+
+    /// Sets, moves, filters anew or removes a box, as a number says.
+    fn change(broad_phase: &mut BroadPhase, id: u32, number: u32) {
+        if number.is_multiple_of(5) {
+            broad_phase.remove(id);
+            return;
+        }
+        let at = [number % 7, number % 11, number % 3].map(|x| x as f32);
+        let filter = ProxyFilter { body: number % 13, ..ProxyFilter::ALL };
+        broad_phase.set(id, Aabb::from_center(at, [1.2; 3]), filter).unwrap();
+    }
+
+    /// A device that finds all pairs gives each update the events of the CPU.
+    #[test]
+    fn updates_have_the_events_of_the_cpu() {
+        let config = Config { backend: Backend::Device, ..Config::DEFAULT };
+        let device = RemoteDevice { find_all: brute_force };
+        let mut both = [
+            BroadPhase::with_device(config, Box::new(device)).unwrap(),
+            BroadPhase::new(Config::DEFAULT).unwrap(),
+        ];
+        let mut events = 0;
+        for step in 0..40 {
+            for number in (0..12).map(|k: u32| (step * 12 + k).wrapping_mul(2_654_435_761) >> 8) {
+                both.iter_mut().for_each(|it| change(it, number % 60, number / 60));
+            }
+            let [found, expected] = both.each_mut().map(|it| it.update().unwrap().clone());
+            assert_eq!(found, expected, "step {step}");
+            assert_eq!(both[0].report().fallback, None);
+            events += found.added.len() + found.removed.len();
+        }
+        assert!(events > 1000, "too few events: {events}");
+    }
+}

@@ -1,0 +1,23 @@
+// The GPU for the simulation's module, which imports `find_pairs` and `take_pairs`.
+
+let memory;
+let search;
+let pairs;
+
+/** Sets the memory of the simulation's module, and the function that returns a promise of the pairs of boxes and filters. */
+export function connect(moduleMemory, searchFunction) {
+    [memory, search] = [moduleMemory, searchFunction];
+}
+
+async function find(boxes, filters, count) {
+    const copy = (Type, at, numbers) => new Type(memory.buffer, at, numbers * count).slice();
+    pairs = await search(copy(Float32Array, boxes, 6), filters ? copy(Uint32Array, filters, 4) : undefined);
+}
+
+/** Suspends the calling module until the GPU has answered. */
+export const find_pairs = globalThis.WebAssembly?.Suspending ? new WebAssembly.Suspending(find) : () => {};
+
+/** Returns the pairs that were found last: ids, pair after pair. */
+export function take_pairs() {
+    return pairs;
+}
