@@ -12,7 +12,7 @@ function reordered(text, groupOf, laneOf) {
     if (group) {
         parameters = parameters.replace(`(workgroup_id) ${group}`, "(workgroup_id) given_group");
         if (!groups) parameters += ", @builtin(num_workgroups) all_groups: vec3<u32>";
-        body += `let n = ${groups ?? "all_groups"}; let ${group} = vec3(${groupOf("given_group.x", "n.x")}, ${groupOf("given_group.y", "n.y")}, 0u);`;
+        body += `let given_groups = ${groups ?? "all_groups"}; let ${group} = vec3(${groupOf("given_group.x", "given_groups.x")}, ${groupOf("given_group.y", "given_groups.y")}, 0u);`;
     }
     if (lane) {
         parameters = parameters.replace(`(local_invocation_index) ${lane}`, "(local_invocation_index) given_lane");

@@ -25,7 +25,7 @@ const page = `<script type="module">
     import * as module from "/pbig_wasm_gpu.mjs";
     import { check } from "/check.mjs";
     const post = (to, text) => fetch(to, { method: "POST", body: String(text) });
-    const isRight = module.default().then(() => check(module, (line) => post("/line", line)));
+    const isRight = module.default({ module_or_path: "/pbig_wasm_gpu_bg.wasm" }).then(() => check(module, (line) => post("/line", line)));
     post("/end", await isRight.catch((error) => error));
 </script>`;
 const types = { js: "text/javascript", mjs: "text/javascript", wasm: "application/wasm" };

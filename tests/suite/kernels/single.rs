@@ -5,6 +5,7 @@ use pbig_gpu::layout::GROUPS_PER_ROW;
 use pbig_gpu::{GpuError, GpuFinder, GpuOptions};
 use pbig_shaders::Kernel;
 use std::sync::mpsc::channel;
+use std::time::Duration;
 use wgpu::BufferUsages as Usage;
 use wgpu::util::{BufferInitDescriptor, DeviceExt, DownloadBuffer};
 
@@ -77,7 +78,8 @@ fn download(
 ) -> Result<DownloadBuffer, GpuError> {
     let (sender, receiver) = channel();
     DownloadBuffer::read_buffer(device, queue, &buffer.slice(..), move |read| _ = sender.send(read));
-    let patience = GpuOptions::DEFAULT.patience;
+    // A software driver compiles a kernel when it first runs.
+    let patience = Duration::from_secs(600);
     let poll = wgpu::PollType::Wait { submission_index: None, timeout: Some(patience) };
     device.poll(poll).map_err(|_| GpuError::Timeout(patience))?;
     // If another thread polls the device, that thread calls back, perhaps a moment later.

@@ -12,7 +12,10 @@ pub(crate) struct Mode {
     /// Maximum number of boxes that the mode can take, or can take in seconds.
     pub(crate) most_boxes: usize,
     coding: Coding,
+    /// The caller wants the pairs in order.
     is_sorted: bool,
+    /// They come in order. Otherwise that is left to the core.
+    comes_sorted: bool,
     has_grid: bool,
     /// Number of small and of large work items of a submission.
     chunk: [u32; 2],
@@ -24,6 +27,7 @@ const PLAIN: Mode = Mode {
     most_boxes: usize::MAX,
     coding: Coding::Plain,
     is_sorted: false,
+    comes_sorted: false,
     has_grid: true,
     chunk: GpuOptions::DEFAULT.chunk,
 };
@@ -31,7 +35,7 @@ const PLAIN: Mode = Mode {
 /// Every mode.
 pub(crate) const MODES: &[Mode] = &[
     PLAIN,
-    Mode { name: "sorted", is_sorted: true, coding: Coding::Auto, ..PLAIN },
+    Mode { name: "sorted", is_sorted: true, comes_sorted: true, coding: Coding::Auto, ..PLAIN },
     Mode { name: "records", coding: Coding::Packed, ..PLAIN },
     Mode { name: "bits", coding: Coding::Packed, has_grid: false, most_boxes: 1024, ..PLAIN },
     Mode { name: "all pairs, sorted", is_sorted: true, has_grid: false, most_boxes: 1024, ..PLAIN },
@@ -73,7 +77,7 @@ async fn find(
     let request = SearchRequest { boxes, filters, is_sorted: mode.is_sorted, max_pairs: u64::MAX };
     let mut found = DeviceFound::default();
     gpu.find_all_async(&request, &mut found).await.map_err(|failure| format!("{failure:?}"))?;
-    if !mode.is_sorted {
+    if !mode.comes_sorted {
         found.pairs.sort_unstable();
     }
     Ok(found.pairs)
