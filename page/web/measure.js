@@ -122,7 +122,9 @@ export class Measure {
         this.#worker = undefined;
     }
 
+    // The event of a close may come after the dialog is open again.
     #leave() {
+        if (element("dialog").open) return;
         this.#drop();
         this.#pause(false);
     }
