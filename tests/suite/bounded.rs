@@ -62,7 +62,8 @@ fn needles_that_a_tree_cannot_cut_apart_take_bounded_work() {
     let boxes = Recipe([0, 1, 2].map(needle).to_vec()).boxes(700_000, 1);
     let [tree, chosen] = [Some(Engine::Tree), None].map(|engine| search(&boxes, engine));
     println!("needles: {tree:.2} in a tree, {chosen:.2}");
-    assert!(chosen < WORK_LIMIT as f64 && WORK_LIMIT as f64 < tree, "{chosen}, {tree} in a tree");
+    let limit = WORK_LIMIT as f64;
+    assert!(chosen < limit && limit < tree, "{chosen}, {tree} in a tree");
 }
 
 /// They are in a class of their own, and as long as the world on one axis.
