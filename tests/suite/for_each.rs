@@ -8,6 +8,7 @@ use pbig_harness::counting::{held, largest};
 use pbig_tests::{corpus, difference, strategies};
 use rand::rngs::StdRng;
 use rand::{RngExt, SeedableRng};
+use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 
@@ -20,7 +21,11 @@ fn ways() -> [Config; 4] {
 
 /// Returns the pairs that a closure got, sorted; twice is twice.
 fn visited<'a>(config: Config, boxes: impl Into<Boxes<'a>>) -> Vec<Pair> {
-    let (got, mut finder) = (Mutex::new(Vec::new()), Finder::new(config));
+    visited_by(&mut Finder::new(config), boxes)
+}
+
+fn visited_by<'a>(finder: &mut Finder, boxes: impl Into<Boxes<'a>>) -> Vec<Pair> {
+    let got = Mutex::new(Vec::new());
     let count = finder.for_each_pair(boxes, |pair| got.lock().expect("no panic").push(pair));
     let mut got = got.into_inner().expect("no panic");
     got.sort_unstable();
@@ -56,6 +61,25 @@ fn a_closure_gets_each_pair_once_from_several_threads() {
         got.sort_unstable();
         assert_eq!(count, Ok(got.len() as u64));
         assert!(got == oracle::pairs_between(of_a, of_b), "{config:?}");
+    }
+}
+
+#[test]
+fn a_finder_works_after_a_closure_has_panicked() {
+    let boxes: Vec<_> =
+        (0..20_000).map(|i| Aabb::from_center([i as f32 * 0.4, 0.0, 0.0], [0.5; 3])).collect();
+    let wanted: Vec<_> = (0..19_999).flat_map(|a| [a + 1, a + 2].map(|b| Pair { a, b })).collect();
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(5).build().expect("a pool");
+    for config in ways().into_iter().filter(|config| config.backend != Backend::Brute) {
+        let mut finder = Finder::new(config);
+        for last in [1, 30_000] {
+            let visits = AtomicU64::new(0);
+            let visit = |_| assert!(visits.fetch_add(1, Relaxed) < last, "planted");
+            let end = catch_unwind(AssertUnwindSafe(|| pool.install(|| finder.for_each_pair(&boxes, visit))));
+            assert!(end.is_err() && finder.pairs().is_empty(), "{config:?}");
+            let got = pool.install(|| visited_by(&mut finder, &boxes));
+            assert_eq!(difference(&got, &wanted[..wanted.len() - 1]), None, "{config:?}");
+        }
     }
 }
 

@@ -9,7 +9,8 @@ impl Finder {
     /// pairs.
     ///
     /// There is no list, so memory does not grow with the pairs, and [`crate::Limits::max_pairs`] does not apply: each thread
-    /// gathers a few thousand pairs before it hands them over. The CPU does the work; no device is asked.
+    /// gathers a few thousand pairs before it hands them over. The CPU does the work; no device is asked. A panic in `visit`
+    /// reaches the caller when the other threads have ended; the finder stays usable.
     ///
     /// ```
     /// use pbig_core::{Aabb, Finder};
