@@ -94,7 +94,7 @@ run_chromium() {
 compile() {
     local seconds
     # A program for Windows ends its lines by two characters.
-    seconds=$(timeout 60 wine "$out/fxc.exe" "$1" "$2" | tr -d '\r') || { echo "FXC does not compile $1 within 60 s" >&2 && return 1; }
+    seconds=$(timeout 300 wine "$out/fxc.exe" "$1" "$2" | tr -d '\r') || { echo "FXC does not compile $1 within 300 s" >&2 && return 1; }
     printf '%s\n' "$seconds"
     awk -v seconds="$seconds" 'BEGIN { exit seconds > 5 }' || { echo "FXC takes $seconds s for $1" >&2 && return 1; }
 }
