@@ -1,6 +1,6 @@
 //! A broad phase whose events are followed, whose pairs are compared with the oracle's, and whose work the wanted backend does.
 
-use pbig_core::{Aabb, Backend, ProxyFilter};
+use pbig_core::{Aabb, Backend, BroadPhase, ProxyFilter};
 use pbig_harness::follower;
 use pbig_tests::Way;
 use std::ops::{Deref, DerefMut};
@@ -24,7 +24,11 @@ impl DerefMut for Follower {
 
 impl Follower {
     pub(crate) fn new(way: impl Into<Way>, ids: usize) -> Self {
-        Self(follower::Follower::new(way.into().broad_phase(), ids))
+        Self::of(way.into().broad_phase(), ids)
+    }
+
+    pub(crate) fn of(broad_phase: BroadPhase, ids: usize) -> Self {
+        Self(follower::Follower::new(broad_phase, ids))
     }
 
     pub(crate) fn set(&mut self, id: u32, aabb: Aabb, filter: ProxyFilter) {

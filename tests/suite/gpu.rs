@@ -3,6 +3,7 @@
 
 mod failures;
 mod turns;
+mod work;
 
 use pbig_core::{
     Aabb, Backend, BroadPhase, Config, DeviceFailure, DeviceFound, DeviceReport, Finder, NoDevice, Order,

@@ -129,4 +129,6 @@ pub enum DeviceFailure {
     TooManyPairs,
     /// The device could not do the work, for this reason. The CPU does it.
     Failed(String),
+    /// The device works, but the CPU does this call with less work, for this reason. No warning is logged.
+    Declined(String),
 }

@@ -53,7 +53,7 @@ impl DeviceSlot {
 
     /// Returns the report that the wanted backend could not do the work. Logs the first one of a row as a warning.
     fn fall_back(&mut self, why: &str) -> String {
-        let why = format!("{why}: the CPU does the work");
+        let why = by_cpu(why);
         if !std::mem::replace(&mut self.has_warned, true) {
             tracing::warn!("pbig: {why}");
         }
@@ -78,12 +78,19 @@ impl DeviceSlot {
                 success(&found, clock.lap())
             }
             Err(DeviceFailure::TooManyPairs) => Outcome { end: End::TooManyPairs, ..Outcome::default() },
+            Err(DeviceFailure::Declined(why)) => {
+                Outcome { fallback: Some(by_cpu(&why)), ..Outcome::default() }
+            }
             Err(DeviceFailure::Failed(why)) => {
                 Outcome { fallback: Some(self.fall_back(&why)), ..Outcome::default() }
             }
         };
         (outcome, found)
     }
+}
+
+fn by_cpu(why: &str) -> String {
+    format!("{why}: the CPU does the work")
 }
 
 /// Returns what the device did in this time.

@@ -174,6 +174,8 @@ pub struct DeviceReport {
     pub chunks: u32,
     /// Parts into which the boxes were split because of the device's limits; 1 if they were not.
     pub parts: u32,
+    /// Waits of the host for the device, one after the other.
+    pub waits: u32,
     /// Repetitions of the map or of a chunk that did not fit its buffers.
     pub repeats: u32,
 }

@@ -37,7 +37,10 @@ pub mod model;
 mod options;
 #[doc(hidden)]
 pub mod pbig;
+mod policy;
 
+#[cfg(all(feature = "wgpu", not(target_arch = "wasm32")))]
+pub use gpu::GpuFinders;
 #[doc(hidden)]
 #[cfg(feature = "wgpu")]
 pub use gpu::testing;

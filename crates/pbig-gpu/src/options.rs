@@ -41,7 +41,8 @@ pub struct GpuOptions {
     pub chunk: [u32; 2],
     /// Largest buffer and binding in bytes, at least 2^20. The device may allow less.
     pub max_bytes: u64,
-    /// Size in bytes, in the first call, of buffers whose needed size is unknown.
+    /// Bytes for each box, in the first call, of the lists whose lengths only the device knows. With less than they need the
+    /// call begins anew.
     pub first_bytes: u64,
     /// Longest time that a call waits for the device before it finishes on the CPU.
     pub patience: Duration,
@@ -74,7 +75,7 @@ impl GpuOptions {
         load_balancing: true,
         chunk: [1 << 18, 1 << 12],
         max_bytes: u64::MAX,
-        first_bytes: 1 << 16,
+        first_bytes: 16,
         patience: Duration::from_secs(30),
         pause: Duration::from_secs(5),
         boxes_per_cell: 4.0,

@@ -53,6 +53,17 @@ impl Summary {
         Self { valid, classes, sample: sampled(boxes) }
     }
 
+    /// Returns about the number of overlapping pairs, as the sample tells; 0 if too few of its boxes overlap to tell.
+    pub fn pairs(&self) -> u64 {
+        const FEWEST: usize = 16;
+        let sample = &self.sample;
+        let partners =
+            |(i, one): (usize, &Aabb)| sample[..i].iter().filter(|other| one.overlaps(other)).count();
+        let found: usize = sample.iter().enumerate().map(partners).sum();
+        let share = f64::from(self.valid) / sample.len().max(1) as f64;
+        if found < FEWEST { 0 } else { (found as f64 * share * share) as u64 }
+    }
+
     fn count(&mut self, one: &Aabb) {
         if !one.is_valid() {
             return;
@@ -122,12 +133,12 @@ pub fn cells_in(lengths: [f32; 3], cell: f32) -> f64 {
     lengths.into_iter().map(|length| cells_along(length, cell)).product()
 }
 
-/// Returns the sample without boxes as wide as the range of all boxes, such as a ground or a half-space.
+/// Returns the sample without boxes wider than half the range of all boxes, such as a ground, a cover or a half-space.
 ///
-/// A box as wide as the range touches too many cells, so it is tested against all others instead. It would also stretch the space.
+/// Such a box touches too many cells, so it is tested against all others instead. It would also stretch the space.
 pub fn ordinary(summary: &Summary) -> Vec<Aabb> {
     let widths: [f32; 3] = std::array::from_fn(|k| summary.range(k).1 - summary.range(k).0);
-    let largest = widths.into_iter().fold(0.0, f32::max);
+    let largest = 0.5 * widths.into_iter().fold(0.0, f32::max);
     let fits = |b: &&Aabb| b.extents().into_iter().all(|extent| extent < largest);
     let ordinary: Vec<Aabb> = summary.sample.iter().filter(fits).copied().collect();
     if ordinary.is_empty() { summary.sample.clone() } else { ordinary }

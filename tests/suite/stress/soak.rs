@@ -3,8 +3,8 @@
 
 use super::memory;
 use crate::follower::Follower;
-use pbig_core::{Aabb, Backend, Config, Engine, ProxyFilter, Report};
-use pbig_gpu::Coding;
+use pbig_core::{Aabb, Backend, BroadPhase, Config, Engine, ProxyFilter, Report};
+use pbig_gpu::{Coding, GpuFinder};
 use pbig_harness::boxes::BoxSet;
 use pbig_tests::{Way, gpu, needs_gpu};
 use rand::rngs::StdRng;
@@ -227,7 +227,13 @@ fn soak_on_threads() {
 fn soak_on_a_gpu() {
     needs_gpu!();
     let way = gpu(Coding::Auto).with(|it| it.margin = 0.05);
-    let tally = soak(|| Churn::new(way, 400), (updates() / 100).max(200));
+    // A device of its own: threads that share one free each other's memory.
+    let broad_phase = || {
+        let device = GpuFinder::new().expect("an adapter").with_options(way.gpu);
+        BroadPhase::with_device(way.config, Box::new(device)).expect("a margin")
+    };
+    let churn = || Churn { world: Follower::of(broad_phase(), 400), ..Churn::new(cpu(None), 400) };
+    let tally = soak(churn, (updates() / 100).max(200));
     tally.assert_mostly(&["device"], 99);
     assert!(tally.bytes[1] > 0, "nothing is held on the device");
 }

@@ -37,6 +37,8 @@ pub(super) enum Fault {
     TooFew,
     /// It adds pairs of boxes that are apart.
     TooMany,
+    /// It leaves every second call to the CPU.
+    Declines,
     /// It finds more pairs than it may.
     IgnoresLimits,
 }
@@ -61,6 +63,9 @@ impl Double {
         let (n, calls) = (boxes as u32, self.calls);
         match self.fault {
             Fault::Fails if calls.is_multiple_of(2) => return Err(DeviceFailure::Failed("no luck".into())),
+            Fault::Declines if calls.is_multiple_of(2) => {
+                return Err(DeviceFailure::Declined("a crowd".into()));
+            }
             Fault::IsSlow => std::thread::sleep(Duration::from_millis(2)),
             Fault::IsLost if calls > 2 => {
                 found.pairs.truncate(found.pairs.len() / 2);

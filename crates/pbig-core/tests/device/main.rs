@@ -15,9 +15,10 @@ const IDS: u32 = 120;
 const ON_DEVICE: Config = Config { backend: Backend::Device, margin: 0.1, ..Config::DEFAULT };
 
 /// Faults that the core notices, or that are none.
-const HARMLESS: [Fault; 13] = [
+const HARMLESS: [Fault; 14] = [
     Fault::Nothing,
     Fault::Fails,
+    Fault::Declines,
     Fault::IsSlow,
     Fault::IsLost,
     Fault::Restarts,
@@ -92,7 +93,7 @@ fn updates_equal_those_of_the_cpu_whatever_fails() {
             done_by_device += usize::from(ours.report().device.is_some());
         }
         let wanted = match fault {
-            Fault::Fails => 15..=25,
+            Fault::Fails | Fault::Declines => 15..=25,
             Fault::IsLost => 2..=2,
             Fault::BeyondTheLast | Fault::Inverted | Fault::RestartsOthers | Fault::MoreThanAll => 0..=0,
             _ => 35..=40,

@@ -11,12 +11,15 @@ use super::passes::{self, CLEAR_TOTALS, Groups, Step};
 use super::session::Session;
 use super::sink::Sink;
 use crate::decode::pair_count;
-use crate::layout::{BITS, Chunk, LANES, Params, SORTED};
+use crate::layout::{BITS, Chunk, Counters, LANES, Params, SORTED};
 use pbig_shaders::CHECK_ALL;
 use std::collections::VecDeque;
 
 /// Maximum number of repetitions of a map before the set is split. Each one has the capacities that the last one asked for.
 const MAX_REPEATS: u32 = 8;
+
+/// Factor on the cell size with which a plan of too many tests is tried once more.
+const FINEST_RETRY: f32 = 0.125;
 
 impl Session {
     /// Searches with a grid, or tests every pair (Avril 3.2).
@@ -56,21 +59,42 @@ impl Session {
         let mut result = self.finish(chunk, params, sink).await?;
         if matches!(result, ChunkResult::Unsorted) {
             let others = cut(rest(&self.sizes.lists, &items), self.chunk_items());
-            chunk = self.submit_rest_and_sort(params, &others, sink)?;
+            chunk = self.submit_rest_and_sort(params, &items, &others, sink.left())?;
             items = chunk.items;
             result = self.finish(chunk, params, sink).await?;
         }
         match result {
             ChunkResult::Done => Ok(Some(items)),
             ChunkResult::MapTooLarge => Ok(None),
-            ChunkResult::TooManyTests => {
-                self.plan = None;
-                Ok(None)
-            }
+            ChunkResult::TooManyTests => self.replan(params).map(|()| None),
             ChunkResult::OutputTooLarge(words) => self.note_output(words, params),
             // The last submission has all pairs: it is done, or too large.
             ChunkResult::Unsorted => Err(self.too_large().into()),
         }
+    }
+
+    /// Gives up a plan that makes too many tests. A new one is tried once more, with finer cells.
+    ///
+    /// # Errors
+    /// If that is done: the call is declined.
+    fn replan(&mut self, params: &Params) -> Result<(), Failure> {
+        let was_new = self.plan.take().is_some_and(|kept| kept.is_new());
+        // Lists that such a plan makes are not worth their memory.
+        let Counters { tests, too_many_tests, .. } = std::mem::take(&mut self.sizes.lists);
+        if !was_new {
+            return Ok(());
+        }
+        if self.cell_factor > FINEST_RETRY {
+            self.cell_factor = FINEST_RETRY;
+            return Ok(());
+        }
+        self.cell_factor = 1.0;
+        let [tests, most] = [tests, params.most_tests].map(|tests| u64::from(LANES) * u64::from(tests));
+        let over = if too_many_tests > 0 { "over 2^40, or " } else { "" };
+        let boxes = params.boxes;
+        Err(Failure::Declined(format!(
+            "the device declined {over}{tests} tests of {boxes} boxes, more than {most}"
+        )))
     }
 
     /// Notes how much output there is. Returns the items that are done: none if the map can be used again.
@@ -95,16 +119,25 @@ impl Session {
             let steps = [CLEAR_TOTALS, Step::Run(&CHECK_ALL, Groups::Direct(small_items))];
             return self.submit(params, items, 0, &steps, left);
         }
-        passes::make_buffers(&mut self.storage, params, &self.sizes.lists, self.options.first_bytes)?;
-        if params.flags & SORTED != 0 {
-            let most = self.storage.max_buffer_bytes;
-            let words = (4 * self.sizes.word_capacity).clamp(self.options.first_bytes.min(most), most) / 4;
-            passes::make_sort_buffers(&mut self.storage, params, words)?;
-        }
+        let first_bytes = self.first_bytes(params.boxes);
+        passes::make_buffers(&mut self.storage, params, &self.sizes.lists, first_bytes)?;
         let [small_items, large_items] = self.chunk_items();
         let items = Chunk { small_items, large_items, ..Chunk::default() };
-        let is_all = rest(&self.sizes.lists, &items).is_empty();
-        self.submit(params, items, 0, &passes::map_and_check(params, is_all), left)
+        if params.flags & SORTED == 0 {
+            return self.submit(params, items, 0, &passes::map_and_check(params, false), left);
+        }
+        let most = self.storage.max_buffer_bytes;
+        let words = (4 * self.sizes.word_capacity).clamp(first_bytes.min(most), most) / 4;
+        passes::make_sort_buffers(&mut self.storage, params, words)?;
+        let others = cut(rest(&self.sizes.lists, &items), self.chunk_items());
+        let steps = passes::map_and_check(params, others.is_empty());
+        if others.is_empty() {
+            return self.submit(params, items, 0, &steps, left);
+        }
+        // As many chunks as in the last call, without a wait in between. Items that are not there are skipped.
+        self.make_room(params, 0)?;
+        self.submit_unread(params, items, &steps, left)?;
+        self.submit_rest_and_sort(params, &items, &others, left)
     }
 
     /// Returns the work items of a chunk. A software adapter gets fewer, so that it answers in time.

@@ -4,7 +4,7 @@ use super::GpuError;
 use super::coding::bit_words;
 use super::device::Variant;
 use super::error::Failure;
-use super::items::rest;
+use super::items::{covered, rest};
 use super::passes::{CLASSES_BYTES, Recording, Step, apply_changes, check, lists_fit, measure, sort};
 use super::readback::{self, HEADER_BYTES, Header};
 use super::session::Session;
@@ -23,7 +23,7 @@ pub(super) struct PendingChunk {
     pub(super) items: Chunk,
     side: Side,
     submission: wgpu::SubmissionIndex,
-    /// Number of submissions that the wait for it covers.
+    /// Number of submissions that the wait for it covers: those before it have no wait of their own.
     submissions: u32,
     /// Bytes of output that come with the header.
     prefetched: u64,
@@ -61,25 +61,36 @@ impl Session {
         Ok(PendingChunk { items, side, submission, submissions: 1, prefetched, passes })
     }
 
-    /// Checks the other chunks of sorted pairs, which add their output to that of the first, and sorts all.
+    /// Checks the chunks after `done`, which add their pairs to those of the first, and sorts all.
     pub(super) fn submit_rest_and_sort(
         &mut self,
         params: &Params,
-        rest: &[Chunk],
-        sink: &mut Sink,
+        done: &Chunk,
+        others: &[Chunk],
+        left: u64,
     ) -> Result<PendingChunk, GpuError> {
-        let left = sink.left();
-        for items in rest {
-            let mut clock = Clock::start();
-            self.write_chunk(*items, 0, left)?;
+        for items in others {
             let steps = check(items.small_items, items.large_items);
-            self.record(params, 0, &steps, None)?;
-            self.recording += clock.lap();
-            sink.found.report.chunks += 1;
+            self.submit_unread(params, *items, &steps, left)?;
         }
-        let all = Chunk { small_items: u32::MAX, large_items: u32::MAX, ..Chunk::default() };
-        let last = self.submit(params, all, 0, &sort(params), left)?;
-        Ok(PendingChunk { submissions: rest.len() as u32 + 1, ..last })
+        let last = self.submit(params, covered(done, others), 0, &sort(params), left)?;
+        Ok(PendingChunk { submissions: others.len() as u32 + 2, ..last })
+    }
+
+    /// Submits a chunk whose output stays on the device.
+    pub(super) fn submit_unread(
+        &mut self,
+        params: &Params,
+        items: Chunk,
+        steps: &[Step],
+        left: u64,
+    ) -> Result<(), GpuError> {
+        let mut clock = Clock::start();
+        self.write_chunk(items, 0, left)?;
+        self.record(params, 0, steps, None)?;
+        self.has_raw_boxes &= params.flags & RAW == 0;
+        self.recording += clock.lap();
+        Ok(())
     }
 
     /// Tells the kernels which work items to check, and how much output there may be.
@@ -150,7 +161,8 @@ impl Session {
     }
 
     /// Makes the buffers for the output of a chunk. Returns the bytes to prefetch.
-    fn make_room(&mut self, params: &Params, side: Side) -> Result<u64, GpuError> {
+    pub(super) fn make_room(&mut self, params: &Params, side: Side) -> Result<u64, GpuError> {
+        let first_bytes = self.first_bytes(params.boxes);
         let (storage, sizes) = (&mut self.storage, &self.sizes);
         let (out, most) = (BufferId::of(Buffer::Out, side), storage.max_buffer_bytes);
         let (words, prefetched) = if params.flags & BITS == 0 {
@@ -160,7 +172,7 @@ impl Session {
             let words = bit_words(params).next_multiple_of(8);
             (words, words)
         };
-        storage.ensure(out, (4 * words).clamp(self.options.first_bytes.min(most), most))?;
+        storage.ensure(out, (4 * words).clamp(first_bytes.min(most), most))?;
         storage.ensure(BufferId::of(Buffer::Totals, side), size_of::<Totals>() as u64)?;
         storage.ensure(Buffer::Counters, size_of::<Counters>() as u64)?;
         let prefetched = (4 * prefetched).min(storage.size(out)).min(most - HEADER_BYTES);
@@ -183,6 +195,7 @@ impl Session {
         let received = readback::read(&self.device, staging, bytes, submission, patience).await?;
         sink.found.report.wait += clock.lap();
         sink.found.report.downloaded += bytes;
+        sink.found.report.waits += 1;
         let (header, prefetched) = received.split_at(HEADER_BYTES as usize);
         let header: Header = bytemuck::pod_read_unaligned(header);
         self.note_times(&chunk, &header, sink);
@@ -193,7 +206,7 @@ impl Session {
             sink.found.report.repeats += 1;
             return Ok(repeat);
         }
-        sink.found.report.chunks += 1;
+        sink.found.report.chunks += chunk.submissions.saturating_sub(1).max(1);
         if params.flags & SORTED != 0 && totals.sorted == 0 && !rest(&counters, &chunk.items).is_empty() {
             return Ok(ChunkResult::Unsorted);
         }
@@ -233,9 +246,7 @@ impl Session {
         if params.levels > 0 {
             self.sizes.lists = *counters;
             // First: lists that a plan for other boxes makes are not worth their memory.
-            let is_any_number_allowed = params.most_tests == u32::MAX;
-            if !is_any_number_allowed && (counters.tests > params.most_tests || counters.too_many_tests != 0)
-            {
+            if counters.tests > params.most_tests || counters.too_many_tests != 0 {
                 return Some(ChunkResult::TooManyTests);
             }
             if !lists_fit(params, counters) {
@@ -312,6 +323,7 @@ impl Session {
         let bytes = 4 * (to - from);
         self.storage.ensure(BufferId::FetchStaging, bytes)?;
         report.downloaded += bytes;
+        report.waits += 1;
         let staging = self.storage.get(BufferId::FetchStaging);
         let descriptor = wgpu::CommandEncoderDescriptor { label: Some("pbig fetch") };
         let mut encoder = self.device.handle.create_command_encoder(&descriptor);

@@ -85,6 +85,8 @@ pub enum GpuError {
 pub(super) enum Failure {
     /// There are more pairs than the caller allows.
     TooManyPairs,
+    /// The CPU takes less work, for this reason.
+    Declined(String),
     /// The device failed, and the CPU can do the work.
     Device(GpuError),
 }
@@ -100,6 +102,7 @@ impl Failure {
     pub(super) fn for_core(self) -> DeviceFailure {
         match self {
             Self::TooManyPairs => DeviceFailure::TooManyPairs,
+            Self::Declined(why) => DeviceFailure::Declined(why),
             Self::Device(error) => DeviceFailure::Failed(error.to_string()),
         }
     }

@@ -27,6 +27,16 @@ pub(super) fn cut(all: Chunk, [small, large]: [u32; 2]) -> Vec<Chunk> {
     (0..count).map(part).collect()
 }
 
+/// Returns the work items of a chunk that begins with the first ones, and of the chunks after it, as one.
+pub(super) fn covered(done: &Chunk, others: &[Chunk]) -> Chunk {
+    let mut all = Chunk { small_items: done.small_items, large_items: done.large_items, ..Chunk::default() };
+    for chunk in others {
+        all.small_items = all.small_items.max(chunk.first_small + chunk.small_items);
+        all.large_items = all.large_items.max(chunk.first_large + chunk.large_items);
+    }
+    all
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -48,6 +58,8 @@ mod tests {
             assert_eq!(items(|c| (c.first_small, c.small_items)), (5..5 + small).collect::<Vec<_>>());
             assert_eq!(items(|c| (c.first_large, c.large_items)), (2..2 + large).collect::<Vec<_>>());
             assert!(chunks.iter().all(|c| c.small_items + c.large_items > 0));
+            let all = covered(&Chunk { small_items: 5, large_items: 2, ..Chunk::default() }, &chunks);
+            assert_eq!((all.small_items, all.large_items), (5 + small, 2 + large));
         }
     }
 }

@@ -3,6 +3,7 @@
 
 use super::GpuPlan;
 use crate::layout::{Counters, LANES};
+use crate::policy::most_tests;
 
 /// Factor by which the number of boxes, or the work for a box, may change until a plan is outgrown.
 const OUTGROWN: u64 = 2;
@@ -19,6 +20,8 @@ const ALWAYS_ALLOWED_TESTS: u64 = 1024;
 pub(super) struct KeptPlan {
     pub(super) plan: GpuPlan,
     boxes: u64,
+    /// Number of pairs that a sample promised.
+    pairs: u64,
     first: Option<Work>,
 }
 
@@ -41,9 +44,14 @@ impl Work {
 }
 
 impl KeptPlan {
-    /// Keeps a plan that was made for this number of boxes.
-    pub(super) fn new(plan: GpuPlan, boxes: u32) -> Self {
-        Self { plan, boxes: u64::from(boxes), first: None }
+    /// Keeps a plan that was made for this number of boxes, with about this number of pairs.
+    pub(super) fn new(plan: GpuPlan, boxes: u32, pairs: u64) -> Self {
+        Self { plan, boxes: u64::from(boxes), pairs, first: None }
+    }
+
+    /// Returns true if no search has used the plan.
+    pub(super) fn is_new(&self) -> bool {
+        self.first.is_none()
     }
 
     /// Returns true if the plan was made for about as many boxes.
@@ -52,11 +60,16 @@ impl KeptPlan {
         boxes <= OUTGROWN * self.boxes && self.boxes <= OUTGROWN * boxes
     }
 
-    /// Returns the tests that a call may need, in units of [`LANES`]: any number in the first call.
+    /// Returns the tests that a call may need, in units of [`LANES`].
     pub(super) fn most_tests(&self, boxes: u32) -> u32 {
-        let Some(first) = self.first else { return u32::MAX };
-        let usual = first.tests.max(1) * u64::from(boxes) / first.boxes;
-        u32::try_from(MAX_TESTS_FACTOR * usual + ALWAYS_ALLOWED_TESTS).unwrap_or(u32::MAX)
+        let boxes = u64::from(boxes);
+        let pairs = self.pairs.saturating_mul(boxes.div_ceil(self.boxes.max(1)));
+        let most = most_tests(boxes, pairs) / u64::from(LANES);
+        let usual = self.first.map_or(u64::MAX, |first| {
+            MAX_TESTS_FACTOR * (first.tests.max(1) * boxes / first.boxes) + ALWAYS_ALLOWED_TESTS
+        });
+        // The device takes the largest number for no limit.
+        most.min(usual).min(u64::from(u32::MAX) - 1) as u32
     }
 
     /// Notes a call. Returns true if the work for a box has doubled or halved since the first one.
@@ -79,7 +92,7 @@ mod tests {
 
     fn kept(boxes: u32) -> KeptPlan {
         let cubes: Vec<_> = (0..boxes).map(|i| Aabb::from_center([i as f32, 0.0, 0.0], [0.5; 3])).collect();
-        KeptPlan::new(GpuPlan::new(&Summary::of(&cubes), &GpuOptions::DEFAULT, 1.0, 1 << 20), boxes)
+        KeptPlan::new(GpuPlan::new(&Summary::of(&cubes), &GpuOptions::DEFAULT, 1.0, 1 << 20), boxes, 0)
     }
 
     fn counted(valid: u32, entries: u32, tests: u32) -> Counters {
@@ -106,9 +119,18 @@ mod tests {
     #[test]
     fn later_calls_may_need_four_times_the_tests_of_the_first() {
         let mut plan = kept(100_000);
-        assert_eq!(plan.most_tests(100_000), u32::MAX);
-        plan.is_outgrown_after(&counted(100_000, 0, 5000));
-        assert_eq!(plan.most_tests(100_000), 4 * 5000 + 1024);
-        assert_eq!(plan.most_tests(50_000), 4 * 2500 + 1024);
+        assert_eq!(u64::from(plan.most_tests(100_000)), most_tests(100_000, 0) / 256);
+        plan.is_outgrown_after(&counted(100_000, 0, 4000));
+        assert_eq!(plan.most_tests(100_000), 4 * 4000 + 1024);
+        assert_eq!(plan.most_tests(50_000), 4 * 2000 + 1024);
+    }
+
+    /// The largest number would tell the device that there is no limit, even if its counts wrapped around.
+    #[test]
+    fn no_plan_may_need_any_number_of_tests() {
+        let mut plan = KeptPlan { pairs: u64::MAX, ..kept(1000) };
+        assert_eq!(plan.most_tests(u32::MAX), u32::MAX - 1);
+        plan.is_outgrown_after(&counted(1, 0, u32::MAX));
+        assert_eq!(plan.most_tests(u32::MAX), u32::MAX - 1);
     }
 }

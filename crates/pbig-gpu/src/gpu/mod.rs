@@ -14,6 +14,7 @@ mod attempts;
 mod changes;
 mod chunk;
 mod coding;
+mod declined;
 mod device;
 mod error;
 mod items;
@@ -25,6 +26,8 @@ mod plan;
 mod readback;
 mod search;
 mod session;
+#[cfg(not(target_arch = "wasm32"))]
+mod several;
 mod sink;
 mod storage;
 pub mod testing;
@@ -36,6 +39,8 @@ pub use adapter::{adapters, adapters_async, describe};
 use error::Failure;
 pub use error::GpuError;
 pub use plan::GpuPlan;
+#[cfg(not(target_arch = "wasm32"))]
+pub use several::GpuFinders;
 
 use crate::GpuOptions;
 use device::GpuDevice;
@@ -225,7 +230,7 @@ impl GpuFinder {
             session.end_call(found, request.kept());
         });
         match result {
-            Err(Failure::TooManyPairs) => session.uploaded.forget_motions(),
+            Err(Failure::TooManyPairs | Failure::Declined(_)) => session.uploaded.forget_motions(),
             Err(Failure::Device(_)) => return result,
             Ok(()) => {}
         }

@@ -127,13 +127,26 @@ pub(super) fn make_buffers(
     for (buffer, bytes) in buffers {
         storage.ensure(buffer, bytes)?;
     }
+    let slot_bytes = first_bytes.min(bytes_of::<Slot>(params.cells));
     let lists = [
-        (Buffer::Entries, needed.entries, size_of::<u32>(), &mut params.entry_capacity),
-        (Buffer::Slots, needed.slots, size_of::<Slot>(), &mut params.slot_capacity),
-        (Buffer::SmallItems, needed.small_items, size_of::<SmallItem>(), &mut params.small_capacity),
-        (Buffer::LargeItems, needed.large_items, size_of::<LargeItem>(), &mut params.large_capacity),
+        (Buffer::Entries, needed.entries, size_of::<u32>(), &mut params.entry_capacity, first_bytes),
+        (Buffer::Slots, needed.slots, size_of::<Slot>(), &mut params.slot_capacity, slot_bytes),
+        (
+            Buffer::SmallItems,
+            needed.small_items,
+            size_of::<SmallItem>(),
+            &mut params.small_capacity,
+            first_bytes / 4,
+        ),
+        (
+            Buffer::LargeItems,
+            needed.large_items,
+            size_of::<LargeItem>(),
+            &mut params.large_capacity,
+            first_bytes / 4,
+        ),
     ];
-    for (buffer, len, size, capacity) in lists {
+    for (buffer, len, size, capacity, first_bytes) in lists {
         let bytes = u64::from(len) * size as u64;
         storage.ensure(buffer, bytes.max(first_bytes.min(storage.max_buffer_bytes)))?;
         *capacity = u32::try_from(storage.size(buffer) / size as u64).unwrap_or(u32::MAX);

@@ -198,3 +198,22 @@ fn dims(space: [f32; 3], cell: f64, most: f64) -> [u32; 3] {
     }
     dims
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A cover barely wider than the scene is in the sample, because the first box always is.
+    #[test]
+    fn a_cover_around_the_scene_does_not_add_cells() {
+        let at = |i: u32, d: u32| (i / d % 80) as f32 * 1.3;
+        let cubes = (0..512_000).map(|i| Aabb::from_center([at(i, 1), at(i, 80), at(i, 6400)], [0.5; 3]));
+        let with = |half: f32| {
+            let cover = Aabb::from_center([52.0; 3], [half; 3]);
+            let boxes: Vec<_> = std::iter::once(cover).chain(cubes.clone()).collect();
+            GpuPlan::new(&Summary::of(&boxes), &GpuOptions::DEFAULT, 1.0, 1 << 28).cells
+        };
+        let [small, cover] = [0.5, 53.0].map(with);
+        assert!(cover.abs_diff(small) < small / 10, "{cover} cells, {small} without a cover");
+    }
+}

@@ -4,6 +4,7 @@ use super::device::GpuDevice;
 use super::passes::{MAX_PASSES, Recording};
 use super::storage::BufferId;
 use super::{GpuError, wait};
+use crate::GpuOptions;
 use crate::layout::{Counters, Totals};
 use bytemuck::{Pod, Zeroable};
 use pbig_shaders::{Buffer, Kernel};
@@ -44,8 +45,9 @@ pub(super) struct Timestamps {
 }
 
 impl Timestamps {
-    pub(super) fn new(device: &GpuDevice) -> Result<Option<Self>, GpuError> {
-        if !device.has_timestamps {
+    /// Makes them if times are wanted: some drivers allow about 32 query sets in all.
+    pub(super) fn new(device: &GpuDevice, options: &GpuOptions) -> Result<Option<Self>, GpuError> {
+        if !device.has_timestamps || !options.time_kernels {
             return Ok(None);
         }
         let (label, ty, count) = (Some("times"), wgpu::QueryType::Timestamp, 2 * MAX_PASSES);

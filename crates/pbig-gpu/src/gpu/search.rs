@@ -6,6 +6,7 @@
 
 use super::GpuError;
 use super::changes::Changes;
+use super::declined::Declined;
 use super::error::Failure;
 use super::job::{Input, Job};
 use super::session::{Session, Sizes};
@@ -75,6 +76,9 @@ pub(super) async fn search(
     request: &Search<'_>,
     mut pairs: Vec<Pair>,
 ) -> Result<DeviceFound, Failure> {
+    if let Some(why) = session.declined.unseen(request.boxes.len()) {
+        return Err(Failure::Declined(why));
+    }
     // First, while the boxes are in the cache.
     let restarted = request.changes.map_or_else(Vec::new, |changes| changes.restarted());
     let len = request.boxes.len();
@@ -98,8 +102,13 @@ pub(super) async fn search(
                 // The device may have gone on to the new boxes.
                 session.uploaded.forget_motions();
             }
-            result => {
-                result?;
+            Err(Failure::Declined(why)) => {
+                session.declined.note(len, &why);
+                return Err(Failure::Declined(why));
+            }
+            Err(failure) => return Err(failure),
+            Ok(()) => {
+                session.declined = Declined::default();
                 sink.found.restarted = restarted;
                 return Ok(sink.end());
             }
@@ -152,12 +161,12 @@ async fn search_parts(
     Ok(())
 }
 
-fn of_ids<T: Copy>(all: &[T], ids: &[u32]) -> Vec<T> {
+pub(super) fn of_ids<T: Copy>(all: &[T], ids: &[u32]) -> Vec<T> {
     ids.iter().map(|&id| all[id as usize]).collect()
 }
 
 /// Replaces indices into a part by the ids of its boxes.
-fn name_pairs(pairs: &mut [Pair], ids: &[u32]) {
+pub(super) fn name_pairs(pairs: &mut [Pair], ids: &[u32]) {
     for pair in pairs {
         *pair = Pair::new(ids[pair.a as usize], ids[pair.b as usize]);
     }
@@ -171,7 +180,7 @@ struct Part<'a> {
 }
 
 /// Returns the ids of the valid boxes, sorted along the axis on which they are spread most, and that axis.
-fn sorted(boxes: &[Aabb]) -> (Vec<u32>, usize) {
+pub(super) fn sorted(boxes: &[Aabb]) -> (Vec<u32>, usize) {
     let sample = sampled(boxes);
     let width = |k: usize| {
         let ends = sample.iter().map(|b| b.min[k]);

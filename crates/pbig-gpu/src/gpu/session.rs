@@ -1,6 +1,7 @@
 //! The state of a finder on a device, and what happens before a search: upload, plan, choice of the coding.
 
 use super::coding::{Counted, bits_that_fit};
+use super::declined::Declined;
 use super::device::GpuDevice;
 use super::error::Failure;
 use super::job::{Input, Job};
@@ -13,6 +14,7 @@ use super::{GpuError, GpuPlan};
 use crate::decode::pair_count;
 use crate::layout::{BITS, COUNTED, Counters, DeviceBox, FILTERED, LANES, Params, RAW, SORTED};
 use crate::pbig::Summary;
+use crate::policy::WIDEST_ITEM;
 use crate::{Coding, GpuOptions};
 use pbig_core::{DeviceFound, DeviceReport, internal::Clock};
 use std::sync::Arc;
@@ -21,6 +23,9 @@ use std::time::Duration;
 /// Maximum number of words of output per changed box that are prefetched: four pairs. The output of a burst of pairs
 /// says nothing about an update with few changes.
 const PREFETCHED_WORDS_PER_CHANGE: u64 = 8;
+
+/// Number of boxes by which lists of the first call are longer than for the boxes there are: few boxes may need many entries.
+const EXTRA_BOXES: u64 = 4096;
 
 /// Maximum number of cells of a plan.
 const MAX_CELLS: u64 = 1 << 28;
@@ -53,6 +58,7 @@ pub(super) struct Session {
     pub(super) cell_factor: f32,
     /// Number of boxes of a set that needed parts, and of its parts, until the next window of [`Storage::end_call`].
     pub(super) split: Option<(usize, usize)>,
+    pub(super) declined: Declined,
     /// This job searches for changes instead of all overlaps.
     pub(super) finds_changes: bool,
     /// Changes were uploaded that no submission has applied yet.
@@ -69,12 +75,13 @@ impl Session {
             options: *options,
             storage: Storage::new(device.clone(), options),
             uploaded: UploadCache::default(),
-            timestamps: [Timestamps::new(&device)?, Timestamps::new(&device)?],
+            timestamps: [Timestamps::new(&device, options)?, Timestamps::new(&device, options)?],
             sizes: Sizes::default(),
             counted: Counted::default(),
             plan: None,
             cell_factor: 1.0,
             split: None,
+            declined: Declined::default(),
             finds_changes: false,
             has_pending_changes: false,
             table: None,
@@ -131,6 +138,10 @@ impl Session {
     fn upload(&mut self, job: &Job<'_>, report: &mut DeviceReport) -> Result<Params, GpuError> {
         self.table = None;
         self.sizes.expected_words = std::mem::take(&mut self.sizes.max_words);
+        if self.sizes.lists == Counters::default() && self.options.first_bytes > 0 {
+            // A pair a box.
+            self.sizes.expected_words = 2 * job.boxes.len() as u64;
+        }
         self.sizes.word_capacity = self.sizes.expected_words;
         self.finds_changes = !matches!(job.input, Input::Boxes);
         self.storage.bytes_sent = 0;
@@ -159,12 +170,17 @@ impl Session {
         Ok(params)
     }
 
+    /// Returns the bytes of a list whose length no call has told.
+    pub(super) fn first_bytes(&self, boxes: u32) -> u64 {
+        self.options.first_bytes * (u64::from(boxes) + EXTRA_BOXES)
+    }
+
     fn params(&self, job: &Job<'_>) -> Params {
         let flags = [(job.filters.is_some(), FILTERED), (self.options.count_tests, COUNTED)];
         Params {
             small_cell: self.options.small_cell.clamp(1, LANES),
             // The output of a work item must fit the smallest buffer.
-            columns: if self.storage.max_buffer_bytes < 8 << 20 { 1 } else { 8 },
+            columns: if self.storage.max_buffer_bytes < 8 << 20 { 1 } else { WIDEST_ITEM },
             flags: flags.into_iter().filter(|(is_set, _)| *is_set).map(|(_, flag)| flag).sum(),
             split: job.split,
             ..Params::default()
@@ -200,9 +216,10 @@ impl Session {
             None => {
                 let classes = self.measure(params, report).await?;
                 let mut clock = Clock::start();
-                let plan = self.plan_for(&Summary::of_classes(classes, job.boxes));
+                let summary = Summary::of_classes(classes, job.boxes);
+                let plan = KeptPlan::new(self.plan_for(&summary), params.boxes, summary.pairs());
                 report.plan += clock.lap();
-                KeptPlan::new(plan, params.boxes)
+                plan
             }
         };
         Ok(self.plan.insert(plan))

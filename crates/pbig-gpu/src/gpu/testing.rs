@@ -38,6 +38,11 @@ impl GpuFinder {
         wait::block_on(device.watch(async || Ok(device.pipeline(kernel, Variant::new(options, changes)))))
     }
 
+    /// Returns the number of query sets that the finder holds.
+    pub fn query_sets(&self) -> usize {
+        self.session.iter().flat_map(|session| &session.timestamps).flatten().count()
+    }
+
     /// Runs `work` on the device, and returns errors that wgpu reports meanwhile.
     pub fn on_device<T>(
         &self,

@@ -1,0 +1,51 @@
+//! The rules on counts by which the device declines a call, and the limit of a dispatch.
+
+/// Maximum number of segments of columns of a large item.
+pub(crate) const WIDEST_ITEM: u32 = 8;
+
+/// Maximum number of tests for each box and binary logarithm of the number of boxes. Uniform cubes make about one.
+const TESTS_PER_BOX_AND_LOG: u64 = 3;
+
+/// Maximum number of tests for each pair that a sample promises, as on the CPU: in a crowd no other way is faster.
+const TESTS_PER_PAIR: u64 = 32;
+
+/// Number of tests that every search may make: the device is done in less time than the CPU takes to begin.
+const ALWAYS_ALLOWED_TESTS: u64 = 1 << 16;
+
+/// Returns the maximum number of tests of a search. Beyond it the device declines: the CPU's work is bounded for every shape,
+/// that of one grid is not.
+pub(crate) const fn most_tests(boxes: u64, expected_pairs: u64) -> u64 {
+    let by_boxes = TESTS_PER_BOX_AND_LOG * boxes * (boxes | 1).ilog2() as u64;
+    let by_pairs = TESTS_PER_PAIR.saturating_mul(expected_pairs);
+    by_boxes.saturating_add(by_pairs).saturating_add(ALWAYS_ALLOWED_TESTS)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::GpuOptions;
+    use crate::layout::LANES;
+
+    /// Returns the maximum number of tests of one dispatch, for chunks of this number of small and large items.
+    const fn tests_of_dispatch([small, large]: [u32; 2], columns: u32) -> u64 {
+        let lanes = LANES as u64;
+        let (small, large) = (small as u64 * lanes, large as u64 * lanes * lanes * columns as u64);
+        if small > large { small } else { large }
+    }
+
+    /// A device with a twentieth of a modern one's speed makes 10^11 tests a second: 20 ms.
+    #[test]
+    fn no_dispatch_of_the_defaults_makes_more_than_two_billion_tests() {
+        assert_eq!(tests_of_dispatch(GpuOptions::DEFAULT.chunk, WIDEST_ITEM), 1 << 31);
+    }
+
+    /// One ground under ten million boxes: each pair of the ground is one test more.
+    #[test]
+    fn ordinary_scenes_are_far_below_the_limit_and_crowds_beyond() {
+        let million = 10_000_000;
+        assert!(most_tests(million, 0) > 2 * (18 * million + million));
+        assert!(most_tests(million, 0) < million * million / 1000);
+        assert!(most_tests(25_000, 0) < 25_000 * 25_000 / 2 / 20);
+        assert!(most_tests(25_000, 25_000 * 12_500) > 25_000 * 25_000);
+    }
+}

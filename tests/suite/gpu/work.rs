@@ -1,0 +1,163 @@
+//! The device's work, in counts: what a call sends, repeats and waits for, and which shapes it leaves to the CPU.
+
+use super::{cubes, find, on_cpu, set, with, with_device};
+use pbig_core::{
+    Aabb, Backend, BroadPhase, Config, DeviceFound, Finder, PairDevice, ProxyFilter, SearchRequest,
+};
+use pbig_gpu::{Coding, GpuFinder, GpuFinders, GpuOptions, adapters};
+use pbig_harness::hard::{Part, Recipe, shapes};
+use pbig_tests::{difference, needs_gpu};
+
+/// Maximum tests of a shape, as a multiple of those of cubes, without those that its pairs need.
+const MOST_TESTS: u64 = 5;
+
+/// Tests that a pair may need, as on the CPU.
+const TESTS_PER_PAIR: u64 = 32;
+
+/// Number of boxes of a shape.
+const BOXES: usize = 25_000;
+
+/// Finds the pairs of boxes. Returns the tests that the device made, or why it made none.
+fn tests_of(boxes: &[Aabb]) -> Result<u64, String> {
+    let mut finder = with(GpuOptions::DEFAULT).finder();
+    let found = finder.find(boxes).expect("few pairs").to_vec();
+    assert_eq!(difference(&found, &on_cpu(boxes)), None);
+    let report = finder.report();
+    report.fallback.clone().map_or(Ok(report.checks.made), Err)
+}
+
+#[test]
+fn a_device_bounds_its_work_or_leaves_the_shape_to_the_cpu() {
+    needs_gpu!();
+    let cubes = Recipe(vec![Part::CUBES]).boxes(BOXES, 1);
+    let uniform = tests_of(&cubes).expect("cubes are done on the device");
+    for (name, recipe) in shapes() {
+        let boxes = recipe.boxes(BOXES, 1);
+        match tests_of(&boxes) {
+            Ok(tests) => {
+                let most = MOST_TESTS * uniform + TESTS_PER_PAIR * on_cpu(&boxes).len() as u64;
+                println!("{name}: {tests} of at most {most}");
+                assert!(tests <= most, "{name}: {tests} tests, cubes {uniform}");
+            }
+            Err(why) => {
+                println!("{name}: {why}");
+                assert!(why.contains("declined") && why.contains("tests of"), "{name}: {why}");
+            }
+        }
+    }
+}
+
+/// Contract: a declined call is no fault. The device goes on with other sets, and with the next update of a world.
+#[test]
+fn a_declined_call_is_done_by_the_cpu_and_the_next_may_be_done_by_the_device() {
+    needs_gpu!();
+    let config = Config { backend: Backend::Device, ..Config::DEFAULT };
+    let gpu = GpuFinder::new().expect("an adapter");
+    let mut ours = BroadPhase::with_device(config, Box::new(gpu)).expect("a margin");
+    let mut cpu =
+        BroadPhase::new(Config { backend: Backend::Cpu, ..Config::DEFAULT }).expect("the same margin");
+    let mut ways = Vec::new();
+    let tight = crossing();
+    let spread = Recipe(vec![Part::CUBES]).boxes(tight.len(), 1);
+    for boxes in [&spread, &tight, &spread, &spread, &tight, &spread, &spread, &spread, &spread] {
+        for (id, aabb) in (0..).zip(boxes) {
+            ours.set(id, *aabb, ProxyFilter::ALL).expect("an id");
+            cpu.set(id, *aabb, ProxyFilter::ALL).expect("an id");
+        }
+        // Otherwise the repeated set changes nothing.
+        ours.set(0, boxes[1], ProxyFilter::ALL).expect("an id");
+        cpu.set(0, boxes[1], ProxyFilter::ALL).expect("an id");
+        assert!(ours.update() == cpu.update(), "after {ways:?}");
+        let why = ours.report().fallback.clone();
+        assert!(why.as_ref().is_none_or(|why| why.contains("declined")), "{why:?}");
+        ways.push(why.is_none());
+    }
+    assert!(ways[0] && !ways[1] && ways[8], "done by the device: {ways:?}");
+}
+
+/// Needles in one layer, of which each would meet half of the others in a grid of cubes, and few touch.
+fn crossing() -> Vec<Aabb> {
+    let long = |i: usize, half: [f32; 3]| Aabb::from_center([0.0, 0.0, i as f32].map(|x| x * 0.001), half);
+    let half = |i: usize| if i.is_multiple_of(2) { [9.0, 0.0001, 0.0001] } else { [0.0001, 9.0, 0.0001] };
+    (0..20_000).map(|i| long(i, half(i))).collect()
+}
+
+#[test]
+fn query_sets_are_made_only_if_times_are_wanted() {
+    needs_gpu!();
+    let boxes = set("unit", 3000);
+    let request = SearchRequest { boxes: &boxes, filters: None, is_sorted: true, max_pairs: u64::MAX };
+    for time_kernels in [false, true] {
+        let options = GpuOptions { time_kernels, ..GpuOptions::DEFAULT };
+        let mut gpu = GpuFinder::new().expect("an adapter").with_options(options);
+        let mut found = DeviceFound::default();
+        gpu.find_all(&request, &mut found).expect("a device that works");
+        let has_times = !found.report.kernels.is_empty();
+        assert_eq!(gpu.query_sets(), if has_times { 2 } else { 0 }, "wanted: {time_kernels}");
+        assert!(time_kernels || !has_times);
+    }
+}
+
+#[test]
+fn the_first_call_repeats_nothing_and_waits_at_most_once_more() {
+    needs_gpu!();
+    for (name, n) in [("unit", 1000), ("unit", 10_000), ("uniform", 10_000), ("unit", 100_000)] {
+        let boxes = set(name, n);
+        let device = GpuFinder::new().expect("an adapter");
+        let mut finder = with_device(GpuOptions::DEFAULT, device);
+        let (_, first) = find(&mut finder, &boxes);
+        let (_, next) = find(&mut finder, &boxes);
+        assert_eq!((first.repeats, next.repeats), (0, 0), "{n} in {name}");
+        assert_eq!((first.waits, next.waits), (2, 1), "{n} in {name}: one more to measure the boxes");
+    }
+}
+
+#[test]
+fn many_chunks_take_one_wait_and_send_no_pair_twice() {
+    needs_gpu!();
+    let boxes = set("unit", 20_000);
+    let options = GpuOptions { chunk: [64, 4], time_kernels: false, ..GpuOptions::DEFAULT };
+    let mut finder = with_device(options, GpuFinder::new().expect("an adapter"));
+    let wanted = on_cpu(&boxes);
+    for call in 0..3 {
+        let (pairs, report) = find(&mut finder, &boxes);
+        assert_eq!(difference(&pairs, &wanted), None);
+        assert!(report.chunks > 4, "{} chunks", report.chunks);
+        let most = 1000 + 10 * wanted.len() as u64;
+        assert!(call == 0 || report.downloaded <= most, "{} bytes, at most {most}", report.downloaded);
+        assert!(call == 0 || report.waits == 1, "call {call}: {} waits", report.waits);
+    }
+    // More items than the last call had: what is missing is checked in a second round.
+    let more: Vec<_> = boxes.iter().map(|b| Aabb::new(b.min, b.max.map(|x| x + 0.4))).collect();
+    let (pairs, _) = find(&mut finder, &more);
+    assert_eq!(difference(&pairs, &on_cpu(&more)), None);
+}
+
+/// Contract 1: one call on several devices gives the bytes of one.
+#[test]
+fn several_devices_share_a_call_and_give_the_same_bytes() {
+    needs_gpu!();
+    let all = adapters();
+    let config = Config { backend: Backend::Device, ..Config::DEFAULT };
+    for together in [vec![all[0].clone(), all[0].clone()], all.clone()] {
+        let gpus = GpuFinders::on_all(&together)
+            .expect("devices")
+            .with_options(GpuOptions { coding: Coding::Plain, ..GpuOptions::DEFAULT });
+        let mut finder = Finder::with_device(config, Box::new(gpus));
+        let ground = Aabb::new([f32::NEG_INFINITY; 3], [f32::INFINITY, 0.0, f32::INFINITY]);
+        for mut boxes in [set("pile", 6000), set("mixed", 4000), set("unit", 20_000), cubes(2500), cubes(9)] {
+            boxes.push(ground);
+            boxes.push(Aabb::NOWHERE);
+            let filters: Vec<_> = (0..boxes.len() as u32)
+                .map(|i| ProxyFilter { body: i / 3, mask: 1 << (i % 5), ..ProxyFilter::ALL })
+                .collect();
+            let (pairs, report) = find(&mut finder, &boxes);
+            assert_eq!(difference(&pairs, &on_cpu(&boxes)), None);
+            let parts = if boxes.len() < 2048 { 1 } else { together.len() as u32 };
+            assert_eq!(report.parts, parts, "{}", report.name);
+            let found = finder.find_filtered(&boxes, &filters).expect("few pairs").to_vec();
+            let mut cpu = Finder::new(Config { backend: Backend::Cpu, ..config });
+            assert_eq!(difference(&found, cpu.find_filtered(&boxes, &filters).expect("few pairs")), None);
+        }
+    }
+}
