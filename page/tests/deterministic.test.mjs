@@ -19,7 +19,8 @@ before(async () => {
 function modulePairs({ scene, bodies, seed, broadPhase }) {
     const simulation = new module.Simulation(scene, bodies, seed, broadPhase);
     return Array.from({ length: PAIR_STEPS }, () => {
-        simulation.step();
+        simulation.advance();
+        simulation.end_step();
         return Array.from(simulation.pairs());
     });
 }

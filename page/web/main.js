@@ -84,7 +84,7 @@ class Page {
         if (obstacle) return this.#showSettings();
         this.#settings = { ...this.#settings, broadPhase };
         this.#showSettings();
-        this.#do(() => this.#simulation.changeBroadPhase(broadPhase));
+        this.#do(() => this.#simulation?.changeBroadPhase(broadPhase));
     }
 
     #pause(isPaused) {
@@ -136,6 +136,8 @@ class Page {
     }
 
     async #step() {
+        // The simulation may have been dropped since this step was due.
+        if (!this.#simulation) return;
         const frame = await this.#simulation.step();
         this.#times.add(frame);
         this.#show(frame);
