@@ -22,7 +22,7 @@ pub(crate) struct Divisor(pub(crate) u32);
 
 impl CollisionHooks for Veto<'_> {
     fn filter_pairs(&self, one: Entity, other: Entity, _: &mut Commands) -> bool {
-        self.divisor.0 == 0 || (one.index_u32() + other.index_u32()) % self.divisor.0 != 0
+        self.divisor.0 == 0 || !(one.index_u32() + other.index_u32()).is_multiple_of(self.divisor.0)
     }
 }
 
@@ -45,7 +45,7 @@ pub(crate) fn plugins() -> bevy::app::PluginGroupBuilder {
 }
 
 /// Two or three, by the crate that is tested.
-const DIMENSIONS: f32 = size_of::<Position>() as f32 / size_of::<f32>() as f32;
+pub(crate) const DIMENSIONS: f32 = size_of::<Position>() as f32 / size_of::<f32>() as f32;
 
 /// The entities of a random world.
 pub(crate) struct RandomWorld {
