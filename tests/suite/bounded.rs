@@ -51,6 +51,21 @@ fn a_tree_alone_takes_no_work_without_bound() {
     }
 }
 
+/// A tree takes n^1.5, so that only a large number of needles is beyond the bound.
+#[test]
+fn needles_that_a_tree_cannot_cut_apart_take_bounded_work() {
+    let needle = |axis: usize| {
+        let mut part = Part { width: [1.0; 3], half: [1e-9; 3], growth: 0.0, ..Part::CUBES };
+        (part.corner[axis], part.width[axis], part.half[axis]) = (0.5, 0.0, 0.5);
+        part
+    };
+    let boxes = Recipe([0, 1, 2].map(needle).to_vec()).boxes(700_000, 1);
+    let [tree, chosen] = [Some(Engine::Tree), None].map(|engine| search(&boxes, engine));
+    println!("needles: {tree:.2} in a tree, {chosen:.2}");
+    let limit = WORK_LIMIT as f64;
+    assert!(chosen < limit && limit < tree, "{chosen}, {tree} in a tree");
+}
+
 /// They are in a class of their own, and as long as the world on one axis.
 #[test]
 fn two_half_infinite_boxes_leave_a_tree_as_it_is() {

@@ -98,7 +98,7 @@ pub struct Checks {
 
 /// Maximum [`Report::work`] for each box and pair, in binary logarithms of the number of boxes, for every shape, motion and history
 /// of the boxes. A pair counts if its boxes overlap, also if filters or keys exclude it. Measured, not proven: docs/STRESS.md has the
-/// worst case that was found. Two sets of a crowd and points around it grow beyond it slowly, like the square of the logarithm.
+/// worst case that was found.
 pub const WORK_LIMIT: u64 = 64;
 
 /// The report on the last call of a [`crate::Finder`] or [`crate::BroadPhase`].

@@ -17,6 +17,9 @@ const PIECE: usize = 64;
 /// Pairs of a leaf that are kept together.
 const BATCH: usize = 4096;
 
+/// Maximum number of boxes of a leaf that meet the bounds of another one for a test at once.
+const FEW_LANES: u32 = 3;
+
 impl BoxIndex {
     /// Estimates the work of [`BoxIndex::find_pairs`] that overlaps do not pay for, from some leaves. Stops above `most`. `hits` are
     /// scratch.
@@ -101,7 +104,7 @@ impl Join<'_, '_> {
         while let Some(at) = waiting.pop() {
             self.hits.runs += 1;
             if index.is_leaf(at) {
-                self.test(simd, leaf, at);
+                self.test(simd, leaf, at, &bounds);
                 // Boxes as large as the world meet all others.
                 if self.hits.pairs.len() >= from + BATCH {
                     self.hits.keep(from, self.rule);
@@ -121,11 +124,18 @@ impl Join<'_, '_> {
         self.hits.keep(from, self.rule);
     }
 
-    /// Tests the boxes of a leaf against those of another one, or of its own.
+    /// Tests the boxes of a leaf, which have these bounds, against those of another one, or of its own.
     #[inline(always)]
-    fn test(&mut self, simd: impl Simd, leaf: u32, at: u32) {
+    fn test(&mut self, simd: impl Simd, leaf: u32, at: u32, bounds: &Aabb) {
         let (one, other) = (&self.index.nodes[leaf as usize], &self.index.nodes[at as usize]);
         let mut lanes = simd.overlaps_eight(&one.boxes, &other.bounds());
+        // Around the edge of a crowd a leaf has bounds that all boxes of another one overlap, and no box that overlaps theirs.
+        if lanes.count_ones() > FEW_LANES && leaf != at {
+            self.hits.tests += LANES as u64;
+            if simd.overlaps_eight(&other.boxes, bounds) == 0 {
+                return;
+            }
+        }
         while let Some(lane) = next(&mut lanes) {
             let aabb: Aabb = one.get(lane);
             let wanted = if leaf == at { 255 & !((2u32 << lane) - 1) } else { 255 };

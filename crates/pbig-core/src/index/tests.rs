@@ -2,7 +2,7 @@
 
 use super::{BoxIndex, Visited};
 use crate::grid::{Hits, Rule};
-use crate::{Aabb, Pair, oracle};
+use crate::{Aabb, Config, Engine, Finder, Pair, oracle};
 use rand::rngs::StdRng;
 use rand::{RngExt, SeedableRng};
 use std::sync::atomic::AtomicU64;
@@ -284,5 +284,51 @@ fn questions_with_nans_visit_nothing() {
     assert_eq!(sweep(&unit, [f32::INFINITY, 0.0, 0.0], 1.0), 1);
     for (point, distance) in [([f32::NAN; 3], 1.0), ([f32::NEG_INFINITY; 3], 1.0), ([0.5; 3], f32::NAN)] {
         assert_eq!(index.near(point, distance, &mut |_| 1.0), Visited::default());
+    }
+}
+
+/// Leaves of points around an edge of the crowd have bounds that all of its boxes overlap.
+#[test]
+fn a_crowd_does_not_test_the_points_around_it() {
+    let mut random = StdRng::seed_from_u64(4);
+    let mut point = |i: usize| {
+        let mut at = [0; 3].map(|_| random.random_range(0.0f32..1.0));
+        at[i % 3] = [-1e-4, 1.0001][i / 3 % 2];
+        Aabb::new(at, at)
+    };
+    // One of each set is far away, so that the bounds of a set do not drop the others.
+    let [low, high] = [-5.0, 5.0].map(|at| Aabb::new([at; 3], [at + 0.5; 3]));
+    let mut ratio = |n: usize| {
+        let crowd: Vec<Aabb> =
+            [low, high].into_iter().chain((0..n).map(|_| Aabb::new([0.0; 3], [1.0; 3]))).collect();
+        let points: Vec<Aabb> = [low, high].into_iter().chain((0..n).map(&mut point)).collect();
+        let mut finder = Finder::new(Config { engine: Some(Engine::Tree), ..Config::DEFAULT });
+        assert_eq!(finder.find_between(&crowd, &points).expect("few pairs").len(), 2);
+        let report = finder.report();
+        report.work as f64 / (report.boxes as f64 * (report.boxes as f64).log2())
+    };
+    let ratios = [5000, 40_000].map(&mut ratio);
+    assert!(ratios[1] < 0.25 * crate::WORK_LIMIT as f64, "{ratios:?}");
+}
+
+#[test]
+fn the_work_of_a_join_is_estimated_from_some_leaves() {
+    let mut random = StdRng::seed_from_u64(5);
+    let needle = |i: usize| {
+        let (mut at, mut half) = ([0; 3].map(|_| random.random_range(0.0f32..1.0)), [1e-9; 3]);
+        (at[i % 3], half[i % 3]) = (0.5, 0.5);
+        Aabb::from_center(at, half)
+    };
+    let boxes: Vec<Aabb> = (0..20_000).map(needle).collect();
+    let (mut index, found, mut hits) = (BoxIndex::default(), AtomicU64::new(0), [Hits::default()]);
+    let rule = Rule::listing(None, &found);
+    for split in [None, Some(10_000)] {
+        index.sort_sets(&boxes, split.unwrap_or(u32::MAX));
+        let estimated = index.vain_work(split, &rule, u64::MAX, &mut hits[0]);
+        hits[0].begin(0, 0);
+        index.find_pairs(split, &rule, &mut hits);
+        let work = hits[0].tests + hits[0].runs;
+        assert!(estimated.abs_diff(work) < work / 4, "{estimated} for {work}");
+        assert!(index.vain_work(split, &rule, work / 4, &mut hits[0]) < work / 2, "stops soon");
     }
 }
