@@ -151,14 +151,31 @@ pub fn map<T: Send>(pieces: usize, work: impl Fn(usize) -> T + Sync) -> Vec<T> {
     results.into_iter().flatten().collect()
 }
 
+/// Maximum number of spare elements of a scratch buffer: an eighth of ten million would be a tenth of all memory.
+const MAX_SPARE: usize = 1 << 17;
+
 /// Makes `buffer` at least `len` elements long. Its old content is scratch and is not copied.
 pub(crate) fn ensure_scratch<T: Copy>(buffer: &mut Vec<T>, len: usize, fill: T) {
     if buffer.capacity() < len {
         buffer.clear();
         buffer.shrink_to(0);
-        buffer.reserve_exact(len + len / 8 + 1024);
+        buffer.reserve_exact(len + (len / 8).min(MAX_SPARE) + 1024);
     }
     if buffer.len() < len {
         buffer.resize(buffer.capacity(), fill);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_scratch_buffer_has_an_eighth_to_spare_and_a_large_one_less() {
+        for (len, most) in [(80_000, 92_000), (10_000_000, 10_140_000)] {
+            let mut buffer = Vec::new();
+            ensure_scratch(&mut buffer, len, 0u8);
+            assert!(buffer.len() > len + len / 100 && buffer.len() < most, "{}", buffer.len());
+        }
     }
 }

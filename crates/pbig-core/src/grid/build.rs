@@ -71,7 +71,6 @@ impl Grid {
     }
 
     fn reserve(&mut self, boxes: usize) {
-        ensure_scratch(&mut self.keys, boxes, 0);
         ensure_scratch(&mut self.coarse, boxes, Record::EMPTY);
         ensure_scratch(&mut self.records, boxes, Record::EMPTY);
         ensure_scratch(&mut self.codes, boxes + 2 * BLOCK, TOMBSTONE);
@@ -81,7 +80,9 @@ impl Grid {
     /// Computes keys, and counts boxes by bucket.
     fn count(&mut self, boxes: &[Aabb], split: Split, workers: usize) {
         self.counts.resize(split.pieces.max(self.counts.len()), BucketCounts::ZERO);
-        let (keys, counts) = (SharedSlice::new(&mut self.keys), SharedSlice::new(&mut self.counts));
+        // In the memory of the codes, which are computed when the keys are no longer needed.
+        let keys: &mut [u32] = bytemuck::cast_slice_mut(&mut self.codes);
+        let (keys, counts) = (SharedSlice::new(keys), SharedSlice::new(&mut self.counts));
         let plan = &self.plan;
         run(workers, split.pieces, |_, piece| {
             let range = piece_range(boxes.len(), piece, split.pieces);
@@ -116,7 +117,8 @@ impl Grid {
         if self.len + self.invalid as usize == boxes.len() {
             return;
         }
-        for (i, aabb) in boxes.iter().enumerate().filter(|(i, _)| self.keys[*i] == OVERSIZE) {
+        let keys: &[u32] = bytemuck::cast_slice(&self.codes);
+        for (i, aabb) in boxes.iter().enumerate().filter(|(i, _)| keys[*i] == OVERSIZE) {
             self.oversize.push(Record::new(*aabb, first_id + i as u32, OVERSIZE));
         }
     }
@@ -124,7 +126,7 @@ impl Grid {
     /// Brings records into their buckets.
     fn scatter(&mut self, (boxes, first_id): (&[Aabb], u32), split: Split, workers: usize) {
         let (coarse, counts) = (SharedSlice::new(&mut self.coarse), SharedSlice::new(&mut self.counts));
-        let keys = &self.keys;
+        let keys: &[u32] = bytemuck::cast_slice(&self.codes);
         run(workers, split.pieces, |_, piece| {
             // SAFETY: each piece has its own counts.
             let next = unsafe { &mut counts.part(piece..piece + 1)[0].0 };

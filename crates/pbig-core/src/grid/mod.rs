@@ -50,7 +50,7 @@ pub(crate) struct Grid {
     pub(crate) plan: GridPlan,
     /// By slot, sorted by cell. Longer than `len`.
     records: Vec<Record>,
-    /// By slot; tombstones beyond `len`, so that a block can be read anywhere.
+    /// By slot; tombstones beyond `len`, so that a block can be read anywhere. While the grid is built, the keys of the boxes.
     codes: Vec<u64>,
     /// By cell: its first slot.
     starts: Vec<u32>,
@@ -60,8 +60,6 @@ pub(crate) struct Grid {
     pub(crate) oversize: Vec<Record>,
     /// Invalid boxes met by the last build.
     pub(crate) invalid: u32,
-    /// By box: the key of the last build.
-    keys: Vec<u32>,
     /// The records by bucket, of the last build.
     coarse: Vec<Record>,
     counts: Vec<BucketCounts>,
