@@ -201,7 +201,7 @@ mod tests {
             [x, x.round(), x.signum() * 0.0, x * f32::INFINITY][(kind as usize).min(3)]
         };
         let (one, other) = ([end(), end(), end()], [end(), end(), end()]);
-        let is_thin = |k: usize| kind < 2 && (one[0] as i32).rem_euclid(3) != k as i32;
+        let is_thin = |k: usize| kind == 0 && (one[0] as i32).rem_euclid(3) != k as i32;
         let high = |k: usize| if is_thin(k) { one[k].min(other[k]) } else { one[k].max(other[k]) };
         Aabb::new(std::array::from_fn(|k| one[k].min(other[k])), std::array::from_fn(high))
     }

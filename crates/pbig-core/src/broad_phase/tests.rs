@@ -233,6 +233,8 @@ fn a_clone_goes_on_as_the_original() {
         let mut clone = broad_phase.clone();
         for one in [&mut broad_phase, &mut clone] {
             crowded(one, 100..200, gap, 0.01);
+            // An id that had no box before, if there are gaps.
+            one.set(1, Aabb::from_center([0.3; 3], [0.1; 3]), ProxyFilter::ALL).expect("few boxes");
             one.update().expect("few pairs");
             assert_eq!(one.report().plan.algorithm, Algorithm::Tree);
             assert!(one.pairs().eq(oracle::pairs(one.fat_aabbs())));
