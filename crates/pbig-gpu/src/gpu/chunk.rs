@@ -88,7 +88,6 @@ impl Session {
         let mut clock = Clock::start();
         self.write_chunk(items, 0, left)?;
         self.record(params, 0, steps, None)?;
-        self.has_raw_boxes &= params.flags & RAW == 0;
         self.recording += clock.lap();
         Ok(())
     }
