@@ -1,12 +1,12 @@
 //! The boxes of pbig: one for each proxy in avian's trees.
 
 use crate::lost::Lost;
+use crate::waiting::Waiting;
 use avian::collider_tree::{
     ColliderTreeProxy, ColliderTreeProxyKey, ColliderTreeType, ColliderTrees, MovedProxies,
 };
 use bevy::prelude::*;
 use pbig_core::{Aabb, BroadPhase, Error, Pair, ProxyFilter, Report};
-use std::collections::BTreeSet;
 
 /// The id of a collider that has no box.
 const NO_ID: u32 = u32::MAX;
@@ -20,8 +20,9 @@ pub struct ColliderBoxes {
     free: Vec<u32>,
     /// By index of the collider's entity: its id.
     ids: Vec<u32>,
-    /// Overlapping pairs without a contact: vetoed by a joint or a hook, or not asked for since their contact was removed.
-    pub(crate) without_contact: BTreeSet<Pair>,
+    pub(crate) without_contact: Waiting,
+    /// Ids of the proxies that moved in this update.
+    moved: Vec<u32>,
     pub(crate) update: u32,
 }
 
@@ -32,8 +33,6 @@ pub(crate) struct Slot {
     pub(crate) collider: Entity,
     /// Last update in which the proxy moved, by avian's list.
     pub(crate) moved_in: u32,
-    /// Last update in which the box began anew, or was removed.
-    begun_in: u32,
 }
 
 /// The query for the proxies of colliders that take part in collisions.
@@ -72,12 +71,11 @@ impl ColliderBoxes {
         keys: &ProxyKeys<'_, '_>,
     ) -> Result<(), Error> {
         self.update = self.update.wrapping_add(1);
+        self.moved.clear();
         // Avian names each proxy once. So all are set, whatever becomes of one of them.
         let mut all = self.begin_anew(trees, lost, keys);
         for &key in moved.proxies() {
-            all = all.and(self.set(trees, key).map(|id| {
-                id.into_iter().for_each(|id| self.slots[id as usize].moved_in = self.update);
-            }));
+            all = all.and(self.set(trees, key).map(|id| id.into_iter().for_each(|id| self.note_moved(id))));
         }
         all
     }
@@ -101,9 +99,6 @@ impl ColliderBoxes {
                 all = all.and(self.set(trees, key).map(|_| ()));
             }
         }
-        let (now, slots) = (self.update, &self.slots);
-        let is_old = |id: u32| slots[id as usize].begun_in != now;
-        self.without_contact.retain(|pair| is_old(pair.a) && is_old(pair.b));
         all
     }
 
@@ -130,7 +125,7 @@ impl ColliderBoxes {
             slot.key = key;
             return id;
         }
-        let slot = Slot { key, collider, moved_in: self.update.wrapping_sub(1), begun_in: self.update };
+        let slot = Slot { key, collider, moved_in: self.update.wrapping_sub(1) };
         self.ids[index] = self.insert(slot);
         self.ids[index]
     }
@@ -148,19 +143,31 @@ impl ColliderBoxes {
     fn remove(&mut self, collider: Entity) {
         let Some(id) = self.ids.get_mut(collider.index_u32() as usize) else { return };
         let id = std::mem::replace(id, NO_ID);
-        if let Some(slot) = self.slots.get_mut(id as usize) {
-            slot.begun_in = self.update;
+        if id != NO_ID {
             self.free.push(id);
             self.broad_phase.remove(id);
+            self.without_contact.forget(id);
         }
     }
 
     /// Appends the pairs that have begun since the last update.
     pub(crate) fn find(&mut self, begun: &mut Vec<Pair>) -> Result<(), Error> {
         let events = self.broad_phase.update()?;
-        events.removed.iter().for_each(|pair| _ = self.without_contact.remove(pair));
+        events.removed.iter().for_each(|pair| self.without_contact.remove(pair));
         begun.extend_from_slice(&events.added);
         Ok(())
+    }
+
+    /// Adds the pairs without a contact of which one proxy moved, and sorts the pairs.
+    pub(crate) fn add_waiting(&self, pairs: &mut Vec<Pair>) {
+        self.without_contact.list(&self.moved, |id| self.has_moved(id), pairs);
+        pairs.sort_unstable();
+        pairs.dedup();
+    }
+
+    fn note_moved(&mut self, id: u32) {
+        self.slots[id as usize].moved_in = self.update;
+        self.moved.push(id);
     }
 
     /// Returns true if the proxy with this id moved in this update.

@@ -30,11 +30,7 @@ impl StepInput<'_, '_> {
         let followed = boxes.follow(&self.trees, &self.moved, &mut self.lost, &self.keys);
         let mut pairs = Vec::new();
         let found = boxes.find(&mut pairs);
-        if !self.moved.proxies().is_empty() && !boxes.without_contact.is_empty() {
-            let has_moved = |pair: &&Pair| boxes.has_moved(pair.a) || boxes.has_moved(pair.b);
-            pairs.extend(boxes.without_contact.iter().filter(has_moved));
-            pairs.sort_unstable();
-        }
+        boxes.add_waiting(&mut pairs);
         (pairs, followed.and(found))
     }
 }

@@ -33,6 +33,7 @@ mod boxes;
 mod collect;
 mod lost;
 pub mod shadow;
+mod waiting;
 
 pub use boxes::ColliderBoxes;
 pub use pbig_core::{Error, Report};
