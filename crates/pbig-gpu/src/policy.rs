@@ -1,5 +1,7 @@
 //! The rules on counts by which the device declines a call, and the limit of a dispatch.
 
+use crate::GpuOptions;
+
 /// Maximum number of segments of columns of a large item.
 pub(crate) const WIDEST_ITEM: u32 = 8;
 
@@ -12,6 +14,11 @@ const TESTS_PER_PAIR: u64 = 32;
 /// Number of tests that every search may make: the device is done in less time than the CPU takes to begin.
 const ALWAYS_ALLOWED_TESTS: u64 = 1 << 16;
 
+/// Returns how many times the tests of the default cells a caller allows who wants this number of boxes in a cell.
+pub(crate) fn allowed_by_wish(boxes_per_cell: f32) -> u64 {
+    (boxes_per_cell / GpuOptions::DEFAULT.boxes_per_cell).max(1.0).min(1024.0) as u64
+}
+
 /// Returns the maximum number of tests of a search. Beyond it the device declines: the CPU's work is bounded for every shape,
 /// that of one grid is not.
 pub(crate) const fn most_tests(boxes: u64, expected_pairs: u64) -> u64 {
@@ -23,7 +30,6 @@ pub(crate) const fn most_tests(boxes: u64, expected_pairs: u64) -> u64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::GpuOptions;
     use crate::layout::LANES;
 
     /// Returns the maximum number of tests of one dispatch, for chunks of this number of small and large items.
@@ -37,6 +43,14 @@ mod tests {
     #[test]
     fn no_dispatch_of_the_defaults_makes_more_than_two_billion_tests() {
         assert_eq!(tests_of_dispatch(GpuOptions::DEFAULT.chunk, WIDEST_ITEM), 1 << 31);
+    }
+
+    #[test]
+    fn larger_cells_allow_as_many_times_the_tests() {
+        assert_eq!(
+            [f32::NAN, -1.0, 2.0, 4.0, 32.0, f32::INFINITY].map(allowed_by_wish),
+            [1, 1, 1, 1, 8, 1024]
+        );
     }
 
     /// One ground under ten million boxes: each pair of the ground is one test more.

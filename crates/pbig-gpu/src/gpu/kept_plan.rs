@@ -61,10 +61,10 @@ impl KeptPlan {
     }
 
     /// Returns the tests that a call may need, in units of [`LANES`].
-    pub(super) fn most_tests(&self, boxes: u32) -> u32 {
+    pub(super) fn most_tests(&self, boxes: u32, allowed_by_wish: u64) -> u32 {
         let boxes = u64::from(boxes);
         let pairs = self.pairs.saturating_mul(boxes.div_ceil(self.boxes.max(1)));
-        let most = most_tests(boxes, pairs) / u64::from(LANES);
+        let most = most_tests(boxes, pairs).saturating_mul(allowed_by_wish) / u64::from(LANES);
         let usual = self.first.map_or(u64::MAX, |first| {
             MAX_TESTS_FACTOR * (first.tests.max(1) * boxes / first.boxes) + ALWAYS_ALLOWED_TESTS
         });
@@ -119,18 +119,19 @@ mod tests {
     #[test]
     fn later_calls_may_need_four_times_the_tests_of_the_first() {
         let mut plan = kept(100_000);
-        assert_eq!(u64::from(plan.most_tests(100_000)), most_tests(100_000, 0) / 256);
+        assert_eq!(u64::from(plan.most_tests(100_000, 1)), most_tests(100_000, 0) / 256);
+        assert_eq!(u64::from(plan.most_tests(100_000, 8)), most_tests(100_000, 0) / 32);
         plan.is_outgrown_after(&counted(100_000, 0, 4000));
-        assert_eq!(plan.most_tests(100_000), 4 * 4000 + 1024);
-        assert_eq!(plan.most_tests(50_000), 4 * 2000 + 1024);
+        assert_eq!(plan.most_tests(100_000, 1), 4 * 4000 + 1024);
+        assert_eq!(plan.most_tests(50_000, 1), 4 * 2000 + 1024);
     }
 
     /// The largest number would tell the device that there is no limit, even if its counts wrapped around.
     #[test]
     fn no_plan_may_need_any_number_of_tests() {
         let mut plan = KeptPlan { pairs: u64::MAX, ..kept(1000) };
-        assert_eq!(plan.most_tests(u32::MAX), u32::MAX - 1);
+        assert_eq!(plan.most_tests(u32::MAX, 1), u32::MAX - 1);
         plan.is_outgrown_after(&counted(1, 0, u32::MAX));
-        assert_eq!(plan.most_tests(u32::MAX), u32::MAX - 1);
+        assert_eq!(plan.most_tests(u32::MAX, 1), u32::MAX - 1);
     }
 }

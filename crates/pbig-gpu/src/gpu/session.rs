@@ -15,6 +15,7 @@ use crate::decode::pair_count;
 use crate::layout::{BITS, COUNTED, Counters, DeviceBox, FILTERED, LANES, Params, RAW, SORTED};
 use crate::pbig::Summary;
 use crate::policy::WIDEST_ITEM;
+use crate::policy::allowed_by_wish;
 use crate::{Coding, GpuOptions};
 use pbig_core::{DeviceFound, DeviceReport, internal::Clock};
 use std::sync::Arc;
@@ -195,10 +196,11 @@ impl Session {
         report: &mut DeviceReport,
     ) -> Result<Params, GpuError> {
         if job.needs_grid {
+            let allowed = allowed_by_wish(self.options.boxes_per_cell);
             let kept = self.plan(job, &params, report).await?;
             check_entries(kept, params.boxes)?;
             params = kept.plan.add_to(params);
-            params.most_tests = kept.most_tests(params.boxes);
+            params.most_tests = kept.most_tests(params.boxes, allowed);
         }
         params.flags |= self.coding_flags(job, &params);
         Ok(params)
