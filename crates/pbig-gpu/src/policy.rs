@@ -56,9 +56,9 @@ mod tests {
     /// One ground under ten million boxes: each pair of the ground is one test more.
     #[test]
     fn ordinary_scenes_are_far_below_the_limit_and_crowds_beyond() {
-        let million = 10_000_000;
-        assert!(most_tests(million, 0) > 2 * (18 * million + million));
-        assert!(most_tests(million, 0) < million * million / 1000);
+        let ten_million = 10_000_000;
+        assert!(most_tests(ten_million, 0) > 2 * (18 * ten_million + ten_million));
+        assert!(most_tests(ten_million, 0) < ten_million * ten_million / 1000);
         assert!(most_tests(25_000, 0) < 25_000 * 25_000 / 2 / 20);
         assert!(most_tests(25_000, 25_000 * 12_500) > 25_000 * 25_000);
     }

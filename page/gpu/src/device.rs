@@ -46,7 +46,7 @@ pub(crate) async fn find(
 
 fn failure(failure: DeviceFailure) -> JsError {
     match failure {
-        DeviceFailure::Failed(reason) => to_js(reason),
+        DeviceFailure::Failed(reason) | DeviceFailure::Declined(reason) => to_js(reason),
         DeviceFailure::TooManyPairs => to_js("there are too many pairs"),
     }
 }

@@ -139,7 +139,8 @@ impl Session {
     fn upload(&mut self, job: &Job<'_>, report: &mut DeviceReport) -> Result<Params, GpuError> {
         self.table = None;
         self.sizes.expected_words = std::mem::take(&mut self.sizes.max_words);
-        if self.sizes.lists == Counters::default() && self.options.first_bytes > 0 {
+        let is_first = self.sizes.expected_words == 0 && self.sizes.lists == Counters::default();
+        if is_first && self.options.first_bytes > 0 {
             // A pair a box.
             self.sizes.expected_words = 2 * job.boxes.len() as u64;
         }

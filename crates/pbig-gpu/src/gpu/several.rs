@@ -18,6 +18,7 @@ pub struct GpuFinders {
 
 impl GpuFinders {
     /// Opens a device on each adapter, see [`crate::adapters`]. They should be about equally fast: each gets as many boxes.
+    /// A GPU that two APIs offer, as Vulkan and DirectX 12, is two adapters: give one of them.
     ///
     /// # Errors
     /// As [`GpuFinder::on`], and if there is no adapter.
