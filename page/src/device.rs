@@ -6,8 +6,8 @@ use pbig_core::{
 };
 use std::fmt;
 
-/// Returns all pairs of the boxes that their filters, if any, allow.
-pub(crate) type FindAll = fn(&[Aabb], Option<&[ProxyFilter]>) -> Vec<Pair>;
+/// Returns all pairs of the boxes that their filters, if any, allow; none if the device declines the call.
+pub(crate) type FindAll = fn(&[Aabb], Option<&[ProxyFilter]>) -> Option<Vec<Pair>>;
 
 /// A device that another module is, which finds all pairs in each call.
 #[derive(Clone)]
@@ -35,7 +35,8 @@ impl RemoteDevice {
         filters: Option<&[ProxyFilter]>,
         max: u64,
     ) -> Result<Vec<Pair>, DeviceFailure> {
-        let pairs = (self.find_all)(boxes, filters);
+        let declined = || DeviceFailure::Declined("the GPU declined the boxes: the CPU does the work".into());
+        let pairs = (self.find_all)(boxes, filters).ok_or_else(declined)?;
         if pairs.len() as u64 > max { Err(DeviceFailure::TooManyPairs) } else { Ok(pairs) }
     }
 }
@@ -88,7 +89,7 @@ fn count_valid(now: &ChangeRequest<'_>) -> u32 {
 
 /// Asks the page's GPU, and suspends the module until it answers. A failure ends the step with the GPU's error.
 #[cfg(target_family = "wasm")]
-fn find_on_gpu(boxes: &[Aabb], filters: Option<&[ProxyFilter]>) -> Vec<Pair> {
+fn find_on_gpu(boxes: &[Aabb], filters: Option<&[ProxyFilter]>) -> Option<Vec<Pair>> {
     use wasm_bindgen::prelude::wasm_bindgen;
 
     // Without wasm-bindgen, whose JavaScript around a function cannot be suspended.
@@ -98,16 +99,16 @@ fn find_on_gpu(boxes: &[Aabb], filters: Option<&[ProxyFilter]>) -> Vec<Pair> {
     }
     #[wasm_bindgen(raw_module = "pbig-page-device")]
     extern "C" {
-        fn take_pairs() -> Vec<u32>;
+        fn take_pairs() -> Option<Vec<u32>>;
     }
     let filters = filters.map_or(std::ptr::null(), <[_]>::as_ptr);
     // SAFETY: `web/device.js` reads `boxes.len()` boxes and, unless the pointer is null, as many filters.
     unsafe { find_pairs(boxes.as_ptr(), filters, boxes.len()) };
-    take_pairs().as_chunks().0.iter().map(|&[a, b]| Pair { a, b }).collect()
+    Some(take_pairs()?.as_chunks().0.iter().map(|&[a, b]| Pair { a, b }).collect())
 }
 
 #[cfg(not(target_family = "wasm"))]
-fn find_on_gpu(_: &[Aabb], _: Option<&[ProxyFilter]>) -> Vec<Pair> {
+fn find_on_gpu(_: &[Aabb], _: Option<&[ProxyFilter]>) -> Option<Vec<Pair>> {
     panic!("the page's GPU is that of a browser")
 }
 
@@ -116,8 +117,28 @@ mod tests {
     use super::*;
     use pbig_core::{Backend, BroadPhase, Config, oracle};
 
-    fn brute_force(boxes: &[Aabb], filters: Option<&[ProxyFilter]>) -> Vec<Pair> {
-        oracle::pairs_filtered(boxes, filters.unwrap_or(&vec![ProxyFilter::ALL; boxes.len()]))
+    fn brute_force(boxes: &[Aabb], filters: Option<&[ProxyFilter]>) -> Option<Vec<Pair>> {
+        Some(oracle::pairs_filtered(boxes, filters.unwrap_or(&vec![ProxyFilter::ALL; boxes.len()])))
+    }
+
+    #[test]
+    fn the_cpu_does_what_the_device_declines() {
+        let config = Config { backend: Backend::Device, ..Config::DEFAULT };
+        let device = Box::new(RemoteDevice { find_all: |_, _| None });
+        let mut broad_phase = BroadPhase::with_device(config, device).unwrap();
+        (0..40).for_each(|id| change(&mut broad_phase, id, 7 * id + 1));
+        let events = broad_phase.update().unwrap().added.len();
+        assert!(
+            events > 20
+                && broad_phase.pairs().eq(oracle::pairs_filtered(
+                    broad_phase.fat_aabbs(),
+                    &(0..40)
+                        .map(|id| ProxyFilter { body: (7 * id + 1) % 13, ..ProxyFilter::ALL })
+                        .collect::<Vec<_>>(),
+                )),
+            "{events} events"
+        );
+        assert!(broad_phase.report().fallback.as_deref().is_some_and(|why| why.contains("declined")));
     }
 
     /// Sets, moves, filters anew or removes a box, as a number says.

@@ -17,7 +17,7 @@ async function find(boxes, filters, count) {
 /** Suspends the calling module until the GPU has answered. */
 export const find_pairs = globalThis.WebAssembly?.Suspending ? new WebAssembly.Suspending(find) : () => {};
 
-/** Returns the pairs that were found last: ids, pair after pair. */
+/** Returns the pairs that were found last: ids, pair after pair. Nothing if the GPU declined. */
 export function take_pairs() {
     return pairs;
 }

@@ -23,6 +23,7 @@ class Page {
     #stage;
     #panel;
     #times = new Times();
+    #choice;
     #pace = new Pace();
     #isPaused = false;
     #isHeld = false;
@@ -79,7 +80,9 @@ class Page {
     }
 
     async #changeBroadPhase(broadPhase) {
+        const choice = (this.#choice = {});
         const obstacle = broadPhase === "gpu" ? await gpuObstacle() : undefined;
+        if (choice !== this.#choice) return; // There was a later one.
         this.#panel.showObstacle(obstacle);
         if (obstacle) return this.#showSettings();
         this.#settings = { ...this.#settings, broadPhase };

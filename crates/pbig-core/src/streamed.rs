@@ -41,7 +41,7 @@ impl Ranked {
     }
 }
 
-/// Finds all pairs of some boxes, or, with a `split`, those of a box before it with one from there on.
+/// Finds all pairs of some boxes; with a `split`, the pairs of an id below it and an id from it on.
 pub(crate) fn find_pairs(boxes: &[Aabb], split: Option<u32>, rule: &Rule<'_>, hits: &mut [Hits]) {
     let all = ranked(boxes);
     match split.map(|split| all.partition_point(|one| one.id < split)) {

@@ -60,7 +60,7 @@ const REACHED: f64 = 0.6;
 const DISPATCH_MS: f64 = 0.008;
 const CALL_MS: f64 = 0.15;
 /// Dispatches of a sorted search. wgpu adds one for each indirect one.
-const DISPATCHES: f64 = 18.0 + 7.0;
+const DISPATCHES: f64 = 17.0 + 7.0;
 
 /// Memory accesses of a kernel.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -1,6 +1,6 @@
 //! The measurement of a set of boxes on the GPU, beside the CPU. JavaScript measures the times of whole calls.
 
-use crate::device::{Device, find};
+use crate::device::{Device, failure, find};
 use crate::to_js;
 use pbig_core::{Aabb, Backend, Config, DeviceFound, Finder, Limits, SearchRequest};
 use pbig_gpu::{GpuFinder, GpuOptions};
@@ -104,7 +104,7 @@ impl Benchmark {
         let finder = if times_kernels { &mut self.timed } else { &mut self.device.finder };
         let boxes = &self.boxes[round as usize % 2];
         let request = SearchRequest { boxes, filters: None, is_sorted: true, max_pairs: u64::MAX };
-        find(finder, &request, &mut self.found).await
+        find(finder, &request, &mut self.found).await.map_err(failure)
     }
 
     /// Returns true if both processors have found the same pairs.

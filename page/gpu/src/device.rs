@@ -36,15 +36,15 @@ pub(crate) async fn find(
     finder: &mut GpuFinder,
     request: &SearchRequest<'_>,
     found: &mut DeviceFound,
-) -> Result<(), JsError> {
-    finder.find_all_async(request, found).await.map_err(failure)?;
+) -> Result<(), DeviceFailure> {
+    finder.find_all_async(request, found).await?;
     if !found.pairs.is_sorted() {
         found.pairs.sort_unstable();
     }
     Ok(())
 }
 
-fn failure(failure: DeviceFailure) -> JsError {
+pub(crate) fn failure(failure: DeviceFailure) -> JsError {
     match failure {
         DeviceFailure::Failed(reason) | DeviceFailure::Declined(reason) => to_js(reason),
         DeviceFailure::TooManyPairs => to_js("there are too many pairs"),

@@ -1,8 +1,8 @@
 //! The GPU as the simulation uses it.
 
-use crate::device::{Device, find};
+use crate::device::{Device, failure, find};
 use bytemuck::cast_slice;
-use pbig_core::{DeviceFound, SearchRequest};
+use pbig_core::{DeviceFailure, DeviceFound, SearchRequest};
 use wasm_bindgen::prelude::*;
 
 /// An open GPU.
@@ -23,15 +23,22 @@ impl Gpu {
     }
 
     /// Returns the pairs of boxes that their filters allow, as two ids a pair. A box is six numbers, `min` and `max`. A filter is four
-    /// numbers, the memory of a [`pbig_core::ProxyFilter`]; without filters all boxes may pair.
+    /// numbers, the memory of a [`pbig_core::ProxyFilter`]; without filters all boxes may pair. Returns nothing if the device declines.
     ///
     /// # Errors
     /// The reason of the device.
-    pub async fn find(&mut self, boxes: Vec<f32>, filters: Option<Vec<u32>>) -> Result<Vec<u32>, JsError> {
+    pub async fn find(
+        &mut self,
+        boxes: Vec<f32>,
+        filters: Option<Vec<u32>>,
+    ) -> Result<Option<Vec<u32>>, JsError> {
         let filters = filters.as_deref().map(cast_slice);
         let request =
             SearchRequest { boxes: cast_slice(&boxes), filters, is_sorted: true, max_pairs: u64::MAX };
-        find(&mut self.device.finder, &request, &mut self.found).await?;
-        Ok(cast_slice(&self.found.pairs).to_vec())
+        match find(&mut self.device.finder, &request, &mut self.found).await {
+            Ok(()) => Ok(Some(cast_slice(&self.found.pairs).to_vec())),
+            Err(DeviceFailure::Declined(_)) => Ok(None),
+            Err(other) => Err(failure(other)),
+        }
     }
 }

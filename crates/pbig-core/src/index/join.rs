@@ -17,7 +17,7 @@ const PIECE: usize = 64;
 /// Pairs of a leaf that are kept together.
 const BATCH: usize = 4096;
 
-/// Maximum number of boxes of a leaf that meet the bounds of another one for a test at once.
+/// Maximum number of boxes that are tested at once, without a look at the bounds of their leaf.
 const FEW_LANES: u32 = 3;
 
 impl BoxIndex {

@@ -16,7 +16,7 @@ impl BoxIndex {
     /// may differ from those at the last call, in any order, repeated or not; without it any box may differ.
     pub fn refresh(&mut self, boxes: &[Aabb], changed: Option<&[u32]>) {
         self.has_moved |= changed.is_none_or(|changed| !changed.is_empty());
-        let is_few = |changed: &&[u32]| changed.len() * policy::REFIT_SHARE < self.places.len();
+        let is_few = |changed: &&[u32]| changed.len() * policy::REFIT_SHARE < self.listed;
         match changed.filter(is_few) {
             Some(changed) => changed.iter().for_each(|&id| self.take(id, boxes)),
             None => self.refit(boxes),

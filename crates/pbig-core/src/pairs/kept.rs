@@ -11,8 +11,8 @@ const MIN_ROOM: u32 = 4;
 /// Marks a spare place of a row; the other bits are the row's id. Ids are below 2^28.
 const SPARE: u32 = 1 << 31;
 
-/// Number of ids that are read in the time in which the rows of `b` take an event: after a rebuild with more events these rows are
-/// made anew, by all ids, when they are wanted.
+/// Number of ids that are read in the time that an event takes in the rows of `b`. After a rebuild with more events, these rows are
+/// made anew from all ids when they are wanted.
 const IDS_OF_EVENT: usize = 32;
 
 /// Number of pairs between a prefetch of rows and their use.
@@ -89,7 +89,8 @@ impl Rows {
     fn remove(&mut self, run: &[Pair]) {
         let id = run[0].a;
         let span = self.spans[id as usize];
-        let row = &mut self.pool[span.range()];
+        // An empty row may lie beyond the pool.
+        let Some(row) = self.pool.get_mut(span.range()) else { return };
         let (mut from, mut len) = (0, 0);
         for pair in run {
             if let Ok(place) = row[from..].binary_search(&pair.b) {

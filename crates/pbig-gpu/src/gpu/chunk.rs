@@ -199,9 +199,14 @@ impl Session {
         let header: Header = bytemuck::pod_read_unaligned(header);
         self.note_times(&chunk, &header, sink);
         let Header { totals, counters, .. } = header;
-        sink.check(found_pairs(params, &totals))?;
         let (out, needed) = (BufferId::of(Buffer::Out, chunk.side), output_words(params, &totals));
-        if let Some(repeat) = self.repeat(params, &counters, needed, out) {
+        let mut repeat = self.refused(params, &counters);
+        if repeat.is_none() {
+            // The counts of a refused map are of no account.
+            sink.check(found_pairs(params, &totals))?;
+            repeat = self.too_much_output(needed, out);
+        }
+        if let Some(repeat) = repeat {
             sink.found.report.repeats += 1;
             return Ok(repeat);
         }
@@ -234,14 +239,8 @@ impl Session {
         sink.check(0)
     }
 
-    /// Returns why the map or the chunk has to be repeated, if it has.
-    fn repeat(
-        &mut self,
-        params: &Params,
-        counters: &Counters,
-        needed: u64,
-        out: BufferId,
-    ) -> Option<ChunkResult> {
+    /// Returns why the map has to be repeated, if it has.
+    fn refused(&mut self, params: &Params, counters: &Counters) -> Option<ChunkResult> {
         if params.levels > 0 {
             self.sizes.lists = *counters;
             // First: lists that a plan for other boxes makes are not worth their memory.
@@ -252,6 +251,10 @@ impl Session {
                 return Some(ChunkResult::MapTooLarge);
             }
         }
+        None
+    }
+
+    fn too_much_output(&self, needed: u64, out: BufferId) -> Option<ChunkResult> {
         (needed > self.storage.size(out) / 4).then_some(ChunkResult::OutputTooLarge(needed))
     }
 

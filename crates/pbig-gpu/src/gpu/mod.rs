@@ -214,6 +214,8 @@ impl GpuFinder {
         self.check_pause()?;
         let result = self.try_run(request, found).await;
         self.failed = match &result {
+            // Another call in the page is in progress.
+            Err(Failure::Device(GpuError::Busy)) => self.failed.take(),
             Err(Failure::Device(error)) => Some((Clock::start(), error.to_string())),
             _ => None,
         };
@@ -231,8 +233,8 @@ impl GpuFinder {
         });
         match result {
             Err(Failure::TooManyPairs | Failure::Declined(_)) => session.uploaded.forget_motions(),
+            Ok(()) | Err(Failure::Device(GpuError::Busy)) => {}
             Err(Failure::Device(_)) => return result,
-            Ok(()) => {}
         }
         self.session = Some(session);
         result
