@@ -300,3 +300,29 @@ fn pairs_of_a_removed_box_end_for_the_other_in_a_rebuild() {
     assert_eq!(broad_phase.report().plan.algorithm, Algorithm::Grid);
     assert!(broad_phase.pairs_of(3).eq([Pair { a: 3, b: 6 }]));
 }
+
+/// Boxes of all scales around a corner: a tree searches them in little work, and many look-ups in it are given up.
+#[test]
+fn look_ups_given_up_cost_at_most_64_tests_a_box() {
+    let n = 9000;
+    let mut random = StdRng::seed_from_u64(1);
+    let mut one = || {
+        let at = [0; 3].map(|_| random.random_range(0.0f32..1.0));
+        let scale = 10f32.powf(-6.0 * at[0]);
+        Aabb::from_center(at.map(|x| x * scale), [0.01 * scale; 3])
+    };
+    let mut boxes: Vec<Aabb> = (0..n).map(|_| one()).collect();
+    let mut broad_phase = BroadPhase::default();
+    for changed in [n, n / 21] {
+        boxes[..changed].iter_mut().for_each(|aabb| *aabb = one());
+        for (id, aabb) in (0..).zip(&boxes) {
+            broad_phase.set(id, *aabb, ProxyFilter::ALL).unwrap();
+        }
+        broad_phase.update().unwrap();
+    }
+    let mut finder = crate::Finder::default();
+    finder.find(&boxes).unwrap();
+    let [update, search] = [broad_phase.report(), finder.report()].map(|report| report.work);
+    assert!(update > 50 * n as u64, "{update}: no look-up was given up");
+    assert!(update <= 3 * search / 2 + 64 * n as u64, "{update}, and {search} in a search");
+}

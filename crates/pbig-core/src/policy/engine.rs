@@ -33,8 +33,9 @@ const EDIT_UP_TO_WORK_PER_BOX: u64 = 60;
 /// Maximum number of rebuilds in a row after updates that were given up.
 const MAX_REBUILDS: u32 = 64;
 
-/// Maximum number of nodes looked at and boxes met in an update in a tree, for each box of the world.
-const LOOK_UP_TO_NODES_PER_BOX: u64 = 8;
+/// Maximum number of nodes looked at and boxes met in an update in a tree, for each box of the world. A node counts as nine in the
+/// work: an update that is given up takes at most 64 more for each box than a search.
+const LOOK_UP_TO_NODES_PER_BOX: u64 = 7;
 
 /// Maximum share of boxes out of the grid's order for an edit, as one in this number: lists are slower than slots.
 pub(crate) const SPILL_UP_TO_ONE_IN: usize = 2;
@@ -192,7 +193,7 @@ mod tests {
         assert_eq!(choose_engine(&Counts { changed: 501, ..tree }, None), Engine::Rebuild);
         assert_eq!(choose_engine(&Counts { boxes: 2048, ..tree }, None), Engine::Sweep);
         assert_eq!(choose_engine(&Counts { boxes: 2049, ..tree }, None), Engine::Tree);
-        assert_eq!(look_up_to_nodes(1000), 8000);
+        assert_eq!(look_up_to_nodes(1000), 7000);
     }
 
     #[test]
