@@ -93,7 +93,7 @@ fn ground(world: &mut World, width: f32) {
 }
 
 fn shape(i: usize, size: f32) -> Collider {
-    if i % 2 == 0 { Collider::cuboid(size, size, size) } else { Collider::sphere(size / 2.0) }
+    if i.is_multiple_of(2) { Collider::cuboid(size, size, size) } else { Collider::sphere(size / 2.0) }
 }
 
 /// A settled block of cubes and balls.
