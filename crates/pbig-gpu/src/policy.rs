@@ -12,7 +12,7 @@ const TESTS_PER_BOX_AND_LOG: u64 = 3;
 const TESTS_PER_PAIR: u64 = 32;
 
 /// Number of tests that every search may make: the device is done in less time than the CPU takes to begin.
-const ALWAYS_ALLOWED_TESTS: u64 = 1 << 16;
+const ALWAYS_ALLOWED_TESTS: u64 = 1 << 17;
 
 /// Returns how many times the tests of the default cells a caller allows who wants this number of boxes in a cell.
 pub(crate) fn allowed_by_wish(boxes_per_cell: f32) -> u64 {

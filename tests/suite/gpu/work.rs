@@ -117,7 +117,10 @@ fn many_chunks_take_one_wait_and_send_no_pair_twice() {
     needs_gpu!();
     let boxes = set("unit", 20_000);
     let options = GpuOptions { chunk: [64, 4], time_kernels: false, ..GpuOptions::DEFAULT };
-    let mut finder = with_device(options, GpuFinder::new().expect("an adapter"));
+    // `with_device` times kernels, and a chunk that is timed is awaited.
+    let device = GpuFinder::new().expect("an adapter").with_options(options);
+    let config = Config { backend: Backend::Device, ..Config::DEFAULT };
+    let mut finder = Finder::with_device(config, Box::new(device));
     let wanted = on_cpu(&boxes);
     for call in 0..3 {
         let (pairs, report) = find(&mut finder, &boxes);
