@@ -16,7 +16,8 @@ const ALWAYS_ALLOWED_TESTS: u64 = 1 << 17;
 
 /// Returns how many times the tests of the default cells a caller allows who wants this number of boxes in a cell.
 pub(crate) fn allowed_by_wish(boxes_per_cell: f32) -> u64 {
-    (boxes_per_cell / GpuOptions::DEFAULT.boxes_per_cell).max(1.0).min(1024.0) as u64
+    // A NaN is 0 as an integer.
+    ((boxes_per_cell / GpuOptions::DEFAULT.boxes_per_cell).clamp(1.0, 1024.0) as u64).max(1)
 }
 
 /// Returns the maximum number of tests of a search. Beyond it the device declines: the CPU's work is bounded for every shape,
