@@ -11,11 +11,9 @@ use pbig_core::{
 };
 use pbig_gpu::{Coding, GpuFinder, GpuOptions, adapters};
 use pbig_harness::boxes::BoxSet;
-use pbig_shaders::{KERNELS, Stage};
 use pbig_tests::{Way, difference, gpu, needs_gpu};
 use std::pin::pin;
 use std::task::{Context, Poll, Waker};
-use std::time::Duration;
 
 fn set(name: &str, n: usize) -> Vec<Aabb> {
     BoxSet::named(name).expect("the set exists").boxes(n, 5)
@@ -65,20 +63,6 @@ fn lists_that_begin_far_too_small_lose_nothing() {
             assert!(report.repeats > 0, "{name}: nothing was too small");
             let (_, report) = find(&mut finder, &boxes);
             assert_eq!(report.repeats, 0, "{name}: the second call has the room the first one needed");
-        }
-    }
-}
-
-#[test]
-fn work_in_many_chunks_is_complete_with_and_without_pipelining() {
-    needs_gpu!();
-    for (name, boxes) in [("mixed", set("mixed", 3000)), ("identical", cubes(2000))] {
-        let wanted = on_cpu(&boxes);
-        for pipelining in [true, false] {
-            let options = GpuOptions { chunk: [3, 2], pipelining, first_bytes: 0, ..GpuOptions::DEFAULT };
-            let (pairs, report) = find(&mut with(options).finder(), &boxes);
-            assert_eq!(difference(&pairs, &wanted), None, "{name}, pipelining {pipelining}");
-            assert!(report.chunks > 4, "{name}: {} chunks", report.chunks);
         }
     }
 }
@@ -214,28 +198,6 @@ fn packed_output_is_an_eighth_in_crowds_and_used_if_it_pays() {
     let sparse = set("uniform", 20_000);
     find(&mut finder, &sparse);
     assert_eq!(find(&mut finder, &sparse).1.compression, 1.0, "few pairs do not pay for the table");
-}
-
-#[test]
-fn a_call_sends_each_box_once_and_gets_each_pair_once_in_order() {
-    needs_gpu!();
-    let mut boxes = set("unit", 20_000);
-    let mut finder = with(GpuOptions::DEFAULT).finder();
-    let all = size_of_val(boxes.as_slice()) as u64;
-    for _ in 0..3 {
-        let (pairs, report) = find(&mut finder, &boxes);
-        assert_eq!(report.uploaded, all);
-        assert_eq!(difference(&pairs, &on_cpu(&boxes)), None);
-        assert!(report.kernels.iter().any(|(name, _)| *name == "rank_pairs"), "{:?}", report.kernels);
-        let is_map = |name: &str| KERNELS.iter().any(|it| it.name == name && it.stage == Stage::Map);
-        let map: Duration =
-            report.kernels.iter().filter(|(name, _)| is_map(name)).map(|(_, time)| time).sum();
-        assert!(map > Duration::ZERO && report.map == map, "{:?}, not {map:?}", report.map);
-        boxes[777] = boxes[778];
-    }
-    let (_, report) = find(&mut finder, &boxes);
-    let pairs = finder.pairs().len() as u64;
-    assert!(report.downloaded <= 1000 + 8 * pairs * 5 / 4, "{} bytes for {pairs} pairs", report.downloaded);
 }
 
 /// A world of one part whose first update has more events than a buffer holds: the device cannot sort them.

@@ -37,6 +37,7 @@ pub mod model;
 mod options;
 #[doc(hidden)]
 pub mod pbig;
+#[cfg(feature = "wgpu")]
 mod policy;
 
 #[cfg(all(feature = "wgpu", not(target_arch = "wasm32")))]

@@ -6,7 +6,9 @@ use pbig_core::{
 };
 use pbig_gpu::{Coding, GpuFinder, GpuFinders, GpuOptions, adapters};
 use pbig_harness::hard::{Part, Recipe, shapes};
+use pbig_shaders::{KERNELS, Stage};
 use pbig_tests::{difference, needs_gpu};
+use std::time::Duration;
 
 /// Maximum tests of a shape, as a multiple of those of cubes, without those that its pairs need.
 const MOST_TESTS: u64 = 5;
@@ -110,6 +112,42 @@ fn the_first_call_repeats_nothing_and_waits_at_most_once_more() {
         assert_eq!((first.repeats, next.repeats), (0, 0), "{n} in {name}");
         assert_eq!((first.waits, next.waits), (2, 1), "{n} in {name}: one more to measure the boxes");
     }
+}
+
+#[test]
+fn work_in_many_chunks_is_complete_with_and_without_pipelining() {
+    needs_gpu!();
+    for (name, boxes) in [("mixed", set("mixed", 3000)), ("identical", cubes(2000))] {
+        let wanted = on_cpu(&boxes);
+        for pipelining in [true, false] {
+            let options = GpuOptions { chunk: [3, 2], pipelining, first_bytes: 0, ..GpuOptions::DEFAULT };
+            let (pairs, report) = find(&mut with(options).finder(), &boxes);
+            assert_eq!(difference(&pairs, &wanted), None, "{name}, pipelining {pipelining}");
+            assert!(report.chunks > 4, "{name}: {} chunks", report.chunks);
+        }
+    }
+}
+
+#[test]
+fn a_call_sends_each_box_once_and_gets_each_pair_once_in_order() {
+    needs_gpu!();
+    let mut boxes = set("unit", 20_000);
+    let mut finder = with(GpuOptions::DEFAULT).finder();
+    let all = size_of_val(boxes.as_slice()) as u64;
+    for _ in 0..3 {
+        let (pairs, report) = find(&mut finder, &boxes);
+        assert_eq!(report.uploaded, all);
+        assert_eq!(difference(&pairs, &on_cpu(&boxes)), None);
+        assert!(report.kernels.iter().any(|(name, _)| *name == "rank_pairs"), "{:?}", report.kernels);
+        let is_map = |name: &str| KERNELS.iter().any(|it| it.name == name && it.stage == Stage::Map);
+        let map: Duration =
+            report.kernels.iter().filter(|(name, _)| is_map(name)).map(|(_, time)| time).sum();
+        assert!(map > Duration::ZERO && report.map == map, "{:?}, not {map:?}", report.map);
+        boxes[777] = boxes[778];
+    }
+    let (_, report) = find(&mut finder, &boxes);
+    let pairs = finder.pairs().len() as u64;
+    assert!(report.downloaded <= 1000 + 8 * pairs * 5 / 4, "{} bytes for {pairs} pairs", report.downloaded);
 }
 
 #[test]

@@ -43,7 +43,7 @@ fn searches(gpu: &GpuFinder, quick: bool) -> Result<[Table; 3], Failure> {
     let cases = sizes(gpu, quick).into_iter().flat_map(|n| sets.map(|set| (n, set)));
     for (n, set) in tracked(cases, "sets") {
         let ([cpu, on_gpu], counts, report) = search(gpu, set, n)?;
-        let predicted = counts.predicted_ms(like(gpu));
+        let predicted = known(gpu).map(|gpu| counts.predicted_ms(gpu));
         let pairs = counts.pairs as u64;
         let times = cells![set, n, pairs, cpu, on_gpu, cpu / on_gpu, predicted, milliseconds(report.wait)];
         let bytes = cells![report.uploaded, report.downloaded, report.device_bytes, report.compression];
@@ -60,9 +60,9 @@ fn searches(gpu: &GpuFinder, quick: bool) -> Result<[Table; 3], Failure> {
     Ok([table, kernels, model])
 }
 
-/// Returns the GPU of the model with the adapter's name, or else the smallest one.
-fn like(gpu: &GpuFinder) -> &'static Gpu {
-    GPUS.iter().find(|known| gpu.adapter().contains(known.name)).unwrap_or(&GPUS[3])
+/// Returns the GPU of the model with the adapter's name, if the model has it. The table `model` has all.
+fn known(gpu: &GpuFinder) -> Option<&'static Gpu> {
+    GPUS.iter().find(|known| gpu.adapter().contains(known.name))
 }
 
 /// Returns what the model asks for. The finder has just searched on the device.
