@@ -4,8 +4,6 @@ mod build;
 #[cfg_attr(feature = "dim2", path = "two.rs")]
 #[cfg_attr(not(feature = "dim2"), path = "three.rs")]
 pub mod dimension;
-#[cfg(not(any(feature = "dim2", feature = "f64")))]
 pub mod queries;
-#[cfg(not(any(feature = "dim2", feature = "f64")))]
 pub mod run;
 pub mod world;

@@ -1,6 +1,6 @@
 //! The scene queries of each frame, put to rapier.
 
-use crate::world::{World, pose, to_vector};
+use crate::world::{World, from_vector, pose, real, to_vector};
 use glam::Vec3;
 use pbig_scenes::frames::{
     AREA_RADIUS_METRES, CAPSULE_HALF_HEIGHT_METRES, CAPSULE_RADIUS_METRES, CAST_RADIUS_METRES, Extent,
@@ -52,13 +52,12 @@ impl FrameQueries {
 
     /// Moves the character, and returns its collisions.
     fn walk(&mut self, queries: &QueryPipeline<'_>) -> u64 {
-        let capsule = Capsule::new_y(CAPSULE_HALF_HEIGHT_METRES, CAPSULE_RADIUS_METRES);
+        let capsule = Capsule::new_y(real(CAPSULE_HALF_HEIGHT_METRES), real(CAPSULE_RADIUS_METRES));
         let (at, wanted) = (pose(self.character), to_vector(self.extent.character_motion(self.frame)));
         let (controller, mut collisions) = (KinematicCharacterController::default(), 0);
         let count = |_| collisions += 1;
-        let moved = controller.move_shape(FRAME_SECONDS, queries, &capsule, &at, wanted, count);
-        let way = moved.translation;
-        self.character += Vec3::new(way.x, way.y, way.z);
+        let moved = controller.move_shape(real(FRAME_SECONDS), queries, &capsule, &at, wanted, count);
+        self.character += from_vector(moved.translation);
         collisions
     }
 }
@@ -69,25 +68,25 @@ fn extent(world: &World) -> Extent {
     let moving = world.colliders.iter().filter(|(_, collider)| can_move(collider));
     Extent::around(moving.map(|(_, collider)| {
         let aabb = collider.compute_aabb();
-        [aabb.mins, aabb.maxs].map(|corner| Vec3::new(corner.x, corner.y, corner.z))
+        [aabb.mins, aabb.maxs].map(from_vector)
     }))
 }
 
 fn ray(queries: &QueryPipeline<'_>, query: Query) -> usize {
     let ray = Ray::new(to_vector(query.origin), to_vector(query.direction));
-    queries.cast_ray(&ray, MAX_DISTANCE_METRES, true).iter().count()
+    queries.cast_ray(&ray, real(MAX_DISTANCE_METRES), true).iter().count()
 }
 
 fn cast(queries: &QueryPipeline<'_>, query: Query) -> usize {
     let (at, along) = (pose(query.origin), to_vector(query.direction));
-    let options = ShapeCastOptions::with_max_time_of_impact(MAX_DISTANCE_METRES);
-    queries.cast_shape(&at, along, &Ball::new(CAST_RADIUS_METRES), options).iter().count()
+    let options = ShapeCastOptions::with_max_time_of_impact(real(MAX_DISTANCE_METRES));
+    queries.cast_shape(&at, along, &Ball::new(real(CAST_RADIUS_METRES)), options).iter().count()
 }
 
 fn area(queries: &QueryPipeline<'_>, query: Query) -> usize {
-    queries.intersect_shape(pose(query.origin), &Ball::new(AREA_RADIUS_METRES)).count()
+    queries.intersect_shape(pose(query.origin), &Ball::new(real(AREA_RADIUS_METRES))).count()
 }
 
 fn point(queries: &QueryPipeline<'_>, query: Query) -> usize {
-    queries.project_point(to_vector(query.origin), MAX_PROJECTION_METRES, true).iter().count()
+    queries.project_point(to_vector(query.origin), real(MAX_PROJECTION_METRES), true).iter().count()
 }

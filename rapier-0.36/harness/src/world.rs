@@ -195,6 +195,13 @@ pub fn to_vector(v: Vec3) -> Vector {
     Vector::from(std::array::from_fn::<Real, DIM, _>(|k| real(numbers[k])))
 }
 
+/// Returns rapier's vector as glam's. In two dimensions z is 0.
+#[allow(clippy::unnecessary_cast, reason = "rapier's numbers are f32 or f64")]
+pub fn from_vector(v: Vector) -> Vec3 {
+    let numbers: [Real; DIM] = v.into();
+    Vec3::from_array(std::array::from_fn(|k| numbers.get(k).map_or(0.0, |&x| x as f32)))
+}
+
 /// Returns a pose without rotation.
 pub fn pose(at: Vec3) -> Pose {
     Pose::from_translation(to_vector(at))

@@ -93,7 +93,7 @@ impl Across<'_> {
         for slot in scattered(0..self.own.len, step) {
             hits.begin(0, 0);
             self.search_slots(slot..slot + 1, rule, hits);
-            vain += policy::in_vain(hits.tests, hits.overlaps) * step as u64;
+            vain += policy::in_vain(hits.work_in_cells(), hits.overlaps) * step as u64;
         }
         let step = step.min(self.oversize_count() / policy::SAMPLED_OVERSIZE + 1);
         for i in scattered(0..self.oversize_count(), step) {

@@ -49,7 +49,7 @@ impl Sorted<'_> {
         for slot in scattered(0..len, step) {
             hits.begin(0, 0);
             self.grid.search_slots(slot..slot + 1, &rule, hits);
-            in_grid += search::in_vain(hits.tests, hits.overlaps);
+            in_grid += search::in_vain(hits.work_in_cells(), hits.overlaps);
         }
         let step_oversize = step.min(oversize / search::SAMPLED_OVERSIZE + 1);
         let mut among_oversize = 0;

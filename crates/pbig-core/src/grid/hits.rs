@@ -7,6 +7,7 @@
 use super::record::Record;
 use super::simd::{BLOCK, Simd, eight_from, prefetch};
 use crate::pairs::Grouping;
+use crate::policy::search::WORK_OF_VAGUE_TEST;
 use crate::{Keys, Pair, ProxyFilter, keys};
 use std::sync::atomic::{AtomicU64, Ordering};
 
@@ -59,6 +60,8 @@ pub(crate) struct Hits {
     pub(crate) group_shift: u32,
     /// Candidates tested.
     pub(crate) tests: u64,
+    /// Candidates that their codes do not tell apart, which are tested exactly.
+    vague: u64,
     /// Runs of cells, or nodes of a tree, looked at.
     pub(crate) runs: u64,
     /// Overlapping boxes met, filtered ones included.
@@ -119,8 +122,13 @@ impl Hits {
         self.groups.clear();
         self.groups.resize(groups, 0);
         self.group_shift = shift;
-        (self.tests, self.runs, self.overlaps, self.handed_over) = (0, 0, 0, 0);
+        (self.tests, self.vague, self.runs, self.overlaps, self.handed_over) = (0, 0, 0, 0, 0);
         (self.accounted, self.is_full) = (0, false);
+    }
+
+    /// Returns the work of the boxes in cells, in tests of codes.
+    pub(super) fn work_in_cells(&self) -> u64 {
+        self.tests + self.vague * (WORK_OF_VAGUE_TEST - 1)
     }
 
     /// Returns true if more pairs were found than may be.
@@ -139,6 +147,7 @@ impl Hits {
         rule: &Rule<'_>,
     ) {
         let candidates = self.expand(simd, &writer.blocks[..writer.len]);
+        self.vague += candidates as u64;
         self.test(own, records, candidates, rule);
         writer.len = 0;
     }
