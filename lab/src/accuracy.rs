@@ -1,8 +1,6 @@
-//! StudyRun time against error: a study for each thing that can be wrong by a little.
+//! Run time against error: a study for each thing that can be wrong by a little.
 
-mod coordinates;
 mod index;
-mod margin;
 mod simulation;
 mod wide;
 
@@ -13,13 +11,8 @@ use pbig_harness::prelude::*;
 pub type StudyRun = fn(bool) -> Result<BenchReport, Failure>;
 
 /// Every study with its name.
-pub const STUDIES: [(&str, StudyRun); 5] = [
-    ("index", index::run),
-    ("coordinates", coordinates::run),
-    ("margin", margin::run),
-    ("wide", wide::run),
-    ("simulation", simulation::run),
-];
+pub const STUDIES: [(&str, StudyRun); 3] =
+    [("index", index::run), ("wide", wide::run), ("simulation", simulation::run)];
 
 /// Returns a study with its chart: names of lines, each with a time and an error.
 fn report(
@@ -43,8 +36,4 @@ fn report(
 /// Returns the share of a part, in percent.
 fn percent(part: u64, all: u64) -> f64 {
     part as f64 / all.max(1) as f64 * 100.0
-}
-
-fn mean(values: &[f64]) -> f64 {
-    values.iter().sum::<f64>() / values.len().max(1) as f64
 }

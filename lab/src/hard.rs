@@ -1,7 +1,7 @@
 //! Times of hard worlds, on which a grid of one cell size takes quadratic time, and of hard histories of edits.
 
-use pbig_core::{Aabb, BroadPhase, Config, Engine, Finder, ProxyFilter};
-use pbig_harness::hard::{History, histories, shapes};
+use pbig_core::{Aabb, BroadPhase, Config, Engine, Finder};
+use pbig_harness::hard::{History, histories, shapes, tell};
 use pbig_harness::prelude::*;
 
 /// Numbers of boxes; a grid alone is measured with the first one only.
@@ -59,20 +59,13 @@ fn search(boxes: &[Aabb], engine: Option<Engine>) -> Result<(Finder, f64), Failu
 
 /// Returns mean and worst milliseconds of updates, and of searches of the same boxes.
 fn follow(history: &History, n: usize) -> Result<[[f64; 2]; 2], Failure> {
-    let boxes = history.start.boxes(n, 1);
     let mut broad_phase = BroadPhase::new(crate::UNLIMITED)?;
-    for (id, aabb) in (0..).zip(&boxes) {
-        broad_phase.set(id, *aabb, ProxyFilter::ALL)?;
-    }
-    broad_phase.update()?;
     let (mut finder, mut times) = (Finder::new(crate::UNLIMITED), [vec![], vec![]]);
-    for changes in history.changes(&boxes, 1) {
-        for (id, aabb) in changes {
-            match aabb {
-                Some(aabb) => broad_phase.set(id, aabb, ProxyFilter::ALL)?,
-                None => _ = broad_phase.remove(id),
-            }
-        }
+    let all = history.changes(n, 1);
+    tell(&mut broad_phase, &all[0])?;
+    broad_phase.update()?;
+    for changes in &all[1..] {
+        tell(&mut broad_phase, changes)?;
         let (done, ms) = timed(|| broad_phase.update().map(|_| ()));
         done?;
         times[0].push(ms);

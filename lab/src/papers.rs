@@ -5,7 +5,6 @@
 //! Using GPU Mapping Function", EGPGV 2012; times on a Quadro FX 3600M. The printed numbers are in `printed`, each with its place.
 
 mod avril;
-mod claims;
 mod figures;
 mod model;
 pub(crate) mod printed;
@@ -33,7 +32,7 @@ pub fn run(quick: bool) -> Result<BenchReport, Failure> {
     for part in tracked(PARTS, "parts") {
         tables.extend(part(&setup)?);
     }
-    tables.push(claims::table());
+    tables.push(figures::sizes());
     let gpu = if setup.is_software() { "pbig, software adapter" } else { "pbig, GPU" };
     let charts = charts(&tables, gpu);
     let head = vec![("software", setup.is_software().to_string()), ("adapter", setup.adapter)];

@@ -1,18 +1,12 @@
 //! A world in f64, beside the one in f32: its poses, boxes and pairs are the reference, near the origin and far from it.
 
-mod ulps;
-mod world;
-
-pub use ulps::widened_by_ulps;
-pub use world::{WideWorld, moved};
-
 use parry3d_f64::bounding_volume::BoundingVolume;
 use parry3d_f64::shape::SharedShape as WideShape;
 use pbig_core::{Aabb, Pair, oracle};
 use pbig_harness::world::World;
 use rand::rngs::StdRng;
 use rand::{RngExt, SeedableRng};
-use rapier3d::na::{Point3, Translation3, Unit, UnitQuaternion, Vector3};
+use rapier3d::na::{Point3, Translation3, UnitQuaternion, Vector3};
 use rapier3d::prelude::{Collider, ColliderBuilder, Isometry, Real, Shape, SharedShape, TypedShape};
 use std::ops::AddAssign;
 
@@ -33,12 +27,6 @@ impl Wide {
     pub fn gap(&self, other: &Self) -> f64 {
         let gaps = (0..3).map(|k| (self.min[k] - other.max[k]).max(other.min[k] - self.max[k]));
         gaps.fold(f64::NEG_INFINITY, f64::max)
-    }
-
-    /// Returns the distance by which a box in f32 ends inside this one, on each axis; 0 where it does not.
-    pub fn shortfall(&self, aabb: &Aabb) -> [f64; 3] {
-        let [min, max] = [aabb.min, aabb.max].map(|corner| corner.map(f64::from));
-        std::array::from_fn(|k| (min[k] - self.min[k]).max(self.max[k] - max[k]).max(0.0))
     }
 }
 
@@ -201,7 +189,6 @@ fn shape_in_f64(shape: &dyn Shape) -> Option<WideShape> {
         }
         TypedShape::Cylinder(it) => WideShape::cylinder(it.half_height.into(), it.radius.into()),
         TypedShape::Cone(it) => WideShape::cone(it.half_height.into(), it.radius.into()),
-        TypedShape::HalfSpace(it) => WideShape::halfspace(Unit::new_normalize(it.normal.into_inner().cast())),
         TypedShape::ConvexPolyhedron(hull) => {
             let corners: Vec<_> = hull.points().iter().map(|corner| corner.cast()).collect();
             WideShape::convex_hull(&corners)?

@@ -1,9 +1,11 @@
 //! The corpus, with the backends and engines to try on it.
 
+pub use pbig_harness::boxes::shifted;
 pub use pbig_harness::corpus::{Case, corpus, difference};
 
-use pbig_core::{Backend, BroadPhase, Config, Engine, Finder, PairDevice};
+use pbig_core::{Aabb, Backend, BroadPhase, Config, Engine, Finder, PairDevice, ProxyFilter};
 use pbig_gpu::{Coding, GpuOptions};
+use pbig_harness::boxes::BoxSet;
 use pbig_harness::options;
 use std::io::Write;
 use std::ops::Deref;
@@ -110,19 +112,25 @@ macro_rules! needs_gpu {
     };
 }
 
-/// Every backend that finds pairs, by name.
+/// Every way in which the CPU finds all pairs, by name.
+pub fn on_cpu() -> [(&'static str, Config); 4] {
+    [
+        ("auto", Config::DEFAULT),
+        ("grid", grid()),
+        ("tree", Config { engine: Some(Engine::Tree), ..grid() }),
+        ("brute", Config { backend: Backend::Brute, ..Config::DEFAULT }),
+    ]
+}
+
+/// Every way to find all pairs, by name.
 pub fn strategies() -> Vec<(&'static str, Way)> {
-    let on = |backend| Way::from(Config { backend, ..Config::DEFAULT });
-    let all = vec![
-        ("auto", Config::DEFAULT.into()),
-        ("grid", grid().into()),
-        ("tree", Config { engine: Some(Engine::Tree), ..grid() }.into()),
-        ("brute", on(Backend::Brute)),
-        ("gpu", on(Backend::Device)),
+    let on_gpu = [
+        ("gpu", Config { backend: Backend::Device, ..Config::DEFAULT }.into()),
         ("gpu grid", gpu(Coding::Plain)),
         ("gpu grid packed", gpu(Coding::Packed)),
     ];
-    all.into_iter().filter(|(_, way)| may_run(way)).collect()
+    let all = on_cpu().map(|(name, config)| (name, config.into())).into_iter().chain(on_gpu);
+    all.filter(|(_, way)| may_run(way)).collect()
 }
 
 /// The CPU's grid, however few the boxes.
@@ -140,4 +148,30 @@ pub fn engines() -> Vec<(&'static str, Way)> {
 pub fn gpu(coding: Coding) -> Way {
     let gpu = GpuOptions { coding, all_pairs_up_to: 0, count_tests: true, ..GpuOptions::DEFAULT };
     Way { config: Config { backend: Backend::Device, ..Config::DEFAULT }, gpu }
+}
+
+/// Returns a set of boxes by name.
+///
+/// # Panics
+/// If there is no such set.
+pub fn set(name: &str, n: usize, seed: u64) -> Vec<Aabb> {
+    BoxSet::named(name).expect("the set exists").boxes(n, seed)
+}
+
+/// Sets boxes without filters, by place in the list.
+///
+/// # Panics
+/// If the broad phase refuses one.
+pub fn set_all(broad_phase: &mut BroadPhase, boxes: &[Aabb]) {
+    for (id, aabb) in (0..).zip(boxes) {
+        broad_phase.set(id, *aabb, ProxyFilter::ALL).expect("a small id");
+    }
+}
+
+/// Runs something on a pool of its own.
+///
+/// # Panics
+/// If there can be no pool with this number of threads.
+pub fn on_threads<T: Send>(threads: usize, run: impl FnOnce() -> T + Send) -> T {
+    rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool").install(run)
 }

@@ -1,12 +1,11 @@
 //! Pairs between two sets: those of the oracle, in order, at the cost of what is across.
 
 use pbig_core::{
-    Aabb, Algorithm, Backend, Boxes, Config, CrossPair, Engine, Error, Finder, Keys, Limits, NO_KEY, Order,
+    Aabb, Algorithm, Boxes, Config, CrossPair, Engine, Error, Finder, Keys, Limits, NO_KEY, Order,
     ProxyFilter, WORK_LIMIT, oracle,
 };
-use pbig_harness::boxes::BoxSet;
 use pbig_harness::hard::{Recipe, ratio, shapes};
-use pbig_tests::corpus;
+use pbig_tests::{corpus, on_cpu, on_threads, set};
 use rand::rngs::StdRng;
 use rand::{RngExt, SeedableRng};
 
@@ -30,17 +29,6 @@ fn divide(boxes: &[Aabb], (_, is_first): Division) -> (Vec<Aabb>, Vec<Aabb>) {
     (part(true), part(false))
 }
 
-/// Every way in which a finder can search two sets.
-fn ways() -> [(&'static str, Config); 4] {
-    let with = |engine| Config { engine: Some(engine), ..Config::DEFAULT };
-    [
-        ("auto", Config::DEFAULT),
-        ("brute", Config { backend: Backend::Brute, ..Config::DEFAULT }),
-        ("grids", with(Engine::Rebuild)),
-        ("tree", with(Engine::Tree)),
-    ]
-}
-
 /// Returns the first difference of two sorted lists in words.
 fn difference(found: &[CrossPair], wanted: &[CrossPair]) -> Option<String> {
     if found == wanted {
@@ -53,7 +41,7 @@ fn difference(found: &[CrossPair], wanted: &[CrossPair]) -> Option<String> {
 fn check(name: &str, a: &[Aabb], b: &[Aabb]) {
     let wanted = oracle::pairs_between(a, b);
     let invalid = a.iter().chain(b).filter(|aabb| !aabb.is_valid()).count() as u64;
-    for (way, config) in ways() {
+    for (way, config) in on_cpu() {
         let mut finder = Finder::new(config);
         let found = finder.find_between(a, b).expect("within the limits");
         assert_eq!(difference(found, &wanted), None, "{name}, {way}");
@@ -77,16 +65,16 @@ fn the_corpus_divided_in_every_way() {
 
 #[test]
 fn random_sets_with_every_degenerate_kind() {
-    let set = BoxSet::named("degenerate").expect("the set exists");
     for seed in 0..2000 {
-        let (a, b) = (set.boxes((seed % 211) as usize, seed), set.boxes((seed % 137) as usize, seed + 7000));
+        let [a, b] = [(seed % 211, seed), (seed % 137, seed + 7000)]
+            .map(|(n, seed)| set("degenerate", n as usize, seed));
         check(&format!("degenerate, seed {seed}"), &a, &b);
     }
 }
 
 #[test]
 fn a_finder_used_for_one_set_and_two_mixes_nothing_up() {
-    let [a, b] = [1, 2].map(|seed| BoxSet::named("unit").expect("the set exists").boxes(3000, seed));
+    let [a, b] = [1, 2].map(|seed| set("unit", 3000, seed));
     let mut finder = Finder::default();
     for _ in 0..2 {
         let across = finder.find_between(&a, &b).expect("within the limits").to_vec();
@@ -98,11 +86,10 @@ fn a_finder_used_for_one_set_and_two_mixes_nothing_up() {
 
 #[test]
 fn the_same_bytes_between_sets_for_any_number_of_threads() {
-    for (name, way) in ways().into_iter().filter(|(name, _)| *name != "brute") {
-        let [a, b] = [5, 6].map(|seed| BoxSet::named("mixed").expect("the set exists").boxes(30_000, seed));
+    for (name, way) in on_cpu().into_iter().filter(|(name, _)| *name != "brute") {
+        let [a, b] = [5, 6].map(|seed| set("mixed", 30_000, seed));
         let with_threads = |threads, order| {
-            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool");
-            pool.install(|| {
+            on_threads(threads, || {
                 let mut finder = Finder::new(Config { order, ..way });
                 finder.find_between(&a, &b).expect("within the limits").to_vec()
             })
@@ -121,7 +108,7 @@ fn the_same_bytes_between_sets_for_any_number_of_threads() {
 #[test]
 fn filters_and_keys_of_two_sets_agree_with_the_oracle() {
     let mut random = StdRng::seed_from_u64(3);
-    let [a, b] = [1, 2].map(|seed| BoxSet::named("pile").expect("the set exists").boxes(2000, seed));
+    let [a, b] = [1, 2].map(|seed| set("pile", 2000, seed));
     let bodies: Vec<ProxyFilter> = (0..2000)
         .map(|i| ProxyFilter { body: i % 9, memberships: 1 << (i % 3), mask: 6, ..ProxyFilter::ALL })
         .collect();
@@ -132,7 +119,7 @@ fn filters_and_keys_of_two_sets_agree_with_the_oracle() {
         |pair: &CrossPair| of_a[pair.a as usize].iter().any(|key| of_b[pair.b as usize].contains(key));
     let allow = |pair: &CrossPair| bodies[pair.a as usize].allows(&ProxyFilter::ALL);
     let all = oracle::pairs_between(&a, &b);
-    for (way, config) in ways() {
+    for (way, config) in on_cpu() {
         let mut finder = Finder::new(config);
         let filtered = Boxes::new(&a).with_filters(&bodies);
         let found = finder.find_between(filtered, &b).expect("one each").to_vec();
@@ -147,7 +134,7 @@ fn filters_and_keys_of_two_sets_agree_with_the_oracle() {
 #[test]
 fn limits_and_lists_of_other_lengths_end_in_errors() {
     let boxes = vec![Aabb::new([0.0; 3], [1.0; 3]); 300];
-    for (way, config) in ways() {
+    for (way, config) in on_cpu() {
         let with =
             |max_boxes, max_pairs| Finder::new(Config { limits: Limits { max_boxes, max_pairs }, ..config });
         let found = with(600, 90_000).find_between(&boxes, &boxes).map(<[_]>::len);

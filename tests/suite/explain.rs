@@ -139,18 +139,6 @@ fn calls_without_changes_are_counted_and_hide_nothing() {
     assert_eq!(broad_phase.stats().totals.updates, 13);
 }
 
-#[test]
-fn the_collider_with_fewer_pairs_comes_first() {
-    let mut world = World::default();
-    let ground = world.colliders.insert(ColliderBuilder::halfspace(Vector::y_axis()));
-    for i in 0..20 {
-        world.add(World::dynamic(glam::vec3(i as f32 * 3.0, 0.4, 0.0)), ColliderBuilder::ball(0.5));
-    }
-    world.step(&mut PbigBroadPhase::new());
-    let second: Vec<_> = world.narrow_phase.contact_pairs().map(|pair| pair.collider2).collect();
-    assert_eq!(second, [ground; 20]);
-}
-
 thread_local! {
     /// Names of the spans that this thread has entered.
     static SPANS: RefCell<BTreeSet<&'static str>> = const { RefCell::new(BTreeSet::new()) };
@@ -317,15 +305,4 @@ fn stock_alone_notices_a_missing_contact_even_if_it_joins_late() {
     assert_eq!(faults, [Fault::MissingContact]);
     let file = broad_phase.differences()[0].replay.as_ref().expect("a folder was given");
     std::fs::remove_file(file.as_ref().expect("a writable folder")).expect("the file is there");
-}
-
-#[test]
-fn a_shadow_that_joins_late_finds_no_difference() {
-    let mut world = Scene::named("column").expect("the scene exists").build(120, 2);
-    let mut broad_phase = PbigBroadPhase::new();
-    (0..60).for_each(|_| world.step(&mut broad_phase));
-    let mut broad_phase = broad_phase.with_shadow(Shadow::Stock).with_shadow(Shadow::Oracle);
-    (0..60).for_each(|_| world.step(&mut broad_phase));
-    assert!(broad_phase.differences().is_empty(), "{}", broad_phase.differences()[0]);
-    assert!(broad_phase.pair_count() > 50);
 }

@@ -2,9 +2,7 @@
 
 use pbig_core::{Aabb, Backend, Config, Error, Finder, Limits, Order, Pair, ProxyFilter, oracle};
 use pbig_gpu::Coding;
-use pbig_harness::boxes::BoxSet;
-use pbig_tests::{Way, corpus, difference, gpu, may_run, strategies};
-use proptest::prelude::*;
+use pbig_tests::{Way, corpus, difference, gpu, may_run, on_threads, set, shifted, strategies};
 
 pub(crate) fn check(name: &str, boxes: &[Aabb]) {
     check_on(strategies(), name, boxes);
@@ -37,9 +35,8 @@ fn the_corpus_on_every_strategy() {
 
 #[test]
 fn ten_thousand_random_sets_with_every_degenerate_kind() {
-    let set = BoxSet::named("degenerate").expect("the set exists");
     for seed in 0..10_000 {
-        let boxes = set.boxes((seed % 301) as usize, seed);
+        let boxes = set("degenerate", (seed % 301) as usize, seed);
         // A software adapter takes 4 ms for what the CPU does in 10 us.
         let on_gpu = |name: &str| name.starts_with("gpu");
         let strategies = strategies().into_iter().filter(|(name, _)| !on_gpu(name) || seed % 25 == 0);
@@ -51,7 +48,7 @@ fn ten_thousand_random_sets_with_every_degenerate_kind() {
 #[test]
 fn the_sets_of_the_paper_at_100_000() {
     for name in ["uniform", "gaussian"] {
-        let boxes = BoxSet::named(name).expect("the set exists").boxes(100_000, 7);
+        let boxes = set(name, 100_000, 7);
         let wanted = oracle::pairs(&boxes);
         for (strategy, way) in strategies().into_iter().filter(|(s, _)| *s != "brute") {
             let mut finder = way.finder();
@@ -64,10 +61,9 @@ fn the_sets_of_the_paper_at_100_000() {
 #[test]
 fn the_same_bytes_for_any_number_of_threads() {
     for name in ["uniform", "gaussian", "mixed", "pile"] {
-        let boxes = BoxSet::named(name).expect("the set exists").boxes(40_000, 3);
+        let boxes = set(name, 40_000, 3);
         let with_threads = |threads, order| {
-            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool");
-            pool.install(|| {
+            on_threads(threads, || {
                 let mut finder = Finder::new(Config { order, ..Config::DEFAULT });
                 finder.find(&boxes).expect("within the limits").to_vec()
             })
@@ -96,7 +92,7 @@ fn a_finder_that_is_used_again_forgets_the_boxes_before() {
 
 #[test]
 fn filters_are_applied_while_searching() {
-    let boxes = BoxSet::named("pile").expect("the set exists").boxes(2000, 1);
+    let boxes = set("pile", 2000, 1);
     let filters: Vec<_> = (0..2000u32)
         .map(|i| ProxyFilter {
             body: i % 50,
@@ -137,18 +133,16 @@ fn limits_end_in_errors_that_name_them() {
 #[test]
 fn clusters_do_not_cost_more_than_an_even_spread() {
     // 2 x 20,000 boxes far apart: cells sized for the whole world would hold a cluster each.
-    let unit = BoxSet::named("unit").expect("the set exists");
     for apart in [1e3f32, 1e6, 1e7] {
-        let away = |b: &Aabb| Aabb::new(b.min.map(|x| x + apart), b.max.map(|x| x + apart));
-        let mut boxes = unit.boxes(20_000, 1);
-        boxes.extend(unit.boxes(20_000, 2).iter().map(away));
+        let mut boxes = set("unit", 20_000, 1);
+        boxes.extend(set("unit", 20_000, 2).iter().map(|aabb| shifted(aabb, [apart; 3])));
         checks_at_most(60 * 40_000, &boxes);
     }
 }
 
 #[test]
 fn boxes_flung_far_away_do_not_coarsen_the_cells_of_others() {
-    let mut boxes = BoxSet::named("pile").expect("the set exists").boxes(9000, 1);
+    let mut boxes = set("pile", 9000, 1);
     boxes.extend((0..1000).map(|i| {
         let side = |k: u32| if i >> k & 1 == 0 { 1.0 } else { -1.0 };
         Aabb::from_center([side(0), side(1), side(2)].map(|s| s * (1e9 + 1e6 * i as f32)), [0.5; 3])
@@ -158,12 +152,7 @@ fn boxes_flung_far_away_do_not_coarsen_the_cells_of_others() {
 
 #[test]
 fn points_among_identical_ones_cost_no_more_than_those() {
-    let mut boxes: Vec<Aabb> = BoxSet::named("unit")
-        .expect("the set exists")
-        .boxes(9000, 1)
-        .iter()
-        .map(|b| Aabb::new(b.min, b.min))
-        .collect();
+    let mut boxes: Vec<Aabb> = set("unit", 9000, 1).iter().map(|b| Aabb::new(b.min, b.min)).collect();
     boxes.extend(vec![boxes[17]; 300]);
     checks_at_most(300 * 300 / 2 + 60 * 9300, &boxes);
 }
@@ -201,31 +190,4 @@ fn nothing_of_an_earlier_call_outlives_a_failed_one() {
     assert_eq!(finder.find(&boxes).map(<[Pair]>::len), Ok(3));
     assert!(finder.find_filtered(&boxes, &[]).is_err());
     assert!(finder.pairs().is_empty() && finder.report().boxes == 0);
-}
-
-proptest! {
-    #![proptest_config(ProptestConfig { cases: 500, failure_persistence: None, ..ProptestConfig::default() })]
-
-    #[test]
-    fn any_floats_at_all(values in proptest::collection::vec(proptest::num::f32::ANY, 0..600)) {
-        let boxes: Vec<Aabb> = values
-            .chunks_exact(6)
-            .map(|v| Aabb::new([v[0].min(v[3]), v[1], v[2].min(v[5])], [v[0].max(v[3]), v[4], v[2].max(v[5])]))
-            .collect();
-        check("any floats", &boxes);
-    }
-
-    #[test]
-    fn boxes_on_a_coarse_raster_where_every_border_coincides(
-        corners in proptest::collection::vec((0i8..12, 0i8..12, 0i8..12, 0i8..4), 64..400),
-        scale in -30i32..30,
-    ) {
-        let scale = (scale as f32).exp2();
-        let at = |c: i8| f32::from(c) * scale;
-        let boxes: Vec<Aabb> = corners
-            .iter()
-            .map(|&(x, y, z, s)| Aabb::new([at(x), at(y), at(z)], [at(x + s), at(y + s), at(z + s)]))
-            .collect();
-        check("raster", &boxes);
-    }
 }

@@ -1,23 +1,13 @@
 //! Pairs without a list: each pair once, in memory that does not grow with the pairs. And pairs without a shared key.
 
-use pbig_core::{
-    Aabb, Backend, Boxes, Config, Engine, Finder, Keys, Limits, NO_KEY, Pair, ProxyFilter, oracle,
-};
-use pbig_harness::boxes::BoxSet;
+use pbig_core::{Aabb, Backend, Boxes, Config, Finder, Keys, Limits, NO_KEY, Pair, ProxyFilter, oracle};
 use pbig_harness::counting::{held, largest};
-use pbig_tests::{corpus, difference, strategies};
+use pbig_tests::{corpus, difference, on_cpu, on_threads, set, strategies};
 use rand::rngs::StdRng;
 use rand::{RngExt, SeedableRng};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
-
-/// Every way in which the CPU can search.
-fn ways() -> [Config; 4] {
-    let with = |engine| Config { engine: Some(engine), ..Config::DEFAULT };
-    let brute = Config { backend: Backend::Brute, ..Config::DEFAULT };
-    [Config::DEFAULT, brute, with(Engine::Rebuild), with(Engine::Tree)]
-}
 
 /// Returns the pairs that a closure got, sorted; twice is twice.
 fn visited<'a>(config: Config, boxes: impl Into<Boxes<'a>>) -> Vec<Pair> {
@@ -38,7 +28,7 @@ fn visited_by<'a>(finder: &mut Finder, boxes: impl Into<Boxes<'a>>) -> Vec<Pair>
 fn a_closure_gets_each_pair_of_the_corpus_once() {
     for case in corpus() {
         let wanted = oracle::pairs(&case.boxes);
-        for config in ways() {
+        for (_, config) in on_cpu() {
             let got = visited(config, &case.boxes);
             assert_eq!(difference(&got, &wanted), None, "{}, {config:?}", case.name);
         }
@@ -47,16 +37,15 @@ fn a_closure_gets_each_pair_of_the_corpus_once() {
 
 #[test]
 fn a_closure_gets_each_pair_once_from_several_threads() {
-    let boxes = BoxSet::named("mixed").expect("the set exists").boxes(40_000, 3);
+    let boxes = set("mixed", 40_000, 3);
     let filters: Vec<_> = (0..40_000).map(|i| ProxyFilter { body: i % 3, ..ProxyFilter::ALL }).collect();
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(5).build().expect("a pool");
-    for config in ways().into_iter().filter(|config| config.backend != Backend::Brute) {
-        let got = pool.install(|| visited(config, Boxes::new(&boxes).with_filters(&filters)));
+    for (_, config) in on_cpu().into_iter().filter(|(name, _)| *name != "brute") {
+        let got = on_threads(5, || visited(config, Boxes::new(&boxes).with_filters(&filters)));
         assert_eq!(difference(&got, &oracle::pairs_filtered(&boxes, &filters)), None, "{config:?}");
         let (of_a, of_b) = boxes.split_at(17_000);
         let (got, mut finder) = (Mutex::new(Vec::new()), Finder::new(config));
         let visit = |pair| got.lock().expect("no panic").push(pair);
-        let count = pool.install(|| finder.for_each_pair_between(of_a, of_b, visit));
+        let count = on_threads(5, || finder.for_each_pair_between(of_a, of_b, visit));
         let mut got = got.into_inner().expect("no panic");
         got.sort_unstable();
         assert_eq!(count, Ok(got.len() as u64));
@@ -69,15 +58,15 @@ fn a_finder_works_after_a_closure_has_panicked() {
     let boxes: Vec<_> =
         (0..20_000).map(|i| Aabb::from_center([i as f32 * 0.4, 0.0, 0.0], [0.5; 3])).collect();
     let wanted: Vec<_> = (0..19_999).flat_map(|a| [a + 1, a + 2].map(|b| Pair { a, b })).collect();
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(5).build().expect("a pool");
-    for config in ways().into_iter().filter(|config| config.backend != Backend::Brute) {
+    for (_, config) in on_cpu().into_iter().filter(|(name, _)| *name != "brute") {
         let mut finder = Finder::new(config);
         for last in [1, 30_000] {
             let visits = AtomicU64::new(0);
             let visit = |_| assert!(visits.fetch_add(1, Relaxed) < last, "planted");
-            let end = catch_unwind(AssertUnwindSafe(|| pool.install(|| finder.for_each_pair(&boxes, visit))));
+            let end =
+                catch_unwind(AssertUnwindSafe(|| on_threads(5, || finder.for_each_pair(&boxes, visit))));
             assert!(end.is_err() && finder.pairs().is_empty(), "{config:?}");
-            let got = pool.install(|| visited_by(&mut finder, &boxes));
+            let got = on_threads(5, || visited_by(&mut finder, &boxes));
             assert_eq!(difference(&got, &wanted[..wanted.len() - 1]), None, "{config:?}");
         }
     }
@@ -95,11 +84,10 @@ fn twenty_million_pairs_take_no_list() {
     const PAIRS: u64 = (BOXES * (BOXES - 1) / 2) as u64;
     let boxes = crowd(BOXES);
     // One thread, whose requests for memory are counted. No limit on pairs applies.
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("a pool");
-    for config in ways() {
+    for (_, config) in on_cpu() {
         let limits = Limits { max_pairs: 10, ..Limits::DEFAULT };
         let config = Config { limits, ..config };
-        pool.install(|| {
+        on_threads(1, || {
             let (before, sum) = (held(), AtomicU64::new(0));
             largest();
             let mut finder = Finder::new(config);
@@ -125,7 +113,7 @@ fn share(one: &Keys, other: &Keys) -> bool {
 fn pairs_with_a_key_in_common_are_left_out_on_every_strategy() {
     let mut random = StdRng::seed_from_u64(8);
     for (name, n) in [("pile", 2000), ("degenerate", 300), ("unit", 40)] {
-        let boxes = BoxSet::named(name).expect("the set exists").boxes(n, 4);
+        let boxes = set(name, n, 4);
         let mut key = || if random.random_range(0..3) == 0 { NO_KEY } else { random.random_range(0..12) };
         let keys: Vec<Keys> = (0..n).map(|_| [0; 4].map(|_| key())).collect();
         let wanted = oracle::pairs_where(&boxes, |a, b| !share(&keys[a as usize], &keys[b as usize]));
@@ -136,7 +124,7 @@ fn pairs_with_a_key_in_common_are_left_out_on_every_strategy() {
             assert_eq!(difference(found, &wanted), None, "{name}, {strategy}");
             assert_eq!(finder.report().pairs, wanted.len() as u64, "{name}, {strategy}");
         }
-        for config in ways() {
+        for (_, config) in on_cpu() {
             let got = visited(config, Boxes::new(&boxes).with_keys(&keys));
             assert_eq!(difference(&got, &wanted), None, "{name}, {config:?}");
         }

@@ -6,17 +6,16 @@ mod turns;
 mod work;
 
 use pbig_core::{
-    Aabb, Backend, BroadPhase, Config, DeviceFailure, DeviceFound, DeviceReport, Finder, NoDevice, Order,
-    Pair, ProxyFilter, SearchRequest,
+    Aabb, Backend, Config, DeviceFailure, DeviceFound, DeviceReport, Finder, NoDevice, Order, Pair,
+    ProxyFilter, SearchRequest,
 };
 use pbig_gpu::{Coding, GpuFinder, GpuOptions, adapters};
-use pbig_harness::boxes::BoxSet;
 use pbig_tests::{Way, difference, gpu, needs_gpu};
 use std::pin::pin;
 use std::task::{Context, Poll, Waker};
 
 fn set(name: &str, n: usize) -> Vec<Aabb> {
-    BoxSet::named(name).expect("the set exists").boxes(n, 5)
+    pbig_tests::set(name, n, 5)
 }
 
 /// Returns settings for a device that always makes a grid.
@@ -258,47 +257,6 @@ fn memory_follows_what_is_needed_down_as_well_as_up() {
     let after = find(&mut finder, &few).1.device_bytes;
     assert!(after * 4 < burst, "{after} of {burst} bytes are still held");
     assert_eq!(difference(&find(&mut finder, &many).0, &on_cpu(&many)), None);
-}
-
-#[test]
-fn nothing_grows_while_boxes_churn() {
-    needs_gpu!();
-    let mut finder = with(GpuOptions::DEFAULT).finder();
-    let bytes = |seed| {
-        let boxes = BoxSet::named("pile").expect("the set exists").boxes(400 + (seed % 100) as usize, seed);
-        (boxes, seed)
-    };
-    let mut most = 0;
-    for seed in 0..600 {
-        let held = find(&mut finder, &bytes(seed).0).1.device_bytes;
-        if seed < 100 {
-            most = held.max(most);
-        }
-        assert!(held <= most * 5 / 4, "call {seed}: {held} bytes after at most {most}");
-    }
-}
-
-#[test]
-fn auto_uses_a_device_from_half_a_million_changed_boxes_on() {
-    needs_gpu!();
-    let mut device = GpuFinder::new().expect("an adapter");
-    device.pretend_hardware();
-    let mut ours = BroadPhase::with_device(Config::DEFAULT, Box::new(device)).expect("a margin");
-    let mut cpu = BroadPhase::new(Config { backend: Backend::Cpu, ..Config::DEFAULT }).expect("a margin");
-    let start = set("unit", 500_000);
-    for (frame, step) in [(0, 1), (1, 100), (2, 1), (3, 2)] {
-        for (id, b) in start.iter().enumerate().step_by(step) {
-            let shift = 0.1 + ((id + frame) % 7) as f32 * 0.2;
-            let moved = Aabb::new(b.min.map(|x| x + shift), b.max.map(|x| x + shift));
-            ours.set(id as u32, moved, ProxyFilter::ALL).expect("within the limits");
-            cpu.set(id as u32, moved, ProxyFilter::ALL).expect("within the limits");
-        }
-        assert!(ours.update() == cpu.update(), "frame {frame}: events differ");
-        let report = ours.report();
-        let wanted = if step == 1 { None } else { Some(NoDevice::FewChanged) };
-        assert_eq!(report.plan.no_device, wanted, "frame {frame}, {} changed", report.changed);
-        assert_eq!((report.device.is_some(), &report.fallback), (step == 1, &None), "frame {frame}");
-    }
 }
 
 #[test]

@@ -2,9 +2,9 @@
 //! boxes, and the events lead from one state to the next.
 
 use crate::follower::Follower;
-use pbig_core::{Aabb, Algorithm, BroadPhase, Config, Engine, Error, Limits, Pair, Plan, ProxyFilter};
+use pbig_core::{Aabb, Algorithm, BroadPhase, Config, Engine, Error, Limits, Pair, ProxyFilter};
 use pbig_harness::boxes::{BoxSet, moved};
-use pbig_tests::{engines, strategies};
+use pbig_tests::{engines, set, set_all, shifted, strategies};
 use rand::rngs::StdRng;
 use rand::{RngExt, SeedableRng};
 use std::collections::BTreeSet;
@@ -47,42 +47,6 @@ fn change(world: &mut Follower, rng: &mut StdRng, id: u32, new: Aabb) {
     }
 }
 
-#[test]
-fn moving_sets_where_all_or_a_few_boxes_move() {
-    for (name, distance) in [("unit", 0.1), ("mixed", 0.1), ("pile", 0.02)] {
-        for share in [1.0, 0.01] {
-            play(name, distance, share, None);
-            let all_by = |engine, algorithm| {
-                let plans = play(name, distance, share, Some(engine));
-                assert!(plans.iter().all(|plan| plan.algorithm == algorithm), "{name}: {plans:?}");
-            };
-            all_by(Engine::Edit, Algorithm::Edit);
-            all_by(Engine::Rebuild, Algorithm::Grid);
-            all_by(Engine::Sweep, Algorithm::Sweep);
-            all_by(Engine::Tree, Algorithm::Tree);
-        }
-    }
-}
-
-/// Plays frames of a set with one engine, and returns the plans of all updates after the first.
-fn play(name: &str, distance: f32, share: f64, engine: Option<Engine>) -> Vec<Plan> {
-    let mut boxes = BoxSet::named(name).expect("the set exists").boxes(4000, 5);
-    let mut world = Follower::new(Config { margin: 0.01, engine, ..Config::DEFAULT }, boxes.len());
-    let (mut rng, mut plans) = (StdRng::seed_from_u64(1), vec![]);
-    for frame in 0..12 {
-        let next = moved(&boxes, distance, frame);
-        for (id, next) in next.into_iter().enumerate() {
-            if frame == 0 || rng.random_bool(share) {
-                boxes[id] = next;
-                world.set(id as u32, next, ProxyFilter::ALL);
-            }
-        }
-        world.update(&format!("{name}, share {share}, frame {frame}, {engine:?}"));
-        plans.push(world.broad_phase.report().plan.clone());
-    }
-    plans.split_off(1)
-}
-
 /// Small worlds up to the largest that is swept and beyond, whether all or a few boxes change, and filters with them.
 #[test]
 fn small_worlds_of_every_width_with_all_kinds_of_boxes() {
@@ -118,7 +82,7 @@ fn a_few_boxes_stay_in_their_cells_leave_and_come_back() {
     let (mut edits, mut out_of_order, mut in_order) = (0, 0, 0);
     for (name, distance) in [("unit", 0.1), ("unit", 1.5), ("mixed", 0.2), ("gaussian", 0.3), ("pile", 0.05)]
     {
-        let home = BoxSet::named(name).expect("the set exists").boxes(3000, 7);
+        let home = set(name, 3000, 7);
         let away = moved(&home, distance, 3);
         let mut world = Follower::new(Config { margin: 0.0, ..Config::DEFAULT }, home.len());
         home.iter().enumerate().for_each(|(id, aabb)| world.set(id as u32, *aabb, ProxyFilter::ALL));
@@ -148,17 +112,11 @@ fn a_few_boxes_stay_in_their_cells_leave_and_come_back() {
 
 #[test]
 fn contract_5_no_change_no_work_and_few_changes_little() {
-    let boxes = BoxSet::named("unit").expect("the set exists").boxes(20_000, 5);
+    let boxes = set("unit", 20_000, 5);
     let mut broad_phase = BroadPhase::new(Config { margin: 0.05, ..Config::DEFAULT }).expect("a good margin");
-    let set_all = |broad_phase: &mut BroadPhase, by: f32| {
-        for (id, b) in boxes.iter().enumerate() {
-            let aabb = Aabb::new(b.min.map(|x| x + by), b.max.map(|x| x + by));
-            broad_phase.set(id as u32, aabb, ProxyFilter::ALL).expect("a small id");
-        }
-    };
-    set_all(&mut broad_phase, 0.0);
+    set_all(&mut broad_phase, &boxes);
     broad_phase.update().expect("within the limits");
-    set_all(&mut broad_phase, 0.04);
+    set_all(&mut broad_phase, &boxes.iter().map(|aabb| shifted(aabb, [0.04; 3])).collect::<Vec<_>>());
     broad_phase.update().expect("within the limits");
     let report = broad_phase.report();
     assert_eq!((report.changed, report.checks.made), (0, 0), "motion within the margin changes nothing");
@@ -175,10 +133,7 @@ fn contract_5_no_change_no_work_and_few_changes_little() {
 fn an_update_that_finds_too_many_pairs_can_be_repeated() {
     let limits = Limits { max_pairs: 10, ..Limits::DEFAULT };
     let mut broad_phase = BroadPhase::new(Config { limits, ..Config::DEFAULT }).expect("a good margin");
-    let unit = Aabb::new([0.0; 3], [1.0; 3]);
-    for id in 0..6 {
-        broad_phase.set(id, unit, ProxyFilter::ALL).expect("a small id");
-    }
+    set_all(&mut broad_phase, &[Aabb::new([0.0; 3], [1.0; 3]); 6]);
     assert_eq!(broad_phase.update().unwrap_err(), Error::TooManyPairs { limit: 10 });
     assert!(broad_phase.events().added.is_empty() && broad_phase.pair_count() == 0, "no partial result");
     broad_phase.remove(5);
@@ -194,10 +149,8 @@ fn finds_too_many(engine: Option<Engine>) {
     let limits = Limits { max_pairs: 250, ..Limits::DEFAULT };
     let config = Config { limits, engine, ..Config::DEFAULT };
     let mut broad_phase = BroadPhase::new(config).expect("a good margin");
-    let boxes = BoxSet::named("unit").expect("the set exists").boxes(100, 1);
-    for (id, aabb) in boxes.iter().enumerate() {
-        broad_phase.set(id as u32, *aabb, ProxyFilter::ALL).expect("a small id");
-    }
+    let boxes = set("unit", 100, 1);
+    set_all(&mut broad_phase, &boxes);
     broad_phase.update().expect("within the limits");
     let before: BTreeSet<Pair> = broad_phase.pairs().collect();
     for id in [3, 4] {
@@ -211,31 +164,9 @@ fn finds_too_many(engine: Option<Engine>) {
 }
 
 #[test]
-fn boxes_that_moved_once_and_came_to_rest_stop_costing() {
-    let boxes = BoxSet::named("unit").expect("the set exists").boxes(10_000, 5);
-    let mut broad_phase = BroadPhase::new(Config::DEFAULT).expect("a good margin");
-    for (id, aabb) in boxes.iter().enumerate() {
-        broad_phase.set(id as u32, *aabb, ProxyFilter::ALL).expect("a small id");
-    }
-    broad_phase.update().expect("within the limits");
-    for (id, aabb) in moved(&boxes[..1000], 0.1, 1).into_iter().enumerate() {
-        broad_phase.set(id as u32, aabb, ProxyFilter::ALL).expect("a small id");
-    }
-    let mut made = 0;
-    for frame in 0..40 {
-        broad_phase
-            .set(5000, Aabb::from_center([frame as f32; 3], [0.5; 3]), ProxyFilter::ALL)
-            .expect("a small id");
-        broad_phase.update().expect("within the limits");
-        made = broad_phase.report().checks.made;
-    }
-    assert!(made < 200, "{made} checks for one moving box: {}", broad_phase.report().plan);
-}
-
-#[test]
 fn a_margin_that_changes_applies_to_boxes_set_afterwards() {
     let mut world = Follower::new(Config { margin: 0.5, ..Config::DEFAULT }, 40);
-    let boxes = BoxSet::named("pile").expect("the set exists").boxes(40, 2);
+    let boxes = set("pile", 40, 2);
     for (round, margin) in [0.5, 0.01, 2.0, 0.0].into_iter().enumerate() {
         world.broad_phase.set_margin(margin).expect("a good margin");
         for (id, aabb) in moved(&boxes, 0.02, round as u64).into_iter().enumerate() {
@@ -243,27 +174,6 @@ fn a_margin_that_changes_applies_to_boxes_set_afterwards() {
         }
         world.update(&format!("margin {margin}"));
     }
-}
-
-#[test]
-fn the_same_events_on_any_number_of_threads() {
-    let boxes = BoxSet::named("pile").expect("the set exists").boxes(20_000, 2);
-    let run = |threads| {
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool");
-        pool.install(|| {
-            let mut broad_phase = BroadPhase::new(Config::DEFAULT).expect("a good margin");
-            let mut all = Vec::new();
-            for round in 0..3 {
-                for (id, aabb) in moved(&boxes, 0.05, round).into_iter().enumerate() {
-                    broad_phase.set(id as u32, aabb, ProxyFilter::ALL).expect("a small id");
-                }
-                all.push(broad_phase.update().expect("within the limits").clone());
-            }
-            all
-        })
-    };
-    let wanted = run(1);
-    assert!([2, 5, 16].into_iter().all(|threads| run(threads) == wanted));
 }
 
 #[test]

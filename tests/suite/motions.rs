@@ -4,8 +4,7 @@
 use crate::follower::Follower;
 use pbig_core::{BroadPhase, Config, Events, ProxyFilter};
 use pbig_harness::motions::{Density, Motion, MovingBoxes};
-use pbig_tests::engines;
-use rayon::ThreadPoolBuilder;
+use pbig_tests::{engines, on_threads};
 
 const FRAMES: usize = 14;
 
@@ -55,8 +54,7 @@ fn a_thousand_sequences_of_every_motion_agree_with_the_oracle() {
 
 /// Returns the events of enough boxes for several threads.
 fn events(motion: Motion, threads: usize) -> Vec<Events> {
-    let pool = ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool");
-    pool.install(|| {
+    on_threads(threads, || {
         let mut scene = MovingBoxes::new(motion, Density::Dense, 20_000, 7);
         let ids: Vec<u32> = (0..20_000).collect();
         let mut broad_phase = BroadPhase::default();

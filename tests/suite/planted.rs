@@ -1,17 +1,16 @@
 //! Each checker notices the faults it is for: a dropped, a doubled, a swapped and a spurious pair.
 
 use pbig_core::{Aabb, Pair, oracle};
-use pbig_harness::boxes::BoxSet;
 use pbig_harness::runner::{Run, Timed};
 use pbig_harness::scenes::Scene;
-use pbig_tests::difference;
+use pbig_tests::{difference, set};
 use rapier_pbig::shadow::Fault;
 use rapier_pbig::{PbigBroadPhase, PbigConfig};
 use rapier3d::prelude::*;
 
 #[test]
 fn the_comparison_with_the_oracle_notices_each_fault() {
-    let boxes = BoxSet::named("unit").expect("the set exists").boxes(200, 1);
+    let boxes = set("unit", 200, 1);
     let right = oracle::pairs(&boxes);
     assert_eq!(difference(&right, &right), None);
     let noticed = |change: &dyn Fn(&mut Vec<Pair>)| {

@@ -181,25 +181,6 @@ fn queries_work_before_the_first_step_and_on_mutable_sets() {
 }
 
 #[test]
-fn several_threads_may_ask_at_once() {
-    let mut world = Scene::named("column").expect("the scene exists").build(200, 2);
-    let mut ours = PbigBroadPhase::new();
-    (0..30).for_each(|_| world.step(&mut ours));
-    let cast = || {
-        let filter = QueryFilter::default();
-        let queries =
-            ours.as_query_pipeline(&DefaultQueryDispatcher, &world.bodies, &world.colliders, filter);
-        let ray = Ray::new(point![0.0, 50.0, 0.0], -Vector::y());
-        queries.cast_ray(&ray, 100.0, true).map(|hit| hit.1)
-    };
-    let answers: Vec<_> = std::thread::scope(|scope| {
-        let threads: Vec<_> = (0..4).map(|_| scope.spawn(cast)).collect();
-        threads.into_iter().map(|thread| thread.join().expect("no panic")).collect()
-    });
-    assert!(answers[0].is_some() && answers.iter().all(|answer| *answer == answers[0]), "{answers:?}");
-}
-
-#[test]
 fn a_character_walks_the_same_way_with_either() {
     use rapier3d::control::KinematicCharacterController;
     let mut world = World::default();

@@ -5,7 +5,7 @@ use pbig_core::{Backend, Config, Engine};
 use pbig_harness::runner::{Run, Timed};
 use pbig_harness::scenes::Scene;
 use pbig_harness::world::World;
-use pbig_tests::Way;
+use pbig_tests::{Way, on_threads};
 use rapier_pbig::{PbigBroadPhase, PbigConfig};
 use rapier3d::prelude::*;
 
@@ -47,8 +47,7 @@ fn every_scene_on_every_strategy() {
 }
 
 fn bits(scene: Scene, config: Config, threads: usize, steps: usize) -> Vec<u32> {
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool");
-    pool.install(|| {
+    on_threads(threads, || {
         let bodies = scene.default_bodies.min(MOST_BODIES);
         let mut run = Run::new(scene, bodies, 5, pbig(config));
         (0..steps).for_each(|_| run.step());
@@ -70,20 +69,6 @@ fn a_scene_gives_the_same_bits_for_any_number_of_threads() {
         other != Run::new(Scene::ALL[0], 100, 5, PbigBroadPhase::new()).world.pose_bits(),
         "another seed differs"
     );
-}
-
-#[test]
-fn a_large_world_gives_the_same_bits_on_one_and_two_threads() {
-    let scene = Scene::named("column").expect("the scene exists");
-    let run = |threads| {
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool");
-        pool.install(|| {
-            let mut run = Run::new(scene, 6000, 5, PbigBroadPhase::new());
-            (0..60).for_each(|_| run.step());
-            run.world.pose_bits()
-        })
-    };
-    assert!(run(1) == run(2));
 }
 
 #[test]

@@ -170,7 +170,6 @@ pub fn has_ground(world: &World) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use pbig_scenes::world::heights;
 
     fn drawn(collider: &Collider) -> Vec<Instance> {
         let mut drawn = Vec::new();
@@ -228,7 +227,7 @@ mod tests {
         let mut world = World::default();
         assert!(!has_ground(&world));
         world.colliders.insert(World::ground());
-        let field = ColliderBuilder::heightfield(heights(3, |_, _| 0.5), [4.0, 2.0, 4.0].into());
+        let field = ColliderBuilder::heightfield(DMatrix::from_element(3, 3, 0.5), [4.0, 2.0, 4.0].into());
         world.colliders.insert(field.translation([0.0, 1.0, 0.0].into()));
         let surfaces = surfaces(&world);
         assert!(has_ground(&world) && surfaces.len() == 1 && surfaces[0].triangles.len() == 8);

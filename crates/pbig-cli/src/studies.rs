@@ -1,4 +1,4 @@
-//! Commands of the program `pbig-studies`, which is built apart: it needs rapier in f64 and other libraries' trees.
+//! Commands of the program `pbig-studies`, which is built apart: it needs other libraries' trees.
 
 use pbig_harness::output::Failure;
 use std::ffi::OsString;

@@ -36,13 +36,16 @@ impl BoxSet {
     }
 }
 
+/// Returns a box elsewhere.
+pub fn shifted(aabb: &Aabb, by: [f32; 3]) -> Aabb {
+    let add = |corner: [f32; 3]| std::array::from_fn(|k| corner[k] + by[k]);
+    Aabb::new(add(aabb.min), add(aabb.max))
+}
+
 /// The boxes moved by up to `distance` along each axis, sizes kept.
 pub fn moved(boxes: &[Aabb], distance: f32, seed: u64) -> Vec<Aabb> {
     let mut rng = StdRng::seed_from_u64(seed);
-    let mut shift = |b: &Aabb| {
-        let by = [0; 3].map(|_| rng.random_range(-distance..=distance));
-        Aabb::new(std::array::from_fn(|k| b.min[k] + by[k]), std::array::from_fn(|k| b.max[k] + by[k]))
-    };
+    let mut shift = |b: &Aabb| shifted(b, [0; 3].map(|_| rng.random_range(-distance..=distance)));
     boxes.iter().map(&mut shift).collect()
 }
 

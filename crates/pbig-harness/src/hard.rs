@@ -4,7 +4,8 @@ mod known;
 
 pub use known::{histories, shapes};
 
-use pbig_core::{Aabb, BroadPhase, Config, Finder, Limits, ProxyFilter, Report};
+use crate::boxes::shifted;
+use pbig_core::{Aabb, BroadPhase, Config, Error, Finder, Limits, ProxyFilter, Report};
 use rand::rngs::StdRng;
 use rand::{RngExt, SeedableRng};
 
@@ -132,10 +133,13 @@ pub struct History {
 }
 
 impl History {
-    /// Returns the changes of each update: ids with their new boxes, or without one if they are removed.
-    pub fn changes(&self, boxes: &[Aabb], seed: u64) -> Vec<Vec<(u32, Option<Aabb>)>> {
-        let all: Vec<_> = (0..).zip(self.after(boxes, seed)).collect();
-        all.chunks(boxes.len().div_ceil(self.updates.max(1)).max(1)).map(<[_]>::to_vec).collect()
+    /// Returns the changes of each update. The first one makes the world of `n` boxes.
+    pub fn changes(&self, n: usize, seed: u64) -> Vec<Changes> {
+        let boxes = self.start.boxes(n, seed);
+        let all: Vec<_> = (0..).zip(self.after(&boxes, seed)).collect();
+        let start = (0..).zip(boxes.into_iter().map(Some)).collect();
+        let later = all.chunks(n.div_ceil(self.updates.max(1)).max(1)).map(<[_]>::to_vec);
+        std::iter::once(start).chain(later).collect()
     }
 
     /// Returns the boxes as they become, by id.
@@ -153,14 +157,28 @@ impl History {
                     half.map(|half| half * factor),
                 ))
             }
-            Change::Shift(by) => Some(Aabb::new(
-                std::array::from_fn(|k| aabb.min[k] + by[k]),
-                std::array::from_fn(|k| aabb.max[k] + by[k]),
-            )),
+            Change::Shift(by) => Some(shifted(aabb, *by)),
             Change::Remove => None,
         };
         boxes.iter().enumerate().map(changed).collect()
     }
+}
+
+/// The changes of an update: ids with their new boxes, or without one if they are removed.
+pub type Changes = Vec<(u32, Option<Aabb>)>;
+
+/// Sets and removes boxes.
+///
+/// # Errors
+/// The broad phase's own.
+pub fn tell(broad_phase: &mut BroadPhase, changes: &Changes) -> Result<(), Error> {
+    for (id, aabb) in changes {
+        match aabb {
+            Some(aabb) => broad_phase.set(*id, *aabb, ProxyFilter::ALL)?,
+            None => _ = broad_phase.remove(*id),
+        }
+    }
+    Ok(())
 }
 
 /// Maximum number of pairs for a world to be measured: more would be a test of memory.
@@ -186,24 +204,12 @@ pub fn ratio_of_search(recipe: &Recipe, n: usize) -> Option<f64> {
 
 /// Returns the largest ratio of all updates of a history; none where there are too many pairs.
 pub fn ratio_of_history(history: &History, n: usize) -> Option<f64> {
-    let boxes = history.start.boxes(n, 1);
     let mut broad_phase = BroadPhase::new(config()).ok()?;
-    for (id, aabb) in (0..).zip(&boxes) {
-        broad_phase.set(id, *aabb, ProxyFilter::ALL).ok()?;
-    }
-    let mut update = |changes: &[(u32, Option<Aabb>)]| {
-        for (id, aabb) in changes {
-            match aabb {
-                Some(aabb) => broad_phase.set(*id, *aabb, ProxyFilter::ALL).ok()?,
-                None => _ = broad_phase.remove(*id),
-            }
-        }
+    let mut worst = 0f64;
+    for changes in history.changes(n, 1) {
+        tell(&mut broad_phase, &changes).ok()?;
         broad_phase.update().ok()?;
-        Some(ratio(broad_phase.report()))
-    };
-    let mut worst = update(&[])?;
-    for changes in history.changes(&boxes, 1) {
-        worst = worst.max(update(&changes)?);
+        worst = worst.max(ratio(broad_phase.report()));
     }
     Some(worst)
 }

@@ -182,29 +182,9 @@ pub fn pose(at: Vec3) -> Isometry<Real> {
     Isometry::translation(at.x, at.y, at.z)
 }
 
-/// Returns the body at a place and with a rotation.
-pub fn turned_body(body: RigidBodyBuilder, at: Vec3, turn: Quat) -> RigidBodyBuilder {
-    body.position(turned(at, turn))
-}
-
 /// Returns a pose with a rotation, bit by bit. The builders' own `rotation` takes an angle, of which rapier computes the
 /// sine and the cosine as the platform does.
 pub fn turned(at: Vec3, turn: Quat) -> Isometry<Real> {
     let turn = UnitQuaternion::new_unchecked(Quaternion::new(turn.w, turn.x, turn.y, turn.z));
     Isometry::from_parts(to_vector(at).into(), turn)
-}
-
-/// Returns a joint that turns around one axis, a unit vector.
-pub fn hinge(axis: Vec3) -> RevoluteJointBuilder {
-    RevoluteJointBuilder::new(UnitVector::new_unchecked(to_vector(axis)))
-}
-
-/// Returns a square grid of heights.
-pub fn heights(side: usize, height: impl Fn(usize, usize) -> f32) -> DMatrix<Real> {
-    DMatrix::from_fn(side, side, height)
-}
-
-/// Returns groups that meet if each has a group of the other's filter.
-pub fn groups_that_meet(memberships: Group, filter: Group) -> InteractionGroups {
-    InteractionGroups::new(memberships, filter)
 }

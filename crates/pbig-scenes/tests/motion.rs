@@ -2,7 +2,7 @@
 
 use glam::Vec3;
 use pbig_scenes::scenes::Scene;
-use pbig_scenes::world::{World, to_vector};
+use pbig_scenes::world::World;
 use rapier3d::prelude::*;
 use std::collections::HashSet;
 
@@ -81,34 +81,6 @@ fn nothing_explodes_or_falls_through_the_ground_in_300_steps() {
             let run = run.steps(STEPS);
             assert_eq!(fault(&run), None, "{}, {bodies} bodies", scene.name);
         }
-    }
-}
-
-#[test]
-fn a_body_that_explodes_or_is_nowhere_is_a_fault() {
-    let planted: [fn(&mut RigidBody); 3] = [
-        |body| body.set_linvel(to_vector(Vec3::X * 101.0), true),
-        |body| body.set_translation(to_vector(Vec3::Y * 1e4), true),
-        |body| body.set_translation(to_vector(Vec3::NAN), true),
-    ];
-    for plant in planted {
-        let mut run = Run::new("column", 100).steps(10);
-        assert_eq!(fault(&run), None);
-        plant(run.world.bodies.iter_mut().next().expect("there are bodies").1);
-        assert!(fault(&run).is_some());
-    }
-}
-
-#[test]
-fn bodies_that_fall_through_the_ground_are_a_fault() {
-    for name in ["column", "pyramid"] {
-        let mut run = Run::new(name, 100);
-        let ground =
-            run.world.colliders.iter().find(|(_, collider)| collider.shape().as_halfspace().is_some());
-        let ground = ground.expect("there is ground").0;
-        run.world.remove_collider(ground);
-        let run = run.steps(STEPS / 2);
-        assert!(fault(&run).is_some(), "{name}");
     }
 }
 

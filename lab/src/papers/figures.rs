@@ -2,7 +2,7 @@
 //! And tables IV, V and VI: each optimisation on and off, and the time of each task.
 
 use super::OUR_GRID;
-use super::model::{GAUSSIAN, Model, UNIFORM};
+use super::model::{GAUSSIAN, GAUSSIAN_READ, Model, UNIFORM};
 use super::printed::*;
 use super::sides::{SearchCall, Setup, Way, effort, once, race};
 use super::table_iii::{expected_checks, options_for};
@@ -218,10 +218,31 @@ fn on_cpu(setup: &Setup) -> Result<Table, Failure> {
     Ok(table)
 }
 
+/// Section 6.4: the printed bytes of output against the pairs of the printed boxes, and of those that give table III.
+pub(super) fn sizes() -> Table {
+    let mut table = Table::new("what the papers print", "paper | place | quantity | value");
+    let [printed, read] = [GAUSSIAN, GAUSSIAN_READ].map(|model| model.pairs(MOST_BOXES));
+    let off = |pairs: f64| 100.0 * (8.0 * pairs / (GAUSSIAN_GB * 1e9) - 1.0);
+    for (quantity, value) in [
+        ("these off the bytes, %", off(printed)),
+        ("pairs expected, by the reading of table III", read.round()),
+        ("the pairs of that reading off the bytes, %", off(read)),
+    ] {
+        table.row(cells!["PBIG", "section 6.4", quantity, value]);
+    }
+    table
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
     use pbig_core::oracle;
+
+    #[test]
+    fn the_printed_bytes_are_those_of_the_reading_of_table_iii() {
+        let [printed, _, read] = sizes().numbers("value")[..] else { panic!("three values") };
+        assert!(printed > 2.0 && read.abs() < 0.1, "{printed} {read}");
+    }
 
     #[test]
     fn slabs_count_each_pair_once() {

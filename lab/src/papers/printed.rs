@@ -13,8 +13,6 @@ pub(super) const MOST_BOXES: usize = 10_000_000;
 pub(super) const GAUSSIAN_GB: f64 = 8.968;
 /// PBIG 4.1 and 6: threads of a warp, `W` of equation 6.
 pub(super) const WARP: f64 = 32.0;
-/// PBIG 5.2 and 6: boxes of a segment and threads of a block.
-pub(super) const SEGMENT: u64 = 256;
 /// PBIG 6.1: lengths of the cells of figure 9, beside that of equation 6.
 pub(super) const CELLS: [f64; 5] = [64.0, 128.0, 256.0, 512.0, 1024.0];
 /// A row of PBIG's table III, for 10^7 boxes.
@@ -107,7 +105,3 @@ pub(super) const AVRIL_6: [(usize, [f64; 4]); 4] = [
 /// Avril, table 7: objects; milliseconds without the grid and with it.
 pub(super) const AVRIL_7: [(usize, f64, f64); 3] =
     [(100, 0.046, 1.020), (1000, 0.872, 1.840), (10_000, 31.450, 3.257)];
-
-/// Avril 3.1: boxes, index of a pair counted from 0, and the pair counted from 1.
-pub(super) const AVRIL_EXAMPLES: [(u64, u64, (u64, u64)); 2] =
-    [(1000, 71_452, (75, 303)), (1000, 46_108, (48, 285))];

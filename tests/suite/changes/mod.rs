@@ -8,7 +8,6 @@ use pbig_core::{
 };
 use pbig_gpu::testing::Fault;
 use pbig_gpu::{Coding, GpuFinder, GpuOptions};
-use pbig_harness::boxes::BoxSet;
 use pbig_tests::needs_gpu;
 use rand::rngs::StdRng;
 use rand::{RngExt, SeedableRng};
@@ -16,7 +15,7 @@ use std::time::Duration;
 use world::DeviceWorld;
 
 fn set(name: &str, n: usize) -> Vec<Aabb> {
-    BoxSet::named(name).expect("the set exists").boxes(n, 5)
+    pbig_tests::set(name, n, 5)
 }
 
 fn device(options: GpuOptions) -> GpuFinder {

@@ -62,9 +62,7 @@ impl DeviceWorld {
     }
 
     pub(super) fn shift(&mut self, id: u32, by: [f32; 3]) {
-        let one = self.boxes[id as usize];
-        let moved = |corner: [f32; 3]| std::array::from_fn(|k| corner[k] + by[k]);
-        self.put(id, Aabb::new(moved(one.min), moved(one.max)));
+        self.put(id, pbig_tests::shifted(&self.boxes[id as usize], by));
     }
 
     /// Runs an update on a device and compares it with brute force.

@@ -1,11 +1,11 @@
 //! Contract: updates on a device and on the CPU may take turns, and fail in between, and no event is lost.
 
-use pbig_core::{Aabb, Backend, BroadPhase, Config, Error, Limits, Pair, ProxyFilter, oracle};
+use pbig_core::{Aabb, Backend, BroadPhase, Config, Error, Limits, Pair, ProxyFilter};
 use pbig_gpu::{GpuFinder, GpuOptions};
+use pbig_harness::follower::Follower;
 use pbig_tests::needs_gpu;
 use rand::rngs::StdRng;
 use rand::{RngExt, SeedableRng};
-use std::collections::BTreeSet;
 use std::ops::Range;
 
 /// Boxes 2i and 2i + 1 of some couples, which overlap when they are close. Between the two the latter goes half its
@@ -43,13 +43,6 @@ fn a_device_whose_update_was_too_much_does_not_go_on_from_it() {
     assert!(broad_phase.report().device.is_some());
 }
 
-fn brute_force(broad_phase: &BroadPhase) -> Vec<Pair> {
-    let ids = 0..broad_phase.id_count();
-    let boxes: Vec<_> = ids.clone().map(|id| broad_phase.fat_aabb(id).unwrap_or(Aabb::NOWHERE)).collect();
-    let filters: Vec<_> = ids.map(|id| broad_phase.filter(id).copied().unwrap_or_default()).collect();
-    oracle::pairs_filtered(&boxes, &filters)
-}
-
 /// Events lead from the pairs of the last successful update to the present pairs, on every backend.
 #[test]
 fn devices_and_the_cpu_take_turns_and_updates_fail_in_between() {
@@ -62,41 +55,34 @@ fn devices_and_the_cpu_take_turns_and_updates_fail_in_between() {
 
 fn take_turns(options: GpuOptions) {
     let gpu = GpuFinder::new().expect("an adapter").with_options(options);
-    let mut broad_phase =
-        BroadPhase::with_device(Config::DEFAULT, Box::new(gpu)).expect("a margin that is one");
-    let (mut random, mut pairs) = (StdRng::seed_from_u64(17), BTreeSet::new());
+    let broad_phase = BroadPhase::with_device(Config::DEFAULT, Box::new(gpu)).expect("a margin that is one");
+    let (mut world, mut random) = (Follower::new(broad_phase, 400), StdRng::seed_from_u64(17));
     let home = |id: u32| [id % 8, id / 8 % 8, id / 64].map(|i| i as f32);
     // Updates on the device and on the CPU, successful and failed ones.
     let mut seen = [[0; 2]; 2];
     for round in 0..300 {
         let way = random.random_range(0..2);
         let max_pairs = if random.random_ratio(1, 6) { 40 } else { u64::MAX };
-        broad_phase
-            .set_backend([Backend::Device, Backend::Cpu][way], Limits { max_pairs, ..Limits::DEFAULT });
+        let limits = Limits { max_pairs, ..Limits::DEFAULT };
+        world.broad_phase.set_backend([Backend::Device, Backend::Cpu][way], limits);
         for id in 0..400 {
             let to = if random.random_ratio(1, 400) { random.random_range(0..400) } else { id };
             let center = home(to).map(|x| x + random.random_range(-0.02..0.02));
             if random.random_ratio(1, 400) {
-                broad_phase.remove(id);
-                pairs.retain(|pair: &Pair| pair.a != id && pair.b != id);
+                world.remove(id).expect("as both know");
             }
             if random.random_ratio(399, 400) {
                 let memberships = 1 + u32::from(random.random_ratio(1, 400));
                 let filter = ProxyFilter { memberships, ..ProxyFilter::ALL };
-                broad_phase.set(id, Aabb::from_center(center, [0.5; 3]), filter).expect("room for it");
+                world.set(id, Aabb::from_center(center, [0.5; 3]), filter).expect("room for it");
             }
         }
-        let result = broad_phase.update().cloned();
-        let is_on_gpu = broad_phase.report().device.is_some();
+        let result = world.update();
+        let is_on_gpu = world.broad_phase.report().device.is_some();
         assert!(result.is_err() || is_on_gpu == (way == 0), "round {round}: the device works");
         seen[way][usize::from(result.is_err())] += 1;
-        if let Ok(events) = result {
-            assert!(events.removed.iter().all(|pair| pairs.remove(pair)), "round {round}: was not there");
-            assert!(events.added.iter().all(|pair| pairs.insert(*pair)), "round {round}: was there");
-            let wanted = brute_force(&broad_phase);
-            assert!(wanted.iter().eq(&pairs), "round {round}");
-            assert!(broad_phase.pairs().eq(wanted), "round {round}: kept");
-        }
+        let is_limit = |why: &String| why.contains("Limits::max_pairs");
+        assert!(result.as_ref().err().is_none_or(is_limit), "round {round}: {result:?}");
     }
     assert!(seen.as_flattened().iter().all(|updates| *updates > 10), "{seen:?}");
 }

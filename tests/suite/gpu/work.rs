@@ -51,7 +51,7 @@ fn a_device_bounds_its_work_or_leaves_the_shape_to_the_cpu() {
 
 /// Contract: a declined call is no fault. The device goes on with other sets, and with the next update of a world.
 #[test]
-fn a_declined_call_is_done_by_the_cpu_and_the_next_may_be_done_by_the_device() {
+fn a_declined_call_is_the_cpus_and_the_next_may_be_the_devices() {
     needs_gpu!();
     let config = Config { backend: Backend::Device, ..Config::DEFAULT };
     let gpu = GpuFinder::new().expect("an adapter");

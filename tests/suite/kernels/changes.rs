@@ -152,40 +152,6 @@ pub(super) fn apply_changes(s: &mut State) {
     }
 }
 
-#[test]
-fn apply_changes_agrees_with_its_twin() {
-    agrees("apply_changes");
-}
-
-/// Compares a kernel with its twin on all sets of at most `most_boxes` boxes, with all codings.
-fn check_agrees_on_changes(kernel: &str, codings: &[u32], most_boxes: usize) {
-    for case in moving_cases().into_iter().filter(|case| case.boxes.len() <= most_boxes) {
-        let before = State::before(kernel, &case);
-        for &coding in codings {
-            for (filtered, split) in [(0, 0), (FILTERED, before.params.boxes / 2)] {
-                let state = before.clone().with(coding | filtered, split);
-                let fault = fault(twin(kernel), &GpuOptions::DEFAULT, &state);
-                assert_eq!(fault, None, "{}, flags {}, split {split}", case.name, coding | filtered);
-            }
-        }
-    }
-}
-
-#[test]
-fn check_small_agrees_with_its_twin_on_changes() {
-    check_agrees_on_changes("check_small", &[0, PACKED], usize::MAX);
-}
-
-#[test]
-fn check_large_agrees_with_its_twin_on_changes() {
-    check_agrees_on_changes("check_large", &[0, PACKED], usize::MAX);
-}
-
-#[test]
-fn check_all_agrees_with_its_twin_on_changes() {
-    check_agrees_on_changes("check_all", &[0, PACKED, BITS], 2000);
-}
-
 /// Boxes and filters beyond the ends of the lists must not change.
 #[test]
 fn apply_changes_changes_nothing_else() {
@@ -244,14 +210,7 @@ fn faults_planted_in_what_is_known_of_boxes_are_noticed() {
         ("apply_changes", |s| s.motions[2].before = s.motions[2].now),
         ("apply_changes", |s| s.filters[9].mask ^= 1),
     ];
-    for (i, (kernel, plant)) in faults.into_iter().enumerate() {
-        let before = State::before(kernel, &moving(pile()));
-        let wanted = after_twin(twin(kernel), &before);
-        let mut found = wanted.clone();
-        assert_eq!((twin(kernel).compare)(&before, &found, &wanted), None, "{kernel}");
-        plant(&mut found);
-        assert!((twin(kernel).compare)(&before, &found, &wanted).is_some(), "fault {i}, {kernel}");
-    }
+    assert_noticed(&faults, &moving(pile()));
 }
 
 /// A moved box without its mark is skipped, so its pairs are missing.

@@ -85,12 +85,14 @@ pub(super) fn agrees(kernel: &str) {
     }
 }
 
-/// Compares a kernel with its twin on all sets, with all codings, filters and splits.
+/// Compares a kernel with its twin on sets of at most `most_boxes` boxes, at rest and moving, with all codings, filters and splits.
 pub(super) fn check_agrees(kernel: &str, codings: &[u32], most_boxes: usize) {
-    for case in cases().into_iter().filter(|case| case.boxes.len() <= most_boxes) {
+    for case in cases().into_iter().chain(moving_cases()).filter(|case| case.boxes.len() <= most_boxes) {
         let before = State::before(kernel, &case);
+        let settings = [(0, 0), (FILTERED, before.params.boxes / 2), (FILTERED, 0)];
+        let settings = &settings[..if before.finds_changes() { 2 } else { 3 }];
         for &coding in codings {
-            for (filtered, split) in [(0, 0), (FILTERED, 0), (FILTERED, before.params.boxes / 2)] {
+            for &(filtered, split) in settings {
                 let state = before.clone().with(coding | filtered, split);
                 let fault = fault(twin(kernel), &GpuOptions::DEFAULT, &state);
                 assert_eq!(fault, None, "{}, flags {}, split {split}", case.name, coding | filtered);

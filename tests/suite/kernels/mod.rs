@@ -35,7 +35,6 @@ use pbig_gpu::layout::{
 };
 use pbig_gpu::testing::plan_params;
 use pbig_gpu::{GpuFinder, GpuOptions};
-use pbig_harness::boxes::BoxSet;
 use pbig_harness::pair_index::{index_of, pair_count, pair_of};
 use pbig_shaders::{self as shaders, Buffer, KERNELS, Kernel, Stage};
 use pbig_tests::{corpus, difference, needs_gpu, without_gpu};
@@ -105,8 +104,17 @@ fn some(states: &[State], what: &str, has: impl Fn(&State) -> bool) {
 }
 
 #[test]
-fn measure_agrees_with_its_twin() {
-    agrees("measure");
+fn kernels_before_the_checks_agree_with_their_twins() {
+    for Twin { kernel, .. } in TWINS.iter().take_while(|twin| twin.kernel.stage != Stage::Check) {
+        agrees(kernel.name);
+    }
+}
+
+#[test]
+fn checks_agree_with_their_twins() {
+    check_agrees("check_small", &[0, PACKED], usize::MAX);
+    check_agrees("check_large", &[0, PACKED], usize::MAX);
+    check_agrees("check_all", &[0, PACKED, BITS], 2000);
 }
 
 /// With more boxes than the lanes of all workgroups each lane takes several turns.
@@ -114,11 +122,6 @@ fn measure_agrees_with_its_twin() {
 fn measure_agrees_with_its_twin_on_many_boxes() {
     let before = State::before("measure", &Case { boxes: set("mixed", 40_000), ..pile() });
     assert_eq!(fault(twin("measure"), &GpuOptions::DEFAULT, &before), None);
-}
-
-#[test]
-fn locate_agrees_with_its_twin() {
-    agrees("locate");
 }
 
 /// Boxes go up as floats: all bit patterns must become what the host would make of them.
@@ -153,21 +156,6 @@ fn checks_turn_floats_into_ordered_integers() {
     }
 }
 
-#[test]
-fn visit_agrees_with_its_twin() {
-    agrees("visit");
-}
-
-#[test]
-fn scan_blocks_agrees_with_its_twin() {
-    agrees("scan_blocks");
-}
-
-#[test]
-fn scan_sums_agrees_with_its_twin() {
-    agrees("scan_sums");
-}
-
 /// With more blocks than lanes the workgroup takes several turns.
 #[test]
 fn scan_sums_agrees_with_its_twin_on_many_blocks() {
@@ -177,11 +165,6 @@ fn scan_sums_agrees_with_its_twin_on_many_blocks() {
         let before = State { params, sums, ..State::default() };
         assert_eq!(fault(twin("scan_sums"), &GpuOptions::DEFAULT, &before), None, "{blocks} blocks");
     }
-}
-
-#[test]
-fn schedule_agrees_with_its_twin() {
-    agrees("schedule");
 }
 
 /// `schedule` numbers the items of a cell by a formula, which must hold for hundreds of segments and every width.
@@ -200,16 +183,6 @@ fn schedule_numbers_the_items_of_huge_cells_without_gaps() {
         before.large_items = vec![LargeItem::default(); large_items as usize];
         assert_eq!(fault(twin("schedule"), &GpuOptions::DEFAULT, &before), None, "{columns} columns");
     }
-}
-
-#[test]
-fn scatter_agrees_with_its_twin() {
-    agrees("scatter");
-}
-
-#[test]
-fn arrange_agrees_with_its_twin() {
-    agrees("arrange");
 }
 
 #[test]
@@ -243,16 +216,6 @@ fn arrange_dispatches_nothing_without_capacity() {
 }
 
 #[test]
-fn check_small_agrees_with_its_twin() {
-    check_agrees("check_small", &[0, PACKED], usize::MAX);
-}
-
-#[test]
-fn check_large_agrees_with_its_twin() {
-    check_agrees("check_large", &[0, PACKED], usize::MAX);
-}
-
-#[test]
 fn check_large_agrees_with_its_twin_without_load_balancing() {
     let options = GpuOptions { load_balancing: false, ..GpuOptions::DEFAULT };
     for case in cases() {
@@ -261,11 +224,6 @@ fn check_large_agrees_with_its_twin_without_load_balancing() {
             assert_eq!(fault(twin("check_large"), &options, &before), None, "{}, flags {flags}", case.name);
         }
     }
-}
-
-#[test]
-fn check_all_agrees_with_its_twin() {
-    check_agrees("check_all", &[0, PACKED, BITS], 2000);
 }
 
 /// Numbers of pairs around the size of a workgroup, and none.
@@ -338,8 +296,13 @@ fn planted_faults_are_noticed() {
         ("check_small", |s| s.totals.redundant[0] ^= 1),
         ("index_pairs", |s| s.out[4] ^= 1),
     ];
-    for (i, (kernel, plant)) in faults.into_iter().enumerate() {
-        let before = State::before(kernel, &pile());
+    assert_noticed(&faults, &pile());
+}
+
+/// Asserts that comparisons notice faults in what kernels leave, and nothing else.
+fn assert_noticed(faults: &[(&str, Plant)], case: &Case) {
+    for (i, (kernel, plant)) in faults.iter().enumerate() {
+        let before = State::before(kernel, case);
         let wanted = after_twin(twin(kernel), &before);
         let mut found = wanted.clone();
         assert_eq!((twin(kernel).compare)(&before, &found, &wanted), None, "{kernel}");

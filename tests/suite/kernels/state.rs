@@ -46,7 +46,7 @@ pub(super) struct Case {
 }
 
 pub(super) fn set(name: &str, n: usize) -> Vec<Aabb> {
-    BoxSet::named(name).expect("the set exists").boxes(n, 1)
+    pbig_tests::set(name, n, 1)
 }
 
 pub(super) fn cases() -> Vec<Case> {

@@ -1,17 +1,16 @@
 //! Numbers: sizes and offsets by decades, the smallest, the largest, both zeros, infinities, no numbers.
 
-use super::{everywhere, intervals, product, shifted, through_updates};
+use super::{everywhere, intervals, product, through_updates};
 use crate::follower::Follower;
 use pbig_core::{Aabb, ProxyFilter};
-use pbig_harness::boxes::BoxSet;
-use pbig_tests::strategies;
+use pbig_tests::{set, shifted, strategies};
 use rand::rngs::StdRng;
 use rand::{RngExt, SeedableRng};
 
 const INFINITY: f32 = f32::INFINITY;
 
 fn pile(n: usize) -> Vec<Aabb> {
-    BoxSet::named("pile").expect("the set exists").boxes(n, 1)
+    set("pile", n, 1)
 }
 
 #[test]

@@ -90,9 +90,3 @@ fn product(x: &[[f32; 2]], y: &[[f32; 2]], z: &[[f32; 2]]) -> Vec<Aabb> {
         |x: [f32; 2], y: [f32; 2]| z.iter().map(move |z| Aabb::new([x[0], y[0], z[0]], [x[1], y[1], z[1]]));
     x.iter().flat_map(|x| y.iter().flat_map(move |y| column(*x, *y))).collect()
 }
-
-/// The box elsewhere.
-fn shifted(aabb: &Aabb, by: [f32; 3]) -> Aabb {
-    let moved = |corner: [f32; 3]| std::array::from_fn(|k| corner[k] + by[k]);
-    Aabb::new(moved(aabb.min), moved(aabb.max))
-}

@@ -3,7 +3,7 @@
 use super::{at_length, memory, through_updates};
 use crate::follower::Follower;
 use pbig_core::{Aabb, Algorithm, Backend, BroadPhase, Config, Engine, ProxyFilter};
-use pbig_harness::boxes::BoxSet;
+use pbig_tests::{on_threads, set, shifted};
 
 /// A column of cubes after a number of steps of 1/60 s under 9.81 m/s^2, computed as it would be: in f32.
 struct Falling {
@@ -13,7 +13,7 @@ struct Falling {
 
 impl Falling {
     fn new(n: usize) -> Self {
-        Self { boxes: BoxSet::named("pile").expect("the set exists").boxes(n, 3), speed: 0.0 }
+        Self { boxes: set("pile", n, 3), speed: 0.0 }
     }
 
     fn step(&mut self, acceleration: f32) {
@@ -34,8 +34,7 @@ fn free_fall_for_a_million_steps_at_the_same_cost_and_memory() {
     // This depth in fewer steps.
     let acceleration = 9.81 * (1e6 / steps as f32).powi(2);
     for config in small_and_grid() {
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("a pool");
-        let (cost, depth) = pool.install(|| fall(config, steps, acceleration));
+        let (cost, depth) = on_threads(1, || fall(config, steps, acceleration));
         println!("{:?}: {steps} steps to {depth:e}, at most {cost:?} checks", config.engine);
         assert!(depth < -1e9, "fell to {depth}");
         assert!(cost.late <= cost.early * 5 / 4, "{cost:?}: deep down it costs more");
@@ -100,7 +99,7 @@ fn a_fall_beyond_the_range_of_f32_and_back() {
     for decade in 0..40 {
         // From 10^39 on this is infinite.
         let depth = 10f64.powi(decade) as f32;
-        frames.push(frames[frames.len() - 1].iter().map(|b| super::shifted(b, [0.0, -depth, 0.0])).collect());
+        frames.push(frames[frames.len() - 1].iter().map(|b| shifted(b, [0.0, -depth, 0.0])).collect());
     }
     assert!(frames[40].iter().all(|b| b.max[1] == f32::NEG_INFINITY));
     frames.push(vec![Aabb::NOWHERE; 150]);
@@ -112,11 +111,11 @@ fn a_fall_beyond_the_range_of_f32_and_back() {
 #[test]
 fn explosions_from_a_heap_to_infinity() {
     for n in [150, 1100] {
-        let heap = BoxSet::named("pile").expect("the set exists").boxes(n, 8);
+        let heap = set("pile", n, 8);
         let middle = heap[n / 2].min;
         let blown = |b: &Aabb, factor: f32| {
             let by: [f32; 3] = std::array::from_fn(|k| (b.min[k] - middle[k]) * factor);
-            super::shifted(b, by)
+            shifted(b, by)
         };
         let frame = |factor: f32| heap.iter().map(|b| blown(b, factor)).collect::<Vec<_>>();
         let factors = [0.0, 0.01, 0.3, 10.0, 1e4, 1e9, 1e20, 1e37, f32::MAX, 0.0, 1e6, 0.0];
@@ -127,14 +126,14 @@ fn explosions_from_a_heap_to_infinity() {
 /// One of many flies off each frame, and the others stay: no resolution is lost to those that have gone.
 #[test]
 fn debris_that_leaves_for_ever_does_not_cost_those_that_stay() {
-    let heap = BoxSet::named("pile").expect("the set exists").boxes(3000, 9);
+    let heap = set("pile", 3000, 9);
     let mut broad_phase =
         BroadPhase::new(Config { backend: Backend::Cpu, ..Config::DEFAULT }).expect("a margin");
     let mut most = 0;
     for frame in 0..300 {
         for (id, aabb) in heap.iter().enumerate() {
             let flown = if id % 50 == 0 && id / 10 < frame { 10f32.powi((frame / 8) as i32) } else { 0.0 };
-            let there = super::shifted(aabb, [flown, -flown * 0.5, flown * (id as f32 / 3000.0)]);
+            let there = shifted(aabb, [flown, -flown * 0.5, flown * (id as f32 / 3000.0)]);
             broad_phase.set(id as u32, there, ProxyFilter::ALL).expect("a small id");
         }
         broad_phase.update().expect("few pairs");

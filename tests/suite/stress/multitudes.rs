@@ -50,22 +50,6 @@ fn identical_boxes_by_the_thousand_that_come_and_go() {
 }
 
 #[test]
-fn all_overlapping_all_is_complete_or_an_error_with_the_limit() {
-    let (many, few) = (nested(20_000), nested(1200));
-    for (strategy, way) in strategies() {
-        let limits = Limits { max_pairs: 1_000_000, ..Limits::DEFAULT };
-        let error = way.with(|it| it.limits = limits).finder().find(&many).expect_err("2 * 10^8 pairs");
-        assert_eq!(error, Error::TooManyPairs { limit: 1_000_000 }, "{strategy}");
-        assert!(
-            error.to_string().contains("Limits::max_pairs = 1000000")
-                && error.to_string().contains("raise it")
-        );
-        let mut finder = way.finder();
-        assert!(finder.find(&few).expect("10^6 pairs").iter().copied().eq(all_pairs(1200)), "{strategy}");
-    }
-}
-
-#[test]
 fn everything_overlapping_everything_in_updates() {
     ways_to_update()
         .into_iter()

@@ -1,10 +1,10 @@
 //! Worlds that are flat, thin or on the borders of cells.
 
-use super::{everywhere, shifted};
+use super::everywhere;
 use crate::follower::Follower;
 use pbig_core::{Aabb, Algorithm, Config, Engine, Finder, Plan, ProxyFilter};
 use pbig_harness::boxes::BoxSet;
-use pbig_tests::{Way, strategies};
+use pbig_tests::{Way, shifted, strategies};
 
 #[test]
 fn flat_worlds_of_any_thickness_on_every_axis() {

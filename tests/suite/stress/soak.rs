@@ -5,8 +5,7 @@ use super::memory;
 use crate::follower::Follower;
 use pbig_core::{Aabb, Backend, BroadPhase, Config, Engine, ProxyFilter, Report};
 use pbig_gpu::{Coding, GpuFinder};
-use pbig_harness::boxes::BoxSet;
-use pbig_tests::{Way, gpu, needs_gpu};
+use pbig_tests::{Way, gpu, needs_gpu, on_threads, set, shifted};
 use rand::rngs::StdRng;
 use rand::{RngExt, SeedableRng};
 use std::collections::BTreeMap;
@@ -36,21 +35,16 @@ struct Churn {
 
 impl Churn {
     fn new(way: impl Into<Way>, ids: usize) -> Self {
-        let set = |name: &str, n| BoxSet::named(name).expect("the set exists").boxes(n, 4);
         let world = Follower::new(way, ids);
         let rng = StdRng::seed_from_u64(6);
-        let (home, odd) = (set("unit", ids), set("degenerate", 100));
+        let (home, odd) = (set("unit", ids, 4), set("degenerate", 100, 4));
         Self { world, rng, home, odd, swings: false, one_in: 30, tally: SoakCounts::default() }
     }
 
     fn aabb(&mut self, id: u32) -> Aabb {
         let by = std::array::from_fn(|_| self.rng.random_range(-0.6..0.6));
         let odd = self.rng.random_ratio(1, 100);
-        if odd {
-            self.odd[self.rng.random_range(0..100)]
-        } else {
-            super::shifted(&self.home[id as usize], by)
-        }
+        if odd { self.odd[self.rng.random_range(0..100)] } else { shifted(&self.home[id as usize], by) }
     }
 
     /// All but one, which in every third update comes or goes.
@@ -63,7 +57,7 @@ impl Churn {
             if is_visitor && self.world.has(id) {
                 self.world.remove(id);
             } else if is_visitor || self.world.has(id) {
-                let aabb = super::shifted(&self.home[id as usize], by);
+                let aabb = shifted(&self.home[id as usize], by);
                 self.world.set(id, aabb, ProxyFilter { body: id % 20, ..ProxyFilter::ALL });
             }
         }
@@ -176,8 +170,7 @@ fn soak_on(
     updates: usize,
     sampled: usize,
 ) -> SoakCounts {
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool");
-    pool.install(|| {
+    on_threads(threads, || {
         let mut churn = churn();
         churn.run(updates, sampled);
         churn.tally

@@ -5,6 +5,7 @@ use super::memory;
 use glam::Vec3;
 use pbig_harness::runner::Timed;
 use pbig_harness::world::World;
+use pbig_tests::on_threads;
 use rand::rngs::StdRng;
 use rand::{RngExt, SeedableRng};
 use rapier_pbig::{PbigBroadPhase, PbigConfig};
@@ -108,8 +109,7 @@ impl Tray {
 /// On one thread, whose memory is counted.
 #[test]
 fn soak_of_a_rapier_world_that_comes_and_goes() {
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("a pool");
-    pool.install(|| {
+    on_threads(1, || {
         let steps = steps();
         let mut tray = Tray::new();
         let weighed = Weighed { inner: PbigBroadPhase::new(), bytes: 0 };

@@ -2,6 +2,7 @@
 
 use super::engines::Engines;
 use super::input::Input;
+use crate::boxes::shifted;
 use pbig_core::{Aabb, Backend, Config, Error, Limits, Order, Pair, ProxyFilter, oracle};
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -238,9 +239,4 @@ impl Player {
         assert_eq!(found, wanted, "{aabb:?}");
         Some(())
     }
-}
-
-fn shifted(aabb: &Aabb, by: [f32; 3]) -> Aabb {
-    let add = |corner: [f32; 3]| std::array::from_fn(|k| corner[k] + by[k]);
-    Aabb::new(add(aabb.min), add(aabb.max))
 }

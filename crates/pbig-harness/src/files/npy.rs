@@ -349,11 +349,4 @@ mod tests {
             assert_eq!(value("True", 1, 2), Some(at(5.0, 6.0)), "{kind}");
         }
     }
-
-    #[test]
-    fn the_first_invalid_box_is_known_by_its_row() {
-        let bytes = [head("<f4", "False", "3, 6"), vec![0; 24], vec![255; 24], vec![0; 24]].concat();
-        let list = boxes(Source::of(&bytes)).expect("boxes");
-        assert_eq!((list.boxes.len(), list.first_invalid), (3, Some((1, Location::Row(1)))));
-    }
 }

@@ -216,11 +216,4 @@ mod tests {
         let later = error("0,0,0,1,1,1\n# min_x,min_y,min_z,max_x,max_y,max_z\n");
         assert_eq!(later, "line 2: column 1: '# min_x' is not a number");
     }
-
-    #[test]
-    fn the_first_invalid_box_is_known_by_its_line() {
-        let text = "min_x,min_y,min_z,max_x,max_y,max_z\n0,0,0,1,1,1\n\n0,0,0,nan,1,1\n1,1,1,0,0,0\n";
-        let list = boxes(text.as_bytes(), 9).expect("boxes");
-        assert_eq!((list.boxes.len(), list.first_invalid), (3, Some((1, Location::Line(4)))));
-    }
 }

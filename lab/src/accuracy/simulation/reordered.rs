@@ -1,23 +1,21 @@
-//! Broad phases that report what another one finds, with its events in another order. Rapier solves contacts in an order that
-//! comes from the order of events, so a run with such a broad phase differs from one with the broad phase inside by order alone.
+//! A broad phase that reports what another one finds, with its events in another order. Rapier solves contacts in an order that
+//! comes from the order of events.
 
 use rapier_pbig::PbigBroadPhase;
 use rapier3d::prelude::*;
 
 /// A broad phase's name and constructor.
-pub(crate) type NamedBroadPhase = (&'static str, fn() -> Box<dyn BroadPhase>);
+pub(super) type NamedBroadPhase = (&'static str, fn() -> Box<dyn BroadPhase>);
 
-/// Broad phases, each before one that differs from it in the order of its events alone: `lower first` puts the lower handle of a
-/// pair first, as stock does; `sorted` sorts events, as pbig does.
-pub(crate) const KINDS: [NamedBroadPhase; 4] = [
+/// The broad phases of a run. `stock sorted` sorts events, as pbig does, and so differs from stock by order alone.
+pub(super) const KINDS: [NamedBroadPhase; 3] = [
     ("pbig", || Box::new(PbigBroadPhase::new())),
-    ("pbig lower first", || Box::new(Reordered(PbigBroadPhase::new(), lower_first))),
     ("stock", || Box::new(DefaultBroadPhase::new())),
     ("stock sorted", || Box::new(Reordered(DefaultBroadPhase::new(), |events| events.sort_by_key(key)))),
 ];
 
 /// A broad phase, and what is done to the events of each update.
-pub(crate) struct Reordered<B>(pub(crate) B, pub(crate) fn(&mut [BroadPhasePairEvent]));
+pub(super) struct Reordered<B>(pub(super) B, pub(super) fn(&mut [BroadPhasePairEvent]));
 
 impl<B: BroadPhase> BroadPhase for Reordered<B> {
     fn update(
@@ -32,16 +30,6 @@ impl<B: BroadPhase> BroadPhase for Reordered<B> {
         let before = events.len();
         self.0.update(params, colliders, bodies, modified, removed, events);
         self.1(&mut events[before..]);
-    }
-}
-
-/// Names the collider with the lower index first in each pair, as rapier's own broad phase does.
-fn lower_first(events: &mut [BroadPhasePairEvent]) {
-    for event in events {
-        let (BroadPhasePairEvent::AddPair(pair) | BroadPhasePairEvent::DeletePair(pair)) = event;
-        if pair.collider2.into_raw_parts() < pair.collider1.into_raw_parts() {
-            *pair = pair.swap();
-        }
     }
 }
 
@@ -88,14 +76,5 @@ mod tests {
         assert!(!is_sorted(&stock) && is_sorted(&sorted) && is_sorted(&told("unit", PbigBroadPhase::new())));
         let plain = |events: &Vec<_>| events.iter().map(plain).collect::<BTreeSet<_>>();
         assert!(stock.iter().map(plain).eq(sorted.iter().map(plain)), "no event is lost or turned");
-    }
-
-    #[test]
-    fn the_lower_collider_comes_first() {
-        let mut all = told("mixed", Reordered(PbigBroadPhase::new(), lower_first)).into_iter().flatten();
-        assert!(all.all(|event| plain(&event).1.is_sorted()));
-        assert!(
-            told("mixed", PbigBroadPhase::new()).iter().flatten().any(|event| !plain(event).1.is_sorted())
-        );
     }
 }
