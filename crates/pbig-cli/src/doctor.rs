@@ -18,7 +18,6 @@ pub(crate) fn run() -> Result<(), Failure> {
         simd_found().join(" "),
         pbig_core::simd(),
     ))?;
-    explain_drivers_noise()?;
     let gpus = describe_adapters()?;
     print("self-test, 2000 boxes of each set against brute force:")?;
     let searches = cpu_searches().into_iter().chain(gpus.iter().flat_map(gpu_searches));
@@ -27,16 +26,6 @@ pub(crate) fn run() -> Result<(), Failure> {
         wrong.extend(test(search)?);
     }
     check(wrong.is_empty(), || format!("self-test failed: {}", wrong.join(", ")))
-}
-
-/// Announces what some drivers print on stderr while they are asked for adapters.
-fn explain_drivers_noise() -> Result<(), Failure> {
-    if !cfg!(target_os = "linux") || std::env::var_os("XDG_RUNTIME_DIR").is_some() {
-        return Ok(());
-    }
-    print(
-        "note: XDG_RUNTIME_DIR is not set. A graphics driver may complain about that on stderr; pbig does not need it",
-    )
 }
 
 /// Prints every adapter, and returns those on which the kernels can run.
