@@ -4,6 +4,7 @@ use crate::frames::FrameKind;
 use crate::queries::{Answer, FrameQueries};
 use crate::scenes::Scene;
 use crate::world::World;
+pub use pbig_scenes::times::StepTime;
 use rapier_pbig::shadow::{Call, Checker, Difference, ReplayError, Shadow, Watcher, write_frames};
 use rapier3d::prelude::*;
 use std::fmt;
@@ -79,19 +80,6 @@ impl<B: BroadPhase> BroadPhase for Timed<B> {
             self.checking += clock.elapsed();
         }
     }
-}
-
-/// Milliseconds of one frame, without its checks.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct StepTime {
-    /// Inside the broad phase, all its calls.
-    pub broad_phase: f64,
-    /// Time of the whole step, the broad phase included.
-    pub step: f64,
-    /// Scene queries after the step, with the upkeep of an index that the first of them causes.
-    pub queries: f64,
-    /// The step and the queries.
-    pub frame: f64,
 }
 
 /// A scene being run with one broad phase.

@@ -3,11 +3,16 @@
 
 #[cfg(feature = "rapier")]
 mod build;
+#[cfg(feature = "rapier")]
+pub mod drawn;
+#[cfg(feature = "rapier")]
+pub mod exchange;
 pub mod frames;
 pub mod pair_order;
 pub mod plan;
 pub mod scenes;
 #[cfg(feature = "rapier")]
 pub mod stock;
+pub mod times;
 #[cfg(feature = "rapier")]
 pub mod world;
