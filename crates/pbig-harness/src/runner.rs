@@ -36,8 +36,8 @@ impl<B> Timed<B> {
 
     /// Adds a checker, which compares in one of `every` calls that modify something. `relative_margin` as in [`Watcher::new`].
     pub fn checked(self, relative_margin: f32, every: usize) -> Self {
-        let watcher = Watcher::new(relative_margin).with(Shadow::Stock).with(Shadow::Oracle);
-        Self { watcher: Some(watcher.every(every)), ..self }
+        let checker = Checker::default().with(Shadow::Stock).with(Shadow::Oracle).every(every);
+        Self { watcher: Some(Watcher::new(relative_margin, checker)), ..self }
     }
 
     /// Returns the checker's counts and differences.
