@@ -58,6 +58,7 @@ step_fmt() {
 
 step_clippy() {
     step cargo clippy --release --all-targets -- -D warnings
+    step cargo clippy --release -p pbig-page -p pbig-page-bindgen -p pbig-wasm --all-targets -- -D warnings
     step cargo check --release --locked --manifest-path fuzz/Cargo.toml --target-dir "${CARGO_TARGET_DIR:-target}"
 }
 
