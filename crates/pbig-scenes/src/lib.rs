@@ -1,4 +1,5 @@
-//! Scenes of rapier by name, number of bodies and seed, and the scene queries of a frame, for the harness, a viewer and a web page.
+//! Scenes of rapier by name, number of bodies and seed, and the scene queries of a frame, for the harness, a viewer and a web page;
+//! and what the viewer and the page share: the parts to draw, and a broad phase that can be exchanged.
 //! Nothing here draws, starts a thread or reads a clock, so all of it builds for wasm32-unknown-unknown.
 
 #[cfg(feature = "rapier")]
