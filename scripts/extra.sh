@@ -142,7 +142,7 @@ run_aarch64() {
 # The tests open a window under Xvfb, press each key, and leave screenshots in viewer/out. A software adapter will do.
 run_viewer() {
     { has Xvfb && has xdotool && has_libraries libvulkan.so.1; } || { left_out "the viewer" && return; }
-    step cargo build --locked --release --package pbig-viewer --bins --examples
+    step cargo build --locked --release --package pbig-viewer
     step cargo test --locked --release --package pbig-viewer -- --include-ignored
     step cargo clippy --locked --release --package pbig-viewer --all-targets -- -D warnings
 }

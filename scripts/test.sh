@@ -14,8 +14,6 @@ export TMPDIR
 trap 'rm -rf "$TMPDIR"' EXIT
 
 # Options of several words, which are not quoted where they are used.
-# The default members, for commands that leave one out: cargo takes `--exclude` only beside `--workspace`.
-members="--workspace --exclude pbig-page --exclude pbig-page-bindgen --exclude pbig-page-gpu --exclude pbig-viewer --exclude pbig-wasm --exclude pbig-wasm-gpu"
 in_036="--manifest-path rapier-0.36/Cargo.toml"
 members_036="-p rapier3d-pbig -p pbig-harness-036"
 features_036="--features rapier3d-pbig/debug-render"
@@ -37,13 +35,13 @@ lacks() {
     case $'\n'$tree in *$'\n'"$crate v"*) echo "$package pulls in $crate" && return 1 ;; esac
 }
 
-# without_harness: prints options that leave out the crates that measure and run scenes, if there is no adapter: they are
-# tested on every backend. They are the unpublished ones but for pbig-scenes, which uses no GPU.
-without_harness() {
-    local manifest
-    ! has_gpu || return 0
-    for manifest in $(grep -l '^publish' crates/*/Cargo.toml lab/Cargo.toml | grep -v '^crates/pbig-scenes/'); do
-        echo "--exclude $(sed -n 's/^name = "\(pbig.*\)"/\1/p' "$manifest" | head -n 1)"
+# unit_packages: prints the default members but the suite, as options. Without an adapter the crates that measure and run scenes are
+# left out, too: they are tested on every backend.
+unit_packages() {
+    local name others=pbig-tests
+    has_gpu || others="$others pbig-harness pbig-cli pbig-studies"
+    for name in $(cargo tree --depth 0 --prefix none | sed -n 's/ v.*//p'); do
+        case " $others " in *" $name "*) ;; *) echo "-p $name" ;; esac
     done
 }
 
@@ -60,13 +58,14 @@ step_fmt() {
 
 step_clippy() {
     step cargo clippy --release --all-targets -- -D warnings
+    step cargo clippy --release -p pbig-page -p pbig-page-bindgen -p pbig-wasm --all-targets -- -D warnings
     step cargo check --release --locked --manifest-path fuzz/Cargo.toml --target-dir "${CARGO_TARGET_DIR:-target}"
 }
 
 # All but the suite. One profile and one set of features: every crate is built once.
 step_unit() {
     step cargo build --release --examples --bins
-    step cargo test --release $members --exclude pbig-tests $(without_harness) --no-fail-fast
+    step cargo test --release $(unit_packages) --no-fail-fast
     # Once more with overflow checks and debug assertions, where there is unsafe code and index arithmetic.
     step cargo test -p pbig-core --features serde --no-fail-fast
     step cargo test -p pbig-gpu --no-default-features --lib --no-fail-fast
@@ -144,7 +143,8 @@ step_rapier_0_36() {
     step cargo clippy --locked --release $in_036 $others_036 --all-targets -- -D warnings
     step env PBIG_RUNS=100 PBIG_BODIES=80 cargo test --release $in_036 $others_036 --no-fail-fast
     step cargo test --release $in_036 -p pbig-harness-036 --no-default-features --features enhanced-determinism
-    step cargo run --release $in_036 -p pbig-harness-036 $features_036 --example falling_objects -- --bodies 500 --steps 60
+    step cargo run --release $in_036 -p pbig-harness-036 $features_036 --bin bench_step -- --scenes column --bodies 500 \
+        --steps 60 --chart "$TMPDIR/steps.svg"
     step env RUSTDOCFLAGS="-D warnings" \
         cargo doc --release $in_036 -p rapier3d-pbig --features shadow,debug-render --no-deps
     # The packages have their source, which is a link in three of them.

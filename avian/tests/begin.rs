@@ -3,9 +3,8 @@
 mod support;
 
 use avian::prelude::*;
-use avian_pbig::PbigBroadPhasePlugin;
 use bevy::prelude::*;
-use support::{Veto, app, collider, plugins};
+use support::{app_with_pbig, collider};
 
 struct Two {
     app: App,
@@ -15,8 +14,7 @@ struct Two {
 impl Two {
     /// Two overlapping balls, with a contact.
     fn new() -> Self {
-        let own = PbigBroadPhasePlugin::<Veto>::default();
-        let mut app = app(plugins().disable::<BvhBroadPhasePlugin<Veto>>().add(own));
+        let mut app = app_with_pbig();
         let ids = [0.0, 0.4].map(|x| {
             let body =
                 (RigidBody::Dynamic, GravityScale(0.0), collider(1.0), Transform::from_xyz(x, 0.0, 0.0));

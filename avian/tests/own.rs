@@ -4,18 +4,13 @@ mod support;
 
 use avian::math::RVector;
 use avian::prelude::*;
-use avian_pbig::PbigBroadPhasePlugin;
 use bevy::prelude::*;
 use bevy::tasks::{ComputeTaskPool, TaskPoolBuilder};
 use std::process::Command;
-use support::{DIMENSIONS, Veto, app, collider, plugins};
+use support::{DIMENSIONS, app, app_with_pbig, collider, plugins};
 
 /// The variable with a number of threads, which tells a test that it runs in a process of its own.
 const THREADS: &str = "PBIG_AVIAN_THREADS";
-
-fn app_with_pbig() -> App {
-    app(plugins().disable::<BvhBroadPhasePlugin<Veto>>().add(PbigBroadPhasePlugin::<Veto>::default()))
-}
 
 /// Makes a box, or a rectangle, by its half extents.
 fn cuboid(half: RVector) -> Collider {

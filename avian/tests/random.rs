@@ -5,10 +5,10 @@ mod support;
 use avian::collider_tree::{ColliderTreeProxyKey, ColliderTreeSystems, ColliderTrees, MovedProxies};
 use avian::collision::broad_phase::BroadPhaseSystems;
 use avian::prelude::*;
+use avian_pbig::ColliderBoxes;
 use avian_pbig::shadow::{Shadow, ShadowPlugin};
-use avian_pbig::{ColliderBoxes, PbigBroadPhasePlugin};
 use bevy::prelude::*;
-use support::{RandomWorld, Veto, app, plugins};
+use support::{RandomWorld, Veto, app, app_with_pbig, plugins};
 
 /// Steps a random world, with changes in each step.
 fn run(app: &mut App, seed: u64, bodies: usize, steps: usize) {
@@ -42,8 +42,7 @@ struct Missed(Vec<(Entity, Entity)>);
 /// Avian's own broad phase runs after pbig, and must find nothing.
 #[test]
 fn avian_finds_nothing_after_pbig() {
-    let own = PbigBroadPhasePlugin::<Veto>::default();
-    let mut app = app(plugins().disable::<BvhBroadPhasePlugin<Veto>>().add(own));
+    let mut app = app_with_pbig();
     app.init_resource::<Missed>();
     let place =
         note_missed.after(BroadPhaseSystems::CollectCollisions).before(ColliderTreeSystems::BeginOptimize);
@@ -100,8 +99,7 @@ fn note_missed(
 #[test]
 fn contacts_are_in_the_same_order_each_time() {
     let contacts = || {
-        let own = PbigBroadPhasePlugin::<Veto>::default();
-        let mut app = app(plugins().disable::<BvhBroadPhasePlugin<Veto>>().add(own));
+        let mut app = app_with_pbig();
         run(&mut app, 6, 300, 60);
         let graph = app.world().resource::<ContactGraph>();
         let pairs = graph.active_pairs().iter().chain(graph.sleeping_pairs());

@@ -8,7 +8,7 @@ use pbig_harness::chart::{Chart, Line, Plot};
 use pbig_harness::options::BackendOption;
 use pbig_harness::runner::{Run, Spread, StepTime};
 use pbig_harness::scenes::Scene;
-use rapier_pbig::shadow::Difference;
+use rapier_pbig::shadow::Checker;
 use rapier_pbig::{PbigBroadPhase, PbigConfig};
 use rapier3d::prelude::{BroadPhase, DefaultBroadPhase};
 use std::io::IsTerminal;
@@ -52,9 +52,9 @@ fn main() -> ExitCode {
         bar.inc(1);
     }
     bar.finish_and_clear();
-    let checked = check(&args, args.backend.for_rapier());
+    let checker = check(&args, args.backend.for_rapier());
     println!("{} with {} bodies, {} steps\n", args.scene.name, args.bodies, args.steps);
-    print_table(&stock, &ours, &checked);
+    print_table(&stock, &ours, &checker);
     println!("\n{}", ours.broad_phase.inner.stats().report.plan);
     if let Some(why) = &ours.broad_phase.inner.stats().report.fallback {
         println!("note: {why}");
@@ -65,10 +65,10 @@ fn main() -> ExitCode {
         Err(error) => eprintln!("{error}"),
     }
     print_where_to_watch(&args);
-    for difference in checked.differences.iter().take(3) {
+    for difference in checker.differences.iter().take(3) {
         eprintln!("{difference}");
     }
-    if checked.differences.is_empty() && drawn.is_ok() { ExitCode::SUCCESS } else { ExitCode::FAILURE }
+    if checker.differences.is_empty() && drawn.is_ok() { ExitCode::SUCCESS } else { ExitCode::FAILURE }
 }
 
 fn progress(steps: u64) -> indicatif::ProgressBar {
@@ -80,13 +80,7 @@ fn progress(steps: u64) -> indicatif::ProgressBar {
 }
 
 /// Compares a third run with the oracle: it is slow, so it is apart from the measured ones.
-struct Checked {
-    comparisons: usize,
-    missing: usize,
-    differences: Vec<Difference>,
-}
-
-fn check(args: &Args, broad_phase: PbigBroadPhase) -> Checked {
+fn check(args: &Args, broad_phase: PbigBroadPhase) -> Checker {
     let run = Run::new(args.scene, args.bodies as usize, args.seed, broad_phase);
     let mut run = run.checked(PbigConfig::DEFAULT.margin, CHECK_EVERY);
     let bar = progress(args.steps.into());
@@ -95,12 +89,10 @@ fn check(args: &Args, broad_phase: PbigBroadPhase) -> Checked {
         bar.inc(1);
     }
     bar.finish_and_clear();
-    let checker = run.broad_phase.checker().expect("it is checked");
-    let missing = checker.differences.iter().filter(|d| d.fault.is_missing()).count();
-    Checked { comparisons: checker.compared, missing, differences: checker.differences.clone() }
+    run.broad_phase.checker().expect("it is checked").clone()
 }
 
-fn print_table(stock: &Run<DefaultBroadPhase>, ours: &Run<PbigBroadPhase>, checked: &Checked) {
+fn print_table(stock: &Run<DefaultBroadPhase>, ours: &Run<PbigBroadPhase>, checker: &Checker) {
     println!("                                 stock        pbig   stock/pbig");
     let row = |name: &str, of: fn(&StepTime) -> f64| {
         let [stock, ours] = [&stock.times, &ours.times].map(|times| Spread::of(times.iter().map(of)).median);
@@ -110,8 +102,9 @@ fn print_table(stock: &Run<DefaultBroadPhase>, ours: &Run<PbigBroadPhase>, check
     row("whole step, ms", |t| t.step);
     println!("{:<26} {:>11} {:>11}", "pairs at the end", stock.pairs(), ours.pairs());
     println!("{:<26} {:>11} {:>11}", "events", events(stock), events(ours));
-    let against = format!("(against the oracle, {} comparisons)", checked.comparisons);
-    println!("{:<26} {:>11} {:>11}   {against}", "missing pairs", "", checked.missing);
+    let missing = checker.differences.iter().filter(|d| d.fault.is_missing()).count();
+    let against = format!("(against the oracle, {} comparisons)", checker.compared);
+    println!("{:<26} {:>11} {missing:>11}   {against}", "missing pairs", "");
     println!(
         "\nTimes are medians over the steps. The two worlds drift apart, so pairs and events differ in number.\n\
          Where a scene has pairs that rapier's narrow phase throws away, pbig leaves them out."

@@ -1,10 +1,13 @@
 //! The functions that JavaScript calls.
 
-use crate::broad_phase::Choice;
-use crate::groups::Groups;
-use crate::parts::Kind;
-use crate::run::{Run, StepTime};
+use crate::choice::Choice;
+use crate::run::Run;
+use pbig_scenes::drawn::{Drawn, Kind, Member, Part, Triangles};
 use pbig_scenes::scenes::Scene;
+use pbig_scenes::times::StepTime;
+use pbig_scenes::world::World;
+use rapier3d::na::Matrix4;
+use rapier3d::prelude::{Isometry, Real};
 use std::sync::{Mutex, PoisonError};
 use wasm_bindgen::prelude::*;
 
@@ -58,7 +61,7 @@ pub struct MeshData {
 /// Parts that one instanced call draws.
 #[wasm_bindgen(getter_with_clone)]
 pub struct GroupData {
-    /// `ball`, `cuboid`, `cylinder`, `cone`, `half-space` or `mesh`.
+    /// `ball`, `cuboid`, `cylinder`, `half-space` or `mesh`.
     pub kind: String,
     /// Number of the mesh, if the kind is `mesh`.
     pub mesh: Option<u32>,
@@ -72,7 +75,7 @@ pub struct GroupData {
 #[wasm_bindgen]
 pub struct Simulation {
     run: Run,
-    groups: Groups,
+    drawn: Drawn,
     advanced: Result<StepTime, String>,
     time: StepTime,
 }
@@ -87,9 +90,8 @@ impl Simulation {
     pub fn new(scene: &str, bodies: u32, seed: u32, broad_phase: &str) -> Result<Self, JsError> {
         let choice: Choice = broad_phase.parse().map_err(to_js)?;
         let run = Run::new(scene, bodies as usize, seed.into(), choice).map_err(to_js)?;
-        let groups = Groups::new(&run.world.bodies, &run.world.colliders);
-        let time = StepTime::default();
-        Ok(Self { run, groups, advanced: Ok(time), time })
+        let (drawn, time) = (Drawn::new(&run.world), StepTime::default());
+        Ok(Self { run, drawn, advanced: Ok(time), time })
     }
 
     /// Advances the world by 1/60 s. With the GPU this must be called so that it can be suspended: by
@@ -104,9 +106,9 @@ impl Simulation {
     /// The text of pbig's error.
     pub fn end_step(&mut self) -> Result<bool, JsError> {
         self.time = self.advanced.clone().map_err(to_js)?;
-        let is_outdated = self.groups.is_outdated(&self.run.world.colliders);
+        let is_outdated = self.drawn.is_outdated(&self.run.world);
         if is_outdated {
-            self.groups = Groups::new(&self.run.world.bodies, &self.run.world.colliders);
+            self.drawn = Drawn::new(&self.run.world);
         }
         Ok(is_outdated)
     }
@@ -122,12 +124,12 @@ impl Simulation {
 
     /// Returns the milliseconds of the broad phase in the last step.
     pub fn broad_phase_ms(&self) -> f64 {
-        self.time.broad_phase_ms
+        self.time.broad_phase
     }
 
     /// Returns the milliseconds of the last step, the broad phase included.
     pub fn step_ms(&self) -> f64 {
-        self.time.step_ms
+        self.time.step
     }
 
     /// Returns the number of steps so far.
@@ -137,7 +139,7 @@ impl Simulation {
 
     /// Returns the number of pairs that the broad phase reported.
     pub fn pair_count(&self) -> u32 {
-        self.run.pair_count() as u32
+        self.run.world.pair_count() as u32
     }
 
     /// Returns the number of rigid bodies.
@@ -155,48 +157,81 @@ impl Simulation {
         self.run.pairs().into_flattened()
     }
 
-    /// Returns the centre and the half extents of a box around the bodies that can move: six coordinates.
+    /// Returns the centre and the half extents, in metres, of a box around the bodies that can move: six coordinates.
     pub fn moving_box(&self) -> Vec<f32> {
-        self.run.moving_box().to_vec()
+        let around = self.run.world.moving_aabb();
+        let (centre, half) =
+            around.map_or_else(Default::default, |it| (it.center().coords, it.half_extents()));
+        vec![centre.x, centre.y, centre.z, half.x, half.y, half.z]
     }
 
     /// Returns the groups of parts.
     pub fn groups(&self) -> Vec<GroupData> {
-        self.groups.groups.iter().map(group_data).collect()
+        self.drawn.groups().map(group_data).collect()
     }
 
     /// Returns the meshes that groups name by number.
     pub fn meshes(&self) -> Vec<MeshData> {
-        let copied = |mesh: &crate::mesh::Mesh| MeshData {
-            coordinates: mesh.coordinates.clone(),
-            indices: mesh.indices.clone(),
-        };
-        self.groups.meshes.iter().map(copied).collect()
+        self.drawn.meshes.iter().map(mesh_data).collect()
     }
 
     /// Returns the colour class of each part, group by group.
     pub fn colours(&self) -> Vec<u8> {
-        self.groups.colours()
+        self.drawn.members.iter().map(|member| member.part.colour as u8).collect()
     }
 
     /// Returns a matrix of 16 floats for each part, group by group, column by column.
     pub fn matrices(&self) -> Vec<f32> {
-        self.groups.matrices(&self.run.world.colliders)
+        matrices(&self.drawn, &self.run.world)
     }
 }
 
-fn group_data(group: &crate::Group) -> GroupData {
-    let (kind, mesh) = match group.kind {
+fn group_data(members: &[Member]) -> GroupData {
+    let (kind, mesh) = match members[0].part.kind {
         Kind::Ball => ("ball", None),
         Kind::Cuboid => ("cuboid", None),
         Kind::Cylinder => ("cylinder", None),
-        Kind::Cone => ("cone", None),
         Kind::HalfSpace => ("half-space", None),
         Kind::Mesh(number) => ("mesh", Some(number)),
     };
-    GroupData { kind: kind.into(), mesh, is_translucent: group.is_translucent, count: group.count }
+    let (is_translucent, count) = (members[0].is_translucent, members.len() as u32);
+    GroupData { kind: kind.into(), mesh, is_translucent, count }
+}
+
+fn mesh_data((points, triangles): &Triangles) -> MeshData {
+    let coordinates = points.iter().flat_map(|point| [point.x, point.y, point.z]).collect();
+    MeshData { coordinates, indices: triangles.as_flattened().to_vec() }
+}
+
+/// Returns the matrix of each part at the present pose of its collider, column by column.
+fn matrices(drawn: &Drawn, world: &World) -> Vec<f32> {
+    let mut floats = Vec::with_capacity(16 * drawn.members.len());
+    for Member { collider, part, .. } in &drawn.members {
+        let collider = world.colliders.get(*collider);
+        let matrix = collider.map_or_else(Matrix4::zeros, |it| matrix(it.position(), part));
+        floats.extend_from_slice(matrix.as_slice());
+    }
+    floats
+}
+
+fn matrix(pose: &Isometry<Real>, part: &Part) -> Matrix4<f32> {
+    (pose * part.local).to_homogeneous().prepend_nonuniform_scaling(&part.scale)
 }
 
 fn to_js(message: String) -> JsError {
     JsError::new(&message)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rapier3d::prelude::*;
+
+    #[test]
+    fn a_matrix_scales_then_places() {
+        let mut world = World::default();
+        world.colliders.insert(ColliderBuilder::cuboid(1.0, 2.0, 3.0).translation(vector![4.0, 5.0, 6.0]));
+        let wanted = [1., 0., 0., 0., 0., 2., 0., 0., 0., 0., 3., 0., 4., 5., 6., 1.];
+        assert_eq!(matrices(&Drawn::new(&world), &world), wanted);
+    }
 }

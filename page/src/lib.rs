@@ -3,16 +3,11 @@
 //!
 //! `exports` is all that JavaScript sees. The rest knows nothing of a browser, and is tested as a native program.
 
-mod broad_phase;
+mod choice;
 mod clock;
-mod device;
 pub mod exports;
-mod groups;
-mod mesh;
-mod parts;
+mod remote;
 mod run;
 
-pub use broad_phase::{Choice, ExchangeableBroadPhase};
-pub use groups::{Group, Groups};
-pub use parts::Kind;
-pub use run::{Run, StepTime};
+pub use choice::Choice;
+pub use run::Run;

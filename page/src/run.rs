@@ -1,26 +1,19 @@
 //! A scene that runs, step by step.
 
-use crate::broad_phase::{Choice, ExchangeableBroadPhase};
+use crate::choice::Choice;
 use crate::clock::now_ms;
+use pbig_scenes::exchange::Exchange;
 use pbig_scenes::scenes::Scene;
+use pbig_scenes::times::StepTime;
 use pbig_scenes::world::World;
-use rapier3d::parry::bounding_volume::BoundingVolume;
-use rapier3d::prelude::{Aabb, Collider, ColliderPair};
-
-/// Milliseconds of one step.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct StepTime {
-    /// Time in the broad phase, over all its calls.
-    pub broad_phase_ms: f64,
-    /// Time of the whole step, the broad phase included.
-    pub step_ms: f64,
-}
+use rapier3d::prelude::ColliderPair;
 
 /// A world and its broad phase.
 pub struct Run {
     /// The world.
     pub world: World,
-    broad_phase: ExchangeableBroadPhase,
+    choice: Choice,
+    broad_phase: Exchange,
     steps: u32,
 }
 
@@ -31,7 +24,7 @@ impl Run {
     /// A text that lists the scenes if none has this name.
     pub fn new(scene: &str, bodies: usize, seed: u64, choice: Choice) -> Result<Self, String> {
         let world = Scene::named(scene)?.build(bodies, seed);
-        Ok(Self { world, broad_phase: ExchangeableBroadPhase::new(choice), steps: 0 })
+        Ok(Self { world, choice, broad_phase: Exchange::new(choice.pbig(), now_ms), steps: 0 })
     }
 
     /// Advances the world by one step of rapier's length, 1/60 s.
@@ -41,28 +34,25 @@ impl Run {
     pub fn step(&mut self) -> Result<StepTime, String> {
         let start_ms = now_ms();
         self.world.step(&mut self.broad_phase);
-        let step_ms = now_ms() - start_ms;
+        let step = now_ms() - start_ms;
         self.steps += 1;
-        let time = StepTime { broad_phase_ms: self.broad_phase.take_spent_ms(), step_ms };
+        let time =
+            StepTime { broad_phase: self.broad_phase.take_spent_ms(), step, queries: 0.0, frame: step };
         let error = self.broad_phase.pbig().and_then(|pbig| pbig.last_error());
         error.map_or(Ok(time), |error| Err(format!("step {}: {error}", self.steps)))
     }
 
     /// Changes the broad phase; the world goes on.
     pub fn change_broad_phase(&mut self, choice: Choice) {
-        self.broad_phase.change(choice, &self.world);
+        if choice != self.choice {
+            self.choice = choice;
+            self.broad_phase.change(choice.pbig(), &self.world);
+        }
     }
 
     /// Returns the number of steps so far.
     pub fn steps(&self) -> u32 {
         self.steps
-    }
-
-    /// Returns the number of pairs of the narrow phase, which are those that the broad phase reported.
-    pub fn pair_count(&self) -> usize {
-        let narrow_phase = &self.world.narrow_phase;
-        let contacts = narrow_phase.contact_graph().raw_graph().raw_edges().len();
-        contacts + narrow_phase.intersection_graph().raw_graph().raw_edges().len()
     }
 
     /// Returns pbig's algorithm in the last update and the reason for it; empty with rapier's own broad phase.
@@ -80,31 +70,51 @@ impl Run {
         pairs.sort_unstable();
         pairs
     }
-
-    /// Returns the centre and the half extents, in metres, of a box around the colliders that can move; of all colliders if
-    /// none can.
-    pub fn moving_box(&self) -> [f32; 6] {
-        let World { bodies, colliders, .. } = &self.world;
-        let can_move = |it: &Collider| {
-            it.parent().and_then(|body| bodies.get(body)).is_some_and(|body| !body.is_fixed())
-        };
-        let is_bounded = |it: &Aabb| it.half_extents().max() < MAX_HALF_EXTENT;
-        let around =
-            |boxes: &mut dyn Iterator<Item = Aabb>| boxes.filter(is_bounded).reduce(|a, b| a.merged(&b));
-        let all = || colliders.iter().map(|(_, it)| it);
-        let moving = around(&mut all().filter(|it| can_move(it)).map(Collider::compute_aabb));
-        let found = moving.or_else(|| around(&mut all().map(Collider::compute_aabb)));
-        let (centre, half) =
-            found.map_or_else(Default::default, |it| (it.center().coords, it.half_extents()));
-        [centre.x, centre.y, centre.z, half.x, half.y, half.z]
-    }
 }
-
-/// Half extents, in metres, above which an AABB is that of a half-space.
-const MAX_HALF_EXTENT: f32 = 1e6;
 
 fn indices(pair: ColliderPair) -> [u32; 2] {
     let mut both = [pair.collider1, pair.collider2].map(|handle| handle.into_raw_parts().0);
     both.sort_unstable();
     both
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rapier3d::prelude::{ColliderHandle, RigidBodyHandle};
+    use std::collections::BTreeSet;
+
+    /// Returns the sleeping bodies, and the pairs without those of two fixed colliders, which stock reports, too.
+    fn state(run: &Run) -> (Vec<RigidBodyHandle>, BTreeSet<[(u32, u32); 2]>) {
+        let World { bodies, colliders, .. } = &run.world;
+        let asleep = bodies.iter().filter(|(_, body)| body.is_sleeping()).map(|(handle, _)| handle);
+        let both = |pair: ColliderPair| [pair.collider1, pair.collider2];
+        let can_move = |pair: &[ColliderHandle; 2]| pair.iter().any(|&it| colliders[it].parent().is_some());
+        let raw = |pair: [ColliderHandle; 2]| {
+            let mut raw = pair.map(ColliderHandle::into_raw_parts);
+            raw.sort_unstable();
+            raw
+        };
+        (asleep.collect(), run.world.pairs().map(both).filter(can_move).map(raw).collect())
+    }
+
+    /// After each change a world has the pairs that it would have had with stock from the start, and sleeps on.
+    #[test]
+    fn a_change_leaves_resting_bodies_alone() {
+        let [mut changed, mut other] = [Choice::Pbig, Choice::Stock].map(|choice| {
+            let mut run = Run::new("sleeping", 150, 1, choice).unwrap();
+            (0..10).try_for_each(|_| run.step().map(drop)).unwrap();
+            run
+        });
+        for choice in [Choice::Stock, Choice::Pbig, Choice::Stock] {
+            changed.change_broad_phase(choice);
+            for step in 1..=5 {
+                changed.step().unwrap();
+                other.step().unwrap();
+                let (found, expected) = (state(&changed), state(&other));
+                assert!(expected.0.len() > 100, "too few sleep: {}", expected.0.len());
+                assert_eq!(found, expected, "{choice:?}, step {step}");
+            }
+        }
+    }
 }

@@ -6,7 +6,7 @@ import { themeColour } from "./theme.js";
 // Above these numbers of parts, round shapes get fewer triangles.
 const FINE_PARTS = 3000;
 const GROUND_SIZE = 4000;
-// The classes of `Colour` in src/parts.rs, in their order. Fixed parts are ground or walls.
+// The classes of `Colour` of pbig-scenes, in their order. Fixed parts are ground or walls.
 const COLOURS = ["--ground", "--ball", "--cuboid", "--slab", "--capsule", "--other"];
 const OPACITY = 0.4;
 
@@ -14,7 +14,6 @@ const unitGeometries = {
     ball: (fine) => new THREE.SphereGeometry(1, fine ? 20 : 10, fine ? 14 : 7),
     cuboid: () => new THREE.BoxGeometry(2, 2, 2),
     cylinder: (fine) => new THREE.CylinderGeometry(1, 1, 2, fine ? 20 : 10),
-    cone: (fine) => new THREE.ConeGeometry(1, 2, fine ? 20 : 10),
     "half-space": () => new THREE.PlaneGeometry(GROUND_SIZE, GROUND_SIZE).rotateX(-Math.PI / 2),
 };
 

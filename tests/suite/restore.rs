@@ -111,7 +111,7 @@ fn a_device_is_given_at_the_start_or_after_a_restore() {
     let config = PbigConfig { backend: Backend::Device, ..PbigConfig::DEFAULT };
     let gpu = || GpuFinder::new().expect("an adapter");
     let (mut world, mut ours) =
-        (scene("column", 100), PbigBroadPhase::with_gpu(config, gpu()).expect("a length"));
+        (scene("column", 100), PbigBroadPhase::with_device(config, Box::new(gpu())).expect("a length"));
     steps(&mut world, &mut ours, 20);
     let (mut other, mut again) = (copy(&world), restored(&saved(&ours)));
     assert!(again.device_name().is_none(), "a snapshot holds no device");

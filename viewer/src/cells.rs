@@ -1,10 +1,9 @@
 //! The cells of pbig's grid, and the cell of each collider.
 
-use crate::engine::Pbig;
 use crate::simulation::Simulation;
 use pbig_core::Plan;
-use rapier_pbig::DebugRenderParts;
-use rapier3d::pipeline::{DebugColor, DebugRenderObject};
+use rapier_pbig::{DebugRenderParts, PbigBroadPhase};
+use rapier3d::pipeline::{DebugColor, DebugRenderBackend, DebugRenderObject};
 use rapier3d::prelude::*;
 use std::collections::HashMap;
 
@@ -31,10 +30,8 @@ pub struct Cells {
 impl Cells {
     /// Reads the cells of the broad phase in use.
     pub fn of(simulation: &Simulation) -> Self {
-        simulation
-            .engine
-            .pbig()
-            .map_or_else(Self::default, |pbig| Self::read(pbig, &simulation.world.colliders))
+        let pbig = simulation.broad_phase.pbig();
+        pbig.map_or_else(Self::default, |pbig| Self::read(pbig, &simulation.world.colliders))
     }
 
     /// Returns the cell of a collider, counted from the grid's origin. A box lies in the cell of its lower corner.
@@ -42,7 +39,7 @@ impl Cells {
         self.of_collider.get(&collider).copied()
     }
 
-    fn read(pbig: &Pbig, colliders: &ColliderSet) -> Self {
+    fn read(pbig: &PbigBroadPhase, colliders: &ColliderSet) -> Self {
         let cells = boxes_of(pbig, colliders, DebugRenderParts { cells: true, fat_boxes: false });
         let fat_boxes = boxes_of(pbig, colliders, DebugRenderParts { cells: false, fat_boxes: true });
         let occupied = cells.into_iter().map(|(_, cell, _)| cell).collect();
@@ -54,12 +51,22 @@ impl Cells {
     }
 }
 
-/// The boxes that pbig draws, each with its collider and whether it lies in a cell. `rapier` has the trait that calls it.
-pub(crate) struct Boxes(Vec<(ColliderHandle, Cell, bool)>);
+/// The boxes that pbig draws, each with its collider and whether it lies in a cell.
+struct Boxes(Vec<(ColliderHandle, Cell, bool)>);
 
-impl Boxes {
+impl DebugRenderBackend for Boxes {
+    fn draw_line(&mut self, _: DebugRenderObject, _: Point<Real>, _: Point<Real>, _: DebugColor) {}
+
     /// Appends an AABB; other objects are left out.
-    pub(crate) fn push(&mut self, object: DebugRenderObject, [_, saturation, lightness, _]: DebugColor) {
+    fn draw_polyline(
+        &mut self,
+        object: DebugRenderObject,
+        _: &[Point<Real>],
+        _: &[[u32; 2]],
+        _: &Isometry<Real>,
+        _: &Vector<Real>,
+        [_, saturation, lightness, _]: DebugColor,
+    ) {
         if let DebugRenderObject::ColliderAabb(handle, _, aabb) = object {
             let cell = Cell { min: aabb.mins.into(), max: aabb.maxs.into(), lightness };
             // Pbig draws boxes outside the grid in grey.
@@ -69,7 +76,7 @@ impl Boxes {
 }
 
 fn boxes_of(
-    pbig: &Pbig,
+    pbig: &PbigBroadPhase,
     colliders: &ColliderSet,
     parts: DebugRenderParts,
 ) -> Vec<(ColliderHandle, Cell, bool)> {
@@ -110,7 +117,7 @@ mod tests {
     #[test]
     fn objects_in_the_grid_lie_in_occupied_cells() {
         let (cells, simulation) = cells(Choice::Cpu);
-        let plan = &simulation.engine.pbig().unwrap().stats().report.plan;
+        let plan = &simulation.broad_phase.pbig().unwrap().stats().report.plan;
         // The middle of a cell, because its corner lies on a border.
         let middle = |cell: &Cell| std::array::from_fn(|i| cell.min[i] + 0.5 * plan.cell[i]);
         let occupied: Vec<_> = cells.occupied.iter().filter_map(|cell| cell_at(middle(cell), plan)).collect();

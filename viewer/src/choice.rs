@@ -1,7 +1,7 @@
 //! The broad phases to choose from.
 
 use clap::ValueEnum;
-use rapier_pbig::Backend;
+use rapier_pbig::{Backend, GpuFinder, PbigBroadPhase, PbigConfig};
 
 /// `--backend`: a broad phase, and where it works.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
@@ -40,15 +40,21 @@ impl Choice {
         }
     }
 
-    /// Returns pbig's setting, or `None` for stock.
-    pub const fn backend(self) -> Option<Backend> {
-        match self {
-            Self::Stock => None,
-            Self::Auto => Some(Backend::Auto),
-            Self::Cpu => Some(Backend::Cpu),
-            Self::Gpu => Some(Backend::Device),
-            Self::Brute => Some(Backend::Brute),
+    /// Returns pbig's broad phase, or `None` for stock.
+    pub fn pbig(self) -> Option<PbigBroadPhase> {
+        let backend = match self {
+            Self::Stock => return None,
+            Self::Auto => Backend::Auto,
+            Self::Cpu => Backend::Cpu,
+            Self::Gpu => Backend::Device,
+            Self::Brute => Backend::Brute,
+        };
+        let config = PbigConfig { backend, ..PbigConfig::DEFAULT };
+        let mut pbig = PbigBroadPhase::with_config(config).expect("the default margin is a length");
+        if self == Self::Gpu {
+            pbig.set_device(Box::new(GpuFinder::shared()));
         }
+        Some(pbig)
     }
 }
 

@@ -92,9 +92,15 @@ pub struct Controls {
 
 impl Controls {
     /// Returns the controls of a scene that runs, with its keys listed.
-    pub fn new(colouring: Colouring, is_grid_shown: bool) -> Self {
-        let (is_paused, is_ending, is_saving) = (false, false, false);
-        Self { is_paused, colouring, is_grid_shown, is_help_shown: true, is_ending, is_saving }
+    pub fn new(colouring: Colouring) -> Self {
+        Self {
+            is_paused: false,
+            colouring,
+            is_grid_shown: false,
+            is_help_shown: true,
+            is_ending: false,
+            is_saving: false,
+        }
     }
 
     /// Does what a key asks for. `ball` is thrown if the key asks for one.
@@ -107,7 +113,7 @@ impl Controls {
             }
             Action::Reset => simulation.reset(),
             Action::NextScene => simulation.next_scene(),
-            Action::NextBroadPhase => simulation.swap(simulation.engine.choice().next()),
+            Action::NextBroadPhase => simulation.swap(simulation.choice.next()),
             Action::Use(choice) => simulation.swap(choice),
             Action::ThrowBall => simulation.throw(ball),
             Action::NextColouring => self.colouring = self.colouring.next(),
@@ -122,8 +128,8 @@ impl Controls {
     pub fn describe(&self, simulation: &Simulation) -> String {
         let Self { is_paused, colouring, is_grid_shown, is_help_shown, .. } = self;
         let scene = simulation.setting.scene.name;
-        let (backend, steps) = (simulation.engine.choice(), simulation.steps);
-        let (bodies, pairs) = (simulation.world.bodies.len(), simulation.pairs());
+        let (backend, steps) = (simulation.choice, simulation.steps);
+        let (bodies, pairs) = (simulation.world.bodies.len(), simulation.world.pair_count());
         format!(
             "scene={scene} bodies={bodies} step={steps} paused={is_paused} backend={backend:?} pairs={pairs} \
              colouring={colouring:?} cells={is_grid_shown} help={is_help_shown}"
@@ -141,7 +147,7 @@ mod tests {
 
     fn start() -> (Controls, Simulation) {
         let setting = Setting { scene: Scene::named("column").unwrap(), bodies: 50, seed: 1 };
-        (Controls::new(Colouring::Shape, false), Simulation::new(setting, Choice::Cpu))
+        (Controls::new(Colouring::Shape), Simulation::new(setting, Choice::Cpu))
     }
 
     #[test]

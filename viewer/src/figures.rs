@@ -2,10 +2,9 @@
 
 use crate::choice::Choice;
 use crate::controls::Controls;
-use crate::engine::Pbig;
-use crate::history::Summary;
 use crate::simulation::Simulation;
-use rapier_pbig::Error;
+use pbig_scenes::times::Summary;
+use rapier_pbig::PbigBroadPhase;
 
 /// The number of characters after which the plan's text is broken.
 const LINE_CHARS: usize = 52;
@@ -32,20 +31,20 @@ pub struct Figures {
 impl Figures {
     /// Gathers the figures.
     pub fn of(simulation: &Simulation, controls: &Controls) -> Self {
-        let engine = &simulation.engine;
+        let pbig = simulation.broad_phase.pbig();
         let broad_phase = simulation.history.summary(|step| step.broad_phase_ms);
         let step = simulation.history.summary(|step| step.step_ms);
         let last = simulation.history.last().map_or([0.0; 2], |step| [step.broad_phase_ms, step.step_ms]);
         Self {
             scene: scene_line(simulation, controls),
-            broad_phase: broad_phase_line(engine.choice(), engine.pbig()),
+            broad_phase: broad_phase_line(simulation.choice, pbig),
             times: vec![
                 time_line("broad phase", last[0], broad_phase),
                 time_line("whole step", last[1], step),
             ],
-            counts: counts_line(simulation.pairs(), engine.events()),
-            error: wrap(&error_text(engine.last_error()), LINE_CHARS),
-            plan: wrap(&plan_text(engine.pbig()), LINE_CHARS),
+            counts: counts_line(simulation.world.pair_count(), simulation.broad_phase.events()),
+            error: wrap(&error_text(pbig), LINE_CHARS),
+            plan: wrap(&plan_text(pbig), LINE_CHARS),
             legend: legend_line(simulation, controls),
         }
     }
@@ -65,8 +64,8 @@ fn scene_line(simulation: &Simulation, controls: &Controls) -> String {
     format!("{name}: {bodies} bodies, step {}{paused}", simulation.steps)
 }
 
-fn broad_phase_line(choice: Choice, pbig: Option<&Pbig>) -> String {
-    let adapter = pbig.and_then(Pbig::device_name).filter(|_| choice == Choice::Gpu);
+fn broad_phase_line(choice: Choice, pbig: Option<&PbigBroadPhase>) -> String {
+    let adapter = pbig.and_then(PbigBroadPhase::device_name).filter(|_| choice == Choice::Gpu);
     adapter.map_or_else(|| choice.name().to_owned(), |adapter| format!("{}: {adapter}", choice.name()))
 }
 
@@ -74,19 +73,17 @@ fn time_line(name: &str, last: f64, Summary { mean, p99, .. }: Summary) -> Strin
     format!("{name} {last:.2} ms  (mean {mean:.2}, p99 {p99:.2})")
 }
 
-fn counts_line(pairs: usize, events: Option<[u64; 2]>) -> String {
-    match events {
-        Some([added, deleted]) => format!("{pairs} pairs, events: {added} added, {deleted} removed"),
-        None => format!("{pairs} pairs"),
-    }
+fn counts_line(pairs: usize, [added, deleted]: [u64; 2]) -> String {
+    format!("{pairs} pairs, events: {added} added, {deleted} removed")
 }
 
-fn error_text(error: Option<&Error>) -> String {
+fn error_text(pbig: Option<&PbigBroadPhase>) -> String {
+    let error = pbig.and_then(PbigBroadPhase::last_error);
     error.map(|error| format!("error: {error}")).unwrap_or_default()
 }
 
 /// Returns the algorithm and the reasons: the plan of the last update, and why a GPU was not used.
-fn plan_text(pbig: Option<&Pbig>) -> String {
+fn plan_text(pbig: Option<&PbigBroadPhase>) -> String {
     let Some(pbig) = pbig else { return "a tree of boxes, updated and searched in each step".to_owned() };
     let report = pbig.stats().report;
     match &report.fallback {
@@ -97,7 +94,7 @@ fn plan_text(pbig: Option<&Pbig>) -> String {
 
 fn legend_line(simulation: &Simulation, controls: &Controls) -> String {
     let legend = controls.colouring.legend();
-    match (controls.is_grid_shown, simulation.engine.pbig()) {
+    match (controls.is_grid_shown, simulation.broad_phase.pbig()) {
         (false, _) => legend.to_owned(),
         (true, None) => format!("{legend}; stock has no cells"),
         (true, Some(_)) => format!("{legend}; cells shown"),
@@ -122,16 +119,15 @@ fn wrap(text: &str, chars: usize) -> Vec<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::engine::Engine;
     use crate::palette::Colouring;
-    use crate::simulation::Setting;
+    use crate::simulation::{Setting, with_max_pairs};
     use pbig_scenes::scenes::Scene;
 
     fn figures(choice: Choice, steps: usize) -> Figures {
         let setting = Setting { scene: Scene::named("column").unwrap(), bodies: 200, seed: 1 };
         let mut simulation = Simulation::new(setting, choice);
         (0..steps).for_each(|_| simulation.step());
-        Figures::of(&simulation, &Controls::new(Colouring::Shape, false))
+        Figures::of(&simulation, &Controls::new(Colouring::Shape))
     }
 
     #[test]
@@ -140,6 +136,11 @@ mod tests {
         let pbig = figures(Choice::Cpu, 1);
         assert_eq!(pbig.scene, "column: 200 bodies, step 1");
         assert_eq!(pbig.broad_phase, "pbig on the CPU");
+        assert!(
+            pbig.counts.contains(" pairs, events: ") && pbig.counts.contains(" added, "),
+            "{}",
+            pbig.counts
+        );
         assert!(pbig.plan.join(" ").contains("tested against all 201"), "{:?}", pbig.plan);
         let stock = figures(Choice::Stock, 3);
         assert!(stock.broad_phase.starts_with("stock") && stock.plan[0].starts_with("a tree"));
@@ -147,19 +148,13 @@ mod tests {
     }
 
     #[test]
-    fn events_are_shown_where_they_are_known() {
-        assert_eq!(counts_line(3, Some([5, 2])), "3 pairs, events: 5 added, 2 removed");
-        assert_eq!(counts_line(3, None), "3 pairs");
-    }
-
-    #[test]
     fn an_error_of_the_broad_phase_is_shown() {
         assert!(figures(Choice::Cpu, 1).error.is_empty() && figures(Choice::Stock, 1).error.is_empty());
         let setting = Setting { scene: Scene::named("column").unwrap(), bodies: 200, seed: 1 };
         let mut simulation = Simulation::new(setting, Choice::Auto);
-        simulation.engine = Engine::with_max_pairs(10);
+        simulation.broad_phase = with_max_pairs(10);
         simulation.step();
-        let figures = Figures::of(&simulation, &Controls::new(Colouring::Shape, false));
+        let figures = Figures::of(&simulation, &Controls::new(Colouring::Shape));
         let shown = figures.lines().join(" ");
         assert!(shown.contains("error: ") && shown.contains("10"), "{shown}");
     }

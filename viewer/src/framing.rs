@@ -4,7 +4,6 @@ use crate::shapes::to_vec3;
 use crate::simulation::Ball;
 use kiss3d::prelude::Vec3;
 use pbig_scenes::world::World;
-use rapier3d::prelude::*;
 
 /// A place to look from, and one to look at.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -29,8 +28,7 @@ const BALL_SECONDS: f32 = 0.8;
 impl Framing {
     /// Returns a place from which the moving objects of a world can be seen. Without one it looks at all objects.
     pub fn of(world: &World) -> Self {
-        let around = bounds(world, true).or_else(|| bounds(world, false));
-        let (centre, half) = around.map_or((Vec3::ZERO, Vec3::splat(5.0)), |around| {
+        let (centre, half) = world.moving_aabb().map_or((Vec3::ZERO, Vec3::splat(5.0)), |around| {
             (to_vec3(around.center()), to_vec3(around.half_extents()))
         });
         let radius = half.length().max(2.0);
@@ -48,15 +46,6 @@ impl Framing {
         let velocity = (at - start) / BALL_SECONDS;
         Ball { from: start.into(), velocity: velocity.into(), radius: BALL_SHARE * self.radius }
     }
-}
-
-/// Returns the box around the colliders of dynamic bodies, or around all that are not endless.
-fn bounds(world: &World, dynamic_only: bool) -> Option<Aabb> {
-    let is_dynamic =
-        |collider: &Collider| collider.parent().is_some_and(|body| world.bodies[body].is_dynamic());
-    let wanted = world.colliders.iter().filter(|(_, collider)| !dynamic_only || is_dynamic(collider));
-    let boxes = wanted.map(|(_, collider)| collider.compute_aabb());
-    boxes.filter(|aabb| to_vec3(aabb.extents()).max_element() < 1e5).reduce(|a, b| a.merged(&b))
 }
 
 #[cfg(test)]

@@ -1,7 +1,7 @@
 //! The rolling graph of the broad phase's time.
 
 use crate::choice::Choice;
-use crate::history::{HISTORY_STEPS, History, StepTime};
+use crate::history::{HISTORY_STEPS, History, MeasuredStep};
 use crate::sheet::{Area, Rgba, Sheet};
 
 /// The graph's lines and texts.
@@ -29,7 +29,7 @@ pub fn scale_end_ms(longest_ms: f64) -> f64 {
 /// dashed line at the p99 of the one in use now. The axis ends at `end_ms`, at the upper border. `size` is the height of texts.
 pub fn draw(sheet: &mut Sheet, area: Area, history: &History, end_ms: f64, size: f32) {
     let points: Vec<[f32; 2]> = places(history, area, end_ms);
-    let steps: Vec<&StepTime> = history.steps().collect();
+    let steps: Vec<&MeasuredStep> = history.steps().collect();
     let mut start = 0;
     for run in steps.chunk_by(|a, b| a.swaps == b.swaps) {
         // A run begins where the one before it ends, so that the graph has no gap.
@@ -45,7 +45,7 @@ pub fn draw(sheet: &mut Sheet, area: Area, history: &History, end_ms: f64, size:
 
 /// Returns the point of each step. The newest one lies at the right border once the history is full.
 fn places(history: &History, area: Area, end_ms: f64) -> Vec<[f32; 2]> {
-    let place = |(i, step): (usize, &StepTime)| {
+    let place = |(i, step): (usize, &MeasuredStep)| {
         let share = (step.broad_phase_ms / end_ms).min(1.0) as f32;
         area.at(i as f32 / (HISTORY_STEPS - 1) as f32, share)
     };
@@ -80,7 +80,7 @@ mod tests {
                 history.count_swap();
             }
             let swaps = history.swaps();
-            history.push(StepTime { choice, swaps, broad_phase_ms, step_ms: 1.0 });
+            history.push(MeasuredStep { choice, swaps, broad_phase_ms, step_ms: 1.0 });
         }
         history
     }

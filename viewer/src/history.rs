@@ -1,6 +1,7 @@
 //! The last steps' times, for the graph and its figures.
 
 use crate::choice::Choice;
+use pbig_scenes::times::Summary;
 use std::collections::VecDeque;
 
 /// Steps that the graph shows.
@@ -8,7 +9,7 @@ pub const HISTORY_STEPS: usize = 300;
 
 /// The times of one step.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct StepTime {
+pub struct MeasuredStep {
     /// The broad phase that was measured.
     pub choice: Choice,
     /// Swaps of the broad phase before the step.
@@ -22,40 +23,13 @@ pub struct StepTime {
 /// The times of the last [`HISTORY_STEPS`] steps, oldest first.
 #[derive(Clone, Debug, Default)]
 pub struct History {
-    steps: VecDeque<StepTime>,
+    steps: VecDeque<MeasuredStep>,
     swaps: u32,
-}
-
-/// Figures of some times, in ms. All zero without times.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Summary {
-    /// The mean.
-    pub mean: f64,
-    /// The median; of an even count, the upper of the two in the middle.
-    pub median: f64,
-    /// The 99th percentile: the smallest time that at least 99% of the times do not exceed.
-    pub p99: f64,
-}
-
-impl Summary {
-    /// Summarizes times.
-    pub fn of(times: impl IntoIterator<Item = f64>) -> Self {
-        let mut times: Vec<f64> = times.into_iter().collect();
-        times.sort_unstable_by(f64::total_cmp);
-        let rank = (times.len() * 99).div_ceil(100);
-        match times.get(rank.wrapping_sub(1)) {
-            None => Self::default(),
-            Some(&p99) => {
-                let mean = times.iter().sum::<f64>() / times.len() as f64;
-                Self { mean, median: times[times.len() / 2], p99 }
-            }
-        }
-    }
 }
 
 impl History {
     /// Appends a step, and drops the oldest one if there are more than [`HISTORY_STEPS`].
-    pub fn push(&mut self, step: StepTime) {
+    pub fn push(&mut self, step: MeasuredStep) {
         if self.steps.len() == HISTORY_STEPS {
             self.steps.pop_front();
         }
@@ -73,22 +47,22 @@ impl History {
     }
 
     /// Returns the steps, oldest first.
-    pub fn steps(&self) -> impl ExactSizeIterator<Item = &StepTime> {
+    pub fn steps(&self) -> impl ExactSizeIterator<Item = &MeasuredStep> {
         self.steps.iter()
     }
 
     /// Returns the newest step since the last swap.
-    pub fn last(&self) -> Option<&StepTime> {
+    pub fn last(&self) -> Option<&MeasuredStep> {
         self.since_swap().next()
     }
 
     /// Returns the steps since the last swap, newest first.
-    fn since_swap(&self) -> impl Iterator<Item = &StepTime> {
+    fn since_swap(&self) -> impl Iterator<Item = &MeasuredStep> {
         self.steps.iter().rev().take_while(|step| step.swaps == self.swaps)
     }
 
     /// Summarizes one time of the shown steps since the last swap.
-    pub fn summary(&self, time: impl Fn(&StepTime) -> f64) -> Summary {
+    pub fn summary(&self, time: impl Fn(&MeasuredStep) -> f64) -> Summary {
         Summary::of(self.since_swap().map(time))
     }
 
@@ -104,18 +78,7 @@ mod tests {
 
     fn push(history: &mut History, choice: Choice, broad_phase_ms: f64) {
         let swaps = history.swaps();
-        history.push(StepTime { choice, swaps, broad_phase_ms, step_ms: 10.0 * broad_phase_ms });
-    }
-
-    #[test]
-    fn p99_is_the_nearest_rank() {
-        assert_eq!(Summary::of([]), Summary::default());
-        assert_eq!(Summary::of([3.0]), Summary { mean: 3.0, median: 3.0, p99: 3.0 });
-        assert_eq!(Summary::of((1..=100).map(f64::from)), Summary { mean: 50.5, median: 51.0, p99: 99.0 });
-        assert_eq!(
-            Summary::of((1..=101).rev().map(f64::from)),
-            Summary { mean: 51.0, median: 51.0, p99: 100.0 }
-        );
+        history.push(MeasuredStep { choice, swaps, broad_phase_ms, step_ms: 10.0 * broad_phase_ms });
     }
 
     #[test]

@@ -115,7 +115,7 @@ fn add_times(sheet: &mut Sheet, side: &HudSide<'_>, width: f32, text: f32) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::history::StepTime;
+    use crate::history::MeasuredStep;
     use crate::options::MIN_SIZE;
     use crate::palette::Colouring;
     use crate::simulation::{Setting, Simulation};
@@ -151,11 +151,9 @@ mod tests {
     #[test]
     fn every_key_is_on_the_screen_unless_hidden() {
         let is_listed = |sheet: &Sheet, text: &str| sheet.texts.iter().any(|found| found.text == text);
-        let shown = sheet(&Controls::new(Colouring::Shape, false), [1280.0, 800.0]);
-        let hidden = sheet(
-            &Controls { is_help_shown: false, ..Controls::new(Colouring::Shape, false) },
-            [1280.0, 800.0],
-        );
+        let shown = sheet(&Controls::new(Colouring::Shape), [1280.0, 800.0]);
+        let hidden =
+            sheet(&Controls { is_help_shown: false, ..Controls::new(Colouring::Shape) }, [1280.0, 800.0]);
         for binding in &BINDINGS {
             assert!(is_listed(&shown, binding.help) && !is_listed(&hidden, binding.help), "{}", binding.name);
         }
@@ -163,7 +161,7 @@ mod tests {
 
     #[test]
     fn nothing_leaves_the_screen() {
-        let controls = Controls::new(Colouring::Contacts, true);
+        let controls = Controls { is_grid_shown: true, ..Controls::new(Colouring::Contacts) };
         let min = MIN_SIZE.map(|pixels| pixels as f32);
         for size in [[1280.0, 800.0], [800.0, 600.0], [3840.0, 2160.0], [min[0], 2160.0], min] {
             let sheet = sheet(&controls, size);
@@ -178,7 +176,7 @@ mod tests {
     fn a_comparison_shows_the_median_of_its_side() {
         let mut history = History::default();
         for broad_phase_ms in [1.0, 1.5, 9.0] {
-            history.push(StepTime { choice: Choice::Stock, swaps: 0, broad_phase_ms, step_ms: 9.0 });
+            history.push(MeasuredStep { choice: Choice::Stock, swaps: 0, broad_phase_ms, step_ms: 9.0 });
         }
         let side = HudSide { choice: Choice::Stock, history: &history, end_ms: 10.0, title: "step 2".into() };
         let sheet = comparison(&side, [640.0, 640.0]);

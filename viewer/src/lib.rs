@@ -2,20 +2,17 @@
 //!
 //! | files | content |
 //! | --- | --- |
-//! | `program`, `options`, `error` | the program, its command line, and what can go wrong |
-//! | `choice`, `engine`, `simulation`, `history` | the broad phase, the world and their times; nothing here draws |
+//! | `options` | the command line |
+//! | `choice`, `simulation`, `history` | the broad phase, the world and their times; nothing here draws |
 //! | `controls` | keys and what they do |
 //! | `figures`, `graph`, `hud`, `sheet` | what is written over the picture, as texts and lines in pixels |
-//! | `shapes`, `palette`, `cells`, `framing` | colliders as instances of meshes, their colours, the grid's cells, the camera |
+//! | `shapes`, `palette`, `cells`, `framing` | parts of colliders as instances, their colours, the grid's cells, the camera |
 //! | `draw`, `window`, `pictures` | drawing with kiss3d |
-//! | `rapier` | conversions of rapier's types |
 
 pub mod cells;
 pub mod choice;
 pub mod controls;
 pub mod draw;
-pub mod engine;
-pub mod error;
 pub mod figures;
 pub mod framing;
 pub mod graph;
@@ -24,11 +21,46 @@ pub mod hud;
 pub mod options;
 pub mod palette;
 pub mod pictures;
-pub mod program;
-pub mod rapier;
 pub mod shapes;
 pub mod sheet;
 pub mod simulation;
 pub mod window;
 
-pub use program::main;
+use clap::Parser;
+use draw::Quality;
+use options::Options;
+use std::process::ExitCode;
+
+/// Runs the program with the options of the command line.
+pub fn main() -> ExitCode {
+    let options = Options::parse();
+    match kiss3d::pollster::block_on(run(&options)) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("{error}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+async fn run(options: &Options) -> Result<(), String> {
+    let quality = if is_software().await? { Quality::Fast } else { Quality::Fine };
+    match &options.frames {
+        None => window::run(options, quality).await,
+        Some(folder) => pictures::run(options, folder).await,
+    }
+}
+
+/// Returns true if the graphics adapter is software. The drawing library panics without an adapter, so this says first what is
+/// missing.
+async fn is_software() -> Result<bool, String> {
+    let instance = wgpu::Instance::new(wgpu::InstanceDescriptor::new_without_display_handle());
+    let found = instance.request_adapter(&wgpu::RequestAdapterOptions::default()).await;
+    let adapter = found.map_err(|error| {
+        format!(
+            "there is no graphics adapter: {error}\na software one will do; on Debian and Ubuntu: \
+             apt install mesa-vulkan-drivers libvulkan1"
+        )
+    })?;
+    Ok(adapter.get_info().device_type == wgpu::DeviceType::Cpu)
+}

@@ -26,9 +26,6 @@ pub struct Options {
     /// The colours to begin with.
     #[arg(long, value_enum, default_value_t)]
     pub colour: Colouring,
-    /// Begin with the cells of pbig's grid shown.
-    #[arg(long)]
-    pub cells: bool,
     /// Width and height in pixels.
     #[arg(long, default_value = "1280x800", value_parser = parse_size)]
     pub size: [u32; 2],

@@ -1,9 +1,8 @@
 //! The colour of each object.
 
 use crate::cells::Cells;
-use crate::rapier::is_touching;
-use crate::shapes::Primitive;
 use clap::ValueEnum;
+use pbig_scenes::drawn::Colour;
 use pbig_scenes::world::World;
 use rapier3d::prelude::*;
 
@@ -74,12 +73,12 @@ impl<'a> Palette<'a> {
         Self { colouring, world, cells, contacts }
     }
 
-    /// Returns the colour of a collider whose shape, or part of it, is drawn as this primitive.
-    pub fn colour(&self, handle: ColliderHandle, collider: &Collider, primitive: Primitive) -> Rgb {
+    /// Returns the colour of a part of a collider, by its colour class.
+    pub fn colour(&self, handle: ColliderHandle, collider: &Collider, class: Colour) -> Rgb {
         let body = collider.parent().and_then(|body| self.world.bodies.get(body));
         let Some(body) = body.filter(|body| !body.is_fixed()) else { return FIXED };
         match self.colouring {
-            Colouring::Shape => by_shape(primitive, handle.into_raw_parts().0),
+            Colouring::Shape => by_shape(class, handle.into_raw_parts().0),
             Colouring::Contacts => self.by_contacts(handle),
             Colouring::Sleeping => {
                 if body.is_sleeping() {
@@ -101,7 +100,7 @@ impl<'a> Palette<'a> {
 /// Counts the objects that each collider touches, by its index.
 fn count_contacts(world: &World) -> Vec<u32> {
     let mut counts = Vec::new();
-    for pair in world.narrow_phase.contact_pairs().filter(|pair| is_touching(pair)) {
+    for pair in world.narrow_phase.contact_pairs().filter(|pair| pair.has_any_active_contact) {
         for handle in [pair.collider1, pair.collider2] {
             let index = handle.into_raw_parts().0 as usize;
             if counts.len() <= index {
@@ -114,13 +113,14 @@ fn count_contacts(world: &World) -> Vec<u32> {
 }
 
 /// Returns a colour for each kind of shape, a little lighter or darker by the collider's index, so that neighbours differ.
-fn by_shape(primitive: Primitive, index: u32) -> Rgb {
-    let base = match primitive {
-        Primitive::Ball => [0.92, 0.36, 0.22],
-        Primitive::Cube => [0.20, 0.52, 0.82],
-        Primitive::Slab => [0.96, 0.74, 0.22],
-        Primitive::Capsule => [0.24, 0.68, 0.46],
-        Primitive::Cone | Primitive::Cylinder => [0.62, 0.40, 0.76],
+fn by_shape(class: Colour, index: u32) -> Rgb {
+    let base = match class {
+        Colour::Fixed => FIXED,
+        Colour::Ball => [0.92, 0.36, 0.22],
+        Colour::Cuboid => [0.20, 0.52, 0.82],
+        Colour::Slab => [0.96, 0.74, 0.22],
+        Colour::Capsule => [0.24, 0.68, 0.46],
+        Colour::Other => [0.62, 0.40, 0.76],
     };
     let light = 0.86 + 0.07 * (index % 5) as f32;
     base.map(|part| (part * light).min(1.0))
@@ -157,7 +157,7 @@ mod tests {
         let cells = Cells::of(&simulation);
         let palette = Palette::new(colouring, &simulation.world, &cells);
         let bodies = simulation.world.colliders.iter().filter(|(_, collider)| collider.parent().is_some());
-        bodies.map(|(handle, collider)| palette.colour(handle, collider, Primitive::Ball)).collect()
+        bodies.map(|(handle, collider)| palette.colour(handle, collider, Colour::Ball)).collect()
     }
 
     fn share(colours: &[Rgb], is: impl Fn(&Rgb) -> bool) -> f64 {

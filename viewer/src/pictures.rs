@@ -3,7 +3,6 @@
 use crate::choice::Choice;
 use crate::controls::Controls;
 use crate::draw::{Quality, View};
-use crate::error::Error;
 use crate::figures::Figures;
 use crate::graph::scale_end_ms;
 use crate::hud::{self, HudSide};
@@ -18,7 +17,7 @@ use std::path::Path;
 ///
 /// # Errors
 /// If a picture cannot be written, or the broad phase fails in a step.
-pub async fn run(options: &Options, folder: &Path) -> Result<(), Error> {
+pub async fn run(options: &Options, folder: &Path) -> Result<(), String> {
     let mut studio = Studio::new(options).await;
     for step in 0..=options.steps {
         if step > 0 {
@@ -36,10 +35,10 @@ pub async fn run(options: &Options, folder: &Path) -> Result<(), Error> {
 ///
 /// # Errors
 /// If it cannot be written.
-pub fn save(picture: &RgbImage, path: &Path) -> Result<(), Error> {
+pub fn save(picture: &RgbImage, path: &Path) -> Result<(), String> {
     let folder = path.parent().unwrap_or(Path::new("."));
-    std::fs::create_dir_all(folder).map_err(|error| Error::File(folder.to_owned(), error.to_string()))?;
-    picture.save(path).map_err(|error| Error::File(path.to_owned(), error.to_string()))
+    std::fs::create_dir_all(folder).map_err(|error| format!("{}: {error}", folder.display()))?;
+    picture.save(path).map_err(|error| format!("{}: {error}", path.display()))
 }
 
 /// One simulation, or two beside each other, drawn without a window.
@@ -67,12 +66,12 @@ impl Studio {
             (simulation, view)
         };
         let sides = choices.into_iter().map(&mut side).collect();
-        let controls = Controls { is_help_shown: false, ..Controls::new(options.colour, options.cells) };
+        let controls = Controls { is_help_shown: false, ..Controls::new(options.colour) };
         Self { window, sides, controls, has_comparison: options.compare }
     }
 
     /// Makes one step on each side in turn, so that both see the same noise of the machine.
-    fn step(&mut self) -> Result<(), Error> {
+    fn step(&mut self) -> Result<(), String> {
         step_all(self.sides.iter_mut().map(|(simulation, _)| simulation))
     }
 
@@ -99,13 +98,13 @@ impl Studio {
             self.sides.iter().map(|(side, _)| side.history.longest_broad_phase_ms()).fold(0.0, f64::max);
         let (bodies, steps) = (simulation.world.bodies.len(), simulation.steps);
         let title = format!("{} objects, step {steps}: broad phase, ms a step", thousands(bodies));
-        let (choice, history) = (simulation.engine.choice(), &simulation.history);
+        let (choice, history) = (simulation.choice, &simulation.history);
         hud::comparison(&HudSide { choice, history, end_ms: scale_end_ms(longest), title }, size)
     }
 }
 
 /// Makes one step of each simulation, and ends with the first that fails.
-fn step_all<'a>(mut simulations: impl Iterator<Item = &'a mut Simulation>) -> Result<(), Error> {
+fn step_all<'a>(mut simulations: impl Iterator<Item = &'a mut Simulation>) -> Result<(), String> {
     simulations.try_for_each(|simulation| {
         simulation.step();
         simulation.check()
@@ -139,8 +138,7 @@ fn beside(pictures: &[RgbImage]) -> RgbImage {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::engine::Engine;
-    use crate::simulation::Setting;
+    use crate::simulation::{Setting, with_max_pairs};
     use image::Rgb;
     use pbig_scenes::scenes::Scene;
 
@@ -154,8 +152,8 @@ mod tests {
         let setting = Setting { scene: Scene::named("column").unwrap(), bodies: 200, seed: 1 };
         let mut sides = [Choice::Stock, Choice::Auto].map(|choice| Simulation::new(setting, choice));
         assert_eq!(step_all(sides.iter_mut()), Ok(()));
-        sides[1].engine = Engine::with_max_pairs(10);
-        assert!(matches!(step_all(sides.iter_mut()), Err(Error::Step(2, _))));
+        sides[1].broad_phase = with_max_pairs(10);
+        assert!(step_all(sides.iter_mut()).unwrap_err().starts_with("step 2: "));
     }
 
     #[test]
@@ -171,7 +169,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let file = folder.path().join("file");
         std::fs::write(&file, "").unwrap();
-        let error = save(&RgbImage::new(1, 1), &file.join("x.png")).unwrap_err().to_string();
+        let error = save(&RgbImage::new(1, 1), &file.join("x.png")).unwrap_err();
         assert!(error.contains("file"), "{error}");
         let deep = folder.path().join("a/b/x.png");
         save(&RgbImage::new(1, 1), &deep).unwrap();

@@ -17,12 +17,6 @@ pub struct Area {
 }
 
 impl Area {
-    /// Returns the area without a border of this width.
-    pub fn inner(&self, border: f32) -> Self {
-        let (width, height) = (self.width - 2.0 * border, self.height - 2.0 * border);
-        Self { x: self.x + border, y: self.y + border, width, height }
-    }
-
     /// Returns the point at shares of the width and the height, the latter from the lower border.
     pub fn at(&self, x: f32, y: f32) -> [f32; 2] {
         [self.x + x * self.width, self.y + (1.0 - y) * self.height]

@@ -1,13 +1,14 @@
 //! A scene that runs: its world, its broad phase and its times.
 
 use crate::choice::Choice;
-use crate::engine::Engine;
-use crate::error::Error;
-use crate::history::{History, StepTime};
+use crate::history::{History, MeasuredStep};
+use pbig_scenes::exchange::Exchange;
 use pbig_scenes::scenes::Scene;
 use pbig_scenes::world::World;
+use rapier_pbig::PbigBroadPhase;
 use rapier3d::prelude::*;
-use std::time::{Duration, Instant};
+use std::sync::LazyLock;
+use std::time::Instant;
 
 /// The scene, and how to build it.
 #[derive(Clone, Copy)]
@@ -53,8 +54,10 @@ pub struct Simulation {
     pub setting: Setting,
     /// Rapier's world.
     pub world: World,
+    /// The broad phase that was asked for.
+    pub choice: Choice,
     /// The broad phase.
-    pub engine: Engine,
+    pub broad_phase: Exchange,
     /// The last steps' times.
     pub history: History,
     /// Steps since the world was built.
@@ -66,40 +69,42 @@ pub struct Simulation {
 impl Simulation {
     /// Builds a scene.
     pub fn new(setting: Setting, choice: Choice) -> Self {
-        let (world, engine) = (setting.build(), Engine::new(choice));
-        Self { setting, world, engine, history: History::default(), steps: 0, is_swapped: false }
+        let (world, broad_phase) = (setting.build(), Exchange::new(choice.pbig(), now_ms));
+        let history = History::default();
+        Self { setting, world, choice, broad_phase, history, steps: 0, is_swapped: false }
     }
 
     /// Makes one step of 1/60 s, and notes its times. Those of the first step after a swap are left out: a new broad phase sets
     /// up its tree, grid or device there.
     pub fn step(&mut self) {
-        let clock = Instant::now();
-        self.engine.step(&mut self.world);
-        let step_ms = milliseconds(clock.elapsed());
-        let broad_phase_ms = milliseconds(self.engine.take_time());
+        let start_ms = now_ms();
+        self.world.step(&mut self.broad_phase);
+        let step_ms = now_ms() - start_ms;
+        let broad_phase_ms = self.broad_phase.take_spent_ms();
         self.steps += 1;
         if !std::mem::take(&mut self.is_swapped) {
-            let (choice, swaps) = (self.engine.choice(), self.history.swaps());
-            self.history.push(StepTime { choice, swaps, broad_phase_ms, step_ms });
+            let (choice, swaps) = (self.choice, self.history.swaps());
+            self.history.push(MeasuredStep { choice, swaps, broad_phase_ms, step_ms });
         }
     }
 
     /// Builds the same scene again, with the same broad phase.
     pub fn reset(&mut self) {
-        *self = Self::new(self.setting, self.engine.choice());
+        *self = Self::new(self.setting, self.choice);
     }
 
     /// Builds the next scene, with the same broad phase.
     pub fn next_scene(&mut self) {
-        *self = Self::new(self.setting.next_scene(), self.engine.choice());
+        *self = Self::new(self.setting.next_scene(), self.choice);
     }
 
     /// Goes on with another broad phase. The world stays as it is. Does nothing if this one is in use.
     pub fn swap(&mut self, choice: Choice) {
-        if choice == self.engine.choice() {
+        if choice == self.choice {
             return;
         }
-        self.engine.swap(choice, &self.world);
+        self.choice = choice;
+        self.broad_phase.change(choice.pbig(), &self.world);
         self.history.count_swap();
         self.is_swapped = true;
     }
@@ -107,10 +112,10 @@ impl Simulation {
     /// Checks that the last step found its pairs.
     ///
     /// # Errors
-    /// [`Error::Step`] with the broad phase's reason.
-    pub fn check(&self) -> Result<(), Error> {
-        let error = self.engine.last_error();
-        error.map_or(Ok(()), |error| Err(Error::Step(self.steps, error.to_string())))
+    /// The number of the step, and the broad phase's reason.
+    pub fn check(&self) -> Result<(), String> {
+        let error = self.broad_phase.pbig().and_then(PbigBroadPhase::last_error);
+        error.map_or(Ok(()), |error| Err(format!("step {}: {error}", self.steps)))
     }
 
     /// Throws a heavy ball into the world.
@@ -121,18 +126,19 @@ impl Simulation {
             .ccd_enabled(true);
         self.world.add(body, ColliderBuilder::ball(ball.radius).density(BALL_DENSITY));
     }
-
-    /// Returns the number of pairs that the narrow phase knows.
-    pub fn pairs(&self) -> usize {
-        let narrow_phase = &self.world.narrow_phase;
-        let contacts = narrow_phase.contact_graph().raw_graph().raw_edges().len();
-        contacts + narrow_phase.intersection_graph().raw_graph().raw_edges().len()
-    }
 }
 
-/// Returns a duration in ms.
-fn milliseconds(time: Duration) -> f64 {
-    time.as_secs_f64() * 1e3
+/// Returns the milliseconds since its first call.
+fn now_ms() -> f64 {
+    static START: LazyLock<Instant> = LazyLock::new(Instant::now);
+    START.elapsed().as_secs_f64() * 1e3
+}
+
+/// Returns pbig with a limit on the number of pairs, above which updates fail.
+#[cfg(test)]
+pub(crate) fn with_max_pairs(max_pairs: u64) -> Exchange {
+    let config = rapier_pbig::PbigConfig { max_pairs, ..rapier_pbig::PbigConfig::DEFAULT };
+    Exchange::new(PbigBroadPhase::with_config(config).ok(), now_ms)
 }
 
 #[cfg(test)]

@@ -2,7 +2,6 @@
 
 use crate::controls::{Action, Controls, action_of};
 use crate::draw::{Quality, View};
-use crate::error::Error;
 use crate::figures::Figures;
 use crate::hud;
 use crate::options::Options;
@@ -17,10 +16,10 @@ use std::panic::{self, AssertUnwindSafe};
 ///
 /// # Errors
 /// If there is no display, or a window cannot be opened on it.
-pub async fn run(options: &Options, quality: Quality) -> Result<(), Error> {
+pub async fn run(options: &Options, quality: Quality) -> Result<(), String> {
     let mut window = open(options.size, quality)?;
     let mut simulation = Simulation::new(options.setting(), options.backend);
-    let mut controls = Controls::new(options.colour, options.cells);
+    let mut controls = Controls::new(options.colour);
     let mut view = View::new(&mut window, &simulation, quality);
     println!("ready {}", controls.describe(&simulation));
     while !controls.is_ending && draw(&mut window, &mut view, &simulation, &controls).await {
@@ -68,11 +67,11 @@ fn save_picture(options: &Options, window: &Window) {
 
 /// Opens the window. The window library panics if it reaches no display or lacks a library of the display, so the panic becomes
 /// an error here.
-fn open([width, height]: [u32; 2], quality: Quality) -> Result<Window, Error> {
+fn open([width, height]: [u32; 2], quality: Quality) -> Result<Window, String> {
     check_display()?;
     let opening = || Window::new_with_setup("pbig", width, height, quality.canvas_setup());
     let window = without_panic_message(|| kiss3d::pollster::block_on(opening()));
-    window.map_err(|panic| Error::NoDisplay(text_of(&*panic)))
+    window.map_err(|panic| no_display(text_of(&*panic)))
 }
 
 /// Calls a function, and returns its panic instead of printing it.
@@ -85,18 +84,22 @@ fn without_panic_message<T>(call: impl FnOnce() -> T) -> Result<T, Box<dyn Any +
 }
 
 /// Returns the text of a panic.
-fn text_of(panic: &(dyn Any + Send)) -> String {
+fn text_of(panic: &(dyn Any + Send)) -> &str {
     let text = panic.downcast_ref::<String>().map(String::as_str);
     let text = text.or_else(|| panic.downcast_ref::<&str>().copied());
-    text.unwrap_or("the window library gave no reason").to_owned()
+    text.unwrap_or("the window library gave no reason")
+}
+
+fn no_display(why: &str) -> String {
+    format!("there is no display: {why}\n--frames DIR writes pictures without one")
 }
 
 /// Says what is missing, in clearer words than the window library's.
-fn check_display() -> Result<(), Error> {
+fn check_display() -> Result<(), String> {
     let is_set = |name: &str| std::env::var_os(name).is_some_and(|value| !value.is_empty());
     let needs_one = cfg!(all(unix, not(target_os = "macos")));
     if needs_one && !is_set("DISPLAY") && !is_set("WAYLAND_DISPLAY") {
-        return Err(Error::NoDisplay("neither DISPLAY nor WAYLAND_DISPLAY is set".into()));
+        return Err(no_display("neither DISPLAY nor WAYLAND_DISPLAY is set"));
     }
     Ok(())
 }
@@ -108,7 +111,7 @@ mod tests {
     #[test]
     fn a_panic_is_returned_with_its_text() {
         assert_eq!(without_panic_message(|| 7).ok(), Some(7));
-        let text = |call: fn()| without_panic_message(call).map_err(|panic| text_of(&*panic));
+        let text = |call: fn()| without_panic_message(call).map_err(|panic| text_of(&*panic).to_owned());
         assert_eq!(text(|| panic!("plain")), Err("plain".into()));
         assert_eq!(text(|| panic!("number {}", std::hint::black_box(3))), Err("number 3".into()));
         assert!(text(|| panic::panic_any(3)).unwrap_err().contains("no reason"));

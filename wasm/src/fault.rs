@@ -4,7 +4,7 @@ use pbig_core::Pair;
 
 /// The list of pairs that a run falsifies.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Fault {
+pub(crate) enum Fault {
     /// No list.
     None,
     /// A list from `Finder` that loses a pair.
@@ -21,7 +21,7 @@ pub enum Fault {
 
 impl Fault {
     /// The faults that a run must notice.
-    pub const PLANTED: [Self; 5] =
+    pub(crate) const PLANTED: [Self; 5] =
         [Self::FinderLoses, Self::FinderRepeats, Self::AddedLost, Self::RemovedLost, Self::WorldLoses];
 
     /// Removes the middle one of a list of pairs or events if `at` is this fault.

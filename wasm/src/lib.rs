@@ -8,55 +8,45 @@ mod finder;
 mod motion;
 mod world;
 
-pub use fault::Fault;
+use fault::Fault;
 use pbig_core::Backend;
 use pbig_harness::corpus::{Case, corpus};
 
 /// The backends that need no device.
 const BACKENDS: [Backend; 3] = [Backend::Auto, Backend::Cpu, Backend::Brute];
 
-/// Result of a run over the corpus.
-#[derive(Clone, Debug, Default)]
+/// Result of a run.
 pub struct Outcome {
-    /// Number of cases that were run.
-    pub cases: u32,
-    /// Number of cases that failed.
-    pub failed: u32,
-    /// Text of the first failure; empty without one.
-    pub first: String,
-    /// What happened in the rapier world.
-    pub world: String,
+    /// Report for the terminal: counts, the first failure, and the planted faults that were overlooked.
+    pub text: String,
+    /// True if every case passed and every planted fault was noticed.
+    pub has_passed: bool,
 }
 
-impl Outcome {
-    /// Counts a case. Returns what it produced, if it passed.
-    fn count<T>(&mut self, result: Result<T, String>) -> Option<T> {
-        self.cases += 1;
-        result
-            .inspect_err(|why| {
-                self.failed += 1;
-                if self.first.is_empty() {
-                    self.first.clone_from(why);
-                }
-            })
-            .ok()
-    }
-}
-
-/// Runs every case of the corpus, and the rapier world as one more case.
+/// Runs every case of the corpus, and the rapier world as one more case; then the planted faults.
 pub fn run() -> Outcome {
-    let mut outcome = Outcome::default();
-    for case in corpus() {
-        outcome.count(check(&case, Fault::None));
-    }
-    outcome.world = outcome.count(world::check(Fault::None)).unwrap_or_default();
-    outcome
+    let cases = corpus();
+    let mut failures: Vec<String> = cases.iter().filter_map(|case| check(case, Fault::None).err()).collect();
+    let world = world::check(Fault::None);
+    failures.extend(world.clone().err());
+    let (all, failed) = (cases.len() + 1, failures.len());
+    let told: Vec<String> = failures.into_iter().take(1).chain(world.ok()).collect();
+    let overlooked: Vec<Fault> = Fault::PLANTED.into_iter().filter(|fault| !is_noticed(*fault)).collect();
+    let text = format!(
+        "{} cases passed, {failed} failed\n{}\n{} planted faults, overlooked: {overlooked:?}",
+        all - failed,
+        told.join("\n"),
+        Fault::PLANTED.len()
+    );
+    Outcome { text, has_passed: failed == 0 && overlooked.is_empty() }
 }
 
-/// Returns the failure that a planted fault causes, or none if the checks overlook it.
-pub fn notice(fault: Fault) -> Option<String> {
-    let in_corpus = || corpus().iter().find_map(|case| check(case, fault).err());
-    if fault == Fault::WorldLoses { world::check(fault).err() } else { in_corpus() }
+/// Returns true if the checks notice a planted fault.
+fn is_noticed(fault: Fault) -> bool {
+    match fault {
+        Fault::WorldLoses => world::check(fault).is_err(),
+        _ => corpus().iter().any(|case| check(case, fault).is_err()),
+    }
 }
 
 /// Checks one case on every backend, all at once and in motion.

@@ -4,7 +4,7 @@ use crate::Fault;
 use pbig_scenes::scenes::Scene;
 use pbig_scenes::world::World;
 use rapier_pbig::PbigBroadPhase;
-use rapier_pbig::shadow::{Call, Shadow, Watcher};
+use rapier_pbig::shadow::{Call, Checker, Shadow, Watcher};
 use rapier3d::prelude::*;
 
 const BODIES: usize = 200;
@@ -46,7 +46,7 @@ struct Watched {
 impl Watched {
     fn new(fault: Fault) -> Self {
         let inner = PbigBroadPhase::new().with_shadow(Shadow::Stock).with_shadow(Shadow::Oracle);
-        Self { inner, watcher: Watcher::new(0.01).with(Shadow::Oracle), fault }
+        Self { inner, watcher: Watcher::new(0.01, Checker::default().with(Shadow::Oracle)), fault }
     }
 }
 

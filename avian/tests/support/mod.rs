@@ -3,6 +3,7 @@
 #![allow(dead_code, reason = "each test uses its part")]
 
 use avian::prelude::*;
+use avian_pbig::PbigBroadPhasePlugin;
 use bevy::ecs::system::SystemParam;
 use bevy::prelude::*;
 use bevy::time::TimeUpdateStrategy;
@@ -42,6 +43,11 @@ pub(crate) fn app(plugins: impl PluginGroup) -> App {
 /// Avian's plugins with [`Veto`], stepped once in each update.
 pub(crate) fn plugins() -> bevy::app::PluginGroupBuilder {
     PhysicsPlugins::default().with_collision_hooks::<Veto>().build()
+}
+
+/// Makes an app with pbig in place of avian's broad phase, and [`Veto`].
+pub(crate) fn app_with_pbig() -> App {
+    app(plugins().disable::<BvhBroadPhasePlugin<Veto>>().add(PbigBroadPhasePlugin::<Veto>::default()))
 }
 
 /// Two or three, by the crate that is tested.

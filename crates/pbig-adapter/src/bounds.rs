@@ -20,7 +20,7 @@ pub trait Bounds: Copy + Debug + Send + Sync + 'static {
     /// The type of its coordinates.
     type Real: Scalar<Aabb = Self>;
     /// The stored AABBs of a world.
-    type Boxes: Boxes<Self>;
+    type Store: BoxStore<Self>;
 
     /// An invalid box.
     const NOWHERE: Self;
@@ -45,7 +45,7 @@ pub trait Bounds: Copy + Debug + Send + Sync + 'static {
 }
 
 /// The stored AABBs of a world, and the candidate pairs that the core finds and that are no pairs.
-pub trait Boxes<A: Bounds>: Clone + Debug + Default + Send + Sync {
+pub trait BoxStore<A: Bounds>: Clone + Debug + Default + Send + Sync {
     /// Changes the margin of boxes that are set after this call.
     fn set_margin(&mut self, core: &mut BroadPhase, margin: f32) -> Result<(), Error>;
 
@@ -99,7 +99,7 @@ pub trait Boxes<A: Bounds>: Clone + Debug + Default + Send + Sync {
 
 impl Bounds for Aabb {
     type Real = f32;
-    type Boxes = CoreBoxes;
+    type Store = CoreBoxes;
     const NOWHERE: Self = Aabb::NOWHERE;
 
     #[inline(always)]
@@ -134,7 +134,7 @@ impl Bounds for Aabb {
 #[derive(Clone, Copy, Debug, Default)]
 pub struct CoreBoxes;
 
-impl Boxes<Aabb> for CoreBoxes {
+impl BoxStore<Aabb> for CoreBoxes {
     #[inline(always)]
     fn set_margin(&mut self, core: &mut BroadPhase, margin: f32) -> Result<(), Error> {
         core.set_margin(margin)

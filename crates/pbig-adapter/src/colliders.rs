@@ -6,7 +6,7 @@ use crate::order::PairOrder;
 use crate::registry::ColliderRegistry;
 use crate::stats::{Counts, Totals};
 use crate::tree::SceneTree;
-use crate::{Bounds, Boxes, Handle, HandlePair, Scene, Tree};
+use crate::{Bounds, BoxStore, Handle, HandlePair, Scene, Tree};
 use pbig_core::{BroadPhase, Error, PairDevice, ProxyFilter};
 use std::collections::HashSet;
 
@@ -24,7 +24,7 @@ type QueryOf<T> = SceneQuery<<T as Tree>::Aabb, RealOf<T>>;
 #[derive(Clone, Debug)]
 pub struct Colliders<T: Tree> {
     pub(crate) core: BroadPhase,
-    pub(crate) boxes: <T::Aabb as Bounds>::Boxes,
+    pub(crate) boxes: <T::Aabb as Bounds>::Store,
     pub(crate) registry: ColliderRegistry,
     pub(crate) writer: EventWriter,
     /// Proxies that several threads compute. Kept for its memory.
@@ -76,7 +76,7 @@ impl<T: Tree> Colliders<T> {
     /// Changes the margin of boxes that are set after this call, in the world's unit. A negative, infinite or NaN margin is the
     /// error of this update.
     #[inline(always)]
-    pub fn set_margin(&mut self, margin: f32) {
+    pub(crate) fn set_margin(&mut self, margin: f32) {
         if let Err(error) = self.boxes.set_margin(&mut self.core, margin) {
             self.note_error(error);
         }
@@ -262,7 +262,7 @@ impl<T: Tree> Colliders<T> {
     }
 
     /// Logs an error and keeps it as that of this update.
-    pub fn note_error(&mut self, error: Error) {
+    pub(crate) fn note_error(&mut self, error: Error) {
         tracing::error!("pbig: {error}");
         self.last_error = Some(error);
     }
@@ -300,20 +300,5 @@ impl<T: Tree> Colliders<T> {
     pub fn boxes(&self) -> impl Iterator<Item = (Handle, T::Aabb)> {
         let of = |id| Some((self.registry.handle(id)?, self.boxes.fat(&self.core, id)?));
         (0..self.core.id_count()).filter_map(of)
-    }
-
-    /// Returns the known collider with this index.
-    pub fn handle(&self, index: u32) -> Option<Handle> {
-        self.registry.handle(index)
-    }
-
-    /// Returns the number of known colliders, disabled ones included.
-    pub fn len(&self) -> usize {
-        self.registry.len()
-    }
-
-    /// Returns true if no collider is known.
-    pub fn is_empty(&self) -> bool {
-        self.len() == 0
     }
 }

@@ -1,6 +1,6 @@
 //! The boxes and cells that rapier's debug renderer draws.
 
-use crate::{Boxes, Colliders, Handle, Tree};
+use crate::{BoxStore, Colliders, Handle, Tree};
 
 /// The parts that `debug_render` draws.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -33,7 +33,7 @@ const ALPHA: [f32; 2] = [1.0, 0.5];
 impl<T: Tree> Colliders<T> {
     /// Returns the cells, then the stored boxes of the colliders that exist.
     pub fn drawn(&self, parts: DebugRenderParts, exists: impl Fn(Handle) -> bool) -> Vec<DrawnBox<T::Aabb>> {
-        let known = |id: u32| self.handle(id).filter(|&handle| exists(handle));
+        let known = |id: u32| self.registry.handle(id).filter(|&handle| exists(handle));
         let (cells, mut drawn) = (self.core().cells(), Vec::new());
         let mut in_grid = vec![false; self.core().id_count() as usize];
         for cell in &cells {

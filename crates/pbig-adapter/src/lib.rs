@@ -32,7 +32,7 @@ mod tree;
 mod why;
 mod wide;
 
-pub use bounds::{Bounds, Boxes, CoreBoxes, Scalar};
+pub use bounds::{Bounds, BoxStore, CoreBoxes, Scalar};
 pub use colliders::Colliders;
 pub use drawn::{DebugRenderParts, DrawnBox};
 pub use events::PairEvent;

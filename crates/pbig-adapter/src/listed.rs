@@ -2,7 +2,7 @@
 
 #[cfg(feature = "parallel")]
 use crate::policy;
-use crate::{Bounds, Boxes, Colliders, Handle, Proxy, Scene, Tree};
+use crate::{Bounds, BoxStore, Colliders, Handle, Proxy, Scene, Tree};
 use pbig_core::ProxyFilter;
 #[cfg(feature = "parallel")]
 use rayon::prelude::*;

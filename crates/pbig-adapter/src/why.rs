@@ -1,6 +1,6 @@
 //! Explains why two colliders are a pair or not.
 
-use crate::{BodyKind, Bounds, Boxes, Colliders, Groups, Handle, Tree};
+use crate::{BodyKind, Bounds, BoxStore, Colliders, Groups, Handle, Tree};
 use pbig_core::Pair;
 use std::fmt;
 

@@ -4,7 +4,7 @@
 //! Pairs are exactly those whose f64 boxes overlap, wherever the centre is. Two boxes can meet without a new event of the core, so
 //! an update tests all candidates of changed boxes.
 
-use crate::bounds::{Bounds, Boxes, Scalar};
+use crate::bounds::{Bounds, BoxStore, Scalar};
 use crate::{SceneQuery, policy};
 use pbig_core::{Aabb, BroadPhase, Error, Events, Pair, ProxyFilter};
 use std::collections::HashSet;
@@ -40,7 +40,7 @@ impl Scalar for f64 {
 
 impl Bounds for WideAabb {
     type Real = f64;
-    type Boxes = WideBoxes;
+    type Store = WideBoxes;
     const NOWHERE: Self = Self { min: [f64::NAN; 3], max: [f64::NAN; 3] };
 
     fn from_corners(min: [f64; 3], max: [f64; 3]) -> Self {
@@ -175,7 +175,7 @@ impl WideBoxes {
     }
 }
 
-impl Boxes<WideAabb> for WideBoxes {
+impl BoxStore<WideAabb> for WideBoxes {
     /// The core's margin is 0: the boxes that it gets are fat.
     fn set_margin(&mut self, core: &mut BroadPhase, margin: f32) -> Result<(), Error> {
         core.set_margin(margin)?;

@@ -18,25 +18,14 @@ pub(crate) fn run() -> Result<(), Failure> {
         simd_found().join(" "),
         pbig_core::simd(),
     ))?;
-    explain_drivers_noise()?;
     let gpus = describe_adapters()?;
     print("self-test, 2000 boxes of each set against brute force:")?;
-    let searches = cpu_searches().into_iter().chain(gpus.iter().flat_map(gpu_searches));
+    let finders = cpu_finders().into_iter().chain(gpus.iter().flat_map(gpu_finders));
     let mut wrong = Vec::new();
-    for search in searches {
-        wrong.extend(test(search)?);
+    for (name, finder) in finders {
+        wrong.extend(test(&name, finder)?);
     }
     check(wrong.is_empty(), || format!("self-test failed: {}", wrong.join(", ")))
-}
-
-/// Announces what some drivers print on stderr while they are asked for adapters.
-fn explain_drivers_noise() -> Result<(), Failure> {
-    if !cfg!(target_os = "linux") || std::env::var_os("XDG_RUNTIME_DIR").is_some() {
-        return Ok(());
-    }
-    print(
-        "note: XDG_RUNTIME_DIR is not set. A graphics driver may complain about that on stderr; pbig does not need it",
-    )
 }
 
 /// Prints every adapter, and returns those on which the kernels can run.
@@ -98,39 +87,33 @@ fn describe(i: usize, adapter: &wgpu::Adapter, opened: &Result<GpuFinder, GpuErr
     )
 }
 
-/// A search with its name.
-type NamedSearch = (String, Box<dyn FnMut(&[Aabb]) -> Result<Vec<Pair>, String>>);
-
-fn cpu_searches() -> Vec<NamedSearch> {
-    let with = |backend| Finder::new(Config { backend, ..Config::DEFAULT });
-    vec![by("cpu", with(Backend::Cpu)), by("brute", with(Backend::Brute))]
+fn cpu_finders() -> [(String, Finder); 2] {
+    [("cpu", Backend::Cpu), ("brute", Backend::Brute)]
+        .map(|(name, backend)| (name.into(), Finder::new(Config { backend, ..Config::DEFAULT })))
 }
 
-/// Returns a device's searches in both codings, always with the grid.
-fn gpu_searches((name, gpu): &(String, GpuFinder)) -> [NamedSearch; 2] {
+/// Returns finders on a device in both codings, always with the grid.
+fn gpu_finders((name, gpu): &(String, GpuFinder)) -> [(String, Finder); 2] {
     [(Coding::Plain, "plain"), (Coding::Packed, "packed")].map(|(coding, words)| {
         let options = GpuOptions { coding, all_pairs_up_to: 0, ..GpuOptions::DEFAULT };
         let config = Config { backend: Backend::Device, ..Config::DEFAULT };
         let gpu = gpu.clone().with_options(options);
-        by(&format!("{name} {words}"), Finder::with_device(config, Box::new(gpu)))
+        (format!("{name} {words}"), Finder::with_device(config, Box::new(gpu)))
     })
 }
 
-/// Returns a finder's search. A device that leaves the work to the CPU is an error.
-fn by(name: &str, mut finder: Finder) -> NamedSearch {
-    let find = move |boxes: &[Aabb]| {
-        let pairs = finder.find(boxes).map_err(|error| error.to_string())?.to_vec();
-        finder.report().fallback.clone().map_or(Ok(pairs), Err)
-    };
-    (name.into(), Box::new(find))
+/// Returns the pairs of boxes. A device that leaves the work to the CPU is an error.
+fn find(finder: &mut Finder, boxes: &[Aabb]) -> Result<Vec<Pair>, String> {
+    let pairs = finder.find(boxes).map_err(|error| error.to_string())?.to_vec();
+    finder.report().fallback.clone().map_or(Ok(pairs), Err)
 }
 
-/// Tests a search on every set; returns what was wrong.
-fn test((name, mut find): NamedSearch) -> Result<Vec<String>, Failure> {
+/// Tests a finder on every set; returns what was wrong.
+fn test(name: &str, mut finder: Finder) -> Result<Vec<String>, Failure> {
     let mut wrong = Vec::new();
     for set in BoxSet::ALL {
         let boxes = set.boxes(2000, 1);
-        let verdict = match find(&boxes) {
+        let verdict = match find(&mut finder, &boxes) {
             Err(why) => why,
             Ok(pairs) if pairs == oracle::pairs(&boxes) => "ok".into(),
             Ok(_) => "WRONG".into(),

@@ -1,7 +1,7 @@
 //! `pbig pairs --mesh`: candidate pairs of the vertices, edges and faces of a mesh, without those that share a vertex.
 
-use crate::options::{check_output, plan_text, print_summary, search_text, with_threads};
-use crate::pairs::Args;
+use crate::options::{check_output, plan_text, print_summary, with_threads};
+use crate::pairs::{Args, repeated};
 use pbig_core::{Finder, Report};
 use pbig_harness::files::{BOXES_OR_PAIRS, ending, is_stdout, write_csv, write_id_pairs};
 use pbig_harness::mesh::{Elements, Mesh, MeshElements};
@@ -92,15 +92,8 @@ fn has_kinds<T>(all: &[T]) -> bool {
 
 fn find(args: &Args, path: &Path, kinds: &Kinds, elements: &MeshElements) -> Result<Found, Failure> {
     let mut finder = args.backend.finder();
-    let once = |_| {
-        let (found, ms) = timed(|| search(&mut finder, kinds.of(elements)));
-        found.map_err(|error| format!("{}: {}: {}", path.display(), kinds.0, search_text(&error)))?;
-        Ok(ms)
-    };
-    let times = progress(args.repeat, "finding pairs")
-        .wrap_iter(0..args.repeat)
-        .map(once)
-        .collect::<Result<Vec<f64>, Failure>>()?;
+    let subject = format!("{}: {}", path.display(), kinds.0);
+    let times = repeated(args, &subject, || search(&mut finder, kinds.of(elements)))?;
     let pairs = finder.pairs().iter().map(|pair| [pair.a, pair.b]);
     let between = finder.pairs_between().iter().map(|pair| [pair.a, pair.b]);
     let pairs = pairs.chain(between).collect();
@@ -153,5 +146,5 @@ fn report(args: &Args, elements: &MeshElements, all: &[Found]) -> Result<(), Fai
     };
     let lines: String = all.iter().map(line).collect();
     let summary = format!("{vertices} vertices, {edges} edges, {faces} faces{lines}");
-    print_summary(args.output.as_deref(), "pairs", &summary)
+    print_summary(args.output.as_deref(), &summary)
 }

@@ -31,16 +31,13 @@ pub(crate) fn check_output(
     Ok(files::check_output(output, known, input)?)
 }
 
-/// Prints a summary where it does not mix with the output, or with a hint how to get an output of `what`.
-pub(crate) fn print_summary(output: Option<&Path>, what: &str, summary: &str) -> Result<(), Failure> {
-    match output {
-        None => print(&format!("{summary}\nhint: -o FILE writes the {what} to a file, -o - to stdout")),
-        Some(output) if files::is_stdout(output) => {
-            print_aside(summary);
-            Ok(())
-        }
-        Some(_) => print(summary),
+/// Prints a summary where it does not mix with the output.
+pub(crate) fn print_summary(output: Option<&Path>, summary: &str) -> Result<(), Failure> {
+    if output.is_some_and(files::is_stdout) {
+        print_aside(summary);
+        return Ok(());
     }
+    print(summary)
 }
 
 /// Numbers of threads: beyond the largest, starting them takes longer than any work.

@@ -4,7 +4,7 @@ use crate::mesh::{self, Kinds, kinds};
 use crate::options::{
     THREADS, check_output, plan_text, print_summary, search_text, stages, whole, with_threads,
 };
-use pbig_core::Finder;
+use pbig_core::{Error, Finder};
 use pbig_harness::files::{BOXES_OR_PAIRS, BoxList, Location, read_boxes, write_id_pairs, write_pairs};
 use pbig_harness::options::BackendOption;
 use pbig_harness::prelude::*;
@@ -95,15 +95,23 @@ fn refuse_invalid(path: &Path, list: &BoxList) -> Result<(), Failure> {
 
 fn find(finder: &mut Finder, lists: &[Named<'_>], args: &Args) -> Result<Vec<f64>, Failure> {
     let names: Vec<String> = lists.iter().map(|(path, _)| path.display().to_string()).collect();
-    let about = |error| format!("{}: {}", names.join(" with "), search_text(&error));
-    let mut search = || match lists {
+    repeated(args, &names.join(" with "), || match lists {
         [(_, a), (_, b)] => finder.find_between(&a.boxes, &b.boxes).map(|_| ()),
         [(_, all), ..] => finder.find(&all.boxes).map(|_| ()),
         [] => Ok(()),
-    };
+    })
+}
+
+/// Repeats a search, and returns the milliseconds of each. An error begins with the subject.
+pub(crate) fn repeated(
+    args: &Args,
+    subject: &str,
+    mut search: impl FnMut() -> Result<(), Error>,
+) -> Result<Vec<f64>, Failure> {
     let once = |_| {
         let (found, ms) = timed(&mut search);
-        Ok(found.map(|()| ms).map_err(about)?)
+        found.map_err(|error| format!("{subject}: {}", search_text(&error)))?;
+        Ok(ms)
     };
     progress(args.repeat, "finding pairs").wrap_iter(0..args.repeat).map(once).collect()
 }
@@ -129,7 +137,7 @@ fn report(args: &Args, finder: &Finder, lists: &[Named<'_>], ms: Spread) -> Resu
     let first = first.next().map_or(String::new(), |(path, place)| first_text(lists.len(), path, &place));
     let summary =
         format!("{boxes} boxes ({invalid} invalid{first}), {pairs} overlapping pairs\n{ms}\n{plan}");
-    print_summary(args.output.as_deref(), "pairs", &summary)
+    print_summary(args.output.as_deref(), &summary)
 }
 
 /// Says where the first invalid box is; of two files, in which.

@@ -138,5 +138,5 @@ fn report(args: &Args, frames: &Frames, replay: &Replay, broad_phase: &BroadPhas
         replay.invalid_line(),
         plan_text(report)
     );
-    print_summary(args.output.as_deref(), "events", &summary)
+    print_summary(args.output.as_deref(), &summary)
 }

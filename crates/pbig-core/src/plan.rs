@@ -8,7 +8,7 @@ use std::fmt;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Algorithm {
-    /// None: fewer than two valid boxes, nothing has changed, or two sets lie apart.
+    /// None: fewer than two boxes can meet, because others are invalid or far from the other set; or nothing has changed.
     #[default]
     Nothing,
     /// Every pair was tested.
@@ -123,8 +123,8 @@ impl fmt::Display for Plan {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let boxes = self.boxes;
         match self.algorithm {
-            Algorithm::Nothing if boxes < 2 => write!(f, "nothing to do: fewer than two valid boxes")?,
-            Algorithm::Nothing => write!(f, "nothing to do: no box has changed, or two sets lie apart")?,
+            Algorithm::Nothing if boxes < 2 => write!(f, "nothing to do: fewer than two boxes can meet")?,
+            Algorithm::Nothing => write!(f, "nothing to do: no box has changed")?,
             Algorithm::Brute => write!(f, "brute force: every pair of {boxes} boxes is tested")?,
             Algorithm::Sweep => write!(f, "sweep: changed boxes are tested against all {boxes}")?,
             Algorithm::Tree => {

@@ -4,6 +4,7 @@ use crate::frames::FrameKind;
 use crate::queries::{Answer, FrameQueries};
 use crate::scenes::Scene;
 use crate::world::World;
+pub use pbig_scenes::times::StepTime;
 use rapier_pbig::shadow::{Call, Checker, Difference, ReplayError, Shadow, Watcher, write_frames};
 use rapier3d::prelude::*;
 use std::fmt;
@@ -35,8 +36,8 @@ impl<B> Timed<B> {
 
     /// Adds a checker, which compares in one of `every` calls that modify something. `relative_margin` as in [`Watcher::new`].
     pub fn checked(self, relative_margin: f32, every: usize) -> Self {
-        let watcher = Watcher::new(relative_margin).with(Shadow::Stock).with(Shadow::Oracle);
-        Self { watcher: Some(watcher.every(every)), ..self }
+        let checker = Checker::default().with(Shadow::Stock).with(Shadow::Oracle).every(every);
+        Self { watcher: Some(Watcher::new(relative_margin, checker)), ..self }
     }
 
     /// Returns the checker's counts and differences.
@@ -79,19 +80,6 @@ impl<B: BroadPhase> BroadPhase for Timed<B> {
             self.checking += clock.elapsed();
         }
     }
-}
-
-/// Milliseconds of one frame, without its checks.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct StepTime {
-    /// Inside the broad phase, all its calls.
-    pub broad_phase: f64,
-    /// Time of the whole step, the broad phase included.
-    pub step: f64,
-    /// Scene queries after the step, with the upkeep of an index that the first of them causes.
-    pub queries: f64,
-    /// The step and the queries.
-    pub frame: f64,
 }
 
 /// A scene being run with one broad phase.

@@ -119,6 +119,23 @@ impl World {
         contacts.chain(intersections).map(|(one, other)| ColliderPair::new(one, other))
     }
 
+    /// Returns the number of pairs of the narrow phase.
+    pub fn pair_count(&self) -> usize {
+        let contacts = self.narrow_phase.contact_graph().raw_graph().raw_edges().len();
+        contacts + self.narrow_phase.intersection_graph().raw_graph().raw_edges().len()
+    }
+
+    /// Returns true if the collider is part of a body that is not fixed.
+    pub fn can_move(&self, collider: &Collider) -> bool {
+        collider.parent().and_then(|body| self.bodies.get(body)).is_some_and(|body| !body.is_fixed())
+    }
+
+    /// Returns the AABB around the colliders that can move, or around all if none can. Half-spaces do not count.
+    pub fn moving_aabb(&self) -> Option<Aabb> {
+        let all = || self.colliders.iter().map(|(_, collider)| collider);
+        around(all().filter(|collider| self.can_move(collider))).or_else(|| around(all()))
+    }
+
     /// Returns the bits of all numbers in the poses of all bodies, in order. They are equal exactly when all poses are.
     pub fn pose_bits(&self) -> Vec<u32> {
         let bits = |(_, body): (RigidBodyHandle, &RigidBody)| {
@@ -165,6 +182,15 @@ impl World {
             pipeline,
         })
     }
+}
+
+/// Half extents, in metres, above which an AABB is that of a half-space.
+const MAX_HALF_EXTENT: f32 = 1e6;
+
+/// Returns the AABB around those colliders that have an end.
+fn around<'a>(colliders: impl Iterator<Item = &'a Collider>) -> Option<Aabb> {
+    let aabbs = colliders.map(Collider::compute_aabb);
+    aabbs.filter(|aabb| aabb.half_extents().max() < MAX_HALF_EXTENT).reduce(|a, b| a.merged(&b))
 }
 
 /// Returns a glam vector as rapier's.

@@ -35,7 +35,7 @@ impl Default for PbigBroadPhase {
 impl std::fmt::Debug for PbigBroadPhase {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let mut shown = f.debug_struct("PbigBroadPhase");
-        shown.field("colliders", &self.colliders.len()).field("pairs", &self.pair_count());
+        shown.field("colliders", &self.stats().colliders).field("pairs", &self.pair_count());
         shown.field("margin", &self.relative_margin).finish_non_exhaustive()
     }
 }
@@ -61,15 +61,6 @@ impl PbigBroadPhase {
     /// [`Error::Margin`].
     pub fn with_device(config: PbigConfig, device: Box<dyn PairDevice>) -> Result<Self, Error> {
         pbig_core::BroadPhase::with_device(config.into(), device).map(Self::around)
-    }
-
-    /// As [`PbigBroadPhase::with_device`], on a GPU.
-    ///
-    /// # Errors
-    /// [`Error::Margin`].
-    #[cfg(feature = "gpu")]
-    pub fn with_gpu(config: PbigConfig, gpu: pbig_gpu::GpuFinder) -> Result<Self, Error> {
-        Self::with_device(config, Box::new(gpu))
     }
 
     /// Uses this device in later updates. A broad phase restored from a snapshot has none.

@@ -1,4 +1,5 @@
 //! scripts/patch-rapier.sh in a project of its own: what it makes, what it removes, what it prints, and its errors.
+#![cfg(not(any(feature = "dim2", feature = "f64")))]
 
 use std::fs;
 use std::path::{Path, PathBuf};

@@ -1,4 +1,5 @@
 //! Both broad phases answer the queries of frames, and a frame without queries is a step.
+#![cfg(not(any(feature = "dim2", feature = "f64")))]
 
 use glam::Vec3;
 use pbig_harness_036::queries::FrameQueries;

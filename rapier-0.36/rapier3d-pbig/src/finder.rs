@@ -44,15 +44,6 @@ impl PbigFinder {
         pbig_core::BroadPhase::with_device(config.into(), device).map(Self::around)
     }
 
-    /// As [`PbigFinder::with_device`], on a GPU.
-    ///
-    /// # Errors
-    /// [`Error::Margin`].
-    #[cfg(feature = "gpu")]
-    pub fn with_gpu(config: PbigConfig, gpu: pbig_gpu::GpuFinder) -> Result<Self, Error> {
-        Self::with_device(config, Box::new(gpu))
-    }
-
     /// Uses this device in later updates, in place of the one in use.
     pub fn set_device(&mut self, device: Box<dyn PairDevice>) {
         self.colliders.set_device(device);

@@ -71,7 +71,7 @@ pub struct Shadowed<F> {
 impl<F> Shadowed<F> {
     /// Creates a checker without references. `relative_margin` is the finder's margin in units of `length_unit`.
     pub fn new(inner: F, relative_margin: f32) -> Self {
-        let checker = Checker::new().with_replays();
+        let checker = Checker::default().with_replays();
         let stock = Some(BroadPhaseBvh::new());
         Self { inner, checker, relative_margin, stock, has_moved: false, has_started: false }
     }

@@ -14,6 +14,7 @@ use kiss3d::prelude::{
     Camera3d, CanvasSetup, Color, CoordinateSystem2d, FixedView2d, NumSamples, OrbitCamera3d, Vec3, Window,
 };
 use overlay::Overlay;
+use pbig_scenes::drawn::Drawn;
 use stage::Stage;
 
 /// The resolution of pictures.
@@ -40,6 +41,7 @@ impl Quality {
 
 /// A scene's meshes, light and camera, and what is written over them.
 pub struct View {
+    drawn: Drawn,
     stage: Stage,
     overlay: Overlay,
     camera: OrbitCamera3d,
@@ -54,11 +56,12 @@ impl View {
     /// Prepares to draw the world of a simulation.
     pub fn new(window: &mut Window, simulation: &Simulation, quality: Quality) -> Self {
         window.set_shadow_resolution(quality.shadow_pixels());
-        let framing = Framing::of(&simulation.world);
-        let stage = Stage::new(window, &simulation.world, &framing);
+        let (framing, drawn) = (Framing::of(&simulation.world), Drawn::new(&simulation.world));
+        let stage = Stage::new(window, &simulation.world, &drawn, &framing);
         let flat_camera = FixedView2d::new(CoordinateSystem2d::TopLeftDown, false);
         let scene = simulation.setting.scene.name;
         Self {
+            drawn,
             stage,
             overlay: Overlay::new(),
             camera: camera(&framing),
@@ -98,8 +101,10 @@ impl View {
         let is_needed = controls.is_grid_shown || controls.colouring == Colouring::Cell;
         let cells = if is_needed { Cells::of(simulation) } else { Cells::default() };
         let palette = Palette::new(controls.colouring, &simulation.world, &cells);
-        let mut instances = Vec::new();
-        shapes::instances(&simulation.world, &palette, &mut instances);
+        if self.drawn.is_outdated(&simulation.world) {
+            self.drawn = Drawn::new(&simulation.world);
+        }
+        let instances = shapes::instances(&simulation.world, &self.drawn, &palette);
         self.stage.show(&instances, if controls.is_grid_shown { &cells.occupied } else { &[] });
     }
 }

@@ -4,8 +4,9 @@ use super::linear;
 use crate::cells::Cell;
 use crate::framing::Framing;
 use crate::palette::Rgb;
-use crate::shapes::{self, Instance, Mesh, Surface};
+use crate::shapes::{self, Instance, KINDS, Surface};
 use kiss3d::prelude::{Color, Fog, InstanceData3d, Light, Mat3, SceneNode3d, Vec3, Window};
+use pbig_scenes::drawn::{Drawn, Kind};
 use pbig_scenes::world::World;
 
 /// The sky, and what far ground fades into.
@@ -26,14 +27,14 @@ const BALL_PARTS: [u32; 2] = [14, 8];
 /// The nodes that kiss3d draws.
 pub(super) struct Stage {
     pub(super) root: SceneNode3d,
-    solids: [SceneNode3d; Mesh::ALL.len()],
-    sensors: [SceneNode3d; Mesh::ALL.len()],
+    solids: [SceneNode3d; KINDS.len()],
+    sensors: [SceneNode3d; KINDS.len()],
     edges: SceneNode3d,
 }
 
 impl Stage {
     /// Builds what does not move, and empty sets of instances.
-    pub(super) fn new(window: &mut Window, world: &World, framing: &Framing) -> Self {
+    pub(super) fn new(window: &mut Window, world: &World, drawn: &Drawn, framing: &Framing) -> Self {
         set_light(window, framing);
         let mut root = SceneNode3d::empty();
         let sun = Light::directional(Vec3::new(-0.55, -1.0, -0.25)).with_intensity(2.6);
@@ -41,26 +42,26 @@ impl Stage {
         let fill =
             Light::directional(Vec3::new(0.8, -0.3, -0.6)).with_intensity(0.7).with_casts_shadows(false);
         root.add_light(fill);
-        if shapes::has_ground(world) {
+        if shapes::has_ground(drawn) {
             add_ground(&mut root, framing);
         }
-        shapes::surfaces(world).into_iter().for_each(|surface| add_surface(&mut root, surface));
-        let solids = Mesh::ALL.map(|mesh| add_mesh(&mut root, mesh));
-        let sensors = Mesh::ALL.map(|mesh| {
-            add_mesh(&mut root, mesh)
+        shapes::surfaces(world, drawn).into_iter().for_each(|surface| add_surface(&mut root, surface));
+        let solids = KINDS.map(|kind| add_mesh(&mut root, kind));
+        let sensors = KINDS.map(|kind| {
+            add_mesh(&mut root, kind)
                 .set_color(Color::new(1.0, 1.0, 1.0, SENSOR_ALPHA))
                 .set_casts_shadows(false)
         });
-        let edges = add_mesh(&mut root, Mesh::Cube).set_casts_shadows(false);
+        let edges = root.add_cube(1.0, 1.0, 1.0).set_roughness(0.7).set_casts_shadows(false);
         Self { root, solids, sensors, edges }
     }
 
     /// Places the instances and the cells' edges of this frame.
     pub(super) fn show(&mut self, instances: &[Instance], cells: &[Cell]) {
-        for mesh in Mesh::ALL {
-            for (nodes, is_sensor) in [(&mut self.solids, false), (&mut self.sensors, true)] {
-                let shown = instances.iter().filter(|i| i.mesh == mesh && i.is_sensor == is_sensor);
-                place(&mut nodes[mesh as usize], &shown.map(instance).collect::<Vec<_>>());
+        for (nodes, is_sensor) in [(&mut self.solids, false), (&mut self.sensors, true)] {
+            for (node, kind) in nodes.iter_mut().zip(KINDS) {
+                let shown = instances.iter().filter(|i| i.kind == kind && i.is_sensor == is_sensor);
+                place(node, &shown.map(instance).collect::<Vec<_>>());
             }
         }
         place(&mut self.edges, &cells.iter().flat_map(cell_edges).collect::<Vec<_>>());
@@ -84,13 +85,13 @@ fn place(node: &mut SceneNode3d, instances: &[InstanceData3d]) {
     }
 }
 
-fn add_mesh(root: &mut SceneNode3d, mesh: Mesh) -> SceneNode3d {
+/// Adds a node of one of [`KINDS`], whose instances have no place yet.
+fn add_mesh(root: &mut SceneNode3d, kind: Kind) -> SceneNode3d {
     let [around, up] = BALL_PARTS;
-    let mut node = match mesh {
-        Mesh::Ball => root.add_sphere_with_subdiv(0.5, around, up),
-        Mesh::Cube => root.add_cube(1.0, 1.0, 1.0),
-        Mesh::Cylinder => root.add_cylinder_with_subdiv(0.5, 1.0, around),
-        Mesh::Cone => root.add_cone_with_subdiv(0.5, 1.0, around),
+    let mut node = match kind {
+        Kind::Ball => root.add_sphere_with_subdiv(1.0, around, up),
+        Kind::Cylinder => root.add_cylinder_with_subdiv(1.0, 2.0, around),
+        _ => root.add_cube(2.0, 2.0, 2.0),
     };
     node.set_roughness(0.7).set_visible(false)
 }

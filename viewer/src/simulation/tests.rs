@@ -65,10 +65,14 @@ fn a_swap_to_the_broad_phase_in_use_changes_nothing() {
     for choice in [Choice::Stock, Choice::Cpu] {
         let mut simulation = column(choice);
         simulation.step();
-        let before = (simulation.engine.events(), simulation.history.last().copied());
+        let before = (simulation.broad_phase.events(), simulation.history.last().copied());
         assert!(before.1.is_some());
         simulation.swap(choice);
-        assert_eq!((simulation.engine.events(), simulation.history.last().copied()), before, "{choice:?}");
+        assert_eq!(
+            (simulation.broad_phase.events(), simulation.history.last().copied()),
+            before,
+            "{choice:?}"
+        );
         simulation.step();
         assert_eq!((simulation.history.steps().len(), simulation.history.swaps()), (2, 0));
     }
@@ -79,8 +83,8 @@ fn an_error_of_the_broad_phase_is_that_of_the_step() {
     let mut simulation = column(Choice::Auto);
     simulation.step();
     assert_eq!(simulation.check(), Ok(()));
-    simulation.engine = Engine::with_max_pairs(10);
+    simulation.broad_phase = with_max_pairs(10);
     simulation.step();
-    let error = simulation.check().unwrap_err().to_string();
+    let error = simulation.check().unwrap_err();
     assert!(error.starts_with("step 2: ") && error.contains("10"), "{error}");
 }

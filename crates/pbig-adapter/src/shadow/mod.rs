@@ -66,7 +66,7 @@ pub struct Watched<'a, V> {
     pub stock: Option<&'a [PairEvent]>,
 }
 
-/// Follows the calls and events of a broad phase, and compares its pairs with the references.
+/// Follows the calls and events of a broad phase, and compares its pairs with the references; the default has none.
 #[derive(Clone, Default)]
 pub struct Checker {
     /// Everything wrong so far, each fault of a pair once, oldest first, at most a thousand.
@@ -93,11 +93,6 @@ pub struct Checker {
 }
 
 impl Checker {
-    /// Creates a checker without a reference.
-    pub fn new() -> Self {
-        Self::default()
-    }
-
     /// Adds a reference.
     pub fn with(mut self, shadow: Shadow) -> Self {
         self.add(shadow);
@@ -117,17 +112,11 @@ impl Checker {
         Self { every, ..self }
     }
 
-    /// Writes the AABBs of the calls up to the first difference into this folder.
-    pub fn with_replays_in(self, folder: PathBuf) -> Self {
-        Self { folder: Some(folder), ..self }
-    }
-
-    /// As [`Checker::with_replays_in`], with the system's folder for temporary files. wasm32-unknown-unknown has none.
+    /// Writes the AABBs of the calls up to the first difference into the system's folder for temporary files, which
+    /// wasm32-unknown-unknown lacks.
     pub fn with_replays(self) -> Self {
-        if cfg!(all(target_family = "wasm", target_os = "unknown")) {
-            return self;
-        }
-        self.with_replays_in(std::env::temp_dir())
+        let has_folder = !cfg!(all(target_family = "wasm", target_os = "unknown"));
+        Self { folder: has_folder.then(std::env::temp_dir), ..self }
     }
 
     /// Prepares for another world, or for one that already has pairs. `pairs` are the narrow phase's. Stock must see all colliders

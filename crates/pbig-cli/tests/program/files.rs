@@ -1,6 +1,6 @@
 //! Input and output of the commands: bounded memory, an input that is not overwritten, pairs on stdout, hints.
 
-use super::{array, pbig, refused, save};
+use super::{array, pbig, read_pairs, refused, save};
 use ndarray::{Array2, Array3};
 use pbig_core::Aabb;
 use std::path::Path;
@@ -101,26 +101,13 @@ fn a_hyphen_writes_csv_to_stdout_and_the_summary_to_stderr() {
 }
 
 #[test]
-fn without_an_output_there_is_a_hint_how_to_get_one() {
-    let folder = tempfile::tempdir().expect("a folder");
-    let here = folder.path();
-    write(here, "boxes.csv", THREE);
-    save(here, "frames.npy", &Array3::<f32>::zeros((1, 2, 6)));
-    for (args, what) in [(["pairs", "boxes.csv"], "pairs"), (["replay", "frames.npy"], "events")] {
-        let hint = format!("hint: -o FILE writes the {what} to a file, -o - to stdout\n");
-        assert!(stdout(&pbig(here, &args)).ends_with(&hint), "{args:?}");
-        let with_output = [&args[..], &["-o", "out.csv"]].concat();
-        assert!(!stdout(&pbig(here, &with_output)).contains("hint"), "{args:?}");
-    }
-}
-
-#[test]
 fn the_first_invalid_box_is_named() {
     let folder = tempfile::tempdir().expect("a folder");
     let here = folder.path();
     write(here, "boxes.csv", format!("min_x,min_y,min_z,max_x,max_y,max_z\n\n{THREE}1,1,1,0,0,0\n"));
     let text = stdout(&pbig(here, &["pairs", "boxes.csv"]));
     assert!(text.starts_with("4 boxes (2 invalid, the first in line 5), 1 overlapping pairs\n"), "{text}");
+    assert!(!text.contains("no device"), "nothing has failed: {text}");
     let what = "boxes.csv: line 5: box 2 (counted from 0) has a NaN or a minimum above its maximum";
     refused(&pbig(here, &["pairs", "boxes.csv", "--strict"]), &[what]);
     save(here, "boxes.npy", &array(&[Aabb::new([0.0; 3], [1.0; 3]), Aabb::new([1.0; 3], [0.0; 3])]));
@@ -140,36 +127,16 @@ fn no_boxes_are_an_answer_and_no_bytes_an_error() {
     let here = folder.path();
     save(here, "none.npy", &Array2::<f32>::zeros((0, 6)));
     write(here, "header.csv", "min_x,min_y,min_z,max_x,max_y,max_z\n");
+    // As `numpy.savetxt(.., delimiter=",", header="min_x,..")` writes it.
     write(here, "savetxt.csv", "# min_x,min_y,min_z,max_x,max_y,max_z\n");
-    for input in ["none.npy", "header.csv", "savetxt.csv"] {
-        assert!(stdout(&pbig(here, &["pairs", input])).starts_with("0 boxes (0 invalid), 0 "), "{input}");
+    write(here, "blank.csv", "\n");
+    for input in ["none.npy", "header.csv", "savetxt.csv", "blank.csv"] {
+        let text = stdout(&pbig(here, &["pairs", input, "-o", "out.npy"]));
+        assert!(text.starts_with("0 boxes (0 invalid), 0 "), "{input}: {text}");
+        assert_eq!(read_pairs(&here.join("out.npy")), []);
     }
     for (command, input) in [("pairs", "zero.npy"), ("pairs", "zero.csv"), ("replay", "zero.npy")] {
         write(here, input, "");
         refused(&pbig(here, &[command, input]), &[&format!("pbig: {input}: the file is empty")]);
     }
-}
-
-/// As `numpy.savetxt(.., delimiter=",", header="min_x,..")` writes it.
-#[test]
-fn a_file_of_savetxt_is_read() {
-    let folder = tempfile::tempdir().expect("a folder");
-    let row = |x: f32| format!("{x:.18e},{:.18e},{:.18e},{:.18e},{:.18e},{:.18e}\n", 0.0, 0.0, 2.0, 1.0, 1.0);
-    let text = format!("# min_x,min_y,min_z,max_x,max_y,max_z\n{}{}", row(0.0), row(1.5));
-    write(folder.path(), "boxes.csv", text);
-    assert_eq!(stdout(&pbig(folder.path(), &["pairs", "boxes.csv", "-o", "-"])), "a,b\n0,1\n");
-}
-
-#[test]
-fn what_is_no_failure_does_not_read_like_one() {
-    let folder = tempfile::tempdir().expect("a folder");
-    write(folder.path(), "boxes.csv", THREE);
-    let text = stdout(&pbig(folder.path(), &["pairs", "boxes.csv"]));
-    assert!(!text.contains("no device"), "{text}");
-    let mut doctor = std::process::Command::new(env!("CARGO_BIN_EXE_pbig"));
-    let text = stdout(&doctor.arg("doctor").env_remove("XDG_RUNTIME_DIR").output().expect("it starts"));
-    let note = "note: XDG_RUNTIME_DIR is not set. A graphics driver may complain about that on stderr";
-    assert!(!cfg!(target_os = "linux") || text.contains(note), "{text}");
-    let text = stdout(&super::pbig_where(folder.path(), "LANG", "C", &["doctor"]));
-    assert!(!text.contains("XDG_RUNTIME_DIR"), "{text}");
 }

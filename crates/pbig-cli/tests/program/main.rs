@@ -131,18 +131,6 @@ fn f64_boxes_are_rounded_outward() {
 }
 
 #[test]
-fn no_boxes_at_all() {
-    let folder = tempfile::tempdir().expect("a folder");
-    save(folder.path(), "none.npy", &Array2::<f32>::zeros((0, 6)));
-    std::fs::write(folder.path().join("none.csv"), "\n").expect("written");
-    for input in ["none.npy", "none.csv"] {
-        let object = json(&pbig(folder.path(), &["pairs", input, "-o", "out.npy", "--json"]));
-        assert_eq!(object["pairs"], 0);
-        assert_eq!(read_pairs(&folder.path().join("out.npy")), []);
-    }
-}
-
-#[test]
 fn frames_without_boxes_and_boxes_without_frames() {
     let folder = tempfile::tempdir().expect("a folder");
     for (frames, boxes) in [(0, 5), (3, 0), (0, 0)] {

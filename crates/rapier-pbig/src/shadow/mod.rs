@@ -39,8 +39,7 @@ impl PbigBroadPhase {
         let known: Vec<_> = self.colliders.pairs().chain(self.colliders.adopted().iter().copied()).collect();
         let margin = self.relative_margin;
         let watcher = self.shadow.get_or_insert_with(|| {
-            let mut watcher = Watcher::new(margin);
-            watcher.checker = std::mem::take(&mut watcher.checker).with_replays();
+            let mut watcher = Watcher::new(margin, Checker::default().with_replays());
             watcher.start_over(known);
             Box::new(watcher)
         });
@@ -69,21 +68,10 @@ pub struct Watcher {
 }
 
 impl Watcher {
-    /// Creates a watcher without a reference. `relative_margin` is the margin of the broad phase in units of `length_unit`:
-    /// the AABBs of a pair may be four margins apart, two for each box.
-    pub fn new(relative_margin: f32) -> Self {
-        Self { checker: Checker::new(), relative_margin, stock: Stock::default() }
-    }
-
-    /// Adds a reference.
-    pub fn with(mut self, shadow: Shadow) -> Self {
-        self.checker.add(shadow);
-        self
-    }
-
-    /// Compares in one of `every` calls that modify something. The events of all calls are followed.
-    pub fn every(self, every: usize) -> Self {
-        Self { checker: self.checker.every(every), ..self }
+    /// Creates a watcher. `relative_margin` is the margin of the broad phase in units of `length_unit`: the AABBs of a pair may be
+    /// four margins apart, two for each box.
+    pub fn new(relative_margin: f32, checker: Checker) -> Self {
+        Self { checker, relative_margin, stock: Stock::default() }
     }
 
     /// Prepares for another world, or for one that already has pairs. `pairs` are the narrow phase's. Stock sees all colliders in
@@ -139,7 +127,7 @@ mod tests {
     fn a_missing_pair_is_one_fault_although_stock_has_it_too() {
         let (colliders, pair) = scene::tests::balls(1.0);
         let (params, bodies) = (IntegrationParameters::default(), RigidBodySet::new());
-        let mut watcher = Watcher::new(0.01).with(Shadow::Stock).with(Shadow::Oracle);
+        let mut watcher = Watcher::new(0.01, Checker::default().with(Shadow::Stock).with(Shadow::Oracle));
         let handles = pair;
         let call = Call {
             params: &params,
@@ -182,7 +170,7 @@ mod tests {
             let (mut colliders, pair) = scene::tests::balls(0.9);
             colliders[pair[1]].set_translation(vector![0.9, y, 0.0]);
             let (params, bodies) = (IntegrationParameters::default(), RigidBodySet::new());
-            let mut watcher = Watcher::new(0.01).with(Shadow::Stock);
+            let mut watcher = Watcher::new(0.01, Checker::default().with(Shadow::Stock));
             let (colliders, modified) = (&colliders, &pair);
             watcher.watch(&Call { params: &params, colliders, bodies: &bodies, modified, removed: &[] }, &[]);
             let checker = &watcher.checker;

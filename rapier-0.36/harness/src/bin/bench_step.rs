@@ -1,17 +1,16 @@
-//! Frames of rapier 0.36.1 with its own broad phase and with pbig, in turn: `cargo run --release --bin bench_step -- --help`.
+//! Prints frames of rapier 0.36.1 with its own broad phase and with pbig, in turn, as CSV: `cargo run --release --bin bench_step -- --help`.
 
 use clap::Parser;
+use pbig_chart::{Chart, Line, Plot};
 use pbig_harness_036::run::{Run, StepTime, Summary};
 use pbig_scenes::frames::FrameKind;
 use pbig_scenes::scenes::Scene;
 use rapier::prelude::BroadPhaseBvh;
-use std::fs::File;
-use std::io::Write;
 use std::path::PathBuf;
 use std::process::ExitCode;
 use std::time::{Duration, Instant};
 
-/// Frames of rapier 0.36.1, with its own broad phase ("stock") and with pbig, in turn: a whole step, and scene queries.
+/// Frames of rapier 0.36.1, with its own broad phase ("stock") and with pbig, in turn: a whole step, and scene queries, as CSV.
 #[derive(Parser)]
 struct Args {
     /// Bodies, several separated by commas.
@@ -30,21 +29,17 @@ struct Args {
     /// Seconds for each row after the first step, which is not counted.
     #[arg(long, default_value_t = 60)]
     seconds: u64,
-    /// File for all rows (CSV).
+    /// File for a chart of each step of the last row (SVG).
     #[arg(long)]
-    write: Option<PathBuf>,
+    chart: Option<PathBuf>,
 }
 
-/// The heading of the CSV file. With fewer than 100 steps p99 is the worst step.
+/// The heading of the rows. With fewer than 100 steps p99 is the worst step.
 const HEADING: &str = "scene,bodies,threads,steps,stock_broad_mean_ms,pbig_broad_mean_ms,stock_broad_median_ms,\
 pbig_broad_median_ms,stock_broad_p99_ms,pbig_broad_p99_ms,stock_step_mean_ms,pbig_step_mean_ms,stock_step_median_ms,\
 pbig_step_median_ms,stock_step_p99_ms,pbig_step_p99_ms,stock_pairs,pbig_pairs,queries,stock_frame_mean_ms,\
 pbig_frame_mean_ms,stock_frame_median_ms,pbig_frame_median_ms,stock_frame_p99_ms,pbig_frame_p99_ms,\
 stock_queries_mean_ms,pbig_queries_mean_ms,stock_over_pbig_frame_mean,stock_hits,pbig_hits";
-
-/// The heading on the terminal: means, and ratios of stock to pbig.
-const SHOWN: &str = "scene        bodies queries     steps   broad phase, ms: stock   pbig      x   p99 x   step, ms: stock   \
-pbig      x median x   queries, ms: stock   pbig   frame, ms: stock   pbig      x median x   p99 x";
 
 /// The threads that rapier uses.
 const THREADS: &str = if cfg!(feature = "parallel") { "2" } else { "1" };
@@ -54,21 +49,35 @@ fn main() -> ExitCode {
     if args.scenes.is_empty() {
         args.scenes = Scene::ALL.to_vec();
     }
-    println!("{SHOWN}");
-    let mut rows = vec![HEADING.to_string()];
-    for case in cases(&args) {
-        let sides = case.measure(&args);
-        case.show(&sides);
-        rows.push(case.row(&sides));
-    }
-    match args.write.map(|file| File::create(&file).and_then(|mut out| writeln!(out, "{}", rows.join("\n"))))
-    {
-        Some(Err(error)) => {
-            eprintln!("the rows cannot be written: {error}");
+    match run(&args) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("{error}");
             ExitCode::FAILURE
         }
-        _ => ExitCode::SUCCESS,
     }
+}
+
+fn run(args: &Args) -> Result<(), String> {
+    println!("{HEADING}");
+    for case in cases(args) {
+        let runs = case.measure(args);
+        println!("{}", case.row(&runs.each_ref().map(Side::of)));
+        if let Some(file) = &args.chart {
+            chart(&runs).write(file)?;
+        }
+    }
+    Ok(())
+}
+
+/// Returns the times of each step of stock and pbig.
+fn chart(runs: &[Run; 2]) -> Chart {
+    let plot = |title, of: fn(&StepTime) -> f64| {
+        let lines = ["stock", "pbig"].into_iter().zip(runs);
+        Plot::steps(title, lines.map(|(name, run)| Line::steps(name, run.times.iter().map(of))).collect())
+    };
+    let plots = vec![plot("broad phase", |time| time.broad_phase), plot("whole step", |time| time.step)];
+    Chart { plots, ..Chart::default() }
 }
 
 fn cases(args: &Args) -> impl Iterator<Item = Case> {
@@ -113,8 +122,8 @@ impl Side {
 }
 
 impl Case {
-    /// Returns stock and pbig.
-    fn measure(&self, args: &Args) -> [Side; 2] {
+    /// Runs stock and pbig.
+    fn measure(&self, args: &Args) -> [Run; 2] {
         let [mut stock, mut ours] = [BroadPhaseBvh::new(), rapier_pbig::broad_phase()]
             .map(|one| Run::new(self.scene, self.bodies, 1, one).with_queries(self.queries));
         stock.step();
@@ -130,23 +139,10 @@ impl Case {
                 break;
             }
         }
-        [&stock, &ours].map(Side::of)
+        [stock, ours]
     }
 
-    fn show(&self, [stock, ours]: &[Side; 2]) {
-        let times = |of: fn(&Side) -> f64| of(stock) / of(ours);
-        print!("{:<12} {:>6} {:<10} {:>6} ", self.scene.name, self.bodies, self.queries.name(), ours.steps);
-        print!("{:>24.3} {:>6.3} ", stock.broad.mean, ours.broad.mean);
-        print!("{:>5.2}x {:>6.2}x ", times(|side| side.broad.mean), times(|side| side.broad.p99));
-        print!("{:>17.3} {:>6.3} ", stock.step.mean, ours.step.mean);
-        print!("{:>5.2}x {:>7.2}x ", times(|side| side.step.mean), times(|side| side.step.median));
-        print!("{:>20.3} {:>6.3} ", stock.queries.mean, ours.queries.mean);
-        print!("{:>18.3} {:>6.3} ", stock.frame.mean, ours.frame.mean);
-        print!("{:>5.2}x {:>7.2}x ", times(|side| side.frame.mean), times(|side| side.frame.median));
-        println!("{:>6.2}x", times(|side| side.frame.p99));
-    }
-
-    /// Returns a line of the CSV file, see [`HEADING`].
+    /// Returns a row, see [`HEADING`].
     fn row(&self, sides: &[Side; 2]) -> String {
         let [stock, ours] = sides;
         let [broad, step, frame] = [

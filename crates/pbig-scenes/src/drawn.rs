@@ -1,6 +1,7 @@
-//! The simple shapes that a collider is drawn with.
+//! The simple shapes that a world's colliders are drawn with, for a window and for a web page. Parts of one kind are a group,
+//! which one instanced call draws.
 
-use crate::mesh::Mesh;
+use crate::world::World;
 use rapier3d::parry::shape::{Shape, TypedShape};
 use rapier3d::prelude::*;
 
@@ -13,52 +14,118 @@ pub enum Kind {
     Cuboid,
     /// A cylinder of radius 1, along y from -1 to 1.
     Cylinder,
-    /// A cone of radius 1, along y from its base at -1 to its tip at 1.
-    Cone,
     /// The half-space below the plane y = 0.
     HalfSpace,
-    /// Triangles of a shape that is none of the others; the number of its mesh.
+    /// The triangles of a height field; the number of its mesh.
     Mesh(u32),
 }
 
-/// Colour class of a part. A page maps each class to a colour.
+/// Colour class of a part.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
-pub(crate) enum Colour {
+pub enum Colour {
+    /// A part that does not move.
     Fixed,
+    /// A ball.
     Ball,
+    /// A box that is about as thick as it is wide.
     Cuboid,
+    /// A flat or long box.
     Slab,
+    /// A cylinder with round ends.
     Capsule,
+    /// A cylinder.
     Other,
 }
 
 /// A scaled shape at a place in its collider.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Part {
-    pub(crate) kind: Kind,
-    pub(crate) colour: Colour,
-    pub(crate) local: Isometry<Real>,
-    pub(crate) scale: Vector<Real>,
+pub struct Part {
+    /// The shape.
+    pub kind: Kind,
+    /// Its colour class.
+    pub colour: Colour,
+    /// Its place in the collider.
+    pub local: Isometry<Real>,
+    /// Its half extents, if its kind fits into the cube.
+    pub scale: Vector<Real>,
 }
 
-/// Number of sides of a round border in a mesh.
-const MESH_SIDES: u32 = 12;
+/// Vertices in the frame of a shape, and the three vertices of each triangle.
+pub type Triangles = (Vec<Point<Real>>, Vec<[u32; 3]>);
 
-/// Appends the parts of a shape at a place in its collider. Shapes without a kind of their own become meshes.
-pub(crate) fn append_parts(
-    shape: &dyn Shape,
-    at: &Isometry<Real>,
-    parts: &mut Vec<Part>,
-    meshes: &mut Vec<Mesh>,
-) {
+/// A part and its collider.
+#[derive(Clone, Copy, Debug)]
+pub struct Member {
+    /// The collider.
+    pub collider: ColliderHandle,
+    /// True for parts that would hide what happens: those of sensors, and walls.
+    pub is_translucent: bool,
+    /// The part.
+    pub part: Part,
+}
+
+impl Member {
+    fn key(&self) -> (Kind, bool) {
+        (self.part.kind, self.is_translucent)
+    }
+}
+
+/// Every part of a world, sorted by kind.
+pub struct Drawn {
+    /// The parts. Those of a kind and translucency lie together, in the order of their colliders.
+    pub members: Vec<Member>,
+    /// The meshes that parts name by number.
+    pub meshes: Vec<Triangles>,
+    colliders: usize,
+}
+
+impl Drawn {
+    /// Takes the colliders of a world apart.
+    pub fn new(world: &World) -> Self {
+        let mut drawn = Self { members: Vec::new(), meshes: Vec::new(), colliders: world.colliders.len() };
+        for (handle, collider) in world.colliders.iter() {
+            drawn.append(handle, collider, world);
+        }
+        // A stable sort: parts of a group keep the order of their colliders.
+        drawn.members.sort_by_key(Member::key);
+        drawn
+    }
+
+    /// Returns true if the world has another number of colliders than the parts were made from.
+    pub fn is_outdated(&self, world: &World) -> bool {
+        self.colliders != world.colliders.len()
+    }
+
+    /// Returns the parts group by group: of one kind, translucent or not.
+    pub fn groups(&self) -> impl Iterator<Item = &[Member]> {
+        self.members.chunk_by(|one, other| one.key() == other.key())
+    }
+
+    fn append(&mut self, handle: ColliderHandle, collider: &Collider, world: &World) {
+        let mut parts = Vec::new();
+        append_parts(collider.shape(), &Isometry::identity(), &mut parts, &mut self.meshes);
+        let is_fixed = !world.can_move(collider);
+        for mut part in parts {
+            if is_fixed {
+                part.colour = Colour::Fixed;
+            }
+            let is_ground = matches!(part.kind, Kind::HalfSpace | Kind::Mesh(_));
+            let is_translucent = collider.is_sensor() || is_fixed && !is_ground;
+            self.members.push(Member { collider: handle, is_translucent, part });
+        }
+    }
+}
+
+/// Appends the parts of a shape at a place in its collider. Shapes that no scene has are not drawn.
+fn append_parts(shape: &dyn Shape, at: &Isometry<Real>, parts: &mut Vec<Part>, meshes: &mut Vec<Triangles>) {
     let mut add = |kind, colour, scale| parts.push(Part { kind, colour, local: *at, scale });
-    let upright = |radius, half_height| vector![radius, half_height, radius];
     match shape.as_typed_shape() {
         TypedShape::Ball(ball) => add(Kind::Ball, Colour::Ball, Vector::repeat(ball.radius)),
         TypedShape::Cuboid(cuboid) => add(Kind::Cuboid, colour_of(&cuboid.half_extents), cuboid.half_extents),
-        TypedShape::Cylinder(it) => add(Kind::Cylinder, Colour::Other, upright(it.radius, it.half_height)),
-        TypedShape::Cone(it) => add(Kind::Cone, Colour::Other, upright(it.radius, it.half_height)),
+        TypedShape::Cylinder(it) => {
+            add(Kind::Cylinder, Colour::Other, vector![it.radius, it.half_height, it.radius]);
+        }
         // Drawn with sharp corners, so that all of them are one group.
         TypedShape::RoundCuboid(it) => {
             let half_extents = it.inner_shape.half_extents.add_scalar(it.border_radius);
@@ -66,21 +133,17 @@ pub(crate) fn append_parts(
         }
         TypedShape::HalfSpace(it) => parts.push(half_space(it, at)),
         TypedShape::Capsule(capsule) => parts.extend(capsule_parts(capsule, at)),
+        TypedShape::HeightField(field) => {
+            add(Kind::Mesh(meshes.len() as u32), Colour::Other, Vector::repeat(1.0));
+            meshes.push(field.to_trimesh());
+        }
         TypedShape::Compound(compound) => {
             for (pose, shape) in compound.shapes() {
                 append_parts(&**shape, &(at * pose), parts, meshes);
             }
         }
-        other => append_mesh(other, at, parts, meshes),
+        _ => {}
     }
-}
-
-fn append_mesh(shape: TypedShape<'_>, at: &Isometry<Real>, parts: &mut Vec<Part>, meshes: &mut Vec<Mesh>) {
-    // A shape without triangles, such as a polyline, is not drawn.
-    let Some(mesh) = Mesh::of(shape, MESH_SIDES) else { return };
-    let kind = Kind::Mesh(meshes.len() as u32);
-    meshes.push(mesh);
-    parts.push(Part { kind, colour: Colour::Other, local: *at, scale: Vector::repeat(1.0) });
 }
 
 /// A cuboid that is less than half as thick as wide is a slab.
@@ -115,6 +178,7 @@ fn capsule_parts(capsule: &Capsule, at: &Isometry<Real>) -> [Part; 3] {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::scenes::Scene;
 
     fn parts_of(shape: &SharedShape) -> Vec<Part> {
         let mut parts = Vec::new();
@@ -131,6 +195,7 @@ mod tests {
             SharedShape::cuboid(0.1, 0.2, 0.3),
             SharedShape::capsule_x(0.4, 0.2),
             SharedShape::capsule_y(0.4, 0.2),
+            SharedShape::capsule_z(0.4, 0.2),
             SharedShape::cylinder(0.4, 0.2),
             SharedShape::round_cuboid(0.1, 0.2, 0.3, 0.05),
             SharedShape::compound(vec![
@@ -158,10 +223,36 @@ mod tests {
     }
 
     #[test]
+    fn flat_boxes_are_slabs() {
+        assert_eq!(parts_of(&SharedShape::cuboid(0.5, 0.1, 0.5))[0].colour, Colour::Slab);
+        assert_eq!(parts_of(&SharedShape::cuboid(0.5, 0.4, 0.5))[0].colour, Colour::Cuboid);
+    }
+
+    #[test]
     fn the_plane_of_a_half_space_faces_its_normal() {
         for normal in [Vector::y_axis(), Vector::x_axis(), -Vector::y_axis()] {
             let part = parts_of(&SharedShape::halfspace(normal))[0];
             assert!((part.local * Vector::y() - *normal).norm() < 1e-6, "{normal:?}");
+        }
+    }
+
+    /// Each scene has a part to draw of every collider, and groups that have all parts.
+    #[test]
+    fn groups_cover_every_scene() {
+        for scene in Scene::ALL {
+            let mut world = scene.build(100, 1);
+            let drawn = Drawn::new(&world);
+            let grouped: usize = drawn.groups().map(<[Member]>::len).sum();
+            assert_eq!(grouped, drawn.members.len(), "{}", scene.name);
+            let has_part = |(handle, _): (ColliderHandle, &Collider)| {
+                drawn.members.iter().any(|member| member.collider == handle)
+            };
+            assert!(world.colliders.iter().all(has_part), "{}", scene.name);
+            let is_number = |member: &Member| member.part.scale.iter().all(|x| x.is_finite());
+            assert!(drawn.members.iter().all(is_number), "{}", scene.name);
+            assert!(!drawn.is_outdated(&world));
+            world.colliders.insert(ColliderBuilder::ball(1.0));
+            assert!(drawn.is_outdated(&world));
         }
     }
 }

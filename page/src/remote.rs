@@ -4,13 +4,12 @@
 use pbig_core::{
     Aabb, ChangeRequest, DeviceFailure, DeviceFound, Pair, PairDevice, ProxyFilter, SearchRequest,
 };
-use std::fmt;
 
 /// Returns all pairs of the boxes that their filters, if any, allow; none if the device declines the call.
 pub(crate) type FindAll = fn(&[Aabb], Option<&[ProxyFilter]>) -> Option<Vec<Pair>>;
 
 /// A device that another module is, which finds all pairs in each call.
-#[derive(Clone)]
+#[derive(Clone, Debug)]
 pub(crate) struct RemoteDevice {
     find_all: FindAll,
 }
@@ -20,15 +19,7 @@ impl RemoteDevice {
     pub(crate) fn gpu() -> Self {
         Self { find_all: find_on_gpu }
     }
-}
 
-impl fmt::Debug for RemoteDevice {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("RemoteDevice").finish_non_exhaustive()
-    }
-}
-
-impl RemoteDevice {
     fn pairs(
         &self,
         boxes: &[Aabb],
