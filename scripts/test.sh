@@ -15,7 +15,7 @@ trap 'rm -rf "$TMPDIR"' EXIT
 
 # Options of several words, which are not quoted where they are used.
 # The default members, for commands that leave one out: cargo takes `--exclude` only beside `--workspace`.
-members="--workspace --exclude pbig-page --exclude pbig-page-bindgen --exclude pbig-page-gpu --exclude pbig-viewer --exclude pbig-wasm --exclude pbig-wasm-gpu"
+members="--workspace --exclude pbig-page --exclude pbig-page-bindgen --exclude pbig-page-gpu --exclude pbig-viewer --exclude pbig-wasm"
 in_036="--manifest-path rapier-0.36/Cargo.toml"
 members_036="-p rapier3d-pbig -p pbig-harness-036"
 features_036="--features rapier3d-pbig/debug-render"

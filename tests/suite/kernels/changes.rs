@@ -10,7 +10,7 @@ impl State {
 
     /// Returns the bounds of a box now and at the last update.
     pub(super) fn bounds(&self, id: usize) -> DeviceBox {
-        self.motions.get(id).map_or_else(|| self.boxes[id], bounds_of)
+        self.motions.get(id).map_or_else(|| DeviceBox::new(&self.boxes[id]), bounds_of)
     }
 
     /// Returns true if this update has changed a box, or if the device got the box now and before.
@@ -18,15 +18,12 @@ impl State {
         id >= self.params.known as usize || self.changed[id / 32] >> (id % 32) & 1 != 0
     }
 
-    /// Brings the boxes into the form that the checks need.
+    /// Brings the boxes now and before into the form that the checks need.
     pub(super) fn renew(&mut self) {
         for id in 0..self.motions.len() {
             if !self.has_changed(id) {
                 self.motions[id].before = self.motions[id].now;
             }
-        }
-        if self.has(RAW) {
-            self.boxes.iter_mut().for_each(|one| *one = DeviceBox::new(&floats(one)));
         }
     }
 
@@ -44,7 +41,7 @@ impl State {
     pub(super) fn is_wanted(&self, i: usize, j: usize) -> bool {
         match (self.motions.get(i), self.motions.get(j)) {
             (Some(a), Some(b)) => overlap(&a.now, &b.now) != overlap(&a.before, &b.before),
-            _ => overlap(&self.boxes[i], &self.boxes[j]),
+            _ => overlap(&self.bounds(i), &self.bounds(j)),
         }
     }
 
@@ -68,17 +65,6 @@ impl State {
         self.params.box_changes = self.box_changes.len() as u32;
         self.params.filter_changes = self.filter_changes.len() as u32;
     }
-}
-
-/// Returns a box as the host uploads it.
-pub(super) fn raw(aabb: &Aabb) -> DeviceBox {
-    DeviceBox { low: aabb.min.map(|x| x.to_bits() as i32), high: aabb.max.map(|x| x.to_bits() as i32) }
-}
-
-/// Returns an uploaded box.
-pub(super) fn floats(raw: &DeviceBox) -> Aabb {
-    let floats = |corner: [i32; 3]| corner.map(|bits| f32::from_bits(bits as u32));
-    Aabb::new(floats(raw.low), floats(raw.high))
 }
 
 fn bounds_of(motion: &Motion) -> DeviceBox {
@@ -152,40 +138,6 @@ pub(super) fn apply_changes(s: &mut State) {
     }
 }
 
-#[test]
-fn apply_changes_agrees_with_its_twin() {
-    agrees("apply_changes");
-}
-
-/// Compares a kernel with its twin on all sets of at most `most_boxes` boxes, with all codings.
-fn check_agrees_on_changes(kernel: &str, codings: &[u32], most_boxes: usize) {
-    for case in moving_cases().into_iter().filter(|case| case.boxes.len() <= most_boxes) {
-        let before = State::before(kernel, &case);
-        for &coding in codings {
-            for (filtered, split) in [(0, 0), (FILTERED, before.params.boxes / 2)] {
-                let state = before.clone().with(coding | filtered, split);
-                let fault = fault(twin(kernel), &GpuOptions::DEFAULT, &state);
-                assert_eq!(fault, None, "{}, flags {}, split {split}", case.name, coding | filtered);
-            }
-        }
-    }
-}
-
-#[test]
-fn check_small_agrees_with_its_twin_on_changes() {
-    check_agrees_on_changes("check_small", &[0, PACKED], usize::MAX);
-}
-
-#[test]
-fn check_large_agrees_with_its_twin_on_changes() {
-    check_agrees_on_changes("check_large", &[0, PACKED], usize::MAX);
-}
-
-#[test]
-fn check_all_agrees_with_its_twin_on_changes() {
-    check_agrees_on_changes("check_all", &[0, PACKED, BITS], 2000);
-}
-
 /// Boxes and filters beyond the ends of the lists must not change.
 #[test]
 fn apply_changes_changes_nothing_else() {
@@ -244,25 +196,5 @@ fn faults_planted_in_what_is_known_of_boxes_are_noticed() {
         ("apply_changes", |s| s.motions[2].before = s.motions[2].now),
         ("apply_changes", |s| s.filters[9].mask ^= 1),
     ];
-    for (i, (kernel, plant)) in faults.into_iter().enumerate() {
-        let before = State::before(kernel, &moving(pile()));
-        let wanted = after_twin(twin(kernel), &before);
-        let mut found = wanted.clone();
-        assert_eq!((twin(kernel).compare)(&before, &found, &wanted), None, "{kernel}");
-        plant(&mut found);
-        assert!((twin(kernel).compare)(&before, &found, &wanted).is_some(), "fault {i}, {kernel}");
-    }
-}
-
-/// A moved box without its mark is skipped, so its pairs are missing.
-#[test]
-fn an_entry_that_lost_its_mark_costs_pairs() {
-    needs_gpu!();
-    let mut before = State::before("check_small", &moving(pile()));
-    let wanted = after_twin(twin("check_small"), &before);
-    before.entries.iter_mut().for_each(|entry| *entry &= !MOVED);
-    let before = with_capacity_for(&before, &wanted);
-    let found = on_device(gpu(), twin("check_small"), &GpuOptions::DEFAULT, &before);
-    let fault = compare_checks(&before, &found, &wanted).expect("pairs are missing");
-    assert!(fault.starts_with("missing"), "{fault}");
+    are_noticed(&faults, &moving(pile()));
 }

@@ -278,14 +278,7 @@ fn faults_planted_in_the_sort_are_noticed() {
         ("place_windows", |s| s.out[1] ^= ENDED),
         ("rank_windows", |s| s.out[0] ^= 1),
     ];
-    for (i, (kernel, plant)) in faults.into_iter().enumerate() {
-        let before = State::before(kernel, &pile());
-        let wanted = after_twin(twin(kernel), &before);
-        let mut found = wanted.clone();
-        assert_eq!((twin(kernel).compare)(&before, &found, &wanted), None, "{kernel}");
-        plant(&mut found);
-        assert!((twin(kernel).compare)(&before, &found, &wanted).is_some(), "fault {i}, {kernel}");
-    }
+    are_noticed(&faults, &pile());
 }
 
 /// Returns the pairs of `grounds` large boxes, which every `step`-th other one touches, before a kernel of the sort.

@@ -75,39 +75,3 @@ fn under_a_box(level: &SizeRange, larger: &SizeRange, lengths: [f64; 3]) -> f64 
     let share = |k: usize| (f64::from(larger.max_extent[k]) / lengths[k]).min(1.0);
     f64::from(level.boxes) * (0..3).map(share).product::<f64>()
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use pbig_core::Aabb;
-
-    fn lattice(n: u32, step: f32, half: f32) -> Vec<Aabb> {
-        let at = |i: u32, d: u32| (i / d % n) as f32 * step;
-        (0..n * n * n).map(|i| Aabb::from_center([at(i, 1), at(i, n), at(i, n * n)], [half; 3])).collect()
-    }
-
-    fn boxes_of_levels(boxes: &[Aabb]) -> Vec<u32> {
-        levels(&Summary::of(boxes)).iter().map(|level| level.boxes).collect()
-    }
-
-    #[test]
-    fn boxes_of_one_size_share_a_level_and_few_huge_ones_have_none() {
-        let mut boxes = lattice(20, 1.0, 0.4);
-        assert_eq!(boxes_of_levels(&boxes), [8000]);
-        boxes.push(Aabb::new([-1e4; 3], [1e4; 3]));
-        assert_eq!(boxes_of_levels(&boxes), [8000], "the large box has no level");
-    }
-
-    #[test]
-    fn many_boxes_of_two_sizes_get_two_levels() {
-        let mut boxes = lattice(40, 1.0, 0.0005);
-        boxes.extend(lattice(20, 4.0, 2.0));
-        assert_eq!(boxes_of_levels(&boxes), [64_000, 8000]);
-    }
-
-    #[test]
-    fn no_boxes_have_no_levels() {
-        assert!(boxes_of_levels(&[]).is_empty());
-        assert!(boxes_of_levels(&[Aabb::new([f32::NEG_INFINITY; 3], [f32::INFINITY; 3]); 3]).is_empty());
-    }
-}
