@@ -82,7 +82,8 @@ impl Summary {
 }
 
 impl SizeClass {
-    fn add(&mut self, more: &Self) {
+    /// Adds the boxes of another class.
+    pub(crate) fn add(&mut self, more: &Self) {
         self.boxes += more.boxes;
         for (max, extent) in self.max_extent.iter_mut().zip(more.max_extent) {
             *max = max.max(extent);

@@ -66,7 +66,7 @@ impl GpuPlan {
         for (shift, level) in shifts {
             let share = max_cells.saturating_sub(1) / split.len().max(1) as u32;
             let most =
-                (f64::from(level.boxes) * CELLS_PER_BOX).max(MIN_CELLS_PER_LEVEL).min(f64::from(share));
+                (f64::from(level.all.boxes) * CELLS_PER_BOX).max(MIN_CELLS_PER_LEVEL).min(f64::from(share));
             plan.push(dims(space, cell * f64::from(shift).exp2(), most), shift);
         }
         plan.push([1; 3], 0);
@@ -108,17 +108,17 @@ fn edge(level: &SizeRange, summary: &Summary, space: [f32; 3], options: &GpuOpti
     let sample: Vec<Aabb> = summary.sample.iter().filter(of_level).copied().collect();
     let wanted = options.boxes_per_cell.max(1.0);
     let cell = if sample.is_empty() {
-        cell_size(CellRule::Density, &sample, level.boxes, space, wanted)
+        cell_size(CellRule::Density, &sample, level.all.boxes, space, wanted)
     } else {
         // A quarter of the sample is enough: equation 6 is evaluated on it 24 times.
         let quarter: Vec<Aabb> = sample.iter().step_by(4).copied().collect();
-        cell_size(options.cell_rule, &quarter, level.boxes, space, wanted)
+        cell_size(options.cell_rule, &quarter, level.all.boxes, space, wanted)
     };
-    let largest = level.max_extent.into_iter().fold(0.0, f32::max);
+    let largest = level.all.max_extent.into_iter().fold(0.0, f32::max);
     // A box crosses at most one border more than it has cell lengths, and one more by rounding.
     let smallest = f64::from(largest) * 1.001 / f64::from(MAX_SPAN - 2);
     let most = OCCUPANCY_LIMIT * f64::from(wanted);
-    with_limited_occupancy(&sample, level.boxes, f64::from(cell), smallest, most).max(smallest)
+    with_limited_occupancy(&sample, level.all.boxes, f64::from(cell), smallest, most).max(smallest)
 }
 
 /// Returns a cell size at which a box has at most `most` other boxes in its cell, as the sample tells.
