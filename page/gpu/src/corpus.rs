@@ -14,7 +14,7 @@ use wasm_bindgen::prelude::*;
 
 /// Counts of a run.
 #[wasm_bindgen(getter_with_clone)]
-#[derive(Default)]
+#[derive(Debug, Default)]
 pub struct Outcome {
     /// Number of sets whose pairs were compared.
     pub sets: u32,

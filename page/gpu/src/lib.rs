@@ -4,7 +4,7 @@
 mod benchmark;
 mod clock;
 #[cfg(feature = "corpus")]
-mod corpus;
+pub mod corpus;
 mod device;
 mod gpu;
 
