@@ -69,9 +69,9 @@ build_module() {
     choose_cargo "$target" || return 1
     use_wasm_linker
     built=$(target_folder)/wasm
-    step "${cargo[@]}" build --locked --profile wasm --lib --package pbig-wasm-gpu --target "$target" --target-dir "$built"
-    step cargo run --quiet --locked --package pbig-page-bindgen -- "$built/$target/wasm/pbig_wasm_gpu.wasm" "$out/module"
-    mv "$out/module/pbig_wasm_gpu.js" "$out/module/pbig_wasm_gpu.mjs"
+    step "${cargo[@]}" build --locked --profile wasm --lib --package pbig-page-gpu --features corpus --target "$target" --target-dir "$built"
+    step cargo run --quiet --locked --package pbig-page-bindgen -- "$built/$target/wasm/pbig_page_gpu.wasm" "$out/module"
+    mv "$out/module/pbig_page_gpu.js" "$out/module/pbig_page_gpu.mjs"
 }
 
 # Dawn takes SwiftShader: lavapipe of Mesa 22 lacks what it asks for.

@@ -32,8 +32,6 @@ pub enum Buffer {
     FilterChanges,
     /// A bit for each box: it has changed since the last update.
     Changed,
-    /// Number and largest extents of the boxes of each size class.
-    Classes,
     /// Cells and level of each box.
     Located,
     /// Entries of each cell: counts, then ends of its lists, then their starts.
@@ -78,7 +76,6 @@ impl Buffer {
             Self::BoxChanges => "box_changes",
             Self::FilterChanges => "filter_changes",
             Self::Changed => "changed",
-            Self::Classes => "classes",
             Self::Located => "located",
             Self::Cells => "cells",
             Self::Sums => "sums",
@@ -180,8 +177,6 @@ macro_rules! kernels {
 kernels! {
     /// Changes: applies the changes of boxes and filters.
     APPLY_CHANGES Map "apply_changes" [] (Params, BoxChanges, FilterChanges, Boxes, Filters, Changed);
-    /// Plan: counts the boxes of each size.
-    MEASURE Map "measure" [FLOATS, SEARCH_OVERLAPS, KNOWN_BOX] (Params, Boxes, Changed, Classes);
     /// Map: computes the cells and the level of each box, and counts the residents of each cell.
     LOCATE Map "locate" [FLOATS, SEARCH_OVERLAPS, KNOWN_BOX, CELLS]
         (Params, Boxes, Changed, Located, Cells, Counters);

@@ -55,7 +55,7 @@ fn locate(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_ind
 
 fn locate_one(id: u32) {
     let known = known_box(id);
-    if IS_RENEWED_ONCE && is_stale(boxes[id], has_changed(id)) {
+    if is_stale(boxes[id], has_changed(id)) {
         boxes[id] = known;
     }
     let one = bounds_of(known);

@@ -6,9 +6,5 @@ fn has_changed(id: u32) -> bool {
 }
 
 fn known_box(id: u32) -> KnownBox {
-    let one = boxes[id];
-    if is_stale(one, has_changed(id)) {
-        return renewed(one);
-    }
-    return one;
+    return renewed(boxes[id], has_changed(id));
 }

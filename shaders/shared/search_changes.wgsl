@@ -6,16 +6,17 @@ alias KnownBox = Motion;
 // Number of boxes of small cells that fit workgroup memory.
 const STAGED = 192u;
 
-const IS_RENEWED_ONCE = true;
-
 // Returns true if a stored box is not yet as the checks need it: an earlier update has changed it, this one has not.
 fn is_stale(one: KnownBox, has_changed: bool) -> bool {
     return !has_changed && has_moved(one);
 }
 
-// Returns a stale box as the checks need it.
-fn renewed(one: KnownBox) -> KnownBox {
-    return Motion(one.now, one.now);
+// Returns a box as the checks need it.
+fn renewed(one: KnownBox, has_changed: bool) -> KnownBox {
+    if is_stale(one, has_changed) {
+        return Motion(one.now, one.now);
+    }
+    return one;
 }
 
 fn checked_box(one: KnownBox) -> KnownBox {

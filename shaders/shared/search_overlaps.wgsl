@@ -1,30 +1,24 @@
-// Search for all overlaps. A wanted pair overlaps.
+// Search for all overlaps. A wanted pair overlaps. Boxes stay as they came up, in floats, and kernels convert what they read:
+// to store all boxes costs more.
 
 alias KnownBox = DeviceBox;
 
 // Number of boxes of small cells that fit workgroup memory.
 const STAGED = 256u;
 
-// True if `locate` stores renewed boxes. Otherwise boxes stay as they came up, and kernels renew what they read: to store all
-// boxes costs more.
-const IS_RENEWED_ONCE = false;
-
-// Returns true if a stored box is not yet as the checks need it.
+// Returns true if `locate` stores the box as the checks need it.
 fn is_stale(one: KnownBox, has_changed: bool) -> bool {
-    return (params.flags & RAW) != 0u;
+    return false;
 }
 
-// Returns a stale box as the checks need it.
-fn renewed(one: KnownBox) -> KnownBox {
+// Returns a box as the checks need it.
+fn renewed(one: KnownBox, has_changed: bool) -> KnownBox {
     return ordered_box(one);
 }
 
 // Returns a box that `locate` has seen, as the checks need it.
 fn checked_box(one: KnownBox) -> KnownBox {
-    if (params.flags & RAW) != 0u {
-        return ordered_box(one);
-    }
-    return one;
+    return ordered_box(one);
 }
 
 // Returns the box whose cells the known box is sorted into.

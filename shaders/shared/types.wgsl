@@ -13,12 +13,10 @@ const NO_LEVEL = 0xffffffffu;
 const FILTERED = 1u;
 const PACKED = 2u;
 const BITS = 4u;
-// The boxes are floats; `locate` turns them into ordered integers.
-const RAW = 8u;
 // Plain pairs are sorted, if they fit one buffer.
-const SORTED = 16u;
+const SORTED = 8u;
 // The checks count redundant tests and overlaps.
-const COUNTED = 32u;
+const COUNTED = 16u;
 
 // An AABB whose coordinates are integers in the order of the floats. Comparisons of integers are exact on every device,
 // whatever it does to denormals, infinities and NaN. An invalid box has all of `low` above all of `high`.

@@ -232,8 +232,10 @@ fn boxes_that_jump_together_or_apart_get_another_plan_at_once() {
     };
     let mut finder = with(GpuOptions::DEFAULT).with(|it| it.order = Order::Unspecified).finder();
     let mut plans = Vec::new();
-    for boxes in [&spread, &factor(&spread, 1e-3), &factor(&spread, 1e4), &spread, &spread] {
-        let (mut pairs, _) = find(&mut finder, boxes);
+    let sets = [&spread, &factor(&spread, 1e-3), &factor(&spread, 1e4), &spread, &spread];
+    for (i, boxes) in sets.into_iter().enumerate() {
+        let (mut pairs, gpu) = find(&mut finder, boxes);
+        assert!(i != 1 || gpu.repeats > 0, "the plan of the first set is refused");
         pairs.sort_unstable();
         assert_eq!(difference(&pairs, &on_cpu(boxes)), None);
         let report = finder.report();
@@ -257,15 +259,6 @@ fn memory_follows_what_is_needed_down_as_well_as_up() {
     let after = find(&mut finder, &few).1.device_bytes;
     assert!(after * 4 < burst, "{after} of {burst} bytes are still held");
     assert_eq!(difference(&find(&mut finder, &many).0, &on_cpu(&many)), None);
-}
-
-#[test]
-fn an_unknown_adapter_is_an_error_that_lists_the_adapters() {
-    needs_gpu!();
-    let error = GpuFinder::on_adapter("no such adapter").expect_err("no adapter has this name");
-    let real = adapters().into_iter().next().expect("an adapter").get_info().name;
-    let text = error.to_string();
-    assert!(text.contains("no such adapter") && text.contains(&real), "{text}");
 }
 
 #[test]

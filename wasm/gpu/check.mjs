@@ -53,15 +53,23 @@ async function runModes(module, mostBoxes, tell) {
     let failed = 0;
     for (const [i, mode] of module.modes().entries()) {
         const outcome = await module.run(i, mostBoxes);
-        tell(`${outcome.adapter}, ${mode}: ${outcome.calls} sets, ${outcome.pairs} pairs, ${outcome.failed} failed ${outcome.first}`);
+        tell(`${outcome.adapter}, ${mode}: ${outcome.sets} sets, ${outcome.pairs} pairs, ${outcome.failed} failed ${outcome.first}`);
         failed += outcome.failed + (outcome.pairs > 0 ? 0 : 1);
     }
     return failed;
 }
 
-// Returns true if all is as it should be. Other orders and faults run on fewer sets: a software adapter takes minutes.
+// Returns true if all is as it should be. An error has the message of a panic, which ends the module.
 export async function check(module, tell) {
-    module.keep_panics();
+    try {
+        return await checkAll(module, tell);
+    } catch (error) {
+        throw new Error(`${error} ${module.panic_message()}`);
+    }
+}
+
+// Other orders and faults run on fewer sets: a software adapter takes minutes.
+async function checkAll(module, tell) {
     let isRight = true;
     for (const [order, change] of Object.entries(orders)) {
         tell(`workgroups and lanes ${order}`);

@@ -15,17 +15,17 @@ async function inNode() {
     // wgpu looks for the class of the global object: a page's or a worker's.
     Object.assign(globalThis, globals, { window: globalThis, Window: Object });
     Object.defineProperty(globalThis, "navigator", { value: { gpu: create([]) }, configurable: true });
-    const module = await import(pathToFileURL(resolve(folder, "pbig_wasm_gpu.mjs")));
-    module.initSync({ module: await readFile(join(folder, "pbig_wasm_gpu_bg.wasm")) });
+    const module = await import(pathToFileURL(resolve(folder, "pbig_page_gpu.mjs")));
+    module.initSync({ module: await readFile(join(folder, "pbig_page_gpu_bg.wasm")) });
     const { check } = await import("./check.mjs");
     return check(module, console.log);
 }
 
 const page = `<script type="module">
-    import * as module from "/pbig_wasm_gpu.mjs";
+    import * as module from "/pbig_page_gpu.mjs";
     import { check } from "/check.mjs";
     const post = (to, text) => fetch(to, { method: "POST", body: String(text) });
-    const isRight = module.default({ module_or_path: "/pbig_wasm_gpu_bg.wasm" }).then(() => check(module, (line) => post("/line", line)));
+    const isRight = module.default({ module_or_path: "/pbig_page_gpu_bg.wasm" }).then(() => check(module, (line) => post("/line", line)));
     post("/end", await isRight.catch((error) => error));
 </script>`;
 const types = { js: "text/javascript", mjs: "text/javascript", wasm: "application/wasm" };

@@ -107,45 +107,20 @@ pub fn events(
 /// If a record is cut off, or names an entry or a box that does not exist. Then nothing useful was appended.
 pub fn records(words: &[u32], entries: &[u32], boxes: u32, pairs: &mut Vec<Pair>) -> Result<(), DecodeError> {
     let pieces = pieces(words)?;
-    let mut end = pairs.len();
-    let places = parallel::map(pieces.len(), |i| count(words, &pieces[i])).into_iter().map(|count| {
-        end += count;
-        end - count..end
-    });
-    let places: Vec<Range<usize>> = places.collect();
-    pairs.resize(end, Pair::default());
-    let shared = SharedSlice::new(pairs);
     let decoded = parallel::map(pieces.len(), |i| {
-        // SAFETY: the places are inside the list, and no other piece has these.
-        let places = unsafe { shared.part(places[i].clone()) }.iter_mut();
-        let mut reader = Reader { words, entries, boxes, at: pieces[i].start, places };
-        while reader.at < pieces[i].end {
+        let Range { start: at, end } = pieces[i];
+        // Most words have two or three pairs.
+        let pairs = Vec::with_capacity(3 * (end - at));
+        let mut reader = Reader { words, entries, boxes, at, pairs };
+        while reader.at < end {
             reader.record()?;
         }
-        Ok(())
+        Ok(reader.pairs)
     });
-    decoded.into_iter().collect()
-}
-
-/// Returns the number of pairs of whole records, if no row is longer than its record.
-fn count(words: &[u32], range: &Range<usize>) -> usize {
-    let (mut at, mut pairs) = (range.start, 0);
-    while at < range.end {
-        let end = at + record_len(words[at]);
-        if words[at] & PLAIN != 0 {
-            pairs += (end - at - 1) / 2;
-            at = end;
-            continue;
-        }
-        at += 3;
-        while at < end {
-            let partners = (words[at] >> 8 & 0xFF) as usize + 1;
-            pairs += partners;
-            at += row_len(partners);
-        }
-        at = end;
+    for piece in decoded {
+        pairs.append(&mut piece?);
     }
-    pairs
+    Ok(())
 }
 
 /// Returns the number of words of a row with this number of partners.
@@ -179,8 +154,7 @@ struct Reader<'a> {
     entries: &'a [u32],
     boxes: u32,
     at: usize,
-    /// Places for the pairs, as many as [`count`] has counted.
-    places: std::slice::IterMut<'a, Pair>,
+    pairs: Vec<Pair>,
 }
 
 impl Reader<'_> {
@@ -194,7 +168,7 @@ impl Reader<'_> {
                 if a >= b || b >= self.boxes {
                     return Err(DecodeError { what: "not a < b < boxes", at: i });
                 }
-                self.write(Pair { a, b });
+                self.pairs.push(Pair { a, b });
             }
             self.at = end;
             return Ok(());
@@ -227,15 +201,9 @@ impl Reader<'_> {
             if one == other {
                 return Err(DecodeError { what: "a box paired with itself", at });
             }
-            self.write(Pair::new(one, other));
+            self.pairs.push(Pair::new(one, other));
         }
         Ok(())
-    }
-
-    fn write(&mut self, pair: Pair) {
-        if let Some(place) = self.places.next() {
-            *place = pair;
-        }
     }
 
     fn id(&self, place: usize) -> Result<u32, DecodeError> {

@@ -8,8 +8,6 @@ use pbig_core::{Aabb, ProxyFilter};
 pub const LANES: u32 = 256;
 /// Number of workgroups in a row of a dispatch. The portable limit is 65,535.
 pub const GROUPS_PER_ROW: u32 = 32_768;
-/// Maximum number of workgroups that measure the boxes. Each adds its counts to those of all.
-pub const MEASURE_GROUPS: u32 = 64;
 /// Maximum number of levels of cells. The last level has one cell for everything.
 pub const MAX_LEVELS: usize = 8;
 /// Maximum number of cells that a box touches along one axis of its level.
@@ -51,12 +49,10 @@ pub const FILTERED: u32 = 1;
 pub const PACKED: u32 = 2;
 /// Bit of [`Params::flags`]: the output of `check_all` is one bit a pair.
 pub const BITS: u32 = 4;
-/// Bit of [`Params::flags`]: the boxes are floats.
-pub const RAW: u32 = 8;
 /// Bit of [`Params::flags`]: plain pairs are sorted, if they fit one buffer.
-pub const SORTED: u32 = 16;
+pub const SORTED: u32 = 8;
 /// Bit of [`Params::flags`]: redundant tests and overlaps are counted.
-pub const COUNTED: u32 = 32;
+pub const COUNTED: u32 = 16;
 
 /// Declares structs of plain 32-bit numbers.
 macro_rules! shared_structs {

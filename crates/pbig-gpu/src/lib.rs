@@ -32,8 +32,6 @@ pub mod decode;
 mod gpu;
 #[doc(hidden)]
 pub mod layout;
-#[doc(hidden)]
-pub mod model;
 mod options;
 #[doc(hidden)]
 pub mod pbig;
@@ -46,5 +44,5 @@ pub use gpu::GpuFinders;
 #[cfg(feature = "wgpu")]
 pub use gpu::testing;
 #[cfg(feature = "wgpu")]
-pub use gpu::{GpuError, GpuFinder, GpuPlan, adapters, adapters_async, describe};
+pub use gpu::{GpuError, GpuFinder, adapters, describe};
 pub use options::{CellRule, Coding, GpuOptions};

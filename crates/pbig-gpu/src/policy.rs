@@ -14,18 +14,15 @@ const TESTS_PER_PAIR: u64 = 32;
 /// Number of tests that every search may make: the device is done in less time than the CPU takes to begin.
 const ALWAYS_ALLOWED_TESTS: u64 = 1 << 17;
 
-/// Returns how many times the tests of the default cells a caller allows who wants this number of boxes in a cell.
-pub(crate) fn allowed_by_wish(boxes_per_cell: f32) -> u64 {
-    // A NaN is 0 as an integer.
-    ((boxes_per_cell / GpuOptions::DEFAULT.boxes_per_cell).clamp(1.0, 1024.0) as u64).max(1)
-}
-
 /// Returns the maximum number of tests of a search. Beyond it the device declines: the CPU's work is bounded for every shape,
-/// that of one grid is not.
-pub(crate) const fn most_tests(boxes: u64, expected_pairs: u64) -> u64 {
-    let by_boxes = TESTS_PER_BOX_AND_LOG * boxes * (boxes | 1).ilog2() as u64;
+/// that of one grid is not. A caller who wants larger cells allows their tests.
+pub(crate) fn most_tests(boxes: u64, expected_pairs: u64, boxes_per_cell: f32) -> u64 {
+    let by_boxes = TESTS_PER_BOX_AND_LOG * boxes * u64::from((boxes | 1).ilog2());
     let by_pairs = TESTS_PER_PAIR.saturating_mul(expected_pairs);
-    by_boxes.saturating_add(by_pairs).saturating_add(ALWAYS_ALLOWED_TESTS)
+    let most = by_boxes.saturating_add(by_pairs).saturating_add(ALWAYS_ALLOWED_TESTS);
+    // A NaN is 0 as an integer.
+    let larger = (boxes_per_cell / GpuOptions::DEFAULT.boxes_per_cell).clamp(1.0, 1024.0) as u64;
+    most.saturating_mul(larger.max(1))
 }
 
 #[cfg(test)]
@@ -48,16 +45,15 @@ mod tests {
 
     #[test]
     fn larger_cells_allow_as_many_times_the_tests() {
-        assert_eq!(
-            [f32::NAN, -1.0, 2.0, 4.0, 32.0, f32::INFINITY].map(allowed_by_wish),
-            [1, 1, 1, 1, 8, 1024]
-        );
+        let times = |wanted: f32| most_tests(1000, 0, wanted) / most_tests(1000, 0, 4.0);
+        assert_eq!([f32::NAN, -1.0, 2.0, 4.0, 32.0, f32::INFINITY].map(times), [1, 1, 1, 1, 8, 1024]);
     }
 
     /// One ground under ten million boxes: each pair of the ground is one test more.
     #[test]
     fn ordinary_scenes_are_far_below_the_limit_and_crowds_beyond() {
         let ten_million = 10_000_000;
+        let most_tests = |boxes, pairs| most_tests(boxes, pairs, GpuOptions::DEFAULT.boxes_per_cell);
         assert!(most_tests(ten_million, 0) > 2 * (18 * ten_million + ten_million));
         assert!(most_tests(ten_million, 0) < ten_million * ten_million / 1000);
         assert!(most_tests(25_000, 0) < 25_000 * 25_000 / 2 / 20);

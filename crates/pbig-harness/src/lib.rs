@@ -9,11 +9,14 @@ pub mod checks;
 pub mod corpus;
 #[cfg(feature = "run")]
 pub mod counting;
+pub mod device_world;
 #[cfg(feature = "run")]
 pub mod field;
 #[cfg(feature = "files")]
 pub mod files;
 pub mod follower;
+#[cfg(feature = "run")]
+pub mod gpu_model;
 #[cfg(feature = "run")]
 pub mod gpu_race;
 pub mod hard;

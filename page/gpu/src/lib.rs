@@ -1,7 +1,10 @@
-//! pbig on the GPU of a browser: all pairs of given boxes, and the measurement beside the CPU. JavaScript calls everything here.
+//! pbig on the GPU of a browser: all pairs of given boxes, and the measurement beside the CPU; for tests, the corpus. JavaScript calls
+//! everything here.
 
 mod benchmark;
 mod clock;
+#[cfg(feature = "corpus")]
+pub mod corpus;
 mod device;
 mod gpu;
 

@@ -1,9 +1,9 @@
 //! Contract: a device that fails or is lost at any moment costs no pair and no event.
 
 use super::{find, on_cpu, set, with_device};
-use pbig_core::{Backend, BroadPhase, Config, ProxyFilter, oracle};
+use pbig_core::{Aabb, Backend, BroadPhase, Config, Finder, ProxyFilter, oracle};
 use pbig_gpu::testing::Fault;
-use pbig_gpu::{Coding, GpuFinder, GpuOptions, adapters};
+use pbig_gpu::{Coding, GpuFinder, GpuFinders, GpuOptions, adapters};
 use pbig_harness::follower::Follower;
 use pbig_tests::{corpus, difference, needs_gpu, shifted};
 use std::time::Duration;
@@ -60,7 +60,7 @@ fn a_device_that_is_lost_at_any_moment_of_a_call_loses_no_pair() {
     let options =
         GpuOptions { chunk: [12, 8], first_bytes: 0, coding: Coding::Packed, ..GpuOptions::DEFAULT };
     let in_parts = GpuOptions { max_bytes: 1 << 20, ..GpuOptions::DEFAULT };
-    for (boxes, options) in [(set("mixed", 3000), options), (set("uniform", 45_000), in_parts)] {
+    for (boxes, options) in [(set("mixed", 3000), options), (set("uniform", 70_000), in_parts)] {
         let wanted = on_cpu(&boxes);
         let mut lost = 0;
         for after in 0..10 {
@@ -73,6 +73,24 @@ fn a_device_that_is_lost_at_any_moment_of_a_call_loses_no_pair() {
         }
         assert!(lost >= 6, "the device was lost in {lost} of 10 calls only");
     }
+}
+
+#[test]
+fn several_devices_of_which_one_is_lost_lose_no_pair() {
+    needs_gpu!();
+    let adapter = adapters().into_iter().next().expect("an adapter");
+    let options = GpuOptions { pause: Duration::ZERO, ..GpuOptions::DEFAULT };
+    let gpus = GpuFinders::on_all(&[adapter.clone(), adapter]).expect("devices").with_options(options);
+    gpus.inject(Fault::LoseDevice, 1);
+    let config = Config { backend: Backend::Device, ..Config::DEFAULT };
+    let mut finder = Finder::with_device(config, Box::new(gpus));
+    let boxes = set("mixed", 5000);
+    let parts = [(); 4].map(|()| {
+        assert_eq!(difference(finder.find(&boxes).expect("few pairs"), &on_cpu(&boxes)), None);
+        let report = finder.report();
+        report.fallback.is_none().then(|| report.device.as_ref().map_or(0, |gpu| gpu.parts))
+    });
+    assert_eq!(parts.iter().flatten().collect::<Vec<_>>(), [&2; 3], "one call is the CPU's");
 }
 
 #[test]

@@ -77,6 +77,18 @@ fn a_declined_call_is_the_cpus_and_the_next_may_be_the_devices() {
     assert!(ways[0] && !ways[1] && ways[8], "done by the device: {ways:?}");
 }
 
+#[test]
+fn a_part_that_the_device_declines_leaves_the_call_to_the_cpu() {
+    needs_gpu!();
+    let mut boxes = crossing();
+    boxes.extend(set("uniform", 30_000));
+    let options = GpuOptions { max_bytes: 1 << 20, ..GpuOptions::DEFAULT };
+    let mut finder = with(options).finder();
+    assert_eq!(difference(finder.find(&boxes).expect("few pairs"), &on_cpu(&boxes)), None);
+    let why = finder.report().fallback.clone().expect("a part is declined");
+    assert!(why.contains("declined") && !why.contains("of 50000 boxes"), "{why}");
+}
+
 /// Needles in one layer, of which each would meet half of the others in a grid of cubes, and few touch.
 fn crossing() -> Vec<Aabb> {
     let long = |i: usize, half: [f32; 3]| Aabb::from_center([0.0, 0.0, i as f32].map(|x| x * 0.001), half);
@@ -101,7 +113,7 @@ fn query_sets_are_made_only_if_times_are_wanted() {
 }
 
 #[test]
-fn the_first_call_repeats_nothing_and_waits_at_most_once_more() {
+fn the_first_call_repeats_nothing_and_waits_once() {
     needs_gpu!();
     for (name, n) in [("unit", 1000), ("unit", 10_000), ("uniform", 10_000), ("unit", 100_000)] {
         let boxes = set(name, n);
@@ -110,7 +122,7 @@ fn the_first_call_repeats_nothing_and_waits_at_most_once_more() {
         let (_, first) = find(&mut finder, &boxes);
         let (_, next) = find(&mut finder, &boxes);
         assert_eq!((first.repeats, next.repeats), (0, 0), "{n} in {name}");
-        assert_eq!((first.waits, next.waits), (2, 1), "{n} in {name}: one more to measure the boxes");
+        assert_eq!((first.waits, next.waits), (1, 1), "{n} in {name}");
     }
 }
 
@@ -194,7 +206,13 @@ fn several_devices_share_a_call_and_give_the_same_bytes() {
                 .collect();
             let (pairs, report) = find(&mut finder, &boxes);
             assert_eq!(difference(&pairs, &on_cpu(&boxes)), None);
-            let parts = if boxes.len() < 2048 { 1 } else { together.len() as u32 };
+            let devices = together.len() as u32;
+            // Boxes with one corner are not parted, but the ground is.
+            let parts = match boxes.len() {
+                ..2048 => 1,
+                2502 => devices.min(2),
+                _ => devices,
+            };
             assert_eq!(report.parts, parts, "{}", report.name);
             let found = finder.find_filtered(&boxes, &filters).expect("few pairs").to_vec();
             let mut cpu = Finder::new(Config { backend: Backend::Cpu, ..config });

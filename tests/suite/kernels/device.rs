@@ -77,17 +77,11 @@ pub(super) fn fault(twin: &Twin, options: &GpuOptions, before: &State) -> Option
     Some(format!("{}: {fault}", twin.kernel.name))
 }
 
-/// Compares a kernel with its twin on all sets, at rest and moving.
-pub(super) fn agrees(kernel: &str) {
-    for case in cases().into_iter().chain(moving_cases()) {
-        let before = State::before(kernel, &case);
-        assert_eq!(fault(twin(kernel), &GpuOptions::DEFAULT, &before), None, "{}", case.name);
-    }
-}
-
-/// Compares a kernel with its twin on sets of at most `most_boxes` boxes, at rest and moving, with all codings, filters and splits.
+/// Compares a kernel with its twin on all sets of at most `most_boxes` boxes, at rest and moving, with these codings, with filters
+/// and splits.
 pub(super) fn check_agrees(kernel: &str, codings: &[u32], most_boxes: usize) {
-    for case in cases().into_iter().chain(moving_cases()).filter(|case| case.boxes.len() <= most_boxes) {
+    let all = cases().into_iter().chain(moving_cases());
+    for case in all.filter(|case| case.boxes.len() <= most_boxes) {
         let before = State::before(kernel, &case);
         let settings = [(0, 0), (FILTERED, before.params.boxes / 2), (FILTERED, 0)];
         let settings = &settings[..if before.finds_changes() { 2 } else { 3 }];

@@ -1,7 +1,7 @@
 //! Idle lanes and loads, counted by texts that count what the kernel does instead of redundant tests.
 
 use super::*;
-use pbig_gpu::model::Counts;
+use pbig_harness::gpu_model::Counts;
 
 /// Returns the number that a counting text has added to the redundant tests, and the tests.
 fn counted(kernel: &str, edits: &[[&str; 2]], before: &State) -> [u64; 2] {

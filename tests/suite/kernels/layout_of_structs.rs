@@ -103,7 +103,6 @@ fn constants_are_those_of_the_kernels() {
         ("FILTERED", FILTERED),
         ("PACKED", PACKED),
         ("BITS", BITS),
-        ("RAW", layout::RAW),
         ("SORTED", layout::SORTED),
         ("COUNTED", COUNTED),
         ("ENDED", ENDED),
@@ -118,7 +117,6 @@ fn constants_are_those_of_the_kernels() {
         ("PIECE", PIECE),
         ("PIECES", PIECES),
         ("FIRST_PIECE", FIRST_PIECE),
-        ("MEASURE_GROUPS", MEASURE_GROUPS),
     ];
     let most_span = format!("const MAX_SPAN = {MAX_SPAN};");
     for kernel in all_kernels() {

@@ -278,7 +278,7 @@ fn faults_planted_in_the_sort_are_noticed() {
         ("place_windows", |s| s.out[1] ^= ENDED),
         ("rank_windows", |s| s.out[0] ^= 1),
     ];
-    assert_noticed(&faults, &pile());
+    are_noticed(&faults, &pile());
 }
 
 /// Returns the pairs of `grounds` large boxes, which every `step`-th other one touches, before a kernel of the sort.

@@ -10,13 +10,12 @@ pub(super) const NEARLY: [u32; 2] = [u32::MAX - 2, 0];
 pub(super) struct State {
     pub(super) params: Params,
     pub(super) chunk: Chunk,
-    pub(super) boxes: Vec<DeviceBox>,
+    pub(super) boxes: Vec<Aabb>,
     /// Boxes now and before, which replace `boxes` in a search for changes.
     pub(super) motions: Vec<Motion>,
     pub(super) box_changes: Vec<BoxChange>,
     pub(super) filter_changes: Vec<FilterChange>,
     pub(super) changed: Vec<u32>,
-    pub(super) classes: Vec<[u32; 4]>,
     pub(super) filters: Vec<ProxyFilter>,
     pub(super) located: Vec<Located>,
     pub(super) cells: Vec<Cell>,
@@ -103,12 +102,11 @@ impl State {
                 pairs_left: [u32::MAX; 2],
                 ..Chunk::default()
             },
-            boxes: case.boxes.iter().map(DeviceBox::new).collect(),
+            boxes: case.boxes.clone(),
             filters: (0..n as u32).map(filter).collect(),
             located: vec![Located::default(); n],
             cells: vec![Cell::default(); params.cells as usize],
             sums: vec![0; (2 * params.cells).div_ceil(COUNTS_PER_BLOCK) as usize],
-            classes: vec![[0; 4]; 256],
             totals: Totals {
                 words: [0; 2],
                 pairs: NEARLY,
@@ -197,7 +195,6 @@ impl State {
             Buffer::BoxChanges => cast_slice_mut(&mut self.box_changes),
             Buffer::FilterChanges => cast_slice_mut(&mut self.filter_changes),
             Buffer::Changed => cast_slice_mut(&mut self.changed),
-            Buffer::Classes => cast_slice_mut(&mut self.classes),
             Buffer::Filters => cast_slice_mut(&mut self.filters),
             Buffer::Located => cast_slice_mut(&mut self.located),
             Buffer::Cells => cast_slice_mut(&mut self.cells),

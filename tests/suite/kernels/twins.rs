@@ -12,9 +12,8 @@ pub(super) struct Twin {
 }
 
 /// The twins, in the order in which the kernels run.
-pub(super) static TWINS: [Twin; 19] = [
+pub(super) static TWINS: [Twin; 18] = [
     Twin { kernel: &shaders::APPLY_CHANGES, run: apply_changes, groups: by_change, compare: compare_motions },
-    Twin { kernel: &shaders::MEASURE, run: measure, groups: by_box_at_most_64, compare: compare_classes },
     Twin { kernel: &shaders::LOCATE, run: locate, groups: by_box, compare: compare_located },
     Twin { kernel: &shaders::VISIT, run: visit, groups: by_box, compare: compare_cells },
     Twin { kernel: &shaders::SCAN_BLOCKS, run: scan_blocks, groups: by_block, compare: compare_blocks },
@@ -58,11 +57,6 @@ pub(super) fn by_cell_block(s: &State) -> u32 {
     s.params.cells.div_ceil(CELLS_PER_BLOCK)
 }
 
-/// Returns the workgroups that measure the boxes.
-pub(super) fn by_box_at_most_64(s: &State) -> u32 {
-    by_box(s).min(MEASURE_GROUPS)
-}
-
 pub(super) fn by_small_item(s: &State) -> u32 {
     s.counters.small_items.min(s.chunk.small_items)
 }
@@ -73,28 +67,6 @@ pub(super) fn by_large_item(s: &State) -> u32 {
 
 pub(super) fn by_pair(s: &State) -> u32 {
     pair_count(s.params.boxes.into()).div_ceil(LANES.into()) as u32
-}
-
-/// Counts the boxes of each class by the bits of floats.
-pub(super) fn measure(s: &mut State) {
-    let mut fresh = s.clone();
-    fresh.renew();
-    let edge = |low: i32, high: i32| {
-        let (low, high) = (float_of(low), float_of(high));
-        if low.is_infinite() || high.is_infinite() { f32::INFINITY } else { high - low }
-    };
-    for id in 0..fresh.boxes.len() {
-        let one = fresh.bounds(id);
-        if one.low[0] > one.high[0] {
-            continue;
-        }
-        let edges = [0, 1, 2].map(|k| edge(one.low[k], one.high[k]).to_bits());
-        let class = edges.iter().max().expect("three edges") >> 23;
-        s.classes[class as usize][0] += 1;
-        for (most, edge) in s.classes[class as usize][1..].iter_mut().zip(edges) {
-            *most = edge.max(*most);
-        }
-    }
 }
 
 pub(super) fn locate(s: &mut State) {

@@ -1,8 +1,8 @@
 //! `pbig bench gpu`: the GPU beside the CPU, kernel by kernel, and the host's part of a call.
 
 use pbig_core::{Aabb, Backend, BroadPhase, Config, DeviceReport, Finder, Limits, Order, ProxyFilter};
-use pbig_gpu::model::{Counts, GPUS, Gpu};
 use pbig_gpu::{GpuFinder, GpuOptions};
+use pbig_harness::gpu_model::{Counts, GPUS, Gpu};
 use pbig_harness::gpu_race::{on_device, race};
 use pbig_harness::prelude::*;
 

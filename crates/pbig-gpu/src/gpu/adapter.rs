@@ -6,11 +6,11 @@ use super::{GpuError, wait};
 ///
 /// None in a browser, where nothing may block. `WGPU_BACKEND` and wgpu's other variables apply. With `WGPU_POWER_PREF=low` integrated adapters come first.
 pub fn adapters() -> Vec<wgpu::Adapter> {
-    wait::block_on(async { Ok::<_, GpuError>(adapters_async().await) }).unwrap_or_default()
+    wait::block_on(async { Ok::<_, GpuError>(best_first().await) }).unwrap_or_default()
 }
 
-/// Returns all adapters, as [`adapters`]. Of several a browser shows one.
-pub async fn adapters_async() -> Vec<wgpu::Adapter> {
+/// Returns all adapters, best first. Of several a browser shows one.
+async fn best_first() -> Vec<wgpu::Adapter> {
     let instance = wgpu::Instance::new(wgpu::InstanceDescriptor::new_without_display_handle_from_env());
     let backends = wgpu::Backends::from_env().unwrap_or(wgpu::Backends::all());
     let mut adapters = instance.enumerate_adapters(backends).await;
@@ -29,24 +29,24 @@ fn rank(kind: wgpu::DeviceType, low_power: bool) -> u32 {
     }
 }
 
-/// Returns the adapter of the given name, or of `WGPU_ADAPTER_NAME`, or the best. A part of the name is enough, in any
-/// case.
+/// Returns the adapter of the given name, or of `WGPU_ADAPTER_NAME`, or the best.
 pub(super) async fn choose(name: Option<&str>) -> Result<wgpu::Adapter, GpuError> {
     if let Some(value) = unknown_api() {
         return Err(GpuError::UnknownApi(value));
     }
     let wanted = name.map(str::to_owned).or_else(|| std::env::var("WGPU_ADAPTER_NAME").ok());
-    let all = adapters_async().await;
-    let name_of = |adapter: &wgpu::Adapter| adapter.get_info().name;
-    let matches = |adapter: &&wgpu::Adapter| {
-        wanted.as_ref().is_none_or(|name| name_of(adapter).to_lowercase().contains(&name.to_lowercase()))
-    };
-    all.iter().find(matches).cloned().ok_or_else(|| {
-        let found = all.iter().map(name_of).collect::<Vec<_>>().join(", ");
-        GpuError::NoAdapter {
-            wanted: wanted.as_ref().map(|name| format!(" named {name:?}")).unwrap_or_default(),
-            found: if found.is_empty() { "none".into() } else { found },
-        }
+    let all = best_first().await;
+    let names: Vec<_> = all.iter().map(|adapter| adapter.get_info().name).collect();
+    Ok(all[place_of(wanted.as_deref(), &names)?].clone())
+}
+
+/// Returns the place of the first adapter with the wanted name. A part of the name is enough, in any case.
+fn place_of(wanted: Option<&str>, names: &[String]) -> Result<usize, GpuError> {
+    let part = wanted.unwrap_or_default().to_lowercase();
+    names.iter().position(|name| name.to_lowercase().contains(&part)).ok_or_else(|| {
+        let wanted = wanted.map(|name| format!(" named {name:?}")).unwrap_or_default();
+        let found = if names.is_empty() { "none".to_owned() } else { names.join(", ") };
+        GpuError::NoAdapter(format!("{wanted}; found: {found}"))
     })
 }
 
@@ -82,5 +82,17 @@ mod tests {
         };
         assert_eq!(best_first(false), [DiscreteGpu, IntegratedGpu, VirtualGpu, Other, Cpu]);
         assert_eq!(best_first(true)[..2], [IntegratedGpu, DiscreteGpu]);
+    }
+
+    #[test]
+    fn a_part_of_a_name_in_any_case_chooses_an_adapter() {
+        let names = ["Iris Xe", "llvmpipe (LLVM 15)"].map(str::to_owned);
+        assert_eq!(
+            [None, Some("xe"), Some("LLVMPIPE")].map(|name| place_of(name, &names)),
+            [Ok(0), Ok(0), Ok(1)]
+        );
+        let why = |names: &[String]| place_of(Some("no such"), names).unwrap_err().to_string();
+        assert_eq!(why(&names), r#"no GPU adapter named "no such"; found: Iris Xe, llvmpipe (LLVM 15)"#);
+        assert_eq!(why(&[]), r#"no GPU adapter named "no such"; found: none"#);
     }
 }

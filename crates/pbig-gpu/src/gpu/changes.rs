@@ -5,7 +5,7 @@
 
 use super::upload::PIECE;
 use crate::layout::{BoxChange, DeviceBox, FilterChange, Motion, WAS_ABSENT};
-use pbig_core::{Aabb, ChangeRequest, ChangedBox, ProxyFilter, internal as parallel};
+use pbig_core::{Aabb, ChangedBox, ProxyFilter, internal as parallel};
 use std::ops::Range;
 
 /// The changes since the last update.
@@ -16,15 +16,9 @@ pub(super) struct Changes<'a> {
     /// Filters now, by id.
     pub(super) filters: &'a [ProxyFilter],
     pub(super) changed: &'a [ChangedBox],
-    /// Number of pairs at the last update.
-    pub(super) kept: u64,
 }
 
-impl<'a> Changes<'a> {
-    pub(super) fn of(&ChangeRequest { boxes, filters, changed, kept, .. }: &ChangeRequest<'a>) -> Self {
-        Self { boxes, filters, changed, kept }
-    }
-
+impl Changes<'_> {
     /// Returns true if the device treats a changed box as new.
     ///
     /// - The box has left its old place. Otherwise the cells between both places could be all there are; so no box

@@ -8,35 +8,18 @@ use pbig_core::DeviceFailure;
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum GpuError {
-    /// There is no adapter, or none of the wanted name.
-    #[error("no GPU adapter{wanted}; found: {found}")]
-    NoAdapter {
-        /// The wanted name, in words.
-        wanted: String,
-        /// The adapters that exist.
-        found: String,
-    },
+    /// There is no adapter, or none of the wanted name: the name in words, and those that exist.
+    #[error("no GPU adapter{0}")]
+    NoAdapter(String),
     /// `WGPU_BACKEND` has this value, which names no API that wgpu knows, so no adapter is looked for.
     #[error("no GPU adapter: WGPU_BACKEND={0:?} names no API (known: vulkan, metal, dx12, gl)")]
     UnknownApi(String),
-    /// The adapter refused to open a device.
-    #[error("the adapter {adapter} opened no device: {why}")]
-    NoDevice {
-        /// The adapter.
-        adapter: String,
-        /// The adapter's message.
-        why: String,
-    },
-    /// A limit of the device is below that of every WebGPU device.
-    #[error("the device allows {found} {what}, but {needed} are needed")]
-    TooLimited {
-        /// The limit's name.
-        what: &'static str,
-        /// The device's value.
-        found: u64,
-        /// The value that pbig needs.
-        needed: u64,
-    },
+    /// The adapter refused to open a device, for this reason.
+    #[error("the adapter opened no device: {0}")]
+    NoDevice(String),
+    /// A limit of the device is below that of every WebGPU device: the limit, and the value that pbig needs.
+    #[error("the device allows {0}")]
+    TooLimited(String),
     /// The device was lost, before or during the call.
     #[error("the device was lost")]
     Lost,
@@ -68,16 +51,9 @@ pub enum GpuError {
     /// The device returned words that break the pair format.
     #[error(transparent)]
     Decode(#[from] DecodeError),
-    /// The device failed a short while ago, and calls wait before they try it again.
-    #[error("the device failed {ago:?} ago ({why}); it is tried again after {pause:?}")]
-    Paused {
-        /// Time since the failure.
-        ago: std::time::Duration,
-        /// The failure.
-        why: String,
-        /// See [`crate::GpuOptions::pause`].
-        pause: std::time::Duration,
-    },
+    /// The device failed a short while ago, and calls wait before they try it again ([`crate::GpuOptions::pause`]).
+    #[error("the device failed {0}")]
+    Paused(String),
 }
 
 /// Reason why a search on a device ended early.

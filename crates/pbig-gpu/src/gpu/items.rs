@@ -29,12 +29,9 @@ pub(super) fn cut(all: Chunk, [small, large]: [u32; 2]) -> Vec<Chunk> {
 
 /// Returns the work items of a chunk that begins with the first ones, and of the chunks after it, as one.
 pub(super) fn covered(done: &Chunk, others: &[Chunk]) -> Chunk {
-    let mut all = Chunk { small_items: done.small_items, large_items: done.large_items, ..Chunk::default() };
-    for chunk in others {
-        all.small_items = all.small_items.max(chunk.first_small + chunk.small_items);
-        all.large_items = all.large_items.max(chunk.first_large + chunk.large_items);
-    }
-    all
+    let small_items = done.small_items + others.iter().map(|chunk| chunk.small_items).sum::<u32>();
+    let large_items = done.large_items + others.iter().map(|chunk| chunk.large_items).sum::<u32>();
+    Chunk { small_items, large_items, ..Chunk::default() }
 }
 
 #[cfg(test)]

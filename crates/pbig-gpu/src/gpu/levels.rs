@@ -3,7 +3,7 @@
 //! From the smallest boxes on, sizes share a level until a box as large as the next size would lie over too many of the
 //! level's boxes. The largest boxes have no level if they are few: they go into the last level's single cell.
 
-use crate::pbig::{OVERSIZE_CLASS, Summary};
+use crate::pbig::{OVERSIZE_CLASS, SizeClass, Summary};
 
 /// Maximum number of boxes of a level, spread evenly, that may lie in the space of a box. Of 4, 8, 16, 32 and 64, this
 /// one led to the fewest entries and tests on twelve sets of mixed sizes.
@@ -20,19 +20,8 @@ const EXTENT_ALLOWANCE: f32 = 1.0 + 1.0 / 128.0;
 pub(super) struct SizeRange {
     /// First and last size class ([`Summary::classes`]).
     pub(super) classes: (usize, usize),
-    pub(super) boxes: u32,
-    /// Largest extent on each axis, rounded up.
-    pub(super) max_extent: [f32; 3],
-}
-
-impl SizeRange {
-    fn joined(&self, larger: &Self) -> Self {
-        Self {
-            classes: (self.classes.0, larger.classes.1),
-            boxes: self.boxes + larger.boxes,
-            max_extent: std::array::from_fn(|k| self.max_extent[k].max(larger.max_extent[k])),
-        }
-    }
+    /// All of these boxes. Extents are rounded up.
+    pub(super) all: SizeClass,
 }
 
 /// Returns the levels, finest first. Boxes larger than those of the last level have none.
@@ -42,16 +31,17 @@ pub(super) fn levels(summary: &Summary) -> Vec<SizeRange> {
     for range in used_classes(summary) {
         match levels.last_mut() {
             Some(level) if under_a_box(level, &range, lengths) <= MOST_UNDER_A_BOX => {
-                *level = level.joined(&range);
+                level.classes.1 = range.classes.1;
+                level.all.add(&range.all);
             }
             _ => levels.push(range),
         }
     }
     let mut left = MOST_WITHOUT_LEVEL;
     while let [_, .., last] = levels[..]
-        && last.boxes <= left
+        && last.all.boxes <= left
     {
-        left -= last.boxes;
+        left -= last.all.boxes;
         levels.pop();
     }
     levels
@@ -65,49 +55,15 @@ fn used_classes(summary: &Summary) -> impl Iterator<Item = SizeRange> {
     let used = summary.classes[..OVERSIZE_CLASS].iter().enumerate().filter(|(_, class)| class.boxes > 0);
     used.map(|(i, class)| SizeRange {
         classes: (i, i),
-        boxes: class.boxes,
-        max_extent: class.max_extent.map(|extent| (extent * EXTENT_ALLOWANCE).next_up().min(f32::MAX)),
+        all: SizeClass {
+            max_extent: class.max_extent.map(|extent| (extent * EXTENT_ALLOWANCE).next_up().min(f32::MAX)),
+            ..*class
+        },
     })
 }
 
 /// Returns the number of boxes of a level, spread evenly over these lengths, that lie in the space of a larger box.
 fn under_a_box(level: &SizeRange, larger: &SizeRange, lengths: [f64; 3]) -> f64 {
-    let share = |k: usize| (f64::from(larger.max_extent[k]) / lengths[k]).min(1.0);
-    f64::from(level.boxes) * (0..3).map(share).product::<f64>()
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use pbig_core::Aabb;
-
-    fn lattice(n: u32, step: f32, half: f32) -> Vec<Aabb> {
-        let at = |i: u32, d: u32| (i / d % n) as f32 * step;
-        (0..n * n * n).map(|i| Aabb::from_center([at(i, 1), at(i, n), at(i, n * n)], [half; 3])).collect()
-    }
-
-    fn boxes_of_levels(boxes: &[Aabb]) -> Vec<u32> {
-        levels(&Summary::of(boxes)).iter().map(|level| level.boxes).collect()
-    }
-
-    #[test]
-    fn boxes_of_one_size_share_a_level_and_few_huge_ones_have_none() {
-        let mut boxes = lattice(20, 1.0, 0.4);
-        assert_eq!(boxes_of_levels(&boxes), [8000]);
-        boxes.push(Aabb::new([-1e4; 3], [1e4; 3]));
-        assert_eq!(boxes_of_levels(&boxes), [8000], "the large box has no level");
-    }
-
-    #[test]
-    fn many_boxes_of_two_sizes_get_two_levels() {
-        let mut boxes = lattice(40, 1.0, 0.0005);
-        boxes.extend(lattice(20, 4.0, 2.0));
-        assert_eq!(boxes_of_levels(&boxes), [64_000, 8000]);
-    }
-
-    #[test]
-    fn no_boxes_have_no_levels() {
-        assert!(boxes_of_levels(&[]).is_empty());
-        assert!(boxes_of_levels(&[Aabb::new([f32::NEG_INFINITY; 3], [f32::INFINITY; 3]); 3]).is_empty());
-    }
+    let share = |k: usize| (f64::from(larger.all.max_extent[k]) / lengths[k]).min(1.0);
+    f64::from(level.all.boxes) * (0..3).map(share).product::<f64>()
 }

@@ -4,7 +4,7 @@
 //! upload ─► locate ─► visit ─► scan ─► schedule ─► scatter ─► check ─► count, place and rank pairs ─► readback
 //! ```
 //!
-//! A call is one submission and one wait, unless there is more work or output than fits in one chunk, or no plan yet.
+//! A call is one submission and one wait, unless there is more work or output than fits in one chunk.
 //!
 //! `docs/GPU.md` says why it is right and which file has what.
 //! The kernels are in the crate `pbig-shaders`. The module `layout` has the structs that their buffers hold.
@@ -14,15 +14,14 @@ mod attempts;
 mod changes;
 mod chunk;
 mod coding;
-mod declined;
-mod device;
 mod error;
+mod gpu_device;
+mod gpu_plan;
 mod items;
 mod job;
 mod kept_plan;
 mod levels;
 mod passes;
-mod plan;
 mod readback;
 mod search;
 mod session;
@@ -35,24 +34,21 @@ mod upload;
 #[cfg_attr(target_arch = "wasm32", path = "wait_web.rs")]
 mod wait;
 
-pub use adapter::{adapters, adapters_async, describe};
+pub use adapter::{adapters, describe};
 use error::Failure;
 pub use error::GpuError;
-pub use plan::GpuPlan;
+use gpu_plan::GpuPlan;
 #[cfg(not(target_arch = "wasm32"))]
 pub use several::GpuFinders;
 
 use crate::GpuOptions;
-use device::GpuDevice;
+use gpu_device::GpuDevice;
+use job::Job;
 use pbig_core::internal::Clock;
 use pbig_core::{ChangeRequest, DeviceFailure, DeviceFound, PairDevice, SearchRequest};
-use search::{Search, search};
+use search::search;
 use session::Session;
 use std::sync::Arc;
-use std::time::Duration;
-
-/// Time that a call waits for a device of the app that was busy for too long.
-const PROBE: Duration = Duration::from_millis(10);
 
 /// The origin of a finder's device. It tells where to look for another one when the device is lost.
 #[derive(Clone, Debug)]
@@ -91,26 +87,10 @@ impl GpuFinder {
     /// # Errors
     /// If there is no adapter, or if it gives no device that the kernels can run on.
     pub fn new() -> Result<Self, GpuError> {
-        Self::open(None)
+        wait::block_on(Self::open_async())
     }
 
-    /// Opens a device on the first adapter whose name contains `name`, in any case.
-    ///
-    /// # Errors
-    /// As [`GpuFinder::new`].
-    pub fn on_adapter(name: &str) -> Result<Self, GpuError> {
-        Self::open(Some(name.to_owned()))
-    }
-
-    /// Opens a device on the given adapter, see [`adapters`].
-    ///
-    /// # Errors
-    /// If the adapter gives no device that the kernels can run on.
-    pub fn on(adapter: &wgpu::Adapter) -> Result<Self, GpuError> {
-        wait::block_on(Self::on_async(adapter))
-    }
-
-    /// Opens a device on the best adapter, without blocking. In a browser this is the way, with [`GpuFinder::find_all_async`].
+    /// Opens a device as [`GpuFinder::new`], without blocking. In a browser this is the way, with [`GpuFinder::find_all_async`].
     ///
     /// # Errors
     /// As [`GpuFinder::new`].
@@ -118,12 +98,13 @@ impl GpuFinder {
         Ok(Self::with(Source::Own(None), GpuDevice::on(&adapter::choose(None).await?).await?))
     }
 
-    /// Opens a device on the given adapter, without blocking.
+    /// Opens a device on the given adapter, see [`adapters`].
     ///
     /// # Errors
-    /// As [`GpuFinder::on`].
-    pub async fn on_async(adapter: &wgpu::Adapter) -> Result<Self, GpuError> {
-        Ok(Self::with(Source::Own(Some(adapter.get_info().name)), GpuDevice::on(adapter).await?))
+    /// If the adapter gives no device that the kernels can run on.
+    pub fn on(adapter: &wgpu::Adapter) -> Result<Self, GpuError> {
+        let device = wait::block_on(GpuDevice::on(adapter))?;
+        Ok(Self::with(Source::Own(Some(adapter.get_info().name)), device))
     }
 
     /// Uses the app's own device, which is never replaced: after its loss, calls run on the CPU.
@@ -132,13 +113,6 @@ impl GpuFinder {
     /// [`GpuError::TooLimited`] if the device allows less than WebGPU guarantees.
     pub fn from_device(device: wgpu::Device, queue: wgpu::Queue) -> Result<Self, GpuError> {
         Ok(Self::with(Source::Given, GpuDevice::new(device, queue)?))
-    }
-
-    fn open(name: Option<String>) -> Result<Self, GpuError> {
-        wait::block_on(async {
-            let device = GpuDevice::on(&adapter::choose(name.as_deref()).await?).await?;
-            Ok::<_, GpuError>(Self::with(Source::Own(name), device))
-        })
     }
 
     fn with(source: Source, device: GpuDevice) -> Self {
@@ -194,7 +168,7 @@ impl GpuFinder {
         request: &SearchRequest<'_>,
         found: &mut DeviceFound,
     ) -> Result<(), DeviceFailure> {
-        self.run(&Search::all(request), found).await.map_err(Failure::for_core)
+        self.run(&Job::all(request), found).await.map_err(Failure::for_core)
     }
 
     /// Finds the pairs that an update has changed, as [`PairDevice::find_changed`], without blocking.
@@ -206,13 +180,13 @@ impl GpuFinder {
         request: &ChangeRequest<'_>,
         found: &mut DeviceFound,
     ) -> Result<(), DeviceFailure> {
-        self.run(&Search::changes(request), found).await.map_err(Failure::for_core)
+        self.run(&Job::changes(request), found).await.map_err(Failure::for_core)
     }
 
     /// Runs a search, and notes how it went.
-    async fn run(&mut self, request: &Search<'_>, found: &mut DeviceFound) -> Result<(), Failure> {
+    async fn run(&mut self, job: &Job<'_>, found: &mut DeviceFound) -> Result<(), Failure> {
         self.check_pause()?;
-        let result = self.try_run(request, found).await;
+        let result = self.try_run(job, found).await;
         self.failed = match &result {
             // Another call in the page is in progress.
             Err(Failure::Device(GpuError::Busy)) => self.failed.take(),
@@ -223,16 +197,16 @@ impl GpuFinder {
     }
 
     /// Runs a search in a session that is kept unless the device failed: its state may be wrong then, or if the call was given up.
-    async fn try_run(&mut self, request: &Search<'_>, found: &mut DeviceFound) -> Result<(), Failure> {
+    async fn try_run(&mut self, job: &Job<'_>, found: &mut DeviceFound) -> Result<(), Failure> {
         let mut session = self.take_session().await?;
         let (device, pairs) = (session.device.clone(), std::mem::take(&mut found.pairs));
-        let result = device.watch(async || search(&mut session, request, pairs).await).await;
+        let result = device.watch(async || search(&mut session, job, pairs).await).await;
         let result = result.map(|answer| {
             *found = answer;
-            session.end_call(found, request.kept());
+            session.end_call();
         });
         match result {
-            Err(Failure::TooManyPairs | Failure::Declined(_)) => session.uploaded.forget_motions(),
+            Err(Failure::TooManyPairs | Failure::Declined(_)) => session.forget_call(),
             Ok(()) | Err(Failure::Device(GpuError::Busy)) => {}
             Err(Failure::Device(_)) => return result,
         }
@@ -245,7 +219,9 @@ impl GpuFinder {
         let pause = self.options.pause;
         let Some((clock, why)) = &self.failed else { return Ok(()) };
         match clock.time() {
-            Some(ago) if ago < pause => Err(GpuError::Paused { ago, why: why.clone(), pause }),
+            Some(ago) if ago < pause => {
+                Err(GpuError::Paused(format!("{ago:?} ago ({why}); it is tried again after {pause:?}")))
+            }
             _ => Ok(()),
         }
     }
@@ -261,22 +237,14 @@ impl GpuFinder {
 
     /// Returns the device, or another one if it was lost.
     async fn open_device(&mut self) -> Result<Arc<GpuDevice>, GpuError> {
-        if let Some(device) = self.device.take_if(|device| device.is_lost()) {
-            self.session = None;
-            // An app's device may only have been busy for too long.
-            if matches!(self.source, Source::Given) && device.is_idle_within(PROBE) {
-                device.take_back();
-            }
-            self.device = Some(device).filter(|_| matches!(self.source, Source::Given));
+        if let Some(device) = self.device.as_ref().filter(|device| !device.is_lost()) {
+            return Ok(device.clone());
         }
-        let device = match (&self.device, &self.source) {
-            (Some(device), _) if device.is_lost() => return Err(GpuError::Lost),
-            (Some(device), _) => device.clone(),
-            (None, Source::Shared) => GpuDevice::shared().await?,
-            (None, Source::Own(name)) => {
-                Arc::new(GpuDevice::on(&adapter::choose(name.as_deref()).await?).await?)
-            }
-            (None, Source::Given) => return Err(GpuError::Lost),
+        self.session = None;
+        let device = match &self.source {
+            Source::Shared => GpuDevice::shared().await?,
+            Source::Own(name) => Arc::new(GpuDevice::on(&adapter::choose(name.as_deref()).await?).await?),
+            Source::Given => return Err(GpuError::Lost),
         };
         Ok(self.device.insert(device).clone())
     }
@@ -288,7 +256,7 @@ impl PairDevice for GpuFinder {
         request: &SearchRequest<'_>,
         found: &mut DeviceFound,
     ) -> Result<(), DeviceFailure> {
-        wait::block_on(self.run(&Search::all(request), found)).map_err(Failure::for_core)
+        wait::block_on(self.run(&Job::all(request), found)).map_err(Failure::for_core)
     }
 
     /// The device has each box now and at the last update (`shaders/shared/search_changes.wgsl`). So transfers in both
@@ -298,12 +266,12 @@ impl PairDevice for GpuFinder {
         request: &ChangeRequest<'_>,
         found: &mut DeviceFound,
     ) -> Result<(), DeviceFailure> {
-        wait::block_on(self.run(&Search::changes(request), found)).map_err(Failure::for_core)
+        wait::block_on(self.run(&Job::changes(request), found)).map_err(Failure::for_core)
     }
 
     fn forget(&mut self) {
         if let Some(session) = &mut self.session {
-            session.uploaded.forget_motions();
+            session.storage.known = None;
         }
     }
 

@@ -1,20 +1,17 @@
 //! The kernels and buffers of a submission, as tables.
 
 use super::GpuError;
-use super::device::Variant;
+use super::gpu_device::Variant;
 use super::storage::{BufferId, Side, Storage};
 use crate::layout::{
     self, CELLS_PER_BLOCK, COUNTS_PER_BLOCK, Cell, Counters, GROUPS_PER_ROW, LANES, LargeItem, Located,
-    MEASURE_GROUPS, Params, SHORT_ROW, SORTED, Slot, SmallItem, Totals, WINDOW,
+    Params, SHORT_ROW, SORTED, Slot, SmallItem, Totals, WINDOW,
 };
 use pbig_core::Pair;
 use pbig_shaders::{self as shaders, Buffer, Kernel};
 
 /// Maximum number of kernels in one submission. Each takes two timestamps.
 pub(super) const MAX_PASSES: u32 = 24;
-
-/// Bytes of the counts of size classes.
-pub(super) const CLASSES_BYTES: u64 = 256 * 16;
 
 /// The number of workgroups of a kernel.
 #[derive(Clone, Copy, Debug)]
@@ -53,12 +50,6 @@ pub(super) fn apply_changes(params: &Params) -> [Step; 2] {
 /// Returns the bytes of a bit for each box.
 pub(super) fn changed_bytes(boxes: u32) -> u64 {
     4 * u64::from(boxes.div_ceil(32))
-}
-
-/// Returns the steps that count the boxes of each size.
-pub(super) fn measure(params: &Params) -> [Step; 2] {
-    let groups = params.boxes.div_ceil(LANES).min(MEASURE_GROUPS);
-    [Clear(Buffer::Classes, CLASSES_BYTES), Run(&shaders::MEASURE, Direct(groups))]
 }
 
 /// Returns the steps that turn boxes into work items, without a round trip to the host, check the first of these, and sort
@@ -198,13 +189,8 @@ pub(super) struct Recording<'a> {
     pub(super) passes: Vec<&'static Kernel>,
 }
 
-/// A kernel that is ready to run.
-struct Ready {
-    kernel: &'static Kernel,
-    pipeline: wgpu::ComputePipeline,
-    bind_group: wgpu::BindGroup,
-    groups: Groups,
-}
+/// A kernel with its number of workgroups and its choices.
+type Dispatch = (&'static Kernel, Groups, Variant);
 
 impl Recording<'_> {
     /// Records steps: first everything that is cleared, then the kernels. They share a pass, unless each is timed.
@@ -217,45 +203,38 @@ impl Recording<'_> {
                     self.encoder.clear_buffer(buffer, 0, Some(bytes));
                 }
                 Run(_, Direct(0)) => {}
-                Run(kernel, groups) => kernels.push(self.ready(kernel, groups, self.variant)),
-                RunOnRows(kernel, groups) => {
-                    kernels.push(self.ready(kernel, groups, self.variant.of_rows()));
-                }
+                Run(kernel, groups) => kernels.push((kernel, groups, self.variant)),
+                RunOnRows(kernel, groups) => kernels.push((kernel, groups, self.variant.of_rows())),
             }
         }
-        self.passes.extend(kernels.iter().map(|ready| ready.kernel));
         let Some(query_set) = self.queries else {
             return self.run(&kernels, None);
         };
-        for (i, kernel) in (0u32..).zip(&kernels) {
-            let (beginning, end) = (Some(2 * i), Some(2 * i + 1));
+        for kernel in kernels {
+            let at = 2 * self.passes.len() as u32;
             let writes = wgpu::ComputePassTimestampWrites {
                 query_set,
-                beginning_of_pass_write_index: beginning,
-                end_of_pass_write_index: end,
+                beginning_of_pass_write_index: Some(at),
+                end_of_pass_write_index: Some(at + 1),
             };
-            self.run(std::slice::from_ref(kernel), Some(writes));
+            self.run(&[kernel], Some(writes));
         }
     }
 
-    fn ready(&mut self, kernel: &'static Kernel, groups: Groups, variant: Variant) -> Ready {
-        let pipeline = self.storage.device.pipeline(kernel, variant);
-        let bind_group = self.storage.bind_group(kernel, variant, self.side, &pipeline);
-        Ready { kernel, pipeline, bind_group, groups }
-    }
-
     /// Records a pass.
-    fn run(&mut self, kernels: &[Ready], timestamp_writes: Option<wgpu::ComputePassTimestampWrites<'_>>) {
+    fn run(&mut self, kernels: &[Dispatch], timestamp_writes: Option<wgpu::ComputePassTimestampWrites<'_>>) {
         let descriptor = wgpu::ComputePassDescriptor { label: Some("pbig"), timestamp_writes };
         let mut pass = self.encoder.begin_compute_pass(&descriptor);
-        for Ready { kernel, pipeline, bind_group, groups } in kernels {
+        for &(kernel, groups, variant) in kernels {
+            let pipeline = self.storage.device.pipeline(kernel, variant);
             pass.insert_debug_marker(kernel.name);
-            pass.set_pipeline(pipeline);
-            pass.set_bind_group(0, bind_group, &[]);
-            match *groups {
+            pass.set_pipeline(&pipeline);
+            pass.set_bind_group(0, &self.storage.bind_group(kernel, variant, self.side, &pipeline), &[]);
+            match groups {
                 Direct(n) => pass.dispatch_workgroups(n.min(GROUPS_PER_ROW), n.div_ceil(GROUPS_PER_ROW), 1),
                 Indirect(buffer, at) => pass.dispatch_workgroups_indirect(self.storage.get(buffer), at),
             }
+            self.passes.push(kernel);
         }
     }
 }

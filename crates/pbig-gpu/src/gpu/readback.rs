@@ -1,6 +1,6 @@
 //! Readback: copies the output of a submission to the host.
 
-use super::device::GpuDevice;
+use super::gpu_device::GpuDevice;
 use super::passes::{MAX_PASSES, Recording};
 use super::storage::BufferId;
 use super::{GpuError, wait};

@@ -5,92 +5,46 @@
 //! each block is searched with all others.
 
 use super::GpuError;
-use super::changes::Changes;
-use super::declined::Declined;
 use super::error::Failure;
 use super::job::{Input, Job};
 use super::session::{Session, Sizes};
 use super::sink::Sink;
 use crate::layout::{BOX_BITS, DeviceBox, Motion, ordered};
 use crate::pbig::sampled;
-use pbig_core::{Aabb, ChangeRequest, DeviceFound, Pair, ProxyFilter, SearchRequest};
+use pbig_core::{Aabb, DeviceFound, Pair};
 
 /// Maximum number of boxes of one cell: their work items, 2^17 rows by 2^17 / 8 groups of 8 columns, fit 32 bits.
 const MAX_BOXES_PER_CELL: u64 = 1 << 25;
+const _: () = assert!(MAX_BOXES_PER_CELL <= 1 << BOX_BITS, "an entry names each box");
 
 /// Fewest boxes of a part that is split further because a list was too large.
 const MIN_SPLIT_BOXES: usize = 256;
 
-/// A search for all pairs or for changes.
-#[derive(Clone, Copy)]
-pub(super) struct Search<'a> {
-    /// The boxes now.
-    boxes: &'a [Aabb],
-    filters: Option<&'a [ProxyFilter]>,
-    /// The changes; none in a search for all pairs.
-    changes: Option<Changes<'a>>,
-    is_sorted: bool,
-    max_pairs: u64,
-}
-
-impl<'a> Search<'a> {
-    pub(super) fn all(request: &SearchRequest<'a>) -> Self {
-        let &SearchRequest { boxes, filters, is_sorted, max_pairs } = request;
-        Self { boxes, filters, changes: None, is_sorted, max_pairs }
-    }
-
-    pub(super) fn changes(request: &ChangeRequest<'a>) -> Self {
-        let &ChangeRequest { boxes, filters, max_pairs, .. } = request;
-        let (filters, changes) = (Some(filters), Some(Changes::of(request)));
-        Self { boxes, filters, changes, is_sorted: true, max_pairs }
-    }
-
-    /// Returns the number of pairs at the last update.
-    pub(super) fn kept(&self) -> u64 {
-        self.changes.map_or(0, |changes| changes.kept)
-    }
-
-    /// Returns the job of all boxes at once.
-    fn whole(&self, all_pairs_up_to: u32) -> Job<'a> {
-        Job {
-            boxes: self.boxes,
-            input: self.changes.map_or(Input::Boxes, Input::Changes),
-            filters: self.filters,
-            split: 0,
-            needs_grid: self.boxes.len() > all_pairs_up_to as usize,
-            is_sorted: self.is_sorted,
-        }
-    }
-
-    /// Returns the most boxes that fit every buffer, and an entry's bits.
-    fn max_boxes(&self, session: &Session) -> usize {
-        let largest = if self.changes.is_some() { size_of::<Motion>() } else { size_of::<DeviceBox>() };
-        let by_bytes = session.storage.max_buffer_bytes / largest as u64;
-        by_bytes.min(1 << BOX_BITS).min(MAX_BOXES_PER_CELL) as usize
-    }
+/// Returns the most boxes that fit every buffer.
+fn max_boxes(job: &Job<'_>, session: &Session) -> usize {
+    let largest = if job.changed().is_some() { size_of::<Motion>() } else { size_of::<DeviceBox>() };
+    let by_bytes = session.storage.max_buffer_bytes / largest as u64;
+    by_bytes.min(MAX_BOXES_PER_CELL) as usize
 }
 
 /// Searches in as few parts as fit. The result uses the memory of `pairs`.
 pub(super) async fn search(
     session: &mut Session,
-    request: &Search<'_>,
+    job: &Job<'_>,
     mut pairs: Vec<Pair>,
 ) -> Result<DeviceFound, Failure> {
-    if let Some(why) = session.declined.unseen(request.boxes.len()) {
-        return Err(Failure::Declined(why));
-    }
     // First, while the boxes are in the cache.
-    let restarted = request.changes.map_or_else(Vec::new, |changes| changes.restarted());
-    let len = request.boxes.len();
+    let restarted = job.changed().map_or_else(Vec::new, |changes| changes.restarted());
+    let len = job.boxes.len();
     // The lists of a set say nothing about a set of another size.
     session.split = session.split.filter(|&(split, _)| split / 2 <= len && len / 2 <= split);
-    let mut most = request.max_boxes(session).min(session.split.map_or(usize::MAX, |(_, most)| most));
+    let mut most = max_boxes(job, session).min(session.split.map_or(usize::MAX, |(_, most)| most));
     loop {
-        let mut sink = Sink::new(std::mem::take(&mut pairs), request.max_pairs, request.kept());
+        session.sink = Sink::new(std::mem::take(&mut pairs), job.max_pairs);
         let result = if len <= most {
-            search_whole(session, request, &mut sink).await
+            search_whole(session, job).await
         } else {
-            search_parts(session, request, most, &mut sink).await
+            search_parts(session, job, most).await
         };
         match result {
             // Only the device knew the length of the list that was too large. Fewer boxes make it shorter.
@@ -100,43 +54,32 @@ pub(super) async fn search(
                 // A set that was too large says nothing about its parts.
                 (session.sizes, session.plan) = (Sizes::default(), None);
                 // The device may have gone on to the new boxes.
-                session.uploaded.forget_motions();
-            }
-            Err(Failure::Declined(why)) => {
-                session.declined.note(len, &why);
-                return Err(Failure::Declined(why));
+                session.storage.known = None;
             }
             Err(failure) => return Err(failure),
             Ok(()) => {
-                session.declined = Declined::default();
-                sink.found.restarted = restarted;
-                return Ok(sink.end());
+                session.sink.found.restarted = restarted;
+                return Ok(std::mem::take(&mut session.sink).end());
             }
         }
     }
 }
 
-async fn search_whole(session: &mut Session, request: &Search<'_>, sink: &mut Sink) -> Result<(), Failure> {
-    if request.boxes.len() < 2 {
-        sink.found.valid = request.boxes.iter().filter(|one| one.is_valid()).count() as u32;
+async fn search_whole(session: &mut Session, job: &Job<'_>) -> Result<(), Failure> {
+    if job.boxes.len() < 2 {
+        session.sink.found.valid = job.valid();
         return Ok(());
     }
-    session.run(&request.whole(session.options.all_pairs_up_to), sink).await
+    session.run(job).await
 }
 
-async fn search_parts(
-    session: &mut Session,
-    request: &Search<'_>,
-    most: usize,
-    sink: &mut Sink,
-) -> Result<(), Failure> {
-    let bounds = request.changes.map(|changes| changes.bounds());
-    let bounds = bounds.as_deref().unwrap_or(request.boxes);
-    let (sorted, axis) = sorted(bounds);
-    let parts = parts(bounds, &sorted, axis, most / 2);
+async fn search_parts(session: &mut Session, job: &Job<'_>, most: usize) -> Result<(), Failure> {
+    let bounds = job.bounds();
+    let (sorted, axis) = sorted(&bounds);
+    let parts = parts(&bounds, &sorted, axis, most / 2);
     // The device gets one part after the other.
-    session.uploaded.forget_motions();
-    let motions = request.changes.map(|changes| changes.motions(0..request.boxes.len()));
+    session.storage.known = None;
+    let motions = job.changed().map(|changes| changes.motions(0..job.boxes.len()));
     for part in &parts {
         let ids: Vec<u32> = [part.first, part.second].concat();
         let split = if part.second.is_empty() { 0 } else { part.first.len() as u32 };
@@ -144,20 +87,20 @@ async fn search_parts(
         if motions.as_ref().is_some_and(|motions| motions.iter().all(|motion| motion.now == motion.before)) {
             continue;
         }
-        let (boxes, filters) = (of_ids(request.boxes, &ids), request.filters.map(|all| of_ids(all, &ids)));
+        let (boxes, filters) = (of_ids(&bounds, &ids), job.filters.map(|all| of_ids(all, &ids)));
         let input = motions.as_deref().map_or(Input::Boxes, Input::Motions);
         let filters = filters.as_deref();
-        let (found, ended) = (sink.found.pairs.len(), sink.found.ended.len());
-        let job = Job { boxes: &boxes, input, filters, split, needs_grid: true, is_sorted: false };
+        let (found, ended) = (session.sink.found.pairs.len(), session.sink.found.ended.len());
+        let part = Job { boxes: &boxes, input, filters, split: Some(split), is_sorted: false, ..*job };
         // Each part lies elsewhere.
         session.plan = None;
-        session.run(&job, sink).await?;
-        name_pairs(&mut sink.found.pairs[found..], &ids);
-        name_pairs(&mut sink.found.ended[ended..], &ids);
+        session.run(&part).await?;
+        name_pairs(&mut session.sink.found.pairs[found..], &ids);
+        name_pairs(&mut session.sink.found.ended[ended..], &ids);
     }
     session.plan = None;
-    sink.found.valid = sorted.len() as u32;
-    sink.found.report.parts = parts.len() as u32;
+    session.sink.found.valid = sorted.len() as u32;
+    session.sink.found.report.parts = parts.len() as u32;
     Ok(())
 }
 
@@ -179,14 +122,18 @@ struct Part<'a> {
     second: &'a [u32],
 }
 
-/// Returns the ids of the valid boxes, sorted along the axis on which they are spread most, and that axis.
-pub(super) fn sorted(boxes: &[Aabb]) -> (Vec<u32>, usize) {
-    let sample = sampled(boxes);
+/// Returns the axis on which boxes are spread most, as the sample tells.
+pub(super) fn widest_axis(sample: &[Aabb]) -> usize {
     let width = |k: usize| {
         let ends = sample.iter().map(|b| b.min[k]);
         ends.clone().fold(f32::MIN, f32::max) - ends.fold(f32::MAX, f32::min)
     };
-    let axis = (0..3).max_by(|&j, &k| width(j).total_cmp(&width(k))).unwrap_or(0);
+    (0..3).max_by(|&j, &k| width(j).total_cmp(&width(k))).unwrap_or(0)
+}
+
+/// Returns the ids of the valid boxes, sorted along the axis on which they are spread most, and that axis.
+fn sorted(boxes: &[Aabb]) -> (Vec<u32>, usize) {
+    let axis = widest_axis(&sampled(boxes));
     let mut ids: Vec<u32> = (0..boxes.len() as u32).filter(|&id| boxes[id as usize].is_valid()).collect();
     ids.sort_unstable_by_key(|&id| (ordered(boxes[id as usize].min[axis]), id));
     (ids, axis)
@@ -210,7 +157,6 @@ fn parts<'a>(boxes: &[Aabb], ids: &'a [u32], axis: usize, size: usize) -> Vec<Pa
 mod tests {
     use super::*;
     use pbig_core::oracle;
-    use std::collections::BTreeSet;
 
     #[test]
     fn every_overlapping_pair_is_in_exactly_one_part() {
@@ -219,24 +165,19 @@ mod tests {
             .collect();
         boxes.push(Aabb::new([f32::NEG_INFINITY; 3], [f32::INFINITY; 3]));
         boxes.push(Aabb::NOWHERE);
+        let overlap = |pair: &Pair| boxes[pair.a as usize].overlaps(&boxes[pair.b as usize]);
         for size in [1, 7, 50, 1000] {
             let (ids, axis) = sorted(&boxes);
             assert_eq!((ids.len(), axis), (301, 0));
             let mut found = Vec::new();
-            for part in parts(&boxes, &ids, axis, size) {
-                let pairs = |one: &[u32], other: &[u32]| -> Vec<(u32, u32)> {
-                    one.iter().flat_map(|&a| other.iter().map(move |&b| (a.min(b), a.max(b)))).collect()
-                };
-                let own = pairs(part.first, part.first).into_iter().filter(|(a, b)| a < b);
-                let own: BTreeSet<_> = if part.second.is_empty() { own.collect() } else { BTreeSet::new() };
-                found.extend(own);
-                found.extend(pairs(part.first, part.second));
+            for Part { first, second } in parts(&boxes, &ids, axis, size) {
+                for (i, &a) in first.iter().enumerate() {
+                    let others = if second.is_empty() { &first[i + 1..] } else { second };
+                    found.extend(others.iter().map(|&b| Pair::new(a, b)).filter(overlap));
+                }
             }
-            let overlap = |&(a, b): &(u32, u32)| boxes[a as usize].overlaps(&boxes[b as usize]);
-            let mut overlapping: Vec<_> = found.into_iter().filter(overlap).collect();
-            overlapping.sort_unstable();
-            let wanted: Vec<_> = oracle::pairs(&boxes).iter().map(|p| (p.a, p.b)).collect();
-            assert_eq!(overlapping, wanted, "blocks of {size}");
+            found.sort_unstable();
+            assert_eq!(found, oracle::pairs(&boxes), "blocks of {size}");
         }
     }
 }

@@ -1,25 +1,22 @@
 //! The state of a finder on a device, and what happens before a search: upload, plan, choice of the coding.
 
-use super::coding::{Counted, bits_that_fit};
-use super::declined::Declined;
-use super::device::GpuDevice;
+use super::coding::coding_flag;
 use super::error::Failure;
+use super::gpu_device::GpuDevice;
 use super::job::{Input, Job};
 use super::kept_plan::KeptPlan;
 use super::readback::Timestamps;
 use super::sink::Sink;
 use super::storage::Storage;
-use super::upload::UploadCache;
+use super::upload::{upload_all, upload_changes};
 use super::{GpuError, GpuPlan};
 use crate::decode::pair_count;
-use crate::layout::{BITS, COUNTED, Counters, DeviceBox, FILTERED, LANES, Params, RAW, SORTED};
+use crate::layout::{BITS, COUNTED, Counters, FILTERED, LANES, Params, SORTED};
 use crate::pbig::Summary;
 use crate::policy::WIDEST_ITEM;
-use crate::policy::allowed_by_wish;
 use crate::{Coding, GpuOptions};
-use pbig_core::{DeviceFound, DeviceReport, internal::Clock};
+use pbig_core::{DeviceReport, internal::Clock};
 use std::sync::Arc;
-use std::time::Duration;
 
 /// Maximum number of words of output per changed box that are prefetched: four pairs. The output of a burst of pairs
 /// says nothing about an update with few changes.
@@ -36,6 +33,8 @@ const MAX_CELLS: u64 = 1 << 28;
 pub(super) struct Sizes {
     /// Lengths of the lists of the map in the last call.
     pub(super) lists: Counters,
+    /// Number of pairs of the last search.
+    pub(super) pairs: u64,
     /// Expected words of output of a chunk: these are prefetched.
     pub(super) expected_words: u64,
     /// Maximum number of words of a chunk of this job.
@@ -49,25 +48,21 @@ pub(super) struct Session {
     pub(super) device: Arc<GpuDevice>,
     pub(super) options: GpuOptions,
     pub(super) storage: Storage,
-    pub(super) uploaded: UploadCache,
     pub(super) timestamps: [Option<Timestamps>; 2],
     pub(super) sizes: Sizes,
-    /// Counts of the last search.
-    pub(super) counted: Counted,
     pub(super) plan: Option<KeptPlan>,
-    /// Factor on the cell size: smaller while cells hold too many boxes.
-    pub(super) cell_factor: f32,
     /// Number of boxes of a set that needed parts, and of its parts, until the next window of [`Storage::end_call`].
     pub(super) split: Option<(usize, usize)>,
-    pub(super) declined: Declined,
     /// This job searches for changes instead of all overlaps.
     pub(super) finds_changes: bool,
     /// Changes were uploaded that no submission has applied yet.
     pub(super) has_pending_changes: bool,
     /// Entries of this job's map, once fetched.
     pub(super) table: Option<Vec<u32>>,
-    /// Time of the host in this job, recording and submitting.
-    pub(super) recording: Duration,
+    /// Parameters of this job.
+    pub(super) params: Params,
+    /// Pairs and counts of this call so far.
+    pub(super) sink: Sink,
 }
 
 impl Session {
@@ -75,68 +70,56 @@ impl Session {
         Ok(Self {
             options: *options,
             storage: Storage::new(device.clone(), options),
-            uploaded: UploadCache::default(),
             timestamps: [Timestamps::new(&device, options)?, Timestamps::new(&device, options)?],
             sizes: Sizes::default(),
-            counted: Counted::default(),
             plan: None,
-            cell_factor: 1.0,
             split: None,
-            declined: Declined::default(),
             finds_changes: false,
             has_pending_changes: false,
             table: None,
-            recording: Duration::ZERO,
+            params: Params::default(),
+            sink: Sink::default(),
             device,
         })
     }
 
-    /// Notes the end of a call, which is one job or several. Makes the cells of the next search finer if these held far
-    /// too many boxes, coarser if they were nearly empty.
-    pub(super) fn end_call(&mut self, found: &DeviceFound, kept: u64) {
-        const TOO_FULL: u64 = 64;
-        const NEARLY_EMPTY: u64 = 4;
+    /// Notes the end of a call, which is one job or several.
+    pub(super) fn end_call(&mut self) {
         if self.storage.end_call() {
             self.split = None;
         }
-        if found.plan.is_none() {
-            return;
-        }
-        let pairs = (found.pairs.len() + found.ended.len()) as u64;
-        let useful_tests = (u64::from(found.valid) + kept.max(pairs)).max(1);
-        let factor = match found.checks.made / useful_tests {
-            0..NEARLY_EMPTY => (self.cell_factor * 2.0).min(1.0),
-            NEARLY_EMPTY..=TOO_FULL => self.cell_factor,
-            _ => (self.cell_factor * 0.5).max(1.0 / 64.0),
-        };
-        if factor != self.cell_factor {
-            (self.cell_factor, self.plan) = (factor, None);
-        }
     }
 
-    pub(super) async fn run(&mut self, job: &Job<'_>, sink: &mut Sink) -> Result<(), Failure> {
-        let params = self.upload(job, &mut sink.found.report)?;
-        let result = self.search(job, params, sink).await;
-        sink.found.valid = if job.needs_grid { self.sizes.lists.valid } else { job.valid() };
+    /// Forgets what a call without an answer has left: the device may have gone on to its boxes, and a plan that no search has
+    /// used was made for them.
+    pub(super) fn forget_call(&mut self) {
+        (self.storage.known, self.sink) = (None, Sink::default());
+        self.plan.take_if(|kept| kept.is_new());
+    }
+
+    /// Searches the boxes of a job, and adds its pairs and counts to those of the call.
+    pub(super) async fn run(&mut self, job: &Job<'_>) -> Result<(), Failure> {
+        self.upload(job)?;
+        let result = self.search(job).await;
+        let (found, lists) = (&mut self.sink.found, &self.sizes.lists);
+        let tests = if job.needs_grid(&self.options) {
+            found.valid = lists.valid;
+            found.report.cells += self.plan.as_ref().map_or(0, |kept| u64::from(kept.plan.cells));
+            found.report.entries += u64::from(lists.entries);
+            u64::from(LANES) * u64::from(lists.tests)
+        } else {
+            found.valid = job.valid();
+            pair_count(self.params.boxes)
+        };
         if !self.options.count_tests {
-            sink.found.checks.made += if job.needs_grid {
-                u64::from(LANES) * u64::from(self.sizes.lists.tests)
-            } else {
-                pair_count(params.boxes)
-            };
+            found.checks.made += tests;
         }
-        let report = &mut sink.found.report;
-        if job.needs_grid {
-            report.cells += self.plan.as_ref().map_or(0, |kept| u64::from(kept.plan.cells));
-            report.entries += u64::from(self.sizes.lists.entries);
-        }
-        report.device_bytes = report.device_bytes.max(self.storage.bytes());
-        report.record += std::mem::take(&mut self.recording);
+        found.report.device_bytes = found.report.device_bytes.max(self.storage.bytes());
         result
     }
 
-    /// Uploads the boxes of a job. Returns its parameters, without grid and capacities.
-    fn upload(&mut self, job: &Job<'_>, report: &mut DeviceReport) -> Result<Params, GpuError> {
+    /// Uploads the boxes of a job, and sets its parameters, without grid and capacities.
+    fn upload(&mut self, job: &Job<'_>) -> Result<(), GpuError> {
         self.table = None;
         self.sizes.expected_words = std::mem::take(&mut self.sizes.max_words);
         let is_first = self.sizes.expected_words == 0 && self.sizes.lists == Counters::default();
@@ -147,106 +130,81 @@ impl Session {
         self.sizes.word_capacity = self.sizes.expected_words;
         self.finds_changes = !matches!(job.input, Input::Boxes);
         self.storage.bytes_sent = 0;
-        let mut params = self.params(job);
+        self.params = self.params_of(job);
         let mut clock = Clock::start();
-        let (storage, uploaded, filters) = (&mut self.storage, &mut self.uploaded, job.filters);
+        let (storage, params, filters) = (&mut self.storage, &mut self.params, job.filters);
         match job.input {
-            Input::Boxes if job.needs_grid => {
-                params.flags |= RAW;
-                uploaded.upload_all(storage, job.boxes, filters, &mut params)?;
-            }
-            Input::Boxes => {
-                let boxes: Vec<_> = job.boxes.iter().map(DeviceBox::new).collect();
-                uploaded.upload_all(storage, &boxes, filters, &mut params)?;
-            }
-            Input::Motions(motions) => uploaded.upload_all(storage, motions, filters, &mut params)?,
+            Input::Boxes => upload_all(storage, job.boxes, filters, params)?,
+            Input::Motions(motions) => upload_all(storage, motions, filters, params)?,
             Input::Changes(changes) => {
                 let most = PREFETCHED_WORDS_PER_CHANGE * changes.changed.len() as u64;
                 self.sizes.expected_words = self.sizes.expected_words.min(most);
-                uploaded.upload_changes(storage, changes, &mut params)?;
+                upload_changes(storage, changes, params)?;
             }
         };
+        let report = &mut self.sink.found.report;
         report.uploaded += self.storage.bytes_sent;
         report.upload += clock.lap();
-        self.has_pending_changes = params.known > 0;
-        Ok(params)
+        self.has_pending_changes = self.params.known > 0;
+        Ok(())
     }
 
     /// Returns the bytes of a list whose length no call has told.
-    pub(super) fn first_bytes(&self, boxes: u32) -> u64 {
-        self.options.first_bytes * (u64::from(boxes) + EXTRA_BOXES)
+    pub(super) fn first_bytes(&self) -> u64 {
+        self.options.first_bytes * (u64::from(self.params.boxes) + EXTRA_BOXES)
     }
 
-    fn params(&self, job: &Job<'_>) -> Params {
+    fn params_of(&self, job: &Job<'_>) -> Params {
         let flags = [(job.filters.is_some(), FILTERED), (self.options.count_tests, COUNTED)];
         Params {
             small_cell: self.options.small_cell.clamp(1, LANES),
             // The output of a work item must fit the smallest buffer.
             columns: if self.storage.max_buffer_bytes < 8 << 20 { 1 } else { WIDEST_ITEM },
             flags: flags.into_iter().filter(|(is_set, _)| *is_set).map(|(_, flag)| flag).sum(),
-            split: job.split,
+            split: job.split.unwrap_or(0),
             ..Params::default()
         }
     }
 
-    /// Adds to the parameters of a job what a plan and the coding of the output set.
-    pub(super) async fn with_plan(
-        &mut self,
-        job: &Job<'_>,
-        mut params: Params,
-        report: &mut DeviceReport,
-    ) -> Result<Params, GpuError> {
-        if job.needs_grid {
-            let allowed = allowed_by_wish(self.options.boxes_per_cell);
-            let kept = self.plan(job, &params, report).await?;
-            check_entries(kept, params.boxes)?;
-            params = kept.plan.add_to(params);
-            params.most_tests = kept.most_tests(params.boxes, allowed);
+    /// Adds to the parameters what a plan and the coding of the output set.
+    pub(super) fn add_plan(&mut self, job: &Job<'_>) -> Result<(), GpuError> {
+        if job.needs_grid(&self.options) {
+            self.plan.take_if(|kept| !kept.suits(job.boxes.len()));
+            let (options, max_bytes) = (&self.options, self.storage.max_buffer_bytes);
+            let report = &mut self.sink.found.report;
+            let kept = self.plan.get_or_insert_with(|| new_plan(job, options, max_bytes, report));
+            check_entries(kept, self.params.boxes)?;
+            self.params = kept.plan.add_to(self.params);
+            self.params.most_tests = kept.most_tests(self.params.boxes, options.boxes_per_cell);
         }
-        params.flags |= self.coding_flags(job, &params);
-        Ok(params)
-    }
-
-    /// Returns the plan: the kept one, or one for the boxes that the device has now.
-    async fn plan(
-        &mut self,
-        job: &Job<'_>,
-        params: &Params,
-        report: &mut DeviceReport,
-    ) -> Result<&KeptPlan, GpuError> {
-        let plan = match self.plan.take_if(|kept| kept.suits(job.boxes.len())) {
-            Some(kept) => kept,
-            None => {
-                let classes = self.measure(params, report).await?;
-                let mut clock = Clock::start();
-                let summary = Summary::of_classes(classes, job.boxes);
-                let plan = KeptPlan::new(self.plan_for(&summary), params.boxes, summary.pairs());
-                report.plan += clock.lap();
-                plan
-            }
-        };
-        Ok(self.plan.insert(plan))
-    }
-
-    fn plan_for(&self, summary: &Summary) -> GpuPlan {
-        let max_cells = (self.storage.max_buffer_bytes / 8).min(MAX_CELLS) as u32;
-        GpuPlan::new(summary, &self.options, self.cell_factor, max_cells)
+        self.params.flags |= self.coding_flags(job);
+        Ok(())
     }
 
     /// Returns the flags of the coding: plain pairs where the device sorts, and for changes. These are rarely so many that
     /// records or bits are smaller, and need a mark.
-    fn coding_flags(&self, job: &Job<'_>, params: &Params) -> u32 {
-        let (has_grid, most) = (params.levels > 0, self.storage.max_buffer_bytes);
+    fn coding_flags(&self, job: &Job<'_>) -> u32 {
+        let (params, most) = (&self.params, self.storage.max_buffer_bytes);
+        let has_grid = params.levels > 0;
         let flags = match self.options.coding {
             _ if self.finds_changes => 0,
             // One bit a pair fits the smallest buffer.
             _ if !has_grid && self.sizes.word_capacity > most / 4 => BITS,
             Coding::Auto if job.is_sorted && has_grid => 0,
-            Coding::Auto if job.is_sorted => bits_that_fit(params, most),
-            wanted => self.counted.flag(wanted, params),
+            // The order of bits is that of the pairs.
+            Coding::Auto if job.is_sorted => BITS,
+            wanted => coding_flag(wanted, params, &self.sizes),
         };
         if flags == 0 && has_grid && job.is_sorted { SORTED } else { flags }
     }
+}
+
+fn new_plan(job: &Job<'_>, options: &GpuOptions, max_bytes: u64, report: &mut DeviceReport) -> KeptPlan {
+    let mut clock = Clock::start();
+    let summary = Summary::of(&job.bounds());
+    let plan = GpuPlan::new(&summary, options, (max_bytes / 8).min(MAX_CELLS) as u32);
+    report.plan += clock.lap();
+    KeptPlan::new(plan, job.boxes.len(), summary.pairs())
 }
 
 /// Returns an error if 32 bits might not count the entries of this number of boxes: up to 4 x 4 x 4 in each level but the last.

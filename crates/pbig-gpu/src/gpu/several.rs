@@ -1,9 +1,10 @@
-//! One call on several devices (PBIG section 7): each gets a slab of the boxes, and those that reach into it from before.
+//! One call on several devices (PBIG section 7): each gets a slab of the space, with the boxes that reach into it.
 
-use super::search::{name_pairs, of_ids, sorted};
+use super::search::{name_pairs, of_ids, widest_axis};
 use super::{GpuError, GpuFinder};
 use crate::GpuOptions;
 use crate::layout::ordered;
+use crate::pbig::sampled;
 use pbig_core::{Aabb, ChangeRequest, DeviceFailure, DeviceFound, PairDevice, SearchRequest};
 
 /// Fewest boxes for which a second device is asked.
@@ -12,7 +13,7 @@ const FEWEST_BOXES: usize = 2048;
 /// Several devices that share the boxes of a search for all pairs. Updates go to the first one.
 #[derive(Clone, Debug)]
 pub struct GpuFinders {
-    finders: Vec<GpuFinder>,
+    pub(super) finders: Vec<GpuFinder>,
     name: String,
 }
 
@@ -25,7 +26,7 @@ impl GpuFinders {
     pub fn on_all(adapters: &[wgpu::Adapter]) -> Result<Self, GpuError> {
         let finders: Vec<_> = adapters.iter().map(GpuFinder::on).collect::<Result<_, _>>()?;
         if finders.is_empty() {
-            return Err(GpuError::NoAdapter { wanted: String::new(), found: "none".into() });
+            return Err(GpuError::NoAdapter(String::new()));
         }
         let name = finders.iter().map(GpuFinder::adapter).collect::<Vec<_>>().join(" and ");
         Ok(Self { finders, name })
@@ -37,75 +38,76 @@ impl GpuFinders {
         Self { finders, ..self }
     }
 
-    /// Gives each slab to a device. Returns the answers, whose pairs have the ids of the caller.
-    fn find_slabs(
-        &mut self,
-        request: &SearchRequest<'_>,
-        slabs: &[Slab],
-    ) -> Vec<Result<DeviceFound, DeviceFailure>> {
+    /// Gives a slab to each device. Returns the answers, whose pairs have the ids of the caller.
+    fn find_slabs(&mut self, request: &SearchRequest<'_>) -> Vec<Result<DeviceFound, DeviceFailure>> {
         std::thread::scope(|scope| {
-            let with_finders = slabs.iter().zip(&mut self.finders);
+            let slabs = slabs(request.boxes, self.finders.len()).into_iter();
+            let with_finders = slabs.zip(&mut self.finders);
             let threads: Vec<_> =
-                with_finders.map(|(slab, finder)| scope.spawn(|| slab.find(finder, request))).collect();
+                with_finders.map(|(slab, finder)| scope.spawn(move || slab.find(finder, request))).collect();
             let failed = |_| Err(DeviceFailure::Failed("the thread of a device ended".into()));
             threads.into_iter().map(|thread| thread.join().unwrap_or_else(failed)).collect()
         })
     }
 }
 
-/// The boxes of one device.
+/// The space of one device. A box is the slab's own if its lower corner is there.
 struct Slab {
-    /// Ids of boxes: first those of earlier slabs that reach into this one.
-    ids: Vec<u32>,
-    /// Number of boxes of earlier slabs.
-    earlier: u32,
+    axis: usize,
+    /// First coordinate of the slab, and first one beyond it, in ordered integers.
+    begin: i32,
+    end: i32,
 }
 
 impl Slab {
-    /// Finds the pairs with at least one box of the slab's own. The other pairs belong to earlier slabs.
+    /// Finds the pairs whose later box is the slab's own, among the boxes that reach into the slab.
     fn find(
         &self,
         finder: &mut GpuFinder,
         request: &SearchRequest<'_>,
     ) -> Result<DeviceFound, DeviceFailure> {
-        let boxes = of_ids(request.boxes, &self.ids);
-        let filters = request.filters.map(|all| of_ids(all, &self.ids));
-        let filters = filters.as_deref();
+        let is_own = |id: u32| ordered(request.boxes[id as usize].min[self.axis]) >= self.begin;
+        let ids = self.ids(request.boxes);
+        let (boxes, filters) = (of_ids(request.boxes, &ids), request.filters.map(|all| of_ids(all, &ids)));
+        let part = SearchRequest { boxes: &boxes, filters: filters.as_deref(), is_sorted: false, ..*request };
         let mut found = DeviceFound::default();
-        let part = SearchRequest { boxes: &boxes, filters, is_sorted: false, ..*request };
-        match finder.find_all(&part, &mut found) {
+        finder.find_all(&part, &mut found).map_err(|failure| match failure {
             // Some of them may belong to an earlier slab: the CPU counts exactly.
-            Err(DeviceFailure::TooManyPairs) => {
-                Err(DeviceFailure::Declined("too many pairs in a slab".into()))
-            }
-            Err(failure) => Err(failure),
-            Ok(()) => {
-                found.pairs.retain(|pair| pair.b >= self.earlier);
-                name_pairs(&mut found.pairs, &self.ids);
-                Ok(found)
-            }
-        }
+            DeviceFailure::TooManyPairs => DeviceFailure::Declined("too many pairs in a slab".into()),
+            other => other,
+        })?;
+        name_pairs(&mut found.pairs, &ids);
+        found.pairs.retain(|pair| is_own(pair.a) || is_own(pair.b));
+        found.valid = ids.iter().filter(|&&id| is_own(id)).count() as u32;
+        Ok(found)
+    }
+
+    /// Returns the ids of the valid boxes that reach into the slab.
+    fn ids(&self, boxes: &[Aabb]) -> Vec<u32> {
+        let reaches =
+            |one: &Aabb| ordered(one.min[self.axis]) < self.end && ordered(one.max[self.axis]) >= self.begin;
+        let ids = (0..).zip(boxes).filter(|(_, one)| one.is_valid() && reaches(one));
+        ids.map(|(id, _)| id).collect()
     }
 }
 
-/// Cuts the boxes into slabs with equally many of their own, along the axis on which they are spread most.
+/// Returns slabs with about equally many boxes of their own, along the axis on which they are spread most.
 fn slabs(boxes: &[Aabb], count: usize) -> Vec<Slab> {
-    let (ids, axis) = sorted(boxes);
-    let size = ids.len().div_ceil(count).max(1);
-    let slab = |(i, own): (usize, &[u32])| {
-        let begin = ordered(boxes[own[0] as usize].min[axis]);
-        let reaches = |id: &&u32| ordered(boxes[**id as usize].max[axis]) >= begin;
-        let mut all: Vec<u32> = ids[..i * size].iter().filter(reaches).copied().collect();
-        let earlier = all.len() as u32;
-        all.extend(own);
-        Slab { ids: all, earlier }
-    };
-    ids.chunks(size).enumerate().map(slab).collect()
+    let sample = sampled(boxes);
+    let axis = widest_axis(&sample);
+    let mut corners: Vec<i32> = sample.iter().map(|one| ordered(one.min[axis])).collect();
+    corners.sort_unstable();
+    let inner = (1..count).map(|i| corners.get(i * corners.len() / count).copied().unwrap_or(0));
+    let mut borders: Vec<i32> = [i32::MIN].into_iter().chain(inner).chain([i32::MAX]).collect();
+    // Boxes with one corner are not parted.
+    borders.dedup();
+    borders.windows(2).map(|two| Slab { axis, begin: two[0], end: two[1] }).collect()
 }
 
 /// Adds the answer of a slab to those before it.
 fn add(all: &mut DeviceFound, mut slab: DeviceFound) {
     all.pairs.append(&mut slab.pairs);
+    all.valid += slab.valid;
     all.checks.made += slab.checks.made;
     all.checks.redundant += slab.checks.redundant;
     all.checks.unnecessary += slab.checks.unnecessary;
@@ -128,11 +130,9 @@ impl PairDevice for GpuFinders {
         if self.finders.len() < 2 || request.boxes.len() < FEWEST_BOXES {
             return self.finders[0].find_all(request, found);
         }
-        let slabs = slabs(request.boxes, self.finders.len());
-        for answer in self.find_slabs(request, &slabs) {
+        for answer in self.find_slabs(request) {
             add(found, answer?);
         }
-        found.valid = slabs.iter().map(|slab| slab.ids.len() as u32 - slab.earlier).sum();
         let is_too_many = found.pairs.len() as u64 > request.max_pairs;
         if is_too_many { Err(DeviceFailure::TooManyPairs) } else { Ok(()) }
     }

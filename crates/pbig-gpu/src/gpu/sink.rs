@@ -7,23 +7,22 @@ use pbig_shaders::{Kernel, Stage};
 use std::time::Duration;
 
 /// The pairs and counts of a search so far.
+#[derive(Debug, Default)]
 pub(super) struct Sink {
     pub(super) found: DeviceFound,
     /// Words of output so far.
     pub(super) words: u64,
-    /// The caller's limit of pairs.
-    pub(super) limit: u64,
-    /// Number of kept pairs in a search for changes. As many may be removed without counting against the limit.
-    pub(super) kept: u64,
+    /// Maximum number of pairs.
+    max_pairs: u64,
 }
 
 impl Sink {
     /// Returns an empty result with the memory of `pairs`.
-    pub(super) fn new(mut pairs: Vec<Pair>, limit: u64, kept: u64) -> Self {
+    pub(super) fn new(mut pairs: Vec<Pair>, max_pairs: u64) -> Self {
         pairs.clear();
         let mut found = DeviceFound::default();
         (found.pairs, found.report.parts) = (pairs, 1);
-        Self { found, words: 0, limit, kept }
+        Self { found, words: 0, max_pairs }
     }
 
     /// Notes the grid. Of several parts the last one's is reported.
@@ -38,13 +37,12 @@ impl Sink {
     }
 
     pub(super) fn left(&self) -> u64 {
-        self.limit.saturating_add(self.kept).saturating_sub(self.pairs())
+        self.max_pairs.saturating_sub(self.pairs())
     }
 
     /// Returns an error if `more` pairs are too many, or those so far.
     pub(super) fn check(&self, more: u64) -> Result<(), Failure> {
-        let limit = self.limit.saturating_add(self.kept);
-        if self.pairs().saturating_add(more) > limit { Err(Failure::TooManyPairs) } else { Ok(()) }
+        if self.pairs().saturating_add(more) > self.max_pairs { Err(Failure::TooManyPairs) } else { Ok(()) }
     }
 
     /// Adds the counts of a chunk with this number of words of output. A device counts tests only if it was told to.

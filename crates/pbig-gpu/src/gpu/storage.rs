@@ -2,7 +2,7 @@
 //! are hardly used. Lists go up through one staging buffer, which stays mapped between calls: the host copies each list once.
 
 use super::GpuError;
-use super::device::{GpuDevice, Variant};
+use super::gpu_device::{GpuDevice, Variant};
 use crate::GpuOptions;
 use bytemuck::Pod;
 use pbig_core::internal::{self as parallel, threads_for};
@@ -93,15 +93,6 @@ impl<'a> Upload<'a> {
     }
 }
 
-/// A copy from the staging buffer that the next submission makes.
-#[derive(Clone, Copy, Debug)]
-struct PendingCopy {
-    from: u64,
-    buffer: Buffer,
-    to: u64,
-    bytes: u64,
-}
-
 #[derive(Debug)]
 struct KeptBuffer {
     buffer: wgpu::Buffer,
@@ -117,10 +108,13 @@ pub(super) struct Storage {
     pub(super) max_buffer_bytes: u64,
     /// Bytes written since the last reset.
     pub(super) bytes_sent: u64,
+    /// Number of boxes of the last update that the device has now and before; none if it has not seen that update.
+    pub(super) known: Option<usize>,
     buffers: HashMap<BufferId, KeptBuffer>,
     /// The host may write into the staging buffer.
     is_staging_mapped: Arc<AtomicBool>,
-    pending_copies: Vec<PendingCopy>,
+    /// Copies from the staging buffer, which the next submission makes.
+    pub(super) copies: Option<wgpu::CommandEncoder>,
     /// Bind groups of the present buffers.
     bind_groups: HashMap<(&'static str, Variant, Side), wgpu::BindGroup>,
     calls: u32,
@@ -128,18 +122,15 @@ pub(super) struct Storage {
 
 impl Storage {
     pub(super) fn new(device: Arc<GpuDevice>, options: &GpuOptions) -> Self {
-        let max_buffer_bytes = device.max_buffer_bytes(options);
-        let (buffers, bind_groups) = (HashMap::new(), HashMap::new());
-        let (is_staging_mapped, pending_copies) = (Arc::default(), Vec::new());
-        let bytes_sent = 0;
         Self {
+            max_buffer_bytes: device.max_buffer_bytes(options),
             device,
-            max_buffer_bytes,
-            bytes_sent,
-            buffers,
-            is_staging_mapped,
-            pending_copies,
-            bind_groups,
+            bytes_sent: 0,
+            known: None,
+            buffers: HashMap::new(),
+            is_staging_mapped: Arc::default(),
+            copies: None,
+            bind_groups: HashMap::new(),
             calls: 0,
         }
     }
@@ -196,7 +187,7 @@ impl Storage {
     /// Writes lists into the staging buffer, from where the next submission copies them into their buffers.
     pub(super) fn stage(&mut self, uploads: &[Upload<'_>]) -> Result<(), GpuError> {
         // A call that failed before it was submitted leaves copies behind.
-        self.pending_copies.clear();
+        self.copies = None;
         let bytes: u64 = uploads.iter().map(|upload| aligned(upload.len())).sum();
         if bytes > self.max_buffer_bytes {
             // Each list fits a buffer, but not all together.
@@ -207,7 +198,7 @@ impl Storage {
             return Ok(());
         }
         self.map_staging(bytes)?;
-        let pieces = self.plan_copies(uploads);
+        let pieces = self.record_copies(uploads);
         let staging = self.get(BufferId::UploadStaging);
         let has_failed = AtomicBool::new(false);
         parallel::run(threads_for(pieces.len()), pieces.len(), |_, i| {
@@ -226,16 +217,18 @@ impl Storage {
         Ok(())
     }
 
-    /// Gives each list a place in the staging buffer, and cuts it into pieces that threads copy.
-    fn plan_copies<'a>(&mut self, uploads: &[Upload<'a>]) -> Vec<(u64, &'a [u8])> {
+    /// Gives each list a place in the staging buffer, and records its copy. Returns the pieces that threads write there.
+    fn record_copies<'a>(&mut self, uploads: &[Upload<'a>]) -> Vec<(u64, &'a [u8])> {
         let (mut pieces, mut from) = (Vec::new(), 0);
-        for upload in uploads {
-            let (buffer, to, bytes) = (upload.buffer, upload.at, upload.len());
-            self.pending_copies.push(PendingCopy { from, buffer, to, bytes });
-            let starts = (from..).step_by(PIECE_BYTES);
-            pieces.extend(starts.zip(upload.bytes.chunks(PIECE_BYTES)));
+        let mut encoder = self.device.encoder();
+        let staging = self.get(BufferId::UploadStaging);
+        for upload in uploads.iter().filter(|upload| upload.len() > 0) {
+            let (to, bytes) = (self.get(upload.buffer), upload.len());
+            encoder.copy_buffer_to_buffer(staging, from, to, upload.at, bytes);
+            pieces.extend((from..).step_by(PIECE_BYTES).zip(upload.bytes.chunks(PIECE_BYTES)));
             from = aligned(from + bytes);
         }
+        self.copies = Some(encoder);
         pieces
     }
 
@@ -249,16 +242,6 @@ impl Storage {
             self.is_staging_mapped = Arc::new(AtomicBool::new(true));
         }
         Ok(())
-    }
-
-    /// Records the copies out of the staging buffer. Returns true if there are any.
-    pub(super) fn record_copies(&mut self, encoder: &mut wgpu::CommandEncoder) -> bool {
-        let copies = std::mem::take(&mut self.pending_copies);
-        for copy in copies.iter().filter(|copy| copy.bytes > 0) {
-            let (staging, to) = (self.get(BufferId::UploadStaging), self.get(copy.buffer));
-            encoder.copy_buffer_to_buffer(staging, copy.from, to, copy.to, copy.bytes);
-        }
-        !copies.is_empty()
     }
 
     /// Asks for the staging buffer back once the device has made its copies: the wait for the submission maps it.

@@ -1,7 +1,7 @@
 //! For tests: faults, single pipelines, plans.
 
-pub use super::device::Fault;
-use super::device::Variant;
+pub use super::gpu_device::Fault;
+use super::gpu_device::Variant;
 use super::{GpuError, GpuFinder, GpuPlan, wait};
 use crate::GpuOptions;
 use crate::layout::Params;
@@ -11,7 +11,15 @@ use pbig_shaders::Kernel;
 
 /// Returns the kernels' parameters for a grid of the boxes with at most `max_cells` cells. Only what the plan sets is filled in.
 pub fn plan_params(boxes: &[Aabb], options: &GpuOptions, max_cells: u32) -> Params {
-    GpuPlan::new(&Summary::of(boxes), options, 1.0, max_cells).add_to(Params::default())
+    GpuPlan::new(&Summary::of(boxes), options, max_cells).add_to(Params::default())
+}
+
+#[cfg(not(target_arch = "wasm32"))]
+impl super::GpuFinders {
+    /// Makes the last of the devices fail after this number of submissions.
+    pub fn inject(&self, fault: Fault, submissions: u32) {
+        self.finders.last().into_iter().for_each(|finder| finder.inject(fault, submissions));
+    }
 }
 
 impl GpuFinder {

@@ -16,53 +16,37 @@ use pbig_shaders::Buffer;
 /// Fewest elements for a thread: 10 us of work.
 pub(super) const PIECE: usize = 1 << 14;
 
-/// The boxes, now and before, that the device has.
-#[derive(Debug, Default)]
-pub(super) struct UploadCache {
-    /// Number of boxes of the last update; none if the device has not seen it.
-    motions: Option<usize>,
+/// Uploads all boxes, or boxes now and before, whatever the device has. Sets the number of boxes in `params`.
+pub(super) fn upload_all<T: Pod>(
+    storage: &mut Storage,
+    boxes: &[T],
+    filters: Option<&[ProxyFilter]>,
+    params: &mut Params,
+) -> Result<(), GpuError> {
+    storage.known = None;
+    params.boxes = boxes.len() as u32;
+    make_room(storage, size_of_val(boxes), filters.map_or(0, size_of_val), params.boxes)?;
+    let filters = filters.unwrap_or(&[]);
+    storage.stage(&[Upload::new(Buffer::Boxes, 0, boxes), Upload::new(Buffer::Filters, 0, filters)])
 }
 
-/// Each upload sets the lengths of the lists in `params`.
-impl UploadCache {
-    /// Forgets which motions the device has: the next search for changes uploads all boxes.
-    pub(super) fn forget_motions(&mut self) {
-        self.motions = None;
+/// Uploads the changes, or all boxes to a device that does not have those of the last update. Sets the lengths of the lists in
+/// `params`.
+pub(super) fn upload_changes(
+    storage: &mut Storage,
+    changes: Changes<'_>,
+    params: &mut Params,
+) -> Result<(), GpuError> {
+    let (boxes, filters) = (changes.boxes.len(), changes.filters);
+    params.boxes = boxes as u32;
+    let (bytes, filter_bytes) = (boxes * size_of::<Motion>(), size_of_val(filters));
+    let has_lost_content = make_room(storage, bytes, filter_bytes, params.boxes)?;
+    match storage.known.filter(|_| !has_lost_content) {
+        Some(known) => send_lists(storage, changes, known.min(boxes), params)?,
+        None => upload_all(storage, &changes.motions(0..boxes), Some(filters), params)?,
     }
-
-    /// Uploads all boxes, or boxes now and before, whatever the device has.
-    pub(super) fn upload_all<T: Pod>(
-        &mut self,
-        storage: &mut Storage,
-        boxes: &[T],
-        filters: Option<&[ProxyFilter]>,
-        params: &mut Params,
-    ) -> Result<(), GpuError> {
-        self.motions = None;
-        params.boxes = boxes.len() as u32;
-        make_room(storage, size_of_val(boxes), filters.map_or(0, size_of_val), params.boxes)?;
-        let filters = filters.unwrap_or(&[]);
-        storage.stage(&[Upload::new(Buffer::Boxes, 0, boxes), Upload::new(Buffer::Filters, 0, filters)])
-    }
-
-    /// Uploads the changes, or all boxes to a device that does not have those of the last update.
-    pub(super) fn upload_changes(
-        &mut self,
-        storage: &mut Storage,
-        changes: Changes<'_>,
-        params: &mut Params,
-    ) -> Result<(), GpuError> {
-        let (boxes, filters) = (changes.boxes.len(), changes.filters);
-        params.boxes = boxes as u32;
-        let (bytes, filter_bytes) = (boxes * size_of::<Motion>(), size_of_val(filters));
-        let has_lost_content = make_room(storage, bytes, filter_bytes, params.boxes)?;
-        match self.motions.filter(|_| !has_lost_content) {
-            Some(known) => send_lists(storage, changes, known.min(boxes), params)?,
-            None => self.upload_all(storage, &changes.motions(0..boxes), Some(filters), params)?,
-        }
-        self.motions = Some(boxes);
-        Ok(())
-    }
+    storage.known = Some(boxes);
+    Ok(())
 }
 
 /// Makes the buffers of boxes. Returns true if one of them has lost its content.

@@ -1,7 +1,7 @@
 //! Waiting for the device in a program: the thread blocks, so futures here are ready at once.
 
 use super::GpuError;
-use super::device::{Fault, GpuDevice};
+use super::gpu_device::{Fault, GpuDevice};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::mpsc;
 use std::time::Duration;
@@ -41,16 +41,11 @@ pub(super) async fn map(
 }
 
 impl GpuDevice {
+    /// Returns true if the device finishes all its work, and an empty submission, within a second.
     pub(super) fn is_alive(&self) -> bool {
-        self.is_idle_within(Duration::from_secs(1))
-    }
-
-    /// Returns true if the device finishes all its work, and an empty submission, in time.
-    pub(super) fn is_idle_within(&self, limit: Duration) -> bool {
         let scope = self.handle.push_error_scope(wgpu::ErrorFilter::Validation);
-        let encoder = self.handle.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
-        let submission = self.queue.submit([encoder.finish()]);
-        let finished = self.poll(submission, limit).is_ok();
+        let submission = self.queue.submit([self.encoder().finish()]);
+        let finished = self.poll(submission, Duration::from_secs(1)).is_ok();
         let refused = pollster::block_on(scope.pop()).is_some();
         finished && !refused
     }

@@ -1,7 +1,7 @@
 //! Waiting for the device in a page, where nothing may block: the browser calls back.
 
 use super::GpuError;
-use super::device::{GpuDevice, lock};
+use super::gpu_device::{GpuDevice, lock};
 use std::future::poll_fn;
 use std::sync::atomic::Ordering;
 use std::sync::{Arc, Mutex};
@@ -58,10 +58,5 @@ impl GpuDevice {
     /// Returns true: a lost device does not refuse commands, but it maps no buffer.
     pub(super) fn is_alive(&self) -> bool {
         true
-    }
-
-    /// Returns false: the page would have to wait to find out.
-    pub(super) fn is_idle_within(&self, _: Duration) -> bool {
-        false
     }
 }

@@ -25,15 +25,15 @@ const MAX_CELL: f64 = 1073741824.0;
 
 /// The levels and cells of a search on a GPU.
 #[derive(Clone, Debug, PartialEq)]
-pub struct GpuPlan {
+pub(super) struct GpuPlan {
     /// Edge of the cells of the finest level, in the boxes' length unit.
-    pub cell: f32,
+    pub(super) cell: f32,
     /// Lower corner of cell 0, in the boxes' length unit: the middle of most boxes.
-    pub origin: [f32; 3],
+    origin: [f32; 3],
     /// Number of cells of all levels.
-    pub cells: u32,
+    pub(super) cells: u32,
     /// Levels, finest first. The last has one cell.
-    pub(crate) levels: Vec<Level>,
+    pub(super) levels: Vec<Level>,
 }
 
 /// `4097 cells, 16 x 16 x 16 of 1.5`.
@@ -50,14 +50,12 @@ impl fmt::Display for GpuPlan {
 
 impl GpuPlan {
     /// Plans the grid for the boxes behind `summary`, with at most `max_cells` cells.
-    ///
-    /// `cell_factor` scales the cells: 1, or less where earlier cells held too many boxes.
-    pub(crate) fn new(summary: &Summary, options: &GpuOptions, cell_factor: f32, max_cells: u32) -> Self {
+    pub(super) fn new(summary: &Summary, options: &GpuOptions, max_cells: u32) -> Self {
         let split = levels(summary);
         // The coarsest levels are kept if there are too many: finer boxes then share the first of these.
         let split = &split[split.len().saturating_sub(MAX_LEVELS - 1)..];
         let (space, low) = space_of(summary, &ordinary(summary));
-        let edges = split.iter().map(|level| edge(level, summary, space, options, cell_factor));
+        let edges = split.iter().map(|level| edge(level, summary, space, options));
         let (cell, shifts) = powers_of_two(&edges.collect::<Vec<_>>(), split, space);
         let mut plan = Self {
             cell: cell as f32,
@@ -68,7 +66,7 @@ impl GpuPlan {
         for (shift, level) in shifts {
             let share = max_cells.saturating_sub(1) / split.len().max(1) as u32;
             let most =
-                (f64::from(level.boxes) * CELLS_PER_BOX).max(MIN_CELLS_PER_LEVEL).min(f64::from(share));
+                (f64::from(level.all.boxes) * CELLS_PER_BOX).max(MIN_CELLS_PER_LEVEL).min(f64::from(share));
             plan.push(dims(space, cell * f64::from(shift).exp2(), most), shift);
         }
         plan.push([1; 3], 0);
@@ -81,7 +79,7 @@ impl GpuPlan {
     }
 
     /// Returns the kernels' parameters with those that the plan sets.
-    pub(crate) fn add_to(&self, params: Params) -> Params {
+    pub(super) fn add_to(&self, params: Params) -> Params {
         let scale = (1.0 / f64::from(self.cell)) as f32;
         let reach = 0.99 * MAX_CELL / f64::from(scale);
         let bound = |k: usize, sign: f64| {
@@ -105,29 +103,22 @@ impl GpuPlan {
 
 /// Returns the cell size of a level: by the cell rule on its boxes alone, but such that its largest box touches few
 /// cells on each axis.
-fn edge(
-    level: &SizeRange,
-    summary: &Summary,
-    space: [f32; 3],
-    options: &GpuOptions,
-    cell_factor: f32,
-) -> f64 {
+fn edge(level: &SizeRange, summary: &Summary, space: [f32; 3], options: &GpuOptions) -> f64 {
     let of_level = |b: &&Aabb| (level.classes.0..=level.classes.1).contains(&size_class_of(b.extents()));
     let sample: Vec<Aabb> = summary.sample.iter().filter(of_level).copied().collect();
     let wanted = options.boxes_per_cell.max(1.0);
     let cell = if sample.is_empty() {
-        cell_size(CellRule::Density, &sample, level.boxes, space, wanted)
+        cell_size(CellRule::Density, &sample, level.all.boxes, space, wanted)
     } else {
         // A quarter of the sample is enough: equation 6 is evaluated on it 24 times.
         let quarter: Vec<Aabb> = sample.iter().step_by(4).copied().collect();
-        cell_size(options.cell_rule, &quarter, level.boxes, space, wanted)
+        cell_size(options.cell_rule, &quarter, level.all.boxes, space, wanted)
     };
-    let largest = level.max_extent.into_iter().fold(0.0, f32::max);
+    let largest = level.all.max_extent.into_iter().fold(0.0, f32::max);
     // A box crosses at most one border more than it has cell lengths, and one more by rounding.
     let smallest = f64::from(largest) * 1.001 / f64::from(MAX_SPAN - 2);
-    let even = f64::from(cell) * f64::from(cell_factor);
-    with_limited_occupancy(&sample, level.boxes, even, smallest, OCCUPANCY_LIMIT * f64::from(wanted))
-        .max(smallest)
+    let most = OCCUPANCY_LIMIT * f64::from(wanted);
+    with_limited_occupancy(&sample, level.all.boxes, f64::from(cell), smallest, most).max(smallest)
 }
 
 /// Returns a cell size at which a box has at most `most` other boxes in its cell, as the sample tells.
@@ -197,23 +188,4 @@ fn dims(space: [f32; 3], cell: f64, most: f64) -> [u32; 3] {
         *longest = (*longest * 3 / 4).max(FEWEST_CELLS);
     }
     dims
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// A cover barely wider than the scene is in the sample, because the first box always is.
-    #[test]
-    fn a_cover_around_the_scene_does_not_add_cells() {
-        let at = |i: u32, d: u32| (i / d % 80) as f32 * 1.3;
-        let cubes = (0..512_000).map(|i| Aabb::from_center([at(i, 1), at(i, 80), at(i, 6400)], [0.5; 3]));
-        let with = |half: f32| {
-            let cover = Aabb::from_center([52.0; 3], [half; 3]);
-            let boxes: Vec<_> = std::iter::once(cover).chain(cubes.clone()).collect();
-            GpuPlan::new(&Summary::of(&boxes), &GpuOptions::DEFAULT, 1.0, 1 << 28).cells
-        };
-        let [small, cover] = [0.5, 53.0].map(with);
-        assert!(cover.abs_diff(small) < small / 10, "{cover} cells, {small} without a cover");
-    }
 }

@@ -6,11 +6,11 @@ use pbig_harness::corpus::difference;
 
 /// A way of the device to find pairs.
 #[derive(Debug)]
-pub(crate) struct Mode {
-    pub(crate) name: &'static str,
-    pub(crate) finds_changes: bool,
+pub(super) struct Mode {
+    pub(super) name: &'static str,
+    pub(super) finds_changes: bool,
     /// Maximum number of boxes that the mode can take, or can take in seconds.
-    pub(crate) most_boxes: usize,
+    pub(super) most_boxes: usize,
     coding: Coding,
     /// The caller wants the pairs in order.
     is_sorted: bool,
@@ -33,7 +33,7 @@ const PLAIN: Mode = Mode {
 };
 
 /// Every mode.
-pub(crate) const MODES: &[Mode] = &[
+pub(super) const MODES: &[Mode] = &[
     PLAIN,
     Mode { name: "sorted", is_sorted: true, comes_sorted: true, coding: Coding::Auto, ..PLAIN },
     Mode { name: "records", coding: Coding::Packed, ..PLAIN },
@@ -45,14 +45,14 @@ pub(crate) const MODES: &[Mode] = &[
 ];
 
 impl Mode {
-    pub(crate) fn options(&self) -> GpuOptions {
+    pub(super) fn options(&self) -> GpuOptions {
         let all_pairs_up_to = if self.has_grid { 0 } else { 1024 };
         GpuOptions { coding: self.coding, chunk: self.chunk, all_pairs_up_to, ..GpuOptions::DEFAULT }
     }
 }
 
 /// Compares the device's pairs with the oracle's, without and with filters. Returns their number.
-pub(crate) async fn check(gpu: &mut GpuFinder, mode: &Mode, boxes: &[Aabb]) -> Result<usize, String> {
+pub(super) async fn check(gpu: &mut GpuFinder, mode: &Mode, boxes: &[Aabb]) -> Result<usize, String> {
     let filters = filters(boxes.len());
     let all = find(gpu, mode, boxes, None).await?;
     compare(&all, &oracle::pairs(boxes))?;
@@ -62,7 +62,7 @@ pub(crate) async fn check(gpu: &mut GpuFinder, mode: &Mode, boxes: &[Aabb]) -> R
 }
 
 /// Makes filters that put every seventh box into one body, and even and odd boxes into groups.
-pub(crate) fn filters(n: usize) -> Vec<ProxyFilter> {
+pub(super) fn filters(n: usize) -> Vec<ProxyFilter> {
     let filter =
         |id: u32| ProxyFilter { body: id % 7, memberships: 1 + id % 2, mask: 3 - id % 3, ..ProxyFilter::ALL };
     (0..n as u32).map(filter).collect()
@@ -83,6 +83,6 @@ async fn find(
     Ok(found.pairs)
 }
 
-pub(crate) fn compare(found: &[Pair], wanted: &[Pair]) -> Result<(), String> {
+fn compare(found: &[Pair], wanted: &[Pair]) -> Result<(), String> {
     difference(found, wanted).map_or(Ok(()), Err)
 }

@@ -98,10 +98,8 @@ impl GpuDevice {
             memory_hints: wgpu::MemoryHints::MemoryUsage,
             ..Default::default()
         };
-        let name = || adapter.get_info().name;
         let opened = adapter.request_device(&descriptor).await;
-        let (device, queue) =
-            opened.map_err(|why| GpuError::NoDevice { adapter: name(), why: why.to_string() })?;
+        let (device, queue) = opened.map_err(|why| GpuError::NoDevice(why.to_string()))?;
         Self::new(device, queue)
     }
 
@@ -216,6 +214,10 @@ impl GpuDevice {
         Ok(self.handle.create_buffer(&descriptor))
     }
 
+    pub(super) fn encoder(&self) -> wgpu::CommandEncoder {
+        self.handle.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("pbig") })
+    }
+
     pub(super) fn submit(&self, encoder: wgpu::CommandEncoder) -> wgpu::SubmissionIndex {
         if self.is_due(Fault::LoseDevice) {
             self.handle.destroy();
@@ -224,10 +226,6 @@ impl GpuDevice {
             *left = left.saturating_sub(1);
         }
         self.queue.submit([encoder.finish()])
-    }
-
-    pub(super) fn take_back(&self) {
-        self.is_lost.store(false, Ordering::Relaxed);
     }
 
     /// Marks the device as lost, because its state is unknown.
@@ -258,7 +256,9 @@ fn check_limits(limits: &wgpu::Limits) -> Result<(), GpuError> {
         ("bytes a buffer", limits.max_buffer_size, 1 << 20),
     ];
     match needs.into_iter().find(|&(_, found, needed)| found < needed) {
-        Some((what, found, needed)) => Err(GpuError::TooLimited { what, found, needed }),
+        Some((what, found, needed)) => {
+            Err(GpuError::TooLimited(format!("{found} {what}, but {needed} are needed")))
+        }
         None => Ok(()),
     }
 }

@@ -4,8 +4,8 @@
 //! A kernel streams bytes, and reaches places of tables in no order. A place that misses the cache costs a line, and one that
 //! is changed costs its way back too. A table that fits the cache is free.
 
-use crate::layout::{CELLS_PER_BLOCK, Cell, DeviceBox, LANES, Located, SHORT_ROW, Slot, SmallItem};
 use pbig_core::Pair;
+use pbig_gpu::layout::{CELLS_PER_BLOCK, Cell, DeviceBox, LANES, Located, SHORT_ROW, Slot, SmallItem};
 
 /// The counts of a call, as the report has them.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -51,9 +51,6 @@ pub const GPUS: [Gpu; 4] = [
     Gpu { name: "Iris", bandwidth: 68.0, bus: None, cache: 4e6, line: 64.0, atomics: 0.3e9 },
 ];
 
-/// A discrete GPU and an integrated one, for the bytes of a box.
-pub const CLASSES: [Gpu; 2] = [GPUS[1], GPUS[3]];
-
 /// Share of the bandwidth that kernels reach.
 const REACHED: f64 = 0.6;
 /// Milliseconds for a dispatch, and for a submission and its wait.
@@ -62,26 +59,22 @@ const CALL_MS: f64 = 0.15;
 /// Dispatches of a sorted search. wgpu adds one for each indirect one.
 const DISPATCHES: f64 = 17.0 + 7.0;
 
-/// Memory accesses of a kernel.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Traffic {
-    /// Name of the kernel, or of a copy.
-    pub name: &'static str,
+/// Memory accesses of a kernel, or of a copy.
+struct Traffic {
     /// Bytes read and written in order.
-    pub streamed: f64,
+    streamed: f64,
     /// Accesses in no order.
-    pub scattered: f64,
-    /// Bytes of the table that these go to.
-    pub table: f64,
-    /// Bytes of such an access.
-    pub element: f64,
+    scattered: f64,
+    /// Bytes of such an access, and of the table that it goes to.
+    element: f64,
+    table: f64,
     /// Ways of a line: 1 for reads, 2 for changes.
-    pub ways: f64,
+    ways: f64,
 }
 
 impl Traffic {
-    fn streams(name: &'static str, streamed: f64) -> Self {
-        Self { name, streamed, scattered: 0.0, table: 0.0, element: 0.0, ways: 1.0 }
+    fn streams(streamed: f64) -> Self {
+        Self { streamed, scattered: 0.0, table: 0.0, element: 0.0, ways: 1.0 }
     }
 
     fn and_reads(self, scattered: f64, element: f64, table: f64) -> Self {
@@ -89,11 +82,11 @@ impl Traffic {
     }
 
     fn and_changes(self, scattered: f64, element: f64, table: f64) -> Self {
-        Self { scattered, element, table, ways: 2.0, ..self }
+        Self { ways: 2.0, ..self.and_reads(scattered, element, table) }
     }
 
     /// Returns the bytes that the memory of a GPU moves.
-    pub fn bytes(&self, gpu: &Gpu) -> f64 {
+    fn bytes(&self, gpu: &Gpu) -> f64 {
         // An element at any multiple of its size may lie across two lines.
         let lines = 1.0 + (self.element - 4.0) / gpu.line;
         let misses = (1.0 - gpu.cache / self.table.max(1.0)).max(0.0);
@@ -124,34 +117,34 @@ impl Counts {
         self.items().max(self.boxes / groups).max((self.longest_row / groups).ceil())
     }
 
-    /// Returns the accesses of each kernel.
-    pub fn traffic(&self) -> Vec<Traffic> {
+    /// Returns the accesses of the upload, each kernel and the readback, in their order.
+    fn traffic(&self) -> [Traffic; 14] {
         let &Self { boxes: n, entries: e, pairs: p, .. } = self;
         let (cells, rows) = (self.cells * size::<Cell>(), 4.0 * n);
-        let (located, pair) = (size::<Located>() * n, size::<Pair>());
+        let (boxes, located, pair) = (size::<DeviceBox>() * n, size::<Located>() * n, size::<Pair>());
         let visits = if self.has_visits { located } else { 0.0 };
         let lists = self.cells * size::<Slot>() + self.items() * size::<SmallItem>();
         let loads = self.box_loads();
         let long = if self.longest_row > f64::from(SHORT_ROW) { self.longest_row } else { 0.0 };
-        vec![
-            Traffic::streams("upload", 2.0 * size::<DeviceBox>() * n),
-            Traffic::streams("clear", cells + rows),
-            Traffic::streams("locate", size::<DeviceBox>() * n + located).and_changes(e, 4.0, cells),
-            Traffic::streams("visit", visits),
-            Traffic::streams("scan", 2.0 * cells),
-            Traffic::streams("schedule", 2.0 * cells + lists),
-            Traffic::streams("scatter", located + 4.0 * e).and_changes(e, 4.0, cells + 4.0 * e),
-            Traffic::streams("check", lists + 4.0 * loads + size::<DeviceBox>() * n + pair * p).and_reads(
-                loads,
-                size::<DeviceBox>(),
-                size::<DeviceBox>() * n,
-            ),
-            Traffic::streams("count_pairs", pair * p).and_changes(p, 4.0, rows),
-            Traffic::streams("scan of rows", 2.0 * rows),
-            Traffic::streams("place_pairs", 2.0 * pair * p).and_changes(p, pair, pair * p),
-            Traffic::streams("rank_pairs", 2.0 * pair * p + rows),
-            Traffic::streams("long rows", 3.0 * pair * long),
-            Traffic::streams("readback", pair * p),
+        let check = Traffic::streams(lists + 4.0 * loads + boxes + pair * p);
+        [
+            Traffic::streams(2.0 * boxes),
+            // Clears.
+            Traffic::streams(cells + rows),
+            // The map: locate, visit, both kernels of the scan, schedule, scatter.
+            Traffic::streams(boxes + located).and_changes(e, 4.0, cells),
+            Traffic::streams(visits),
+            Traffic::streams(2.0 * cells),
+            Traffic::streams(2.0 * cells + lists),
+            Traffic::streams(located + 4.0 * e).and_changes(e, 4.0, cells + 4.0 * e),
+            check.and_reads(loads, size::<DeviceBox>(), boxes),
+            // The sort: count_pairs, scan of rows, place_pairs, rank_pairs, long rows.
+            Traffic::streams(pair * p).and_changes(p, 4.0, rows),
+            Traffic::streams(2.0 * rows),
+            Traffic::streams(2.0 * pair * p).and_changes(p, pair, pair * p),
+            Traffic::streams(2.0 * pair * p + rows),
+            Traffic::streams(3.0 * pair * long),
+            Traffic::streams(pair * p),
         ]
     }
 
@@ -191,13 +184,10 @@ mod tests {
         has_visits: false,
     };
 
-    fn bytes_a_box(counts: &Counts) -> [f64; 2] {
-        CLASSES.map(|gpu| counts.bytes(&gpu) / counts.boxes)
-    }
-
     #[test]
     fn a_box_costs_what_the_document_says() {
-        assert_eq!(bytes_a_box(&UNIT).map(f64::round), [240.0, 722.0]);
+        let bytes_a_box = [GPUS[1], GPUS[3]].map(|gpu| (UNIT.bytes(&gpu) / UNIT.boxes).round());
+        assert_eq!(bytes_a_box, [240.0, 722.0]);
         let rounded = |ms: f64| (100.0 * ms).round() / 100.0;
         assert_eq!(GPUS.map(|gpu| rounded(UNIT.predicted_ms(&gpu))), [1.14, 2.44, 8.91, 18.29]);
         assert_eq!(GPUS.map(|gpu| rounded(UNIT.floor_ms(&gpu))), [0.02, 0.11, 0.53, 0.78]);

@@ -1,35 +1,38 @@
 //! A world of boxes with its pairs by brute force, and its updates on a device.
 
+use crate::corpus::difference;
 use pbig_core::{
     Aabb, ChangeRequest, ChangedBox, DeviceFailure, DeviceFound, Limits, Pair, PairDevice, ProxyFilter,
     oracle,
 };
-use pbig_gpu::GpuFinder;
 use std::collections::{BTreeMap, BTreeSet};
 
 /// The state of a broad phase, in the plainest form.
-pub(super) struct DeviceWorld {
-    pub(super) boxes: Vec<Aabb>,
-    pub(super) filters: Vec<ProxyFilter>,
-    pub(super) changed: BTreeMap<u32, ChangedBox>,
-    pub(super) kept: BTreeSet<Pair>,
-    pub(super) update: u64,
+#[derive(Debug, Default)]
+pub struct DeviceWorld {
+    /// The boxes now, by id.
+    pub boxes: Vec<Aabb>,
+    /// The filters now, by id.
+    pub filters: Vec<ProxyFilter>,
+    /// The changed boxes at the last update, by id.
+    pub changed: BTreeMap<u32, ChangedBox>,
+    /// The pairs of the last update, without those that a removal has ended.
+    pub kept: BTreeSet<Pair>,
+    /// Number of updates.
+    pub update: u64,
 }
 
 impl DeviceWorld {
-    pub(super) fn new(boxes: &[Aabb]) -> Self {
-        let mut world = Self {
-            boxes: Vec::new(),
-            filters: Vec::new(),
-            changed: BTreeMap::new(),
-            kept: BTreeSet::new(),
-            update: 0,
-        };
+    /// Returns a world in which all boxes are new.
+    pub fn new(boxes: &[Aabb]) -> Self {
+        let mut world = Self::default();
         (0u32..).zip(boxes).for_each(|(id, aabb)| world.set(id, *aabb, ProxyFilter::ALL));
         world
     }
 
-    pub(super) fn len(&self) -> u32 {
+    /// Returns the number of ids.
+    #[allow(clippy::len_without_is_empty, reason = "a number of ids")]
+    pub fn len(&self) -> u32 {
         self.boxes.len() as u32
     }
 
@@ -43,58 +46,90 @@ impl DeviceWorld {
         self.changed.entry(id).or_insert(was);
     }
 
-    pub(super) fn set(&mut self, id: u32, aabb: Aabb, filter: ProxyFilter) {
+    /// Sets a box and its filter.
+    pub fn set(&mut self, id: u32, aabb: Aabb, filter: ProxyFilter) {
         self.note(id);
         self.boxes[id as usize] = if aabb.is_valid() { aabb } else { Aabb::NOWHERE };
         self.filters[id as usize] = filter;
     }
 
-    pub(super) fn put(&mut self, id: u32, aabb: Aabb) {
+    /// Sets a box, which keeps its filter.
+    pub fn put(&mut self, id: u32, aabb: Aabb) {
         let filter = self.filters.get(id as usize).copied().unwrap_or_default();
         self.set(id, aabb, filter);
     }
 
     /// Removes a box. Its pairs end without an event.
-    pub(super) fn remove(&mut self, id: u32) {
+    pub fn remove(&mut self, id: u32) {
         self.put(id, Aabb::NOWHERE);
         self.changed.entry(id).and_modify(|change| change.aabb = Aabb::NOWHERE);
         self.kept.retain(|pair| pair.a != id && pair.b != id);
     }
 
-    pub(super) fn shift(&mut self, id: u32, by: [f32; 3]) {
-        self.put(id, pbig_tests::shifted(&self.boxes[id as usize], by));
+    /// Moves a box.
+    pub fn shift(&mut self, id: u32, by: [f32; 3]) {
+        let one = self.boxes[id as usize];
+        let moved = |corner: [f32; 3]| std::array::from_fn(|k| corner[k] + by[k]);
+        self.put(id, Aabb::new(moved(one.min), moved(one.max)));
     }
 
-    /// Runs an update on a device and compares it with brute force.
-    pub(super) fn follow(&mut self, gpu: &mut GpuFinder) -> Result<DeviceFound, DeviceFailure> {
-        self.follow_within(gpu, Limits::DEFAULT.max_pairs)
+    /// Runs an update on a device, and compares it with brute force.
+    ///
+    /// # Errors
+    /// The device's own.
+    ///
+    /// # Panics
+    /// If the device is wrong.
+    pub fn follow(&mut self, device: &mut dyn PairDevice) -> Result<DeviceFound, DeviceFailure> {
+        self.follow_within(device, Limits::DEFAULT.max_pairs)
     }
 
     /// As [`DeviceWorld::follow`], with a limit of pairs.
-    pub(super) fn follow_within(
+    ///
+    /// # Errors
+    /// The device's own.
+    ///
+    /// # Panics
+    /// If the device is wrong.
+    pub fn follow_within(
         &mut self,
-        gpu: &mut GpuFinder,
+        device: &mut dyn PairDevice,
         max_pairs: u64,
     ) -> Result<DeviceFound, DeviceFailure> {
-        let changed: Vec<_> = self.changed.values().copied().collect();
-        let request = ChangeRequest {
-            boxes: &self.boxes,
-            filters: &self.filters,
-            changed: &changed,
-            kept: self.kept.len() as u64,
-            max_pairs,
-        };
+        let changed = self.changes();
         let mut found = DeviceFound::default();
-        gpu.find_changed(&request, &mut found)?;
-        assert_eq!(self.fault(&found), None, "update {}", self.update);
-        let pairs = self.completed(&found);
-        self.advance();
-        assert_eq!(pairs, self.kept, "update {}: what a caller makes of it", self.update);
+        device.find_changed(&ChangeRequest { max_pairs, ..self.request(&changed) }, &mut found)?;
+        self.take(&found).unwrap_or_else(|why| panic!("update {}: {why}", self.update));
         Ok(found)
     }
 
+    /// Returns the changed boxes, for [`DeviceWorld::request`].
+    pub fn changes(&self) -> Vec<ChangedBox> {
+        self.changed.values().copied().collect()
+    }
+
+    /// Returns the request of an update.
+    pub fn request<'a>(&'a self, changed: &'a [ChangedBox]) -> ChangeRequest<'a> {
+        let Self { boxes, filters, kept, .. } = self;
+        let max_pairs = Limits::DEFAULT.max_pairs;
+        ChangeRequest { boxes, filters, changed, kept: kept.len() as u64, max_pairs }
+    }
+
+    /// Takes the answer of a device, and compares it with brute force.
+    ///
+    /// # Errors
+    /// The first difference.
+    pub fn take(&mut self, found: &DeviceFound) -> Result<(), String> {
+        if let Some(fault) = self.fault(found) {
+            return Err(fault);
+        }
+        let pairs = self.completed(found)?;
+        self.advance();
+        if pairs == self.kept { Ok(()) } else { Err("a caller makes other pairs of it".into()) }
+    }
+
     /// Runs an update without the device.
-    pub(super) fn advance(&mut self) {
+    pub fn advance(&mut self) {
         self.kept = oracle::pairs_filtered(&self.boxes, &self.filters).into_iter().collect();
         self.changed.clear();
         self.update += 1;
@@ -117,20 +152,22 @@ impl DeviceWorld {
         let wanted: Vec<Pair> = (&pairs(&self.boxes) ^ &pairs(&before)).into_iter().collect();
         let mut pairs = [&found.pairs[..], &found.ended[..]].concat();
         pairs.sort_unstable();
-        pbig_tests::difference(&pairs, &wanted)
+        difference(&pairs, &wanted)
     }
 
     /// Returns the pairs after the update, completed as the rules of a search for changes say.
-    fn completed(&self, found: &DeviceFound) -> BTreeSet<Pair> {
+    fn completed(&self, found: &DeviceFound) -> Result<BTreeSet<Pair>, String> {
         let again = |pair: &Pair| [pair.a, pair.b].iter().any(|id| found.restarted.contains(id));
         let overlaps = |pair: &Pair| self.boxes[pair.a as usize].overlaps(&self.boxes[pair.b as usize]);
         let allowed = |pair: &Pair| self.filters[pair.a as usize].allows(&self.filters[pair.b as usize]);
         let mut pairs = self.kept.clone();
         for pair in found.pairs.iter().chain(&found.ended) {
-            let news = if overlaps(pair) { pairs.insert(*pair) } else { pairs.remove(pair) };
-            assert!(news || again(pair), "{pair:?} is no news");
+            let is_news = if overlaps(pair) { pairs.insert(*pair) } else { pairs.remove(pair) };
+            if !is_news && !again(pair) {
+                return Err(format!("{pair:?} is no news"));
+            }
         }
         pairs.retain(|pair| !again(pair) || (overlaps(pair) && allowed(pair)));
-        pairs
+        Ok(pairs)
     }
 }
