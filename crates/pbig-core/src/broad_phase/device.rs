@@ -1,7 +1,7 @@
 //! The device of a broad phase.
 
 use super::BroadPhase;
-use crate::device::PairDevice;
+use crate::PairDevice;
 use crate::device_slot::DeviceSlot;
 use crate::holder::Holder;
 use crate::{Backend, Config, Error, Limits, NoDevice};

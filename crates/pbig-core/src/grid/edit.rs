@@ -3,15 +3,16 @@
 //! A box that stays in its cell is overwritten. One that leaves its cell leaves a tombstone in its slot, and goes to a
 //! *spill* list of its new cell.
 
+use super::Grid;
 use super::cells::{Cells, TOMBSTONE};
 use super::lookup::Place;
 use super::plan::GridPlan;
 use super::record::Record;
 use super::search::KeyRun;
+use super::search::Sorted;
 use super::simd::{Simd, dispatch, prefetch};
-use super::{Grid, Sorted};
-use crate::Aabb;
 use crate::policy::search::WORK_OF_EXACT_TEST;
+use crate::{Aabb, Algorithm, Plan};
 
 /// Number of boxes between a prefetch and the move.
 const AHEAD: usize = 12;
@@ -160,9 +161,11 @@ impl EditedGrid {
         records[..*len].iter_mut().chain(oversize).for_each(|record| record.id = names[record.id as usize]);
     }
 
-    /// Returns the grid without the spilled boxes, for reports.
-    pub(crate) fn grid(&self) -> &Grid {
-        &self.grid
+    /// Returns the plan for reports, with this number of valid boxes.
+    pub(crate) fn describe(&self, boxes: u32) -> Plan {
+        let (algorithm, spilled) = (Algorithm::Edit, self.spilled() as u32);
+        let Grid { plan, oversize, .. } = &self.grid;
+        Plan { algorithm, spilled, ..Plan::of_grid(plan, boxes as usize, oversize.len()) }
     }
 
     /// Returns the work of looking up `boxes` boxes among the oversize ones, before and after they move.

@@ -6,8 +6,9 @@
 
 use super::record::Record;
 use super::simd::{BLOCK, Simd, eight_from, prefetch};
+use crate::boxes::share_no_key;
 use crate::pairs::Grouping;
-use crate::{Keys, Pair, ProxyFilter, keys};
+use crate::{Keys, Pair, ProxyFilter};
 use std::sync::atomic::{AtomicU64, Ordering};
 
 /// Number of hits that are tested together.
@@ -184,7 +185,7 @@ impl Hits {
             self.filter(from, filters, ProxyFilter::allows);
         }
         if let Some(keys) = rule.keys {
-            self.filter(from, keys, keys::share_none);
+            self.filter(from, keys, share_no_key);
         }
         if let Some(receiver) = rule.receiver {
             if self.pairs.len() >= BATCH {

@@ -8,10 +8,10 @@
 //! A search visits half of each box's neighbouring cells as contiguous runs of slots, tests 64-bit codes (`cells`), and
 //! tests exactly what these leave over.
 
-mod across;
 #[cfg(target_arch = "x86_64")]
 mod avx2;
 mod bounds;
+mod brute;
 mod build;
 mod cells;
 mod count;
@@ -27,18 +27,19 @@ mod simd;
 #[cfg(test)]
 mod tests;
 
-pub(crate) use across::{Across, TwoGrids, brute_force_across};
 #[cfg(target_arch = "x86_64")]
 pub(crate) use avx2::Avx2;
+pub(crate) use brute::{brute_force, brute_force_across};
+pub(crate) use build::TwoGrids;
 pub(crate) use count::scattered;
 pub(crate) use edit::EditedGrid;
 pub(crate) use hits::{Hits, Receiver, Rule};
 pub(crate) use lookup::{Budget, Candidates, Meet, Place};
 pub use occupied::OccupiedCell;
-pub(crate) use oversize::brute_force;
 pub(crate) use plan::GridPlan;
 pub use plan::NeighbourScan;
 pub(crate) use record::Record;
+pub(crate) use search::Sorted;
 pub use simd::simd;
 pub(crate) use simd::{BLOCK, EightBoxes, Portable, Simd, dispatch, prefetch};
 
@@ -77,9 +78,4 @@ impl Grid {
         // SAFETY: the caller's promise.
         unsafe { &*self.codes.as_ptr().add(first).cast() }
     }
-}
-
-/// A grid as it was built: every box lies in its cell. (A grid that was edited has tombstones, and cannot be searched.)
-pub(crate) struct Sorted<'a> {
-    pub(crate) grid: &'a Grid,
 }

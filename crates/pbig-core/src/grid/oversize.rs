@@ -1,30 +1,12 @@
-//! Oversize boxes: too large for the cells, tested exactly against every box in the cells that they reach.
+//! The cells that an oversize box reaches: one too large for the cells, tested exactly against every box there.
 
 use super::Grid;
 use super::cells::{Cells, Window};
-use super::hits::{Hits, Rule};
-use super::record::Record;
 use super::search::KeyRun;
 use super::simd::{Simd, dispatch};
 use crate::Aabb;
 
 impl Grid {
-    /// Finds the pairs of an oversize box with the boxes in the grid, and with the oversize boxes after it.
-    pub(super) fn find_oversize_pairs(&self, i: usize, rule: &Rule<'_>, hits: &mut Hits) {
-        let one = &self.oversize[i];
-        self.find_reached(one, rule, hits);
-        hits.test_run(one, &self.oversize[i + 1..], rule);
-    }
-
-    /// Finds the pairs of an oversize box, of this grid or another one of the same plan, with the boxes in the grid.
-    pub(super) fn find_reached(&self, one: &Record, rule: &Rule<'_>, hits: &mut Hits) {
-        self.reached_by(&one.aabb, |run| {
-            let (first, end) = self.slots(run);
-            hits.runs += 1;
-            hits.test_run(one, &self.records[first..end], rule);
-        });
-    }
-
     /// Visits the cells in which boxes can lie that overlap a box of any size.
     pub(super) fn reached_by(&self, aabb: &Aabb, mut visit: impl FnMut(KeyRun)) {
         let cells = &self.plan.cells;
@@ -66,21 +48,4 @@ fn layer(cells: &Cells, window: &Window, z: i32) -> KeyRun {
 fn window_of(simd: impl Simd, cells: &Cells, aabb: &Aabb) -> Window {
     let (low, high) = simd.steps(cells, aabb);
     cells.window(low, high)
-}
-
-/// Tests every pair of valid boxes; returns how many are valid.
-pub(crate) fn brute_force(boxes: &[Aabb], rule: &Rule<'_>, hits: &mut Hits) -> usize {
-    let valid = boxes.iter().enumerate().filter(|(_, aabb)| aabb.is_valid());
-    let mut records = std::mem::take(&mut hits.records);
-    records.clear();
-    records.extend(valid.map(|(id, aabb)| Record::new(*aabb, id as u32, 0)));
-    for (i, one) in records.iter().enumerate() {
-        hits.test_run(one, &records[i + 1..], rule);
-        if hits.is_full {
-            break;
-        }
-    }
-    let valid = records.len();
-    hits.records = records;
-    valid
 }

@@ -2,11 +2,10 @@
 
 use super::task::Task;
 use crate::broad_phase::world::{Old, World};
-use crate::device::{ChangeRequest, ChangedBox, DeviceFound, PairDevice};
 use crate::device_slot::DeviceSlot;
 use crate::holder::Holder;
 use crate::outcome::{End, Outcome};
-use crate::{Aabb, Pair};
+use crate::{Aabb, ChangeRequest, ChangedBox, DeviceFound, Pair, PairDevice};
 
 /// Leaves the events of an update in the task. Gives up if the device cannot do the work.
 pub(crate) fn run(slot: &mut DeviceSlot, task: &mut Task<'_>) -> Outcome {

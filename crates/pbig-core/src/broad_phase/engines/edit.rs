@@ -12,7 +12,7 @@ use crate::pairs::Comparison;
 use crate::parallel::{SharedSlice, available_threads, piece_range, run_with};
 use crate::policy;
 use crate::report::{Checks, Clock, StageTimes, stage};
-use crate::{Aabb, Algorithm, Pair, Plan, ProxyFilter};
+use crate::{Aabb, Pair, ProxyFilter};
 
 /// The buffers of the engine.
 #[derive(Clone, Debug, Default)]
@@ -62,7 +62,7 @@ impl Edit {
             holder,
             checks: self.checks(),
             work: self.work.min(limits.work),
-            plan: Plan { boxes: world.valid(), ..Plan::of_grid(Algorithm::Edit, &task.store.grid) },
+            plan: task.store.grid.describe(world.valid()),
             stages: StageTimes { check, ..StageTimes::default() },
             ..Outcome::default()
         }

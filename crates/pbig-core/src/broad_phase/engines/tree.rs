@@ -61,7 +61,7 @@ impl LookUp {
             // Tested again, because an infinite box meets the empty places of a tree.
             let mut take =
                 |other: u32| now.extend(aabb.overlaps(&world.boxes[other as usize]).then_some(other));
-            nodes += store.tree.overlapping(aabb, &mut take).nodes;
+            nodes += store.tree.overlapping(aabb, &mut take);
             met += now.len() as u64;
             if nodes + met > max_work {
                 break;
