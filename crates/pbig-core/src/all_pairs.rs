@@ -1,6 +1,6 @@
 //! All pairs of a list of boxes: by a grid, by a tree where a grid would test too many, or by testing every pair of a few.
 
-use crate::grid::{EditedGrid, GridPlan, Hits, Receiver, Rule, brute_force};
+use crate::grid::{EditedGrid, GridPlan, Hits, Receiver, Rule, Sorted, brute_force};
 use crate::holder::Holder;
 use crate::index::BoxIndex;
 use crate::outcome::{End, Outcome};
@@ -142,9 +142,7 @@ impl AllPairs {
             store.grid.build(plan, request.boxes, workers)
         };
         outcome.stages.map += clock.lap();
-        let (boxes, work) = (sorted.boxes(), sorted.work(workers));
-        let vain = |step: usize, hits: &mut _| sorted.vain_work(step, request.filters, hits);
-        let is_grid = self.is_for_grid(request, (boxes, boxes), work, vain);
+        let is_grid = self.is_for_grid(request, &sorted);
         if is_grid {
             stage!("check");
             sorted.search(rule, &mut self.hits);
@@ -157,23 +155,17 @@ impl AllPairs {
         }
     }
 
-    /// Returns true if a grid finds the pairs of boxes, of which some are searched for, with less work than a tree. `vain_work`
-    /// estimates the work in vain from one box in a number.
-    pub(crate) fn is_for_grid(
-        &mut self,
-        request: &Request<'_>,
-        (boxes, searched): (usize, usize),
-        work: u64,
-        vain_work: impl FnOnce(usize, &mut Hits) -> u64,
-    ) -> bool {
+    /// Returns true if a search of sorted boxes takes less work than a tree.
+    pub(crate) fn is_for_grid(&mut self, request: &Request<'_>, sorted: &Sorted<'_>) -> bool {
         if let Some(engine) = request.config.engine {
             return engine != Engine::Tree;
         }
+        let (boxes, work) = (sorted.boxes(), sorted.work(self.hits.len()));
         if search::is_light(boxes, work) {
             return true;
         }
-        let hits = &mut self.hits[0];
-        let vain = vain_work(search::sample_one_in(searched, work), hits);
+        let (hits, step) = (&mut self.hits[0], search::sample_one_in(sorted.seekers(), work));
+        let vain = sorted.vain_work(step, request.filters, hits);
         hits.begin_for(request.grouping);
         search::is_light(boxes, vain)
     }

@@ -2,7 +2,7 @@
 //! found by two grids, by a tree where a grid would test too many, or by testing every pair where one set is small.
 
 use crate::all_pairs::{AllPairs, Request};
-use crate::grid::{Across, GridPlan, Rule, TwoGrids, brute_force_across};
+use crate::grid::{GridPlan, Rule, TwoGrids, brute_force_across};
 use crate::index::BoxIndex;
 use crate::outcome::Outcome;
 use crate::policy::{BRUTE_FORCE_UP_TO_BOXES, FEW_BOXES};
@@ -159,31 +159,21 @@ impl AllPairs {
             GridPlan { scan: NeighbourScan::Windows, ..GridPlan::new(request.boxes, workers) }
         };
         outcome.stages.plan += clock.lap();
-        let across = {
+        let sorted = {
             stage!("map");
             store.grids.build(plan, request.boxes, split, workers)
         };
         outcome.stages.map += clock.lap();
-        let is_grid = self.is_for_grids(request, &across);
+        let is_grid = self.is_for_grid(request, &sorted);
         if is_grid {
             stage!("check");
-            across.search(rule, &mut self.hits);
+            sorted.search(rule, &mut self.hits);
         }
         outcome.stages.check += clock.lap();
-        outcome.plan = Plan::of_cells(Algorithm::Grid, &plan, across.boxes(), across.oversize_count());
+        outcome.plan = Plan::of_cells(Algorithm::Grid, &plan, sorted.boxes(), sorted.oversize_count());
         if !is_grid {
             self.search_trees((request, split as u32), &mut store.tree, rule, outcome);
         }
-    }
-
-    /// Returns true if two grids find the pairs with less work than a tree.
-    fn is_for_grids(&mut self, request: &Request<'_>, across: &Across<'_>) -> bool {
-        let boxes = (across.boxes(), across.searched());
-        let work = across.work(self.hits.len());
-        self.is_for_grid(request, boxes, work, |step, hits| {
-            let found = AtomicU64::new(0);
-            across.vain_work(step, &Rule::listing(request.filters, &found), hits)
-        })
     }
 
     /// Sorts the boxes of two sets into a tree, and finds the pairs there.
