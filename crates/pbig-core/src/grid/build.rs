@@ -5,10 +5,10 @@
 
 use super::Grid;
 use super::cells::{Cells, TOMBSTONE};
-use super::plan::GridPlan;
 use super::record::Record;
 use super::search::Sorted;
 use super::simd::{BLOCK, Simd, dispatch};
+use super::spacing::GridPlan;
 use crate::Aabb;
 use crate::parallel::{SharedSlice, ensure_scratch, piece_range, run};
 use std::ops::Range;
@@ -65,7 +65,7 @@ impl Grid {
         self.reserve(boxes.len());
         self.count(boxes, split, workers);
         let in_buckets = self.place(split);
-        self.list_oversize(boxes, first_id);
+        self.list_oversize(boxes, first_id, split);
         self.scatter((boxes, first_id), split, workers);
         self.sort_buckets(&in_buckets, split, workers);
         self.bucket_starts = in_buckets;
@@ -109,13 +109,12 @@ impl Grid {
         }
         starts.push(next);
         self.len = next as usize;
-        self.invalid = counts.iter().map(|counts| counts.0[BucketCounts::INVALID]).sum();
         starts
     }
 
-    fn list_oversize(&mut self, boxes: &[Aabb], first_id: u32) {
+    fn list_oversize(&mut self, boxes: &[Aabb], first_id: u32, split: Split) {
         self.oversize.clear();
-        if self.len + self.invalid as usize == boxes.len() {
+        if self.counts[..split.pieces].iter().all(|counts| counts.0[BucketCounts::OVERSIZE] == 0) {
             return;
         }
         let keys: &[u32] = bytemuck::cast_slice(&self.codes);

@@ -3,10 +3,10 @@
 use super::Grid;
 use super::cells::query_of;
 use super::hits::{Hits, Rule};
-use super::plan::NeighbourScan;
 use super::record::Record;
 use super::search::Sorted;
 use super::simd::{BLOCK, Simd, dispatch};
+use super::spacing::NeighbourScan;
 use crate::ProxyFilter;
 use crate::parallel::run;
 use crate::policy::search;

@@ -6,11 +6,11 @@
 use super::Grid;
 use super::cells::{Cells, TOMBSTONE};
 use super::lookup::Place;
-use super::plan::GridPlan;
 use super::record::Record;
 use super::search::KeyRun;
 use super::search::Sorted;
 use super::simd::{Simd, dispatch, prefetch};
+use super::spacing::GridPlan;
 use crate::policy::search::WORK_OF_EXACT_TEST;
 use crate::{Aabb, Algorithm, Plan};
 
@@ -80,20 +80,6 @@ impl Spill {
         let (word, bit) = (key / 64, key % 64);
         // In two steps, because a shift by 64 does nothing.
         self.occupied[word] >> bit | self.occupied[word + 1] << 1 << (63 - bit)
-    }
-
-    /// Prefetches the memory that a visit reads next.
-    #[inline(always)]
-    pub(super) fn prefetch_heads(&self, (key, count): KeyRun) {
-        if key + count <= self.heads.len() && self.occupied_from(key) << (64 - count.clamp(1, 64)) != 0 {
-            prefetch(&self.heads[key + self.occupied_from(key).trailing_zeros() as usize]);
-        }
-    }
-
-    /// Prefetches the memory that a visit reads first.
-    #[inline(always)]
-    pub(super) fn prefetch(&self, key: usize) {
-        prefetch(self.occupied.as_ptr().wrapping_add(key / 64));
     }
 
     /// Forgets all entries.

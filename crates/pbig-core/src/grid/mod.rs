@@ -19,11 +19,10 @@ mod edit;
 mod hits;
 mod lookup;
 mod occupied;
-mod oversize;
-mod plan;
 mod record;
 mod search;
 mod simd;
+mod spacing;
 #[cfg(test)]
 mod tests;
 
@@ -34,14 +33,14 @@ pub(crate) use build::TwoGrids;
 pub(crate) use count::scattered;
 pub(crate) use edit::EditedGrid;
 pub(crate) use hits::{Hits, Receiver, Rule};
-pub(crate) use lookup::{Budget, Candidates, Meet, Place};
+pub(crate) use lookup::{Budget, Place, Tally};
 pub use occupied::OccupiedCell;
-pub(crate) use plan::GridPlan;
-pub use plan::NeighbourScan;
 pub(crate) use record::Record;
 pub(crate) use search::Sorted;
 pub use simd::simd;
 pub(crate) use simd::{BLOCK, EightBoxes, Portable, Simd, dispatch, prefetch};
+pub(crate) use spacing::GridPlan;
+pub use spacing::NeighbourScan;
 
 use build::BucketCounts;
 
@@ -59,8 +58,6 @@ pub(crate) struct Grid {
     pub(crate) len: usize,
     /// Boxes too large for the cells.
     pub(crate) oversize: Vec<Record>,
-    /// Invalid boxes met by the last build.
-    pub(crate) invalid: u32,
     /// The records by bucket, of the last build.
     coarse: Vec<Record>,
     counts: Vec<BucketCounts>,

@@ -2,15 +2,16 @@
 //! first or whose cell is lower.
 
 use super::Grid;
-use super::cells::{Cells, query_of};
+use super::cells::{Cells, query_of, steps_portable};
 use super::hits::{HIT_ROOM, HitWriter, Hits, Rule};
-use super::plan::NeighbourScan;
 use super::record::Record;
 use super::simd::{BLOCK, Simd, dispatch};
+use super::spacing::NeighbourScan;
+use crate::Aabb;
 use crate::parallel::run_with;
 use std::ops::Range;
 
-/// Maximum number of boxes in a piece of work. Less of it, because each of a few boxes may meet many, if threads share it.
+/// Maximum number of boxes in a piece of work. Threads share smaller pieces, because each of a few boxes may meet many.
 const PIECE: usize = 16_384;
 
 /// Number of oversize boxes in a piece of work.
@@ -276,6 +277,24 @@ impl Grid {
     #[inline(always)]
     pub(super) fn slots(&self, (key, count): KeyRun) -> (usize, usize) {
         (self.starts[key] as usize, self.starts[key + count] as usize)
+    }
+
+    /// Visits the cells in which boxes can lie that overlap a box of any size.
+    pub(super) fn reached_by(&self, aabb: &Aabb, mut visit: impl FnMut(KeyRun)) {
+        let cells = &self.plan.cells;
+        let (low, high) = steps_portable(cells, aabb);
+        let window = cells.window(low, high).clipped(cells);
+        for z in window.low[2]..=window.high[2] {
+            for y in window.low[1]..=window.high[1] {
+                let (first, last) = ([window.low[0], y, z], window.high[0]);
+                let row = if cells.wraps {
+                    cells.row::<true>(first, last)
+                } else {
+                    cells.row::<false>(first, last)
+                };
+                row.into_iter().filter(|(_, count)| *count > 0).for_each(&mut visit);
+            }
+        }
     }
 }
 

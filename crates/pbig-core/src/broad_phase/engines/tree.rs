@@ -1,9 +1,9 @@
 //! The engine for few changed boxes where a tree is kept: each is looked up where it is, and what it overlaps is compared with its
 //! kept pairs.
 
+use super::Task;
 use super::listed::Listed;
 use super::partners::Partners;
-use super::task::Task;
 use crate::grid::BLOCK;
 use crate::holder::Holder;
 use crate::outcome::{End, Outcome};
@@ -33,7 +33,7 @@ impl LookUp {
         let made = nodes * BLOCK as u64;
         outcome.checks = Checks { made, unnecessary: made - met, redundant: 0 };
         outcome.work = refit + made + nodes + met;
-        outcome.plan = Plan { algorithm: Algorithm::Tree, boxes: world.valid(), ..Plan::default() };
+        outcome.plan = Plan { algorithm: Algorithm::Tree, boxes: world.valid, ..Plan::default() };
         outcome.end = if nodes + met <= max_work { End::Done } else { End::GivenUp };
         outcome
     }
