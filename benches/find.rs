@@ -1,4 +1,4 @@
-//! The finder alone, set by set and size by size, and its stages, each on its own; updates in which all or few boxes move;
+//! The finder alone, set by set and size by size; updates in which all or few boxes move;
 //! and the first update of a rapier world beside stock's.
 //!
 //! `cargo bench -p pbig-benches`
@@ -10,15 +10,8 @@ use pbig_harness::scenes::Scene;
 use rapier_pbig::PbigBroadPhase;
 use rapier3d::prelude::*;
 use std::hint::black_box;
-use std::time::Duration;
 
 const CONFIG: Config = Config { order: Order::Unspecified, ..Config::DEFAULT };
-
-/// Searches after which one is like those before.
-const WARM_UP: usize = 4;
-
-/// Criterion cannot show a time of zero.
-const LEAST: Duration = Duration::from_nanos(1);
 
 fn find(c: &mut Criterion) {
     let mut group = c.benchmark_group("find");
@@ -31,29 +24,6 @@ fn find(c: &mut Criterion) {
             group.throughput(Throughput::Elements(n as u64));
             group.bench_function(BenchmarkId::new(set.name, n), |b| {
                 b.iter(|| finder.find(black_box(&boxes)).map(<[_]>::len));
-            });
-        }
-    }
-}
-
-/// The stages of a search from nothing, as the finder measures them itself; boxes move a little from one to the next.
-fn stages(c: &mut Criterion) {
-    for name in ["unit", "mixed"] {
-        let mut group = c.benchmark_group(format!("stages from nothing, {name} 100000"));
-        group.sample_size(10);
-        let boxes = BoxSet::named(name).expect("the set exists").boxes(100_000, 1);
-        let frames = [0, 1].map(|seed| moved(&boxes, 0.1, seed));
-        let (mut finder, mut frame) = (Finder::new(CONFIG), 0);
-        let mut find = || {
-            frame += 1;
-            finder.find(black_box(&frames[frame % 2])).expect("few pairs");
-            finder.report().stages.named()
-        };
-        // A stage that does nothing has no time to measure.
-        let last = (0..WARM_UP).map(|_| find()).last().unwrap_or_default();
-        for (stage, (name, _)) in last.into_iter().enumerate().filter(|(_, (_, time))| !time.is_zero()) {
-            group.bench_function(name, |b| {
-                b.iter_custom(|rounds| (0..rounds).map(|_| find()[stage].1.max(LEAST)).sum());
             });
         }
     }
@@ -96,5 +66,5 @@ fn first_update(c: &mut Criterion) {
     group.bench_function("stock", |b| b.iter(|| run(&mut DefaultBroadPhase::new())));
 }
 
-criterion_group!(benches, find, stages, update, first_update);
+criterion_group!(benches, find, update, first_update);
 criterion_main!(benches);

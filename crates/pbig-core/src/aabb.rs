@@ -166,21 +166,6 @@ impl Aabb {
         }
     }
 
-    /// Returns the box around this one before and after `motion`, a displacement in the same unit: velocity times time.
-    /// A motion with a NaN leaves the box as it is.
-    ///
-    /// ```
-    /// use pbig_core::Aabb;
-    /// let (cube, velocity, dt) = (Aabb::from_center([0.0; 3], [0.5; 3]), [6.0, 0.0, -12.0], 0.25);
-    /// let swept = cube.swept(velocity.map(|v| v * dt));
-    /// assert_eq!(swept, Aabb::new([-0.5, -0.5, -3.5], [2.0, 0.5, 0.5]));
-    /// ```
-    #[inline]
-    pub fn swept(&self, motion: [f32; 3]) -> Self {
-        let moved = |corner: [f32; 3]| std::array::from_fn(|k| corner[k] + motion[k]);
-        self.union(&Self::new(moved(self.min), moved(self.max)))
-    }
-
     /// Returns true if `other` lies in this box, its border included. A NaN makes it false.
     #[inline]
     pub fn contains(&self, other: &Self) -> bool {
@@ -238,8 +223,6 @@ mod tests {
         for invalid in [Aabb::NOWHERE, Aabb::new([0.0, 0.0, 3.0], [9.0, 9.0, 2.0])] {
             assert_eq!((cube.union(&invalid), invalid.union(&cube)), (cube, cube));
         }
-        assert_eq!(cube.swept([0.0, f32::NAN, 1.0]), cube);
-        assert_eq!(all.swept([1.0; 3]), all);
         assert!(cube.contains(&cube) && all.contains(&cube) && !cube.contains(&all));
         assert!(!cube.contains(&Aabb::new([0.5; 3], [0.9, 0.9, 1.0f32.next_up()])));
         assert!(!all.contains(&Aabb::NOWHERE) && !Aabb::NOWHERE.contains(&cube));

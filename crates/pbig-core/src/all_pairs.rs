@@ -1,6 +1,9 @@
-//! All pairs of a list of boxes: by a grid, by a tree where a grid would test too many, or by testing every pair of a few.
+//! All pairs of a list of boxes, or those of two sets: by grids, by a tree where a grid would test too many, or by testing every
+//! pair of a few.
 
-use crate::grid::{EditedGrid, GridPlan, Hits, Receiver, Rule, brute_force};
+use crate::grid::{
+    EditedGrid, GridPlan, Hits, Receiver, Rule, Sorted, TwoGrids, brute_force, brute_force_across,
+};
 use crate::holder::Holder;
 use crate::index::BoxIndex;
 use crate::outcome::{End, Outcome};
@@ -9,13 +12,15 @@ use crate::parallel::available_threads;
 use crate::policy::{self, PARALLEL_FROM_BOXES, search};
 use crate::report::{Checks, Clock, stage};
 use crate::streamed;
-use crate::{Aabb, Algorithm, Backend, Config, Engine, Keys, Pair, Plan, ProxyFilter};
+use crate::{Aabb, Algorithm, Backend, Config, Engine, Keys, NeighbourScan, Pair, Plan, ProxyFilter};
 use std::sync::atomic::AtomicU64;
 
 /// A search: boxes, filters and settings.
 #[derive(Clone, Copy)]
 pub(crate) struct Request<'a> {
     pub(crate) boxes: &'a [Aabb],
+    /// With a split, the valid boxes of two sets: the second has the ids from it on. No two boxes of a set pair.
+    pub(crate) split: Option<u32>,
     /// By id; none if all may pair.
     pub(crate) filters: Option<&'a [ProxyFilter]>,
     /// By id; none if boxes have no keys.
@@ -30,7 +35,7 @@ pub(crate) struct Request<'a> {
 impl<'a> Request<'a> {
     /// Makes a search for all pairs of boxes, whose groups are not counted.
     pub(crate) fn new(boxes: &'a [Aabb], config: &'a Config) -> Self {
-        Self { boxes, filters: None, keys: None, receiver: None, config, grouping: None }
+        Self { boxes, split: None, filters: None, keys: None, receiver: None, config, grouping: None }
     }
 
     /// Returns the rule for pairs, which `found` counts.
@@ -39,12 +44,23 @@ impl<'a> Request<'a> {
         let max_pairs = if receiver.is_some() { u64::MAX } else { self.config.limits.pairs() };
         Rule { filters, keys, receiver, max_pairs, found }
     }
+
+    /// Returns true if every pair should be tested.
+    fn is_for_brute_force(&self) -> bool {
+        let boxes = self.boxes.len();
+        let smaller = self.split.map(|split| (split as usize).min(boxes - split as usize));
+        let is_few =
+            boxes <= policy::BRUTE_FORCE_UP_TO_BOXES || smaller.is_some_and(|few| few <= policy::FEW_BOXES);
+        let may_be_brute = self.config.engine.is_none() || smaller == Some(0);
+        self.config.backend == Backend::Brute || may_be_brute && is_few
+    }
 }
 
 /// The structures that can hold the boxes of a search.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Store {
     pub(crate) grid: EditedGrid,
+    two_grids: TwoGrids,
     pub(crate) tree: BoxIndex,
     /// Tests of the last search that was done.
     pub(crate) work: u64,
@@ -79,10 +95,7 @@ impl AllPairs {
         self.begin(request);
         let found = AtomicU64::new(0);
         let rule = request.rule(&found);
-        let may_be_brute = request.config.engine.is_none();
-        let is_few = may_be_brute && request.boxes.len() <= policy::BRUTE_FORCE_UP_TO_BOXES;
-        let brute = request.config.backend == Backend::Brute || is_few;
-        if brute {
+        if request.is_for_brute_force() {
             self.test_all(request, &rule, &mut outcome);
         } else {
             self.search(request, store, &rule, &mut outcome);
@@ -95,7 +108,7 @@ impl AllPairs {
     }
 
     /// Hands over what is left, and counts.
-    pub(crate) fn finish(&mut self, rule: &Rule<'_>, mut outcome: Outcome) -> Outcome {
+    fn finish(&mut self, rule: &Rule<'_>, mut outcome: Outcome) -> Outcome {
         if let Some(receiver) = rule.receiver {
             self.hits.iter_mut().for_each(|hits| hits.hand_over(receiver));
         }
@@ -114,7 +127,7 @@ impl AllPairs {
         self.hits.iter().map(Hits::count).sum()
     }
 
-    pub(crate) fn begin(&mut self, request: &Request<'_>) {
+    fn begin(&mut self, request: &Request<'_>) {
         let workers = Self::workers(request.boxes.len());
         self.hits.resize_with(workers, Hits::default);
         self.hits.iter_mut().for_each(|hits| hits.begin_for(request.grouping));
@@ -123,57 +136,62 @@ impl AllPairs {
     fn test_all(&mut self, request: &Request<'_>, rule: &Rule<'_>, outcome: &mut Outcome) {
         stage!("check");
         let mut clock = Clock::start();
-        let valid = brute_force(request.boxes, rule, &mut self.hits[0]);
-        let algorithm = if valid < 2 { Algorithm::Nothing } else { Algorithm::Brute };
-        outcome.plan = Plan { algorithm, boxes: valid as u32, ..Plan::default() };
+        let boxes = match request.split {
+            Some(split) => {
+                brute_force_across(request.boxes, split as usize, rule, &mut self.hits);
+                request.boxes.len()
+            }
+            None => brute_force(request.boxes, rule, &mut self.hits[0]),
+        };
+        let algorithm = if boxes < 2 { Algorithm::Nothing } else { Algorithm::Brute };
+        outcome.plan = Plan { algorithm, boxes: boxes as u32, ..Plan::default() };
         outcome.stages.check += clock.lap();
     }
 
     fn search(&mut self, request: &Request<'_>, store: &mut Store, rule: &Rule<'_>, outcome: &mut Outcome) {
-        let workers = self.hits.len();
+        let (boxes, workers) = (request.boxes, self.hits.len());
+        let Store { grid, two_grids, tree, .. } = store;
         let mut clock = Clock::start();
-        let plan = {
+        let mut plan = {
             stage!("plan");
-            GridPlan::new(request.boxes, workers)
+            GridPlan::new(boxes, workers)
         };
         outcome.stages.plan += clock.lap();
+        if request.split.is_some() {
+            plan.scan = NeighbourScan::Windows;
+        }
         let sorted = {
             stage!("map");
-            store.grid.build(plan, request.boxes, workers)
+            match request.split {
+                Some(split) => two_grids.build(plan, boxes, split as usize, workers),
+                None => grid.build(plan, boxes, workers),
+            }
         };
         outcome.stages.map += clock.lap();
-        let (boxes, work) = (sorted.boxes(), sorted.work(workers));
-        let vain = |step: usize, hits: &mut _| sorted.vain_work(step, request.filters, hits);
-        let is_grid = self.is_for_grid(request, (boxes, boxes), work, vain);
+        let is_grid = self.is_for_grid(request, &sorted);
         if is_grid {
             stage!("check");
             sorted.search(rule, &mut self.hits);
-            outcome.holder = Holder::Grid;
         }
         outcome.stages.check += clock.lap();
-        outcome.plan = Plan::of_grid(Algorithm::Grid, &store.grid);
+        outcome.holder = Holder::Grid;
+        outcome.plan = Plan::of_grid(&plan, sorted.boxes(), sorted.oversize_count());
         if !is_grid {
-            self.search_tree(request, store, rule, outcome);
+            self.search_tree(request, tree, rule, outcome);
         }
     }
 
-    /// Returns true if a grid finds the pairs of boxes, of which some are searched for, with less work than a tree. `vain_work`
-    /// estimates the work in vain from one box in a number.
-    pub(crate) fn is_for_grid(
-        &mut self,
-        request: &Request<'_>,
-        (boxes, searched): (usize, usize),
-        work: u64,
-        vain_work: impl FnOnce(usize, &mut Hits) -> u64,
-    ) -> bool {
+    /// Returns true if a grid finds the pairs with less work than a tree.
+    fn is_for_grid(&mut self, request: &Request<'_>, sorted: &Sorted<'_>) -> bool {
         if let Some(engine) = request.config.engine {
             return engine != Engine::Tree;
         }
+        let (boxes, work) = (sorted.boxes(), sorted.work(self.hits.len()));
         if search::is_light(boxes, work) {
             return true;
         }
-        let hits = &mut self.hits[0];
-        let vain = vain_work(search::sample_one_in(searched, work), hits);
+        let (hits, step) = (&mut self.hits[0], search::sample_one_in(sorted.seekers(), work));
+        let vain = sorted.vain_work(step, request.filters, hits);
         hits.begin_for(request.grouping);
         search::is_light(boxes, vain)
     }
@@ -182,35 +200,29 @@ impl AllPairs {
     fn search_tree(
         &mut self,
         request: &Request<'_>,
-        store: &mut Store,
+        tree: &mut BoxIndex,
         rule: &Rule<'_>,
         outcome: &mut Outcome,
     ) {
         let mut clock = Clock::start();
         {
             stage!("map");
-            store.tree.sort(request.boxes);
+            tree.sort_sets(request.boxes, request.split);
         }
         outcome.stages.map += clock.lap();
-        self.join((request, None), &store.tree, rule);
+        self.join(request, tree, rule);
         outcome.stages.check += clock.lap();
         outcome.holder = Holder::Tree;
         outcome.plan = Plan { algorithm: Algorithm::Tree, boxes: outcome.plan.boxes, ..Plan::default() };
     }
 
-    /// Finds the pairs of the boxes in a tree, or those of two sets, the second with the ids from `split` on: by the tree, unless they
-    /// cross, and it does not cut them apart.
-    pub(crate) fn join(
-        &mut self,
-        (request, split): (&Request<'_>, Option<u32>),
-        tree: &BoxIndex,
-        rule: &Rule<'_>,
-    ) {
+    /// Finds the pairs of the boxes in a tree: by the tree, unless they cross, and it does not cut them apart.
+    fn join(&mut self, request: &Request<'_>, tree: &BoxIndex, rule: &Rule<'_>) {
         stage!("check");
-        let (boxes, found) = (request.boxes, AtomicU64::new(0));
-        let (most, listing) = (search::join_up_to_work(boxes.len()), Rule::listing(None, &found));
+        let Request { boxes, split, .. } = *request;
+        let most = search::join_up_to_work(boxes.len());
         let may_stream = request.config.engine != Some(Engine::Tree);
-        let is_heavy = may_stream && tree.vain_work(split, &listing, most, &mut self.hits[0]) > most;
+        let is_heavy = may_stream && tree.vain_work(split, most, &mut self.hits[0]) > most;
         self.hits[0].begin_for(request.grouping);
         if is_heavy {
             streamed::find_pairs(boxes, split, rule, &mut self.hits);
@@ -225,13 +237,11 @@ impl AllPairs {
         groups.gather(grouping, &mut self.hits, workers)
     }
 
-    /// Takes pairs that a device has found, a list for each thread.
-    pub(crate) fn take(&mut self, lists: Vec<Vec<Pair>>, grouping: Option<Grouping>) {
-        self.hits.resize_with(lists.len().max(1), Hits::default);
-        self.hits.iter_mut().for_each(|hits| hits.begin_for(grouping));
-        for (hits, pairs) in self.hits.iter_mut().zip(lists) {
-            hits.take(pairs);
-        }
+    /// Takes pairs that a device has found.
+    pub(crate) fn take(&mut self, pairs: Vec<Pair>, grouping: Option<Grouping>) {
+        self.hits.resize_with(1, Hits::default);
+        self.hits[0].begin_for(grouping);
+        self.hits[0].take(pairs);
     }
 
     /// Copies all pairs into one list, in no particular order.

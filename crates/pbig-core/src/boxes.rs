@@ -1,6 +1,14 @@
-//! The boxes of a search, with what else decides about their pairs.
+//! The boxes of a search, with what else decides about their pairs: filters, and keys. Two boxes with a key in common never pair.
 
-use crate::{Aabb, Error, Keys, ProxyFilter};
+use crate::{Aabb, Error, ProxyFilter};
+
+/// Up to four numbers of a box; [`NO_KEY`] where there are fewer.
+///
+/// Boxes of a mesh have their vertices: `[v, NO_KEY, NO_KEY, NO_KEY]` is a vertex, `[v, w, NO_KEY, NO_KEY]` an edge.
+pub type Keys = [u32; 4];
+
+/// An unused place in [`Keys`], which nothing has in common.
+pub const NO_KEY: u32 = u32::MAX;
 
 /// Boxes to search, and what else decides about their pairs: filters, keys, or neither. `boxes[i]` has the id `i`.
 ///
@@ -51,20 +59,20 @@ impl<'a> Boxes<'a> {
     }
 }
 
-impl<'a> From<&'a [Aabb]> for Boxes<'a> {
-    fn from(boxes: &'a [Aabb]) -> Self {
-        Self::new(boxes)
+impl<'a, T: AsRef<[Aabb]> + ?Sized> From<&'a T> for Boxes<'a> {
+    fn from(boxes: &'a T) -> Self {
+        Self::new(boxes.as_ref())
     }
 }
 
-impl<'a> From<&'a Vec<Aabb>> for Boxes<'a> {
-    fn from(boxes: &'a Vec<Aabb>) -> Self {
-        Self::new(boxes)
+/// Returns true if two boxes share no key. Without a branch, so that the compiler compares four at once.
+#[inline(always)]
+pub(crate) fn share_no_key(one: &Keys, other: &Keys) -> bool {
+    let mut shared = [0; 4];
+    for &key in one {
+        for (shared, &other) in shared.iter_mut().zip(other) {
+            *shared |= u32::from(key == other) & u32::from(key != NO_KEY);
+        }
     }
-}
-
-impl<'a, const N: usize> From<&'a [Aabb; N]> for Boxes<'a> {
-    fn from(boxes: &'a [Aabb; N]) -> Self {
-        Self::new(boxes)
-    }
+    shared == [0; 4]
 }

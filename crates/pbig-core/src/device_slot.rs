@@ -1,7 +1,7 @@
 //! The device of a finder or a broad phase, if it has one, and the report of a device that cannot do the work.
 
-use crate::device::{DeviceFailure, DeviceFound, PairDevice};
 use crate::outcome::{End, Outcome};
+use crate::pair_device::{DeviceFailure, DeviceFound, PairDevice};
 use crate::policy::{Choice, choose_backend};
 use crate::report::{Clock, Report, StageTimes, stage};
 use crate::{Algorithm, Config, Pair, Plan, parallel};

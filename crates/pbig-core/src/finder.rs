@@ -1,18 +1,18 @@
 //! `Finder`: all pairs of a list of boxes, with nothing kept between calls but memory.
 
 use crate::all_pairs::{AllPairs, Request, Store};
-use crate::between::{Sets, TwoSets};
-use crate::device::{PairDevice, SearchRequest};
 use crate::device_slot::DeviceSlot;
 use crate::outcome::Outcome;
+use crate::pair_device::{PairDevice, SearchRequest};
 use crate::pairs::{Grouping, Groups};
 use crate::report::{Clock, Report, stage};
 use crate::{Aabb, Backend, Boxes, Config, Error, Keys, Limits, Order, Pair, ProxyFilter};
 
 mod between;
 mod for_each;
+mod sets;
 
-pub use between::find_pairs_between;
+use sets::Sets;
 
 /// Returns every pair of overlapping boxes, sorted, with default settings.
 ///
@@ -53,10 +53,9 @@ pub struct Finder {
     all_pairs: AllPairs,
     groups: Groups,
     sets: Sets,
-    two_sets: TwoSets,
     pairs: Vec<Pair>,
     /// Pairs of two sets: the ids of a [`crate::CrossPair`].
-    crossing: Vec<Pair>,
+    pairs_between: Vec<Pair>,
     report: Report,
 }
 
@@ -70,11 +69,6 @@ impl Finder {
     /// the boxes are many.
     pub fn with_device(config: Config, device: Box<dyn PairDevice>) -> Self {
         Self { device: DeviceSlot::new(device), ..Self::new(config) }
-    }
-
-    /// Uses this device from the next call on.
-    pub fn set_device(&mut self, device: Box<dyn PairDevice>) {
-        self.device = DeviceSlot::new(device);
     }
 
     /// Returns the name of the device in use. None while there is no device or it has failed.
@@ -179,7 +173,7 @@ impl Finder {
         if grouping.is_none() || found.pairs.is_sorted_by(|one, next| one < next) {
             self.pairs = found.pairs;
         } else {
-            self.all_pairs.take(vec![found.pairs], grouping);
+            self.all_pairs.take(found.pairs, grouping);
             self.emit(grouping);
         }
         Ok(true)
@@ -208,7 +202,7 @@ impl Finder {
     /// Forgets the last call, so that no result of it remains if the next one fails.
     fn forget(&mut self) {
         self.pairs.clear();
-        self.crossing.clear();
+        self.pairs_between.clear();
         self.report = Report::default();
     }
 

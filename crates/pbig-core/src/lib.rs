@@ -6,7 +6,7 @@
 //! | --- | --- |
 //! | a list of boxes, once | [`find_pairs`] |
 //! | a new list every time | [`Finder`], which keeps its buffers |
-//! | two sets of boxes, and only pairs across | [`find_pairs_between`], [`Finder::find_between`] |
+//! | two sets of boxes, and only pairs across | [`Finder::find_between`] |
 //! | a mesh, and no pairs of neighbours | [`Finder::find_without_shared`] |
 //! | more pairs than a list should hold | [`Finder::for_each_pair`] |
 //! | boxes that move a little, come and go | [`BroadPhase`], which tells what changed |
@@ -55,12 +55,11 @@
 struct Readme;
 
 mod aabb;
+mod algorithm;
 mod all_pairs;
-mod between;
 mod boxes;
 mod broad_phase;
 mod config;
-mod device;
 mod device_slot;
 mod error;
 mod filter;
@@ -68,32 +67,30 @@ mod finder;
 mod grid;
 mod holder;
 mod index;
-mod keys;
 pub mod oracle;
 mod outcome;
 #[cfg(all(target_family = "wasm", target_os = "unknown"))]
 mod page_clock;
 mod pair;
+mod pair_device;
 mod pairs;
 mod parallel;
-mod plan;
 mod policy;
 mod report;
 mod streamed;
 
 pub use aabb::Aabb;
-pub use boxes::Boxes;
+pub use algorithm::{Algorithm, Plan};
+pub use boxes::{Boxes, Keys, NO_KEY};
 pub use broad_phase::{BroadPhase, Events};
 pub use config::{Backend, Config, Engine, Limits, Order};
-pub use device::{ChangeRequest, ChangedBox, DeviceFailure, DeviceFound, PairDevice, SearchRequest};
 pub use error::Error;
 pub use filter::{ProxyFilter, TestMode};
-pub use finder::{Finder, find_pairs, find_pairs_between};
+pub use finder::{Finder, find_pairs};
 pub use grid::{NeighbourScan, OccupiedCell, simd};
-pub use index::{BoxIndex, Visited};
-pub use keys::{Keys, NO_KEY};
+pub use index::BoxIndex;
 pub use pair::{CrossPair, Pair};
-pub use plan::{Algorithm, Plan};
+pub use pair_device::{ChangeRequest, ChangedBox, DeviceFailure, DeviceFound, PairDevice, SearchRequest};
 pub use policy::NoDevice;
 pub use report::{Checks, DeviceReport, Report, StageTimes, WORK_LIMIT};
 

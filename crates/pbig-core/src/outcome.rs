@@ -1,7 +1,7 @@
 //! The outcome of an engine or a search of all boxes, and how a report takes it.
 
+use crate::Plan;
 use crate::holder::Holder;
-use crate::plan::Plan;
 use crate::report::{Checks, DeviceReport, Report, StageTimes};
 use crate::{Config, Error};
 

@@ -1,8 +1,8 @@
 //! The report of a call: times, counts and the plan.
 
+use crate::Plan;
 #[cfg(all(target_family = "wasm", target_os = "unknown"))]
 use crate::page_clock::Instant;
-use crate::plan::Plan;
 use std::time::Duration;
 #[cfg(not(all(target_family = "wasm", target_os = "unknown")))]
 use std::time::Instant;
@@ -41,11 +41,6 @@ impl StageTimes {
         self.check += other.check;
         self.emit += other.emit;
         self.diff += other.diff;
-    }
-
-    /// Returns the sum of all stages.
-    pub fn total(&self) -> Duration {
-        self.named().iter().map(|(_, time)| *time).sum()
     }
 }
 

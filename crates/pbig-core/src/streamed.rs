@@ -19,31 +19,49 @@ const PARTS: usize = 16;
 /// Number of pairs that are kept together.
 const BATCH: usize = 4096;
 
-/// A box by ranks: on each axis the place of its begin among the begins of all boxes, and the number of begins up to its end.
+/// A box with integers for corners, in the order of its coordinates.
 #[repr(align(32))]
 #[derive(Clone, Copy, Debug, Default)]
-struct Ranked {
+struct Corners {
     begin: [u32; 3],
     end: [u32; 3],
     id: u32,
 }
 
-impl Ranked {
-    /// Returns true if a box begins after this one, before it ends.
+impl Corners {
+    fn new(id: u32, aabb: &Aabb) -> Self {
+        Self { begin: aabb.min.map(ordered), end: aabb.max.map(ordered), id }
+    }
+
+    /// Returns the place of the box among all as a point: of two boxes that begin together, the one with the lower id comes first.
     #[inline(always)]
-    fn has(&self, point: &Self, axis: usize) -> bool {
-        (self.begin[axis] < point.begin[axis]) & (point.begin[axis] < self.end[axis])
+    fn point(&self, axis: usize) -> u64 {
+        u64::from(self.begin[axis]) << 32 | u64::from(self.id)
+    }
+
+    /// Returns true if this one begins before a point, and does not end before it.
+    #[inline(always)]
+    fn has(&self, point: u64, axis: usize) -> bool {
+        (self.point(axis) < point) & ((point >> 32) as u32 <= self.end[axis])
     }
 
     #[inline(always)]
     fn overlaps(&self, other: &Self) -> bool {
-        (0..3).all(|k| (self.begin[k] < other.end[k]) & (other.begin[k] < self.end[k]))
+        (0..3).all(|k| (self.begin[k] <= other.end[k]) & (other.begin[k] <= self.end[k]))
     }
+}
+
+/// Returns an integer in the order of the numbers that are not NaN.
+fn ordered(x: f32) -> u32 {
+    // Without a sign of zero, because -0 and 0 are one number.
+    let bits = (x + 0.0).to_bits();
+    if bits >> 31 == 1 { !bits } else { bits | 1 << 31 }
 }
 
 /// Finds all pairs of some boxes; with a `split`, the pairs of an id below it and an id from it on.
 pub(crate) fn find_pairs(boxes: &[Aabb], split: Option<u32>, rule: &Rule<'_>, hits: &mut [Hits]) {
-    let all = ranked(boxes);
+    let valid = (0..).zip(boxes).filter(|(_, aabb)| aabb.is_valid());
+    let all: Vec<Corners> = valid.map(|(id, aabb)| Corners::new(id, aabb)).collect();
     match split.map(|split| all.partition_point(|one| one.id < split)) {
         None => stream(&all, &all, rule, hits),
         Some(split) => {
@@ -54,33 +72,10 @@ pub(crate) fn find_pairs(boxes: &[Aabb], split: Option<u32>, rule: &Rule<'_>, hi
     }
 }
 
-/// Returns the valid boxes by ranks, in the order of ids.
-fn ranked(boxes: &[Aabb]) -> Vec<Ranked> {
-    let is_valid = |id: &u32| boxes[*id as usize].is_valid();
-    let ids: Vec<u32> = (0..boxes.len() as u32).filter(is_valid).collect();
-    let mut all: Vec<Ranked> = ids.iter().map(|&id| Ranked { id, ..Ranked::default() }).collect();
-    let mut begins: Vec<(f32, u32)> = Vec::new();
-    for axis in 0..3 {
-        // Without a sign of zero, because the numbers decide.
-        let begin = |(at, id): (u32, &u32)| (boxes[*id as usize].min[axis] + 0.0, at);
-        begins.clear();
-        begins.extend((0..).zip(&ids).map(begin));
-        begins.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-        for (rank, (_, at)) in (0..).zip(&begins) {
-            all[*at as usize].begin[axis] = rank;
-        }
-        for one in &mut all {
-            let end = boxes[one.id as usize].max[axis];
-            one.end[axis] = begins.partition_point(|(begin, _)| *begin <= end) as u32;
-        }
-    }
-    all
-}
-
 /// Finds the pairs of an interval and a point on the last axis that overlap on the other ones.
-fn stream(intervals: &[Ranked], points: &[Ranked], rule: &Rule<'_>, hits: &mut [Hits]) {
+fn stream(intervals: &[Corners], points: &[Corners], rule: &Rule<'_>, hits: &mut [Hits]) {
     let mut points = points.to_vec();
-    points.sort_unstable_by_key(|point| point.begin[2]);
+    points.sort_unstable_by_key(|point| point.point(2));
     let parts = if points.len() < PARALLEL_FROM_BOXES { 1 } else { PARTS };
     let (len, size) = (points.len(), points.len().div_ceil(parts).max(1));
     let points = SharedSlice::new(&mut points);
@@ -102,7 +97,7 @@ struct Stream<'a, 'b> {
 
 impl Stream<'_, '_> {
     /// Finds the pairs of an interval and a point on an axis that overlap on the lower ones. On the higher ones all overlap.
-    fn find(&mut self, intervals: &[Ranked], points: &mut [Ranked], axis: usize) {
+    fn find(&mut self, intervals: &[Corners], points: &mut [Corners], axis: usize) {
         if self.hits.is_full() {
             return;
         }
@@ -110,38 +105,43 @@ impl Stream<'_, '_> {
             return self.test_all(intervals, points, axis);
         }
         self.hits.runs += (intervals.len() + points.len()) as u64;
-        let mut divided = Divided::new(intervals, points, axis);
-        let (whole, partial) = divided.parts();
+        let places = || points.iter().map(|point| point.point(axis));
+        let (first, last) = (places().fold(u64::MAX, u64::min), places().fold(0, u64::max));
+        let has_all = |one: &Corners| one.has(first, axis) & one.has(last, axis);
+        let meets = |one: &Corners| (one.point(axis) < last) & ((first >> 32) as u32 <= one.end[axis]);
+        let has_some = |one: &Corners| meets(one) & !has_all(one);
+        let mut whole = chosen(intervals, has_all);
         if axis == 0 {
-            self.push_all(whole, points);
+            self.push_all(&whole, points);
         } else {
-            self.find(whole, points, axis - 1);
-            self.find(points, whole, axis - 1);
+            self.find(&whole, points, axis - 1);
+            self.find(points, &mut whole, axis - 1);
         }
+        drop(whole);
+        let partial = chosen(intervals, has_some);
         if !partial.is_empty() {
             let middle = points.len() / 2;
-            points.select_nth_unstable_by_key(middle, |point| point.begin[axis]);
+            points.select_nth_unstable_by_key(middle, |point| point.point(axis));
             let (first, rest) = points.split_at_mut(middle);
-            self.find(partial, first, axis);
-            self.find(partial, rest, axis);
+            self.find(&partial, first, axis);
+            self.find(&partial, rest, axis);
         }
     }
 
-    fn test_all(&mut self, intervals: &[Ranked], points: &[Ranked], axis: usize) {
+    fn test_all(&mut self, intervals: &[Corners], points: &[Corners], axis: usize) {
         self.hits.tests += (intervals.len() * points.len()) as u64;
         for one in intervals {
-            for point in points.iter().filter(|point| one.has(point, axis) & one.overlaps(point)) {
-                self.push(one, point);
-            }
+            let is_met = |point: &&Corners| one.has(point.point(axis), axis) & one.overlaps(point);
+            points.iter().filter(is_met).for_each(|point| self.push(one, point));
         }
     }
 
-    fn push_all(&mut self, intervals: &[Ranked], points: &[Ranked]) {
+    fn push_all(&mut self, intervals: &[Corners], points: &[Corners]) {
         self.hits.tests += (intervals.len() * points.len()) as u64;
         intervals.iter().for_each(|one| points.iter().for_each(|point| self.push(one, point)));
     }
 
-    fn push(&mut self, one: &Ranked, other: &Ranked) {
+    fn push(&mut self, one: &Corners, other: &Corners) {
         self.hits.pairs.push(Pair::new(one.id, other.id));
         if self.hits.pairs.len() >= self.from + BATCH {
             self.keep();
@@ -155,41 +155,22 @@ impl Stream<'_, '_> {
     }
 }
 
-/// The intervals that have all points, then unused room, then those that have some.
-struct Divided {
-    all: Vec<Ranked>,
-    whole: usize,
-    partial: usize,
-}
-
-impl Divided {
-    fn new(intervals: &[Ranked], points: &[Ranked], axis: usize) -> Self {
-        let begins = || points.iter().map(|point| point.begin[axis]);
-        let (first, last) = (begins().fold(u32::MAX, u32::min), begins().fold(0, u32::max));
-        let mut all = vec![Ranked::default(); intervals.len()];
-        let (mut whole, mut partial) = (0, intervals.len());
-        for one in intervals {
-            let (begin, end) = (one.begin[axis], one.end[axis]);
-            let has_all = (begin < first) & (last < end);
-            let has_some = (begin < last) & (first < end) & !has_all;
-            // Without a branch: written where it may belong, and counted where it does.
-            all[whole] = *one;
-            all[partial - 1] = *one;
-            whole += usize::from(has_all);
-            partial -= usize::from(has_some);
-        }
-        Self { all, whole, partial }
+/// Returns the boxes for which a condition is true. Without a branch: each is written, and the next one overwrites it unless it is
+/// chosen.
+fn chosen(boxes: &[Corners], is_chosen: impl Fn(&Corners) -> bool) -> Vec<Corners> {
+    let (mut chosen, mut len) = (vec![Corners::default(); boxes.len()], 0);
+    for one in boxes {
+        chosen[len] = *one;
+        len += usize::from(is_chosen(one));
     }
-
-    fn parts(&mut self) -> (&mut [Ranked], &mut [Ranked]) {
-        let (first, partial) = self.all.split_at_mut(self.partial);
-        (&mut first[..self.whole], partial)
-    }
+    chosen.truncate(len);
+    chosen
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::index::tests::needles;
     use crate::oracle;
     use rand::rngs::StdRng;
     use rand::{RngExt, SeedableRng};
@@ -235,16 +216,9 @@ mod tests {
     #[test]
     fn needles_in_three_directions_take_little_more_work_each_if_they_are_more() {
         let work = [20_000, 160_000].map(|n: usize| {
-            let mut random = StdRng::seed_from_u64(1);
-            let needle = |i: usize| {
-                let (mut at, mut half) = ([0; 3].map(|_| random.random_range(0.0f32..1.0)), [1e-9; 3]);
-                (at[i % 3], half[i % 3]) = (0.5, 0.5);
-                Aabb::from_center(at, half)
-            };
-            let boxes: Vec<Aabb> = (0..n).map(needle).collect();
             let (found, mut hits) = (AtomicU64::new(0), [Hits::default()]);
             hits[0].begin(0, 0);
-            find_pairs(&boxes, None, &Rule::listing(None, &found), &mut hits);
+            find_pairs(&needles(n), None, &Rule::listing(None, &found), &mut hits);
             (hits[0].tests + hits[0].runs) as f64 / n as f64
         });
         assert!(work[1] < 1.7 * work[0], "{work:?}");

@@ -6,7 +6,7 @@ use crate::holder::Holder;
 use crate::outcome::{End, Outcome};
 use crate::policy::{self, Counts};
 use crate::report::Clock;
-use crate::{Backend, Engine, Error, Plan};
+use crate::{Backend, Engine, Error, NoDevice, Plan};
 
 impl BroadPhase {
     /// Finds what has changed since the last update. Takes next to no time when nothing has.
@@ -32,23 +32,32 @@ impl BroadPhase {
 
     fn find_events(&mut self) -> Result<(), Error> {
         if self.is_for_device() {
-            let outcome = self.run_on_device();
+            let outcome = self.run(None);
             if self.take(outcome)? {
                 return Ok(());
             }
         }
         let changed = self.world.changed.len();
         let engine = self.choose_engine();
-        let outcome = self.run(engine);
+        let outcome = self.run(Some(engine));
         if engine != Engine::Rebuild {
             self.given_up.note(outcome.end == End::GivenUp, changed);
         }
         if !self.take(outcome)? {
-            let outcome = self.run(Engine::Rebuild);
+            let outcome = self.run(Some(Engine::Rebuild));
             let is_done = self.take(outcome)?;
             debug_assert!(is_done, "a rebuild never gives up");
         }
         Ok(())
+    }
+
+    /// Returns true if a device should do the update. Otherwise the report gets the reason.
+    fn is_for_device(&mut self) -> bool {
+        let is_wanted = self.device.is_wanted(&self.config, self.world.changed.len(), &mut self.report);
+        if is_wanted && !self.world.knows_old() {
+            self.report.plan.no_device = Some(NoDevice::OldBoxesUnknown);
+        }
+        is_wanted && self.world.knows_old()
     }
 
     fn choose_engine(&mut self) -> Engine {
@@ -70,15 +79,14 @@ impl BroadPhase {
         }
     }
 
-    fn run(&mut self, engine: Engine) -> Outcome {
-        let Self { world, config, holder, store, kept, comparison: events, .. } = self;
-        self.engines.run(engine, &mut Task { world, config, holder: *holder, store, kept, events })
-    }
-
-    fn run_on_device(&mut self) -> Outcome {
+    /// Runs an engine; the device, if none is given.
+    fn run(&mut self, engine: Option<Engine>) -> Outcome {
         let Self { world, config, holder, store, kept, comparison: events, .. } = self;
         let mut task = Task { world, config, holder: *holder, store, kept, events };
-        engines::device::run(&mut self.device, &mut task)
+        match engine {
+            Some(engine) => self.engines.run(engine, &mut task),
+            None => engines::on_device::run(&mut self.device, &mut task),
+        }
     }
 
     /// Adds an outcome to the report, and applies the events to the kept pairs. Returns false if the engine gave up.
@@ -101,7 +109,7 @@ impl BroadPhase {
         if (self.kept.len() + events.added.len() - gone) as u64 > limit {
             return Err(Error::TooManyPairs { limit });
         }
-        self.kept.drop_pairs(&events.dropped);
+        self.kept.apply(&[], &events.dropped);
         self.kept.apply(&events.added, &events.removed);
         self.report.stages.diff = clock.lap();
         Ok(())
@@ -136,9 +144,9 @@ impl BroadPhase {
         let report = &mut self.report;
         (report.stages, report.checks, report.work) = Default::default();
         report.boxes = present;
-        report.invalid = present - u64::from(self.world.valid());
+        report.invalid = present - u64::from(self.world.valid);
         report.changed = self.world.changed.len() as u64;
-        report.plan = Plan { boxes: self.world.valid(), ..Plan::default() };
+        report.plan = Plan { boxes: self.world.valid, ..Plan::default() };
         report.device = None;
         // A backend that was asked for stays unavailable until a call on it succeeds.
         if self.config.backend != Backend::Device {

@@ -35,10 +35,10 @@ pub(crate) struct World {
     /// Maximum number of old states.
     pub(super) keep_old: usize,
     /// Ids whose box of the last update was removed.
-    removed: Vec<u32>,
+    pub(super) removed: Vec<u32>,
     /// Ids whose box was set and not removed, valid or not.
     pub(super) present: IdSet,
-    valid: u32,
+    pub(super) valid: u32,
     /// Boxes that were ever given a filter other than [`ProxyFilter::ALL`].
     pub(super) is_filtered: bool,
 }
@@ -47,10 +47,6 @@ impl World {
     /// Returns one more than the largest id that was ever set.
     pub(super) fn ids(&self) -> usize {
         self.boxes.len()
-    }
-
-    pub(super) fn valid(&self) -> u32 {
-        self.valid
     }
 
     /// Returns true if a box was set and not removed, valid or not.
@@ -63,11 +59,6 @@ impl World {
     #[inline(always)]
     pub(super) fn was_removed(&self, id: u32) -> bool {
         self.states[id as usize] & state::REMOVED != 0
-    }
-
-    /// Returns the ids whose box of the last update was removed since.
-    pub(super) fn removed(&self) -> &[u32] {
-        &self.removed
     }
 
     /// Returns true if any box was removed since the last update.

@@ -1,32 +1,15 @@
 //! Pairs of a box of one set with a box of another one.
 
-use super::Finder;
+use super::{Finder, Sets};
 use crate::all_pairs::Request;
 use crate::grid::Receiver;
 use crate::pairs::Grouping;
 use crate::parallel::{SharedSlice, piece_range, run, threads_for};
 use crate::report::{Clock, stage};
-use crate::{Aabb, Boxes, CrossPair, Error, Order, Pair};
+use crate::{Boxes, CrossPair, Error, Order, Pair};
 
 /// Pairs whose ids a thread looks up at a time.
 const PIECE: usize = 1 << 16;
-
-/// Returns every pair of a box of `a` with a box of `b` that overlap, sorted, with default settings. See [`Finder::find_between`].
-///
-/// # Errors
-/// [`Error::TooManyBoxes`] and [`Error::TooManyPairs`], see [`crate::Limits`].
-///
-/// ```
-/// use pbig_core::{Aabb, CrossPair, find_pairs_between};
-/// let at = |x: f32| Aabb::from_center([x, 0.0, 0.0], [0.5; 3]);
-/// let (a, b) = ([at(0.0), at(5.0), at(5.0)], [at(9.0), at(5.5)]);
-/// assert_eq!(find_pairs_between(&a, &b)?, [CrossPair { a: 1, b: 1 }, CrossPair { a: 2, b: 1 }]);
-/// # Ok::<(), pbig_core::Error>(())
-/// ```
-pub fn find_pairs_between(a: &[Aabb], b: &[Aabb]) -> Result<Vec<CrossPair>, Error> {
-    let mut finder = Finder::default();
-    Ok(finder.find_between(a, b)?.to_vec())
-}
 
 impl Finder {
     /// Returns every pair of a box of `a` with a box of `b` that overlap: `CrossPair { a: i, b: j }` for `a[i]` and `b[j]`,
@@ -36,14 +19,11 @@ impl Finder {
     /// a comparison or two. [`Boxes`] add filters and keys. The CPU does the work; no device is asked.
     ///
     /// ```
-    /// use pbig_core::{Aabb, Boxes, CrossPair, Finder, NO_KEY};
-    /// // Vertices 0 and 1, and the triangle of vertices 0, 2 and 3: vertex 0 belongs to it.
-    /// let vertices = [Aabb::new([0.0; 3], [0.0; 3]), Aabb::new([0.5; 3], [0.5; 3])];
-    /// let triangles = [Aabb::new([0.0; 3], [1.0; 3])];
-    /// let own = [0, 1].map(|v| [v, NO_KEY, NO_KEY, NO_KEY]);
-    /// let corners = [[0, 2, 3, NO_KEY]];
-    /// let (a, b) = (Boxes::new(&vertices).with_keys(&own), Boxes::new(&triangles).with_keys(&corners));
-    /// assert_eq!(Finder::default().find_between(a, b)?, [CrossPair { a: 1, b: 0 }]);
+    /// use pbig_core::{Aabb, CrossPair, Finder};
+    /// let at = |x: f32| Aabb::from_center([x, 0.0, 0.0], [0.5; 3]);
+    /// let (a, b) = ([at(0.0), at(5.0), at(5.0)], [at(9.0), at(5.5)]);
+    /// let mut finder = Finder::default();
+    /// assert_eq!(finder.find_between(&a, &b)?, [CrossPair { a: 1, b: 1 }, CrossPair { a: 2, b: 1 }]);
     /// # Ok::<(), pbig_core::Error>(())
     /// ```
     ///
@@ -61,7 +41,7 @@ impl Finder {
 
     /// Returns the pairs of the last call of [`Finder::find_between`]; none if another call followed, or it failed.
     pub fn pairs_between(&self) -> &[CrossPair] {
-        bytemuck::cast_slice(&self.crossing)
+        bytemuck::cast_slice(&self.pairs_between)
     }
 
     /// Finds the pairs of two sets, by place in their list, for a receiver or as a list.
@@ -77,14 +57,20 @@ impl Finder {
         self.sets.take(a, b);
         self.report.stages.plan = clock.lap();
         let is_sorted = self.config.order == Order::Sorted && visit.is_none();
-        let grouping = is_sorted.then(|| Grouping::new(self.sets.split));
+        let grouping = is_sorted.then(|| Grouping::new(self.sets.split as usize));
         let ids = &self.sets.ids;
         let hand_over = visit.map(|visit| move |pairs: &[Pair]| visit(pairs, ids));
         let receiver = hand_over.as_ref().map(|hand_over| hand_over as Receiver<'_>);
-        let (filters, keys) = self.sets.rules();
-        let all = Request::new(&self.sets.boxes, &self.config);
-        let request = Request { filters, keys, receiver, grouping, ..all };
-        let outcome = self.all_pairs.find_between(&request, &self.sets, &mut self.two_sets);
+        let Sets { boxes, split, filters, keys, .. } = &self.sets;
+        let request = Request {
+            split: Some(*split),
+            filters: filters.as_deref(),
+            keys: keys.as_deref(),
+            receiver,
+            grouping,
+            ..Request::new(boxes, &self.config)
+        };
+        let outcome = self.all_pairs.find(&request, &mut self.store);
         let is_done = self.add(outcome);
         self.report.invalid = self.report.boxes - self.sets.valid;
         is_done?;
@@ -100,9 +86,9 @@ impl Finder {
     fn name_ids(&mut self) {
         stage!("emit");
         let mut clock = Clock::start();
-        std::mem::swap(&mut self.pairs, &mut self.crossing);
-        let (len, ids) = (self.crossing.len(), &self.sets.ids);
-        let (pairs, pieces) = (SharedSlice::new(&mut self.crossing), len.div_ceil(PIECE));
+        std::mem::swap(&mut self.pairs, &mut self.pairs_between);
+        let (len, ids) = (self.pairs_between.len(), &self.sets.ids);
+        let (pairs, pieces) = (SharedSlice::new(&mut self.pairs_between), len.div_ceil(PIECE));
         run(threads_for(pieces), pieces, |_, piece| {
             // SAFETY: each piece has its own pairs.
             let pairs = unsafe { pairs.part(piece_range(len, piece, pieces)) };

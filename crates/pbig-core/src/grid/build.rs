@@ -3,11 +3,12 @@
 //! The first sort brings records into a few hundred *buckets* of neighbouring cells, the second one sorts each bucket
 //! while it is in the cache, and computes codes. Each pass is shared by threads piece by piece.
 
+use super::Grid;
 use super::cells::{Cells, TOMBSTONE};
-use super::plan::GridPlan;
 use super::record::Record;
+use super::search::Sorted;
 use super::simd::{BLOCK, Simd, dispatch};
-use super::{Grid, Sorted};
+use super::spacing::GridPlan;
 use crate::Aabb;
 use crate::parallel::{SharedSlice, ensure_scratch, piece_range, run};
 use std::ops::Range;
@@ -54,17 +55,17 @@ impl Grid {
     /// Sorts the valid boxes, `boxes[id]` with the id `id`, into cells.
     pub(crate) fn build(&mut self, plan: GridPlan, boxes: &[Aabb], workers: usize) -> Sorted<'_> {
         self.build_from(plan, boxes, 0, workers);
-        Sorted { grid: self }
+        Sorted { own: self, other: None }
     }
 
     /// Sorts the valid boxes into cells; the first box has this id.
-    pub(super) fn build_from(&mut self, plan: GridPlan, boxes: &[Aabb], first_id: u32, workers: usize) {
+    fn build_from(&mut self, plan: GridPlan, boxes: &[Aabb], first_id: u32, workers: usize) {
         self.plan = plan;
         let split = Split::new(boxes.len(), self.plan.cells.count(), workers);
         self.reserve(boxes.len());
         self.count(boxes, split, workers);
         let in_buckets = self.place(split);
-        self.list_oversize(boxes, first_id);
+        self.list_oversize(boxes, first_id, split);
         self.scatter((boxes, first_id), split, workers);
         self.sort_buckets(&in_buckets, split, workers);
         self.bucket_starts = in_buckets;
@@ -108,13 +109,12 @@ impl Grid {
         }
         starts.push(next);
         self.len = next as usize;
-        self.invalid = counts.iter().map(|counts| counts.0[BucketCounts::INVALID]).sum();
         starts
     }
 
-    fn list_oversize(&mut self, boxes: &[Aabb], first_id: u32) {
+    fn list_oversize(&mut self, boxes: &[Aabb], first_id: u32, split: Split) {
         self.oversize.clear();
-        if self.len + self.invalid as usize == boxes.len() {
+        if self.counts[..split.pieces].iter().all(|counts| counts.0[BucketCounts::OVERSIZE] == 0) {
             return;
         }
         let keys: &[u32] = bytemuck::cast_slice(&self.codes);
@@ -155,6 +155,28 @@ impl Grid {
         self.starts[0] = 0;
         self.starts[cells + 1..cells + 4].fill(self.len as u32);
         self.codes[self.len..self.len + 2 * BLOCK].fill(TOMBSTONE);
+    }
+}
+
+/// The grids of two sets.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct TwoGrids([Grid; 2]);
+
+impl TwoGrids {
+    /// Sorts valid boxes, `boxes[id]` with the id `id`, into two grids: those before `split` into the first.
+    pub(crate) fn build(
+        &mut self,
+        plan: GridPlan,
+        boxes: &[Aabb],
+        split: usize,
+        workers: usize,
+    ) -> Sorted<'_> {
+        let [first, second] = &mut self.0;
+        first.build_from(plan, &boxes[..split], 0, workers);
+        second.build_from(plan, &boxes[split..], split as u32, workers);
+        let (first, second) = (&*first, &*second);
+        let (own, other) = if first.len <= second.len { (first, second) } else { (second, first) };
+        Sorted { own, other: Some(other) }
     }
 }
 

@@ -1,42 +1,37 @@
 //! Counts the work of a search before the search: once boxes are sorted, the slots that each would visit are known.
 
+use super::Grid;
 use super::cells::query_of;
 use super::hits::{Hits, Rule};
-use super::plan::NeighbourScan;
 use super::record::Record;
+use super::search::Sorted;
 use super::simd::{BLOCK, Simd, dispatch};
-use super::{Grid, Sorted};
+use super::spacing::NeighbourScan;
 use crate::ProxyFilter;
 use crate::parallel::run;
-use crate::policy::{PARALLEL_FROM_BOXES, search};
+use crate::policy::search;
 use std::ops::Range;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 /// Slots that are counted together.
-pub(super) const PIECE: usize = PARALLEL_FROM_BOXES;
+const PIECE: usize = 16_384;
 
 impl Sorted<'_> {
-    /// Returns the number of boxes.
-    pub(crate) fn boxes(&self) -> usize {
-        self.grid.len + self.grid.oversize.len()
-    }
-
     /// Returns the work of a search: of the boxes in cells one in [`search::COUNT_ONE_IN`] is counted, without a test.
     pub(crate) fn work(&self, workers: usize) -> u64 {
-        let (grid, total) = (self.grid, AtomicU64::new(0));
+        let (len, oversize, total) = (self.own.len, self.oversize_count(), AtomicU64::new(0));
         // Pieces do not depend on the number of threads: otherwise other boxes would be counted, and the choice could differ.
-        run(workers, grid.len.div_ceil(PIECE), |_, piece| {
-            let slots = piece * PIECE..grid.len.min((piece + 1) * PIECE);
-            total.fetch_add(dispatch!(count_slots, grid, slots.clone()), Ordering::Relaxed);
+        run(workers, len.div_ceil(PIECE), |_, piece| {
+            let slots = piece * PIECE..len.min((piece + 1) * PIECE);
+            total.fetch_add(dispatch!(count_slots, self, slots.clone()), Ordering::Relaxed);
         });
-        let oversize = grid.oversize.len();
         let step = oversize.div_ceil(search::COUNTED_OVERSIZE).max(1);
-        let counted =
-            scattered(0..oversize, step).map(|i| grid.work_of_oversize(&grid.oversize[i])).sum::<u64>();
-        let between = oversize as u64 * oversize as u64 / 2;
-        total.into_inner() * search::COUNT_ONE_IN as u64
-            + counted * step as u64
-            + between * search::WORK_OF_EXACT_TEST
+        let work_of = |i: usize| {
+            let (one, grid, others) = self.oversize(i);
+            grid.work_of_oversize(one) + others.len() as u64 * search::WORK_OF_EXACT_TEST
+        };
+        let counted = scattered(0..oversize, step).map(work_of).sum::<u64>();
+        total.into_inner() * search::COUNT_ONE_IN as u64 + counted * step as u64
     }
 
     /// Estimates the work in vain of a search, by a sample of one box in `step`: the tests of each box that its own overlaps do not
@@ -44,21 +39,19 @@ impl Sorted<'_> {
     pub(crate) fn vain_work(&self, step: usize, filters: Option<&[ProxyFilter]>, hits: &mut Hits) -> u64 {
         let found = AtomicU64::new(0);
         let rule = Rule::listing(filters, &found);
-        let (len, oversize) = (self.grid.len, self.grid.oversize.len());
-        let mut in_grid = 0;
-        for slot in scattered(0..len, step) {
+        let mut vain = 0;
+        for slot in scattered(0..self.own.len, step) {
             hits.begin(0, 0);
-            self.grid.search_slots(slot..slot + 1, &rule, hits);
-            in_grid += search::in_vain(hits.work_in_cells(), hits.overlaps);
+            self.search_slots(slot..slot + 1, &rule, hits);
+            vain += search::in_vain(hits.work_in_cells(), hits.overlaps) * step as u64;
         }
-        let step_oversize = step.min(oversize / search::SAMPLED_OVERSIZE + 1);
-        let mut among_oversize = 0;
-        for i in scattered(0..oversize, step_oversize) {
+        let step = step.min(self.oversize_count() / search::SAMPLED_OVERSIZE + 1);
+        for i in scattered(0..self.oversize_count(), step) {
             hits.begin(0, 0);
-            self.grid.find_oversize_pairs(i, &rule, hits);
-            among_oversize += search::in_vain(hits.tests * search::WORK_OF_EXACT_TEST, hits.overlaps);
+            self.search_oversize(i, &rule, hits);
+            vain += search::in_vain(hits.tests * search::WORK_OF_EXACT_TEST, hits.overlaps) * step as u64;
         }
-        in_grid * step as u64 + among_oversize * step_oversize as u64
+        vain
     }
 }
 
@@ -77,7 +70,7 @@ pub(crate) fn scattered(range: Range<usize>, step: usize) -> impl Iterator<Item 
 
 impl Grid {
     /// Returns the work of an oversize box: the rows of cells that it reaches, and the boxes in them.
-    pub(super) fn work_of_oversize(&self, one: &Record) -> u64 {
+    fn work_of_oversize(&self, one: &Record) -> u64 {
         let mut work = 0;
         self.reached_by(&one.aabb, |run| {
             let (first, end) = self.slots(run);
@@ -87,19 +80,19 @@ impl Grid {
     }
 }
 
-/// Counts the slots that one box in [`search::COUNT_ONE_IN`] visits.
+/// Counts the rows and slots that one box in [`search::COUNT_ONE_IN`] visits.
 #[inline(always)]
-fn count_slots(simd: impl Simd, grid: &Grid, slots: Range<usize>) -> u64 {
-    let half = |(rows, slots): (u64, u64)| rows + slots / 2;
+fn count_slots(simd: impl Simd, sorted: &Sorted<'_>, slots: Range<usize>) -> u64 {
+    let (own, grid) = (sorted.own, sorted.searched());
     let mut work = 0;
     for slot in scattered(slots, search::COUNT_ONE_IN) {
-        let slots = match (grid.plan.scan, grid.plan.cells.wraps) {
-            (NeighbourScan::Runs, _) => in_runs(grid, slot),
-            (NeighbourScan::Windows, false) => half(in_window::<false>(simd, grid, grid, slot)),
-            (NeighbourScan::Windows, true) => half(in_window::<true>(simd, grid, grid, slot)),
+        let (rows, slots) = match (sorted.other, grid.plan.scan, grid.plan.cells.wraps) {
+            (None, NeighbourScan::Runs, _) => (0, in_runs(grid, slot)),
+            (_, _, false) => in_window::<false>(simd, sorted, slot),
+            (_, _, true) => in_window::<true>(simd, sorted, slot),
         };
-        let is_vague = has_vague_code(simd, grid, slot);
-        work += if is_vague { slots * search::WORK_OF_VAGUE_TEST } else { slots };
+        let is_vague = has_vague_code(simd, own, slot);
+        work += rows + if is_vague { slots * search::WORK_OF_VAGUE_TEST } else { slots };
     }
     work
 }
@@ -107,7 +100,7 @@ fn count_slots(simd: impl Simd, grid: &Grid, slots: Range<usize>) -> u64 {
 /// Returns true if the code of a box is like all eight codes behind it. Boxes beyond the cells, and many tiny ones in one place,
 /// have such codes; their candidates need the exact test.
 #[inline(always)]
-pub(super) fn has_vague_code(simd: impl Simd, grid: &Grid, slot: usize) -> bool {
+fn has_vague_code(simd: impl Simd, grid: &Grid, slot: usize) -> bool {
     // SAFETY: a slot in use is before it.
     let codes = unsafe { grid.block(slot + 1) };
     let alike = simd.test(query_of(grid.codes[slot]), codes);
@@ -125,16 +118,12 @@ fn in_runs(grid: &Grid, slot: usize) -> u64 {
     own + row(key + dx - 1) + row(key + layer - dx - 1) + row(key + layer - 1) + row(key + layer + dx - 1)
 }
 
-/// Returns the rows and slots of a grid in the window of a box, which lies in a slot of the same grid or of another one.
+/// Returns the rows in the window of a box, and the slots that the box visits there: half of them in its own grid.
 #[inline(always)]
-pub(super) fn in_window<const WRAPS: bool>(
-    simd: impl Simd,
-    own: &Grid,
-    grid: &Grid,
-    slot: usize,
-) -> (u64, u64) {
+fn in_window<const WRAPS: bool>(simd: impl Simd, sorted: &Sorted<'_>, slot: usize) -> (u64, u64) {
+    let grid = sorted.searched();
     let cells = &grid.plan.cells;
-    let (low, high) = simd.steps(cells, &own.records[slot].aabb);
+    let (low, high) = simd.steps(cells, &sorted.own.records[slot].aabb);
     let window = cells.window(low, high);
     let (mut rows, mut slots) = (0, 0);
     for z in window.low[2]..=window.high[2] {
@@ -145,5 +134,5 @@ pub(super) fn in_window<const WRAPS: bool>(
             }
         }
     }
-    (rows, slots)
+    (rows, if sorted.other.is_none() { slots / 2 } else { slots })
 }

@@ -3,15 +3,16 @@
 //! A box that stays in its cell is overwritten. One that leaves its cell leaves a tombstone in its slot, and goes to a
 //! *spill* list of its new cell.
 
+use super::Grid;
 use super::cells::{Cells, TOMBSTONE};
 use super::lookup::Place;
-use super::plan::GridPlan;
 use super::record::Record;
 use super::search::KeyRun;
+use super::search::Sorted;
 use super::simd::{Simd, dispatch, prefetch};
-use super::{Grid, Sorted};
-use crate::Aabb;
+use super::spacing::GridPlan;
 use crate::policy::search::WORK_OF_EXACT_TEST;
+use crate::{Aabb, Algorithm, Plan};
 
 /// Number of boxes between a prefetch and the move.
 const AHEAD: usize = 12;
@@ -81,20 +82,6 @@ impl Spill {
         self.occupied[word] >> bit | self.occupied[word + 1] << 1 << (63 - bit)
     }
 
-    /// Prefetches the memory that a visit reads next.
-    #[inline(always)]
-    pub(super) fn prefetch_heads(&self, (key, count): KeyRun) {
-        if key + count <= self.heads.len() && self.occupied_from(key) << (64 - count.clamp(1, 64)) != 0 {
-            prefetch(&self.heads[key + self.occupied_from(key).trailing_zeros() as usize]);
-        }
-    }
-
-    /// Prefetches the memory that a visit reads first.
-    #[inline(always)]
-    pub(super) fn prefetch(&self, key: usize) {
-        prefetch(self.occupied.as_ptr().wrapping_add(key / 64));
-    }
-
     /// Forgets all entries.
     fn clear(&mut self) {
         for record in &self.records {
@@ -160,9 +147,11 @@ impl EditedGrid {
         records[..*len].iter_mut().chain(oversize).for_each(|record| record.id = names[record.id as usize]);
     }
 
-    /// Returns the grid without the spilled boxes, for reports.
-    pub(crate) fn grid(&self) -> &Grid {
-        &self.grid
+    /// Returns the plan for reports, with this number of valid boxes.
+    pub(crate) fn describe(&self, boxes: u32) -> Plan {
+        let (algorithm, spilled) = (Algorithm::Edit, self.spilled() as u32);
+        let Grid { plan, oversize, .. } = &self.grid;
+        Plan { algorithm, spilled, ..Plan::of_grid(plan, boxes as usize, oversize.len()) }
     }
 
     /// Returns the work of looking up `boxes` boxes among the oversize ones, before and after they move.

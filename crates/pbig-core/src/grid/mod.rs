@@ -8,10 +8,10 @@
 //! A search visits half of each box's neighbouring cells as contiguous runs of slots, tests 64-bit codes (`cells`), and
 //! tests exactly what these leave over.
 
-mod across;
 #[cfg(target_arch = "x86_64")]
 mod avx2;
 mod bounds;
+mod brute;
 mod build;
 mod cells;
 mod count;
@@ -19,28 +19,28 @@ mod edit;
 mod hits;
 mod lookup;
 mod occupied;
-mod oversize;
-mod plan;
 mod record;
 mod search;
 mod simd;
+mod spacing;
 #[cfg(test)]
 mod tests;
 
-pub(crate) use across::{Across, TwoGrids, brute_force_across};
 #[cfg(target_arch = "x86_64")]
 pub(crate) use avx2::Avx2;
+pub(crate) use brute::{brute_force, brute_force_across};
+pub(crate) use build::TwoGrids;
 pub(crate) use count::scattered;
 pub(crate) use edit::EditedGrid;
 pub(crate) use hits::{Hits, Receiver, Rule};
-pub(crate) use lookup::{Budget, Candidates, Meet, Place};
+pub(crate) use lookup::{Budget, Place, Tally};
 pub use occupied::OccupiedCell;
-pub(crate) use oversize::brute_force;
-pub(crate) use plan::GridPlan;
-pub use plan::NeighbourScan;
 pub(crate) use record::Record;
+pub(crate) use search::Sorted;
 pub use simd::simd;
 pub(crate) use simd::{BLOCK, EightBoxes, Portable, Simd, dispatch, prefetch};
+pub(crate) use spacing::GridPlan;
+pub use spacing::NeighbourScan;
 
 use build::BucketCounts;
 
@@ -58,8 +58,6 @@ pub(crate) struct Grid {
     pub(crate) len: usize,
     /// Boxes too large for the cells.
     pub(crate) oversize: Vec<Record>,
-    /// Invalid boxes met by the last build.
-    pub(crate) invalid: u32,
     /// The records by bucket, of the last build.
     coarse: Vec<Record>,
     counts: Vec<BucketCounts>,
@@ -77,9 +75,4 @@ impl Grid {
         // SAFETY: the caller's promise.
         unsafe { &*self.codes.as_ptr().add(first).cast() }
     }
-}
-
-/// A grid as it was built: every box lies in its cell. (A grid that was edited has tombstones, and cannot be searched.)
-pub(crate) struct Sorted<'a> {
-    pub(crate) grid: &'a Grid,
 }

@@ -1,83 +1,135 @@
-//! The search of a whole grid: every pair of overlapping boxes is met once, from the box whose slot comes first or whose
-//! cell is lower.
+//! The search of all boxes in cells: every pair of overlapping boxes is met once. In one grid it is met from the box whose slot comes
+//! first or whose cell is lower.
 
-use super::cells::{Cells, query_of};
+use super::Grid;
+use super::cells::{Cells, query_of, steps_portable};
 use super::hits::{HIT_ROOM, HitWriter, Hits, Rule};
-use super::plan::NeighbourScan;
 use super::record::Record;
 use super::simd::{BLOCK, Simd, dispatch};
-use super::{Grid, Sorted};
+use super::spacing::NeighbourScan;
+use crate::Aabb;
 use crate::parallel::run_with;
-use crate::policy::PARALLEL_FROM_BOXES;
 use std::ops::Range;
 
-/// Number of boxes in a piece of work: enough to hide the cost of handing it out, few enough to balance.
-pub(super) const PIECE: Range<usize> = 512..16_384;
+/// Maximum number of boxes in a piece of work. Threads share smaller pieces, because each of a few boxes may meet many.
+const PIECE: usize = 16_384;
 
 /// Number of oversize boxes in a piece of work.
-pub(super) const OVERSIZE_PIECE: usize = 4;
+const OVERSIZE_PIECE: usize = 4;
 
-impl Sorted<'_> {
+/// Boxes in cells, as they were built: every box lies in its cell. (A grid that was edited has tombstones, and cannot be searched.) Boxes
+/// of one set meet each other. Those of two sets lie in two grids of one plan, and no two boxes of a set meet.
+#[derive(Clone, Copy)]
+pub(crate) struct Sorted<'a> {
+    /// The grid whose boxes are searched for: of two, the one with fewer boxes.
+    pub(super) own: &'a Grid,
+    /// The grid of another set.
+    pub(super) other: Option<&'a Grid>,
+}
+
+/// An oversize box, the grid that it is searched for in, and other oversize boxes that it is tested against.
+type Oversize<'a> = (&'a Record, &'a Grid, &'a [Record]);
+
+impl<'a> Sorted<'a> {
+    /// Returns the grid that is searched.
+    pub(super) fn searched(&self) -> &'a Grid {
+        self.other.unwrap_or(self.own)
+    }
+
+    /// Returns the number of boxes.
+    pub(crate) fn boxes(&self) -> usize {
+        self.own.len + self.other.map_or(0, |other| other.len) + self.oversize_count()
+    }
+
+    /// Returns the number of boxes that are searched for.
+    pub(crate) fn seekers(&self) -> usize {
+        self.own.len + self.oversize_count()
+    }
+
+    /// Returns the number of oversize boxes.
+    pub(crate) fn oversize_count(&self) -> usize {
+        self.own.oversize.len() + self.other.map_or(0, |other| other.oversize.len())
+    }
+
+    /// Returns an oversize box. One of `own` comes first, and meets those of the other set, or those of its own set after it.
+    pub(super) fn oversize(&self, i: usize) -> Oversize<'a> {
+        let own = &self.own.oversize;
+        match self.other {
+            None => (&own[i], self.own, &own[i + 1..]),
+            Some(other) if i < own.len() => (&own[i], other, &other.oversize),
+            Some(other) => (&other.oversize[i - own.len()], self.own, &[]),
+        }
+    }
+
     /// Finds all pairs, into the lists of as many threads as there are `hits`.
     pub(crate) fn search(&self, rule: &Rule<'_>, hits: &mut [Hits]) {
-        let grid = self.grid;
-        let workers = if grid.len + grid.oversize.len() < PARALLEL_FROM_BOXES { 1 } else { hits.len() };
-        let piece = (grid.len / (8 * workers)).clamp(PIECE.start, PIECE.end);
-        let in_grid = grid.len.div_ceil(piece);
-        let pieces = in_grid + grid.oversize.len().div_ceil(OVERSIZE_PIECE);
-        run_with(&mut hits[..workers], pieces, |hits, i| {
+        let (len, oversize) = (self.own.len, self.oversize_count());
+        let wanted = if hits.len() == 1 { 1 } else { 8 * hits.len() };
+        let piece = len.div_ceil(wanted).clamp(1, PIECE);
+        let in_grid = len.div_ceil(piece);
+        run_with(hits, in_grid + oversize.div_ceil(OVERSIZE_PIECE), |hits, i| {
             if hits.is_full {
                 return;
             }
             if i < in_grid {
-                grid.search_slots(i * piece..grid.len.min((i + 1) * piece), rule, hits);
-            } else {
-                let first = (i - in_grid) * OVERSIZE_PIECE;
-                let last = grid.oversize.len().min(first + OVERSIZE_PIECE);
-                (first..last).for_each(|i| grid.find_oversize_pairs(i, rule, hits));
+                return self.search_slots(i * piece..len.min((i + 1) * piece), rule, hits);
             }
+            let first = (i - in_grid) * OVERSIZE_PIECE;
+            (first..oversize.min(first + OVERSIZE_PIECE)).for_each(|i| self.search_oversize(i, rule, hits));
         });
     }
-}
 
-impl Grid {
-    /// Finds the pairs of the boxes in some slots with those behind them.
+    /// Finds the pairs of the boxes in some slots.
     pub(super) fn search_slots(&self, slots: Range<usize>, rule: &Rule<'_>, hits: &mut Hits) {
         dispatch!(search_piece, self, slots.clone(), rule, hits);
+    }
+
+    /// Finds the pairs of an oversize box.
+    pub(super) fn search_oversize(&self, i: usize, rule: &Rule<'_>, hits: &mut Hits) {
+        let (one, grid, others) = self.oversize(i);
+        grid.reached_by(&one.aabb, |run| {
+            let (first, end) = grid.slots(run);
+            hits.runs += 1;
+            hits.test_run(one, &grid.records[first..end], rule);
+        });
+        hits.test_run(one, others, rule);
     }
 }
 
 #[inline(always)]
-fn search_piece(simd: impl Simd, grid: &Grid, slots: Range<usize>, rule: &Rule<'_>, hits: &mut Hits) {
+fn search_piece(simd: impl Simd, sorted: &Sorted<'_>, slots: Range<usize>, rule: &Rule<'_>, hits: &mut Hits) {
     let mut blocks = [0; HIT_ROOM];
     let writer = HitWriter::new(&mut blocks);
-    let mut scan = Scan { simd, cells: grid.plan.cells, own: grid, grid, rule, hits, writer };
-    match (grid.plan.scan, grid.plan.cells.wraps) {
-        (NeighbourScan::Runs, _) => scan.runs(slots),
-        (NeighbourScan::Windows, false) => scan.windows::<false>(slots),
-        (NeighbourScan::Windows, true) => scan.windows::<true>(slots),
+    let (own, grid) = (sorted.own, sorted.searched());
+    let mut scan = Scan { simd, cells: grid.plan.cells, own, grid, rule, hits, writer };
+    match (sorted.other, grid.plan.scan, grid.plan.cells.wraps) {
+        (None, NeighbourScan::Runs, _) => scan.runs(slots),
+        (None, NeighbourScan::Windows, false) => scan.windows::<false>(slots),
+        (None, NeighbourScan::Windows, true) => scan.windows::<true>(slots),
+        (Some(_), _, false) => scan.across::<false>(slots),
+        (Some(_), _, true) => scan.across::<true>(slots),
     }
     scan.finish();
 }
 
 /// A search for the boxes of one grid in another one of the same plan, or in itself.
-pub(super) struct Scan<'a, 'b, S> {
-    pub(super) simd: S,
-    pub(super) cells: Cells,
+struct Scan<'a, 'b, S> {
+    simd: S,
+    cells: Cells,
     /// The grid with the boxes that are searched for.
-    pub(super) own: &'a Grid,
+    own: &'a Grid,
     /// The grid that is searched.
-    pub(super) grid: &'a Grid,
-    pub(super) rule: &'a Rule<'b>,
-    pub(super) hits: &'a mut Hits,
-    pub(super) writer: HitWriter<'a>,
+    grid: &'a Grid,
+    rule: &'a Rule<'b>,
+    hits: &'a mut Hits,
+    writer: HitWriter<'a>,
 }
 
 /// A box that is searched for: its slot, and the query that finds its partners.
 #[derive(Clone, Copy)]
-pub(super) struct Seeker {
-    pub(super) slot: usize,
-    pub(super) query: u64,
+struct Seeker {
+    slot: usize,
+    query: u64,
 }
 
 impl<S: Simd> Scan<'_, '_, S> {
@@ -143,7 +195,7 @@ impl<S: Simd> Scan<'_, '_, S> {
     }
 
     #[inline(always)]
-    pub(super) fn finish(mut self) {
+    fn finish(mut self) {
         let records = (&self.own.records[..], &self.grid.records[..]);
         self.hits.flush(self.simd, &mut self.writer, records, self.rule);
         self.hits.tests += self.writer.tests;
@@ -181,9 +233,28 @@ impl<S: Simd> Scan<'_, '_, S> {
         }
     }
 
+    /// Visits, for each box, the cells of the other grid in which the lower corner of an overlapping box can lie.
+    #[inline(always)]
+    fn across<const WRAPS: bool>(&mut self, slots: Range<usize>) {
+        let cells = self.cells;
+        for slot in slots {
+            if self.hits.is_full {
+                break;
+            }
+            let (low, high) = self.simd.steps(&cells, &self.own.records[slot].aabb);
+            let one = Seeker { slot, query: query_of(self.simd.code(low, high)) };
+            let window = cells.window(low, high);
+            for z in window.low[2]..=window.high[2] {
+                for y in window.low[1]..=window.high[1] {
+                    self.row(one, cells.row::<WRAPS>([window.low[0], y, z], window.high[0]));
+                }
+            }
+        }
+    }
+
     /// Tests a row of cells.
     #[inline(always)]
-    pub(super) fn row(&mut self, one: Seeker, row: [KeyRun; 2]) {
+    fn row(&mut self, one: Seeker, row: [KeyRun; 2]) {
         for run in row {
             self.hits.runs += 1;
             self.slots(one, self.grid.slots(run));
@@ -206,6 +277,24 @@ impl Grid {
     #[inline(always)]
     pub(super) fn slots(&self, (key, count): KeyRun) -> (usize, usize) {
         (self.starts[key] as usize, self.starts[key + count] as usize)
+    }
+
+    /// Visits the cells in which boxes can lie that overlap a box of any size.
+    pub(super) fn reached_by(&self, aabb: &Aabb, mut visit: impl FnMut(KeyRun)) {
+        let cells = &self.plan.cells;
+        let (low, high) = steps_portable(cells, aabb);
+        let window = cells.window(low, high).clipped(cells);
+        for z in window.low[2]..=window.high[2] {
+            for y in window.low[1]..=window.high[1] {
+                let (first, last) = ([window.low[0], y, z], window.high[0]);
+                let row = if cells.wraps {
+                    cells.row::<true>(first, last)
+                } else {
+                    cells.row::<false>(first, last)
+                };
+                row.into_iter().filter(|(_, count)| *count > 0).for_each(&mut visit);
+            }
+        }
     }
 }
 

@@ -1,8 +1,8 @@
 //! Cells and codes never lose an overlapping pair, and every implementation of the inner loops gives the same values.
 
 use super::cells::{Cells, query_of};
-use super::plan::GridPlan;
 use super::simd::{BLOCK, EightBoxes, Portable, Simd, dispatch};
+use super::spacing::GridPlan;
 use crate::Aabb;
 use rand::rngs::StdRng;
 use rand::{RngExt, SeedableRng};

@@ -4,12 +4,13 @@
 //! which boxes lie apart most, and has a part for each class. So a leaf looks at few nodes.
 
 use super::BoxIndex;
-use super::node::{LANES, NONE};
+use super::node::{LANES, NONE, next};
 use crate::grid::{Hits, Rule, Simd, dispatch, scattered};
 use crate::parallel::run_with;
-use crate::policy::{PARALLEL_FROM_BOXES, search};
+use crate::policy::search;
 use crate::{Aabb, Pair};
 use std::ops::Range;
+use std::sync::atomic::AtomicU64;
 
 /// Number of leaves in a piece of work.
 const PIECE: usize = 64;
@@ -23,8 +24,9 @@ const FEW_LANES: u32 = 3;
 impl BoxIndex {
     /// Estimates the work of [`BoxIndex::find_pairs`] that overlaps do not pay for, from some leaves. Stops above `most`. `hits` are
     /// scratch.
-    pub(crate) fn vain_work(&self, split: Option<u32>, rule: &Rule<'_>, most: u64, hits: &mut Hits) -> u64 {
-        let (leaves, earliest) = self.joined(split);
+    pub(crate) fn vain_work(&self, split: Option<u32>, most: u64, hits: &mut Hits) -> u64 {
+        let ((leaves, earliest), found) = (self.joined(split), AtomicU64::new(0));
+        let rule = &Rule::listing(None, &found);
         let (last_leaves, step) = (self.last_leaves(), search::leaves_per_sampled(leaves));
         let mut vain = 0;
         for leaf in scattered(0..leaves as usize, step) {
@@ -53,8 +55,7 @@ impl BoxIndex {
         debug_assert!(self.loose().is_empty());
         let (leaves, earliest) = self.joined(split);
         let (last_leaves, leaves) = (self.last_leaves(), leaves as usize);
-        let workers = if self.leaves as usize * LANES < PARALLEL_FROM_BOXES { 1 } else { hits.len() };
-        run_with(&mut hits[..workers], leaves.div_ceil(PIECE), |hits, piece| {
+        run_with(hits, leaves.div_ceil(PIECE), |hits, piece| {
             let leaves = piece * PIECE..leaves.min((piece + 1) * PIECE);
             let join = &mut Join { index: self, last_leaves: &last_leaves, earliest, rule, hits };
             dispatch!(Join::meet_all, join, leaves.clone());
@@ -148,13 +149,4 @@ impl Join<'_, '_> {
             }
         }
     }
-}
-
-/// Takes the lowest bit out of a mask, and returns its number.
-#[inline(always)]
-fn next(mask: &mut u32) -> Option<usize> {
-    let lane = mask.trailing_zeros() as usize;
-    let is_any = *mask != 0;
-    *mask &= mask.wrapping_sub(1);
-    is_any.then_some(lane)
 }

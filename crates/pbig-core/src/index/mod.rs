@@ -15,7 +15,7 @@ mod question;
 mod refit;
 mod sort;
 #[cfg(test)]
-mod tests;
+pub(crate) mod tests;
 mod walk;
 
 use crate::grid::dispatch;
@@ -24,15 +24,6 @@ use node::{LANES, Node};
 use question::{Near, Question, Sweep};
 use std::sync::atomic::{AtomicU64, Ordering};
 use walk::Walk;
-
-/// The work of a question.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Visited {
-    /// Nodes, of eight boxes each, that were tested.
-    pub nodes: u64,
-    /// Boxes that were handed to the caller.
-    pub boxes: u64,
-}
 
 /// Boxes by id, for questions about places: which boxes does a ray, a moving box, a box or a point meet?
 ///
@@ -92,44 +83,43 @@ impl BoxIndex {
     ///
     /// `visit` returns the time until which further boxes are wanted; boxes that are met just after it may be visited as well.
     /// After a time of 0 no box is wanted. No box is visited twice. With a NaN in the question, or a
-    /// negative time, no box is visited.
+    /// negative time, no box is visited. Returns the number of nodes, of eight boxes each, that were tested.
     pub fn sweep(
         &self,
         start: &Aabb,
         velocity: [f32; 3],
         max_time: f32,
         visit: &mut dyn FnMut(u32) -> f32,
-    ) -> Visited {
-        match Sweep::new(start, velocity, max_time) {
-            Some(question) => self.ask(question, max_time, visit),
-            None => Visited::default(),
-        }
+    ) -> u64 {
+        Sweep::new(start, velocity, max_time).map_or(0, |question| self.ask(question, max_time, visit))
     }
 
     /// Visits the ids of boxes within a distance of a point: those around it first, by id, then the others, about the nearest
     /// first. `visit` returns the distance up to which
-    /// further boxes are wanted; boxes just beyond may be visited as well.
-    pub fn near(&self, point: [f32; 3], max_distance: f32, visit: &mut dyn FnMut(u32) -> f32) -> Visited {
+    /// further boxes are wanted; boxes just beyond may be visited as well. Returns the number of nodes that were tested.
+    pub fn near(&self, point: [f32; 3], max_distance: f32, visit: &mut dyn FnMut(u32) -> f32) -> u64 {
         let is_place = point.iter().all(|x| x.is_finite());
-        if is_place { self.ask(Near { point }, max_distance, visit) } else { Visited::default() }
+        if is_place { self.ask(Near { point }, max_distance, visit) } else { 0 }
     }
 
-    /// Visits the ids of boxes that overlap a box, in ascending order.
-    pub fn overlapping(&self, aabb: &Aabb, visit: &mut dyn FnMut(u32)) -> Visited {
+    /// Visits the ids of boxes that overlap a box, in ascending order. Returns the number of nodes that were tested.
+    pub fn overlapping(&self, aabb: &Aabb, visit: &mut dyn FnMut(u32)) -> u64 {
         self.sweep(aabb, [0.0; 3], 0.0, &mut |id| {
             visit(id);
             0.0
         })
     }
 
-    fn ask<Q: Question>(&self, question: Q, bound: f32, visit: &mut dyn FnMut(u32) -> f32) -> Visited {
+    fn ask<Q: Question>(&self, question: Q, bound: f32, visit: &mut dyn FnMut(u32) -> f32) -> u64 {
         if bound.is_nan() || bound < 0.0 {
-            return Visited::default();
+            return 0;
         }
         // An empty lane is met at infinity.
-        let visited = dispatch!(Walk::answer, Walk::new(self, question, bound.min(f32::MAX), visit));
-        self.looked_at.fetch_add(visited.nodes, Ordering::Relaxed);
-        visited
+        let bound = bound.min(f32::MAX);
+        let walk = Walk { index: self, question, bound, visit, at_start: Vec::new(), looked_at: 0 };
+        let looked_at = dispatch!(Walk::answer, walk);
+        self.looked_at.fetch_add(looked_at, Ordering::Relaxed);
+        looked_at
     }
 
     /// Returns the leaves and the ids of their boxes, for pictures.

@@ -76,55 +76,9 @@ impl Node {
     /// Reads the boxes that a leaf stands for.
     #[inline(always)]
     pub(super) fn read(&mut self, boxes: &[Aabb]) {
-        let mut eight = [&Aabb::NOWHERE; LANES];
         for lane in 0..LANES {
-            if let Some(aabb) = boxes.get(self.children[lane] as usize) {
-                eight[lane] = aabb;
-            }
+            self.set(lane, boxes.get(self.children[lane] as usize).unwrap_or(&Aabb::NOWHERE));
         }
-        self.transpose(eight);
-        let mut is_valid = [1; LANES];
-        for k in 0..3 {
-            for lane in 0..LANES {
-                is_valid[lane] &= u32::from(self.boxes[k][lane] <= self.boxes[k + 3][lane]);
-            }
-        }
-        if is_valid.iter().fold(1, |all, one| all & one) == 0 {
-            self.empty_invalid(&is_valid);
-        }
-    }
-
-    /// Stores eight boxes axis by axis: four at a time, which takes half as long as number by number.
-    #[cfg(target_arch = "x86_64")]
-    #[inline(always)]
-    fn transpose(&mut self, eight: [&Aabb; LANES]) {
-        use std::arch::x86_64::_MM_TRANSPOSE4_PS;
-        for half in 0..2 {
-            let [mut a, mut b, mut c, mut d] = [0, 1, 2, 3].map(|i| eight[4 * half + i].corners());
-            // SAFETY: SSE is part of the architecture.
-            unsafe {
-                _MM_TRANSPOSE4_PS(&mut a.0, &mut b.0, &mut c.0, &mut d.0);
-                _MM_TRANSPOSE4_PS(&mut a.1, &mut b.1, &mut c.1, &mut d.1);
-            }
-            for (axis, four) in self.boxes.iter_mut().zip([a.0, b.0, c.0, a.1, b.1, c.1]) {
-                bytemuck::cast_mut::<Lanes, [[f32; 4]; 2]>(axis)[half] = bytemuck::cast(four);
-            }
-        }
-    }
-
-    #[cfg(not(target_arch = "x86_64"))]
-    #[inline(always)]
-    fn transpose(&mut self, eight: [&Aabb; LANES]) {
-        for lane in 0..LANES {
-            for k in 0..3 {
-                (self.boxes[k][lane], self.boxes[k + 3][lane]) = (eight[lane].min[k], eight[lane].max[k]);
-            }
-        }
-    }
-
-    #[cold]
-    fn empty_invalid(&mut self, is_valid: &[u32; LANES]) {
-        (0..LANES).filter(|lane| is_valid[*lane] == 0).for_each(|lane| self.set(lane, &Aabb::NOWHERE));
     }
 
     /// Returns true if a lane has this box.
@@ -148,4 +102,13 @@ fn fold(lanes: &Lanes, of: impl Fn(f32, f32) -> f32) -> f32 {
     let mut four = [0.0; 4];
     (0..4).for_each(|i| four[i] = of(lanes[i], lanes[i + 4]));
     of(of(four[0], four[2]), of(four[1], four[3]))
+}
+
+/// Takes the lowest bit out of a mask, and returns its number.
+#[inline(always)]
+pub(super) fn next(mask: &mut u32) -> Option<usize> {
+    let lane = mask.trailing_zeros() as usize;
+    let is_any = *mask != 0;
+    *mask &= mask.wrapping_sub(1);
+    is_any.then_some(lane)
 }

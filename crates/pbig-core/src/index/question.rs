@@ -23,10 +23,8 @@ pub(super) struct Sweep {
 enum Axis {
     /// It stays where it is, from the first to the second coordinate.
     Still(f32, f32),
-    /// Its upper and lower end, and the time that it takes for a length unit.
-    Up(f32, f32, f32),
-    /// As `Up`, with a negative time.
-    Down(f32, f32, f32),
+    /// Its front and its back end, and the time that it takes for a length unit: negative if it moves down.
+    Moving(f32, f32, f32),
 }
 
 impl Axis {
@@ -41,7 +39,7 @@ impl Axis {
             return Self::Still(low + reach.min(0.0), high + reach.max(0.0));
         }
         let [low, high] = [low, high].map(finite);
-        if pace > 0.0 { Self::Up(high, low, pace) } else { Self::Down(high, low, pace) }
+        if pace > 0.0 { Self::Moving(high, low, pace) } else { Self::Moving(low, high, pace) }
     }
 
     /// Narrows the times at which the boxes of a node are met.
@@ -54,26 +52,15 @@ impl Axis {
                     leave[i] = if meets { leave[i] } else { f32::NEG_INFINITY };
                 }
             }
-            Self::Up(top, bottom, pace) => narrow(low, top, high, bottom, pace, enter, leave),
-            Self::Down(top, bottom, pace) => narrow(high, bottom, low, top, pace, enter, leave),
+            Self::Moving(front, back, pace) => {
+                let (near, far) = if pace > 0.0 { (low, high) } else { (high, low) };
+                for i in 0..LANES {
+                    let (begins, ends) = ((near[i] - front) * pace, (far[i] - back) * pace);
+                    enter[i] = if begins > enter[i] { begins } else { enter[i] };
+                    leave[i] = if ends < leave[i] { ends } else { leave[i] };
+                }
+            }
         }
-    }
-}
-
-#[inline(always)]
-fn narrow(
-    first: &Lanes,
-    first_end: f32,
-    last: &Lanes,
-    last_end: f32,
-    pace: f32,
-    enter: &mut Lanes,
-    leave: &mut Lanes,
-) {
-    for i in 0..LANES {
-        let (begins, ends) = ((first[i] - first_end) * pace, (last[i] - last_end) * pace);
-        enter[i] = if begins > enter[i] { begins } else { enter[i] };
-        leave[i] = if ends < leave[i] { ends } else { leave[i] };
     }
 }
 

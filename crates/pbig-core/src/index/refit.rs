@@ -76,12 +76,12 @@ impl BoxIndex {
 
     /// Sorts the boxes as they are now.
     pub fn sort(&mut self, boxes: &[Aabb]) {
-        self.sort_sets(boxes, u32::MAX);
+        self.sort_sets(boxes, None);
     }
 
-    /// Sorts the boxes of two sets: ids from `split` on are the second, and no leaf has boxes of both.
-    pub(crate) fn sort_sets(&mut self, boxes: &[Aabb], split: u32) {
-        self.lay_out(boxes, Some(split));
+    /// Sorts the boxes; of two sets, ids from `split` on are the second, and no leaf has boxes of both.
+    pub(crate) fn sort_sets(&mut self, boxes: &[Aabb], split: Option<u32>) {
+        self.lay_out(boxes, Some(split.unwrap_or(u32::MAX)));
     }
 
     /// Reads all boxes.
@@ -106,12 +106,10 @@ impl BoxIndex {
                 next.children.iter().for_each(|id| prefetch(boxes.as_ptr().wrapping_add(*id as usize)));
             }
             index.nodes[leaf as usize].read(boxes);
-            let bounds = index.nodes[leaf as usize].bounds();
-            index.tell_parent(leaf, &bounds);
+            index.tell_parent(leaf);
         }
         for node in index.leaves..index.end {
-            let bounds = index.nodes[node as usize].bounds();
-            index.tell_parent(node, &bounds);
+            index.tell_parent(node);
         }
     }
 
@@ -151,29 +149,27 @@ impl BoxIndex {
         self.extents.push(f32::INFINITY);
     }
 
-    /// Copies the bounds of a node into its parent.
+    /// Copies the bounds of a node into its parent. Returns the parent; none if there is none, or if it has them already.
     #[inline(always)]
-    fn tell_parent(&mut self, node: u32, bounds: &Aabb) {
-        let (place, extent) = (self.parents[node as usize], &mut self.extents[node as usize]);
-        if extent_sum(bounds) > policy::GROWN_TO * *extent {
+    fn tell_parent(&mut self, node: u32) -> Option<u32> {
+        let (bounds, place) = (self.nodes[node as usize].bounds(), self.parents[node as usize]);
+        let extent = &mut self.extents[node as usize];
+        if extent_sum(&bounds) > policy::GROWN_TO * *extent {
             (*extent, self.grown) = (f32::INFINITY, self.grown + 1);
         }
-        if place != NONE {
-            self.nodes[place as usize / LANES].set(place as usize % LANES, bounds);
+        let (parent, lane) = (place / LANES as u32, place as usize % LANES);
+        if place == NONE || self.nodes[parent as usize].holds(lane, &bounds) {
+            return None;
         }
+        self.nodes[parent as usize].set(lane, &bounds);
+        Some(parent)
     }
 
     /// Tells a node's ancestors its bounds, up to the first one that they do not change.
-    fn tell_ancestors(&mut self, mut node: u32) {
-        loop {
-            let (bounds, place) = (self.nodes[node as usize].bounds(), self.parents[node as usize]);
-            let is_known =
-                place == NONE || self.nodes[place as usize / LANES].holds(place as usize % LANES, &bounds);
-            self.tell_parent(node, &bounds);
-            if is_known {
-                return;
-            }
-            node = place / LANES as u32;
+    fn tell_ancestors(&mut self, node: u32) {
+        let mut next = Some(node);
+        while let Some(node) = next {
+            next = self.tell_parent(node);
         }
     }
 

@@ -1,8 +1,8 @@
 //! Walking the nodes that a question meets, nearest first.
 
-use super::node::{LANES, Lanes, NONE, Node};
+use super::BoxIndex;
+use super::node::{LANES, Lanes, NONE, Node, next};
 use super::question::Question;
-use super::{BoxIndex, Visited};
 use crate::grid::Simd;
 use arrayvec::ArrayVec;
 
@@ -13,29 +13,22 @@ const STACK: usize = 128;
 type Waiting = (f32, u32);
 
 pub(super) struct Walk<'a, Q> {
-    index: &'a BoxIndex,
-    question: Q,
-    bound: f32,
+    pub(super) index: &'a BoxIndex,
+    pub(super) question: Q,
+    pub(super) bound: f32,
     /// Called with the id of a box; returns the new bound.
-    visit: &'a mut dyn FnMut(u32) -> f32,
+    pub(super) visit: &'a mut dyn FnMut(u32) -> f32,
     /// Boxes at bound 0, of which crowds have many.
-    at_start: Vec<u32>,
-    visited: Visited,
+    pub(super) at_start: Vec<u32>,
+    /// Nodes.
+    pub(super) looked_at: u64,
 }
 
-impl<'a, Q: Question> Walk<'a, Q> {
-    pub(super) fn new(
-        index: &'a BoxIndex,
-        question: Q,
-        bound: f32,
-        visit: &'a mut dyn FnMut(u32) -> f32,
-    ) -> Self {
-        Self { index, question, bound, visit, at_start: Vec::new(), visited: Visited::default() }
-    }
-
-    /// Visits the boxes. Those at bound 0 come first, by id, so that the lowest id wins among them without a look at the others.
+impl<Q: Question> Walk<'_, Q> {
+    /// Visits the boxes, and returns the number of nodes looked at. Boxes at bound 0 come first, by id, so that the lowest id wins among
+    /// them without a look at the others.
     #[inline(always)]
-    pub(super) fn answer(_: impl Simd, mut walk: Self) -> Visited {
+    pub(super) fn answer(_: impl Simd, mut walk: Self) -> u64 {
         let is_still = walk.bound <= 0.0;
         let bound = std::mem::replace(&mut walk.bound, 0.0);
         walk.walk::<true>();
@@ -44,13 +37,13 @@ impl<'a, Q: Question> Walk<'a, Q> {
         for id in std::mem::take(&mut walk.at_start) {
             walk.take(id);
             if walk.bound <= 0.0 && !is_still {
-                return walk.visited;
+                return walk.looked_at;
             }
         }
         if !is_still {
             walk.walk::<false>();
         }
-        walk.visited
+        walk.looked_at
     }
 
     /// Collects the boxes at bound 0, or visits the others.
@@ -77,7 +70,7 @@ impl<'a, Q: Question> Walk<'a, Q> {
         nodes: &mut ArrayVec<Waiting, STACK>,
     ) {
         let node = &self.index.nodes[number as usize];
-        self.visited.nodes += 1;
+        self.looked_at += 1;
         let met = self.met(node, &self.question.least(node));
         if !is_leaf {
             return nodes.extend(met);
@@ -93,7 +86,6 @@ impl<'a, Q: Question> Walk<'a, Q> {
 
     #[inline(always)]
     fn take(&mut self, id: u32) {
-        self.visited.boxes += 1;
         self.bound = (self.visit)(id).min(f32::MAX);
     }
 
@@ -101,11 +93,8 @@ impl<'a, Q: Question> Walk<'a, Q> {
     #[inline(always)]
     fn met(&self, node: &Node, least: &Lanes) -> ArrayVec<Waiting, LANES> {
         let mut met = ArrayVec::new();
-        let within = (0..LANES).fold(0u32, |mask, i| mask | u32::from(least[i] <= self.bound) << i);
-        let mut rest = within;
-        while rest != 0 {
-            let lane = rest.trailing_zeros() as usize;
-            rest &= rest - 1;
+        let mut within = (0..LANES).fold(0u32, |mask, i| mask | u32::from(least[i] <= self.bound) << i);
+        while let Some(lane) = next(&mut within) {
             if node.children[lane] != NONE {
                 insert(&mut met, (least[lane], node.children[lane]));
             }

@@ -27,25 +27,21 @@ pub(crate) struct Comparison {
 struct Part {
     added: Vec<Pair>,
     removed: Vec<Pair>,
-    dropped: Vec<Pair>,
-    /// An old row without the partners that were removed.
-    stripped: Vec<u32>,
 }
 
 impl Comparison {
-    /// Compares all found pairs with the kept pairs, and keeps the found ones. `is_removed` returns true for a box whose kept
-    /// pairs have already ended. Without it there is no such box. With `names`, a search of these ids alone has found the pairs, and
-    /// their `a` are places in this list.
+    /// Compares all found pairs with the kept pairs, and keeps the found ones. With `names`, a search of these ids alone has found
+    /// the pairs, and their `a` are places in this list.
     pub(crate) fn run(
         &mut self,
         (found, names): (&mut Groups, Option<&[u32]>),
         kept: &mut Kept,
-        is_removed: Option<&(dyn Fn(u32) -> bool + Sync)>,
         workers: usize,
     ) {
         let (grouping, count) = (found.grouping, found.len());
         let mut next = std::mem::take(&mut kept.next);
-        next.prepare(grouping.ids, count);
+        next.spans.resize(grouping.ids, Span::default());
+        next.pool.resize(count, 0);
         self.parts.resize_with(grouping.count, Part::default);
         let parts = SharedSlice::new(&mut self.parts);
         let (spans, pool) = (SharedSlice::new(&mut next.spans), SharedSlice::new(&mut next.pool));
@@ -56,17 +52,15 @@ impl Comparison {
             // SAFETY: each group has its own part, ids and places.
             let (part, spans, pool) =
                 unsafe { (&mut parts.part(group..group + 1)[0], spans.part(ids), pool.part(places)) };
-            part.clear();
+            part.added.clear();
+            part.removed.clear();
             found.sort::<false>(group, sorter, spans, pool, first_place);
             let new = NewRows { names, first_id, first_place, spans, pool };
-            match is_removed {
-                Some(is_removed) => part.compare_stripped(old, &new, is_removed),
-                None => dispatch!(Part::compare, part, old, &new),
-            }
+            dispatch!(Part::compare, part, old, &new);
         });
         kept.next = next;
         self.gather();
-        kept.adopt_next(names, &self.added, &self.removed, &self.dropped);
+        kept.adopt_next(names, &self.added, &self.removed);
     }
 
     /// Forgets all events.
@@ -78,45 +72,26 @@ impl Comparison {
 
     /// Sorts events that were found in any order.
     pub(crate) fn sort(&mut self, ids: usize) {
-        let Self { added, removed, sorted, counts, .. } = self;
-        for events in [added, removed] {
+        let Self { added, removed, dropped, sorted, counts, .. } = self;
+        for events in [added, removed, dropped] {
             groups::sort(events, sorted, counts, ids);
         }
     }
 
-    /// Puts events in order that may be in order already. Those that were found twice are left once.
-    pub(crate) fn put_in_order(&mut self, ids: usize) {
-        let is_sorted = |events: &[Pair]| events.is_sorted_by(|one, next| one < next);
-        if !is_sorted(&self.added) || !is_sorted(&self.removed) {
-            self.sort(ids);
-            self.added.dedup();
-            self.removed.dedup();
-        }
-        self.dropped.sort_unstable();
+    /// Sorts events of which some may have been found twice. These are left once.
+    pub(crate) fn sort_and_dedup(&mut self, ids: usize) {
+        self.sort(ids);
+        self.added.dedup();
+        self.removed.dedup();
         self.dropped.dedup();
     }
 
     fn gather(&mut self) {
         self.clear();
-        let Self { added, removed, dropped, parts, .. } = self;
-        for part in parts {
-            added.extend_from_slice(&part.added);
-            removed.extend_from_slice(&part.removed);
-            dropped.extend_from_slice(&part.dropped);
+        for part in &self.parts {
+            self.added.extend_from_slice(&part.added);
+            self.removed.extend_from_slice(&part.removed);
         }
-    }
-
-    /// Gives back memory.
-    pub(crate) fn shrink(&mut self) {
-        *self = Self::default();
-    }
-}
-
-impl Rows {
-    /// Makes room for `pairs` pairs of `ids` ids. The old content is lost.
-    fn prepare(&mut self, ids: usize, pairs: usize) {
-        self.spans.resize(ids, Span::default());
-        self.pool.resize(pairs, 0);
     }
 }
 
@@ -149,41 +124,12 @@ impl NewRows<'_> {
 }
 
 impl Part {
-    fn clear(&mut self) {
-        self.added.clear();
-        self.removed.clear();
-        self.dropped.clear();
-    }
-
-    /// Compares rows without the kept pairs of removed boxes.
-    fn compare_stripped(&mut self, old: &Rows, new: &NewRows<'_>, is_removed: &(dyn Fn(u32) -> bool + Sync)) {
-        for (a, row) in new.rows() {
-            let is = &new.pool[row];
-            self.strip(a, old.row(a), is_removed);
-            if !row::equal(&self.stripped, is) {
-                row::differences(a, &self.stripped, is, &mut self.added, &mut self.removed);
-            }
-        }
-    }
-
     /// Compares rows, most of which are short and have not changed.
     #[inline(always)]
     fn compare(simd: impl Simd, part: &mut Self, old: &Rows, new: &NewRows<'_>) {
         for (a, is) in new.rows() {
             let was = old.spans[a as usize].range();
             row::compare(simd, a, (&old.pool, was), (new.pool, is), (&mut part.added, &mut part.removed));
-        }
-    }
-
-    fn strip(&mut self, a: u32, was: &[u32], is_removed: &(dyn Fn(u32) -> bool + Sync)) {
-        self.stripped.clear();
-        let has_ended = is_removed(a);
-        for &b in was {
-            if has_ended || is_removed(b) {
-                self.dropped.push(Pair { a, b });
-            } else {
-                self.stripped.push(b);
-            }
         }
     }
 }

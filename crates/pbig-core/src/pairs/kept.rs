@@ -18,9 +18,6 @@ const IDS_OF_EVENT: usize = 32;
 /// Number of pairs between a prefetch of rows and their use.
 const AHEAD: usize = 8;
 
-/// Minimum number of pairs that are sorted by `b` for the rows of `b`.
-const TURN_FROM: usize = 64;
-
 /// Sorted rows of ids, by id. Spare places behind a row are marked as its own.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Rows {
@@ -48,17 +45,8 @@ impl Rows {
         Span { start, len: span.len }
     }
 
-    /// Adds pairs, sorted, to the rows of their `a`.
-    fn insert_all(&mut self, pairs: &[Pair]) {
-        self.for_each_run(pairs, Self::insert);
-    }
-
-    /// Removes pairs, sorted, from the rows of their `a`.
-    fn remove_all(&mut self, pairs: &[Pair]) {
-        self.for_each_run(pairs, Self::remove);
-    }
-
-    fn for_each_run(&mut self, pairs: &[Pair], change: impl Fn(&mut Self, &[Pair])) {
+    /// Changes the rows of the `a` of sorted pairs.
+    fn change(&mut self, pairs: &[Pair], change: fn(&mut Self, &[Pair])) {
         let mut rest = pairs;
         for run in pairs.chunk_by(|one, next| one.a == next.a) {
             (0..run.len().min(AHEAD)).for_each(|i| self.prefetch(&rest[i..]));
@@ -212,10 +200,10 @@ impl Kept {
         Rows { spans, pool }
     }
 
-    /// Inserts added pairs into the rows, and takes removed pairs out.
+    /// Inserts added pairs into the rows, and takes removed pairs out. Both lists are sorted.
     pub(crate) fn apply(&mut self, added: &[Pair], removed: &[Pair]) {
-        self.change(removed, Rows::remove_all);
-        self.change(added, Rows::insert_all);
+        self.change(removed, Rows::remove);
+        self.change(added, Rows::insert);
         self.count(added, removed);
         self.forward.compact(self.len);
         if let Some(rows) = self.backward.get_mut() {
@@ -225,12 +213,7 @@ impl Kept {
 
     /// Changes the rows of `a` and of `b`.
     fn change(&mut self, pairs: &[Pair], change: fn(&mut Rows, &[Pair])) {
-        if !pairs.is_sorted() {
-            let mut sorted = pairs.to_vec();
-            sorted.sort_unstable();
-            return self.change(&sorted, change);
-        }
-        change(&mut self.forward, pairs);
+        self.forward.change(pairs, change);
         self.change_backward(pairs, change);
     }
 
@@ -239,10 +222,8 @@ impl Kept {
         if let Some(rows) = self.backward.get_mut() {
             self.turned.clear();
             self.turned.extend(pairs.iter().map(|pair| Pair { a: pair.b, b: pair.a }));
-            if pairs.len() >= TURN_FROM {
-                self.turned.sort_unstable();
-            }
-            change(rows, &self.turned);
+            self.turned.sort_unstable();
+            rows.change(&self.turned, change);
         }
     }
 
@@ -253,13 +234,7 @@ impl Kept {
     }
 
     /// Takes the compared rows for the kept ones: all, or those of the ids in `names`. No other id has a pair.
-    pub(super) fn adopt_next(
-        &mut self,
-        names: Option<&[u32]>,
-        added: &[Pair],
-        removed: &[Pair],
-        dropped: &[Pair],
-    ) {
+    pub(super) fn adopt_next(&mut self, names: Option<&[u32]>, added: &[Pair], removed: &[Pair]) {
         std::mem::swap(&mut self.forward, &mut self.next);
         if let Some(names) = names {
             std::mem::swap(&mut self.forward.spans, &mut self.next.spans);
@@ -267,19 +242,12 @@ impl Kept {
             rows.for_each(|(id, span)| self.forward.spans[*id as usize] = *span);
         }
         self.count(added, removed);
-        self.count(&[], dropped);
-        let events = added.len() + removed.len() + dropped.len();
+        let events = added.len() + removed.len();
         if names.is_none() || events * IDS_OF_EVENT > self.lower.len() {
             self.backward.take();
         }
-        self.change_backward(dropped, Rows::remove_all);
-        self.change_backward(removed, Rows::remove_all);
-        self.change_backward(added, Rows::insert_all);
-    }
-
-    /// Drops pairs that end without an event.
-    pub(crate) fn drop_pairs(&mut self, dropped: &[Pair]) {
-        self.apply(&[], dropped);
+        self.change_backward(removed, Rows::remove);
+        self.change_backward(added, Rows::insert);
     }
 
     /// Replaces all pairs by sorted ones.
@@ -317,16 +285,17 @@ mod tests {
     fn a_row_that_grows_and_shrinks_keeps_its_place() {
         let mut kept = Kept::default();
         kept.reserve_ids(100);
-        let row = |len: u32| (0..len).flat_map(|i| [Pair { a: 3, b: 10 + i }, Pair { a: 4, b: 10 + i }]);
+        let row =
+            |len: u32| [3, 4].into_iter().flat_map(move |a| (0..len).map(move |i| Pair { a, b: 10 + i }));
         for (shorter, longer) in [(4, 5), (0, 1), (7, 9)] {
             kept.apply(&row(longer).collect::<Vec<_>>(), &[]);
             let places = kept.forward.pool.len();
             for _ in 0..1000 {
-                let last: Vec<Pair> = row(longer).skip(2 * shorter as usize).collect();
+                let last: Vec<Pair> = row(longer).filter(|pair| pair.b >= 10 + shorter).collect();
                 kept.apply(&[], &last);
-                assert!(kept.iter().eq(sorted(row(shorter))));
+                assert!(kept.iter().eq(row(shorter)));
                 kept.apply(&last, &[]);
-                assert!(kept.iter().eq(sorted(row(longer))));
+                assert!(kept.iter().eq(row(longer)));
             }
             assert_eq!(kept.forward.pool.len(), places);
             kept.apply(&[], &row(longer).collect::<Vec<_>>());
@@ -374,20 +343,18 @@ mod tests {
     fn rows_survive_compaction() {
         let mut kept = Kept::default();
         kept.reserve_ids(300);
-        let pairs = |from: u32, to: u32| (from..to).map(|i| Pair { a: i % 7, b: 10 + i }).collect::<Vec<_>>();
+        let pairs = |from: u32, to: u32| {
+            let mut pairs: Vec<_> = (from..to).map(|i| Pair { a: i % 7, b: 10 + i }).collect();
+            pairs.sort_unstable();
+            pairs
+        };
         kept.apply(&pairs(0, 280), &[]);
         kept.apply(&[], &pairs(20, 280));
         for round in 0..50 {
             kept.apply(&pairs(20, 100 + round), &[]);
-            assert!(kept.iter().eq(sorted(pairs(0, 100 + round).into_iter())));
+            assert!(kept.iter().eq(pairs(0, 100 + round)));
             kept.apply(&[], &pairs(20, 100 + round));
         }
         assert!(kept.forward.pool.len() <= 2 * 150 + 300, "{} places", kept.forward.pool.len());
-    }
-
-    fn sorted(pairs: impl Iterator<Item = Pair>) -> std::vec::IntoIter<Pair> {
-        let mut pairs: Vec<Pair> = pairs.collect();
-        pairs.sort_unstable();
-        pairs.into_iter()
     }
 }

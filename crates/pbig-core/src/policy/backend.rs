@@ -63,20 +63,17 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_backend_that_is_asked_for_needs_no_reason() {
-        for device in [None, Some(true), Some(false)] {
-            assert_eq!(choose_backend(Backend::Device, device, 2), Choice::Device);
-            assert_eq!(choose_backend(Backend::Cpu, device, u64::MAX), Choice::Cpu(None));
-            assert_eq!(choose_backend(Backend::Brute, device, u64::MAX), Choice::Cpu(None));
-        }
-    }
-
-    #[test]
-    fn auto_uses_hardware_from_half_a_million_changed_boxes_on() {
+    fn only_auto_needs_a_reason_and_half_a_million_changed_boxes() {
         let auto = |device, changed| choose_backend(Backend::Auto, device, changed);
         assert_eq!(auto(None, u64::MAX), Choice::Cpu(Some(NoDevice::NotGiven)));
         assert_eq!(auto(Some(true), u64::MAX), Choice::Cpu(Some(NoDevice::Software)));
         assert_eq!(auto(Some(false), 499_999), Choice::Cpu(Some(NoDevice::FewChanged)));
         assert_eq!(auto(Some(false), 500_000), Choice::Device);
+        for device in [None, Some(true), Some(false)] {
+            assert_eq!(choose_backend(Backend::Device, device, 2), Choice::Device);
+            for backend in [Backend::Cpu, Backend::Brute] {
+                assert_eq!(choose_backend(backend, device, u64::MAX), Choice::Cpu(None));
+            }
+        }
     }
 }

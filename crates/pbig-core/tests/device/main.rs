@@ -162,60 +162,47 @@ fn lies_about_pairs_do_not_panic_and_end_with_a_new_start() {
 
 #[test]
 fn a_failure_is_reported_and_the_device_is_asked_again() {
-    let mut finder = Finder::with_device(ON_DEVICE, Double::new(Fault::Fails));
     let boxes = random_boxes(1);
-    let mut why = |_| {
-        finder.find(&boxes).expect("few pairs");
-        finder.report().fallback.clone()
-    };
-    let failed = Some("no luck: the CPU does the work".to_owned());
-    assert_eq!([0, 1, 2, 3].map(&mut why), [None, failed.clone(), None, failed]);
-}
-
-#[test]
-fn a_device_that_is_lost_has_no_name() {
-    let mut finder = Finder::with_device(ON_DEVICE, Double::new(Fault::IsLost));
-    assert_eq!(finder.device_name(), Some("a double"));
-    (0..3).for_each(|seed| _ = finder.find(&random_boxes(seed)).expect("few pairs"));
-    assert_eq!(finder.device_name(), None);
-}
-
-#[test]
-fn without_a_device_the_cpu_does_the_work_and_says_so() {
-    let mut finder = Finder::new(ON_DEVICE);
-    let boxes = random_boxes(3);
-    assert_eq!(finder.find(&boxes).expect("few pairs"), oracle::pairs(&boxes));
-    assert_eq!(finder.report().fallback.as_deref(), Some("no device was given: the CPU does the work"));
-}
-
-#[test]
-fn auto_uses_a_device_for_many_boxes_unless_it_is_software() {
-    let mut software = Double::new(Fault::Nothing);
-    software.is_software = true;
-    let few = random_boxes(4);
-    for (device, wanted) in
-        [(Double::new(Fault::Nothing), NoDevice::FewChanged), (software, NoDevice::Software)]
-    {
-        let mut finder = Finder::with_device(Config::DEFAULT, device);
-        finder.find(&few).expect("few pairs");
-        assert_eq!((finder.report().plan.no_device, &finder.report().fallback), (Some(wanted), &None));
+    let on_device = |fault| Finder::with_device(ON_DEVICE, Double::new(fault));
+    for (mut finder, whys) in [
+        (on_device(Fault::Fails), [None, Some("no luck"), None, Some("no luck")]),
+        (on_device(Fault::IsLost), [None, None, Some("lost"), Some("lost")]),
+        (Finder::new(ON_DEVICE), [Some("no device was given"); 4]),
+    ] {
+        for why in whys {
+            assert_eq!(finder.find(&boxes).expect("few pairs"), oracle::pairs(&boxes));
+            let fallback = why.map(|why| format!("{why}: the CPU does the work"));
+            assert_eq!(finder.report().fallback, fallback);
+            let is_there = why.is_none_or(|why| why == "no luck");
+            assert_eq!(finder.device_name(), is_there.then_some("a double"), "{why:?}");
+        }
     }
 }
 
 #[test]
-fn auto_uses_a_device_from_half_a_million_changed_boxes_on() {
+fn auto_uses_hardware_from_half_a_million_changed_boxes_on() {
     let mut boxes = vec![Aabb::NOWHERE; 500_000];
     boxes[7..9].fill(Aabb::new([0.0; 3], [1.0; 3]));
     let pair = [Pair::new(7, 8)];
-    let mut finder = Finder::with_device(Config::DEFAULT, Double::new(Fault::Nothing));
-    for (n, is_used) in [(499_999, false), (500_000, true)] {
+    let mut software = Double::new(Fault::Nothing);
+    software.is_software = true;
+    for (device, n, reason) in [
+        (software, 500_000, Some(NoDevice::Software)),
+        (Double::new(Fault::Nothing), 499_999, Some(NoDevice::FewChanged)),
+        (Double::new(Fault::Nothing), 500_000, None),
+    ] {
+        let mut finder = Finder::with_device(Config::DEFAULT, device.clone());
         assert_eq!(finder.find(&boxes[..n]).expect("a pair"), pair);
-        assert_eq!(finder.report().device.is_some(), is_used);
+        let mut world = BroadPhase::with_device(Config::DEFAULT, device).expect("a margin");
+        for (id, aabb) in (0..).zip(&boxes[..n]) {
+            world.set(id, *aabb, ProxyFilter::ALL).expect("a small id");
+        }
+        assert_eq!(world.update().expect("a pair").added, pair);
+        for report in [finder.report(), world.report()] {
+            assert_eq!((report.plan.no_device, &report.fallback), (reason, &None));
+            assert_eq!(report.device.is_some(), reason.is_none());
+        }
     }
-    let mut world = BroadPhase::with_device(Config::DEFAULT, Double::new(Fault::Nothing)).expect("a margin");
-    (0..).zip(&boxes).for_each(|(id, aabb)| world.set(id, *aabb, ProxyFilter::ALL).expect("a small id"));
-    assert_eq!(world.update().expect("a pair").added, pair);
-    assert!(world.report().device.is_some());
 }
 
 /// A device needs each changed box as it was. Without a device few of them are kept.

@@ -3,16 +3,16 @@
 //! A pair has ended if it overlapped before and does not now, and is new if it did not overlap before and does now. Nothing else is
 //! looked at, so an update takes time in proportion to the changed boxes.
 
-use super::task::Task;
+use super::Task;
+use crate::Pair;
 use crate::broad_phase::world::{Old, World};
-use crate::grid::{Budget, Candidates, EditedGrid, Meet, Place, Record};
+use crate::grid::{Budget, EditedGrid, Place, Record, Tally};
 use crate::holder::Holder;
 use crate::outcome::{End, Outcome};
 use crate::pairs::Comparison;
 use crate::parallel::{SharedSlice, available_threads, piece_range, run_with};
 use crate::policy;
 use crate::report::{Checks, Clock, StageTimes, stage};
-use crate::{Aabb, Algorithm, Pair, Plan, ProxyFilter};
 
 /// The buffers of the engine.
 #[derive(Clone, Debug, Default)]
@@ -26,8 +26,6 @@ pub(crate) struct Edit {
     threads: Vec<Thread>,
     /// Key and number of each changed box.
     order: Vec<u64>,
-    /// Work of the last run.
-    work: u64,
 }
 
 /// Limits of a run: pairs to be listed, and work to be done.
@@ -40,7 +38,7 @@ pub(crate) struct EditLimits {
 /// The findings and buffers of one thread.
 #[derive(Clone, Debug, Default)]
 struct Thread {
-    candidates: Candidates,
+    tally: Tally,
     added: Vec<Pair>,
     removed: Vec<Pair>,
     dropped: Vec<Pair>,
@@ -54,33 +52,32 @@ impl Edit {
         let world = task.world;
         let most = policy::edit_up_to_work(world.present.len(), task.kept.len(), task.store.work);
         let limits = EditLimits { pairs: task.config.limits.pairs(), work: task.unless_forced(most) };
-        let is_done = self.find(world, &mut task.store.grid, task.events, limits);
+        let (is_done, work) = self.find(world, &mut task.store.grid, task.events, limits);
         let check = clock.lap();
         let (end, holder) = if is_done { (End::Done, Holder::Grid) } else { (End::GivenUp, Holder::Nothing) };
         Outcome {
             end,
             holder,
             checks: self.checks(),
-            work: self.work.min(limits.work),
-            plan: Plan { boxes: world.valid(), ..Plan::of_grid(Algorithm::Edit, &task.store.grid) },
+            work: work.min(limits.work),
+            plan: task.store.grid.describe(world.valid),
             stages: StageTimes { check, ..StageTimes::default() },
             ..Outcome::default()
         }
     }
 
     /// Brings `grid` up to date with the changes of the world, and leaves the events in `events`, sorted: all, or more new
-    /// pairs than the limit. Returns false if the work is beyond its limit, and leaves grid and events unusable.
+    /// pairs than the limit. Returns the work, and false if it is beyond its limit. Then grid and events are unusable.
     pub(crate) fn find(
         &mut self,
         world: &World,
         grid: &mut EditedGrid,
         events: &mut Comparison,
         limits: EditLimits,
-    ) -> bool {
+    ) -> (bool, u64) {
         let budget = Budget::new(limits.work);
-        self.work = 0;
         if grid.work_with_oversize(world.changed.len()) > limits.work {
-            return false;
+            return (false, 0);
         }
         self.list(world, grid);
         let threads = if self.before.len() < policy::PARALLEL_FROM_EDITS { 1 } else { available_threads() };
@@ -92,22 +89,13 @@ impl Edit {
             self.find_new(world, grid, &budget, (threads, limits.pairs));
             self.gather(events, world.ids());
         }
-        self.work = budget.spent();
-        !budget.is_over()
-    }
-
-    /// Returns the work of the last run.
-    #[cfg(test)]
-    pub(crate) fn work(&self) -> u64 {
-        self.work
+        (!budget.is_over(), budget.spent())
     }
 
     /// Returns the tests of the last run.
     fn checks(&self) -> Checks {
-        let sum = |of: fn(&Candidates) -> u64| {
-            self.threads.iter().map(|thread| of(&thread.candidates)).sum::<u64>()
-        };
-        let (made, met) = (sum(|candidates| candidates.tests), sum(|candidates| candidates.met));
+        let sum = |of: fn(&Tally) -> u64| self.threads.iter().map(|thread| of(&thread.tally)).sum::<u64>();
+        let (made, met) = (sum(|tally| tally.tests), sum(|tally| tally.met));
         Checks { made, unnecessary: made - met, redundant: 0 }
     }
 
@@ -138,12 +126,19 @@ impl Edit {
         let (before, after) = (&*before, &*after);
         run_with(&mut all[..threads], threads, |thread, piece| {
             let range = piece_range(before.len(), piece, threads);
-            let Thread { candidates, removed, dropped, .. } = thread;
             // SAFETY: each piece has its own range.
             let places = unsafe { places.part(range.clone()) };
-            let (before, after) = (&before[range.clone()], &after[range]);
-            let mut ended = Ended { world, before, after, places, removed, dropped };
-            grid.look_up(before, candidates, budget, &mut ended);
+            let changed = Changed { world, before: &before[range.clone()], after: &after[range] };
+            let Thread { tally, removed, dropped, .. } = thread;
+            grid.look_up(changed.before, tally, budget, |i, stored, place| {
+                if changed.before[i].id == stored.id {
+                    places[i] = place;
+                }
+                if let Some((pair, is_dropped)) = changed.ended(i, stored) {
+                    let pairs = if is_dropped { &mut *dropped } else { &mut *removed };
+                    pairs.push(pair);
+                }
+            });
         });
     }
 
@@ -158,9 +153,14 @@ impl Edit {
         let (before, after) = (&*before, &*after);
         run_with(&mut all[..threads], threads, |thread, piece| {
             let range = piece_range(after.len(), piece, threads);
-            let Thread { candidates, added, .. } = thread;
-            let (before, after) = (&before[range.clone()], &after[range]);
-            grid.look_up(after, candidates, budget, &mut New { world, before, after, added, max_pairs });
+            let changed = Changed { world, before: &before[range.clone()], after: &after[range] };
+            let Thread { tally, added, .. } = thread;
+            grid.look_up(changed.after, tally, budget, |i, stored, _| {
+                // Beyond, the update fails.
+                if added.len() as u64 <= max_pairs {
+                    added.extend(changed.begun(i, stored));
+                }
+            });
         });
     }
 
@@ -180,37 +180,21 @@ impl Thread {
         self.added.clear();
         self.removed.clear();
         self.dropped.clear();
-        self.candidates.clear_counts();
-    }
-}
-
-/// A box at one time, with all that decides about its pairs.
-#[derive(Clone, Copy)]
-struct State<'a> {
-    aabb: &'a Aabb,
-    filter: &'a ProxyFilter,
-}
-
-impl State<'_> {
-    fn pairs_with(&self, other: &Self) -> bool {
-        self.aabb.overlaps(other.aabb) && self.filter.allows(other.filter)
+        self.tally = Tally::default();
     }
 }
 
 impl World {
-    /// Returns a stored box as it was.
-    fn state_before(&self, id: u32) -> State<'_> {
-        match self.change_of(id) {
-            Some(at) => {
-                let Old { aabb, filter } = &self.old[at];
-                State { aabb, filter }
-            }
-            None => self.state_now(id),
-        }
+    /// Returns true if the filters of two boxes allow a pair.
+    fn allows(&self, id: u32, other: u32) -> bool {
+        !self.is_filtered || self.filters[id as usize].allows(&self.filters[other as usize])
     }
 
-    fn state_now(&self, id: u32) -> State<'_> {
-        State { aabb: &self.boxes[id as usize], filter: &self.filters[id as usize] }
+    /// Returns true if the filters of two boxes allowed a pair at the last update.
+    fn allowed(&self, id: u32, other: u32) -> bool {
+        let filter =
+            |id: u32| self.change_of(id).map_or(&self.filters[id as usize], |at| &self.old[at].filter);
+        !self.is_filtered || filter(id).allows(filter(other))
     }
 
     /// Returns true if this box does not report the pair: the other box is itself, or has changed and has the lower id.
@@ -223,74 +207,44 @@ impl World {
     }
 }
 
-/// Meets what changed boxes overlapped.
-struct Ended<'a> {
+/// Changed boxes, each as it was and as it is.
+#[derive(Clone, Copy)]
+struct Changed<'a> {
     world: &'a World,
     before: &'a [Record],
     after: &'a [Record],
-    places: &'a mut [Place],
-    removed: &'a mut Vec<Pair>,
-    dropped: &'a mut Vec<Pair>,
 }
 
-impl Meet for Ended<'_> {
+impl Changed<'_> {
+    /// Returns the pair of a changed box with a stored one that it overlapped, if the pair has ended; and true if one of the two was
+    /// removed.
     #[inline(always)]
-    fn meet(&mut self, i: usize, stored: &Record, place: Place) {
+    fn ended(&self, i: usize, stored: &Record) -> Option<(Pair, bool)> {
         let (world, id, other) = (self.world, self.before[i].id, stored.id);
-        if id == other {
-            self.places[i] = place;
-        }
-        if world.is_met_twice(id, other) {
-            return;
+        if world.is_met_twice(id, other) || !world.allowed(id, other) {
+            return None;
         }
         let still_overlaps = match world.change_of(other) {
             None => self.after[i].overlaps(stored),
             Some(_) => self.after[i].aabb.overlaps(&world.boxes[other as usize]),
         };
-        let refiltered = world.is_filtered;
-        if still_overlaps && !refiltered && world.existed(id, other) {
-            return;
-        }
-        let allowed = |one: State<'_>, other: State<'_>| one.filter.allows(other.filter);
-        if refiltered && !allowed(world.state_before(id), world.state_before(other)) {
-            return;
-        }
-        if !world.existed(id, other) {
-            self.dropped.push(Pair::new(id, other));
-        } else if !(still_overlaps && allowed(world.state_now(id), world.state_now(other))) {
-            self.removed.push(Pair::new(id, other));
-        }
+        let is_dropped = !world.existed(id, other);
+        let has_ended = is_dropped || !still_overlaps || !world.allows(id, other);
+        has_ended.then(|| (Pair::new(id, other), is_dropped))
     }
-}
 
-/// Meets what changed boxes overlap now.
-struct New<'a> {
-    world: &'a World,
-    before: &'a [Record],
-    after: &'a [Record],
-    added: &'a mut Vec<Pair>,
-    /// Beyond, the update fails, and no more pairs are listed.
-    max_pairs: u64,
-}
-
-impl Meet for New<'_> {
+    /// Returns the pair of a changed box with a stored one that it overlaps, if the pair is new.
     #[inline(always)]
-    fn meet(&mut self, i: usize, stored: &Record, _: Place) {
+    fn begun(&self, i: usize, stored: &Record) -> Option<Pair> {
         let (world, id, other) = (self.world, self.after[i].id, stored.id);
-        if world.is_met_twice(id, other) {
-            return;
-        }
-        if world.is_filtered && !world.state_now(id).filter.allows(world.state_now(other).filter) {
-            return;
+        if world.is_met_twice(id, other) || !world.allows(id, other) {
+            return None;
         }
         let overlapped = || match world.change_of(other) {
             None => self.before[i].overlaps(stored),
-            Some(_) => self.before[i].aabb.overlaps(world.state_before(other).aabb),
+            Some(at) => self.before[i].aabb.overlaps(&world.old[at].aabb),
         };
-        let paired = || world.state_before(id).pairs_with(&world.state_before(other));
-        let existed = world.existed(id, other) && overlapped() && (!world.is_filtered || paired());
-        if !existed && self.added.len() as u64 <= self.max_pairs {
-            self.added.push(Pair::new(id, other));
-        }
+        let was_pair = world.existed(id, other) && overlapped() && world.allowed(id, other);
+        (!was_pair).then(|| Pair::new(id, other))
     }
 }

@@ -1,20 +1,22 @@
 //! The engines: each gets a [`Task`], leaves the events in it, and returns an [`Outcome`].
 
-pub(super) mod device;
 pub(super) mod edit;
 mod listed;
+pub(super) mod on_device;
 mod partners;
 mod rebuild;
 mod sweep;
-mod task;
 mod tree;
 
-use crate::Engine;
+use super::world::World;
+use crate::all_pairs::Store;
+use crate::holder::Holder;
 use crate::outcome::Outcome;
+use crate::pairs::{Comparison, Kept};
+use crate::{Config, Engine};
 use edit::Edit;
 use rebuild::Rebuild;
 use sweep::Sweep;
-pub(super) use task::Task;
 use tree::LookUp;
 
 /// The engines on the CPU, each with its buffers.
@@ -34,5 +36,24 @@ impl Engines {
             Engine::Tree => self.tree.run(task),
             Engine::Rebuild => self.rebuild.run(task),
         }
+    }
+}
+
+/// An update: what an engine reads, and where it leaves the events.
+pub(crate) struct Task<'a> {
+    pub(crate) world: &'a World,
+    pub(crate) config: &'a Config,
+    /// The structure that holds the boxes of the last update.
+    pub(crate) holder: Holder,
+    pub(crate) store: &'a mut Store,
+    pub(crate) kept: &'a mut Kept,
+    /// The events. An engine clears them first, and leaves them sorted.
+    pub(crate) events: &'a mut Comparison,
+}
+
+impl Task<'_> {
+    /// Returns the maximum work of an engine. An engine that the caller chose has no limit.
+    pub(super) fn unless_forced(&self, limit: u64) -> u64 {
+        self.config.engine.map_or(limit, |_| u64::MAX)
     }
 }

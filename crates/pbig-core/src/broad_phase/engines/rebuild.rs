@@ -1,8 +1,8 @@
 //! The engine for many changed boxes: all boxes are searched, and the pairs are compared with the kept ones. Where most ids have
 //! no box, the present boxes are listed first, and the search knows them by their places in the list.
 
+use super::Task;
 use super::listed::Listed;
-use super::task::Task;
 use crate::Pair;
 use crate::all_pairs::{AllPairs, Request};
 use crate::broad_phase::world::World;
@@ -48,26 +48,27 @@ impl Rebuild {
     fn compare(&mut self, task: &mut Task<'_>, holder: Holder, is_listed: bool) {
         stage!("diff");
         let world = task.world;
+        if world.has_removed() {
+            drop_pairs_of_removed(world, task.kept);
+        }
         let boxes = if is_listed { self.listed.ids.len() } else { world.ids() };
         self.all_pairs.gather(Grouping::new(boxes), &mut self.groups);
         let names = is_listed.then_some(&self.listed.ids[..]);
         if let Some(names) = names {
             task.store.rename(holder, names);
             self.groups.rename_partners(names);
-            drop_rows_of_removed(world, task.kept);
         }
-        let was_removed = |id: u32| world.was_removed(id);
-        let is_removed: Option<&(dyn Fn(u32) -> bool + Sync)> =
-            if world.has_removed() { Some(&was_removed) } else { None };
-        let workers = AllPairs::workers(boxes);
-        task.events.run((&mut self.groups, names), task.kept, is_removed, workers);
+        task.events.run((&mut self.groups, names), task.kept, AllPairs::workers(boxes));
     }
 }
 
-/// Drops the pairs of removed boxes whose ids are not in a list of the present boxes.
-fn drop_rows_of_removed(world: &World, kept: &mut Kept) {
-    let absent = world.removed().iter().filter(|id| !world.contains(**id));
-    let pairs = |&a: &u32| kept.later_partners(a).iter().map(move |&b| Pair { a, b });
-    let dropped: Vec<Pair> = absent.flat_map(pairs).collect();
-    kept.drop_pairs(&dropped);
+/// Drops the kept pairs of boxes that were removed since the last update. Boxes left after a peak are few, so it reads their rows only.
+fn drop_pairs_of_removed(world: &World, kept: &mut Kept) {
+    let absent = world.removed.iter().copied().filter(|id| !world.contains(*id));
+    let pairs = |a: u32| kept.later_partners(a).iter().map(move |&b| Pair { a, b });
+    let has_ended = |pair: &Pair| world.was_removed(pair.a) || world.was_removed(pair.b);
+    let all = world.present.iter().chain(absent).flat_map(pairs);
+    let mut dropped: Vec<Pair> = all.filter(has_ended).collect();
+    dropped.sort_unstable();
+    kept.apply(&[], &dropped);
 }

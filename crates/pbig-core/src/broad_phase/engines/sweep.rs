@@ -5,8 +5,8 @@
 //! Boxes lie axis by axis, so that eight are tested at once. There is no index to keep. The tests take
 //! a quarter of a microsecond for one changed box of a thousand; each pair that begins or ends takes as long as 256 tests.
 
+use super::Task;
 use super::partners::Partners;
-use super::task::Task;
 use crate::broad_phase::world::World;
 use crate::grid::{BLOCK, EightBoxes, Simd, dispatch};
 use crate::holder::Holder;
@@ -47,7 +47,7 @@ impl Sweep {
         let mut clock = Clock::start();
         let world = task.world;
         task.events.clear();
-        let are_many = 2 * world.changed.len() > world.valid() as usize;
+        let are_many = 2 * world.changed.len() > world.valid as usize;
         self.bring_up_to_date(world, task.holder == Holder::Lanes, are_many);
         let (kept, events) = (&*task.kept, &mut *task.events);
         let (made, met) = dispatch!(Self::sweep, self, world, kept, events, are_many);
@@ -57,7 +57,7 @@ impl Sweep {
             holder: Holder::Lanes,
             checks: Checks { made, unnecessary: made - met, redundant: 0 },
             work: made,
-            plan: Plan { algorithm: Algorithm::Sweep, boxes: world.valid(), ..Plan::default() },
+            plan: Plan { algorithm: Algorithm::Sweep, boxes: world.valid, ..Plan::default() },
             stages: StageTimes { check: clock.lap(), ..StageTimes::default() },
             ..Outcome::default()
         }
@@ -65,7 +65,7 @@ impl Sweep {
 
     /// Stores all boxes, or the changed ones if the blocks hold the boxes of the last update.
     fn bring_up_to_date(&mut self, world: &World, is_current: bool, are_many: bool) {
-        let has_holes = self.free.len() > world.valid() as usize + MAX_HOLES;
+        let has_holes = self.free.len() > world.valid as usize + MAX_HOLES;
         let can_stay = is_current && !has_holes && (self.is_in_order || !are_many);
         if can_stay {
             self.lanes.resize(world.ids(), NONE);

@@ -1,9 +1,9 @@
 //! The engine for few changed boxes where a tree is kept: each is looked up where it is, and what it overlaps is compared with its
 //! kept pairs.
 
+use super::Task;
 use super::listed::Listed;
 use super::partners::Partners;
-use super::task::Task;
 use crate::grid::BLOCK;
 use crate::holder::Holder;
 use crate::outcome::{End, Outcome};
@@ -33,7 +33,7 @@ impl LookUp {
         let made = nodes * BLOCK as u64;
         outcome.checks = Checks { made, unnecessary: made - met, redundant: 0 };
         outcome.work = refit + made + nodes + met;
-        outcome.plan = Plan { algorithm: Algorithm::Tree, boxes: world.valid(), ..Plan::default() };
+        outcome.plan = Plan { algorithm: Algorithm::Tree, boxes: world.valid, ..Plan::default() };
         outcome.end = if nodes + met <= max_work { End::Done } else { End::GivenUp };
         outcome
     }
@@ -61,7 +61,7 @@ impl LookUp {
             // Tested again, because an infinite box meets the empty places of a tree.
             let mut take =
                 |other: u32| now.extend(aabb.overlaps(&world.boxes[other as usize]).then_some(other));
-            nodes += store.tree.overlapping(aabb, &mut take).nodes;
+            nodes += store.tree.overlapping(aabb, &mut take);
             met += now.len() as u64;
             if nodes + met > max_work {
                 break;

@@ -1,12 +1,11 @@
 //! The engine on a device: only what has changed goes there, only pairs that were added or removed come back.
 
-use super::task::Task;
+use super::Task;
 use crate::broad_phase::world::{Old, World};
-use crate::device::{ChangeRequest, ChangedBox, DeviceFound, PairDevice};
 use crate::device_slot::DeviceSlot;
 use crate::holder::Holder;
 use crate::outcome::{End, Outcome};
-use crate::{Aabb, Pair};
+use crate::{Aabb, ChangeRequest, ChangedBox, DeviceFound, Pair, PairDevice};
 
 /// Leaves the events of an update in the task. Gives up if the device cannot do the work.
 pub(crate) fn run(slot: &mut DeviceSlot, task: &mut Task<'_>) -> Outcome {
@@ -23,7 +22,7 @@ pub(crate) fn run(slot: &mut DeviceSlot, task: &mut Task<'_>) -> Outcome {
         outcome.holder = Holder::Device;
         sort_out(&found, task);
     } else {
-        outcome.plan.boxes = task.world.valid();
+        outcome.plan.boxes = task.world.valid;
         // The structure on the CPU is untouched, so the next update may go on with it.
         outcome.holder = if task.holder == Holder::Device { Holder::Nothing } else { task.holder };
     }
@@ -51,7 +50,7 @@ fn sort_out(found: &DeviceFound, task: &mut Task<'_>) {
     let begins = |(pair, is_kept): (Pair, bool)| (!is_kept || !existed(&pair)).then_some(pair);
     events.removed.extend(kept.look_up(&found.ended).filter_map(ends));
     events.added.extend(kept.look_up(&found.pairs).filter_map(begins));
-    for &id in world.removed() {
+    for &id in &world.removed {
         events.dropped.extend(kept.partners(id).map(|other| Pair::new(id, other)));
     }
     let overlaps = |pair: &Pair| world.boxes[pair.a as usize].overlaps(&world.boxes[pair.b as usize]);
@@ -60,5 +59,5 @@ fn sort_out(found: &DeviceFound, task: &mut Task<'_>) {
         let pairs = kept.partners(id).map(|other| Pair::new(id, other));
         events.removed.extend(pairs.filter(|pair| existed(pair) && !(overlaps(pair) && allows(pair))));
     }
-    events.put_in_order(world.ids());
+    events.sort_and_dedup(world.ids());
 }

@@ -1,6 +1,6 @@
 //! The plan in a report: what was done, and why, in words.
 
-use crate::grid::{EditedGrid, GridPlan, NeighbourScan};
+use crate::grid::{GridPlan, NeighbourScan};
 use crate::policy::NoDevice;
 use std::fmt;
 
@@ -77,17 +77,10 @@ pub struct Plan {
 }
 
 impl Plan {
-    /// Describes a grid that was used.
-    pub(crate) fn of_grid(algorithm: Algorithm, edited: &EditedGrid) -> Self {
-        let (grid, spilled) = (edited.grid(), edited.spilled() as u32);
-        let (boxes, oversize) = (grid.len + grid.oversize.len(), grid.oversize.len());
-        Self { spilled, ..Self::of_cells(algorithm, &grid.plan, boxes, oversize) }
-    }
-
-    /// Describes the cells of a grid, or of two.
-    pub(crate) fn of_cells(algorithm: Algorithm, plan: &GridPlan, boxes: usize, oversize: usize) -> Self {
+    /// Describes a search of a grid, or of two with one plan.
+    pub(crate) fn of_grid(plan: &GridPlan, boxes: usize, oversize: usize) -> Self {
         Self {
-            algorithm,
+            algorithm: Algorithm::Grid,
             boxes: boxes as u32,
             origin: plan.cells.origin(),
             cell: plan.cells.edges(),
@@ -95,14 +88,6 @@ impl Plan {
             scan: plan.scan,
             oversize: oversize as u32,
             ..Self::default()
-        }
-    }
-
-    fn write_device(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "device: {} boxes", self.boxes)?;
-        match &self.device {
-            Some(plan) => write!(f, "; {plan}"),
-            None => write!(f, ", every pair is tested"),
         }
     }
 
@@ -130,7 +115,10 @@ impl fmt::Display for Plan {
             Algorithm::Tree => {
                 write!(f, "tree: cells would hold too many of {boxes} boxes, or few have changed")?
             }
-            Algorithm::Device => self.write_device(f)?,
+            Algorithm::Device => match &self.device {
+                Some(plan) => write!(f, "device: {boxes} boxes; {plan}")?,
+                None => write!(f, "device: {boxes} boxes, every pair is tested")?,
+            },
             Algorithm::Grid => write!(f, "grid: {boxes} boxes are sorted and searched")?,
             Algorithm::Edit => {
                 write!(f, "edit: {} of {boxes} boxes are out of the grid's order", self.spilled)?
