@@ -1,7 +1,7 @@
 //! Contract: a device that fails or is lost at any moment costs no pair and no event.
 
 use super::{find, on_cpu, set, with_device};
-use pbig_core::{Aabb, Backend, BroadPhase, Config, Finder, ProxyFilter, oracle};
+use pbig_core::{Backend, BroadPhase, Config, Finder, ProxyFilter, oracle};
 use pbig_gpu::testing::Fault;
 use pbig_gpu::{Coding, GpuFinder, GpuFinders, GpuOptions, adapters};
 use pbig_harness::follower::Follower;
