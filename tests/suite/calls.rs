@@ -143,3 +143,26 @@ fn repeated_calls_allocate_for_rare_plans_only() {
     let added = weigher.inner.stats().totals.added - before;
     assert!(added > 1000, "{added} pairs");
 }
+
+#[test]
+fn the_collision_pipeline_works_as_with_stock() {
+    let (mut bodies, mut colliders) = (RigidBodySet::new(), ColliderSet::new());
+    let sensor = || {
+        let shape = ColliderBuilder::cuboid(1.0, 1.0, 1.0).sensor(true);
+        shape.active_collision_types(ActiveCollisionTypes::all())
+    };
+    let first = colliders.insert(sensor());
+    colliders.insert(sensor());
+    let (mut broad_phase, mut narrow_phase) = (PbigBroadPhase::new(), NarrowPhase::new());
+    let prediction = IntegrationParameters::default().prediction_distance();
+    CollisionPipeline::new().step(
+        prediction,
+        &mut broad_phase,
+        &mut narrow_phase,
+        &mut bodies,
+        &mut colliders,
+        &(),
+        &(),
+    );
+    assert_eq!(narrow_phase.intersection_pairs_with(first).filter(|(_, _, hit)| *hit).count(), 1);
+}

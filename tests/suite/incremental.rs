@@ -187,3 +187,46 @@ fn bad_arguments_are_errors() {
     assert!(matches!(error, Error::TooManyBoxes { boxes: 4_294_967_296, .. }));
     assert!(!broad_phase.remove(5), "an unknown id is not there");
 }
+
+#[test]
+fn the_same_events_on_any_number_of_threads() {
+    let boxes = BoxSet::named("pile").expect("the set exists").boxes(20_000, 2);
+    let run = |threads| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool");
+        pool.install(|| {
+            let mut broad_phase = BroadPhase::new(Config::DEFAULT).expect("a good margin");
+            let mut all = Vec::new();
+            for round in 0..3 {
+                for (id, aabb) in moved(&boxes, 0.05, round).into_iter().enumerate() {
+                    broad_phase.set(id as u32, aabb, ProxyFilter::ALL).expect("a small id");
+                }
+                all.push(broad_phase.update().expect("within the limits").clone());
+            }
+            all
+        })
+    };
+    let wanted = run(1);
+    assert!([2, 5, 16].into_iter().all(|threads| run(threads) == wanted));
+}
+
+#[test]
+fn boxes_that_moved_once_and_came_to_rest_stop_costing() {
+    let boxes = BoxSet::named("unit").expect("the set exists").boxes(10_000, 5);
+    let mut broad_phase = BroadPhase::new(Config::DEFAULT).expect("a good margin");
+    for (id, aabb) in boxes.iter().enumerate() {
+        broad_phase.set(id as u32, *aabb, ProxyFilter::ALL).expect("a small id");
+    }
+    broad_phase.update().expect("within the limits");
+    for (id, aabb) in moved(&boxes[..1000], 0.1, 1).into_iter().enumerate() {
+        broad_phase.set(id as u32, aabb, ProxyFilter::ALL).expect("a small id");
+    }
+    let mut made = 0;
+    for frame in 0..40 {
+        broad_phase
+            .set(5000, Aabb::from_center([frame as f32; 3], [0.5; 3]), ProxyFilter::ALL)
+            .expect("a small id");
+        broad_phase.update().expect("within the limits");
+        made = broad_phase.report().checks.made;
+    }
+    assert!(made < 200, "{made} checks for one moving box: {}", broad_phase.report().plan);
+}

@@ -125,3 +125,17 @@ fn upstream_14_endless_falls_are_found_at_the_same_cost() {
         assert!(broad_phase.first_difference().is_none(), "{name}: {:?}", broad_phase.first_difference());
     }
 }
+
+#[test]
+fn a_large_world_gives_the_same_bits_on_one_and_two_threads() {
+    let scene = Scene::named("column").expect("the scene exists");
+    let run = |threads| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool");
+        pool.install(|| {
+            let mut run = Run::new(scene, 6000, 5, PbigBroadPhase::new());
+            (0..60).for_each(|_| run.step());
+            run.world.pose_bits()
+        })
+    };
+    assert!(run(1) == run(2));
+}

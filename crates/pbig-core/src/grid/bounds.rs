@@ -1,7 +1,7 @@
 //! Bounds and sizes of a set of boxes, from which the plan of a grid follows.
 
 use crate::Aabb;
-use crate::parallel::{piece_range, run_with};
+use crate::parallel::{SharedSlice, piece_range, run};
 
 /// Maximum coordinate. Larger ones count as this one, so that a width never overflows.
 const FARTHEST: f32 = 1e37;
@@ -12,31 +12,32 @@ pub(super) const SAMPLE_SIZE: usize = 128;
 /// Maximum number of boxes looked at for a sample: some may be invalid.
 const SAMPLE_TRIES: usize = 1024;
 
-/// Maximum number of threads that measure boxes.
-const MAX_THREADS: usize = 64;
-
 /// Size classes: one for each power of two of the largest extent.
 const CLASSES: usize = 256;
 
 /// Smallest and largest corners, and the largest extents, of the valid boxes.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Bounds {
-    pub(super) low: [f32; 3],
-    pub(super) high: [f32; 3],
-    pub(super) extent: [f32; 3],
+    pub(super) low: [f32; 4],
+    pub(super) high: [f32; 4],
+    pub(super) extent: [f32; 4],
 }
 
 impl Bounds {
-    const NONE: Self = Self { low: [FARTHEST; 3], high: [-FARTHEST; 3], extent: [0.0; 3] };
+    const NONE: Self = Self { low: [FARTHEST; 4], high: [-FARTHEST; 4], extent: [0.0; 4] };
 
     /// Measures all boxes.
     pub(super) fn of(boxes: &[Aabb], workers: usize) -> Self {
-        let mut parts = [Self::NONE; MAX_THREADS];
-        let threads = workers.clamp(1, MAX_THREADS);
-        run_with(&mut parts[..threads], threads, |part, piece| {
-            *part = part.merged(&measure(&boxes[piece_range(boxes.len(), piece, threads)]));
+        let pieces = workers.max(1);
+        let mut parts = [Self::NONE; 64];
+        let shared = SharedSlice::new(&mut parts);
+        let pieces = pieces.min(64);
+        run(workers, pieces, |_, piece| {
+            let part = measure(&boxes[piece_range(boxes.len(), piece, pieces)]);
+            // SAFETY: each piece writes its own part.
+            unsafe { shared.write(piece, part) }
         });
-        parts[..threads].iter().fold(Self::NONE, |all, part| all.merged(part)).limited()
+        parts[..pieces].iter().fold(Self::NONE, |all, part| all.merged(part)).limited()
     }
 
     fn merged(self, other: &Self) -> Self {
@@ -90,11 +91,29 @@ fn greater(x: f32, y: f32) -> f32 {
     if x > y { x } else { y }
 }
 
-fn largest(extent: &[f32; 3]) -> f32 {
+fn largest(extent: &[f32]) -> f32 {
     extent[0].max(extent[1]).max(extent[2])
 }
 
-/// Measures some boxes.
+/// Widens bounds to some boxes, three axes at once: every x86-64 has the instructions.
+#[cfg(target_arch = "x86_64")]
+fn measure(boxes: &[Aabb]) -> Bounds {
+    use std::arch::x86_64::*;
+    let mut all = Bounds::NONE;
+    let lanes = |of: [f32; 4]| bytemuck::cast::<_, __m128>(of);
+    let (mut low, mut high, mut extent) = (lanes(all.low), lanes(all.high), lanes(all.extent));
+    for (min, max) in boxes.iter().map(Aabb::corners) {
+        // SAFETY: SSE is part of the architecture. The second operand wins where the first is NaN.
+        (low, high, extent) = unsafe {
+            (_mm_min_ps(min, low), _mm_max_ps(max, high), _mm_max_ps(_mm_sub_ps(max, min), extent))
+        };
+    }
+    [all.low, all.high, all.extent] = [low, high, extent].map(bytemuck::cast);
+    all
+}
+
+/// Widens bounds to some boxes.
+#[cfg(not(target_arch = "x86_64"))]
 fn measure(boxes: &[Aabb]) -> Bounds {
     let mut all = Bounds::NONE;
     for aabb in boxes {
@@ -177,16 +196,50 @@ pub(super) struct SizeClass {
 
 /// Counts valid boxes by size class. Counted rather than sampled: a sample misses a thousand large boxes among a million
 /// small ones.
-pub(super) fn size_classes(boxes: &[Aabb]) -> [SizeClass; CLASSES] {
-    let mut classes = [SizeClass::default(); CLASSES];
-    for aabb in boxes.iter().filter(|aabb| aabb.is_valid()) {
+pub(super) fn size_classes(boxes: &[Aabb], workers: usize) -> SizeClasses {
+    if workers <= 1 {
+        return classes_of(boxes);
+    }
+    let pieces = workers.min(16);
+    let mut parts = [NO_CLASSES; 16];
+    let shared = SharedSlice::new(&mut parts);
+    run(workers, pieces, |_, piece| {
+        let part = classes_of(&boxes[piece_range(boxes.len(), piece, pieces)]);
+        // SAFETY: each piece writes its own part.
+        unsafe { shared.write(piece, part) }
+    });
+    let mut all = parts[0];
+    for part in &parts[1..pieces] {
+        all.iter_mut().zip(part).for_each(|(all, part)| all.add(part.boxes, part.extent));
+    }
+    all
+}
+
+fn classes_of(boxes: &[Aabb]) -> SizeClasses {
+    let mut classes = NO_CLASSES;
+    boxes.iter().for_each(|aabb| count(&mut classes, aabb));
+    classes
+}
+
+type SizeClasses = [SizeClass; CLASSES];
+
+const NO_CLASSES: SizeClasses = [SizeClass { boxes: 0, extent: [0.0; 3] }; CLASSES];
+
+impl SizeClass {
+    #[inline(always)]
+    fn add(&mut self, boxes: u32, extent: [f32; 3]) {
+        self.boxes += boxes;
+        self.extent = std::array::from_fn(|k| self.extent[k].max(extent[k]));
+    }
+}
+
+#[inline(always)]
+fn count(classes: &mut SizeClasses, aabb: &Aabb) {
+    if aabb.is_valid() {
         let extent = aabb.extents();
         // The exponent; a NaN, of a point at infinity, counts as infinite.
-        let class = &mut classes[(largest(&extent).to_bits() >> 23 & 255) as usize];
-        class.boxes += 1;
-        class.extent = std::array::from_fn(|k| class.extent[k].max(extent[k]));
+        classes[(largest(&extent).to_bits() >> 23 & 255) as usize].add(1, extent);
     }
-    classes
 }
 
 #[cfg(test)]
@@ -218,7 +271,7 @@ mod tests {
             Aabb::new([0.0; 3], [1.5, 0.5, 0.25]),
             Aabb::new([f32::INFINITY; 3], [f32::INFINITY; 3]),
         ];
-        let classes = size_classes(&boxes);
+        let classes = size_classes(&boxes, 2);
         assert_eq!((classes[127].boxes, classes[127].extent), (1, [1.5, 0.5, 0.25]));
         assert_eq!(classes[255].boxes, 1);
         assert_eq!(classes.iter().map(|class| class.boxes).sum::<u32>(), 2);

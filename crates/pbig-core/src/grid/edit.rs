@@ -82,6 +82,20 @@ impl Spill {
         self.occupied[word] >> bit | self.occupied[word + 1] << 1 << (63 - bit)
     }
 
+    /// Prefetches the memory that a visit reads next.
+    #[inline(always)]
+    pub(super) fn prefetch_heads(&self, (key, count): KeyRun) {
+        if key + count <= self.heads.len() && self.occupied_from(key) << (64 - count.clamp(1, 64)) != 0 {
+            prefetch(&self.heads[key + self.occupied_from(key).trailing_zeros() as usize]);
+        }
+    }
+
+    /// Prefetches the memory that a visit reads first.
+    #[inline(always)]
+    pub(super) fn prefetch(&self, key: usize) {
+        prefetch(self.occupied.as_ptr().wrapping_add(key / 64));
+    }
+
     /// Forgets all entries.
     fn clear(&mut self) {
         for record in &self.records {

@@ -61,7 +61,7 @@ pub(crate) struct Hits {
     pub(crate) group_shift: u32,
     /// Candidates tested.
     pub(crate) tests: u64,
-    /// Candidates that their codes do not tell apart, which are tested exactly.
+    /// Candidates that their codes leave to the exact test.
     vague: u64,
     /// Runs of cells, or nodes of a tree, looked at.
     pub(crate) runs: u64,
@@ -169,12 +169,20 @@ impl Hits {
     #[inline(always)]
     fn test(&mut self, own: &[Record], records: &[Record], candidates: usize, rule: &Rule<'_>) {
         let from = self.pairs.len();
+        self.pairs.reserve(candidates + 1);
         let (queries, places) = (&self.queries[..candidates], &self.places[..candidates + AHEAD]);
-        let tested = |i: usize| {
-            prefetch(records.as_ptr().wrapping_add(places[i + AHEAD] as usize));
-            (&own[queries[i] as usize], &records[places[i] as usize])
-        };
-        push_overlapping(&mut self.pairs, candidates, tested);
+        // SAFETY: the pairs have room for all candidates, and for one more that is overwritten.
+        unsafe {
+            let start = self.pairs.as_mut_ptr().add(from);
+            let mut next = start;
+            for (i, query) in queries.iter().enumerate() {
+                prefetch(records.as_ptr().wrapping_add(places[i + AHEAD] as usize));
+                let (one, other) = (&own[*query as usize], &records[places[i] as usize]);
+                next.write(Pair::new(one.id, other.id));
+                next = next.add(usize::from(one.overlaps(other)));
+            }
+            self.pairs.set_len(from + next.offset_from(start) as usize);
+        }
         self.keep(from, rule);
     }
 
@@ -220,8 +228,24 @@ impl Hits {
         for run in run.chunks(BATCH) {
             let from = self.pairs.len();
             self.tests += run.len() as u64;
-            push_overlapping(&mut self.pairs, run.len(), |i| (one, &run[i]));
+            self.push_overlapping(one, run);
             self.keep(from, rule);
+        }
+    }
+
+    /// Appends the pairs of a box with those of a run that overlap it.
+    fn push_overlapping(&mut self, one: &Record, run: &[Record]) {
+        let from = self.pairs.len();
+        self.pairs.reserve(run.len() + 1);
+        // SAFETY: there is room for a pair of each, and one more to be overwritten.
+        unsafe {
+            let start = self.pairs.as_mut_ptr().add(from);
+            let mut next = start;
+            for other in run {
+                next.write(Pair::new(one.id, other.id));
+                next = next.add(usize::from(one.overlaps(other)));
+            }
+            self.pairs.set_len(from + next.offset_from(start) as usize);
         }
     }
 
@@ -255,27 +279,5 @@ impl Hits {
             kept += usize::from(allow(&by_id[pair.a as usize], &by_id[pair.b as usize]));
         }
         self.pairs.truncate(kept);
-    }
-}
-
-/// Tests `count` pairs of boxes exactly, and appends those that overlap.
-#[inline(always)]
-fn push_overlapping<'a>(
-    pairs: &mut Vec<Pair>,
-    count: usize,
-    tested: impl Fn(usize) -> (&'a Record, &'a Record),
-) {
-    let from = pairs.len();
-    pairs.reserve(count + 1);
-    // SAFETY: there is room for a pair of each, and for one more that is overwritten.
-    unsafe {
-        let start = pairs.as_mut_ptr().add(from);
-        let mut next = start;
-        for i in 0..count {
-            let (one, other) = tested(i);
-            next.write(Pair::new(one.id, other.id));
-            next = next.add(usize::from(one.overlaps(other)));
-        }
-        pairs.set_len(from + next.offset_from(start) as usize);
     }
 }

@@ -4,10 +4,19 @@ use super::cells::query_of;
 use super::edit::EditedGrid;
 use super::record::Record;
 use super::search::KeyRun;
-use super::simd::{BLOCK, Simd, dispatch};
+use super::simd::{BLOCK, Simd, dispatch, prefetch};
 use crate::Aabb;
 use crate::policy::search::{WORK_OF_ENTRY, WORK_OF_EXACT_TEST};
 use std::sync::atomic::{AtomicU64, Ordering};
+
+/// Maximum number of candidates that are tested together.
+const ROOM: usize = 4096;
+
+/// Candidates that are tested together for each box of a short list.
+const ROOM_PER_BOX: usize = 32;
+
+/// Number of rows of cells in a round: enough for the first row's codes to arrive before the last row is prefetched.
+const ROWS: usize = 256;
 
 /// Place of a stored box.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -20,6 +29,23 @@ pub(crate) enum Place {
     Oversize(u32),
     /// Nowhere: the box was absent or invalid.
     Nowhere,
+}
+
+/// A row of cells to look through for a box.
+#[derive(Clone, Copy, Debug)]
+struct Row {
+    query: u64,
+    /// The number of the box.
+    i: u32,
+    /// The first key and the one after the last; later the slots.
+    first: u32,
+    end: u32,
+}
+
+impl Row {
+    fn cells(&self) -> KeyRun {
+        (self.first as usize, (self.end - self.first) as usize)
+    }
 }
 
 /// The work that look-ups may take, and what all threads have taken. Beyond the limit they end early.
@@ -48,20 +74,46 @@ impl Budget {
 /// Work that a thread does before it adds it to the total.
 const CHARGED_TOGETHER: u64 = 4096;
 
-/// The counts of a thread's look-ups.
+/// Buffers of a look-up: candidates as the number of the box and a slot, or an entry of the spill list.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct Tally {
+pub(crate) struct Candidates {
+    rows: Vec<Row>,
+    boxes: Vec<u32>,
+    places: Vec<u32>,
+    len: usize,
+    room: usize,
     /// Stored boxes tested.
     pub(crate) tests: u64,
-    /// Stored boxes that overlapped, each box itself included.
-    pub(crate) met: u64,
     /// The work: tests of codes, rows, and exact tests of what lies out of order.
     work: u64,
     /// The part of the work that other threads know of.
     charged: u64,
+    /// Stored boxes that overlapped, each box itself included.
+    pub(crate) met: u64,
 }
 
-impl Tally {
+impl Candidates {
+    /// Makes room for the candidates of some boxes.
+    fn begin(&mut self, boxes: usize) {
+        self.room = ROOM.min(boxes * ROOM_PER_BOX).max(self.room);
+        self.boxes.resize(self.room + 2 * BLOCK, 0);
+        self.places.resize(self.room + 2 * BLOCK, 0);
+        self.len = 0;
+    }
+
+    /// Forgets what was counted.
+    pub(crate) fn clear_counts(&mut self) {
+        (self.tests, self.met, self.work, self.charged) = (0, 0, 0, 0);
+    }
+
+    /// Counts the candidates from `from` on, which are entries of lists.
+    #[inline(always)]
+    fn count_entries(&mut self, from: usize) {
+        let entries = (self.len - from) as u64;
+        self.tests += entries;
+        self.work += entries * WORK_OF_ENTRY;
+    }
+
     /// Returns true while the budget lasts.
     #[inline(always)]
     fn may_go_on(&mut self, budget: &Budget) -> bool {
@@ -78,136 +130,227 @@ impl Tally {
     }
 }
 
+/// Marks an entry of the spill list. Slots are below 2^28.
+const SPILL: u32 = 1 << 31;
+
 impl EditedGrid {
     /// Hands every stored box that overlaps one of `boxes` to `meet`, with the number of that one; some only, if the budget does not
     /// suffice. Invalid boxes meet nothing.
-    pub(crate) fn look_up<M: FnMut(usize, &Record, Place)>(
+    pub(crate) fn look_up(
         &self,
         boxes: &[Record],
-        tally: &mut Tally,
+        candidates: &mut Candidates,
         budget: &Budget,
-        meet: M,
+        mut meet: impl FnMut(usize, &Record, Place),
     ) {
-        let look_up = &mut LookUp { grid: self, tally, budget, meet };
+        candidates.begin(boxes.len());
+        let look_up = &mut LookUp { grid: self, boxes, candidates, budget, meet: &mut meet };
         if self.grid.plan.cells.wraps {
-            dispatch!(LookUp::all::<true>, look_up, boxes);
+            dispatch!(LookUp::in_cells::<true>, look_up);
         } else {
-            dispatch!(LookUp::all::<false>, look_up, boxes);
+            dispatch!(LookUp::in_cells::<false>, look_up);
         }
-        tally.charge(budget);
+        for (i, one) in boxes.iter().enumerate().filter(|(_, one)| one.aabb.is_valid()) {
+            if !candidates.may_go_on(budget) {
+                break;
+            }
+            self.meet_oversize(i, one, candidates, &mut meet);
+        }
+        candidates.charge(budget);
+    }
+
+    fn meet_oversize(
+        &self,
+        i: usize,
+        one: &Record,
+        counts: &mut Candidates,
+        meet: &mut impl FnMut(usize, &Record, Place),
+    ) {
+        let mut counted = |stored: &Record, place: Place| {
+            counts.tests += 1;
+            counts.work += WORK_OF_EXACT_TEST;
+            if one.overlaps(stored) {
+                counts.met += 1;
+                counts.work += WORK_OF_ENTRY;
+                meet(i, stored, place);
+            }
+        };
+        for (place, stored) in self.grid.oversize.iter().enumerate() {
+            counted(stored, Place::Oversize(place as u32));
+        }
+        if !self.grid.plan.cells.takes(&one.aabb) {
+            let work = self.visit_reached(&one.aabb, counted);
+            counts.work += work;
+        }
+    }
+
+    /// Visits all boxes in the cells that an oversize box reaches. Returns the work of finding them.
+    fn visit_reached(&self, aabb: &Aabb, mut visit: impl FnMut(&Record, Place)) -> u64 {
+        let mut work = 0;
+        self.grid.reached_by(aabb, |run| {
+            work += WORK_OF_ENTRY;
+            let (first, end) = self.grid.slots(run);
+            for (slot, stored) in (first..end).zip(&self.grid.records[first..end]) {
+                visit(stored, Place::Slot(slot as u32));
+            }
+            self.spill.visit(run, |entry| visit(self.spill.record(entry), Place::Spill(entry)));
+        });
+        work
     }
 
     /// Hands stored boxes that overlap `aabb` to `visit`.
     pub(crate) fn overlapping(&self, aabb: &Aabb, visit: &mut dyn FnMut(u32)) {
         let one = [Record::new(*aabb, u32::MAX, 0)];
-        let (tally, budget) = (&mut Tally::default(), &Budget::new(u64::MAX));
-        self.look_up(&one, tally, budget, |_, stored, _| visit(stored.id));
+        let (candidates, budget) = (&mut Candidates::default(), &Budget::new(u64::MAX));
+        self.look_up(&one, candidates, budget, |_, stored, _| visit(stored.id));
     }
 }
 
 struct LookUp<'a, M> {
     grid: &'a EditedGrid,
-    tally: &'a mut Tally,
+    boxes: &'a [Record],
+    candidates: &'a mut Candidates,
     budget: &'a Budget,
-    meet: M,
+    meet: &'a mut M,
 }
 
+/// In three rounds over many rows, so that memory is asked for long before it is read: where the cells begin, then the codes
+/// in them, then the records of matching codes.
 impl<M: FnMut(usize, &Record, Place)> LookUp<'_, M> {
     #[inline(always)]
-    fn all<const WRAPS: bool>(simd: impl Simd, look_up: &mut Self, boxes: &[Record]) {
-        for (i, one) in boxes.iter().enumerate() {
-            if !look_up.tally.may_go_on(look_up.budget) {
-                break;
+    fn in_cells<const WRAPS: bool>(simd: impl Simd, look_up: &mut Self) {
+        look_up.candidates.rows.clear();
+        for i in 0..look_up.boxes.len() {
+            if look_up.grid.grid.plan.cells.takes(&look_up.boxes[i].aabb) {
+                look_up.list::<WRAPS>(simd, i);
             }
-            if simd.takes(&look_up.grid.grid.plan.cells, &one.aabb) {
-                look_up.in_cells::<WRAPS>(simd, i, one);
-            } else if one.aabb.is_valid() {
-                look_up.in_reach(i, one);
-            } else {
-                continue;
-            }
-            for (entry, stored) in (0..).zip(&look_up.grid.grid.oversize) {
-                look_up.test_counted(i, one, stored, Place::Oversize(entry), WORK_OF_EXACT_TEST);
+            if look_up.candidates.rows.len() >= ROWS {
+                look_up.look_through(simd);
+                if look_up.budget.is_over() {
+                    break;
+                }
             }
         }
+        look_up.look_through(simd);
+        look_up.test();
     }
 
-    /// Visits the cells in which the lower corner of an overlapping box can lie.
+    /// Lists the rows of cells in which the lower corner of an overlapping box can lie.
     #[inline(always)]
-    fn in_cells<const WRAPS: bool>(&mut self, simd: impl Simd, i: usize, one: &Record) {
+    fn list<const WRAPS: bool>(&mut self, simd: impl Simd, i: usize) {
         let cells = &self.grid.grid.plan.cells;
-        let (low, high) = simd.steps(cells, &one.aabb);
+        let (low, high) = simd.steps(cells, &self.boxes[i].aabb);
         let (query, window) = (query_of(simd.code(low, high)), cells.window(low, high));
         for z in window.low[2]..=window.high[2] {
             for y in window.low[1]..=window.high[1] {
-                let row = cells.row::<WRAPS>([window.low[0], y, z], window.high[0]);
-                for run in row.into_iter().filter(|(_, count)| *count > 0) {
-                    self.tally.work += 1;
-                    self.spilled(i, one, run, WORK_OF_ENTRY);
-                    self.slots(simd, query, (i, one), run);
+                let [run, rest] = cells.row::<WRAPS>([window.low[0], y, z], window.high[0]);
+                self.push(i, query, run);
+                if WRAPS && rest.1 > 0 {
+                    self.push(i, query, rest);
                 }
             }
         }
     }
 
-    /// Tests the spilled boxes of a run of cells.
     #[inline(always)]
-    fn spilled(&mut self, i: usize, one: &Record, run: KeyRun, work: u64) {
-        let spill = &self.grid.spill;
-        if !spill.is_empty() {
-            spill.visit(run, |entry| {
-                self.test_counted(i, one, spill.record(entry), Place::Spill(entry), work);
+    fn push(&mut self, i: usize, query: u64, (key, count): KeyRun) {
+        prefetch(self.grid.grid.starts.as_ptr().wrapping_add(key));
+        self.grid.spill.prefetch(key);
+        let row = Row { query, i: i as u32, first: key as u32, end: (key + count) as u32 };
+        self.candidates.rows.push(row);
+    }
+
+    /// Gathers the candidates of all rows listed.
+    #[inline(always)]
+    fn look_through(&mut self, simd: impl Simd) {
+        let mut rows = std::mem::take(&mut self.candidates.rows);
+        let grid = &self.grid.grid;
+        self.candidates.work += rows.len() as u64;
+        if !self.grid.spill.is_empty() {
+            rows.iter().for_each(|row| self.grid.spill.prefetch_heads(row.cells()));
+            self.spilled(&rows);
+        }
+        let mut slots = 0;
+        for row in &mut rows {
+            (row.first, row.end) = (grid.starts[row.first as usize], grid.starts[row.end as usize]);
+            slots += u64::from(row.end - row.first);
+            prefetch(grid.codes.as_ptr().wrapping_add(row.first as usize));
+        }
+        self.candidates.tests += slots;
+        self.candidates.work += slots;
+        if self.candidates.may_go_on(self.budget) {
+            for row in &rows {
+                self.slots(simd, row);
+            }
+        }
+        rows.clear();
+        self.candidates.rows = rows;
+    }
+
+    /// Gathers the candidates of a run of slots.
+    #[inline(always)]
+    fn slots(&mut self, simd: impl Simd, row: &Row) {
+        let grid = &self.grid.grid;
+        for first in (row.first..row.end).step_by(BLOCK) {
+            let beyond = (row.end - first).min(BLOCK as u32);
+            let Candidates { boxes, places, len, .. } = &mut *self.candidates;
+            // SAFETY: `first` is below an end that comes from `starts`; `len` is at most `room`, and the lists have two blocks more.
+            let (codes, boxes, places) = unsafe {
+                let [boxes, places] = [boxes, places].map(|list| &mut *list.as_mut_ptr().add(*len).cast());
+                (grid.block(first as usize), boxes, places)
+            };
+            let mask = simd.test(row.query, codes) & ((1u32 << beyond) - 1);
+            *len += simd.expand(row.i, first, mask, boxes, places);
+            prefetch(grid.records.as_ptr().wrapping_add(places[0] as usize & 0xFFF_FFFF));
+            if self.candidates.len > self.candidates.room {
+                self.test();
+            }
+        }
+    }
+
+    /// Gathers the spilled boxes in rows of cells; not all if there are more than the budget allows.
+    #[inline(always)]
+    fn spilled(&mut self, rows: &[Row]) {
+        let grid = self.grid;
+        // Candidates from here on are not counted yet.
+        let (mut uncounted, mut may_go_on) = (self.candidates.len, true);
+        for row in rows {
+            grid.spill.visit(row.cells(), |entry| {
+                prefetch(grid.spill.record(entry));
+                let at = self.candidates.len;
+                (self.candidates.boxes[at], self.candidates.places[at]) = (row.i, entry | SPILL);
+                self.candidates.len += 1;
+                if self.candidates.len > self.candidates.room {
+                    self.candidates.count_entries(uncounted);
+                    uncounted = 0;
+                    self.test();
+                    may_go_on = self.candidates.may_go_on(self.budget);
+                }
             });
-        }
-    }
-
-    /// Tests the slots of a run of cells, first by their codes.
-    #[inline(always)]
-    fn slots(&mut self, simd: impl Simd, query: u64, (i, one): (usize, &Record), run: KeyRun) {
-        let grid = &self.grid.grid;
-        let (first, end) = grid.slots(run);
-        self.tally.tests += (end - first) as u64;
-        self.tally.work += (end - first) as u64;
-        for first in (first..end).step_by(BLOCK) {
-            let beyond = (end - first).min(BLOCK) as u32;
-            // SAFETY: `first` is below an end that comes from `starts`.
-            let block = unsafe { grid.block(first) };
-            let mut mask = simd.test(query, block) & ((1u32 << beyond) - 1);
-            while mask != 0 {
-                let slot = first + mask.trailing_zeros() as usize;
-                mask &= mask - 1;
-                self.test(i, one, &grid.records[slot], Place::Slot(slot as u32));
+            if !may_go_on {
+                break;
             }
         }
+        self.candidates.count_entries(uncounted);
     }
 
-    /// Tests all boxes in the cells that an oversize box reaches.
-    fn in_reach(&mut self, i: usize, one: &Record) {
-        let grid = &self.grid.grid;
-        grid.reached_by(&one.aabb, |run| {
-            self.tally.work += WORK_OF_ENTRY;
-            let (first, end) = grid.slots(run);
-            for (slot, stored) in (first as u32..).zip(&grid.records[first..end]) {
-                self.test_counted(i, one, stored, Place::Slot(slot), WORK_OF_EXACT_TEST);
+    /// Tests the candidates so far exactly.
+    #[inline(always)]
+    fn test(&mut self) {
+        let candidates = self.candidates.len;
+        for at in 0..candidates {
+            let (i, place) = (self.candidates.boxes[at] as usize, self.candidates.places[at]);
+            let (stored, place) = if place & SPILL == 0 {
+                (&self.grid.grid.records[place as usize], Place::Slot(place))
+            } else {
+                (self.grid.spill.record(place & !SPILL), Place::Spill(place & !SPILL))
+            };
+            if self.boxes[i].overlaps(stored) {
+                self.candidates.met += 1;
+                self.candidates.work += WORK_OF_ENTRY;
+                (self.meet)(i, stored, place);
             }
-            self.spilled(i, one, run, WORK_OF_EXACT_TEST);
-        });
-    }
-
-    /// Tests a stored box, and counts the test and its work.
-    #[inline(always)]
-    fn test_counted(&mut self, i: usize, one: &Record, stored: &Record, place: Place, work: u64) {
-        self.tally.tests += 1;
-        self.tally.work += work;
-        self.test(i, one, stored, place);
-    }
-
-    #[inline(always)]
-    fn test(&mut self, i: usize, one: &Record, stored: &Record, place: Place) {
-        if one.overlaps(stored) {
-            self.tally.met += 1;
-            self.tally.work += WORK_OF_ENTRY;
-            (self.meet)(i, stored, place);
         }
+        self.candidates.len = 0;
     }
 }

@@ -33,7 +33,7 @@ pub(crate) use build::TwoGrids;
 pub(crate) use count::scattered;
 pub(crate) use edit::EditedGrid;
 pub(crate) use hits::{Hits, Receiver, Rule};
-pub(crate) use lookup::{Budget, Place, Tally};
+pub(crate) use lookup::{Budget, Candidates, Place};
 pub use occupied::OccupiedCell;
 pub(crate) use record::Record;
 pub(crate) use search::Sorted;

@@ -2,7 +2,7 @@
 //! first or whose cell is lower.
 
 use super::Grid;
-use super::cells::{Cells, query_of, steps_portable};
+use super::cells::{Cells, Window, query_of, steps_portable};
 use super::hits::{HIT_ROOM, HitWriter, Hits, Rule};
 use super::record::Record;
 use super::simd::{BLOCK, Simd, dispatch};
@@ -285,6 +285,10 @@ impl Grid {
         let (low, high) = steps_portable(cells, aabb);
         let window = cells.window(low, high).clipped(cells);
         for z in window.low[2]..=window.high[2] {
+            if cells.are_whole_rows(&window) {
+                visit(cells.layer(&window, z));
+                continue;
+            }
             for y in window.low[1]..=window.high[1] {
                 let (first, last) = ([window.low[0], y, z], window.high[0]);
                 let row = if cells.wraps {
@@ -311,5 +315,19 @@ impl Cells {
         let before_border = count.min(self.dims[0] - x);
         let behind_border = (self.key([0, y, z]) as usize, (count - before_border) as usize);
         [(self.key([x, y, z]) as usize, before_border as usize), behind_border]
+    }
+
+    /// Returns true if a window has all cells of its rows, so that its rows in a layer follow each other.
+    fn are_whole_rows(&self, window: &Window) -> bool {
+        let [first, last] = if self.wraps { [0, self.dims[0] - 1] } else { [1, self.dims[0] - 2] };
+        let is_aligned = !self.wraps || window.low[1] >= 0 && window.high[1] < self.dims[1];
+        window.low[0] <= first && window.high[0] >= last && is_aligned
+    }
+
+    /// Returns all rows of a window in a layer as one run: the border cells between them are empty.
+    fn layer(&self, window: &Window, z: i32) -> KeyRun {
+        let z = if self.wraps { z & (self.dims[2] - 1) } else { z };
+        let first = self.key([0, window.low[1], z]) as usize;
+        (first, self.key([self.dims[0] - 1, window.high[1], z]) as usize + 1 - first)
     }
 }

@@ -29,7 +29,11 @@ impl GridPlan {
         let all = Bounds::of(boxes, workers);
         let space = all.trimmed(&sample);
         let is_mixed = all.largest() > policy::MIXED_SIZE_RATIO * sample.median_extent();
-        let extent = if is_mixed { cheapest_extent(&size_classes(boxes), &space) } else { all.extent };
+        let extent = if is_mixed {
+            cheapest_extent(&size_classes(boxes, workers)[..], &space)
+        } else {
+            std::array::from_fn(|k| all.extent[k])
+        };
         Spacing::new(boxes.len(), space, extent).uncrowded(&sample).plan()
     }
 }
@@ -86,7 +90,7 @@ impl Spacing {
     fn new(boxes: usize, space: Bounds, extent: [f32; 3]) -> Self {
         let volume: f64 = (0..3).map(|k| space.width(k)).product();
         let edge = (policy::BOXES_PER_CELL * volume / boxes.max(1) as f64).cbrt();
-        let origin = space.low.map(f64::from);
+        let origin = std::array::from_fn(|k| f64::from(space.low[k]));
         let mut spacing = Self { boxes, space, extent, edge, origin, wraps: false };
         while spacing.count() > spacing.most_cells() {
             spacing.edge *= 1.5;

@@ -228,6 +228,10 @@ impl GpuDevice {
         self.queue.submit([encoder.finish()])
     }
 
+    pub(super) fn take_back(&self) {
+        self.is_lost.store(false, Ordering::Relaxed);
+    }
+
     /// Marks the device as lost, because its state is unknown.
     pub(super) fn give_up(&self) -> GpuError {
         self.is_lost.store(true, Ordering::Relaxed);

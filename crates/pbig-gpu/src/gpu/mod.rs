@@ -14,6 +14,7 @@ mod attempts;
 mod changes;
 mod chunk;
 mod coding;
+mod declined;
 mod error;
 mod gpu_device;
 mod gpu_plan;
@@ -42,6 +43,7 @@ use gpu_plan::GpuPlan;
 pub use several::GpuFinders;
 
 use crate::GpuOptions;
+use declined::Declined;
 use gpu_device::GpuDevice;
 use job::Job;
 use pbig_core::internal::Clock;
@@ -49,6 +51,10 @@ use pbig_core::{ChangeRequest, DeviceFailure, DeviceFound, PairDevice, SearchReq
 use search::search;
 use session::Session;
 use std::sync::Arc;
+use std::time::Duration;
+
+/// Time that a call waits for a device of the app that was busy for too long.
+const PROBE: Duration = Duration::from_millis(10);
 
 /// The origin of a finder's device. It tells where to look for another one when the device is lost.
 #[derive(Clone, Debug)]
@@ -69,8 +75,7 @@ pub struct GpuFinder {
     device: Option<Arc<GpuDevice>>,
     session: Option<Session>,
     failed: Option<(Clock, String)>,
-    /// [`pbig_core::Backend::Auto`] takes a software adapter for hardware, in tests.
-    pretends_hardware: bool,
+    declined: Declined,
 }
 
 /// A copy shares the device and has buffers of its own.
@@ -127,7 +132,7 @@ impl GpuFinder {
             device: None,
             session: None,
             failed: None,
-            pretends_hardware: false,
+            declined: Declined::default(),
         }
     }
 
@@ -186,7 +191,17 @@ impl GpuFinder {
     /// Runs a search, and notes how it went.
     async fn run(&mut self, job: &Job<'_>, found: &mut DeviceFound) -> Result<(), Failure> {
         self.check_pause()?;
+        let boxes = job.boxes.len();
+        if let Some(why) = self.declined.unseen(boxes) {
+            self.forget();
+            return Err(Failure::Declined(why));
+        }
         let result = self.try_run(job, found).await;
+        match &result {
+            Err(Failure::Declined(why)) => self.declined.note(boxes, why),
+            Ok(()) => self.declined = Declined::default(),
+            Err(_) => {}
+        }
         self.failed = match &result {
             // Another call in the page is in progress.
             Err(Failure::Device(GpuError::Busy)) => self.failed.take(),
@@ -241,6 +256,13 @@ impl GpuFinder {
             return Ok(device.clone());
         }
         self.session = None;
+        // An app's device may only have been busy for too long.
+        if let (Source::Given, Some(device)) = (&self.source, &self.device)
+            && device.is_idle_within(PROBE)
+        {
+            device.take_back();
+            return Ok(device.clone());
+        }
         let device = match &self.source {
             Source::Shared => GpuDevice::shared().await?,
             Source::Own(name) => Arc::new(GpuDevice::on(&adapter::choose(name.as_deref()).await?).await?),
@@ -280,7 +302,7 @@ impl PairDevice for GpuFinder {
     }
 
     fn is_software(&self) -> bool {
-        self.is_software() && !self.pretends_hardware
+        self.is_software()
     }
 
     fn clone_box(&self) -> Box<dyn PairDevice> {

@@ -23,11 +23,6 @@ impl super::GpuFinders {
 }
 
 impl GpuFinder {
-    /// Makes [`pbig_core::Backend::Auto`] take a software adapter for hardware.
-    pub fn pretend_hardware(&mut self) {
-        self.pretends_hardware = true;
-    }
-
     /// Makes the device fail after this number of submissions.
     pub fn inject(&self, fault: Fault, submissions: u32) {
         if let Some(device) = &self.device {

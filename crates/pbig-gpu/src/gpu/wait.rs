@@ -41,11 +41,15 @@ pub(super) async fn map(
 }
 
 impl GpuDevice {
-    /// Returns true if the device finishes all its work, and an empty submission, within a second.
     pub(super) fn is_alive(&self) -> bool {
+        self.is_idle_within(Duration::from_secs(1))
+    }
+
+    /// Returns true if the device finishes all its work, and an empty submission, in time.
+    pub(super) fn is_idle_within(&self, limit: Duration) -> bool {
         let scope = self.handle.push_error_scope(wgpu::ErrorFilter::Validation);
         let submission = self.queue.submit([self.encoder().finish()]);
-        let finished = self.poll(submission, Duration::from_secs(1)).is_ok();
+        let finished = self.poll(submission, limit).is_ok();
         let refused = pollster::block_on(scope.pop()).is_some();
         finished && !refused
     }

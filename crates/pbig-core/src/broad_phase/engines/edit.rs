@@ -6,7 +6,7 @@
 use super::Task;
 use crate::Pair;
 use crate::broad_phase::world::{Old, World};
-use crate::grid::{Budget, EditedGrid, Place, Record, Tally};
+use crate::grid::{Budget, Candidates, EditedGrid, Place, Record};
 use crate::holder::Holder;
 use crate::outcome::{End, Outcome};
 use crate::pairs::Comparison;
@@ -38,7 +38,7 @@ pub(crate) struct EditLimits {
 /// The findings and buffers of one thread.
 #[derive(Clone, Debug, Default)]
 struct Thread {
-    tally: Tally,
+    candidates: Candidates,
     added: Vec<Pair>,
     removed: Vec<Pair>,
     dropped: Vec<Pair>,
@@ -76,13 +76,13 @@ impl Edit {
         limits: EditLimits,
     ) -> (bool, u64) {
         let budget = Budget::new(limits.work);
+        self.threads.iter_mut().for_each(Thread::clear);
         if grid.work_with_oversize(world.changed.len()) > limits.work {
             return (false, 0);
         }
         self.list(world, grid);
         let threads = if self.before.len() < policy::PARALLEL_FROM_EDITS { 1 } else { available_threads() };
         self.threads.resize_with(threads.max(self.threads.len()), Thread::default);
-        self.threads.iter_mut().for_each(Thread::clear);
         self.find_ended(world, grid, &budget, threads);
         if !budget.is_over() {
             grid.move_all(&self.after, &self.places);
@@ -94,8 +94,10 @@ impl Edit {
 
     /// Returns the tests of the last run.
     fn checks(&self) -> Checks {
-        let sum = |of: fn(&Tally) -> u64| self.threads.iter().map(|thread| of(&thread.tally)).sum::<u64>();
-        let (made, met) = (sum(|tally| tally.tests), sum(|tally| tally.met));
+        let sum = |of: fn(&Candidates) -> u64| {
+            self.threads.iter().map(|thread| of(&thread.candidates)).sum::<u64>()
+        };
+        let (made, met) = (sum(|candidates| candidates.tests), sum(|candidates| candidates.met));
         Checks { made, unnecessary: made - met, redundant: 0 }
     }
 
@@ -129,8 +131,8 @@ impl Edit {
             // SAFETY: each piece has its own range.
             let places = unsafe { places.part(range.clone()) };
             let changed = Changed { world, before: &before[range.clone()], after: &after[range] };
-            let Thread { tally, removed, dropped, .. } = thread;
-            grid.look_up(changed.before, tally, budget, |i, stored, place| {
+            let Thread { candidates, removed, dropped, .. } = thread;
+            grid.look_up(changed.before, candidates, budget, |i, stored, place| {
                 if changed.before[i].id == stored.id {
                     places[i] = place;
                 }
@@ -154,8 +156,8 @@ impl Edit {
         run_with(&mut all[..threads], threads, |thread, piece| {
             let range = piece_range(after.len(), piece, threads);
             let changed = Changed { world, before: &before[range.clone()], after: &after[range] };
-            let Thread { tally, added, .. } = thread;
-            grid.look_up(changed.after, tally, budget, |i, stored, _| {
+            let Thread { candidates, added, .. } = thread;
+            grid.look_up(changed.after, candidates, budget, |i, stored, _| {
                 // Beyond, the update fails.
                 if added.len() as u64 <= max_pairs {
                     added.extend(changed.begun(i, stored));
@@ -180,17 +182,19 @@ impl Thread {
         self.added.clear();
         self.removed.clear();
         self.dropped.clear();
-        self.tally = Tally::default();
+        self.candidates.clear_counts();
     }
 }
 
 impl World {
     /// Returns true if the filters of two boxes allow a pair.
+    #[inline(always)]
     fn allows(&self, id: u32, other: u32) -> bool {
         !self.is_filtered || self.filters[id as usize].allows(&self.filters[other as usize])
     }
 
     /// Returns true if the filters of two boxes allowed a pair at the last update.
+    #[inline(always)]
     fn allowed(&self, id: u32, other: u32) -> bool {
         let filter =
             |id: u32| self.change_of(id).map_or(&self.filters[id as usize], |at| &self.old[at].filter);
@@ -198,10 +202,12 @@ impl World {
     }
 
     /// Returns true if this box does not report the pair: the other box is itself, or has changed and has the lower id.
+    #[inline(always)]
     fn is_met_twice(&self, id: u32, other: u32) -> bool {
         other < id && self.change_of(other).is_some() || other == id
     }
 
+    #[inline(always)]
     fn existed(&self, id: u32, other: u32) -> bool {
         !self.was_removed(id) && !self.was_removed(other)
     }
