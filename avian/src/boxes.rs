@@ -72,7 +72,7 @@ impl ColliderBoxes {
     ) -> Result<(), Error> {
         self.update = self.update.wrapping_add(1);
         self.moved.clear();
-        // Avian names each proxy once. So all are set, whatever becomes of one of them.
+        // Avian names each proxy once. So all are set, even if one of them fails.
         let mut all = self.begin_anew(trees, lost, keys);
         for &key in moved.proxies() {
             all = all.and(self.set(trees, key).map(|id| id.into_iter().for_each(|id| self.note_moved(id))));

@@ -49,7 +49,7 @@ pub trait BoxStore<A: Bounds>: Clone + Debug + Default + Send + Sync {
     /// Changes the margin of boxes that are set after this call.
     fn set_margin(&mut self, core: &mut BroadPhase, margin: f32) -> Result<(), Error>;
 
-    /// Returns that margin.
+    /// Returns the margin of boxes that are set from now on.
     fn margin(&self, core: &BroadPhase) -> f32;
 
     /// Stores the AABB and the filter of a collider.
@@ -93,7 +93,7 @@ pub trait BoxStore<A: Bounds>: Clone + Debug + Default + Send + Sync {
         true
     }
 
-    /// Returns a bound for that query that is not below this one.
+    /// Returns the bound of the narrowed query, which is not below this bound.
     fn narrow_bound(&self, bound: A::Real) -> f32;
 }
 

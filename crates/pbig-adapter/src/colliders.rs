@@ -34,7 +34,7 @@ pub struct Colliders<T: Tree> {
     tree: SceneTree<T>,
     pub(crate) counts: Counts,
     last_error: Option<Error>,
-    /// The last call had nothing to do and left nothing to do.
+    /// True if the last call had nothing to do and left nothing to do.
     is_idle: bool,
     /// The last call stored only some of the listed colliders: a shape panicked, or the core refused a box. The next call
     /// reads all colliders, because rapier lists a change only once.

@@ -70,8 +70,9 @@ pub(crate) struct SceneIndex {
     is_fresh: AtomicBool,
     /// Questions that a grid has answered since the index was fresh.
     asked_of_grid: AtomicU32,
-    /// Held while the index is brought up to date. Nobody waits for `state` to write, so that a query within a query, on the
-    /// thread that reads it already, does not wait for a writer that waits for that thread.
+    /// Held while the index is brought up to date. A writer never waits for readers of `state`: a sort gives up while there is
+    /// one, and a refresh runs while there is none. Otherwise a query inside a query could wait for a writer that waits for the
+    /// outer query.
     refreshing: Mutex<()>,
 }
 

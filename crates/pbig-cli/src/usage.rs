@@ -5,7 +5,7 @@ use pbig_harness::output::Failure;
 use std::error::Error;
 use std::ffi::OsString;
 
-/// Clap's finding, and the command whose options those are.
+/// Returns clap's message in one line, with the command whose help has the options.
 pub(crate) fn failure(error: &clap::Error, cli: &clap::Command, first: Option<OsString>) -> Failure {
     let command = first.and_then(|name| cli.find_subcommand(name));
     let command = command.map_or(String::new(), |command| format!("{} ", command.get_name()));
@@ -29,7 +29,7 @@ fn line(error: &clap::Error) -> String {
     }
 }
 
-/// Without the usage, and without tips: these are guesses, often of what was not meant.
+/// Returns the message without usage and tips. Tips are guesses, and often wrong.
 fn first_paragraphs(message: &str) -> String {
     let lines = message.lines().map(str::trim).filter(|line| !line.is_empty());
     let rest = ["tip:", "Usage:", "For more"];

@@ -75,15 +75,15 @@ impl Aabb {
         return self.overlaps_by_axes(other);
     }
 
-    /// Returns true if the gaps between this box and one around it are from 0 to `slack` on all sides; none if one of them
-    /// is NaN, because of a NaN or of equal infinities.
+    /// Returns true if the gaps between this box and one around it are from 0 to `slack` on all sides; none if a gap is NaN, as
+    /// between equal infinities.
     #[cfg(target_arch = "x86_64")]
     #[inline(always)]
     pub(crate) fn gaps_are_within(&self, outer: &Self, slack: f32) -> Option<bool> {
         use std::arch::x86_64::*;
         // SAFETY: SSE is part of the architecture.
         unsafe {
-            // Lane by lane: a box that was just computed would be waited for if it were written and loaded as a whole.
+            // Each coordinate goes into a lane. A box that was just computed and is loaded as a whole waits until it is written.
             let [min, max] = [self.min, self.max].map(|[x, y, z]| _mm_setr_ps(x, y, z, z));
             let (outer_min, outer_max) = outer.corners();
             let (below, above) = (_mm_sub_ps(min, outer_min), _mm_sub_ps(outer_max, max));
@@ -96,8 +96,8 @@ impl Aabb {
         }
     }
 
-    /// Returns true if the gaps between this box and one around it are from 0 to `slack` on all sides; none if one of them
-    /// is NaN, because of a NaN or of equal infinities.
+    /// Returns true if the gaps between this box and one around it are from 0 to `slack` on all sides; none if a gap is NaN, as
+    /// between equal infinities.
     #[cfg(not(target_arch = "x86_64"))]
     #[inline(always)]
     pub(crate) fn gaps_are_within(&self, outer: &Self, slack: f32) -> Option<bool> {
@@ -153,7 +153,7 @@ impl Aabb {
         Self::new(self.min.map(|x| x - margin), self.max.map(|x| x + margin))
     }
 
-    /// Returns the smallest box around both. An invalid box does not count; of two, this one is returned.
+    /// Returns the smallest box around both. An invalid box does not count. If both are invalid, returns this one.
     #[inline]
     pub fn union(&self, other: &Self) -> Self {
         match (self.is_valid(), other.is_valid()) {

@@ -107,7 +107,7 @@ impl AllPairs {
         outcome
     }
 
-    /// Hands over what is left, and counts.
+    /// Hands the last pairs to the receiver, and returns the outcome with its counts.
     fn finish(&mut self, rule: &Rule<'_>, mut outcome: Outcome) -> Outcome {
         if let Some(receiver) = rule.receiver {
             self.hits.iter_mut().for_each(|hits| hits.hand_over(receiver));

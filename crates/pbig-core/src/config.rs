@@ -5,13 +5,13 @@
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub enum Backend {
-    /// The CPU. A device that was given, if it is hardware and the boxes are many.
+    /// The given device if it is hardware and many boxes have changed, otherwise the CPU.
     #[default]
     Auto,
     /// The CPU, with rayon's threads if there are enough boxes.
     Cpu,
     /// The device that was given. Without one the call finishes on the CPU and [`crate::Report::fallback`] says so.
-    // Snapshots have the name that it had at first.
+    // Snapshots keep the earlier name of this variant.
     #[cfg_attr(feature = "serde", serde(rename = "Gpu"))]
     Device,
     /// Every pair is tested, on the CPU: the definition of right, quadratic time.
@@ -46,7 +46,7 @@ impl Limits {
     /// 2^28 boxes and 2^29 pairs: as many as the numbers inside can tell apart.
     pub const UNLIMITED: Self = Self { max_boxes: 1 << 28, max_pairs: 1 << 29 };
 
-    /// Returns the maximum number of pairs that the numbers inside can also tell apart.
+    /// Returns [`Limits::max_pairs`], at most that of [`Limits::UNLIMITED`].
     pub(crate) fn pairs(&self) -> u64 {
         self.max_pairs.min(Self::UNLIMITED.max_pairs)
     }

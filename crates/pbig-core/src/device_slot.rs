@@ -51,7 +51,7 @@ impl DeviceSlot {
         choice == Choice::Device && is_software.is_some()
     }
 
-    /// Returns the report that the wanted backend could not do the work. Logs the first one of a row as a warning.
+    /// Returns the reason why the wanted backend could not do the work. Logs the first of several failures in a row as a warning.
     fn fall_back(&mut self, why: &str) -> String {
         let why = by_cpu(why);
         if !std::mem::replace(&mut self.has_warned, true) {

@@ -16,8 +16,8 @@ use bytemuck::{Pod, Zeroable};
 /// assert!(wheel.allows(&ProxyFilter::ALL));
 /// ```
 ///
-/// Groups divide the boxes of a [`crate::BroadPhase`] into two sides, of which only pairs across are events. Pairs within a side are
-/// met and dropped, which costs a test each: a side that is a crowd takes time. [`crate::Finder::find_between`] never meets them.
+/// Groups can divide the boxes of a [`crate::BroadPhase`] into two sides whose boxes pair with the other side only. A pair within
+/// a side still costs a test, so a side that is a crowd takes time. [`crate::Finder::find_between`] does not test such pairs.
 ///
 /// ```
 /// use pbig_core::ProxyFilter;
@@ -58,7 +58,7 @@ impl ProxyFilter {
     /// The body of a box without one.
     pub const NO_BODY: u32 = u32::MAX;
 
-    /// Pairs with every other such filter.
+    /// The filter without a restriction: two boxes that have it may pair.
     pub const ALL: Self = Self {
         body: Self::NO_BODY,
         kind: 1,

@@ -148,7 +148,7 @@ impl Finder {
         self.device.is_wanted(&self.config, request.boxes.len(), &mut self.report)
     }
 
-    /// Says in the report that a device was wanted for what no device does.
+    /// Reports that the wanted device cannot do this kind of search.
     fn note_no_device(&mut self) {
         if self.config.backend == Backend::Device {
             self.report.fallback =

@@ -1,4 +1,4 @@
-//! The clock on wasm32-unknown-unknown, which has none: the one that the page gives.
+//! The clock on wasm32-unknown-unknown. The platform has none, so the page gives one.
 
 use std::sync::OnceLock;
 use std::time::Duration;
@@ -15,7 +15,7 @@ pub(crate) fn is_set() -> bool {
     NOW.get().is_some()
 }
 
-/// A moment. All are the same one without a clock.
+/// A moment. Without a clock all moments are equal.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Instant(Duration);
 

@@ -30,8 +30,8 @@ pub trait PairDevice: fmt::Debug + Send + Sync {
     fn find_all(&mut self, request: &SearchRequest<'_>, found: &mut DeviceFound)
     -> Result<(), DeviceFailure>;
 
-    /// Finds the pairs that an update has changed: [`DeviceFound::pairs`] that are pairs now and were none at the last update,
-    /// and [`DeviceFound::ended`], the other way round. Without an earlier update there were no boxes.
+    /// Finds the pairs that an update has changed: those that have begun since the last update ([`DeviceFound::pairs`]), and
+    /// those that have ended ([`DeviceFound::ended`]). Without an earlier update there were no boxes.
     ///
     /// # Errors
     /// As [`PairDevice::find_all`].

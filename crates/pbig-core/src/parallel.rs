@@ -15,7 +15,7 @@ mod threads {
         rayon::current_num_threads()
     }
 
-    /// Runs `take_pieces(worker)` on so many threads.
+    /// Runs `take_pieces(worker)` on `workers` threads.
     pub(super) fn run_workers(workers: usize, take_pieces: impl Fn(usize) + Sync) {
         rayon::in_place_scope(|scope| {
             let take_pieces = &take_pieces;

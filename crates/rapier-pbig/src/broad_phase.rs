@@ -175,7 +175,7 @@ impl PbigBroadPhase {
         }
     }
 
-    /// A checker sees every call.
+    /// Returns true if the call has nothing to do. With a checker it returns false, because a checker sees every call.
     #[inline(always)]
     fn skips(&mut self, call: &Call<'_>) -> bool {
         #[cfg(feature = "shadow")]

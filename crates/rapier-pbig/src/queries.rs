@@ -210,7 +210,7 @@ impl<'a> Queries<'a> {
         cost: impl Fn(&Collider, Real) -> Option<T>,
     ) -> Option<(ColliderHandle, T)> {
         let of = |index: u32, reach: Real| {
-            // The handle of now: the index may have another collider since the last update.
+            // The handle comes from the present set, because the index may have another collider since the last update.
             let (handle, collider) = self.collider(index)?;
             let found = cost(collider, reach)?;
             Some((found.cost(), (handle, found)))

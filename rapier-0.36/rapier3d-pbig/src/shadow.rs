@@ -249,7 +249,7 @@ impl View for Call<'_> {
         !same_body && kinds && a.collision_groups().test(b.collision_groups())
     }
 
-    /// If parry cannot compare the shapes, their AABBs decide.
+    /// Returns true if parry finds a contact. If parry cannot compare the shapes, their AABBs decide.
     fn in_contact(&self, HandlePair(a, b): HandlePair) -> bool {
         let (Some(x), Some(y)) = (self.find_enabled(a), self.find_enabled(b)) else { return false };
         let reach = self.params.prediction_distance() + x.contact_skin() + y.contact_skin();

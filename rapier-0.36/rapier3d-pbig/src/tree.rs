@@ -6,8 +6,8 @@ use rapier::math::{DIM, Real, Vector};
 use rapier::parry::bounding_volume::Aabb as TreeAabb;
 use rapier::parry::partitioning::{Bvh, BvhBuildStrategy, BvhWorkspace};
 
-/// Leaves that change, in 16ths of all: below, each is inserted anew, which keeps the tree good and reads nothing else. Rapier's
-/// own broad phase has the same rule.
+/// Minimum share of changed leaves, in 16ths, for a pass over the tree. Below it each changed leaf is inserted anew, which keeps
+/// the tree good and reads no other leaf. Rapier's own broad phase has the same rule.
 const REINSERT_BELOW_SIXTEENTHS: usize = 1;
 
 #[derive(Clone, Default)]

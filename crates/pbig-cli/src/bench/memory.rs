@@ -82,7 +82,8 @@ fn in_child(case: &str, boxes: usize) -> Result<Value, Failure> {
 pub(crate) fn probe(args: &Args) -> Result<(), Failure> {
     let boxes = unit(args.boxes);
     let before = resident("VmRSS:");
-    // Linux then counts the peak from now on; where it may not, making the boxes had no higher one.
+    // This resets Linux's count of the peak. Where it is not allowed, the count is still right: making the boxes took less memory
+    // than the probe.
     let _ = std::fs::write("/proc/self/clear_refs", "5");
     let pairs = match PROBES.into_iter().find(|(case, _)| *case == args.case) {
         Some((_, Some(motion))) => {

@@ -15,8 +15,8 @@ const DISTANCE: f32 = 1.0;
 /// Calls in which nothing has moved are measured together: one is shorter than a clock can tell.
 const STILL_CALLS: usize = 1000;
 
-/// Ours and stock's broad phase beside the same world; and the floor below both, merely computing the
-/// boxes of what has moved, on one thread and on all.
+/// Pbig's and rapier's own broad phase beside the same world, and the floor below both: the boxes of moved colliders are computed
+/// and nothing else, on one thread and on all.
 struct Calls {
     field: Field,
     movers: Option<Movers>,

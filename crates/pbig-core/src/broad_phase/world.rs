@@ -87,8 +87,8 @@ impl World {
 
     /// Moves a box that is present. Returns false, and does nothing, if it is not.
     ///
-    /// A stored box that is valid is present; while it holds the new one its state is not read, and its filter only if any
-    /// box was ever filtered.
+    /// A valid stored box is present, so its state is not read if it holds the new box. Its filter is read only if any box was
+    /// ever filtered.
     #[inline(always)]
     pub(super) fn set(&mut self, id: u32, aabb: Aabb, filter: ProxyFilter, margin: f32) -> bool {
         if !self.set_aabb(id, aabb, margin) {

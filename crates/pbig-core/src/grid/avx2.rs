@@ -190,7 +190,7 @@ impl Simd for Avx2 {
             let lanes = _mm256_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7);
             let behind = _mm256_cmpgt_epi32(lanes, _mm256_set1_epi32(len as i32 - 1));
             let numbers = _mm256_loadu_si256(numbers.as_ptr().cast());
-            // No id is the largest number.
+            // Lanes behind the row get the largest number, which is not an id.
             let mut others = _mm256_or_si256(_mm256_loadu_si256(others.as_ptr().cast()), behind);
             let next = _mm256_setr_epi32(1, 2, 3, 4, 5, 6, 7, 0);
             let mut found = _mm256_cmpeq_epi32(numbers, others);

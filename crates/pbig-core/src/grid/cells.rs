@@ -38,7 +38,7 @@ pub(crate) struct Cells {
     pub(super) shift: u32,
     /// Cells by axis; powers of two if they wrap.
     pub(super) dims: [i32; 3],
-    /// True if cells beyond the last one are the first ones again; otherwise boxes beyond the border lie in the border cells.
+    /// True if the cells wrap around: the first cell follows the last. Otherwise boxes beyond the border lie in the border cells.
     pub(super) wraps: bool,
 }
 

@@ -78,7 +78,7 @@ impl Spill {
     #[inline(always)]
     fn occupied_from(&self, key: usize) -> u64 {
         let (word, bit) = (key / 64, key % 64);
-        // In two steps, because a shift by 64 does nothing.
+        // Two shifts, because `64 - bit` can be 64, which is too large for one shift.
         self.occupied[word] >> bit | self.occupied[word + 1] << 1 << (63 - bit)
     }
 

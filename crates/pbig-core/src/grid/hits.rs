@@ -56,7 +56,7 @@ pub(crate) struct Hits {
     places: Vec<u32>,
     /// The pairs, in no particular order.
     pub(crate) pairs: Vec<Pair>,
-    /// By group of `a` (`a >> group_shift`): pairs found. Empty if nobody asks.
+    /// By group of `a` (`a >> group_shift`): pairs found. Empty if pairs are not counted by group.
     pub(crate) groups: Vec<u32>,
     pub(crate) group_shift: u32,
     /// Candidates tested.
@@ -69,7 +69,7 @@ pub(crate) struct Hits {
     pub(crate) overlaps: u64,
     /// Pairs that a receiver got.
     handed_over: u64,
-    /// Pairs that other threads know of.
+    /// Number of listed pairs that were added to the count of all threads.
     accounted: usize,
     pub(super) is_full: bool,
     /// The boxes of [`brute_force`](super::brute_force).
@@ -109,7 +109,7 @@ impl<'a> HitWriter<'a> {
 }
 
 impl Hits {
-    /// Forgets the pairs of an earlier search; counts those of the next one by group, if they are wanted so.
+    /// Forgets the pairs of an earlier search; counts those of the next one by group, if there is a grouping.
     pub(crate) fn begin_for(&mut self, grouping: Option<Grouping>) {
         let Grouping { count, shift, .. } = grouping.unwrap_or_default();
         self.begin(count, shift);

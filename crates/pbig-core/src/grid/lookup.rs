@@ -86,7 +86,7 @@ pub(crate) struct Candidates {
     pub(crate) tests: u64,
     /// The work: tests of codes, rows, and exact tests of what lies out of order.
     work: u64,
-    /// The part of the work that other threads know of.
+    /// The part of the work that was added to the budget.
     charged: u64,
     /// Stored boxes that overlapped, each box itself included.
     pub(crate) met: u64,

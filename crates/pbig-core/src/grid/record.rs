@@ -16,7 +16,7 @@ const _: () = assert!(size_of::<Record>() == 32);
 impl Record {
     pub(crate) const EMPTY: Self = Self { aabb: Aabb::NOWHERE, id: 0, key: 0 };
 
-    /// Makes a record by words of eight bytes. Written number by number, a copy would wait for the writes.
+    /// Makes a record by words of eight bytes. Otherwise a copy of the record would wait until eight separate writes are done.
     #[inline(always)]
     pub(crate) fn new(aabb: Aabb, id: u32, key: u32) -> Self {
         let [x, y, z]: [u64; 3] = bytemuck::cast(aabb);

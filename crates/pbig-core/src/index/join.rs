@@ -130,7 +130,8 @@ impl Join<'_, '_> {
     fn test(&mut self, simd: impl Simd, leaf: u32, at: u32, bounds: &Aabb) {
         let (one, other) = (&self.index.nodes[leaf as usize], &self.index.nodes[at as usize]);
         let mut lanes = simd.overlaps_eight(&one.boxes, &other.bounds());
-        // Around the edge of a crowd a leaf has bounds that all boxes of another one overlap, and no box that overlaps theirs.
+        // At the edge of a crowd all boxes of one leaf can overlap the bounds of the other leaf, although no two boxes overlap.
+        // The second test, of the other leaf's boxes against the first one's bounds, finds this at once.
         if lanes.count_ones() > FEW_LANES && leaf != at {
             self.hits.tests += LANES as u64;
             if simd.overlaps_eight(&other.boxes, bounds) == 0 {

@@ -28,7 +28,8 @@ enum Axis {
 }
 
 impl Axis {
-    /// A velocity that is too small to divide by moves the box by less than it is widened here.
+    /// Makes the motion of a box along an axis. If the velocity is too small to divide by, the box stays, and is widened by its
+    /// whole way.
     fn new(low: f32, high: f32, velocity: f32, max_time: f32) -> Self {
         let pace = 1.0 / velocity;
         if velocity == 0.0 {

@@ -51,7 +51,7 @@ impl BoxIndex {
         }
     }
 
-    /// Takes the places from all boxes: without a look at ids that have none.
+    /// Clears the places of all boxes, without a pass over ids that have none.
     fn forget_places(&mut self) {
         for leaf in (0..self.leaves).chain(self.loose()) {
             for id in self.nodes[leaf as usize].children.iter().filter(|id| **id != NONE) {
@@ -173,7 +173,7 @@ impl BoxIndex {
         }
     }
 
-    /// Makes all nodes anew, in order of ids, or sorted as two sets, the first with the ids below a number.
+    /// Makes all nodes anew: in the order of ids, or with a `split` sorted as two sets, the first with the ids below it.
     fn lay_out(&mut self, boxes: &[Aabb], split: Option<u32>) {
         let ids = (0u32..).zip(boxes).filter(|(_, aabb)| aabb.is_valid());
         let mut entries: Vec<Entry> = ids.map(|(id, aabb)| Entry::new(id, aabb)).collect();

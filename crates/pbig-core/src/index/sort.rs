@@ -42,7 +42,8 @@ impl Entry {
         u32::from(self.id >= split) << 31 | class
     }
 
-    /// Returns true if a join meets boxes of both classes, which are different, of two sets if the ids from `split` on are one.
+    /// Returns true if the classes of these boxes differ and a join meets both. Between two sets, split by id, it meets classes
+    /// of different sets only.
     fn may_meet(&self, other: &Self, split: u32) -> bool {
         let (one, other) = (self.class(split), other.class(split));
         let has_sets = split != u32::MAX;
@@ -55,13 +56,14 @@ fn exponent(x: f32) -> u8 {
     (x.to_bits() >> 23) as u8
 }
 
-/// Returns a number with such an exponent.
+/// Returns the number with this exponent, a power of two.
 fn with_exponent(exponent: u8) -> f64 {
     f64::from(f32::from_bits(u32::from(exponent.min(254)) << 23))
 }
 
-/// Sorts boxes by class, and within a class by place. Returns the classes. Boxes with ids from `split` on are another set: no class
-/// has boxes of both. But each is cut with a look at the other: long boxes of one set keep those of the other from being cut across.
+/// Sorts boxes by class, and within a class by place. Returns the classes. Boxes with ids from `split` on are another set: no
+/// class has boxes of both. But the cuts of a set take the boxes of the other set into account, so that few of these lie across a
+/// cut.
 pub(super) fn sort(entries: &mut [Entry], split: u32) -> Vec<Range<usize>> {
     let are_alike = |a: &Entry, b: &Entry| a.class(split) == b.class(split);
     entries.sort_unstable_by_key(|entry| entry.class(split));
@@ -118,8 +120,8 @@ fn cut(len: usize) -> usize {
 const TIE: f64 = 0.01;
 
 /// Returns the axis along which the boxes lie apart most: the spread of their centers is longest, compared with their own extents
-/// and the mean extents of all boxes in the same place. (Compared with their own alone, thin tiles would be cut into slabs as wide as
-/// the world, and slabs of tiles that stand in two directions all meet. Boxes elsewhere are not met, whatever the cut.)
+/// and the mean extents of all boxes in the same place. (If only their own extents counted, thin tiles would be cut into slabs as
+/// wide as the world. Slabs of tiles that stand in two directions all meet each other.)
 fn best_axis(part: &Measure, others: &[Sampled]) -> usize {
     let Measure { spread, extents, .. } = part;
     let extents: [f64; 3] = std::array::from_fn(|k| extents[k] + part.mean_within(others, k));
@@ -152,12 +154,12 @@ impl Sampled {
 #[derive(Clone, Debug)]
 struct Others {
     samples: Vec<Sampled>,
-    /// True if the samples are too few to tell which of them are near a part of the part: an expected number stands for those.
+    /// True if the samples are too few to tell which of them are near half of the part. Their expected number is used instead.
     is_few: bool,
 }
 
 impl Others {
-    /// Returns those that may overlap a part: some for all, where they are many.
+    /// Returns the boxes that may overlap a part, or a sample of them if they are many.
     fn near(&self, part: &Measure) -> Self {
         if self.is_few {
             return self.clone();
@@ -170,7 +172,7 @@ impl Others {
         Self { samples: samples.collect(), is_few: count < MIN_SAMPLED }
     }
 
-    /// Leaves the number of boxes that may overlap one half of a part, if that cannot be told from the samples.
+    /// Reduces the number of boxes to those expected near one half of a part, if the samples are too few.
     fn halve(&mut self, part: &Measure, axis: usize) {
         if self.is_few {
             let width = part.spread[axis] + part.extents[axis];

@@ -11,8 +11,8 @@ const MIN_ROOM: u32 = 4;
 /// Marks a spare place of a row; the other bits are the row's id. Ids are below 2^28.
 const SPARE: u32 = 1 << 31;
 
-/// Number of ids that are read in the time that an event takes in the rows of `b`. After a rebuild with more events, these rows are
-/// made anew from all ids when they are wanted.
+/// Number of ids that can be read in the time in which one event is applied to the rows of `b`. After a rebuild with more events
+/// than ids divided by this number, these rows are dropped, and made anew when they are needed.
 const IDS_OF_EVENT: usize = 32;
 
 /// Number of pairs between a prefetch of rows and their use.
@@ -30,7 +30,7 @@ impl Rows {
         self.spans.get(id as usize).map_or(&[], |span| self.at(*span))
     }
 
-    /// Returns the row of a span. That of an empty row may lie beyond the pool, which others have replaced.
+    /// Returns the row of a span. The span of an empty row may lie beyond the pool, because the pool was replaced since.
     fn at(&self, span: Span) -> &[u32] {
         self.pool.get(span.range()).unwrap_or(&[])
     }
@@ -73,7 +73,7 @@ impl Rows {
         self.spans[id as usize] = Span { len, ..span };
     }
 
-    /// Takes pairs out of one row. What lies between two of them moves at once.
+    /// Removes pairs from one row. The partners between two removed ones move together.
     fn remove(&mut self, run: &[Pair]) {
         let id = run[0].a;
         let span = self.spans[id as usize];

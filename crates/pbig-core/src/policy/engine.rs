@@ -113,7 +113,7 @@ pub(crate) fn choose_engine(counts: &Counts, forced: Option<Engine>) -> Engine {
 /// after the first, twice as many after each further one, until an update is not given up.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct GivenUp {
-    /// Changed boxes of the last one.
+    /// Number of changed boxes of the last update that was given up.
     changed: usize,
     /// Rebuilds after it.
     rebuilds: u32,
@@ -143,8 +143,8 @@ impl GivenUp {
     }
 }
 
-/// Returns the maximum work of an edit, in tests of codes: about half the time of a rebuild, which sorts the boxes and does the work
-/// of the last one, unless that world was fuller.
+/// Returns the maximum work of an edit, in tests of codes: about half the time of a rebuild. A rebuild sorts the boxes, and is
+/// expected to do the work of the last rebuild, at most that of a full grid.
 pub(crate) fn edit_up_to_work(boxes: usize, pairs: usize, rebuild_work: u64) -> u64 {
     EDIT_UP_TO_WORK_PER_BOX * boxes as u64 + rebuild_work.min(work_of_full_grid(boxes, pairs)) / 2
 }

@@ -10,7 +10,8 @@ pub(crate) const GROWN_TO: f32 = 2.0;
 /// Minimum share of grown nodes, as one in this number, for the order to be bad.
 pub(crate) const GROWN_SHARE: usize = 8;
 
-/// Number of sorts that questions pay for before the boxes are sorted although the order is not bad: a sort adds at most an eighth.
+/// Minimum work of questions, in sorts, before boxes are sorted although their order is not bad: such a sort adds at most an
+/// eighth to the work.
 pub(crate) const SORTS_FOR_ORDER: u64 = 8;
 
 /// Returns the number of nodes that questions look at before a sort: it then takes about as long as they did. A sort looks at

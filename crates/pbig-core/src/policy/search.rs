@@ -24,7 +24,7 @@ pub(crate) const WORK_OF_ENTRY: u64 = 16;
 /// Maximum number of tests for each box for a search of the grid: a tree is sorted and joined in about the same time.
 const GRID_UP_TO_PER_BOX: u64 = 400;
 
-/// Tests of a box that each of its overlaps pays for: in a crowd each box meets many, and a tree is not faster.
+/// Number of tests that each overlap of a box justifies: in a crowd each box overlaps many, and a tree is not faster.
 const GRID_UP_TO_PER_PAIR: u64 = 32;
 
 /// Maximum work of a join of a tree for each box, in binary logarithms of their number: within [`crate::WORK_LIMIT`]. Streamed segment

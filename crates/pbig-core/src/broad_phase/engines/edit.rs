@@ -104,7 +104,7 @@ impl Edit {
     /// Lists changed boxes in the order of their old cells: neighbours share cache lines.
     fn list(&mut self, world: &World, grid: &EditedGrid) {
         let Self { before, after, order, .. } = self;
-        // In the order of their changes at first.
+        // `after` is in the order of changes, until both lists get the order of cells.
         after.clear();
         let old = |(&id, old): (&u32, &Old)| Record::new(old.aabb, id, 0);
         after.extend(world.changed.iter().zip(&world.old).map(old));

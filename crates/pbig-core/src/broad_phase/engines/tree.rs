@@ -50,7 +50,8 @@ impl LookUp {
         (world.changed.len() + self.listed.ids.len()) as u64
     }
 
-    /// Returns the numbers of nodes looked at and of boxes met. If these are more than `max_work`, events are missing.
+    /// Looks the changed boxes up, and leaves the events. Returns the numbers of nodes looked at and of boxes met. If they are
+    /// more than `max_work` together, events are missing.
     fn look_up(&mut self, task: &mut Task<'_>, max_work: u64) -> (u64, u64) {
         let Task { world, kept, store, events, .. } = task;
         events.clear();
