@@ -137,8 +137,13 @@ impl Stream<'_, '_> {
     }
 
     fn push_all(&mut self, intervals: &[Corners], points: &[Corners]) {
-        self.hits.tests += (intervals.len() * points.len()) as u64;
-        intervals.iter().for_each(|one| points.iter().for_each(|point| self.push(one, point)));
+        for one in intervals {
+            if self.hits.is_full() {
+                return;
+            }
+            self.hits.tests += points.len() as u64;
+            points.iter().for_each(|point| self.push(one, point));
+        }
     }
 
     fn push(&mut self, one: &Corners, other: &Corners) {

@@ -325,3 +325,24 @@ fn look_ups_given_up_cost_at_most_64_tests_a_box() {
     assert!(update > 50 * n as u64, "{update}: no look-up was given up");
     assert!(update <= 3 * search / 2 + 64 * n as u64, "{update}, and {search} in a search");
 }
+
+/// Boxes that were removed leave free lanes, which must not be tested for each of the others.
+#[test]
+fn a_sweep_tests_no_free_lanes_where_most_boxes_changed() {
+    let at = |x: u32| Aabb::from_center([2.0 * x as f32, 0.0, 0.0], [0.5; 3]);
+    let mut broad_phase = BroadPhase::new(Config::DEFAULT).expect("a margin");
+    let move_all = |broad_phase: &mut BroadPhase, ids: std::ops::Range<u32>, by: u32| {
+        ids.for_each(|id| broad_phase.set(id, at(id + by), ProxyFilter::ALL).expect("a small id"));
+        broad_phase.update().expect("few pairs");
+    };
+    move_all(&mut broad_phase, 0..864, 0);
+    move_all(&mut broad_phase, 0..150, 1);
+    for first in [400, 516, 632, 748] {
+        assert!((first..first + 116).all(|id| broad_phase.remove(id)));
+        broad_phase.update().expect("few pairs");
+    }
+    move_all(&mut broad_phase, 0..201, 2);
+    let report = broad_phase.report();
+    assert_eq!(report.plan.algorithm, Algorithm::Sweep);
+    assert!(report.work <= 400 * 400, "{}", report.work);
+}

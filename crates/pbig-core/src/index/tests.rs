@@ -333,3 +333,14 @@ fn the_work_of_a_join_is_estimated_from_some_leaves() {
         assert!(index.vain_work(split, work / 4, &mut hits[0]) < work / 2, "stops soon");
     }
 }
+
+#[test]
+fn a_box_without_bounds_meets_no_removed_one() {
+    let unit = Aabb::new([0.0; 3], [1.0; 3]);
+    let mut index = BoxIndex::default();
+    index.refresh(&[unit; 2], None);
+    index.refresh(&[unit, Aabb::NOWHERE], Some(&[1]));
+    let mut met = vec![];
+    index.overlapping(&Aabb::new([f32::NEG_INFINITY; 3], [f32::INFINITY; 3]), &mut |id| met.push(id));
+    assert_eq!(met, [0]);
+}

@@ -95,7 +95,8 @@ impl<Q: Question> Walk<'_, Q> {
         let mut met = ArrayVec::new();
         let mut within = (0..LANES).fold(0u32, |mask, i| mask | u32::from(least[i] <= self.bound) << i);
         while let Some(lane) = next(&mut within) {
-            if node.children[lane] != NONE {
+            // A box without bounds meets empty lanes, too.
+            if node.children[lane] != NONE && node.has(lane) {
                 insert(&mut met, (least[lane], node.children[lane]));
             }
         }

@@ -18,7 +18,7 @@ use crate::{Aabb, Algorithm, Checks, Plan};
 /// The lane of a box that is absent or invalid, and the box of a free lane.
 const NONE: u32 = u32::MAX;
 
-/// Maximum number of free lanes beyond the number of boxes. Free lanes are tested, too.
+/// Maximum number of free lanes beyond an eighth of the boxes. Free lanes are tested, too.
 const MAX_HOLES: usize = 64;
 
 /// Eight lanes. Aligned, as every second load would cross a cache line.
@@ -65,14 +65,14 @@ impl Sweep {
 
     /// Stores all boxes, or the changed ones if the blocks hold the boxes of the last update.
     fn bring_up_to_date(&mut self, world: &World, is_current: bool, are_many: bool) {
-        let has_holes = self.free.len() > world.valid as usize + MAX_HOLES;
+        let has_holes = self.free.len() > world.valid as usize / 8 + MAX_HOLES;
         let can_stay = is_current && !has_holes && (self.is_in_order || !are_many);
         if can_stay {
             self.lanes.resize(world.ids(), NONE);
             world.changed.iter().for_each(|&id| self.put(id, &world.boxes[id as usize]));
         }
-        // A box in a lane that was free is out of order.
-        if !can_stay || are_many && !self.is_in_order {
+        // A box in a lane that was free is out of order. Where each box is tested, so would be each free lane.
+        if !can_stay || are_many && !(self.is_in_order && self.free.is_empty()) {
             self.lay_out(world);
         }
     }
