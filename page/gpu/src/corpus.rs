@@ -20,6 +20,8 @@ pub struct Outcome {
     pub sets: u32,
     /// Number of sets with a difference.
     pub failed: u32,
+    /// Number of sets that the device declined: the CPU's, in a finder.
+    pub declined: u32,
     /// Number of pairs in all sets.
     pub pairs: u32,
     /// The first difference; empty without one.
@@ -33,6 +35,7 @@ impl Outcome {
         self.sets += 1;
         match result {
             Ok(pairs) => self.pairs += pairs as u32,
+            Err(why) if why.starts_with("Declined") => self.declined += 1,
             Err(why) => {
                 self.failed += 1;
                 if self.first.is_empty() {
