@@ -83,7 +83,8 @@ impl Churn {
         }
     }
 
-    /// So many updates, `sampled` of them compared with the oracle. In the first fifth memory may grow to what it takes.
+    /// So many updates, `sampled` of them compared with the oracle. In the first fifth memory may grow to what it takes; in a short run
+    /// in the first half.
     fn run(&mut self, updates: usize, sampled: usize) {
         let (every, tenth) = ((updates / sampled).max(1), (updates / 10).max(1));
         for update in 0..updates {
@@ -94,7 +95,10 @@ impl Churn {
             } else {
                 self.world.update_unchecked();
             }
-            self.tally.count(self.world.broad_phase.report(), update < updates / 5);
+            self.tally.count(
+                self.world.broad_phase.report(),
+                update < updates / if given().is_some() { 5 } else { 2 },
+            );
             if (update + 1).is_multiple_of(tenth) && given().is_some() {
                 self.tally.tell(self.home.len());
             }
@@ -110,7 +114,7 @@ struct SoakCounts {
     equal: usize,
     /// By who found the pairs: a device, or else what the plan names.
     ways: BTreeMap<&'static str, usize>,
-    /// Bytes held by the threads of this pool and on the device: now, and the most in the first fifth.
+    /// Bytes held by the threads of this pool and on the device: now, and the most while it may grow.
     bytes: [i64; 2],
     early: [i64; 2],
 }
