@@ -171,13 +171,14 @@ impl Hits {
         let from = self.pairs.len();
         self.pairs.reserve(candidates + 1);
         let (queries, places) = (&self.queries[..candidates], &self.places[..candidates + AHEAD]);
+        let candidates = queries.iter().zip(places).zip(&places[AHEAD..]);
         // SAFETY: the pairs have room for all candidates, and for one more that is overwritten.
         unsafe {
             let start = self.pairs.as_mut_ptr().add(from);
             let mut next = start;
-            for (i, query) in queries.iter().enumerate() {
-                prefetch(records.as_ptr().wrapping_add(places[i + AHEAD] as usize));
-                let (one, other) = (&own[*query as usize], &records[places[i] as usize]);
+            for ((&query, &place), &ahead) in candidates {
+                prefetch(records.as_ptr().wrapping_add(ahead as usize));
+                let (one, other) = (&own[query as usize], &records[place as usize]);
                 next.write(Pair::new(one.id, other.id));
                 next = next.add(usize::from(one.overlaps(other)));
             }
@@ -223,14 +224,30 @@ impl Hits {
         self.handed_over + self.pairs.len() as u64
     }
 
-    /// Tests a box exactly against each of a run, some at a time, and keeps the pairs that the rule allows.
+    /// Tests a box exactly against each of a run, and keeps the pairs that the rule allows.
     pub(super) fn test_run(&mut self, one: &Record, run: &[Record], rule: &Rule<'_>) {
+        let from = self.test_part(one, run, self.pairs.len(), rule);
+        self.keep(from, rule);
+    }
+
+    /// Tests a box exactly against each of a run, where the pairs from `from` on are to be kept still. Keeps them if they are many.
+    /// Returns the first one that is left.
+    pub(super) fn test_part(
+        &mut self,
+        one: &Record,
+        run: &[Record],
+        mut from: usize,
+        rule: &Rule<'_>,
+    ) -> usize {
         for run in run.chunks(BATCH) {
-            let from = self.pairs.len();
             self.tests += run.len() as u64;
             self.push_overlapping(one, run);
-            self.keep(from, rule);
+            if self.pairs.len() - from >= BATCH {
+                self.keep(from, rule);
+                from = self.pairs.len();
+            }
         }
+        from
     }
 
     /// Appends the pairs of a box with those of a run that overlap it.

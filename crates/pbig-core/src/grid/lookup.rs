@@ -291,7 +291,8 @@ impl<M: FnMut(usize, &Record, Place)> LookUp<'_, M> {
     #[inline(always)]
     fn slots(&mut self, simd: impl Simd, row: &Row) {
         let grid = &self.grid.grid;
-        for first in (row.first..row.end).step_by(BLOCK) {
+        let mut first = row.first;
+        while first < row.end {
             let beyond = (row.end - first).min(BLOCK as u32);
             let Candidates { boxes, places, len, .. } = &mut *self.candidates;
             // SAFETY: `first` is below an end that comes from `starts`; `len` is at most `room`, and the lists have two blocks more.
@@ -305,6 +306,7 @@ impl<M: FnMut(usize, &Record, Place)> LookUp<'_, M> {
             if self.candidates.len > self.candidates.room {
                 self.test();
             }
+            first += BLOCK as u32;
         }
     }
 
@@ -334,8 +336,8 @@ impl<M: FnMut(usize, &Record, Place)> LookUp<'_, M> {
         self.candidates.count_entries(uncounted);
     }
 
-    /// Tests the candidates so far exactly.
-    #[inline(always)]
+    /// Tests the candidates so far exactly. One copy for all its callers, so that `meet` is inlined.
+    #[inline(never)]
     fn test(&mut self) {
         let candidates = self.candidates.len;
         for at in 0..candidates {

@@ -87,12 +87,14 @@ impl<'a> Sorted<'a> {
     /// Finds the pairs of an oversize box.
     pub(super) fn search_oversize(&self, i: usize, rule: &Rule<'_>, hits: &mut Hits) {
         let (one, grid, others) = self.oversize(i);
+        let mut from = hits.pairs.len();
         grid.reached_by(&one.aabb, |run| {
             let (first, end) = grid.slots(run);
             hits.runs += 1;
-            hits.test_run(one, &grid.records[first..end], rule);
+            from = hits.test_part(one, &grid.records[first..end], from, rule);
         });
-        hits.test_run(one, others, rule);
+        from = hits.test_part(one, others, from, rule);
+        hits.keep(from, rule);
     }
 }
 
@@ -169,12 +171,13 @@ impl<S: Simd> Scan<'_, '_, S> {
 
     /// Tests the slots from `first` up to `end`.
     #[inline(always)]
-    fn rest(&mut self, one: Seeker, (first, end): (usize, usize)) {
-        for first in (first..end).step_by(BLOCK) {
+    fn rest(&mut self, one: Seeker, (mut first, end): (usize, usize)) {
+        while first < end {
             // SAFETY: `first` is below an end that comes from `starts`.
             let block = unsafe { self.grid.block(first) };
             self.test(one, block, (first, end));
             self.make_room();
+            first += BLOCK;
         }
     }
 

@@ -132,15 +132,21 @@ impl Edit {
             let places = unsafe { places.part(range.clone()) };
             let changed = Changed { world, before: &before[range.clone()], after: &after[range] };
             let Thread { candidates, removed, dropped, .. } = thread;
-            grid.look_up(changed.before, candidates, budget, |i, stored, place| {
-                if changed.before[i].id == stored.id {
-                    places[i] = place;
-                }
-                if let Some((pair, is_dropped)) = changed.ended(i, stored) {
-                    let pairs = if is_dropped { &mut *dropped } else { &mut *removed };
-                    pairs.push(pair);
-                }
-            });
+            grid.look_up(
+                changed.before,
+                candidates,
+                budget,
+                #[inline(always)]
+                |i, stored, place| {
+                    if changed.before[i].id == stored.id {
+                        places[i] = place;
+                    }
+                    if let Some((pair, is_dropped)) = changed.ended(i, stored) {
+                        let pairs = if is_dropped { &mut *dropped } else { &mut *removed };
+                        pairs.push(pair);
+                    }
+                },
+            );
         });
     }
 
@@ -157,12 +163,18 @@ impl Edit {
             let range = piece_range(after.len(), piece, threads);
             let changed = Changed { world, before: &before[range.clone()], after: &after[range] };
             let Thread { candidates, added, .. } = thread;
-            grid.look_up(changed.after, candidates, budget, |i, stored, _| {
-                // Beyond, the update fails.
-                if added.len() as u64 <= max_pairs {
-                    added.extend(changed.begun(i, stored));
-                }
-            });
+            grid.look_up(
+                changed.after,
+                candidates,
+                budget,
+                #[inline(always)]
+                |i, stored, _| {
+                    // Beyond, the update fails.
+                    if added.len() as u64 <= max_pairs {
+                        added.extend(changed.begun(i, stored));
+                    }
+                },
+            );
         });
     }
 
