@@ -65,6 +65,20 @@ fn a_multitude_leaves_the_same_behind_on_any_number_of_threads() {
 }
 
 #[test]
+fn a_fixed_collider_has_no_margin_until_it_moves() {
+    everywhere(|mut scene| {
+        scene.ball(0.0);
+        let (fixed, _) = scene.ball(1.017);
+        scene.world.bodies[fixed].set_body_type(RigidBodyType::Fixed, true);
+        assert_eq!(scene.step(), 0, "the gap is wider than the margin of one");
+        scene.move_to(fixed, 2.0);
+        assert_eq!(scene.step(), 0);
+        scene.move_to(fixed, 1.017);
+        assert_eq!(scene.step(), 1, "the gap is narrower than both margins");
+    });
+}
+
+#[test]
 fn kinds_of_bodies_take_effect_without_motion() {
     everywhere(|mut scene| {
         let (a, on_a) = scene.ball(0.0);

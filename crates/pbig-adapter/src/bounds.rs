@@ -42,6 +42,12 @@ pub trait Bounds: Copy + Debug + Send + Sync + 'static {
 
     /// Returns the smallest box in f32 around this one.
     fn to_f32(&self) -> Aabb;
+
+    /// Returns the largest distance of a corner from the origin along an axis.
+    fn reach(&self) -> f32 {
+        let Aabb { min, max } = self.to_f32();
+        min.iter().chain(&max).fold(0.0, |reach, x| reach.max(x.abs()))
+    }
 }
 
 /// The stored AABBs of a world, and the candidate pairs that the core finds and that are no pairs.

@@ -1,8 +1,7 @@
 //! Reads the colliders that rapier lists and sets their boxes in the core.
 
-#[cfg(feature = "parallel")]
 use crate::policy;
-use crate::{Bounds, BoxStore, Colliders, Handle, Proxy, Scene, Tree};
+use crate::{BodyKind, Bounds, BoxStore, Colliders, Handle, Proxy, Scene, Tree};
 use pbig_core::ProxyFilter;
 #[cfg(feature = "parallel")]
 use rayon::prelude::*;
@@ -57,6 +56,9 @@ impl<T: Tree> Colliders<T> {
                 if let Some(margin) = scene.margin(&aabb) {
                     self.set_margin(margin);
                 }
+                if BodyKind::of(&filter) == BodyKind::Fixed && !self.registry.contains(handle) {
+                    return self.enable_fixed(handle, aabb, filter);
+                }
                 self.enable(handle, aabb, filter);
             }
             Proxy::Disabled => self.disable(handle),
@@ -73,6 +75,16 @@ impl<T: Tree> Colliders<T> {
         if let Err(error) = self.boxes.set(&mut self.core, handle.index, aabb, filter) {
             self.note_error(error);
         }
+    }
+
+    /// Enables a new collider that may never move, with as much margin as rounding needs: more would only add pairs. Once it has moved, it
+    /// has the margin of others.
+    #[cold]
+    fn enable_fixed(&mut self, handle: Handle, aabb: T::Aabb, filter: ProxyFilter) {
+        let margin = self.boxes.margin(&self.core);
+        self.set_margin(margin.min(aabb.reach() * policy::MARGIN_OF_ROUNDING));
+        self.enable(handle, aabb, filter);
+        self.set_margin(margin);
     }
 
     /// Makes a collider known. An older collider that used its index loses its box: rapier never listed it as removed.

@@ -31,6 +31,9 @@ pub(crate) const REPLAY_FRAMES: usize = 8;
 #[cfg(feature = "shadow")]
 pub(crate) const MAX_DIFFERENCES: usize = 1000;
 
+/// Margin that covers the rounding of a box to f32, per distance from the origin: twice what `lab/tests/far.rs` needs.
+pub(crate) const MARGIN_OF_ROUNDING: f32 = 1.0 / (1 << 21) as f32;
+
 /// Distance from the centre of a world in f64, in margins, beyond which a box is far. There f32 is exact to a 128th of a margin.
 pub(crate) const FAR_MARGINS: f64 = 65_536.0;
 
