@@ -4,8 +4,7 @@ use super::OUR_GRID;
 use super::printed::*;
 use super::sides::{Setup, Way, effort, race};
 use crate::UNSORTED;
-use crate::alone::{NAMES, alone};
-use pbig_core::{Aabb, Backend, Config, Pair};
+use pbig_core::{Aabb, Backend, BroadPhase, Config, Finder, Pair, ProxyFilter};
 use pbig_gpu::{CellRule, GpuOptions};
 use pbig_harness::gpu_race;
 use pbig_harness::pair_index::{pair_count, pair_of};
@@ -136,31 +135,50 @@ fn brute_force_and_grid(setup: &Setup) -> Result<Table, Failure> {
 /// their edge: `BroadPhase::set_many`, then `update`, events included, beside a search from nothing; on the CPU means, on a
 /// device medians of a few updates.
 fn steps(setup: &Setup) -> Result<Table, Failure> {
-    let columns = "objects | share moved | side | pairs | boxes up to date, ms | grid (ours: plan and map), ms | \
-        search (ours: check, emit, diff), ms | whole, ms | updates";
-    let mut table = Table::new("Avril table 6, figures 5 and 6: a step", columns);
+    let mut table = Table::new(
+        "Avril table 6, figures 5 and 6: a step",
+        "objects | share moved | side | pairs | whole, ms",
+    );
     let (n, most) = if setup.quick { (10_000, 100_000) } else { (100_000, usize::MAX) };
     let sizes = AVRIL_6.into_iter().filter(|(n, _)| *n <= most).map(|(n, printed)| (n, 1.0, Some(printed)));
     for (n, share, printed) in sizes.chain([0.75, 0.5, 0.25, 0.1, 0.01].map(|share| (n, share, None))) {
         if let Some(printed) = printed {
-            table.row(cells![n, share, "printed", (), ..printed]);
+            table.row(cells![n, share, "printed", (), printed]);
         }
         let boxes = || cubes(n, 1.0, 1.0, 1);
-        for (side, events) in [("ours, CPU", true), ("ours, CPU, from nothing", false)] {
-            let ours = alone(events, boxes(), (share, DISTANCE), Effort::new(setup.quick))?;
-            let of = |wanted: &[&str]| -> f64 {
-                let times = NAMES.iter().zip(ours.mean);
-                times.filter(|(name, _)| wanted.contains(name)).map(|(_, ms)| ms).sum()
-            };
-            let parts = [of(&["set"]), of(&["plan", "map"]), of(&["check", "emit", "diff"])];
-            table.row(cells![n, share, side, ours.pairs, ..parts, ours.mean[0], ours.chosen]);
+        let (pairs, ms) = step(Wander::new(boxes(), share, DISTANCE), Effort::new(setup.quick))?;
+        for (side, ms) in ["ours, CPU", "ours, CPU, from nothing"].into_iter().zip(ms) {
+            table.row(cells![n, share, side, pairs, ms.mean]);
         }
         if let Some(gpu) = setup.for_boxes(n) {
             let raced = gpu_race::race(gpu, boxes(), share, DISTANCE)?;
-            table.row(cells![n, share, "ours, GPU", raced.pairs, ..[(); 3], raced.ms[1]]);
+            table.row(cells![n, share, "ours, GPU", raced.pairs, raced.ms[1]]);
         }
     }
     Ok(table)
+}
+
+/// Measures an update, and a search from nothing, in turn. Returns the pairs, too.
+fn step(wander: Wander, effort: Effort) -> Result<(usize, Vec<Took>), Failure> {
+    let (mut finder, mut broad_phase) = (Finder::new(UNSORTED), BroadPhase::new(UNSORTED)?);
+    let all: Vec<u32> = (0..wander.boxes.len() as u32).collect();
+    let prepare = |(wander, moved): &mut (Wander, Vec<u32>), round| {
+        let now = wander.step(round);
+        // In the first round all are new.
+        if round > 0 {
+            *moved = now;
+        }
+    };
+    let took = measured(&mut (wander, all), 2, effort, prepare, |(wander, moved), side| {
+        let of = |id: u32| Some((wander.boxes[id as usize], ProxyFilter::ALL));
+        let (done, ms) = timed(|| match side {
+            0 => broad_phase.set_many(moved, of).and_then(|()| broad_phase.update().map(|_| ())),
+            _ => finder.find(&wander.boxes).map(|_| ()),
+        });
+        Ok(done.map(|()| ms)?)
+    })?;
+    check(broad_phase.pair_count() == finder.pairs().len(), || "an update and a search differ".into())?;
+    Ok((finder.pairs().len(), took))
 }
 
 #[cfg(test)]
