@@ -6,12 +6,12 @@
 use clap::Parser;
 use pbig_harness::chart::{Chart, Line, Plot};
 use pbig_harness::options::BackendOption;
+use pbig_harness::output::progress;
 use pbig_harness::runner::{Run, Spread, StepTime};
 use pbig_harness::scenes::Scene;
 use rapier_pbig::shadow::Checker;
 use rapier_pbig::{PbigBroadPhase, PbigConfig};
 use rapier3d::prelude::{BroadPhase, DefaultBroadPhase};
-use std::io::IsTerminal;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
@@ -45,7 +45,7 @@ fn main() -> ExitCode {
     let args = Args::parse();
     let mut stock = Run::new(args.scene, args.bodies as usize, args.seed, DefaultBroadPhase::new());
     let mut ours = Run::new(args.scene, args.bodies as usize, args.seed, args.backend.for_rapier());
-    let bar = progress(args.steps.into());
+    let bar = progress(args.steps as usize, "steps");
     for _ in 0..args.steps {
         stock.step();
         ours.step();
@@ -71,19 +71,11 @@ fn main() -> ExitCode {
     if checker.differences.is_empty() && drawn.is_ok() { ExitCode::SUCCESS } else { ExitCode::FAILURE }
 }
 
-fn progress(steps: u64) -> indicatif::ProgressBar {
-    if std::io::stderr().is_terminal() {
-        indicatif::ProgressBar::new(steps)
-    } else {
-        indicatif::ProgressBar::hidden()
-    }
-}
-
 /// Compares a third run with the oracle: it is slow, so it is apart from the measured ones.
 fn check(args: &Args, broad_phase: PbigBroadPhase) -> Checker {
     let run = Run::new(args.scene, args.bodies as usize, args.seed, broad_phase);
     let mut run = run.checked(PbigConfig::DEFAULT.margin, CHECK_EVERY);
-    let bar = progress(args.steps.into());
+    let bar = progress(args.steps as usize, "steps");
     for _ in 0..args.steps {
         run.step();
         bar.inc(1);

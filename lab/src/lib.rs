@@ -2,15 +2,13 @@
 //! them is in docs/.
 
 pub mod accuracy;
-mod alone;
 pub mod hard;
 mod index;
 pub mod papers;
-pub mod pbig_grid;
+mod pbig_grid;
 pub mod peers;
 pub mod steady;
 mod trees;
-pub mod wide;
 pub mod worst;
 
 use pbig_core::{Config, Limits, Order};

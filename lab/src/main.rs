@@ -1,10 +1,8 @@
 //! The program `pbig-studies`: numbers as tables, one JSON object, or files.
 
 use clap::{Parser, Subcommand};
-use pbig_harness::output::{Failure, finish, print, tracked};
-use pbig_harness::report::BenchReport;
+use pbig_harness::output::{Failure, finish};
 use pbig_studies::{accuracy, hard, papers, peers, steady, worst};
-use serde_json::{Map, json};
 use std::path::PathBuf;
 use std::process::ExitCode;
 
@@ -51,12 +49,8 @@ enum Command {
         #[arg(long, default_value_t = 10_000)]
         boxes: usize,
     },
-    /// Run time against error.
-    Accuracy {
-        /// This study alone.
-        #[arg(long, value_name = "STUDY", value_parser = accuracy::STUDIES.map(|(name, _)| name))]
-        only: Option<String>,
-    },
+    /// Run time against error, from the index of a pair to the pair.
+    Accuracy,
 }
 
 fn main() -> ExitCode {
@@ -72,22 +66,7 @@ fn run(cli: &Cli) -> Result<(), Failure> {
         Command::Worst { seconds, seed, boxes } => {
             worst::run(worst::Search { seconds: *seconds, seed: *seed, boxes: *boxes })?
         }
-        Command::Accuracy { only } => return run_accuracy(cli, only.as_deref()),
+        Command::Accuracy => accuracy::run(cli.quick)?,
     };
     report.finish(cli.json, cli.write.as_deref())
-}
-
-fn run_accuracy(cli: &Cli, only: Option<&str>) -> Result<(), Failure> {
-    let mut objects = Map::new();
-    let studies = accuracy::STUDIES.into_iter().filter(|(name, _)| only.is_none_or(|only| only == *name));
-    for (name, study) in tracked(studies, "studies") {
-        let report: BenchReport = study(cli.quick)?;
-        if cli.json {
-            objects.insert(name.into(), report.object());
-            cli.write.as_ref().map_or(Ok(()), |folder| report.write(folder))?;
-        } else {
-            report.finish(false, cli.write.as_deref())?;
-        }
-    }
-    if cli.json { print(&json!({ "suite": "accuracy", "studies": objects }).to_string()) } else { Ok(()) }
 }

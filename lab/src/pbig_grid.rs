@@ -19,19 +19,19 @@ const MAX_TOUCHED_CELLS: u64 = 512;
 
 /// The grid of [`pbig_grid`]: one entry for each cell that a box touches.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct PbigPlan {
+pub(crate) struct PbigPlan {
     /// Edge of the cubic cells, in the boxes' length unit.
-    pub cell: f32,
+    pub(crate) cell: f32,
     /// Lower corner of cell 0, in the boxes' length unit.
-    pub origin: [f32; 3],
+    pub(crate) origin: [f32; 3],
     /// Number of cells on each axis. Boxes beyond are clamped into the border cells.
-    pub dims: [u32; 3],
+    pub(crate) dims: [u32; 3],
 }
 
 impl PbigPlan {
     /// Plans the grid for the boxes behind `summary`, with the cell size by [`GpuOptions::cell_rule`] and
     /// [`GpuOptions::boxes_per_cell`].
-    pub fn new(summary: &Summary, options: &GpuOptions) -> Self {
+    pub(crate) fn new(summary: &Summary, options: &GpuOptions) -> Self {
         let sample = ordinary(summary);
         let (space, origin) = space_of(summary, &sample);
         let n = summary.valid;
@@ -52,13 +52,13 @@ impl PbigPlan {
 
 /// The result of [`pbig_grid`].
 #[derive(Clone, Debug, PartialEq)]
-pub struct PbigFound {
+pub(crate) struct PbigFound {
     /// All overlapping pairs, sorted.
-    pub pairs: Vec<Pair>,
+    pub(crate) pairs: Vec<Pair>,
     /// Tests made, counted as in the paper's section 4.1.
-    pub checks: Checks,
+    pub(crate) checks: Checks,
     /// The grid.
-    pub plan: PbigPlan,
+    pub(crate) plan: PbigPlan,
 }
 
 /// Finds all overlapping pairs with PBIG's grid, on one thread.
@@ -67,7 +67,7 @@ pub struct PbigFound {
 ///
 /// # Errors
 /// [`Error::TooManyBoxes`] and [`Error::TooManyPairs`], by [`Limits::DEFAULT`].
-pub fn pbig_grid(boxes: &[Aabb], options: &GpuOptions) -> Result<PbigFound, Error> {
+pub(crate) fn pbig_grid(boxes: &[Aabb], options: &GpuOptions) -> Result<PbigFound, Error> {
     let limit = Limits::DEFAULT.max_boxes;
     if boxes.len() as u64 > limit {
         return Err(Error::TooManyBoxes { boxes: boxes.len() as u64, limit });

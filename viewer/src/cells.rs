@@ -10,9 +10,7 @@ use std::collections::HashMap;
 /// An occupied cell.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Cell {
-    /// The lower corner.
     pub min: [f32; 3],
-    /// The upper corner.
     pub max: [f32; 3],
     /// From 0.2 to 1: more boxes, more light.
     pub lightness: f32,
@@ -22,7 +20,6 @@ pub struct Cell {
 /// a grid on a GPU.
 #[derive(Clone, Debug, Default)]
 pub struct Cells {
-    /// Occupied cells.
     pub occupied: Vec<Cell>,
     of_collider: HashMap<ColliderHandle, [i64; 3]>,
 }

@@ -5,44 +5,26 @@ use crate::palette::Colouring;
 use crate::simulation::{Ball, Simulation};
 use kiss3d::event::Key;
 
-/// The action of a key.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Action {
-    /// Stop, or go on.
     Pause,
-    /// Make one step, and stop.
     Step,
-    /// Build the scene again.
     Reset,
-    /// Build the next scene.
     NextScene,
-    /// Go on with the next broad phase.
     NextBroadPhase,
-    /// Go on with this broad phase.
     Use(Choice),
-    /// Throw a ball to where the camera looks.
     ThrowBall,
-    /// Colour the objects in the next way.
     NextColouring,
-    /// Show or hide the cells of the grid.
     ToggleCells,
-    /// Show or hide the list of keys.
     ToggleHelp,
-    /// Write a picture of the window.
     SavePicture,
-    /// End the program.
     Quit,
 }
 
-/// A key and its action.
 pub struct Binding {
-    /// The key.
     pub key: Key,
-    /// The key's name on the screen.
     pub name: &'static str,
-    /// The action.
     pub action: Action,
-    /// The action in a few words.
     pub help: &'static str,
 }
 
@@ -50,7 +32,6 @@ const fn bind(key: Key, name: &'static str, action: Action, help: &'static str) 
     Binding { key, name, action, help }
 }
 
-/// Every key.
 pub const BINDINGS: [Binding; 14] = [
     bind(Key::Space, "Space", Action::Pause, "pause or go on"),
     bind(Key::S, "S", Action::Step, "one step, then pause"),
@@ -68,7 +49,6 @@ pub const BINDINGS: [Binding; 14] = [
     bind(Key::Escape, "Esc", Action::Quit, "quit"),
 ];
 
-/// Returns the action of a key.
 pub fn action_of(key: Key) -> Option<Action> {
     BINDINGS.iter().find(|binding| binding.key == key).map(|binding| binding.action)
 }
@@ -76,17 +56,11 @@ pub fn action_of(key: Key) -> Option<Action> {
 /// Switches: parts of the picture, and whether the scene runs.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Controls {
-    /// True while the scene stands still.
     pub is_paused: bool,
-    /// The property that an object's colour shows.
     pub colouring: Colouring,
-    /// True if the cells of the grid are shown.
     pub is_grid_shown: bool,
-    /// True if the keys are listed.
     pub is_help_shown: bool,
-    /// True once the program is to end.
     pub is_ending: bool,
-    /// True if the next frame is to be saved.
     pub is_saving: bool,
 }
 

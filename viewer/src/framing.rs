@@ -8,11 +8,9 @@ use pbig_scenes::world::World;
 /// A place to look from, and one to look at.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Framing {
-    /// The camera's place.
     pub eye: [f32; 3],
     /// The place in the middle of the picture.
     pub at: [f32; 3],
-    /// The radius of what is to be seen.
     pub radius: f32,
 }
 

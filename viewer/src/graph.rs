@@ -9,7 +9,6 @@ const INK: Rgba = [0.13, 0.16, 0.20, 1.0];
 /// The lines of the scale.
 const FAINT: Rgba = [0.13, 0.16, 0.20, 0.22];
 
-/// Returns the colour of a broad phase.
 pub const fn colour_of(choice: Choice) -> Rgba {
     match choice {
         Choice::Stock => [0.85, 0.28, 0.14, 1.0],

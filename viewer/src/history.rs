@@ -41,12 +41,10 @@ impl History {
         self.swaps += 1;
     }
 
-    /// Returns the number of swaps so far.
     pub fn swaps(&self) -> u32 {
         self.swaps
     }
 
-    /// Returns the steps, oldest first.
     pub fn steps(&self) -> impl ExactSizeIterator<Item = &MeasuredStep> {
         self.steps.iter()
     }
@@ -94,7 +92,10 @@ mod tests {
         assert_eq!((history.last(), history.summary(|step| step.step_ms)), (None, Summary::default()));
         push(&mut history, Choice::Cpu, 1.0);
         push(&mut history, Choice::Cpu, 2.0);
-        assert_eq!(history.summary(|step| step.broad_phase_ms), Summary { mean: 1.5, median: 2.0, p99: 2.0 });
+        assert_eq!(
+            history.summary(|step| step.broad_phase_ms),
+            Summary { mean: 1.5, median: 2.0, p99: 2.0, max: 2.0 }
+        );
         assert_eq!(history.summary(|step| step.step_ms).mean, 15.0);
     }
 

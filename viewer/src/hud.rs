@@ -69,9 +69,7 @@ fn add_keys(sheet: &mut Sheet, size: [f32; 2], text: f32) {
 
 /// One side of a comparison.
 pub struct HudSide<'a> {
-    /// The broad phase.
     pub choice: Choice,
-    /// Its times.
     pub history: &'a History,
     /// Where the graph's axis ends, in ms: the same on both sides.
     pub end_ms: f64,

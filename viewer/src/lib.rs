@@ -9,6 +9,8 @@
 //! | `shapes`, `palette`, `cells`, `framing` | parts of colliders as instances, their colours, the grid's cells, the camera |
 //! | `draw`, `window`, `pictures` | drawing with kiss3d |
 
+#![allow(missing_docs, reason = "a program, whose names say most")]
+
 pub mod cells;
 pub mod choice;
 pub mod controls;
@@ -31,7 +33,6 @@ use draw::Quality;
 use options::Options;
 use std::process::ExitCode;
 
-/// Runs the program with the options of the command line.
 pub fn main() -> ExitCode {
     let options = Options::parse();
     match kiss3d::pollster::block_on(run(&options)) {

@@ -47,7 +47,6 @@ pub struct Options {
 }
 
 impl Options {
-    /// Returns the scene and how to build it.
     pub fn setting(&self) -> Setting {
         Setting { scene: self.scene, bodies: self.bodies as usize, seed: self.seed }
     }

@@ -18,7 +18,6 @@ pub struct Instance {
     pub position: [f32; 3],
     /// Rotation times scale, by columns.
     pub columns: [[f32; 3]; 3],
-    /// The colour.
     pub colour: Rgb,
     /// True for sensors, which one can look through.
     pub is_sensor: bool,
@@ -55,7 +54,6 @@ pub fn instances(world: &World, drawn: &Drawn, palette: &Palette<'_>) -> Vec<Ins
 /// A surface that does not move, such as a height field.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Surface {
-    /// Corners.
     pub vertices: Vec<[f32; 3]>,
     /// Triangles, as three corners each.
     pub triangles: Vec<[u32; 3]>,

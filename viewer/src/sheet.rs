@@ -6,13 +6,9 @@ pub type Rgba = [f32; 4];
 /// A rectangle of the screen, in pixels.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Area {
-    /// The left border.
     pub x: f32,
-    /// The upper border.
     pub y: f32,
-    /// The width.
     pub width: f32,
-    /// The height.
     pub height: f32,
 }
 
@@ -23,57 +19,42 @@ impl Area {
     }
 }
 
-/// A filled rectangle.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Panel {
-    /// The rectangle.
     pub area: Area,
-    /// The colour.
     pub colour: Rgba,
 }
 
-/// A line of text.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Text {
-    /// The text.
     pub text: String,
     /// The upper left corner.
     pub at: [f32; 2],
     /// The height of the line.
     pub size: f32,
-    /// The colour.
     pub colour: Rgba,
 }
 
-/// A straight line.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Line {
-    /// The ends.
     pub ends: [[f32; 2]; 2],
-    /// The width.
     pub width: f32,
-    /// The colour.
     pub colour: Rgba,
 }
 
 /// Everything that is written over one picture; panels lie under lines, and lines under texts.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Sheet {
-    /// Panels.
     pub panels: Vec<Panel>,
-    /// Lines.
     pub lines: Vec<Line>,
-    /// Texts.
     pub texts: Vec<Text>,
 }
 
 impl Sheet {
-    /// Adds a panel.
     pub fn panel(&mut self, area: Area, colour: Rgba) {
         self.panels.push(Panel { area, colour });
     }
 
-    /// Adds a text.
     pub fn text(&mut self, text: impl Into<String>, at: [f32; 2], size: f32, colour: Rgba) {
         self.texts.push(Text { text: text.into(), at, size, colour });
     }

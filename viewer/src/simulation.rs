@@ -13,16 +13,12 @@ use std::time::Instant;
 /// The scene, and how to build it.
 #[derive(Clone, Copy)]
 pub struct Setting {
-    /// The scene.
     pub scene: Scene,
-    /// The number of bodies that the scene is built for.
     pub bodies: usize,
-    /// The seed of the scene's random numbers.
     pub seed: u64,
 }
 
 impl Setting {
-    /// Builds the world.
     pub fn build(&self) -> World {
         self.scene.build(self.bodies, self.seed)
     }
@@ -34,40 +30,30 @@ impl Setting {
     }
 }
 
-/// A ball to throw.
 #[derive(Clone, Copy, Debug)]
 pub struct Ball {
-    /// The centre at the start.
     pub from: [f32; 3],
     /// The velocity at the start, in length units a second.
     pub velocity: [f32; 3],
-    /// The radius.
     pub radius: f32,
 }
 
 /// The density of a thrown ball; scenes use 1. A heavy ball is not stopped by the first object.
 const BALL_DENSITY: f32 = 8.0;
 
-/// A scene that runs.
 pub struct Simulation {
     /// The scene, and how to build it again.
     pub setting: Setting,
-    /// Rapier's world.
     pub world: World,
-    /// The broad phase that was asked for.
     pub choice: Choice,
-    /// The broad phase.
     pub broad_phase: Exchange,
-    /// The last steps' times.
     pub history: History,
-    /// Steps since the world was built.
     pub steps: u64,
     /// True until the first step after a swap.
     is_swapped: bool,
 }
 
 impl Simulation {
-    /// Builds a scene.
     pub fn new(setting: Setting, choice: Choice) -> Self {
         let (world, broad_phase) = (setting.build(), Exchange::new(choice.pbig(), now_ms));
         let history = History::default();
@@ -88,7 +74,6 @@ impl Simulation {
         }
     }
 
-    /// Builds the same scene again, with the same broad phase.
     pub fn reset(&mut self) {
         *self = Self::new(self.setting, self.choice);
     }
@@ -118,7 +103,6 @@ impl Simulation {
         error.map_or(Ok(()), |error| Err(format!("step {}: {error}", self.steps)))
     }
 
-    /// Throws a heavy ball into the world.
     pub fn throw(&mut self, ball: Ball) {
         let body = RigidBodyBuilder::dynamic()
             .translation(ball.from.into())

@@ -2,7 +2,7 @@
 
 use crate::cells;
 use crate::output::Failure;
-use crate::runner::{Spread, milliseconds};
+use crate::runner::{Spread, Summary, milliseconds};
 use crate::table::Value;
 use std::time::{Duration, Instant};
 
@@ -11,7 +11,6 @@ use std::time::{Duration, Instant};
 pub struct Effort {
     /// Rounds that do not count: they allocate, fill caches, and learn how boxes move.
     pub warm_up: usize,
-    /// Maximum number of rounds that count.
     pub rounds: usize,
     /// Time after which no further round starts, if there are enough rounds for a median.
     pub budget: Duration,
@@ -29,7 +28,6 @@ impl Effort {
 /// The times of a side, in milliseconds.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Took {
-    /// The median.
     pub median: f64,
     /// The mean of all rounds. It includes its share of work that one round does for many.
     pub mean: f64,
@@ -42,7 +40,6 @@ pub const COMPARED: &str = "case | boxes | pairs | unit | pbig_median | pbig_mea
 /// A unit, and the factor from milliseconds to it.
 pub type Unit = (&'static str, f64);
 
-/// Milliseconds.
 pub const MS: Unit = ("ms", 1.0);
 
 /// Returns a row of [`COMPARED`].
@@ -132,22 +129,11 @@ pub fn timed<T>(call: impl FnOnce() -> T) -> (T, f64) {
     (result, milliseconds(clock.elapsed()))
 }
 
-/// Returns mean, median, 99th percentile by nearest rank and maximum of all frames but the first, and the first; zeros for none.
+/// Returns mean, median, 99th percentile and maximum of all frames but the first, and the first; zeros for none.
 pub fn figures(ms: &[f64]) -> [f64; 5] {
     let Some((&first, rest)) = ms.split_first() else { return [0.0; 5] };
-    let [mean, median, p99, max] = summary(rest);
+    let Summary { mean, median, p99, max } = Summary::of(rest.iter().copied());
     [mean, median, p99, max, first]
-}
-
-/// Returns mean, median, 99th percentile by nearest rank and maximum of some times; zeros for none.
-pub fn summary(ms: &[f64]) -> [f64; 4] {
-    let mut sorted = ms.to_vec();
-    sorted.sort_unstable_by(f64::total_cmp);
-    let count = sorted.len();
-    let at = |place: usize| sorted.get(place).copied().unwrap_or(0.0);
-    let mean = sorted.iter().sum::<f64>() / count.max(1) as f64;
-    let p99 = (99 * count).div_ceil(100).saturating_sub(1);
-    [mean, at(count / 2), at(p99), at(count.saturating_sub(1))]
 }
 
 #[cfg(test)]

@@ -9,13 +9,11 @@ use rand_distr::{Distribution, Normal};
 /// A named generator: `n` boxes from a seed, the same ones every time.
 #[derive(Clone, Copy, Debug)]
 pub struct BoxSet {
-    /// The name on the command line.
     pub name: &'static str,
     make: fn(usize, &mut StdRng) -> Vec<Aabb>,
 }
 
 impl BoxSet {
-    /// Every set.
     pub const ALL: [Self; 6] = [
         Self { name: "uniform", make: uniform }, // PBIG 6.1: centres uniform in 10^4 cubed, edges 1 to 100
         Self { name: "gaussian", make: gaussian }, // PBIG 6.3: centres normal, deviation 1000
@@ -25,18 +23,15 @@ impl BoxSet {
         Self { name: "degenerate", make: degenerate }, // every kind of bad, flat, far, huge and identical box
     ];
 
-    /// The set with this name.
     pub fn named(name: &str) -> Option<Self> {
         Self::ALL.into_iter().find(|set| set.name == name)
     }
 
-    /// Makes `n` boxes.
     pub fn boxes(&self, n: usize, seed: u64) -> Vec<Aabb> {
         (self.make)(n, &mut StdRng::seed_from_u64(seed))
     }
 }
 
-/// Returns a box elsewhere.
 pub fn shifted(aabb: &Aabb, by: [f32; 3]) -> Aabb {
     let add = |corner: [f32; 3]| std::array::from_fn(|k| corner[k] + by[k]);
     Aabb::new(add(aabb.min), add(aabb.max))
@@ -70,7 +65,6 @@ pub fn cubes(n: usize, spread: f32, pairs: f32, seed: u64) -> Vec<Aabb> {
 #[derive(Clone, Debug)]
 pub struct Movers {
     order: Vec<u32>,
-    /// Returns the number of boxes that move in a frame.
     pub count: usize,
 }
 
@@ -96,7 +90,6 @@ impl Movers {
 /// returns. So a set stays what it is, however many frames there are.
 #[derive(Clone, Debug)]
 pub struct Wander {
-    /// The boxes in the present frame.
     pub boxes: Vec<Aabb>,
     home: Vec<Aabb>,
     is_away: Vec<bool>,

@@ -6,9 +6,7 @@ use pbig_core::{Aabb, Pair};
 /// A set of boxes with a name, which failures report.
 #[derive(Clone, Debug)]
 pub struct Case {
-    /// The name.
     pub name: String,
-    /// The boxes.
     pub boxes: Vec<Aabb>,
 }
 

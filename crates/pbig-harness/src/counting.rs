@@ -1,4 +1,4 @@
-//! An allocator that counts the memory that each thread requests and frees. Tests and benches install it with
+//! An allocator that counts the memory that each thread requests and frees. Tests and measurements install it with
 //! `#[global_allocator]`. Without that all counts are 0.
 
 use std::alloc::{GlobalAlloc, Layout, System};

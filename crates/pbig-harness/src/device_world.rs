@@ -1,5 +1,6 @@
 //! A world of boxes with its pairs by brute force, and its updates on a device.
 
+use crate::boxes::shifted;
 use crate::corpus::difference;
 use pbig_core::{
     Aabb, ChangeRequest, ChangedBox, DeviceFailure, DeviceFound, Limits, Pair, PairDevice, ProxyFilter,
@@ -10,27 +11,21 @@ use std::collections::{BTreeMap, BTreeSet};
 /// The state of a broad phase, in the plainest form.
 #[derive(Debug, Default)]
 pub struct DeviceWorld {
-    /// The boxes now, by id.
     pub boxes: Vec<Aabb>,
-    /// The filters now, by id.
     pub filters: Vec<ProxyFilter>,
-    /// The changed boxes at the last update, by id.
     pub changed: BTreeMap<u32, ChangedBox>,
     /// The pairs of the last update, without those that a removal has ended.
     pub kept: BTreeSet<Pair>,
-    /// Number of updates.
     pub update: u64,
 }
 
 impl DeviceWorld {
-    /// Returns a world in which all boxes are new.
     pub fn new(boxes: &[Aabb]) -> Self {
         let mut world = Self::default();
         (0u32..).zip(boxes).for_each(|(id, aabb)| world.set(id, *aabb, ProxyFilter::ALL));
         world
     }
 
-    /// Returns the number of ids.
     #[allow(clippy::len_without_is_empty, reason = "a number of ids")]
     pub fn len(&self) -> u32 {
         self.boxes.len() as u32
@@ -46,7 +41,6 @@ impl DeviceWorld {
         self.changed.entry(id).or_insert(was);
     }
 
-    /// Sets a box and its filter.
     pub fn set(&mut self, id: u32, aabb: Aabb, filter: ProxyFilter) {
         self.note(id);
         self.boxes[id as usize] = if aabb.is_valid() { aabb } else { Aabb::NOWHERE };
@@ -66,17 +60,11 @@ impl DeviceWorld {
         self.kept.retain(|pair| pair.a != id && pair.b != id);
     }
 
-    /// Moves a box.
     pub fn shift(&mut self, id: u32, by: [f32; 3]) {
-        let one = self.boxes[id as usize];
-        let moved = |corner: [f32; 3]| std::array::from_fn(|k| corner[k] + by[k]);
-        self.put(id, Aabb::new(moved(one.min), moved(one.max)));
+        self.put(id, shifted(&self.boxes[id as usize], by));
     }
 
     /// Runs an update on a device, and compares it with brute force.
-    ///
-    /// # Errors
-    /// The device's own.
     ///
     /// # Panics
     /// If the device is wrong.
@@ -85,9 +73,6 @@ impl DeviceWorld {
     }
 
     /// As [`DeviceWorld::follow`], with a limit of pairs.
-    ///
-    /// # Errors
-    /// The device's own.
     ///
     /// # Panics
     /// If the device is wrong.

@@ -9,7 +9,6 @@ use rapier3d::prelude::*;
 
 /// A cuboid on a dynamic body of its own for each box.
 pub struct Field {
-    /// The world; nothing in it moves by itself.
     pub world: World,
     /// The cuboids, in the order of the boxes.
     pub colliders: Vec<ColliderHandle>,
@@ -18,7 +17,6 @@ pub struct Field {
 }
 
 impl Field {
-    /// A collider for each box.
     pub fn new(boxes: &[Aabb]) -> Self {
         let mut world = World::default();
         let bodies: Vec<RigidBodyHandle> = boxes.iter().map(|aabb| add(&mut world, aabb)).collect();

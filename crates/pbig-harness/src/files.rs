@@ -39,7 +39,6 @@ fn brief(text: &str) -> String {
 /// Boxes of a file, and the place of the first invalid one.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct BoxList {
-    /// The boxes, perhaps invalid ones.
     pub boxes: Vec<Aabb>,
     /// The first box that is invalid: its index and its place in the file.
     pub first_invalid: Option<(usize, Location)>,
@@ -111,10 +110,8 @@ pub fn read_frames(path: &Path) -> Result<Frames, String> {
     npy::frames(Source::open(path)?).map_err(|what| at(path, what))
 }
 
-/// The content of a file of frames.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Frames {
-    /// Boxes in each frame.
     pub boxes: usize,
     /// The frames, each with its boxes, perhaps invalid ones. None: all six values are NaN, the box is not there.
     pub frames: Vec<Vec<Option<Aabb>>>,

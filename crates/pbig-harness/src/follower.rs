@@ -5,7 +5,6 @@ use pbig_core::{Aabb, BroadPhase, Events, Pair, ProxyFilter, oracle};
 
 /// A broad phase with the boxes that were set in it, and the pairs that its events lead to.
 pub struct Follower {
-    /// The broad phase.
     pub broad_phase: BroadPhase,
     /// By id; none for an absent box.
     pub boxes: Vec<Option<(Aabb, ProxyFilter)>>,
@@ -23,7 +22,6 @@ impl Follower {
         Self { broad_phase, boxes: vec![None; ids], spoil: Box::new(|_| ()), pairs: vec![], gone: vec![] }
     }
 
-    /// Returns the number of ids, those of absent boxes included.
     pub fn ids(&self) -> usize {
         self.boxes.len()
     }
@@ -34,18 +32,12 @@ impl Follower {
     }
 
     /// Sets one box.
-    ///
-    /// # Errors
-    /// The broad phase's own.
     pub fn set(&mut self, id: u32, aabb: Aabb, filter: ProxyFilter) -> Result<(), String> {
         self.boxes[id as usize] = Some((aabb, filter));
         self.broad_phase.set(id, aabb, filter).map_err(|error| error.to_string())
     }
 
     /// Sets all boxes in one call, without filters.
-    ///
-    /// # Errors
-    /// The broad phase's own.
     pub fn set_all(&mut self, boxes: &[Aabb]) -> Result<(), String> {
         let all = |aabb: &Aabb| Some((*aabb, ProxyFilter::ALL));
         self.boxes = boxes.iter().map(all).collect();

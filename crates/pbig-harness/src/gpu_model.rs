@@ -10,15 +10,10 @@ use pbig_gpu::layout::{CELLS_PER_BLOCK, Cell, DeviceBox, LANES, Located, SHORT_R
 /// The counts of a call, as the report has them.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Counts {
-    /// Boxes of the set.
     pub boxes: f64,
-    /// Cells of the plan.
     pub cells: f64,
-    /// Entries of boxes in cells.
     pub entries: f64,
-    /// Tests of two boxes.
     pub tests: f64,
-    /// Pairs found.
     pub pairs: f64,
     /// Pairs of the box with the most of them, such as a ground.
     pub longest_row: f64,
@@ -37,7 +32,6 @@ pub struct Gpu {
     pub bus: Option<f64>,
     /// Last cache of the GPU, in bytes.
     pub cache: f64,
-    /// Bytes that a miss moves.
     pub line: f64,
     /// Atomic operations on one address, in a second.
     pub atomics: f64,

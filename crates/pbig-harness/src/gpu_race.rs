@@ -7,16 +7,13 @@ use crate::runner::Spread;
 use pbig_core::{Aabb, Backend, BroadPhase, Config, DeviceReport, Limits, ProxyFilter, Report};
 use pbig_gpu::GpuFinder;
 
-/// The result of a race.
 #[derive(Debug)]
 pub struct Raced {
     /// Median times of an update on the CPU and on the device, in ms.
     pub ms: [f64; 2],
-    /// Pairs at the end.
     pub pairs: usize,
     /// Pairs that were added or removed in the last round.
     pub events: usize,
-    /// The device's report on the last round.
     pub report: DeviceReport,
 }
 

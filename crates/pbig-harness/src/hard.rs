@@ -15,32 +15,24 @@ pub const MEANT_FOR: usize = 25_000;
 /// The arrangement of a part's boxes in its region.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Placement {
-    /// Anywhere.
     Anywhere,
     /// At equal distances along the region's diagonal.
     Line,
-    /// In cells of a cubic lattice.
     Lattice,
     /// At distances from its corner that are log-uniform over ten decades up to its width, sizes in proportion.
     Around,
 }
 
-/// Boxes of one kind.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Part {
     /// The share of all boxes, relative to the other parts'.
     pub weight: u32,
-    /// The arrangement of the boxes.
     pub place: Placement,
-    /// The lower corner of the region.
     pub corner: [f32; 3],
-    /// The widths of the region.
     pub width: [f32; 3],
     /// The power of the number of boxes with which the widths grow: a third keeps the density.
     pub growth: f32,
-    /// Half extents.
     pub half: [f32; 3],
-    /// The decades by which sizes differ.
     pub decades: f32,
 }
 
@@ -91,7 +83,6 @@ impl Part {
 pub struct Recipe(pub Vec<Part>);
 
 impl Recipe {
-    /// Makes `n` boxes.
     pub fn boxes(&self, n: usize, seed: u64) -> Vec<Aabb> {
         let mut random = StdRng::seed_from_u64(seed);
         let turns: Vec<usize> =
@@ -113,20 +104,15 @@ impl Recipe {
 pub enum Change {
     /// It goes where another world has it, with its size.
     To(Recipe),
-    /// Its extents grow by a factor.
     Grow(f32),
-    /// It moves.
     Shift([f32; 3]),
-    /// It is removed.
     Remove,
 }
 
 /// A world and its history: in each update the next boxes change, each once.
 #[derive(Clone, Debug, PartialEq)]
 pub struct History {
-    /// The world at first.
     pub start: Recipe,
-    /// The change of each box.
     pub change: Change,
     /// The number of updates after which all boxes have changed.
     pub updates: usize,
@@ -168,9 +154,6 @@ impl History {
 pub type Changes = Vec<(u32, Option<Aabb>)>;
 
 /// Sets and removes boxes.
-///
-/// # Errors
-/// The broad phase's own.
 pub fn tell(broad_phase: &mut BroadPhase, changes: &Changes) -> Result<(), Error> {
     for (id, aabb) in changes {
         match aabb {

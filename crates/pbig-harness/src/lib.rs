@@ -1,6 +1,8 @@
 //! Box sets, motions, files, the headless runner and the frame of measurements behind the program `pbig`, the
 //! studies, the tests and the examples.
 
+#![allow(missing_docs, reason = "most names say it; not published")]
+
 #[cfg(feature = "run")]
 pub mod bench;
 pub mod boxes;

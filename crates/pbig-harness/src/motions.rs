@@ -48,7 +48,6 @@ pub enum Motion {
 }
 
 impl Motion {
-    /// Every kind.
     pub const ALL: [Self; 9] = {
         use Motion::*;
         [Drift, Jitter, Swing, Fall, Jump, Burst, Shares, Few, Churn]
@@ -90,7 +89,6 @@ pub enum Density {
 }
 
 impl Density {
-    /// Every density.
     pub const ALL: [Self; 3] = [Self::Dense, Self::Sparse, Self::Mixed];
 
     /// Returns the name in tables and files.
@@ -109,18 +107,15 @@ impl Density {
     }
 }
 
-/// Boxes that move.
 #[derive(Debug)]
 pub struct MovingBoxes {
     motion: Motion,
     /// Edge of the cube that holds the centers, in the boxes' length unit.
     side: f32,
-    /// Number of frames so far.
     frame: usize,
     rng: StdRng,
     /// All ids, shuffled: each frame takes the next ones.
     order: Vec<u32>,
-    /// Position in `order`.
     next: usize,
     centers: Vec<[f32; 3]>,
     edges: Vec<f32>,

@@ -20,20 +20,15 @@ pub enum BackendOption {
 }
 
 impl BackendOption {
-    /// Returns a finder.
     pub fn finder(self) -> Finder {
         finder(Config { backend: self.backend(), ..Config::DEFAULT }, GpuOptions::DEFAULT)
     }
 
     /// Returns a broad phase.
-    ///
-    /// # Errors
-    /// [`Error::Margin`].
     pub fn broad_phase(self, margin: f32) -> Result<BroadPhase, Error> {
         broad_phase(Config { margin, backend: self.backend(), ..Config::DEFAULT }, GpuOptions::DEFAULT)
     }
 
-    /// Returns a broad phase for rapier.
     pub fn for_rapier(self) -> PbigBroadPhase {
         let config = PbigConfig { backend: self.backend(), ..PbigConfig::DEFAULT };
         let mut broad_phase = PbigBroadPhase::with_config(config).expect("the default margin is a length");
@@ -77,9 +72,6 @@ pub fn finder(config: Config, options: GpuOptions) -> Finder {
 }
 
 /// As [`finder`], a broad phase.
-///
-/// # Errors
-/// [`Error::Margin`].
 pub fn broad_phase(config: Config, options: GpuOptions) -> Result<BroadPhase, Error> {
     match shared_gpu(config.backend, options) {
         Some(gpu) => BroadPhase::with_device(config, gpu),

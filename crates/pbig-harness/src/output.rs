@@ -15,7 +15,6 @@ pub enum Failure {
 }
 
 impl Failure {
-    /// Returns the exit status.
     pub fn code(&self) -> ExitCode {
         ExitCode::from(match self {
             Self::Check(_) => 1,

@@ -104,8 +104,7 @@ impl FrameQueries {
 
 /// Returns the AABB around the colliders of all bodies that can move.
 fn extent(world: &World) -> Extent {
-    let can_move = |collider: &Collider| collider.parent().is_some_and(|body| !world.bodies[body].is_fixed());
-    let moving = world.colliders.iter().filter(|(_, collider)| can_move(collider));
+    let moving = world.colliders.iter().filter(|(_, collider)| world.can_move(collider));
     Extent::around(moving.map(|(_, collider)| {
         let aabb = collider.compute_aabb();
         [aabb.mins, aabb.maxs].map(|corner| Vec3::new(corner.x, corner.y, corner.z))

@@ -6,16 +6,13 @@ use crate::table::Table;
 use serde_json::{Value, json};
 use std::path::Path;
 
-/// The tables and charts of a suite.
 #[derive(Clone, Debug, Default)]
 pub struct BenchReport {
     /// The name of the suite, with which the names of its files begin.
     pub suite: String,
     /// Conditions of the run besides the machine, each with its name.
     pub head: Vec<(&'static str, String)>,
-    /// The tables.
     pub tables: Vec<Table>,
-    /// The charts.
     pub charts: Vec<Chart>,
 }
 
@@ -39,7 +36,6 @@ impl BenchReport {
         self.tables.iter().map(|table| (name(table), format!("{head}{}", table.csv()))).collect()
     }
 
-    /// Returns one JSON object.
     pub fn object(&self) -> Value {
         let head: serde_json::Map<_, _> =
             self.heads().map(|(name, value)| (name.into(), json!(value))).collect();

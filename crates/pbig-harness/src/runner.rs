@@ -4,7 +4,7 @@ use crate::frames::FrameKind;
 use crate::queries::{Answer, FrameQueries};
 use crate::scenes::Scene;
 use crate::world::World;
-pub use pbig_scenes::times::StepTime;
+pub use pbig_scenes::times::{StepTime, Summary};
 use rapier_pbig::shadow::{Call, Checker, Difference, ReplayError, Shadow, Watcher, write_frames};
 use rapier3d::prelude::*;
 use std::fmt;
@@ -13,15 +13,12 @@ use std::time::{Duration, Instant};
 
 /// Any broad phase with a clock around it, and perhaps a checker beside it.
 pub struct Timed<B> {
-    /// The broad phase.
     pub inner: B,
     /// Time inside since the last [`Timed::take`].
     time: Duration,
     /// Time that the checker has taken in the present step.
     checking: Duration,
-    /// `AddPair` events so far.
     pub added: u64,
-    /// `DeletePair` events so far.
     pub removed: u64,
     /// The checker, beside stock and the oracle.
     pub watcher: Option<Watcher>,
@@ -45,7 +42,6 @@ impl<B> Timed<B> {
         self.watcher.as_ref().map(|watcher| &watcher.checker)
     }
 
-    /// Returns the first difference.
     pub fn first_difference(&self) -> Option<&Difference> {
         self.checker()?.differences.first()
     }
@@ -84,24 +80,18 @@ impl<B: BroadPhase> BroadPhase for Timed<B> {
 
 /// A scene being run with one broad phase.
 pub struct Run<B> {
-    /// The world.
     pub world: World,
-    /// The broad phase and its counts.
     pub broad_phase: Timed<B>,
-    /// One for each step so far.
     pub times: Vec<StepTime>,
-    /// Hits of all queries so far.
     pub hits: u64,
     queries: Option<FrameQueries>,
 }
 
 impl<B: BroadPhase> Run<B> {
-    /// Builds the scene.
     pub fn new(scene: Scene, bodies: usize, seed: u64, broad_phase: B) -> Self {
         Self::in_world(scene.build(bodies, seed), broad_phase)
     }
 
-    /// Takes a world that has been built.
     pub fn in_world(world: World, broad_phase: B) -> Self {
         Self { world, broad_phase: Timed::new(broad_phase), times: Vec::new(), hits: 0, queries: None }
     }
@@ -127,7 +117,6 @@ impl<B: BroadPhase> Run<B> {
         }
     }
 
-    /// One step, measured.
     pub fn step(&mut self) {
         let clock = Instant::now();
         self.world.step(&mut self.broad_phase);
@@ -162,7 +151,6 @@ impl<B: BroadPhase + Answer> Run<B> {
     }
 }
 
-/// A duration in milliseconds.
 pub fn milliseconds(time: Duration) -> f64 {
     time.as_secs_f64() * 1e3
 }
@@ -170,11 +158,9 @@ pub fn milliseconds(time: Duration) -> f64 {
 /// Smallest, median and largest of some times.
 #[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize)]
 pub struct Spread {
-    /// The smallest.
     pub min: f64,
     /// The median; of an even count, the upper of the two in the middle.
     pub median: f64,
-    /// The largest.
     pub max: f64,
 }
 

@@ -46,9 +46,7 @@ fn short(value: &Value) -> String {
 /// panic, and so is a row with too many values.
 #[derive(Clone, Debug)]
 pub struct Table {
-    /// The name in files and JSON.
     pub name: String,
-    /// The names of the columns.
     pub columns: Vec<String>,
     /// The rows, each with a value for each column.
     pub rows: Vec<Vec<Value>>,
@@ -74,13 +72,11 @@ impl Table {
         place.unwrap_or_else(|| panic!("{} has no column {column}", self.name))
     }
 
-    /// Returns the values of a column.
     pub fn column(&self, name: &str) -> impl Iterator<Item = &Value> {
         let place = self.place(name);
         self.rows.iter().map(move |row| &row[place])
     }
 
-    /// Returns the numbers of a column.
     pub fn numbers(&self, name: &str) -> Vec<f64> {
         self.column(name).filter_map(Value::as_f64).collect()
     }
@@ -115,7 +111,6 @@ impl Table {
         words.collect::<Vec<_>>().join("-")
     }
 
-    /// Returns the rows as objects.
     pub fn object(&self) -> Value {
         let row = |row: &Vec<Value>| -> Value {
             self.columns.iter().cloned().zip(row.iter().cloned()).collect::<Map<_, _>>().into()

@@ -20,32 +20,24 @@ pub enum Kind {
     Mesh(u32),
 }
 
-/// Colour class of a part.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
 pub enum Colour {
-    /// A part that does not move.
     Fixed,
-    /// A ball.
     Ball,
     /// A box that is about as thick as it is wide.
     Cuboid,
     /// A flat or long box.
     Slab,
-    /// A cylinder with round ends.
     Capsule,
-    /// A cylinder.
     Other,
 }
 
 /// A scaled shape at a place in its collider.
 #[derive(Clone, Copy, Debug)]
 pub struct Part {
-    /// The shape.
     pub kind: Kind,
-    /// Its colour class.
     pub colour: Colour,
-    /// Its place in the collider.
     pub local: Isometry<Real>,
     /// Its half extents, if its kind fits into the cube.
     pub scale: Vector<Real>,
@@ -54,14 +46,11 @@ pub struct Part {
 /// Vertices in the frame of a shape, and the three vertices of each triangle.
 pub type Triangles = (Vec<Point<Real>>, Vec<[u32; 3]>);
 
-/// A part and its collider.
 #[derive(Clone, Copy, Debug)]
 pub struct Member {
-    /// The collider.
     pub collider: ColliderHandle,
     /// True for parts that would hide what happens: those of sensors, and walls.
     pub is_translucent: bool,
-    /// The part.
     pub part: Part,
 }
 

@@ -38,7 +38,6 @@ impl Exchange {
         };
     }
 
-    /// Returns pbig's broad phase if it is in use.
     pub fn pbig(&self) -> Option<&PbigBroadPhase> {
         match &self.inner {
             Inner::Stock(_) => None,
@@ -100,6 +99,30 @@ mod tests {
             let pairs = world.pairs().count() as u64;
             assert_eq!(exchange.added - exchange.deleted, pairs);
             assert!(exchange.added - before < pairs, "{pairs} pairs are not announced again");
+        }
+    }
+
+    /// Bodies sleep on as in a world whose broad phase stays.
+    #[test]
+    fn a_change_wakes_no_body() {
+        let build = || Scene::named("sleeping").expect("the scene exists").build(150, 1);
+        let sleepers = |world: &World| -> Vec<_> {
+            let asleep = world.bodies.iter().filter(|(_, body)| body.is_sleeping());
+            asleep.map(|(handle, _)| handle).collect()
+        };
+        let (mut changed, mut exchange) = (build(), Exchange::new(Some(PbigBroadPhase::new()), || 0.0));
+        let (mut other, mut stock) = (build(), StockBroadPhase::default());
+        for step in 0..25 {
+            match step {
+                10 | 20 => exchange.change(None, &changed),
+                15 => exchange.change(Some(PbigBroadPhase::new()), &changed),
+                _ => {}
+            }
+            changed.step(&mut exchange);
+            other.step(&mut stock);
+            let [left, expected] = [&changed, &other].map(sleepers);
+            assert!(step < 10 || expected.len() > 100, "step {step}: too few sleep: {}", expected.len());
+            assert!(step < 10 || left == expected, "step {step}: {} of {}", left.len(), expected.len());
         }
     }
 }

@@ -24,38 +24,29 @@ pub const CAPSULE_RADIUS_METRES: f32 = 0.3;
 /// The time of a frame, in seconds.
 pub const FRAME_SECONDS: f32 = 1.0 / 60.0;
 
-/// The speed of the character, in metres per second.
 const WALKING_SPEED: f32 = 4.0;
 
 /// The part of a character's motion that goes down in each frame, in metres. It keeps the character on the ground.
 const FALL_METRES: f32 = 0.05;
 
-/// The frames after which the character turns.
 const FRAMES_PER_HEADING: u64 = 30;
 
 /// The queries of one frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum FrameKind {
-    /// No query.
     None,
-    /// One ray.
     Ray,
-    /// A hundred rays.
     Rays100,
-    /// Ten thousand rays.
     Rays10000,
-    /// One cast of a ball.
     Cast,
     /// One move of a character controller with a capsule.
     Character,
     /// One test of which colliders intersect a ball.
     Boxes,
-    /// One projection of a point.
     Point,
 }
 
 impl FrameKind {
-    /// Every kind.
     pub const ALL: [Self; 8] = [
         Self::None,
         Self::Ray,
@@ -91,7 +82,6 @@ impl FrameKind {
         found.ok_or_else(|| format!("no kind of query is called '{name}'; there are: {}", names()))
     }
 
-    /// Returns the number of queries in a frame.
     pub fn queries(self) -> u64 {
         match self {
             Self::None => 0,
@@ -105,7 +95,6 @@ impl FrameKind {
 /// A place and a direction to ask about.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Query {
-    /// The place, in metres.
     pub origin: Vec3,
     /// A unit vector.
     pub direction: Vec3,
@@ -114,9 +103,7 @@ pub struct Query {
 /// An AABB around all bodies that can move, in metres.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Extent {
-    /// The lower corner.
     pub min: Vec3,
-    /// The upper corner.
     pub max: Vec3,
 }
 
@@ -138,7 +125,6 @@ impl Extent {
         Query { origin: self.min + share * (self.max - self.min), direction: direction.normalize() }
     }
 
-    /// Returns the queries of a frame.
     pub fn queries(self, kind: FrameKind, frame: u64) -> impl Iterator<Item = Query> {
         (0..kind.queries()).map(move |number| self.query(frame, number))
     }

@@ -2,6 +2,8 @@
 //! and what the viewer and the page share: the parts to draw, and a broad phase that can be exchanged.
 //! Nothing here draws, starts a thread or reads a clock, so all of it builds for wasm32-unknown-unknown.
 
+#![allow(missing_docs, reason = "most names say it; not published")]
+
 #[cfg(feature = "rapier")]
 mod build;
 #[cfg(feature = "rapier")]

@@ -6,12 +6,9 @@ use rand::rngs::StdRng;
 use rand::{RngExt, SeedableRng};
 use std::collections::HashSet;
 
-/// A change of a ball.
 #[derive(Clone, Copy, Debug)]
 pub enum Change {
-    /// A new place.
     Move(Vec3),
-    /// A new velocity.
     Throw(Vec3),
     /// No groups, so no pairs.
     Exclude,
@@ -26,15 +23,12 @@ pub type Told = (bool, [(u32, u32); 2]);
 
 /// A world with a fixed sensor, a cube with an edge of 4 m around the origin, and weightless balls. All listen for events.
 pub trait Zone {
-    /// Returns the sensor alone.
     fn new() -> Self;
     /// Adds a ball with a radius of 0.4 m.
     fn add_ball(&mut self, at: Vec3, is_sensor: bool);
-    /// Changes a ball, by its number.
     fn change(&mut self, ball: usize, change: Change);
     /// Lets another broad phase find the pairs, or saves and restores the world.
     fn hand_over(&mut self, rng: &mut StdRng);
-    /// Runs a step, and returns its events.
     fn step(&mut self) -> Vec<Told>;
 }
 
@@ -47,7 +41,6 @@ struct App<Z> {
 }
 
 impl<Z: Zone> App<Z> {
-    /// Returns a zone with a ball in it.
     fn new() -> Self {
         let mut zone = Z::new();
         zone.add_ball(Vec3::ZERO, false);

@@ -9,23 +9,21 @@ pub struct StepTime {
     pub step: f64,
     /// Scene queries after the step, with the upkeep of an index that the first of them causes.
     pub queries: f64,
-    /// The step and the queries.
     pub frame: f64,
 }
 
 /// Figures of some times; zeros for none.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Summary {
-    /// The mean.
     pub mean: f64,
     /// The median; of an even count, the upper of the two in the middle.
     pub median: f64,
     /// The 99th percentile: the smallest time that at least 99% of the times do not exceed.
     pub p99: f64,
+    pub max: f64,
 }
 
 impl Summary {
-    /// Summarizes times.
     pub fn of(times: impl IntoIterator<Item = f64>) -> Self {
         let mut times: Vec<f64> = times.into_iter().collect();
         times.sort_unstable_by(f64::total_cmp);
@@ -34,7 +32,7 @@ impl Summary {
             None => Self::default(),
             Some(&p99) => {
                 let mean = times.iter().sum::<f64>() / times.len() as f64;
-                Self { mean, median: times[times.len() / 2], p99 }
+                Self { mean, median: times[times.len() / 2], p99, max: times[times.len() - 1] }
             }
         }
     }
@@ -46,10 +44,10 @@ mod tests {
 
     #[test]
     fn p99_is_the_nearest_rank() {
-        let summary = |mean, median, p99| Summary { mean, median, p99 };
+        let summary = |mean, median, p99, max| Summary { mean, median, p99, max };
         assert_eq!(Summary::of([]), Summary::default());
-        assert_eq!(Summary::of([3.0]), summary(3.0, 3.0, 3.0));
-        assert_eq!(Summary::of((1..=100).map(f64::from)), summary(50.5, 51.0, 99.0));
-        assert_eq!(Summary::of((1..=101).rev().map(f64::from)), summary(51.0, 51.0, 100.0));
+        assert_eq!(Summary::of([3.0]), summary(3.0, 3.0, 3.0, 3.0));
+        assert_eq!(Summary::of((1..=100).map(f64::from)), summary(50.5, 51.0, 99.0, 100.0));
+        assert_eq!(Summary::of((1..=101).rev().map(f64::from)), summary(51.0, 51.0, 100.0, 101.0));
     }
 }

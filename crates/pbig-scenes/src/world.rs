@@ -7,19 +7,13 @@ use std::sync::mpsc::channel;
 
 /// Everything that rapier keeps apart, together; the broad phase is lent to each step.
 pub struct World {
-    /// Rigid bodies.
     pub bodies: RigidBodySet,
-    /// Colliders.
     pub colliders: ColliderSet,
-    /// Joints between bodies.
     pub impulse_joints: ImpulseJointSet,
-    /// Articulations.
     pub multibody_joints: MultibodyJointSet,
-    /// Contacts and intersections.
     pub narrow_phase: NarrowPhase,
     /// Acceleration, m/s^2.
     pub gravity: Vec3,
-    /// Step length and the like.
     pub params: IntegrationParameters,
     islands: IslandManager,
     ccd_solver: CCDSolver,
@@ -44,17 +38,14 @@ impl Default for World {
 }
 
 impl World {
-    /// Returns an empty world with this acceleration, m/s^2.
     pub fn with_gravity(gravity: Vec3) -> Self {
         Self { gravity, ..Self::default() }
     }
 
-    /// Runs one step of rapier's physics pipeline.
     pub fn step(&mut self, broad_phase: &mut dyn BroadPhase) {
         self.step_for(broad_phase, &());
     }
 
-    /// Runs one step, and returns its collision events.
     pub fn step_with_events(&mut self, broad_phase: &mut dyn BroadPhase) -> Vec<CollisionEvent> {
         let (send, received) = channel();
         self.step_for(broad_phase, &ChannelEventCollector::new(send, channel().0));
@@ -78,7 +69,6 @@ impl World {
         );
     }
 
-    /// Adds a body with one collider.
     pub fn add(&mut self, body: RigidBodyBuilder, collider: ColliderBuilder) -> RigidBodyHandle {
         let handle = self.bodies.insert(body);
         self.colliders.insert_with_parent(collider, handle, &mut self.bodies);
@@ -95,21 +85,13 @@ impl World {
         ColliderBuilder::halfspace(Vector::y_axis())
     }
 
-    /// Removes a body with its colliders.
     pub fn remove(&mut self, body: RigidBodyHandle) {
         let Self { bodies, islands, colliders, impulse_joints, multibody_joints, .. } = self;
         bodies.remove(body, islands, colliders, impulse_joints, multibody_joints, true);
     }
 
-    /// Removes a collider.
     pub fn remove_collider(&mut self, collider: ColliderHandle) {
         self.colliders.remove(collider, &mut self.islands, &mut self.bodies, true);
-    }
-
-    /// Throws a heavy ball with a radius of half a metre; the velocity in m/s.
-    pub fn throw(&mut self, from: Vec3, velocity: Vec3) -> RigidBodyHandle {
-        let ball = Self::dynamic(from).linvel(to_vector(velocity)).ccd_enabled(true);
-        self.add(ball, ColliderBuilder::ball(0.5).density(10.0))
     }
 
     /// Returns the pairs of the narrow phase: of contacts, and with sensors.
@@ -119,13 +101,11 @@ impl World {
         contacts.chain(intersections).map(|(one, other)| ColliderPair::new(one, other))
     }
 
-    /// Returns the number of pairs of the narrow phase.
     pub fn pair_count(&self) -> usize {
         let contacts = self.narrow_phase.contact_graph().raw_graph().raw_edges().len();
         contacts + self.narrow_phase.intersection_graph().raw_graph().raw_edges().len()
     }
 
-    /// Returns true if the collider is part of a body that is not fixed.
     pub fn can_move(&self, collider: &Collider) -> bool {
         collider.parent().and_then(|body| self.bodies.get(body)).is_some_and(|body| !body.is_fixed())
     }
@@ -193,17 +173,14 @@ fn around<'a>(colliders: impl Iterator<Item = &'a Collider>) -> Option<Aabb> {
     aabbs.filter(|aabb| aabb.half_extents().max() < MAX_HALF_EXTENT).reduce(|a, b| a.merged(&b))
 }
 
-/// Returns a glam vector as rapier's.
 pub fn to_vector(v: Vec3) -> Vector<Real> {
     vector![v.x, v.y, v.z]
 }
 
-/// Returns a glam vector as a point of rapier's.
 pub fn to_point(v: Vec3) -> Point<Real> {
     to_vector(v).into()
 }
 
-/// Returns a pose without rotation.
 pub fn pose(at: Vec3) -> Isometry<Real> {
     Isometry::translation(at.x, at.y, at.z)
 }

@@ -4,11 +4,10 @@ use super::OUR_GRID;
 use super::printed::*;
 use super::sides::{Setup, Way, effort, race};
 use crate::UNSORTED;
-use crate::alone::{NAMES, alone};
-use pbig_core::{Aabb, Backend, Config, Pair};
+use pbig_core::{Aabb, Backend, BroadPhase, Config, Finder, Pair, ProxyFilter};
 use pbig_gpu::{CellRule, GpuOptions};
 use pbig_harness::gpu_race;
-use pbig_harness::pair_index::{pair_count, pair_of};
+use pbig_harness::pair_index::pair_count;
 use pbig_harness::prelude::*;
 
 /// The distance that cubes with edges of 1 move in a step, along each axis.
@@ -26,13 +25,13 @@ fn output_bytes(n: u64) -> [u64; 2] {
     [pair_count(n), pair_count(n).div_ceil(8)]
 }
 
-/// A way to write down which pairs overlap, and to read it.
-type Form = (&'static str, fn(&[Aabb]) -> Vec<u8>, fn(&[u8], u64) -> Vec<Pair>);
+/// A way to write down which pairs overlap.
+type Form = (&'static str, fn(&[Aabb]) -> Vec<u8>);
 
 const FORMS: [Form; 3] = [
-    ("a byte a pair of boxes", write_bytes, read_bytes),
-    ("a bit a pair of boxes", write_bits, read_bits),
-    ("a list of pairs", write_list, read_list),
+    ("a byte a pair of boxes", write_bytes),
+    ("a bit a pair of boxes", write_bits),
+    ("a list of pairs", write_list),
 ];
 
 /// Returns every pair in the order of its index, and true if it overlaps.
@@ -59,46 +58,18 @@ fn write_list(boxes: &[Aabb]) -> Vec<u8> {
     bytemuck::cast_slice(&pairs).to_vec()
 }
 
-fn pair_at(k: u64, n: u64) -> Pair {
-    let (a, b) = pair_of(k, n);
-    Pair::new(a as u32, b as u32)
-}
-
-fn read_bytes(out: &[u8], n: u64) -> Vec<Pair> {
-    (0..).zip(out).filter(|(_, byte)| **byte != 0).map(|(k, _)| pair_at(k, n)).collect()
-}
-
-fn read_bits(out: &[u8], n: u64) -> Vec<Pair> {
-    let of_byte =
-        |(i, &byte): (u64, &u8)| (0..8).filter(move |bit| byte >> bit & 1 != 0).map(move |bit| 8 * i + bit);
-    (0..).zip(out).flat_map(of_byte).map(|k| pair_at(k, n)).collect()
-}
-
-fn read_list(out: &[u8], _: u64) -> Vec<Pair> {
-    bytemuck::pod_collect_to_vec(out)
-}
-
-/// Table 5 and figure 3 on one thread: every pair is tested and written in memory, whence the pairs are read again. Printed rates
-/// are bytes over the output's time, and tests over the kernel's.
+/// Table 5 and figure 3 on one thread: every pair is tested and written in memory.
 fn forms_on_cpu() -> Result<Table, Failure> {
-    let columns = "objects | pairs | form | bytes written | ms, tests and output | ms, pairs read from it | \
-        kernel printed, ms | output printed, us | GB/s printed | tests/s printed";
+    let columns = "objects | pairs | form | bytes written | ms, tests and output | kernel printed, ms | output printed, us";
     let mut table = Table::new("Avril table 5 and figure 3: forms of output, CPU", columns);
     for (n, byte, bit) in AVRIL_5 {
         let boxes = cubes(n as usize, 1.0, 1.0, 1);
-        let known = read_list(&write_list(&boxes), n);
-        for ((name, write, read), printed) in FORMS.into_iter().zip([Some(byte), Some(bit), None]) {
-            let mut found = (write(&boxes), vec![]);
-            let ms = medians(&mut found, 2, effort(boxes.len()), unprepared, |(out, pairs), side| {
-                let write = || *out = write(&boxes);
-                Ok(if side == 0 { timed(write).1 } else { timed(|| *pairs = read(out, n)).1 })
-            })?;
-            let (bytes, pairs) = (found.0.len(), found.1);
-            check(pairs == known, || format!("{n} objects: other pairs from {name}"))?;
-            let tests = pair_count(n) as f64;
-            let rates = |[kernel, us]: [f64; 2]| [kernel, us, bytes as f64 / us / 1e3, tests / kernel * 1e3];
-            let printed = printed.into_iter().flat_map(rates);
-            table.row(cells![n, pairs.len(), name, bytes, ..ms, ..printed]);
+        let pairs = write_list(&boxes).len() / size_of::<Pair>();
+        for ((name, write), printed) in FORMS.into_iter().zip([Some(byte), Some(bit), None]) {
+            let mut out = vec![];
+            let run = |out: &mut Vec<u8>, _| Ok(timed(|| *out = write(&boxes)).1);
+            let ms = medians(&mut out, 1, effort(boxes.len()), unprepared, run)?;
+            table.row(cells![n, pairs, name, out.len(), ..ms, ..printed.into_iter().flatten()]);
         }
     }
     Ok(table)
@@ -136,37 +107,57 @@ fn brute_force_and_grid(setup: &Setup) -> Result<Table, Failure> {
 /// their edge: `BroadPhase::set_many`, then `update`, events included, beside a search from nothing; on the CPU means, on a
 /// device medians of a few updates.
 fn steps(setup: &Setup) -> Result<Table, Failure> {
-    let columns = "objects | share moved | side | pairs | boxes up to date, ms | grid (ours: plan and map), ms | \
-        search (ours: check, emit, diff), ms | whole, ms | updates";
-    let mut table = Table::new("Avril table 6, figures 5 and 6: a step", columns);
+    let mut table = Table::new(
+        "Avril table 6, figures 5 and 6: a step",
+        "objects | share moved | side | pairs | whole, ms",
+    );
     let (n, most) = if setup.quick { (10_000, 100_000) } else { (100_000, usize::MAX) };
     let sizes = AVRIL_6.into_iter().filter(|(n, _)| *n <= most).map(|(n, printed)| (n, 1.0, Some(printed)));
     for (n, share, printed) in sizes.chain([0.75, 0.5, 0.25, 0.1, 0.01].map(|share| (n, share, None))) {
         if let Some(printed) = printed {
-            table.row(cells![n, share, "printed", (), ..printed]);
+            table.row(cells![n, share, "printed", (), printed]);
         }
         let boxes = || cubes(n, 1.0, 1.0, 1);
-        for (side, events) in [("ours, CPU", true), ("ours, CPU, from nothing", false)] {
-            let ours = alone(events, boxes(), (share, DISTANCE), Effort::new(setup.quick))?;
-            let of = |wanted: &[&str]| -> f64 {
-                let times = NAMES.iter().zip(ours.mean);
-                times.filter(|(name, _)| wanted.contains(name)).map(|(_, ms)| ms).sum()
-            };
-            let parts = [of(&["set"]), of(&["plan", "map"]), of(&["check", "emit", "diff"])];
-            table.row(cells![n, share, side, ours.pairs, ..parts, ours.mean[0], ours.chosen]);
+        let (pairs, ms) = step(Wander::new(boxes(), share, DISTANCE), Effort::new(setup.quick))?;
+        for (side, ms) in ["ours, CPU", "ours, CPU, from nothing"].into_iter().zip(ms) {
+            table.row(cells![n, share, side, pairs, ms.mean]);
         }
         if let Some(gpu) = setup.for_boxes(n) {
             let raced = gpu_race::race(gpu, boxes(), share, DISTANCE)?;
-            table.row(cells![n, share, "ours, GPU", raced.pairs, ..[(); 3], raced.ms[1]]);
+            table.row(cells![n, share, "ours, GPU", raced.pairs, raced.ms[1]]);
         }
     }
     Ok(table)
+}
+
+/// Measures an update, and a search from nothing, in turn. Returns the pairs, too.
+fn step(wander: Wander, effort: Effort) -> Result<(usize, Vec<Took>), Failure> {
+    let (mut finder, mut broad_phase) = (Finder::new(UNSORTED), BroadPhase::new(UNSORTED)?);
+    let all: Vec<u32> = (0..wander.boxes.len() as u32).collect();
+    let prepare = |(wander, moved): &mut (Wander, Vec<u32>), round| {
+        let now = wander.step(round);
+        // In the first round all are new.
+        if round > 0 {
+            *moved = now;
+        }
+    };
+    let took = measured(&mut (wander, all), 2, effort, prepare, |(wander, moved), side| {
+        let of = |id: u32| Some((wander.boxes[id as usize], ProxyFilter::ALL));
+        let (done, ms) = timed(|| match side {
+            0 => broad_phase.set_many(moved, of).and_then(|()| broad_phase.update().map(|_| ())),
+            _ => finder.find(&wander.boxes).map(|_| ()),
+        });
+        Ok(done.map(|()| ms)?)
+    })?;
+    check(broad_phase.pair_count() == finder.pairs().len(), || "an update and a search differ".into())?;
+    Ok((finder.pairs().len(), took))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use pbig_core::oracle;
+    use pbig_harness::pair_index::index_of;
 
     #[test]
     fn every_form_has_the_oracles_pairs_and_the_calculated_bytes() {
@@ -174,9 +165,16 @@ mod tests {
         let boxes = cubes(90, 1.0, 3.0, 1);
         let pairs = oracle::pairs(&boxes);
         let [bytes, bits] = output_bytes(90);
-        for ((name, write, read), size) in FORMS.iter().zip([bytes, bits, 8 * pairs.len() as u64]) {
-            let out = write(&boxes);
-            assert_eq!((out.len() as u64, &read(&out, 90)), (size, &pairs), "{name}");
+        for ((name, write), size) in FORMS.iter().zip([bytes, bits, 8 * pairs.len() as u64]) {
+            assert_eq!(write(&boxes).len() as u64, size, "{name}");
+        }
+        assert_eq!(write_list(&boxes), bytemuck::cast_slice::<Pair, u8>(&pairs));
+        let places: Vec<u64> = pairs.iter().map(|pair| index_of(pair.a.into(), pair.b.into(), 90)).collect();
+        let [by_byte, by_bit] = [write_bytes(&boxes), write_bits(&boxes)];
+        for k in 0..bytes {
+            let (hit, byte, bit) =
+                (places.contains(&k), by_byte[k as usize], by_bit[k as usize / 8] >> (k % 8));
+            assert_eq!((byte, bit & 1), (u8::from(hit), u8::from(hit)), "index {k}");
         }
     }
 }

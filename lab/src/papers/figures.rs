@@ -1,5 +1,5 @@
 //! PBIG's figures 8, 9 and 11: number of boxes, size of cells, distribution. They have no printed numbers but what the text says.
-//! And tables IV, V and VI: each optimisation on and off, and the time of each task.
+//! And table IV: each optimisation on and off.
 
 use super::OUR_GRID;
 use super::model::{GAUSSIAN, GAUSSIAN_READ, Model, UNIFORM};
@@ -7,10 +7,9 @@ use super::printed::*;
 use super::sides::{SearchCall, Setup, Way, effort, once, race};
 use super::table_iii::{expected_checks, options_for};
 use crate::UNSORTED;
-use pbig_core::{Aabb, Config, DeviceReport, Finder, Order, Report};
+use pbig_core::{Aabb, Config, Finder, Order, Report};
 use pbig_gpu::{CellRule, Coding, GpuOptions};
 use pbig_harness::prelude::*;
-use std::time::Duration;
 
 /// Maximum number of pairs of a call here: their list and its copy stay below 4 GB.
 const MOST_PAIRS: f64 = 2e8;
@@ -18,13 +17,13 @@ const MOST_PAIRS: f64 = 2e8;
 const MOST_PLAIN: usize = 1_000_000;
 
 pub(super) fn tables(setup: &Setup) -> Result<Vec<Table>, Failure> {
-    let gaussian_ms = TABLE_VI[7].total as f64 / 1e3;
     let n = setup.on_device();
-    let runs = setup.run(&TABLE_VI.map(|row| optimised(&row)), &crowded(n).draw(n, 1), 1.0)?;
+    let ways = TABLE_IV.map(|(setting, ..)| optimised(setting));
+    let runs = setup.run(&ways, &crowded(n).draw(n, 1), 1.0)?;
     Ok(vec![
         by_number("PBIG figure 8: number of boxes", &UNIFORM, "< 1000".into(), setup)?,
         by_length(setup)?,
-        by_number("PBIG figure 11: distribution of boxes", &GAUSSIAN, gaussian_ms.into(), setup)?,
+        by_number("PBIG figure 11: distribution of boxes", &GAUSSIAN, TABLE_IV[7].2.into(), setup)?,
         optimisations(&runs),
         on_cpu(setup)?,
     ])
@@ -129,36 +128,22 @@ fn crowded(n: usize) -> Model {
 }
 
 /// Returns the way of a setting. Chunks are as small as gives several at this size: one alone leaves nothing to overlap.
-fn optimised(row: &Timing) -> Way {
-    let has = |letter: char| row.setting.contains(letter);
+fn optimised(setting: &str) -> Way {
+    let has = |letter: char| setting.contains(letter);
     let coding = if has('C') { Coding::Packed } else { Coding::Plain };
     let (pipelining, load_balancing, chunk) = (has('P'), has('B'), [1 << 13, 1 << 7]);
     Way::Gpu(GpuOptions { coding, pipelining, load_balancing, chunk, ..GpuOptions::DEFAULT })
 }
 
-/// Tables IV, V and VI: each setting's total, the time of each task, and what it sends. Printed: with P, CHECK has the time of
-/// CHECK, `DataOut` and REPORT together. Ours: section 6.3 with fewer boxes, as crowded; `DataOut` is the time that the host waits
-/// beyond the kernels. In none: total less the tasks; with P tasks overlap, and what is at the same time counts twice.
+/// Table IV: each setting's total, and what it sends. Ours: section 6.3 with fewer boxes, as crowded.
 fn optimisations(runs: &[SearchCall]) -> Table {
-    let columns = format!(
-        "setting | side | speed-up printed | total, ms | speed-up by the totals | {} | in none | pairs | checks | \
-         bytes written | bytes written a pair | bytes fetched | bytes fetched a pair | chunks",
-        TASKS.join(" | ")
-    );
-    let mut table =
-        Table::new("PBIG tables IV, V and VI: optimisations on and off, and tasks, ms, GPU", &columns);
-    let mut row =
-        |labels: Vec<Value>, [first, total]: [f64; 2], tasks: [Option<f64>; 7], sent: Vec<Value>| {
-            let rest = total - tasks.iter().flatten().sum::<f64>();
-            table.row(cells![..labels, total, first / total, ..tasks, rest, ..sent]);
-        };
-    for (i, printed) in TABLE_VI.iter().enumerate() {
-        let tasks = std::array::from_fn(|k| printed.tasks.get(k).map(|us| *us as f64 / 1e3));
-        let totals = [TABLE_VI[0].total, printed.total].map(|us| us as f64 / 1e3);
-        row(cells![printed.setting, "printed", printed.speed_up], totals, tasks, vec![]);
+    let columns = "setting | side | speed-up printed | total, ms | speed-up by the totals | pairs | checks | bytes written | \
+        bytes written a pair | bytes fetched | bytes fetched a pair | chunks";
+    let mut table = Table::new("PBIG table IV: optimisations on and off, GPU", columns);
+    for (i, (setting, speed_up, total)) in TABLE_IV.into_iter().enumerate() {
+        table.row(cells![setting, "printed", speed_up, total, TABLE_IV[0].2 / total]);
         if let Some(call) = runs.get(i) {
-            let labels = cells![printed.setting, "ours", ()];
-            row(labels, [runs[0].ms, call.ms], of_tasks(call), sent(call));
+            table.row(cells![setting, "ours", (), call.ms, runs[0].ms / call.ms, ..sent(call)]);
         }
     }
     table
@@ -169,19 +154,6 @@ fn sent(call: &SearchCall) -> Vec<Value> {
     let of = |bytes: Option<u64>| cells![bytes, bytes.map(|bytes| bytes as f64 / *pairs as f64)];
     let bytes = [of(call.written()), of(gpu.as_ref().map(|gpu| gpu.downloaded))].concat();
     cells![*pairs, checks.made, ..bytes, gpu.as_ref().map(|gpu| gpu.chunks)]
-}
-
-/// Returns the times of a call on a device by the paper's tasks.
-fn of_tasks(call: &SearchCall) -> [Option<f64>; TASKS.len()] {
-    let is_check = |name: &str| matches!(name, "check_all" | "check_small" | "check_large");
-    let is_schedule = |name: &str| matches!(name, "schedule" | "arrange");
-    let map = call.kernels(|name| !is_check(name) && !is_schedule(name));
-    let (schedule, check, all) = (call.kernels(is_schedule), call.kernels(is_check), call.kernels(|_| true));
-    let Report { stages, device: gpu, .. } = &call.report;
-    let of = |time: fn(&DeviceReport) -> Duration| gpu.as_ref().map(|gpu| milliseconds(time(gpu)));
-    let out = of(|gpu| gpu.wait).zip(all).map(|(wait, all)| (wait - all).max(0.0));
-    let decode = of(|gpu| gpu.decode).map(|decode| decode + milliseconds(stages.emit));
-    [of(|gpu| gpu.upload), Some(milliseconds(stages.plan)), map, schedule, check, out, decode]
 }
 
 /// Returns the settings that can be switched on the CPU.

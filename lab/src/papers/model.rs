@@ -31,21 +31,14 @@ pub(super) struct Model {
     pub(super) space: Space,
     /// True if lower corners are drawn from the space, false if centres are.
     pub(super) has_corners: bool,
-    /// Lengths are uniform between two.
+    /// Lengths are uniform between two, on each axis by itself.
     pub(super) lengths: [f64; 2],
-    /// One length for all axes of a box, or one for each.
-    pub(super) cubes: bool,
 }
 
 impl Model {
     /// Boxes whose centres are uniform in the paper's space.
     pub(super) const fn boxes(low: f64, high: f64) -> Self {
-        Self { space: Space::Even(SPACE), has_corners: false, lengths: [low, high], cubes: false }
-    }
-
-    /// Boxes like [`Model::boxes`], with one length for all axes.
-    pub(super) const fn cubes(low: f64, high: f64) -> Self {
-        Self { cubes: true, ..Self::boxes(low, high) }
+        Self { space: Space::Even(SPACE), has_corners: false, lengths: [low, high] }
     }
 
     pub(super) fn mean_length(&self) -> f64 {
@@ -82,11 +75,9 @@ impl Model {
     /// The chance that two boxes overlap, and the relative variance over one box's sizes and places of its
     /// chance to overlap another.
     fn chance(&self) -> (f64, f64) {
-        let alike = if self.cubes { 3 } else { 1 };
-        let of_one = |e: f64| self.average(|f| self.on_axis(e, f).powi(alike));
+        let of_one = |e: f64| self.average(|f| self.on_axis(e, f));
         let (first, second) = (self.average(of_one), self.average(|e| of_one(e).powi(2)));
-        let axes = 3 / alike;
-        (first.powi(axes), (second / first.powi(2)).powi(axes) * self.crowding().powi(3) - 1.0)
+        (first.powi(3), (second / first.powi(2) * self.crowding()).powi(3) - 1.0)
     }
 
     /// Along an axis the mean square of a box's chance to meet another, by where it lies, over the square of
@@ -126,9 +117,7 @@ impl Model {
 
     fn one(&self, rng: &mut StdRng) -> Aabb {
         let [low, high] = self.lengths;
-        let mut edge = || low + (high - low) * rng.random_range(0.0..1.0);
-        let first = edge();
-        let edges = if self.cubes { [first; 3] } else { [first, edge(), edge()] };
+        let edges = [(); 3].map(|()| low + (high - low) * rng.random_range(0.0..1.0));
         let shift = if self.has_corners { 0.0 } else { 0.5 };
         let min = edges.map(|edge| self.point(rng) - shift * edge);
         Aabb::new(min.map(|x| x as f32), std::array::from_fn(|k| (min[k] + edges[k]) as f32))
@@ -151,7 +140,7 @@ mod tests {
     #[test]
     fn the_expected_pairs_are_those_of_brute_force() {
         let (n, seeds) = (2000, 6);
-        let laws = [Model::cubes(900.0, 900.0), Model::boxes(0.0, 1500.0), Model::cubes(100.0, 1500.0)];
+        let laws = [Model::boxes(900.0, 900.0), Model::boxes(0.0, 1500.0)];
         let spaces = [Space::Even(1e4), Space::Normal([5000.0, 2000.0])];
         let laws = laws.into_iter().flat_map(|law| spaces.map(|space| Model { space, ..law }));
         for law in laws.flat_map(|law| [false, true].map(|has_corners| Model { has_corners, ..law })) {

@@ -35,55 +35,39 @@ pub(super) const TABLE_III: [Coverage; 5] = [
     Coverage { doc: 10.0, pairs: 49_514_252, checks: 744_000_000, output: 44.734, cell: Some(128.0) },
 ];
 
-/// A row of PBIG's tables IV and VI, in microseconds (section 6.4 calls 1,941,184 of them 1.941 seconds).
-pub(super) struct Timing {
-    /// C: data compression, P: pipelined execution, B: load balancing.
-    pub(super) setting: &'static str,
-    pub(super) speed_up: Option<f64>,
-    pub(super) total: u64,
-    /// `DataIn`, PLAN, MAP, SCHED, CHECK, `DataOut`, REPORT; with pipelining one number for the last three.
-    pub(super) tasks: &'static [u64],
-}
-
-const fn timing(setting: &'static str, speed_up: Option<f64>, total: u64, tasks: &'static [u64]) -> Timing {
-    Timing { setting, speed_up, total, tasks }
-}
-
-/// PBIG, tables IV and VI.
-pub(super) const TABLE_VI: [Timing; 8] = [
-    timing("baseline", None, 10_264_940, &[50_423, 30, 137_909, 2_644, 4_970_496, 1_740_208, 3_312_812]),
-    timing("+C", Some(1.86), 5_512_054, &[52_686, 35, 137_713, 2_709, 3_806_897, 473_857, 995_124]),
-    timing("+P", Some(1.98), 5_181_014, &[48_470, 28, 137_649, 2_753, 4_983_314]),
-    timing("+C+P", Some(2.63), 3_891_116, &[49_243, 30, 137_845, 2_684, 3_697_194]),
-    timing("+B", Some(1.01), 10_167_360, &[49_926, 31, 137_854, 2_701, 5_039_146, 1_696_377, 3_191_348]),
-    timing("+C+B", Some(2.88), 3_562_590, &[54_857, 39, 137_996, 3_193, 2_097_496, 483_593, 740_671]),
-    timing("+P+B", Some(1.92), 5_337_236, &[48_115, 41, 137_856, 2_837, 5_139_588]),
-    timing("+C+P+B", Some(4.81), 2_132_998, &[47_760, 35, 137_840, 2_537, 1_941_184]),
+/// PBIG, table IV, with the totals of table VI in ms: the setting (C: data compression, P: pipelined execution, B: load balancing),
+/// the speed-up, and the total.
+pub(super) const TABLE_IV: [(&str, Option<f64>, f64); 8] = [
+    ("baseline", None, 10_264.94),
+    ("+C", Some(1.86), 5512.054),
+    ("+P", Some(1.98), 5181.014),
+    ("+C+P", Some(2.63), 3891.116),
+    ("+B", Some(1.01), 10_167.36),
+    ("+C+B", Some(2.88), 3562.59),
+    ("+P+B", Some(1.92), 5337.236),
+    ("+C+P+B", Some(4.81), 2132.998),
 ];
-
-/// PBIG, table V: the tasks. Ours: `DeviceReport::upload`; `StageTimes::plan` on the host; the kernels `locate` to `scan_add` and
-/// `scatter`; `schedule` and `arrange`; `check_*`; `DeviceReport::wait` less the kernels; `DeviceReport::decode` and emit.
-pub(super) const TASKS: [&str; 7] = ["DataIn", "PLAN", "MAP", "SCHED", "CHECK", "DataOut", "REPORT"];
 
 /// Avril, table 2: objects, milliseconds with the square root and the "lazy way" without.
 pub(super) const AVRIL_2: [(u64, f64, f64); 3] =
     [(1000, 0.21, 0.25), (10_000, 2.25, 4.28), (100_000, 29.66, 58.24)];
 
-/// A row of Avril's table 4.
-pub(crate) struct Roots {
-    pub(crate) roots: u64,
-    /// Milliseconds by Carmack's or Lomont's approximation, which it has the same for both.
-    pub(crate) approximate: f64,
-    /// Milliseconds of CUDA's own.
-    pub(crate) cuda: f64,
-}
+/// Avril, table 3: numbers; wrong roots in percent by Carmack's constant, with two steps and with three.
+pub(crate) const AVRIL_3: [(u32, [f64; 2]); 6] = [
+    (1000, [2.9, 0.7]),
+    (10_000, [0.89, 0.12]),
+    (100_000, [0.27, 0.035]),
+    (1_000_000, [0.18, 0.011]),
+    (10_000_000, [0.3681, 0.004]),
+    (100_000_000, [0.9847, 0.0134]),
+];
 
-/// Avril, table 4.
-pub(crate) const AVRIL_4: [Roots; 4] = [
-    Roots { roots: 1_000_000, approximate: 0.042, cuda: 0.048 },
-    Roots { roots: 10_000_000, approximate: 0.409, cuda: 0.478 },
-    Roots { roots: 100_000_000, approximate: 4.102, cuda: 4.722 },
-    Roots { roots: 1_000_000_000, approximate: 41.01, cuda: 48.01 },
+/// Avril, table 4: roots; milliseconds by Carmack's approximation and by CUDA's own root.
+pub(crate) const AVRIL_4: [(u32, [f64; 2]); 4] = [
+    (1_000_000, [0.042, 0.048]),
+    (10_000_000, [0.409, 0.478]),
+    (100_000_000, [4.102, 4.722]),
+    (1_000_000_000, [41.01, 48.01]),
 ];
 
 /// Avril, table 5: objects; kernel (ms) and output (microseconds) with a byte a pair, and with a bit.
@@ -94,13 +78,9 @@ pub(super) const AVRIL_5: [(u64, [f64; 2], [f64; 2]); 4] = [
     (7500, [163.60, 45_865.94], [162.03, 5687.20]),
 ];
 
-/// Avril, table 6: objects; milliseconds of the update of boxes, of the grid, of brute force, in all.
-pub(super) const AVRIL_6: [(usize, [f64; 4]); 4] = [
-    (1000, [0.03, 0.13, 0.09, 0.25]),
-    (10_000, [0.31, 1.45, 0.59, 2.35]),
-    (100_000, [3.38, 11.12, 13.41, 27.91]),
-    (1_000_000, [14.26, 134.91, 142.72, 291.89]),
-];
+/// Avril, table 6: objects; milliseconds of a step.
+pub(super) const AVRIL_6: [(usize, f64); 4] =
+    [(1000, 0.25), (10_000, 2.35), (100_000, 27.91), (1_000_000, 291.89)];
 
 /// Avril, table 7: objects; milliseconds without the grid and with it.
 pub(super) const AVRIL_7: [(usize, f64, f64); 3] =

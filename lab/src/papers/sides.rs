@@ -184,11 +184,4 @@ impl SearchCall {
         // The ratio to two ids a pair, of all that the kernels wrote.
         (self.report.pairs > 0).then(|| (gpu.compression * 8.0 * self.report.pairs as f64).round() as u64)
     }
-
-    /// Returns the milliseconds of the kernels whose name a rule takes.
-    pub(super) fn kernels(&self, takes: impl Fn(&str) -> bool) -> Option<f64> {
-        let kernels = &self.report.device.as_ref()?.kernels;
-        let wanted = kernels.iter().filter(|(name, _)| takes(name)).map(|(_, time)| milliseconds(*time));
-        (!kernels.is_empty()).then(|| wanted.sum())
-    }
 }

@@ -17,7 +17,6 @@ use overlay::Overlay;
 use pbig_scenes::drawn::Drawn;
 use stage::Stage;
 
-/// The resolution of pictures.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Quality {
     /// Smooth edges and sharp shadows.

@@ -13,7 +13,6 @@ pub(super) struct Overlay {
 }
 
 impl Overlay {
-    /// Creates an empty overlay.
     pub(super) fn new() -> Self {
         Self { root: SceneNode2d::empty(), panels: Vec::new(), font: Font::default() }
     }

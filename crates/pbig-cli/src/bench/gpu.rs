@@ -1,6 +1,6 @@
-//! `pbig bench gpu`: the GPU beside the CPU, kernel by kernel, and the host's part of a call.
+//! `pbig bench gpu`: the GPU beside the CPU, kernel by kernel.
 
-use pbig_core::{Aabb, Backend, BroadPhase, Config, DeviceReport, Finder, Limits, Order, ProxyFilter};
+use pbig_core::{Aabb, Backend, Config, DeviceReport, Finder, Limits};
 use pbig_gpu::{GpuFinder, GpuOptions};
 use pbig_harness::gpu_model::{Counts, GPUS, Gpu};
 use pbig_harness::gpu_race::{on_device, race};
@@ -13,7 +13,7 @@ pub(super) fn run(quick: bool) -> Result<BenchReport, Failure> {
     let gpu = GpuFinder::new().map_err(|error| Failure::Input(error.to_string()))?;
     let head = vec![("adapter", gpu.adapter().to_owned()), ("software", gpu.is_software().to_string())];
     let [searches, kernels, model] = searches(&gpu, quick)?;
-    let tables = vec![searches, kernels, model, host(&gpu, quick)?, events(&gpu, quick)?];
+    let tables = vec![searches, kernels, model, events(&gpu, quick)?];
     Ok(BenchReport { head, ..BenchReport::new("gpu", tables) })
 }
 
@@ -34,7 +34,7 @@ fn boxes(set: &str, n: usize) -> Vec<Aabb> {
 /// Returns the table of searches, that of their kernels, and that of what the model predicts: medians in ms of calls between which all boxes move. `wait_ms`
 /// and the columns after it are of the last call.
 fn searches(gpu: &GpuFinder, quick: bool) -> Result<[Table; 3], Failure> {
-    let columns = "set | boxes | pairs | cpu_ms | gpu_ms | cpu_over_gpu | predicted_ms | wait_ms | uploaded_bytes | downloaded_bytes | device_bytes | compression";
+    let columns = "set | boxes | pairs | cpu_ms | gpu_ms | cpu_over_gpu | predicted_ms | wait_ms | upload_ms | plan_ms | record_ms | decode_ms | uploaded_bytes | downloaded_bytes | device_bytes | compression";
     let mut table = Table::new("searches", columns);
     let mut kernels = Table::new("kernels", "set | boxes | kernel | kernel_ms");
     let mut model =
@@ -45,9 +45,10 @@ fn searches(gpu: &GpuFinder, quick: bool) -> Result<[Table; 3], Failure> {
         let ([cpu, on_gpu], counts, report) = search(gpu, set, n)?;
         let predicted = known(gpu).map(|gpu| counts.predicted_ms(gpu));
         let pairs = counts.pairs as u64;
-        let times = cells![set, n, pairs, cpu, on_gpu, cpu / on_gpu, predicted, milliseconds(report.wait)];
+        let times = cells![set, n, pairs, cpu, on_gpu, cpu / on_gpu, predicted];
+        let parts = [report.wait, report.upload, report.plan, report.record, report.decode];
         let bytes = cells![report.uploaded, report.downloaded, report.device_bytes, report.compression];
-        table.row([times, bytes].concat());
+        table.row(cells![..times, ..parts.map(milliseconds), ..bytes]);
         for (name, time) in &report.kernels {
             kernels.row(cells![set, n, *name, milliseconds(*time)]);
         }
@@ -107,69 +108,6 @@ fn search(gpu: &GpuFinder, set: &str, n: usize) -> Result<([f64; 2], Counts, Dev
 fn time(finder: &mut Finder, boxes: &[Aabb]) -> Result<f64, Failure> {
     let (found, ms) = timed(|| finder.find(boxes).map(|_| ()));
     Ok(found.map(|()| ms)?)
-}
-
-/// Numbers of calls whose host's part is measured, and of calls before, which allocate and plan.
-const ROUNDS: usize = 6;
-const WARM_UP: usize = 3;
-
-/// Measures all but waiting for the device: medians in ms of searches of moved boxes, unsorted and sorted, and of updates in
-/// which one box in a hundred moves. `host` is the call without `wait`, `order` the sort of pairs that the device left unsorted.
-fn host(gpu: &GpuFinder, quick: bool) -> Result<Table, Failure> {
-    let columns = "call | boxes | pairs | host_ms | upload_ms | plan_ms | record_ms | decode_ms | order_ms";
-    let mut table = Table::new("host", columns);
-    for n in tracked(sizes(gpu, quick).into_iter().filter(|n| *n >= 10_000), "calls") {
-        let start = boxes("unit", n);
-        let frames = [moved(&start, 1.0, 2), start];
-        for (call, order) in [("unsorted", Order::Unspecified), ("sorted", Order::Sorted)] {
-            table.row([cells![call, n], host_of_searches(gpu, &frames, order)?].concat());
-        }
-        table.row([cells!["update, 1% moved", n], host_of_updates(gpu, &frames)?].concat());
-    }
-    Ok(table)
-}
-
-/// Returns the median of each of the host's times, by a call that gets the round and returns its milliseconds, the device's report,
-/// and the milliseconds of the sort.
-fn host_medians(
-    mut call: impl FnMut(usize) -> Result<(f64, DeviceReport, f64), Failure>,
-) -> Result<Vec<Value>, Failure> {
-    let mut times = Vec::new();
-    for round in 0..WARM_UP + ROUNDS {
-        let (ms, gpu, order) = call(round)?;
-        let [wait, upload, plan, record, decode] =
-            [gpu.wait, gpu.upload, gpu.plan, gpu.record, gpu.decode].map(milliseconds);
-        times.push([ms - wait, upload, plan, record, decode, order]);
-    }
-    let median = |k: usize| Spread::of(times[WARM_UP..].iter().map(|times| times[k])).median;
-    Ok((0..6).map(|k| median(k).into()).collect())
-}
-
-/// Returns the pairs, then the host's times.
-fn host_of_searches(gpu: &GpuFinder, frames: &[Vec<Aabb>; 2], order: Order) -> Result<Vec<Value>, Failure> {
-    let mut finder = Finder::with_device(Config { order, ..ON_GPU }, Box::new(gpu.clone()));
-    let times = host_medians(|round| {
-        let ms = time(&mut finder, &frames[round % 2])?;
-        let report = finder.report();
-        Ok((ms, on_device(report)?.clone(), milliseconds(report.stages.emit)))
-    })?;
-    Ok([cells![finder.pairs().len()], times].concat())
-}
-
-/// Measures updates like [`host_of_searches`], without the calls that set the boxes.
-fn host_of_updates(gpu: &GpuFinder, [moved, start]: &[Vec<Aabb>; 2]) -> Result<Vec<Value>, Failure> {
-    let mut broad_phase = BroadPhase::with_device(ON_GPU, Box::new(gpu.clone()))?;
-    let ids: Vec<u32> = (0..start.len() as u32).collect();
-    broad_phase.set_many(&ids, |id| Some((start[id as usize], ProxyFilter::ALL)))?;
-    broad_phase.update()?;
-    let times = host_medians(|round| {
-        let movers: Vec<u32> = ids.iter().copied().filter(|id| id % 100 == round as u32).collect();
-        broad_phase.set_many(&movers, |id| Some((moved[id as usize], ProxyFilter::ALL)))?;
-        let (done, ms) = timed(|| broad_phase.update().map(|_| ()));
-        done?;
-        Ok((ms, on_device(broad_phase.report())?.clone(), 0.0))
-    })?;
-    Ok([cells![broad_phase.pair_count()], times].concat())
 }
 
 /// Returns the medians of setting the boxes of the set `unit` that have moved by up to a tenth of an edge, and the update. The

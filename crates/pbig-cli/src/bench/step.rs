@@ -1,11 +1,10 @@
 //! `pbig bench step`: steps of every scene, with scene queries if asked for, in two worlds: one with rapier's own broad phase
 //! and one with pbig's, frame by frame in turn.
 
-use pbig_harness::bench::summary;
 use pbig_harness::frames::FrameKind;
 use pbig_harness::prelude::*;
 use pbig_harness::queries::Answer;
-use pbig_harness::runner::{Run, StepTime};
+use pbig_harness::runner::{Run, StepTime, Summary};
 use pbig_harness::scenes::Scene;
 use rapier_pbig::PbigBroadPhase;
 use rapier3d::prelude::{BroadPhase, DefaultBroadPhase};
@@ -93,7 +92,7 @@ impl Both {
 
     /// Returns means, medians and 99th percentiles, each of both sides.
     fn figures(&self, of: impl Fn(&StepTime) -> f64) -> [[f64; 2]; 3] {
-        let sides = self.times.each_ref().map(|times| summary(&times.iter().map(&of).collect::<Vec<_>>()));
-        [0, 1, 2].map(|figure| sides.map(|side| side[figure]))
+        let sides = self.times.each_ref().map(|times| Summary::of(times.iter().map(&of)));
+        [sides.map(|it| it.mean), sides.map(|it| it.median), sides.map(|it| it.p99)]
     }
 }

@@ -100,7 +100,7 @@ fn a_missing_program_of_studies_is_named() {
     refused(&run(&["bench", "papers", "--quick"]), &[build, &format!("{studies} papers --quick")]);
     let steady = run(&["bench", "steady", "--boxes", "10,20", "--write", "out"]);
     refused(&steady, &[&format!("{studies} steady --write out --boxes 10,20")]);
-    refused(&run(&["accuracy", "--only", "index"]), &[&format!("{studies} accuracy --only index")]);
+    refused(&run(&["accuracy", "--quick"]), &[&format!("{studies} accuracy --quick")]);
     refused(&pbig(Path::new("."), &["bench", "step", "--boxes", "60"]), &["--boxes", "steady"]);
     refused(&pbig(Path::new("."), &["bench", "gpu", "--queries", "ray"]), &["--queries", "step"]);
 }

@@ -5,162 +5,81 @@ use super::{
     wrecking,
 };
 
+/// Makes the list of rows: name, default number of bodies, builder; a description; what is hard.
+macro_rules! scenes {
+    ($($name:literal $default_bodies:literal $build:expr, $about:literal, $hard:literal;)*) => {
+        [$(Self { name: $name, about: $about, hard: $hard, default_bodies: $default_bodies, build: $build }),*]
+    };
+}
+
 impl Scene {
     /// Every scene.
-    pub const ALL: [Self; 22] = [
-        Self {
-            name: "column",
-            about: "spheres, cubes and slabs fall in a column onto a plane (Avril, figure 1)",
-            hard: "all boxes move at first, then rest in a heap",
-            default_bodies: 1000,
-            build: falling::column,
-        },
-        Self {
-            name: "spheres",
-            about: "the column with spheres alone",
-            hard: "boxes of about one size, which roll apart",
-            default_bodies: 1000,
-            build: |b, n| falling::fall(b, n, falling::sphere),
-        },
-        Self {
-            name: "cubes",
-            about: "the column with cubes alone",
-            hard: "boxes that grow and shrink as cubes tumble",
-            default_bodies: 1000,
-            build: |b, n| falling::fall(b, n, falling::cube),
-        },
-        Self {
-            name: "slabs",
-            about: "the column with slabs alone",
-            hard: "flat boxes, long one way and short the other",
-            default_bodies: 1000,
-            build: |b, n| falling::fall(b, n, falling::slab),
-        },
-        Self {
-            name: "columns",
-            about: "columns of spheres, of cubes and of slabs fall side by side (Avril, figure 1)",
-            hard: "crowds with empty space between them",
-            default_bodies: 3000,
-            build: falling::columns,
-        },
-        Self {
-            name: "pile",
-            about: "cubes stacked close together settle and fall asleep",
-            hard: "many pairs a box, all of them kept",
-            default_bodies: 1000,
-            build: resting::pile,
-        },
-        Self {
-            name: "pyramid",
-            about: "a pyramid of cubes at rest",
-            hard: "boxes that touch exactly, and hardly move",
-            default_bodies: 650,
-            build: resting::pyramid,
-        },
-        Self {
-            name: "mixed",
-            about: "sizes from 0.05 to 50 fall together",
-            hard: "large boxes beside small ones",
-            default_bodies: 600,
-            build: falling::mixed,
-        },
-        Self {
-            name: "jar",
-            about: "balls and cubes of mixed sizes fall into a jar",
-            hard: "small boxes crowded between larger ones",
-            default_bodies: 1500,
-            build: jar::jar,
-        },
-        Self {
-            name: "city",
-            about: "fixed blocks in streets, few movers among them",
-            hard: "many boxes of which few move",
-            default_bodies: 3000,
-            build: resting::city,
-        },
-        Self {
-            name: "traffic",
-            about: "cars circle through a town of rings and knock barrels about",
-            hard: "fixed and kinematic boxes, whose overlaps are no pairs",
-            default_bodies: 2000,
-            build: traffic::traffic,
-        },
-        Self {
-            name: "rain",
-            about: "small drops fall fast over a wide, hilly ground, thinly spread",
-            hard: "fast boxes in much empty space",
-            default_bodies: 1500,
-            build: falling::rain,
-        },
-        Self {
-            name: "avalanche",
-            about: "boulders roll down a valley, which is a height field",
-            hard: "one box below all others, and a crowd that never rests",
-            default_bodies: 1500,
-            build: avalanche::avalanche,
-        },
-        Self {
-            name: "galton",
-            about: "balls fall through the pegs of Galton boards into bins",
-            hard: "many fixed boxes close to few that move",
-            default_bodies: 1000,
-            build: galton::galton,
-        },
-        Self {
-            name: "wrecking",
-            about: "wrecking balls swing into walls of bricks",
-            hard: "long slanted rods, whose boxes are mostly empty",
-            default_bodies: 1000,
-            build: wrecking::wrecking,
-        },
-        Self {
-            name: "asteroids",
-            about: "asteroids of many sizes circle and collide, pulled to the middle",
-            hard: "sizes from 0.2 to 15 in all directions, none at rest",
-            default_bodies: 1500,
-            build: asteroids::asteroids,
-        },
-        Self {
-            name: "ragdolls",
-            about: "figures of eleven jointed parts fall over each other",
-            hard: "small boxes that overlap by their joints, and are no contacts",
-            default_bodies: 660,
-            build: ragdolls::ragdolls,
-        },
-        Self {
-            name: "conveyor",
-            about: "rollers carry crates around in rings, through gates, which are sensors",
-            hard: "sensors that boxes enter and leave all the time",
-            default_bodies: 1400,
-            build: conveyor::conveyor,
-        },
-        Self {
-            name: "sensors",
-            about: "spheres fall through layers of sensors, some that see fixed bodies too",
-            hard: "pairs of sensors and of fixed boxes",
-            default_bodies: 800,
-            build: filtered::sensors,
-        },
-        Self {
-            name: "compounds",
-            about: "bodies of several colliders, and compound shapes, fall",
-            hard: "boxes of one body, whose overlaps are no pairs",
-            default_bodies: 500,
-            build: falling::compounds,
-        },
-        Self {
-            name: "sleeping",
-            about: "one awake body among sleeping ones",
-            hard: "one box that moves among many that do not",
-            default_bodies: 20_000,
-            build: resting::sleeping,
-        },
-        Self {
-            name: "groups",
-            about: "crowds in groups that ignore each other, kinematic bodies and moving walls",
-            hard: "boxes in one place that are no pairs",
-            default_bodies: 800,
-            build: filtered::groups,
-        },
-    ];
+    pub const ALL: [Self; 22] = scenes! {
+        "column" 1000 falling::column,
+            "spheres, cubes and slabs fall in a column onto a plane (Avril, figure 1)",
+            "all boxes move at first, then rest in a heap";
+        "spheres" 1000 |b, n| falling::fall(b, n, falling::sphere),
+            "the column with spheres alone",
+            "boxes of about one size, which roll apart";
+        "cubes" 1000 |b, n| falling::fall(b, n, falling::cube),
+            "the column with cubes alone",
+            "boxes that grow and shrink as cubes tumble";
+        "slabs" 1000 |b, n| falling::fall(b, n, falling::slab),
+            "the column with slabs alone",
+            "flat boxes, long one way and short the other";
+        "columns" 3000 falling::columns,
+            "columns of spheres, of cubes and of slabs fall side by side (Avril, figure 1)",
+            "crowds with empty space between them";
+        "pile" 1000 resting::pile,
+            "cubes stacked close together settle and fall asleep",
+            "many pairs a box, all of them kept";
+        "pyramid" 650 resting::pyramid,
+            "a pyramid of cubes at rest",
+            "boxes that touch exactly, and hardly move";
+        "mixed" 600 falling::mixed,
+            "sizes from 0.05 to 50 fall together",
+            "large boxes beside small ones";
+        "jar" 1500 jar::jar,
+            "balls and cubes of mixed sizes fall into a jar",
+            "small boxes crowded between larger ones";
+        "city" 3000 resting::city,
+            "fixed blocks in streets, few movers among them",
+            "many boxes of which few move";
+        "traffic" 2000 traffic::traffic,
+            "cars circle through a town of rings and knock barrels about",
+            "fixed and kinematic boxes, whose overlaps are no pairs";
+        "rain" 1500 falling::rain,
+            "small drops fall fast over a wide, hilly ground, thinly spread",
+            "fast boxes in much empty space";
+        "avalanche" 1500 avalanche::avalanche,
+            "boulders roll down a valley, which is a height field",
+            "one box below all others, and a crowd that never rests";
+        "galton" 1000 galton::galton,
+            "balls fall through the pegs of Galton boards into bins",
+            "many fixed boxes close to few that move";
+        "wrecking" 1000 wrecking::wrecking,
+            "wrecking balls swing into walls of bricks",
+            "long slanted rods, whose boxes are mostly empty";
+        "asteroids" 1500 asteroids::asteroids,
+            "asteroids of many sizes circle and collide, pulled to the middle",
+            "sizes from 0.2 to 15 in all directions, none at rest";
+        "ragdolls" 660 ragdolls::ragdolls,
+            "figures of eleven jointed parts fall over each other",
+            "small boxes that overlap by their joints, and are no contacts";
+        "conveyor" 1400 conveyor::conveyor,
+            "rollers carry crates around in rings, through gates, which are sensors",
+            "sensors that boxes enter and leave all the time";
+        "sensors" 800 filtered::sensors,
+            "spheres fall through layers of sensors, some that see fixed bodies too",
+            "pairs of sensors and of fixed boxes";
+        "compounds" 500 falling::compounds,
+            "bodies of several colliders, and compound shapes, fall",
+            "boxes of one body, whose overlaps are no pairs";
+        "sleeping" 20_000 resting::sleeping,
+            "one awake body among sleeping ones",
+            "one box that moves among many that do not";
+        "groups" 800 filtered::groups,
+            "crowds in groups that ignore each other, kinematic bodies and moving walls",
+            "boxes in one place that are no pairs";
+    };
 }

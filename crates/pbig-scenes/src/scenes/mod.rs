@@ -23,14 +23,10 @@ use builder::Builder;
 use rand::SeedableRng;
 use rand::rngs::StdRng;
 
-/// A named scene.
 #[derive(Clone, Copy)]
 pub struct Scene {
-    /// The name on the command line.
     pub name: &'static str,
-    /// A description in a few words.
     pub about: &'static str,
-    /// The property that makes the scene hard for a broad phase.
     pub hard: &'static str,
     /// Bodies when the user does not say how many.
     pub default_bodies: usize,

@@ -1,1 +1,0 @@
-//! Benchmarks of pbig; each file beside this one is one.
