@@ -23,8 +23,6 @@ mod queries;
 mod random_worlds;
 mod restore;
 mod scalable_ccd;
-mod shapes;
 mod stress;
 mod upstream;
-mod upstream_churn;
 mod worlds;
