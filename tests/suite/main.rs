@@ -5,7 +5,6 @@ mod bounded;
 mod calls;
 mod changes;
 mod checked;
-mod crowds;
 mod documents;
 mod drop_in;
 mod edits;
