@@ -216,10 +216,3 @@ fn no_two_sets_take_work_without_bound() {
         }
     }
 }
-
-#[test]
-fn two_grids_alone_break_the_bound() {
-    let (_, recipe) = shapes().into_iter().find(|(name, _)| *name == "two scales").expect("a shape");
-    let [small, large] = SIZES.map(|n| ratio_between(&recipe, n, DIVISIONS[1], Some(Engine::Rebuild)));
-    assert!(large > (2.0 * small).max(30.0), "{small}, {large}");
-}

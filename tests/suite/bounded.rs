@@ -147,3 +147,28 @@ fn after_a_peak_work_follows_the_boxes_that_are_left() {
         assert!(works[1..].iter().all(|work| *work <= 1.5 * works[0]), "{left} left: {works:?}");
     }
 }
+
+/// Crowds whose boxes may not pair with their like, at a thousand places in each of two clusters.
+#[test]
+fn clusters_far_apart_take_no_more_work_than_their_crowds() {
+    let filter = ProxyFilter { memberships: 1, mask: 2, ..ProxyFilter::ALL };
+    for crowd in [8, 16, 40] {
+        let cube = |id: u32, by: f32| {
+            let (place, town) = (id / crowd % 1000, (id / crowd / 1000) as f32 * 3000.0);
+            let at = [place % 10, place / 10 % 10, place / 100].map(|x| x as f32 + town + by);
+            pbig_core::Aabb::from_center(at, [0.45; 3])
+        };
+        // A grid alone, because a tree would take over.
+        let config = Config { engine: Some(Engine::Edit), ..Config::DEFAULT };
+        let mut broad_phase = BroadPhase::new(config).expect("a margin");
+        // Work for each changed box and each box at its place: if all change, and if few do, which are looked up.
+        for (step, by, most) in [(1, 0.0, 16.0), (50, 0.2, 120.0)] {
+            let changed = (0..2000 * crowd).step_by(step);
+            changed.clone().for_each(|id| broad_phase.set(id, cube(id, by), filter).expect("an id"));
+            broad_phase.update().expect("few pairs");
+            let work = broad_phase.report().work as f64 / f64::from(crowd) / changed.len() as f64;
+            println!("{crowd} at a place, one in {step} changed: {work:.1}");
+            assert!(work < most, "{crowd} at a place: {work}, {}", broad_phase.report().plan);
+        }
+    }
+}

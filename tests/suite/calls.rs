@@ -1,7 +1,7 @@
 //! Rapier's calls of a broad phase, and the order of its answers.
 
-use crate::checked::{backends, everywhere, pbig};
-use crate::stress::memory;
+use crate::checked::{backends, pbig};
+use crate::stress::memory::Weighed;
 use pbig_harness::scenes::Scene;
 use pbig_harness::world::World;
 use rapier_pbig::PbigBroadPhase;
@@ -86,83 +86,19 @@ fn deletions_come_first_sorted_and_equal_on_every_backend() {
 }
 
 #[test]
-fn calls_without_changes_do_nothing() {
-    everywhere(|mut scene| {
-        scene.ball(0.0);
-        scene.ball(0.9);
-        scene.step();
-        let World { params, colliders, bodies, .. } = &scene.world;
-        let broad_phase = &mut scene.broad_phase.inner;
-        let mut events = Vec::new();
-        broad_phase.update(params, colliders, bodies, &[], &[], &mut events);
-        let unknown = [ColliderHandle::from_raw_parts(77, 3), ColliderHandle::invalid()];
-        broad_phase.update(params, colliders, bodies, &unknown, &unknown, &mut events);
-        assert!(events.is_empty());
-        let report = broad_phase.stats().report;
-        assert_eq!((report.changed, report.checks.made, report.boxes, report.pairs), (0, 0, 2, 1));
-    });
-}
-
-/// Notes the largest block of memory that each call asks for.
-struct Weigher<B> {
-    inner: B,
-    largest: Vec<usize>,
-}
-
-impl<B: BroadPhase> BroadPhase for Weigher<B> {
-    fn update(
-        &mut self,
-        params: &IntegrationParameters,
-        colliders: &ColliderSet,
-        bodies: &RigidBodySet,
-        modified: &[ColliderHandle],
-        removed: &[ColliderHandle],
-        events: &mut Vec<BroadPhasePairEvent>,
-    ) {
-        events.reserve(10_000);
-        memory::largest();
-        self.inner.update(params, colliders, bodies, modified, removed, events);
-        self.largest.push(memory::largest());
-    }
-}
-
-#[test]
 fn repeated_calls_allocate_for_rare_plans_only() {
     let mut world = Scene::named("column").expect("the scene exists").build(3000, 4);
-    let mut weigher = Weigher { inner: PbigBroadPhase::new(), largest: vec![] };
+    let mut weighed = Weighed { inner: PbigBroadPhase::new(), bytes: 0, largest: vec![] };
     // While the column falls apart the number of pairs doubles, and buffers that hold pairs or candidates grow with it.
-    (0..200).for_each(|_| world.step(&mut weigher));
-    let before = weigher.inner.stats().totals.added;
-    weigher.largest.clear();
-    (0..200).for_each(|_| world.step(&mut weigher));
-    let late = &weigher.largest;
+    (0..200).for_each(|_| world.step(&mut weighed));
+    let before = weighed.inner.stats().totals.added;
+    weighed.largest.clear();
+    (0..200).for_each(|_| world.step(&mut weighed));
+    let late = &weighed.largest;
     // Half of them have nothing to do.
     let asking = |least: usize| late.iter().filter(|bytes| **bytes > least).count();
     assert!(20 * asking(0) < late.len(), "{} of {} calls", asking(0), late.len());
     assert!(100 * asking(4096) <= late.len(), "{} calls for more than a plan: {late:?}", asking(4096));
-    let added = weigher.inner.stats().totals.added - before;
+    let added = weighed.inner.stats().totals.added - before;
     assert!(added > 1000, "{added} pairs");
-}
-
-#[test]
-fn the_collision_pipeline_works_as_with_stock() {
-    let (mut bodies, mut colliders) = (RigidBodySet::new(), ColliderSet::new());
-    let sensor = || {
-        let shape = ColliderBuilder::cuboid(1.0, 1.0, 1.0).sensor(true);
-        shape.active_collision_types(ActiveCollisionTypes::all())
-    };
-    let first = colliders.insert(sensor());
-    colliders.insert(sensor());
-    let (mut broad_phase, mut narrow_phase) = (PbigBroadPhase::new(), NarrowPhase::new());
-    let prediction = IntegrationParameters::default().prediction_distance();
-    CollisionPipeline::new().step(
-        prediction,
-        &mut broad_phase,
-        &mut narrow_phase,
-        &mut bodies,
-        &mut colliders,
-        &(),
-        &(),
-    );
-    assert_eq!(narrow_phase.intersection_pairs_with(first).filter(|(_, _, hit)| *hit).count(), 1);
 }

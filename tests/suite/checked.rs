@@ -74,12 +74,8 @@ impl Checked {
 
     /// A second ball of radius 0.5 on a body, at its origin.
     pub(crate) fn attach(&mut self, body: RigidBodyHandle) -> ColliderHandle {
-        self.attach_shape(body, ColliderBuilder::ball(0.5))
-    }
-
-    pub(crate) fn attach_shape(&mut self, body: RigidBodyHandle, shape: ColliderBuilder) -> ColliderHandle {
         let World { bodies, colliders, .. } = &mut self.world;
-        colliders.insert_with_parent(shape, body, bodies)
+        colliders.insert_with_parent(ColliderBuilder::ball(0.5), body, bodies)
     }
 
     pub(crate) fn move_to(&mut self, body: RigidBodyHandle, x: f32) {
@@ -91,19 +87,6 @@ impl Checked {
         self.world.step(&mut self.broad_phase);
         self.assert_no_difference();
         self.broad_phase.inner.pair_count()
-    }
-
-    pub(crate) fn steps(&mut self, steps: usize) -> usize {
-        (0..steps).map(|_| self.step()).last().unwrap_or(0)
-    }
-
-    /// Exact tests in the last update.
-    pub(crate) fn checks(&self) -> u64 {
-        self.broad_phase.inner.stats().report.checks.made
-    }
-
-    pub(crate) fn on_gpu(&self) -> bool {
-        self.way.backend == Backend::Device
     }
 
     /// Pairs that the narrow phase has, apart from those with sensors.
@@ -118,6 +101,11 @@ impl Checked {
         let report = self.broad_phase.inner.stats().report;
         assert_eq!(report.fallback, None, "a GPU's work is not done by the CPU");
         let searched = report.changed > 0 && report.boxes - report.invalid > 1;
-        assert_eq!(report.device.is_some(), searched && self.on_gpu(), "{}", report.plan);
+        assert_eq!(
+            report.device.is_some(),
+            searched && self.way.backend == Backend::Device,
+            "{}",
+            report.plan
+        );
     }
 }

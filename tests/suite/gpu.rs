@@ -6,8 +6,8 @@ mod turns;
 mod work;
 
 use pbig_core::{
-    Aabb, Backend, Config, DeviceFailure, DeviceFound, DeviceReport, Finder, NoDevice, Order, Pair,
-    ProxyFilter, SearchRequest,
+    Aabb, Backend, ChangeRequest, Config, DeviceFailure, DeviceFound, DeviceReport, Finder, NoDevice, Order,
+    Pair, PairDevice, ProxyFilter, SearchRequest,
 };
 use pbig_gpu::{Coding, GpuFinder, GpuOptions, adapters};
 use pbig_tests::{Way, difference, gpu, needs_gpu};
@@ -85,6 +85,11 @@ fn sets_beyond_the_limits_of_a_device_are_split_and_complete() {
             assert_eq!(difference(&pairs, &wanted), None, "{name}, {coding:?}");
             assert!(report.parts >= parts, "{name}: {} parts", report.parts);
         }
+        let filter = |i: u32| ProxyFilter { body: i / 3, mask: 1 << (i % 5), ..ProxyFilter::ALL };
+        let filters: Vec<_> = (0..boxes.len() as u32).map(filter).collect();
+        let [found, wanted] = [with(options).finder(), Finder::default()]
+            .map(|mut finder| finder.find_filtered(&boxes, &filters).expect("within the limits").to_vec());
+        assert!(!wanted.is_empty() && found == wanted, "{name}, filtered");
     }
 }
 
@@ -131,36 +136,26 @@ fn a_device_that_really_allows_little_is_enough() {
 }
 
 #[test]
-fn filters_hold_in_every_part() {
-    needs_gpu!();
-    let boxes = set("pile", 45_000);
-    let filters: Vec<_> =
-        (0..45_000).map(|i| ProxyFilter { body: i / 3, mask: 1 << (i % 5), ..ProxyFilter::ALL }).collect();
-    let options = GpuOptions { max_bytes: 1 << 20, ..GpuOptions::DEFAULT };
-    let mut cpu = Finder::new(Config { backend: Backend::Cpu, ..Config::DEFAULT });
-    let mut finder = with(options).finder();
-    let wanted = cpu.find_filtered(&boxes, &filters).expect("within the limits");
-    assert!(!wanted.is_empty());
-    assert_eq!(difference(finder.find_filtered(&boxes, &filters).expect("within the limits"), wanted), None);
-    assert!(finder.report().device.as_ref().is_some_and(|gpu| gpu.parts > 1));
-}
-
-#[test]
 fn every_switch_gives_the_same_bytes() {
     needs_gpu!();
     for (name, boxes) in
         [("pile", set("pile", 2000)), ("mixed", set("mixed", 2000)), ("identical", cubes(700))]
     {
         let wanted = on_cpu(&boxes);
-        let mut all = vec![GpuOptions { load_balancing: false, ..GpuOptions::DEFAULT }];
-        all.extend(
-            [Coding::Plain, Coding::Packed].map(|coding| GpuOptions { coding, ..GpuOptions::DEFAULT }),
-        );
-        for options in all {
+        let usual = GpuOptions::DEFAULT;
+        let chunks = GpuOptions { chunk: [3, 2], first_bytes: 0, ..usual };
+        for options in [
+            GpuOptions { load_balancing: false, ..usual },
+            GpuOptions { coding: Coding::Plain, ..usual },
+            GpuOptions { coding: Coding::Packed, ..usual },
+            chunks,
+            GpuOptions { pipelining: false, ..chunks },
+        ] {
             for small_cell in [1, 32, 256] {
                 let mut finder = with(GpuOptions { small_cell, ..options }).finder();
-                let (pairs, _) = find(&mut finder, &boxes);
+                let (pairs, report) = find(&mut finder, &boxes);
                 assert_eq!(difference(&pairs, &wanted), None, "{name}, {small_cell}, {options:?}");
+                assert!(report.chunks > 1 || options.chunk != chunks.chunk, "{} chunks", report.chunks);
             }
         }
     }
@@ -261,16 +256,64 @@ fn memory_follows_what_is_needed_down_as_well_as_up() {
     assert_eq!(difference(&find(&mut finder, &many).0, &on_cpu(&many)), None);
 }
 
+/// A device that is hardware, whatever its adapter says.
+#[derive(Clone, Debug)]
+struct Hardware(GpuFinder);
+
+impl PairDevice for Hardware {
+    fn find_all(&mut self, request: &SearchRequest<'_>, to: &mut DeviceFound) -> Result<(), DeviceFailure> {
+        self.0.find_all(request, to)
+    }
+    fn find_changed(
+        &mut self,
+        request: &ChangeRequest<'_>,
+        to: &mut DeviceFound,
+    ) -> Result<(), DeviceFailure> {
+        self.0.find_changed(request, to)
+    }
+    fn forget(&mut self) {
+        self.0.forget();
+    }
+    fn name(&self) -> Option<&str> {
+        self.0.name()
+    }
+    fn is_software(&self) -> bool {
+        false
+    }
+    fn clone_box(&self) -> Box<dyn PairDevice> {
+        Box::new(self.clone())
+    }
+}
+
 #[test]
-fn auto_leaves_a_software_adapter_alone() {
+fn auto_uses_hardware_for_many_boxes_and_no_software() {
     needs_gpu!();
+    let boxes = set("unit", 500_000);
     let device = GpuFinder::new().expect("an adapter");
-    let (software, boxes) = (device.is_software(), set("unit", 20_000));
-    let mut finder = Finder::with_device(Config::DEFAULT, Box::new(device));
-    for _ in 0..6 {
-        finder.find(&boxes).expect("within the limits");
-        let report = finder.report();
-        assert!((report.device.is_none() && report.plan.no_device == Some(NoDevice::Software)) || !software);
+    let software = device.is_software().then_some(NoDevice::Software);
+    let mut soft = Finder::with_device(Config::DEFAULT, device.clone_box());
+    soft.find(&boxes).expect("within the limits");
+    assert_eq!(
+        (soft.report().plan.no_device, soft.report().device.is_none()),
+        (software, software.is_some())
+    );
+    let mut finder = Finder::with_device(Config::DEFAULT, Box::new(Hardware(device)));
+    for (many, why) in [(true, None), (false, Some(NoDevice::FewChanged)), (true, None)] {
+        let found = finder.find(&boxes[usize::from(!many)..]).expect("within the limits").to_vec();
+        assert_eq!((finder.report().plan.no_device, finder.report().device.is_some()), (why, many));
+        assert_eq!((finder.report().fallback.as_ref(), found == soft.pairs()), (None, many));
+    }
+}
+
+#[test]
+fn nothing_grows_in_fifty_calls_with_other_boxes() {
+    needs_gpu!();
+    let (mut finder, mut most) = (with(GpuOptions::DEFAULT).finder(), 0);
+    for call in 0..50 {
+        let held =
+            find(&mut finder, &pbig_tests::set("pile", 400 + call as usize * 37 % 100, call)).1.device_bytes;
+        most = if call < 15 { held.max(most) } else { most };
+        assert!(held <= most * 5 / 4, "call {call}: {held} bytes after at most {most}");
     }
 }
 

@@ -2,12 +2,11 @@
 //! boxes, and the events lead from one state to the next.
 
 use crate::follower::Follower;
-use pbig_core::{Aabb, Algorithm, BroadPhase, Config, Engine, Error, Limits, Pair, ProxyFilter};
+use pbig_core::{Aabb, BroadPhase, Config, Engine, Error, Limits, Pair, ProxyFilter};
 use pbig_harness::boxes::{BoxSet, moved};
 use pbig_tests::{engines, set, set_all, shifted, strategies};
 use rand::rngs::StdRng;
 use rand::{RngExt, SeedableRng};
-use std::collections::BTreeSet;
 
 #[test]
 fn random_worlds_with_churn_on_every_strategy() {
@@ -78,39 +77,6 @@ fn infinite_boxes_within_their_margin_have_not_changed() {
 }
 
 #[test]
-fn a_few_boxes_stay_in_their_cells_leave_and_come_back() {
-    let (mut edits, mut out_of_order, mut in_order) = (0, 0, 0);
-    for (name, distance) in [("unit", 0.1), ("unit", 1.5), ("mixed", 0.2), ("gaussian", 0.3), ("pile", 0.05)]
-    {
-        let home = set(name, 3000, 7);
-        let away = moved(&home, distance, 3);
-        let mut world = Follower::new(Config { margin: 0.0, ..Config::DEFAULT }, home.len());
-        home.iter().enumerate().for_each(|(id, aabb)| world.set(id as u32, *aabb, ProxyFilter::ALL));
-        world.update("all are new");
-        let mut rng = StdRng::seed_from_u64(9);
-        for frame in 0..30 {
-            let changes = rng.random_range(1..100);
-            for _ in 0..changes {
-                let id = rng.random_range(0..home.len());
-                let places = [home[id], away[id], Aabb::NOWHERE];
-                let aabb = places[usize::from(rng.random_ratio(1, 2)) + usize::from(rng.random_ratio(1, 20))];
-                let filter = ProxyFilter { body: id as u32 % 50, ..ProxyFilter::ALL };
-                if rng.random_ratio(1, 20) && world.boxes[id].is_some() {
-                    world.remove(id as u32);
-                }
-                world.set(id as u32, aabb, if rng.random_ratio(1, 10) { filter } else { ProxyFilter::ALL });
-            }
-            world.update(&format!("{name}, frame {frame}"));
-            let plan = &world.broad_phase.report().plan;
-            edits += u32::from(plan.algorithm == Algorithm::Edit);
-            out_of_order = out_of_order.max(plan.spilled);
-            in_order += u32::from(plan.algorithm == Algorithm::Edit && u64::from(plan.spilled) < changes);
-        }
-    }
-    assert!(edits > 120 && out_of_order > 200 && in_order > 20, "{edits} {out_of_order} {in_order}");
-}
-
-#[test]
 fn contract_5_no_change_no_work_and_few_changes_little() {
     let boxes = set("unit", 20_000, 5);
     let mut broad_phase = BroadPhase::new(Config { margin: 0.05, ..Config::DEFAULT }).expect("a good margin");
@@ -131,36 +97,26 @@ fn contract_5_no_change_no_work_and_few_changes_little() {
 
 #[test]
 fn an_update_that_finds_too_many_pairs_can_be_repeated() {
-    let limits = Limits { max_pairs: 10, ..Limits::DEFAULT };
-    let mut broad_phase = BroadPhase::new(Config { limits, ..Config::DEFAULT }).expect("a good margin");
-    set_all(&mut broad_phase, &[Aabb::new([0.0; 3], [1.0; 3]); 6]);
-    assert_eq!(broad_phase.update().unwrap_err(), Error::TooManyPairs { limit: 10 });
-    assert!(broad_phase.events().added.is_empty() && broad_phase.pair_count() == 0, "no partial result");
-    broad_phase.remove(5);
-    assert_eq!(broad_phase.update().expect("ten pairs now").added.len(), 10);
-}
-
-#[test]
-fn an_edit_that_finds_too_many_pairs_can_be_repeated() {
-    std::iter::once(None).chain(Engine::ALL.map(Some)).for_each(finds_too_many);
-}
-
-fn finds_too_many(engine: Option<Engine>) {
     let limits = Limits { max_pairs: 250, ..Limits::DEFAULT };
-    let config = Config { limits, engine, ..Config::DEFAULT };
-    let mut broad_phase = BroadPhase::new(config).expect("a good margin");
-    let boxes = set("unit", 100, 1);
-    set_all(&mut broad_phase, &boxes);
-    broad_phase.update().expect("within the limits");
-    let before: BTreeSet<Pair> = broad_phase.pairs().collect();
-    for id in [3, 4] {
-        broad_phase.set(id, Aabb::from_center([0.0; 3], [1e6; 3]), ProxyFilter::ALL).expect("a small id");
+    for engine in std::iter::once(None).chain(Engine::ALL.map(Some)) {
+        let config = Config { limits, engine, ..Config::DEFAULT };
+        let mut broad_phase = BroadPhase::new(config).expect("a good margin");
+        let all = Aabb::from_center([0.0; 3], [1e6; 3]);
+        set_all(&mut broad_phase, &[all; 100]);
+        assert_eq!(broad_phase.update(), Err(Error::TooManyPairs { limit: 250 }));
+        assert!(broad_phase.events().added.is_empty() && broad_phase.pair_count() == 0, "no partial result");
+        let boxes = set("unit", 100, 1);
+        set_all(&mut broad_phase, &boxes);
+        broad_phase.update().expect("within the limits");
+        let before: Vec<Pair> = broad_phase.pairs().collect();
+        // Few changes: an edit may find too many, too.
+        [3, 4].into_iter().for_each(|id| broad_phase.set(id, all, ProxyFilter::ALL).expect("a small id"));
+        assert_eq!(broad_phase.update(), Err(Error::TooManyPairs { limit: 250 }));
+        assert!(broad_phase.pairs().eq(before), "nothing has changed");
+        broad_phase.set(4, boxes[4], ProxyFilter::ALL).expect("a small id");
+        broad_phase.update().expect("a hundred pairs now");
+        assert_eq!(broad_phase.degree(3), 99);
     }
-    assert_eq!(broad_phase.update().expect_err("too many pairs"), Error::TooManyPairs { limit: 250 });
-    assert_eq!(broad_phase.pairs().collect::<BTreeSet<_>>(), before, "nothing has changed");
-    broad_phase.set(4, boxes[4], ProxyFilter::ALL).expect("a small id");
-    broad_phase.update().expect("a hundred pairs now");
-    assert_eq!(broad_phase.degree(3), 99);
 }
 
 #[test]
@@ -186,47 +142,4 @@ fn bad_arguments_are_errors() {
     let error = broad_phase.set(u32::MAX, Aabb::NOWHERE, ProxyFilter::ALL).unwrap_err();
     assert!(matches!(error, Error::TooManyBoxes { boxes: 4_294_967_296, .. }));
     assert!(!broad_phase.remove(5), "an unknown id is not there");
-}
-
-#[test]
-fn the_same_events_on_any_number_of_threads() {
-    let boxes = BoxSet::named("pile").expect("the set exists").boxes(20_000, 2);
-    let run = |threads| {
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool");
-        pool.install(|| {
-            let mut broad_phase = BroadPhase::new(Config::DEFAULT).expect("a good margin");
-            let mut all = Vec::new();
-            for round in 0..3 {
-                for (id, aabb) in moved(&boxes, 0.05, round).into_iter().enumerate() {
-                    broad_phase.set(id as u32, aabb, ProxyFilter::ALL).expect("a small id");
-                }
-                all.push(broad_phase.update().expect("within the limits").clone());
-            }
-            all
-        })
-    };
-    let wanted = run(1);
-    assert!([2, 5, 16].into_iter().all(|threads| run(threads) == wanted));
-}
-
-#[test]
-fn boxes_that_moved_once_and_came_to_rest_stop_costing() {
-    let boxes = BoxSet::named("unit").expect("the set exists").boxes(10_000, 5);
-    let mut broad_phase = BroadPhase::new(Config::DEFAULT).expect("a good margin");
-    for (id, aabb) in boxes.iter().enumerate() {
-        broad_phase.set(id as u32, *aabb, ProxyFilter::ALL).expect("a small id");
-    }
-    broad_phase.update().expect("within the limits");
-    for (id, aabb) in moved(&boxes[..1000], 0.1, 1).into_iter().enumerate() {
-        broad_phase.set(id as u32, aabb, ProxyFilter::ALL).expect("a small id");
-    }
-    let mut made = 0;
-    for frame in 0..40 {
-        broad_phase
-            .set(5000, Aabb::from_center([frame as f32; 3], [0.5; 3]), ProxyFilter::ALL)
-            .expect("a small id");
-        broad_phase.update().expect("within the limits");
-        made = broad_phase.report().checks.made;
-    }
-    assert!(made < 200, "{made} checks for one moving box: {}", broad_phase.report().plan);
 }

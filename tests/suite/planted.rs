@@ -6,6 +6,7 @@ use pbig_harness::scenes::Scene;
 use pbig_tests::{difference, set};
 use rapier_pbig::shadow::Fault;
 use rapier_pbig::{PbigBroadPhase, PbigConfig};
+use rapier3d::prelude::BroadPhasePairEvent::{AddPair, DeletePair};
 use rapier3d::prelude::*;
 
 #[test]
@@ -25,59 +26,15 @@ fn the_comparison_with_the_oracle_notices_each_fault() {
     assert!(noticed(&|pairs| pairs.push(Pair { a: 198, b: 5000 })).starts_with("spurious"));
 }
 
-/// The fault of a broad phase in one of its events.
-#[derive(Clone, Copy, Debug)]
-enum Plant {
-    DropAdd,
-    DoubleAdd,
-    SwappedDoubleAdd,
-    DropDelete,
-    DeleteLive,
-    Flicker,
-    DeleteUnknown,
-    AddFar,
-    WithItself,
-}
+/// Returns what is sent instead of an event of a pair. The other pair is far from the first.
+type Falsify = fn(ColliderPair, ColliderPair) -> Vec<BroadPhasePairEvent>;
 
-/// Ours, with a fault in the hundredth event of a kind.
+/// Ours, with a fault in the hundredth added or deleted pair.
 struct Faulty {
     inner: PbigBroadPhase,
-    plant: Plant,
+    is_add: bool,
+    falsify: Falsify,
     seen: usize,
-}
-
-fn copy(event: &BroadPhasePairEvent) -> BroadPhasePairEvent {
-    match event {
-        BroadPhasePairEvent::AddPair(pair) => BroadPhasePairEvent::AddPair(*pair),
-        BroadPhasePairEvent::DeletePair(pair) => BroadPhasePairEvent::DeletePair(*pair),
-    }
-}
-
-impl Faulty {
-    fn falsify(&mut self, event: &BroadPhasePairEvent, far: ColliderPair, to: &mut Vec<BroadPhasePairEvent>) {
-        use BroadPhasePairEvent::{AddPair, DeletePair};
-        let of_kind = match (self.plant, event) {
-            (Plant::DropDelete, DeletePair(pair)) => Some(*pair),
-            (Plant::DropDelete, AddPair(_)) | (_, DeletePair(_)) => None,
-            (_, AddPair(pair)) => Some(*pair),
-        };
-        self.seen += usize::from(of_kind.is_some());
-        let Some(pair) = of_kind.filter(|_| self.seen == 100) else {
-            return to.push(copy(event));
-        };
-        let kept = |more: BroadPhasePairEvent| vec![copy(event), more];
-        to.extend(match self.plant {
-            Plant::DropAdd | Plant::DropDelete => vec![],
-            Plant::DoubleAdd => kept(AddPair(pair)),
-            Plant::SwappedDoubleAdd => kept(AddPair(pair.swap())),
-            Plant::DeleteLive => kept(DeletePair(pair)),
-            Plant::Flicker => vec![copy(event), DeletePair(pair), AddPair(pair)],
-            Plant::DeleteUnknown => vec![DeletePair(far), copy(event)],
-            Plant::AddFar => kept(AddPair(far)),
-            // Rapier's narrow phase panics when it is told such a pair: only without one, see below.
-            Plant::WithItself => kept(AddPair(ColliderPair::new(pair.collider1, pair.collider1))),
-        });
-    }
 }
 
 impl BroadPhase for Faulty {
@@ -95,30 +52,38 @@ impl BroadPhase for Faulty {
         // The first and the last object of a column never meet.
         let handle = |index: usize| ColliderHandle::from_raw_parts(index as u32, 0);
         let far = ColliderPair::new(handle(1), handle(colliders.len() - 1));
-        right.iter().for_each(|event| self.falsify(event, far, events));
+        for event in right {
+            let (is_add, pair) = match event {
+                AddPair(pair) => (true, pair),
+                DeletePair(pair) => (false, pair),
+            };
+            self.seen += usize::from(is_add == self.is_add);
+            let is_hundredth = is_add == self.is_add && self.seen == 100;
+            events.extend(if is_hundredth { (self.falsify)(pair, far) } else { vec![event] });
+        }
     }
 }
 
 #[test]
 fn the_shadow_checker_notices_each_fault_and_writes_the_frames() {
     let folder = tempfile::tempdir().expect("a folder");
-    for (plant, faults) in [
-        (Plant::DropAdd, &[Fault::Missing][..]),
-        (Plant::DoubleAdd, &[Fault::AddedTwice]),
-        (Plant::SwappedDoubleAdd, &[Fault::AddedTwice]),
-        (Plant::DropDelete, &[Fault::Spurious]),
-        (Plant::DeleteLive, &[Fault::Missing]),
-        (Plant::Flicker, &[Fault::Flickered]),
-        (Plant::DeleteUnknown, &[Fault::DeletedUnknown]),
-        (Plant::AddFar, &[Fault::Spurious]),
-    ] {
+    let plants: [(&str, bool, Falsify, Fault); 8] = [
+        ("not added", true, |_, _| vec![], Fault::Missing),
+        ("added twice", true, |pair, _| vec![AddPair(pair), AddPair(pair)], Fault::AddedTwice),
+        ("added both ways", true, |pair, _| vec![AddPair(pair), AddPair(pair.swap())], Fault::AddedTwice),
+        ("not deleted", false, |_, _| vec![], Fault::Spurious),
+        ("deleted at once", true, |pair, _| vec![AddPair(pair), DeletePair(pair)], Fault::Missing),
+        ("flickers", true, |pair, _| vec![AddPair(pair), DeletePair(pair), AddPair(pair)], Fault::Flickered),
+        ("deleted unknown", true, |pair, far| vec![DeletePair(far), AddPair(pair)], Fault::DeletedUnknown),
+        ("far apart", true, |pair, far| vec![AddPair(pair), AddPair(far)], Fault::Spurious),
+    ];
+    for (what, is_add, falsify, fault) in plants {
         let scene = Scene::named("column").expect("the scene exists");
-        let faulty = Faulty { inner: PbigBroadPhase::new(), plant, seen: 0 };
+        let faulty = Faulty { inner: PbigBroadPhase::new(), is_add, falsify, seen: 0 };
         let mut run = Run::new(scene, 300, 1, faulty).checked(PbigConfig::DEFAULT.margin, 1);
         run.steps(300, || ());
-        let first = run.broad_phase.first_difference();
-        let first = first.unwrap_or_else(|| panic!("{plant:?} was not noticed"));
-        assert!(faults.contains(&first.fault), "{plant:?}: {first}");
+        let first = run.broad_phase.first_difference().unwrap_or_else(|| panic!("{what}: not noticed"));
+        assert_eq!(first.fault, fault, "{what}: {first}");
         let file = run.write_failure("column", folder.path()).expect("it failed").expect("a writable folder");
         let frames = pbig_harness::files::read_frames(&file).expect("a replayable file");
         assert_eq!(frames.boxes, 301, "one box for each collider");
@@ -129,7 +94,8 @@ fn the_shadow_checker_notices_each_fault_and_writes_the_frames() {
 fn the_shadow_checker_notices_a_collider_paired_with_itself() {
     let world = Scene::named("column").expect("the scene exists").build(300, 1);
     let handles: Vec<ColliderHandle> = world.colliders.iter().map(|(handle, _)| handle).collect();
-    let faulty = Faulty { inner: PbigBroadPhase::new(), plant: Plant::WithItself, seen: 99 };
+    let falsify: Falsify = |pair, _| vec![AddPair(ColliderPair::new(pair.collider1, pair.collider1))];
+    let faulty = Faulty { inner: PbigBroadPhase::new(), is_add: true, falsify, seen: 99 };
     let mut shadow = Timed::new(faulty).checked(PbigConfig::DEFAULT.margin, 1);
     // Without a narrow phase, which would panic. Large boxes, so that there are pairs at once.
     let params = IntegrationParameters { normalized_prediction_distance: 1.0, ..world.params };

@@ -1,6 +1,5 @@
 //! Scene queries give what rapier's own give.
 
-use crate::checked::{backends, pbig};
 use pbig_harness::scenes::Scene;
 use pbig_harness::world::World;
 use rand::rngs::SmallRng;
@@ -129,31 +128,6 @@ fn queries_agree_with_stock_in_each_frame_of_each_scene() {
 }
 
 #[test]
-fn queries_agree_with_stock_while_a_world_moves_and_changes() {
-    for (name, config) in backends() {
-        for scene in ["column", "compounds"] {
-            let mut world = Scene::named(scene).expect("the scene exists").build(120, 2);
-            let ours = pbig(config);
-            let mut both = Both { ours, stock: DefaultBroadPhase::new() };
-            let (mut random, mut hits) = (SmallRng::seed_from_u64(9), 0);
-            for round in 0..12 {
-                (0..10).for_each(|_| world.step(&mut both));
-                hits += compare(&world, &both, &mut random, 20);
-                let bodies: Vec<RigidBodyHandle> = world.bodies.iter().map(|(handle, _)| handle).collect();
-                let body = bodies[round * 7 % bodies.len()];
-                match round % 4 {
-                    0 => world.remove(body),
-                    1 => world.bodies[body].set_translation(vector![1.0, 3.0, round as f32], true),
-                    2 => world.bodies[body].set_enabled(false),
-                    _ => _ = world.add(World::dynamic(glam::Vec3::Y * 4.0), ColliderBuilder::ball(0.6)),
-                }
-            }
-            assert!(hits > 20, "{scene} on {name}: {hits} hits");
-        }
-    }
-}
-
-#[test]
 fn queries_work_before_the_first_step_and_on_mutable_sets() {
     for count in 0..5 {
         let mut world = World::default();
@@ -178,34 +152,6 @@ fn queries_work_before_the_first_step_and_on_mutable_sets() {
         world.step(&mut ours);
         assert_eq!(cast(&mut world, &ours), (count > 1).then_some(7.5), "the first is out of the way");
     }
-}
-
-#[test]
-fn a_character_walks_the_same_way_with_either() {
-    use rapier3d::control::KinematicCharacterController;
-    let mut world = World::default();
-    world.colliders.insert(ColliderBuilder::cuboid(20.0, 0.5, 20.0));
-    for i in 1..30 {
-        let step = ColliderBuilder::cuboid(0.3, 0.05 * i as f32, 3.0);
-        world.colliders.insert(step.translation(vector![1.0 + 0.6 * i as f32, 0.5, 0.0]));
-    }
-    let mut both = Both { ours: PbigBroadPhase::new(), stock: DefaultBroadPhase::new() };
-    world.step(&mut both);
-    let controller = KinematicCharacterController::default();
-    let walk = |queries: &QueryPipeline<'_>| {
-        let mut at = Isometry::translation(0.0, 1.1, 0.0);
-        for _ in 0..200 {
-            let wanted = vector![0.05, -0.02, 0.01];
-            let moved = controller.move_shape(1.0 / 60.0, queries, &Ball::new(0.5), &at, wanted, |_| ());
-            at.translation.vector += moved.translation;
-        }
-        at.translation.vector
-    };
-    let filter = QueryFilter::default();
-    let (bodies, colliders) = (&world.bodies, &world.colliders);
-    let ours = walk(&both.ours.as_query_pipeline(&DefaultQueryDispatcher, bodies, colliders, filter));
-    let stock = walk(&both.stock.as_query_pipeline(&DefaultQueryDispatcher, bodies, colliders, filter));
-    assert!((ours - stock).norm() < 1e-3 && ours.x > 0.5, "{ours} {stock}");
 }
 
 #[test]

@@ -1,6 +1,5 @@
 //! The number of threads, a second run, saving and restoring must not change a single bit.
 
-use pbig_harness_036::dimension::cuboid;
 use pbig_harness_036::world::{World, to_vector};
 use pbig_scenes::scenes::Scene;
 use rapier::geometry::PairFinder;
@@ -102,66 +101,6 @@ fn a_restored_world_and_a_clone_go_on_as_the_original() {
             }
         }
     }
-}
-
-/// Returns a wall of cubes, ten wide, which stands in two dimensions as well.
-fn wall() -> World {
-    let mut world = World::default();
-    world.colliders.insert(World::ground());
-    for i in 0..100 {
-        let at = glam::Vec3::new(1.02 * (i % 10) as f32, 0.5 + (i / 10) as f32, 0.0);
-        world.add(World::dynamic(at), ColliderBuilder::new(cuboid(glam::Vec3::splat(0.5))));
-    }
-    world
-}
-
-/// The tree takes over when nobody installs pbig again, and pbig from the tree: the wall stays where it is.
-#[test]
-fn pbig_and_the_tree_take_over_from_each_other() {
-    let (mut world, mut broad_phase) = (wall(), BroadPhaseBvh::new());
-    let pairs = |world: &World| {
-        world.narrow_phase.contact_pairs().filter(|pair| pair.has_any_active_contact()).count()
-    };
-    for _ in 0..60 {
-        world.step(&mut broad_phase);
-    }
-    let before = pairs(&world);
-    for round in 0..6 {
-        if round % 2 == 0 {
-            rapier_pbig::install(&mut broad_phase);
-        } else {
-            rapier_pbig::uninstall(&mut broad_phase);
-            assert!(rapier_pbig::finder(&broad_phase).is_none());
-        }
-        for (_, body) in world.bodies.iter_mut() {
-            body.wake_up(true);
-        }
-        for _ in 0..20 {
-            world.step(&mut broad_phase);
-        }
-        let now = pairs(&world);
-        assert!(now.abs_diff(before) * 20 <= before, "round {round}: {before} contacts before, {now} now");
-    }
-}
-
-#[test]
-fn a_body_whose_pose_is_no_number_disturbs_nobody() {
-    let (mut world, mut broad_phase) = (World::of(&scene("column").plan(60, 1)), rapier_pbig::broad_phase());
-    let at = |x: f32| to_vector(glam::Vec3::new(x, 0.0, 0.0));
-    let bodies: Vec<_> = world.bodies.iter().map(|(handle, _)| handle).collect();
-    for step in 0..120 {
-        match step {
-            20 => world.bodies[bodies[3]].set_translation(at(f32::NAN), true),
-            30 => world.bodies[bodies[4]].set_linvel(at(f32::INFINITY), true),
-            40 => _ = world.add(World::dynamic(glam::Vec3::NAN), ColliderBuilder::ball(0.5)),
-            _ => (),
-        }
-        world.step(&mut broad_phase);
-        let finder = pbig_in(&broad_phase);
-        assert!(finder.last_error().is_none());
-    }
-    let low = world.bodies.iter().filter(|(_, body)| body.translation().y < -0.1).count();
-    assert!(low <= 3, "{low} bodies fell through the ground");
 }
 
 /// Returns the height at which a ray from above hits something.

@@ -72,16 +72,8 @@ impl Zone for InRapier {
 }
 
 #[test]
-fn a_ball_that_leaves_a_zone_in_one_step_leaves_as_it_came() {
+fn pairs_end_in_the_order_in_which_they_began() {
     pair_order::a_ball_that_leaves_a_zone_leaves_as_it_came::<InRapier>();
-}
-
-#[test]
-fn pairs_keep_their_order_whoever_finds_them_next() {
     pair_order::pairs_keep_their_order_whoever_finds_them_next::<InRapier>();
-}
-
-#[test]
-fn an_end_in_the_other_order_is_noticed() {
     pair_order::an_end_in_the_other_order_is_noticed::<InRapier>();
 }

@@ -37,11 +37,13 @@ fn a_device_that_fails_in_the_middle_of_a_run_loses_no_event() {
         (Fault::OutOfMemory, "out of device memory"),
         (Fault::RefuseShader, "refused"),
     ] {
-        for pause in [Duration::ZERO, Duration::from_secs(3600)] {
-            let options = GpuOptions { pause, first_bytes: 0, ..GpuOptions::DEFAULT };
+        // Shaders are compiled and buffers are made in the first call only; each call submits, some of them several times.
+        let is_early = matches!(fault, Fault::OutOfMemory | Fault::RefuseShader);
+        let moments = if is_early { &[0][..] } else { &[2, 3, 5, 7] };
+        let pauses = [Duration::ZERO, Duration::from_secs(3600)];
+        for (&at, pause) in moments.iter().flat_map(|at| pauses.map(|pause| (at, pause))) {
+            let options = GpuOptions { pause, first_bytes: 0, chunk: [12, 8], ..GpuOptions::DEFAULT };
             let device = GpuFinder::new().expect("an adapter");
-            // Shaders are compiled and buffers are made in the first call only; each call submits.
-            let at = if matches!(fault, Fault::LoseDevice | Fault::Timeout | Fault::Panic) { 5 } else { 0 };
             device.inject(fault, at);
             let device = Box::new(device.with_options(options));
             let got = frames(BroadPhase::with_device(config, device).expect("a margin"));

@@ -142,20 +142,6 @@ fn the_first_call_repeats_nothing_and_waits_once() {
 }
 
 #[test]
-fn work_in_many_chunks_is_complete_with_and_without_pipelining() {
-    needs_gpu!();
-    for (name, boxes) in [("mixed", set("mixed", 3000)), ("identical", cubes(2000))] {
-        let wanted = on_cpu(&boxes);
-        for pipelining in [true, false] {
-            let options = GpuOptions { chunk: [3, 2], pipelining, first_bytes: 0, ..GpuOptions::DEFAULT };
-            let (pairs, report) = find(&mut with(options).finder(), &boxes);
-            assert_eq!(difference(&pairs, &wanted), None, "{name}, pipelining {pipelining}");
-            assert!(report.chunks > 4, "{name}: {} chunks", report.chunks);
-        }
-    }
-}
-
-#[test]
 fn a_call_sends_each_box_once_and_gets_each_pair_once_in_order() {
     needs_gpu!();
     let mut boxes = set("unit", 20_000);

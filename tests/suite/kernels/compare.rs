@@ -16,38 +16,6 @@ pub(super) fn sorted<T: Ord + Clone>(list: &[T]) -> Vec<T> {
     list
 }
 
-pub(super) fn compare_motions(_: &State, found: &State, wanted: &State) -> Option<String> {
-    same("motions", &found.motions, &wanted.motions)
-        .or_else(|| same("filters", &found.filters, &wanted.filters))
-        .or_else(|| same("changed boxes", &found.changed, &wanted.changed))
-}
-
-pub(super) fn compare_located(before: &State, found: &State, wanted: &State) -> Option<String> {
-    same("located", &found.located, &wanted.located)
-        .or_else(|| compare_cells(before, found, wanted))
-        .or_else(|| same("boxes", bits(&found.boxes), bits(&wanted.boxes)))
-        .or_else(|| same("motions", &found.motions, &wanted.motions))
-        .or_else(|| same("counters", &[found.counters], &[wanted.counters]))
-}
-
-/// Returns the bits of boxes: two NaN are never equal.
-fn bits(boxes: &[Aabb]) -> &[u32] {
-    bytemuck::cast_slice(boxes)
-}
-
-pub(super) fn compare_cells(_: &State, found: &State, wanted: &State) -> Option<String> {
-    same("cells", &found.cells, &wanted.cells)
-}
-
-pub(super) fn compare_blocks(before: &State, found: &State, wanted: &State) -> Option<String> {
-    same("sums", &found.sums, &wanted.sums).or_else(|| compare_cells(before, found, wanted))
-}
-
-pub(super) fn compare_sums(_: &State, found: &State, wanted: &State) -> Option<String> {
-    same("counters", &[found.counters], &[wanted.counters])
-        .or_else(|| same("sums", &found.sums, &wanted.sums))
-}
-
 pub(super) fn compare_schedules(_: &State, found: &State, wanted: &State) -> Option<String> {
     same("counters", &[found.counters], &[wanted.counters])
         .or_else(|| same("slots", &sorted(&found.slots), &sorted(&wanted.slots)))
@@ -73,10 +41,6 @@ pub(super) fn compare_entries(before: &State, found: &State, wanted: &State) -> 
         parts.into_iter().find_map(fault)
     };
     same("cells", &found.cells, &wanted.cells).or_else(|| (0..before.cells.len()).find_map(cell_fault))
-}
-
-pub(super) fn compare_dispatches(_: &State, found: &State, wanted: &State) -> Option<String> {
-    same("dispatches", &found.dispatches, &wanted.dispatches)
 }
 
 /// Returns pairs as words, in the simplest way that the format allows.
@@ -164,10 +128,6 @@ pub(super) fn hits(s: &State) -> u64 {
     } else {
         wide(s.totals.words) / 2
     }
-}
-
-pub(super) fn compare_out(_: &State, found: &State, wanted: &State) -> Option<String> {
-    same("words", &found.out, &wanted.out)
 }
 
 pub(super) fn compare_indices(_: &State, found: &State, wanted: &State) -> Option<String> {

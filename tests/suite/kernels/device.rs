@@ -15,27 +15,37 @@ pub(super) fn gpus() -> Option<&'static GpuFinder> {
 
 /// Runs a kernel on a state, and returns the state afterwards.
 pub(super) fn on_device(gpu: &GpuFinder, twin: &Twin, options: &GpuOptions, before: &State) -> State {
-    run_text(gpu, twin, &poisoned(twin.kernel, before.finds_changes()), options, before)
+    let text = poisoned(twin.kernel, before.finds_changes());
+    run_text(gpu, twin.kernel, twin.groups, &text, options, before)
 }
 
 /// Runs a kernel with a text that counts what the kernel does. An edit replaces its first part by its second one.
 pub(super) fn counting(kernel: &str, edits: &[[&str; 2]], before: &State) -> State {
-    let mut text = poisoned(twin(kernel).kernel, before.finds_changes());
+    let of_twins = TWINS.iter().map(|twin| (twin.kernel, twin.groups));
+    let (kernel, groups) =
+        of_twins.chain(SORT).find(|(one, _)| one.name == kernel).expect("a kernel of this name");
+    let mut text = poisoned(kernel, before.finds_changes());
     for [from, to] in edits {
-        assert!(text.contains(from), "{kernel} has no {from}");
+        assert!(text.contains(from), "{} has no {from}", kernel.name);
         text = text.replace(from, to);
     }
-    run_text(gpu(), twin(kernel), &text, &GpuOptions::DEFAULT, before)
+    run_text(gpu(), kernel, groups, &text, &GpuOptions::DEFAULT, before)
 }
 
-fn run_text(gpu: &GpuFinder, twin: &Twin, text: &str, options: &GpuOptions, before: &State) -> State {
+/// Runs a text of a kernel on a state, and returns the state afterwards.
+pub(super) fn run_text(
+    gpu: &GpuFinder,
+    kernel: &'static Kernel,
+    groups: fn(&State) -> u32,
+    text: &str,
+    options: &GpuOptions,
+    before: &State,
+) -> State {
     let mut after = before.clone();
-    let bindings = twin.kernel.bindings;
+    let bindings = kernel.bindings;
     let buffers: Vec<_> = bindings.iter().map(|&buffer| padded(after.bytes(buffer))).collect();
-    let groups = (twin.groups)(before);
-    let left =
-        single::run(gpu, twin.kernel, text, options, &buffers, groups).expect("the device runs the kernel");
-    for (&buffer, left) in bindings.iter().zip(&left) {
+    let left = single::run(gpu, kernel, text, options, &buffers, groups(before));
+    for (&buffer, left) in bindings.iter().zip(&left.expect("the device runs the kernel")) {
         let own = after.bytes(buffer);
         let len = own.len();
         own.copy_from_slice(&left[..len]);
@@ -73,13 +83,13 @@ pub(super) fn fault(twin: &Twin, options: &GpuOptions, before: &State) -> Option
     let wanted = after_twin(twin, before);
     let before = with_capacity_for(before, &wanted);
     let found = on_device(gpus()?, twin, options, &before);
-    let fault = (twin.compare)(&before, &found, &wanted)?;
+    let fault = twin.compare(&before, &found, &wanted)?;
     Some(format!("{}: {fault}", twin.kernel.name))
 }
 
 /// Compares a kernel with its twin on all sets of at most `most_boxes` boxes, at rest and moving, with these codings, with filters
 /// and splits.
-pub(super) fn check_agrees(kernel: &str, codings: &[u32], most_boxes: usize) {
+pub(super) fn check_agrees(kernel: &str, options: &GpuOptions, codings: &[u32], most_boxes: usize) {
     let all = cases().into_iter().chain(moving_cases());
     for case in all.filter(|case| case.boxes.len() <= most_boxes) {
         let before = State::before(kernel, &case);
@@ -88,7 +98,7 @@ pub(super) fn check_agrees(kernel: &str, codings: &[u32], most_boxes: usize) {
         for &coding in codings {
             for &(filtered, split) in settings {
                 let state = before.clone().with(coding | filtered, split);
-                let fault = fault(twin(kernel), &GpuOptions::DEFAULT, &state);
+                let fault = fault(twin(kernel), options, &state);
                 assert_eq!(fault, None, "{}, flags {}, split {split}", case.name, coding | filtered);
             }
         }

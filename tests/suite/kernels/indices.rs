@@ -36,6 +36,7 @@ fn index_fault(before: &State) -> Option<String> {
     let found = on_device(gpu(), kernel, &GpuOptions::DEFAULT, &with_capacity_for(before, &wanted));
     let mut rows = found.out.iter().zip(&wanted.out).step_by(3);
     let far = rows.find(|(estimate, row)| estimate.abs_diff(**row) > 2);
-    (kernel.compare)(before, &found, &wanted)
+    kernel
+        .compare(before, &found, &wanted)
         .or_else(|| far.map(|(estimate, row)| format!("row {row} was estimated as {estimate}")))
 }

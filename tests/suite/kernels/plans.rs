@@ -12,13 +12,8 @@ fn levels(plan: &Params) -> &[Level] {
     &plan.level[..plan.levels as usize]
 }
 
-/// Returns the edge of the cells of the finest level.
-fn cell(plan: &Params) -> f32 {
-    1.0 / plan.scale
-}
-
-/// Asserts what the kernels rely on.
-fn validate(plan: &Params) {
+/// Asserts what the kernels rely on: of all plans that they run with here.
+pub(super) fn validate(plan: &Params) {
     let mut first = 0;
     for level in levels(plan) {
         assert_eq!(level.first_cell, first, "{plan:?}");
@@ -43,7 +38,7 @@ fn lattice(n: u32, step: f32, half: f32) -> Vec<Aabb> {
 #[test]
 fn each_size_of_many_boxes_has_a_level_beside_the_cell_for_everything() {
     let one_size = lattice(20, 1.0, 0.4);
-    let cells = cell(&plan(&one_size));
+    let cells = 1.0 / plan(&one_size).scale;
     assert!((0.4..4.0).contains(&cells), "{cells}");
     let huge = [one_size.clone(), vec![Aabb::new([-1e4; 3], [1e4; 3])]].concat();
     let two_sizes = [lattice(40, 1.0, 0.0005), lattice(10, 16.0, 8.0)].concat();
@@ -62,36 +57,4 @@ fn a_cover_around_the_scene_does_not_add_cells() {
     };
     let [small, cover] = [0.5, 53.0].map(with);
     assert!(cover.abs_diff(small) < small / 10, "{cover} cells, {small} without a cover");
-}
-
-#[test]
-fn clusters_far_apart_do_not_share_a_cell_each() {
-    let mut boxes = lattice(12, 1.0, 0.4);
-    for apart in [1e4f32, 1e7] {
-        boxes.truncate(1728);
-        let away = |b: &Aabb| Aabb::new(b.min.map(|x| x + apart), b.max.map(|x| x + apart));
-        boxes.extend(lattice(12, 1.0, 0.4).iter().map(away));
-        let plan = plan(&boxes);
-        assert!(cell(&plan) < 4.0, "{apart} apart: {plan:?}");
-    }
-    // No cell parts identical boxes, so none is looked for.
-    let plan = plan(&[lattice(12, 1.0, 0.4), vec![Aabb::new([3.0; 3], [3.8; 3]); 3000]].concat());
-    assert!(cell(&plan) > 0.2, "{plan:?}");
-}
-
-#[test]
-fn twelve_decades_fit_the_integers() {
-    let boxes: Vec<_> = (0..600)
-        .map(|i| Aabb::from_center([(i % 7) as f32; 3], [10f32.powf((i % 121) as f32 / 10.0 - 6.0); 3]))
-        .collect();
-    plan(&boxes);
-}
-
-#[test]
-fn extreme_sets_have_a_plan() {
-    plan(&[Aabb::NOWHERE; 5]);
-    plan(&vec![Aabb::new([f32::MAX; 3], [f32::MAX; 3]); 500]);
-    plan(&vec![Aabb::new([1e-42; 3], [2e-42; 3]); 500]);
-    let flat: Vec<_> = (0..900).map(|i| Aabb::from_center([(i % 30) as f32, 0.0, 0.0], [0.5; 3])).collect();
-    plan(&flat);
 }

@@ -92,6 +92,7 @@ impl State {
         let n = case.boxes.len();
         let (small_cell, columns) = (case.small_cell, case.columns);
         let plan = plan_params(&all_bounds(case), &GpuOptions::DEFAULT, 1 << 20);
+        validate(&plan);
         let (flags, most_tests) = (COUNTED, u32::MAX);
         let params = Params { boxes: n as u32, small_cell, columns, flags, most_tests, ..plan };
         let mut state = Self {
@@ -139,9 +140,6 @@ impl State {
     pub(super) fn before(kernel: &str, case: &Case) -> Self {
         if kernel == "index_pairs" {
             return indices(1000, 77, 4000);
-        }
-        if SORT.contains(&kernel) {
-            return pairs_to_sort(kernel, case);
         }
         let mut state = Self::new(case);
         // Without a grid no box is located.

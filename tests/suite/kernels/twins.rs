@@ -2,35 +2,60 @@
 
 use super::*;
 
-/// A kernel, its twin, its number of workgroups, and the comparison of their results. The comparison gets the state before,
-/// the found one and the wanted one.
+/// A kernel, its twin, its number of workgroups, and the comparison of their results where the device may choose an order. The
+/// comparison gets the state before, the found one and the wanted one.
 pub(super) struct Twin {
     pub(super) kernel: &'static Kernel,
     pub(super) run: fn(&mut State),
     pub(super) groups: fn(&State) -> u32,
-    pub(super) compare: fn(&State, &State, &State) -> Option<String>,
+    compare: Option<Compare>,
 }
 
-/// The twins, in the order in which the kernels run.
-pub(super) static TWINS: [Twin; 18] = [
-    Twin { kernel: &shaders::APPLY_CHANGES, run: apply_changes, groups: by_change, compare: compare_motions },
-    Twin { kernel: &shaders::LOCATE, run: locate, groups: by_box, compare: compare_located },
-    Twin { kernel: &shaders::VISIT, run: visit, groups: by_box, compare: compare_cells },
-    Twin { kernel: &shaders::SCAN_BLOCKS, run: scan_blocks, groups: by_block, compare: compare_blocks },
-    Twin { kernel: &shaders::SCAN_SUMS, run: scan_sums, groups: one, compare: compare_sums },
-    Twin { kernel: &shaders::SCHEDULE, run: schedule, groups: by_cell_block, compare: compare_schedules },
-    Twin { kernel: &shaders::SCATTER, run: scatter, groups: by_box, compare: compare_entries },
-    Twin { kernel: &shaders::ARRANGE, run: arrange, groups: one, compare: compare_dispatches },
-    Twin { kernel: &shaders::CHECK_SMALL, run: check_small, groups: by_small_item, compare: compare_checks },
-    Twin { kernel: &shaders::CHECK_LARGE, run: check_large, groups: by_large_item, compare: compare_checks },
-    Twin { kernel: &shaders::CHECK_ALL, run: check_all, groups: by_pair, compare: compare_checks },
-    Twin { kernel: &shaders::ARRANGE_ROWS, run: arrange_rows, groups: one, compare: compare_row_dispatches },
-    Twin { kernel: &shaders::COUNT_PAIRS, run: count_pairs, groups: by_found_pair, compare: compare_rows },
-    Twin { kernel: &shaders::PLACE_PAIRS, run: place_pairs, groups: by_found_pair, compare: compare_grouped },
-    Twin { kernel: &shaders::RANK_PAIRS, run: rank_pairs, groups: by_found_pair, compare: compare_ranked },
-    Twin { kernel: &shaders::PLACE_WINDOWS, run: place_windows, groups: by_piece, compare: compare_windows },
-    Twin { kernel: &shaders::RANK_WINDOWS, run: rank_windows, groups: by_piece, compare: compare_out },
-    Twin { kernel: &shaders::INDEX_PAIRS, run: index_pairs, groups: by_cell, compare: compare_indices },
+type Compare = fn(&State, &State, &State) -> Option<String>;
+
+impl Twin {
+    /// Returns the first difference of two results: in any buffer, unless the kernel has a comparison of its own.
+    pub(super) fn compare(&self, before: &State, found: &State, wanted: &State) -> Option<String> {
+        if let Some(compare) = self.compare {
+            return compare(before, found, wanted);
+        }
+        let [mut found, mut wanted] = [found, wanted].map(State::clone);
+        self.kernel.bindings.iter().find_map(|&buffer| {
+            let words = |s: &mut State| s.bytes(buffer).as_chunks::<4>().0.to_vec();
+            same(buffer.name(), &words(&mut found), &words(&mut wanted))
+        })
+    }
+}
+
+/// The twins, in the order in which the kernels run. The kernels of the sort have none.
+pub(super) static TWINS: [Twin; 12] = [
+    Twin { kernel: &shaders::APPLY_CHANGES, run: apply_changes, groups: by_change, compare: None },
+    Twin { kernel: &shaders::LOCATE, run: locate, groups: by_box, compare: None },
+    Twin { kernel: &shaders::VISIT, run: visit, groups: by_box, compare: None },
+    Twin { kernel: &shaders::SCAN_BLOCKS, run: scan_blocks, groups: by_block, compare: None },
+    Twin { kernel: &shaders::SCAN_SUMS, run: scan_sums, groups: one, compare: None },
+    Twin {
+        kernel: &shaders::SCHEDULE,
+        run: schedule,
+        groups: by_cell_block,
+        compare: Some(compare_schedules),
+    },
+    Twin { kernel: &shaders::SCATTER, run: scatter, groups: by_box, compare: Some(compare_entries) },
+    Twin { kernel: &shaders::ARRANGE, run: arrange, groups: one, compare: None },
+    Twin {
+        kernel: &shaders::CHECK_SMALL,
+        run: check_small,
+        groups: by_small_item,
+        compare: Some(compare_checks),
+    },
+    Twin {
+        kernel: &shaders::CHECK_LARGE,
+        run: check_large,
+        groups: by_large_item,
+        compare: Some(compare_checks),
+    },
+    Twin { kernel: &shaders::CHECK_ALL, run: check_all, groups: by_pair, compare: Some(compare_checks) },
+    Twin { kernel: &shaders::INDEX_PAIRS, run: index_pairs, groups: by_cell, compare: Some(compare_indices) },
 ];
 
 pub(super) fn twin(kernel: &str) -> &'static Twin {

@@ -8,6 +8,7 @@ use rand::rngs::StdRng;
 use rand::{RngExt, SeedableRng};
 
 const INFINITY: f32 = f32::INFINITY;
+const SMALLEST: f32 = f32::from_bits(1);
 
 fn pile(n: usize) -> Vec<Aabb> {
     set("pile", n, 1)
@@ -40,66 +41,33 @@ fn offsets_from_one_to_1e30_each_alone_and_all_at_once() {
 }
 
 #[test]
-fn denormals_down_to_the_smallest() {
-    let smallest = f32::from_bits(1);
-    for unit in [smallest, 8.0 * smallest, f32::MIN_POSITIVE] {
-        let at = |i: usize| (i as f32 - 3.0) * unit;
-        let row = |i: usize| [at(i), at(i + 1)];
-        let rows: Vec<[f32; 2]> = (0..7).map(row).collect();
+fn rasters_of_denormals() {
+    for unit in [SMALLEST, 8.0 * SMALLEST, f32::MIN_POSITIVE] {
+        let rows: Vec<[f32; 2]> = (-3..4).map(|i| [i as f32 * unit, (i + 1) as f32 * unit]).collect();
         everywhere(&format!("raster of {unit:e}"), &product(&rows, &rows, &rows));
     }
-    let numbers = [-1.0, -smallest, 0.0, smallest, f32::MIN_POSITIVE];
-    everywhere(
-        "denormals among others",
-        &product(&intervals(&numbers), &[[0.0, smallest]], &intervals(&numbers)),
-    );
 }
 
+/// Every box between two of some numbers on one axis, and of fewer on the others: alone, and some of them among small ones.
 #[test]
-fn both_zeros_are_one() {
-    let zeros = [0.0, -0.0];
-    let ends: Vec<[f32; 2]> = zeros.iter().flat_map(|low| zeros.map(|high| [*low, high])).collect();
-    let boxes = product(&ends, &ends, &ends);
-    everywhere("zeros", &boxes);
-    assert_eq!(pbig_core::oracle::pairs(&boxes).len(), 64 * 63 / 2, "all of them are one point");
-    let below = f32::from_bits(1).copysign(-1.0);
-    everywhere(
-        "zeros and what is next to them",
-        &product(&ends, &intervals(&[-1.0, below, -0.0, 1.0]), &ends),
-    );
-}
-
-#[test]
-fn the_largest_floats() {
-    let numbers = [-f32::MAX, (-f32::MAX).next_up(), -1.0, 1.0, f32::MAX.next_down(), f32::MAX];
-    let few = intervals(&[-f32::MAX, 0.0, f32::MAX]);
-    everywhere("largest", &product(&intervals(&numbers), &few, &few[2..4]));
-    let small = pile(300);
-    everywhere("largest among small ones", &[&small[..], &product(&few, &few, &few[..3])].concat());
-}
-
-#[test]
-fn half_spaces_on_every_side() {
+fn boxes_between_special_numbers() {
+    let half_space = |far: f32| vec![-far, 2.0, 2.0f32.next_up(), far];
     let half = 0.5 * f32::MAX;
-    let mut boxes = pile(500);
-    for axis in 0..3 {
-        for (low, high) in [(-half, half), (-INFINITY, INFINITY), (-f32::MAX, f32::MAX)] {
-            let (mut below, mut above) = (Aabb::new([low; 3], [high; 3]), Aabb::new([low; 3], [high; 3]));
-            below.max[axis] = 2.0;
-            above.min[axis] = 2.0f32.next_up();
-            boxes.extend([below, above, Aabb::new([low; 3], [high; 3])]);
-        }
+    for (name, numbers, few) in [
+        ("denormals", vec![-1.0, -SMALLEST, 0.0, SMALLEST, f32::MIN_POSITIVE], vec![0.0, SMALLEST]),
+        ("zeros", vec![-1.0, -SMALLEST, -0.0, 0.0, -0.0, 1.0], vec![-0.0, 0.0, -0.0]),
+        ("largest", vec![-f32::MAX, (-f32::MAX).next_up(), 1.0, f32::MAX], vec![-f32::MAX, 0.0, f32::MAX]),
+        ("infinities", vec![-INFINITY, -f32::MAX, 0.0, 1.0, INFINITY], vec![-INFINITY, 0.5, INFINITY]),
+        ("half of the largest", half_space(half), vec![-half, half]),
+        ("half-spaces to the largest", half_space(f32::MAX), vec![-f32::MAX, f32::MAX]),
+        ("half-spaces", half_space(INFINITY), vec![-INFINITY, INFINITY]),
+    ] {
+        let few = intervals(&few);
+        let boxes = product(&intervals(&numbers), &few, &few);
+        everywhere(name, &boxes);
+        let some: Vec<Aabb> = boxes.into_iter().step_by(11).collect();
+        everywhere(&format!("{name} among small ones"), &[&pile(300)[..], &some].concat());
     }
-    everywhere("half-spaces", &boxes);
-}
-
-#[test]
-fn infinities_at_every_end() {
-    let numbers = [-INFINITY, -f32::MAX, 0.0, 1.0, INFINITY];
-    let few = intervals(&[-INFINITY, 0.5, INFINITY]);
-    everywhere("infinities", &product(&intervals(&numbers), &few, &[[0.0, 1.0], [-INFINITY, 0.0]]));
-    let small = pile(300);
-    everywhere("infinities among small ones", &[&small[..], &product(&few, &few, &few)].concat());
 }
 
 /// Which of its six numbers are spoiled: a bit each.
@@ -109,18 +77,6 @@ fn spoiled(aabb: &Aabb, which: usize, with: impl Fn(f32) -> f32) -> Aabb {
         *number = if which >> k & 1 == 1 { with(*number) } else { *number };
     }
     bytemuck::cast(numbers)
-}
-
-#[test]
-fn nan_in_any_field_of_the_first_a_middle_and_the_last_box() {
-    let boxes = pile(120);
-    for which in 1..64 {
-        let mut bad = boxes.clone();
-        for id in [0, 57, 58, 119] {
-            bad[id] = spoiled(&bad[id], which, |_| f32::NAN);
-        }
-        crate::finder::check(&format!("NaN in {which:06b}"), &bad);
-    }
 }
 
 /// Spoiled when it comes, while it moves, twice, when its filter changes, when it is removed and comes back in one update,

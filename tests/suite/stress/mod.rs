@@ -4,7 +4,6 @@
 mod extremes;
 mod fuzzed;
 pub(crate) mod memory;
-mod mixed;
 mod motion;
 mod multitudes;
 mod shapes;

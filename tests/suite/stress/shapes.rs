@@ -2,9 +2,9 @@
 
 use super::everywhere;
 use crate::follower::Follower;
-use pbig_core::{Aabb, Algorithm, Config, Engine, Finder, Plan, ProxyFilter};
+use pbig_core::{Aabb, Algorithm, Config, Engine, Plan, ProxyFilter};
 use pbig_harness::boxes::BoxSet;
-use pbig_tests::{Way, shifted, strategies};
+use pbig_tests::shifted;
 
 #[test]
 fn flat_worlds_of_any_thickness_on_every_axis() {
@@ -78,63 +78,25 @@ fn heaps() -> Vec<Aabb> {
     [(0.01, 0.0), (1.0, 50.0), (100.0, 500.0)].into_iter().flat_map(heap).collect()
 }
 
-/// The boxes, every other one of them moved onto a border of the cells that the plan for them has. Cells follow the
-/// boxes, so none leaves the space that all have, and it is tried again until they stay.
-fn on_borders(start: &[Aabb]) -> (Vec<Aabb>, usize) {
-    let (mut boxes, mut best) = (start.to_vec(), (start.to_vec(), 0));
-    let space = start.iter().fold(Aabb::NOWHERE, |all, aabb| all.union(aabb));
-    for _ in 0..8 {
-        let mut finder = Finder::new(pbig_tests::grid());
-        finder.find(&boxes).expect("few pairs");
-        let plan = finder.report().plan.clone();
-        let on = boxes.iter().filter(|aabb| on_border(aabb, &plan)).count();
-        best = if on > best.1 { (boxes, on) } else { best };
-        let put = |(i, aabb): (usize, &Aabb)| {
-            let there = onto_border(aabb, &plan, i / 2);
-            if i % 2 == 1 && space.contains(&there) { there } else { *aabb }
-        };
-        boxes = start.iter().enumerate().map(put).collect();
-    }
-    best
-}
-
+/// Few boxes change at a time, so that the plan stays: of a grid that is edited, and of one that is built anew.
 #[test]
-fn boxes_on_the_borders_of_the_cells_that_are_planned_for_them() {
-    for (name, start) in [("heaps", heaps()), ("one heap", heaps()[800..1600].to_vec())] {
-        let (boxes, on) = on_borders(&start);
-        println!("{name}: {on} boxes on borders");
-        assert!(on > 100, "{name}: only {on} of {} boxes are on borders", boxes.len());
-        for (strategy, way) in strategies().into_iter().filter(|(name, _)| !name.starts_with("gpu")) {
-            everywhere_on(way, strategy, &boxes);
-        }
-    }
-}
-
-/// Few boxes at a time, so that the grid that is there stays: on the borders of its cells.
-#[test]
-fn boxes_on_the_borders_of_the_cells_of_an_edited_grid() {
+fn boxes_on_the_borders_of_the_cells_of_a_grid() {
     let start = heaps();
-    let config = Config { engine: Some(Engine::Edit), ..Config::DEFAULT };
-    let mut world = Follower::new(config, start.len());
-    super::step(&mut world, &[], &start);
-    world.update("the heaps");
-    let (mut edits, mut on) = (0, 0);
-    for round in 0..12 {
-        let plan = world.broad_phase.report().plan.clone();
-        for i in (round..start.len()).step_by(37) {
-            let aabb = onto_border(&start[i], &plan, i / 37 + round);
-            world.set(i as u32, aabb, ProxyFilter::ALL);
-            on += usize::from(on_border(&aabb, &plan));
+    for engine in [Engine::Edit, Engine::Rebuild] {
+        let mut world = Follower::new(Config { engine: Some(engine), ..Config::DEFAULT }, start.len());
+        super::step(&mut world, &[], &start);
+        world.update("the heaps");
+        let (mut plan, mut on) = (world.broad_phase.report().plan.clone(), 0);
+        for round in 0..12 {
+            let moved = (round..start.len()).step_by(37);
+            for i in moved.clone() {
+                world.set(i as u32, onto_border(&start[i], &plan, i / 37 + round), ProxyFilter::ALL);
+            }
+            world.update(&format!("{engine:?}, round {round}"));
+            plan = world.broad_phase.report().plan.clone();
+            assert_eq!(plan.algorithm == Algorithm::Edit, engine == Engine::Edit, "{plan}");
+            on += moved.filter(|&i| world.boxes[i].is_some_and(|(aabb, _)| on_border(&aabb, &plan))).count();
         }
-        world.update(&format!("round {round}"));
-        edits += usize::from(world.broad_phase.report().plan.algorithm == Algorithm::Edit);
+        assert!(on > 200, "{engine:?}: {on} boxes on borders");
     }
-    assert!(edits == 12 && on > 200, "{edits} edits, {on} boxes on borders");
-}
-
-/// What lies on the borders of one strategy's cells is of no special place to another.
-fn everywhere_on(way: Way, strategy: &str, boxes: &[Aabb]) {
-    crate::finder::check_on(vec![(strategy, way)], "on borders", boxes);
-    let mut world = Follower::new(way, boxes.len());
-    super::play(&mut world, &super::shuffled(boxes), &format!("on borders, {strategy}"));
 }

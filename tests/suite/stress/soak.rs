@@ -26,9 +26,7 @@ struct Churn {
     rng: StdRng,
     home: Vec<Aabb>,
     odd: Vec<Aabb>,
-    /// True if all boxes move smoothly around their homes, so that near pairs are kept.
-    swings: bool,
-    /// The number of boxes from one changed box to the next, if they do not swing.
+    /// The number of boxes from one changed box to the next.
     one_in: usize,
     tally: SoakCounts,
 }
@@ -38,7 +36,7 @@ impl Churn {
         let world = Follower::new(way, ids);
         let rng = StdRng::seed_from_u64(6);
         let (home, odd) = (set("unit", ids, 4), set("degenerate", 100, 4));
-        Self { world, rng, home, odd, swings: false, one_in: 30, tally: SoakCounts::default() }
+        Self { world, rng, home, odd, one_in: 30, tally: SoakCounts::default() }
     }
 
     fn aabb(&mut self, id: u32) -> Aabb {
@@ -47,27 +45,8 @@ impl Churn {
         if odd { self.odd[self.rng.random_range(0..100)] } else { shifted(&self.home[id as usize], by) }
     }
 
-    /// All but one, which in every third update comes or goes.
-    fn swing(&mut self, update: usize) {
-        let visitor = update.is_multiple_of(3).then_some((update / 3 % self.home.len()) as u32);
-        for id in 0..self.home.len() as u32 {
-            let phase = update as f32 * 0.01 * (1 + id % 7) as f32;
-            let by = [phase.sin(), (1.3 * phase).sin(), (1.7 * phase).sin()].map(|x| 0.5 * x);
-            let is_visitor = visitor == Some(id);
-            if is_visitor && self.world.has(id) {
-                self.world.remove(id);
-            } else if is_visitor || self.world.has(id) {
-                let aabb = shifted(&self.home[id as usize], by);
-                self.world.set(id, aabb, ProxyFilter { body: id % 20, ..ProxyFilter::ALL });
-            }
-        }
-    }
-
     /// A share of the boxes, and now and then all of them.
     fn change(&mut self, update: usize) {
-        if self.swings && !update.is_multiple_of(50) {
-            return self.swing(update);
-        }
         let ids = self.home.len();
         let all = update.is_multiple_of(97);
         for i in 0..if all { ids } else { 1 + ids / self.one_in } {
@@ -198,13 +177,6 @@ fn soak_of_a_world_in_the_grid_with_edits() {
 fn soak_of_a_small_world_in_the_grid() {
     let tally = soak(|| Churn::new(cpu(Some(Engine::Rebuild)), 120), updates());
     tally.assert_mostly(&["grid"], 90);
-}
-
-/// Edits for ever: the lists of boxes out of the grid's order stay short, and memory is bounded.
-#[test]
-fn soak_of_a_small_world_in_an_edited_grid() {
-    let churn = || Churn { swings: true, ..Churn::new(cpu(Some(Engine::Edit)), 300) };
-    soak(churn, updates()).assert_mostly(&["edit"], 95);
 }
 
 /// So many boxes that threads share the work: a thirtieth of the updates, each of which changes thousands.

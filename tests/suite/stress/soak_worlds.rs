@@ -1,7 +1,7 @@
 //! Churn for ever through rapier: bodies fall, come to rest, change and go while others come. The broad phase holds no more
 //! memory as time goes on, and no pair is missed.
 
-use super::memory;
+use super::memory::Weighed;
 use glam::Vec3;
 use pbig_harness::runner::Timed;
 use pbig_harness::world::World;
@@ -15,31 +15,6 @@ use std::collections::VecDeque;
 /// Steps, a few hundred without `PBIG_SOAK`.
 fn steps() -> usize {
     super::soak::given().unwrap_or(600)
-}
-
-/// A broad phase, and the bytes that it keeps of what it asks for.
-struct Weighed<B> {
-    inner: B,
-    bytes: i64,
-}
-
-impl<B: BroadPhase> BroadPhase for Weighed<B> {
-    fn update(
-        &mut self,
-        params: &IntegrationParameters,
-        colliders: &ColliderSet,
-        bodies: &RigidBodySet,
-        modified: &[ColliderHandle],
-        removed: &[ColliderHandle],
-        events: &mut Vec<BroadPhasePairEvent>,
-    ) {
-        // Events are the caller's.
-        let mut own = Vec::new();
-        let before = memory::held();
-        self.inner.update(params, colliders, bodies, modified, removed, &mut own);
-        self.bytes += memory::held() - before - (own.capacity() * size_of::<BroadPhasePairEvent>()) as i64;
-        events.append(&mut own);
-    }
 }
 
 /// Bodies that come above a tray with a rim, the oldest of which go.
@@ -112,7 +87,7 @@ fn soak_of_a_rapier_world_that_comes_and_goes() {
     on_threads(1, || {
         let steps = steps();
         let mut tray = Tray::new();
-        let weighed = Weighed { inner: PbigBroadPhase::new(), bytes: 0 };
+        let weighed = Weighed { inner: PbigBroadPhase::new(), bytes: 0, largest: vec![] };
         let mut broad_phase = Timed::new(weighed).checked(PbigConfig::DEFAULT.margin, (steps / 5000).max(1));
         let mut early = 0;
         for step in 0..steps {

@@ -143,17 +143,6 @@ fn frames_without_boxes_and_boxes_without_frames() {
 }
 
 #[test]
-fn absent_boxes_are_not_invalid_ones() {
-    let folder = tempfile::tempdir().expect("a folder");
-    let mut frames = Array3::<f32>::zeros((2, 3, 6));
-    frames.slice_mut(ndarray::s![0, 0, ..]).fill(f32::NAN);
-    frames[[1, 1, 4]] = f32::NAN;
-    save(folder.path(), "frames.npy", &frames);
-    let object = json(&pbig(folder.path(), &["replay", "frames.npy", "--json"]));
-    assert_eq!(object["invalid"], 1);
-}
-
-#[test]
 fn a_missing_backend_is_replaced_and_the_output_says_so() {
     let folder = tempfile::tempdir().expect("a folder");
     save(folder.path(), "boxes.npy", &Array2::<f32>::zeros((3, 6)));

@@ -124,17 +124,6 @@ fn a_list_of_frames_and_one_of_boxes_are_told_apart() {
 }
 
 #[test]
-fn what_is_no_npy_file_is_not_read_as_one() {
-    let folder = tempfile::tempdir().expect("a folder");
-    for command in ["pairs", "replay"] {
-        let about = |content| line_about(folder.path(), command, "x.npy", content);
-        assert_eq!(about(b""), "pbig: x.npy: the file is empty");
-        let other = "pbig: x.npy: not a .npy file, as `numpy.save` writes it";
-        assert_eq!((about(b"0,0,0,1,1,1\n").as_str(), about(b"\x93NUMP").as_str()), (other, other));
-    }
-}
-
-#[test]
 fn other_separators_or_headers_are_told_what_is_expected() {
     let folder = tempfile::tempdir().expect("a folder");
     let header = "the header must be min_x,min_y,min_z,max_x,max_y,max_z, or be left out";

@@ -90,30 +90,3 @@ fn with_a_margin_pairs_are_at_most_those_of_two_margins() {
         assert!(state.is_subset(&pairs(&grown)), "{:?}", state.difference(&pairs(&grown)).next());
     }
 }
-
-#[test]
-fn the_file_of_a_shadow_shows_the_missing_pair_in_a_replay() {
-    use pbig_harness::world::World;
-    use rapier_pbig::PbigBroadPhase;
-    use rapier_pbig::shadow::Shadow;
-    use rapier3d::prelude::*;
-
-    let mut world = World::with_gravity(glam::Vec3::ZERO);
-    let [a, _, c] =
-        [0.0, 10.0, 20.0].map(|x| world.add(World::dynamic(glam::Vec3::X * x), ColliderBuilder::ball(0.5)));
-    let [a, c] = [a, c].map(|body| world.bodies[body].colliders()[0]);
-    let mut broad_phase = PbigBroadPhase::new().with_shadow(Shadow::Oracle);
-    world.step(&mut broad_phase);
-    // The app's fault: the first ball moves onto the second, and the broad phase is told of the third.
-    world.colliders[a].set_position(Isometry::translation(10.5, 0.0, 0.0));
-    let World { params, colliders, bodies, .. } = &world;
-    broad_phase.update(params, colliders, bodies, &[c], &[], &mut Vec::new());
-    let replay = broad_phase.differences()[0].replay.clone().expect("a folder").expect("a file");
-
-    let folder = tempfile::tempdir().expect("a folder");
-    let file = replay.to_str().expect("UTF-8");
-    json(&pbig(folder.path(), &["replay", file, "-o", "events.csv", "--json"]));
-    let events = std::fs::read_to_string(folder.path().join("events.csv")).expect("events");
-    assert_eq!(events.lines().last(), Some("2,+,0,1"), "{events}");
-    std::fs::remove_file(replay).expect("the file is there");
-}
