@@ -205,7 +205,7 @@ run_sanitize() {
 # longest TARGET: the length in bytes at which an input takes milliseconds, and no allocation that the input does not account for.
 longest() {
     case $1 in
-    finder_against_oracle) echo 1600 ;;
+    finder_against_oracle | between_against_oracle) echo 1600 ;;
     updates_against_scratch) echo 800 ;;
     work_is_bounded) echo 100 ;;
     *) echo 4096 ;;
@@ -217,7 +217,8 @@ longest() {
 run_fuzz() {
     local seconds=${1:-600} target words
     shift || true
-    [ $# -gt 0 ] || set -- finder_against_oracle updates_against_scratch work_is_bounded decode csv_reader npy_reader
+    [ $# -gt 0 ] || set -- finder_against_oracle between_against_oracle updates_against_scratch work_is_bounded decode \
+        csv_reader npy_reader ply_reader obj_reader
     step cargo run --release -p pbig-tests --example fuzz_seeds
     for target in "$@"; do
         words=''

@@ -26,12 +26,21 @@ pub(crate) struct StepInput<'w, 's> {
 impl StepInput<'_, '_> {
     /// Brings the boxes up to date, and lists the pairs to ask about, in the order of their ids: those that have begun, and those
     /// without a contact.
-    pub(crate) fn candidates(&mut self, boxes: &mut ColliderBoxes) -> (Vec<Pair>, Result<(), Error>) {
+    pub(crate) fn candidates(&mut self, boxes: &mut ColliderBoxes) -> (Vec<Pair>, Result<(), String>) {
         let followed = boxes.follow(&self.trees, &self.moved, &mut self.lost, &self.keys);
         let mut pairs = Vec::new();
         let found = boxes.find(&mut pairs);
         boxes.add_waiting(&mut pairs);
-        (pairs, followed.and(found))
+        (pairs, followed.and(found).map_err(|error| in_words(&error)))
+    }
+}
+
+/// Returns an error in words. The core's own words ask for larger limits, which the plug-in has no setting for.
+fn in_words(error: &Error) -> String {
+    match error {
+        Error::TooManyBoxes { limit, .. } => format!("the plug-in takes at most {limit} colliders"),
+        Error::TooManyPairs { limit } => format!("the plug-in keeps at most {limit} overlapping pairs"),
+        other => other.to_string(),
     }
 }
 
@@ -92,4 +101,18 @@ fn add_edge(graph: &mut ContactGraph, [one, other]: [&ColliderTreeProxy; 2]) {
         contact.flags.set(ContactPairFlags::MODIFY_CONTACTS, has(ColliderTreeProxyFlags::MODIFY_CONTACTS));
         contact.flags.set(ContactPairFlags::GENERATE_CONSTRAINTS, is_solid);
     });
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn errors_name_no_setting_that_a_user_lacks() {
+        let limits = [Error::TooManyBoxes { boxes: 9, limit: 8 }, Error::TooManyPairs { limit: 8 }];
+        for text in limits.map(|error| in_words(&error)) {
+            assert!(text.contains("at most 8 ") && !text.contains("max_"), "{text}");
+        }
+        assert!(in_words(&Error::SparseId { id: 9, known: 1 }).contains("id 9"));
+    }
 }

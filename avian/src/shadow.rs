@@ -14,6 +14,21 @@ use std::marker::PhantomData;
 
 /// Compares the pairs of pbig with those of avian's own broad phase. Add it beside `BvhBroadPhasePlugin`, with the same hooks, and
 /// without [`crate::PbigBroadPhasePlugin`]. Hooks are asked twice.
+///
+/// ```
+/// use avian::prelude::*; // avian2d or avian3d
+/// use avian_pbig::shadow::{Shadow, ShadowPlugin};
+/// use bevy::prelude::*;
+///
+/// let mut app = App::new();
+/// app.add_plugins((MinimalPlugins, bevy::transform::TransformPlugin));
+/// app.add_plugins(PhysicsPlugins::default().build().add(ShadowPlugin::new()));
+/// app.finish();
+/// app.cleanup();
+/// app.update();
+/// let shadow = app.world().resource::<Shadow>();
+/// assert!(shadow.missing.is_empty() && shadow.spurious.is_empty(), "{shadow:?}");
+/// ```
 pub struct ShadowPlugin<H: CollisionHooks = ()>(PhantomData<H>);
 
 impl ShadowPlugin {

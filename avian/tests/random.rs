@@ -54,8 +54,7 @@ fn avian_finds_nothing_after_pbig() {
 
 /// Tests each moved proxy against every other, by avian's rules.
 fn note_missed(
-    trees: Res<ColliderTrees>,
-    moved: Res<MovedProxies>,
+    (trees, moved): (Res<ColliderTrees>, Res<MovedProxies>),
     graph: Res<ContactGraph>,
     joints: Res<avian::dynamics::joints::joint_graph::JointGraph>,
     keys: Query<&ColliderTreeProxyKey, Without<ColliderDisabled>>,

@@ -20,6 +20,9 @@ fn main() -> std::io::Result<()> {
         // All finders, without filters, for which these bytes have no room.
         let settings = (i % 4) as u8;
         write("finder_against_oracle", i, &[&[settings][..], &concat(boxes)].concat())?;
+        write("between_against_oracle", i, &[&[settings][..], &in_turns(boxes)].concat())?;
+        write("obj_reader", i, obj(boxes).as_bytes())?;
+        write("ply_reader", i, &ply(boxes, i % 2 == 1))?;
         write("csv_reader", i, csv(boxes).as_bytes())?;
         write("npy_reader", i, &npy(boxes, 1))?;
         write("decode", i, &words(boxes))?;
@@ -41,6 +44,44 @@ fn write(target: &str, number: usize, bytes: &[u8]) -> std::io::Result<()> {
 
 fn concat(boxes: &[Aabb]) -> Vec<u8> {
     boxes.iter().flat_map(raw).collect()
+}
+
+/// Boxes of the first set and of the second one in turns.
+fn in_turns(boxes: &[Aabb]) -> Vec<u8> {
+    boxes.iter().zip(0..).flat_map(|(aabb, i)| [vec![i], raw(aabb)].concat()).collect()
+}
+
+/// A triangle for each box: two corners of it, and one of the box before.
+fn triangles(boxes: &[Aabb]) -> Vec<[usize; 3]> {
+    (1..boxes.len()).map(|i| [2 * i, 2 * i + 1, 2 * i - 1]).collect()
+}
+
+fn obj(boxes: &[Aabb]) -> String {
+    let vertex = |[x, y, z]: [f32; 3]| format!("v {x} {y} {z}\n");
+    let face = |corners: [usize; 3]| format!("f {}//1 {} -1\n", corners[0] + 1, corners[1] + 1);
+    let vertices = boxes.iter().flat_map(|aabb| [aabb.min, aabb.max]).map(vertex);
+    vertices.chain(triangles(boxes).into_iter().map(face)).collect()
+}
+
+fn ply(boxes: &[Aabb], is_binary: bool) -> Vec<u8> {
+    let (format, faces) = (if is_binary { "binary_little_endian" } else { "ascii" }, triangles(boxes));
+    let head = format!(
+        "ply\nformat {format} 1.0\nelement vertex {}\nproperty float x\nproperty float y\nproperty float z\n\
+         element face {}\nproperty list uchar int vertex_indices\nend_header\n",
+        2 * boxes.len(),
+        faces.len()
+    );
+    let vertices = boxes.iter().flat_map(|aabb| [aabb.min, aabb.max]);
+    let rows: Vec<u8> = if is_binary {
+        let floats = vertices.flatten().flat_map(f32::to_le_bytes);
+        let face = |face: [usize; 3]| [vec![3], face.map(|v| (v as u32).to_le_bytes()).concat()].concat();
+        floats.chain(faces.into_iter().flat_map(face)).collect()
+    } else {
+        let vertices = vertices.map(|[x, y, z]| format!("{x} {y} {z}\n"));
+        let faces = faces.into_iter().map(|[a, b, c]| format!("3 {a} {b} {c}\n"));
+        vertices.chain(faces).collect::<String>().into_bytes()
+    };
+    [head.into_bytes(), rows].concat()
 }
 
 fn csv(boxes: &[Aabb]) -> String {

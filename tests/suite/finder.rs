@@ -122,7 +122,7 @@ fn limits_end_in_errors_that_name_them() {
         );
         let error = with(300, pairs - 1).finder().find(&boxes).unwrap_err();
         assert_eq!(error, Error::TooManyPairs { limit: pairs - 1 }, "{strategy}");
-        assert!(error.to_string().contains("Limits::max_pairs"));
+        assert!(error.to_string().contains("max_pairs"));
         let error = with(299, pairs).finder().find(&boxes).unwrap_err();
         assert_eq!(error, Error::TooManyBoxes { boxes: 300, limit: 299 }, "{strategy}");
     }

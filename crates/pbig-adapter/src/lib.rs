@@ -11,6 +11,7 @@
 // Labels each item in the documentation with the feature that it needs; on docs.rs only, as it takes nightly Rust.
 #![cfg_attr(docsrs, feature(doc_cfg))]
 
+mod adapter;
 mod bounds;
 mod colliders;
 mod drawn;

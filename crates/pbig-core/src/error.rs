@@ -1,11 +1,12 @@
-//! The errors. Each message says what to do about it.
+//! The errors. Each message says what to do about it. It names a limit by its field alone, which is the same in [`crate::Limits`]
+//! and in the settings of the adapters.
 
 /// The reason why a call could not be completed. There is no partial result beside an error.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
     /// More boxes than [`crate::Limits::max_boxes`], or an id beyond it.
-    #[error("{boxes} boxes are more than Limits::max_boxes = {limit}; raise it or split the set")]
+    #[error("{boxes} boxes are more than max_boxes = {limit}; raise it or split the set")]
     TooManyBoxes {
         /// Boxes asked for: the length of the list, or the id plus one.
         boxes: u64,
@@ -22,7 +23,7 @@ pub enum Error {
     },
     /// More pairs than [`crate::Limits::max_pairs`].
     #[error(
-        "more than Limits::max_pairs = {limit} overlapping pairs; raise it (8 bytes a pair) or split the set"
+        "more than max_pairs = {limit} overlapping pairs; raise it (8 bytes a pair) or search fewer boxes"
     )]
     TooManyPairs {
         /// The limit in force.

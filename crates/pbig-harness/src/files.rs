@@ -26,12 +26,12 @@ fn at(path: &Path, what: impl fmt::Display) -> String {
 }
 
 /// Returns a library's message in one line.
-fn one_line(what: impl fmt::Display) -> String {
+pub(crate) fn one_line(what: impl fmt::Display) -> String {
     what.to_string().replace(['\n', '\r'], " ")
 }
 
 /// Returns the beginning of a value in a file, short enough that a message can also say what was expected.
-fn brief(text: &str) -> String {
+pub(crate) fn brief(text: &str) -> String {
     const LONGEST: usize = 120;
     text.char_indices().nth(LONGEST).map_or(text.to_owned(), |(end, _)| format!("{}...", &text[..end]))
 }

@@ -3,8 +3,9 @@
 mod obj;
 mod ply;
 
-use crate::files::ending;
+use crate::files::{ending, one_line};
 use pbig_core::{Aabb, Boxes, Keys, NO_KEY};
+use std::io::{BufRead, BufReader};
 use std::path::Path;
 
 /// The endings of a file with a mesh.
@@ -65,11 +66,25 @@ impl Mesh {
     /// # Errors
     /// The file, what is wrong and where, in one line.
     pub fn read(path: &Path) -> Result<Self, String> {
-        let read = if ending(path, &MESHES)? == "ply" { ply::read } else { obj::read };
+        let read = if ending(path, &MESHES)? == "ply" { Self::from_ply } else { Self::from_obj };
         let file = std::fs::File::open(path).map_err(|error| error.to_string());
-        let mesh = file.and_then(|file| read(std::io::BufReader::new(file)));
-        mesh.and_then(Self::checked)
-            .map_err(|what| format!("{}: {}", path.display(), what.replace('\n', " ")))
+        file.and_then(|file| read(BufReader::new(file))).map_err(|what| format!("{}: {what}", path.display()))
+    }
+
+    /// Reads the content of a `.ply` file.
+    ///
+    /// # Errors
+    /// What is wrong and where, in one line.
+    pub fn from_ply(content: impl BufRead) -> Result<Self, String> {
+        ply::read(content).and_then(Self::checked).map_err(one_line)
+    }
+
+    /// Reads the content of an `.obj` file.
+    ///
+    /// # Errors
+    /// What is wrong and where, in one line.
+    pub fn from_obj(content: impl BufRead) -> Result<Self, String> {
+        obj::read(content).and_then(Self::checked).map_err(one_line)
     }
 
     /// Refuses a face with a vertex that does not exist.

@@ -2,9 +2,9 @@
 
 use crate::PbigConfig;
 use crate::call::Call;
-use crate::scene::{handle, to_collider};
+use crate::scene::{handle, to_event, to_pair};
 use crate::tree::ParryTree;
-use pbig_adapter::{Colliders, Error, HandlePair, PairDevice, PairEvent, Stats, Why};
+use pbig_adapter::{Colliders, Error, HandlePair, Why};
 use rapier3d::prelude::{
     BroadPhase, BroadPhasePairEvent, ColliderHandle, ColliderPair, ColliderSet, IntegrationParameters,
     NarrowPhase, RigidBodySet,
@@ -46,33 +46,6 @@ impl PbigBroadPhase {
         Self::with_config(PbigConfig::DEFAULT).expect("the default margin is a length")
     }
 
-    /// Creates an empty broad phase.
-    ///
-    /// # Errors
-    /// [`Error::Margin`].
-    pub fn with_config(config: PbigConfig) -> Result<Self, Error> {
-        pbig_core::BroadPhase::new(config.into()).map(Self::around)
-    }
-
-    /// As [`PbigBroadPhase::with_config`], on a given device. [`pbig_core::Backend::Device`] always uses it.
-    /// [`pbig_core::Backend::Auto`] uses it for large changes, unless it is software.
-    ///
-    /// # Errors
-    /// [`Error::Margin`].
-    pub fn with_device(config: PbigConfig, device: Box<dyn PairDevice>) -> Result<Self, Error> {
-        pbig_core::BroadPhase::with_device(config.into(), device).map(Self::around)
-    }
-
-    /// Uses this device in later updates. A broad phase restored from a snapshot has none.
-    pub fn set_device(&mut self, device: Box<dyn PairDevice>) {
-        self.colliders.set_device(device);
-    }
-
-    /// Returns the name of the device in use.
-    pub fn device_name(&self) -> Option<&str> {
-        self.colliders.core().device_name()
-    }
-
     /// As [`PbigBroadPhase::with_config`], with any settings of the core; its margin is in units of rapier's `length_unit`.
     /// For studies and tests.
     ///
@@ -105,28 +78,6 @@ impl PbigBroadPhase {
         let pairs = contacts.chain(intersections).map(|(a, b)| HandlePair(handle(a), handle(b)));
         self.colliders.adopt(pairs.collect(), Vec::new(), true);
         self.restart_shadow();
-    }
-
-    /// Returns the error of the last update, or `None` if it succeeded. If pairs could not be found, no events were sent, and
-    /// the next update sees the same changes again. If a box could not be stored, the next update reads all colliders.
-    pub fn last_error(&self) -> Option<&Error> {
-        self.colliders.last_error()
-    }
-
-    /// Returns the counts of the last update.
-    pub fn stats(&self) -> Stats<'_> {
-        self.colliders.stats()
-    }
-
-    /// Returns the number of pairs that rapier knows of. Adopted pairs count after the next update.
-    pub fn pair_count(&self) -> usize {
-        self.colliders.pair_count()
-    }
-
-    /// Returns the pairs that rapier knows of, sorted by the two indices; the collider with the smaller shape comes first in each, then the lower index.
-    /// Adopted pairs are included after the next update.
-    pub fn pairs(&self) -> impl Iterator<Item = ColliderPair> {
-        self.colliders.pairs().map(to_pair)
     }
 
     /// Returns why these two colliders are a pair since the last update, or the first test that they fail.
@@ -186,16 +137,7 @@ impl PbigBroadPhase {
     }
 }
 
-pub(crate) fn to_pair(HandlePair(a, b): HandlePair) -> ColliderPair {
-    ColliderPair::new(to_collider(a), to_collider(b))
-}
-
-fn to_event(event: PairEvent) -> BroadPhasePairEvent {
-    match event {
-        PairEvent::Add(pair) => BroadPhasePairEvent::AddPair(to_pair(pair)),
-        PairEvent::Delete(pair) => BroadPhasePairEvent::DeletePair(to_pair(pair)),
-    }
-}
+pbig_adapter::methods!(PbigBroadPhase);
 
 impl BroadPhase for PbigBroadPhase {
     fn update(

@@ -1,7 +1,7 @@
 //! Draws the broad phase through rapier's debug renderer.
 
 use crate::PbigBroadPhase;
-use crate::scene::to_collider;
+use crate::scene::to_handle;
 use crate::tree::to_tree;
 use pbig_adapter::DebugRenderParts;
 use rapier3d::parry::bounding_volume::Aabb as DrawnAabb;
@@ -18,8 +18,8 @@ impl PbigBroadPhase {
         parts: DebugRenderParts,
         backend: &mut dyn DebugRenderBackend,
     ) {
-        for drawn in self.colliders.drawn(parts, |handle| colliders.contains(to_collider(handle))) {
-            let (handle, aabb) = (to_collider(drawn.collider), to_tree(&drawn.aabb));
+        for drawn in self.colliders.drawn(parts, |handle| colliders.contains(to_handle(handle))) {
+            let (handle, aabb) = (to_handle(drawn.collider), to_tree(&drawn.aabb));
             let object = DebugRenderObject::ColliderAabb(handle, &colliders[handle], &aabb);
             if backend.filter_object(object) {
                 let edges = DrawnAabb::EDGES_VERTEX_IDS.map(|(a, b)| [a as u32, b as u32]);

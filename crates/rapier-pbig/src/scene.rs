@@ -6,8 +6,8 @@ use pbig_adapter::policy::COLLIDERS_PER_BLOCK;
 use pbig_adapter::{BodyKind, Groups, Handle, Proxy, Scene, size_class};
 use pbig_core::{Aabb, ProxyFilter, TestMode};
 use rapier3d::prelude::{
-    Collider, ColliderHandle, IntegrationParameters, InteractionGroups, Isometry, Point, Real, RigidBody,
-    RigidBodySet, RigidBodyType, Shape, TypedShape,
+    BroadPhasePairEvent, Collider, ColliderHandle, ColliderPair, IntegrationParameters, InteractionGroups,
+    Isometry, Point, Real, RigidBody, RigidBodySet, RigidBodyType, Shape, TypedShape,
 };
 use std::ops::Range;
 
@@ -120,13 +120,7 @@ pub(crate) fn groups_of(groups: InteractionGroups) -> Groups {
     Groups { memberships: groups.memberships.bits(), mask: groups.filter.bits(), mode: TestMode::And }
 }
 
-pub(crate) fn handle(handle: ColliderHandle) -> Handle {
-    handle.into_raw_parts().into()
-}
-
-pub(crate) fn to_collider(handle: Handle) -> ColliderHandle {
-    ColliderHandle::from_raw_parts(handle.index, handle.generation)
-}
+pbig_adapter::conversions!();
 
 impl Call<'_> {
     /// Calls `take` with each of these colliders and its proxy, in the order of the list.
@@ -169,7 +163,7 @@ impl Scene for Call<'_> {
     }
 
     fn size(&self, handle: Handle) -> u8 {
-        let shape = self.colliders.get(to_collider(handle)).map(Collider::shape);
+        let shape = self.colliders.get(to_handle(handle)).map(Collider::shape);
         shape.map_or(0, |shape| size_class(shape.compute_local_aabb().half_extents().max()))
     }
 }

@@ -1,7 +1,7 @@
 //! Draws the broad phase through rapier's debug renderer.
 
 use crate::PbigFinder;
-use crate::finder::to_handle;
+use crate::scene::to_handle;
 use crate::tree::to_tree;
 use pbig_adapter::DebugRenderParts;
 use rapier::math::{Pose, Vector};

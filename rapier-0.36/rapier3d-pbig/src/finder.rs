@@ -1,9 +1,9 @@
 //! `PbigFinder`: translates rapier's calls into calls of the core.
 
-use crate::scene::{Call, handle, own_margin};
+use crate::scene::{Call, handle, own_margin, to_event, to_handle, to_pair};
 use crate::tree::{ParryTree, from_tree, spatial, to_tree};
 use crate::{Bounds, PairFinder, PbigConfig, SceneQuery, to_f32};
-use pbig_adapter::{Bounds as _, Colliders, Error, HandlePair, PairDevice, PairEvent, Stats, Why};
+use pbig_adapter::{Bounds as _, Colliders, HandlePair, Why};
 use rapier::math::Real;
 use rapier::parry::bounding_volume::Aabb as TreeAabb;
 use rapier::parry::partitioning::Bvh;
@@ -27,56 +27,8 @@ impl Default for PbigFinder {
 }
 
 impl PbigFinder {
-    /// Creates an empty finder.
-    ///
-    /// # Errors
-    /// [`Error::Margin`].
-    pub fn with_config(config: PbigConfig) -> Result<Self, Error> {
-        pbig_core::BroadPhase::new(config.into()).map(Self::around)
-    }
-
-    /// As [`PbigFinder::with_config`], on a given device. [`pbig_core::Backend::Device`] always uses it.
-    /// [`pbig_core::Backend::Auto`] uses it for large changes, unless it is software.
-    ///
-    /// # Errors
-    /// [`Error::Margin`].
-    pub fn with_device(config: PbigConfig, device: Box<dyn PairDevice>) -> Result<Self, Error> {
-        pbig_core::BroadPhase::with_device(config.into(), device).map(Self::around)
-    }
-
-    /// Uses this device in later updates, in place of the one in use.
-    pub fn set_device(&mut self, device: Box<dyn PairDevice>) {
-        self.colliders.set_device(device);
-    }
-
-    /// Returns the name of the device in use.
-    pub fn device_name(&self) -> Option<&str> {
-        self.colliders.core().device_name()
-    }
-
     fn around(core: pbig_core::BroadPhase) -> Self {
         Self { relative_margin: core.config().margin, colliders: Colliders::new(core) }
-    }
-
-    /// Returns the counts of the last update.
-    pub fn stats(&self) -> Stats<'_> {
-        self.colliders.stats()
-    }
-
-    /// Returns the error of the last update, or `None` if it succeeded. If pairs could not be found, no events were sent, and
-    /// the next update sees the same changes again. If a box could not be stored, the next update reads all colliders.
-    pub fn last_error(&self) -> Option<&Error> {
-        self.colliders.last_error()
-    }
-
-    /// Returns the number of pairs that rapier knows of.
-    pub fn pair_count(&self) -> usize {
-        self.colliders.pair_count()
-    }
-
-    /// Returns the pairs that rapier knows of, in no particular order.
-    pub fn pairs(&self) -> impl Iterator<Item = ColliderPair> {
-        self.colliders.pairs().map(to_pair)
     }
 
     /// Returns why these two colliders are a pair since the last update, or the first test that they fail.
@@ -84,6 +36,8 @@ impl PbigFinder {
         self.colliders.why(handle(one), handle(other))
     }
 }
+
+pbig_adapter::methods!(PbigFinder);
 
 fn to_query(query: &SceneQuery) -> pbig_adapter::SceneQuery<Bounds, Real> {
     use pbig_adapter::SceneQuery as Query;
@@ -95,21 +49,6 @@ fn to_query(query: &SceneQuery) -> pbig_adapter::SceneQuery<Bounds, Real> {
         SceneQuery::Sweep(aabb, velocity, time) => Query::Sweep(from_tree(&aabb), spatial(velocity), time),
         SceneQuery::Near(point, distance) => Query::Near(spatial(point), distance),
         SceneQuery::Overlap(aabb) => Query::Overlap(from_tree(&aabb)),
-    }
-}
-
-pub(crate) fn to_handle(handle: pbig_adapter::Handle) -> ColliderHandle {
-    ColliderHandle::from_raw_parts(handle.index, handle.generation)
-}
-
-fn to_pair(HandlePair(a, b): HandlePair) -> ColliderPair {
-    ColliderPair::new(to_handle(a), to_handle(b))
-}
-
-fn to_event(event: PairEvent) -> BroadPhasePairEvent {
-    match event {
-        PairEvent::Add(pair) => BroadPhasePairEvent::AddPair(to_pair(pair)),
-        PairEvent::Delete(pair) => BroadPhasePairEvent::DeletePair(to_pair(pair)),
     }
 }
 

@@ -1,6 +1,5 @@
 //! Shows rapier's colliders to the part of the broad phase that knows no rapier.
 
-use crate::finder::to_handle;
 use crate::tree::from_tree;
 use crate::{Bounds, to_f32};
 use pbig_adapter::{BodyKind, Bounds as _, Groups, Handle, Proxy, ProxyFilter, Scene, filter_of, size_class};
@@ -69,9 +68,7 @@ pub(crate) fn groups_of(groups: InteractionGroups) -> Groups {
     Groups { memberships: groups.memberships.bits(), mask: groups.filter.bits(), mode }
 }
 
-pub(crate) fn handle(handle: ColliderHandle) -> Handle {
-    handle.into_raw_parts().into()
-}
+pbig_adapter::conversions!();
 
 /// Returns the margin of rapier's `adaptive_change_detection_margin`: an eighth of the box's smallest extent, within limits.
 #[inline(always)]

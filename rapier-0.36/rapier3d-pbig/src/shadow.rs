@@ -4,7 +4,7 @@
 
 pub use pbig_adapter::shadow::{Checker, Difference, Fault, ReplayError, Shadow, Side, View, write_frames};
 
-use crate::scene::{Call, groups_of, handle};
+use crate::scene::{Call, groups_of, handle, of_events, to_handle};
 use crate::tree::from_tree;
 use crate::{Bounds, PairFinder, PbigFinder, SceneQuery, to_f32};
 use pbig_adapter::shadow::Watched;
@@ -89,7 +89,7 @@ impl<F> Shadowed<F> {
 
     fn watch(&mut self, call: &Call<'_>, events: &[BroadPhasePairEvent]) {
         let stock = self.update_stock(call);
-        let (events, removed) = (pair_events(events), removed(call));
+        let (events, removed) = (of_events(events), removed(call));
         let is_modified = std::mem::take(&mut self.has_moved) || !call.modified.is_empty();
         let relative = if call.adaptive_margin { crate::MAX_ADAPTIVE_MARGIN } else { self.relative_margin };
         let (margin, stock) = (relative * to_f32(call.params.length_unit), stock.as_deref());
@@ -111,7 +111,7 @@ impl<F> Shadowed<F> {
             }
             stock.update(params, colliders, bodies, modified, removed, &mut events);
         })?;
-        Some(pair_events(&events))
+        Some(of_events(&events))
     }
 
     /// Calls a function of stock. After a panic stock is dropped.
@@ -190,22 +190,13 @@ fn show_all(stock: &mut BroadPhaseBvh, call: &Call<'_>, events: &mut Vec<BroadPh
     stock.update(call.params, &colliders, call.bodies, &all, &[], events);
 }
 
-fn pair_events(events: &[BroadPhasePairEvent]) -> Vec<PairEvent> {
-    let pair = |pair: &ColliderPair| HandlePair(handle(pair.collider1), handle(pair.collider2));
-    let convert = |event: &BroadPhasePairEvent| match event {
-        BroadPhasePairEvent::AddPair(added) => PairEvent::Add(pair(added)),
-        BroadPhasePairEvent::DeletePair(deleted) => PairEvent::Delete(pair(deleted)),
-    };
-    events.iter().map(convert).collect()
-}
-
 fn removed(call: &Call<'_>) -> Vec<Handle> {
     call.removed.iter().map(|&removed| handle(removed)).collect()
 }
 
 impl Call<'_> {
     fn find(&self, wanted: Handle) -> Option<&Collider> {
-        self.colliders.get(ColliderHandle::from_raw_parts(wanted.index, wanted.generation))
+        self.colliders.get(to_handle(wanted))
     }
 
     fn find_enabled(&self, wanted: Handle) -> Option<&Collider> {

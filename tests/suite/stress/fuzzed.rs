@@ -7,13 +7,16 @@ use rand::{RngExt, SeedableRng};
 
 type Check = fn(&[u8]);
 
-const TARGETS: [(&str, Check); 6] = [
+const TARGETS: [(&str, Check); 9] = [
     ("finder_against_oracle", checks::finder_against_oracle),
+    ("between_against_oracle", checks::between_against_oracle),
     ("updates_against_scratch", checks::updates_against_scratch),
     ("work_is_bounded", checks::work_is_bounded),
     ("decode", checks::decode_words),
     ("npy_reader", checks::npy_reader),
     ("csv_reader", checks::csv_reader),
+    ("ply_reader", checks::ply_reader),
+    ("obj_reader", checks::obj_reader),
 ];
 
 /// Asserts that one allocation takes at most what a search needs to begin with, and 256 bytes for each byte of the input.

@@ -27,7 +27,7 @@ fn read(input: &mut Input, filtered: bool) -> (Vec<Aabb>, Vec<ProxyFilter>) {
 }
 
 /// Returns the settings of the finder. A forced engine takes a grid even for few boxes.
-fn config(settings: u8) -> Config {
+pub(super) fn config(settings: u8) -> Config {
     let base = Config { backend: Backend::Cpu, ..Config::DEFAULT };
     let grid = Config { engine: Some(Engine::Rebuild), ..base };
     match settings & 3 {

@@ -3,6 +3,7 @@
 //! The crate `tobj` numbers vertices anew for each object, and its errors name no line.
 
 use super::{Mesh, face};
+use crate::files::brief;
 use std::io::BufRead;
 
 pub(super) fn read(reader: impl BufRead) -> Result<Mesh, String> {
@@ -41,7 +42,7 @@ fn take(line: &str, mesh: &mut Mesh) -> Result<(), String> {
 }
 
 fn number(word: &str) -> Result<f64, String> {
-    word.parse().map_err(|_| format!("'{word}' is no number"))
+    word.parse().map_err(|_| format!("'{}' is no number", brief(word)))
 }
 
 /// Returns the vertex of `vertex/texture/normal`: counted from 1, or backwards from the last one with -1.
@@ -49,5 +50,5 @@ fn corner(word: &str, vertices: usize) -> Result<u32, String> {
     let number = word.split('/').next().and_then(|vertex| vertex.parse::<i64>().ok());
     let index = number
         .and_then(|number| if number < 0 { vertices as i64 + number } else { number - 1 }.try_into().ok());
-    index.ok_or_else(|| format!("'{word}' is no vertex"))
+    index.ok_or_else(|| format!("'{}' is no vertex", brief(word)))
 }

@@ -61,6 +61,11 @@ fn a_failed_update_says_why_and_the_next_sees_its_changes() {
         (events, error, broad_phase.stats().totals.failures, broad_phase.pair_count())
     };
     let too_many = || Some(Error::TooManyPairs { limit: 3 });
+    let text = too_many().map(|error| error.to_string()).unwrap_or_default();
+    assert!(
+        text.contains("than max_pairs = 3"),
+        "{text}: the setting's name, without a type that an app lacks"
+    );
     assert_eq!(call(&handles, &[]), (0, too_many(), 1, 0), "11 pairs");
     assert_eq!(call(&[], &[]), (0, too_many(), 2, 0), "still");
     // Rapier lists disabled colliders as removed.

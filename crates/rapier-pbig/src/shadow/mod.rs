@@ -9,9 +9,9 @@ pub use crate::call::Call;
 pub use pbig_adapter::shadow::{Checker, Difference, Fault, ReplayError, Shadow, Side, View, write_frames};
 
 use crate::PbigBroadPhase;
-use crate::scene::handle;
+use crate::scene::{handle, of_events, of_pair};
 use pbig_adapter::shadow::Watched;
-use pbig_adapter::{Handle, HandlePair, PairEvent};
+use pbig_adapter::{Handle, HandlePair};
 use rapier3d::prelude::*;
 use scene::SceneView;
 use stock::Stock;
@@ -105,18 +105,6 @@ impl Watcher {
             stock: stock.as_deref(),
         });
     }
-}
-
-fn of_pair(pair: &ColliderPair) -> HandlePair {
-    HandlePair(handle(pair.collider1), handle(pair.collider2))
-}
-
-fn of_events(events: &[BroadPhasePairEvent]) -> Vec<PairEvent> {
-    let of = |event: &BroadPhasePairEvent| match event {
-        BroadPhasePairEvent::AddPair(pair) => PairEvent::Add(of_pair(pair)),
-        BroadPhasePairEvent::DeletePair(pair) => PairEvent::Delete(of_pair(pair)),
-    };
-    events.iter().map(of).collect()
 }
 
 #[cfg(test)]

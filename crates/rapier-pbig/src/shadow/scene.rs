@@ -1,7 +1,7 @@
 //! Computes what a broad phase should see of a world, through rapier's own functions.
 
 use super::{Call, Side, View};
-use crate::scene::{groups_of, handle, kind_of, to_collider};
+use crate::scene::{groups_of, handle, kind_of, to_handle};
 use pbig_adapter::{Handle, HandlePair};
 use pbig_core::Aabb;
 use rapier3d::parry::bounding_volume::BoundingVolume;
@@ -23,7 +23,7 @@ impl<'a> SceneView<'a> {
     }
 
     fn find(&self, wanted: Handle) -> Option<&Collider> {
-        self.colliders.get(to_collider(wanted)).filter(|collider| collider.is_enabled())
+        self.colliders.get(to_handle(wanted)).filter(|collider| collider.is_enabled())
     }
 
     /// Returns the pose that soft CCD predicts for a listed collider, if it is within the prediction distance: beyond, rapier
@@ -52,7 +52,7 @@ impl View for SceneView<'_> {
     }
 
     fn side(&self, wanted: Handle) -> Option<Side> {
-        let collider = self.colliders.get(to_collider(wanted))?;
+        let collider = self.colliders.get(to_handle(wanted))?;
         let body = collider.parent().and_then(|parent| self.bodies.get(parent));
         Some(Side {
             aabb: self.aabb(wanted),
@@ -66,8 +66,7 @@ impl View for SceneView<'_> {
     fn aabb(&self, wanted: Handle) -> Option<Aabb> {
         let collider = self.find(wanted)?;
         let mut aabb = collider.compute_aabb();
-        if let Some(predicted) =
-            self.predicted(collider).filter(|_| self.listed.contains(&to_collider(wanted)))
+        if let Some(predicted) = self.predicted(collider).filter(|_| self.listed.contains(&to_handle(wanted)))
         {
             aabb.merge(&collider.shape().compute_aabb(&predicted));
         }

@@ -1,0 +1,145 @@
+//! Code that is the same in each adapter but for rapier's types, which are those of the place where a macro is called.
+
+/// Defines `PbigConfig`, the settings of an adapter, with the margin of its rapier's own broad phase.
+#[macro_export]
+macro_rules! settings {
+    ($(#[$about:meta])* pub struct PbigConfig { $(#[$about_margin:meta])* margin: $margin:expr }) => {
+        $(#[$about])*
+        /// A later version may have more settings: end with `..PbigConfig::DEFAULT`.
+        #[derive(Clone, Copy, Debug, PartialEq)]
+        pub struct PbigConfig {
+            /// The distance by which a stored AABB is larger than its collider's, in units of rapier's `length_unit`. A larger
+            /// margin means that fewer colliders count as moved, and that more pairs are reported that do not touch yet.
+            $(#[$about_margin])*
+            pub margin: f32,
+            /// The processor that searches for pairs.
+            pub backend: pbig_core::Backend,
+            /// Maximum number of pairs. An update that would have more sends no events, and `last_error` returns the error; the
+            /// next update sees the same changes again. The default is the largest number that the core can keep: rapier has
+            /// no limit.
+            pub max_pairs: u64,
+        }
+
+        impl PbigConfig {
+            /// The default settings.
+            pub const DEFAULT: Self = Self {
+                margin: $margin,
+                backend: pbig_core::Backend::Auto,
+                max_pairs: pbig_core::Limits::UNLIMITED.max_pairs,
+            };
+        }
+
+        impl Default for PbigConfig {
+            fn default() -> Self {
+                Self::DEFAULT
+            }
+        }
+
+        impl From<PbigConfig> for pbig_core::Config {
+            fn from(PbigConfig { margin, backend, max_pairs }: PbigConfig) -> Self {
+                let limits = pbig_core::Limits { max_pairs, ..pbig_core::Limits::UNLIMITED };
+                Self { margin, backend, limits, ..Self::DEFAULT }
+            }
+        }
+    };
+}
+
+/// Implements the methods that need no more than [`crate::Colliders`], for a type with a field `colliders` and a function
+/// `around` that makes one of a core.
+#[macro_export]
+macro_rules! methods {
+    ($Type:ident) => {
+        impl $Type {
+            /// Creates an empty one.
+            ///
+            /// # Errors
+            /// [`crate::Error::Margin`].
+            pub fn with_config(config: PbigConfig) -> Result<Self, $crate::Error> {
+                pbig_core::BroadPhase::new(config.into()).map(Self::around)
+            }
+
+            /// As [`Self::with_config`], on a given device. [`pbig_core::Backend::Device`] always uses it.
+            /// [`pbig_core::Backend::Auto`] uses it for large changes, unless it is software.
+            ///
+            /// # Errors
+            /// [`crate::Error::Margin`].
+            pub fn with_device(
+                config: PbigConfig,
+                device: Box<dyn $crate::PairDevice>,
+            ) -> Result<Self, $crate::Error> {
+                pbig_core::BroadPhase::with_device(config.into(), device).map(Self::around)
+            }
+
+            /// Uses this device in later updates, in place of the one in use. What is restored from a snapshot has none.
+            pub fn set_device(&mut self, device: Box<dyn $crate::PairDevice>) {
+                self.colliders.set_device(device);
+            }
+
+            /// Returns the name of the device in use.
+            pub fn device_name(&self) -> Option<&str> {
+                self.colliders.core().device_name()
+            }
+
+            /// Returns the counts of the last update.
+            pub fn stats(&self) -> $crate::Stats<'_> {
+                self.colliders.stats()
+            }
+
+            /// Returns the error of the last update, or `None` if it succeeded. If pairs could not be found, no events were sent,
+            /// and the next update sees the same changes again. If a box could not be stored, the next update reads all colliders.
+            pub fn last_error(&self) -> Option<&$crate::Error> {
+                self.colliders.last_error()
+            }
+
+            /// Returns the number of pairs that rapier knows of. Adopted pairs count after the next update.
+            pub fn pair_count(&self) -> usize {
+                self.colliders.pair_count()
+            }
+
+            /// Returns the pairs that rapier knows of, sorted by the two indices; the collider with the smaller shape comes first
+            /// in each, then the lower index. Adopted pairs are included after the next update.
+            pub fn pairs(&self) -> impl Iterator<Item = ColliderPair> {
+                self.colliders.pairs().map(to_pair)
+            }
+        }
+    };
+}
+
+/// Defines the conversions between rapier's handles, pairs and events and those of this crate.
+#[macro_export]
+macro_rules! conversions {
+    () => {
+        pub(crate) fn handle(handle: ColliderHandle) -> $crate::Handle {
+            handle.into_raw_parts().into()
+        }
+
+        pub(crate) fn to_handle(handle: $crate::Handle) -> ColliderHandle {
+            ColliderHandle::from_raw_parts(handle.index, handle.generation)
+        }
+
+        pub(crate) fn to_pair($crate::HandlePair(a, b): $crate::HandlePair) -> ColliderPair {
+            ColliderPair::new(to_handle(a), to_handle(b))
+        }
+
+        pub(crate) fn to_event(event: $crate::PairEvent) -> BroadPhasePairEvent {
+            match event {
+                $crate::PairEvent::Add(pair) => BroadPhasePairEvent::AddPair(to_pair(pair)),
+                $crate::PairEvent::Delete(pair) => BroadPhasePairEvent::DeletePair(to_pair(pair)),
+            }
+        }
+
+        #[cfg(feature = "shadow")]
+        pub(crate) fn of_pair(pair: &ColliderPair) -> $crate::HandlePair {
+            $crate::HandlePair(handle(pair.collider1), handle(pair.collider2))
+        }
+
+        #[cfg(feature = "shadow")]
+        pub(crate) fn of_events(events: &[BroadPhasePairEvent]) -> Vec<$crate::PairEvent> {
+            let of = |event: &BroadPhasePairEvent| match event {
+                BroadPhasePairEvent::AddPair(pair) => $crate::PairEvent::Add(of_pair(pair)),
+                BroadPhasePairEvent::DeletePair(pair) => $crate::PairEvent::Delete(of_pair(pair)),
+            };
+            events.iter().map(of).collect()
+        }
+    };
+}
