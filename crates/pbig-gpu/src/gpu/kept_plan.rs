@@ -63,7 +63,7 @@ mod tests {
 
     fn kept(boxes: usize) -> KeptPlan {
         let cubes: Vec<_> = (0..boxes).map(|i| Aabb::from_center([i as f32, 0.0, 0.0], [0.5; 3])).collect();
-        KeptPlan::new(GpuPlan::new(&Summary::of(&cubes), &GpuOptions::DEFAULT, 1.0, 1 << 20), boxes, 0)
+        KeptPlan::new(GpuPlan::new(&Summary::of(&cubes), &GpuOptions::DEFAULT, 1 << 20), boxes, 0)
     }
 
     fn counted(valid: u32, entries: u32, tests: u32) -> Counters {

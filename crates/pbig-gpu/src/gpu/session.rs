@@ -51,8 +51,6 @@ pub(super) struct Session {
     pub(super) timestamps: [Option<Timestamps>; 2],
     pub(super) sizes: Sizes,
     pub(super) plan: Option<KeptPlan>,
-    /// Factor on the cells of a new plan: below 1 if this job's first plan made too many tests.
-    pub(super) cell_factor: f32,
     /// Number of boxes of a set that needed parts, and of its parts, until the next window of [`Storage::end_call`].
     pub(super) split: Option<(usize, usize)>,
     /// This job searches for changes instead of all overlaps.
@@ -75,7 +73,6 @@ impl Session {
             timestamps: [Timestamps::new(&device, options)?, Timestamps::new(&device, options)?],
             sizes: Sizes::default(),
             plan: None,
-            cell_factor: 1.0,
             split: None,
             finds_changes: false,
             has_pending_changes: false,
@@ -173,10 +170,9 @@ impl Session {
     pub(super) fn add_plan(&mut self, job: &Job<'_>) -> Result<(), GpuError> {
         if job.needs_grid(&self.options) {
             self.plan.take_if(|kept| !kept.suits(job.boxes.len()));
-            let (options, factor, max_bytes) =
-                (&self.options, self.cell_factor, self.storage.max_buffer_bytes);
+            let (options, max_bytes) = (&self.options, self.storage.max_buffer_bytes);
             let report = &mut self.sink.found.report;
-            let kept = self.plan.get_or_insert_with(|| new_plan(job, (options, factor), max_bytes, report));
+            let kept = self.plan.get_or_insert_with(|| new_plan(job, options, max_bytes, report));
             check_entries(kept, self.params.boxes)?;
             self.params = kept.plan.add_to(self.params);
             self.params.most_tests = kept.most_tests(self.params.boxes, options.boxes_per_cell);
@@ -203,15 +199,10 @@ impl Session {
     }
 }
 
-fn new_plan(
-    job: &Job<'_>,
-    (options, cell_factor): (&GpuOptions, f32),
-    max_bytes: u64,
-    report: &mut DeviceReport,
-) -> KeptPlan {
+fn new_plan(job: &Job<'_>, options: &GpuOptions, max_bytes: u64, report: &mut DeviceReport) -> KeptPlan {
     let mut clock = Clock::start();
     let summary = Summary::of(&job.bounds());
-    let plan = GpuPlan::new(&summary, options, cell_factor, (max_bytes / 8).min(MAX_CELLS) as u32);
+    let plan = GpuPlan::new(&summary, options, (max_bytes / 8).min(MAX_CELLS) as u32);
     report.plan += clock.lap();
     KeptPlan::new(plan, job.boxes.len(), summary.pairs())
 }
