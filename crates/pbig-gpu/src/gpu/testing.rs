@@ -43,7 +43,7 @@ impl GpuFinder {
 
     /// Returns the number of query sets that the finder holds.
     pub fn query_sets(&self) -> usize {
-        self.session.iter().flat_map(|session| &session.timestamps).flatten().count()
+        self.session.iter().filter_map(|session| session.timestamps.as_ref()).count()
     }
 
     /// Runs `work` on the device, and returns errors that wgpu reports meanwhile.
