@@ -8,7 +8,7 @@
 
 use pbig_core::{Aabb, Checks, Error, Limits, Pair};
 use pbig_gpu::GpuOptions;
-use pbig_gpu::pbig::{Summary, cell_size, cells_along, cells_in, ordinary, space_of};
+use pbig_gpu::pbig::{Summary, cells_along, cells_in, density_cell, ordinary, pbig_cell, space_of};
 use pbig_harness::pair_index::{pair_count, pair_of, row_len, row_pair};
 
 /// Maximum number of cells per box. With more cells, empty cells cost more than full ones.
@@ -16,6 +16,15 @@ const MAX_CELLS_PER_BOX: f64 = 4.0;
 
 /// Maximum number of cells that a box may touch. A box that touches more is tested against all others.
 const MAX_TOUCHED_CELLS: u64 = 512;
+
+/// The rule that turns [`GpuOptions::boxes_per_cell`] into a cell size.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum CellRule {
+    /// PBIG's equation 6: the smallest cell with that many entries on average.
+    Objective,
+    /// Avril's section 4.1: the cell that holds this number of boxes at the density of the space. Sizes do not matter.
+    Density,
+}
 
 /// The grid of [`pbig_grid`]: one entry for each cell that a box touches.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -29,13 +38,15 @@ pub(crate) struct PbigPlan {
 }
 
 impl PbigPlan {
-    /// Plans the grid for the boxes behind `summary`, with the cell size by [`GpuOptions::cell_rule`] and
-    /// [`GpuOptions::boxes_per_cell`].
-    pub(crate) fn new(summary: &Summary, options: &GpuOptions) -> Self {
+    /// Plans the grid for the boxes behind `summary`, with the cell size by the rule and [`GpuOptions::boxes_per_cell`].
+    pub(crate) fn new(summary: &Summary, options: &GpuOptions, rule: CellRule) -> Self {
         let sample = ordinary(summary);
         let (space, origin) = space_of(summary, &sample);
-        let n = summary.valid;
-        let mut cell = cell_size(options.cell_rule, &sample, n, space, options.boxes_per_cell.max(1.0));
+        let (n, wanted) = (summary.valid, options.boxes_per_cell.max(1.0));
+        let mut cell = match rule {
+            CellRule::Objective => pbig_cell(&sample, n, space, wanted),
+            CellRule::Density => density_cell(n, space, wanted),
+        };
         // Oversize boxes in the sample raise alpha, and with it f, at any cell size. Equation 6 would then have a billion
         // cells for a handful of boxes.
         while cells_in(space, cell) > f64::from(n.max(64)) * MAX_CELLS_PER_BOX {
@@ -63,16 +74,16 @@ pub(crate) struct PbigFound {
 
 /// Finds all overlapping pairs with PBIG's grid, on one thread.
 ///
-/// It uses the options `cell_rule`, `boxes_per_cell` and `small_cell`.
+/// It uses the options `boxes_per_cell` and `small_cell`.
 ///
 /// # Errors
 /// [`Error::TooManyBoxes`] and [`Error::TooManyPairs`], by [`Limits::DEFAULT`].
-pub(crate) fn pbig_grid(boxes: &[Aabb], options: &GpuOptions) -> Result<PbigFound, Error> {
+pub(crate) fn pbig_grid(boxes: &[Aabb], options: &GpuOptions, rule: CellRule) -> Result<PbigFound, Error> {
     let limit = Limits::DEFAULT.max_boxes;
     if boxes.len() as u64 > limit {
         return Err(Error::TooManyBoxes { boxes: boxes.len() as u64, limit });
     }
-    let plan = PbigPlan::new(&Summary::of(boxes), options);
+    let plan = PbigPlan::new(&Summary::of(boxes), options, rule);
     let grid = PbigGrid::new(&plan, boxes);
     let mut found = PbigFound { pairs: Vec::new(), checks: Checks::default(), plan };
     for key in 0..grid.offsets.len() - 1 {
@@ -212,8 +223,7 @@ impl PbigFound {
 mod tests {
     use super::*;
     use pbig_core::oracle;
-    use pbig_gpu::CellRule;
-    use pbig_gpu::pbig::{density_cell, pbig_cell, pbig_objective};
+    use pbig_gpu::pbig::pbig_objective;
     use pbig_harness::corpus::corpus;
 
     fn boxes() -> Vec<Aabb> {
@@ -229,11 +239,11 @@ mod tests {
     /// Compares the pairs and the counts of tests with the oracle, for all options.
     fn check(boxes: &[Aabb], name: &str) {
         let wanted = oracle::pairs(boxes);
-        for cell_rule in [CellRule::Objective, CellRule::Density] {
+        for rule in [CellRule::Objective, CellRule::Density] {
             for (boxes_per_cell, small_cell) in [(1.0, 32), (4.0, 1), (32.0, 0), (4.0, u32::MAX)] {
-                let options = GpuOptions { cell_rule, boxes_per_cell, small_cell, ..GpuOptions::DEFAULT };
-                let found = pbig_grid(boxes, &options).expect("few boxes");
-                assert_eq!(found.pairs, wanted, "{name}, {cell_rule:?}, {boxes_per_cell}, {small_cell}");
+                let options = GpuOptions { boxes_per_cell, small_cell, ..GpuOptions::DEFAULT };
+                let found = pbig_grid(boxes, &options, rule).expect("few boxes");
+                assert_eq!(found.pairs, wanted, "{name}, {rule:?}, {boxes_per_cell}, {small_cell}");
                 let Checks { made, unnecessary, redundant, .. } = found.checks;
                 assert_eq!(made, unnecessary + redundant + wanted.len() as u64, "{name}, {:?}", found.plan);
             }
@@ -252,7 +262,7 @@ mod tests {
         let mut boxes: Vec<Aabb> = (0..999).map(|i| Aabb::from_center(at(i), [0.5; 3])).collect();
         for half in [1e3, 1e6, 0.5 * f32::MAX] {
             boxes.push(Aabb::from_center([0.0; 3], [half; 3]));
-            let plan = PbigPlan::new(&Summary::of(&boxes), &GpuOptions::DEFAULT);
+            let plan = PbigPlan::new(&Summary::of(&boxes), &GpuOptions::DEFAULT, CellRule::Objective);
             assert!(plan.cell < 10.0, "ground of {half}: {plan:?}");
         }
     }

@@ -9,7 +9,7 @@ use pbig_core::{
     Aabb, Backend, ChangeRequest, Config, DeviceFailure, DeviceFound, DeviceReport, Finder, NoDevice, Order,
     Pair, PairDevice, ProxyFilter, SearchRequest,
 };
-use pbig_gpu::{Coding, GpuFinder, GpuOptions, adapters};
+use pbig_gpu::{Coding, GpuFinder, GpuFinders, GpuOptions, adapters};
 use pbig_tests::{Way, difference, gpu, needs_gpu};
 use std::pin::pin;
 use std::task::{Context, Poll, Waker};
@@ -90,6 +90,26 @@ fn sets_beyond_the_limits_of_a_device_are_split_and_complete() {
         let [found, wanted] = [with(options).finder(), Finder::default()]
             .map(|mut finder| finder.find_filtered(&boxes, &filters).expect("within the limits").to_vec());
         assert!(!wanted.is_empty() && found == wanted, "{name}, filtered");
+    }
+}
+
+/// Contract: the limit of pairs is that of the call, not of its parts.
+#[test]
+fn parts_of_a_call_share_its_limit_of_pairs() {
+    needs_gpu!();
+    let boxes = set("uniform", 70_000);
+    let all = on_cpu(&boxes).len() as u64;
+    let adapter = adapters().into_iter().next().expect("an adapter");
+    let small = GpuOptions { max_bytes: 1 << 20, ..GpuOptions::DEFAULT };
+    let one = GpuFinder::on(&adapter).expect("a device").with_options(small);
+    let two = GpuFinders::on_all(&[adapter.clone(), adapter]).expect("devices");
+    for mut device in [Box::new(one) as Box<dyn PairDevice>, Box::new(two)] {
+        for (max_pairs, wanted) in [(all, Ok(())), (all - 1, Err(DeviceFailure::TooManyPairs))] {
+            let request = SearchRequest { boxes: &boxes, filters: None, is_sorted: false, max_pairs };
+            let mut found = DeviceFound::default();
+            assert_eq!(device.find_all(&request, &mut found), wanted);
+            assert!(wanted.is_err() || found.report.parts > 1, "{} parts", found.report.parts);
+        }
     }
 }
 

@@ -97,6 +97,7 @@ pub use report::{Checks, DeviceReport, Report, StageTimes, WORK_LIMIT};
 /// Items for the other crates of pbig. They may change in any release.
 #[doc(hidden)]
 pub mod internal {
+    pub use crate::grid::bounds::{SizeClass, SizeClasses, size_class_of, size_classes, spread_evenly};
     #[cfg(all(target_family = "wasm", target_os = "unknown"))]
     pub use crate::page_clock::set_clock;
     pub use crate::parallel::{SharedSlice, map, run, threads_for};

@@ -40,7 +40,9 @@ pub fn plain(words: &[u32], boxes: u32, is_sorted: bool, pairs: &mut Vec<Pair>) 
         let copied = copy_into(unsafe { places.part(at..at + piece.len()) }, piece);
         let before = i.checked_sub(1).and_then(|i| pieces[i].last());
         let is_in_order = || copied.is_sorted_by(|a, b| a < b) && before < copied.first();
-        are_pairs(copied, boxes) && (!is_sorted || is_in_order())
+        // Without an early end, so that the compiler uses SIMD.
+        let are_pairs = copied.iter().fold(true, |all, pair| all & (pair.a < pair.b) & (pair.b < boxes));
+        are_pairs && (!is_sorted || is_in_order())
     });
     // SAFETY: as many pairs were reserved, and written.
     unsafe { pairs.set_len(start + given.len()) };
@@ -57,17 +59,16 @@ fn copy_into<'a>(place: &'a mut [MaybeUninit<Pair>], pairs: &[Pair]) -> &'a [Pai
     unsafe { std::slice::from_raw_parts(place.as_ptr().cast(), place.len()) }
 }
 
-fn are_pairs(piece: &[Pair], boxes: u32) -> bool {
-    // Without an early end, so that the compiler uses SIMD.
-    piece.iter().fold(true, |all, pair| all & (pair.a < pair.b) & (pair.b < boxes))
-}
-
 /// Returns the error of a piece whose first word is `at`.
 fn fault_of(piece: &[Pair], boxes: u32, at: usize) -> DecodeError {
-    match piece.iter().position(|pair| pair.a >= pair.b || pair.b >= boxes) {
-        Some(i) => DecodeError { what: "not a < b < boxes", at: at + 2 * i },
-        None => DecodeError { what: "pairs out of order", at },
-    }
+    let fault = (at..).step_by(2).zip(piece).find_map(|(at, pair)| checked(*pair, boxes, at).err());
+    fault.unwrap_or(DecodeError { what: "pairs out of order", at })
+}
+
+/// Returns the pair at a word, or an error if it is none.
+fn checked(pair: Pair, boxes: u32, at: usize) -> Result<Pair, DecodeError> {
+    let is_pair = pair.a < pair.b && pair.b < boxes;
+    is_pair.then_some(pair).ok_or(DecodeError { what: "not a < b < boxes", at })
 }
 
 fn whole_pairs(words: &[u32]) -> Result<&[Pair], DecodeError> {
@@ -88,15 +89,11 @@ pub fn events(
 ) -> Result<(), DecodeError> {
     let mut last = None;
     for (i, &Pair { a, b: marked }) in whole_pairs(words)?.iter().enumerate() {
-        let b = marked & !ENDED;
-        if a >= b || b >= boxes {
-            return Err(DecodeError { what: "not a < b < boxes", at: 2 * i });
-        }
-        if is_sorted && last.replace(Pair { a, b }) >= Some(Pair { a, b }) {
+        let pair = checked(Pair { a, b: marked & !ENDED }, boxes, 2 * i)?;
+        if is_sorted && last.replace(pair) >= Some(pair) {
             return Err(DecodeError { what: "pairs out of order", at: 2 * i });
         }
-        let list = if b == marked { &mut *added } else { &mut *ended };
-        list.push(Pair { a, b });
+        if pair.b == marked { added.push(pair) } else { ended.push(pair) }
     }
     Ok(())
 }
@@ -121,11 +118,6 @@ pub fn records(words: &[u32], entries: &[u32], boxes: u32, pairs: &mut Vec<Pair>
         pairs.append(&mut piece?);
     }
     Ok(())
-}
-
-/// Returns the number of words of a row with this number of partners.
-fn row_len(partners: usize) -> usize {
-    (partners + 2).div_ceil(4)
 }
 
 /// Cuts the words between records into pieces of about [`PIECE`] words.
@@ -164,11 +156,8 @@ impl Reader<'_> {
         let end = self.at + record_len(first);
         if first & PLAIN != 0 {
             for i in (self.at + 1..end).step_by(2) {
-                let (a, b) = (self.words[i], self.words[i + 1]);
-                if a >= b || b >= self.boxes {
-                    return Err(DecodeError { what: "not a < b < boxes", at: i });
-                }
-                self.pairs.push(Pair { a, b });
+                let pair = Pair { a: self.words[i], b: self.words[i + 1] };
+                self.pairs.push(checked(pair, self.boxes, i)?);
             }
             self.at = end;
             return Ok(());
@@ -190,7 +179,8 @@ impl Reader<'_> {
         let at = self.at;
         let [row, more, ..] = self.words[at].to_le_bytes();
         let partners = usize::from(more) + 1;
-        self.at += row_len(partners);
+        // The place, the number of partners and each partner take a byte.
+        self.at += (partners + 2).div_ceil(4);
         if self.at > end {
             return Err(DecodeError { what: "a row is cut off", at });
         }

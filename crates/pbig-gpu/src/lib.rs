@@ -45,4 +45,4 @@ pub use gpu::GpuFinders;
 pub use gpu::testing;
 #[cfg(feature = "wgpu")]
 pub use gpu::{GpuError, GpuFinder, adapters, describe};
-pub use options::{CellRule, Coding, GpuOptions};
+pub use options::{Coding, GpuOptions};

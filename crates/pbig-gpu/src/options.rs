@@ -2,17 +2,6 @@
 
 use std::time::Duration;
 
-/// The rule by which the GPU turns [`GpuOptions::boxes_per_cell`] into a cell size.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum CellRule {
-    /// PBIG's equation 6: the smallest cell with that many entries on average. A box has an entry in every cell that it
-    /// touches.
-    #[default]
-    Objective,
-    /// Avril's section 4.1: the cell that holds this number of boxes at the density of the space. Sizes do not matter.
-    Density,
-}
-
 /// The coding of the GPU's output (docs/PAIR_FORMAT.md).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Coding {
@@ -51,8 +40,6 @@ pub struct GpuOptions {
     /// Wanted boxes per cell: PBIG's `W` in the constraint `f >= W` of equation 6. More boxes make larger cells. The paper
     /// takes a warp, 32.
     pub boxes_per_cell: f32,
-    /// Rule that turns the wanted boxes per cell into a cell size.
-    pub cell_rule: CellRule,
     /// Maximum number of boxes of a cell, up to 256, whose pairs are tested through Avril's mapping. Larger cells are
     /// tested by PBIG's balanced rows.
     pub small_cell: u32,
@@ -79,7 +66,6 @@ impl GpuOptions {
         patience: Duration::from_secs(30),
         pause: Duration::from_secs(5),
         boxes_per_cell: 4.0,
-        cell_rule: CellRule::Objective,
         small_cell: 96,
         all_pairs_up_to: 1024,
         count_tests: false,

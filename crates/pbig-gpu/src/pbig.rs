@@ -1,41 +1,23 @@
 //! Planning of PBIG's grid: statistics of the boxes, and cell sizes by PBIG's equations 2 to 6 (Lo et al. 2013, section
 //! 4.1) or by Avril's density rule (Avril et al. 2012, section 4.1).
 
-use crate::CellRule;
-use pbig_core::{Aabb, internal as parallel};
-
-/// The boxes whose largest extent lies within one power of two.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct SizeClass {
-    /// Number of boxes.
-    pub boxes: u32,
-    /// Largest extent on each axis, in the boxes' length unit.
-    pub max_extent: [f32; 3],
-}
-
-/// Number of size classes: exponents of f32.
-pub const CLASSES: usize = 256;
+use pbig_core::Aabb;
+use pbig_core::internal::{SizeClasses, size_class_of, size_classes, spread_evenly, threads_for};
 
 /// First size class that belongs to no level (2^100). A cell of that size, or its inverse, would leave the normal range
 /// of f32.
 pub const OVERSIZE_CLASS: usize = 227;
 
-/// The size classes, by the exponent of the largest extent, from 0 (denormal) to 255 (infinite).
-type SizeClasses = [SizeClass; CLASSES];
-
 /// Fewest boxes for a thread: 20 us of work.
 const PIECE: usize = 1 << 14;
 
 /// Counts of boxes by size class, and a sample of valid boxes.
-///
-/// Sizes are counted, not sampled: a sample easily misses a thousand large boxes among a million small ones. One pass
-/// takes 1.2 ns a box.
 #[derive(Clone, Debug)]
 pub struct Summary {
     /// Number of valid boxes.
     pub valid: u32,
     /// Size classes of the valid boxes.
-    pub classes: Box<SizeClasses>,
+    pub classes: SizeClasses,
     /// At most [`Summary::SAMPLE`] valid boxes, spread evenly over the list. Oversize boxes are left out.
     pub sample: Vec<Aabb>,
 }
@@ -44,13 +26,9 @@ impl Summary {
     /// Sample size. PBIG's section 4.1 takes a simple random sample of 1000.
     pub const SAMPLE: usize = 1000;
 
-    /// Returns the summary of the boxes.
+    /// Returns the summary of the boxes. It takes 1.2 ns a box.
     pub fn of(boxes: &[Aabb]) -> Self {
-        let pieces: Vec<&[Aabb]> = boxes.chunks(PIECE).collect();
-        let mut classes = Box::new([SizeClass::default(); CLASSES]);
-        for piece in parallel::map(pieces.len(), |i| classes_of(pieces[i])) {
-            classes.iter_mut().zip(*piece).for_each(|(class, more)| class.add(&more));
-        }
+        let classes = size_classes(boxes, threads_for(boxes.len() / PIECE));
         Self { valid: classes.iter().map(|class| class.boxes).sum(), classes, sample: sampled(boxes) }
     }
 
@@ -81,53 +59,10 @@ impl Summary {
     }
 }
 
-impl SizeClass {
-    /// Adds the boxes of another class.
-    pub(crate) fn add(&mut self, more: &Self) {
-        self.boxes += more.boxes;
-        for (max, extent) in self.max_extent.iter_mut().zip(more.max_extent) {
-            *max = max.max(extent);
-        }
-    }
-}
-
-fn classes_of(boxes: &[Aabb]) -> Box<SizeClasses> {
-    let mut classes = Box::new([SizeClass::default(); CLASSES]);
-    for one in boxes.iter().filter(|one| one.is_valid()) {
-        let max_extent = one.extents();
-        classes[size_class_of(max_extent)].add(&SizeClass { boxes: 1, max_extent });
-    }
-    classes
-}
-
 /// Returns the sample of [`Summary`].
 pub fn sampled(boxes: &[Aabb]) -> Vec<Aabb> {
     let sampled = spread_evenly(boxes.len(), Summary::SAMPLE).map(|i| boxes[i]);
     sampled.filter(|b| b.is_valid() && size_class_of(b.extents()) < OVERSIZE_CLASS).collect()
-}
-
-/// Returns at most `most` numbers below `len`, by a golden-ratio walk.
-///
-/// A pattern in the order of the boxes cannot bias such a sample. The same length gives the same numbers.
-fn spread_evenly(len: usize, most: usize) -> impl Iterator<Item = usize> {
-    const GOLDEN: u64 = 0x9E37_79B9_7F4A_7C15;
-    let walk = move |i: u64| ((i.wrapping_mul(GOLDEN) >> 32) * len as u64) >> 32;
-    (0..len.min(most) as u64).map(move |i| if len <= most { i } else { walk(i) } as usize)
-}
-
-/// Returns the exponent of the largest extent. NaN counts as infinite; a point at infinity has it.
-#[inline]
-pub fn size_class_of(extents: [f32; 3]) -> usize {
-    let largest = extents[0].max(extents[1]).max(extents[2]);
-    (largest.to_bits() >> 23 & 0xFF) as usize
-}
-
-/// Returns the edge of the cubic cells for `n` boxes in a space, so that a cell holds `wanted` boxes by the rule.
-pub fn cell_size(rule: CellRule, sample: &[Aabb], n: u32, space: [f32; 3], wanted: f32) -> f32 {
-    match rule {
-        CellRule::Objective => pbig_cell(sample, n, space, wanted),
-        CellRule::Density => density_cell(n, space, wanted),
-    }
 }
 
 /// Returns the number of cells along a length.
@@ -144,7 +79,7 @@ pub fn cells_in(lengths: [f32; 3], cell: f32) -> f64 {
 ///
 /// Such a box touches too many cells, so it is tested against all others instead. It would also stretch the space.
 pub fn ordinary(summary: &Summary) -> Vec<Aabb> {
-    let widths: [f32; 3] = std::array::from_fn(|k| summary.range(k).1 - summary.range(k).0);
+    let widths = [0, 1, 2].map(|k| summary.range(k)).map(|(low, high)| high - low);
     let largest = 0.5 * widths.into_iter().fold(0.0, f32::max);
     let fits = |b: &&Aabb| b.extents().into_iter().all(|extent| extent < largest);
     let ordinary: Vec<Aabb> = summary.sample.iter().filter(fits).copied().collect();
@@ -194,22 +129,6 @@ pub fn density_cell(n: u32, space: [f32; 3], wanted: f32) -> f32 {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn invalid_boxes_are_not_counted_and_infinite_ones_have_a_class() {
-        let boxes = [
-            Aabb::NOWHERE,
-            Aabb::new([1.0; 3], [0.0; 3]),
-            Aabb::new([0.0; 3], [1.5, 0.5, 0.25]),
-            Aabb::new([0.0; 3], [f32::INFINITY; 3]),
-            Aabb::new([f32::INFINITY; 3], [f32::INFINITY; 3]),
-            Aabb::new([f32::MIN; 3], [f32::MAX; 3]),
-        ];
-        let summary = Summary::of(&boxes);
-        assert_eq!((summary.valid, summary.classes[255].boxes), (4, 3));
-        assert_eq!(summary.classes[127].max_extent, [1.5, 0.5, 0.25]);
-        assert_eq!(summary.sample.len(), 1);
-    }
 
     #[test]
     fn the_range_is_that_of_most_boxes_beside_a_far_one_or_a_half_space() {

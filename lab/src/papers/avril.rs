@@ -5,7 +5,7 @@ use super::printed::*;
 use super::sides::{Setup, Way, effort, race};
 use crate::UNSORTED;
 use pbig_core::{Aabb, Backend, BroadPhase, Config, Finder, Pair, ProxyFilter};
-use pbig_gpu::{CellRule, GpuOptions};
+use pbig_gpu::GpuOptions;
 use pbig_harness::gpu_race;
 use pbig_harness::pair_index::pair_count;
 use pbig_harness::prelude::*;
@@ -84,13 +84,12 @@ fn brute_force_and_grid(setup: &Setup) -> Result<Table, Failure> {
         ms, CPU: Avril's cells, one thread | tests/s, CPU: brute force | ms printed: without grid | \
         ms printed: with grid | ms, GPU: with grid | ms, GPU: without grid";
     let mut table = Table::new("Avril figure 4 and table 7: brute force, with and without a grid", columns);
-    let density = Way::Pbig(GpuOptions { cell_rule: CellRule::Density, ..GpuOptions::DEFAULT });
     let on_device = [0, ALL_PAIRS as u32]
         .map(|all_pairs_up_to| Way::Gpu(GpuOptions { all_pairs_up_to, ..GpuOptions::DEFAULT }));
     for n in [100usize, 500, 1000, 2500, 5000, 10_000] {
         let (boxes, tests) = (cubes(n, 1.0, 1.0, 1), pair_count(n as u64));
         let gpu = setup.run(&on_device[..1 + usize::from(n <= ALL_PAIRS)], &boxes, DISTANCE)?;
-        let cpu = race(&[BRUTE, Way::Finder(OUR_GRID), density], None, boxes, DISTANCE, effort(n))?;
+        let cpu = race(&[BRUTE, Way::Finder(OUR_GRID), Way::Avril], None, boxes, DISTANCE, effort(n))?;
         let bytes = [24 * n, output_bytes(n as u64)[1] as usize];
         let ms = cpu.iter().map(|call| call.median);
         let tests_a_second = tests as f64 / cpu[0].median * 1e3;

@@ -8,7 +8,7 @@ use super::sides::{SearchCall, Setup, Way, effort, once, race};
 use super::table_iii::{expected_checks, options_for};
 use crate::UNSORTED;
 use pbig_core::{Aabb, Config, Finder, Order, Report};
-use pbig_gpu::{CellRule, Coding, GpuOptions};
+use pbig_gpu::{Coding, GpuOptions};
 use pbig_harness::prelude::*;
 
 /// Maximum number of pairs of a call here: their list and its copy stay below 4 GB.
@@ -161,12 +161,11 @@ fn settings() -> [(&'static str, Way); 7] {
     let default = GpuOptions::DEFAULT;
     let wanted = |boxes_per_cell: f32| Way::Pbig(GpuOptions { boxes_per_cell, ..default });
     let small_cell = |small_cell: u32| Way::Pbig(GpuOptions { small_cell, ..default });
-    let density = Way::Pbig(GpuOptions { cell_rule: CellRule::Density, ..default });
     let sorted = Way::Finder(Config { order: Order::Sorted, ..OUR_GRID });
     [
         ("PBIG's grid, equation 6, W = 32", wanted(32.0)),
         ("PBIG's grid, equation 6, W = 4", wanted(4.0)),
-        ("PBIG's grid, Avril's cells of that many objects", density),
+        ("PBIG's grid, Avril's cells of that many objects", Way::Avril),
         ("the same as the second, every cell by balanced rows", small_cell(0)),
         ("the same, every cell by Avril's mapping", small_cell(u32::MAX)),
         ("our grid, one entry a box", Way::Finder(OUR_GRID)),

@@ -2,7 +2,7 @@
 
 use super::printed::MOST_BOXES;
 use crate::UNSORTED;
-use crate::pbig_grid::pbig_grid;
+use crate::pbig_grid::{CellRule, pbig_grid};
 use pbig_core::{Aabb, Backend, Config, Finder, Report};
 use pbig_gpu::{GpuFinder, GpuOptions};
 use pbig_harness::prelude::*;
@@ -15,8 +15,10 @@ pub(super) enum Way {
     Finder(Config),
     /// Pbig's on a device with these settings.
     Gpu(GpuOptions),
-    /// PBIG's grid on the CPU, of whose options it reads `cell_rule`, `boxes_per_cell` and `small_cell`.
+    /// PBIG's grid on the CPU, of whose options it reads `boxes_per_cell` and `small_cell`.
     Pbig(GpuOptions),
+    /// PBIG's grid on the CPU, with Avril's cells.
+    Avril,
 }
 
 /// The settings of [`Way::Gpu`].
@@ -49,15 +51,20 @@ impl Racer {
             }
             (Way::Gpu(_), None) => Finder::new(ON_GPU),
             (Way::Finder(config), _) => Finder::new(config),
-            (Way::Pbig(_), _) => Finder::default(),
+            (Way::Pbig(_) | Way::Avril, _) => Finder::default(),
         };
         Self { way, finder, calls: vec![] }
     }
 
     /// Makes a call. Fails if a device left it to the CPU.
     fn call(&mut self, boxes: &[Aabb]) -> Result<SearchCall, Failure> {
-        if let Way::Pbig(options) = self.way {
-            let (found, ms) = timed(|| pbig_grid(boxes, &options));
+        let cells = match self.way {
+            Way::Pbig(options) => Some((options, CellRule::Objective)),
+            Way::Avril => Some((GpuOptions::DEFAULT, CellRule::Density)),
+            _ => None,
+        };
+        if let Some((options, rule)) = cells {
+            let (found, ms) = timed(|| pbig_grid(boxes, &options, rule));
             let (found, mut report) = (found?, Report::default());
             (report.pairs, report.checks) = (found.pairs.len() as u64, found.checks);
             return Ok(SearchCall { ms, cell: Some(found.plan.cell), report, ..SearchCall::default() });

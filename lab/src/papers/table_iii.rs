@@ -7,7 +7,7 @@ use super::model::{Model, Space};
 use super::printed::{Coverage, MOST_BOXES, SPACE, TABLE_III, WARP};
 use super::sides::{SearchCall, Setup, Way, effort, once, race};
 use crate::UNSORTED;
-use crate::pbig_grid::PbigPlan;
+use crate::pbig_grid::{CellRule, PbigPlan};
 use pbig_core::Aabb;
 use pbig_gpu::pbig::Summary;
 use pbig_gpu::{Coding, GpuOptions};
@@ -71,7 +71,7 @@ pub(super) fn options_for(boxes: &[Aabb], cell: f64) -> GpuOptions {
     let (mut low, mut high) = (1.0, boxes.len().max(2) as f64);
     for _ in 0..40 {
         let middle: f64 = (low * high).sqrt();
-        let given = f64::from(PbigPlan::new(&summary, &with(middle)).cell);
+        let given = f64::from(PbigPlan::new(&summary, &with(middle), CellRule::Objective).cell);
         if given < cell { low = middle } else { high = middle }
     }
     with(high)

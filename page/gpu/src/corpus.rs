@@ -10,6 +10,9 @@ use pbig_gpu::GpuFinder;
 use pbig_harness::boxes::{BoxSet, moved};
 use pbig_harness::corpus::{Case, corpus};
 use pbig_harness::device_world::DeviceWorld;
+use std::future::poll_fn;
+use std::pin::pin;
+use std::task::Poll;
 use wasm_bindgen::prelude::*;
 
 /// Counts of a run.
@@ -68,6 +71,32 @@ pub async fn run(mode: usize, most_boxes: usize) -> Result<Outcome, JsError> {
         outcome.count(&set.name, result);
     }
     Ok(outcome)
+}
+
+/// Gives up a call while the device works, and makes one beside it. Returns the first fault; empty without one.
+///
+/// # Errors
+/// If there is no device.
+#[wasm_bindgen]
+pub async fn interrupt() -> Result<String, JsError> {
+    let gpu = GpuFinder::open_async().await.map_err(to_js)?;
+    Ok(interrupted(&mut gpu.clone(), &mut gpu.clone()).await.err().unwrap_or_default())
+}
+
+/// Uses two finders on one device.
+async fn interrupted(gpu: &mut GpuFinder, beside: &mut GpuFinder) -> Result<(), String> {
+    let (mode, boxes) = (&MODES[0], on_ground("uniform").boxes);
+    modes::check(gpu, mode, &boxes).await?;
+    {
+        let mut call = pin!(modes::check(gpu, mode, &boxes));
+        let is_waiting = poll_fn(|context| Poll::Ready(call.as_mut().poll(context).is_pending())).await;
+        let refusal = modes::check(beside, mode, &boxes).await.err().unwrap_or_default();
+        if !is_waiting || !refusal.contains("another call of the page uses the device") {
+            return Err(format!("waiting: {is_waiting}, refusal: {refusal:?}"));
+        }
+    }
+    modes::check(gpu, mode, &boxes).await?;
+    modes::check(beside, mode, &boxes).await.map(|_| ())
 }
 
 async fn run_set(gpu: &mut GpuFinder, mode: &Mode, boxes: &[Aabb]) -> Result<usize, String> {

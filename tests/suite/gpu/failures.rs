@@ -95,6 +95,27 @@ fn several_devices_of_which_one_is_lost_lose_no_pair() {
     assert_eq!(parts.iter().flatten().collect::<Vec<_>>(), [&2; 3], "one call is the CPU's");
 }
 
+/// Contract: a device of the app that was busy for too long is lost for that call only.
+#[test]
+fn an_apps_device_that_was_busy_is_used_again_when_it_is_idle() {
+    needs_gpu!();
+    let adapter = adapters().into_iter().next().expect("an adapter");
+    let device = pollster::block_on(adapter.request_device(&wgpu::DeviceDescriptor::default()));
+    let (device, queue) = device.expect("a device with WebGPU's default limits");
+    let finder = GpuFinder::from_device(device, queue).expect("default limits are enough");
+    finder.inject(Fault::Timeout, 1);
+    let options = GpuOptions { pause: Duration::ZERO, ..GpuOptions::DEFAULT };
+    let mut finder = with_device(options, finder);
+    let boxes = set("pile", 2000);
+    let mut whys = Vec::new();
+    while whys.len() < 100 && whys.last() != Some(&None) {
+        assert_eq!(finder.find(&boxes).expect("few pairs"), on_cpu(&boxes));
+        whys.push(finder.report().fallback.clone());
+    }
+    assert!(whys[0].as_ref().is_some_and(|why| why.contains("did not answer")), "{:?}", whys[0]);
+    assert_eq!(whys.last(), Some(&None), "after {} calls", whys.len());
+}
+
 #[test]
 fn an_app_shares_its_device_and_a_lost_one_is_not_replaced() {
     needs_gpu!();

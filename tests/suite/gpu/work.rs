@@ -49,9 +49,9 @@ fn a_device_bounds_its_work_or_leaves_the_shape_to_the_cpu() {
     }
 }
 
-/// A few boxes at the end of the numbers leave cells that are too large for the others. Finer ones are tried before the CPU.
+/// A needle that lies over few boxes, and boxes at the end of the numbers, must not enlarge the cells of the others.
 #[test]
-fn a_pile_among_boxes_far_away_is_the_devices() {
+fn a_pile_with_a_needle_and_boxes_far_away_is_the_devices() {
     needs_gpu!();
     let mut boxes = set("pile", 6000);
     for (i, far) in [f32::NEG_INFINITY, f32::INFINITY, f32::MAX].into_iter().enumerate() {
@@ -59,9 +59,11 @@ fn a_pile_among_boxes_far_away_is_the_devices() {
         boxes[50 * i + 1].max[i] = far.max(boxes[50 * i + 1].max[i]);
         boxes[50 * i + 2] = Aabb::new([far; 3], [far; 3]);
     }
+    // This box is the last of its row. It reaches the first one.
+    boxes[3000].min[0] = boxes[3000 - 3000 % 19].min[0];
     boxes.push(Aabb::new([f32::NEG_INFINITY; 3], [f32::INFINITY, 1.0, f32::INFINITY]));
     let tests = tests_of(&boxes).expect("done by the device");
-    assert!(tests < 300 * boxes.len() as u64, "{tests}");
+    assert!(tests < 100 * boxes.len() as u64, "{tests}");
 }
 
 /// Contract: a declined call is no fault. The device goes on with other sets, and with the next update of a world.
@@ -122,7 +124,7 @@ fn query_sets_are_made_only_if_times_are_wanted() {
         let mut found = DeviceFound::default();
         gpu.find_all(&request, &mut found).expect("a device that works");
         let has_times = !found.report.kernels.is_empty();
-        assert_eq!(gpu.query_sets(), if has_times { 2 } else { 0 }, "wanted: {time_kernels}");
+        assert_eq!(gpu.query_sets(), usize::from(has_times), "wanted: {time_kernels}");
         assert!(time_kernels || !has_times);
     }
 }

@@ -180,23 +180,24 @@ impl Sample {
 
 /// Yields at most `most` of the numbers below `len` by a golden-ratio walk: a pattern in the order of the boxes cannot
 /// bias the sample.
-fn spread_evenly(len: usize, most: usize) -> impl Iterator<Item = usize> {
+pub fn spread_evenly(len: usize, most: usize) -> impl Iterator<Item = usize> {
     const GOLDEN: u64 = 0x9E37_79B9_7F4A_7C15;
     let walk = move |i: u64| ((i.wrapping_mul(GOLDEN) >> 32) * len as u64) >> 32;
     (0..len.min(most) as u64).map(move |i| if len <= most { i } else { walk(i) } as usize)
 }
 
 /// Boxes whose largest extent lies within one power of two.
-#[derive(Clone, Copy, Debug, Default)]
-pub(super) struct SizeClass {
-    pub(super) boxes: u32,
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct SizeClass {
+    /// Number of boxes.
+    pub boxes: u32,
     /// Largest extent, by axis.
-    pub(super) extent: [f32; 3],
+    pub extent: [f32; 3],
 }
 
 /// Counts valid boxes by size class. Counted rather than sampled: a sample misses a thousand large boxes among a million
 /// small ones.
-pub(super) fn size_classes(boxes: &[Aabb], workers: usize) -> SizeClasses {
+pub fn size_classes(boxes: &[Aabb], workers: usize) -> SizeClasses {
     if workers <= 1 {
         return classes_of(boxes);
     }
@@ -210,7 +211,7 @@ pub(super) fn size_classes(boxes: &[Aabb], workers: usize) -> SizeClasses {
     });
     let mut all = parts[0];
     for part in &parts[1..pieces] {
-        all.iter_mut().zip(part).for_each(|(all, part)| all.add(part.boxes, part.extent));
+        all.iter_mut().zip(part).for_each(|(all, part)| all.add(part));
     }
     all
 }
@@ -221,15 +222,17 @@ fn classes_of(boxes: &[Aabb]) -> SizeClasses {
     classes
 }
 
-type SizeClasses = [SizeClass; CLASSES];
+/// The size classes, by the exponent of the largest extent, from 0 (denormal) to 255 (infinite).
+pub type SizeClasses = [SizeClass; CLASSES];
 
 const NO_CLASSES: SizeClasses = [SizeClass { boxes: 0, extent: [0.0; 3] }; CLASSES];
 
 impl SizeClass {
+    /// Adds the boxes of another class.
     #[inline(always)]
-    fn add(&mut self, boxes: u32, extent: [f32; 3]) {
-        self.boxes += boxes;
-        self.extent = std::array::from_fn(|k| self.extent[k].max(extent[k]));
+    pub fn add(&mut self, more: &Self) {
+        self.boxes += more.boxes;
+        self.extent = std::array::from_fn(|k| self.extent[k].max(more.extent[k]));
     }
 }
 
@@ -237,9 +240,14 @@ impl SizeClass {
 fn count(classes: &mut SizeClasses, aabb: &Aabb) {
     if aabb.is_valid() {
         let extent = aabb.extents();
-        // The exponent; a NaN, of a point at infinity, counts as infinite.
-        classes[(largest(&extent).to_bits() >> 23 & 255) as usize].add(1, extent);
+        classes[size_class_of(extent)].add(&SizeClass { boxes: 1, extent });
     }
+}
+
+/// Returns the exponent of the largest extent. A NaN, of a point at infinity, counts as infinite.
+#[inline(always)]
+pub fn size_class_of(extent: [f32; 3]) -> usize {
+    (largest(&extent).to_bits() >> 23 & 255) as usize
 }
 
 #[cfg(test)]

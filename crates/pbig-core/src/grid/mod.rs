@@ -10,7 +10,7 @@
 
 #[cfg(target_arch = "x86_64")]
 mod avx2;
-mod bounds;
+pub(crate) mod bounds;
 mod brute;
 mod build;
 mod cells;

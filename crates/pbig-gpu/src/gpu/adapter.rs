@@ -19,14 +19,19 @@ async fn best_first() -> Vec<wgpu::Adapter> {
     adapters
 }
 
-fn rank(kind: wgpu::DeviceType, low_power: bool) -> u32 {
-    match kind {
-        wgpu::DeviceType::DiscreteGpu => u32::from(low_power),
-        wgpu::DeviceType::IntegratedGpu => u32::from(!low_power),
-        wgpu::DeviceType::VirtualGpu => 2,
-        wgpu::DeviceType::Other => 3,
-        wgpu::DeviceType::Cpu => 4,
-    }
+/// Kinds of adapters, best first.
+const KINDS: [(wgpu::DeviceType, &str); 5] = [
+    (wgpu::DeviceType::DiscreteGpu, "discrete"),
+    (wgpu::DeviceType::IntegratedGpu, "integrated"),
+    (wgpu::DeviceType::VirtualGpu, "virtual"),
+    (wgpu::DeviceType::Other, "unknown kind"),
+    (wgpu::DeviceType::Cpu, "software"),
+];
+
+fn rank(kind: wgpu::DeviceType, low_power: bool) -> usize {
+    let rank = KINDS.iter().position(|known| known.0 == kind).unwrap_or(KINDS.len());
+    // For low power the first two kinds change places.
+    if low_power && rank < 2 { 1 - rank } else { rank }
 }
 
 /// Returns the adapter of the given name, or of `WGPU_ADAPTER_NAME`, or the best.
@@ -58,14 +63,7 @@ fn unknown_api() -> Option<String> {
 
 /// Returns an adapter's name, kind and API, as reports show them.
 pub fn describe(info: &wgpu::AdapterInfo) -> String {
-    let kind = match info.device_type {
-        wgpu::DeviceType::Cpu => "software",
-        wgpu::DeviceType::DiscreteGpu => "discrete",
-        wgpu::DeviceType::IntegratedGpu => "integrated",
-        wgpu::DeviceType::VirtualGpu => "virtual",
-        wgpu::DeviceType::Other => "unknown kind",
-    };
-    format!("{} ({kind}, {})", info.name, info.backend)
+    format!("{} ({}, {})", info.name, KINDS[rank(info.device_type, false)].1, info.backend)
 }
 
 #[cfg(test)]

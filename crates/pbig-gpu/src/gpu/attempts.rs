@@ -16,14 +16,10 @@ use std::collections::VecDeque;
 /// Maximum number of repetitions of a map before the set is split. Each one has the capacities that the last one asked for.
 const MAX_REPEATS: u32 = 8;
 
-/// Factor on the cells with which a plan of too many tests is tried once more.
-const FINER_RETRY: f32 = 0.125;
-
 impl Session {
     /// Searches with a grid, or tests every pair (Avril 3.2).
     pub(super) async fn search(&mut self, job: &Job<'_>) -> Result<(), Failure> {
         let (uploaded, before) = (self.params, self.sink.pairs());
-        self.cell_factor = 1.0;
         for _ in 0..MAX_REPEATS {
             self.params = uploaded;
             self.add_plan(job)?;
@@ -48,8 +44,7 @@ impl Session {
         let mut items = chunk.items;
         let mut result = self.finish(chunk).await?;
         if matches!(result, ChunkResult::Unsorted) {
-            let others = self.chunks_after(&items);
-            chunk = self.submit_rest_and_sort(&items, &others)?;
+            chunk = self.submit_rest_and_sort(&items)?;
             items = chunk.items;
             result = self.finish(chunk).await?;
         }
@@ -63,21 +58,16 @@ impl Session {
         }
     }
 
-    /// Gives up a plan that makes too many tests: it may have been made for other boxes. One that was made for these is tried once
-    /// more, with finer cells: a few boxes far away leave too large ones.
+    /// Gives up a plan that makes too many tests: it may have been made for other boxes.
     ///
     /// # Errors
-    /// If that is done: the call is declined.
+    /// If the plan was made for these boxes: the call is declined.
     fn replan(&mut self) -> Result<(), Failure> {
         let was_new = self.plan.take().is_some_and(|kept| kept.is_new());
         // Lists that such a plan makes are not worth their memory, and say nothing of the next one's.
         let Counters { tests, too_many_tests, .. } = std::mem::take(&mut self.sizes.lists);
         self.sizes.pairs = 0;
         if !was_new {
-            return Ok(());
-        }
-        if self.cell_factor > FINER_RETRY {
-            self.cell_factor = FINER_RETRY;
             return Ok(());
         }
         let Params { boxes, most_tests, .. } = self.params;
@@ -122,16 +112,16 @@ impl Session {
         let most = self.storage.max_buffer_bytes;
         let words = (4 * self.sizes.word_capacity).clamp(first_bytes.min(most), most) / 4;
         passes::make_sort_buffers(&mut self.storage, &mut self.params, words)?;
-        let others = self.chunks_after(&items);
-        let steps = passes::map_and_check(&self.params, others.is_empty());
+        let is_all = rest(&self.sizes.lists, &items).is_empty();
+        let steps = passes::map_and_check(&self.params, is_all);
         // A chunk that is not read is not timed.
-        if others.is_empty() || self.options.time_kernels {
+        if is_all || self.options.time_kernels {
             return self.submit(items, 0, &steps);
         }
         // As many chunks as in the last call, without a wait in between. Items that are not there are skipped.
         self.make_room(0)?;
         self.submit_unread(items, &steps)?;
-        self.submit_rest_and_sort(&items, &others)
+        self.submit_rest_and_sort(&items)
     }
 
     /// Returns the work items of a chunk. A software adapter gets fewer, so that it answers in time.
@@ -141,7 +131,7 @@ impl Session {
     }
 
     /// Returns the chunks after the first one, as the last map counted the work items.
-    fn chunks_after(&self, first: &Chunk) -> Vec<Chunk> {
+    pub(super) fn chunks_after(&self, first: &Chunk) -> Vec<Chunk> {
         cut(rest(&self.sizes.lists, first), self.chunk_items())
     }
 
@@ -156,7 +146,7 @@ impl Session {
                 && let Some(items) = pending.pop_front()
             {
                 side = 1 - side;
-                let [small, large] = passes::check(items.small_items, items.large_items);
+                let [small, large] = passes::check(&items);
                 in_progress.push_back(self.submit(items, side, &[CLEAR_TOTALS, small, large])?);
             }
             let Some(chunk) = in_progress.pop_front() else { return Ok(()) };

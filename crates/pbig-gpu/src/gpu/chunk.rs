@@ -1,14 +1,14 @@
 //! A chunk of work items: submitted to the device, awaited, and decoded.
 
-use super::GpuError;
 use super::coding::bit_words;
 use super::error::Failure;
 use super::gpu_device::Variant;
-use super::items::{covered, rest};
+use super::items::rest;
 use super::passes::{Recording, Step, apply_changes, check, lists_fit, sort};
 use super::readback::{self, HEADER_BYTES, Header, Mapped};
 use super::session::Session;
 use super::storage::{BufferId, Side};
+use super::{GpuError, wait};
 use crate::decode::{self, DecodeError};
 use crate::layout::{BITS, Chunk, Counters, PACKED, Params, SORTED, Totals, halves, wide};
 use pbig_core::{DeviceFound, internal::Clock};
@@ -56,16 +56,16 @@ impl Session {
         Ok(PendingChunk { items, side, submission, submissions: 1, prefetched, passes })
     }
 
-    /// Checks the chunks after `done`, which add their pairs to those of the first, and sorts all.
-    pub(super) fn submit_rest_and_sort(
-        &mut self,
-        done: &Chunk,
-        others: &[Chunk],
-    ) -> Result<PendingChunk, GpuError> {
-        for items in others {
-            self.submit_unread(*items, &check(items.small_items, items.large_items))?;
+    /// Checks the chunks after `done`, as many as the last map had, which add their pairs to those of the first. Sorts all.
+    pub(super) fn submit_rest_and_sort(&mut self, done: &Chunk) -> Result<PendingChunk, GpuError> {
+        let others = self.chunks_after(done);
+        for items in &others {
+            self.submit_unread(*items, &check(items))?;
         }
-        let last = self.submit(covered(done, others), 0, &sort(&self.params))?;
+        let Counters { small_items, large_items, .. } = self.sizes.lists;
+        let (small_items, large_items) =
+            (small_items.max(done.small_items), large_items.max(done.large_items));
+        let last = self.submit(Chunk { small_items, large_items, ..*done }, 0, &sort(&self.params))?;
         Ok(PendingChunk { submissions: others.len() as u32 + 2, ..last })
     }
 
@@ -93,8 +93,7 @@ impl Session {
     ) -> Result<(wgpu::SubmissionIndex, Vec<&'static Kernel>), GpuError> {
         let mut clock = Clock::start();
         self.storage.write(Buffer::Params, &[self.params])?;
-        let is_timed = prefetched.is_some() && self.options.time_kernels;
-        let timestamps = self.timestamps[side].as_ref().filter(|_| is_timed);
+        let timestamps = self.timestamps.as_ref().filter(|_| prefetched.is_some());
         let copies = self.storage.copies.take();
         let has_copies = copies.is_some();
         let mut recording = Recording {
@@ -147,10 +146,13 @@ impl Session {
         let staging = BufferId::Staging(chunk.side);
         let patience = self.options.patience.saturating_mul(chunk.submissions);
         let bytes = HEADER_BYTES + chunk.prefetched;
-        let received = self.receive(staging, bytes, chunk.submission.clone(), patience).await?;
+        let received = self.receive(staging, bytes, chunk.submission, patience).await?;
         let (header, prefetched) = received.split_at(HEADER_BYTES as usize);
         let header: Header = bytemuck::pod_read_unaligned(header);
-        self.note_times(&chunk, &header);
+        if self.timestamps.is_some() {
+            let times = header.times(&chunk.passes, self.device.queue.get_timestamp_period());
+            times.for_each(|(kernel, time)| self.sink.add_time(kernel, time));
+        }
         let Header { totals, counters, .. } = header;
         let (out, needed) = (BufferId::of(Buffer::Out, chunk.side), output_words(&self.params, &totals));
         let repeat = self.refused(&counters);
@@ -189,13 +191,6 @@ impl Session {
             return Some(ChunkResult::TooManyTests);
         }
         (!lists_fit(&self.params, counters)).then_some(ChunkResult::MapTooLarge)
-    }
-
-    fn note_times(&mut self, chunk: &PendingChunk, header: &Header) {
-        if self.device.has_timestamps && self.options.time_kernels {
-            let times = header.times(&chunk.passes, self.device.queue.get_timestamp_period());
-            times.for_each(|(kernel, time)| self.sink.add_time(kernel, time));
-        }
     }
 
     /// Reads the words of output that did not come with the header, and decodes all. Notes how many there were.
@@ -265,7 +260,8 @@ impl Session {
     ) -> Result<Mapped, GpuError> {
         let mut clock = Clock::start();
         let staging = self.storage.get(staging);
-        let received = readback::read(&self.device, staging, bytes, submission, patience).await?;
+        wait::map(&self.device, staging, bytes, submission, patience).await?;
+        let received = Mapped::new(&self.device, staging, bytes)?;
         let report = &mut self.sink.found.report;
         report.wait += clock.lap();
         report.downloaded += bytes;

@@ -5,10 +5,10 @@
 //! a level of their own are tested against all others, once (contract 4).
 
 use super::levels::{SizeRange, levels};
+use crate::GpuOptions;
 use crate::layout::{FEWEST_CELLS, Level, MAX_LEVELS, MAX_SPAN, Params, ordered};
-use crate::pbig::{Summary, cell_size, ordinary, size_class_of, space_of};
-use crate::{CellRule, GpuOptions};
-use pbig_core::Aabb;
+use crate::pbig::{Summary, density_cell, ordinary, pbig_cell, space_of};
+use pbig_core::{Aabb, internal::size_class_of};
 use std::fmt;
 
 /// Maximum number of cells of a level per box. With more cells, the scan costs more than full cells do.
@@ -50,14 +50,12 @@ impl fmt::Display for GpuPlan {
 
 impl GpuPlan {
     /// Plans the grid for the boxes behind `summary`, with at most `max_cells` cells.
-    ///
-    /// `cell_factor` scales the cells: 1, or less where earlier cells held too many boxes.
-    pub(super) fn new(summary: &Summary, options: &GpuOptions, cell_factor: f32, max_cells: u32) -> Self {
+    pub(super) fn new(summary: &Summary, options: &GpuOptions, max_cells: u32) -> Self {
         let split = levels(summary);
         // The coarsest levels are kept if there are too many: finer boxes then share the first of these.
         let split = &split[split.len().saturating_sub(MAX_LEVELS - 1)..];
         let (space, low) = space_of(summary, &ordinary(summary));
-        let edges = split.iter().map(|level| edge(level, summary, space, (options, cell_factor)));
+        let edges = split.iter().map(|level| edge(level, summary, space, options));
         let (cell, shifts) = powers_of_two(&edges.collect::<Vec<_>>(), split, space);
         let mut plan = Self {
             cell: cell as f32,
@@ -84,16 +82,14 @@ impl GpuPlan {
     pub(super) fn add_to(&self, params: Params) -> Params {
         let scale = (1.0 / f64::from(self.cell)) as f32;
         let reach = 0.99 * MAX_CELL / f64::from(scale);
-        let bound = |k: usize, sign: f64| {
-            let x =
-                (f64::from(self.origin[k]) + sign * reach).clamp(-f64::from(f32::MAX), f64::from(f32::MAX));
-            ordered(x as f32)
+        let bound = |k: usize, reach: f64| {
+            ordered(((f64::from(self.origin[k]) + reach) as f32).clamp(f32::MIN, f32::MAX))
         };
         let mut params = Params {
             origin: self.origin,
             scale,
-            clamp_low: std::array::from_fn(|k| bound(k, -1.0)),
-            clamp_high: std::array::from_fn(|k| bound(k, 1.0)),
+            clamp_low: std::array::from_fn(|k| bound(k, -reach)),
+            clamp_high: std::array::from_fn(|k| bound(k, reach)),
             levels: self.levels.len() as u32,
             cells: self.cells,
             ..params
@@ -103,30 +99,24 @@ impl GpuPlan {
     }
 }
 
-/// Returns the cell size of a level: by the cell rule on its boxes alone, but such that its largest box touches few
+/// Returns the cell size of a level: by equation 6 on its boxes alone, but such that its largest box touches few
 /// cells on each axis.
-fn edge(
-    level: &SizeRange,
-    summary: &Summary,
-    space: [f32; 3],
-    (options, cell_factor): (&GpuOptions, f32),
-) -> f64 {
+fn edge(level: &SizeRange, summary: &Summary, space: [f32; 3], options: &GpuOptions) -> f64 {
     let of_level = |b: &&Aabb| (level.classes.0..=level.classes.1).contains(&size_class_of(b.extents()));
     let sample: Vec<Aabb> = summary.sample.iter().filter(of_level).copied().collect();
     let wanted = options.boxes_per_cell.max(1.0);
     let cell = if sample.is_empty() {
-        cell_size(CellRule::Density, &sample, level.all.boxes, space, wanted)
+        density_cell(level.all.boxes, space, wanted)
     } else {
         // A quarter of the sample is enough: equation 6 is evaluated on it 24 times.
         let quarter: Vec<Aabb> = sample.iter().step_by(4).copied().collect();
-        cell_size(options.cell_rule, &quarter, level.all.boxes, space, wanted)
+        pbig_cell(&quarter, level.all.boxes, space, wanted)
     };
-    let largest = level.all.max_extent.into_iter().fold(0.0, f32::max);
+    let largest = level.all.extent.into_iter().fold(0.0, f32::max);
     // A box crosses at most one border more than it has cell lengths, and one more by rounding.
     let smallest = f64::from(largest) * 1.001 / f64::from(MAX_SPAN - 2);
     let most = OCCUPANCY_LIMIT * f64::from(wanted);
-    let even = f64::from(cell) * f64::from(cell_factor);
-    with_limited_occupancy(&sample, level.all.boxes, even, smallest, most).max(smallest)
+    with_limited_occupancy(&sample, level.all.boxes, f64::from(cell), smallest, most).max(smallest)
 }
 
 /// Returns a cell size at which a box has at most `most` other boxes in its cell, as the sample tells.

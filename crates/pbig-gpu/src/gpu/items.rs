@@ -4,8 +4,8 @@ use crate::layout::{Chunk, Counters};
 
 /// Returns the work items that are left after the first chunk.
 pub(super) fn rest(all: &Counters, done: &Chunk) -> Chunk {
-    let first_small = all.small_items.min(done.small_items);
-    let first_large = all.large_items.min(done.large_items);
+    let [first_small, first_large] =
+        [all.small_items.min(done.small_items), all.large_items.min(done.large_items)];
     let (small_items, large_items) = (all.small_items - first_small, all.large_items - first_large);
     Chunk { first_small, small_items, first_large, large_items, ..Chunk::default() }
 }
@@ -25,13 +25,6 @@ pub(super) fn cut(all: Chunk, [small, large]: [u32; 2]) -> Vec<Chunk> {
         }
     };
     (0..count).map(part).collect()
-}
-
-/// Returns the work items of a chunk that begins with the first ones, and of the chunks after it, as one.
-pub(super) fn covered(done: &Chunk, others: &[Chunk]) -> Chunk {
-    let small_items = done.small_items + others.iter().map(|chunk| chunk.small_items).sum::<u32>();
-    let large_items = done.large_items + others.iter().map(|chunk| chunk.large_items).sum::<u32>();
-    Chunk { small_items, large_items, ..Chunk::default() }
 }
 
 #[cfg(test)]
@@ -55,8 +48,6 @@ mod tests {
             assert_eq!(items(|c| (c.first_small, c.small_items)), (5..5 + small).collect::<Vec<_>>());
             assert_eq!(items(|c| (c.first_large, c.large_items)), (2..2 + large).collect::<Vec<_>>());
             assert!(chunks.iter().all(|c| c.small_items + c.large_items > 0));
-            let all = covered(&Chunk { small_items: 5, large_items: 2, ..Chunk::default() }, &chunks);
-            assert_eq!((all.small_items, all.large_items), (5 + small, 2 + large));
         }
     }
 }

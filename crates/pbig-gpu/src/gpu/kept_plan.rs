@@ -2,11 +2,17 @@
 //! host looks at all of them once more. In between, a call costs it nothing for planning.
 
 use super::GpuPlan;
+use crate::GpuOptions;
 use crate::layout::{Counters, LANES};
+use crate::pbig::Summary;
 use crate::policy::most_tests;
+use pbig_core::Aabb;
 
 /// Factor by which the number of boxes, or the work for a box, may change until a plan is outgrown.
 const OUTGROWN: u64 = 2;
+
+/// Maximum number of cells of a plan.
+const MAX_CELLS: u64 = 1 << 28;
 
 /// A plan, and how it did.
 #[derive(Debug)]
@@ -20,9 +26,11 @@ pub(super) struct KeptPlan {
 }
 
 impl KeptPlan {
-    /// Keeps a plan that was made for this number of boxes, with about this number of pairs.
-    pub(super) fn new(plan: GpuPlan, boxes: usize, pairs: u64) -> Self {
-        Self { plan, boxes: boxes as u64, pairs, first_work: None }
+    /// Plans for boxes, on a device with buffers of at most this size.
+    pub(super) fn new(boxes: &[Aabb], options: &GpuOptions, max_bytes: u64) -> Self {
+        let summary = Summary::of(boxes);
+        let plan = GpuPlan::new(&summary, options, (max_bytes / 8).min(MAX_CELLS) as u32);
+        Self { plan, boxes: boxes.len() as u64, pairs: summary.pairs(), first_work: None }
     }
 
     /// Returns true if no search has used the plan.
@@ -57,13 +65,10 @@ impl KeptPlan {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::GpuOptions;
-    use crate::pbig::Summary;
-    use pbig_core::Aabb;
 
     fn kept(boxes: usize) -> KeptPlan {
         let cubes: Vec<_> = (0..boxes).map(|i| Aabb::from_center([i as f32, 0.0, 0.0], [0.5; 3])).collect();
-        KeptPlan::new(GpuPlan::new(&Summary::of(&cubes), &GpuOptions::DEFAULT, 1.0, 1 << 20), boxes, 0)
+        KeptPlan::new(&cubes, &GpuOptions::DEFAULT, 1 << 23)
     }
 
     fn counted(valid: u32, entries: u32, tests: u32) -> Counters {

@@ -3,9 +3,10 @@
 //! From the smallest boxes on, sizes share a level until a box as large as the next size would lie over too many of the
 //! level's boxes. The largest boxes have no level if they are few: they go into the last level's single cell.
 
-use crate::pbig::{OVERSIZE_CLASS, SizeClass, Summary};
+use crate::pbig::{OVERSIZE_CLASS, Summary};
+use pbig_core::internal::SizeClass;
 
-/// Maximum number of boxes of a level, spread evenly, that may lie in the space of a box. Of 4, 8, 16, 32 and 64, this
+/// Maximum number of boxes of a level, spread evenly, that may lie in the cube around a box. Of 4, 8, 16, 32 and 64, this
 /// one led to the fewest entries and tests on twelve sets of mixed sizes.
 const MOST_UNDER_A_BOX: f64 = 16.0;
 
@@ -26,7 +27,10 @@ pub(super) struct SizeRange {
 
 /// Returns the levels, finest first. Boxes larger than those of the last level have none.
 pub(super) fn levels(summary: &Summary) -> Vec<SizeRange> {
-    let lengths = std::array::from_fn(|k| length(summary.range(k)));
+    let lengths = [0, 1, 2].map(|k| {
+        let (low, high) = summary.range(k);
+        (f64::from(high) - f64::from(low)).max(f64::MIN_POSITIVE)
+    });
     let mut levels: Vec<SizeRange> = Vec::new();
     for range in used_classes(summary) {
         match levels.last_mut() {
@@ -47,23 +51,21 @@ pub(super) fn levels(summary: &Summary) -> Vec<SizeRange> {
     levels
 }
 
-fn length((low, high): (f32, f32)) -> f64 {
-    (f64::from(high) - f64::from(low)).max(f64::MIN_POSITIVE)
-}
-
 fn used_classes(summary: &Summary) -> impl Iterator<Item = SizeRange> {
     let used = summary.classes[..OVERSIZE_CLASS].iter().enumerate().filter(|(_, class)| class.boxes > 0);
     used.map(|(i, class)| SizeRange {
         classes: (i, i),
         all: SizeClass {
-            max_extent: class.max_extent.map(|extent| (extent * EXTENT_ALLOWANCE).next_up().min(f32::MAX)),
+            extent: class.extent.map(|extent| (extent * EXTENT_ALLOWANCE).next_up().min(f32::MAX)),
             ..*class
         },
     })
 }
 
-/// Returns the number of boxes of a level, spread evenly over these lengths, that lie in the space of a larger box.
+/// Returns the number of boxes of a level, spread evenly over these lengths, that lie in the cube around a larger box. Cells
+/// are cubes: those of the level would grow with the longest axis, however thin the box is.
 fn under_a_box(level: &SizeRange, larger: &SizeRange, lengths: [f64; 3]) -> f64 {
-    let share = |k: usize| (f64::from(larger.all.max_extent[k]) / lengths[k]).min(1.0);
-    f64::from(level.all.boxes) * (0..3).map(share).product::<f64>()
+    let edge = larger.all.extent.into_iter().fold(0.0, f32::max);
+    let share = |length: f64| (f64::from(edge) / length).min(1.0);
+    f64::from(level.all.boxes) * lengths.map(share).into_iter().product::<f64>()
 }

@@ -1,12 +1,5 @@
-//! The GPU backend: PBIG's pipeline in WGSL, on any device that wgpu supports.
+//! The GPU backend: PBIG's pipeline in WGSL, on any device that wgpu supports. `docs/GPU.md` shows it, and says why it is right.
 //!
-//! ```text
-//! upload ─► locate ─► visit ─► scan ─► schedule ─► scatter ─► check ─► count, place and rank pairs ─► readback
-//! ```
-//!
-//! A call is one submission and one wait, unless there is more work or output than fits in one chunk.
-//!
-//! `docs/GPU.md` says why it is right and which file has what.
 //! The kernels are in the crate `pbig-shaders`. The module `layout` has the structs that their buffers hold.
 
 mod adapter;
@@ -57,9 +50,10 @@ use std::time::Duration;
 const PROBE: Duration = Duration::from_millis(10);
 
 /// The origin of a finder's device. It tells where to look for another one when the device is lost.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 enum Source {
     /// The device that the process shares.
+    #[default]
     Shared,
     /// A device of its own, on the adapter of this name or on the best.
     Own(Option<String>),
@@ -68,7 +62,7 @@ enum Source {
 }
 
 /// A device for one [`pbig_core::Finder`] or [`pbig_core::BroadPhase`], with its buffers there.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub struct GpuFinder {
     source: Source,
     options: GpuOptions,
@@ -126,14 +120,7 @@ impl GpuFinder {
 
     /// Returns a finder on the device that the process shares. The first call opens it.
     pub fn shared() -> Self {
-        Self {
-            source: Source::Shared,
-            options: GpuOptions::DEFAULT,
-            device: None,
-            session: None,
-            failed: None,
-            declined: Declined::default(),
-        }
+        Self::default()
     }
 
     /// Returns the finder with other settings.
@@ -188,7 +175,6 @@ impl GpuFinder {
         self.run(&Job::changes(request), found).await.map_err(Failure::for_core)
     }
 
-    /// Runs a search, and notes how it went.
     async fn run(&mut self, job: &Job<'_>, found: &mut DeviceFound) -> Result<(), Failure> {
         self.check_pause()?;
         let boxes = job.boxes.len();
@@ -241,7 +227,6 @@ impl GpuFinder {
         }
     }
 
-    /// Returns the session of the last call, or a new one.
     async fn take_session(&mut self) -> Result<Session, GpuError> {
         let device = self.open_device().await?;
         match self.session.take().filter(|session| session.options == self.options) {
@@ -281,8 +266,6 @@ impl PairDevice for GpuFinder {
         wait::block_on(self.run(&Job::all(request), found)).map_err(Failure::for_core)
     }
 
-    /// The device has each box now and at the last update (`shaders/shared/search_changes.wgsl`). So transfers in both
-    /// directions are proportional to the number of changes.
     fn find_changed(
         &mut self,
         request: &ChangeRequest<'_>,

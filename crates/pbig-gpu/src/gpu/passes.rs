@@ -4,8 +4,8 @@ use super::GpuError;
 use super::gpu_device::Variant;
 use super::storage::{BufferId, Side, Storage};
 use crate::layout::{
-    self, CELLS_PER_BLOCK, COUNTS_PER_BLOCK, Cell, Counters, GROUPS_PER_ROW, LANES, LargeItem, Located,
-    Params, SHORT_ROW, SORTED, Slot, SmallItem, Totals, WINDOW,
+    self, CELLS_PER_BLOCK, COUNTS_PER_BLOCK, Cell, Chunk, Counters, GROUPS_PER_ROW, LANES, LargeItem,
+    Located, Params, SHORT_ROW, SORTED, Slot, SmallItem, Totals, WINDOW,
 };
 use pbig_core::Pair;
 use pbig_shaders::{self as shaders, Buffer, Kernel};
@@ -92,7 +92,8 @@ pub(super) fn sort(params: &Params) -> [Step; 10] {
     ]
 }
 
-pub(super) fn check(small_items: u32, large_items: u32) -> [Step; 2] {
+pub(super) fn check(items: &Chunk) -> [Step; 2] {
+    let Chunk { small_items, large_items, .. } = *items;
     [Run(&shaders::CHECK_SMALL, Direct(small_items)), Run(&shaders::CHECK_LARGE, Direct(large_items))]
 }
 
@@ -119,23 +120,13 @@ pub(super) fn make_buffers(
         storage.ensure(buffer, bytes)?;
     }
     let slot_bytes = first_bytes.min(bytes_of::<Slot>(params.cells));
+    let [entry, slot, small, large] =
+        [size_of::<u32>(), size_of::<Slot>(), size_of::<SmallItem>(), size_of::<LargeItem>()];
     let lists = [
-        (Buffer::Entries, needed.entries, size_of::<u32>(), &mut params.entry_capacity, first_bytes),
-        (Buffer::Slots, needed.slots, size_of::<Slot>(), &mut params.slot_capacity, slot_bytes),
-        (
-            Buffer::SmallItems,
-            needed.small_items,
-            size_of::<SmallItem>(),
-            &mut params.small_capacity,
-            first_bytes / 4,
-        ),
-        (
-            Buffer::LargeItems,
-            needed.large_items,
-            size_of::<LargeItem>(),
-            &mut params.large_capacity,
-            first_bytes / 4,
-        ),
+        (Buffer::Entries, needed.entries, entry, &mut params.entry_capacity, first_bytes),
+        (Buffer::Slots, needed.slots, slot, &mut params.slot_capacity, slot_bytes),
+        (Buffer::SmallItems, needed.small_items, small, &mut params.small_capacity, first_bytes / 4),
+        (Buffer::LargeItems, needed.large_items, large, &mut params.large_capacity, first_bytes / 4),
     ];
     for (buffer, len, size, capacity, first_bytes) in lists {
         let bytes = u64::from(len) * size as u64;

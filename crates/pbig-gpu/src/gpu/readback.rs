@@ -1,9 +1,9 @@
 //! Readback: copies the output of a submission to the host.
 
+use super::GpuError;
 use super::gpu_device::GpuDevice;
 use super::passes::{MAX_PASSES, Recording};
 use super::storage::BufferId;
-use super::{GpuError, wait};
 use crate::GpuOptions;
 use crate::layout::{Counters, Totals};
 use bytemuck::{Pod, Zeroable};
@@ -83,6 +83,14 @@ pub(super) struct Mapped {
     buffer: wgpu::Buffer,
 }
 
+impl Mapped {
+    /// Reads the first `bytes` of a staging buffer that the host has mapped.
+    pub(super) fn new(device: &GpuDevice, staging: &wgpu::Buffer, bytes: u64) -> Result<Self, GpuError> {
+        let view = staging.get_mapped_range(0..bytes).map_err(|_| device.give_up())?;
+        Ok(Self { view: Some(view), buffer: staging.clone() })
+    }
+}
+
 impl std::ops::Deref for Mapped {
     type Target = [u8];
 
@@ -96,17 +104,4 @@ impl Drop for Mapped {
         self.view = None;
         self.buffer.unmap();
     }
-}
-
-/// Waits for a submission. Returns the first `bytes` of the staging buffer that it has filled.
-pub(super) async fn read(
-    device: &GpuDevice,
-    staging: &wgpu::Buffer,
-    bytes: u64,
-    submission: wgpu::SubmissionIndex,
-    patience: Duration,
-) -> Result<Mapped, GpuError> {
-    wait::map(device, staging, bytes, submission, patience).await?;
-    let view = staging.get_mapped_range(0..bytes).map_err(|_| device.give_up())?;
-    Ok(Mapped { view: Some(view), buffer: staging.clone() })
 }

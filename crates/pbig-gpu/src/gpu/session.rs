@@ -1,6 +1,6 @@
 //! The state of a finder on a device, and what happens before a search: upload, plan, choice of the coding.
 
-use super::coding::coding_flag;
+use super::GpuError;
 use super::error::Failure;
 use super::gpu_device::GpuDevice;
 use super::job::{Input, Job};
@@ -9,13 +9,11 @@ use super::readback::Timestamps;
 use super::sink::Sink;
 use super::storage::Storage;
 use super::upload::{upload_all, upload_changes};
-use super::{GpuError, GpuPlan};
+use crate::GpuOptions;
 use crate::decode::pair_count;
-use crate::layout::{BITS, COUNTED, Counters, FILTERED, LANES, Params, SORTED};
-use crate::pbig::Summary;
+use crate::layout::{COUNTED, Counters, FILTERED, LANES, Params};
 use crate::policy::WIDEST_ITEM;
-use crate::{Coding, GpuOptions};
-use pbig_core::{DeviceReport, internal::Clock};
+use pbig_core::internal::Clock;
 use std::sync::Arc;
 
 /// Maximum number of words of output per changed box that are prefetched: four pairs. The output of a burst of pairs
@@ -24,9 +22,6 @@ const PREFETCHED_WORDS_PER_CHANGE: u64 = 8;
 
 /// Number of boxes by which lists of the first call are longer than for the boxes there are: few boxes may need many entries.
 const EXTRA_BOXES: u64 = 4096;
-
-/// Maximum number of cells of a plan.
-const MAX_CELLS: u64 = 1 << 28;
 
 /// Lengths of lists and output that earlier calls needed.
 #[derive(Debug, Default)]
@@ -48,11 +43,10 @@ pub(super) struct Session {
     pub(super) device: Arc<GpuDevice>,
     pub(super) options: GpuOptions,
     pub(super) storage: Storage,
-    pub(super) timestamps: [Option<Timestamps>; 2],
+    /// Timestamps, if kernels are timed. Submissions use them one after the other.
+    pub(super) timestamps: Option<Timestamps>,
     pub(super) sizes: Sizes,
     pub(super) plan: Option<KeptPlan>,
-    /// Factor on the cells of a new plan: below 1 if this job's first plan made too many tests.
-    pub(super) cell_factor: f32,
     /// Number of boxes of a set that needed parts, and of its parts, until the next window of [`Storage::end_call`].
     pub(super) split: Option<(usize, usize)>,
     /// This job searches for changes instead of all overlaps.
@@ -72,10 +66,9 @@ impl Session {
         Ok(Self {
             options: *options,
             storage: Storage::new(device.clone(), options),
-            timestamps: [Timestamps::new(&device, options)?, Timestamps::new(&device, options)?],
+            timestamps: Timestamps::new(&device, options)?,
             sizes: Sizes::default(),
             plan: None,
-            cell_factor: 1.0,
             split: None,
             finds_changes: false,
             has_pending_changes: false,
@@ -132,7 +125,6 @@ impl Session {
         }
         self.sizes.word_capacity = self.sizes.expected_words;
         self.finds_changes = !matches!(job.input, Input::Boxes);
-        self.storage.bytes_sent = 0;
         self.params = self.params_of(job);
         let mut clock = Clock::start();
         let (storage, params, filters) = (&mut self.storage, &mut self.params, job.filters);
@@ -146,7 +138,7 @@ impl Session {
             }
         };
         let report = &mut self.sink.found.report;
-        report.uploaded += self.storage.bytes_sent;
+        report.uploaded += std::mem::take(&mut self.storage.bytes_sent);
         report.upload += clock.lap();
         self.has_pending_changes = self.params.known > 0;
         Ok(())
@@ -158,12 +150,12 @@ impl Session {
     }
 
     fn params_of(&self, job: &Job<'_>) -> Params {
-        let flags = [(job.filters.is_some(), FILTERED), (self.options.count_tests, COUNTED)];
         Params {
             small_cell: self.options.small_cell.clamp(1, LANES),
             // The output of a work item must fit the smallest buffer.
             columns: if self.storage.max_buffer_bytes < 8 << 20 { 1 } else { WIDEST_ITEM },
-            flags: flags.into_iter().filter(|(is_set, _)| *is_set).map(|(_, flag)| flag).sum(),
+            flags: FILTERED * u32::from(job.filters.is_some())
+                + COUNTED * u32::from(self.options.count_tests),
             split: job.split.unwrap_or(0),
             ..Params::default()
         }
@@ -173,47 +165,21 @@ impl Session {
     pub(super) fn add_plan(&mut self, job: &Job<'_>) -> Result<(), GpuError> {
         if job.needs_grid(&self.options) {
             self.plan.take_if(|kept| !kept.suits(job.boxes.len()));
-            let (options, factor, max_bytes) =
-                (&self.options, self.cell_factor, self.storage.max_buffer_bytes);
+            let (options, max_bytes) = (&self.options, self.storage.max_buffer_bytes);
             let report = &mut self.sink.found.report;
-            let kept = self.plan.get_or_insert_with(|| new_plan(job, (options, factor), max_bytes, report));
+            let kept = self.plan.get_or_insert_with(|| {
+                let mut clock = Clock::start();
+                let plan = KeptPlan::new(&job.bounds(), options, max_bytes);
+                report.plan += clock.lap();
+                plan
+            });
             check_entries(kept, self.params.boxes)?;
             self.params = kept.plan.add_to(self.params);
             self.params.most_tests = kept.most_tests(self.params.boxes, options.boxes_per_cell);
         }
-        self.params.flags |= self.coding_flags(job);
+        self.params.flags |= self.coding_flag(job);
         Ok(())
     }
-
-    /// Returns the flags of the coding: plain pairs where the device sorts, and for changes. These are rarely so many that
-    /// records or bits are smaller, and need a mark.
-    fn coding_flags(&self, job: &Job<'_>) -> u32 {
-        let (params, most) = (&self.params, self.storage.max_buffer_bytes);
-        let has_grid = params.levels > 0;
-        let flags = match self.options.coding {
-            _ if self.finds_changes => 0,
-            // One bit a pair fits the smallest buffer.
-            _ if !has_grid && self.sizes.word_capacity > most / 4 => BITS,
-            Coding::Auto if job.is_sorted && has_grid => 0,
-            // The order of bits is that of the pairs.
-            Coding::Auto if job.is_sorted => BITS,
-            wanted => coding_flag(wanted, params, &self.sizes),
-        };
-        if flags == 0 && has_grid && job.is_sorted { SORTED } else { flags }
-    }
-}
-
-fn new_plan(
-    job: &Job<'_>,
-    (options, cell_factor): (&GpuOptions, f32),
-    max_bytes: u64,
-    report: &mut DeviceReport,
-) -> KeptPlan {
-    let mut clock = Clock::start();
-    let summary = Summary::of(&job.bounds());
-    let plan = GpuPlan::new(&summary, options, cell_factor, (max_bytes / 8).min(MAX_CELLS) as u32);
-    report.plan += clock.lap();
-    KeptPlan::new(plan, job.boxes.len(), summary.pairs())
 }
 
 /// Returns an error if 32 bits might not count the entries of this number of boxes: up to 4 x 4 x 4 in each level but the last.

@@ -106,7 +106,7 @@ pub(super) struct Storage {
     pub(super) device: Arc<GpuDevice>,
     /// Largest size of a buffer, in bytes.
     pub(super) max_buffer_bytes: u64,
-    /// Bytes written since the last reset.
+    /// Bytes of lists that went up and were not yet reported.
     pub(super) bytes_sent: u64,
     /// Number of boxes of the last update that the device has now and before; none if it has not seen that update.
     pub(super) known: Option<usize>,
@@ -171,16 +171,11 @@ impl Storage {
         self.buffers.values().map(|kept| kept.buffer.size()).sum()
     }
 
-    fn write_bytes(&mut self, id: impl Into<BufferId>, at: u64, bytes: &[u8]) {
-        self.device.queue.write_buffer(self.get(id), at, bytes);
-        self.bytes_sent += bytes.len() as u64;
-    }
-
     /// Writes a few values, such as the parameters of a submission.
     pub(super) fn write<T: Pod>(&mut self, id: impl Into<BufferId>, data: &[T]) -> Result<(), GpuError> {
         let id = id.into();
         self.ensure(id, size_of_val(data) as u64)?;
-        self.write_bytes(id, 0, bytemuck::cast_slice(data));
+        self.device.queue.write_buffer(self.get(id), 0, bytemuck::cast_slice(data));
         Ok(())
     }
 
@@ -189,9 +184,12 @@ impl Storage {
         // A call that failed before it was submitted leaves copies behind.
         self.copies = None;
         let bytes: u64 = uploads.iter().map(|upload| aligned(upload.len())).sum();
+        self.bytes_sent += uploads.iter().map(Upload::len).sum::<u64>();
         if bytes > self.max_buffer_bytes {
             // Each list fits a buffer, but not all together.
-            uploads.iter().for_each(|upload| self.write_bytes(upload.buffer, upload.at, upload.bytes));
+            for &Upload { buffer, at, bytes } in uploads {
+                self.device.queue.write_buffer(self.get(buffer), at, bytes);
+            }
             return Ok(());
         }
         if bytes == 0 {
@@ -213,7 +211,6 @@ impl Storage {
         }
         staging.unmap();
         self.is_staging_mapped.store(false, Ordering::Relaxed);
-        self.bytes_sent += uploads.iter().map(Upload::len).sum::<u64>();
         Ok(())
     }
 
