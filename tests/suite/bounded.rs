@@ -162,7 +162,7 @@ fn clusters_far_apart_take_no_more_work_than_their_crowds() {
         let config = Config { engine: Some(Engine::Edit), ..Config::DEFAULT };
         let mut broad_phase = BroadPhase::new(config).expect("a margin");
         // Work for each changed box and each box at its place: if all change, and if few do, which are looked up.
-        for (step, by, most) in [(1, 0.0, 16.0), (50, 0.2, 120.0)] {
+        for (step, by, most) in [(1, 0.0, 16.0), (50, 0.2, 250.0)] {
             let changed = (0..2000 * crowd).step_by(step);
             changed.clone().for_each(|id| broad_phase.set(id, cube(id, by), filter).expect("an id"));
             broad_phase.update().expect("few pairs");
