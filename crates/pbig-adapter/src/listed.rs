@@ -19,7 +19,7 @@ impl<T: Tree> Colliders<T> {
             let batches = starts.map(|start| start..listed.min(start + policy::PROXIES_PER_BATCH));
             return batches.for_each(|batch| self.read_batch(scene, batch));
         }
-        scene.for_each_listed(0..listed, |handle, proxy| self.set_proxy(scene, handle, proxy));
+        scene.for_each_listed(0..listed, |handle, proxy| self.set_listed(scene, handle, proxy));
     }
 
     /// Computes proxies on several threads, and sets them on this one.
@@ -39,9 +39,21 @@ impl<T: Tree> Colliders<T> {
             });
         });
         for &(handle, proxy) in &proxies {
-            self.set_proxy(scene, handle, proxy);
+            self.set_listed(scene, handle, proxy);
         }
         self.proxies = proxies;
+    }
+
+    #[inline(always)]
+    fn set_listed(&mut self, scene: &impl Scene<Aabb = T::Aabb>, handle: Handle, proxy: Proxy<T::Aabb>) {
+        match proxy {
+            Proxy::Enabled(aabb, filter)
+                if BodyKind::of(&filter) == BodyKind::Fixed && !self.registry.contains(handle) =>
+            {
+                self.enable_fixed(handle, aabb, filter);
+            }
+            _ => self.set_proxy(scene, handle, proxy),
+        }
     }
 
     #[inline(always)]
@@ -55,9 +67,6 @@ impl<T: Tree> Colliders<T> {
             Proxy::Enabled(aabb, filter) => {
                 if let Some(margin) = scene.margin(&aabb) {
                     self.set_margin(margin);
-                }
-                if BodyKind::of(&filter) == BodyKind::Fixed && !self.registry.contains(handle) {
-                    return self.enable_fixed(handle, aabb, filter);
                 }
                 self.enable(handle, aabb, filter);
             }
@@ -77,8 +86,8 @@ impl<T: Tree> Colliders<T> {
         }
     }
 
-    /// Enables a new collider that may never move, with as much margin as rounding needs: more would only add pairs. Once it has moved, it
-    /// has the margin of others.
+    /// Enables a new collider that may never move, with as much margin as rounding needs: more would only add pairs. Once it has moved, or
+    /// is read again, it has the margin of others.
     #[cold]
     fn enable_fixed(&mut self, handle: Handle, aabb: T::Aabb, filter: ProxyFilter) {
         let margin = self.boxes.margin(&self.core);

@@ -159,14 +159,14 @@ impl Groups {
         others: &mut [u32],
         base: u32,
     ) {
-        let Sorter { firsts, unsorted, bits, .. } = sorter;
+        let Sorter { firsts, unsorted, .. } = sorter;
         let first_id = self.grouping.ids_of(group).start as u32;
         let pairs = &self.pairs[self.range(group)];
         if LIST {
             ensure_scratch(firsts, pairs.len(), 0);
         }
         ensure_scratch(unsorted, pairs.len() + SHORT, 0);
-        dispatch!(sort_rows::<LIST>, pairs, (first_id, base), spans, others, (firsts, unsorted, bits));
+        dispatch!(sort_rows::<LIST>, pairs, (first_id, base), spans, others, firsts, unsorted);
     }
 }
 
@@ -179,8 +179,6 @@ pub(super) struct Sorter {
     firsts: Vec<u32>,
     /// The `b` of each pair, by row, in no order within it.
     unsorted: Vec<u32>,
-    /// A bit for each id of a row that is sorted by bits; zero otherwise.
-    bits: Vec<u64>,
 }
 
 /// Sorts pairs by the highest bits of `a`, into `to`.
@@ -225,7 +223,8 @@ fn sort_rows<const LIST: bool>(
     (first_id, base): (u32, u32),
     spans: &mut [Span],
     others: &mut [u32],
-    (firsts, unsorted, bits): (&mut [u32], &mut [u32], &mut Vec<u64>),
+    firsts: &mut [u32],
+    unsorted: &mut [u32],
 ) {
     spans.fill(Span::default());
     for pair in pairs {
@@ -247,7 +246,7 @@ fn sort_rows<const LIST: bool>(
     }
     for span in spans {
         let range = span.range();
-        row::sort_into(simd, unsorted, range, others, bits);
+        row::sort_into(simd, unsorted, range, others);
         span.start += base;
     }
 }

@@ -7,19 +7,10 @@ use std::ops::Range;
 /// Ids of a row that one register holds.
 pub(super) const SHORT: usize = 8;
 
-/// Words of bits to be looked at for each id of a row: looking at more takes longer than a sort by comparisons.
-const WORDS_PER_ID: usize = 2;
-
 /// Copies the row at `range` of `from` to the same range of `to`, sorted; rows are copied in order, as a short one may
 /// overwrite what comes behind it. A row with a register of elements behind its start is sorted in it.
 #[inline(always)]
-pub(super) fn sort_into(
-    simd: impl Simd,
-    from: &[u32],
-    range: Range<usize>,
-    to: &mut [u32],
-    bits: &mut Vec<u64>,
-) {
+pub(super) fn sort_into(simd: impl Simd, from: &[u32], range: Range<usize>, to: &mut [u32]) {
     let (len, to) = (range.len(), &mut to[range.start..]);
     match from[range.start..].first_chunk() {
         Some(eight) if len <= SHORT => {
@@ -29,33 +20,11 @@ pub(super) fn sort_into(
                 None => to[..len].copy_from_slice(&sorted[..len]),
             }
         }
-        _ => sort_long(&from[range], &mut to[..len], bits),
-    }
-}
-
-/// Writes the ids of a row to `to`, sorted: by a bit for each, if there are few words of bits to look at. All bits are zero before and
-/// after.
-fn sort_long(row: &[u32], to: &mut [u32], bits: &mut Vec<u64>) {
-    let word = |id: u32| (id / u64::BITS) as usize;
-    let is_sparse = |id: u32| word(id) >= WORDS_PER_ID * row.len();
-    let highest = if is_sparse(row[0]) { row[0] } else { row.iter().fold(0, |highest, &id| highest.max(id)) };
-    if is_sparse(highest) {
-        to.copy_from_slice(row);
-        return to.sort_unstable();
-    }
-    bits.resize(bits.len().max(word(highest) + 1), 0);
-    row.iter().for_each(|&id| bits[word(id)] |= 1 << (id % u64::BITS));
-    let mut next = 0;
-    for (first, bits) in (0..).step_by(64).zip(&mut bits[..=word(highest)]) {
-        let mut left = std::mem::take(bits);
-        while left != 0 {
-            to[next] = first + left.trailing_zeros();
-            next += 1;
-            left &= left - 1;
+        _ => {
+            to[..len].copy_from_slice(&from[range]);
+            to[..len].sort_unstable();
         }
     }
-    // Nothing is left, unless a device gave a pair twice.
-    to[next..].fill(highest);
 }
 
 /// A row at a range of a pool.
@@ -134,22 +103,6 @@ mod tests {
         differences(5, &[], &[7], &mut added, &mut removed);
         differences(6, &[8], &[], &mut added, &mut removed);
         assert_eq!((added[2], removed[2]), (Pair { a: 5, b: 7 }, Pair { a: 6, b: 8 }));
-    }
-
-    #[test]
-    fn long_rows_are_sorted_by_bits_or_by_comparisons() {
-        let mut bits = vec![];
-        for (len, ids) in [(9, 500), (9, 1200), (9, 40_000), (100, 10_000), (300, 300), (300, 20_000)] {
-            let row: Vec<u32> = (0..len).map(|i| (i * 7919 + 13) % ids).collect();
-            let (mut to, mut wanted) = (vec![u32::MAX; row.len()], row.clone());
-            wanted.sort_unstable();
-            sort_long(&row, &mut to, &mut bits);
-            assert_eq!(to, wanted, "{len} ids below {ids}");
-            assert!(bits.iter().all(|word| *word == 0));
-        }
-        let mut to = [u32::MAX; 9];
-        sort_long(&[4, 3, 2, 1, 9, 8, 7, 6, 9], &mut to, &mut bits);
-        assert_eq!(to, [1, 2, 3, 4, 6, 7, 8, 9, 9], "a pair given twice");
     }
 
     fn compared(simd: impl Simd, old: &[u32], new: &[u32]) -> [Vec<Pair>; 2] {
