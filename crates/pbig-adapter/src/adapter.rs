@@ -1,15 +1,17 @@
 //! Code that is the same in each adapter but for rapier's types, which are those of the place where a macro is called.
 
 /// Defines `PbigConfig`, the settings of an adapter, with the margin of its rapier's own broad phase.
+#[doc(hidden)]
 #[macro_export]
-macro_rules! settings {
+macro_rules! define_config {
     ($(#[$about:meta])* pub struct PbigConfig { $(#[$about_margin:meta])* margin: $margin:expr }) => {
         $(#[$about])*
         /// A later version may have more settings: end with `..PbigConfig::DEFAULT`.
         #[derive(Clone, Copy, Debug, PartialEq)]
         pub struct PbigConfig {
             /// The distance by which a stored AABB is larger than its collider's, in units of rapier's `length_unit`. A larger
-            /// margin means that fewer colliders count as moved, and that more pairs are reported that do not touch yet.
+            /// margin means that fewer colliders count as moved, and that more pairs are reported that do not touch yet. A fixed
+            /// collider has none until it moves, beyond what rounding needs.
             $(#[$about_margin])*
             pub margin: f32,
             /// The processor that searches for pairs.
@@ -46,11 +48,12 @@ macro_rules! settings {
 
 /// Implements the methods that need no more than [`crate::Colliders`], for a type with a field `colliders` and a function
 /// `around` that makes one of a core.
+#[doc(hidden)]
 #[macro_export]
-macro_rules! methods {
+macro_rules! define_methods {
     ($Type:ident) => {
         impl $Type {
-            /// Creates an empty one.
+            /// Creates a finder without colliders.
             ///
             /// # Errors
             /// [`crate::Error::Margin`].
@@ -70,7 +73,7 @@ macro_rules! methods {
                 pbig_core::BroadPhase::with_device(config.into(), device).map(Self::around)
             }
 
-            /// Uses this device in later updates, in place of the one in use. What is restored from a snapshot has none.
+            /// Uses this device in later updates, in place of the one in use. After a restore from a snapshot there is none.
             pub fn set_device(&mut self, device: Box<dyn $crate::PairDevice>) {
                 self.colliders.set_device(device);
             }
@@ -106,8 +109,9 @@ macro_rules! methods {
 }
 
 /// Defines the conversions between rapier's handles, pairs and events and those of this crate.
+#[doc(hidden)]
 #[macro_export]
-macro_rules! conversions {
+macro_rules! define_conversions {
     () => {
         pub(crate) fn handle(handle: ColliderHandle) -> $crate::Handle {
             handle.into_raw_parts().into()

@@ -50,7 +50,7 @@ impl<T: Tree> Colliders<T> {
             Proxy::Enabled(aabb, filter)
                 if BodyKind::of(&filter) == BodyKind::Fixed && !self.registry.contains(handle) =>
             {
-                self.enable_fixed(handle, aabb, filter);
+                self.enable_fixed(scene.margin(&aabb), handle, aabb, filter);
             }
             _ => self.set_proxy(scene, handle, proxy),
         }
@@ -86,14 +86,14 @@ impl<T: Tree> Colliders<T> {
         }
     }
 
-    /// Enables a new collider that may never move, with as much margin as rounding needs: more would only add pairs. Once it has moved, or
-    /// is read again, it has the margin of others.
+    /// Enables a new collider that may never move, with as much margin as rounding needs: more would only add pairs. Once it has moved, it
+    /// has the margin of others. So has one that is not listed when it is read first, as after a restore: it may have pairs by its margin.
     #[cold]
-    fn enable_fixed(&mut self, handle: Handle, aabb: T::Aabb, filter: ProxyFilter) {
-        let margin = self.boxes.margin(&self.core);
-        self.set_margin(margin.min(aabb.reach() * policy::MARGIN_OF_ROUNDING));
+    fn enable_fixed(&mut self, own: Option<f32>, handle: Handle, aabb: T::Aabb, filter: ProxyFilter) {
+        let common = self.boxes.margin(&self.core);
+        self.set_margin(own.unwrap_or(common).min(aabb.reach() * policy::MARGIN_OF_ROUNDING));
         self.enable(handle, aabb, filter);
-        self.set_margin(margin);
+        self.set_margin(common);
     }
 
     /// Makes a collider known. An older collider that used its index loses its box: rapier never listed it as removed.

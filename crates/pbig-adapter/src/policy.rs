@@ -31,7 +31,8 @@ pub(crate) const REPLAY_FRAMES: usize = 8;
 #[cfg(feature = "shadow")]
 pub(crate) const MAX_DIFFERENCES: usize = 1000;
 
-/// Margin that covers the rounding of a box to f32, per distance from the origin: twice what `lab/tests/far.rs` needs.
+/// Margin that covers rounding to f32, per distance from the origin: twice what `lab/tests/far.rs` needs for a box, because the other box
+/// of a pair may have used up its own.
 pub(crate) const MARGIN_OF_ROUNDING: f32 = 1.0 / (1 << 21) as f32;
 
 /// Distance from the centre of a world in f64, in margins, beyond which a box is far. There f32 is exact to a 128th of a margin.

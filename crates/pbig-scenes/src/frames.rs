@@ -24,6 +24,7 @@ pub const CAPSULE_RADIUS_METRES: f32 = 0.3;
 /// The time of a frame, in seconds.
 pub const FRAME_SECONDS: f32 = 1.0 / 60.0;
 
+/// Metres per second.
 const WALKING_SPEED: f32 = 4.0;
 
 /// The part of a character's motion that goes down in each frame, in metres. It keeps the character on the ground.

@@ -137,7 +137,7 @@ impl PbigBroadPhase {
     }
 }
 
-pbig_adapter::methods!(PbigBroadPhase);
+pbig_adapter::define_methods!(PbigBroadPhase);
 
 impl BroadPhase for PbigBroadPhase {
     fn update(

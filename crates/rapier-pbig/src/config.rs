@@ -1,6 +1,6 @@
 //! The settings of the broad phase.
 
-pbig_adapter::settings! {
+pbig_adapter::define_config! {
     /// The settings of a [`crate::PbigBroadPhase`].
     ///
     /// ```

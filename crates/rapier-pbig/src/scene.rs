@@ -120,7 +120,7 @@ pub(crate) fn groups_of(groups: InteractionGroups) -> Groups {
     Groups { memberships: groups.memberships.bits(), mask: groups.filter.bits(), mode: TestMode::And }
 }
 
-pbig_adapter::conversions!();
+pbig_adapter::define_conversions!();
 
 impl Call<'_> {
     /// Calls `take` with each of these colliders and its proxy, in the order of the list.

@@ -1,6 +1,6 @@
 //! The settings of the finder.
 
-pbig_adapter::settings! {
+pbig_adapter::define_config! {
     /// The settings of a [`crate::PbigFinder`].
     ///
     /// ```

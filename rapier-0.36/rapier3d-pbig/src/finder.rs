@@ -37,7 +37,7 @@ impl PbigFinder {
     }
 }
 
-pbig_adapter::methods!(PbigFinder);
+pbig_adapter::define_methods!(PbigFinder);
 
 fn to_query(query: &SceneQuery) -> pbig_adapter::SceneQuery<Bounds, Real> {
     use pbig_adapter::SceneQuery as Query;

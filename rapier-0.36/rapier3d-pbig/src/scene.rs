@@ -68,7 +68,7 @@ pub(crate) fn groups_of(groups: InteractionGroups) -> Groups {
     Groups { memberships: groups.memberships.bits(), mask: groups.filter.bits(), mode }
 }
 
-pbig_adapter::conversions!();
+pbig_adapter::define_conversions!();
 
 /// Returns the margin of rapier's `adaptive_change_detection_margin`: an eighth of the box's smallest extent, within limits.
 #[inline(always)]

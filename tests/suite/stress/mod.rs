@@ -4,6 +4,7 @@
 mod extremes;
 mod fuzzed;
 pub(crate) mod memory;
+mod mixed;
 mod motion;
 mod multitudes;
 mod shapes;

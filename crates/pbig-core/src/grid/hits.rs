@@ -230,8 +230,8 @@ impl Hits {
         self.keep(from, rule);
     }
 
-    /// Tests a box exactly against each of a run, where the pairs from `from` on are to be kept still. Keeps them if they are many.
-    /// Returns the first one that is left.
+    /// Tests a box exactly against each of a run. The pairs from `from` on were not filtered and counted yet. Keeps them if they are many,
+    /// and returns the first one that is left.
     pub(super) fn test_part(
         &mut self,
         one: &Record,

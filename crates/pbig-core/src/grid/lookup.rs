@@ -292,6 +292,7 @@ impl<M: FnMut(usize, &Record, Place)> LookUp<'_, M> {
     fn slots(&mut self, simd: impl Simd, row: &Row) {
         let grid = &self.grid.grid;
         let mut first = row.first;
+        // Not `step_by`, which counts its steps first.
         while first < row.end {
             let beyond = (row.end - first).min(BLOCK as u32);
             let Candidates { boxes, places, len, .. } = &mut *self.candidates;

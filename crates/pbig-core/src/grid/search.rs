@@ -172,6 +172,7 @@ impl<S: Simd> Scan<'_, '_, S> {
     /// Tests the slots from `first` up to `end`.
     #[inline(always)]
     fn rest(&mut self, one: Seeker, (mut first, end): (usize, usize)) {
+        // Not `step_by`, which counts its steps first: mixed sizes took 8% longer.
         while first < end {
             // SAFETY: `first` is below an end that comes from `starts`.
             let block = unsafe { self.grid.block(first) };

@@ -19,17 +19,19 @@ async fn best_first() -> Vec<wgpu::Adapter> {
     adapters
 }
 
-/// Kinds of adapters, best first.
-const KINDS: [(wgpu::DeviceType, &str); 5] = [
-    (wgpu::DeviceType::DiscreteGpu, "discrete"),
-    (wgpu::DeviceType::IntegratedGpu, "integrated"),
-    (wgpu::DeviceType::VirtualGpu, "virtual"),
-    (wgpu::DeviceType::Other, "unknown kind"),
-    (wgpu::DeviceType::Cpu, "software"),
-];
+/// Returns the rank of a kind of adapter, best first, and its name.
+fn kind_of(kind: wgpu::DeviceType) -> (usize, &'static str) {
+    match kind {
+        wgpu::DeviceType::DiscreteGpu => (0, "discrete"),
+        wgpu::DeviceType::IntegratedGpu => (1, "integrated"),
+        wgpu::DeviceType::VirtualGpu => (2, "virtual"),
+        wgpu::DeviceType::Other => (3, "unknown kind"),
+        wgpu::DeviceType::Cpu => (4, "software"),
+    }
+}
 
 fn rank(kind: wgpu::DeviceType, low_power: bool) -> usize {
-    let rank = KINDS.iter().position(|known| known.0 == kind).unwrap_or(KINDS.len());
+    let (rank, _) = kind_of(kind);
     // For low power the first two kinds change places.
     if low_power && rank < 2 { 1 - rank } else { rank }
 }
@@ -63,7 +65,7 @@ fn unknown_api() -> Option<String> {
 
 /// Returns an adapter's name, kind and API, as reports show them.
 pub fn describe(info: &wgpu::AdapterInfo) -> String {
-    format!("{} ({}, {})", info.name, KINDS[rank(info.device_type, false)].1, info.backend)
+    format!("{} ({}, {})", info.name, kind_of(info.device_type).1, info.backend)
 }
 
 #[cfg(test)]

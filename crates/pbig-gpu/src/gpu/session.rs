@@ -127,6 +127,8 @@ impl Session {
         self.finds_changes = !matches!(job.input, Input::Boxes);
         self.params = self.params_of(job);
         let mut clock = Clock::start();
+        // A failed upload leaves its bytes.
+        self.storage.bytes_sent = 0;
         let (storage, params, filters) = (&mut self.storage, &mut self.params, job.filters);
         match job.input {
             Input::Boxes => upload_all(storage, job.boxes, filters, params)?,
