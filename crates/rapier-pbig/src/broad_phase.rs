@@ -94,7 +94,7 @@ impl PbigBroadPhase {
     /// broad_phase.update(&params, &colliders, &bodies, &handles, &[], &mut Vec::new());
     /// assert!(matches!(broad_phase.why(handles[0], handles[1]), Why::BodyTypes(_)), "both are fixed");
     /// let why = broad_phase.why(handles[0], handles[2]);
-    /// assert_eq!(why.to_string(), "not reported: the boxes are 3.978 apart on the x axis");
+    /// assert_eq!(why.to_string(), "not reported: the boxes are 3.998 apart on the x axis");
     /// ```
     pub fn why(&self, one: ColliderHandle, other: ColliderHandle) -> Why {
         self.colliders.why(handle(one), handle(other))

@@ -3,8 +3,11 @@
 
 use super::*;
 
-/// The kernels of the sort in the order in which they run, each with its number of workgroups.
-pub(super) static SORT: [(&Kernel, fn(&State) -> u32); 6] = [
+/// A kernel with its number of workgroups.
+type Run = (&'static Kernel, fn(&State) -> u32);
+
+/// The kernels of the sort in the order in which they run.
+pub(super) static SORT: [Run; 6] = [
     (&shaders::ARRANGE_ROWS, one),
     (&shaders::COUNT_PAIRS, by_found_pair),
     (&shaders::PLACE_PAIRS, by_found_pair),
