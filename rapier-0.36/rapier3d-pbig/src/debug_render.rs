@@ -68,11 +68,11 @@ mod tests {
             canvas
         });
         assert_eq!(boxes.lines, 512 * edges);
-        // On each side the margin, and half the prediction distance of 2 cm.
-        let edge = 1.0 + 2.0 * (crate::MARGIN + crate::to_f32(params.prediction_distance()) / 2.0);
+        // On each side half the prediction distance of 2 cm: new fixed colliders have no margin.
+        let edge = 1.0 + crate::to_f32(params.prediction_distance());
         assert!(
             (crate::to_f32(boxes.longest) - edge).abs() < 1e-4,
-            "a ball with its margins: {}",
+            "a ball and its prediction: {}",
             boxes.longest
         );
         assert!(
