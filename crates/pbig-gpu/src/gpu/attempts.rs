@@ -16,10 +16,14 @@ use std::collections::VecDeque;
 /// Maximum number of repetitions of a map before the set is split. Each one has the capacities that the last one asked for.
 const MAX_REPEATS: u32 = 8;
 
+/// Factor on the cells with which a plan of too many tests is tried once more.
+const FINER_RETRY: f32 = 0.125;
+
 impl Session {
     /// Searches with a grid, or tests every pair (Avril 3.2).
     pub(super) async fn search(&mut self, job: &Job<'_>) -> Result<(), Failure> {
         let (uploaded, before) = (self.params, self.sink.pairs());
+        self.cell_factor = 1.0;
         for _ in 0..MAX_REPEATS {
             self.params = uploaded;
             self.add_plan(job)?;
@@ -58,16 +62,21 @@ impl Session {
         }
     }
 
-    /// Gives up a plan that makes too many tests: it may have been made for other boxes.
+    /// Gives up a plan that makes too many tests: it may have been made for other boxes. One that was made for these is tried once
+    /// more, with finer cells: a few boxes far away leave too large ones.
     ///
     /// # Errors
-    /// If the plan was made for these boxes: the call is declined.
+    /// If that is done: the call is declined.
     fn replan(&mut self) -> Result<(), Failure> {
         let was_new = self.plan.take().is_some_and(|kept| kept.is_new());
         // Lists that such a plan makes are not worth their memory, and say nothing of the next one's.
         let Counters { tests, too_many_tests, .. } = std::mem::take(&mut self.sizes.lists);
         self.sizes.pairs = 0;
         if !was_new {
+            return Ok(());
+        }
+        if self.cell_factor > FINER_RETRY {
+            self.cell_factor = FINER_RETRY;
             return Ok(());
         }
         let Params { boxes, most_tests, .. } = self.params;

@@ -50,12 +50,14 @@ impl fmt::Display for GpuPlan {
 
 impl GpuPlan {
     /// Plans the grid for the boxes behind `summary`, with at most `max_cells` cells.
-    pub(super) fn new(summary: &Summary, options: &GpuOptions, max_cells: u32) -> Self {
+    ///
+    /// `cell_factor` scales the cells: 1, or less where earlier cells held too many boxes.
+    pub(super) fn new(summary: &Summary, options: &GpuOptions, cell_factor: f32, max_cells: u32) -> Self {
         let split = levels(summary);
         // The coarsest levels are kept if there are too many: finer boxes then share the first of these.
         let split = &split[split.len().saturating_sub(MAX_LEVELS - 1)..];
         let (space, low) = space_of(summary, &ordinary(summary));
-        let edges = split.iter().map(|level| edge(level, summary, space, options));
+        let edges = split.iter().map(|level| edge(level, summary, space, (options, cell_factor)));
         let (cell, shifts) = powers_of_two(&edges.collect::<Vec<_>>(), split, space);
         let mut plan = Self {
             cell: cell as f32,
@@ -101,7 +103,12 @@ impl GpuPlan {
 
 /// Returns the cell size of a level: by equation 6 on its boxes alone, but such that its largest box touches few
 /// cells on each axis.
-fn edge(level: &SizeRange, summary: &Summary, space: [f32; 3], options: &GpuOptions) -> f64 {
+fn edge(
+    level: &SizeRange,
+    summary: &Summary,
+    space: [f32; 3],
+    (options, cell_factor): (&GpuOptions, f32),
+) -> f64 {
     let of_level = |b: &&Aabb| (level.classes.0..=level.classes.1).contains(&size_class_of(b.extents()));
     let sample: Vec<Aabb> = summary.sample.iter().filter(of_level).copied().collect();
     let wanted = options.boxes_per_cell.max(1.0);
@@ -116,7 +123,8 @@ fn edge(level: &SizeRange, summary: &Summary, space: [f32; 3], options: &GpuOpti
     // A box crosses at most one border more than it has cell lengths, and one more by rounding.
     let smallest = f64::from(largest) * 1.001 / f64::from(MAX_SPAN - 2);
     let most = OCCUPANCY_LIMIT * f64::from(wanted);
-    with_limited_occupancy(&sample, level.all.boxes, f64::from(cell), smallest, most).max(smallest)
+    let even = f64::from(cell) * f64::from(cell_factor);
+    with_limited_occupancy(&sample, level.all.boxes, even, smallest, most).max(smallest)
 }
 
 /// Returns a cell size at which a box has at most `most` other boxes in its cell, as the sample tells.

@@ -26,10 +26,10 @@ pub(super) struct KeptPlan {
 }
 
 impl KeptPlan {
-    /// Plans for boxes, on a device with buffers of at most this size.
-    pub(super) fn new(boxes: &[Aabb], options: &GpuOptions, max_bytes: u64) -> Self {
+    /// Plans for boxes, with a factor on the cells, on a device with buffers of at most this size.
+    pub(super) fn new(boxes: &[Aabb], (options, cell_factor): (&GpuOptions, f32), max_bytes: u64) -> Self {
         let summary = Summary::of(boxes);
-        let plan = GpuPlan::new(&summary, options, (max_bytes / 8).min(MAX_CELLS) as u32);
+        let plan = GpuPlan::new(&summary, options, cell_factor, (max_bytes / 8).min(MAX_CELLS) as u32);
         Self { plan, boxes: boxes.len() as u64, pairs: summary.pairs(), first_work: None }
     }
 
@@ -68,7 +68,7 @@ mod tests {
 
     fn kept(boxes: usize) -> KeptPlan {
         let cubes: Vec<_> = (0..boxes).map(|i| Aabb::from_center([i as f32, 0.0, 0.0], [0.5; 3])).collect();
-        KeptPlan::new(&cubes, &GpuOptions::DEFAULT, 1 << 23)
+        KeptPlan::new(&cubes, (&GpuOptions::DEFAULT, 1.0), 1 << 23)
     }
 
     fn counted(valid: u32, entries: u32, tests: u32) -> Counters {

@@ -47,6 +47,8 @@ pub(super) struct Session {
     pub(super) timestamps: Option<Timestamps>,
     pub(super) sizes: Sizes,
     pub(super) plan: Option<KeptPlan>,
+    /// Factor on the cells of a new plan: below 1 if this job's first plan made too many tests.
+    pub(super) cell_factor: f32,
     /// Number of boxes of a set that needed parts, and of its parts, until the next window of [`Storage::end_call`].
     pub(super) split: Option<(usize, usize)>,
     /// This job searches for changes instead of all overlaps.
@@ -69,6 +71,7 @@ impl Session {
             timestamps: Timestamps::new(&device, options)?,
             sizes: Sizes::default(),
             plan: None,
+            cell_factor: 1.0,
             split: None,
             finds_changes: false,
             has_pending_changes: false,
@@ -167,11 +170,12 @@ impl Session {
     pub(super) fn add_plan(&mut self, job: &Job<'_>) -> Result<(), GpuError> {
         if job.needs_grid(&self.options) {
             self.plan.take_if(|kept| !kept.suits(job.boxes.len()));
-            let (options, max_bytes) = (&self.options, self.storage.max_buffer_bytes);
+            let (options, factor, max_bytes) =
+                (&self.options, self.cell_factor, self.storage.max_buffer_bytes);
             let report = &mut self.sink.found.report;
             let kept = self.plan.get_or_insert_with(|| {
                 let mut clock = Clock::start();
-                let plan = KeptPlan::new(&job.bounds(), options, max_bytes);
+                let plan = KeptPlan::new(&job.bounds(), (options, factor), max_bytes);
                 report.plan += clock.lap();
                 plan
             });

@@ -11,7 +11,7 @@ use pbig_shaders::Kernel;
 
 /// Returns the kernels' parameters for a grid of the boxes with at most `max_cells` cells. Only what the plan sets is filled in.
 pub fn plan_params(boxes: &[Aabb], options: &GpuOptions, max_cells: u32) -> Params {
-    GpuPlan::new(&Summary::of(boxes), options, max_cells).add_to(Params::default())
+    GpuPlan::new(&Summary::of(boxes), options, 1.0, max_cells).add_to(Params::default())
 }
 
 #[cfg(not(target_arch = "wasm32"))]
