@@ -49,7 +49,7 @@ test_features() {
     powerset-0.36) lint rapier3d-pbig "--manifest-path rapier-0.36/Cargo.toml" parallel gpu debug-render shadow ;;
     *)
         step cargo test --locked --release -p pbig-tests --no-default-features --features "${kind#none}" --test suite -- \
-            calls drop_in upstream shapes restore queries explain random_worlds worlds::a_scene_gives
+            calls drop_in upstream restore queries explain random_worlds worlds::a_scene_gives
         ;;
     esac
 }

@@ -74,7 +74,7 @@ impl Mesh {
     /// Reads the content of a `.ply` file.
     ///
     /// # Errors
-    /// What is wrong and where, in one line.
+    /// The fault and its place, in one line.
     pub fn from_ply(content: impl BufRead) -> Result<Self, String> {
         ply::read(content).and_then(Self::checked).map_err(one_line)
     }
@@ -82,7 +82,7 @@ impl Mesh {
     /// Reads the content of an `.obj` file.
     ///
     /// # Errors
-    /// What is wrong and where, in one line.
+    /// The fault and its place, in one line.
     pub fn from_obj(content: impl BufRead) -> Result<Self, String> {
         obj::read(content).and_then(Self::checked).map_err(one_line)
     }

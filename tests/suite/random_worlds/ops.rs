@@ -25,7 +25,7 @@ pub(super) struct Op {
     pub(super) seed: u64,
 }
 
-/// Who does an operation, and what.
+/// An operation: the part of the world that changes, and how.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Act {
     /// One to three steps.

@@ -62,8 +62,8 @@ impl Churn {
         }
     }
 
-    /// So many updates, `sampled` of them compared with the oracle. In the first fifth memory may grow to what it takes; in a short run
-    /// in the first half.
+    /// Runs a number of updates, and compares `sampled` of them with the oracle. In the first fifth memory may grow to what it takes; in a
+    /// short run in the first half.
     fn run(&mut self, updates: usize, sampled: usize) {
         let (every, tenth) = ((updates / sampled).max(1), (updates / 10).max(1));
         for update in 0..updates {
