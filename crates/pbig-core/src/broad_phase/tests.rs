@@ -326,6 +326,23 @@ fn look_ups_given_up_cost_at_most_64_tests_a_box() {
     assert!(update <= 3 * search / 2 + 64 * n as u64, "{update}, and {search} in a search");
 }
 
+/// Known from counts before any look-up: each changed box would be tested against all the others.
+#[test]
+fn boxes_that_outgrow_the_cells_are_not_looked_up() {
+    let n = 10_000u32;
+    let cube = |id: u32, half: f32| {
+        Aabb::from_center([id % 100, id / 100, 0].map(|x| 2.0 * x as f32), [half, 0.5, 0.5])
+    };
+    let mut broad_phase = BroadPhase::default();
+    (0..n).for_each(|id| broad_phase.set(id, cube(id, 0.5), ProxyFilter::ALL).expect("a small id"));
+    broad_phase.update().expect("few pairs");
+    let search = broad_phase.report().work;
+    (0..n / 25).for_each(|i| assert!(broad_phase.set_aabb(25 * i, cube(25 * i, 0.7))));
+    broad_phase.update().expect("few pairs");
+    let work = broad_phase.report().work;
+    assert!(work <= search + search / 2, "{work}, and {search} in a search");
+}
+
 /// Boxes that were removed leave free lanes, which must not be tested for each of the others.
 #[test]
 fn a_sweep_tests_no_free_lanes_where_most_boxes_changed() {

@@ -168,9 +168,11 @@ impl EditedGrid {
         Plan { algorithm, spilled, ..Plan::of_grid(plan, boxes as usize, oversize.len()) }
     }
 
-    /// Returns the work of looking up `boxes` boxes among the oversize ones, before and after they move.
-    pub(crate) fn work_with_oversize(&self, boxes: usize) -> u64 {
-        2 * boxes as u64 * self.grid.oversize.len() as u64 * WORK_OF_EXACT_TEST
+    /// Returns about the work of looking up boxes among the oversize ones, before and after they move to where `after` yields them.
+    pub(crate) fn work_with_oversize<'a>(&self, after: impl ExactSizeIterator<Item = &'a Aabb>) -> u64 {
+        let (boxes, oversize, cells) = (after.len(), self.grid.oversize.len(), &self.grid.plan.cells);
+        let more = after.filter(|aabb| !cells.takes(aabb) && aabb.is_valid()).count();
+        (boxes * (oversize + more.max(oversize))) as u64 * WORK_OF_EXACT_TEST
     }
 
     /// Returns the number of boxes that are out of the grid's order.

@@ -77,7 +77,7 @@ impl Edit {
     ) -> (bool, u64) {
         let budget = Budget::new(limits.work);
         self.threads.iter_mut().for_each(Thread::clear);
-        if grid.work_with_oversize(world.changed.len()) > limits.work {
+        if grid.work_with_oversize(world.changed.iter().map(|id| &world.boxes[*id as usize])) > limits.work {
             return (false, 0);
         }
         self.list(world, grid);
