@@ -14,18 +14,20 @@ set -euo pipefail
 cd "$(dirname "$0")/.."
 . scripts/common.sh
 
-# sets FEATURE...: prints every set of the features, one a line, separated by commas.
+# sets FEATURE...: prints sets of the features, one a line, separated by commas: none, all, each alone, and all without each. Any two
+# features meet on and off in every way.
 sets() {
-    [ $# -gt 0 ] || { echo && return; }
-    local first=$1 set
-    shift
-    sets "$@" | while read -r set; do
-        echo "$set"
-        echo "$first${set:+,$set}"
+    local feature all
+    all=$(IFS=, && echo "$*")
+    printf '\n%s\n' "$all"
+    [ $# -gt 1 ] || return 0
+    for feature in "$@"; do
+        echo "$feature"
+        echo "$all" | sed "s/\b$feature\b//; s/,,/,/; s/^,//; s/,$//"
     done
 }
 
-# lint PACKAGE OPTIONS FEATURE...: lints a package, and its dependencies of the workspace, with every set of the features.
+# lint PACKAGE OPTIONS FEATURE...: lints a package, and its dependencies of the workspace, with sets of the features.
 lint() {
     local package=$1 options=$2 set
     shift 2
@@ -38,15 +40,15 @@ lint() {
 }
 
 # test_features KIND: none, parallel, simd and deterministic test all that depends on rapier, with this feature of rapier alone
-# (`parallel`, `simd-stable`, `enhanced-determinism`). powerset and powerset-0.36 lint pbig with every set of its features.
+# (`parallel`, `simd-stable`, `enhanced-determinism`). sets and sets-0.36 lint pbig with sets of its features.
 test_features() {
     local kind=$1
     case $kind in
-    powerset)
+    sets)
         lint rapier-pbig "" parallel gpu serde debug-render shadow
         lint pbig-gpu "" wgpu
         ;;
-    powerset-0.36) lint rapier3d-pbig "--manifest-path rapier-0.36/Cargo.toml" parallel gpu debug-render shadow ;;
+    sets-0.36) lint rapier3d-pbig "--manifest-path rapier-0.36/Cargo.toml" parallel gpu debug-render shadow ;;
     *)
         step cargo test --locked --release -p pbig-tests --no-default-features --features "${kind#none}" --test suite -- \
             calls drop_in upstream restore queries explain random_worlds worlds::a_scene_gives

@@ -71,12 +71,9 @@ step_unit() {
     step cargo test -p pbig-gpu --no-default-features --lib --no-fail-fast
 }
 
-step_suite_cpu() {
-    step $without_gpu cargo test --release --test suite
-}
-
-step_suite_gpu() {
-    has_gpu || { left_out "there is no GPU adapter" && return; }
+# With an adapter each test also runs on the GPU.
+step_suite() {
+    has_gpu || { left_out "there is no GPU adapter" && step $without_gpu cargo test --release --test suite --no-fail-fast && return; }
     step cargo test --release --test suite --no-fail-fast
 }
 
@@ -95,11 +92,7 @@ step_doc() {
 }
 
 step_features() {
-    step scripts/extra.sh --no-setup features powerset
-    # Rapier's own features beside those of the suite; one of the other kind for all.
-    local on=''
-    has_gpu || on=$without_gpu
-    step $on scripts/extra.sh --no-setup features deterministic
+    step scripts/extra.sh --no-setup features sets
 }
 
 step_packages() {
@@ -132,13 +125,16 @@ step_docs() {
     step scripts/docs.sh
 }
 
-# The adapters for rapier 0.36, in a workspace of its own: cargo replaces rapier there by a patched copy.
+# The adapters for rapier 0.36, in a workspace of its own: cargo replaces rapier there by a patched copy. One target folder: what
+# both workspaces need is built once.
 step_rapier_0_36() {
+    export CARGO_TARGET_DIR
+    CARGO_TARGET_DIR=$(target_folder)
     step scripts/patch-rapier.sh rapier-0.36
     step cargo fmt --all $in_036 --check
     # `--locked` checks the lock file without a download of bevy.
     step cargo clippy --locked --release $in_036 $members_036 $features_036 --all-targets -- -D warnings
-    step scripts/extra.sh --no-setup features powerset-0.36
+    step scripts/extra.sh --no-setup features sets-0.36
     step cargo test --release $in_036 $members_036 $features_036 --no-fail-fast
     step cargo clippy --locked --release $in_036 $others_036 --all-targets -- -D warnings
     step env PBIG_RUNS=100 PBIG_BODIES=80 cargo test --release $in_036 $others_036 --no-fail-fast
@@ -188,7 +184,7 @@ run_step() {
     all_passed=$((all_passed + passed)) all_failed=$((all_failed + failed)) all_skipped=$((all_skipped + skipped))
 }
 
-all="setup fmt clippy unit suite-cpu suite-gpu gpu doc features packages wasm examples docs rapier-0.36"
+all="setup fmt clippy unit suite gpu doc features packages wasm examples docs rapier-0.36"
 if [ "${1:-}" = --no-setup ]; then
     all=${all#setup }
     shift
