@@ -7,7 +7,8 @@
 use crate::bounds::{Bounds, BoxStore, Scalar};
 use crate::{SceneQuery, policy};
 use pbig_core::{Aabb, BroadPhase, Error, Events, Pair, ProxyFilter};
-use std::collections::HashSet;
+use std::iter::Peekable;
+use std::vec::IntoIter;
 
 /// A closed AABB in f64. It is valid if `min <= max` on all axes.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -83,8 +84,8 @@ pub struct WideBoxes {
     /// Ids of boxes that have changed since the last update, repeated or not.
     changed: Vec<u32>,
     has_removed: bool,
-    /// Candidates whose f64 boxes do not overlap.
-    apart: HashSet<Pair>,
+    /// Candidates whose f64 boxes do not overlap, sorted.
+    apart: Vec<Pair>,
     events: Events,
 }
 
@@ -150,28 +151,52 @@ impl WideBoxes {
         })
     }
 
-    /// Tests the candidates that are new or have changed.
-    fn test_candidates(&mut self, core: &BroadPhase) {
+    /// Tests the candidates that are new or have changed. `old` are those that were no pairs before, new ones included, sorted.
+    fn test_candidates(&mut self, core: &BroadPhase, old: Vec<Pair>) {
         self.changed.sort_unstable();
         self.changed.dedup();
         let is_few = self.changed.len() * policy::WIDE_LOOKUPS < core.id_count() as usize;
-        let mut tested: Vec<Pair> = if is_few {
-            self.changed.iter().flat_map(|&id| core.pairs_of(id)).collect()
+        let mut old = old.into_iter().peekable();
+        if is_few {
+            let of_changed = self.changed.iter().flat_map(|&id| core.pairs_of(id));
+            let mut tested: Vec<Pair> = of_changed.chain(core.events().added.iter().copied()).collect();
+            tested.sort_unstable();
+            tested.dedup();
+            tested.into_iter().for_each(|pair| self.test(pair, &mut old));
         } else {
-            core.pairs().collect()
-        };
-        tested.extend(&core.events().added);
-        tested.into_iter().for_each(|pair| self.test(pair));
+            core.pairs().for_each(|pair| self.test(pair, &mut old));
+        }
+        // Those that were not tested are still apart.
+        self.apart.extend(old);
     }
 
-    fn test(&mut self, pair: Pair) {
-        if !self.get(pair.a).overlaps(&self.get(pair.b)) {
-            if self.apart.insert(pair) {
-                self.events.removed.push(pair);
-            }
-        } else if !self.apart.is_empty() && self.apart.remove(&pair) {
-            self.events.added.push(pair);
+    /// Tests a candidate. The next one is a later pair.
+    #[inline(always)]
+    fn test(&mut self, pair: Pair, old: &mut Peekable<IntoIter<Pair>>) {
+        while let Some(still_apart) = old.next_if(|other| *other < pair) {
+            self.apart.push(still_apart);
         }
+        let was_pair = old.next_if_eq(&pair).is_none();
+        let is_pair = self.boxes[pair.a as usize].overlaps(&self.boxes[pair.b as usize]);
+        if !is_pair {
+            self.apart.push(pair);
+        }
+        if is_pair != was_pair {
+            let events = if is_pair { &mut self.events.added } else { &mut self.events.removed };
+            events.push(pair);
+        }
+    }
+
+    /// Returns the candidates that were no pairs before an update of the core, sorted.
+    fn no_pairs_before(&mut self, core: &BroadPhase) -> Vec<Pair> {
+        let mut old = std::mem::take(&mut self.apart);
+        if self.has_removed || !core.events().removed.is_empty() {
+            old.retain(|pair| core.has_pair(*pair));
+        }
+        old.extend(&core.events().added);
+        old.sort_unstable();
+        old.dedup();
+        old
     }
 }
 
@@ -248,27 +273,21 @@ impl BoxStore<WideAabb> for WideBoxes {
     }
 
     fn update<'a>(&'a mut self, core: &'a mut BroadPhase) -> Result<&'a Events, Error> {
-        self.events = Events::default();
-        let found = core.update()?;
-        for pair in &found.removed {
-            if !self.apart.remove(pair) {
-                self.events.removed.push(*pair);
-            }
-        }
-        // Apart until they are tested.
-        self.apart.extend(&found.added);
-        self.test_candidates(core);
+        self.events.added.clear();
+        self.events.removed.clear();
+        core.update()?;
+        let ended = core.events().removed.iter().filter(|pair| self.apart.binary_search(pair).is_err());
+        self.events.removed.extend(ended);
+        let old = self.no_pairs_before(core);
+        self.test_candidates(core, old);
         self.changed.clear();
-        if std::mem::take(&mut self.has_removed) {
-            self.apart.retain(|pair| core.has_pair(*pair));
-        }
-        self.events.added.sort_unstable();
+        self.has_removed = false;
         self.events.removed.sort_unstable();
         Ok(&self.events)
     }
 
     fn admits(&self, pair: &Pair) -> bool {
-        !self.apart.contains(pair)
+        self.apart.binary_search(pair).is_err()
     }
 
     fn pair_count(&self, core: &BroadPhase) -> usize {

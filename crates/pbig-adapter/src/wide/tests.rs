@@ -2,6 +2,7 @@
 
 use super::*;
 use pbig_core::Config;
+use std::collections::HashSet;
 
 const MARGIN: f32 = 0.04;
 
