@@ -4,7 +4,7 @@ use crate::PbigConfig;
 use crate::call::Call;
 use crate::scene::{handle, to_event, to_pair};
 use crate::tree::ParryTree;
-use pbig_adapter::{Colliders, Error, HandlePair, Why};
+use pbig_adapter::{Colliders, Error, HandlePair, Margins, Why};
 use rapier3d::prelude::{
     BroadPhase, BroadPhasePairEvent, ColliderHandle, ColliderPair, ColliderSet, IntegrationParameters,
     NarrowPhase, RigidBodySet,
@@ -113,10 +113,11 @@ impl PbigBroadPhase {
     fn handle(&mut self, call: &Call<'_>, events: &mut Vec<BroadPhasePairEvent>) {
         #[cfg(feature = "shadow")]
         let (start, rescans) = (events.len(), self.stats().totals.rescans);
-        let margin = self.relative_margin * call.params.length_unit;
+        let usual = self.relative_margin * call.params.length_unit;
         #[cfg(feature = "shadow")]
         let adopted = self.colliders.adopted().to_vec();
-        self.colliders.update(call, margin, |event| events.push(to_event(event)));
+        let margins = Margins { usual, ..Margins::default() };
+        self.colliders.update(call, &margins, |event| events.push(to_event(event)));
         #[cfg(feature = "shadow")]
         if let Some(watcher) = &mut self.shadow {
             if self.colliders.stats().totals.rescans > rescans {

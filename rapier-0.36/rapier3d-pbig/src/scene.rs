@@ -2,9 +2,9 @@
 
 use crate::tree::from_tree;
 use crate::{Bounds, to_f32};
-use pbig_adapter::{BodyKind, Bounds as _, Groups, Handle, Proxy, ProxyFilter, Scene, filter_of, size_class};
+use pbig_adapter::{BodyKind, Groups, Handle, Margins, Proxy, ProxyFilter, Scene, filter_of, size_class};
 use pbig_core::TestMode;
-use rapier::math::{DIM, Real};
+use rapier::math::DIM;
 use rapier::parry::bounding_volume::Aabb as TreeAabb;
 use rapier::prelude::*;
 use std::ops::Range;
@@ -13,7 +13,7 @@ use std::ops::Range;
 #[derive(Clone, Copy)]
 pub(crate) struct Call<'a> {
     pub(crate) params: &'a IntegrationParameters,
-    pub(crate) adaptive_margin: bool,
+    pub(crate) margins: Margins,
     pub(crate) colliders: &'a ColliderSet,
     pub(crate) bodies: &'a RigidBodySet,
     pub(crate) modified: &'a [ColliderHandle],
@@ -60,6 +60,13 @@ impl Call<'_> {
     }
 }
 
+/// Returns the margins of an update. `relative` is the usual one in units of `length_unit`.
+pub(crate) fn margins(relative: f32, params: &IntegrationParameters, is_adaptive: bool) -> Margins {
+    let unit = to_f32(params.length_unit);
+    let limits = [crate::MARGIN, crate::MAX_ADAPTIVE_MARGIN].map(|margin| margin * unit);
+    Margins { usual: relative * unit, adaptive: is_adaptive.then_some(limits), axes: DIM }
+}
+
 pub(crate) fn groups_of(groups: InteractionGroups) -> Groups {
     let mode = match groups.test_mode {
         InteractionTestMode::And => TestMode::And,
@@ -69,14 +76,6 @@ pub(crate) fn groups_of(groups: InteractionGroups) -> Groups {
 }
 
 pbig_adapter::define_conversions!();
-
-/// Returns the margin of rapier's `adaptive_change_detection_margin`: an eighth of the box's smallest extent, within limits.
-#[inline(always)]
-pub(crate) fn own_margin(aabb: &Bounds, length_unit: f32) -> f32 {
-    let [min, max] = aabb.corners();
-    let extent = (0..DIM).map(|k| max[k] - min[k]).fold(Real::INFINITY, Real::min);
-    (0.125 * to_f32(extent)).max(crate::MARGIN * length_unit).min(crate::MAX_ADAPTIVE_MARGIN * length_unit)
-}
 
 impl Scene for Call<'_> {
     type Aabb = Bounds;
@@ -108,10 +107,5 @@ impl Scene for Call<'_> {
     fn size(&self, handle: Handle) -> u8 {
         let shape = self.colliders.get(to_handle(handle)).map(Collider::shape);
         shape.map_or(0, |shape| size_class(to_f32(shape.compute_local_aabb().half_extents().max_element())))
-    }
-
-    #[inline(always)]
-    fn margin(&self, aabb: &Bounds) -> Option<f32> {
-        self.adaptive_margin.then(|| own_margin(aabb, to_f32(self.params.length_unit)))
     }
 }

@@ -4,9 +4,9 @@
 
 pub use pbig_adapter::shadow::{Checker, Difference, Fault, ReplayError, Shadow, Side, View, write_frames};
 
-use crate::scene::{Call, groups_of, handle, of_events, to_handle};
+use crate::scene::{Call, groups_of, handle, margins, of_events, to_handle};
 use crate::tree::from_tree;
-use crate::{Bounds, PairFinder, PbigFinder, SceneQuery, to_f32};
+use crate::{Bounds, PairFinder, PbigFinder, SceneQuery};
 use pbig_adapter::shadow::Watched;
 use pbig_adapter::{Bounds as _, Handle, HandlePair, PairEvent};
 use rapier::math::Real;
@@ -91,8 +91,7 @@ impl<F> Shadowed<F> {
         let stock = self.update_stock(call);
         let (events, removed) = (of_events(events), removed(call));
         let is_modified = std::mem::take(&mut self.has_moved) || !call.modified.is_empty();
-        let relative = if call.adaptive_margin { crate::MAX_ADAPTIVE_MARGIN } else { self.relative_margin };
-        let (margin, stock) = (relative * to_f32(call.params.length_unit), stock.as_deref());
+        let (margin, stock) = (call.margins.largest(), stock.as_deref());
         let (removed, events) = (&removed[..], &events[..]);
         self.checker.watch(&Watched { view: call, margin, removed, is_modified, events, stock });
     }
@@ -105,7 +104,7 @@ impl<F> Shadowed<F> {
         let (Call { params, colliders, bodies, modified, removed, .. }, mut events) = (*call, Vec::new());
         let first = !std::mem::replace(&mut self.has_started, true);
         self.guard(|stock| {
-            stock.adaptive_change_detection_margin = call.adaptive_margin;
+            stock.adaptive_change_detection_margin = call.margins.adaptive.is_some();
             if first {
                 show_all(stock, call, &mut events);
             }
@@ -138,7 +137,8 @@ impl<F: PairFinder + Clone> PairFinder for Shadowed<F> {
     ) {
         let start = events.len();
         self.inner.update(params, adaptive_margin, colliders, bodies, modified, removed, events);
-        let call = Call { params, adaptive_margin, colliders, bodies, modified, removed };
+        let margins = margins(self.relative_margin, params, adaptive_margin);
+        let call = Call { params, margins, colliders, bodies, modified, removed };
         self.watch(&call, &events[start..]);
     }
 
