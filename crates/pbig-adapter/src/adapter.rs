@@ -147,3 +147,94 @@ macro_rules! define_conversions {
         }
     };
 }
+
+/// Defines `ParryTree` with parry's type of corners. The optional function moves leaves, and returns true, if these are few.
+#[doc(hidden)]
+#[macro_export]
+macro_rules! define_tree {
+    ($Corner:ident $(, $move_few:ident)?) => {
+        #[derive(Clone, Default)]
+        pub(crate) struct ParryTree {
+            pub(crate) bvh: Bvh,
+            workspace: BvhWorkspace,
+        }
+
+        impl std::fmt::Debug for ParryTree {
+            fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+                self.bvh.fmt(f)
+            }
+        }
+
+        impl $crate::Tree for ParryTree {
+            type Aabb = Bounds;
+
+            fn build(leaves: impl Iterator<Item = (u32, Bounds)> + Clone) -> Self {
+                let leaves = leaves.map(|(id, aabb)| (id as usize, to_tree(&aabb)));
+                Self { bvh: Bvh::from_iter(BvhBuildStrategy::Binned, leaves), workspace: BvhWorkspace::default() }
+            }
+
+            /// Removals leave nodes behind that parry 0.22's optimiser may take for leaves. Refitting drops these nodes.
+            fn remove(&mut self, gone: &[u32]) {
+                gone.iter().for_each(|&id| self.bvh.remove(id));
+                self.bvh.refit(&mut self.workspace);
+            }
+
+            fn update(&mut self, leaves: impl Iterator<Item = (u32, Bounds)>) {
+                let leaves: Vec<_> = leaves.map(|(id, aabb)| (id, to_tree(&aabb))).collect();
+                $(if $move_few(&mut self.bvh, &leaves) {
+                    return;
+                })?
+                for (id, aabb) in leaves {
+                    _ = self.bvh.insert_or_update_partially(aabb, id, 0.0);
+                }
+                self.bvh.optimize_incremental(&mut self.workspace);
+                self.bvh.refit(&mut self.workspace);
+            }
+        }
+
+        /// Clamps infinite boxes to the size of rapier's half-spaces, because the tree computes centres.
+        pub(crate) fn to_tree(aabb: &Bounds) -> TreeAabb {
+            let corner = |corner: [Real; 3]| {
+                let clamped = |k: usize| corner[k].clamp(Real::MIN / 2.0, Real::MAX / 2.0);
+                $Corner::from(std::array::from_fn::<Real, DIM, _>(clamped))
+            };
+            let [min, max] = $crate::Bounds::corners(aabb);
+            TreeAabb::new(corner(min), corner(max))
+        }
+    };
+}
+
+/// Implements `debug_render` for a type with a field `colliders`. `$unmoved` and `$unscaled` are arguments of rapier's renderer.
+#[doc(hidden)]
+#[macro_export]
+macro_rules! define_debug_render {
+    ($Type:ident, $unmoved:expr, $unscaled:expr) => {
+        impl $Type {
+            /// Draws the stored boxes and cells as lines, through the renderer that also draws rapier's own pictures. Each is passed
+            /// as a [`DebugRenderObject::ColliderAabb`], a cell with the first collider in it. Few boxes have no cells, because they
+            /// need no grid. A GPU shows no cells.
+            pub fn debug_render(
+                &self,
+                colliders: &ColliderSet,
+                parts: $crate::DebugRenderParts,
+                backend: &mut dyn DebugRenderBackend,
+            ) {
+                for drawn in self.colliders.drawn(parts, |handle| colliders.contains(to_handle(handle))) {
+                    let (handle, aabb) = (to_handle(drawn.collider), to_tree(&drawn.aabb));
+                    let object = DebugRenderObject::ColliderAabb(handle, &colliders[handle], &aabb);
+                    if backend.filter_object(object) {
+                        let edges = Aabb::EDGES_VERTEX_IDS.map(|(a, b)| [a as u32, b as u32]);
+                        backend.draw_polyline(
+                            object,
+                            &aabb.vertices(),
+                            &edges,
+                            $unmoved,
+                            $unscaled,
+                            drawn.color,
+                        );
+                    }
+                }
+            }
+        }
+    };
+}

@@ -3,37 +3,17 @@
 use crate::PbigFinder;
 use crate::scene::to_handle;
 use crate::tree::to_tree;
-use pbig_adapter::DebugRenderParts;
 use rapier::math::{Pose, Vector};
-use rapier::parry::bounding_volume::Aabb as DrawnAabb;
+use rapier::parry::bounding_volume::Aabb;
 use rapier::pipeline::{DebugRenderBackend, DebugRenderObject};
 use rapier::prelude::ColliderSet;
 
-impl PbigFinder {
-    /// Draws the stored boxes and cells as lines, through the renderer that also draws rapier's own pictures. Each is passed as
-    /// a [`DebugRenderObject::ColliderAabb`], a cell with the first collider in it. Few boxes have no cells, because
-    /// they need no grid. A GPU shows no cells.
-    pub fn debug_render(
-        &self,
-        colliders: &ColliderSet,
-        parts: DebugRenderParts,
-        backend: &mut dyn DebugRenderBackend,
-    ) {
-        for drawn in self.colliders.drawn(parts, |handle| colliders.contains(to_handle(handle))) {
-            let (handle, aabb) = (to_handle(drawn.collider), to_tree(&drawn.aabb));
-            let object = DebugRenderObject::ColliderAabb(handle, &colliders[handle], &aabb);
-            if backend.filter_object(object) {
-                let edges = DrawnAabb::EDGES_VERTEX_IDS.map(|(a, b)| [a as u32, b as u32]);
-                let (pose, scale) = (Pose::IDENTITY, Vector::ONE);
-                backend.draw_polyline(object, &aabb.vertices(), &edges, &pose, scale, drawn.color);
-            }
-        }
-    }
-}
+pbig_adapter::define_debug_render!(PbigFinder, &Pose::IDENTITY, Vector::ONE);
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::DebugRenderParts;
     use rapier::prelude::*;
 
     #[derive(Default)]
