@@ -108,11 +108,62 @@ macro_rules! define_methods {
     };
 }
 
-/// Defines the conversions between rapier's handles, pairs and events and those of this crate.
+/// Implements [`crate::Scene`] for `Call`, the arguments of rapier's call, which has a function `for_each_of`. Defines the conversions
+/// between rapier's handles, pairs and events and those of this crate. `$largest` returns the largest number of a vector.
 #[doc(hidden)]
 #[macro_export]
-macro_rules! define_conversions {
-    () => {
+macro_rules! define_scene {
+    ($largest:ident) => {
+        /// An AABB in rapier's numbers.
+        pub(crate) type Bounds = <Real as $crate::Scalar>::Aabb;
+
+        impl $crate::Scene for Call<'_> {
+            type Aabb = Bounds;
+
+            fn collider_count(&self) -> usize {
+                self.colliders.len()
+            }
+
+            fn listed_count(&self) -> usize {
+                self.modified.len()
+            }
+
+            fn for_each_listed(
+                &self,
+                range: std::ops::Range<usize>,
+                take: impl FnMut($crate::Handle, $crate::Proxy<Bounds>),
+            ) {
+                self.for_each_of(&self.modified[range], take);
+            }
+
+            fn for_each_collider(&self, take: impl FnMut($crate::Handle, $crate::Proxy<Bounds>)) {
+                let all: Vec<ColliderHandle> = self.colliders.iter().map(|(handle, _)| handle).collect();
+                self.for_each_of(&all, take);
+            }
+
+            fn removed(&self) -> impl Iterator<Item = ($crate::Handle, bool)> {
+                self.removed.iter().map(|&removed| (handle(removed), self.colliders.contains(removed)))
+            }
+
+            #[allow(clippy::unnecessary_cast, reason = "rapier's numbers are f32 or f64")]
+            fn size(&self, handle: $crate::Handle) -> u8 {
+                let shape = self.colliders.get(to_handle(handle)).map(Collider::shape);
+                let extent = |shape: &dyn Shape| shape.compute_local_aabb().half_extents().$largest();
+                shape.map_or(0, |shape| $crate::size_class(extent(shape) as f32))
+            }
+        }
+
+        pub(crate) fn parent_of<'a>(bodies: &'a RigidBodySet, collider: &Collider) -> Option<&'a RigidBody> {
+            collider.parent().and_then(|handle| bodies.get(handle))
+        }
+
+        #[inline(always)]
+        fn filter_with(body: Option<&RigidBody>, collider: &Collider) -> $crate::ProxyFilter {
+            let parent = collider.parent().map(|handle| handle.into_raw_parts().into());
+            let types = collider.active_collision_types().bits();
+            $crate::filter_of(parent, kind_of(body), types, groups_of(collider.collision_groups()))
+        }
+
         pub(crate) fn handle(handle: ColliderHandle) -> $crate::Handle {
             handle.into_raw_parts().into()
         }

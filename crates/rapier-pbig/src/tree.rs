@@ -1,6 +1,6 @@
 //! The tree for scene queries: parry's, in the version of rapier 0.27.
 
-use pbig_adapter::Aabb as Bounds;
+use crate::scene::Bounds;
 use rapier3d::math::{DIM, Real};
 use rapier3d::parry::bounding_volume::Aabb as TreeAabb;
 use rapier3d::parry::partitioning::{Bvh, BvhBuildStrategy, BvhWorkspace};

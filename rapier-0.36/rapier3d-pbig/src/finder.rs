@@ -1,8 +1,8 @@
 //! `PbigFinder`: translates rapier's calls into calls of the core.
 
-use crate::scene::{Call, handle, margins, to_event, to_handle, to_pair};
+use crate::scene::{Bounds, Call, handle, margins, to_event, to_handle, to_pair};
 use crate::tree::{ParryTree, from_tree, spatial, to_tree};
-use crate::{Bounds, PairFinder, PbigConfig, SceneQuery};
+use crate::{PairFinder, PbigConfig, SceneQuery};
 use pbig_adapter::{Bounds as _, Colliders, HandlePair, Why};
 use rapier::math::Real;
 use rapier::parry::bounding_volume::Aabb as TreeAabb;

@@ -4,9 +4,9 @@
 
 pub use pbig_adapter::shadow::{Checker, Difference, Fault, ReplayError, Shadow, Side, View, write_frames};
 
-use crate::scene::{Call, groups_of, handle, margins, of_events, to_handle};
+use crate::scene::{Bounds, Call, groups_of, handle, kind_of, margins, of_events, parent_of, to_handle};
 use crate::tree::from_tree;
-use crate::{Bounds, PairFinder, PbigFinder, SceneQuery};
+use crate::{PairFinder, PbigFinder, SceneQuery};
 use pbig_adapter::shadow::Watched;
 use pbig_adapter::{Bounds as _, Handle, HandlePair, PairEvent};
 use rapier::math::Real;
@@ -221,7 +221,7 @@ impl View for Call<'_> {
         Some(Side {
             aabb: self.aabb(wanted).map(|aabb| aabb.to_f32()),
             parent: collider.parent().map(|body| body.into_raw_parts().into()),
-            body_type: self.kind(collider),
+            body_type: kind_of(parent_of(self.bodies, collider)),
             active_collision_types: collider.active_collision_types().bits(),
             groups: groups_of(collider.collision_groups()),
         })

@@ -1,6 +1,6 @@
 //! The tree for scene queries and CCD: parry's, as rapier's own broad phase keeps it.
 
-use crate::Bounds;
+use crate::scene::Bounds;
 use pbig_adapter::Bounds as _;
 use rapier::math::{DIM, Real, Vector};
 use rapier::parry::bounding_volume::Aabb as TreeAabb;
