@@ -182,20 +182,6 @@ macro_rules! define_scene {
                 $crate::PairEvent::Delete(pair) => BroadPhasePairEvent::DeletePair(to_pair(pair)),
             }
         }
-
-        #[cfg(feature = "shadow")]
-        pub(crate) fn of_pair(pair: &ColliderPair) -> $crate::HandlePair {
-            $crate::HandlePair(handle(pair.collider1), handle(pair.collider2))
-        }
-
-        #[cfg(feature = "shadow")]
-        pub(crate) fn of_events(events: &[BroadPhasePairEvent]) -> Vec<$crate::PairEvent> {
-            let of = |event: &BroadPhasePairEvent| match event {
-                BroadPhasePairEvent::AddPair(pair) => $crate::PairEvent::Add(of_pair(pair)),
-                BroadPhasePairEvent::DeletePair(pair) => $crate::PairEvent::Delete(of_pair(pair)),
-            };
-            events.iter().map(of).collect()
-        }
     };
 }
 
@@ -286,6 +272,110 @@ macro_rules! define_debug_render {
                     }
                 }
             }
+        }
+    };
+}
+
+/// Implements [`crate::shadow::View`] for `Call`, which has functions `aabb_of_stock` and `reaches_further_with`, and updates rapier's own
+/// broad phase. `$distance` returns the distance between the shapes of two colliders.
+#[doc(hidden)]
+#[macro_export]
+macro_rules! define_view {
+    ($distance:ident) => {
+        impl Call<'_> {
+            fn find_enabled(&self, wanted: $crate::Handle) -> Option<&Collider> {
+                self.colliders.get(to_handle(wanted)).filter(|collider| collider.is_enabled())
+            }
+        }
+
+        impl $crate::shadow::View for Call<'_> {
+            fn enabled(&self) -> Vec<$crate::Handle> {
+                self.colliders.iter_enabled().map(|(each, _)| handle(each)).collect()
+            }
+
+            fn side(&self, wanted: $crate::Handle) -> Option<Side> {
+                let collider = self.colliders.get(to_handle(wanted))?;
+                Some(Side {
+                    aabb: self.aabb(wanted).map(|aabb| $crate::Bounds::to_f32(&aabb)),
+                    parent: collider.parent().map(|body| body.into_raw_parts().into()),
+                    body_type: kind_of(parent_of(self.bodies, collider)),
+                    active_collision_types: collider.active_collision_types().bits(),
+                    groups: groups_of(collider.collision_groups()),
+                })
+            }
+
+            fn aabb(&self, wanted: $crate::Handle) -> Option<Bounds> {
+                self.find_enabled(wanted).map(|collider| self.aabb_of_stock(to_handle(wanted), collider))
+            }
+
+            fn allowed(&self, pair: HandlePair) -> bool {
+                let (Some(a), Some(b)) = (self.find_enabled(pair.0), self.find_enabled(pair.1)) else {
+                    return false;
+                };
+                let same_body = a.parent().is_some() && a.parent() == b.parent();
+                let [x, y] = [a, b].map(|collider| {
+                    parent_of(self.bodies, collider).map_or(RigidBodyType::Fixed, RigidBody::body_type)
+                });
+                let kinds = a.active_collision_types().test(x, y) || b.active_collision_types().test(x, y);
+                !same_body && kinds && a.collision_groups().test(b.collision_groups())
+            }
+
+            /// Parry 0.22's contact query between a cuboid and a compound can report a penetration for shapes 0.08 apart (in the
+            /// scene `compounds`), so its distance query must agree. If parry cannot compare the shapes, their AABBs decide.
+            fn in_contact(&self, pair: HandlePair) -> bool {
+                let (Some(x), Some(y)) = (self.find_enabled(pair.0), self.find_enabled(pair.1)) else {
+                    return false;
+                };
+                let reach = self.params.prediction_distance() + x.contact_skin() + y.contact_skin();
+                match contact(x.position(), x.shape(), y.position(), y.shape(), reach) {
+                    Ok(found) => found.is_some() && !$distance(x, y).is_some_and(|apart| apart > reach),
+                    Err(_) => self
+                        .aabb(pair.0)
+                        .zip(self.aabb(pair.1))
+                        .is_some_and(|(a, b)| $crate::Bounds::overlaps(&a, &b)),
+                }
+            }
+
+            fn reaches_further(&self, wanted: $crate::Handle) -> bool {
+                let collider = self.find_enabled(wanted);
+                let body = collider.and_then(|collider| parent_of(self.bodies, collider));
+                collider.zip(body).is_some_and(|(collider, body)| self.reaches_further_with(collider, body))
+            }
+        }
+
+        /// Updates stock, and returns its events unless it panics. The world may be older than stock, so stock sees all colliders
+        /// before its first update. It skips colliders that have not changed, so a copy of them is marked as changed.
+        pub(super) fn update_stock(
+            stock: &mut $crate::shadow::Stock<BroadPhaseBvh>,
+            call: &Call<'_>,
+        ) -> Option<Vec<$crate::PairEvent>> {
+            let (Call { params, bodies, modified, removed, .. }, mut events) = (*call, Vec::new());
+            let is_first = stock.starts();
+            stock.guard(|stock| {
+                if is_first {
+                    let mut colliders = call.colliders.clone();
+                    let all: Vec<_> = colliders.iter_enabled().map(|(handle, _)| handle).collect();
+                    for &handle in &all {
+                        let pose = *colliders[handle].position();
+                        colliders[handle].set_position(pose);
+                    }
+                    stock.update(params, &colliders, bodies, &all, &[], &mut events);
+                }
+                stock.update(params, call.colliders, bodies, modified, removed, &mut events);
+            })?;
+            Some(of_events(&events))
+        }
+
+        pub(super) fn of_pair(pair: &ColliderPair) -> $crate::HandlePair {
+            $crate::HandlePair(handle(pair.collider1), handle(pair.collider2))
+        }
+
+        pub(super) fn of_events(events: &[BroadPhasePairEvent]) -> Vec<$crate::PairEvent> {
+            let of = |event: &BroadPhasePairEvent| match event {
+                BroadPhasePairEvent::AddPair(pair) => $crate::PairEvent::Add(of_pair(pair)),
+                BroadPhasePairEvent::DeletePair(pair) => $crate::PairEvent::Delete(of_pair(pair)),
+            };
+            events.iter().map(of).collect()
         }
     };
 }
