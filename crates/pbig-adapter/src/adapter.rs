@@ -260,15 +260,8 @@ macro_rules! define_debug_render {
                     let (handle, aabb) = (to_handle(drawn.collider), to_tree(&drawn.aabb));
                     let object = DebugRenderObject::ColliderAabb(handle, &colliders[handle], &aabb);
                     if backend.filter_object(object) {
-                        let edges = Aabb::EDGES_VERTEX_IDS.map(|(a, b)| [a as u32, b as u32]);
-                        backend.draw_polyline(
-                            object,
-                            &aabb.vertices(),
-                            &edges,
-                            $unmoved,
-                            $unscaled,
-                            drawn.color,
-                        );
+                        let (vertices, edges) = (aabb.vertices(), $crate::box_edges(DIM));
+                        backend.draw_polyline(object, &vertices, &edges, $unmoved, $unscaled, drawn.color);
                     }
                 }
             }

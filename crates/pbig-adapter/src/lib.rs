@@ -36,7 +36,7 @@ mod wide;
 
 pub use bounds::{Bounds, BoxStore, CoreBoxes, Scalar};
 pub use colliders::Colliders;
-pub use drawn::{DebugRenderParts, DrawnBox};
+pub use drawn::{DebugRenderParts, DrawnBox, box_edges};
 pub use events::PairEvent;
 pub use filter::{BodyKind, Groups, accepted_kinds, filter_of};
 pub use handle::{Handle, HandlePair};

@@ -3,7 +3,7 @@
 use crate::PbigBroadPhase;
 use crate::scene::to_handle;
 use crate::tree::to_tree;
-use rapier3d::parry::bounding_volume::Aabb;
+use rapier3d::math::DIM;
 use rapier3d::pipeline::{DebugRenderBackend, DebugRenderObject};
 use rapier3d::prelude::{ColliderSet, Isometry, Vector};
 
