@@ -52,6 +52,12 @@ macro_rules! define_config {
 #[macro_export]
 macro_rules! define_methods {
     ($Type:ident) => {
+        impl Default for $Type {
+            fn default() -> Self {
+                Self::with_config(PbigConfig::DEFAULT).expect("the default margin is a length")
+            }
+        }
+
         impl $Type {
             /// Creates a finder without colliders.
             ///
@@ -145,11 +151,10 @@ macro_rules! define_scene {
                 self.removed.iter().map(|&removed| (handle(removed), self.colliders.contains(removed)))
             }
 
-            #[allow(clippy::unnecessary_cast, reason = "rapier's numbers are f32 or f64")]
             fn size(&self, handle: $crate::Handle) -> u8 {
                 let shape = self.colliders.get(to_handle(handle)).map(Collider::shape);
                 let extent = |shape: &dyn Shape| shape.compute_local_aabb().half_extents().$largest();
-                shape.map_or(0, |shape| $crate::size_class(extent(shape) as f32))
+                shape.map_or(0, |shape| $crate::size_class($crate::Scalar::to_f32(extent(shape))))
             }
         }
 

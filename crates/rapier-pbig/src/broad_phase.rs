@@ -26,12 +26,6 @@ pub struct PbigBroadPhase {
     pub(crate) shadow: Option<Box<crate::shadow::Watcher>>,
 }
 
-impl Default for PbigBroadPhase {
-    fn default() -> Self {
-        Self::new()
-    }
-}
-
 impl std::fmt::Debug for PbigBroadPhase {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let mut shown = f.debug_struct("PbigBroadPhase");
@@ -43,7 +37,7 @@ impl std::fmt::Debug for PbigBroadPhase {
 impl PbigBroadPhase {
     /// Creates an empty broad phase with [`PbigConfig::DEFAULT`].
     pub fn new() -> Self {
-        Self::with_config(PbigConfig::DEFAULT).expect("the default margin is a length")
+        Self::default()
     }
 
     /// As [`PbigBroadPhase::with_config`], with any settings of the core; its margin is in units of rapier's `length_unit`.

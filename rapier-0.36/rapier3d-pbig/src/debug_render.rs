@@ -13,6 +13,7 @@ pbig_adapter::define_debug_render!(PbigFinder, &Pose::IDENTITY, Vector::ONE);
 mod tests {
     use super::*;
     use crate::DebugRenderParts;
+    use pbig_adapter::Scalar as _;
     use rapier::prelude::*;
 
     #[derive(Default)]
@@ -48,12 +49,8 @@ mod tests {
         });
         assert_eq!(boxes.lines, 512 * edges);
         // On each side half the prediction distance of 2 cm: new fixed colliders have no margin.
-        let edge = 1.0 + crate::to_f32(params.prediction_distance());
-        assert!(
-            (crate::to_f32(boxes.longest) - edge).abs() < 1e-3,
-            "a ball and its prediction: {}",
-            boxes.longest
-        );
+        let edge = 1.0 + params.prediction_distance().to_f32();
+        assert!((boxes.longest.to_f32() - edge).abs() < 1e-3, "a ball and its prediction: {}", boxes.longest);
         assert!(
             cells.lines % edges == 0 && cells.lines > edges && cells.lines <= 512 * edges,
             "{}",

@@ -20,12 +20,6 @@ pub struct PbigFinder {
     pub(crate) relative_margin: f32,
 }
 
-impl Default for PbigFinder {
-    fn default() -> Self {
-        Self::with_config(PbigConfig::DEFAULT).expect("the default margin is a length")
-    }
-}
-
 impl PbigFinder {
     fn around(core: pbig_core::BroadPhase) -> Self {
         Self { relative_margin: core.config().margin, colliders: Colliders::new(core) }

@@ -1,8 +1,7 @@
 //! Shows rapier's colliders to the part of the broad phase that knows no rapier.
 
-use crate::to_f32;
 use crate::tree::from_tree;
-use pbig_adapter::{BodyKind, Groups, Handle, Margins, Proxy};
+use pbig_adapter::{BodyKind, Groups, Handle, Margins, Proxy, Scalar as _};
 use pbig_core::TestMode;
 use rapier::parry::bounding_volume::Aabb as TreeAabb;
 use rapier::prelude::*;
@@ -56,7 +55,7 @@ pub(crate) fn kind_of(body: Option<&RigidBody>) -> BodyKind {
 
 /// Returns the margins of an update. `relative` is the usual one in units of `length_unit`.
 pub(crate) fn margins(relative: f32, params: &IntegrationParameters, is_adaptive: bool) -> Margins {
-    let unit = to_f32(params.length_unit);
+    let unit = params.length_unit.to_f32();
     let limits = [crate::MARGIN, crate::MAX_ADAPTIVE_MARGIN].map(|margin| margin * unit);
     Margins { usual: relative * unit, adaptive: is_adaptive.then_some(limits), axes: DIM }
 }
