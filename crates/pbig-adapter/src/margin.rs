@@ -34,3 +34,26 @@ impl Margins {
         self.adaptive.map_or(self.usual, |[_, most]| most)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use pbig_core::Aabb;
+
+    #[test]
+    fn an_adaptive_margin_is_an_eighth_of_the_smallest_extent() {
+        let margins = Margins { usual: 0.5, adaptive: Some([0.04, 0.25]), axes: 2 };
+        let own = |margins: Margins, width: f32| margins.own(&Aabb::new([0.0; 3], [width, 9.0, 0.0]), false);
+        assert_eq!([0.1, 1.0, 8.0].map(|width| own(margins, width)), [0.04, 0.125, 0.25].map(Some));
+        assert_eq!(own(Margins { axes: 3, ..margins }, 1.0), Some(0.04), "flat in three dimensions");
+        assert_eq!(own(Margins { adaptive: None, ..margins }, 1.0), None);
+        assert_eq!(margins.largest(), 0.25);
+    }
+
+    #[test]
+    fn a_new_fixed_box_has_at_most_the_margin_of_rounding() {
+        let far = Aabb::new([-4096.0, 0.0, 0.0], [1.0; 3]);
+        let own = |usual| Margins { usual, ..Margins::default() }.own(&far, true);
+        assert_eq!([1.0, 1e-6].map(own), [1.0 / 512.0, 1e-6].map(Some));
+    }
+}
