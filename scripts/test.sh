@@ -139,6 +139,8 @@ step_rapier_0_36() {
     step cargo clippy --locked --release $in_036 $others_036 --all-targets -- -D warnings
     step env PBIG_RUNS=100 PBIG_BODIES=80 cargo test --release $in_036 $others_036 --no-fail-fast
     step cargo test --release $in_036 -p pbig-harness-036 --no-default-features --features enhanced-determinism
+    # The other dimension of the debug renderer.
+    step cargo test --release $in_036 -p rapier2d-pbig --features debug-render --lib
     step cargo run --release $in_036 -p pbig-harness-036 $features_036 --bin bench_step -- --scenes column --bodies 500 \
         --steps 60 --chart "$TMPDIR/steps.svg"
     step env RUSTDOCFLAGS="-D warnings" \

@@ -22,8 +22,8 @@ impl<'a, H: CollisionHooks> Ask<'a, H> {
             |slot: &Slot| self.trees.get_proxy(slot.key).filter(|proxy| proxy.collider == slot.collider);
         let proxies = [proxy(one)?, proxy(other)?];
         let looks = [
-            boxes.has_moved(pair.a) && looks_into(one, proxies[0], other),
-            boxes.has_moved(pair.b) && looks_into(other, proxies[1], one),
+            one.has_moved && looks_into(one, proxies[0], other),
+            other.has_moved && looks_into(other, proxies[1], one),
         ];
         match looks {
             [false, false] => None,

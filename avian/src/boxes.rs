@@ -1,10 +1,8 @@
 //! The boxes of pbig: one for each proxy in avian's trees.
 
-use crate::lost::Lost;
+use crate::collect::StepInput;
 use crate::waiting::Waiting;
-use avian::collider_tree::{
-    ColliderTreeProxy, ColliderTreeProxyKey, ColliderTreeType, ColliderTrees, MovedProxies,
-};
+use avian::collider_tree::{ColliderTreeProxy, ColliderTreeProxyKey, ColliderTreeType, ColliderTrees};
 use bevy::prelude::*;
 use pbig_core::{Aabb, BroadPhase, Error, Pair, ProxyFilter, Report};
 
@@ -23,7 +21,6 @@ pub struct ColliderBoxes {
     pub(crate) without_contact: Waiting,
     /// Ids of the proxies that moved in this update.
     moved: Vec<u32>,
-    pub(crate) update: u32,
 }
 
 /// A collider with a box.
@@ -31,13 +28,9 @@ pub struct ColliderBoxes {
 pub(crate) struct Slot {
     pub(crate) key: ColliderTreeProxyKey,
     pub(crate) collider: Entity,
-    /// Last update in which the proxy moved, by avian's list.
-    pub(crate) moved_in: u32,
+    /// The proxy moved in this update, by avian's list.
+    pub(crate) has_moved: bool,
 }
-
-/// The query for the proxies of colliders that take part in collisions.
-pub(crate) type ProxyKeys<'w, 's> =
-    Query<'w, 's, &'static ColliderTreeProxyKey, Without<avian::prelude::ColliderDisabled>>;
 
 impl ColliderBoxes {
     /// Returns a report of the last update.
@@ -58,60 +51,51 @@ impl ColliderBoxes {
     /// Iterates over the colliders of all pairs whose boxes overlap and whose filters allow it, in the order of their ids. Joints
     /// and hooks may forbid some of them.
     pub fn pairs(&self) -> impl Iterator<Item = (Entity, Entity)> + '_ {
-        let collider = |id: u32| self.slots[id as usize].collider;
-        self.broad_phase.pairs().map(move |pair| (collider(pair.a), collider(pair.b)))
+        self.broad_phase.pairs().map(|pair| self.colliders(pair))
     }
 
-    /// Brings the boxes up to date with avian's trees.
-    pub(crate) fn follow(
-        &mut self,
-        trees: &ColliderTrees,
-        moved: &MovedProxies,
-        lost: &mut Lost,
-        keys: &ProxyKeys<'_, '_>,
-    ) -> Result<(), Error> {
-        self.update = self.update.wrapping_add(1);
-        self.moved.clear();
-        // Avian names each proxy once. So all are set, even if one of them fails.
-        let mut all = self.begin_anew(trees, lost, keys);
-        for &key in moved.proxies() {
-            all = all.and(self.set(trees, key).map(|id| id.into_iter().for_each(|id| self.note_moved(id))));
-        }
-        all
+    /// Returns the colliders of a pair.
+    pub(crate) fn colliders(&self, pair: Pair) -> (Entity, Entity) {
+        let [a, b] = [pair.a, pair.b].map(|id| self.slots[id as usize].collider);
+        (a, b)
     }
 
-    /// Removes the boxes of colliders that have lost their contacts, and sets those that still have a proxy.
-    fn begin_anew(
-        &mut self,
-        trees: &ColliderTrees,
-        lost: &mut Lost,
-        keys: &ProxyKeys<'_, '_>,
-    ) -> Result<(), Error> {
-        if lost.0.is_empty() {
-            return Ok(());
-        }
-        let lost = std::mem::take(&mut lost.0);
+    /// Brings the boxes up to date with avian's trees. Colliders that have lost their contacts begin anew: their boxes are removed, and
+    /// set again where they still have a proxy.
+    pub(crate) fn follow(&mut self, input: &mut StepInput) -> Result<(), Error> {
+        self.moved.drain(..).for_each(|id| self.slots[id as usize].has_moved = false);
+        let lost = std::mem::take(&mut input.lost.0);
         lost.iter().for_each(|&collider| self.remove(collider));
-        let mut all = Ok(());
-        for collider in lost {
-            let Ok(&key) = keys.get(collider) else { continue };
-            if trees.get_proxy(key).is_some_and(|proxy| proxy.collider == collider) {
-                all = all.and(self.set(trees, key).map(|_| ()));
-            }
-        }
-        all
+        let trees = &input.trees;
+        let key = |collider| {
+            let key = *input.keys.get(collider).ok()?;
+            trees.get_proxy(key).is_some_and(|proxy| proxy.collider == collider).then_some((key, false))
+        };
+        let moved = input.moved.proxies().iter().map(|&key| (key, true));
+        // Avian names each proxy once. So all are set, even if one of them fails.
+        let set = |all: Result<(), Error>, (key, has_moved)| all.and(self.set(trees, key, has_moved));
+        lost.into_iter().filter_map(key).chain(moved).fold(Ok(()), set)
     }
 
-    /// Sets the box of a proxy, and returns its id. Returns none if the key is out of date.
-    fn set(&mut self, trees: &ColliderTrees, key: ColliderTreeProxyKey) -> Result<Option<u32>, Error> {
+    /// Sets the box of a proxy, unless the key is out of date.
+    fn set(
+        &mut self,
+        trees: &ColliderTrees,
+        key: ColliderTreeProxyKey,
+        has_moved: bool,
+    ) -> Result<(), Error> {
         let tree = trees.tree_for_type(key.tree_type());
         let (Some(proxy), Some(aabb)) = (tree.get_proxy(key.id()), tree.get_proxy_aabb(key.id())) else {
-            return Ok(None);
+            return Ok(());
         };
         let id = self.id_of(proxy.collider, key);
         let [min, max] = [aabb.min, aabb.max].map(|corner| [corner.x, corner.y, corner.z]);
         self.broad_phase.set(id, Aabb::new(min, max), filter(key, proxy))?;
-        Ok(Some(id))
+        if has_moved {
+            self.slots[id as usize].has_moved = true;
+            self.moved.push(id);
+        }
+        Ok(())
     }
 
     /// Returns the id of a collider; a new one if it has none.
@@ -125,18 +109,11 @@ impl ColliderBoxes {
             slot.key = key;
             return id;
         }
-        let slot = Slot { key, collider, moved_in: self.update.wrapping_sub(1) };
-        self.ids[index] = self.insert(slot);
-        self.ids[index]
-    }
-
-    fn insert(&mut self, slot: Slot) -> u32 {
-        if let Some(id) = self.free.pop() {
-            self.slots[id as usize] = slot;
-            return id;
-        }
-        self.slots.push(slot);
-        self.slots.len() as u32 - 1
+        let (slot, id) = (Slot { key, collider, has_moved: false }, self.free.pop());
+        let id = id.unwrap_or(self.slots.len() as u32);
+        self.slots.resize(self.slots.len().max(id as usize + 1), slot);
+        (self.slots[id as usize], self.ids[index]) = (slot, id);
+        id
     }
 
     /// Removes the box of a collider, if it has one. Its id is free.
@@ -150,29 +127,17 @@ impl ColliderBoxes {
         }
     }
 
-    /// Appends the pairs that have begun since the last update.
-    pub(crate) fn find(&mut self, begun: &mut Vec<Pair>) -> Result<(), Error> {
-        let events = self.broad_phase.update()?;
-        events.removed.iter().for_each(|pair| self.without_contact.remove(pair));
-        begun.extend_from_slice(&events.added);
-        Ok(())
-    }
-
-    /// Adds the pairs without a contact of which one proxy moved, and sorts the pairs.
-    pub(crate) fn add_waiting(&self, pairs: &mut Vec<Pair>) {
-        self.without_contact.list(&self.moved, |id| self.has_moved(id), pairs);
+    /// Returns the pairs that have begun since the last update, and those without a contact of which one proxy moved, sorted.
+    pub(crate) fn find(&mut self) -> (Vec<Pair>, Result<(), Error>) {
+        let mut pairs = Vec::new();
+        let found = self.broad_phase.update().map(|events| {
+            events.removed.iter().for_each(|pair| self.without_contact.set(*pair, false));
+            pairs.extend_from_slice(&events.added);
+        });
+        self.without_contact.list(&self.moved, |id| self.slots[id as usize].has_moved, &mut pairs);
         pairs.sort_unstable();
         pairs.dedup();
-    }
-
-    fn note_moved(&mut self, id: u32) {
-        self.slots[id as usize].moved_in = self.update;
-        self.moved.push(id);
-    }
-
-    /// Returns true if the proxy with this id moved in this update.
-    pub(crate) fn has_moved(&self, id: u32) -> bool {
-        self.slots[id as usize].moved_in == self.update
+        (pairs, found)
     }
 }
 

@@ -1,9 +1,11 @@
 //! The system that adds contacts for the pairs that pbig finds.
 
 use crate::ask::Ask;
-use crate::boxes::{ColliderBoxes, ProxyKeys};
+use crate::boxes::ColliderBoxes;
 use crate::lost::Lost;
-use avian::collider_tree::{ColliderTreeProxy, ColliderTreeProxyFlags, ColliderTrees, MovedProxies};
+use avian::collider_tree::{
+    ColliderTreeProxy, ColliderTreeProxyFlags, ColliderTreeProxyKey, ColliderTrees, MovedProxies,
+};
 use avian::collision::CollisionDiagnostics;
 use avian::collision::contact_types::ContactEdgeFlags;
 use avian::dynamics::joints::joint_graph::JointGraph;
@@ -19,18 +21,17 @@ pub(crate) struct StepInput<'w, 's> {
     pub(crate) trees: Res<'w, ColliderTrees>,
     pub(crate) moved: Res<'w, MovedProxies>,
     pub(crate) joints: Res<'w, JointGraph>,
-    keys: ProxyKeys<'w, 's>,
-    lost: ResMut<'w, Lost>,
+    /// The proxies of colliders that take part in collisions.
+    pub(crate) keys: Query<'w, 's, &'static ColliderTreeProxyKey, Without<ColliderDisabled>>,
+    pub(crate) lost: ResMut<'w, Lost>,
 }
 
 impl StepInput<'_, '_> {
     /// Brings the boxes up to date, and lists the pairs to ask about, in the order of their ids: those that have begun, and those
     /// without a contact.
     pub(crate) fn candidates(&mut self, boxes: &mut ColliderBoxes) -> (Vec<Pair>, Result<(), String>) {
-        let followed = boxes.follow(&self.trees, &self.moved, &mut self.lost, &self.keys);
-        let mut pairs = Vec::new();
-        let found = boxes.find(&mut pairs);
-        boxes.add_waiting(&mut pairs);
+        let followed = boxes.follow(self);
+        let (pairs, found) = boxes.find();
         (pairs, followed.and(found).map_err(|error| in_words(&error)))
     }
 }
@@ -72,7 +73,7 @@ fn add_contact<H: CollisionHooks>(
     graph: &mut ContactGraph,
     commands: &mut Commands,
 ) {
-    let [a, b] = [pair.a, pair.b].map(|id| boxes.slots[id as usize].collider);
+    let (a, b) = boxes.colliders(pair);
     let has_contact = graph.contains(a, b)
         || ask.proxies(boxes, pair).is_some_and(|proxies| {
             let is_allowed = ask.allows(proxies, commands);
@@ -81,11 +82,7 @@ fn add_contact<H: CollisionHooks>(
             }
             is_allowed
         });
-    if has_contact {
-        boxes.without_contact.remove(&pair);
-    } else {
-        boxes.without_contact.insert(pair);
-    }
+    boxes.without_contact.set(pair, !has_contact);
 }
 
 /// Adds a contact with the flags that avian's own broad phase gives it.

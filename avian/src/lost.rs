@@ -17,18 +17,14 @@ use std::collections::BTreeSet;
 pub(crate) struct Lost(pub(crate) BTreeSet<Entity>);
 
 pub(crate) fn add_observers(app: &mut App) {
-    app.add_observer(note_collider::<Add<(Disabled, ColliderDisabled)>>)
-        .add_observer(note_collider::<Remove<(Disabled, ColliderDisabled)>>)
-        .add_observer(note_collider::<Remove<ColliderMarker>>)
-        .add_observer(note_collider::<Insert<ColliderOf>>)
-        .add_observer(note_collider::<Remove<ColliderOf>>)
-        .add_observer(note_collider::<Add<Sensor>>)
-        .add_observer(note_collider::<Remove<Sensor>>)
-        .add_observer(note_collider::<Insert<CollisionLayers>>)
+    app.add_observer(note_collider::<Add<(Disabled, ColliderDisabled, Sensor)>>)
+        .add_observer(
+            note_collider::<Remove<(Disabled, ColliderDisabled, ColliderMarker, ColliderOf, Sensor)>>,
+        )
+        .add_observer(note_collider::<Insert<(ColliderOf, CollisionLayers)>>)
         .add_observer(note_body::<Add<(Disabled, RigidBodyDisabled)>>)
-        .add_observer(note_body::<Remove<RigidBodyDisabled>>)
+        .add_observer(note_body::<Remove<(RigidBodyDisabled, RigidBody)>>)
         .add_observer(note_body::<Insert<RigidBody>>)
-        .add_observer(note_body::<Remove<RigidBody>>)
         .add_observer(note_joint);
 }
 

@@ -89,17 +89,13 @@ fn compare<H: CollisionHooks + 'static>(
     }
     let ask = Ask { trees: &input.trees, joints: &input.joints, hooks: &hooks.into_inner() };
     for pair in candidates {
-        let [a, b] = [pair.a, pair.b].map(|id| boxes.slots[id as usize].collider);
+        let (a, b) = boxes.colliders(pair);
         let has_contact = graph.contains(a, b);
         let is_wanted = ask.proxies(&boxes, pair).is_some_and(|proxies| ask.allows(proxies, &mut commands));
         if is_wanted && !has_contact {
             shadow.spurious.insert((a, b));
         }
-        if has_contact {
-            boxes.without_contact.remove(&pair);
-        } else {
-            boxes.without_contact.insert(pair);
-        }
+        boxes.without_contact.set(pair, !has_contact);
     }
     let ours: HashSet<_> = boxes.pairs().map(|(a, b)| ordered(a, b)).collect();
     for contact in graph.active_pairs().iter().chain(graph.sleeping_pairs()) {

@@ -11,20 +11,20 @@ pub(crate) struct Waiting {
 }
 
 impl Waiting {
-    pub(crate) fn insert(&mut self, pair: Pair) {
-        self.ends.extend([[pair.a, pair.b], [pair.b, pair.a]]);
-    }
-
-    pub(crate) fn remove(&mut self, pair: &Pair) {
-        if self.ends.remove(&[pair.a, pair.b]) {
-            self.ends.remove(&[pair.b, pair.a]);
+    /// Inserts a pair or removes it.
+    pub(crate) fn set(&mut self, pair: Pair, waits: bool) {
+        let ends = [[pair.a, pair.b], [pair.b, pair.a]];
+        if waits {
+            self.ends.extend(ends);
+        } else if self.ends.remove(&ends[0]) {
+            self.ends.remove(&ends[1]);
         }
     }
 
     /// Removes the pairs of an id.
     pub(crate) fn forget(&mut self, id: u32) {
         let pairs: Vec<_> = self.of(id).collect();
-        pairs.iter().for_each(|pair| self.remove(pair));
+        pairs.into_iter().for_each(|pair| self.set(pair, false));
     }
 
     /// Appends the pairs with at least one of some different ids, in no order, perhaps twice. The work follows the smaller set.
@@ -60,11 +60,11 @@ mod tests {
         let (mut waiting, mut all) = (Waiting::default(), BTreeSet::new());
         for i in 0..200 {
             let pair = Pair { a: i % 9, b: 9 + i % 11 };
-            waiting.insert(pair);
+            waiting.set(pair, true);
             all.insert(pair);
         }
         for removed in [Pair { a: 3, b: 12 }, Pair { a: 3, b: 12 }] {
-            waiting.remove(&removed);
+            waiting.set(removed, false);
             all.remove(&removed);
         }
         [0, 14].iter().for_each(|&id| waiting.forget(id));
@@ -79,7 +79,7 @@ mod tests {
     #[test]
     fn ten_thousand_waiting_pairs_cost_what_the_moved_ones_are() {
         let mut waiting = Waiting::default();
-        (0..10_000).for_each(|i| waiting.insert(Pair { a: i, b: i + 10_000 }));
+        (0..10_000).for_each(|i| waiting.set(Pair { a: i, b: i + 10_000 }, true));
         let asked = std::cell::Cell::new(0);
         let mut pairs = Vec::new();
         waiting.list(

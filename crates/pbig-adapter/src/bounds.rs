@@ -9,10 +9,18 @@ use std::fmt::Debug;
 pub trait Scalar: Copy + Debug + Send + Sync + 'static {
     /// Its AABBs.
     type Aabb: Bounds<Real = Self>;
+
+    /// Returns the nearest f32.
+    fn to_f32(self) -> f32;
 }
 
 impl Scalar for f32 {
     type Aabb = Aabb;
+
+    #[inline(always)]
+    fn to_f32(self) -> f32 {
+        self
+    }
 }
 
 /// An AABB in the precision of a world. A world in two dimensions has the z coordinates 0.

@@ -6,7 +6,7 @@ use crate::order::PairOrder;
 use crate::registry::ColliderRegistry;
 use crate::stats::{Counts, Totals};
 use crate::tree::SceneTree;
-use crate::{Bounds, BoxStore, Handle, HandlePair, Scene, Tree};
+use crate::{Bounds, BoxStore, Handle, HandlePair, Margins, Scene, Tree};
 use pbig_core::{BroadPhase, Error, PairDevice, ProxyFilter};
 use std::collections::HashSet;
 
@@ -27,6 +27,8 @@ pub struct Colliders<T: Tree> {
     pub(crate) boxes: <T::Aabb as Bounds>::Store,
     pub(crate) registry: ColliderRegistry,
     pub(crate) writer: EventWriter,
+    /// The margins of the last update; the usual one is valid.
+    pub(crate) margins: Margins,
     /// Proxies that several threads compute. Kept for its memory.
     #[cfg(feature = "parallel")]
     pub(crate) proxies: Vec<(Handle, crate::Proxy<T::Aabb>)>,
@@ -51,6 +53,7 @@ impl<T: Tree> Colliders<T> {
             boxes: Default::default(),
             registry: ColliderRegistry::default(),
             writer: EventWriter::default(),
+            margins: Margins::default(),
             #[cfg(feature = "parallel")]
             proxies: Vec::new(),
             index: SceneIndex::default(),
@@ -92,13 +95,13 @@ impl<T: Tree> Colliders<T> {
         self.inherited = boxes;
     }
 
-    /// Sets the AABBs of colliders, with this margin or one of their own, and keeps their filters. A collider without a box gets a filter
-    /// that admits all, until the next update sets its own before it looks for pairs.
+    /// Sets the AABBs of colliders, and keeps their filters. A collider without a box gets a filter that admits all, until the next update
+    /// sets its own before it looks for pairs.
     #[inline(always)]
-    pub fn set_aabbs(&mut self, margin: f32, moved: impl Iterator<Item = (Handle, T::Aabb, Option<f32>)>) {
-        self.set_margin(margin);
-        for (handle, aabb, own) in moved {
-            if let Some(margin) = own {
+    pub fn set_aabbs(&mut self, margins: &Margins, moved: impl Iterator<Item = (Handle, T::Aabb)>) {
+        self.set_margin(margins.usual);
+        for (handle, aabb) in moved {
+            if let Some(margin) = margins.own(&aabb, false) {
                 self.set_margin(margin);
             }
             // A collider that was disabled is known but has no box.
@@ -141,7 +144,12 @@ impl<T: Tree> Colliders<T> {
     }
 
     /// Updates the boxes that rapier lists, and sends the events.
-    pub fn update(&mut self, scene: &impl Scene<Aabb = T::Aabb>, margin: f32, send: impl FnMut(PairEvent)) {
+    pub fn update(
+        &mut self,
+        scene: &impl Scene<Aabb = T::Aabb>,
+        margins: &Margins,
+        send: impl FnMut(PairEvent),
+    ) {
         let removed = scene.removed().count();
         let modified = scene.listed_count();
         let has_changes = modified + removed > 0 || self.differs_from(scene);
@@ -152,7 +160,7 @@ impl<T: Tree> Colliders<T> {
         // A shape may panic in the middle.
         self.index.expire();
         self.tree.expire();
-        self.read(scene, margin);
+        self.read(scene, margins);
         self.index.note(self.core.changes(), self.core.id_count());
         self.tree.note(self.boxes.changes(&self.core).iter().copied(), self.registry.len());
         self.find_and_send(|handle| scene.size(handle), send);
@@ -186,13 +194,14 @@ impl<T: Tree> Colliders<T> {
     }
 
     /// Removes first, because a modified collider may reuse the index of a removed one.
-    fn read(&mut self, scene: &impl Scene<Aabb = T::Aabb>, margin: f32) {
+    fn read(&mut self, scene: &impl Scene<Aabb = T::Aabb>, margins: &Margins) {
         for (handle, exists) in scene.removed() {
             // Rapier lists disabled colliders as removed, too.
             if exists { self.disable(handle) } else { self.forget(handle) }
         }
         self.writer.forget_adopted(scene.removed().map(|(handle, _)| handle));
-        let margin = self.boxes.set_margin(&mut self.core, margin);
+        let margin = self.boxes.set_margin(&mut self.core, margins.usual);
+        self.margins = Margins { usual: self.boxes.margin(&self.core), ..*margins };
         if std::mem::replace(&mut self.is_incomplete, true) {
             self.read_all(scene);
         } else {
@@ -217,14 +226,13 @@ impl<T: Tree> Colliders<T> {
             let gone: HashSet<u32> = scene.removed().map(|(handle, _)| handle.index).collect();
             inherited.retain(|(id, _)| !gone.contains(id));
         }
-        let margin = self.boxes.margin(&self.core);
         if !inherited.is_empty() && self.boxes.set_margin(&mut self.core, 0.0).is_ok() {
             for &(id, aabb) in &inherited {
                 _ = self.boxes.set(&mut self.core, id, aabb, Default::default());
             }
-            self.set_margin(margin);
+            self.set_margin(self.margins.usual);
         }
-        scene.for_each_collider(|handle, proxy| self.set_proxy(scene, handle, proxy));
+        scene.for_each_collider(|handle, proxy| self.set_proxy(handle, proxy, false));
         for (id, _) in inherited {
             if self.registry.handle(id).is_none() {
                 self.boxes.remove(&mut self.core, id);

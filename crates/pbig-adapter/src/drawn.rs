@@ -53,6 +53,13 @@ impl<T: Tree> Colliders<T> {
     }
 }
 
+/// Returns the edges of a rectangle or a box, by the numbers that parry gives its vertices.
+pub fn box_edges(axes: usize) -> Vec<[u32; 2]> {
+    let ring = |k| [[k, k + 1], [k + 1, k + 2], [k + 3, k + 2], [k, k + 3]];
+    let rings = [0, 4].into_iter().take(axes - 1).flat_map(ring);
+    rings.chain((0..4).filter(|_| axes > 2).map(|k| [k, k + 4])).collect()
+}
+
 /// Returns green for cells and the boxes in them, grey for boxes in no cell.
 fn hsla(in_grid: bool, lightness: f32, alpha: f32) -> [f32; 4] {
     if in_grid { [120.0, 1.0, lightness, alpha] } else { [0.0, 0.0, lightness, alpha] }

@@ -1,5 +1,6 @@
 //! Reads the colliders that rapier lists and sets their boxes in the core.
 
+#[cfg(feature = "parallel")]
 use crate::policy;
 use crate::{BodyKind, Bounds, BoxStore, Colliders, Handle, Proxy, Scene, Tree};
 use pbig_core::ProxyFilter;
@@ -19,7 +20,7 @@ impl<T: Tree> Colliders<T> {
             let batches = starts.map(|start| start..listed.min(start + policy::PROXIES_PER_BATCH));
             return batches.for_each(|batch| self.read_batch(scene, batch));
         }
-        scene.for_each_listed(0..listed, |handle, proxy| self.set_listed(scene, handle, proxy));
+        scene.for_each_listed(0..listed, |handle, proxy| self.set_proxy(handle, proxy, true));
     }
 
     /// Computes proxies on several threads, and sets them on this one.
@@ -39,36 +40,25 @@ impl<T: Tree> Colliders<T> {
             });
         });
         for &(handle, proxy) in &proxies {
-            self.set_listed(scene, handle, proxy);
+            self.set_proxy(handle, proxy, true);
         }
         self.proxies = proxies;
     }
 
     #[inline(always)]
-    fn set_listed(&mut self, scene: &impl Scene<Aabb = T::Aabb>, handle: Handle, proxy: Proxy<T::Aabb>) {
-        match proxy {
-            Proxy::Enabled(aabb, filter)
-                if BodyKind::of(&filter) == BodyKind::Fixed && !self.registry.contains(handle) =>
-            {
-                self.enable_fixed(scene.margin(&aabb), handle, aabb, filter);
-            }
-            _ => self.set_proxy(scene, handle, proxy),
-        }
-    }
-
-    #[inline(always)]
-    pub(crate) fn set_proxy(
-        &mut self,
-        scene: &impl Scene<Aabb = T::Aabb>,
-        handle: Handle,
-        proxy: Proxy<T::Aabb>,
-    ) {
+    pub(crate) fn set_proxy(&mut self, handle: Handle, proxy: Proxy<T::Aabb>, is_listed: bool) {
         match proxy {
             Proxy::Enabled(aabb, filter) => {
-                if let Some(margin) = scene.margin(&aabb) {
+                let is_fixed = BodyKind::of(&filter) == BodyKind::Fixed;
+                let is_new_and_fixed = is_listed && is_fixed && !self.registry.contains(handle);
+                let own = self.margins.own(&aabb, is_new_and_fixed);
+                if let Some(margin) = own {
                     self.set_margin(margin);
                 }
                 self.enable(handle, aabb, filter);
+                if own.is_some() {
+                    self.set_margin(self.margins.usual);
+                }
             }
             Proxy::Disabled => self.disable(handle),
             Proxy::Unplaced(filter) => self.keep_box(handle, filter),
@@ -84,16 +74,6 @@ impl<T: Tree> Colliders<T> {
         if let Err(error) = self.boxes.set(&mut self.core, handle.index, aabb, filter) {
             self.note_error(error);
         }
-    }
-
-    /// Enables a new collider that may never move, with as much margin as rounding needs: more would only add pairs. Once it has moved, it
-    /// has the margin of others. So has one that is not listed when it is read first, as after a restore: it may have pairs by its margin.
-    #[cold]
-    fn enable_fixed(&mut self, own: Option<f32>, handle: Handle, aabb: T::Aabb, filter: ProxyFilter) {
-        let common = self.boxes.margin(&self.core);
-        self.set_margin(own.unwrap_or(common).min(aabb.reach() * policy::MARGIN_OF_ROUNDING));
-        self.enable(handle, aabb, filter);
-        self.set_margin(common);
     }
 
     /// Makes a collider known. An older collider that used its index loses its box: rapier never listed it as removed.

@@ -39,10 +39,4 @@ pub trait Scene: Sync {
 
     /// Returns the size class of a collider's shape, see [`crate::size_class`]. It decides which collider comes first in a pair.
     fn size(&self, handle: Handle) -> u8;
-
-    /// Returns the margin of a box, if it is not the same for all.
-    #[inline(always)]
-    fn margin(&self, _aabb: &Self::Aabb) -> Option<f32> {
-        None
-    }
 }

@@ -10,12 +10,12 @@ use crate::policy;
 use pbig_core::Aabb;
 use std::sync::{Mutex, OnceLock, PoisonError};
 
-/// Parry's tree, in the version that rapier uses. The AABBs can be infinite.
-pub trait Tree {
+/// Parry's tree, in the version that rapier uses. The AABBs can be infinite. The default has no leaves.
+pub trait Tree: Default {
     /// The AABBs of the world.
     type Aabb: Bounds;
 
-    /// Builds the tree of these leaves.
+    /// Builds the tree of at least three leaves.
     fn build(leaves: impl Iterator<Item = (u32, Self::Aabb)> + Clone) -> Self;
 
     /// Removes these leaves, and makes the tree ready for further changes.
@@ -100,7 +100,14 @@ impl<T: Tree> SceneTree<T> {
 
 fn build<T: Tree>(ids: u32, aabb: impl Fn(u32) -> Option<T::Aabb>) -> T {
     let aabb = &aabb;
-    T::build((0..ids).filter_map(move |id| Some((id, aabb(id)?))))
+    let leaves = (0..ids).filter_map(move |id| Some((id, aabb(id)?)));
+    if leaves.clone().nth(2).is_some() {
+        return T::build(leaves);
+    }
+    // Parry 0.22 takes the ids of one or two leaves for 0 and 1.
+    let mut tree = T::default();
+    tree.update(leaves);
+    tree
 }
 
 impl<T: Tree> Stale<T> {

@@ -37,6 +37,11 @@ impl WideAabb {
 
 impl Scalar for f64 {
     type Aabb = WideAabb;
+
+    #[inline(always)]
+    fn to_f32(self) -> f32 {
+        self as f32
+    }
 }
 
 impl Bounds for WideAabb {

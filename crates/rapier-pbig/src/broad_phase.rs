@@ -4,7 +4,7 @@ use crate::PbigConfig;
 use crate::call::Call;
 use crate::scene::{handle, to_event, to_pair};
 use crate::tree::ParryTree;
-use pbig_adapter::{Colliders, Error, HandlePair, Why};
+use pbig_adapter::{Colliders, Error, HandlePair, Margins, Why};
 use rapier3d::prelude::{
     BroadPhase, BroadPhasePairEvent, ColliderHandle, ColliderPair, ColliderSet, IntegrationParameters,
     NarrowPhase, RigidBodySet,
@@ -26,12 +26,6 @@ pub struct PbigBroadPhase {
     pub(crate) shadow: Option<Box<crate::shadow::Watcher>>,
 }
 
-impl Default for PbigBroadPhase {
-    fn default() -> Self {
-        Self::new()
-    }
-}
-
 impl std::fmt::Debug for PbigBroadPhase {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let mut shown = f.debug_struct("PbigBroadPhase");
@@ -43,7 +37,7 @@ impl std::fmt::Debug for PbigBroadPhase {
 impl PbigBroadPhase {
     /// Creates an empty broad phase with [`PbigConfig::DEFAULT`].
     pub fn new() -> Self {
-        Self::with_config(PbigConfig::DEFAULT).expect("the default margin is a length")
+        Self::default()
     }
 
     /// As [`PbigBroadPhase::with_config`], with any settings of the core; its margin is in units of rapier's `length_unit`.
@@ -113,10 +107,11 @@ impl PbigBroadPhase {
     fn handle(&mut self, call: &Call<'_>, events: &mut Vec<BroadPhasePairEvent>) {
         #[cfg(feature = "shadow")]
         let (start, rescans) = (events.len(), self.stats().totals.rescans);
-        let margin = self.relative_margin * call.params.length_unit;
+        let usual = self.relative_margin * call.params.length_unit;
         #[cfg(feature = "shadow")]
         let adopted = self.colliders.adopted().to_vec();
-        self.colliders.update(call, margin, |event| events.push(to_event(event)));
+        let margins = Margins { usual, ..Margins::default() };
+        self.colliders.update(call, &margins, |event| events.push(to_event(event)));
         #[cfg(feature = "shadow")]
         if let Some(watcher) = &mut self.shadow {
             if self.colliders.stats().totals.rescans > rescans {

@@ -3,13 +3,12 @@
 
 use crate::call::Call;
 use pbig_adapter::policy::COLLIDERS_PER_BLOCK;
-use pbig_adapter::{BodyKind, Groups, Handle, Proxy, Scene, size_class};
+use pbig_adapter::{BodyKind, Groups, Handle, Proxy};
 use pbig_core::{Aabb, ProxyFilter, TestMode};
 use rapier3d::prelude::{
     BroadPhasePairEvent, Collider, ColliderHandle, ColliderPair, IntegrationParameters, InteractionGroups,
     Isometry, Point, Real, RigidBody, RigidBodySet, RigidBodyType, Shape, TypedShape,
 };
-use std::ops::Range;
 
 /// A collider and its body, if they exist.
 pub(crate) type Fetched<'a> = (Option<&'a Collider>, Option<&'a RigidBody>);
@@ -39,10 +38,6 @@ impl<'a> Call<'a> {
 /// The margin is not included. A pose with a NaN gives an invalid AABB, which pairs with nothing.
 pub fn collision_aabb(params: &IntegrationParameters, bodies: &RigidBodySet, collider: &Collider) -> Aabb {
     aabb_of(params, parent_of(bodies, collider), collider)
-}
-
-fn parent_of<'a>(bodies: &'a RigidBodySet, collider: &Collider) -> Option<&'a RigidBody> {
-    collider.parent().and_then(|handle| bodies.get(handle))
 }
 
 #[inline(always)]
@@ -103,13 +98,6 @@ pub fn filter_of(bodies: &RigidBodySet, collider: &Collider) -> ProxyFilter {
     filter_with(parent_of(bodies, collider), collider)
 }
 
-#[inline(always)]
-fn filter_with(body: Option<&RigidBody>, collider: &Collider) -> ProxyFilter {
-    let parent = collider.parent().map(|handle| handle.into_raw_parts().into());
-    let types = collider.active_collision_types().bits();
-    pbig_adapter::filter_of(parent, kind_of(body), types, groups_of(collider.collision_groups()))
-}
-
 /// Returns the type of a collider's body. A collider without a body counts as fixed.
 #[inline(always)]
 pub(crate) fn kind_of(body: Option<&RigidBody>) -> BodyKind {
@@ -120,7 +108,7 @@ pub(crate) fn groups_of(groups: InteractionGroups) -> Groups {
     Groups { memberships: groups.memberships.bits(), mask: groups.filter.bits(), mode: TestMode::And }
 }
 
-pbig_adapter::define_conversions!();
+pbig_adapter::define_scene!(max);
 
 impl Call<'_> {
     /// Calls `take` with each of these colliders and its proxy, in the order of the list.
@@ -135,36 +123,6 @@ impl Call<'_> {
                 take(handle(listed), self.proxy(fetched));
             }
         }
-    }
-}
-
-impl Scene for Call<'_> {
-    type Aabb = Aabb;
-
-    fn collider_count(&self) -> usize {
-        self.colliders.len()
-    }
-
-    fn listed_count(&self) -> usize {
-        self.modified.len()
-    }
-
-    fn for_each_listed(&self, range: Range<usize>, take: impl FnMut(Handle, Proxy<Aabb>)) {
-        self.for_each_of(&self.modified[range], take);
-    }
-
-    fn for_each_collider(&self, take: impl FnMut(Handle, Proxy<Aabb>)) {
-        let all: Vec<ColliderHandle> = self.colliders.iter().map(|(handle, _)| handle).collect();
-        self.for_each_of(&all, take);
-    }
-
-    fn removed(&self) -> impl Iterator<Item = (Handle, bool)> {
-        self.removed.iter().map(|&removed| (handle(removed), self.colliders.contains(removed)))
-    }
-
-    fn size(&self, handle: Handle) -> u8 {
-        let shape = self.colliders.get(to_handle(handle)).map(Collider::shape);
-        shape.map_or(0, |shape| size_class(shape.compute_local_aabb().half_extents().max()))
     }
 }
 

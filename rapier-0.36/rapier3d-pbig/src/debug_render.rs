@@ -3,37 +3,17 @@
 use crate::PbigFinder;
 use crate::scene::to_handle;
 use crate::tree::to_tree;
-use pbig_adapter::DebugRenderParts;
-use rapier::math::{Pose, Vector};
-use rapier::parry::bounding_volume::Aabb as DrawnAabb;
+use rapier::math::{DIM, Pose, Vector};
 use rapier::pipeline::{DebugRenderBackend, DebugRenderObject};
 use rapier::prelude::ColliderSet;
 
-impl PbigFinder {
-    /// Draws the stored boxes and cells as lines, through the renderer that also draws rapier's own pictures. Each is passed as
-    /// a [`DebugRenderObject::ColliderAabb`], a cell with the first collider in it. Few boxes have no cells, because
-    /// they need no grid. A GPU shows no cells.
-    pub fn debug_render(
-        &self,
-        colliders: &ColliderSet,
-        parts: DebugRenderParts,
-        backend: &mut dyn DebugRenderBackend,
-    ) {
-        for drawn in self.colliders.drawn(parts, |handle| colliders.contains(to_handle(handle))) {
-            let (handle, aabb) = (to_handle(drawn.collider), to_tree(&drawn.aabb));
-            let object = DebugRenderObject::ColliderAabb(handle, &colliders[handle], &aabb);
-            if backend.filter_object(object) {
-                let edges = DrawnAabb::EDGES_VERTEX_IDS.map(|(a, b)| [a as u32, b as u32]);
-                let (pose, scale) = (Pose::IDENTITY, Vector::ONE);
-                backend.draw_polyline(object, &aabb.vertices(), &edges, &pose, scale, drawn.color);
-            }
-        }
-    }
-}
+pbig_adapter::define_debug_render!(PbigFinder, &Pose::IDENTITY, Vector::ONE);
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::DebugRenderParts;
+    use pbig_adapter::Scalar as _;
     use rapier::prelude::*;
 
     #[derive(Default)]
@@ -69,12 +49,8 @@ mod tests {
         });
         assert_eq!(boxes.lines, 512 * edges);
         // On each side half the prediction distance of 2 cm: new fixed colliders have no margin.
-        let edge = 1.0 + crate::to_f32(params.prediction_distance());
-        assert!(
-            (crate::to_f32(boxes.longest) - edge).abs() < 1e-4,
-            "a ball and its prediction: {}",
-            boxes.longest
-        );
+        let edge = 1.0 + params.prediction_distance().to_f32();
+        assert!((boxes.longest.to_f32() - edge).abs() < 1e-3, "a ball and its prediction: {}", boxes.longest);
         assert!(
             cells.lines % edges == 0 && cells.lines > edges && cells.lines <= 512 * edges,
             "{}",

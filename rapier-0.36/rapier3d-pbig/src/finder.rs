@@ -1,8 +1,8 @@
 //! `PbigFinder`: translates rapier's calls into calls of the core.
 
-use crate::scene::{Call, handle, own_margin, to_event, to_handle, to_pair};
+use crate::scene::{Bounds, Call, handle, margins, to_event, to_handle, to_pair};
 use crate::tree::{ParryTree, from_tree, spatial, to_tree};
-use crate::{Bounds, PairFinder, PbigConfig, SceneQuery, to_f32};
+use crate::{PairFinder, PbigConfig, SceneQuery};
 use pbig_adapter::{Bounds as _, Colliders, HandlePair, Why};
 use rapier::math::Real;
 use rapier::parry::bounding_volume::Aabb as TreeAabb;
@@ -18,12 +18,6 @@ pub struct PbigFinder {
     pub(crate) colliders: Colliders<ParryTree>,
     /// In units of `IntegrationParameters::length_unit`.
     pub(crate) relative_margin: f32,
-}
-
-impl Default for PbigFinder {
-    fn default() -> Self {
-        Self::with_config(PbigConfig::DEFAULT).expect("the default margin is a length")
-    }
 }
 
 impl PbigFinder {
@@ -64,10 +58,10 @@ impl PairFinder for PbigFinder {
         events: &mut Vec<BroadPhasePairEvent>,
     ) {
         let (modified, removed) = (modified_colliders, removed_colliders);
-        let call = Call { params, adaptive_margin, colliders, bodies, modified, removed };
+        let margins = margins(self.relative_margin, params, adaptive_margin);
+        let call = Call { params, margins, colliders, bodies, modified, removed };
         if !self.colliders.skips(&call) {
-            let margin = self.relative_margin * to_f32(params.length_unit);
-            self.colliders.update(&call, margin, |event| events.push(to_event(event)));
+            self.colliders.update(&call, &call.margins, |event| events.push(to_event(event)));
         }
     }
 
@@ -77,12 +71,8 @@ impl PairFinder for PbigFinder {
         adaptive_margin: bool,
         aabbs: &[(ColliderHandle, TreeAabb)],
     ) {
-        let unit = to_f32(params.length_unit);
-        let moved = aabbs.iter().map(|&(moved, aabb)| {
-            let aabb = from_tree(&aabb);
-            (handle(moved), aabb, adaptive_margin.then(|| own_margin(&aabb, unit)))
-        });
-        self.colliders.set_aabbs(self.relative_margin * unit, moved);
+        let moved = aabbs.iter().map(|(moved, aabb)| (handle(*moved), from_tree(aabb)));
+        self.colliders.set_aabbs(&margins(self.relative_margin, params, adaptive_margin), moved);
     }
 
     fn tree(&self) -> &Bvh {

@@ -73,15 +73,6 @@ const MARGIN: f32 = 0.04;
 /// The largest margin with `adaptive_change_detection_margin`, in units of `length_unit`.
 const MAX_ADAPTIVE_MARGIN: f32 = 0.25;
 
-/// An AABB in rapier's numbers.
-type Bounds = <rapier::math::Real as pbig_adapter::Scalar>::Aabb;
-
-#[inline(always)]
-#[allow(clippy::unnecessary_cast, reason = "rapier's numbers are f32 or f64")]
-fn to_f32(x: rapier::math::Real) -> f32 {
-    x as f32
-}
-
 /// Returns an empty broad phase in which pbig finds the pairs, in place of `BroadPhaseBvh::new()`.
 pub fn broad_phase() -> BroadPhaseBvh {
     let mut broad_phase = BroadPhaseBvh::new();

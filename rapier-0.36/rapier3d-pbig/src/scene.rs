@@ -1,19 +1,16 @@
 //! Shows rapier's colliders to the part of the broad phase that knows no rapier.
 
 use crate::tree::from_tree;
-use crate::{Bounds, to_f32};
-use pbig_adapter::{BodyKind, Bounds as _, Groups, Handle, Proxy, ProxyFilter, Scene, filter_of, size_class};
+use pbig_adapter::{BodyKind, Groups, Handle, Margins, Proxy, Scalar as _};
 use pbig_core::TestMode;
-use rapier::math::{DIM, Real};
 use rapier::parry::bounding_volume::Aabb as TreeAabb;
 use rapier::prelude::*;
-use std::ops::Range;
 
 /// The arguments of one update.
 #[derive(Clone, Copy)]
 pub(crate) struct Call<'a> {
     pub(crate) params: &'a IntegrationParameters,
-    pub(crate) adaptive_margin: bool,
+    pub(crate) margins: Margins,
     pub(crate) colliders: &'a ColliderSet,
     pub(crate) bodies: &'a RigidBodySet,
     pub(crate) modified: &'a [ColliderHandle],
@@ -26,7 +23,7 @@ impl Call<'_> {
         if !collider.is_enabled() {
             return Proxy::Disabled;
         }
-        let filter = self.filter(collider);
+        let filter = filter_with(parent_of(self.bodies, collider), collider);
         match self.aabb_of(collider) {
             Some(aabb) => Proxy::Enabled(from_tree(&aabb), filter),
             // Rapier's own broad phase also keeps the last box. Rapier disables such a collider at the end of the step.
@@ -42,22 +39,25 @@ impl Call<'_> {
         predicted.or_else(|| Some(now()).filter(is_finite))
     }
 
-    pub(crate) fn filter(&self, collider: &Collider) -> ProxyFilter {
-        let groups = groups_of(collider.collision_groups());
-        let body = collider.parent().map(|body| body.into_raw_parts().into());
-        filter_of(body, self.kind(collider), collider.active_collision_types().bits(), groups)
+    /// Calls `take` with each of these colliders and its proxy, in the order of the list.
+    fn for_each_of(&self, listed: &[ColliderHandle], mut take: impl FnMut(Handle, Proxy<Bounds>)) {
+        listed.iter().for_each(|&listed| take(handle(listed), self.proxy(listed)));
     }
+}
 
-    /// Returns the type of the collider's body. A collider without a body counts as fixed, the frame of a soft body as dynamic.
-    pub(crate) fn kind(&self, collider: &Collider) -> BodyKind {
-        let body = collider.parent().and_then(|handle| self.bodies.get(handle));
-        match body.map_or(RigidBodyType::Fixed, RigidBody::body_type) {
-            RigidBodyType::Dynamic | RigidBodyType::SoftFrame => BodyKind::Dynamic,
-            RigidBodyType::Fixed => BodyKind::Fixed,
-            RigidBodyType::KinematicPositionBased => BodyKind::KinematicPositionBased,
-            RigidBodyType::KinematicVelocityBased => BodyKind::KinematicVelocityBased,
-        }
+/// Returns the type of a collider's body. A collider without a body counts as fixed, the frame of a soft body as dynamic.
+pub(crate) fn kind_of(body: Option<&RigidBody>) -> BodyKind {
+    match body.map_or(RigidBodyType::Fixed, RigidBody::body_type) {
+        RigidBodyType::SoftFrame => BodyKind::Dynamic,
+        body => BodyKind::from_number(body as u32),
     }
+}
+
+/// Returns the margins of an update. `relative` is the usual one in units of `length_unit`.
+pub(crate) fn margins(relative: f32, params: &IntegrationParameters, is_adaptive: bool) -> Margins {
+    let unit = params.length_unit.to_f32();
+    let limits = [crate::MARGIN, crate::MAX_ADAPTIVE_MARGIN].map(|margin| margin * unit);
+    Margins { usual: relative * unit, adaptive: is_adaptive.then_some(limits), axes: DIM }
 }
 
 pub(crate) fn groups_of(groups: InteractionGroups) -> Groups {
@@ -68,50 +68,4 @@ pub(crate) fn groups_of(groups: InteractionGroups) -> Groups {
     Groups { memberships: groups.memberships.bits(), mask: groups.filter.bits(), mode }
 }
 
-pbig_adapter::define_conversions!();
-
-/// Returns the margin of rapier's `adaptive_change_detection_margin`: an eighth of the box's smallest extent, within limits.
-#[inline(always)]
-pub(crate) fn own_margin(aabb: &Bounds, length_unit: f32) -> f32 {
-    let [min, max] = aabb.corners();
-    let extent = (0..DIM).map(|k| max[k] - min[k]).fold(Real::INFINITY, Real::min);
-    (0.125 * to_f32(extent)).max(crate::MARGIN * length_unit).min(crate::MAX_ADAPTIVE_MARGIN * length_unit)
-}
-
-impl Scene for Call<'_> {
-    type Aabb = Bounds;
-
-    fn collider_count(&self) -> usize {
-        self.colliders.len()
-    }
-
-    fn listed_count(&self) -> usize {
-        self.modified.len()
-    }
-
-    fn for_each_listed(&self, range: Range<usize>, mut take: impl FnMut(Handle, Proxy<Bounds>)) {
-        for &listed in &self.modified[range] {
-            take(handle(listed), self.proxy(listed));
-        }
-    }
-
-    fn for_each_collider(&self, mut take: impl FnMut(Handle, Proxy<Bounds>)) {
-        for (each, _) in self.colliders.iter() {
-            take(handle(each), self.proxy(each));
-        }
-    }
-
-    fn removed(&self) -> impl Iterator<Item = (Handle, bool)> {
-        self.removed.iter().map(|&removed| (handle(removed), self.colliders.contains(removed)))
-    }
-
-    fn size(&self, handle: Handle) -> u8 {
-        let shape = self.colliders.get(to_handle(handle)).map(Collider::shape);
-        shape.map_or(0, |shape| size_class(to_f32(shape.compute_local_aabb().half_extents().max_element())))
-    }
-
-    #[inline(always)]
-    fn margin(&self, aabb: &Bounds) -> Option<f32> {
-        self.adaptive_margin.then(|| own_margin(aabb, to_f32(self.params.length_unit)))
-    }
-}
+pbig_adapter::define_scene!(max_element);

@@ -12,11 +12,13 @@
 mod difference;
 mod followed;
 mod replay;
+mod stock;
 
 pub use difference::{Difference, Fault, Side};
 pub use replay::{ReplayError, write_frames};
+pub use stock::Stock;
 
-use crate::{Bounds, Handle, HandlePair, PairEvent, policy};
+use crate::{Bounds, Handle, HandlePair, PairEvent, Scene, policy};
 use followed::Followed;
 use pbig_core::{Aabb, oracle as brute_force};
 use std::collections::{HashSet, VecDeque};
@@ -33,9 +35,7 @@ pub enum Shadow {
 }
 
 /// A world as a [`Checker`] sees it, through rapier's own functions.
-pub trait View {
-    /// The AABBs of the world.
-    type Aabb: Bounds;
+pub trait View: Scene {
     /// Returns the enabled colliders.
     fn enabled(&self) -> Vec<Handle>;
     /// Returns a collider.
@@ -56,10 +56,8 @@ pub struct Watched<'a, V> {
     pub view: &'a V,
     /// The largest margin of a box. The AABBs of a pair may be four margins apart, two for each box.
     pub margin: f32,
-    /// Colliders that were removed or disabled.
-    pub removed: &'a [Handle],
-    /// True if something was modified or moved.
-    pub is_modified: bool,
+    /// True if the step has moved something since the last call.
+    pub has_moved: bool,
     /// The events of the broad phase.
     pub events: &'a [PairEvent],
     /// The events of rapier's own broad phase, if it is a reference; none once it has panicked.
@@ -137,15 +135,17 @@ impl Checker {
     /// Checks a call that the broad phase has just answered.
     pub fn watch(&mut self, call: &Watched<'_, impl View>) {
         let mut faults = Vec::new();
-        self.known.purge(call.removed);
+        let removed: Vec<Handle> = call.view.removed().map(|(handle, _)| handle).collect();
+        self.known.purge(&removed);
         self.known.follow(call.events, |fault, pair| faults.push((fault, pair)));
         if let (Some(stock), Some(events)) = (&mut self.stock, call.stock) {
-            stock.purge(call.removed);
+            stock.purge(&removed);
             stock.follow(events, |_, _| ());
         }
         // If nothing was modified, only pairs of removed colliders can have changed.
         let fresh = std::mem::take(&mut self.fresh);
-        if fresh || call.is_modified || !call.events.is_empty() {
+        let is_modified = call.has_moved || call.view.listed_count() > 0;
+        if fresh || is_modified || !call.events.is_empty() {
             self.keep_frame(call.view);
             if self.comparable.is_multiple_of(self.every.max(1)) {
                 self.compare(call, &mut faults);
