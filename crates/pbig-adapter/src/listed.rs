@@ -128,3 +128,6 @@ impl<T: Tree> Colliders<T> {
         }
     }
 }
+
+#[cfg(all(test, feature = "parallel"))]
+mod tests;
