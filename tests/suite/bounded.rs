@@ -1,7 +1,7 @@
 //! The work of a call is bounded for every shape, motion and history of boxes: counts, never times.
 
 use pbig_core::{BroadPhase, Config, Engine, Finder, ProxyFilter, WORK_LIMIT, oracle};
-use pbig_harness::hard::{History, Part, Recipe, histories, ratio, shapes, tell};
+use pbig_harness::hard::{History, Part, Recipe, histories, ratio, ratio_of_search, shapes, tell};
 
 /// Numbers of boxes, too many for a sweep: a work that is not bounded grows faster than they do.
 const SIZES: [usize; 2] = [5000, 20_000];
@@ -86,6 +86,19 @@ fn a_grid_alone_breaks_the_bound() {
     let (_, recipe) = shapes().into_iter().find(|(name, _)| *name == "two scales").expect("a shape");
     let [small, large] = SIZES.map(|n| search(&recipe.boxes(n, 1), Some(Engine::Rebuild)));
     assert!(large > MAX_GROWTH * small && large > WORK_LIMIT as f64, "{small}, {large}");
+}
+
+/// It is hard with 10,000 boxes, not with 9000 or 11,000.
+#[test]
+fn the_worst_world_of_an_hours_search_is_below_the_bound() {
+    let (name, recipe) = shapes().pop().expect("the last one");
+    let ratio = ratio_of_search(&recipe, 10_000).expect("few pairs");
+    assert!(ratio <= WORK_LIMIT as f64, "{name}: {ratio}");
+    // Elsewhere powers are rounded in another way.
+    assert!(
+        !cfg!(target_os = "linux") || (ratio - 54.4).abs() < 0.1,
+        "{name}: {ratio}, not as in docs/STRESS.md"
+    );
 }
 
 /// Runs a history, and returns the largest ratio of an update, and the largest work besides one and a half times a search's.

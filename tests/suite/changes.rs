@@ -185,6 +185,23 @@ fn transfers_follow_what_has_changed() {
     assert_eq!(update(&mut world).0, BOX_CHANGE + FILTER_CHANGE, "a box at an id that was free");
 }
 
+/// The contract of `PairDevice::forget`: the device has missed an update, and gets all boxes once.
+#[test]
+fn after_a_missed_update_all_boxes_go_up_again() {
+    needs_gpu!();
+    let (mut world, mut gpu) = (DeviceWorld::new(&set("pile", 2000)), with(GpuOptions::DEFAULT));
+    let uploaded = [false, false, true, false].map(|has_missed_one| {
+        jostle(&mut world, 100, 0.02);
+        if has_missed_one {
+            world.advance();
+            gpu.forget();
+            jostle(&mut world, 50, 0.02);
+        }
+        world.follow(&mut gpu).expect("a device").report.uploaded
+    });
+    assert_eq!(uploaded, [2000 * WHOLE, 20 * BOX_CHANGE, 2000 * WHOLE, 20 * BOX_CHANGE]);
+}
+
 #[test]
 fn only_boxes_that_jump_or_change_their_filter_restart() {
     needs_gpu!();

@@ -308,7 +308,9 @@ impl PairDevice for Hardware {
 #[test]
 fn auto_uses_hardware_for_many_boxes_and_no_software() {
     needs_gpu!();
-    let boxes = set("unit", 500_000);
+    // All count as changed, and few are valid: a software device has little to do.
+    let mut boxes = vec![Aabb::NOWHERE; 500_000];
+    boxes[..5000].copy_from_slice(&set("unit", 5000));
     let device = GpuFinder::new().expect("an adapter");
     let software = device.is_software().then_some(NoDevice::Software);
     let mut soft = Finder::with_device(Config::DEFAULT, device.clone_box());

@@ -1,10 +1,11 @@
 //! Snapshots: our state restored goes on bit by bit; another world is noticed; no bytes do harm. Random worlds are restored,
 //! and handed to fresh broad phases, at any moment.
 
-use crate::checked::{backends, on_its_device, pbig};
+use crate::checked::{backends, on_gpu, on_its_device, pbig};
 use pbig_core::Config;
 use pbig_harness::scenes::Scene;
 use pbig_harness::world::World;
+use pbig_tests::needs_gpu;
 use rapier_pbig::shadow::Shadow;
 use rapier_pbig::{PbigBroadPhase, PbigConfig};
 use rapier3d::prelude::*;
@@ -51,6 +52,23 @@ fn upstream_910_966_a_restored_one_and_a_clone_resume_bit_by_bit() {
         }
         assert!(ends.iter().all(|end| *end == ends[0]), "{name}: one backend and another");
     }
+}
+
+#[test]
+fn a_snapshot_holds_no_device() {
+    needs_gpu!();
+    let without = PbigBroadPhase::with_core_config(on_gpu().config).expect("a length");
+    let [(mut world, with), (_, without)] = [pbig(on_gpu()), without].map(|mut ours| {
+        let mut world = scene("column", 60);
+        steps(&mut world, &mut ours, 40);
+        (world, ours)
+    });
+    assert_eq!(saved(&with), saved(&without));
+    let mut again = restored(&saved(&with));
+    steps(&mut world, &mut again, 1);
+    let devices = [&with, &again].map(|one| one.stats().report.device.is_some());
+    let why = again.stats().report.fallback.clone().unwrap_or_default();
+    assert!(devices == [true, false] && why.starts_with("no device was given"), "{devices:?}, {why}");
 }
 
 #[test]

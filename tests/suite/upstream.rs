@@ -25,6 +25,21 @@ fn upstream_177_180_a_shape_grows_and_shrinks_in_place() {
     });
 }
 
+#[test]
+fn a_voxel_that_is_set_in_place_grows_the_box() {
+    everywhere(|mut scene| {
+        let voxels = ColliderBuilder::voxels(Vector::repeat(1.0), &[Point::origin()]);
+        let voxels = scene.world.colliders.insert(voxels);
+        scene.ball(5.4);
+        assert_eq!(scene.step(), 0);
+        for (x, pairs) in [(3, 0), (4, 1)] {
+            let shape = scene.world.colliders[voxels].shape_mut().as_voxels_mut().expect("voxels");
+            shape.set_voxel(point![x, 0, 0], true);
+            assert_eq!((scene.step(), scene.contacts()), (pairs, pairs), "voxel {x}");
+        }
+    });
+}
+
 /// A ball without a body that reports collisions with everything.
 fn loud(x: f32) -> ColliderBuilder {
     let ball = ColliderBuilder::ball(0.5).translation(vector![x, 0.0, 0.0]);

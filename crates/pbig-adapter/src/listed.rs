@@ -108,3 +108,6 @@ impl<T: Tree> Colliders<T> {
         }
     }
 }
+
+#[cfg(all(test, feature = "parallel"))]
+mod tests;

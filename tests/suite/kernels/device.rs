@@ -24,12 +24,18 @@ pub(super) fn counting(kernel: &str, edits: &[[&str; 2]], before: &State) -> Sta
     let of_twins = TWINS.iter().map(|twin| (twin.kernel, twin.groups));
     let (kernel, groups) =
         of_twins.chain(SORT).find(|(one, _)| one.name == kernel).expect("a kernel of this name");
-    let mut text = poisoned(kernel, before.finds_changes());
+    let text = edited(kernel, edits, before.finds_changes());
+    run_text(gpu(), kernel, groups, &text, &GpuOptions::DEFAULT, before)
+}
+
+/// Returns the text of a kernel in which each edit replaces its first part by its second one.
+pub(super) fn edited(kernel: &Kernel, edits: &[[&str; 2]], changes: bool) -> String {
+    let mut text = poisoned(kernel, changes);
     for [from, to] in edits {
         assert!(text.contains(from), "{} has no {from}", kernel.name);
         text = text.replace(from, to);
     }
-    run_text(gpu(), kernel, groups, &text, &GpuOptions::DEFAULT, before)
+    text
 }
 
 /// Runs a text of a kernel on a state, and returns the state afterwards.

@@ -50,9 +50,16 @@ fn unsorted(boxes: u32, pairs: &[Pair]) -> State {
 }
 
 /// Runs the kernels of the sort on the device, up to the one of this name.
-fn run_before(name: &str, mut state: State) -> State {
+fn run_before(name: &str, state: State) -> State {
+    run_edited(name, state, &[])
+}
+
+/// As [`run_before`], with edits of the texts of some kernels.
+fn run_edited(name: &str, mut state: State, edits: &[(&str, [&str; 2])]) -> State {
     for (kernel, groups) in SORT.iter().take_while(|(kernel, _)| kernel.name != name) {
-        state = run_text(gpu(), kernel, *groups, &poisoned(kernel, false), &GpuOptions::DEFAULT, &state);
+        let own = edits.iter().filter(|(of, _)| *of == kernel.name).map(|(_, edit)| *edit);
+        let text = edited(kernel, &own.collect::<Vec<_>>(), false);
+        state = run_text(gpu(), kernel, *groups, &text, &GpuOptions::DEFAULT, &state);
         if kernel.name == "count_pairs" {
             scan_rows(&mut state);
         }
@@ -74,16 +81,24 @@ fn scan_rows(s: &mut State) {
     }
 }
 
-/// Asserts that the device sorts these pairs, and returns the number of pieces of long rows.
-fn assert_sorts(what: &str, boxes: u32, pairs: &[Pair]) -> u32 {
+/// Sorts these pairs on the device, with edits of kernels. Returns the first fault, and the number of pieces of long rows.
+fn sort(boxes: u32, pairs: &[Pair], edits: &[(&str, [&str; 2])]) -> (Option<String>, u32) {
     let before = unsorted(boxes, pairs);
     let mut wanted = before.out.as_chunks::<2>().0.to_vec();
     wanted.sort_unstable_by_key(|[a, b]| [*a, b & !ENDED]);
-    let after = run_before("none", before);
-    assert_eq!(same("pairs", after.out.as_chunks::<2>().0, &wanted), None, "{what}");
+    let after = run_edited("none", before, edits);
     let pieces = by_piece(&after);
     let groups = [pieces.min(GROUPS_PER_ROW), pieces.div_ceil(GROUPS_PER_ROW), 1];
-    assert_eq!((after.totals.sorted, &after.long_rows[..3]), (1, &groups[..]), "{what}");
+    let fault = same("pairs", after.out.as_chunks::<2>().0, &wanted)
+        .or_else(|| same("flag", &[after.totals.sorted], &[1]))
+        .or_else(|| same("workgroups", &after.long_rows[..3], &groups));
+    (fault, pieces)
+}
+
+/// Asserts that the device sorts these pairs, and returns the number of pieces of long rows.
+fn assert_sorts(what: &str, boxes: u32, pairs: &[Pair]) -> u32 {
+    let (fault, pieces) = sort(boxes, pairs, &[]);
+    assert_eq!(fault, None, "{what}");
     pieces
 }
 
@@ -106,6 +121,32 @@ fn the_sort_orders_long_rows() {
     let pairs: Vec<_> = ground.chain(second).chain(limit).chain([Pair::new(boxes - 2, boxes - 1)]).collect();
     let pieces = [boxes - 1, (boxes - 70_000).div_ceil(3), SHORT_ROW + 1].map(|row| row.div_ceil(PIECE));
     assert_eq!(assert_sorts("long rows", boxes, &pairs), pieces.iter().sum::<u32>());
+}
+
+/// A comparison that never finds a fault would pass the tests above.
+#[test]
+fn faults_planted_in_the_sort_are_noticed() {
+    needs_gpu!();
+    // A long row, and a short one.
+    let pairs: Vec<_> = (1..900).map(|b| Pair::new(0, b)).chain((2..90).map(|b| Pair::new(1, b))).collect();
+    let swapped = ["out[2u * at", "out[2u * (at ^ 1u)"];
+    for (kernel, edit, words) in [
+        // Lost marks.
+        ("place_pairs", ["= out[2u * i + 1u];", "= out[2u * i + 1u] & 0x7fffffffu;"], "pairs: "),
+        ("rank_pairs", ["= second;", "= second_of(second);"], "pairs: "),
+        ("place_windows", ["= word;", "= second_of(word);"], "pairs: "),
+        ("rank_windows", ["word >> 31u", "0u"], "pairs: "),
+        // Swapped pairs.
+        ("rank_pairs", swapped, "pairs: "),
+        ("rank_windows", swapped, "pairs: "),
+        ("arrange_rows", ["u32(sorted)", "u32(!sorted)"], "flag: "),
+    ] {
+        let (fault, _) = sort(900, &pairs, &[(kernel, edit)]);
+        assert!(
+            fault.as_ref().is_some_and(|fault| fault.starts_with(words)),
+            "{kernel}, {edit:?}: {fault:?}"
+        );
+    }
 }
 
 #[test]

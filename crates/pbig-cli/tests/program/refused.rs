@@ -3,7 +3,11 @@
 use super::{array, json, pbig, read_pairs, refused, save};
 use ndarray::{Array2, Array3};
 use pbig_core::Aabb;
+#[cfg(target_os = "linux")]
+use std::io::Write;
 use std::path::Path;
+#[cfg(target_os = "linux")]
+use std::process::Command;
 
 /// The one line on stderr about this content of a file.
 fn line_about(folder: &Path, command: &str, name: &str, content: &[u8]) -> String {
@@ -85,6 +89,32 @@ fn a_header_cannot_lie_and_says_what_the_values_are() {
     ] {
         let line = line_about(folder.path(), command, "x.npy", &content);
         assert!(line.starts_with("pbig: x.npy: ") && line.contains(words), "{words}: {line}");
+    }
+}
+
+/// What a file promises, or how long it is, costs no memory: with 1 GiB of addresses the program still answers.
+#[cfg(target_os = "linux")]
+#[test]
+fn wrong_files_are_refused_in_little_memory() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let floats = |rows: u64| header("'<f4'", &format!("{rows}, 6"));
+    let ply = "ply\nformat binary_little_endian 1.0\nelement vertex 4000000000\n\
+               property float x\nproperty float y\nproperty float z\nend_header\n";
+    let mesh = ["--elements", "vv", "--mesh", "x.ply"];
+    for (content, holes, args) in [
+        (floats(1 << 27), 0, &["x.npy"][..]),
+        (floats(1 << 28), 24 << 28, &["x.npy"]),
+        (vec![], 1 << 33, &["x.npy"]),
+        (vec![], 1 << 33, &["x.csv"]),
+        (ply.into(), 0, &mesh),
+    ] {
+        let name = args[args.len() - 1];
+        let mut file = std::fs::File::create(folder.path().join(name)).expect("a file");
+        file.write_all(&content).expect("written");
+        file.set_len(content.len() as u64 + holes).expect("holes, which take no place on the disk");
+        let limited = ["-c", "ulimit -v 1048576 && exec \"$@\"", "sh", env!("CARGO_BIN_EXE_pbig"), "pairs"];
+        let output = Command::new("sh").current_dir(folder.path()).args(limited).args(args).output();
+        refused(&output.expect("a shell"), &[name]);
     }
 }
 

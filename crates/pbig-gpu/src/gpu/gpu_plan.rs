@@ -195,3 +195,56 @@ fn dims(space: [f32; 3], cell: f64, most: f64) -> [u32; 3] {
     }
     dims
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const OPTIONS: GpuOptions = GpuOptions::DEFAULT;
+
+    /// Returns boxes of nine sizes on a line: of each size twenty times as many as there is room for side by side.
+    fn sizes_on_a_line() -> Vec<Aabb> {
+        let row = |size: u32| (0..20 << size).map(move |i| (i as f32 * 50.0, 1000.0, (1 << size) as f32));
+        let boxes = (1..10).flat_map(row);
+        boxes.map(|(x, length, n)| Aabb::new([x / n, 0.0, 0.0], [(x + length) / n, 0.0, 0.0])).collect()
+    }
+
+    /// However full the cells are, or small after plans that made too many tests.
+    #[test]
+    fn a_cell_is_at_least_half_as_long_as_the_largest_box_of_its_level() {
+        let summary = Summary::of(&sizes_on_a_line());
+        let (space, _) = space_of(&summary, &ordinary(&summary));
+        let sizes = levels(&summary);
+        assert!(sizes.len() > MAX_LEVELS, "{} levels", sizes.len());
+        for (level, factor) in sizes.iter().flat_map(|level| [1.0, 1e-6].map(|factor| (level, factor))) {
+            let largest = level.all.extent.into_iter().fold(0.0, f32::max);
+            let cell = edge(level, &summary, space, (&OPTIONS, factor));
+            assert!(
+                cell * f64::from(MAX_SPAN - 2) > largest.into(),
+                "{cell}, box {largest}, factor {factor}"
+            );
+        }
+    }
+
+    #[test]
+    fn every_world_has_a_plan_of_finite_cells() {
+        let point = Aabb::new([3.0; 3], [3.0; 3]);
+        let ends = [f32::MIN, 0.0, f32::MAX].map(|x| Aabb::new([x; 3], [x; 3]));
+        let worlds = [
+            ("none", vec![], 1),
+            ("one box", vec![Aabb::new([0.0; 3], [1.0; 3])], 2),
+            ("equal points", vec![point; 5000], 2),
+            ("points at both ends of the numbers", ends.repeat(300), 2),
+            ("all numbers", vec![Aabb::new([f32::MIN; 3], [f32::MAX; 3]); 50], 1),
+            ("nine sizes", sizes_on_a_line(), MAX_LEVELS),
+        ];
+        for ((name, boxes, most), factor) in worlds.iter().flat_map(|world| [1.0, 1e-6].map(|f| (world, f))) {
+            let plan = GpuPlan::new(&Summary::of(boxes), &OPTIONS, factor, 1 << 16);
+            let Params { origin, scale, levels, cells, clamp_low, clamp_high, .. } =
+                plan.add_to(Params::default());
+            assert!(origin.iter().chain([&scale]).all(|x| x.is_finite()) && scale > 0.0, "{name}: {plan:?}");
+            assert!(levels as usize <= *most && cells <= 1 << 16, "{name}: {plan}");
+            assert!((0..3).all(|k| clamp_low[k] <= clamp_high[k]), "{name}: {plan:?}");
+        }
+    }
+}

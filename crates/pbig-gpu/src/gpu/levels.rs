@@ -69,3 +69,40 @@ fn under_a_box(level: &SizeRange, larger: &SizeRange, lengths: [f64; 3]) -> f64 
     let share = |length: f64| (f64::from(edge) / length).min(1.0);
     f64::from(level.all.boxes) * lengths.map(share).into_iter().product::<f64>()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use pbig_core::Aabb;
+
+    /// Returns `n` x `n` x `n` cubes in a space of 10 x 10 x 10.
+    fn cubes(n: u32, edge: f32) -> Vec<Aabb> {
+        let at = |i: u32, d: u32| (i / d % n) as f32 * (10.0 / n as f32);
+        let center = |i: u32| [at(i, 1), at(i, n), at(i, n * n)];
+        (0..n * n * n).map(|i| Aabb::from_center(center(i), [edge / 2.0; 3])).collect()
+    }
+
+    /// Returns the numbers of boxes of the levels.
+    fn counts(sets: &[Vec<Aabb>]) -> Vec<u32> {
+        levels(&Summary::of(&sets.concat())).iter().map(|level| level.all.boxes).collect()
+    }
+
+    #[test]
+    fn sizes_share_a_level_while_a_larger_box_lies_over_few() {
+        let small = cubes(10, 0.3);
+        assert_eq!(counts(&[small.clone(), cubes(10, 1.5)]), [2000]);
+        assert_eq!(counts(&[small.clone(), cubes(10, 6.0)]), [1000, 1000]);
+        // In a level of two sizes more boxes lie under a box.
+        assert_eq!(counts(&[small, cubes(10, 1.5), cubes(5, 2.6)]), [2000, 125]);
+    }
+
+    #[test]
+    fn up_to_32_of_the_largest_boxes_have_no_level() {
+        let with = |large: usize, larger: usize| {
+            counts(&[cubes(10, 0.3), cubes(4, 6.0)[..large].to_vec(), cubes(4, 50.0)[..larger].to_vec()])
+        };
+        assert_eq!((with(32, 0), with(33, 0)), (vec![1000], vec![1000, 33]));
+        assert_eq!((with(20, 12), with(20, 13)), (vec![1000], vec![1000, 20]));
+        assert_eq!(counts(&[cubes(3, 1.0)[..1].to_vec()]), [1], "the only level stays");
+    }
+}

@@ -58,8 +58,11 @@ pub fn shapes() -> Vec<(&'static str, Recipe)> {
     let small = |width: f32, half: f32| growing(0.0, part([width; 3], [half; 3]));
     let sheets =
         |x: f32| at([x, 0.0, 0.0], share(150, growing(0.5, part([3.0, 130.0, 130.0], [1e-5, 0.4, 0.4]))));
+    let sheet = |x: f32, weight: u32, width: f32, half: [f32; 3]| {
+        at([x, 65.0, 65.0], share(weight, growing(0.5, part([width, 0.0, 0.0], half))))
+    };
     let around = Part { place: Placement::Around, ..small(1e5, 2e3) };
-    let worlds: [(&str, &[Part]); 23] = [
+    let worlds: [(&str, &[Part]); 24] = [
         ("uniform", &[CUBES]),
         ("two scales", &[part([1000.0; 3], CUBES.half), small(0.01, 5e-6)]),
         ("size by distance", &[around]),
@@ -127,6 +130,30 @@ pub fn shapes() -> Vec<(&'static str, Recipe)> {
         (
             "needles in a thin world",
             &[at([0.47, 1.3, 0.0], mixed(2.1, line([0.02, 2200.0, 0.01], [8e-7, 3000.0, 55.0])))],
+        ),
+        // The worst one of an hour's search, with 10,000 boxes: a sample promises less work in a grid than there is. With fewer
+        // digits it does not.
+        (
+            "tiny tiles among sheets",
+            &[
+                mixed(
+                    0.040395737,
+                    Part {
+                        weight: 150,
+                        corner: [7.0019517, 0.0723704, 0.0],
+                        width: [0.0021275363, 0.101915136, 0.1538184],
+                        half: [1.0353697e-10, 0.0029106543, 0.0008135489],
+                        growth: 0.5,
+                        ..CUBES
+                    },
+                ),
+                mixed(1.7322884, sheet(383.4098, 2, 132.27032, [0.0003539665, 80_001.45, 4800.538])),
+                Part {
+                    place: Placement::Line,
+                    ..sheet(6.4418683, 6, 0.24045853, [0.00017519857, 147_902.34, 4539.5073])
+                },
+                mixed(2.8373046, sheet(5.0, 2, 0.69801897, [0.0010956939, 1_903_660.3, 318.9507])),
+            ],
         ),
     ];
     worlds.map(|(name, parts)| (name, Recipe(parts.to_vec()))).into()
