@@ -308,7 +308,7 @@ impl PairDevice for Hardware {
 #[test]
 fn auto_uses_hardware_for_many_boxes_and_no_software() {
     needs_gpu!();
-    // All count as changed, and few are valid: a software device has little to do.
+    // Each box counts as changed, and few are valid: a software device has little to do.
     let mut boxes = vec![Aabb::NOWHERE; 500_000];
     boxes[..5000].copy_from_slice(&set("unit", 5000));
     let device = GpuFinder::new().expect("an adapter");

@@ -190,7 +190,7 @@ macro_rules! define_scene {
     };
 }
 
-/// Defines `ParryTree` with parry's type of corners. The optional function moves leaves, and returns true, if these are few.
+/// Defines `ParryTree` with parry's type of corners. Where few leaves change, the optional function moves them and returns true.
 #[doc(hidden)]
 #[macro_export]
 macro_rules! define_tree {
@@ -261,12 +261,19 @@ macro_rules! define_debug_render {
                 parts: $crate::DebugRenderParts,
                 backend: &mut dyn DebugRenderBackend,
             ) {
+                let edges = $crate::box_edges(DIM);
                 for drawn in self.colliders.drawn(parts, |handle| colliders.contains(to_handle(handle))) {
                     let (handle, aabb) = (to_handle(drawn.collider), to_tree(&drawn.aabb));
                     let object = DebugRenderObject::ColliderAabb(handle, &colliders[handle], &aabb);
                     if backend.filter_object(object) {
-                        let (vertices, edges) = (aabb.vertices(), $crate::box_edges(DIM));
-                        backend.draw_polyline(object, &vertices, &edges, $unmoved, $unscaled, drawn.color);
+                        backend.draw_polyline(
+                            object,
+                            &aabb.vertices(),
+                            &edges,
+                            $unmoved,
+                            $unscaled,
+                            drawn.color,
+                        );
                     }
                 }
             }

@@ -56,7 +56,7 @@ impl<T: Tree> Colliders<T> {
                     self.set_margin(margin);
                 }
                 self.enable(handle, aabb, filter);
-                if own.is_some() {
+                if is_new_and_fixed {
                     self.set_margin(self.margins.usual);
                 }
             }

@@ -156,33 +156,34 @@ impl WideBoxes {
         })
     }
 
-    /// Tests the candidates that are new or have changed. `old` are those that were no pairs before, new ones included, sorted.
-    fn test_candidates(&mut self, core: &BroadPhase, old: Vec<Pair>) {
+    /// Tests the candidates that are new or have changed. `apart_before` has the candidates that were no pairs before, new ones included,
+    /// sorted.
+    fn test_candidates(&mut self, core: &BroadPhase, apart_before: Vec<Pair>) {
         self.changed.sort_unstable();
         self.changed.dedup();
         let is_few = self.changed.len() * policy::WIDE_LOOKUPS < core.id_count() as usize;
-        let mut old = old.into_iter().peekable();
+        let mut apart_before = apart_before.into_iter().peekable();
         if is_few {
             let of_changed = self.changed.iter().flat_map(|&id| core.pairs_of(id));
             let mut tested: Vec<Pair> = of_changed.chain(core.events().added.iter().copied()).collect();
             tested.sort_unstable();
             tested.dedup();
-            tested.into_iter().for_each(|pair| self.test(pair, &mut old));
+            tested.into_iter().for_each(|pair| self.test(pair, &mut apart_before));
         } else {
-            core.pairs().for_each(|pair| self.test(pair, &mut old));
+            core.pairs().for_each(|pair| self.test(pair, &mut apart_before));
         }
-        // Those that were not tested are still apart.
-        self.apart.extend(old);
+        // The rest was not tested, and is still apart.
+        self.apart.extend(apart_before);
     }
 
-    /// Tests a candidate. The next one is a later pair.
+    /// Tests a candidate, both of whose boxes were stored. The next candidate is a later pair.
     #[inline(always)]
-    fn test(&mut self, pair: Pair, old: &mut Peekable<IntoIter<Pair>>) {
-        while let Some(still_apart) = old.next_if(|other| *other < pair) {
+    fn test(&mut self, pair: Pair, apart_before: &mut Peekable<IntoIter<Pair>>) {
+        while let Some(still_apart) = apart_before.next_if(|other| *other < pair) {
             self.apart.push(still_apart);
         }
-        let was_pair = old.next_if_eq(&pair).is_none();
-        let is_pair = self.boxes[pair.a as usize].overlaps(&self.boxes[pair.b as usize]);
+        let was_pair = apart_before.next_if_eq(&pair).is_none();
+        let is_pair = self.get(pair.a).overlaps(&self.get(pair.b));
         if !is_pair {
             self.apart.push(pair);
         }
@@ -192,16 +193,19 @@ impl WideBoxes {
         }
     }
 
-    /// Returns the candidates that were no pairs before an update of the core, sorted.
-    fn no_pairs_before(&mut self, core: &BroadPhase) -> Vec<Pair> {
-        let mut old = std::mem::take(&mut self.apart);
-        if self.has_removed || !core.events().removed.is_empty() {
-            old.retain(|pair| core.has_pair(*pair));
+    /// Takes the candidates that were no pairs before an update of the core, sorted.
+    fn take_apart(&mut self, core: &BroadPhase) -> Vec<Pair> {
+        let (mut apart, events) = (std::mem::take(&mut self.apart), core.events());
+        if self.has_removed || !events.removed.is_empty() {
+            apart.retain(|pair| core.has_pair(*pair));
         }
-        old.extend(&core.events().added);
-        old.sort_unstable();
-        old.dedup();
-        old
+        if !events.added.is_empty() {
+            apart.extend(&events.added);
+            apart.sort_unstable();
+            apart.dedup();
+        }
+        self.apart.reserve(apart.len());
+        apart
     }
 }
 
@@ -283,8 +287,11 @@ impl BoxStore<WideAabb> for WideBoxes {
         core.update()?;
         let ended = core.events().removed.iter().filter(|pair| self.apart.binary_search(pair).is_err());
         self.events.removed.extend(ended);
-        let old = self.no_pairs_before(core);
-        self.test_candidates(core, old);
+        if self.changed.is_empty() && *core.events() == Events::default() {
+            return Ok(&self.events);
+        }
+        let apart_before = self.take_apart(core);
+        self.test_candidates(core, apart_before);
         self.changed.clear();
         self.has_removed = false;
         self.events.removed.sort_unstable();

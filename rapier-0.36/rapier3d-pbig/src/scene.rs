@@ -48,8 +48,10 @@ impl Call<'_> {
 /// Returns the type of a collider's body. A collider without a body counts as fixed, the frame of a soft body as dynamic.
 pub(crate) fn kind_of(body: Option<&RigidBody>) -> BodyKind {
     match body.map_or(RigidBodyType::Fixed, RigidBody::body_type) {
-        RigidBodyType::SoftFrame => BodyKind::Dynamic,
-        body => BodyKind::from_number(body as u32),
+        RigidBodyType::Dynamic | RigidBodyType::SoftFrame => BodyKind::Dynamic,
+        RigidBodyType::Fixed => BodyKind::Fixed,
+        RigidBodyType::KinematicPositionBased => BodyKind::KinematicPositionBased,
+        RigidBodyType::KinematicVelocityBased => BodyKind::KinematicVelocityBased,
     }
 }
 

@@ -54,7 +54,7 @@ fn run_before(name: &str, state: State) -> State {
     run_edited(name, state, &[])
 }
 
-/// As [`run_before`], with edits of the texts of some kernels.
+/// Does the same as [`run_before`], with edits of the texts of some kernels.
 fn run_edited(name: &str, mut state: State, edits: &[(&str, [&str; 2])]) -> State {
     for (kernel, groups) in SORT.iter().take_while(|(kernel, _)| kernel.name != name) {
         let own = edits.iter().filter(|(of, _)| *of == kernel.name).map(|(_, edit)| *edit);

@@ -1,7 +1,7 @@
 //! The margin of new fixed colliders: in f32 and f64, read by one thread and by several, and after a rescan.
 
 use super::*;
-use crate::{Groups, WideAabb, filter_of};
+use crate::{Groups, Margins, WideAabb, filter_of};
 use pbig_core::{Aabb, BroadPhase, Config, TestMode};
 use std::marker::PhantomData;
 
@@ -56,6 +56,12 @@ impl<A: Bounds> Scene for Lattice<A> {
 /// A tree that nobody asks.
 struct NoTree<A>(PhantomData<A>);
 
+impl<A> Default for NoTree<A> {
+    fn default() -> Self {
+        Self(PhantomData)
+    }
+}
+
 impl<A: Bounds> Tree for NoTree<A> {
     type Aabb = A;
 
@@ -85,14 +91,15 @@ fn check<A: Bounds>(of: fn([f32; 3]) -> A, count: usize) {
     let core = BroadPhase::new(Config { margin: MARGIN, ..Config::DEFAULT }).expect("a length");
     let mut colliders = Colliders::<NoTree<A>>::new(core);
     let is_common = |[least, most]: [f32; 2]| least > 0.999 * MARGIN && most < 1.001 * MARGIN;
+    let margins_of_update = Margins { usual: MARGIN, ..Margins::default() };
     for call in 0..2 {
-        colliders.update(&scene, MARGIN, |_| panic!("no pair"));
+        colliders.update(&scene, &margins_of_update, |_| panic!("no pair"));
         let [fixed, dynamic] = margins(&colliders, &scene);
         assert!(fixed[1] < 0.001 * MARGIN && is_common(dynamic), "call {call}: {fixed:?}, {dynamic:?}");
     }
     // A world with fewer colliders is another one, which is read as a whole.
     scene.count -= 1;
-    colliders.update(&scene, MARGIN, |_| panic!("no pair"));
+    colliders.update(&scene, &margins_of_update, |_| panic!("no pair"));
     let [fixed, dynamic] = margins(&colliders, &scene);
     assert_eq!(colliders.counts.totals.rescans, 1);
     assert!(is_common(fixed) && is_common(dynamic), "after a rescan: {fixed:?}, {dynamic:?}");

@@ -50,6 +50,7 @@ impl World {
     fn update(&mut self) -> [usize; 2] {
         self.boxes.settle(&mut self.core);
         let found = self.boxes.update(&mut self.core).expect("the pairs are few");
+        assert!([&found.added, &found.removed].iter().all(|pairs| is_list(pairs)));
         for pair in &found.removed {
             assert!(self.pairs.remove(pair), "{pair:?} ends unknown");
         }
@@ -68,8 +69,14 @@ impl World {
             .map(|(a, b)| Pair::new(a as u32, b as u32))
             .collect();
         assert_eq!(self.pairs, wanted);
+        assert!(is_list(&self.boxes.apart));
         assert_eq!(self.boxes.pair_count(&self.core), wanted.len());
     }
+}
+
+/// Returns true if pairs are sorted, each once.
+fn is_list(pairs: &[Pair]) -> bool {
+    pairs.is_sorted_by(|one, next| one < next)
 }
 
 #[test]

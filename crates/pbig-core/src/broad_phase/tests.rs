@@ -326,10 +326,10 @@ fn look_ups_given_up_cost_at_most_64_tests_a_box() {
     assert!(update <= 3 * search / 2 + 64 * n as u64, "{update}, and {search} in a search");
 }
 
-/// Known from counts before any look-up: each changed box would be tested against all the others.
+/// Counts tell before any look-up that each changed box would be tested against all the others.
 #[test]
 fn boxes_that_outgrow_the_cells_are_not_looked_up() {
-    let n = 10_000u32;
+    let n = 20_000u32;
     let cube = |id: u32, half: f32| {
         Aabb::from_center([id % 100, id / 100, 0].map(|x| 2.0 * x as f32), [half, 0.5, 0.5])
     };

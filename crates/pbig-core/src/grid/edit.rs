@@ -168,11 +168,12 @@ impl EditedGrid {
         Plan { algorithm, spilled, ..Plan::of_grid(plan, boxes as usize, oversize.len()) }
     }
 
-    /// Returns about the work of looking up boxes among the oversize ones, before and after they move to where `after` yields them.
+    /// Returns an estimate of the work of testing changed boxes against the oversize ones, before and after the move. `after` are the
+    /// boxes as they are now. Those that are oversize may have been so before.
     pub(crate) fn work_with_oversize<'a>(&self, after: impl ExactSizeIterator<Item = &'a Aabb>) -> u64 {
         let (boxes, oversize, cells) = (after.len(), self.grid.oversize.len(), &self.grid.plan.cells);
         let more = after.filter(|aabb| !cells.takes(aabb) && aabb.is_valid()).count();
-        (boxes * (oversize + more.max(oversize))) as u64 * WORK_OF_EXACT_TEST
+        boxes as u64 * (oversize + more.max(oversize)) as u64 * WORK_OF_EXACT_TEST
     }
 
     /// Returns the number of boxes that are out of the grid's order.

@@ -209,7 +209,7 @@ mod tests {
         boxes.map(|(x, length, n)| Aabb::new([x / n, 0.0, 0.0], [(x + length) / n, 0.0, 0.0])).collect()
     }
 
-    /// However full the cells are, or small after plans that made too many tests.
+    /// The cells may be full, or small after plans that made too many tests.
     #[test]
     fn a_cell_is_at_least_half_as_long_as_the_largest_box_of_its_level() {
         let summary = Summary::of(&sizes_on_a_line());

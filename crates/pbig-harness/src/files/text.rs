@@ -5,7 +5,7 @@ use pbig_core::Aabb;
 use std::io::{self, BufRead};
 
 /// Maximum length of a line, in bytes. Six numbers need a few hundred.
-const MAX_LINE_BYTES: usize = 64 << 10;
+pub(crate) const MAX_LINE_BYTES: usize = 64 << 10;
 
 /// The columns of a `.csv` file.
 const COLUMNS: [&str; 6] = ["min_x", "min_y", "min_z", "max_x", "max_y", "max_z"];
@@ -17,7 +17,7 @@ pub fn csv_boxes(bytes: &[u8]) -> Result<Vec<Aabb>, String> {
 
 /// Reads boxes from a text. Stops at the first line that is wrong.
 pub(super) fn boxes(reader: impl BufRead, max_boxes: u64) -> Result<BoxList, String> {
-    let mut lines = Lines { reader, bytes: Vec::new(), number: 0, ended_by: 0 };
+    let mut lines = Lines::new(reader);
     let (mut list, mut is_first) = (BoxList::default(), true);
     while lines.advance()? {
         let about = |what| format!("line {}: {what}", lines.number);
@@ -40,20 +40,28 @@ fn check_count(boxes: usize, limit: u64) -> Result<(), String> {
     if boxes as u64 > limit { Err(too_many(boxes, limit)) } else { Ok(()) }
 }
 
+pub(crate) fn too_long() -> String {
+    format!("longer than {MAX_LINE_BYTES} bytes")
+}
+
 /// Lines of bounded length, which end with `\n`, `\r\n` or `\r`.
-struct Lines<R> {
+pub(crate) struct Lines<R> {
     reader: R,
     /// The present line, without its end.
-    bytes: Vec<u8>,
+    pub(crate) bytes: Vec<u8>,
     /// Number of the present line, from 1.
-    number: usize,
+    pub(crate) number: usize,
     /// The byte that ended the present line, or 0.
     ended_by: u8,
 }
 
 impl<R: BufRead> Lines<R> {
+    pub(crate) fn new(reader: R) -> Self {
+        Self { reader, bytes: Vec::new(), number: 0, ended_by: 0 }
+    }
+
     /// Moves to the next line. Returns false at the end of the text.
-    fn advance(&mut self) -> Result<bool, String> {
+    pub(crate) fn advance(&mut self) -> Result<bool, String> {
         let before = self.ended_by;
         if !self.fill().map_err(one_line)? {
             return Ok(false);
@@ -64,9 +72,7 @@ impl<R: BufRead> Lines<R> {
         }
         self.number += 1;
         match self.bytes.len() > MAX_LINE_BYTES {
-            true => {
-                Err(format!("line {}: longer than {MAX_LINE_BYTES} bytes; expected 6 numbers", self.number))
-            }
+            true => Err(format!("line {}: {}", self.number, too_long())),
             false => Ok(true),
         }
     }
@@ -166,7 +172,7 @@ mod tests {
     /// A reader without an end: only a bound lets this end.
     #[test]
     fn a_line_without_an_end_is_refused() {
-        let wanted = "longer than 65536 bytes; expected 6 numbers";
+        let wanted = "longer than 65536 bytes";
         let first = boxes(BufReader::new(repeat(0)), 9).expect_err("refused");
         assert_eq!(first, format!("line 1: {wanted}"));
         let second = boxes(BufReader::new(b"0,0,0,1,1,1\n\"".chain(repeat(b'0'))), 9).expect_err("refused");

@@ -3,19 +3,19 @@
 //! The crate `tobj` numbers vertices anew for each object, and its errors name no line.
 
 use super::{Mesh, face};
-use crate::files::brief;
+use crate::files::{Lines, MAX_LINE_BYTES, brief, too_long};
 use std::io::BufRead;
 
 pub(super) fn read(reader: impl BufRead) -> Result<Mesh, String> {
-    let mut mesh = Mesh::default();
+    let (mut mesh, mut lines) = (Mesh::default(), Lines::new(reader));
     let mut whole = String::new();
-    for (i, line) in reader.split(b'\n').enumerate() {
-        let at = |what: String| format!("line {}: {what}", i + 1);
-        let line = line.map_err(|error| at(error.to_string()))?;
+    while lines.advance()? {
+        let at = |what: String| format!("line {}: {what}", lines.number);
         // Comments and names may be in any encoding.
-        let line = String::from_utf8_lossy(&line);
+        let line = String::from_utf8_lossy(&lines.bytes);
         let line = line.trim_start_matches('\u{feff}').split('#').next().unwrap_or_default().trim_end();
         match line.strip_suffix('\\') {
+            Some(_) if whole.len() > MAX_LINE_BYTES => return Err(at(too_long())),
             Some(begun) => whole += begun,
             None => take(&(std::mem::take(&mut whole) + line), &mut mesh).map_err(at)?,
         }
@@ -51,4 +51,25 @@ fn corner(word: &str, vertices: usize) -> Result<u32, String> {
     let index = number
         .and_then(|number| if number < 0 { vertices as i64 + number } else { number - 1 }.try_into().ok());
     index.ok_or_else(|| format!("'{}' is no vertex", brief(word)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::io::{BufReader, Read, repeat};
+
+    /// Readers without an end: only a bound lets this end.
+    #[test]
+    fn a_line_without_an_end_is_refused() {
+        let refused = |reader: &mut dyn Read| read(BufReader::new(reader)).expect_err("refused");
+        assert_eq!(refused(&mut repeat(b'v')), "line 1: longer than 65536 bytes");
+        let continued = "v 1 2 3\\\n".repeat(10_000);
+        assert!(refused(&mut continued.as_bytes()).ends_with(": longer than 65536 bytes"));
+    }
+
+    #[test]
+    fn a_line_that_goes_on_in_the_next_one_is_one() {
+        let mesh = read(&b"v 0 0 \\\r\n 1\nv 1 0 0\nv 0 1 0\nf 1 2 \\\n-1\n"[..]).expect("a triangle");
+        assert_eq!((mesh.vertices[0], mesh.faces.len()), ([0.0, 0.0, 1.0], 1));
+    }
 }
