@@ -56,7 +56,7 @@ impl<T: Tree> Colliders<T> {
                     self.set_margin(margin);
                 }
                 self.enable(handle, aabb, filter);
-                if is_new_and_fixed {
+                if own.is_some() {
                     self.set_margin(self.margins.usual);
                 }
             }

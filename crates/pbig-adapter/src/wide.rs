@@ -7,8 +7,8 @@
 use crate::bounds::{Bounds, BoxStore, Scalar};
 use crate::{SceneQuery, policy};
 use pbig_core::{Aabb, BroadPhase, Error, Events, Pair, ProxyFilter};
+use std::collections::BTreeSet;
 use std::iter::Peekable;
-use std::vec::IntoIter;
 
 /// A closed AABB in f64. It is valid if `min <= max` on all axes.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -89,8 +89,8 @@ pub struct WideBoxes {
     /// Ids of boxes that have changed since the last update, repeated or not.
     changed: Vec<u32>,
     has_removed: bool,
-    /// Candidates whose f64 boxes do not overlap, sorted.
-    apart: Vec<Pair>,
+    /// Candidates whose f64 boxes do not overlap.
+    apart: BTreeSet<Pair>,
     events: Events,
 }
 
@@ -150,62 +150,48 @@ impl WideBoxes {
             return self.centre;
         }
         let (middle, grid) = (corners.len() / 2, self.limit());
-        std::array::from_fn(|k| {
+        let median = std::array::from_fn(|k| {
             let median = corners.select_nth_unstable_by(middle, |a, b| a[k].total_cmp(&b[k])).1[k];
             if grid > 0.0 { (median / grid).round() * grid } else { median }
-        })
+        });
+        if median.iter().all(|x: &f64| x.is_finite()) { median } else { self.centre }
     }
 
-    /// Tests the candidates that are new or have changed. `apart_before` has the candidates that were no pairs before, new ones included,
-    /// sorted.
-    fn test_candidates(&mut self, core: &BroadPhase, apart_before: Vec<Pair>) {
+    /// Tests the candidates that are new or have changed, in their order.
+    fn test_candidates(&mut self, core: &BroadPhase) {
         self.changed.sort_unstable();
         self.changed.dedup();
         let is_few = self.changed.len() * policy::WIDE_LOOKUPS < core.id_count() as usize;
-        let mut apart_before = apart_before.into_iter().peekable();
+        let mut new = core.events().added.iter().copied().peekable();
         if is_few {
             let of_changed = self.changed.iter().flat_map(|&id| core.pairs_of(id));
-            let mut tested: Vec<Pair> = of_changed.chain(core.events().added.iter().copied()).collect();
+            let mut tested: Vec<Pair> = of_changed.chain(new.clone()).collect();
             tested.sort_unstable();
             tested.dedup();
-            tested.into_iter().for_each(|pair| self.test(pair, &mut apart_before));
+            tested.into_iter().for_each(|pair| self.test(pair, &mut new));
         } else {
-            core.pairs().for_each(|pair| self.test(pair, &mut apart_before));
+            core.pairs().for_each(|pair| self.test(pair, &mut new));
         }
-        // The rest was not tested, and is still apart.
-        self.apart.extend(apart_before);
     }
 
-    /// Tests a candidate, both of whose boxes were stored. The next candidate is a later pair.
+    /// Tests a candidate, which may be the first one of `new`.
     #[inline(always)]
-    fn test(&mut self, pair: Pair, apart_before: &mut Peekable<IntoIter<Pair>>) {
-        while let Some(still_apart) = apart_before.next_if(|other| *other < pair) {
-            self.apart.push(still_apart);
+    fn test(&mut self, pair: Pair, new: &mut Peekable<impl Iterator<Item = Pair>>) {
+        let is_new = new.next_if_eq(&pair).is_some();
+        let was_apart = !self.apart.is_empty() && self.apart.contains(&pair);
+        if self.get(pair.a).overlaps(&self.get(pair.b)) {
+            if was_apart {
+                self.apart.remove(&pair);
+            }
+            if is_new || was_apart {
+                self.events.added.push(pair);
+            }
+        } else if !was_apart {
+            self.apart.insert(pair);
+            if !is_new {
+                self.events.removed.push(pair);
+            }
         }
-        let was_pair = apart_before.next_if_eq(&pair).is_none();
-        let is_pair = self.get(pair.a).overlaps(&self.get(pair.b));
-        if !is_pair {
-            self.apart.push(pair);
-        }
-        if is_pair != was_pair {
-            let events = if is_pair { &mut self.events.added } else { &mut self.events.removed };
-            events.push(pair);
-        }
-    }
-
-    /// Takes the candidates that were no pairs before an update of the core, sorted.
-    fn take_apart(&mut self, core: &BroadPhase) -> Vec<Pair> {
-        let (mut apart, events) = (std::mem::take(&mut self.apart), core.events());
-        if self.has_removed || !events.removed.is_empty() {
-            apart.retain(|pair| core.has_pair(*pair));
-        }
-        if !events.added.is_empty() {
-            apart.extend(&events.added);
-            apart.sort_unstable();
-            apart.dedup();
-        }
-        self.apart.reserve(apart.len());
-        apart
     }
 }
 
@@ -285,21 +271,22 @@ impl BoxStore<WideAabb> for WideBoxes {
         self.events.added.clear();
         self.events.removed.clear();
         core.update()?;
-        let ended = core.events().removed.iter().filter(|pair| self.apart.binary_search(pair).is_err());
-        self.events.removed.extend(ended);
-        if self.changed.is_empty() && *core.events() == Events::default() {
-            return Ok(&self.events);
+        for pair in &core.events().removed {
+            if !self.apart.remove(pair) {
+                self.events.removed.push(*pair);
+            }
         }
-        let apart_before = self.take_apart(core);
-        self.test_candidates(core, apart_before);
+        if std::mem::take(&mut self.has_removed) {
+            self.apart.retain(|pair| core.has_pair(*pair));
+        }
+        self.test_candidates(core);
         self.changed.clear();
-        self.has_removed = false;
         self.events.removed.sort_unstable();
         Ok(&self.events)
     }
 
     fn admits(&self, pair: &Pair) -> bool {
-        self.apart.binary_search(pair).is_err()
+        !self.apart.contains(pair)
     }
 
     fn pair_count(&self, core: &BroadPhase) -> usize {
