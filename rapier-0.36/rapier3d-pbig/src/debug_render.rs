@@ -48,7 +48,7 @@ mod tests {
             canvas
         });
         assert_eq!(boxes.lines, 512 * edges);
-        // On each side half the prediction distance of 2 cm: new fixed colliders have no margin.
+        // On each side half the prediction distance of 2 cm. New fixed colliders have a margin for rounding: 1.5e-4 at 155 m.
         let edge = 1.0 + params.prediction_distance().to_f32();
         assert!((boxes.longest.to_f32() - edge).abs() < 1e-3, "a ball and its prediction: {}", boxes.longest);
         assert!(

@@ -4,12 +4,12 @@ use super::input::Input;
 use crate::hard::{Change, History, Part, Placement, Recipe, ratio_of_history, ratio_of_search};
 use pbig_core::WORK_LIMIT;
 
-/// A byte for the number of boxes, one for the updates (few: 2000 boxes may all overlap), then parts of 12 bytes: one to four of
-/// a world, and one to four of the world that its boxes move to.
+/// A byte for the number of boxes, one for the updates, then parts of 12 bytes: one to four of a world, and one to four of
+/// the world that its boxes move to.
 pub fn work_is_bounded(data: &[u8]) {
     let mut input = Input(data);
     let (Some(boxes), Some(updates)) = (input.byte(), input.byte()) else { return };
-    let (n, updates) = (65 + 8 * usize::from(boxes), 1 + usize::from(updates % 16));
+    let (n, updates) = (65 + 8 * usize::from(boxes), 1 + usize::from(updates % 64));
     let Some(start) = recipe(&mut input) else { return };
     check(ratio_of_search(&start, n), &start);
     if let Some(to) = recipe(&mut input) {

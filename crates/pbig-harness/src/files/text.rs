@@ -17,7 +17,7 @@ pub fn csv_boxes(bytes: &[u8]) -> Result<Vec<Aabb>, String> {
 
 /// Reads boxes from a text. Stops at the first line that is wrong.
 pub(super) fn boxes(reader: impl BufRead, max_boxes: u64) -> Result<BoxList, String> {
-    let mut lines = Lines::new(reader);
+    let mut lines = Lines::new(reader, "6 numbers");
     let (mut list, mut is_first) = (BoxList::default(), true);
     while lines.advance()? {
         let about = |what| format!("line {}: {what}", lines.number);
@@ -40,13 +40,15 @@ fn check_count(boxes: usize, limit: u64) -> Result<(), String> {
     if boxes as u64 > limit { Err(too_many(boxes, limit)) } else { Ok(()) }
 }
 
-pub(crate) fn too_long() -> String {
-    format!("longer than {MAX_LINE_BYTES} bytes")
+pub(crate) fn too_long(expected: &str) -> String {
+    format!("longer than {MAX_LINE_BYTES} bytes; expected {expected}")
 }
 
 /// Lines of bounded length, which end with `\n`, `\r\n` or `\r`.
 pub(crate) struct Lines<R> {
     reader: R,
+    /// What a line should have, for an error.
+    expected: &'static str,
     /// The present line, without its end.
     pub(crate) bytes: Vec<u8>,
     /// Number of the present line, from 1.
@@ -56,8 +58,8 @@ pub(crate) struct Lines<R> {
 }
 
 impl<R: BufRead> Lines<R> {
-    pub(crate) fn new(reader: R) -> Self {
-        Self { reader, bytes: Vec::new(), number: 0, ended_by: 0 }
+    pub(crate) fn new(reader: R, expected: &'static str) -> Self {
+        Self { reader, expected, bytes: Vec::new(), number: 0, ended_by: 0 }
     }
 
     /// Moves to the next line. Returns false at the end of the text.
@@ -72,7 +74,7 @@ impl<R: BufRead> Lines<R> {
         }
         self.number += 1;
         match self.bytes.len() > MAX_LINE_BYTES {
-            true => Err(format!("line {}: {}", self.number, too_long())),
+            true => Err(format!("line {}: {}", self.number, too_long(self.expected))),
             false => Ok(true),
         }
     }
@@ -172,7 +174,7 @@ mod tests {
     /// A reader without an end: only a bound lets this end.
     #[test]
     fn a_line_without_an_end_is_refused() {
-        let wanted = "longer than 65536 bytes";
+        let wanted = "longer than 65536 bytes; expected 6 numbers";
         let first = boxes(BufReader::new(repeat(0)), 9).expect_err("refused");
         assert_eq!(first, format!("line 1: {wanted}"));
         let second = boxes(BufReader::new(b"0,0,0,1,1,1\n\"".chain(repeat(b'0'))), 9).expect_err("refused");

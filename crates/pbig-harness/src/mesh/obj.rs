@@ -6,8 +6,11 @@ use super::{Mesh, face};
 use crate::files::{Lines, MAX_LINE_BYTES, brief, too_long};
 use std::io::BufRead;
 
+/// What a line should have.
+const EXPECTED: &str = "a vertex or a face";
+
 pub(super) fn read(reader: impl BufRead) -> Result<Mesh, String> {
-    let (mut mesh, mut lines) = (Mesh::default(), Lines::new(reader));
+    let (mut mesh, mut lines) = (Mesh::default(), Lines::new(reader, EXPECTED));
     let mut whole = String::new();
     while lines.advance()? {
         let at = |what: String| format!("line {}: {what}", lines.number);
@@ -15,7 +18,7 @@ pub(super) fn read(reader: impl BufRead) -> Result<Mesh, String> {
         let line = String::from_utf8_lossy(&lines.bytes);
         let line = line.trim_start_matches('\u{feff}').split('#').next().unwrap_or_default().trim_end();
         match line.strip_suffix('\\') {
-            Some(_) if whole.len() > MAX_LINE_BYTES => return Err(at(too_long())),
+            Some(_) if whole.len() > MAX_LINE_BYTES => return Err(at(too_long(EXPECTED))),
             Some(begun) => whole += begun,
             None => take(&(std::mem::take(&mut whole) + line), &mut mesh).map_err(at)?,
         }
@@ -62,9 +65,12 @@ mod tests {
     #[test]
     fn a_line_without_an_end_is_refused() {
         let refused = |reader: &mut dyn Read| read(BufReader::new(reader)).expect_err("refused");
-        assert_eq!(refused(&mut repeat(b'v')), "line 1: longer than 65536 bytes");
+        assert_eq!(
+            refused(&mut repeat(b'v')),
+            "line 1: longer than 65536 bytes; expected a vertex or a face"
+        );
         let continued = "v 1 2 3\\\n".repeat(10_000);
-        assert!(refused(&mut continued.as_bytes()).ends_with(": longer than 65536 bytes"));
+        assert!(refused(&mut continued.as_bytes()).contains(": longer than 65536 bytes; expected"));
     }
 
     #[test]
