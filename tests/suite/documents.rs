@@ -1,7 +1,7 @@
 //! Holds the numbers of the documents against the measured ones. A block of numbers lies between two marks:
 //!
 //! ```text
-//! <!-- from: docs/results/frames.csv | scene= | bodies= | stock_ms [queries=none] & pbig_ms [queries=none] | _ | -->
+//! <!-- from: docs/benchmarks/results/frames.csv | scene= | bodies= | stock_ms [queries=none] & pbig_ms [queries=none] | _ | -->
 //! | scene | bodies | ms | remark |
 //! |---|---|---|---|
 //! | rain | 1000 | 3.54 → 3.18 | like table 3 |

@@ -13,7 +13,7 @@ pub enum Algorithm {
     Nothing,
     /// Every pair was tested.
     Brute,
-    /// Changed boxes were tested against all, before and after.
+    /// Changed boxes were tested against all, and what they overlap was compared with their kept pairs.
     Sweep,
     /// All boxes were sorted into a grid and searched.
     Grid,

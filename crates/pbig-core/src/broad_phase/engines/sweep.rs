@@ -1,6 +1,5 @@
 //! The engine for small worlds: each changed box is tested against all boxes, and the overlapping ones are compared with its kept
-//! pairs. If more than half of the boxes changed, each box is tested against the boxes with higher ids. In a large world, a tree
-//! tells what a changed box overlaps.
+//! pairs. If more than half of the boxes changed, each box is tested against the boxes with higher ids.
 //!
 //! Boxes lie axis by axis, so that eight are tested at once. There is no index to keep. The tests take
 //! a quarter of a microsecond for one changed box of a thousand; each pair that begins or ends takes as long as 256 tests.
