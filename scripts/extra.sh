@@ -27,12 +27,14 @@ sets() {
     done
 }
 
-# lint PACKAGE OPTIONS FEATURE...: lints a package, and its dependencies of the workspace, with sets of the features.
+# lint PACKAGE OPTIONS PINNED FEATURE...: lints a package, and its dependencies of the workspace, with sets of the features. Sets of
+# several come with all features of an engine, PINNED: so it is checked once for these, and as each feature needs it alone.
 lint() {
-    local package=$1 options=$2 set
-    shift 2
+    local package=$1 options=$2 pinned=$3 set
+    shift 3
     sets "$@" | while read -r set; do
         echo "== $package with '$set'"
+        case $set in *,*) set=$set,$pinned ;; esac
         # Not quoted: several words, or none.
         cargo clippy --quiet --locked --release $options -p "$package" --no-default-features --features "$set" -- -D warnings \
             </dev/null
@@ -45,10 +47,12 @@ test_features() {
     local kind=$1
     case $kind in
     sets)
-        lint rapier-pbig "" parallel gpu serde debug-render shadow
-        lint pbig-gpu "" wgpu
+        lint rapier-pbig "" rapier3d/serde-serialize,rapier3d/debug-render parallel gpu serde debug-render shadow
+        lint pbig-gpu "" "" wgpu
         ;;
-    sets-0.36) lint rapier3d-pbig "--manifest-path rapier-0.36/Cargo.toml" parallel gpu debug-render shadow ;;
+    sets-0.36)
+        lint rapier3d-pbig "--manifest-path rapier-0.36/Cargo.toml" rapier/debug-render parallel gpu debug-render shadow
+        ;;
     *)
         step cargo test --locked --release -p pbig-tests --no-default-features --features "${kind#none}" --test suite -- \
             calls drop_in upstream restore queries explain random_worlds worlds::a_scene_gives
@@ -116,7 +120,9 @@ run_publish() {
 # run_module NAME FLAGS: builds the module with these flags of rustc, and runs it.
 run_module() {
     echo "== WebAssembly $1"
+    # Slower code of rapier has the same results, and compiles sooner.
     RUSTFLAGS=$2 step "${cargo[@]}" build --locked --quiet --profile wasm --lib --package pbig-wasm \
+        --config profile.wasm.package.rapier3d.opt-level=1 --config profile.wasm.package.parry3d.opt-level=1 \
         --target "$target" --target-dir "$folder"
     step node wasm/run.mjs "$folder/$target/wasm/pbig_wasm.wasm"
 }
@@ -226,7 +232,7 @@ run_fuzz() {
     shift || true
     [ $# -gt 0 ] || set -- finder_against_oracle between_against_oracle updates_against_scratch work_is_bounded decode \
         csv_reader npy_reader ply_reader obj_reader
-    step cargo run --release -p pbig-tests --example fuzz_seeds
+    step cargo run --release --example fuzz_seeds
     for target in "$@"; do
         words=''
         [ ! -f "fuzz/$target.dict" ] || words="-dict=fuzz/$target.dict"

@@ -38,7 +38,7 @@ driver() {
 texts() {
     rm -rf "$out/texts"
     mkdir -p "$out/texts"
-    PBIG_TEXTS=$out/texts step cargo test --quiet --release -p pbig-shaders --test valid translate::
+    PBIG_TEXTS=$out/texts step cargo test --quiet --release --test valid translate::
 }
 
 # expect PATTERN FILE: fails, and shows the file, unless a line of it has the pattern.
