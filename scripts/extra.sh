@@ -28,7 +28,8 @@ sets() {
 }
 
 # lint PACKAGE OPTIONS PINNED FEATURE...: lints a package, and its dependencies of the workspace, with sets of the features. Sets of
-# several come with all features of an engine, PINNED: so it is checked once for these, and as each feature needs it alone.
+# several come with all features of an engine, PINNED, so that it is checked once for them. That a feature of ours asks for the engine's
+# is seen where it stands alone.
 lint() {
     local package=$1 options=$2 pinned=$3 set
     shift 3
@@ -205,7 +206,7 @@ run_sanitize() {
             { left_out "the thread sanitizer" "rustup component add rust-src installs what it needs" && return; }
         std=-Zbuild-std
     fi
-    export CARGO_PROFILE_DEV_OPT_LEVEL=1 CARGO_PROFILE_DEV_DEBUG=line-tables-only
+    export CARGO_PROFILE_DEV_DEBUG=line-tables-only
     step env RUSTC_BOOTSTRAP=1 RUSTFLAGS="-Zsanitizer=$sanitizer" cargo test $std --target "$host" \
         --target-dir "$(target_folder)/sanitize-$sanitizer" -p pbig-core --features serde --lib
 }

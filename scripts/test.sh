@@ -17,7 +17,7 @@ trap 'rm -rf "$TMPDIR"' EXIT
 in_036="--manifest-path rapier-0.36/Cargo.toml"
 members_036="-p rapier3d-pbig -p pbig-harness-036"
 features_036="--features rapier3d-pbig/debug-render"
-# The same source for two dimensions and for f64; the other dimension of the debug renderer.
+# The same source for two dimensions and for f64; one of them with the debug renderer, whose other dimension it is.
 others_036="-p rapier2d-pbig -p pbig-harness-2d -p pbig-harness-2d-f64 -p pbig-harness-3d-f64 --features rapier2d-pbig/debug-render"
 quick_036="--config profile.release.package.rapier3d.opt-level=1 --config profile.release.package.parry3d.opt-level=1"
 # The suite refuses to leave the GPU out with CI=true.
@@ -139,7 +139,9 @@ step_rapier_0_36() {
     # `--locked` checks the lock file without a download of bevy.
     step cargo clippy --locked --release $in_036 $members_036 $features_036 --all-targets -- -D warnings
     step scripts/extra.sh --no-setup features sets-0.36
+    rm -f "$CARGO_TARGET_DIR/release/bench_step"
     step cargo test --release $in_036 $members_036 $features_036 --no-fail-fast
+    # Built for the tests above. `cargo run` would build rapier again, for other features.
     step "$CARGO_TARGET_DIR/release/bench_step" --scenes column --bodies 500 --steps 60 --chart "$TMPDIR/steps.svg"
     step cargo clippy --locked --release $in_036 $others_036 --all-targets -- -D warnings
     step env PBIG_RUNS=100 PBIG_BODIES=80 cargo test --release $in_036 $others_036 --no-fail-fast
@@ -166,7 +168,7 @@ count() {
         }' "$1"
 }
 
-# run_step NAME: runs a step, shows its headings, and its output if it fails; leaves its row of the table in a file.
+# run_step NAME: runs a step, and shows its headings; leaves its row of the table in a file, and its output if it failed.
 run_step() {
     local start=$SECONDS log=$TMPDIR/$1.log status passed failed skipped note
     echo "== $1"
@@ -175,12 +177,12 @@ run_step() {
         set -e
         . scripts/common.sh
         "step_$(echo "$1" | tr '.-' '__')"
-    ) 2>&1 </dev/null | tee "$log" | awk -v name="$1" '/^== / { sub(/^==/, "== " name ":"); print; fflush() }'
+    ) 2>&1 </dev/null | tee "$log" | grep --line-buffered '^== ' | while read -r line; do echo "== $1: ${line#== }"; done
     status=${PIPESTATUS[0]}
     read -r passed failed skipped <<<"$(count "$log" "$status")"
     note=$(sed -n 's/^== left out: /left out: /p' "$log" | head -n 1)
     if [ "$status" != 0 ]; then
-        printf '%s\n' "-- $1 failed with status $status; the last lines of its output:" "$(tail -n 300 "$log")" "--"
+        printf '%s\n' "-- $1 failed with status $status; the last lines of its output:" "$(tail -n 300 "$log")" "--" >"$TMPDIR/$1.end"
     fi
     echo "$1 $((SECONDS - start)) $passed $failed $skipped $note" >"$TMPDIR/$1.row"
 }
@@ -205,6 +207,7 @@ fi
 first='' one='' other=''
 for name in "$@"; do
     case " $all " in *" $name "*) ;; *) echo "there is no step '$name'; the steps: $all" >&2 && exit 2 ;; esac
+    case " $first $one $other " in *" $name "*) echo "the step '$name' is named twice" >&2 && exit 2 ;; esac
     case " $beside " in *" $name "*) other+=" $name" ;; *) [ "$name" = setup ] && first=setup || one+=" $name" ;; esac
 done
 run_steps $first
@@ -214,9 +217,13 @@ wait
 
 columns='%-12s %8s %8s %8s %8s'
 all_passed=0 all_failed=0 all_skipped=0
+for name in "$@"; do
+    [ ! -f "$TMPDIR/$name.end" ] || cat "$TMPDIR/$name.end"
+done
 printf "\n$columns\n" step time passed failed skipped
 for name in "$@"; do
-    [ -f "$TMPDIR/$name.row" ] || echo "$name 0 0 1 0 did not end" >"$TMPDIR/$name.row"
+    # A step that was killed has no row, or not all of it.
+    grep -qsE '^[^ ]+( [0-9]+){4} ' "$TMPDIR/$name.row" || echo "$name 0 0 1 0 did not end" >"$TMPDIR/$name.row"
     read -r name time passed failed skipped note <"$TMPDIR/$name.row"
     printf "$columns   %s\n" "$name" "$time s" "$passed" "$failed" "$skipped" "$note"
     all_passed=$((all_passed + passed)) all_failed=$((all_failed + failed)) all_skipped=$((all_skipped + skipped))
