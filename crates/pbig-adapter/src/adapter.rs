@@ -116,7 +116,7 @@ macro_rules! define_methods {
 
 /// Implements [`crate::Scene`] for `Call`, the arguments of rapier's call, which has a function `for_each_of`. Defines the conversions
 /// between rapier's handles, pairs and events and those of this crate. `$largest` returns the largest number of a vector. `Call` has
-/// fields `colliders`, `modified` and `removed`. In scope: functions `kind_of` and `groups_of`, and rapier's names for what it has.
+/// fields `colliders`, `modified` and `removed`. In scope: functions `kind_of` and `groups_of`, and the imports of an adapter's `scene.rs`.
 #[doc(hidden)]
 #[macro_export]
 macro_rules! define_scene {
@@ -192,7 +192,7 @@ macro_rules! define_scene {
 }
 
 /// Defines `ParryTree` with parry's type of corners. Where few leaves change, the optional function moves them and returns true.
-/// In scope: parry's `Bvh` and its companions, its AABB as `TreeAabb`, `Real`, `DIM`, and `Bounds` of [`define_scene!`](crate::define_scene).
+/// In scope: the imports of an adapter's `tree.rs`, with parry's AABB as `TreeAabb`.
 #[doc(hidden)]
 #[macro_export]
 macro_rules! define_tree {
@@ -249,7 +249,7 @@ macro_rules! define_tree {
 }
 
 /// Implements `debug_render` for a type with a field `colliders`. `$unmoved` and `$unscaled` are arguments of rapier's renderer.
-/// In scope: `to_handle` and `to_tree` of the macros above, `DIM`, and rapier's names for what it draws.
+/// In scope: the imports of an adapter's `debug_render.rs`.
 #[doc(hidden)]
 #[macro_export]
 macro_rules! define_debug_render {
@@ -285,8 +285,8 @@ macro_rules! define_debug_render {
 }
 
 /// Implements [`crate::shadow::View`] for `Call`, which has functions `aabb_of_stock` and `reaches_further_with`, and updates rapier's own
-/// broad phase. `$distance` returns the distance between the shapes of two colliders. In scope: the functions of
-/// [`define_scene!`](crate::define_scene), parry's `contact`, `Side` and `HandlePair` of this crate, and rapier's names.
+/// broad phase. `$distance` returns the distance between the shapes of two colliders. In scope: the
+/// imports of an adapter's `shadow`.
 #[doc(hidden)]
 #[macro_export]
 macro_rules! define_view {
