@@ -195,10 +195,10 @@ run_steps() {
     done
 }
 
-# Steps that run beside the others, as compilers and tests often keep one core busy. Most of what they build has folders of its own.
+# Steps that run beside the others, as compilers and tests often keep one core busy. The first two have folders of their own to build in.
 beside="packages wasm features"
 
-all="setup fmt clippy unit suite gpu doc features packages wasm examples docs rapier-0.36"
+all="setup fmt clippy unit suite gpu doc packages wasm features examples docs rapier-0.36"
 if [ "${1:-}" = --no-setup ]; then
     all=${all#setup }
     shift
@@ -207,8 +207,11 @@ fi
 first='' one='' other=''
 for name in "$@"; do
     case " $all " in *" $name "*) ;; *) echo "there is no step '$name'; the steps: $all" >&2 && exit 2 ;; esac
-    case " $first $one $other " in *" $name "*) echo "the step '$name' is named twice" >&2 && exit 2 ;; esac
-    case " $beside " in *" $name "*) other+=" $name" ;; *) [ "$name" = setup ] && first=setup || one+=" $name" ;; esac
+    case "$first $one $other " in *" $name "*) echo "the step '$name' is named twice" >&2 && exit 2 ;; esac
+    case " $beside " in
+    *" $name "*) other+=" $name" ;;
+    *) [ "$name" = setup ] && first=" setup" || one+=" $name" ;;
+    esac
 done
 run_steps $first
 run_steps $other &
