@@ -20,14 +20,15 @@ pub struct Shadow {
 /// Compares the pairs that pbig finds with the contacts that avian has.
 pub(crate) fn compare<H: CollisionHooks + 'static>(
     mut step: Step<H>,
-    graph: Res<ContactGraph>,
+    mut graph: Res<ContactGraph>,
     mut shadow: ResMut<Shadow>,
 ) where
     for<'w, 's> SystemParamItem<'w, 's, H>: CollisionHooks,
 {
     let ordered = |a: Entity, b: Entity| (a.min(b), a.max(b));
-    let spurious = step.find_contacts(&graph);
-    shadow.spurious.extend(spurious.iter().map(|[one, other]| ordered(one.collider, other.collider)));
+    step.find_contacts(&mut graph, |_, [one, other]| {
+        shadow.spurious.insert(ordered(one.collider, other.collider));
+    });
     let ours: HashSet<_> = step.boxes.pairs().map(|(a, b)| ordered(a, b)).collect();
     for contact in graph.active_pairs().iter().chain(graph.sleeping_pairs()) {
         let (a, b) = ordered(contact.collider1, contact.collider2);

@@ -9,6 +9,7 @@ use avian::prelude::*;
 use bevy::ecs::system::{StaticSystemParam, SystemParam, SystemParamItem};
 use bevy::platform::time::Instant;
 use bevy::prelude::*;
+use std::ops::Deref;
 
 /// The boxes, and the parts of a world that decide about a contact.
 #[derive(SystemParam)]
@@ -26,21 +27,23 @@ impl<'w, H: CollisionHooks + 'static> Step<'w, '_, H>
 where
     for<'a, 'b> SystemParamItem<'a, 'b, H>: CollisionHooks,
 {
-    /// Brings the boxes up to date. Returns the proxies of the pairs that `graph` lacks a contact for, in the order of their ids. A
-    /// pair that is not asked for or not allowed waits until one of its colliders moves.
-    pub(crate) fn find_contacts(&mut self, graph: &ContactGraph) -> Vec<[&'w ColliderTreeProxy; 2]> {
-        let mut found = Vec::new();
+    /// Brings the boxes up to date. Calls `add` with the proxies of the pairs that the graph lacks a contact for, in the order of
+    /// their ids. A pair that is not asked for or not allowed waits until one of its colliders moves.
+    pub(crate) fn find_contacts<G: Deref<Target = ContactGraph>>(
+        &mut self,
+        graph: &mut G,
+        mut add: impl FnMut(&mut G, [&ColliderTreeProxy; 2]),
+    ) {
         for pair in self.boxes.update(&self.trees, &self.moved, &self.keys) {
             let slots = self.boxes.slots(pair);
             if graph.contains(slots[0].collider, slots[1].collider) {
                 continue;
             }
             match self.proxies(slots).filter(|proxies| self.allows(*proxies)) {
-                Some(proxies) => found.push(proxies),
+                Some(proxies) => add(graph, proxies),
                 None => _ = self.boxes.without_contact.insert(pair),
             }
         }
-        found
     }
 
     /// Returns the proxies of a pair, in avian's order, if avian would look at the pair in this update.
@@ -79,7 +82,7 @@ pub(crate) fn add_contacts<H: CollisionHooks + 'static>(
     for<'w, 's> SystemParamItem<'w, 's, H>: CollisionHooks,
 {
     let start = Instant::now();
-    step.find_contacts(&graph).into_iter().for_each(|proxies| add_contact(&mut graph, proxies));
+    step.find_contacts(&mut graph, |graph, proxies| add_contact(graph, proxies));
     diagnostics.broad_phase += start.elapsed();
 }
 
