@@ -11,6 +11,9 @@ use std::collections::BTreeSet;
 /// The keys of the proxies of colliders that take part in collisions.
 pub(crate) type Keys<'w, 's> = Query<'w, 's, &'static ColliderTreeProxyKey, Without<ColliderDisabled>>;
 
+/// Pairs, each as it is and turned, so that those of an id are a range.
+type Waiting = BTreeSet<[u32; 2]>;
+
 /// The boxes of all colliders, and the pairs between them.
 #[derive(Resource, Default)]
 pub struct ColliderBoxes {
@@ -25,7 +28,7 @@ pub struct ColliderBoxes {
     /// Colliders that begin anew in the next update.
     pub(crate) lost: BTreeSet<Entity>,
     /// Overlapping pairs that a joint or a hook vetoes, or that nobody asked for since their contact was removed.
-    pub(crate) without_contact: BTreeSet<Pair>,
+    pub(crate) waiting: Waiting,
 }
 
 /// A collider with a box.
@@ -62,7 +65,7 @@ impl ColliderBoxes {
     }
 
     /// Brings the boxes up to date with avian's trees. Returns the pairs to ask about, in the order of their ids: those that have
-    /// begun, and those without a contact of which one proxy moved. The caller inserts the ones that stay without a contact again.
+    /// begun, and waiting ones of which a proxy moved. Those that stay without a contact must wait again.
     pub(crate) fn update(&mut self, trees: &ColliderTrees, moved: &MovedProxies, keys: &Keys) -> Vec<Pair> {
         let followed = self.follow(trees, moved, keys);
         let found = self.broad_phase.update().map(drop);
@@ -70,11 +73,13 @@ impl ColliderBoxes {
             error!("pbig: {}; some pairs that began in this step are not found yet", in_words(&error));
         }
         let events = self.broad_phase.events();
-        events.removed.iter().for_each(|pair| _ = self.without_contact.remove(pair));
-        let mut pairs = events.added.clone();
         let has_moved = |id: u32| self.slots[id as usize].has_moved;
-        pairs.extend(take_moved(&mut self.without_contact, &self.broad_phase, &self.moved, has_moved));
+        let again = waiting_of_moved(&self.waiting, &self.moved, has_moved);
+        let left = events.removed.iter().chain(&again).flat_map(ends);
+        left.for_each(|end| _ = self.waiting.remove(&end));
+        let mut pairs: Vec<_> = again.into_iter().chain(events.added.iter().copied()).collect();
         pairs.sort_unstable();
+        pairs.dedup();
         pairs
     }
 
@@ -87,7 +92,7 @@ impl ColliderBoxes {
         let anew = |collider| Some(Slot { key: *keys.get(collider).ok()?, collider, has_moved: false });
         let at = |&key| Some(Slot { key, collider: trees.get_proxy(key)?.collider, has_moved: true });
         let slots = lost.into_iter().filter_map(anew).chain(moved.proxies().iter().filter_map(at));
-        // Avian names each proxy once. So all are set, even if one of them fails.
+        // Avian names each proxy once. So the others are set even if one of them fails.
         slots.map(|slot| self.set(trees, slot)).reduce(Result::and).unwrap_or(Ok(()))
     }
 
@@ -106,12 +111,9 @@ impl ColliderBoxes {
     fn store(&mut self, slot: Slot) -> u32 {
         let index = slot.collider.index_u32() as usize;
         self.ids.resize(self.ids.len().max(index + 1), None);
-        let id = *self.ids[index].get_or_insert_with(|| {
-            self.free.pop().unwrap_or_else(|| {
-                self.slots.push(slot);
-                self.slots.len() as u32 - 1
-            })
-        });
+        let new_id = || self.free.pop().unwrap_or(self.slots.len() as u32);
+        let id = *self.ids[index].get_or_insert_with(new_id);
+        self.slots.resize(self.slots.len().max(id as usize + 1), slot);
         self.slots[id as usize] = slot;
         id
     }
@@ -121,34 +123,38 @@ impl ColliderBoxes {
         let id = self.ids.get_mut(collider.index_u32() as usize).and_then(Option::take);
         let Some(id) = id else { return };
         // Pairs of a removed box end without an event.
-        if !self.without_contact.is_empty() {
-            self.broad_phase.pairs_of(id).for_each(|pair| _ = self.without_contact.remove(&pair));
-        }
+        let pairs: Vec<_> = waiting_of(&self.waiting, id).collect();
+        pairs.iter().flat_map(ends).for_each(|end| _ = self.waiting.remove(&end));
         self.broad_phase.remove(id);
         self.free.push(id);
     }
 }
 
-/// Takes the pairs with a moved id out of `waiting`, in no order. All of them are pairs of the broad phase. The work follows
-/// the smaller number: all pairs of the moved ids, or the waiting pairs.
-fn take_moved(
-    waiting: &mut BTreeSet<Pair>,
-    broad_phase: &BroadPhase,
-    moved: &[u32],
-    has_moved: impl Fn(u32) -> bool,
-) -> Vec<Pair> {
-    let pairs_of_moved = || moved.iter().map(|&id| broad_phase.degree(id) as usize).sum::<usize>();
-    if moved.len() < waiting.len() && pairs_of_moved() < waiting.len() {
-        let pairs = moved.iter().flat_map(|&id| broad_phase.pairs_of(id));
-        pairs.filter(|pair| waiting.remove(pair)).collect()
+/// Returns a pair as it is, and turned.
+pub(crate) fn ends(pair: &Pair) -> [[u32; 2]; 2] {
+    [[pair.a, pair.b], [pair.b, pair.a]]
+}
+
+/// Returns the waiting pairs of an id.
+fn waiting_of(waiting: &Waiting, id: u32) -> impl Iterator<Item = Pair> + '_ {
+    waiting.range([id, 0]..=[id, u32::MAX]).map(|&[one, other]| Pair::new(one, other))
+}
+
+/// Returns the waiting pairs with a moved id, in no order, perhaps twice. The work follows the smaller number: moved ids and their
+/// waiting pairs, or all waiting pairs.
+fn waiting_of_moved(waiting: &Waiting, moved: &[u32], has_moved: impl Fn(u32) -> bool) -> Vec<Pair> {
+    if 2 * moved.len() < waiting.len() {
+        moved.iter().flat_map(|&id| waiting_of(waiting, id)).collect()
     } else {
-        waiting.extract_if(.., |pair| has_moved(pair.a) || has_moved(pair.b)).collect()
+        let of_moved = waiting.iter().filter(|[id, _]| has_moved(*id));
+        of_moved.map(|&[one, other]| Pair::new(one, other)).collect()
     }
 }
 
 /// Returns the filter of a proxy: layers, body, and the trees that avian searches for it. Static colliders pair with each other
 /// only if one is a sensor, and standalone ones never do.
 fn filter(key: ColliderTreeProxyKey, proxy: &ColliderTreeProxy) -> ProxyFilter {
+    // Kinds: 1 moves, or is a static sensor; 2 is static; 4 is standalone.
     let (kind, accepted_kinds) = match key.tree_type() {
         ColliderTreeType::Static if !proxy.is_sensor() => (2, 0),
         ColliderTreeType::Standalone => (4, !4),
@@ -200,53 +206,53 @@ mod tests {
     fn waiting(places: impl IntoIterator<Item = u32>) -> ColliderBoxes {
         let mut boxes = ColliderBoxes::default();
         (0..).zip(places).for_each(|(index, place)| assert_eq!(set(&mut boxes, index, place), index));
-        boxes.without_contact = update(&mut boxes).into_iter().collect();
+        boxes.waiting = update(&mut boxes).iter().flat_map(ends).collect();
         boxes
     }
 
-    /// Takes the waiting pairs of moved ids. Returns them, sorted, and how often a waiting pair was looked at.
-    fn take(boxes: &mut ColliderBoxes, moved: &[u32]) -> (Vec<Pair>, usize) {
+    /// Returns the waiting pairs of moved ids, sorted, and how often a waiting pair was looked at.
+    fn of_moved(waiting: &Waiting, moved: &[u32]) -> (Vec<Pair>, usize) {
         let asked = Cell::new(0);
         let has_moved = |id| {
             asked.set(asked.get() + 1);
             moved.contains(&id)
         };
-        let mut pairs = take_moved(&mut boxes.without_contact, &boxes.broad_phase, moved, has_moved);
+        let mut pairs = waiting_of_moved(waiting, moved, has_moved);
         pairs.sort_unstable();
+        pairs.dedup();
         (pairs, asked.get())
     }
 
     #[test]
-    fn both_ways_to_take_pairs_give_those_of_the_moved_ids() {
+    fn both_ways_to_list_pairs_give_those_of_the_moved_ids() {
+        let pairs: Vec<_> = (0..20).flat_map(|a| (a + 1..20).map(move |b| Pair { a, b })).collect();
+        let pairs: Vec<_> =
+            pairs.into_iter().filter(|pair| pair.a < 9 && pair.b >= 9 && pair.a + pair.b != 15).collect();
+        let waiting = pairs.iter().flat_map(ends).collect();
         // Few moved ids are looked up, many are compared with every pair.
         for (moved, is_few) in
-            [(vec![], true), (vec![3], true), (vec![0, 1, 14, 12], true), ((2..20).collect(), false)]
+            [(vec![], true), (vec![3], true), (vec![0, 1, 14, 12], true), ((2..200).collect(), false)]
         {
-            let mut boxes = waiting([0; 20]);
-            boxes.without_contact.retain(|pair| pair.a < 9 && pair.b >= 9 && pair.a + pair.b != 15);
-            let (wanted, others): (Vec<_>, Vec<_>) = (boxes.without_contact.iter())
-                .partition(|pair| moved.contains(&pair.a) || moved.contains(&pair.b));
-            let (pairs, asked) = take(&mut boxes, &moved);
-            assert_eq!((pairs, asked == 0), (wanted, is_few), "{moved:?}");
-            assert!(boxes.without_contact.iter().eq(&others), "{moved:?}");
+            let wanted = pairs.iter().filter(|pair| moved.contains(&pair.a) || moved.contains(&pair.b));
+            let (found, asked) = of_moved(&waiting, &moved);
+            assert_eq!((found, asked == 0), (wanted.copied().collect(), is_few), "{moved:?}");
         }
     }
 
     #[test]
     fn ten_thousand_waiting_pairs_cost_what_the_moved_ones_are() {
-        let mut boxes = waiting((0..20_000).map(|id| id % 10_000));
-        assert_eq!(boxes.without_contact.len(), 10_000);
+        let boxes = waiting((0..20_000).map(|id| id % 10_000));
+        assert_eq!(boxes.waiting.len(), 20_000);
         let wanted = [Pair { a: 7, b: 10_007 }, Pair { a: 9000, b: 19_000 }];
-        assert_eq!(take(&mut boxes, &[7, 19_000]), (wanted.to_vec(), 0));
+        assert_eq!(of_moved(&boxes.waiting, &[7, 19_000]), (wanted.to_vec(), 0));
     }
 
     #[test]
-    fn a_moved_box_with_many_pairs_costs_what_the_waiting_ones_are() {
-        let mut boxes = waiting([0; 300]);
-        let wanted = Pair { a: 0, b: 9 };
-        boxes.without_contact = [wanted, Pair { a: 1, b: 2 }, Pair { a: 3, b: 4 }].into();
-        let (pairs, asked) = take(&mut boxes, &[0]);
-        assert!(pairs == [wanted] && (1..=6).contains(&asked), "{pairs:?}, asked {asked} times");
+    fn many_moved_boxes_cost_what_the_waiting_pairs_are() {
+        let waiting =
+            [Pair { a: 0, b: 9 }, Pair { a: 1, b: 2 }, Pair { a: 3, b: 4 }].iter().flat_map(ends).collect();
+        let moved: Vec<_> = (5..300).collect();
+        assert_eq!(of_moved(&waiting, &moved), (vec![Pair { a: 0, b: 9 }], 6));
     }
 
     #[test]
@@ -255,11 +261,11 @@ mod tests {
         set(&mut boxes, 2, 1);
         boxes.lost = [3, 4].map(collider).into();
         assert_eq!(update(&mut boxes), []);
-        assert_eq!(boxes.without_contact, [Pair { a: 0, b: 1 }].into());
+        assert_eq!(boxes.waiting, [[0, 1], [1, 0]].into());
         // Another collider gets an id again, and its pairs begin.
         let id = set(&mut boxes, 99, 0);
         assert_eq!(update(&mut boxes), [Pair::new(0, id), Pair::new(1, id)]);
-        assert!(id < 5 && boxes.without_contact.len() == 1);
+        assert!(id < 5 && boxes.waiting.len() == 2);
     }
 
     #[test]

@@ -65,7 +65,8 @@ impl<H: CollisionHooks> Default for PbigBroadPhasePlugin<H> {
 
 impl<H: CollisionHooks> PbigBroadPhasePlugin<H> {
     /// Makes the plugin compare its pairs with those of avian's own broad phase, which stays in charge. [`Shadow`] has the result.
-    /// Add it beside `BvhBroadPhasePlugin`, with the same hooks. They are asked again about pairs that they forbid.
+    /// Add it beside `BvhBroadPhasePlugin`, without which all pairs are spurious, and with the same hooks. They are asked again about
+    /// pairs that they forbid.
     ///
     /// ```
     /// use avian::prelude::*; // avian2d or avian3d

@@ -21,7 +21,7 @@ pub(crate) fn add_observers(app: &mut App) {
         .add_observer(note_joint);
 }
 
-/// Notes a collider, or the colliders of a body.
+/// Notes an entity as a collider, and as a body with all its colliders.
 fn note<E: EventPattern<Event: EntityEvent>>(
     trigger: On<E>,
     bodies: Query<&RigidBodyColliders, Allow<Disabled>>,

@@ -1,6 +1,7 @@
 //! pbig beside avian's own broad phase, which stays in charge: each step, the pairs of both are compared.
 
 use crate::step::Step;
+use avian::collider_tree::{ColliderTreeProxyKey, ColliderTrees};
 use avian::prelude::*;
 use bevy::ecs::system::SystemParamItem;
 use bevy::prelude::*;
@@ -21,6 +22,7 @@ pub struct Shadow {
 pub(crate) fn compare<H: CollisionHooks + 'static>(
     mut step: Step<H>,
     mut graph: Res<ContactGraph>,
+    keys: Query<&ColliderTreeProxyKey>,
     mut shadow: ResMut<Shadow>,
 ) where
     for<'w, 's> SystemParamItem<'w, 's, H>: CollisionHooks,
@@ -33,18 +35,19 @@ pub(crate) fn compare<H: CollisionHooks + 'static>(
     for contact in graph.active_pairs().iter().chain(graph.sleeping_pairs()) {
         let (a, b) = ordered(contact.collider1, contact.collider2);
         shadow.compared += 1;
-        if !ours.contains(&(a, b)) && is_found(&step, a, b) {
+        if !ours.contains(&(a, b)) && is_found(&step.trees, &keys, a, b) {
             shadow.missing.insert((a, b));
         }
     }
 }
 
 /// Returns true if avian would find the pair now, if both had moved. Contacts live on for a short distance; those of sleeping
-/// bodies also when layers no longer allow them. It shares no code with the boxes, so that it finds their mistakes.
-fn is_found<H: CollisionHooks>(step: &Step<H>, a: Entity, b: Entity) -> bool {
+/// bodies also when layers no longer allow them. It reads avian's trees alone, so that it finds mistakes of
+/// the boxes.
+fn is_found(trees: &ColliderTrees, keys: &Query<&ColliderTreeProxyKey>, a: Entity, b: Entity) -> bool {
     let find = |collider| {
-        let &key = step.keys.get(collider).ok()?;
-        let tree = step.trees.tree_for_type(key.tree_type());
+        let &key = keys.get(collider).ok()?;
+        let tree = trees.tree_for_type(key.tree_type());
         Some((key, tree.get_proxy_aabb(key.id())?, tree.get_proxy(key.id())?))
     };
     find(a).zip(find(b)).is_some_and(|((key, aabb, one), (other_key, other_aabb, other))| {

@@ -1,6 +1,6 @@
 //! A step of the broad phase: pbig finds the pairs, and avian's own questions decide about their contacts, in avian's order.
 
-use crate::boxes::{ColliderBoxes, Keys, Slot};
+use crate::boxes::{ColliderBoxes, Keys, Slot, ends};
 use avian::collider_tree::{ColliderTreeProxy, ColliderTreeProxyFlags, ColliderTrees, MovedProxies};
 use avian::collision::CollisionDiagnostics;
 use avian::collision::contact_types::ContactEdgeFlags;
@@ -16,7 +16,7 @@ use std::ops::Deref;
 pub(crate) struct Step<'w, 's, H: CollisionHooks + 'static> {
     pub(crate) boxes: ResMut<'w, ColliderBoxes>,
     pub(crate) trees: Res<'w, ColliderTrees>,
-    pub(crate) keys: Keys<'w, 's>,
+    keys: Keys<'w, 's>,
     moved: Res<'w, MovedProxies>,
     joints: Res<'w, JointGraph>,
     hooks: StaticSystemParam<'w, 's, H>,
@@ -41,13 +41,15 @@ where
             }
             match self.proxies(slots).filter(|proxies| self.allows(*proxies)) {
                 Some(proxies) => add(graph, proxies),
-                None => _ = self.boxes.without_contact.insert(pair),
+                None => self.boxes.waiting.extend(ends(&pair)),
             }
         }
     }
 
-    /// Returns the proxies of a pair, in avian's order, if avian would look at the pair in this update.
+    /// Returns the proxies of a pair, if avian would look at the pair in this update. In its order: of two that look, the one with the
+    /// lower key is the first.
     fn proxies(&self, mut slots: [Slot; 2]) -> Option<[&'w ColliderTreeProxy; 2]> {
+        // The proxies outlive the borrow of `self`.
         let trees = Res::clone(&self.trees).into_inner();
         slots.sort_unstable_by_key(|slot| (slot.key.tree_type() as u8, slot.key.id()));
         let [one, other] = slots.map(|slot| Some((slot, slot.proxy(trees)?)));
