@@ -74,9 +74,9 @@ impl ColliderBoxes {
         }
         let events = self.broad_phase.events();
         let has_moved = |id: u32| self.slots[id as usize].has_moved;
+        events.removed.iter().flat_map(ends).for_each(|end| _ = self.waiting.remove(&end));
         let again = waiting_of_moved(&self.waiting, &self.moved, has_moved);
-        let left = events.removed.iter().chain(&again).flat_map(ends);
-        left.for_each(|end| _ = self.waiting.remove(&end));
+        again.iter().flat_map(ends).for_each(|end| _ = self.waiting.remove(&end));
         let mut pairs: Vec<_> = again.into_iter().chain(events.added.iter().copied()).collect();
         pairs.sort_unstable();
         pairs.dedup();
