@@ -22,22 +22,22 @@
 //! With collision hooks, name them twice: `disable::<BvhBroadPhasePlugin<MyHooks>>()` and
 //! `add(PbigBroadPhasePlugin::<MyHooks>::default())`.
 //!
-//! The pairs are those of avian's own broad phase, in each step. [`shadow::ShadowPlugin`] compares both in a running app. Contacts
-//! are created in an order that depends on the scene alone, not on the number of threads. Spatial queries and swept CCD read
-//! avian's trees, as before.
+//! The pairs are those of avian's own broad phase, in each step. [`PbigBroadPhasePlugin::as_shadow`] compares both in a running
+//! app. Contacts are created in an order that depends on the scene alone, not on the number of threads. Spatial queries and swept
+//! CCD read avian's trees, as before.
 //!
 //! Do not clear avian's `ContactGraph` by hand: pbig reports each pair once, when it begins.
 
-mod ask;
 mod boxes;
-mod collect;
 mod lost;
-pub mod shadow;
-mod waiting;
+mod shadow;
+mod step;
 
 pub use boxes::ColliderBoxes;
-pub use pbig_core::{Error, Report};
+pub use pbig_core;
+pub use shadow::Shadow;
 
+use avian::collider_tree::ColliderTreeSystems;
 use avian::collision::broad_phase::BroadPhaseSystems;
 use avian::prelude::*;
 use bevy::ecs::system::SystemParamItem;
@@ -45,7 +45,10 @@ use bevy::prelude::*;
 use std::marker::PhantomData;
 
 /// Finds pairs of colliders with pbig. Add it in place of `BvhBroadPhasePlugin`, with the same hooks.
-pub struct PbigBroadPhasePlugin<H: CollisionHooks = ()>(PhantomData<H>);
+pub struct PbigBroadPhasePlugin<H: CollisionHooks = ()> {
+    is_shadow: bool,
+    hooks: PhantomData<H>,
+}
 
 impl PbigBroadPhasePlugin {
     /// Makes the plugin without collision hooks.
@@ -56,7 +59,31 @@ impl PbigBroadPhasePlugin {
 
 impl<H: CollisionHooks> Default for PbigBroadPhasePlugin<H> {
     fn default() -> Self {
-        Self(PhantomData)
+        Self { is_shadow: false, hooks: PhantomData }
+    }
+}
+
+impl<H: CollisionHooks> PbigBroadPhasePlugin<H> {
+    /// Makes the plugin compare its pairs with those of avian's own broad phase, which stays in charge. [`Shadow`] has the result.
+    /// Add it beside `BvhBroadPhasePlugin`, without which all pairs are spurious, and with the same hooks. They are asked again about
+    /// pairs that they forbid.
+    ///
+    /// ```
+    /// use avian::prelude::*; // avian2d or avian3d
+    /// use avian_pbig::{PbigBroadPhasePlugin, Shadow};
+    /// use bevy::prelude::*;
+    ///
+    /// let mut app = App::new();
+    /// app.add_plugins((MinimalPlugins, bevy::transform::TransformPlugin));
+    /// app.add_plugins(PhysicsPlugins::default().build().add(PbigBroadPhasePlugin::new().as_shadow()));
+    /// app.finish();
+    /// app.cleanup();
+    /// app.update();
+    /// let shadow = app.world().resource::<Shadow>();
+    /// assert!(shadow.missing.is_empty() && shadow.spurious.is_empty(), "{shadow:?}");
+    /// ```
+    pub fn as_shadow(self) -> Self {
+        Self { is_shadow: true, ..self }
     }
 }
 
@@ -65,27 +92,27 @@ where
     for<'w, 's> SystemParamItem<'w, 's, H>: CollisionHooks,
 {
     fn build(&self, app: &mut App) {
-        follow_colliders(app);
-        app.add_systems(
-            PhysicsSchedule,
-            collect::add_contacts::<H>
-                .in_set(BroadPhaseSystems::CollectCollisions)
-                // Avian's schedule panics at an ambiguity; `finish` warns of the one that can be.
-                .ambiguous_with_all(),
-        );
+        app.init_resource::<ColliderBoxes>();
+        lost::add_observers(app);
+        if self.is_shadow {
+            let system = shadow::compare::<H>
+                .in_set(PhysicsStepSystems::BroadPhase)
+                .after(BroadPhaseSystems::CollectCollisions)
+                .before(ColliderTreeSystems::BeginOptimize);
+            app.init_resource::<Shadow>().add_systems(PhysicsSchedule, system);
+        } else {
+            // Avian's schedule panics at an ambiguity; `finish` warns of the one that can be.
+            let system =
+                step::add_contacts::<H>.in_set(BroadPhaseSystems::CollectCollisions).ambiguous_with_all();
+            app.add_systems(PhysicsSchedule, system);
+        }
     }
 
     fn finish(&self, app: &mut App) {
-        if app.is_plugin_added::<BvhBroadPhasePlugin<H>>() {
+        if !self.is_shadow && app.is_plugin_added::<BvhBroadPhasePlugin<H>>() {
             warn!(
                 "avian's own broad phase runs beside pbig: `.disable::<BvhBroadPhasePlugin>()` saves its time"
             );
         }
     }
-}
-
-/// Adds the boxes, and the observers that tell which colliders have lost their contacts.
-fn follow_colliders(app: &mut App) {
-    app.init_resource::<ColliderBoxes>().init_resource::<lost::Lost>();
-    lost::add_observers(app);
 }

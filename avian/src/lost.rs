@@ -5,41 +5,31 @@
 //! avian's narrow phase, of its joint graph, and of the layers that its narrow phase reads. Colliders that are enabled, or given
 //! to another body, are here, too: avian clears its list of moved proxies at the end of a step, perhaps before pbig has seen them.
 
+use crate::boxes::ColliderBoxes;
 use avian::dynamics::joints::joint_graph::JointGraph;
 use avian::prelude::*;
 use bevy::ecs::entity_disabling::Disabled;
 use bevy::ecs::event::{EntityEvent, EventPattern};
 use bevy::prelude::*;
-use std::collections::BTreeSet;
 
-/// Colliders that begin anew in the next update.
-#[derive(Resource, Default)]
-pub(crate) struct Lost(pub(crate) BTreeSet<Entity>);
+type Removed = (Disabled, ColliderDisabled, ColliderMarker, ColliderOf, Sensor, RigidBodyDisabled, RigidBody);
 
 pub(crate) fn add_observers(app: &mut App) {
-    app.add_observer(note_collider::<Add<(Disabled, ColliderDisabled, Sensor)>>)
-        .add_observer(
-            note_collider::<Remove<(Disabled, ColliderDisabled, ColliderMarker, ColliderOf, Sensor)>>,
-        )
-        .add_observer(note_collider::<Insert<(ColliderOf, CollisionLayers)>>)
-        .add_observer(note_body::<Add<(Disabled, RigidBodyDisabled)>>)
-        .add_observer(note_body::<Remove<(RigidBodyDisabled, RigidBody)>>)
-        .add_observer(note_body::<Insert<RigidBody>>)
+    app.add_observer(note::<Add<(Disabled, ColliderDisabled, Sensor, RigidBodyDisabled)>>)
+        .add_observer(note::<Remove<Removed>>)
+        .add_observer(note::<Insert<(ColliderOf, CollisionLayers, RigidBody)>>)
         .add_observer(note_joint);
 }
 
-fn note_collider<E: EventPattern<Event: EntityEvent>>(trigger: On<E>, mut lost: ResMut<Lost>) {
-    lost.0.insert(trigger.event_target());
-}
-
-fn note_body<E: EventPattern<Event: EntityEvent>>(
+/// Notes an entity as a collider, and as a body with all its colliders.
+fn note<E: EventPattern<Event: EntityEvent>>(
     trigger: On<E>,
     bodies: Query<&RigidBodyColliders, Allow<Disabled>>,
-    mut lost: ResMut<Lost>,
+    mut boxes: ResMut<ColliderBoxes>,
 ) {
-    if let Ok(colliders) = bodies.get(trigger.event_target()) {
-        lost.0.extend(colliders.iter());
-    }
+    let entity = trigger.event_target();
+    boxes.lost.insert(entity);
+    boxes.lost.extend(bodies.get(entity).into_iter().flat_map(|colliders| colliders.iter()));
 }
 
 /// Notes the colliders of both bodies when a joint begins to disable their collisions.
@@ -47,11 +37,8 @@ fn note_joint(
     trigger: On<Add<JointCollisionDisabled>>,
     joints: Res<JointGraph>,
     bodies: Query<&RigidBodyColliders>,
-    mut lost: ResMut<Lost>,
+    mut boxes: ResMut<ColliderBoxes>,
 ) {
-    for body in joints.bodies_of(trigger.entity).into_iter().flatten() {
-        if let Ok(colliders) = bodies.get(body) {
-            lost.0.extend(colliders.iter());
-        }
-    }
+    let both = joints.bodies_of(trigger.entity).into_iter().flatten();
+    boxes.lost.extend(bodies.iter_many(both).flatten().flat_map(|colliders| colliders.iter()));
 }

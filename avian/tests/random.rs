@@ -5,8 +5,7 @@ mod support;
 use avian::collider_tree::{ColliderTreeProxyKey, ColliderTreeSystems, ColliderTrees, MovedProxies};
 use avian::collision::broad_phase::BroadPhaseSystems;
 use avian::prelude::*;
-use avian_pbig::ColliderBoxes;
-use avian_pbig::shadow::{Shadow, ShadowPlugin};
+use avian_pbig::{ColliderBoxes, PbigBroadPhasePlugin, Shadow};
 use bevy::prelude::*;
 use support::{RandomWorld, Veto, app, app_with_pbig, plugins};
 
@@ -25,7 +24,7 @@ fn run(app: &mut App, seed: u64, bodies: usize, steps: usize) {
 fn pairs_equal_those_of_avian() {
     let mut compared = 0;
     for (seed, bodies) in [(1, 30), (2, 300), (3, 300), (4, 5000)] {
-        let mut app = app(plugins().add(ShadowPlugin::<Veto>::default()));
+        let mut app = app(plugins().add(PbigBroadPhasePlugin::<Veto>::default().as_shadow()));
         run(&mut app, seed, bodies, 320);
         let shadow = app.world().resource::<Shadow>();
         assert!(shadow.missing.is_empty(), "seed {seed}: {shadow:?}");
@@ -49,7 +48,7 @@ fn avian_finds_nothing_after_pbig() {
     app.add_systems(PhysicsSchedule, place.in_set(PhysicsStepSystems::BroadPhase));
     run(&mut app, 5, 400, 200);
     assert_eq!(app.world().resource::<Missed>().0, []);
-    assert!(app.world().resource::<ColliderBoxes>().len() > 300);
+    assert!(app.world().resource::<ColliderBoxes>().broad_phase().len() > 300);
 }
 
 /// Tests each moved proxy against every other, by avian's rules.
