@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # The one test command. It sets the machine up, runs named steps, and ends with a table of times and counts.
-#   scripts/test.sh [--no-setup] [STEP...]     without a step: all; a few run beside the others
+#   scripts/test.sh [--no-setup] [STEP...]     without a step: all
 # setup.sh installs what is missing, if it may, and says what; --no-setup leaves it out. A step is a function `step_NAME`, with
 # `_` for `-` and `.`. It ends at its first failing command, and the other steps go on. Without a GPU adapter (a software one
 # will do) the parts that need one are left out, and the table says so. With CI=true that is a failure.
@@ -168,69 +168,43 @@ count() {
         }' "$1"
 }
 
-# run_step NAME: runs a step, and shows its headings; leaves its row of the table in a file, and its output if it failed.
+# run_step NAME: runs a step, shows its headings, and its output if it fails; adds its row to the table.
 run_step() {
-    local start=$SECONDS log=$TMPDIR/$1.log status passed failed skipped note
+    local start=$SECONDS log=$TMPDIR/log status passed failed skipped note
     echo "== $1"
     # A shell of its own, so that `set -e` ends the step alone. setup.sh may have installed another Rust before.
     (
         set -e
         . scripts/common.sh
         "step_$(echo "$1" | tr '.-' '__')"
-    ) 2>&1 </dev/null | tee "$log" | grep --line-buffered '^== ' | while read -r line; do echo "== $1: ${line#== }"; done
+    ) 2>&1 </dev/null | tee "$log" | grep --line-buffered '^== '
     status=${PIPESTATUS[0]}
     read -r passed failed skipped <<<"$(count "$log" "$status")"
     note=$(sed -n 's/^== left out: /left out: /p' "$log" | head -n 1)
     if [ "$status" != 0 ]; then
-        printf '%s\n' "-- $1 failed with status $status; the last lines of its output:" "$(tail -n 300 "$log")" "--" >"$TMPDIR/$1.end"
+        echo "-- $1 failed with status $status; the last lines of its output:"
+        tail -n 300 "$log"
+        echo "--"
     fi
-    echo "$1 $((SECONDS - start)) $passed $failed $skipped $note" >"$TMPDIR/$1.row"
+    rows+=$(printf "$columns   %s" "$1" "$((SECONDS - start)) s" "$passed" "$failed" "$skipped" "$note")$'\n'
+    all_passed=$((all_passed + passed)) all_failed=$((all_failed + failed)) all_skipped=$((all_skipped + skipped))
 }
 
-# run_steps NAME...: runs steps one after the other.
-run_steps() {
-    local name
-    for name in "$@"; do
-        run_step "$name"
-    done
-}
-
-# Steps that run beside the others, as compilers and tests often keep one core busy. The first two have folders of their own to build in.
-beside="packages wasm features"
-
-all="setup fmt clippy unit suite gpu doc packages wasm features examples docs rapier-0.36"
+all="setup fmt clippy unit suite gpu doc features packages wasm examples docs rapier-0.36"
 if [ "${1:-}" = --no-setup ]; then
     all=${all#setup }
     shift
 fi
 [ $# -gt 0 ] || set -- $all
-first='' one='' other=''
 for name in "$@"; do
     case " $all " in *" $name "*) ;; *) echo "there is no step '$name'; the steps: $all" >&2 && exit 2 ;; esac
-    case "$first $one $other " in *" $name "*) echo "the step '$name' is named twice" >&2 && exit 2 ;; esac
-    case " $beside " in
-    *" $name "*) other+=" $name" ;;
-    *) [ "$name" = setup ] && first=" setup" || one+=" $name" ;;
-    esac
 done
-run_steps $first
-run_steps $other &
-run_steps $one
-wait
-
 columns='%-12s %8s %8s %8s %8s'
-all_passed=0 all_failed=0 all_skipped=0
+rows='' all_passed=0 all_failed=0 all_skipped=0
 for name in "$@"; do
-    [ ! -f "$TMPDIR/$name.end" ] || cat "$TMPDIR/$name.end"
+    run_step "$name"
 done
-printf "\n$columns\n" step time passed failed skipped
-for name in "$@"; do
-    # A step that was killed has no row, or not all of it.
-    grep -qsE '^[^ ]+( [0-9]+){4} ' "$TMPDIR/$name.row" || echo "$name 0 0 1 0 did not end" >"$TMPDIR/$name.row"
-    read -r name time passed failed skipped note <"$TMPDIR/$name.row"
-    printf "$columns   %s\n" "$name" "$time s" "$passed" "$failed" "$skipped" "$note"
-    all_passed=$((all_passed + passed)) all_failed=$((all_failed + failed)) all_skipped=$((all_skipped + skipped))
-done
+printf "\n$columns\n%s" step time passed failed skipped "$rows"
 printf "$columns\n\n%s\n" all "$SECONDS s" "$all_passed" "$all_failed" "$all_skipped" \
     "$all_passed passed, $all_failed failed, $all_skipped skipped"
 [ "$all_failed" = 0 ]
