@@ -28,8 +28,8 @@ sets() {
 }
 
 # lint PACKAGE OPTIONS PINNED FEATURE...: lints a package, and its dependencies of the workspace, with sets of the features. Sets of
-# several come with all features of an engine, PINNED, so that it is checked once for them. That a feature of ours asks for the engine's
-# is seen where it stands alone.
+# several come with all features of an engine, PINNED, so that it is checked once for them. A feature that stands alone shows whether it
+# asks for what it needs of the engine.
 lint() {
     local package=$1 options=$2 pinned=$3 set
     shift 3

@@ -17,7 +17,7 @@ trap 'rm -rf "$TMPDIR"' EXIT
 in_036="--manifest-path rapier-0.36/Cargo.toml"
 members_036="-p rapier3d-pbig -p pbig-harness-036"
 features_036="--features rapier3d-pbig/debug-render"
-# The same source for two dimensions and for f64; one of them with the debug renderer, whose other dimension it is.
+# The same source for two dimensions and for f64. rapier2d-pbig brings the debug renderer of two dimensions.
 others_036="-p rapier2d-pbig -p pbig-harness-2d -p pbig-harness-2d-f64 -p pbig-harness-3d-f64 --features rapier2d-pbig/debug-render"
 quick_036="--config profile.release.package.rapier3d.opt-level=1 --config profile.release.package.parry3d.opt-level=1"
 # The suite refuses to leave the GPU out with CI=true.

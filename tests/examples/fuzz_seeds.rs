@@ -1,6 +1,6 @@
 //! Writes the seeds of the fuzz targets into `fuzz/corpus`: sets of boxes, scenes that run, and files of both.
 //!
-//! `cargo run --release -p pbig-tests --example fuzz_seeds`
+//! `cargo run --release --example fuzz_seeds`
 
 use ndarray::{Array2, Array3};
 use ndarray_npy::WriteNpyExt;

@@ -285,8 +285,8 @@ macro_rules! define_debug_render {
 }
 
 /// Implements [`crate::shadow::View`] for `Call`, which has functions `aabb_of_stock` and `reaches_further_with`, and updates rapier's own
-/// broad phase. `$distance` returns the distance between the shapes of two colliders. In scope: the
-/// imports of an adapter's `shadow`.
+/// broad phase. `$distance` returns the distance between the shapes of two colliders. In scope: the imports of an
+/// adapter's `shadow`.
 #[doc(hidden)]
 #[macro_export]
 macro_rules! define_view {
