@@ -6,8 +6,8 @@ mod turns;
 mod work;
 
 use pbig_core::{
-    Aabb, Backend, ChangeRequest, Config, DeviceFailure, DeviceFound, DeviceReport, Finder, NoDevice, Order,
-    Pair, PairDevice, ProxyFilter, SearchRequest,
+    Aabb, Backend, BroadPhase, ChangeRequest, Config, DeviceFailure, DeviceFound, DeviceReport, Finder,
+    NoDevice, Order, Pair, PairDevice, ProxyFilter, SearchRequest,
 };
 use pbig_gpu::{Coding, GpuFinder, GpuFinders, GpuOptions, adapters};
 use pbig_tests::{Way, difference, gpu, needs_gpu};
@@ -260,6 +260,30 @@ fn boxes_that_jump_together_or_apart_get_another_plan_at_once() {
     }
     assert_ne!(plans[0], plans[1]);
     assert_eq!(plans[3], plans[4], "a plan that suits is kept");
+}
+
+/// An app that prepares its device while it loads waits for no driver later.
+#[test]
+fn a_prepared_device_compiles_nothing_in_searches_and_updates() {
+    needs_gpu!();
+    let mut gpu = GpuFinder::new().expect("an adapter");
+    assert_eq!(gpu.pipelines(), 0);
+    gpu.prepare().expect("kernels compile");
+    let prepared = gpu.pipelines();
+    let config = Config { backend: Backend::Device, ..Config::DEFAULT };
+    for order in [Order::Sorted, Order::Unspecified] {
+        let mut finder = Finder::with_device(Config { order, ..config }, Box::new(gpu.clone()));
+        for boxes in [set("pile", 3000), set("unit", 500)] {
+            find(&mut finder, &boxes);
+        }
+    }
+    let mut world = BroadPhase::with_device(config, Box::new(gpu.clone())).expect("a margin");
+    for (id, aabb) in (0..).zip(set("pile", 3000)) {
+        world.set(id, aabb, ProxyFilter::ALL).expect("a box");
+    }
+    world.update().expect("an update");
+    assert!(world.report().device.is_some(), "{:?}", world.report().fallback);
+    assert_eq!(gpu.pipelines(), prepared);
 }
 
 #[test]

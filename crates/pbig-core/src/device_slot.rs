@@ -1,7 +1,7 @@
 //! The device of a finder or a broad phase, if it has one, and the report of a device that cannot do the work.
 
 use crate::outcome::{End, Outcome};
-use crate::pair_device::{DeviceFailure, DeviceFound, PairDevice};
+use crate::pair_device::{ChangedBox, DeviceFailure, DeviceFound, PairDevice};
 use crate::policy::{Choice, choose_backend};
 use crate::report::{Clock, Report, StageTimes, stage};
 use crate::{Algorithm, Config, Pair, Plan, parallel};
@@ -15,12 +15,14 @@ const PIECE: usize = 1 << 16;
 pub(crate) struct DeviceSlot {
     device: Option<Box<dyn PairDevice>>,
     has_warned: bool,
+    /// Memory for the changes of an update.
+    pub(crate) changed: Vec<ChangedBox>,
 }
 
 impl DeviceSlot {
     /// Makes a slot with a device.
     pub(crate) fn new(device: Box<dyn PairDevice>) -> Self {
-        Self { device: Some(device), has_warned: false }
+        Self { device: Some(device), ..Self::default() }
     }
 
     /// Returns true if there is a device.
@@ -119,6 +121,14 @@ fn check(found: &DeviceFound, boxes: usize) -> Result<(), DeviceFailure> {
     let form =
         format!("pairs a < b < {boxes}, ascending ids of restarted boxes, and at most {boxes} valid boxes");
     Err(DeviceFailure::Failed(format!("the device's answer is malformed: {form} were expected")))
+}
+
+/// Returns true if pairs are in order, each once. Threads share the work: one alone takes as long as the device for all the rest.
+pub(crate) fn are_in_order(pairs: &[Pair]) -> bool {
+    let pieces: Vec<&[Pair]> = pairs.chunks(PIECE).collect();
+    let is_after_last = |i: usize| pieces[i - 1].last() < pieces[i].first();
+    let is_good = |i: usize| (i == 0 || is_after_last(i)) && pieces[i].is_sorted_by(|one, next| one < next);
+    parallel::map(pieces.len(), is_good).into_iter().all(|is_good| is_good)
 }
 
 /// Returns true if every pair is `a < b < boxes`.

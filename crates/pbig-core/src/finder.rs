@@ -1,7 +1,7 @@
 //! `Finder`: all pairs of a list of boxes, with nothing kept between calls but memory.
 
 use crate::all_pairs::{AllPairs, Request, Store};
-use crate::device_slot::DeviceSlot;
+use crate::device_slot::{DeviceSlot, are_in_order};
 use crate::outcome::Outcome;
 use crate::pair_device::{PairDevice, SearchRequest};
 use crate::pairs::{Grouping, Groups};
@@ -170,7 +170,7 @@ impl Finder {
         if found.pairs.len() as u64 > max_pairs {
             return Err(Error::TooManyPairs { limit: max_pairs });
         }
-        if grouping.is_none() || found.pairs.is_sorted_by(|one, next| one < next) {
+        if grouping.is_none() || are_in_order(&found.pairs) {
             self.pairs = found.pairs;
         } else {
             self.all_pairs.take(found.pairs, grouping);

@@ -88,7 +88,9 @@ pub fn events(
     ended: &mut Vec<Pair>,
 ) -> Result<(), DecodeError> {
     let mut last = None;
-    for (i, &Pair { a, b: marked }) in whole_pairs(words)?.iter().enumerate() {
+    // One copy at once, see `copy_into`.
+    let given = whole_pairs(words)?.to_vec();
+    for (i, Pair { a, b: marked }) in given.into_iter().enumerate() {
         let pair = checked(Pair { a, b: marked & !ENDED }, boxes, 2 * i)?;
         if is_sorted && last.replace(pair) >= Some(pair) {
             return Err(DecodeError { what: "pairs out of order", at: 2 * i });

@@ -79,14 +79,14 @@ fn bench_gpu_has_both_backends_and_moves_changed_bytes_only() {
     let is_whole = |row: &Value| number(row, "predicted_ms") > number(row, "floor_ms");
     assert!(model.len() == 4 * searches.len() && model.iter().all(is_whole));
     let events = rows(&tables, "events");
-    assert_eq!(events.len(), 4);
+    assert_eq!(events.len(), 6);
     for row in events {
         assert!(number(row, "cpu_ms") > 0.0 && number(row, "gpu_ms") > 0.0, "{row}");
         let changed = number(row, "boxes") * number(row, "share");
         assert!(number(row, "uploaded_bytes") < 64.0 * changed + 4096.0, "{row}");
         assert!(number(row, "downloaded_bytes") < 32.0 * number(row, "events") + 4096.0, "{row}");
     }
-    assert!(number(&events[3], "events") > 1000.0);
+    assert!(number(&events[5], "events") > 1000.0);
 }
 
 #[test]

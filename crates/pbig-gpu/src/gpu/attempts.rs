@@ -4,7 +4,7 @@
 use super::GpuError;
 use super::chunk::{ChunkResult, PendingChunk};
 use super::error::Failure;
-use super::items::{cut, rest};
+use super::items::{cut, rest, with_slack};
 use super::job::Job;
 use super::passes::{self, CLEAR_TOTALS, Groups, Step};
 use super::session::Session;
@@ -48,7 +48,8 @@ impl Session {
         let mut items = chunk.items;
         let mut result = self.finish(chunk).await?;
         if matches!(result, ChunkResult::Unsorted) {
-            chunk = self.submit_rest_and_sort(&items)?;
+            let counted = self.sizes.lists;
+            chunk = self.submit_rest_and_sort(&items, &counted)?;
             items = chunk.items;
             result = self.finish(chunk).await?;
         }
@@ -121,16 +122,17 @@ impl Session {
         let most = self.storage.max_buffer_bytes;
         let words = (4 * self.sizes.word_capacity).clamp(first_bytes.min(most), most) / 4;
         passes::make_sort_buffers(&mut self.storage, &mut self.params, words)?;
-        let is_all = rest(&self.sizes.lists, &items).is_empty();
+        let expected = with_slack(&self.sizes.lists);
+        let is_all = rest(&expected, &items).is_empty();
         let steps = passes::map_and_check(&self.params, is_all);
         // A chunk that is not read is not timed.
         if is_all || self.options.time_kernels {
             return self.submit(items, 0, &steps);
         }
-        // As many chunks as in the last call, without a wait in between. Items that are not there are skipped.
+        // The chunks of the last call, and a few items more, without a wait in between. Items that are not there are skipped.
         self.make_room(0)?;
         self.submit_unread(items, &steps)?;
-        self.submit_rest_and_sort(&items)
+        self.submit_rest_and_sort(&items, &expected)
     }
 
     /// Returns the work items of a chunk. A software adapter gets fewer, so that it answers in time.
@@ -139,14 +141,14 @@ impl Session {
         self.options.chunk.map(|items| (items / share).max(1))
     }
 
-    /// Returns the chunks after the first one, as the last map counted the work items.
-    pub(super) fn chunks_after(&self, first: &Chunk) -> Vec<Chunk> {
-        cut(rest(&self.sizes.lists, first), self.chunk_items())
+    /// Returns the chunks after the first one, of these work items.
+    pub(super) fn chunks_after(&self, first: &Chunk, items: &Counters) -> Vec<Chunk> {
+        cut(rest(items, first), self.chunk_items())
     }
 
     /// Searches the other chunks, two at a time: the device checks one while the host decodes the other (PBIG 5.3).
     async fn search_rest(&mut self, done: &Chunk) -> Result<(), Failure> {
-        let mut pending: VecDeque<Chunk> = self.chunks_after(done).into();
+        let mut pending: VecDeque<Chunk> = self.chunks_after(done, &self.sizes.lists).into();
         let mut in_progress: VecDeque<PendingChunk> = VecDeque::new();
         let most = if self.options.pipelining { 2 } else { 1 };
         let mut side = 0;

@@ -6,6 +6,7 @@
 use super::upload::PIECE;
 use crate::layout::{BoxChange, DeviceBox, FilterChange, Motion, WAS_ABSENT};
 use pbig_core::{Aabb, ChangedBox, ProxyFilter, internal as parallel};
+use std::borrow::Cow;
 use std::ops::Range;
 
 /// The changes since the last update.
@@ -49,6 +50,10 @@ impl Changes<'_> {
 
     /// Returns boxes now and before, for a device that does not have them.
     pub(super) fn motions(&self, ids: Range<usize>) -> Vec<Motion> {
+        if ids.is_empty() {
+            // Usual in an update: not worth a look at all changes.
+            return Vec::new();
+        }
         let at_rest = |now: DeviceBox| Motion { now, before: now };
         let boxes = self.boxes[ids.clone()].iter();
         let mut motions: Vec<_> = boxes.map(|now| at_rest(DeviceBox::new(now))).collect();
@@ -58,15 +63,31 @@ impl Changes<'_> {
         motions
     }
 
-    /// Returns the changes of the first `known` boxes, for a device that has these boxes at the last update. Each list is
-    /// in pieces.
-    pub(super) fn lists(&self, known: usize) -> Vec<(Vec<BoxChange>, Vec<FilterChange>)> {
+    /// Returns the changes of the first `known` boxes.
+    pub(super) fn of_known(&self, known: usize) -> Cow<'_, [ChangedBox]> {
+        if known >= self.boxes.len() {
+            return Cow::Borrowed(self.changed);
+        }
+        Cow::Owned(self.changed.iter().filter(|change| (change.id as usize) < known).copied().collect())
+    }
+
+    /// Returns the changes of filters, in pieces.
+    pub(super) fn filter_changes(&self) -> Vec<Vec<FilterChange>> {
         let pieces: Vec<&[ChangedBox]> = self.changed.chunks(PIECE).collect();
         parallel::map(pieces.len(), |i| {
-            let changed = pieces[i].iter().filter(|change| (change.id as usize) < known);
-            let boxes = changed.clone().map(|change| self.box_change(change)).collect();
-            (boxes, changed.filter_map(|change| self.filter_change(change)).collect())
+            pieces[i].iter().filter_map(|change| self.filter_change(change)).collect()
         })
+    }
+
+    /// Gives the changes of boxes, as the device stores them, to `put`: some of them at a time.
+    pub(super) fn put_box_changes(&self, mut put: impl FnMut(&[BoxChange])) {
+        const BLOCK: usize = 128;
+        let mut block = [BoxChange::default(); BLOCK];
+        for changed in self.changed.chunks(BLOCK) {
+            let made = changed.iter().map(|change| self.box_change(change));
+            block.iter_mut().zip(made).for_each(|(to, made)| *to = made);
+            put(&block[..changed.len()]);
+        }
     }
 
     fn box_change(&self, change: &ChangedBox) -> BoxChange {

@@ -56,13 +56,17 @@ impl Session {
         Ok(PendingChunk { items, side, submission, submissions: 1, prefetched, passes })
     }
 
-    /// Checks the chunks after `done`, as many as the last map had, which add their pairs to those of the first. Sorts all.
-    pub(super) fn submit_rest_and_sort(&mut self, done: &Chunk) -> Result<PendingChunk, GpuError> {
-        let others = self.chunks_after(done);
+    /// Checks the `expected` work items after `done`, which add their pairs to those of the first. Sorts all.
+    pub(super) fn submit_rest_and_sort(
+        &mut self,
+        done: &Chunk,
+        expected: &Counters,
+    ) -> Result<PendingChunk, GpuError> {
+        let others = self.chunks_after(done, expected);
         for items in &others {
             self.submit_unread(*items, &check(items))?;
         }
-        let Counters { small_items, large_items, .. } = self.sizes.lists;
+        let Counters { small_items, large_items, .. } = *expected;
         let (small_items, large_items) =
             (small_items.max(done.small_items), large_items.max(done.large_items));
         let last = self.submit(Chunk { small_items, large_items, ..*done }, 0, &sort(&self.params))?;

@@ -2,7 +2,7 @@
 
 use super::{GpuError, adapter, wait};
 use crate::GpuOptions;
-use pbig_shaders::{Buffer, Kernel};
+use pbig_shaders::{Buffer, KERNELS, Kernel, SCAN_BLOCKS, SCAN_SUMS};
 use std::collections::HashMap;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -164,6 +164,17 @@ impl GpuDevice {
         }
     }
 
+    /// Compiles the kernels of all searches.
+    pub(super) fn compile_all(&self, options: &GpuOptions) {
+        for (kernel, changes) in KERNELS.iter().flat_map(|kernel| [(kernel, false), (kernel, true)]) {
+            self.pipeline(kernel, Variant::new(options, changes));
+        }
+        for kernel in [&SCAN_BLOCKS, &SCAN_SUMS] {
+            self.pipeline(kernel, Variant::new(options, false).of_rows());
+            self.pipeline(kernel, Variant::new(options, true).of_rows());
+        }
+    }
+
     /// Returns the pipeline of a kernel, which is compiled at first use.
     pub(super) fn pipeline(&self, kernel: &'static Kernel, variant: Variant) -> wgpu::ComputePipeline {
         // Most kernels do not depend on what is searched for.
@@ -198,6 +209,11 @@ impl GpuDevice {
             },
             cache: None,
         })
+    }
+
+    /// Returns the number of pipelines.
+    pub(super) fn pipelines(&self) -> usize {
+        lock(&self.pipelines).len()
     }
 
     pub(super) fn buffer(

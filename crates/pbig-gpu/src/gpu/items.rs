@@ -10,6 +10,14 @@ pub(super) fn rest(all: &Counters, done: &Chunk) -> Chunk {
     Chunk { first_small, small_items, first_large, large_items, ..Chunk::default() }
 }
 
+/// Returns the counts of a map with a sixteenth more work items: when boxes move, the next map has a few more or less. An item
+/// that is not there costs a workgroup that ends at once, one that was not expected a submission and a wait.
+pub(super) fn with_slack(counters: &Counters) -> Counters {
+    let more = |items: u32| items.saturating_add(items / 16);
+    let (small_items, large_items) = (more(counters.small_items), more(counters.large_items));
+    Counters { small_items, large_items, ..*counters }
+}
+
 /// Cuts a range of work items into chunks.
 pub(super) fn cut(all: Chunk, [small, large]: [u32; 2]) -> Vec<Chunk> {
     let (small, large) = (small.max(1), large.max(1));

@@ -128,6 +128,19 @@ impl GpuFinder {
         Self { options, ..self }
     }
 
+    /// Compiles all kernels. Otherwise the first search and the first update do, which takes a driver up to a second: call it while the
+    /// app loads, perhaps on a clone in another thread.
+    ///
+    /// # Errors
+    /// As [`GpuFinder::new`].
+    pub fn prepare(&mut self) -> Result<(), GpuError> {
+        let options = self.options;
+        wait::block_on(async {
+            let device = self.open_device().await?;
+            device.watch(async || Ok(device.compile_all(&options))).await
+        })
+    }
+
     /// Returns the adapter's name, kind and API; empty before the first call on a shared device.
     pub fn adapter(&self) -> &str {
         self.device.as_ref().map_or("", |device| &device.name)

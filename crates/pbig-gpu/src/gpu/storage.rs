@@ -2,8 +2,11 @@
 //! are hardly used. Lists go up through one staging buffer, which stays mapped between calls: the host copies each list once.
 
 use super::GpuError;
+use super::changes::Changes;
 use super::gpu_device::{GpuDevice, Variant};
+use super::upload::PIECE;
 use crate::GpuOptions;
+use crate::layout::BoxChange;
 use bytemuck::Pod;
 use pbig_core::internal::{self as parallel, threads_for};
 use pbig_shaders::{Buffer, Kernel};
@@ -77,19 +80,63 @@ impl BufferId {
 
 /// A list for a buffer of the device, from this byte of the buffer on.
 pub(super) struct Upload<'a> {
-    pub(super) buffer: Buffer,
-    pub(super) at: u64,
-    pub(super) bytes: &'a [u8],
+    buffer: Buffer,
+    at: u64,
+    content: Content<'a>,
+}
+
+/// A list, or a piece of one.
+#[derive(Clone, Copy)]
+enum Content<'a> {
+    Bytes(&'a [u8]),
+    /// Changes of boxes. They are made where they go: a list of them would take new memory in each call.
+    BoxChanges(Changes<'a>),
 }
 
 impl<'a> Upload<'a> {
     /// A list of elements, from the element `start` on.
     pub(super) fn new<T: Pod>(buffer: Buffer, start: usize, list: &'a [T]) -> Self {
-        Self { buffer, at: (start * size_of::<T>()) as u64, bytes: bytemuck::cast_slice(list) }
+        let content = Content::Bytes(bytemuck::cast_slice(list));
+        Self { buffer, at: (start * size_of::<T>()) as u64, content }
     }
 
+    /// The changes of boxes.
+    pub(super) fn of_box_changes(changes: Changes<'a>) -> Self {
+        Self { buffer: Buffer::BoxChanges, at: 0, content: Content::BoxChanges(changes) }
+    }
+}
+
+impl<'a> Content<'a> {
     fn len(&self) -> u64 {
-        self.bytes.len() as u64
+        match self {
+            Self::Bytes(bytes) => bytes.len() as u64,
+            Self::BoxChanges(changes) => (changes.changed.len() * size_of::<BoxChange>()) as u64,
+        }
+    }
+
+    /// Returns pieces for threads. Each but the last ends at a multiple of [`wgpu::MAP_ALIGNMENT`].
+    fn pieces(&self) -> Vec<Content<'a>> {
+        match *self {
+            Self::Bytes(bytes) => bytes.chunks(PIECE_BYTES).map(Content::Bytes).collect(),
+            Self::BoxChanges(changes) => {
+                let pieces = changes.changed.chunks(PIECE);
+                pieces.map(|changed| Content::BoxChanges(Changes { changed, ..changes })).collect()
+            }
+        }
+    }
+
+    /// Gives the bytes to `put`, each time with their place.
+    fn put(&self, mut put: impl FnMut(u64, &[u8])) {
+        match self {
+            Self::Bytes(bytes) => put(0, bytes),
+            Self::BoxChanges(changes) => {
+                let mut at = 0;
+                changes.put_box_changes(|block| {
+                    put(at, bytemuck::cast_slice(block));
+                    at += size_of_val(block) as u64;
+                });
+            }
+        }
     }
 }
 
@@ -183,12 +230,14 @@ impl Storage {
     pub(super) fn stage(&mut self, uploads: &[Upload<'_>]) -> Result<(), GpuError> {
         // A call that failed before it was submitted leaves copies behind.
         self.copies = None;
-        let bytes: u64 = uploads.iter().map(|upload| aligned(upload.len())).sum();
-        self.bytes_sent += uploads.iter().map(Upload::len).sum::<u64>();
+        let lens = uploads.iter().map(|upload| upload.content.len());
+        let bytes: u64 = lens.clone().map(aligned).sum();
+        self.bytes_sent += lens.sum::<u64>();
         if bytes > self.max_buffer_bytes {
             // Each list fits a buffer, but not all together.
-            for &Upload { buffer, at, bytes } in uploads {
-                self.device.queue.write_buffer(self.get(buffer), at, bytes);
+            for Upload { buffer, at, content } in uploads {
+                let to = self.get(*buffer);
+                content.put(|place, bytes| self.device.queue.write_buffer(to, at + place, bytes));
             }
             return Ok(());
         }
@@ -200,9 +249,12 @@ impl Storage {
         let staging = self.get(BufferId::UploadStaging);
         let has_failed = AtomicBool::new(false);
         parallel::run(threads_for(pieces.len()), pieces.len(), |_, i| {
-            let (from, piece) = pieces[i];
-            match staging.get_mapped_range_mut(from..from + piece.len() as u64) {
-                Ok(mut view) => view.copy_from_slice(piece),
+            let (from, piece) = &pieces[i];
+            match staging.get_mapped_range_mut(*from..from + piece.len()) {
+                Ok(mut view) => piece.put(|at, bytes| {
+                    let at = at as usize;
+                    view.slice(at..at + bytes.len()).copy_from_slice(bytes);
+                }),
                 Err(_) => has_failed.store(true, Ordering::Relaxed),
             }
         });
@@ -215,15 +267,17 @@ impl Storage {
     }
 
     /// Gives each list a place in the staging buffer, and records its copy. Returns the pieces that threads write there.
-    fn record_copies<'a>(&mut self, uploads: &[Upload<'a>]) -> Vec<(u64, &'a [u8])> {
+    fn record_copies<'a>(&mut self, uploads: &[Upload<'a>]) -> Vec<(u64, Content<'a>)> {
         let (mut pieces, mut from) = (Vec::new(), 0);
         let mut encoder = self.device.encoder();
         let staging = self.get(BufferId::UploadStaging);
-        for upload in uploads.iter().filter(|upload| upload.len() > 0) {
-            let (to, bytes) = (self.get(upload.buffer), upload.len());
-            encoder.copy_buffer_to_buffer(staging, from, to, upload.at, bytes);
-            pieces.extend((from..).step_by(PIECE_BYTES).zip(upload.bytes.chunks(PIECE_BYTES)));
-            from = aligned(from + bytes);
+        for Upload { buffer, at, content } in uploads.iter().filter(|upload| upload.content.len() > 0) {
+            encoder.copy_buffer_to_buffer(staging, from, self.get(*buffer), *at, content.len());
+            for piece in content.pieces() {
+                pieces.push((from, piece));
+                from += piece.len();
+            }
+            from = aligned(from);
         }
         self.copies = Some(encoder);
         pieces

@@ -41,6 +41,11 @@ impl GpuFinder {
         wait::block_on(device.watch(async || Ok(device.pipeline(kernel, Variant::new(options, changes)))))
     }
 
+    /// Returns the number of kernels that were compiled for the device.
+    pub fn pipelines(&self) -> usize {
+        self.device.as_ref().map_or(0, |device| device.pipelines())
+    }
+
     /// Returns the number of query sets that the finder holds.
     pub fn query_sets(&self) -> usize {
         self.session.iter().filter_map(|session| session.timestamps.as_ref()).count()

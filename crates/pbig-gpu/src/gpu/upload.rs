@@ -62,22 +62,23 @@ fn send_lists(
     known: usize,
     params: &mut Params,
 ) -> Result<(), GpuError> {
-    let lists = changes.lists(known);
     let new = changes.motions(known..changes.boxes.len());
+    let changed = changes.of_known(known);
+    let of_known = Changes { changed: &changed, ..changes };
     let mut uploads = vec![
         Upload::new(Buffer::Boxes, known, &new),
         Upload::new(Buffer::Filters, known, &changes.filters[known..]),
+        Upload::of_box_changes(of_known),
     ];
-    let (mut box_changes, mut filter_changes) = (0, 0);
-    for (boxes, filters) in &lists {
-        uploads.push(Upload::new(Buffer::BoxChanges, box_changes, boxes));
+    let (lists, mut filter_changes) = (of_known.filter_changes(), 0);
+    for filters in &lists {
         uploads.push(Upload::new(Buffer::FilterChanges, filter_changes, filters));
-        (box_changes, filter_changes) = (box_changes + boxes.len(), filter_changes + filters.len());
+        filter_changes += filters.len();
     }
-    storage.ensure(Buffer::BoxChanges, (box_changes * size_of::<BoxChange>()) as u64)?;
+    storage.ensure(Buffer::BoxChanges, size_of::<BoxChange>() as u64 * changed.len() as u64)?;
     storage.ensure(Buffer::FilterChanges, (filter_changes * size_of::<FilterChange>()) as u64)?;
     storage.stage(&uploads)?;
     params.known = known as u32;
-    (params.box_changes, params.filter_changes) = (box_changes as u32, filter_changes as u32);
+    (params.box_changes, params.filter_changes) = (changed.len() as u32, filter_changes as u32);
     Ok(())
 }

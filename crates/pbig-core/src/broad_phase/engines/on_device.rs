@@ -1,23 +1,29 @@
 //! The engine on a device: only what has changed goes there, only pairs that were added or removed come back.
 
 use super::Task;
-use crate::broad_phase::world::{Old, World};
+use crate::broad_phase::world::World;
 use crate::device_slot::DeviceSlot;
 use crate::holder::Holder;
 use crate::outcome::{End, Outcome};
-use crate::{Aabb, ChangeRequest, ChangedBox, DeviceFound, Pair, PairDevice};
+use crate::parallel::{self, SharedSlice};
+use crate::{Aabb, ChangeRequest, ChangedBox, DeviceFound, Pair, PairDevice, ProxyFilter};
+
+/// Changed boxes, or pairs, that a thread takes at a time.
+const PIECE: usize = 1 << 14;
 
 /// Leaves the events of an update in the task. Gives up if the device cannot do the work.
 pub(crate) fn run(slot: &mut DeviceSlot, task: &mut Task<'_>) -> Outcome {
     if task.holder != Holder::Device {
         slot.forget();
     }
-    let changed = changed_boxes(task.world);
+    let mut list = std::mem::take(&mut slot.changed);
+    let changed = changed_boxes(task.world, &mut list);
     let World { boxes, filters, .. } = task.world;
     let (kept, max_pairs) = (task.kept.len() as u64, task.config.limits.pairs());
-    let request = ChangeRequest { boxes, filters, changed: &changed, kept, max_pairs };
+    let request = ChangeRequest { boxes, filters, changed, kept, max_pairs };
     let call = |device: &mut dyn PairDevice, found: &mut _| device.find_changed(&request, found);
     let (mut outcome, found) = slot.call(boxes.len(), Vec::new(), call);
+    slot.changed = list;
     if outcome.end == End::Done {
         outcome.holder = Holder::Device;
         sort_out(&found, task);
@@ -29,13 +35,30 @@ pub(crate) fn run(slot: &mut DeviceSlot, task: &mut Task<'_>) -> Outcome {
     outcome
 }
 
-/// Returns the changed boxes as they were at the last update.
-fn changed_boxes(world: &World) -> Vec<ChangedBox> {
-    let was = |(&id, old): (&u32, &Old)| {
-        let aabb = if world.was_removed(id) { Aabb::NOWHERE } else { old.aabb };
-        ChangedBox { id, aabb, filter: old.filter }
-    };
-    world.changed.iter().zip(&world.old).map(was).collect()
+/// Writes the changed boxes, as they were at the last update, to the start of a list, which keeps its memory. Returns them.
+fn changed_boxes<'a>(world: &World, list: &'a mut Vec<ChangedBox>) -> &'a [ChangedBox] {
+    const NONE: ChangedBox = ChangedBox { id: 0, aabb: Aabb::NOWHERE, filter: ProxyFilter::ALL };
+    let changed = world.changed.len();
+    if list.len() / 4 > changed.max(PIECE) {
+        *list = Vec::new();
+    }
+    parallel::ensure_scratch(list, changed, NONE);
+    let (shared, pieces) = (SharedSlice::new(&mut list[..changed]), changed.div_ceil(PIECE));
+    parallel::run(parallel::threads_for(pieces), pieces, |_, piece| {
+        for i in parallel::piece_range(changed, piece, pieces) {
+            let (id, old) = (world.changed[i], &world.old[i]);
+            let aabb = if world.was_removed(id) { Aabb::NOWHERE } else { old.aabb };
+            // SAFETY: the list outlives the call, and each place belongs to one piece.
+            unsafe { shared.write(i, ChangedBox { id, aabb, filter: old.filter }) };
+        }
+    });
+    &list[..changed]
+}
+
+/// Returns what `select` leaves of pairs: threads hand it some at a time.
+fn selected(pairs: &[Pair], select: impl Fn(&[Pair]) -> Vec<Pair> + Sync) -> Vec<Pair> {
+    let pieces: Vec<&[Pair]> = pairs.chunks(PIECE).collect();
+    parallel::map(pieces.len(), |i| select(pieces[i])).concat()
 }
 
 /// Sorts what a device has found into added, removed and dropped pairs.
@@ -48,8 +71,8 @@ fn sort_out(found: &DeviceFound, task: &mut Task<'_>) {
     // reports all pairs of a box that it treats as new.
     let ends = |(pair, is_kept): (Pair, bool)| (is_kept && existed(&pair)).then_some(pair);
     let begins = |(pair, is_kept): (Pair, bool)| (!is_kept || !existed(&pair)).then_some(pair);
-    events.removed.extend(kept.look_up(&found.ended).filter_map(ends));
-    events.added.extend(kept.look_up(&found.pairs).filter_map(begins));
+    events.removed = selected(&found.ended, |pairs| kept.look_up(pairs).filter_map(ends).collect());
+    events.added = selected(&found.pairs, |pairs| kept.look_up(pairs).filter_map(begins).collect());
     for &id in &world.removed {
         events.dropped.extend(kept.partners(id).map(|other| Pair::new(id, other)));
     }
