@@ -2,7 +2,7 @@
 
 use crate::outcome::{End, Outcome};
 use crate::pair_device::{ChangedBox, DeviceFailure, DeviceFound, PairDevice};
-use crate::policy::{Choice, choose_backend};
+use crate::policy::{Choice, Work, choose_backend};
 use crate::report::{Clock, Report, StageTimes, stage};
 use crate::{Algorithm, Config, Pair, Plan, parallel};
 use std::time::Duration;
@@ -42,10 +42,10 @@ impl DeviceSlot {
         }
     }
 
-    /// Returns true if a call with this number of changed boxes should run on the device. Otherwise the report gets the reason.
-    pub(crate) fn is_wanted(&mut self, config: &Config, changed: usize, report: &mut Report) -> bool {
+    /// Returns true if a call should run on the device. Otherwise the report gets the reason.
+    pub(crate) fn is_wanted(&mut self, config: &Config, work: Work, report: &mut Report) -> bool {
         let is_software = self.device.as_ref().map(|device| device.is_software());
-        let choice = choose_backend(config.backend, is_software, changed as u64);
+        let choice = choose_backend(config.backend, is_software, work);
         report.plan.no_device = if let Choice::Cpu(why) = choice { why } else { None };
         if choice == Choice::Device && is_software.is_none() {
             report.fallback = Some(self.fall_back("no device was given"));

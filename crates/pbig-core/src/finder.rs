@@ -5,6 +5,7 @@ use crate::device_slot::{DeviceSlot, are_in_order};
 use crate::outcome::Outcome;
 use crate::pair_device::{PairDevice, SearchRequest};
 use crate::pairs::{Grouping, Groups};
+use crate::policy::Work;
 use crate::report::{Clock, Report, stage};
 use crate::{Aabb, Backend, Boxes, Config, Error, Keys, Limits, Order, Pair, ProxyFilter};
 
@@ -145,7 +146,8 @@ impl Finder {
             self.note_no_device();
             return false;
         }
-        self.device.is_wanted(&self.config, request.boxes.len(), &mut self.report)
+        let work = Work::Search(request.boxes.len() as u64);
+        self.device.is_wanted(&self.config, work, &mut self.report)
     }
 
     /// Reports that the wanted device cannot do this kind of search.

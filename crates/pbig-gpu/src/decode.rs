@@ -24,13 +24,13 @@ pub const PLAIN: u32 = 1 << 31;
 /// Number of words that a thread decodes at a time.
 const PIECE: usize = 1 << 15;
 
-/// Appends plain pairs: two ids each, the smaller first. If `is_sorted`, they must be in order.
+/// Appends plain pairs: two ids each, the smaller first. If `is_sorted`, they must be in order, also after those in the list.
 ///
 /// # Errors
 /// If the number of words is odd, a pair is not `a < b < boxes`, or the order is broken. Then some pairs were appended.
 pub fn plain(words: &[u32], boxes: u32, is_sorted: bool, pairs: &mut Vec<Pair>) -> Result<(), DecodeError> {
     let given = whole_pairs(words)?;
-    let start = pairs.len();
+    let (start, last) = (pairs.len(), pairs.last().copied());
     let pieces: Vec<&[Pair]> = given.chunks(2 * PIECE).collect();
     pairs.reserve(given.len());
     let places = SharedSlice::new(&mut pairs.spare_capacity_mut()[..given.len()]);
@@ -38,7 +38,7 @@ pub fn plain(words: &[u32], boxes: u32, is_sorted: bool, pairs: &mut Vec<Pair>) 
         let (at, piece) = (2 * PIECE * i, pieces[i]);
         // SAFETY: the place is inside the reserved memory, and no other piece has it.
         let copied = copy_into(unsafe { places.part(at..at + piece.len()) }, piece);
-        let before = i.checked_sub(1).and_then(|i| pieces[i].last());
+        let before = i.checked_sub(1).map_or(last.as_ref(), |i| pieces[i].last());
         let is_in_order = || copied.is_sorted_by(|a, b| a < b) && before < copied.first();
         // Without an early end, so that the compiler uses SIMD.
         let are_pairs = copied.iter().fold(true, |all, pair| all & (pair.a < pair.b) & (pair.b < boxes));

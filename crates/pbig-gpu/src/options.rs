@@ -5,7 +5,7 @@ use std::time::Duration;
 /// The coding of the GPU's output (docs/PAIR_FORMAT.md).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Coding {
-    /// The coding that would have been smaller in the last call, with the tables for decoding.
+    /// The fastest: plain pairs, and without a grid one bit for each pair of boxes.
     #[default]
     Auto,
     /// Two ids a pair.

@@ -116,7 +116,7 @@ fn search(gpu: &GpuFinder, set: &str, n: usize) -> Result<Option<Searched>, Fail
         }
     }
     let rounds = if gpu.is_software() { 2 } else { 10 };
-    let mut repeat = |finder: &mut Finder| -> Result<Vec<f64>, Failure> {
+    let repeat = |finder: &mut Finder| -> Result<Vec<f64>, Failure> {
         (0..rounds).map(|round| time(finder, &frames[round % 2])).collect()
     };
     let [cpu, both] = times.map(|times| Spread::of(times).median);

@@ -93,8 +93,7 @@ impl BroadPhase {
         Ok(broad_phase)
     }
 
-    /// Makes a broad phase with a given device. [`Backend::Device`] always uses it, [`Backend::Auto`] if it is hardware and many boxes
-    /// change.
+    /// Makes a broad phase with a given device, which [`Backend::Device`] uses. [`Backend::Auto`] leaves updates to the CPU.
     ///
     /// # Errors
     /// [`Error::Margin`].
@@ -107,7 +106,7 @@ impl BroadPhase {
     /// Uses this device, beginning with the first update whose changes are all set after this call. Earlier updates use the CPU.
     pub fn set_device(&mut self, device: Box<dyn PairDevice>) {
         self.device = DeviceSlot::new(device);
-        self.world.keep_old = usize::MAX;
+        self.world.keep_old = self.old_to_keep();
         if self.holder == Holder::Device {
             self.holder = Holder::Nothing;
         }
@@ -117,6 +116,7 @@ impl BroadPhase {
     #[doc(hidden)]
     pub fn set_backend(&mut self, backend: Backend, limits: Limits) {
         (self.config.backend, self.config.limits) = (backend, limits);
+        self.world.keep_old = self.old_to_keep();
     }
 
     /// Returns the name of the device in use. None while there is no device or it has failed.

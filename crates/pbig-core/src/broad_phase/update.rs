@@ -4,7 +4,7 @@ use super::engines::{self, Task};
 use super::{BroadPhase, Events};
 use crate::holder::Holder;
 use crate::outcome::{End, Outcome};
-use crate::policy::{self, Counts};
+use crate::policy::{self, Counts, Work};
 use crate::report::Clock;
 use crate::{Backend, Engine, Error, NoDevice, Plan};
 
@@ -53,7 +53,7 @@ impl BroadPhase {
 
     /// Returns true if a device should do the update. Otherwise the report gets the reason.
     fn is_for_device(&mut self) -> bool {
-        let is_wanted = self.device.is_wanted(&self.config, self.world.changed.len(), &mut self.report);
+        let is_wanted = self.device.is_wanted(&self.config, Work::Update, &mut self.report);
         if is_wanted && !self.world.knows_old() {
             self.report.plan.no_device = Some(NoDevice::OldBoxesUnknown);
         }
@@ -132,7 +132,7 @@ impl BroadPhase {
 
     /// Returns the number of old states to keep until the next update.
     pub(super) fn old_to_keep(&self) -> usize {
-        if self.device.has_device() {
+        if self.device.has_device() && self.config.backend != Backend::Auto {
             return usize::MAX;
         }
         policy::old_states_to_keep(self.len(), self.config.engine)

@@ -3,8 +3,17 @@
 use crate::Backend;
 use std::fmt;
 
-/// Minimum number of changed boxes for [`Backend::Auto`] to use a hardware device. A search of all boxes counts each as changed.
-pub(crate) const AUTO_DEVICE_FROM_CHANGED_BOXES: u64 = 500_000;
+/// Minimum number of boxes for [`Backend::Auto`] to search them on a hardware device. An H100 was as fast as 16 threads for tens of
+/// thousands, and faster than four.
+pub(crate) const AUTO_DEVICE_FROM_BOXES: u64 = 100_000;
+
+/// The work of a call.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Work {
+    /// A search of this number of boxes.
+    Search(u64),
+    Update,
+}
 
 /// The backend that does the work of a call.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -22,8 +31,10 @@ pub enum NoDevice {
     NotGiven,
     /// The given device is software.
     Software,
-    /// Too few boxes have changed.
-    FewChanged,
+    /// There are too few boxes for a search.
+    FewBoxes,
+    /// An update: several threads are as fast, or faster where few boxes move or all.
+    Update,
     /// The boxes of the last update are not known, after a restore: the CPU does one update, also with [`Backend::Device`].
     OldBoxesUnknown,
 }
@@ -33,28 +44,32 @@ impl fmt::Display for NoDevice {
         f.write_str(match self {
             Self::NotGiven => "none was given",
             Self::Software => "the given one is software",
-            Self::FewChanged => "too few boxes have changed",
+            Self::FewBoxes => "there are too few boxes",
+            Self::Update => "threads make an update as fast",
             Self::OldBoxesUnknown => "the boxes of the last update are not known",
         })
     }
 }
 
-/// Chooses the backend for a call in which `changed` boxes have changed. `is_software` tells about the device, if there is one.
+/// Chooses the backend for a call. `is_software` tells about the device, if there is one.
 ///
-/// | backend | device | changed boxes | choice |
+/// | backend | device | work | choice |
 /// | --- | --- | --- | --- |
 /// | `Device` | any | any | device; without one the caller falls back to the CPU |
 /// | `Cpu`, `Brute` | any | any | CPU |
-/// | `Auto` | hardware | at least [`AUTO_DEVICE_FROM_CHANGED_BOXES`] | device |
+/// | `Auto` | hardware | a search of at least [`AUTO_DEVICE_FROM_BOXES`] | device |
 /// | `Auto` | any | any | CPU |
-pub(crate) fn choose_backend(backend: Backend, is_software: Option<bool>, changed: u64) -> Choice {
+pub(crate) fn choose_backend(backend: Backend, is_software: Option<bool>, work: Work) -> Choice {
     Choice::Cpu(match (backend, is_software) {
         (Backend::Device, _) => return Choice::Device,
         (Backend::Cpu | Backend::Brute, _) => None,
         (Backend::Auto, None) => Some(NoDevice::NotGiven),
         (Backend::Auto, Some(true)) => Some(NoDevice::Software),
-        (Backend::Auto, _) if changed < AUTO_DEVICE_FROM_CHANGED_BOXES => Some(NoDevice::FewChanged),
-        (Backend::Auto, _) => return Choice::Device,
+        (Backend::Auto, _) => match work {
+            Work::Update => Some(NoDevice::Update),
+            Work::Search(boxes) if boxes < AUTO_DEVICE_FROM_BOXES => Some(NoDevice::FewBoxes),
+            Work::Search(_) => return Choice::Device,
+        },
     })
 }
 
@@ -63,16 +78,20 @@ mod tests {
     use super::*;
 
     #[test]
-    fn only_auto_needs_a_reason_and_half_a_million_changed_boxes() {
-        let auto = |device, changed| choose_backend(Backend::Auto, device, changed);
+    fn only_auto_needs_a_reason_and_a_search_of_many_boxes() {
+        let auto = |device, boxes| choose_backend(Backend::Auto, device, Work::Search(boxes));
         assert_eq!(auto(None, u64::MAX), Choice::Cpu(Some(NoDevice::NotGiven)));
         assert_eq!(auto(Some(true), u64::MAX), Choice::Cpu(Some(NoDevice::Software)));
-        assert_eq!(auto(Some(false), 499_999), Choice::Cpu(Some(NoDevice::FewChanged)));
-        assert_eq!(auto(Some(false), 500_000), Choice::Device);
+        assert_eq!(auto(Some(false), 99_999), Choice::Cpu(Some(NoDevice::FewBoxes)));
+        assert_eq!(auto(Some(false), 100_000), Choice::Device);
+        let update = choose_backend(Backend::Auto, Some(false), Work::Update);
+        assert_eq!(update, Choice::Cpu(Some(NoDevice::Update)));
         for device in [None, Some(true), Some(false)] {
-            assert_eq!(choose_backend(Backend::Device, device, 2), Choice::Device);
+            for work in [Work::Search(2), Work::Update] {
+                assert_eq!(choose_backend(Backend::Device, device, work), Choice::Device);
+            }
             for backend in [Backend::Cpu, Backend::Brute] {
-                assert_eq!(choose_backend(backend, device, u64::MAX), Choice::Cpu(None));
+                assert_eq!(choose_backend(backend, device, Work::Search(u64::MAX)), Choice::Cpu(None));
             }
         }
     }

@@ -10,7 +10,7 @@ pub(crate) mod index;
 pub(crate) mod search;
 
 pub use backend::NoDevice;
-pub(crate) use backend::{Choice, choose_backend};
+pub(crate) use backend::{Choice, Work, choose_backend};
 pub(crate) use engine::{
     Counts, GivenUp, PARALLEL_FROM_EDITS, choose_engine, edit_up_to_work, is_listed, look_up_to_nodes,
     old_states_to_keep,

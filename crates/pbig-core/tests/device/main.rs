@@ -180,16 +180,16 @@ fn a_failure_is_reported_and_the_device_is_asked_again() {
 }
 
 #[test]
-fn auto_uses_hardware_from_half_a_million_changed_boxes_on() {
-    let mut boxes = vec![Aabb::NOWHERE; 500_000];
+fn auto_searches_on_hardware_from_a_hundred_thousand_boxes_on() {
+    let mut boxes = vec![Aabb::NOWHERE; 100_000];
     boxes[7..9].fill(Aabb::new([0.0; 3], [1.0; 3]));
     let pair = [Pair::new(7, 8)];
     let mut software = Double::new(Fault::Nothing);
     software.is_software = true;
     for (device, n, reason) in [
-        (software, 500_000, Some(NoDevice::Software)),
-        (Double::new(Fault::Nothing), 499_999, Some(NoDevice::FewChanged)),
-        (Double::new(Fault::Nothing), 500_000, None),
+        (software, 100_000, Some(NoDevice::Software)),
+        (Double::new(Fault::Nothing), 99_999, Some(NoDevice::FewBoxes)),
+        (Double::new(Fault::Nothing), 100_000, None),
     ] {
         let mut finder = Finder::with_device(Config::DEFAULT, device.clone());
         assert_eq!(finder.find(&boxes[..n]).expect("a pair"), pair);
@@ -198,7 +198,8 @@ fn auto_uses_hardware_from_half_a_million_changed_boxes_on() {
             world.set(id, *aabb, ProxyFilter::ALL).expect("a small id");
         }
         assert_eq!(world.update().expect("a pair").added, pair);
-        for report in [finder.report(), world.report()] {
+        let of_update = Some(reason.filter(|why| *why == NoDevice::Software).unwrap_or(NoDevice::Update));
+        for (report, reason) in [(finder.report(), reason), (world.report(), of_update)] {
             assert_eq!((report.plan.no_device, &report.fallback), (reason, &None));
             assert_eq!(report.device.is_some(), reason.is_none());
         }

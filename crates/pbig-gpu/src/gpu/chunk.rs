@@ -13,7 +13,6 @@ use crate::decode::{self, DecodeError};
 use crate::layout::{BITS, Chunk, Counters, PACKED, Params, SORTED, Totals, halves, wide};
 use pbig_core::{DeviceFound, internal::Clock};
 use pbig_shaders::{Buffer, Kernel};
-use std::borrow::Cow;
 use std::time::Duration;
 
 /// A chunk that the device is working on.
@@ -207,19 +206,34 @@ impl Session {
     ) -> Result<(), Failure> {
         self.sizes.max_words = self.sizes.max_words.max(needed);
         self.sizes.expected_words = self.sizes.max_words;
-        let have = prefetched.len() as u64;
-        let words = if needed <= have {
-            Cow::Borrowed(&prefetched[..needed as usize])
-        } else {
-            Cow::Owned([prefetched, &self.fetch(out, have, needed).await?].concat())
-        };
+        if needed <= prefetched.len() as u64 {
+            return self.take(&prefetched[..needed as usize], is_sorted).await;
+        }
+        let is_listed = !self.has(PACKED) && !self.has(BITS) && !self.finds_changes;
+        if !is_listed {
+            // A record may begin in one part and end in the other.
+            let rest = self.fetch(out, prefetched.len() as u64, needed).await?;
+            let words = [prefetched, bytemuck::cast_slice(&rest)].concat();
+            // The buffer is needed for the entries.
+            drop(rest);
+            return self.take(&words, is_sorted).await;
+        }
+        // Where they lie: a copy of many pairs would take longer than the device.
+        let whole_pairs = prefetched.len() & !1;
+        self.take(&prefetched[..whole_pairs], is_sorted).await?;
+        let rest = self.fetch(out, whole_pairs as u64, needed).await?;
+        self.take(bytemuck::cast_slice(&rest), is_sorted).await
+    }
+
+    /// Decodes words of output.
+    async fn take(&mut self, words: &[u32], is_sorted: bool) -> Result<(), Failure> {
         // Records name entries, which are read once a job.
-        if self.has(PACKED) && self.table.is_none() && needed > 0 {
-            let entries = u64::from(self.sizes.lists.entries);
-            self.table = Some(self.fetch(Buffer::Entries.into(), 0, entries).await?);
+        if self.has(PACKED) && self.table.is_none() && !words.is_empty() {
+            let entries = self.fetch(Buffer::Entries.into(), 0, self.sizes.lists.entries.into()).await?;
+            self.table = Some(bytemuck::pod_collect_to_vec(&entries));
         }
         let mut clock = Clock::start();
-        self.decode(&words, is_sorted)?;
+        self.decode(words, is_sorted)?;
         self.sink.found.report.decode += clock.lap();
         self.sink.check(0)
     }
@@ -239,19 +253,15 @@ impl Session {
         }
     }
 
-    /// Reads the words `from..to` of a buffer, in a submission of its own.
-    async fn fetch(&mut self, source: BufferId, from: u64, to: u64) -> Result<Vec<u32>, GpuError> {
-        if from >= to {
-            return Ok(Vec::new());
-        }
+    /// Reads the words `from..to` of a buffer, at least one, in a submission of its own.
+    async fn fetch(&mut self, source: BufferId, from: u64, to: u64) -> Result<Mapped, GpuError> {
         let bytes = 4 * (to - from);
         self.storage.ensure(BufferId::FetchStaging, bytes)?;
         let staging = self.storage.get(BufferId::FetchStaging);
         let mut encoder = self.device.encoder();
         encoder.copy_buffer_to_buffer(self.storage.get(source), 4 * from, staging, 0, bytes);
         let submission = self.device.submit(encoder);
-        let received = self.receive(BufferId::FetchStaging, bytes, submission, self.options.patience).await?;
-        Ok(bytemuck::pod_collect_to_vec(&received))
+        self.receive(BufferId::FetchStaging, bytes, submission, self.options.patience).await
     }
 
     /// Waits for a submission. Returns the first `bytes` of the staging buffer that it has filled.
