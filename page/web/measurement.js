@@ -12,7 +12,7 @@ const MAX_BOXES_OF_MANY_ROUNDS = 100_000;
 const ROUNDS = { few: 4, many: 7 };
 /** Rounds whose kernels are timed, after the others: timing makes a call slower. */
 export const KERNEL_ROUNDS = 2;
-// The first columns are those of the searches of `pbig bench gpu` without its prediction, the next ones those of its table of the host's part.
+// The first columns are those of the searches of `pbig bench gpu` without `steady_ms` and the prediction, the next ones those of its table of the host's part.
 const COLUMNS = [
     ["set", "boxes", "pairs", "cpu_ms", "gpu_ms", "cpu_over_gpu", "wait_ms", "uploaded_bytes", "downloaded_bytes"],
     ["device_bytes", "compression", "upload_ms", "plan_ms", "record_ms", "decode_ms", "pairs_equal"],

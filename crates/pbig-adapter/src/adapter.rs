@@ -67,8 +67,8 @@ macro_rules! define_methods {
                 pbig_core::BroadPhase::new(config.into()).map(Self::around)
             }
 
-            /// As [`Self::with_config`], on a given device. [`pbig_core::Backend::Device`] always uses it.
-            /// [`pbig_core::Backend::Auto`] uses it for large changes, unless it is software.
+            /// As [`Self::with_config`], on a given device, for [`pbig_core::Backend::Device`]. [`pbig_core::Backend::Auto`] does not use it:
+            /// updates are the CPU's.
             ///
             /// # Errors
             /// [`crate::Error::Margin`].

@@ -5,7 +5,7 @@
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub enum Backend {
-    /// The given device if it is hardware and many boxes are searched, otherwise the CPU. Updates are the CPU's.
+    /// The given device for a search of many boxes, if it is hardware; otherwise the CPU. Updates are the CPU's.
     #[default]
     Auto,
     /// The CPU, with rayon's threads if there are enough boxes.

@@ -139,3 +139,21 @@ fn are_pairs(pairs: &[Pair], boxes: usize) -> bool {
     let are_good = |i: usize| pieces[i].iter().fold(true, |all, pair| all & is_good(pair));
     parallel::map(pieces.len(), are_good).into_iter().all(|is_good| is_good)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn pairs_out_of_order_or_twice_are_noticed_in_every_piece_and_between_two() {
+        let pairs: Vec<Pair> = (0..3 * PIECE as u32).map(|i| Pair::new(i, i + 1)).collect();
+        assert!(are_in_order(&pairs) && are_in_order(&pairs[..1]) && are_in_order(&[]));
+        for at in [0, PIECE - 1, PIECE, 2 * PIECE - 1, 3 * PIECE - 2] {
+            let mut others = pairs.clone();
+            others.swap(at, at + 1);
+            assert!(!are_in_order(&others), "swapped at {at}");
+            others[at] = others[at + 1];
+            assert!(!are_in_order(&others), "twice at {at}");
+        }
+    }
+}

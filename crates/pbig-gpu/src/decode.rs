@@ -242,9 +242,12 @@ pub fn bits(words: &[u32], boxes: u32, pairs: &mut Vec<Pair>) -> Result<(), Deco
 mod tests {
     use super::*;
 
-    /// More pairs than two threads take at a time, in order.
+    /// A pair that is there before.
+    const FIRST: Pair = Pair { a: 0, b: 8 };
+
+    /// More pairs than two threads take at a time, in order, after [`FIRST`].
     fn many() -> Vec<Pair> {
-        (0..5 * PIECE as u32).map(|i| Pair { a: i / 3, b: i / 3 + 1 + i % 3 }).collect()
+        (3..5 * PIECE as u32).map(|i| Pair { a: i / 3, b: i / 3 + 1 + i % 3 }).collect()
     }
 
     fn words_of(pairs: &[Pair]) -> Vec<u32> {
@@ -252,7 +255,7 @@ mod tests {
     }
 
     fn decoded(pairs: &[Pair]) -> Result<Vec<Pair>, DecodeError> {
-        let mut all = vec![Pair { a: 7, b: 8 }];
+        let mut all = vec![FIRST];
         plain(&words_of(pairs), u32::MAX, true, &mut all)?;
         Ok(all.split_off(1))
     }
@@ -275,6 +278,21 @@ mod tests {
             let mut pairs = many();
             pairs.swap(at, at + 1);
             assert_eq!(decoded(&pairs).expect_err("two are swapped").what, "pairs out of order", "at {at}");
+        }
+    }
+
+    /// Output that came in two parts is one list.
+    #[test]
+    fn pairs_out_of_order_at_the_seam_of_two_parts_are_found() {
+        let (parts, seam) = (many(), 2 * PIECE + 1);
+        let in_parts = |second: &[Pair]| {
+            let mut all = vec![];
+            plain(&words_of(&parts[..seam]), u32::MAX, true, &mut all)?;
+            plain(&words_of(second), u32::MAX, true, &mut all).map(|()| all)
+        };
+        assert_eq!(in_parts(&parts[seam..]).as_ref(), Ok(&parts));
+        for second in [&parts[seam - 1..], &parts[..1]] {
+            assert_eq!(in_parts(second).map_err(|fault| fault.what), Err("pairs out of order"));
         }
     }
 

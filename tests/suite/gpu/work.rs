@@ -179,14 +179,17 @@ fn many_chunks_take_one_wait_and_send_no_pair_twice() {
     let frames = [boxes.clone(), boxes.iter().enumerate().map(|(i, b)| grown(i, b)).collect()];
     let wanted = frames.each_ref().map(|boxes| on_cpu(boxes));
     let most_pairs = wanted[0].len().max(wanted[1].len());
+    let mut tests = [0; 2];
     for call in 0..6 {
         let (pairs, report) = find(&mut finder, &frames[call % 2]);
+        tests[call % 2] = finder.report().checks.made;
         assert_eq!(difference(&pairs, &wanted[call % 2]), None);
         assert!(report.chunks > 4, "{} chunks", report.chunks);
         let most = 1000 + 10 * most_pairs as u64;
         assert!(call == 0 || report.downloaded <= most, "{} bytes, at most {most}", report.downloaded);
         assert!(call == 0 || report.waits == 1, "call {call}: {} waits", report.waits);
     }
+    assert!(tests[1] > tests[0], "{tests:?}: the second frame has more work items");
     // Many more items than the last call had: what is missing is checked in a second round.
     let more: Vec<_> = boxes.iter().map(|b| Aabb::new(b.min, b.max.map(|x| x + 0.4))).collect();
     let (pairs, _) = find(&mut finder, &more);

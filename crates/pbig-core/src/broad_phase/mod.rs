@@ -248,6 +248,7 @@ impl BroadPhase {
         self.world.shrink();
         self.kept.shrink();
         (self.store, self.engines) = (Store::default(), Engines::default());
+        self.device.changed = Vec::new();
         self.comparison = Comparison::default();
         if self.holder != Holder::Device {
             self.holder = Holder::Nothing;

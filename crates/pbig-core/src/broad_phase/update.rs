@@ -132,6 +132,7 @@ impl BroadPhase {
 
     /// Returns the number of old states to keep until the next update.
     pub(super) fn old_to_keep(&self) -> usize {
+        // Auto has no use for them. Who switches to the CPU may switch back.
         if self.device.has_device() && self.config.backend != Backend::Auto {
             return usize::MAX;
         }

@@ -206,6 +206,23 @@ fn auto_searches_on_hardware_from_a_hundred_thousand_boxes_on() {
     }
 }
 
+/// More changes and events than a thread takes at a time: a row of boxes whose every second one moves.
+#[test]
+fn updates_of_many_boxes_equal_those_of_the_cpu() {
+    let (mut ours, mut cpu) = (on_device(Fault::Nothing), on_cpu());
+    let ids: Vec<u32> = (0..40_000).collect();
+    for (step, moved) in [(0.0, &ids[..]), (0.6, &ids[..]), (0.0, &ids[3..35_000])] {
+        let x = |id: u32| id as f32 + if id.is_multiple_of(2) { 0.0 } else { step };
+        let at = |id| Some((Aabb::from_center([x(id), 0.0, 0.0], [0.35; 3]), ProxyFilter::ALL));
+        for world in [&mut ours, &mut cpu] {
+            world.set_many(moved, at).expect("room for them");
+            world.update().expect("few pairs");
+        }
+        assert_eq!((ours.events(), ours.report().fallback.as_ref()), (cpu.events(), None), "by {step}");
+    }
+    assert!(cpu.events().removed.len() > 17_000, "{}", cpu.events().removed.len());
+}
+
 /// A device needs each changed box as it was. Without a device few of them are kept.
 #[test]
 fn a_device_that_comes_amid_changes_begins_with_the_next_update() {

@@ -22,7 +22,7 @@ const FINER_RETRY: f32 = 0.125;
 impl Session {
     /// Searches with a grid, or tests every pair (Avril 3.2).
     pub(super) async fn search(&mut self, job: &Job<'_>) -> Result<(), Failure> {
-        let (uploaded, before) = (self.params, self.sink.pairs());
+        let uploaded = self.params;
         self.cell_factor = 1.0;
         for _ in 0..MAX_REPEATS {
             self.params = uploaded;
@@ -35,7 +35,6 @@ impl Session {
                 self.sink.note_plan(self.plan.as_ref().map(|kept| &kept.plan));
                 self.plan.take_if(|kept| kept.is_outgrown_after(&self.sizes.lists));
             }
-            self.sizes.pairs = self.sink.pairs() - before;
             return Ok(());
         }
         Err(self.too_large().into())
@@ -72,7 +71,6 @@ impl Session {
         let was_new = self.plan.take().is_some_and(|kept| kept.is_new());
         // Lists that such a plan makes are not worth their memory, and say nothing of the next one's.
         let Counters { tests, too_many_tests, .. } = std::mem::take(&mut self.sizes.lists);
-        self.sizes.pairs = 0;
         if !was_new {
             return Ok(());
         }
@@ -122,7 +120,9 @@ impl Session {
         let most = self.storage.max_buffer_bytes;
         let words = (4 * self.sizes.word_capacity).clamp(first_bytes.min(most), most) / 4;
         passes::make_sort_buffers(&mut self.storage, &mut self.params, words)?;
-        let expected = with_slack(&self.sizes.lists);
+        // Kernels that are timed are all in one submission if they may be.
+        let lists = self.sizes.lists;
+        let expected = if self.options.time_kernels { lists } else { with_slack(&lists) };
         let is_all = rest(&expected, &items).is_empty();
         let steps = passes::map_and_check(&self.params, is_all);
         // A chunk that is not read is not timed.

@@ -206,30 +206,29 @@ impl Session {
     ) -> Result<(), Failure> {
         self.sizes.max_words = self.sizes.max_words.max(needed);
         self.sizes.expected_words = self.sizes.max_words;
-        if needed <= prefetched.len() as u64 {
-            return self.take(&prefetched[..needed as usize], is_sorted).await;
+        let have = prefetched.len() as u64;
+        if needed <= have {
+            return self.decode_words(&prefetched[..needed as usize], is_sorted).await;
         }
-        let is_listed = !self.has(PACKED) && !self.has(BITS) && !self.finds_changes;
-        if !is_listed {
-            // A record may begin in one part and end in the other.
-            let rest = self.fetch(out, prefetched.len() as u64, needed).await?;
+        if self.has(PACKED) || self.has(BITS) || self.finds_changes {
+            // A record may begin in one part and end in the other. The second is given back, for the entries.
+            let rest = self.fetch(out, have, needed).await?;
             let words = [prefetched, bytemuck::cast_slice(&rest)].concat();
-            // The buffer is needed for the entries.
             drop(rest);
-            return self.take(&words, is_sorted).await;
+            return self.decode_words(&words, is_sorted).await;
         }
-        // Where they lie: a copy of many pairs would take longer than the device.
+        // Plain pairs are decoded where they lie: a copy of many would take longer than the device.
         let whole_pairs = prefetched.len() & !1;
-        self.take(&prefetched[..whole_pairs], is_sorted).await?;
+        self.decode_words(&prefetched[..whole_pairs], is_sorted).await?;
         let rest = self.fetch(out, whole_pairs as u64, needed).await?;
-        self.take(bytemuck::cast_slice(&rest), is_sorted).await
+        self.decode_words(bytemuck::cast_slice(&rest), is_sorted).await
     }
 
-    /// Decodes words of output.
-    async fn take(&mut self, words: &[u32], is_sorted: bool) -> Result<(), Failure> {
+    async fn decode_words(&mut self, words: &[u32], is_sorted: bool) -> Result<(), Failure> {
         // Records name entries, which are read once a job.
-        if self.has(PACKED) && self.table.is_none() && !words.is_empty() {
-            let entries = self.fetch(Buffer::Entries.into(), 0, self.sizes.lists.entries.into()).await?;
+        let entries = u64::from(self.sizes.lists.entries);
+        if self.has(PACKED) && self.table.is_none() && !words.is_empty() && entries > 0 {
+            let entries = self.fetch(Buffer::Entries.into(), 0, entries).await?;
             self.table = Some(bytemuck::pod_collect_to_vec(&entries));
         }
         let mut clock = Clock::start();

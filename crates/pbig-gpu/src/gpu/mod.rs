@@ -128,17 +128,22 @@ impl GpuFinder {
         Self { options, ..self }
     }
 
-    /// Compiles all kernels. Otherwise the first search and the first update do, which takes a driver up to a second: call it while the
-    /// app loads, perhaps on a clone in another thread.
+    /// Compiles all kernels for the present options. Otherwise the first search and the first update do, which takes a driver up to a
+    /// second: call it while the app loads, perhaps on a clone in another thread.
     ///
     /// # Errors
-    /// As [`GpuFinder::new`].
+    /// As [`GpuFinder::new`], and [`GpuError::Refused`].
     pub fn prepare(&mut self) -> Result<(), GpuError> {
-        let options = self.options;
-        wait::block_on(async {
-            let device = self.open_device().await?;
-            device.watch(async || Ok(device.compile_all(&options))).await
-        })
+        wait::block_on(self.prepare_async())
+    }
+
+    /// Compiles all kernels as [`GpuFinder::prepare`], without blocking.
+    ///
+    /// # Errors
+    /// As [`GpuFinder::prepare`].
+    pub async fn prepare_async(&mut self) -> Result<(), GpuError> {
+        let (device, options) = (self.open_device().await?, self.options);
+        device.watch(async || Ok(device.compile_all(&options))).await
     }
 
     /// Returns the adapter's name, kind and API; empty before the first call on a shared device.

@@ -28,8 +28,6 @@ const EXTRA_BOXES: u64 = 4096;
 pub(super) struct Sizes {
     /// Lengths of the lists of the map in the last call.
     pub(super) lists: Counters,
-    /// Number of pairs of the last search.
-    pub(super) pairs: u64,
     /// Expected words of output of a chunk: these are prefetched.
     pub(super) expected_words: u64,
     /// Maximum number of words of a chunk of this job.

@@ -236,8 +236,13 @@ impl Storage {
         if bytes > self.max_buffer_bytes {
             // Each list fits a buffer, but not all together.
             for Upload { buffer, at, content } in uploads {
-                let to = self.get(*buffer);
-                content.put(|place, bytes| self.device.queue.write_buffer(to, at + place, bytes));
+                let (to, mut at) = (self.get(*buffer), *at);
+                for piece in content.pieces() {
+                    let mut bytes = Vec::new();
+                    piece.put(|_, part| bytes.extend_from_slice(part));
+                    self.device.queue.write_buffer(to, at, &bytes);
+                    at += piece.len();
+                }
             }
             return Ok(());
         }

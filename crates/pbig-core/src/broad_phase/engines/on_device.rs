@@ -39,9 +39,6 @@ pub(crate) fn run(slot: &mut DeviceSlot, task: &mut Task<'_>) -> Outcome {
 fn changed_boxes<'a>(world: &World, list: &'a mut Vec<ChangedBox>) -> &'a [ChangedBox] {
     const NONE: ChangedBox = ChangedBox { id: 0, aabb: Aabb::NOWHERE, filter: ProxyFilter::ALL };
     let changed = world.changed.len();
-    if list.len() / 4 > changed.max(PIECE) {
-        *list = Vec::new();
-    }
     parallel::ensure_scratch(list, changed, NONE);
     let (shared, pieces) = (SharedSlice::new(&mut list[..changed]), changed.div_ceil(PIECE));
     parallel::run(parallel::threads_for(pieces), pieces, |_, piece| {
@@ -55,10 +52,12 @@ fn changed_boxes<'a>(world: &World, list: &'a mut Vec<ChangedBox>) -> &'a [Chang
     &list[..changed]
 }
 
-/// Returns what `select` leaves of pairs: threads hand it some at a time.
-fn selected(pairs: &[Pair], select: impl Fn(&[Pair]) -> Vec<Pair> + Sync) -> Vec<Pair> {
+/// Appends the pairs that `choose` takes out of some of them, which a thread hands it at a time.
+fn select(pairs: &[Pair], chosen: &mut Vec<Pair>, choose: impl Fn(&[Pair]) -> Vec<Pair> + Sync) {
     let pieces: Vec<&[Pair]> = pairs.chunks(PIECE).collect();
-    parallel::map(pieces.len(), |i| select(pieces[i])).concat()
+    for piece in parallel::map(pieces.len(), |i| choose(pieces[i])) {
+        chosen.extend(piece);
+    }
 }
 
 /// Sorts what a device has found into added, removed and dropped pairs.
@@ -71,8 +70,8 @@ fn sort_out(found: &DeviceFound, task: &mut Task<'_>) {
     // reports all pairs of a box that it treats as new.
     let ends = |(pair, is_kept): (Pair, bool)| (is_kept && existed(&pair)).then_some(pair);
     let begins = |(pair, is_kept): (Pair, bool)| (!is_kept || !existed(&pair)).then_some(pair);
-    events.removed = selected(&found.ended, |pairs| kept.look_up(pairs).filter_map(ends).collect());
-    events.added = selected(&found.pairs, |pairs| kept.look_up(pairs).filter_map(begins).collect());
+    select(&found.ended, &mut events.removed, |pairs| kept.look_up(pairs).filter_map(ends).collect());
+    select(&found.pairs, &mut events.added, |pairs| kept.look_up(pairs).filter_map(begins).collect());
     for &id in &world.removed {
         events.dropped.extend(kept.partners(id).map(|other| Pair::new(id, other)));
     }
