@@ -3,8 +3,8 @@
 use crate::Backend;
 use std::fmt;
 
-/// Minimum number of boxes for [`Backend::Auto`] to search them on a hardware device. With so many, an H100 took 0.6 to 0.9 of the time
-/// of 16 threads, and 0.3 to 0.4 of that of four. Smaller devices gain later, but still: those that share memory copy nothing far.
+/// Minimum number of boxes for [`Backend::Auto`] to search them on a hardware device. With so many, an H100 took 0.7 to 1.0 of the time
+/// of 16 threads, and 0.3 to 0.4 of that of four. No smaller device was measured.
 pub(crate) const AUTO_DEVICE_FROM_BOXES: u64 = 100_000;
 
 /// The work of a call.
