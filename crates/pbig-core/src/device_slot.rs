@@ -11,12 +11,19 @@ use std::time::Duration;
 const PIECE: usize = 1 << 16;
 
 /// Room for a device.
-#[derive(Clone, Debug, Default)]
+#[derive(Debug, Default)]
 pub(crate) struct DeviceSlot {
     device: Option<Box<dyn PairDevice>>,
     has_warned: bool,
     /// Memory for the changes of an update.
     pub(crate) changed: Vec<ChangedBox>,
+}
+
+/// A copy has a device of its own, and no memory yet.
+impl Clone for DeviceSlot {
+    fn clone(&self) -> Self {
+        Self { device: self.device.clone(), has_warned: self.has_warned, changed: Vec::new() }
+    }
 }
 
 impl DeviceSlot {

@@ -5,7 +5,7 @@ use std::time::Duration;
 /// The coding of the GPU's output (docs/PAIR_FORMAT.md).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Coding {
-    /// The fastest: plain pairs, and without a grid one bit for each pair of boxes.
+    /// The fastest: plain pairs, and without a grid one bit for each pair of boxes if these are few or the caller wants order.
     #[default]
     Auto,
     /// Two ids a pair.

@@ -43,6 +43,31 @@ fn a_device_whose_update_was_too_much_does_not_go_on_from_it() {
     assert!(broad_phase.report().device.is_some());
 }
 
+/// A world shrinks to one box, which moves: the device must not go on from its old place.
+#[test]
+fn an_update_of_a_single_box_is_not_forgotten() {
+    needs_gpu!();
+    for all_pairs_up_to in [0, 1024] {
+        let options = GpuOptions { all_pairs_up_to, ..GpuOptions::DEFAULT };
+        let gpu = GpuFinder::new().expect("an adapter").with_options(options);
+        let config = Config { backend: Backend::Device, ..Config::DEFAULT };
+        let mut world = BroadPhase::with_device(config, Box::new(gpu)).expect("a margin");
+        let set = |world: &mut BroadPhase, id: u32, x: f32| {
+            world.set(id, Aabb::from_center([x, 0.0, 0.0], [0.5; 3]), ProxyFilter::ALL).expect("a small id");
+        };
+        (0..3).for_each(|id| set(&mut world, id, 0.6 * id as f32));
+        assert_eq!(world.update().map(|events| events.added.len()), Ok(2));
+        assert!(world.remove(1) && world.remove(2));
+        world.update().expect("no pairs");
+        world.shrink_to_fit();
+        set(&mut world, 0, 100.0);
+        world.update().expect("no pairs");
+        set(&mut world, 1, 100.4);
+        assert_eq!(world.update().map(|events| events.added.clone()), Ok(vec![Pair::new(0, 1)]));
+        assert_eq!(world.report().fallback, None);
+    }
+}
+
 /// Events lead from the pairs of the last successful update to the present pairs, on every backend.
 #[test]
 fn devices_and_the_cpu_take_turns_and_updates_fail_in_between() {

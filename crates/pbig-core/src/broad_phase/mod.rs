@@ -238,7 +238,8 @@ impl BroadPhase {
 
     /// Removes all boxes; their pairs end without an event.
     pub fn clear(&mut self) {
-        let device = std::mem::take(&mut self.device);
+        let mut device = std::mem::take(&mut self.device);
+        device.changed = Vec::new();
         *self = Self { config: self.config, device, ..Self::default() };
         self.world.keep_old = self.old_to_keep();
     }

@@ -2,9 +2,12 @@
 
 use super::job::Job;
 use super::session::Session;
-use crate::Coding;
 use crate::decode::pair_count;
 use crate::layout::{BITS, PACKED, Params, SORTED};
+use crate::{Coding, GpuOptions};
+
+/// Maximum number of boxes of which a bit for each pair is sent, 64 kB, however few pairs there are.
+const FEW_BOXES: u32 = GpuOptions::DEFAULT.all_pairs_up_to;
 
 /// Maximum number of boxes of one cell that records can name: 2^16 segments.
 const MAX_PACKED_BOXES: u32 = 1 << 24;
@@ -19,7 +22,8 @@ impl Session {
             // One bit a pair fits the smallest buffer.
             _ if !has_grid && sizes.word_capacity > self.storage.max_buffer_bytes / 4 => true,
             // Records save transfers, and cost the host more: on an H100 115 ms became 352 for 115 million pairs.
-            Coding::Auto => !has_grid,
+            // The order of bits is that of the pairs, and those of few boxes are few.
+            Coding::Auto => !has_grid && (job.is_sorted || self.params.boxes <= FEW_BOXES),
             wanted => wanted == Coding::Packed,
         };
         match (is_packed, has_grid) {

@@ -67,6 +67,8 @@ pub(super) async fn search(
 
 async fn search_whole(session: &mut Session, job: &Job<'_>) -> Result<(), Failure> {
     if job.boxes.len() < 2 {
+        // The device does not get the boxes, so it has no longer those of the last update.
+        session.storage.known = None;
         session.sink.found.valid = job.valid();
         return Ok(());
     }
