@@ -143,7 +143,11 @@ impl GpuFinder {
     /// As [`GpuFinder::prepare`].
     pub async fn prepare_async(&mut self) -> Result<(), GpuError> {
         let (device, options) = (self.open_device().await?, self.options);
-        device.watch(async || Ok(device.compile_all(&options))).await
+        let compile = async || {
+            device.compile_all(&options);
+            Ok(())
+        };
+        device.watch(compile).await
     }
 
     /// Returns the adapter's name, kind and API; empty before the first call on a shared device.
