@@ -175,7 +175,8 @@ fn many_chunks_take_one_wait_and_send_no_pair_twice() {
     let config = Config { backend: Backend::Device, ..Config::DEFAULT };
     let mut finder = Finder::with_device(config, Box::new(device));
     // Some boxes grow and shrink again, so each second map has a few work items more than the last one.
-    let grown = |i: usize, b: &Aabb| if i % 50 == 0 { Aabb::new(b.min, b.max.map(|x| x + 0.4)) } else { *b };
+    let grown =
+        |i: usize, b: &Aabb| if i.is_multiple_of(50) { Aabb::new(b.min, b.max.map(|x| x + 0.4)) } else { *b };
     let frames = [boxes.clone(), boxes.iter().enumerate().map(|(i, b)| grown(i, b)).collect()];
     let wanted = frames.each_ref().map(|boxes| on_cpu(boxes));
     let most_pairs = wanted[0].len().max(wanted[1].len());
