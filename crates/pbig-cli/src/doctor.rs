@@ -12,7 +12,7 @@ pub(crate) fn run() -> Result<(), Failure> {
         "pbig {}\n\
          CPU: {} threads, SIMD found: {}; SIMD used: {}\n\
          limits: {max_boxes} boxes, {max_pairs} pairs (pbig_core::Limits)\n\
-         backend auto: cpu; a GPU only where an app hands one over and many boxes have changed",
+         backend auto: cpu; a GPU only where an app hands one over and searches many boxes",
         env!("CARGO_PKG_VERSION"),
         rayon::current_num_threads(),
         simd_found().join(" "),

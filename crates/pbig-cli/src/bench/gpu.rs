@@ -91,7 +91,7 @@ struct Searched {
     /// Medians on the CPU and on the device in turn, and on the device alone.
     ms: [f64; 3],
     counts: Counts,
-    /// Of the last call, with the times of kernels.
+    /// Report of the last call, with the times of kernels.
     report: DeviceReport,
 }
 

@@ -169,9 +169,9 @@ impl GpuDevice {
         for (kernel, changes) in KERNELS.iter().flat_map(|kernel| [(kernel, false), (kernel, true)]) {
             self.pipeline(kernel, Variant::new(options, changes));
         }
+        // The scan does not depend on what is searched for.
         for kernel in [&SCAN_BLOCKS, &SCAN_SUMS] {
             self.pipeline(kernel, Variant::new(options, false).of_rows());
-            self.pipeline(kernel, Variant::new(options, true).of_rows());
         }
     }
 
