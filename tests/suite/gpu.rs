@@ -6,8 +6,8 @@ mod turns;
 mod work;
 
 use pbig_core::{
-    Aabb, Backend, BroadPhase, ChangeRequest, Config, DeviceFailure, DeviceFound, DeviceReport, Finder,
-    NoDevice, Order, Pair, PairDevice, ProxyFilter, SearchRequest,
+    Aabb, Backend, ChangeRequest, Config, DeviceFailure, DeviceFound, DeviceReport, Finder, NoDevice, Order,
+    Pair, PairDevice, ProxyFilter, SearchRequest,
 };
 use pbig_gpu::{Coding, GpuFinder, GpuFinders, GpuOptions, adapters};
 use pbig_tests::{Way, difference, gpu, needs_gpu};
@@ -238,29 +238,6 @@ fn more_events_than_a_buffer_holds_are_complete() {
     }
 }
 
-/// Each list of changes fits a buffer, and all together do not: boxes and filters of all ids, and new boxes.
-#[test]
-fn changes_that_exceed_the_staging_buffer_together_are_complete() {
-    needs_gpu!();
-    let gpu = GpuFinder::new().expect("an adapter");
-    let gpu = gpu.with_options(GpuOptions { max_bytes: 1 << 20, ..GpuOptions::DEFAULT });
-    let on = |backend| Config { backend, ..Config::DEFAULT };
-    let mut ours = BroadPhase::with_device(on(Backend::Device), Box::new(gpu)).expect("a margin");
-    let mut cpu = BroadPhase::new(on(Backend::Cpu)).expect("a margin");
-    for (seed, n) in [(1, 20_000), (2, 21_800)] {
-        let boxes = pbig_tests::set("unit", n, seed);
-        let ids: Vec<u32> = (0..n as u32).collect();
-        let filter = ProxyFilter { memberships: 1 << seed, ..ProxyFilter::ALL };
-        for world in [&mut ours, &mut cpu] {
-            world.set_many(&ids, |id| Some((boxes[id as usize], filter))).expect("room for them");
-            world.update().expect("few pairs");
-        }
-        assert_eq!((ours.events(), ours.report().fallback.as_ref()), (cpu.events(), None), "seed {seed}");
-    }
-    let report = ours.report().device.as_ref().expect("the device did the work");
-    assert!(report.parts == 1 && report.uploaded > 1 << 20, "{report:?}");
-}
-
 /// A plan that was made for other boxes must not keep the device busy: it is noticed before anything is tested.
 #[test]
 fn boxes_that_jump_together_or_apart_get_another_plan_at_once() {
@@ -284,34 +261,6 @@ fn boxes_that_jump_together_or_apart_get_another_plan_at_once() {
     }
     assert_ne!(plans[0], plans[1]);
     assert_eq!(plans[3], plans[4], "a plan that suits is kept");
-}
-
-/// An app that prepares its device while it loads waits for no driver later.
-#[test]
-fn a_prepared_device_compiles_nothing_in_searches_and_updates() {
-    needs_gpu!();
-    let mut gpu = GpuFinder::new().expect("an adapter");
-    assert_eq!(gpu.pipelines(), 0);
-    gpu.prepare().expect("kernels compile");
-    let prepared = gpu.pipelines();
-    let config = Config { backend: Backend::Device, ..Config::DEFAULT };
-    for order in [Order::Sorted, Order::Unspecified] {
-        let mut finder = Finder::with_device(Config { order, ..config }, Box::new(gpu.clone()));
-        for boxes in [set("pile", 3000), set("unit", 500)] {
-            find(&mut finder, &boxes);
-        }
-    }
-    for n in [3000, 500] {
-        let mut world = BroadPhase::with_device(config, Box::new(gpu.clone())).expect("a margin");
-        for update in 0..2 {
-            for (id, aabb) in (0..).zip(pbig_tests::set("pile", n, update)) {
-                world.set(id, aabb, ProxyFilter::ALL).expect("a box");
-            }
-            world.update().expect("an update");
-            assert!(world.report().device.is_some(), "{:?}", world.report().fallback);
-        }
-    }
-    assert_eq!(gpu.pipelines(), prepared);
 }
 
 #[test]

@@ -68,6 +68,29 @@ fn an_update_of_a_single_box_is_not_forgotten() {
     }
 }
 
+/// Each list of changes fits a buffer, and all together do not: boxes and filters of all ids, and new boxes.
+#[test]
+fn changes_that_exceed_the_staging_buffer_together_are_complete() {
+    needs_gpu!();
+    let gpu = GpuFinder::new().expect("an adapter");
+    let gpu = gpu.with_options(GpuOptions { max_bytes: 1 << 20, ..GpuOptions::DEFAULT });
+    let on = |backend| Config { backend, ..Config::DEFAULT };
+    let mut ours = BroadPhase::with_device(on(Backend::Device), Box::new(gpu)).expect("a margin");
+    let mut cpu = BroadPhase::new(on(Backend::Cpu)).expect("a margin");
+    for (seed, n) in [(1, 20_000), (2, 21_800)] {
+        let boxes = pbig_tests::set("unit", n, seed);
+        let ids: Vec<u32> = (0..n as u32).collect();
+        let filter = ProxyFilter { memberships: 1 << seed, ..ProxyFilter::ALL };
+        for world in [&mut ours, &mut cpu] {
+            world.set_many(&ids, |id| Some((boxes[id as usize], filter))).expect("room for them");
+            world.update().expect("few pairs");
+        }
+        assert_eq!((ours.events(), ours.report().fallback.as_ref()), (cpu.events(), None), "seed {seed}");
+    }
+    let report = ours.report().device.as_ref().expect("the device did the work");
+    assert!(report.parts == 1 && report.uploaded > 1 << 20, "{report:?}");
+}
+
 /// Events lead from the pairs of the last successful update to the present pairs, on every backend.
 #[test]
 fn devices_and_the_cpu_take_turns_and_updates_fail_in_between() {

@@ -2,7 +2,7 @@
 
 use super::{cubes, find, on_cpu, set, with, with_device};
 use pbig_core::{
-    Aabb, Backend, BroadPhase, Config, DeviceFound, Finder, PairDevice, ProxyFilter, SearchRequest,
+    Aabb, Backend, BroadPhase, Config, DeviceFound, Finder, Order, PairDevice, ProxyFilter, SearchRequest,
 };
 use pbig_gpu::{Coding, GpuFinder, GpuFinders, GpuOptions, adapters};
 use pbig_harness::hard::{Part, Recipe, shapes};
@@ -230,4 +230,32 @@ fn several_devices_share_a_call_and_give_the_same_bytes() {
             assert_eq!(difference(&found, cpu.find_filtered(&boxes, &filters).expect("few pairs")), None);
         }
     }
+}
+
+/// An app that prepares its device while it loads waits for no driver later.
+#[test]
+fn a_prepared_device_compiles_nothing_in_searches_and_updates() {
+    needs_gpu!();
+    let mut gpu = GpuFinder::new().expect("an adapter");
+    assert_eq!(gpu.pipelines(), 0);
+    gpu.prepare().expect("kernels compile");
+    let prepared = gpu.pipelines();
+    let config = Config { backend: Backend::Device, ..Config::DEFAULT };
+    for order in [Order::Sorted, Order::Unspecified] {
+        let mut finder = Finder::with_device(Config { order, ..config }, Box::new(gpu.clone()));
+        for boxes in [set("pile", 3000), set("unit", 500)] {
+            find(&mut finder, &boxes);
+        }
+    }
+    for n in [3000, 500] {
+        let mut world = BroadPhase::with_device(config, Box::new(gpu.clone())).expect("a margin");
+        for update in 0..2 {
+            for (id, aabb) in (0..).zip(pbig_tests::set("pile", n, update)) {
+                world.set(id, aabb, ProxyFilter::ALL).expect("a box");
+            }
+            world.update().expect("an update");
+            assert!(world.report().device.is_some(), "{:?}", world.report().fallback);
+        }
+    }
+    assert_eq!(gpu.pipelines(), prepared);
 }
