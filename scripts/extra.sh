@@ -14,28 +14,30 @@ set -euo pipefail
 cd "$(dirname "$0")/.."
 . scripts/common.sh
 
-# sets FEATURE...: prints sets of the features, one a line, separated by commas: none, all, each alone, and all without each. Any two
-# features meet on and off in every way.
+# sets FEATURE...: prints sets of the features, one a line, separated by commas: none, and all without each. With three or more, any two
+# meet on and off in every way. Where FEATURE is NAME=ENGINE'S and NAME is left out, the engine's own feature stays, so that the engine
+# is checked once for all sets; where NAME is in, it has to ask for that feature itself.
 sets() {
-    local feature all
-    all=$(IFS=, && echo "$*")
-    printf '\n%s\n' "$all"
-    [ $# -gt 1 ] || return 0
+    local feature other name line
+    echo
     for feature in "$@"; do
-        echo "$feature"
-        echo "$all" | sed "s/\b$feature\b//; s/,,/,/; s/^,//; s/,$//"
+        line=
+        for other in "$@"; do
+            name=${other%%=*}
+            [ "$other" != "$feature" ] || name=$(echo "$other" | cut -s -d = -f 2)
+            line+=${name:+,$name}
+        done
+        echo "${line#,}"
     done
 }
 
-# lint PACKAGE OPTIONS PINNED FEATURE...: lints a package, and its dependencies of the workspace, with sets of the features. Sets of
-# several come with all features of an engine, PINNED, so that it is checked once for them. A feature that stands alone shows whether it
-# asks for what it needs of the engine.
+# lint PACKAGE OPTIONS FEATURE...: lints a package, and its dependencies of the workspace, with sets of the features. All of them
+# together are linted by test.sh.
 lint() {
-    local package=$1 options=$2 pinned=$3 set
-    shift 3
+    local package=$1 options=$2 set
+    shift 2
     sets "$@" | while read -r set; do
         echo "== $package with '$set'"
-        case $set in *,*) set=$set,$pinned ;; esac
         # Not quoted: several words, or none.
         cargo clippy --quiet --locked --release $options -p "$package" --no-default-features --features "$set" -- -D warnings \
             </dev/null
@@ -48,11 +50,11 @@ test_features() {
     local kind=$1
     case $kind in
     sets)
-        lint rapier-pbig "" rapier3d/serde-serialize,rapier3d/debug-render parallel gpu serde debug-render shadow
-        lint pbig-gpu "" "" wgpu
+        lint rapier-pbig "" shadow parallel gpu serde=rapier3d/serde-serialize debug-render=rapier3d/debug-render
+        lint pbig-gpu ""
         ;;
     sets-0.36)
-        lint rapier3d-pbig "--manifest-path rapier-0.36/Cargo.toml" rapier/debug-render parallel gpu debug-render shadow
+        lint rapier3d-pbig "--manifest-path rapier-0.36/Cargo.toml" shadow parallel gpu debug-render=rapier/debug-render
         ;;
     *)
         step cargo test --locked --release -p pbig-tests --no-default-features --features "${kind#none}" --test suite -- \
@@ -96,45 +98,53 @@ check_interface() {
     step cargo semver-checks --baseline-rev "$tag" "$@"
 }
 
-# check_oldest OPTION...: builds with the oldest Rust that is supported.
-check_oldest() {
+# oldest: prints a setting that chooses the oldest Rust that is supported; says so if it is not here.
+oldest() {
     local version
     version=$(sed -n 's/^rust-version = "\(.*\)"/\1/p' Cargo.toml)
-    has rustup && rustup run "$version" rustc --version >/dev/null 2>&1 || { left_out "a build with Rust $version" && return; }
-    step env RUSTUP_TOOLCHAIN="$version" cargo check --locked --all-features "$@" --target-dir "$(target_folder)/msrv"
+    if has rustup && rustup run "$version" rustc --version >/dev/null 2>&1; then
+        echo "RUSTUP_TOOLCHAIN=$version"
+    else
+        left_out "a build with Rust $version" >&2
+    fi
 }
 
 run_publish() {
-    local options="-p pbig-shaders -p pbig-core -p pbig-gpu -p pbig-adapter -p rapier-pbig" folder
+    local options="-p pbig-shaders -p pbig-core -p pbig-gpu -p pbig-adapter -p rapier-pbig" folder toolchain
     for folder in shaders crates/pbig-core crates/pbig-gpu crates/pbig-adapter crates/rapier-pbig avian/avian2d-pbig avian/avian3d-pbig; do
         check_contents "$folder"
     done
-    # Each is built from its package, against the others' packages.
+    # Each is built from its package, against the others' packages, by the oldest Rust. Not optimized: nothing runs.
     # Cargo keeps what it has unpacked in an earlier dry run from the same folder, and would build against that.
     rm -rf "${CARGO_HOME:-$HOME/.cargo}"/registry/{src,cache}/-*/{pbig,rapier-pbig}-* 2>/dev/null || true
-    step cargo publish --dry-run --locked --allow-dirty $options
+    toolchain=$(oldest)
+    step env $toolchain CARGO_PROFILE_DEV_OPT_LEVEL=0 CARGO_PROFILE_DEV_DEBUG=false \
+        cargo publish --dry-run --locked --allow-dirty --all-features $options --target-dir "$(target_folder)/publish"
     check_dependencies
     check_interface $options
-    check_oldest $options
 }
 
-# run_module NAME FLAGS: builds the module with these flags of rustc, and runs it.
+# run_module NAME [VARIABLE]: builds the module in this environment, and runs it.
 run_module() {
     echo "== WebAssembly $1"
     # Slower code of rapier has the same results, and compiles sooner.
-    RUSTFLAGS=$2 step "${cargo[@]}" build --locked --quiet --profile wasm --lib --package pbig-wasm \
+    step env ${2:+"$2"} "${cargo[@]}" build --locked --quiet --profile wasm --lib --package pbig-wasm \
         --config profile.wasm.package.rapier3d.opt-level=1 --config profile.wasm.package.parry3d.opt-level=1 \
         --target "$target" --target-dir "$folder"
     step node wasm/run.mjs "$folder/$target/wasm/pbig_wasm.wasm"
 }
 
+# With SIMD only the workspace's own crates are built again: cargo's wrapper of rustc is for these.
 run_wasm() {
     local target=wasm32-unknown-unknown folder
     choose_cargo "$target" && has node || { left_out "$target" && return; }
     use_wasm_linker
     folder="$(target_folder)/wasm"
-    run_module "without SIMD" ""
-    run_module "with SIMD" "-C target-feature=+simd128"
+    mkdir -p "$folder"
+    printf '#!/bin/sh\nexec "$@" -C target-feature=+simd128\n' >"$folder/rustc-simd"
+    chmod +x "$folder/rustc-simd"
+    run_module "without SIMD"
+    run_module "with SIMD" RUSTC_WORKSPACE_WRAPPER="$folder/rustc-simd"
 }
 
 run_aarch64() {

@@ -14,12 +14,16 @@ export TMPDIR
 trap 'rm -rf "$TMPDIR"' EXIT
 
 # Options of several words, which are not quoted where they are used.
+# One choice for lints and documents, which need the same metadata. The viewer draws with hundreds of crates.
+all_but_viewer="--workspace --exclude pbig-viewer"
 in_036="--manifest-path rapier-0.36/Cargo.toml"
 members_036="-p rapier3d-pbig -p pbig-harness-036"
 features_036="--features rapier3d-pbig/debug-render"
-# The same source for two dimensions and for f64. rapier2d-pbig brings the debug renderer of two dimensions.
-others_036="-p rapier2d-pbig -p pbig-harness-2d -p pbig-harness-2d-f64 -p pbig-harness-3d-f64 --features rapier2d-pbig/debug-render"
-quick_036="--config profile.release.package.rapier3d.opt-level=1 --config profile.release.package.parry3d.opt-level=1"
+# The same source for two dimensions and for f64. rapier2d-pbig brings the debug renderer of two dimensions. One of them has rapier's
+# threads off, and its mathematics that are the same on every machine.
+others_036="-p rapier2d-pbig -p pbig-harness-2d -p pbig-harness-2d-f64 -p pbig-harness-3d-f64 --no-default-features --features \
+rapier2d-pbig/debug-render,pbig-harness-2d/parallel,pbig-harness-2d/dim2,pbig-harness-2d-f64/enhanced-determinism,\
+pbig-harness-2d-f64/dim2,pbig-harness-2d-f64/f64,pbig-harness-3d-f64/parallel,pbig-harness-3d-f64/f64"
 # The suite refuses to leave the GPU out with CI=true.
 without_gpu="env -u CI PBIG_GPU=none"
 
@@ -36,11 +40,11 @@ lacks() {
     case $'\n'$tree in *$'\n'"$crate v"*) echo "$package pulls in $crate" && return 1 ;; esac
 }
 
-# unit_packages: prints the default members but the suite, as options. Without an adapter the crates that measure and run scenes are
-# left out, too: they are tested on every backend.
+# unit_packages: prints options for the default members. Without an adapter the crates that measure and run scenes are left out:
+# they are tested on every backend.
 unit_packages() {
-    local name others=pbig-tests
-    has_gpu || others="$others pbig-harness pbig-cli pbig-studies"
+    local name others=
+    has_gpu || others="pbig-harness pbig-cli pbig-studies"
     for name in $(cargo tree --depth 0 --prefix none | sed -n 's/ v.*//p'); do
         case " $others " in *" $name "*) ;; *) echo "-p $name" ;; esac
     done
@@ -58,30 +62,32 @@ step_fmt() {
 }
 
 step_clippy() {
-    step cargo clippy --release --all-targets -- -D warnings
-    step cargo clippy --release -p pbig-page -p pbig-page-bindgen -p pbig-wasm --all-targets -- -D warnings
+    step cargo clippy --release $all_but_viewer --all-targets -- -D warnings
     # Nothing is linked, so any name of a library saves the build of libFuzzer.
     step env CUSTOM_LIBFUZZER_PATH="$PWD/libnone.a" cargo check --release --locked --manifest-path fuzz/Cargo.toml \
         --target-dir "$(target_folder)"
 }
 
-# All but the suite. One profile and one set of features: every crate is built once.
+# All but the suite. One profile, and one choice of packages, which is one set of features: every crate is built once.
 step_unit() {
+    local packages
+    packages=$(unit_packages)
     step cargo build --release --examples --bins
-    step cargo test --release $(unit_packages) --no-fail-fast
+    step cargo test --release $packages --lib --bins --example headless_test --test '[!s]*' --test studies --no-fail-fast
+    step cargo test --release $packages --doc --no-fail-fast
     # Once more with overflow checks and debug assertions, where there is unsafe code and index arithmetic.
     step cargo test -p pbig-core --features serde --no-fail-fast
     step cargo test -p pbig-gpu --no-default-features --lib --no-fail-fast
 }
 
-# With an adapter each test also runs on the GPU.
+# With an adapter each test also runs on the GPU. The tests of the GPU alone are the next step's.
 step_suite() {
     local on=''
     has_gpu || { left_out "there is no GPU adapter" && on=$without_gpu; }
-    step $on cargo test --release --test suite --no-fail-fast
+    step $on cargo test --release --test suite --no-fail-fast -- --skip kernels:: --skip gpu::
 }
 
-# The parts of gpu.sh that need packages of Debian alone.
+# The parts of gpu.sh that need packages of Debian alone: the suite's GPU part, under a validation layer where there is one.
 step_gpu() {
     has_gpu || { left_out "there is no GPU adapter" && return; }
     step scripts/gpu.sh --no-setup amd validation
@@ -92,7 +98,7 @@ step_doc() {
     printf '#!/bin/sh\nRUSTC_BOOTSTRAP=1 exec rustdoc "$@"\n' >"$TMPDIR/rustdoc"
     chmod +x "$TMPDIR/rustdoc"
     step env RUSTDOC="$TMPDIR/rustdoc" RUSTDOCFLAGS="-D warnings --cfg docsrs" \
-        cargo doc --release --no-deps
+        cargo doc --release $all_but_viewer --no-deps
 }
 
 step_features() {
@@ -137,16 +143,14 @@ step_rapier_0_36() {
     step scripts/patch-rapier.sh rapier-0.36
     step cargo fmt --all $in_036 --check
     # `--locked` checks the lock file without a download of bevy.
-    step cargo clippy --locked --release $in_036 $members_036 $features_036 --all-targets -- -D warnings
+    step cargo clippy --locked --release $in_036 --features rapier2d-pbig/debug-render,rapier3d-pbig/debug-render --all-targets \
+        -- -D warnings
     step scripts/extra.sh --no-setup features sets-0.36
     rm -f "$CARGO_TARGET_DIR/release/bench_step"
     step cargo test --release $in_036 $members_036 $features_036 --no-fail-fast
     # Built for the tests above. `cargo run` would build rapier again, for other features.
     step "$CARGO_TARGET_DIR/release/bench_step" --scenes column --bodies 500 --steps 60 --chart "$TMPDIR/steps.svg"
-    step cargo clippy --locked --release $in_036 $others_036 --all-targets -- -D warnings
     step env PBIG_RUNS=100 PBIG_BODIES=80 cargo test --release $in_036 $others_036 --no-fail-fast
-    # Slower code of rapier has the same results.
-    step cargo test --release $in_036 $quick_036 -p pbig-harness-036 --no-default-features --features enhanced-determinism
     step env RUSTDOCFLAGS="-D warnings" \
         cargo doc --release $in_036 -p rapier3d-pbig --features shadow,debug-render --no-deps
     # The packages have their source, which is a link in three of them.
