@@ -7,6 +7,7 @@ use avian::collision::broad_phase::BroadPhaseSystems;
 use avian::prelude::*;
 use avian_pbig::{ColliderBoxes, PbigBroadPhasePlugin, Shadow};
 use bevy::prelude::*;
+use std::collections::HashMap;
 use support::{RandomWorld, Veto, app, app_with_pbig, plugins};
 
 /// Steps a random world, with changes in each step.
@@ -104,4 +105,39 @@ fn contacts_are_in_the_same_order_each_time() {
         pairs.map(|pair| (pair.collider1, pair.collider2)).collect::<Vec<_>>()
     };
     assert_eq!(contacts(), contacts());
+}
+
+/// Returns the contacts by their colliders, the lower one first.
+fn contacts(app: &App) -> HashMap<[Entity; 2], [Entity; 2]> {
+    let graph = app.world().resource::<ContactGraph>();
+    let pairs = graph.active_pairs().iter().chain(graph.sleeping_pairs());
+    pairs.map(|pair| [pair.collider1, pair.collider2]).map(|ends| (sorted(ends), ends)).collect()
+}
+
+fn sorted(mut ends: [Entity; 2]) -> [Entity; 2] {
+    ends.sort_unstable();
+    ends
+}
+
+/// Two worlds with the same changes. Contacts that begin in the same step in both have the same collider first.
+#[test]
+fn contacts_have_their_colliders_in_avians_order() {
+    let mut apps = [app_with_pbig(), app(plugins())];
+    let mut worlds = [0, 1].map(|i| RandomWorld::new(&mut apps[i], 7, 300));
+    let (mut before, mut compared, mut turned) = ([HashMap::new(), HashMap::new()], 0, 0);
+    for _ in 0..60 {
+        let now = [0, 1].map(|i| {
+            worlds[i].change(&mut apps[i], 15);
+            apps[i].update();
+            contacts(&apps[i])
+        });
+        for (pair, ends) in now[0].iter().filter(|(pair, _)| before.iter().all(|old| !old.contains_key(*pair))) {
+            let Some(avians) = now[1].get(pair) else { continue };
+            assert_eq!(ends, avians);
+            compared += 1;
+            turned += usize::from(ends != pair);
+        }
+        before = now;
+    }
+    assert!(compared > 1000 && turned > 100, "{compared} contacts compared, {turned} begin with the later entity");
 }
