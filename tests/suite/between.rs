@@ -2,7 +2,7 @@
 
 use pbig_core::{
     Aabb, Algorithm, Boxes, Config, CrossPair, Engine, Error, Finder, Keys, Limits, NO_KEY, Order,
-    ProxyFilter, WORK_LIMIT, oracle,
+    ProxyFilter, Report, WORK_LIMIT, oracle,
 };
 use pbig_harness::hard::{Recipe, ratio, shapes};
 use pbig_tests::{corpus, on_cpu, on_threads, set};
@@ -164,6 +164,32 @@ fn a_crowd_costs_nothing_if_the_other_set_is_elsewhere() {
     let a = crowd(1_000_000, [0.0; 3]);
     assert!(finder.find_between(&a, &crowd(1, [9.0; 3])).expect("no pairs").is_empty());
     assert_eq!((finder.report().work, finder.report().plan.algorithm), (0, Algorithm::Nothing));
+    // An invalid box is no reason to look farther.
+    let inverted = Aabb::new([f32::INFINITY; 3], [f32::NEG_INFINITY; 3]);
+    let elsewhere = [crowd(20, [9.0; 3]), vec![inverted; 20], vec![Aabb::NOWHERE; 20]].concat();
+    for (one, other) in [(&a, &elsewhere), (&elsewhere, &a)] {
+        assert!(finder.find_between(one, other).expect("no pairs").is_empty());
+        assert_eq!((finder.report().work, finder.report().invalid), (0, 40));
+    }
+}
+
+#[test]
+fn each_box_of_sparse_sets_visits_four_rows_at_most() {
+    let mut rng = StdRng::seed_from_u64(7);
+    // One box for 8 and for 80 units of volume.
+    for side in [70.0, 150.0] {
+        let [a, b] = [(); 2].map(|()| {
+            let at = |rng: &mut StdRng| [(); 3].map(|()| rng.random_range(0.0..side));
+            (0..20_000).map(|_| Aabb::from_center(at(&mut rng), [0.5; 3])).collect::<Vec<_>>()
+        });
+        let mut finder = Finder::default();
+        let found = finder.find_between(&a, &b).expect("few pairs");
+        assert_eq!(difference(found, &oracle::pairs_between(&a, &b)), None);
+        // A row of two long cells has about four boxes of the other set.
+        let Report { work, checks, .. } = *finder.report();
+        let (rows, tests) = ((work - checks.made) / 20_000, checks.made / 20_000);
+        assert!(rows <= 4 && tests <= 16, "{rows} rows, {tests} tests");
+    }
 }
 
 #[test]

@@ -12,7 +12,7 @@ use crate::parallel::available_threads;
 use crate::policy::{self, PARALLEL_FROM_BOXES, search};
 use crate::report::{Checks, Clock, stage};
 use crate::streamed;
-use crate::{Aabb, Algorithm, Backend, Config, Engine, Keys, NeighbourScan, Pair, Plan, ProxyFilter};
+use crate::{Aabb, Algorithm, Backend, Config, Engine, Keys, Pair, Plan, ProxyFilter};
 use std::sync::atomic::AtomicU64;
 
 /// A search: boxes, filters and settings.
@@ -152,14 +152,11 @@ impl AllPairs {
         let (boxes, workers) = (request.boxes, self.hits.len());
         let Store { grid, two_grids, tree, .. } = store;
         let mut clock = Clock::start();
-        let mut plan = {
+        let plan = {
             stage!("plan");
-            GridPlan::new(boxes, workers)
+            GridPlan::new(boxes, request.split.is_some(), workers)
         };
         outcome.stages.plan += clock.lap();
-        if request.split.is_some() {
-            plan.scan = NeighbourScan::Windows;
-        }
         let sorted = {
             stage!("map");
             match request.split {

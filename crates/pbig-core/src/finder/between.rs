@@ -61,14 +61,14 @@ impl Finder {
         let ids = &self.sets.ids;
         let hand_over = visit.map(|visit| move |pairs: &[Pair]| visit(pairs, ids));
         let receiver = hand_over.as_ref().map(|hand_over| hand_over as Receiver<'_>);
-        let Sets { boxes, split, filters, keys, .. } = &self.sets;
+        let Sets { split, filters, keys, .. } = &self.sets;
         let request = Request {
             split: Some(*split),
             filters: filters.as_deref(),
             keys: keys.as_deref(),
             receiver,
             grouping,
-            ..Request::new(boxes, &self.config)
+            ..Request::new(self.sets.boxes(), &self.config)
         };
         let outcome = self.all_pairs.find(&request, &mut self.store);
         let is_done = self.add(outcome);

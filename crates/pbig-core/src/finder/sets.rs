@@ -1,80 +1,143 @@
 //! The boxes of two sets in one list, without those that miss all of the other set.
 
+use crate::grid::bounds::bounds_of;
+use crate::parallel::{SharedSlice, ensure_scratch, map, piece_range};
 use crate::{Aabb, Boxes, Keys, NO_KEY, ProxyFilter};
+
+/// Boxes that a thread looks at together: they stay in its second cache.
+const PIECE: usize = 1 << 13;
 
 /// The boxes of two sets that may have pairs, in one list: those of the first set, then those of the second.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Sets {
-    pub(super) boxes: Vec<Aabb>,
+    /// Longer than `len`, as `ids`.
+    boxes: Vec<Aabb>,
     /// By place in the list: the id in the set.
     pub(super) ids: Vec<u32>,
+    len: usize,
     pub(super) filters: Option<Vec<ProxyFilter>>,
     pub(super) keys: Option<Vec<Keys>>,
     /// The number of boxes of the first set.
     pub(super) split: u32,
     /// Valid boxes of both sets, before any was dropped.
     pub(super) valid: u64,
-    /// Scratch: the ids of the second set.
-    second: Vec<u32>,
 }
 
-/// A box that all valid boxes overlap.
-const EVERYWHERE: Aabb = Aabb::new([f32::NEG_INFINITY; 3], [f32::INFINITY; 3]);
-
 impl Sets {
+    /// Returns the list.
+    pub(super) fn boxes(&self) -> &[Aabb] {
+        &self.boxes[..self.len]
+    }
+
     /// Takes two sets, without the boxes that miss all of the other one.
     pub(super) fn take(&mut self, a: &Boxes<'_>, b: &Boxes<'_>) {
-        self.list_near(a.boxes, b.boxes);
-        self.split = self.ids.len() as u32;
-        self.ids.append(&mut self.second);
-        let (first, second) = self.ids.split_at(self.split as usize);
-        self.boxes.clear();
-        self.boxes.extend(first.iter().map(|id| a.boxes[*id as usize]));
-        self.boxes.extend(second.iter().map(|id| b.boxes[*id as usize]));
+        let len = a.boxes.len() + b.boxes.len();
+        ensure_scratch(&mut self.boxes, len, Aabb::NOWHERE);
+        ensure_scratch(&mut self.ids, len, 0);
+        let (split, second) = self.list_near(a.boxes, b.boxes);
+        let behind = a.boxes.len()..a.boxes.len() + second;
+        self.boxes.copy_within(behind.clone(), split);
+        self.ids.copy_within(behind, split);
+        (self.split, self.len) = (split as u32, split + second);
+        let (first, second) = self.ids[..self.len].split_at(split);
         self.filters = gather([(first, a.filters), (second, b.filters)], ProxyFilter::ALL);
         self.keys = gather([(first, a.keys), (second, b.keys)], [NO_KEY; 4]);
     }
 
-    /// Lists the valid boxes of each set that overlap the bounds of the other set. Repeats it while a quarter of the boxes is
-    /// dropped, because the bounds of the boxes that are left are smaller.
-    fn list_near(&mut self, a: &[Aabb], b: &[Aabb]) {
-        let (first, second) = (&mut self.ids, &mut self.second);
-        first.clear();
-        first.extend(0..a.len() as u32);
-        second.clear();
-        second.extend(0..b.len() as u32);
-        let mut bounds = keep_near(second, b, &EVERYWHERE);
-        self.valid = second.len() as u64 + a.iter().filter(|aabb| aabb.is_valid()).count() as u64;
-        loop {
-            let before = first.len() + second.len();
-            let first_bounds = keep_near(first, a, &bounds);
-            bounds = keep_near(second, b, &first_bounds);
-            if first.is_empty() || second.is_empty() {
-                first.clear();
-                second.clear();
-            }
-            if 4 * (first.len() + second.len()) >= 3 * before {
-                return;
-            }
+    /// Lists the valid boxes of each set that overlap the bounds of the other set, and returns their numbers. Repeats it while a quarter
+    /// of the boxes is dropped, because the bounds of the boxes that are left are smaller.
+    fn list_near(&mut self, a: &[Aabb], b: &[Aabb]) -> (usize, usize) {
+        let ((first, behind), (first_ids, behind_ids)) =
+            (self.boxes.split_at_mut(a.len()), self.ids.split_at_mut(a.len()));
+        let mut first = Side::new(first, first_ids);
+        let mut second = Side::new(&mut behind[..b.len()], &mut behind_ids[..b.len()]);
+        self.valid = first.keep_near(Some(a), &bounds_of_valid(b));
+        self.valid += second.keep_near(Some(b), &first.bounds);
+        let (mut before, mut left) = (a.len() + b.len(), first.len + second.len);
+        while 4 * left < 3 * before {
+            first.keep_near(None, &second.bounds);
+            second.keep_near(None, &first.bounds);
+            (before, left) = (left, first.len + second.len);
         }
+        (first.len, second.len)
     }
 }
 
-/// Drops boxes that are invalid or miss a box; returns the bounds of the others, invalid if there are none.
-fn keep_near(ids: &mut Vec<u32>, boxes: &[Aabb], near: &Aabb) -> Aabb {
-    let mut bounds = Aabb::new([f32::INFINITY; 3], [f32::NEG_INFINITY; 3]);
-    ids.retain(|id| {
-        let aabb = &boxes[*id as usize];
-        let is_near = aabb.is_valid() & aabb.overlaps(near);
-        if is_near {
-            for k in 0..3 {
-                bounds.min[k] = bounds.min[k].min(aabb.min[k]);
-                bounds.max[k] = bounds.max[k].max(aabb.max[k]);
+/// The boxes of one set that are left, with their ids, and the bounds of these boxes.
+struct Side<'a> {
+    boxes: &'a mut [Aabb],
+    ids: &'a mut [u32],
+    len: usize,
+    bounds: Aabb,
+}
+
+impl<'a> Side<'a> {
+    fn new(boxes: &'a mut [Aabb], ids: &'a mut [u32]) -> Self {
+        Self { len: boxes.len(), boxes, ids, bounds: Aabb::NOWHERE }
+    }
+
+    /// Drops boxes that are invalid or miss a box; with a set, takes its boxes first. Returns the number of valid ones.
+    fn keep_near(&mut self, set: Option<&[Aabb]>, near: &Aabb) -> u64 {
+        let (len, pieces) = (self.len, self.len.div_ceil(PIECE));
+        let (boxes, ids) = (SharedSlice::new(self.boxes), SharedSlice::new(self.ids));
+        let kept = map(pieces, |piece| {
+            let range = piece_range(len, piece, pieces);
+            // SAFETY: each piece has its own boxes.
+            let (boxes, ids) = unsafe { (boxes.part(range.clone()), ids.part(range.clone())) };
+            if let Some(set) = set {
+                boxes.copy_from_slice(&set[range.clone()]);
+                ids.iter_mut().zip(range.start as u32..).for_each(|(id, i)| *id = i);
             }
+            keep_near(boxes, ids, near)
+        });
+        self.close_gaps(&kept);
+        self.bounds = bounds_of(kept.iter().map(|kept| &kept.bounds));
+        kept.iter().map(|kept| kept.valid).sum()
+    }
+
+    /// Moves what is left of each piece to the end of the one before.
+    fn close_gaps(&mut self, pieces: &[Kept]) {
+        let (len, mut end) = (self.len, 0);
+        for (piece, kept) in pieces.iter().enumerate() {
+            let first = piece_range(len, piece, pieces.len()).start;
+            if first > end {
+                self.boxes.copy_within(first..first + kept.len, end);
+                self.ids.copy_within(first..first + kept.len, end);
+            }
+            end += kept.len;
         }
-        is_near
+        self.len = end;
+    }
+}
+
+/// What is left of a piece: the number of boxes, their bounds, and how many were valid before.
+struct Kept {
+    len: usize,
+    valid: u64,
+    bounds: Aabb,
+}
+
+/// Returns the bounds of the valid ones of some boxes.
+fn bounds_of_valid(boxes: &[Aabb]) -> Aabb {
+    let pieces = boxes.len().div_ceil(PIECE);
+    let bounds = map(pieces, |piece| {
+        let boxes = &boxes[piece_range(boxes.len(), piece, pieces)];
+        bounds_of(boxes.iter().filter(|aabb| aabb.is_valid()))
     });
-    if ids.is_empty() { Aabb::NOWHERE } else { bounds }
+    bounds_of(&bounds)
+}
+
+/// Moves valid boxes that overlap a box to the front.
+fn keep_near(boxes: &mut [Aabb], ids: &mut [u32], near: &Aabb) -> Kept {
+    let (mut len, mut valid) = (0, 0);
+    for i in 0..boxes.len() {
+        // Tested where it lies: a copy that was just written would be slow to read.
+        let (is_valid, is_near) = (boxes[i].is_valid(), boxes[i].overlaps(near));
+        (boxes[len], ids[len]) = (boxes[i], ids[i]);
+        valid += u64::from(is_valid);
+        len += usize::from(is_valid & is_near);
+    }
+    Kept { len, valid, bounds: bounds_of(&boxes[..len]) }
 }
 
 /// Copies the values of listed boxes; none if neither set has any.

@@ -79,6 +79,13 @@ impl Bounds {
     }
 }
 
+/// Returns a box around valid boxes; [`Aabb::NOWHERE`] if all are invalid.
+pub(crate) fn bounds_of<'a>(boxes: impl IntoIterator<Item = &'a Aabb>) -> Aabb {
+    let Bounds { low: [x, y, z, _], high: [right, top, back, _], .. } = measure(boxes);
+    let bounds = Aabb::new([x, y, z], [right, top, back]);
+    if bounds.is_valid() { bounds } else { Aabb::NOWHERE }
+}
+
 /// The lesser of two; the second one where the first is NaN.
 #[inline(always)]
 fn lesser(x: f32, y: f32) -> f32 {
@@ -97,12 +104,12 @@ fn largest(extent: &[f32]) -> f32 {
 
 /// Widens bounds to some boxes, three axes at once: every x86-64 has the instructions.
 #[cfg(target_arch = "x86_64")]
-fn measure(boxes: &[Aabb]) -> Bounds {
+fn measure<'a>(boxes: impl IntoIterator<Item = &'a Aabb>) -> Bounds {
     use std::arch::x86_64::*;
     let mut all = Bounds::NONE;
     let lanes = |of: [f32; 4]| bytemuck::cast::<_, __m128>(of);
     let (mut low, mut high, mut extent) = (lanes(all.low), lanes(all.high), lanes(all.extent));
-    for (min, max) in boxes.iter().map(Aabb::corners) {
+    for (min, max) in boxes.into_iter().map(Aabb::corners) {
         // SAFETY: SSE is part of the architecture. The second operand wins where the first is NaN.
         (low, high, extent) = unsafe {
             (_mm_min_ps(min, low), _mm_max_ps(max, high), _mm_max_ps(_mm_sub_ps(max, min), extent))
@@ -114,7 +121,7 @@ fn measure(boxes: &[Aabb]) -> Bounds {
 
 /// Widens bounds to some boxes.
 #[cfg(not(target_arch = "x86_64"))]
-fn measure(boxes: &[Aabb]) -> Bounds {
+fn measure<'a>(boxes: impl IntoIterator<Item = &'a Aabb>) -> Bounds {
     let mut all = Bounds::NONE;
     for aabb in boxes {
         for k in 0..3 {

@@ -23,8 +23,8 @@ pub(crate) struct GridPlan {
 }
 
 impl GridPlan {
-    /// Plans a grid for the valid ones of some boxes.
-    pub(crate) fn new(boxes: &[Aabb], workers: usize) -> Self {
+    /// Plans a grid for the valid ones of some boxes, or two grids for those of two sets.
+    pub(crate) fn new(boxes: &[Aabb], is_of_two_sets: bool, workers: usize) -> Self {
         let sample = Sample::of(boxes);
         let all = Bounds::of(boxes, workers);
         let space = all.trimmed(&sample);
@@ -34,7 +34,7 @@ impl GridPlan {
         } else {
             std::array::from_fn(|k| all.extent[k])
         };
-        Spacing::new(boxes.len(), space, extent).uncrowded(&sample).plan()
+        Spacing::new(boxes.len(), space, extent).uncrowded(&sample).plan(is_of_two_sets)
     }
 }
 
@@ -162,11 +162,16 @@ impl Spacing {
         if others < policy::MIN_COINCIDENCES { 0.0 } else { others as f64 / n * (self.boxes as f64 / n) }
     }
 
-    fn plan(&self) -> GridPlan {
+    fn plan(&self, is_of_two_sets: bool) -> GridPlan {
         let per_cell = self.boxes as f64 / (0..3).map(|k| self.cells_along(k)).product::<f64>();
         let is_crowded = self.wraps || per_cell > policy::RUNS_UP_TO_PER_CELL;
-        // Half cells where the grid wraps, so that cells that fold onto one place hold fewer boxes.
-        let shift = if self.wraps { 5 } else { 6 };
+        let shift = match is_of_two_sets {
+            // Half cells where the grid wraps, so that cells that fold onto one place hold fewer boxes.
+            _ if self.wraps => 5,
+            // A window of cells twice as long has at most two on an axis.
+            true if per_cell <= policy::TWICE_AS_LONG_UP_TO_PER_CELL => 7,
+            _ => 6,
+        };
         let mut cells = Cells { shift, wraps: self.wraps, ..Cells::default() };
         for k in 0..3 {
             let step = self.step(k);
@@ -180,7 +185,8 @@ impl Spacing {
         if self.wraps {
             cells.dims = wrapped_dims(cells.dims, self.most_cells());
         }
-        GridPlan { cells, scan: if is_crowded { NeighbourScan::Windows } else { NeighbourScan::Runs } }
+        let scan = if is_crowded || is_of_two_sets { NeighbourScan::Windows } else { NeighbourScan::Runs };
+        GridPlan { cells, scan }
     }
 }
 
