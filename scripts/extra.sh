@@ -3,7 +3,7 @@
 #   scripts/extra.sh [--no-setup] NAME [ARGUMENT...]     it calls setup.sh first, unless told not to
 #   features [KIND...]     rapier's own features, and sets of pbig's: see `test_features`
 #   publish                what would be published; publishes nothing
-#   wasm                   the corpus and a rapier world under node, without and with SIMD; from clean two minutes
+#   wasm                   the corpus and a rapier world under node, pbig without and with SIMD; from clean two minutes
 #   aarch64                pbig-core's unit tests, the corpus and a rapier world under qemu; ten minutes
 #   viewer                 builds, lints and tests the viewer
 #   pictures               makes docs/images again from a fixed seed, with the times of this machine
@@ -14,25 +14,27 @@ set -euo pipefail
 cd "$(dirname "$0")/.."
 . scripts/common.sh
 
-# sets FEATURE...: prints sets of the features, one a line, separated by commas: none, and all without each. With three or more, any two
-# meet on and off in every way. Where FEATURE is NAME=ENGINE'S and NAME is left out, the engine's own feature stays, so that the engine
-# is checked once for all sets; where NAME is in, it has to ask for that feature itself.
+# sets FEATURE...: prints sets of features, one a line, separated by commas: none, then all without each. With three features or more, any
+# two of them meet on and off in every way. A FEATURE may be NAME=ENGINE_FEATURE. Then the set without NAME has ENGINE_FEATURE: the engine
+# has the same features in all sets but the first, so it is checked once, and NAME has to ask for its ENGINE_FEATURE in the other sets.
 sets() {
-    local feature other name line
+    local feature other line
     echo
     for feature in "$@"; do
         line=
         for other in "$@"; do
-            name=${other%%=*}
-            [ "$other" != "$feature" ] || name=$(echo "$other" | cut -s -d = -f 2)
-            line+=${name:+,$name}
+            if [ "$other" != "$feature" ]; then
+                line+=,${other%%=*}
+            elif [ "$other" != "${other#*=}" ]; then
+                line+=,${other#*=}
+            fi
         done
         echo "${line#,}"
     done
 }
 
-# lint PACKAGE OPTIONS FEATURE...: lints a package, and its dependencies of the workspace, with sets of the features. All of them
-# together are linted by test.sh.
+# lint PACKAGE OPTIONS FEATURE...: lints a package, and its dependencies of the workspace, with sets of the features. test.sh lints it
+# with all of them.
 lint() {
     local package=$1 options=$2 set
     shift 2
@@ -98,7 +100,7 @@ check_interface() {
     step cargo semver-checks --baseline-rev "$tag" "$@"
 }
 
-# oldest: prints a setting that chooses the oldest Rust that is supported; says so if it is not here.
+# oldest: prints a setting that chooses the oldest Rust that is supported.
 oldest() {
     local version
     version=$(sed -n 's/^rust-version = "\(.*\)"/\1/p' Cargo.toml)
@@ -114,27 +116,27 @@ run_publish() {
     for folder in shaders crates/pbig-core crates/pbig-gpu crates/pbig-adapter crates/rapier-pbig avian/avian2d-pbig avian/avian3d-pbig; do
         check_contents "$folder"
     done
-    # Each is built from its package, against the others' packages, by the oldest Rust. Not optimized: nothing runs.
+    check_dependencies
+    check_interface $options
+    # Each is built from its package, against the others' packages; by the oldest Rust, if it is there.
     # Cargo keeps what it has unpacked in an earlier dry run from the same folder, and would build against that.
     rm -rf "${CARGO_HOME:-$HOME/.cargo}"/registry/{src,cache}/-*/{pbig,rapier-pbig}-* 2>/dev/null || true
     toolchain=$(oldest)
-    step env $toolchain CARGO_PROFILE_DEV_OPT_LEVEL=0 CARGO_PROFILE_DEV_DEBUG=false \
-        cargo publish --dry-run --locked --allow-dirty --all-features $options --target-dir "$(target_folder)/publish"
-    check_dependencies
-    check_interface $options
+    step env $toolchain CARGO_PROFILE_DEV_DEBUG=false cargo publish --dry-run --locked --allow-dirty $options \
+        --target-dir "$(target_folder)/publish"
 }
 
 # run_module NAME [VARIABLE]: builds the module in this environment, and runs it.
 run_module() {
     echo "== WebAssembly $1"
     # Slower code of rapier has the same results, and compiles sooner.
-    step env ${2:+"$2"} "${cargo[@]}" build --locked --quiet --profile wasm --lib --package pbig-wasm \
+    step env RUSTFLAGS= ${2:+"$2"} "${cargo[@]}" build --locked --quiet --profile wasm --lib --package pbig-wasm \
         --config profile.wasm.package.rapier3d.opt-level=1 --config profile.wasm.package.parry3d.opt-level=1 \
         --target "$target" --target-dir "$folder"
     step node wasm/run.mjs "$folder/$target/wasm/pbig_wasm.wasm"
 }
 
-# With SIMD only the workspace's own crates are built again: cargo's wrapper of rustc is for these.
+# With SIMD only pbig's own crates are built again: cargo's wrapper of rustc is for these.
 run_wasm() {
     local target=wasm32-unknown-unknown folder
     choose_cargo "$target" && has node || { left_out "$target" && return; }

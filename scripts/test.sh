@@ -14,13 +14,14 @@ export TMPDIR
 trap 'rm -rf "$TMPDIR"' EXIT
 
 # Options of several words, which are not quoted where they are used.
-# One choice for lints and documents, which need the same metadata. The viewer draws with hundreds of crates.
+# One choice for lints and documents, which need the same metadata, and one set of features; extra.sh lints others. The viewer draws with
+# hundreds of crates.
 all_but_viewer="--workspace --exclude pbig-viewer"
 in_036="--manifest-path rapier-0.36/Cargo.toml"
 members_036="-p rapier3d-pbig -p pbig-harness-036"
 features_036="--features rapier3d-pbig/debug-render"
-# The same source for two dimensions and for f64. rapier2d-pbig brings the debug renderer of two dimensions. One of them has rapier's
-# threads off, and its mathematics that are the same on every machine.
+# The same source for two dimensions and for f64. rapier2d-pbig brings the debug renderer of two dimensions. One has rapier's threads off,
+# and its `enhanced-determinism`; the mathematics of that, in simba, are all the others' in this build.
 others_036="-p rapier2d-pbig -p pbig-harness-2d -p pbig-harness-2d-f64 -p pbig-harness-3d-f64 --no-default-features --features \
 rapier2d-pbig/debug-render,pbig-harness-2d/parallel,pbig-harness-2d/dim2,pbig-harness-2d-f64/enhanced-determinism,\
 pbig-harness-2d-f64/dim2,pbig-harness-2d-f64/f64,pbig-harness-3d-f64/parallel,pbig-harness-3d-f64/f64"
@@ -40,13 +41,15 @@ lacks() {
     case $'\n'$tree in *$'\n'"$crate v"*) echo "$package pulls in $crate" && return 1 ;; esac
 }
 
-# unit_packages: prints options for the default members. Without an adapter the crates that measure and run scenes are left out:
-# they are tested on every backend.
-unit_packages() {
-    local name others=
-    has_gpu || others="pbig-harness pbig-cli pbig-studies"
+# choose_units: sets `units` to the targets of the default members that the step `unit` tests: all but the suite, by patterns that leave
+# `suite` out. Without an adapter the crates that measure and run scenes are left out, too: they are tested on every backend.
+choose_units() {
+    local name
+    units=(--lib --bins --example headless_test --test '[!s]*' --test 's[!u]*')
+    ! has_gpu || return 0
+    units=()
     for name in $(cargo tree --depth 0 --prefix none | sed -n 's/ v.*//p'); do
-        case " $others " in *" $name "*) ;; *) echo "-p $name" ;; esac
+        case $name in pbig-tests | pbig-harness | pbig-cli | pbig-studies) ;; *) units+=(-p "$name") ;; esac
     done
 }
 
@@ -70,27 +73,31 @@ step_clippy() {
 
 # All but the suite. One profile, and one choice of packages, which is one set of features: every crate is built once.
 step_unit() {
-    local packages
-    packages=$(unit_packages)
     step cargo build --release --examples --bins
-    step cargo test --release $packages --lib --bins --example headless_test --test '[!s]*' --test studies --no-fail-fast
-    step cargo test --release $packages --doc --no-fail-fast
+    local units
+    choose_units
+    step cargo test --release "${units[@]}" --no-fail-fast
+    step cargo test --release --doc --no-fail-fast
     # Once more with overflow checks and debug assertions, where there is unsafe code and index arithmetic.
     step cargo test -p pbig-core --features serde --no-fail-fast
     step cargo test -p pbig-gpu --no-default-features --lib --no-fail-fast
 }
 
-# With an adapter each test also runs on the GPU. The tests of the GPU alone are the next step's.
+# With an adapter each test also runs on the GPU, and the tests of the GPU itself are the next step's.
 step_suite() {
-    local on=''
-    has_gpu || { left_out "there is no GPU adapter" && on=$without_gpu; }
-    step $on cargo test --release --test suite --no-fail-fast -- --skip kernels:: --skip gpu::
+    local suite="cargo test --release --test suite --no-fail-fast"
+    if has_gpu; then
+        step $suite -- --skip kernels:: --skip gpu::
+    else
+        left_out "there is no GPU adapter"
+        step $without_gpu $suite
+    fi
 }
 
-# The parts of gpu.sh that need packages of Debian alone: the suite's GPU part, under a validation layer where there is one.
+# The parts of gpu.sh that need packages of Debian alone: the suite's GPU part, under the validation layer where that is installed.
 step_gpu() {
     has_gpu || { left_out "there is no GPU adapter" && return; }
-    step scripts/gpu.sh --no-setup amd validation
+    step scripts/gpu.sh --no-setup validation amd
 }
 
 # On docs.rs a nightly Rust labels each item with its feature. A wrapper lets this release do that, too.
@@ -143,8 +150,8 @@ step_rapier_0_36() {
     step scripts/patch-rapier.sh rapier-0.36
     step cargo fmt --all $in_036 --check
     # `--locked` checks the lock file without a download of bevy.
-    step cargo clippy --locked --release $in_036 --features rapier2d-pbig/debug-render,rapier3d-pbig/debug-render --all-targets \
-        -- -D warnings
+    step cargo clippy --locked --release $in_036 --all-targets --features \
+        rapier2d-pbig/debug-render,rapier3d-pbig/debug-render,rapier3d-pbig/gpu -- -D warnings
     step scripts/extra.sh --no-setup features sets-0.36
     rm -f "$CARGO_TARGET_DIR/release/bench_step"
     step cargo test --release $in_036 $members_036 $features_036 --no-fail-fast

@@ -108,7 +108,7 @@ fn contacts_are_in_the_same_order_each_time() {
 }
 
 /// Returns the contacts by their colliders, the lower one first.
-fn contacts(app: &App) -> HashMap<[Entity; 2], [Entity; 2]> {
+fn ends_by_pair(app: &App) -> HashMap<[Entity; 2], [Entity; 2]> {
     let graph = app.world().resource::<ContactGraph>();
     let pairs = graph.active_pairs().iter().chain(graph.sleeping_pairs());
     pairs.map(|pair| [pair.collider1, pair.collider2]).map(|ends| (sorted(ends), ends)).collect()
@@ -119,7 +119,7 @@ fn sorted(mut ends: [Entity; 2]) -> [Entity; 2] {
     ends
 }
 
-/// Two worlds with the same changes. Contacts that begin in the same step in both have the same collider first.
+/// Two worlds get the same changes, and contacts that begin in the same step in both have the same collider first.
 #[test]
 fn contacts_have_their_colliders_in_avians_order() {
     let mut apps = [app_with_pbig(), app(plugins())];
@@ -129,9 +129,11 @@ fn contacts_have_their_colliders_in_avians_order() {
         let now = [0, 1].map(|i| {
             worlds[i].change(&mut apps[i], 15);
             apps[i].update();
-            contacts(&apps[i])
+            ends_by_pair(&apps[i])
         });
-        for (pair, ends) in now[0].iter().filter(|(pair, _)| before.iter().all(|old| !old.contains_key(*pair))) {
+        for (pair, ends) in
+            now[0].iter().filter(|(pair, _)| before.iter().all(|old| !old.contains_key(*pair)))
+        {
             let Some(avians) = now[1].get(pair) else { continue };
             assert_eq!(ends, avians);
             compared += 1;
@@ -139,5 +141,8 @@ fn contacts_have_their_colliders_in_avians_order() {
         }
         before = now;
     }
-    assert!(compared > 1000 && turned > 100, "{compared} contacts compared, {turned} begin with the later entity");
+    assert!(
+        compared > 1000 && turned > 100,
+        "{compared} contacts compared, {turned} begin with the later entity"
+    );
 }

@@ -171,24 +171,39 @@ fn a_crowd_costs_nothing_if_the_other_set_is_elsewhere() {
         assert!(finder.find_between(one, other).expect("no pairs").is_empty());
         assert_eq!((finder.report().work, finder.report().invalid), (0, 40));
     }
+    // All boxes of the other set are dropped, although its bounds hold the crowd.
+    let around = [crowd(1, [-9.0; 3]), crowd(1, [9.0; 3])].concat();
+    for (one, other) in [(&a, &around), (&around, &a)] {
+        assert!(finder.find_between(one, other).expect("no pairs").is_empty());
+        assert_eq!((finder.report().work, finder.report().plan.algorithm), (0, Algorithm::Nothing));
+    }
 }
 
 #[test]
 fn each_box_of_sparse_sets_visits_four_rows_at_most() {
     let mut rng = StdRng::seed_from_u64(7);
-    // One box for 8 and for 80 units of volume.
-    for side in [70.0, 150.0] {
-        let [a, b] = [(); 2].map(|()| {
+    // Numbers of boxes, the side of their space, and the most rows and tests of each box of the smaller set. Below a side of 37 cells are
+    // as long as boxes; a window of these has up to nine rows, which count twice.
+    let cases = [
+        (20_000, 20_000, 70.0, (4, 16)),
+        (20_000, 20_000, 150.0, (4, 16)),
+        (20_000, 20_000, 38.7, (4, 32)),
+        (20_000, 20_000, 33.0, (18, 32)),
+        (2000, 38_000, 70.0, (4, 32)),
+        (38_000, 2000, 38.7, (4, 64)),
+    ];
+    for (n, m, side, (most_rows, most_tests)) in cases {
+        let [a, b] = [n, m].map(|n| {
             let at = |rng: &mut StdRng| [(); 3].map(|()| rng.random_range(0.0..side));
-            (0..20_000).map(|_| Aabb::from_center(at(&mut rng), [0.5; 3])).collect::<Vec<_>>()
+            (0..n).map(|_| Aabb::from_center(at(&mut rng), [0.5; 3])).collect::<Vec<_>>()
         });
         let mut finder = Finder::default();
         let found = finder.find_between(&a, &b).expect("few pairs");
         assert_eq!(difference(found, &oracle::pairs_between(&a, &b)), None);
-        // A row of two long cells has about four boxes of the other set.
         let Report { work, checks, .. } = *finder.report();
-        let (rows, tests) = ((work - checks.made) / 20_000, checks.made / 20_000);
-        assert!(rows <= 4 && tests <= 16, "{rows} rows, {tests} tests");
+        let few = n.min(m) as u64;
+        let (rows, tests) = ((work - checks.made) / few, checks.made / few);
+        assert!(rows <= most_rows && tests <= most_tests, "{n}, {m}, {side}: {rows} rows, {tests} tests");
     }
 }
 

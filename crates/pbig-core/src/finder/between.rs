@@ -16,7 +16,7 @@ impl Finder {
     /// sorted by `a`, then `b`.
     ///
     /// Boxes of one set are never compared with each other, so a set may be a crowd. Its boxes that miss all of the other set cost
-    /// a comparison or two. [`Boxes`] add filters and keys. The CPU does the work; no device is asked.
+    /// a copy and a comparison or two. [`Boxes`] add filters and keys. The CPU does the work; no device is asked.
     ///
     /// ```
     /// use pbig_core::{Aabb, CrossPair, Finder};

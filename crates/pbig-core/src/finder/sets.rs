@@ -2,7 +2,9 @@
 
 use crate::grid::bounds::bounds_of;
 use crate::parallel::{SharedSlice, ensure_scratch, map, piece_range};
+use crate::policy::PARALLEL_FROM_BOXES;
 use crate::{Aabb, Boxes, Keys, NO_KEY, ProxyFilter};
+use std::ops::Range;
 
 /// Boxes that a thread looks at together: they stay in its second cache.
 const PIECE: usize = 1 << 13;
@@ -10,10 +12,11 @@ const PIECE: usize = 1 << 13;
 /// The boxes of two sets that may have pairs, in one list: those of the first set, then those of the second.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Sets {
-    /// Longer than `len`, as `ids`.
+    /// Only the first `len` are in use, here and in `ids`.
     boxes: Vec<Aabb>,
     /// By place in the list: the id in the set.
     pub(super) ids: Vec<u32>,
+    /// The number of boxes of both sets.
     len: usize,
     pub(super) filters: Option<Vec<ProxyFilter>>,
     pub(super) keys: Option<Vec<Keys>>,
@@ -44,22 +47,22 @@ impl Sets {
         self.keys = gather([(first, a.keys), (second, b.keys)], [NO_KEY; 4]);
     }
 
-    /// Lists the valid boxes of each set that overlap the bounds of the other set, and returns their numbers. Repeats it while a quarter
-    /// of the boxes is dropped, because the bounds of the boxes that are left are smaller.
+    /// Lists the valid boxes of each set that overlap the bounds of the other set, and returns how many are left of each. Repeats it
+    /// while more than a quarter of the boxes is dropped, because the bounds of the boxes that are left are smaller.
     fn list_near(&mut self, a: &[Aabb], b: &[Aabb]) -> (usize, usize) {
-        let ((first, behind), (first_ids, behind_ids)) =
+        let ((boxes, more_boxes), (ids, more_ids)) =
             (self.boxes.split_at_mut(a.len()), self.ids.split_at_mut(a.len()));
-        let mut first = Side::new(first, first_ids);
-        let mut second = Side::new(&mut behind[..b.len()], &mut behind_ids[..b.len()]);
-        self.valid = first.keep_near(Some(a), &bounds_of_valid(b));
-        self.valid += second.keep_near(Some(b), &first.bounds);
+        let mut first = Side::new(boxes, ids);
+        let mut second = Side::new(&mut more_boxes[..b.len()], &mut more_ids[..b.len()]);
+        self.valid = first.take(a, &bounds_of_valid(b));
+        self.valid += second.take(b, &first.bounds);
         let (mut before, mut left) = (a.len() + b.len(), first.len + second.len);
         while 4 * left < 3 * before {
-            first.keep_near(None, &second.bounds);
-            second.keep_near(None, &first.bounds);
+            first.keep_near(&second.bounds);
+            second.keep_near(&first.bounds);
             (before, left) = (left, first.len + second.len);
         }
-        (first.len, second.len)
+        if first.len.min(second.len) == 0 { (0, 0) } else { (first.len, second.len) }
     }
 }
 
@@ -76,19 +79,29 @@ impl<'a> Side<'a> {
         Self { len: boxes.len(), boxes, ids, bounds: Aabb::NOWHERE }
     }
 
-    /// Drops boxes that are invalid or miss a box; with a set, takes its boxes first. Returns the number of valid ones.
-    fn keep_near(&mut self, set: Option<&[Aabb]>, near: &Aabb) -> u64 {
-        let (len, pieces) = (self.len, self.len.div_ceil(PIECE));
+    /// Takes the valid boxes of a set that overlap a box. Returns how many are valid.
+    fn take(&mut self, set: &[Aabb], near: &Aabb) -> u64 {
+        self.keep(near, |boxes, ids, range| {
+            boxes.copy_from_slice(&set[range.clone()]);
+            ids.iter_mut().zip(range.start as u32..).for_each(|(id, i)| *id = i);
+        })
+    }
+
+    /// Drops boxes that miss a box.
+    fn keep_near(&mut self, near: &Aabb) {
+        self.keep(near, |_, _, _| ());
+    }
+
+    /// Keeps the valid boxes that overlap a box, of what `fill` puts into each piece. Returns how many are valid.
+    fn keep(&mut self, near: &Aabb, fill: impl Fn(&mut [Aabb], &mut [u32], Range<usize>) + Sync) -> u64 {
+        let (len, pieces) = (self.len, pieces(self.len));
         let (boxes, ids) = (SharedSlice::new(self.boxes), SharedSlice::new(self.ids));
         let kept = map(pieces, |piece| {
             let range = piece_range(len, piece, pieces);
-            // SAFETY: each piece has its own boxes.
+            // SAFETY: `len` is at most the length of both lists, and each piece has its own part of it.
             let (boxes, ids) = unsafe { (boxes.part(range.clone()), ids.part(range.clone())) };
-            if let Some(set) = set {
-                boxes.copy_from_slice(&set[range.clone()]);
-                ids.iter_mut().zip(range.start as u32..).for_each(|(id, i)| *id = i);
-            }
-            keep_near(boxes, ids, near)
+            fill(boxes, ids, range);
+            keep_in_piece(boxes, ids, near)
         });
         self.close_gaps(&kept);
         self.bounds = bounds_of(kept.iter().map(|kept| &kept.bounds));
@@ -117,9 +130,14 @@ struct Kept {
     bounds: Aabb,
 }
 
+/// Returns the number of pieces of some boxes.
+fn pieces(boxes: usize) -> usize {
+    if boxes < PARALLEL_FROM_BOXES { 1 } else { boxes.div_ceil(PIECE) }
+}
+
 /// Returns the bounds of the valid ones of some boxes.
 fn bounds_of_valid(boxes: &[Aabb]) -> Aabb {
-    let pieces = boxes.len().div_ceil(PIECE);
+    let pieces = pieces(boxes.len());
     let bounds = map(pieces, |piece| {
         let boxes = &boxes[piece_range(boxes.len(), piece, pieces)];
         bounds_of(boxes.iter().filter(|aabb| aabb.is_valid()))
@@ -128,7 +146,7 @@ fn bounds_of_valid(boxes: &[Aabb]) -> Aabb {
 }
 
 /// Moves valid boxes that overlap a box to the front.
-fn keep_near(boxes: &mut [Aabb], ids: &mut [u32], near: &Aabb) -> Kept {
+fn keep_in_piece(boxes: &mut [Aabb], ids: &mut [u32], near: &Aabb) -> Kept {
     let (mut len, mut valid) = (0, 0);
     for i in 0..boxes.len() {
         // Tested where it lies: a copy that was just written would be slow to read.

@@ -79,7 +79,7 @@ impl Bounds {
     }
 }
 
-/// Returns a box around valid boxes; [`Aabb::NOWHERE`] if all are invalid.
+/// Returns a box around boxes that are valid or [`Aabb::NOWHERE`], which it is without a valid one.
 pub(crate) fn bounds_of<'a>(boxes: impl IntoIterator<Item = &'a Aabb>) -> Aabb {
     let Bounds { low: [x, y, z, _], high: [right, top, back, _], .. } = measure(boxes);
     let bounds = Aabb::new([x, y, z], [right, top, back]);

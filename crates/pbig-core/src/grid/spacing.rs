@@ -11,7 +11,7 @@ pub enum NeighbourScan {
     /// Half of the 27 neighbouring cells, as five runs of sorted boxes, even if empty: fastest where cells hold few boxes.
     #[default]
     Runs,
-    /// The cells in which an overlapping box can lie: fastest where cells hold many.
+    /// The cells in which an overlapping box can lie: fastest where cells hold many. Two sets always have these.
     Windows,
 }
 
@@ -165,21 +165,16 @@ impl Spacing {
     fn plan(&self, is_of_two_sets: bool) -> GridPlan {
         let per_cell = self.boxes as f64 / (0..3).map(|k| self.cells_along(k)).product::<f64>();
         let is_crowded = self.wraps || per_cell > policy::RUNS_UP_TO_PER_CELL;
-        let shift = match is_of_two_sets {
-            // Half cells where the grid wraps, so that cells that fold onto one place hold fewer boxes.
-            _ if self.wraps => 5,
-            // A window of cells twice as long has at most two on an axis.
-            true if per_cell <= policy::TWICE_AS_LONG_UP_TO_PER_CELL => 7,
-            _ => 6,
-        };
+        let shift = self.shift(per_cell, is_of_two_sets);
+        let (cell, border) = (f64::from(1u32 << shift), f64::from(64u32.max(1 << shift)));
         let mut cells = Cells { shift, wraps: self.wraps, ..Cells::default() };
         for k in 0..3 {
             let step = self.step(k);
-            cells.origin[k] = self.origin[k] - 64.0 * step;
+            cells.origin[k] = self.origin[k] - border * step;
             cells.scale[k] = 1.0 / step;
             cells.max_extent[k] = self.extent_with_slack(k);
             cells.reach[k] = (f64::from(cells.max_extent[k]) / step).ceil() as i32 + 2;
-            let needed = (self.space.width(k) / step + 128.0) / f64::from(1u32 << shift);
+            let needed = (self.space.width(k) / step + 2.0 * border) / cell;
             cells.dims[k] = needed.min(f64::from(1 << 24)) as i32 + 3;
         }
         if self.wraps {
@@ -187,6 +182,19 @@ impl Spacing {
         }
         let scan = if is_crowded || is_of_two_sets { NeighbourScan::Windows } else { NeighbourScan::Runs };
         GridPlan { cells, scan }
+    }
+
+    /// Returns log2 of the steps in a cell.
+    fn shift(&self, per_cell: f64, is_of_two_sets: bool) -> u32 {
+        if self.wraps {
+            // Cells that fold onto one place hold fewer boxes.
+            5
+        } else if is_of_two_sets && per_cell <= policy::LONG_CELLS_UP_TO_PER_CELL {
+            // A box of 62 steps and its reach lie in two cells on an axis. Candidates are fewer than 256 steps away, as codes need.
+            7
+        } else {
+            6
+        }
     }
 }
 
