@@ -165,11 +165,12 @@ fn a_crowd_costs_nothing_if_the_other_set_is_elsewhere() {
     assert!(finder.find_between(&a, &crowd(1, [9.0; 3])).expect("no pairs").is_empty());
     assert_eq!((finder.report().work, finder.report().plan.algorithm), (0, Algorithm::Nothing));
     // An invalid box is no reason to look farther.
-    let inverted = Aabb::new([f32::INFINITY; 3], [f32::NEG_INFINITY; 3]);
+    let inverted = Aabb::new([-9.0, 0.4, -9.0], [9.0, 0.3, 9.0]);
     let elsewhere = [crowd(20, [9.0; 3]), vec![inverted; 20], vec![Aabb::NOWHERE; 20]].concat();
-    for (one, other) in [(&a, &elsewhere), (&elsewhere, &a)] {
-        assert!(finder.find_between(one, other).expect("no pairs").is_empty());
-        assert_eq!((finder.report().work, finder.report().invalid), (0, 40));
+    let with_one_there = [&a[..], &crowd(1, [9.0; 3])].concat();
+    for (one, other) in [(&with_one_there, &elsewhere), (&elsewhere, &with_one_there)] {
+        assert_eq!(finder.find_between(one, other).map(<[_]>::len), Ok(20));
+        assert_eq!((finder.report().plan.boxes, finder.report().invalid), (21, 40));
     }
     // All boxes of the other set are dropped, although its bounds hold the crowd.
     let around = [crowd(1, [-9.0; 3]), crowd(1, [9.0; 3])].concat();
@@ -205,6 +206,23 @@ fn each_box_of_sparse_sets_visits_four_rows_at_most() {
         let (rows, tests) = ((work - checks.made) / few, checks.made / few);
         assert!(rows <= most_rows && tests <= most_tests, "{n}, {m}, {side}: {rows} rows, {tests} tests");
     }
+}
+
+#[test]
+fn boxes_that_miss_the_other_set_are_dropped_wherever_they_are_listed() {
+    let mut rng = StdRng::seed_from_u64(8);
+    // Enough for several threads. Every third box of a set is far on its own side.
+    let [a, b] = [-900.0, 900.0].map(|far| {
+        let at = |rng: &mut StdRng| [(); 3].map(|()| rng.random_range(0.0..50.0f32));
+        let boxes = (0..20_000).map(|i| (i, at(&mut rng)));
+        let moved = |(i, [x, y, z]): (u32, [f32; 3])| [if i % 3 == 1 { x + far } else { x }, y, z];
+        boxes.map(|one| Aabb::from_center(moved(one), [0.5; 3])).collect::<Vec<_>>()
+    });
+    let mut finder = Finder::default();
+    let found = finder.find_between(&a, &b).expect("few pairs");
+    assert_eq!(difference(found, &oracle::pairs_between(&a, &b)), None);
+    let listed = finder.report().plan.boxes;
+    assert!((26_000..26_668).contains(&listed), "{listed}");
 }
 
 #[test]
