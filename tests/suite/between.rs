@@ -172,7 +172,12 @@ fn a_crowd_costs_nothing_if_the_other_set_is_elsewhere() {
         assert_eq!(finder.find_between(one, other).map(<[_]>::len), Ok(20));
         assert_eq!((finder.report().plan.boxes, finder.report().invalid), (21, 40));
     }
+    // However far away.
+    let a = [crowd(5000, [2e37; 3]), vec![Aabb::new([2e37; 3], [3.3e38; 3])]].concat();
+    assert_eq!(finder.find_between(&a, &crowd(5000, [3e38; 3])).map(<[_]>::len), Ok(5000));
+    assert_eq!(finder.report().plan.boxes, 5001);
     // All boxes of the other set are dropped, although its bounds hold the crowd.
+    let a = crowd(1000, [0.0; 3]);
     let around = [crowd(1, [-9.0; 3]), crowd(1, [9.0; 3])].concat();
     for (one, other) in [(&a, &around), (&around, &a)] {
         assert!(finder.find_between(one, other).expect("no pairs").is_empty());
@@ -205,6 +210,25 @@ fn each_box_of_sparse_sets_visits_four_rows_at_most() {
         let few = n.min(m) as u64;
         let (rows, tests) = ((work - checks.made) / few, checks.made / few);
         assert!(rows <= most_rows && tests <= most_tests, "{n}, {m}, {side}: {rows} rows, {tests} tests");
+    }
+}
+
+#[test]
+fn a_crowd_in_a_sparse_space_keeps_cells_short() {
+    let mut rng = StdRng::seed_from_u64(9);
+    for (in_crowd, is_long) in [(0, true), (16_000, false)] {
+        let [a, b] = [(); 2].map(|()| {
+            let mut boxes = |n: usize, side: f32, half: f32| {
+                let at = |rng: &mut StdRng| [(); 3].map(|()| rng.random_range(10.0..10.0 + side));
+                (0..n).map(|_| Aabb::from_center(at(&mut rng), [half; 3])).collect::<Vec<_>>()
+            };
+            [boxes(20_000 - in_crowd, 60.0, 0.5), boxes(in_crowd, 2.0, 0.05)].concat()
+        });
+        let mut finder = Finder::default();
+        let found = finder.find_between(&a, &b).expect("few pairs");
+        assert_eq!(difference(found, &oracle::pairs_between(&a, &b)), None);
+        let cell = finder.report().plan.cell[0];
+        assert_eq!(cell > 2.0, is_long, "{in_crowd}: {cell}");
     }
 }
 

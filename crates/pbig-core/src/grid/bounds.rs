@@ -25,6 +25,7 @@ pub(super) struct Bounds {
 
 impl Bounds {
     const NONE: Self = Self { low: [FARTHEST; 4], high: [-FARTHEST; 4], extent: [0.0; 4] };
+    const EMPTY: Self = Self { low: [f32::INFINITY; 4], high: [f32::NEG_INFINITY; 4], extent: [0.0; 4] };
 
     /// Measures all boxes.
     pub(super) fn of(boxes: &[Aabb], workers: usize) -> Self {
@@ -33,7 +34,7 @@ impl Bounds {
         let shared = SharedSlice::new(&mut parts);
         let pieces = pieces.min(64);
         run(workers, pieces, |_, piece| {
-            let part = measure(&boxes[piece_range(boxes.len(), piece, pieces)]);
+            let part = measure(Self::NONE, &boxes[piece_range(boxes.len(), piece, pieces)]);
             // SAFETY: each piece writes its own part.
             unsafe { shared.write(piece, part) }
         });
@@ -81,7 +82,7 @@ impl Bounds {
 
 /// Returns a box around boxes that are valid or [`Aabb::NOWHERE`], which it is without a valid one.
 pub(crate) fn bounds_of<'a>(boxes: impl IntoIterator<Item = &'a Aabb>) -> Aabb {
-    let Bounds { low: [x, y, z, _], high: [right, top, back, _], .. } = measure(boxes);
+    let Bounds { low: [x, y, z, _], high: [right, top, back, _], .. } = measure(Bounds::EMPTY, boxes);
     let bounds = Aabb::new([x, y, z], [right, top, back]);
     if bounds.is_valid() { bounds } else { Aabb::NOWHERE }
 }
@@ -104,9 +105,8 @@ fn largest(extent: &[f32]) -> f32 {
 
 /// Widens bounds to some boxes, three axes at once: every x86-64 has the instructions.
 #[cfg(target_arch = "x86_64")]
-fn measure<'a>(boxes: impl IntoIterator<Item = &'a Aabb>) -> Bounds {
+fn measure<'a>(mut all: Bounds, boxes: impl IntoIterator<Item = &'a Aabb>) -> Bounds {
     use std::arch::x86_64::*;
-    let mut all = Bounds::NONE;
     let lanes = |of: [f32; 4]| bytemuck::cast::<_, __m128>(of);
     let (mut low, mut high, mut extent) = (lanes(all.low), lanes(all.high), lanes(all.extent));
     for (min, max) in boxes.into_iter().map(Aabb::corners) {
@@ -121,8 +121,7 @@ fn measure<'a>(boxes: impl IntoIterator<Item = &'a Aabb>) -> Bounds {
 
 /// Widens bounds to some boxes.
 #[cfg(not(target_arch = "x86_64"))]
-fn measure<'a>(boxes: impl IntoIterator<Item = &'a Aabb>) -> Bounds {
-    let mut all = Bounds::NONE;
+fn measure<'a>(mut all: Bounds, boxes: impl IntoIterator<Item = &'a Aabb>) -> Bounds {
     for aabb in boxes {
         for k in 0..3 {
             all.low[k] = lesser(aabb.min[k], all.low[k]);

@@ -34,7 +34,7 @@ impl GridPlan {
         } else {
             std::array::from_fn(|k| all.extent[k])
         };
-        Spacing::new(boxes.len(), space, extent).uncrowded(&sample).plan(is_of_two_sets)
+        Spacing::new(boxes.len(), space, extent).uncrowded(&sample).plan(is_of_two_sets, &sample)
     }
 }
 
@@ -162,10 +162,11 @@ impl Spacing {
         if others < policy::MIN_COINCIDENCES { 0.0 } else { others as f64 / n * (self.boxes as f64 / n) }
     }
 
-    fn plan(&self, is_of_two_sets: bool) -> GridPlan {
+    fn plan(&self, is_of_two_sets: bool, sample: &Sample) -> GridPlan {
         let per_cell = self.boxes as f64 / (0..3).map(|k| self.cells_along(k)).product::<f64>();
         let is_crowded = self.wraps || per_cell > policy::RUNS_UP_TO_PER_CELL;
-        let shift = self.shift(per_cell, is_of_two_sets);
+        let is_sparse = per_cell <= policy::LONG_CELLS_UP_TO_PER_CELL && self.crowd(sample) == 0.0;
+        let shift = self.shift(is_of_two_sets && is_sparse);
         let (cell, border) = (f64::from(1u32 << shift), f64::from(64u32.max(1 << shift)));
         let mut cells = Cells { shift, wraps: self.wraps, ..Cells::default() };
         for k in 0..3 {
@@ -185,11 +186,11 @@ impl Spacing {
     }
 
     /// Returns log2 of the steps in a cell.
-    fn shift(&self, per_cell: f64, is_of_two_sets: bool) -> u32 {
+    fn shift(&self, has_long_cells: bool) -> u32 {
         if self.wraps {
             // Cells that fold onto one place hold fewer boxes.
             5
-        } else if is_of_two_sets && per_cell <= policy::LONG_CELLS_UP_TO_PER_CELL {
+        } else if has_long_cells {
             // A box of 62 steps and its reach lie in two cells on an axis. Candidates are fewer than 256 steps away, as codes need.
             7
         } else {

@@ -34,8 +34,8 @@ pub(crate) const MIN_CELLS: f64 = 4096.0;
 /// Maximum mean number of boxes in a cell for a search to visit the five runs of the half neighbourhood unseen.
 pub(crate) const RUNS_UP_TO_PER_CELL: f64 = 3.0;
 
-/// Maximum mean number of boxes of both sets in a cell of 64 steps, for their cells to have 128: few windows, whose rows fit a block of
-/// codes or two. A search of sparse sets took half as long, and one of dense sets would test two to three times as many.
+/// Maximum mean number of boxes of both sets in a cell of 64 steps, for their cells to have 128, if the sample sees
+/// no crowd: windows have few rows, which fit a block of codes or two. A search of sparse sets took half as long, and one of dense sets would test two to three times as many.
 pub(crate) const LONG_CELLS_UP_TO_PER_CELL: f64 = 1.0;
 
 /// Maximum extent of a box that a grid takes, in extents of its largest box: a cube that turns by 10 degrees grows this much.
