@@ -50,11 +50,8 @@ fn ten_thousand_random_sets_with_every_degenerate_kind() {
 fn random_sets_of_every_shape() {
     for seed in 0..100 {
         let case = random_case(seed);
-        check_on(
-            on_cpu().into_iter().map(|(name, config)| (name, config.into())).collect(),
-            &case.name,
-            &case.boxes,
-        );
+        let strategies = on_cpu().map(|(name, config)| (name, config.into()));
+        check_on(strategies.into(), &case.name, &case.boxes);
     }
 }
 

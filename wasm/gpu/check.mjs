@@ -1,5 +1,5 @@
 // Runs the module's sets with the kernels as they are, and with workgroups and lanes in other orders: a result that depends on
-// the order in which a GPU runs them would differ.
+// the order in which a GPU runs them would differ. Then it runs the parts: random sets and changes, faults, tiny limits, lost devices.
 
 // Puts a new order into a kernel's text: `group` and `lane` become functions of those that the device gives.
 function reordered(text, groupOf, laneOf) {

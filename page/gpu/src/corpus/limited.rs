@@ -79,7 +79,7 @@ async fn in_chunks(gpu: &GpuFinder) -> Result<u32, String> {
     for boxes in [set("pile", 2000), set("mixed", 2000), cubes(700)] {
         for (small_cell, pipelining) in [(1, true), (32, false), (256, true)] {
             let tiny =
-                GpuOptions { chunk: [3, 2], first_bytes: 0, all_pairs_up_to: 0, ..GpuOptions::DEFAULT };
+                GpuOptions { chunk: [12, 8], first_bytes: 0, all_pairs_up_to: 0, ..GpuOptions::DEFAULT };
             let gpu = &mut gpu.clone().with_options(GpuOptions { small_cell, pipelining, ..tiny });
             let report = by_device(check(gpu, &boxes, None).await?)?;
             if report.chunks < 2 {

@@ -28,7 +28,7 @@ pub(super) async fn devices() -> Result<Counts, String> {
 
 /// Loses pbig's own device after a number of submissions. The next call opens another one.
 async fn at_any_moment() -> Result<u32, String> {
-    let chunks = GpuOptions { chunk: [12, 8], first_bytes: 0, coding: Coding::Packed, ..AT_ONCE };
+    let chunks = GpuOptions { chunk: [48, 32], first_bytes: 0, coding: Coding::Packed, ..AT_ONCE };
     let in_parts = GpuOptions { max_bytes: 1 << 20, ..AT_ONCE };
     let mut lost = 0;
     for (boxes, options, most) in [(set("mixed", 3000), chunks, 8), (set("unit", 45_000), in_parts, 2)] {
