@@ -98,7 +98,7 @@ async function inTime(seconds, what, result) {
 // Runs a part, and tells its counts. Returns true if none is zero and there is no fault.
 async function runPart(module, { name, limits = {} }, tell) {
     const start = Date.now();
-    const { counts, names, fault } = await inTime(600, name, withLimits(limits, () => module.run_part(name)));
+    const { counts, names, fault } = await inTime(1800, name, withLimits(limits, () => module.run_part(name)));
     const told = names.map((count, i) => `${counts[i]} ${count}`).join(", ");
     tell(`${[name, ...Object.keys(limits)].join(", ")}: ${told}${fault}, ${Math.round((Date.now() - start) / 1000)} s`);
     return fault === "" && counts.length > 0 && counts.every((count) => count > 0);

@@ -1,11 +1,10 @@
 //! Faults that are injected into the device, as in the suite: the CPU finishes the call, and the report says why.
 
-use super::parts::{Counts, open};
+use super::parts::{Counts, open, set};
 use super::relay::{ON_DEVICE, Relay};
 use pbig_core::{Aabb, Config};
 use pbig_gpu::testing::{FAULTS, Fault};
 use pbig_gpu::{GpuFinder, GpuOptions};
-use pbig_harness::boxes::BoxSet;
 use pbig_harness::follower::Follower;
 use std::time::Duration;
 
@@ -41,7 +40,7 @@ pub(super) async fn faults() -> Result<Counts, String> {
 
 /// Plays frames, compared with brute force. Returns true if the device is used in the frame after its fault.
 async fn frames(mut gpu: GpuFinder, word: &str) -> Result<bool, String> {
-    let start = BoxSet::named("pile").map_or(vec![], |set| set.boxes(600, 5));
+    let start = set("pile", 600);
     let relay = Relay::default();
     let broad_phase = relay.world(Config { margin: 0.05, ..ON_DEVICE })?;
     let mut world = Follower::new(broad_phase, start.len());

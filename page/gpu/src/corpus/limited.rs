@@ -1,18 +1,13 @@
 //! Tiny limits: what does not fit is done in parts and chunks, and what a device must not do is the CPU's, with the reason.
 
-use super::parts::{Counts, open};
+use super::parts::{Counts, open, set};
 use super::relay::{Found, ON_CPU, ON_DEVICE, Relay, check, compare, expect, expect_device};
 use pbig_core::{Aabb, BroadPhase, DeviceFailure, DeviceReport, ProxyFilter};
 use pbig_gpu::{Coding, GpuFinder, GpuOptions};
-use pbig_harness::boxes::BoxSet;
 use pbig_harness::hard::crossing;
 
 /// The smallest limit of a buffer that pbig takes: no more than 131,072 plain pairs.
 const SMALLEST: GpuOptions = GpuOptions { max_bytes: 1 << 20, all_pairs_up_to: 0, ..GpuOptions::DEFAULT };
-
-fn set(name: &str, n: usize) -> Vec<Aabb> {
-    BoxSet::named(name).map_or(vec![], |set| set.boxes(n, 5))
-}
 
 fn cubes(n: usize) -> Vec<Aabb> {
     vec![Aabb::new([0.0; 3], [1.0; 3]); n]

@@ -1,12 +1,11 @@
 //! Devices that are lost between calls and within one: each call ends, and its pairs are those of the CPU.
 
-use super::parts::{Counts, open};
+use super::parts::{Counts, open, set};
 use super::relay::{check, compare, expect, expect_device};
 use crate::device::request;
 use pbig_core::{Aabb, DeviceFound, Report, SearchRequest};
 use pbig_gpu::testing::Fault;
 use pbig_gpu::{Coding, GpuFinder, GpuOptions};
-use pbig_harness::boxes::BoxSet;
 use std::future::poll_fn;
 use std::pin::pin;
 use std::task::Context;
@@ -14,10 +13,6 @@ use std::time::Duration;
 
 /// A lost device is replaced in the next call.
 const AT_ONCE: GpuOptions = GpuOptions { pause: Duration::ZERO, ..GpuOptions::DEFAULT };
-
-fn set(name: &str, n: usize) -> Vec<Aabb> {
-    BoxSet::named(name).map_or(vec![], |set| set.boxes(n, 5))
-}
 
 /// Loses devices in every way.
 pub(super) async fn devices() -> Result<Counts, String> {

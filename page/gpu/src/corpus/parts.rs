@@ -1,7 +1,9 @@
 //! The parts of the checks beside the modes. Each ends at its first fault, and counts what it has seen.
 
 use super::{failing, limited, lost, random};
+use pbig_core::Aabb;
 use pbig_gpu::GpuFinder;
+use pbig_harness::boxes::BoxSet;
 use wasm_bindgen::prelude::*;
 
 /// Counts with their names.
@@ -46,4 +48,9 @@ pub async fn run_part(name: String) -> Part {
 /// Opens a device of pbig's own.
 pub(super) async fn open() -> Result<GpuFinder, String> {
     GpuFinder::open_async().await.map_err(|error| error.to_string())
+}
+
+/// Returns a set as the suite's tests of devices use it.
+pub(super) fn set(name: &str, n: usize) -> Vec<Aabb> {
+    BoxSet::named(name).map_or(vec![], |set| set.boxes(n, 5))
 }
