@@ -23,28 +23,6 @@ fn with(options: GpuOptions) -> GpuFinder {
     device(GpuOptions { all_pairs_up_to: 0, count_tests: true, ..options })
 }
 
-/// Changes a box in one of many ways.
-fn disturb(world: &mut DeviceWorld, rng: &mut StdRng) {
-    let id = rng.random_range(0..world.len() + 2);
-    let at: [f32; 3] = std::array::from_fn(|_| rng.random_range(-1.0..12.0));
-    let half = [rng.random_range(0.1..1.5), rng.random_range(0.1f32..1.5), 0.5];
-    let filter = ProxyFilter { body: id / 2, mask: 1 << rng.random_range(0..3), ..ProxyFilter::ALL };
-    match rng.random_range(0..14) {
-        0 => world.put(id, Aabb::from_center(at, half)),
-        1 => world.put(id, Aabb::NOWHERE),
-        2 => world.put(id, Aabb::new([f32::NEG_INFINITY; 3], [f32::INFINITY, at[1], f32::INFINITY])),
-        3 => world.put(id, Aabb::from_center(at, [30.0; 3])),
-        4 => world.put(id, Aabb::new([f32::INFINITY; 3], [f32::INFINITY; 3])),
-        5 => world.put(id, Aabb::from_center([1e30, -3e38, at[2]], half)),
-        6 => world.remove(id),
-        7 => world.set(id, Aabb::from_center(at, half), filter),
-        8 if id < world.len() => world.set(id, world.boxes[id as usize], filter),
-        9 if id < world.len() => world.put(id, world.boxes[id as usize]),
-        _ if id < world.len() => world.shift(id, at.map(|x| 0.04 * x)),
-        _ => {}
-    }
-}
-
 /// Finds all pairs of a set: no matter of the world that the device follows.
 fn find_all(gpu: &mut GpuFinder, boxes: &[Aabb]) {
     let request =
@@ -58,15 +36,14 @@ fn find_all(gpu: &mut GpuFinder, boxes: &[Aabb]) {
 /// Runs random updates on one device. Now and then another backend does one, or all pairs are found. Returns the numbers of chunks and of repeats.
 fn follow_at_random(seed: u64, boxes: usize, updates: usize, mut gpu: GpuFinder) -> [u32; 2] {
     let rng = &mut StdRng::seed_from_u64(seed);
-    let start = |_| Aabb::from_center(std::array::from_fn(|_| rng.random_range(0.0..11.0)), [0.7; 3]);
-    let mut world = DeviceWorld::new(&(0..boxes).map(start).collect::<Vec<_>>());
+    let mut world = DeviceWorld::random(boxes, rng);
     let [mut chunks, mut repeats] = [0; 2];
     for update in 0..updates {
         let tracked = world.follow(&mut gpu).expect("no device fails here");
         assert_eq!(tracked.report.uploaded > 0, world.len() > 0, "update {update}");
         (chunks, repeats) = (chunks + tracked.report.chunks, repeats + tracked.report.repeats);
         for _ in 0..rng.random_range(0..2 * boxes / 3) {
-            disturb(&mut world, rng);
+            world.disturb(rng);
         }
         match rng.random_range(0..8) {
             0 => {

@@ -2,7 +2,8 @@
 
 use pbig_core::{Aabb, Backend, Config, Error, Finder, Limits, Order, Pair, ProxyFilter, oracle};
 use pbig_gpu::Coding;
-use pbig_tests::{Way, corpus, difference, gpu, may_run, on_threads, set, shifted, strategies};
+use pbig_harness::corpus::random_case;
+use pbig_tests::{Way, corpus, difference, gpu, may_run, on_cpu, on_threads, set, shifted, strategies};
 
 pub(crate) fn check(name: &str, boxes: &[Aabb]) {
     check_on(strategies(), name, boxes);
@@ -42,6 +43,15 @@ fn ten_thousand_random_sets_with_every_degenerate_kind() {
         let strategies = strategies().into_iter().filter(|(name, _)| !on_gpu(name) || seed % 25 == 0);
         let name = format!("degenerate, seed {seed}");
         check_on(strategies.collect(), &name, &boxes);
+    }
+}
+
+#[test]
+fn random_sets_of_every_shape() {
+    for seed in 0..100 {
+        let case = random_case(seed);
+        let strategies = on_cpu().map(|(name, config)| (name, config.into()));
+        check_on(strategies.into(), &case.name, &case.boxes);
     }
 }
 

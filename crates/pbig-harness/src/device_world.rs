@@ -6,6 +6,8 @@ use pbig_core::{
     Aabb, ChangeRequest, ChangedBox, DeviceFailure, DeviceFound, Limits, Pair, PairDevice, ProxyFilter,
     oracle,
 };
+use rand::RngExt;
+use rand::rngs::StdRng;
 use std::collections::{BTreeMap, BTreeSet};
 
 /// The state of a broad phase, in the plainest form.
@@ -24,6 +26,12 @@ impl DeviceWorld {
         let mut world = Self::default();
         (0u32..).zip(boxes).for_each(|(id, aabb)| world.set(id, *aabb, ProxyFilter::ALL));
         world
+    }
+
+    /// Returns a world of cubes at random places, for [`DeviceWorld::disturb`].
+    pub fn random(boxes: usize, rng: &mut StdRng) -> Self {
+        let cube = |_| Aabb::from_center(std::array::from_fn(|_| rng.random_range(0.0..11.0)), [0.7; 3]);
+        Self::new(&(0..boxes).map(cube).collect::<Vec<_>>())
     }
 
     #[allow(clippy::len_without_is_empty, reason = "a number of ids")]
@@ -62,6 +70,28 @@ impl DeviceWorld {
 
     pub fn shift(&mut self, id: u32, by: [f32; 3]) {
         self.put(id, shifted(&self.boxes[id as usize], by));
+    }
+
+    /// Changes a box in one of many ways.
+    pub fn disturb(&mut self, rng: &mut StdRng) {
+        let id = rng.random_range(0..self.len() + 2);
+        let at: [f32; 3] = std::array::from_fn(|_| rng.random_range(-1.0..12.0));
+        let half = [rng.random_range(0.1..1.5), rng.random_range(0.1f32..1.5), 0.5];
+        let filter = ProxyFilter { body: id / 2, mask: 1 << rng.random_range(0..3), ..ProxyFilter::ALL };
+        match rng.random_range(0..14) {
+            0 => self.put(id, Aabb::from_center(at, half)),
+            1 => self.put(id, Aabb::NOWHERE),
+            2 => self.put(id, Aabb::new([f32::NEG_INFINITY; 3], [f32::INFINITY, at[1], f32::INFINITY])),
+            3 => self.put(id, Aabb::from_center(at, [30.0; 3])),
+            4 => self.put(id, Aabb::new([f32::INFINITY; 3], [f32::INFINITY; 3])),
+            5 => self.put(id, Aabb::from_center([1e30, -3e38, at[2]], half)),
+            6 => self.remove(id),
+            7 => self.set(id, Aabb::from_center(at, half), filter),
+            8 if id < self.len() => self.set(id, self.boxes[id as usize], filter),
+            9 if id < self.len() => self.put(id, self.boxes[id as usize]),
+            _ if id < self.len() => self.shift(id, at.map(|x| 0.04 * x)),
+            _ => {}
+        }
     }
 
     /// Runs an update on a device, and compares it with brute force.

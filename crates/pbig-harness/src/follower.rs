@@ -1,5 +1,6 @@
 //! A caller of `BroadPhase` that keeps the pairs by its events, and compares them with the oracle.
 
+use crate::boxes::shifted;
 use crate::corpus::difference;
 use pbig_core::{Aabb, BroadPhase, Events, Pair, ProxyFilter, oracle};
 
@@ -58,6 +59,21 @@ impl Follower {
         } else {
             Err(format!("box {id} was present: {was_present}, and `remove` returned the opposite"))
         }
+    }
+
+    /// Sets the boxes of a frame: each moves, and every 17th is absent.
+    ///
+    /// # Errors
+    /// As [`Follower::set`] and [`Follower::remove`].
+    pub fn set_frame(&mut self, start: &[Aabb], frame: usize) -> Result<(), String> {
+        (0..).zip(start).try_for_each(|(id, aabb)| {
+            let number = id as usize;
+            if (number + frame).is_multiple_of(17) {
+                return self.remove(id);
+            }
+            let by = ((number * 7 + frame * 13) % 11) as f32 * 0.1;
+            self.set(id, shifted(aabb, [by; 3]), ProxyFilter::ALL)
+        })
     }
 
     /// Updates, applies the events, and compares with the oracle and with the kept pairs.

@@ -99,6 +99,13 @@ impl Recipe {
     }
 }
 
+/// Returns needles in one layer, of which each would meet half of the others in a grid of cubes, and few touch.
+pub fn crossing(n: usize) -> Vec<Aabb> {
+    let long = |i: usize, half: [f32; 3]| Aabb::from_center([0.0, 0.0, i as f32].map(|x| x * 0.001), half);
+    let half = |i: usize| if i.is_multiple_of(2) { [9.0, 0.0001, 0.0001] } else { [0.0001, 9.0, 0.0001] };
+    (0..n).map(|i| long(i, half(i))).collect()
+}
+
 /// The change that each box of a history undergoes once.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Change {

@@ -14,21 +14,26 @@ pub(crate) struct Device {
 
 impl Device {
     pub(crate) async fn open() -> Result<Self, JsError> {
-        let instance = wgpu::Instance::default();
-        let power_preference = wgpu::PowerPreference::HighPerformance;
-        let options = wgpu::RequestAdapterOptions { power_preference, ..Default::default() };
-        let adapter = instance.request_adapter(&options).await.map_err(to_js)?;
-        let required_features = adapter.features() & wgpu::Features::TIMESTAMP_QUERY;
-        let limits = wgpu::Limits::default();
-        let descriptor = wgpu::DeviceDescriptor {
-            required_features,
-            required_limits: limits.clone(),
-            ..Default::default()
-        };
-        let (device, queue) = adapter.request_device(&descriptor).await.map_err(to_js)?;
+        let (device, queue) = request().await.map_err(to_js)?;
+        let has_timestamps = device.features().contains(wgpu::Features::TIMESTAMP_QUERY);
         let finder = GpuFinder::from_device(device, queue).map_err(to_js)?;
-        Ok(Self { finder, limits, has_timestamps: !required_features.is_empty() })
+        Ok(Self { finder, limits: wgpu::Limits::default(), has_timestamps })
     }
+}
+
+/// Returns a device of the adapter, with timestamps if it has them.
+///
+/// # Errors
+/// The browser's reason.
+pub(crate) async fn request() -> Result<(wgpu::Device, wgpu::Queue), String> {
+    let instance = wgpu::Instance::default();
+    let power_preference = wgpu::PowerPreference::HighPerformance;
+    let options = wgpu::RequestAdapterOptions { power_preference, ..Default::default() };
+    let adapter = instance.request_adapter(&options).await.map_err(|error| error.to_string())?;
+    let required_features = adapter.features() & wgpu::Features::TIMESTAMP_QUERY;
+    let required_limits = wgpu::Limits::default();
+    let descriptor = wgpu::DeviceDescriptor { required_features, required_limits, ..Default::default() };
+    adapter.request_device(&descriptor).await.map_err(|error| error.to_string())
 }
 
 /// Finds all pairs in ascending order. `found` keeps its memory.

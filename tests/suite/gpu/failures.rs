@@ -1,25 +1,18 @@
 //! Contract: a device that fails or is lost at any moment costs no pair and no event.
 
 use super::{find, on_cpu, set, with_device};
-use pbig_core::{Backend, BroadPhase, Config, Finder, ProxyFilter, oracle};
-use pbig_gpu::testing::Fault;
+use pbig_core::{Backend, BroadPhase, Config, Finder, oracle};
+use pbig_gpu::testing::{FAULTS, Fault};
 use pbig_gpu::{Coding, GpuFinder, GpuFinders, GpuOptions, adapters};
 use pbig_harness::follower::Follower;
-use pbig_tests::{corpus, difference, needs_gpu, shifted};
+use pbig_tests::{corpus, difference, needs_gpu};
 use std::time::Duration;
 
 /// Runs frames in which boxes move, appear and disappear, compared with the oracle. Returns why the CPU did a device's work in each.
 fn frames(broad_phase: BroadPhase) -> Vec<Option<String>> {
     let (start, mut world) = (set("pile", 600), Follower::new(broad_phase, 600));
-    let frame = |f: usize| {
-        for (id, b) in start.iter().enumerate() {
-            if (id + f).is_multiple_of(17) {
-                world.remove(id as u32).expect("as both know");
-            } else {
-                let moved = shifted(b, [((id * 7 + f * 13) % 11) as f32 * 0.1; 3]);
-                world.set(id as u32, moved, ProxyFilter::ALL).expect("within the limits");
-            }
-        }
+    let frame = |frame: usize| {
+        world.set_frame(&start, frame).expect("as both know, within the limits");
         world.update().expect("the oracle's pairs");
         world.broad_phase.report().fallback.clone()
     };
@@ -30,16 +23,7 @@ fn frames(broad_phase: BroadPhase) -> Vec<Option<String>> {
 fn a_device_that_fails_in_the_middle_of_a_run_loses_no_event() {
     needs_gpu!();
     let config = Config { margin: 0.05, backend: Backend::Device, ..Config::DEFAULT };
-    for (fault, words) in [
-        (Fault::LoseDevice, "lost"),
-        (Fault::Timeout, "did not answer"),
-        (Fault::Panic, "lost"),
-        (Fault::OutOfMemory, "out of device memory"),
-        (Fault::RefuseShader, "refused"),
-    ] {
-        // Shaders are compiled and buffers are made in the first call only; each call submits, some of them several times.
-        let is_early = matches!(fault, Fault::OutOfMemory | Fault::RefuseShader);
-        let moments = if is_early { &[0][..] } else { &[2, 3, 5, 7] };
+    for (fault, words, moments) in FAULTS {
         let pauses = [Duration::ZERO, Duration::from_secs(3600)];
         for (&at, pause) in moments.iter().flat_map(|at| pauses.map(|pause| (at, pause))) {
             let options = GpuOptions { pause, first_bytes: 0, chunk: [12, 8], ..GpuOptions::DEFAULT };

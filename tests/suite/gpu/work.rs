@@ -5,7 +5,7 @@ use pbig_core::{
     Aabb, Backend, BroadPhase, Config, DeviceFound, Finder, Order, PairDevice, ProxyFilter, SearchRequest,
 };
 use pbig_gpu::{Coding, GpuFinder, GpuFinders, GpuOptions, adapters};
-use pbig_harness::hard::{Part, Recipe, shapes};
+use pbig_harness::hard::{Part, Recipe, crossing, shapes};
 use pbig_shaders::{KERNELS, Stage};
 use pbig_tests::{difference, needs_gpu};
 use std::time::Duration;
@@ -76,7 +76,7 @@ fn a_declined_call_is_the_cpus_and_the_next_may_be_the_devices() {
     let mut cpu =
         BroadPhase::new(Config { backend: Backend::Cpu, ..Config::DEFAULT }).expect("the same margin");
     let mut ways = Vec::new();
-    let tight = crossing();
+    let tight = crossing(20_000);
     let spread = Recipe(vec![Part::CUBES]).boxes(tight.len(), 1);
     for boxes in [&spread, &tight, &spread, &spread, &tight, &spread, &spread, &spread, &spread] {
         for (id, aabb) in (0..).zip(boxes) {
@@ -97,20 +97,13 @@ fn a_declined_call_is_the_cpus_and_the_next_may_be_the_devices() {
 #[test]
 fn a_part_that_the_device_declines_leaves_the_call_to_the_cpu() {
     needs_gpu!();
-    let mut boxes = crossing();
+    let mut boxes = crossing(20_000);
     boxes.extend(set("uniform", 30_000));
     let options = GpuOptions { max_bytes: 1 << 20, ..GpuOptions::DEFAULT };
     let mut finder = with(options).finder();
     assert_eq!(difference(finder.find(&boxes).expect("few pairs"), &on_cpu(&boxes)), None);
     let why = finder.report().fallback.clone().expect("a part is declined");
     assert!(why.contains("declined") && !why.contains("of 50000 boxes"), "{why}");
-}
-
-/// Needles in one layer, of which each would meet half of the others in a grid of cubes, and few touch.
-fn crossing() -> Vec<Aabb> {
-    let long = |i: usize, half: [f32; 3]| Aabb::from_center([0.0, 0.0, i as f32].map(|x| x * 0.001), half);
-    let half = |i: usize| if i.is_multiple_of(2) { [9.0, 0.0001, 0.0001] } else { [0.0001, 9.0, 0.0001] };
-    (0..20_000).map(|i| long(i, half(i))).collect()
 }
 
 #[test]

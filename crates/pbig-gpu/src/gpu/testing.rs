@@ -9,6 +9,16 @@ use crate::pbig::Summary;
 use pbig_core::Aabb;
 use pbig_shaders::Kernel;
 
+/// The faults, a word of each one's report, and the numbers of submissions after which it is injected: shaders are compiled and
+/// buffers are made in the first call only, and each call submits, some of them several times.
+pub const FAULTS: [(Fault, &str, &[u32]); 5] = [
+    (Fault::LoseDevice, "lost", &[2, 3, 5, 7]),
+    (Fault::Timeout, "did not answer", &[2, 3, 5, 7]),
+    (Fault::Panic, "lost", &[2, 3, 5, 7]),
+    (Fault::OutOfMemory, "out of device memory", &[0]),
+    (Fault::RefuseShader, "refused", &[0]),
+];
+
 /// Returns the kernels' parameters for a grid of the boxes with at most `max_cells` cells. Only what the plan sets is filled in.
 pub fn plan_params(boxes: &[Aabb], options: &GpuOptions, max_cells: u32) -> Params {
     GpuPlan::new(&Summary::of(boxes), options, 1.0, max_cells).add_to(Params::default())

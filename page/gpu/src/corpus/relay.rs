@@ -1,0 +1,186 @@
+//! The device of a finder or a world in a page, which may not wait in a call: the answer is there before the core asks.
+
+use pbig_core::{
+    Aabb, Backend, BroadPhase, ChangeRequest, ChangedBox, Config, DeviceFailure, DeviceFound, Finder, Limits,
+    Pair, PairDevice, ProxyFilter, Report, SearchRequest,
+};
+use pbig_gpu::GpuFinder;
+use pbig_harness::corpus::difference;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+/// Settings that ask for the device.
+pub(super) const ON_DEVICE: Config = Config { backend: Backend::Device, ..Config::DEFAULT };
+
+/// Settings without a device.
+pub(super) const ON_CPU: Config = Config { backend: Backend::Cpu, ..Config::DEFAULT };
+
+/// A device that gives the core the answer of another one.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Relay(Arc<Mutex<State>>);
+
+#[derive(Debug, Default)]
+struct State {
+    answer: Option<Result<DeviceFound, DeviceFailure>>,
+    /// The last question without an answer.
+    asked: Option<Update>,
+    /// The core has asked to forget the last update since then.
+    must_forget: bool,
+}
+
+/// A copy of a [`ChangeRequest`].
+#[derive(Debug)]
+struct Update {
+    boxes: Vec<Aabb>,
+    filters: Vec<ProxyFilter>,
+    changed: Vec<ChangedBox>,
+    kept: u64,
+    max_pairs: u64,
+}
+
+impl Update {
+    fn of(request: &ChangeRequest<'_>) -> Self {
+        let &ChangeRequest { boxes, filters, changed, kept, max_pairs } = request;
+        let (boxes, filters, changed) = (boxes.to_vec(), filters.to_vec(), changed.to_vec());
+        Self { boxes, filters, changed, kept, max_pairs }
+    }
+
+    fn request(&self) -> ChangeRequest<'_> {
+        let Self { boxes, filters, changed, kept, max_pairs } = self;
+        ChangeRequest { boxes, filters, changed, kept: *kept, max_pairs: *max_pairs }
+    }
+}
+
+impl Relay {
+    /// Returns a world whose device this is.
+    pub(super) fn world(&self, config: Config) -> Result<BroadPhase, String> {
+        BroadPhase::with_device(config, Box::new(self.clone())).map_err(|error| error.to_string())
+    }
+
+    /// Gets the device's answer to the next update of a world. A copy of the world asks the question.
+    pub(super) async fn ask(&self, world: &BroadPhase, gpu: &mut GpuFinder) {
+        // The update of the copy is the CPU's, and may exceed a limit.
+        let _ = world.clone().update();
+        let (asked, must_forget) = {
+            let mut state = self.state();
+            (state.asked.take(), std::mem::take(&mut state.must_forget))
+        };
+        if must_forget {
+            gpu.forget();
+        }
+        if let Some(asked) = asked {
+            let mut found = DeviceFound::default();
+            let done = gpu.find_changed_async(&asked.request(), &mut found).await;
+            self.state().answer = Some(done.map(|()| found));
+        }
+    }
+
+    fn state(&self) -> MutexGuard<'_, State> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Returns the answer, if there is one.
+    fn take(&self, found: &mut DeviceFound) -> Result<(), DeviceFailure> {
+        let none = || Err(DeviceFailure::Declined("there is no answer yet".into()));
+        *found = self.state().answer.take().unwrap_or_else(none)?;
+        Ok(())
+    }
+}
+
+impl PairDevice for Relay {
+    fn find_all(&mut self, _: &SearchRequest<'_>, found: &mut DeviceFound) -> Result<(), DeviceFailure> {
+        self.take(found)
+    }
+
+    fn find_changed(
+        &mut self,
+        request: &ChangeRequest<'_>,
+        found: &mut DeviceFound,
+    ) -> Result<(), DeviceFailure> {
+        let mut state = self.state();
+        if state.answer.is_none() {
+            state.asked = Some(Update::of(request));
+        }
+        drop(state);
+        self.take(found)
+    }
+
+    /// The device has forgotten already if its answer is there.
+    fn forget(&mut self) {
+        let mut state = self.state();
+        state.must_forget = state.answer.is_none();
+    }
+
+    fn name(&self) -> Option<&str> {
+        Some("relay")
+    }
+
+    fn is_software(&self) -> bool {
+        false
+    }
+
+    fn clone_box(&self) -> Box<dyn PairDevice> {
+        Box::new(self.clone())
+    }
+}
+
+/// The pairs of a finder, and its report.
+#[derive(Debug)]
+pub(super) struct Found {
+    pub(super) pairs: Vec<Pair>,
+    pub(super) report: Report,
+}
+
+/// Finds pairs by a finder with the device.
+///
+/// # Errors
+/// If its bytes differ from those of a finder on the CPU.
+pub(super) async fn check(
+    gpu: &mut GpuFinder,
+    boxes: &[Aabb],
+    filters: Option<&[ProxyFilter]>,
+) -> Result<Found, String> {
+    let max_pairs = Limits::DEFAULT.max_pairs;
+    let request = SearchRequest { boxes, filters, is_sorted: true, max_pairs };
+    let mut found = DeviceFound::default();
+    let done = gpu.find_all_async(&request, &mut found).await;
+    compare(done.map(|()| found), boxes, filters)
+}
+
+/// As [`check`], with the answer of the device.
+pub(super) fn compare(
+    answer: Result<DeviceFound, DeviceFailure>,
+    boxes: &[Aabb],
+    filters: Option<&[ProxyFilter]>,
+) -> Result<Found, String> {
+    let relay = Relay::default();
+    relay.state().answer = Some(answer);
+    let (pairs, report) = find(Finder::with_device(ON_DEVICE, Box::new(relay)), boxes, filters)?;
+    let (wanted, _) = find(Finder::new(ON_CPU), boxes, filters)?;
+    difference(&pairs, &wanted).map_or(Ok(Found { pairs, report }), Err)
+}
+
+fn find(
+    mut finder: Finder,
+    boxes: &[Aabb],
+    filters: Option<&[ProxyFilter]>,
+) -> Result<(Vec<Pair>, Report), String> {
+    let found = match filters {
+        Some(filters) => finder.find_filtered(boxes, filters),
+        None => finder.find(boxes),
+    };
+    let pairs = found.map_err(|error| error.to_string())?.to_vec();
+    Ok((pairs, finder.report().clone()))
+}
+
+/// Returns an error unless a report says that the CPU did the work, and this word of the reason.
+pub(super) fn expect(report: &Report, word: &str) -> Result<(), String> {
+    match &report.fallback {
+        Some(why) if why.contains(word) => Ok(()),
+        other => Err(format!("not {word:?} but {other:?} is the reason for the CPU's work")),
+    }
+}
+
+/// Returns an error if a report says that the CPU did the work.
+pub(super) fn expect_device(report: &Report) -> Result<(), String> {
+    report.fallback.as_ref().map_or(Ok(()), |why| Err(format!("the CPU did the work: {why}")))
+}
