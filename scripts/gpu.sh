@@ -81,13 +81,14 @@ run_dawn() {
     needs Dawn "$file" node npm || return 0
     install_dawn
     build_module
-    step env VK_DRIVER_FILES="$file" node wasm/gpu/run.mjs "$out/module"
+    step env VK_DRIVER_FILES="$file" timeout 2h node wasm/gpu/run.mjs "$out/module"
 }
 
 run_chromium() {
     needs Chromium chromium node || return 0
     build_module
-    step node wasm/gpu/run.mjs "$out/module" chromium
+    # A panic of the module can leave the page waiting.
+    step timeout --foreground 1h node wasm/gpu/run.mjs "$out/module" chromium
 }
 
 # compile TEXT KERNEL: prints the seconds that FXC takes, and fails if they exceed the limit.

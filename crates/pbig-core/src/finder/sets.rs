@@ -123,7 +123,7 @@ impl<'a> Side<'a> {
     }
 }
 
-/// What is left of a piece: the number of boxes, their bounds, and how many were valid before.
+/// A piece after its boxes have been dropped: the number and bounds of the others, and how many were valid before.
 struct Kept {
     len: usize,
     valid: u64,

@@ -136,7 +136,7 @@ struct Seeker {
 
 impl<S: Simd> Scan<'_, '_, S> {
     /// Visits five runs for each box: the rest of its row of three cells, and the four rows of three cells above it and
-    /// in the next layer. The first block of a run is tested unseen: most have no second one.
+    /// in the next layer.
     #[inline(always)]
     fn runs(&mut self, slots: Range<usize>) {
         let (dx, layer) = (self.cells.dims[0] as usize, (self.cells.dims[0] * self.cells.dims[1]) as usize);
@@ -149,24 +149,34 @@ impl<S: Simd> Scan<'_, '_, S> {
             let row = |key: usize| (start(key), start(key + 3));
             let (above, next) = (key + dx - 1, key + layer - 1);
             let runs = [(slot + 1, start(key + 2)), row(above), row(next - dx), row(next), row(next + dx)];
-            let (one, mut longest) = (Seeker { slot, query: query_of(codes[slot]) }, 0);
-            for (first, end) in runs {
-                // SAFETY: `first` is a start, or `slot + 1`: at most the number of slots.
-                let block = unsafe { self.grid.block(first) };
-                self.test(one, block, (first, end));
-                self.writer.tests += (end - first) as u64;
-                longest = longest.max(end - first);
-            }
-            if longest > BLOCK {
-                for (first, end) in runs {
-                    self.rest(one, (first + BLOCK, end));
-                }
-            }
-            self.make_room();
+            // SAFETY: each begins at a start, or at `slot + 1`: at most the number of slots.
+            unsafe { self.few(Seeker { slot, query: query_of(codes[slot]) }, runs) };
             if self.hits.is_full {
                 break;
             }
         }
+    }
+
+    /// Tests a few runs of slots. The first block of each is tested unseen: most have no second one.
+    ///
+    /// # Safety
+    /// Each run begins at most at the number of slots in use.
+    #[inline(always)]
+    unsafe fn few<const N: usize>(&mut self, one: Seeker, runs: [(usize, usize); N]) {
+        let mut longest = 0;
+        for (first, end) in runs {
+            // SAFETY: the caller's promise.
+            let block = unsafe { self.grid.block(first) };
+            self.test(one, block, (first, end));
+            self.writer.tests += (end - first) as u64;
+            longest = longest.max(end - first);
+        }
+        if longest > BLOCK {
+            for (first, end) in runs {
+                self.rest(one, (first + BLOCK, end));
+            }
+        }
+        self.make_room();
     }
 
     /// Tests the slots from `first` up to `end`.
@@ -260,8 +270,8 @@ impl<S: Simd> Scan<'_, '_, S> {
         }
     }
 
-    /// Tests a window of up to two rows in up to two layers, as most are. Rows that it lacks are empty, and the first block of a row is
-    /// tested unseen: no branch depends on where the box lies.
+    /// Tests a window of up to two rows in up to two layers, as most are. Rows that it lacks are empty: no branch depends on where the
+    /// box lies.
     #[inline(always)]
     fn four_rows(&mut self, one: Seeker, &Window { low, high }: &Window) {
         let count = (high[0] - low[0] + 1) as usize;
@@ -277,20 +287,8 @@ impl<S: Simd> Scan<'_, '_, S> {
             row(high[1], high[2], is_higher & is_deeper),
         ];
         self.hits.runs += 4;
-        let mut longest = 0;
-        for (first, end) in runs {
-            // SAFETY: `first` is a start: at most the number of slots.
-            let block = unsafe { self.grid.block(first) };
-            self.test(one, block, (first, end));
-            self.writer.tests += (end - first) as u64;
-            longest = longest.max(end - first);
-        }
-        if longest > BLOCK {
-            for (first, end) in runs {
-                self.rest(one, (first + BLOCK, end));
-            }
-        }
-        self.make_room();
+        // SAFETY: each begins at a start: at most the number of slots.
+        unsafe { self.few(one, runs) };
     }
 
     /// Tests a row of cells.

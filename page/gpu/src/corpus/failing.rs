@@ -38,7 +38,7 @@ pub(super) async fn faults() -> Result<Counts, String> {
     Ok(vec![("faults", failed), ("devices used again", recovered), ("devices paused", paused)])
 }
 
-/// Plays frames, compared with brute force. Returns true if the device is used in the frame after its fault.
+/// Plays frames, compared with brute force. Returns true if the device is used in the frames after its fault.
 async fn frames(mut gpu: GpuFinder, word: &str) -> Result<bool, String> {
     let start = set("pile", 600);
     let relay = Relay::default();
@@ -51,8 +51,11 @@ async fn frames(mut gpu: GpuFinder, word: &str) -> Result<bool, String> {
     let is_fault = |why: &Option<String>| why.as_ref().is_some_and(|why| why.contains(word));
     let failed = reasons.iter().position(is_fault).ok_or("the fault was not reported")?;
     let has_worked = reasons[..failed].iter().all(Option::is_none);
-    let after = reasons.get(failed + 1).ok_or("the last frame failed")?;
-    if has_worked { Ok(after.is_none()) } else { Err(format!("{reasons:?}")) }
+    let (after, is_used_again) =
+        (&reasons[failed + 1..], reasons.get(failed + 1).is_some_and(Option::is_none));
+    // It stays in use, or paused, to the end.
+    let is_steady = after.iter().all(|why| why.is_none() == is_used_again);
+    if has_worked && is_steady && !after.is_empty() { Ok(is_used_again) } else { Err(format!("{reasons:?}")) }
 }
 
 /// Plays a frame. Returns why the CPU did the device's work, if it did.

@@ -2,7 +2,7 @@
 
 use super::parts::{Counts, open, set};
 use super::relay::{Found, ON_CPU, ON_DEVICE, Relay, check, compare, expect, expect_device};
-use pbig_core::{Aabb, BroadPhase, DeviceFailure, DeviceReport, ProxyFilter};
+use pbig_core::{Aabb, BroadPhase, DeviceFailure, DeviceReport, Order, ProxyFilter};
 use pbig_gpu::{Coding, GpuFinder, GpuOptions};
 use pbig_harness::hard::crossing;
 
@@ -154,7 +154,7 @@ pub(super) async fn refused() -> Result<Counts, String> {
         Ok(gpu) => return Err(format!("{} is not refused", gpu.adapter())),
         Err(why) => why,
     };
-    let found = compare(Err(DeviceFailure::Failed(why)), &set("pile", 2000), None)?;
+    let found = compare(Order::Sorted, Err(DeviceFailure::Failed(why)), &set("pile", 2000), None)?;
     expect(&found.report, "the device allows")?;
     Ok(vec![("pairs", found.pairs.len() as u32)])
 }

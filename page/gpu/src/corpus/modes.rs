@@ -13,7 +13,7 @@ pub(super) struct Mode {
     pub(super) most_boxes: usize,
     coding: Coding,
     /// The caller wants the pairs in order.
-    is_sorted: bool,
+    pub(super) is_sorted: bool,
     /// They come in order. Otherwise that is left to the core.
     comes_sorted: bool,
     has_grid: bool,

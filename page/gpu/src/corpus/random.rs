@@ -2,9 +2,9 @@
 
 use super::modes::{MODES, Mode, filters};
 use super::parts::{Counts, open};
-use super::relay::{Found, ON_CPU, ON_DEVICE, Relay, check, expect, expect_device};
+use super::relay::{Found, ON_CPU, ON_DEVICE, Relay, check, check_in, expect, expect_device};
 use super::update;
-use pbig_core::{Aabb, BroadPhase, PairDevice, Report, oracle};
+use pbig_core::{Aabb, BroadPhase, Order, PairDevice, Report, oracle};
 use pbig_gpu::{Coding, GpuFinder, GpuOptions};
 use pbig_harness::corpus::{difference, random_case};
 use pbig_harness::device_world::DeviceWorld;
@@ -17,39 +17,50 @@ const SETS: u64 = 160;
 /// Number of updates of a random world.
 const UPDATES: u32 = 14;
 
-/// Finds the pairs of random sets: every second one with filters, the modes in turn.
+/// Finds the pairs of random sets, with and without filters, in random modes.
 pub(super) async fn sets() -> Result<Counts, String> {
     let mut gpu = open().await?;
     let (mut pairs, mut by_device) = (0, 0);
     for seed in 0..SETS {
-        let case = random_case(seed);
-        gpu = gpu.with_options(mode_of(seed, case.boxes.len()).options());
-        let report = random_set(&mut gpu, seed, &case.boxes).await;
-        let report = report.map_err(|why| format!("{}: {why}", case.name))?;
+        let (case, rng) = (random_case(seed), &mut StdRng::seed_from_u64(!seed));
+        let mode = mode_for(case.boxes.len(), rng);
+        gpu = gpu.with_options(mode.options());
+        let report = random_set(&mut gpu, mode, &case.boxes, rng.random()).await;
+        let report = report.map_err(|why| format!("{}, {}: {why}", case.name, mode.name))?;
         pairs += report.pairs as u32;
-        by_device += u32::from(report.fallback.is_none());
+        by_device += u32::from(report.device.is_some());
         if report.fallback.is_some() {
             // It would decline sets of this size unseen.
             gpu = gpu.clone();
         }
     }
+    if by_device < SETS as u32 * 3 / 4 {
+        return Err(format!("the device found {by_device} of {SETS} sets"));
+    }
     Ok(vec![("sets", SETS as u32), ("by the device", by_device), ("pairs", pairs)])
 }
 
 /// Returns a mode that takes this number of boxes.
-fn mode_of(seed: u64, boxes: usize) -> &'static Mode {
-    let modes = || MODES.iter().filter(|mode| !mode.finds_changes && boxes <= mode.most_boxes);
-    modes().cycle().nth(seed as usize / 2 % MODES.len()).unwrap_or(&MODES[0])
+fn mode_for(boxes: usize, rng: &mut StdRng) -> &'static Mode {
+    let takes = |mode: &&Mode| !mode.finds_changes && boxes <= mode.most_boxes;
+    let modes: Vec<_> = MODES.iter().filter(takes).collect();
+    modes[rng.random_range(0..modes.len())]
 }
 
-async fn random_set(gpu: &mut GpuFinder, seed: u64, boxes: &[Aabb]) -> Result<Report, String> {
+async fn random_set(
+    gpu: &mut GpuFinder,
+    mode: &Mode,
+    boxes: &[Aabb],
+    has_filters: bool,
+) -> Result<Report, String> {
     let filters = filters(boxes.len());
-    let (filters, wanted) = if seed.is_multiple_of(2) {
-        (None, oracle::pairs(boxes))
-    } else {
+    let (filters, wanted) = if has_filters {
         (Some(&filters[..]), oracle::pairs_filtered(boxes, &filters))
+    } else {
+        (None, oracle::pairs(boxes))
     };
-    let Found { pairs, report } = check(gpu, boxes, filters).await?;
+    let order = if mode.is_sorted { Order::Sorted } else { Order::Unspecified };
+    let Found { pairs, report } = check_in(order, gpu, boxes, filters).await?;
     difference(&pairs, &wanted).map_or(Ok(()), Err)?;
     if report.fallback.is_some() {
         expect(&report, "declined")?;
@@ -81,7 +92,7 @@ pub(super) async fn changes() -> Result<Counts, String> {
         ("updates", alone[0]),
         ("events", alone[1]),
         ("updates beside the CPU", beside[0]),
-        ("events", beside[1]),
+        ("events beside the CPU", beside[1]),
     ])
 }
 

@@ -2,7 +2,7 @@
 
 use pbig_core::{
     Aabb, Backend, BroadPhase, ChangeRequest, ChangedBox, Config, DeviceFailure, DeviceFound, Finder, Limits,
-    Pair, PairDevice, ProxyFilter, Report, SearchRequest,
+    Order, Pair, PairDevice, ProxyFilter, Report, SearchRequest,
 };
 use pbig_gpu::GpuFinder;
 use pbig_harness::corpus::difference;
@@ -14,7 +14,8 @@ pub(super) const ON_DEVICE: Config = Config { backend: Backend::Device, ..Config
 /// Settings without a device.
 pub(super) const ON_CPU: Config = Config { backend: Backend::Cpu, ..Config::DEFAULT };
 
-/// A device that gives the core the answer of another one.
+/// A device that gives the core the answer of another one. A copy of the world asks, and notes the question here; the other device
+/// answers it; then the world's own update takes the answer. See [`Relay::ask`].
 #[derive(Clone, Debug, Default)]
 pub(super) struct Relay(Arc<Mutex<State>>);
 
@@ -139,22 +140,37 @@ pub(super) async fn check(
     boxes: &[Aabb],
     filters: Option<&[ProxyFilter]>,
 ) -> Result<Found, String> {
-    let max_pairs = Limits::DEFAULT.max_pairs;
-    let request = SearchRequest { boxes, filters, is_sorted: true, max_pairs };
-    let mut found = DeviceFound::default();
-    let done = gpu.find_all_async(&request, &mut found).await;
-    compare(done.map(|()| found), boxes, filters)
+    check_in(Order::Sorted, gpu, boxes, filters).await
 }
 
-/// As [`check`], with the answer of the device.
+/// As [`check`], with pairs in this order.
+pub(super) async fn check_in(
+    order: Order,
+    gpu: &mut GpuFinder,
+    boxes: &[Aabb],
+    filters: Option<&[ProxyFilter]>,
+) -> Result<Found, String> {
+    let max_pairs = Limits::DEFAULT.max_pairs;
+    let request = SearchRequest { boxes, filters, is_sorted: order == Order::Sorted, max_pairs };
+    let mut found = DeviceFound::default();
+    let done = gpu.find_all_async(&request, &mut found).await;
+    compare(order, done.map(|()| found), boxes, filters)
+}
+
+/// As [`check_in`], with the answer of the device.
 pub(super) fn compare(
+    order: Order,
     answer: Result<DeviceFound, DeviceFailure>,
     boxes: &[Aabb],
     filters: Option<&[ProxyFilter]>,
 ) -> Result<Found, String> {
     let relay = Relay::default();
     relay.state().answer = Some(answer);
-    let (pairs, report) = find(Finder::with_device(ON_DEVICE, Box::new(relay)), boxes, filters)?;
+    let config = Config { order, ..ON_DEVICE };
+    let (mut pairs, report) = find(Finder::with_device(config, Box::new(relay)), boxes, filters)?;
+    if order == Order::Unspecified {
+        pairs.sort_unstable();
+    }
     let (wanted, _) = find(Finder::new(ON_CPU), boxes, filters)?;
     difference(&pairs, &wanted).map_or(Ok(Found { pairs, report }), Err)
 }
