@@ -47,7 +47,7 @@ where
     }
 
     /// Returns the proxies of a pair, if avian would look at the pair in this update. In its order: of two that look, the one with the
-    /// lower key is the first.
+    /// lower key is the first. (Avian finds a sensor that looks from both sides, in the order of its list of moved proxies.)
     fn proxies(&self, mut slots: [Slot; 2]) -> Option<[&'w ColliderTreeProxy; 2]> {
         // The proxies outlive the borrow of `self`.
         let trees = Res::clone(&self.trees).into_inner();

@@ -8,7 +8,7 @@ use avian::prelude::*;
 use avian_pbig::{ColliderBoxes, PbigBroadPhasePlugin, Shadow};
 use bevy::prelude::*;
 use std::collections::HashMap;
-use support::{RandomWorld, Veto, app, app_with_pbig, plugins};
+use support::{Divisor, Number, RandomWorld, Veto, app, app_with_pbig, plugins};
 
 /// Steps a random world, with changes in each step.
 fn run(app: &mut App, seed: u64, bodies: usize, steps: usize) {
@@ -107,42 +107,35 @@ fn contacts_are_in_the_same_order_each_time() {
     assert_eq!(contacts(), contacts());
 }
 
-/// Returns the contacts by their colliders, the lower one first.
-fn ends_by_pair(app: &App) -> HashMap<[Entity; 2], [Entity; 2]> {
+/// Returns the contacts of numbered bodies by their numbers, the lower one first. Sensors are left out: if both colliders have moved,
+/// avian finds such a pair from both, and which one is first depends on its list of moved proxies.
+fn ends_by_pair(app: &App) -> HashMap<[Number; 2], [Number; 2]> {
     let graph = app.world().resource::<ContactGraph>();
     let pairs = graph.active_pairs().iter().chain(graph.sleeping_pairs());
-    pairs.map(|pair| [pair.collider1, pair.collider2]).map(|ends| (sorted(ends), ends)).collect()
+    let is_sensor = |collider| app.world().get::<Sensor>(collider).is_some();
+    let number = |collider| app.world().get::<Number>(collider).copied().filter(|_| !is_sensor(collider));
+    let ends = pairs.filter_map(|pair| Some([number(pair.collider1)?, number(pair.collider2)?]));
+    ends.map(|ends| ([ends[0].min(ends[1]), ends[0].max(ends[1])], ends)).collect()
 }
 
-fn sorted(mut ends: [Entity; 2]) -> [Entity; 2] {
-    ends.sort_unstable();
-    ends
-}
-
-/// Two worlds get the same changes, and contacts that begin in the same step in both have the same collider first.
+/// Two worlds begin alike. (Later their bodies are in other places, and others of them have moved.)
 #[test]
 fn contacts_have_their_colliders_in_avians_order() {
-    let mut apps = [app_with_pbig(), app(plugins())];
-    let mut worlds = [0, 1].map(|i| RandomWorld::new(&mut apps[i], 7, 300));
-    let (mut before, mut compared, mut turned) = ([HashMap::new(), HashMap::new()], 0, 0);
-    for _ in 0..60 {
-        let now = [0, 1].map(|i| {
-            worlds[i].change(&mut apps[i], 15);
-            apps[i].update();
-            ends_by_pair(&apps[i])
+    let (mut compared, mut turned) = (0, 0);
+    for seed in 10..20 {
+        let [ours, avians] = [app_with_pbig(), app(plugins())].map(|mut app| {
+            RandomWorld::new(&mut app, seed, 300).change(&mut app, 15);
+            // The hooks look at entities, which differ.
+            app.insert_resource(Divisor(0));
+            app.update();
+            ends_by_pair(&app)
         });
-        for (pair, ends) in
-            now[0].iter().filter(|(pair, _)| before.iter().all(|old| !old.contains_key(*pair)))
-        {
-            let Some(avians) = now[1].get(pair) else { continue };
-            assert_eq!(ends, avians);
-            compared += 1;
-            turned += usize::from(ends != pair);
-        }
-        before = now;
+        assert_eq!(ours, avians);
+        compared += ours.len();
+        turned += ours.iter().filter(|(pair, ends)| pair != ends).count();
     }
     assert!(
-        compared > 1000 && turned > 100,
-        "{compared} contacts compared, {turned} begin with the later entity"
+        compared > 500 && turned > 100,
+        "{compared} contacts compared, {turned} begin with the later body"
     );
 }

@@ -53,19 +53,25 @@ pub(crate) fn app_with_pbig() -> App {
 /// Two or three, by the crate that is tested.
 pub(crate) const DIMENSIONS: f32 = size_of::<Position>() as f32 / size_of::<f32>() as f32;
 
+/// The number of a body in the order in which bodies are spawned: the same in two apps, whose entities differ.
+#[derive(Component, Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub(crate) struct Number(pub(crate) u32);
+
 /// The entities of a random world.
 pub(crate) struct RandomWorld {
     rng: StdRng,
     bodies: Vec<Entity>,
     joints: Vec<(Entity, [Entity; 2])>,
     width: f32,
+    spawned: u32,
 }
 
 impl RandomWorld {
     /// Spawns bodies of all kinds.
     pub(crate) fn new(app: &mut App, seed: u64, bodies: usize) -> Self {
         let width = (bodies as f32).powf(1.0 / DIMENSIONS) * 1.5;
-        let mut world = Self { rng: StdRng::seed_from_u64(seed), bodies: vec![], joints: vec![], width };
+        let mut world =
+            Self { rng: StdRng::seed_from_u64(seed), bodies: vec![], joints: vec![], width, spawned: 0 };
         (0..bodies).for_each(|_| world.spawn(app.world_mut()));
         (0..bodies / 10).for_each(|_| world.join(app.world_mut()));
         world
@@ -110,7 +116,9 @@ impl RandomWorld {
 
     fn spawn(&mut self, world: &mut World) {
         let place = self.place();
-        let mut entity = world.spawn((collider(self.rng.random_range(0.2..1.2)), place));
+        let mut entity =
+            world.spawn((collider(self.rng.random_range(0.2..1.2)), place, Number(self.spawned)));
+        self.spawned += 1;
         let body = self.rng.random_range(0..8);
         if body < 7 {
             entity.insert((kind(body), GravityScale(0.0)));
