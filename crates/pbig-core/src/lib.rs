@@ -66,6 +66,7 @@ mod filter;
 mod finder;
 mod grid;
 mod holder;
+mod id_set;
 mod index;
 pub mod oracle;
 mod outcome;

@@ -5,7 +5,6 @@
 //! ```
 
 mod engines;
-mod id_set;
 mod query;
 #[cfg(feature = "serde")]
 mod snapshot;

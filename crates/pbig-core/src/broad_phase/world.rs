@@ -1,6 +1,6 @@
 //! The world: what is kept of each box by id, and which boxes have changed since the last update. It knows no grid.
 
-use super::id_set::IdSet;
+use crate::id_set::IdSet;
 use crate::{Aabb, ProxyFilter};
 
 /// A word for each id: two flags, and 1 + the place in the list of changed ids, or 0.

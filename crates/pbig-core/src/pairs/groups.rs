@@ -3,6 +3,7 @@
 use super::row::{self, SHORT};
 use crate::Pair;
 use crate::grid::{Hits, Simd, dispatch};
+use crate::id_set::IdSet;
 use crate::parallel::{SharedSlice, ensure_scratch, run, run_with};
 use std::ops::{Range, RangeInclusive};
 
@@ -159,14 +160,13 @@ impl Groups {
         others: &mut [u32],
         base: u32,
     ) {
-        let Sorter { firsts, unsorted, .. } = sorter;
         let first_id = self.grouping.ids_of(group).start as u32;
         let pairs = &self.pairs[self.range(group)];
         if LIST {
-            ensure_scratch(firsts, pairs.len(), 0);
+            ensure_scratch(&mut sorter.firsts, pairs.len(), 0);
         }
-        ensure_scratch(unsorted, pairs.len() + SHORT, 0);
-        dispatch!(sort_rows::<LIST>, pairs, (first_id, base), spans, others, firsts, unsorted);
+        ensure_scratch(&mut sorter.unsorted, pairs.len() + SHORT, 0);
+        dispatch!(sort_rows::<LIST>, pairs, (first_id, base), spans, others, sorter);
     }
 }
 
@@ -179,6 +179,8 @@ pub(super) struct Sorter {
     firsts: Vec<u32>,
     /// The `b` of each pair, by row, in no order within it.
     unsorted: Vec<u32>,
+    /// Empty: for rows that are long.
+    long: IdSet,
 }
 
 /// Sorts pairs by the highest bits of `a`, into `to`.
@@ -223,9 +225,9 @@ fn sort_rows<const LIST: bool>(
     (first_id, base): (u32, u32),
     spans: &mut [Span],
     others: &mut [u32],
-    firsts: &mut [u32],
-    unsorted: &mut [u32],
+    sorter: &mut Sorter,
 ) {
+    let Sorter { firsts, unsorted, long, .. } = sorter;
     spans.fill(Span::default());
     for pair in pairs {
         spans[(pair.a - first_id) as usize].len += 1;
@@ -246,7 +248,7 @@ fn sort_rows<const LIST: bool>(
     }
     for span in spans {
         let range = span.range();
-        row::sort_into(simd, unsorted, range, others);
+        row::sort_into(simd, unsorted, range, others, long);
         span.start += base;
     }
 }

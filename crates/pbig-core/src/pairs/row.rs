@@ -2,27 +2,53 @@
 
 use crate::Pair;
 use crate::grid::Simd;
+use crate::id_set::IdSet;
 use std::ops::Range;
 
 /// Ids of a row that one register holds.
 pub(super) const SHORT: usize = 8;
 
+/// Maximum number of ids of a row that is sorted by counting the lesser ones of each. A set of bits sorts longer ones in less time.
+const MEDIUM: usize = 96;
+
 /// Copies the row at `range` of `from` to the same range of `to`, sorted; rows are copied in order, as a short one may
-/// overwrite what comes behind it. A row with a register of elements behind its start is sorted in it.
+/// overwrite what comes behind it. No two ids of a row are equal. A register of elements is behind all rows of `from`.
 #[inline(always)]
-pub(super) fn sort_into(simd: impl Simd, from: &[u32], range: Range<usize>, to: &mut [u32]) {
+pub(super) fn sort_into(
+    simd: impl Simd,
+    from: &[u32],
+    range: Range<usize>,
+    to: &mut [u32],
+    long: &mut IdSet,
+) {
     let (len, to) = (range.len(), &mut to[range.start..]);
-    match from[range.start..].first_chunk() {
-        Some(eight) if len <= SHORT => {
-            let sorted = simd.sorted_short(eight, len);
-            match to.first_chunk_mut() {
-                Some(to) => *to = sorted,
-                None => to[..len].copy_from_slice(&sorted[..len]),
+    if len > MEDIUM {
+        long.sort(&from[range], &mut to[..len]);
+    } else if len > SHORT {
+        sort_by_counting(&from[range.start..], len, &mut to[..len]);
+    } else if let Some(eight) = from[range.start..].first_chunk() {
+        let sorted = simd.sorted_short(eight, len);
+        match to.first_chunk_mut() {
+            Some(to) => *to = sorted,
+            None => to[..len].copy_from_slice(&sorted[..len]),
+        }
+    }
+}
+
+/// Sorts the first `len` of some ids, eight at a time: the place of each is the number of lesser ones.
+#[inline(always)]
+fn sort_by_counting(from: &[u32], len: usize, to: &mut [u32]) {
+    let row = &from[..len];
+    for first in (0..len).step_by(SHORT) {
+        let Some(eight) = from[first..].first_chunk::<SHORT>() else { break };
+        let mut lesser = [0u32; SHORT];
+        for id in row {
+            for lane in 0..SHORT {
+                lesser[lane] += u32::from(*id < eight[lane]);
             }
         }
-        _ => {
-            to[..len].copy_from_slice(&from[range]);
-            to[..len].sort_unstable();
+        for (id, place) in eight.iter().zip(lesser).take(len - first) {
+            to[place as usize] = *id;
         }
     }
 }
@@ -120,6 +146,32 @@ mod tests {
             let [added, removed] = crate::grid::dispatch!(compared, old, new);
             assert_eq!(added, [5, 7].map(|b| Pair { a: 1, b }));
             assert_eq!(removed, [Pair { a: 1, b: 2 }]);
+        }
+    }
+
+    /// Sorts three rows that follow each other.
+    fn sorted(simd: impl Simd, pool: &[u32], len: usize) -> Vec<u32> {
+        let (mut to, mut long) = (vec![0; 3 * len], IdSet::default());
+        for row in 0..3 {
+            sort_into(simd, pool, row * len..(row + 1) * len, &mut to, &mut long);
+        }
+        to
+    }
+
+    #[test]
+    fn rows_of_every_length_are_sorted_at_the_end_of_their_list_too() {
+        for len in 1..300 {
+            // High ones where no set of bits would take memory for the ids below.
+            let base = if len > MEDIUM { 0 } else { u32::MAX - 400_000 };
+            let id = |i: usize| base + (i * 7919 % len) as u32 * 1021 + u32::from(i % 3 == 0);
+            let rows: Vec<Vec<u32>> =
+                (0..3).map(|row| (0..len).map(|i| id(i) + row * 50_000).collect()).collect();
+            // Behind the rows, numbers of no row.
+            let pool = [&rows.concat()[..], &[0, 1, u32::MAX, 3, 4, 5, 6, 7]].concat();
+            let mut wanted = rows;
+            wanted.iter_mut().for_each(|row| row.sort_unstable());
+            assert_eq!(crate::grid::dispatch!(sorted, &pool, len), wanted.concat(), "{len}");
+            assert_eq!(sorted(crate::grid::Portable, &pool, len), wanted.concat(), "{len}, portable");
         }
     }
 }

@@ -17,20 +17,40 @@ impl IdSet {
     }
 
     /// Makes room for ids below `ids`; no member is beyond.
-    pub(super) fn reserve(&mut self, ids: usize) {
+    pub(crate) fn reserve(&mut self, ids: usize) {
         self.bits.resize(ids.div_ceil(64), 0);
         self.words.resize(self.bits.len().div_ceil(64), 0);
     }
 
-    pub(super) fn insert(&mut self, id: u32) {
+    pub(crate) fn insert(&mut self, id: u32) {
         let (word, bit) = (id as usize / 64, 1 << (id % 64));
         self.len += usize::from(self.bits[word] & bit == 0);
         self.bits[word] |= bit;
         self.words[word / 64] |= 1 << (word % 64);
     }
 
+    /// Sorts ids of which no two are equal, into `to`. The set is empty before and after.
+    #[inline(always)]
+    pub(crate) fn sort(&mut self, ids: &[u32], to: &mut [u32]) {
+        let (first, last) = ids.iter().fold((u32::MAX, 0), |(low, high), id| (low.min(*id), high.max(*id)));
+        if self.bits.len() * 64 <= last as usize {
+            self.reserve(last as usize + 1);
+        }
+        for id in ids {
+            self.bits[*id as usize / 64] |= 1 << (id % 64);
+            self.words[*id as usize / 4096] |= 1 << (id / 64 % 64);
+        }
+        let mut to = to.iter_mut();
+        for at in first as usize / 4096..=last as usize / 4096 {
+            for word in ones(at, std::mem::take(&mut self.words[at])) {
+                let members = ones(word as usize, std::mem::take(&mut self.bits[word as usize]));
+                members.zip(&mut to).for_each(|(id, to)| *to = id);
+            }
+        }
+    }
+
     /// Takes out a member.
-    pub(super) fn remove(&mut self, id: u32) {
+    pub(crate) fn remove(&mut self, id: u32) {
         let word = id as usize / 64;
         self.len -= 1;
         self.bits[word] &= !(1 << (id % 64));
@@ -46,13 +66,14 @@ impl IdSet {
     }
 
     /// Gives back memory.
-    pub(super) fn shrink(&mut self) {
+    pub(crate) fn shrink(&mut self) {
         self.bits.shrink_to_fit();
         self.words.shrink_to_fit();
     }
 }
 
 /// Yields the numbers of the bits of the word `at` of many.
+#[inline(always)]
 fn ones(at: usize, mut word: u64) -> impl Iterator<Item = u32> {
     std::iter::from_fn(move || {
         let bit = word.trailing_zeros();
@@ -77,5 +98,20 @@ mod tests {
         assert!(set.iter().eq([0, 63, 65, 4095, 8191]) && set.len() == 5);
         set.reserve(8192);
         assert!(set.iter().eq([0, 63, 65, 4095, 8191]));
+    }
+
+    #[test]
+    fn ids_are_sorted_anywhere_and_leave_the_set_empty() {
+        let mut set = IdSet::default();
+        for (len, step) in [(0, 1), (1, 1), (300, 1), (300, 63), (300, 64), (300, 4097), (5000, 7)] {
+            for first in [0, 5, 100_000] {
+                let sorted: Vec<u32> = (0..len).map(|i| first + i * step).collect();
+                let ids: Vec<u32> = (0..len).map(|i| first + (i * 7919 % len) * step).collect();
+                let mut to = vec![0; len as usize];
+                set.sort(&ids, &mut to);
+                assert!(to == sorted, "{len} ids, {step} apart, from {first}");
+                assert!(set.iter().next().is_none());
+            }
+        }
     }
 }
