@@ -72,6 +72,28 @@ fn random_sets_with_every_degenerate_kind() {
     }
 }
 
+/// A sample of a set does not see one box of thousands: then no box is dropped before the search.
+#[test]
+fn a_few_invalid_and_far_boxes_among_many() {
+    let odd = [
+        Aabb::NOWHERE,
+        Aabb::new([3.0; 3], [2.0; 3]),
+        Aabb::new([f32::NAN; 3], [1.0; 3]),
+        Aabb::from_center([1e9; 3], [1.0; 3]),
+        Aabb::new([f32::NEG_INFINITY; 3], [f32::INFINITY; 3]),
+    ];
+    for (seed, sizes) in [[3000, 3000], [10, 3000], [3000, 70]].into_iter().enumerate() {
+        for odd in odd {
+            let [mut a, mut b] = sizes.map(|n| set("unit", n, seed as u64 + n as u64));
+            for at in 700..703 {
+                a.get_mut(at).into_iter().chain(b.get_mut(at)).for_each(|aabb| *aabb = odd);
+            }
+            check(&format!("{sizes:?} with {odd:?}"), &a, &b);
+            check(&format!("{sizes:?} with {odd:?}, the other way"), &b, &a);
+        }
+    }
+}
+
 #[test]
 fn a_finder_used_for_one_set_and_two_mixes_nothing_up() {
     let [a, b] = [1, 2].map(|seed| set("unit", 3000, seed));
@@ -293,8 +315,8 @@ fn no_two_sets_take_work_without_bound() {
                 let what = format!("{name}, {}, {engine:?}: {small:.2}, {large:.2}", division.0);
                 println!("{what}");
                 assert!(small.max(large) <= WORK_LIMIT as f64, "{what}");
-                // Up to 400 tests for each of 20,000 boxes a grid is searched. Needles in three directions double.
-                assert!(large <= (2.0 * small).max(30.0), "{what}");
+                // Up to an estimated ratio of 31 a grid is searched. Needles in three directions double.
+                assert!(large <= (2.0 * small).max(36.0), "{what}");
             }
         }
     }

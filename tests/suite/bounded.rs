@@ -12,8 +12,8 @@ const MAX_GROWTH: f64 = 2.0;
 /// Maximum growth of the ratio in a tree. Needles between needles exceed it if their part is cut by their own extents alone.
 const MAX_GROWTH_OF_TREES: f64 = 1.25;
 
-/// The ratio up to which a grid is searched: 400 tests for each box of 20,000. Below, it may grow.
-const RATIO_OF_GRIDS: f64 = 30.0;
+/// The ratio up to which a grid is searched, 31, and what its estimate may lack. Below, the ratio may grow.
+const RATIO_OF_GRIDS: f64 = 36.0;
 
 /// Work for each box that an update may take besides one and a half times a search's: an edit hands over before it takes as
 /// long as sorting half of the boxes.

@@ -2,7 +2,7 @@
 //! pair of a few.
 
 use crate::grid::{
-    EditedGrid, GridPlan, Hits, Receiver, Rule, Sorted, TwoGrids, brute_force, brute_force_across,
+    ById, EditedGrid, GridPlan, Hits, Receiver, Rule, Sorted, TwoGrids, brute_force, brute_force_across,
 };
 use crate::holder::Holder;
 use crate::index::BoxIndex;
@@ -12,19 +12,19 @@ use crate::parallel::available_threads;
 use crate::policy::{self, PARALLEL_FROM_BOXES, search};
 use crate::report::{Checks, Clock, stage};
 use crate::streamed;
-use crate::{Aabb, Algorithm, Backend, Config, Engine, Keys, Pair, Plan, ProxyFilter};
+use crate::{Aabb, Algorithm, Backend, Boxes, Config, Engine, Keys, Pair, Plan, ProxyFilter};
 use std::sync::atomic::AtomicU64;
 
 /// A search: boxes, filters and settings.
 #[derive(Clone, Copy)]
 pub(crate) struct Request<'a> {
     pub(crate) boxes: &'a [Aabb],
-    /// With a split, the valid boxes of two sets: the second has the ids from it on. No two boxes of a set pair.
-    pub(crate) split: Option<u32>,
-    /// By id; none if all may pair.
-    pub(crate) filters: Option<&'a [ProxyFilter]>,
-    /// By id; none if boxes have no keys.
-    pub(crate) keys: Option<&'a [Keys]>,
+    /// The boxes of another set, whose ids are behind those of `boxes`. With it no two boxes of a set pair.
+    pub(crate) others: Option<&'a [Aabb]>,
+    /// None if all may pair.
+    pub(crate) filters: Option<ById<'a, ProxyFilter>>,
+    /// None if boxes have no keys.
+    pub(crate) keys: Option<ById<'a, Keys>>,
     /// None if pairs are listed.
     pub(crate) receiver: Option<Receiver<'a>>,
     pub(crate) config: &'a Config,
@@ -35,7 +35,27 @@ pub(crate) struct Request<'a> {
 impl<'a> Request<'a> {
     /// Makes a search for all pairs of boxes, whose groups are not counted.
     pub(crate) fn new(boxes: &'a [Aabb], config: &'a Config) -> Self {
-        Self { boxes, split: None, filters: None, keys: None, receiver: None, config, grouping: None }
+        Self { boxes, others: None, filters: None, keys: None, receiver: None, config, grouping: None }
+    }
+
+    /// Makes a search for the pairs of one set.
+    pub(crate) fn of_one(all: &Boxes<'a>, config: &'a Config) -> Self {
+        let Boxes { boxes, filters, keys } = *all;
+        let (filters, keys) = (filters.map(ById::of_one), keys.map(ById::of_one));
+        Self { filters, keys, ..Self::new(boxes, config) }
+    }
+
+    /// Returns the number of boxes, of both sets.
+    fn count(&self) -> usize {
+        self.boxes.len() + self.others.map_or(0, <[_]>::len)
+    }
+
+    /// Returns the boxes in one list, and the first id of the second set, if there is one. Two sets are copied into a buffer.
+    fn in_one_list<'b>(&'b self, both_sets: &'b mut Vec<Aabb>) -> (&'b [Aabb], Option<u32>) {
+        let Some(others) = self.others else { return (self.boxes, None) };
+        both_sets.clear();
+        both_sets.extend(self.boxes.iter().chain(others));
+        (both_sets, Some(self.boxes.len() as u32))
     }
 
     /// Returns the rule for pairs, which `found` counts.
@@ -47,10 +67,9 @@ impl<'a> Request<'a> {
 
     /// Returns true if every pair should be tested.
     fn is_for_brute_force(&self) -> bool {
-        let boxes = self.boxes.len();
-        let smaller = self.split.map(|split| (split as usize).min(boxes - split as usize));
-        let is_few =
-            boxes <= policy::BRUTE_FORCE_UP_TO_BOXES || smaller.is_some_and(|few| few <= policy::FEW_BOXES);
+        let smaller = self.others.map(|others| others.len().min(self.boxes.len()));
+        let is_few = self.count() <= policy::BRUTE_FORCE_UP_TO_BOXES
+            || smaller.is_some_and(|few| few <= policy::FEW_BOXES);
         let may_be_brute = self.config.engine.is_none() || smaller == Some(0);
         self.config.backend == Backend::Brute || may_be_brute && is_few
     }
@@ -62,6 +81,8 @@ pub(crate) struct Store {
     pub(crate) grid: EditedGrid,
     two_grids: TwoGrids,
     pub(crate) tree: BoxIndex,
+    /// Both sets in one list, for a tree.
+    both_sets: Vec<Aabb>,
     /// Tests of the last search that was done.
     pub(crate) work: u64,
 }
@@ -128,7 +149,7 @@ impl AllPairs {
     }
 
     fn begin(&mut self, request: &Request<'_>) {
-        let workers = Self::workers(request.boxes.len());
+        let workers = Self::workers(request.count());
         self.hits.resize_with(workers, Hits::default);
         self.hits.iter_mut().for_each(|hits| hits.begin_for(request.grouping));
     }
@@ -136,11 +157,8 @@ impl AllPairs {
     fn test_all(&mut self, request: &Request<'_>, rule: &Rule<'_>, outcome: &mut Outcome) {
         stage!("check");
         let mut clock = Clock::start();
-        let boxes = match request.split {
-            Some(split) => {
-                brute_force_across(request.boxes, split as usize, rule, &mut self.hits);
-                request.boxes.len()
-            }
+        let boxes = match request.others {
+            Some(others) => brute_force_across(request.boxes, others, rule, &mut self.hits),
             None => brute_force(request.boxes, rule, &mut self.hits[0]),
         };
         let algorithm = if boxes < 2 { Algorithm::Nothing } else { Algorithm::Brute };
@@ -150,17 +168,17 @@ impl AllPairs {
 
     fn search(&mut self, request: &Request<'_>, store: &mut Store, rule: &Rule<'_>, outcome: &mut Outcome) {
         let (boxes, workers) = (request.boxes, self.hits.len());
-        let Store { grid, two_grids, tree, .. } = store;
+        let Store { grid, two_grids, tree, both_sets, .. } = store;
         let mut clock = Clock::start();
         let plan = {
             stage!("plan");
-            GridPlan::new(boxes, request.split.is_some(), workers)
+            GridPlan::new(boxes, request.others, workers)
         };
         outcome.stages.plan += clock.lap();
         let sorted = {
             stage!("map");
-            match request.split {
-                Some(split) => two_grids.build(plan, boxes, split as usize, workers),
+            match request.others {
+                Some(others) => two_grids.build(plan, [boxes, others], workers),
                 None => grid.build(plan, boxes, workers),
             }
         };
@@ -174,7 +192,7 @@ impl AllPairs {
         outcome.holder = Holder::Grid;
         outcome.plan = Plan::of_grid(&plan, sorted.boxes(), sorted.oversize_count());
         if !is_grid {
-            self.search_tree(request, tree, rule, outcome);
+            self.search_tree(request, (tree, both_sets), rule, outcome);
         }
     }
 
@@ -197,35 +215,33 @@ impl AllPairs {
     fn search_tree(
         &mut self,
         request: &Request<'_>,
-        tree: &mut BoxIndex,
+        (tree, both_sets): (&mut BoxIndex, &mut Vec<Aabb>),
         rule: &Rule<'_>,
         outcome: &mut Outcome,
     ) {
         let mut clock = Clock::start();
+        let (boxes, split) = request.in_one_list(both_sets);
         {
             stage!("map");
-            tree.sort_sets(request.boxes, request.split);
+            tree.sort_sets(boxes, split);
         }
         outcome.stages.map += clock.lap();
-        self.join(request, tree, rule);
+        {
+            stage!("check");
+            let most = search::join_up_to_work(boxes.len());
+            let may_stream = request.config.engine != Some(Engine::Tree);
+            let is_heavy = may_stream && tree.vain_work(split, most, &mut self.hits[0]) > most;
+            self.hits[0].begin_for(request.grouping);
+            // A tree does not cut boxes apart that cross.
+            if is_heavy {
+                streamed::find_pairs(boxes, split, rule, &mut self.hits);
+            } else {
+                tree.find_pairs(split, rule, &mut self.hits);
+            }
+        }
         outcome.stages.check += clock.lap();
         outcome.holder = Holder::Tree;
         outcome.plan = Plan { algorithm: Algorithm::Tree, boxes: outcome.plan.boxes, ..Plan::default() };
-    }
-
-    /// Finds the pairs of the boxes in a tree: by the tree, unless they cross, and it does not cut them apart.
-    fn join(&mut self, request: &Request<'_>, tree: &BoxIndex, rule: &Rule<'_>) {
-        stage!("check");
-        let Request { boxes, split, .. } = *request;
-        let most = search::join_up_to_work(boxes.len());
-        let may_stream = request.config.engine != Some(Engine::Tree);
-        let is_heavy = may_stream && tree.vain_work(split, most, &mut self.hits[0]) > most;
-        self.hits[0].begin_for(request.grouping);
-        if is_heavy {
-            streamed::find_pairs(boxes, split, rule, &mut self.hits);
-        } else {
-            tree.find_pairs(split, rule, &mut self.hits);
-        }
     }
 
     /// Gathers what was found, for sorting.

@@ -114,13 +114,12 @@ impl Finder {
 
     fn list(&mut self, all: Boxes<'_>) -> Result<&[Pair], Error> {
         self.begin(&[all])?;
-        let Boxes { boxes, filters, keys } = all;
         let is_sorted = self.config.order == Order::Sorted;
-        let grouping = is_sorted.then(|| Grouping::new(boxes.len()));
+        let grouping = is_sorted.then(|| Grouping::new(all.boxes.len()));
         // A copy, so that the finder is free for its backends.
         let config = self.config;
-        let request = Request { filters, keys, grouping, ..Request::new(boxes, &config) };
-        let is_found = self.may_use_device(&request) && self.find_on_device(&request)?;
+        let request = Request { grouping, ..Request::of_one(&all, &config) };
+        let is_found = self.may_use_device(&request) && self.find_on_device(&all, &request)?;
         if !is_found {
             let outcome = self.all_pairs.find(&request, &mut self.store);
             self.add(outcome)?;
@@ -159,8 +158,8 @@ impl Finder {
     }
 
     /// Returns true if a device has found the pairs.
-    fn find_on_device(&mut self, request: &Request<'_>) -> Result<bool, Error> {
-        let Request { boxes, filters, config, grouping, .. } = *request;
+    fn find_on_device(&mut self, all: &Boxes<'_>, request: &Request<'_>) -> Result<bool, Error> {
+        let (Boxes { boxes, filters, .. }, Request { config, grouping, .. }) = (*all, *request);
         let (is_sorted, max_pairs) = (grouping.is_some(), config.limits.pairs());
         let request = SearchRequest { boxes, filters, is_sorted, max_pairs };
         let pairs = std::mem::take(&mut self.pairs);

@@ -54,25 +54,25 @@ impl Finder {
         self.begin(&[*a, *b])?;
         self.note_no_device();
         let mut clock = Clock::start();
-        self.sets.take(a, b);
+        self.sets.take([a, b]);
         self.report.stages.plan = clock.lap();
         let is_sorted = self.config.order == Order::Sorted && visit.is_none();
-        let grouping = is_sorted.then(|| Grouping::new(self.sets.split as usize));
-        let ids = &self.sets.ids;
-        let hand_over = visit.map(|visit| move |pairs: &[Pair]| visit(pairs, ids));
+        let sets = &self.sets;
+        let [first, second] = sets.boxes([a, b]);
+        let grouping = is_sorted.then(|| Grouping::new(first.len()));
+        let hand_over = visit.map(|visit| move |pairs: &[Pair]| visit(pairs, sets));
         let receiver = hand_over.as_ref().map(|hand_over| hand_over as Receiver<'_>);
-        let Sets { split, filters, keys, .. } = &self.sets;
         let request = Request {
-            split: Some(*split),
-            filters: filters.as_deref(),
-            keys: keys.as_deref(),
+            others: Some(second),
+            filters: sets.filters([a, b]),
+            keys: sets.keys([a, b]),
             receiver,
             grouping,
-            ..Request::new(self.sets.boxes(), &self.config)
+            ..Request::new(first, &self.config)
         };
         let outcome = self.all_pairs.find(&request, &mut self.store);
         let is_done = self.add(outcome);
-        self.report.invalid = self.report.boxes - self.sets.valid;
+        self.report.invalid -= self.sets.dropped;
         is_done?;
         self.report.pairs = self.all_pairs.count();
         if visit.is_none() {
@@ -87,13 +87,13 @@ impl Finder {
         stage!("emit");
         let mut clock = Clock::start();
         std::mem::swap(&mut self.pairs, &mut self.pairs_between);
-        let (len, ids) = (self.pairs_between.len(), &self.sets.ids);
+        let (len, sets) = (self.pairs_between.len(), &self.sets);
         let (pairs, pieces) = (SharedSlice::new(&mut self.pairs_between), len.div_ceil(PIECE));
         run(threads_for(pieces), pieces, |_, piece| {
             // SAFETY: each piece has its own pairs.
             let pairs = unsafe { pairs.part(piece_range(len, piece, pieces)) };
             for pair in pairs {
-                let CrossPair { a, b } = named(pair, ids);
+                let CrossPair { a, b } = sets.named(pair);
                 *pair = Pair { a, b };
             }
         });
@@ -101,11 +101,5 @@ impl Finder {
     }
 }
 
-/// Receiver of pairs of places in the list of both sets, and of the ids by place.
-pub(super) type Visit<'a> = &'a (dyn Fn(&[Pair], &[u32]) + Sync);
-
-/// Returns a pair of places in the list of both sets as a pair of ids.
-#[inline(always)]
-pub(super) fn named(pair: &Pair, ids: &[u32]) -> CrossPair {
-    CrossPair { a: ids[pair.a as usize], b: ids[pair.b as usize] }
-}
+/// Receiver of pairs of a search, and of the sets that name them.
+pub(super) type Visit<'a> = &'a (dyn Fn(&[Pair], &Sets) + Sync);

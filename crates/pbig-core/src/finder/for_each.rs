@@ -1,6 +1,6 @@
 //! Pairs without a list: each is handed to a closure where it is found.
 
-use super::{Finder, between::named};
+use super::{Finder, Sets};
 use crate::all_pairs::Request;
 use crate::{Boxes, CrossPair, Error, Pair};
 
@@ -35,10 +35,8 @@ impl Finder {
         let all = boxes.into();
         self.begin(&[all])?;
         self.note_no_device();
-        let Boxes { boxes, filters, keys } = all;
         let receiver = |pairs: &[Pair]| pairs.iter().for_each(|pair| visit(*pair));
-        let request =
-            Request { filters, keys, receiver: Some(&receiver), ..Request::new(boxes, &self.config) };
+        let request = Request { receiver: Some(&receiver), ..Request::of_one(&all, &self.config) };
         let outcome = self.all_pairs.find(&request, &mut self.store);
         self.add(outcome)?;
         self.report.pairs = self.all_pairs.count();
@@ -56,7 +54,7 @@ impl Finder {
         b: impl Into<Boxes<'a>>,
         visit: impl Fn(CrossPair) + Sync,
     ) -> Result<u64, Error> {
-        let each = |pairs: &[Pair], ids: &[u32]| pairs.iter().for_each(|pair| visit(named(pair, ids)));
+        let each = |pairs: &[Pair], sets: &Sets| pairs.iter().for_each(|pair| visit(sets.named(pair)));
         self.search_between(&a.into(), &b.into(), Some(&each))?;
         Ok(self.report.pairs)
     }

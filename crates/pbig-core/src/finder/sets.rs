@@ -1,69 +1,142 @@
-//! The boxes of two sets in one list, without those that miss all of the other set.
+//! The boxes of two sets that may have pairs: without those that miss all of the other set, if these are many.
 
-use crate::grid::bounds::bounds_of;
+use crate::grid::ById;
+use crate::grid::bounds::{bounds_of, spread_evenly};
 use crate::parallel::{SharedSlice, ensure_scratch, map, piece_range};
 use crate::policy::PARALLEL_FROM_BOXES;
-use crate::{Aabb, Boxes, Keys, NO_KEY, ProxyFilter};
+use crate::{Aabb, Boxes, CrossPair, Keys, NO_KEY, Pair, ProxyFilter};
 use std::ops::Range;
 
 /// Boxes that a thread looks at together: they stay in its second cache.
 const PIECE: usize = 1 << 13;
 
-/// The boxes of two sets that may have pairs, in one list: those of the first set, then those of the second.
+/// Maximum number of boxes of a set that tell whether some miss the other set.
+const SAMPLE: usize = 256;
+
+/// Two sets, as they are, or copies of the boxes that overlap the bounds of the other set. Of a pair, the second box has a place behind
+/// all places of the first set.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Sets {
-    /// Only the first `len` are in use, here and in `ids`.
-    boxes: Vec<Aabb>,
-    /// By place in the list: the id in the set.
-    pub(super) ids: Vec<u32>,
-    /// The number of boxes of both sets.
+    copies: [Copies; 2],
+    /// True if the copies are searched.
+    are_copied: bool,
+    /// Valid boxes that were dropped.
+    pub(super) dropped: u64,
+}
+
+/// Copies of what is known about the boxes of a set that are left.
+#[derive(Clone, Debug, Default)]
+struct Copies {
+    /// The number of places. Only so many boxes and ids are in use, and these only if the set is copied.
     len: usize,
-    pub(super) filters: Option<Vec<ProxyFilter>>,
-    pub(super) keys: Option<Vec<Keys>>,
-    /// The number of boxes of the first set.
-    pub(super) split: u32,
-    /// Valid boxes of both sets, before any was dropped.
-    pub(super) valid: u64,
+    boxes: Vec<Aabb>,
+    /// By place: the id in the set.
+    ids: Vec<u32>,
+    filters: Vec<ProxyFilter>,
+    keys: Vec<Keys>,
 }
 
 impl Sets {
-    /// Returns the list.
-    pub(super) fn boxes(&self) -> &[Aabb] {
-        &self.boxes[..self.len]
+    /// Takes two sets. Copies them unless all boxes seem to overlap the bounds of the other set.
+    pub(super) fn take(&mut self, sets: [&Boxes<'_>; 2]) {
+        let [a, b] = sets.map(|set| set.boxes);
+        let near_b = bounds_of_valid(b);
+        self.are_copied = !seem_near(a, &near_b) || !seem_near(b, &bounds_of_valid(a));
+        self.dropped = 0;
+        let lens = if self.are_copied { self.copy_near(a, b, &near_b) } else { [a.len(), b.len()] };
+        self.copies.iter_mut().zip(lens).for_each(|(copies, len)| copies.len = len);
+        self.fill(sets.map(|set| set.filters), |copy| &mut copy.filters, ProxyFilter::ALL);
+        self.fill(sets.map(|set| set.keys), |copy| &mut copy.keys, [NO_KEY; 4]);
     }
 
-    /// Takes two sets, without the boxes that miss all of the other one.
-    pub(super) fn take(&mut self, a: &Boxes<'_>, b: &Boxes<'_>) {
-        let len = a.boxes.len() + b.boxes.len();
-        ensure_scratch(&mut self.boxes, len, Aabb::NOWHERE);
-        ensure_scratch(&mut self.ids, len, 0);
-        let (split, second) = self.list_near(a.boxes, b.boxes);
-        let behind = a.boxes.len()..a.boxes.len() + second;
-        self.boxes.copy_within(behind.clone(), split);
-        self.ids.copy_within(behind, split);
-        (self.split, self.len) = (split as u32, split + second);
-        let (first, second) = self.ids[..self.len].split_at(split);
-        self.filters = gather([(first, a.filters), (second, b.filters)], ProxyFilter::ALL);
-        self.keys = gather([(first, a.keys), (second, b.keys)], [NO_KEY; 4]);
+    /// Returns the boxes that are left of both sets.
+    pub(super) fn boxes<'a>(&'a self, sets: [&Boxes<'a>; 2]) -> [&'a [Aabb]; 2] {
+        let [one, other] = &self.copies;
+        if self.are_copied {
+            [one, other].map(|copy| &copy.boxes[..copy.len])
+        } else {
+            sets.map(|set| set.boxes)
+        }
     }
 
-    /// Lists the valid boxes of each set that overlap the bounds of the other set, and returns how many are left of each. Repeats it
-    /// while more than a quarter of the boxes is dropped, because the bounds of the boxes that are left are smaller.
-    fn list_near(&mut self, a: &[Aabb], b: &[Aabb]) -> (usize, usize) {
-        let ((boxes, more_boxes), (ids, more_ids)) =
-            (self.boxes.split_at_mut(a.len()), self.ids.split_at_mut(a.len()));
-        let mut first = Side::new(boxes, ids);
-        let mut second = Side::new(&mut more_boxes[..b.len()], &mut more_ids[..b.len()]);
-        self.valid = first.take(a, &bounds_of_valid(b));
-        self.valid += second.take(b, &first.bounds);
+    /// Returns the filters by place; none if neither set has any.
+    pub(super) fn filters<'a>(&'a self, sets: [&Boxes<'a>; 2]) -> Option<ById<'a, ProxyFilter>> {
+        self.by_place(sets.map(|set| set.filters), |copy| &copy.filters)
+    }
+
+    /// Returns the keys by place; none if neither set has any.
+    pub(super) fn keys<'a>(&'a self, sets: [&Boxes<'a>; 2]) -> Option<ById<'a, Keys>> {
+        self.by_place(sets.map(|set| set.keys), |copy| &copy.keys)
+    }
+
+    /// Returns a pair of places as a pair of ids.
+    #[inline(always)]
+    pub(super) fn named(&self, pair: &Pair) -> CrossPair {
+        let [first, second] = &self.copies;
+        let (a, b) = (pair.a, pair.b - first.len as u32);
+        if self.are_copied {
+            CrossPair { a: first.ids[a as usize], b: second.ids[b as usize] }
+        } else {
+            CrossPair { a, b }
+        }
+    }
+
+    fn by_place<'a, T>(
+        &'a self,
+        given: [Option<&'a [T]>; 2],
+        copied: impl Fn(&'a Copies) -> &'a Vec<T>,
+    ) -> Option<ById<'a, T>> {
+        given.iter().any(Option::is_some).then(|| {
+            let values = |side: usize| given[side].filter(|_| !self.are_copied);
+            ById::of_two([0, 1].map(|side| values(side).unwrap_or_else(|| copied(&self.copies[side]))))
+        })
+    }
+
+    /// Copies the values of the places of each set that cannot be read where they are given.
+    fn fill<T: Copy>(
+        &mut self,
+        given: [Option<&[T]>; 2],
+        copied: impl Fn(&mut Copies) -> &mut Vec<T>,
+        default: T,
+    ) {
+        if given.iter().all(Option::is_none) {
+            return;
+        }
+        for (copy, given) in self.copies.iter_mut().zip(given) {
+            let mut values = std::mem::take(copied(copy));
+            values.clear();
+            match given {
+                Some(given) if self.are_copied => {
+                    values.extend(copy.ids[..copy.len].iter().map(|id| given[*id as usize]));
+                }
+                Some(_) => {}
+                None => values.resize(copy.len, default),
+            }
+            *copied(copy) = values;
+        }
+    }
+
+    /// Copies the valid boxes of each set that overlap the bounds of the other set. Drops more of them while more than a quarter of
+    /// the boxes is dropped, because the bounds of the boxes that are left are smaller. Returns how many are left.
+    fn copy_near(&mut self, a: &[Aabb], b: &[Aabb], near_b: &Aabb) -> [usize; 2] {
+        let [first, second] = &mut self.copies;
+        let (mut first, mut second) = (Side::new(first, a.len()), Side::new(second, b.len()));
+        let valid = first.take(a, near_b) + second.take(b, &first.bounds);
         let (mut before, mut left) = (a.len() + b.len(), first.len + second.len);
         while 4 * left < 3 * before {
             first.keep_near(&second.bounds);
             second.keep_near(&first.bounds);
             (before, left) = (left, first.len + second.len);
         }
-        if first.len.min(second.len) == 0 { (0, 0) } else { (first.len, second.len) }
+        let lens = if first.len.min(second.len) == 0 { [0, 0] } else { [first.len, second.len] };
+        self.dropped = valid - (lens[0] + lens[1]) as u64;
+        lens
     }
+}
+
+/// Returns true if a sample of a set is valid, and overlaps a box.
+fn seem_near(set: &[Aabb], near: &Aabb) -> bool {
+    spread_evenly(set.len(), SAMPLE).all(|i| set[i].is_valid() && set[i].overlaps(near))
 }
 
 /// The boxes of one set that are left, with their ids, and the bounds of these boxes.
@@ -75,8 +148,10 @@ struct Side<'a> {
 }
 
 impl<'a> Side<'a> {
-    fn new(boxes: &'a mut [Aabb], ids: &'a mut [u32]) -> Self {
-        Self { len: boxes.len(), boxes, ids, bounds: Aabb::NOWHERE }
+    fn new(copy: &'a mut Copies, len: usize) -> Self {
+        ensure_scratch(&mut copy.boxes, len, Aabb::NOWHERE);
+        ensure_scratch(&mut copy.ids, len, 0);
+        Self { boxes: &mut copy.boxes, ids: &mut copy.ids, len, bounds: Aabb::NOWHERE }
     }
 
     /// Takes the valid boxes of a set that overlap a box. Returns how many are valid.
@@ -156,14 +231,4 @@ fn keep_in_piece(boxes: &mut [Aabb], ids: &mut [u32], near: &Aabb) -> Kept {
         len += usize::from(is_valid & is_near);
     }
     Kept { len, valid, bounds: bounds_of(&boxes[..len]) }
-}
-
-/// Copies the values of listed boxes; none if neither set has any.
-fn gather<T: Copy>(sets: [(&[u32], Option<&[T]>); 2], default: T) -> Option<Vec<T>> {
-    if sets.iter().all(|(_, values)| values.is_none()) {
-        return None;
-    }
-    let value = |values: Option<&[T]>, id: u32| values.map_or(default, |values| values[id as usize]);
-    let all = sets.into_iter().flat_map(|(ids, values)| ids.iter().map(move |id| value(values, *id)));
-    Some(all.collect())
 }

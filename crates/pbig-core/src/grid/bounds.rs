@@ -27,8 +27,14 @@ impl Bounds {
     const NONE: Self = Self { low: [FARTHEST; 4], high: [-FARTHEST; 4], extent: [0.0; 4] };
     const EMPTY: Self = Self { low: [f32::INFINITY; 4], high: [f32::NEG_INFINITY; 4], extent: [0.0; 4] };
 
+    /// Measures the boxes of two lists.
+    pub(super) fn of_both([first, second]: [&[Aabb]; 2], workers: usize) -> Self {
+        let bounds = Self::of(first, workers);
+        if second.is_empty() { bounds } else { bounds.merged(&Self::of(second, workers)) }
+    }
+
     /// Measures all boxes.
-    pub(super) fn of(boxes: &[Aabb], workers: usize) -> Self {
+    fn of(boxes: &[Aabb], workers: usize) -> Self {
         let pieces = workers.max(1);
         let mut parts = [Self::NONE; 64];
         let shared = SharedSlice::new(&mut parts);
@@ -132,7 +138,7 @@ fn measure<'a>(mut all: Bounds, boxes: impl IntoIterator<Item = &'a Aabb>) -> Bo
     all
 }
 
-/// A few valid boxes, spread evenly over the list.
+/// A few valid boxes, spread evenly over two lists.
 #[derive(Clone, Debug)]
 pub(super) struct Sample {
     boxes: [Aabb; SAMPLE_SIZE],
@@ -141,9 +147,10 @@ pub(super) struct Sample {
 
 impl Sample {
     /// Draws a sample.
-    pub(super) fn of(boxes: &[Aabb]) -> Self {
+    pub(super) fn of_both([first, second]: [&[Aabb]; 2]) -> Self {
         let mut sample = Self { boxes: [Aabb::NOWHERE; SAMPLE_SIZE], len: 0 };
-        let tries = spread_evenly(boxes.len(), SAMPLE_TRIES).map(|i| boxes[i]);
+        let at = |i: usize| if i < first.len() { first[i] } else { second[i - first.len()] };
+        let tries = spread_evenly(first.len() + second.len(), SAMPLE_TRIES).map(at);
         for aabb in tries.filter(Aabb::is_valid).take(SAMPLE_SIZE) {
             sample.boxes[sample.len] = aabb;
             sample.len += 1;
@@ -199,6 +206,15 @@ pub struct SizeClass {
     pub boxes: u32,
     /// Largest extent, by axis.
     pub extent: [f32; 3],
+}
+
+/// Counts the valid boxes of two lists by size class.
+pub(super) fn size_classes_of_both([first, second]: [&[Aabb]; 2], workers: usize) -> SizeClasses {
+    let mut all = size_classes(first, workers);
+    if !second.is_empty() {
+        all.iter_mut().zip(&size_classes(second, workers)).for_each(|(all, part)| all.add(part));
+    }
+    all
 }
 
 /// Counts valid boxes by size class. Counted rather than sampled: a sample misses a thousand large boxes among a million

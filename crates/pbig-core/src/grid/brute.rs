@@ -25,22 +25,29 @@ pub(crate) fn brute_force(boxes: &[Aabb], rule: &Rule<'_>, hits: &mut Hits) -> u
     valid
 }
 
-/// Tests every valid box before `split` against every one behind it.
-pub(crate) fn brute_force_across(boxes: &[Aabb], split: usize, rule: &Rule<'_>, hits: &mut [Hits]) {
-    let (first, second) = boxes.split_at(split);
-    let sides = [(first, 0), (second, split as u32)];
+/// Tests every valid box of a set against every one of another set, whose ids are behind those of the first; returns how many are
+/// valid.
+pub(crate) fn brute_force_across(
+    first: &[Aabb],
+    second: &[Aabb],
+    rule: &Rule<'_>,
+    hits: &mut [Hits],
+) -> usize {
+    let sides = [(first, 0), (second, first.len() as u32)];
     let [few, (many, first_id)] = if first.len() <= second.len() { sides } else { [sides[1], sides[0]] };
     run_with(hits, many.len().div_ceil(PIECE), |hits, piece| {
         let start = piece * PIECE;
         let many = &many[start..many.len().min(start + PIECE)];
         test_piece(few, (many, first_id + start as u32), rule, hits);
     });
+    first.iter().chain(second).filter(|aabb| aabb.is_valid()).count()
 }
 
-/// Tests all boxes of a list, given with the id of its first one, against those of another list.
+/// Tests the valid boxes of a list, given with the id of its first one, against those of another list.
 fn test_piece(few: (&[Aabb], u32), many: (&[Aabb], u32), rule: &Rule<'_>, hits: &mut Hits) {
     let records = |(boxes, first_id): (&[Aabb], u32)| {
-        boxes.iter().zip(first_id..).map(|(aabb, id)| Record::new(*aabb, id, 0)).collect()
+        let valid = boxes.iter().zip(first_id..).filter(|(aabb, _)| aabb.is_valid());
+        valid.map(|(aabb, id)| Record::new(*aabb, id, 0)).collect()
     };
     let (few, many): (Vec<Record>, Vec<Record>) = (records(few), records(many));
     for one in few {

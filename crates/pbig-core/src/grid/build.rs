@@ -54,21 +54,21 @@ impl Split {
 impl Grid {
     /// Sorts the valid boxes, `boxes[id]` with the id `id`, into cells.
     pub(crate) fn build(&mut self, plan: GridPlan, boxes: &[Aabb], workers: usize) -> Sorted<'_> {
-        self.build_from(plan, boxes, 0, workers);
+        let split = self.bring_into_buckets(plan, boxes, 0, workers);
+        self.sort_buckets(split, workers);
         Sorted { own: self, other: None }
     }
 
-    /// Sorts the valid boxes into cells; the first box has this id.
-    fn build_from(&mut self, plan: GridPlan, boxes: &[Aabb], first_id: u32, workers: usize) {
+    /// Brings the valid boxes into buckets; the first box has this id.
+    fn bring_into_buckets(&mut self, plan: GridPlan, boxes: &[Aabb], first_id: u32, workers: usize) -> Split {
         self.plan = plan;
         let split = Split::new(boxes.len(), self.plan.cells.count(), workers);
         self.reserve(boxes.len());
         self.count(boxes, split, workers);
-        let in_buckets = self.place(split);
+        self.place(split);
         self.list_oversize(boxes, first_id, split);
         self.scatter((boxes, first_id), split, workers);
-        self.sort_buckets(&in_buckets, split, workers);
-        self.bucket_starts = in_buckets;
+        split
     }
 
     fn reserve(&mut self, boxes: usize) {
@@ -95,9 +95,9 @@ impl Grid {
         });
     }
 
-    /// Turns counts into places, and returns the beginning of each bucket and the end of the last one.
-    fn place(&mut self, split: Split) -> Vec<u32> {
-        let mut starts = std::mem::take(&mut self.bucket_starts);
+    /// Turns counts into places, and notes the beginning of each bucket and the end of the last one.
+    fn place(&mut self, split: Split) {
+        let starts = &mut self.bucket_starts;
         starts.clear();
         let mut next = 0;
         let counts = &mut self.counts[..split.pieces];
@@ -109,7 +109,6 @@ impl Grid {
         }
         starts.push(next);
         self.len = next as usize;
-        starts
     }
 
     fn list_oversize(&mut self, boxes: &[Aabb], first_id: u32, split: Split) {
@@ -138,8 +137,8 @@ impl Grid {
     }
 
     /// Sorts each bucket by cell, and computes codes.
-    fn sort_buckets(&mut self, bucket_starts: &[u32], split: Split, workers: usize) {
-        let cells = self.plan.cells.count();
+    fn sort_buckets(&mut self, split: Split, workers: usize) {
+        let (cells, bucket_starts) = (self.plan.cells.count(), &self.bucket_starts);
         let sort = SortBuckets {
             plan: self.plan,
             coarse: &self.coarse,
@@ -163,19 +162,22 @@ impl Grid {
 pub(crate) struct TwoGrids([Grid; 2]);
 
 impl TwoGrids {
-    /// Sorts valid boxes, `boxes[id]` with the id `id`, into two grids: those before `split` into the first.
-    pub(crate) fn build(
-        &mut self,
-        plan: GridPlan,
-        boxes: &[Aabb],
-        split: usize,
-        workers: usize,
-    ) -> Sorted<'_> {
+    /// Sorts the valid boxes of two sets, of which the second has the ids behind the first's, each into a grid. Boxes that are
+    /// searched for stay in their buckets, near those that they meet, unless an oversize box of the other set meets them in cells.
+    pub(crate) fn build(&mut self, plan: GridPlan, boxes: [&[Aabb]; 2], workers: usize) -> Sorted<'_> {
         let [first, second] = &mut self.0;
-        first.build_from(plan, &boxes[..split], 0, workers);
-        second.build_from(plan, &boxes[split..], split as u32, workers);
-        let (first, second) = (&*first, &*second);
-        let (own, other) = if first.len <= second.len { (first, second) } else { (second, first) };
+        let first_split = first.bring_into_buckets(plan, boxes[0], 0, workers);
+        let second_split = second.bring_into_buckets(plan, boxes[1], boxes[0].len() as u32, workers);
+        let is_first_smaller = first.len <= second.len;
+        let (first, second) = ((first, first_split), (second, second_split));
+        let ((own, own_split), (other, split)) =
+            if is_first_smaller { (first, second) } else { (second, first) };
+        other.sort_buckets(split, workers);
+        if other.oversize.is_empty() {
+            std::mem::swap(&mut own.records, &mut own.coarse);
+        } else {
+            own.sort_buckets(own_split, workers);
+        }
         Sorted { own, other: Some(other) }
     }
 }

@@ -2,7 +2,7 @@
 
 use super::Grid;
 use super::cells::query_of;
-use super::hits::{Hits, Rule};
+use super::hits::{ById, Hits, Rule};
 use super::record::Record;
 use super::search::Sorted;
 use super::simd::{BLOCK, Simd, dispatch};
@@ -36,7 +36,12 @@ impl Sorted<'_> {
 
     /// Estimates the work in vain of a search, by a sample of one box in `step`: the tests of each box that its own overlaps do not
     /// pay for. A box that meets thousands does not pay for others that meet none. `hits` are scratch.
-    pub(crate) fn vain_work(&self, step: usize, filters: Option<&[ProxyFilter]>, hits: &mut Hits) -> u64 {
+    pub(crate) fn vain_work(
+        &self,
+        step: usize,
+        filters: Option<ById<'_, ProxyFilter>>,
+        hits: &mut Hits,
+    ) -> u64 {
         let found = AtomicU64::new(0);
         let rule = Rule::listing(filters, &found);
         let mut vain = 0;
@@ -49,7 +54,7 @@ impl Sorted<'_> {
         for i in scattered(0..self.oversize_count(), step) {
             hits.begin(0, 0);
             self.search_oversize(i, &rule, hits);
-            vain += search::in_vain(hits.tests * search::WORK_OF_EXACT_TEST, hits.overlaps) * step as u64;
+            vain += search::in_vain(hits.work_of_oversize(), hits.overlaps) * step as u64;
         }
         vain
     }
@@ -83,7 +88,7 @@ impl Grid {
 /// Counts the rows and slots that one box in [`search::COUNT_ONE_IN`] visits.
 #[inline(always)]
 fn count_slots(simd: impl Simd, sorted: &Sorted<'_>, slots: Range<usize>) -> u64 {
-    let (own, grid) = (sorted.own, sorted.searched());
+    let grid = sorted.searched();
     let mut work = 0;
     for slot in scattered(slots, search::COUNT_ONE_IN) {
         let (rows, slots) = match (sorted.other, grid.plan.scan, grid.plan.cells.wraps) {
@@ -91,19 +96,22 @@ fn count_slots(simd: impl Simd, sorted: &Sorted<'_>, slots: Range<usize>) -> u64
             (_, _, false) => in_window::<false>(simd, sorted, slot),
             (_, _, true) => in_window::<true>(simd, sorted, slot),
         };
-        let is_vague = has_vague_code(simd, own, slot);
+        let is_vague = has_vague_code(simd, sorted, slot);
         work += rows + if is_vague { slots * search::WORK_OF_VAGUE_TEST } else { slots };
     }
     work
 }
 
-/// Returns true if the code of a box is like all eight codes behind it. Boxes beyond the cells, and many tiny ones in one place,
-/// have such codes; their candidates need the exact test.
+/// Returns true if the code of a box is like all eight codes behind it, or the first ones of the other set in its cell. Boxes beyond
+/// the cells, and many tiny ones in one place, have such codes; their candidates need the exact test.
 #[inline(always)]
-fn has_vague_code(simd: impl Simd, grid: &Grid, slot: usize) -> bool {
-    // SAFETY: a slot in use is before it.
-    let codes = unsafe { grid.block(slot + 1) };
-    let alike = simd.test(query_of(grid.codes[slot]), codes);
+fn has_vague_code(simd: impl Simd, sorted: &Sorted<'_>, slot: usize) -> bool {
+    let (record, grid) = (&sorted.own.records[slot], sorted.searched());
+    let first = if sorted.other.is_some() { grid.starts[record.key as usize] as usize } else { slot + 1 };
+    // SAFETY: a start, or a slot in use is before it.
+    let codes = unsafe { grid.block(first) };
+    let (low, high) = simd.steps(&grid.plan.cells, &record.aabb);
+    let alike = simd.test(query_of(simd.code(low, high)), codes);
     alike.count_ones() as usize == BLOCK
 }
 

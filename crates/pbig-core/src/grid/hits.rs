@@ -8,7 +8,7 @@ use super::record::Record;
 use super::simd::{BLOCK, Simd, eight_from, prefetch};
 use crate::boxes::share_no_key;
 use crate::pairs::Grouping;
-use crate::policy::search::WORK_OF_VAGUE_TEST;
+use crate::policy::search::{WORK_OF_EXACT_TEST, WORK_OF_VAGUE_TEST};
 use crate::{Keys, Pair, ProxyFilter};
 use std::sync::atomic::{AtomicU64, Ordering};
 
@@ -27,13 +27,36 @@ const BATCH: usize = 4096;
 /// Receiver of pairs that are not listed, some at a time. Each thread calls it.
 pub(crate) type Receiver<'a> = &'a (dyn Fn(&[Pair]) + Sync);
 
+/// A value for each box, by id. Of two sets each has a list of its own, and the second has the ids behind the first's.
+#[derive(Clone, Copy)]
+pub(crate) struct ById<'a, T> {
+    /// The values of boxes that are the first of a pair.
+    first: &'a [T],
+    /// The values of boxes that are the second of a pair.
+    second: &'a [T],
+    /// The id of the first value of `second`.
+    split: usize,
+}
+
+impl<'a, T> ById<'a, T> {
+    /// Takes the values of one set.
+    pub(crate) fn of_one(values: &'a [T]) -> Self {
+        Self { first: values, second: values, split: 0 }
+    }
+
+    /// Takes the values of two sets.
+    pub(crate) fn of_two([first, second]: [&'a [T]; 2]) -> Self {
+        Self { first, second, split: first.len() }
+    }
+}
+
 /// Conditions for a found pair, besides that its boxes overlap, and where it goes.
 #[derive(Clone, Copy)]
 pub(crate) struct Rule<'a> {
-    /// Filters by id; none if all may pair.
-    pub(crate) filters: Option<&'a [ProxyFilter]>,
-    /// Keys by id; none if boxes have no keys.
-    pub(crate) keys: Option<&'a [Keys]>,
+    /// None if all may pair.
+    pub(crate) filters: Option<ById<'a, ProxyFilter>>,
+    /// None if boxes have no keys.
+    pub(crate) keys: Option<ById<'a, Keys>>,
     /// None if pairs are listed.
     pub(crate) receiver: Option<Receiver<'a>>,
     /// Pairs that may be found.
@@ -44,7 +67,7 @@ pub(crate) struct Rule<'a> {
 
 impl<'a> Rule<'a> {
     /// Makes a rule for a list of pairs, however many.
-    pub(crate) fn listing(filters: Option<&'a [ProxyFilter]>, found: &'a AtomicU64) -> Self {
+    pub(crate) fn listing(filters: Option<ById<'a, ProxyFilter>>, found: &'a AtomicU64) -> Self {
         Self { filters, keys: None, receiver: None, max_pairs: u64::MAX, found }
     }
 }
@@ -129,7 +152,12 @@ impl Hits {
 
     /// Returns the work of the boxes in cells, in tests of codes.
     pub(super) fn work_in_cells(&self) -> u64 {
-        self.tests + self.vague * (WORK_OF_VAGUE_TEST - 1)
+        self.runs + self.tests + self.vague * (WORK_OF_VAGUE_TEST - 1)
+    }
+
+    /// Returns the work of oversize boxes, in tests of codes.
+    pub(super) fn work_of_oversize(&self) -> u64 {
+        (self.runs + self.tests) * WORK_OF_EXACT_TEST
     }
 
     /// Returns true if more pairs were found than may be.
@@ -284,16 +312,17 @@ impl Hits {
 
     /// Drops the pairs from `from` on whose filters, or keys, do not allow them.
     #[inline(always)]
-    fn filter<T>(&mut self, from: usize, by_id: &[T], allow: impl Fn(&T, &T) -> bool) {
+    fn filter<T>(&mut self, from: usize, by_id: ById<'_, T>, allow: impl Fn(&T, &T) -> bool) {
+        let ById { first, second, split } = by_id;
         let (mut kept, len) = (from, self.pairs.len());
         for i in from..len {
             if let Some(ahead) = self.pairs.get(i + AHEAD) {
-                prefetch(by_id.as_ptr().wrapping_add(ahead.a as usize));
-                prefetch(by_id.as_ptr().wrapping_add(ahead.b as usize));
+                prefetch(first.as_ptr().wrapping_add(ahead.a as usize));
+                prefetch(second.as_ptr().wrapping_add(ahead.b as usize - split));
             }
             let pair = self.pairs[i];
             self.pairs[kept] = pair;
-            kept += usize::from(allow(&by_id[pair.a as usize], &by_id[pair.b as usize]));
+            kept += usize::from(allow(&first[pair.a as usize], &second[pair.b as usize - split]));
         }
         self.pairs.truncate(kept);
     }

@@ -32,7 +32,7 @@ pub(crate) use brute::{brute_force, brute_force_across};
 pub(crate) use build::TwoGrids;
 pub(crate) use count::scattered;
 pub(crate) use edit::EditedGrid;
-pub(crate) use hits::{Hits, Receiver, Rule};
+pub(crate) use hits::{ById, Hits, Receiver, Rule};
 pub(crate) use lookup::{Budget, Candidates, Place};
 pub use occupied::OccupiedCell;
 pub(crate) use record::Record;

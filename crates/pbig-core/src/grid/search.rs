@@ -21,7 +21,8 @@ const OVERSIZE_PIECE: usize = 4;
 /// of one set meet each other. Those of two sets lie in two grids of one plan, and no two boxes of a set meet.
 #[derive(Clone, Copy)]
 pub(crate) struct Sorted<'a> {
-    /// The grid whose boxes are searched for: of two, the one with fewer boxes.
+    /// The grid whose boxes are searched for: of two, the one with fewer boxes. These lie in their buckets, and in their cells only
+    /// if the other grid has oversize boxes.
     pub(super) own: &'a Grid,
     /// The grid of another set.
     pub(super) other: Option<&'a Grid>,

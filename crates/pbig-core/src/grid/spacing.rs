@@ -1,6 +1,6 @@
 //! The plan: the size of a grid's cells, the boxes that it takes, and the neighbouring cells that a search visits.
 
-use super::bounds::{Bounds, SAMPLE_SIZE, Sample, SizeClass, size_classes};
+use super::bounds::{Bounds, SAMPLE_SIZE, Sample, SizeClass, size_classes_of_both};
 use super::cells::{Cells, MAX_STEPS_PER_BOX};
 use crate::Aabb;
 use crate::policy;
@@ -24,17 +24,19 @@ pub(crate) struct GridPlan {
 
 impl GridPlan {
     /// Plans a grid for the valid ones of some boxes, or two grids for those of two sets.
-    pub(crate) fn new(boxes: &[Aabb], is_of_two_sets: bool, workers: usize) -> Self {
-        let sample = Sample::of(boxes);
-        let all = Bounds::of(boxes, workers);
+    pub(crate) fn new(boxes: &[Aabb], others: Option<&[Aabb]>, workers: usize) -> Self {
+        let both = [boxes, others.unwrap_or(&[])];
+        let sample = Sample::of_both(both);
+        let all = Bounds::of_both(both, workers);
         let space = all.trimmed(&sample);
         let is_mixed = all.largest() > policy::MIXED_SIZE_RATIO * sample.median_extent();
         let extent = if is_mixed {
-            cheapest_extent(&size_classes(boxes, workers)[..], &space)
+            cheapest_extent(&size_classes_of_both(both, workers)[..], &space)
         } else {
             std::array::from_fn(|k| all.extent[k])
         };
-        Spacing::new(boxes.len(), space, extent).uncrowded(&sample).plan(is_of_two_sets, &sample)
+        let count = both[0].len() + both[1].len();
+        Spacing::new(count, space, extent).uncrowded(&sample).plan(others.is_some(), &sample)
     }
 }
 

@@ -43,7 +43,7 @@ fn overlapping_boxes_have_codes_that_may_overlap() {
     let mut met = [0; 2];
     for round in 0..12 {
         let boxes = random_boxes(&mut random, [1, 3][round % 2]);
-        let cells = GridPlan::new(&boxes, false, 1).cells;
+        let cells = GridPlan::new(&boxes, None, 1).cells;
         let values: Vec<Values> = boxes.iter().map(|aabb| dispatch!(values, &cells, aabb)).collect();
         for (i, one) in boxes.iter().enumerate().filter(|(i, _)| values[*i].takes) {
             for (j, other) in boxes.iter().enumerate().filter(|(j, _)| values[*j].takes) {
@@ -63,7 +63,7 @@ fn every_implementation_computes_the_same_values() {
     let infinite = Aabb::new([f32::NEG_INFINITY; 3], [f32::INFINITY; 3]);
     for clusters in [1, 3] {
         let mut boxes = random_boxes(&mut random, clusters);
-        let cells = GridPlan::new(&boxes, false, 1).cells;
+        let cells = GridPlan::new(&boxes, None, 1).cells;
         boxes.extend([Aabb::NOWHERE, infinite, Aabb::new([f32::MAX; 3], [f32::MIN; 3])]);
         for aabb in &boxes {
             assert_eq!(dispatch!(values, &cells, aabb), values(Portable, &cells, aabb), "{aabb:?}");

@@ -183,7 +183,7 @@ mod tests {
         assert_eq!(choose_engine(&Counts { holder: Holder::Nothing, ..WORLD }, None), Engine::Rebuild);
         assert_eq!(choose_engine(&Counts { knows_old: false, ..WORLD }, None), Engine::Rebuild);
         assert_eq!(edit_up_to_work(1000, 10, 6000), 63_000);
-        assert_eq!(edit_up_to_work(1000, 10, u64::MAX), 60_000 + 200_160);
+        assert_eq!(edit_up_to_work(1024, 10, u64::MAX), 61_440 + 155 * 1024 + 160);
     }
 
     #[test]

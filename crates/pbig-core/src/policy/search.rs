@@ -21,8 +21,9 @@ pub(crate) const WORK_OF_VAGUE_TEST: u64 = 6;
 /// run of cells.
 pub(crate) const WORK_OF_ENTRY: u64 = 16;
 
-/// Maximum number of tests for each box for a search of the grid: a tree is sorted and joined in about the same time.
-const GRID_UP_TO_PER_BOX: u64 = 400;
+/// Maximum number of tests for each box for a search of the grid, in binary logarithms of the number of boxes: a tree is sorted and
+/// joined in about the same time.
+const GRID_UP_TO_LOGS_PER_BOX: u64 = 31;
 
 /// Number of tests that each overlap of a box justifies: in a crowd each box overlaps many, and a tree is not faster.
 const GRID_UP_TO_PER_PAIR: u64 = 32;
@@ -42,12 +43,12 @@ const SAMPLE_WORK_PER_BOX: u64 = 16;
 
 /// Returns true if a grid with this work is faster than a tree.
 pub(crate) fn is_light(boxes: usize, work: u64) -> bool {
-    work <= GRID_UP_TO_PER_BOX * boxes as u64
+    work <= logs(boxes, GRID_UP_TO_LOGS_PER_BOX)
 }
 
 /// Returns the work of a grid that is as full as one may be.
 pub(super) fn work_of_full_grid(boxes: usize, pairs: usize) -> u64 {
-    GRID_UP_TO_PER_BOX * boxes as u64 + GRID_UP_TO_PER_PAIR * pairs as u64
+    logs(boxes, GRID_UP_TO_LOGS_PER_BOX) + GRID_UP_TO_PER_PAIR * pairs as u64
 }
 
 /// Returns the part of a box's work that its overlaps do not pay for.
@@ -63,7 +64,14 @@ pub(crate) fn sample_one_in(boxes: usize, work: u64) -> usize {
 
 /// Returns the maximum work of a join of a tree that overlaps do not pay for.
 pub(crate) fn join_up_to_work(boxes: usize) -> u64 {
-    JOIN_UP_TO_LOGS_PER_BOX * boxes as u64 * u64::from(boxes.max(1).ilog2())
+    logs(boxes, JOIN_UP_TO_LOGS_PER_BOX)
+}
+
+/// Returns a work for each box, in binary logarithms of the number of boxes. These are rounded down to quarters, as integers, so that
+/// every machine has the same.
+fn logs(boxes: usize, per_box: u64) -> u64 {
+    let quarters = (boxes.clamp(1, u32::MAX as usize) as u128).pow(4).ilog2();
+    per_box * boxes as u64 * u64::from(quarters) / 4
 }
 
 /// Returns the step from one sampled leaf of a tree to the next.
@@ -78,7 +86,7 @@ mod tests {
 
     #[test]
     fn a_grid_is_searched_if_cells_hold_few_or_many_pair() {
-        assert!(is_light(1000, 400_000) && !is_light(1000, 400_001));
+        assert!(is_light(1024, 310 << 10) && !is_light(1024, (310 << 10) + 1));
         assert_eq!((in_vain(4000, 100), in_vain(4000, 1000)), (800, 0));
         assert_eq!(sample_one_in(100_000, 16_000_000), 196);
         assert_eq!(sample_one_in(100_000, 800_000_000), 501);
@@ -88,7 +96,7 @@ mod tests {
 
     #[test]
     fn a_tree_is_joined_while_its_work_grows_like_boxes_and_their_logarithm() {
-        assert_eq!([0, 1024, 1 << 20].map(join_up_to_work), [0, 480 << 10, 960 << 20]);
+        assert_eq!([0, 1024, 1218, 1 << 20].map(join_up_to_work), [0, 480 << 10, 492 * 1218, 960 << 20]);
         assert_eq!([1, 4096, 8192].map(leaves_per_sampled), [16, 16, 32]);
     }
 }

@@ -6,6 +6,7 @@ use super::listed::Listed;
 use crate::Pair;
 use crate::all_pairs::{AllPairs, Request};
 use crate::broad_phase::world::World;
+use crate::grid::ById;
 use crate::holder::Holder;
 use crate::outcome::{End, Outcome};
 use crate::pairs::{Grouping, Groups, Kept};
@@ -30,7 +31,7 @@ impl Rebuild {
             self.listed.take(world);
             (boxes, filters) = (&self.listed.boxes, &self.listed.filters);
         }
-        let filters = world.is_filtered.then_some(&filters[..]);
+        let filters = world.is_filtered.then(|| ById::of_one(filters));
         let grouping = Some(Grouping::new(boxes.len()));
         let request = Request { filters, grouping, ..Request::new(boxes, task.config) };
         let mut outcome = self.all_pairs.find(&request, task.store);
